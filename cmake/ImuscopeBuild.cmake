@@ -1,0 +1,96 @@
+# Build settings shared by every folder, and the three functions that declare what a folder holds.
+include_guard(GLOBAL)
+include(GNUInstallDirs)
+include(GoogleTest)
+
+option(IMUSCOPE_TESTS "Build the tests" ON)
+option(IMUSCOPE_WERROR "Treat warnings as errors" ON)
+set(IMUSCOPE_SANITIZE "" CACHE STRING "Sanitizers to build with: empty, 'address,undefined' or 'thread'")
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+
+find_program(IMUSCOPE_CCACHE ccache)
+if(IMUSCOPE_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${IMUSCOPE_CCACHE})
+endif()
+
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(Boost 1.74 REQUIRED)
+find_path(IMUSCOPE_TOMLPLUSPLUS_DIR toml++/toml.h REQUIRED)
+find_path(IMUSCOPE_EXPECTED_DIR tl/expected.hpp REQUIRED)
+
+add_library(imuscope_flags INTERFACE)
+target_compile_options(imuscope_flags INTERFACE
+  -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+  # The estimate is a function of its inputs: the compiler may not fuse multiply and add where it likes.
+  -ffp-contract=off)
+if(IMUSCOPE_WERROR)
+  target_compile_options(imuscope_flags INTERFACE -Werror)
+endif()
+if(IMUSCOPE_SANITIZE)
+  target_compile_options(imuscope_flags INTERFACE
+    -fsanitize=${IMUSCOPE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(imuscope_flags INTERFACE -fsanitize=${IMUSCOPE_SANITIZE})
+endif()
+target_link_libraries(imuscope_flags INTERFACE Threads::Threads)
+
+# Every folder is seen through a directory of its own that holds one link to it, so that a target finds
+# only the headers of the folders it links: an include against the flow does not compile.
+function(imuscope_layer target folder)
+  set(layer ${CMAKE_BINARY_DIR}/layers/${target})
+  string(REGEX REPLACE "^src/" "" name ${folder})
+  get_filename_component(parent ${layer}/${name} DIRECTORY)
+  file(MAKE_DIRECTORY ${parent})
+  file(CREATE_LINK ${CMAKE_SOURCE_DIR}/${folder} ${layer}/${name} SYMBOLIC)
+  set_property(GLOBAL PROPERTY IMUSCOPE_LAYER_${target} ${layer})
+endfunction()
+
+# imuscope_library(NAME SOURCES a.cpp ... PUBLIC libs... PRIVATE libs...)
+# Declares the library of the current folder. Without SOURCES it is header-only.
+function(imuscope_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  file(RELATIVE_PATH folder ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  imuscope_layer(${name} ${folder})
+  if(ARG_SOURCES)
+    add_library(${name} STATIC ${ARG_SOURCES})
+    target_include_directories(${name} PUBLIC ${CMAKE_BINARY_DIR}/layers/${name})
+    target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE imuscope_flags ${ARG_PRIVATE})
+  else()
+    add_library(${name} INTERFACE)
+    target_include_directories(${name} INTERFACE ${CMAKE_BINARY_DIR}/layers/${name})
+    target_link_libraries(${name} INTERFACE ${ARG_PUBLIC})
+  endif()
+endfunction()
+
+# imuscope_program(NAME SOURCES a.cpp ... LIBS libs...)
+function(imuscope_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS})
+endfunction()
+
+# imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds])
+# One GoogleTest program; every test case is a CTest test of its own.
+function(imuscope_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS} test_support
+                        GTest::gmock GTest::gtest_main)
+  gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+                       PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+endfunction()

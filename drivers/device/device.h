@@ -1,0 +1,69 @@
+#pragma once
+
+/// What every device driver offers: a decoder (bytes to samples) and, for devices that must be spoken to, a
+/// session (what to write, and in which state the device is). Neither does I/O: bytes and times are handed in,
+/// so the same code serves a serial port, a capture and a test.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "base/time.h"
+#include "sample/sample.h"
+
+namespace imuscope {
+
+/// Counts since construction. Every byte is accounted for: it belongs to a good frame or is skipped.
+struct DecoderCounters {
+  std::uint64_t bytes = 0;            ///< handed in
+  std::uint64_t bytes_skipped = 0;    ///< belonged to no valid frame
+  std::uint64_t frames = 0;           ///< valid frames
+  std::uint64_t bad_checksums = 0;
+  std::uint64_t bad_lengths = 0;
+  std::uint64_t bad_contents = 0;     ///< checksum right, content not to be understood
+  std::uint64_t samples = 0;          ///< handed to the sink
+  std::uint64_t samples_lost = 0;     ///< missing according to the device's own counter or time tags
+  std::uint64_t clock_resets = 0;     ///< the device's count was not continuable: a new segment began
+};
+
+/// Turns the byte stream of one device into samples. Core: no allocation, no exception after construction.
+class DeviceDecoder {
+ public:
+  virtual ~DeviceDecoder() = default;
+
+  /// Decodes one read. Frames may span reads; samples come out in stream order.
+  /// @param bytes    what the read returned
+  /// @param arrival  host time of the read
+  virtual void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept = 0;
+
+  [[nodiscard]] virtual const DecoderCounters& counters() const noexcept = 0;
+};
+
+enum class SessionState : std::uint8_t {
+  kConnecting,   ///< looking for the device
+  kConfiguring,  ///< the device answers and is being set up
+  kStreaming,    ///< the device sends what was asked for
+  kFailed,       ///< gave up; problem() says why and what to do
+};
+
+/// Speaks with a device until it streams what the configuration asks for. Core: no allocation after
+/// construction. A device that only sends (no handshake) has a session that is kStreaming with its first frame.
+class DeviceSession {
+ public:
+  virtual ~DeviceSession() = default;
+
+  /// Hands in the bytes of a read (the same ones that the decoder gets).
+  virtual void on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noexcept = 0;
+
+  /// What to write to the device now; empty when there is nothing to say. Call after on_bytes() and at least
+  /// every 10 ms. The span is valid until the next call.
+  [[nodiscard]] virtual std::span<const std::uint8_t> poll(HostTime now) noexcept = 0;
+
+  [[nodiscard]] virtual SessionState state() const noexcept = 0;
+
+  /// Last problem in one sentence, with the remedy; empty when there is none. Static or member storage.
+  [[nodiscard]] virtual std::string_view problem() const noexcept = 0;
+};
+
+}  // namespace imuscope
