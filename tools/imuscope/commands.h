@@ -1,0 +1,24 @@
+#pragma once
+
+/// The subcommands of `imuscope`. Each registers its options with CLI11 and hands its work to `Commands`; the
+/// work runs after parsing, so that every wrong option is told before anything starts.
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "base/result.h"
+
+namespace imuscope::cli {
+
+/// The work of the chosen subcommand: nothing on success, else an Error that main() prints and turns into the
+/// exit code (2 usage or configuration, 1 failed work).
+using Work = std::function<Result<void>()>;
+
+/// Called by a subcommand's registration: sets the work that runs when that subcommand was chosen.
+inline void on_chosen(CLI::App& subcommand, Work& chosen, Work work) {
+  subcommand.callback([&chosen, work = std::move(work)] { chosen = work; });
+}
+
+// One function a subcommand, one file a function (command_NAME.cpp).
+
+}  // namespace imuscope::cli

@@ -1,0 +1,34 @@
+#include <exception>
+#include <fmt/format.h>
+
+#include "commands.h"
+
+namespace {
+
+int run(int argc, char** argv) {
+  CLI::App app{"imuscope: shows, live on a moving vehicle, how wrong a low-cost IMU is, and why"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", IMUSCOPE_VERSION);
+  imuscope::cli::Work work;
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    constexpr int kExitUsage = 2;
+    return app.exit(error) == 0 ? 0 : kExitUsage;
+  }
+  const auto result = work();
+  if (result) return 0;
+  fmt::print(stderr, "imuscope: {}\n", result.error().text());
+  return result.error().kind == imuscope::ErrorKind::kUsage ? 2 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "imuscope: unexpected failure: {}\n", error.what());
+    return 1;
+  }
+}
