@@ -81,16 +81,20 @@ function(imuscope_program name)
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS})
 endfunction()
 
-# imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds])
-# One GoogleTest program; every test case is a CTest test of its own.
+# imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds] [SLOW])
+# One GoogleTest program; every test case is a CTest test of its own. SLOW: left out by tools/test --quick.
 function(imuscope_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "SLOW" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
+  endif()
+  set(labels)
+  if(ARG_SLOW)
+    set(labels LABELS slow)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS} test_support
                         GTest::gmock GTest::gtest_main)
   gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
-                       PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+                       PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels})
 endfunction()
