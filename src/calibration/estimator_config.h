@@ -1,0 +1,158 @@
+#pragma once
+
+/// What the estimator is told before it starts. All SI and radians; frames and symbols as in ARCHITECTURE.md.
+/// A default is chosen so that three MTx-class S-IMUs beside a navigation-grade R-IMU work without tuning.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "base/units.h"
+#include "sample/sample.h"
+
+namespace imuscope {
+
+/// Row-major 3 x 3.
+using Matrix3 = std::array<double, 9>;
+
+/// Most S-IMUs that one estimator can hold.
+inline constexpr std::size_t kMaxStudies = 6;
+
+/// Parts of the state of one S-IMU. Each can be left out; its quantity then stays at its prior value.
+enum StudyBlock : std::uint32_t {
+  kBoresightBlock = 1U << 0U,   ///< psi, rotation vector in b, C_b_s = C^_b_s Exp(-psi)
+  kLeverArmBlock = 1U << 1U,    ///< r_bs_b
+  kGyroBiasBlock = 1U << 2U,    ///< b_g, in s
+  kAccelBiasBlock = 1U << 3U,   ///< b_a, in s
+  kTimeOffsetBlock = 1U << 4U,  ///< t_d: the S sample at t shows the motion at t + t_d
+  kGyroScaleBlock = 1U << 5U,   ///< s_g, in s
+  kAccelScaleBlock = 1U << 6U,  ///< s_a, in s
+};
+/// The 19 states that are the default.
+inline constexpr std::uint32_t kFullStudyBlocks = 0x7FU;
+/// The paper's own 6 states: boresight and lever arm.
+inline constexpr std::uint32_t kPaperStudyBlocks = kBoresightBlock | kLeverArmBlock;
+/// Biases alone, with everything else known: the second pass of a study, whose history is smoothed.
+inline constexpr std::uint32_t kBiasStudyBlocks = kGyroBiasBlock | kAccelBiasBlock;
+
+/// Motion classes that carry their own measurement noise.
+enum class Regime : std::uint8_t { kStatic, kDynamic };
+inline constexpr std::size_t kRegimeCount = 2;
+
+/// First-order Gauss-Markov process; an infinite time constant is a random constant.
+struct GaussMarkovConfig {
+  double sd = 0.0;  ///< stationary sd of the process, in the unit of the quantity
+  double time_constant_s = std::numeric_limits<double>::infinity();
+};
+
+/// The R-IMU's own errors, and how it is sampled.
+struct ReferenceConfig {
+  DeviceIndex device = 0;
+  double rate_hz = 100.0;
+  /// Taps of the differentiator that gives angular acceleration: 5, 7, 9 or 11 (all of polynomial order 4).
+  /// 5 suits a fibre-optic reference (widest band), 7 to 11 a MEMS reference (least noise).
+  int differentiator_points = 5;
+  double gyro_white_radps_per_sqrt_hz = 0.0015 * kRadPerDeg / 60.0;  ///< angle random walk, rad/sqrt(s)
+  double accel_white_mps2_per_sqrt_hz = 10.0 * kMps2PerMicroG;       ///< velocity random walk
+  GaussMarkovConfig gyro_bias{0.005 * kRadPerDeg / kSecondsPerHour, 3600.0};
+  GaussMarkovConfig accel_bias{5e-4, 3600.0};
+};
+
+/// How far GNSS solutions are trusted, per solution kind (kSingle .. kFixed).
+struct GnssConfig {
+  bool enabled = false;
+  DeviceIndex device = 0;
+  Vector3 antenna_lever_arm_b_m{0.0, 0.0, 0.0};
+  bool use_velocity = true;
+  /// Used where the receiver gives no sd: north, east, down; scaled up for a solution worse than kFixed.
+  Vector3 default_sd_position_m{0.02, 0.02, 0.04};
+  Vector3 default_sd_velocity_mps{0.05, 0.05, 0.05};
+  /// Never believed to be better than this, whatever the receiver says.
+  Vector3 floor_sd_position_m{0.01, 0.01, 0.02};
+  Vector3 floor_sd_velocity_mps{0.02, 0.02, 0.02};
+};
+
+/// Start of the navigation. What is absent is found from the R-IMU's own attitude, from rest, or in motion.
+struct NavigationConfig {
+  bool enabled = true;  ///< false: calibration alone, also where there is GNSS
+  /// Roll, pitch, heading of b at the first epoch, with sd.
+  std::optional<Vector3> initial_rpy_rad;
+  Vector3 initial_rpy_sd_rad{0.01 * kRadPerDeg, 0.01 * kRadPerDeg, 0.03 * kRadPerDeg};
+  /// Latitude, longitude, height for a start without GNSS.
+  std::optional<Vector3> initial_position_rad_m;
+};
+
+/// Noise of one S-IMU sensor triad in one regime, per axis of s, at the sensor's own rate.
+struct TriadNoise {
+  Vector3 white_sd{0.0, 0.0, 0.0};  ///< per sample
+  /// Fast Gauss-Markov process (time constant of a second or less); it inflates the filter's R to its
+  /// low-frequency equivalent and enters the NIS as it is.
+  Vector3 fast_sd{0.0, 0.0, 0.0};
+  Vector3 fast_time_constant_s{0.0, 0.0, 0.0};  ///< 0: none
+};
+
+/// The stochastic model of one S-IMU. This is what a fitted noise model replaces (Estimator::set_noise).
+struct StudyNoise {
+  std::array<TriadNoise, kRegimeCount> gyro;   ///< rad/s
+  std::array<TriadNoise, kRegimeCount> accel;  ///< m/s^2
+  /// Slow part of the bias: Gauss-Markov, per axis.
+  std::array<GaussMarkovConfig, 3> gyro_bias;
+  std::array<GaussMarkovConfig, 3> accel_bias;
+};
+
+/// MTx class: the dynamic and static gyro models of the paper's Table II, accelerometer of its data sheet's
+/// class.
+StudyNoise mtx_class_noise();
+
+/// One S-IMU: priors, noise and which states it has.
+struct StudyConfig {
+  DeviceIndex device = 0;
+  double rate_hz = 100.0;
+  std::uint32_t blocks = kFullStudyBlocks;
+  StudyNoise noise = mtx_class_noise();
+
+  /// Mounting. Absent: found by the coarse alignment, to any rotation.
+  std::optional<Matrix3> prior_C_b_s;
+  Vector3 prior_boresight_sd_rad{2.0 * kRadPerDeg, 2.0 * kRadPerDeg, 2.0 * kRadPerDeg};
+  /// Growth of the boresight's variance per second (mount creep), rad/sqrt(s). 0: rigid.
+  double boresight_creep_rad_per_sqrt_s = 0.0;
+
+  Vector3 prior_r_bs_b_m{0.0, 0.0, 0.0};
+  Vector3 prior_r_bs_b_sd_m{0.5, 0.5, 0.5};
+
+  /// Time offset. Absent: found by the coarse alignment within +-coarse_search_s.
+  std::optional<double> prior_t_d_s;
+  double prior_t_d_sd_s = 0.01;
+  double coarse_search_s = 2.0;
+
+  Vector3 prior_gyro_bias_radps{0.0, 0.0, 0.0};
+  Vector3 turn_on_gyro_sd_radps{0.3 * kRadPerDeg, 0.3 * kRadPerDeg, 0.3 * kRadPerDeg};
+  Vector3 prior_accel_bias_mps2{0.0, 0.0, 0.0};
+  Vector3 turn_on_accel_sd_mps2{0.05, 0.05, 0.05};
+  Vector3 prior_gyro_scale{0.0, 0.0, 0.0};
+  Vector3 prior_gyro_scale_sd{0.003, 0.003, 0.003};
+  Vector3 prior_accel_scale{0.0, 0.0, 0.0};
+  Vector3 prior_accel_scale_sd{0.003, 0.003, 0.003};
+
+  /// Accuracy that the live display compares with.
+  double goal_boresight_sd_rad = 0.01 * kRadPerDeg;
+  double goal_r_bs_b_sd_m = 1e-3;
+  double goal_t_d_sd_s = 1e-4;
+};
+
+struct EstimatorConfig {
+  ReferenceConfig reference;
+  GnssConfig gnss;
+  NavigationConfig navigation;
+  std::vector<StudyConfig> studies;  ///< at most kMaxStudies; outputs are in this order
+
+  /// Probability with which a good measurement of one axis passes the gate.
+  double gate_probability = 0.99999;
+  /// An S sample waits this long (on the arrival time scale) for its reference, then counts as late.
+  Duration late_after = std::chrono::milliseconds{100};
+};
+
+}  // namespace imuscope
