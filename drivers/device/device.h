@@ -1,8 +1,8 @@
 #pragma once
 
 /// What every device driver offers: a decoder (bytes to samples) and, for devices that must be spoken to, a
-/// session (what to write, and in which state the device is). Neither does I/O: bytes and times are handed in,
-/// so the same code serves a serial port, a capture and a test.
+/// session (what to write, and in which state the device is). Neither does I/O: bytes and times are handed
+/// in, so the same code serves a serial port, a capture and a test.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,15 +16,15 @@ namespace imuscope {
 
 /// Counts since construction. Every byte is accounted for: it belongs to a good frame or is skipped.
 struct DecoderCounters {
-  std::uint64_t bytes = 0;            ///< handed in
-  std::uint64_t bytes_skipped = 0;    ///< belonged to no valid frame
-  std::uint64_t frames = 0;           ///< valid frames
+  std::uint64_t bytes = 0;          ///< handed in
+  std::uint64_t bytes_skipped = 0;  ///< belonged to no valid frame
+  std::uint64_t frames = 0;         ///< valid frames
   std::uint64_t bad_checksums = 0;
   std::uint64_t bad_lengths = 0;
-  std::uint64_t bad_contents = 0;     ///< checksum right, content not to be understood
-  std::uint64_t samples = 0;          ///< handed to the sink
-  std::uint64_t samples_lost = 0;     ///< missing according to the device's own counter or time tags
-  std::uint64_t clock_resets = 0;     ///< the device's count was not continuable: a new segment began
+  std::uint64_t bad_contents = 0;  ///< checksum right, content not to be understood
+  std::uint64_t samples = 0;       ///< handed to the sink
+  std::uint64_t samples_lost = 0;  ///< missing according to the device's own counter or time tags
+  std::uint64_t clock_resets = 0;  ///< the device's count was not continuable: a new segment began
 };
 
 /// Turns the byte stream of one device into samples. Core: no allocation, no exception after construction.
@@ -48,7 +48,8 @@ enum class SessionState : std::uint8_t {
 };
 
 /// Speaks with a device until it streams what the configuration asks for. Core: no allocation after
-/// construction. A device that only sends (no handshake) has a session that is kStreaming with its first frame.
+/// construction. A device that only sends (no handshake) has a session that is kStreaming with its first
+/// frame.
 class DeviceSession {
  public:
   virtual ~DeviceSession() = default;

@@ -69,7 +69,7 @@ struct GnssData {
   Vector3 sd_position_m;    ///< north, east, down
   Vector3 sd_velocity_mps;  ///< north, east, down
   GnssSolution solution;
-  std::uint32_t flags;      ///< GnssFlag bits
+  std::uint32_t flags;  ///< GnssFlag bits
 };
 
 /// Bits of AttitudeData::flags.
@@ -84,9 +84,9 @@ enum AttitudeFlag : std::uint32_t {
 struct AttitudeData {
   double roll_rad;
   double pitch_rad;
-  double heading_rad;     ///< clockwise from true north, [0, 2 pi)
-  Vector3 sd_rpy_rad;     ///< roll, pitch, heading
-  std::uint32_t flags;    ///< AttitudeFlag bits
+  double heading_rad;   ///< clockwise from true north, [0, 2 pi)
+  Vector3 sd_rpy_rad;   ///< roll, pitch, heading
+  std::uint32_t flags;  ///< AttitudeFlag bits
 };
 
 struct Sample {

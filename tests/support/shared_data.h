@@ -2,8 +2,8 @@
 
 /// Where tests find recordings, oracle files, the source tree and the built programs.
 
-#include <filesystem>
 #include <gtest/gtest.h>
+#include <filesystem>
 #include <string_view>
 
 namespace imuscope::test {
@@ -24,9 +24,9 @@ std::filesystem::path scratch_folder();
 }  // namespace imuscope::test
 
 /// Skips the running test, with the reason, where a recording or oracle file is absent.
-#define IMUSCOPE_NEEDS_SHARED(relative)                                                                   \
-  do {                                                                                                    \
-    if (!std::filesystem::exists(::imuscope::test::shared_path(relative)))                                \
-      GTEST_SKIP() << "needs " << ::imuscope::test::shared_path(relative).string()                        \
-                   << ", which is kept beside the checkout and is absent here";                           \
+#define IMUSCOPE_NEEDS_SHARED(relative)                                            \
+  do {                                                                             \
+    if (!std::filesystem::exists(::imuscope::test::shared_path(relative)))         \
+      GTEST_SKIP() << "needs " << ::imuscope::test::shared_path(relative).string() \
+                   << ", which is kept beside the checkout and is absent here";    \
   } while (false)

@@ -1,5 +1,5 @@
-#include <exception>
 #include <fmt/format.h>
+#include <exception>
 
 #include "commands.h"
 

@@ -1,0 +1,412 @@
+#include "service/config.h"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "base/units.h"
+#include "service/toml_reader.h"
+
+namespace imuscope {
+
+namespace {
+
+constexpr std::array kRoleNames{std::string_view("reference"), std::string_view("study"),
+                                std::string_view("gnss")};
+constexpr std::array kProtocolNames{std::string_view("xsens_mt"), std::string_view("ixblue_stdbin"),
+                                    std::string_view("greis"), std::string_view("csv_imu"),
+                                    std::string_view("csv_gnss")};
+
+constexpr double kMaxRate_hz = 2000.0;
+constexpr double kMaxBaud = 4'000'000.0;
+
+template <std::size_t N>
+std::vector<std::string_view> words(const std::array<std::string_view, N>& names) {
+  return {names.begin(), names.end()};
+}
+
+bool is_gnss(Protocol protocol) { return protocol == Protocol::kGreis || protocol == Protocol::kCsvGnss; }
+bool is_csv(Protocol protocol) { return protocol == Protocol::kCsvImu || protocol == Protocol::kCsvGnss; }
+
+// Defaults of the reference: Ixsea Airins, the noise and bias of the public data sheet class (noise below
+// 0.0015 deg/sqrt(h), bias below 0.01 deg/h), as in the calibration study the filter was designed on.
+ImuNoiseConfig default_reference_noise(double rate_hz) {
+  ImuNoiseConfig noise;
+  noise.gyro_white_sd_radps = 0.0015 * kRadPerDeg / 60.0 * std::sqrt(rate_hz);
+  noise.accel_white_sd_mps2 = 10.0 * kMps2PerMicroG * std::sqrt(rate_hz);
+  noise.gyro_bias_sd_radps = 0.005 * kRadPerDeg / kSecondsPerHour;
+  noise.accel_bias_sd_mps2 = 5e-4;
+  return noise;
+}
+
+// Defaults of an S-IMU: XSens MTx. Gyroscope after Table II of Stebler et al. (2014), the fast Gauss-Markov
+// process folded into the white noise at its low-frequency equivalent (0.854 and 0.613 (deg/s)^2 per sample);
+// accelerometer and turn-on biases of the MTx's data sheet class.
+ImuNoiseConfig default_study_noise() {
+  ImuNoiseConfig noise;
+  noise.gyro_white_sd_radps = std::sqrt(0.854) * kRadPerDeg;
+  noise.gyro_white_sd_static_radps = std::sqrt(0.613) * kRadPerDeg;
+  noise.gyro_bias_sd_radps = 0.3 * kRadPerDeg;
+  noise.gyro_gm_sd_radps = std::sqrt(0.00981) * kRadPerDeg;
+  noise.gyro_gm_tau_s = 645.0;
+  noise.accel_white_sd_mps2 = 0.03;
+  noise.accel_bias_sd_mps2 = 0.05;
+  noise.accel_gm_sd_mps2 = 0.02;
+  noise.accel_gm_tau_s = 645.0;
+  noise.gyro_scale_sd = 0.003;
+  noise.accel_scale_sd = 0.003;
+  return noise;
+}
+
+/// White noise can be given per sample or as a density; not both.
+void read_white(TomlReader& in, double& sd, std::string_view per_sample_key, double per_sample_unit,
+                std::string_view density_key, double density_unit, double rate_hz) {
+  if (in.has(per_sample_key) && in.has(density_key)) {
+    in.fail(density_key, fmt::format("says again what {} says", per_sample_key), "keep one of the two");
+  }
+  in.number(per_sample_key, sd, per_sample_unit, 0.0, 1e6);
+  if (in.has(density_key)) {
+    in.number(density_key, sd, density_unit * std::sqrt(rate_hz), 0.0, 1e9);
+  } else {
+    in.ignore(density_key);
+  }
+}
+
+void read_noise(TomlReader in, double rate_hz, ImuNoiseConfig& noise) {
+  read_white(in, noise.gyro_white_sd_radps, "gyro_white_sd_degps", kRadPerDeg, "gyro_white_deg_per_sqrt_h",
+             kRadPerDeg / 60.0, rate_hz);
+  read_white(in, noise.accel_white_sd_mps2, "accel_white_sd_mps2", 1.0, "accel_white_ug_per_sqrt_hz",
+             kMps2PerMicroG, rate_hz);
+  in.number("gyro_white_sd_static_degps", noise.gyro_white_sd_static_radps, kRadPerDeg, 0.0, 1e6);
+  in.number("accel_white_sd_static_mps2", noise.accel_white_sd_static_mps2, 1.0, 0.0, 1e6);
+  if (in.has("gyro_bias_sd_degps") && in.has("gyro_bias_sd_deg_per_h")) {
+    in.fail("gyro_bias_sd_deg_per_h", "says again what gyro_bias_sd_degps says", "keep one of the two");
+  }
+  in.number("gyro_bias_sd_degps", noise.gyro_bias_sd_radps, kRadPerDeg, 0.0, 1e3);
+  in.number("gyro_bias_sd_deg_per_h", noise.gyro_bias_sd_radps, kRadPerDeg / kSecondsPerHour, 0.0, 1e6);
+  in.number("accel_bias_sd_mps2", noise.accel_bias_sd_mps2, 1.0, 0.0, 100.0);
+  in.number("gyro_gm_sd_degps", noise.gyro_gm_sd_radps, kRadPerDeg, 0.0, 1e3);
+  in.number("gyro_gm_tau_s", noise.gyro_gm_tau_s, 1.0, 1e-3, 1e7);
+  in.number("accel_gm_sd_mps2", noise.accel_gm_sd_mps2, 1.0, 0.0, 100.0);
+  in.number("accel_gm_tau_s", noise.accel_gm_tau_s, 1.0, 1e-3, 1e7);
+  in.number("gyro_scale_sd_percent", noise.gyro_scale_sd, 0.01, 0.0, 50.0);
+  in.number("accel_scale_sd_percent", noise.accel_scale_sd, 0.01, 0.0, 50.0);
+  in.finish();
+}
+
+std::array<double, 9> rotation_from_vector(const Vector3& rotation_rad) {
+  const double angle = std::sqrt(rotation_rad[0] * rotation_rad[0] + rotation_rad[1] * rotation_rad[1] +
+                                 rotation_rad[2] * rotation_rad[2]);
+  if (angle == 0.0) return {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double x = rotation_rad[0] / angle;
+  const double y = rotation_rad[1] / angle;
+  const double z = rotation_rad[2] / angle;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  const double v = 1.0 - c;
+  return {c + x * x * v,     x * y * v - z * s, x * z * v + y * s, y * x * v + z * s, c + y * y * v,
+          y * z * v - x * s, z * x * v - y * s, z * y * v + x * s, c + z * z * v};
+}
+
+void read_prior(TomlReader in, MountingPriorConfig& prior) {
+  Vector3 rotation_rad{};
+  in.vector("rotation_vector_b_s_deg", rotation_rad, kRadPerDeg);
+  if (in.has("rotation_vector_b_s_deg")) prior.C_b_s = rotation_from_vector(rotation_rad);
+  in.number("boresight_sd_deg", prior.boresight_sd_rad, kRadPerDeg, 1e-6, 180.0);
+  in.vector("lever_arm_b_m", prior.r_bs_b_m, 1.0);
+  in.number("lever_arm_sd_m", prior.lever_arm_sd_m, 1.0, 1e-6, 100.0);
+  double offset_s = 0.0;
+  in.number("time_offset_ms", offset_s, 1e-3, -1e6, 1e6);
+  if (in.has("time_offset_ms")) prior.time_offset_s = offset_s;
+  in.number("time_offset_sd_ms", prior.time_offset_sd_s, 1e-3, 1e-6, 1e6);
+  in.finish();
+}
+
+void read_csv(TomlReader in, CsvConfig& csv) {
+  in.text("time_column", csv.time_column);
+  in.texts("gyro_columns", csv.gyro_columns);
+  in.texts("accel_columns", csv.accel_columns);
+  csv.gyro_in_degps = in.choice("gyro_unit", {"rad/s", "deg/s"}, 0) == 1;
+  csv.accel_in_g = in.choice("accel_unit", {"m/s2", "g"}, 0) == 1;
+  in.text("counter_column", csv.counter_column);
+  in.text("latitude_column", csv.latitude_column);
+  in.text("longitude_column", csv.longitude_column);
+  in.text("height_column", csv.height_column);
+  in.texts("velocity_columns", csv.velocity_columns);
+  in.texts("position_sd_columns", csv.position_sd_columns);
+  csv.common_clock = in.choice("clock", {"common", "own"}, 0) == 0;
+  in.finish();
+}
+
+/// "+x -y -z" or three rows of three numbers.
+void read_axes(TomlReader& in, std::array<double, 9>& axes) {
+  const auto* node = in.node("axes");
+  if (node == nullptr) return;
+  std::array<double, 9> read{};
+  bool good = false;
+  if (const auto text = node->value_exact<std::string>()) {
+    std::istringstream words(*text);
+    std::string word;
+    std::size_t row = 0;
+    for (; words >> word; ++row) {
+      const bool shape =
+          word.size() == 2 && (word[0] == '+' || word[0] == '-') && word[1] >= 'x' && word[1] <= 'z';
+      if (!shape || row > 2) break;
+      read[3 * row + static_cast<std::size_t>(word[1] - 'x')] = word[0] == '+' ? 1.0 : -1.0;
+    }
+    good = row == 3 && words.eof();
+  } else if (const auto* rows = node->as_array(); rows != nullptr && rows->size() == 3) {
+    good = true;
+    for (std::size_t i = 0; i < 3 && good; ++i) {
+      const auto* row = (*rows)[i].as_array();
+      good = row != nullptr && row->size() == 3;
+      for (std::size_t j = 0; j < 3 && good; ++j) {
+        const auto value = (*row)[j].is_number() ? (*row)[j].value<double>() : std::nullopt;
+        good = value.has_value();
+        if (good) read[3 * i + j] = *value;
+      }
+    }
+  }
+  if (!good) {
+    in.fail("axes", "is neither three signed axes nor three rows of three numbers",
+            "write for example \"+x -y -z\"");
+    return;
+  }
+  constexpr double kOrthonormal = 1e-6;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      double dot = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) dot += read[3 * i + k] * read[3 * j + k];
+      if (std::abs(dot - (i == j ? 1.0 : 0.0)) > kOrthonormal) good = false;
+    }
+  }
+  const double determinant = read[0] * (read[4] * read[8] - read[5] * read[7]) -
+                             read[1] * (read[3] * read[8] - read[5] * read[6]) +
+                             read[2] * (read[3] * read[7] - read[4] * read[6]);
+  if (!good || determinant < 0.0) {
+    in.fail("axes", "is not a rotation", "its rows must be orthogonal unit axes of a right-handed frame");
+    return;
+  }
+  axes = read;
+}
+
+void read_transport(TomlReader in, std::optional<SerialConfig>& serial) {
+  if (!in.present()) return;
+  in.choice("kind", {"serial"}, 0);
+  SerialConfig config;
+  in.text("port", config.port);
+  in.require("port", "give the device's path, such as /dev/serial/by-id/...");
+  double baud = config.baud;
+  in.number("baud", baud, 1.0, 50.0, kMaxBaud);
+  config.baud = static_cast<std::uint32_t>(baud);
+  in.integer("stop_bits", config.stop_bits, 1, 2);
+  in.finish();
+  serial = config;
+}
+
+void check_name(TomlReader& in, const std::string& name) {
+  const bool good = !name.empty() && name.size() <= 32 && std::all_of(name.begin(), name.end(), [](char c) {
+    return (std::isalnum(static_cast<unsigned char>(c)) != 0) || c == '_' || c == '-';
+  });
+  if (!good) in.fail("name", "must be 1 to 32 letters, digits, '_' or '-'", "it becomes part of file names");
+}
+
+DeviceConfig read_device(TomlReader in) {
+  DeviceConfig device;
+  in.require("name", "every [[device]] needs a name of its own");
+  in.text("name", device.name);
+  if (in.has("name")) check_name(in, device.name);
+  in.require("role", "valid: reference, study, gnss");
+  device.role = static_cast<DeviceRole>(in.choice("role", words(kRoleNames), 0));
+  in.require("protocol", fmt::format("valid: {}", fmt::join(kProtocolNames, ", ")));
+  device.protocol = static_cast<Protocol>(in.choice("protocol", words(kProtocolNames), 0));
+  if (is_gnss(device.protocol) != (device.role == DeviceRole::kGnss)) {
+    in.fail("protocol",
+            fmt::format("{} does not fit role {}", name_of(device.protocol), name_of(device.role)),
+            "a gnss device speaks greis or csv_gnss, an IMU any other protocol");
+  }
+  device.rate_hz = is_gnss(device.protocol) ? 10.0 : 100.0;
+  in.number("rate_hz", device.rate_hz, 1.0, 0.1, kMaxRate_hz);
+  // The StdBin telegram is in forward-port-up axes, b is forward-right-down.
+  if (device.protocol == Protocol::kIxblueStdbin) device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+  read_axes(in, device.axes);
+  read_transport(in.table("transport"), device.serial);
+  device.noise =
+      device.role == DeviceRole::kReference ? default_reference_noise(device.rate_hz) : default_study_noise();
+  read_noise(in.table("noise"), device.rate_hz, device.noise);
+  device.prior.boresight_sd_rad = 2.0 * kRadPerDeg;
+  device.prior.lever_arm_sd_m = 1.0;
+  device.prior.time_offset_sd_s = 0.010;
+  read_prior(in.table("prior"), device.prior);
+  if (is_csv(device.protocol)) read_csv(in.table("csv"), device.csv);
+  if (device.role == DeviceRole::kGnss) {
+    device.gnss.position_sd_m = {0.02, 0.02, 0.04};
+    device.gnss.velocity_sd_mps = {0.05, 0.05, 0.10};
+    device.gnss.position_sd_floor_m = 0.005;
+    device.gnss.velocity_sd_floor_mps = 0.01;
+    in.vector("antenna_lever_arm_b_m", device.gnss.antenna_lever_arm_b_m, 1.0);
+    in.vector("position_sd_m", device.gnss.position_sd_m, 1.0);
+    in.vector("velocity_sd_mps", device.gnss.velocity_sd_mps, 1.0);
+    in.number("position_sd_floor_m", device.gnss.position_sd_floor_m, 1.0, 0.0, 1e3);
+    in.number("velocity_sd_floor_mps", device.gnss.velocity_sd_floor_mps, 1.0, 0.0, 1e3);
+    in.number("latency_ms", device.gnss.latency_s, 1e-3, 0.0, 1e4);
+  }
+  in.finish();
+  return device;
+}
+
+void read_devices(TomlReader& root, TomlProblem& problem, Configuration& configuration) {
+  root.require("device", "describe every device in a [[device]] table");
+  const auto* list = root.array("device");
+  if (list == nullptr) return;
+  std::set<std::string> names;
+  for (const auto& node : *list) {
+    const auto* table = node.as_table();
+    if (table == nullptr) {
+      root.fail("device", "must be a list of tables", "write [[device]]");
+      return;
+    }
+    TomlReader in(table, "device", problem);
+    configuration.devices.push_back(read_device(in));
+    const auto& device = configuration.devices.back();
+    if (!names.insert(device.name).second) {
+      in.fail("name", fmt::format("'{}' is used twice", device.name), "names must differ");
+    }
+  }
+  const auto count = [&](DeviceRole role) {
+    return std::count_if(configuration.devices.begin(), configuration.devices.end(),
+                         [&](const DeviceConfig& device) { return device.role == role; });
+  };
+  constexpr int kMaxStudies = 6;
+  if (count(DeviceRole::kReference) != 1) {
+    root.fail("device", fmt::format("lists {} devices with role reference", count(DeviceRole::kReference)),
+              "exactly one IMU is the reference");
+  } else if (count(DeviceRole::kStudy) < 1 || count(DeviceRole::kStudy) > kMaxStudies) {
+    root.fail("device", fmt::format("lists {} devices with role study", count(DeviceRole::kStudy)),
+              fmt::format("1 to {} IMUs can be under study", kMaxStudies));
+  } else if (count(DeviceRole::kGnss) > 1) {
+    root.fail("device", "lists more than one gnss device", "keep the better one");
+  }
+}
+
+void read_estimator(TomlReader in, EstimatorOptions& options) {
+  options.paper_states = in.choice("states", {"full", "paper"}, 0) == 1;
+  in.boolean("navigation", options.navigation);
+  in.integer("differentiator_points", options.differentiator_points, 5, 11);
+  if (options.differentiator_points % 2 == 0) in.fail("differentiator_points", "must be 5, 7, 9 or 11");
+  in.finish();
+}
+
+void read_noise_options(TomlReader in, NoiseOptions& options) {
+  in.text("model", options.model);
+  in.number("refit_interval_s", options.refit_interval_s, 1.0, 1.0, 1e5);
+  in.boolean("remove_scale_error", options.remove_scale_error);
+  in.finish();
+}
+
+std::string sha256_of(const std::string& text) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int size = 0;
+  EVP_Digest(text.data(), text.size(), digest.data(), &size, EVP_sha256(), nullptr);
+  std::string hex;
+  for (unsigned int i = 0; i < size; ++i) hex += fmt::format("{:02x}", digest[i]);
+  return hex;
+}
+
+}  // namespace
+
+std::string_view name_of(DeviceRole role) { return kRoleNames[static_cast<std::size_t>(role)]; }
+std::string_view name_of(Protocol protocol) { return kProtocolNames[static_cast<std::size_t>(protocol)]; }
+
+const DeviceConfig* Configuration::find(std::string_view name) const {
+  const auto found = std::find_if(devices.begin(), devices.end(),
+                                  [&](const DeviceConfig& device) { return device.name == name; });
+  return found == devices.end() ? nullptr : &*found;
+}
+
+std::size_t Configuration::reference_index() const {
+  const auto found = std::find_if(devices.begin(), devices.end(), [](const DeviceConfig& device) {
+    return device.role == DeviceRole::kReference;
+  });
+  return static_cast<std::size_t>(found - devices.begin());
+}
+
+std::vector<std::size_t> Configuration::study_indices() const {
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    if (devices[i].role == DeviceRole::kStudy) indices.push_back(i);
+  }
+  return indices;
+}
+
+std::optional<std::size_t> Configuration::gnss_index() const {
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    if (devices[i].role == DeviceRole::kGnss) return i;
+  }
+  return std::nullopt;
+}
+
+Result<Configuration> load_configuration(const std::filesystem::path& file) {
+  std::error_code code;
+  const auto status = std::filesystem::status(file, code);
+  if (!std::filesystem::exists(status)) {
+    return usage_error(fmt::format("configuration {} does not exist", file.string()),
+                       "give the path of a TOML file; config/ holds examples");
+  }
+  if (!std::filesystem::is_regular_file(status)) {
+    return usage_error(fmt::format("configuration {} is not a file", file.string()),
+                       "give the path of a TOML file");
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in)
+    return usage_error(fmt::format("configuration {} cannot be read", file.string()),
+                       "check its permissions");
+  return parse_configuration(text.str(), file);
+}
+
+Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name) {
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
+    return usage_error(fmt::format("configuration {} is empty", name.string()), "config/ holds examples");
+  }
+  toml::table document;
+  try {
+    document = toml::parse(text, name.string());
+  } catch (const toml::parse_error& error) {
+    return usage_error(
+        fmt::format("{}:{}: not TOML: {}", name.string(), error.source().begin.line, error.description()),
+        "see config/ for examples");
+  }
+  Configuration configuration;
+  configuration.file = name;
+  configuration.text = text;
+  configuration.sha256 = sha256_of(text);
+  configuration.run_name = name.stem().string();
+
+  TomlProblem problem{name.string(), std::nullopt};
+  TomlReader root(&document, "", problem);
+  auto run = root.table("run");
+  run.text("name", configuration.run_name);
+  run.finish();
+  read_estimator(root.table("estimator"), configuration.estimator);
+  read_noise_options(root.table("noise"), configuration.noise);
+  auto lcm = root.table("lcm");
+  lcm.text("url", configuration.lcm.url);
+  lcm.text("channel_prefix", configuration.lcm.channel_prefix);
+  lcm.finish();
+  auto record = root.table("record");
+  record.text("folder", configuration.record.folder);
+  record.finish();
+  root.ignore("simulation");  // belongs to imusim, which checks it
+  read_devices(root, problem, configuration);
+  root.finish();
+  if (problem.error) return tl::unexpected<Error>(*problem.error);
+  return configuration;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,141 @@
+#pragma once
+
+/// The configuration of a run, read from TOML. Keys name their units; here everything is SI and radians.
+/// Unknown keys and impossible values are refused with file, line and the nearest valid key. Everything but
+/// the devices has a default that works for three MTx and an Airins.
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "sample/sample.h"
+
+namespace imuscope {
+
+enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss };
+enum class Protocol : std::uint8_t { kXsensMt, kIxblueStdbin, kGreis, kCsvImu, kCsvGnss };
+
+/// Name of a role or protocol as the configuration writes it.
+std::string_view name_of(DeviceRole role);
+std::string_view name_of(Protocol protocol);
+
+/// How the bytes come in. `port` is empty for a device that only exists as a file given on the command line.
+struct SerialConfig {
+  std::string port;
+  std::uint32_t baud = 115200;
+  int stop_bits = 1;
+};
+
+/// What the filter assumes of an IMU's errors. White noise is per sample at the device's rate.
+struct ImuNoiseConfig {
+  double gyro_white_sd_radps = 0.0;         ///< in motion
+  double gyro_white_sd_static_radps = 0.0;  ///< at rest
+  double gyro_bias_sd_radps = 0.0;          ///< turn-on bias, 1 sigma
+  double gyro_gm_sd_radps = 0.0;            ///< stationary sd of the slow Gauss-Markov bias
+  double gyro_gm_tau_s = 0.0;               ///< its correlation time
+  double accel_white_sd_mps2 = 0.0;
+  double accel_white_sd_static_mps2 = 0.0;
+  double accel_bias_sd_mps2 = 0.0;
+  double accel_gm_sd_mps2 = 0.0;
+  double accel_gm_tau_s = 0.0;
+  double gyro_scale_sd = 0.0;  ///< 1 sigma, fraction
+  double accel_scale_sd = 0.0;
+};
+
+/// What is known of a mounting beforehand. Without a rotation the estimator finds the mounting by itself.
+struct MountingPriorConfig {
+  std::optional<std::array<double, 9>> C_b_s;  ///< row-major
+  double boresight_sd_rad = 0.0;
+  Vector3 r_bs_b_m{};
+  double lever_arm_sd_m = 0.0;
+  std::optional<double> time_offset_s;  ///< to be added to the S time; searched for where absent
+  double time_offset_sd_s = 0.0;
+};
+
+/// Columns of a CSV device. See drivers/csv.
+struct CsvConfig {
+  std::string time_column = "t_s";
+  std::array<std::string, 3> gyro_columns{"gyro_x_radps", "gyro_y_radps", "gyro_z_radps"};
+  std::array<std::string, 3> accel_columns{"accel_x_mps2", "accel_y_mps2", "accel_z_mps2"};
+  bool gyro_in_degps = false;
+  bool accel_in_g = false;
+  std::string counter_column;  ///< empty: the row number counts
+  std::string latitude_column = "lat_deg";
+  std::string longitude_column = "lon_deg";
+  std::string height_column = "height_m";
+  std::array<std::string, 3> velocity_columns;     ///< north, east, down; empty: none
+  std::array<std::string, 3> position_sd_columns;  ///< north, east, down; empty: none
+  bool common_clock = true;  ///< false: the file's times are of a clock of its own, brought to the reference
+};
+
+struct GnssConfig {
+  Vector3 antenna_lever_arm_b_m{};
+  Vector3 position_sd_m{};  ///< north, east, down; where the receiver gives none
+  Vector3 velocity_sd_mps{};
+  double position_sd_floor_m = 0.0;
+  double velocity_sd_floor_mps = 0.0;
+  double latency_s = 0.0;  ///< of the stamps, where no UTC brings them to the reference's time
+};
+
+struct DeviceConfig {
+  std::string name;
+  DeviceRole role{};
+  Protocol protocol{};
+  double rate_hz = 0.0;
+  std::array<double, 9> axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rotates the device's components, row-major
+  std::optional<SerialConfig> serial;
+  ImuNoiseConfig noise;       ///< reference and study
+  MountingPriorConfig prior;  ///< study
+  CsvConfig csv;              ///< csv_imu, csv_gnss
+  GnssConfig gnss;            ///< gnss
+};
+
+struct EstimatorOptions {
+  bool paper_states = false;      ///< the paper's six states per S-IMU
+  bool navigation = true;         ///< R-IMU/GNSS navigation; needs a gnss device
+  int differentiator_points = 5;  ///< of the reference: 5, 7, 9 or 11
+};
+
+struct NoiseOptions {
+  std::string model = "WN+2*GM";
+  double refit_interval_s = 60.0;
+  bool remove_scale_error = true;  ///< from the error process before models are fitted
+};
+
+struct LcmOptions {
+  std::string url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string channel_prefix = "IMUSCOPE";
+};
+
+struct RecordOptions {
+  std::string folder;  ///< where live runs are recorded; relative to the working folder
+};
+
+struct Configuration {
+  std::string run_name;
+  std::filesystem::path file;
+  std::string text;    ///< as read
+  std::string sha256;  ///< of the text
+  std::vector<DeviceConfig> devices;
+  EstimatorOptions estimator;
+  NoiseOptions noise;
+  LcmOptions lcm;
+  RecordOptions record;
+
+  [[nodiscard]] const DeviceConfig* find(std::string_view name) const;
+  [[nodiscard]] std::size_t reference_index() const;
+  [[nodiscard]] std::vector<std::size_t> study_indices() const;
+  [[nodiscard]] std::optional<std::size_t> gnss_index() const;
+};
+
+/// Reads and checks a configuration file.
+Result<Configuration> load_configuration(const std::filesystem::path& file);
+
+/// The same for a text that was kept in a capture; `name` stands for the file in messages.
+Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name);
+
+}  // namespace imuscope

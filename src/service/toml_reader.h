@@ -1,0 +1,68 @@
+#pragma once
+
+/// Reads a TOML table key by key and remembers what was asked for, so that anything left over is refused with
+/// the nearest key that exists. The first problem wins and carries file and line.
+
+#include <toml++/toml.h>
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+
+namespace imuscope {
+
+/// The first problem of one document.
+struct TomlProblem {
+  std::string file;
+  std::optional<Error> error;
+
+  void report(const toml::source_region& where, const std::string& what, const std::string& remedy = {});
+};
+
+class TomlReader {
+ public:
+  /// @param name  the table's name in messages, such as "device.noise"
+  TomlReader(const toml::table* table, std::string name, TomlProblem& problem);
+
+  [[nodiscard]] bool present() const { return table_ != nullptr; }
+  [[nodiscard]] bool has(std::string_view key) const;
+
+  void text(std::string_view key, std::string& value);
+  void boolean(std::string_view key, bool& value);
+  /// A number in [low, high], multiplied by `unit` into `value`.
+  void number(std::string_view key, double& value, double unit, double low, double high);
+  void integer(std::string_view key, int& value, int low, int high);
+  void vector(std::string_view key, std::array<double, 3>& value, double unit);
+  void texts(std::string_view key, std::array<std::string, 3>& value);
+  /// One of the given words; the index of the word found, or `fallback` when the key is absent.
+  std::size_t choice(std::string_view key, const std::vector<std::string_view>& words, std::size_t fallback);
+  [[nodiscard]] TomlReader table(std::string_view key);
+  [[nodiscard]] const toml::array* array(std::string_view key);
+  [[nodiscard]] const toml::node* node(std::string_view key);
+
+  /// Reports that `key` is missing, with what it is for.
+  void require(std::string_view key, const std::string& purpose);
+  /// Reports a problem at `key` (or at the table when the key is absent).
+  void fail(std::string_view key, const std::string& what, const std::string& remedy = {});
+  /// Refuses keys that were never asked for. Call last.
+  void finish();
+  /// Marks a key as known without reading it.
+  void ignore(std::string_view key) { known_.emplace_back(key); }
+
+ private:
+  [[nodiscard]] std::string full_name(std::string_view key) const;
+  [[nodiscard]] toml::source_region where(std::string_view key) const;
+
+  const toml::table* table_;
+  std::string name_;
+  TomlProblem* problem_;
+  std::vector<std::string> known_;
+};
+
+/// The candidate with the smallest edit distance to `word`, or empty when none is near.
+std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates);
+
+}  // namespace imuscope
