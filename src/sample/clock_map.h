@@ -1,8 +1,8 @@
 #pragma once
 
-/// Device time to host time. A device's own count (sample counter, time tag) spaces its samples far better than
-/// their arrival does; what it lacks is an origin and an exact rate on the host's time scale. A clock map learns
-/// both from arrivals that are late by an unknown, never negative amount.
+/// Device time to host time. A device's own count (sample counter, time tag) spaces its samples far better
+/// than their arrival does; what it lacks is an origin and an exact rate on the host's time scale. A clock
+/// map learns both from arrivals that are late by an unknown, never negative amount.
 ///
 /// Model: arrival = device_time + offset + skew * device_time + delay, delay >= 0. The map follows the lower
 /// envelope of (arrival - device_time): late bytes, bursts and stalls lie above it and have no influence.
@@ -34,8 +34,8 @@ struct ClockMapConfig {
   }
 };
 
-/// Maps the device time of one device. Core: no allocation after construction, noexcept, bounded time per call.
-/// Not thread-safe; trivially copyable.
+/// Maps the device time of one device. Core: no allocation after construction, noexcept, bounded time per
+/// call. Not thread-safe; trivially copyable.
 class ClockMap {
  public:
   explicit ClockMap(const ClockMapConfig& config = {}) noexcept;
@@ -44,10 +44,12 @@ class ClockMap {
   /// every observation before whenever device_time_ns is (equal where device_time_ns is equal).
   ///
   /// A device time that is less than the one before begins a new segment, as restart() does. So does one that
-  /// arrives earlier than the line allows, or keeps arriving later than it by seconds: the device's clock jumped.
+  /// arrives earlier than the line allows, or keeps arriving later than it by seconds: the device's clock
+  /// jumped.
   ///
   /// @param device_time_ns  the device's time of the sample, unwrapped by the driver, any origin; |.| < 2^62
-  /// @param first_byte      host time of the first byte of the sample's frame (upper bound: the read's arrival
+  /// @param first_byte      host time of the first byte of the sample's frame (upper bound: the read's
+  /// arrival
   ///                        minus the time on the wire of the bytes from the first on)
   HostTime observe(std::int64_t device_time_ns, HostTime first_byte) noexcept;
 

@@ -1,0 +1,185 @@
+#include "sample/clock_map.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/contracts.h"
+
+namespace imuscope {
+namespace {
+
+// Interval of device time that leaves one point (its lowest). 256 of them span 8.5 minutes: long enough to
+// see the bottom of the 1 ms saw-tooth that USB frames make at a skew of 5 ppm (200 s), short enough for a
+// crystal that warms up.
+constexpr double kBin_s = 2.0;
+// A rate is fitted when the closed intervals span this much; before, the rate of the segment before is kept.
+constexpr std::size_t kBinsForRate = 5;
+// The weight of an interval falls with its age, so that the line touches the envelope near the present.
+constexpr double kWeightAge_s = 200.0;
+// How far the rate may have wandered: old points are lifted by half of this times age squared, so that a
+// crystal that warms up is followed and old points bind less than new ones.
+constexpr double kRateWander_per_s = 1e-9;
+
+// A point this far below a settled line cannot be explained by delay or by an unknown rate (crystals: 200
+// ppm).
+constexpr double kEarlyAllowance_s = 0.020;
+constexpr double kRateAllowance = 200e-6;
+constexpr double kSettled_s = 10.0;
+constexpr int kEarlyToRestart = 3;
+// Every observation later than the line by this much for this long: the device's clock jumped.
+constexpr double kLate_s = 0.050;
+constexpr double kLateToRestart_s = 10.0;
+
+// A correction decays with a time constant that grows with the segment's age between these.
+constexpr double kCorrectionMin_s = 0.2;
+constexpr double kCorrectionMax_s = 10.0;
+constexpr double kCorrectionPerAge = 0.1;
+// The mapped time runs at least at this fraction of the device's rate.
+constexpr double kSlowest = 0.5;
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+}  // namespace
+
+ClockMap::ClockMap(const ClockMapConfig& config) noexcept : config_(config) {
+  IMUSCOPE_EXPECTS(config.rate_ratio > 0.9 && config.rate_ratio < 1.1);
+}
+
+HostTime ClockMap::observe(std::int64_t device_time_ns, HostTime first_byte) noexcept {
+  if (is_fixed()) {
+    // Whole nanoseconds plus the small rest, so that days of device time keep their nanoseconds.
+    const double rest_ns = (config_.rate_ratio - 1.0) * static_cast<double>(device_time_ns);
+    return config_.origin + Duration{device_time_ns + std::llround(rest_ns)};
+  }
+  if (in_segment_ && device_time_ns < last_device_ns_) restart();
+  if (!in_segment_) begin_segment(device_time_ns, first_byte);
+
+  const double x_s = seconds(device_time_ns - device_origin_ns_);
+  const Point point{x_s, seconds((first_byte - host_origin_).count() - (device_time_ns - device_origin_ns_))};
+  if (jumped(x_s, point.y_s - line_.at(x_s))) {
+    restart();
+    begin_segment(device_time_ns, first_byte);
+    take({0.0, 0.0});
+    return emit(device_time_ns, 0.0);
+  }
+  if (early_in_a_row_ == 0) take(point);
+  return emit(device_time_ns, x_s);
+}
+
+void ClockMap::restart() noexcept {
+  if (!in_segment_) return;
+  in_segment_ = false;
+  ++restarts_;
+}
+
+double ClockMap::skew_ppm() const noexcept { return (is_fixed() ? config_.rate_ratio - 1.0 : line_.b) * 1e6; }
+
+void ClockMap::begin_segment(std::int64_t device_time_ns, HostTime first_byte) noexcept {
+  in_segment_ = true;
+  device_origin_ns_ = device_time_ns;
+  host_origin_ = first_byte;
+  line_.a_s = 0.0;
+  correction_s_ = 0.0;
+  bins_begin_ = 0;
+  bins_count_ = 0;
+  open_bin_start_s_ = 0.0;
+  open_bin_empty_ = true;
+  early_in_a_row_ = 0;
+  late_ = false;
+}
+
+bool ClockMap::jumped(double x_s, double residual_s) noexcept {
+  const double unseen_s = x_s - seconds(last_device_ns_ - device_origin_ns_);
+  const bool early = x_s > kSettled_s && residual_s < -(kEarlyAllowance_s + kRateAllowance * unseen_s);
+  early_in_a_row_ = early ? early_in_a_row_ + 1 : 0;
+  if (early_in_a_row_ >= kEarlyToRestart) return true;
+  if (residual_s < kLate_s) {
+    late_ = false;
+    return false;
+  }
+  if (!late_) late_since_s_ = x_s;
+  late_ = true;
+  return x_s - late_since_s_ > kLateToRestart_s;
+}
+
+void ClockMap::take(const Point& point) noexcept {
+  if (point.x_s - open_bin_start_s_ >= kBin_s) {
+    close_bin();
+    refit();
+    open_bin_start_s_ = kBin_s * std::floor(point.x_s / kBin_s);
+  }
+  const double residual_s = point.y_s - line_.at(point.x_s);
+  if (open_bin_empty_ || residual_s < open_bin_.y_s - line_.at(open_bin_.x_s)) open_bin_ = point;
+  open_bin_empty_ = false;
+  // The envelope never lies above an observation.
+  if (residual_s < 0.0) move_line({line_.a_s + residual_s, line_.b}, point.x_s);
+}
+
+void ClockMap::close_bin() noexcept {
+  if (bins_count_ == kBins) {
+    bins_begin_ = (bins_begin_ + 1) % kBins;
+    --bins_count_;
+  }
+  bins_[(bins_begin_ + bins_count_) % kBins] = open_bin_;
+  ++bins_count_;
+  open_bin_empty_ = true;
+}
+
+// The line below all points that is closest to them in weighted mean: the edge of their lower convex hull
+// that spans their weighted mean time (the dual of a linear program with two unknowns).
+void ClockMap::refit() noexcept {
+  if (bins_count_ < kBinsForRate) return;
+  const Point& newest = bins_[(bins_begin_ + bins_count_ - 1) % kBins];
+  std::array<Point, kBins> hull;
+  std::size_t n = 0;
+  double sum_w = 0.0;
+  double sum_wx = 0.0;
+  for (std::size_t i = 0; i < bins_count_; ++i) {
+    Point p = bins_[(bins_begin_ + i) % kBins];
+    const double age_s = newest.x_s - p.x_s;
+    const double weight = 1.0 / (1.0 + (age_s / kWeightAge_s) * (age_s / kWeightAge_s));
+    sum_w += weight;
+    sum_wx += weight * p.x_s;
+    p.y_s += 0.5 * kRateWander_per_s * age_s * age_s;
+    // Drop the last vertex while it lies on or above the chord from the one before it to p.
+    while (n >= 2 && (hull[n - 1].y_s - hull[n - 2].y_s) * (p.x_s - hull[n - 2].x_s) >=
+                         (p.y_s - hull[n - 2].y_s) * (hull[n - 1].x_s - hull[n - 2].x_s)) {
+      --n;
+    }
+    hull[n++] = p;
+  }
+  if (n < 2) return;
+  const double centre_s = sum_wx / sum_w;
+  std::size_t right = 1;
+  while (right + 1 < n && hull[right].x_s < centre_s) ++right;
+  const Point& p = hull[right - 1];
+  const Point& q = hull[right];
+  const double b = std::clamp((q.y_s - p.y_s) / (q.x_s - p.x_s), -kRateAllowance, kRateAllowance);
+  move_line({q.y_s - b * q.x_s, b}, newest.x_s);
+}
+
+void ClockMap::move_line(const Line& line, double x_s) noexcept {
+  correction_s_ += line_.at(x_s) - line.at(x_s);
+  line_ = line;
+}
+
+HostTime ClockMap::emit(std::int64_t device_time_ns, double x_s) noexcept {
+  if (has_last_ && device_time_ns == last_device_ns_) return last_mapped_;
+  const bool continues = has_last_ && device_time_ns > last_device_ns_;
+  const double step_s = continues ? seconds(device_time_ns - last_device_ns_) : 0.0;
+  const double tau_s = std::clamp(kCorrectionPerAge * x_s, kCorrectionMin_s, kCorrectionMax_s);
+  correction_s_ *= tau_s / (tau_s + step_s);
+
+  const Duration since_origin{device_time_ns - device_origin_ns_};
+  HostTime mapped = host_origin_ + since_origin + from_seconds(line_.at(x_s) + correction_s_);
+  if (has_last_) {
+    const HostTime floor = last_mapped_ + std::max(Duration{1}, from_seconds(kSlowest * step_s));
+    mapped = std::max(mapped, floor);
+  }
+  has_last_ = true;
+  last_device_ns_ = device_time_ns;
+  last_mapped_ = mapped;
+  return mapped;
+}
+
+}  // namespace imuscope
