@@ -72,7 +72,7 @@ struct CsvConfig {
   bool common_clock = true;  ///< false: the file's times are of a clock of its own, brought to the reference
 };
 
-struct GnssConfig {
+struct GnssOptions {
   Vector3 antenna_lever_arm_b_m{};
   Vector3 position_sd_m{};  ///< north, east, down; where the receiver gives none
   Vector3 velocity_sd_mps{};
@@ -91,7 +91,7 @@ struct DeviceConfig {
   ImuNoiseConfig noise;       ///< reference and study
   MountingPriorConfig prior;  ///< study
   CsvConfig csv;              ///< csv_imu, csv_gnss
-  GnssConfig gnss;            ///< gnss
+  GnssOptions gnss;           ///< gnss
 };
 
 struct EstimatorOptions {

@@ -1,0 +1,70 @@
+#include "service/core.h"
+
+#include <algorithm>
+
+#include "base/contracts.h"
+
+namespace imuscope {
+
+Core::Core(const EstimatorConfig& config, std::size_t n_devices, std::vector<LateSample> late_samples,
+           HistorySink* history)
+    : estimator_(config, history), late_samples_(n_devices) {
+  for (std::size_t i = 0; i < n_devices; ++i) rings_.push_back(std::make_unique<SampleRing>());
+  std::sort(late_samples.begin(), late_samples.end(),
+            [](const LateSample& a, const LateSample& b) { return a.sequence < b.sequence; });
+  for (const auto& late : late_samples) {
+    if (late.device < n_devices) late_samples_[late.device].push_back(late);
+  }
+}
+
+bool Core::held_back(const Sample& sample, std::int64_t index) const noexcept {
+  const auto& late = late_samples_[sample.device];
+  const auto found = std::lower_bound(
+      late.begin(), late.end(), sample.sequence,
+      [](const LateSample& entry, std::uint64_t sequence) { return entry.sequence < sequence; });
+  return found != late.end() && found->sequence == sample.sequence && found->tick > index;
+}
+
+void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
+  for (;;) {
+    // Oldest arrival first; equal stamps in configuration order, then in sequence (the ring's own order).
+    SampleRing* next = nullptr;
+    const Sample* oldest = nullptr;
+    for (const auto& ring : rings_) {
+      const Sample* sample = ring->front();
+      if (sample == nullptr || sample->arrival > cut || held_back(*sample, index)) continue;
+      if (oldest == nullptr || sample->arrival < oldest->arrival) {
+        oldest = sample;
+        next = ring.get();
+      }
+    }
+    if (next == nullptr) return;
+    if (oldest->arrival <= previous_cut_) {
+      sink.on_late_sample({oldest->device, oldest->sequence, index});
+    }
+    estimator_.add(*oldest);
+    next->pop();
+  }
+}
+
+void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
+  IMUSCOPE_EXPECTS(cut > previous_cut_);
+  consume(index, cut, sink);
+  previous_cut_ = cut;
+  estimator_.advance(cut);
+
+  for (const auto& event : estimator_.events()) sink.on_event(event);
+  for (const auto& epoch : estimator_.epochs()) {
+    if (epoch.calibrating) sink.on_error({epoch.study, live_error_row(epoch)});
+  }
+  if (index % kTicksPerSnapshot != 0) return;
+  snapshot_.tick = index;
+  snapshot_.cut = cut;
+  snapshot_.n_studies = estimator_.study_count();
+  snapshot_.navigation = estimator_.navigation();
+  for (std::size_t i = 0; i < snapshot_.n_studies; ++i) snapshot_.studies[i] = estimator_.study(i);
+  snapshot_.counters = estimator_.counters();
+  sink.on_snapshot(snapshot_);
+}
+
+}  // namespace imuscope

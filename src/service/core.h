@@ -1,0 +1,93 @@
+#pragma once
+
+/// One tick of the core, live and in replay: samples leave the devices' rings in the order of arrival and
+/// enter the estimator, and what came of it is handed on. What a tick consumes depends on arrival stamps and
+/// on the cut alone, never on when it was computed.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "calibration/estimator.h"
+#include "error_process/error_row.h"
+#include "rt/spsc_ring.h"
+#include "sample/sample.h"
+
+namespace imuscope {
+
+/// Ticks per second of the core.
+inline constexpr double kTickRate_hz = 100.0;
+inline constexpr Duration kTickPeriod{10'000'000};
+/// Every tenth tick leaves a snapshot: 10 Hz.
+inline constexpr std::int64_t kTicksPerSnapshot = 10;
+
+/// From one device to the core: ten seconds at 100 Hz, far beyond any stall of the core.
+using SampleRing = SpscRing<Sample, 1024>;
+
+/// The estimates at one tick.
+struct Snapshot {
+  std::int64_t tick;
+  HostTime cut;
+  std::size_t n_studies;
+  NavigationOutput navigation;
+  std::array<StudyOutput, kMaxStudies> studies;
+  EstimatorCounters counters;
+};
+static_assert(std::is_trivially_copyable_v<Snapshot>);
+
+/// One row of the error process on its way out of the core.
+struct ErrorRecord {
+  std::size_t study;
+  ErrorRow row;
+};
+static_assert(std::is_trivially_copyable_v<ErrorRecord>);
+
+/// A sample that reached its ring only after the tick to which its arrival belonged, and the tick that took
+/// it. A replay takes it at the same tick.
+struct LateSample {
+  DeviceIndex device;
+  std::uint64_t sequence;
+  std::int64_t tick;
+};
+
+/// What comes out of a tick. On the real-time side an implementation pushes into rings; in a replay it works.
+class CoreSink {
+ public:
+  virtual ~CoreSink() = default;
+  virtual void on_error(const ErrorRecord& record) noexcept = 0;
+  virtual void on_event(const EstimatorEvent& event) noexcept = 0;
+  virtual void on_snapshot(const Snapshot& snapshot) noexcept = 0;
+  virtual void on_late_sample(const LateSample& late) noexcept = 0;
+};
+
+/// Consumer of the sample rings and owner of the estimator. Thread: one, save for the rings' producer side.
+/// Allocates: in the constructor alone.
+class Core {
+ public:
+  /// @param late_samples  of the run that is replayed, empty otherwise; any order
+  Core(const EstimatorConfig& config, std::size_t n_devices, std::vector<LateSample> late_samples = {},
+       HistorySink* history = nullptr);
+
+  /// Producer side of device `device`'s ring.
+  [[nodiscard]] SampleRing& ring(DeviceIndex device) noexcept { return *rings_[device]; }
+
+  /// Consumes every sample that had arrived by `cut`, advances the estimator and reports to `sink`.
+  /// Ticks increase; a skipped tick is simply not called.
+  void tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
+
+  [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
+
+ private:
+  [[nodiscard]] bool held_back(const Sample& sample, std::int64_t index) const noexcept;
+  void consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
+
+  Estimator estimator_;
+  std::vector<std::unique_ptr<SampleRing>> rings_;
+  std::vector<std::vector<LateSample>> late_samples_;  ///< per device, by sequence
+  HostTime previous_cut_{HostTime::min()};
+  Snapshot snapshot_{};
+};
+
+}  // namespace imuscope
