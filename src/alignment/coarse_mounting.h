@@ -1,0 +1,69 @@
+#pragma once
+
+/// How an S-IMU sits, without any prior: Wahba's problem on pairs of rates and forces. Good to a degree or
+/// two after a minute of driving, which is enough for the filter to take over. Rates enter with their means
+/// removed, so gyro biases do not matter; gravity enters once, with the accelerometer's bias as its
+/// uncertainty. in EQUATIONS.md.
+///
+/// Core: fixed memory, no allocation, noexcept. Thread: owner only.
+
+#include <Eigen/Core>
+#include <cstdint>
+
+namespace imuscope {
+
+enum class MountingResult : std::uint8_t {
+  kOk,
+  kTooFewPairs,
+  kTooLittleExcitation,  ///< some direction's sd stays above the limit: at rest or on a straight road
+  kInconsistent,         ///< no rotation makes the pairs match: another time offset, axes or a flipped sign
+};
+
+struct CoarseMounting {
+  Eigen::Matrix3d C_b_s = Eigen::Matrix3d::Identity();
+  /// Covariance of the boresight psi (rotation vector in b, C = C^ Exp(-psi)), rad^2.
+  Eigen::Matrix3d covariance_rad2 = Eigen::Matrix3d::Zero();
+  double rate_correlation = 0.0;  ///< of C_b_s omega_b with omega_s, 0 to 1
+  /// Mean of omega_s - C_b_s omega_b: first estimate of the S gyro bias, s axes.
+  Eigen::Vector3d gyro_bias_s_radps = Eigen::Vector3d::Zero();
+};
+
+struct CoarseMountingOptions {
+  double accel_bias_sd_mps2 = 0.3;  ///< of S against R, as it turns gravity
+  double sd_limit_rad = 0.05;       ///< of the weakest direction
+  int pairs_min = 200;
+};
+
+class CoarseMountingEstimator {
+ public:
+  CoarseMountingEstimator() = default;
+  explicit CoarseMountingEstimator(const CoarseMountingOptions& options) noexcept : options_(options) {}
+
+  /// Adds one pair: the reference's motion at the S sample's time, and the S sample.
+  void add(const Eigen::Vector3d& omega_b_radps, const Eigen::Vector3d& f_b_mps2,
+           const Eigen::Vector3d& omega_s_radps, const Eigen::Vector3d& f_s_mps2) noexcept;
+
+  /// Solves from all pairs since clear(). `out` is written with kOk and kTooLittleExcitation.
+  [[nodiscard]] MountingResult solve(CoarseMounting& out) const noexcept;
+
+  [[nodiscard]] std::int64_t pairs() const noexcept { return pairs_; }
+  void clear() noexcept;
+
+ private:
+  /// Running mean and second moments of a pair of vectors, about the means (Welford's update).
+  struct Moments {
+    void add(const Eigen::Vector3d& b, const Eigen::Vector3d& s, double n) noexcept;
+    Eigen::Vector3d mean_b = Eigen::Vector3d::Zero();
+    Eigen::Vector3d mean_s = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d bb = Eigen::Matrix3d::Zero();  ///< sum of (b - mean)(b - mean)'
+    Eigen::Matrix3d sb = Eigen::Matrix3d::Zero();
+    Eigen::Matrix3d ss = Eigen::Matrix3d::Zero();
+  };
+
+  CoarseMountingOptions options_;
+  Moments rate_;
+  Moments force_;
+  std::int64_t pairs_ = 0;
+};
+
+}  // namespace imuscope

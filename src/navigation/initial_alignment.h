@@ -1,0 +1,171 @@
+#pragma once
+
+/// Finds the first navigation state, so that the filter can start. Three ways, in this order of preference:
+///
+/// 1. the R-IMU's own attitude solution, once it says that its heading is valid;
+/// 2. at rest: level from the mean specific force, heading from the Earth's rate (gyrocompass) where the
+///    gyro's bias and noise leave a heading better than the limit;
+/// 3. in motion, for a MEMS reference: level at rest, carry the attitude on with the gyros from an arbitrary
+///    heading, and find that heading by least squares between the accelerations that the IMU felt and those
+///    that GNSS positions show, over windows of several seconds. Needs no assumption on how the IMU is turned
+///    about the vertical and no GNSS velocity. EQUATIONS.md N-40 to N-47.
+///
+/// All need a GNSS position. Core: fixed memory (about 40 kB), no allocation, noexcept. Thread: owner only.
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/time.h"
+#include "base/units.h"
+#include "navigation/error_model.h"
+#include "navigation/so3.h"
+
+namespace imuscope {
+
+enum class AlignmentMethod : std::uint8_t { kReferenceAttitude, kGyrocompass, kInMotion };
+
+enum class AlignmentStage : std::uint8_t {
+  kWaitingForRest,      ///< no rest seen yet, so no level
+  kWaitingForHeading,   ///< level; heading comes with the gyrocompass's averaging or with motion
+  kWaitingForPosition,  ///< attitude is known, GNSS position is not
+  kDone,
+};
+
+/// Attitude with its sd: rotation vector about north, east, down (phi).
+struct InitialAttitude {
+  Eigen::Matrix3d C_b_n = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d sd_n_rad = Eigen::Vector3d::Zero();
+};
+
+/// Level attitude of an IMU at rest (N-40). Heading is set to the given one; its sd to pi.
+/// @param mean_f_b_mps2   mean specific force at rest
+/// @param sd_f_mps2       of that mean, bias included
+[[nodiscard]] InitialAttitude level_from_rest(const Eigen::Vector3d& mean_f_b_mps2, double sd_f_mps2,
+                                              double heading_rad) noexcept;
+
+/// Level attitude and heading from the Earth's rate (N-41).
+/// @param sd_omega_radps  of the mean rate, bias included
+[[nodiscard]] InitialAttitude gyrocompass(const Eigen::Vector3d& mean_omega_ib_b_radps,
+                                          const Eigen::Vector3d& mean_f_b_mps2, double sd_omega_radps,
+                                          double sd_f_mps2, double latitude_rad) noexcept;
+
+/// Where the filter starts.
+struct InitialNavigation {
+  NavigationState state;
+  HostTime time{};                                           ///< of the newest IMU sample handed in
+  NavigationErrorVector sd = NavigationErrorVector::Zero();  ///< of the error states, in their order
+  AlignmentMethod method = AlignmentMethod::kReferenceAttitude;
+};
+
+struct InitialAlignmentOptions {
+  NavigationProcessNoise reference_noise;  ///< of the R-IMU; its bias sd decides on gyrocompassing
+  Eigen::Vector3d r_ba_b_m = Eigen::Vector3d::Zero();  ///< GNSS antenna's lever arm
+  double heading_sd_limit_rad = 5.0 * kRadPerDeg;      ///< a heading is good enough below this
+  double rest_s = 2.0;                                 ///< least rest for levelling
+  double gyrocompass_s_max = 300.0;                    ///< rest is averaged at most this long
+};
+
+class InitialAligner {
+ public:
+  explicit InitialAligner(const InitialAlignmentOptions& options) noexcept;
+
+  /// Adds one R-IMU sample, not compensated, times strictly rising (others are ignored). After a gap of more
+  /// than 0.5 s the alignment starts afresh.
+  void add_imu(HostTime time, const InertialRates& measured) noexcept;
+
+  /// Adds one GNSS position of the antenna. At most 0.5 s older than the newest IMU sample.
+  /// @param sd_m  NED
+  void add_gnss_position(HostTime time, const GeodeticPosition& antenna,
+                         const Eigen::Vector3d& sd_m) noexcept;
+
+  /// Adds one GNSS velocity; not required.
+  void add_gnss_velocity(HostTime time, const Eigen::Vector3d& v_n_mps,
+                         const Eigen::Vector3d& sd_mps) noexcept;
+
+  /// Adds the R-IMU's own attitude; only hand in attitudes whose roll, pitch and heading are valid.
+  void add_attitude(HostTime time, const EulerAngles& attitude, const Eigen::Vector3d& sd_rpy_rad) noexcept;
+
+  [[nodiscard]] AlignmentStage stage() const noexcept { return stage_; }
+  /// The start, at the newest IMU sample; nullptr before kDone. The aligner runs on, so it stays the newest.
+  [[nodiscard]] const InitialNavigation* result() const noexcept;
+  /// Sd of the heading as known now; pi when nothing is known. For the log.
+  [[nodiscard]] double heading_sd_rad() const noexcept { return heading_sd_rad_; }
+
+ private:
+  /// Antenna position and what the IMU felt up to then, at one GNSS epoch.
+  struct Node {
+    double time_s = 0.0;                                     ///< since origin_time_
+    Eigen::Vector3d position_n_m = Eigen::Vector3d::Zero();  ///< antenna, NED about origin_
+    Eigen::Vector3d felt_a_m = Eigen::Vector3d::Zero();      ///< second integral of C_b_a f + g, plus C_b_a l
+    double sd_m = 0.0;                                       ///< horizontal
+  };
+  static constexpr std::size_t kNodes = 240;
+  /// Second difference of antenna positions, and of what the IMU felt, over one window.
+  struct WindowPair;
+
+  void restart(HostTime time) noexcept;
+  void close_block() noexcept;
+  void relevel() noexcept;
+  void integrate(const InertialRates& end, double dt_s) noexcept;
+  void update_result() noexcept;
+  void solve_heading() noexcept;
+  [[nodiscard]] bool gyrocompass_attitude(InitialAttitude& out) const noexcept;
+  [[nodiscard]] bool position_and_velocity(const Eigen::Matrix3d& C_a_n,
+                                           InitialNavigation& out) const noexcept;
+  void finish(const InitialAttitude& attitude, AlignmentMethod method) noexcept;
+  [[nodiscard]] double seconds(HostTime time) const noexcept;
+  [[nodiscard]] const Node& node(std::size_t index) const noexcept;  ///< 0 = oldest
+
+  InitialAlignmentOptions options_;
+  AlignmentStage stage_ = AlignmentStage::kWaitingForRest;
+  double heading_sd_rad_ = kPi;
+  bool done_ = false;
+  InitialNavigation result_;
+
+  // Newest IMU sample.
+  bool has_imu_ = false;
+  HostTime imu_time_{};
+  InertialRates imu_;
+
+  // Blocks of half a second, and the rest that they make up.
+  InertialRates block_sum_;
+  double block_s_ = 0.0;
+  int block_samples_ = 0;
+  InertialRates rest_mean_;
+  double rest_s_ = 0.0;
+  bool moved_by_gnss_ = false;
+
+  // Frame a: level, of arbitrary heading.
+  bool level_ = false;
+  Eigen::Matrix3d C_b_a_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d gyro_bias_b_radps_ = Eigen::Vector3d::Zero();
+  double gyro_bias_sd_radps_ = 0.0;
+  Eigen::Vector3d a_a_mps2_ = Eigen::Vector3d::Zero();  ///< C_b_a f + g
+  Eigen::Vector3d felt_velocity_a_mps_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d felt_a_m_ = Eigen::Vector3d::Zero();
+
+  // GNSS.
+  bool has_origin_ = false;
+  GeodeticPosition origin_;
+  HostTime origin_time_{};
+  std::array<Node, kNodes> nodes_;
+  std::size_t node_count_ = 0;  ///< ever added since the restart
+  bool has_velocity_ = false;
+  HostTime velocity_time_{};
+  Eigen::Vector3d v_n_mps_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_sd_mps_ = Eigen::Vector3d::Zero();
+
+  // Heading of frame a.
+  bool heading_solved_ = false;
+  double heading_of_a_rad_ = 0.0;
+  Eigen::Vector2d tilt_a_rad_ = Eigen::Vector2d::Zero();
+
+  // R-IMU's own attitude.
+  bool has_attitude_ = false;
+  HostTime attitude_time_{};
+  InitialAttitude reference_attitude_;
+};
+
+}  // namespace imuscope
