@@ -1,0 +1,85 @@
+#pragma once
+
+/// Generalized method of wavelet moments: the parameters of a composite model from a wavelet variance, by the
+/// global minimum of (wv - model)' Omega (wv - model). Deterministic: amplitudes by non-negative least
+/// squares, rates by a grid and a polish; no random starts. An amplitude at zero is exactly zero and is said
+/// to be unsupported.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "noise/model.h"
+#include "noise/wavelet_variance.h"
+
+namespace imuscope::noise {
+
+enum class Weighting : std::uint8_t {
+  kOptimal,  ///< inverse of the wavelet variance's covariance under the model itself, iterated
+  kCi,       ///< 1 / (interval width)^2, diagonal: what the reference packages use
+};
+
+struct FitResult;
+
+struct FitOptions {
+  Weighting weighting = Weighting::kOptimal;
+  int levels = 0;  ///< use only the first so many levels; 0: all
+  double confidence = 0.95;
+  std::string signal_unit;                ///< as printed with the parameters: "rad/s", "m/s^2", "deg/s"
+  const FitResult* warm_start = nullptr;  ///< an earlier fit of the same model: polish from it, no grid
+};
+
+struct FittedLevel {
+  WvLevel observed;
+  double fitted = 0.0;
+  double model_ci_low = 0.0;  ///< interval of the observed value from the fitted model's own covariance
+  double model_ci_high = 0.0;
+};
+
+/// One parameter in the terms of the reference literature at the given rate: WN sigma2; GM beta (1/s) and
+/// sigma2 (variance of the process); RW gamma2 (per sample); QN q2; DR omega (per sample); MA1 theta, sigma2;
+/// ARMA11 phi, theta, sigma2; SIN alpha, frequency (Hz).
+struct ParameterEstimate {
+  std::string process;  ///< "WN", "GM1" (GM in order of falling beta), ...
+  std::string name;     ///< "sigma2", "beta", ...
+  std::string unit;
+  double value = 0.0;
+  std::optional<double> sd;      ///< absent where the parameter is not identifiable
+  std::optional<double> ci_low;  ///< interval on the logarithmic scale (amplitudes, rates)
+  std::optional<double> ci_high;
+  std::optional<double> log_sd;  ///< sd on the scale the interval was made on
+};
+
+/// Test that the model explains the wavelet variance, on the levels with M_j >= 3 * 2^j.
+struct JTest {
+  double statistic = 0.0;
+  int dof = 0;
+  double p_value = 0.0;
+};
+
+struct FitResult {
+  std::uint64_t n = 0;  ///< samples used
+  double rate_hz = 0.0;
+  ModelSpec spec;
+  Weighting weighting = Weighting::kOptimal;
+  std::vector<FittedLevel> wv;
+  std::vector<ParameterEstimate> parameters;
+  Model model;  ///< the estimate in sample terms
+  /// Covariance of the parameters on their interval scale (log for amplitudes and rates), row-major, in the
+  /// order of `parameters`; NaN rows where not identifiable.
+  std::vector<double> covariance;
+  double objective = 0.0;
+  std::optional<JTest> j_test;  ///< absent with fewer levels than parameters + 1
+  double criterion = 0.0;       ///< for the ranking of models of the same signal; smaller is better
+  bool identifiable = true;
+  std::string simpler_model;  ///< where not identifiable: the model to use instead
+  std::vector<std::string> warnings;
+};
+
+/// Errors: rate not positive (kUsage); fewer levels than parameters, constant signal (kWork).
+Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double rate_hz,
+                      const FitOptions& options = {});
+
+}  // namespace imuscope::noise

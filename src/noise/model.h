@@ -1,0 +1,45 @@
+#pragma once
+
+/// A composite noise model: which processes (ModelSpec), and with which values (Model).
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "noise/process.h"
+
+namespace imuscope::noise {
+
+/// The processes of a model, in the order QN, WN, MA1, ARMA11, SIN..., GM..., RW, DR.
+struct ModelSpec {
+  std::vector<ProcessKind> processes;
+
+  [[nodiscard]] std::string name() const;  ///< canonical, such as "WN+2*GM+RW"
+  [[nodiscard]] int parameter_count() const;
+  [[nodiscard]] int count(ProcessKind kind) const;
+  friend bool operator==(const ModelSpec&, const ModelSpec&) = default;
+};
+
+/// Reads "WN+2*GM", "WN + GM + GM", "QN+WN+RW". At most one each of WN, QN, RW, DR, MA1, ARMA11; up to
+/// kMaxRepeated GM and SIN. Errors (kUsage): an unknown or repeated term, named, with the terms that exist.
+Result<ModelSpec> parse_model(std::string_view text);
+
+inline constexpr int kMaxRepeated = 4;
+
+/// A process with values, in sample terms; see process.h for what amplitude and shape mean.
+struct Component {
+  ProcessKind kind = ProcessKind::kWhiteNoise;
+  double amplitude = 0.0;
+  Shape shape{};
+};
+
+/// GM components in order of falling rate.
+struct Model {
+  std::vector<Component> components;
+};
+
+/// Wavelet variance of the model at `level`.
+double model_wv(const Model& model, int level) noexcept;
+
+}  // namespace imuscope::noise

@@ -1,0 +1,181 @@
+#include "noise/process.h"
+
+#include <cmath>
+
+#include "base/contracts.h"
+
+namespace imuscope::noise {
+namespace {
+
+/// Below this n*a the numerator loses digits in closed form and is summed as a power series instead.
+constexpr double kSeriesBelow = 0.5;
+/// phi from which ARMA(1,1) is evaluated as Gauss-Markov plus white noise; below it the closed form is exact.
+constexpr double kArmaSplitAbovePhi = 0.5;
+
+CurvePoint white_noise(double tau) noexcept { return {1.0 / tau, {}}; }
+
+/// sum_{k>=3} (-a)^k / k! (4 (1+n)^k - (1+2n)^k - 3 - n 2^k): the numerator of gauss_markov_wv() for small n
+/// a. The terms k < 3 vanish identically; that is the cancellation.
+CurvePoint series_numerator(double a, double n) noexcept {
+  constexpr double kRelativeStop = 1e-18;
+  constexpr int kMaxTerms = 80;
+  double p_next = 1.0;    // ((1+n) a)^k / k!
+  double p_double = 1.0;  // ((1+2n) a)^k / k!
+  double p_one = 1.0;     // a^k / k!
+  double p_two = 1.0;     // (2a)^k / k!
+  CurvePoint sum;
+  double sign = 1.0;
+  for (int k = 1; k < kMaxTerms; ++k) {
+    p_next *= (1.0 + n) * a / k;
+    p_double *= (1.0 + 2.0 * n) * a / k;
+    p_one *= a / k;
+    p_two *= 2.0 * a / k;
+    sign = -sign;
+    if (k < 3) continue;
+    const double term = sign * (4.0 * p_next - p_double - 3.0 * p_one - n * p_two);
+    sum.value += term;
+    sum.derivative[0] += term * k / a;
+    if (std::abs(term) * k < kRelativeStop * std::abs(sum.value)) break;
+  }
+  return sum;
+}
+
+CurvePoint closed_numerator(double a, double n) noexcept {
+  const double phi = std::exp(-a);
+  const double u = -std::expm1(-n * a);
+  const double du = n * std::exp(-n * a);
+  CurvePoint numerator;
+  numerator.value = -n * std::expm1(-2.0 * a) - phi * u * (2.0 + u);
+  numerator.derivative[0] = 2.0 * n * phi * phi + phi * u * (2.0 + u) - phi * (2.0 + 2.0 * u) * du;
+  return numerator;
+}
+
+CurvePoint moving_average(double theta, double tau) noexcept {
+  const double tau2 = tau * tau;
+  return {((1.0 + theta) * (1.0 + theta) * tau - 6.0 * theta) / tau2,
+          {(2.0 * (1.0 + theta) * tau - 6.0) / tau2, 0.0}};
+}
+
+/// 2 [(th+phi)(1+th phi)(3 - 4 phi^n + phi^2n) + (1+th)^2 (phi^2-1) n] / ((phi-1)^3 (1+phi) tau^2)
+CurvePoint arma_closed(double phi, double theta, double n) noexcept {
+  const double tau = 2.0 * n;
+  const double phi_n = std::pow(phi, n);
+  const double dphi_n = n * std::pow(phi, n - 1.0);
+  const double cross = (theta + phi) * (1.0 + theta * phi);
+  const double power = 3.0 - 4.0 * phi_n + phi_n * phi_n;
+  const double gain = (1.0 + theta) * (1.0 + theta);
+  const double numerator = 2.0 * (cross * power + gain * (phi * phi - 1.0) * n);
+  const double denominator = std::pow(phi - 1.0, 3) * (1.0 + phi) * tau * tau;
+  const double value = numerator / denominator;
+  const double dcross_dphi = (1.0 + theta * phi) + (theta + phi) * theta;
+  const double dcross_dtheta = (1.0 + theta * phi) + (theta + phi) * phi;
+  const double dpower = (-4.0 + 2.0 * phi_n) * dphi_n;
+  const double dnum_dphi = 2.0 * (dcross_dphi * power + cross * dpower + gain * 2.0 * phi * n);
+  const double dnum_dtheta = 2.0 * (dcross_dtheta * power + 2.0 * (1.0 + theta) * (phi * phi - 1.0) * n);
+  const double dlog_denominator = 3.0 / (phi - 1.0) + 1.0 / (1.0 + phi);
+  return {value, {dnum_dphi / denominator - value * dlog_denominator, dnum_dtheta / denominator}};
+}
+
+/// The same curve as variance (g1/phi) of a Gauss-Markov process plus white noise of variance g0 - g1/phi,
+/// where g0, g1 are the autocovariances at lags 0 and 1.
+CurvePoint arma_split(double phi, double theta, int level) noexcept {
+  const double tau = std::ldexp(1.0, level);
+  const CurvePoint gm = gauss_markov_wv(-std::log(phi), level);
+  const double gm_dphi = -gm.derivative[0] / phi;
+  const double one = (1.0 - phi) * (1.0 + phi);
+  const double cross = (theta + phi) * (1.0 + theta * phi);
+  const double share = cross / (phi * one);
+  const double dshare_dtheta = ((1.0 + theta * phi) + (theta + phi) * phi) / (phi * one);
+  const double dcross_dphi = (1.0 + theta * phi) + (theta + phi) * theta;
+  const double dshare_dphi = dcross_dphi / (phi * one) - share * (1.0 / phi - 2.0 * phi / one);
+  const double white = -theta / phi;  // g0 - g1/phi, which simplifies to this
+  return {share * gm.value + white / tau,
+          {dshare_dphi * gm.value + share * gm_dphi + theta / (phi * phi) / tau,
+           dshare_dtheta * gm.value - 1.0 / (phi * tau)}};
+}
+
+CurvePoint sinusoid(double b, double n) noexcept {
+  const double half = 0.5 * b;
+  const double s1 = std::sin(half);
+  const double sn = std::sin(n * half);
+  const double ratio = sn / (n * s1);
+  const double value = 0.5 * ratio * ratio * sn * sn;
+  // d/db = value (2n cot(nb/2) - cot(b/2)), written without the division by sin(nb/2).
+  const double derivative = ratio * ratio * sn * n * std::cos(n * half) - value * std::cos(half) / s1;
+  return {value, {derivative, 0.0}};
+}
+
+}  // namespace
+
+std::string_view short_name(ProcessKind kind) noexcept {
+  switch (kind) {
+    case ProcessKind::kQuantization:
+      return "QN";
+    case ProcessKind::kWhiteNoise:
+      return "WN";
+    case ProcessKind::kMa1:
+      return "MA1";
+    case ProcessKind::kArma11:
+      return "ARMA11";
+    case ProcessKind::kSinusoid:
+      return "SIN";
+    case ProcessKind::kGaussMarkov:
+      return "GM";
+    case ProcessKind::kRandomWalk:
+      return "RW";
+    case ProcessKind::kRamp:
+      return "DR";
+  }
+  return "?";
+}
+
+int shape_count(ProcessKind kind) noexcept {
+  switch (kind) {
+    case ProcessKind::kArma11:
+      return 2;
+    case ProcessKind::kMa1:
+    case ProcessKind::kSinusoid:
+    case ProcessKind::kGaussMarkov:
+      return 1;
+    default:
+      return 0;
+  }
+}
+
+CurvePoint gauss_markov_wv(double a, int level) noexcept {
+  IMUSCOPE_EXPECTS(a > 0.0 && level >= 1 && level <= kMaxLevel);
+  const double n = std::ldexp(1.0, level - 1);
+  const CurvePoint numerator = n * a < kSeriesBelow ? series_numerator(a, n) : closed_numerator(a, n);
+  const double v = -std::expm1(-a);
+  const double denominator = 2.0 * n * n * v * v;
+  const double value = numerator.value / denominator;
+  return {value, {numerator.derivative[0] / denominator - value * 2.0 * std::exp(-a) / v, 0.0}};
+}
+
+CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
+  IMUSCOPE_EXPECTS(level >= 1 && level <= kMaxLevel);
+  const double tau = std::ldexp(1.0, level);
+  const double n = 0.5 * tau;
+  switch (kind) {
+    case ProcessKind::kWhiteNoise:
+      return white_noise(tau);
+    case ProcessKind::kQuantization:
+      return {6.0 / (tau * tau), {}};
+    case ProcessKind::kRandomWalk:
+      return {(tau * tau + 2.0) / (12.0 * tau), {}};
+    case ProcessKind::kRamp:
+      return {tau * tau / 16.0, {}};
+    case ProcessKind::kGaussMarkov:
+      return gauss_markov_wv(shape[0], level);
+    case ProcessKind::kMa1:
+      return moving_average(shape[0], tau);
+    case ProcessKind::kSinusoid:
+      return sinusoid(shape[0], n);
+    case ProcessKind::kArma11:
+      return shape[0] > kArmaSplitAbovePhi ? arma_split(shape[0], shape[1], level)
+                                           : arma_closed(shape[0], shape[1], n);
+  }
+  return {};
+}
+
+}  // namespace imuscope::noise

@@ -1,0 +1,262 @@
+#include "noise/wavelet_variance.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <random>
+
+#include "noise/robust_scale.h"
+#include "oracle_files.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::noise {
+namespace {
+
+using test::read_series;
+using test::read_table;
+using testing::HasSubstr;
+
+std::vector<double> integers_of_s07() {
+  std::vector<double> x;
+  for (int t = 0; t < 1000; ++t) x.push_back((7919 * t) % 101 - 50);
+  return x;
+}
+
+std::vector<double> white(std::size_t n, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> x(n);
+  for (double& v : x) v = normal(random);
+  return x;
+}
+
+/// Straight from the definition, in long double.
+double by_definition(const std::vector<double>& x, int level) {
+  const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
+  long double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t t = 2 * n; t <= x.size(); ++t, ++count) {
+    long double newer = 0;
+    long double older = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      newer += x[t - 1 - i];
+      older += x[t - 1 - n - i];
+    }
+    const long double w = (newer - older) / static_cast<long double>(2 * n);
+    sum += w * w;
+  }
+  return static_cast<double>(sum / static_cast<long double>(count));
+}
+
+double relative(double value, double expected) { return std::abs(value - expected) / std::abs(expected); }
+
+TEST(WaveletVariance, AgreesWithItsDefinitionOnWhiteNoiseOfOddLength) {
+  const auto x = white(1013, 1);
+  const auto wv = haar_wavelet_variance(x);
+  ASSERT_TRUE(wv) << wv.error().text();
+  ASSERT_EQ(wv->levels.size(), 9U);
+  for (const auto& level : wv->levels) {
+    EXPECT_LT(relative(level.value, by_definition(x, level.level)), 1e-13) << "level " << level.level;
+    EXPECT_EQ(level.n_coefficients, x.size() - (std::size_t{1} << static_cast<unsigned>(level.level)) + 1);
+  }
+}
+
+TEST(WaveletVariance, EveryClassicalLevelAndIntervalOfTheOracleIsReproducedTo1em10) {
+  IMUSCOPE_NEEDS_SHARED("oracle/gmwm/wv_oracle.csv");
+  std::map<std::string, WaveletVariance> computed;
+  int compared = 0;
+  for (auto& row : read_table("wv_oracle.csv")) {
+    if (row["type"] != "classical") continue;
+    const std::string& name = row["series"];
+    if (!computed.contains(name)) {
+      const auto x = name == "s07_integer_n1000" ? integers_of_s07() : read_series(name);
+      ASSERT_FALSE(x.empty()) << "series " << name << " is missing";
+      computed[name] = haar_wavelet_variance(x).value();
+    }
+    const auto& level = computed[name].levels.at(static_cast<std::size_t>(std::stoi(row["j"]) - 1));
+    EXPECT_LT(relative(level.value, std::stod(row["wv"])), 1e-10) << name << " level " << row["j"];
+    EXPECT_LT(relative(level.ci_low, std::stod(row["ci_low"])), 1e-10) << name << " level " << row["j"];
+    EXPECT_LT(relative(level.ci_high, std::stod(row["ci_high"])), 1e-10) << name << " level " << row["j"];
+    EXPECT_EQ(level.n_coefficients, std::stoull(row["n_coef"])) << name << " level " << row["j"];
+    ++compared;
+  }
+  EXPECT_GE(compared, 237);
+}
+
+TEST(WaveletVariance, RobustLevelsAreTheRootsOfTheEstimatingEquationWithTheRightConstant) {
+  IMUSCOPE_NEEDS_SHARED("oracle/gmwm/robust_wv_root_correct_c.csv");
+  for (auto& row : read_table("robust_wv_root_correct_c.csv")) {
+    const auto x = row["series"] == "s07_integer_n1000" ? integers_of_s07() : read_series(row["series"]);
+    ASSERT_FALSE(x.empty()) << row["series"];
+    WvOptions options;
+    options.robust = RobustOptions{};
+    options.levels = std::stoi(row["j"]);
+    const auto wv = haar_wavelet_variance(x, options).value();
+    EXPECT_LT(relative(wv.levels.back().value, std::stod(row["robust_wv_exact_root"])), 1e-9)
+        << row["series"] << " level " << row["j"];
+  }
+}
+
+TEST(WaveletVariance, RobustLevelsWithTheOtherSoftwaresConstantAreItsRoots) {
+  IMUSCOPE_NEEDS_SHARED("oracle/gmwm/robust_wv_root_pkg_constant.csv");
+  for (auto& row : read_table("robust_wv_root_pkg_constant.csv")) {
+    const auto x = row["series"] == "s07_integer_n1000" ? integers_of_s07() : read_series(row["series"]);
+    ASSERT_FALSE(x.empty()) << row["series"];
+    WvOptions options;
+    options.robust = RobustOptions{0.6, 4.973362134};
+    options.levels = std::stoi(row["j"]);
+    const auto wv = haar_wavelet_variance(x, options).value();
+    EXPECT_LT(relative(wv.levels.back().value, std::stod(row["robust_wv_exact_root"])), 1e-8)
+        << row["series"] << " level " << row["j"];
+  }
+}
+
+// Quadrature to 40 digits, rounded.
+TEST(RobustScale, TuningConstantsHaveTheEfficiencyTheyPromise) {
+  EXPECT_NEAR(biweight_constant(0.60), 4.400278056, 2e-9);
+  EXPECT_NEAR(biweight_constant(0.80), 5.448855123, 2e-9);
+  EXPECT_NEAR(biweight_constant(0.90), 6.583978572, 2e-9);
+  EXPECT_NEAR(biweight_constant(0.95), 7.878543797, 2e-9);
+  EXPECT_NEAR(biweight_expectation(4.400278056), 0.5691688598, 2e-10);
+  EXPECT_NEAR(biweight_efficiency(4.973362134), 0.7270, 5e-5);
+}
+
+TEST(RobustScale, EfficiencyOnGaussianDrawsIsTheOnePromised) {
+  const double c = biweight_constant(0.6);
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 2000;
+  constexpr std::size_t kLength = 400;
+  double mean = 0;
+  double square = 0;
+  std::vector<double> w(kLength);
+  for (int i = 0; i < kDraws; ++i) {
+    for (double& v : w) v = normal(random);
+    const double s2 = biweight_scale(w, c).s2;
+    mean += s2 / kDraws;
+    square += s2 * s2 / kDraws;
+  }
+  const double efficiency = (2.0 / kLength) / (square - mean * mean);
+  // The sampling error of a variance from 2000 draws is 3.2 %.
+  EXPECT_NEAR(efficiency, 0.6, 0.06);
+}
+
+TEST(WaveletVariance, RobustLevelsOneToThreeSurviveOnePercentOfSpikesOf1e4) {
+  auto x = white(4096, 3);
+  for (std::size_t i = 50; i < x.size(); i += 100) x[i] += 1e4;
+  WvOptions options;
+  options.robust = RobustOptions{};
+  options.levels = 3;
+  const auto wv = haar_wavelet_variance(x, options).value();
+  // A spike rejects 2^level coefficients; what remains is slightly diluted.
+  EXPECT_NEAR(wv.levels[0].value, 0.5, 0.05);
+  EXPECT_NEAR(wv.levels[1].value, 0.25, 0.03);
+  EXPECT_NEAR(wv.levels[2].value, 0.125, 0.02);
+  EXPECT_NEAR(wv.levels[0].rejected_share, 0.02, 0.002);
+}
+
+TEST(WaveletVariance, RobustLevelsOfAPureRampAreNotZero) {
+  std::vector<double> x(3000);
+  std::iota(x.begin(), x.end(), 0.0);
+  WvOptions options;
+  options.robust = RobustOptions{};
+  const auto wv = haar_wavelet_variance(x, options).value();
+  const auto classical = haar_wavelet_variance(x).value();
+  for (std::size_t i = 0; i < wv.levels.size(); ++i) {
+    EXPECT_GT(wv.levels[i].value, 0.5 * classical.levels[i].value) << "level " << i + 1;
+    EXPECT_DOUBLE_EQ(classical.levels[i].value, std::pow(4.0, static_cast<double>(i + 1)) / 16.0);
+  }
+}
+
+TEST(WaveletVariance, AnOffsetThatTheInputCarriesExactlyChangesNothing) {
+  auto x = white(5000, 4);
+  for (double& v : x) v = std::round(v * 1024.0) / 1024.0;  // so that the sum with 2^30 is exact
+  auto shifted = x;
+  for (double& v : shifted) v += 1073741824.0;
+  const auto a = haar_wavelet_variance(x).value();
+  const auto b = haar_wavelet_variance(shifted).value();
+  for (std::size_t i = 0; i < a.levels.size(); ++i) {
+    EXPECT_LT(relative(b.levels[i].value, a.levels[i].value), 1e-12) << "level " << i + 1;
+  }
+}
+
+TEST(WaveletVariance, AMaskKeepsOnlyCoefficientsWhoseWholeSupportIsValid) {
+  const auto x = white(700, 5);
+  std::vector<std::uint8_t> mask(x.size(), 1);
+  mask[300] = 0;
+  for (std::size_t i = 500; i < 520; ++i) mask[i] = 0;
+  WvOptions options;
+  options.mask = mask;
+  const auto wv = haar_wavelet_variance(x, options).value();
+  ASSERT_EQ(wv.levels.size(), 8U);  // the longest run has 300
+  for (const auto& level : wv.levels) {
+    const auto width = static_cast<std::size_t>(level.tau_samples);
+    double sum = 0;
+    std::uint64_t count = 0;
+    for (std::size_t t = width; t <= x.size(); ++t) {
+      if (std::count(mask.begin() + static_cast<long>(t - width), mask.begin() + static_cast<long>(t), 0) !=
+          0)
+        continue;
+      double w = 0;
+      for (std::size_t i = 0; i < width; ++i) w += (i < width / 2 ? 1.0 : -1.0) * x[t - 1 - i];
+      sum += w * w / (level.tau_samples * level.tau_samples);
+      ++count;
+    }
+    EXPECT_EQ(level.n_coefficients, count) << "level " << level.level;
+    EXPECT_LT(relative(level.value, sum / static_cast<double>(count)), 1e-12) << "level " << level.level;
+  }
+}
+
+TEST(WaveletVariance, AValueThatIsNotFiniteIsToldWithItsPlaceOrCountsAsAGap) {
+  auto x = white(100, 6);
+  x[37] = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = haar_wavelet_variance(x);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), HasSubstr("sample 37"));
+  WvOptions options;
+  options.nan_is_gap = true;
+  const auto wv = haar_wavelet_variance(x, options);
+  ASSERT_TRUE(wv) << wv.error().text();
+  EXPECT_EQ(wv->n_valid, 99U);
+  EXPECT_EQ(wv->levels[0].n_coefficients, 36U + 61U);
+}
+
+TEST(WaveletVariance, OneSampleIsRefusedAndTwoGiveOneLevel) {
+  EXPECT_FALSE(haar_wavelet_variance(std::vector<double>{1.0}));
+  EXPECT_FALSE(haar_wavelet_variance(std::vector<double>{}));
+  const auto wv = haar_wavelet_variance(std::vector<double>{1.0, 3.0});
+  ASSERT_TRUE(wv);
+  ASSERT_EQ(wv->levels.size(), 1U);
+  EXPECT_DOUBLE_EQ(wv->levels[0].value, 1.0);
+}
+
+TEST(WaveletVariance, APowerOfTwoKeepsItsLastLevelWithOneCoefficient) {
+  const auto x = white(64, 8);
+  const auto wv = haar_wavelet_variance(x).value();
+  ASSERT_EQ(wv.levels.size(), 6U);
+  EXPECT_EQ(wv.levels.back().n_coefficients, 1U);
+  EXPECT_LT(relative(wv.levels.back().value, by_definition(x, 6)), 1e-12);
+}
+
+TEST(WaveletVariance, AConstantSignalHasZeroAtEveryLevelClassicalAndRobust) {
+  const std::vector<double> x(256, -3.25);
+  WvOptions options;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (const auto& level : haar_wavelet_variance(x, options).value().levels) EXPECT_EQ(level.value, 0.0);
+    options.robust = RobustOptions{};
+  }
+}
+
+TEST(WaveletVariance, MoreLevelsThanTheDataAllowAreRefusedWithTheNumberThatWorks) {
+  WvOptions options;
+  options.levels = 11;
+  const auto refused = haar_wavelet_variance(white(1000, 9), options);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), HasSubstr("at most 9"));
+}
+
+}  // namespace
+}  // namespace imuscope::noise
