@@ -32,39 +32,9 @@ std::vector<std::string_view> words(const std::array<std::string_view, N>& names
 bool is_gnss(Protocol protocol) { return protocol == Protocol::kGreis || protocol == Protocol::kCsvGnss; }
 bool is_csv(Protocol protocol) { return protocol == Protocol::kCsvImu || protocol == Protocol::kCsvGnss; }
 
-// Defaults of the reference: Ixsea Airins, the noise and bias of the public data sheet class (noise below
-// 0.0015 deg/sqrt(h), bias below 0.01 deg/h), as in the calibration study the filter was designed on.
-ImuNoiseConfig default_reference_noise(double rate_hz) {
-  ImuNoiseConfig noise;
-  noise.gyro_white_sd_radps = 0.0015 * kRadPerDeg / 60.0 * std::sqrt(rate_hz);
-  noise.accel_white_sd_mps2 = 10.0 * kMps2PerMicroG * std::sqrt(rate_hz);
-  noise.gyro_bias_sd_radps = 0.005 * kRadPerDeg / kSecondsPerHour;
-  noise.accel_bias_sd_mps2 = 5e-4;
-  return noise;
-}
-
-// Defaults of an S-IMU: XSens MTx. Gyroscope after Table II of Stebler et al. (2014), the fast Gauss-Markov
-// process folded into the white noise at its low-frequency equivalent (0.854 and 0.613 (deg/s)^2 per sample);
-// accelerometer and turn-on biases of the MTx's data sheet class.
-ImuNoiseConfig default_study_noise() {
-  ImuNoiseConfig noise;
-  noise.gyro_white_sd_radps = std::sqrt(0.854) * kRadPerDeg;
-  noise.gyro_white_sd_static_radps = std::sqrt(0.613) * kRadPerDeg;
-  noise.gyro_bias_sd_radps = 0.3 * kRadPerDeg;
-  noise.gyro_gm_sd_radps = std::sqrt(0.00981) * kRadPerDeg;
-  noise.gyro_gm_tau_s = 645.0;
-  noise.accel_white_sd_mps2 = 0.03;
-  noise.accel_bias_sd_mps2 = 0.05;
-  noise.accel_gm_sd_mps2 = 0.02;
-  noise.accel_gm_tau_s = 645.0;
-  noise.gyro_scale_sd = 0.003;
-  noise.accel_scale_sd = 0.003;
-  return noise;
-}
-
 /// White noise can be given per sample or as a density; not both.
-void read_white(TomlReader& in, double& sd, std::string_view per_sample_key, double per_sample_unit,
-                std::string_view density_key, double density_unit, double rate_hz) {
+void read_white(TomlReader& in, std::optional<double>& sd, std::string_view per_sample_key,
+                double per_sample_unit, std::string_view density_key, double density_unit, double rate_hz) {
   if (in.has(per_sample_key) && in.has(density_key)) {
     in.fail(density_key, fmt::format("says again what {} says", per_sample_key), "keep one of the two");
   }
@@ -235,12 +205,7 @@ DeviceConfig read_device(TomlReader in) {
   if (device.protocol == Protocol::kIxblueStdbin) device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
   read_axes(in, device.axes);
   read_transport(in.table("transport"), device.serial);
-  device.noise =
-      device.role == DeviceRole::kReference ? default_reference_noise(device.rate_hz) : default_study_noise();
   read_noise(in.table("noise"), device.rate_hz, device.noise);
-  device.prior.boresight_sd_rad = 2.0 * kRadPerDeg;
-  device.prior.lever_arm_sd_m = 1.0;
-  device.prior.time_offset_sd_s = 0.010;
   read_prior(in.table("prior"), device.prior);
   if (is_csv(device.protocol)) read_csv(in.table("csv"), device.csv);
   if (device.role == DeviceRole::kGnss) {

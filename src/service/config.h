@@ -30,30 +30,31 @@ struct SerialConfig {
   int stop_bits = 1;
 };
 
-/// What the filter assumes of an IMU's errors. White noise is per sample at the device's rate.
+/// What the filter is told of an IMU's errors, where it differs from the estimator's defaults (a
+/// navigation-grade reference, MTx-class S-IMUs). White noise is per sample at the device's rate.
 struct ImuNoiseConfig {
-  double gyro_white_sd_radps = 0.0;         ///< in motion
-  double gyro_white_sd_static_radps = 0.0;  ///< at rest
-  double gyro_bias_sd_radps = 0.0;          ///< turn-on bias, 1 sigma
-  double gyro_gm_sd_radps = 0.0;            ///< stationary sd of the slow Gauss-Markov bias
-  double gyro_gm_tau_s = 0.0;               ///< its correlation time
-  double accel_white_sd_mps2 = 0.0;
-  double accel_white_sd_static_mps2 = 0.0;
-  double accel_bias_sd_mps2 = 0.0;
-  double accel_gm_sd_mps2 = 0.0;
-  double accel_gm_tau_s = 0.0;
-  double gyro_scale_sd = 0.0;  ///< 1 sigma, fraction
-  double accel_scale_sd = 0.0;
+  std::optional<double> gyro_white_sd_radps;         ///< replaces the default model's fast processes too
+  std::optional<double> gyro_white_sd_static_radps;  ///< at rest; the one in motion where absent
+  std::optional<double> gyro_bias_sd_radps;          ///< turn-on bias, 1 sigma
+  std::optional<double> gyro_gm_sd_radps;            ///< stationary sd of the slow Gauss-Markov bias
+  std::optional<double> gyro_gm_tau_s;               ///< its correlation time
+  std::optional<double> accel_white_sd_mps2;
+  std::optional<double> accel_white_sd_static_mps2;
+  std::optional<double> accel_bias_sd_mps2;
+  std::optional<double> accel_gm_sd_mps2;
+  std::optional<double> accel_gm_tau_s;
+  std::optional<double> gyro_scale_sd;  ///< 1 sigma, fraction
+  std::optional<double> accel_scale_sd;
 };
 
 /// What is known of a mounting beforehand. Without a rotation the estimator finds the mounting by itself.
 struct MountingPriorConfig {
   std::optional<std::array<double, 9>> C_b_s;  ///< row-major
-  double boresight_sd_rad = 0.0;
+  std::optional<double> boresight_sd_rad;
   Vector3 r_bs_b_m{};
-  double lever_arm_sd_m = 0.0;
+  std::optional<double> lever_arm_sd_m;
   std::optional<double> time_offset_s;  ///< to be added to the S time; searched for where absent
-  double time_offset_sd_s = 0.0;
+  std::optional<double> time_offset_sd_s;
 };
 
 /// Columns of a CSV device. See drivers/csv.

@@ -8,7 +8,7 @@ namespace imuscope {
 
 Core::Core(const EstimatorConfig& config, std::size_t n_devices, std::vector<LateSample> late_samples,
            HistorySink* history)
-    : estimator_(config, history), late_samples_(n_devices) {
+    : estimator_(config, history), reference_(config.reference.device), late_samples_(n_devices) {
   for (std::size_t i = 0; i < n_devices; ++i) rings_.push_back(std::make_unique<SampleRing>());
   std::sort(late_samples.begin(), late_samples.end(),
             [](const LateSample& a, const LateSample& b) { return a.sequence < b.sequence; });
@@ -42,8 +42,21 @@ void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
     if (oldest->arrival <= previous_cut_) {
       sink.on_late_sample({oldest->device, oldest->sequence, index});
     }
+    note_first_reference(*oldest);
     estimator_.add(*oldest);
     next->pop();
+  }
+}
+
+void Core::note_first_reference(const Sample& sample) noexcept {
+  if (sample.device != reference_ || sample.kind != SampleKind::kImu) return;
+  if (!snapshot_.has_reference) {
+    snapshot_.has_reference = true;
+    snapshot_.first_reference_time = sample.time;
+  }
+  if (!snapshot_.has_utc && sample.has_utc) {
+    snapshot_.has_utc = true;
+    snapshot_.first_reference_utc = sample.utc - (sample.time - snapshot_.first_reference_time);
   }
 }
 
@@ -55,7 +68,9 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
 
   for (const auto& event : estimator_.events()) sink.on_event(event);
   for (const auto& epoch : estimator_.epochs()) {
-    if (epoch.calibrating) sink.on_error({epoch.study, live_error_row(epoch)});
+    if (epoch.calibrating) {
+      sink.on_error({epoch.study, snapshot_.first_reference_time, live_error_row(epoch)});
+    }
   }
   if (index % kTicksPerSnapshot != 0) return;
   snapshot_.tick = index;

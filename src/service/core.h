@@ -30,6 +30,10 @@ using SampleRing = SpscRing<Sample, 1024>;
 struct Snapshot {
   std::int64_t tick;
   HostTime cut;
+  bool has_reference;             ///< a first R-IMU epoch has been seen
+  HostTime first_reference_time;  ///< its time of validity: the origin of time_s in every file
+  bool has_utc;
+  UtcTime first_reference_utc;
   std::size_t n_studies;
   NavigationOutput navigation;
   std::array<StudyOutput, kMaxStudies> studies;
@@ -40,6 +44,7 @@ static_assert(std::is_trivially_copyable_v<Snapshot>);
 /// One row of the error process on its way out of the core.
 struct ErrorRecord {
   std::size_t study;
+  HostTime first_reference_time;  ///< origin of time_s
   ErrorRow row;
 };
 static_assert(std::is_trivially_copyable_v<ErrorRecord>);
@@ -82,8 +87,10 @@ class Core {
  private:
   [[nodiscard]] bool held_back(const Sample& sample, std::int64_t index) const noexcept;
   void consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
+  void note_first_reference(const Sample& sample) noexcept;
 
   Estimator estimator_;
+  DeviceIndex reference_;
   std::vector<std::unique_ptr<SampleRing>> rings_;
   std::vector<std::vector<LateSample>> late_samples_;  ///< per device, by sequence
   HostTime previous_cut_{HostTime::min()};

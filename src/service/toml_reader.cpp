@@ -103,6 +103,13 @@ void TomlReader::number(std::string_view key, double& value, double unit, double
   value = *read * unit;
 }
 
+void TomlReader::number(std::string_view key, std::optional<double>& value, double unit, double low,
+                        double high) {
+  double read = 0.0;
+  number(key, read, unit, low, high);
+  if (has(key)) value = read;
+}
+
 void TomlReader::integer(std::string_view key, int& value, int low, int high) {
   double read = value;
   number(key, read, 1.0, low, high);

@@ -34,6 +34,7 @@ class TomlReader {
   void boolean(std::string_view key, bool& value);
   /// A number in [low, high], multiplied by `unit` into `value`.
   void number(std::string_view key, double& value, double unit, double low, double high);
+  void number(std::string_view key, std::optional<double>& value, double unit, double low, double high);
   void integer(std::string_view key, int& value, int low, int high);
   void vector(std::string_view key, std::array<double, 3>& value, double unit);
   void texts(std::string_view key, std::array<std::string, 3>& value);

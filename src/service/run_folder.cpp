@@ -1,0 +1,292 @@
+#include "service/run_folder.h"
+
+#include <fmt/format.h>
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "base/units.h"
+
+namespace imuscope {
+
+namespace {
+
+constexpr std::array kAxes{'x', 'y', 'z'};
+
+std::string navigation_header() {
+  return "time_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_deg,"
+         "sd_n_m,sd_e_m,sd_d_m,sd_v_n_mps,sd_v_e_mps,sd_v_d_mps,sd_roll_deg,sd_pitch_deg,sd_heading_deg\n";
+}
+
+/// Columns of calibration_NAME.csv that carry an sd, in order.
+std::vector<std::string> calibration_columns() {
+  std::vector<std::string> names;
+  for (const char axis : kAxes) names.push_back(fmt::format("psi_{}_deg", axis));
+  for (const char axis : kAxes) names.push_back(fmt::format("r_{}_m", axis));
+  names.emplace_back("t_d_ms");
+  for (const char axis : kAxes) names.push_back(fmt::format("bg_{}_radps", axis));
+  for (const char axis : kAxes) names.push_back(fmt::format("ba_{}_mps2", axis));
+  for (const char axis : kAxes) names.push_back(fmt::format("sg_{}", axis));
+  for (const char axis : kAxes) names.push_back(fmt::format("sa_{}", axis));
+  return names;
+}
+
+constexpr std::size_t kPsiColumns = 3;
+
+std::string calibration_header() {
+  const auto names = calibration_columns();
+  std::string header = "time_s";
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i == kPsiColumns) header += ",q_w,q_x,q_y,q_z";
+    header += "," + names[i];
+  }
+  for (const auto& name : names) header += ",sd_" + name;
+  return header + "\n";
+}
+
+Eigen::Quaterniond quaternion_of(const Matrix3& C_b_s) {
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(C_b_s.data());
+  Eigen::Quaterniond q(Eigen::Matrix3d{C});
+  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
+  return q;
+}
+
+void append(fmt::memory_buffer& row, const Vector3& v, double unit) {
+  for (const double value : v) fmt::format_to(std::back_inserter(row), ",{}", value * unit);
+}
+
+nlohmann::json numbers(const Vector3& v, double unit = 1.0) {
+  return {v[0] * unit, v[1] * unit, v[2] * unit};
+}
+
+constexpr std::array kDirectionNames{"psi_x", "psi_y", "psi_z", "r_x", "r_y", "r_z"};
+
+}  // namespace
+
+Result<void> CsvFile::open(const std::filesystem::path& file, const std::string& header) {
+  file_ = file;
+  out_.open(file, std::ios::binary | std::ios::trunc);
+  if (!out_) {
+    return work_error(fmt::format("{} cannot be written", file.string()),
+                      "check the folder's permissions and space");
+  }
+  out_ << header;
+  return {};
+}
+
+void CsvFile::append(std::string_view rows) {
+  out_.write(rows.data(), static_cast<std::streamsize>(rows.size()));
+}
+
+Result<void> CsvFile::close() {
+  if (!out_.is_open()) return {};
+  out_.close();
+  if (out_.fail()) {
+    return work_error(fmt::format("{} could not be written to its end", file_.string()),
+                      "check the disk's free space");
+  }
+  return {};
+}
+
+Result<void> write_json(const std::filesystem::path& file, const nlohmann::json& document) {
+  CsvFile out;
+  if (auto opened = out.open(file, document.dump(2) + "\n"); !opened) return opened;
+  return out.close();
+}
+
+void SampleTimeLine::add(std::int64_t counter, double time_s) {
+  if (n_ == 0.0) counter0_ = counter;
+  const auto c = static_cast<double>(counter - counter0_);
+  n_ += 1.0;
+  const double delta_c = c - mean_c_;
+  mean_c_ += delta_c / n_;
+  const double delta_t = time_s - mean_t_;
+  mean_t_ += delta_t / n_;
+  sum_cc_ += delta_c * (c - mean_c_);
+  sum_ct_ += delta_c * (time_s - mean_t_);
+}
+
+double SampleTimeLine::period_s() const { return sum_ct_ / sum_cc_; }
+double SampleTimeLine::t0_s() const { return mean_t_ - period_s() * mean_c_; }
+
+std::string error_csv_header() {
+  return "time_s,counter,e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,"
+         "e_accel_z_mps2,regime\n";
+}
+
+std::string error_csv_row(const ErrorRow& row, double time_s) {
+  fmt::memory_buffer text;
+  fmt::format_to(std::back_inserter(text), "{},{}", time_s, row.counter);
+  // An invalid triad is an empty field: nothing is invented.
+  for (std::size_t i = 0; i < 3; ++i) {
+    row.gyro_valid ? fmt::format_to(std::back_inserter(text), ",{}", row.e_gyro_radps[i])
+                   : fmt::format_to(std::back_inserter(text), ",");
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    row.accel_valid ? fmt::format_to(std::back_inserter(text), ",{}", row.e_accel_mps2[i])
+                    : fmt::format_to(std::back_inserter(text), ",");
+  }
+  fmt::format_to(std::back_inserter(text), ",{}\n", row.regime == Regime::kStatic ? "static" : "dynamic");
+  return fmt::to_string(text);
+}
+
+nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& study,
+                                const SampleTimeLine& times) {
+  const auto q = quaternion_of(study.C_b_s);
+  nlohmann::json imu;
+  imu["name"] = info.name;
+  imu["C_b_s"] = study.C_b_s;
+  imu["C_prior"] = study.C_prior;
+  imu["q_b_s"] = {q.w(), q.x(), q.y(), q.z()};
+  imu["boresight_sd_deg"] = numbers(study.sd_psi_rad, kDegPerRad);
+  imu["r_bs_b_m"] = study.r_bs_b_m;
+  imu["r_bs_b_sd_m"] = study.sd_r_bs_b_m;
+  imu["t_d_s"] = study.t_d_s + info.clock_shift_s;
+  imu["t_d_sd_s"] = study.sd_t_d_s;
+  if (times.valid()) {
+    imu["sample_time"] = {
+        {"counter0", times.counter0()}, {"t0_s", times.t0_s() + study.t_d_s}, {"period_s", times.period_s()}};
+  } else {
+    imu["sample_time"] = nullptr;
+  }
+  imu["gyro_bias_radps"] = study.gyro_bias_radps;
+  imu["gyro_bias_sd_radps"] = study.sd_gyro_bias_radps;
+  imu["accel_bias_mps2"] = study.accel_bias_mps2;
+  imu["accel_bias_sd_mps2"] = study.sd_accel_bias_mps2;
+  imu["gyro_scale"] = study.gyro_scale;
+  imu["gyro_scale_sd"] = study.sd_gyro_scale;
+  imu["accel_scale"] = study.accel_scale;
+  imu["accel_scale_sd"] = study.sd_accel_scale;
+  imu["covariance_psi_r"] = study.covariance_psi_r;
+  nlohmann::json observable;
+  for (std::size_t i = 0; i < kDirectionNames.size(); ++i)
+    observable[kDirectionNames[i]] = study.observable[i];
+  observable["t_d"] = study.t_d_observable;
+  imu["observable"] = observable;
+  imu["weakest_direction"] = kDirectionNames[static_cast<std::size_t>(study.weakest_component)];
+  constexpr std::array kStatusNames{"waiting", "coarse", "converging", "calibrated"};
+  imu["status"] = kStatusNames[static_cast<std::size_t>(study.status)];
+  imu["method"] = "filter end value";
+  imu["samples"] = {{"received", study.counters.samples},
+                    {"used", study.counters.used},
+                    {"late", study.counters.late},
+                    {"no_reference", study.counters.no_reference},
+                    {"gated_gyro", study.counters.gated_gyro},
+                    {"gated_accel", study.counters.gated_accel}};
+  imu["nis_gyro"] = study.nis_gyro;
+  imu["nis_accel"] = study.nis_accel;
+  return imu;
+}
+
+Result<std::unique_ptr<RunFolder>> RunFolder::create(const std::filesystem::path& folder,
+                                                     std::vector<StudyFileInfo> studies, bool write_errors) {
+  std::error_code code;
+  std::filesystem::create_directories(folder, code);
+  if (code) {
+    return work_error(fmt::format("folder {} cannot be made: {}", folder.string(), code.message()),
+                      "choose another --out folder");
+  }
+  std::unique_ptr<RunFolder> run(new RunFolder);
+  run->folder_ = folder;
+  run->studies_ = std::move(studies);
+  const std::size_t n = run->studies_.size();
+  run->calibrations_.resize(n);
+  run->errors_.resize(n);
+  run->sample_times_.resize(n);
+  if (auto opened = run->navigation_.open(folder / "navigation.csv", navigation_header()); !opened) {
+    return tl::unexpected<Error>(opened.error());
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto& name = run->studies_[i].name;
+    auto opened =
+        run->calibrations_[i].open(folder / fmt::format("calibration_{}.csv", name), calibration_header());
+    if (opened && write_errors) {
+      opened = run->errors_[i].open(folder / fmt::format("errors_{}.csv", name), error_csv_header());
+    }
+    if (!opened) return tl::unexpected<Error>(opened.error());
+  }
+  return run;
+}
+
+void RunFolder::on_error(const ErrorRecord& record) noexcept {
+  const double time_s = to_seconds(record.row.time - record.first_reference_time);
+  sample_times_[record.study].add(record.row.counter, time_s);
+  if (errors_[record.study].is_open()) errors_[record.study].append(error_csv_row(record.row, time_s));
+}
+
+void RunFolder::on_event(const EstimatorEvent& event) noexcept { events_.push_back(event); }
+
+void RunFolder::on_late_sample(const LateSample& late) noexcept { late_.push_back(late); }
+
+double RunFolder::seconds_since_start(HostTime time) const {
+  return to_seconds(time - last_->first_reference_time);
+}
+
+void RunFolder::on_snapshot(const Snapshot& snapshot) noexcept {
+  last_ = snapshot;
+  if (!snapshot.has_reference) return;
+  if (snapshot.navigation.status == NavigationStatus::kNavigating) write_navigation(snapshot);
+  for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
+    const auto& study = snapshot.studies[i];
+    if (study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated)
+      write_study(i, study);
+  }
+}
+
+void RunFolder::write_navigation(const Snapshot& snapshot) {
+  const auto& nav = snapshot.navigation;
+  fmt::memory_buffer row;
+  fmt::format_to(std::back_inserter(row), "{},{},{},{}", seconds_since_start(nav.time),
+                 nav.latitude_rad * kDegPerRad, nav.longitude_rad * kDegPerRad, nav.height_m);
+  append(row, nav.v_n_mps, 1.0);
+  append(row, nav.rpy_rad, kDegPerRad);
+  append(row, nav.sd_position_m, 1.0);
+  append(row, nav.sd_velocity_mps, 1.0);
+  append(row, nav.sd_rpy_rad, kDegPerRad);
+  row.push_back('\n');
+  navigation_.append({row.data(), row.size()});
+}
+
+void RunFolder::write_study(std::size_t index, const StudyOutput& study) {
+  const auto q = quaternion_of(study.C_b_s);
+  constexpr double kMsPerS = 1e3;
+  fmt::memory_buffer row;
+  fmt::format_to(std::back_inserter(row), "{}", seconds_since_start(study.time));
+  append(row, study.psi_rad, kDegPerRad);
+  fmt::format_to(std::back_inserter(row), ",{},{},{},{}", q.w(), q.x(), q.y(), q.z());
+  append(row, study.r_bs_b_m, 1.0);
+  fmt::format_to(std::back_inserter(row), ",{}", (study.t_d_s + studies_[index].clock_shift_s) * kMsPerS);
+  append(row, study.gyro_bias_radps, 1.0);
+  append(row, study.accel_bias_mps2, 1.0);
+  append(row, study.gyro_scale, 1.0);
+  append(row, study.accel_scale, 1.0);
+  append(row, study.sd_psi_rad, kDegPerRad);
+  append(row, study.sd_r_bs_b_m, 1.0);
+  fmt::format_to(std::back_inserter(row), ",{}", study.sd_t_d_s * kMsPerS);
+  append(row, study.sd_gyro_bias_radps, 1.0);
+  append(row, study.sd_accel_bias_mps2, 1.0);
+  append(row, study.sd_gyro_scale, 1.0);
+  append(row, study.sd_accel_scale, 1.0);
+  row.push_back('\n');
+  calibrations_[index].append({row.data(), row.size()});
+}
+
+Result<void> RunFolder::write_calibration() {
+  nlohmann::json imus = nlohmann::json::array();
+  for (std::size_t i = 0; last_ && i < last_->n_studies; ++i) {
+    imus.push_back(calibration_json(studies_[i], last_->studies[i], sample_times_[i]));
+  }
+  return write_json(folder_ / "calibration.json", {{"schema", "imuscope.calibration/1"}, {"imus", imus}});
+}
+
+Result<void> RunFolder::close() {
+  auto result = navigation_.close();
+  for (auto* files : {&calibrations_, &errors_}) {
+    for (auto& file : *files) {
+      auto closed = file.close();
+      if (result && !closed) result = closed;
+    }
+  }
+  return result;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,113 @@
+#pragma once
+
+/// The files of a run: navigation.csv, calibration_NAME.csv, errors_NAME.csv while it goes, calibration.json
+/// and run.json at its end. Columns and keys are promised to users; see docs in README.md, "Files of a run".
+/// Soft world: one thread, allocates, writes files.
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "service/core.h"
+
+namespace imuscope {
+
+/// Rows are formatted in memory and written in blocks; a failed write is told by close().
+class CsvFile {
+ public:
+  Result<void> open(const std::filesystem::path& file, const std::string& header);
+  /// Appends text that ends in a newline.
+  void append(std::string_view rows);
+  [[nodiscard]] Result<void> close();
+  [[nodiscard]] bool is_open() const { return out_.is_open(); }
+
+ private:
+  std::filesystem::path file_;
+  std::ofstream out_;
+};
+
+/// Writes `document` to `file`, indented, numbers with the digits that give the same double back.
+Result<void> write_json(const std::filesystem::path& file, const nlohmann::json& document);
+
+/// Straight line through (counter, time of validity): when a sample of the device showed the motion.
+class SampleTimeLine {
+ public:
+  void add(std::int64_t counter, double time_s);
+  [[nodiscard]] bool valid() const { return n_ >= 2.0 && sum_cc_ > 0.0; }
+  [[nodiscard]] std::int64_t counter0() const { return counter0_; }
+  [[nodiscard]] double period_s() const;
+  /// Time of counter0.
+  [[nodiscard]] double t0_s() const;
+  [[nodiscard]] double n() const { return n_; }
+
+ private:
+  std::int64_t counter0_ = 0;
+  double n_ = 0.0;
+  double mean_c_ = 0.0;
+  double mean_t_ = 0.0;
+  double sum_cc_ = 0.0;
+  double sum_ct_ = 0.0;
+};
+
+/// What a file needs to know of one S-IMU beyond its estimate.
+struct StudyFileInfo {
+  std::string name;
+  /// Seconds that were added to the device's own times before the estimator saw them (recordings with a clock
+  /// of their own). Written time offsets include it, so that they refer to the times as recorded.
+  double clock_shift_s = 0.0;
+};
+
+/// Writes the series of a run as the core produces them. Errors of the disk are kept and told by close().
+class RunFolder final : public CoreSink {
+ public:
+  /// Creates the folder if needed. Existing files of an earlier run in it are replaced.
+  static Result<std::unique_ptr<RunFolder>> create(const std::filesystem::path& folder,
+                                                   std::vector<StudyFileInfo> studies, bool write_errors);
+
+  void on_error(const ErrorRecord& record) noexcept override;
+  void on_event(const EstimatorEvent& event) noexcept override;
+  void on_snapshot(const Snapshot& snapshot) noexcept override;
+  void on_late_sample(const LateSample& late) noexcept override;
+
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  [[nodiscard]] const std::optional<Snapshot>& last_snapshot() const { return last_; }
+  [[nodiscard]] const std::vector<LateSample>& late_samples() const { return late_; }
+  [[nodiscard]] const std::vector<EstimatorEvent>& events() const { return events_; }
+
+  /// Writes calibration.json from the last snapshot.
+  [[nodiscard]] Result<void> write_calibration();
+  /// Closes the CSV files; the first failed write, if any, is the error.
+  [[nodiscard]] Result<void> close();
+
+ private:
+  RunFolder() = default;
+  [[nodiscard]] double seconds_since_start(HostTime time) const;
+  void write_navigation(const Snapshot& snapshot);
+  void write_study(std::size_t index, const StudyOutput& study);
+
+  std::filesystem::path folder_;
+  std::vector<StudyFileInfo> studies_;
+  CsvFile navigation_;
+  std::vector<CsvFile> calibrations_;
+  std::vector<CsvFile> errors_;
+  std::vector<SampleTimeLine> sample_times_;
+  std::vector<EstimatorEvent> events_;
+  std::vector<LateSample> late_;
+  std::optional<Snapshot> last_;
+};
+
+/// Row of errors_NAME.csv.
+std::string error_csv_row(const ErrorRow& row, double time_s);
+/// Header of errors_NAME.csv.
+std::string error_csv_header();
+
+/// One entry of calibration.json's "imus".
+nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& study,
+                                const SampleTimeLine& times);
+
+}  // namespace imuscope
