@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/units.h"
+#include "sample/regime.h"
 #include "sample/sample.h"
 
 namespace imuscope {
@@ -37,10 +38,6 @@ inline constexpr std::uint32_t kFullStudyBlocks = 0x7FU;
 inline constexpr std::uint32_t kPaperStudyBlocks = kBoresightBlock | kLeverArmBlock;
 /// Biases alone, with everything else known: the second pass of a study, whose history is smoothed.
 inline constexpr std::uint32_t kBiasStudyBlocks = kGyroBiasBlock | kAccelBiasBlock;
-
-/// Motion classes that carry their own measurement noise.
-enum class Regime : std::uint8_t { kStatic, kDynamic };
-inline constexpr std::size_t kRegimeCount = 2;
 
 /// First-order Gauss-Markov process; an infinite time constant is a random constant.
 struct GaussMarkovConfig {
@@ -78,11 +75,9 @@ struct GnssConfig {
 /// Start of the navigation. What is absent is found from the R-IMU's own attitude, from rest, or in motion.
 struct NavigationConfig {
   bool enabled = true;  ///< false: calibration alone, also where there is GNSS
-  /// Roll, pitch, heading of b at the first epoch, with sd.
+  /// Roll, pitch, heading of b, with sd; the vehicle then stands until the first GNSS position.
   std::optional<Vector3> initial_rpy_rad;
   Vector3 initial_rpy_sd_rad{0.01 * kRadPerDeg, 0.01 * kRadPerDeg, 0.03 * kRadPerDeg};
-  /// Latitude, longitude, height for a start without GNSS.
-  std::optional<Vector3> initial_position_rad_m;
 };
 
 /// Noise of one S-IMU sensor triad in one regime, per axis of s, at the sensor's own rate.

@@ -1,0 +1,199 @@
+#pragma once
+
+/// What the service has to say, as plain values in SI and radians. The publisher turns them into LCM
+/// messages, which speak degrees, milliseconds and microseconds. Unknown numbers are NaN.
+///
+/// NavigationReport, CalibrationReport and ErrorReport are trivially copyable: they cross the ring from the
+/// estimator to the publisher. The others are made in the soft world.
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/time.h"
+#include "sample/regime.h"
+#include "sample/sample.h"
+
+namespace imuscope {
+
+inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// Navigation solution of frame b's origin at one epoch.
+struct NavigationReport {
+  UtcTime utc;          ///< time of validity
+  double time_s;        ///< time of validity, seconds since the run's first R-IMU epoch
+  double latitude_rad;  ///< WGS-84 geodetic
+  double longitude_rad;
+  double height_m;          ///< above the ellipsoid
+  Vector3 v_n_mps;          ///< relative to the Earth, north-east-down
+  Vector3 rpy_rad;          ///< roll, pitch, heading of b relative to north-east-down
+  Vector3 sd_position_m;    ///< north, east, down
+  Vector3 sd_velocity_mps;  ///< north, east, down
+  Vector3 sd_rpy_rad;
+};
+static_assert(std::is_trivially_copyable_v<NavigationReport>);
+
+/// The states of one S-IMU; used once for values and once for standard deviations.
+struct CalibrationStates {
+  Vector3 psi_b_rad;          ///< boresight, rotation vector -Log(C_prior^T C_b_s), resolved in b
+  Vector3 r_bs_b_m;           ///< lever arm from b to s, resolved in b
+  double t_d_s;               ///< added to the S time
+  Vector3 gyro_bias_s_radps;  ///< resolved in s
+  Vector3 accel_bias_s_mps2;
+  Vector3 gyro_scale;  ///< error, dimensionless, along s
+  Vector3 accel_scale;
+};
+
+/// Calibration of one S-IMU at one epoch.
+struct CalibrationReport {
+  UtcTime utc;    ///< time of validity
+  double time_s;  ///< time of validity, seconds since the run's first R-IMU epoch
+  DeviceIndex device;
+  std::array<double, 4> q_b_s;  ///< C_b_s as a Hamilton quaternion w, x, y, z
+  CalibrationStates value;
+  CalibrationStates sd;
+};
+static_assert(std::is_trivially_copyable_v<CalibrationReport>);
+
+/// One row of the error process of one S-IMU, resolved in s.
+struct ErrorReport {
+  UtcTime utc;    ///< time of validity of the S sample
+  double time_s;  ///< time of validity, seconds since the run's first R-IMU epoch
+  DeviceIndex device;
+  Regime regime;
+  std::int64_t counter;  ///< the S-IMU's own, unwrapped
+  Vector3 gyro_radps;
+  Vector3 accel_mps2;
+};
+static_assert(std::is_trivially_copyable_v<ErrorReport>);
+
+/// Wavelet variance of one axis in one regime.
+struct AxisWaveletVariance {
+  struct Level {
+    int level;      ///< 1, 2, ...
+    double tau_s;   ///< 2^level / rate
+    double value;   ///< unit squared
+    double ci_low;  ///< 95 % interval
+    double ci_high;
+    std::int64_t n_coefficients;
+  };
+  std::string axis;  ///< gyro_x .. accel_z
+  std::string regime;
+  std::string unit;    ///< of the axis
+  std::int64_t n = 0;  ///< samples
+  double rate_hz = 0.0;
+  std::vector<Level> levels;
+};
+
+/// Wavelet variances of one S-IMU at a refit.
+struct WaveletVarianceReport {
+  UtcTime utc;  ///< of the last sample used
+  double time_s = 0.0;
+  std::string name;
+  std::vector<AxisWaveletVariance> axes;
+};
+
+/// Stochastic model of one axis in one regime; fields as `imuscope fit --json`.
+struct AxisNoiseModel {
+  struct Parameter {
+    std::string process;
+    std::string name;
+    std::string unit;
+    double value = kUnknown;
+    double sd = kUnknown;
+    double ci_low = kUnknown;
+    double ci_high = kUnknown;
+  };
+  struct Fitted {
+    double tau_s;
+    double value;  ///< wavelet variance implied by the model, unit squared
+  };
+  std::string axis;
+  std::string regime;
+  std::string unit;
+  std::int64_t n = 0;
+  double rate_hz = 0.0;
+  std::string model;
+  std::string weights;
+  std::vector<Parameter> parameters;
+  std::vector<Fitted> fitted;
+  double objective = kUnknown;
+  double j_statistic = kUnknown;
+  double j_dof = kUnknown;
+  double j_p_value = kUnknown;
+  double criterion = kUnknown;
+  bool identifiable = false;
+  std::vector<std::string> warnings;
+};
+
+/// Noise models of one S-IMU at a refit.
+struct NoiseModelReport {
+  UtcTime utc;  ///< of the last sample used
+  double time_s = 0.0;
+  std::string name;
+  std::vector<AxisNoiseModel> models;
+};
+
+/// Health of the service. Counts are since the start of the run.
+struct StatusReport {
+  struct Device {
+    std::string name;
+    std::string role;
+    std::string protocol;
+    std::string state;
+    std::string problem;
+    double rate_hz = 0.0;  ///< samples per second over the last status interval
+    std::uint64_t bytes = 0;
+    std::uint64_t bytes_skipped = 0;
+    std::uint64_t frames = 0;
+    std::uint64_t bad_checksums = 0;
+    std::uint64_t samples = 0;
+    std::uint64_t samples_lost = 0;
+    std::uint64_t samples_late = 0;
+    std::uint64_t samples_refused = 0;
+    std::uint64_t clock_resets = 0;
+    double latency_s = kUnknown;
+    double clock_drift_ppm = kUnknown;
+    double clock_sd_s = kUnknown;
+  };
+  struct Thread {
+    std::string name;
+    std::string scheduling;  ///< what was granted: "fifo 80", "normal", "idle"
+    std::uint64_t ticks = 0;
+    std::uint64_t overruns = 0;
+    std::uint64_t skipped = 0;
+    Duration lateness_p50{0};
+    Duration lateness_p99{0};
+    Duration lateness_p999{0};
+    Duration lateness_max{0};
+  };
+  struct Ring {
+    std::string name;
+    std::uint64_t capacity = 0;
+    std::uint64_t level = 0;
+    std::uint64_t high_water = 0;
+    std::uint64_t refused = 0;
+  };
+  UtcTime utc;  ///< of this report
+  std::string run;
+  std::string version;
+  std::string state;   ///< starting, aligning, running, degraded, failed
+  std::string reason;  ///< why it is in that state
+  double uptime_s = 0.0;
+  std::int64_t tick = 0;
+  std::uint64_t refits = 0;
+  double refit_duration_s = kUnknown;
+  std::uint64_t resident_memory_bytes = 0;
+  std::string capture_path;
+  std::uint64_t capture_bytes = 0;
+  std::uint64_t capture_lost = 0;
+  std::vector<Device> devices;
+  std::vector<Thread> threads;
+  std::vector<Ring> rings;
+  std::vector<std::string> problems;  ///< each with its remedy
+};
+
+}  // namespace imuscope
