@@ -47,6 +47,10 @@ constexpr double kTurnFadeSpeed_mps = 1.0;
 // Road, by distance, and the body on its springs.
 constexpr double kGradeRms_rad = 2.0 * kRadPerDeg;
 constexpr double kBankRms_rad = 1.2 * kRadPerDeg;
+constexpr double kGradeLow_per_m = 1.0 / 1500.0;
+constexpr double kGradeHigh_per_m = 1.0 / 300.0;
+constexpr double kBankLow_per_m = 1.0 / 1000.0;
+constexpr double kBankHigh_per_m = 1.0 / 200.0;
 constexpr double kBodyPitch_rad_per_mps2 = 0.0044;
 constexpr double kBodyRoll_rad_per_mps2 = 0.0075;
 
@@ -56,14 +60,18 @@ constexpr double kRoughnessHigh_hz = 1.5;
 constexpr double kRoughnessSpeed_mps = 10.0;
 constexpr double kRoughRoll_rad = 0.25 * kRadPerDeg;
 constexpr double kRoughPitch_rad = 0.20 * kRadPerDeg;
-constexpr double kRoughHeave_m = 0.045;
+constexpr double kRoughHeave_mps = 0.045;  // vertical velocity
 
 /// Sum of sinusoids with random frequencies and phases, of unit variance; smooth to any derivative.
 class SmoothNoise {
  public:
   SmoothNoise(Random& random, double low_hz, double high_hz) {
+    // One frequency in each equal part of the band: every seed fills the band evenly.
+    const double part_hz = (high_hz - low_hz) / static_cast<double>(kWaves);
+    double from_hz = low_hz;
     for (Wave& wave : waves_) {
-      wave.omega = 2.0 * kPi * random.uniform(low_hz, high_hz);
+      wave.omega = 2.0 * kPi * random.uniform(from_hz, from_hz + part_hz);
+      from_hz += part_hz;
       wave.phase = random.uniform(0.0, 2.0 * kPi);
     }
   }
@@ -213,8 +221,8 @@ DriveNodes make_drive(const Scenario& scenario) {
   const std::vector<double> yaw_rate = make_yaw_rate(scenario, speed, grid);
 
   Random road(scenario.seed, "road");
-  const SmoothNoise grade_by_m(road, 1.0 / 800.0, 1.0 / 150.0);
-  const SmoothNoise bank_by_m(road, 1.0 / 500.0, 1.0 / 80.0);
+  const SmoothNoise grade_by_m(road, kGradeLow_per_m, kGradeHigh_per_m);
+  const SmoothNoise bank_by_m(road, kBankLow_per_m, kBankHigh_per_m);
   Random rough(scenario.seed, "roughness");
   const SmoothNoise rough_roll(rough, kRoughnessLow_hz, kRoughnessHigh_hz);
   const SmoothNoise rough_pitch(rough, kRoughnessLow_hz, kRoughnessHigh_hz);
@@ -237,7 +245,7 @@ DriveNodes make_drive(const Scenario& scenario) {
       const double roughness = speed[i] / kRoughnessSpeed_mps;
       nodes.latitude_offset_rad.push_back(latitude_offset);
       nodes.longitude_offset_rad.push_back(longitude_offset);
-      nodes.height_m.push_back(height + roughness * kRoughHeave_m * rough_heave.at(t_s));
+      nodes.height_m.push_back(height);
       // The body leans out of a turn and squats when it accelerates.
       nodes.roll_rad.push_back(kBankRms_rad * bank_by_m.at(distance) -
                                kBodyRoll_rad_per_mps2 * speed[i] * yaw_rate[i] +
@@ -256,7 +264,9 @@ DriveNodes make_drive(const Scenario& scenario) {
     latitude_offset += step_m * std::cos(grade) * std::cos(middle) / (radii.meridian_m + height);
     longitude_offset +=
         step_m * std::cos(grade) * std::sin(middle) / ((radii.transverse_m + height) * std::cos(latitude));
-    height += step_m * std::sin(grade);
+    const double heave_mps = kRoughHeave_mps * (speed[i] / kRoughnessSpeed_mps) *
+                             rough_heave.at((static_cast<double>(i) + 0.5) * kFineStep_s);
+    height += step_m * std::sin(grade) + heave_mps * kFineStep_s;
     heading += turn;
     distance += step_m;
   }

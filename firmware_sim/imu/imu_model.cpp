@@ -1,0 +1,107 @@
+#include "firmware_sim/imu/imu_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+namespace imusim {
+namespace {
+
+// The low-pass sees the motion as straight lines between points this close.
+constexpr double kFilterStep_s = 0.001;
+
+std::array<NoiseSource, 3> noise_sources(const TriadErrors& errors, RegimeSwitch regime_switch,
+                                         std::uint64_t seed, const std::string& stream) {
+  const auto axis = [&](std::size_t i) {
+    return NoiseSource(errors.noise[i], regime_switch, Random(seed, stream + "xyz"[i]));
+  };
+  return {axis(0), axis(1), axis(2)};
+}
+
+/// First-order low-pass over one step, exact for an input that runs straight from `before` to `now`.
+Eigen::Vector3d low_passed(const Eigen::Vector3d& output, const Eigen::Vector3d& before,
+                           const Eigen::Vector3d& now, double step_s, double corner_hz) {
+  if (!std::isfinite(corner_hz)) return now;
+  const double tau_s = 1.0 / (2.0 * std::numbers::pi * corner_hz);
+  const Eigen::Vector3d lag = (now - before) * (tau_s / step_s);
+  return now - lag + (output - before + lag) * std::exp(-step_s / tau_s);
+}
+
+Eigen::Vector3d clipped_and_quantised(const Eigen::Vector3d& value, const TriadErrors& errors) {
+  Eigen::Vector3d result = value.cwiseMin(errors.range).cwiseMax(-errors.range);
+  if (errors.quantisation > 0.0)
+    for (double& axis : result) axis = errors.quantisation * std::round(axis / errors.quantisation);
+  return result;
+}
+
+Eigen::Vector3d next_noise(std::array<NoiseSource, 3>& sources, Regime regime, double step_s) {
+  const double x = sources[0].next(regime, step_s);
+  const double y = sources[1].next(regime, step_s);
+  const double z = sources[2].next(regime, step_s);
+  return {x, y, z};
+}
+
+Eigen::Vector3d with_errors(const Eigen::Vector3d& truth, const Eigen::Vector3d& f,
+                            const Eigen::Vector3d& noise, const TriadErrors& errors) {
+  return clipped_and_quantised(truth + errors.scale.cwiseProduct(truth) + errors.misalignment * truth +
+                                   errors.g_sensitivity * f + errors.bias + noise,
+                               errors);
+}
+
+}  // namespace
+
+IdealReading ideal_reading(const MotionState& state, const Mounting& mounting) {
+  return {mounting.C_b_s * state.omega_ib_b_radps,
+          mounting.C_b_s * specific_force_at(state, mounting.r_bs_b_m)};
+}
+
+ImuModel::ImuModel(const Motion& motion, const Mounting& mounting, const ImuErrors& errors,
+                   std::uint64_t seed, std::string_view name)
+    : motion_(&motion),
+      mounting_(mounting),
+      errors_(errors),
+      gyro_noise_(noise_sources(errors.gyro, errors.regime_switch, seed, std::string(name) + "/gyro_")),
+      accel_noise_(noise_sources(errors.accel, errors.regime_switch, seed, std::string(name) + "/accel_")) {}
+
+IdealReading ImuModel::through_low_pass(const IdealReading& now, double t_s) {
+  const double gyro_hz = errors_.gyro.low_pass_hz;
+  const double accel_hz = errors_.accel.low_pass_hz;
+  if (!std::isfinite(gyro_hz) && !std::isfinite(accel_hz)) return now;
+  if (!has_last_) {
+    last_input_ = filtered_ = now;
+    return now;
+  }
+  const double span_s = t_s - last_t_s_;
+  const int steps = std::max(1, static_cast<int>(std::ceil(span_s / kFilterStep_s)));
+  const double step_s = span_s / steps;
+  for (int k = 1; k <= steps; ++k) {
+    const IdealReading input =
+        k == steps ? now : ideal_reading(motion_->state_at(last_t_s_ + k * step_s), mounting_);
+    filtered_.omega_radps =
+        low_passed(filtered_.omega_radps, last_input_.omega_radps, input.omega_radps, step_s, gyro_hz);
+    filtered_.f_mps2 = low_passed(filtered_.f_mps2, last_input_.f_mps2, input.f_mps2, step_s, accel_hz);
+    last_input_ = input;
+  }
+  return filtered_;
+}
+
+ImuReading ImuModel::sample_at(double t_s) {
+  const IdealReading ideal = ideal_reading(motion_->state_at(t_s), mounting_);
+  const IdealReading seen = through_low_pass(ideal, t_s);
+  const double step_s = has_last_ ? t_s - last_t_s_ : 0.0;
+  const Regime regime = motion_->regime_at(t_s);
+  const Eigen::Vector3d gyro_noise = next_noise(gyro_noise_, regime, step_s);
+  const Eigen::Vector3d accel_noise = next_noise(accel_noise_, regime, step_s);
+  last_t_s_ = t_s;
+  has_last_ = true;
+
+  ImuReading reading;
+  reading.omega_radps = with_errors(seen.omega_radps, seen.f_mps2, gyro_noise, errors_.gyro);
+  reading.f_mps2 = with_errors(seen.f_mps2, seen.f_mps2, accel_noise, errors_.accel);
+  reading.gyro_error_radps = reading.omega_radps - ideal.omega_radps;
+  reading.accel_error_mps2 = reading.f_mps2 - ideal.f_mps2;
+  return reading;
+}
+
+}  // namespace imusim

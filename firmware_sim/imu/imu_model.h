@@ -1,0 +1,88 @@
+#pragma once
+
+/// What an IMU somewhere on the vehicle reads: the motion at its place and orientation, and its errors.
+///
+///   reading = quantise(clip((I + diag(scale) + misalignment) u + g_sensitivity f + bias + noise))
+///
+/// with u the true rate or force in the sensor's axes s, through the sensor's low-pass where it has one. By
+/// default samples are instantaneous and nothing is clipped or quantised.
+
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <string_view>
+
+#include "firmware_sim/imu/noise.h"
+#include "firmware_sim/motion/motion.h"
+
+namespace imusim {
+
+/// Where the sensor sits.
+struct Mounting {
+  Eigen::Matrix3d C_b_s = Eigen::Matrix3d::Identity();  ///< rotates b to s
+  Eigen::Vector3d r_bs_b_m = Eigen::Vector3d::Zero();   ///< from b's origin to s's origin
+};
+
+/// Errors of three axes of one kind, in rad/s (gyro) or m/s^2 (accelerometer).
+struct TriadErrors {
+  std::array<RegimeNoise, 3> noise;
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();                ///< turn-on bias
+  Eigen::Vector3d scale = Eigen::Vector3d::Zero();               ///< relative; 0.001 reads 0.1 % too much
+  Eigen::Matrix3d misalignment = Eigen::Matrix3d::Zero();        ///< cross-coupling, rad; diagonal zero
+  Eigen::Matrix3d g_sensitivity = Eigen::Matrix3d::Zero();       ///< gyro only: rad/s per m/s^2
+  double quantisation = 0.0;                                     ///< step; 0 for none
+  double range = std::numeric_limits<double>::infinity();        ///< readings end at +-range
+  double low_pass_hz = std::numeric_limits<double>::infinity();  ///< corner of the first-order low-pass
+};
+
+struct ImuErrors {
+  TriadErrors gyro;
+  TriadErrors accel;
+  RegimeSwitch regime_switch = RegimeSwitch::kContinuous;
+};
+
+/// One sample, in s.
+struct ImuReading {
+  Eigen::Vector3d omega_radps;
+  Eigen::Vector3d f_mps2;
+  /// Reading minus the true rate and force at the instant of the sample.
+  Eigen::Vector3d gyro_error_radps;
+  Eigen::Vector3d accel_error_mps2;
+};
+
+/// True rate and force at the sensor's place, in its axes.
+struct IdealReading {
+  Eigen::Vector3d omega_radps;
+  Eigen::Vector3d f_mps2;
+};
+IdealReading ideal_reading(const MotionState& state, const Mounting& mounting);
+
+class ImuModel {
+ public:
+  /// @param motion  must outlive the model
+  /// @param name    of the device; with the seed it makes the noise reproducible
+  ImuModel(const Motion& motion, const Mounting& mounting, const ImuErrors& errors, std::uint64_t seed,
+           std::string_view name);
+
+  /// The sample taken at t_s. Times must rise from call to call.
+  ImuReading sample_at(double t_s);
+
+  [[nodiscard]] const Mounting& mounting() const { return mounting_; }
+  [[nodiscard]] const ImuErrors& errors() const { return errors_; }
+
+ private:
+  using TriadNoise = std::array<NoiseSource, 3>;
+  IdealReading through_low_pass(const IdealReading& now, double t_s);
+
+  const Motion* motion_;
+  Mounting mounting_;
+  ImuErrors errors_;
+  TriadNoise gyro_noise_;
+  TriadNoise accel_noise_;
+  bool has_last_ = false;
+  double last_t_s_ = 0.0;
+  IdealReading last_input_{};
+  IdealReading filtered_{};
+};
+
+}  // namespace imusim
