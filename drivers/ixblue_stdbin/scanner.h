@@ -1,0 +1,69 @@
+#pragma once
+
+/// Finds telegrams ("IX") and answers ("AN") in a byte stream. The checksum is the only proof of a frame;
+/// after a false start the search goes on at the byte behind it, so that no good frame inside garbage is
+/// lost. Core: bounded memory, no allocation, noexcept.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/time.h"
+#include "drivers/device/frame_buffer.h"
+#include "drivers/ixblue_stdbin/wire.h"
+
+namespace imuscope::ixblue_stdbin {
+
+struct Frame {
+  enum class Kind : std::uint8_t { kTelegram, kAnswer };
+  Kind kind = Kind::kTelegram;
+  std::span<const std::uint8_t> bytes;  ///< whole frame; valid until the next append()
+  std::uint64_t offset = 0;             ///< of its first byte in the stream
+  HostTime first_byte{};                ///< when its first byte arrived at the latest
+};
+
+struct ScanCounters {
+  std::uint64_t bytes_skipped = 0;
+  std::uint64_t bad_checksums = 0;
+  std::uint64_t bad_lengths = 0;
+  std::uint64_t unsupported_versions = 0;  ///< headers of a later protocol version than this code reads
+};
+
+class Scanner {
+ public:
+  /// @param per_byte  time of one byte on the wire, zero for a network stream
+  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : buffer_(per_byte) {}
+
+  /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
+  std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
+    return buffer_.append(bytes, arrival);
+  }
+
+  /// The next frame, or false where more bytes are needed.
+  /// @param at_end  no more bytes will come: look for frames behind a start that announced more
+  [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
+
+  [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }
+
+ private:
+  enum class Verdict : std::uint8_t { kNeedMore, kFrame, kFalseStart, kBadChecksum, kBadLength };
+  struct Examined {
+    Verdict verdict;
+    std::size_t size = 0;
+    Frame::Kind kind = Frame::Kind::kTelegram;
+  };
+
+  [[nodiscard]] Examined examine(std::span<const std::uint8_t> pending) noexcept;
+  [[nodiscard]] Examined examine_telegram(std::span<const std::uint8_t> pending) noexcept;
+  [[nodiscard]] static Examined examine_answer(std::span<const std::uint8_t> pending) noexcept;
+  void skip(std::size_t n) noexcept;
+
+  FrameBuffer<2 * kTelegramMax> buffer_;
+  std::size_t taken_ = 0;
+  ScanCounters counters_;
+};
+
+/// Sum of the bytes modulo 2^32.
+[[nodiscard]] std::uint32_t checksum(std::span<const std::uint8_t> bytes) noexcept;
+
+}  // namespace imuscope::ixblue_stdbin

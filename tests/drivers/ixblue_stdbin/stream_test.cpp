@@ -1,0 +1,125 @@
+// The scanner against damaged streams, at every position.
+#include <gtest/gtest.h>
+
+#include "drivers/ixblue_stdbin/messages.h"
+#include "drivers/ixblue_stdbin/scanner.h"
+#include "tests/drivers/ixblue_stdbin/telegram_builder.h"
+
+namespace imuscope::ixblue_stdbin {
+namespace {
+
+using test::Bytes;
+using test::TelegramBuilder;
+
+std::vector<Bytes> scan(std::span<const Bytes> reads) {
+  Scanner scanner;
+  std::vector<Bytes> frames;
+  Frame frame;
+  for (const Bytes& read : reads) {
+    std::span<const std::uint8_t> rest(read);
+    while (!rest.empty()) {
+      rest = rest.subspan(scanner.append(rest, {}));
+      while (scanner.next(frame)) frames.emplace_back(frame.bytes.begin(), frame.bytes.end());
+    }
+  }
+  while (scanner.next(frame, true)) frames.emplace_back(frame.bytes.begin(), frame.bytes.end());
+  return frames;
+}
+
+/// Telegrams of every version; one whose data contain the sync bytes.
+test::StreamUnderTest stream() {
+  test::StreamUnderTest under_test;
+  under_test.scan = scan;
+  std::uint32_t counter = 7;
+  for (std::uint8_t version = 2; version <= 5; ++version) {
+    ++counter;
+    TelegramBuilder builder(version, counter, 1000 * counter);
+    builder.nav(0, TelegramBuilder::floats({1.5F, -2.5F, 3.5F}));
+    builder.nav(28, Bytes{'I', 'X', 3, 'I', 'X', 5, 'A', 'N', 4, 0, 1, 2});
+    if (version > 2) builder.extended(2, TelegramBuilder::floats({0.1F, 0.2F, 0.3F}));
+    builder.external(13, Bytes{0, 0, 1, 2, 0, 0, 3, 4});
+    under_test.frames.push_back(builder.build());
+  }
+  return under_test;
+}
+
+TEST(StdBinStream, EverySplitIntoReadsGivesTheSameTelegrams) {
+  test::expect_every_split_keeps_all_frames(stream());
+}
+TEST(StdBinStream, EverySingleBitFlipLosesOnlyItsTelegram) {
+  test::expect_every_bit_flip_loses_only_its_frame(stream());
+}
+TEST(StdBinStream, EveryCutLosesOnlyTheTelegramsItTouches) {
+  test::expect_every_cut_loses_only_its_frames(stream());
+}
+TEST(StdBinStream, EveryInsertionLosesOnlyItsTelegram) {
+  test::expect_every_insertion_loses_only_its_frame(stream(), 11);
+}
+TEST(StdBinStream, NoTelegramInsideGarbageIsLost) {
+  test::expect_no_frame_in_garbage_is_lost(stream(),
+                                           std::string_view("IXIX\x02\x03\x04\x05"
+                                                            "AN",
+                                                            10),
+                                           12);
+}
+
+TEST(StdBinStream, EveryByteBelongsToATelegramOrIsSkipped) {
+  const auto under_test = stream();
+  Bytes all{'I', 'X', 9, 1, 2, 3};
+  for (const Bytes& frame : under_test.frames) all.insert(all.end(), frame.begin(), frame.end());
+  all.push_back('I');
+  Scanner scanner;
+  Frame frame;
+  std::size_t in_frames = 0;
+  ASSERT_EQ(scanner.append(all, {}), all.size());
+  while (scanner.next(frame, true)) in_frames += frame.bytes.size();
+  EXPECT_EQ(in_frames + scanner.counters().bytes_skipped, all.size());
+  EXPECT_EQ(scanner.counters().bytes_skipped, 7U);
+}
+
+TEST(StdBinStream, AHeaderThatContradictsItselfIsRefusedWithoutWaitingForItsBytes) {
+  Bytes bytes = TelegramBuilder(3, 1, 1).nav(0, TelegramBuilder::floats({1, 2, 3})).build();
+  bytes[15] = 7;  // announces 1800 bytes more than its blocks need
+  const Bytes good = TelegramBuilder(3, 2, 2).nav(0, TelegramBuilder::floats({1, 2, 3})).build();
+  bytes.insert(bytes.end(), good.begin(), good.end());
+  Scanner scanner;
+  Frame frame;
+  ASSERT_EQ(scanner.append(bytes, {}), bytes.size());
+  ASSERT_TRUE(scanner.next(frame));
+  EXPECT_EQ(parse_telegram(frame.bytes).counter, 2U);
+  EXPECT_EQ(scanner.counters().bad_lengths, 1U);
+}
+
+TEST(StdBinStream, AnUnknownExternalBlockLeavesTheRestUnreadAndTheFirstBlocksReadable) {
+  const Bytes bytes = TelegramBuilder(4, 1, 1)
+                          .nav(0, TelegramBuilder::floats({1, 2, 3}))
+                          .external(13, Bytes(8, 1))
+                          .external(23, Bytes(11, 2))
+                          .external(25, Bytes(17, 3))
+                          .build();
+  const Bytes reads[] = {bytes};
+  const auto frames = scan(reads);
+  ASSERT_EQ(frames.size(), 1U);
+  const Telegram telegram = parse_telegram(frames[0]);
+  EXPECT_TRUE(telegram.rest_unread);
+  EXPECT_FALSE(telegram.block(Nav::kAttitude).empty());
+  EXPECT_NE(telegram.external_at[13], 0);
+  EXPECT_EQ(telegram.external_at[25], 0);
+}
+
+TEST(StdBinStream, AnUnknownNavBlockIsJumpedOverByTheNavSizeOfV4) {
+  const Bytes bytes = TelegramBuilder(4, 1, 1)
+                          .nav(0, TelegramBuilder::floats({1, 2, 3}))
+                          .nav(31, Bytes(9, 7))
+                          .external(13, Bytes(8, 1))
+                          .build();
+  const Bytes reads[] = {bytes};
+  const auto frames = scan(reads);
+  ASSERT_EQ(frames.size(), 1U);
+  const Telegram telegram = parse_telegram(frames[0]);
+  EXPECT_TRUE(telegram.rest_unread);
+  EXPECT_EQ(telegram.external_at[13], 27 + 12 + 9);
+}
+
+}  // namespace
+}  // namespace imuscope::ixblue_stdbin
