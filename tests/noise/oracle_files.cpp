@@ -67,6 +67,7 @@ std::vector<std::map<std::string, std::string>> read_table(const std::string& fi
   std::vector<std::string> header;
   std::vector<std::map<std::string, std::string>> rows;
   while (std::getline(in, line)) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
     std::vector<std::string> cells;
     std::istringstream stream(line);
     std::string cell;
