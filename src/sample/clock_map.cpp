@@ -14,8 +14,6 @@ namespace {
 constexpr double kBin_s = 2.0;
 // A rate is fitted when the closed intervals span this much; before, the rate of the segment before is kept.
 constexpr std::size_t kBinsForRate = 5;
-// The weight of an interval falls with its age, so that the line touches the envelope near the present.
-constexpr double kWeightAge_s = 200.0;
 // How far the rate may have wandered: old points are lifted by half of this times age squared, so that a
 // crystal that warms up is followed and old points bind less than new ones.
 constexpr double kRateWander_per_s = 1e-9;
@@ -132,14 +130,11 @@ void ClockMap::refit() noexcept {
   const Point& newest = bins_[(bins_begin_ + bins_count_ - 1) % kBins];
   std::array<Point, kBins> hull;
   std::size_t n = 0;
-  double sum_w = 0.0;
-  double sum_wx = 0.0;
+  double sum_x_s = 0.0;
   for (std::size_t i = 0; i < bins_count_; ++i) {
     Point p = bins_[(bins_begin_ + i) % kBins];
     const double age_s = newest.x_s - p.x_s;
-    const double weight = 1.0 / (1.0 + (age_s / kWeightAge_s) * (age_s / kWeightAge_s));
-    sum_w += weight;
-    sum_wx += weight * p.x_s;
+    sum_x_s += p.x_s;
     p.y_s += 0.5 * kRateWander_per_s * age_s * age_s;
     // Drop the last vertex while it lies on or above the chord from the one before it to p.
     while (n >= 2 && (hull[n - 1].y_s - hull[n - 2].y_s) * (p.x_s - hull[n - 2].x_s) >=
@@ -149,7 +144,7 @@ void ClockMap::refit() noexcept {
     hull[n++] = p;
   }
   if (n < 2) return;
-  const double centre_s = sum_wx / sum_w;
+  const double centre_s = sum_x_s / static_cast<double>(bins_count_);
   std::size_t right = 1;
   while (right + 1 < n && hull[right].x_s < centre_s) ++right;
   const Point& p = hull[right - 1];

@@ -1,0 +1,98 @@
+#include "drivers/xsens_mt/scanner.h"
+
+#include <algorithm>
+
+#include "drivers/device/bytes.h"
+
+namespace imuscope::xsens {
+
+bool Scanner::next(Frame& frame, bool at_end) noexcept {
+  for (;;) {
+    const auto behind = buffer_.pending().subspan(taken_);
+    if (behind.empty()) return false;
+    const Examined found = examine(behind);
+    if (found.verdict == Verdict::kFrame) {
+      buffer_.consume(taken_);
+      taken_ = found.size;
+      const auto bytes = buffer_.pending().first(found.size);
+      frame.bid = bytes[1];
+      frame.mid = bytes[2];
+      frame.data = bytes.subspan(found.header, found.size - found.header - kChecksumSize);
+      frame.size = found.size;
+      frame.offset = buffer_.position();
+      frame.first_byte = buffer_.arrival_of(0);
+      return true;
+    }
+    if (found.verdict == Verdict::kNeedMore && !at_end) return false;
+    if (taken_ > 0) {
+      const Verdict inside = look_back(at_end);
+      if (inside == Verdict::kNeedMore) return false;
+      if (inside == Verdict::kFrame) continue;
+    }
+    count(found.verdict);
+    buffer_.consume(taken_ + 1);
+    taken_ = 0;
+    counters_.bytes_skipped += 1;
+    // Whatever is no preamble goes at once.
+    const auto rest = buffer_.pending();
+    const auto preamble = std::find(rest.begin(), rest.end(), kPreamble);
+    const auto n = static_cast<std::size_t>(preamble - rest.begin());
+    counters_.bytes_skipped += n;
+    buffer_.consume(n);
+  }
+}
+
+Scanner::Examined Scanner::examine(std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes[0] != kPreamble) return {Verdict::kFalseStart};
+  if (bytes.size() < 2) return {Verdict::kNeedMore};
+  if (bytes[1] > kBusBidMax && bytes[1] != kMasterBid) return {Verdict::kFalseStart};
+  if (bytes.size() < kHeaderSize) return {Verdict::kNeedMore};
+  std::size_t header = kHeaderSize;
+  std::size_t length = bytes[3];
+  if (length == kExtendedLength) {
+    if (bytes.size() < kExtendedHeaderSize) return {Verdict::kNeedMore};
+    header = kExtendedHeaderSize;
+    length = read_be<std::uint16_t>(bytes, kHeaderSize);
+    if (length > kDataMax) return {Verdict::kBadLength};
+  }
+  const std::size_t size = header + length + kChecksumSize;
+  if (bytes.size() < size) return {Verdict::kNeedMore};
+  std::uint8_t sum = 0;
+  for (const std::uint8_t byte : bytes.subspan(1, size - 1)) sum = static_cast<std::uint8_t>(sum + byte);
+  if (sum != 0) return {Verdict::kBadChecksum};
+  return {Verdict::kFrame, header, size};
+}
+
+// Whether good frames follow each other from `start` to across `end`.
+Scanner::Verdict Scanner::chain_across(std::span<const std::uint8_t> bytes, std::size_t start,
+                                       std::size_t end) noexcept {
+  while (start < end) {
+    const Examined found = examine(bytes.subspan(start));
+    if (found.verdict != Verdict::kFrame) return found.verdict;
+    start += found.size;
+  }
+  return start > end ? Verdict::kFrame : Verdict::kFalseStart;
+}
+
+// Behind the last frame comes no frame, so it may have been a false one that swallowed the start of a good
+// one. Where there is such a good one, drops what is before it and says kFrame.
+Scanner::Verdict Scanner::look_back(bool at_end) noexcept {
+  const auto bytes = buffer_.pending();
+  for (std::size_t start = 1; start < taken_; ++start) {
+    if (bytes[start] != kPreamble) continue;
+    const Verdict chain = chain_across(bytes, start, taken_);
+    if (chain == Verdict::kNeedMore && !at_end) return chain;
+    if (chain != Verdict::kFrame) continue;
+    buffer_.consume(start);
+    taken_ = 0;
+    return chain;
+  }
+  return Verdict::kFalseStart;
+}
+
+void Scanner::count(Verdict verdict) noexcept {
+  if (verdict == Verdict::kBadChecksum) ++counters_.bad_checksums;
+  if (verdict == Verdict::kBadLength) ++counters_.bad_lengths;
+}
+
+}  // namespace imuscope::xsens
