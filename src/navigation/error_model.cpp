@@ -1,0 +1,197 @@
+#include "navigation/error_model.h"
+
+#include <cmath>
+
+#include "navigation/gravity.h"
+#include "navigation/so3.h"
+
+namespace imuscope {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// The blocks of three of F, by name.
+template <typename Matrix>
+auto block(Matrix& m, NavigationErrorBlock row, NavigationErrorBlock column) {
+  return m.template block<3, 3>(row, column);
+}
+
+struct Geometry {
+  double M;        ///< meridian radius + height
+  double N;        ///< transverse radius + height
+  double M_slope;  ///< dM/dL
+  double N_slope;  ///< dN/dL
+  double sin_L;
+  double cos_L;
+  double tan_L;
+};
+
+Geometry geometry_at(const GeodeticPosition& position) noexcept {
+  const Curvature k = curvature_at(position.latitude_rad);
+  const double s = std::sin(position.latitude_rad);
+  const double c = std::cos(position.latitude_rad);
+  return {k.meridian_m + position.height_m,
+          k.transverse_m + position.height_m,
+          k.meridian_slope_m,
+          k.transverse_slope_m,
+          s,
+          c,
+          s / c};
+}
+
+// N-21: d(dr')/d(dr)
+Matrix3d position_feedback(const Geometry& g, const Vector3d& v) noexcept {
+  Matrix3d F = Matrix3d::Zero();
+  F(0, 0) = -v.z() / g.M;
+  F(0, 2) = v.x() / g.M;
+  F(1, 0) = v.y() * g.tan_L / g.N;
+  F(1, 1) = -(v.z() + v.x() * g.tan_L) / g.N;
+  F(1, 2) = v.y() / g.N;
+  return F;
+}
+
+// N-22: d(w_en)/d(dr). A step dr_N changes the latitude by 1/M, dr_D the height by -1.
+Matrix3d transport_rate_by_position(const Geometry& g, const Vector3d& v) noexcept {
+  const double per_N2 = 1.0 / (g.N * g.N);
+  const double per_M2 = 1.0 / (g.M * g.M);
+  Matrix3d D = Matrix3d::Zero();
+  D(0, 0) = -v.y() * g.N_slope * per_N2 / g.M;
+  D(0, 2) = v.y() * per_N2;
+  D(1, 0) = v.x() * g.M_slope * per_M2 / g.M;
+  D(1, 2) = -v.x() * per_M2;
+  D(2, 0) = -v.y() * (1.0 / (g.cos_L * g.cos_L * g.N) - g.tan_L * g.N_slope * per_N2) / g.M;
+  D(2, 2) = -v.y() * g.tan_L * per_N2;
+  return D;
+}
+
+// N-22: d(w_en)/d(dv)
+Matrix3d transport_rate_by_velocity(const Geometry& g) noexcept {
+  Matrix3d D = Matrix3d::Zero();
+  D(0, 1) = 1.0 / g.N;
+  D(1, 0) = -1.0 / g.M;
+  D(2, 1) = -g.tan_L / g.N;
+  return D;
+}
+
+// N-22: d(w_ie)/d(dr)
+Matrix3d earth_rate_by_position(const Geometry& g) noexcept {
+  Matrix3d D = Matrix3d::Zero();
+  D(0, 0) = -kEarthRate_radps * g.sin_L / g.M;
+  D(2, 0) = -kEarthRate_radps * g.cos_L / g.M;
+  return D;
+}
+
+/// 1/T; 0 for a random constant.
+double decay_rate(const BiasProcess& bias) noexcept {
+  return std::isinf(bias.correlation_time_s) ? 0.0 : 1.0 / bias.correlation_time_s;
+}
+
+}  // namespace
+
+NavigationDynamics error_dynamics(const NavigationState& state, const InertialRates& rates) noexcept {
+  const Geometry g = geometry_at(state.position);
+  const Vector3d& v = state.v_n_mps;
+  const Vector3d w_ie = earth_rate_n(state.position.latitude_rad);
+  const Vector3d w_en = transport_rate_n(state.position, v);
+  const Vector3d f_n = state.C_b_n * rates.f_b_mps2;
+  const Gravity gravity = normal_gravity(state.position.latitude_rad, state.position.height_m);
+
+  const Matrix3d w_en_by_r = transport_rate_by_position(g, v);
+  const Matrix3d w_en_by_v = transport_rate_by_velocity(g);
+  const Matrix3d w_ie_by_r = earth_rate_by_position(g);
+  Matrix3d gravity_by_r = Matrix3d::Zero();
+  gravity_by_r(2, 0) = gravity.latitude_slope_mps2 / g.M;
+  gravity_by_r(2, 2) = -gravity.height_slope_per_s2;
+
+  NavigationDynamics F = NavigationDynamics::Zero();
+  // N-21
+  block(F, kPositionError, kPositionError) = position_feedback(g, v);
+  block(F, kPositionError, kVelocityError).setIdentity();
+  // N-23: -(dw) x v = [v x] dw
+  block(F, kVelocityError, kPositionError) = skew(v) * (2.0 * w_ie_by_r + w_en_by_r) + gravity_by_r;
+  block(F, kVelocityError, kVelocityError) = -skew(2.0 * w_ie + w_en) + skew(v) * w_en_by_v;
+  block(F, kVelocityError, kAttitudeError) = -skew(f_n);
+  block(F, kVelocityError, kAccelBiasError) = -state.C_b_n;
+  // N-24
+  block(F, kAttitudeError, kPositionError) = -(w_ie_by_r + w_en_by_r);
+  block(F, kAttitudeError, kVelocityError) = -w_en_by_v;
+  block(F, kAttitudeError, kAttitudeError) = -skew(w_ie + w_en);
+  block(F, kAttitudeError, kGyroBiasError) = -state.C_b_n;
+  return F;
+}
+
+NavigationTransition transition(const NavigationState& state, const InertialRates& rates,
+                                const NavigationProcessNoise& noise, double dt_s) noexcept {
+  const NavigationDynamics F = error_dynamics(state, rates);
+  const double beta_g = decay_rate(noise.gyro_bias);
+  const double beta_a = decay_rate(noise.accel_bias);
+
+  // N-25: F^2 needs the bias rows too, which are plain decay.
+  NavigationDynamics F2 = F.leftCols<kNavigationKinematicSize>() * F;
+  F2.middleCols<3>(kGyroBiasError) -= beta_g * F.middleCols<3>(kGyroBiasError);
+  F2.middleCols<3>(kAccelBiasError) -= beta_a * F.middleCols<3>(kAccelBiasError);
+  NavigationTransition out;
+  out.kinematic_rows = dt_s * F + (0.5 * dt_s * dt_s) * F2;
+  out.kinematic_rows.diagonal().array() += 1.0;
+  out.gyro_bias_decay = std::exp(-beta_g * dt_s);
+  out.accel_bias_decay = std::exp(-beta_a * dt_s);
+
+  // N-26: trapezoid of the intensities, the biases' own blocks exact.
+  const double gyro_intensity = noise.gyro_noise_radps_per_sqrt_hz * noise.gyro_noise_radps_per_sqrt_hz;
+  const double accel_intensity = noise.accel_noise_mps2_per_sqrt_hz * noise.accel_noise_mps2_per_sqrt_hz;
+  const double gyro_variance = noise.gyro_bias.sd * noise.gyro_bias.sd;
+  const double accel_variance = noise.accel_bias.sd * noise.accel_bias.sd;
+  NavigationErrorVector intensity = NavigationErrorVector::Zero();
+  intensity.segment<3>(kVelocityError).setConstant(accel_intensity);
+  intensity.segment<3>(kAttitudeError).setConstant(gyro_intensity);
+  intensity.segment<3>(kGyroBiasError).setConstant(2.0 * beta_g * gyro_variance);
+  intensity.segment<3>(kAccelBiasError).setConstant(2.0 * beta_a * accel_variance);
+
+  const NavigationErrorCovariance Phi = full_matrix(out);
+  NavigationErrorCovariance& Q = out.process_covariance;
+  Q.noalias() = (0.5 * dt_s) * (Phi * intensity.asDiagonal() * Phi.transpose());
+  Q.diagonal() += (0.5 * dt_s) * intensity;
+  const double gyro_q = -gyro_variance * std::expm1(-2.0 * beta_g * dt_s);
+  const double accel_q = -accel_variance * std::expm1(-2.0 * beta_a * dt_s);
+  Q.diagonal().segment<3>(kGyroBiasError).setConstant(gyro_q);
+  Q.diagonal().segment<3>(kAccelBiasError).setConstant(accel_q);
+  return out;
+}
+
+NavigationErrorCovariance full_matrix(const NavigationTransition& transition) noexcept {
+  NavigationErrorCovariance Phi = NavigationErrorCovariance::Zero();
+  Phi.topRows<kNavigationKinematicSize>() = transition.kinematic_rows;
+  Phi.diagonal().segment<3>(kGyroBiasError).setConstant(transition.gyro_bias_decay);
+  Phi.diagonal().segment<3>(kAccelBiasError).setConstant(transition.accel_bias_decay);
+  return Phi;
+}
+
+// N-20
+void inject(NavigationState& state, const NavigationErrorVector& error) noexcept {
+  const Geometry g = geometry_at(state.position);
+  state.position.latitude_rad += error(kPositionError) / g.M;
+  state.position.longitude_rad += error(kPositionError + 1) / (g.N * g.cos_L);
+  state.position.height_m -= error(kPositionError + 2);
+  state.v_n_mps += error.segment<3>(kVelocityError);
+  state.C_b_n = orthonormalised(exp_so3(error.segment<3>(kAttitudeError)) * state.C_b_n);
+  state.gyro_bias_b_radps += error.segment<3>(kGyroBiasError);
+  state.accel_bias_b_mps2 += error.segment<3>(kAccelBiasError);
+}
+
+NavigationErrorVector error_between(const NavigationState& truth, const NavigationState& estimate) noexcept {
+  const Geometry g = geometry_at(estimate.position);
+  NavigationErrorVector error;
+  error(kPositionError) = (truth.position.latitude_rad - estimate.position.latitude_rad) * g.M;
+  error(kPositionError + 1) =
+      wrapped_angle(truth.position.longitude_rad - estimate.position.longitude_rad) * g.N * g.cos_L;
+  error(kPositionError + 2) = -(truth.position.height_m - estimate.position.height_m);
+  error.segment<3>(kVelocityError) = truth.v_n_mps - estimate.v_n_mps;
+  error.segment<3>(kAttitudeError) = log_so3(truth.C_b_n * estimate.C_b_n.transpose());
+  error.segment<3>(kGyroBiasError) = truth.gyro_bias_b_radps - estimate.gyro_bias_b_radps;
+  error.segment<3>(kAccelBiasError) = truth.accel_bias_b_mps2 - estimate.accel_bias_b_mps2;
+  return error;
+}
+
+}  // namespace imuscope
