@@ -1,0 +1,35 @@
+#pragma once
+
+/// The recorded bytes of one device, read by read.
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "base/result.h"
+#include "base/time.h"
+
+namespace imuscope {
+
+/// One read as it was made when it was recorded; `bytes` stay valid until the next call of next().
+struct RecordedRead {
+  std::optional<HostTime> arrival;  ///< absent in recordings without arrival stamps
+  std::span<const std::uint8_t> bytes;
+};
+
+class ByteSource {
+ public:
+  virtual ~ByteSource() = default;
+  /// The next read, or nothing at the end.
+  virtual Result<std::optional<RecordedRead>> next() = 0;
+  /// Bytes handed out so far and in all, for progress bars.
+  [[nodiscard]] virtual std::uint64_t bytes_read() const = 0;
+  [[nodiscard]] virtual std::uint64_t bytes_total() const = 0;
+};
+
+/// A raw dump: X.bin or a CSV file, with X.arrivals.csv beside it where the arrivals were kept.
+Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file);
+
+}  // namespace imuscope

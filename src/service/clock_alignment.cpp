@@ -1,0 +1,115 @@
+#include "service/clock_alignment.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "alignment/cross_correlation.h"
+
+namespace imuscope {
+
+namespace {
+
+struct RateSeries {
+  std::vector<double> time_s;
+  std::vector<double> rate_radps;
+};
+
+RateSeries rate_series(const std::vector<Sample>& samples) {
+  RateSeries series;
+  for (const auto& sample : samples) {
+    if (sample.kind != SampleKind::kImu || (sample.imu.flags & kGyroValid) == 0) continue;
+    const auto& w = sample.imu.omega_radps;
+    series.time_s.push_back(to_seconds(sample.time.time_since_epoch()));
+    series.rate_radps.push_back(std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]));
+  }
+  return series;
+}
+
+/// UTC minus the device's own time: the median, since a single tag may be damaged.
+std::optional<Duration> utc_minus_own(const std::vector<Sample>& samples) {
+  std::vector<std::int64_t> differences;
+  for (const auto& sample : samples) {
+    if (sample.has_utc) differences.push_back(to_ns(sample.utc) - to_ns(sample.time));
+  }
+  if (differences.empty()) return std::nullopt;
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return Duration{*middle};
+}
+
+bool shares_the_reference_clock(const DeviceConfig& device) {
+  return (device.protocol == Protocol::kCsvImu || device.protocol == Protocol::kCsvGnss) &&
+         device.csv.common_clock;
+}
+
+Result<DeviceClock> align_by_rate(const std::string& name, const RateSeries& reference,
+                                  const std::vector<Sample>& samples) {
+  const auto study = rate_series(samples);
+  const auto found =
+      find_time_offset({reference.time_s, reference.rate_radps}, {study.time_s, study.rate_radps});
+  if (!found) {
+    return work_error(
+        fmt::format("{}: its clock cannot be brought to the reference's: {}", name, found.error().what),
+        "a drive with turns is needed, or recordings with arrival stamps");
+  }
+  // t_R = t_S + offset + rate (t_S - origin)  =>  host time of device time 0, and seconds per device second.
+  const double origin_s = found->offset_s - found->clock_rate * found->study_origin_s;
+  DeviceClock clock;
+  clock.map = ClockMapConfig::fixed(HostTime{from_seconds(origin_s)}, 1.0 + found->clock_rate);
+  const double mid_s = 0.5 * (study.time_s.front() + study.time_s.back());
+  clock.shift_s = origin_s + found->clock_rate * mid_s;
+  clock.shift_sd_s = found->sd_s;
+  clock.how = fmt::format("angular rate against the reference's (correlation {:.2f}, clock rate {:+.1f} ppm)",
+                          found->correlation, found->clock_rate * 1e6);
+  return clock;
+}
+
+}  // namespace
+
+Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration,
+                                              const std::vector<bool>& unstamped, const ReadSamples& read) {
+  std::vector<DeviceClock> clocks(configuration.devices.size());
+  const auto reference = configuration.reference_index();
+  if (!unstamped[reference]) {
+    if (std::find(unstamped.begin(), unstamped.end(), true) == unstamped.end()) return clocks;
+    return work_error("some recordings have arrival stamps (X.arrivals.csv) and others have none",
+                      "give stamps for all of them, or for none");
+  }
+  const auto reference_samples = read(static_cast<DeviceIndex>(reference));
+  if (!reference_samples) return tl::unexpected<Error>(reference_samples.error());
+  const auto reference_rate = rate_series(*reference_samples);
+  const auto reference_utc = utc_minus_own(*reference_samples);
+  const auto own_times = ClockMapConfig::fixed(HostTime{}, 1.0);
+  clocks[reference] = {own_times, 0.0, 0.0, "the recording's own times, which are the run's"};
+
+  for (std::size_t i = 0; i < configuration.devices.size(); ++i) {
+    if (i == reference || !unstamped[i]) continue;
+    const auto& device = configuration.devices[i];
+    if (shares_the_reference_clock(device)) {
+      clocks[i] = {own_times, 0.0, 0.0, "the reference's clock, as configured"};
+      continue;
+    }
+    const auto samples = read(static_cast<DeviceIndex>(i));
+    if (!samples) return tl::unexpected<Error>(samples.error());
+    const auto utc = utc_minus_own(*samples);
+    if (utc && reference_utc) {
+      const auto shift = *utc - *reference_utc;
+      clocks[i] = {ClockMapConfig::fixed(HostTime{shift}, 1.0), to_seconds(shift), 0.0, "UTC tags"};
+      continue;
+    }
+    if (device.role != DeviceRole::kStudy) {
+      return work_error(
+          fmt::format("{}: neither UTC tags nor arrival stamps bring it to the reference's time",
+                      device.name),
+          "set csv.clock = \"common\" where its times are the reference's");
+    }
+    auto clock = align_by_rate(device.name, reference_rate, *samples);
+    if (!clock) return tl::unexpected<Error>(clock.error());
+    clocks[i] = std::move(*clock);
+  }
+  return clocks;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,35 @@
+#pragma once
+
+/// Recordings without arrival stamps: each device's clock is brought to the reference's by what it recorded.
+/// UTC tags where both have them, otherwise the angular rate of the moving vehicle, which every IMU on it
+/// shares.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "sample/clock_map.h"
+#include "service/config.h"
+
+namespace imuscope {
+
+/// How the times of one device are mapped.
+struct DeviceClock {
+  ClockMapConfig map{};  ///< online for a stamped recording
+  double shift_s = 0.0;  ///< what was added to the device's own time at mid-record; 0 for stamped ones
+  double shift_sd_s = 0.0;
+  std::string how = "arrival stamps";  ///< for the log and run.json
+};
+
+/// All samples of one device, its times taken as they stand in the recording.
+using ReadSamples = std::function<Result<std::vector<Sample>>(DeviceIndex)>;
+
+/// @param unstamped  per device: present, and without arrival stamps
+/// @param read       decodes one device with a clock that starts at zero
+/// @return per device; devices that are stamped or absent keep the online map
+/// Errors (kWork): no reference, or a study that cannot be brought to it, with the reason.
+Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration,
+                                              const std::vector<bool>& unstamped, const ReadSamples& read);
+
+}  // namespace imuscope

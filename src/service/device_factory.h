@@ -1,0 +1,24 @@
+#pragma once
+
+/// From a device's configuration to its driver. The one place that knows every protocol.
+
+#include <memory>
+
+#include "drivers/device/device.h"
+#include "sample/clock_map.h"
+#include "service/config.h"
+
+namespace imuscope {
+
+/// @param clock  online for live streams and stamped recordings, fixed for recordings without arrival stamps
+std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIndex index,
+                                            const ClockMapConfig& clock);
+
+/// For a device on a line of its own. Protocols that exist only as files have none: nullptr.
+std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device);
+
+/// What a decoder has to say about its device beyond counts, in one sentence with the remedy; empty when all
+/// is well. `decoder` must have been made for `device`.
+std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& decoder);
+
+}  // namespace imuscope

@@ -1,0 +1,50 @@
+#include "service/noise_series.h"
+
+#include <algorithm>
+
+namespace imuscope {
+
+namespace {
+
+constexpr std::array kAxisNames{"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+
+/// A hole longer than this is not padded sample by sample (one hour at 100 Hz): the counter began anew.
+constexpr std::int64_t kLongestHole = 360'000;
+
+}  // namespace
+
+std::string axis_name(std::size_t axis) { return kAxisNames[axis]; }
+std::string axis_unit(std::size_t axis) { return axis < 3 ? "rad/s" : "m/s^2"; }
+
+void NoiseSeries::add(const ErrorRow& row) {
+  if (started_ && row.counter < next_counter_) return;
+  const std::int64_t hole = started_ ? std::min(row.counter - next_counter_, kLongestHole) : 0;
+  missing_ += static_cast<std::size_t>(hole);
+  const std::size_t padded = size() + static_cast<std::size_t>(hole);
+  regimes_.resize(padded, Cell::kMissing);
+  regimes_.push_back(row.regime == Regime::kStatic ? Cell::kStatic : Cell::kDynamic);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    values_[axis].resize(padded, 0.0);
+    valid_[axis].resize(padded, 0);
+    values_[axis].push_back(axis < 3 ? row.e_gyro_radps[axis] : row.e_accel_mps2[axis - 3]);
+    valid_[axis].push_back((axis < 3 ? row.gyro_valid : row.accel_valid) ? 1 : 0);
+  }
+  started_ = true;
+  next_counter_ = row.counter + 1;
+}
+
+std::vector<std::uint8_t> NoiseSeries::mask(std::size_t axis) const { return valid_[axis]; }
+
+std::vector<std::uint8_t> NoiseSeries::mask(std::size_t axis, Regime regime) const {
+  const Cell wanted = regime == Regime::kStatic ? Cell::kStatic : Cell::kDynamic;
+  std::vector<std::uint8_t> mask = valid_[axis];
+  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = mask[i] != 0 && regimes_[i] == wanted ? 1 : 0;
+  return mask;
+}
+
+std::size_t NoiseSeries::count(Regime regime) const {
+  const Cell wanted = regime == Regime::kStatic ? Cell::kStatic : Cell::kDynamic;
+  return static_cast<std::size_t>(std::count(regimes_.begin(), regimes_.end(), wanted));
+}
+
+}  // namespace imuscope

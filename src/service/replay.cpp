@@ -1,0 +1,249 @@
+#include "service/replay.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <set>
+
+#include "rt/host_clock.h"
+#include "rt/periodic.h"
+#include "service/device_factory.h"
+
+namespace imuscope {
+
+namespace {
+
+/// Decoded samples on their way into the core's ring.
+class RingSink final : public SampleSink {
+ public:
+  /// @param refused  sequence numbers that the live run's ring refused
+  RingSink(SampleRing& ring, std::set<std::uint64_t> refused)
+      : ring_(&ring), refused_live_(std::move(refused)) {}
+
+  void on_sample(const Sample& sample) noexcept override {
+    newest_arrival_ = std::max(newest_arrival_, sample.arrival);
+    if (refused_live_.contains(sample.sequence) || !ring_->try_push(sample)) ++refused_;
+  }
+  [[nodiscard]] HostTime newest_arrival() const { return newest_arrival_; }
+  [[nodiscard]] std::uint64_t refused() const { return refused_; }
+  [[nodiscard]] bool half_full() const { return ring_->counters().level > SampleRing::capacity() / 2; }
+
+ private:
+  SampleRing* ring_;
+  std::set<std::uint64_t> refused_live_;
+  HostTime newest_arrival_{HostTime::min()};
+  std::uint64_t refused_ = 0;
+};
+
+/// One device of the recording: its bytes, its decoder, its ring.
+class Feed {
+ public:
+  Feed(std::unique_ptr<ByteSource> source, std::unique_ptr<DeviceDecoder> decoder, RingSink sink)
+      : source_(std::move(source)), decoder_(std::move(decoder)), sink_(std::move(sink)) {}
+
+  /// Reads the first bytes, so that first_arrival() can be asked.
+  Result<void> start() {
+    if (auto fetched = fetch(); !fetched) return fetched;
+    // Without stamps, arrivals are known once something was decoded.
+    while (pending_ && !pending_->arrival && sink_.newest_arrival() == HostTime::min()) {
+      if (auto pushed = push_pending(); !pushed) return pushed;
+    }
+    return {};
+  }
+
+  [[nodiscard]] std::optional<HostTime> first_arrival() const {
+    if (pending_ && pending_->arrival) return pending_->arrival;
+    return sink_.newest_arrival() == HostTime::min() ? std::nullopt : std::optional(sink_.newest_arrival());
+  }
+
+  /// Decodes everything that had arrived by `cut`, and a little more where arrivals come from the device's
+  /// time.
+  Result<void> feed(HostTime cut) {
+    while (pending_ && due(cut)) {
+      if (auto pushed = push_pending(); !pushed) return pushed;
+    }
+    return {};
+  }
+
+  [[nodiscard]] bool at_end() const { return !pending_; }
+  [[nodiscard]] const ByteSource& source() const { return *source_; }
+  [[nodiscard]] const DeviceDecoder& decoder() const { return *decoder_; }
+  [[nodiscard]] const RingSink& sink() const { return sink_; }
+
+ private:
+  [[nodiscard]] bool due(HostTime cut) const {
+    if (pending_->arrival) return *pending_->arrival <= cut;
+    return sink_.newest_arrival() <= cut && !sink_.half_full();
+  }
+
+  Result<void> fetch() {
+    auto read = source_->next();
+    if (!read) return tl::unexpected<Error>(read.error());
+    pending_ = *read;
+    return {};
+  }
+
+  Result<void> push_pending() {
+    last_arrival_ = pending_->arrival.value_or(HostTime{});
+    decoder_->push(pending_->bytes, last_arrival_, sink_);
+    if (auto fetched = fetch(); !fetched) return fetched;
+    if (!pending_) decoder_->finish(last_arrival_, sink_);
+    return {};
+  }
+
+  std::unique_ptr<ByteSource> source_;
+  std::unique_ptr<DeviceDecoder> decoder_;
+  RingSink sink_;
+  std::optional<RecordedRead> pending_;
+  HostTime last_arrival_{};
+};
+
+class Replayer {
+ public:
+  Replayer(const Configuration& configuration, const EstimatorConfig& estimator, const Recording& recording,
+           CoreSink& sink, const ReplayOptions& options)
+      : configuration_(configuration),
+        recording_(recording),
+        sink_(sink),
+        options_(options),
+        core_(estimator, configuration.devices.size(),
+              recording.schedule ? recording.schedule->late_samples : std::vector<LateSample>{},
+              options.history),
+        feeds_(configuration.devices.size()) {}
+
+  Result<ReplayResult> run() {
+    if (auto opened = open(); !opened) return tl::unexpected<Error>(opened.error());
+    const auto t0 = first_cut();
+    if (!t0)
+      return work_error("the recording holds no data that a decoder understands",
+                        "check protocols and files");
+    ReplayResult result;
+    result.t0 = *t0;
+    if (auto ran = run_ticks(*t0, result.ticks); !ran) return tl::unexpected<Error>(ran.error());
+    for (std::size_t i = 0; i < feeds_.size(); ++i) result.devices.push_back(device_result(i));
+    if (auto checked = check(result); !checked) return tl::unexpected<Error>(checked.error());
+    return result;
+  }
+
+ private:
+  Result<void> open() {
+    for (std::size_t i = 0; i < feeds_.size(); ++i) {
+      if (!recording_.present[i]) continue;
+      const auto index = static_cast<DeviceIndex>(i);
+      auto source = recording_.open(index);
+      if (!source) return tl::unexpected<Error>(source.error());
+      feeds_[i] = std::make_unique<Feed>(
+          std::move(*source), make_decoder(configuration_.devices[i], index, recording_.clocks[i].map),
+          RingSink(core_.ring(index), refused(index)));
+      if (auto started = feeds_[i]->start(); !started) return started;
+    }
+    return {};
+  }
+
+  [[nodiscard]] std::set<std::uint64_t> refused(DeviceIndex device) const {
+    std::set<std::uint64_t> sequences;
+    if (!recording_.schedule) return sequences;
+    for (const auto& sample : recording_.schedule->refused_samples) {
+      if (sample.device == device) sequences.insert(sample.sequence);
+    }
+    return sequences;
+  }
+
+  [[nodiscard]] std::optional<HostTime> first_cut() const {
+    if (recording_.schedule) return recording_.schedule->t0;
+    std::optional<HostTime> first;
+    for (const auto& feed : feeds_) {
+      const auto arrival = feed ? feed->first_arrival() : std::nullopt;
+      if (arrival && (!first || *arrival < *first)) first = arrival;
+    }
+    if (!first) return first;
+    // On a whole tick, so that the same recording is cut the same way wherever it begins.
+    return HostTime{(first->time_since_epoch() / kTickPeriod) * kTickPeriod};
+  }
+
+  [[nodiscard]] bool finished(std::int64_t index) const {
+    return std::all_of(feeds_.begin(), feeds_.end(),
+                       [](const auto& feed) { return !feed || feed->at_end(); }) &&
+           index > last_needed_tick_;
+  }
+
+  Result<void> run_ticks(HostTime t0, std::int64_t& ticks) {
+    const auto skipped = recording_.schedule
+                             ? std::set<std::int64_t>(recording_.schedule->skipped_ticks.begin(),
+                                                      recording_.schedule->skipped_ticks.end())
+                             : std::set<std::int64_t>{};
+    const HostTime started = host_now();
+    for (std::int64_t index = 0; !finished(index); ++index) {
+      const HostTime cut = t0 + index * kTickPeriod;
+      for (auto& feed : feeds_) {
+        if (!feed) continue;
+        if (auto fed = feed->feed(cut); !fed) return fed;
+        // What is decoded must be consumed, and waited for as long as the estimator waits for a late
+        // reference.
+        if (feed->sink().newest_arrival() > HostTime::min()) {
+          last_needed_tick_ =
+              std::max(last_needed_tick_, (feed->sink().newest_arrival() - t0) / kTickPeriod + kTailTicks);
+        }
+      }
+      if (skipped.contains(index)) continue;
+      if (options_.realtime) sleep_until(started + index * kTickPeriod);
+      core_.tick(index, cut, sink_);
+      ++ticks;
+      if (index % kProgressTicks == 0 && options_.progress) options_.progress(share_read());
+    }
+    return {};
+  }
+
+  [[nodiscard]] double share_read() const {
+    double read = 0.0;
+    double total = 0.0;
+    for (const auto& feed : feeds_) {
+      if (!feed) continue;
+      read += static_cast<double>(feed->source().bytes_read());
+      total += static_cast<double>(feed->source().bytes_total());
+    }
+    return total > 0.0 ? read / total : 1.0;
+  }
+
+  [[nodiscard]] DeviceResult device_result(std::size_t i) const {
+    DeviceResult result;
+    if (!feeds_[i]) return result;
+    result.counters = feeds_[i]->decoder().counters();
+    result.refused = feeds_[i]->sink().refused();
+    result.problem = decoder_problem(configuration_.devices[i], feeds_[i]->decoder());
+    return result;
+  }
+
+  [[nodiscard]] Result<void> check(const ReplayResult& result) const {
+    for (std::size_t i = 0; i < result.devices.size(); ++i) {
+      const auto& device = configuration_.devices[i];
+      if (!recording_.present[i] || result.devices[i].counters.samples > 0) continue;
+      const auto& counters = result.devices[i].counters;
+      const auto& problem = result.devices[i].problem;
+      return work_error(
+          problem.empty() ? fmt::format("{}: {} bytes, and not one {} sample in them", device.name,
+                                        counters.bytes, name_of(device.protocol))
+                          : fmt::format("{}: {}", device.name, problem),
+          problem.empty() ? "check that the file is this device's and the protocol is right" : "");
+    }
+    return {};
+  }
+
+  static constexpr std::int64_t kProgressTicks = 500;
+
+  const Configuration& configuration_;
+  const Recording& recording_;
+  CoreSink& sink_;
+  const ReplayOptions& options_;
+  Core core_;
+  std::vector<std::unique_ptr<Feed>> feeds_;
+  std::int64_t last_needed_tick_ = 0;
+};
+
+}  // namespace
+
+Result<ReplayResult> replay(const Configuration& configuration, const EstimatorConfig& estimator,
+                            const Recording& recording, CoreSink& sink, const ReplayOptions& options) {
+  return Replayer(configuration, estimator, recording, sink, options).run();
+}
+
+}  // namespace imuscope

@@ -1,0 +1,75 @@
+#pragma once
+
+/// Recorded bytes through the same core as the live service, on virtual ticks. Where a recording has no
+/// arrival stamps, arrival is device time plus time on the wire, and the devices' clocks are brought together
+/// by content (clock_alignment.h).
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "drivers/device/device.h"
+#include "service/byte_source.h"
+#include "service/clock_alignment.h"
+#include "service/config.h"
+#include "service/core.h"
+
+namespace imuscope {
+
+/// Opens the recorded bytes of device `index` from their beginning; a study reads them more than once.
+using OpenSource = std::function<Result<std::unique_ptr<ByteSource>>(DeviceIndex index)>;
+
+/// A sample that found its ring full in the live run: the core never saw it.
+struct RefusedSample {
+  DeviceIndex device;
+  std::uint64_t sequence;
+};
+
+/// After the newest arrival the core runs on for this many ticks, live and in replay: what waits for a
+/// reference that does not come is given up by then.
+inline constexpr std::int64_t kTailTicks = 20;
+
+/// What a recording says about the live run it came from, so that a replay repeats it tick by tick.
+struct RecordedSchedule {
+  HostTime t0{};  ///< cut of tick 0
+  std::vector<LateSample> late_samples;
+  std::vector<std::int64_t> skipped_ticks;  ///< ascending
+  std::vector<RefusedSample> refused_samples;
+};
+
+/// A recording, ready to be replayed any number of times.
+struct Recording {
+  std::string description;  ///< for run.json: the inputs as given
+  OpenSource open;
+  std::vector<bool> present;                 ///< per device of the configuration
+  std::vector<DeviceClock> clocks;           ///< per device
+  std::optional<RecordedSchedule> schedule;  ///< of a capture of a live run
+};
+
+/// Counts of one device after a replay.
+struct DeviceResult {
+  DecoderCounters counters;
+  std::uint64_t refused = 0;  ///< samples that found their ring full
+  std::string problem;        ///< decoder_problem()
+};
+
+struct ReplayResult {
+  std::vector<DeviceResult> devices;
+  HostTime t0{};
+  std::int64_t ticks = 0;
+};
+
+struct ReplayOptions {
+  bool realtime = false;                 ///< paced as recorded
+  std::function<void(double)> progress;  ///< share of the bytes read, 0 to 1; called now and then
+  HistorySink* history = nullptr;
+};
+
+/// Runs the recording through a core made from `estimator`. Errors: a recording that cannot be read, or that
+/// holds no sample of the reference or of any study (kWork).
+Result<ReplayResult> replay(const Configuration& configuration, const EstimatorConfig& estimator,
+                            const Recording& recording, CoreSink& sink, const ReplayOptions& options = {});
+
+}  // namespace imuscope
