@@ -1,0 +1,148 @@
+#include "capture/capture_reader.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace imuscope {
+namespace {
+
+/// Follows the sequence numbers of each device through a capture.
+class LossFinder {
+ public:
+  void look(const RawPiece& piece, std::vector<CaptureLoss>& losses) {
+    const auto [place, is_first] = seen_.try_emplace(piece.read.device);
+    Seen& seen = place->second;
+    if (is_first) seen.last_arrival = piece.read.arrival;
+    if (piece.sequence > seen.next_sequence) {
+      losses.push_back({piece.read.device, seen.last_arrival, piece.sequence - seen.next_sequence});
+    }
+    seen.next_sequence = piece.sequence + 1;
+    seen.last_arrival = piece.read.arrival;
+  }
+
+ private:
+  struct Seen {
+    std::int64_t next_sequence = 0;
+    HostTime last_arrival{};
+  };
+  std::map<std::string, Seen> seen_;
+};
+
+void count_piece(const RawPiece& piece, CaptureSummary& summary) {
+  const auto [place, is_first] = summary.devices.try_emplace(piece.read.device);
+  CapturedDevice& device = place->second;
+  if (is_first) device.first = piece.read.arrival;
+  device.last = piece.read.arrival;
+  const bool is_write = piece.read.direction == Direction::kWrite;
+  if (!is_write) device.bytes_read += piece.read.bytes.size();
+  if (piece.continues) return;  // counted with its last piece
+  (is_write ? device.writes : device.reads) += 1;
+}
+
+}  // namespace
+
+Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
+  auto log = EventLogReader::open(path);
+  if (!log) return tl::unexpected(log.error());
+  CaptureSummary summary;
+  LossFinder losses;
+  bool has_run = false;
+  LogEvent event;
+  while (log->next(event)) {
+    auto record = decode_record(event.data);
+    if (!record) {
+      summary.other_messages += 1;
+    } else if (auto* run = std::get_if<RunHeader>(&*record)) {
+      summary.run = std::move(*run);
+      has_run = true;
+    } else if (auto* piece = std::get_if<RawPiece>(&*record)) {
+      losses.look(*piece, summary.losses);
+      count_piece(*piece, summary);
+    } else {
+      summary.exceptions.push_back(std::move(std::get<StoredException>(*record)));
+    }
+  }
+  summary.bytes_skipped = log->bytes_skipped();
+  summary.bytes_cut_off = log->bytes_cut_off();
+  if (summary.devices.empty()) {
+    return work_error(path.string() + " is an LCM event log without device bytes (" +
+                          std::to_string(summary.other_messages) + " other messages)",
+                      "replay needs a capture, which 'imuscope run' records");
+  }
+  if (!has_run) {
+    return work_error(path.string() + " holds device bytes but not what was run",
+                      "its first record (channel IMUSCOPE_RUN) is missing: use the first file of the run");
+  }
+  return summary;
+}
+
+Result<CaptureReader> CaptureReader::open(const std::filesystem::path& path) {
+  auto log = EventLogReader::open(path);
+  if (!log) return tl::unexpected(log.error());
+  return CaptureReader(std::move(*log));
+}
+
+std::optional<RawRead> CaptureReader::next() {
+  while (!ended_ && (held_.empty() || newest_ - held_.begin()->first.arrival < kReorderWindow)) {
+    ended_ = !read_one();
+    if (ended_) close_assemblies();
+  }
+  if (held_.empty()) return std::nullopt;
+  auto oldest = held_.extract(held_.begin());
+  if (oldest.key().arrival < given_) disordered_ += 1;
+  given_ = std::max(given_, oldest.key().arrival);
+  return std::move(oldest.mapped());
+}
+
+/// Takes in one event. Returns false at the end of the file.
+bool CaptureReader::read_one() {
+  LogEvent event;
+  if (!log_.next(event)) return false;
+  auto record = decode_record(event.data);
+  if (!record) return true;
+  if (const auto* run = std::get_if<RunHeader>(&*record)) {
+    devices_ = run->devices;
+  } else if (auto* piece = std::get_if<RawPiece>(&*record)) {
+    add_piece(std::move(*piece));
+  }
+  return true;
+}
+
+void CaptureReader::add_piece(RawPiece&& piece) {
+  Assembly& assembly = assemblies_[piece.read.device];
+  const bool follows = piece.sequence == assembly.next_sequence;
+  assembly.next_sequence = piece.sequence + 1;
+  if (assembly.open && follows) {
+    auto& bytes = assembly.read.bytes;
+    bytes.insert(bytes.end(), piece.read.bytes.begin(), piece.read.bytes.end());
+  } else {
+    if (assembly.open) add_whole(std::move(assembly.read));
+    assembly.read = std::move(piece.read);
+  }
+  assembly.open = piece.continues;
+  if (!assembly.open) add_whole(std::move(assembly.read));
+}
+
+/// At the end of the file: reads whose last piece is missing are given as far as they go.
+void CaptureReader::close_assemblies() {
+  for (auto& [device, assembly] : assemblies_) {
+    if (std::exchange(assembly.open, false)) add_whole(std::move(assembly.read));
+  }
+}
+
+void CaptureReader::add_whole(RawRead&& read) {
+  const Key key{read.arrival, index_of(read.device), completed_++};
+  newest_ = std::max(newest_, read.arrival);
+  held_.emplace(key, std::move(read));
+}
+
+/// Place of the device in the configuration; devices that the run header does not name follow in the order of
+/// their appearance.
+std::size_t CaptureReader::index_of(const std::string& device) {
+  const auto place = std::find(devices_.begin(), devices_.end(), device);
+  const auto index = static_cast<std::size_t>(place - devices_.begin());
+  if (place == devices_.end()) devices_.push_back(device);
+  return index;
+}
+
+}  // namespace imuscope

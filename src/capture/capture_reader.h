@@ -1,0 +1,103 @@
+#pragma once
+
+/// Reads a capture: what was run, what went wrong, and every read and write in the order of arrival.
+
+#include <chrono>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "capture/event_log_reader.h"
+#include "capture/record_codec.h"
+#include "capture/records.h"
+
+namespace imuscope {
+
+/// Bytes of a device that the recorder could not keep: from here on a replay is no longer exact.
+struct CaptureLoss {
+  std::string device;
+  HostTime after{};          ///< arrival of the last record before the gap
+  std::int64_t records = 0;  ///< missing
+};
+
+/// What a capture holds of one device.
+struct CapturedDevice {
+  std::uint64_t reads = 0;
+  std::uint64_t writes = 0;
+  std::uint64_t bytes_read = 0;
+  HostTime first{};
+  HostTime last{};
+};
+
+/// A capture seen as a whole, by one pass over the file.
+struct CaptureSummary {
+  RunHeader run;
+  std::map<std::string, CapturedDevice> devices;
+  std::vector<StoredException> exceptions;  ///< in file order; a replay needs them ahead of their ticks
+  std::vector<CaptureLoss> losses;
+  std::uint64_t other_messages = 0;  ///< messages of other types, such as published ones
+  std::uint64_t bytes_skipped = 0;   ///< damage in the midst of the file
+  std::uint64_t bytes_cut_off = 0;   ///< unfinished record at the end: the recorder was killed
+};
+
+/// @return an error that says what the file is where it is not a capture, and of kind kWork for an event log
+///         that holds no device bytes or no run header
+[[nodiscard]] Result<CaptureSummary> summarise_capture(const std::filesystem::path& path);
+
+/// Iterates over reads and writes ordered by arrival, equal arrivals by the order of the configuration, then
+/// in the order in which they happened. Thread: one, of the soft world.
+///
+/// The file is in the order in which the recorder emptied its rings, which is nearly that of arrival. Reads
+/// are held until the file is kReorderWindow further; what is out of order by more is given late and counted.
+class CaptureReader {
+ public:
+  static constexpr Duration kReorderWindow = std::chrono::seconds(5);
+
+  static Result<CaptureReader> open(const std::filesystem::path& path);
+
+  /// The next read or write; nothing at the end of the capture. A read of which a piece was lost comes as the
+  /// pieces that are there.
+  [[nodiscard]] std::optional<RawRead> next();
+
+  /// Reads that were out of order by more than the window.
+  [[nodiscard]] std::uint64_t disordered() const noexcept { return disordered_; }
+
+ private:
+  /// Position of a read in the order of the replay.
+  struct Key {
+    HostTime arrival;
+    std::size_t device;
+    std::uint64_t order;  // of completion within the file
+    auto operator<=>(const Key&) const = default;
+  };
+  struct Assembly {
+    RawRead read;
+    std::int64_t next_sequence = 0;
+    bool open = false;  // pieces are still to come
+  };
+
+  explicit CaptureReader(EventLogReader log) : log_(std::move(log)) {}
+  bool read_one();
+  void add_piece(RawPiece&& piece);
+  void close_assemblies();
+  void add_whole(RawRead&& read);
+  std::size_t index_of(const std::string& device);
+
+  EventLogReader log_;
+  std::vector<std::string> devices_;
+  std::map<std::string, Assembly> assemblies_;
+  std::map<Key, RawRead> held_;
+  std::uint64_t completed_ = 0;
+  HostTime newest_ = HostTime::min();
+  HostTime given_ = HostTime::min();
+  std::uint64_t disordered_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace imuscope

@@ -1,0 +1,27 @@
+#pragma once
+
+/// The LCM event log as a file format: records of
+///   uint32 0xEDA1DA01, int64 number, int64 utime, int32 channel length, int32 data length, channel, data,
+/// big-endian, one after another, without a file header. (LCM documentation, "LCM log file format".)
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace imuscope {
+
+inline constexpr std::uint32_t kEventLogSync = 0xEDA1'DA01;
+inline constexpr std::size_t kEventLogHeaderBytes = 28;
+/// Larger lengths in a record are taken for corruption. LCM itself limits neither.
+inline constexpr std::size_t kMaxEventChannelBytes = 1000;
+inline constexpr std::size_t kMaxEventDataBytes = std::size_t{64} << 20U;
+
+struct LogEvent {
+  std::int64_t number = 0;
+  std::int64_t utime = 0;
+  std::string channel;
+  std::vector<std::uint8_t> data;
+};
+
+}  // namespace imuscope

@@ -1,0 +1,192 @@
+#include "capture/event_log_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+namespace imuscope {
+namespace {
+
+constexpr std::size_t kReadBytes = std::size_t{256} << 10U;
+constexpr std::size_t kSniffBytes = 64;
+
+// Offsets of the fields of a record header.
+constexpr std::size_t kNumberAt = 4;
+constexpr std::size_t kUtimeAt = 12;
+constexpr std::size_t kChannelLengthAt = 20;
+constexpr std::size_t kDataLengthAt = 24;
+
+std::uint64_t big_endian(const std::uint8_t* bytes, std::size_t n) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < n; ++i) value = value << 8U | bytes[i];
+  return value;
+}
+
+struct Lengths {
+  std::size_t channel;
+  std::size_t data;
+  [[nodiscard]] bool plausible() const {
+    return channel > 0 && channel < kMaxEventChannelBytes && data <= kMaxEventDataBytes;
+  }
+  [[nodiscard]] std::size_t record() const { return kEventLogHeaderBytes + channel + data; }
+};
+
+Lengths lengths_of(const std::uint8_t* header) {
+  return {static_cast<std::size_t>(big_endian(header + kChannelLengthAt, 4)),
+          static_cast<std::size_t>(big_endian(header + kDataLengthAt, 4))};
+}
+
+bool is_text(const std::vector<std::uint8_t>& bytes) {
+  return std::all_of(bytes.begin(), bytes.end(), [](std::uint8_t byte) {
+    return byte >= 0x80 || std::isprint(byte) != 0 || std::isspace(byte) != 0;
+  });
+}
+
+std::string in_hex(const std::vector<std::uint8_t>& bytes) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  constexpr std::size_t kShown = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(bytes.size(), kShown); ++i) {
+    if (i > 0) text += ' ';
+    text += kDigits[bytes[i] >> 4U];
+    text += kDigits[bytes[i] & 0xfU];
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string describe_bytes(const std::vector<std::uint8_t>& first_bytes) {
+  struct Magic {
+    std::string_view bytes;
+    std::string_view name;
+  };
+  constexpr std::array<Magic, 6> kMagics{{{"\x1f\x8b", "a gzip archive"},
+                                          {"PK\x03\x04", "a zip archive"},
+                                          {"\xfd"
+                                           "7zXZ",
+                                           "an xz archive"},
+                                          {"\x28\xb5\x2f\xfd", "a zstd archive"},
+                                          {"\x7f"
+                                           "ELF",
+                                           "a program"},
+                                          {"#ROSBAG", "a ROS bag"}}};
+  const std::string_view view(reinterpret_cast<const char*>(first_bytes.data()), first_bytes.size());
+  for (const Magic& magic : kMagics) {
+    if (view.starts_with(magic.bytes)) return std::string(magic.name);
+  }
+  if (is_text(first_bytes)) {
+    constexpr std::size_t kShown = 32;
+    return "text that begins with '" +
+           std::string(view.substr(0, std::min(view.find_first_of("\r\n"), kShown))) + "'";
+  }
+  return "binary data that begins with the bytes " + in_hex(first_bytes);
+}
+
+Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  const std::string name = path.string();
+  if (!std::filesystem::exists(status)) return usage_error(name + " does not exist", "check the path");
+  if (std::filesystem::is_directory(status)) {
+    return usage_error(name + " is a folder, not a capture", "name the .lcm file in it");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return usage_error(name + " cannot be read", "check its permissions");
+
+  EventLogReader reader(std::move(file));
+  (void)reader.ensure(kSniffBytes);
+  if (reader.buffer_.empty()) {
+    return work_error(name + " is empty: nothing was recorded",
+                      "check that recording ran and the disk had space");
+  }
+  constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
+  const bool has_sync =
+      reader.buffer_.size() >= kSyncBytes && big_endian(reader.buffer_.data(), kSyncBytes) == kEventLogSync;
+  if (!has_sync) {
+    const std::vector<std::uint8_t> first(
+        reader.buffer_.begin(),
+        reader.buffer_.begin() + static_cast<std::ptrdiff_t>(std::min(reader.buffer_.size(), kSniffBytes)));
+    return usage_error(
+        name + " is not a capture (an LCM event log) but " + describe_bytes(first),
+        "give a raw device dump as NAME=" + name + ", with the device's name in the configuration");
+  }
+  return reader;
+}
+
+bool EventLogReader::ensure(std::size_t n) {
+  if (buffer_.size() - begin_ >= n) return true;
+  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin_));
+  begin_ = 0;
+  while (buffer_.size() < n && file_) {
+    const std::size_t have = buffer_.size();
+    buffer_.resize(have + std::max(kReadBytes, n - have));
+    file_.read(reinterpret_cast<char*>(buffer_.data() + have),
+               static_cast<std::streamsize>(buffer_.size() - have));
+    buffer_.resize(have + static_cast<std::size_t>(file_.gcount()));
+  }
+  return buffer_.size() >= n;
+}
+
+/// What begins at `position` bytes after the last one consumed.
+EventLogReader::Look EventLogReader::look_at(std::size_t position) {
+  constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
+  const bool header_is_here = ensure(position + kEventLogHeaderBytes);
+  const std::uint8_t* bytes = buffer_.data() + begin_ + position;
+  const std::size_t available = std::min(buffer_.size() - begin_ - position, kSyncBytes);
+  const std::uint64_t expected = std::uint64_t{kEventLogSync} >> (8 * (kSyncBytes - available));
+  if (big_endian(bytes, available) != expected) return Look::kNoRecord;
+  if (!header_is_here) return Look::kCutOff;
+  const Lengths lengths = lengths_of(bytes);
+  if (!lengths.plausible()) return Look::kNoRecord;
+  return ensure(position + lengths.record()) ? Look::kRecord : Look::kCutOff;
+}
+
+/// Where the next whole record begins after `position`, if any: then what is there was damaged, not cut off.
+std::optional<std::size_t> EventLogReader::next_whole_record(std::size_t position) {
+  for (std::size_t next = position + 1; ensure(next + kEventLogHeaderBytes); ++next) {
+    if (look_at(next) == Look::kRecord) return next;
+  }
+  return std::nullopt;
+}
+
+bool EventLogReader::next(LogEvent& event) {
+  while (ensure(1)) {
+    std::size_t skip = 1;
+    const Look look = look_at(0);
+    if (look == Look::kRecord) {
+      take(event);
+      return true;
+    }
+    if (look == Look::kCutOff) {
+      const auto whole = next_whole_record(0);
+      if (!whole) {
+        bytes_cut_off_ = buffer_.size() - begin_;
+        begin_ = buffer_.size();
+        return false;
+      }
+      skip = *whole;
+    }
+    begin_ += skip;
+    bytes_skipped_ += skip;
+  }
+  return false;
+}
+
+void EventLogReader::take(LogEvent& event) {
+  const std::uint8_t* record = buffer_.data() + begin_;
+  const Lengths lengths = lengths_of(record);
+  event.number = static_cast<std::int64_t>(big_endian(record + kNumberAt, 8));
+  event.utime = static_cast<std::int64_t>(big_endian(record + kUtimeAt, 8));
+  const std::uint8_t* channel = record + kEventLogHeaderBytes;
+  const std::uint8_t* data = channel + lengths.channel;
+  event.channel.assign(channel, data);
+  event.data.assign(data, data + lengths.data);
+  begin_ += lengths.record();
+  events_ += 1;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,57 @@
+#pragma once
+
+/// Reads any LCM event log, whole or damaged.
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/result.h"
+#include "capture/event_log.h"
+
+namespace imuscope {
+
+/// Iterates over the events in file order. Damage never stops it: after bytes that are no record it goes on
+/// at the next whole record and counts what lay between. A record that the end of the file cuts off is the
+/// normal end of a capture whose recorder was killed: it is counted apart. Thread: one, of the soft world.
+class EventLogReader {
+ public:
+  /// Errors name what is there instead: nothing, a folder, an empty file, another kind of file.
+  static Result<EventLogReader> open(const std::filesystem::path& path);
+
+  /// Fetches the next event. Returns false at the end of the file.
+  [[nodiscard]] bool next(LogEvent& event);
+
+  [[nodiscard]] std::uint64_t events() const noexcept { return events_; }
+  /// Bytes in the midst of the file that belong to no whole record.
+  [[nodiscard]] std::uint64_t bytes_skipped() const noexcept { return bytes_skipped_; }
+  /// Bytes of the record that the end of the file cuts off; 0 for a complete log. Known after next() returned
+  /// false.
+  [[nodiscard]] std::uint64_t bytes_cut_off() const noexcept { return bytes_cut_off_; }
+
+ private:
+  enum class Look : std::uint8_t { kRecord, kNoRecord, kCutOff };
+
+  explicit EventLogReader(std::ifstream file) : file_(std::move(file)) {}
+  bool ensure(std::size_t n);
+  Look look_at(std::size_t position);
+  std::optional<std::size_t> next_whole_record(std::size_t position);
+  void take(LogEvent& event);
+
+  std::ifstream file_;
+  std::vector<std::uint8_t> buffer_;  // what is read and not yet consumed begins at begin_
+  std::size_t begin_ = 0;
+  std::uint64_t events_ = 0;
+  std::uint64_t bytes_skipped_ = 0;
+  std::uint64_t bytes_cut_off_ = 0;
+};
+
+/// What the first bytes of a file that is not an event log look like, in words: "text that begins with ...".
+[[nodiscard]] std::string describe_bytes(const std::vector<std::uint8_t>& first_bytes);
+
+}  // namespace imuscope

@@ -1,0 +1,140 @@
+#include "capture/raw_dump.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+namespace imuscope {
+namespace {
+
+constexpr std::string_view kHeader = "byte_offset,n_bytes,arrival_ns";
+constexpr std::size_t kBlockBytes = 4096;  // of a dump without arrivals
+constexpr std::size_t kColumns = 3;
+
+std::string_view without_line_end(std::string_view line) {
+  while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
+  return line;
+}
+
+/// Three whole numbers separated by commas, nothing else.
+std::optional<std::array<std::int64_t, kColumns>> parse_line(std::string_view line) {
+  std::array<std::int64_t, kColumns> numbers{};
+  const char* at = line.data();
+  const char* const end = at + line.size();
+  for (std::size_t column = 0; column < kColumns; ++column) {
+    if (column > 0) {
+      if (at == end || *at != ',') return std::nullopt;
+      ++at;
+    }
+    const auto [after, error] = std::from_chars(at, end, numbers[column]);
+    if (error != std::errc()) return std::nullopt;
+    at = after;
+  }
+  if (at != end) return std::nullopt;
+  return numbers;
+}
+
+}  // namespace
+
+std::filesystem::path RawDump::arrivals_path(const std::filesystem::path& dump) {
+  std::filesystem::path path = dump;
+  path.replace_extension(".arrivals.csv");
+  return path;
+}
+
+Result<RawDump> RawDump::open(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return usage_error(name + " does not exist", "check the path");
+  if (std::filesystem::is_directory(status)) {
+    return usage_error(name + " is a folder, not a raw dump", "name the file in it");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return usage_error(name + " cannot be read", "check its permissions");
+  const auto size = std::filesystem::is_regular_file(status) ? std::filesystem::file_size(path, error) : 0;
+  if (size == 0) return work_error(name + " is empty: it holds no device bytes", "check how it was recorded");
+
+  std::vector<Arrival> arrivals;
+  if (std::filesystem::exists(arrivals_path(path), error)) {
+    auto loaded = load_arrivals(arrivals_path(path), size);
+    if (!loaded) return tl::unexpected(loaded.error());
+    arrivals = std::move(*loaded);
+  }
+  return RawDump(std::move(file), std::move(arrivals));
+}
+
+Result<std::vector<RawDump::Arrival>> RawDump::load_arrivals(const std::filesystem::path& path,
+                                                             std::uint64_t dump_bytes) {
+  std::ifstream file(path);
+  std::size_t line_number = 0;
+  const auto wrong = [&](const std::string& what) {
+    return usage_error(path.string() + ":" + std::to_string(line_number) + ": " + what,
+                       "correct the file, or remove it to take the times from the bytes");
+  };
+  std::vector<Arrival> arrivals;
+  std::uint64_t offset = 0;
+  std::string text;
+  while (std::getline(file, text)) {
+    // A last line without its end is what a kill leaves of it.
+    const bool is_unfinished = file.eof() && offset > 0;
+    line_number += 1;
+    const std::string_view line = without_line_end(text);
+    if (line_number == 1) {
+      if (line != kHeader)
+        return wrong("the header is '" + std::string(line) + "', not '" + std::string(kHeader) + "'");
+      continue;
+    }
+    if (line.empty() || line.front() == '#') continue;
+    const auto numbers = parse_line(line);
+    if (!numbers && is_unfinished) break;
+    if (!numbers) return wrong("'" + std::string(line) + "' is not three whole numbers");
+    const auto [byte_offset, n_bytes, arrival_ns] = *numbers;
+    if (n_bytes <= 0) return wrong("a read of " + std::to_string(n_bytes) + " bytes");
+    if (byte_offset < 0 || static_cast<std::uint64_t>(byte_offset) != offset) {
+      return wrong("byte_offset is " + std::to_string(byte_offset) + ", but the read before ends at " +
+                   std::to_string(offset));
+    }
+    const HostTime arrival = host_time_from_ns(arrival_ns);
+    if (!arrivals.empty() && arrival < arrivals.back().arrival) return wrong("arrival_ns goes back");
+    arrivals.push_back({static_cast<std::uint64_t>(n_bytes), arrival});
+    offset += static_cast<std::uint64_t>(n_bytes);
+    if (offset >= dump_bytes) break;
+  }
+  if (line_number == 0) {
+    line_number = 1;
+    return wrong("the file is empty");
+  }
+  if (offset < dump_bytes) {
+    return wrong("the reads end at byte " + std::to_string(offset) + " of " + std::to_string(dump_bytes));
+  }
+  return arrivals;
+}
+
+std::optional<RawDump::Read> RawDump::next() {
+  Read read;
+  std::uint64_t wanted = kBlockBytes;
+  if (has_arrivals()) {
+    if (next_arrival_ == arrivals_.size()) return std::nullopt;
+    const Arrival& arrival = arrivals_[next_arrival_++];
+    wanted = arrival.n_bytes;
+    read.arrival = arrival.arrival;
+  }
+  // In blocks, since n_bytes is only what a file says.
+  buffer_.clear();
+  while (buffer_.size() < wanted && file_) {
+    const std::size_t have = buffer_.size();
+    buffer_.resize(have + static_cast<std::size_t>(std::min<std::uint64_t>(wanted - have, kBlockBytes)));
+    file_.read(reinterpret_cast<char*>(buffer_.data() + have),
+               static_cast<std::streamsize>(buffer_.size() - have));
+    buffer_.resize(have + static_cast<std::size_t>(file_.gcount()));
+  }
+  if (buffer_.empty()) return std::nullopt;
+  read.bytes = buffer_;
+  return read;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,61 @@
+#pragma once
+
+/// Reads raw dumps: X.bin holds the bytes of one device one after another; X.arrivals.csv beside it, where
+/// there is one, says which bytes came in one read, and when.
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "base/result.h"
+#include "base/time.h"
+
+namespace imuscope {
+
+/// Iterates over the reads of a dump in order. Thread: one, of the soft world.
+///
+/// The columns of X.arrivals.csv are byte_offset, n_bytes, arrival_ns (CLOCK_MONOTONIC); its reads cover the
+/// dump without gaps and their arrivals never go back. A dump without it is given in blocks of arbitrary size
+/// and no arrival: the times have to come from the bytes themselves.
+class RawDump {
+ public:
+  struct Read {
+    std::optional<HostTime> arrival;
+    std::span<const std::uint8_t> bytes;  ///< valid until the next call
+  };
+
+  /// Errors name file and line, what is wrong and what is expected.
+  /// An arrivals file that speaks of more bytes than the dump has (both were cut off by a kill) is no error:
+  /// the dump ends where its bytes end.
+  static Result<RawDump> open(const std::filesystem::path& path);
+
+  /// The next read; nothing at the end.
+  [[nodiscard]] std::optional<Read> next();
+
+  [[nodiscard]] bool has_arrivals() const noexcept { return !arrivals_.empty(); }
+
+  /// The file that may stand beside a dump: mtx1.bin has mtx1.arrivals.csv.
+  static std::filesystem::path arrivals_path(const std::filesystem::path& dump);
+
+ private:
+  struct Arrival {
+    std::uint64_t n_bytes;
+    HostTime arrival;
+  };
+  RawDump(std::ifstream file, std::vector<Arrival> arrivals)
+      : file_(std::move(file)), arrivals_(std::move(arrivals)) {}
+  static Result<std::vector<Arrival>> load_arrivals(const std::filesystem::path& path,
+                                                    std::uint64_t dump_bytes);
+
+  std::ifstream file_;
+  std::vector<Arrival> arrivals_;
+  std::size_t next_arrival_ = 0;
+  std::vector<std::uint8_t> buffer_;
+};
+
+}  // namespace imuscope

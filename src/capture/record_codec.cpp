@@ -1,0 +1,164 @@
+#include "capture/record_codec.h"
+
+#include <algorithm>
+#include <exception>
+#include <imuscope/exception_t.hpp>
+#include <imuscope/raw_t.hpp>
+#include <imuscope/run_t.hpp>
+
+#include "publish/message_builders.h"
+
+namespace imuscope {
+namespace {
+
+constexpr std::int64_t kNsPerUs = 1000;
+
+template <typename Message>
+std::vector<std::uint8_t> encoded(const Message& message) {
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  (void)message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));  // cannot fail: the size is its own
+  return bytes;
+}
+
+/// The message, if the bytes are one of this type and nothing more.
+template <typename Message>
+std::optional<Message> decoded(const std::vector<std::uint8_t>& bytes) {
+  Message message;
+  try {
+    const int size = static_cast<int>(bytes.size());
+    if (message.decode(bytes.data(), 0, size) == size) return message;
+  } catch (const std::exception&) {  // a damaged array length asks for more memory than there is
+  }
+  return std::nullopt;
+}
+
+std::int64_t fingerprint_of(const std::vector<std::uint8_t>& message) {
+  std::uint64_t fingerprint = 0;
+  for (std::size_t i = 0; i < sizeof fingerprint; ++i) fingerprint = fingerprint << 8U | message[i];
+  return static_cast<std::int64_t>(fingerprint);
+}
+
+RunHeader to_record(const run_t& message) {
+  RunHeader header;
+  header.name = message.name;
+  header.version = message.version;
+  header.build = message.build;
+  header.processor = message.processor;
+  header.t0 = host_time_from_ns(message.t0_ns);
+  header.period = Duration{message.period_ns};
+  header.t0_wall = utc_time_from_ns(message.t0_utime * kNsPerUs);
+  header.configuration = message.configuration;
+  header.configuration_hash = message.configuration_hash;
+  header.devices = message.devices;
+  return header;
+}
+
+RawPiece to_record(const raw_t& message) {
+  RawPiece piece;
+  piece.read.device = message.device;
+  piece.read.direction = message.direction == raw_t::WRITE ? Direction::kWrite : Direction::kRead;
+  piece.read.arrival = host_time_from_ns(message.arrival_ns);
+  piece.read.bytes = message.bytes;
+  piece.sequence = message.sequence;
+  piece.continues = message.continues != 0;
+  return piece;
+}
+
+std::int8_t kind_of(ExceptionKind kind) {
+  switch (kind) {
+    case ExceptionKind::kLateSample:
+      return exception_t::LATE_SAMPLE;
+    case ExceptionKind::kRefusedSample:
+      return exception_t::REFUSED_SAMPLE;
+    case ExceptionKind::kSkippedTicks:
+      break;
+  }
+  return exception_t::SKIPPED_TICKS;
+}
+
+std::optional<CaptureRecord> to_record(const exception_t& message) {
+  StoredException stored;
+  switch (message.kind) {
+    case exception_t::LATE_SAMPLE:
+      stored.exception.kind = ExceptionKind::kLateSample;
+      break;
+    case exception_t::REFUSED_SAMPLE:
+      stored.exception.kind = ExceptionKind::kRefusedSample;
+      break;
+    case exception_t::SKIPPED_TICKS:
+      stored.exception.kind = ExceptionKind::kSkippedTicks;
+      break;
+    default:
+      return std::nullopt;
+  }
+  stored.device = message.device;
+  stored.exception.sample_sequence = message.sample_sequence;
+  stored.exception.tick = message.tick;
+  stored.exception.count = message.count;
+  return stored;
+}
+
+}  // namespace
+
+std::int64_t RecordClock::utime(HostTime time) const noexcept { return to_utime(t0_wall + (time - t0)); }
+
+std::vector<std::uint8_t> encode(const RunHeader& header, std::int64_t file) {
+  run_t message;
+  message.utime = to_utime(header.t0_wall);
+  message.sequence = file;
+  message.format = kCaptureFormat;
+  message.name = header.name;
+  message.version = header.version;
+  message.build = header.build;
+  message.processor = header.processor;
+  message.t0_ns = to_ns(header.t0);
+  message.period_ns = header.period.count();
+  message.t0_utime = message.utime;
+  message.configuration = header.configuration;
+  message.configuration_hash = header.configuration_hash;
+  message.n_devices = static_cast<std::int32_t>(header.devices.size());
+  message.devices = header.devices;
+  return encoded(message);
+}
+
+std::vector<std::uint8_t> encode(const RawChunk& chunk, const std::string& device, const RecordClock& clock) {
+  raw_t message;
+  message.utime = clock.utime(chunk.arrival);
+  message.sequence = chunk.sequence;
+  message.device = device;
+  message.direction = chunk.direction == Direction::kWrite ? raw_t::WRITE : raw_t::READ;
+  message.arrival_ns = to_ns(chunk.arrival);
+  message.continues = chunk.continues ? 1 : 0;
+  message.n_bytes = chunk.n_bytes;
+  message.bytes.assign(chunk.bytes.begin(), chunk.bytes.begin() + chunk.n_bytes);
+  return encoded(message);
+}
+
+std::vector<std::uint8_t> encode(const RunException& exception, const std::string& device, HostTime at,
+                                 std::int64_t sequence, const RecordClock& clock) {
+  exception_t message;
+  message.utime = clock.utime(at);
+  message.sequence = sequence;
+  message.kind = kind_of(exception.kind);
+  if (exception.kind != ExceptionKind::kSkippedTicks) message.device = device;
+  message.sample_sequence = exception.sample_sequence;
+  message.tick = exception.tick;
+  message.count = exception.count;
+  return encoded(message);
+}
+
+std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& message) {
+  if (message.size() < sizeof(std::int64_t)) return std::nullopt;
+  const std::int64_t fingerprint = fingerprint_of(message);
+  if (fingerprint == raw_t::getHash()) {
+    if (const auto raw = decoded<raw_t>(message)) return to_record(*raw);
+  } else if (fingerprint == run_t::getHash()) {
+    const auto run = decoded<run_t>(message);
+    if (run && run->format == kCaptureFormat) return to_record(*run);
+  } else if (fingerprint == exception_t::getHash()) {
+    if (const auto exception = decoded<exception_t>(message)) return to_record(*exception);
+  }
+  return std::nullopt;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,51 @@
+#pragma once
+
+/// Between the records of a capture and their LCM messages. Any thread of the soft world.
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "capture/records.h"
+
+namespace imuscope {
+
+/// A chunk as it is stored: RawChunk with the device's name and as many bytes as there are.
+struct RawPiece {
+  RawRead read;
+  std::int64_t sequence = 0;
+  bool continues = false;
+};
+
+/// An exception as it is stored: with the device's name.
+struct StoredException {
+  RunException exception{};
+  std::string device;  ///< empty with kSkippedTicks
+};
+
+using CaptureRecord = std::variant<RunHeader, RawPiece, StoredException>;
+
+/// Maps the host's clock to the utime of records: the wall clock of the PC as it was at t0, running on with
+/// the host's clock, so that a clock set during the run does not disturb it.
+struct RecordClock {
+  HostTime t0{};
+  UtcTime t0_wall{};
+  [[nodiscard]] std::int64_t utime(HostTime time) const noexcept;
+};
+
+/// @param file number of the file within the run
+[[nodiscard]] std::vector<std::uint8_t> encode(const RunHeader& header, std::int64_t file);
+[[nodiscard]] std::vector<std::uint8_t> encode(const RawChunk& chunk, const std::string& device,
+                                               const RecordClock& clock);
+/// @param at       when the recorder got to know of it
+/// @param sequence counts the exceptions of the run
+[[nodiscard]] std::vector<std::uint8_t> encode(const RunException& exception, const std::string& device,
+                                               HostTime at, std::int64_t sequence, const RecordClock& clock);
+
+/// What a message of a capture says, recognised by the fingerprint of its type, not by its channel. Nothing
+/// for a message of another type (a capture may hold published messages) and for one that is damaged.
+[[nodiscard]] std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& message);
+
+}  // namespace imuscope

@@ -1,0 +1,131 @@
+#include "capture/recorder.h"
+
+#include <chrono>
+#include <utility>
+
+#include "base/contracts.h"
+#include "rt/host_clock.h"
+
+namespace imuscope {
+namespace {
+
+// The rings hold seconds; a kill loses at most what came since the last flush, which must stay below 1 s.
+constexpr Duration kDrainInterval = std::chrono::milliseconds(20);
+constexpr Duration kFlushInterval = std::chrono::milliseconds(250);
+constexpr std::size_t kFlushBytes = std::size_t{1} << 20U;
+
+}  // namespace
+
+Result<std::unique_ptr<Recorder>> Recorder::start(Options options, std::vector<RawRing*> raw_rings,
+                                                  std::vector<ExceptionRing*> exception_rings) {
+  IMUSCOPE_EXPECTS(options.run.devices.size() <= kMaxDevices);
+  auto writer = CaptureWriter::create(options.path);
+  if (!writer) return tl::unexpected(writer.error());
+  const RecordClock clock{options.run.t0, options.run.t0_wall};
+  const std::vector<std::uint8_t> header = encode(options.run, 0);
+  writer->append(channel_name(options.channel_prefix, "RUN"), clock.utime(options.run.t0), header);
+  if (auto flushed = writer->flush(); !flushed) return tl::unexpected(flushed.error());
+
+  auto recorder = std::unique_ptr<Recorder>(
+      new Recorder(std::move(options), std::move(*writer), std::move(raw_rings), std::move(exception_rings)));
+  recorder->update_status({});
+  recorder->thread_ = std::thread([raw = recorder.get()] { raw->run(); });
+  return recorder;
+}
+
+Recorder::Recorder(Options options, CaptureWriter writer, std::vector<RawRing*> raw_rings,
+                   std::vector<ExceptionRing*> exception_rings)
+    : options_(std::move(options)),
+      clock_{options_.run.t0, options_.run.t0_wall},
+      exception_channel_(channel_name(options_.channel_prefix, "EXCEPTION")),
+      raw_rings_(std::move(raw_rings)),
+      exception_rings_(std::move(exception_rings)),
+      writer_(std::move(writer)) {
+  for (const std::string& device : options_.run.devices) {
+    raw_channels_.push_back(channel_name(options_.channel_prefix, "RAW", device));
+  }
+}
+
+Recorder::~Recorder() {
+  if (thread_.joinable()) (void)stop();
+}
+
+Result<void> Recorder::stop() {
+  IMUSCOPE_EXPECTS(thread_.joinable());
+  stop_.store(true);
+  thread_.join();
+  drain();  // this thread is the consumer now: join() orders it after the other
+  const Result<void> closed = writer_.close();
+  update_status(closed);
+  return closed;
+}
+
+RecorderStatus Recorder::status() const {
+  const std::lock_guard lock(status_mutex_);
+  return status_;
+}
+
+void Recorder::run() {
+  HostTime flush_due = host_now() + kFlushInterval;
+  while (!stop_.load()) {
+    drain();
+    if (host_now() >= flush_due || writer_.pending_bytes() > kFlushBytes) {
+      flush();
+      flush_due = host_now() + kFlushInterval;
+    }
+    std::this_thread::sleep_for(kDrainInterval);
+  }
+}
+
+void Recorder::drain() {
+  while (drain_oldest_chunk()) {
+    if (writer_.pending_bytes() > kFlushBytes) flush();
+  }
+  drain_exceptions();
+}
+
+/// Records the chunk that arrived first among the heads of the rings, so that the file is nearly in order.
+bool Recorder::drain_oldest_chunk() {
+  RawRing* oldest_ring = nullptr;
+  const RawChunk* oldest = nullptr;
+  for (RawRing* ring : raw_rings_) {
+    const RawChunk* chunk = ring->front();
+    if (chunk != nullptr && (oldest == nullptr || chunk->arrival < oldest->arrival)) {
+      oldest_ring = ring;
+      oldest = chunk;
+    }
+  }
+  if (oldest == nullptr) return false;
+  IMUSCOPE_EXPECTS(oldest->device < raw_channels_.size());
+  const std::vector<std::uint8_t> message = encode(*oldest, options_.run.devices[oldest->device], clock_);
+  writer_.append(raw_channels_[oldest->device], clock_.utime(oldest->arrival), message);
+  oldest_ring->pop();
+  return true;
+}
+
+void Recorder::drain_exceptions() {
+  for (ExceptionRing* ring : exception_rings_) {
+    while (const RunException* exception = ring->front()) {
+      const HostTime now = host_now();
+      const bool has_device = exception->kind != ExceptionKind::kSkippedTicks;
+      IMUSCOPE_EXPECTS(!has_device || exception->device < options_.run.devices.size());
+      const std::string device = has_device ? options_.run.devices[exception->device] : std::string();
+      const std::vector<std::uint8_t> message = encode(*exception, device, now, exceptions_++, clock_);
+      writer_.append(exception_channel_, clock_.utime(now), message);
+      ring->pop();
+    }
+  }
+}
+
+void Recorder::flush() { update_status(writer_.flush()); }
+
+void Recorder::update_status(const Result<void>& flushed) {
+  const std::lock_guard lock(status_mutex_);
+  status_.path = writer_.path();
+  status_.bytes = writer_.bytes_written();
+  status_.records = writer_.records_written();
+  status_.records_lost = writer_.records_lost();
+  status_.problem = flushed ? std::nullopt : std::optional(flushed.error());
+}
+
+}  // namespace imuscope

@@ -1,0 +1,83 @@
+#pragma once
+
+/// The recorder thread: empties the rings of raw bytes and exceptions into a capture.
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/result.h"
+#include "capture/capture_writer.h"
+#include "capture/record_codec.h"
+#include "capture/records.h"
+#include "publish/channel_name.h"
+
+namespace imuscope {
+
+/// What the recorder says about itself. Losses in the rings are counted there (SpscRing::counters()).
+struct RecorderStatus {
+  std::filesystem::path path;
+  std::uint64_t bytes = 0;  ///< safe from the death of this process
+  std::uint64_t records = 0;
+  std::uint64_t records_lost = 0;  ///< refused by the disk
+  std::optional<Error> problem;    ///< of the last flush, with the remedy; empty when it worked
+};
+
+/// Back-pressure ends here: a slow or full disk makes the recorder lose records (counted, visible to the
+/// capture's reader as gaps in the sequences), never an I/O thread wait.
+///
+/// Threads: start(), stop() and the destructor from one; status() from any of the soft world. The rings must
+/// outlive the recorder, whose thread is their only consumer.
+class Recorder {
+ public:
+  struct Options {
+    std::filesystem::path path;  ///< must not exist yet
+    std::string channel_prefix{kDefaultChannelPrefix};
+    RunHeader run;  ///< run.devices names what DeviceIndex counts
+  };
+
+  /// Creates the capture, writes the run header and starts the thread.
+  static Result<std::unique_ptr<Recorder>> start(Options options, std::vector<RawRing*> raw_rings,
+                                                 std::vector<ExceptionRing*> exception_rings);
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  /// Records what is still in the rings, completes the file, ends the thread. Call after the producers ended.
+  /// @return the problem of the last flush, if any
+  Result<void> stop();
+
+  [[nodiscard]] RecorderStatus status() const;
+
+ private:
+  Recorder(Options options, CaptureWriter writer, std::vector<RawRing*> raw_rings,
+           std::vector<ExceptionRing*> exception_rings);
+  void run();
+  void drain();
+  bool drain_oldest_chunk();
+  void drain_exceptions();
+  void flush();
+  void update_status(const Result<void>& flushed);
+
+  Options options_;
+  RecordClock clock_;
+  std::vector<std::string> raw_channels_;  // by DeviceIndex
+  std::string exception_channel_;
+  std::vector<RawRing*> raw_rings_;
+  std::vector<ExceptionRing*> exception_rings_;
+  CaptureWriter writer_;
+  std::int64_t exceptions_ = 0;
+
+  mutable std::mutex status_mutex_;
+  RecorderStatus status_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace imuscope

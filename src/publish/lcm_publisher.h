@@ -1,0 +1,62 @@
+#pragma once
+
+/// Publishes reports over LCM. The only place that knows the LCM library.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "publish/channel_name.h"
+#include "publish/reports.h"
+
+namespace imuscope {
+
+/// Multicast that stays on this PC; with ttl=1 it reaches the local network.
+inline constexpr std::string_view kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
+
+/// Messages stay within one UDP datagram: a larger one is lost whole when any of its fragments is.
+inline constexpr std::size_t kMaxMessageBytes = 65'000;
+
+struct PublishCounters {
+  std::uint64_t published = 0;
+  std::uint64_t failed = 0;     ///< the library would not send
+  std::uint64_t too_large = 0;  ///< above kMaxMessageBytes; not sent
+};
+
+/// Thread: one, of the soft world (publishing allocates and makes system calls). A message that cannot be
+/// sent is counted and given up: what is live is not worth waiting for.
+class LcmPublisher {
+ public:
+  /// Opens the bus.
+  /// @param url     udpm://ADDRESS:PORT?ttl=N, or file://PATH?mode=w to write messages into an LCM log
+  /// @param prefix  of every channel, without the underscore
+  /// @return an error of kind kUsage for a URL that cannot serve (tcpq is refused: its library call aborts
+  /// the
+  ///         process when the server goes), of kind kWork where this PC has no multicast route
+  static Result<LcmPublisher> open(std::string_view url = kDefaultLcmUrl,
+                                   std::string_view prefix = kDefaultChannelPrefix);
+
+  LcmPublisher(LcmPublisher&&) noexcept;
+  LcmPublisher& operator=(LcmPublisher&&) noexcept;
+  ~LcmPublisher();
+
+  void publish(const StatusReport& report);      ///< <PREFIX>_STATUS
+  void publish(const NavigationReport& report);  ///< <PREFIX>_NAVIGATION
+  /// @param name of the S-IMU that report.device stands for
+  void publish(const CalibrationReport& report, const std::string& name);  ///< <PREFIX>_CALIBRATION_<NAME>
+  void publish(const ErrorReport& report, const std::string& name);        ///< <PREFIX>_ERROR_<NAME>
+  void publish(const WaveletVarianceReport& report);                       ///< <PREFIX>_WV_<NAME>
+  void publish(const NoiseModelReport& report);                            ///< <PREFIX>_NOISE_MODEL_<NAME>
+
+  [[nodiscard]] const PublishCounters& counters() const noexcept;
+
+ private:
+  struct Impl;
+  explicit LcmPublisher(std::unique_ptr<Impl> impl) noexcept;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace imuscope
