@@ -1,0 +1,161 @@
+#include "report/figures.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace imuscope::report {
+namespace {
+
+/// Significant digits that are more than a figure can show, also when zoomed.
+constexpr int kDigitsOfSignal = 4;
+constexpr int kDigitsOfEstimate = 7;
+
+std::string quoted(const std::string& any) {
+  return nlohmann::json(any).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
+std::string short_number(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : std::string("null");
+}
+
+/// "[1,2,null]" of value(i) for i < n.
+template <typename Value>
+std::string array_of(std::size_t n, int digits, Value value) {
+  std::string array = "[";
+  for (std::size_t i = 0; i < n; ++i) {
+    if (i > 0) array += ',';
+    array += short_number(value(i), digits);
+  }
+  return array + "]";
+}
+
+double or_nan(std::optional<double> value) {
+  return value.value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
+std::string head_of(const Figure& figure, const char* kind) {
+  std::string head = fmt::format("\"id\":{},\"kind\":\"{}\",\"group\":{},\"y_label\":{}", quoted(figure.id),
+                                 kind, quoted(figure.group), quoted(figure.y_label));
+  if (figure.window) {
+    head += fmt::format(",\"window\":[{},{}]", short_number(figure.window->begin_s, kDigitsOfEstimate),
+                        short_number(figure.window->end_s, kDigitsOfEstimate));
+  }
+  if (figure.truth) head += fmt::format(",\"truth\":{}", short_number(*figure.truth, kDigitsOfEstimate));
+  head += ",\"shaded\":[";
+  for (std::size_t i = 0; i < figure.shaded.size(); ++i) {
+    head +=
+        fmt::format("{}[{:.1f},{:.1f}]", i > 0 ? "," : "", figure.shaded[i].begin_s, figure.shaded[i].end_s);
+  }
+  return head + "]";
+}
+
+std::string times_of(const BinnedSignals& signals) {
+  // A stretch's middle is a multiple of half the first width: two decimals of a second hold it.
+  std::string array = "[";
+  for (std::size_t i = 0; i < signals.size(); ++i)
+    array += fmt::format("{}{:.2f}", i > 0 ? "," : "", signals.time_s(i));
+  return array + "]";
+}
+
+std::string wavelet_series(const Fit& fit) {
+  const auto values = [&](auto member) {
+    return array_of(fit.levels.size(), kDigitsOfSignal,
+                    [&](std::size_t i) { return or_nan(member(fit.levels[i])); });
+  };
+  return fmt::format(
+      "{{\"name\":{},\"tau\":{},\"mid\":{},\"low\":{},\"high\":{},\"fitted\":{}}}",
+      quoted(fit.regime.empty() ? "all" : fit.regime),
+      array_of(fit.levels.size(), kDigitsOfEstimate, [&](std::size_t i) { return fit.levels[i].tau_s; }),
+      values([](const FitLevel& level) { return level.value; }),
+      values([](const FitLevel& level) { return level.ci_low; }),
+      values([](const FitLevel& level) { return level.ci_high; }),
+      values([](const FitLevel& level) { return level.fitted; }));
+}
+
+}  // namespace
+
+void FigureSheet::add(const std::string& figure) {
+  if (!figures_.empty()) figures_ += ",\n";
+  figures_ += "{" + figure + "}";
+}
+
+Html FigureSheet::range_figure(const Figure& figure, const BinnedSignals& signals, std::size_t signal,
+                               int colour, const Html& caption) {
+  const auto values = [&](auto member) {
+    return array_of(signals.size(), kDigitsOfSignal, [&](std::size_t i) {
+      const auto& bin = signals.bin(signal, i);
+      return bin.n == 0 ? std::numeric_limits<double>::quiet_NaN() : member(bin);
+    });
+  };
+  add(head_of(figure, "time") + fmt::format(",\"colour\":{},\"times\":{},\"mid\":{},\"low\":{},\"high\":{}",
+                                            colour, times_of(signals),
+                                            values([](const auto& bin) { return bin.mean(); }),
+                                            values([](const auto& bin) { return bin.smallest; }),
+                                            values([](const auto& bin) { return bin.largest; })));
+  return figure_place(figure.id, caption);
+}
+
+Html FigureSheet::estimate_figure(const Figure& figure, const BinnedSignals& signals, std::size_t signal,
+                                  std::size_t sd_signal, double unit, int colour, const Html& caption) {
+  const auto values = [&](double factor) {
+    return array_of(signals.size(), kDigitsOfEstimate, [&](std::size_t i) {
+      const double sd = signals.bin(sd_signal, i).last;
+      return unit * (signals.bin(signal, i).last + (factor == 0.0 ? 0.0 : factor * sd));
+    });
+  };
+  add(head_of(figure, "time") + fmt::format(",\"colour\":{},\"times\":{},\"mid\":{},\"low\":{},\"high\":{}",
+                                            colour, times_of(signals), values(0.0), values(-1.0),
+                                            values(1.0)));
+  return figure_place(figure.id, caption);
+}
+
+Html FigureSheet::wavelet_figure(const std::string& id, const std::vector<const Fit*>& fits,
+                                 const Html& caption) {
+  Figure figure;
+  figure.id = id;
+  figure.y_label = fits.empty() ? "" : "(" + fits.front()->unit + ")²";
+  std::string series;
+  for (const Fit* fit : fits) series += (series.empty() ? "" : ",") + wavelet_series(*fit);
+  add(head_of(figure, "wavelet") + ",\"series\":[" + series + "]");
+  return figure_place(id, caption);
+}
+
+Html FigureSheet::map_figure(const std::string& id, const BinnedSignals& navigation, const Html& caption) {
+  Figure figure;
+  figure.id = id;
+  const auto values = [&](std::size_t signal) {
+    return array_of(navigation.size(), kDigitsOfEstimate,
+                    [&](std::size_t i) { return navigation.bin(signal, i).last; });
+  };
+  add(head_of(figure, "map") + fmt::format(",\"times\":{},\"north\":{},\"east\":{},\"speed\":{}",
+                                           times_of(navigation), values(kNorth_m), values(kEast_m),
+                                           values(kSpeed_mps)));
+  return figure_place(id, caption, "map");
+}
+
+std::optional<Stretch> settled_window(const BinnedSignals& signals, std::size_t signal, std::size_t sd_signal,
+                                      double unit, std::optional<double> truth) {
+  constexpr std::size_t kUnsettledFifth = 5;
+  constexpr double kSdShown = 2.0;
+  constexpr double kMargin = 0.05;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (std::size_t i = signals.size() / kUnsettledFifth; i < signals.size(); ++i) {
+    const double value = unit * signals.bin(signal, i).last;
+    const double sd = unit * signals.bin(sd_signal, i).last;
+    if (!std::isfinite(value) || !std::isfinite(sd)) continue;
+    low = std::min(low, value - kSdShown * sd);
+    high = std::max(high, value + kSdShown * sd);
+  }
+  if (truth) {
+    low = std::min(low, *truth);
+    high = std::max(high, *truth);
+  }
+  if (!(high > low) || !std::isfinite(high - low)) return {};
+  const double margin = kMargin * (high - low);
+  return Stretch{low - margin, high + margin};
+}
+
+}  // namespace imuscope::report

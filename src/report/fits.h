@@ -1,0 +1,58 @@
+#pragma once
+
+/// The noise models of a run, in the units they are shown in: gyroscopes in deg/s as in the paper.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace imuscope::report {
+
+struct FitLevel {
+  double tau_s = 0.0;
+  std::optional<double> value;
+  std::optional<double> ci_low;
+  std::optional<double> ci_high;
+  std::optional<double> fitted;
+};
+
+struct FitParameter {
+  std::string process;
+  std::string name;
+  std::string unit;
+  std::optional<double> value;
+  std::optional<double> ci_low;
+  std::optional<double> ci_high;
+};
+
+struct Fit {
+  std::string imu;
+  std::string axis;    ///< "gyro_x"
+  std::string regime;  ///< "static", "dynamic", or what the run calls it
+  std::string unit;    ///< of the signal
+  std::string model;
+  std::optional<double> n;
+  std::vector<FitLevel> levels;
+  std::vector<FitParameter> parameters;
+  std::optional<double> j_p_value;
+  bool identifiable = true;
+  std::vector<std::string> warnings;
+};
+
+/// The fits in `models` (the array of models.json); empty where it is null.
+std::vector<Fit> read_fits(const nlohmann::json& models);
+
+/// Regimes that occur, "static" and "dynamic" first, then the others as they come.
+std::vector<std::string> regimes_of(const std::vector<Fit>& fits);
+
+/// nullptr where there is none.
+const Fit* find_fit(const std::vector<Fit>& fits, const std::string& imu, const std::string& axis,
+                    const std::string& regime);
+
+inline constexpr const char* kAxes[] = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+
+/// "gyroscope x" for "gyro_x"; any other axis as it is.
+std::string axis_words(const std::string& axis);
+
+}  // namespace imuscope::report

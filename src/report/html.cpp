@@ -1,0 +1,81 @@
+#include "report/html.h"
+
+#include <fmt/format.h>
+
+namespace imuscope::report {
+
+Html text(std::string_view any) {
+  std::string escaped;
+  escaped.reserve(any.size());
+  for (const char c : any) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return Html::markup(escaped);
+}
+
+Html element(std::string_view tag, const Html& content, std::string_view css_class) {
+  const std::string attribute = css_class.empty() ? "" : fmt::format(" class=\"{}\"", css_class);
+  return Html::markup(fmt::format("<{0}{1}>{2}</{0}>", tag, attribute, content.str()));
+}
+
+Html paragraph(std::string_view any, std::string_view css_class) {
+  return element("p", text(any), css_class);
+}
+
+std::string json_for_script(std::string json) {
+  std::string safe;
+  safe.reserve(json.size());
+  for (const char c : json) {
+    if (c == '<') {
+      safe += "\\u003c";
+    } else {
+      safe += c;
+    }
+  }
+  return safe;
+}
+
+Html Table::html() const {
+  Html head;
+  for (const Html& heading : headings_) head += element("th", heading);
+  Html body;
+  for (const auto& row : rows_) {
+    if (row.size() == 1) {
+      body += Html::markup(fmt::format("<tr class=\"group\"><th colspan=\"{}\">{}</th></tr>",
+                                       headings_.size(), row.front().str()));
+      continue;
+    }
+    Html cells;
+    for (std::size_t i = 0; i < row.size(); ++i) cells += element(i == 0 ? "th" : "td", row[i]);
+    body += element("tr", cells);
+  }
+  const Html table = element("table", element("thead", element("tr", head)) + element("tbody", body));
+  return element("div", table, "scroll");
+}
+
+Html figure_place(std::string_view id, const Html& caption, std::string_view css_class) {
+  return Html::markup(
+      fmt::format("<figure class=\"{}\"><figcaption>{}</figcaption><div class=\"legend\"></div>"
+                  "<div class=\"plot\" data-figure=\"{}\"></div></figure>",
+                  css_class, caption.str(), text(id).str()));
+}
+
+}  // namespace imuscope::report

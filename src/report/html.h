@@ -1,0 +1,62 @@
+#pragma once
+
+/// Markup that cannot be confused with text: whatever comes from a file becomes markup only through text(),
+/// which escapes it.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace imuscope::report {
+
+class Html {
+ public:
+  Html() = default;
+  /// For markup written in this program, never for what was read from a file.
+  static Html markup(std::string_view trusted) { return Html(std::string(trusted)); }
+
+  Html& operator+=(const Html& other) {
+    markup_ += other.markup_;
+    return *this;
+  }
+  friend Html operator+(Html left, const Html& right) { return left += right; }
+  [[nodiscard]] const std::string& str() const { return markup_; }
+  [[nodiscard]] bool empty() const { return markup_.empty(); }
+
+ private:
+  explicit Html(std::string markup) : markup_(std::move(markup)) {}
+  std::string markup_;
+};
+
+/// Text of any origin, safe inside elements and quoted attributes.
+Html text(std::string_view any);
+
+/// <tag class="css_class">content</tag>; `tag` and `css_class` are written in this program.
+Html element(std::string_view tag, const Html& content, std::string_view css_class = {});
+
+/// A paragraph of plain text.
+Html paragraph(std::string_view any, std::string_view css_class = {});
+
+/// A JSON document as the content of a <script> element: no text in it can end the element.
+std::string json_for_script(std::string json);
+
+/// A table with a heading row. The first cell of a row is its heading.
+class Table {
+ public:
+  explicit Table(std::vector<Html> headings) : headings_(std::move(headings)) {}
+  void add_row(std::vector<Html> cells) { rows_.push_back(std::move(cells)); }
+  /// A row that names the group of rows below it.
+  void add_group(Html name) { rows_.push_back({std::move(name)}); }
+  [[nodiscard]] bool empty() const { return rows_.empty(); }
+  /// The table, inside an element that scrolls sideways where the page is narrow.
+  [[nodiscard]] Html html() const;
+
+ private:
+  std::vector<Html> headings_;
+  std::vector<std::vector<Html>> rows_;
+};
+
+/// A place where page.js draws the figure `id`, with what it shows in words below it.
+Html figure_place(std::string_view id, const Html& caption, std::string_view css_class = {});
+
+}  // namespace imuscope::report

@@ -1,0 +1,309 @@
+// Draws the figures of the page from the JSON in #figures. Every figure has a place in the page that names it.
+(function () {
+  'use strict';
+
+  // Legible on white and on black, and told apart by the colour-blind (after Okabe and Ito).
+  const COLOURS = ['#d1600a', '#0b9a6e', '#3a86d8', '#9a6fd0', '#c14b78'];
+  const SPEED_COLOURS = ['#8a63c9', '#3a86d8', '#0b9a6e', '#d99a00', '#d1600a'];
+  const TRUTH_DASH = [6, 4];
+
+  const escaped = (any) => String(any).replace(/[&<>"']/g, (c) => '&#' + c.charCodeAt(0) + ';');
+  const variable = (name) => getComputedStyle(document.body).getPropertyValue(name).trim();
+  const shown = (value) => {
+    if (value === null || !isFinite(value)) return '–';
+    return Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3) ? value.toExponential(2)
+                                                                            : String(+value.toPrecision(5));
+  };
+
+  const graphs = [];
+  const groups = new Map();
+
+  // A finger scrolls the page; two fingers zoom. The library alone would take both.
+  const interaction = Object.assign({}, Dygraph.defaultInteractionModel);
+  for (const kind of ['touchstart', 'touchmove', 'touchend']) {
+    const whole = Dygraph.defaultInteractionModel[kind];
+    interaction[kind] = (event, graph, context) => {
+      if (event.touches.length > 1 || (kind === 'touchend' && context.touchDirections)) whole(event, graph, context);
+    };
+  }
+
+  function legend(entries) {
+    return entries.map((entry) => '<span class="swatch" style="background:' + entry.colour + '"></span>' +
+                                  escaped(entry.text)).join('');
+  }
+
+  // What lies under the curves: times at rest, and the truth where it is known.
+  function underlay(figure) {
+    return (canvas, area, graph) => {
+      canvas.fillStyle = variable('--rest');
+      for (const [begin, end] of figure.shaded) {
+        const left = Math.max(graph.toDomXCoord(begin), area.x);
+        const right = Math.min(graph.toDomXCoord(end), area.x + area.w);
+        if (right > left) canvas.fillRect(left, area.y, right - left, area.h);
+      }
+      if (figure.truth === undefined) return;
+      const y = graph.toDomYCoord(figure.truth);
+      canvas.save();
+      canvas.strokeStyle = variable('--text');
+      canvas.setLineDash(TRUTH_DASH);
+      canvas.beginPath();
+      canvas.moveTo(area.x, y);
+      canvas.lineTo(area.x + area.w, y);
+      canvas.stroke();
+      canvas.restore();
+    };
+  }
+
+  function zoomTogether(group) {
+    return (left, right) => {
+      for (const graph of groups.get(group) || []) graph.updateOptions({dateWindow: [left, right]});
+    };
+  }
+
+  function common(figure, legendPlace) {
+    return {
+      customBars: true,
+      interactionModel: interaction,
+      underlayCallback: underlay(figure),
+      labelsDiv: legendPlace,
+      legend: 'always',
+      gridLineColor: variable('--line'),
+      axisLineColor: variable('--line'),
+      axisLabelFontSize: 12,
+      fillAlpha: 0.25,
+      strokeWidth: 1.3,
+      highlightCircleSize: 2.5,
+      rightGap: 8,
+      axes: {y: {axisLabelWidth: 52}, x: {axisLabelWidth: 46, pixelsPerLabel: 60}},
+    };
+  }
+
+  function drawTime(figure, place, legendPlace) {
+    const rows = figure.times.map((time, i) => [time, figure.mid[i] === null
+        ? [null, null, null] : [figure.low[i] === null ? figure.mid[i] : figure.low[i], figure.mid[i],
+                                figure.high[i] === null ? figure.mid[i] : figure.high[i]]]);
+    const colour = COLOURS[figure.colour % COLOURS.length];
+    const options = common(figure, legendPlace);
+    options.labels = ['time', 'value'];
+    options.colors = [colour];
+    options.valueRange = figure.window || null;
+    options.axes.y.axisLabelFormatter = shown;
+    options.axes.x.axisLabelFormatter = (value) => value + ' s';
+    options.zoomCallback = figure.group ? zoomTogether(figure.group) : null;
+    // The library asks for the legend while it constructs the graph, before there is one to ask.
+    let graph = null;
+    options.legendFormatter = (data) => {
+      if (graph === null || data.x === undefined || data.x === null) return legend([{colour, text: figure.y_label}]);
+      const row = rows[graph.getSelection()];
+      if (!row || row[1][1] === null) return '';
+      return legend([{colour, text: shown(row[1][1]) + ' (' + shown(row[1][0]) + ' … ' + shown(row[1][2]) + ') ' +
+                                    figure.y_label + ' at ' + data.x + ' s'}]);
+    };
+    graph = new Dygraph(place, rows, options);
+    graphs.push({graph, figure});
+    if (figure.group) groups.set(figure.group, (groups.get(figure.group) || []).concat(graph));
+  }
+
+  // A point with its interval as a whisker.
+  function whiskers(e) {
+    const canvas = e.drawingContext;
+    canvas.strokeStyle = e.color;
+    canvas.fillStyle = e.color;
+    canvas.lineWidth = 1.4;
+    for (const point of e.points) {
+      if (!isFinite(point.canvasy) || point.yval === null) continue;
+      const top = e.plotArea.y + e.plotArea.h * point.y_top;
+      const bottom = e.plotArea.y + e.plotArea.h * point.y_bottom;
+      canvas.beginPath();
+      canvas.moveTo(point.canvasx, top);
+      canvas.lineTo(point.canvasx, bottom);
+      canvas.stroke();
+      canvas.beginPath();
+      canvas.arc(point.canvasx, point.canvasy, 2.6, 0, 2 * Math.PI);
+      canvas.fill();
+    }
+  }
+
+  // Powers of ten only: between them there is no room for labels.
+  function decades(low, high) {
+    const ticks = [];
+    const first = Math.floor(Math.log10(low));
+    const last = Math.ceil(Math.log10(high));
+    const step = Math.max(1, Math.ceil((last - first) / 5));
+    for (let exponent = first; exponent <= last; ++exponent) {
+      const labelled = (exponent - first) % step === 0;
+      ticks.push({v: Math.pow(10, exponent), label: labelled ? '10' + superscript(exponent) : ''});
+    }
+    return ticks;
+  }
+  const superscript = (exponent) => '<sup>' + String(exponent).replace('-', '−') + '</sup>';
+
+  function drawWavelet(figure, place, legendPlace) {
+    const taus = [...new Set(figure.series.flatMap((series) => series.tau))].sort((a, b) => a - b);
+    const labels = ['τ'];
+    const options = common(figure, legendPlace);
+    options.series = {};
+    options.colors = [];
+    figure.series.forEach((series, k) => {
+      const colour = COLOURS[(figure.series.length === 1 ? 2 : 2 - k + 5) % COLOURS.length];
+      labels.push(series.name, series.name + ' fitted');
+      options.colors.push(colour, colour);
+      options.series[series.name] = {plotter: whiskers, strokeWidth: 0};
+      options.series[series.name + ' fitted'] = {plotter: Dygraph.Plotters.linePlotter};
+    });
+    const rows = taus.map((tau) => {
+      const row = [tau];
+      for (const series of figure.series) {
+        const i = series.tau.indexOf(tau);
+        const mid = i < 0 ? null : series.mid[i];
+        const fitted = i < 0 ? null : series.fitted[i];
+        // A lower end at zero has no place on a logarithmic axis.
+        const low = mid === null ? null : series.low[i] > 0 ? series.low[i] : mid / 100;
+        const high = mid === null ? null : series.high[i] === null ? mid : series.high[i];
+        row.push(mid === null ? null : [low, mid, high], fitted === null ? null : [fitted, fitted, fitted]);
+      }
+      return row;
+    });
+    const ends = rows.flatMap((row) => row.slice(1).filter((bar) => bar !== null).flat());
+    options.labels = labels;
+    options.connectSeparatedPoints = true;
+    options.logscale = true;
+    options.valueRange = ends.length ? [Math.min(...ends) / 1.4, Math.max(...ends) * 1.4] : null;
+    options.dateWindow = [taus[0] / 1.4, taus[taus.length - 1] * 1.4];
+    options.axes.x.logscale = true;
+    options.axes.x.ticker = decades;
+    options.axes.y.ticker = decades;
+    options.axes.y.axisLabelWidth = 36;
+    options.interactionModel = {};
+    const names = () => legend(figure.series.map((series, k) => ({colour: options.colors[2 * k], text: series.name})));
+    options.legendFormatter = (data) => {
+      if (data.x === undefined || data.x === null) return names();
+      return legend(data.series.filter((series) => series.y !== undefined && series.y !== null)
+          .filter((series, k) => k % 2 === 0)
+          .map((series) => ({colour: series.color, text: series.label + ' ' + shown(series.y)}))) +
+          ' at τ = ' + shown(data.x) + ' s';
+    };
+    graphs.push({graph: new Dygraph(place, rows, options), figure});
+  }
+
+  // Metres that make a scale bar of about `wanted` metres.
+  function roundLength(wanted) {
+    const power = Math.pow(10, Math.floor(Math.log10(wanted)));
+    return [5, 2, 1].map((digit) => digit * power).find((length) => length <= wanted) || power;
+  }
+
+  function drawMap(figure, place, legendPlace) {
+    const points = figure.times.map((time, i) => ({time, n: figure.north[i], e: figure.east[i], v: figure.speed[i]}))
+        .filter((point) => point.n !== null && point.e !== null);
+    if (points.length === 0) return;
+    const range = (values) => [Math.min(...values), Math.max(...values)];
+    const [south, north] = range(points.map((point) => point.n));
+    const [west, east] = range(points.map((point) => point.e));
+    const [, fastest] = range(points.map((point) => point.v || 0));
+    const width = 1000;
+    const margin = 46;
+    const span = Math.max(east - west, (north - south) * 0.6, 1);
+    const scale = (width - 2 * margin) / Math.max(east - west, (north - south) / 0.62, span * 1e-3);
+    const height = Math.max((north - south) * scale, 140) + 2 * margin;
+    const x = (e) => margin + (e - west) * scale + ((width - 2 * margin) - (east - west) * scale) / 2;
+    const y = (n) => height - margin - (n - south) * scale - ((height - 2 * margin) - (north - south) * scale) / 2;
+    const level = (v) => Math.min(SPEED_COLOURS.length - 1, Math.floor((v || 0) / (fastest || 1) * SPEED_COLOURS.length));
+
+    // One path for each run of points of the same speed class; a gap in time breaks the way.
+    const step = figure.times.length > 1 ? figure.times[1] - figure.times[0] : 1;
+    const paths = [];
+    for (let i = 1; i < points.length; ++i) {
+      const from = points[i - 1];
+      const to = points[i];
+      if (to.time - from.time > 1.5 * step) continue;
+      const colour = SPEED_COLOURS[level(to.v)];
+      const last = paths[paths.length - 1];
+      const segment = 'L' + x(to.e).toFixed(1) + ' ' + y(to.n).toFixed(1);
+      if (last && last.colour === colour && last.end === i - 1) {
+        last.d += segment;
+        last.end = i;
+      } else {
+        paths.push({colour, end: i, d: 'M' + x(from.e).toFixed(1) + ' ' + y(from.n).toFixed(1) + segment});
+      }
+    }
+    const bar = roundLength((width - 2 * margin) / 4 / scale);
+    const mark = (point, label) => '<circle cx="' + x(point.e) + '" cy="' + y(point.n) + '" r="5" fill="none" stroke-width="2" ' +
+        'stroke="currentColor"/><text x="' + (x(point.e) + 9) + '" y="' + (y(point.n) - 7) + '">' + label + '</text>';
+    place.innerHTML = '<svg viewBox="0 0 ' + width + ' ' + height.toFixed(0) + '" role="img" aria-label="map">' +
+        '<rect class="frame" x="0.5" y="0.5" width="' + (width - 1) + '" height="' + (height - 1).toFixed(0) + '"/>' +
+        paths.map((path) => '<path d="' + path.d + '" fill="none" stroke-width="2.5" vector-effect="non-scaling-stroke" ' +
+                            'stroke-linejoin="round" stroke="' + path.colour + '"/>').join('') +
+        mark(points[0], 'start') + mark(points[points.length - 1], 'end') +
+        '<path d="M20 ' + (height - 18) + 'h' + (bar * scale) + '" stroke="currentColor" stroke-width="3"/>' +
+        '<text x="20" y="' + (height - 26) + '">' + (bar >= 1000 ? bar / 1000 + ' km' : bar + ' m') + '</text>' +
+        '<path d="M' + (width - 26) + ' 44V18l-6 9m6-9l6 9" fill="none" stroke="currentColor" stroke-width="2"/>' +
+        '<text x="' + (width - 31) + '" y="60">N</text></svg>';
+    legendPlace.innerHTML = legend(SPEED_COLOURS.map((colour, k) => ({
+      colour,
+      text: (k * fastest / SPEED_COLOURS.length).toFixed(0) + '–' + ((k + 1) * fastest / SPEED_COLOURS.length).toFixed(0) +
+            (k === SPEED_COLOURS.length - 1 ? ' m/s' : ''),
+    })));
+    makeMapMovable(place.firstChild, width, height);
+  }
+
+  // Wheel with Ctrl zooms about the pointer, dragging moves, a double click returns.
+  function makeMapMovable(svg, width, height) {
+    let box = [0, 0, width, height];
+    const show = () => svg.setAttribute('viewBox', box.join(' '));
+    svg.addEventListener('wheel', (event) => {
+      if (!event.ctrlKey) return;
+      event.preventDefault();
+      const bounds = svg.getBoundingClientRect();
+      const u = (event.clientX - bounds.left) / bounds.width;
+      const v = (event.clientY - bounds.top) / bounds.height;
+      const factor = Math.exp(event.deltaY / 400);
+      const wide = Math.min(width, Math.max(width / 200, box[2] * factor));
+      const high = wide * height / width;
+      box = [box[0] + u * (box[2] - wide), box[1] + v * (box[3] - high), wide, high];
+      show();
+    }, {passive: false});
+    let from = null;
+    svg.addEventListener('pointerdown', (event) => { from = event.pointerType === 'mouse' ? event : null; });
+    window.addEventListener('pointerup', () => { from = null; });
+    svg.addEventListener('pointermove', (event) => {
+      if (from === null) return;
+      const factor = box[2] / svg.getBoundingClientRect().width;
+      box[0] -= (event.clientX - from.clientX) * factor;
+      box[1] -= (event.clientY - from.clientY) * factor;
+      from = event;
+      show();
+    });
+    svg.addEventListener('dblclick', () => { box = [0, 0, width, height]; show(); });
+  }
+
+  const draw = {time: drawTime, wavelet: drawWavelet, map: drawMap};
+  const places = new Map();
+  document.querySelectorAll('.plot').forEach((place) => places.set(place.dataset.figure, place));
+  for (const figure of JSON.parse(document.getElementById('figures').textContent)) {
+    const place = places.get(figure.id);
+    if (place) draw[figure.kind](figure, place, place.parentElement.querySelector('.legend'));
+  }
+
+  const button = document.getElementById('whole-range');
+  if (button) {
+    button.addEventListener('click', () => {
+      const whole = button.getAttribute('aria-pressed') !== 'true';
+      button.setAttribute('aria-pressed', String(whole));
+      button.textContent = whole ? 'show the settled estimates' : 'show the whole range';
+      for (const {graph, figure} of graphs) {
+        if (figure.window) graph.updateOptions({valueRange: whole ? null : figure.window});
+      }
+    });
+  }
+
+  function redraw() {
+    for (const {graph} of graphs) {
+      graph.updateOptions({gridLineColor: variable('--line'), axisLineColor: variable('--line')}, true);
+      graph.resize();
+    }
+  }
+  window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
+  window.addEventListener('beforeprint', () => { document.body.classList.add('printing'); redraw(); });
+  window.addEventListener('afterprint', () => { document.body.classList.remove('printing'); redraw(); });
+  document.body.dataset.figuresDrawn = String(graphs.length);
+})();

@@ -1,0 +1,71 @@
+#pragma once
+
+/// What a run folder holds, read once, in a size that does not depend on the length of the run.
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "report/binned_signals.h"
+
+namespace imuscope::report {
+
+/// Signals of RunFiles::navigation.
+enum NavigationSignal : std::size_t {
+  kNorth_m,  ///< metres from the first position, in its tangent plane
+  kEast_m,
+  kHeight_m,
+  kSpeed_mps,
+  kSdNorth_m,
+  kSdEast_m,
+  kSdDown_m,
+  kNavigationSignals
+};
+
+/// Signals of StudyFiles::calibration; the sd of signal i is signal i + kSdOffset.
+enum CalibrationSignal : std::size_t { kPsi_deg = 0, kLeverArm_m = 3, kTimeOffset_ms = 6, kSdOffset = 7 };
+inline constexpr std::size_t kCalibrationSignals = 14;
+
+/// Signals of StudyFiles::errors: three of the gyroscope in deg/s, three of the accelerometer in m/s².
+inline constexpr std::size_t kErrorSignals = 6;
+
+/// Time from begin_s to end_s.
+struct Stretch {
+  double begin_s = 0.0;
+  double end_s = 0.0;
+};
+
+/// The files of one S-IMU.
+struct StudyFiles {
+  std::string name;
+  nlohmann::json calibration;  ///< its entry in calibration.json
+  nlohmann::json truth;        ///< its entry in truth.json; null where there is none
+  std::optional<BinnedSignals> calibration_series;
+  std::optional<BinnedSignals> errors;
+  std::uint64_t n_errors = 0;               ///< rows of errors_NAME.csv
+  std::vector<Stretch> static_stretches;    ///< regime "static" of errors_NAME.csv, the longest ones
+  std::array<double, kErrorSignals> rms{};  ///< over the whole record; NaN where there is no value
+};
+
+struct RunFiles {
+  std::filesystem::path folder;
+  nlohmann::json run;          ///< run.json; null where absent
+  nlohmann::json models;       ///< array of fits; null where absent
+  nlohmann::json regressions;  ///< array; null where absent
+  bool has_truth = false;
+  std::optional<BinnedSignals> navigation;
+  std::array<double, 2> origin_deg{};  ///< latitude and longitude of the first position
+  double distance_m = 0.0;             ///< driven, from the speed
+  std::vector<StudyFiles> studies;     ///< in the order of calibration.json
+  std::vector<std::string> absent;     ///< names of files that a run may have and this one has not
+};
+
+/// Errors as write_report().
+Result<RunFiles> read_run_files(const std::filesystem::path& folder);
+
+}  // namespace imuscope::report

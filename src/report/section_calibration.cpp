@@ -1,0 +1,204 @@
+#include <fmt/format.h>
+#include <cmath>
+
+#include "base/units.h"
+#include "report/json_fields.h"
+#include "report/mounting.h"
+#include "report/people.h"
+#include "report/sections.h"
+
+namespace imuscope::report {
+namespace {
+
+using Three = std::array<double, 3>;
+
+constexpr std::array<char, 3> kAxisNames{'x', 'y', 'z'};
+constexpr double kMmPerM = 1e3;
+constexpr double kMsPerS = 1e3;
+constexpr double kPpm = 1e6;
+constexpr double kMdegPerDeg = 1e3;
+
+Html bold_sub(const char* symbol, const char* index) {
+  return Html::markup(fmt::format("{}<sub>{}</sub>", symbol, index));
+}
+
+/// A quantity of three axes as it stands in calibration.json and in truth.json.
+struct Quantity {
+  Html name;
+  const char* value_key;
+  const char* sd_key;
+  double unit;  ///< factor from the file's unit to the shown one
+};
+
+std::vector<Html> row_of_three(Html name, const std::optional<Three>& values, const std::optional<Three>& sd,
+                               double unit) {
+  std::vector<Html> row{std::move(name)};
+  for (std::size_t i = 0; i < kAxisNames.size(); ++i) {
+    if (!values) {
+      row.push_back(text(kUnknown));
+    } else {
+      row.push_back(with_sd(unit * (*values)[i], sd ? std::optional(unit * (*sd)[i]) : std::nullopt));
+    }
+  }
+  return row;
+}
+
+Html error_cell(double error, const char* unit, std::optional<double> sd) {
+  Html cell = number(error, 2) + text(std::string(" ") + unit);
+  if (sd) cell += element("span", text(" (" + in_sd(error, sd) + ")"), "interval");
+  return cell;
+}
+
+/// Found, true and difference of one quantity.
+void add_quantity(Table& table, const StudyFiles& study, const Quantity& quantity, const char* error_unit,
+                  double error_factor) {
+  const auto found = numbers_at<3>(study.calibration, quantity.value_key);
+  const auto sd = numbers_at<3>(study.calibration, quantity.sd_key);
+  if (!found) return;
+  table.add_row(row_of_three(quantity.name, found, sd, quantity.unit));
+  const auto known = numbers_at<3>(study.truth, quantity.value_key);
+  if (!known) return;
+  table.add_row(row_of_three(text("– truth"), known, {}, quantity.unit));
+  std::vector<Html> row{text("– error")};
+  for (std::size_t i = 0; i < kAxisNames.size(); ++i) {
+    row.push_back(error_cell(error_factor * ((*found)[i] - (*known)[i]), error_unit,
+                             sd ? std::optional(error_factor * (*sd)[i]) : std::nullopt));
+  }
+  table.add_row(std::move(row));
+}
+
+void add_boresight(Table& table, const StudyFiles& study, const Rotation& C_b_s) {
+  const auto sd_deg = numbers_at<3>(study.calibration, "boresight_sd_deg");
+  const Rotation square = nearest_square_mounting(C_b_s);
+  table.add_row(row_of_three(text("boresight from the square mounting, deg"), boresight_deg(square, C_b_s),
+                             sd_deg, 1.0));
+  if (const auto prior = numbers_at<9>(study.calibration, "C_prior")) {
+    table.add_row(row_of_three(text("boresight from the coarse alignment (Figure 1), deg"),
+                               boresight_deg(*prior, C_b_s), sd_deg, 1.0));
+  }
+  const auto true_C = numbers_at<9>(study.truth, "C_b_s");
+  if (!true_C) return;
+  table.add_row(
+      row_of_three(text("– truth, from the square mounting"), boresight_deg(square, *true_C), {}, 1.0));
+  const Angles error_deg = boresight_deg(*true_C, C_b_s);
+  std::vector<Html> row{text("– error")};
+  for (std::size_t i = 0; i < error_deg.size(); ++i) {
+    row.push_back(error_cell(kMdegPerDeg * error_deg[i], "mdeg",
+                             sd_deg ? std::optional(kMdegPerDeg * (*sd_deg)[i]) : std::nullopt));
+  }
+  table.add_row(std::move(row));
+}
+
+void add_time_offset(Table& table, const StudyFiles& study) {
+  const auto t_d_s = number_at(study.calibration, "t_d_s");
+  const auto sd_s = number_at(study.calibration, "t_d_sd_s");
+  if (!t_d_s) return;
+  const auto in_ms = [](std::optional<double> seconds) {
+    return seconds ? std::optional(kMsPerS * *seconds) : std::nullopt;
+  };
+  table.add_row(
+      {bold_sub("time offset t", "d") + text(", ms"), with_sd(kMsPerS * *t_d_s, in_ms(sd_s)), {}, {}});
+  const auto known_s = number_at(study.truth, "t_d_s");
+  if (!known_s) return;
+  table.add_row({text("– truth"), number(kMsPerS * *known_s), {}, {}});
+  table.add_row({text("– error"), error_cell(kMsPerS * (*t_d_s - *known_s), "ms", in_ms(sd_s)), {}, {}});
+}
+
+Html study_table(const StudyFiles& study) {
+  Table table({text("± one sd"), text("x"), text("y"), text("z")});
+  if (const auto C_b_s = numbers_at<9>(study.calibration, "C_b_s")) add_boresight(table, study, *C_b_s);
+  add_quantity(table, study, {text("lever arm r, mm"), "r_bs_b_m", "r_bs_b_sd_m", kMmPerM}, "mm", kMmPerM);
+  add_time_offset(table, study);
+  add_quantity(table, study,
+               {text("gyroscope bias, deg/s"), "gyro_bias_radps", "gyro_bias_sd_radps", kDegPerRad}, "deg/s",
+               kDegPerRad);
+  add_quantity(table, study, {text("accelerometer bias, m/s²"), "accel_bias_mps2", "accel_bias_sd_mps2", 1.0},
+               "m/s²", 1.0);
+  add_quantity(table, study, {text("gyroscope scale error, ppm"), "gyro_scale", "gyro_scale_sd", kPpm}, "ppm",
+               kPpm);
+  add_quantity(table, study, {text("accelerometer scale error, ppm"), "accel_scale", "accel_scale_sd", kPpm},
+               "ppm", kPpm);
+  return table.html();
+}
+
+Html mounting_words(const StudyFiles& study) {
+  const auto C_b_s = numbers_at<9>(study.calibration, "C_b_s");
+  if (!C_b_s) return paragraph("The mounting is not known.");
+  std::string words = fmt::format("Mounted with its {} of the reference, but for the small angles below.",
+                                  square_mounting_words(nearest_square_mounting(*C_b_s)));
+  if (const auto q = numbers_at<4>(study.calibration, "q_b_s")) {
+    words += fmt::format(" Quaternion from b to s (scalar first): {:.7f}, {:.7f}, {:.7f}, {:.7f}.", (*q)[0],
+                         (*q)[1], (*q)[2], (*q)[3]);
+  }
+  const std::string method = text_at(study.calibration, "method");
+  if (!method.empty()) words += fmt::format(" Method: {}.", method);
+  return paragraph(words);
+}
+
+Html estimate_panels(const StudyFiles& study, FigureSheet& figures) {
+  if (!study.calibration_series) {
+    return paragraph(fmt::format(
+        "No calibration_{}.csv with estimates in this run folder: Figure 1 has nothing to show for it.",
+        study.name));
+  }
+  const BinnedSignals& series = *study.calibration_series;
+  std::optional<Angles> true_psi_deg;
+  const auto prior = numbers_at<9>(study.calibration, "C_prior");
+  const auto true_C = numbers_at<9>(study.truth, "C_b_s");
+  if (prior && true_C) true_psi_deg = boresight_deg(*prior, *true_C);
+  const auto true_r_m = numbers_at<3>(study.truth, "r_bs_b_m");
+  Html panels;
+  const auto add_panel = [&](const char* what, const char* symbol, std::size_t signal, std::size_t axis,
+                             double unit, const char* unit_name, std::optional<double> truth) {
+    Figure figure;
+    figure.id = fmt::format("{}-{}-{}", what, kAxisNames[axis], study.name);
+    figure.group = "estimates of " + study.name;
+    figure.y_label = unit_name;
+    figure.truth = truth;
+    figure.shaded = study.static_stretches;
+    figure.window = settled_window(series, signal + axis, signal + axis + kSdOffset, unit, truth);
+    panels += figures.estimate_figure(
+        figure, series, signal + axis, signal + axis + kSdOffset, unit, static_cast<int>(axis),
+        Html::markup(fmt::format("{}<sub>{}</sub>, {}", symbol, kAxisNames[axis], unit_name)));
+  };
+  for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
+    add_panel("psi", "ψ", kPsi_deg, axis, 1.0, "deg",
+              true_psi_deg ? std::optional((*true_psi_deg)[axis]) : std::nullopt);
+  }
+  for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
+    add_panel("r", "r", kLeverArm_m, axis, kMmPerM, "mm",
+              true_r_m ? std::optional(kMmPerM * (*true_r_m)[axis]) : std::nullopt);
+  }
+  return element("div", panels, "panels");
+}
+
+}  // namespace
+
+Html calibration_section(const RunFiles& run, FigureSheet& figures) {
+  Html section = element("h2", text("The mounting of each S-IMU"));
+  section += paragraph(
+      "b is the frame of the reference IMU (x forward, y right, z down), s that of the sensor under study. "
+      "The "
+      "boresight ψ is a rotation vector in b; the lever arm r leads from b to s, in b. A positive time "
+      "offset is added to "
+      "the sensor's time stamps.");
+  if (!run.has_truth)
+    section += paragraph("No truth.json in this run: nothing to compare the estimates with.", "note");
+  for (const StudyFiles& study : run.studies) {
+    section += element("h3", text(study.name)) + mounting_words(study) + study_table(study);
+  }
+  section += element("h2", text("Figure 1: boresight and lever arm over time"));
+  section += element("p", text("Line: the estimate at that time; band: ± one sd") +
+                              text(run.has_truth ? "; dashed: the truth" : "") +
+                              text("; darker ground: at rest. Heights are chosen to show the settled "
+                                   "estimates; drag to zoom, double "
+                                   "click to return. ") +
+                              Html::markup("<button type=\"button\" id=\"whole-range\" "
+                                           "aria-pressed=\"false\">show the whole range</button>"));
+  for (const StudyFiles& study : run.studies) {
+    section += element("h3", text(study.name)) + estimate_panels(study, figures);
+  }
+  return section;
+}
+
+}  // namespace imuscope::report

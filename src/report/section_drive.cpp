@@ -1,0 +1,67 @@
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+
+#include "report/people.h"
+#include "report/sections.h"
+
+namespace imuscope::report {
+namespace {
+
+constexpr int kColour = 2;
+constexpr double kMetresPerKm = 1e3;
+
+double largest_of(const BinnedSignals& signals, std::size_t signal) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < signals.size(); ++i)
+    largest = std::max(largest, signals.bin(signal, i).largest);
+  return largest;
+}
+
+/// Times at rest, from the first S-IMU that has errors: all of them share the vehicle.
+std::vector<Stretch> standstills(const RunFiles& run) {
+  for (const StudyFiles& study : run.studies) {
+    if (study.errors) return study.static_stretches;
+  }
+  return {};
+}
+
+}  // namespace
+
+Html drive_section(const RunFiles& run, FigureSheet& figures) {
+  Html section = element("h2", text("The drive"));
+  if (!run.navigation) {
+    return section +
+           paragraph(
+               "No navigation in this run: either no GNSS was used (the calibration does not need it), or "
+               "the filter had not aligned itself. There is no map and no profile.");
+  }
+  const BinnedSignals& navigation = *run.navigation;
+  constexpr double kKmhPerMps = 3.6;
+  section +=
+      paragraph(fmt::format("{:.2f} km in {}, at most {:.0f} km/h. The map's origin is at latitude {:.5f} "
+                            "deg, longitude {:.5f} deg. Largest sd of the "
+                            "position: {:.2f} m north, {:.2f} m east, {:.2f} m down.",
+                            run.distance_m / kMetresPerKm,
+                            duration_words(navigation.time_s(navigation.size() - 1) - navigation.time_s(0)),
+                            kKmhPerMps * largest_of(navigation, kSpeed_mps), run.origin_deg[0],
+                            run.origin_deg[1], largest_of(navigation, kSdNorth_m),
+                            largest_of(navigation, kSdEast_m), largest_of(navigation, kSdDown_m)));
+  section += figures.map_figure(
+      "map", navigation, text("The way driven, in metres north and east of its start, coloured by speed"));
+  Figure speed;
+  speed.id = "speed";
+  speed.group = "profile";
+  speed.y_label = "m/s";
+  speed.shaded = standstills(run);
+  section += figures.range_figure(speed, navigation, kSpeed_mps, kColour,
+                                  text("Speed over ground; standstill on a darker ground"));
+  Figure height = speed;
+  height.id = "height";
+  height.y_label = "m";
+  section += figures.estimate_figure(height, navigation, kHeight_m, kSdDown_m, 1.0, kColour,
+                                     text("Height above the ellipsoid, with its sd"));
+  return section;
+}
+
+}  // namespace imuscope::report

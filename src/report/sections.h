@@ -1,0 +1,26 @@
+#pragma once
+
+/// The sections of the page below its summary, in their order. Each draws only what the run folder holds and
+/// says what it has not.
+
+#include "report/figures.h"
+#include "report/fits.h"
+#include "report/html.h"
+#include "report/run_files.h"
+
+namespace imuscope::report {
+
+/// Map, speed and height.
+Html drive_section(const RunFiles& run, FigureSheet& figures);
+/// Mounting tables with sd and, where known, the truth; Figure 1.
+Html calibration_section(const RunFiles& run, FigureSheet& figures);
+/// Error signals: Figure 2 and their size.
+Html errors_section(const RunFiles& run, FigureSheet& figures);
+/// Noise models: Figure 4 and Table II; Table I where there is a regression.
+Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureSheet& figures);
+/// Health of the devices.
+Html health_section(const RunFiles& run);
+/// Configuration, versions, inputs, warnings, absent files.
+Html making_section(const RunFiles& run);
+
+}  // namespace imuscope::report

@@ -1,0 +1,363 @@
+#include "report/verdict.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <algorithm>
+#include <cmath>
+
+#include "report/json_fields.h"
+#include "report/mounting.h"
+#include "report/people.h"
+
+namespace imuscope::report {
+namespace {
+
+constexpr double kMmPerM = 1e3;
+constexpr double kMsPerS = 1e3;
+/// An error beyond this many sd is not chance.
+constexpr double kSdMax = 4.0;
+/// Fewer seconds of a regime than this leave its slow processes unseen.
+constexpr double kRegimeShort_s = 60.0;
+/// More names than this are counted instead.
+constexpr std::size_t kNamesMax = 6;
+
+using Three = std::array<double, 3>;
+
+std::optional<double> largest(const std::optional<Three>& values) {
+  return values ? std::optional(*std::max_element(values->begin(), values->end())) : std::nullopt;
+}
+
+/// Largest sd of each kind; empty where calibration.json does not say.
+struct Accuracy {
+  std::optional<double> boresight_deg;
+  std::optional<double> lever_arm_mm;
+  std::optional<double> time_offset_ms;
+};
+
+Accuracy accuracy_of(const StudyFiles& study) {
+  Accuracy accuracy;
+  accuracy.boresight_deg = largest(numbers_at<3>(study.calibration, "boresight_sd_deg"));
+  accuracy.lever_arm_mm = largest(numbers_at<3>(study.calibration, "r_bs_b_sd_m"));
+  if (accuracy.lever_arm_mm) *accuracy.lever_arm_mm *= kMmPerM;
+  accuracy.time_offset_ms = number_at(study.calibration, "t_d_sd_s");
+  if (accuracy.time_offset_ms) *accuracy.time_offset_ms *= kMsPerS;
+  return accuracy;
+}
+
+std::string direction_words(const std::string& direction) {
+  if (direction.rfind("psi_", 0) == 0) return "boresight about " + direction.substr(4);
+  if (direction.rfind("r_", 0) == 0) return "lever arm along " + direction.substr(2);
+  return direction == "t_d" ? "time offset" : direction;
+}
+
+/// Names of what the run says it has not observed.
+std::vector<std::string> not_observed(const StudyFiles& study) {
+  std::vector<std::string> names;
+  for (const auto& [name, observed] : field(study.calibration, "observable").items()) {
+    if (observed == nlohmann::json(false)) names.push_back(name);
+  }
+  return names;
+}
+
+std::vector<std::string> words_of(const std::vector<std::string>& directions) {
+  std::vector<std::string> words;
+  for (const std::string& direction : directions) words.push_back(direction_words(direction));
+  return words;
+}
+
+struct Goal {
+  const char* what;
+  std::optional<double> sd;
+  double goal;
+  const char* unit;
+};
+
+std::array<Goal, 3> goals_of(const StudyFiles& study) {
+  const Accuracy accuracy = accuracy_of(study);
+  return {Goal{"boresight", accuracy.boresight_deg, kUsableBoresightSd_deg, "deg"},
+          Goal{"lever arm", accuracy.lever_arm_mm, kUsableLeverArmSd_mm, "mm"},
+          Goal{"time offset", accuracy.time_offset_ms, kUsableTimeOffsetSd_ms, "ms"}};
+}
+
+bool is_calibrated(const StudyFiles& study) {
+  const auto goals = goals_of(study);
+  return not_observed(study).empty() && std::all_of(goals.begin(), goals.end(), [](const Goal& goal) {
+           return goal.sd && *goal.sd <= goal.goal;
+         });
+}
+
+std::string accuracy_sentence(const StudyFiles& study) {
+  std::vector<std::string> parts;
+  for (const Goal& goal : goals_of(study)) {
+    if (!goal.sd) {
+      parts.push_back(fmt::format("{} unknown", goal.what));
+    } else {
+      parts.push_back(
+          fmt::format("{} {:.2g} {}{}", goal.what, *goal.sd, goal.unit,
+                      *goal.sd <= goal.goal ? "" : fmt::format(" (wanted: {:g} {})", goal.goal, goal.unit)));
+    }
+  }
+  std::string sentence = fmt::format("{}: largest sd of {}.", study.name, fmt::join(parts, ", "));
+  const auto missing = words_of(not_observed(study));
+  if (!missing.empty())
+    sentence += fmt::format(" Not observable in this drive: {}.", fmt::join(missing, ", "));
+  return sentence;
+}
+
+/// Largest error against truth.json in units of its sd; empty where either is not known.
+std::optional<double> worst_error_sd(const StudyFiles& study) {
+  std::optional<double> worst;
+  const auto take = [&](double error, double sd) {
+    if (sd > 0.0) worst = std::max(worst.value_or(0.0), std::abs(error) / sd);
+  };
+  const auto found_C = numbers_at<9>(study.calibration, "C_b_s");
+  const auto true_C = numbers_at<9>(study.truth, "C_b_s");
+  const auto sd_deg = numbers_at<3>(study.calibration, "boresight_sd_deg");
+  if (found_C && true_C && sd_deg) {
+    const Angles error_deg = boresight_deg(*true_C, *found_C);
+    for (std::size_t i = 0; i < error_deg.size(); ++i) take(error_deg[i], (*sd_deg)[i]);
+  }
+  const auto found_r = numbers_at<3>(study.calibration, "r_bs_b_m");
+  const auto true_r = numbers_at<3>(study.truth, "r_bs_b_m");
+  const auto sd_m = numbers_at<3>(study.calibration, "r_bs_b_sd_m");
+  if (found_r && true_r && sd_m) {
+    for (std::size_t i = 0; i < found_r->size(); ++i) take((*found_r)[i] - (*true_r)[i], (*sd_m)[i]);
+  }
+  return worst;
+}
+
+std::size_t count_rejected(const std::vector<Fit>& fits, double level) {
+  return static_cast<std::size_t>(std::count_if(
+      fits.begin(), fits.end(), [&](const Fit& fit) { return fit.j_p_value && *fit.j_p_value < level; }));
+}
+
+std::string fit_name(const Fit& fit) {
+  return fmt::format("{} {} ({})", fit.imu, axis_words(fit.axis), fit.regime.empty() ? "all" : fit.regime);
+}
+
+std::string fit_names(const std::vector<const Fit*>& fits) {
+  std::vector<std::string> names;
+  for (const Fit* fit : fits) {
+    if (names.size() == kNamesMax)
+      return fmt::format("{} and {} more", fmt::join(names, ", "), fits.size() - kNamesMax);
+    names.push_back(fit_name(*fit));
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
+template <typename Condition>
+std::vector<const Fit*> those(const std::vector<Fit>& fits, Condition condition) {
+  std::vector<const Fit*> chosen;
+  for (const Fit& fit : fits) {
+    if (condition(fit)) chosen.push_back(&fit);
+  }
+  return chosen;
+}
+
+/// What to drive so that these directions can be seen.
+void manoeuvres(const RunFiles& run, std::vector<std::string>& steps) {
+  bool turns = false;
+  bool brakes = false;
+  bool rough = false;
+  for (const StudyFiles& study : run.studies) {
+    const auto missing = not_observed(study);
+    const auto misses = [&](std::string_view name) {
+      return std::find(missing.begin(), missing.end(), name) != missing.end();
+    };
+    const auto goals = goals_of(study);
+    const auto short_of = [&](std::size_t i) { return goals[i].sd && *goals[i].sd > goals[i].goal; };
+    turns = turns || misses("psi_x") || misses("psi_y") || misses("r_x") || misses("r_y") || misses("t_d") ||
+            short_of(0) || short_of(1) || short_of(2);
+    brakes = brakes || misses("psi_z") || short_of(0);
+    rough = rough || misses("r_z") || short_of(1);
+  }
+  if (turns) {
+    steps.emplace_back(
+        "Drive figures of eight or roundabouts both ways at 0.3 to 0.5 rad/s: turning shows the boresight "
+        "about "
+        "the level axes, the level lever arm and the time offset.");
+  }
+  if (brakes)
+    steps.emplace_back(
+        "Brake and start firmly, some six times: it shows the boresight about the vertical axis.");
+  if (rough)
+    steps.emplace_back("Include a piece of rough road: pitching and rolling shows the vertical lever arm.");
+}
+
+void device_steps(const RunFiles& run, std::vector<std::string>& steps) {
+  for (const auto& device : field(run.run, "devices")) {
+    const double samples_lost = number_at(device, "samples_lost").value_or(0.0);
+    const double bad_checksums = number_at(device, "bad_checksums").value_or(0.0);
+    if (samples_lost + bad_checksums == 0.0) continue;
+    steps.push_back(
+        fmt::format("Look after device {}: {:.0f} samples lost, {:.0f} frames with a wrong checksum (cable, "
+                    "baud rate, load of the computer).",
+                    text_at(device, "name"), samples_lost, bad_checksums));
+  }
+}
+
+void model_steps(const RunFiles& run, const std::vector<Fit>& fits, std::vector<std::string>& steps) {
+  const double level = fits.empty() ? kTestLevel : kTestLevel / static_cast<double>(fits.size());
+  if (count_rejected(fits, level) > 0) {
+    steps.emplace_back(
+        "Try another composition of the noise model for the signals that the test rejects; Figure 4 shows at "
+        "which "
+        "times the fitted line leaves the intervals.");
+  }
+  const auto vague = those(fits, [](const Fit& fit) { return !fit.identifiable; });
+  if (!vague.empty()) {
+    steps.push_back(
+        fmt::format("Record longer, or use a simpler model, where parameters cannot be told apart: {}.",
+                    fit_names(vague)));
+  }
+  for (const char* regime : {"static", "dynamic"}) {
+    const auto seconds = number_at(field(run.run, "regimes"), fmt::format("{}_s", regime).c_str());
+    if (seconds && *seconds < kRegimeShort_s) {
+      steps.push_back(fmt::format("Record more of the {} regime: this run has {} of it.", regime,
+                                  duration_words(*seconds)));
+    }
+  }
+}
+
+const char* css_class_of(Answer answer) {
+  switch (answer) {
+    case Answer::kYes:
+      return "answer yes";
+    case Answer::kPartly:
+      return "answer partly";
+    case Answer::kNo:
+      return "answer no";
+    case Answer::kOpen:
+      break;
+  }
+  return "answer unknown";
+}
+
+Html list_of(const std::vector<std::string>& sentences) {
+  Html items;
+  for (const std::string& sentence : sentences) items += element("li", text(sentence));
+  return element("ul", items);
+}
+
+Html verdict_block(const std::string& question, const Verdict& verdict) {
+  return element(
+      "div",
+      element("h3", text(question)) + paragraph(verdict.headline, "headline") + list_of(verdict.reasons),
+      css_class_of(verdict.answer));
+}
+
+}  // namespace
+
+Verdict calibration_verdict(const RunFiles& run) {
+  Verdict verdict;
+  if (run.studies.empty()) {
+    verdict.headline = "Cannot be said: the run has no S-IMU.";
+    return verdict;
+  }
+  std::vector<std::string> usable;
+  for (const StudyFiles& study : run.studies) {
+    if (is_calibrated(study)) usable.push_back(study.name);
+    verdict.reasons.push_back(accuracy_sentence(study));
+  }
+  if (usable.size() == run.studies.size()) {
+    verdict.answer = Answer::kYes;
+    verdict.headline = usable.size() == 1 ? "Yes." : fmt::format("Yes, for all {} S-IMUs.", usable.size());
+  } else if (usable.empty()) {
+    verdict.answer = Answer::kNo;
+    verdict.headline = "Not yet: the uncertainties below are above what the error process needs.";
+  } else {
+    verdict.answer = Answer::kPartly;
+    verdict.headline = fmt::format("For {}, not for the others.", fmt::join(usable, ", "));
+  }
+  for (const StudyFiles& study : run.studies) {
+    const auto worst = worst_error_sd(study);
+    if (!worst) continue;
+    verdict.reasons.push_back(
+        fmt::format("{} against the known truth: largest error of boresight and lever arm {:.1f} sd{}.",
+                    study.name, *worst, *worst > kSdMax ? ", more than its sd allows" : ""));
+    if (*worst > kSdMax && verdict.answer == Answer::kYes) {
+      verdict.answer = Answer::kPartly;
+      verdict.headline = "Precise, but not as accurate as it says: an error exceeds its sd.";
+    }
+  }
+  return verdict;
+}
+
+Verdict model_verdict(const std::vector<Fit>& fits) {
+  Verdict verdict;
+  if (fits.empty()) {
+    verdict.headline = "Cannot be said: this run has no noise model.";
+    return verdict;
+  }
+  const auto tested = those(fits, [](const Fit& fit) { return fit.j_p_value.has_value(); });
+  const auto vague = those(fits, [](const Fit& fit) { return !fit.identifiable; });
+  const double corrected = kTestLevel / static_cast<double>(std::max<std::size_t>(tested.size(), 1));
+  const auto rejected =
+      those(fits, [&](const Fit& fit) { return fit.j_p_value && *fit.j_p_value < corrected; });
+  if (tested.empty()) {
+    verdict.headline = fmt::format("Cannot be said: none of the {} models could be tested.", fits.size());
+  } else if (rejected.empty()) {
+    verdict.answer = vague.empty() ? Answer::kYes : Answer::kPartly;
+    verdict.headline = vague.empty()
+                           ? "Yes: the data contradict none of the models."
+                           : "The data contradict none of the models, but not every parameter can be told.";
+  } else {
+    verdict.answer = rejected.size() == tested.size() ? Answer::kNo : Answer::kPartly;
+    verdict.headline = fmt::format("Not everywhere: {} of {} models do not explain their wavelet variance.",
+                                   rejected.size(), tested.size());
+  }
+  if (!tested.empty()) {
+    verdict.reasons.push_back(
+        fmt::format("The J-test at {:.0f} % rejects {} of {} models ({:.1f} expected by chance if all were "
+                    "right), {} when corrected for that many tests{}.",
+                    100.0 * kTestLevel, count_rejected(fits, kTestLevel), tested.size(),
+                    kTestLevel * static_cast<double>(tested.size()), rejected.size(),
+                    rejected.empty() ? "" : ": " + fit_names(rejected)));
+  }
+  if (tested.size() < fits.size()) {
+    verdict.reasons.push_back(
+        fmt::format("{} models have too few levels to be tested.", fits.size() - tested.size()));
+  }
+  if (!vague.empty()) {
+    verdict.reasons.push_back(
+        fmt::format("Not identifiable in {} of {}: {}.", vague.size(), fits.size(), fit_names(vague)));
+  }
+  return verdict;
+}
+
+std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>& fits) {
+  std::vector<std::string> steps;
+  manoeuvres(run, steps);
+  device_steps(run, steps);
+  if (fits.empty()) {
+    steps.emplace_back("Fit noise models to the error signals: this run folder has none.");
+  } else {
+    model_steps(run, fits, steps);
+  }
+  if (steps.empty()) {
+    steps.emplace_back(
+        "Nothing has to be repeated. The mounting is in calibration.json and the noise models are in "
+        "models.json of this "
+        "run, ready for a filter.");
+  }
+  return steps;
+}
+
+Html summary_section(const RunFiles& run, const std::vector<Fit>& fits) {
+  Html section = element("h2", text("In short"));
+  section += verdict_block("Is the calibration usable?", calibration_verdict(run));
+  section += verdict_block("Is the noise model adequate?", model_verdict(fits));
+  section +=
+      element("div", element("h3", text("What to do next")) + list_of(next_steps(run, fits)), "answer next");
+  section += paragraph(
+      fmt::format(
+          "Usable means: an sd of at most {:g} deg for the boresight, {:g} mm for the lever arm and {:g} ms "
+          "for "
+          "the time offset, so that what is left disturbs the error signals less than an automotive MEMS "
+          "sensor's own noise in a roundabout.",
+          kUsableBoresightSd_deg, kUsableLeverArmSd_mm, kUsableTimeOffsetSd_ms),
+      "note");
+  return section;
+}
+
+}  // namespace imuscope::report

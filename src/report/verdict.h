@@ -1,0 +1,40 @@
+#pragma once
+
+/// What the numbers mean, in words: the head of the report.
+
+#include <string>
+#include <vector>
+
+#include "report/fits.h"
+#include "report/html.h"
+#include "report/run_files.h"
+
+namespace imuscope::report {
+
+enum class Answer { kYes, kPartly, kNo, kOpen };
+
+/// The answer to one question, and the sentences that justify it.
+struct Verdict {
+  Answer answer = Answer::kOpen;
+  std::string headline;
+  std::vector<std::string> reasons;
+};
+
+/// A mounting is usable when what is left uncertain disturbs the error process less than the noise of the
+/// S-IMUs that are studied with it. With an automotive MEMS unit (white noise of 0.5 deg/s and 0.02 m/s² per
+/// sample at 100 Hz) in a roundabout (0.5 rad/s, 1 rad/s²), these leave 0.05 deg/s and 0.01 m/s².
+inline constexpr double kUsableBoresightSd_deg = 0.1;
+inline constexpr double kUsableLeverArmSd_mm = 10.0;
+inline constexpr double kUsableTimeOffsetSd_ms = 1.0;
+/// Level of the tests.
+inline constexpr double kTestLevel = 0.05;
+
+Verdict calibration_verdict(const RunFiles& run);
+Verdict model_verdict(const std::vector<Fit>& fits);
+/// What to do next; never empty.
+std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>& fits);
+
+/// The three of them as the first section of the page.
+Html summary_section(const RunFiles& run, const std::vector<Fit>& fits);
+
+}  // namespace imuscope::report
