@@ -21,4 +21,7 @@ inline void on_chosen(CLI::App& subcommand, Work& chosen, Work work) {
 
 // One function a subcommand, one file a function (command_NAME.cpp).
 
+/// `imuscope report RUN_DIR`
+void add_report(CLI::App& app, Work& chosen);
+
 }  // namespace imuscope::cli

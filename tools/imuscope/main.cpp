@@ -10,6 +10,7 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", IMUSCOPE_VERSION);
   imuscope::cli::Work work;
+  imuscope::cli::add_report(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
