@@ -133,7 +133,8 @@ void Decoder::mirror_scan_counters() noexcept {
   counters_.bad_checksums = scanner_.counters().bad_checksums;
   counters_.bad_lengths = scanner_.counters().bad_lengths;
   counters_.bad_contents = bad_messages_ + raw_blocks_refused_;
-  counters_.clock_resets = clock_.restarts();
+  // A fixed clock map begins no segments of its own.
+  counters_.clock_resets = std::max(restarts_, clock_.restarts());
 }
 
 void Decoder::on_telegram(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept {
@@ -165,6 +166,7 @@ void Decoder::on_telegram(const Frame& frame, HostTime arrival, SampleSink& sink
 }
 
 void Decoder::restart_segment() noexcept {
+  ++restarts_;
   clock_.restart();
   in_segment_ = false;
   has_utc_ = false;

@@ -41,8 +41,8 @@ enum class RawBlocks : std::uint8_t {
   kUnknown,  ///< no telegram yet
   kGood,
   kMissing,  ///< not in the telegrams: bits 28 and extended 2 are to be switched on in the unit
-  kZero,     ///< all zero: export-limited unit, or a simulation
   kFrozen,   ///< the same bits again and again
+  kZero,     ///< all zero: export-limited unit, or a simulation
 };
 
 /// One sentence with the remedy, empty for kGood and kUnknown.
@@ -94,6 +94,7 @@ class Decoder final : public DeviceDecoder {
   std::uint64_t sequence_ = 0;
 
   bool in_segment_ = false;
+  std::uint64_t restarts_ = 0;  ///< segments begun because the counter was not continuable
   std::uint32_t last_counter_ = 0;
   int stragglers_ = 0;               ///< telegrams in a row that came twice or out of order
   std::int64_t counter_ = 0;         ///< unwrapped
