@@ -19,7 +19,7 @@
 namespace imuscope {
 
 enum class NavigationStatus : std::uint8_t {
-  kNotOffered,    ///< disabled, or no GNSS and no initial position: the calibration runs without it
+  kNotOffered,    ///< disabled, or no GNSS configured: the calibration runs without it
   kInitialising,  ///< waiting for R-IMU samples, attitude or a first position
   kAligning,      ///< levelled; heading still to be found
   kNavigating,
@@ -138,6 +138,15 @@ struct StudyEpoch {
   Matrix3 C_b_s{};
   Vector3 r_bs_b_m{};
   Regime regime = Regime::kStatic;
+  /// What the filter saw: sample minus prediction (biases and scales included), its variance by the model as
+  /// it is (white + fast + H P H^T, nothing inflated), and the axes that were used. Zero unless
+  /// `calibrating`.
+  Vector3 innovation_gyro_radps{};
+  Vector3 innovation_accel_mps2{};
+  Vector3 variance_gyro{};
+  Vector3 variance_accel{};
+  std::array<bool, 3> used_gyro{};
+  std::array<bool, 3> used_accel{};
   bool calibrating = false;  ///< filter is running: C_b_s and r_bs_b_m are estimates, not placeholders
 };
 

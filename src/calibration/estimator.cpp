@@ -1,0 +1,188 @@
+#include "calibration/estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/contracts.h"
+#include "calibration/event_log.h"
+#include "calibration/filter_core.h"
+#include "calibration/navigation_filter.h"
+#include "calibration/regime_detector.h"
+#include "calibration/study_filter.h"
+
+namespace imuscope {
+namespace {
+
+/// S samples that one tick can show: 0.5 s of six sensors at 400 Hz, so that a stall is caught up in one go.
+constexpr std::size_t kEpochsPerTick = 1200;
+/// At standstill f_z of forward-right-down axes is about -9.8; above this it points elsewhere.
+constexpr double kGravityWrong_mps2 = -8.0;
+
+bool is_finite(const ImuData& imu) noexcept {
+  bool finite = true;
+  for (std::size_t i = 0; i < 3; ++i)
+    finite = finite && std::isfinite(imu.omega_radps[i]) && std::isfinite(imu.f_mps2[i]);
+  return finite;
+}
+
+void check(const EstimatorConfig& config) {
+  IMUSCOPE_EXPECTS(config.studies.size() <= kMaxStudies);
+  IMUSCOPE_EXPECTS(config.reference.rate_hz > 0.0);
+  IMUSCOPE_EXPECTS(config.gate_probability > 0.5 && config.gate_probability < 1.0);
+  for (const StudyConfig& study : config.studies) {
+    IMUSCOPE_EXPECTS(study.rate_hz > 0.0);
+    IMUSCOPE_EXPECTS(study.blocks != 0);
+  }
+}
+
+}  // namespace
+
+class Estimator::Impl final : public EpochSink {
+ public:
+  explicit Impl(const EstimatorConfig& config)
+      : config_(config),
+        core_(config),
+        window_({config.reference.differentiator_points, 1.0 / config.reference.rate_hz}),
+        navigation_(config, core_, log_, counters_) {
+    epochs_.reserve(kEpochsPerTick);
+    studies_.reserve(config.studies.size());
+    for (std::size_t i = 0; i < config.studies.size(); ++i) studies_.emplace_back(config, i);
+  }
+
+  void add(const Sample& sample) noexcept {
+    if (sample.kind == SampleKind::kGnss) {
+      if (config_.gnss.enabled && sample.device == config_.gnss.device) {
+        navigation_.add_gnss(sample);
+        return;
+      }
+    } else if (sample.device == config_.reference.device) {
+      if (sample.kind == SampleKind::kAttitude) {
+        navigation_.add_attitude(sample);
+      } else {
+        add_reference(sample);
+      }
+      return;
+    } else if (sample.kind == SampleKind::kImu) {
+      for (StudyFilter& study : studies_) {
+        if (study.config().device != sample.device) continue;
+        study.add(sample);
+        return;
+      }
+    }
+    ++counters_.unknown_device;
+  }
+
+  void advance(HostTime cut) noexcept {
+    IMUSCOPE_EXPECTS(cut >= last_cut_);
+    last_cut_ = cut;
+    ++counters_.ticks;
+    epochs_.clear();
+    StudyContext context{core_, window_, log_, *this, regime_.regime()};
+    for (StudyFilter& study : studies_) study.process(context, cut);
+    watch_covariance(cut);
+    navigation_.update_output();
+    for (StudyFilter& study : studies_) study.update_output(core_);
+    counters_.events_lost = log_.lost();
+    shown_ = log_;
+    log_.clear();
+  }
+
+  void set_noise(std::size_t study, const StudyNoise& noise) noexcept {
+    IMUSCOPE_EXPECTS(study < studies_.size());
+    studies_[study].set_noise(core_, noise);
+  }
+
+  void on_epoch(const StudyEpoch& epoch) noexcept override {
+    if (epochs_.size() == kEpochsPerTick) {
+      ++counters_.epochs_lost;
+      return;
+    }
+    epochs_.push_back(epoch);
+  }
+
+  [[nodiscard]] const NavigationOutput& navigation() const noexcept { return navigation_.output(); }
+  [[nodiscard]] std::size_t study_count() const noexcept { return studies_.size(); }
+  [[nodiscard]] const StudyOutput& study(std::size_t i) const noexcept { return studies_[i].output(); }
+  [[nodiscard]] std::span<const StudyEpoch> epochs() const noexcept { return epochs_; }
+  [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept { return shown_.events(); }
+  [[nodiscard]] const EstimatorCounters& counters() const noexcept { return counters_; }
+
+ private:
+  void add_reference(const Sample& sample) noexcept {
+    ++counters_.reference_samples;
+    if (!is_finite(sample.imu)) {
+      ++counters_.reference_not_finite;
+      return;
+    }
+    if (!window_.push(sample)) {
+      ++counters_.reference_not_increasing;
+      return;
+    }
+    const double dt_s = has_reference_ ? to_seconds(sample.time - last_reference_) : 0.0;
+    if (dt_s > 1.5 / config_.reference.rate_hz) {
+      ++counters_.reference_gaps;
+      log_.add(EstimatorEventKind::kReferenceGap, sample.device, sample.time, dt_s);
+    }
+    has_reference_ = true;
+    last_reference_ = sample.time;
+    const Eigen::Vector3d omega = to_eigen(sample.imu.omega_radps);
+    regime_.add(omega, to_eigen(sample.imu.f_mps2), dt_s);
+    watch_gravity(sample);
+    for (StudyFilter& study : studies_) study.add_reference(sample.time, omega.norm());
+    navigation_.add_reference(sample);
+  }
+
+  void watch_gravity(const Sample& sample) noexcept {
+    if (gravity_told_ || regime_.regime() != Regime::kStatic) return;
+    if (regime_.mean_f_mps2().z() < kGravityWrong_mps2) return;
+    gravity_told_ = true;
+    log_.add(EstimatorEventKind::kReferenceGravityWrong, sample.device, sample.time,
+             regime_.mean_f_mps2().z());
+  }
+
+  void watch_covariance(HostTime time) noexcept {
+    std::size_t state = 0;
+    const std::size_t repaired = core_.repair(state);
+    if (repaired == 0) return;
+    counters_.covariance_repairs += repaired;
+    log_.add(EstimatorEventKind::kCovarianceRepaired, config_.reference.device, time,
+             static_cast<double>(state));
+  }
+
+  EstimatorConfig config_;
+  FilterCore core_;
+  ReferenceWindow window_;
+  EventLog log_;
+  EventLog shown_;
+  EstimatorCounters counters_;
+  NavigationFilter navigation_;
+  RegimeDetector regime_;
+  std::vector<StudyFilter> studies_;
+  std::vector<StudyEpoch> epochs_;
+  HostTime last_cut_{HostTime::min()};
+  bool has_reference_ = false;
+  HostTime last_reference_{};
+  bool gravity_told_ = false;
+};
+
+Estimator::Estimator(const EstimatorConfig& config, HistorySink* /*history*/) {
+  check(config);
+  impl_ = std::make_unique<Impl>(config);
+}
+Estimator::~Estimator() = default;
+Estimator::Estimator(Estimator&&) noexcept = default;
+Estimator& Estimator::operator=(Estimator&&) noexcept = default;
+
+void Estimator::add(const Sample& sample) noexcept { impl_->add(sample); }
+void Estimator::advance(HostTime cut) noexcept { impl_->advance(cut); }
+void Estimator::set_noise(std::size_t study, const StudyNoise& noise) noexcept {
+  impl_->set_noise(study, noise);
+}
+const NavigationOutput& Estimator::navigation() const noexcept { return impl_->navigation(); }
+std::size_t Estimator::study_count() const noexcept { return impl_->study_count(); }
+const StudyOutput& Estimator::study(std::size_t index) const noexcept { return impl_->study(index); }
+std::span<const StudyEpoch> Estimator::epochs() const noexcept { return impl_->epochs(); }
+std::span<const EstimatorEvent> Estimator::events() const noexcept { return impl_->events(); }
+const EstimatorCounters& Estimator::counters() const noexcept { return impl_->counters(); }
+
+}  // namespace imuscope

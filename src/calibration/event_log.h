@@ -1,0 +1,34 @@
+#pragma once
+
+/// The events of one tick, in fixed memory.
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "calibration/estimator.h"
+
+namespace imuscope {
+
+class EventLog {
+ public:
+  static constexpr std::size_t kCapacity = 64;
+
+  void add(EstimatorEventKind kind, DeviceIndex device, HostTime time, double value) noexcept {
+    if (size_ == kCapacity) {
+      ++lost_;
+      return;
+    }
+    events_[size_++] = {kind, device, time, value};
+  }
+  [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept { return {events_.data(), size_}; }
+  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+  void clear() noexcept { size_ = 0; }
+
+ private:
+  std::array<EstimatorEvent, kCapacity> events_{};
+  std::size_t size_ = 0;
+  std::uint64_t lost_ = 0;
+};
+
+}  // namespace imuscope

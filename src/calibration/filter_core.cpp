@@ -1,0 +1,120 @@
+#include "calibration/filter_core.h"
+
+#include <cmath>
+
+#include "base/contracts.h"
+
+namespace imuscope {
+namespace {
+
+std::size_t filter_dimension(const EstimatorConfig& config) {
+  std::size_t dimension = kNavigationStates;
+  for (const StudyConfig& study : config.studies) dimension += StudyLayout::make(study.blocks, 0).size;
+  return dimension;
+}
+
+/// Calls f(state index, prior sd) for every state of one S-IMU.
+template <typename Function>
+void for_each_prior(const StudyLayout& layout, const StudyConfig& config, Function f) {
+  const auto block = [&](std::size_t first, const Vector3& sd) {
+    if (first == StudyLayout::kAbsent) return;
+    for (std::size_t i = 0; i < 3; ++i) f(first + i, sd[i]);
+  };
+  const auto bias = [&](std::size_t first, const Vector3& turn_on, const auto& process) {
+    block(first, {std::hypot(turn_on[0], process[0].sd), std::hypot(turn_on[1], process[1].sd),
+                  std::hypot(turn_on[2], process[2].sd)});
+  };
+  block(layout.psi, config.prior_boresight_sd_rad);
+  block(layout.r, config.prior_r_bs_b_sd_m);
+  bias(layout.gyro_bias, config.turn_on_gyro_sd_radps, config.noise.gyro_bias);
+  bias(layout.accel_bias, config.turn_on_accel_sd_mps2, config.noise.accel_bias);
+  if (layout.t_d != StudyLayout::kAbsent) f(layout.t_d, config.prior_t_d_sd_s);
+  block(layout.gyro_scale, config.prior_gyro_scale_sd);
+  block(layout.accel_scale, config.prior_accel_scale_sd);
+}
+
+// Where a variance of the navigation is lost, these wide values stand in: m, m/s, rad.
+constexpr std::array<double, 3> kRepairNavigationSd{100.0, 10.0, 0.1};
+
+}  // namespace
+
+FilterCore::FilterCore(const EstimatorConfig& config) : covariance_(filter_dimension(config)) {
+  repair_variance_.resize(covariance_.dimension());
+  for (std::size_t i = 0; i < 9; ++i)
+    repair_variance_[i] = kRepairNavigationSd[i / 3] * kRepairNavigationSd[i / 3];
+  const ReferenceConfig& reference = config.reference;
+  for (std::size_t i = 0; i < 3; ++i) {
+    repair_variance_[kGyroBiasError + i] = reference.gyro_bias.sd * reference.gyro_bias.sd;
+    repair_variance_[kAccelBiasError + i] = reference.accel_bias.sd * reference.accel_bias.sd;
+    covariance_.reset_state(kGyroBiasError + i, repair_variance_[kGyroBiasError + i]);
+    covariance_.reset_state(kAccelBiasError + i, repair_variance_[kAccelBiasError + i]);
+  }
+  std::size_t first = kNavigationStates;
+  studies_.resize(config.studies.size());
+  for (std::size_t i = 0; i < config.studies.size(); ++i) {
+    layouts_.push_back(StudyLayout::make(config.studies[i].blocks, first));
+    first += layouts_.back().size;
+    for_each_prior(layouts_.back(), config.studies[i],
+                   [this](std::size_t state, double sd) { repair_variance_[state] = sd * sd; });
+    reset_to_prior(*this, i, config.studies[i]);
+  }
+}
+
+double FilterCore::sd(std::size_t state) const noexcept {
+  return state == StudyLayout::kAbsent ? 0.0 : std::sqrt(covariance_(state, state));
+}
+
+bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use) noexcept {
+  if (!covariance_.update(to_array(innovation), use)) return false;
+  const std::span<const double> correction = covariance_.correction();
+  const Eigen::Map<const NavigationErrorVector> navigation_correction(correction.data());
+  inject(navigation_, navigation_correction);
+  injected_ += navigation_correction;
+  for (std::size_t i = 0; i < studies_.size(); ++i) inject(studies_[i], layouts_[i], correction);
+  return true;
+}
+
+void FilterCore::carry_injected(const NavigationTransition& transition) noexcept {
+  NavigationErrorVector carried;
+  carried.head<kNavigationKinematicSize>() = transition.kinematic_rows * injected_;
+  carried.segment<3>(kGyroBiasError) = transition.gyro_bias_decay * injected_.segment<3>(kGyroBiasError);
+  carried.segment<3>(kAccelBiasError) = transition.accel_bias_decay * injected_.segment<3>(kAccelBiasError);
+  injected_ = carried;
+}
+
+std::size_t FilterCore::repair(std::size_t& first) noexcept {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < covariance_.dimension(); ++i) {
+    const double variance = covariance_(i, i);
+    if (variance >= 0.0 && std::isfinite(variance)) continue;
+    if (count++ == 0) first = i;
+    covariance_.reset_state(i, repair_variance_[i]);
+  }
+  return count;
+}
+
+void reset_to_prior(FilterCore& core, std::size_t study, const StudyConfig& config) noexcept {
+  StudyState& state = core.study(study);
+  state = StudyState{};
+  if (config.prior_C_b_s) state.C_b_s = to_eigen(*config.prior_C_b_s);
+  state.r_bs_b_m = to_eigen(config.prior_r_bs_b_m);
+  state.gyro_bias_s_radps = to_eigen(config.prior_gyro_bias_radps);
+  state.accel_bias_s_mps2 = to_eigen(config.prior_accel_bias_mps2);
+  state.t_d_s = config.prior_t_d_s.value_or(0.0);
+  state.gyro_scale = to_eigen(config.prior_gyro_scale);
+  state.accel_scale = to_eigen(config.prior_accel_scale);
+  for_each_prior(core.layout(study), config,
+                 [&core](std::size_t i, double sd) { core.covariance().reset_state(i, sd * sd); });
+}
+
+Eigen::Matrix3d to_eigen(const Matrix3& m) noexcept {
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data());
+}
+
+Matrix3 to_array(const Eigen::Matrix3d& m) noexcept {
+  Matrix3 out;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.data()) = m;
+  return out;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,486 @@
+#include "calibration/navigation_filter.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "navigation/so3.h"
+#include "navigation/strapdown.h"
+
+namespace imuscope {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Longest interval that is bridged by interpolating the rates; beyond it the navigation starts anew.
+constexpr double kBridgedGap_s = 1.0;
+/// Steps in which a gap is bridged; the transition is a second-order expansion.
+constexpr double kStep_s = 0.05;
+/// What a road vehicle's rate and force may do unseen during a gap, as white noise, rad/s and m/s^2 per
+/// sqrt(Hz).
+constexpr double kUnseenRate = 0.05;
+constexpr double kUnseenForce = 0.5;
+/// A GNSS solution may be newer than the newest R epoch by this much and still be taken there.
+constexpr Duration kGnssAhead = std::chrono::milliseconds{1};
+/// Stamps of R epochs are mapped; a solution at the same instant must not fall off the ring by rounding.
+constexpr double kConfiguredStartVelocitySd_mps = 0.05;
+/// Re-acquisition: velocity is uncertain by this much.
+constexpr double kReacquireVelocitySd_mps = 3.0;
+
+/// Receivers without sd: how much worse than a fixed solution.
+double sd_factor(GnssSolution solution) noexcept {
+  switch (solution) {
+    case GnssSolution::kFixed:
+      return 1.0;
+    case GnssSolution::kFloat:
+      return 15.0;
+    case GnssSolution::kDifferential:
+      return 50.0;
+    case GnssSolution::kSingle:
+    case GnssSolution::kNone:
+      break;
+  }
+  return 150.0;
+}
+
+NavigationProcessNoise process_noise(const ReferenceConfig& config) noexcept {
+  return {config.gyro_white_radps_per_sqrt_hz,
+          config.accel_white_mps2_per_sqrt_hz,
+          {config.gyro_bias.sd, config.gyro_bias.time_constant_s},
+          {config.accel_bias.sd, config.accel_bias.time_constant_s}};
+}
+
+InitialAlignmentOptions alignment_options(const EstimatorConfig& config) noexcept {
+  InitialAlignmentOptions options;
+  options.reference_noise = process_noise(config.reference);
+  options.r_ba_b_m = to_eigen(config.gnss.antenna_lever_arm_b_m);
+  return options;
+}
+
+InertialRates rates_of(const ImuData& imu) noexcept {
+  return {to_eigen(imu.omega_radps), to_eigen(imu.f_mps2)};
+}
+
+InertialRates mixed(const InertialRates& a, const InertialRates& b, double share_of_b) noexcept {
+  return {a.omega_ib_b_radps + share_of_b * (b.omega_ib_b_radps - a.omega_ib_b_radps),
+          a.f_b_mps2 + share_of_b * (b.f_b_mps2 - a.f_b_mps2)};
+}
+
+bool is_finite(const GnssData& gnss) noexcept {
+  bool finite =
+      std::isfinite(gnss.latitude_rad) && std::isfinite(gnss.longitude_rad) && std::isfinite(gnss.height_m);
+  for (std::size_t i = 0; i < 3; ++i) finite = finite && std::isfinite(gnss.v_n_mps[i]);
+  return finite;
+}
+
+Vector3d trusted_sd(bool given, const Vector3& reported, const Vector3& fallback, const Vector3& floor,
+                    GnssSolution solution) noexcept {
+  const Vector3d sd = given ? to_eigen(reported) : Vector3d(sd_factor(solution) * to_eigen(fallback));
+  return floored_sd(sd, to_eigen(floor));
+}
+
+InitialisationMethod method_of(AlignmentMethod method) noexcept {
+  switch (method) {
+    case AlignmentMethod::kReferenceAttitude:
+      return InitialisationMethod::kReferenceAttitude;
+    case AlignmentMethod::kGyrocompass:
+      return InitialisationMethod::kGyrocompass;
+    case AlignmentMethod::kInMotion:
+      break;
+  }
+  return InitialisationMethod::kInMotion;
+}
+
+}  // namespace
+
+NavigationFilter::NavigationFilter(const EstimatorConfig& config, FilterCore& core, EventLog& log,
+                                   EstimatorCounters& counters)
+    : reference_(config.reference),
+      gnss_(config.gnss),
+      navigation_(config.navigation),
+      noise_(process_noise(config.reference)),
+      core_(core),
+      log_(log),
+      counters_(counters),
+      aligner_(alignment_options(config)),
+      past_(kPastEpochs) {
+  const bool offered = navigation_.enabled && gnss_.enabled;
+  output_.status = offered ? NavigationStatus::kInitialising : NavigationStatus::kNotOffered;
+}
+
+NavigationFilter::PastEpoch& NavigationFilter::past(std::size_t back) noexcept {
+  return past_[(past_head_ + kPastEpochs - 1 - back) % kPastEpochs];
+}
+const NavigationFilter::PastEpoch& NavigationFilter::past(std::size_t back) const noexcept {
+  return past_[(past_head_ + kPastEpochs - 1 - back) % kPastEpochs];
+}
+
+void NavigationFilter::add_reference(const Sample& sample) noexcept {
+  const InertialRates measured = rates_of(sample.imu);
+  if (has_last_) {
+    const double dt_s = to_seconds(sample.time - last_time_);
+    if (navigating() && dt_s > kBridgedGap_s) stop(sample.time, dt_s);
+    if (navigating()) {
+      carry_over_interval(measured, (sample.imu.flags & kIsIncrement) != 0, dt_s);
+    } else {
+      predict_biases_only(dt_s);
+    }
+  }
+  has_last_ = true;
+  last_time_ = sample.time;
+  last_utc_ = sample.utc;
+  last_has_utc_ = sample.has_utc;
+  last_ = measured;
+  if (output_.status == NavigationStatus::kNotOffered) return;
+  if (navigating()) {
+    remember(sample, measured);
+  } else {
+    try_start(sample);
+  }
+  if (pending_size_ == 0) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < pending_size_; ++i) {
+    if (!apply_gnss(pending_[i])) pending_[kept++] = pending_[i];
+  }
+  pending_size_ = kept;
+}
+
+void NavigationFilter::carry_over_interval(const InertialRates& measured, bool is_mean,
+                                           double dt_s) noexcept {
+  NavigationState& state = core_.navigation();
+  const bool gap = dt_s > 1.5 / reference_.rate_hz;
+  if (!gap) {
+    const InertialRates start = compensated(last_, state);
+    const InertialRates end = compensated(measured, state);
+    predict(is_mean ? end : mixed(start, end, 0.5), dt_s, 0.0);
+    propagate(state,
+              is_mean ? increment_from_means(start, end, dt_s) : increment_from_samples(start, end, dt_s));
+    return;
+  }
+  const int steps = static_cast<int>(std::ceil(dt_s / kStep_s));
+  const double step_s = dt_s / steps;
+  for (int i = 0; i < steps; ++i) {
+    const InertialRates start = compensated(mixed(last_, measured, static_cast<double>(i) / steps), state);
+    const InertialRates end = compensated(mixed(last_, measured, static_cast<double>(i + 1) / steps), state);
+    predict(mixed(start, end, 0.5), step_s, 1.0);
+    propagate(state, increment_from_samples(start, end, step_s));
+  }
+  // Past states are no longer one R epoch apart; a solution from before the gap is given up.
+  past_size_ = 0;
+  core_.clear_injected();
+}
+
+void NavigationFilter::predict(const InertialRates& rates, double dt_s, double unseen) noexcept {
+  NavigationProcessNoise noise = noise_;
+  noise.gyro_noise_radps_per_sqrt_hz += unseen * kUnseenRate;
+  noise.accel_noise_mps2_per_sqrt_hz += unseen * kUnseenForce;
+  const NavigationTransition step = transition(core_.navigation(), rates, noise, dt_s);
+  KernelTransition kernel;
+  Eigen::Map<Eigen::Matrix<double, kNavigationKinematicSize, kNavigationErrorSize, Eigen::RowMajor>>(
+      kernel.coupled.data()) = step.kinematic_rows;
+  Eigen::Map<NavigationErrorCovariance>(kernel.noise.data()) = step.process_covariance;
+  std::fill_n(kernel.decay.begin(), 3, step.gyro_bias_decay);
+  std::fill_n(kernel.decay.begin() + 3, 3, step.accel_bias_decay);
+  core_.covariance().predict_navigation(kernel);
+  core_.carry_injected(step);
+  core_.navigation().gyro_bias_b_radps *= step.gyro_bias_decay;
+  core_.navigation().accel_bias_b_mps2 *= step.accel_bias_decay;
+  PastEpoch& next = past_[past_head_];
+  next.kinematic_rows = step.kinematic_rows;
+  next.gyro_bias_decay = step.gyro_bias_decay;
+  next.accel_bias_decay = step.accel_bias_decay;
+}
+
+void NavigationFilter::predict_biases_only(double dt_s) noexcept {
+  const auto decay_block = [&](std::size_t first, const GaussMarkovConfig& process, Vector3d& bias) {
+    const double decay = std::exp(-dt_s / process.time_constant_s);
+    const double variance = process.sd * process.sd * (1.0 - decay * decay);
+    for (std::size_t i = 0; i < 3; ++i) core_.covariance().predict_state(first + i, decay, variance);
+    bias *= decay;
+  };
+  decay_block(kGyroBiasError, reference_.gyro_bias, core_.navigation().gyro_bias_b_radps);
+  decay_block(kAccelBiasError, reference_.accel_bias, core_.navigation().accel_bias_b_mps2);
+}
+
+void NavigationFilter::remember(const Sample& sample, const InertialRates& measured) noexcept {
+  PastEpoch& next = past_[past_head_];
+  next.time = sample.time;
+  next.utc = sample.utc;
+  next.has_utc = sample.has_utc;
+  next.state = core_.navigation();
+  next.measured = measured;
+  next.injected = core_.injected();
+  past_head_ = (past_head_ + 1) % kPastEpochs;
+  past_size_ = std::min(past_size_ + 1, kPastEpochs);
+}
+
+void NavigationFilter::try_start(const Sample& sample) noexcept {
+  if (navigation_.initial_rpy_rad) return;  // waits for the first position, in add_gnss()
+  aligner_.add_imu(sample.time, last_);
+  if (const InitialNavigation* found = aligner_.result()) {
+    start(found->state, found->sd, method_of(found->method), sample.time);
+    remember(sample, last_);
+    return;
+  }
+  output_.status = aligner_.stage() == AlignmentStage::kWaitingForHeading ? NavigationStatus::kAligning
+                                                                          : NavigationStatus::kInitialising;
+}
+
+void NavigationFilter::start(const NavigationState& state, const NavigationErrorVector& sd,
+                             InitialisationMethod method, HostTime time) noexcept {
+  NavigationState& now = core_.navigation();
+  const Vector3d gyro_bias = now.gyro_bias_b_radps;
+  const Vector3d accel_bias = now.accel_bias_b_mps2;
+  now = state;
+  // The R biases live on in the filter, with what the S-IMUs know of them.
+  now.gyro_bias_b_radps = gyro_bias;
+  now.accel_bias_b_mps2 = accel_bias;
+  for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) {
+    const double value = sd(static_cast<Eigen::Index>(i));
+    core_.covariance().reset_state(i, value * value);
+  }
+  core_.clear_injected();
+  past_size_ = 0;
+  output_.status = NavigationStatus::kNavigating;
+  output_.method = method;
+  log_.add(EstimatorEventKind::kNavigationStarted, reference_.device, time, static_cast<double>(method));
+}
+
+void NavigationFilter::stop(HostTime time, double gap_s) noexcept {
+  output_.status = NavigationStatus::kInitialising;
+  output_.method = InitialisationMethod::kNone;
+  // A configured attitude belonged to the first start.
+  navigation_.initial_rpy_rad.reset();
+  past_size_ = 0;
+  for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) core_.covariance().reset_state(i, 0.0);
+  core_.clear_injected();
+  log_.add(EstimatorEventKind::kNavigationStopped, reference_.device, time, gap_s);
+}
+
+void NavigationFilter::add_attitude(const Sample& sample) noexcept {
+  constexpr std::uint32_t kWhole = kRollPitchValid | kHeadingValid;
+  if (output_.status == NavigationStatus::kNotOffered || navigating()) return;
+  const AttitudeData& a = sample.attitude;
+  if ((a.flags & kWhole) != kWhole || !std::isfinite(a.roll_rad + a.pitch_rad + a.heading_rad)) return;
+  const Vector3d configured = to_eigen(navigation_.initial_rpy_sd_rad);
+  const Vector3d sd =
+      (a.flags & kHasAttitudeSd) != 0 ? floored_sd(to_eigen(a.sd_rpy_rad), configured) : configured;
+  aligner_.add_attitude(sample.time, {a.roll_rad, a.pitch_rad, a.heading_rad}, sd);
+}
+
+void NavigationFilter::add_gnss(const Sample& sample) noexcept {
+  ++counters_.gnss_samples;
+  if (!is_finite(sample.gnss)) {
+    ++counters_.gnss_not_finite;
+    return;
+  }
+  if (output_.status == NavigationStatus::kNotOffered || sample.gnss.solution == GnssSolution::kNone) return;
+  if (apply_gnss(sample)) return;
+  if (pending_size_ == kPendingGnss) {
+    std::copy(pending_.begin() + 1, pending_.end(), pending_.begin());
+    --pending_size_;
+    ++counters_.gnss_too_old;
+  }
+  pending_[pending_size_++] = sample;
+}
+
+HostTime NavigationFilter::host_time_of(const Sample& gnss) const noexcept {
+  if (!gnss.has_utc || !last_has_utc_) return gnss.time;
+  // The tag of the nearest R epoch carries the solution to host time, so that clock maps cannot part them.
+  const PastEpoch* nearest = nullptr;
+  for (std::size_t back = 0; back < past_size_; ++back) {
+    if (!past(back).has_utc) continue;
+    nearest = &past(back);
+    if (past(back).utc <= gnss.utc) break;
+  }
+  if (nearest == nullptr) return last_time_ + (gnss.utc - last_utc_);
+  return nearest->time + (gnss.utc - nearest->utc);
+}
+
+NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out) noexcept {
+  if (past_size_ == 0 || time > past(0).time + kGnssAhead) return Lookup::kTooNew;
+  if (time < past(past_size_ - 1).time) return Lookup::kTooOld;
+  out.back.setIdentity();
+  std::size_t k = 0;
+  for (; past(k).time > time; ++k) {
+    const PastEpoch& step = past(k);
+    // [x_k; b] = [A B; 0 D] [x_k-1; b_k-1], undone from the left.
+    const Eigen::Matrix<double, 9, 9> A_inverse = step.kinematic_rows.leftCols<9>().inverse();
+    out.back.middleRows<3>(kGyroBiasError) /= step.gyro_bias_decay;
+    out.back.middleRows<3>(kAccelBiasError) /= step.accel_bias_decay;
+    const Eigen::Matrix<double, 9, 15> kinematic =
+        A_inverse * (out.back.topRows<9>() - step.kinematic_rows.rightCols<6>() * out.back.bottomRows<6>());
+    out.back.topRows<9>() = kinematic;
+  }
+  const PastEpoch& epoch = past(k);
+  out.state = epoch.state;
+  out.measured = epoch.measured;
+  inject(out.state, out.back * core_.injected() - epoch.injected);
+  const double rest_s = to_seconds(time - epoch.time);
+  if (k > 0 && rest_s > 0.0) {
+    const PastEpoch& after = past(k - 1);
+    const double share = rest_s / to_seconds(after.time - epoch.time);
+    out.measured = mixed(epoch.measured, after.measured, share);
+    propagate(out.state, increment_from_samples(compensated(epoch.measured, out.state),
+                                                compensated(out.measured, out.state), rest_s));
+  }
+  // Solutions come in order: nothing before this epoch will be asked for again, so that what was injected
+  // up to now need only be carried as far back as here.
+  past_size_ = k + 1;
+  return Lookup::kFound;
+}
+
+bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
+  const GnssData& gnss = sample.gnss;
+  const bool has_position = (gnss.flags & kPositionValid) != 0;
+  const bool has_velocity = gnss_.use_velocity && (gnss.flags & kVelocityValid) != 0;
+  const GeodeticPosition antenna{gnss.latitude_rad, gnss.longitude_rad, gnss.height_m};
+  const Vector3d sd_position =
+      trusted_sd((gnss.flags & kHasPositionSd) != 0, gnss.sd_position_m, gnss_.default_sd_position_m,
+                 gnss_.floor_sd_position_m, gnss.solution);
+  const Vector3d sd_velocity =
+      trusted_sd((gnss.flags & kHasVelocitySd) != 0, gnss.sd_velocity_mps, gnss_.default_sd_velocity_mps,
+                 gnss_.floor_sd_velocity_mps, gnss.solution);
+  if (!has_last_) return true;
+  const HostTime time = host_time_of(sample);
+
+  if (!navigating()) {
+    if (navigation_.initial_rpy_rad && has_position) {
+      NavigationState state;
+      const Vector3& rpy = *navigation_.initial_rpy_rad;
+      const Vector3d arm = to_eigen(gnss_.antenna_lever_arm_b_m);
+      state.C_b_n = rotation_from_euler({rpy[0], rpy[1], rpy[2]});
+      state.position = displaced(antenna, -(state.C_b_n * arm));
+      NavigationErrorVector sd = NavigationErrorVector::Zero();
+      sd.segment<3>(kPositionError) = sd_position;
+      sd.segment<3>(kVelocityError).setConstant(kConfiguredStartVelocitySd_mps);
+      sd.segment<3>(kAttitudeError) = to_eigen(navigation_.initial_rpy_sd_rad);
+      start(state, sd, InitialisationMethod::kConfigured, last_time_);
+      return true;
+    }
+    if (has_position) aligner_.add_gnss_position(time, antenna, sd_position);
+    if (has_velocity) aligner_.add_gnss_velocity(time, to_eigen(gnss.v_n_mps), sd_velocity);
+    return true;
+  }
+
+  Delayed then;
+  switch (look_back(time, then)) {
+    case Lookup::kTooNew:
+      return false;
+    case Lookup::kTooOld:
+      ++counters_.gnss_too_old;
+      return true;
+    case Lookup::kFound:
+      break;
+  }
+  const Vector3d arm = to_eigen(gnss_.antenna_lever_arm_b_m);
+  bool used = false;
+  if (has_position) {
+    const GnssInnovation position = gnss_position_innovation(then.state, antenna, arm);
+    used = apply(position_gate_, position, then.back, sd_position, time, output_.nis_position) || used;
+    if (used)
+      inject(then.state,
+             then.back * Eigen::Map<const NavigationErrorVector>(core_.covariance().correction().data()));
+  }
+  if (has_velocity) {
+    const GnssInnovation velocity =
+        gnss_velocity_innovation(then.state, to_eigen(gnss.v_n_mps), then.measured.omega_ib_b_radps, arm);
+    used = apply(velocity_gate_, velocity, then.back, sd_velocity, time, output_.nis_velocity) || used;
+  }
+  if (used) {
+    ++counters_.gnss_used;
+    if (streak_) {
+      streak_ = false;
+      log_.add(EstimatorEventKind::kGnssReacquired, gnss_.device, time, to_seconds(time - streak_start_));
+    }
+  } else if (has_position || has_velocity) {
+    ++counters_.gnss_rejected;
+    if (!streak_) {
+      streak_ = true;
+      streak_start_ = time;
+      const double nis = has_position ? position_gate_.last_nis() : velocity_gate_.last_nis();
+      log_.add(EstimatorEventKind::kGnssRejected, gnss_.device, time, nis);
+    }
+  }
+  return true;
+}
+
+bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured,
+                             const NavigationErrorCovariance& back, const Vector3d& sd, HostTime time,
+                             Vector3& nis) noexcept {
+  const NavigationMeasurementMatrix H = measured.H * back;
+  SparseMeasurement sparse;
+  for (std::size_t column = 0; column < kNavigationStates; column += 3) {
+    MeasurementBlock& block = sparse.append(column, 3);
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j)
+        block.h[i][j] = H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(column + j));
+    }
+  }
+  const Matrix3d R = sd.cwiseAbs2().asDiagonal();
+  CovarianceKernel& P = core_.covariance();
+  P.project(sparse, to_array(R));
+  Matrix3d S = to_eigen(P.innovation_covariance());
+  const GateDecision decision = gate.decide(time, measured.innovation, S, R);
+  for (Eigen::Index i = 0; i < 3; ++i)
+    nis[static_cast<std::size_t>(i)] = measured.innovation(i) * measured.innovation(i) / S(i, i);
+  if (decision == GateDecision::kReject) return false;
+  if (decision == GateDecision::kReacquire) {
+    widen_for_reacquisition(measured.innovation);
+    P.project(sparse, to_array(R));
+  }
+  return core_.update(measured.innovation, {true, true, true});
+}
+
+void NavigationFilter::widen_for_reacquisition(const Vector3d& innovation) noexcept {
+  CovarianceKernel& P = core_.covariance();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double off = innovation(static_cast<Eigen::Index>(i));
+    P.reset_state(kPositionError + i, P(kPositionError + i, kPositionError + i) + off * off);
+    P.reset_state(kVelocityError + i, kReacquireVelocitySd_mps * kReacquireVelocitySd_mps);
+  }
+}
+
+void NavigationFilter::update_output() noexcept {
+  output_.time = last_time_;
+  output_.utc = last_utc_;
+  output_.has_utc = last_has_utc_;
+  if (!navigating()) return;
+  const NavigationState& state = core_.navigation();
+  output_.latitude_rad = state.position.latitude_rad;
+  output_.longitude_rad = state.position.longitude_rad;
+  output_.height_m = state.position.height_m;
+  output_.v_n_mps = to_array(state.v_n_mps);
+  output_.C_b_n = to_array(state.C_b_n);
+  const EulerAngles rpy = euler_from_rotation(state.C_b_n);
+  output_.rpy_rad = {rpy.roll_rad, rpy.pitch_rad, rpy.heading_rad};
+  output_.gyro_bias_radps = to_array(state.gyro_bias_b_radps);
+  output_.accel_bias_mps2 = to_array(state.accel_bias_b_mps2);
+  Matrix3d P_phi;
+  for (std::size_t i = 0; i < 3; ++i) {
+    output_.sd_position_m[i] = core_.sd(kPositionError + i);
+    output_.sd_velocity_mps[i] = core_.sd(kVelocityError + i);
+    output_.sd_gyro_bias_radps[i] = core_.sd(kGyroBiasError + i);
+    output_.sd_accel_bias_mps2[i] = core_.sd(kAccelBiasError + i);
+    for (std::size_t j = 0; j < 3; ++j)
+      P_phi(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          core_.covariance()(kAttitudeError + i, kAttitudeError + j);
+  }
+  // phi = T d(roll, pitch, heading), with C_b_n = Rz(heading) Ry(pitch) Rx(roll) perturbed from the left.
+  // E-7.
+  const double sh = std::sin(rpy.heading_rad);
+  const double ch = std::cos(rpy.heading_rad);
+  const double cp = std::max(std::cos(rpy.pitch_rad), 1e-6);
+  const double sp = std::sin(rpy.pitch_rad);
+  Matrix3d T;
+  T << ch * cp, -sh, 0.0, sh * cp, ch, 0.0, -sp, 0.0, 1.0;
+  const Matrix3d T_inverse = T.inverse();
+  const Matrix3d P_rpy = T_inverse * P_phi * T_inverse.transpose();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    output_.sd_rpy_rad[i] = std::sqrt(std::max(P_rpy(k, k), 0.0));
+  }
+}
+
+}  // namespace imuscope

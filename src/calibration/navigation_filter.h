@@ -1,0 +1,103 @@
+#pragma once
+
+/// R-IMU/GNSS navigation inside the common filter: start, propagation, gaps, delayed GNSS solutions.
+///
+/// A GNSS solution is applied at its time of validity: a ring of past states with the transitions between
+/// them gives the state then, corrected with what has been learned since, and carries the measurement matrix
+/// to the present, H_eff = H Phi^-1 (E-5; the process noise during the delay is left out). Core. Thread: one.
+
+#include <cstddef>
+#include <vector>
+
+#include "calibration/event_log.h"
+#include "calibration/filter_core.h"
+#include "navigation/gnss_gate.h"
+#include "navigation/gnss_measurement.h"
+#include "navigation/initial_alignment.h"
+
+namespace imuscope {
+
+class NavigationFilter {
+ public:
+  NavigationFilter(const EstimatorConfig& config, FilterCore& core, EventLog& log,
+                   EstimatorCounters& counters);
+
+  /// One R sample, finite and newer than the last.
+  void add_reference(const Sample& sample) noexcept;
+  void add_attitude(const Sample& sample) noexcept;
+  void add_gnss(const Sample& sample) noexcept;
+
+  [[nodiscard]] bool navigating() const noexcept { return output_.status == NavigationStatus::kNavigating; }
+  /// Writes the newest state and its sd into output().
+  void update_output() noexcept;
+  [[nodiscard]] const NavigationOutput& output() const noexcept { return output_; }
+
+ private:
+  /// State at one R epoch, and the transition that led to it from the epoch before.
+  struct PastEpoch {
+    HostTime time;
+    UtcTime utc;
+    bool has_utc;
+    NavigationState state;
+    InertialRates measured;
+    NavigationErrorVector injected;  ///< FilterCore::injected() when the entry was written
+    NavigationDynamics kinematic_rows;
+    double gyro_bias_decay;
+    double accel_bias_decay;
+  };
+  /// A past epoch seen from the present.
+  struct Delayed {
+    NavigationState state;
+    InertialRates measured;
+    NavigationErrorCovariance back;  ///< Phi^-1: error then = back * error now
+  };
+  enum class Lookup : std::uint8_t { kFound, kTooNew, kTooOld };
+
+  void carry_over_interval(const InertialRates& measured, bool is_mean, double dt_s) noexcept;
+  void predict(const InertialRates& rates, double dt_s, double extra_rate_noise) noexcept;
+  void predict_biases_only(double dt_s) noexcept;
+  void remember(const Sample& sample, const InertialRates& measured) noexcept;
+  void try_start(const Sample& sample) noexcept;
+  void start(const NavigationState& state, const NavigationErrorVector& sd, InitialisationMethod method,
+             HostTime time) noexcept;
+  void stop(HostTime time, double gap_s) noexcept;
+  bool apply_gnss(const Sample& sample) noexcept;
+  [[nodiscard]] HostTime host_time_of(const Sample& gnss) const noexcept;
+  Lookup look_back(HostTime time, Delayed& out) noexcept;
+  bool apply(GnssGate& gate, const GnssInnovation& measured, const NavigationErrorCovariance& back,
+             const Eigen::Vector3d& sd, HostTime time, Vector3& nis) noexcept;
+  void widen_for_reacquisition(const Eigen::Vector3d& innovation) noexcept;
+  [[nodiscard]] PastEpoch& past(std::size_t back) noexcept;  ///< 0 = newest
+  [[nodiscard]] const PastEpoch& past(std::size_t back) const noexcept;
+
+  static constexpr std::size_t kPastEpochs = 256;
+  static constexpr std::size_t kPendingGnss = 8;
+
+  ReferenceConfig reference_;
+  GnssConfig gnss_;
+  NavigationConfig navigation_;
+  NavigationProcessNoise noise_;
+  FilterCore& core_;
+  EventLog& log_;
+  EstimatorCounters& counters_;
+  InitialAligner aligner_;
+  GnssGate position_gate_;
+  GnssGate velocity_gate_;
+  NavigationOutput output_;
+
+  bool has_last_ = false;
+  HostTime last_time_{};
+  UtcTime last_utc_{};
+  bool last_has_utc_ = false;
+  InertialRates last_;
+
+  std::vector<PastEpoch> past_;
+  std::size_t past_head_ = 0;
+  std::size_t past_size_ = 0;
+  std::array<Sample, kPendingGnss> pending_{};
+  std::size_t pending_size_ = 0;
+  bool streak_ = false;
+  HostTime streak_start_{};
+};
+
+}  // namespace imuscope

@@ -1,0 +1,446 @@
+#include "calibration/study_filter.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+
+#include "navigation/so3.h"
+
+namespace imuscope {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// A silence of this length makes the biases uncertain again: the sensor may have been off.
+constexpr double kReturnAfter_s = 5.0;
+/// NIS is averaged over this time.
+constexpr double kNisMean_s = 10.0;
+/// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
+constexpr double kMountingChangedShare = 0.8;
+constexpr double kMountingWatch_s = 3.0;
+/// The coarse alignment is tried this often.
+constexpr Duration kCoarseEvery = std::chrono::seconds{1};
+/// A coarse offset that moves by more than this makes the gathered pairs useless.
+constexpr double kCoarseOffsetStable_s = 0.02;
+/// The cross-correlation's own sd is optimistic where signals are smooth.
+constexpr double kCoarseOffsetSdFactor = 3.0;
+constexpr Duration kDirectionEvery = std::chrono::seconds{1};
+/// Less than this share of the prior left: observable.
+constexpr double kObservableShare = 0.5;
+
+bool is_finite(const ImuData& imu) noexcept {
+  bool finite = true;
+  for (std::size_t i = 0; i < 3; ++i)
+    finite = finite && std::isfinite(imu.omega_radps[i]) && std::isfinite(imu.f_mps2[i]);
+  return finite;
+}
+
+double axis_gate(double probability) {
+  return boost::math::quantile(boost::math::chi_squared(1.0), probability);
+}
+
+}  // namespace
+
+StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
+    : index_(index),
+      config_(config.studies[index]),
+      late_after_(config.late_after),
+      gate_(axis_gate(config.gate_probability)),
+      rate_noise_radps_(config.reference.gyro_white_radps_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
+      force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
+      increment_centre_(from_seconds(0.5 / config_.rate_hz)),
+      queue_(kQueue) {
+  precompute_noise();
+}
+
+void StudyFilter::precompute_noise() noexcept {
+  const double dt_s = 1.0 / config_.rate_hz;
+  for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
+    for (const Triad triad : {Triad::kGyro, Triad::kAccel}) {
+      const TriadNoise& noise =
+          triad == Triad::kGyro ? config_.noise.gyro[regime] : config_.noise.accel[regime];
+      NoiseVariances& out = variances_[regime][static_cast<std::size_t>(triad)];
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto k = static_cast<Eigen::Index>(i);
+        out.inflated(k) =
+            inflated_variance(noise.white_sd[i], noise.fast_sd[i], noise.fast_time_constant_s[i], dt_s);
+        const double fast = noise.fast_time_constant_s[i] > 0.0 ? noise.fast_sd[i] : 0.0;
+        out.plain(k) = noise.white_sd[i] * noise.white_sd[i] + fast * fast;
+      }
+    }
+  }
+}
+
+void StudyFilter::add(const Sample& sample) noexcept {
+  StudyCounters& counters = output_.counters;
+  ++counters.samples;
+  if (!is_finite(sample.imu)) {
+    ++counters.not_finite;
+    return;
+  }
+  if (has_last_added_ && sample.time <= last_added_) {
+    ++counters.not_increasing;
+    return;
+  }
+  if (queue_size_ == kQueue) {
+    ++counters.refused_full;
+    return;
+  }
+  has_last_added_ = true;
+  last_added_ = sample.time;
+  queue_[(queue_head_ + queue_size_++) % kQueue] = sample;
+}
+
+void StudyFilter::add_reference(HostTime time, double rate_radps) noexcept {
+  if (!calibrating_) live_offset_.add_reference(time, rate_radps);
+}
+
+bool StudyFilter::gives_up(const Sample& sample, HostTime cut) const noexcept {
+  // A sensor that runs ahead (t_d > 0) is expected to wait for t_d.
+  const Duration ahead = std::max(Duration{0}, from_seconds(output_.t_d_s));
+  return cut > std::max(sample.arrival, sample.time + ahead) + late_after_;
+}
+
+void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
+  if (!calibrating_ && output_.status == StudyStatus::kWaiting && queue_size_ > 0) {
+    output_.status = StudyStatus::kCoarse;
+    const bool knows_mounting = config_.prior_C_b_s && prior_in_force_;
+    if (knows_mounting && config_.prior_t_d_s) {
+      begin(context, queue_[queue_head_].time, to_eigen(*config_.prior_C_b_s), Matrix3d::Zero(),
+            *config_.prior_t_d_s, config_.prior_t_d_sd_s);
+    } else {
+      offset_known_ = config_.prior_t_d_s.has_value();
+      coarse_t_d_s_ = config_.prior_t_d_s.value_or(0.0);
+      coarse_t_d_sd_s_ = config_.prior_t_d_sd_s;
+      next_attempt_ = queue_[queue_head_].time + kCoarseEvery;
+    }
+  }
+  while (queue_size_ > 0) {
+    const Sample& sample = queue_[queue_head_];
+    const bool is_mean = (sample.imu.flags & kIsIncrement) != 0;
+    const HostTime valid = is_mean ? sample.time - increment_centre_ : sample.time;
+    const double t_d_s = calibrating_ ? context.core.study(index_).t_d_s : coarse_t_d_s_;
+    output_.t_d_s = t_d_s;
+    ReferenceKinematics b;
+    switch (context.window.evaluate(valid + from_seconds(t_d_s), b)) {
+      case ReferenceResult::kTooNew:
+        if (!gives_up(sample, cut)) return;
+        ++output_.counters.late;
+        break;
+      case ReferenceResult::kTooOld:
+      case ReferenceResult::kGap:
+        ++output_.counters.no_reference;
+        break;
+      case ReferenceResult::kOk:
+        process_sample(context, sample, valid, b);
+        break;
+    }
+    queue_head_ = (queue_head_ + 1) % kQueue;
+    --queue_size_;
+  }
+}
+
+void StudyFilter::process_sample(StudyContext& context, const Sample& sample, HostTime valid,
+                                 const ReferenceKinematics& measured) noexcept {
+  FilterCore& core = context.core;
+  const double dt_s = has_last_ ? to_seconds(valid - last_time_) : 0.0;
+  if (has_last_ && dt_s > kReturnAfter_s && calibrating_) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const StudyLayout& layout = core.layout(index_);
+      if (layout.gyro_bias != StudyLayout::kAbsent)
+        core.covariance().predict_state(layout.gyro_bias + i, 1.0,
+                                        config_.turn_on_gyro_sd_radps[i] * config_.turn_on_gyro_sd_radps[i]);
+      if (layout.accel_bias != StudyLayout::kAbsent)
+        core.covariance().predict_state(layout.accel_bias + i, 1.0,
+                                        config_.turn_on_accel_sd_mps2[i] * config_.turn_on_accel_sd_mps2[i]);
+    }
+    context.log.add(EstimatorEventKind::kStudyReturned, config_.device, valid, dt_s);
+  }
+  has_last_ = true;
+  last_time_ = valid;
+  output_.time = valid;
+  output_.regime = context.regime;
+  if (calibrating_) predict(core, dt_s);
+
+  const NavigationState& navigation = core.navigation();
+  ReferenceKinematics b = measured;
+  b.omega_radps -= navigation.gyro_bias_b_radps;
+  b.f_mps2 -= navigation.accel_bias_b_mps2;
+
+  StudyEpoch epoch;
+  epoch.study = index_;
+  epoch.time = valid;
+  epoch.t_d_s = output_.t_d_s;
+  epoch.sample = sample.imu;
+  epoch.omega_ib_b_radps = to_array(b.omega_radps);
+  epoch.omega_dot_ib_b_radps2 = to_array(b.omega_dot_radps2);
+  epoch.omega_ddot_ib_b_radps3 = to_array(b.omega_ddot_radps3);
+  epoch.f_b_mps2 = to_array(b.f_mps2);
+  epoch.f_dot_b_mps3 = to_array(b.f_dot_mps3);
+  epoch.reference_gyro_bias_radps = to_array(navigation.gyro_bias_b_radps);
+  epoch.reference_accel_bias_mps2 = to_array(navigation.accel_bias_b_mps2);
+  epoch.C_b_s = to_array(core.study(index_).C_b_s);
+  epoch.r_bs_b_m = to_array(core.study(index_).r_bs_b_m);
+  epoch.regime = context.regime;
+  epoch.calibrating = calibrating_;
+  if (calibrating_) {
+    const auto before = output_.counters;
+    correct(context, Triad::kGyro, b, epoch);
+    correct(context, Triad::kAccel, b, epoch);
+    ++output_.counters.used;
+    bool gated = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      gated = gated || before.gated_gyro[i] != output_.counters.gated_gyro[i] ||
+              before.gated_accel[i] != output_.counters.gated_accel[i];
+    }
+    context.epochs.on_epoch(epoch);
+    watch_mounting(context, gated, valid, dt_s);
+  } else {
+    context.epochs.on_epoch(epoch);
+    gather(context, sample, valid, b);
+  }
+}
+
+void StudyFilter::gather(StudyContext& context, const Sample& sample, HostTime valid,
+                         const ReferenceKinematics& b) noexcept {
+  const Vector3d omega = to_eigen(sample.imu.omega_radps);
+  live_offset_.add_study(valid, omega.norm());
+  coarse_mounting_.add(b.omega_radps, b.f_mps2, omega, to_eigen(sample.imu.f_mps2));
+  if (valid < next_attempt_) return;
+  next_attempt_ = valid + kCoarseEvery;
+  try_coarse_alignment(context, valid);
+}
+
+void StudyFilter::try_coarse_alignment(StudyContext& context, HostTime now) noexcept {
+  ++output_.counters.coarse_attempts;
+  if (!config_.prior_t_d_s || !prior_in_force_) {
+    TimeOffset found;
+    if (!live_offset_.estimate(found)) return;
+    const bool moved = std::abs(found.offset_s - coarse_t_d_s_) > kCoarseOffsetStable_s;
+    coarse_t_d_s_ = found.offset_s;
+    coarse_t_d_sd_s_ = std::max(config_.prior_t_d_sd_s, kCoarseOffsetSdFactor * found.sd_s);
+    offset_known_ = true;
+    if (moved) {
+      coarse_mounting_.clear();
+      return;
+    }
+  }
+  if (config_.prior_C_b_s && prior_in_force_) {
+    begin(context, now, to_eigen(*config_.prior_C_b_s), Matrix3d::Zero(), coarse_t_d_s_, coarse_t_d_sd_s_);
+    return;
+  }
+  CoarseMounting mounting;
+  const MountingResult result = coarse_mounting_.solve(mounting);
+  if (result == MountingResult::kOk) {
+    begin(context, now, mounting.C_b_s, mounting.covariance_rad2, coarse_t_d_s_, coarse_t_d_sd_s_);
+    context.log.add(EstimatorEventKind::kCoarseAlignmentDone, config_.device, now,
+                    std::sqrt(mounting.covariance_rad2.trace()));
+  } else if (result == MountingResult::kInconsistent) {
+    context.log.add(EstimatorEventKind::kCoarseAlignmentPoor, config_.device, now, mounting.rate_correlation);
+    coarse_mounting_.clear();
+  }
+}
+
+void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b_s,
+                        const Matrix3d& mounting_covariance, double t_d_s, double t_d_sd_s) noexcept {
+  FilterCore& core = context.core;
+  reset_to_prior(core, index_, config_);
+  StudyState& state = core.study(index_);
+  state.C_b_s = orthonormalised(C_b_s);
+  state.t_d_s = t_d_s;
+  const StudyLayout& layout = core.layout(index_);
+  CovarianceKernel& P = core.covariance();
+  if (layout.psi != StudyLayout::kAbsent) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = i; j < 3; ++j) {
+        const double prior =
+            i == j ? config_.prior_boresight_sd_rad[i] * config_.prior_boresight_sd_rad[i] : 0.0;
+        P.set(layout.psi + i, layout.psi + j,
+              prior + mounting_covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)));
+      }
+    }
+  }
+  if (layout.t_d != StudyLayout::kAbsent) P.reset_state(layout.t_d, t_d_sd_s * t_d_sd_s);
+  output_.C_prior = to_array(state.C_b_s);
+  for (std::size_t i = 0; i < 3; ++i) {
+    prior_sd_psi_r_[i] = core.sd(layout.psi == StudyLayout::kAbsent ? layout.psi : layout.psi + i);
+    prior_sd_psi_r_[i + 3] = core.sd(layout.r == StudyLayout::kAbsent ? layout.r : layout.r + i);
+  }
+  prior_sd_t_d_ = t_d_sd_s;
+  output_.nis_gyro.fill(1.0);
+  output_.nis_accel.fill(1.0);
+  output_.status = StudyStatus::kConverging;
+  gated_share_ = 0.0;
+  next_direction_ = now;
+  calibrating_ = true;
+}
+
+void StudyFilter::predict(FilterCore& core, double dt_s) noexcept {
+  const StudyLayout& layout = core.layout(index_);
+  StudyState& state = core.study(index_);
+  const auto bias = [&](std::size_t first, const std::array<GaussMarkovConfig, 3>& process, Vector3d& value) {
+    if (first == StudyLayout::kAbsent) return;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double decay = std::exp(-dt_s / process[i].time_constant_s);
+      core.covariance().predict_state(first + i, decay,
+                                      process[i].sd * process[i].sd * (1.0 - decay * decay));
+      value(static_cast<Eigen::Index>(i)) *= decay;
+    }
+  };
+  bias(layout.gyro_bias, config_.noise.gyro_bias, state.gyro_bias_s_radps);
+  bias(layout.accel_bias, config_.noise.accel_bias, state.accel_bias_s_mps2);
+  const double creep = config_.boresight_creep_rad_per_sqrt_s;
+  if (creep > 0.0 && layout.psi != StudyLayout::kAbsent) {
+    for (std::size_t i = 0; i < 3; ++i)
+      core.covariance().predict_state(layout.psi + i, 1.0, creep * creep * dt_s);
+  }
+}
+
+ReferenceNoise StudyFilter::reference_noise(const ReferenceKinematics& b) const noexcept {
+  return {rate_noise_radps_ * b.value_noise_gain, rate_noise_radps_ * b.derivative_noise_gain_per_s,
+          force_noise_mps2_ * b.value_noise_gain};
+}
+
+void StudyFilter::correct(StudyContext& context, Triad triad, const ReferenceKinematics& b,
+                          StudyEpoch& epoch) noexcept {
+  const bool gyro = triad == Triad::kGyro;
+  const std::uint32_t flags = epoch.sample.flags;
+  if ((flags & (gyro ? kGyroValid : kAccelValid)) == 0) return;
+  FilterCore& core = context.core;
+  const ReferenceBiasColumns columns{kGyroBiasError, kAccelBiasError};
+  const StudyMeasurement m =
+      gyro ? gyro_measurement(core.study(index_), core.layout(index_), columns, b, reference_noise(b))
+           : accel_measurement(core.study(index_), core.layout(index_), columns, b, reference_noise(b));
+  const NoiseVariances& noise =
+      variances_[static_cast<std::size_t>(context.regime)][static_cast<std::size_t>(triad)];
+  Matrix3d R = m.reference_covariance;
+  R.diagonal() += noise.inflated;
+  core.covariance().project(m.H, to_array(R));
+  const Matrix3d S = to_eigen(core.covariance().innovation_covariance());
+  const Vector3d y = to_eigen(gyro ? epoch.sample.omega_radps : epoch.sample.f_mps2) - m.predicted;
+  const Vector3d plain = S.diagonal() - noise.inflated + noise.plain;
+
+  StudyCounters& counters = output_.counters;
+  std::array<bool, 3>& use = gyro ? epoch.used_gyro : epoch.used_accel;
+  Vector3& nis = gyro ? output_.nis_gyro : output_.nis_accel;
+  const double share = std::min(1.0, 1.0 / (kNisMean_s * config_.rate_hz));
+  const auto first_clip = static_cast<std::uint32_t>(gyro ? kGyroClipX : kAccelClipX);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if ((flags & (first_clip << i)) != 0) {
+      use[i] = false;
+      ++(gyro ? counters.clipped_gyro : counters.clipped_accel)[i];
+      continue;
+    }
+    use[i] = y(k) * y(k) <= gate_ * S(k, k);
+    if (!use[i]) ++(gyro ? counters.gated_gyro : counters.gated_accel)[i];
+    nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
+  }
+  (gyro ? epoch.innovation_gyro_radps : epoch.innovation_accel_mps2) = to_array(y);
+  (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(plain);
+  core.update(y, use);
+}
+
+void StudyFilter::watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept {
+  gated_share_ += std::min(1.0, dt_s / kMountingWatch_s) * ((gated ? 1.0 : 0.0) - gated_share_);
+  if (gated_share_ < kMountingChangedShare) return;
+  double worst = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) worst = std::max({worst, output_.nis_gyro[i], output_.nis_accel[i]});
+  context.log.add(EstimatorEventKind::kMountingChanged, config_.device, now, worst);
+  ++output_.counters.resets;
+  reset_to_prior(context.core, index_, config_);
+  calibrating_ = false;
+  prior_in_force_ = false;
+  offset_known_ = false;
+  coarse_t_d_s_ = 0.0;
+  coarse_mounting_.clear();
+  output_.status = StudyStatus::kCoarse;
+  next_attempt_ = now + kCoarseEvery;
+}
+
+void StudyFilter::set_noise(FilterCore& core, const StudyNoise& noise) noexcept {
+  const StudyLayout& layout = core.layout(index_);
+  // The part of the bias variance that the process accounts for moves with it; correlations stay.
+  const auto rescale = [&](std::size_t first, const std::array<GaussMarkovConfig, 3>& before,
+                           const std::array<GaussMarkovConfig, 3>& after) {
+    if (first == StudyLayout::kAbsent) return;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double grown = after[i].sd * after[i].sd - before[i].sd * before[i].sd;
+      if (grown > 0.0)
+        core.covariance().predict_state(first + i, 1.0,
+                                        std::min(grown, core.covariance()(first + i, first + i)));
+    }
+  };
+  rescale(layout.gyro_bias, config_.noise.gyro_bias, noise.gyro_bias);
+  rescale(layout.accel_bias, config_.noise.accel_bias, noise.accel_bias);
+  config_.noise = noise;
+  precompute_noise();
+}
+
+void StudyFilter::update_output(const FilterCore& core) noexcept {
+  if (!calibrating_) return;
+  const StudyState& state = core.study(index_);
+  const StudyLayout& layout = core.layout(index_);
+  const CovarianceKernel& P = core.covariance();
+  output_.C_b_s = to_array(state.C_b_s);
+  output_.psi_rad = to_array(Vector3d(-log_so3(to_eigen(output_.C_prior).transpose() * state.C_b_s)));
+  output_.r_bs_b_m = to_array(state.r_bs_b_m);
+  output_.t_d_s = state.t_d_s;
+  output_.gyro_bias_radps = to_array(state.gyro_bias_s_radps);
+  output_.accel_bias_mps2 = to_array(state.accel_bias_s_mps2);
+  output_.gyro_scale = to_array(state.gyro_scale);
+  output_.accel_scale = to_array(state.accel_scale);
+  const auto sd_of = [&](std::size_t first, Vector3& out) {
+    for (std::size_t i = 0; i < 3; ++i) out[i] = first == StudyLayout::kAbsent ? 0.0 : core.sd(first + i);
+  };
+  sd_of(layout.psi, output_.sd_psi_rad);
+  sd_of(layout.r, output_.sd_r_bs_b_m);
+  sd_of(layout.gyro_bias, output_.sd_gyro_bias_radps);
+  sd_of(layout.accel_bias, output_.sd_accel_bias_mps2);
+  sd_of(layout.gyro_scale, output_.sd_gyro_scale);
+  sd_of(layout.accel_scale, output_.sd_accel_scale);
+  output_.sd_t_d_s = core.sd(layout.t_d);
+
+  bool calibrated = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const std::size_t block = i < 3 ? layout.psi : layout.r;
+    const double sd = i < 3 ? output_.sd_psi_rad[i] : output_.sd_r_bs_b_m[i - 3];
+    const double goal = i < 3 ? config_.goal_boresight_sd_rad : config_.goal_r_bs_b_sd_m;
+    calibrated = calibrated && sd <= goal;
+    output_.observable[i] = sd < kObservableShare * prior_sd_psi_r_[i];
+    for (std::size_t j = 0; j < 6; ++j) {
+      const std::size_t other = j < 3 ? layout.psi : layout.r;
+      const bool absent = block == StudyLayout::kAbsent || other == StudyLayout::kAbsent;
+      output_.covariance_psi_r[i * 6 + j] = absent ? 0.0 : P(block + i % 3, other + j % 3);
+    }
+  }
+  output_.t_d_observable =
+      layout.t_d != StudyLayout::kAbsent && output_.sd_t_d_s < kObservableShare * prior_sd_t_d_;
+  output_.status = calibrated ? StudyStatus::kCalibrated : StudyStatus::kConverging;
+  if (output_.time >= next_direction_) {
+    next_direction_ = output_.time + kDirectionEvery;
+    update_weakest_direction(core);
+  }
+}
+
+void StudyFilter::update_weakest_direction(const FilterCore& core) noexcept {
+  const StudyLayout& layout = core.layout(index_);
+  if (layout.psi == StudyLayout::kAbsent || layout.r == StudyLayout::kAbsent) return;
+  Eigen::Matrix<double, 6, 6> scaled;
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j)
+      scaled(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+          output_.covariance_psi_r[i * 6 + j] / (prior_sd_psi_r_[i] * prior_sd_psi_r_[j]);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(scaled);
+  const auto weakest = solver.eigenvectors().col(5);
+  Eigen::Index largest = 0;
+  weakest.cwiseAbs().maxCoeff(&largest);
+  for (std::size_t i = 0; i < 6; ++i) output_.weakest_direction[i] = weakest(static_cast<Eigen::Index>(i));
+  output_.weakest_component = static_cast<StudyDirection>(largest);
+  output_.weakest_relative_sd = std::sqrt(std::max(0.0, solver.eigenvalues()(5)));
+}
+
+}  // namespace imuscope

@@ -1,0 +1,109 @@
+#pragma once
+
+/// One S-IMU on its way through the estimator: its waiting samples, its coarse alignment, its measurement
+/// updates and what is told about them. Core. Thread: one.
+
+#include <cstddef>
+#include <vector>
+
+#include "alignment/coarse_mounting.h"
+#include "alignment/cross_correlation.h"
+#include "alignment/reference_window.h"
+#include "calibration/event_log.h"
+#include "calibration/filter_core.h"
+
+namespace imuscope {
+
+/// Where processed S samples go.
+class EpochSink {
+ public:
+  virtual ~EpochSink() = default;
+  virtual void on_epoch(const StudyEpoch& epoch) noexcept = 0;
+};
+
+/// What the S-IMUs share in one tick.
+struct StudyContext {
+  FilterCore& core;
+  const ReferenceWindow& window;
+  EventLog& log;
+  EpochSink& epochs;
+  Regime regime;
+};
+
+class StudyFilter {
+ public:
+  StudyFilter(const EstimatorConfig& config, std::size_t index);
+
+  /// Takes a sample into the waiting queue.
+  void add(const Sample& sample) noexcept;
+  /// The reference's rate, for the coarse time offset.
+  void add_reference(HostTime time, double rate_radps) noexcept;
+  /// Processes what has its reference, gives up what waited too long.
+  void process(StudyContext& context, HostTime cut) noexcept;
+
+  void set_noise(FilterCore& core, const StudyNoise& noise) noexcept;
+  void update_output(const FilterCore& core) noexcept;
+  [[nodiscard]] const StudyOutput& output() const noexcept { return output_; }
+  [[nodiscard]] const StudyConfig& config() const noexcept { return config_; }
+
+ private:
+  enum class Triad : std::uint8_t { kGyro, kAccel };
+
+  [[nodiscard]] bool gives_up(const Sample& sample, HostTime cut) const noexcept;
+  void process_sample(StudyContext& context, const Sample& sample, HostTime valid,
+                      const ReferenceKinematics& measured) noexcept;
+  void gather(StudyContext& context, const Sample& sample, HostTime valid,
+              const ReferenceKinematics& b) noexcept;
+  void try_coarse_alignment(StudyContext& context, HostTime now) noexcept;
+  void begin(StudyContext& context, HostTime now, const Eigen::Matrix3d& C_b_s,
+             const Eigen::Matrix3d& mounting_covariance, double t_d_s, double t_d_sd_s) noexcept;
+  void predict(FilterCore& core, double dt_s) noexcept;
+  void correct(StudyContext& context, Triad triad, const ReferenceKinematics& b, StudyEpoch& epoch) noexcept;
+  void watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
+  void update_weakest_direction(const FilterCore& core) noexcept;
+  [[nodiscard]] ReferenceNoise reference_noise(const ReferenceKinematics& b) const noexcept;
+  void precompute_noise() noexcept;
+
+  static constexpr std::size_t kQueue = 2048;
+
+  std::size_t index_;
+  StudyConfig config_;
+  Duration late_after_;
+  double gate_;              ///< bound of y^2 / S of one axis
+  double rate_noise_radps_;  ///< of one R sample
+  double force_noise_mps2_;
+  Duration increment_centre_;  ///< half a sample period
+
+  std::vector<Sample> queue_;
+  std::size_t queue_head_ = 0;
+  std::size_t queue_size_ = 0;
+  bool has_last_added_ = false;
+  HostTime last_added_{};
+
+  StudyOutput output_;
+  bool calibrating_ = false;
+  bool prior_in_force_ = true;  ///< false after the mounting has changed
+  bool has_last_ = false;
+  HostTime last_time_{};
+
+  LiveTimeOffset live_offset_;
+  CoarseMountingEstimator coarse_mounting_;
+  bool offset_known_ = false;
+  double coarse_t_d_s_ = 0.0;
+  double coarse_t_d_sd_s_ = 0.0;
+  HostTime next_attempt_{};
+
+  /// Per regime and triad: R of the filter (inflated) and the model's own variance.
+  struct NoiseVariances {
+    Eigen::Vector3d inflated;
+    Eigen::Vector3d plain;
+  };
+  std::array<std::array<NoiseVariances, 2>, kRegimeCount> variances_;
+
+  double gated_share_ = 0.0;
+  std::array<double, 6> prior_sd_psi_r_{};
+  double prior_sd_t_d_ = 0.0;
+  HostTime next_direction_{};
+};
+
+}  // namespace imuscope
