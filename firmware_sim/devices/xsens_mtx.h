@@ -1,0 +1,98 @@
+#pragma once
+
+/// Firmware of an XSens MTx on a serial line: states, settings and commands as the manuals MT0100P and
+/// MT0101P describe them, and legacy MTData out of it.
+///
+/// At power-on it sends WakeUp; without a WakeUpAck within 500 ms it sends its Configuration and measures
+/// with its stored settings (factory: 100 Hz, quaternion and sample counter, 115200 baud). In Measurement it
+/// hears GoToConfig and Reset only, and goes on sending data until it has acknowledged.
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <vector>
+
+#include "firmware_sim/devices/device.h"
+#include "firmware_sim/devices/xsens_encoder.h"
+
+namespace imusim {
+
+class XsensMtx : public Device {
+ public:
+  /// What a sample taken at a time holds, but for its counter.
+  /// @param counter  counts samples from the first one on, not wrapped
+  using Sampler = std::function<xsens::MtSample(double t_s, std::int64_t counter)>;
+
+  struct Options {
+    std::uint32_t device_id = 0x00300001;
+    double latency_s = 0.002;     ///< from the sampling instant to the first bit of the message
+    double clock_skew_ppm = 0.0;  ///< positive: the device's clock is fast, so it samples more often
+    double first_sample_s = 0.0;  ///< earliest sampling instant
+    std::uint16_t first_counter = 0;
+    int baud = 115200;
+  };
+
+  enum class State { kWaking, kConfig, kMeasurement };
+
+  /// Just powered on, at time power_on_s.
+  XsensMtx(const Options& options, Sampler sampler, double power_on_s);
+
+  void receive(std::span<const std::uint8_t> bytes, double t_s) override;
+  void run_until(double t_s, std::vector<Emission>& out) override;
+  [[nodiscard]] int baud() const override { return baud_; }
+
+  [[nodiscard]] State state() const { return state_; }
+
+  /// Starts measuring calibrated rates and forces with the sample counter in float32, as if a host had set it
+  /// up already.
+  void start_calibrated(double t_s);
+
+ private:
+  /// Kept without power.
+  struct Settings {
+    std::uint16_t period = 1152;  // 1/115200 s
+    std::uint16_t skip_factor = 0;
+    std::uint16_t output_mode = xsens::kModeOrientation;
+    std::uint32_t output_settings = xsens::kSettingsCounter;
+    std::uint16_t error_mode = 1;
+    std::uint8_t baud_code = 2;
+  };
+  struct Command {
+    std::uint8_t mid;
+    Bytes data;
+  };
+
+  bool take_frame(Command& command);
+  void handle(const Command& command, double t_s);
+  void handle_in_config(const Command& command, double t_s);
+  template <typename T>
+  void request_or_set(const Command& command, T& setting, bool (*is_valid)(T), std::uint8_t error,
+                      double t_s);
+  void set_baudrate(const Command& command, double t_s);
+  void power_on(double t_s);
+  void enter_measurement(double t_s);
+  void reply(std::uint8_t mid, const Bytes& data, double t_s);
+  void error(std::uint8_t code, double t_s);
+  void emit_samples_until(double t_s, std::vector<Emission>& out);
+  [[nodiscard]] Bytes configuration() const;
+  [[nodiscard]] std::uint16_t data_length() const;
+  [[nodiscard]] double sample_time(std::int64_t index) const;
+  [[nodiscard]] double period_s() const;
+
+  Options options_;
+  Sampler sampler_;
+  Settings settings_;
+  State state_ = State::kWaking;
+  int baud_;
+  double wake_deadline_s_ = 0.0;
+  /// Measurement ends when the ack of GoToConfig leaves; infinite when none is due.
+  double measurement_end_s_;
+  Bytes heard_;
+  std::deque<Emission> replies_;
+  // The sampling grid: sample index i is taken at grid_origin_s_ + i * period.
+  double grid_origin_s_;
+  std::int64_t next_index_ = 0;
+  std::int64_t index_at_grid_ = 0;
+};
+
+}  // namespace imusim
