@@ -1,0 +1,394 @@
+#include "noise/separable_fit.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "base/contracts.h"
+
+namespace imuscope::noise {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Grid points a coordinate by the number of coordinates; chosen so that every local minimum of three GM over
+/// twenty octaves has a point in its basin.
+constexpr std::array<int, 8> kGridPoints{1, 200, 60, 32, 16, 10, 7, 5};
+constexpr std::size_t kPolished = 8;
+
+/// One searched coordinate: shape value `shape` of process `process` of the spec.
+struct Coordinate {
+  std::size_t process;
+  int shape;
+  ProcessKind kind;
+  CoordinateRange range;
+};
+
+std::vector<Coordinate> coordinates_of(const SeparableProblem& problem) {
+  std::vector<Coordinate> out;
+  const int highest = problem.levels.back();
+  for (std::size_t p = 0; p < problem.spec.processes.size(); ++p) {
+    const ProcessKind kind = problem.spec.processes[p];
+    for (int i = 0; i < shape_count(kind); ++i)
+      out.push_back({p, i, kind, coordinate_range(kind, i, highest)});
+  }
+  return out;
+}
+
+RowVector whitened_curve(const SeparableProblem& problem, ProcessKind kind, const Shape& shape) {
+  RowVector curve(problem.y.size());
+  for (Eigen::Index r = 0; r < curve.size(); ++r) {
+    curve[r] = unit_wv(kind, shape, problem.levels[static_cast<std::size_t>(r)]).value;
+  }
+  return problem.whitener * curve;
+}
+
+RowVector whitened_slope(const SeparableProblem& problem, ProcessKind kind, const Shape& shape, int i) {
+  RowVector curve(problem.y.size());
+  for (Eigen::Index r = 0; r < curve.size(); ++r) {
+    curve[r] = unit_wv(kind, shape, problem.levels[static_cast<std::size_t>(r)])
+                   .derivative[static_cast<std::size_t>(i)];
+  }
+  return problem.whitener * curve;
+}
+
+/// Shapes of all processes at a point of the coordinates.
+std::vector<Shape> shapes_at(const SeparableProblem& problem, const std::vector<Coordinate>& coordinates,
+                             const ColumnVector& u) {
+  std::vector<Shape> shapes(problem.spec.processes.size(), Shape{});
+  for (std::size_t c = 0; c < coordinates.size(); ++c) {
+    const Coordinate& k = coordinates[c];
+    shapes[k.process][static_cast<std::size_t>(k.shape)] =
+        shape_of_coordinate(k.kind, k.shape, u[static_cast<Eigen::Index>(c)]);
+  }
+  return shapes;
+}
+
+/// The amplitudes and what remains at one point of the coordinates.
+struct Evaluation {
+  Design columns;          ///< whitened, of length 1
+  ColumnVector length;     ///< of the whitened columns before
+  ColumnVector amplitude;  ///< of the columns of length 1
+  RowVector residual;
+  double objective = 0.0;
+};
+
+Evaluation evaluate(const SeparableProblem& problem, const RowVector& target,
+                    const std::vector<Shape>& shapes) {
+  Evaluation e;
+  const auto p = static_cast<Eigen::Index>(shapes.size());
+  e.columns.resize(target.size(), p);
+  e.length.resize(p);
+  for (Eigen::Index i = 0; i < p; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    e.columns.col(i) = whitened_curve(problem, problem.spec.processes[k], shapes[k]);
+    e.length[i] = e.columns.col(i).norm();
+    e.columns.col(i) /= e.length[i];
+  }
+  e.amplitude = nnls(e.columns, target);
+  e.residual = target - e.columns * e.amplitude;
+  e.objective = e.residual.squaredNorm();
+  return e;
+}
+
+/// Levenberg-Marquardt on the coordinates with the amplitudes projected out (Kaufman's Jacobian).
+class Polisher {
+ public:
+  Polisher(const SeparableProblem& problem, const std::vector<Coordinate>& coordinates)
+      : problem_(problem), coordinates_(coordinates), target_(problem.whitener * problem.y) {}
+
+  Evaluation run(ColumnVector& u) const {
+    constexpr int kMaxSteps = 200;
+    constexpr double kRelativeStop = 1e-13;
+    Evaluation now = at(u);
+    double damping = 1e-3;
+    int quiet = 0;
+    for (int step = 0; step < kMaxSteps && u.size() > 0 && quiet < 3; ++step) {
+      const Design jacobian = projected_jacobian(now, u);
+      const Gram normal = jacobian.transpose() * jacobian;
+      const ColumnVector gradient = jacobian.transpose() * now.residual;
+      bool improved = false;
+      while (damping < 1e12) {
+        Gram damped = normal;
+        for (Eigen::Index i = 0; i < u.size(); ++i) damped(i, i) += damping * normal(i, i) + 1e-300;
+        ColumnVector next = u + ColumnVector(damped.ldlt().solve(gradient)).cwiseMax(-2.0).cwiseMin(2.0);
+        clamp(next);
+        const Evaluation trial = at(next);
+        if (trial.objective < now.objective) {
+          quiet = now.objective - trial.objective <= kRelativeStop * now.objective ? quiet + 1 : 0;
+          u = next;
+          now = trial;
+          damping = std::max(damping * 0.1, 1e-12);
+          improved = true;
+          break;
+        }
+        damping *= 10.0;
+      }
+      if (!improved) break;
+    }
+    return now;
+  }
+
+ private:
+  [[nodiscard]] Evaluation at(const ColumnVector& u) const {
+    return evaluate(problem_, target_, shapes_at(problem_, coordinates_, u));
+  }
+
+  void clamp(ColumnVector& u) const {
+    for (std::size_t c = 0; c < coordinates_.size(); ++c) {
+      double& v = u[static_cast<Eigen::Index>(c)];
+      v = std::clamp(v, coordinates_[c].range.low, coordinates_[c].range.high);
+    }
+  }
+
+  /// d(model)/du with the part that the active amplitudes can follow removed; zero columns where the
+  /// amplitude is zero and where a coordinate presses against the end of its range.
+  [[nodiscard]] Design projected_jacobian(const Evaluation& e, const ColumnVector& u) const {
+    const auto shapes = shapes_at(problem_, coordinates_, u);
+    Design active(e.columns.rows(), e.columns.cols());
+    Eigen::Index n_active = 0;
+    for (Eigen::Index i = 0; i < e.columns.cols(); ++i) {
+      if (e.amplitude[i] > 0.0) active.col(n_active++) = e.columns.col(i);
+    }
+    active.conservativeResize(e.columns.rows(), n_active);
+    Design jacobian = Design::Zero(e.columns.rows(), u.size());
+    if (n_active == 0) return jacobian;
+    const Eigen::ColPivHouseholderQR<Design> qr(active);
+    for (std::size_t c = 0; c < coordinates_.size(); ++c) {
+      const Coordinate& k = coordinates_[c];
+      const auto p = static_cast<Eigen::Index>(k.process);
+      if (e.amplitude[p] <= 0.0) continue;
+      const double v = u[static_cast<Eigen::Index>(c)];
+      RowVector column = whitened_slope(problem_, k.kind, shapes[k.process], k.shape) *
+                         (e.amplitude[p] / e.length[p] * shape_slope(k.kind, k.shape, v));
+      column -= active * ColumnVector(qr.solve(column));
+      const double downhill = column.dot(e.residual);
+      if ((v <= k.range.low && downhill < 0.0) || (v >= k.range.high && downhill > 0.0)) continue;
+      jacobian.col(static_cast<Eigen::Index>(c)) = column;
+    }
+    return jacobian;
+  }
+
+  const SeparableProblem& problem_;
+  const std::vector<Coordinate>& coordinates_;
+  RowVector target_;
+};
+
+/// The objective over the whole grid of coordinates.
+class GridSearch {
+ public:
+  GridSearch(const SeparableProblem& problem, const std::vector<Coordinate>& coordinates)
+      : problem_(problem), coordinates_(coordinates), target_(problem.whitener * problem.y) {
+    IMUSCOPE_EXPECTS(coordinates.size() < kGridPoints.size());
+    points_ = kGridPoints[coordinates.size()];
+    total_ = 1;
+    for (std::size_t c = 0; c < coordinates.size(); ++c) total_ *= static_cast<std::size_t>(points_);
+    prepare_columns();
+    objective_.assign(total_, kInfinity);
+    for (std::size_t cell = 0; cell < total_; ++cell) {
+      if (ordered(cell)) objective_[cell] = solve(cell);
+    }
+  }
+
+  /// Coordinates of the best local minima, best first.
+  [[nodiscard]] std::vector<ColumnVector> best(std::size_t count) const {
+    std::vector<std::size_t> minima;
+    for (std::size_t cell = 0; cell < total_; ++cell) {
+      if (objective_[cell] < kInfinity && is_local_minimum(cell)) minima.push_back(cell);
+    }
+    std::sort(minima.begin(), minima.end(),
+              [&](std::size_t a, std::size_t b) { return objective_[a] < objective_[b]; });
+    if (minima.size() > count) minima.resize(count);
+    std::vector<ColumnVector> out;
+    for (const std::size_t cell : minima) {
+      ColumnVector u(static_cast<Eigen::Index>(coordinates_.size()));
+      for (std::size_t c = 0; c < coordinates_.size(); ++c)
+        u[static_cast<Eigen::Index>(c)] = value(c, index(cell, c));
+      out.push_back(u);
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] double value(std::size_t c, int i) const {
+    const CoordinateRange& r = coordinates_[c].range;
+    return r.low + (r.high - r.low) * (static_cast<double>(i) + 0.5) / points_;
+  }
+  [[nodiscard]] std::size_t stride(std::size_t c) const {
+    std::size_t s = 1;
+    for (std::size_t k = 0; k < c; ++k) s *= static_cast<std::size_t>(points_);
+    return s;
+  }
+  [[nodiscard]] int index(std::size_t cell, std::size_t c) const {
+    return static_cast<int>(cell / stride(c) % static_cast<std::size_t>(points_));
+  }
+
+  /// Processes of one kind are interchangeable: only falling first coordinates are searched.
+  [[nodiscard]] bool ordered(std::size_t cell) const {
+    for (std::size_t c = 1; c < coordinates_.size(); ++c) {
+      const Coordinate& before = coordinates_[c - 1];
+      const Coordinate& here = coordinates_[c];
+      if (here.kind != before.kind || here.process == before.process) continue;
+      if (index(cell, c) >= index(cell, c - 1)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool is_local_minimum(std::size_t cell) const {
+    for (std::size_t c = 0; c < coordinates_.size(); ++c) {
+      const int i = index(cell, c);
+      if (i > 0 && objective_[cell - stride(c)] < objective_[cell]) return false;
+      if (i + 1 < points_ && objective_[cell + stride(c)] < objective_[cell]) return false;
+    }
+    return true;
+  }
+
+  /// Every column that any grid point needs, once: column_of_[process][grid index of its shapes].
+  void prepare_columns() {
+    std::vector<RowVector> columns;
+    for (std::size_t p = 0; p < problem_.spec.processes.size(); ++p) {
+      const ProcessKind kind = problem_.spec.processes[p];
+      first_.push_back(columns.size());
+      std::vector<std::size_t> own;
+      for (std::size_t c = 0; c < coordinates_.size(); ++c) {
+        if (coordinates_[c].process == p) own.push_back(c);
+      }
+      own_.push_back(own);
+      const int n0 = own.empty() ? 1 : points_;
+      const int n1 = own.size() < 2 ? 1 : points_;
+      for (int j = 0; j < n1; ++j) {
+        for (int i = 0; i < n0; ++i) {
+          Shape shape{};
+          if (!own.empty()) shape[0] = shape_of_coordinate(kind, 0, value(own[0], i));
+          if (own.size() > 1) shape[1] = shape_of_coordinate(kind, 1, value(own[1], j));
+          columns.push_back(whitened_curve(problem_, kind, shape).normalized());
+        }
+      }
+    }
+    Eigen::MatrixXd all(target_.size(), static_cast<Eigen::Index>(columns.size()));
+    for (std::size_t i = 0; i < columns.size(); ++i) all.col(static_cast<Eigen::Index>(i)) = columns[i];
+    products_.noalias() = all.transpose() * all;
+    projected_ = all.transpose() * target_;
+    target_square_ = target_.squaredNorm();
+  }
+
+  [[nodiscard]] double solve(std::size_t cell) const {
+    const auto p = static_cast<Eigen::Index>(problem_.spec.processes.size());
+    std::array<Eigen::Index, kMaxColumns> column{};
+    for (std::size_t k = 0; k < static_cast<std::size_t>(p); ++k) {
+      std::size_t at = first_[k];
+      if (!own_[k].empty()) at += static_cast<std::size_t>(index(cell, own_[k][0]));
+      if (own_[k].size() > 1) at += static_cast<std::size_t>(index(cell, own_[k][1]) * points_);
+      column[k] = static_cast<Eigen::Index>(at);
+    }
+    Gram gram(p, p);
+    ColumnVector projected(p);
+    for (Eigen::Index i = 0; i < p; ++i) {
+      projected[i] = projected_[column[static_cast<std::size_t>(i)]];
+      for (Eigen::Index j = 0; j < p; ++j) {
+        gram(i, j) = products_(column[static_cast<std::size_t>(i)], column[static_cast<std::size_t>(j)]);
+      }
+    }
+    const ColumnVector x = nnls_from_gram(gram, projected);
+    return target_square_ - 2.0 * projected.dot(x) + x.dot(gram * x);
+  }
+
+  const SeparableProblem& problem_;
+  const std::vector<Coordinate>& coordinates_;
+  RowVector target_;
+  int points_ = 1;
+  std::size_t total_ = 1;
+  std::vector<std::size_t> first_;
+  std::vector<std::vector<std::size_t>> own_;
+  Eigen::MatrixXd products_;
+  Eigen::VectorXd projected_;
+  double target_square_ = 0.0;
+  std::vector<double> objective_;
+};
+
+SeparableSolution solution_of(const SeparableProblem& problem, const std::vector<Coordinate>& coordinates,
+                              const ColumnVector& u, const Evaluation& e) {
+  SeparableSolution s;
+  s.objective = e.objective;
+  const auto shapes = shapes_at(problem, coordinates, u);
+  for (std::size_t p = 0; p < shapes.size(); ++p) {
+    const auto i = static_cast<Eigen::Index>(p);
+    s.model.components.push_back({problem.spec.processes[p], e.amplitude[i] / e.length[i], shapes[p]});
+  }
+  std::stable_sort(s.model.components.begin(), s.model.components.end(),
+                   [](const Component& a, const Component& b) {
+                     return a.kind != b.kind ? a.kind < b.kind : a.shape[0] > b.shape[0];
+                   });
+  return s;
+}
+
+}  // namespace
+
+double coordinate_of_shape(ProcessKind kind, int /*i*/, double shape) noexcept {
+  const bool bounded = kind == ProcessKind::kMa1 || kind == ProcessKind::kArma11;
+  return bounded ? std::atanh(shape) : std::log(shape);
+}
+
+double shape_of_coordinate(ProcessKind kind, int /*i*/, double coordinate) noexcept {
+  const bool bounded = kind == ProcessKind::kMa1 || kind == ProcessKind::kArma11;
+  return bounded ? std::tanh(coordinate) : std::exp(coordinate);
+}
+
+double shape_slope(ProcessKind kind, int i, double coordinate) noexcept {
+  const double shape = shape_of_coordinate(kind, i, coordinate);
+  const bool bounded = kind == ProcessKind::kMa1 || kind == ProcessKind::kArma11;
+  return bounded ? 1.0 - shape * shape : shape;
+}
+
+CoordinateRange coordinate_range(ProcessKind kind, int i, int highest_level) noexcept {
+  constexpr double kMaBound = 3.8;        // theta = 0.999
+  constexpr double kArmaPhiBound = 5.3;   // phi = 0.99995
+  constexpr double kFastestRate = 20.0;   // phi = 2e-9: white
+  constexpr double kSlowestShare = 0.01;  // of a over the longest tau: a random walk to within half a percent
+  const double longest = std::ldexp(1.0, highest_level);
+  switch (kind) {
+    case ProcessKind::kMa1:
+      return {-kMaBound, kMaBound};
+    case ProcessKind::kArma11:
+      return i == 0 ? CoordinateRange{-1.5, kArmaPhiBound} : CoordinateRange{-kMaBound, kMaBound};
+    case ProcessKind::kSinusoid:
+      return {std::log(std::numbers::pi / longest), std::log(0.999 * std::numbers::pi)};
+    default:
+      return {std::log(kSlowestShare / longest), std::log(kFastestRate)};
+  }
+}
+
+SeparableSolution find_global_minimum(const SeparableProblem& problem) {
+  const auto coordinates = coordinates_of(problem);
+  const Polisher polisher(problem, coordinates);
+  std::vector<ColumnVector> starts(1);
+  if (!coordinates.empty()) starts = GridSearch(problem, coordinates).best(kPolished);
+  Evaluation best;
+  best.objective = kInfinity;
+  ColumnVector best_u;
+  for (ColumnVector& u : starts) {
+    const Evaluation e = polisher.run(u);
+    if (e.objective < best.objective) {
+      best = e;
+      best_u = u;
+    }
+  }
+  return solution_of(problem, coordinates, best_u, best);
+}
+
+SeparableSolution polish(const SeparableProblem& problem, const Model& start) {
+  const auto coordinates = coordinates_of(problem);
+  ColumnVector u(static_cast<Eigen::Index>(coordinates.size()));
+  for (std::size_t c = 0; c < coordinates.size(); ++c) {
+    const Coordinate& k = coordinates[c];
+    const double shape = start.components.at(k.process).shape[static_cast<std::size_t>(k.shape)];
+    u[static_cast<Eigen::Index>(c)] =
+        std::clamp(coordinate_of_shape(k.kind, k.shape, shape), k.range.low, k.range.high);
+  }
+  const Evaluation e = Polisher(problem, coordinates).run(u);
+  return solution_of(problem, coordinates, u, e);
+}
+
+}  // namespace imuscope::noise
