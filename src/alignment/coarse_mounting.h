@@ -29,8 +29,8 @@ struct CoarseMounting {
 };
 
 struct CoarseMountingOptions {
-  double accel_bias_sd_mps2 = 0.3;  ///< of S against R, as it turns gravity
-  double sd_limit_rad = 0.05;       ///< of the weakest direction
+  double accel_bias_sd_mps2 = 0.15;  ///< of S against R, as it turns gravity
+  double sd_limit_rad = 0.05;        ///< of the weakest direction
   int pairs_min = 200;
 };
 
@@ -43,7 +43,7 @@ class CoarseMountingEstimator {
   void add(const Eigen::Vector3d& omega_b_radps, const Eigen::Vector3d& f_b_mps2,
            const Eigen::Vector3d& omega_s_radps, const Eigen::Vector3d& f_s_mps2) noexcept;
 
-  /// Solves from all pairs since clear(). `out` is written with kOk and kTooLittleExcitation.
+  /// Solves from all pairs since clear(). `out` is not written with kTooFewPairs.
   [[nodiscard]] MountingResult solve(CoarseMounting& out) const noexcept;
 
   [[nodiscard]] std::int64_t pairs() const noexcept { return pairs_; }
@@ -59,6 +59,8 @@ class CoarseMountingEstimator {
     Eigen::Matrix3d sb = Eigen::Matrix3d::Zero();
     Eigen::Matrix3d ss = Eigen::Matrix3d::Zero();
   };
+
+  [[nodiscard]] bool is_mirrored(const Eigen::Matrix3d& B, const Eigen::Matrix3d& C) const noexcept;
 
   CoarseMountingOptions options_;
   Moments rate_;

@@ -43,36 +43,39 @@ struct TimeOffset {
                                                   const RateMagnitudeSeries& study,
                                                   const TimeOffsetOptions& options = {});
 
-/// The same on a live stream, within +-2 s, from the last 20 s. Core: fixed memory (about 100 kB: make it a
-/// member of something that lives on the heap or is static), no allocation. Thread: owner only.
+/// The same on a live stream, within +-2 s, from the last 20 s. Core: fixed memory (about 150 kB: make it a
+/// member of something that lives on the heap or is static), no allocation, noexcept. Thread: owner only.
 class LiveTimeOffset {
  public:
+  /// Samples closer than 8 ms to the one before are left out; times that do not rise are ignored.
   void add_reference(HostTime time, double rate_radps) noexcept { reference_.add(time, rate_radps); }
   void add_study(HostTime time, double rate_radps) noexcept { study_.add(time, rate_radps); }
 
-  /// Offset to add to the study time. Costs about 0.2 ms: ask once a second, not every tick.
+  /// Offset to add to the study time. Costs a few tenths of a millisecond: ask now and then, not every tick.
   /// @return false where there is not enough data or motion, or no clear peak; `out` is then untouched
   [[nodiscard]] bool estimate(TimeOffset& out) noexcept;
 
  private:
-  static constexpr double kGrid_s = 0.02;
-  static constexpr int kMaxLag = 100;     ///< +-2 s
-  static constexpr int kGridSize = 1000;  ///< 20 s
+  static constexpr std::size_t kMaxLag = 100;     ///< +-2 s of grid steps
+  static constexpr std::size_t kGridSize = 1000;  ///< 20 s
   static constexpr std::size_t kSamples = 4096;
 
   /// The last kSamples of one stream.
   struct Stream {
     void add(HostTime time, double rate) noexcept;
+    [[nodiscard]] HostTime newest() const noexcept;
+    /// Linear interpolation at start + i * step; false where the stream does not cover that.
+    [[nodiscard]] bool sample_onto(HostTime start, Duration step, std::span<double> grid) const noexcept;
     std::array<HostTime, kSamples> time{};
     std::array<double, kSamples> rate{};
     std::size_t count = 0;  ///< ever added
   };
-  static bool averaged_on_grid(const Stream& stream, HostTime start, std::span<double> grid) noexcept;
 
   Stream reference_;
   Stream study_;
   std::array<double, kGridSize + 2 * kMaxLag> reference_grid_{};
   std::array<double, kGridSize> study_grid_{};
+  std::array<double, 2 * kMaxLag + 1> correlation_{};
 };
 
 }  // namespace imuscope
