@@ -1,0 +1,133 @@
+#include "drivers/transport/port_problems.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <grp.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+namespace imuscope {
+namespace fs = std::filesystem;
+namespace {
+
+std::vector<std::string> entries(const fs::path& folder, const std::string& prefix) {
+  std::vector<std::string> found;
+  std::error_code ignored;
+  for (fs::directory_iterator it(folder, ignored), end; !ignored && it != end; it.increment(ignored)) {
+    if (it->path().filename().string().rfind(prefix, 0) == 0) found.push_back(it->path().string());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+/// "/dev/ttyUSB3" to "ttyUSB".
+std::string name_without_number(const fs::path& path) {
+  std::string name = path.filename().string();
+  while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back())) != 0) name.pop_back();
+  return name;
+}
+
+std::string process_name(const fs::path& process) {
+  std::string name;
+  std::ifstream file(process / "comm");
+  std::getline(file, name);
+  return name.empty() ? "?" : name;
+}
+
+/// Processes that have the file open, as "1234 (name)"; only those that this user may look into.
+std::vector<std::string> holders(const std::string& path) {
+  std::vector<std::string> found;
+  std::error_code ignored;
+  const fs::path real = fs::canonical(path, ignored);
+  const std::string self = std::to_string(getpid());
+  for (const std::string& process : entries("/proc", "")) {
+    const std::string pid = fs::path(process).filename().string();
+    if (pid.empty() || std::isdigit(static_cast<unsigned char>(pid[0])) == 0) continue;
+    for (const std::string& fd : entries(process + "/fd", "")) {
+      std::error_code unreadable;
+      if (fs::read_symlink(fd, unreadable) != real) continue;
+      found.push_back(pid == self ? "this program" : fmt::format("{} ({})", pid, process_name(process)));
+      break;
+    }
+  }
+  return found;
+}
+
+std::string group_of(const std::string& path) {
+  struct stat info {};
+  if (stat(path.c_str(), &info) != 0) return "dialout";
+  const group* owner = getgrgid(info.st_gid);
+  return owner != nullptr ? owner->gr_name : "dialout";
+}
+
+Error missing(const std::string& path) {
+  std::vector<std::string> others = entries(fs::path(path).parent_path(), name_without_number(path));
+  for (std::string& port : serial_ports()) {
+    if (std::find(others.begin(), others.end(), port) == others.end()) others.push_back(std::move(port));
+  }
+  return {ErrorKind::kWork, fmt::format("port {} does not exist", path),
+          others.empty() ? "plug the device in; no serial port is there at all"
+                         : fmt::format("plug the device in, or use one of: {}", fmt::join(others, ", "))};
+}
+
+}  // namespace
+
+std::vector<std::string> serial_ports() {
+  std::vector<std::string> ports = entries("/dev/serial/by-id", "");
+  std::vector<fs::path> named;
+  for (const std::string& port : ports) {
+    std::error_code ignored;
+    named.push_back(fs::canonical(port, ignored));
+  }
+  for (const char* prefix : {"ttyUSB", "ttyACM"}) {
+    for (std::string& port : entries("/dev", prefix)) {
+      if (std::find(named.begin(), named.end(), port) == named.end()) ports.push_back(std::move(port));
+    }
+  }
+  return ports;
+}
+
+Error explain_open_failure(const std::string& path, int error) {
+  switch (error) {
+    case ENOENT:
+      return missing(path);
+    case EACCES:
+    case EPERM: {
+      const std::string group = group_of(path);
+      return {
+          ErrorKind::kWork, fmt::format("no permission for port {}", path),
+          fmt::format(
+              "add yourself to its group (sudo usermod -aG {0} $USER, then log in again), or give it away "
+              "by a udev rule: SUBSYSTEM==\"tty\", GROUP=\"{0}\", MODE=\"0660\"",
+              group)};
+    }
+    case EBUSY: {
+      const auto by = holders(path);
+      return {ErrorKind::kWork,
+              by.empty() ? fmt::format("port {} is in use by another program", path)
+                         : fmt::format("port {} is in use by process {}", path, fmt::join(by, ", ")),
+              "stop that program; ModemManager leaves a port alone with the udev rule "
+              "ENV{ID_MM_DEVICE_IGNORE}=\"1\""};
+    }
+    case ENXIO:
+    case ENODEV:
+    case EIO:
+      return {ErrorKind::kWork,
+              fmt::format("port {} has no device behind it ({})", path, std::strerror(error)),
+              "plug the device in again"};
+    case EISDIR:
+      return {ErrorKind::kWork, fmt::format("{} is a folder, not a serial port", path),
+              "give a tty, such as one of /dev/serial/by-id"};
+    default:
+      return {ErrorKind::kWork, fmt::format("port {} does not open: {}", path, std::strerror(error)), ""};
+  }
+}
+
+}  // namespace imuscope
