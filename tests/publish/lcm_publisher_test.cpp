@@ -1,0 +1,189 @@
+#include "publish/lcm_publisher.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <imuscope/error_t.hpp>
+#include <imuscope/noise_model_t.hpp>
+#include <lcm/lcm-cpp.hpp>
+#include <map>
+
+#include "example_reports.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+/// Publishes into a log and reads it with the library's own reader.
+std::map<std::string, int> channels_of(const std::filesystem::path& log_path) {
+  std::map<std::string, int> channels;
+  lcm::LogFile log(log_path.string(), "r");
+  EXPECT_TRUE(log.good());
+  while (const lcm::LogEvent* event = log.readNextEvent()) channels[event->channel] += 1;
+  return channels;
+}
+
+TEST(LcmPublisher, EachReportGoesToItsChannel) {
+  const auto path = test::scratch_folder() / "bus.lcm";
+  {
+    auto publisher = LcmPublisher::open("file://" + path.string() + "?mode=w", "CAR2");
+    ASSERT_TRUE(publisher.has_value()) << publisher.error().text();
+    publisher->publish(test::example_status());
+    publisher->publish(test::example_navigation());
+    publisher->publish(test::example_navigation());
+    publisher->publish(test::example_calibration(), "mtx1");
+    publisher->publish(test::example_error(), "mtx2");
+    publisher->publish(test::example_wavelet_variance());
+    publisher->publish(test::example_noise_model());
+    EXPECT_EQ(publisher->counters().published, 7U);
+    EXPECT_EQ(publisher->counters().failed, 0U);
+  }
+  const std::map<std::string, int> expected{{"CAR2_STATUS", 1},           {"CAR2_NAVIGATION", 2},
+                                            {"CAR2_CALIBRATION_MTX1", 1}, {"CAR2_ERROR_MTX2", 1},
+                                            {"CAR2_WV_MTX1", 1},          {"CAR2_NOISE_MODEL_MTX1", 1}};
+  EXPECT_EQ(channels_of(path), expected);
+}
+
+TEST(LcmPublisher, SequencesCountPerChannel) {
+  const auto path = test::scratch_folder() / "bus.lcm";
+  {
+    auto publisher = LcmPublisher::open("file://" + path.string() + "?mode=w");
+    ASSERT_TRUE(publisher.has_value());
+    publisher->publish(test::example_error(), "mtx1");
+    publisher->publish(test::example_error(), "mtx2");
+    publisher->publish(test::example_error(), "mtx1");
+  }
+  lcm::LogFile log(path.string(), "r");
+  std::map<std::string, std::vector<std::int64_t>> sequences;
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    error_t message;
+    ASSERT_EQ(message.decode(event->data, 0, event->datalen), event->datalen);
+    sequences[event->channel].push_back(message.sequence);
+  }
+  EXPECT_EQ(sequences["IMUSCOPE_ERROR_MTX1"], (std::vector<std::int64_t>{0, 1}));
+  EXPECT_EQ(sequences["IMUSCOPE_ERROR_MTX2"], (std::vector<std::int64_t>{0}));
+}
+
+TEST(LcmPublisher, AMessageThatWouldNotFitADatagramIsCountedAndNotSent) {
+  const auto path = test::scratch_folder() / "bus.lcm";
+  {
+    auto publisher = LcmPublisher::open("file://" + path.string() + "?mode=w");
+    ASSERT_TRUE(publisher.has_value());
+    NoiseModelReport report = test::example_noise_model();
+    report.models[0].warnings = {std::string(kMaxMessageBytes, 'x')};
+    publisher->publish(report);
+    publisher->publish(test::example_noise_model());
+    EXPECT_EQ(publisher->counters().too_large, 1U);
+    EXPECT_EQ(publisher->counters().published, 1U);
+  }
+  lcm::LogFile log(path.string(), "r");
+  const lcm::LogEvent* event = log.readNextEvent();
+  ASSERT_NE(event, nullptr);
+  noise_model_t message;
+  ASSERT_EQ(message.decode(event->data, 0, event->datalen), event->datalen);
+  EXPECT_EQ(message.sequence, 1) << "the receiver must see the gap that the unsent message leaves";
+}
+
+TEST(LcmPublisher, RefusesUrlsThatCannotServeWithTheReasonAndTheRightForm) {
+  const struct {
+    const char* url;
+    const char* reason;
+  } cases[] = {{"tcpq://localhost:7700", "aborts the whole process"},
+               {"http://localhost", "imuscope speaks udpm:// (network) and file:// (log)"},
+               {"", "imuscope speaks udpm://"},
+               {"udpm://192.168.1.7:7667?ttl=0", "'192.168.1.7' is not a multicast address"},
+               {"udpm://239.255.76:7667", "'239.255.76' is not a multicast address"},
+               {"udpm://239.255.76.67:port", "'port' is not a port"},
+               {"udpm://239.255.76.67:99999", "'99999' is not a port"}};
+  for (const auto& [url, reason] : cases) {
+    const auto publisher = LcmPublisher::open(url);
+    ASSERT_FALSE(publisher.has_value()) << url;
+    EXPECT_EQ(publisher.error().kind, ErrorKind::kUsage) << url;
+    EXPECT_THAT(publisher.error().text(),
+                AllOf(HasSubstr(reason), HasSubstr("udpm://239.255.76.67:7667?ttl=0")));
+  }
+}
+
+constexpr int kNotPermitted = 77;
+
+/// Runs `body` in a child process with a network of its own: a loopback interface that is down, no routes.
+int in_private_network(const std::function<int()>& body) {
+  const pid_t child = fork();
+  if (child == 0) {
+    if (unshare(CLONE_NEWNET) != 0) _exit(kNotPermitted);
+    _exit(body());
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+struct Received {
+  int count = 0;
+  error_t last;
+  void on_error(const lcm::ReceiveBuffer* /*buffer*/, const std::string& /*channel*/,
+                const error_t* message) {
+    count += 1;
+    last = *message;
+  }
+};
+
+int publish_over_multicast() {
+  if (std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo") != 0) return 1;
+  auto publisher = LcmPublisher::open();
+  if (!publisher) return 2;
+  lcm::LCM receiver{std::string(kDefaultLcmUrl)};
+  if (!receiver.good()) return 3;
+  Received received;
+  receiver.subscribe("IMUSCOPE_ERROR_MTX1", &Received::on_error, &received);
+  for (int i = 0; i < 10; ++i) publisher->publish(test::example_error(), "mtx1");
+  constexpr int kTimeoutMs = 2000;
+  while (received.count < 10 && receiver.handleTimeout(kTimeoutMs) > 0) {
+  }
+  if (received.count != 10) return 4;
+  return received.last.sequence == 9 && received.last.counter == 70'001 && received.last.regime == "dynamic"
+             ? 0
+             : 5;
+}
+
+TEST(LcmPublisher, ReachesAReceiverByMulticast) {
+  const int outcome = in_private_network(publish_over_multicast);
+  if (outcome == kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
+  EXPECT_EQ(outcome, 0) << "1: ip failed, 2: publisher, 3: receiver, 4: messages lost, 5: contents";
+}
+
+int open_without_route(const std::filesystem::path& stderr_path) {
+  const int file = ::open(stderr_path.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  if (file < 0 || dup2(file, STDERR_FILENO) < 0) return 1;
+  const auto publisher = LcmPublisher::open();
+  if (publisher.has_value()) return 2;
+  const std::string text = publisher.error().text();
+  if (publisher.error().kind != ErrorKind::kWork) return 3;
+  if (text.find("no route to the multicast address 239.255.76.67") == std::string::npos) return 4;
+  if (text.find("'ip link set lo up multicast on'") == std::string::npos) return 5;
+  if (text.find("'ip route add 224.0.0.0/4 dev lo'") == std::string::npos) return 6;
+  // The remedy, word for word, must be one.
+  if (std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo") != 0) return 7;
+  return LcmPublisher::open().has_value() ? 0 : 8;
+}
+
+TEST(LcmPublisher, WithoutARouteNamesTheTwoCommandsThatMendItAndTheyDo) {
+  const auto stderr_path = test::scratch_folder() / "stderr.txt";
+  const int outcome = in_private_network([&] { return open_without_route(stderr_path); });
+  if (outcome == kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
+  EXPECT_EQ(outcome, 0) << "see the numbers in open_without_route";
+  EXPECT_EQ(std::filesystem::file_size(stderr_path), 0U) << "the library wrote to the terminal";
+}
+
+}  // namespace
+}  // namespace imuscope

@@ -1,0 +1,193 @@
+#include "publish/message_builders.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <cmath>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "example_reports.h"
+#include "publish/channel_name.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using testing::ElementsAre;
+
+constexpr double kDegreesPerRadian = 57.29577951308232;  // 180 / pi
+
+/// What a receiver on the other side of the wire gets.
+template <typename Message>
+Message over_the_wire(const Message& message) {
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  EXPECT_EQ(message.encode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
+  Message received;
+  EXPECT_EQ(received.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
+  return received;
+}
+
+/// Names of the fields of one message type, read from its definition.
+std::vector<std::string> fields_of(const std::string& type) {
+  std::ifstream file(test::source_path("src/publish/lcm/" + type + ".lcm"));
+  EXPECT_TRUE(file.is_open()) << type;
+  std::vector<std::string> fields;
+  const std::regex declaration(R"(^\s+(?:double|string|int64_t)\s+(\w+)\s*;.*)");
+  for (std::string line; std::getline(file, line);) {
+    std::smatch match;
+    if (std::regex_match(line, match, declaration)) fields.push_back(match[1]);
+  }
+  return fields;
+}
+
+std::vector<std::string> words(const std::string& text) {
+  std::istringstream stream(text);
+  return {std::istream_iterator<std::string>(stream), {}};
+}
+
+TEST(MessageTypes, FieldsAreThoseOfTheFilesOfARun) {
+  EXPECT_EQ(
+      fields_of("navigation_t"),
+      words("utime sequence time_s lat_deg lon_deg height_m v_n_mps v_e_mps v_d_mps roll_deg pitch_deg "
+            "heading_deg sd_n_m sd_e_m sd_d_m sd_v_n_mps sd_v_e_mps sd_v_d_mps sd_roll_deg sd_pitch_deg "
+            "sd_heading_deg"));
+  EXPECT_EQ(fields_of("error_t"),
+            words("utime sequence name time_s counter e_gyro_x_radps e_gyro_y_radps e_gyro_z_radps "
+                  "e_accel_x_mps2 e_accel_y_mps2 e_accel_z_mps2 regime"));
+  EXPECT_EQ(
+      fields_of("calibration_t"),
+      words("utime sequence name time_s psi_x_deg psi_y_deg psi_z_deg q_w q_x q_y q_z r_x_m r_y_m r_z_m "
+            "t_d_ms bg_x_radps bg_y_radps bg_z_radps ba_x_mps2 ba_y_mps2 ba_z_mps2 sg_x sg_y sg_z sa_x "
+            "sa_y sa_z sd_psi_x_deg sd_psi_y_deg sd_psi_z_deg sd_r_x_m sd_r_y_m sd_r_z_m sd_t_d_ms "
+            "sd_bg_x_radps sd_bg_y_radps sd_bg_z_radps sd_ba_x_mps2 sd_ba_y_mps2 sd_ba_z_mps2 sd_sg_x "
+            "sd_sg_y sd_sg_z sd_sa_x sd_sa_y sd_sa_z"));
+}
+
+TEST(MessageBuilders, UtimeIsWholeMicrosecondsRoundedDown) {
+  EXPECT_EQ(to_utime(utc_time_from_ns(1'700'000'000'123'456'789)), 1'700'000'000'123'456);
+  EXPECT_EQ(to_utime(utc_time_from_ns(999)), 0);
+  EXPECT_EQ(to_utime(utc_time_from_ns(-1)), -1);
+}
+
+TEST(MessageBuilders, NavigationArrivesInDegreesWithEveryFieldInItsPlace) {
+  const navigation_t message = over_the_wire(to_message(test::example_navigation(), 41));
+  EXPECT_EQ(message.utime, 1'700'000'000'123'456);
+  EXPECT_EQ(message.sequence, 41);
+  EXPECT_EQ(message.time_s, 3.25);
+  EXPECT_DOUBLE_EQ(message.lat_deg, 0.8 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(message.lon_deg, 0.15 * kDegreesPerRadian);
+  EXPECT_EQ(message.height_m, 432.1);
+  EXPECT_THAT((std::array{message.v_n_mps, message.v_e_mps, message.v_d_mps}), ElementsAre(11, 12, 13));
+  EXPECT_DOUBLE_EQ(message.roll_deg, 0.1 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(message.pitch_deg, -0.2 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(message.heading_deg, 3.0 * kDegreesPerRadian);
+  EXPECT_THAT((std::array{message.sd_n_m, message.sd_e_m, message.sd_d_m}), ElementsAre(0.01, 0.02, 0.03));
+  EXPECT_THAT((std::array{message.sd_v_n_mps, message.sd_v_e_mps, message.sd_v_d_mps}),
+              ElementsAre(0.04, 0.05, 0.06));
+  EXPECT_DOUBLE_EQ(message.sd_roll_deg, 0.07 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(message.sd_pitch_deg, 0.08 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(message.sd_heading_deg, 0.09 * kDegreesPerRadian);
+}
+
+TEST(MessageBuilders, CalibrationArrivesWithEveryStateAndSdInItsPlace) {
+  const calibration_t m = over_the_wire(to_message(test::example_calibration(), "mtx1", 5));
+  EXPECT_EQ(m.name, "mtx1");
+  EXPECT_EQ(m.sequence, 5);
+  EXPECT_EQ(m.time_s, 12.5);
+  EXPECT_THAT((std::array{m.q_w, m.q_x, m.q_y, m.q_z}), ElementsAre(0.5, -0.5, 0.1, 0.7));
+  // The example counts 1, 2, 3, ... through psi, r, gyro bias, accel bias, gyro scale, accel scale, t_d.
+  EXPECT_DOUBLE_EQ(m.psi_x_deg, 1 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.psi_y_deg, 2 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.psi_z_deg, 3 * kDegreesPerRadian);
+  EXPECT_THAT((std::array{m.r_x_m, m.r_y_m, m.r_z_m, m.bg_x_radps, m.bg_y_radps, m.bg_z_radps, m.ba_x_mps2,
+                          m.ba_y_mps2, m.ba_z_mps2, m.sg_x, m.sg_y, m.sg_z, m.sa_x, m.sa_y, m.sa_z}),
+              ElementsAre(4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18));
+  EXPECT_DOUBLE_EQ(m.t_d_ms, 19'000);
+  EXPECT_DOUBLE_EQ(m.sd_psi_x_deg, 101 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.sd_psi_y_deg, 102 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.sd_psi_z_deg, 103 * kDegreesPerRadian);
+  EXPECT_THAT((std::array{m.sd_r_x_m, m.sd_r_y_m, m.sd_r_z_m, m.sd_bg_x_radps, m.sd_bg_y_radps,
+                          m.sd_bg_z_radps, m.sd_ba_x_mps2, m.sd_ba_y_mps2, m.sd_ba_z_mps2, m.sd_sg_x,
+                          m.sd_sg_y, m.sd_sg_z, m.sd_sa_x, m.sd_sa_y, m.sd_sa_z}),
+              ElementsAre(104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 114, 115, 116, 117, 118));
+  EXPECT_DOUBLE_EQ(m.sd_t_d_ms, 119'000);
+}
+
+TEST(MessageBuilders, ErrorRowArrivesWithItsRegimeInWords) {
+  const error_t m = over_the_wire(to_message(test::example_error(), "mtx2", 9));
+  EXPECT_EQ(m.name, "mtx2");
+  EXPECT_EQ(m.counter, 70'001);
+  EXPECT_EQ(m.regime, "dynamic");
+  EXPECT_THAT((std::array{m.e_gyro_x_radps, m.e_gyro_y_radps, m.e_gyro_z_radps}),
+              ElementsAre(1e-3, 2e-3, 3e-3));
+  EXPECT_THAT((std::array{m.e_accel_x_mps2, m.e_accel_y_mps2, m.e_accel_z_mps2}), ElementsAre(0.1, 0.2, 0.3));
+}
+
+TEST(MessageBuilders, WaveletVarianceKeepsItsLevels) {
+  const wavelet_variance_t m = over_the_wire(to_message(test::example_wavelet_variance(), 1));
+  EXPECT_EQ(m.name, "mtx1");
+  ASSERT_EQ(m.axes.size(), 2U);
+  const axis_wavelet_variance_t& axis = m.axes[1];
+  EXPECT_EQ(axis.axis, "gyro_x");
+  EXPECT_EQ(axis.unit, "rad/s");
+  EXPECT_THAT(axis.level, ElementsAre(1, 2));
+  EXPECT_THAT(axis.tau_s, ElementsAre(0.02, 0.04));
+  EXPECT_THAT(axis.value, ElementsAre(1e-6, 5e-7));
+  EXPECT_THAT(axis.ci_low, ElementsAre(0.9e-6, 4e-7));
+  EXPECT_THAT(axis.ci_high, ElementsAre(1.2e-6, 7e-7));
+  EXPECT_THAT(axis.n_coefficients, ElementsAre(5999, 5997));
+}
+
+TEST(MessageBuilders, NoiseModelKeepsItsParametersAndWhatIsUnknown) {
+  const noise_model_t m = over_the_wire(to_message(test::example_noise_model(), 1));
+  ASSERT_EQ(m.models.size(), 1U);
+  const axis_noise_model_t& model = m.models[0];
+  EXPECT_EQ(model.model, "WN+GM");
+  ASSERT_EQ(model.parameters.size(), 2U);
+  EXPECT_EQ(model.parameters[0].process, "WN");
+  EXPECT_EQ(model.parameters[0].ci_high, 1.2);
+  EXPECT_EQ(model.parameters[1].value, 0.5);
+  EXPECT_TRUE(std::isnan(model.parameters[1].sd));
+  EXPECT_THAT(model.tau_s, ElementsAre(0.02));
+  EXPECT_THAT(model.fitted, ElementsAre(0.25));
+  EXPECT_THAT((std::array{model.objective, model.j_statistic, model.j_dof, model.j_p_value, model.criterion}),
+              ElementsAre(3.5, 4.5, 7, 0.72, -2.5));
+  EXPECT_EQ(model.identifiable, 1);
+  EXPECT_THAT(model.warnings, ElementsAre("the slowest process is longer than the data"));
+}
+
+TEST(MessageBuilders, StatusKeepsDevicesThreadsRingsAndProblems) {
+  const status_t m = over_the_wire(to_message(test::example_status(), 1));
+  EXPECT_EQ(m.state, "degraded");
+  EXPECT_EQ(m.reason, "mtx2 is silent");
+  EXPECT_DOUBLE_EQ(m.resident_memory_mb, 41.0);
+  ASSERT_EQ(m.devices.size(), 2U);
+  const device_status_t& device = m.devices[1];
+  EXPECT_THAT(
+      (std::array{device.bytes, device.bytes_skipped, device.frames, device.bad_checksums, device.samples,
+                  device.samples_lost, device.samples_late, device.samples_refused, device.clock_resets}),
+      ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_DOUBLE_EQ(device.latency_ms, 4.2);
+  EXPECT_DOUBLE_EQ(device.clock_sd_us, 25.0);
+  ASSERT_EQ(m.threads.size(), 1U);
+  EXPECT_THAT((std::array{m.threads[0].ticks, m.threads[0].overruns, m.threads[0].skipped}),
+              ElementsAre(10, 11, 12));
+  EXPECT_DOUBLE_EQ(m.threads[0].lateness_p50_us, 13);
+  EXPECT_DOUBLE_EQ(m.threads[0].lateness_p99_us, 14);
+  EXPECT_DOUBLE_EQ(m.threads[0].lateness_p999_us, 15);
+  EXPECT_DOUBLE_EQ(m.threads[0].lateness_max_us, 16);
+  ASSERT_EQ(m.rings.size(), 1U);
+  EXPECT_THAT((std::array{m.rings[0].capacity, m.rings[0].level, m.rings[0].high_water, m.rings[0].refused}),
+              ElementsAre(1024, 17, 18, 19));
+  EXPECT_THAT(m.problems, ElementsAre("no route; run ip route add"));
+}
+
+TEST(ChannelName, IsUpperCaseWithUnderscores) {
+  EXPECT_EQ(channel_name("IMUSCOPE", "STATUS"), "IMUSCOPE_STATUS");
+  EXPECT_EQ(channel_name("CAR2", "ERROR", "mtx-1"), "CAR2_ERROR_MTX_1");
+  EXPECT_EQ(channel_name("IMUSCOPE", "RAW", std::string(100, 'x')).size(), 63U);
+}
+
+}  // namespace
+}  // namespace imuscope
