@@ -27,7 +27,7 @@ struct FitOptions {
   Weighting weighting = Weighting::kOptimal;
   int levels = 0;  ///< use only the first so many levels; 0: all
   double confidence = 0.95;
-  std::string signal_unit;                ///< as printed with the parameters: "rad/s", "m/s^2", "deg/s"
+  std::string signal_unit{};              ///< as printed with the parameters: "rad/s", "m/s^2", "deg/s"
   const FitResult* warm_start = nullptr;  ///< an earlier fit of the same model: polish from it, no grid
 };
 

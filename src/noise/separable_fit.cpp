@@ -308,6 +308,13 @@ class GridSearch {
   std::vector<double> objective_;
 };
 
+void order_components(Model& model) {
+  std::stable_sort(model.components.begin(), model.components.end(),
+                   [](const Component& a, const Component& b) {
+                     return a.kind != b.kind ? a.kind < b.kind : a.shape[0] > b.shape[0];
+                   });
+}
+
 SeparableSolution solution_of(const SeparableProblem& problem, const std::vector<Coordinate>& coordinates,
                               const ColumnVector& u, const Evaluation& e) {
   SeparableSolution s;
@@ -317,10 +324,7 @@ SeparableSolution solution_of(const SeparableProblem& problem, const std::vector
     const auto i = static_cast<Eigen::Index>(p);
     s.model.components.push_back({problem.spec.processes[p], e.amplitude[i] / e.length[i], shapes[p]});
   }
-  std::stable_sort(s.model.components.begin(), s.model.components.end(),
-                   [](const Component& a, const Component& b) {
-                     return a.kind != b.kind ? a.kind < b.kind : a.shape[0] > b.shape[0];
-                   });
+  order_components(s.model);
   return s;
 }
 
@@ -375,7 +379,19 @@ SeparableSolution find_global_minimum(const SeparableProblem& problem) {
       best_u = u;
     }
   }
-  return solution_of(problem, coordinates, best_u, best);
+  SeparableSolution found = solution_of(problem, coordinates, best_u, best);
+  if (problem.spec.count(ProcessKind::kGaussMarkov) < 2) return found;
+  // Where the last GM has no support the surface has a kink that stops the polish short of the smaller
+  // model's minimum; that minimum is a point of this model too.
+  SeparableProblem smaller = problem;
+  smaller.spec.processes.erase(
+      std::find(smaller.spec.processes.begin(), smaller.spec.processes.end(), ProcessKind::kGaussMarkov));
+  SeparableSolution nested = find_global_minimum(smaller);
+  if (nested.objective > found.objective) return found;
+  const double slowest = std::exp(coordinate_range(ProcessKind::kGaussMarkov, 0, problem.levels.back()).low);
+  nested.model.components.push_back({ProcessKind::kGaussMarkov, 0.0, {slowest, 0.0}});
+  order_components(nested.model);
+  return nested;
 }
 
 SeparableSolution polish(const SeparableProblem& problem, const Model& start) {

@@ -1,0 +1,50 @@
+#pragma once
+
+/// What a fit may say about its parameters: their covariance, intervals, whether they can be told apart at
+/// all, and whether the model explains the wavelet variance.
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "noise/fit.h"
+
+namespace imuscope::noise {
+
+/// A parameter's place in the model and the scale on which its interval is made.
+struct ParameterPlace {
+  std::size_t component = 0;
+  int shape = -1;  ///< shape value, or -1: the amplitude
+};
+
+/// Places in the order of FitResult::parameters: for each component its shapes, then its amplitude.
+std::vector<ParameterPlace> parameter_places(const Model& model);
+
+/// d(model wv)/d(parameter on its interval scale: log of amplitudes, search coordinate of shapes), one row a
+/// level.
+Eigen::MatrixXd wv_jacobian(const Model& model, const std::vector<int>& levels,
+                            const std::vector<ParameterPlace>& places);
+
+/// Covariance of the parameters whose amplitude is not zero; NaN rows and columns for the others and for
+/// those the data do not determine. `v` is the covariance of the wavelet variance, `omega` the weights of the
+/// fit.
+struct ParameterCovariance {
+  Eigen::MatrixXd covariance;
+  std::vector<bool> determined;
+};
+ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
+                                         const Eigen::MatrixXd& omega, const std::vector<bool>& present);
+
+/// Test of the model on the levels with M_j >= 3 * 2^j. The part of the residual that the parameters could
+/// still follow is projected out, so the test holds for every weighting of the fit.
+std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& residual,
+                            const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
+                            const std::vector<bool>& present);
+
+/// Fills parameters (values and intervals), covariance, identifiable, simpler_model and warnings of `result`,
+/// whose model, spec and rate are set.
+void report_parameters(FitResult& result, const ParameterCovariance& covariance, const FitOptions& options,
+                       int highest_level);
+
+}  // namespace imuscope::noise

@@ -1,0 +1,188 @@
+#include "noise/fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <random>
+#include <set>
+
+#include "oracle_files.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::noise {
+namespace {
+
+using test::read_series;
+using test::read_table;
+using testing::HasSubstr;
+
+double value_of(const FitResult& fit, const std::string& process, const std::string& name) {
+  for (const auto& p : fit.parameters) {
+    if (p.process == process && p.name == name) return p.value;
+  }
+  ADD_FAILURE() << "no parameter " << name << " of " << process;
+  return std::nan("");
+}
+
+TEST(Fit, ReachesTheGlobalMinimumOfEveryOracleRowWithIntervalWeights) {
+  IMUSCOPE_NEEDS_SHARED("oracle/gmwm/gmwm_global_optimum.csv");
+  std::map<std::string, WaveletVariance> wvs;
+  std::set<std::string> done;
+  for (auto& row : read_table("gmwm_global_optimum.csv")) {
+    const std::string key = row["series"] + " " + row["model"];
+    if (!done.insert(key).second) continue;
+    if (!wvs.contains(row["series"])) {
+      const auto x = read_series(row["series"]);
+      ASSERT_FALSE(x.empty()) << "series " << row["series"] << " is missing";
+      wvs[row["series"]] = haar_wavelet_variance(x).value();
+    }
+    const auto result =
+        fit(wvs[row["series"]], parse_model(row["model"]).value(), 100.0, {.weighting = Weighting::kCi});
+    ASSERT_TRUE(result) << key << ": " << result.error().text();
+    EXPECT_LE(result->objective, std::stod(row["objective"]) * (1.0 + 1e-6)) << key;
+  }
+  EXPECT_GE(done.size(), 14U);
+}
+
+TEST(Fit, ParametersAtAWellCurvedGlobalMinimumAgreeWithTheOracle) {
+  IMUSCOPE_NEEDS_SHARED("oracle/gmwm/series/f01_wn_gm_n20000.csv");
+  const auto wv = haar_wavelet_variance(read_series("f01_wn_gm_n20000")).value();
+  const auto result = fit(wv, parse_model("WN+GM").value(), 100.0, {.weighting = Weighting::kCi}).value();
+  EXPECT_NEAR(value_of(result, "WN", "sigma2"), 1.001874159, 1e-5);
+  EXPECT_NEAR(value_of(result, "GM1", "beta"), 1.44122428, 1e-3);
+  EXPECT_NEAR(value_of(result, "GM1", "sigma2"), 0.40056433, 1e-4);
+}
+
+/// Wavelet variance that equals a model's exactly, with the counts of n samples.
+WaveletVariance exact_wv(const Model& model, std::size_t n, int levels) {
+  WaveletVariance wv;
+  wv.n_samples = wv.n_valid = n;
+  wv.segments = {{0, n}};
+  for (int j = 1; j <= levels; ++j) {
+    WvLevel level;
+    level.level = j;
+    level.tau_samples = std::ldexp(1.0, j);
+    level.value = model_wv(model, j);
+    level.n_coefficients = n - static_cast<std::size_t>(level.tau_samples) + 1;
+    wv.levels.push_back(level);
+  }
+  set_intervals(wv.levels, 1.0, 0.95);
+  return wv;
+}
+
+TEST(Fit, FindsTheModelBehindAnExactCurveWithBothWeightings) {
+  const std::vector<std::pair<std::string, Model>> cases{
+      {"WN+3*GM",
+       {{{ProcessKind::kWhiteNoise, 1.0, {}},
+         {ProcessKind::kGaussMarkov, 0.5, {0.22, 0}},
+         {ProcessKind::kGaussMarkov, 0.2, {0.01, 0}},
+         {ProcessKind::kGaussMarkov, 0.1, {1e-4, 0}}}}},
+      {"QN+WN+RW+DR",
+       {{{ProcessKind::kQuantization, 1.0, {}},
+         {ProcessKind::kWhiteNoise, 0.09, {}},
+         {ProcessKind::kRandomWalk, 1e-5, {}},
+         {ProcessKind::kRamp, 1e-10, {}}}}},
+      {"WN+SIN", {{{ProcessKind::kWhiteNoise, 0.2, {}}, {ProcessKind::kSinusoid, 0.5, {0.21, 0}}}}},
+      {"MA1+RW", {{{ProcessKind::kMa1, 1.0, {-0.5, 0}}, {ProcessKind::kRandomWalk, 1e-4, {}}}}},
+      {"ARMA11", {{{ProcessKind::kArma11, 1.0, {0.95, -0.4}}}}}};
+  for (const auto& [name, truth] : cases) {
+    const auto wv = exact_wv(truth, 200000, 17);
+    for (const auto weighting : {Weighting::kCi, Weighting::kOptimal}) {
+      const auto result = fit(wv, parse_model(name).value(), 100.0, {.weighting = weighting});
+      ASSERT_TRUE(result) << result.error().text();
+      EXPECT_LT(result->objective, 1e-6) << name;
+      for (const auto& level : result->wv) {
+        EXPECT_NEAR(level.fitted / level.observed.value, 1.0, 1e-3)
+            << name << " level " << level.observed.level;
+      }
+    }
+  }
+}
+
+std::vector<double> white(std::size_t n, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> x(n);
+  for (double& v : x) v = normal(random);
+  return x;
+}
+
+TEST(Fit, WhiteNoiseAloneHasTheEfficientEstimateAndInterval) {
+  // Under pure white noise the optimal weights approach the maximum-likelihood estimate, whose relative sd is
+  // sqrt(2/n).
+  const std::size_t n = 50000;
+  const auto result =
+      fit(haar_wavelet_variance(white(n, 11)).value(), parse_model("WN").value(), 100.0).value();
+  ASSERT_TRUE(result.parameters[0].sd.has_value());
+  EXPECT_NEAR(*result.parameters[0].log_sd / std::sqrt(2.0 / static_cast<double>(n)), 1.0, 0.02);
+  EXPECT_NEAR(result.parameters[0].value, 1.0, 4.0 * std::sqrt(2.0 / static_cast<double>(n)));
+  EXPECT_TRUE(result.identifiable);
+}
+
+TEST(Fit, ATermTheDataDoNotHoldIsExactlyZeroAndNamedWithTheSimplerModel) {
+  // Random walk put into a white-noise series whose long levels lie below the white-noise line.
+  auto wv = haar_wavelet_variance(white(4096, 12)).value();
+  for (auto& level : wv.levels) level.value = 1.0 / level.tau_samples * std::pow(0.97, level.level);
+  set_intervals(wv.levels, 1.0, 0.95);
+  const auto result = fit(wv, parse_model("WN+RW").value(), 100.0).value();
+  EXPECT_EQ(value_of(result, "RW", "gamma2"), 0.0);
+  EXPECT_FALSE(result.identifiable);
+  EXPECT_EQ(result.simpler_model, "WN");
+  ASSERT_FALSE(result.warnings.empty());
+  EXPECT_THAT(result.warnings[0], HasSubstr("RW"));
+  EXPECT_FALSE(result.parameters[1].sd.has_value());
+  EXPECT_TRUE(result.parameters[0].sd.has_value());
+}
+
+TEST(Fit, AGaussMarkovProcessThatIsARandomWalkIsCalledOne) {
+  const Model truth{{{ProcessKind::kWhiteNoise, 1.0, {}}, {ProcessKind::kRandomWalk, 1e-4, {}}}};
+  const auto result = fit(exact_wv(truth, 100000, 14), parse_model("WN+GM").value(), 100.0).value();
+  EXPECT_FALSE(result.identifiable);
+  EXPECT_EQ(result.simpler_model, "WN+RW");
+  EXPECT_FALSE(result.parameters[1].sd.has_value());
+}
+
+TEST(Fit, TwoGaussMarkovProcessesThatAreOneAreNotGivenIntervals) {
+  const Model truth{{{ProcessKind::kWhiteNoise, 1.0, {}}, {ProcessKind::kGaussMarkov, 0.5, {0.01, 0}}}};
+  auto wv = exact_wv(truth, 100000, 16);
+  const auto result = fit(wv, parse_model("WN+2*GM").value(), 100.0).value();
+  EXPECT_FALSE(result.identifiable);
+  EXPECT_FALSE(result.simpler_model.empty());
+}
+
+TEST(Fit, BadInputIsRefusedWithWhatToDo) {
+  const auto wv = haar_wavelet_variance(white(16, 13)).value();
+  const auto few = fit(wv, parse_model("WN+2*GM").value(), 100.0);
+  ASSERT_FALSE(few);
+  EXPECT_THAT(few.error().text(), HasSubstr("5 parameters"));
+  const auto rate = fit(wv, parse_model("WN").value(), 0.0);
+  ASSERT_FALSE(rate);
+  EXPECT_EQ(rate.error().kind, ErrorKind::kUsage);
+  const auto constant =
+      fit(haar_wavelet_variance(std::vector<double>(100, 2.0)).value(), parse_model("WN").value(), 1);
+  ASSERT_FALSE(constant);
+  EXPECT_THAT(constant.error().text(), HasSubstr("constant"));
+}
+
+TEST(ParseModel, ReadsTheUsualSpellingsAndOrdersTheTerms) {
+  EXPECT_EQ(parse_model("WN+2*GM")->name(), "WN+2*GM");
+  EXPECT_EQ(parse_model(" rw + gm+WN + GM ")->name(), "WN+2*GM+RW");
+  EXPECT_EQ(parse_model("QN+WN+RW")->parameter_count(), 3);
+  EXPECT_EQ(parse_model("WN+1GM")->name(), "WN+GM");
+}
+
+TEST(ParseModel, NamesTheTermThatIsUnknownRepeatedOrEmpty) {
+  for (const char* text : {"WN+XY", "WN+WN", "", "WN+", "9*GM", "0*GM", "2*WN"}) {
+    const auto refused = parse_model(text);
+    ASSERT_FALSE(refused) << text;
+    EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
+    EXPECT_THAT(refused.error().text(), HasSubstr("WN+2*GM")) << text;
+  }
+  EXPECT_THAT(parse_model("WN+XY").error().text(), HasSubstr("'XY'"));
+}
+
+}  // namespace
+}  // namespace imuscope::noise
