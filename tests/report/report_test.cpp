@@ -1,0 +1,318 @@
+#include "report/report.h"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
+
+#include "report/html.h"
+#include "tests/report/synthetic_run.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using testing::HasSubstr;
+
+/// Whether the page holds `text`; a failure names the text, not the whole page.
+testing::AssertionResult holds(const std::string& page, const std::string& text) {
+  const bool found = page.find(text) != std::string::npos;
+  return (found ? testing::AssertionSuccess() : testing::AssertionFailure())
+         << "the page " << (found ? "holds " : "does not hold ") << text;
+}
+
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream content;
+  content << stream.rdbuf();
+  return content.str();
+}
+
+/// Writes a run folder, makes its report, returns the page.
+std::string page_of(const std::filesystem::path& folder) {
+  const auto written = write_report(folder);
+  EXPECT_TRUE(written) << written.error().text();
+  return content_of(folder / "report.html");
+}
+
+std::string page_of(const test::SyntheticRun& options) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, options);
+  return page_of(folder);
+}
+
+/// The page without comments and without what is inside <script> and <style>.
+std::string markup_of(const std::string& page) {
+  std::string markup;
+  std::size_t begin = 0;
+  const auto skip = [&](std::size_t from, const char* end_mark) {
+    const std::size_t end = page.find(end_mark, from);
+    EXPECT_NE(end, std::string::npos) << "unclosed before " << end_mark;
+    return end;
+  };
+  while (begin < page.size()) {
+    if (page.compare(begin, 4, "<!--") == 0) {
+      begin = skip(begin, "-->") + 3;
+    } else if (page.compare(begin, 7, "<script") == 0 || page.compare(begin, 6, "<style") == 0) {
+      const bool script = page[begin + 2] == 'c';
+      const std::size_t open_end = skip(begin, ">") + 1;
+      markup += page.substr(begin, open_end - begin);
+      begin = skip(open_end, script ? "</script>" : "</style>");
+    } else {
+      markup += page[begin++];
+    }
+  }
+  return markup;
+}
+
+/// Names of elements left open or closed out of order; empty for well-formed markup.
+std::string nesting_fault(const std::string& markup) {
+  static const std::regex kTag("<(/?)([a-z][a-z0-9]*)([^<>]*)>");
+  std::vector<std::string> open;
+  for (std::sregex_iterator tag(markup.begin(), markup.end(), kTag), end; tag != end; ++tag) {
+    const std::string name = (*tag)[2];
+    if (name == "meta" || name == "br") continue;
+    if ((*tag)[1] == "/") {
+      if (open.empty() || open.back() != name)
+        return "</" + name + "> does not close " + (open.empty() ? "anything" : open.back());
+      open.pop_back();
+    } else {
+      open.push_back(name);
+    }
+  }
+  return open.empty() ? "" : "never closed: " + open.back();
+}
+
+nlohmann::json figures_of(const std::string& page) {
+  const std::string mark = "id=\"figures\">";
+  const std::size_t begin = page.find(mark) + mark.size();
+  return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin), nullptr, false);
+}
+
+TEST(Report, PageIsWellFormedAndHoldsEverySImu) {
+  test::SyntheticRun options;
+  options.names = {"mtx1", "mtx2", "left_rear"};
+  const std::string page = page_of(options);
+  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  for (const std::string& name : options.names) {
+    EXPECT_TRUE(holds(page, "<h3>" + name + "</h3>"));
+    for (const char* figure : {"psi-x-", "r-z-", "error-gyro_x-", "error-accel_z-", "wavelet-gyro_z-"}) {
+      EXPECT_TRUE(holds(page, "data-figure=\"" + (figure + name) + "\""));
+    }
+  }
+}
+
+TEST(Report, EveryFigureThatThePageNamesIsInTheSheetOnce) {
+  const std::string page = page_of(test::SyntheticRun{});
+  const auto figures = figures_of(page);
+  ASSERT_FALSE(figures.is_discarded());
+  std::multiset<std::string> drawn;
+  for (const auto& figure : figures) drawn.insert(figure.at("id").get<std::string>());
+  static const std::regex kPlace("data-figure=\"([^\"]*)\"");
+  const std::string markup = markup_of(page);
+  std::size_t n_places = 0;
+  for (std::sregex_iterator place(markup.begin(), markup.end(), kPlace), end; place != end;
+       ++place, ++n_places) {
+    EXPECT_EQ(drawn.count((*place)[1]), 1U) << (*place)[1];
+  }
+  // Map, speed, height; per sensor six panels each of Figures 1, 2 and 4.
+  EXPECT_EQ(n_places, 3U + 2U * 18U);
+  EXPECT_EQ(drawn.size(), n_places);
+}
+
+TEST(Report, ThePageLoadsNothing) {
+  const std::string page = page_of(test::SyntheticRun{});
+  const std::string markup = markup_of(page);
+  EXPECT_FALSE(std::regex_search(markup, std::regex("\\s(src|href|action|data|poster|srcset)\\s*=")));
+  EXPECT_FALSE(holds(markup, "<link"));
+  EXPECT_FALSE(holds(markup, "http:"));
+  EXPECT_FALSE(holds(markup, "https:"));
+  for (const char* loader : {"@import", "url(", "importScripts", "fetch(", "new Worker", "sendBeacon"}) {
+    EXPECT_FALSE(holds(page, loader));
+  }
+  EXPECT_TRUE(holds(page, "Content-Security-Policy\" content=\"default-src 'none'"));
+}
+
+TEST(Report, ThePlottingLibraryStandsInThePageWithItsLicence) {
+  const std::string page = page_of(test::SyntheticRun{});
+  EXPECT_TRUE(holds(page, "Permission is hereby granted, free of charge"));
+  EXPECT_TRUE(holds(page, "@license"));
+}
+
+TEST(Report, NamesWithMarkupAreTextInThePageAndInItsScripts) {
+  test::SyntheticRun options;
+  options.names = {"<img onerror=alert(1)>&\"'", "<!--<script>"};
+  const std::string page = page_of(options);
+  EXPECT_FALSE(holds(page, "<img"));
+  EXPECT_FALSE(holds(page, "<!--<script>"));
+  EXPECT_TRUE(holds(page, "&lt;img onerror=alert(1)&gt;&amp;&quot;&#39;"));
+  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  const auto figures = figures_of(page);
+  ASSERT_FALSE(figures.is_discarded());
+  EXPECT_THAT(figures.dump(), HasSubstr("<img onerror=alert(1)>"));
+}
+
+TEST(Report, ClosingScriptTagsInJsonCannotEndTheScript) {
+  EXPECT_EQ(report::json_for_script("{\"a\":\"</script>\"}"), "{\"a\":\"\\u003c/script>\"}");
+}
+
+TEST(Report, FifteenMinutesOfThreeSensorsStayBelowThreeMegabytes) {
+  test::SyntheticRun options;
+  options.duration_s = 900.0;
+  options.names = {"mtx1", "mtx2", "mtx3"};
+  EXPECT_LT(page_of(options).size(), 3'000'000U);
+}
+
+TEST(Report, ErrorFigureShowsTheExtremesOfTheSamples) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  // One sample of 10 rad/s among thousands: it must not be lost in a mean.
+  std::string errors = content_of(folder / "errors_mtx1.csv");
+  errors += "60.0,6000,10,0,0,0,0,0,dynamic\n";
+  std::ofstream(folder / "errors_mtx1.csv") << errors;
+  const auto figures = figures_of(page_of(folder));
+  for (const auto& figure : figures) {
+    if (figure["id"] != "error-gyro_x-mtx1") continue;
+    double largest = 0.0;
+    for (const auto& high : figure["high"])
+      largest = std::max(largest, high.is_null() ? 0.0 : high.get<double>());
+    EXPECT_NEAR(largest, 572.958, 0.1);  // 10 rad/s in deg/s, four digits
+    return;
+  }
+  FAIL() << "no such figure";
+}
+
+TEST(Report, AGapInTheErrorsIsAGapInTheFigure) {
+  test::SyntheticRun options;
+  options.gap_begin_s = 20.0;
+  options.gap_end_s = 40.0;
+  for (const auto& figure : figures_of(page_of(options))) {
+    if (figure["id"] != "error-gyro_x-mtx1") continue;
+    for (std::size_t i = 0; i < figure["times"].size(); ++i) {
+      const double time_s = figure["times"][i];
+      if (time_s > 21.0 && time_s < 39.0) {
+        EXPECT_TRUE(figure["mid"][i].is_null()) << time_s;
+      }
+      if (time_s > 1.0 && time_s < 19.0) {
+        EXPECT_TRUE(figure["mid"][i].is_number()) << time_s;
+      }
+    }
+    return;
+  }
+  FAIL() << "no such figure";
+}
+
+TEST(Report, GyroscopeModelsAreShownInDegrees) {
+  // The made-up static WN sigma2 is 0.5055 (deg/s)^2, written in (rad/s)^2.
+  const std::string page = page_of(test::SyntheticRun{});
+  EXPECT_TRUE(holds(page, "<td>(deg/s)^2</td><td>0.5055 "));
+  EXPECT_FALSE(holds(page, "(rad/s)^2"));
+}
+
+TEST(Report, TruthIsComparedWhereGivenAndNotMissedSilentlyWhereAbsent) {
+  test::SyntheticRun options;
+  EXPECT_TRUE(holds(page_of(options), "– truth"));
+  options.with_truth = false;
+  const std::string page = page_of(options);
+  EXPECT_FALSE(holds(page, "– truth"));
+  EXPECT_TRUE(holds(page, "No truth.json in this run"));
+}
+
+TEST(Report, ACalibrationAloneMakesAReportThatNamesWhatIsAbsent) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().filename() != "calibration.json") std::filesystem::remove(entry.path());
+  }
+  const std::string page = page_of(folder);
+  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  for (const char* file : {"run.json", "navigation.csv", "calibration_mtx1.csv", "errors_mtx2.csv",
+                           "models.json", "regression.json", "truth.json"}) {
+    EXPECT_TRUE(holds(page, "<li>" + std::string(file) + "</li>"));
+  }
+  EXPECT_TRUE(holds(page, "No navigation in this run"));
+  EXPECT_TRUE(holds(page, "No noise model in this run"));
+}
+
+TEST(Report, AMissingFolderIsOneClearSentence) {
+  const auto written = write_report(test::scratch_folder() / "nowhere");
+  ASSERT_FALSE(written);
+  EXPECT_THAT(written.error().text(),
+              HasSubstr("nowhere is not a folder; give the folder that a run wrote with --out"));
+}
+
+TEST(Report, AFolderWithoutCalibrationIsRefusedAndLeftAlone) {
+  const auto folder = test::scratch_folder();
+  const auto written = write_report(folder);
+  ASSERT_FALSE(written);
+  EXPECT_THAT(written.error().text(), HasSubstr("holds no calibration.json"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder));
+}
+
+TEST(Report, ABrokenJsonIsNamed) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  std::ofstream(folder / "models.json") << "{\"models\": [";
+  const auto written = write_report(folder);
+  ASSERT_FALSE(written);
+  EXPECT_THAT(written.error().text(), HasSubstr("models.json is not a JSON object"));
+}
+
+TEST(Report, AMissingColumnIsNamedWithItsFile) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  std::ofstream(folder / "errors_mtx1.csv") << "time_s,counter,e_gyro_x_radps\n0,0,0\n";
+  const auto written = write_report(folder);
+  ASSERT_FALSE(written);
+  EXPECT_THAT(written.error().text(), HasSubstr("errors_mtx1.csv has no column 'e_gyro_y_radps'"));
+}
+
+TEST(Report, AnEmptyCsvIsNamed) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  std::ofstream(folder / "navigation.csv") << "";
+  const auto written = write_report(folder);
+  ASSERT_FALSE(written);
+  EXPECT_THAT(written.error().text(), HasSubstr("navigation.csv"));
+}
+
+TEST(Report, CsvFilesWithAHeaderAloneLeaveTheirFiguresOut) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  for (const char* file : {"navigation.csv", "calibration_mtx1.csv", "errors_mtx1.csv"}) {
+    const std::string content = content_of(folder / file);
+    std::ofstream(folder / file) << content.substr(0, content.find('\n') + 1);
+  }
+  const std::string page = page_of(folder);
+  EXPECT_FALSE(holds(page, "data-figure=\"map\""));
+  EXPECT_TRUE(holds(page, "No errors_mtx1.csv with samples"));
+  EXPECT_FALSE(holds(markup_of(page), "nan"));
+}
+
+TEST(Report, UnknownNumbersAreNotDrawnNorCalculatedWith) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  auto calibration = nlohmann::json::parse(content_of(folder / "calibration.json"));
+  for (auto& imu : calibration["imus"]) {
+    imu["boresight_sd_deg"] = nullptr;
+    imu["C_b_s"] = {1, 0, nullptr, 0, 1, 0, 0, 0, 1};
+    imu.erase("r_bs_b_m");
+    imu["observable"] = nullptr;
+  }
+  std::ofstream(folder / "calibration.json") << calibration.dump();
+  const std::string page = page_of(folder);
+  EXPECT_TRUE(holds(page, "The mounting is not known."));
+  EXPECT_TRUE(holds(page, "boresight unknown"));
+}
+
+TEST(Report, SameRunSamePage) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  const std::string first = page_of(folder);
+  EXPECT_EQ(page_of(folder), first);
+}
+
+}  // namespace
+}  // namespace imuscope

@@ -1,0 +1,323 @@
+#include "tests/report/synthetic_run.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "base/units.h"
+
+namespace imuscope::test {
+namespace {
+
+using nlohmann::json;
+using Matrix = std::array<double, 9>;
+using Vector = std::array<double, 3>;
+
+constexpr double kSampleRate_hz = 100.0;
+constexpr double kSeriesRate_hz = 10.0;
+constexpr unsigned kSeed = 20240607;
+constexpr const char* kAxes[] = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+
+/// Rodrigues: rotation by a rotation vector.
+Matrix exp_matrix(const Vector& v) {
+  const double angle = std::hypot(v[0], v[1], v[2]);
+  if (angle == 0.0) return {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const double x = v[0] / angle;
+  const double y = v[1] / angle;
+  const double z = v[2] / angle;
+  const double s = std::sin(angle);
+  const double c = std::cos(angle);
+  const double d = 1.0 - c;
+  return {c + x * x * d,     x * y * d - z * s, x * z * d + y * s, x * y * d + z * s, c + y * y * d,
+          y * z * d - x * s, x * z * d - y * s, y * z * d + x * s, c + z * z * d};
+}
+
+Matrix product(const Matrix& A, const Matrix& B) {
+  Matrix C{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      for (std::size_t k = 0; k < 3; ++k) C[3 * i + j] += A[3 * i + k] * B[3 * k + j];
+  return C;
+}
+
+/// The first sensor looks as b does, the second is turned by a right angle about z, the third is upside down.
+Matrix square_of(std::size_t imu) {
+  constexpr std::array<Matrix, 3> kSquares{Matrix{1, 0, 0, 0, 1, 0, 0, 0, 1},
+                                           Matrix{0, 1, 0, -1, 0, 0, 0, 0, 1},
+                                           Matrix{1, 0, 0, 0, -1, 0, 0, 0, -1}};
+  return kSquares[imu % kSquares.size()];
+}
+
+/// Boresight of sensor `imu` from its square mounting: C_b_s = square * Exp(-psi), psi in b.
+Vector true_psi_deg(std::size_t imu) {
+  const double shift = 0.3 * static_cast<double>(imu);
+  return {0.8 - shift, -1.1 + shift, 0.6};
+}
+
+Vector true_lever_arm_m(std::size_t imu) {
+  const double shift = 0.1 * static_cast<double>(imu);
+  return {0.35 - shift, -0.22 + shift, 0.12};
+}
+
+Matrix mounting(std::size_t imu, const Vector& psi_deg) {
+  return product(square_of(imu),
+                 exp_matrix({-kRadPerDeg * psi_deg[0], -kRadPerDeg * psi_deg[1], -kRadPerDeg * psi_deg[2]}));
+}
+
+/// Error of the estimate relative to its sd, by axis; the same at all times.
+constexpr Vector kErrorInSd{0.7, -1.2, 0.4};
+
+/// Falls from a coarse value to `end` with the square root of time.
+double sd_at(double time_s, double end, double duration_s) {
+  return end * std::sqrt(duration_s / (time_s + duration_s * 1e-4));
+}
+
+bool at_rest(double time_s) { return std::fmod(time_s, 150.0) < 30.0; }
+
+double speed_mps(double time_s) {
+  if (at_rest(time_s)) return 0.0;
+  const double phase = (std::fmod(time_s, 150.0) - 30.0) / 120.0;
+  return 14.0 * std::sin(kPi * phase) * (1.0 + 0.2 * std::sin(0.3 * time_s));
+}
+
+void write_json(const std::filesystem::path& file, const json& document) {
+  std::ofstream(file) << document.dump(2) << '\n';
+}
+
+void write_navigation(const std::filesystem::path& folder, const SyntheticRun& options) {
+  std::ofstream out(folder / "navigation.csv");
+  out << "time_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_deg,"
+         "sd_n_m,sd_e_m,sd_d_m,sd_v_n_mps,sd_v_e_mps,sd_v_d_mps,sd_roll_deg,sd_pitch_deg,sd_heading_deg\n";
+  constexpr double kMetresPerDeg = 111320.0;
+  double north_m = 0.0;
+  double east_m = 0.0;
+  for (double t = 0.0; t < options.duration_s; t += 1.0 / kSeriesRate_hz) {
+    const double v = speed_mps(t);
+    const double heading = 0.012 * t + 0.9 * std::sin(0.04 * t);
+    north_m += v * std::cos(heading) / kSeriesRate_hz;
+    east_m += v * std::sin(heading) / kSeriesRate_hz;
+    out << fmt::format("{},{},{},{},{},{},0,0,0,{},0.02,0.02,0.04,0.01,0.01,0.01,0.005,0.005,0.02\n", t,
+                       46.52 + north_m / kMetresPerDeg, 6.57 + east_m / (kMetresPerDeg * 0.688),
+                       430.0 + 6.0 * std::sin(0.01 * t), v * std::cos(heading), v * std::sin(heading),
+                       std::fmod(heading * kDegPerRad, 360.0));
+  }
+}
+
+void write_calibration_series(const std::filesystem::path& file, std::size_t imu,
+                              const SyntheticRun& options) {
+  std::ofstream out(file);
+  out << "time_s,psi_x_deg,psi_y_deg,psi_z_deg,q_w,q_x,q_y,q_z,r_x_m,r_y_m,r_z_m,t_d_ms,sd_psi_x_deg,sd_psi_"
+         "y_deg,"
+         "sd_psi_z_deg,sd_r_x_m,sd_r_y_m,sd_r_z_m,sd_t_d_ms\n";
+  const Vector psi = true_psi_deg(imu);
+  const Vector r = true_lever_arm_m(imu);
+  for (double t = 12.0; t < options.duration_s; t += 1.0 / kSeriesRate_hz) {
+    const double sd_psi = sd_at(t - 12.0, options.boresight_sd_deg, options.duration_s);
+    const double sd_r = sd_at(t - 12.0, 0.0008, options.duration_s);
+    const double sd_t = sd_at(t - 12.0, 0.03, options.duration_s);
+    std::string row = fmt::format("{}", t);
+    for (std::size_t i = 0; i < 3; ++i)
+      row += fmt::format(",{}", psi[i] + kErrorInSd[i] * sd_psi * std::cos(0.01 * t));
+    row += ",1,0,0,0";
+    for (std::size_t i = 0; i < 3; ++i) row += fmt::format(",{}", r[i] - kErrorInSd[i] * sd_r);
+    row += fmt::format(",{},{},{},{},{},{},{},{}\n", -8.4 + 0.5 * sd_t, sd_psi, sd_psi, sd_psi, sd_r, sd_r,
+                       sd_r, sd_t);
+    out << row;
+  }
+}
+
+void write_errors(const std::filesystem::path& file, std::size_t imu, const SyntheticRun& options) {
+  std::ofstream out(file);
+  out << "time_s,counter,e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,"
+         "e_accel_z_mps2,regime\n";
+  std::minstd_rand random(kSeed + static_cast<unsigned>(imu));
+  std::normal_distribution<double> normal;
+  const auto n = static_cast<int>(options.duration_s * kSampleRate_hz);
+  std::string rows;
+  for (int k = 0; k < n; ++k) {
+    const double t = k / kSampleRate_hz;
+    if (t >= options.gap_begin_s && t < options.gap_end_s) continue;
+    const double louder = at_rest(t) ? 1.0 : 1.15;
+    rows += fmt::format("{},{}", t, k);
+    for (int axis = 0; axis < 6; ++axis) {
+      const double sd = axis < 3 ? 0.71 * kRadPerDeg : 0.012;
+      const double slow = sd * (0.3 * std::sin(0.007 * t + axis) + 0.2 * axis);
+      rows += fmt::format(",{:.6g}", slow + louder * sd * normal(random));
+    }
+    rows += at_rest(t) ? ",static\n" : ",dynamic\n";
+  }
+  out << rows;
+}
+
+json calibration_entry(std::size_t imu, const std::string& name, const SyntheticRun& options) {
+  Vector psi = true_psi_deg(imu);
+  Vector r = true_lever_arm_m(imu);
+  for (std::size_t i = 0; i < 3; ++i) {
+    psi[i] += kErrorInSd[i] * options.boresight_sd_deg;
+    r[i] -= kErrorInSd[i] * 0.0008;
+  }
+  const double sd = options.boresight_sd_deg;
+  return {
+      {"name", name},
+      {"C_b_s", mounting(imu, psi)},
+      {"C_prior", square_of(imu)},
+      {"q_b_s", {1.0, 0.0, 0.0, 0.0}},
+      {"boresight_sd_deg", {sd, 0.8 * sd, 0.6 * sd}},
+      {"r_bs_b_m", r},
+      {"r_bs_b_sd_m", {0.0008, 0.0008, 0.0008}},
+      {"t_d_s", -0.00838},
+      {"t_d_sd_s", 0.00003},
+      {"gyro_bias_radps", {0.0012, -0.0008, 0.0004}},
+      {"gyro_bias_sd_radps", {0.00002, 0.00002, 0.00003}},
+      {"accel_bias_mps2", {0.021, -0.034, 0.015}},
+      {"accel_bias_sd_mps2", {0.001, 0.001, 0.002}},
+      {"gyro_scale", {0.0011, -0.0007, 0.0002}},
+      {"gyro_scale_sd", {0.0003, 0.0003, 0.0001}},
+      {"accel_scale", {0.0004, 0.0002, nullptr}},
+      {"observable",
+       {{"psi_x", true}, {"psi_y", true}, {"psi_z", options.psi_z_observable}, {"r_x", true}, {"t_d", true}}},
+      {"method", "filter end value"}};
+}
+
+json truth_entry(std::size_t imu, const std::string& name) {
+  return {{"name", name},
+          {"C_b_s", mounting(imu, true_psi_deg(imu))},
+          {"r_bs_b_m", true_lever_arm_m(imu)},
+          {"t_d_s", -0.0084},
+          {"gyro_bias_radps", {0.00119, -0.00082, 0.00043}},
+          {"accel_bias_mps2", {0.0205, -0.0335, 0.0161}}};
+}
+
+/// WN + two GM whose wavelet variance is drawn as a sum of a falling line and two humps.
+json fit_entry(const std::string& name, const std::string& axis, const std::string& regime,
+               const SyntheticRun& options) {
+  const bool gyro = axis.rfind("gyro", 0) == 0;
+  const double unit = gyro ? kRadPerDeg * kRadPerDeg : 1e-4;
+  const double white = (regime == "static" ? 0.5055 : 0.6538) * unit;
+  const auto hump = [](double tau, double beta, double sigma2) {
+    const double x = beta * tau;
+    return sigma2 * x / (1.0 + x * x / 3.0 + x);
+  };
+  const auto n = static_cast<int>(options.duration_s * kSampleRate_hz / 2);
+  json wv = json::array();
+  for (int level = 1; (1 << level) <= n / 2; ++level) {
+    const double tau = (1 << level) / kSampleRate_hz;
+    const double fitted =
+        white / (1 << level) + hump(tau, 1.68, 0.0017 * unit) + hump(tau, 0.02, 0.0098 * unit);
+    const double relative = std::sqrt(3.0 * (1 << level) / n);
+    const double value = fitted * (1.0 + 0.4 * relative * std::sin(2.0 * level));
+    wv.push_back({{"level", level},
+                  {"tau_s", tau},
+                  {"value", value},
+                  {"ci_low", value * std::exp(-1.96 * relative)},
+                  {"ci_high", value * std::exp(1.96 * relative)},
+                  {"fitted", fitted},
+                  {"n_coefficients", n - (1 << level)}});
+  }
+  const std::string squared = gyro ? "(rad/s)^2" : "(m/s^2)^2";
+  const auto parameter = [](const char* process, const char* label, const std::string& of, double value,
+                            double relative) {
+    return json{{"process", process},
+                {"name", label},
+                {"unit", of},
+                {"value", value},
+                {"sd", value * relative},
+                {"ci_low", value * std::exp(-1.96 * relative)},
+                {"ci_high", value * std::exp(1.96 * relative)}};
+  };
+  return {
+      {"name", name},
+      {"axis", axis},
+      {"regime", regime},
+      {"unit", gyro ? "rad/s" : "m/s^2"},
+      {"n", n},
+      {"rate_hz", kSampleRate_hz},
+      {"model", "WN+2*GM"},
+      {"weights", "optimal"},
+      {"wv", wv},
+      {"parameters",
+       {parameter("WN", "sigma2", squared, white, 0.004), parameter("GM1", "beta", "1/s", 1.68, 0.3),
+        parameter("GM1", "sigma2", squared, 0.0017 * unit, 0.2), parameter("GM2", "beta", "1/s", 0.0049, 0.9),
+        parameter("GM2", "sigma2", squared, 0.0098 * unit, 0.5)}},
+      {"objective", 7.2},
+      {"j_test", {{"statistic", 7.2}, {"dof", 6}, {"p_value", options.j_p_value}}},
+      {"criterion", 19.0},
+      {"identifiable", true},
+      {"warnings", json::array()}};
+}
+
+json run_document(const SyntheticRun& options) {
+  json devices = json::array();
+  const auto device = [&](const std::string& name, const char* role, const char* protocol, double rate_hz) {
+    const auto samples = static_cast<long>(options.duration_s * rate_hz);
+    devices.push_back({{"name", name},
+                       {"role", role},
+                       {"protocol", protocol},
+                       {"samples", samples},
+                       {"rate_hz", rate_hz},
+                       {"frames", samples},
+                       {"bytes", samples * 58},
+                       {"bytes_skipped", 0},
+                       {"bad_checksums", 0},
+                       {"samples_lost", 0},
+                       {"gaps", 0},
+                       {"late", 0}});
+  };
+  device("airins", "reference", "ixblue_stdbin", kSampleRate_hz);
+  for (const std::string& name : options.names) device(name, "study", "xsens_mt", kSampleRate_hz);
+  device("gnss", "gnss", "greis", 10.0);
+  return {{"schema", "imuscope.run/1"},
+          {"version", "0.1.0"},
+          {"build", "release"},
+          {"configuration", "config/demo.toml"},
+          {"configuration_sha256", "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"},
+          {"inputs", {"airins=airins.bin", "gnss=gnss.bin"}},
+          {"duration_s", options.duration_s},
+          {"t0_utc", "2024-06-07T08:00:00Z"},
+          {"devices", devices},
+          {"regimes",
+           {{"static_s", 0.2 * options.duration_s + 60.0}, {"dynamic_s", 0.8 * options.duration_s + 60.0}}},
+          {"warnings", json::array()}};
+}
+
+}  // namespace
+
+void write_synthetic_run(const std::filesystem::path& folder, const SyntheticRun& options) {
+  json calibrations = json::array();
+  json truths = json::array();
+  json models = json::array();
+  json regressions = json::array();
+  for (std::size_t i = 0; i < options.names.size(); ++i) {
+    const std::string& name = options.names[i];
+    calibrations.push_back(calibration_entry(i, name, options));
+    truths.push_back(truth_entry(i, name));
+    write_calibration_series(folder / ("calibration_" + name + ".csv"), i, options);
+    write_errors(folder / ("errors_" + name + ".csv"), i, options);
+    for (const char* axis : kAxes) {
+      for (const char* regime : {"static", "dynamic"})
+        models.push_back(fit_entry(name, axis, regime, options));
+      regressions.push_back({{"name", name},
+                             {"axis", axis},
+                             {"r2", 0.1542},
+                             {"f", 2600.0},
+                             {"p_value", 1e-9},
+                             {"method", "ols"}});
+    }
+  }
+  write_json(folder / "run.json", run_document(options));
+  write_json(folder / "calibration.json", {{"schema", "imuscope.calibration/1"}, {"imus", calibrations}});
+  write_json(folder / "models.json", {{"schema", "imuscope.models/1"}, {"models", models}});
+  if (options.with_truth)
+    write_json(folder / "truth.json", {{"schema", "imuscope.truth/1"}, {"imus", truths}});
+  if (options.with_regression) {
+    write_json(folder / "regression.json",
+               {{"schema", "imuscope.regression/1"}, {"regressions", regressions}});
+  }
+  write_navigation(folder, options);
+}
+
+}  // namespace imuscope::test
