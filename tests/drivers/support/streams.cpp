@@ -35,20 +35,36 @@ std::vector<Bytes> untouched(const StreamUnderTest& stream, const std::vector<Pl
   return kept;
 }
 
+struct Trials {
+  std::size_t all = 0;
+  std::size_t accidents = 0;
+};
+
 void expect_found(const StreamUnderTest& stream, const Bytes& faulty, const std::vector<Bytes>& expected,
-                  const std::string& fault) {
+                  const std::string& fault, Trials& trials) {
   const Bytes reads[] = {faulty};
-  const auto found = stream.scan(reads);
+  ++trials.all;
+  bool appeared = false;
   std::size_t next = 0;
-  for (const Bytes& frame : found) {
+  for (const Bytes& frame : stream.scan(reads)) {
     if (next < expected.size() && frame == expected[next]) {
       ++next;
       continue;
     }
     const bool was_sent = std::find(stream.frames.begin(), stream.frames.end(), frame) != stream.frames.end();
-    ASSERT_TRUE(was_sent || stream.may_appear(frame)) << "a frame appeared that was not sent; " << fault;
+    appeared = appeared || !(was_sent || stream.may_appear(frame));
   }
+  if (appeared && stream.accidents_max > 0.0) {
+    ++trials.accidents;
+    return;
+  }
+  ASSERT_FALSE(appeared) << "a frame appeared that was not sent; " << fault;
   ASSERT_EQ(next, expected.size()) << "an untouched frame was lost; " << fault;
+}
+
+void expect_few_accidents(const StreamUnderTest& stream, const Trials& trials) {
+  EXPECT_LE(static_cast<double>(trials.accidents), stream.accidents_max * static_cast<double>(trials.all))
+      << trials.accidents << " accidents in " << trials.all << " faults";
 }
 
 }  // namespace
@@ -112,18 +128,23 @@ void expect_every_split_keeps_all_frames(const StreamUnderTest& stream) {
   }
 }
 
-void expect_every_bit_flip_loses_only_its_frame(const StreamUnderTest& stream) {
+void expect_every_bit_flip_loses_only_its_frame(const StreamUnderTest& given) {
+  // Every checksum sees a single flipped bit.
+  StreamUnderTest stream = given;
+  stream.accidents_max = 0.0;
+  Trials trials;
   std::vector<Placed> places;
   const Bytes all = concatenate(stream, places);
   for (std::size_t bit = 0; bit < 8 * all.size(); ++bit) {
     Bytes faulty = all;
     faulty[bit / 8] = static_cast<std::uint8_t>(faulty[bit / 8] ^ (1U << (bit % 8)));
     const auto expected = untouched(stream, places, bit / 8, bit / 8 + 1);
-    ASSERT_NO_FATAL_FAILURE(expect_found(stream, faulty, expected, "bit " + std::to_string(bit)));
+    ASSERT_NO_FATAL_FAILURE(expect_found(stream, faulty, expected, "bit " + std::to_string(bit), trials));
   }
 }
 
 void expect_every_cut_loses_only_its_frames(const StreamUnderTest& stream) {
+  Trials trials;
   std::vector<Placed> places;
   const Bytes all = concatenate(stream, places);
   for (const std::size_t size : {1U, 2U, 3U, 8U, 31U}) {
@@ -131,13 +152,16 @@ void expect_every_cut_loses_only_its_frames(const StreamUnderTest& stream) {
       Bytes faulty(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(at));
       faulty.insert(faulty.end(), all.begin() + static_cast<std::ptrdiff_t>(at + size), all.end());
       const auto expected = untouched(stream, places, at, at + size);
-      ASSERT_NO_FATAL_FAILURE(expect_found(
-          stream, faulty, expected, "cut of " + std::to_string(size) + " bytes at " + std::to_string(at)));
+      ASSERT_NO_FATAL_FAILURE(
+          expect_found(stream, faulty, expected,
+                       "cut of " + std::to_string(size) + " bytes at " + std::to_string(at), trials));
     }
   }
+  expect_few_accidents(stream, trials);
 }
 
 void expect_every_insertion_loses_only_its_frame(const StreamUnderTest& stream, std::uint32_t seed) {
+  Trials trials;
   std::mt19937 random(seed);
   std::vector<Placed> places;
   const Bytes all = concatenate(stream, places);
@@ -151,14 +175,17 @@ void expect_every_insertion_loses_only_its_frame(const StreamUnderTest& stream, 
       for (std::size_t i = 0; i < places.size(); ++i) {
         if (at <= places[i].begin || at >= places[i].end) expected.push_back(stream.frames[i]);
       }
-      ASSERT_NO_FATAL_FAILURE(expect_found(
-          stream, faulty, expected, "insertion of " + std::to_string(size) + " at " + std::to_string(at)));
+      ASSERT_NO_FATAL_FAILURE(
+          expect_found(stream, faulty, expected,
+                       "insertion of " + std::to_string(size) + " at " + std::to_string(at), trials));
     }
   }
+  expect_few_accidents(stream, trials);
 }
 
 void expect_no_frame_in_garbage_is_lost(const StreamUnderTest& stream, std::string_view lures,
                                         std::uint32_t seed) {
+  Trials trials;
   std::mt19937 random(seed);
   for (int run = 0; run < 300; ++run) {
     Bytes faulty;
@@ -176,8 +203,9 @@ void expect_no_frame_in_garbage_is_lost(const StreamUnderTest& stream, std::stri
     }
     garbage();
     ASSERT_NO_FATAL_FAILURE(
-        expect_found(stream, faulty, stream.frames, "garbage run " + std::to_string(run)));
+        expect_found(stream, faulty, stream.frames, "garbage run " + std::to_string(run), trials));
   }
+  expect_few_accidents(stream, trials);
 }
 
 }  // namespace imuscope::test

@@ -48,6 +48,9 @@ struct StreamUnderTest {
   Bytes separator;
   Scan scan;
   std::function<bool(const Bytes&)> may_appear = [](const Bytes&) { return false; };
+  /// Share of cuts and insertions whose debris may pass for a frame and hide what it swallows: what the
+  /// protocol's checksum lets through, 1/256 for one of 8 bits, with room for the small number of trials.
+  double accidents_max = 0.0;
 };
 void expect_every_split_keeps_all_frames(const StreamUnderTest& stream);
 void expect_every_bit_flip_loses_only_its_frame(const StreamUnderTest& stream);

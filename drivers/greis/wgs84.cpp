@@ -1,0 +1,46 @@
+#include "drivers/greis/wgs84.h"
+
+#include <cmath>
+
+namespace imuscope::greis {
+namespace {
+
+// Defining parameters of WGS-84.
+constexpr double kSemiMajor_m = 6378137.0;
+constexpr double kFlattening = 1.0 / 298.257223563;
+constexpr double kE2 = kFlattening * (2.0 - kFlattening);
+
+/// Bowring's iteration gains about three digits near the ellipsoid and more than one far above it.
+constexpr int kIterations = 5;
+
+}  // namespace
+
+Geodetic geodetic_of(const std::array<double, 3>& xyz_ecef_m) noexcept {
+  const auto [x, y, z] = xyz_ecef_m;
+  const double p = std::hypot(x, y);
+  // Bowring 1976: beta is the parametric (reduced) latitude.
+  double beta = std::atan2(z, (1.0 - kFlattening) * p);
+  double lat = 0.0;
+  for (int i = 0; i < kIterations; ++i) {
+    const double sin_beta = std::sin(beta);
+    const double cos_beta = std::cos(beta);
+    lat = std::atan2(z + kE2 / (1.0 - kFlattening) * kSemiMajor_m * sin_beta * sin_beta * sin_beta,
+                     p - kE2 * kSemiMajor_m * cos_beta * cos_beta * cos_beta);
+    beta = std::atan2((1.0 - kFlattening) * std::sin(lat), std::cos(lat));
+  }
+  const double sin_lat = std::sin(lat);
+  const double cos_lat = std::cos(lat);
+  // Well conditioned at the equator and at the poles alike.
+  const double height = p * cos_lat + z * sin_lat - kSemiMajor_m * std::sqrt(1.0 - kE2 * sin_lat * sin_lat);
+  return {lat, std::atan2(y, x), height};
+}
+
+std::array<double, 3> ned_of(const std::array<double, 3>& v_ecef, const Geodetic& at) noexcept {
+  const double sin_lat = std::sin(at.lat_rad), cos_lat = std::cos(at.lat_rad);
+  const double sin_lon = std::sin(at.lon_rad), cos_lon = std::cos(at.lon_rad);
+  const auto [x, y, z] = v_ecef;
+  return {-sin_lat * cos_lon * x - sin_lat * sin_lon * y + cos_lat * z, -sin_lon * x + cos_lon * y,
+          -cos_lat * cos_lon * x - cos_lat * sin_lon * y - sin_lat * z};
+}
+
+}  // namespace imuscope::greis

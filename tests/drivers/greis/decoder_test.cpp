@@ -1,0 +1,216 @@
+// Epochs to samples: time, date, solution types, standard deviations, losses; and the receiver's session.
+#include "drivers/greis/decoder.h"
+
+#include <gtest/gtest.h>
+#include <cmath>
+#include <numbers>
+
+#include "tests/drivers/greis/message_builder.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::greis {
+namespace {
+
+using namespace test;
+using namespace std::chrono_literals;
+
+DecoderConfig fixed_config() {
+  DecoderConfig config;
+  config.device = 4;
+  config.clock = ClockMapConfig::fixed(host_time_from_ns(0), 1.0);
+  return config;
+}
+
+struct Rig {
+  explicit Rig(const DecoderConfig& config = fixed_config()) : decoder(config) {}
+  void push(std::initializer_list<Bytes> messages) { decoder.push(lines(messages), {}, sink); }
+  Decoder decoder;
+  CollectingSink sink;
+};
+
+const UtcTime kDay = std::chrono::sys_days{std::chrono::year{2026} / 3 / 14};
+
+TEST(GreisDecoder, AnRtkEpochBecomesAFixedSolutionWithTimeAndSd) {
+  Rig rig;
+  rig.push({rt(45'000'100), rd(2026, 3, 14, 0), st(45'000'100, 4), pg(0.85, 0.04, 106.5, 0.5F, 4),
+            vg(1.5F, -0.5F, 0.25F, 0.5F, 4), sg(0.010F, 0.015F, 0.020F, 0.030F, 4), et(45'000'100)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  const Sample& sample = rig.sink.samples[0];
+  EXPECT_EQ(sample.kind, SampleKind::kGnss);
+  EXPECT_EQ(sample.device, 4);
+  EXPECT_EQ(sample.gnss.solution, GnssSolution::kFixed);
+  EXPECT_EQ(sample.gnss.latitude_rad, 0.85);
+  EXPECT_EQ(sample.gnss.longitude_rad, 0.04);
+  EXPECT_EQ(sample.gnss.height_m, 106.5);
+  EXPECT_EQ(sample.gnss.v_n_mps, (Vector3{1.5, -0.5, -0.25}));
+  EXPECT_NEAR(sample.gnss.sd_position_m[0], 0.010 / std::numbers::sqrt2, 1e-8);
+  EXPECT_NEAR(sample.gnss.sd_position_m[2], 0.015, 1e-8);
+  EXPECT_NEAR(sample.gnss.sd_velocity_mps[1], 0.020 / std::numbers::sqrt2, 1e-8);
+  EXPECT_EQ(sample.gnss.flags, kPositionValid | kVelocityValid | kHasPositionSd | kHasVelocitySd);
+  ASSERT_TRUE(sample.has_utc);
+  EXPECT_EQ(sample.utc, kDay + 45'000'100ms - 18s);  // GPS time is 18 s ahead of UTC
+  EXPECT_EQ(to_ns(sample.time), 45'000'100'000'000);
+}
+
+TEST(GreisDecoder, ADelayedSolutionIsStampedWithItsOwnEpoch) {
+  Rig rig;
+  rig.push({rt(1000), rd(2026, 3, 14, 1), st(600, 4), pg(0.85, 0.04, 106.5, 0.5F, 4), et(1000)});
+  // Across midnight: the solution is of the day before.
+  rig.push({rt(1200), st(86'399'900, 4), pg(0.85, 0.04, 106.5, 0.5F, 4), et(1200)});
+  ASSERT_EQ(rig.sink.samples.size(), 2U);
+  EXPECT_EQ(rig.sink.samples[0].utc, kDay + 600ms);
+  EXPECT_EQ(to_ns(rig.sink.samples[0].time), 600'000'000);
+  EXPECT_EQ(rig.sink.samples[1].utc, kDay - 100ms);
+}
+
+TEST(GreisDecoder, TheClockOffsetLeadsToTheReferenceTime) {
+  Rig rig;
+  rig.push({rt(1000), rd(2026, 3, 14, 1), pg(0.85, 0.04, 106.5, 0.5F, 4), to(-0.00025), et(1000)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_EQ(rig.sink.samples[0].utc, kDay + 1s - 250us);
+}
+
+TEST(GreisDecoder, TimeBasesOfTheDateAreHonoured) {
+  const auto utc = [](U8 base) {
+    Rig rig;
+    rig.push({rt(20'000'000), rd(2026, 3, 14, base), pg(0.85, 0.04, 106.5, 0.5F, 4), et(20'000'000)});
+    return rig.sink.samples.at(0).utc;
+  };
+  EXPECT_EQ(utc(0), kDay + 20'000s - 18s);
+  EXPECT_EQ(utc(1), kDay + 20'000s);
+  EXPECT_EQ(utc(2), kDay + 20'000s - 3h);
+  EXPECT_EQ(utc(3), kDay + 20'000s);
+}
+
+TEST(GreisDecoder, TheDateIsCarriedThroughMidnightWithoutANewOne) {
+  Rig rig;
+  rig.push({rt(86'399'900), rd(2026, 3, 14, 1), pg(0.85, 0.04, 106.5, 0.5F, 4), et(86'399'900)});
+  rig.push({rt(0), pg(0.85, 0.04, 106.5, 0.5F, 4), et(0)});
+  ASSERT_EQ(rig.sink.samples.size(), 2U);
+  EXPECT_EQ(rig.sink.samples[1].utc - rig.sink.samples[0].utc, Duration(100ms));
+  EXPECT_EQ(rig.sink.samples[1].time - rig.sink.samples[0].time, Duration(100ms));
+  EXPECT_EQ(rig.decoder.counters().samples_lost, 0U);
+}
+
+TEST(GreisDecoder, GpsTimeGivesTheDateWhereTheReceiverSentNone) {
+  Rig rig;
+  // Week 2409 of the GPS, 2026-03-08, as its ten bits.
+  const Bytes gt = greis_message("GT", test::Body().put(U32{562'518'100}).put(U16{2409 % 1024}));
+  const U32 tod = 562'518'100 % 86'400'000;
+  rig.push({rt(tod), gt, pg(0.85, 0.04, 106.5, 0.5F, 4), et(tod)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  const UtcTime week = std::chrono::sys_days{std::chrono::year{2026} / 3 / 8};
+  EXPECT_EQ(rig.sink.samples[0].utc, week + 562'518'100ms - 18s);
+}
+
+TEST(GreisDecoder, TheReceiversOwnLeapSecondsOverrideTheConstant) {
+  Rig rig;
+  const Bytes uo = greis_message(
+      "UO",
+      test::Body().put(0.0).put(0.0F).put(U32{0}).put(U16{0}).put(U8{19}).put(U8{0}).put(U16{0}).put(U8{19}));
+  rig.push({uo, rt(45'000'000), rd(2026, 3, 14, 0), pg(0.85, 0.04, 106.5, 0.5F, 4), et(45'000'000)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_EQ(rig.sink.samples[0].utc, kDay + 45'000s - 19s);
+}
+
+TEST(GreisDecoder, SolutionTypesAreTranslatedAndUndefinedOnesAreNone) {
+  const auto solution = [](U8 type) {
+    Rig rig;
+    rig.push({rt(1000), pg(0.85, 0.04, 106.5, 0.5F, type), et(1000)});
+    return rig.sink.samples.at(0).gnss;
+  };
+  EXPECT_EQ(solution(1).solution, GnssSolution::kSingle);
+  EXPECT_EQ(solution(2).solution, GnssSolution::kDifferential);
+  EXPECT_EQ(solution(3).solution, GnssSolution::kFloat);
+  EXPECT_EQ(solution(4).solution, GnssSolution::kFixed);
+  for (const U8 type : {U8{0}, U8{5}, U8{9}}) {
+    EXPECT_EQ(solution(type).solution, GnssSolution::kNone);
+    EXPECT_EQ(solution(type).flags, 0U);
+  }
+}
+
+TEST(GreisDecoder, ValuesThatAreNotNumbersAreNotUsed) {
+  Rig rig;
+  rig.push({rt(1000), pg(0.85, 0.04, 106.5, NAN, 4), vg(NAN, 0.0F, 0.0F, 0.1F, 4), et(1000)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_EQ(rig.sink.samples[0].gnss.flags, kPositionValid);
+}
+
+TEST(GreisDecoder, ASphericalErrorProbableBecomesAnSdPerAxis) {
+  Rig rig;
+  rig.push({rt(1000), pg(0.85, 0.04, 106.5, 1.5381723F, 4), et(1000)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  for (const double sd : rig.sink.samples[0].gnss.sd_position_m) EXPECT_NEAR(sd, 1.0, 1e-6);
+}
+
+TEST(GreisDecoder, AnEpochThatLostBytesGivesNoSampleAndTheNextOneDoes) {
+  for (int damage = 0; damage < 4; ++damage) {
+    Rig rig;
+    Bytes position = pg(0.85, 0.04, 106.5, 0.5F, 4);
+    if (damage == 0) position[20] ^= 1;
+    Bytes opening = rt(1100);
+    if (damage == 1) opening[6] ^= 1;
+    const Bytes closing = damage == 2 ? et(1000) : et(1100);
+    rig.push({rt(1000), pg(0.85, 0.04, 106.5, 0.5F, 4), et(1000)});
+    if (damage == 3) {
+      rig.push({rt(1100), position});  // no ET
+    } else {
+      rig.push({opening, position, closing});
+    }
+    rig.push({rt(1200), pg(0.85, 0.04, 106.5, 0.5F, 4), et(1200)});
+    // What is left of a damaged message may look like a longer one: only the end of the stream settles it.
+    rig.decoder.finish({}, rig.sink);
+    ASSERT_EQ(rig.sink.samples.size(), 2U) << damage;
+    EXPECT_EQ(rig.decoder.counters().samples_lost, 1U) << damage;
+    EXPECT_EQ(to_ns(rig.sink.samples[1].time), 1'200'000'000) << damage;
+  }
+}
+
+TEST(GreisDecoder, MissingEpochsAreCountedByTime) {
+  Rig rig;
+  for (const U32 tod : {1000U, 1100U, 1500U}) rig.push({rt(tod), pg(0.85, 0.04, 106.5, 0.5F, 4), et(tod)});
+  EXPECT_EQ(rig.sink.samples.size(), 3U);
+  EXPECT_EQ(rig.decoder.counters().samples_lost, 3U);
+}
+
+TEST(GreisDecoder, TheEpochVectorGivesTheValuesOfItsMessages) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.hex");
+  const auto vectors = load_vectors(shared_path("oracle/protocols/greis.hex"));
+  Rig rig;
+  rig.decoder.push(vector_named(vectors, "epoch"), {}, rig.sink);
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  const GnssData& gnss = rig.sink.samples[0].gnss;
+  EXPECT_EQ(gnss.solution, GnssSolution::kFixed);
+  EXPECT_EQ(gnss.latitude_rad, 0.8527264415590355);
+  EXPECT_EQ(gnss.height_m, 106.66247083619237);
+  EXPECT_EQ(rig.sink.samples[0].utc, kDay + 45'000'100ms + 250us);  // base UTC, TO 0.25 ms
+}
+
+TEST(GreisDecoder, TheJavadLogWithoutEpochEndsGivesItsCompleteEpochs) {
+  IMUSCOPE_NEEDS_SHARED("data/streams/greis/javad.jps");
+  DecoderConfig config = fixed_config();
+  config.period = 1s;
+  Rig rig(config);
+  const Bytes bytes = load_bytes(shared_path("data/streams/greis/javad.jps"));
+  for (std::size_t at = 0; at < bytes.size(); at += 1000) {
+    const std::size_t n = std::min<std::size_t>(1000, bytes.size() - at);
+    rig.decoder.push(std::span(bytes).subspan(at, n), {}, rig.sink);
+  }
+  rig.decoder.finish({}, rig.sink);
+  EXPECT_EQ(rig.decoder.epochs(), 130U);
+  EXPECT_EQ(rig.decoder.epochs_damaged(), 1U);  // the last one, cut by the end of the file
+  ASSERT_EQ(rig.sink.samples.size(), 129U);
+  EXPECT_EQ(rig.decoder.counters().samples_lost, 0U);
+  for (const Sample& sample : rig.sink.samples) {
+    EXPECT_EQ(sample.gnss.solution, GnssSolution::kSingle);
+    EXPECT_EQ(sample.gnss.flags & (kPositionValid | kVelocityValid), kPositionValid | kVelocityValid);
+    EXPECT_LT(std::hypot(sample.gnss.v_n_mps[0], sample.gnss.v_n_mps[1], sample.gnss.v_n_mps[2]), 0.2);
+  }
+  // The first epoch's [RD] 2011-01-15, base GPS, and [RT] 8803.000 s; its [UO] has 15 leap
+  // seconds, its [TO] -0.2448 ms.
+  const UtcTime day = std::chrono::sys_days{std::chrono::year{2011} / 1 / 15};
+  EXPECT_NEAR(to_seconds(rig.sink.samples[0].utc - day), 8803.0 - 15.0 - 0.0002448, 1e-7);
+}
+
+}  // namespace
+}  // namespace imuscope::greis

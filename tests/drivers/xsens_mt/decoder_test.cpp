@@ -1,0 +1,276 @@
+#include "drivers/xsens_mt/decoder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/drivers/xsens_mt/mt_frames.h"
+
+namespace imuscope::xsens {
+namespace {
+
+using namespace test_frames;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using test::CollectingSink;
+
+constexpr Duration kPeriod = milliseconds{10};
+
+HostTime host(Duration since_start) { return host_time_from_ns(1'000'000'000'000) + since_start; }
+
+/// Feeds one frame a read, each at its time.
+struct Line {
+  explicit Line(const MtDecoderConfig& config = {}) : decoder(config) {}
+  void send(const Bytes& bytes, Duration at) { decoder.push(bytes, host(at), sink); }
+  MtDecoder decoder;
+  CollectingSink sink;
+};
+
+TEST(MtDecoder, GivesRatesAndForcesInSiAndInTheRotatedAxes) {
+  MtDecoderConfig config;
+  config.device = 3;
+  config.axes = {0, 1, 0, -1, 0, 0, 0, 0, 1};  // a quarter turn about z
+  Line line(config);
+  line.send(mtdata(17, {1.0, 2.0, 3.0}, {0.25, 0.5, 0.75}), kPeriod);
+  ASSERT_EQ(line.sink.samples.size(), 1U);
+  const Sample& s = line.sink.samples[0];
+  EXPECT_EQ(s.kind, SampleKind::kImu);
+  EXPECT_EQ(s.device, 3);
+  EXPECT_EQ(s.imu.counter, 17);
+  EXPECT_EQ(s.imu.f_mps2, (Vector3{2.0, -1.0, 3.0}));
+  EXPECT_EQ(s.imu.omega_radps, (Vector3{0.5, -0.25, 0.75}));
+  EXPECT_EQ(s.imu.flags, kGyroValid | kAccelValid);
+  EXPECT_EQ(s.arrival, host(kPeriod));
+  // 43 bytes at 115200 baud before the read's end.
+  EXPECT_NEAR(to_seconds(s.arrival - s.time), 430.0 / 115200.0, 1e-8);
+}
+
+TEST(MtDecoder, UnwrapsTheCounterAndTellsLossFromWrap) {
+  Line line;
+  const std::array<std::uint16_t, 6> counters{65533, 65534, 65535, 0, 1, 4};
+  for (const std::uint16_t c : counters) {
+    line.send(mtdata(c), kPeriod * ((c + 65536 - 65533) % 65536));
+  }
+  ASSERT_EQ(line.sink.samples.size(), 6U);
+  EXPECT_EQ(line.sink.samples[5].imu.counter, 65540);
+  EXPECT_EQ(line.decoder.counters().samples_lost, 2U);
+  EXPECT_EQ(line.decoder.counters().clock_resets, 0U);
+  EXPECT_EQ(line.sink.samples[4].imu.flags & kGapBefore, 0U);
+  EXPECT_NE(line.sink.samples[5].imu.flags & kGapBefore, 0U);
+}
+
+TEST(MtDecoder, HostTimeSaysHowOftenTheCounterWrappedInALongSilence) {
+  for (const int turns : {1, 2, 5}) {
+    Line line;
+    for (int i = 0; i < 100; ++i) line.send(mtdata(static_cast<std::uint16_t>(i)), kPeriod * i);
+    const std::int64_t later = 99 + 65536 * turns + 40;
+    line.send(mtdata(static_cast<std::uint16_t>(later)), kPeriod * later);
+    ASSERT_EQ(line.sink.samples.size(), 101U);
+    EXPECT_EQ(line.sink.samples.back().imu.counter, later) << turns;
+    EXPECT_EQ(line.decoder.counters().samples_lost, static_cast<std::uint64_t>(later - 100)) << turns;
+  }
+}
+
+TEST(MtDecoder, ARestartedCounterBeginsANewSegmentAndTimeNeverStepsBack) {
+  Line line;
+  for (int i = 0; i < 3000; ++i) line.send(mtdata(static_cast<std::uint16_t>(i + 20000)), kPeriod * i);
+  for (int i = 0; i < 3000; ++i) line.send(mtdata(static_cast<std::uint16_t>(i)), seconds{32} + kPeriod * i);
+  EXPECT_EQ(line.decoder.counters().clock_resets, 1U);
+  EXPECT_EQ(line.decoder.counters().bad_contents, 1U);  // the first one could have been a damaged frame
+  ASSERT_EQ(line.sink.samples.size(), 5999U);
+  for (std::size_t i = 1; i < line.sink.samples.size(); ++i) {
+    ASSERT_GT(line.sink.samples[i].time, line.sink.samples[i - 1].time) << i;
+    ASSERT_GT(line.sink.samples[i].imu.counter, line.sink.samples[i - 1].imu.counter) << i;
+  }
+  const Sample& last = line.sink.samples.back();
+  EXPECT_NEAR(to_seconds(last.arrival - last.time), 430.0 / 115200.0, 1e-4);
+}
+
+TEST(MtDecoder, ADamagedCounterWithARightChecksumIsRefusedAlone) {
+  Line line;
+  for (int i = 0; i < 200; ++i) {
+    const int counter = i == 100 ? i + 30000 : i;
+    line.send(mtdata(static_cast<std::uint16_t>(counter)), kPeriod * i);
+  }
+  EXPECT_EQ(line.sink.samples.size(), 199U);
+  EXPECT_EQ(line.decoder.counters().bad_contents, 1U);
+  EXPECT_EQ(line.decoder.counters().clock_resets, 0U);
+  EXPECT_EQ(line.decoder.counters().samples_lost, 1U);
+}
+
+TEST(MtDecoder, AStallOfTheHostIsNeitherLossNorRestart) {
+  Line line;
+  int next = 0;
+  for (; next < 500; ++next) line.send(mtdata(static_cast<std::uint16_t>(next)), kPeriod * next);
+  Bytes backlog;  // four seconds of it in one read
+  for (; next < 900; ++next) {
+    const Bytes frame = mtdata(static_cast<std::uint16_t>(next));
+    backlog.insert(backlog.end(), frame.begin(), frame.end());
+  }
+  line.send(backlog, kPeriod * next);
+  for (; next < 1500; ++next) line.send(mtdata(static_cast<std::uint16_t>(next)), kPeriod * next);
+  EXPECT_EQ(line.sink.samples.size(), 1500U);
+  EXPECT_EQ(line.decoder.counters().samples_lost, 0U);
+  EXPECT_EQ(line.decoder.counters().clock_resets, 0U);
+  for (std::size_t i = 1; i < line.sink.samples.size(); ++i) {
+    ASSERT_EQ(line.sink.samples[i].time - line.sink.samples[i - 1].time, kPeriod) << i;
+  }
+}
+
+TEST(MtDecoder, LearnsTheLayoutRateAndSkipFactorFromTheConfigurationInTheStream) {
+  Line line;
+  // Acceleration and rate only, every second sample of 200 Hz.
+  line.send(configuration(576, 1, 1, 26, output_mode::kCalibrated,
+                          output_settings::kSampleCounter | output_settings::kNoField),
+            Duration{});
+  for (int i = 0; i < 10; ++i) {
+    Bytes data = floats({1, 2, 3, 0.1, 0.2, 0.3});
+    append(data, be16(static_cast<std::uint16_t>(2 * i)));
+    line.send(frame(mid::kMtData, data), kPeriod * (i + 1));
+  }
+  ASSERT_EQ(line.sink.samples.size(), 10U);
+  EXPECT_EQ(line.sink.samples[9].imu.f_mps2, (Vector3{1, 2, 3}));
+  EXPECT_EQ(line.decoder.counters().samples_lost, 0U);
+  EXPECT_EQ(line.sink.samples[9].time - line.sink.samples[8].time, kPeriod);
+}
+
+TEST(MtDecoder, DataOfAnotherLengthThanTheLayoutIsCountedAndNotGuessed) {
+  Line line;
+  line.send(frame(mid::kMtData, Bytes(54)), kPeriod);
+  EXPECT_TRUE(line.sink.samples.empty());
+  EXPECT_EQ(line.decoder.counters().bad_contents, 1U);
+  EXPECT_EQ(line.decoder.counters().bytes_skipped, 0U);
+}
+
+TEST(MtDecoder, SplitsWhatAnXbusMasterSendsAndDropsADeviceThatFellOffTheBus) {
+  MtDecoderConfig config;
+  config.bus_devices = {4, 5, 6};
+  Line line(config);
+  line.send(configuration(1152, 0, 3, 36, output_mode::kCalibrated, 0, 0x00100456), Duration{});
+  constexpr int kMessages = 50;
+  for (int i = 0; i < kMessages; ++i) {
+    Bytes data = u16(static_cast<std::uint16_t>(i));
+    for (int device = 0; device < 3; ++device) {
+      const double noise = device == 1 && i >= 20 ? 0.0 : 1e-3 * i;  // device 2 repeats itself from then on
+      const Bytes block = floats({device + noise, 0, 9.8, 0.1, 0.2, 0.3, 0.5, 0.5, 0.5});
+      data.insert(data.end(), block.begin(), block.end());
+    }
+    line.send(frame(mid::kMtData, data), kPeriod * (i + 1));
+  }
+  std::array<int, 7> n{};
+  for (const Sample& s : line.sink.samples) {
+    ++n[s.device];
+    EXPECT_NEAR(s.imu.f_mps2[0], s.device - 4, 0.06);
+  }
+  EXPECT_EQ(n[4], kMessages);
+  EXPECT_EQ(n[6], kMessages);
+  EXPECT_EQ(n[5], 23);  // 20 of its own, and three before the repetition is certain
+}
+
+TEST(MtDecoder, AFixedClockNeedsNoArrivalsAndBackDatesNothing) {
+  MtDecoderConfig config;
+  config.clock = ClockMapConfig::fixed(host(Duration{}), 1.0 + 20e-6);
+  Line line(config);
+  for (int i = 0; i < 1000; ++i) line.send(mtdata(static_cast<std::uint16_t>(i)), Duration{});
+  ASSERT_EQ(line.sink.samples.size(), 1000U);
+  const Sample& last = line.sink.samples.back();
+  EXPECT_EQ(last.time, host(Duration{static_cast<std::int64_t>(9.99e9 * (1.0 + 20e-6))}));
+  EXPECT_NEAR(to_seconds(last.arrival - last.time), 430.0 / 115200.0, 1e-7);
+}
+
+/// One MTData2 message with inertial data.
+Bytes inertial(std::uint16_t packet, std::uint32_t ticks, std::uint32_t status = 0) {
+  Bytes data;
+  append_item(data, xdi::kPacketCounter, u16(packet));
+  append_item(data, xdi::kSampleTimeFine, u32(ticks));
+  append_item(data, xdi::kAcceleration, floats({0.5, 0.25, 9.75}));
+  append_item(data, xdi::kRateOfTurn, floats({0.125, -0.5, 1.0}));
+  append_item(data, xdi::kStatusWord, u32(status));
+  return frame(mid::kMtData2, data);
+}
+
+TEST(MtDecoder, GnssMessagesThatShareThePacketCounterAreNoLoss) {
+  Line line;
+  std::uint16_t packet = 65500;
+  for (int i = 0; i < 400; ++i) {
+    line.send(inertial(packet++, static_cast<std::uint32_t>(1000 + 100 * i)), kPeriod * i);
+    if (i % 25 != 3) continue;
+    Bytes gnss;
+    append_item(gnss, xdi::kPacketCounter, u16(packet++));
+    append_item(gnss, 0x7010, Bytes(kGnssPvtSize));
+    line.send(frame(mid::kMtData2, gnss), kPeriod * i + milliseconds{2});
+  }
+  EXPECT_EQ(line.sink.samples.size(), 400U);
+  EXPECT_EQ(line.decoder.counters().samples_lost, 0U);
+  for (std::size_t i = 1; i < line.sink.samples.size(); ++i) {
+    ASSERT_EQ(line.sink.samples[i].imu.counter, line.sink.samples[i - 1].imu.counter + 1);
+    ASSERT_EQ(line.sink.samples[i].time - line.sink.samples[i - 1].time, kPeriod) << i;
+  }
+}
+
+TEST(MtDecoder, SampleTimeFineWrapsAtADayOrAtThirtyTwoBits) {
+  for (const std::int64_t wrap : {kSampleTimeFineDay, kSampleTimeFineModulus}) {
+    Line line;
+    for (int i = 0; i < 20; ++i) {
+      const std::int64_t ticks = (wrap - 1000 + 100 * i) % wrap;
+      line.send(inertial(static_cast<std::uint16_t>(i), static_cast<std::uint32_t>(ticks)), kPeriod * i);
+    }
+    ASSERT_EQ(line.sink.samples.size(), 20U) << wrap;
+    EXPECT_EQ(line.decoder.counters().samples_lost, 0U) << wrap;
+    EXPECT_EQ(line.decoder.counters().clock_resets, 0U) << wrap;
+    EXPECT_EQ(line.sink.samples[19].time - line.sink.samples[0].time, 19 * kPeriod) << wrap;
+  }
+}
+
+TEST(MtDecoder, LostMessagesAreCountedByTheSampleTime) {
+  Line line;
+  for (const int i : {0, 1, 2, 6, 7}) {
+    line.send(inertial(static_cast<std::uint16_t>(i), static_cast<std::uint32_t>(100 * i)), kPeriod * i);
+  }
+  EXPECT_EQ(line.decoder.counters().samples_lost, 3U);
+  EXPECT_NE(line.sink.samples[3].imu.flags & kGapBefore, 0U);
+  EXPECT_EQ(line.sink.samples[4].imu.counter, 7);
+}
+
+TEST(MtDecoder, ClippedAxesAreFlagged) {
+  Line line;
+  line.send(inertial(0, 0, 1U << 9U | 1U << 13U), Duration{});
+  EXPECT_EQ(line.sink.samples[0].imu.flags, kGyroValid | kAccelValid | kAccelClipY | kGyroClipZ);
+}
+
+TEST(MtDecoder, IncrementsBecomeMeansOverTheirInterval) {
+  Line line;
+  const double angle = 0.02;  // about y, in 10 ms
+  for (int i = 0; i < 3; ++i) {
+    Bytes data;
+    append_item(data, xdi::kSampleTimeFine, u32(static_cast<std::uint32_t>(100 * i)));
+    append_item(data, xdi::kDeltaV, floats({0.01, 0.0, 0.098}));
+    append_item(data, xdi::kDeltaQ, floats({-std::cos(angle / 2), 0.0, -std::sin(angle / 2), 0.0}));
+    line.send(frame(mid::kMtData2, data), kPeriod * i);
+  }
+  const ImuData& imu = line.sink.samples[2].imu;
+  EXPECT_EQ(imu.flags, kGyroValid | kAccelValid | kIsIncrement);
+  EXPECT_NEAR(imu.omega_radps[1], angle / 0.01, 1e-5);  // float32 quaternion
+  EXPECT_NEAR(imu.f_mps2[2], 9.8, 1e-5);
+}
+
+TEST(MtDecoder, AnItemBeyondTheEndMakesTheWholeMessageInvalid) {
+  Line line;
+  Bytes data;
+  append_item(data, xdi::kAcceleration, floats({1, 2, 3}));
+  data.insert(data.end(), {0x80, 0x20, 12, 0, 0});
+  line.send(frame(mid::kMtData2, data), Duration{});
+  EXPECT_TRUE(line.sink.samples.empty());
+  EXPECT_EQ(line.decoder.counters().bad_contents, 1U);
+}
+
+TEST(MtDecoder, AnErrorMessageIsKept) {
+  Line line;
+  EXPECT_FALSE(line.decoder.last_error());
+  line.send(frame(mid::kError, {0x29}), Duration{});
+  EXPECT_EQ(line.decoder.last_error(), 0x29);
+  EXPECT_NE(error_text(0x29).find("baud rate"), std::string_view::npos);
+}
+
+}  // namespace
+}  // namespace imuscope::xsens

@@ -1,0 +1,218 @@
+#include "drivers/xsens_mt/scanner.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <random>
+
+#include "drivers/xsens_mt/messages.h"
+#include "tests/drivers/support/streams.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::xsens {
+namespace {
+
+using test::Bytes;
+
+struct Found {
+  std::uint64_t offset;
+  Bytes bytes;
+};
+
+std::vector<Found> scan(std::span<const Bytes> reads, ScanCounters* counters = nullptr) {
+  Scanner scanner;
+  std::vector<Found> found;
+  Frame frame;
+  Bytes all;
+  for (const Bytes& read : reads) all.insert(all.end(), read.begin(), read.end());
+  const auto take = [&](bool at_end) {
+    while (scanner.next(frame, at_end)) {
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(frame.offset);
+      found.push_back({frame.offset, Bytes(begin, begin + static_cast<std::ptrdiff_t>(frame.size))});
+    }
+  };
+  for (const Bytes& read : reads) {
+    std::span<const std::uint8_t> rest = read;
+    while (!rest.empty()) {
+      rest = rest.subspan(scanner.append(rest, HostTime{}));
+      take(false);
+    }
+  }
+  take(true);
+  if (counters != nullptr) *counters = scanner.counters();
+  return found;
+}
+
+bool checksum_is_right(const Bytes& frame) {
+  return std::accumulate(frame.begin() + 1, frame.end(), 0U) % 256 == 0;
+}
+
+Bytes frame_of(std::uint8_t mid, const Bytes& data) {
+  const OutgoingFrame frame(kMasterBid, mid, data);
+  return {frame.bytes().begin(), frame.bytes().end()};
+}
+
+/// Frames as an MTx sends them, the preamble in their data included, with handshake frames among them.
+test::StreamUnderTest stream() {
+  std::mt19937 random(7);
+  test::StreamUnderTest s;
+  for (int i = 0; i < 8; ++i) {
+    Bytes data(i % 2 == 0 ? 38 : 54);
+    for (auto& byte : data) byte = static_cast<std::uint8_t>(random() % 5 == 0 ? kPreamble : random());
+    s.frames.push_back(frame_of(mid::kMtData, data));
+    if (i == 3) s.frames.push_back(frame_of(0x31, {}));
+  }
+  s.scan = [](std::span<const Bytes> reads) {
+    std::vector<Bytes> frames;
+    for (const Found& found : scan(reads)) frames.push_back(found.bytes);
+    return frames;
+  };
+  // One false frame in 256 has a right checksum; the layout and the counter tell it apart later.
+  s.may_appear = checksum_is_right;
+  return s;
+}
+
+TEST(MtScanner, EverySplitIntoReadsKeepsAllFrames) { test::expect_every_split_keeps_all_frames(stream()); }
+TEST(MtScanner, EverySingleBitFlipLosesOnlyItsFrame) {
+  test::expect_every_bit_flip_loses_only_its_frame(stream());
+}
+TEST(MtScanner, EveryCutLosesOnlyTheFramesItTouches) {
+  test::expect_every_cut_loses_only_its_frames(stream());
+}
+TEST(MtScanner, EveryInsertionLosesOnlyTheFrameItTouches) {
+  test::expect_every_insertion_loses_only_its_frame(stream(), 11);
+}
+
+// Random garbage holds, every now and then, a whole false frame with a right checksum that swallows the start
+// of a good one and ends in the middle of it. The good one must still be found.
+TEST(MtScanner, FindsTheFrameThatAFalseFrameWithARightChecksumSwallowed) {
+  const Bytes good = frame_of(mid::kMtData, Bytes(20, 0x11));
+  const Bytes next = frame_of(mid::kMtData, Bytes(20, 0x22));
+  for (std::size_t swallowed = 1; swallowed < good.size(); ++swallowed) {
+    // FA FF 32 LEN x [swallowed bytes of the good frame up to its checksum byte]; x makes the sum right.
+    Bytes bytes{kPreamble, kMasterBid, mid::kMtData, static_cast<std::uint8_t>(swallowed), 0};
+    bytes.insert(bytes.end(), good.begin(), good.begin() + static_cast<std::ptrdiff_t>(swallowed));
+    const auto sum = std::accumulate(bytes.begin() + 1, bytes.end(), 0U);
+    bytes[4] = static_cast<std::uint8_t>(0U - sum);
+    bytes.insert(bytes.end(), good.begin() + static_cast<std::ptrdiff_t>(swallowed), good.end());
+    bytes.insert(bytes.end(), next.begin(), next.end());
+    const Bytes reads[] = {bytes};
+    const auto found = scan(reads);
+    ASSERT_EQ(found.size(), 3U) << swallowed;
+    EXPECT_EQ(found[1].bytes, good) << swallowed;
+    EXPECT_EQ(found[2].bytes, next) << swallowed;
+  }
+}
+
+TEST(MtScanner, CountsEveryByteAsFrameOrSkipped) {
+  std::mt19937 random(3);
+  Bytes bytes;
+  std::size_t in_frames = 0;
+  for (int i = 0; i < 400; ++i) {
+    const Bytes frame = frame_of(mid::kMtData, Bytes(38, static_cast<std::uint8_t>(i)));
+    bytes.insert(bytes.end(), frame.begin(), frame.end());
+    for (std::size_t n = random() % 9; n > 0; --n) bytes.push_back(static_cast<std::uint8_t>(random() % 250));
+  }
+  ScanCounters counters;
+  const Bytes reads[] = {bytes};
+  for (const Found& found : scan(reads, &counters)) in_frames += found.bytes.size();
+  EXPECT_EQ(in_frames, 400U * (38 + 5));
+  EXPECT_EQ(in_frames + counters.bytes_skipped, bytes.size());
+}
+
+TEST(MtScanner, RefusesALengthBeyondTheDocumentedCeilingAtOnce) {
+  Bytes bytes{kPreamble, kMasterBid, mid::kMtData, kExtendedLength, 0x08, 0x01};  // 2049
+  const Bytes good = frame_of(0x31, {});
+  bytes.insert(bytes.end(), good.begin(), good.end());
+  Scanner scanner;
+  ASSERT_EQ(scanner.append(bytes, HostTime{}), bytes.size());
+  Frame frame;
+  ASSERT_TRUE(scanner.next(frame));
+  EXPECT_EQ(frame.mid, 0x31);
+  EXPECT_EQ(scanner.counters().bad_lengths, 1U);
+}
+
+TEST(MtScanner, TakesAFrameOfTheLongestLengthThroughOneByteReads) {
+  Bytes bytes{kPreamble, kMasterBid, 0x91, kExtendedLength, 0x08, 0x00};
+  for (std::size_t i = 0; i < kDataMax; ++i) bytes.push_back(static_cast<std::uint8_t>(7 * i));
+  const auto sum = std::accumulate(bytes.begin() + 1, bytes.end(), 0U);
+  bytes.push_back(static_cast<std::uint8_t>(0U - sum));
+  std::vector<Bytes> reads;
+  for (int twice = 0; twice < 3; ++twice) {
+    for (const std::uint8_t byte : bytes) reads.push_back({byte});
+  }
+  const auto found = scan(reads);
+  ASSERT_EQ(found.size(), 3U);
+  EXPECT_EQ(found[2].bytes, bytes);
+}
+
+TEST(MtScanner, StampsTheFirstByteOfAFrameByWhatFollowedItInItsRead) {
+  // 10 bytes at 1 ms each: the first byte of the second frame had 5 byte times to go.
+  const Bytes ack = frame_of(0x31, {});
+  Bytes bytes = ack;
+  bytes.insert(bytes.end(), ack.begin(), ack.end());
+  Scanner scanner(byte_time(10000.0));
+  const HostTime arrival = host_time_from_ns(1'000'000'000);
+  scanner.append(bytes, arrival);
+  Frame frame;
+  ASSERT_TRUE(scanner.next(frame));
+  EXPECT_EQ(frame.first_byte, arrival - std::chrono::milliseconds(10));
+  ASSERT_TRUE(scanner.next(frame));
+  EXPECT_EQ(frame.first_byte, arrival - std::chrono::milliseconds(5));
+}
+
+TEST(MtScanner, ReadsTheControlVectors) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_control.json");
+  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_control.hex"));
+  const auto oracle = test::load_json(test::shared_path("oracle/protocols/xsens_control.json"));
+  ASSERT_EQ(oracle["vectors"].size(), 48U);
+  const auto expect_frame = [](const Found& found, const nlohmann::json& expected) {
+    const std::size_t header = found.bytes[3] == kExtendedLength ? kExtendedHeaderSize : kHeaderSize;
+    std::string data;
+    for (std::size_t i = header; i + 1 < found.bytes.size(); ++i) {
+      char hex[3];
+      std::snprintf(hex, sizeof hex, "%02x", found.bytes[i]);
+      data += hex;
+    }
+    EXPECT_EQ(found.bytes[1], expected["bid"]);
+    EXPECT_EQ(found.bytes[2], expected["mid"]);
+    EXPECT_EQ(data, expected["data"]);
+  };
+  for (const auto& expected : oracle["vectors"]) {
+    SCOPED_TRACE(expected["name"].get<std::string>());
+    const Bytes& bytes = test::vector_named(vectors, expected["name"].get<std::string>());
+    const Bytes reads[] = {bytes};
+    const auto found = scan(reads);
+    if (expected.contains("frames")) {
+      ASSERT_EQ(found.size(), expected["frames"].size());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        expect_frame(found[i], expected["frames"][i]);
+        EXPECT_EQ(found[i].offset, expected["frames"][i]["offset"]);
+      }
+    } else if (expected.value("valid", true)) {
+      ASSERT_EQ(found.size(), 1U);
+      expect_frame(found[0], expected);
+    } else {
+      EXPECT_TRUE(found.empty());
+    }
+  }
+}
+
+TEST(MtMessages, BuildsTheFramesOfTheControlVectors) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_control.json");
+  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_control.hex"));
+  const auto built = [](std::uint8_t mid, std::span<const std::uint8_t> data = {}) {
+    const OutgoingFrame frame(kMasterBid, mid, data);
+    return Bytes(frame.bytes().begin(), frame.bytes().end());
+  };
+  EXPECT_EQ(built(mid::kGoToConfig), test::vector_named(vectors, "GoToConfig"));
+  EXPECT_EQ(built(mid::kWakeUpAck), test::vector_named(vectors, "WakeUpAck"));
+  EXPECT_EQ(built(mid::kReset), test::vector_named(vectors, "Reset"));
+  EXPECT_EQ(built(mid::kPeriod, be16(1152)), test::vector_named(vectors, "SetPeriod_100Hz"));
+  EXPECT_EQ(built(mid::kOutputMode, be16(7)), test::vector_named(vectors, "SetOutputMode_calib_orient_temp"));
+  EXPECT_EQ(built(mid::kOutputSettings, be32(0x205)),
+            test::vector_named(vectors, "SetOutputSettings_counter_euler_fp1632"));
+}
+
+}  // namespace
+}  // namespace imuscope::xsens
