@@ -32,4 +32,9 @@ class ByteSource {
 /// A raw dump: X.bin or a CSV file, with X.arrivals.csv beside it where the arrivals were kept.
 Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file);
 
+/// The reads of one device out of a capture.
+/// @param bytes  of this device in the capture, as CaptureSummary says
+Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::path& capture,
+                                                         const std::string& device, std::uint64_t bytes);
+
 }  // namespace imuscope

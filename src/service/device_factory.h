@@ -2,8 +2,11 @@
 
 /// From a device's configuration to its driver. The one place that knows every protocol.
 
+#include <filesystem>
 #include <memory>
+#include <string>
 
+#include "base/result.h"
 #include "drivers/device/device.h"
 #include "sample/clock_map.h"
 #include "service/config.h"
@@ -20,5 +23,8 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device);
 /// What a decoder has to say about its device beyond counts, in one sentence with the remedy; empty when all
 /// is well. `decoder` must have been made for `device`.
 std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& decoder);
+
+/// Looks at a recorded file before it is used: protocols that are text name the line and column of a mistake.
+Result<void> check_recorded_file(const DeviceConfig& device, const std::filesystem::path& file);
 
 }  // namespace imuscope

@@ -41,7 +41,7 @@ struct RecordedSchedule {
 
 /// A recording, ready to be replayed any number of times.
 struct Recording {
-  std::string description;  ///< for run.json: the inputs as given
+  std::vector<std::string> inputs;  ///< as given, for run.json
   OpenSource open;
   std::vector<bool> present;                 ///< per device of the configuration
   std::vector<DeviceClock> clocks;           ///< per device

@@ -21,6 +21,15 @@ inline void on_chosen(CLI::App& subcommand, Work& chosen, Work work) {
 
 // One function a subcommand, one file a function (command_NAME.cpp).
 
+/// `imuscope run CONFIG`
+void add_run(CLI::App& app, Work& chosen);
+
+/// `imuscope replay INPUT...`
+void add_replay(CLI::App& app, Work& chosen);
+
+/// `imuscope process INPUT...`
+void add_process(CLI::App& app, Work& chosen);
+
 /// `imuscope report RUN_DIR`
 void add_report(CLI::App& app, Work& chosen);
 

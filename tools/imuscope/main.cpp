@@ -1,4 +1,6 @@
 #include <fmt/format.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
 #include <exception>
 
 #include "commands.h"
@@ -10,6 +12,9 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", IMUSCOPE_VERSION);
   imuscope::cli::Work work;
+  imuscope::cli::add_run(app, work);
+  imuscope::cli::add_replay(app, work);
+  imuscope::cli::add_process(app, work);
   imuscope::cli::add_report(app, work);
   try {
     app.parse(argc, argv);
@@ -17,6 +22,9 @@ int run(int argc, char** argv) {
     constexpr int kExitUsage = 2;
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
+  // Results go to stdout, the log to stderr.
+  spdlog::set_default_logger(spdlog::stderr_color_mt("imuscope"));
+  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
   const auto result = work();
   if (result) return 0;
   fmt::print(stderr, "imuscope: {}\n", result.error().text());

@@ -1,0 +1,88 @@
+#include "service/byte_source.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+
+#include "capture/capture_reader.h"
+#include "capture/raw_dump.h"
+
+namespace imuscope {
+
+namespace {
+
+/// Bytes without stamps are handed out in pieces so small that what is decoded from one always fits a ring.
+constexpr std::size_t kUnstampedPiece = 4096;
+
+class RawDumpSource final : public ByteSource {
+ public:
+  RawDumpSource(RawDump dump, std::uint64_t total) : dump_(std::move(dump)), total_(total) {}
+
+  Result<std::optional<RecordedRead>> next() override {
+    if (rest_.empty()) {
+      const auto read = dump_.next();
+      if (!read) return std::optional<RecordedRead>{};
+      arrival_ = read->arrival;
+      rest_ = read->bytes;
+    }
+    const std::size_t n = arrival_ ? rest_.size() : std::min(rest_.size(), kUnstampedPiece);
+    const RecordedRead piece{arrival_, rest_.first(n)};
+    rest_ = rest_.subspan(n);
+    read_ += n;
+    return std::optional<RecordedRead>{piece};
+  }
+  [[nodiscard]] std::uint64_t bytes_read() const override { return read_; }
+  [[nodiscard]] std::uint64_t bytes_total() const override { return total_; }
+
+ private:
+  RawDump dump_;
+  std::uint64_t total_;
+  std::uint64_t read_ = 0;
+  std::optional<HostTime> arrival_;
+  std::span<const std::uint8_t> rest_;
+};
+
+/// One device's reads out of a capture; what was written to devices is passed over.
+class CaptureSource final : public ByteSource {
+ public:
+  CaptureSource(CaptureReader reader, std::string device, std::uint64_t total)
+      : reader_(std::move(reader)), device_(std::move(device)), total_(total) {}
+
+  Result<std::optional<RecordedRead>> next() override {
+    for (;;) {
+      auto read = reader_.next();
+      if (!read) return std::optional<RecordedRead>{};
+      if (read->device != device_ || read->direction != Direction::kRead) continue;
+      current_ = std::move(*read);
+      read_ += current_.bytes.size();
+      return std::optional<RecordedRead>{RecordedRead{current_.arrival, current_.bytes}};
+    }
+  }
+  [[nodiscard]] std::uint64_t bytes_read() const override { return read_; }
+  [[nodiscard]] std::uint64_t bytes_total() const override { return total_; }
+
+ private:
+  CaptureReader reader_;
+  std::string device_;
+  std::uint64_t total_;
+  std::uint64_t read_ = 0;
+  RawRead current_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file) {
+  auto dump = RawDump::open(file);
+  if (!dump) return tl::unexpected<Error>(dump.error());
+  std::error_code code;
+  const auto size = std::filesystem::file_size(file, code);
+  return std::make_unique<RawDumpSource>(std::move(*dump), code ? 0 : size);
+}
+
+Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::path& capture,
+                                                         const std::string& device, std::uint64_t bytes) {
+  auto reader = CaptureReader::open(capture);
+  if (!reader) return tl::unexpected<Error>(reader.error());
+  return std::make_unique<CaptureSource>(std::move(*reader), device, bytes);
+}
+
+}  // namespace imuscope

@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include "base/units.h"
+#include "service/study.h"
+
+namespace imuscope {
+
+namespace {
+
+std::string_view method_name(double value) {
+  switch (static_cast<InitialisationMethod>(static_cast<int>(value))) {
+    case InitialisationMethod::kConfigured:
+      return "the configured attitude";
+    case InitialisationMethod::kReferenceAttitude:
+      return "the R-IMU's own attitude";
+    case InitialisationMethod::kGyrocompass:
+      return "levelling and gyrocompassing at rest";
+    case InitialisationMethod::kInMotion:
+      return "levelling at rest and heading from the motion";
+    case InitialisationMethod::kNone:
+      break;
+  }
+  return "nothing";
+}
+
+}  // namespace
+
+std::string describe(const Configuration& configuration, const EstimatorEvent& event) {
+  const std::string& name = configuration.devices[event.device].name;
+  switch (event.kind) {
+    case EstimatorEventKind::kNavigationStarted:
+      return fmt::format("navigation started from {}", method_name(event.value));
+    case EstimatorEventKind::kNavigationStopped:
+      return fmt::format(
+          "navigation stopped: the reference was silent for {:.2f} s; it starts again by itself",
+          event.value);
+    case EstimatorEventKind::kReferenceGap:
+      return fmt::format("{}: reference silent for {:.3f} s; check its cable and baud rate if this repeats",
+                         name, event.value);
+    case EstimatorEventKind::kReferenceGravityWrong:
+      return fmt::format(
+          "{}: at standstill its specific force along b's z axis is {:+.2f} m/s^2 and should be near -9.8: "
+          "check `axes` in the configuration (b is forward-right-down)",
+          name, event.value);
+    case EstimatorEventKind::kCoarseAlignmentDone:
+      return fmt::format("{}: mounting found, residual {:.2f} deg", name, event.value * kDegPerRad);
+    case EstimatorEventKind::kCoarseAlignmentPoor:
+      return fmt::format(
+          "{}: motion does not fit one mounting (residual {:.1f} deg): loose mount, swapped sensor or "
+          "mirrored axes?",
+          name, event.value * kDegPerRad);
+    case EstimatorEventKind::kMountingChanged:
+      return fmt::format(
+          "{}: it sits differently than before (mean NIS {:.1f}); its calibration starts again", name,
+          event.value);
+    case EstimatorEventKind::kStudyReturned:
+      return fmt::format("{}: back after {:.2f} s of silence", name, event.value);
+    case EstimatorEventKind::kGnssRejected:
+      return fmt::format("{}: solutions rejected (NIS {:.0f})", name, event.value);
+    case EstimatorEventKind::kGnssReacquired:
+      return fmt::format("{}: solutions accepted again after {:.1f} s", name, event.value);
+    case EstimatorEventKind::kCovarianceRepaired:
+      return fmt::format("numerical trouble: variance of state {:.0f} was repaired; please keep the capture",
+                         event.value);
+  }
+  return "unknown event";
+}
+
+}  // namespace imuscope

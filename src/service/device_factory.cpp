@@ -1,0 +1,90 @@
+#include "service/device_factory.h"
+
+#include <fmt/format.h>
+
+#include "drivers/csv/decoder.h"
+#include "drivers/greis/decoder.h"
+#include "drivers/greis/session.h"
+#include "drivers/ixblue_stdbin/decoder.h"
+#include "drivers/ixblue_stdbin/session.h"
+#include "drivers/xsens_mt/decoder.h"
+#include "drivers/xsens_mt/session.h"
+
+namespace imuscope {
+
+namespace {
+
+/// Baud rate with which a byte's time on the wire is computed: that of the configured line, also for a
+/// recording that was made from it.
+double baud_of(const DeviceConfig& device) { return device.serial ? device.serial->baud : 0.0; }
+
+std::unique_ptr<DeviceDecoder> make_xsens(const DeviceConfig& device, DeviceIndex index,
+                                          const ClockMapConfig& clock) {
+  xsens::MtDecoderConfig config;
+  config.device = index;
+  config.rate_hz = device.rate_hz;
+  config.baud = baud_of(device);
+  config.axes = device.axes;
+  config.clock = clock;
+  return std::make_unique<xsens::MtDecoder>(config);
+}
+
+std::unique_ptr<DeviceDecoder> make_stdbin(const DeviceConfig& device, DeviceIndex index,
+                                           const ClockMapConfig& clock) {
+  return std::make_unique<ixblue_stdbin::Decoder>(
+      ixblue_stdbin::DecoderConfig{index, device.axes, baud_of(device), clock});
+}
+
+std::unique_ptr<DeviceDecoder> make_greis(const DeviceConfig& device, DeviceIndex index,
+                                          const ClockMapConfig& clock) {
+  return std::make_unique<greis::Decoder>(
+      greis::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), baud_of(device), clock});
+}
+
+}  // namespace
+
+std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIndex index,
+                                            const ClockMapConfig& clock) {
+  switch (device.protocol) {
+    case Protocol::kXsensMt:
+      return make_xsens(device, index, clock);
+    case Protocol::kIxblueStdbin:
+      return make_stdbin(device, index, clock);
+    case Protocol::kGreis:
+      return make_greis(device, index, clock);
+    case Protocol::kCsvImu:
+    case Protocol::kCsvGnss:
+      break;
+  }
+  return nullptr;
+}
+
+std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device) {
+  switch (device.protocol) {
+    case Protocol::kXsensMt: {
+      xsens::MtSessionConfig config;
+      config.output = xsens::MtSessionConfig::Output::kAsDevice;
+      config.rate_hz = device.rate_hz;
+      config.baud = baud_of(device);
+      return std::make_unique<xsens::MtSession>(config);
+    }
+    case Protocol::kIxblueStdbin:
+      return std::make_unique<ixblue_stdbin::Session>();
+    case Protocol::kGreis:
+      return std::make_unique<greis::Session>(greis::SessionConfig{from_seconds(1.0 / device.rate_hz), true});
+    case Protocol::kCsvImu:
+    case Protocol::kCsvGnss:
+      break;
+  }
+  return nullptr;
+}
+
+std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& decoder) {
+  if (device.protocol == Protocol::kIxblueStdbin) {
+    return std::string(
+        ixblue_stdbin::describe(static_cast<const ixblue_stdbin::Decoder&>(decoder).raw_blocks()));
+  }
+  return {};
+}
+
+}  // namespace imuscope

@@ -1,0 +1,199 @@
+#include "service/io_thread.h"
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+#include <unistd.h>
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <future>
+
+#include "rt/host_clock.h"
+
+namespace imuscope {
+
+namespace {
+
+/// A read takes what a burst can bring: 4 kB is 350 ms of a line at 115200 baud.
+constexpr std::size_t kReadBytes = 4096;
+/// Sessions are polled at least this often (device.h asks for 10 ms).
+constexpr int kPoll_ms = 5;
+constexpr Duration kStatusPeriod = std::chrono::milliseconds(100);
+constexpr std::size_t kPrefaultedStack = 128 * 1024;
+
+}  // namespace
+
+/// One device's line, decoder and books.
+class IoThread::Line final : public SampleSink {
+ public:
+  Line(DeviceIndex index, SampleRing& ring, ExceptionRing& exceptions, std::unique_ptr<DeviceDecoder> decoder)
+      : index_(index), ring_(ring), exceptions_(exceptions), decoder_(std::move(decoder)) {}
+  ~Line() override {
+    delete offered_.load();
+    delete returned_.load();
+    delete connection_;
+  }
+  Line(const Line&) = delete;
+  Line& operator=(const Line&) = delete;
+
+  void on_sample(const Sample& sample) noexcept override {
+    newest_arrival_ = std::max(newest_arrival_, sample.arrival);
+    status_.latency_s = to_seconds(sample.arrival - sample.time);
+    if (ring_.try_push(sample)) return;
+    ++status_.refused;
+    (void)exceptions_.try_push(
+        {ExceptionKind::kRefusedSample, index_, static_cast<std::int64_t>(sample.sequence), -1, 1});
+  }
+
+  /// Supervisor's side.
+  void offer(Connection* connection) { delete offered_.exchange(connection, std::memory_order_acq_rel); }
+  [[nodiscard]] Connection* take_back() { return returned_.exchange(nullptr, std::memory_order_acq_rel); }
+  [[nodiscard]] LineStatus status() {
+    (void)published_.take();
+    return published_.value();
+  }
+
+  /// I/O thread's side.
+  void adopt(int epoll) noexcept {
+    if (connection_ != nullptr || offered_.load(std::memory_order_relaxed) == nullptr) return;
+    connection_ = offered_.exchange(nullptr, std::memory_order_acq_rel);
+    epoll_event event{};
+    event.events = EPOLLIN;
+    event.data.ptr = this;
+    (void)epoll_ctl(epoll, EPOLL_CTL_ADD, connection_->port.fd(), &event);
+    status_.line = LineState::kOpen;
+  }
+
+  void read(RawTap& tap, int epoll) noexcept {
+    for (int i = 0; i < kReadsPerWake && connection_ != nullptr; ++i) {
+      const auto result = connection_->port.read(buffer_);
+      if (result.status == IoStatus::kGone) give_back(epoll);
+      if (result.status != IoStatus::kDone) return;
+      const HostTime arrival = host_now();
+      const std::span<const std::uint8_t> bytes(buffer_.data(), result.n);
+      tap.record(index_, Direction::kRead, bytes, arrival);
+      decoder_->push(bytes, arrival, *this);
+      connection_->session->on_bytes(bytes, arrival);
+      status_.last_arrival = arrival;
+      ++status_.reads;
+      if (result.n < buffer_.size()) return;
+    }
+  }
+
+  void say(RawTap& tap, HostTime now) noexcept {
+    if (connection_ == nullptr) return;
+    const auto bytes = connection_->session->poll(now);
+    if (bytes.empty()) return;
+    const auto result = connection_->port.write(bytes);
+    if (result.status == IoStatus::kDone) tap.record(index_, Direction::kWrite, bytes.first(result.n), now);
+  }
+
+  void publish(HostTime now) noexcept {
+    if (now - last_status_ < kStatusPeriod) return;
+    last_status_ = now;
+    status_.counters = decoder_->counters();
+    if (connection_ != nullptr) {
+      status_.session = connection_->session->state();
+      const auto problem = connection_->session->problem();
+      const std::size_t n = std::min(problem.size(), status_.problem.size() - 1);
+      std::memcpy(status_.problem.data(), problem.data(), n);
+      status_.problem[n] = '\0';
+    }
+    published_.write(status_);
+  }
+
+  [[nodiscard]] HostTime newest_arrival() const { return newest_arrival_; }
+
+ private:
+  static constexpr int kReadsPerWake = 4;
+
+  void give_back(int epoll) noexcept {
+    (void)epoll_ctl(epoll, EPOLL_CTL_DEL, connection_->port.fd(), nullptr);
+    // The slot is empty: the supervisor offers a new connection only after it took the old one back.
+    returned_.store(connection_, std::memory_order_release);
+    connection_ = nullptr;
+    status_.line = LineState::kClosed;
+    status_.session = SessionState::kConnecting;
+  }
+
+  DeviceIndex index_;
+  SampleRing& ring_;
+  ExceptionRing& exceptions_;
+  std::unique_ptr<DeviceDecoder> decoder_;
+  Connection* connection_ = nullptr;
+  std::atomic<Connection*> offered_{nullptr};
+  std::atomic<Connection*> returned_{nullptr};
+  std::array<std::uint8_t, kReadBytes> buffer_{};
+  LineStatus status_;
+  HostTime last_status_{};
+  HostTime newest_arrival_{HostTime::min()};
+  LatestValue<LineStatus> published_;
+};
+
+IoThread::IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders)
+    : raw_ring_(std::make_unique<RawRing>()),
+      exceptions_(std::make_unique<ExceptionRing>()),
+      tap_(*raw_ring_) {
+  for (std::size_t i = 0; i < decoders.size(); ++i) {
+    const auto index = static_cast<DeviceIndex>(i);
+    lines_.push_back(std::make_unique<Line>(index, core.ring(index), *exceptions_, std::move(decoders[i])));
+  }
+}
+
+IoThread::~IoThread() {
+  stop();
+  if (epoll_ >= 0) ::close(epoll_);
+}
+
+Result<void> IoThread::start(const ThreadPlan& plan, std::vector<Error>& refusals) {
+  epoll_ = epoll_create1(EPOLL_CLOEXEC);
+  if (epoll_ < 0) {
+    return work_error(fmt::format("no epoll descriptor: {}", std::strerror(errno)),
+                      "raise the limit of open files");
+  }
+  running_.store(true, std::memory_order_release);
+  std::promise<std::vector<Error>> ready;
+  auto refused = ready.get_future();
+  thread_ = std::thread([this, plan, &ready] {
+    auto errors = setup_this_thread(plan);
+    prefault_stack(kPrefaultedStack);
+    ready.set_value(std::move(errors));
+    loop();
+  });
+  for (auto& error : refused.get()) refusals.push_back(std::move(error));
+  return {};
+}
+
+void IoThread::stop() {
+  running_.store(false, std::memory_order_release);
+  if (thread_.joinable()) thread_.join();
+  for (const auto& line : lines_) newest_arrival_ = std::max(newest_arrival_, line->newest_arrival());
+}
+
+void IoThread::offer(DeviceIndex device, std::unique_ptr<Connection> connection) {
+  lines_[device]->offer(connection.release());
+}
+
+std::unique_ptr<Connection> IoThread::take_back(DeviceIndex device) {
+  return std::unique_ptr<Connection>(lines_[device]->take_back());
+}
+
+LineStatus IoThread::status(DeviceIndex device) { return lines_[device]->status(); }
+
+void IoThread::loop() {
+  std::array<epoll_event, kMaxDevices> events{};
+  while (running_.load(std::memory_order_acquire)) {
+    for (const auto& line : lines_) line->adopt(epoll_);
+    const int n = epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), kPoll_ms);
+    for (int i = 0; i < n; ++i) {
+      static_cast<Line*>(events[static_cast<std::size_t>(i)].data.ptr)->read(tap_, epoll_);
+    }
+    const HostTime now = host_now();
+    for (const auto& line : lines_) {
+      line->say(tap_, now);
+      line->publish(now);
+    }
+  }
+}
+
+}  // namespace imuscope

@@ -1,0 +1,86 @@
+#pragma once
+
+/// The I/O thread: waits for bytes on every line, stamps their arrival, hands them to the recorder and to the
+/// device's decoder, and says to each device what its session wants said. Core: after start() it neither
+/// allocates nor locks nor opens anything; lines are opened by the supervisor and handed over through an
+/// atomic pointer.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "capture/raw_chunk.h"
+#include "capture/records.h"
+#include "drivers/device/device.h"
+#include "drivers/transport/serial_port.h"
+#include "rt/latest_value.h"
+#include "rt/thread_setup.h"
+#include "service/core.h"
+
+namespace imuscope {
+
+/// An open line and the conversation on it. Made and destroyed by the supervisor, used by the I/O thread.
+struct Connection {
+  SerialPort port;
+  std::unique_ptr<DeviceSession> session;
+};
+
+enum class LineState : std::uint8_t { kClosed, kOpen };
+
+/// What the I/O thread says of one device, ten times a second.
+struct LineStatus {
+  LineState line = LineState::kClosed;
+  SessionState session = SessionState::kConnecting;
+  DecoderCounters counters{};
+  std::uint64_t refused = 0;  ///< samples that found the ring to the core full
+  std::uint64_t reads = 0;
+  double latency_s = 0.0;  ///< arrival minus mapped time of the last sample
+  HostTime last_arrival{};
+  std::array<char, 200> problem{};  ///< of the session; NUL-terminated
+};
+static_assert(std::is_trivially_copyable_v<LineStatus>);
+
+class IoThread {
+ public:
+  /// @param decoders  one a device
+  IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders);
+  ~IoThread();
+  IoThread(const IoThread&) = delete;
+  IoThread& operator=(const IoThread&) = delete;
+
+  /// @param[out] refusals  what the system refused of the plan, appended
+  Result<void> start(const ThreadPlan& plan, std::vector<Error>& refusals);
+  /// Ends the loop and joins. No byte is read after it returns.
+  void stop();
+
+  /// Hands a connection to the thread. Supervisor only; one may wait at a time.
+  void offer(DeviceIndex device, std::unique_ptr<Connection> connection);
+  /// Takes back a connection whose device vanished, to be destroyed and opened anew. Supervisor only.
+  [[nodiscard]] std::unique_ptr<Connection> take_back(DeviceIndex device);
+
+  /// Newest status of a device. One reader: the publisher.
+  [[nodiscard]] LineStatus status(DeviceIndex device);
+
+  [[nodiscard]] RawRing& raw_ring() { return *raw_ring_; }
+  [[nodiscard]] ExceptionRing& exceptions() { return *exceptions_; }
+  /// Arrival of the newest sample pushed; valid after stop().
+  [[nodiscard]] HostTime newest_arrival() const { return newest_arrival_; }
+
+ private:
+  class Line;
+  void loop();
+
+  std::vector<std::unique_ptr<Line>> lines_;
+  std::unique_ptr<RawRing> raw_ring_;
+  std::unique_ptr<ExceptionRing> exceptions_;
+  RawTap tap_;
+  int epoll_ = -1;
+  HostTime newest_arrival_{HostTime::min()};
+  std::atomic<bool> running_{false};
+  std::thread thread_;
+};
+
+}  // namespace imuscope

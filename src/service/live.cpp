@@ -1,0 +1,181 @@
+#include "service/live.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "capture/recorder.h"
+#include "noise/model.h"
+#include "rt/host_clock.h"
+#include "rt/thread_setup.h"
+#include "service/core_thread.h"
+#include "service/device_factory.h"
+#include "service/estimator_setup.h"
+#include "service/io_thread.h"
+#include "service/live_publisher.h"
+#include "service/study.h"
+
+namespace imuscope {
+
+namespace {
+
+constexpr int kIoPriority = 80;
+constexpr int kEstimatorPriority = 70;
+/// Stacks are locked in full; the deepest core call needs far less.
+constexpr std::size_t kThreadStackBytes = 1024 * 1024;
+constexpr auto kSupervisorPeriod = std::chrono::milliseconds(100);
+constexpr Duration kReopenFirst = std::chrono::milliseconds(200);
+constexpr Duration kReopenLongest = std::chrono::seconds(5);
+/// From now to tick 0: the threads start meanwhile.
+constexpr Duration kStartDelay = std::chrono::milliseconds(100);
+
+/// Opens lines, again and again with growing pauses where they are missing, and tells what changed.
+class Supervisor {
+ public:
+  Supervisor(const Configuration& configuration, IoThread& io) : configuration_(configuration), io_(io) {
+    lines_.resize(configuration.devices.size());
+  }
+
+  void step(HostTime now) {
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      if (configuration_.devices[i].serial) step_line(static_cast<DeviceIndex>(i), now);
+    }
+  }
+
+ private:
+  struct Line {
+    bool open = false;
+    HostTime next_try{};
+    Duration pause = kReopenFirst;
+    std::string last_problem;
+  };
+
+  void step_line(DeviceIndex index, HostTime now) {
+    auto& line = lines_[index];
+    const auto& device = configuration_.devices[index];
+    if (auto gone = io_.take_back(index)) {
+      spdlog::warn("{}: {} is gone; trying to open it again", device.name, device.serial->port);
+      line.open = false;
+      line.pause = kReopenFirst;
+      line.next_try = now + line.pause;
+    }
+    if (line.open || now < line.next_try) return;
+    auto port = SerialPort::open({device.serial->port, device.serial->baud, device.serial->stop_bits});
+    if (!port) {
+      // Said once, and again when the reason changes: a log is no place for a heartbeat.
+      const auto text = port.error().text();
+      if (text != line.last_problem) spdlog::error("{}: {}", device.name, text);
+      line.last_problem = text;
+      line.next_try = now + line.pause;
+      line.pause = std::min(line.pause * 2, kReopenLongest);
+      return;
+    }
+    spdlog::info("{}: {} open at {:.0f} baud", device.name, device.serial->port, port->baud());
+    io_.offer(index, std::make_unique<Connection>(Connection{std::move(*port), make_session(device)}));
+    line = {true, {}, kReopenFirst, {}};
+  }
+
+  const Configuration& configuration_;
+  IoThread& io_;
+  std::vector<Line> lines_;
+};
+
+RunHeader run_header(const Configuration& configuration, const LiveOptions& options, HostTime t0) {
+  RunHeader header;
+  header.name = configuration.run_name;
+  header.version = options.version;
+  header.build = __VERSION__;
+  header.t0 = t0;
+  header.period = kTickPeriod;
+  header.t0_wall = wall_clock_now() + (t0 - host_now());
+  header.configuration = configuration.text;
+  header.configuration_hash = configuration.sha256;
+  for (const auto& device : configuration.devices) header.devices.push_back(device.name);
+  return header;
+}
+
+void log_refusals(const std::vector<Error>& refusals) {
+  for (const auto& refusal : refusals) spdlog::warn("{}", refusal.text());
+}
+
+Result<void> check_lines(const Configuration& configuration) {
+  for (const auto& device : configuration.devices) {
+    if (device.serial) continue;
+    return usage_error(
+        fmt::format("{}: device '{}' has no transport, so it cannot be run live", configuration.file.string(),
+                    device.name),
+        "give it transport = { kind = \"serial\", port = ..., baud = ... }, or use imuscope process");
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> run_live(const Configuration& configuration, const LiveOptions& options,
+                      const std::atomic<bool>& stop) {
+  if (auto checked = check_lines(configuration); !checked) return checked;
+  const auto spec = noise::parse_model(configuration.noise.model);
+  if (!spec) return tl::unexpected<Error>(spec.error());
+  if (auto sized = set_thread_stack_size(kThreadStackBytes); !sized) spdlog::warn("{}", sized.error().text());
+
+  Core core(estimator_config(configuration), configuration.devices.size());
+  std::vector<std::unique_ptr<DeviceDecoder>> decoders;
+  for (std::size_t i = 0; i < configuration.devices.size(); ++i) {
+    decoders.push_back(make_decoder(configuration.devices[i], static_cast<DeviceIndex>(i), ClockMapConfig{}));
+  }
+  IoThread io(core, std::move(decoders));
+  const HostTime t0{((host_now() + kStartDelay).time_since_epoch() / kTickPeriod) * kTickPeriod};
+  CoreThread estimator(core, t0);
+
+  auto publisher = LivePublisher::create(configuration, *spec, options, io, estimator);
+  if (!publisher) return tl::unexpected<Error>(publisher.error());
+  auto recorder = Recorder::start(
+      {options.out / "capture.lcm", configuration.lcm.channel_prefix, run_header(configuration, options, t0)},
+      {&io.raw_ring()}, {&io.exceptions(), &estimator.rings().exceptions});
+  if (!recorder) return tl::unexpected<Error>(recorder.error());
+  (*publisher)->set_recorder(**recorder);
+
+  std::vector<Error> refusals;
+  if (auto locked = lock_memory(); !locked) refusals.push_back(locked.error());
+  if (auto started = io.start({"imuscope-io", Scheduling::kFifo, kIoPriority, {}}, refusals); !started)
+    return started;
+  estimator.start({"imuscope-est", Scheduling::kFifo, kEstimatorPriority, {}}, refusals);
+  (*publisher)->start();
+  log_refusals(refusals);
+  (*publisher)->set_refusals(refusals);
+  spdlog::info("running '{}' into {}; Ctrl-C ends it", configuration.run_name, options.out.string());
+
+  Supervisor supervisor(configuration, io);
+  const HostTime started = host_now();
+  const auto over = [&] {
+    return options.duration_s && host_now() - started > from_seconds(*options.duration_s);
+  };
+  while (!stop.load(std::memory_order_relaxed) && !over()) {
+    supervisor.step(host_now());
+    std::this_thread::sleep_for(kSupervisorPeriod);
+  }
+
+  // In the order of the flow, so that nothing is lost: no more bytes, then their last tick, then what came of
+  // it.
+  spdlog::info("ending: estimating, recording and writing what has arrived");
+  io.stop();
+  const auto tail =
+      io.newest_arrival() > HostTime::min() ? (io.newest_arrival() - t0) / kTickPeriod + kTailTicks : 0;
+  estimator.finish(tail);
+  auto written = (*publisher)->finish(estimator.last_tick());
+  auto recorded = (*recorder)->stop();
+  if (!recorded) return recorded;
+  if (!written) return written;
+  if (io.newest_arrival() == HostTime::min()) {
+    return work_error("no device ever sent a sample",
+                      "check power, cables and baud rates; the log above names each line");
+  }
+  spdlog::info("recorded {} ({:.1f} MB); replay it with: imuscope replay {}",
+               (*recorder)->status().path.string(), static_cast<double>((*recorder)->status().bytes) * 1e-6,
+               (*recorder)->status().path.string());
+  return {};
+}
+
+}  // namespace imuscope

@@ -1,0 +1,302 @@
+#include "service/live_publisher.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+
+#include "rt/host_clock.h"
+#include "service/study.h"
+
+namespace imuscope {
+
+namespace {
+
+constexpr auto kDrainPeriod = std::chrono::milliseconds(10);
+constexpr Duration kStatusPeriod = std::chrono::seconds(1);
+
+constexpr std::array kSessionNames{"connecting", "configuring", "streaming", "failed"};
+constexpr std::array kStudyNames{"waiting for samples", "looking for its mounting", "converging",
+                                 "calibrated"};
+
+std::uint64_t resident_memory_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  std::uint64_t total = 0;
+  std::uint64_t resident = 0;
+  statm >> total >> resident;
+  return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+template <typename Ring>
+StatusReport::Ring ring_status(const char* name, const Ring& ring) {
+  const auto counters = ring.counters();
+  return {name, Ring::capacity(), counters.level, counters.high_water, counters.refused};
+}
+
+}  // namespace
+
+LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpec spec,
+                             const LiveOptions& options, IoThread& io, CoreThread& estimator)
+    : configuration_(configuration),
+      options_(options),
+      io_(io),
+      estimator_(estimator),
+      study_devices_(configuration.study_indices()),
+      modeller_(configuration, std::move(spec)),
+      watches_(configuration.devices.size()),
+      lines_(configuration.devices.size()),
+      study_states_(study_devices_.size(), StudyStatus::kWaiting),
+      started_(host_now()) {
+  anchor_ = {started_, wall_clock_now()};
+}
+
+LivePublisher::~LivePublisher() {
+  running_.store(false, std::memory_order_release);
+  if (thread_.joinable()) thread_.join();
+}
+
+Result<std::unique_ptr<LivePublisher>> LivePublisher::create(const Configuration& configuration,
+                                                             noise::ModelSpec spec,
+                                                             const LiveOptions& options, IoThread& io,
+                                                             CoreThread& estimator) {
+  std::unique_ptr<LivePublisher> publisher(
+      new LivePublisher(configuration, std::move(spec), options, io, estimator));
+  std::vector<StudyFileInfo> infos;
+  for (const auto index : publisher->study_devices_)
+    infos.push_back({configuration.devices[index].name, 0.0});
+  auto folder = RunFolder::create(options.out, std::move(infos), true);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  publisher->folder_ = std::move(*folder);
+  auto bus = LcmPublisher::open(configuration.lcm.url, configuration.lcm.channel_prefix);
+  if (bus) {
+    publisher->bus_.emplace(std::move(*bus));
+  } else if (bus.error().kind == ErrorKind::kUsage) {
+    return tl::unexpected<Error>(bus.error());
+  } else {
+    spdlog::warn("nothing is published over LCM: {}", bus.error().text());
+    publisher->refusals_.push_back(bus.error().text());
+  }
+  return publisher;
+}
+
+void LivePublisher::set_refusals(const std::vector<Error>& refusals) {
+  const std::lock_guard lock(refusals_mutex_);
+  for (const auto& refusal : refusals) refusals_.push_back(refusal.text());
+}
+
+void LivePublisher::start() {
+  modeller_.start({"imuscope-model", Scheduling::kIdle, 0, {}});
+  running_.store(true, std::memory_order_release);
+  thread_ = std::thread([this] {
+    (void)setup_this_thread({"imuscope-pub", Scheduling::kNormal, 0, {}});
+    loop();
+  });
+}
+
+void LivePublisher::loop() {
+  while (running_.load(std::memory_order_acquire)) {
+    drain();
+    const HostTime now = host_now();
+    if (now - last_status_ >= kStatusPeriod) {
+      watch_devices(now);
+      publish_status(now);
+      last_status_ = now;
+    }
+    std::this_thread::sleep_for(kDrainPeriod);
+  }
+}
+
+void LivePublisher::drain() {
+  auto& rings = estimator_.rings();
+  EstimatorEvent event;
+  while (rings.events.try_pop(event)) {
+    spdlog::info("{}", describe(configuration_, event));
+    folder_->on_event(event);
+  }
+  ErrorRecord record;
+  while (rings.errors.try_pop(record)) on_error(record);
+  while (const Snapshot* snapshot = rings.snapshots.front()) {
+    on_snapshot(*snapshot);
+    rings.snapshots.pop();
+  }
+  for (const auto& refit : modeller_.take()) on_refit(refit);
+}
+
+void LivePublisher::on_error(const ErrorRecord& record) {
+  folder_->on_error(record);
+  modeller_.add(record);
+  if (!bus_) return;
+  const auto device = study_devices_[record.study];
+  bus_->publish(error_report(record, static_cast<DeviceIndex>(device), anchor_),
+                configuration_.devices[device].name);
+}
+
+void LivePublisher::on_snapshot(const Snapshot& snapshot) {
+  last_ = snapshot;
+  folder_->on_snapshot(snapshot);
+  if (snapshot.has_utc && !anchored_by_device_) {
+    anchor_ = {snapshot.first_reference_time, snapshot.first_reference_utc};
+    anchored_by_device_ = true;
+  }
+  for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
+    const auto state = snapshot.studies[i].status;
+    if (state == study_states_[i]) continue;
+    study_states_[i] = state;
+    spdlog::info("{}: {}", configuration_.devices[study_devices_[i]].name,
+                 kStudyNames[static_cast<std::size_t>(state)]);
+  }
+  if (!bus_) return;
+  if (snapshot.navigation.status == NavigationStatus::kNavigating) {
+    bus_->publish(navigation_report(snapshot, anchor_));
+  }
+  for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
+    const auto state = snapshot.studies[i].status;
+    if (state != StudyStatus::kConverging && state != StudyStatus::kCalibrated) continue;
+    const auto device = study_devices_[i];
+    bus_->publish(calibration_report(snapshot, i, static_cast<DeviceIndex>(device), anchor_),
+                  configuration_.devices[device].name);
+  }
+}
+
+void LivePublisher::on_refit(const Refit& refit) {
+  ++refits_;
+  refit_duration_s_ = refit.duration_s;
+  Refit stamped = refit;
+  stamped.wavelet_variance.utc = stamped.noise_model.utc = anchor_.at(refit.time);
+  stamped.wavelet_variance.time_s = stamped.noise_model.time_s =
+      to_seconds(refit.time - refit.first_reference_time);
+  spdlog::info("{}: noise models fitted anew ({} of them, {:.0f} ms)", refit.noise_model.name,
+               refit.noise_model.models.size(), refit.duration_s * 1e3);
+  if (!bus_) return;
+  bus_->publish(stamped.wavelet_variance);
+  bus_->publish(stamped.noise_model);
+}
+
+void LivePublisher::watch_devices(HostTime now) {
+  for (std::size_t i = 0; i < lines_.size(); ++i) {
+    const auto status = io_.status(static_cast<DeviceIndex>(i));
+    lines_[i] = status;
+    auto& watch = watches_[i];
+    const auto& name = configuration_.devices[i].name;
+    const double seconds = std::max(to_seconds(now - last_status_), 1e-3);
+    watch.rate_hz = static_cast<double>(status.counters.samples - watch.samples) / seconds;
+    watch.samples = status.counters.samples;
+    const std::string problem(status.problem.data());
+    if (problem != watch.problem && !problem.empty()) spdlog::warn("{}: {}", name, problem);
+    watch.problem = problem;
+    if (status.session != watch.session) {
+      spdlog::info("{}: {}", name, kSessionNames[static_cast<std::size_t>(status.session)]);
+      watch.session = status.session;
+    }
+  }
+}
+
+StatusReport::Device LivePublisher::device_status(std::size_t index) const {
+  const auto& device = configuration_.devices[index];
+  const auto& status = lines_[index];
+  StatusReport::Device report;
+  report.name = device.name;
+  report.role = name_of(device.role);
+  report.protocol = name_of(device.protocol);
+  report.state =
+      status.line == LineState::kOpen ? kSessionNames[static_cast<std::size_t>(status.session)] : "no line";
+  report.problem = watches_[index].problem;
+  report.rate_hz = watches_[index].rate_hz;
+  report.bytes = status.counters.bytes;
+  report.bytes_skipped = status.counters.bytes_skipped;
+  report.frames = status.counters.frames;
+  report.bad_checksums = status.counters.bad_checksums;
+  report.samples = status.counters.samples;
+  report.samples_lost = status.counters.samples_lost;
+  report.samples_refused = status.refused;
+  report.clock_resets = status.counters.clock_resets;
+  if (status.counters.samples > 0) report.latency_s = status.latency_s;
+  const auto study = std::find(study_devices_.begin(), study_devices_.end(), index);
+  if (last_ && study != study_devices_.end()) {
+    report.samples_late =
+        last_->studies[static_cast<std::size_t>(study - study_devices_.begin())].counters.late;
+  }
+  return report;
+}
+
+StatusReport LivePublisher::status(HostTime now) {
+  StatusReport report;
+  report.utc = anchor_.at(now);
+  report.run = configuration_.run_name;
+  report.version = options_.version;
+  report.uptime_s = to_seconds(now - started_);
+  report.tick = estimator_.last_tick();
+  report.refits = refits_;
+  report.refit_duration_s = refit_duration_s_;
+  report.resident_memory_bytes = resident_memory_bytes();
+  if (recorder_ != nullptr) {
+    const auto recorded = recorder_->status();
+    report.capture_path = recorded.path.string();
+    report.capture_bytes = recorded.bytes;
+    report.capture_lost = recorded.records_lost + io_.raw_ring().counters().refused;
+    if (recorded.problem) report.problems.push_back(recorded.problem->text());
+  }
+  bool all_streaming = true;
+  for (std::size_t i = 0; i < lines_.size(); ++i) {
+    report.devices.push_back(device_status(i));
+    if (lines_[i].session == SessionState::kStreaming) continue;
+    all_streaming = false;
+    if (report.reason.empty()) {
+      report.reason = fmt::format("{} is {}", report.devices.back().name, report.devices.back().state);
+    }
+  }
+  const auto beat = estimator_.statistics();
+  report.threads.push_back({"estimator", "100 Hz", beat.ticks, beat.overruns, beat.skipped,
+                            beat.lateness.quantile(0.5), beat.lateness.quantile(0.99),
+                            beat.lateness.quantile(0.999), beat.lateness.max()});
+  auto& rings = estimator_.rings();
+  report.rings.push_back(ring_status("errors", rings.errors));
+  report.rings.push_back(ring_status("snapshots", rings.snapshots));
+  report.rings.push_back(ring_status("events", rings.events));
+  report.rings.push_back(ring_status("raw bytes", io_.raw_ring()));
+  {
+    const std::lock_guard lock(refusals_mutex_);
+    report.problems.insert(report.problems.end(), refusals_.begin(), refusals_.end());
+  }
+  const bool calibrating = std::any_of(study_states_.begin(), study_states_.end(), [](StudyStatus state) {
+    return state == StudyStatus::kConverging || state == StudyStatus::kCalibrated;
+  });
+  if (!all_streaming) {
+    report.state = calibrating ? "degraded" : "starting";
+  } else {
+    report.state = calibrating ? "running" : "aligning";
+    report.reason = calibrating ? "all devices stream" : "waiting for motion that shows how the S-IMUs sit";
+  }
+  return report;
+}
+
+void LivePublisher::publish_status(HostTime now) {
+  if (bus_) bus_->publish(status(now));
+}
+
+Result<void> LivePublisher::finish(std::int64_t last_tick) {
+  running_.store(false, std::memory_order_release);
+  if (thread_.joinable()) thread_.join();
+  drain();
+  modeller_.stop();
+  drain();
+  watch_devices(host_now());
+  publish_status(host_now());
+  if (auto written = folder_->write_calibration(); !written) return written;
+  if (auto closed = folder_->close(); !closed) return closed;
+
+  Recording recording;
+  recording.inputs = {"live"};
+  recording.clocks.resize(lines_.size());
+  ReplayResult result;
+  result.ticks = last_tick + 1;
+  for (const auto& line : lines_)
+    result.devices.push_back({line.counters, line.refused, line.problem.data()});
+  RunDescription run{options_.version,          &configuration_,   &recording, &result,
+                     last_ ? &*last_ : nullptr, folder_->events(), {}};
+  return write_json(options_.out / "run.json", run_json(run));
+}
+
+}  // namespace imuscope

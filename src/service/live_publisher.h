@@ -1,0 +1,88 @@
+#pragma once
+
+/// The publisher's thread: takes what the core and the I/O thread put out, publishes it over LCM, writes the
+/// run folder and feeds the modeller. Soft world.
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "capture/recorder.h"
+#include "publish/lcm_publisher.h"
+#include "service/config.h"
+#include "service/core_thread.h"
+#include "service/io_thread.h"
+#include "service/live.h"
+#include "service/modeller.h"
+#include "service/report_values.h"
+#include "service/run_folder.h"
+
+namespace imuscope {
+
+class LivePublisher {
+ public:
+  /// Makes the run folder and opens the bus. Without a multicast route it works on without publishing and
+  /// says so.
+  static Result<std::unique_ptr<LivePublisher>> create(const Configuration& configuration,
+                                                       noise::ModelSpec spec, const LiveOptions& options,
+                                                       IoThread& io, CoreThread& estimator);
+  ~LivePublisher();
+  LivePublisher(const LivePublisher&) = delete;
+  LivePublisher& operator=(const LivePublisher&) = delete;
+
+  void set_recorder(const Recorder& recorder) { recorder_ = &recorder; }
+  /// What the system refused at start; repeated in every status message.
+  void set_refusals(const std::vector<Error>& refusals);
+  void start();
+  /// Publishes and writes what is left, closes the files. Call after the core's thread has ended.
+  [[nodiscard]] Result<void> finish(std::int64_t last_tick);
+
+ private:
+  LivePublisher(const Configuration& configuration, noise::ModelSpec spec, const LiveOptions& options,
+                IoThread& io, CoreThread& estimator);
+  void loop();
+  void drain();
+  void on_error(const ErrorRecord& record);
+  void on_snapshot(const Snapshot& snapshot);
+  void on_refit(const Refit& refit);
+  void watch_devices(HostTime now);
+  void publish_status(HostTime now);
+  [[nodiscard]] StatusReport status(HostTime now);
+  [[nodiscard]] StatusReport::Device device_status(std::size_t index) const;
+
+  const Configuration& configuration_;
+  LiveOptions options_;
+  IoThread& io_;
+  CoreThread& estimator_;
+  const Recorder* recorder_ = nullptr;
+  std::vector<std::size_t> study_devices_;
+  std::optional<LcmPublisher> bus_;
+  std::unique_ptr<RunFolder> folder_;
+  Modeller modeller_;
+  std::optional<Snapshot> last_;
+  UtcAnchor anchor_;
+  bool anchored_by_device_ = false;
+
+  struct DeviceWatch {
+    SessionState session = SessionState::kConnecting;
+    std::string problem;
+    std::uint64_t samples = 0;  ///< at the last status
+    double rate_hz = 0.0;
+  };
+  std::vector<DeviceWatch> watches_;
+  std::vector<LineStatus> lines_;
+  std::vector<StudyStatus> study_states_;
+  std::uint64_t refits_ = 0;
+  double refit_duration_s_ = kUnknown;
+  HostTime started_;
+  HostTime last_status_{};
+  std::mutex refusals_mutex_;
+  std::vector<std::string> refusals_;
+  std::atomic<bool> running_{false};
+  std::thread thread_;
+};
+
+}  // namespace imuscope

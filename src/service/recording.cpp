@@ -1,0 +1,244 @@
+#include "service/recording.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <algorithm>
+
+#include "capture/capture_reader.h"
+#include "service/device_factory.h"
+#include "service/toml_reader.h"
+
+namespace imuscope {
+
+namespace {
+
+class SampleCollector final : public SampleSink {
+ public:
+  explicit SampleCollector(std::vector<Sample>& samples) : samples_(samples) {}
+  void on_sample(const Sample& sample) noexcept override { samples_.push_back(sample); }
+
+ private:
+  std::vector<Sample>& samples_;
+};
+
+Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex index, ByteSource& source) {
+  std::vector<Sample> samples;
+  SampleCollector collector(samples);
+  const auto decoder = make_decoder(device, index, ClockMapConfig::fixed(HostTime{}, 1.0));
+  for (;;) {
+    auto read = source.next();
+    if (!read) return tl::unexpected<Error>(read.error());
+    if (!*read) break;
+    decoder->push((*read)->bytes, HostTime{}, collector);
+  }
+  decoder->finish(HostTime{}, collector);
+  if (samples.empty()) {
+    const auto problem = decoder_problem(device, *decoder);
+    if (!problem.empty()) return work_error(fmt::format("{}: {}", device.name, problem));
+    return work_error(fmt::format("{}: {} bytes, and not one {} sample in them", device.name,
+                                  decoder->counters().bytes, name_of(device.protocol)),
+                      "check that the file is this device's and the protocol is right");
+  }
+  return samples;
+}
+
+Result<std::vector<std::filesystem::path>> assign_files(const std::vector<std::string>& inputs,
+                                                        const Configuration& configuration) {
+  std::vector<std::string> names;
+  for (const auto& device : configuration.devices) names.push_back(device.name);
+  std::vector<std::filesystem::path> files(names.size());
+  for (const auto& input : inputs) {
+    const auto equals = input.find('=');
+    const std::string name = input.substr(0, equals);
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end()) {
+      const auto near = nearest_word(name, names);
+      return usage_error(fmt::format("{}: the configuration has no device '{}'", input, name),
+                         near.empty() ? fmt::format("its devices are {}", fmt::join(names, ", "))
+                                      : fmt::format("did you mean '{}'?", near));
+    }
+    auto& file = files[static_cast<std::size_t>(found - names.begin())];
+    if (!file.empty())
+      return usage_error(fmt::format("device '{}' is given twice", name), "give one file a device");
+    file = input.substr(equals + 1);
+  }
+  return files;
+}
+
+Result<void> check_roles(const Configuration& configuration, const std::vector<bool>& present) {
+  const auto reference = configuration.reference_index();
+  if (!present[reference]) {
+    return usage_error(
+        fmt::format("no file is given for the reference '{}'", configuration.devices[reference].name),
+        fmt::format("add {}=FILE", configuration.devices[reference].name));
+  }
+  const auto studies = configuration.study_indices();
+  if (std::none_of(studies.begin(), studies.end(), [&](std::size_t i) { return present[i]; })) {
+    return usage_error("no file is given for any IMU under study",
+                       fmt::format("add {}=FILE", configuration.devices[studies.front()].name));
+  }
+  return {};
+}
+
+Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
+  const auto files = assign_files(inputs, configuration);
+  if (!files) return tl::unexpected<Error>(files.error());
+  const std::size_t n = configuration.devices.size();
+  OpenedRecording opened;
+  auto& recording = opened.recording;
+  recording.inputs = inputs;
+  recording.present.resize(n);
+  std::vector<bool> unstamped(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    recording.present[i] = !(*files)[i].empty();
+    if (!recording.present[i]) {
+      opened.remarks.push_back(
+          fmt::format("{}: no file given; the run goes without it", configuration.devices[i].name));
+      continue;
+    }
+    // Opened here already, so that a wrong path is told before anything is computed.
+    auto source = open_raw_dump((*files)[i]);
+    if (!source) return tl::unexpected<Error>(source.error());
+    const auto first = (*source)->next();
+    if (!first) return tl::unexpected<Error>(first.error());
+    unstamped[i] = *first && !(*first)->arrival;
+  }
+  if (auto checked = check_roles(configuration, recording.present); !checked) {
+    return tl::unexpected<Error>(checked.error());
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!recording.present[i]) continue;
+    if (auto valid = check_recorded_file(configuration.devices[i], (*files)[i]); !valid) {
+      return tl::unexpected<Error>(valid.error());
+    }
+  }
+  recording.open = [files = *files](DeviceIndex index) { return open_raw_dump(files[index]); };
+  auto clocks = align_clocks(configuration, unstamped, [&](DeviceIndex index) -> Result<std::vector<Sample>> {
+    auto source = recording.open(index);
+    if (!source) return tl::unexpected<Error>(source.error());
+    return decode_all(configuration.devices[index], index, **source);
+  });
+  if (!clocks) return tl::unexpected<Error>(clocks.error());
+  recording.clocks = std::move(*clocks);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!recording.present[i] || !unstamped[i]) continue;
+    opened.remarks.push_back(fmt::format("{}: times from {}, {:+.3f} s", configuration.devices[i].name,
+                                         recording.clocks[i].how, recording.clocks[i].shift_s));
+  }
+  opened.configuration = std::move(configuration);
+  return opened;
+}
+
+RecordedSchedule schedule_of(const CaptureSummary& summary, const Configuration& configuration) {
+  const auto index_of = [&](const std::string& name) {
+    const auto* device = configuration.find(name);
+    return static_cast<DeviceIndex>(device == nullptr ? 0 : device - configuration.devices.data());
+  };
+  RecordedSchedule schedule;
+  schedule.t0 = summary.run.t0;
+  for (const auto& stored : summary.exceptions) {
+    const auto& exception = stored.exception;
+    const DeviceIndex device = index_of(stored.device);
+    switch (exception.kind) {
+      case ExceptionKind::kLateSample:
+        schedule.late_samples.push_back(
+            {device, static_cast<std::uint64_t>(exception.sample_sequence), exception.tick});
+        break;
+      case ExceptionKind::kRefusedSample:
+        for (std::int64_t k = 0; k < std::max<std::int64_t>(exception.count, 1); ++k) {
+          schedule.refused_samples.push_back(
+              {device, static_cast<std::uint64_t>(exception.sample_sequence + k)});
+        }
+        break;
+      case ExceptionKind::kSkippedTicks:
+        for (std::int64_t k = exception.count; k > 0; --k)
+          schedule.skipped_ticks.push_back(exception.tick - k);
+        break;
+    }
+  }
+  std::sort(schedule.skipped_ticks.begin(), schedule.skipped_ticks.end());
+  return schedule;
+}
+
+Result<OpenedRecording> open_capture(const std::string& input,
+                                     const std::optional<std::filesystem::path>& file) {
+  const auto summary = summarise_capture(input);
+  if (!summary) return tl::unexpected<Error>(summary.error());
+  auto configuration = file ? load_configuration(*file)
+                            : parse_configuration(summary->run.configuration,
+                                                  fmt::format("{} (kept in the capture)", summary->run.name));
+  if (!configuration) return tl::unexpected<Error>(configuration.error());
+  const std::size_t n = configuration->devices.size();
+  OpenedRecording opened;
+  auto& recording = opened.recording;
+  recording.inputs = {input};
+  recording.present.resize(n);
+  recording.clocks.resize(n);
+  std::vector<std::uint64_t> bytes(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto found = summary->devices.find(configuration->devices[i].name);
+    recording.present[i] = found != summary->devices.end() && found->second.reads > 0;
+    if (recording.present[i]) {
+      bytes[i] = found->second.bytes_read;
+    } else {
+      opened.remarks.push_back(
+          fmt::format("{}: the capture holds nothing of it", configuration->devices[i].name));
+    }
+  }
+  if (auto checked = check_roles(*configuration, recording.present); !checked) {
+    return work_error(checked.error().what, "this capture cannot be studied with this configuration");
+  }
+  std::vector<std::string> names;
+  for (const auto& device : configuration->devices) names.push_back(device.name);
+  recording.open = [input, names, bytes](DeviceIndex index) {
+    return open_captured_device(input, names[index], bytes[index]);
+  };
+  // Exceptions name devices by their index in the recorded configuration: they hold for that one alone.
+  if (configuration->sha256 == summary->run.configuration_hash) {
+    recording.schedule = schedule_of(*summary, *configuration);
+  } else {
+    opened.remarks.emplace_back(
+        "another configuration than the recorded one: results will differ from the live run's");
+  }
+  for (const auto& loss : summary->losses) {
+    opened.remarks.push_back(
+        fmt::format("{}: the recorder lost {} records; the replay is not exact from there on", loss.device,
+                    loss.records));
+  }
+  if (summary->bytes_cut_off > 0) {
+    opened.remarks.push_back(
+        fmt::format("{}: its last record is cut off ({} bytes); everything before it is used", input,
+                    summary->bytes_cut_off));
+  }
+  if (summary->bytes_skipped > 0) {
+    opened.remarks.push_back(
+        fmt::format("{}: {} bytes are damaged and were passed over", input, summary->bytes_skipped));
+  }
+  opened.configuration = std::move(*configuration);
+  return opened;
+}
+
+}  // namespace
+
+Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
+                                       const std::optional<std::filesystem::path>& configuration) {
+  const auto is_dump = [](const std::string& input) { return input.find('=') != std::string::npos; };
+  const auto n_dumps = std::count_if(inputs.begin(), inputs.end(), is_dump);
+  if (n_dumps == 0) {
+    if (inputs.size() != 1) {
+      return usage_error("more than one capture is given", "give one capture, or raw dumps as NAME=FILE");
+    }
+    return open_capture(inputs.front(), configuration);
+  }
+  if (static_cast<std::size_t>(n_dumps) != inputs.size()) {
+    return usage_error("captures and raw dumps (NAME=FILE) are mixed", "give one capture, or raw dumps only");
+  }
+  if (!configuration) {
+    return usage_error("raw dumps do not say what devices they come from", "add --config FILE.toml");
+  }
+  auto loaded = load_configuration(*configuration);
+  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  return open_raw_dumps(inputs, std::move(*loaded));
+}
+
+}  // namespace imuscope

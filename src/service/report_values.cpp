@@ -1,0 +1,111 @@
+#include "service/report_values.h"
+
+#include <Eigen/Geometry>
+
+#include "service/noise_series.h"
+
+namespace imuscope {
+
+namespace {
+
+std::array<double, 4> quaternion(const Matrix3& C_b_s) {
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(C_b_s.data());
+  Eigen::Quaterniond q(Eigen::Matrix3d{C});
+  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+}  // namespace
+
+NavigationReport navigation_report(const Snapshot& snapshot, const UtcAnchor& anchor) {
+  const auto& nav = snapshot.navigation;
+  NavigationReport report{};
+  report.utc = nav.has_utc ? nav.utc : anchor.at(nav.time);
+  report.time_s = to_seconds(nav.time - snapshot.first_reference_time);
+  report.latitude_rad = nav.latitude_rad;
+  report.longitude_rad = nav.longitude_rad;
+  report.height_m = nav.height_m;
+  report.v_n_mps = nav.v_n_mps;
+  report.rpy_rad = nav.rpy_rad;
+  report.sd_position_m = nav.sd_position_m;
+  report.sd_velocity_mps = nav.sd_velocity_mps;
+  report.sd_rpy_rad = nav.sd_rpy_rad;
+  return report;
+}
+
+CalibrationReport calibration_report(const Snapshot& snapshot, std::size_t study, DeviceIndex device,
+                                     const UtcAnchor& anchor) {
+  const auto& estimate = snapshot.studies[study];
+  CalibrationReport report{};
+  report.utc = anchor.at(estimate.time);
+  report.time_s = to_seconds(estimate.time - snapshot.first_reference_time);
+  report.device = device;
+  report.q_b_s = quaternion(estimate.C_b_s);
+  report.value = {estimate.psi_rad,         estimate.r_bs_b_m,        estimate.t_d_s,
+                  estimate.gyro_bias_radps, estimate.accel_bias_mps2, estimate.gyro_scale,
+                  estimate.accel_scale};
+  report.sd = {estimate.sd_psi_rad,         estimate.sd_r_bs_b_m,        estimate.sd_t_d_s,
+               estimate.sd_gyro_bias_radps, estimate.sd_accel_bias_mps2, estimate.sd_gyro_scale,
+               estimate.sd_accel_scale};
+  return report;
+}
+
+ErrorReport error_report(const ErrorRecord& record, DeviceIndex device, const UtcAnchor& anchor) {
+  constexpr Vector3 kUnknownVector{kUnknown, kUnknown, kUnknown};
+  const auto& row = record.row;
+  ErrorReport report{};
+  report.utc = anchor.at(row.time);
+  report.time_s = to_seconds(row.time - record.first_reference_time);
+  report.device = device;
+  report.regime = row.regime;
+  report.counter = row.counter;
+  report.gyro_radps = row.gyro_valid ? row.e_gyro_radps : kUnknownVector;
+  report.accel_mps2 = row.accel_valid ? row.e_accel_mps2 : kUnknownVector;
+  return report;
+}
+
+AxisWaveletVariance axis_wavelet_variance(const noise::WaveletVariance& wv, std::size_t axis, Regime regime,
+                                          double rate_hz) {
+  AxisWaveletVariance out;
+  out.axis = axis_name(axis);
+  out.regime = regime_name(regime);
+  out.unit = axis_unit(axis);
+  out.n = static_cast<std::int64_t>(wv.n_valid);
+  out.rate_hz = rate_hz;
+  for (const auto& level : wv.levels) {
+    out.levels.push_back({level.level, level.tau_samples / rate_hz, level.value, level.ci_low, level.ci_high,
+                          static_cast<std::int64_t>(level.n_coefficients)});
+  }
+  return out;
+}
+
+AxisNoiseModel axis_noise_model(const noise::FitResult& fit, std::size_t axis, Regime regime) {
+  AxisNoiseModel out;
+  out.axis = axis_name(axis);
+  out.regime = regime_name(regime);
+  out.unit = axis_unit(axis);
+  out.n = static_cast<std::int64_t>(fit.n);
+  out.rate_hz = fit.rate_hz;
+  out.model = fit.spec.name();
+  out.weights = fit.weighting == noise::Weighting::kOptimal ? "optimal" : "ci";
+  for (const auto& parameter : fit.parameters) {
+    out.parameters.push_back({parameter.process, parameter.name, parameter.unit, parameter.value,
+                              parameter.sd.value_or(kUnknown), parameter.ci_low.value_or(kUnknown),
+                              parameter.ci_high.value_or(kUnknown)});
+  }
+  for (const auto& level : fit.wv) {
+    out.fitted.push_back({level.observed.tau_samples / fit.rate_hz, level.fitted});
+  }
+  out.objective = fit.objective;
+  if (fit.j_test) {
+    out.j_statistic = fit.j_test->statistic;
+    out.j_dof = fit.j_test->dof;
+    out.j_p_value = fit.j_test->p_value;
+  }
+  out.criterion = fit.criterion;
+  out.identifiable = fit.identifiable;
+  out.warnings = fit.warnings;
+  return out;
+}
+
+}  // namespace imuscope

@@ -1,0 +1,285 @@
+#include "service/study.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "noise/fit.h"
+#include "noise/json.h"
+#include "noise/wavelet_variance.h"
+#include "service/estimator_setup.h"
+#include "service/noise_series.h"
+
+namespace imuscope {
+
+namespace {
+
+std::string utc_text(UtcTime utc) {
+  const auto since_epoch = std::chrono::floor<std::chrono::seconds>(utc);
+  const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(since_epoch));
+  const std::chrono::hh_mm_ss time(since_epoch - std::chrono::floor<std::chrono::days>(since_epoch));
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", static_cast<int>(date.year()),
+                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+                     time.hours().count(), time.minutes().count(), time.seconds().count());
+}
+
+/// Rows of the second pass: mounting frozen at its final value, the whole drive covered.
+class ErrorCollector final : public CoreSink {
+ public:
+  ErrorCollector(std::vector<StudyOutput> finals, bool remove_scale, RunFolder& folder)
+      : finals_(std::move(finals)), remove_scale_(remove_scale), folder_(folder), series_(finals_.size()) {}
+
+  void on_error(const ErrorRecord& record) noexcept override {
+    folder_.on_error(record);
+    const auto& final = finals_[record.study];
+    series_[record.study].add(
+        remove_scale_ ? without_scale_error(record.row, {final.gyro_scale, final.accel_scale}) : record.row);
+  }
+  void on_event(const EstimatorEvent&) noexcept override {}
+  void on_snapshot(const Snapshot&) noexcept override {}
+  void on_late_sample(const LateSample&) noexcept override {}
+
+  [[nodiscard]] const std::vector<NoiseSeries>& series() const { return series_; }
+
+ private:
+  std::vector<StudyOutput> finals_;
+  bool remove_scale_;
+  RunFolder& folder_;
+  std::vector<NoiseSeries> series_;
+};
+
+/// First pass: everything but errors goes to the folder.
+class CalibrationPass final : public CoreSink {
+ public:
+  explicit CalibrationPass(RunFolder& folder) : folder_(folder) {}
+  void on_error(const ErrorRecord&) noexcept override {}
+  void on_event(const EstimatorEvent& event) noexcept override { folder_.on_event(event); }
+  void on_snapshot(const Snapshot& snapshot) noexcept override { folder_.on_snapshot(snapshot); }
+  void on_late_sample(const LateSample& late) noexcept override { folder_.on_late_sample(late); }
+
+ private:
+  RunFolder& folder_;
+};
+
+bool calibrated(const StudyOutput& study) {
+  return study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
+}
+
+/// The estimator of the second pass: mounting, time offset and scales known, biases free, so that the
+/// reference is evaluated at the right instant from the first sample on.
+EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& finals) {
+  for (std::size_t i = 0; i < config.studies.size(); ++i) {
+    auto& study = config.studies[i];
+    const auto& final = finals[i];
+    if (!calibrated(final)) continue;
+    study.blocks = kBiasStudyBlocks;
+    study.prior_C_b_s = final.C_b_s;
+    study.prior_r_bs_b_m = final.r_bs_b_m;
+    study.prior_t_d_s = final.t_d_s;
+    study.prior_gyro_scale = final.gyro_scale;
+    study.prior_accel_scale = final.accel_scale;
+  }
+  return config;
+}
+
+/// Fits one axis in one regime; what cannot be fitted becomes a warning.
+void fit_axis(const NoiseSeries& series, std::size_t axis, const std::vector<std::uint8_t>& mask,
+              const std::string& regime, const std::string& name, double rate_hz,
+              const noise::ModelSpec& spec, nlohmann::json& models, std::vector<std::string>& warnings) {
+  noise::WvOptions options;
+  options.mask = mask;
+  const auto wv = noise::haar_wavelet_variance(series.values(axis), options);
+  if (!wv) {
+    warnings.push_back(
+        fmt::format("{} {} {}: no wavelet variance: {}", name, axis_name(axis), regime, wv.error().what));
+    return;
+  }
+  noise::FitOptions fit_options;
+  fit_options.signal_unit = axis_unit(axis);
+  const auto fit = noise::fit(*wv, spec, rate_hz, fit_options);
+  if (!fit) {
+    warnings.push_back(
+        fmt::format("{} {} {}: no noise model: {}", name, axis_name(axis), regime, fit.error().what));
+    return;
+  }
+  nlohmann::json model = noise::to_json(*fit);
+  model["name"] = name;
+  model["axis"] = axis_name(axis);
+  model["regime"] = regime;
+  model["unit"] = axis_unit(axis);
+  models.push_back(std::move(model));
+}
+
+nlohmann::json fit_models(const Configuration& configuration, const std::vector<NoiseSeries>& all_series,
+                          const noise::ModelSpec& spec, const StudyRunOptions& options,
+                          std::vector<std::string>& warnings) {
+  nlohmann::json models = nlohmann::json::array();
+  const auto indices = configuration.study_indices();
+  const double total = static_cast<double>(all_series.size() * kAxisCount);
+  double done = 0.0;
+  for (std::size_t i = 0; i < all_series.size(); ++i) {
+    const auto& series = all_series[i];
+    const auto& device = configuration.devices[indices[i]];
+    for (std::size_t axis = 0; axis < kAxisCount && series.size() > 0; ++axis) {
+      fit_axis(series, axis, series.mask(axis), "all", device.name, device.rate_hz, spec, models, warnings);
+      for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {
+        fit_axis(series, axis, series.mask(axis, regime), regime_name(regime), device.name, device.rate_hz,
+                 spec, models, warnings);
+      }
+      if (options.progress) options.progress("noise models", (done += 1.0) / total);
+    }
+  }
+  return models;
+}
+
+nlohmann::json device_json(const RunDescription& run, std::size_t i) {
+  const auto& device = run.configuration->devices[i];
+  const auto& result = run.result->devices[i];
+  const auto& counters = result.counters;
+  nlohmann::json entry{{"name", device.name},
+                       {"role", name_of(device.role)},
+                       {"protocol", name_of(device.protocol)},
+                       {"rate_hz", device.rate_hz},
+                       {"samples", counters.samples},
+                       {"frames", counters.frames},
+                       {"bytes", counters.bytes},
+                       {"bytes_skipped", counters.bytes_skipped},
+                       {"bad_checksums", counters.bad_checksums},
+                       {"bad_lengths", counters.bad_lengths},
+                       {"bad_contents", counters.bad_contents},
+                       {"samples_lost", counters.samples_lost},
+                       {"clock_resets", counters.clock_resets},
+                       {"refused", result.refused},
+                       {"problem", result.problem},
+                       {"clock", run.recording->clocks[i].how},
+                       {"clock_shift_s", run.recording->clocks[i].shift_s}};
+  const auto studies = run.configuration->study_indices();
+  const auto found = std::find(studies.begin(), studies.end(), i);
+  const bool is_study = found != studies.end() && run.last != nullptr;
+  entry["late"] =
+      is_study
+          ? nlohmann::json(run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters.late)
+          : nlohmann::json(nullptr);
+  return entry;
+}
+
+std::vector<StudyOutput> final_studies(const Snapshot& last) {
+  return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
+}
+
+void warn_of_uncalibrated(const Configuration& configuration, const std::vector<StudyOutput>& finals,
+                          std::vector<std::string>& warnings) {
+  const auto indices = configuration.study_indices();
+  for (std::size_t i = 0; i < finals.size(); ++i) {
+    if (calibrated(finals[i])) continue;
+    warnings.push_back(
+        fmt::format("{}: no mounting was found; it needs about a minute of driving with turns, or a "
+                    "[device.prior] in the configuration",
+                    configuration.devices[indices[i]].name));
+  }
+}
+
+}  // namespace
+
+std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording) {
+  std::vector<StudyFileInfo> infos;
+  for (const auto index : configuration.study_indices()) {
+    infos.push_back({configuration.devices[index].name, recording.clocks[index].shift_s});
+  }
+  return infos;
+}
+
+nlohmann::json run_json(const RunDescription& run) {
+  nlohmann::json json{{"schema", "imuscope.run/1"},
+                      {"name", run.configuration->run_name},
+                      {"version", run.version},
+                      {"build", fmt::format("{} {}", __VERSION__, sizeof(void*) == 8 ? "64 bit" : "32 bit")},
+                      {"configuration", run.configuration->file.filename().string()},
+                      {"configuration_sha256", run.configuration->sha256},
+                      {"inputs", run.recording->inputs},
+                      {"ticks", run.result->ticks},
+                      {"duration_s", static_cast<double>(run.result->ticks) / kTickRate_hz},
+                      {"regimes", {{"static_s", run.static_s}, {"dynamic_s", run.dynamic_s}}},
+                      {"warnings", run.warnings}};
+  json["t0_utc"] = run.last != nullptr && run.last->has_utc
+                       ? nlohmann::json(utc_text(run.last->first_reference_utc))
+                       : nlohmann::json(nullptr);
+  json["devices"] = nlohmann::json::array();
+  for (std::size_t i = 0; i < run.configuration->devices.size(); ++i)
+    json["devices"].push_back(device_json(run, i));
+  json["events"] = nlohmann::json::array();
+  for (const auto& event : run.events) {
+    json["events"].push_back(
+        {{"time_s", run.last != nullptr ? to_seconds(event.time - run.last->first_reference_time) : 0.0},
+         {"text", describe(*run.configuration, event)}});
+  }
+  return json;
+}
+
+Result<void> run_study(const Configuration& configuration, const Recording& recording,
+                       const StudyRunOptions& options) {
+  const auto spec = noise::parse_model(configuration.noise.model);
+  if (!spec) return tl::unexpected<Error>(spec.error());
+  auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  const auto estimator = estimator_config(configuration);
+
+  CalibrationPass first(**folder);
+  ReplayOptions replay_options;
+  if (options.progress)
+    replay_options.progress = [&](double share) { options.progress("calibration", share); };
+  const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
+  if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
+  const Snapshot last = *(*folder)->last_snapshot();
+  const auto finals = final_studies(last);
+
+  RunDescription run{options.version, &configuration,      &recording, &*calibrated_run,
+                     &last,           (*folder)->events(), {}};
+  warn_of_uncalibrated(configuration, finals, run.warnings);
+  if (std::none_of(finals.begin(), finals.end(), calibrated)) {
+    return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
+  }
+
+  ErrorCollector collector(finals, configuration.noise.remove_scale_error, **folder);
+  if (options.progress)
+    replay_options.progress = [&](double share) { options.progress("error process", share); };
+  const auto second = replay(configuration, frozen(estimator, finals), recording, collector, replay_options);
+  if (!second) return tl::unexpected<Error>(second.error());
+
+  const auto models = fit_models(configuration, collector.series(), *spec, options, run.warnings);
+  const auto& series = collector.series();
+  const double rate_hz = configuration.devices[configuration.study_indices().front()].rate_hz;
+  run.static_s = static_cast<double>(series.front().count(Regime::kStatic)) / rate_hz;
+  run.dynamic_s = static_cast<double>(series.front().count(Regime::kDynamic)) / rate_hz;
+
+  if (auto written = (*folder)->write_calibration(); !written) return written;
+  if (auto closed = (*folder)->close(); !closed) return closed;
+  if (auto written =
+          write_json(options.out / "models.json", {{"schema", "imuscope.models/1"}, {"models", models}});
+      !written) {
+    return written;
+  }
+  return write_json(options.out / "run.json", run_json(run));
+}
+
+Result<void> run_replay(const Configuration& configuration, const Recording& recording,
+                        const StudyRunOptions& options, bool realtime) {
+  auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  ReplayOptions replay_options;
+  replay_options.realtime = realtime;
+  if (options.progress) replay_options.progress = [&](double share) { options.progress("replay", share); };
+  const auto result =
+      replay(configuration, estimator_config(configuration), recording, **folder, replay_options);
+  if (!result) return tl::unexpected<Error>(result.error());
+  if (auto written = (*folder)->write_calibration(); !written) return written;
+  if (auto closed = (*folder)->close(); !closed) return closed;
+  const auto& last = (*folder)->last_snapshot();
+  RunDescription run{options.version,         &configuration,      &recording, &*result,
+                     last ? &*last : nullptr, (*folder)->events(), {}};
+  if (last) warn_of_uncalibrated(configuration, final_studies(*last), run.warnings);
+  return write_json(options.out / "run.json", run_json(run));
+}
+
+}  // namespace imuscope

@@ -1,0 +1,56 @@
+#pragma once
+
+/// The study of a recording: calibration, then the error process with the final mounting over the whole
+/// drive, then noise models per axis and regime. Everything is written to a run folder.
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "service/replay.h"
+#include "service/run_folder.h"
+
+namespace imuscope {
+
+struct StudyRunOptions {
+  std::filesystem::path out;
+  std::string version;
+  /// Called with what is being done and the share of it that is done.
+  std::function<void(const std::string& step, double share)> progress;
+};
+
+/// What a run is made of, for run.json.
+struct RunDescription {
+  std::string version;
+  const Configuration* configuration = nullptr;
+  const Recording* recording = nullptr;
+  const ReplayResult* result = nullptr;
+  const Snapshot* last = nullptr;
+  std::vector<EstimatorEvent> events;
+  std::vector<std::string> warnings;
+  double static_s = 0.0;
+  double dynamic_s = 0.0;
+};
+
+/// run.json's content.
+nlohmann::json run_json(const RunDescription& run);
+
+/// What a person should know of an event, in one sentence.
+std::string describe(const Configuration& configuration, const EstimatorEvent& event);
+
+/// Names and clock shifts of the S-IMUs, in the order of the configuration.
+std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording);
+
+/// Runs the whole study of `recording` into options.out. Errors: what replay() refuses; a folder that cannot
+/// be written; no S-IMU that could be calibrated (kWork).
+Result<void> run_study(const Configuration& configuration, const Recording& recording,
+                       const StudyRunOptions& options);
+
+/// Replays `recording` once and writes navigation.csv, calibration_NAME.csv, errors_NAME.csv with the
+/// estimates as they stood, calibration.json and run.json.
+Result<void> run_replay(const Configuration& configuration, const Recording& recording,
+                        const StudyRunOptions& options, bool realtime);
+
+}  // namespace imuscope

@@ -1,0 +1,90 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <memory>
+
+#include "commands.h"
+#include "progress.h"
+#include "report/report.h"
+#include "service/recording.h"
+#include "service/study.h"
+#include "study_table.h"
+
+namespace imuscope::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> inputs;
+  std::string config;
+  std::string out;
+  bool realtime = false;
+  bool json = false;
+};
+
+Result<OpenedRecording> open(const Options& options) {
+  std::optional<std::filesystem::path> config;
+  if (!options.config.empty()) config = options.config;
+  auto opened = open_recording(options.inputs, config);
+  if (opened) {
+    for (const auto& remark : opened->remarks) spdlog::info("{}", remark);
+  }
+  return opened;
+}
+
+void add_inputs(CLI::App& command, Options& options) {
+  command.add_option("input", options.inputs, "a capture, or raw dumps as NAME=FILE (NAME of a device)")
+      ->required()
+      ->type_name("INPUT");
+  command.add_option("--config,-c", options.config, "configuration (TOML); a capture holds its own")
+      ->type_name("FILE");
+}
+
+Result<void> process(const Options& options) {
+  const auto opened = open(options);
+  if (!opened) return tl::unexpected<Error>(opened.error());
+  {
+    ProgressBar bar;
+    const StudyRunOptions run{options.out, IMUSCOPE_VERSION,
+                              [&](const std::string& step, double share) { bar.show(step, share); }};
+    if (auto done = run_study(opened->configuration, opened->recording, run); !done) return done;
+  }
+  if (auto written = write_report(options.out); !written) return written;
+  return print_study(options.out, options.json);
+}
+
+Result<void> replay_command(const Options& options) {
+  const auto opened = open(options);
+  if (!opened) return tl::unexpected<Error>(opened.error());
+  {
+    ProgressBar bar;
+    const StudyRunOptions run{options.out, IMUSCOPE_VERSION,
+                              [&](const std::string& step, double share) { bar.show(step, share); }};
+    if (auto done = run_replay(opened->configuration, opened->recording, run, options.realtime); !done)
+      return done;
+  }
+  return print_study(options.out, options.json);
+}
+
+}  // namespace
+
+void add_process(CLI::App& app, Work& chosen) {
+  auto* command =
+      app.add_subcommand("process", "The study: calibration, error process, noise models, report");
+  auto options = std::make_shared<Options>();
+  add_inputs(*command, *options);
+  command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
+  command->add_flag("--json", options->json, "print the summary as JSON");
+  on_chosen(*command, chosen, [options] { return process(*options); });
+}
+
+void add_replay(CLI::App& app, Work& chosen) {
+  auto* command = app.add_subcommand("replay", "The live pipeline again, fed from a recording");
+  auto options = std::make_shared<Options>();
+  add_inputs(*command, *options);
+  command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
+  command->add_flag("--realtime", options->realtime, "paced as recorded");
+  command->add_flag("--json", options->json, "print the summary as JSON");
+  on_chosen(*command, chosen, [options] { return replay_command(*options); });
+}
+
+}  // namespace imuscope::cli

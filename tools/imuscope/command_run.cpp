@@ -1,0 +1,61 @@
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <memory>
+
+#include "commands.h"
+#include "service/live.h"
+
+namespace imuscope::cli {
+
+namespace {
+
+// A signal handler may only set a lock-free flag.
+std::atomic<bool> stop_requested{false};  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+extern "C" void request_stop(int) { stop_requested.store(true); }
+
+struct Options {
+  std::string config;
+  std::string out;
+  double seconds = 0.0;
+};
+
+/// runs/NAME-YYYYMMDD-HHMMSS, where the configuration names no folder.
+std::filesystem::path default_folder(const Configuration& configuration) {
+  const std::filesystem::path parent =
+      configuration.record.folder.empty() ? "runs" : configuration.record.folder;
+  return parent /
+         fmt::format("{}-{:%Y%m%d-%H%M%S}", configuration.run_name,
+                     fmt::localtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
+}
+
+Result<void> run(const Options& options) {
+  const auto configuration = load_configuration(options.config);
+  if (!configuration) return tl::unexpected<Error>(configuration.error());
+  LiveOptions live;
+  live.out = options.out.empty() ? default_folder(*configuration) : std::filesystem::path(options.out);
+  live.version = IMUSCOPE_VERSION;
+  if (options.seconds > 0.0) live.duration_s = options.seconds;
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
+  return run_live(*configuration, live, stop_requested);
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Work& chosen) {
+  auto* command = app.add_subcommand("run", "The live service: devices, estimator, recording, LCM");
+  auto options = std::make_shared<Options>();
+  command->add_option("config", options->config, "configuration (TOML)")->required()->type_name("CONFIG");
+  command->add_option("--out,-o", options->out, "folder for capture and results (default: runs/NAME-TIME)")
+      ->type_name("DIR");
+  command->add_option("--seconds", options->seconds, "end by itself after this time")
+      ->check(CLI::PositiveNumber);
+  on_chosen(*command, chosen, [options] { return run(*options); });
+}
+
+}  // namespace imuscope::cli

@@ -1,0 +1,139 @@
+#include "study_table.h"
+
+#include <fmt/format.h>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+namespace imuscope::cli {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr double kMdegPerRad = 180.0 / 3.14159265358979323846 * 1e3;
+
+std::optional<json> read(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  if (!in) return std::nullopt;
+  auto document = json::parse(in, nullptr, false);
+  if (document.is_discarded()) return std::nullopt;
+  return document;
+}
+
+using Row = std::array<double, 9>;
+
+Row matrix(const json& value) {
+  Row m{};
+  for (std::size_t i = 0; i < m.size(); ++i) m[i] = value.at(i).get<double>();
+  return m;
+}
+
+/// Rotation vector in b that takes `from` to `to`: Log(from^T to), for small angles from its skew part.
+std::array<double, 3> small_rotation_b(const Row& from, const Row& to) {
+  Row d{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t k = 0; k < 3; ++k) d[3 * i + j] += from[3 * k + i] * to[3 * k + j];
+    }
+  }
+  return {0.5 * (d[7] - d[5]), 0.5 * (d[2] - d[6]), 0.5 * (d[3] - d[1])};
+}
+
+/// zyx Euler angles of C_b_s, degrees: what a person can picture.
+std::array<double, 3> euler_deg(const Row& C) {
+  constexpr double kDeg = kMdegPerRad * 1e-3;
+  return {std::atan2(C[7], C[8]) * kDeg, -std::asin(std::clamp(C[6], -1.0, 1.0)) * kDeg,
+          std::atan2(C[3], C[0]) * kDeg};
+}
+
+const json* by_name(const json& document, const std::string& name) {
+  for (const auto& imu : document.at("imus")) {
+    if (imu.at("name") == name) return &imu;
+  }
+  return nullptr;
+}
+
+std::string triple(const json& values, double unit, int digits) {
+  return fmt::format("{:9.{}f} {:9.{}f} {:9.{}f}", values.at(0).get<double>() * unit, digits,
+                     values.at(1).get<double>() * unit, digits, values.at(2).get<double>() * unit, digits);
+}
+
+void print_truth(const json& imu, const json& truth) {
+  const auto error = small_rotation_b(matrix(truth.at("C_b_s")), matrix(imu.at("C_b_s")));
+  fmt::print("    boresight error  {:9.1f} {:9.1f} {:9.1f}  mdeg  (found minus true)\n",
+             error[0] * kMdegPerRad, error[1] * kMdegPerRad, error[2] * kMdegPerRad);
+  const auto& r = imu.at("r_bs_b_m");
+  const auto& t = truth.at("r_bs_b_m");
+  fmt::print("    lever-arm error  {:9.2f} {:9.2f} {:9.2f}  mm    (found minus true)\n",
+             (r.at(0).get<double>() - t.at(0).get<double>()) * 1e3,
+             (r.at(1).get<double>() - t.at(1).get<double>()) * 1e3,
+             (r.at(2).get<double>() - t.at(2).get<double>()) * 1e3);
+  fmt::print("    time-offset error{:9.3f}                      ms    (found minus true, {:.3f} ms)\n",
+             (imu.at("t_d_s").get<double>() - truth.at("t_d_s").get<double>()) * 1e3,
+             truth.at("t_d_s").get<double>() * 1e3);
+}
+
+void print_imu(const json& imu, const std::optional<json>& truth) {
+  const std::string name = imu.at("name");
+  fmt::print("\n{}  ({})\n", name, imu.at("status").get<std::string>());
+  const auto angles = euler_deg(matrix(imu.at("C_b_s")));
+  fmt::print("  C_b_s, zyx Euler x y z {:9.3f} {:9.3f} {:9.3f}  deg\n", angles[0], angles[1], angles[2]);
+  fmt::print("    sd               {}  mdeg\n", triple(imu.at("boresight_sd_deg"), 1e3, 1));
+  fmt::print("  lever arm b, x y z {}  mm\n", triple(imu.at("r_bs_b_m"), 1e3, 2));
+  fmt::print("    sd               {}  mm\n", triple(imu.at("r_bs_b_sd_m"), 1e3, 2));
+  fmt::print("  time offset        {:9.3f}  sd {:.3f}  ms\n", imu.at("t_d_s").get<double>() * 1e3,
+             imu.at("t_d_sd_s").get<double>() * 1e3);
+  if (!truth) return;
+  if (const auto* true_imu = by_name(*truth, name)) print_truth(imu, *true_imu);
+}
+
+std::string number(const json& value) {
+  return value.is_null() ? "-" : fmt::format("{:.4g}", value.get<double>());
+}
+
+void print_model(const json& models) {
+  if (models.at("models").empty()) return;
+  const auto& all = models.at("models");
+  const auto dynamic =
+      std::find_if(all.begin(), all.end(), [](const json& m) { return m.at("regime") == "dynamic"; });
+  const json& model = dynamic != all.end() ? *dynamic : all.front();
+  fmt::print("\nNoise model of {} {}, {} ({}{}):\n", model.at("name").get<std::string>(),
+             model.at("axis").get<std::string>(), model.at("regime").get<std::string>(),
+             model.at("model").get<std::string>(),
+             model.at("identifiable").get<bool>() ? "" : ", not identifiable");
+  for (const auto& p : model.at("parameters")) {
+    fmt::print("  {:<4} {:<7} {:>11}  [{}, {}]  {}\n", p.at("process").get<std::string>(),
+               p.at("name").get<std::string>(), number(p.at("value")), number(p.at("ci_low")),
+               number(p.at("ci_high")), p.at("unit").get<std::string>());
+  }
+}
+
+}  // namespace
+
+Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) {
+  const auto calibration = read(run_folder / "calibration.json");
+  const auto models = read(run_folder / "models.json");
+  const auto run = read(run_folder / "run.json");
+  const auto truth = read(run_folder / "truth.json");
+  if (!calibration || !run) {
+    return work_error(fmt::format("{} does not hold a finished run", run_folder.string()), "run it again");
+  }
+  if (as_json) {
+    json all{{"schema", "imuscope.summary/1"}, {"run", *run}, {"calibration", *calibration}};
+    all["models"] = models.value_or(json(nullptr));
+    fmt::print("{}\n", all.dump(2));
+    return {};
+  }
+  for (const auto& imu : calibration->at("imus")) print_imu(imu, truth);
+  if (models) print_model(*models);
+  for (const auto& warning : run->at("warnings")) fmt::print("\nNote: {}\n", warning.get<std::string>());
+  const auto report = run_folder / "report.html";
+  fmt::print("\nResults: {}\n", run_folder.string());
+  if (std::filesystem::exists(report)) fmt::print("Report:  {}\n", report.string());
+  return {};
+}
+
+}  // namespace imuscope::cli
