@@ -40,9 +40,8 @@ Lengths lengths_of(const std::uint8_t* header) {
 }
 
 bool is_text(const std::vector<std::uint8_t>& bytes) {
-  return std::all_of(bytes.begin(), bytes.end(), [](std::uint8_t byte) {
-    return byte >= 0x80 || std::isprint(byte) != 0 || std::isspace(byte) != 0;
-  });
+  return std::all_of(bytes.begin(), bytes.end(),
+                     [](std::uint8_t byte) { return std::isprint(byte) != 0 || std::isspace(byte) != 0; });
 }
 
 std::string in_hex(const std::vector<std::uint8_t>& bytes) {
@@ -131,24 +130,32 @@ bool EventLogReader::ensure(std::size_t n) {
   return buffer_.size() >= n;
 }
 
-/// What begins at `position` bytes after the last one consumed.
-EventLogReader::Look EventLogReader::look_at(std::size_t position) {
-  constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
+/// The record that begins `position` bytes after the last one consumed, by its header alone.
+EventLogReader::Look EventLogReader::look_at(std::size_t position, std::size_t& length) {
   const bool header_is_here = ensure(position + kEventLogHeaderBytes);
-  const std::uint8_t* bytes = buffer_.data() + begin_ + position;
-  const std::size_t available = std::min(buffer_.size() - begin_ - position, kSyncBytes);
-  const std::uint64_t expected = std::uint64_t{kEventLogSync} >> (8 * (kSyncBytes - available));
-  if (big_endian(bytes, available) != expected) return Look::kNoRecord;
+  if (!may_begin_record(position)) return Look::kNoRecord;
   if (!header_is_here) return Look::kCutOff;
-  const Lengths lengths = lengths_of(bytes);
+  const Lengths lengths = lengths_of(buffer_.data() + begin_ + position);
   if (!lengths.plausible()) return Look::kNoRecord;
-  return ensure(position + lengths.record()) ? Look::kRecord : Look::kCutOff;
+  length = lengths.record();
+  return ensure(position + length) ? Look::kRecord : Look::kCutOff;
 }
 
-/// Where the next whole record begins after `position`, if any: then what is there was damaged, not cut off.
-std::optional<std::size_t> EventLogReader::next_whole_record(std::size_t position) {
-  for (std::size_t next = position + 1; ensure(next + kEventLogHeaderBytes); ++next) {
-    if (look_at(next) == Look::kRecord) return next;
+/// Whether the sync word, as far as the file goes, stands at `position`; true at the end of the file.
+bool EventLogReader::may_begin_record(std::size_t position) {
+  constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
+  (void)ensure(position + kSyncBytes);
+  const std::size_t available = std::min(buffer_.size() - begin_ - position, kSyncBytes);
+  const std::uint64_t expected = std::uint64_t{kEventLogSync} >> (8 * (kSyncBytes - available));
+  return big_endian(buffer_.data() + begin_ + position, available) == expected;
+}
+
+/// Where the first record begins after `position` and before `limit` that another record, or the end of the
+/// file, follows without a gap.
+std::optional<std::size_t> EventLogReader::next_sure_record(std::size_t position, std::size_t limit) {
+  std::size_t length = 0;
+  for (std::size_t next = position + 1; next < limit && ensure(next + kEventLogHeaderBytes); ++next) {
+    if (look_at(next, length) == Look::kRecord && may_begin_record(next + length)) return next;
   }
   return std::nullopt;
 }
@@ -156,19 +163,24 @@ std::optional<std::size_t> EventLogReader::next_whole_record(std::size_t positio
 bool EventLogReader::next(LogEvent& event) {
   while (ensure(1)) {
     std::size_t skip = 1;
-    const Look look = look_at(0);
+    std::size_t length = 0;
+    const Look look = look_at(0, length);
     if (look == Look::kRecord) {
-      take(event);
-      return true;
-    }
-    if (look == Look::kCutOff) {
-      const auto whole = next_whole_record(0);
-      if (!whole) {
+      // A damaged length makes a record swallow those behind it; then one of them shows inside.
+      const auto inside = may_begin_record(length) ? std::nullopt : next_sure_record(0, length);
+      if (!inside) {
+        take(event);
+        return true;
+      }
+      skip = *inside;
+    } else if (look == Look::kCutOff) {
+      const auto behind = next_sure_record(0, buffer_.size() - begin_);
+      if (!behind) {
         bytes_cut_off_ = buffer_.size() - begin_;
         begin_ = buffer_.size();
         return false;
       }
-      skip = *whole;
+      skip = *behind;
     }
     begin_ += skip;
     bytes_skipped_ += skip;

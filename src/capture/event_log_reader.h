@@ -39,8 +39,9 @@ class EventLogReader {
 
   explicit EventLogReader(std::ifstream file) : file_(std::move(file)) {}
   bool ensure(std::size_t n);
-  Look look_at(std::size_t position);
-  std::optional<std::size_t> next_whole_record(std::size_t position);
+  Look look_at(std::size_t position, std::size_t& length);
+  bool may_begin_record(std::size_t position);
+  std::optional<std::size_t> next_sure_record(std::size_t position, std::size_t limit);
   void take(LogEvent& event);
 
   std::ifstream file_;

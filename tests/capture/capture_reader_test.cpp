@@ -1,0 +1,304 @@
+#include "capture/capture_reader.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <filesystem>
+#include <fstream>
+#include <imuscope/raw_t.hpp>
+#include <random>
+
+#include "capture/capture_writer.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using testing::HasSubstr;
+using Bytes = std::vector<std::uint8_t>;
+
+const HostTime kT0 = host_time_from_ns(50'000'000'000);
+
+RunHeader example_run() {
+  RunHeader run;
+  run.name = "drive 7";
+  run.version = "0.1.0";
+  run.build = "g++ 12.2 -O2";
+  run.processor = "a CPU";
+  run.t0 = kT0;
+  run.period = std::chrono::milliseconds(10);
+  run.t0_wall = utc_time_from_ns(1'700'000'000'000'000'000);
+  run.configuration = "[run]\nname = \"drive 7\"\n";
+  run.configuration_hash = "abc123";
+  run.devices = {"airins", "mtx1"};
+  return run;
+}
+
+/// A capture under construction, record by record.
+class Capture {
+ public:
+  explicit Capture(const std::filesystem::path& path) : writer_(std::move(*CaptureWriter::create(path))) {}
+
+  void header() { writer_.append("IMUSCOPE_RUN", 1, encode(run_, 0)); }
+  void chunk(DeviceIndex device, std::int64_t sequence, std::int64_t arrival_ms, const Bytes& bytes,
+             bool continues = false, Direction direction = Direction::kRead) {
+    RawChunk chunk{};
+    chunk.sequence = sequence;
+    chunk.arrival = kT0 + std::chrono::milliseconds(arrival_ms);
+    chunk.device = device;
+    chunk.direction = direction;
+    chunk.continues = continues;
+    chunk.n_bytes = static_cast<std::uint16_t>(bytes.size());
+    std::copy(bytes.begin(), bytes.end(), chunk.bytes.begin());
+    writer_.append("IMUSCOPE_RAW_X", 1, encode(chunk, run_.devices.at(device), {run_.t0, run_.t0_wall}));
+  }
+  void exception(const RunException& exception) {
+    const std::string device =
+        exception.kind == ExceptionKind::kSkippedTicks ? "" : run_.devices.at(exception.device);
+    writer_.append("IMUSCOPE_EXCEPTION", 1, encode(exception, device, kT0, 0, {run_.t0, run_.t0_wall}));
+  }
+  void foreign(const Bytes& bytes) { writer_.append("POSE", 1, bytes); }
+  void done() { ASSERT_TRUE(writer_.close().has_value()); }
+
+ private:
+  RunHeader run_ = example_run();
+  CaptureWriter writer_;
+};
+
+std::vector<RawRead> read_all(CaptureReader& reader) {
+  std::vector<RawRead> reads;
+  while (auto read = reader.next()) reads.push_back(std::move(*read));
+  return reads;
+}
+
+TEST(CaptureReader, GivesBackTheRunHeaderAndEveryReadWithItsBoundaries) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(0, 0, 1, {1, 2, 3});
+  capture.chunk(1, 0, 2, {9}, false, Direction::kWrite);
+  capture.chunk(0, 1, 3, {4});
+  capture.done();
+
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value()) << summary.error().text();
+  const RunHeader expected = example_run();
+  EXPECT_EQ(summary->run.name, expected.name);
+  EXPECT_EQ(summary->run.version, expected.version);
+  EXPECT_EQ(summary->run.build, expected.build);
+  EXPECT_EQ(summary->run.processor, expected.processor);
+  EXPECT_EQ(summary->run.t0, expected.t0);
+  EXPECT_EQ(summary->run.period, expected.period);
+  EXPECT_EQ(summary->run.t0_wall, expected.t0_wall);
+  EXPECT_EQ(summary->run.configuration, expected.configuration);
+  EXPECT_EQ(summary->run.configuration_hash, expected.configuration_hash);
+  EXPECT_EQ(summary->run.devices, expected.devices);
+  EXPECT_EQ(summary->devices.at("airins").reads, 2U);
+  EXPECT_EQ(summary->devices.at("airins").bytes_read, 4U);
+  EXPECT_EQ(summary->devices.at("mtx1").writes, 1U);
+
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  const auto reads = read_all(*reader);
+  ASSERT_EQ(reads.size(), 3U);
+  EXPECT_EQ(reads[0].device, "airins");
+  EXPECT_EQ(reads[0].arrival, kT0 + std::chrono::milliseconds(1));
+  EXPECT_EQ(reads[0].bytes, (Bytes{1, 2, 3}));
+  EXPECT_EQ(reads[1].direction, Direction::kWrite);
+  EXPECT_EQ(reads[2].bytes, (Bytes{4}));
+}
+
+TEST(CaptureReader, OrdersByArrivalThenConfigurationThenHappening) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(1, 0, 5, {10});
+  capture.chunk(1, 1, 7, {11});
+  capture.chunk(1, 2, 7, {12});
+  capture.chunk(0, 0, 5, {20});
+  capture.chunk(0, 1, 6, {21});
+  capture.chunk(0, 2, 7, {22});
+  capture.done();
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  std::vector<int> order;
+  for (const RawRead& read : read_all(*reader)) order.push_back(read.bytes.at(0));
+  EXPECT_EQ(order, (std::vector<int>{20, 10, 21, 22, 11, 12}));
+  EXPECT_EQ(reader->disordered(), 0U);
+}
+
+TEST(CaptureReader, IsInOrderWhenOneRingIsRecordedSecondsAfterTheOther) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  for (std::int64_t second = 0; second < 30; ++second) {
+    for (int i = 0; i < 10; ++i) capture.chunk(1, second * 10 + i, second * 1000 + i * 100, {1});
+    if (second < 3) continue;
+    for (int i = 0; i < 10; ++i) capture.chunk(0, (second - 3) * 10 + i, (second - 3) * 1000 + i * 100, {0});
+  }
+  capture.done();
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  HostTime last = HostTime::min();
+  const auto reads = read_all(*reader);
+  for (const RawRead& read : reads) {
+    ASSERT_GE(read.arrival, last);
+    last = read.arrival;
+  }
+  EXPECT_EQ(reads.size(), 570U);
+  EXPECT_EQ(reader->disordered(), 0U);
+}
+
+TEST(CaptureReader, DisorderBeyondTheWindowIsCounted) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(0, 0, 1000, {1});
+  capture.chunk(0, 1, 20'000, {2});
+  capture.chunk(0, 2, 30'000, {3});
+  capture.chunk(1, 0, 500, {4});
+  capture.done();
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  EXPECT_EQ(read_all(*reader).size(), 4U);
+  EXPECT_EQ(reader->disordered(), 1U);
+}
+
+TEST(CaptureReader, JoinsReadsThatWereSplit) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  RawRing* ring = nullptr;
+  const auto storage = std::make_unique<RawRing>();
+  ring = storage.get();
+  RawTap tap(*ring);
+  std::mt19937 random(4);
+  std::vector<Bytes> written;
+  Capture capture(path);
+  capture.header();
+  std::int64_t at = 0;
+  for (const std::size_t size : {1U, 1023U, 1024U, 1025U, 2048U, 2049U, 5000U}) {
+    Bytes bytes(size);
+    for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random());
+    tap.record(0, Direction::kRead, bytes, kT0 + std::chrono::milliseconds(at));
+    while (const RawChunk* chunk = ring->front()) {
+      EXPECT_LE(chunk->n_bytes, kRawChunkBytes);
+      capture.chunk(0, chunk->sequence, at,
+                    Bytes(chunk->bytes.begin(), chunk->bytes.begin() + chunk->n_bytes), chunk->continues);
+      ring->pop();
+    }
+    written.push_back(bytes);
+    at += 1;
+  }
+  capture.done();
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  const auto reads = read_all(*reader);
+  ASSERT_EQ(reads.size(), written.size());
+  for (std::size_t i = 0; i < reads.size(); ++i) EXPECT_EQ(reads[i].bytes, written[i]) << i;
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value());
+  EXPECT_EQ(summary->devices.at("airins").reads, written.size()) << "pieces were counted as reads";
+}
+
+TEST(CaptureReader, LossesOfTheRecorderAreNamedWithDeviceTimeAndCount) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(0, 0, 1, {1});
+  capture.chunk(1, 0, 2, {2});
+  capture.chunk(0, 5, 3, {3});
+  capture.chunk(1, 1, 4, {4});
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value());
+  ASSERT_EQ(summary->losses.size(), 1U);
+  EXPECT_EQ(summary->losses[0].device, "airins");
+  EXPECT_EQ(summary->losses[0].after, kT0 + std::chrono::milliseconds(1));
+  EXPECT_EQ(summary->losses[0].records, 4);
+}
+
+TEST(CaptureReader, AReadOfWhichAPieceWasLostComesInPieces) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(0, 0, 1, {1}, true);
+  capture.chunk(0, 2, 1, {3});
+  capture.chunk(0, 3, 2, {4}, true);  // the end of the file takes its rest
+  capture.done();
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  const auto reads = read_all(*reader);
+  ASSERT_EQ(reads.size(), 3U);
+  EXPECT_EQ(reads[0].bytes, (Bytes{1}));
+  EXPECT_EQ(reads[1].bytes, (Bytes{3}));
+  EXPECT_EQ(reads[2].bytes, (Bytes{4}));
+}
+
+TEST(CaptureReader, ExceptionsComeBackWithDeviceSampleAndTick) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(0, 0, 1, {1});
+  capture.exception({ExceptionKind::kLateSample, 1, 77, 1234, 1});
+  capture.exception({ExceptionKind::kRefusedSample, 0, 78, -1, 1});
+  capture.exception({ExceptionKind::kSkippedTicks, 0, -1, 1300, 3});
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value());
+  ASSERT_EQ(summary->exceptions.size(), 3U);
+  EXPECT_EQ(summary->exceptions[0].exception.kind, ExceptionKind::kLateSample);
+  EXPECT_EQ(summary->exceptions[0].device, "mtx1");
+  EXPECT_EQ(summary->exceptions[0].exception.sample_sequence, 77);
+  EXPECT_EQ(summary->exceptions[0].exception.tick, 1234);
+  EXPECT_EQ(summary->exceptions[1].exception.kind, ExceptionKind::kRefusedSample);
+  EXPECT_EQ(summary->exceptions[1].device, "airins");
+  EXPECT_EQ(summary->exceptions[2].exception.kind, ExceptionKind::kSkippedTicks);
+  EXPECT_EQ(summary->exceptions[2].device, "");
+  EXPECT_EQ(summary->exceptions[2].exception.count, 3);
+}
+
+TEST(CaptureReader, PassesOverForeignAndDamagedMessages) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.foreign({});
+  capture.foreign({1, 2, 3});
+  capture.foreign(Bytes(100, 0xff));
+  // The right fingerprint, then array lengths of any size.
+  std::mt19937 random(6);
+  Bytes fingerprint(8);
+  for (unsigned i = 0; i < 8; ++i) {
+    fingerprint[i] = static_cast<std::uint8_t>(static_cast<std::uint64_t>(raw_t::getHash()) >> (56 - 8 * i));
+  }
+  for (int i = 0; i < 300; ++i) {
+    Bytes forged = fingerprint;
+    const std::size_t size = random() % 80;
+    while (forged.size() < 8 + size) forged.push_back(static_cast<std::uint8_t>(random()));
+    capture.foreign(forged);
+  }
+  capture.chunk(0, 0, 1, {1});
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value()) << summary.error().text();
+  EXPECT_EQ(summary->other_messages, 303U);
+  EXPECT_EQ(summary->devices.size(), 1U);
+}
+
+TEST(CaptureReader, AnEventLogThatIsNoCaptureIsToldApart) {
+  const auto folder = test::scratch_folder();
+  Capture other(folder / "other.lcm");
+  other.foreign({1, 2, 3, 4, 5, 6, 7, 8, 9});
+  other.done();
+  const auto no_bytes = summarise_capture(folder / "other.lcm");
+  ASSERT_FALSE(no_bytes.has_value());
+  EXPECT_THAT(no_bytes.error().text(),
+              HasSubstr("is an LCM event log without device bytes (1 other messages)"));
+
+  Capture headless(folder / "headless.lcm");
+  headless.chunk(0, 0, 1, {1});
+  headless.done();
+  const auto no_header = summarise_capture(folder / "headless.lcm");
+  ASSERT_FALSE(no_header.has_value());
+  EXPECT_THAT(no_header.error().text(), HasSubstr("IMUSCOPE_RUN"));
+}
+
+}  // namespace
+}  // namespace imuscope

@@ -1,0 +1,246 @@
+#include <sys/resource.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <lcm/lcm-cpp.hpp>
+#include <random>
+
+#include "capture/capture_writer.h"
+#include "capture/event_log_reader.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using testing::HasSubstr;
+using Bytes = std::vector<std::uint8_t>;
+
+Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
+
+Bytes read_file(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void write_file(const std::filesystem::path& path, const Bytes& bytes) {
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+}
+
+std::vector<LogEvent> read_all(EventLogReader& reader) {
+  std::vector<LogEvent> events;
+  for (LogEvent event; reader.next(event);) events.push_back(event);
+  return events;
+}
+
+std::vector<LogEvent> read_with_lcm(const std::filesystem::path& path) {
+  std::vector<LogEvent> events;
+  lcm::LogFile log(path.string(), "r");
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    const auto* data = static_cast<const std::uint8_t*>(event->data);
+    events.push_back({event->eventnum, event->timestamp, event->channel, Bytes(data, data + event->datalen)});
+  }
+  return events;
+}
+
+bool same(const LogEvent& a, const LogEvent& b) {
+  return a.number == b.number && a.utime == b.utime && a.channel == b.channel && a.data == b.data;
+}
+
+/// Writes n records of differing sizes, one of them empty, and returns where each ends in the file.
+std::vector<std::size_t> write_example(const std::filesystem::path& path, int n) {
+  auto writer = CaptureWriter::create(path);
+  EXPECT_TRUE(writer.has_value());
+  std::vector<std::size_t> ends;
+  for (int i = 0; i < n; ++i) {
+    const Bytes data(static_cast<std::size_t>(i * 7), static_cast<std::uint8_t>(i));
+    writer->append("CHANNEL_" + std::to_string(i), 1'700'000'000'000'000 + i, data);
+    EXPECT_TRUE(writer->flush().has_value());
+    ends.push_back(static_cast<std::size_t>(writer->bytes_written()));
+  }
+  EXPECT_TRUE(writer->close().has_value());
+  return ends;
+}
+
+TEST(CaptureWriter, WritesWhatTheLcmLibraryReads) {
+  const auto path = test::scratch_folder() / "new" / "capture.lcm";
+  write_example(path, 20);
+  const auto events = read_with_lcm(path);
+  ASSERT_EQ(events.size(), 20U);
+  for (int i = 0; i < 20; ++i) {
+    const LogEvent expected{i, 1'700'000'000'000'000 + i, "CHANNEL_" + std::to_string(i),
+                            Bytes(static_cast<std::size_t>(i * 7), static_cast<std::uint8_t>(i))};
+    EXPECT_TRUE(same(events[static_cast<std::size_t>(i)], expected)) << i;
+  }
+}
+
+TEST(CaptureWriter, NeverOverwritesACapture) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  write_example(path, 3);
+  const auto second = CaptureWriter::create(path);
+  ASSERT_FALSE(second.has_value());
+  EXPECT_THAT(second.error().text(), HasSubstr("never overwritten"));
+  EXPECT_EQ(read_with_lcm(path).size(), 3U);
+}
+
+TEST(CaptureWriter, SaysWhyAFileCannotBeMade) {
+  const auto folder = test::scratch_folder();
+  write_file(folder / "file", {1});
+  const auto writer = CaptureWriter::create(folder / "file" / "capture.lcm");
+  ASSERT_FALSE(writer.has_value());
+  EXPECT_THAT(writer.error().text(), HasSubstr((folder / "file" / "capture.lcm").string()));
+}
+
+TEST(CaptureWriter, AFullDiskCostsTheRecordsItRefusesAndNothingElse) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  auto writer = CaptureWriter::create(path);
+  ASSERT_TRUE(writer.has_value());
+  const Bytes data(100, 7);
+  const auto append_and_flush = [&](const std::string& channel) {
+    writer->append(channel, 1, data);
+    return writer->flush();
+  };
+  ASSERT_TRUE(append_and_flush("BEFORE").has_value());
+
+  // A limit on the file's size refuses like a full disk: the first bytes of the record go, the rest does not.
+  const auto previous_handler = std::signal(SIGXFSZ, SIG_IGN);
+  rlimit unlimited{};
+  getrlimit(RLIMIT_FSIZE, &unlimited);
+  rlimit full = unlimited;
+  full.rlim_cur = static_cast<rlim_t>(writer->bytes_written() + 50);
+  setrlimit(RLIMIT_FSIZE, &full);
+  const auto refused = append_and_flush("DURING");
+  setrlimit(RLIMIT_FSIZE, &unlimited);
+  std::signal(SIGXFSZ, previous_handler);
+
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_THAT(refused.error().text(), HasSubstr("records were lost"));
+  EXPECT_EQ(writer->records_lost(), 1U);
+  EXPECT_EQ(std::filesystem::file_size(path), writer->bytes_written()) << "a part of a record is in the file";
+  ASSERT_TRUE(append_and_flush("AFTER").has_value());
+  ASSERT_TRUE(writer->close().has_value());
+  const auto events = read_with_lcm(path);
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0].channel, "BEFORE");
+  EXPECT_EQ(events[1].channel, "AFTER");
+  EXPECT_EQ(events[1].number, 2) << "the event numbers show the loss";
+}
+
+TEST(EventLogReader, ReadsWhatTheLcmLibraryWrites) {
+  const auto path = test::scratch_folder() / "log.lcm";
+  {
+    lcm::LogFile log(path.string(), "w");
+    for (int i = 0; i < 10; ++i) {
+      std::string data = "data " + std::to_string(i);
+      lcm::LogEvent event;
+      event.timestamp = 1000 + i;
+      event.channel = "POSE";
+      event.datalen = static_cast<std::int32_t>(data.size());
+      event.data = data.data();
+      ASSERT_EQ(log.writeEvent(&event), 0);
+    }
+  }
+  auto reader = EventLogReader::open(path);
+  ASSERT_TRUE(reader.has_value()) << reader.error().text();
+  const auto events = read_all(*reader);
+  ASSERT_EQ(events.size(), 10U);
+  EXPECT_TRUE(same(events[9], {9, 1009, "POSE", bytes_of("data 9")}));
+  EXPECT_EQ(reader->bytes_skipped(), 0U);
+  EXPECT_EQ(reader->bytes_cut_off(), 0U);
+}
+
+TEST(EventLogReader, AKillAtAnyByteOfTheLastRecordLosesOnlyThatRecord) {
+  const auto folder = test::scratch_folder();
+  const auto ends = write_example(folder / "whole.lcm", 12);
+  const Bytes whole = read_file(folder / "whole.lcm");
+  for (std::size_t size = ends[10]; size < ends[11]; ++size) {
+    const auto path = folder / "cut.lcm";
+    write_file(path, Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)));
+    auto reader = EventLogReader::open(path);
+    ASSERT_TRUE(reader.has_value());
+    ASSERT_EQ(read_all(*reader).size(), 11U) << "cut at byte " << size;
+    ASSERT_EQ(reader->bytes_cut_off(), size - ends[10]) << "cut at byte " << size;
+    ASSERT_EQ(reader->bytes_skipped(), 0U) << "cut at byte " << size;
+    ASSERT_EQ(read_with_lcm(path).size(), 11U) << "cut at byte " << size;
+  }
+}
+
+TEST(EventLogReader, AFlippedByteCostsAtMostTheRecordItIsIn) {
+  const auto folder = test::scratch_folder();
+  const auto ends = write_example(folder / "whole.lcm", 12);
+  const Bytes whole = read_file(folder / "whole.lcm");
+  const auto intact = read_with_lcm(folder / "whole.lcm");
+  for (std::size_t at = ends[4]; at < ends[5]; ++at) {
+    Bytes damaged = whole;
+    damaged[at] ^= 0xffU;
+    write_file(folder / "damaged.lcm", damaged);
+    auto reader = EventLogReader::open(folder / "damaged.lcm");
+    ASSERT_TRUE(reader.has_value());
+    const auto events = read_all(*reader);
+    for (std::size_t i = 0; i < intact.size(); ++i) {
+      const bool found = std::any_of(events.begin(), events.end(),
+                                     [&](const LogEvent& event) { return same(event, intact[i]); });
+      ASSERT_EQ(found, i != 5) << "record " << i << " with byte " << at << " flipped";
+    }
+  }
+}
+
+TEST(EventLogReader, EveryByteIsAccountedForInRandomDamage) {
+  const auto folder = test::scratch_folder();
+  write_example(folder / "whole.lcm", 40);
+  const Bytes whole = read_file(folder / "whole.lcm");
+  std::mt19937 random(11);
+  for (int round = 0; round < 200; ++round) {
+    Bytes damaged = whole;
+    for (int i = 0; i < 30; ++i)
+      damaged[4 + random() % (damaged.size() - 4)] = static_cast<std::uint8_t>(random());
+    // Forged sync words with forged lengths.
+    for (int i = 0; i < 3; ++i) {
+      const Bytes sync{0xed, 0xa1, 0xda, 0x01};
+      std::copy(sync.begin(), sync.end(),
+                damaged.begin() + static_cast<std::ptrdiff_t>(4 + random() % (damaged.size() - 8)));
+    }
+    write_file(folder / "damaged.lcm", damaged);
+    auto reader = EventLogReader::open(folder / "damaged.lcm");
+    ASSERT_TRUE(reader.has_value());
+    std::uint64_t in_records = 0;
+    for (const LogEvent& event : read_all(*reader)) {
+      in_records += kEventLogHeaderBytes + event.channel.size() + event.data.size();
+    }
+    ASSERT_EQ(in_records + reader->bytes_skipped() + reader->bytes_cut_off(), damaged.size())
+        << "round " << round;
+  }
+}
+
+TEST(EventLogReader, SaysWhatAFileIsThatIsNoCapture) {
+  const auto folder = test::scratch_folder();
+  write_file(folder / "empty.lcm", {});
+  write_file(folder / "text.lcm", bytes_of("time_s,lat_deg\n1,2\n"));
+  write_file(folder / "log.gz", {0x1f, 0x8b, 0x08, 0x00});
+  write_file(folder / "mtx1.bin", {0xfa, 0xff, 0x32, 0x00, 0x01});
+  write_file(folder / "short.lcm", {0xed, 0xa1});
+  const struct {
+    const char* name;
+    const char* what;
+  } cases[] = {{"absent.lcm", "does not exist"},
+               {"", "is a folder, not a capture"},
+               {"empty.lcm", "is empty: nothing was recorded"},
+               {"text.lcm", "but text that begins with 'time_s,lat_deg'"},
+               {"log.gz", "but a gzip archive"},
+               {"mtx1.bin", "but binary data that begins with the bytes fa ff 32 00 01"},
+               {"short.lcm", "but binary data that begins with the bytes ed a1"}};
+  for (const auto& [name, what] : cases) {
+    const auto reader = EventLogReader::open(folder / name);
+    ASSERT_FALSE(reader.has_value()) << name;
+    EXPECT_THAT(reader.error().text(), HasSubstr((folder / name).string()));
+    EXPECT_THAT(reader.error().text(), HasSubstr(what));
+    EXPECT_FALSE(reader.error().remedy.empty()) << name;
+  }
+}
+
+}  // namespace
+}  // namespace imuscope

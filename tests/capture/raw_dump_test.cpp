@@ -1,0 +1,109 @@
+#include "capture/raw_dump.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <fstream>
+#include <string>
+
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using testing::HasSubstr;
+
+class RawDumpTest : public testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& content) const {
+    std::ofstream(folder_ / name, std::ios::binary) << content;
+  }
+  [[nodiscard]] std::string error_of(const std::string& arrivals) const {
+    write("mtx1.arrivals.csv", arrivals);
+    const auto dump = RawDump::open(folder_ / "mtx1.bin");
+    return dump.has_value() ? "accepted" : dump.error().text();
+  }
+  const std::filesystem::path folder_ = test::scratch_folder();
+};
+
+TEST_F(RawDumpTest, GivesTheReadsAsTheyWere) {
+  write("mtx1.bin", "abcdefgh");
+  write("mtx1.arrivals.csv", "byte_offset,n_bytes,arrival_ns\n0,3,1000\n3,1,1000\n4,4,2500\n");
+  auto dump = RawDump::open(folder_ / "mtx1.bin");
+  ASSERT_TRUE(dump.has_value()) << dump.error().text();
+  EXPECT_TRUE(dump->has_arrivals());
+  const struct {
+    const char* bytes;
+    std::int64_t arrival_ns;
+  } expected[] = {{"abc", 1000}, {"d", 1000}, {"efgh", 2500}};
+  for (const auto& [bytes, arrival_ns] : expected) {
+    const auto read = dump->next();
+    ASSERT_TRUE(read.has_value());
+    EXPECT_EQ(std::string(read->bytes.begin(), read->bytes.end()), bytes);
+    EXPECT_EQ(to_ns(read->arrival.value()), arrival_ns);
+  }
+  EXPECT_FALSE(dump->next().has_value());
+}
+
+TEST_F(RawDumpTest, WithoutArrivalsGivesAllBytesAndNoTime) {
+  std::string content;
+  for (int i = 0; i < 100'000; ++i) content += static_cast<char>(i * 31);
+  write("mtx1.bin", content);
+  auto dump = RawDump::open(folder_ / "mtx1.bin");
+  ASSERT_TRUE(dump.has_value());
+  EXPECT_FALSE(dump->has_arrivals());
+  std::string together;
+  while (const auto read = dump->next()) {
+    EXPECT_FALSE(read->arrival.has_value());
+    together.append(read->bytes.begin(), read->bytes.end());
+  }
+  EXPECT_EQ(together, content);
+}
+
+TEST_F(RawDumpTest, TakesWindowsLineEndsCommentsAndALastLineWithoutEnd) {
+  write("mtx1.bin", "abcd");
+  EXPECT_EQ(error_of("byte_offset,n_bytes,arrival_ns\r\n# by hand\r\n0,2,5\r\n2,2,6"), "accepted");
+}
+
+TEST_F(RawDumpTest, AKilledRecordingEndsWhereItsBytesEnd) {
+  write("mtx1.bin", "abcde");
+  write("mtx1.arrivals.csv", "byte_offset,n_bytes,arrival_ns\n0,3,10\n3,9,20\n12,7,30\n");
+  auto dump = RawDump::open(folder_ / "mtx1.bin");
+  ASSERT_TRUE(dump.has_value()) << dump.error().text();
+  EXPECT_EQ(dump->next()->bytes.size(), 3U);
+  EXPECT_EQ(dump->next()->bytes.size(), 2U);
+  EXPECT_FALSE(dump->next().has_value());
+}
+
+TEST_F(RawDumpTest, NamesTheLineThatCannotBe) {
+  write("mtx1.bin", "abcdefgh");
+  const std::string header = "byte_offset,n_bytes,arrival_ns\n";
+  EXPECT_THAT(error_of("offset,bytes,ns\n"),
+              HasSubstr("mtx1.arrivals.csv:1: the header is 'offset,bytes,ns'"));
+  EXPECT_THAT(error_of(header + "0,4,1\n4,x,2\n"), HasSubstr(":3: '4,x,2' is not three whole numbers"));
+  EXPECT_THAT(error_of(header + "0,4,1.5\n"), HasSubstr(":2: '0,4,1.5' is not three whole numbers"));
+  EXPECT_THAT(error_of(header + "0,4\n"), HasSubstr("is not three whole numbers"));
+  EXPECT_THAT(error_of(header + "0,4,1\n5,3,2\n"),
+              HasSubstr(":3: byte_offset is 5, but the read before ends at 4"));
+  EXPECT_THAT(error_of(header + "0,0,1\n"), HasSubstr("a read of 0 bytes"));
+  EXPECT_THAT(error_of(header + "0,4,9\n4,4,8\n"), HasSubstr(":3: arrival_ns goes back"));
+  EXPECT_THAT(error_of(header + "0,4,9\n"), HasSubstr("the reads end at byte 4 of 8"));
+  EXPECT_THAT(error_of(""), HasSubstr("the file is empty"));
+}
+
+TEST_F(RawDumpTest, ALengthThatNoFileHasDoesNotAskForItsMemory) {
+  write("mtx1.bin", "abcd");
+  write("mtx1.arrivals.csv", "byte_offset,n_bytes,arrival_ns\n0,4000000000000,1\n");
+  auto dump = RawDump::open(folder_ / "mtx1.bin");
+  ASSERT_TRUE(dump.has_value());
+  EXPECT_EQ(dump->next()->bytes.size(), 4U);
+}
+
+TEST_F(RawDumpTest, SaysWhatIsThereInstead) {
+  write("empty.bin", "");
+  EXPECT_THAT(RawDump::open(folder_ / "absent.bin").error().text(), HasSubstr("does not exist"));
+  EXPECT_THAT(RawDump::open(folder_).error().text(), HasSubstr("is a folder"));
+  EXPECT_THAT(RawDump::open(folder_ / "empty.bin").error().text(), HasSubstr("is empty"));
+}
+
+}  // namespace
+}  // namespace imuscope

@@ -1,0 +1,197 @@
+#include "capture/recorder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <lcm/lcm-cpp.hpp>
+#include <map>
+#include <memory>
+#include <thread>
+
+#include "capture/capture_reader.h"
+#include "rt/host_clock.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::HasSubstr;
+using Bytes = std::vector<std::uint8_t>;
+
+Recorder::Options options_for(const std::filesystem::path& path) {
+  Recorder::Options options;
+  options.path = path;
+  options.run.name = "test";
+  options.run.t0 = host_now();
+  options.run.period = milliseconds(10);
+  options.run.t0_wall = wall_clock_now();
+  options.run.configuration = "# none";
+  options.run.devices = {"airins", "mtx1", "gnss"};
+  return options;
+}
+
+/// Bytes by which a read can be recognised: its number, then a pattern.
+Bytes numbered_bytes(std::uint32_t number, std::size_t size) {
+  Bytes bytes(size);
+  for (std::size_t i = 0; i < size; ++i)
+    bytes[i] = static_cast<std::uint8_t>((number >> (8 * (i % 4))) + i / 4);
+  return bytes;
+}
+
+TEST(Recorder, KeepsEveryReadOfTwoIoThreadsInOrderWithItsArrival) {
+  constexpr std::uint32_t kReads = 3000;
+  const auto path = test::scratch_folder() / "capture.lcm";
+  const auto ring_a = std::make_unique<RawRing>();
+  const auto ring_b = std::make_unique<RawRing>();
+  const auto exceptions = std::make_unique<ExceptionRing>();
+  auto recorder = Recorder::start(options_for(path), {ring_a.get(), ring_b.get()}, {exceptions.get()});
+  ASSERT_TRUE(recorder.has_value()) << recorder.error().text();
+
+  std::map<std::string, std::vector<HostTime>> arrivals;  // by device; each written by one thread
+  arrivals["airins"].reserve(kReads);
+  arrivals["mtx1"].reserve(kReads);
+  const auto io = [&](RawRing& ring, DeviceIndex device, std::vector<HostTime>& times) {
+    RawTap tap(ring);
+    for (std::uint32_t i = 0; i < kReads; ++i) {
+      const HostTime now = host_now();
+      times.push_back(now);
+      tap.record(device, i % 10 == 0 ? Direction::kWrite : Direction::kRead, numbered_bytes(i, 1 + i % 1500),
+                 now);
+      std::this_thread::sleep_for(std::chrono::microseconds(100));
+    }
+  };
+  std::thread a([&] { io(*ring_a, 0, arrivals.at("airins")); });
+  std::thread b([&] { io(*ring_b, 1, arrivals.at("mtx1")); });
+  ASSERT_TRUE(exceptions->try_push({ExceptionKind::kSkippedTicks, 0, -1, 5, 2}));
+  a.join();
+  b.join();
+  const auto stopped = (*recorder)->stop();
+  ASSERT_TRUE(stopped.has_value()) << stopped.error().text();
+  ASSERT_EQ(ring_a->counters().refused + ring_b->counters().refused, 0U)
+      << "the machine is too slow for this test";
+
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value());
+  EXPECT_TRUE(summary->losses.empty());
+  EXPECT_EQ(summary->exceptions.size(), 1U);
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  std::map<std::string, std::uint32_t> next;
+  HostTime last = HostTime::min();
+  while (const auto read = reader->next()) {
+    const std::uint32_t i = next[read->device]++;
+    ASSERT_EQ(read->bytes, numbered_bytes(i, 1 + i % 1500)) << read->device << " " << i;
+    ASSERT_EQ(read->arrival, arrivals.at(read->device).at(i));
+    ASSERT_EQ(read->direction, i % 10 == 0 ? Direction::kWrite : Direction::kRead);
+    ASSERT_GE(read->arrival, last);
+    last = read->arrival;
+  }
+  EXPECT_EQ(next["airins"], kReads);
+  EXPECT_EQ(next["mtx1"], kReads);
+  EXPECT_EQ(reader->disordered(), 0U);
+  const RecorderStatus status = (*recorder)->status();
+  EXPECT_EQ(status.bytes, std::filesystem::file_size(path));
+  EXPECT_EQ(status.records_lost, 0U);
+  EXPECT_FALSE(status.problem.has_value());
+}
+
+TEST(Recorder, WritesALogThatLcmToolsRead) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  const auto ring = std::make_unique<RawRing>();
+  auto recorder = Recorder::start(options_for(path), {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value());
+  RawTap tap(*ring);
+  tap.record(1, Direction::kRead, numbered_bytes(1, 10), host_now());
+  tap.record(2, Direction::kRead, numbered_bytes(2, 10), host_now());
+  ASSERT_TRUE((*recorder)->stop().has_value());
+
+  lcm::LogFile log(path.string(), "r");
+  std::vector<std::string> channels;
+  const std::int64_t now_us = to_ns(wall_clock_now()) / 1000;
+  constexpr std::int64_t kMinuteUs = 60'000'000;
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    channels.push_back(event->channel);
+    EXPECT_NEAR(static_cast<double>(event->timestamp), static_cast<double>(now_us), kMinuteUs);
+  }
+  EXPECT_EQ(channels, (std::vector<std::string>{"IMUSCOPE_RUN", "IMUSCOPE_RAW_MTX1", "IMUSCOPE_RAW_GNSS"}));
+}
+
+/// The child feeds numbered reads at 1 kHz and reports each; the parent kills it at a moment of its own
+/// choice.
+TEST(Recorder, AKillLosesLessThanASecond) {
+  for (const auto lifetime : {milliseconds(1), milliseconds(900), milliseconds(1300)}) {
+    const auto path = test::scratch_folder() / "capture.lcm";
+    int report[2];
+    ASSERT_EQ(pipe(report), 0);
+    const pid_t child = fork();
+    if (child == 0) {
+      const auto ring = std::make_unique<RawRing>();
+      auto recorder = Recorder::start(options_for(path), {ring.get()}, {});
+      if (!recorder) _exit(1);
+      RawTap tap(*ring);
+      for (;;) {
+        const std::int64_t ns = to_ns(host_now());
+        tap.record(0, Direction::kRead, numbered_bytes(0, 30), host_time_from_ns(ns));
+        if (::write(report[1], &ns, sizeof ns) != sizeof ns) _exit(1);
+        std::this_thread::sleep_for(milliseconds(1));
+      }
+    }
+    close(report[1]);
+    std::int64_t last_ns = 0;
+    ASSERT_EQ(read(report[0], &last_ns, sizeof last_ns), static_cast<ssize_t>(sizeof last_ns));
+    std::this_thread::sleep_for(lifetime);
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    while (read(report[0], &last_ns, sizeof last_ns) == static_cast<ssize_t>(sizeof last_ns)) {
+    }
+    close(report[0]);
+
+    auto reader = CaptureReader::open(path);
+    ASSERT_TRUE(reader.has_value()) << reader.error().text();
+    HostTime recorded = HostTime::min();
+    while (const auto record = reader->next()) recorded = record->arrival;
+    if (lifetime < milliseconds(500)) continue;  // nothing need have been flushed but the header
+    EXPECT_LT(last_ns - to_ns(recorded), 1'000'000'000) << "killed after " << lifetime.count() << " ms";
+  }
+}
+
+TEST(Recorder, AFullRingCostsRecordsAndTheCaptureSaysWhere) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  const auto ring = std::make_unique<RawRing>();
+  RawTap tap(*ring);
+  const HostTime now = host_now();
+  // The recorder stands still, as behind a dead disk: the ring fills, and what follows is refused.
+  for (std::uint32_t i = 0; i < kRawRingCapacity + 10; ++i) {
+    tap.record(1, Direction::kRead, numbered_bytes(i, 4), now + milliseconds(i));
+  }
+  EXPECT_EQ(ring->counters().refused, 10U);
+  auto recorder = Recorder::start(options_for(path), {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value());
+  while (ring->counters().level > 0) std::this_thread::sleep_for(milliseconds(5));
+  tap.record(1, Direction::kRead, numbered_bytes(9999, 4), now + milliseconds(3000));
+  ASSERT_TRUE((*recorder)->stop().has_value());
+
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value());
+  EXPECT_EQ(summary->devices.at("mtx1").reads, kRawRingCapacity + 1);
+  ASSERT_EQ(summary->losses.size(), 1U);
+  EXPECT_EQ(summary->losses[0].records, 10);
+  EXPECT_EQ(summary->losses[0].after, now + milliseconds(kRawRingCapacity - 1));
+}
+
+TEST(Recorder, DoesNotStartWhereNothingCanBeWritten) {
+  const auto folder = test::scratch_folder();
+  std::ofstream(folder / "taken.lcm") << "x";
+  const auto recorder = Recorder::start(options_for(folder / "taken.lcm"), {}, {});
+  ASSERT_FALSE(recorder.has_value());
+  EXPECT_THAT(recorder.error().text(), HasSubstr("taken.lcm"));
+}
+
+}  // namespace
+}  // namespace imuscope
