@@ -1,0 +1,108 @@
+#include "noise/compare.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+
+namespace imuscope::noise {
+namespace {
+
+/// A parameter on the scale of its interval. The covariance of omega and alpha is that of their squares.
+double on_interval_scale(const ParameterEstimate& p) {
+  if (p.name == "theta" || p.name == "phi") return std::atanh(p.value);
+  const double log = std::log(p.value);
+  return p.name == "omega" || p.name == "alpha" ? 2.0 * log : log;
+}
+
+double covariance_of(const FitResult& fit, std::size_t i, std::size_t k) {
+  const std::size_t size = fit.parameters.size();
+  return fit.covariance.size() == size * size ? fit.covariance[i * size + k] : std::nan("");
+}
+
+double p_value_of(double statistic, int dof) {
+  return boost::math::cdf(complement(boost::math::chi_squared(dof), statistic));
+}
+
+std::optional<std::size_t> index_of(const FitResult& fit, const ParameterEstimate& p) {
+  const auto at = std::find_if(fit.parameters.begin(), fit.parameters.end(), [&](const ParameterEstimate& q) {
+    return q.process == p.process && q.name == p.name;
+  });
+  if (at == fit.parameters.end()) return std::nullopt;
+  return static_cast<std::size_t>(at - fit.parameters.begin());
+}
+
+struct Pair {
+  std::size_t first;
+  std::size_t second;
+};
+
+std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b,
+                                         const std::vector<Pair>& pairs) {
+  if (pairs.empty()) return std::nullopt;
+  const auto n = static_cast<Eigen::Index>(pairs.size());
+  Eigen::VectorXd difference(n);
+  Eigen::MatrixXd covariance(n, n);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    difference[static_cast<Eigen::Index>(i)] =
+        on_interval_scale(b.parameters[pairs[i].second]) - on_interval_scale(a.parameters[pairs[i].first]);
+    for (std::size_t k = 0; k < pairs.size(); ++k) {
+      covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          covariance_of(a, pairs[i].first, pairs[k].first) +
+          covariance_of(b, pairs[i].second, pairs[k].second);
+    }
+  }
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(covariance);
+  if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return std::nullopt;
+  DifferenceTest test;
+  test.dof = static_cast<int>(n);
+  test.statistic = difference.dot(ldlt.solve(difference));
+  test.p_value = p_value_of(test.statistic, test.dof);
+  return test;
+}
+
+}  // namespace
+
+Comparison compare(const FitResult& first, const FitResult& second) {
+  Comparison out;
+  std::vector<Pair> testable;
+  for (std::size_t i = 0; i < first.parameters.size(); ++i) {
+    const ParameterEstimate& p = first.parameters[i];
+    ComparedParameter row{p.process, p.name, p.unit, p.value, std::nullopt, std::nullopt, std::nullopt};
+    if (const auto k = index_of(second, p)) {
+      const ParameterEstimate& q = second.parameters[*k];
+      row.second = q.value;
+      if (p.value != 0.0) row.ratio = q.value / p.value;
+      if (p.unit != q.unit) {
+        out.warnings.push_back(
+            fmt::format("{} {} is in '{}' and in '{}': not compared", p.process, p.name, p.unit, q.unit));
+      } else if (const double variance = covariance_of(first, i, i) + covariance_of(second, *k, *k);
+                 std::isfinite(variance) && variance > 0.0) {
+        const double d = on_interval_scale(q) - on_interval_scale(p);
+        row.p_value = p_value_of(d * d / variance, 1);
+        testable.push_back({i, *k});
+      }
+    }
+    out.parameters.push_back(row);
+  }
+  for (const ParameterEstimate& q : second.parameters) {
+    if (index_of(first, q)) continue;
+    out.parameters.push_back({q.process, q.name, q.unit, std::nullopt, q.value, std::nullopt, std::nullopt});
+  }
+  if (!(first.spec == second.spec)) {
+    out.warnings.push_back(
+        fmt::format("the models differ ({} and {}): a term of one may stand for several of the other",
+                    first.spec.name(), second.spec.name()));
+  }
+  if (first.rate_hz != second.rate_hz) {
+    out.warnings.push_back(
+        fmt::format("the rates differ ({} and {} Hz): WN, RW, QN and DR parameters are per sample",
+                    first.rate_hz, second.rate_hz));
+  }
+  out.test = joint_test(first, second, testable);
+  return out;
+}
+
+}  // namespace imuscope::noise

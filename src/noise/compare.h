@@ -1,0 +1,40 @@
+#pragma once
+
+/// Two fits side by side, with the test that they have the same parameters.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "noise/fit.h"
+
+namespace imuscope::noise {
+
+/// One parameter in both fits; the difference is tested on the scale of its interval (logarithms).
+struct ComparedParameter {
+  std::string process;
+  std::string name;
+  std::string unit;
+  std::optional<double> first;  ///< absent where that fit does not have the parameter
+  std::optional<double> second;
+  std::optional<double> ratio;    ///< second / first
+  std::optional<double> p_value;  ///< of no difference; absent where a sd is
+};
+
+/// Joint test over the parameters that both fits determine: (a-b)' (Sa+Sb)^-1 (a-b).
+struct DifferenceTest {
+  double statistic = 0.0;
+  int dof = 0;
+  double p_value = 0.0;
+};
+
+struct Comparison {
+  std::vector<ComparedParameter> parameters;
+  std::optional<DifferenceTest> test;  ///< absent where no parameter is determined in both
+  std::vector<std::string> warnings;
+};
+
+/// The fits are of different stretches or sensors (independent). Parameters are matched by process and name.
+Comparison compare(const FitResult& first, const FitResult& second);
+
+}  // namespace imuscope::noise

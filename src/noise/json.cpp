@@ -1,0 +1,189 @@
+#include "noise/json.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+namespace imuscope::noise {
+namespace {
+
+using nlohmann::json;
+
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+json number(const std::optional<double>& value) { return value ? number(*value) : json(nullptr); }
+
+json level_to_json(const WvLevel& level, double rate_hz) {
+  return {{"level", level.level},
+          {"tau_s", level.tau_samples / rate_hz},
+          {"value", number(level.value)},
+          {"ci_low", number(level.ci_low)},
+          {"ci_high", number(level.ci_high)},
+          {"n_coefficients", level.n_coefficients}};
+}
+
+double number_or_nan(const json& j) {
+  return j.is_null() ? std::numeric_limits<double>::quiet_NaN() : j.get<double>();
+}
+
+std::optional<double> optional_number(const json& object, const char* key) {
+  const auto at = object.find(key);
+  if (at == object.end() || at->is_null()) return std::nullopt;
+  return at->get<double>();
+}
+
+/// The component's value that a printed parameter stands for, back in sample terms.
+void set_parameter(Component& c, const ParameterEstimate& p, double rate_hz) {
+  if (p.name == "beta") {
+    c.shape[0] = p.value / rate_hz;
+  } else if (p.name == "frequency") {
+    c.shape[0] = 2.0 * std::numbers::pi * p.value / rate_hz;
+  } else if (p.name == "phi") {
+    c.shape[0] = p.value;
+  } else if (p.name == "theta") {
+    c.shape[c.kind == ProcessKind::kArma11 ? 1 : 0] = p.value;
+  } else if (p.name == "omega" || p.name == "alpha") {
+    c.amplitude = p.value * p.value;
+  } else {
+    c.amplitude = p.value;
+  }
+}
+
+Model model_from_parameters(const FitResult& fit) {
+  Model model;
+  std::size_t p = 0;
+  for (const ProcessKind kind : fit.spec.processes) {
+    Component c{kind, 0.0, {}};
+    for (int i = 0; i <= shape_count(kind); ++i) set_parameter(c, fit.parameters.at(p++), fit.rate_hz);
+    model.components.push_back(c);
+  }
+  return model;
+}
+
+FitResult read_fit(const json& j) {
+  FitResult fit;
+  fit.n = j.at("n").get<std::uint64_t>();
+  fit.rate_hz = j.at("rate_hz").get<double>();
+  const auto spec = parse_model(j.at("model").get<std::string>());
+  if (!spec) throw std::invalid_argument(spec.error().text());
+  fit.spec = *spec;
+  fit.weighting = j.at("weights").get<std::string>() == "ci" ? Weighting::kCi : Weighting::kOptimal;
+  for (const json& row : j.at("wv")) {
+    FittedLevel level;
+    level.observed.level = row.at("level").get<int>();
+    level.observed.tau_samples = std::ldexp(1.0, level.observed.level);
+    level.observed.value = number_or_nan(row.at("value"));
+    level.observed.ci_low = number_or_nan(row.at("ci_low"));
+    level.observed.ci_high = number_or_nan(row.at("ci_high"));
+    level.observed.n_coefficients = row.at("n_coefficients").get<std::uint64_t>();
+    level.fitted = number_or_nan(row.at("fitted"));
+    level.model_ci_low = optional_number(row, "model_ci_low").value_or(0.0);
+    level.model_ci_high = optional_number(row, "model_ci_high").value_or(0.0);
+    fit.wv.push_back(level);
+  }
+  for (const json& row : j.at("parameters")) {
+    ParameterEstimate p;
+    p.process = row.at("process").get<std::string>();
+    p.name = row.at("name").get<std::string>();
+    p.unit = row.at("unit").get<std::string>();
+    p.value = row.at("value").get<double>();
+    p.sd = optional_number(row, "sd");
+    p.ci_low = optional_number(row, "ci_low");
+    p.ci_high = optional_number(row, "ci_high");
+    fit.parameters.push_back(p);
+  }
+  fit.model = model_from_parameters(fit);
+  if (j.contains("covariance")) {
+    for (const json& v : j.at("covariance")) fit.covariance.push_back(number_or_nan(v));
+  }
+  fit.objective = number_or_nan(j.at("objective"));
+  const json& test = j.at("j_test");
+  if (test.is_object()) {
+    fit.j_test = JTest{test.at("statistic").get<double>(), test.at("dof").get<int>(),
+                       test.at("p_value").get<double>()};
+  }
+  fit.criterion = number_or_nan(j.at("criterion"));
+  fit.identifiable = j.at("identifiable").get<bool>();
+  fit.simpler_model = j.value("simpler_model", std::string());
+  fit.warnings = j.at("warnings").get<std::vector<std::string>>();
+  return fit;
+}
+
+}  // namespace
+
+json wv_to_json(const WaveletVariance& wv, double rate_hz) {
+  json out{{"n", wv.n_valid}, {"rate_hz", rate_hz}, {"wv", json::array()}};
+  const bool robust = wv.efficiency < 1.0;
+  if (robust) out["efficiency"] = wv.efficiency;
+  for (const WvLevel& level : wv.levels) {
+    json row = level_to_json(level, rate_hz);
+    if (robust) row["rejected_share"] = level.rejected_share;
+    out["wv"].push_back(std::move(row));
+  }
+  return out;
+}
+
+json fit_to_json(const FitResult& fit) {
+  json out{{"n", fit.n},
+           {"rate_hz", fit.rate_hz},
+           {"model", fit.spec.name()},
+           {"weights", fit.weighting == Weighting::kCi ? "ci" : "optimal"},
+           {"wv", json::array()},
+           {"parameters", json::array()},
+           {"covariance", json::array()},
+           {"objective", number(fit.objective)},
+           {"j_test", nullptr},
+           {"criterion", number(fit.criterion)},
+           {"identifiable", fit.identifiable},
+           {"warnings", fit.warnings}};
+  if (!fit.simpler_model.empty()) out["simpler_model"] = fit.simpler_model;
+  for (const FittedLevel& level : fit.wv) {
+    json row = level_to_json(level.observed, fit.rate_hz);
+    row["fitted"] = number(level.fitted);
+    const bool known = level.model_ci_high > 0.0;
+    row["model_ci_low"] = known ? number(level.model_ci_low) : json(nullptr);
+    row["model_ci_high"] = known ? number(level.model_ci_high) : json(nullptr);
+    out["wv"].push_back(std::move(row));
+  }
+  for (const ParameterEstimate& p : fit.parameters) {
+    out["parameters"].push_back({{"process", p.process},
+                                 {"name", p.name},
+                                 {"unit", p.unit},
+                                 {"value", number(p.value)},
+                                 {"sd", number(p.sd)},
+                                 {"ci_low", number(p.ci_low)},
+                                 {"ci_high", number(p.ci_high)}});
+  }
+  for (const double v : fit.covariance) out["covariance"].push_back(number(v));
+  if (fit.j_test) {
+    out["j_test"] = {{"statistic", number(fit.j_test->statistic)},
+                     {"dof", fit.j_test->dof},
+                     {"p_value", number(fit.j_test->p_value)}};
+  }
+  return out;
+}
+
+json quantities_to_json(const std::vector<Quantity>& quantities) {
+  json out = json::array();
+  for (const Quantity& q : quantities) {
+    out.push_back({{"process", q.process},
+                   {"name", q.name},
+                   {"unit", q.unit},
+                   {"value", number(q.value)},
+                   {"ci_low", number(q.ci_low)},
+                   {"ci_high", number(q.ci_high)}});
+  }
+  return out;
+}
+
+Result<FitResult> fit_from_json(const json& j) {
+  try {
+    return read_fit(j);
+  } catch (const std::exception& error) {
+    return work_error(fmt::format("this is not a fit as `imuscope fit --json` writes it: {}", error.what()));
+  }
+}
+
+}  // namespace imuscope::noise

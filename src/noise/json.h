@@ -1,0 +1,30 @@
+#pragma once
+
+/// Wavelet variances and fits as JSON: the fields of `wv --json`, `fit --json` and the entries of
+/// models.json. What is not known is null.
+
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "base/result.h"
+#include "noise/fit.h"
+#include "noise/quantities.h"
+
+namespace imuscope::noise {
+
+/// {"n", "rate_hz", "wv": [{"level", "tau_s", "value", "ci_low", "ci_high", "n_coefficients"}]};
+/// a robust one has "efficiency" and "rejected_share" too.
+nlohmann::json wv_to_json(const WaveletVariance& wv, double rate_hz);
+
+/// {"n", "rate_hz", "model", "weights", "wv": [.. and "fitted", "model_ci_low", "model_ci_high"],
+///  "parameters": [{"process", "name", "unit", "value", "sd", "ci_low", "ci_high"}], "covariance" (row-major,
+///  of the logarithms), "objective", "j_test", "criterion", "identifiable", "simpler_model", "warnings"}.
+nlohmann::json fit_to_json(const FitResult& fit);
+
+/// [{"process", "name", "unit", "value", "ci_low", "ci_high"}].
+nlohmann::json quantities_to_json(const std::vector<Quantity>& quantities);
+
+/// Reads what fit_to_json() wrote. Errors (kWork): the field that is missing or of the wrong type.
+Result<FitResult> fit_from_json(const nlohmann::json& json);
+
+}  // namespace imuscope::noise

@@ -1,0 +1,132 @@
+#include "noise/quantities.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "base/units.h"
+
+namespace imuscope::noise {
+namespace {
+
+constexpr std::array<std::pair<SignalUnit, std::string_view>, 5> kUnits{{{SignalUnit::kNone, ""},
+                                                                         {SignalUnit::kRadps, "rad/s"},
+                                                                         {SignalUnit::kDegps, "deg/s"},
+                                                                         {SignalUnit::kMps2, "m/s^2"},
+                                                                         {SignalUnit::kG, "g"}}};
+/// sqrt(2 ln 2 / pi): Allan deviation of flicker noise of unit bias instability (IEEE 952, annex C).
+constexpr double kFlickerAllanDeviation = 0.664;
+const double kSqrtSecondsPerHour = std::sqrt(kSecondsPerHour);
+
+bool is_gyro(SignalUnit unit) { return unit == SignalUnit::kRadps || unit == SignalUnit::kDegps; }
+
+/// Factor to the data sheet's own unit: degrees, or metres per second squared.
+double sheet_factor(SignalUnit unit) {
+  if (unit == SignalUnit::kRadps) return kDegPerRad;
+  return unit == SignalUnit::kG ? kMps2PerG : 1.0;
+}
+
+class Builder {
+ public:
+  Builder(const FitResult& fit, SignalUnit unit) : fit_(fit), unit_(unit), u_(unit_name(unit)) {
+    if (u_.empty()) u_ = "unit";
+  }
+
+  std::vector<Quantity> build() {
+    for (const ParameterEstimate& p : fit_.parameters) add_parameter(p);
+    add_bias_instability();
+    return std::move(out_);
+  }
+
+ private:
+  /// value = factor * parameter^power
+  void add(const ParameterEstimate& p, std::string name, std::string unit, double factor, double power) {
+    const auto map = [&](double v) { return factor * std::pow(v, power); };
+    Quantity q{p.process, std::move(name), std::move(unit), map(p.value), std::nullopt, std::nullopt};
+    if (p.ci_low && p.ci_high) {
+      q.ci_low = std::min(map(*p.ci_low), map(*p.ci_high));
+      q.ci_high = std::max(map(*p.ci_low), map(*p.ci_high));
+    }
+    out_.push_back(std::move(q));
+  }
+
+  void add_parameter(const ParameterEstimate& p) {
+    const double f = fit_.rate_hz;
+    if (p.process == "WN") {
+      add(p, "density", fmt::format("({})^2/Hz", u_), 1.0 / f, 1.0);
+      add(p, "density root", fmt::format("{}/sqrt(Hz)", u_), 1.0 / std::sqrt(f), 0.5);
+      if (unit_ == SignalUnit::kNone) return;
+      const double sheet = sheet_factor(unit_) * kSqrtSecondsPerHour / std::sqrt(f);
+      if (is_gyro(unit_)) {
+        add(p, "angle random walk", "deg/sqrt(h)", sheet, 0.5);
+      } else {
+        add(p, "velocity random walk", "m/s/sqrt(h)", sheet, 0.5);
+      }
+    } else if (p.process == "RW") {
+      add(p, "driving density", fmt::format("({})^2 Hz", u_), f, 1.0);
+      if (unit_ == SignalUnit::kNone) return;
+      const double sheet = sheet_factor(unit_) * kSqrtSecondsPerHour * std::sqrt(f);
+      add(p, is_gyro(unit_) ? "rate random walk" : "acceleration random walk",
+          is_gyro(unit_) ? "deg/s/sqrt(h)" : "m/s^2/sqrt(h)", sheet, 0.5);
+    } else if (p.process == "QN") {
+      add(p, "quantization", fmt::format("{} s", u_), 1.0 / f, 0.5);
+    } else if (p.process == "DR") {
+      add(p, "ramp", fmt::format("{}/s", u_), f, 1.0);
+    } else if (p.process.starts_with("GM")) {
+      add_gauss_markov(p);
+    }
+  }
+
+  void add_gauss_markov(const ParameterEstimate& p) {
+    if (p.name == "beta") {
+      add(p, "correlation time", "s", 1.0, -1.0);
+      beta_ = p.value;
+      return;
+    }
+    add(p, "sd", u_, 1.0, 0.5);
+    out_.push_back({p.process, "driving density", fmt::format("({})^2 Hz", u_), 2.0 * beta_ * p.value,
+                    std::nullopt, std::nullopt});
+  }
+
+  void add_bias_instability() {
+    if (unit_ == SignalUnit::kNone || fit_.wv.empty()) return;
+    double smallest = std::numeric_limits<double>::infinity();
+    for (const FittedLevel& level : fit_.wv) smallest = std::min(smallest, level.fitted);
+    // The Allan variance is twice the wavelet variance.
+    const double deviation = std::sqrt(2.0 * smallest) / kFlickerAllanDeviation * sheet_factor(unit_);
+    const double per_hour = is_gyro(unit_) ? kSecondsPerHour : 1.0 / kMps2PerMicroG;
+    out_.push_back({"model", "bias instability", is_gyro(unit_) ? "deg/h" : "micro-g", deviation * per_hour,
+                    std::nullopt, std::nullopt});
+  }
+
+  const FitResult& fit_;
+  SignalUnit unit_;
+  std::string u_;
+  double beta_ = 0.0;
+  std::vector<Quantity> out_;
+};
+
+}  // namespace
+
+Result<SignalUnit> parse_unit(std::string_view text) {
+  for (const auto& [unit, name] : kUnits) {
+    if (name == text) return unit;
+  }
+  return usage_error(fmt::format("the unit '{}' is not known", text), "give rad/s, deg/s, m/s^2 or g");
+}
+
+std::string_view unit_name(SignalUnit unit) noexcept {
+  for (const auto& [kind, name] : kUnits) {
+    if (kind == unit) return name;
+  }
+  return "";
+}
+
+std::vector<Quantity> filter_quantities(const FitResult& fit, SignalUnit unit) {
+  return Builder(fit, unit).build();
+}
+
+}  // namespace imuscope::noise

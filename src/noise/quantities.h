@@ -1,0 +1,39 @@
+#pragma once
+
+/// A fitted model in the terms of a Kalman filter and of a data sheet.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "noise/fit.h"
+
+namespace imuscope::noise {
+
+enum class SignalUnit : std::uint8_t { kNone, kRadps, kDegps, kMps2, kG };
+
+/// "rad/s", "deg/s", "m/s^2", "g" or "" (none). Errors: kUsage, with the units that exist.
+Result<SignalUnit> parse_unit(std::string_view text);
+std::string_view unit_name(SignalUnit unit) noexcept;
+
+struct Quantity {
+  std::string process;  ///< "WN", "GM1", ...; "model" for what the sum of the processes has
+  std::string name;     ///< "density", "correlation time", "driving density", "angle random walk", ...
+  std::string unit;
+  double value = 0.0;
+  std::optional<double> ci_low;   ///< from the parameter's interval; absent where that is, or where it is no
+  std::optional<double> ci_high;  ///< function of one parameter alone
+};
+
+/// At sampling rate f, signal unit u:
+///   WN   density sigma2 / f (u^2/Hz); its root is the angle or velocity random walk (deg/sqrt(h),
+///   m/s/sqrt(h)) RW   driving density gamma2 f (u^2 Hz); its root is the rate random walk GM   correlation
+///   time 1 / beta (s), driving density 2 beta sigma2, sd sqrt(sigma2) QN   quantization sqrt(q2) / f (u s)
+///   DR   ramp omega f (u/s)
+///   model: bias instability = smallest Allan deviation of the model over the fitted levels / 0.664
+/// Data-sheet names appear with a known unit only.
+std::vector<Quantity> filter_quantities(const FitResult& fit, SignalUnit unit);
+
+}  // namespace imuscope::noise
