@@ -22,6 +22,15 @@ double shown_in_degrees(std::string& unit) {
   return squared ? kDegPerRad * kDegPerRad : kDegPerRad;
 }
 
+/// "(m/s²)²" for "(m/s^2)^2".
+std::string with_raised_twos(std::string unit) {
+  constexpr std::string_view kSquare = "^2";
+  for (std::size_t place = 0; (place = unit.find(kSquare)) != std::string::npos;) {
+    unit.replace(place, kSquare.size(), "²");
+  }
+  return unit;
+}
+
 std::optional<double> scaled(std::optional<double> value, double factor) {
   return value ? std::optional(*value * factor) : value;
 }
@@ -32,6 +41,7 @@ FitParameter read_parameter(const json& entry) {
   parameter.name = text_at(entry, "name");
   parameter.unit = text_at(entry, "unit");
   const double factor = shown_in_degrees(parameter.unit);
+  parameter.unit = with_raised_twos(parameter.unit);
   parameter.value = scaled(number_at(entry, "value"), factor);
   parameter.ci_low = scaled(number_at(entry, "ci_low"), factor);
   parameter.ci_high = scaled(number_at(entry, "ci_high"), factor);
@@ -47,6 +57,7 @@ Fit read_fit(const json& entry) {
   fit.model = text_at(entry, "model");
   fit.n = number_at(entry, "n");
   const double factor = shown_in_degrees(fit.unit);
+  fit.unit = with_raised_twos(fit.unit);
   for (const json& level : field(entry, "wv")) {
     const auto tau_s = number_at(level, "tau_s");
     if (!tau_s) continue;

@@ -5,6 +5,8 @@
   // Legible on white and on black, and told apart by the colour-blind (after Okabe and Ito).
   const COLOURS = ['#d1600a', '#0b9a6e', '#3a86d8', '#9a6fd0', '#c14b78'];
   const SPEED_COLOURS = ['#8a63c9', '#3a86d8', '#0b9a6e', '#d99a00', '#d1600a'];
+  const REGIME_COLOURS = ['#3a86d8', '#d1600a', '#0b9a6e', '#9a6fd0', '#c14b78'];
+  const WHISKER_STEP = 5;  // pixels
   const TRUTH_DASH = [6, 4];
 
   const escaped = (any) => String(any).replace(/[&<>"']/g, (c) => '&#' + c.charCodeAt(0) + ';');
@@ -74,7 +76,7 @@
       strokeWidth: 1.3,
       highlightCircleSize: 2.5,
       rightGap: 8,
-      axes: {y: {axisLabelWidth: 52}, x: {axisLabelWidth: 46, pixelsPerLabel: 60}},
+      axes: {y: {axisLabelWidth: 52, pixelsPerLabel: 24}, x: {axisLabelWidth: 46, pixelsPerLabel: 48}},
     };
   }
 
@@ -90,10 +92,10 @@
     options.axes.y.axisLabelFormatter = shown;
     options.axes.x.axisLabelFormatter = (value) => value + ' s';
     options.zoomCallback = figure.group ? zoomTogether(figure.group) : null;
-    // The library asks for the legend while it constructs the graph, before there is one to ask.
+    // Values under the pointer. The library asks while it constructs the graph, too, before there is one.
     let graph = null;
     options.legendFormatter = (data) => {
-      if (graph === null || data.x === undefined || data.x === null) return legend([{colour, text: figure.y_label}]);
+      if (graph === null || data.x === undefined || data.x === null) return '';
       const row = rows[graph.getSelection()];
       if (!row || row[1][1] === null) return '';
       return legend([{colour, text: shown(row[1][1]) + ' (' + shown(row[1][0]) + ' … ' + shown(row[1][2]) + ') ' +
@@ -104,25 +106,24 @@
     if (figure.group) groups.set(figure.group, (groups.get(figure.group) || []).concat(graph));
   }
 
-  // A point with its interval as a whisker.
-  function whiskers(e) {
+  // A point with its interval as a whisker. Regimes stand side by side, so that none hides the other.
+  const whiskers = (shift) => (e) => {
     const canvas = e.drawingContext;
     canvas.strokeStyle = e.color;
     canvas.fillStyle = e.color;
     canvas.lineWidth = 1.4;
     for (const point of e.points) {
       if (!isFinite(point.canvasy) || point.yval === null) continue;
-      const top = e.plotArea.y + e.plotArea.h * point.y_top;
-      const bottom = e.plotArea.y + e.plotArea.h * point.y_bottom;
+      const x = point.canvasx + shift;
       canvas.beginPath();
-      canvas.moveTo(point.canvasx, top);
-      canvas.lineTo(point.canvasx, bottom);
+      canvas.moveTo(x, e.plotArea.y + e.plotArea.h * point.y_top);
+      canvas.lineTo(x, e.plotArea.y + e.plotArea.h * point.y_bottom);
       canvas.stroke();
       canvas.beginPath();
-      canvas.arc(point.canvasx, point.canvasy, 2.6, 0, 2 * Math.PI);
+      canvas.arc(x, point.canvasy, 2.4, 0, 2 * Math.PI);
       canvas.fill();
     }
-  }
+  };
 
   // Powers of ten only: between them there is no room for labels.
   function decades(low, high) {
@@ -145,10 +146,10 @@
     options.series = {};
     options.colors = [];
     figure.series.forEach((series, k) => {
-      const colour = COLOURS[(figure.series.length === 1 ? 2 : 2 - k + 5) % COLOURS.length];
+      const colour = REGIME_COLOURS[k % REGIME_COLOURS.length];
       labels.push(series.name, series.name + ' fitted');
       options.colors.push(colour, colour);
-      options.series[series.name] = {plotter: whiskers, strokeWidth: 0};
+      options.series[series.name] = {plotter: whiskers(WHISKER_STEP * (k - (figure.series.length - 1) / 2)), strokeWidth: 0};
       options.series[series.name + ' fitted'] = {plotter: Dygraph.Plotters.linePlotter};
     });
     const rows = taus.map((tau) => {
@@ -200,10 +201,10 @@
     const [south, north] = range(points.map((point) => point.n));
     const [west, east] = range(points.map((point) => point.e));
     const [, fastest] = range(points.map((point) => point.v || 0));
-    const width = 1000;
-    const margin = 46;
-    const span = Math.max(east - west, (north - south) * 0.6, 1);
-    const scale = (width - 2 * margin) / Math.max(east - west, (north - south) / 0.62, span * 1e-3);
+    const width = Math.max(320, place.clientWidth);
+    const margin = 36;
+    const flattest = 0.52;  // of height to width: the map shall fit a screen
+    const scale = (width - 2 * margin) / Math.max(east - west, (north - south) / flattest, 1);
     const height = Math.max((north - south) * scale, 140) + 2 * margin;
     const x = (e) => margin + (e - west) * scale + ((width - 2 * margin) - (east - west) * scale) / 2;
     const y = (n) => height - margin - (n - south) * scale - ((height - 2 * margin) - (north - south) * scale) / 2;
@@ -226,7 +227,7 @@
         paths.push({colour, end: i, d: 'M' + x(from.e).toFixed(1) + ' ' + y(from.n).toFixed(1) + segment});
       }
     }
-    const bar = roundLength((width - 2 * margin) / 4 / scale);
+    const bar = roundLength((width - 2 * margin) / 3 / scale);
     const mark = (point, label) => '<circle cx="' + x(point.e) + '" cy="' + y(point.n) + '" r="5" fill="none" stroke-width="2" ' +
         'stroke="currentColor"/><text x="' + (x(point.e) + 9) + '" y="' + (y(point.n) - 7) + '">' + label + '</text>';
     place.innerHTML = '<svg viewBox="0 0 ' + width + ' ' + height.toFixed(0) + '" role="img" aria-label="map">' +

@@ -8,7 +8,7 @@ namespace imuscope::report {
 namespace {
 
 /// Beyond these a power of ten reads better.
-constexpr double kPlainMin = 1e-3;
+constexpr double kPlainMin = 5e-4;
 constexpr double kPlainMax = 1e6;
 constexpr int kDigitsOfSd = 2;
 constexpr int kDecimalsMax = 12;

@@ -22,6 +22,9 @@ Html bold_sub(const char* symbol, const char* index) {
   return Html::markup(fmt::format("{}<sub>{}</sub>", symbol, index));
 }
 
+/// Name of a row that belongs to the quantity above it.
+Html subordinate(const char* name) { return element("span", text(name), "subordinate"); }
+
 /// A quantity of three axes as it stands in calibration.json and in truth.json.
 struct Quantity {
   Html name;
@@ -58,8 +61,8 @@ void add_quantity(Table& table, const StudyFiles& study, const Quantity& quantit
   table.add_row(row_of_three(quantity.name, found, sd, quantity.unit));
   const auto known = numbers_at<3>(study.truth, quantity.value_key);
   if (!known) return;
-  table.add_row(row_of_three(text("– truth"), known, {}, quantity.unit));
-  std::vector<Html> row{text("– error")};
+  table.add_row(row_of_three(subordinate("truth"), known, {}, quantity.unit));
+  std::vector<Html> row{subordinate("error")};
   for (std::size_t i = 0; i < kAxisNames.size(); ++i) {
     row.push_back(error_cell(error_factor * ((*found)[i] - (*known)[i]), error_unit,
                              sd ? std::optional(error_factor * (*sd)[i]) : std::nullopt));
@@ -79,9 +82,9 @@ void add_boresight(Table& table, const StudyFiles& study, const Rotation& C_b_s)
   const auto true_C = numbers_at<9>(study.truth, "C_b_s");
   if (!true_C) return;
   table.add_row(
-      row_of_three(text("– truth, from the square mounting"), boresight_deg(square, *true_C), {}, 1.0));
+      row_of_three(subordinate("truth, from the square mounting"), boresight_deg(square, *true_C), {}, 1.0));
   const Angles error_deg = boresight_deg(*true_C, C_b_s);
-  std::vector<Html> row{text("– error")};
+  std::vector<Html> row{subordinate("error")};
   for (std::size_t i = 0; i < error_deg.size(); ++i) {
     row.push_back(error_cell(kMdegPerDeg * error_deg[i], "mdeg",
                              sd_deg ? std::optional(kMdegPerDeg * (*sd_deg)[i]) : std::nullopt));
@@ -100,8 +103,8 @@ void add_time_offset(Table& table, const StudyFiles& study) {
       {bold_sub("time offset t", "d") + text(", ms"), with_sd(kMsPerS * *t_d_s, in_ms(sd_s)), {}, {}});
   const auto known_s = number_at(study.truth, "t_d_s");
   if (!known_s) return;
-  table.add_row({text("– truth"), number(kMsPerS * *known_s), {}, {}});
-  table.add_row({text("– error"), error_cell(kMsPerS * (*t_d_s - *known_s), "ms", in_ms(sd_s)), {}, {}});
+  table.add_row({subordinate("truth"), number(kMsPerS * *known_s), {}, {}});
+  table.add_row({subordinate("error"), error_cell(kMsPerS * (*t_d_s - *known_s), "ms", in_ms(sd_s)), {}, {}});
 }
 
 Html study_table(const StudyFiles& study) {
@@ -110,10 +113,10 @@ Html study_table(const StudyFiles& study) {
   add_quantity(table, study, {text("lever arm r, mm"), "r_bs_b_m", "r_bs_b_sd_m", kMmPerM}, "mm", kMmPerM);
   add_time_offset(table, study);
   add_quantity(table, study,
-               {text("gyroscope bias, deg/s"), "gyro_bias_radps", "gyro_bias_sd_radps", kDegPerRad}, "deg/s",
-               kDegPerRad);
+               {text("gyroscope bias, deg/s"), "gyro_bias_radps", "gyro_bias_sd_radps", kDegPerRad}, "mdeg/s",
+               kMdegPerDeg * kDegPerRad);
   add_quantity(table, study, {text("accelerometer bias, m/s²"), "accel_bias_mps2", "accel_bias_sd_mps2", 1.0},
-               "m/s²", 1.0);
+               "mm/s²", kMmPerM);
   add_quantity(table, study, {text("gyroscope scale error, ppm"), "gyro_scale", "gyro_scale_sd", kPpm}, "ppm",
                kPpm);
   add_quantity(table, study, {text("accelerometer scale error, ppm"), "accel_scale", "accel_scale_sd", kPpm},

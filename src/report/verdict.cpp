@@ -86,24 +86,6 @@ bool is_calibrated(const StudyFiles& study) {
          });
 }
 
-std::string accuracy_sentence(const StudyFiles& study) {
-  std::vector<std::string> parts;
-  for (const Goal& goal : goals_of(study)) {
-    if (!goal.sd) {
-      parts.push_back(fmt::format("{} unknown", goal.what));
-    } else {
-      parts.push_back(
-          fmt::format("{} {:.2g} {}{}", goal.what, *goal.sd, goal.unit,
-                      *goal.sd <= goal.goal ? "" : fmt::format(" (wanted: {:g} {})", goal.goal, goal.unit)));
-    }
-  }
-  std::string sentence = fmt::format("{}: largest sd of {}.", study.name, fmt::join(parts, ", "));
-  const auto missing = words_of(not_observed(study));
-  if (!missing.empty())
-    sentence += fmt::format(" Not observable in this drive: {}.", fmt::join(missing, ", "));
-  return sentence;
-}
-
 /// Largest error against truth.json in units of its sd; empty where either is not known.
 std::optional<double> worst_error_sd(const StudyFiles& study) {
   std::optional<double> worst;
@@ -124,6 +106,28 @@ std::optional<double> worst_error_sd(const StudyFiles& study) {
     for (std::size_t i = 0; i < found_r->size(); ++i) take((*found_r)[i] - (*true_r)[i], (*sd_m)[i]);
   }
   return worst;
+}
+
+std::string accuracy_sentence(const StudyFiles& study) {
+  std::vector<std::string> parts;
+  for (const Goal& goal : goals_of(study)) {
+    if (!goal.sd) {
+      parts.push_back(fmt::format("{} unknown", goal.what));
+    } else {
+      parts.push_back(
+          fmt::format("{} {:.2g} {}{}", goal.what, *goal.sd, goal.unit,
+                      *goal.sd <= goal.goal ? "" : fmt::format(" (wanted: {:g} {})", goal.goal, goal.unit)));
+    }
+  }
+  std::string sentence = fmt::format("{}: largest sd of {}.", study.name, fmt::join(parts, ", "));
+  const auto missing = words_of(not_observed(study));
+  if (!missing.empty())
+    sentence += fmt::format(" Not observable in this drive: {}.", fmt::join(missing, ", "));
+  if (const auto worst = worst_error_sd(study)) {
+    sentence += fmt::format(" Against the truth, boresight and lever arm err by at most {:.1f} sd{}.", *worst,
+                            *worst > kSdMax ? ", more than their sd allows" : "");
+  }
+  return sentence;
 }
 
 std::size_t count_rejected(const std::vector<Fit>& fits, double level) {
@@ -269,16 +273,12 @@ Verdict calibration_verdict(const RunFiles& run) {
     verdict.answer = Answer::kPartly;
     verdict.headline = fmt::format("For {}, not for the others.", fmt::join(usable, ", "));
   }
-  for (const StudyFiles& study : run.studies) {
-    const auto worst = worst_error_sd(study);
-    if (!worst) continue;
-    verdict.reasons.push_back(
-        fmt::format("{} against the known truth: largest error of boresight and lever arm {:.1f} sd{}.",
-                    study.name, *worst, *worst > kSdMax ? ", more than its sd allows" : ""));
-    if (*worst > kSdMax && verdict.answer == Answer::kYes) {
-      verdict.answer = Answer::kPartly;
-      verdict.headline = "Precise, but not as accurate as it says: an error exceeds its sd.";
-    }
+  const bool overconfident = std::any_of(run.studies.begin(), run.studies.end(), [](const StudyFiles& study) {
+    return worst_error_sd(study).value_or(0.0) > kSdMax;
+  });
+  if (overconfident && verdict.answer == Answer::kYes) {
+    verdict.answer = Answer::kPartly;
+    verdict.headline = "Precise, but not as accurate as it says: an error exceeds its sd.";
   }
   return verdict;
 }

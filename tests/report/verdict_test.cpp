@@ -54,7 +54,7 @@ TEST(Verdict, AnErrorFarBeyondItsSdIsTold) {
   }
   const Verdict verdict = calibration_verdict(run);
   EXPECT_EQ(verdict.answer, Answer::kPartly);
-  EXPECT_THAT(verdict.reasons, Contains(HasSubstr("more than its sd allows")));
+  EXPECT_THAT(verdict.reasons, Contains(HasSubstr("more than their sd allows")));
 }
 
 TEST(Verdict, ModelsThatTheDataDoNotContradictAreAdequate) {
