@@ -57,7 +57,8 @@ struct GnssConfig {
   std::array<std::string, 3> velocity_sd_columns;  ///< north, east, down m/s; all empty: none
   std::string solution_column;                     ///< empty: none
   SolutionCode solution_code = SolutionCode::kRtklib;
-  GnssSolution solution_without_column = GnssSolution::kSingle;
+  /// Fixed: the standard deviations of the file, or the configured ones, hold as they are.
+  GnssSolution solution_without_column = GnssSolution::kFixed;
   Duration period{};
   ClockMapConfig clock = ClockMapConfig::fixed({}, 1.0);
 };
