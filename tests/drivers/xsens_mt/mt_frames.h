@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <numeric>
 #include <span>
 
 #include "drivers/xsens_mt/messages.h"
@@ -23,8 +24,17 @@ inline void append_float(Bytes& bytes, double value) {
 }
 
 inline Bytes frame(std::uint8_t mid, const Bytes& data = {}, std::uint8_t bid = kMasterBid) {
-  const OutgoingFrame made(bid, mid, data);
-  return {made.bytes().begin(), made.bytes().end()};
+  Bytes bytes{kPreamble, bid, mid};
+  if (data.size() < kExtendedLength) {
+    bytes.push_back(static_cast<std::uint8_t>(data.size()));
+  } else {
+    bytes.push_back(kExtendedLength);
+    append(bytes, be16(static_cast<std::uint16_t>(data.size())));
+  }
+  bytes.insert(bytes.end(), data.begin(), data.end());
+  const auto sum = std::accumulate(bytes.begin() + 1, bytes.end(), 0U);
+  bytes.push_back(static_cast<std::uint8_t>(0U - sum));
+  return bytes;
 }
 
 /// Calibrated float32 data with the sample counter (kDefaultLayout).

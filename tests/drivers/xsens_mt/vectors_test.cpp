@@ -91,7 +91,7 @@ TEST(MtDataVectors, EveryLegacyVectorDecodesToItsValues) {
     const auto name = v["name"].get<std::string>();
     SCOPED_TRACE(name);
     const auto data = data_of(test::vector_named(vectors, name));
-    if (v["mid"] == mid::kConfiguration) {
+    if (v.value("mid", 0) == mid::kConfiguration) {
       const auto configuration = read_configuration(data);
       ASSERT_TRUE(configuration);
       expect_configuration(*configuration, v["expected"]);

@@ -1,0 +1,177 @@
+#include "drivers/transport/serial_port.h"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <pty.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <numeric>
+#include <thread>
+
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+/// A pseudo-terminal with a stable name, as udev gives one to a plugged-in device.
+class PluggedDevice {
+ public:
+  explicit PluggedDevice(const std::filesystem::path& name) {
+    char path[128];
+    int slave = -1;
+    EXPECT_EQ(openpty(&master_, &slave, path, nullptr, nullptr), 0);
+    close(slave);
+    const auto link = name.string() + ".new";
+    std::filesystem::create_symlink(path, link);
+    std::filesystem::rename(link, name);
+  }
+  ~PluggedDevice() { unplug(); }
+  PluggedDevice(const PluggedDevice&) = delete;
+  PluggedDevice& operator=(const PluggedDevice&) = delete;
+  void unplug() {
+    if (master_ >= 0) close(master_);
+    master_ = -1;
+  }
+  [[nodiscard]] int master() const { return master_; }
+
+ private:
+  int master_ = -1;
+};
+
+class SerialPortTest : public testing::Test {
+ protected:
+  std::filesystem::path name_ = test::scratch_folder() / "mtx1";
+  PluggedDevice device_{name_};
+  SerialSettings settings_{name_.string(), 115200, 1};
+};
+
+bool becomes_readable(int fd) {
+  pollfd wait{fd, POLLIN, 0};
+  return poll(&wait, 1, 1000) == 1;
+}
+
+TEST_F(SerialPortTest, CarriesEveryByteValueBothWaysUnchanged) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port) << port.error().text();
+  std::vector<std::uint8_t> all(256);
+  std::iota(all.begin(), all.end(), std::uint8_t{0});
+  ASSERT_EQ(write(device_.master(), all.data(), all.size()), 256);
+  ASSERT_TRUE(becomes_readable(port->fd()));
+  std::vector<std::uint8_t> got(300);
+  const IoResult read_result = port->read(got);
+  EXPECT_EQ(read_result.status, IoStatus::kDone);
+  got.resize(read_result.n);
+  EXPECT_EQ(got, all);
+
+  EXPECT_EQ(port->write(all).n, 256U);
+  std::vector<std::uint8_t> heard(300);
+  heard.resize(static_cast<std::size_t>(read(device_.master(), heard.data(), heard.size())));
+  EXPECT_EQ(heard, all);
+}
+
+TEST_F(SerialPortTest, NoDataIsNotTheEnd) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_EQ(port->read(buffer).status, IoStatus::kNothing);
+}
+
+TEST_F(SerialPortTest, TakesAnyBaudRateAndTellsTheRealOne) {
+  for (const std::uint32_t baud :
+       {9600U, 14400U, 28800U, 76800U, 115200U, 460800U, 921600U, 2000000U, 123456U}) {
+    settings_.baud = baud;
+    auto port = SerialPort::open(settings_);
+    ASSERT_TRUE(port) << port.error().text();
+    EXPECT_EQ(port->baud(), baud);
+  }
+  settings_.baud = 28800;
+  settings_.stop_bits = 2;
+  EXPECT_TRUE(SerialPort::open(settings_));
+}
+
+TEST_F(SerialPortTest, ASecondProgramIsTurnedAwayAndToldWhoHoldsThePort) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  const auto second = SerialPort::open(settings_);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().what.find("in use by process this program"), std::string::npos)
+      << second.error().what;
+  port = SerialPort::open({(name_.string() + ".none"), 115200, 1});
+}
+
+TEST_F(SerialPortTest, ClosingLetsTheNextOneIn) {
+  { auto port = SerialPort::open(settings_); }
+  EXPECT_TRUE(SerialPort::open(settings_));
+}
+
+TEST_F(SerialPortTest, UnplugIsNoticedAndTheSameNameOpensTheNewDevice) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  device_.unplug();
+  ASSERT_TRUE(becomes_readable(port->fd()));
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_EQ(port->read(buffer).status, IoStatus::kGone);
+  EXPECT_EQ(port->write(buffer).status, IoStatus::kGone);
+
+  PluggedDevice again(name_);
+  auto reopened = SerialPort::open(settings_);
+  ASSERT_TRUE(reopened) << reopened.error().text();
+  port = std::move(reopened);
+  ASSERT_EQ(write(again.master(), "x", 1), 1);
+  ASSERT_TRUE(becomes_readable(port->fd()));
+  EXPECT_EQ(port->read(buffer).n, 1U);
+}
+
+TEST_F(SerialPortTest, AStaleNameOfAnUnpluggedDeviceSaysToPlugItIn) {
+  device_.unplug();
+  const auto port = SerialPort::open(settings_);
+  ASSERT_FALSE(port);
+  EXPECT_NE(port.error().remedy.find("plug the device in"), std::string::npos) << port.error().text();
+}
+
+TEST_F(SerialPortTest, WhatCameBeforeOpeningIsThrownAway) {
+  ASSERT_EQ(write(device_.master(), "old", 3), 3);
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  std::array<std::uint8_t, 8> buffer{};
+  EXPECT_EQ(port->read(buffer).status, IoStatus::kNothing);
+}
+
+TEST_F(SerialPortTest, AFullLineIsNotTheEnd) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  const std::vector<std::uint8_t> block(4096);
+  IoResult result{IoStatus::kDone, 0};
+  for (int i = 0; i < 1000 && result.status == IoStatus::kDone; ++i) result = port->write(block);
+  EXPECT_EQ(result.status, IoStatus::kNothing);
+}
+
+TEST(SerialPort, AMissingPortNamesThoseThatAreThere) {
+  const auto folder = test::scratch_folder();
+  std::ofstream(folder / "ttyMT7").put('x');
+  const auto port = SerialPort::open({(folder / "ttyMT3").string(), 115200, 1});
+  ASSERT_FALSE(port);
+  EXPECT_NE(port.error().what.find("ttyMT3 does not exist"), std::string::npos);
+  EXPECT_NE(port.error().remedy.find("ttyMT7"), std::string::npos) << port.error().remedy;
+}
+
+TEST(SerialPort, AFileIsNotASerialPort) {
+  const auto file = test::scratch_folder() / "notes.txt";
+  std::ofstream(file).put('x');
+  const auto port = SerialPort::open({file.string(), 115200, 1});
+  ASSERT_FALSE(port);
+  EXPECT_NE(port.error().what.find("is not a serial port"), std::string::npos) << port.error().what;
+}
+
+TEST(SerialPort, ANonsenseLineIsAUsageError) {
+  EXPECT_EQ(SerialPort::open({"/dev/null", 0, 1}).error().kind, ErrorKind::kUsage);
+  EXPECT_EQ(SerialPort::open({"/dev/null", 9600, 3}).error().kind, ErrorKind::kUsage);
+}
+
+}  // namespace
+}  // namespace imuscope
