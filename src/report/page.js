@@ -297,14 +297,8 @@
     });
   }
 
-  function redraw() {
-    for (const {graph} of graphs) {
-      graph.updateOptions({gridLineColor: variable('--line'), axisLineColor: variable('--line')}, true);
-      graph.resize();
-    }
-  }
-  window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
-  window.addEventListener('beforeprint', () => { document.body.classList.add('printing'); redraw(); });
-  window.addEventListener('afterprint', () => { document.body.classList.remove('printing'); redraw(); });
+  window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+    for (const {graph} of graphs) graph.updateOptions({gridLineColor: variable('--line'), axisLineColor: variable('--line')});
+  });
   document.body.dataset.figuresDrawn = String(graphs.length);
 })();

@@ -79,7 +79,7 @@ Html making_section(const RunFiles& run) {
     table.add_row({text("duration"), duration_cell(number_at(run.run, "duration_s"))});
     table.add_row({text("at rest"), duration_cell(number_at(regimes, "static_s"))});
     table.add_row({text("in motion"), duration_cell(number_at(regimes, "dynamic_s"))});
-    section += table.html() + element("h3", text("Warnings")) + warnings_of(run);
+    section += element("div", table.html(), "words") + element("h3", text("Warnings")) + warnings_of(run);
   }
   return section + absent_files(run);
 }
