@@ -13,6 +13,7 @@ namespace {
 constexpr Duration kDrainInterval = std::chrono::milliseconds(20);
 constexpr Duration kFlushInterval = std::chrono::milliseconds(250);
 constexpr std::size_t kFlushBytes = std::size_t{1} << 20U;
+constexpr std::size_t kMaxWaitingMessageBytes = std::size_t{4} << 20U;
 
 }  // namespace
 
@@ -61,8 +62,10 @@ Result<void> Recorder::stop() {
 }
 
 RecorderStatus Recorder::status() const {
-  const std::lock_guard lock(status_mutex_);
-  return status_;
+  const std::scoped_lock lock(status_mutex_, messages_mutex_);
+  RecorderStatus status = status_;
+  status.messages_lost = messages_lost_;
+  return status;
 }
 
 void Recorder::run() {
@@ -82,6 +85,7 @@ void Recorder::drain() {
     if (writer_.pending_bytes() > kFlushBytes) flush();
   }
   drain_exceptions();
+  drain_messages();
 }
 
 /// Records the chunk that arrived first among the heads of the rings, so that the file is nearly in order.
@@ -115,6 +119,27 @@ void Recorder::drain_exceptions() {
       ring->pop();
     }
   }
+}
+
+void Recorder::drain_messages() {
+  std::vector<LogEvent> messages;
+  {
+    const std::lock_guard lock(messages_mutex_);
+    messages.swap(messages_);
+    messages_bytes_ = 0;
+  }
+  for (const LogEvent& message : messages) writer_.append(message.channel, message.utime, message.data);
+}
+
+void Recorder::record_message(std::string_view channel, std::int64_t utime,
+                              std::span<const std::uint8_t> message) {
+  const std::lock_guard lock(messages_mutex_);
+  if (messages_bytes_ + message.size() > kMaxWaitingMessageBytes) {
+    messages_lost_ += 1;
+    return;
+  }
+  messages_bytes_ += message.size();
+  messages_.push_back({0, utime, std::string(channel), {message.begin(), message.end()}});
 }
 
 void Recorder::flush() { update_status(writer_.flush()); }

@@ -3,17 +3,21 @@
 /// The recorder thread: empties the rings of raw bytes and exceptions into a capture.
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
 #include "base/result.h"
 #include "capture/capture_writer.h"
+#include "capture/event_log.h"
 #include "capture/record_codec.h"
 #include "capture/records.h"
 #include "publish/channel_name.h"
@@ -25,8 +29,9 @@ struct RecorderStatus {
   std::filesystem::path path;
   std::uint64_t bytes = 0;  ///< safe from the death of this process
   std::uint64_t records = 0;
-  std::uint64_t records_lost = 0;  ///< refused by the disk
-  std::optional<Error> problem;    ///< of the last flush, with the remedy; empty when it worked
+  std::uint64_t records_lost = 0;   ///< refused by the disk
+  std::uint64_t messages_lost = 0;  ///< given to record_message() too fast
+  std::optional<Error> problem;     ///< of the last flush, with the remedy; empty when it worked
 };
 
 /// Back-pressure ends here: a slow or full disk makes the recorder lose records (counted, visible to the
@@ -49,6 +54,10 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
+  /// Adds a published message, so that the capture shows the run in lcm-logplayer and lcm-spy, too. A replay
+  /// passes over it. Any thread of the soft world. A message that finds too many waiting is counted as lost.
+  void record_message(std::string_view channel, std::int64_t utime, std::span<const std::uint8_t> message);
+
   /// Records what is still in the rings, completes the file, ends the thread. Call after the producers ended.
   /// @return the problem of the last flush, if any
   Result<void> stop();
@@ -62,6 +71,7 @@ class Recorder {
   void drain();
   bool drain_oldest_chunk();
   void drain_exceptions();
+  void drain_messages();
   void flush();
   void update_status(const Result<void>& flushed);
 
@@ -73,6 +83,11 @@ class Recorder {
   std::vector<ExceptionRing*> exception_rings_;
   CaptureWriter writer_;
   std::int64_t exceptions_ = 0;
+
+  mutable std::mutex messages_mutex_;
+  std::vector<LogEvent> messages_;
+  std::size_t messages_bytes_ = 0;
+  std::uint64_t messages_lost_ = 0;
 
   mutable std::mutex status_mutex_;
   RecorderStatus status_;

@@ -108,6 +108,7 @@ struct LcmPublisher::Impl {
       return;
     }
     counters.published += 1;
+    if (tap) tap(channel, message.utime, buffer);
   }
 
   lcm::LCM lcm;
@@ -115,6 +116,7 @@ struct LcmPublisher::Impl {
   std::map<std::string, std::int64_t> sequences;  // by channel; counts what was lost here, too
   std::vector<std::uint8_t> buffer;
   PublishCounters counters;
+  Tap tap;
 };
 
 Result<LcmPublisher> LcmPublisher::open(std::string_view url, std::string_view prefix) {
@@ -160,6 +162,8 @@ void LcmPublisher::publish(const NoiseModelReport& report) {
   impl_->send(channel_name(impl_->prefix, "NOISE_MODEL", report.name),
               [&](std::int64_t sequence) { return to_message(report, sequence); });
 }
+
+void LcmPublisher::set_tap(Tap tap) { impl_->tap = std::move(tap); }
 
 const PublishCounters& LcmPublisher::counters() const noexcept { return impl_->counters; }
 

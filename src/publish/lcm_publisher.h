@@ -4,7 +4,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -50,6 +52,10 @@ class LcmPublisher {
   void publish(const ErrorReport& report, const std::string& name);        ///< <PREFIX>_ERROR_<NAME>
   void publish(const WaveletVarianceReport& report);                       ///< <PREFIX>_WV_<NAME>
   void publish(const NoiseModelReport& report);                            ///< <PREFIX>_NOISE_MODEL_<NAME>
+
+  /// Gives every message that is sent to `tap`, too: channel, utime and encoded bytes. For the recorder.
+  using Tap = std::function<void(std::string_view, std::int64_t, std::span<const std::uint8_t>)>;
+  void set_tap(Tap tap);
 
   [[nodiscard]] const PublishCounters& counters() const noexcept;
 

@@ -185,6 +185,27 @@ TEST(Recorder, AFullRingCostsRecordsAndTheCaptureSaysWhere) {
   EXPECT_EQ(summary->losses[0].after, now + milliseconds(kRawRingCapacity - 1));
 }
 
+TEST(Recorder, KeepsPublishedMessagesBesideTheBytesAndReplayPassesOverThem) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  const auto ring = std::make_unique<RawRing>();
+  auto recorder = Recorder::start(options_for(path), {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value());
+  (*recorder)->record_message("IMUSCOPE_STATUS", 1234, Bytes{1, 2, 3});
+  RawTap(*ring).record(0, Direction::kRead, Bytes{9}, host_now());
+  (*recorder)->record_message("IMUSCOPE_STATUS", 1235, Bytes(std::size_t{8} << 20U));
+  EXPECT_EQ((*recorder)->status().messages_lost, 1U) << "memory for waiting messages must be bounded";
+  ASSERT_TRUE((*recorder)->stop().has_value());
+  lcm::LogFile log(path.string(), "r");
+  std::vector<std::int64_t> utimes;
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    if (event->channel == "IMUSCOPE_STATUS") utimes.push_back(event->timestamp);
+  }
+  EXPECT_EQ(utimes, (std::vector<std::int64_t>{1234}));
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value());
+  EXPECT_EQ(summary->other_messages, 1U);
+}
+
 TEST(Recorder, DoesNotStartWhereNothingCanBeWritten) {
   const auto folder = test::scratch_folder();
   std::ofstream(folder / "taken.lcm") << "x";

@@ -74,6 +74,24 @@ TEST(LcmPublisher, SequencesCountPerChannel) {
   EXPECT_EQ(sequences["IMUSCOPE_ERROR_MTX2"], (std::vector<std::int64_t>{0}));
 }
 
+TEST(LcmPublisher, TheTapGetsWhatIsSent) {
+  const auto path = test::scratch_folder() / "bus.lcm";
+  auto publisher = LcmPublisher::open("file://" + path.string() + "?mode=w");
+  ASSERT_TRUE(publisher.has_value());
+  std::string channel;
+  std::int64_t utime = 0;
+  error_t message;
+  publisher->set_tap([&](std::string_view on, std::int64_t at, std::span<const std::uint8_t> bytes) {
+    channel = on;
+    utime = at;
+    message.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  });
+  publisher->publish(test::example_error(), "mtx1");
+  EXPECT_EQ(channel, "IMUSCOPE_ERROR_MTX1");
+  EXPECT_EQ(utime, 1'700'000'000'123'456);
+  EXPECT_EQ(message.counter, 70'001);
+}
+
 TEST(LcmPublisher, AMessageThatWouldNotFitADatagramIsCountedAndNotSent) {
   const auto path = test::scratch_folder() / "bus.lcm";
   {
