@@ -21,6 +21,15 @@ inline void on_chosen(CLI::App& subcommand, Work& chosen, Work work) {
 
 // One function a subcommand, one file a function (command_NAME.cpp).
 
+/// `imuscope wv FILE --rate HZ`
+void add_wv(CLI::App& app, Work& chosen);
+
+/// `imuscope fit FILE --rate HZ --model 'WN+2*GM'`
+void add_fit(CLI::App& app, Work& chosen);
+
+/// `imuscope compare A.json B.json`
+void add_compare(CLI::App& app, Work& chosen);
+
 /// `imuscope run CONFIG`
 void add_run(CLI::App& app, Work& chosen);
 

@@ -12,6 +12,9 @@ int run(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", IMUSCOPE_VERSION);
   imuscope::cli::Work work;
+  imuscope::cli::add_wv(app, work);
+  imuscope::cli::add_fit(app, work);
+  imuscope::cli::add_compare(app, work);
   imuscope::cli::add_run(app, work);
   imuscope::cli::add_replay(app, work);
   imuscope::cli::add_process(app, work);
