@@ -54,6 +54,7 @@ XsensMtx::XsensMtx(const Options& options, Sampler sampler, double power_on_s)
       baud_(options.baud),
       measurement_end_s_(kNever_s),
       grid_origin_s_(options.first_sample_s) {
+  settings_.period = options.period;
   settings_.baud_code = code_of_baud(options.baud);
   power_on(power_on_s);
 }

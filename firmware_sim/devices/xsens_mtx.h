@@ -29,6 +29,7 @@ class XsensMtx : public Device {
     double clock_skew_ppm = 0.0;  ///< positive: the device's clock is fast, so it samples more often
     double first_sample_s = 0.0;  ///< earliest sampling instant
     std::uint16_t first_counter = 0;
+    std::uint16_t period = 1152;  ///< stored period, 1/115200 s
     int baud = 115200;
   };
 

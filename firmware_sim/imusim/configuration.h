@@ -1,0 +1,102 @@
+#pragma once
+
+/// The configuration as the simulator sees it: what plays the far end of each [[device]], and the truth in
+/// the table [simulation], which imuscope itself does not look at. Everything is SI and radians here.
+///
+/// Keys of [simulation], all optional:
+///   duration_s, seed, scenario ("drive", "static"), start_utc, start_latitude_deg, start_longitude_deg,
+///   start_height_m, gyro_noise ("by_regime", "static", "dynamic"), regime_switch ("continuous",
+///   "independent")
+/// [simulation.reference]: gyro_white_deg_per_sqrt_h, accel_white_ug_per_sqrt_hz, gyro_bias_sd_deg_per_h,
+///   accel_bias_sd_mps2, attitude_sd_deg (roll, pitch, heading), latency_ms, alignment_s
+/// [simulation.gnss]: position_sd_m, velocity_sd_mps (north, east, down), latency_ms
+/// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm
+/// [[simulation.imu]], one for each S-IMU, found by `name`: rotation_vector_b_s_deg, lever_arm_b_m,
+/// latency_ms,
+///   clock_skew_ppm, first_counter, accel_white_mps2, gyro_bias_sd_deg_per_s, accel_bias_sd_mps2,
+///   gyro_scale_sd_percent, accel_scale_sd_percent, and instead of what is drawn from those:
+///   gyro_bias_deg_per_s, accel_bias_mps2, gyro_scale_percent, accel_scale_percent; and
+///   gyro_misalignment_deg, accel_misalignment_deg, g_sensitivity_deg_per_s_per_g (three rows of three),
+///   gyro_range_deg_per_s, accel_range_mps2, gyro_step_deg_per_s, accel_step_mps2, gyro_low_pass_hz,
+///   accel_low_pass_hz
+/// A mounting that is not given is drawn: 2 deg and 0.3 m, one sigma per axis.
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "firmware_sim/devices/utc.h"
+#include "firmware_sim/imu/sensor_classes.h"
+#include "firmware_sim/imusim/failure.h"
+#include "firmware_sim/io/serial_line.h"
+#include "firmware_sim/motion/motion.h"
+
+namespace imusim {
+
+enum class Role { kReference, kStudy, kGnss };
+enum class Protocol { kXsensMt, kIxblueStdbin, kGreis };
+
+struct PlayedDevice {
+  std::string name;
+  Role role = Role::kStudy;
+  Protocol protocol = Protocol::kXsensMt;
+  double rate_hz = 100.0;
+  std::string port;  ///< empty where the configuration names none
+  int baud = 115200;
+  Eigen::Matrix3d C_device_frame = Eigen::Matrix3d::Identity();  ///< rotates the device's axes to b or s
+  Eigen::Vector3d antenna_b_m = Eigen::Vector3d::Zero();
+};
+
+struct ReferenceSimulation {
+  AirinsClass noise;
+  Eigen::Vector3d attitude_sd_rad;  ///< roll, pitch, heading
+  double latency_s = 0.001;
+  double alignment_s = 0.0;
+};
+
+struct GnssSimulation {
+  Eigen::Vector3d position_sd_m{0.01, 0.01, 0.02};
+  Eigen::Vector3d velocity_sd_mps{0.02, 0.02, 0.03};
+  double latency_s = 0.040;
+};
+
+struct StudySimulation {
+  std::string name;
+  std::optional<Eigen::Vector3d> rotation_vector_b_s_rad;
+  std::optional<Eigen::Vector3d> r_bs_b_m;
+  double latency_s = 0.002;
+  std::optional<double> clock_skew_ppm;        ///< drawn within +-30 where absent
+  std::optional<std::uint16_t> first_counter;  ///< drawn where absent
+  MtxClass draw;
+  // Taken instead of what is drawn.
+  std::optional<Eigen::Vector3d> gyro_bias_radps;
+  std::optional<Eigen::Vector3d> accel_bias_mps2;
+  std::optional<Eigen::Vector3d> gyro_scale;
+  std::optional<Eigen::Vector3d> accel_scale;
+  /// Misalignment, g-sensitivity, range, quantisation and low-pass; noise, bias and scale of these two are
+  /// not used.
+  TriadErrors gyro;
+  TriadErrors accel;
+};
+
+struct Configuration {
+  std::filesystem::path file;
+  std::string text;
+  std::vector<PlayedDevice> devices;
+  Scenario scenario;
+  Utc utc_begin;
+  ReferenceSimulation reference;
+  GnssSimulation gnss;
+  LineOptions line;                      ///< all but the baud rate
+  std::vector<StudySimulation> studies;  ///< one for each device with role study, in its order
+};
+
+/// Reads and checks a configuration file.
+Outcome<Configuration> load_configuration(const std::filesystem::path& file);
+
+/// The same for a text; `file` stands for it in messages.
+Outcome<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& file);
+
+}  // namespace imusim

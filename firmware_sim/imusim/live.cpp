@@ -1,0 +1,104 @@
+#include "firmware_sim/imusim/live.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <ctime>
+
+#include "firmware_sim/imusim/truth_files.h"
+#include "firmware_sim/io/pseudo_terminal.h"
+
+namespace imusim {
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+// As a USB host controller would, the player looks after its ports once a millisecond.
+constexpr std::int64_t kTick_ns = 1'000'000;
+
+/// A device, the line it drives and the pseudo-terminal at the end of the line.
+struct Port {
+  WorldDevice* device;
+  SerialLine line;
+  PseudoTerminal terminal;
+  LiveCounts counts;
+
+  void run_until(double t_s) {
+    const Bytes heard = terminal.read();
+    counts.received_bytes += heard.size();
+    if (!heard.empty()) device->device->receive(heard, t_s);
+    emissions.clear();
+    device->device->run_until(t_s, emissions);
+    line.set_baud(device->device->baud());
+    for (const Emission& emission : emissions) line.send(emission);
+    line.deliver_until(t_s, [this](std::span<const std::uint8_t> bytes, std::int64_t /*arrival_ns*/) {
+      const std::size_t dropped = terminal.write(bytes);
+      counts.dropped_bytes += dropped;
+      counts.sent_bytes += bytes.size() - dropped;
+    });
+  }
+
+  std::vector<Emission> emissions{};
+};
+
+std::int64_t monotonic_ns() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return now.tv_sec * kNsPerSecond + now.tv_nsec;
+}
+
+void sleep_until(std::int64_t time_ns) {
+  const timespec until{time_ns / kNsPerSecond, time_ns % kNsPerSecond};
+  // Interrupted by a signal, it returns early: the caller looks whether it is to stop.
+  ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+}
+
+Outcome<std::vector<Port>> open_ports(World& world, const LiveOptions& options) {
+  std::vector<Port> ports;
+  ports.reserve(world.devices().size());
+  for (WorldDevice& device : world.devices()) {
+    const PlayedDevice& played = device.played;
+    if (played.port.empty())
+      return wrong_usage(fmt::format(
+          "{}: device '{}' has no port to play on; give transport = {{ kind = \"serial\", port = \"...\" }}",
+          world.configuration().file.string(), played.name));
+    auto terminal = PseudoTerminal::open(played.port);
+    if (!terminal) return failed_work(fmt::format("device '{}': {}", played.name, terminal.error()));
+    if (options.on_line)
+      options.on_line(fmt::format("{:<10} {} -> {}, {} baud", played.name, played.port, terminal->terminal(),
+                                  played.baud));
+    ports.push_back({&device, world.line_of(played), std::move(*terminal), {played.name, 0, 0, 0}});
+  }
+  return ports;
+}
+
+}  // namespace
+
+Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const LiveOptions& options,
+                                      const std::atomic<bool>& stop) {
+  if (options.start_s >= configuration.scenario.duration_s)
+    return wrong_usage(fmt::format("the scenario lasts {} s; a start at {} s lies behind its end",
+                                   configuration.scenario.duration_s, options.start_s));
+  World world(configuration, World::Beginning::kPoweredOn, options.start_s);
+  if (options.folder) {
+    if (auto made = make_folder(*options.folder); !made) return tl::unexpected(made.error());
+    for (const auto& write : {write_truth_json, write_truth_csv})
+      if (auto written = write(world, *options.folder); !written) return tl::unexpected(written.error());
+  }
+  auto ports = open_ports(world, options);
+  if (!ports) return tl::unexpected(ports.error());
+
+  const double end_s =
+      std::min(configuration.scenario.duration_s,
+               options.start_s + options.seconds.value_or(configuration.scenario.duration_s));
+  const std::int64_t begin_ns = monotonic_ns();
+  for (std::int64_t tick_ns = begin_ns; !stop.load(); tick_ns += kTick_ns) {
+    sleep_until(tick_ns);
+    const double t_s = options.start_s + static_cast<double>(monotonic_ns() - begin_ns) / kNsPerSecond;
+    if (t_s > end_s) break;
+    for (Port& port : *ports) port.run_until(t_s);
+  }
+  std::vector<LiveCounts> counts;
+  for (const Port& port : *ports) counts.push_back(port.counts);
+  return counts;
+}
+
+}  // namespace imusim

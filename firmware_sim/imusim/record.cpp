@@ -1,0 +1,144 @@
+#include "firmware_sim/imusim/record.h"
+
+#include <fmt/format.h>
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <future>
+#include <limits>
+
+#include "firmware_sim/imusim/truth_files.h"
+
+namespace imusim {
+namespace {
+
+/// A file that is written in large pieces and remembers whether all of them went well.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::filesystem::path& path) : path_(path), file_(path, std::ios::binary) {}
+
+  void write(const char* data, std::size_t size) {
+    buffer_.append(data, data + size);
+    constexpr std::size_t kPiece = 1U << 20U;
+    if (buffer_.size() >= kPiece) flush();
+  }
+  void write(const std::string& text) { write(text.data(), text.size()); }
+
+  Outcome<void> close() {
+    flush();
+    file_.close();
+    if (!file_)
+      return failed_work(fmt::format("cannot write {}; is there room, and the permission?", path_.string()));
+    return {};
+  }
+
+ private:
+  void flush() {
+    file_.write(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
+    buffer_.clear();
+  }
+
+  std::filesystem::path path_;
+  std::ofstream file_;
+  fmt::memory_buffer buffer_;
+};
+
+/// Runs one device through the whole scenario and writes what the host reads.
+Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::filesystem::path& folder,
+                                std::atomic<double>& done_s) {
+  OutputFile bytes_file(folder / (device.played.name + ".bin"));
+  OutputFile arrivals(folder / (device.played.name + ".arrivals.csv"));
+  arrivals.write("byte_offset,n_bytes,arrival_ns\n");
+  Recorded recorded{device.played.name, 0, 0};
+  const auto on_read = [&](std::span<const std::uint8_t> bytes, std::int64_t arrival_ns) {
+    bytes_file.write(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const fmt::format_int offset(recorded.bytes);
+    const fmt::format_int count(bytes.size());
+    const fmt::format_int arrival(arrival_ns);
+    arrivals.write(offset.data(), offset.size());
+    arrivals.write(",", 1);
+    arrivals.write(count.data(), count.size());
+    arrivals.write(",", 1);
+    arrivals.write(arrival.data(), arrival.size());
+    arrivals.write("\n", 1);
+    recorded.bytes += bytes.size();
+    ++recorded.reads;
+  };
+
+  SerialLine line = world.line_of(device.played);
+  const double duration_s = world.motion().duration_s();
+  constexpr double kStep_s = 1.0;
+  const auto steps = static_cast<int>(std::ceil(duration_s / kStep_s));
+  std::vector<Emission> emissions;
+  for (int step = 1; step <= steps; ++step) {
+    const double until_s = std::min(step * kStep_s, duration_s);
+    emissions.clear();
+    device.device->run_until(until_s, emissions);
+    for (const Emission& emission : emissions) line.send(emission);
+    line.deliver_until(until_s, on_read);
+    done_s.fetch_add(kStep_s, std::memory_order_relaxed);
+  }
+  line.deliver_until(std::numeric_limits<double>::infinity(), on_read);
+  if (auto closed = bytes_file.close(); !closed) return tl::unexpected(closed.error());
+  if (auto closed = arrivals.close(); !closed) return tl::unexpected(closed.error());
+  return recorded;
+}
+
+std::string configuration_copy(const Configuration& configuration) {
+  std::string inputs;
+  for (const PlayedDevice& device : configuration.devices) inputs += fmt::format(" {0}={0}.bin", device.name);
+  return fmt::format(
+      "# Recorded by imusim record with seed {} over {} s. Read from this folder by\n"
+      "#   imuscope process{} --config config.toml --out RESULT\n\n{}",
+      configuration.scenario.seed, configuration.scenario.duration_s, inputs, configuration.text);
+}
+
+}  // namespace
+
+Outcome<std::vector<Recorded>> record(const Configuration& configuration, const RecordOptions& options) {
+  if (auto made = make_folder(options.folder); !made) return tl::unexpected(made.error());
+  World world(configuration, World::Beginning::kStreaming);
+  for (const auto& write : {write_truth_json, write_truth_csv})
+    if (auto written = write(world, options.folder); !written) return tl::unexpected(written.error());
+  if (auto written = write_file(options.folder / "config.toml", configuration_copy(configuration)); !written)
+    return tl::unexpected(written.error());
+
+  std::vector<std::unique_ptr<OutputFile>> error_files;
+  if (options.true_errors) {
+    for (const StudyTruth& study : world.studies()) {
+      error_files.push_back(
+          std::make_unique<OutputFile>(options.folder / fmt::format("errors_truth_{}.csv", study.name)));
+      error_files.back()->write(error_header());
+      world.observe(study.name, [&world, file = error_files.back().get()](const TrueSample& sample) {
+        file->write(error_row(world, sample));
+      });
+    }
+  }
+
+  // Devices know nothing of one another, so each has a thread of its own.
+  std::atomic<double> done_s = 0.0;
+  std::vector<std::future<Outcome<Recorded>>> work;
+  for (WorldDevice& device : world.devices())
+    work.push_back(std::async(std::launch::async, [&world, &device, &options, &done_s] {
+      return record_device(world, device, options.folder, done_s);
+    }));
+  const double all_s = world.motion().duration_s() * static_cast<double>(work.size());
+  std::vector<Recorded> recorded;
+  Outcome<std::vector<Recorded>> result = recorded;
+  for (std::future<Outcome<Recorded>>& one : work) {
+    constexpr std::chrono::milliseconds kProgressInterval(100);
+    while (one.wait_for(kProgressInterval) != std::future_status::ready)
+      if (options.on_progress) options.on_progress(std::min(1.0, done_s.load() / all_s));
+    const Outcome<Recorded> outcome = one.get();
+    if (outcome && result)
+      result->push_back(*outcome);
+    else if (!outcome)
+      result = tl::unexpected(outcome.error());
+  }
+  for (const auto& file : error_files)
+    if (auto closed = file->close(); !closed && result) result = tl::unexpected(closed.error());
+  if (options.on_progress) options.on_progress(1.0);
+  return result;
+}
+
+}  // namespace imusim

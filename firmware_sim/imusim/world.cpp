@@ -1,0 +1,314 @@
+#include "firmware_sim/imusim/world.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "firmware_sim/devices/greis_receiver.h"
+#include "firmware_sim/devices/stdbin_unit.h"
+#include "firmware_sim/devices/xsens_mtx.h"
+
+namespace imusim {
+namespace {
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+constexpr double kDrawnRotationSd_rad = 2.0 / kDegPerRad;
+constexpr double kDrawnLeverArmSd_m = 0.3;
+constexpr double kClockSkewMax_ppm = 30.0;  // MTx manual: worst case
+// What a short differentiator makes of the reference gyro's white noise.
+constexpr double kRotationAccelerationSd_degps2 = 0.024;
+// The host's clock at the scenario's beginning: a PC that has been up for a while.
+constexpr std::int64_t kHostBegin_ns = 1'000'000'000'000;
+
+/// North-east-down to north-west-up, the world of an MTx.
+const Eigen::DiagonalMatrix<double, 3>& C_ned_nwu() {
+  static const Eigen::DiagonalMatrix<double, 3> flip(1.0, -1.0, -1.0);
+  return flip;
+}
+
+Eigen::Vector3d draw3(Random& random, double sd) {
+  const double x = random.normal();
+  const double y = random.normal();
+  const double z = random.normal();
+  return sd * Eigen::Vector3d(x, y, z);
+}
+
+Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& vector) {
+  const double angle = vector.norm();
+  if (angle == 0.0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
+}
+
+double wrapped_deg(double angle_rad) {
+  const double angle = std::fmod(angle_rad * kDegPerRad, 360.0);
+  return angle < 0.0 ? angle + 360.0 : angle;
+}
+
+ImuErrors errors_of(const StudySimulation& study, RegimeSwitch regime_switch, Random& random) {
+  ImuErrors errors = draw_mtx(study.draw, random);
+  errors.regime_switch = regime_switch;
+  const auto take_over = [](TriadErrors& drawn, const TriadErrors& given,
+                            const std::optional<Eigen::Vector3d>& bias,
+                            const std::optional<Eigen::Vector3d>& scale) {
+    drawn.bias = bias.value_or(drawn.bias);
+    drawn.scale = scale.value_or(drawn.scale);
+    drawn.misalignment = given.misalignment;
+    drawn.g_sensitivity = given.g_sensitivity;
+    drawn.range = given.range;
+    drawn.quantisation = given.quantisation;
+    drawn.low_pass_hz = given.low_pass_hz;
+  };
+  take_over(errors.gyro, study.gyro, study.gyro_bias_radps, study.gyro_scale);
+  take_over(errors.accel, study.accel, study.accel_bias_mps2, study.accel_scale);
+  return errors;
+}
+
+/// What the R-IMU adds to the truth in its own navigation solution: constant attitude errors, and position
+/// and velocity errors that wander as those of a unit aided by plain GNSS.
+class NavigationSolution {
+ public:
+  NavigationSolution(const Configuration& configuration, const std::string& name)
+      : reference_(configuration.reference) {
+    Random random(configuration.scenario.seed, name + "/solution");
+    attitude_error_ = draw3(random, 1.0).cwiseProduct(reference_.attitude_sd_rad);
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::string stream = name + "/solution_" + "ned"[axis];
+      const AxisNoise position{0.0, {{position_sd_m[axis] * position_sd_m[axis], 1.0 / kPositionTau_s}}};
+      const AxisNoise velocity{0.0, {{kVelocitySd_mps * kVelocitySd_mps, 1.0 / kVelocityTau_s}}};
+      position_.emplace_back(same_in_both(position), RegimeSwitch::kContinuous,
+                             Random(configuration.scenario.seed, stream + "p"));
+      velocity_.emplace_back(same_in_both(velocity), RegimeSwitch::kContinuous,
+                             Random(configuration.scenario.seed, stream + "v"));
+    }
+  }
+
+  void fill(const MotionState& state, double step_s, stdbin::Telegram& telegram) {
+    const bool aligning = state.t_s < reference_.alignment_s;
+    const Eigen::Vector3d error = attitude_error_ * kDegPerRad;
+    const Eigen::Vector3d sd = reference_.attitude_sd_rad * kDegPerRad;
+    const double heading_rad =
+        state.heading_rad + attitude_error_.z() + (aligning ? kHeadingErrorWhileAligning_rad : 0.0);
+    telegram.heading_roll_pitch_deg =
+        Eigen::Vector3d(wrapped_deg(heading_rad), state.roll_rad * kDegPerRad + error.x(),
+                        -(state.pitch_rad * kDegPerRad + error.y()));
+    telegram.heading_roll_pitch_sd_deg =
+        Eigen::Vector3d(aligning ? kHeadingErrorWhileAligning_rad * kDegPerRad : sd.z(), sd.x(), sd.y());
+    const GeodeticPosition place = displaced(state.position, next(position_, step_s));
+    telegram.position =
+        stdbin::Position{place.latitude_rad * kDegPerRad, wrapped_deg(place.longitude_rad), place.height_m};
+    telegram.position_sd = stdbin::PositionSd{position_sd_m[0], position_sd_m[1], 0.0, position_sd_m[2]};
+    const Eigen::Vector3d v = state.v_n_mps + next(velocity_, step_s);
+    telegram.speed_neu_mps = Eigen::Vector3d(v.x(), v.y(), -v.z());
+    telegram.speed_sd_neu_mps = Eigen::Vector3d::Constant(kVelocitySd_mps);
+    telegram.sensor_status = {stdbin::kSensorDataReady, 0U};
+    telegram.user_status =
+        stdbin::kUserGpsValid | stdbin::kUserTimeValid |
+        (aligning ? stdbin::kUserHrpInvalid | stdbin::kUserAlignment : stdbin::kUserNavigation);
+  }
+
+ private:
+  static constexpr std::array<double, 3> position_sd_m = {1.0, 1.0, 1.5};
+  static constexpr double kPositionTau_s = 300.0;
+  static constexpr double kVelocitySd_mps = 0.02;
+  static constexpr double kVelocityTau_s = 60.0;
+  static constexpr double kHeadingErrorWhileAligning_rad = 20.0 / kDegPerRad;
+
+  static Eigen::Vector3d next(std::vector<NoiseSource>& sources, double step_s) {
+    const double north = sources[0].next(Regime::kStatic, step_s);
+    const double east = sources[1].next(Regime::kStatic, step_s);
+    const double down = sources[2].next(Regime::kStatic, step_s);
+    return {north, east, down};
+  }
+
+  ReferenceSimulation reference_;
+  Eigen::Vector3d attitude_error_;
+  std::vector<NoiseSource> position_;
+  std::vector<NoiseSource> velocity_;
+};
+
+}  // namespace
+
+World::World(const Configuration& configuration, Beginning beginning, double begin_s)
+    : configuration_(configuration), motion_(std::make_shared<Motion>(configuration.scenario)) {
+  std::size_t next_study = 0;
+  for (const PlayedDevice& played : configuration_.devices) {
+    switch (played.role) {
+      case Role::kStudy:
+        add_study(played, configuration_.studies[next_study++], beginning, begin_s);
+        break;
+      case Role::kReference:
+        add_reference(played, beginning, begin_s);
+        break;
+      case Role::kGnss:
+        add_gnss(played, begin_s);
+        break;
+    }
+  }
+}
+
+void World::add_study(const PlayedDevice& played, const StudySimulation& study, Beginning beginning,
+                      double begin_s) {
+  // Every property is drawn in the same order whether it is given or not: giving one changes no other.
+  Random random(configuration_.scenario.seed, played.name + "/unit");
+  const Eigen::Vector3d drawn_rotation = draw3(random, kDrawnRotationSd_rad);
+  const Eigen::Vector3d drawn_lever_arm = draw3(random, kDrawnLeverArmSd_m);
+  const double drawn_skew = random.uniform(-kClockSkewMax_ppm, kClockSkewMax_ppm);
+  const auto drawn_counter = static_cast<std::uint16_t>(random.bits() & 0xFFFFU);
+  const double drawn_phase = random.uniform();
+
+  StudyTruth truth;
+  truth.name = played.name;
+  truth.mounting.C_b_s = rotation_from_vector(study.rotation_vector_b_s_rad.value_or(drawn_rotation));
+  truth.mounting.r_bs_b_m = study.r_bs_b_m.value_or(drawn_lever_arm);
+  truth.errors = errors_of(study, study.draw.regime_switch, random);
+  truth.latency_s = study.latency_s;
+  truth.clock_skew_ppm = study.clock_skew_ppm.value_or(drawn_skew);
+  truth.period_s = 1.0 / played.rate_hz / (1.0 + truth.clock_skew_ppm * 1e-6);
+  truth.first_sample_s = drawn_phase * truth.period_s;
+  truth.first_counter = study.first_counter.value_or(drawn_counter);
+  studies_.push_back(truth);
+  add_imu(played,
+          std::make_shared<ImuModel>(*motion_, truth.mounting, truth.errors, configuration_.scenario.seed,
+                                     played.name),
+          truth, beginning, begin_s);
+}
+
+void World::add_reference(const PlayedDevice& played, Beginning beginning, double begin_s) {
+  Random random(configuration_.scenario.seed, played.name + "/unit");
+  const ImuErrors errors = draw_airins(configuration_.reference.noise, played.rate_hz, random);
+  StudyTruth clock;
+  clock.name = played.name;
+  clock.latency_s = configuration_.reference.latency_s;
+  clock.first_counter = static_cast<std::uint16_t>(random.bits() & 0xFFFFU);
+  clock.clock_skew_ppm =
+      played.protocol == Protocol::kXsensMt ? random.uniform(-kClockSkewMax_ppm, kClockSkewMax_ppm) : 0.0;
+  clock.period_s = 1.0 / played.rate_hz / (1.0 + clock.clock_skew_ppm * 1e-6);
+  // Anywhere within a period, on the 0.1 ms grid in which StdBin counts time.
+  clock.first_sample_s = std::floor(random.uniform() * clock.period_s * 1e4) * 1e-4;
+  const double periods = std::max(0.0, std::ceil((begin_s - clock.first_sample_s) / clock.period_s));
+  first_reference_sample_s_ = clock.first_sample_s + periods * clock.period_s;
+  add_imu(played,
+          std::make_shared<ImuModel>(*motion_, Mounting{}, errors, configuration_.scenario.seed, played.name),
+          clock, beginning, begin_s);
+}
+
+void World::add_imu(const PlayedDevice& played, std::shared_ptr<ImuModel> imu, const StudyTruth& clock,
+                    Beginning beginning, double begin_s) {
+  auto observer = std::make_shared<OnTrueSample>();
+  observers_.emplace_back(played.name, observer);
+  const Eigen::Matrix3d C_frame_device = played.C_device_frame.transpose();
+  const std::shared_ptr<const Motion> motion = motion_;
+  const auto sample = [motion, imu, observer](double t_s, std::int64_t counter) {
+    const ImuReading reading = imu->sample_at(t_s);
+    if (*observer) (*observer)({t_s, counter, reading, motion->regime_at(t_s)});
+    return reading;
+  };
+
+  if (played.protocol == Protocol::kXsensMt) {
+    XsensMtx::Options options;
+    constexpr std::uint32_t kFirstDeviceId = 0x00300001;
+    options.device_id = kFirstDeviceId + static_cast<std::uint32_t>(devices_.size());
+    options.latency_s = clock.latency_s;
+    options.clock_skew_ppm = clock.clock_skew_ppm;
+    options.first_sample_s = clock.first_sample_s;
+    options.first_counter = clock.first_counter;
+    options.baud = played.baud;
+    options.period = static_cast<std::uint16_t>(std::lround(115200.0 / played.rate_hz));
+    const Eigen::Matrix3d C_device_b = imu->mounting().C_b_s.transpose() * played.C_device_frame;
+    auto device = std::make_unique<XsensMtx>(
+        options,
+        [motion, sample, C_frame_device, C_device_b](double t_s, std::int64_t counter) {
+          const ImuReading reading = sample(t_s, counter);
+          xsens::MtSample message;
+          message.acc_mps2 = C_frame_device * reading.f_mps2;
+          message.gyr_radps = C_frame_device * reading.omega_radps;
+          message.sensor_to_world = Eigen::Matrix3d(C_ned_nwu() * motion->state_at(t_s).C_b_n * C_device_b);
+          return message;
+        },
+        begin_s);
+    if (beginning == Beginning::kStreaming) device->start_calibrated(begin_s);
+    devices_.push_back({played, std::move(device)});
+    return;
+  }
+
+  StdbinUnit::Options options;
+  options.utc_begin = configuration_.utc_begin;
+  options.rate_hz = played.rate_hz;
+  options.phase_100us = std::llround(clock.first_sample_s * 1e4);
+  options.latency_s = clock.latency_s;
+  options.first_counter = clock.first_counter;
+  options.baud = played.baud;
+  auto solution = std::make_shared<NavigationSolution>(configuration_, played.name);
+  auto differentiator =
+      std::make_shared<Random>(configuration_.scenario.seed, played.name + "/differentiator");
+  const Eigen::Matrix3d C_b_device = C_frame_device * imu->mounting().C_b_s;
+  auto unit = std::make_unique<StdbinUnit>(
+      options,
+      [motion, sample, solution, differentiator, C_frame_device, C_b_device, first = clock.first_counter,
+       counter = std::int64_t{0}, step_s = 1.0 / played.rate_hz](double t_s) mutable {
+        const ImuReading reading = sample(t_s, first + counter++);
+        const MotionState state = motion->state_at(t_s);
+        stdbin::Telegram telegram;
+        solution->fill(state, step_s, telegram);
+        telegram.raw_acceleration_mps2 = C_frame_device * reading.f_mps2;
+        telegram.raw_rotation_rate_degps = C_frame_device * reading.omega_radps * kDegPerRad;
+        telegram.rotation_acceleration_degps2 = C_b_device * state.omega_dot_ib_b_radps2 * kDegPerRad +
+                                                draw3(*differentiator, kRotationAccelerationSd_degps2);
+        return telegram;
+      });
+  unit->skip_to(begin_s);
+  devices_.push_back({played, std::move(unit)});
+}
+
+void World::add_gnss(const PlayedDevice& played, double begin_s) {
+  const GnssSimulation gnss = configuration_.gnss;
+  GreisReceiver::Options options;
+  options.utc_begin = configuration_.utc_begin;
+  options.rate_hz = played.rate_hz;
+  options.latency_s = gnss.latency_s;
+  options.baud = played.baud;
+  auto random = std::make_shared<Random>(configuration_.scenario.seed, played.name + "/noise");
+  const std::shared_ptr<const Motion> motion = motion_;
+  auto receiver = std::make_unique<GreisReceiver>(options, [=, antenna = played.antenna_b_m](double t_s) {
+    const MotionState state = motion->state_at(t_s);
+    const GeodeticPosition place =
+        displaced(position_at(state, antenna), draw3(*random, 1.0).cwiseProduct(gnss.position_sd_m));
+    const Eigen::Vector3d v =
+        velocity_at(state, antenna) + draw3(*random, 1.0).cwiseProduct(gnss.velocity_sd_mps);
+    greis::Solution solution;
+    solution.latitude_rad = place.latitude_rad;
+    solution.longitude_rad = place.longitude_rad;
+    solution.height_m = place.height_m;
+    solution.north_mps = static_cast<float>(v.x());
+    solution.east_mps = static_cast<float>(v.y());
+    solution.up_mps = static_cast<float>(-v.z());
+    // [SG] gives the plane's and the vertical standard deviations, [PG] and [VG] that of all three axes.
+    const auto sd = [](double value) { return static_cast<float>(value); };
+    solution.position_sd_m = sd(gnss.position_sd_m.norm());
+    solution.velocity_sd_mps = sd(gnss.velocity_sd_mps.norm());
+    solution.horizontal_position_sd_m = sd(gnss.position_sd_m.head<2>().norm());
+    solution.vertical_position_sd_m = sd(gnss.position_sd_m.z());
+    solution.horizontal_velocity_sd_mps = sd(gnss.velocity_sd_mps.head<2>().norm());
+    solution.vertical_velocity_sd_mps = sd(gnss.velocity_sd_mps.z());
+    return solution;
+  });
+  receiver->skip_to(begin_s);
+  devices_.push_back({played, std::move(receiver)});
+}
+
+SerialLine World::line_of(const PlayedDevice& played) const {
+  LineOptions options = configuration_.line;
+  options.baud = played.baud;
+  options.host_begin_ns = kHostBegin_ns;
+  // All devices hang on one host controller: its frames are common.
+  options.usb_phase_s = Random(configuration_.scenario.seed, "usb").uniform(0.0, 1e-3);
+  return {options, Random(configuration_.scenario.seed, played.name + "/line")};
+}
+
+void World::observe(const std::string& name, OnTrueSample on_sample) {
+  for (auto& [observed, observer] : observers_)
+    if (observed == name) *observer = std::move(on_sample);
+}
+
+}  // namespace imusim

@@ -1,0 +1,91 @@
+#pragma once
+
+/// The simulated world of a configuration: one motion, and every device with its errors, its clock and its
+/// line. Truth comes from here too, as nothing else knows it.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "firmware_sim/devices/device.h"
+#include "firmware_sim/imu/imu_model.h"
+#include "firmware_sim/imusim/configuration.h"
+#include "firmware_sim/io/serial_line.h"
+#include "firmware_sim/motion/motion.h"
+
+namespace imusim {
+
+/// One sample of an S-IMU as it was made.
+struct TrueSample {
+  double t_s;
+  std::int64_t counter;  ///< not wrapped
+  ImuReading reading;
+  Regime regime;
+};
+using OnTrueSample = std::function<void(const TrueSample&)>;
+
+/// What is true of one S-IMU.
+struct StudyTruth {
+  std::string name;
+  Mounting mounting;
+  ImuErrors errors;
+  double latency_s = 0.0;       ///< from the sampling instant to the first bit on the line
+  double clock_skew_ppm = 0.0;  ///< positive: samples more often than its nominal rate
+  double first_sample_s = 0.0;  ///< instant of the sample with first_counter
+  double period_s = 0.0;        ///< between two samples, its clock's skew included
+  std::uint16_t first_counter = 0;
+};
+
+struct WorldDevice {
+  PlayedDevice played;
+  std::unique_ptr<Device> device;
+};
+
+class World {
+ public:
+  /// Devices as they are when a recording begins: set up and measuring from time 0 (kStreaming), or just
+  /// powered on at `begin_s` (kPoweredOn).
+  enum class Beginning { kStreaming, kPoweredOn };
+
+  World(const Configuration& configuration, Beginning beginning, double begin_s = 0.0);
+
+  [[nodiscard]] const Configuration& configuration() const { return configuration_; }
+  [[nodiscard]] const Motion& motion() const { return *motion_; }
+  [[nodiscard]] std::vector<WorldDevice>& devices() { return devices_; }
+  [[nodiscard]] const std::vector<StudyTruth>& studies() const { return studies_; }
+
+  /// Latency of the R-IMU, from the sampling instant to the first bit on the line.
+  [[nodiscard]] double reference_latency_s() const { return configuration_.reference.latency_s; }
+  /// Instant of the R-IMU's first sample at or after the beginning: what time_s counts from.
+  [[nodiscard]] double first_reference_sample_s() const { return first_reference_sample_s_; }
+
+  /// The line of a device to the host.
+  [[nodiscard]] SerialLine line_of(const PlayedDevice& played) const;
+
+  /// Has every sample of an S-IMU shown as it is made, in the thread that runs the device.
+  void observe(const std::string& name, OnTrueSample on_sample);
+
+ private:
+  void add_study(const PlayedDevice& played, const StudySimulation& study, Beginning beginning,
+                 double begin_s);
+  void add_reference(const PlayedDevice& played, Beginning beginning, double begin_s);
+  void add_gnss(const PlayedDevice& played, double begin_s);
+  void add_imu(const PlayedDevice& played, std::shared_ptr<ImuModel> imu, const StudyTruth& clock,
+               Beginning beginning, double begin_s);
+
+  Configuration configuration_;
+  std::shared_ptr<const Motion> motion_;
+  std::vector<WorldDevice> devices_;
+  std::vector<StudyTruth> studies_;
+  std::vector<std::pair<std::string, std::shared_ptr<OnTrueSample>>> observers_;
+  double first_reference_sample_s_ = 0.0;
+};
+
+/// The instant on the R-IMU's time scale that an S-IMU's sample shows is its stamp plus this, where both
+/// stamps are the host times of the first bit of a message: z_S(t) = h(R at t + t_d).
+inline double true_time_offset_s(const World& world, const StudyTruth& study) {
+  return world.reference_latency_s() - study.latency_s;
+}
+
+}  // namespace imusim

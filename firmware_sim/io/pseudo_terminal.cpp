@@ -1,0 +1,113 @@
+#include "firmware_sim/io/pseudo_terminal.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <termios.h>
+#include <unistd.h>
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+namespace imusim {
+namespace {
+
+/// Makes missing folders for their owner alone.
+std::error_code make_private_folders(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (folder.empty() || std::filesystem::exists(folder, error)) return {};
+  if (const std::error_code above = make_private_folders(folder.parent_path())) return above;
+  constexpr mode_t kOwnerOnly = 0700;
+  if (::mkdir(folder.c_str(), kOwnerOnly) != 0 && errno != EEXIST) return {errno, std::system_category()};
+  return {};
+}
+
+/// Opens the far end once and closes it: from then on the near end tells whether somebody has it open. Sets
+/// it raw, so that nothing is echoed to the device before the program has set it up itself.
+bool prepare_far_end(const char* terminal) {
+  const int far_end = ::open(terminal, O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (far_end < 0) return false;
+  termios settings{};
+  const bool ready = ::tcgetattr(far_end, &settings) == 0;
+  ::cfmakeraw(&settings);
+  const bool set = ready && ::tcsetattr(far_end, TCSANOW, &settings) == 0;
+  ::close(far_end);
+  return set;
+}
+
+/// Puts the link in place in one step, so that no program ever finds half of it.
+std::error_code replace_link(const std::string& target, const std::filesystem::path& link) {
+  std::error_code error;
+  const auto status = std::filesystem::symlink_status(link, error);
+  if (std::filesystem::exists(status) && !std::filesystem::is_symlink(status))
+    return std::make_error_code(std::errc::file_exists);
+  const std::filesystem::path temporary = link.string() + fmt::format(".{}", ::getpid());
+  std::filesystem::remove(temporary, error);
+  std::filesystem::create_symlink(target, temporary, error);
+  if (error) return error;
+  std::filesystem::rename(temporary, link, error);
+  return error;
+}
+
+}  // namespace
+
+tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesystem::path& link) {
+  if (const std::error_code error = make_private_folders(link.parent_path()))
+    return tl::unexpected(
+        fmt::format("cannot make the folder {}: {}", link.parent_path().string(), error.message()));
+  const int master = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+  constexpr std::size_t kNameSize = 64;
+  std::array<char, kNameSize> name{};
+  if (master < 0 || ::grantpt(master) != 0 || ::unlockpt(master) != 0 ||
+      ::ptsname_r(master, name.data(), name.size()) != 0 || !prepare_far_end(name.data())) {
+    const int cause = errno;
+    if (master >= 0) ::close(master);
+    return tl::unexpected(fmt::format("cannot open a pseudo-terminal: {}", std::strerror(cause)));
+  }
+  if (const std::error_code error = replace_link(name.data(), link)) {
+    ::close(master);
+    return tl::unexpected(
+        fmt::format("cannot put a link to {} at {}: {}", name.data(), link.string(), error.message()));
+  }
+  return PseudoTerminal(master, name.data(), link);
+}
+
+PseudoTerminal::PseudoTerminal(PseudoTerminal&& other) noexcept
+    : master_(std::exchange(other.master_, -1)),
+      terminal_(std::move(other.terminal_)),
+      link_(std::move(other.link_)) {}
+
+PseudoTerminal::~PseudoTerminal() {
+  if (master_ < 0) return;
+  ::close(master_);
+  std::error_code error;
+  if (std::filesystem::read_symlink(link_, error) == terminal_) std::filesystem::remove(link_, error);
+}
+
+bool PseudoTerminal::is_open_elsewhere() const {
+  pollfd state{master_, POLLOUT, 0};
+  return ::poll(&state, 1, 0) >= 0 && (state.revents & POLLHUP) == 0;
+}
+
+std::size_t PseudoTerminal::write(std::span<const std::uint8_t> bytes) {
+  if (bytes.empty() || !is_open_elsewhere()) return bytes.size();
+  const ssize_t written = ::write(master_, bytes.data(), bytes.size());
+  return bytes.size() - static_cast<std::size_t>(written > 0 ? written : 0);
+}
+
+Bytes PseudoTerminal::read() {
+  constexpr std::size_t kChunk = 1024;
+  Bytes result;
+  std::array<std::uint8_t, kChunk> chunk{};
+  while (true) {
+    const ssize_t count = ::read(master_, chunk.data(), chunk.size());
+    if (count <= 0) return result;
+    result.insert(result.end(), chunk.begin(), chunk.begin() + count);
+  }
+}
+
+}  // namespace imusim

@@ -1,0 +1,51 @@
+#pragma once
+
+/// A serial port made of software: a pseudo-terminal whose far end a program opens by a path of its choice.
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "firmware_sim/devices/bytes.h"
+
+namespace imusim {
+
+class PseudoTerminal {
+ public:
+  /// Opens a pseudo-terminal and puts a symbolic link to it at `link`, replacing one that is there. The
+  /// link's folder is made, for its owner alone, where it does not exist.
+  /// @return what went wrong, in one sentence
+  static tl::expected<PseudoTerminal, std::string> open(const std::filesystem::path& link);
+
+  PseudoTerminal(PseudoTerminal&& other) noexcept;
+  PseudoTerminal& operator=(PseudoTerminal&&) = delete;
+  PseudoTerminal(const PseudoTerminal&) = delete;
+  PseudoTerminal& operator=(const PseudoTerminal&) = delete;
+  /// Closes it and removes the link, if it still leads here.
+  ~PseudoTerminal();
+
+  /// Writes towards the program; never waits. What does not fit, or nobody has the port open, is dropped.
+  /// @return how many bytes were dropped
+  std::size_t write(std::span<const std::uint8_t> bytes);
+
+  /// What the program has written since the last call; never waits.
+  Bytes read();
+
+  /// Whether a program has the port open.
+  [[nodiscard]] bool is_open_elsewhere() const;
+
+  [[nodiscard]] const std::filesystem::path& link() const { return link_; }
+  [[nodiscard]] const std::string& terminal() const { return terminal_; }
+
+ private:
+  PseudoTerminal(int master, std::string terminal, std::filesystem::path link)
+      : master_(master), terminal_(std::move(terminal)), link_(std::move(link)) {}
+
+  int master_;
+  std::string terminal_;
+  std::filesystem::path link_;
+};
+
+}  // namespace imusim
