@@ -98,30 +98,27 @@ class InitialAligner {
   struct Node {
     double time_s = 0.0;                                     ///< since origin_time_
     Eigen::Vector3d position_n_m = Eigen::Vector3d::Zero();  ///< antenna, NED about origin_
-    Eigen::Vector3d felt_a_m = Eigen::Vector3d::Zero();      ///< second integral of C_b_a f + g, plus C_b_a l
-    double sd_m = 0.0;                                       ///< horizontal
+    Eigen::Vector3d felt_a_m = Eigen::Vector3d::Zero();      ///< as felt_a_m_, for the antenna
+    double sd_m = 0.0;
   };
   static constexpr std::size_t kNodes = 240;
-  /// Second difference of antenna positions, and of what the IMU felt, over one window.
-  struct WindowPair;
 
-  void restart(HostTime time) noexcept;
+  void restart() noexcept;
   void close_block() noexcept;
-  void relevel() noexcept;
+  void level_and_gyrocompass() noexcept;
   void integrate(const InertialRates& end, double dt_s) noexcept;
-  void update_result() noexcept;
-  void solve_heading() noexcept;
-  [[nodiscard]] bool gyrocompass_attitude(InitialAttitude& out) const noexcept;
-  [[nodiscard]] bool position_and_velocity(const Eigen::Matrix3d& C_a_n,
-                                           InitialNavigation& out) const noexcept;
-  void finish(const InitialAttitude& attitude, AlignmentMethod method) noexcept;
+  void note_gnss_motion(const Node& node) noexcept;
+  void find_heading_in_motion() noexcept;
+  void update_stage() noexcept;
+  [[nodiscard]] bool find_position_and_velocity(InitialNavigation& out) const noexcept;
+  void take_gnss_velocity(InitialNavigation& out) const noexcept;
+  [[nodiscard]] Eigen::Matrix3d C_a_n() const noexcept;
   [[nodiscard]] double seconds(HostTime time) const noexcept;
-  [[nodiscard]] const Node& node(std::size_t index) const noexcept;  ///< 0 = oldest
+  [[nodiscard]] const Node& node(std::size_t age) const noexcept;  ///< 0 = newest
+  [[nodiscard]] std::size_t nodes_held() const noexcept;
 
   InitialAlignmentOptions options_;
   AlignmentStage stage_ = AlignmentStage::kWaitingForRest;
-  double heading_sd_rad_ = kPi;
-  bool done_ = false;
   InitialNavigation result_;
 
   // Newest IMU sample.
@@ -135,37 +132,39 @@ class InitialAligner {
   int block_samples_ = 0;
   InertialRates rest_mean_;
   double rest_s_ = 0.0;
-  bool moved_by_gnss_ = false;
+  HostTime moving_until_ = HostTime::min();  ///< as GNSS shows it
 
-  // Frame a: level, of arbitrary heading.
+  // Frame a: level, of arbitrary heading. With the R-IMU's own attitude it is NED itself.
   bool level_ = false;
   Eigen::Matrix3d C_b_a_ = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d gyro_bias_b_radps_ = Eigen::Vector3d::Zero();
-  double gyro_bias_sd_radps_ = 0.0;
-  Eigen::Vector3d a_a_mps2_ = Eigen::Vector3d::Zero();  ///< C_b_a f + g
-  Eigen::Vector3d felt_velocity_a_mps_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d felt_a_m_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d C_b_a_at_rest_ = Eigen::Matrix3d::Identity();
+  double levelled_s_ = 0.0;                                      ///< time since the rest ended
+  double rest_used_s_ = 0.0;                                     ///< length of that rest
+  Eigen::Vector3d rest_rate_b_radps_ = Eigen::Vector3d::Zero();  ///< gyro bias and Earth rate together
+  double tilt_sd_rad_ = kPi;
+  Eigen::Vector3d a_a_mps2_ = Eigen::Vector3d::Zero();             ///< C_b_a f + g
+  Eigen::Vector3d felt_velocity_a_mps_ = Eigen::Vector3d::Zero();  ///< its integral
+  Eigen::Vector3d felt_a_m_ = Eigen::Vector3d::Zero();             ///< its second integral
 
   // GNSS.
   bool has_origin_ = false;
   GeodeticPosition origin_;
   HostTime origin_time_{};
+  double gravity_mps2_ = kMps2PerG;
   std::array<Node, kNodes> nodes_;
   std::size_t node_count_ = 0;  ///< ever added since the restart
   bool has_velocity_ = false;
   HostTime velocity_time_{};
-  Eigen::Vector3d v_n_mps_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d v_antenna_n_mps_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d v_sd_mps_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d felt_velocity_then_a_mps_ = Eigen::Vector3d::Zero();  ///< of the antenna
 
-  // Heading of frame a.
-  bool heading_solved_ = false;
+  // Heading of frame a, and what the in-motion solution says of its tilt.
+  bool heading_known_ = false;
+  AlignmentMethod method_ = AlignmentMethod::kInMotion;
   double heading_of_a_rad_ = 0.0;
-  Eigen::Vector2d tilt_a_rad_ = Eigen::Vector2d::Zero();
-
-  // R-IMU's own attitude.
-  bool has_attitude_ = false;
-  HostTime attitude_time_{};
-  InitialAttitude reference_attitude_;
+  double heading_sd_rad_ = kPi;
+  Eigen::Vector3d tilt_error_a_rad_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace imuscope
