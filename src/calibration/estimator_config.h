@@ -108,6 +108,10 @@ struct StudyConfig {
   double rate_hz = 100.0;
   std::uint32_t blocks = kFullStudyBlocks;
   StudyNoise noise = mtx_class_noise();
+  /// Samples whose innovations are averaged into one update, 1 to 50. 1 suits a quiet reference. Where the
+  /// reference's own noise or engine vibration exceeds the motion in single samples (a MEMS reference), 0.1 s
+  /// of samples keep that noise out of the measurement matrix. No sample is left out.
+  int average_samples = 1;
 
   /// Mounting. Absent: found by the coarse alignment, to any rotation.
   std::optional<Matrix3> prior_C_b_s;

@@ -13,8 +13,14 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+/// The power of the time offset's column is averaged over this time, and held against the reference's noise
+/// with a margin for the average's own scatter.
+constexpr double kColumnPowerMean_s = 1.0;
+constexpr double kColumnNoiseMargin = 1.3;
 /// A silence of this length makes the biases uncertain again: the sensor may have been off.
 constexpr double kReturnAfter_s = 5.0;
+/// Samples further apart are not averaged into one update.
+constexpr double kBlockGap_s = 0.1;
 /// NIS is averaged over this time.
 constexpr double kNisMean_s = 10.0;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
@@ -146,6 +152,7 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
                                  const ReferenceKinematics& measured) noexcept {
   FilterCore& core = context.core;
   const double dt_s = has_last_ ? to_seconds(valid - last_time_) : 0.0;
+  if (dt_s > kBlockGap_s) blocks_ = {};
   if (has_last_ && dt_s > kReturnAfter_s && calibrating_) {
     for (std::size_t i = 0; i < 3; ++i) {
       const StudyLayout& layout = core.layout(index_);
@@ -273,6 +280,8 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   output_.nis_accel.fill(1.0);
   output_.status = StudyStatus::kConverging;
   gated_share_ = 0.0;
+  blocks_ = {};
+  t_d_column_power_ = {};
   next_direction_ = now;
   calibrating_ = true;
 }
@@ -310,37 +319,98 @@ void StudyFilter::correct(StudyContext& context, Triad triad, const ReferenceKin
   if ((flags & (gyro ? kGyroValid : kAccelValid)) == 0) return;
   FilterCore& core = context.core;
   const ReferenceBiasColumns columns{kGyroBiasError, kAccelBiasError};
-  const StudyMeasurement m =
-      gyro ? gyro_measurement(core.study(index_), core.layout(index_), columns, b, reference_noise(b))
-           : accel_measurement(core.study(index_), core.layout(index_), columns, b, reference_noise(b));
+  const ReferenceNoise own = reference_noise(b);
+  StudyMeasurement m = gyro ? gyro_measurement(core.study(index_), core.layout(index_), columns, b, own)
+                            : accel_measurement(core.study(index_), core.layout(index_), columns, b, own);
+  const double slope_noise = (gyro ? rate_noise_radps_ : force_noise_mps2_) * b.derivative_noise_gain_per_s;
+  attenuate_time_offset(triad, slope_noise, core, m.H);
+
   const NoiseVariances& noise =
       variances_[static_cast<std::size_t>(context.regime)][static_cast<std::size_t>(triad)];
-  Matrix3d R = m.reference_covariance;
-  R.diagonal() += noise.inflated;
-  core.covariance().project(m.H, to_array(R));
-  const Matrix3d S = to_eigen(core.covariance().innovation_covariance());
   const Vector3d y = to_eigen(gyro ? epoch.sample.omega_radps : epoch.sample.f_mps2) - m.predicted;
-  const Vector3d plain = S.diagonal() - noise.inflated + noise.plain;
+  (gyro ? epoch.innovation_gyro_radps : epoch.innovation_accel_mps2) = to_array(y);
+
+  Block& block = blocks_[static_cast<std::size_t>(triad)];
+  if (block.n == 0) {
+    block = Block{};
+    block.H = m.H;
+  } else {
+    for (std::size_t k = 0; k < m.H.count; ++k) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        for (std::size_t j = 0; j < m.H.blocks[k].width; ++j)
+          block.H.blocks[k].h[i][j] += m.H.blocks[k].h[i][j];
+      }
+    }
+  }
+  ++block.n;
+  block.innovation += y;
+  block.R += m.reference_covariance;
+  block.R.diagonal() += noise.inflated;
+  block.excess += noise.inflated - noise.plain;
+  const auto first_clip = static_cast<std::uint32_t>(gyro ? kGyroClipX : kAccelClipX);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if ((flags & (first_clip << i)) == 0) continue;
+    block.clipped[i] = true;
+    ++(gyro ? output_.counters.clipped_gyro : output_.counters.clipped_accel)[i];
+  }
+  const Vector3d single = m.reference_covariance.diagonal() + noise.plain;
+  (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(single);
+  if (block.n >= config_.average_samples) update_from_block(context, triad, epoch);
+}
+
+void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpoch& epoch) noexcept {
+  const bool gyro = triad == Triad::kGyro;
+  Block& block = blocks_[static_cast<std::size_t>(triad)];
+  const double n = block.n;
+  if (block.n > 1) {
+    for (std::size_t k = 0; k < block.H.count; ++k) {
+      for (auto& row : block.H.blocks[k].h) {
+        for (double& entry : row) entry /= n;
+      }
+    }
+  }
+  // The noise of n samples counts as white: n times less in their mean, and R is a sum over n already.
+  const Matrix3d R = block.R / (n * n);
+  const Vector3d y = block.innovation / n;
+  FilterCore& core = context.core;
+  core.covariance().project(block.H, to_array(R));
+  const Matrix3d S = to_eigen(core.covariance().innovation_covariance());
+  const Vector3d plain = S.diagonal() - block.excess / (n * n);
+  // Of single samples, the variance is known exactly; of a mean's members it lacks H P H^T.
+  if (block.n == 1) (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(plain);
 
   StudyCounters& counters = output_.counters;
   std::array<bool, 3>& use = gyro ? epoch.used_gyro : epoch.used_accel;
   Vector3& nis = gyro ? output_.nis_gyro : output_.nis_accel;
-  const double share = std::min(1.0, 1.0 / (kNisMean_s * config_.rate_hz));
-  const auto first_clip = static_cast<std::uint32_t>(gyro ? kGyroClipX : kAccelClipX);
+  const double share = std::min(1.0, n / (kNisMean_s * config_.rate_hz));
   for (std::size_t i = 0; i < 3; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    if ((flags & (first_clip << i)) != 0) {
-      use[i] = false;
-      ++(gyro ? counters.clipped_gyro : counters.clipped_accel)[i];
-      continue;
-    }
+    use[i] = !block.clipped[i];
+    if (!use[i]) continue;
     use[i] = y(k) * y(k) <= gate_ * S(k, k);
     if (!use[i]) ++(gyro ? counters.gated_gyro : counters.gated_accel)[i];
     nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
   }
-  (gyro ? epoch.innovation_gyro_radps : epoch.innovation_accel_mps2) = to_array(y);
-  (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(plain);
   core.update(y, use);
+  block.n = 0;
+}
+
+void StudyFilter::attenuate_time_offset(Triad triad, double noise, const FilterCore& core,
+                                        SparseMeasurement& H) noexcept {
+  const std::size_t column = core.layout(index_).t_d;
+  if (column == StudyLayout::kAbsent) return;
+  MeasurementBlock* block = nullptr;
+  for (std::size_t k = 0; k < H.count; ++k) {
+    if (H.blocks[k].column == column) block = &H.blocks[k];
+  }
+  double power = 0.0;
+  for (const auto& row : block->h) power += row[0] * row[0];
+  double& mean = t_d_column_power_[static_cast<std::size_t>(triad)];
+  mean += std::min(1.0, 1.0 / (kColumnPowerMean_s * config_.rate_hz)) * (power - mean);
+  // C-13: the column that the noise would be expected to leave out; at standstill nothing remains, so that
+  // the reference's noise is not taken for motion.
+  const double share = std::max(0.0, 1.0 - kColumnNoiseMargin * 3.0 * noise * noise / std::max(mean, 1e-300));
+  for (auto& row : block->h) row[0] *= share;
 }
 
 void StudyFilter::watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept {

@@ -59,6 +59,9 @@ class StudyFilter {
              const Eigen::Matrix3d& mounting_covariance, double t_d_s, double t_d_sd_s) noexcept;
   void predict(FilterCore& core, double dt_s) noexcept;
   void correct(StudyContext& context, Triad triad, const ReferenceKinematics& b, StudyEpoch& epoch) noexcept;
+  void update_from_block(StudyContext& context, Triad triad, StudyEpoch& epoch) noexcept;
+  void attenuate_time_offset(Triad triad, double noise, const FilterCore& core,
+                             SparseMeasurement& H) noexcept;
   void watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
   void update_weakest_direction(const FilterCore& core) noexcept;
   [[nodiscard]] ReferenceNoise reference_noise(const ReferenceKinematics& b) const noexcept;
@@ -99,6 +102,18 @@ class StudyFilter {
     Eigen::Vector3d plain;
   };
   std::array<std::array<NoiseVariances, 2>, kRegimeCount> variances_;
+
+  /// Sums over the samples of one update; C-15.
+  struct Block {
+    int n = 0;
+    Eigen::Vector3d innovation = Eigen::Vector3d::Zero();
+    SparseMeasurement H;
+    Eigen::Matrix3d R = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d excess = Eigen::Vector3d::Zero();  ///< what inflation added to R's diagonal
+    std::array<bool, 3> clipped{};
+  };
+  std::array<Block, 2> blocks_;
+  std::array<double, 2> t_d_column_power_{};  ///< recent mean of |column of t_d|^2, per triad
 
   double gated_share_ = 0.0;
   std::array<double, 6> prior_sd_psi_r_{};
