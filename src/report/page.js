@@ -6,7 +6,7 @@
   const COLOURS = ['#d1600a', '#0b9a6e', '#3a86d8', '#9a6fd0', '#c14b78'];
   const SPEED_COLOURS = ['#8a63c9', '#3a86d8', '#0b9a6e', '#d99a00', '#d1600a'];
   const REGIME_COLOURS = ['#3a86d8', '#d1600a', '#0b9a6e', '#9a6fd0', '#c14b78'];
-  const WHISKER_STEP = 5;  // pixels
+  const WHISKER_STEP = 2.4;  // pixels
   const TRUTH_DASH = [6, 4];
 
   const escaped = (any) => String(any).replace(/[&<>"']/g, (c) => '&#' + c.charCodeAt(0) + ';');
