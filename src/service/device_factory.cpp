@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "drivers/csv/decoder.h"
+#include "drivers/csv/validate.h"
 #include "drivers/greis/decoder.h"
 #include "drivers/greis/session.h"
 #include "drivers/ixblue_stdbin/decoder.h"
@@ -41,6 +42,35 @@ std::unique_ptr<DeviceDecoder> make_greis(const DeviceConfig& device, DeviceInde
       greis::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), baud_of(device), clock});
 }
 
+csv::ImuConfig csv_imu(const DeviceConfig& device, DeviceIndex index, const ClockMapConfig& clock) {
+  csv::ImuConfig config;
+  config.device = index;
+  config.time_column = device.csv.time_column;
+  config.gyro_columns = device.csv.gyro_columns;
+  config.gyro_unit = device.csv.gyro_in_degps ? csv::AngularRateUnit::kDegps : csv::AngularRateUnit::kRadps;
+  config.accel_columns = device.csv.accel_columns;
+  config.accel_unit = device.csv.accel_in_g ? csv::AccelerationUnit::kG : csv::AccelerationUnit::kMps2;
+  config.counter_column = device.csv.counter_column;
+  config.axes = device.axes;
+  config.period = from_seconds(1.0 / device.rate_hz);
+  config.clock = clock;
+  return config;
+}
+
+csv::GnssConfig csv_gnss(const DeviceConfig& device, DeviceIndex index, const ClockMapConfig& clock) {
+  csv::GnssConfig config;
+  config.device = index;
+  config.time_column = device.csv.time_column;
+  config.latitude_column = device.csv.latitude_column;
+  config.longitude_column = device.csv.longitude_column;
+  config.height_column = device.csv.height_column;
+  config.velocity_columns = device.csv.velocity_columns;
+  config.position_sd_columns = device.csv.position_sd_columns;
+  config.period = from_seconds(1.0 / device.rate_hz);
+  config.clock = clock;
+  return config;
+}
+
 }  // namespace
 
 std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIndex index,
@@ -53,8 +83,9 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
     case Protocol::kGreis:
       return make_greis(device, index, clock);
     case Protocol::kCsvImu:
+      return std::make_unique<csv::ImuDecoder>(csv_imu(device, index, clock));
     case Protocol::kCsvGnss:
-      break;
+      return std::make_unique<csv::GnssDecoder>(csv_gnss(device, index, clock));
   }
   return nullptr;
 }
@@ -80,9 +111,32 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device) {
 }
 
 std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& decoder) {
-  if (device.protocol == Protocol::kIxblueStdbin) {
-    return std::string(
-        ixblue_stdbin::describe(static_cast<const ixblue_stdbin::Decoder&>(decoder).raw_blocks()));
+  switch (device.protocol) {
+    case Protocol::kIxblueStdbin:
+      return std::string(
+          ixblue_stdbin::describe(static_cast<const ixblue_stdbin::Decoder&>(decoder).raw_blocks()));
+    case Protocol::kCsvImu:
+    case Protocol::kCsvGnss: {
+      const auto& error = static_cast<const csv::RowDecoder&>(decoder).error();
+      return error.kind == csv::RowError::Kind::kNone ? std::string() : csv::describe(error);
+    }
+    case Protocol::kXsensMt:
+    case Protocol::kGreis:
+      break;
+  }
+  return {};
+}
+
+Result<void> check_recorded_file(const DeviceConfig& device, const std::filesystem::path& file) {
+  switch (device.protocol) {
+    case Protocol::kCsvImu:
+      return csv::validate_file(file, csv_imu(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0)));
+    case Protocol::kCsvGnss:
+      return csv::validate_file(file, csv_gnss(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0)));
+    case Protocol::kXsensMt:
+    case Protocol::kIxblueStdbin:
+    case Protocol::kGreis:
+      break;
   }
   return {};
 }

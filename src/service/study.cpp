@@ -103,7 +103,7 @@ void fit_axis(const NoiseSeries& series, std::size_t axis, const std::vector<std
         fmt::format("{} {} {}: no noise model: {}", name, axis_name(axis), regime, fit.error().what));
     return;
   }
-  nlohmann::json model = noise::to_json(*fit);
+  nlohmann::json model = noise::fit_to_json(*fit);
   model["name"] = name;
   model["axis"] = axis_name(axis);
   model["regime"] = regime;
