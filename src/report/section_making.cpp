@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <algorithm>
+#include <iterator>
 
 #include "report/json_fields.h"
 #include "report/people.h"
@@ -41,25 +42,70 @@ Html absent_files(const RunFiles& run) {
   return element("h3", text("Files that this run folder does not hold")) + element("ul", items);
 }
 
+/// A count of a device and what it is called.
+struct Column {
+  const char* key;
+  const char* heading;
+};
+
+/// The counts that at least one device has.
+std::vector<Column> columns_of(const nlohmann::json& devices) {
+  constexpr Column kColumns[] = {{"rate_hz", "rate, Hz"},
+                                 {"samples", "samples"},
+                                 {"frames", "frames"},
+                                 {"bytes", "bytes"},
+                                 {"bytes_skipped", "bytes skipped"},
+                                 {"bad_checksums", "wrong checksums"},
+                                 {"bad_lengths", "wrong lengths"},
+                                 {"bad_contents", "wrong contents"},
+                                 {"samples_lost", "samples lost"},
+                                 {"gaps", "gaps"},
+                                 {"clock_resets", "clock resets"},
+                                 {"refused", "refused"},
+                                 {"late", "late"}};
+  std::vector<Column> columns;
+  std::copy_if(
+      std::begin(kColumns), std::end(kColumns), std::back_inserter(columns), [&](const Column& column) {
+        return std::any_of(devices.begin(), devices.end(),
+                           [&](const auto& device) { return number_at(device, column.key).has_value(); });
+      });
+  return columns;
+}
+
+/// What happened, as the run noted it.
+Html events_of(const RunFiles& run) {
+  Table table({text("time, s"), text("event")});
+  for (const auto& event : field(run.run, "events")) {
+    const auto time_s = number_at(event, "time_s");
+    table.add_row({text(time_s ? fmt::format("{:.1f}", *time_s) : kUnknown), text(text_at(event, "text"))});
+  }
+  if (table.empty()) return {};
+  return element("h3", text("Events")) + element("div", table.html(), "words");
+}
+
 }  // namespace
 
 Html health_section(const RunFiles& run) {
   Html section = element("h2", text("Health of the devices"));
   if (run.run.is_null()) return section + paragraph(kNoRunFile);
-  Table table({text("device"), text("role"), text("protocol"), text("samples"), text("rate, Hz"),
-               text("frames"), text("bytes"), text("bytes skipped"), text("wrong checksums"),
-               text("samples lost"), text("gaps"), text("late")});
-  for (const auto& device : field(run.run, "devices")) {
+  const auto& devices = field(run.run, "devices");
+  const auto columns = columns_of(devices);
+  std::vector<Html> headings{text("device"), text("role"), text("protocol")};
+  for (const Column& column : columns) headings.push_back(text(column.heading));
+  Table table(std::move(headings));
+  Html problems;
+  for (const auto& device : devices) {
     std::vector<Html> row{text(text_at(device, "name")), text(text_at(device, "role")),
-                          text(text_at(device, "protocol")), count(number_at(device, "samples")),
-                          number(number_at(device, "rate_hz"))};
-    for (const char* key :
-         {"frames", "bytes", "bytes_skipped", "bad_checksums", "samples_lost", "gaps", "late"}) {
-      row.push_back(count(number_at(device, key)));
-    }
+                          text(text_at(device, "protocol"))};
+    for (const Column& column : columns) row.push_back(count(number_at(device, column.key)));
     table.add_row(std::move(row));
+    for (const char* key : {"problem", "clock"}) {
+      const std::string words = text_at(device, key);
+      if (!words.empty()) problems += element("li", text(text_at(device, "name") + ": " + words));
+    }
   }
-  return section + (table.empty() ? paragraph("run.json names no device.") : table.html());
+  if (!problems.empty()) problems = element("ul", problems);
+  return section + (table.empty() ? paragraph("run.json names no device.") : table.html() + problems);
 }
 
 Html making_section(const RunFiles& run) {
@@ -79,7 +125,8 @@ Html making_section(const RunFiles& run) {
     table.add_row({text("duration"), duration_cell(number_at(run.run, "duration_s"))});
     table.add_row({text("at rest"), duration_cell(number_at(regimes, "static_s"))});
     table.add_row({text("in motion"), duration_cell(number_at(regimes, "dynamic_s"))});
-    section += element("div", table.html(), "words") + element("h3", text("Warnings")) + warnings_of(run);
+    section += element("div", table.html(), "words") + element("h3", text("Warnings")) + warnings_of(run) +
+               events_of(run);
   }
   return section + absent_files(run);
 }

@@ -149,6 +149,20 @@ std::string fit_names(const std::vector<const Fit*>& fits) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+/// The fits to judge. A model over all regimes together is judged only where no regime has one of its own: it
+/// mixes what the regimes' models keep apart.
+std::vector<Fit> judged(const std::vector<Fit>& fits) {
+  const auto is_whole = [](const Fit& fit) { return fit.regime == "all" || fit.regime.empty(); };
+  std::vector<Fit> chosen;
+  for (const Fit& fit : fits) {
+    const bool replaced = is_whole(fit) && std::any_of(fits.begin(), fits.end(), [&](const Fit& other) {
+                            return !is_whole(other) && other.imu == fit.imu && other.axis == fit.axis;
+                          });
+    if (!replaced) chosen.push_back(fit);
+  }
+  return chosen;
+}
+
 template <typename Condition>
 std::vector<const Fit*> those(const std::vector<Fit>& fits, Condition condition) {
   std::vector<const Fit*> chosen;
@@ -283,7 +297,8 @@ Verdict calibration_verdict(const RunFiles& run) {
   return verdict;
 }
 
-Verdict model_verdict(const std::vector<Fit>& fits) {
+Verdict model_verdict(const std::vector<Fit>& all_fits) {
+  const std::vector<Fit> fits = judged(all_fits);
   Verdict verdict;
   if (fits.empty()) {
     verdict.headline = "Cannot be said: this run has no noise model.";
@@ -325,7 +340,8 @@ Verdict model_verdict(const std::vector<Fit>& fits) {
   return verdict;
 }
 
-std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>& fits) {
+std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>& all_fits) {
+  const std::vector<Fit> fits = judged(all_fits);
   std::vector<std::string> steps;
   manoeuvres(run, steps);
   device_steps(run, steps);
@@ -333,6 +349,9 @@ std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>&
     steps.emplace_back("Fit noise models to the error signals: this run folder has none.");
   } else {
     model_steps(run, fits, steps);
+  }
+  if (const std::size_t n = field(run.run, "warnings").size(); n > 0) {
+    steps.push_back(fmt::format("Read the warnings of the run ({}) under “How this was made”.", n));
   }
   if (steps.empty()) {
     steps.emplace_back(

@@ -76,6 +76,16 @@ TEST(Verdict, OneRejectionInTwentyFourIsChance) {
   EXPECT_THAT(verdict.reasons, Contains(HasSubstr("rejects 1 of 24 models (1.2 expected by chance")));
 }
 
+TEST(Verdict, AModelOverAllRegimesIsNotJudgedBesideThoseOfTheRegimes) {
+  auto fits = read_fits(run_with({}).models);
+  Fit whole = fits.front();
+  whole.regime = "all";
+  whole.j_p_value = 1e-9;
+  fits.push_back(whole);
+  EXPECT_EQ(model_verdict(fits).answer, Answer::kYes);
+  EXPECT_EQ(model_verdict({whole}).answer, Answer::kNo);
+}
+
 TEST(Verdict, WithoutModelsNothingIsClaimed) { EXPECT_EQ(model_verdict({}).answer, Answer::kOpen); }
 
 }  // namespace
