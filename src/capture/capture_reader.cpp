@@ -42,7 +42,7 @@ void count_piece(const RawPiece& piece, CaptureSummary& summary) {
 }  // namespace
 
 Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
-  auto log = EventLogReader::open(path);
+  auto log = CaptureFiles::open(path);
   if (!log) return tl::unexpected(log.error());
   CaptureSummary summary;
   LossFinder losses;
@@ -53,7 +53,7 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
     if (!record) {
       summary.other_messages += 1;
     } else if (auto* run = std::get_if<RunHeader>(&*record)) {
-      summary.run = std::move(*run);
+      summary.run = std::move(*run);  // the same in every file
       has_run = true;
     } else if (auto* piece = std::get_if<RawPiece>(&*record)) {
       losses.look(*piece, summary.losses);
@@ -77,7 +77,7 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
 }
 
 Result<CaptureReader> CaptureReader::open(const std::filesystem::path& path) {
-  auto log = EventLogReader::open(path);
+  auto log = CaptureFiles::open(path);
   if (!log) return tl::unexpected(log.error());
   return CaptureReader(std::move(*log));
 }

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "capture/event_log_reader.h"
+#include "capture/capture_files.h"
 #include "capture/record_codec.h"
 #include "capture/records.h"
 
@@ -35,7 +35,7 @@ struct CapturedDevice {
   HostTime last{};
 };
 
-/// A capture seen as a whole, by one pass over the file.
+/// A capture seen as a whole, by one pass over its files.
 struct CaptureSummary {
   RunHeader run;
   std::map<std::string, CapturedDevice> devices;
@@ -46,6 +46,7 @@ struct CaptureSummary {
   std::uint64_t bytes_cut_off = 0;   ///< unfinished record at the end: the recorder was killed
 };
 
+/// @param path of the first file of the capture; those that follow are found beside it
 /// @return an error that says what the file is where it is not a capture, and of kind kWork for an event log
 ///         that holds no device bytes or no run header
 [[nodiscard]] Result<CaptureSummary> summarise_capture(const std::filesystem::path& path);
@@ -59,6 +60,7 @@ class CaptureReader {
  public:
   static constexpr Duration kReorderWindow = std::chrono::seconds(5);
 
+  /// @param path of the first file of the capture
   static Result<CaptureReader> open(const std::filesystem::path& path);
 
   /// The next read or write; nothing at the end of the capture. A read of which a piece was lost comes as the
@@ -82,14 +84,14 @@ class CaptureReader {
     bool open = false;  // pieces are still to come
   };
 
-  explicit CaptureReader(EventLogReader log) : log_(std::move(log)) {}
+  explicit CaptureReader(CaptureFiles log) : log_(std::move(log)) {}
   bool read_one();
   void add_piece(RawPiece&& piece);
   void close_assemblies();
   void add_whole(RawRead&& read);
   std::size_t index_of(const std::string& device);
 
-  EventLogReader log_;
+  CaptureFiles log_;
   std::vector<std::string> devices_;
   std::map<std::string, Assembly> assemblies_;
   std::map<Key, RawRead> held_;

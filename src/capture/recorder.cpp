@@ -1,10 +1,13 @@
 #include "capture/recorder.h"
 
 #include <chrono>
+#include <system_error>
 #include <utility>
 
 #include "base/contracts.h"
+#include "capture/capture_files.h"
 #include "rt/host_clock.h"
+#include "rt/thread_setup.h"
 
 namespace imuscope {
 namespace {
@@ -20,13 +23,8 @@ constexpr std::size_t kMaxWaitingMessageBytes = std::size_t{4} << 20U;
 Result<std::unique_ptr<Recorder>> Recorder::start(Options options, std::vector<RawRing*> raw_rings,
                                                   std::vector<ExceptionRing*> exception_rings) {
   IMUSCOPE_EXPECTS(options.run.devices.size() <= kMaxDevices);
-  auto writer = CaptureWriter::create(options.path);
+  auto writer = begin_file(options, 0);
   if (!writer) return tl::unexpected(writer.error());
-  const RecordClock clock{options.run.t0, options.run.t0_wall};
-  const std::vector<std::uint8_t> header = encode(options.run, 0);
-  writer->append(channel_name(options.channel_prefix, "RUN"), clock.utime(options.run.t0), header);
-  if (auto flushed = writer->flush(); !flushed) return tl::unexpected(flushed.error());
-
   auto recorder = std::unique_ptr<Recorder>(
       new Recorder(std::move(options), std::move(*writer), std::move(raw_rings), std::move(exception_rings)));
   recorder->update_status({});
@@ -34,14 +32,15 @@ Result<std::unique_ptr<Recorder>> Recorder::start(Options options, std::vector<R
   return recorder;
 }
 
-Recorder::Recorder(Options options, CaptureWriter writer, std::vector<RawRing*> raw_rings,
+Recorder::Recorder(Options options, std::unique_ptr<CaptureWriter> writer, std::vector<RawRing*> raw_rings,
                    std::vector<ExceptionRing*> exception_rings)
     : options_(std::move(options)),
       clock_{options_.run.t0, options_.run.t0_wall},
       exception_channel_(channel_name(options_.channel_prefix, "EXCEPTION")),
       raw_rings_(std::move(raw_rings)),
       exception_rings_(std::move(exception_rings)),
-      writer_(std::move(writer)) {
+      writer_(std::move(writer)),
+      file_begin_(host_now()) {
   for (const std::string& device : options_.run.devices) {
     raw_channels_.push_back(channel_name(options_.channel_prefix, "RAW", device));
   }
@@ -56,7 +55,7 @@ Result<void> Recorder::stop() {
   stop_.store(true);
   thread_.join();
   drain();  // this thread is the consumer now: join() orders it after the other
-  const Result<void> closed = writer_.close();
+  const Result<void> closed = writer_->close();
   update_status(closed);
   return closed;
 }
@@ -69,10 +68,11 @@ RecorderStatus Recorder::status() const {
 }
 
 void Recorder::run() {
+  (void)setup_this_thread({"imuscope-rec", Scheduling::kNormal, 0, {}});  // a name is never refused
   HostTime flush_due = host_now() + kFlushInterval;
   while (!stop_.load()) {
     drain();
-    if (host_now() >= flush_due || writer_.pending_bytes() > kFlushBytes) {
+    if (host_now() >= flush_due || writer_->pending_bytes() > kFlushBytes) {
       flush();
       flush_due = host_now() + kFlushInterval;
     }
@@ -82,7 +82,7 @@ void Recorder::run() {
 
 void Recorder::drain() {
   while (drain_oldest_chunk()) {
-    if (writer_.pending_bytes() > kFlushBytes) flush();
+    if (writer_->pending_bytes() > kFlushBytes) flush();
   }
   drain_exceptions();
   drain_messages();
@@ -102,7 +102,7 @@ bool Recorder::drain_oldest_chunk() {
   if (oldest == nullptr) return false;
   IMUSCOPE_EXPECTS(oldest->device < raw_channels_.size());
   const std::vector<std::uint8_t> message = encode(*oldest, options_.run.devices[oldest->device], clock_);
-  writer_.append(raw_channels_[oldest->device], clock_.utime(oldest->arrival), message);
+  writer_->append(raw_channels_[oldest->device], clock_.utime(oldest->arrival), message);
   oldest_ring->pop();
   return true;
 }
@@ -115,7 +115,7 @@ void Recorder::drain_exceptions() {
       IMUSCOPE_EXPECTS(!has_device || exception->device < options_.run.devices.size());
       const std::string device = has_device ? options_.run.devices[exception->device] : std::string();
       const std::vector<std::uint8_t> message = encode(*exception, device, now, exceptions_++, clock_);
-      writer_.append(exception_channel_, clock_.utime(now), message);
+      writer_->append(exception_channel_, clock_.utime(now), message);
       ring->pop();
     }
   }
@@ -128,7 +128,7 @@ void Recorder::drain_messages() {
     messages.swap(messages_);
     messages_bytes_ = 0;
   }
-  for (const LogEvent& message : messages) writer_.append(message.channel, message.utime, message.data);
+  for (const LogEvent& message : messages) writer_->append(message.channel, message.utime, message.data);
 }
 
 void Recorder::record_message(std::string_view channel, std::int64_t utime,
@@ -142,14 +142,55 @@ void Recorder::record_message(std::string_view channel, std::int64_t utime,
   messages_.push_back({0, utime, std::string(channel), {message.begin(), message.end()}});
 }
 
-void Recorder::flush() { update_status(writer_.flush()); }
+/// Creates a file of the capture and writes the run header, so that each can be understood by itself.
+Result<std::unique_ptr<CaptureWriter>> Recorder::begin_file(const Options& options, int number) {
+  auto created = CaptureWriter::create(capture_file(options.path, number));
+  if (!created) return tl::unexpected(created.error());
+  auto writer = std::make_unique<CaptureWriter>(std::move(*created));
+  const RecordClock clock{options.run.t0, options.run.t0_wall};
+  const std::vector<std::uint8_t> header = encode(options.run, number);
+  writer->append(channel_name(options.channel_prefix, "RUN"), clock.utime(options.run.t0), header);
+  if (auto flushed = writer->flush(); !flushed) {
+    std::error_code ignored;  // an empty file left behind would only stand in the way of the next attempt
+    std::filesystem::remove(writer->path(), ignored);
+    return tl::unexpected(flushed.error());
+  }
+  return writer;
+}
+
+void Recorder::flush() {
+  update_status(writer_->flush());
+  rotate_if_due();
+}
+
+/// Where the next file cannot be made, the present one goes on and the problem shows in the status.
+void Recorder::rotate_if_due() {
+  const bool is_full = options_.max_file_bytes > 0 && writer_->bytes_written() >= options_.max_file_bytes;
+  const bool is_old =
+      options_.max_file_age > Duration::zero() && host_now() - file_begin_ >= options_.max_file_age;
+  if (!is_full && !is_old) return;
+  auto next = begin_file(options_, file_number_ + 1);
+  Result<void> outcome;
+  if (next) {
+    outcome = writer_->close();
+    finished_.bytes += writer_->bytes_written();
+    finished_.records += writer_->records_written();
+    finished_.records_lost += writer_->records_lost();
+    writer_ = std::move(*next);
+    file_number_ += 1;
+    file_begin_ = host_now();
+  } else {
+    outcome = tl::unexpected(next.error());
+  }
+  update_status(outcome);
+}
 
 void Recorder::update_status(const Result<void>& flushed) {
   const std::lock_guard lock(status_mutex_);
-  status_.path = writer_.path();
-  status_.bytes = writer_.bytes_written();
-  status_.records = writer_.records_written();
-  status_.records_lost = writer_.records_lost();
+  status_.path = writer_->path();
+  status_.bytes = finished_.bytes + writer_->bytes_written();
+  status_.records = finished_.records + writer_->records_written();
+  status_.records_lost = finished_.records_lost + writer_->records_lost();
   status_.problem = flushed ? std::nullopt : std::optional(flushed.error());
 }
 

@@ -3,6 +3,7 @@
 /// The recorder thread: empties the rings of raw bytes and exceptions into a capture.
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -26,8 +27,8 @@ namespace imuscope {
 
 /// What the recorder says about itself. Losses in the rings are counted there (SpscRing::counters()).
 struct RecorderStatus {
-  std::filesystem::path path;
-  std::uint64_t bytes = 0;  ///< safe from the death of this process
+  std::filesystem::path path;  ///< of the file being written
+  std::uint64_t bytes = 0;     ///< of all files, safe from the death of this process
   std::uint64_t records = 0;
   std::uint64_t records_lost = 0;   ///< refused by the disk
   std::uint64_t messages_lost = 0;  ///< given to record_message() too fast
@@ -45,6 +46,10 @@ class Recorder {
     std::filesystem::path path;  ///< must not exist yet
     std::string channel_prefix{kDefaultChannelPrefix};
     RunHeader run;  ///< run.devices names what DeviceIndex counts
+    /// The capture goes on in another file (see capture_files.h) when one has this size or age; 0 means
+    /// never.
+    std::uint64_t max_file_bytes = std::uint64_t{2} << 30U;
+    Duration max_file_age = std::chrono::hours(1);
   };
 
   /// Creates the capture, writes the run header and starts the thread.
@@ -65,14 +70,16 @@ class Recorder {
   [[nodiscard]] RecorderStatus status() const;
 
  private:
-  Recorder(Options options, CaptureWriter writer, std::vector<RawRing*> raw_rings,
+  Recorder(Options options, std::unique_ptr<CaptureWriter> writer, std::vector<RawRing*> raw_rings,
            std::vector<ExceptionRing*> exception_rings);
   void run();
   void drain();
   bool drain_oldest_chunk();
   void drain_exceptions();
   void drain_messages();
+  static Result<std::unique_ptr<CaptureWriter>> begin_file(const Options& options, int number);
   void flush();
+  void rotate_if_due();
   void update_status(const Result<void>& flushed);
 
   Options options_;
@@ -81,7 +88,10 @@ class Recorder {
   std::string exception_channel_;
   std::vector<RawRing*> raw_rings_;
   std::vector<ExceptionRing*> exception_rings_;
-  CaptureWriter writer_;
+  std::unique_ptr<CaptureWriter> writer_;
+  int file_number_ = 0;
+  HostTime file_begin_;
+  RecorderStatus finished_;  // of the files before this one
   std::int64_t exceptions_ = 0;
 
   mutable std::mutex messages_mutex_;

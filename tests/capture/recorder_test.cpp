@@ -206,6 +206,63 @@ TEST(Recorder, KeepsPublishedMessagesBesideTheBytesAndReplayPassesOverThem) {
   EXPECT_EQ(summary->other_messages, 1U);
 }
 
+TEST(Recorder, GoesOnInAnotherFileAndTheReaderJoinsThem) {
+  const auto folder = test::scratch_folder();
+  const auto ring = std::make_unique<RawRing>();
+  auto options = options_for(folder / "capture.lcm");
+  options.max_file_bytes = 20'000;
+  auto recorder = Recorder::start(options, {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value()) << recorder.error().text();
+  RawTap tap(*ring);
+  constexpr std::uint32_t kReads = 1500;
+  for (std::uint32_t i = 0; i < kReads; ++i) {
+    tap.record(0, Direction::kRead, numbered_bytes(i, 40), host_now());
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  ASSERT_TRUE((*recorder)->stop().has_value());
+  ASSERT_TRUE(std::filesystem::exists(folder / "capture_002.lcm")) << "the capture was not split";
+
+  auto reader = CaptureReader::open(folder / "capture.lcm");
+  ASSERT_TRUE(reader.has_value());
+  std::uint32_t next = 0;
+  while (const auto read = reader->next()) {
+    ASSERT_EQ(read->bytes, numbered_bytes(next, 40));
+    next += 1;
+  }
+  EXPECT_EQ(next, kReads);
+  const auto summary = summarise_capture(folder / "capture.lcm");
+  ASSERT_TRUE(summary.has_value());
+  EXPECT_EQ(summary->devices.at("airins").reads, kReads);
+  EXPECT_TRUE(summary->losses.empty());
+  std::uintmax_t bytes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) bytes += entry.file_size();
+  EXPECT_EQ((*recorder)->status().bytes, bytes);
+}
+
+TEST(Recorder, AFileInTheWayOfTheNextOneIsToldAndThePresentOneGoesOn) {
+  const auto folder = test::scratch_folder();
+  std::ofstream(folder / "capture_001.lcm") << "from another run";
+  const auto ring = std::make_unique<RawRing>();
+  auto options = options_for(folder / "capture.lcm");
+  options.max_file_age = milliseconds(1);
+  auto recorder = Recorder::start(options, {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value());
+  RawTap tap(*ring);
+  tap.record(0, Direction::kRead, Bytes{1}, host_now());
+  const HostTime give_up = host_now() + std::chrono::seconds(5);
+  while (!(*recorder)->status().problem && host_now() < give_up)
+    std::this_thread::sleep_for(milliseconds(10));
+  const auto problem = (*recorder)->status().problem;
+  ASSERT_TRUE(problem.has_value());
+  EXPECT_THAT(problem->text(), HasSubstr("capture_001.lcm"));
+  tap.record(0, Direction::kRead, Bytes{2}, host_now());
+  ASSERT_TRUE((*recorder)->stop().has_value());
+  const auto summary = summarise_capture(folder / "capture.lcm");
+  ASSERT_TRUE(summary.has_value());
+  EXPECT_EQ(summary->devices.at("airins").reads, 2U);
+  EXPECT_EQ(summary->bytes_skipped, 0U) << "the other run's file was taken for a part of this one";
+}
+
 TEST(Recorder, DoesNotStartWhereNothingCanBeWritten) {
   const auto folder = test::scratch_folder();
   std::ofstream(folder / "taken.lcm") << "x";

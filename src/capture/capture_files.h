@@ -1,0 +1,47 @@
+#pragma once
+
+/// A capture in several files: what the recorder splits, the reader joins.
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "base/result.h"
+#include "capture/event_log_reader.h"
+#include "capture/records.h"
+
+namespace imuscope {
+
+/// Path of file n of a capture: run.lcm, run_001.lcm, run_002.lcm, ...
+[[nodiscard]] std::filesystem::path capture_file(const std::filesystem::path& first, int n);
+
+/// Iterates over the events of a capture through all its files, given the first. A file belongs to the
+/// capture if it begins with a run header of the same t0; what lies beside it from another run is left alone.
+/// Thread: one, of the soft world.
+class CaptureFiles {
+ public:
+  static Result<CaptureFiles> open(const std::filesystem::path& first);
+
+  /// Fetches the next event. Returns false at the end of the last file.
+  [[nodiscard]] bool next(LogEvent& event);
+
+  /// Sums over the files; see EventLogReader.
+  [[nodiscard]] std::uint64_t bytes_skipped() const noexcept { return bytes_skipped_ + log_.bytes_skipped(); }
+  [[nodiscard]] std::uint64_t bytes_cut_off() const noexcept { return bytes_cut_off_ + log_.bytes_cut_off(); }
+
+ private:
+  CaptureFiles(std::filesystem::path first, EventLogReader log)
+      : first_(std::move(first)), log_(std::move(log)) {}
+  bool open_following();
+
+  std::filesystem::path first_;
+  int number_ = 0;
+  EventLogReader log_;
+  bool at_beginning_ = true;
+  std::optional<HostTime> t0_;
+  std::uint64_t bytes_skipped_ = 0;
+  std::uint64_t bytes_cut_off_ = 0;
+};
+
+}  // namespace imuscope
