@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <limits>
 
 #include "noise/inference.h"
 #include "noise/separable_fit.h"
@@ -15,9 +16,11 @@ namespace imuscope::noise {
 namespace {
 
 /// Rounds of re-weighting by the model's own covariance; they settle in 2 to 4.
-constexpr int kMaxReweighting = 8;
-/// Fitted curves closer than this, relative, are the same.
-constexpr double kSettled = 1e-4;
+constexpr int kMaxReweighting = 10;
+constexpr int kUndampedRounds = 1;
+constexpr double kSettledShareOfSd = 0.02;
+/// Level of the J-test at which the model is said not to explain the data.
+constexpr double kRejected = 0.01;
 /// Added to the diagonal of the covariance, relative: an exact ramp has none of its own.
 constexpr double kRidge = 1e-10;
 
@@ -88,25 +91,31 @@ Eigen::MatrixXd whitener_of(const Eigen::MatrixXd& v) {
   return llt.matrixL().solve(Eigen::MatrixXd::Identity(v.rows(), v.cols()));
 }
 
-bool settled(const Model& a, const Model& b, const std::vector<int>& levels) {
-  return std::all_of(levels.begin(), levels.end(), [&](int level) {
-    const double value = model_wv(b, level);
-    return std::abs(model_wv(a, level) - value) <= kSettled * value;
-  });
+/// No fitted level moved by more than a small part of its own sd.
+bool settled(const Model& before, const Model& after, const std::vector<int>& levels,
+             const Eigen::MatrixXd& v) {
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const double sd = std::sqrt(v(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i)));
+    if (std::abs(model_wv(after, levels[i]) - model_wv(before, levels[i])) > kSettledShareOfSd * sd)
+      return false;
+  }
+  return true;
 }
 
-/// Weights from the model's own covariance, iterated. `solution` is the start and becomes the answer. False
-/// when the rounds did not settle.
+/// Weights from the model's own covariance, iterated. `solution` is the start and becomes the answer; `v` the
+/// covariance that its weights are the inverse of. False when the rounds did not settle.
 bool reweight(SeparableProblem& problem, const WaveletVariance& wv, SeparableSolution& solution,
-              bool search_again) {
+              Eigen::MatrixXd& v, bool search_again) {
   for (int round = 0; round < kMaxReweighting; ++round) {
-    const Eigen::MatrixXd whitener =
-        whitener_of(covariance_with_ridge(solution.model, wv, problem.levels.size()));
+    const Eigen::MatrixXd next_v = covariance_with_ridge(solution.model, wv, problem.levels.size());
+    // Two weightings may each lead to the other: from some round on meet halfway.
+    v = round < kUndampedRounds ? next_v : Eigen::MatrixXd(0.5 * (v + next_v));
+    const Eigen::MatrixXd whitener = whitener_of(v);
     if (whitener.size() == 0) return false;
     problem.whitener = whitener;
     SeparableSolution next =
         search_again && round == 0 ? find_global_minimum(problem) : polish(problem, solution.model);
-    const bool done = settled(solution.model, next.model, problem.levels);
+    const bool done = settled(solution.model, next.model, problem.levels, v);
     solution = std::move(next);
     if (done) return true;
   }
@@ -124,6 +133,19 @@ void set_model_intervals(FitResult& result, const Eigen::MatrixXd& v, double con
     level.model_ci_low = level.observed.value * dof / boost::math::quantile(distribution, 1.0 - tail);
     level.model_ci_high = level.observed.value * dof / boost::math::quantile(distribution, tail);
   }
+}
+
+/// Twice the negative Gaussian log-likelihood of the wavelet variance under the model, in units of the
+/// observed values, plus ln(levels) for each parameter (Schwarz).
+double criterion_of(const SeparableProblem& problem, const Eigen::VectorXd& residual,
+                    const Eigen::MatrixXd& v) {
+  const Eigen::VectorXd scale = problem.y.cwiseInverse();
+  const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * v * scale.asDiagonal());
+  if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
+  const Eigen::MatrixXd factor = llt.matrixL();
+  return llt.matrixL().solve(scale.cwiseProduct(residual)).squaredNorm() +
+         2.0 * factor.diagonal().array().log().sum() +
+         std::log(static_cast<double>(residual.size())) * problem.spec.parameter_count();
 }
 
 std::vector<bool> present_parameters(const Model& model) {
@@ -155,11 +177,11 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
   const bool warm = options.warm_start != nullptr && options.warm_start->spec == spec;
   SeparableSolution solution =
       warm ? polish(problem, options.warm_start->model) : find_global_minimum(problem);
-  FitResult result;
-  if (optimal && !reweight(problem, wv, solution, !warm)) {
-    result.warnings.emplace_back("the weights did not settle: the model is far from the data");
-  }
+  Eigen::MatrixXd v;
+  const bool weights_settled = !optimal || reweight(problem, wv, solution, v, !warm);
+  if (!optimal || v.size() == 0) v = covariance_with_ridge(solution.model, wv, levels);
 
+  FitResult result;
   result.n = wv.n_valid;
   result.rate_hz = rate_hz;
   result.spec = spec;
@@ -169,7 +191,6 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
   for (const WvLevel& level : wv.levels)
     result.wv.push_back({level, model_wv(result.model, level.level), 0.0, 0.0});
 
-  const Eigen::MatrixXd v = covariance_with_ridge(result.model, wv, levels);
   const auto places = parameter_places(result.model);
   const Eigen::MatrixXd jacobian = wv_jacobian(result.model, problem.levels, places);
   const auto present = present_parameters(result.model);
@@ -181,8 +202,15 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
                     problem.levels.back());
   result.j_test = j_test(wv, residual, jacobian, v, present);
   set_model_intervals(result, v, options.confidence);
-  result.criterion =
-      result.objective + 2.0 * static_cast<double>(std::count(present.begin(), present.end(), true));
+  result.criterion = criterion_of(problem, residual, v);
+  if (!weights_settled)
+    result.warnings.emplace_back("the weights did not settle: the model is far from the data");
+  if (result.j_test && result.j_test->p_value < kRejected) {
+    result.warnings.push_back(
+        fmt::format("{} does not explain the wavelet variance (J-test p = {:.2g}): the intervals "
+                    "hold for the best model of this kind only",
+                    spec.name(), result.j_test->p_value));
+  }
   return result;
 }
 

@@ -72,7 +72,9 @@ struct FitResult {
   std::vector<double> covariance;
   double objective = 0.0;
   std::optional<JTest> j_test;  ///< absent with fewer levels than parameters + 1
-  double criterion = 0.0;       ///< for the ranking of models of the same signal; smaller is better
+  /// For the ranking of models of the same signal, smaller is better: -2 log likelihood of the wavelet
+  /// variance under the model plus ln(levels) for each parameter.
+  double criterion = 0.0;
   bool identifiable = true;
   std::string simpler_model;  ///< where not identifiable: the model to use instead
   std::vector<std::string> warnings;

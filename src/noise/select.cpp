@@ -2,13 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <map>
-
-#include "noise/wv_covariance.h"
 
 namespace imuscope::noise {
 namespace {
@@ -33,15 +29,6 @@ std::vector<ModelSpec> sub_models(const ModelSpec& full) {
   }
   std::erase_if(models, [](const ModelSpec& m) { return m.processes.empty(); });
   return models;
-}
-
-double distance(const FitResult& fit, const Eigen::LLT<Eigen::MatrixXd>& v) {
-  Eigen::VectorXd residual(v.rows());
-  for (Eigen::Index i = 0; i < residual.size(); ++i) {
-    const FittedLevel& level = fit.wv[static_cast<std::size_t>(i)];
-    residual[i] = level.observed.value - level.fitted;
-  }
-  return v.matrixL().solve(residual).squaredNorm();
 }
 
 bool before(const RankedModel& a, const RankedModel& b) {
@@ -79,25 +66,13 @@ void apply_parsimony(std::vector<RankedModel>& ranked) {
 
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options) {
-  const auto reference = fit(wv, full, rate_hz, options);
-  if (!reference) return tl::unexpected(reference.error());
-  const std::size_t levels = options.levels > 0
-                                 ? std::min(static_cast<std::size_t>(options.levels), wv.levels.size())
-                                 : wv.levels.size();
-  const Eigen::LLT<Eigen::MatrixXd> v(wv_covariance(reference->model, wv, levels));
-  if (v.info() != Eigen::Success) {
-    return work_error(fmt::format("the covariance under {} is singular", full.name()),
-                      "rank a model with a noise term");
-  }
-  const double penalty = std::log(static_cast<double>(levels));
   std::vector<RankedModel> ranked;
   for (const ModelSpec& spec : sub_models(full)) {
     auto fitted = fit(wv, spec, rate_hz, options);
     if (!fitted) return tl::unexpected(fitted.error());
     RankedModel model;
-    model.criterion = distance(*fitted, v) + penalty * spec.parameter_count();
+    model.criterion = fitted->criterion;
     model.fit = std::move(*fitted);
-    model.fit.criterion = model.criterion;
     ranked.push_back(std::move(model));
   }
   std::stable_sort(ranked.begin(), ranked.end(), before);

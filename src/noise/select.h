@@ -1,6 +1,7 @@
 #pragma once
 
-/// Which terms of a model a signal supports: all sub-models compared under one covariance.
+/// Which terms of a model a signal supports: all sub-models compared by likelihood with a price for each
+/// parameter.
 
 #include <string>
 #include <vector>
@@ -12,8 +13,7 @@ namespace imuscope::noise {
 
 struct RankedModel {
   FitResult fit;
-  /// Distance of the fitted curve from the wavelet variance under the full model's covariance, plus
-  /// ln(levels) for each parameter (Schwarz): a term must earn its place.
+  /// FitResult::criterion: a term must earn its place.
   double criterion = 0.0;
   std::string reason;  ///< why it stands where it stands
 };

@@ -328,6 +328,33 @@ SeparableSolution solution_of(const SeparableProblem& problem, const std::vector
   return s;
 }
 
+/// The smaller model with a GM added: at the slowest rate, and where the amplitudes alone gain most from it.
+std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& smaller) {
+  constexpr int kRates = 40;
+  constexpr std::size_t kKept = 3;
+  const CoordinateRange range = coordinate_range(ProcessKind::kGaussMarkov, 0, problem.levels.back());
+  const RowVector target = problem.whitener * problem.y;
+  struct Candidate {
+    double objective;
+    Model model;
+  };
+  std::vector<Candidate> candidates;
+  for (int i = 0; i <= kRates; ++i) {
+    Model model = smaller;
+    model.components.push_back(
+        {ProcessKind::kGaussMarkov, 0.0, {std::exp(range.low + (range.high - range.low) * i / kRates), 0.0}});
+    order_components(model);
+    std::vector<Shape> shapes;
+    for (const Component& c : model.components) shapes.push_back(c.shape);
+    candidates.push_back({evaluate(problem, target, shapes).objective, std::move(model)});
+  }
+  std::vector<Model> kept{candidates.front().model};
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.objective < b.objective; });
+  for (std::size_t i = 0; i < kKept; ++i) kept.push_back(candidates[i].model);
+  return kept;
+}
+
 }  // namespace
 
 double coordinate_of_shape(ProcessKind kind, int /*i*/, double shape) noexcept {
@@ -387,11 +414,11 @@ SeparableSolution find_global_minimum(const SeparableProblem& problem) {
   smaller.spec.processes.erase(
       std::find(smaller.spec.processes.begin(), smaller.spec.processes.end(), ProcessKind::kGaussMarkov));
   SeparableSolution nested = find_global_minimum(smaller);
-  if (nested.objective > found.objective) return found;
-  const double slowest = std::exp(coordinate_range(ProcessKind::kGaussMarkov, 0, problem.levels.back()).low);
-  nested.model.components.push_back({ProcessKind::kGaussMarkov, 0.0, {slowest, 0.0}});
-  order_components(nested.model);
-  return nested;
+  for (const Model& start : with_one_more(problem, nested.model)) {
+    SeparableSolution candidate = polish(problem, start);
+    if (candidate.objective < found.objective) found = std::move(candidate);
+  }
+  return found;
 }
 
 SeparableSolution polish(const SeparableProblem& problem, const Model& start) {

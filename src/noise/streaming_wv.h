@@ -1,0 +1,99 @@
+#pragma once
+
+/// Haar wavelet variance of a signal as it arrives: O(levels) a sample, no allocation after construction,
+/// equal to the batch result over the same samples, with gaps. Memory: 2^levels doubles (16 levels: 512 KiB).
+
+#include <cstdint>
+#include <vector>
+
+#include "noise/wavelet_variance.h"
+
+namespace imuscope::noise {
+
+struct StreamingOptions {
+  int levels = 16;  ///< 1..24
+  /// Share of its weight that a coefficient loses with each one after it at its level, in [0, 1): 0 keeps all
+  /// for ever; 1/n forgets with a time constant of n samples. The counts then are effective ones, (sum w)^2 /
+  /// (sum w^2).
+  double forgetting = 0.0;
+  double confidence = 0.95;
+};
+
+/// Sums that a wavelet variance is made of; two of them (other stretches, other replicates) can be merged.
+struct WvSums {
+  struct Level {
+    double squares = 0.0;         ///< sum of w W^2
+    double weight = 0.0;          ///< sum of w
+    double weight_squares = 0.0;  ///< sum of w^2
+  };
+  std::uint64_t n_samples = 0;
+  std::vector<Level> levels;
+
+  /// Adds the coefficients of another stretch. What would span the join is in neither, as at a gap.
+  void merge(const WvSums& other);
+  /// Levels with at least one coefficient, with their intervals.
+  [[nodiscard]] WaveletVariance wavelet_variance(double confidence = 0.95) const;
+};
+
+class StreamingWv {
+ public:
+  explicit StreamingWv(const StreamingOptions& options = {});
+
+  /// Next sample. A value that is not finite counts as a gap. Allocates: never. Not thread-safe.
+  void push(double x) noexcept;
+  /// Samples are missing, or the regime changed: no coefficient spans this place.
+  void gap() noexcept { run_ = 0; }
+  /// Forgets everything, keeps the options.
+  void reset() noexcept;
+
+  [[nodiscard]] WvSums sums() const;
+  /// Hands out the sums since the last call and starts new ones; coefficients go on spanning the samples
+  /// before. Precondition: out has this stream's number of levels. Allocates: never.
+  void take(WvSums& out) noexcept;
+  [[nodiscard]] WaveletVariance wavelet_variance() const;
+
+ private:
+  struct Level {
+    double squares = 0.0;  ///< settled part of the sum of (2n W)^2
+    double recent = 0.0;   ///< part since the last settling, so that long sums keep their digits
+    double weight = 0.0;
+    double weight_squares = 0.0;
+    std::size_t offset = 0;  ///< of this level's ring in rings_
+    std::size_t mask = 0;    ///< ring length - 1
+  };
+
+  void add(Level& level, double square) const noexcept;
+  void settle() noexcept;
+
+  StreamingOptions options_;
+  double keep_ = 1.0;
+  std::vector<Level> levels_;
+  std::vector<double> rings_;  ///< for each level the sums of n = 2^(level-1) samples, the last n of them
+  double reference_ = 0.0;
+  std::uint64_t run_ = 0;    ///< samples since the last gap
+  std::uint64_t count_ = 0;  ///< samples taken
+};
+
+/// The wavelet variance of the last `blocks` blocks of `block_length` samples: a sliding window that moves by
+/// a block. Coefficients belong to the block in which they end, so none is lost where blocks meet.
+class WindowedWv {
+ public:
+  /// Precondition: block_length >= 1, blocks >= 1.
+  WindowedWv(int levels, std::uint64_t block_length, std::size_t blocks);
+
+  /// Allocates: never. True when this sample completed a block.
+  bool push(double x) noexcept;
+  void gap() noexcept { stream_.gap(); }
+
+  /// Over the complete blocks of the window.
+  [[nodiscard]] WaveletVariance wavelet_variance(double confidence = 0.95) const;
+
+ private:
+  StreamingWv stream_;
+  std::uint64_t block_length_;
+  std::uint64_t in_block_ = 0;
+  std::vector<WvSums> blocks_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace imuscope::noise
