@@ -1,0 +1,120 @@
+#include <gtest/gtest.h>
+#include <limits>
+
+#include "firmware_sim/io/serial_line.h"
+
+namespace imusim {
+namespace {
+
+struct Read {
+  Bytes bytes;
+  double at_s;
+};
+
+/// Twenty messages of 31 bytes, one each 10 ms, through a line without scheduling jitter.
+std::vector<Read> through(ReadModel model, int baud, double deliver_step_s = 1.0) {
+  LineOptions options;
+  options.reads = model;
+  options.baud = baud;
+  options.jitter_mean_s = 0.0;
+  SerialLine line(options, Random(1, "line"));
+  std::vector<Read> reads;
+  const auto on_read = [&](std::span<const std::uint8_t> bytes, std::int64_t arrival_ns) {
+    reads.push_back({Bytes(bytes.begin(), bytes.end()), static_cast<double>(arrival_ns) * 1e-9});
+  };
+  std::uint8_t next = 0;
+  double delivered_s = 0.0;
+  for (int message = 0; message < 20; ++message) {
+    const double ready_s = 0.0103 + 0.01 * message;
+    for (; delivered_s + deliver_step_s < ready_s; delivered_s += deliver_step_s)
+      line.deliver_until(delivered_s + deliver_step_s, on_read);
+    Emission emission{ready_s, Bytes(31)};
+    for (std::uint8_t& byte : emission.bytes) byte = next++;
+    line.send(emission);
+  }
+  line.deliver_until(std::numeric_limits<double>::infinity(), on_read);
+  return reads;
+}
+
+/// Every byte comes once, in order, and not before its stop bit.
+void expect_causal_and_complete(const std::vector<Read>& reads, int baud) {
+  std::size_t count = 0;
+  for (const Read& read : reads) {
+    for (const std::uint8_t byte : read.bytes) {
+      EXPECT_EQ(byte, static_cast<std::uint8_t>(count));
+      const double done_s =
+          0.0103 + 0.01 * static_cast<double>(count / 31) + 10.0 / baud * static_cast<double>(count % 31 + 1);
+      EXPECT_GE(read.at_s, done_s - 2e-9);
+      ++count;
+    }
+  }
+  EXPECT_EQ(count, 620U);
+}
+
+TEST(SerialLine, AMessageArrivesWhenItsLastByteHasLeftTheWire) {
+  const std::vector<Read> reads = through(ReadModel::kMessages, 115200);
+  expect_causal_and_complete(reads, 115200);
+  ASSERT_EQ(reads.size(), 20U);
+  for (std::size_t i = 0; i < reads.size(); ++i)
+    EXPECT_NEAR(reads[i].at_s, 0.0103 + 0.01 * static_cast<double>(i) + 310.0 / 115200.0, 2e-9);
+}
+
+TEST(SerialLine, UsbReadsLieOnFramesAndWaitAtMostOne) {
+  const std::vector<Read> reads = through(ReadModel::kUsbFrames, 115200);
+  expect_causal_and_complete(reads, 115200);
+  for (const Read& read : reads) {
+    const double frames = read.at_s / 1e-3;
+    EXPECT_NEAR(frames, std::round(frames), 1e-5);
+    EXPECT_LE(read.bytes.size(), 12U);  // 11.52 bytes in 1 ms
+  }
+}
+
+TEST(SerialLine, AnFtdiAdapterSendsFullPacketsOrAfterItsTimer) {
+  const std::vector<Read> reads = through(ReadModel::kFtdi, 115200);
+  expect_causal_and_complete(reads, 115200);
+  std::size_t count = 0;
+  for (const Read& read : reads) {
+    EXPECT_LE(read.bytes.size(), 62U);
+    const double first_done_s =
+        0.0103 + 0.01 * static_cast<double>(count / 31) + 10.0 / 115200 * static_cast<double>(count % 31 + 1);
+    EXPECT_LE(read.at_s - first_done_s, 0.017 + 1e-8);  // timer and one USB frame
+    count += read.bytes.size();
+  }
+  EXPECT_LE(reads.size(), 14U);  // 0.2 s in 16 ms steps
+}
+
+TEST(SerialLine, DeliveringInSmallStepsChangesNothing) {
+  for (const ReadModel model : {ReadModel::kMessages, ReadModel::kUsbFrames, ReadModel::kFtdi}) {
+    const std::vector<Read> coarse = through(model, 57600);
+    const std::vector<Read> fine = through(model, 57600, 0.0007);
+    ASSERT_EQ(coarse.size(), fine.size());
+    for (std::size_t i = 0; i < coarse.size(); ++i) {
+      EXPECT_EQ(coarse[i].bytes, fine[i].bytes);
+      EXPECT_EQ(coarse[i].at_s, fine[i].at_s);
+    }
+  }
+}
+
+TEST(SerialLine, ASlowLineFallsBehindAndKeepsTheOrder) {
+  const std::vector<Read> reads = through(ReadModel::kMessages, 9600);
+  ASSERT_EQ(reads.size(), 20U);
+  // 310 bits at 9600 bit/s take 32 ms: the last message ends 20 of them after the first began.
+  EXPECT_NEAR(reads.back().at_s, 0.0103 + 20.0 * 310.0 / 9600.0, 2e-9);
+}
+
+TEST(SerialLine, TheHostsClockHasItsOwnOriginAndRate) {
+  LineOptions options;
+  options.reads = ReadModel::kMessages;
+  options.jitter_mean_s = 0.0;
+  options.host_begin_ns = 5'000'000'000;
+  options.host_skew_ppm = 100.0;
+  SerialLine line(options, Random(1, "line"));
+  line.send({100.0, Bytes{1}});
+  std::int64_t arrival = 0;
+  line.deliver_until(200.0,
+                     [&](std::span<const std::uint8_t>, std::int64_t arrival_ns) { arrival = arrival_ns; });
+  EXPECT_NEAR(static_cast<double>(arrival), 5e9 + (100.0 + 10.0 / 115200) * 1e9 * (1.0 + 100e-6), 2.0);
+}
+
+}  // namespace
+}  // namespace imusim
