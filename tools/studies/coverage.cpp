@@ -1,0 +1,190 @@
+/// Coverage of the noise engine's intervals and size of its J-test: simulates series of known models, fits
+/// them, and prints how often the interval holds the truth.
+///
+///   coverage [series per truth = 1000] [log2 of the length ... = 14 17]
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "noise/fit.h"
+#include "noise/inference.h"
+#include "noise/wv_covariance.h"
+
+namespace {
+
+using imuscope::noise::Component;
+using imuscope::noise::FitResult;
+using imuscope::noise::Model;
+using imuscope::noise::ProcessKind;
+
+constexpr double kRateHz = 100.0;
+
+struct Truth {
+  std::string name;
+  std::string spec;
+  Model model;  ///< components in the order of the fit
+};
+
+Component gauss_markov(double beta, double sigma2) {
+  return {ProcessKind::kGaussMarkov, sigma2, {beta / kRateHz, 0.0}};
+}
+
+std::vector<Truth> truths() {
+  const Component wn{ProcessKind::kWhiteNoise, 1.0, {}};
+  return {{"WN 1 + GM(1, .5)", "WN+GM", {{wn, gauss_markov(1.0, 0.5)}}},
+          {"WN 1 + GM(10.5, .53) + GM(.05, .1)",
+           "WN+2*GM",
+           {{wn, gauss_markov(10.5, 0.53), gauss_markov(0.05, 0.1)}}},
+          {"WN 1 + RW 1e-4", "WN+RW", {{wn, {ProcessKind::kRandomWalk, 1e-4, {}}}}},
+          {"QN 1 + WN .09 + RW 1e-5",
+           "QN+WN+RW",
+           {{{ProcessKind::kQuantization, 1.0, {}},
+             {ProcessKind::kWhiteNoise, 0.09, {}},
+             {ProcessKind::kRandomWalk, 1e-5, {}}}}}};
+}
+
+void add_component(const Component& c, std::mt19937_64& random, std::vector<double>& x) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  const double sd = std::sqrt(c.amplitude);
+  double state = 0.0;
+  switch (c.kind) {
+    case ProcessKind::kWhiteNoise:
+      for (double& v : x) v += sd * normal(random);
+      break;
+    case ProcessKind::kRandomWalk:
+      for (double& v : x) v += state += sd * normal(random);
+      break;
+    case ProcessKind::kGaussMarkov: {
+      const double phi = std::exp(-c.shape[0]);
+      const double drive = sd * std::sqrt(-std::expm1(-2.0 * c.shape[0]));
+      state = sd * normal(random);
+      for (double& v : x) {
+        v += state;
+        state = phi * state + drive * normal(random);
+      }
+      break;
+    }
+    case ProcessKind::kQuantization: {
+      const double scale = std::sqrt(12.0) * sd;
+      state = uniform(random);
+      for (double& v : x) {
+        const double next = uniform(random);
+        v += scale * (next - state);
+        state = next;
+      }
+      break;
+    }
+    default:
+      std::abort();
+  }
+}
+
+struct Tally {
+  double truth = 0.0;
+  double log_sd_at_truth = 0.0;
+  int given = 0;
+  int covered = 0;
+};
+
+/// Sd of the logarithms of the parameters at the truth, for series of n samples.
+std::vector<double> log_sd_at_truth(const Truth& truth, std::size_t n) {
+  namespace noise = imuscope::noise;
+  noise::WaveletVariance wv;
+  wv.segments = {{0, n}};
+  std::vector<int> levels;
+  for (int j = 1; (std::size_t{1} << static_cast<unsigned>(j)) <= n; ++j) {
+    levels.push_back(j);
+    noise::WvLevel level;
+    level.level = j;
+    level.tau_samples = std::ldexp(1.0, j);
+    level.n_coefficients = n - static_cast<std::size_t>(level.tau_samples) + 1;
+    wv.levels.push_back(level);
+  }
+  const auto places = noise::parameter_places(truth.model);
+  const auto jacobian = noise::wv_jacobian(truth.model, levels, places);
+  const Eigen::MatrixXd v = noise::wv_covariance(truth.model, wv, levels.size());
+  const Eigen::MatrixXd covariance = (jacobian.transpose() * v.llt().solve(jacobian)).inverse();
+  std::vector<double> sd;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) sd.push_back(std::sqrt(covariance(i, i)));
+  return sd;
+}
+
+double true_value(const Truth& truth, const imuscope::noise::ParameterPlace& place) {
+  const Component& c = truth.model.components[place.component];
+  return place.shape < 0 ? c.amplitude : c.shape[static_cast<std::size_t>(place.shape)] * kRateHz;
+}
+
+void study(const Truth& truth, int log2_n, int series) {
+  namespace noise = imuscope::noise;
+  const std::size_t n = std::size_t{1} << static_cast<unsigned>(log2_n);
+  const auto places = noise::parameter_places(truth.model);
+  const auto sd = log_sd_at_truth(truth, n);
+  std::vector<Tally> tallies(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) tallies[i] = {true_value(truth, places[i]), sd[i], 0, 0};
+  const auto spec = noise::parse_model(truth.spec).value();
+  std::mt19937_64 random(20240u + static_cast<unsigned>(log2_n));
+  std::vector<double> x(n);
+  int j_tests = 0;
+  int j_rejected = 0;
+  int identifiable = 0;
+  std::vector<std::string> names;
+  for (int s = 0; s < series; ++s) {
+    std::fill(x.begin(), x.end(), 0.0);
+    for (const Component& c : truth.model.components) add_component(c, random, x);
+    const auto wv = noise::haar_wavelet_variance(x).value();
+    const FitResult fit = noise::fit(wv, spec, kRateHz).value();
+    identifiable += fit.identifiable ? 1 : 0;
+    if (fit.j_test) {
+      ++j_tests;
+      j_rejected += fit.j_test->p_value < 0.05 ? 1 : 0;
+    }
+    names.clear();
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const auto& p = fit.parameters[i];
+      names.push_back(p.process + " " + p.name);
+      if (!p.ci_low) continue;
+      ++tallies[i].given;
+      tallies[i].covered += *p.ci_low <= tallies[i].truth && tallies[i].truth <= *p.ci_high ? 1 : 0;
+    }
+  }
+  fmt::print("\n{}, N = 2^{}, {} series: identifiable {:.1f} %, J-test rejects {:.1f} % at 5 %\n", truth.name,
+             log2_n, series, 100.0 * identifiable / series,
+             j_tests > 0 ? 100.0 * j_rejected / j_tests : std::nan(""));
+  fmt::print("{:<12} {:>10} {:>14} {:>10} {:>10}\n", "parameter", "truth", "log-sd there", "flagged %",
+             "covered %");
+  for (std::size_t i = 0; i < tallies.size(); ++i) {
+    const Tally& t = tallies[i];
+    fmt::print("{:<12} {:>10.4g} {:>14.3f} {:>10.1f} {:>10.1f}\n", names[i], t.truth, t.log_sd_at_truth,
+               100.0 * (series - t.given) / series, t.given > 0 ? 100.0 * t.covered / t.given : std::nan(""));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int series = argc > 1 ? std::atoi(argv[1]) : 1000;
+  std::vector<int> lengths;
+  for (int i = 2; i < argc; ++i) lengths.push_back(std::atoi(argv[i]));
+  if (lengths.empty()) lengths = {14, 17};
+  constexpr int kLongest = 24;
+  for (const int log2_n : lengths) {
+    if (series < 1 || log2_n < 8 || log2_n > kLongest) {
+      fmt::print(stderr, "coverage: give a number of series and lengths from 8 to {} as powers of two\n",
+                 kLongest);
+      return 2;
+    }
+  }
+  for (const int log2_n : lengths) {
+    for (const Truth& truth : truths()) study(truth, log2_n, series);
+  }
+  return 0;
+}
