@@ -12,10 +12,10 @@ namespace imuscope {
 
 namespace detail {
 template <std::size_t Size>
-using UnsignedOfSize = std::conditional_t<
-    Size == 1, std::uint8_t,
-    std::conditional_t<Size == 2, std::uint16_t,
-                       std::conditional_t<Size == 4, std::uint32_t, std::uint64_t>>>;
+using UnsignedOfSize =
+    std::conditional_t<Size == 1, std::uint8_t,
+                       std::conditional_t<Size == 2, std::uint16_t,
+                                          std::conditional_t<Size == 4, std::uint32_t, std::uint64_t>>>;
 }  // namespace detail
 
 /// Most significant byte first. T is an integer or a floating point type of 1, 2, 4 or 8 bytes; `bytes` holds

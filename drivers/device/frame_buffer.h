@@ -18,7 +18,8 @@ namespace imuscope {
 /// Start bit, eight data bits, stop bit.
 inline constexpr double kBitsPerByteOnTheWire = 10.0;
 
-/// Time of one byte on a serial line; zero where `baud` is zero (the stream does not come over a serial line).
+/// Time of one byte on a serial line; zero where `baud` is zero (the stream does not come over a serial
+/// line).
 inline Duration byte_time(double baud) {
   return baud > 0.0 ? from_seconds(kBitsPerByteOnTheWire / baud) : Duration::zero();
 }
@@ -61,8 +62,8 @@ class FrameBuffer {
     }
   }
 
-  /// When the pending byte `index` arrived at the latest: the arrival of its read minus the time on the wire of
-  /// the bytes from it to the end of that read.
+  /// When the pending byte `index` arrived at the latest: the arrival of its read minus the time on the wire
+  /// of the bytes from it to the end of that read.
   [[nodiscard]] HostTime arrival_of(std::size_t index) const noexcept {
     const std::uint64_t at = position_ + index;
     for (std::size_t i = 0; i < n_reads_; ++i) {

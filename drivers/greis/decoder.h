@@ -88,8 +88,8 @@ class Decoder final : public DeviceDecoder {
 
   bool has_time_ = false;
   std::uint32_t last_tod_ms_ = 0;
-  std::int64_t time_ms_ = 0;  ///< receiver time, unwrapped through midnight
-  int leap_s_ = kLeapSeconds;
+  std::int64_t time_ms_ = 0;   ///< receiver time, unwrapped through midnight
+  std::optional<int> leap_s_;  ///< GPS time minus UTC as the receiver says in [UO]
   /// Milliseconds since 1970 in the receiver's time base, minus time_ms_.
   std::optional<std::int64_t> since_1970_minus_time_ms_;
   bool date_from_receiver_date_ = false;

@@ -90,18 +90,14 @@ inline constexpr std::size_t kBodyGrowthMax = 32;
 /// Time base of [RD].
 enum class TimeBase : std::uint8_t { kGps = 0, kUtcUsno = 1, kGlonass = 2, kUtcSu = 3 };
 
-/// GPS time minus UTC since 2017-01-01 (IERS Bulletin C 52), until the receiver says otherwise in [UO].
-inline constexpr int kLeapSeconds = 18;
 /// GLONASS time is UTC(SU) plus three hours.
 inline constexpr std::int64_t kGlonassMinusUtcMs = 3LL * 3600 * 1000;
 
 inline constexpr std::int64_t kMsPerDay = 86'400'000;
 inline constexpr std::int64_t kWeeksPerRollover = 1024;
-/// [GT] gives the GPS week modulo 1024. Weeks are taken from this one on, that of 2017-01-01, when the leap
-/// seconds above began: right until August 2036.
+/// [GT] gives the GPS week modulo 1024. Weeks are taken from this one on, that of 2017-01-01: right until
+/// August 2036.
 inline constexpr std::int64_t kFirstWeek = 1930;
-/// Days from 1970-01-01 to the GPS epoch, 1980-01-06.
-inline constexpr std::int64_t kGpsEpochDays = 3657;
 
 /// The position sigma is a spherical error probable: radius of the sphere that holds half of the errors. For
 /// equal sd in three axes it is this many times the sd (median of the chi distribution with 3 degrees).

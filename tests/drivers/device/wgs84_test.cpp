@@ -1,5 +1,5 @@
 // Geodetic conversion against GeographicLib, an independent implementation.
-#include "drivers/greis/wgs84.h"
+#include "drivers/device/wgs84.h"
 
 #include <gtest/gtest.h>
 #include <GeographicLib/Geocentric.hpp>
@@ -8,10 +8,10 @@
 
 #include "base/units.h"
 
-namespace imuscope::greis {
+namespace imuscope {
 namespace {
 
-TEST(GreisWgs84, GeodeticOfEcefEqualsGeographicLibEverywhere) {
+TEST(Wgs84, GeodeticOfEcefEqualsGeographicLibEverywhere) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> lat(-90.0, 90.0), lon(-180.0, 180.0), height(-1e4, 1e5);
   const auto& earth = GeographicLib::Geocentric::WGS84();
@@ -31,10 +31,12 @@ TEST(GreisWgs84, GeodeticOfEcefEqualsGeographicLibEverywhere) {
       ASSERT_NEAR(std::remainder(found.lon_rad - expected_lon * kRadPerDeg, 2.0 * kPi), 0.0, 1e-14);
     }
     ASSERT_NEAR(found.height_m, expected_height, 1e-8);
+    const auto back = ecef_of(found);
+    ASSERT_NEAR(std::hypot(back[0] - x, back[1] - y, back[2] - z), 0.0, 1e-8);
   }
 }
 
-TEST(GreisWgs84, NorthEastDownOfAnEcefVectorEqualsGeographicLib) {
+TEST(Wgs84, NorthEastDownOfAnEcefVectorEqualsGeographicLib) {
   const double lat_deg = 48.8, lon_deg = 2.3;
   double x = 0.0, y = 0.0, z = 0.0;
   std::vector<double> enu_to_ecef(9);
@@ -51,4 +53,4 @@ TEST(GreisWgs84, NorthEastDownOfAnEcefVectorEqualsGeographicLib) {
 }
 
 }  // namespace
-}  // namespace imuscope::greis
+}  // namespace imuscope

@@ -1,10 +1,10 @@
 #pragma once
 
-/// Earth-centred coordinates to geodetic ones, for receivers that send only the former.
+/// Earth-centred (ECEF) and geodetic coordinates, for receivers that send other ones than imuscope wants.
 
 #include <array>
 
-namespace imuscope::greis {
+namespace imuscope {
 
 struct Geodetic {
   double lat_rad;
@@ -15,7 +15,13 @@ struct Geodetic {
 /// WGS-84. Right to 1e-9 m and 1e-15 rad or so from 10 km below the ellipsoid to 10 000 km above it.
 [[nodiscard]] Geodetic geodetic_of(const std::array<double, 3>& xyz_ecef_m) noexcept;
 
+/// The other way round.
+[[nodiscard]] std::array<double, 3> ecef_of(const Geodetic& at) noexcept;
+
+/// Rows: north, east, down in ECEF components; rotates ECEF to the local frame at a place.
+[[nodiscard]] std::array<double, 9> rotation_ecef_to_ned(const Geodetic& at) noexcept;
+
 /// A vector of ECEF components to north-east-down at a place.
 [[nodiscard]] std::array<double, 3> ned_of(const std::array<double, 3>& v_ecef, const Geodetic& at) noexcept;
 
-}  // namespace imuscope::greis
+}  // namespace imuscope

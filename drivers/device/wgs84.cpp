@@ -1,8 +1,8 @@
-#include "drivers/greis/wgs84.h"
+#include "drivers/device/wgs84.h"
 
 #include <cmath>
 
-namespace imuscope::greis {
+namespace imuscope {
 namespace {
 
 // Defining parameters of WGS-84.
@@ -35,12 +35,32 @@ Geodetic geodetic_of(const std::array<double, 3>& xyz_ecef_m) noexcept {
   return {lat, std::atan2(y, x), height};
 }
 
-std::array<double, 3> ned_of(const std::array<double, 3>& v_ecef, const Geodetic& at) noexcept {
+std::array<double, 3> ecef_of(const Geodetic& at) noexcept {
   const double sin_lat = std::sin(at.lat_rad), cos_lat = std::cos(at.lat_rad);
-  const double sin_lon = std::sin(at.lon_rad), cos_lon = std::cos(at.lon_rad);
-  const auto [x, y, z] = v_ecef;
-  return {-sin_lat * cos_lon * x - sin_lat * sin_lon * y + cos_lat * z, -sin_lon * x + cos_lon * y,
-          -cos_lat * cos_lon * x - cos_lat * sin_lon * y - sin_lat * z};
+  const double normal_m = kSemiMajor_m / std::sqrt(1.0 - kE2 * sin_lat * sin_lat);
+  const double p_m = (normal_m + at.height_m) * cos_lat;
+  return {p_m * std::cos(at.lon_rad), p_m * std::sin(at.lon_rad),
+          (normal_m * (1.0 - kE2) + at.height_m) * sin_lat};
 }
 
-}  // namespace imuscope::greis
+std::array<double, 9> rotation_ecef_to_ned(const Geodetic& at) noexcept {
+  const double sin_lat = std::sin(at.lat_rad), cos_lat = std::cos(at.lat_rad);
+  const double sin_lon = std::sin(at.lon_rad), cos_lon = std::cos(at.lon_rad);
+  return {-sin_lat * cos_lon,
+          -sin_lat * sin_lon,
+          cos_lat,  // north
+          -sin_lon,
+          cos_lon,
+          0.0,  // east
+          -cos_lat * cos_lon,
+          -cos_lat * sin_lon,
+          -sin_lat};  // down
+}
+
+std::array<double, 3> ned_of(const std::array<double, 3>& v_ecef, const Geodetic& at) noexcept {
+  const auto c = rotation_ecef_to_ned(at);
+  const auto [x, y, z] = v_ecef;
+  return {c[0] * x + c[1] * y + c[2] * z, c[3] * x + c[4] * y + c[5] * z, c[6] * x + c[7] * y + c[8] * z};
+}
+
+}  // namespace imuscope

@@ -1,0 +1,227 @@
+#include "drivers/nmea/decoder.h"
+
+#include <chrono>
+#include <cmath>
+
+#include "base/units.h"
+
+namespace imuscope::nmea {
+namespace {
+
+constexpr std::int64_t kNsPerDay = 86'400'000'000'000;
+/// Below this speed a receiver without a course is taken to stand, m/s.
+constexpr double kStandstill_mps = 0.3;
+
+GnssSolution solution_of(int quality) noexcept {
+  switch (quality) {
+    case 1:
+    case 3:
+      return GnssSolution::kSingle;  // 3: PPS, an authorised single-point solution
+    case 2:
+      return GnssSolution::kDifferential;
+    case 4:
+      return GnssSolution::kFixed;
+    case 5:
+      return GnssSolution::kFloat;
+    default:
+      return GnssSolution::kNone;  // 6 dead reckoning, 7 entered, 8 simulated: not of satellites
+  }
+}
+
+}  // namespace
+
+Decoder::Decoder(const DecoderConfig& config) noexcept
+    : config_(config), scanner_(byte_time(config.baud), config.checksum_required), clock_(config.clock) {}
+
+void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
+  counters_.bytes += bytes.size();
+  while (!bytes.empty()) {
+    bytes = bytes.subspan(scanner_.append(bytes, arrival));
+    drain(arrival, sink, false);
+  }
+}
+
+void Decoder::finish(HostTime arrival, SampleSink& sink) noexcept {
+  drain(arrival, sink, true);
+  publish(arrival, sink);
+  mirror_counts();
+}
+
+void Decoder::drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept {
+  Frame frame;
+  while (scanner_.next(frame, at_end)) {
+    ++counters_.frames;
+    on_sentence(frame, arrival, sink);
+  }
+  mirror_counts();
+}
+
+void Decoder::mirror_counts() noexcept {
+  counters_.bytes_skipped = scanner_.counters().bytes_skipped;
+  counters_.bad_checksums = scanner_.counters().bad_checksums;
+  counters_.bad_contents = bad_messages_;
+  counters_.clock_resets = clock_.restarts();
+}
+
+Decoder::Type Decoder::type_of(std::string_view name) noexcept {
+  if (name == "GGA") return Type::kGga;
+  if (name == "RMC") return Type::kRmc;
+  if (name == "VTG") return Type::kVtg;
+  if (name == "GST") return Type::kGst;
+  if (name == "ZDA") return Type::kZda;
+  return Type::kNone;
+}
+
+/// Puts a sentence into an epoch; returns the sentence's time.
+std::optional<TimeOfDay> Decoder::take(Type type, const Fields& fields, Epoch& epoch) const noexcept {
+  switch (type) {
+    case Type::kGga:
+      epoch.gga = parse_gga(fields);
+      // Refers to the sentence, which goes away before the epoch does.
+      epoch.gga->station = {};
+      return epoch.gga->time;
+    case Type::kRmc: {
+      const Rmc rmc = parse_rmc(fields);
+      if (rmc.valid) epoch.rmc = Course{rmc.sog_kn, rmc.cog_deg};
+      if (rmc.date) epoch.date = rmc.date;
+      return rmc.time;
+    }
+    case Type::kVtg: {
+      const Vtg vtg = parse_vtg(fields);
+      epoch.vtg = Course{vtg.sog_kn, vtg.cog_deg};
+      return std::nullopt;
+    }
+    case Type::kGst:
+      epoch.gst = parse_gst(fields);
+      return epoch.gst->time;
+    case Type::kZda: {
+      const Zda zda = parse_zda(fields);
+      if (zda.date) epoch.date = zda.date;
+      return zda.time;
+    }
+    case Type::kNone:
+      break;
+  }
+  return std::nullopt;
+}
+
+void Decoder::on_sentence(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept {
+  const Fields fields(frame.sentence);
+  const Type type = type_of(fields.type());
+  if (type == Type::kNone) return;
+  Epoch alone;
+  const auto time = take(type, fields, alone);
+  if (!time && type != Type::kVtg) return;  // a receiver that does not know the time has no solution either
+  if (time) {
+    const std::int64_t tod_ns = from_seconds(time->seconds()).count();
+    if (!epoch_.open || tod_ns != epoch_.tod_ns) {
+      if (epoch_.open) last_of_epoch_ = epoch_.last;
+      publish(arrival, sink);
+      epoch_ = Epoch{};
+      epoch_.open = true;
+      epoch_.tod_ns = tod_ns;
+      epoch_.first_byte = frame.first_byte;
+    }
+  }
+  if (!epoch_.open) return;
+  (void)take(type, fields, epoch_);
+  epoch_.last = type;
+  epoch_.bytes += frame.sentence.size() + 2;  // CR LF
+  if (type == last_of_epoch_) publish(arrival, sink);
+}
+
+void Decoder::publish(HostTime arrival, SampleSink& sink) noexcept {
+  if (!epoch_.open || epoch_.published) return;
+  epoch_.published = true;
+  if (!unwrap_time()) {
+    ++bad_messages_;
+    return;
+  }
+  update_date();
+  if (!epoch_.gga && !epoch_.rmc && !epoch_.vtg) return;
+  Sample sample{};
+  sample.kind = SampleKind::kGnss;
+  sample.device = config_.device;
+  sample.time = clock_.observe(time_ns_, epoch_.first_byte);
+  const auto wire_time = byte_time(config_.baud) * static_cast<std::int64_t>(epoch_.bytes);
+  sample.arrival = clock_.is_fixed() ? sample.time + wire_time : arrival;
+  if (since_1970_minus_time_ns_) {
+    sample.has_utc = true;
+    sample.utc = utc_time_from_ns(time_ns_ + *since_1970_minus_time_ns_);
+  }
+  sample.gnss = GnssData{};
+  fill_position(sample.gnss);
+  fill_velocity(sample.gnss);
+  sample.sequence = sequence_++;
+  ++counters_.samples;
+  sink.on_sample(sample);
+}
+
+/// False for an epoch that came twice.
+bool Decoder::unwrap_time() noexcept {
+  if (has_time_) {
+    std::int64_t step = epoch_.tod_ns - last_tod_ns_;
+    if (step < -kNsPerDay / 2) step += kNsPerDay;
+    if (step > kNsPerDay / 2) step -= kNsPerDay;
+    if (step == 0) return false;
+    const double periods =
+        config_.period > Duration::zero() ? to_seconds(Duration(step)) / to_seconds(config_.period) : 0.0;
+    constexpr double kGapPeriods = 1.5;
+    if (periods > kGapPeriods)
+      counters_.samples_lost += static_cast<std::uint64_t>(std::llround(periods)) - 1;
+    time_ns_ += step;
+  } else {
+    time_ns_ = epoch_.tod_ns;
+  }
+  has_time_ = true;
+  last_tod_ns_ = epoch_.tod_ns;
+  return true;
+}
+
+void Decoder::update_date() noexcept {
+  if (!epoch_.date) return;
+  const std::chrono::year_month_day date{std::chrono::year{epoch_.date->year},
+                                         std::chrono::month{static_cast<unsigned>(epoch_.date->month)},
+                                         std::chrono::day{static_cast<unsigned>(epoch_.date->day)}};
+  if (!date.ok()) return;
+  const std::int64_t days = std::chrono::sys_days{date}.time_since_epoch().count();
+  since_1970_minus_time_ns_ = days * kNsPerDay + epoch_.tod_ns - time_ns_;
+}
+
+void Decoder::fill_position(GnssData& gnss) const noexcept {
+  if (!epoch_.gga) return;
+  const Gga& gga = *epoch_.gga;
+  gnss.solution = solution_of(gga.quality.value_or(0));
+  const auto separation = gga.geoid_sep_m ? gga.geoid_sep_m : config_.geoid_separation_m;
+  if (gnss.solution == GnssSolution::kNone || !gga.lat_deg || !gga.lon_deg || !gga.alt_msl_m || !separation) {
+    return;
+  }
+  gnss.latitude_rad = *gga.lat_deg * kRadPerDeg;
+  gnss.longitude_rad = *gga.lon_deg * kRadPerDeg;
+  gnss.height_m = *gga.alt_msl_m + *separation;
+  gnss.flags |= kPositionValid;
+  if (!epoch_.gst) return;
+  const Gst& gst = *epoch_.gst;
+  if (gst.std_lat_m && gst.std_lon_m && gst.std_alt_m && *gst.std_lat_m > 0.0 && *gst.std_lon_m > 0.0 &&
+      *gst.std_alt_m > 0.0) {
+    gnss.sd_position_m = {*gst.std_lat_m, *gst.std_lon_m, *gst.std_alt_m};
+    gnss.flags |= kHasPositionSd;
+  }
+}
+
+void Decoder::fill_velocity(GnssData& gnss) const noexcept {
+  const auto& course = epoch_.rmc ? epoch_.rmc : epoch_.vtg;
+  if (!course || !course->sog_kn || (epoch_.gga && gnss.solution == GnssSolution::kNone)) return;
+  const double speed_mps = *course->sog_kn * kMpsPerKnot;
+  if (course->cog_deg) {
+    const double cog_rad = *course->cog_deg * kRadPerDeg;
+    gnss.v_n_mps = {speed_mps * std::cos(cog_rad), speed_mps * std::sin(cog_rad), 0.0};
+  } else if (speed_mps > kStandstill_mps) {
+    return;
+  }
+  gnss.flags |= kVelocityValid | kHasVelocitySd;
+  gnss.sd_velocity_mps = {config_.horizontal_velocity_sd_mps, config_.horizontal_velocity_sd_mps,
+                          config_.vertical_velocity_sd_mps};
+}
+
+}  // namespace imuscope::nmea

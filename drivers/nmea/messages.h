@@ -1,0 +1,190 @@
+#pragma once
+
+/// Fields of the sentences that are read. Sentences are told by the last three letters of their address, as
+/// the talker may change during a drive (GP, GN, ...). Every field may be empty.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace imuscope::nmea {
+
+/// A sentence cut at its commas. Refers to the sentence's text.
+class Fields {
+ public:
+  /// @param sentence  from '$' to the checksum
+  explicit Fields(std::string_view sentence) noexcept;
+
+  /// "GGA", "RMC", ... ; "PASHR" for that proprietary one; empty for other addresses.
+  [[nodiscard]] std::string_view type() const noexcept { return type_; }
+  /// Field behind the address, from 0; empty behind the last one.
+  [[nodiscard]] std::string_view at(std::size_t index) const noexcept;
+  [[nodiscard]] std::optional<double> number(std::size_t index) const noexcept;
+  [[nodiscard]] std::optional<int> integer(std::size_t index) const noexcept;
+
+ private:
+  static constexpr std::size_t kMax = 40;
+  std::string_view type_;
+  std::array<std::string_view, kMax> fields_;
+  std::size_t size_ = 0;
+};
+
+/// hhmmss.sss; seconds may be 60 in a leap second.
+struct TimeOfDay {
+  int hour;
+  int minute;
+  double second;
+  [[nodiscard]] double seconds() const noexcept { return 3600.0 * hour + 60.0 * minute + second; }
+};
+struct Date {
+  int year;
+  int month;
+  int day;
+};
+
+struct Gga {
+  std::optional<TimeOfDay> time;
+  std::optional<double> lat_deg;
+  std::optional<double> lon_deg;
+  std::optional<int> quality;
+  std::optional<int> nsat;
+  std::optional<double> hdop;
+  std::optional<double> alt_msl_m;
+  std::optional<double> geoid_sep_m;
+  std::optional<double> age_s;
+  std::string_view station;
+};
+struct Rmc {
+  std::optional<TimeOfDay> time;
+  bool valid;
+  std::optional<double> lat_deg;
+  std::optional<double> lon_deg;
+  std::optional<double> sog_kn;
+  std::optional<double> cog_deg;
+  std::optional<Date> date;
+  std::string_view mode;
+};
+struct Vtg {
+  std::optional<double> cog_deg;
+  std::optional<double> sog_kn;
+  std::optional<double> sog_kmh;
+};
+struct Gst {
+  std::optional<TimeOfDay> time;
+  std::optional<double> rms;
+  std::optional<double> semi_major_m;
+  std::optional<double> semi_minor_m;
+  std::optional<double> orient_deg;
+  std::optional<double> std_lat_m;
+  std::optional<double> std_lon_m;
+  std::optional<double> std_alt_m;
+};
+struct Zda {
+  std::optional<TimeOfDay> time;
+  std::optional<Date> date;
+  std::optional<int> tz_h;
+  std::optional<int> tz_min;
+};
+struct Hdt {
+  std::optional<double> heading_deg;
+};
+/// Signs of roll and pitch are by maker.
+struct Pashr {
+  std::optional<TimeOfDay> time;
+  std::optional<double> heading_deg;
+  std::optional<double> roll_deg;
+  std::optional<double> pitch_deg;
+  std::optional<double> heave_m;
+  std::optional<double> roll_std;
+  std::optional<double> pitch_std;
+  std::optional<double> heading_std;
+  std::optional<int> gps_quality;
+  std::optional<int> ins_quality;
+};
+
+[[nodiscard]] Gga parse_gga(const Fields& fields) noexcept;
+[[nodiscard]] Rmc parse_rmc(const Fields& fields) noexcept;
+[[nodiscard]] Vtg parse_vtg(const Fields& fields) noexcept;
+[[nodiscard]] Gst parse_gst(const Fields& fields) noexcept;
+[[nodiscard]] Zda parse_zda(const Fields& fields) noexcept;
+[[nodiscard]] Hdt parse_hdt(const Fields& fields) noexcept;
+[[nodiscard]] Pashr parse_pashr(const Fields& fields) noexcept;
+
+inline constexpr double kMpsPerKnot = 1852.0 / 3600.0;
+
+/// One named field of a sentence, for those who list messages. Absent fields are not visited.
+struct NamedValue {
+  enum class Kind : std::uint8_t { kReal, kInteger, kBool, kText };
+  std::string_view name;
+  Kind kind = Kind::kReal;
+  double number = 0.0;    ///< of all but kText
+  std::string_view text;  ///< of kText; valid during the visit
+};
+
+namespace detail {
+struct ShortText {
+  std::array<char, 24> chars{};
+  std::size_t size = 0;
+  [[nodiscard]] std::string_view view() const noexcept { return {chars.data(), size}; }
+};
+/// "12:34:56.100"
+[[nodiscard]] ShortText text_of(const TimeOfDay& time) noexcept;
+/// "2026-03-14"
+[[nodiscard]] ShortText text_of(const Date& date) noexcept;
+}  // namespace detail
+
+/// Calls visit(const NamedValue&) for each field of a sentence that is read; nothing for others.
+template <typename Visit>
+void for_each_field(const Fields& fields, Visit&& visit) {
+  using Kind = NamedValue::Kind;
+  const auto real = [&](std::string_view name, const std::optional<double>& value) {
+    if (value) visit(NamedValue{name, Kind::kReal, *value, {}});
+  };
+  const auto integer = [&](std::string_view name, const std::optional<int>& value) {
+    if (value) visit(NamedValue{name, Kind::kInteger, static_cast<double>(*value), {}});
+  };
+  const auto text = [&](std::string_view name, std::string_view value) {
+    if (!value.empty()) visit(NamedValue{name, Kind::kText, 0.0, value});
+  };
+  const auto stamp = [&](std::string_view name, const auto& value) {
+    if (value) text(name, detail::text_of(*value).view());
+  };
+  const std::string_view type = fields.type();
+  if (type == "GGA") {
+    const Gga gga = parse_gga(fields);
+    stamp("hms", gga.time), real("lat_deg", gga.lat_deg), real("lon_deg", gga.lon_deg);
+    integer("quality", gga.quality), integer("nsat", gga.nsat), real("hdop", gga.hdop);
+    real("alt_msl_m", gga.alt_msl_m), real("geoid_sep_m", gga.geoid_sep_m);
+    if (gga.alt_msl_m && gga.geoid_sep_m) real("h_ellipsoid_m", *gga.alt_msl_m + *gga.geoid_sep_m);
+    real("age_s", gga.age_s), text("station", gga.station);
+  } else if (type == "RMC") {
+    const Rmc rmc = parse_rmc(fields);
+    stamp("hms", rmc.time), visit(NamedValue{"valid", Kind::kBool, rmc.valid ? 1.0 : 0.0, {}});
+    real("lat_deg", rmc.lat_deg), real("lon_deg", rmc.lon_deg), real("sog_kn", rmc.sog_kn);
+    if (rmc.sog_kn) real("sog_ms", *rmc.sog_kn * kMpsPerKnot);
+    real("cog_deg", rmc.cog_deg), stamp("date", rmc.date), text("mode", rmc.mode);
+  } else if (type == "VTG") {
+    const Vtg vtg = parse_vtg(fields);
+    real("cog_deg", vtg.cog_deg), real("sog_kn", vtg.sog_kn), real("sog_kmh", vtg.sog_kmh);
+  } else if (type == "GST") {
+    const Gst gst = parse_gst(fields);
+    stamp("hms", gst.time), real("rms", gst.rms), real("semi_major_m", gst.semi_major_m);
+    real("semi_minor_m", gst.semi_minor_m), real("orient_deg", gst.orient_deg);
+    real("std_lat_m", gst.std_lat_m), real("std_lon_m", gst.std_lon_m), real("std_alt_m", gst.std_alt_m);
+  } else if (type == "ZDA") {
+    const Zda zda = parse_zda(fields);
+    stamp("hms", zda.time), stamp("date", zda.date), integer("tz_h", zda.tz_h);
+    integer("tz_min", zda.tz_min);
+  } else if (type == "HDT") {
+    real("heading_deg", parse_hdt(fields).heading_deg);
+  } else if (type == "PASHR") {
+    const Pashr p = parse_pashr(fields);
+    stamp("hms", p.time), real("heading_deg", p.heading_deg), real("roll_deg", p.roll_deg);
+    real("pitch_deg", p.pitch_deg), real("heave_m", p.heave_m), real("roll_std", p.roll_std);
+    real("pitch_std", p.pitch_std), real("heading_std", p.heading_std);
+    integer("gps_quality", p.gps_quality), integer("ins_quality", p.ins_quality);
+  }
+}
+
+}  // namespace imuscope::nmea

@@ -1,0 +1,65 @@
+#pragma once
+
+/// Finds NMEA 0183 sentences in a byte stream: '$' or '!', text, '*', two hex digits of checksum. After a
+/// false start the search goes on at the byte behind it. Core: bounded memory, no allocation, noexcept.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "base/time.h"
+#include "drivers/device/frame_buffer.h"
+
+namespace imuscope::nmea {
+
+/// The standard allows 82; receivers in RTK send longer ones.
+inline constexpr std::size_t kSentenceMax = 256;
+
+enum class Verdict : std::uint8_t { kNeedMore, kSentence, kFalseStart, kBadChecksum };
+
+struct Examined {
+  Verdict verdict;
+  std::size_t size = 0;  ///< kSentence: from '$' to the last digit of the checksum
+};
+
+/// Whether `pending`, which begins with '$' or '!', begins with a sentence.
+/// @param checksum_required  false: a sentence without '*', ended by CR or LF, is taken too
+[[nodiscard]] Examined examine_sentence(std::span<const std::uint8_t> pending,
+                                        bool checksum_required = true) noexcept;
+
+struct Frame {
+  std::string_view sentence;  ///< from '$' to the checksum; valid until the next append()
+  std::uint64_t offset = 0;   ///< of its first byte in the stream
+  HostTime first_byte{};      ///< when its first byte arrived at the latest
+};
+
+struct ScanCounters {
+  std::uint64_t bytes_skipped = 0;
+  std::uint64_t bad_checksums = 0;
+};
+
+class Scanner {
+ public:
+  explicit Scanner(Duration per_byte = Duration::zero(), bool checksum_required = true) noexcept
+      : buffer_(per_byte), checksum_required_(checksum_required) {}
+
+  /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
+  std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
+    return buffer_.append(bytes, arrival);
+  }
+
+  /// The next sentence, or false where more bytes are needed.
+  /// @param at_end  no more bytes will come
+  [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
+
+  [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }
+
+ private:
+  FrameBuffer<8 * kSentenceMax> buffer_;
+  bool checksum_required_;
+  std::size_t taken_ = 0;
+  ScanCounters counters_;
+};
+
+}  // namespace imuscope::nmea

@@ -1,0 +1,55 @@
+#pragma once
+
+/// Finds UBX messages in a byte stream, and the NMEA sentences that most receivers mix in. After a false
+/// start the search goes on at the byte behind it. Core: bounded memory, no allocation, noexcept.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "base/time.h"
+#include "drivers/device/frame_buffer.h"
+#include "drivers/ubx/wire.h"
+
+namespace imuscope::ubx {
+
+struct Frame {
+  enum class Kind : std::uint8_t { kMessage, kNmea };
+  Kind kind = Kind::kMessage;
+  std::uint8_t message_class = 0;
+  std::uint8_t id = 0;
+  std::span<const std::uint8_t> bytes;    ///< whole frame; valid until the next append()
+  std::span<const std::uint8_t> payload;  ///< of a message
+  std::uint64_t offset = 0;               ///< of its first byte in the stream
+  HostTime first_byte{};                  ///< when its first byte arrived at the latest
+};
+
+struct ScanCounters {
+  std::uint64_t bytes_skipped = 0;
+  std::uint64_t bad_checksums = 0;
+  std::uint64_t bad_lengths = 0;
+};
+
+class Scanner {
+ public:
+  /// @param per_byte  time of one byte on the wire, zero for a network stream
+  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : buffer_(per_byte) {}
+
+  /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
+  std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
+    return buffer_.append(bytes, arrival);
+  }
+
+  /// The next frame, or false where more bytes are needed.
+  /// @param at_end  no more bytes will come: look for frames behind a start that announced more
+  [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
+
+  [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }
+
+ private:
+  FrameBuffer<2 * (kHeaderSize + kPayloadMax + kChecksumSize)> buffer_;
+  std::size_t taken_ = 0;
+  ScanCounters counters_;
+};
+
+}  // namespace imuscope::ubx
