@@ -14,6 +14,9 @@ namespace {
 constexpr double kBin_s = 2.0;
 // A rate is fitted when the closed intervals span this much; before, the rate of the segment before is kept.
 constexpr std::size_t kBinsForRate = 5;
+// Intervals whose lowest point is this far above the envelope saw nothing but late bytes. USB frames take 1
+// ms.
+constexpr double kEnvelope_s = 0.002;
 // How far the rate may have wandered: old points are lifted by half of this times age squared, so that a
 // crystal that warms up is followed and old points bind less than new ones.
 constexpr double kRateWander_per_s = 1e-9;
@@ -123,18 +126,28 @@ void ClockMap::close_bin() noexcept {
   open_bin_empty_ = true;
 }
 
-// The line below all points that is closest to them in weighted mean: the edge of their lower convex hull
-// that spans their weighted mean time (the dual of a linear program with two unknowns).
+// The rate in two steps. First the line below all points that is closest to them in the mean: the edge of
+// their lower convex hull that spans their mean time. It is blind to stalls, but where the envelope itself
+// moves (USB frames beat against the samples) it hangs on few points. So then the points that are near it are
+// fitted by least squares. The line with that rate is laid below all points.
 void ClockMap::refit() noexcept {
   if (bins_count_ < kBinsForRate) return;
-  const Point& newest = bins_[(bins_begin_ + bins_count_ - 1) % kBins];
+  const double newest_s = bin(bins_count_ - 1).x_s;
   std::array<Point, kBins> hull;
+  const std::size_t n = lower_hull(hull);
+  const double b = std::clamp(rate_near(hull_edge(hull, n)), -kRateAllowance, kRateAllowance);
+  double a_s = hull[0].y_s - b * hull[0].x_s;
+  for (std::size_t i = 1; i < n; ++i) a_s = std::min(a_s, hull[i].y_s - b * hull[i].x_s);
+  move_line({a_s, b}, newest_s);
+}
+
+// Vertices from left to right; there are at least two. Old points are lifted, so that they bind less.
+std::size_t ClockMap::lower_hull(std::array<Point, kBins>& hull) const noexcept {
+  const double newest_s = bin(bins_count_ - 1).x_s;
   std::size_t n = 0;
-  double sum_x_s = 0.0;
   for (std::size_t i = 0; i < bins_count_; ++i) {
-    Point p = bins_[(bins_begin_ + i) % kBins];
-    const double age_s = newest.x_s - p.x_s;
-    sum_x_s += p.x_s;
+    Point p = bin(i);
+    const double age_s = newest_s - p.x_s;
     p.y_s += 0.5 * kRateWander_per_s * age_s * age_s;
     // Drop the last vertex while it lies on or above the chord from the one before it to p.
     while (n >= 2 && (hull[n - 1].y_s - hull[n - 2].y_s) * (p.x_s - hull[n - 2].x_s) >=
@@ -143,14 +156,42 @@ void ClockMap::refit() noexcept {
     }
     hull[n++] = p;
   }
-  if (n < 2) return;
-  const double centre_s = sum_x_s / static_cast<double>(bins_count_);
+  return n;
+}
+
+ClockMap::Line ClockMap::hull_edge(const std::array<Point, kBins>& hull, std::size_t n) const noexcept {
+  double sum_x_s = 0.0;
+  for (std::size_t i = 0; i < bins_count_; ++i) sum_x_s += bin(i).x_s;
+  const double mean_s = sum_x_s / static_cast<double>(bins_count_);
   std::size_t right = 1;
-  while (right + 1 < n && hull[right].x_s < centre_s) ++right;
+  while (right + 1 < n && hull[right].x_s < mean_s) ++right;
   const Point& p = hull[right - 1];
   const Point& q = hull[right];
-  const double b = std::clamp((q.y_s - p.y_s) / (q.x_s - p.x_s), -kRateAllowance, kRateAllowance);
-  move_line({q.y_s - b * q.x_s, b}, newest.x_s);
+  const double b = (q.y_s - p.y_s) / (q.x_s - p.x_s);
+  return {p.y_s - b * p.x_s, b};
+}
+
+// Least squares over the points that are no more than kEnvelope_s above the line.
+double ClockMap::rate_near(const Line& line) const noexcept {
+  double count = 0.0;
+  double sum_x = 0.0;
+  double sum_r = 0.0;
+  double sum_xx = 0.0;
+  double sum_xr = 0.0;
+  const double middle_s = bin(bins_count_ / 2).x_s;
+  for (std::size_t i = 0; i < bins_count_; ++i) {
+    const Point& p = bin(i);
+    const double r = p.y_s - line.at(p.x_s);
+    if (r > kEnvelope_s) continue;
+    const double x = p.x_s - middle_s;
+    count += 1.0;
+    sum_x += x;
+    sum_r += r;
+    sum_xx += x * x;
+    sum_xr += x * r;
+  }
+  const double spread = count * sum_xx - sum_x * sum_x;
+  return spread > 0.0 ? line.b + (count * sum_xr - sum_x * sum_r) / spread : line.b;
 }
 
 void ClockMap::move_line(const Line& line, double x_s) noexcept {

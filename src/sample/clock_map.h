@@ -84,6 +84,10 @@ class ClockMap {
   void take(const Point& point) noexcept;
   void close_bin() noexcept;
   void refit() noexcept;
+  [[nodiscard]] std::size_t lower_hull(std::array<Point, kBins>& hull) const noexcept;
+  [[nodiscard]] Line hull_edge(const std::array<Point, kBins>& hull, std::size_t n) const noexcept;
+  [[nodiscard]] double rate_near(const Line& line) const noexcept;
+  [[nodiscard]] const Point& bin(std::size_t i) const noexcept { return bins_[(bins_begin_ + i) % kBins]; }
   void move_line(const Line& line, double x_s) noexcept;
   [[nodiscard]] HostTime emit(std::int64_t device_time_ns, double x_s) noexcept;
 
