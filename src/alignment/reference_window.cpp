@@ -1,6 +1,5 @@
 #include "alignment/reference_window.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -10,43 +9,61 @@ namespace imuscope {
 
 namespace {
 
-constexpr int kOrder = 4;
-constexpr int kCoefficients = kOrder + 1;
-constexpr int kPointsMax = 11;
-constexpr int kValues = 9;
+constexpr std::size_t kOrder = 4;
+constexpr std::size_t kCoefficients = kOrder + 1;
+constexpr std::size_t kPointsMax = 11;
+/// Where the three vectors of an entry begin.
+constexpr std::size_t kOmega = 0;
+constexpr std::size_t kForce = 3;
+constexpr std::size_t kAngularAcceleration = 6;
 /// A spacing above this many periods means that a sample is missing.
 constexpr double kGapPeriods = 1.5;
 
-using Polynomial = Eigen::Matrix<double, kCoefficients, kValues>;
+/// weights[d][i]: what sample i adds to the d-th derivative of the fitted polynomial at x = 0.
+using DerivativeWeights = std::array<std::array<double, kPointsMax>, kCoefficients>;
 
-/// Least-squares polynomial in x = (t_i - t)/scale, so that its derivatives at the instant are its
-/// coefficients.
-struct Fit {
-  Polynomial coefficients;
-  double value_noise_gain;
-  double slope_noise_gain;  ///< per unit of x
-};
-
-Fit fit(const double* x, const std::array<const double*, kPointsMax>& values, int points) noexcept {
-  Eigen::Matrix<double, kCoefficients, kCoefficients> normal =
-      Eigen::Matrix<double, kCoefficients, kCoefficients>::Zero();
-  Polynomial right = Polynomial::Zero();
-  for (int i = 0; i < points; ++i) {
-    Eigen::Matrix<double, kCoefficients, 1> powers;
-    powers(0) = 1.0;
-    for (int k = 1; k < kCoefficients; ++k) powers(k) = powers(k - 1) * x[i];
-    normal.noalias() += powers * powers.transpose();
-    right.noalias() +=
-        powers * Eigen::Map<const Eigen::Matrix<double, 1, kValues>>(values[static_cast<std::size_t>(i)]);
+/// least-squares polynomial through samples at x[0..points), by polynomials that are orthogonal on just
+/// these abscissae (Forsythe's recurrence): well conditioned, and no equations to solve.
+DerivativeWeights derivative_weights(const std::array<double, kPointsMax>& x, std::size_t points,
+                                     std::size_t derivatives) noexcept {
+  DerivativeWeights weights{};
+  std::array<double, kPointsMax>
+      current{};  // the orthogonal polynomial of the running degree, at the samples
+  std::array<double, kPointsMax> previous{};
+  std::array<double, kCoefficients> current_at_0{1.0};  // its derivatives at 0
+  std::array<double, kCoefficients> previous_at_0{};
+  current.fill(1.0);
+  double previous_norm = 1.0;
+  for (std::size_t degree = 0;; ++degree) {
+    double norm = 0.0;
+    double centre = 0.0;
+    for (std::size_t i = 0; i < points; ++i) {
+      const double square = current[i] * current[i];
+      norm += square;
+      centre += x[i] * square;
+    }
+    const double per_norm = 1.0 / norm;
+    for (std::size_t d = 0; d < derivatives && d <= degree; ++d) {
+      const double share = current_at_0[d] * per_norm;
+      for (std::size_t i = 0; i < points; ++i) weights[d][i] += share * current[i];
+    }
+    if (degree == kOrder) return weights;
+    const double alpha = centre * per_norm;
+    const double beta = degree == 0 ? 0.0 : norm / previous_norm;
+    for (std::size_t i = 0; i < points; ++i) {
+      const double next = (x[i] - alpha) * current[i] - beta * previous[i];
+      previous[i] = current[i];
+      current[i] = next;
+    }
+    // Leibniz: (x p)^(d) = x p^(d) + d p^(d-1), at x = 0.
+    for (std::size_t d = kOrder + 1; d-- > 0;) {
+      const double lower = d == 0 ? 0.0 : static_cast<double>(d) * current_at_0[d - 1];
+      const double next = lower - alpha * current_at_0[d] - beta * previous_at_0[d];
+      previous_at_0[d] = current_at_0[d];
+      current_at_0[d] = next;
+    }
+    previous_norm = norm;
   }
-  const Eigen::LLT<Eigen::Matrix<double, kCoefficients, kCoefficients>> factor(normal);
-  Fit out;
-  out.coefficients = factor.solve(right);
-  // the covariance of the coefficients for unit white noise is the inverse normal matrix.
-  using Vector = Eigen::Matrix<double, kCoefficients, 1>;
-  out.value_noise_gain = factor.matrixL().solve(Vector::Unit(0)).norm();
-  out.slope_noise_gain = factor.matrixL().solve(Vector::Unit(1)).norm();
-  return out;
 }
 
 bool all_finite(const Vector3& v) noexcept {
@@ -56,8 +73,7 @@ bool all_finite(const Vector3& v) noexcept {
 }  // namespace
 
 ReferenceWindow::ReferenceWindow(const ReferenceWindowOptions& options) noexcept : options_(options) {
-  IMUSCOPE_EXPECTS(options.points >= kCoefficients && options.points <= kPointsMax &&
-                   options.points % 2 == 1);
+  IMUSCOPE_EXPECTS(options.points == 5 || options.points == 7 || options.points == 9 || options.points == 11);
   IMUSCOPE_EXPECTS(options.period_s > 0.0);
 }
 
@@ -75,9 +91,10 @@ bool ReferenceWindow::push(const Sample& sample) noexcept {
   if (entry.is_mean) entry.time -= from_seconds(0.5 * options_.period_s);
   if (size_ > 0 && entry.time <= at(size_ - 1).time) return false;
   entry.has_angular_acceleration = has_acceleration;
-  std::copy_n(imu.omega_radps.data(), 3, entry.values.data());
-  std::copy_n(imu.f_mps2.data(), 3, entry.values.data() + 3);
-  if (has_acceleration) std::copy_n(imu.angular_acceleration_radps2.data(), 3, entry.values.data() + 6);
+  std::copy_n(imu.omega_radps.data(), 3, entry.values.data() + kOmega);
+  std::copy_n(imu.f_mps2.data(), 3, entry.values.data() + kForce);
+  if (has_acceleration)
+    std::copy_n(imu.angular_acceleration_radps2.data(), 3, entry.values.data() + kAngularAcceleration);
   ring_[head_] = entry;
   head_ = (head_ + 1) % kCapacity;
   size_ = std::min(size_ + 1, kCapacity);
@@ -139,38 +156,53 @@ ReferenceResult ReferenceWindow::evaluate(HostTime time, ReferenceKinematics& ou
     acceleration_given = acceleration_given && entry.has_angular_acceleration;
     if (i > 0 && (x[i] - x[i - 1]) * scale_s > kGapPeriods * options_.period_s) return ReferenceResult::kGap;
   }
-  const Fit polynomial = fit(x.data(), values, options_.points);
-  const Polynomial& c = polynomial.coefficients;
-
-  // derivatives at the instant.
-  const double d1 = 1.0 / scale_s;
-  const double d2 = 2.0 * d1 * d1;
-  const double d3 = 6.0 * d1 * d1 * d1;
-  const double d4 = 24.0 * d1 * d1 * d1 * d1;
-  using Row = Eigen::Matrix<double, 1, kValues>;
-  Row value = c.row(0);
-  Row first = d1 * c.row(1);
-  Row second = d2 * c.row(2);
-  if (at(centre).is_mean) {
+  // A mean's correction needs two derivatives more than those that are asked for.
+  const bool is_mean = at(centre).is_mean;
+  constexpr std::size_t kAsked = 3;
+  DerivativeWeights weights = derivative_weights(x, points, is_mean ? kCoefficients : kAsked);
+  // from x to time.
+  double per_scale = 1.0;
+  for (std::size_t d = 1; d < kCoefficients; ++d) {
+    per_scale /= scale_s;
+    for (std::size_t i = 0; i < points; ++i) weights[d][i] *= per_scale;
+  }
+  if (is_mean) {
     // a mean over T shows y + y'' T^2/24.
     const double k = options_.period_s * options_.period_s / 24.0;
-    value -= k * second;
-    first -= k * d3 * c.row(3);
-    second -= k * d4 * c.row(4);
+    for (std::size_t d = 0; d < kAsked; ++d) {
+      for (std::size_t i = 0; i < points; ++i) weights[d][i] -= k * weights[d + 2][i];
+    }
   }
-  out.omega_radps = value.head<3>().transpose();
-  out.f_mps2 = value.segment<3>(3).transpose();
-  out.f_dot_mps3 = first.segment<3>(3).transpose();
+  const auto combined = [&](std::size_t derivative, std::size_t first_value) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (std::size_t i = 0; i < points; ++i) {
+      const double* const v = values[i] + first_value;
+      const double w = weights[derivative][i];
+      sum.x() += w * v[0];
+      sum.y() += w * v[1];
+      sum.z() += w * v[2];
+    }
+    return sum;
+  };
+  // the noise of a weighted sum of white samples.
+  const auto noise_gain = [&](std::size_t derivative) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < points; ++i) sum += weights[derivative][i] * weights[derivative][i];
+    return std::sqrt(sum);
+  };
+  out.omega_radps = combined(0, kOmega);
+  out.f_mps2 = combined(0, kForce);
+  out.f_dot_mps3 = combined(1, kForce);
   out.angular_acceleration_is_measured = acceleration_given;
   if (acceleration_given) {
-    out.omega_dot_radps2 = value.tail<3>().transpose();
-    out.omega_ddot_radps3 = first.tail<3>().transpose();
+    out.omega_dot_radps2 = combined(0, kAngularAcceleration);
+    out.omega_ddot_radps3 = combined(1, kAngularAcceleration);
   } else {
-    out.omega_dot_radps2 = first.head<3>().transpose();
-    out.omega_ddot_radps3 = second.head<3>().transpose();
+    out.omega_dot_radps2 = combined(1, kOmega);
+    out.omega_ddot_radps3 = combined(2, kOmega);
   }
-  out.value_noise_gain = polynomial.value_noise_gain;
-  out.derivative_noise_gain_per_s = d1 * polynomial.slope_noise_gain;
+  out.value_noise_gain = noise_gain(0);
+  out.derivative_noise_gain_per_s = noise_gain(1);
   return ReferenceResult::kOk;
 }
 

@@ -88,6 +88,76 @@ double decay_rate(const BiasProcess& bias) noexcept {
   return std::isinf(bias.correlation_time_s) ? 0.0 : 1.0 / bias.correlation_time_s;
 }
 
+/// F F, with the bias rows that F leaves out (plain decay), from the blocks that are not zero.
+NavigationDynamics squared(const NavigationDynamics& F, double beta_g, double beta_a) noexcept {
+  const Matrix3d r_r = block(F, kPositionError, kPositionError);
+  const Matrix3d v_r = block(F, kVelocityError, kPositionError);
+  const Matrix3d v_v = block(F, kVelocityError, kVelocityError);
+  const Matrix3d v_p = block(F, kVelocityError, kAttitudeError);
+  const Matrix3d v_a = block(F, kVelocityError, kAccelBiasError);
+  const Matrix3d p_r = block(F, kAttitudeError, kPositionError);
+  const Matrix3d p_v = block(F, kAttitudeError, kVelocityError);
+  const Matrix3d p_p = block(F, kAttitudeError, kAttitudeError);
+  const Matrix3d p_g = block(F, kAttitudeError, kGyroBiasError);
+  NavigationDynamics S;
+  // The block of dr by dv is the identity.
+  block(S, kPositionError, kPositionError) = r_r * r_r + v_r;
+  block(S, kPositionError, kVelocityError) = r_r + v_v;
+  block(S, kPositionError, kAttitudeError) = v_p;
+  block(S, kPositionError, kGyroBiasError).setZero();
+  block(S, kPositionError, kAccelBiasError) = v_a;
+  block(S, kVelocityError, kPositionError) = v_r * r_r + v_v * v_r + v_p * p_r;
+  block(S, kVelocityError, kVelocityError) = v_r + v_v * v_v + v_p * p_v;
+  block(S, kVelocityError, kAttitudeError) = v_v * v_p + v_p * p_p;
+  block(S, kVelocityError, kGyroBiasError) = v_p * p_g;
+  block(S, kVelocityError, kAccelBiasError) = v_v * v_a - beta_a * v_a;
+  block(S, kAttitudeError, kPositionError) = p_r * r_r + p_v * v_r + p_p * p_r;
+  block(S, kAttitudeError, kVelocityError) = p_r + p_v * v_v + p_p * p_v;
+  block(S, kAttitudeError, kAttitudeError) = p_v * v_p + p_p * p_p;
+  block(S, kAttitudeError, kGyroBiasError) = p_p * p_g - beta_g * p_g;
+  block(S, kAttitudeError, kAccelBiasError) = p_v * v_a;
+  return S;
+}
+
+// N-26: trapezoid of the intensities, the biases' own blocks exact.
+void set_process_covariance(const NavigationProcessNoise& noise, double beta_g, double beta_a, double dt_s,
+                            NavigationTransition& step) noexcept {
+  const double gyro_intensity = noise.gyro_noise_radps_per_sqrt_hz * noise.gyro_noise_radps_per_sqrt_hz;
+  const double accel_intensity = noise.accel_noise_mps2_per_sqrt_hz * noise.accel_noise_mps2_per_sqrt_hz;
+  const double gyro_variance = noise.gyro_bias.sd * noise.gyro_bias.sd;
+  const double accel_variance = noise.accel_bias.sd * noise.accel_bias.sd;
+  const double gyro_bias_intensity = 2.0 * beta_g * gyro_variance;
+  const double accel_bias_intensity = 2.0 * beta_a * accel_variance;
+  const double half = 0.5 * dt_s;
+  const auto column = [&](NavigationErrorBlock b) { return step.kinematic_rows.middleCols<3>(b); };
+
+  // Columns of Phi times the root of their intensity: what noise enters through them. None enters through dr.
+  Eigen::Matrix<double, kNavigationKinematicSize, 12> G;
+  G.middleCols<3>(0) = std::sqrt(half * accel_intensity) * column(kVelocityError);
+  G.middleCols<3>(3) = std::sqrt(half * gyro_intensity) * column(kAttitudeError);
+  G.middleCols<3>(6) = std::sqrt(half * gyro_bias_intensity) * column(kGyroBiasError);
+  G.middleCols<3>(9) = std::sqrt(half * accel_bias_intensity) * column(kAccelBiasError);
+
+  NavigationErrorCovariance& Q = step.process_covariance;
+  Q.setZero();
+  for (int i = 0; i < kNavigationKinematicSize; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      const double sum = G.row(i).dot(G.row(j));
+      Q(i, j) = sum;
+      Q(j, i) = sum;
+    }
+  }
+  Q.diagonal().segment<3>(kVelocityError).array() += half * accel_intensity;
+  Q.diagonal().segment<3>(kAttitudeError).array() += half * gyro_intensity;
+  Q.block<9, 3>(0, kGyroBiasError) =
+      (half * gyro_bias_intensity * step.gyro_bias_decay) * column(kGyroBiasError);
+  Q.block<9, 3>(0, kAccelBiasError) =
+      (half * accel_bias_intensity * step.accel_bias_decay) * column(kAccelBiasError);
+  Q.block<6, 9>(kGyroBiasError, 0) = Q.block<9, 6>(0, kGyroBiasError).transpose();
+  Q.diagonal().segment<3>(kGyroBiasError).setConstant(-gyro_variance * std::expm1(-2.0 * beta_g * dt_s));
+  Q.diagonal().segment<3>(kAccelBiasError).setConstant(-accel_variance * std::expm1(-2.0 * beta_a * dt_s));
+}
+
 }  // namespace
 
 NavigationDynamics error_dynamics(const NavigationState& state, const InertialRates& rates) noexcept {
@@ -127,36 +197,13 @@ NavigationTransition transition(const NavigationState& state, const InertialRate
   const NavigationDynamics F = error_dynamics(state, rates);
   const double beta_g = decay_rate(noise.gyro_bias);
   const double beta_a = decay_rate(noise.accel_bias);
-
-  // N-25: F^2 needs the bias rows too, which are plain decay.
-  NavigationDynamics F2 = F.leftCols<kNavigationKinematicSize>() * F;
-  F2.middleCols<3>(kGyroBiasError) -= beta_g * F.middleCols<3>(kGyroBiasError);
-  F2.middleCols<3>(kAccelBiasError) -= beta_a * F.middleCols<3>(kAccelBiasError);
   NavigationTransition out;
-  out.kinematic_rows = dt_s * F + (0.5 * dt_s * dt_s) * F2;
+  // N-25
+  out.kinematic_rows = dt_s * F + (0.5 * dt_s * dt_s) * squared(F, beta_g, beta_a);
   out.kinematic_rows.diagonal().array() += 1.0;
   out.gyro_bias_decay = std::exp(-beta_g * dt_s);
   out.accel_bias_decay = std::exp(-beta_a * dt_s);
-
-  // N-26: trapezoid of the intensities, the biases' own blocks exact.
-  const double gyro_intensity = noise.gyro_noise_radps_per_sqrt_hz * noise.gyro_noise_radps_per_sqrt_hz;
-  const double accel_intensity = noise.accel_noise_mps2_per_sqrt_hz * noise.accel_noise_mps2_per_sqrt_hz;
-  const double gyro_variance = noise.gyro_bias.sd * noise.gyro_bias.sd;
-  const double accel_variance = noise.accel_bias.sd * noise.accel_bias.sd;
-  NavigationErrorVector intensity = NavigationErrorVector::Zero();
-  intensity.segment<3>(kVelocityError).setConstant(accel_intensity);
-  intensity.segment<3>(kAttitudeError).setConstant(gyro_intensity);
-  intensity.segment<3>(kGyroBiasError).setConstant(2.0 * beta_g * gyro_variance);
-  intensity.segment<3>(kAccelBiasError).setConstant(2.0 * beta_a * accel_variance);
-
-  const NavigationErrorCovariance Phi = full_matrix(out);
-  NavigationErrorCovariance& Q = out.process_covariance;
-  Q.noalias() = (0.5 * dt_s) * (Phi * intensity.asDiagonal() * Phi.transpose());
-  Q.diagonal() += (0.5 * dt_s) * intensity;
-  const double gyro_q = -gyro_variance * std::expm1(-2.0 * beta_g * dt_s);
-  const double accel_q = -accel_variance * std::expm1(-2.0 * beta_a * dt_s);
-  Q.diagonal().segment<3>(kGyroBiasError).setConstant(gyro_q);
-  Q.diagonal().segment<3>(kAccelBiasError).setConstant(accel_q);
+  set_process_covariance(noise, beta_g, beta_a, dt_s, out);
   return out;
 }
 

@@ -14,8 +14,9 @@ double normalised_squared(const Eigen::Vector3d& y, const Eigen::Matrix3d& S) no
   return factor.matrixL().solve(y).squaredNorm();
 }
 
-/// While the state is wrong, its own error grows between two solutions; agreement allows for this speed.
-constexpr double kWrongStateSpeed_mps = 1.0;
+/// While the state is wrong, its own error grows between two solutions; agreement allows for this much a
+/// second, in the innovation's unit.
+constexpr double kWrongStateGrowth_per_s = 1.0;
 
 }  // namespace
 
@@ -44,8 +45,8 @@ GateDecision GnssGate::decide(HostTime time, const Eigen::Vector3d& innovation, 
 void GnssGate::extend_streak(HostTime time, const Eigen::Vector3d& innovation,
                              const Eigen::Matrix3d& R) noexcept {
   ++streak_;
-  const double growth_m = kWrongStateSpeed_mps * to_seconds(time - previous_time_);
-  const Eigen::Matrix3d scatter = 2.0 * R + growth_m * growth_m * Eigen::Matrix3d::Identity();
+  const double growth = kWrongStateGrowth_per_s * to_seconds(time - previous_time_);
+  const Eigen::Matrix3d scatter = 2.0 * R + growth * growth * Eigen::Matrix3d::Identity();
   const bool agrees = agreeing_ > 0 && normalised_squared(innovation - previous_innovation_, scatter) <=
                                            options_.chi_square_limit;
   if (agrees) {
