@@ -175,8 +175,14 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
   const bool optimal = options.weighting == Weighting::kOptimal;
   problem.whitener = optimal ? rough_whitener(wv, levels) : interval_whitener(wv, levels);
   const bool warm = options.warm_start != nullptr && options.warm_start->spec == spec;
-  SeparableSolution solution =
-      warm ? polish(problem, options.warm_start->model) : find_global_minimum(problem);
+  SeparableSolution solution;
+  if (!warm) {
+    solution = find_global_minimum(problem);
+  } else if (optimal) {
+    solution.model = options.warm_start->model;  // its own covariance gives the first weights
+  } else {
+    solution = polish(problem, options.warm_start->model);
+  }
   Eigen::MatrixXd v;
   const bool weights_settled = !optimal || reweight(problem, wv, solution, v, !warm);
   if (!optimal || v.size() == 0) v = covariance_with_ridge(solution.model, wv, levels);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace imuscope::noise {
 namespace {
@@ -113,76 +115,171 @@ double exponential_remainder(double z) {
   for (int k = 4; k < 18; ++k) {
     term *= -z / k;
     sum += term;
+    if (std::abs(term) < 1e-17 * std::abs(sum)) break;
   }
   return sum;
 }
 
 /// Cross-covariance of the coefficients of two levels as a function of the lag.
+///
+/// Its break points are the lags b n_k - a n_j. Between two neighbouring ones the signs of all nine arguments
+/// of G are known, so that the sum collapses to a cubic and two decaying exponentials a process; enter()
+/// prepares that.
 class CrossCovariance {
  public:
   CrossCovariance(const Parts& parts, double n_j, double n_k)
-      : parts_(parts), n_j_(n_j), n_k_(n_k), scale_(1.0 / (4.0 * n_j * n_k)) {}
-
-  [[nodiscard]] double operator()(double h) const {
-    if (h > 2.0 * n_k_) return beyond(h - 2.0 * n_k_);
-    if (h < -2.0 * n_j_) return beyond(-h - 2.0 * n_j_);
-    std::array<double, 9> lag{};
-    std::array<double, 9> weight{};
+      : parts_(parts),
+        n_j_(n_j),
+        n_k_(n_k),
+        scale_(1.0 / (4.0 * n_j * n_k)),
+        terms_(parts.exponentials.size()) {
+    for (std::size_t i = 0; i < terms_.size(); ++i) {
+      const Exponential& e = parts.exponentials[i];
+      const double pj = e.a > 0.0 ? -std::expm1(-e.a * n_j_) : 1.0 - std::pow(e.phi, n_j_);
+      const double pk = e.a > 0.0 ? -std::expm1(-e.a * n_k_) : 1.0 - std::pow(e.phi, n_k_);
+      terms_[i].tail = -e.variance * e.gain * pj * pj * pk * pk;
+      terms_[i].form = e.a < 0.0                           ? Form::kAlternating
+                       : e.a * std::max(n_j_, n_k_) >= 0.5 ? Form::kSplit
+                                                           : Form::kRemainder;
+    }
     std::size_t i = 0;
     for (std::size_t a = 0; a < 3; ++a) {
       for (std::size_t b = 0; b < 3; ++b, ++i) {
-        lag[i] = std::abs(h + static_cast<double>(a) * n_j_ - static_cast<double>(b) * n_k_);
-        weight[i] = kDifference[a] * kDifference[b];
+        shift_[i] = static_cast<double>(a) * n_j_ - static_cast<double>(b) * n_k_;
+        weight_[i] = kDifference[a] * kDifference[b];
       }
     }
-    double sum = 0.0;
-    for (i = 0; i < lag.size(); ++i) {
-      const double m = lag[i];
-      double g = m * (parts_.walk * (m * m - 1.0) / 12.0 - 0.5 * parts_.white);
-      if (m == 0.0) g += parts_.quantization;
-      sum += weight[i] * g;
+  }
+
+  /// Prepares for lags strictly between the neighbouring break points p < q; infinite ends are allowed.
+  void enter(double p, double q) {
+    tail_ = p >= 2.0 * n_k_ || q <= -2.0 * n_j_;
+    if (tail_) return;
+    origin_ = p;
+    end_ = q;
+    cubic_ = {};
+    for (Term& t : terms_) t.left = t.right = 0.0;
+    for (std::size_t i = 0; i < shift_.size(); ++i) {
+      const double at = p + shift_[i];  // argument of G at p
+      const double sign = at >= 0.0 ? 1.0 : -1.0;
+      add_polynomial(at, sign * weight_[i]);
+      add_exponentials(at, q + shift_[i], weight_[i]);
     }
-    for (const Exponential& e : parts_.exponentials) sum += e.variance * difference_of(e, lag, weight);
+  }
+
+  /// At a lag inside what was entered.
+  [[nodiscard]] double inside(double h) const {
+    if (tail_) return beyond(h > 0.0 ? h - 2.0 * n_k_ : -h - 2.0 * n_j_) * scale_;
+    const double d = h - origin_;
+    double sum = cubic_[0] + d * (cubic_[1] + d * (cubic_[2] + d * cubic_[3]));
+    for (std::size_t i = 0; i < terms_.size(); ++i) {
+      const Term& t = terms_[i];
+      const Exponential& e = parts_.exponentials[i];
+      if (t.form == Form::kSplit) {
+        sum -= e.variance * e.gain * (t.left * std::exp(-e.a * d) + t.right * std::exp(-e.a * (end_ - h)));
+      } else {
+        sum += e.variance * nonlinear_part(e, t.form, h);
+      }
+    }
+    return sum * scale_;
+  }
+
+  /// At any lag, break points included.
+  [[nodiscard]] double operator()(double h) const {
+    if (h > 2.0 * n_k_) return beyond(h - 2.0 * n_k_) * scale_;
+    if (h < -2.0 * n_j_) return beyond(-h - 2.0 * n_j_) * scale_;
+    double sum = 0.0;
+    for (std::size_t i = 0; i < shift_.size(); ++i) {
+      const double m = std::abs(h + shift_[i]);
+      double g = m * (parts_.walk * (m * m - 1.0) / 12.0 - 0.5 * parts_.white);
+      for (std::size_t k = 0; k < terms_.size(); ++k) g += m * linear_coefficient(k);
+      if (m == 0.0) g += parts_.quantization;
+      sum += weight_[i] * g;
+    }
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      sum += parts_.exponentials[k].variance * nonlinear_part(parts_.exponentials[k], terms_[k].form, h);
+    }
     return sum * scale_;
   }
 
  private:
+  enum class Form { kSplit, kRemainder, kAlternating };
+  struct Term {
+    Form form = Form::kSplit;
+    double tail = 0.0;   ///< beyond the overlap of the supports
+    double left = 0.0;   ///< of exp(-a (h - p))
+    double right = 0.0;  ///< of exp(-a (q - h))
+  };
+
+  [[nodiscard]] double linear_coefficient(std::size_t k) const {
+    const Exponential& e = parts_.exponentials[k];
+    return e.variance * (terms_[k].form == Form::kRemainder ? e.rest : -e.linear);
+  }
+
+  /// Adds weight * ((at + d)^3 - (at + d)) walk / 12 and the linear parts to the cubic in d.
+  void add_polynomial(double at, double weight) {
+    double linear = -0.5 * parts_.white - parts_.walk / 12.0;
+    for (std::size_t k = 0; k < terms_.size(); ++k) linear += linear_coefficient(k);
+    const double third = parts_.walk / 12.0;
+    cubic_[0] += weight * at * (linear + third * at * at);
+    cubic_[1] += weight * (linear + 3.0 * third * at * at);
+    cubic_[2] += weight * 3.0 * third * at;
+    cubic_[3] += weight * third;
+  }
+
+  void add_exponentials(double at_p, double at_q, double weight) {
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      if (terms_[k].form != Form::kSplit) continue;
+      const double a = parts_.exponentials[k].a;
+      if (at_p >= 0.0) {
+        terms_[k].left += weight * std::exp(-a * at_p);
+      } else {
+        terms_[k].right += weight * std::exp(a * at_q);
+      }
+    }
+  }
+
   /// Where the two supports do not overlap only the exponentials remain, and only as a product.
   [[nodiscard]] double beyond(double distance) const {
     double sum = 0.0;
-    for (const Exponential& e : parts_.exponentials) {
-      const double pj = e.a > 0.0 ? -std::expm1(-e.a * n_j_) : 1.0 - std::pow(e.phi, n_j_);
-      const double pk = e.a > 0.0 ? -std::expm1(-e.a * n_k_) : 1.0 - std::pow(e.phi, n_k_);
-      const double decay = e.a > 0.0 ? std::exp(-e.a * distance) : std::pow(e.phi, std::round(distance));
-      sum -= e.variance * e.gain * decay * pj * pj * pk * pk;
-    }
-    return sum * scale_;
-  }
-
-  [[nodiscard]] double difference_of(const Exponential& e, const std::array<double, 9>& lag,
-                                     const std::array<double, 9>& weight) const {
-    double sum = 0.0;
-    if (e.a < 0.0) {
-      for (std::size_t i = 0; i < lag.size(); ++i) {
-        sum -= weight[i] * (e.gain * std::pow(e.phi, std::round(lag[i])) + e.linear * lag[i]);
-      }
-    } else if (e.a * std::max(n_j_, n_k_) >= 0.5) {
-      for (std::size_t i = 0; i < lag.size(); ++i) {
-        sum -= weight[i] * (e.gain * std::exp(-e.a * lag[i]) + e.linear * lag[i]);
-      }
-    } else {
-      // Constant, linear-even and quadratic terms drop out of a fourth difference: leave them out beforehand.
-      for (std::size_t i = 0; i < lag.size(); ++i) {
-        sum += weight[i] * (e.rest * lag[i] - e.gain * exponential_remainder(e.a * lag[i]));
-      }
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      const Exponential& e = parts_.exponentials[k];
+      sum += terms_[k].tail * (e.a > 0.0 ? std::exp(-e.a * distance) : std::pow(e.phi, std::round(distance)));
     }
     return sum;
+  }
+
+  [[nodiscard]] double nonlinear_part(const Exponential& e, Form form, double h) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < shift_.size(); ++i) {
+      const double m = std::abs(h + shift_[i]);
+      switch (form) {
+        case Form::kAlternating:
+          sum -= weight_[i] * std::pow(e.phi, std::round(m));
+          break;
+        case Form::kSplit:
+          sum -= weight_[i] * std::exp(-e.a * m);
+          break;
+        // Constant and quadratic terms drop out of a fourth difference: they are left out beforehand.
+        case Form::kRemainder:
+          sum -= weight_[i] * exponential_remainder(e.a * m);
+          break;
+      }
+    }
+    return sum * e.gain;
   }
 
   const Parts& parts_;
   double n_j_;
   double n_k_;
   double scale_;
+  std::vector<Term> terms_;
+  std::array<double, 9> shift_{};
+  std::array<double, 9> weight_{};
+  std::array<double, 4> cubic_{};
+  double origin_ = 0.0;
+  double end_ = 0.0;
+  bool tail_ = false;
 };
 
 /// Number of coefficient pairs (t of level j, t + h of level k) as a function of the lag.
@@ -235,62 +332,87 @@ class PairCounts {
 
 /// Sum of f over the integers of [low, high]. Between its break points f is smooth, the more so the further
 /// from them: each integer counts close to a break point, then blocks of doubling length by the three-point
-/// rule that is exact for polynomials of degree five over equally spaced points.
+/// rule that is exact for polynomials of degree five over equally spaced points. F has at(h) for break
+/// points, and enter(p, q) with inside(h) for what lies between.
 template <typename F>
 class LagSum {
  public:
-  LagSum(const F& f, int exact_near) : f_(f), exact_(exact_near) {}
+  LagSum(F& f, int exact_near) : f_(f), exact_(exact_near) {}
 
-  double between(const std::vector<double>& breaks, double low, double high) const {
+  double between(const std::vector<double>& breaks, double low, double high) {
+    constexpr double kFar = std::numeric_limits<double>::infinity();
     double sum = 0.0;
-    double last = low - 1.0;
+    double last = -kFar;
     for (const double b : breaks) {
-      if (b < low || b > high) continue;
-      sum += interval(last, b, last >= low) + f_(b);
+      sum += interval(last, b, low, high);
+      if (b >= low && b <= high) sum += f_.at(b);
       last = b;
     }
-    return sum + interval(last, high + 1.0, false, last >= low);
+    return sum + interval(last, kFar, low, high);
   }
 
  private:
-  /// Integers strictly between p and q; from_left/from_right: that end is a break point.
-  double interval(double p, double q, bool from_left, bool right_open = false) const {
-    const double count = q - p - 1.0;
-    if (count <= 0.0) return 0.0;
-    if (right_open) return away(p, 1.0, count);
-    if (!from_left) return away(q, -1.0, count);
-    const double left = std::floor(0.5 * count);
-    return away(p, 1.0, left) + away(q, -1.0, count - left);
+  /// Integers strictly between the break points p and q that lie in [low, high].
+  double interval(double p, double q, double low, double high) {
+    const double from = std::max(p + 1.0, low);
+    const double to = std::min(q - 1.0, high);
+    if (from > to) return 0.0;
+    f_.enter(p, q);
+    if (std::isinf(q)) return away(p, 1.0, from - p, to - p);
+    if (std::isinf(p)) return away(q, -1.0, q - to, q - from);
+    const double middle = std::floor(0.5 * (p + q));
+    return away(p, 1.0, from - p, std::min(to, middle) - p) +
+           away(q, -1.0, q - to, q - std::max(from, middle + 1.0));
   }
 
-  double away(double origin, double sign, double count) const {
+  /// Distances first..last from the break point at origin.
+  double away(double origin, double sign, double first, double last) {
     double sum = 0.0;
-    double d = 1.0;
-    for (; d <= count && d <= exact_; d += 1.0) sum += f_(origin + sign * d);
-    while (d <= count) {
-      const double length = std::min(d, count - d + 1.0);
+    double d = first;
+    for (; d <= last && d <= exact_; d += 1.0) sum += f_.inside(origin + sign * d);
+    while (d <= last) {
+      const double length = std::min(d, last - d + 1.0);
       sum += block(origin, sign, d, length);
       d += length;
     }
     return sum;
   }
 
-  double block(double origin, double sign, double first, double length) const {
+  double block(double origin, double sign, double first, double length) {
     if (length < 4.0) {
       double sum = 0.0;
-      for (double d = first; d < first + length; d += 1.0) sum += f_(origin + sign * d);
+      for (double d = first; d < first + length; d += 1.0) sum += f_.inside(origin + sign * d);
       return sum;
     }
     const double centre = first + 0.5 * (length - 1.0);
     const double second_moment = length * (length * length - 1.0) / 12.0;
     const double offset = std::sqrt((3.0 * length * length - 7.0) / 20.0);
     const double side = 0.5 * second_moment / (offset * offset);
-    return side * (f_(origin + sign * (centre - offset)) + f_(origin + sign * (centre + offset))) +
-           (length - 2.0 * side) * f_(origin + sign * centre);
+    return side *
+               (f_.inside(origin + sign * (centre - offset)) + f_.inside(origin + sign * (centre + offset))) +
+           (length - 2.0 * side) * f_.inside(origin + sign * centre);
   }
 
-  const F& f_;
+  F& f_;
   double exact_;
+};
+
+/// N_jk(h) [2 C^2 + 4 m_j m_k C] as LagSum takes it.
+class PairTerm {
+ public:
+  PairTerm(CrossCovariance c, const PairCounts& pairs, double means)
+      : c_(std::move(c)), pairs_(pairs), means_(means) {}
+
+  void enter(double p, double q) { c_.enter(p, q); }
+  [[nodiscard]] double inside(double h) const { return weighted(h, c_.inside(h)); }
+  [[nodiscard]] double at(double h) const { return weighted(h, c_(h)); }
+
+ private:
+  [[nodiscard]] double weighted(double h, double c) const { return pairs_(h) * c * (2.0 * c + means_); }
+
+  CrossCovariance c_;
+  const PairCounts& pairs_;
+  double means_;
 };
 
 /// |transfer function of level's coefficients|^2 at angular frequency b.
@@ -344,15 +466,9 @@ double uniform_correction(double q2, const WaveletVariance& wv, const WvLevel& j
 double covariance_of_pair(const Parts& parts, const WaveletVariance& wv, const WvLevel& j, const WvLevel& k) {
   const double n_j = 0.5 * j.tau_samples;
   const double n_k = 0.5 * k.tau_samples;
-  const CrossCovariance c(parts, n_j, n_k);
   const PairCounts pairs(wv, j, k);
   const double means = 4.0 * (0.5 * parts.ramp * n_j) * (0.5 * parts.ramp * n_k);
-  const auto term = [&](double h) {
-    const double n = pairs(h);
-    if (n <= 0.0) return 0.0;
-    const double value = c(h);
-    return n * value * (2.0 * value + means);
-  };
+  PairTerm term(CrossCovariance(parts, n_j, n_k), pairs, means);
   std::vector<double> breaks;
   for (int a = 0; a < 3; ++a) {
     for (int b = 0; b < 3; ++b) breaks.push_back(b * n_k - a * n_j);
@@ -373,7 +489,7 @@ double covariance_of_pair(const Parts& parts, const WaveletVariance& wv, const W
   const double high = std::min(pairs.highest(), breaks.back() + std::ceil(reach));
   constexpr int kExactNear = 5;
   constexpr int kExactNearAlternating = 64;
-  const LagSum sum(term, alternating ? kExactNearAlternating : kExactNear);
+  LagSum sum(term, alternating ? kExactNearAlternating : kExactNear);
   const double count_j = static_cast<double>(j.n_coefficients);
   const double count_k = static_cast<double>(k.n_coefficients);
   double result = sum.between(breaks, low, high) / (count_j * count_k);

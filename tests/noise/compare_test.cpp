@@ -1,0 +1,130 @@
+#include "noise/compare.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "noise/json.h"
+#include "noise/quantities.h"
+#include "noise/select.h"
+
+namespace imuscope::noise {
+namespace {
+
+using testing::HasSubstr;
+
+std::vector<double> white_and_walk(std::size_t n, double sd, double walk_sd, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> x(n);
+  double walk = 0.0;
+  for (double& v : x) v = sd * normal(random) + (walk += walk_sd * normal(random));
+  return x;
+}
+
+FitResult fitted(const std::vector<double>& x, const char* model) {
+  FitOptions options;
+  options.signal_unit = "rad/s";
+  return fit(haar_wavelet_variance(x).value(), parse_model(model).value(), 100.0, options).value();
+}
+
+TEST(Compare, TwoStretchesOfOneSensorDifferAsRarelyAsTheTestPromises) {
+  int rejected = 0;
+  constexpr int kPairs = 200;
+  for (unsigned i = 0; i < kPairs; ++i) {
+    const auto a = fitted(white_and_walk(4096, 1.0, 0.06, 2 * i), "WN+RW");
+    const auto b = fitted(white_and_walk(4096, 1.0, 0.06, 2 * i + 1), "WN+RW");
+    const auto result = compare(a, b);
+    ASSERT_TRUE(result.test.has_value());
+    EXPECT_EQ(result.test->dof, 2);
+    rejected += result.test->p_value < 0.05 ? 1 : 0;
+  }
+  // 10 expected; beyond 22 has a chance of 2e-4.
+  EXPECT_LE(rejected, 22);
+}
+
+TEST(Compare, TenPercentMoreWhiteNoiseIsFoundAndBelongsToTheRightParameter) {
+  const auto a = fitted(white_and_walk(30000, 1.0, 0.01, 1), "WN+RW");
+  const auto b = fitted(white_and_walk(30000, 1.1, 0.01, 2), "WN+RW");
+  const auto result = compare(a, b);
+  ASSERT_TRUE(result.test.has_value());
+  EXPECT_LT(result.test->p_value, 1e-6);
+  ASSERT_EQ(result.parameters.size(), 2U);
+  EXPECT_NEAR(*result.parameters[0].ratio, 1.21, 0.05);
+  EXPECT_LT(*result.parameters[0].p_value, 1e-6);
+  EXPECT_GT(*result.parameters[1].p_value, 1e-3);
+}
+
+TEST(Compare, ModelsWithDifferentTermsAreListedSideBySideWithAWarning) {
+  const auto x = white_and_walk(4096, 1.0, 0.02, 3);
+  const auto result = compare(fitted(x, "WN+RW"), fitted(x, "WN+GM"));
+  ASSERT_EQ(result.parameters.size(), 4U);
+  EXPECT_FALSE(result.parameters[1].second.has_value());
+  EXPECT_FALSE(result.parameters[2].first.has_value());
+  ASSERT_EQ(result.warnings.size(), 1U);
+  EXPECT_THAT(result.warnings[0], HasSubstr("WN+GM"));
+}
+
+TEST(NoiseJson, AFitSurvivesTheTripThroughText) {
+  const auto x = white_and_walk(4096, 1.0, 0.02, 4);
+  for (const char* model : {"WN+RW", "WN+2*GM", "QN+WN+DR", "WN+SIN", "ARMA11"}) {
+    const auto before = fitted(x, model);
+    const auto text = fit_to_json(before).dump();
+    const auto after = fit_from_json(nlohmann::json::parse(text));
+    ASSERT_TRUE(after) << after.error().text();
+    EXPECT_EQ(fit_to_json(*after).dump(), text) << model;
+    for (int level = 1; level <= 12; ++level) {
+      EXPECT_NEAR(model_wv(after->model, level) / model_wv(before.model, level), 1.0, 1e-12) << model;
+    }
+  }
+}
+
+TEST(NoiseJson, WhatIsNoFitIsRefusedWithTheFieldThatIsMissing) {
+  const auto refused = fit_from_json(nlohmann::json::parse(R"({"n": 5})"));
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), HasSubstr("rate_hz"));
+}
+
+double quantity(const std::vector<Quantity>& list, const std::string& name) {
+  for (const auto& q : list) {
+    if (q.name == name) return q.value;
+  }
+  ADD_FAILURE() << "no quantity " << name;
+  return std::nan("");
+}
+
+TEST(Quantities, AreTheOnesThatADataSheetGivesForTheSameSensor) {
+  // A gyro with ARW 0.5 deg/sqrt(h) sampled at 100 Hz: N = 0.5/60 deg/s/sqrt(Hz), sigma2 = N^2 f.
+  FitResult fit;
+  fit.rate_hz = 100.0;
+  const double n_degps = 0.5 / 60.0;
+  fit.parameters.push_back({"WN", "sigma2", "", n_degps * n_degps * 100.0, {}, {}, {}, {}});
+  fit.parameters.push_back({"GM1", "beta", "", 0.01, {}, {}, {}, {}});
+  fit.parameters.push_back({"GM1", "sigma2", "", 4e-6, {}, {}, {}, {}});
+  fit.parameters.push_back({"RW", "gamma2", "", 1e-10, {}, {}, {}, {}});
+  const auto list = filter_quantities(fit, SignalUnit::kDegps);
+  EXPECT_NEAR(quantity(list, "angle random walk"), 0.5, 1e-12);
+  EXPECT_NEAR(quantity(list, "correlation time"), 100.0, 1e-9);
+  EXPECT_NEAR(quantity(list, "sd"), 2e-3, 1e-15);
+  EXPECT_NEAR(quantity(list, "rate random walk"), std::sqrt(1e-10 * 100.0) * 60.0, 1e-15);
+  for (const auto& q : list) {
+    if (q.process == "GM1" && q.name == "driving density") {
+      EXPECT_NEAR(q.value, 8e-8, 1e-20);
+    }
+  }
+}
+
+TEST(RankModels, PrefersTheTrueModelOverLargerAndSmallerOnes) {
+  const auto wv = haar_wavelet_variance(white_and_walk(60000, 1.0, 0.02, 6)).value();
+  const auto ranked = rank_models(wv, parse_model("QN+WN+GM+RW").value(), 100.0);
+  ASSERT_TRUE(ranked) << ranked.error().text();
+  EXPECT_EQ(ranked->size(), 15U);
+  EXPECT_EQ(ranked->front().fit.spec.name(), "WN+RW");
+  for (const auto& model : *ranked) EXPECT_FALSE(model.reason.empty()) << model.fit.spec.name();
+}
+
+}  // namespace
+}  // namespace imuscope::noise
