@@ -40,7 +40,7 @@ Html paragraph(std::string_view any, std::string_view css_class) {
   return element("p", text(any), css_class);
 }
 
-std::string json_for_script(std::string json) {
+std::string json_for_script(const std::string& json) {
   std::string safe;
   safe.reserve(json.size());
   for (const char c : json) {

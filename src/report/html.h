@@ -38,7 +38,7 @@ Html element(std::string_view tag, const Html& content, std::string_view css_cla
 Html paragraph(std::string_view any, std::string_view css_class = {});
 
 /// A JSON document as the content of a <script> element: no text in it can end the element.
-std::string json_for_script(std::string json);
+std::string json_for_script(const std::string& json);
 
 /// A table with a heading row. The first cell of a row is its heading.
 class Table {
