@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "navigation/gravity.h"
+#include "navigation/local_earth.h"
 #include "navigation/so3.h"
 
 namespace imuscope {
@@ -18,68 +18,48 @@ auto block(Matrix& m, NavigationErrorBlock row, NavigationErrorBlock column) {
   return m.template block<3, 3>(row, column);
 }
 
-struct Geometry {
-  double M;        ///< meridian radius + height
-  double N;        ///< transverse radius + height
-  double M_slope;  ///< dM/dL
-  double N_slope;  ///< dN/dL
-  double sin_L;
-  double cos_L;
-  double tan_L;
-};
-
-Geometry geometry_at(const GeodeticPosition& position) noexcept {
-  const Curvature k = curvature_at(position.latitude_rad);
-  const double s = std::sin(position.latitude_rad);
-  const double c = std::cos(position.latitude_rad);
-  return {k.meridian_m + position.height_m,
-          k.transverse_m + position.height_m,
-          k.meridian_slope_m,
-          k.transverse_slope_m,
-          s,
-          c,
-          s / c};
-}
-
 // N-21: d(dr')/d(dr)
-Matrix3d position_feedback(const Geometry& g, const Vector3d& v) noexcept {
+Matrix3d position_feedback(const LocalEarth& earth, const Vector3d& v) noexcept {
   Matrix3d F = Matrix3d::Zero();
-  F(0, 0) = -v.z() / g.M;
-  F(0, 2) = v.x() / g.M;
-  F(1, 0) = v.y() * g.tan_L / g.N;
-  F(1, 1) = -(v.z() + v.x() * g.tan_L) / g.N;
-  F(1, 2) = v.y() / g.N;
+  F(0, 0) = -v.z() / earth.M;
+  F(0, 2) = v.x() / earth.M;
+  F(1, 0) = v.y() * earth.tan_L / earth.N;
+  F(1, 1) = -(v.z() + v.x() * earth.tan_L) / earth.N;
+  F(1, 2) = v.y() / earth.N;
   return F;
 }
 
 // N-22: d(w_en)/d(dr). A step dr_N changes the latitude by 1/M, dr_D the height by -1.
-Matrix3d transport_rate_by_position(const Geometry& g, const Vector3d& v) noexcept {
-  const double per_N2 = 1.0 / (g.N * g.N);
-  const double per_M2 = 1.0 / (g.M * g.M);
+Matrix3d transport_rate_by_position(const LocalEarth& earth, const Vector3d& v) noexcept {
+  const double per_N2 = 1.0 / (earth.N * earth.N);
+  const double per_M2 = 1.0 / (earth.M * earth.M);
   Matrix3d D = Matrix3d::Zero();
-  D(0, 0) = -v.y() * g.N_slope * per_N2 / g.M;
+  D(0, 0) = -v.y() * earth.curvature.transverse_slope_m * per_N2 / earth.M;
   D(0, 2) = v.y() * per_N2;
-  D(1, 0) = v.x() * g.M_slope * per_M2 / g.M;
+  D(1, 0) = v.x() * earth.curvature.meridian_slope_m * per_M2 / earth.M;
   D(1, 2) = -v.x() * per_M2;
-  D(2, 0) = -v.y() * (1.0 / (g.cos_L * g.cos_L * g.N) - g.tan_L * g.N_slope * per_N2) / g.M;
-  D(2, 2) = -v.y() * g.tan_L * per_N2;
+  D(2, 0) = -v.y() *
+            (1.0 / (earth.cos_L * earth.cos_L * earth.N) -
+             earth.tan_L * earth.curvature.transverse_slope_m * per_N2) /
+            earth.M;
+  D(2, 2) = -v.y() * earth.tan_L * per_N2;
   return D;
 }
 
 // N-22: d(w_en)/d(dv)
-Matrix3d transport_rate_by_velocity(const Geometry& g) noexcept {
+Matrix3d transport_rate_by_velocity(const LocalEarth& earth) noexcept {
   Matrix3d D = Matrix3d::Zero();
-  D(0, 1) = 1.0 / g.N;
-  D(1, 0) = -1.0 / g.M;
-  D(2, 1) = -g.tan_L / g.N;
+  D(0, 1) = 1.0 / earth.N;
+  D(1, 0) = -1.0 / earth.M;
+  D(2, 1) = -earth.tan_L / earth.N;
   return D;
 }
 
 // N-22: d(w_ie)/d(dr)
-Matrix3d earth_rate_by_position(const Geometry& g) noexcept {
+Matrix3d earth_rate_by_position(const LocalEarth& earth) noexcept {
   Matrix3d D = Matrix3d::Zero();
-  D(0, 0) = -kEarthRate_radps * g.sin_L / g.M;
-  D(2, 0) = -kEarthRate_radps * g.cos_L / g.M;
+  D(0, 0) = -kEarthRate_radps * earth.sin_L / earth.M;
+  D(2, 0) = -kEarthRate_radps * earth.cos_L / earth.M;
   return D;
 }
 
@@ -161,23 +141,22 @@ void set_process_covariance(const NavigationProcessNoise& noise, double beta_g, 
 }  // namespace
 
 NavigationDynamics error_dynamics(const NavigationState& state, const InertialRates& rates) noexcept {
-  const Geometry g = geometry_at(state.position);
+  const LocalEarth earth(state.position);
   const Vector3d& v = state.v_n_mps;
-  const Vector3d w_ie = earth_rate_n(state.position.latitude_rad);
-  const Vector3d w_en = transport_rate_n(state.position, v);
+  const Vector3d& w_ie = earth.w_ie;
+  const Vector3d w_en = earth.transport_rate(v);
   const Vector3d f_n = state.C_b_n * rates.f_b_mps2;
-  const Gravity gravity = normal_gravity(state.position.latitude_rad, state.position.height_m);
 
-  const Matrix3d w_en_by_r = transport_rate_by_position(g, v);
-  const Matrix3d w_en_by_v = transport_rate_by_velocity(g);
-  const Matrix3d w_ie_by_r = earth_rate_by_position(g);
+  const Matrix3d w_en_by_r = transport_rate_by_position(earth, v);
+  const Matrix3d w_en_by_v = transport_rate_by_velocity(earth);
+  const Matrix3d w_ie_by_r = earth_rate_by_position(earth);
   Matrix3d gravity_by_r = Matrix3d::Zero();
-  gravity_by_r(2, 0) = gravity.latitude_slope_mps2 / g.M;
-  gravity_by_r(2, 2) = -gravity.height_slope_per_s2;
+  gravity_by_r(2, 0) = earth.gravity.latitude_slope_mps2 / earth.M;
+  gravity_by_r(2, 2) = -earth.gravity.height_slope_per_s2;
 
   NavigationDynamics F = NavigationDynamics::Zero();
   // N-21
-  block(F, kPositionError, kPositionError) = position_feedback(g, v);
+  block(F, kPositionError, kPositionError) = position_feedback(earth, v);
   block(F, kPositionError, kVelocityError).setIdentity();
   // N-23: -(dw) x v = [v x] dw
   block(F, kVelocityError, kPositionError) = skew(v) * (2.0 * w_ie_by_r + w_en_by_r) + gravity_by_r;
@@ -217,9 +196,9 @@ NavigationErrorCovariance full_matrix(const NavigationTransition& transition) no
 
 // N-20
 void inject(NavigationState& state, const NavigationErrorVector& error) noexcept {
-  const Geometry g = geometry_at(state.position);
-  state.position.latitude_rad += error(kPositionError) / g.M;
-  state.position.longitude_rad += error(kPositionError + 1) / (g.N * g.cos_L);
+  const LocalEarth earth(state.position);
+  state.position.latitude_rad += error(kPositionError) / earth.M;
+  state.position.longitude_rad += error(kPositionError + 1) / (earth.N * earth.cos_L);
   state.position.height_m -= error(kPositionError + 2);
   state.v_n_mps += error.segment<3>(kVelocityError);
   state.C_b_n = orthonormalised(exp_so3(error.segment<3>(kAttitudeError)) * state.C_b_n);
@@ -228,11 +207,11 @@ void inject(NavigationState& state, const NavigationErrorVector& error) noexcept
 }
 
 NavigationErrorVector error_between(const NavigationState& truth, const NavigationState& estimate) noexcept {
-  const Geometry g = geometry_at(estimate.position);
+  const LocalEarth earth(estimate.position);
   NavigationErrorVector error;
-  error(kPositionError) = (truth.position.latitude_rad - estimate.position.latitude_rad) * g.M;
+  error(kPositionError) = (truth.position.latitude_rad - estimate.position.latitude_rad) * earth.M;
   error(kPositionError + 1) =
-      wrapped_angle(truth.position.longitude_rad - estimate.position.longitude_rad) * g.N * g.cos_L;
+      wrapped_angle(truth.position.longitude_rad - estimate.position.longitude_rad) * earth.N * earth.cos_L;
   error(kPositionError + 2) = -(truth.position.height_m - estimate.position.height_m);
   error.segment<3>(kVelocityError) = truth.v_n_mps - estimate.v_n_mps;
   error.segment<3>(kAttitudeError) = log_so3(truth.C_b_n * estimate.C_b_n.transpose());

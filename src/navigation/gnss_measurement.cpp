@@ -1,7 +1,6 @@
 #include "navigation/gnss_measurement.h"
 
-#include <cmath>
-
+#include "navigation/local_earth.h"
 #include "navigation/so3.h"
 
 namespace imuscope {
@@ -13,14 +12,11 @@ using Eigen::Vector3d;
 
 /// d(theta)/d(dr): how local NED turns, relative to the Earth, per metre of travel. A vector with constant
 /// components in local NED moves by theta x vector relative to NED of the estimate (N-31).
-Matrix3d frame_turn_by_position(const GeodeticPosition& position) noexcept {
-  const Curvature k = curvature_at(position.latitude_rad);
-  const double M = k.meridian_m + position.height_m;
-  const double N = k.transverse_m + position.height_m;
+Matrix3d frame_turn_by_position(const LocalEarth& earth) noexcept {
   Matrix3d D = Matrix3d::Zero();
-  D(0, 1) = 1.0 / N;
-  D(1, 0) = -1.0 / M;
-  D(2, 1) = -std::tan(position.latitude_rad) / N;
+  D(0, 1) = 1.0 / earth.N;
+  D(1, 0) = -1.0 / earth.M;
+  D(2, 1) = -earth.tan_L / earth.N;
   return D;
 }
 
@@ -34,7 +30,7 @@ GnssInnovation gnss_position_innovation(const NavigationState& state, const Geod
   out.innovation = ned_offset(state.position, antenna) - arm_n;
   out.H.setZero();
   out.H.middleCols<3>(kPositionError) =
-      Matrix3d::Identity() - skew(arm_n) * frame_turn_by_position(state.position);
+      Matrix3d::Identity() - skew(arm_n) * frame_turn_by_position(LocalEarth(state.position));
   out.H.middleCols<3>(kAttitudeError) = -skew(arm_n);
   return out;
 }
@@ -45,18 +41,17 @@ GnssInnovation gnss_velocity_innovation(const NavigationState& state, const Vect
                                         const Vector3d& r_ba_b_m) noexcept {
   const Vector3d omega_ib_b = omega_ib_b_measured_radps - state.gyro_bias_b_radps;
   const Vector3d arm_n = state.C_b_n * r_ba_b_m;
-  const Vector3d w_ie = earth_rate_n(state.position.latitude_rad);
+  const LocalEarth earth(state.position);
   const Vector3d swing_n = state.C_b_n * omega_ib_b.cross(r_ba_b_m);
   GnssInnovation out;
-  out.innovation = v_antenna_n_mps - (state.v_n_mps + swing_n - w_ie.cross(arm_n));
+  out.innovation = v_antenna_n_mps - (state.v_n_mps + swing_n - earth.w_ie.cross(arm_n));
   out.H.setZero();
   // Earth rate's change with latitude acts through the arm: skew(arm) d(w_ie)/d(dr_N).
-  const double M = curvature_at(state.position.latitude_rad).meridian_m + state.position.height_m;
-  const Vector3d w_ie_by_north(-kEarthRate_radps * std::sin(state.position.latitude_rad) / M, 0.0,
-                               -kEarthRate_radps * std::cos(state.position.latitude_rad) / M);
+  const Vector3d w_ie_by_north(-kEarthRate_radps * earth.sin_L / earth.M, 0.0,
+                               -kEarthRate_radps * earth.cos_L / earth.M);
   out.H.col(kPositionError) = arm_n.cross(w_ie_by_north);
   out.H.middleCols<3>(kVelocityError).setIdentity();
-  out.H.middleCols<3>(kAttitudeError) = -skew(swing_n) + skew(w_ie) * skew(arm_n);
+  out.H.middleCols<3>(kAttitudeError) = -skew(swing_n) + skew(earth.w_ie) * skew(arm_n);
   out.H.middleCols<3>(kGyroBiasError) = state.C_b_n * skew(r_ba_b_m);
   return out;
 }

@@ -15,13 +15,12 @@ constexpr double kRotationRatio = 0.00344978650684;
 }  // namespace
 
 // N-8
-Gravity normal_gravity(double latitude_rad, double height_m) noexcept {
+Gravity normal_gravity_of(double sin_latitude, double cos_latitude, double height_m) noexcept {
   constexpr double a = kWgs84SemiMajorAxis_m;
   constexpr double f = kWgs84Flattening;
   constexpr double e2 = kWgs84EccentricitySquared;
-  const double s = std::sin(latitude_rad);
-  const double s2 = s * s;
-  const double ds2 = std::sin(2.0 * latitude_rad);  // d(s^2)/dL
+  const double s2 = sin_latitude * sin_latitude;
+  const double ds2 = 2.0 * sin_latitude * cos_latitude;  // d(s^2)/dL
   const double w2 = 1.0 - e2 * s2;
   const double w = std::sqrt(w2);
 
@@ -35,6 +34,10 @@ Gravity normal_gravity(double latitude_rad, double height_m) noexcept {
 
   return {g0 * height_factor, g0_slope * height_factor + g0 * height_factor_slope,
           g0 * (first + 2.0 * second * height_m)};
+}
+
+Gravity normal_gravity(double latitude_rad, double height_m) noexcept {
+  return normal_gravity_of(std::sin(latitude_rad), std::cos(latitude_rad), height_m);
 }
 
 }  // namespace imuscope

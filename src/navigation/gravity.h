@@ -13,5 +13,7 @@ struct Gravity {
 };
 
 [[nodiscard]] Gravity normal_gravity(double latitude_rad, double height_m) noexcept;
+/// The same where sine and cosine of the latitude are at hand.
+[[nodiscard]] Gravity normal_gravity_of(double sin_latitude, double cos_latitude, double height_m) noexcept;
 
 }  // namespace imuscope

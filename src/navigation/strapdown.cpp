@@ -1,8 +1,6 @@
 #include "navigation/strapdown.h"
 
-#include <cmath>
-
-#include "navigation/gravity.h"
+#include "navigation/local_earth.h"
 #include "navigation/so3.h"
 
 namespace imuscope {
@@ -52,34 +50,27 @@ InertialIncrement increment_from_means(const InertialRates& previous_mean, const
 void propagate(NavigationState& state, const InertialIncrement& inc) noexcept {
   const double dt = inc.dt_s;
   const Vector3d v0 = state.v_n_mps;
-  const Vector3d w_en_start = transport_rate_n(state.position, v0);
+  const Vector3d dv_n = state.C_b_n * inc.delta_v_b_mps;
 
   // N-12: the middle of the interval, with the velocity carried there by the force of this interval.
-  const Gravity gravity_start = normal_gravity(state.position.latitude_rad, state.position.height_m);
-  const Vector3d w_ie_start = earth_rate_n(state.position.latitude_rad);
-  const Vector3d coriolis_start = (2.0 * w_ie_start + w_en_start).cross(v0);
-  const Vector3d v_mid = v0 + 0.5 * (state.C_b_n * inc.delta_v_b_mps +
-                                     dt * (Vector3d(0.0, 0.0, gravity_start.g_mps2) - coriolis_start));
-  const Curvature k = curvature_at(state.position.latitude_rad);
-  GeodeticPosition middle = state.position;
-  middle.latitude_rad += 0.5 * dt * v_mid.x() / (k.meridian_m + middle.height_m);
-  middle.height_m -= 0.5 * dt * v_mid.z();
-  const Gravity gravity = normal_gravity(middle.latitude_rad, middle.height_m);
-  const Vector3d w_ie = earth_rate_n(middle.latitude_rad);
-  const Vector3d w_en = transport_rate_n(middle, v_mid);
+  const LocalEarth start(state.position);
+  const Vector3d coriolis = (2.0 * start.w_ie + start.transport_rate(v0)).cross(v0);
+  const Vector3d v_mid = v0 + 0.5 * (dv_n + dt * (start.gravity_n() - coriolis));
+  GeodeticPosition middle_position = state.position;
+  middle_position.latitude_rad += 0.5 * dt * v_mid.x() / start.M;
+  middle_position.height_m -= 0.5 * dt * v_mid.z();
+  const LocalEarth middle(middle_position);
+  const Vector3d w_en = middle.transport_rate(v_mid);
 
   // N-13: the navigation frame turns by zeta; half of it has happened in the mean of the interval.
-  const Vector3d zeta = (w_ie + w_en) * dt;
-  const Vector3d dv_n = state.C_b_n * inc.delta_v_b_mps;
+  const Vector3d zeta = (middle.w_ie + w_en) * dt;
   state.v_n_mps = v0 + dv_n - 0.5 * zeta.cross(dv_n) +
-                  dt * (Vector3d(0.0, 0.0, gravity.g_mps2) - (2.0 * w_ie + w_en).cross(v_mid));
+                  dt * (middle.gravity_n() - (2.0 * middle.w_ie + w_en).cross(v_mid));
 
   // N-14: mid-point position, with the radii of the interval's middle.
   const Vector3d v_mean = 0.5 * (v0 + state.v_n_mps);
-  const Curvature k_mid = curvature_at(middle.latitude_rad);
-  state.position.latitude_rad += dt * v_mean.x() / (k_mid.meridian_m + middle.height_m);
-  state.position.longitude_rad +=
-      dt * v_mean.y() / ((k_mid.transverse_m + middle.height_m) * std::cos(middle.latitude_rad));
+  state.position.latitude_rad += dt * v_mean.x() / middle.M;
+  state.position.longitude_rad += dt * v_mean.y() / (middle.N * middle.cos_L);
   state.position.height_m -= dt * v_mean.z();
 
   // N-15, N-16

@@ -10,9 +10,9 @@ constexpr double kSemiMinorAxis_m = kWgs84SemiMajorAxis_m * (1.0 - kWgs84Flatten
 }  // namespace
 
 // N-5
-Curvature curvature_at(double latitude_rad) noexcept {
-  const double s = std::sin(latitude_rad);
-  const double c = std::cos(latitude_rad);
+Curvature curvature_of(double sin_latitude, double cos_latitude) noexcept {
+  const double s = sin_latitude;
+  const double c = cos_latitude;
   const double w2 = 1.0 - kE2 * s * s;
   Curvature k;
   k.transverse_m = kWgs84SemiMajorAxis_m / std::sqrt(w2);
@@ -20,6 +20,10 @@ Curvature curvature_at(double latitude_rad) noexcept {
   k.transverse_slope_m = k.transverse_m * kE2 * s * c / w2;
   k.meridian_slope_m = 3.0 * k.meridian_m * kE2 * s * c / w2;
   return k;
+}
+
+Curvature curvature_at(double latitude_rad) noexcept {
+  return curvature_of(std::sin(latitude_rad), std::cos(latitude_rad));
 }
 
 // N-6

@@ -29,6 +29,8 @@ struct Curvature {
   double transverse_slope_m;  ///< dR_N/dL, per rad
 };
 [[nodiscard]] Curvature curvature_at(double latitude_rad) noexcept;
+/// The same where sine and cosine of the latitude are at hand.
+[[nodiscard]] Curvature curvature_of(double sin_latitude, double cos_latitude) noexcept;
 
 /// Earth-fixed Cartesian coordinates, m (N-6).
 [[nodiscard]] Eigen::Vector3d ecef_from_geodetic(const GeodeticPosition& position) noexcept;
