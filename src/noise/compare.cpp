@@ -10,13 +10,6 @@
 namespace imuscope::noise {
 namespace {
 
-/// A parameter on the scale of its interval. The covariance of omega and alpha is that of their squares.
-double on_interval_scale(const ParameterEstimate& p) {
-  if (p.name == "theta" || p.name == "phi") return std::atanh(p.value);
-  const double log = std::log(p.value);
-  return p.name == "omega" || p.name == "alpha" ? 2.0 * log : log;
-}
-
 double covariance_of(const FitResult& fit, std::size_t i, std::size_t k) {
   const std::size_t size = fit.parameters.size();
   return fit.covariance.size() == size * size ? fit.covariance[i * size + k] : std::nan("");
@@ -64,6 +57,13 @@ std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b,
 }
 
 }  // namespace
+
+/// The covariance of omega and alpha is that of their squares.
+double on_interval_scale(const ParameterEstimate& p) {
+  if (p.name == "theta" || p.name == "phi") return std::atanh(p.value);
+  const double log = std::log(p.value);
+  return p.name == "omega" || p.name == "alpha" ? 2.0 * log : log;
+}
 
 Comparison compare(const FitResult& first, const FitResult& second) {
   Comparison out;

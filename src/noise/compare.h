@@ -34,6 +34,9 @@ struct Comparison {
   std::vector<std::string> warnings;
 };
 
+/// A parameter on the scale of its interval and of FitResult::covariance.
+double on_interval_scale(const ParameterEstimate& parameter);
+
 /// The fits are of different stretches or sensors (independent). Parameters are matched by process and name.
 Comparison compare(const FitResult& first, const FitResult& second);
 

@@ -1,0 +1,40 @@
+#pragma once
+
+/// Several wavelet variances and one model: replicates of a sensor fitted together, and the distance of a
+/// recent window from a model that is in use.
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/result.h"
+#include "noise/fit.h"
+
+namespace imuscope::noise {
+
+/// The coefficients of all replicates as if recorded with gaps between them; levels that at least one has.
+/// Precondition: not empty, all with segments, one efficiency.
+WaveletVariance pool(std::span<const WaveletVariance> replicates);
+
+struct JointFit {
+  FitResult pooled;
+  std::vector<FitResult> separate;  ///< one a replicate
+  /// Test that all replicates have the pooled parameters (near-stationarity), over the parameters that every
+  /// fit determines: sum_k (theta_k - mean)' S_k^-1 (theta_k - mean). Absent where there are none.
+  std::optional<JTest> homogeneity;
+};
+
+/// Errors: those of fit(), and fewer than two replicates (kUsage).
+Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const ModelSpec& spec,
+                             double rate_hz, const FitOptions& options = {});
+
+/// How far a window's wavelet variance is from a model, under the model's own covariance, on the levels with
+/// M_j >= 3 * 2^j. A small p_value says that the behaviour has changed. The model's own uncertainty is not
+/// counted: it should come from far more data than the window. Absent where the window has no such level.
+std::optional<JTest> distance_from_model(const WaveletVariance& window, const Model& model);
+
+/// A model that over-bounds: every amplitude scaled up by the same factor until its curve reaches the upper
+/// end of the model-based interval at every fitted level. For filters that must not be optimistic.
+Model over_bounding_model(const FitResult& fit);
+
+}  // namespace imuscope::noise
