@@ -8,6 +8,7 @@
 #include "calibration/filter_core.h"
 #include "calibration/navigation_filter.h"
 #include "calibration/regime_detector.h"
+#include "calibration/smoother.h"
 #include "calibration/study_filter.h"
 
 namespace imuscope {
@@ -15,6 +16,8 @@ namespace {
 
 /// S samples that one tick can show: 0.5 s of six sensors at 400 Hz, so that a stall is caught up in one go.
 constexpr std::size_t kEpochsPerTick = 1200;
+/// The smoother gets five epochs a second.
+constexpr Duration kHistoryEvery = std::chrono::milliseconds{200};
 /// At standstill f_z of forward-right-down axes is about -9.8; above this it points elsewhere.
 constexpr double kGravityWrong_mps2 = -8.0;
 
@@ -40,11 +43,13 @@ void check(const EstimatorConfig& config) {
 
 class Estimator::Impl final : public EpochSink {
  public:
-  explicit Impl(const EstimatorConfig& config)
+  Impl(const EstimatorConfig& config, HistorySink* history)
       : config_(config),
+        history_(history),
         core_(config),
         window_({config.reference.differentiator_points, 1.0 / config.reference.rate_hz}),
         navigation_(config, core_, log_, counters_) {
+    if (history_ != nullptr) core_.keep_history();
     epochs_.reserve(kEpochsPerTick);
     studies_.reserve(config.studies.size());
     for (std::size_t i = 0; i < config.studies.size(); ++i) studies_.emplace_back(config, i);
@@ -81,6 +86,7 @@ class Estimator::Impl final : public EpochSink {
     StudyContext context{core_, window_, log_, *this, regime_.regime()};
     for (StudyFilter& study : studies_) study.process(context, cut);
     watch_covariance(cut);
+    hand_out_history();
     navigation_.update_output();
     for (StudyFilter& study : studies_) study.update_output(core_);
     counters_.events_lost = log_.lost();
@@ -133,6 +139,15 @@ class Estimator::Impl final : public EpochSink {
     navigation_.add_reference(sample);
   }
 
+  void hand_out_history() noexcept {
+    if (history_ == nullptr || !has_reference_ || last_reference_ < next_history_) return;
+    next_history_ = last_reference_ + kHistoryEvery;
+    const FilterCore::Accumulated& since = core_.accumulated();
+    history_->on_history({last_reference_, since.connected, core_, since.transition, since.noise, since.decay,
+                          since.decay_noise, since.injected});
+    core_.restart_accumulation();
+  }
+
   void watch_gravity(const Sample& sample) noexcept {
     if (gravity_told_ || regime_.regime() != Regime::kStatic) return;
     if (regime_.mean_f_mps2().z() < kGravityWrong_mps2) return;
@@ -151,6 +166,8 @@ class Estimator::Impl final : public EpochSink {
   }
 
   EstimatorConfig config_;
+  HistorySink* history_;
+  HostTime next_history_{HostTime::min()};
   FilterCore core_;
   ReferenceWindow window_;
   EventLog log_;
@@ -166,9 +183,9 @@ class Estimator::Impl final : public EpochSink {
   bool gravity_told_ = false;
 };
 
-Estimator::Estimator(const EstimatorConfig& config, HistorySink* /*history*/) {
+Estimator::Estimator(const EstimatorConfig& config, HistorySink* history) {
   check(config);
-  impl_ = std::make_unique<Impl>(config);
+  impl_ = std::make_unique<Impl>(config, history);
 }
 Estimator::~Estimator() = default;
 Estimator::Estimator(Estimator&&) noexcept = default;

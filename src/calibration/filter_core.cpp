@@ -1,5 +1,6 @@
 #include "calibration/filter_core.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/contracts.h"
@@ -40,6 +41,10 @@ constexpr std::array<double, 3> kRepairNavigationSd{100.0, 10.0, 0.1};
 
 FilterCore::FilterCore(const EstimatorConfig& config) : covariance_(filter_dimension(config)) {
   repair_variance_.resize(covariance_.dimension());
+  accumulated_.decay.resize(covariance_.dimension() - kNavigationStates);
+  accumulated_.decay_noise.resize(covariance_.dimension() - kNavigationStates);
+  accumulated_.injected.resize(covariance_.dimension());
+  restart_accumulation();
   for (std::size_t i = 0; i < 9; ++i)
     repair_variance_[i] = kRepairNavigationSd[i / 3] * kRepairNavigationSd[i / 3];
   const ReferenceConfig& reference = config.reference;
@@ -70,16 +75,67 @@ bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool
   const Eigen::Map<const NavigationErrorVector> navigation_correction(correction.data());
   inject(navigation_, navigation_correction);
   injected_ += navigation_correction;
+  if (keeps_history_) {
+    for (std::size_t i = 0; i < correction.size(); ++i) accumulated_.injected[i] += correction[i];
+  }
   for (std::size_t i = 0; i < studies_.size(); ++i) inject(studies_[i], layouts_[i], correction);
   return true;
 }
 
-void FilterCore::carry_injected(const NavigationTransition& transition) noexcept {
-  NavigationErrorVector carried;
-  carried.head<kNavigationKinematicSize>() = transition.kinematic_rows * injected_;
-  carried.segment<3>(kGyroBiasError) = transition.gyro_bias_decay * injected_.segment<3>(kGyroBiasError);
-  carried.segment<3>(kAccelBiasError) = transition.accel_bias_decay * injected_.segment<3>(kAccelBiasError);
-  injected_ = carried;
+void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
+  KernelTransition kernel;
+  Eigen::Map<Eigen::Matrix<double, kNavigationKinematicSize, kNavigationErrorSize, Eigen::RowMajor>>(
+      kernel.coupled.data()) = step.kinematic_rows;
+  Eigen::Map<NavigationErrorCovariance>(kernel.noise.data()) = step.process_covariance;
+  std::fill_n(kernel.decay.begin(), 3, step.gyro_bias_decay);
+  std::fill_n(kernel.decay.begin() + 3, 3, step.accel_bias_decay);
+  covariance_.predict_navigation(kernel);
+
+  const auto carried = [&step](const NavigationErrorVector& error) {
+    NavigationErrorVector out;
+    out.head<kNavigationKinematicSize>() = step.kinematic_rows * error;
+    out.segment<3>(kGyroBiasError) = step.gyro_bias_decay * error.segment<3>(kGyroBiasError);
+    out.segment<3>(kAccelBiasError) = step.accel_bias_decay * error.segment<3>(kAccelBiasError);
+    return out;
+  };
+  injected_ = carried(injected_);
+  if (!keeps_history_) return;
+  const NavigationErrorCovariance Phi = full_matrix(step);
+  accumulated_.transition = Phi * accumulated_.transition;
+  accumulated_.noise = Phi * accumulated_.noise * Phi.transpose() + step.process_covariance;
+  Eigen::Map<NavigationErrorVector> injected(accumulated_.injected.data());
+  injected = carried(injected);
+}
+
+void FilterCore::predict_state(std::size_t i, double decay, double variance) noexcept {
+  covariance_.predict_state(i, decay, variance);
+  if (!keeps_history_) return;
+  accumulated_.injected[i] *= decay;
+  if (i < kNavigationStates) {
+    const auto k = static_cast<Eigen::Index>(i);
+    accumulated_.transition.row(k) *= decay;
+    accumulated_.noise.row(k) *= decay;
+    accumulated_.noise.col(k) *= decay;
+    accumulated_.noise(k, k) += variance;
+  } else {
+    const std::size_t k = i - kNavigationStates;
+    accumulated_.decay[k] *= decay;
+    accumulated_.decay_noise[k] = decay * decay * accumulated_.decay_noise[k] + variance;
+  }
+}
+
+void FilterCore::reset_state(std::size_t i, double variance) noexcept {
+  covariance_.reset_state(i, variance);
+  accumulated_.connected = false;
+}
+
+void FilterCore::restart_accumulation() noexcept {
+  accumulated_.transition.setIdentity();
+  accumulated_.noise.setZero();
+  std::fill(accumulated_.decay.begin(), accumulated_.decay.end(), 1.0);
+  std::fill(accumulated_.decay_noise.begin(), accumulated_.decay_noise.end(), 0.0);
+  std::fill(accumulated_.injected.begin(), accumulated_.injected.end(), 0.0);
+  accumulated_.connected = true;
 }
 
 std::size_t FilterCore::repair(std::size_t& first) noexcept {
@@ -88,7 +144,7 @@ std::size_t FilterCore::repair(std::size_t& first) noexcept {
     const double variance = covariance_(i, i);
     if (variance >= 0.0 && std::isfinite(variance)) continue;
     if (count++ == 0) first = i;
-    covariance_.reset_state(i, repair_variance_[i]);
+    reset_state(i, repair_variance_[i]);
   }
   return count;
 }
@@ -104,7 +160,7 @@ void reset_to_prior(FilterCore& core, std::size_t study, const StudyConfig& conf
   state.gyro_scale = to_eigen(config.prior_gyro_scale);
   state.accel_scale = to_eigen(config.prior_accel_scale);
   for_each_prior(core.layout(study), config,
-                 [&core](std::size_t i, double sd) { core.covariance().reset_state(i, sd * sd); });
+                 [&core](std::size_t i, double sd) { core.reset_state(i, sd * sd); });
 }
 
 Eigen::Matrix3d to_eigen(const Matrix3& m) noexcept {

@@ -20,6 +20,7 @@ class FilterCore {
  public:
   explicit FilterCore(const EstimatorConfig& config);
 
+  /// For project() and for setting correlations; changes over time go through the functions below.
   [[nodiscard]] CovarianceKernel& covariance() noexcept { return covariance_; }
   [[nodiscard]] const CovarianceKernel& covariance() const noexcept { return covariance_; }
   [[nodiscard]] double sd(std::size_t state) const noexcept;
@@ -35,10 +36,29 @@ class FilterCore {
   /// @return false where nothing was changed
   bool update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use) noexcept;
 
+  /// Carries the covariance of the navigation over one interval (not its state).
+  void predict_navigation(const NavigationTransition& step) noexcept;
+  /// Covariance of one state: decay, then white noise of the given variance.
+  void predict_state(std::size_t i, double decay, double variance) noexcept;
+  /// Makes a state uncorrelated, of the given variance; the history breaks there.
+  void reset_state(std::size_t i, double variance) noexcept;
+
   /// Sum of the navigation corrections injected so far, carried to the present: e <- Phi e + d. E-4.
   [[nodiscard]] const NavigationErrorVector& injected() const noexcept { return injected_; }
-  void carry_injected(const NavigationTransition& transition) noexcept;
   void clear_injected() noexcept { injected_.setZero(); }
+
+  /// What the smoother needs to know of the time since the last take: kept only where asked for.
+  struct Accumulated {
+    NavigationErrorCovariance transition = NavigationErrorCovariance::Identity();
+    NavigationErrorCovariance noise = NavigationErrorCovariance::Zero();
+    std::vector<double> decay;  ///< of the states from 15 on
+    std::vector<double> decay_noise;
+    std::vector<double> injected;  ///< of every state, carried to the present
+    bool connected = true;         ///< no state was reset
+  };
+  void keep_history() noexcept { keeps_history_ = true; }
+  [[nodiscard]] const Accumulated& accumulated() const noexcept { return accumulated_; }
+  void restart_accumulation() noexcept;
 
   /// Makes every variance positive and finite again. @return states repaired; `first` is one of them.
   std::size_t repair(std::size_t& first) noexcept;
@@ -50,6 +70,8 @@ class FilterCore {
   std::vector<StudyState> studies_;
   std::vector<StudyLayout> layouts_;
   std::vector<double> repair_variance_;  ///< prior variance of every state
+  bool keeps_history_ = false;
+  Accumulated accumulated_;
 };
 
 /// Prior variances of one S-IMU's states, written to P with no correlation.

@@ -176,14 +176,7 @@ void NavigationFilter::predict(const InertialRates& rates, double dt_s, double u
   noise.gyro_noise_radps_per_sqrt_hz += unseen * kUnseenRate;
   noise.accel_noise_mps2_per_sqrt_hz += unseen * kUnseenForce;
   const NavigationTransition step = transition(core_.navigation(), rates, noise, dt_s);
-  KernelTransition kernel;
-  Eigen::Map<Eigen::Matrix<double, kNavigationKinematicSize, kNavigationErrorSize, Eigen::RowMajor>>(
-      kernel.coupled.data()) = step.kinematic_rows;
-  Eigen::Map<NavigationErrorCovariance>(kernel.noise.data()) = step.process_covariance;
-  std::fill_n(kernel.decay.begin(), 3, step.gyro_bias_decay);
-  std::fill_n(kernel.decay.begin() + 3, 3, step.accel_bias_decay);
-  core_.covariance().predict_navigation(kernel);
-  core_.carry_injected(step);
+  core_.predict_navigation(step);
   core_.navigation().gyro_bias_b_radps *= step.gyro_bias_decay;
   core_.navigation().accel_bias_b_mps2 *= step.accel_bias_decay;
   PastEpoch& next = past_[past_head_];
@@ -196,7 +189,7 @@ void NavigationFilter::predict_biases_only(double dt_s) noexcept {
   const auto decay_block = [&](std::size_t first, const GaussMarkovConfig& process, Vector3d& bias) {
     const double decay = std::exp(-dt_s / process.time_constant_s);
     const double variance = process.sd * process.sd * (1.0 - decay * decay);
-    for (std::size_t i = 0; i < 3; ++i) core_.covariance().predict_state(first + i, decay, variance);
+    for (std::size_t i = 0; i < 3; ++i) core_.predict_state(first + i, decay, variance);
     bias *= decay;
   };
   decay_block(kGyroBiasError, reference_.gyro_bias, core_.navigation().gyro_bias_b_radps);
@@ -238,7 +231,7 @@ void NavigationFilter::start(const NavigationState& state, const NavigationError
   now.accel_bias_b_mps2 = accel_bias;
   for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) {
     const double value = sd(static_cast<Eigen::Index>(i));
-    core_.covariance().reset_state(i, value * value);
+    core_.reset_state(i, value * value);
   }
   core_.clear_injected();
   past_size_ = 0;
@@ -253,7 +246,7 @@ void NavigationFilter::stop(HostTime time, double gap_s) noexcept {
   // A configured attitude belonged to the first start.
   navigation_.initial_rpy_rad.reset();
   past_size_ = 0;
-  for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) core_.covariance().reset_state(i, 0.0);
+  for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) core_.reset_state(i, 0.0);
   core_.clear_injected();
   log_.add(EstimatorEventKind::kNavigationStopped, reference_.device, time, gap_s);
 }
@@ -434,11 +427,11 @@ bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured,
 }
 
 void NavigationFilter::widen_for_reacquisition(const Vector3d& innovation) noexcept {
-  CovarianceKernel& P = core_.covariance();
+  const CovarianceKernel& P = core_.covariance();
   for (std::size_t i = 0; i < 3; ++i) {
     const double off = innovation(static_cast<Eigen::Index>(i));
-    P.reset_state(kPositionError + i, P(kPositionError + i, kPositionError + i) + off * off);
-    P.reset_state(kVelocityError + i, kReacquireVelocitySd_mps * kReacquireVelocitySd_mps);
+    core_.reset_state(kPositionError + i, P(kPositionError + i, kPositionError + i) + off * off);
+    core_.reset_state(kVelocityError + i, kReacquireVelocitySd_mps * kReacquireVelocitySd_mps);
   }
 }
 

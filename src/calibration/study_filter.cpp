@@ -57,6 +57,7 @@ StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
       rate_noise_radps_(config.reference.gyro_white_radps_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
       force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
       increment_centre_(from_seconds(0.5 / config_.rate_hz)),
+      has_biases_((config_.blocks & kBiasStudyBlocks) == kBiasStudyBlocks),
       queue_(kQueue) {
   precompute_noise();
 }
@@ -157,11 +158,11 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
     for (std::size_t i = 0; i < 3; ++i) {
       const StudyLayout& layout = core.layout(index_);
       if (layout.gyro_bias != StudyLayout::kAbsent)
-        core.covariance().predict_state(layout.gyro_bias + i, 1.0,
-                                        config_.turn_on_gyro_sd_radps[i] * config_.turn_on_gyro_sd_radps[i]);
+        core.predict_state(layout.gyro_bias + i, 1.0,
+                           config_.turn_on_gyro_sd_radps[i] * config_.turn_on_gyro_sd_radps[i]);
       if (layout.accel_bias != StudyLayout::kAbsent)
-        core.covariance().predict_state(layout.accel_bias + i, 1.0,
-                                        config_.turn_on_accel_sd_mps2[i] * config_.turn_on_accel_sd_mps2[i]);
+        core.predict_state(layout.accel_bias + i, 1.0,
+                           config_.turn_on_accel_sd_mps2[i] * config_.turn_on_accel_sd_mps2[i]);
     }
     context.log.add(EstimatorEventKind::kStudyReturned, config_.device, valid, dt_s);
   }
@@ -269,7 +270,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
       }
     }
   }
-  if (layout.t_d != StudyLayout::kAbsent) P.reset_state(layout.t_d, t_d_sd_s * t_d_sd_s);
+  if (layout.t_d != StudyLayout::kAbsent) core.reset_state(layout.t_d, t_d_sd_s * t_d_sd_s);
   output_.C_prior = to_array(state.C_b_s);
   for (std::size_t i = 0; i < 3; ++i) {
     prior_sd_psi_r_[i] = core.sd(layout.psi == StudyLayout::kAbsent ? layout.psi : layout.psi + i);
@@ -293,8 +294,7 @@ void StudyFilter::predict(FilterCore& core, double dt_s) noexcept {
     if (first == StudyLayout::kAbsent) return;
     for (std::size_t i = 0; i < 3; ++i) {
       const double decay = std::exp(-dt_s / process[i].time_constant_s);
-      core.covariance().predict_state(first + i, decay,
-                                      process[i].sd * process[i].sd * (1.0 - decay * decay));
+      core.predict_state(first + i, decay, process[i].sd * process[i].sd * (1.0 - decay * decay));
       value(static_cast<Eigen::Index>(i)) *= decay;
     }
   };
@@ -302,8 +302,7 @@ void StudyFilter::predict(FilterCore& core, double dt_s) noexcept {
   bias(layout.accel_bias, config_.noise.accel_bias, state.accel_bias_s_mps2);
   const double creep = config_.boresight_creep_rad_per_sqrt_s;
   if (creep > 0.0 && layout.psi != StudyLayout::kAbsent) {
-    for (std::size_t i = 0; i < 3; ++i)
-      core.covariance().predict_state(layout.psi + i, 1.0, creep * creep * dt_s);
+    for (std::size_t i = 0; i < 3; ++i) core.predict_state(layout.psi + i, 1.0, creep * creep * dt_s);
   }
 }
 
@@ -318,7 +317,8 @@ void StudyFilter::correct(StudyContext& context, Triad triad, const ReferenceKin
   const std::uint32_t flags = epoch.sample.flags;
   if ((flags & (gyro ? kGyroValid : kAccelValid)) == 0) return;
   FilterCore& core = context.core;
-  const ReferenceBiasColumns columns{kGyroBiasError, kAccelBiasError};
+  const ReferenceBiasColumns columns =
+      has_biases_ ? ReferenceBiasColumns{kGyroBiasError, kAccelBiasError} : ReferenceBiasColumns{};
   const ReferenceNoise own = reference_noise(b);
   StudyMeasurement m = gyro ? gyro_measurement(core.study(index_), core.layout(index_), columns, b, own)
                             : accel_measurement(core.study(index_), core.layout(index_), columns, b, own);
@@ -387,7 +387,7 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     const auto k = static_cast<Eigen::Index>(i);
     use[i] = !block.clipped[i];
     if (!use[i]) continue;
-    use[i] = y(k) * y(k) <= gate_ * S(k, k);
+    use[i] = !has_biases_ || y(k) * y(k) <= gate_ * S(k, k);
     if (!use[i]) ++(gyro ? counters.gated_gyro : counters.gated_accel)[i];
     nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
   }
@@ -439,8 +439,7 @@ void StudyFilter::set_noise(FilterCore& core, const StudyNoise& noise) noexcept 
     for (std::size_t i = 0; i < 3; ++i) {
       const double grown = after[i].sd * after[i].sd - before[i].sd * before[i].sd;
       if (grown > 0.0)
-        core.covariance().predict_state(first + i, 1.0,
-                                        std::min(grown, core.covariance()(first + i, first + i)));
+        core.predict_state(first + i, 1.0, std::min(grown, core.covariance()(first + i, first + i)));
     }
   };
   rescale(layout.gyro_bias, config_.noise.gyro_bias, noise.gyro_bias);

@@ -76,6 +76,9 @@ class StudyFilter {
   double rate_noise_radps_;  ///< of one R sample
   double force_noise_mps2_;
   Duration increment_centre_;  ///< half a sample period
+  /// Without bias states (the paper's filter) S biases would pass for R biases and for outliers: the R biases
+  /// are then left alone, as in the paper's eq. (5), and nothing is gated.
+  bool has_biases_;
 
   std::vector<Sample> queue_;
   std::size_t queue_head_ = 0;

@@ -1,0 +1,60 @@
+#pragma once
+
+/// Several estimates of one mounting made into one, and the question whether they are of one mounting at all.
+/// Soft world: allocates. EQUATIONS.md E-20 to E-23.
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "base/result.h"
+#include "calibration/estimator_config.h"
+
+namespace imuscope {
+
+/// Mounting of one S-IMU as one drive found it.
+struct MountingEstimate {
+  Matrix3 C_b_s{};
+  Vector3 r_bs_b_m{};
+  /// Of (psi, r), row-major, rad and m; psi in b, C = C^ Exp(-psi). Positive definite.
+  std::array<double, 36> covariance_psi_r{};
+};
+
+enum class CombineMethod {
+  kInverseVariance,         ///< the drives' errors are independent
+  kCovarianceIntersection,  ///< they may share errors (one turn-on, one capture cut in two); never
+                            ///< over-confident
+};
+
+struct CombinedMounting {
+  MountingEstimate estimate;
+  std::vector<double> weights;  ///< per drive; covariance intersection only, else 1 each
+  /// Sum of squared deviations from the inverse-variance mean, each by its own covariance. Chi-square with
+  /// 6 (n - 1) degrees of freedom where all drives saw one mounting and their errors are independent.
+  double homogeneity_chi2 = 0.0;
+  std::size_t homogeneity_dof = 0;
+  double homogeneity_p_value = 1.0;
+};
+
+/// Fails where there is no estimate, or a covariance is not positive definite (the message names which, from
+/// 1).
+[[nodiscard]] Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates,
+                                               CombineMethod method);
+
+/// The paper's final value: mean of the values over time, weighted by their inverse variances. Shown beside
+/// the filter's end value for comparison: its sd takes correlated values for independent ones and is too
+/// small.
+class WeightedMean {
+ public:
+  /// Precondition: sd > 0.
+  void add(double value, double sd) noexcept;
+  [[nodiscard]] double mean() const noexcept { return weight_ > 0.0 ? sum_ / weight_ : 0.0; }
+  [[nodiscard]] double claimed_sd() const noexcept;
+
+ private:
+  double sum_ = 0.0;
+  double weight_ = 0.0;
+};
+
+}  // namespace imuscope

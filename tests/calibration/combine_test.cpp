@@ -1,0 +1,135 @@
+#include "calibration/combine.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+#include <random>
+
+#include "calibration/filter_core.h"
+#include "navigation/so3.h"
+
+namespace imuscope {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+const Matrix3d kMounting = exp_so3(Vector3d(0.3, -1.2, 2.0));
+const Vector3d kLeverArm(0.35, -0.22, 0.12);
+
+MountingEstimate estimate_of(const Vector6& error, const Matrix6& P) {
+  MountingEstimate estimate;
+  // C_true = C^ Exp(-psi), so C^ = C_true Exp(psi).
+  estimate.C_b_s = to_array(Matrix3d(kMounting * exp_so3(error.head<3>())));
+  estimate.r_bs_b_m = to_array(Vector3d(kLeverArm - error.tail<3>()));
+  Eigen::Map<Matrix6>(estimate.covariance_psi_r.data()) = P;
+  return estimate;
+}
+
+Vector6 error_of(const MountingEstimate& estimate) {
+  Vector6 error;
+  error.head<3>() = -log_so3(to_eigen(estimate.C_b_s).transpose() * kMounting);
+  error.tail<3>() = kLeverArm - to_eigen(estimate.r_bs_b_m);
+  return error;
+}
+
+Matrix6 covariance_with_sd(double psi, double r) {
+  Matrix6 P = Matrix6::Zero();
+  P.diagonal() << psi * psi, psi * psi, 4.0 * psi * psi, r * r, r * r, 9.0 * r * r;
+  P(0, 4) = P(4, 0) = 0.5 * psi * r;
+  return P;
+}
+
+Vector6 draw(std::mt19937_64& random, const Matrix6& P) {
+  std::normal_distribution<double> normal;
+  Vector6 white;
+  for (Eigen::Index i = 0; i < 6; ++i) white(i) = normal(random);
+  return P.llt().matrixL() * white;
+}
+
+TEST(Combine, IndependentDrivesGiveAConsistentMeanAndAnUnsuspiciousHomogeneity) {
+  std::mt19937_64 random(31);
+  constexpr int kCampaigns = 400;
+  double nees = 0.0;
+  double mean_chi2 = 0.0;
+  int suspicious = 0;
+  for (int c = 0; c < kCampaigns; ++c) {
+    std::vector<MountingEstimate> drives;
+    for (const double scale : {1.0, 2.0, 0.7}) {
+      const Matrix6 P = covariance_with_sd(1e-4 * scale, 5e-4 * scale);
+      drives.push_back(estimate_of(draw(random, P), P));
+    }
+    const auto combined = combine(drives, CombineMethod::kInverseVariance);
+    ASSERT_TRUE(combined.has_value());
+    const Eigen::Map<const Matrix6> P(combined->estimate.covariance_psi_r.data());
+    const Vector6 error = error_of(combined->estimate);
+    nees += error.dot(P.ldlt().solve(error));
+    mean_chi2 += combined->homogeneity_chi2;
+    EXPECT_EQ(combined->homogeneity_dof, 12U);
+    suspicious += combined->homogeneity_p_value < 0.05 ? 1 : 0;
+  }
+  // Chi-square means and their sd; 4 sd.
+  EXPECT_NEAR(nees / kCampaigns, 6.0, 4.0 * std::sqrt(12.0 / kCampaigns));
+  EXPECT_NEAR(mean_chi2 / kCampaigns, 12.0, 4.0 * std::sqrt(24.0 / kCampaigns));
+  EXPECT_NEAR(suspicious, 0.05 * kCampaigns, 4.0 * std::sqrt(0.05 * 0.95 * kCampaigns));
+}
+
+TEST(Combine, IntersectionOfTwiceTheSameDriveLearnsNothing) {
+  const Matrix6 P = covariance_with_sd(1e-4, 5e-4);
+  std::mt19937_64 random(32);
+  const MountingEstimate drive = estimate_of(draw(random, P), P);
+  const std::vector<MountingEstimate> drives{drive, drive};
+  const auto combined = combine(drives, CombineMethod::kCovarianceIntersection);
+  ASSERT_TRUE(combined.has_value());
+  const Eigen::Map<const Matrix6> after(combined->estimate.covariance_psi_r.data());
+  EXPECT_LT((after - P).norm(), 1e-9 * P.norm());
+  EXPECT_NEAR(combined->weights[0] + combined->weights[1], 1.0, 1e-9);
+}
+
+TEST(Combine, IntersectionWeightsMinimiseTheVolume) {
+  const Matrix6 a = covariance_with_sd(1e-4, 2e-3);
+  const Matrix6 b = covariance_with_sd(4e-4, 5e-4);
+  const std::vector<MountingEstimate> drives{estimate_of(Vector6::Zero(), a),
+                                             estimate_of(Vector6::Zero(), b)};
+  const auto combined = combine(drives, CombineMethod::kCovarianceIntersection);
+  ASSERT_TRUE(combined.has_value());
+  const auto log_det = [&](double w) {
+    const Matrix6 scaled = w * a.inverse() + (1.0 - w) * b.inverse();
+    return -std::log(scaled.determinant());
+  };
+  const double w = combined->weights[0];
+  EXPECT_GT(w, 0.05);
+  EXPECT_LT(w, 0.95);
+  for (double other = 0.01; other < 1.0; other += 0.01) EXPECT_LE(log_det(w), log_det(other) + 1e-6);
+}
+
+TEST(Combine, AMovedMountShowsInTheTestOfHomogeneity) {
+  const Matrix6 P = covariance_with_sd(1e-4, 5e-4);
+  Vector6 moved = Vector6::Zero();
+  moved(0) = 8e-4;
+  const std::vector<MountingEstimate> drives{estimate_of(Vector6::Zero(), P), estimate_of(moved, P)};
+  const auto combined = combine(drives, CombineMethod::kInverseVariance);
+  ASSERT_TRUE(combined.has_value());
+  EXPECT_LT(combined->homogeneity_p_value, 1e-4);
+}
+
+TEST(Combine, RefusesNothingAndNamesABrokenCovariance) {
+  EXPECT_FALSE(combine({}, CombineMethod::kInverseVariance).has_value());
+  const std::vector<MountingEstimate> drives{estimate_of(Vector6::Zero(), covariance_with_sd(1e-4, 5e-4)),
+                                             estimate_of(Vector6::Zero(), Matrix6(-Matrix6::Identity()))};
+  const auto combined = combine(drives, CombineMethod::kInverseVariance);
+  ASSERT_FALSE(combined.has_value());
+  EXPECT_NE(combined.error().text().find("mounting 2"), std::string::npos);
+}
+
+TEST(WeightedMean, ClaimsIndependentValues) {
+  WeightedMean mean;
+  mean.add(1.0, 1.0);
+  mean.add(4.0, 2.0);
+  EXPECT_DOUBLE_EQ(mean.mean(), (1.0 + 4.0 / 4.0) / 1.25);
+  EXPECT_DOUBLE_EQ(mean.claimed_sd(), 1.0 / std::sqrt(1.25));
+}
+
+}  // namespace
+}  // namespace imuscope
