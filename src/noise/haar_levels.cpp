@@ -56,6 +56,37 @@ PairOfSums squares_of_two_levels(std::vector<double>& f, std::size_t n, std::siz
   return sums;
 }
 
+/// Levels whose supports are short beside a block that fits the second-level cache.
+constexpr int kLowLevels = 10;
+constexpr std::size_t kBlock = 16384;
+
+/// Levels 1..low_levels, block by block in cache (neighbouring blocks share one support). Leaves in `work`
+/// the sums of 2^low_levels samples. `add` takes level, sum and count.
+template <typename Add>
+void low_level_squares(std::span<const double> run, int low_levels, std::vector<double>& work,
+                       const Add& add) {
+  const std::size_t support = std::size_t{1} << static_cast<unsigned>(low_levels);
+  work.resize(run.size());
+  std::vector<double> local;
+  for (std::size_t start = 0; start < run.size(); start += kBlock) {
+    const std::size_t own = std::min(kBlock, run.size() - start);
+    std::size_t length = std::min(own + support - 1, run.size() - start);
+    local.resize(length);
+    const Eigen::Map<const Eigen::ArrayXd> in(run.data() + start, static_cast<Eigen::Index>(length));
+    stretch(local, 0, length) = in - run.front();
+    for (int level = 1; level <= low_levels; ++level) {
+      const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
+      if (length <= n) break;
+      length -= n;  // sums of 2n samples that lie inside
+      const std::size_t count = std::min(own, length);
+      add(level, squares(local, n, 0, count), count);
+      stretch(local, 0, length) += stretch(local, n, length);
+    }
+    const std::size_t kept = std::min(own, length);
+    stretch(work, start, kept) = stretch(local, 0, kept);
+  }
+}
+
 }  // namespace
 
 int highest_level(std::size_t length) noexcept {
@@ -65,13 +96,14 @@ int highest_level(std::size_t length) noexcept {
 void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vector<double>& work) {
   const int levels = std::min(static_cast<int>(sums.size()), highest_level(run.size()));
   if (levels < 1) return;
-  subtract_first(run, work);
   const auto add = [&](int level, double sum, std::size_t count) {
     auto& total = sums[static_cast<std::size_t>(level - 1)];
     total.sum_of_squares += sum * scale_of(level);
     total.count += count;
   };
-  for (int level = 1; level <= levels; level += 2) {
+  const int low_levels = std::min(levels, kLowLevels);
+  low_level_squares(run, low_levels, work, add);
+  for (int level = low_levels + 1; level <= levels; level += 2) {
     const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
     const std::size_t count = run.size() - 2 * n + 1;
     if (level == levels) {

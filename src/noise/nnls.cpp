@@ -2,7 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace imuscope::noise {
 namespace {
