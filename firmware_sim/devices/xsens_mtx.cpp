@@ -71,6 +71,10 @@ void XsensMtx::start_calibrated(double t_s) {
   settings_.output_mode = kModeCalibrated;
   settings_.output_settings = kSettingsCounter | kSettingsNoMag;
   replies_.clear();
+  // Early enough for the line to be free when the first data come.
+  constexpr double kAhead_s = 0.05;
+  replies_.push_back({t_s - kAhead_s, frame(kConfiguration, configuration())});
+  replies_.push_back({t_s - kAhead_s, frame(kGoToMeasurement + 1, {})});
   enter_measurement(t_s);
 }
 

@@ -44,8 +44,9 @@ class XsensMtx : public Device {
 
   [[nodiscard]] State state() const { return state_; }
 
-  /// Starts measuring calibrated rates and forces with the sample counter in float32, as if a host had set it
-  /// up already.
+  /// Starts measuring calibrated rates and forces with the sample counter in float32, as if a host had just
+  /// set it up. The answers to ReqConfiguration and GoToMeasurement lead the data: they say what the data
+  /// hold.
   void start_calibrated(double t_s);
 
  private:
