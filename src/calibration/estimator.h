@@ -209,8 +209,9 @@ class Estimator {
   /// Cuts do not decrease.
   void advance(HostTime cut) noexcept;
 
-  /// Replaces the stochastic model of one S-IMU, at a tick boundary. The bias covariance is rescaled, never
-  /// reset. Precondition: every sd positive and finite.
+  /// Replaces the stochastic model of one S-IMU, at a tick boundary. Where the bias process became larger,
+  /// the bias variance grows by the difference (at most twofold); it is never reset and correlations stay.
+  /// Precondition: every sd finite, every white sd positive.
   void set_noise(std::size_t study, const StudyNoise& noise) noexcept;
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept;

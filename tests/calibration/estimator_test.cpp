@@ -77,6 +77,56 @@ TEST(Estimator, FindsUnknownMountingsTimeOffsetsAndLeverArmsWithinItsOwnSd) {
   EXPECT_EQ(estimator.counters().covariance_repairs, 0U);
 }
 
+TEST(Estimator, AllTwentyFourAxisPermutationsAreFoundWithinSixtySecondsOfDriving) {
+  std::vector<Matrix3d> permutations;
+  for (int x = 0; x < 3; ++x) {
+    for (int y = 0; y < 3; ++y) {
+      if (x == y) continue;
+      for (int signs = 0; signs < 4; ++signs) {
+        Matrix3d C = Matrix3d::Zero();
+        C(0, x) = (signs & 1) != 0 ? -1.0 : 1.0;
+        C(1, y) = (signs & 2) != 0 ? -1.0 : 1.0;
+        C.row(2) = C.row(0).cross(C.row(1));
+        permutations.push_back(C);
+      }
+    }
+  }
+  ASSERT_EQ(permutations.size(), 24U);
+  constexpr double kStandstill_s = 10.0;
+  for (std::size_t first = 0; first < permutations.size(); first += kMaxStudies) {
+    std::vector<SimulatedStudy> truth(kMaxStudies);
+    for (std::size_t i = 0; i < kMaxStudies; ++i)
+      truth[i].C_b_s = exp_so3(Vector3d(0.02, -0.03, 0.01)) * permutations[first + i];
+    SimulatedDrive drive(150.0, truth, 30 + first);
+    Estimator estimator(drive.config());
+    test::run(drive, estimator, kStandstill_s + 60.0);
+    for (std::size_t i = 0; i < kMaxStudies; ++i) {
+      ASSERT_GE(estimator.study(i).status, StudyStatus::kConverging) << "permutation " << first + i;
+      EXPECT_LT(kDegPerRad * test::mounting_error_rad(estimator.study(i), truth[i].C_b_s).norm(), 2.0);
+      EXPECT_LT(worst_in_sd(estimator.study(i), truth[i]), 5.0) << "permutation " << first + i;
+    }
+  }
+}
+
+TEST(Estimator, ANoiseModelHandedInLaterTakesForce) {
+  const std::vector<SimulatedStudy> truth{{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.004}};
+  SimulatedDrive drive(150.0, truth, 15);
+  EstimatorConfig config = drive.config();
+  config.studies[0].prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  config.studies[0].prior_t_d_s = 0.0;
+  const StudyNoise right = config.studies[0].noise;
+  for (TriadNoise& gyro : config.studies[0].noise.gyro) {
+    for (double& sd : gyro.white_sd) sd *= 2.0;
+  }
+  Estimator estimator(config);
+  test::run(drive, estimator, 70.0);
+  EXPECT_NEAR(estimator.study(0).nis_gyro[0], 0.25, 0.08);
+  estimator.set_noise(0, right);
+  test::run(drive, estimator);
+  EXPECT_NEAR(estimator.study(0).nis_gyro[0], 1.0, 0.25);
+  EXPECT_LT(worst_in_sd(estimator.study(0), truth[0]), 4.0);
+}
+
 TEST(Estimator, WithoutGnssTheCalibrationRunsAndNavigationIsNotOffered) {
   const std::vector<SimulatedStudy> truth{{exp_so3(Vector3d(0.1, 0.2, -1.5)), {-0.30, 0.25, 0.10}, 0.004}};
   SimulatedDrive drive(150.0, truth, 3);
