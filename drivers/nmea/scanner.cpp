@@ -9,6 +9,9 @@ constexpr bool is_start(std::uint8_t byte) noexcept { return byte == '$' || byte
 constexpr bool is_line_end(std::uint8_t byte) noexcept { return byte == '\r' || byte == '\n'; }
 constexpr bool is_printable(std::uint8_t byte) noexcept { return byte >= ' ' && byte <= '~'; }
 
+/// Shortest address: 'P' and three letters of a maker.
+constexpr std::size_t kAddressMin = 4;
+
 /// Value of a hex digit of either case, -1 for anything else.
 constexpr int hex_value(std::uint8_t byte) noexcept {
   if (byte >= '0' && byte <= '9') return byte - '0';
@@ -25,6 +28,7 @@ Examined examine_sentence(std::span<const std::uint8_t> pending, bool checksum_r
   for (std::size_t i = 1; i < searched; ++i) {
     const std::uint8_t byte = pending[i];
     if (byte == '*') {
+      if (i <= kAddressMin) return {Verdict::kFalseStart};
       constexpr std::size_t kDigits = 2;
       for (std::size_t digit = 1; digit <= kDigits; ++digit) {
         if (i + digit >= pending.size()) return {Verdict::kNeedMore};

@@ -1,0 +1,268 @@
+// Sentences, damaged streams, and epochs made of sentences.
+#include <gtest/gtest.h>
+#include <cmath>
+
+#include "base/units.h"
+#include "drivers/nmea/decoder.h"
+#include "drivers/nmea/messages.h"
+#include "drivers/nmea/scanner.h"
+#include "tests/drivers/support/streams.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::nmea {
+namespace {
+
+using nlohmann::json;
+using test::Bytes;
+using test::bytes_of;
+using namespace std::chrono_literals;
+
+std::string sentence(const std::string& content) {
+  unsigned sum = 0;
+  for (const char c : content) sum ^= static_cast<unsigned char>(c);
+  constexpr std::string_view kHex = "0123456789ABCDEF";
+  return "$" + content + "*" + kHex[sum >> 4U] + kHex[sum & 0xFU] + "\r\n";
+}
+
+std::vector<std::string> scan_text(const Bytes& bytes, bool checksum_required = true) {
+  Scanner scanner(Duration::zero(), checksum_required);
+  std::vector<std::string> found;
+  Frame frame;
+  std::span<const std::uint8_t> rest(bytes);
+  while (!rest.empty()) {
+    rest = rest.subspan(scanner.append(rest, {}));
+    while (scanner.next(frame)) found.emplace_back(frame.sentence);
+  }
+  while (scanner.next(frame, true)) found.emplace_back(frame.sentence);
+  return found;
+}
+
+json fields_of(std::string_view text) {
+  json fields = json::object();
+  for_each_field(Fields(text), [&](const NamedValue& value) {
+    json& field = fields[std::string(value.name)];
+    switch (value.kind) {
+      case NamedValue::Kind::kText:
+        field = value.text;
+        break;
+      case NamedValue::Kind::kBool:
+        field = value.number != 0.0;
+        break;
+      case NamedValue::Kind::kReal:
+      case NamedValue::Kind::kInteger:
+        field = value.number;
+        break;
+    }
+  });
+  return fields;
+}
+
+TEST(NmeaVectors, EveryVectorDecodesToItsPublishedValues) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/nmea.hex");
+  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/nmea.hex"));
+  const json expected = test::load_json(test::shared_path("oracle/protocols/nmea.json"));
+  ASSERT_EQ(vectors.size(), expected["vectors"].size());
+  for (const json& vector : expected["vectors"]) {
+    const std::string name = vector["name"];
+    SCOPED_TRACE(name);
+    const Bytes& bytes = test::vector_named(vectors, name);
+    ASSERT_EQ(bytes.size(), vector["length"]);
+    const auto found = scan_text(bytes);
+    if (name == "GGA_bad_checksum" || name == "GGA_no_checksum") {
+      EXPECT_TRUE(found.empty());
+      EXPECT_EQ(scan_text(bytes, false).size(), name == "GGA_no_checksum" ? 1U : 0U);
+      continue;
+    }
+    ASSERT_EQ(found.size(), 1U);
+    if (vector.contains("sentence")) {
+      EXPECT_EQ(found[0], vector["sentence"]);
+    }
+    const json fields = fields_of(found[0]);
+    for (const auto& [field, value] : vector["expected"].items()) {
+      if (value.is_null()) {
+        EXPECT_FALSE(fields.contains(field)) << field;
+        continue;
+      }
+      ASSERT_TRUE(fields.contains(field)) << field;
+      if (value.is_number()) {
+        // The published positions are decimal roundings of the sentence's minutes.
+        EXPECT_NEAR(fields[field].get<double>(), value.get<double>(),
+                    1e-9 * std::abs(value.get<double>()) + 1e-12)
+            << field;
+      } else {
+        EXPECT_EQ(fields[field], value) << field;
+      }
+    }
+  }
+}
+
+test::StreamUnderTest stream() {
+  test::StreamUnderTest under_test;
+  under_test.separator = bytes_of("\r\n");
+  under_test.scan = [](std::span<const Bytes> reads) {
+    Scanner scanner;
+    std::vector<Bytes> frames;
+    Frame frame;
+    for (const Bytes& read : reads) {
+      std::span<const std::uint8_t> rest(read);
+      while (!rest.empty()) {
+        rest = rest.subspan(scanner.append(rest, {}));
+        while (scanner.next(frame)) frames.push_back(bytes_of(frame.sentence));
+      }
+    }
+    while (scanner.next(frame, true)) frames.push_back(bytes_of(frame.sentence));
+    return frames;
+  };
+  // The two digits of the checksum may change case.
+  under_test.may_appear = [](const Bytes& frame) {
+    std::string text(frame.begin(), frame.end());
+    for (char& c : text) c = static_cast<char>(std::toupper(c));
+    return text == "$GNRMC,123456.10,A,4851.39684,N,00221.13314,E,2.617,338.17,140326,,,R,V*1C";
+  };
+  under_test.frames = {
+      bytes_of("$GPGGA,123456.10,4851.39684,N,00221.13314,E,4,18,0.7,35.250,M,46.250,M,1.0,0123*77"),
+      bytes_of("$GNRMC,123456.10,A,4851.39684,N,00221.13314,E,2.617,338.17,140326,,,R,V*1C"),
+      bytes_of("$GPZDA,123456.10,14,03,2026,00,00*60"),
+  };
+  return under_test;
+}
+
+/// A checksum of exclusive ors does not see that two equal characters are missing: a sentence with a hole may
+/// appear. What must hold is that its neighbours do not suffer.
+test::StreamUnderTest stream_with_holes() {
+  auto under_test = stream();
+  under_test.may_appear = [](const Bytes&) { return true; };
+  return under_test;
+}
+
+TEST(NmeaStream, EverySplitIntoReadsGivesTheSameSentences) {
+  test::expect_every_split_keeps_all_frames(stream());
+}
+TEST(NmeaStream, EverySingleBitFlipLosesOnlyItsSentence) {
+  test::expect_every_bit_flip_loses_only_its_frame(stream());
+}
+TEST(NmeaStream, EveryCutLosesOnlyTheSentencesItTouches) {
+  test::expect_every_cut_loses_only_its_frames(stream_with_holes());
+}
+TEST(NmeaStream, EveryInsertionLosesOnlyItsSentence) {
+  test::expect_every_insertion_loses_only_its_frame(stream_with_holes(), 31);
+}
+TEST(NmeaStream, NoSentenceInsideGarbageIsLost) {
+  test::expect_no_frame_in_garbage_is_lost(stream(), "$*$!G0", 32);
+}
+
+DecoderConfig fixed_config() {
+  DecoderConfig config;
+  config.clock = ClockMapConfig::fixed(host_time_from_ns(0), 1.0);
+  return config;
+}
+
+std::vector<Sample> decode(const std::string& text, const DecoderConfig& config = fixed_config()) {
+  Decoder decoder(config);
+  test::CollectingSink sink;
+  decoder.push(bytes_of(text), {}, sink);
+  decoder.finish({}, sink);
+  return sink.samples;
+}
+
+std::string gga(const std::string& time, const std::string& tail = "4,18,0.7,35.250,M,46.250,M,1.0,0123") {
+  return sentence("GNGGA," + time + ",4530.0000,N,00515.0000,W," + tail);
+}
+
+const UtcTime kDay = std::chrono::sys_days{std::chrono::year{2026} / 3 / 14};
+
+TEST(NmeaDecoder, SentencesOfOneTimeBecomeOneSample) {
+  const auto samples =
+      decode(sentence("GPRMC,123456.10,A,4530.0000,N,00515.0000,W,10.0,90.0,140326,,,R,V") +
+             gga("123456.10") + sentence("GPGST,123456.10,,,,,0.012,0.013,0.020") + sentence("GPHDT,1.0,T"));
+  ASSERT_EQ(samples.size(), 1U);
+  const GnssData& gnss = samples[0].gnss;
+  EXPECT_EQ(gnss.solution, GnssSolution::kFixed);
+  EXPECT_NEAR(gnss.latitude_rad, 45.5 * kRadPerDeg, 1e-15);
+  EXPECT_NEAR(gnss.longitude_rad, -5.25 * kRadPerDeg, 1e-15);
+  EXPECT_DOUBLE_EQ(gnss.height_m, 81.5);
+  EXPECT_EQ(gnss.sd_position_m, (Vector3{0.012, 0.013, 0.020}));
+  EXPECT_NEAR(gnss.v_n_mps[0], 0.0, 1e-12);
+  EXPECT_NEAR(gnss.v_n_mps[1], 18520.0 / 3600.0, 1e-12);
+  EXPECT_GE(gnss.sd_velocity_mps[2], 1.0);  // the vertical velocity is not known
+  EXPECT_EQ(samples[0].utc, kDay + 45'296'100ms);
+  EXPECT_EQ(to_ns(samples[0].time), 45'296'100'000'000);
+}
+
+TEST(NmeaDecoder, AnEpochIsHandedOutWithItsLastSentenceOnceTheOrderIsKnown) {
+  Decoder decoder(fixed_config());
+  test::CollectingSink sink;
+  const auto rmc = [](const std::string& time) {
+    return sentence("GPRMC," + time + ",A,4530.0000,N,00515.0000,W,10.0,90.0,140326,,,R,V");
+  };
+  decoder.push(bytes_of(rmc("000001.00") + gga("000001.00")), {}, sink);
+  EXPECT_EQ(sink.samples.size(), 0U);  // nothing says yet that no more sentences follow
+  decoder.push(bytes_of(rmc("000002.00")), {}, sink);
+  EXPECT_EQ(sink.samples.size(), 1U);
+  decoder.push(bytes_of(gga("000002.00")), {}, sink);
+  EXPECT_EQ(sink.samples.size(), 2U);
+  decoder.push(bytes_of(rmc("000003.00") + gga("000003.00")), {}, sink);
+  EXPECT_EQ(sink.samples.size(), 3U);
+  for (const Sample& sample : sink.samples) EXPECT_NE(sample.gnss.flags & kPositionValid, 0U);
+}
+
+TEST(NmeaDecoder, TheTalkerMayChangeDuringTheDrive) {
+  std::string later = gga("000002.00");
+  later = sentence("GP" + later.substr(3, later.find('*') - 3));
+  EXPECT_EQ(decode(gga("000001.00") + later).size(), 2U);
+}
+
+TEST(NmeaDecoder, TheDateIsCarriedThroughMidnight) {
+  const auto samples =
+      decode(sentence("GPZDA,235959.90,14,03,2026,00,00") + gga("235959.90") + gga("000000.00"));
+  ASSERT_EQ(samples.size(), 2U);
+  EXPECT_EQ(samples[0].utc, kDay + 24h - 100ms);
+  EXPECT_EQ(samples[1].utc, kDay + 24h);
+  EXPECT_EQ(samples[1].time - samples[0].time, Duration(100ms));
+}
+
+TEST(NmeaDecoder, QualitiesThatAreNotOfSatellitesGiveNoPosition) {
+  for (const char* quality : {"0", "6", "7", "8", ""}) {
+    const auto samples = decode(gga("000001.00", std::string(quality) + ",18,0.7,35.250,M,46.250,M,,"));
+    ASSERT_EQ(samples.size(), 1U) << quality;
+    EXPECT_EQ(samples[0].gnss.solution, GnssSolution::kNone) << quality;
+    EXPECT_EQ(samples[0].gnss.flags, 0U) << quality;
+  }
+  EXPECT_EQ(decode(gga("000001.00", "5,18,0.7,35.2,M,46.2,M,,")).at(0).gnss.solution, GnssSolution::kFloat);
+}
+
+TEST(NmeaDecoder, WithoutGeoidSeparationTheConfiguredOneIsTaken) {
+  const std::string text = gga("000001.00", "4,18,0.7,35.250,M,,M,,");
+  EXPECT_EQ(decode(text).at(0).gnss.flags & kPositionValid, 0U);
+  DecoderConfig config = fixed_config();
+  config.geoid_separation_m = 40.0;
+  EXPECT_DOUBLE_EQ(decode(text, config).at(0).gnss.height_m, 75.25);
+}
+
+TEST(NmeaDecoder, AReceiverThatStandsGivesZeroVelocityWithoutACourse) {
+  const auto velocity = [](const char* knots) {
+    return decode(sentence(std::string("GPRMC,000001.00,A,4530.0,N,00515.0,W,") + knots + ",,140326,,,R,V"))
+        .at(0)
+        .gnss;
+  };
+  EXPECT_NE(velocity("0.025").flags & kVelocityValid, 0U);
+  EXPECT_EQ(velocity("0.025").v_n_mps, (Vector3{0, 0, 0}));
+  EXPECT_EQ(velocity("5.0").flags & kVelocityValid, 0U);
+}
+
+TEST(NmeaDecoder, TheRecordedDriveGivesOneSampleASecond) {
+  IMUSCOPE_NEEDS_SHARED("data/streams/nmea/drive.nmea");
+  DecoderConfig config = fixed_config();
+  config.period = 1s;
+  Decoder decoder(config);
+  test::CollectingSink sink;
+  decoder.push(test::load_bytes(test::shared_path("data/streams/nmea/drive.nmea")), {}, sink);
+  decoder.finish({}, sink);
+  EXPECT_EQ(decoder.counters().frames, 7268U);
+  EXPECT_EQ(decoder.counters().bytes_skipped, 0U);
+  EXPECT_EQ(sink.samples.size(), 3634U);
+  for (const Sample& sample : sink.samples) ASSERT_TRUE(sample.has_utc);
+}
+
+}  // namespace
+}  // namespace imuscope::nmea

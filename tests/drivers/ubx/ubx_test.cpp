@@ -1,0 +1,188 @@
+// UBX messages, damaged streams, NAV-PVT to samples.
+#include <gtest/gtest.h>
+#include <cmath>
+#include <numbers>
+
+#include "base/units.h"
+#include "drivers/ubx/decoder.h"
+#include "tests/drivers/support/streams.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::ubx {
+namespace {
+
+using nlohmann::json;
+using test::Bytes;
+using namespace std::chrono_literals;
+
+Bytes message(std::uint8_t message_class, std::uint8_t id, const Bytes& payload) {
+  Bytes bytes;
+  bytes.reserve(payload.size() + 8);
+  const auto size = static_cast<unsigned>(payload.size());
+  for (const unsigned byte :
+       {0xB5U, 0x62U, unsigned{message_class}, unsigned{id}, size & 0xFFU, size >> 8U}) {
+    bytes.push_back(static_cast<std::uint8_t>(byte));
+  }
+  for (const std::uint8_t byte : payload) bytes.push_back(byte);
+  unsigned a = 0, b = 0;
+  for (std::size_t i = 2; i < bytes.size(); ++i) {
+    a = (a + bytes[i]) & 0xFFU;
+    b = (b + a) & 0xFFU;
+  }
+  bytes.push_back(static_cast<std::uint8_t>(a));
+  bytes.push_back(static_cast<std::uint8_t>(b));
+  return bytes;
+}
+
+std::vector<Bytes> scan(std::span<const Bytes> reads) {
+  Scanner scanner;
+  std::vector<Bytes> frames;
+  Frame frame;
+  for (const Bytes& read : reads) {
+    std::span<const std::uint8_t> rest(read);
+    while (!rest.empty()) {
+      rest = rest.subspan(scanner.append(rest, {}));
+      while (scanner.next(frame)) frames.emplace_back(frame.bytes.begin(), frame.bytes.end());
+    }
+  }
+  while (scanner.next(frame, true)) frames.emplace_back(frame.bytes.begin(), frame.bytes.end());
+  return frames;
+}
+
+struct Rig {
+  explicit Rig(DecoderConfig config = {})
+      : decoder((config.clock = ClockMapConfig::fixed({}, 1.0), config)) {}
+  void push(const Bytes& bytes) { decoder.push(bytes, {}, sink); }
+  Decoder decoder;
+  test::CollectingSink sink;
+};
+
+TEST(UbxVectors, EveryVectorDecodesToItsPublishedValues) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ubx_nav_pvt.hex");
+  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/ubx_nav_pvt.hex"));
+  const json expected = test::load_json(test::shared_path("oracle/protocols/ubx_nav_pvt.json"));
+  ASSERT_EQ(vectors.size(), expected["vectors"].size());
+  for (const json& vector : expected["vectors"]) {
+    const std::string name = vector["name"];
+    SCOPED_TRACE(name);
+    const Bytes reads[] = {test::vector_named(vectors, name)};
+    ASSERT_EQ(reads[0].size(), vector["length"]);
+    const auto frames = scan(reads);
+    if (vector.value("valid", true) == false) {
+      EXPECT_TRUE(frames.empty());
+      continue;
+    }
+    ASSERT_EQ(frames.size(), 1U);
+    Rig rig;
+    rig.push(frames[0]);
+    ASSERT_EQ(rig.sink.samples.size(), 1U);
+    if (!vector.contains("fields")) continue;
+    json fields = json::object();
+    const auto payload = std::span(frames[0]).subspan(kHeaderSize);
+    for_each_field(parse_nav_pvt(payload),
+                   [&](std::string_view field, double value) { fields[std::string(field)] = value; });
+    for (const auto& [field, value] : fields.items()) {
+      EXPECT_EQ(value.get<double>(), vector["fields"].at(field).get<double>()) << field;
+    }
+  }
+}
+
+TEST(UbxVectors, AnRtkFixBecomesASampleWithTheSecondBeforeItsNegativeNanoseconds) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ubx_nav_pvt.hex");
+  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/ubx_nav_pvt.hex"));
+  Rig rig;
+  rig.push(test::vector_named(vectors, "nav_pvt_rtk_fixed"));
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  const Sample& sample = rig.sink.samples[0];
+  EXPECT_EQ(sample.gnss.solution, GnssSolution::kFixed);
+  EXPECT_NEAR(sample.gnss.latitude_rad / kRadPerDeg, 48.856614, 1e-12);
+  EXPECT_NEAR(sample.gnss.longitude_rad / kRadPerDeg, 2.352219, 1e-12);
+  EXPECT_DOUBLE_EQ(sample.gnss.height_m, 81.5);
+  EXPECT_EQ(sample.gnss.v_n_mps, (Vector3{1.25, -0.5, -0.125}));
+  EXPECT_NEAR(sample.gnss.sd_position_m[0], 0.014 / std::numbers::sqrt2, 1e-12);
+  EXPECT_NEAR(sample.gnss.sd_velocity_mps[0], 0.05 / std::numbers::sqrt3, 1e-12);
+  const UtcTime day = std::chrono::sys_days{std::chrono::year{2026} / 3 / 14};
+  EXPECT_EQ(sample.utc, day + 15h + 29min + 41s + Duration(999'900'100));
+
+  Rig none;
+  none.push(test::vector_named(vectors, "nav_pvt_no_fix"));
+  ASSERT_EQ(none.sink.samples.size(), 1U);
+  EXPECT_EQ(none.sink.samples[0].gnss.flags, 0U);
+  EXPECT_FALSE(none.sink.samples[0].has_utc);
+}
+
+test::StreamUnderTest stream() {
+  test::StreamUnderTest under_test;
+  under_test.scan = scan;
+  under_test.frames = {
+      message(1, 3, {1, 2, 3, 0xB5, 0x62, 1, 7, 92, 0}),
+      message(5, 1, {6, 1}),
+      test::bytes_of("$GPZDA,123456.10,14,03,2026,00,00*60"),
+      message(1, 4, Bytes(18, 0x80)),
+      message(0x0A, 4, {}),
+  };
+  return under_test;
+}
+
+/// The checksum of a sentence does not see that two equal characters are missing.
+test::StreamUnderTest stream_with_holes() {
+  auto under_test = stream();
+  under_test.may_appear = [](const Bytes& frame) { return frame[0] == '$'; };
+  return under_test;
+}
+
+TEST(UbxStream, EverySplitIntoReadsGivesTheSameFrames) {
+  test::expect_every_split_keeps_all_frames(stream());
+}
+TEST(UbxStream, EverySingleBitFlipLosesOnlyItsFrame) {
+  test::expect_every_bit_flip_loses_only_its_frame(stream());
+}
+TEST(UbxStream, EveryCutLosesOnlyTheFramesItTouches) {
+  test::expect_every_cut_loses_only_its_frames(stream_with_holes());
+}
+TEST(UbxStream, EveryInsertionLosesOnlyItsFrame) {
+  test::expect_every_insertion_loses_only_its_frame(stream_with_holes(), 41);
+}
+TEST(UbxStream, NoFrameInsideGarbageIsLost) {
+  test::expect_no_frame_in_garbage_is_lost(stream(), "\xB5\x62\xB5\x62$*", 42);
+}
+
+TEST(UbxDecoder, TheWeekOfTheGpsIsUnwrappedAndMissingEpochsAreCounted) {
+  const auto pvt = [](std::uint32_t itow_ms) {
+    Bytes payload(92, 0);
+    for (std::size_t i = 0; i < 4; ++i) payload[i] = static_cast<std::uint8_t>(itow_ms >> (8 * i));
+    return message(1, 7, payload);
+  };
+  DecoderConfig config;
+  config.period = 100ms;
+  Rig rig(config);
+  for (const std::uint32_t itow_ms : {604'799'900U, 0U, 400U, 400U}) rig.push(pvt(itow_ms));
+  ASSERT_EQ(rig.sink.samples.size(), 3U);
+  EXPECT_EQ(rig.sink.samples[1].time - rig.sink.samples[0].time, Duration(100ms));
+  EXPECT_EQ(rig.sink.samples[2].time - rig.sink.samples[1].time, Duration(400ms));
+  EXPECT_EQ(rig.decoder.counters().samples_lost, 3U);
+  EXPECT_EQ(rig.decoder.counters().bad_contents, 1U);  // the same epoch again
+}
+
+TEST(UbxCapture, TheWalkWithNmeaMixedInLosesNoByte) {
+  IMUSCOPE_NEEDS_SHARED("data/streams/ubx/walk.ubx");
+  const Bytes bytes = test::load_bytes(test::shared_path("data/streams/ubx/walk.ubx"));
+  Scanner scanner;
+  Frame frame;
+  std::size_t messages = 0, sentences = 0;
+  std::span<const std::uint8_t> rest(bytes);
+  while (!rest.empty()) {
+    rest = rest.subspan(scanner.append(rest, {}));
+    while (scanner.next(frame)) ++(frame.kind == Frame::Kind::kMessage ? messages : sentences);
+  }
+  // Counted by a walk over the file in another language, checksums included; 536 of the messages are NAV-PVT.
+  EXPECT_EQ(scanner.counters().bytes_skipped, 0U);
+  EXPECT_EQ(messages, 3400U);
+  EXPECT_EQ(sentences, 2010U);
+  Rig rig;
+  rig.push(bytes);
+  EXPECT_EQ(rig.sink.samples.size(), 536U);
+}
+
+}  // namespace
+}  // namespace imuscope::ubx
