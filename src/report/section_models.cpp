@@ -49,15 +49,6 @@ Html parameter_name(const FitParameter& parameter) {
   return text(parameter.process + " ") + text(known == std::end(kSymbols) ? parameter.name : known->second);
 }
 
-Html parameter_cell(const FitParameter* parameter) {
-  if (parameter == nullptr || !parameter->value) return text(kUnknown);
-  Html cell = with_interval(*parameter->value, parameter->ci_low, parameter->ci_high);
-  if (parameter->name == "beta" && *parameter->value > 0.0) {
-    cell += element("span", text(" τ ") + number(1.0 / *parameter->value, 2) + text(" s"), "interval");
-  }
-  return cell;
-}
-
 const FitParameter* find_parameter(const Fit* fit, const FitParameter& like) {
   if (fit == nullptr) return nullptr;
   const auto found =
@@ -65,6 +56,24 @@ const FitParameter* find_parameter(const Fit* fit, const FitParameter& like) {
         return parameter.process == like.process && parameter.name == like.name;
       });
   return found == fit->parameters.end() ? nullptr : &*found;
+}
+
+/// Whether the fit gave the process of `parameter` no amplitude: its rate then means nothing.
+bool is_unsupported(const Fit& fit, const FitParameter& parameter) {
+  return std::any_of(fit.parameters.begin(), fit.parameters.end(), [&](const FitParameter& other) {
+    return other.process == parameter.process && other.name != "beta" && other.value == 0.0;
+  });
+}
+
+Html parameter_cell(const Fit* fit, const FitParameter* parameter) {
+  if (parameter == nullptr || !parameter->value) return text(kUnknown);
+  const bool rate = parameter->name == "beta";
+  if (rate && is_unsupported(*fit, *parameter)) return text(kUnknown);
+  Html cell = with_interval(*parameter->value, parameter->ci_low, parameter->ci_high);
+  if (rate && *parameter->value > 0.0) {
+    cell += element("span", text(" τ ") + number(1.0 / *parameter->value, 2) + text(" s"), "interval");
+  }
+  return cell;
 }
 
 /// Every parameter that one of the fits has, in their order.
@@ -92,7 +101,12 @@ std::string difference_words(const FitParameter* one, const FitParameter* other)
 }
 
 std::string test_words(const Fit& fit) {
-  std::string words = fit.j_p_value ? fmt::format("J-test p = {:.2g}", *fit.j_p_value) : "not tested";
+  // Below this the p value says no more than that it is small.
+  constexpr double kSmallest = 1e-6;
+  std::string words = "not tested";
+  if (fit.j_p_value) {
+    words = *fit.j_p_value < kSmallest ? "J-test p < 10⁻⁶" : fmt::format("J-test p = {:.2g}", *fit.j_p_value);
+  }
   if (fit.n) words += fmt::format(", n = {:.0f}", *fit.n);
   if (!fit.identifiable) words += ", not identifiable";
   return words;
@@ -123,7 +137,7 @@ Html parameter_table(const std::vector<Fit>& fits, const std::string& imu,
     table.add_group(axis_heading(axis, of_axis));
     for (const FitParameter& parameter : parameters) {
       std::vector<Html> row{parameter_name(parameter), text(parameter.unit)};
-      for (const Fit* fit : of_axis) row.push_back(parameter_cell(find_parameter(fit, parameter)));
+      for (const Fit* fit : of_axis) row.push_back(parameter_cell(fit, find_parameter(fit, parameter)));
       if (comparable) {
         row.push_back(text(
             difference_words(find_parameter(of_axis[0], parameter), find_parameter(of_axis[1], parameter))));

@@ -207,10 +207,13 @@ void device_steps(const RunFiles& run, std::vector<std::string>& steps) {
     const double samples_lost = number_at(device, "samples_lost").value_or(0.0);
     const double bad_checksums = number_at(device, "bad_checksums").value_or(0.0);
     if (samples_lost + bad_checksums == 0.0) continue;
+    std::vector<std::string> what;
+    if (samples_lost > 0.0) what.push_back(fmt::format("{:.0f} samples lost", samples_lost));
+    if (bad_checksums > 0.0)
+      what.push_back(fmt::format("{:.0f} frames with a wrong checksum", bad_checksums));
     steps.push_back(
-        fmt::format("Look after device {}: {:.0f} samples lost, {:.0f} frames with a wrong checksum (cable, "
-                    "baud rate, load of the computer).",
-                    text_at(device, "name"), samples_lost, bad_checksums));
+        fmt::format("Look after device {}: {} (cable, baud rate, reception, load of the computer).",
+                    text_at(device, "name"), fmt::join(what, ", ")));
   }
 }
 
@@ -220,7 +223,7 @@ void model_steps(const RunFiles& run, const std::vector<Fit>& fits, std::vector<
     steps.emplace_back(
         "Try another composition of the noise model for the signals that the test rejects; Figure 4 shows at "
         "which "
-        "times the fitted line leaves the intervals.");
+        "scales the fitted line leaves the intervals.");
   }
   const auto vague = those(fits, [](const Fit& fit) { return !fit.identifiable; });
   if (!vague.empty()) {
@@ -318,8 +321,11 @@ Verdict model_verdict(const std::vector<Fit>& all_fits) {
                            : "The data contradict none of the models, but not every parameter can be told.";
   } else {
     verdict.answer = rejected.size() == tested.size() ? Answer::kNo : Answer::kPartly;
-    verdict.headline = fmt::format("Not everywhere: {} of {} models do not explain their wavelet variance.",
-                                   rejected.size(), tested.size());
+    verdict.headline =
+        verdict.answer == Answer::kNo
+            ? fmt::format("No: none of the {} models explains its wavelet variance.", tested.size())
+            : fmt::format("Not everywhere: {} of {} models do not explain their wavelet variance.",
+                          rejected.size(), tested.size());
   }
   if (!tested.empty()) {
     verdict.reasons.push_back(
