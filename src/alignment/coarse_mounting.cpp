@@ -23,9 +23,11 @@ constexpr double kCorrelationMin = 0.5;
 constexpr double kMirrorResidualShare = 0.5;
 /// Mean forces that differ by more than this many accelerometer bias sd are not of one gravity.
 constexpr double kGravityMismatchSds = 5.0;
-/// Rates and forces of neighbouring samples carry correlated errors (vibration, lever arm): the number of
-/// samples that count as one observation.
-constexpr double kSamplesPerObservation = 10.0;
+/// Pairs that enter as one mean: 0.12 s at 100 Hz, above the periods of vibration, below those of driving.
+constexpr int kPairsPerObservation = 12;
+/// What the rotation leaves unexplained (lever arm, flexing) stays alike over some half a second of road: so
+/// many observations tell as much as one.
+constexpr double kAlikeObservations = 5.0;
 
 /// the orthogonal matrix of the given determinant (+1 or -1) that maximises trace(C B'), by SVD.
 Matrix3d best_orthogonal(const Matrix3d& B, double determinant) noexcept {
@@ -62,29 +64,41 @@ void CoarseMountingEstimator::add(const Vector3d& omega_b_radps, const Vector3d&
     return;
   }
   ++pairs_;
-  const auto n = static_cast<double>(pairs_);
-  rate_.add(omega_b_radps, omega_s_radps, n);
-  force_.add(f_b_mps2, f_s_mps2, n);
+  waiting_.omega_b += omega_b_radps;
+  waiting_.f_b += f_b_mps2;
+  waiting_.omega_s += omega_s_radps;
+  waiting_.f_s += f_s_mps2;
+  if (++waiting_.count < kPairsPerObservation) return;
+  constexpr double kShare = 1.0 / kPairsPerObservation;
+  ++observations_;
+  const auto n = static_cast<double>(observations_);
+  rate_.add(kShare * waiting_.omega_b, kShare * waiting_.omega_s, n);
+  force_.add(kShare * waiting_.f_b, kShare * waiting_.f_s, n);
+  waiting_ = Sums{};
 }
 
 void CoarseMountingEstimator::clear() noexcept {
   rate_ = Moments{};
   force_ = Moments{};
+  waiting_ = Sums{};
+  observations_ = 0;
   pairs_ = 0;
 }
 
 MountingResult CoarseMountingEstimator::solve(CoarseMounting& out) const noexcept {
   if (pairs_ < options_.pairs_min) return MountingResult::kTooFewPairs;
-  const auto n = static_cast<double>(pairs_);
-  const double gravity_weight = 1.0 / (options_.accel_bias_sd_mps2 * options_.accel_bias_sd_mps2);
+  const auto n = static_cast<double>(observations_);
+  // What turns the mean force: the accelerometer's bias, and the mean centripetal force over a lever arm.
+  const double mean_square_rate = rate_.bb.trace() / n + rate_.mean_b.squaredNorm();
+  const double gravity_sd = std::hypot(options_.accel_bias_sd_mps2, options_.arm_m * mean_square_rate);
+  const double gravity_weight = 1.0 / (gravity_sd * gravity_sd);
   const Matrix3d gravity_bb = force_.mean_b * force_.mean_b.transpose();
   const Matrix3d gravity_sb = force_.mean_s * force_.mean_b.transpose();
 
   // weights from the residuals that the last rotation leaves. At first each family weighs by its own
   // size, as if it explained nothing.
   const auto observation_weight = [&](double sum_of_squares) {
-    const double variance = sum_of_squares / (3.0 * n) + 1e-18;
-    return 1.0 / (variance * kSamplesPerObservation);
+    return 1.0 / (kAlikeObservations * sum_of_squares / (3.0 * n) + 1e-18);
   };
   double rate_weight = observation_weight(rate_.ss.trace());
   double force_weight = observation_weight(force_.ss.trace());
@@ -115,7 +129,7 @@ MountingResult CoarseMountingEstimator::solve(CoarseMounting& out) const noexcep
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
   if (std::sqrt(eigen.eigenvalues()(2)) > options_.sd_limit_rad) return MountingResult::kTooLittleExcitation;
   const double gravity_mismatch = (force_.mean_s - C * force_.mean_b).norm();
-  if (correlation < kCorrelationMin || gravity_mismatch > kGravityMismatchSds * options_.accel_bias_sd_mps2) {
+  if (correlation < kCorrelationMin || gravity_mismatch > kGravityMismatchSds * gravity_sd) {
     return MountingResult::kInconsistent;
   }
   return MountingResult::kOk;

@@ -3,7 +3,8 @@
 /// How an S-IMU sits, without any prior: Wahba's problem on pairs of rates and forces. Good to a degree or
 /// two after a minute of driving, which is enough for the filter to take over. Rates enter with their means
 /// removed, so gyro biases do not matter; gravity enters once, with the accelerometer's bias as its
-/// uncertainty. in EQUATIONS.md.
+/// uncertainty. Twelve pairs at a time enter as their mean: engine vibration is not common to two mountings
+/// and would otherwise turn the answer by degrees. in EQUATIONS.md.
 ///
 /// Core: fixed memory, no allocation, noexcept. Thread: owner only.
 
@@ -31,6 +32,7 @@ struct CoarseMounting {
 struct CoarseMountingOptions {
   double accel_bias_sd_mps2 = 0.15;  ///< of S against R, as it turns gravity
   double sd_limit_rad = 0.05;        ///< of the weakest direction
+  double arm_m = 0.5;                ///< lever arms up to this are to be expected: they turn gravity, too
   int pairs_min = 200;
 };
 
@@ -62,9 +64,20 @@ class CoarseMountingEstimator {
 
   [[nodiscard]] bool is_mirrored(const Eigen::Matrix3d& B, const Eigen::Matrix3d& C) const noexcept;
 
+  /// Sum of the pairs that wait for their mean.
+  struct Sums {
+    Eigen::Vector3d omega_b = Eigen::Vector3d::Zero();
+    Eigen::Vector3d f_b = Eigen::Vector3d::Zero();
+    Eigen::Vector3d omega_s = Eigen::Vector3d::Zero();
+    Eigen::Vector3d f_s = Eigen::Vector3d::Zero();
+    int count = 0;
+  };
+
   CoarseMountingOptions options_;
+  Sums waiting_;
   Moments rate_;
   Moments force_;
+  std::int64_t observations_ = 0;
   std::int64_t pairs_ = 0;
 };
 

@@ -2,16 +2,13 @@
 
 #include <gtest/gtest.h>
 #include <cmath>
-#include <fstream>
 #include <memory>
 #include <random>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "base/units.h"
 #include "tests/alignment/analytic_motion.h"
-#include "tests/support/shared_data.h"
 
 namespace imuscope {
 namespace {
@@ -116,38 +113,6 @@ TEST(TimeOffset, AHoleInTheStudyRecordingDoesNotDisturb) {
   const Result<TimeOffset> found = find_time_offset(reference.view(), study.view());
   ASSERT_TRUE(found.has_value()) << found.error().text();
   EXPECT_NEAR(found->offset_s + found->clock_rate * 140.0, 2.0, 0.004);
-}
-
-Series rate_from_csv(const std::filesystem::path& path, int time_column) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  Series out;
-  while (std::getline(file, line)) {
-    std::istringstream fields(line);
-    std::string field;
-    std::vector<double> values;
-    while (std::getline(fields, field, ',')) values.push_back(std::stod(field));
-    const auto c = static_cast<std::size_t>(time_column);
-    out.time_s.push_back(values[c]);
-    out.rate.push_back(std::hypot(values[c + 1], values[c + 2], values[c + 3]));
-  }
-  return out;
-}
-
-TEST(TimeOffset, OfTheRealDrivesAgreesWithTheBatchEstimates) {
-  IMUSCOPE_NEEDS_SHARED("data/car_drive");
-  // Published with the recordings: seconds to add to the study clock, from independent batch estimates.
-  const std::vector<std::pair<std::string, double>> drives{{"02", 0.253}, {"07", 0.035}, {"08", -0.075}};
-  for (const auto& [name, expected] : drives) {
-    const auto folder = test::shared_path("data/car_drive/" + name);
-    const Series reference = rate_from_csv(folder / "reference_imu.csv", 0);
-    const Series study = rate_from_csv(folder / "study_imu.csv", 1);
-    const Result<TimeOffset> found = find_time_offset(reference.view(), study.view(), {30.0, false});
-    ASSERT_TRUE(found.has_value()) << name << ": " << found.error().text();
-    // A coarse offset has to land inside the filter's prior of 10 ms.
-    EXPECT_NEAR(found->offset_s, expected, 0.010) << name;
-  }
 }
 
 TEST(LiveTimeOffset, FindsAnOffsetWithinTwoSecondsFromTheLastTwenty) {
