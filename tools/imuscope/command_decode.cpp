@@ -1,0 +1,172 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <vector>
+
+#include "commands.h"
+#include "decode/stream_protocols.h"
+
+namespace imuscope::cli {
+namespace {
+
+using Stream = std::span<const std::uint8_t>;
+
+/// The protocol is found from this much of a recording's beginning.
+constexpr std::size_t kLook = 1U << 20U;
+
+struct Options {
+  std::string file;
+  std::string protocol;
+  bool json = false;
+};
+
+struct Totals {
+  std::uint64_t messages = 0;
+  std::uint64_t bytes_skipped = 0;
+};
+
+Result<std::vector<std::uint8_t>> read_file(const std::string& file) {
+  std::error_code error;
+  if (std::filesystem::is_directory(file, error))
+    return usage_error(file + " is a folder", "give a raw recording");
+  std::ifstream in(file, std::ios::binary);
+  if (!in)
+    return work_error(fmt::format("{} cannot be read: {}", file, std::strerror(errno)), "check the name");
+  return std::vector<std::uint8_t>(std::istreambuf_iterator<char>(in), {});
+}
+
+std::size_t covered_bytes(const StreamProtocol& protocol, Stream stream) {
+  std::size_t covered = 0;
+  protocol.decode(stream, [&](const DecodedMessage& message) { covered += message.size; });
+  return covered;
+}
+
+/// The protocol whose messages cover the most bytes; null where none covers any.
+const StreamProtocol* find_protocol(Stream stream) {
+  const StreamProtocol* best = nullptr;
+  std::size_t most = 0;
+  for (const StreamProtocol& protocol : stream_protocols()) {
+    const std::size_t covered = covered_bytes(protocol, stream.first(std::min(stream.size(), kLook)));
+    if (covered <= most) continue;
+    most = covered;
+    best = &protocol;
+  }
+  return best;
+}
+
+Result<const StreamProtocol*> choose_protocol(const Options& options, Stream stream) {
+  std::vector<std::string_view> names;
+  for (const StreamProtocol& protocol : stream_protocols()) {
+    if (protocol.name == options.protocol) return &protocol;
+    names.push_back(protocol.name);
+  }
+  if (!options.protocol.empty()) {
+    return usage_error(fmt::format("unknown protocol '{}'", options.protocol),
+                       fmt::format("choose one of: {}", fmt::join(names, ", ")));
+  }
+  const StreamProtocol* found = find_protocol(stream);
+  if (found != nullptr) return found;
+  return work_error(fmt::format("no message of a known protocol in {}", options.file),
+                    fmt::format("known are: {}", fmt::join(names, ", ")));
+}
+
+void print(const StreamProtocol& protocol, const DecodedMessage& message, bool json) {
+  if (json) {
+    nlohmann::ordered_json line = {
+        {"offset", message.offset}, {"protocol", protocol.name}, {"message", message.message}};
+    line.update(message.fields);
+    fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    return;
+  }
+  fmt::print("{:>10}  {}  {:<18}", message.offset, protocol.name, message.message);
+  for (const auto& [key, value] : message.fields.items()) {
+    fmt::print("  {}={}", key, value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  }
+  fmt::print("\n");
+}
+
+/// Prints the messages of a recording in stream order: those of its protocol, and between them those of
+/// others.
+class Printer {
+ public:
+  Printer(Stream stream, const StreamProtocol& protocol, bool json)
+      : stream_(stream), protocol_(protocol), json_(json) {}
+
+  Totals run() {
+    protocol_.decode(stream_, [this](const DecodedMessage& message) {
+      fill_gap(message.offset);
+      print(protocol_, message, json_);
+      ++totals_.messages;
+      end_ = std::max<std::uint64_t>(end_, message.offset + message.size);
+    });
+    fill_gap(stream_.size());
+    return totals_;
+  }
+
+ private:
+  /// What lies between the last message and `to` belongs to other protocols, or to nobody.
+  void fill_gap(std::uint64_t to) {
+    if (to <= end_) return;
+    const Stream gap = stream_.subspan(end_, to - end_);
+    const StreamProtocol* best = nullptr;
+    std::size_t most = 0;
+    for (const StreamProtocol& other : stream_protocols()) {
+      if (!other.mixes_with_others || other.name == protocol_.name) continue;
+      const std::size_t covered = covered_bytes(other, gap);
+      if (covered > most) {
+        most = covered;
+        best = &other;
+      }
+    }
+    if (best != nullptr) {
+      best->decode(gap, [&](DecodedMessage message) {
+        message.offset += end_;
+        print(*best, message, json_);
+        ++totals_.messages;
+      });
+    }
+    totals_.bytes_skipped += gap.size() - most;
+    end_ = to;
+  }
+
+  Stream stream_;
+  const StreamProtocol& protocol_;
+  bool json_;
+  Totals totals_;
+  std::uint64_t end_ = 0;  ///< of what was printed
+};
+
+Result<void> decode(const Options& options) {
+  const auto bytes = read_file(options.file);
+  if (!bytes) return tl::unexpected<Error>(bytes.error());
+  const auto protocol = choose_protocol(options, *bytes);
+  if (!protocol) return tl::unexpected<Error>(protocol.error());
+  const Totals totals = Printer(*bytes, **protocol, options.json).run();
+  if (options.json) {
+    fmt::print("{{\"messages\": {}, \"bytes_skipped\": {}}}\n", totals.messages, totals.bytes_skipped);
+  } else {
+    fmt::print("{} messages, {} bytes skipped\n", totals.messages, totals.bytes_skipped);
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_decode(CLI::App& app, Work& chosen) {
+  auto* command = app.add_subcommand("decode", "the messages of a raw recording, one a line");
+  auto options = std::make_shared<Options>();
+  command->add_option("FILE", options->file, "raw bytes as a device sent them")->required();
+  command->add_option("--protocol", options->protocol, "which one; found by itself where not given");
+  command->add_flag("--json", options->json, "one JSON object a line");
+  on_chosen(*command, chosen, [options] { return decode(*options); });
+}
+
+}  // namespace imuscope::cli

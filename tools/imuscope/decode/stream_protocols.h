@@ -1,0 +1,42 @@
+#pragma once
+
+/// The protocols that `imuscope decode` knows. Each turns a whole recorded stream into messages for people; a
+/// driver turns the same bytes into samples. A new protocol is one file here and one line in the table.
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace imuscope::cli {
+
+/// One message of a stream.
+struct DecodedMessage {
+  std::uint64_t offset = 0;  ///< of its first byte
+  std::size_t size = 0;      ///< bytes of its frame
+  std::string message;       ///< what the protocol's documents call it
+  nlohmann::ordered_json fields = nlohmann::ordered_json::object();
+};
+
+using OnMessage = std::function<void(const DecodedMessage&)>;
+
+struct StreamProtocol {
+  std::string_view name;
+  /// Calls back for each message, in stream order.
+  void (*decode)(std::span<const std::uint8_t> stream, const OnMessage& on_message);
+  /// Its frames are protected well enough to be looked for between those of another protocol.
+  bool mixes_with_others;
+};
+
+/// In the order in which they are tried.
+std::span<const StreamProtocol> stream_protocols();
+
+void decode_xsens_mt(std::span<const std::uint8_t> stream, const OnMessage& on_message);
+
+/// Lower-case hexadecimal digits.
+std::string hex(std::span<const std::uint8_t> bytes);
+
+}  // namespace imuscope::cli
