@@ -42,4 +42,7 @@ void add_process(CLI::App& app, Work& chosen);
 /// `imuscope report RUN_DIR`
 void add_report(CLI::App& app, Work& chosen);
 
+/// `imuscope decode FILE`
+void add_decode(CLI::App& app, Work& chosen);
+
 }  // namespace imuscope::cli

@@ -19,6 +19,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_replay(app, work);
   imuscope::cli::add_process(app, work);
   imuscope::cli::add_report(app, work);
+  imuscope::cli::add_decode(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
