@@ -21,6 +21,10 @@ constexpr double kOverlapMin_s = 10.0;
 constexpr double kMotionMin_radps = 0.005;
 constexpr double kCorrelationMin = 0.3;
 constexpr double kDistinctnessMin = 1.05;
+// Live, a wrong answer costs more than a late one: an idling engine correlates with itself at many lags, and
+// a filter that begins there has to begin again.
+constexpr double kLiveCorrelationMin = 0.7;
+constexpr double kLiveDistinctnessMin = 1.2;
 constexpr double kSegment_s = 30.0;
 constexpr std::size_t kSegmentsMinForClockRate = 4;
 constexpr double kSegmentSearch_s = 0.5;
@@ -333,7 +337,7 @@ bool LiveTimeOffset::estimate(TimeOffset& out) noexcept {
                                           correlation_.begin());
   if (k == 0 || k + 1 == correlation_.size()) return false;
   const double distinctness = distinctness_of(correlation_, k);
-  if (correlation_[k] < kCorrelationMin || distinctness < kDistinctnessMin) return false;
+  if (correlation_[k] < kLiveCorrelationMin || distinctness < kLiveDistinctnessMin) return false;
   const double top = parabola_top(correlation_[k - 1], correlation_[k], correlation_[k + 1]);
   out = TimeOffset{};
   out.offset_s = (static_cast<double>(k) + top - static_cast<double>(kMaxLag)) * kStep_s;

@@ -130,6 +130,8 @@ void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
     const HostTime valid = is_mean ? sample.time - increment_centre_ : sample.time;
     const double t_d_s = calibrating_ ? context.core.study(index_).t_d_s : coarse_t_d_s_;
     output_.t_d_s = t_d_s;
+    // Before the reference is asked: a coarse offset that points outside its window must be able to heal.
+    if (!calibrating_) live_offset_.add_study(valid, to_eigen(sample.imu.omega_radps).norm());
     ReferenceKinematics b;
     switch (context.window.evaluate(valid + from_seconds(t_d_s), b)) {
       case ReferenceResult::kTooNew:
@@ -139,6 +141,7 @@ void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
       case ReferenceResult::kTooOld:
       case ReferenceResult::kGap:
         ++output_.counters.no_reference;
+        if (!calibrating_) attempt(context, valid);
         break;
       case ReferenceResult::kOk:
         process_sample(context, sample, valid, b);
@@ -213,9 +216,12 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
 
 void StudyFilter::gather(StudyContext& context, const Sample& sample, HostTime valid,
                          const ReferenceKinematics& b) noexcept {
-  const Vector3d omega = to_eigen(sample.imu.omega_radps);
-  live_offset_.add_study(valid, omega.norm());
-  coarse_mounting_.add(b.omega_radps, b.f_mps2, omega, to_eigen(sample.imu.f_mps2));
+  coarse_mounting_.add(b.omega_radps, b.f_mps2, to_eigen(sample.imu.omega_radps),
+                       to_eigen(sample.imu.f_mps2));
+  attempt(context, valid);
+}
+
+void StudyFilter::attempt(StudyContext& context, HostTime valid) noexcept {
   if (valid < next_attempt_) return;
   next_attempt_ = valid + kCoarseEvery;
   try_coarse_alignment(context, valid);

@@ -54,6 +54,7 @@ class StudyFilter {
                       const ReferenceKinematics& measured) noexcept;
   void gather(StudyContext& context, const Sample& sample, HostTime valid,
               const ReferenceKinematics& b) noexcept;
+  void attempt(StudyContext& context, HostTime valid) noexcept;
   void try_coarse_alignment(StudyContext& context, HostTime now) noexcept;
   void begin(StudyContext& context, HostTime now, const Eigen::Matrix3d& C_b_s,
              const Eigen::Matrix3d& mounting_covariance, double t_d_s, double t_d_sd_s) noexcept;

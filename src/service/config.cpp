@@ -22,6 +22,7 @@ constexpr std::array kProtocolNames{std::string_view("xsens_mt"), std::string_vi
                                     std::string_view("csv_gnss")};
 
 constexpr double kMaxRate_hz = 2000.0;
+constexpr int kMaxAveraged = 50;
 constexpr double kMaxBaud = 4'000'000.0;
 
 template <std::size_t N>
@@ -207,6 +208,8 @@ DeviceConfig read_device(TomlReader in) {
   read_transport(in.table("transport"), device.serial);
   read_noise(in.table("noise"), device.rate_hz, device.noise);
   read_prior(in.table("prior"), device.prior);
+  if (device.role == DeviceRole::kStudy)
+    in.integer("average_samples", device.average_samples, 1, kMaxAveraged);
   if (is_csv(device.protocol)) read_csv(in.table("csv"), device.csv);
   if (device.role == DeviceRole::kGnss) {
     device.gnss.position_sd_m = {0.02, 0.02, 0.04};

@@ -91,6 +91,7 @@ struct DeviceConfig {
   std::optional<SerialConfig> serial;
   ImuNoiseConfig noise;       ///< reference and study
   MountingPriorConfig prior;  ///< study
+  int average_samples = 1;    ///< study: samples taken into one measurement update, see StudyConfig
   CsvConfig csv;              ///< csv_imu, csv_gnss
   GnssOptions gnss;           ///< gnss
 };

@@ -58,6 +58,7 @@ StudyConfig study_config(const DeviceConfig& device, std::size_t index, bool pap
   StudyConfig study;
   study.device = static_cast<DeviceIndex>(index);
   study.rate_hz = device.rate_hz;
+  study.average_samples = device.average_samples;
   if (paper_states) study.blocks = kPaperStudyBlocks;
   const auto& noise = device.noise;
   set_triad(noise.gyro_white_sd_radps, noise.gyro_white_sd_static_radps, study.noise.gyro);
