@@ -14,7 +14,7 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 template <std::size_t N>
 void copy_text(std::array<char, N>& to, std::string_view text) noexcept {
   const std::size_t n = std::min(text.size(), N - 1);
-  std::memcpy(to.data(), text.data(), n);
+  std::copy_n(text.begin(), n, to.begin());
   to[n] = '\0';
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/device/calendar.h"
 #include "drivers/device/gps_time.h"
 #include "drivers/device/wgs84.h"
 
@@ -18,21 +19,12 @@ constexpr std::int64_t kSolutionDelayMaxMs = 60'000;
 /// Receivers keep their clock within a millisecond of the reference time, or within half a second at worst.
 constexpr double kTimeOffsetMax_s = 0.5;
 
-constexpr std::uint16_t kFirstPlausibleYear = 2000;
-
 /// Time of day difference a - b, taken through midnight: in [-12 h, 12 h).
 constexpr std::int64_t tod_difference(std::uint32_t a_ms, std::uint32_t b_ms) noexcept {
   std::int64_t difference = static_cast<std::int64_t>(a_ms) - static_cast<std::int64_t>(b_ms);
   if (difference < -kMsPerDay / 2) difference += kMsPerDay;
   if (difference >= kMsPerDay / 2) difference -= kMsPerDay;
   return difference;
-}
-
-std::optional<std::int64_t> days_since_1970(const ReceiverDate& date) noexcept {
-  const std::chrono::year_month_day ymd{std::chrono::year{date.year}, std::chrono::month{date.month},
-                                        std::chrono::day{date.day}};
-  if (date.year < kFirstPlausibleYear || !ymd.ok()) return std::nullopt;
-  return std::chrono::sys_days{ymd}.time_since_epoch().count();
 }
 
 std::int64_t since_1970_ms(const GpsTime& time) noexcept {
@@ -255,7 +247,7 @@ bool Decoder::unwrap_time(std::uint32_t tod_ms) noexcept {
 
 void Decoder::update_date() noexcept {
   if (epoch_.date && epoch_.date->base <= static_cast<std::uint8_t>(TimeBase::kUtcSu)) {
-    if (const auto days = days_since_1970(*epoch_.date)) {
+    if (const auto days = days_since_1970(epoch_.date->year, epoch_.date->month, epoch_.date->day)) {
       since_1970_minus_time_ms_ = *days * kMsPerDay + epoch_.tod_ms - time_ms_;
       base_ = static_cast<TimeBase>(epoch_.date->base);
       date_from_receiver_date_ = true;

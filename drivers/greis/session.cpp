@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstring>
 
 namespace imuscope::greis {
 namespace {
@@ -33,7 +32,7 @@ class TextWriter {
   explicit TextWriter(std::span<char> out) noexcept : out_(out) {}
   TextWriter& operator<<(std::string_view text) noexcept {
     const std::size_t n = std::min(text.size(), out_.size() - size_);
-    std::memcpy(out_.data() + size_, text.data(), n);
+    std::copy_n(text.begin(), n, out_.begin() + static_cast<std::ptrdiff_t>(size_));
     size_ += n;
     return *this;
   }

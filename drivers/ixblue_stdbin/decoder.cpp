@@ -1,11 +1,11 @@
 #include "drivers/ixblue_stdbin/decoder.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/units.h"
 #include "drivers/device/bytes.h"
+#include "drivers/device/calendar.h"
 
 namespace imuscope::ixblue_stdbin {
 namespace {
@@ -22,15 +22,9 @@ constexpr std::int32_t kLostMax = 360'000;
 /// Where date and time of day may belong to different days (a public driver allows the same).
 constexpr std::int64_t kNearMidnightTicks = 600 * 10'000;
 
-constexpr std::uint16_t kFirstPlausibleYear = 2000;
-
 /// Date block to days since 1970; nothing where it is not a date.
-std::optional<std::int64_t> days_since_1970(std::span<const std::uint8_t> block) noexcept {
-  const std::uint16_t year = read_be<std::uint16_t>(block, 2);
-  const std::chrono::year_month_day date{std::chrono::year{year}, std::chrono::month{block[1]},
-                                         std::chrono::day{block[0]}};
-  if (year < kFirstPlausibleYear || !date.ok()) return std::nullopt;
-  return std::chrono::sys_days{date}.time_since_epoch().count();
+std::optional<std::int64_t> days_of(std::span<const std::uint8_t> block) noexcept {
+  return days_since_1970(read_be<std::uint16_t>(block, 2), block[1], block[0]);
 }
 
 using Matrix3 = std::array<double, 9>;
@@ -221,7 +215,7 @@ void Decoder::update_utc(const Telegram& telegram) noexcept {
   }
   const std::int64_t expected = utc_ticks_ + (ticks_ - utc_at_ticks_);
   const auto block = telegram.block(Nav::kSystemDate);
-  const auto days = block.empty() ? std::nullopt : days_since_1970(block);
+  const auto days = block.empty() ? std::nullopt : days_of(block);
   if (days) {
     const std::int64_t time_of_day = telegram.validity_ticks;
     utc_ticks_ = *days * kTicksPerDay + time_of_day;

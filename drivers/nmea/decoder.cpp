@@ -1,9 +1,9 @@
 #include "drivers/nmea/decoder.h"
 
-#include <chrono>
 #include <cmath>
 
 #include "base/units.h"
+#include "drivers/device/calendar.h"
 
 namespace imuscope::nmea {
 namespace {
@@ -180,12 +180,12 @@ bool Decoder::unwrap_time() noexcept {
 
 void Decoder::update_date() noexcept {
   if (!epoch_.date) return;
-  const std::chrono::year_month_day date{std::chrono::year{epoch_.date->year},
-                                         std::chrono::month{static_cast<unsigned>(epoch_.date->month)},
-                                         std::chrono::day{static_cast<unsigned>(epoch_.date->day)}};
-  if (!date.ok()) return;
-  const std::int64_t days = std::chrono::sys_days{date}.time_since_epoch().count();
-  since_1970_minus_time_ns_ = days * kNsPerDay + epoch_.tod_ns - time_ns_;
+  const Date& date = *epoch_.date;
+  if (date.month < 0 || date.day < 0) return;
+  const auto days =
+      days_since_1970(date.year, static_cast<unsigned>(date.month), static_cast<unsigned>(date.day));
+  if (!days) return;
+  since_1970_minus_time_ns_ = *days * kNsPerDay + epoch_.tod_ns - time_ns_;
 }
 
 void Decoder::fill_position(GnssData& gnss) const noexcept {

@@ -1,9 +1,9 @@
 #include "drivers/rtklib_pos/messages.h"
 
 #include <charconv>
-#include <chrono>
 #include <cmath>
 
+#include "drivers/device/calendar.h"
 #include "drivers/device/gps_time.h"
 
 namespace imuscope::rtklib_pos {
@@ -80,13 +80,11 @@ std::optional<std::int64_t> calendar_time(std::string_view date, std::string_vie
   const auto minute = to_number<int>(time.substr(colon + 1, second_colon - colon - 1));
   const auto second = to_number<double>(time.substr(second_colon + 1));
   if (!year || !month || !day || !hour || !minute || !second) return std::nullopt;
-  const std::chrono::year_month_day ymd{std::chrono::year{*year}, std::chrono::month{*month},
-                                        std::chrono::day{*day}};
-  const bool possible = ymd.ok() && *hour >= 0 && *hour < 24 && *minute >= 0 && *minute < 60 &&
-                        *second >= 0.0 && *second < 61.0;
+  const auto days = days_since_1970(*year, *month, *day);
+  const bool possible =
+      days && *hour >= 0 && *hour < 24 && *minute >= 0 && *minute < 60 && *second >= 0.0 && *second < 61.0;
   if (!possible) return std::nullopt;
-  const std::int64_t days = std::chrono::sys_days{ymd}.time_since_epoch().count();
-  return (days * kSecondsPerDayInt + *hour * 3600 + *minute * 60) * kNsPerSecond + to_ns(*second);
+  return (*days * kSecondsPerDayInt + *hour * 3600 + *minute * 60) * kNsPerSecond + to_ns(*second);
 }
 
 std::optional<std::int64_t> week_time(std::string_view week_text, std::string_view tow_text) noexcept {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "base/units.h"
+#include "drivers/device/calendar.h"
 
 namespace imuscope::ubx {
 namespace {
@@ -14,12 +15,11 @@ constexpr double kMetrePerMm = 1e-3;
 constexpr std::int64_t kNsPerMs = 1'000'000;
 
 std::optional<UtcTime> utc_of(const NavPvt& pvt) noexcept {
-  const std::chrono::year_month_day date{std::chrono::year{pvt.year}, std::chrono::month{pvt.month},
-                                         std::chrono::day{pvt.day}};
   constexpr std::uint8_t kBoth = kValidDate | kValidTime;
-  if ((pvt.valid & kBoth) != kBoth || !date.ok()) return std::nullopt;
-  return UtcTime{std::chrono::sys_days{date}} + std::chrono::hours(pvt.hour) +
-         std::chrono::minutes(pvt.minute) + std::chrono::seconds(pvt.sec) + Duration(pvt.nano);
+  const auto days = days_since_1970(pvt.year, pvt.month, pvt.day);
+  if ((pvt.valid & kBoth) != kBoth || !days) return std::nullopt;
+  return UtcTime{std::chrono::days(*days)} + std::chrono::hours(pvt.hour) + std::chrono::minutes(pvt.minute) +
+         std::chrono::seconds(pvt.sec) + Duration(pvt.nano);
 }
 
 GnssSolution solution_of(const NavPvt& pvt) noexcept {
