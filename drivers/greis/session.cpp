@@ -31,9 +31,9 @@ class TextWriter {
  public:
   explicit TextWriter(std::span<char> out) noexcept : out_(out) {}
   TextWriter& operator<<(std::string_view text) noexcept {
-    const std::size_t n = std::min(text.size(), out_.size() - size_);
-    std::copy_n(text.begin(), n, out_.begin() + static_cast<std::ptrdiff_t>(size_));
-    size_ += n;
+    for (const char c : text) {
+      if (size_ < out_.size()) out_[size_++] = c;
+    }
     return *this;
   }
   TextWriter& operator<<(std::int64_t number) noexcept {

@@ -174,7 +174,8 @@ TEST(RtklibPosDecoder, DegreesMinutesSecondsAndSeparatorsAreRead) {
 
 TEST(RtklibPosDecoder, LinesThatAreNoSolutionAreCountedAndTheNextOneIsRead) {
   for (const char* bad :
-       {"hello\n", "2026/13/14 12:34:56 45 5 81 1 12 1 1 1 0 0 0 0 0\n",
+       {"hello\n", "29999/03/14 12:34:56 45 5 81 1 12 1 1 1 0 0 0 0 0\n",
+        "2026/13/14 12:34:56 45 5 81 1 12 1 1 1 0 0 0 0 0\n",
         "2026/03/14 12:34:56 95 5 81 1 12 1 1 1 0 0 0 0 0\n", "2026/03/14 12:34:56 45 5 81 1\n",
         "2026/03/14 12:34:56 45 x 81 1 12 1 1 1 0 0 0 0 0\n"}) {
     Rig rig;
