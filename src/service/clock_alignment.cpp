@@ -11,6 +11,10 @@ namespace imuscope {
 
 namespace {
 
+/// An offset is good to some milliseconds; over less time than this it says less about a quartz's rate (tens
+/// of ppm) than is known beforehand.
+constexpr double kClockRateMin_s = 300.0;
+
 struct RateSeries {
   std::vector<double> time_s;
   std::vector<double> rate_radps;
@@ -47,8 +51,11 @@ bool shares_the_reference_clock(const DeviceConfig& device) {
 Result<DeviceClock> align_by_rate(const std::string& name, const RateSeries& reference,
                                   const std::vector<Sample>& samples) {
   const auto study = rate_series(samples);
+  TimeOffsetOptions options;
+  options.estimate_clock_rate =
+      !study.time_s.empty() && study.time_s.back() - study.time_s.front() >= kClockRateMin_s;
   const auto found =
-      find_time_offset({reference.time_s, reference.rate_radps}, {study.time_s, study.rate_radps});
+      find_time_offset({reference.time_s, reference.rate_radps}, {study.time_s, study.rate_radps}, options);
   if (!found) {
     return work_error(
         fmt::format("{}: its clock cannot be brought to the reference's: {}", name, found.error().what),
