@@ -39,7 +39,7 @@ struct TurningBody {
 
 StudyEpoch epoch_at(double t, const Eigen::Matrix3d& C_b_s, const Vector3d& r_b, const Vector3d& error_gyro,
                     const Vector3d& error_accel) {
-  StudyEpoch epoch;
+  StudyEpoch epoch{};
   epoch.omega_ib_b_radps = array(TurningBody::omega_b(t));
   epoch.omega_dot_ib_b_radps2 = array(TurningBody::omega_dot_b(t));
   epoch.f_b_mps2 = array(TurningBody::R(t).transpose() * TurningBody::acceleration(t, Vector3d::Zero()));
@@ -79,7 +79,7 @@ TEST(ErrorRow, OfAPointOnATurningBodyIsTheErrorThatWasPutIn) {
 }
 
 TEST(ErrorRow, TakesTheReferenceBiasOfTheCallersChoice) {
-  StudyEpoch epoch;
+  StudyEpoch epoch{};
   epoch.sample.flags = kGyroValid | kAccelValid;
   epoch.omega_ib_b_radps = {1.0, 0.0, 0.0};  // compensated with 0.1
   epoch.reference_gyro_bias_radps = {0.1, 0.0, 0.0};
@@ -90,7 +90,7 @@ TEST(ErrorRow, TakesTheReferenceBiasOfTheCallersChoice) {
 }
 
 TEST(ErrorRow, AClippedTriadIsNotValid) {
-  StudyEpoch epoch;
+  StudyEpoch epoch{};
   epoch.sample.flags = kGyroValid | kAccelValid | kAccelClipY;
   const auto row = error_row(epoch, {}, {});
   EXPECT_TRUE(row.gyro_valid);

@@ -1,0 +1,157 @@
+/// Real drives with a real sensor, from CSV files to noise models, by the program and the committed
+/// configuration. Known values come with the recordings: independent batch estimates over many drives.
+
+#include <gtest/gtest.h>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "mounting_compare.h"
+#include "programs.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::test {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+const Matrix3d kFluToFrd = Vector3d(1.0, -1.0, -1.0).asDiagonal();
+constexpr double kDeg = 180.0 / 3.14159265358979323846;
+
+struct KnownDrive {
+  const char* name;
+  double t_d_s;  ///< to be added to the study clock
+};
+
+Matrix3d known_C_b_s() { return (kFluToFrd * from_zyx_deg(-1.93, 0.20, -93.63)).transpose(); }
+Vector3d known_r_bs_b_m() { return kFluToFrd * Vector3d(0.002, 0.038, 0.154); }
+
+int process(const std::filesystem::path& drive, const std::filesystem::path& study,
+            const std::filesystem::path& out) {
+  return run_program("imuscope",
+                     {"process", "reference=" + (drive / "reference_imu.csv").string(),
+                      "gnss=" + (drive / "gnss.csv").string(), "dot=" + study.string(), "--config",
+                      source_path("config/csv_drive.toml").string(), "--out", out.string()},
+                     out.string() + ".log");
+}
+
+class RecordedDrive : public testing::TestWithParam<KnownDrive> {};
+
+TEST_P(RecordedDrive, GivesTheKnownMountingLeverArmAndTimeOffsetWithoutAnyPrior) {
+  IMUSCOPE_NEEDS_SHARED("data/car_drive");
+  const auto drive = shared_path("data/car_drive") / GetParam().name;
+  const auto out = scratch_folder() / "run";
+  ASSERT_EQ(process(drive, drive / "study_imu.csv", out), 0) << read_text(out.string() + ".log");
+
+  const auto calibration = read_json(out / "calibration.json");
+  const auto& imu = calibration.at("imus").at(0);
+  const Vector3d psi_deg = kDeg * rotation_between_b(known_C_b_s(), matrix_of(imu.at("C_b_s")));
+  const Vector3d r_mm = 1e3 * (vector_of(imu.at("r_bs_b_m")) - known_r_bs_b_m());
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_LT(std::abs(psi_deg[i]), 0.5) << "boresight axis " << i;
+    EXPECT_LT(std::abs(r_mm[i]), 30.0) << "lever arm axis " << i;
+    EXPECT_GT(vector_of(imu.at("boresight_sd_deg"))[i], 0.0);
+    EXPECT_GT(vector_of(imu.at("r_bs_b_sd_m"))[i], 0.0);
+  }
+  EXPECT_NEAR(imu.at("t_d_s").get<double>(), GetParam().t_d_s, 0.015);
+  EXPECT_GT(imu.at("t_d_sd_s").get<double>(), 0.0);
+
+  // The error process and, for every axis over the whole drive, wavelet variance and model.
+  EXPECT_GT(std::filesystem::file_size(out / "errors_dot.csv"), 1'000'000U);
+  std::set<std::string> axes;
+  const auto models = read_json(out / "models.json");
+  for (const auto& model : models.at("models")) {
+    if (model.at("regime") != "all") continue;
+    axes.insert(model.at("axis").get<std::string>());
+    EXPECT_EQ(model.at("model"), "WN+2*GM");
+    EXPECT_GE(model.at("wv").size(), 10U);
+  }
+  EXPECT_EQ(axes.size(), 6U);
+  EXPECT_TRUE(std::filesystem::exists(out / "report.html"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Car, RecordedDrive,
+                         testing::Values(KnownDrive{"02", 0.253}, KnownDrive{"07", 0.035},
+                                         KnownDrive{"08", -0.075}),
+                         [](const auto& drive) { return std::string("Drive") + drive.param.name; });
+
+/// The study file with its axes named anew: x' = y, y' = z, z' = x.
+void write_permuted(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::ifstream in(from);
+  std::ofstream out(to);
+  std::string line;
+  std::getline(in, line);
+  out << line << '\n';
+  while (std::getline(in, line)) {
+    std::vector<std::string> f;
+    std::istringstream fields(line);
+    for (std::string field; std::getline(fields, field, ',');) f.push_back(field);
+    out << f[0] << ',' << f[1] << ',' << f[3] << ',' << f[4] << ',' << f[2] << ',' << f[6] << ',' << f[7]
+        << ',' << f[5] << '\n';
+  }
+}
+
+TEST(PermutedDrive, WithTheStudyAxesPermutedGivesTheCorrespondinglyRotatedAnswer) {
+  IMUSCOPE_NEEDS_SHARED("data/car_drive");
+  const auto drive = shared_path("data/car_drive/08");
+  const auto folder = scratch_folder();
+  const auto permuted = folder / "permuted.csv";
+  write_permuted(drive / "study_imu.csv", permuted);
+  ASSERT_EQ(process(drive, drive / "study_imu.csv", folder / "as_is"), 0);
+  ASSERT_EQ(process(drive, permuted, folder / "permuted"), 0) << read_text((folder / "permuted.log"));
+
+  Matrix3d P = Matrix3d::Zero();  // takes the old components to the new ones
+  P(0, 1) = P(1, 2) = P(2, 0) = 1.0;
+  const auto as_is = read_json(folder / "as_is" / "calibration.json").at("imus").at(0);
+  const auto turned = read_json(folder / "permuted" / "calibration.json").at("imus").at(0);
+  const Vector3d difference_deg =
+      kDeg * rotation_between_b(P * matrix_of(as_is.at("C_b_s")), matrix_of(turned.at("C_b_s")));
+  // Same data, same information: what differs is the order of rounding.
+  EXPECT_LT(difference_deg.norm(), 1e-3);
+  EXPECT_LT((vector_of(as_is.at("r_bs_b_m")) - vector_of(turned.at("r_bs_b_m"))).norm(), 1e-4);
+  EXPECT_NEAR(as_is.at("t_d_s").get<double>(), turned.at("t_d_s").get<double>(), 1e-5);
+}
+
+TEST(SimulatedDrive, FromRawBytesFindsTheTruthWithinItsStandardDeviations) {
+  const auto folder = scratch_folder();
+  const auto recording = folder / "recording";
+  ASSERT_EQ(run_program("imusim",
+                        {"record", source_path("config/demo.toml").string(), "--minutes", "8", "--seed", "11",
+                         "--out", recording.string()},
+                        folder / "imusim.log"),
+            0)
+      << read_text(folder / "imusim.log");
+  std::vector<std::string> arguments{"process"};
+  for (const char* name : {"airins", "mtx1", "mtx2", "mtx3", "gnss"}) {
+    arguments.push_back(std::string(name) + "=" + (recording / (std::string(name) + ".bin")).string());
+  }
+  for (const auto& word : {std::string("--config"), (recording / "config.toml").string(),
+                           std::string("--out"), (folder / "run").string()}) {
+    arguments.push_back(word);
+  }
+  ASSERT_EQ(run_program("imuscope", arguments, folder / "imuscope.log"), 0)
+      << read_text(folder / "imuscope.log");
+
+  const auto found = read_json(folder / "run" / "calibration.json").at("imus");
+  const auto truth = read_json(recording / "truth.json").at("imus");
+  ASSERT_EQ(found.size(), 3U);
+  // 21 numbers of one seed: 4 sd is exceeded by chance once in a thousand such runs.
+  constexpr double kSds = 4.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    ASSERT_EQ(found[i].at("name"), truth[i].at("name"));
+    const Vector3d psi_deg =
+        kDeg * rotation_between_b(matrix_of(truth[i].at("C_b_s")), matrix_of(found[i].at("C_b_s")));
+    const Vector3d r_m = vector_of(found[i].at("r_bs_b_m")) - vector_of(truth[i].at("r_bs_b_m"));
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_LT(std::abs(psi_deg[axis]), kSds * vector_of(found[i].at("boresight_sd_deg"))[axis]);
+      EXPECT_LT(std::abs(r_m[axis]), kSds * vector_of(found[i].at("r_bs_b_sd_m"))[axis]);
+      EXPECT_LT(vector_of(found[i].at("boresight_sd_deg"))[axis], 0.020) << "the drive shows more than that";
+    }
+    // Clock maps of both devices wander by up to 0.1 ms beside the estimate's own sd.
+    EXPECT_NEAR(found[i].at("t_d_s").get<double>(), truth[i].at("t_d_s").get<double>(), 2e-4);
+  }
+}
+
+}  // namespace
+}  // namespace imuscope::test
