@@ -193,14 +193,14 @@ void World::add_reference(const PlayedDevice& played, Beginning beginning, doubl
           clock, beginning, begin_s);
 }
 
-void World::add_imu(const PlayedDevice& played, std::shared_ptr<ImuModel> imu, const StudyTruth& clock,
+void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const StudyTruth& clock,
                     Beginning beginning, double begin_s) {
   auto observer = std::make_shared<OnTrueSample>();
   observers_.emplace_back(played.name, observer);
   const Eigen::Matrix3d C_frame_device = played.C_device_frame.transpose();
   const std::shared_ptr<const Motion> motion = motion_;
   const auto sample = [motion, imu, observer](double t_s, std::int64_t counter) {
-    const ImuReading reading = imu->sample_at(t_s);
+    ImuReading reading = imu->sample_at(t_s);
     if (*observer) (*observer)({t_s, counter, reading, motion->regime_at(t_s)});
     return reading;
   };
@@ -307,8 +307,11 @@ SerialLine World::line_of(const PlayedDevice& played) const {
 }
 
 void World::observe(const std::string& name, OnTrueSample on_sample) {
-  for (auto& [observed, observer] : observers_)
-    if (observed == name) *observer = std::move(on_sample);
+  for (auto& [observed, observer] : observers_) {
+    if (observed != name) continue;
+    *observer = std::move(on_sample);
+    return;  // names are the devices' own: one device answers to each
+  }
 }
 
 }  // namespace imusim

@@ -71,7 +71,7 @@ class World {
                  double begin_s);
   void add_reference(const PlayedDevice& played, Beginning beginning, double begin_s);
   void add_gnss(const PlayedDevice& played, double begin_s);
-  void add_imu(const PlayedDevice& played, std::shared_ptr<ImuModel> imu, const StudyTruth& clock,
+  void add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const StudyTruth& clock,
                Beginning beginning, double begin_s);
 
   Configuration configuration_;

@@ -36,7 +36,7 @@ class SerialLine {
  public:
   using OnRead = std::function<void(std::span<const std::uint8_t> bytes, std::int64_t arrival_ns)>;
 
-  SerialLine(const LineOptions& options, Random random) : options_(options), random_(std::move(random)) {}
+  SerialLine(const LineOptions& options, const Random& random) : options_(options), random_(random) {}
 
   void send(const Emission& emission);
 

@@ -55,7 +55,7 @@ Result<void> Recorder::stop() {
   stop_.store(true);
   thread_.join();
   drain();  // this thread is the consumer now: join() orders it after the other
-  const Result<void> closed = writer_->close();
+  Result<void> closed = writer_->close();
   update_status(closed);
   return closed;
 }

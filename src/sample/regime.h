@@ -1,7 +1,7 @@
 #pragma once
 
-/// The vehicle's state to which a sample belongs. Measurement noise, error process and noise models are kept apart
-/// by it.
+/// The vehicle's state to which a sample belongs. Measurement noise, error process and noise models are kept
+/// apart by it.
 
 #include <cstddef>
 #include <cstdint>
