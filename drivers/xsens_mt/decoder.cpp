@@ -162,7 +162,7 @@ void MtDecoder::on_mtdata(const Frame& frame, HostTime arrival, SampleSink& sink
   }
 }
 
-// The master's counter, or the device's own; nothing where the layout has none.
+// The Xbus head's counter, or the device's own; nothing where the layout has none.
 std::optional<std::uint16_t> MtDecoder::counter_of(const Frame& frame) noexcept {
   if (xbus_) return read_be<std::uint16_t>(frame.data, 0);
   const DataLayout& layout = blocks_[0].layout;
@@ -291,7 +291,7 @@ bool MtDecoder::read_items(std::span<const std::uint8_t> data, Inertial& out) no
   return true;
 }
 
-// The packet counter counts messages whatever they hold: GNSS takes numbers of its own, so a hole among the
+// packet_counter counts messages whatever they hold: GNSS takes numbers of its own, so a hole among the
 // inertial messages alone is no loss.
 bool MtDecoder::count_message(const Inertial& message, HostTime first_byte) noexcept {
   if (!message.packet_counter) return true;

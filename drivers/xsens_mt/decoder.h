@@ -112,7 +112,7 @@ class MtDecoder final : public DeviceDecoder {
   // Legacy data.
   std::array<Block, kBusDevicesMax> blocks_{};
   std::size_t n_blocks_ = 1;
-  bool xbus_ = false;  ///< a counter of the master leads the blocks
+  bool xbus_ = false;  ///< a counter of the Xbus head leads the blocks
   std::int64_t counts_per_message_ = 1;
   double count_period_s_;
   CountUnwrapper counter_;

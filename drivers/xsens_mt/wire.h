@@ -20,7 +20,7 @@ inline constexpr std::size_t kChecksumSize = 1;
 inline constexpr std::size_t kDataMax = 2048;
 inline constexpr std::size_t kFrameMax = kExtendedHeaderSize + kDataMax + kChecksumSize;
 
-/// Bus ids: the only device or the master; devices on an Xbus count from 1.
+/// Bus ids: the only device or the Xbus head; devices on an Xbus count from 1.
 inline constexpr std::uint8_t kMasterBid = 0xFF;
 inline constexpr std::uint8_t kBusBidMax = 32;
 inline constexpr std::size_t kBusDevicesMax = 10;

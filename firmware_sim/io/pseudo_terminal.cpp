@@ -59,43 +59,43 @@ tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesy
   if (const std::error_code error = make_private_folders(link.parent_path()))
     return tl::unexpected(
         fmt::format("cannot make the folder {}: {}", link.parent_path().string(), error.message()));
-  const int master = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
+  const int near_end = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
   constexpr std::size_t kNameSize = 64;
   std::array<char, kNameSize> name{};
-  if (master < 0 || ::grantpt(master) != 0 || ::unlockpt(master) != 0 ||
-      ::ptsname_r(master, name.data(), name.size()) != 0 || !prepare_far_end(name.data())) {
+  if (near_end < 0 || ::grantpt(near_end) != 0 || ::unlockpt(near_end) != 0 ||
+      ::ptsname_r(near_end, name.data(), name.size()) != 0 || !prepare_far_end(name.data())) {
     const int cause = errno;
-    if (master >= 0) ::close(master);
+    if (near_end >= 0) ::close(near_end);
     return tl::unexpected(fmt::format("cannot open a pseudo-terminal: {}", std::strerror(cause)));
   }
   if (const std::error_code error = replace_link(name.data(), link)) {
-    ::close(master);
+    ::close(near_end);
     return tl::unexpected(
         fmt::format("cannot put a link to {} at {}: {}", name.data(), link.string(), error.message()));
   }
-  return PseudoTerminal(master, name.data(), link);
+  return PseudoTerminal(near_end, name.data(), link);
 }
 
 PseudoTerminal::PseudoTerminal(PseudoTerminal&& other) noexcept
-    : master_(std::exchange(other.master_, -1)),
+    : near_end_(std::exchange(other.near_end_, -1)),
       terminal_(std::move(other.terminal_)),
       link_(std::move(other.link_)) {}
 
 PseudoTerminal::~PseudoTerminal() {
-  if (master_ < 0) return;
-  ::close(master_);
+  if (near_end_ < 0) return;
+  ::close(near_end_);
   std::error_code error;
   if (std::filesystem::read_symlink(link_, error) == terminal_) std::filesystem::remove(link_, error);
 }
 
 bool PseudoTerminal::is_open_elsewhere() const {
-  pollfd state{master_, POLLOUT, 0};
+  pollfd state{near_end_, POLLOUT, 0};
   return ::poll(&state, 1, 0) >= 0 && (state.revents & POLLHUP) == 0;
 }
 
 std::size_t PseudoTerminal::write(std::span<const std::uint8_t> bytes) {
   if (bytes.empty() || !is_open_elsewhere()) return bytes.size();
-  const ssize_t written = ::write(master_, bytes.data(), bytes.size());
+  const ssize_t written = ::write(near_end_, bytes.data(), bytes.size());
   return bytes.size() - static_cast<std::size_t>(written > 0 ? written : 0);
 }
 
@@ -104,7 +104,7 @@ Bytes PseudoTerminal::read() {
   Bytes result;
   std::array<std::uint8_t, kChunk> chunk{};
   while (true) {
-    const ssize_t count = ::read(master_, chunk.data(), chunk.size());
+    const ssize_t count = ::read(near_end_, chunk.data(), chunk.size());
     if (count <= 0) return result;
     result.insert(result.end(), chunk.begin(), chunk.begin() + count);
   }

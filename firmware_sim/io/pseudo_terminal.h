@@ -40,10 +40,10 @@ class PseudoTerminal {
   [[nodiscard]] const std::string& terminal() const { return terminal_; }
 
  private:
-  PseudoTerminal(int master, std::string terminal, std::filesystem::path link)
-      : master_(master), terminal_(std::move(terminal)), link_(std::move(link)) {}
+  PseudoTerminal(int near_end, std::string terminal, std::filesystem::path link)
+      : near_end_(near_end), terminal_(std::move(terminal)), link_(std::move(link)) {}
 
-  int master_;
+  int near_end_;
   std::string terminal_;
   std::filesystem::path link_;
 };

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kBitsPerByte = 10.0;  // 8N1
 constexpr double kUsbFrame_s = 1e-3;
-// FTDI chips: a USB packet of 64 bytes, two of them status; the latency timer's default.
+// FTDI chips: a USB transfer of 64 bytes, two of them status; the latency timer's default.
 constexpr std::size_t kFtdiBytes = 62;
 constexpr double kFtdiTimer_s = 16e-3;
 
@@ -30,7 +30,7 @@ double SerialLine::next_usb_frame(double t_s) const {
 }
 
 SerialLine::NextRead SerialLine::next_ftdi_read() const {
-  // The timer runs on without data: it expires every 16 ms since the last packet.
+  // The timer runs on without data: it expires every 16 ms since the last transfer.
   const double first_s = waiting_.front().done_s;
   const double since_s = flushed_at_s_.value_or(first_s);
   const double expiry_s = since_s + (std::floor((first_s - since_s) / kFtdiTimer_s) + 1.0) * kFtdiTimer_s;

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
-
 #include <cmath>
 #include <cstdio>
 #include <fstream>

@@ -23,9 +23,9 @@ class PluggedDevice {
  public:
   explicit PluggedDevice(const std::filesystem::path& name) {
     char path[128];
-    int slave = -1;
-    EXPECT_EQ(openpty(&master_, &slave, path, nullptr, nullptr), 0);
-    close(slave);
+    int far_end = -1;
+    EXPECT_EQ(openpty(&near_end_, &far_end, path, nullptr, nullptr), 0);
+    close(far_end);
     const auto link = name.string() + ".new";
     std::filesystem::create_symlink(path, link);
     std::filesystem::rename(link, name);
@@ -34,13 +34,13 @@ class PluggedDevice {
   PluggedDevice(const PluggedDevice&) = delete;
   PluggedDevice& operator=(const PluggedDevice&) = delete;
   void unplug() {
-    if (master_ >= 0) close(master_);
-    master_ = -1;
+    if (near_end_ >= 0) close(near_end_);
+    near_end_ = -1;
   }
-  [[nodiscard]] int master() const { return master_; }
+  [[nodiscard]] int near_end() const { return near_end_; }
 
  private:
-  int master_ = -1;
+  int near_end_ = -1;
 };
 
 class SerialPortTest : public testing::Test {
@@ -60,7 +60,7 @@ TEST_F(SerialPortTest, CarriesEveryByteValueBothWaysUnchanged) {
   ASSERT_TRUE(port) << port.error().text();
   std::vector<std::uint8_t> all(256);
   std::iota(all.begin(), all.end(), std::uint8_t{0});
-  ASSERT_EQ(write(device_.master(), all.data(), all.size()), 256);
+  ASSERT_EQ(write(device_.near_end(), all.data(), all.size()), 256);
   ASSERT_TRUE(becomes_readable(port->fd()));
   std::vector<std::uint8_t> got(300);
   const IoResult read_result = port->read(got);
@@ -70,7 +70,7 @@ TEST_F(SerialPortTest, CarriesEveryByteValueBothWaysUnchanged) {
 
   EXPECT_EQ(port->write(all).n, 256U);
   std::vector<std::uint8_t> heard(300);
-  heard.resize(static_cast<std::size_t>(read(device_.master(), heard.data(), heard.size())));
+  heard.resize(static_cast<std::size_t>(read(device_.near_end(), heard.data(), heard.size())));
   EXPECT_EQ(heard, all);
 }
 
@@ -122,7 +122,7 @@ TEST_F(SerialPortTest, UnplugIsNoticedAndTheSameNameOpensTheNewDevice) {
   auto reopened = SerialPort::open(settings_);
   ASSERT_TRUE(reopened) << reopened.error().text();
   port = std::move(reopened);
-  ASSERT_EQ(write(again.master(), "x", 1), 1);
+  ASSERT_EQ(write(again.near_end(), "x", 1), 1);
   ASSERT_TRUE(becomes_readable(port->fd()));
   EXPECT_EQ(port->read(buffer).n, 1U);
 }
@@ -135,7 +135,7 @@ TEST_F(SerialPortTest, AStaleNameOfAnUnpluggedDeviceSaysToPlugItIn) {
 }
 
 TEST_F(SerialPortTest, WhatCameBeforeOpeningIsThrownAway) {
-  ASSERT_EQ(write(device_.master(), "old", 3), 3);
+  ASSERT_EQ(write(device_.near_end(), "old", 3), 3);
   auto port = SerialPort::open(settings_);
   ASSERT_TRUE(port);
   std::array<std::uint8_t, 8> buffer{};

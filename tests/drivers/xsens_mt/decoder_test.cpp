@@ -179,9 +179,9 @@ TEST(MtDecoder, AFixedClockNeedsNoArrivalsAndBackDatesNothing) {
 }
 
 /// One MTData2 message with inertial data.
-Bytes inertial(std::uint16_t packet, std::uint32_t ticks, std::uint32_t status = 0) {
+Bytes inertial(std::uint16_t count, std::uint32_t ticks, std::uint32_t status = 0) {
   Bytes data;
-  append_item(data, xdi::kPacketCounter, u16(packet));
+  append_item(data, xdi::kPacketCounter, u16(count));
   append_item(data, xdi::kSampleTimeFine, u32(ticks));
   append_item(data, xdi::kAcceleration, floats({0.5, 0.25, 9.75}));
   append_item(data, xdi::kRateOfTurn, floats({0.125, -0.5, 1.0}));
@@ -191,12 +191,12 @@ Bytes inertial(std::uint16_t packet, std::uint32_t ticks, std::uint32_t status =
 
 TEST(MtDecoder, GnssMessagesThatShareThePacketCounterAreNoLoss) {
   Line line;
-  std::uint16_t packet = 65500;
+  std::uint16_t count = 65500;
   for (int i = 0; i < 400; ++i) {
-    line.send(inertial(packet++, static_cast<std::uint32_t>(1000 + 100 * i)), kPeriod * i);
+    line.send(inertial(count++, static_cast<std::uint32_t>(1000 + 100 * i)), kPeriod * i);
     if (i % 25 != 3) continue;
     Bytes gnss;
-    append_item(gnss, xdi::kPacketCounter, u16(packet++));
+    append_item(gnss, xdi::kPacketCounter, u16(count++));
     append_item(gnss, 0x7010, Bytes(kGnssPvtSize));
     line.send(frame(mid::kMtData2, gnss), kPeriod * i + milliseconds{2});
   }

@@ -166,7 +166,7 @@ TEST(MtRecordings, EveryNumberOfTheFourRecordingsEqualsThePublishedDecode) {
   }
 }
 
-// 100 messages of 1 s, four of them GNSS solutions that share the packet counter: 96 samples, none lost.
+// 100 messages of 1 s, four of them GNSS solutions that share packet_counter: 96 samples, none lost.
 TEST(MtRecordings, AllInertialMessagesBecomeSamplesAndNoneIsLost) {
   for (int number = 1; number <= 4; ++number) {
     IMUSCOPE_NEEDS_SHARED(recording(number, ".bin"));
