@@ -79,11 +79,7 @@ Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration
                                               const std::vector<bool>& unstamped, const ReadSamples& read) {
   std::vector<DeviceClock> clocks(configuration.devices.size());
   const auto reference = configuration.reference_index();
-  if (!unstamped[reference]) {
-    if (std::find(unstamped.begin(), unstamped.end(), true) == unstamped.end()) return clocks;
-    return work_error("some recordings have arrival stamps (X.arrivals.csv) and others have none",
-                      "give stamps for all of them, or for none");
-  }
+  if (!unstamped[reference]) return clocks;
   const auto reference_samples = read(static_cast<DeviceIndex>(reference));
   if (!reference_samples) return tl::unexpected<Error>(reference_samples.error());
   const auto reference_rate = rate_series(*reference_samples);

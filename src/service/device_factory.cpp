@@ -127,6 +127,27 @@ std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& dec
   return {};
 }
 
+Error no_sample_error(const DeviceConfig& device, const std::vector<std::string>& inputs,
+                      const DeviceDecoder& decoder) {
+  std::string file = inputs.front();
+  bool is_dump = false;
+  for (const auto& input : inputs) {
+    if (!input.starts_with(device.name + "=")) continue;
+    file = input.substr(device.name.size() + 1);
+    is_dump = true;
+  }
+  if (const auto problem = decoder_problem(device, decoder); !problem.empty()) {
+    return {ErrorKind::kWork, fmt::format("{}: {}: {}", device.name, file, problem), {}};
+  }
+  return {ErrorKind::kWork,
+          fmt::format("{}: {}: {} bytes, and not one {} sample in them", device.name, file,
+                      decoder.counters().bytes, name_of(device.protocol)),
+          is_dump ? fmt::format("check that the file is this device's and the protocol is right; "
+                                "imuscope decode {} shows what it holds",
+                                file)
+                  : "check that the device's protocol is right"};
+}
+
 Result<void> check_recorded_file(const DeviceConfig& device, const std::filesystem::path& file) {
   switch (device.protocol) {
     case Protocol::kCsvImu:

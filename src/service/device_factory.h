@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "drivers/device/device.h"
@@ -23,6 +24,12 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device);
 /// What a decoder has to say about its device beyond counts, in one sentence with the remedy; empty when all
 /// is well. `decoder` must have been made for `device`.
 std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& decoder);
+
+/// Why a recording gave not one sample of `device`, with the file.
+/// @param inputs   of the recording, as given: one capture, or NAME=FILE
+/// @param decoder  made for `device`, after the recording's last byte
+Error no_sample_error(const DeviceConfig& device, const std::vector<std::string>& inputs,
+                      const DeviceDecoder& decoder);
 
 /// Looks at a recorded file before it is used: protocols that are text name the line and column of a mistake.
 Result<void> check_recorded_file(const DeviceConfig& device, const std::filesystem::path& file);

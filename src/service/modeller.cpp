@@ -2,9 +2,9 @@
 
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "noise/fit.h"
-#include "noise/wavelet_variance.h"
 #include "rt/host_clock.h"
 #include "service/report_values.h"
 
@@ -28,39 +28,54 @@ ModelBook::ModelBook(const Configuration& configuration, noise::ModelSpec spec) 
   }
 }
 
+void ModelBook::push(Study& study, const ErrorRow& row) {
+  const bool joined = study.started && row.counter == study.next_counter && row.regime == study.regime;
+  const auto regime = static_cast<std::size_t>(row.regime);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    auto& stream = study.streams[axis][regime];
+    const bool valid = axis < 3 ? row.gyro_valid : row.accel_valid;
+    if (!joined || !valid) stream.gap();
+    if (valid) stream.push(axis < 3 ? row.e_gyro_radps[axis] : row.e_accel_mps2[axis - 3]);
+  }
+  study.started = true;
+  study.next_counter = row.counter + 1;
+  study.regime = row.regime;
+}
+
 void ModelBook::add(const ErrorRecord& record) {
   auto& study = studies_[record.study];
-  study.series.add(record.row);
+  push(study, record.row);
   study.last_time = record.row.time;
   study.first_reference_time = record.first_reference_time;
   ++study.samples_since_refit;
 }
 
+Refit ModelBook::fit(std::size_t index) const {
+  const auto& study = studies_[index];
+  const HostTime started = host_now();
+  Refit refit{index, study.last_time, study.first_reference_time, {}, {}, 0.0};
+  refit.wavelet_variance.name = study.name;
+  refit.noise_model.name = study.name;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {
+      const auto wv = study.streams[axis][static_cast<std::size_t>(regime)].wavelet_variance();
+      if (wv.levels.empty()) continue;  // a regime that has not been met yet has no model
+      refit.wavelet_variance.axes.push_back(axis_wavelet_variance(wv, axis, regime, study.rate_hz));
+      noise::FitOptions options;
+      options.signal_unit = axis_unit(axis);
+      const auto fitted = noise::fit(wv, spec_, study.rate_hz, options);
+      if (fitted) refit.noise_model.models.push_back(axis_noise_model(*fitted, axis, regime));
+    }
+  }
+  refit.duration_s = to_seconds(host_now() - started);
+  return refit;
+}
+
 std::optional<Refit> ModelBook::refit() {
   for (std::size_t i = 0; i < studies_.size(); ++i) {
-    auto& study = studies_[i];
-    if (study.samples_since_refit < study.samples_per_refit) continue;
-    study.samples_since_refit = 0;
-    const HostTime started = host_now();
-    Refit refit{i, study.last_time, study.first_reference_time, {}, {}, 0.0};
-    refit.wavelet_variance.name = study.name;
-    refit.noise_model.name = study.name;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {
-        noise::WvOptions options;
-        const auto mask = study.series.mask(axis, regime);
-        options.mask = mask;
-        const auto wv = noise::haar_wavelet_variance(study.series.values(axis), options);
-        if (!wv) continue;  // a regime that has not been met yet has no model
-        refit.wavelet_variance.axes.push_back(axis_wavelet_variance(*wv, axis, regime, study.rate_hz));
-        noise::FitOptions fit_options;
-        fit_options.signal_unit = axis_unit(axis);
-        const auto fit = noise::fit(*wv, spec_, study.rate_hz, fit_options);
-        if (fit) refit.noise_model.models.push_back(axis_noise_model(*fit, axis, regime));
-      }
-    }
-    refit.duration_s = to_seconds(host_now() - started);
-    return refit;
+    if (studies_[i].samples_since_refit < studies_[i].samples_per_refit) continue;
+    studies_[i].samples_since_refit = 0;
+    return fit(i);
   }
   return std::nullopt;
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "noise/model.h"
+#include "noise/streaming_wv.h"
 #include "publish/reports.h"
 #include "rt/spsc_ring.h"
 #include "rt/thread_setup.h"
@@ -30,7 +31,8 @@ struct Refit {
   double duration_s = 0.0;
 };
 
-/// The statistics alone, without the thread: rows in, refits out by sample count.
+/// The statistics alone, without the thread: rows in, refits out by sample count. Memory is bounded: one
+/// streaming wavelet variance of 16 levels (512 KiB) an axis and regime, whatever the length of the run.
 class ModelBook {
  public:
   ModelBook(const Configuration& configuration, noise::ModelSpec spec);
@@ -41,15 +43,24 @@ class ModelBook {
   [[nodiscard]] std::optional<Refit> refit();
 
  private:
+  /// One axis in one regime.
+  using Streams = std::array<std::array<noise::StreamingWv, kRegimeCount>, kAxisCount>;
+
   struct Study {
     std::string name;
     double rate_hz = 0.0;
     std::size_t samples_per_refit = 0;
     std::size_t samples_since_refit = 0;
-    NoiseSeries series;
+    Streams streams;
+    bool started = false;
+    std::int64_t next_counter = 0;
+    Regime regime = Regime::kStatic;
     HostTime last_time{};
     HostTime first_reference_time{};
   };
+
+  static void push(Study& study, const ErrorRow& row);
+  [[nodiscard]] Refit fit(std::size_t index) const;
 
   std::vector<Study> studies_;
   noise::ModelSpec spec_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "capture/capture_reader.h"
+#include "capture/raw_dump.h"
 #include "service/device_factory.h"
 #include "service/toml_reader.h"
 
@@ -21,7 +22,8 @@ class SampleCollector final : public SampleSink {
   std::vector<Sample>& samples_;
 };
 
-Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex index, ByteSource& source) {
+Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex index,
+                                       const std::vector<std::string>& inputs, ByteSource& source) {
   std::vector<Sample> samples;
   SampleCollector collector(samples);
   const auto decoder = make_decoder(device, index, ClockMapConfig::fixed(HostTime{}, 1.0));
@@ -32,13 +34,7 @@ Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex i
     decoder->push((*read)->bytes, HostTime{}, collector);
   }
   decoder->finish(HostTime{}, collector);
-  if (samples.empty()) {
-    const auto problem = decoder_problem(device, *decoder);
-    if (!problem.empty()) return work_error(fmt::format("{}: {}", device.name, problem));
-    return work_error(fmt::format("{}: {} bytes, and not one {} sample in them", device.name,
-                                  decoder->counters().bytes, name_of(device.protocol)),
-                      "check that the file is this device's and the protocol is right");
-  }
+  if (samples.empty()) return tl::unexpected<Error>(no_sample_error(device, inputs, *decoder));
   return samples;
 }
 
@@ -80,6 +76,21 @@ Result<void> check_roles(const Configuration& configuration, const std::vector<b
   return {};
 }
 
+/// Arrival stamps are times of the host, which nothing ties to a device's own.
+Result<void> check_stamps(const std::vector<std::filesystem::path>& files, const std::vector<bool>& present,
+                          const std::vector<bool>& unstamped) {
+  const std::filesystem::path* with = nullptr;
+  const std::filesystem::path* without = nullptr;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (present[i]) (unstamped[i] ? without : with) = &files[i];
+  }
+  if (with == nullptr || without == nullptr) return {};
+  return usage_error(fmt::format("{} has arrival stamps ({}) and {} has none", with->string(),
+                                 RawDump::arrivals_path(*with).filename().string(), without->string()),
+                     fmt::format("put {} beside it, or give only files without stamps",
+                                 RawDump::arrivals_path(*without).filename().string()));
+}
+
 Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
   const auto files = assign_files(inputs, configuration);
   if (!files) return tl::unexpected<Error>(files.error());
@@ -112,11 +123,14 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
       return tl::unexpected<Error>(valid.error());
     }
   }
+  if (auto stamps = check_stamps(*files, recording.present, unstamped); !stamps) {
+    return tl::unexpected<Error>(stamps.error());
+  }
   recording.open = [files = *files](DeviceIndex index) { return open_raw_dump(files[index]); };
   auto clocks = align_clocks(configuration, unstamped, [&](DeviceIndex index) -> Result<std::vector<Sample>> {
     auto source = recording.open(index);
     if (!source) return tl::unexpected<Error>(source.error());
-    return decode_all(configuration.devices[index], index, **source);
+    return decode_all(configuration.devices[index], index, inputs, **source);
   });
   if (!clocks) return tl::unexpected<Error>(clocks.error());
   recording.clocks = std::move(*clocks);

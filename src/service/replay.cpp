@@ -215,15 +215,9 @@ class Replayer {
 
   [[nodiscard]] Result<void> check(const ReplayResult& result) const {
     for (std::size_t i = 0; i < result.devices.size(); ++i) {
-      const auto& device = configuration_.devices[i];
       if (!recording_.present[i] || result.devices[i].counters.samples > 0) continue;
-      const auto& counters = result.devices[i].counters;
-      const auto& problem = result.devices[i].problem;
-      return work_error(
-          problem.empty() ? fmt::format("{}: {} bytes, and not one {} sample in them", device.name,
-                                        counters.bytes, name_of(device.protocol))
-                          : fmt::format("{}: {}", device.name, problem),
-          problem.empty() ? "check that the file is this device's and the protocol is right" : "");
+      return tl::unexpected<Error>(
+          no_sample_error(configuration_.devices[i], recording_.inputs, feeds_[i]->decoder()));
     }
     return {};
   }

@@ -267,6 +267,11 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
                         const StudyRunOptions& options, bool realtime) {
   auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
+  // What an earlier study left in this folder would be taken for this run's.
+  for (const char* of_a_study : {"models.json", "report.html"}) {
+    std::error_code absent_is_well;
+    std::filesystem::remove(options.out / of_a_study, absent_is_well);
+  }
   ReplayOptions replay_options;
   replay_options.realtime = realtime;
   if (options.progress) replay_options.progress = [&](double share) { options.progress("replay", share); };

@@ -1,0 +1,96 @@
+#include "service/core.h"
+
+#include <gtest/gtest.h>
+
+#include "service/estimator_setup.h"
+
+namespace imuscope {
+namespace {
+
+class Notes final : public CoreSink {
+ public:
+  void on_error(const ErrorRecord&) noexcept override {}
+  void on_event(const EstimatorEvent&) noexcept override {}
+  void on_snapshot(const Snapshot& snapshot) noexcept override { snapshots.push_back(snapshot); }
+  void on_late_sample(const LateSample& sample) noexcept override { late.push_back(sample); }
+  std::vector<Snapshot> snapshots;
+  std::vector<LateSample> late;
+};
+
+EstimatorConfig one_study() {
+  return estimator_config(*parse_configuration(R"(
+[[device]]
+name = "r"
+role = "reference"
+protocol = "csv_imu"
+[[device]]
+name = "s"
+role = "study"
+protocol = "csv_imu"
+)",
+                                               "test.toml"));
+}
+
+HostTime at_ms(double ms) { return HostTime{from_seconds(1.0 + ms * 1e-3)}; }
+
+Sample imu_sample(DeviceIndex device, std::uint64_t sequence, double arrival_ms) {
+  Sample sample{};
+  sample.kind = SampleKind::kImu;
+  sample.device = device;
+  sample.sequence = sequence;
+  sample.arrival = at_ms(arrival_ms);
+  sample.time = at_ms(arrival_ms - 1.0);
+  sample.imu.f_mps2 = {0.0, 0.0, -9.8};
+  sample.imu.counter = static_cast<std::int64_t>(sequence);
+  sample.imu.flags = kGyroValid | kAccelValid;
+  return sample;
+}
+
+TEST(Core, ATickTakesWhatArrivedByItsCutAndLeavesTheRest) {
+  Core core(one_study(), 2);
+  Notes notes;
+  ASSERT_TRUE(core.ring(0).try_push(imu_sample(0, 0, 10.0)));
+  ASSERT_TRUE(core.ring(0).try_push(imu_sample(0, 1, 10.001)));
+  core.tick(1, at_ms(10.0), notes);
+  EXPECT_EQ(core.estimator().counters().reference_samples, 1U);
+  EXPECT_EQ(core.ring(0).counters().level, 1U);
+  core.tick(2, at_ms(20.0), notes);
+  EXPECT_EQ(core.estimator().counters().reference_samples, 2U);
+  EXPECT_TRUE(notes.late.empty());
+}
+
+TEST(Core, ASamplePushedAfterItsTickIsNotedAndAReplayTakesItAtTheSameTick) {
+  Notes live;
+  Core first(one_study(), 2);
+  ASSERT_TRUE(first.ring(0).try_push(imu_sample(0, 0, 5.0)));
+  first.tick(1, at_ms(10.0), live);
+  // Stamped before the cut of tick 1, pushed after its tick.
+  ASSERT_TRUE(first.ring(0).try_push(imu_sample(0, 1, 9.9)));
+  first.tick(2, at_ms(20.0), live);
+  ASSERT_EQ(live.late.size(), 1U);
+  EXPECT_EQ(live.late[0].sequence, 1U);
+  EXPECT_EQ(live.late[0].tick, 2);
+
+  Notes replayed;
+  Core second(one_study(), 2, live.late);
+  ASSERT_TRUE(second.ring(0).try_push(imu_sample(0, 0, 5.0)));
+  ASSERT_TRUE(second.ring(0).try_push(imu_sample(0, 1, 9.9)));
+  second.tick(1, at_ms(10.0), replayed);
+  EXPECT_EQ(second.estimator().counters().reference_samples, 1U) << "taken before the live run took it";
+  second.tick(2, at_ms(20.0), replayed);
+  EXPECT_EQ(second.estimator().counters().reference_samples, 2U);
+}
+
+TEST(Core, TheOriginOfTimesIsTheFirstReferenceEpoch) {
+  Core core(one_study(), 2);
+  Notes notes;
+  ASSERT_TRUE(core.ring(1).try_push(imu_sample(1, 0, 1.0)));
+  ASSERT_TRUE(core.ring(0).try_push(imu_sample(0, 0, 3.0)));
+  core.tick(10, at_ms(10.0), notes);
+  ASSERT_EQ(notes.snapshots.size(), 1U);
+  EXPECT_TRUE(notes.snapshots[0].has_reference);
+  EXPECT_EQ(notes.snapshots[0].first_reference_time, at_ms(2.0));
+}
+
+}  // namespace
+}  // namespace imuscope
