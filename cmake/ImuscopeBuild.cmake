@@ -81,16 +81,20 @@ function(imuscope_program name)
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS})
 endfunction()
 
-# imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds] [SLOW])
+# imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds] [SLOW] [ALONE])
 # One GoogleTest program; every test case is a CTest test of its own. SLOW: left out by tools/test --quick.
+# ALONE: runs in real time, so that no other test may run beside it.
 function(imuscope_test name)
-  cmake_parse_arguments(ARG "SLOW" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "SLOW;ALONE" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
   set(labels)
   if(ARG_SLOW)
     set(labels LABELS slow)
+  endif()
+  if(ARG_ALONE)
+    list(APPEND labels RUN_SERIAL TRUE)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS} test_support
