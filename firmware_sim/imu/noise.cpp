@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace imusim {
 
 NoiseSource::NoiseSource(const RegimeNoise& noise, RegimeSwitch regime_switch, Random random)
-    : noise_(noise), regime_switch_(regime_switch), random_(std::move(random)) {
+    : noise_(noise), regime_switch_(regime_switch), random_(random) {
   // A process that exists in one regime only has zero variance in the other.
   const std::size_t count = std::max(noise_.at_rest.processes.size(), noise_.in_motion.processes.size());
   noise_.at_rest.processes.resize(count);

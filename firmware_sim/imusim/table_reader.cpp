@@ -148,10 +148,11 @@ void TableReader::refuse_unknown_keys() {
   if (table_ == nullptr) return;
   for (const auto& [key, value] : *table_) {
     if (std::find(known_.begin(), known_.end(), key.str()) != known_.end()) continue;
+    const std::string_view unknown = key.str();
     const auto nearest = std::min_element(known_.begin(), known_.end(), [&](const auto& a, const auto& b) {
-      return edits_between(a, key.str()) < edits_between(b, key.str());
+      return edits_between(a, unknown) < edits_between(b, unknown);
     });
-    problem_->note(key.source(), fmt::format("[{}] has no key '{}'; the nearest is '{}'", name_, key.str(),
+    problem_->note(key.source(), fmt::format("[{}] has no key '{}'; the nearest is '{}'", name_, unknown,
                                              nearest == known_.end() ? "" : *nearest));
   }
 }
