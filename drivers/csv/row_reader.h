@@ -81,6 +81,11 @@ class RowReader {
   /// The header's names, as they stand there.
   [[nodiscard]] std::string_view header() const noexcept { return {header_.data(), header_size_}; }
 
+  /// Whether the header's column, counted from 0, is one of those asked for.
+  [[nodiscard]] bool is_wanted(std::size_t column) const noexcept {
+    return has_header_ && column < kColumnsMax && wanted_of_column_[column] != kNotWanted;
+  }
+
   [[nodiscard]] const RowError& error() const noexcept { return error_; }
   /// Keeps a mistake of the last row that only its user can see, unless there was one before.
   void report(RowError::Kind kind, std::size_t column, std::string_view text = {}) noexcept;

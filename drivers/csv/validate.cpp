@@ -42,17 +42,21 @@ std::string remedy_for_missing_column(const RowReader& reader) {
   std::size_t least = std::string::npos;
   bool only_numbers = true;
   const std::string_view wanted(reader.error().column.data());
-  for_each_cell(reader.header(), separator_of(reader.header()), [&](std::size_t, std::string_view name) {
-    only_numbers = only_numbers && is_number(name);
-    if (!all.empty()) all += ", ";
-    all += name;
-    const std::size_t distance = edit_distance(wanted, name);
-    if (distance >= least) return;
-    least = distance;
-    nearest = name;
-  });
+  for_each_cell(reader.header(), separator_of(reader.header()),
+                [&](std::size_t column, std::string_view name) {
+                  only_numbers = only_numbers && is_number(name);
+                  if (!all.empty()) all += ", ";
+                  all += name;
+                  // A column that another key asks for, and has, is not meant.
+                  if (reader.is_wanted(column)) return;
+                  const std::size_t distance = edit_distance(wanted, name);
+                  if (distance >= least) return;
+                  least = distance;
+                  nearest = name;
+                });
   if (only_numbers) return "the first line holds numbers: put a line with the names of the columns before it";
-  return "did you mean '" + nearest + "'? The columns are: " + all;
+  const std::string question = nearest.empty() ? "" : "did you mean '" + nearest + "'? ";
+  return question + "its columns are: " + all;
 }
 
 class NoSink final : public SampleSink {
@@ -80,11 +84,14 @@ Result<void> validate(const std::filesystem::path& file, RowDecoder& decoder) {
   if (found.kind == RowError::Kind::kMissingColumn) {
     return usage_error(name + ", " + describe(found), remedy_for_missing_column(decoder.reader()));
   }
-  if (found.kind != RowError::Kind::kNone) return usage_error(name + ", " + describe(found));
-  if (!decoder.reader().has_header()) {
-    return usage_error(name + ": is empty", "a CSV file has a line with the names of its columns, then rows");
+  if (found.kind != RowError::Kind::kNone) {
+    return work_error(name + ", " + describe(found), "correct that line, or take it out");
   }
-  if (decoder.counters().samples == 0) return usage_error(name + ": has a header but no row");
+  if (!decoder.reader().has_header()) {
+    return work_error(name + ": is empty", "a CSV file has a line with the names of its columns, then rows");
+  }
+  if (decoder.counters().samples == 0)
+    return work_error(name + ": has a header but no row", "check how it was written");
   return {};
 }
 

@@ -233,8 +233,8 @@ Outcome<Configuration> parse_configuration(const std::string& text, const std::f
   try {
     root = toml::parse(text, file.string());
   } catch (const toml::parse_error& error) {
-    return wrong_usage(
-        fmt::format("{}:{}: {}", file.string(), error.source().begin.line, error.description()));
+    return wrong_usage(fmt::format("{}:{}: not TOML: {}; config/ holds examples", file.string(),
+                                   error.source().begin.line, error.description()));
   }
   Problem problem{file.string(), {}};
   TableReader in(&root, "", problem);
@@ -258,8 +258,10 @@ Outcome<Configuration> load_configuration(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   text << in.rdbuf();
-  if (!in) return wrong_usage(fmt::format("configuration {} cannot be read", file.string()));
-  if (text.str().empty()) return wrong_usage(fmt::format("configuration {} is empty", file.string()));
+  if (!in)
+    return wrong_usage(fmt::format("configuration {} cannot be read; check its permissions", file.string()));
+  if (text.str().empty())
+    return wrong_usage(fmt::format("configuration {} is empty; config/ holds examples", file.string()));
   return parse_configuration(text.str(), file);
 }
 

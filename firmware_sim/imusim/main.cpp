@@ -15,6 +15,8 @@ namespace {
 using namespace imusim;
 
 constexpr double kSecondsPerMinute = 60.0;
+/// A day, the longest scenario.
+constexpr double kLongest_s = 86400.0;
 
 std::atomic<bool> g_stop = false;
 
@@ -97,9 +99,23 @@ struct LiveCommand {
   }
 };
 
+/// What CLI11 found wrong with the arguments, as one sentence.
+std::string usage_sentence(const CLI::App* app, const CLI::Error& error) {
+  std::string command = "imusim";
+  std::string what = error.what();
+  const auto chosen = app->get_subcommands();
+  if (!chosen.empty()) {
+    command += " " + chosen.front()->get_name();
+  } else if (!app->remaining().empty()) {
+    what = "there is no command '" + app->remaining().front() + "'";
+  }
+  return fmt::format("imusim: {}; see {} --help\n", what, command);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"imusim: simulated IMUs and a GNSS receiver on a vehicle, as bytes"};
   app.require_subcommand(1);
+  app.failure_message(usage_sentence);
   app.set_version_flag("--version", IMUSIM_VERSION);
   std::function<Outcome<void>()> work;
 
@@ -116,10 +132,10 @@ int run(int argc, char** argv) {
   CLI::App* live = app.add_subcommand("live", "plays the devices in real time on pseudo-terminals");
   live_command.common.add_to(*live);
   live->add_option("--seconds", live_command.options.seconds, "how long; to the scenario's end by default")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(0.01, kLongest_s));
   CLI::Option* start =
       live->add_option("--start-s", live_command.options.start_s, "begin this far into the scenario")
-          ->check(CLI::NonNegativeNumber);
+          ->check(CLI::Range(0.0, kLongest_s));
   live->add_flag("--skip-static", live_command.skip_static, "begin where the vehicle starts to move")
       ->excludes(start);
   live->add_option("--out", live_command.folder, "folder for truth.json and truth.csv");

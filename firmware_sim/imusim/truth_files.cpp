@@ -117,7 +117,7 @@ Outcome<void> make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (!std::filesystem::is_directory(folder))
-    return failed_work(fmt::format("cannot make the folder {}: {}", folder.string(),
+    return failed_work(fmt::format("cannot make the folder {}: {}; choose another --out", folder.string(),
                                    error ? error.message() : "something else has that name"));
   return {};
 }

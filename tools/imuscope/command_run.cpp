@@ -18,6 +18,10 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 extern "C" void request_stop(int) { stop_requested.store(true); }
 
+/// What --seconds accepts: something worth recording, to a year.
+constexpr double kShortestRun_s = 0.1;
+constexpr double kLongestRun_s = 365.0 * 86400.0;
+
 struct Options {
   std::string config;
   std::string out;
@@ -54,7 +58,7 @@ void add_run(CLI::App& app, Work& chosen) {
   command->add_option("--out,-o", options->out, "folder for capture and results (default: runs/NAME-TIME)")
       ->type_name("DIR");
   command->add_option("--seconds", options->seconds, "end by itself after this time")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(kShortestRun_s, kLongestRun_s));
   on_chosen(*command, chosen, [options] { return run(*options); });
 }
 

@@ -7,9 +7,23 @@
 
 namespace {
 
+/// What CLI11 found wrong with the arguments, as one sentence.
+std::string usage_sentence(const CLI::App* app, const CLI::Error& error) {
+  std::string command = "imuscope";
+  std::string what = error.what();
+  const auto chosen = app->get_subcommands();
+  if (!chosen.empty()) {
+    command += " " + chosen.front()->get_name();
+  } else if (!app->remaining().empty()) {
+    what = "there is no command '" + app->remaining().front() + "'";
+  }
+  return fmt::format("imuscope: {}; see {} --help\n", what, command);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"imuscope: shows, live on a moving vehicle, how wrong a low-cost IMU is, and why"};
   app.require_subcommand(1);
+  app.failure_message(usage_sentence);
   app.set_version_flag("--version", IMUSCOPE_VERSION);
   imuscope::cli::Work work;
   imuscope::cli::add_wv(app, work);

@@ -111,6 +111,20 @@ void print_model(const json& models) {
   }
 }
 
+/// What was read of each device: a recording that ends early or holds foreign bytes shows here.
+void print_devices(const json& devices) {
+  fmt::print("\n");
+  for (const auto& device : devices) {
+    const auto count = [&](const char* key) { return device.at(key).get<std::int64_t>(); };
+    if (count("bytes") == 0) continue;
+    fmt::print("{:<10} {} samples in {} bytes", device.at("name").get<std::string>(), count("samples"),
+               count("bytes"));
+    if (count("bytes_skipped") > 0) fmt::print(", {} of them in no valid message", count("bytes_skipped"));
+    if (count("samples_lost") > 0) fmt::print("; {} samples are missing", count("samples_lost"));
+    fmt::print("\n");
+  }
+}
+
 }  // namespace
 
 Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) {
@@ -127,6 +141,7 @@ Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) 
     fmt::print("{}\n", all.dump(2));
     return {};
   }
+  print_devices(run->at("devices"));
   for (const auto& imu : calibration->at("imus")) print_imu(imu, truth);
   if (models) print_model(*models);
   for (const auto& warning : run->at("warnings")) fmt::print("\nNote: {}\n", warning.get<std::string>());
