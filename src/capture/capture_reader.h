@@ -76,7 +76,8 @@ class CaptureReader {
     HostTime arrival;
     std::size_t device;
     std::uint64_t order;  // of completion within the file
-    auto operator<=>(const Key&) const = default;
+    // clang-tidy 14 takes the 0 of the comparison that the compiler writes for a pointer.
+    auto operator<=>(const Key&) const = default;  // NOLINT(modernize-use-nullptr)
   };
   struct Assembly {
     RawRead read;
