@@ -100,6 +100,13 @@ void log_refusals(const std::vector<Error>& refusals) {
   for (const auto& refusal : refusals) spdlog::warn("{}", refusal.text());
 }
 
+/// A recording is never written over, nor the files beside it.
+Result<void> check_folder(const std::filesystem::path& out) {
+  if (!std::filesystem::exists(out / "capture.lcm")) return {};
+  return usage_error(fmt::format("{} already holds a recording", out.string()),
+                     "choose another --out folder");
+}
+
 Result<void> check_lines(const Configuration& configuration) {
   for (const auto& device : configuration.devices) {
     if (device.serial) continue;
@@ -116,6 +123,7 @@ Result<void> check_lines(const Configuration& configuration) {
 Result<void> run_live(const Configuration& configuration, const LiveOptions& options,
                       const std::atomic<bool>& stop) {
   if (auto checked = check_lines(configuration); !checked) return checked;
+  if (auto checked = check_folder(options.out); !checked) return checked;
   const auto spec = noise::parse_model(configuration.noise.model);
   if (!spec) return tl::unexpected<Error>(spec.error());
   if (auto sized = set_thread_stack_size(kThreadStackBytes); !sized) spdlog::warn("{}", sized.error().text());
