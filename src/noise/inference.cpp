@@ -244,7 +244,7 @@ ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const 
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
   constexpr double kSingular = 1e-12;
-  const Eigen::VectorXd values = eigen.eigenvalues();
+  const Eigen::VectorXd& values = eigen.eigenvalues();
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Zero(values.size(), values.size());
   std::vector<bool> in_null_space(index.size(), false);
   for (Eigen::Index i = 0; i < values.size(); ++i) {

@@ -97,8 +97,11 @@ protocol = "csv_imu"
 /// A minute of simulated driving and everything that can be wrong with files, once for all cases.
 class BadInput : public testing::Test {
  protected:
+  static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+
   static void SetUpTestSuite() {
-    folder_ = program_path("imuscope").parent_path().parent_path() / "bad_input";
+    // One folder a process: CTest runs every case in one of its own, several at a time.
+    folder_ = program_path("imuscope").parent_path().parent_path() / "bad_input" / std::to_string(getpid());
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_ / "folder");
     const std::string demo = replaced(read_file(source_path("config/demo.toml")), "/tmp/imuscope-demo",
