@@ -6,28 +6,13 @@
 #include <charconv>
 #include <cstring>
 #include <fstream>
-#include <numeric>
+
+#include "base/nearest_word.h"
 
 namespace imuscope::csv {
 namespace {
 
 constexpr std::size_t kReadSize = 64 * 1024;
-
-/// Levenshtein distance: insertions, deletions and changes of one character.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t changed = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({changed, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row.back();
-}
 
 bool is_number(std::string_view text) {
   double value = 0.0;

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 #include <algorithm>
 
+#include "base/nearest_word.h"
 #include "capture/capture_reader.h"
 #include "capture/raw_dump.h"
 #include "service/device_factory.h"

@@ -63,7 +63,4 @@ class TomlReader {
   std::vector<std::string> known_;
 };
 
-/// The candidate with the smallest edit distance to `word`, or empty when none is near.
-std::string nearest_word(std::string_view word, const std::vector<std::string>& candidates);
-
 }  // namespace imuscope
