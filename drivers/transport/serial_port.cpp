@@ -86,7 +86,7 @@ Result<SerialPort> SerialPort::open(const SerialSettings& settings) {
   // O_NONBLOCK: do not wait for a carrier. O_NOCTTY: a break must not end the program.
   const int fd = ::open(settings.path.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return tl::unexpected<Error>(explain_open_failure(settings.path, errno));
-  SerialPort port(fd);
+  SerialPort port(settings.path, fd);
   // TIOCEXCL keeps others out, but not root; flock keeps out whoever asks.
   if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return tl::unexpected<Error>(explain_open_failure(settings.path, EBUSY));
@@ -101,11 +101,16 @@ Result<SerialPort> SerialPort::open(const SerialSettings& settings) {
 }
 
 SerialPort::SerialPort(SerialPort&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)), baud_(other.baud_), low_latency_(other.low_latency_) {}
+    : Transport(std::move(other)),
+      path_(std::move(other.path_)),
+      fd_(std::exchange(other.fd_, -1)),
+      baud_(other.baud_),
+      low_latency_(other.low_latency_) {}
 
 SerialPort& SerialPort::operator=(SerialPort&& other) noexcept {
   if (this == &other) return *this;
   close();
+  path_ = std::move(other.path_);
   fd_ = std::exchange(other.fd_, -1);
   baud_ = other.baud_;
   low_latency_ = other.low_latency_;
@@ -120,13 +125,18 @@ void SerialPort::close() noexcept {
   ::close(std::exchange(fd_, -1));
 }
 
+std::string SerialPort::describe() const { return fmt::format("{} at {:.0f} baud", path_, baud_); }
+
 IoResult SerialPort::read(std::span<std::uint8_t> buffer) noexcept {
   for (;;) {
     const ssize_t n = ::read(fd_, buffer.data(), buffer.size());
-    if (n > 0) return {IoStatus::kDone, static_cast<std::size_t>(n)};
-    if (n == 0) return {IoStatus::kGone, 0};
+    if (n > 0) {
+      const auto count = static_cast<std::size_t>(n);
+      return {IoStatus::kDone, count, count == buffer.size()};
+    }
+    if (n == 0) return {IoStatus::kGone};
     if (errno == EINTR) continue;
-    return {says_gone(errno) ? IoStatus::kGone : IoStatus::kNothing, 0};
+    return {says_gone(errno) ? IoStatus::kGone : IoStatus::kNothing};
   }
 }
 
@@ -135,7 +145,7 @@ IoResult SerialPort::write(std::span<const std::uint8_t> bytes) noexcept {
     const ssize_t n = ::write(fd_, bytes.data(), bytes.size());
     if (n > 0) return {IoStatus::kDone, static_cast<std::size_t>(n)};
     if (n < 0 && errno == EINTR) continue;
-    return {n < 0 && says_gone(errno) ? IoStatus::kGone : IoStatus::kNothing, 0};
+    return {n < 0 && says_gone(errno) ? IoStatus::kGone : IoStatus::kNothing};
   }
 }
 

@@ -4,16 +4,17 @@
 /// Works on UARTs, USB adapters and pseudo-terminals; what only some of them can do (low latency, error
 /// counts) is best effort and never a reason to fail.
 ///
-/// Waiting is the caller's: put fd() into epoll. A port whose device vanished says kGone from then on; close
-/// it and open it again by its stable name (/dev/serial/by-id/...).
+/// A port whose device vanished is to be opened again by its stable name (/dev/serial/by-id/...).
 
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "base/result.h"
+#include "drivers/transport/transport.h"
 
 namespace imuscope {
 
@@ -21,17 +22,6 @@ struct SerialSettings {
   std::string path;
   std::uint32_t baud = 115200;
   int stop_bits = 1;  ///< 1 or 2; XSens devices made before 2008 want 2
-};
-
-enum class IoStatus : std::uint8_t {
-  kDone,     ///< n bytes were moved, n > 0
-  kNothing,  ///< nothing to read, or no room to write, now
-  kGone,     ///< the device vanished (unplugged, other end closed)
-};
-
-struct IoResult {
-  IoStatus status = IoStatus::kNothing;
-  std::size_t n = 0;
 };
 
 /// Counts of the kernel's tty driver since boot.
@@ -43,7 +33,7 @@ struct LineErrors {
   int buffer_overrun = 0;
 };
 
-class SerialPort {
+class SerialPort final : public Transport {
  public:
   /// Opens and sets up the line. Bytes that came before are thrown away. Errors name the remedy: a missing
   /// port lists the ports there are, a busy one names who holds it. Not for the real-time thread.
@@ -53,15 +43,14 @@ class SerialPort {
   SerialPort& operator=(SerialPort&& other) noexcept;
   SerialPort(const SerialPort&) = delete;
   SerialPort& operator=(const SerialPort&) = delete;
-  ~SerialPort();
+  ~SerialPort() override;
 
-  /// Never blocks. Core: no allocation.
-  [[nodiscard]] IoResult read(std::span<std::uint8_t> buffer) noexcept;
-  /// Never blocks; may move fewer bytes than given. Core: no allocation.
-  [[nodiscard]] IoResult write(std::span<const std::uint8_t> bytes) noexcept;
+  [[nodiscard]] IoResult read(std::span<std::uint8_t> buffer) noexcept override;
+  [[nodiscard]] IoResult write(std::span<const std::uint8_t> bytes) noexcept override;
+  /// -1 after a move.
+  [[nodiscard]] int fd() const noexcept override { return fd_; }
+  [[nodiscard]] std::string describe() const override;
 
-  /// For epoll: EPOLLIN, and EPOLLHUP or EPOLLERR when the device vanishes. -1 after a move.
-  [[nodiscard]] int fd() const noexcept { return fd_; }
   /// As the driver gives it, within 2 % of what was asked for.
   [[nodiscard]] double baud() const noexcept { return baud_; }
   /// Whether the driver was told to deliver bytes at once. False where it cannot: FTDI adapters then hold
@@ -71,9 +60,10 @@ class SerialPort {
   [[nodiscard]] std::optional<LineErrors> line_errors() const noexcept;
 
  private:
-  explicit SerialPort(int fd) noexcept : fd_(fd) {}
+  SerialPort(std::string path, int fd) noexcept : path_(std::move(path)), fd_(fd) {}
   void close() noexcept;
 
+  std::string path_;
   int fd_ = -1;
   double baud_ = 0.0;
   bool low_latency_ = false;

@@ -60,13 +60,13 @@ class IoThread::Line final : public SampleSink {
     epoll_event event{};
     event.events = EPOLLIN;
     event.data.ptr = this;
-    (void)epoll_ctl(epoll, EPOLL_CTL_ADD, connection_->port.fd(), &event);
-    status_.line = LineState::kOpen;
+    (void)epoll_ctl(epoll, EPOLL_CTL_ADD, connection_->line->fd(), &event);
+    dropped_before_ = status_.frames_dropped;
   }
 
   void read(RawTap& tap, int epoll) noexcept {
     for (int i = 0; i < kReadsPerWake && connection_ != nullptr; ++i) {
-      const auto result = connection_->port.read(buffer_);
+      const auto result = connection_->line->read(buffer_);
       if (result.status == IoStatus::kGone) give_back(epoll);
       if (result.status != IoStatus::kDone) return;
       const HostTime arrival = host_now();
@@ -76,7 +76,7 @@ class IoThread::Line final : public SampleSink {
       connection_->session->on_bytes(bytes, arrival);
       status_.last_arrival = arrival;
       ++status_.reads;
-      if (result.n < buffer_.size()) return;
+      if (!result.more) return;
     }
   }
 
@@ -84,7 +84,7 @@ class IoThread::Line final : public SampleSink {
     if (connection_ == nullptr) return;
     const auto bytes = connection_->session->poll(now);
     if (bytes.empty()) return;
-    const auto result = connection_->port.write(bytes);
+    const auto result = connection_->line->write(bytes);
     if (result.status == IoStatus::kDone) tap.record(index_, Direction::kWrite, bytes.first(result.n), now);
   }
 
@@ -93,6 +93,9 @@ class IoThread::Line final : public SampleSink {
     last_status_ = now;
     status_.counters = decoder_->counters();
     if (connection_ != nullptr) {
+      const auto health = connection_->line->health();
+      status_.line = health.is_up ? LineState::kOpen : LineState::kDown;
+      status_.frames_dropped = dropped_before_ + health.frames_dropped;
       status_.session = connection_->session->state();
       const auto problem = connection_->session->problem();
       const std::size_t n = std::min(problem.size(), status_.problem.size() - 1);
@@ -108,7 +111,7 @@ class IoThread::Line final : public SampleSink {
   static constexpr int kReadsPerWake = 4;
 
   void give_back(int epoll) noexcept {
-    (void)epoll_ctl(epoll, EPOLL_CTL_DEL, connection_->port.fd(), nullptr);
+    (void)epoll_ctl(epoll, EPOLL_CTL_DEL, connection_->line->fd(), nullptr);
     // The slot is empty: the supervisor offers a new connection only after it took the old one back.
     returned_.store(connection_, std::memory_order_release);
     connection_ = nullptr;
@@ -125,6 +128,7 @@ class IoThread::Line final : public SampleSink {
   std::atomic<Connection*> returned_{nullptr};
   std::array<std::uint8_t, kReadBytes> buffer_{};
   LineStatus status_;
+  std::uint64_t dropped_before_ = 0;  ///< on the connections before this one
   HostTime last_status_{};
   HostTime newest_arrival_{HostTime::min()};
   LatestValue<LineStatus> published_;

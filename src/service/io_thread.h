@@ -15,7 +15,7 @@
 #include "capture/raw_chunk.h"
 #include "capture/records.h"
 #include "drivers/device/device.h"
-#include "drivers/transport/serial_port.h"
+#include "drivers/transport/transport.h"
 #include "rt/latest_value.h"
 #include "rt/thread_setup.h"
 #include "service/core.h"
@@ -24,18 +24,23 @@ namespace imuscope {
 
 /// An open line and the conversation on it. Made and destroyed by the supervisor, used by the I/O thread.
 struct Connection {
-  SerialPort port;
+  std::unique_ptr<Transport> line;
   std::unique_ptr<DeviceSession> session;
 };
 
-enum class LineState : std::uint8_t { kClosed, kOpen };
+enum class LineState : std::uint8_t {
+  kClosed,
+  kDown,  ///< open, and the line itself cannot carry anything
+  kOpen,
+};
 
 /// What the I/O thread says of one device, ten times a second.
 struct LineStatus {
   LineState line = LineState::kClosed;
   SessionState session = SessionState::kConnecting;
   DecoderCounters counters{};
-  std::uint64_t refused = 0;  ///< samples that found the ring to the core full
+  std::uint64_t refused = 0;         ///< samples that found the ring to the core full
+  std::uint64_t frames_dropped = 0;  ///< lost by this PC before they were read
   std::uint64_t reads = 0;
   double latency_s = 0.0;  ///< arrival minus mapped time of the last sample
   HostTime last_arrival{};

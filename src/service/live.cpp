@@ -14,6 +14,7 @@
 #include "service/device_factory.h"
 #include "service/estimator_setup.h"
 #include "service/io_thread.h"
+#include "service/line_factory.h"
 #include "service/live_publisher.h"
 #include "service/study.h"
 
@@ -40,7 +41,7 @@ class Supervisor {
 
   void step(HostTime now) {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
-      if (configuration_.devices[i].serial) step_line(static_cast<DeviceIndex>(i), now);
+      step_line(static_cast<DeviceIndex>(i), now);
     }
   }
 
@@ -56,24 +57,24 @@ class Supervisor {
     auto& line = lines_[index];
     const auto& device = configuration_.devices[index];
     if (auto gone = io_.take_back(index)) {
-      spdlog::warn("{}: {} is gone; trying to open it again", device.name, device.serial->port);
+      spdlog::warn("{}: {} is gone; trying to open it again", device.name, gone->line->describe());
       line.open = false;
       line.pause = kReopenFirst;
       line.next_try = now + line.pause;
     }
     if (line.open || now < line.next_try) return;
-    auto port = SerialPort::open({device.serial->port, device.serial->baud, device.serial->stop_bits});
-    if (!port) {
+    auto opened = open_line(device);
+    if (!opened) {
       // Said once, and again when the reason changes: a log is no place for a heartbeat.
-      const auto text = port.error().text();
+      const auto text = opened.error().text();
       if (text != line.last_problem) spdlog::error("{}: {}", device.name, text);
       line.last_problem = text;
       line.next_try = now + line.pause;
       line.pause = std::min(line.pause * 2, kReopenLongest);
       return;
     }
-    spdlog::info("{}: {} open at {:.0f} baud", device.name, device.serial->port, port->baud());
-    io_.offer(index, std::make_unique<Connection>(Connection{std::move(*port), make_session(device)}));
+    spdlog::info("{}: {} is open", device.name, (*opened)->describe());
+    io_.offer(index, std::make_unique<Connection>(Connection{std::move(*opened), make_session(device)}));
     line = {true, {}, kReopenFirst, {}};
   }
 
@@ -109,7 +110,7 @@ Result<void> check_folder(const std::filesystem::path& out) {
 
 Result<void> check_lines(const Configuration& configuration) {
   for (const auto& device : configuration.devices) {
-    if (device.serial) continue;
+    if (has_line(device)) continue;
     return usage_error(
         fmt::format("{}: device '{}' has no transport, so it cannot be run live", configuration.file.string(),
                     device.name),

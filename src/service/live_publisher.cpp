@@ -21,6 +21,18 @@ constexpr std::array kSessionNames{"connecting", "configuring", "streaming", "fa
 constexpr std::array kStudyNames{"waiting for samples", "looking for its mounting", "converging",
                                  "calibrated"};
 
+std::string state_name(const LineStatus& status) {
+  switch (status.line) {
+    case LineState::kClosed:
+      return "no line";
+    case LineState::kDown:
+      return "line down";
+    case LineState::kOpen:
+      break;
+  }
+  return kSessionNames[static_cast<std::size_t>(status.session)];
+}
+
 std::uint64_t resident_memory_bytes() {
   std::ifstream statm("/proc/self/statm");
   std::uint64_t total = 0;
@@ -200,8 +212,7 @@ StatusReport::Device LivePublisher::device_status(std::size_t index) const {
   report.name = device.name;
   report.role = name_of(device.role);
   report.protocol = name_of(device.protocol);
-  report.state =
-      status.line == LineState::kOpen ? kSessionNames[static_cast<std::size_t>(status.session)] : "no line";
+  report.state = state_name(status);
   report.problem = watches_[index].problem;
   report.rate_hz = watches_[index].rate_hz;
   report.bytes = status.counters.bytes;
