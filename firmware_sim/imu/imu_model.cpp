@@ -88,9 +88,12 @@ IdealReading ImuModel::through_low_pass(const IdealReading& now, double t_s) {
 
 ImuReading ImuModel::sample_at(double t_s) {
   const IdealReading ideal = ideal_reading(motion_->state_at(t_s), mounting_);
-  const IdealReading seen = through_low_pass(ideal, t_s);
+  return sample_of(ideal, through_low_pass(ideal, t_s), motion_->regime_at(t_s), t_s);
+}
+
+ImuReading ImuModel::sample_of(const IdealReading& ideal, const IdealReading& seen, Regime regime,
+                               double t_s) {
   const double step_s = has_last_ ? t_s - last_t_s_ : 0.0;
-  const Regime regime = motion_->regime_at(t_s);
   const Eigen::Vector3d gyro_noise = next_noise(gyro_noise_, regime, step_s);
   const Eigen::Vector3d accel_noise = next_noise(accel_noise_, regime, step_s);
   last_t_s_ = t_s;

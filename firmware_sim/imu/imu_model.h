@@ -66,6 +66,9 @@ class ImuModel {
 
   /// The sample taken at t_s. Times must rise from call to call.
   ImuReading sample_at(double t_s);
+  /// The same with the truth at t_s given, for callers that know it already. `seen` is what is left of it
+  /// behind a low-pass, else the truth itself.
+  ImuReading sample_of(const IdealReading& ideal, const IdealReading& seen, Regime regime, double t_s);
 
   [[nodiscard]] const Mounting& mounting() const { return mounting_; }
   [[nodiscard]] const ImuErrors& errors() const { return errors_; }

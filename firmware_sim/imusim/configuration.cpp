@@ -206,7 +206,7 @@ void read_simulation(TableReader in, Configuration& configuration) {
   auto seed = static_cast<std::int64_t>(scenario.seed);
   in.whole("seed", seed, 0, std::numeric_limits<std::int64_t>::max());
   scenario.seed = static_cast<std::uint64_t>(seed);
-  scenario.kind = static_cast<ScenarioKind>(in.choice("scenario", {"drive", "static"}, 0));
+  scenario.kind = static_cast<ScenarioKind>(in.choice("scenario", {"drive", "static", "straight_road"}, 0));
   in.number("start_latitude_deg", scenario.start.latitude_rad, kRadPerDeg, -80.0, 80.0);
   in.number("start_longitude_deg", scenario.start.longitude_rad, kRadPerDeg, -180.0, 180.0);
   in.number("start_height_m", scenario.start.height_m, 1.0, -1e3, 1e4);

@@ -173,6 +173,7 @@ std::vector<double> make_speed(const Scenario& scenario, const Grid& grid) {
 std::vector<double> make_yaw_rate(const Scenario& scenario, const std::vector<double>& speed,
                                   const Grid& grid) {
   std::vector<double> rate(speed.size(), 0.0);
+  if (scenario.kind == ScenarioKind::kStraightRoad) return rate;
   Random random(scenario.seed, "turns");
   double begin = 0.0;
   while (true) {

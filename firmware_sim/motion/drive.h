@@ -12,8 +12,9 @@ namespace imusim {
 
 /// What the vehicle does.
 enum class ScenarioKind {
-  kDrive,   ///< standstill, stop-and-go drive, standstill
-  kStatic,  ///< standstill throughout
+  kDrive,         ///< standstill, stop-and-go drive, standstill
+  kStatic,        ///< standstill throughout
+  kStraightRoad,  ///< the drive without its turns
 };
 
 struct Scenario {

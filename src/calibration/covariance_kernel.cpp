@@ -6,77 +6,17 @@
 
 #include "base/contracts.h"
 
-// Plain loops, compiled once per instruction set; the loader picks the widest one that the CPU has. No loop
-// adds up across lanes, and fused multiply-add is off, so that every version gives the same bits. The
-// sanitizers do not stand a choice made before their own start.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define IMUSCOPE_VECTOR_VERSIONS \
-  __attribute__((target_clones("arch=skylake-avx512", "arch=haswell", "default")))
-#else
-#define IMUSCOPE_VECTOR_VERSIONS
-#endif
-
 namespace imuscope {
 namespace {
 
 constexpr std::size_t kN = kNavigationStates;
-constexpr std::size_t kC = kNavigationCoupledStates;
 constexpr std::align_val_t kAlignment{64};
 
-/// T = Phi P for the navigation rows: T is 15 rows of `padded`.
-IMUSCOPE_VECTOR_VERSIONS
-void transition_rows(const double* __restrict phi, const double* __restrict decay, const double* __restrict p,
-                     double* __restrict t, std::size_t padded) {
-  for (std::size_t i = 0; i < kC; ++i) {
-    double* __restrict row = t + i * padded;
-    const double* a = phi + i * kN;
-    for (std::size_t c = 0; c < padded; c += kCovariancePadding) {
-      double sum[kCovariancePadding] = {};
-      for (std::size_t k = 0; k < kN; ++k) {
-        const double* source = p + k * padded + c;
-        for (std::size_t l = 0; l < kCovariancePadding; ++l) sum[l] += a[k] * source[l];
-      }
-      for (std::size_t l = 0; l < kCovariancePadding; ++l) row[c + l] = sum[l];
-    }
-  }
-  for (std::size_t i = kC; i < kN; ++i) {
-    double* __restrict row = t + i * padded;
-    const double* source = p + i * padded;
-    for (std::size_t c = 0; c < padded; ++c) row[c] = decay[i - kC] * source[c];
-  }
-}
-
-/// out += h * row, all `padded` long.
-IMUSCOPE_VECTOR_VERSIONS
-void add_scaled_row(double h, const double* __restrict row, double* __restrict out, std::size_t padded) {
-  for (std::size_t c = 0; c < padded; ++c) out[c] += h * row[c];
-}
-
-/// P -= W W^T with W^T given as `rows` rows.
-IMUSCOPE_VECTOR_VERSIONS
-void downdate(double* __restrict p, const double* __restrict w, std::size_t rows, std::size_t padded) {
-  const double* __restrict w0 = w;
-  const double* __restrict w1 = w + padded;
-  const double* __restrict w2 = w + 2 * padded;
-  if (rows == 3) {
-    for (std::size_t i = 0; i < padded; ++i) {
-      const double a = w0[i];
-      const double b = w1[i];
-      const double c = w2[i];
-      double* __restrict row = p + i * padded;
-      for (std::size_t j = 0; j < padded; ++j) row[j] -= (a * w0[j] + b * w1[j]) + c * w2[j];
-    }
-    return;
-  }
-  for (std::size_t r = 0; r < rows; ++r) {
-    const double* __restrict wr = w + r * padded;
-    for (std::size_t i = 0; i < padded; ++i) {
-      const double a = wr[i];
-      double* __restrict row = p + i * padded;
-      for (std::size_t j = 0; j < padded; ++j) row[j] -= a * wr[j];
-    }
-  }
+const CovarianceLoops* loops_for(std::optional<InstructionSet> set) {
+  if (!set) return &widest_covariance_loops();
+  const CovarianceLoops* loops = covariance_loops(*set);
+  IMUSCOPE_EXPECTS(loops != nullptr);
+  return loops;
 }
 
 }  // namespace
@@ -94,18 +34,19 @@ void CovarianceKernel::AlignedDelete::operator()(double* memory) const noexcept 
   ::operator delete[](memory, kAlignment);
 }
 
-CovarianceKernel::CovarianceKernel(std::size_t dimension)
-    : dimension_(dimension),
+CovarianceKernel::CovarianceKernel(std::size_t dimension, std::optional<InstructionSet> instruction_set)
+    : loops_(loops_for(instruction_set)),
+      dimension_(dimension),
       padded_((dimension + kCovariancePadding - 1) / kCovariancePadding * kCovariancePadding) {
   IMUSCOPE_EXPECTS(dimension > 0);
   // predict_navigation() reads and writes 15 rows, whatever the dimension.
-  padded_ = std::max(padded_, (kN + kCovariancePadding - 1) / kCovariancePadding * kCovariancePadding);
-  const std::size_t rows = padded_ + kN + 2 * kMaxMeasurementRows + 1;
+  padded_ = std::max(padded_, kLoopNavigationPadded);
+  const std::size_t rows = padded_ + kLoopNavigationPadded + 2 * kMaxMeasurementRows + 1;
   memory_.reset(static_cast<double*>(::operator new[](rows* padded_ * sizeof(double), kAlignment)));
   std::fill_n(memory_.get(), rows * padded_, 0.0);
   p_ = memory_.get();
   scratch_ = p_ + padded_ * padded_;
-  pht_ = scratch_ + kN * padded_;
+  pht_ = scratch_ + kLoopNavigationPadded * padded_;
   w_ = pht_ + kMaxMeasurementRows * padded_;
   correction_ = w_ + kMaxMeasurementRows * padded_;
 }
@@ -123,61 +64,36 @@ void CovarianceKernel::reset_state(std::size_t i, double variance) noexcept {
 
 void CovarianceKernel::predict_navigation(const KernelTransition& transition) noexcept {
   IMUSCOPE_EXPECTS(dimension_ >= kN);
-  transition_rows(transition.coupled.data(), transition.decay.data(), p_, scratch_, padded_);
-  // Against the states that do not move, T is the new cross-covariance already.
-  for (std::size_t i = 0; i < kN; ++i) {
-    const double* t = scratch_ + i * padded_;
-    for (std::size_t c = kN; c < dimension_; ++c) {
-      p_[i * padded_ + c] = t[c];
-      p_[c * padded_ + i] = t[c];
-    }
-  }
-  // T Phi^T, upper triangle, mirrored: symmetric by construction.
-  for (std::size_t i = 0; i < kN; ++i) {
-    const double* t = scratch_ + i * padded_;
-    for (std::size_t j = i; j < kN; ++j) {
-      double sum = transition.noise[i * kN + j];
-      if (j < kC) {
-        const double* a = transition.coupled.data() + j * kN;
-        for (std::size_t k = 0; k < kN; ++k) sum += t[k] * a[k];
-      } else {
-        sum += t[j] * transition.decay[j - kC];
-      }
-      p_[i * padded_ + j] = sum;
-      p_[j * padded_ + i] = sum;
-    }
-  }
+  loops_->transition(transition.phi.data(), transition.noise.data(), p_, scratch_, padded_);
 }
 
-void CovarianceKernel::predict_state(std::size_t i, double decay, double variance) noexcept {
-  if (decay != 1.0) {
-    double* row = p_ + i * padded_;
-    for (std::size_t c = 0; c < dimension_; ++c) row[c] *= decay;
-    for (std::size_t c = 0; c < dimension_; ++c) p_[c * padded_ + i] = row[c];
-    row[i] *= decay;
+void CovarianceKernel::predict_states(std::size_t first, std::span<const double> decay,
+                                      std::span<const double> variance) noexcept {
+  IMUSCOPE_EXPECTS(decay.size() == variance.size() && first + decay.size() <= dimension_);
+  const bool decays = std::any_of(decay.begin(), decay.end(), [](double d) { return d != 1.0; });
+  if (decays) {
+    loops_->decay(p_, first, decay.size(), decay.data(), variance.data(), padded_);
+    return;
   }
-  p_[i * padded_ + i] += variance;
+  for (std::size_t i = 0; i < variance.size(); ++i) p_[(first + i) * padded_ + first + i] += variance[i];
 }
 
 void CovarianceKernel::project(const SparseMeasurement& H, const std::array<double, 9>& R) noexcept {
-  std::fill_n(pht_, kMaxMeasurementRows * padded_, 0.0);
+  std::array<std::size_t, 3 * kMaxMeasurementBlocks> columns{};
+  std::array<double, 9 * kMaxMeasurementBlocks> h{};
+  std::size_t n = 0;
   for (std::size_t b = 0; b < H.count; ++b) {
     const MeasurementBlock& block = H.blocks[b];
-    for (std::size_t a = 0; a < kMaxMeasurementRows; ++a) {
-      for (std::size_t c = 0; c < block.width; ++c) {
-        if (block.h[a][c] == 0.0) continue;
-        add_scaled_row(block.h[a][c], p_ + (block.column + c) * padded_, pht_ + a * padded_, padded_);
-      }
+    for (std::size_t c = 0; c < block.width; ++c, ++n) {
+      columns[n] = block.column + c;
+      for (std::size_t a = 0; a < kMaxMeasurementRows; ++a) h[3 * n + a] = block.h[a][c];
     }
   }
+  loops_->project(p_, columns.data(), h.data(), n, pht_, padded_);
   for (std::size_t a = 0; a < kMaxMeasurementRows; ++a) {
     for (std::size_t e = a; e < kMaxMeasurementRows; ++e) {
       double sum = R[a * 3 + e];
-      for (std::size_t b = 0; b < H.count; ++b) {
-        const MeasurementBlock& block = H.blocks[b];
-        for (std::size_t c = 0; c < block.width; ++c)
-          sum += block.h[a][c] * pht_[e * padded_ + block.column + c];
-      }
+      for (std::size_t k = 0; k < n; ++k) sum += h[3 * k + a] * pht_[e * padded_ + columns[k]];
       s_[a * 3 + e] = sum;
       s_[e * 3 + a] = sum;
     }
@@ -186,41 +102,37 @@ void CovarianceKernel::project(const SparseMeasurement& H, const std::array<doub
 
 bool CovarianceKernel::update(const std::array<double, 3>& innovation,
                               const std::array<bool, 3>& use) noexcept {
-  std::array<std::size_t, 3> axes{};
-  std::size_t rows = 0;
-  for (std::size_t a = 0; a < kMaxMeasurementRows; ++a) {
-    if (use[a]) axes[rows++] = a;
-  }
-  if (rows == 0) return false;
-
-  std::array<std::array<double, 3>, 3> l{};
-  std::array<double, 3> whitened{};  // L^-1 y
-  for (std::size_t i = 0; i < rows; ++i) {
-    double residual = innovation[axes[i]];
-    for (std::size_t j = 0; j <= i; ++j) {
-      double sum = s_[axes[i] * 3 + axes[j]];
-      for (std::size_t k = 0; k < j; ++k) sum -= l[i][k] * l[j][k];
-      if (i != j) {
-        l[i][j] = sum / l[j][j];
-        residual -= l[i][j] * whitened[j];
-      } else {
-        if (!(sum > 0.0) || !std::isfinite(sum)) return false;
-        l[i][i] = std::sqrt(sum);
-      }
+  // K-4, with a zero row for an axis that is left out: M = L^-1 of the axes in use.
+  std::array<double, 9> l{};
+  std::array<double, 9> m{};
+  std::array<double, 3> whitened{};
+  bool any = false;
+  for (std::size_t i = 0; i < kMaxMeasurementRows; ++i) {
+    if (!use[i]) continue;
+    any = true;
+    double pivot = s_[4 * i];
+    double residual = innovation[i];
+    for (std::size_t j = 0; j < i; ++j) {
+      if (!use[j]) continue;
+      double sum = s_[3 * i + j];
+      for (std::size_t k = 0; k < j; ++k) sum -= l[3 * i + k] * l[3 * j + k];
+      l[3 * i + j] = sum / l[4 * j];
+      pivot -= l[3 * i + j] * l[3 * i + j];
+      residual -= l[3 * i + j] * whitened[j];
     }
-    whitened[i] = residual / l[i][i];
+    if (!(pivot > 0.0) || !std::isfinite(pivot)) return false;
+    l[4 * i] = std::sqrt(pivot);
+    whitened[i] = residual / l[4 * i];
+    m[4 * i] = 1.0 / l[4 * i];
+    for (std::size_t k = 0; k < i; ++k) {
+      double sum = 0.0;
+      for (std::size_t j = k; j < i; ++j) sum -= l[3 * i + j] * m[3 * j + k];
+      m[3 * i + k] = sum / l[4 * i];
+    }
   }
-
-  for (std::size_t i = 0; i < rows; ++i) {
-    double* row = w_ + i * padded_;
-    std::copy_n(pht_ + axes[i] * padded_, padded_, row);
-    for (std::size_t k = 0; k < i; ++k) add_scaled_row(-l[i][k], w_ + k * padded_, row, padded_);
-    const double inverse = 1.0 / l[i][i];
-    for (std::size_t c = 0; c < padded_; ++c) row[c] *= inverse;
-  }
-  std::fill_n(correction_, padded_, 0.0);
-  for (std::size_t i = 0; i < rows; ++i) add_scaled_row(whitened[i], w_ + i * padded_, correction_, padded_);
-  downdate(p_, w_, rows, padded_);
+  if (!any) return false;
+  loops_->whiten(pht_, m.data(), whitened.data(), w_, correction_, padded_);
+  loops_->downdate(p_, w_, padded_);
   return true;
 }
 

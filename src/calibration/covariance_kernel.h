@@ -1,7 +1,8 @@
 #pragma once
 
 /// Covariance of the whole filter: a symmetric matrix in one plain array, rows padded to a multiple of 8
-/// doubles (one 512-bit register), dimension known at run time, allocated once.
+/// doubles (one 512-bit register), dimension known at run time, allocated once. The loops over it come from
+/// covariance_loops.h, for the widest instruction set of the processor unless another is asked for.
 ///
 /// Only what the models of this filter need: a prediction that is dense in the 15 navigation states and
 /// diagonal elsewhere, and a measurement update of up to three rows that are sparse in blocks of three
@@ -11,15 +12,18 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
+
+#include "calibration/covariance_loops.h"
 
 namespace imuscope {
 
-inline constexpr std::size_t kNavigationStates = 15;
+inline constexpr std::size_t kNavigationStates = kLoopNavigationStates;
 /// Rows of the navigation transition that are not a plain decay: position, velocity, attitude.
-inline constexpr std::size_t kNavigationCoupledStates = 9;
+inline constexpr std::size_t kNavigationCoupledStates = kLoopCoupledStates;
 inline constexpr std::size_t kCovariancePadding = 8;
-inline constexpr std::size_t kMaxMeasurementRows = 3;
+inline constexpr std::size_t kMaxMeasurementRows = kLoopMeasurementRows;
 inline constexpr std::size_t kMaxMeasurementBlocks = 8;
 
 /// Up to three consecutive columns of a three-row measurement matrix.
@@ -37,18 +41,18 @@ struct SparseMeasurement {
   MeasurementBlock& append(std::size_t column, std::size_t width) noexcept;
 };
 
-/// Transition of the navigation states over one R epoch: 9 dense rows over 15 columns, then 6 decays.
+/// Transition of the navigation states over one R epoch: 9 dense rows over 15 columns, then 6 decays. Both
+/// matrices stand column by column, each column of 15 followed by a zero.
 struct KernelTransition {
-  std::array<double, kNavigationCoupledStates * kNavigationStates> coupled{};  ///< row-major
-  std::array<double, kNavigationStates - kNavigationCoupledStates> decay{};
-  /// Process noise, 15 x 15 row-major, symmetric.
-  std::array<double, kNavigationStates * kNavigationStates> noise{};
+  static constexpr std::size_t kStride = kLoopNavigationPadded;
+  alignas(64) std::array<double, kNavigationStates * kStride> phi{};
+  alignas(64) std::array<double, kNavigationStates * kStride> noise{};  ///< symmetric
 };
 
 class CovarianceKernel {
  public:
-  /// Zero matrix. Precondition: dimension > 0.
-  explicit CovarianceKernel(std::size_t dimension);
+  /// Zero matrix. Precondition: dimension > 0; the processor has `instruction_set`, where one is asked for.
+  explicit CovarianceKernel(std::size_t dimension, std::optional<InstructionSet> instruction_set = {});
 
   [[nodiscard]] std::size_t dimension() const noexcept { return dimension_; }
   [[nodiscard]] std::size_t padded_dimension() const noexcept { return padded_; }
@@ -61,8 +65,9 @@ class CovarianceKernel {
   /// P <- Phi P Phi^T + Q in the 15 navigation states, which are the first ones. K-1.
   void predict_navigation(const KernelTransition& transition) noexcept;
 
-  /// State i <- decay * state i + white noise of the given variance. K-2.
-  void predict_state(std::size_t i, double decay, double variance) noexcept;
+  /// States first, first + 1, ... <- decay * state + white noise of the given variance. K-2.
+  void predict_states(std::size_t first, std::span<const double> decay,
+                      std::span<const double> variance) noexcept;
 
   /// First half of an update: P H^T and S = H P H^T + R. `R` is row-major 3 x 3, symmetric. K-3.
   void project(const SparseMeasurement& H, const std::array<double, 9>& R) noexcept;
@@ -81,11 +86,12 @@ class CovarianceKernel {
     void operator()(double* memory) const noexcept;
   };
 
+  const CovarianceLoops* loops_;
   std::size_t dimension_;
   std::size_t padded_;
   std::unique_ptr<double[], AlignedDelete> memory_;
   double* p_;           ///< padded_ rows
-  double* scratch_;     ///< kNavigationStates rows
+  double* scratch_;     ///< rows of a transition
   double* pht_;         ///< kMaxMeasurementRows rows: (P H^T)^T
   double* w_;           ///< kMaxMeasurementRows rows: (P H^T L^-T)^T
   double* correction_;  ///< one row

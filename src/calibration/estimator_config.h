@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/units.h"
+#include "calibration/covariance_loops.h"
 #include "sample/regime.h"
 #include "sample/sample.h"
 
@@ -152,6 +153,8 @@ struct EstimatorConfig {
   double gate_probability = 0.99999;
   /// An S sample waits this long (on the arrival time scale) for its reference, then counts as late.
   Duration late_after = std::chrono::milliseconds{100};
+  /// Instructions that the covariance is worked out with. Absent: the widest that the processor has.
+  std::optional<InstructionSet> instruction_set;
 };
 
 }  // namespace imuscope

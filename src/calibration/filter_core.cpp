@@ -39,7 +39,8 @@ constexpr std::array<double, 3> kRepairNavigationSd{100.0, 10.0, 0.1};
 
 }  // namespace
 
-FilterCore::FilterCore(const EstimatorConfig& config) : covariance_(filter_dimension(config)) {
+FilterCore::FilterCore(const EstimatorConfig& config)
+    : covariance_(filter_dimension(config), config.instruction_set) {
   repair_variance_.resize(covariance_.dimension());
   accumulated_.decay.resize(covariance_.dimension() - kNavigationStates);
   accumulated_.decay_noise.resize(covariance_.dimension() - kNavigationStates);
@@ -83,12 +84,14 @@ bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool
 }
 
 void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
+  using Columns = Eigen::Matrix<double, KernelTransition::kStride, kNavigationErrorSize>;
   KernelTransition kernel;
-  Eigen::Map<Eigen::Matrix<double, kNavigationKinematicSize, kNavigationErrorSize, Eigen::RowMajor>>(
-      kernel.coupled.data()) = step.kinematic_rows;
-  Eigen::Map<NavigationErrorCovariance>(kernel.noise.data()) = step.process_covariance;
-  std::fill_n(kernel.decay.begin(), 3, step.gyro_bias_decay);
-  std::fill_n(kernel.decay.begin() + 3, 3, step.accel_bias_decay);
+  Eigen::Map<Columns, Eigen::Aligned64> phi(kernel.phi.data());
+  phi.topRows<kNavigationKinematicSize>() = step.kinematic_rows;
+  phi.diagonal().segment<3>(kGyroBiasError).setConstant(step.gyro_bias_decay);
+  phi.diagonal().segment<3>(kAccelBiasError).setConstant(step.accel_bias_decay);
+  Eigen::Map<Columns, Eigen::Aligned64>(kernel.noise.data()).topRows<kNavigationErrorSize>() =
+      step.process_covariance;
   covariance_.predict_navigation(kernel);
 
   const auto carried = [&step](const NavigationErrorVector& error) {
@@ -108,8 +111,17 @@ void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
 }
 
 void FilterCore::predict_state(std::size_t i, double decay, double variance) noexcept {
-  covariance_.predict_state(i, decay, variance);
+  predict_states(i, {&decay, 1}, {&variance, 1});
+}
+
+void FilterCore::predict_states(std::size_t first, std::span<const double> decay,
+                                std::span<const double> variance) noexcept {
+  covariance_.predict_states(first, decay, variance);
   if (!keeps_history_) return;
+  for (std::size_t k = 0; k < decay.size(); ++k) accumulate(first + k, decay[k], variance[k]);
+}
+
+void FilterCore::accumulate(std::size_t i, double decay, double variance) noexcept {
   accumulated_.injected[i] *= decay;
   if (i < kNavigationStates) {
     const auto k = static_cast<Eigen::Index>(i);

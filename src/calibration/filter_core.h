@@ -40,6 +40,9 @@ class FilterCore {
   void predict_navigation(const NavigationTransition& step) noexcept;
   /// Covariance of one state: decay, then white noise of the given variance.
   void predict_state(std::size_t i, double decay, double variance) noexcept;
+  /// The same of several neighbours at once.
+  void predict_states(std::size_t first, std::span<const double> decay,
+                      std::span<const double> variance) noexcept;
   /// Makes a state uncorrelated, of the given variance; the history breaks there.
   void reset_state(std::size_t i, double variance) noexcept;
 
@@ -64,6 +67,8 @@ class FilterCore {
   std::size_t repair(std::size_t& first) noexcept;
 
  private:
+  void accumulate(std::size_t i, double decay, double variance) noexcept;
+
   CovarianceKernel covariance_;
   NavigationState navigation_;
   NavigationErrorVector injected_ = NavigationErrorVector::Zero();

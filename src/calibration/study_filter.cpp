@@ -296,13 +296,18 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
 void StudyFilter::predict(FilterCore& core, double dt_s) noexcept {
   const StudyLayout& layout = core.layout(index_);
   StudyState& state = core.study(index_);
+  Vector3 decay;
+  Vector3 variance;
   const auto bias = [&](std::size_t first, const std::array<GaussMarkovConfig, 3>& process, Vector3d& value) {
     if (first == StudyLayout::kAbsent) return;
     for (std::size_t i = 0; i < 3; ++i) {
-      const double decay = std::exp(-dt_s / process[i].time_constant_s);
-      core.predict_state(first + i, decay, process[i].sd * process[i].sd * (1.0 - decay * decay));
-      value(static_cast<Eigen::Index>(i)) *= decay;
+      // The axes of a triad mostly share one time constant.
+      const bool again = i > 0 && process[i].time_constant_s == process[i - 1].time_constant_s;
+      decay[i] = again ? decay[i - 1] : std::exp(-dt_s / process[i].time_constant_s);
+      variance[i] = process[i].sd * process[i].sd * (1.0 - decay[i] * decay[i]);
+      value(static_cast<Eigen::Index>(i)) *= decay[i];
     }
+    core.predict_states(first, decay, variance);
   };
   bias(layout.gyro_bias, config_.noise.gyro_bias, state.gyro_bias_s_radps);
   bias(layout.accel_bias, config_.noise.accel_bias, state.accel_bias_s_mps2);

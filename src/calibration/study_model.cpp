@@ -106,7 +106,7 @@ StudyMeasurement accel_measurement(const StudyState& state, const StudyLayout& l
 
 void inject(StudyState& state, const StudyLayout& layout, std::span<const double> error) noexcept {
   if (layout.psi != StudyLayout::kAbsent)
-    state.C_b_s = orthonormalised(state.C_b_s * exp_so3(-error_at(error, layout.psi)));
+    state.C_b_s = tidied(state.C_b_s * exp_so3(-error_at(error, layout.psi)));
   if (layout.r != StudyLayout::kAbsent) state.r_bs_b_m += error_at(error, layout.r);
   if (layout.gyro_bias != StudyLayout::kAbsent) state.gyro_bias_s_radps += error_at(error, layout.gyro_bias);
   if (layout.accel_bias != StudyLayout::kAbsent)

@@ -196,12 +196,14 @@ NavigationErrorCovariance full_matrix(const NavigationTransition& transition) no
 
 // N-20
 void inject(NavigationState& state, const NavigationErrorVector& error) noexcept {
-  const LocalEarth earth(state.position);
-  state.position.latitude_rad += error(kPositionError) / earth.M;
-  state.position.longitude_rad += error(kPositionError + 1) / (earth.N * earth.cos_L);
+  const double cos_L = std::cos(state.position.latitude_rad);
+  const Curvature curvature = curvature_of(std::sin(state.position.latitude_rad), cos_L);
+  const double height = state.position.height_m;
+  state.position.latitude_rad += error(kPositionError) / (curvature.meridian_m + height);
+  state.position.longitude_rad += error(kPositionError + 1) / ((curvature.transverse_m + height) * cos_L);
   state.position.height_m -= error(kPositionError + 2);
   state.v_n_mps += error.segment<3>(kVelocityError);
-  state.C_b_n = orthonormalised(exp_so3(error.segment<3>(kAttitudeError)) * state.C_b_n);
+  state.C_b_n = tidied(exp_so3(error.segment<3>(kAttitudeError)) * state.C_b_n);
   state.gyro_bias_b_radps += error.segment<3>(kGyroBiasError);
   state.accel_bias_b_mps2 += error.segment<3>(kAccelBiasError);
 }

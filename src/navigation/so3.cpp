@@ -60,6 +60,11 @@ Eigen::Matrix3d orthonormalised(const Eigen::Matrix3d& C) noexcept {
   return quaternion_from_rotation(C).toRotationMatrix();
 }
 
+// N-16
+Eigen::Matrix3d tidied(const Eigen::Matrix3d& C) noexcept {
+  return 0.5 * C * (3.0 * Eigen::Matrix3d::Identity() - C.transpose() * C);
+}
+
 // N-4
 Eigen::Matrix3d rotation_from_euler(const EulerAngles& angles) noexcept {
   const double sr = std::sin(angles.roll_rad);

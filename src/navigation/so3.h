@@ -25,8 +25,12 @@ inline Eigen::Matrix3d skew(const Eigen::Vector3d& v) noexcept {
 /// Right Jacobian J with Exp(phi + d) = Exp(phi) Exp(J d) to first order in d (N-3).
 [[nodiscard]] Eigen::Matrix3d right_jacobian_so3(const Eigen::Vector3d& phi_rad) noexcept;
 
-/// Nearest rotation matrix, through the quaternion. Removes the rounding that products collect.
+/// Nearest rotation matrix, through the quaternion: for matrices of any origin.
 [[nodiscard]] Eigen::Matrix3d orthonormalised(const Eigen::Matrix3d& C) noexcept;
+
+/// One Newton step towards the nearest rotation matrix (N-16): for products of rotations, whose rounding it
+/// removes.
+[[nodiscard]] Eigen::Matrix3d tidied(const Eigen::Matrix3d& C) noexcept;
 
 /// Attitude of a body relative to local NED.
 struct EulerAngles {

@@ -7,13 +7,7 @@ namespace imuscope {
 
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-/// One Newton step towards the nearest orthonormal matrix: removes the rounding of one product.
-Matrix3d tidied(const Matrix3d& C) noexcept {
-  return 0.5 * C * (3.0 * Matrix3d::Identity() - C.transpose() * C);
-}
 
 InertialIncrement increment(const InertialRates& first, const InertialRates& second,
                             const Vector3d& mean_omega, const Vector3d& mean_f, double dt_s) noexcept {

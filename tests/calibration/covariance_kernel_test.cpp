@@ -68,14 +68,22 @@ Measurement random_measurement(std::size_t n, const MatrixXd& P, std::mt19937_64
   return m;
 }
 
-class CovarianceKernelOfDimension : public testing::TestWithParam<std::size_t> {};
+using Case = std::tuple<std::size_t, InstructionSet>;
+
+/// Skips what this processor cannot run.
+class CovarianceKernelOfDimension : public testing::TestWithParam<Case> {
+ protected:
+  void SetUp() override {
+    if (covariance_loops(std::get<1>(GetParam())) == nullptr) GTEST_SKIP() << "not on this processor";
+  }
+};
 
 TEST_P(CovarianceKernelOfDimension, PredictionEqualsTheDenseProductAndStaysExactlySymmetric) {
-  const std::size_t n = GetParam();
+  const auto [n, set] = GetParam();
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal;
   const MatrixXd P = random_covariance(n, random);
-  CovarianceKernel kernel(n);
+  CovarianceKernel kernel(n, set);
   load(kernel, P);
 
   KernelTransition transition;
@@ -84,17 +92,19 @@ TEST_P(CovarianceKernelOfDimension, PredictionEqualsTheDenseProductAndStaysExact
   for (Eigen::Index i = 0; i < 9; ++i) {
     for (Eigen::Index j = 0; j < 15; ++j) {
       Phi(i, j) += 0.1 * normal(random) * std::sqrt(P(i, i) / P(j, j));
-      transition.coupled[static_cast<std::size_t>(i * 15 + j)] = Phi(i, j);
     }
   }
   for (Eigen::Index i = 9; i < 15; ++i) {
     Phi(i, i) = 0.9 + 0.01 * static_cast<double>(i - 9);
-    transition.decay[static_cast<std::size_t>(i - 9)] = Phi(i, i);
   }
   MatrixXd Q = MatrixXd::Zero(size, size);
   Q.topLeftCorner(15, 15) = 0.01 * P.topLeftCorner(15, 15);
   for (Eigen::Index i = 0; i < 15; ++i) {
-    for (Eigen::Index j = 0; j < 15; ++j) transition.noise[static_cast<std::size_t>(i * 15 + j)] = Q(i, j);
+    for (Eigen::Index j = 0; j < 15; ++j) {
+      const auto at = static_cast<std::size_t>(j) * KernelTransition::kStride + static_cast<std::size_t>(i);
+      transition.phi[at] = Phi(i, j);
+      transition.noise[at] = Q(i, j);
+    }
   }
 
   kernel.predict_navigation(transition);
@@ -103,28 +113,37 @@ TEST_P(CovarianceKernelOfDimension, PredictionEqualsTheDenseProductAndStaysExact
   EXPECT_TRUE(read(kernel) == read(kernel).transpose());
 }
 
-TEST_P(CovarianceKernelOfDimension, DecayOfOneStateEqualsTheDenseProduct) {
-  const std::size_t n = GetParam();
+TEST_P(CovarianceKernelOfDimension, DecayOfSomeStatesEqualsTheDenseProductAndStaysExactlySymmetric) {
+  const auto [n, set] = GetParam();
   std::mt19937_64 random(12);
   const MatrixXd P = random_covariance(n, random);
-  CovarianceKernel kernel(n);
+  CovarianceKernel kernel(n, set);
   load(kernel, P);
   const auto size = static_cast<Eigen::Index>(n);
-  const Eigen::Index k = size - 2;
   MatrixXd Phi = MatrixXd::Identity(size, size);
-  Phi(k, k) = 0.7;
+  const std::array<double, 3> decay{0.7, 1.0, 0.93};
+  std::array<double, 3> variance{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Index k = size - 4 + static_cast<Eigen::Index>(i);
+    Phi(k, k) = decay[i];
+    variance[i] = 0.3 * P(k, k);
+  }
   MatrixXd oracle = Phi * P * Phi.transpose();
-  oracle(k, k) += 0.3 * P(k, k);
-  kernel.predict_state(n - 2, 0.7, 0.3 * P(k, k));
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::Index k = size - 4 + static_cast<Eigen::Index>(i);
+    oracle(k, k) += variance[i];
+  }
+  kernel.predict_states(n - 4, decay, variance);
   EXPECT_LT(scaled_difference(read(kernel), oracle), 1e-14);
+  EXPECT_TRUE(read(kernel) == read(kernel).transpose());
 }
 
 TEST_P(CovarianceKernelOfDimension, UpdateEqualsTheDenseJosephFormForEveryChoiceOfAxes) {
-  const std::size_t n = GetParam();
+  const auto [n, set] = GetParam();
   std::mt19937_64 random(13);
   for (unsigned mask = 1; mask < 8; ++mask) {
     const MatrixXd P = random_covariance(n, random);
-    CovarianceKernel kernel(n);
+    CovarianceKernel kernel(n, set);
     load(kernel, P);
     const Measurement m = random_measurement(n, P, random);
     MatrixXd R(3, 3);
@@ -167,7 +186,18 @@ TEST_P(CovarianceKernelOfDimension, UpdateEqualsTheDenseJosephFormForEveryChoice
 }
 
 INSTANTIATE_TEST_SUITE_P(OneThreeAndSixStudies, CovarianceKernelOfDimension,
-                         testing::Values(27, 34, 72, 129));
+                         testing::Combine(testing::Values(27, 34, 72, 129),
+                                          testing::Values(InstructionSet::kBaseline, InstructionSet::kAvx2,
+                                                          InstructionSet::kAvx512)));
+
+TEST(CovarianceLoops, TheChosenOnesAreTheWidestThatThisProcessorHas) {
+  const CovarianceLoops& chosen = widest_covariance_loops();
+  EXPECT_EQ(covariance_loops(chosen.instruction_set), &chosen);
+  EXPECT_NE(covariance_loops(InstructionSet::kBaseline), nullptr);
+  if (covariance_loops(InstructionSet::kAvx512) != nullptr) {
+    EXPECT_EQ(chosen.instruction_set, InstructionSet::kAvx512);
+  }
+}
 
 TEST(CovarianceKernel, UpdateWithoutAPositiveInnovationCovarianceChangesNothing) {
   CovarianceKernel kernel(34);

@@ -1,0 +1,146 @@
+#include "tools/studies/study_drive.h"
+
+#include <fmt/format.h>
+#include <cmath>
+#include <ctime>
+
+#include "navigation/so3.h"
+
+namespace study_drive {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using imuscope::kRadPerDeg;
+
+constexpr std::size_t kGnssEvery = 20;  // 5 Hz
+const Vector3d kGnssSd_m(0.01, 0.01, 0.02);
+
+imuscope::Sample stamped(imuscope::DeviceIndex device, std::size_t k, imuscope::SampleKind kind) {
+  imuscope::Sample sample{};
+  sample.kind = kind;
+  sample.device = device;
+  sample.sequence = k;
+  sample.time = imuscope::host_time_from_ns(static_cast<std::int64_t>(k) * 10'000'000);
+  sample.arrival = sample.time;
+  return sample;
+}
+
+imuscope::Sample imu_sample(imuscope::DeviceIndex device, std::size_t k, const imusim::ImuReading& reading) {
+  imuscope::Sample sample = stamped(device, k, imuscope::SampleKind::kImu);
+  sample.imu.omega_radps = to_array(reading.omega_radps);
+  sample.imu.f_mps2 = to_array(reading.f_mps2);
+  sample.imu.counter = static_cast<std::int64_t>(k);
+  sample.imu.flags = imuscope::kGyroValid | imuscope::kAccelValid;
+  return sample;
+}
+
+imuscope::Sample gnss_sample(std::size_t k, const imusim::GeodeticPosition& position) {
+  imuscope::Sample sample = stamped(kGnssDevice, k, imuscope::SampleKind::kGnss);
+  sample.gnss.latitude_rad = position.latitude_rad;
+  sample.gnss.longitude_rad = position.longitude_rad;
+  sample.gnss.height_m = position.height_m;
+  sample.gnss.sd_position_m = to_array(kGnssSd_m);
+  sample.gnss.solution = imuscope::GnssSolution::kFixed;
+  sample.gnss.flags = imuscope::kPositionValid | imuscope::kHasPositionSd;
+  return sample;
+}
+
+imusim::Mounting mounting(std::size_t study) { return {mounting_of(study), lever_arm_of(study)}; }
+
+double time_of(std::size_t k) { return static_cast<double>(k) / kRate_hz; }
+
+}  // namespace
+
+Matrix3d mounting_of(std::size_t study) {
+  const std::array<Vector3d, kStudies> vectors{Vector3d(0, 0, 0), Vector3d(0, 0, 90.0),
+                                               Vector3d(180.0, 0, 0)};
+  return imuscope::exp_so3(-vectors[study] * kRadPerDeg);
+}
+
+Vector3d lever_arm_of(std::size_t study) {
+  const std::array<Vector3d, kStudies> arms{Vector3d(0.35, -0.22, 0.12), Vector3d(-0.30, 0.25, 0.10),
+                                            Vector3d(0.10, 0.40, -0.25)};
+  return arms[study];
+}
+
+Vector3d normal3(imusim::Random& random) {
+  const double x = random.normal();
+  const double y = random.normal();
+  const double z = random.normal();
+  return {x, y, z};
+}
+
+imuscope::Vector3 to_array(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+imuscope::Matrix3 to_array(const Matrix3d& m) {
+  imuscope::Matrix3 out;
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.data()) = m;
+  return out;
+}
+
+double processor_time_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+Truth::Truth(const imusim::Scenario& scenario, double duration_s) : motion_(scenario) {
+  const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kRate_hz));
+  for (std::size_t k = 0; k < ticks; ++k) {
+    const imusim::MotionState now = motion_.state_at(time_of(k));
+    reference_.push_back(imusim::ideal_reading(now, imusim::Mounting{}));
+    const imusim::MotionState then = motion_.state_at(time_of(k) + kTimeOffset_s);
+    for (std::size_t i = 0; i < kStudies; ++i)
+      studies_[i].push_back(imusim::ideal_reading(then, mounting(i)));
+    if (k % kGnssEvery == 0) antenna_.push_back(now.position);
+  }
+}
+
+imusim::MotionState Truth::end() const { return motion_.state_at(time_of(ticks() - 1)); }
+
+Instruments::Instruments(const Truth& truth, const Draw& draw, std::uint64_t seed)
+    : truth_(truth),
+      gnss_noise_(seed, "gnss"),
+      reference_(truth.motion_, imusim::Mounting{}, draw.reference, seed, "reference") {
+  for (std::size_t i = 0; i < kStudies; ++i)
+    studies_.emplace_back(truth.motion_, mounting(i), draw.studies[i], seed, fmt::format("study{}", i));
+}
+
+const Tick& Instruments::next() {
+  // The noise of the studies does not depend on the regime.
+  constexpr imusim::Regime kAny = imusim::Regime::kDynamic;
+  tick_.clear();
+  const imusim::IdealReading& b = truth_.reference_[k_];
+  tick_.push_back(imu_sample(kReferenceDevice, k_, reference_.sample_of(b, b, kAny, time_of(k_))));
+  for (std::size_t i = 0; i < kStudies; ++i) {
+    const imusim::IdealReading& s = truth_.studies_[i][k_];
+    tick_.push_back(imu_sample(static_cast<imuscope::DeviceIndex>(kFirstStudyDevice + i), k_,
+                               studies_[i].sample_of(s, s, kAny, time_of(k_) + kTimeOffset_s)));
+  }
+  if (k_ % kGnssEvery == 0) {
+    const Vector3d noise = normal3(gnss_noise_).cwiseProduct(kGnssSd_m);
+    tick_.push_back(gnss_sample(k_, imusim::displaced(truth_.antenna_[k_ / kGnssEvery], noise)));
+  }
+  ++k_;
+  return tick_;
+}
+
+imuscope::EstimatorConfig configuration(const imusim::Motion& motion) {
+  imuscope::EstimatorConfig config;
+  config.reference.device = kReferenceDevice;
+  config.gnss.enabled = true;
+  config.gnss.device = kGnssDevice;
+  const imusim::MotionState start = motion.state_at(0.0);
+  config.navigation.initial_rpy_rad = imuscope::Vector3{start.roll_rad, start.pitch_rad, start.heading_rad};
+  for (std::size_t i = 0; i < kStudies; ++i) {
+    imuscope::StudyConfig study;
+    study.device = static_cast<imuscope::DeviceIndex>(kFirstStudyDevice + i);
+    study.noise.gyro[0] = study.noise.gyro[1];  // the simulated noise is dynamic throughout
+    config.studies.push_back(study);
+  }
+  return config;
+}
+
+}  // namespace study_drive
