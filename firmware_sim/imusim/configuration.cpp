@@ -241,6 +241,9 @@ Outcome<Configuration> parse_configuration(const std::string& text, const std::f
   if (!root.contains("device"))
     return wrong_usage(
         fmt::format("{} names no devices; describe each in a [[device]] table", file.string()));
+  configuration.run_name = file.stem().string();
+  in.table("run").text("name", configuration.run_name);
+  in.table("lcm").text("channel_prefix", configuration.channel_prefix);
   read_devices(in, configuration);
   read_simulation(in.table("simulation"), configuration);
   if (!problem.text.empty()) return wrong_usage(problem.text);

@@ -84,6 +84,8 @@ struct StudySimulation {
 struct Configuration {
   std::filesystem::path file;
   std::string text;
+  std::string run_name;
+  std::string channel_prefix = "IMUSCOPE";
   std::vector<PlayedDevice> devices;
   Scenario scenario;
   Utc utc_begin;

@@ -121,7 +121,7 @@ int run(int argc, char** argv) {
 
   RecordCommand record_command;
   CLI::App* record =
-      app.add_subcommand("record", "writes what the devices send, when it arrives, and the truth");
+      app.add_subcommand("record", "writes what the devices send, when it arrives (also as one capture), and the truth");
   record_command.common.add_to(*record);
   record->add_option("--out", record_command.folder, "folder to write to")->required();
   record->add_flag("--errors", record_command.options.true_errors,

@@ -3,45 +3,15 @@
 #include <fmt/format.h>
 #include <atomic>
 #include <cmath>
-#include <fstream>
 #include <future>
 #include <limits>
 
+#include "firmware_sim/imusim/capture_file.h"
+#include "firmware_sim/imusim/output_file.h"
 #include "firmware_sim/imusim/truth_files.h"
 
 namespace imusim {
 namespace {
-
-/// A file that is written in large pieces and remembers whether all of them went well.
-class OutputFile {
- public:
-  explicit OutputFile(const std::filesystem::path& path) : path_(path), file_(path, std::ios::binary) {}
-
-  void write(const char* data, std::size_t size) {
-    buffer_.append(data, data + size);
-    constexpr std::size_t kPiece = 1U << 20U;
-    if (buffer_.size() >= kPiece) flush();
-  }
-  void write(const std::string& text) { write(text.data(), text.size()); }
-
-  Outcome<void> close() {
-    flush();
-    file_.close();
-    if (!file_)
-      return failed_work(fmt::format("cannot write {}; is there room, and the permission?", path_.string()));
-    return {};
-  }
-
- private:
-  void flush() {
-    file_.write(buffer_.data(), static_cast<std::streamsize>(buffer_.size()));
-    buffer_.clear();
-  }
-
-  std::filesystem::path path_;
-  std::ofstream file_;
-  fmt::memory_buffer buffer_;
-};
 
 /// Runs one device through the whole scenario and writes what the host reads.
 Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::filesystem::path& folder,
@@ -93,6 +63,18 @@ std::string configuration_copy(const Configuration& configuration) {
       configuration.scenario.seed, configuration.scenario.duration_s, inputs, configuration.text);
 }
 
+CaptureHeader capture_header(const Configuration& configuration) {
+  CaptureHeader header;
+  header.run_name = configuration.run_name;
+  header.version = "imusim";
+  header.utc_begin = configuration.utc_begin;
+  header.host_begin_ns = kHostBegin_ns;
+  header.channel_prefix = configuration.channel_prefix;
+  header.configuration = configuration_copy(configuration);
+  for (const PlayedDevice& device : configuration.devices) header.devices.push_back(device.name);
+  return header;
+}
+
 }  // namespace
 
 Outcome<std::vector<Recorded>> record(const Configuration& configuration, const RecordOptions& options) {
@@ -137,6 +119,10 @@ Outcome<std::vector<Recorded>> record(const Configuration& configuration, const 
   }
   for (const auto& file : error_files)
     if (auto closed = file->close(); !closed && result) result = tl::unexpected(closed.error());
+  if (result) {
+    if (auto captured = write_capture(capture_header(configuration), options.folder); !captured)
+      return tl::unexpected(captured.error());
+  }
   if (options.on_progress) options.on_progress(1.0);
   return result;
 }

@@ -18,8 +18,6 @@ constexpr double kDrawnLeverArmSd_m = 0.3;
 constexpr double kClockSkewMax_ppm = 30.0;  // MTx manual: worst case
 // What a short differentiator makes of the reference gyro's white noise.
 constexpr double kRotationAccelerationSd_degps2 = 0.024;
-// The host's clock at the scenario's beginning: a PC that has been up for a while.
-constexpr std::int64_t kHostBegin_ns = 1'000'000'000'000;
 
 /// North-east-down to north-west-up, the world of an MTx.
 const Eigen::DiagonalMatrix<double, 3>& C_ned_nwu() {

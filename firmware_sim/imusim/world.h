@@ -16,6 +16,9 @@
 
 namespace imusim {
 
+/// The host's monotonic clock at the scenario's beginning: a PC that has been up for a while.
+inline constexpr std::int64_t kHostBegin_ns = 1'000'000'000'000;
+
 /// One sample of an S-IMU as it was made.
 struct TrueSample {
   double t_s;

@@ -84,7 +84,7 @@ std::string whole_folder(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     files[entry.path().filename()] = content_of(entry.path());
   std::string all;
-  for (const auto& [name, content] : files) all += name + "\n" + content;
+  for (const auto& [name, content] : files) all.append(name).append("\n").append(content);
   return all;
 }
 
@@ -161,7 +161,7 @@ TEST(Record, WritesEveryFileThatTheDesignPromises) {
   const std::filesystem::path folder = scratch_folder();
   ASSERT_TRUE(record(configuration(), {folder, true, {}}));
   for (const char* name : {"ref.bin", "ref.arrivals.csv", "a.bin", "a.arrivals.csv", "gnss.bin",
-                           "config.toml", "truth.json", "truth.csv", "errors_truth_a.csv"})
+                           "capture.lcm", "config.toml", "truth.json", "truth.csv", "errors_truth_a.csv"})
     EXPECT_GT(std::filesystem::file_size(folder / name), 0U) << name;
   EXPECT_TRUE(parse_configuration(content_of(folder / "config.toml"), "config.toml"));
 }
