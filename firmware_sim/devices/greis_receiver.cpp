@@ -12,6 +12,8 @@ namespace imusim {
 namespace {
 
 constexpr double kAnswerDelay_s = 0.005;
+/// From power to the first position, satellites and ambiguities included.
+constexpr double kWarmStart_s = 20.0;
 constexpr std::array<std::string_view, 8> kKnown = {"RT", "RD", "ST", "PG", "VG", "SG", "DP", "ET"};
 
 /// Reply and error messages have no checksum.
@@ -26,23 +28,37 @@ Bytes text_reply(std::string_view id, std::string_view text) {
   return bytes;
 }
 
+/// Epochs lie at the multiples of the interval in the time of day.
+double first_epoch_s(const GreisReceiver::Options& options) {
+  const double time_of_day = std::chrono::duration<double>(utc_parts(options.utc_begin).time_of_day).count();
+  const double interval = 1.0 / options.rate_hz;
+  return std::ceil(time_of_day / interval - 1e-9) * interval - time_of_day;
+}
+
 }  // namespace
 
 GreisReceiver::GreisReceiver(const Options& options, Solver solver)
-    : options_(options), solver_(std::move(solver)), enabled_(kKnown.begin(), kKnown.end()) {
-  // Epochs lie at the multiples of the interval in the time of day.
-  const double time_of_day = std::chrono::duration<double>(utc_parts(options.utc_begin).time_of_day).count();
-  const double interval = 1.0 / options.rate_hz;
-  first_epoch_s_ = std::ceil(time_of_day / interval - 1e-9) * interval - time_of_day;
+    : options_(options),
+      solver_(std::move(solver)),
+      grid_(first_epoch_s(options), 1.0 / options.rate_hz),
+      enabled_(kKnown.begin(), kKnown.end()) {}
+
+void GreisReceiver::skip_to(double t_s) { next_index_ = std::max(next_index_, grid_.first_from(t_s)); }
+
+void GreisReceiver::power_cycle(double t_s, double off_s) {
+  skip_to(t_s + off_s + kWarmStart_s);
+  heard_.clear();
+  replies_.clear();
+  enabled_.assign(kKnown.begin(), kKnown.end());
+  epochs_per_output_ = 1;
 }
 
-double GreisReceiver::epoch_time(std::int64_t index) const {
-  return first_epoch_s_ + static_cast<double>(index) / options_.rate_hz;
-}
-
-void GreisReceiver::skip_to(double t_s) {
-  const double index = std::ceil((t_s - epoch_time(0)) * options_.rate_hz);
-  next_index_ = std::max(next_index_, static_cast<std::int64_t>(std::max(index, 0.0)));
+bool GreisReceiver::leave_out(const std::vector<std::string>& blocks) {
+  const bool known = std::all_of(blocks.begin(), blocks.end(), [](const std::string& name) {
+    return std::find(kKnown.begin(), kKnown.end(), name) != kKnown.end();
+  });
+  if (known) left_out_ = blocks;
+  return known;
 }
 
 void GreisReceiver::receive(std::span<const std::uint8_t> bytes, double t_s) {
@@ -97,11 +113,11 @@ bool GreisReceiver::enable(const std::string& arguments) {
   return true;
 }
 
-Bytes GreisReceiver::epoch_bytes(double epoch_s) const {
-  greis::Solution solution = solver_(epoch_s);
+Bytes GreisReceiver::epoch_bytes(std::int64_t index) const {
+  greis::Solution solution = solver_(grid_.instant(index));
   // Time base GPS: what the receiver calls its date and time of day is ahead of UTC by the leap seconds.
-  const UtcParts gps =
-      utc_parts(utc_after(options_.utc_begin, epoch_s) + std::chrono::seconds(kGpsMinusUtc_s));
+  const UtcParts gps = utc_parts(utc_after(options_.utc_begin, grid_.device_time(index)) +
+                                 std::chrono::seconds(kGpsMinusUtc_s));
   solution.time_of_day_ms =
       static_cast<std::uint32_t>(std::chrono::round<std::chrono::milliseconds>(gps.time_of_day).count());
   solution.year = static_cast<std::uint16_t>(gps.year);
@@ -110,6 +126,7 @@ Bytes GreisReceiver::epoch_bytes(double epoch_s) const {
   solution.date_base = 0;
   Bytes bytes;
   for (const std::string& name : enabled_) {
+    if (std::find(left_out_.begin(), left_out_.end(), name) != left_out_.end()) continue;
     put_bytes(bytes, greis::encode(name, solution));
     put_text(bytes, "\r\n");
   }
@@ -120,11 +137,10 @@ void GreisReceiver::run_until(double t_s, std::vector<Emission>& out) {
   for (Emission& reply : replies_) out.push_back(std::move(reply));
   replies_.clear();
   while (true) {
-    const double epoch_s = epoch_time(next_index_);
-    const double ready_s = epoch_s + options_.latency_s;
+    const double ready_s = grid_.instant(next_index_) + options_.latency_s;
     if (ready_s > t_s) break;
     const bool due = next_index_ % epochs_per_output_ == 0 && !enabled_.empty();
-    if (due) out.push_back({ready_s, epoch_bytes(epoch_s)});
+    if (due) out.push_back({ready_s, epoch_bytes(next_index_)});
     ++next_index_;
   }
   std::stable_sort(out.begin(), out.end(),

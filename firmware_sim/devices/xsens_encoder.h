@@ -25,8 +25,12 @@ enum Mid : std::uint8_t {
   kReqFirmwareRevision = 0x12,
   kBaudrate = 0x18,
   kReqProductCode = 0x1C,
+  kReqHardwareVersion = 0x1E,
+  kRunSelftest = 0x24,
   kGoToConfig = 0x30,
   kMtData = 0x32,
+  kReqData = 0x34,
+  kMtData2 = 0x36,
   kWakeUp = 0x3E,
   kWakeUpAck = 0x3F,
   kReset = 0x40,
@@ -35,7 +39,10 @@ enum Mid : std::uint8_t {
   kOutputMode = 0xD0,
   kOutputSettings = 0xD2,
   kOutputSkipFactor = 0xD4,
+  kSyncInSettings = 0xD6,
+  kSyncOutSettings = 0xD8,
   kErrorMode = 0xDA,
+  kTransmitDelay = 0xDC,
 };
 
 /// Bits of OutputMode that this firmware knows.

@@ -18,33 +18,28 @@ constexpr std::uint16_t kPeriodSlowest = 11520;  // 10 Hz
 constexpr double kWakeUpTimeout_s = 0.5;
 // Time the firmware takes to answer a command.
 constexpr double kAnswerDelay_s = 0.003;
-// Longest message that a host sends to an MTx: OutputConfiguration with 32 entries.
-constexpr std::size_t kLongestCommand = 128;
+// From power to WakeUp.
+constexpr double kBoot_s = 1.7;
+// A device has room for one message beside the one that it is sending.
+constexpr double kMessagesInHand = 1.0;
+constexpr double kBitsPerByte = 10.0;
 
 constexpr std::uint8_t kErrorPeriod = 0x03;
 constexpr std::uint8_t kErrorMessage = 0x04;
 constexpr std::uint8_t kErrorBaudrate = 0x20;
 constexpr std::uint8_t kErrorParameter = 0x21;
-
-// Index = baud code; 0x80 is another code of 921600.
-constexpr std::array<int, 12> kBauds = {460800, 230400, 115200, 76800, 57600,  38400,
-                                        28800,  19200,  14400,  9600,  921600, 4800};
-
-int baud_of_code(std::uint8_t code) {
-  if (code == 0x80) return 921600;
-  return code < kBauds.size() ? kBauds[code] : 0;
-}
-
-std::uint8_t code_of_baud(int baud) {
-  const auto* const found = std::find(kBauds.begin(), kBauds.end(), baud);
-  return static_cast<std::uint8_t>(found == kBauds.end() ? 2 : found - kBauds.begin());
-}
+constexpr std::uint8_t kErrorTimerOverflow = 0x1E;
+// Error modes: from the first on, an Error message is sent; from the second on, measuring ends too.
+constexpr std::uint16_t kErrorModeMessage = 2;
+constexpr std::uint16_t kErrorModeConfig = 3;
+// OutputSkipFactor of a device that sends on ReqData only.
+constexpr std::uint16_t kSkipAll = 0xFFFF;
 
 bool valid_period(std::uint16_t period) { return period >= kPeriodFastest && period <= kPeriodSlowest; }
 bool valid_mode(std::uint16_t mode) { return mode != 0 && (mode & ~kKnownModes) == 0; }
 bool valid_settings(std::uint32_t settings) { return (settings & ~kKnownSettings) == 0; }
 bool valid_error_mode(std::uint16_t mode) { return mode <= 3; }
-bool any_skip(std::uint16_t /*skip*/) { return true; }
+bool any_value(std::uint16_t /*value*/) { return true; }
 
 }  // namespace
 
@@ -53,7 +48,8 @@ XsensMtx::XsensMtx(const Options& options, Sampler sampler, double power_on_s)
       sampler_(std::move(sampler)),
       baud_(options.baud),
       measurement_end_s_(kNever_s),
-      grid_origin_s_(options.first_sample_s) {
+      grid_(options.first_sample_s, options.period / kPeriodTicksPerSecond, options.clock_skew_ppm),
+      counter_offset_(options.first_counter) {
   settings_.period = options.period;
   settings_.baud_code = code_of_baud(options.baud);
   power_on(power_on_s);
@@ -63,9 +59,23 @@ void XsensMtx::power_on(double t_s) {
   state_ = State::kWaking;
   measurement_end_s_ = kNever_s;
   wake_deadline_s_ = t_s + kWakeUpTimeout_s;
-  heard_.clear();
+  scanner_ = {};
   replies_.push_back({t_s, frame(kWakeUp, {})});
 }
+
+void XsensMtx::power_cycle(double t_s, double off_s) {
+  state_ = State::kOff;
+  replies_.clear();
+  power_on_s_ = t_s + off_s + kBoot_s;
+  baud_ = baud_of_code(settings_.baud_code);
+  // It counts from 0 again.
+  next_index_ = std::max(next_index_, grid_.first_from(power_on_s_));
+  counter_offset_ = -next_index_;
+}
+
+void XsensMtx::jump_clock(double by_s) { counter_offset_ += std::llround(by_s / grid_.period()); }
+
+void XsensMtx::add_skew(double ppm) { grid_.set_skew(grid_.skew_ppm() + ppm, next_index_); }
 
 void XsensMtx::start_calibrated(double t_s) {
   settings_.output_mode = kModeCalibrated;
@@ -78,53 +88,21 @@ void XsensMtx::start_calibrated(double t_s) {
   enter_measurement(t_s);
 }
 
-double XsensMtx::period_s() const {
-  return settings_.period / kPeriodTicksPerSecond / (1.0 + options_.clock_skew_ppm * 1e-6);
-}
-
-double XsensMtx::sample_time(std::int64_t index) const {
-  return grid_origin_s_ + static_cast<double>(index - index_at_grid_) * period_s();
-}
-
 void XsensMtx::enter_measurement(double t_s) {
   state_ = State::kMeasurement;
   measurement_end_s_ = kNever_s;
   // The sampling clock never stopped: go on with the first sample that lies ahead.
-  const double ahead = std::ceil((t_s - grid_origin_s_) / period_s());
-  next_index_ = std::max(index_at_grid_ + static_cast<std::int64_t>(std::max(ahead, 0.0)), next_index_);
+  next_index_ = std::max(grid_.first_from(t_s), next_index_);
 }
 
 void XsensMtx::receive(std::span<const std::uint8_t> bytes, double t_s) {
-  put_bytes(heard_, bytes);
-  Command command;
-  while (take_frame(command)) handle(command, t_s);
-}
-
-/// Takes the first good frame out of what was heard, skipping one byte where a preamble was none.
-bool XsensMtx::take_frame(Command& command) {
-  constexpr std::size_t kHeader = 4;
-  while (true) {
-    const auto preamble = std::find(heard_.begin(), heard_.end(), std::uint8_t{0xFA});
-    heard_.erase(heard_.begin(), preamble);
-    if (heard_.size() < kHeader) return false;
-    const std::size_t length = heard_[3];
-    if (length > kLongestCommand) {
-      heard_.erase(heard_.begin());
-      continue;
-    }
-    const std::size_t whole = kHeader + length + 1;
-    if (heard_.size() < whole) return false;
-    unsigned sum = 0;
-    for (std::size_t i = 1; i < whole; ++i) sum += heard_[i];
-    if ((sum & 0xFFU) != 0) {
-      heard_.erase(heard_.begin());
-      continue;
-    }
-    command.mid = heard_[2];
-    command.data.assign(heard_.begin() + kHeader, heard_.begin() + static_cast<std::ptrdiff_t>(whole) - 1);
-    heard_.erase(heard_.begin(), heard_.begin() + static_cast<std::ptrdiff_t>(whole));
-    return true;
+  if (state_ == State::kOff) {
+    if (t_s < power_on_s_) return;
+    power_on(power_on_s_);
   }
+  scanner_.hear(bytes);
+  Command command;
+  while (scanner_.next(command)) handle(command, t_s);
 }
 
 void XsensMtx::reply(std::uint8_t mid, const Bytes& data, double t_s) {
@@ -134,6 +112,7 @@ void XsensMtx::reply(std::uint8_t mid, const Bytes& data, double t_s) {
 void XsensMtx::error(std::uint8_t code, double t_s) { reply(kError, {code}, t_s); }
 
 void XsensMtx::handle(const Command& command, double t_s) {
+  if (!command.is_for(1)) return;
   switch (command.mid) {
     case kReset:
       reply(kReset + 1, {}, t_s);
@@ -149,6 +128,13 @@ void XsensMtx::handle(const Command& command, double t_s) {
       return;
     case kWakeUpAck:
       if (state_ == State::kWaking) state_ = State::kConfig;
+      return;
+    case kReqData:
+      if (state_ == State::kMeasurement && settings_.skip_factor == kSkipAll) {
+        next_index_ = std::max(next_index_, grid_.first_from(t_s));
+        replies_.push_back({grid_.instant(next_index_) + options_.latency_s, data_frame(next_index_)});
+        ++next_index_;
+      }
       return;
     default:
       // A command may follow the GoToConfig that is being acknowledged; while measuring all others are
@@ -181,6 +167,34 @@ void XsensMtx::set_baudrate(const Command& command, double t_s) {
   reply(kBaudrate + 1, {}, t_s);
 }
 
+void XsensMtx::set_period(const Command& command, double t_s) {
+  const std::uint16_t before = settings_.period;
+  request_or_set<std::uint16_t>(command, settings_.period, valid_period, kErrorPeriod, t_s);
+  if (settings_.period != before) grid_.set_period(settings_.period / kPeriodTicksPerSecond, next_index_);
+}
+
+/// SyncIn and SyncOut: a parameter's number, and its value where it is to be set. Modes and skips are short.
+void XsensMtx::set_sync(const Command& command, std::array<std::uint32_t, 4>& sync, std::size_t parameters,
+                        double t_s) {
+  if (command.data.empty()) return error(kErrorMessage, t_s);
+  const std::size_t parameter = command.data[0];
+  if (parameter >= parameters) return error(kErrorParameter, t_s);
+  const std::span<const std::uint8_t> value = std::span(command.data).subspan(1);
+  const bool is_short = parameter < 2;
+  const auto ack = static_cast<std::uint8_t>(command.mid + 1);
+  if (value.empty()) {
+    Bytes data{command.data[0]};
+    if (is_short)
+      put_be(data, static_cast<std::uint16_t>(sync[parameter]));
+    else
+      put_be(data, sync[parameter]);
+    return reply(ack, data, t_s);
+  }
+  if (value.size() != (is_short ? 2U : 4U)) return error(kErrorMessage, t_s);
+  sync[parameter] = is_short ? get_be<std::uint16_t>(value) : get_be<std::uint32_t>(value);
+  reply(ack, {}, t_s);
+}
+
 void XsensMtx::handle_in_config(const Command& command, double t_s) {
   switch (command.mid) {
     case kReqDid:
@@ -189,16 +203,8 @@ void XsensMtx::handle_in_config(const Command& command, double t_s) {
       put_be(data, options_.device_id);
       return reply(static_cast<std::uint8_t>(command.mid + 1), data, t_s);
     }
-    case kPeriod: {
-      const double instant = sample_time(next_index_);
-      const std::uint16_t before = settings_.period;
-      request_or_set<std::uint16_t>(command, settings_.period, valid_period, kErrorPeriod, t_s);
-      if (settings_.period != before) {
-        grid_origin_s_ = instant;
-        index_at_grid_ = next_index_;
-      }
-      return;
-    }
+    case kPeriod:
+      return set_period(command, t_s);
     case kReqDataLength: {
       Bytes data;
       put_be(data, data_length());
@@ -216,6 +222,21 @@ void XsensMtx::handle_in_config(const Command& command, double t_s) {
       put_text(data, "MTx-28A53G25        ");
       return reply(kReqProductCode + 1, data, t_s);
     }
+    case kReqHardwareVersion:
+      return reply(kReqHardwareVersion + 1, {0x01, 0x03}, t_s);
+    case kRunSelftest: {
+      constexpr std::uint16_t kAllPass = 0x01FF;
+      Bytes data;
+      put_be(data, kAllPass);
+      return reply(kRunSelftest + 1, data, t_s);
+    }
+    case kSyncInSettings:
+      return set_sync(command, settings_.sync_in, 3, t_s);
+    case kSyncOutSettings:
+      return set_sync(command, settings_.sync_out, 4, t_s);
+    case kTransmitDelay:
+      return request_or_set<std::uint16_t>(command, settings_.transmit_delay, any_value, kErrorParameter,
+                                           t_s);
     case kBaudrate:
       return set_baudrate(command, t_s);
     case kOutputMode:
@@ -224,7 +245,7 @@ void XsensMtx::handle_in_config(const Command& command, double t_s) {
       return request_or_set<std::uint32_t>(command, settings_.output_settings, valid_settings,
                                            kErrorParameter, t_s);
     case kOutputSkipFactor:
-      return request_or_set<std::uint16_t>(command, settings_.skip_factor, any_skip, kErrorParameter, t_s);
+      return request_or_set<std::uint16_t>(command, settings_.skip_factor, any_value, kErrorParameter, t_s);
     case kErrorMode:
       return request_or_set<std::uint16_t>(command, settings_.error_mode, valid_error_mode, kErrorParameter,
                                            t_s);
@@ -247,7 +268,10 @@ Bytes XsensMtx::configuration() const {
   put_be(data, options_.device_id);
   put_be(data, settings_.period);
   put_be(data, settings_.skip_factor);
-  data.resize(kDeviceCountOffset, 0);  // sync settings off, no date, reserved fields empty
+  put_be(data, static_cast<std::uint16_t>(settings_.sync_in[0]));
+  put_be(data, static_cast<std::uint16_t>(settings_.sync_in[1]));
+  put_be(data, settings_.sync_in[2]);
+  data.resize(kDeviceCountOffset, 0);  // no date, reserved fields empty
   put_be(data, std::uint16_t{1});
   put_be(data, options_.device_id);
   put_be(data, data_length());
@@ -258,22 +282,43 @@ Bytes XsensMtx::configuration() const {
   return data;
 }
 
+Bytes XsensMtx::data_frame(std::int64_t index) {
+  MtSample sample = sampler_(grid_.instant(index), index + options_.first_counter);
+  sample.counter = static_cast<std::uint16_t>((index + counter_offset_) & 0xFFFF);
+  return frame(kMtData, mtdata_payload(sample, settings_.output_mode, settings_.output_settings));
+}
+
+/// Whether a message that is ready now still fits into what the line has to send.
+bool XsensMtx::line_is_free(double ready_s, std::size_t bytes) {
+  if (line_busy_until_s_ > ready_s + kMessagesInHand * grid_.period()) return false;
+  line_busy_until_s_ =
+      std::max(line_busy_until_s_, ready_s) + kBitsPerByte * static_cast<double>(bytes) / baud_;
+  return true;
+}
+
 void XsensMtx::emit_samples_until(double t_s, std::vector<Emission>& out) {
-  while (state_ == State::kMeasurement) {
-    const double sampled_s = sample_time(next_index_);
-    const double ready_s = sampled_s + options_.latency_s;
+  while (state_ == State::kMeasurement && settings_.skip_factor != kSkipAll) {
+    const double ready_s = grid_.instant(next_index_) + options_.latency_s;
     if (ready_s > t_s || ready_s >= measurement_end_s_) return;
     const std::int64_t index = next_index_++;
-    const bool every_sample = settings_.skip_factor == 0;
-    if (!every_sample && index % (std::int64_t{settings_.skip_factor} + 1) != 0) continue;
-    MtSample sample = sampler_(sampled_s, index + options_.first_counter);
-    sample.counter = static_cast<std::uint16_t>((index + options_.first_counter) & 0xFFFF);
-    out.push_back(
-        {ready_s, frame(kMtData, mtdata_payload(sample, settings_.output_mode, settings_.output_settings))});
+    if (index % (std::int64_t{settings_.skip_factor} + 1) != 0) continue;
+    Bytes message = data_frame(index);
+    if (line_is_free(ready_s, message.size())) {
+      out.push_back({ready_s, std::move(message)});
+      continue;
+    }
+    // More than the line takes: the sample is gone, and the error mode says who hears of it.
+    if (settings_.error_mode >= kErrorModeMessage)
+      out.push_back({ready_s, frame(kError, Bytes{kErrorTimerOverflow})});
+    if (settings_.error_mode >= kErrorModeConfig) state_ = State::kConfig;
   }
 }
 
 void XsensMtx::run_until(double t_s, std::vector<Emission>& out) {
+  if (state_ == State::kOff) {
+    if (t_s < power_on_s_) return;
+    power_on(power_on_s_);
+  }
   while (!replies_.empty() && replies_.front().ready_s <= t_s) {
     emit_samples_until(replies_.front().ready_s, out);
     if (measurement_end_s_ <= replies_.front().ready_s && state_ == State::kMeasurement) {

@@ -7,12 +7,15 @@
 /// with its stored settings (factory: 100 Hz, quaternion and sample counter, 115200 baud). In Measurement it
 /// hears GoToConfig and Reset only, and goes on sending data until it has acknowledged.
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <vector>
 
 #include "firmware_sim/devices/device.h"
+#include "firmware_sim/devices/sample_grid.h"
+#include "firmware_sim/devices/xsens_command.h"
 #include "firmware_sim/devices/xsens_encoder.h"
 
 namespace imusim {
@@ -33,13 +36,17 @@ class XsensMtx : public Device {
     int baud = 115200;
   };
 
-  enum class State { kWaking, kConfig, kMeasurement };
+  enum class State { kOff, kWaking, kConfig, kMeasurement };
 
   /// Just powered on, at time power_on_s.
   XsensMtx(const Options& options, Sampler sampler, double power_on_s);
 
   void receive(std::span<const std::uint8_t> bytes, double t_s) override;
   void run_until(double t_s, std::vector<Emission>& out) override;
+  void power_cycle(double t_s, double off_s) override;
+  void jump_clock(double by_s) override;
+  void add_skew(double ppm) override;
+  bool leave_out(const std::vector<std::string>& blocks) override { return blocks.empty(); }
   [[nodiscard]] int baud() const override { return baud_; }
 
   [[nodiscard]] State state() const { return state_; }
@@ -58,19 +65,21 @@ class XsensMtx : public Device {
     std::uint32_t output_settings = xsens::kSettingsCounter;
     std::uint16_t error_mode = 1;
     std::uint8_t baud_code = 2;
+    std::array<std::uint32_t, 4> sync_in{};   // mode, skip, offset
+    std::array<std::uint32_t, 4> sync_out{};  // mode, skip, offset, pulse width
+    std::uint16_t transmit_delay = 0;
   };
-  struct Command {
-    std::uint8_t mid;
-    Bytes data;
-  };
+  using Command = xsens::Command;
 
-  bool take_frame(Command& command);
   void handle(const Command& command, double t_s);
   void handle_in_config(const Command& command, double t_s);
   template <typename T>
   void request_or_set(const Command& command, T& setting, bool (*is_valid)(T), std::uint8_t error,
                       double t_s);
+  void set_period(const Command& command, double t_s);
   void set_baudrate(const Command& command, double t_s);
+  void set_sync(const Command& command, std::array<std::uint32_t, 4>& sync, std::size_t parameters,
+                double t_s);
   void power_on(double t_s);
   void enter_measurement(double t_s);
   void reply(std::uint8_t mid, const Bytes& data, double t_s);
@@ -78,8 +87,8 @@ class XsensMtx : public Device {
   void emit_samples_until(double t_s, std::vector<Emission>& out);
   [[nodiscard]] Bytes configuration() const;
   [[nodiscard]] std::uint16_t data_length() const;
-  [[nodiscard]] double sample_time(std::int64_t index) const;
-  [[nodiscard]] double period_s() const;
+  [[nodiscard]] Bytes data_frame(std::int64_t index);
+  [[nodiscard]] bool line_is_free(double ready_s, std::size_t bytes);
 
   Options options_;
   Sampler sampler_;
@@ -87,14 +96,15 @@ class XsensMtx : public Device {
   State state_ = State::kWaking;
   int baud_;
   double wake_deadline_s_ = 0.0;
+  double power_on_s_ = 0.0;  ///< when it wakes, while it is off
   /// Measurement ends when the ack of GoToConfig leaves; infinite when none is due.
   double measurement_end_s_;
-  Bytes heard_;
+  xsens::CommandScanner scanner_;
   std::deque<Emission> replies_;
-  // The sampling grid: sample index i is taken at grid_origin_s_ + i * period.
-  double grid_origin_s_;
+  SampleGrid grid_;
   std::int64_t next_index_ = 0;
-  std::int64_t index_at_grid_ = 0;
+  std::int64_t counter_offset_;  ///< the wire's counter is the index plus this
+  double line_busy_until_s_ = -1e300;
 };
 
 }  // namespace imusim

@@ -225,6 +225,13 @@ void read_simulation(TableReader in, Configuration& configuration) {
 
 }  // namespace
 
+std::vector<Fault> Configuration::faults_of(const std::string& device) const {
+  std::vector<Fault> found;
+  std::copy_if(faults.begin(), faults.end(), std::back_inserter(found),
+               [&](const Fault& fault) { return fault.device == device; });
+  return found;
+}
+
 Outcome<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& file) {
   Configuration configuration;
   configuration.file = file;

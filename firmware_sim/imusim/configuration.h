@@ -28,6 +28,7 @@
 #include <vector>
 
 #include "firmware_sim/devices/utc.h"
+#include "firmware_sim/faults/fault.h"
 #include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/imusim/failure.h"
 #include "firmware_sim/io/serial_line.h"
@@ -93,6 +94,10 @@ struct Configuration {
   GnssSimulation gnss;
   LineOptions line;                      ///< all but the baud rate
   std::vector<StudySimulation> studies;  ///< one for each device with role study, in its order
+  std::vector<Fault> faults;             ///< of a fault script
+  std::string fault_text;                ///< the script as read; empty where there is none
+
+  [[nodiscard]] std::vector<Fault> faults_of(const std::string& device) const;
 };
 
 /// Reads and checks a configuration file.

@@ -14,15 +14,29 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 // As a USB host controller would, the player looks after its ports once a millisecond.
 constexpr std::int64_t kTick_ns = 1'000'000;
 
-/// A device, the line it drives and the pseudo-terminal at the end of the line.
+/// A device, the line it drives and the pseudo-terminal at the end of the line, which is gone while the
+/// device is unplugged.
 struct Port {
   WorldDevice* device;
   SerialLine line;
-  PseudoTerminal terminal;
+  std::vector<Unplugged> unplugged;
+  std::optional<PseudoTerminal> terminal;
   LiveCounts counts;
 
+  void plug_in_or_out(double t_s) {
+    const bool out = std::any_of(unplugged.begin(), unplugged.end(), [&](const Unplugged& span) {
+      return t_s >= span.begin_s && t_s < span.end_s;
+    });
+    if (out == !terminal.has_value()) return;
+    terminal.reset();
+    if (out) return;
+    auto again = PseudoTerminal::open(device->played.port);
+    if (again) terminal.emplace(std::move(*again));
+  }
+
   void run_until(double t_s) {
-    const Bytes heard = terminal.read();
+    plug_in_or_out(t_s);
+    const Bytes heard = terminal ? terminal->read() : Bytes{};
     counts.received_bytes += heard.size();
     if (!heard.empty()) device->device->receive(heard, t_s);
     emissions.clear();
@@ -30,7 +44,7 @@ struct Port {
     line.set_baud(device->device->baud());
     for (const Emission& emission : emissions) line.send(emission);
     line.deliver_until(t_s, [this](std::span<const std::uint8_t> bytes, std::int64_t /*arrival_ns*/) {
-      const std::size_t dropped = terminal.write(bytes);
+      const std::size_t dropped = terminal ? terminal->write(bytes) : bytes.size();
       counts.dropped_bytes += dropped;
       counts.sent_bytes += bytes.size() - dropped;
     });
@@ -65,7 +79,10 @@ Outcome<std::vector<Port>> open_ports(World& world, const LiveOptions& options) 
     if (options.on_line)
       options.on_line(fmt::format("{:<10} {} -> {}, {} baud", played.name, played.port, terminal->terminal(),
                                   played.baud));
-    ports.push_back({&device, world.line_of(played), std::move(*terminal), {played.name, 0, 0, 0}});
+    ports.push_back({&device, world.line_of(played), {}, std::move(*terminal), {played.name, 0, 0, 0}});
+    for (const Fault& fault : world.configuration().faults_of(played.name)) {
+      if (fault.kind == FaultKind::kUnplug) ports.back().unplugged.push_back({fault.begin_s, fault.end_s});
+    }
   }
   return ports;
 }
@@ -78,6 +95,7 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
     return wrong_usage(fmt::format("the scenario lasts {} s; a start at {} s lies behind its end",
                                    configuration.scenario.duration_s, options.start_s));
   World world(configuration, World::Beginning::kPoweredOn, options.start_s);
+  if (auto checked = check_faults(world); !checked) return tl::unexpected(checked.error());
   if (options.folder) {
     if (auto made = make_folder(*options.folder); !made) return tl::unexpected(made.error());
     for (const auto& write : {write_truth_json, write_truth_csv})

@@ -7,6 +7,7 @@
 #include <exception>
 #include <functional>
 
+#include "firmware_sim/imusim/fault_script.h"
 #include "firmware_sim/imusim/live.h"
 #include "firmware_sim/imusim/record.h"
 
@@ -35,6 +36,7 @@ struct Common {
   std::string config;
   std::optional<double> minutes;
   std::optional<std::uint64_t> seed;
+  std::optional<std::string> faults;
 
   void add_to(CLI::App& command) {
     command.add_option("CONFIG", config, "configuration with a [simulation] table, such as config/demo.toml")
@@ -42,11 +44,16 @@ struct Common {
     command.add_option("--minutes", minutes, "length of the scenario, instead of the configuration's")
         ->check(CLI::Range(0.05, 1440.0));
     command.add_option("--seed", seed, "seed of all randomness, instead of the configuration's");
+    command.add_option("--faults", faults,
+                       "fault script: what goes wrong, and when; config/faults.toml explains it");
   }
   [[nodiscard]] Outcome<Configuration> load() const {
     Outcome<Configuration> configuration = load_configuration(config);
     if (configuration && minutes) configuration->scenario.duration_s = *minutes * kSecondsPerMinute;
     if (configuration && seed) configuration->scenario.seed = *seed;
+    if (configuration && faults) {
+      if (auto loaded = load_faults(*faults, *configuration); !loaded) return tl::unexpected(loaded.error());
+    }
     return configuration;
   }
 };
@@ -120,8 +127,8 @@ int run(int argc, char** argv) {
   std::function<Outcome<void>()> work;
 
   RecordCommand record_command;
-  CLI::App* record =
-      app.add_subcommand("record", "writes what the devices send, when it arrives (also as one capture), and the truth");
+  CLI::App* record = app.add_subcommand(
+      "record", "writes what the devices send, when it arrives (also as one capture), and the truth");
   record_command.common.add_to(*record);
   record->add_option("--out", record_command.folder, "folder to write to")->required();
   record->add_flag("--errors", record_command.options.true_errors,

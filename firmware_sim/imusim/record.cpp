@@ -80,6 +80,11 @@ CaptureHeader capture_header(const Configuration& configuration) {
 Outcome<std::vector<Recorded>> record(const Configuration& configuration, const RecordOptions& options) {
   if (auto made = make_folder(options.folder); !made) return tl::unexpected(made.error());
   World world(configuration, World::Beginning::kStreaming);
+  if (auto checked = check_faults(world); !checked) return tl::unexpected(checked.error());
+  if (!configuration.fault_text.empty()) {
+    if (auto written = write_file(options.folder / "faults.toml", configuration.fault_text); !written)
+      return tl::unexpected(written.error());
+  }
   for (const auto& write : {write_truth_json, write_truth_csv})
     if (auto written = write(world, options.folder); !written) return tl::unexpected(written.error());
   if (auto written = write_file(options.folder / "config.toml", configuration_copy(configuration)); !written)

@@ -1,5 +1,7 @@
 #include "firmware_sim/imusim/world.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
@@ -8,6 +10,8 @@
 #include "firmware_sim/devices/greis_receiver.h"
 #include "firmware_sim/devices/stdbin_unit.h"
 #include "firmware_sim/devices/xsens_mtx.h"
+#include "firmware_sim/faults/faulty_device.h"
+#include "firmware_sim/imusim/sensor_faults.h"
 
 namespace imusim {
 namespace {
@@ -145,6 +149,15 @@ World::World(const Configuration& configuration, Beginning beginning, double beg
   }
 }
 
+void World::add(const PlayedDevice& played, std::unique_ptr<Device> device) {
+  const std::vector<Fault> faults = configuration_.faults_of(played.name);
+  if (!faults.empty()) {
+    device = std::make_unique<FaultyDevice>(std::move(device), faults,
+                                            Random(configuration_.scenario.seed, played.name + "/faults"));
+  }
+  devices_.push_back({played, std::move(device)});
+}
+
 void World::add_study(const PlayedDevice& played, const StudySimulation& study, Beginning beginning,
                       double begin_s) {
   // Every property is drawn in the same order whether it is given or not: giving one changes no other.
@@ -197,9 +210,11 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
   observers_.emplace_back(played.name, observer);
   const Eigen::Matrix3d C_frame_device = played.C_device_frame.transpose();
   const std::shared_ptr<const Motion> motion = motion_;
-  const auto sample = [motion, imu, observer](double t_s, std::int64_t counter) {
+  auto faults = std::make_shared<SensorFaults>(configuration_.faults_of(played.name));
+  const auto sample = [motion, imu, observer, faults](double t_s, std::int64_t counter) {
     ImuReading reading = imu->sample_at(t_s);
     if (*observer) (*observer)({t_s, counter, reading, motion->regime_at(t_s)});
+    faults->apply(t_s, reading);
     return reading;
   };
 
@@ -226,7 +241,7 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
         },
         begin_s);
     if (beginning == Beginning::kStreaming) device->start_calibrated(begin_s);
-    devices_.push_back({played, std::move(device)});
+    add(played, std::move(device));
     return;
   }
 
@@ -256,7 +271,7 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
         return telegram;
       });
   unit->skip_to(begin_s);
-  devices_.push_back({played, std::move(unit)});
+  add(played, std::move(unit));
 }
 
 void World::add_gnss(const PlayedDevice& played, double begin_s) {
@@ -268,6 +283,7 @@ void World::add_gnss(const PlayedDevice& played, double begin_s) {
   options.baud = played.baud;
   auto random = std::make_shared<Random>(configuration_.scenario.seed, played.name + "/noise");
   const std::shared_ptr<const Motion> motion = motion_;
+  const auto faults = std::make_shared<const SensorFaults>(configuration_.faults_of(played.name));
   auto receiver = std::make_unique<GreisReceiver>(options, [=, antenna = played.antenna_b_m](double t_s) {
     const MotionState state = motion->state_at(t_s);
     const GeodeticPosition place =
@@ -289,10 +305,11 @@ void World::add_gnss(const PlayedDevice& played, double begin_s) {
     solution.vertical_position_sd_m = sd(gnss.position_sd_m.z());
     solution.horizontal_velocity_sd_mps = sd(gnss.velocity_sd_mps.head<2>().norm());
     solution.vertical_velocity_sd_mps = sd(gnss.velocity_sd_mps.z());
+    faults->apply(t_s, solution);
     return solution;
   });
   receiver->skip_to(begin_s);
-  devices_.push_back({played, std::move(receiver)});
+  add(played, std::move(receiver));
 }
 
 SerialLine World::line_of(const PlayedDevice& played) const {
@@ -301,7 +318,20 @@ SerialLine World::line_of(const PlayedDevice& played) const {
   options.host_begin_ns = kHostBegin_ns;
   // All devices hang on one host controller: its frames are common.
   options.usb_phase_s = Random(configuration_.scenario.seed, "usb").uniform(0.0, 1e-3);
+  add_line_faults(configuration_.faults_of(played.name), options);
   return {options, Random(configuration_.scenario.seed, played.name + "/line")};
+}
+
+Outcome<void> check_faults(World& world) {
+  for (const WorldDevice& device : world.devices()) {
+    for (const Fault& fault : world.configuration().faults_of(device.played.name)) {
+      if (fault.kind == FaultKind::kMissing && !device.device->leave_out(fault.blocks))
+        return wrong_usage(fmt::format("device '{}' has no block '{}' that could be missing",
+                                       device.played.name, fmt::join(fault.blocks, "', '")));
+    }
+    (void)device.device->leave_out({});
+  }
+  return {};
 }
 
 void World::observe(const std::string& name, OnTrueSample on_sample) {

@@ -70,6 +70,7 @@ class World {
   void observe(const std::string& name, OnTrueSample on_sample);
 
  private:
+  void add(const PlayedDevice& played, std::unique_ptr<Device> device);
   void add_study(const PlayedDevice& played, const StudySimulation& study, Beginning beginning,
                  double begin_s);
   void add_reference(const PlayedDevice& played, Beginning beginning, double begin_s);
@@ -84,6 +85,9 @@ class World {
   std::vector<std::pair<std::string, std::shared_ptr<OnTrueSample>>> observers_;
   double first_reference_sample_s_ = 0.0;
 };
+
+/// Refuses a fault script that leaves out blocks which a device does not have.
+Outcome<void> check_faults(World& world);
 
 /// The instant on the R-IMU's time scale that an S-IMU's sample shows is its stamp plus this, where both
 /// stamps are the host times of the first bit of a message: z_S(t) = h(R at t + t_d).

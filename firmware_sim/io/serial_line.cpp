@@ -19,10 +19,24 @@ void SerialLine::send(const Emission& emission) {
   double done = std::max(emission.ready_s, free_at_s_);
   for (const std::uint8_t value : emission.bytes) {
     done += byte_s;
-    waiting_.push_back({done, value, false});
+    if (!is_unplugged(done)) waiting_.push_back({done, value, false});
   }
-  if (!emission.bytes.empty()) waiting_.back().ends_message = true;
+  if (!waiting_.empty()) waiting_.back().ends_message = true;
   free_at_s_ = done;
+}
+
+bool SerialLine::is_unplugged(double t_s) const {
+  return std::any_of(options_.unplugged.begin(), options_.unplugged.end(),
+                     [&](const Unplugged& span) { return t_s >= span.begin_s && t_s < span.end_s; });
+}
+
+double SerialLine::held_until(double t_s) const {
+  for (const HeldReads& hold : options_.holds) {
+    if (t_s < hold.begin_s || t_s >= hold.end_s) continue;
+    const double reads = std::ceil((t_s - hold.begin_s) / hold.every_s);
+    t_s = std::min(hold.end_s, hold.begin_s + reads * hold.every_s);
+  }
+  return t_s;
 }
 
 double SerialLine::next_usb_frame(double t_s) const {
@@ -42,6 +56,15 @@ SerialLine::NextRead SerialLine::next_ftdi_read() const {
 }
 
 SerialLine::NextRead SerialLine::next_read() const {
+  const NextRead next = unheld_read();
+  const double held_s = held_until(next.at_s);
+  if (held_s == next.at_s) return next;
+  std::size_t count = next.count;
+  while (count < waiting_.size() && waiting_[count].done_s <= held_s) ++count;
+  return {held_s, count};
+}
+
+SerialLine::NextRead SerialLine::unheld_read() const {
   if (options_.reads == ReadModel::kFtdi) return next_ftdi_read();
   if (options_.reads == ReadModel::kMessages) {
     std::size_t count = 1;

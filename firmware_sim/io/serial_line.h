@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "firmware_sim/devices/device.h"
 #include "firmware_sim/random/random.h"
@@ -21,6 +22,19 @@ enum class ReadModel {
   kFtdi,       ///< when the adapter has 62 bytes, or 16 ms after it last sent, at the next 1 ms frame
 };
 
+/// While it lasts, the host reads only at its beginning plus whole multiples of every_s, and at its end.
+struct HeldReads {
+  double begin_s;
+  double end_s;
+  double every_s;
+};
+
+/// While it lasts, what the device sends is lost.
+struct Unplugged {
+  double begin_s;
+  double end_s;
+};
+
 struct LineOptions {
   ReadModel reads = ReadModel::kUsbFrames;
   int baud = 115200;
@@ -29,6 +43,8 @@ struct LineOptions {
   // The host's clock at the scenario's time 0, and how fast it is.
   std::int64_t host_begin_ns = 0;
   double host_skew_ppm = 0.0;
+  std::vector<HeldReads> holds;
+  std::vector<Unplugged> unplugged;
 };
 
 /// The line from one device to the host. Emissions go in as they are made, reads come out in order.
@@ -58,6 +74,9 @@ class SerialLine {
     std::size_t count;
   };
   [[nodiscard]] NextRead next_read() const;
+  [[nodiscard]] NextRead unheld_read() const;
+  [[nodiscard]] double held_until(double t_s) const;
+  [[nodiscard]] bool is_unplugged(double t_s) const;
   [[nodiscard]] NextRead next_ftdi_read() const;
   [[nodiscard]] double next_usb_frame(double t_s) const;
 
