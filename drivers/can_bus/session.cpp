@@ -1,0 +1,77 @@
+#include "drivers/can_bus/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace imuscope {
+namespace {
+
+/// A frame that the controller lost is worth a word for so long.
+constexpr Duration kTellOverflow = std::chrono::seconds(10);
+
+}  // namespace
+
+void CanSession::on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noexcept {
+  CanFrameReader reader(bytes);
+  CanFrame frame;
+  while (reader.next(frame)) {
+    if (frame.is_error) {
+      on_error(frame, now);
+      continue;
+    }
+    last_frame_ = now;
+    errors_alone_ = false;
+    state_ = SessionState::kStreaming;
+    // A controller that is off the bus hears nothing: so it is back, though nobody said so.
+    if (bus_state_ == CanBusState::kOff) bus_state_ = CanBusState::kActive;
+  }
+  tell();
+}
+
+void CanSession::on_error(const CanFrame& frame, HostTime now) noexcept {
+  ++error_frames_;
+  const auto report = read_can_error(frame);
+  if (report.state) {
+    if (*report.state == CanBusState::kOff && bus_state_ != CanBusState::kOff) ++bus_offs_;
+    bus_state_ = *report.state;
+  }
+  if (report.receive_overflow) {
+    ++overflows_;
+    overflowed_ = true;
+    last_overflow_ = now;
+  }
+  if (report.has_counts || report.bus_error || report.not_acknowledged) last_error_ = report;
+  errors_alone_ = report.state ? *report.state != CanBusState::kActive : errors_alone_ || report.bus_error;
+}
+
+std::span<const std::uint8_t> CanSession::poll(HostTime now) noexcept {
+  if (state_ == SessionState::kStreaming && now - last_frame_ > kSilence) state_ = SessionState::kConnecting;
+  if (overflowed_ && now - last_overflow_ > kTellOverflow) overflowed_ = false;
+  tell();
+  return {};
+}
+
+void CanSession::tell() noexcept {
+  const auto say = [this]<typename... Args>(fmt::format_string<Args...> text, Args&&... args) {
+    const auto result = fmt::format_to_n(problem_.data(), problem_.size(), text, std::forward<Args>(args)...);
+    problem_size_ = std::min(result.size, problem_.size());
+  };
+  problem_size_ = 0;
+  if (bus_state_ == CanBusState::kOff) {
+    say("bus-off (time {}): the controller has gone silent after too many errors; check wiring, termination "
+        "and "
+        "bit rate, then restart it: ip link set ... type can restart",
+        bus_offs_);
+  } else if (errors_alone_ && state_ != SessionState::kStreaming) {
+    say("only error frames come ({} so far): the bit rate is probably not the bus's", error_frames_);
+  } else if (overflowed_) {
+    say("the controller had no room for frames, {} times so far: frames are lost before this PC sees them",
+        overflows_);
+  } else if (bus_state_ == CanBusState::kPassive) {
+    say("error-passive (errors: transmit {}, receive {}): check wiring and termination",
+        last_error_.transmit_errors, last_error_.receive_errors);
+  }
+}
+
+}  // namespace imuscope
