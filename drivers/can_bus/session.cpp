@@ -41,7 +41,6 @@ void CanSession::on_error(const CanFrame& frame, HostTime now) noexcept {
     overflowed_ = true;
     last_overflow_ = now;
   }
-  if (report.has_counts || report.bus_error || report.not_acknowledged) last_error_ = report;
   errors_alone_ = report.state ? *report.state != CanBusState::kActive : errors_alone_ || report.bus_error;
 }
 
@@ -64,13 +63,12 @@ void CanSession::tell() noexcept {
         "bit rate, then restart it: ip link set ... type can restart",
         bus_offs_);
   } else if (errors_alone_ && state_ != SessionState::kStreaming) {
-    say("only error frames come ({} so far): the bit rate is probably not the bus's", error_frames_);
+    say("only error frames come: the bit rate is probably not the bus's");
   } else if (overflowed_) {
     say("the controller had no room for frames, {} times so far: frames are lost before this PC sees them",
         overflows_);
   } else if (bus_state_ == CanBusState::kPassive) {
-    say("error-passive (errors: transmit {}, receive {}): check wiring and termination",
-        last_error_.transmit_errors, last_error_.receive_errors);
+    say("error-passive: frames are damaged; check wiring and termination");
   }
 }
 

@@ -37,7 +37,6 @@ class CanSession final : public DeviceSession {
 
   SessionState state_ = SessionState::kConnecting;
   CanBusState bus_state_ = CanBusState::kActive;
-  CanErrorReport last_error_;
   HostTime last_frame_{HostTime::min()};
   bool errors_alone_ = false;  ///< error frames came since the last other frame
   bool overflowed_ = false;

@@ -8,8 +8,10 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "base/time.h"
+#include "drivers/device/can_frame.h"
 #include "sample/sample.h"
 
 namespace imuscope {
@@ -45,6 +47,10 @@ class DeviceDecoder {
   }
 
   [[nodiscard]] virtual const DecoderCounters& counters() const noexcept = 0;
+
+  /// Of a device on a CAN bus: the frames that it needs, so that the kernel lets through only those. Empty
+  /// for every other device. Not for the real-time thread.
+  [[nodiscard]] virtual std::vector<CanId> ids() const { return {}; }
 };
 
 enum class SessionState : std::uint8_t {

@@ -168,29 +168,24 @@ std::string bus_off_text(const CanInterface& interface) {
       what, rate_text(interface), interface.name);
 }
 
+/// Without numbers that change from one look to the next: a text that stays the same is said once.
 std::string silence_text(const CanInterface& interface, const CanObservation& seen) {
   const bool errors = seen.error_frames > 0 || interface.state == CanControllerState::kPassive ||
                       interface.state == CanControllerState::kWarning;
-  const auto silent = fmt::format("{:.0f} s", seen.silent_s);
   if (errors && seen.other_frames == 0) {
-    std::string counters;
-    if (interface.rx_errors) counters = fmt::format(", receive errors {}", *interface.rx_errors);
     return fmt::format(
-        "{} hears only errors{} for {} (state {}{}): the bit rate is probably not the bus's; sudo ip link "
-        "set {} "
-        "down, then up with another bitrate",
-        interface.name, rate_text(interface), silent, name_of(interface.state), counters, interface.name);
+        "{} hears only errors{} (state {}): the bit rate is probably not the bus's; sudo ip link set {} "
+        "down, then "
+        "up with another bitrate",
+        interface.name, rate_text(interface), name_of(interface.state), interface.name);
   }
   if (seen.other_frames > 0) {
     return fmt::format(
-        "{} carries {:.0f} frames/s, and for {} none with the identifiers in use ({}); compare with: candump "
-        "{}",
-        interface.name, static_cast<double>(seen.other_frames) / seen.interval_s, silent, seen.ids,
-        interface.name);
+        "{} carries frames, but none with the identifiers in use ({}); compare with: candump {}",
+        interface.name, seen.ids, interface.name);
   }
-  return fmt::format(
-      "nothing is heard on {}{} for {}; check that the bus is awake, the wiring, and the bit rate",
-      interface.name, rate_text(interface), silent);
+  return fmt::format("nothing is heard on {}{}; check that the bus is awake, the wiring, and the bit rate",
+                     interface.name, rate_text(interface));
 }
 
 }  // namespace

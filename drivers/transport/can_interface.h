@@ -50,9 +50,7 @@ struct CanInterface {
 /// What was seen of a CAN device since one look at its interface before.
 struct CanObservation {
   double silent_s = 0.0;  ///< since the last frame with an identifier in use, or since the line was opened
-  bool heard_before = false;         ///< such a frame has come at least once
   std::uint64_t other_frames = 0;    ///< that the interface received since the last look
-  double interval_s = 1.0;           ///< since the last look
   std::uint64_t error_frames = 0;    ///< since the last look
   std::uint64_t frames_dropped = 0;  ///< since the last look
   std::string ids;                   ///< in use, for the text: "0AA, 0B4"

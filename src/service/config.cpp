@@ -165,9 +165,9 @@ void read_axes(TomlReader& in, std::array<double, 9>& axes) {
   axes = read;
 }
 
-void read_transport(TomlReader in, std::optional<SerialConfig>& serial) {
-  if (!in.present()) return;
-  in.choice("kind", {"serial"}, 0);
+constexpr std::array kTransportKinds{std::string_view("serial"), std::string_view("can")};
+
+void read_serial(TomlReader& in, DeviceConfig& device) {
   SerialConfig config;
   in.text("port", config.port);
   in.require("port", "give the device's path, such as /dev/serial/by-id/...");
@@ -175,8 +175,28 @@ void read_transport(TomlReader in, std::optional<SerialConfig>& serial) {
   in.number("baud", baud, 1.0, 50.0, kMaxBaud);
   config.baud = static_cast<std::uint32_t>(baud);
   in.integer("stop_bits", config.stop_bits, 1, 2);
+  device.serial = config;
+}
+
+void read_can(TomlReader& in, DeviceConfig& device) {
+  CanConfig config;
+  in.text("interface", config.interface);
+  in.require("interface", "give the CAN interface, such as can0");
+  config.log_has_common_clock = in.choice("log_clock", {"utc", "common"}, 0) == 1;
+  device.can = config;
+}
+
+void read_transport(TomlReader in, DeviceConfig& device) {
+  if (!in.present()) return;
+  switch (in.choice("kind", words(kTransportKinds), 0)) {
+    case 0:
+      read_serial(in, device);
+      break;
+    default:
+      read_can(in, device);
+      break;
+  }
   in.finish();
-  serial = config;
 }
 
 void check_name(TomlReader& in, const std::string& name) {
@@ -205,7 +225,7 @@ DeviceConfig read_device(TomlReader in) {
   // The StdBin telegram is in forward-port-up axes, b is forward-right-down.
   if (device.protocol == Protocol::kIxblueStdbin) device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
   read_axes(in, device.axes);
-  read_transport(in.table("transport"), device.serial);
+  read_transport(in.table("transport"), device);
   read_noise(in.table("noise"), device.rate_hz, device.noise);
   read_prior(in.table("prior"), device.prior);
   if (device.role == DeviceRole::kStudy)

@@ -30,6 +30,13 @@ struct SerialConfig {
   int stop_bits = 1;
 };
 
+/// A CAN interface, which devices share: each hears the identifiers that it needs.
+struct CanConfig {
+  std::string interface;
+  /// Of logs (candump): true where their stamps are of the reference's clock, not UTC.
+  bool log_has_common_clock = false;
+};
+
 /// What the filter is told of an IMU's errors, where it differs from the estimator's defaults (a
 /// navigation-grade reference, MTx-class S-IMUs). White noise is per sample at the device's rate.
 struct ImuNoiseConfig {
@@ -89,6 +96,7 @@ struct DeviceConfig {
   double rate_hz = 0.0;
   std::array<double, 9> axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rotates the device's components, row-major
   std::optional<SerialConfig> serial;
+  std::optional<CanConfig> can;
   ImuNoiseConfig noise;       ///< reference and study
   MountingPriorConfig prior;  ///< study
   int average_samples = 1;    ///< study: samples taken into one measurement update, see StudyConfig

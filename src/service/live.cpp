@@ -35,7 +35,10 @@ constexpr Duration kStartDelay = std::chrono::milliseconds(100);
 /// Opens lines, again and again with growing pauses where they are missing, and tells what changed.
 class Supervisor {
  public:
-  Supervisor(const Configuration& configuration, IoThread& io) : configuration_(configuration), io_(io) {
+  /// @param ids  per device, what its decoder needs of a CAN bus
+  Supervisor(const Configuration& configuration, std::vector<std::vector<CanId>> ids, IoThread& io,
+             LivePublisher& publisher)
+      : configuration_(configuration), ids_(std::move(ids)), io_(io), publisher_(publisher) {
     lines_.resize(configuration.devices.size());
   }
 
@@ -63,23 +66,29 @@ class Supervisor {
       line.next_try = now + line.pause;
     }
     if (line.open || now < line.next_try) return;
-    auto opened = open_line(device);
+    auto opened = open_line(device, ids_[index]);
     if (!opened) {
       // Said once, and again when the reason changes: a log is no place for a heartbeat.
       const auto text = opened.error().text();
-      if (text != line.last_problem) spdlog::error("{}: {}", device.name, text);
+      if (text != line.last_problem) {
+        spdlog::error("{}: {}", device.name, text);
+        publisher_.set_line_problem(index, text);
+      }
       line.last_problem = text;
       line.next_try = now + line.pause;
       line.pause = std::min(line.pause * 2, kReopenLongest);
       return;
     }
     spdlog::info("{}: {} is open", device.name, (*opened)->describe());
+    publisher_.set_line_problem(index, {});
     io_.offer(index, std::make_unique<Connection>(Connection{std::move(*opened), make_session(device)}));
     line = {true, {}, kReopenFirst, {}};
   }
 
   const Configuration& configuration_;
+  std::vector<std::vector<CanId>> ids_;
   IoThread& io_;
+  LivePublisher& publisher_;
   std::vector<Line> lines_;
 };
 
@@ -131,8 +140,10 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
 
   Core core(estimator_config(configuration), configuration.devices.size());
   std::vector<std::unique_ptr<DeviceDecoder>> decoders;
+  std::vector<std::vector<CanId>> ids;
   for (std::size_t i = 0; i < configuration.devices.size(); ++i) {
     decoders.push_back(make_decoder(configuration.devices[i], static_cast<DeviceIndex>(i), ClockMapConfig{}));
+    ids.push_back(decoders.back()->ids());
   }
   IoThread io(core, std::move(decoders));
   const HostTime t0{((host_now() + kStartDelay).time_since_epoch() / kTickPeriod) * kTickPeriod};
@@ -140,6 +151,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
 
   auto publisher = LivePublisher::create(configuration, *spec, options, io, estimator);
   if (!publisher) return tl::unexpected<Error>(publisher.error());
+  (*publisher)->watch_can(ids);
   auto recorder = Recorder::start(
       {options.out / "capture.lcm", configuration.lcm.channel_prefix, run_header(configuration, options, t0)},
       {&io.raw_ring()}, {&io.exceptions(), &estimator.rings().exceptions});
@@ -156,7 +168,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
   (*publisher)->set_refusals(refusals);
   spdlog::info("running '{}' into {}; Ctrl-C ends it", configuration.run_name, options.out.string());
 
-  Supervisor supervisor(configuration, io);
+  Supervisor supervisor(configuration, ids, io, **publisher);
   const HostTime started = host_now();
   const auto over = [&] {
     return options.duration_s && host_now() - started > from_seconds(*options.duration_s);

@@ -59,6 +59,8 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       modeller_(configuration, std::move(spec)),
       watches_(configuration.devices.size()),
       lines_(configuration.devices.size()),
+      can_watches_(configuration.devices.size()),
+      line_problems_(configuration.devices.size()),
       study_states_(study_devices_.size(), StudyStatus::kWaiting),
       started_(host_now()) {
   anchor_ = {started_, wall_clock_now()};
@@ -96,6 +98,29 @@ Result<std::unique_ptr<LivePublisher>> LivePublisher::create(const Configuration
 void LivePublisher::set_refusals(const std::vector<Error>& refusals) {
   const std::lock_guard lock(refusals_mutex_);
   for (const auto& refusal : refusals) refusals_.push_back(refusal.text());
+}
+
+void LivePublisher::watch_can(const std::vector<std::vector<CanId>>& ids) {
+  for (std::size_t i = 0; i < can_watches_.size(); ++i) {
+    const auto& can = configuration_.devices[i].can;
+    if (can) can_watches_[i].emplace(can->interface, ids[i]);
+  }
+}
+
+void LivePublisher::set_line_problem(DeviceIndex device, const std::string& problem) {
+  const std::lock_guard lock(line_problems_mutex_);
+  line_problems_[device] = problem;
+}
+
+std::string LivePublisher::problem_of(std::size_t device, HostTime now) {
+  {
+    const std::lock_guard lock(line_problems_mutex_);
+    if (!line_problems_[device].empty()) return line_problems_[device];
+  }
+  if (can_watches_[device]) {
+    if (auto problem = can_watches_[device]->look(lines_[device], now); !problem.empty()) return problem;
+  }
+  return lines_[device].problem.data();
 }
 
 void LivePublisher::start() {
@@ -195,7 +220,7 @@ void LivePublisher::watch_devices(HostTime now) {
     const double seconds = std::max(to_seconds(now - last_status_), 1e-3);
     watch.rate_hz = static_cast<double>(status.counters.samples - watch.samples) / seconds;
     watch.samples = status.counters.samples;
-    const std::string problem(status.problem.data());
+    const std::string problem = problem_of(i, now);
     if (problem != watch.problem && !problem.empty()) spdlog::warn("{}: {}", name, problem);
     watch.problem = problem;
     if (status.session != watch.session) {

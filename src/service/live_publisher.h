@@ -12,6 +12,7 @@
 
 #include "capture/recorder.h"
 #include "publish/lcm_publisher.h"
+#include "service/can_watch.h"
 #include "service/config.h"
 #include "service/core_thread.h"
 #include "service/io_thread.h"
@@ -36,6 +37,10 @@ class LivePublisher {
   void set_recorder(const Recorder& recorder) { recorder_ = &recorder; }
   /// What the system refused at start; repeated in every status message.
   void set_refusals(const std::vector<Error>& refusals);
+  /// What the decoders need of their CAN buses, per device; for those watched. Call before start().
+  void watch_can(const std::vector<std::vector<CanId>>& ids);
+  /// Why a device's line does not open; empty once it is open. Any thread of the soft world.
+  void set_line_problem(DeviceIndex device, const std::string& problem);
   void start();
   /// Publishes and writes what is left, closes the files. Call after the core's thread has ended.
   [[nodiscard]] Result<void> finish(std::int64_t last_tick);
@@ -50,6 +55,7 @@ class LivePublisher {
   void on_refit(const Refit& refit);
   void watch_devices(HostTime now);
   void publish_status(HostTime now);
+  [[nodiscard]] std::string problem_of(std::size_t device, HostTime now);
   [[nodiscard]] StatusReport status(HostTime now);
   [[nodiscard]] StatusReport::Device device_status(std::size_t index) const;
 
@@ -74,6 +80,9 @@ class LivePublisher {
   };
   std::vector<DeviceWatch> watches_;
   std::vector<LineStatus> lines_;
+  std::vector<std::optional<CanWatch>> can_watches_;  ///< one a device
+  std::mutex line_problems_mutex_;
+  std::vector<std::string> line_problems_;
   std::vector<StudyStatus> study_states_;
   std::uint64_t refits_ = 0;
   double refit_duration_s_ = kUnknown;

@@ -73,7 +73,7 @@ TEST_F(CanSessionTest, FollowsTheControllerThroughItsStates) {
   EXPECT_EQ(session_.problem(), "") << "frames still come";
   hear(kPassive);
   EXPECT_EQ(session_.bus_state(), CanBusState::kPassive);
-  EXPECT_THAT(std::string(session_.problem()), HasSubstr("transmit 140, receive 130"));
+  EXPECT_THAT(std::string(session_.problem()), HasSubstr("error-passive"));
   hear(kActive);
   EXPECT_EQ(session_.bus_state(), CanBusState::kActive);
   EXPECT_EQ(session_.problem(), "");

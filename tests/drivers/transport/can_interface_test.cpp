@@ -50,7 +50,7 @@ TEST(CanTrouble, ErrorsWithoutFramesMeanAWrongBitRate) {
   interface.state = CanControllerState::kPassive;
   interface.rx_errors = 135;
   const auto by_state = explain_can_trouble(interface, silent());
-  EXPECT_THAT(by_state, AllOf(HasSubstr("only errors at 250000 bit/s"), HasSubstr("receive errors 135"),
+  EXPECT_THAT(by_state, AllOf(HasSubstr("only errors at 250000 bit/s"), HasSubstr("state error-passive"),
                               HasSubstr("bit rate is probably not the bus's")));
   auto seen = silent();
   seen.error_frames = 12;
@@ -59,15 +59,14 @@ TEST(CanTrouble, ErrorsWithoutFramesMeanAWrongBitRate) {
 
 TEST(CanTrouble, NoTrafficNamesBusWiringAndBitRate) {
   EXPECT_THAT(explain_can_trouble(working(), silent()),
-              AllOf(HasSubstr("nothing is heard on can0 at 250000 bit/s for 4 s"), HasSubstr("bit rate")));
+              AllOf(HasSubstr("nothing is heard on can0 at 250000 bit/s;"), HasSubstr("bit rate")));
 }
 
 TEST(CanTrouble, TrafficWithOtherIdentifiersIsToldFromSilence) {
   auto seen = silent();
   seen.other_frames = 1624;
-  seen.interval_s = 2.0;
   EXPECT_THAT(explain_can_trouble(working(), seen),
-              AllOf(HasSubstr("812 frames/s"), HasSubstr("0AA, 18FF0100"), HasSubstr("candump can0")));
+              AllOf(HasSubstr("carries frames"), HasSubstr("0AA, 18FF0100"), HasSubstr("candump can0")));
 }
 
 TEST(CanTrouble, LostFramesAreTold) {
