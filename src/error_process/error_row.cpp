@@ -44,6 +44,9 @@ ErrorRow error_row(const StudyEpoch& epoch, const Mounting& mounting, const Refe
   row.e_accel_mps2 = array(vector(epoch.sample.f_mps2) - f_s);
   row.predicted_omega_s_radps = array(omega_s);
   row.predicted_f_s_mps2 = array(f_s);
+  row.omega_dot_s_radps2 = array(C_b_s * vector(epoch.omega_dot_ib_b_radps2));
+  row.omega_ddot_s_radps3 = array(C_b_s * vector(epoch.omega_ddot_ib_b_radps3));
+  row.f_dot_s_mps3 = array(C_b_s * vector(epoch.f_dot_b_mps3));
   return row;
 }
 

@@ -25,8 +25,12 @@ struct ErrorRow {
   bool accel_valid;
   Vector3 e_gyro_radps;
   Vector3 e_accel_mps2;
-  Vector3 predicted_omega_s_radps;  ///< what the reference predicts; carries the scale error's regressor
+  /// What the reference predicts at the S-IMU's place: the dynamics that the error is studied against.
+  Vector3 predicted_omega_s_radps;
   Vector3 predicted_f_s_mps2;
+  Vector3 omega_dot_s_radps2;
+  Vector3 omega_ddot_s_radps3;
+  Vector3 f_dot_s_mps3;  ///< of the reference's place: without the lever arm's part, which needs omega'''
 };
 
 /// Mounting with which the prediction is made.

@@ -8,6 +8,7 @@
 #include "noise/fit.h"
 #include "noise/json.h"
 #include "noise/wavelet_variance.h"
+#include "service/dynamics_files.h"
 #include "service/estimator_setup.h"
 #include "service/noise_series.h"
 
@@ -27,14 +28,22 @@ std::string utc_text(UtcTime utc) {
 /// Rows of the second pass: mounting frozen at its final value, the whole drive covered.
 class ErrorCollector final : public CoreSink {
  public:
-  ErrorCollector(std::vector<StudyOutput> finals, bool remove_scale, RunFolder& folder)
-      : finals_(std::move(finals)), remove_scale_(remove_scale), folder_(folder), series_(finals_.size()) {}
+  /// @param rows  one spool a S-IMU; must outlive the collector
+  ErrorCollector(std::vector<StudyOutput> finals, bool remove_scale, RunFolder& folder,
+                 std::vector<RowSpool>& rows)
+      : finals_(std::move(finals)),
+        remove_scale_(remove_scale),
+        folder_(folder),
+        rows_(rows),
+        series_(finals_.size()) {}
 
   void on_error(const ErrorRecord& record) noexcept override {
     folder_.on_error(record);
     const auto& final = finals_[record.study];
-    series_[record.study].add(
-        remove_scale_ ? without_scale_error(record.row, {final.gyro_scale, final.accel_scale}) : record.row);
+    const ErrorRow row =
+        remove_scale_ ? without_scale_error(record.row, {final.gyro_scale, final.accel_scale}) : record.row;
+    series_[record.study].add(row);
+    rows_[record.study].add(row);
   }
   void on_event(const EstimatorEvent&) noexcept override {}
   void on_snapshot(const Snapshot&) noexcept override {}
@@ -46,6 +55,7 @@ class ErrorCollector final : public CoreSink {
   std::vector<StudyOutput> finals_;
   bool remove_scale_;
   RunFolder& folder_;
+  std::vector<RowSpool>& rows_;
   std::vector<NoiseSeries> series_;
 };
 
@@ -241,13 +251,23 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
   }
 
-  ErrorCollector collector(finals, configuration.noise.remove_scale_error, **folder);
+  std::vector<RowSpool> rows;
+  for (std::size_t i = 0; i < finals.size(); ++i) {
+    auto spool = RowSpool::create(options.out);
+    if (!spool) return tl::unexpected<Error>(spool.error());
+    rows.push_back(std::move(*spool));
+  }
+  ErrorCollector collector(finals, configuration.noise.remove_scale_error, **folder, rows);
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("error process", share); };
   const auto second = replay(configuration, frozen(estimator, finals), recording, collector, replay_options);
   if (!second) return tl::unexpected<Error>(second.error());
 
   const auto models = fit_models(configuration, collector.series(), *spec, options, run.warnings);
+  const auto regressions = regressions_of(configuration, rows, *spec, run.warnings);
+  if (auto written = write_scatter(configuration, rows, last.first_reference_time, options.out); !written) {
+    return written;
+  }
   const auto& series = collector.series();
   const double rate_hz = configuration.devices[configuration.study_indices().front()].rate_hz;
   run.static_s = static_cast<double>(series.front().count(Regime::kStatic)) / rate_hz;
@@ -260,6 +280,11 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
       !written) {
     return written;
   }
+  if (auto written = write_json(options.out / "regression.json",
+                                {{"schema", "imuscope.regression/1"}, {"regressions", regressions}});
+      !written) {
+    return written;
+  }
   return write_json(options.out / "run.json", run_json(run));
 }
 
@@ -268,7 +293,7 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
   // What an earlier study left in this folder would be taken for this run's.
-  for (const char* of_a_study : {"models.json", "report.html"}) {
+  for (const char* of_a_study : {"models.json", "regression.json", "report.html"}) {
     std::error_code absent_is_well;
     std::filesystem::remove(options.out / of_a_study, absent_is_well);
   }

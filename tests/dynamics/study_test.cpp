@@ -1,0 +1,160 @@
+#include "dynamics/study.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "dynamics/covariates.h"
+#include "dynamics/json.h"
+
+namespace imuscope {
+namespace {
+
+class Rows final : public ErrorRowSource {
+ public:
+  explicit Rows(std::vector<ErrorRow> rows) : rows_(std::move(rows)) {}
+  void rewind() override { at_ = 0; }
+  bool next(ErrorRow& row) override {
+    if (at_ == rows_.size()) return false;
+    row = rows_[at_++];
+    return true;
+  }
+
+ private:
+  std::vector<ErrorRow> rows_;
+  std::size_t at_ = 0;
+};
+
+/// A drive of band-limited motion; the error of every axis is white noise and a slow Gauss-Markov process.
+struct Drive {
+  explicit Drive(unsigned seed, std::size_t n = 6000) : generator(seed) {
+    constexpr double kPhi = 0.98;
+    const double slow = std::exp(-0.05);
+    std::array<double, kCovariates> x{};
+    std::array<double, kErrorAxes> markov{};
+    for (std::size_t i = 0; i < n; ++i) {
+      for (double& value : x) value = kPhi * value + std::sqrt(1.0 - kPhi * kPhi) * normal(generator);
+      ErrorRow row{};
+      row.counter = static_cast<std::int64_t>(i);
+      row.gyro_valid = row.accel_valid = true;
+      for (std::size_t k = 0; k < 3; ++k) {
+        row.predicted_omega_s_radps[k] = x[k];
+        row.omega_dot_s_radps2[k] = x[3 + k];
+        row.omega_ddot_s_radps3[k] = x[6 + k];
+        row.predicted_f_s_mps2[k] = x[9 + k] - (k == 2 ? 9.8 : 0.0);
+        row.f_dot_s_mps3[k] = x[12 + k];
+      }
+      for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+        markov[axis] = slow * markov[axis] + std::sqrt(1.0 - slow * slow) * normal(generator);
+        (axis < 3 ? row.e_gyro_radps[axis] : row.e_accel_mps2[axis - 3]) =
+            0.3 + markov[axis] + 0.7 * normal(generator);
+      }
+      rows.push_back(row);
+    }
+  }
+  std::mt19937 generator;
+  std::normal_distribution<double> normal;
+  std::vector<ErrorRow> rows;
+};
+
+DynamicsOptions options() { return {100.0, *noise::parse_model("WN+GM"), 0.95}; }
+
+const RegressionCoefficient* find(const std::optional<Regression>& regression, std::size_t covariate) {
+  if (!regression) return nullptr;
+  for (const auto& c : regression->coefficients) {
+    if (c.covariate == covariate) return &c;
+  }
+  return nullptr;
+}
+
+TEST(StudyDynamics, FindsAPlantedGSensitivityAndLeavesOtherAxesAlone) {
+  Drive drive(1);
+  constexpr double kPlanted = 0.5;
+  for (auto& row : drive.rows) row.e_gyro_radps[0] += kPlanted * row.predicted_f_s_mps2[1];
+  Rows rows(drive.rows);
+  const auto result = study_dynamics(rows, options());
+  const auto* const c = find(result[0].gls_projected, 10);
+  ASSERT_NE(c, nullptr);
+  EXPECT_LT(result[0].gls_projected->p_value, 1e-6);
+  EXPECT_LT(std::abs(c->value - kPlanted), 4.0 * c->sd);
+  EXPECT_GT(kPlanted, 4.0 * c->sd);  // the drive is long enough to see it
+  EXPECT_GT(result[1].gls_projected->p_value, 1e-4);
+}
+
+// A scale error shows before projection and not after: it is a calibration column.
+TEST(StudyDynamics, ProjectionTakesCalibrationErrorsAway) {
+  Drive drive(2);
+  for (auto& row : drive.rows) {
+    row.e_gyro_radps[0] += 0.8 * row.predicted_omega_s_radps[0] - 0.6 * row.omega_dot_s_radps2[0];
+  }
+  Rows rows(drive.rows);
+  const auto result = study_dynamics(rows, options());
+  EXPECT_LT(result[0].gls->p_value, 1e-6);
+  EXPECT_GT(result[0].gls_projected->p_value, 1e-3);
+  EXPECT_EQ(find(result[0].gls_projected, 0), nullptr);
+  ASSERT_NE(find(result[0].gls, 0), nullptr);
+  EXPECT_NEAR(find(result[0].gls, 0)->value, 0.8, 4.0 * find(result[0].gls, 0)->sd);
+}
+
+TEST(StudyDynamics, GapsAndClippedSamplesAreLeftOut) {
+  Drive drive(3);
+  std::vector<ErrorRow> rows;
+  for (auto row : drive.rows) {
+    if (row.counter > 1000 && row.counter < 1500) continue;
+    if (row.counter == 2000) {
+      row.gyro_valid = false;
+      row.e_gyro_radps[0] = 1e9;
+    }
+    rows.push_back(row);
+  }
+  Rows source(rows);
+  const auto result = study_dynamics(source, options());
+  ASSERT_TRUE(result[0].gls);
+  EXPECT_EQ(result[0].ols->n, rows.size() - 1);
+  EXPECT_EQ(result[0].gls->n, rows.size() - 1);
+  EXPECT_EQ(result[3].gls->n, rows.size());
+  // Whitened by the right model the residual has variance 1.
+  EXPECT_NEAR(result[0].gls->residual_variance, 1.0, 0.1);
+}
+
+TEST(StudyDynamics, StandstillGivesNoRegressionAndNothingIsInvented) {
+  Drive drive(4);
+  for (auto& row : drive.rows) {
+    row.predicted_omega_s_radps = row.omega_dot_s_radps2 = row.omega_ddot_s_radps3 = row.f_dot_s_mps3 = {};
+    row.predicted_f_s_mps2 = {0.0, 0.0, -9.8};
+  }
+  Rows rows(drive.rows);
+  const auto result = study_dynamics(rows, options());
+  for (const auto& axis : result) {
+    EXPECT_FALSE(axis.ols);
+    EXPECT_FALSE(axis.gls_projected);
+  }
+  nlohmann::json json = nlohmann::json::array();
+  append_regressions("mtx1", result, json);
+  EXPECT_TRUE(json.empty());
+}
+
+TEST(StudyDynamics, JsonHasTheFieldsOfTheInterface) {
+  Drive drive(5);
+  Rows rows(drive.rows);
+  nlohmann::json json = nlohmann::json::array();
+  append_regressions("mtx1", study_dynamics(rows, options()), json);
+  ASSERT_EQ(json.size(), 4 * kErrorAxes);
+  const auto& projected = json[3];
+  EXPECT_EQ(projected["name"], "mtx1");
+  EXPECT_EQ(projected["axis"], "gyro_x");
+  EXPECT_EQ(projected["method"], "gls");
+  EXPECT_EQ(projected["projected"], true);
+  EXPECT_EQ(projected["f_dof"][0], 11);
+  EXPECT_EQ(projected["coefficients"].size(), 11U);
+  EXPECT_EQ(projected["left_out"].size(), 4U);
+  EXPECT_EQ(projected["left_out"][0]["why"], "cannot be told from an error of the calibration");
+  EXPECT_NE(projected["coefficients"][0]["means"].get<std::string>().find("delay"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace imuscope
