@@ -90,7 +90,9 @@ TEST(Whitener, AnUnknownStartCostsOneSampleAndOffsetsDoNotMatter) {
     const bool counts = a.push(row_a);
     EXPECT_EQ(counts, i > 0);
     EXPECT_EQ(b.push(row_b), counts);
-    if (counts) EXPECT_NEAR(row_a[0], row_b[0], 1e-4);
+    if (counts) {
+      EXPECT_NEAR(row_a[0], row_b[0], 1e-4);
+    }
   }
 }
 
