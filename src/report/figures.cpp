@@ -122,6 +122,26 @@ Html FigureSheet::wavelet_figure(const std::string& id, const std::vector<const 
   return figure_place(id, caption);
 }
 
+Html FigureSheet::scatter_figure(const std::string& id, const std::string& x_label,
+                                 const std::string& y_label, const std::vector<double>& x,
+                                 const std::vector<double>& y, int colour, const Html& caption) {
+  // The plotting library wants its abscissas in order.
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (std::isfinite(x[i]) && std::isfinite(y[i])) order.push_back(i);
+  }
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
+  Figure figure;
+  figure.id = id;
+  figure.y_label = y_label;
+  const auto values = [&](const std::vector<double>& of) {
+    return array_of(order.size(), kDigitsOfSignal, [&](std::size_t i) { return of[order[i]]; });
+  };
+  add(head_of(figure, "scatter") + fmt::format(",\"colour\":{},\"x_label\":{},\"x\":{},\"y\":{}", colour,
+                                               quoted(x_label), values(x), values(y)));
+  return figure_place(id, caption);
+}
+
 Html FigureSheet::map_figure(const std::string& id, const BinnedSignals& navigation, const Html& caption) {
   Figure figure;
   figure.id = id;

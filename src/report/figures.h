@@ -35,6 +35,10 @@ class FigureSheet {
                        std::size_t sd_signal, double unit, int colour, const Html& caption);
   /// Wavelet variances of the fits with their intervals, and the fitted lines; both axes logarithmic.
   Html wavelet_figure(const std::string& id, const std::vector<const Fit*>& fits, const Html& caption);
+  /// One point for each pair of values that are both known.
+  Html scatter_figure(const std::string& id, const std::string& x_label, const std::string& y_label,
+                      const std::vector<double>& x, const std::vector<double>& y, int colour,
+                      const Html& caption);
   /// The way driven, in metres, coloured by speed.
   Html map_figure(const std::string& id, const BinnedSignals& navigation, const Html& caption);
 

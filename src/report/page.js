@@ -187,6 +187,20 @@
     graphs.push({graph: new Dygraph(place, rows, options), figure});
   }
 
+  function drawScatter(figure, place, legendPlace) {
+    const colour = COLOURS[figure.colour % COLOURS.length];
+    const options = common(figure, legendPlace);
+    Object.assign(options, {
+      customBars: false, labels: [figure.x_label, figure.y_label], colors: [colour], strokeWidth: 0,
+      drawPoints: true, pointSize: 1.1, interactionModel: {}, xlabel: figure.x_label, xLabelHeight: 15,
+      xRangePad: 4, yRangePad: 4,
+    });
+    options.axes.x.axisLabelFormatter = shown;
+    options.axes.y.axisLabelFormatter = shown;
+    options.legendFormatter = () => '';
+    graphs.push({graph: new Dygraph(place, figure.x.map((x, i) => [x, figure.y[i]]), options), figure});
+  }
+
   // Metres that make a scale bar of about `wanted` metres.
   function roundLength(wanted) {
     const power = Math.pow(10, Math.floor(Math.log10(wanted)));
@@ -277,7 +291,7 @@
     svg.addEventListener('dblclick', () => { box = [0, 0, width, height]; show(); });
   }
 
-  const draw = {time: drawTime, wavelet: drawWavelet, map: drawMap};
+  const draw = {time: drawTime, wavelet: drawWavelet, map: drawMap, scatter: drawScatter};
   const places = new Map();
   document.querySelectorAll('.plot').forEach((place) => places.set(place.dataset.figure, place));
   for (const figure of JSON.parse(document.getElementById('figures').textContent)) {

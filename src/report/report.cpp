@@ -51,6 +51,7 @@ std::string make_page(const RunFiles& run) {
   body += element("section", drive_section(run, figures));
   body += element("section", calibration_section(run, figures));
   body += element("section", errors_section(run, figures));
+  body += element("section", dynamics_section(run, figures));
   body += element("section", models_section(run, fits, figures));
   body += element("section", health_section(run));
   body += element("section", making_section(run));

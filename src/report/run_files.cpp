@@ -195,6 +195,12 @@ Result<void> read_studies(RunFiles& run, const json& calibration) {
     study.truth = named(field(*truth, "imus"), study.name);
     if (auto read = read_calibration_series(run, study, run.absent); !read) return read;
     if (auto read = read_errors(run, study, run.absent); !read) return read;
+    const auto scatter_file = run.folder / ("scatter_" + study.name + ".csv");
+    if (present(scatter_file, run.absent)) {
+      auto scatter = read_scatter(scatter_file);
+      if (!scatter) return passed_on(scatter);
+      if (!scatter->errors[0].empty()) study.scatter = std::move(*scatter);
+    }
     run.studies.push_back(std::move(study));
   }
   return {};

@@ -12,6 +12,7 @@
 
 #include "base/result.h"
 #include "report/binned_signals.h"
+#include "report/scatter.h"
 
 namespace imuscope::report {
 
@@ -47,6 +48,7 @@ struct StudyFiles {
   nlohmann::json truth;        ///< its entry in truth.json; null where there is none
   std::optional<BinnedSignals> calibration_series;
   std::optional<BinnedSignals> errors;
+  std::optional<Scatter> scatter;
   std::uint64_t n_errors = 0;               ///< rows of errors_NAME.csv
   std::vector<Stretch> static_stretches;    ///< regime "static" of errors_NAME.csv, the longest ones
   std::array<double, kErrorSignals> rms{};  ///< over the whole record; NaN where there is no value

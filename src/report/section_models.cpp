@@ -175,23 +175,6 @@ Html wavelet_panels(const std::vector<Fit>& fits, const std::string& imu,
   return panels.empty() ? paragraph("No wavelet variance of this sensor.") : element("div", panels, "panels");
 }
 
-Html regression_table(const RunFiles& run) {
-  Html section = element("h2", text("Table I: do the errors depend on the motion?"));
-  if (!run.regressions.is_array() || run.regressions.empty()) {
-    return section +
-           paragraph("No regression.json in this run: the dependence on the motion was not studied.");
-  }
-  Table table({text("S-IMU, axis"), text("method"), text("R²"), text("F"), text("p")});
-  for (const auto& entry : run.regressions) {
-    const auto r2 = number_at(entry, "r2");
-    table.add_row({text(text_at(entry, "name") + " " + axis_words(text_at(entry, "axis"))),
-                   text(text_at(entry, "method")),
-                   r2 ? text(fmt::format("{:.2f} %", 100.0 * *r2)) : text(kUnknown),
-                   number(number_at(entry, "f"), 3), number(number_at(entry, "p_value"), 2)});
-  }
-  return section + table.html();
-}
-
 }  // namespace
 
 Html errors_section(const RunFiles& run, FigureSheet& figures) {
@@ -215,8 +198,7 @@ Html errors_section(const RunFiles& run, FigureSheet& figures) {
 Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureSheet& figures) {
   Html section = element("h2", text("Figure 4: wavelet variance and noise model"));
   if (fits.empty()) {
-    return section + paragraph("No noise model in this run (models.json is absent or empty).") +
-           regression_table(run);
+    return section + paragraph("No noise model in this run (models.json is absent or empty).");
   }
   const auto regimes = regimes_of(fits);
   section += paragraph(
@@ -238,7 +220,7 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
     section += element("h3", text(study.name)) + parameter_table(fits, study.name, regimes) +
                fit_warnings(fits, study.name);
   }
-  return section + regression_table(run);
+  return section;
 }
 
 }  // namespace imuscope::report

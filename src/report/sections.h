@@ -16,7 +16,9 @@ Html drive_section(const RunFiles& run, FigureSheet& figures);
 Html calibration_section(const RunFiles& run, FigureSheet& figures);
 /// Error signals: Figure 2 and their size.
 Html errors_section(const RunFiles& run, FigureSheet& figures);
-/// Noise models: Figure 4 and Table II; Table I where there is a regression.
+/// Dependence of the errors on the motion: Figure 3 and Table I.
+Html dynamics_section(const RunFiles& run, FigureSheet& figures);
+/// Noise models: Figure 4 and Table II.
 Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureSheet& figures);
 /// Health of the devices.
 Html health_section(const RunFiles& run);

@@ -51,8 +51,8 @@ class Browser : public testing::Test {
 TEST_F(Browser, DrawsEveryFigureWithoutAnErrorInTheScript) {
   const std::string page = output_of(browser_command(
       folder_ / "profile", "--virtual-time-budget=20000 --dump-dom", folder_ / "report.html"));
-  // Speed, height and two sensors of 18 panels are graphs; the map is a drawing of its own.
-  EXPECT_NE(page.find("data-figures-drawn=\"38\""), std::string::npos);
+  // Speed, height and two sensors of 33 panels are graphs; the map is a drawing of its own.
+  EXPECT_NE(page.find("data-figures-drawn=\"68\""), std::string::npos);
   EXPECT_NE(page.find("<svg viewBox="), std::string::npos);
 }
 

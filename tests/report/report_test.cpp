@@ -117,8 +117,8 @@ TEST(Report, EveryFigureThatThePageNamesIsInTheSheetOnce) {
        ++place, ++n_places) {
     EXPECT_EQ(drawn.count((*place)[1]), 1U) << (*place)[1];
   }
-  // Map, speed, height; per sensor six panels each of Figures 1, 2 and 4.
-  EXPECT_EQ(n_places, 3U + 2U * 18U);
+  // Map, speed, height; per sensor six panels each of Figures 1, 2 and 4, and fifteen of Figure 3.
+  EXPECT_EQ(n_places, 3U + 2U * 33U);
   EXPECT_EQ(drawn.size(), n_places);
 }
 
@@ -220,6 +220,22 @@ TEST(Report, TruthIsComparedWhereGivenAndNotMissedSilentlyWhereAbsent) {
   EXPECT_TRUE(holds(page, "No truth.json in this run"));
 }
 
+TEST(Report, TheRegressionsSayWhatTheyFoundAndWhatItWouldMean) {
+  test::SyntheticRun options;
+  const std::string page = page_of(options);
+  EXPECT_TRUE(holds(page, "15.42 %"));
+  EXPECT_TRUE(holds(page, "1.23 %"));
+  EXPECT_TRUE(holds(page, "&lt; 10⁻⁶"));
+  EXPECT_TRUE(holds(page, "f_x: g-sensitivity of 0.56 deg/s per g"));
+  EXPECT_FALSE(holds(page, "g-sensitivity of nothing"));
+  EXPECT_TRUE(holds(page, "\"id\":\"scatter-gyro_x-omega_x-mtx1\""));
+  EXPECT_TRUE(holds(page, "gyroscope x, deg/s, against its axis&#39; angular rate; r = 1.000"));
+  options.with_regression = false;
+  const std::string without = page_of(options);
+  EXPECT_TRUE(holds(without, "No regression.json in this run"));
+  EXPECT_TRUE(holds(without, "No scatter_NAME.csv in this run"));
+}
+
 TEST(Report, ACalibrationAloneMakesAReportThatNamesWhatIsAbsent) {
   const auto folder = test::scratch_folder();
   test::write_synthetic_run(folder, {});
@@ -229,7 +245,7 @@ TEST(Report, ACalibrationAloneMakesAReportThatNamesWhatIsAbsent) {
   const std::string page = page_of(folder);
   EXPECT_EQ(nesting_fault(markup_of(page)), "");
   for (const char* file : {"run.json", "navigation.csv", "calibration_mtx1.csv", "errors_mtx2.csv",
-                           "models.json", "regression.json", "truth.json"}) {
+                           "scatter_mtx1.csv", "models.json", "regression.json", "truth.json"}) {
     EXPECT_TRUE(holds(page, "<li>" + std::string(file) + "</li>"));
   }
   EXPECT_TRUE(holds(page, "No navigation in this run"));

@@ -284,6 +284,49 @@ json run_document(const SyntheticRun& options) {
           {"warnings", json::array()}};
 }
 
+/// One coefficient that is clear of chance and one that is not.
+json regression_entry(const std::string& name, const char* axis, const char* method, bool projected,
+                      double r2, double p_value) {
+  const json clear{{"covariate", "f_x"},
+                   {"value", 1e-3},
+                   {"sd", 1e-5},
+                   {"p_value", 1e-12},
+                   {"means", "g-sensitivity of 0.56 deg/s per g"}};
+  const json chance{{"covariate", "f_y"},
+                    {"value", 1e-6},
+                    {"sd", 1e-5},
+                    {"p_value", 0.9},
+                    {"means", "g-sensitivity of nothing"}};
+  return {{"name", name},
+          {"axis", axis},
+          {"n", 1000},
+          {"r2", r2},
+          {"f", 2600.0},
+          {"p_value", p_value},
+          {"method", method},
+          {"projected", projected},
+          {"coefficients", projected ? json::array({clear, chance}) : json::array()}};
+}
+
+void write_scatter(const std::filesystem::path& file) {
+  constexpr int kRows = 4000;
+  std::ofstream out(file);
+  out << "time_s,omega_x,omega_y,omega_z,omega_dot_x,omega_dot_y,omega_dot_z,omega_ddot_x,omega_ddot_y,"
+         "omega_ddot_z,f_x,f_y,f_z,f_dot_x,f_dot_y,f_dot_z,e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,"
+         "e_accel_x_mps2,e_accel_y_mps2,e_accel_z_mps2\n";
+  for (int i = 0; i < kRows; ++i) {
+    out << 0.1 * i;
+    for (int column = 0; column < 15; ++column) out << ',' << std::sin(0.7 * i + column);
+    // The first error follows its axis' rate; a clipped gyro row has no values.
+    if (i % 100 == 7) {
+      out << ",,,";
+    } else {
+      out << ',' << 0.01 * std::sin(0.7 * i) << ",0.01,0.01";
+    }
+    out << ",0.1,0.1," << 0.1 * std::cos(0.3 * i) << '\n';
+  }
+}
+
 }  // namespace
 
 void write_synthetic_run(const std::filesystem::path& folder, const SyntheticRun& options) {
@@ -297,15 +340,13 @@ void write_synthetic_run(const std::filesystem::path& folder, const SyntheticRun
     truths.push_back(truth_entry(i, name));
     write_calibration_series(folder / ("calibration_" + name + ".csv"), i, options);
     write_errors(folder / ("errors_" + name + ".csv"), i, options);
+    if (options.with_regression) write_scatter(folder / ("scatter_" + name + ".csv"));
     for (const char* axis : kAxes) {
       for (const char* regime : {"static", "dynamic"})
         models.push_back(fit_entry(name, axis, regime, options));
-      regressions.push_back({{"name", name},
-                             {"axis", axis},
-                             {"r2", 0.1542},
-                             {"f", 2600.0},
-                             {"p_value", 1e-9},
-                             {"method", "ols"}});
+      regressions.push_back(regression_entry(name, axis, "ols", false, 0.1542, 1e-9));
+      regressions.push_back(regression_entry(name, axis, "gls", false, 0.0011, 0.31));
+      regressions.push_back(regression_entry(name, axis, "gls", true, 0.0123, 0.04));
     }
   }
   write_json(folder / "run.json", run_document(options));
