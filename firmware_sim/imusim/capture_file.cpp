@@ -78,7 +78,20 @@ class EventLog {
   Bytes record_;
 };
 
-/// One device's reads, in order.
+/// The host's two clocks, which differ by a constant.
+struct HostClocks {
+  std::int64_t monotonic_ns;
+  std::int64_t utc_ns;
+  [[nodiscard]] std::int64_t utime(std::int64_t arrival_ns) const {
+    const std::int64_t ns = utc_ns + (arrival_ns - monotonic_ns);
+    return ns / kNsPerUs - (ns % kNsPerUs < 0 ? 1 : 0);
+  }
+  [[nodiscard]] std::int64_t monotonic(std::int64_t at_utc_ns) const {
+    return monotonic_ns + (at_utc_ns - utc_ns);
+  }
+};
+
+/// One device's reads, in order: out of its dump, or out of its log of candump.
 class Reads {
  public:
   struct Read {
@@ -86,12 +99,14 @@ class Reads {
     Bytes bytes;
   };
 
-  Reads(const std::filesystem::path& folder, const std::string& name)
-      : name_(name),
-        bytes_(folder / (name + ".bin"), std::ios::binary),
-        arrivals_(folder / (name + ".arrivals.csv")) {
-    std::string header;
-    std::getline(arrivals_, header);
+  Reads(const std::filesystem::path& folder, const std::string& name, const HostClocks& clocks)
+      : name_(name), clocks_(clocks), log_(folder / (name + ".log")) {
+    if (!log_.is_open()) {
+      bytes_.open(folder / (name + ".bin"), std::ios::binary);
+      arrivals_.open(folder / (name + ".arrivals.csv"));
+      std::string header;
+      std::getline(arrivals_, header);
+    }
     advance();
   }
 
@@ -101,6 +116,7 @@ class Reads {
 
   void advance() {
     head_.reset();
+    if (log_.is_open()) return advance_log();
     std::string line;
     unsigned long long offset = 0;
     unsigned long long count = 0;
@@ -113,21 +129,36 @@ class Reads {
   }
 
  private:
+  /// A frame's record is what a read of a CAN interface holds: identifier, length, three zeros, receive time
+  /// by the host's monotonic clock, all with the least significant byte first, and the data.
+  void advance_log() {
+    long long seconds = 0;
+    long long us = 0;
+    unsigned id = 0;
+    std::array<char, 17> data{};
+    std::string line;
+    if (!std::getline(log_, line)) return;
+    if (std::sscanf(line.c_str(), "(%lld.%lld) %*s %3X#%16s", &seconds, &us, &id, data.data()) < 3) return;
+    constexpr std::int64_t kUsPerSecond = 1'000'000;
+    Read read{clocks_.monotonic((seconds * kUsPerSecond + us) * kNsPerUs), {}};
+    const std::string_view digits(data.data());
+    put_le(read.bytes, std::uint32_t{id});
+    put_le(read.bytes, static_cast<std::uint32_t>(digits.size() / 2));
+    put_le(read.bytes, read.arrival_ns);
+    for (std::size_t i = 0; i + 1 < digits.size(); i += 2) {
+      read.bytes.push_back(
+          static_cast<std::uint8_t>(std::stoul(std::string(digits.substr(i, 2)), nullptr, 16)));
+    }
+    head_ = std::move(read);
+  }
+
   std::string name_;
+  HostClocks clocks_;
+  std::ifstream log_;
   std::ifstream bytes_;
   std::ifstream arrivals_;
   std::optional<Read> head_;
   std::int64_t sequence_ = 0;
-};
-
-/// The host's two clocks, which differ by a constant.
-struct HostClocks {
-  std::int64_t monotonic_ns;
-  std::int64_t utc_ns;
-  [[nodiscard]] std::int64_t utime(std::int64_t arrival_ns) const {
-    const std::int64_t ns = utc_ns + (arrival_ns - monotonic_ns);
-    return ns / kNsPerUs - (ns % kNsPerUs < 0 ? 1 : 0);
-  }
 };
 
 Bytes run_message(const CaptureHeader& header, std::int64_t t0_ns, const HostClocks& clocks) {
@@ -174,7 +205,9 @@ void put_read(Reads& reads, const std::string& channel, const HostClocks& clocks
 
 Outcome<void> write_capture(const CaptureHeader& header, const std::filesystem::path& folder) {
   std::vector<std::unique_ptr<Reads>> devices;
-  for (const std::string& name : header.devices) devices.push_back(std::make_unique<Reads>(folder, name));
+  const HostClocks clocks{header.host_begin_ns, header.utc_begin.time_since_epoch().count()};
+  for (const std::string& name : header.devices)
+    devices.push_back(std::make_unique<Reads>(folder, name, clocks));
   // The oldest head is next; of equal arrivals the device that the configuration names first.
   const auto oldest = [&]() -> Reads* {
     Reads* found = nullptr;
@@ -185,7 +218,6 @@ Outcome<void> write_capture(const CaptureHeader& header, const std::filesystem::
     return found;
   };
 
-  const HostClocks clocks{header.host_begin_ns, header.utc_begin.time_since_epoch().count()};
   const Reads* first = oldest();
   const std::int64_t begin_ns = first != nullptr ? first->head()->arrival_ns : header.host_begin_ns;
   const std::int64_t t0_ns = begin_ns / kTick_ns * kTick_ns;

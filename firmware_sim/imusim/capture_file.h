@@ -25,8 +25,8 @@ struct CaptureHeader {
   std::vector<std::string> devices;  ///< names, in configuration order
 };
 
-/// Writes folder/capture.lcm from the NAME.bin and NAME.arrivals.csv that lie there. Memory does not grow
-/// with the recording.
+/// Writes folder/capture.lcm from the NAME.bin and NAME.arrivals.csv, or the NAME.log, that lie there. Memory
+/// does not grow with the recording.
 Outcome<void> write_capture(const CaptureHeader& header, const std::filesystem::path& folder);
 
 }  // namespace imusim

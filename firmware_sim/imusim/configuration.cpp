@@ -47,6 +47,19 @@ void read_axes(TableReader& in, Eigen::Matrix3d& axes) {
   axes = read;
 }
 
+double default_rate_hz(Role role) {
+  switch (role) {
+    case Role::kGnss:
+      return 10.0;
+    case Role::kOdometry:
+      return 50.0;
+    case Role::kReference:
+    case Role::kStudy:
+      break;
+  }
+  return 100.0;
+}
+
 PlayedDevice read_device(TableReader& in) {
   PlayedDevice device;
   in.text("name", device.name);
@@ -55,11 +68,17 @@ PlayedDevice read_device(TableReader& in) {
     return std::isalnum(letter) != 0 || letter == '_' || letter == '-';
   });
   if (!plain) in.fail("name", "must consist of letters, digits, '_' and '-': it becomes a file name");
-  device.role = static_cast<Role>(in.choice("role", {"reference", "study", "gnss"}, 1));
-  device.protocol = static_cast<Protocol>(in.choice("protocol", {"xsens_mt", "ixblue_stdbin", "greis"}, 0));
-  if ((device.role == Role::kGnss) != (device.protocol == Protocol::kGreis))
-    in.fail("protocol", "does not fit the role: a gnss device speaks greis, an IMU does not");
-  device.rate_hz = device.role == Role::kGnss ? 10.0 : 100.0;
+  device.role = static_cast<Role>(in.choice("role", {"reference", "study", "gnss", "odometry"}, 1));
+  device.protocol = static_cast<Protocol>(
+      in.choice("protocol", {"xsens_mt", "ixblue_stdbin", "greis", "xsens_can", "can_odometry"}, 0));
+  if ((device.role == Role::kGnss) != (device.protocol == Protocol::kGreis) ||
+      (device.role == Role::kOdometry) != (device.protocol == Protocol::kCanOdometry))
+    in.fail(
+        "protocol",
+        "does not fit the role: a gnss device speaks greis, an odometry device can_odometry, an IMU neither");
+  if (device.protocol == Protocol::kXsensCan && device.role == Role::kReference)
+    in.fail("protocol", "is played for an S-IMU only");
+  device.rate_hz = default_rate_hz(device.role);
   in.number("rate_hz", device.rate_hz, 1.0, 1.0, 512.0);
   if (device.protocol == Protocol::kIxblueStdbin)
     device.C_device_frame = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
@@ -70,6 +89,8 @@ PlayedDevice read_device(TableReader& in) {
   double baud = device.baud;
   transport.number("baud", baud, 1.0, 4800.0, 4e6);
   device.baud = static_cast<int>(baud);
+  transport.text("interface", device.can_interface);
+  in.table("odometry").text("dbc", device.dbc);
   return device;
 }
 
@@ -176,6 +197,23 @@ void read_gnss(TableReader in, GnssSimulation& gnss) {
   in.refuse_unknown_keys();
 }
 
+void read_wheels(TableReader in, WheelSimulation& wheels) {
+  in.number("scale_error_percent", wheels.errors.scale, kPercent, -50.0, 50.0);
+  in.number("slow_sd_mps", wheels.errors.slow_sd_mps, 1.0, 0.0, 10.0);
+  in.number("white_sd_mps", wheels.errors.white_sd_mps, 1.0, 0.0, 10.0);
+  in.number("step_kmph", wheels.errors.step_mps, 1.0 / 3.6, 0.0, 10.0);
+  in.number("dead_band_mps", wheels.errors.dead_band_mps, 1.0, 0.0, 5.0);
+  in.number("latency_ms", wheels.latency_s, kMilli, 0.0, 1e3);
+  in.refuse_unknown_keys();
+}
+
+void read_can(TableReader in, CanLineOptions& can) {
+  in.number("bit_rate", can.bit_rate, 1.0, 1e4, 1e6);
+  in.number("bus_load_percent", can.bus_load, kPercent, 0.0, 95.0);
+  in.number("stamp_jitter_us", can.jitter_mean_s, kMicro, 0.0, 1e5);
+  in.refuse_unknown_keys();
+}
+
 void read_line(TableReader in, LineOptions& line) {
   constexpr std::array kModels = {ReadModel::kUsbFrames, ReadModel::kFtdi, ReadModel::kMessages};
   line.reads = kModels[in.choice("reads", {"usb_frames", "ftdi", "messages"}, 0)];
@@ -218,6 +256,8 @@ void read_simulation(TableReader in, Configuration& configuration) {
       static_cast<RegimeSwitch>(in.choice("regime_switch", {"continuous", "independent"}, 0));
   read_reference(in.table("reference"), configuration.reference);
   read_gnss(in.table("gnss"), configuration.gnss);
+  read_wheels(in.table("wheels"), configuration.wheels);
+  read_can(in.table("can"), configuration.can);
   read_line(in.table("line"), configuration.line);
   read_studies(in, common, configuration);
   in.refuse_unknown_keys();

@@ -10,6 +10,8 @@
 /// [simulation.reference]: gyro_white_deg_per_sqrt_h, accel_white_ug_per_sqrt_hz, gyro_bias_sd_deg_per_h,
 ///   accel_bias_sd_mps2, attitude_sd_deg (roll, pitch, heading), latency_ms, alignment_s
 /// [simulation.gnss]: position_sd_m, velocity_sd_mps (north, east, down), latency_ms
+/// [simulation.wheels]: scale_error_percent, slow_sd_mps, white_sd_mps, step_kmph, dead_band_mps, latency_ms
+/// [simulation.can]: bit_rate, bus_load_percent (by others), stamp_jitter_us
 /// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm
 /// [[simulation.imu]], one for each S-IMU, found by `name`: rotation_vector_b_s_deg, lever_arm_b_m,
 /// latency_ms,
@@ -30,21 +32,25 @@
 #include "firmware_sim/devices/utc.h"
 #include "firmware_sim/faults/fault.h"
 #include "firmware_sim/imu/sensor_classes.h"
+#include "firmware_sim/imu/wheel_speed.h"
 #include "firmware_sim/imusim/failure.h"
+#include "firmware_sim/io/can_line.h"
 #include "firmware_sim/io/serial_line.h"
 #include "firmware_sim/motion/motion.h"
 
 namespace imusim {
 
-enum class Role { kReference, kStudy, kGnss };
-enum class Protocol { kXsensMt, kIxblueStdbin, kGreis };
+enum class Role { kReference, kStudy, kGnss, kOdometry };
+enum class Protocol { kXsensMt, kIxblueStdbin, kGreis, kXsensCan, kCanOdometry };
 
 struct PlayedDevice {
   std::string name;
   Role role = Role::kStudy;
   Protocol protocol = Protocol::kXsensMt;
   double rate_hz = 100.0;
-  std::string port;  ///< empty where the configuration names none
+  std::string port;           ///< empty where the configuration names none
+  std::string can_interface;  ///< of a device on a CAN bus
+  std::string dbc;            ///< kCanOdometry: the file that the configuration names
   int baud = 115200;
   Eigen::Matrix3d C_device_frame = Eigen::Matrix3d::Identity();  ///< rotates the device's axes to b or s
   Eigen::Vector3d antenna_b_m = Eigen::Vector3d::Zero();
@@ -61,6 +67,12 @@ struct GnssSimulation {
   Eigen::Vector3d position_sd_m{0.01, 0.01, 0.02};
   Eigen::Vector3d velocity_sd_mps{0.02, 0.02, 0.03};
   double latency_s = 0.040;
+};
+
+/// The four wheels of the vehicle, whose rear axle is under the R-IMU.
+struct WheelSimulation {
+  WheelErrors errors;
+  double latency_s = 0.002;
 };
 
 struct StudySimulation {
@@ -92,11 +104,16 @@ struct Configuration {
   Utc utc_begin;
   ReferenceSimulation reference;
   GnssSimulation gnss;
+  WheelSimulation wheels;
+  CanLineOptions can;
   LineOptions line;                      ///< all but the baud rate
   std::vector<StudySimulation> studies;  ///< one for each device with role study, in its order
   std::vector<Fault> faults;             ///< of a fault script
   std::string fault_text;                ///< the script as read; empty where there is none
 
+  [[nodiscard]] static bool is_on_can(const PlayedDevice& device) {
+    return device.protocol == Protocol::kXsensCan || device.protocol == Protocol::kCanOdometry;
+  }
   [[nodiscard]] std::vector<Fault> faults_of(const std::string& device) const;
 };
 

@@ -5,6 +5,7 @@
 #include <ctime>
 
 #include "firmware_sim/imusim/truth_files.h"
+#include "firmware_sim/io/can_port.h"
 #include "firmware_sim/io/pseudo_terminal.h"
 
 namespace imusim {
@@ -65,11 +66,50 @@ void sleep_until(std::int64_t time_ns) {
   ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
 }
 
+/// A device on a CAN bus, and the interface that it sends on.
+struct CanEnd {
+  WorldDevice* device;
+  CanLine line;
+  CanPort port;
+  LiveCounts counts;
+
+  void run_until(double t_s) {
+    emissions.clear();
+    device->device->run_until(t_s, emissions);
+    for (const Emission& emission : emissions) line.send(emission);
+    line.deliver_until(t_s, [this](const CanFrame& frame, double /*t_s*/) {
+      const bool sent = port.write(frame);
+      (sent ? counts.sent_bytes : counts.dropped_bytes) += frame.data.size();
+    });
+  }
+
+  std::vector<Emission> emissions{};
+};
+
+Outcome<std::vector<CanEnd>> open_can_ends(World& world, const LiveOptions& options) {
+  std::vector<CanEnd> ends;
+  for (WorldDevice& device : world.devices()) {
+    const PlayedDevice& played = device.played;
+    if (!Configuration::is_on_can(played)) continue;
+    if (played.can_interface.empty())
+      return wrong_usage(
+          fmt::format("{}: device '{}' has no CAN interface to play on; give transport = {{ kind = \"can\", "
+                      "interface = \"...\" }}",
+                      world.configuration().file.string(), played.name));
+    auto port = CanPort::open(played.can_interface);
+    if (!port) return failed_work(fmt::format("device '{}': {}", played.name, port.error()));
+    if (options.on_line) options.on_line(fmt::format("{:<10} {}", played.name, played.can_interface));
+    ends.push_back({&device, world.can_line_of(played), std::move(*port), {played.name, 0, 0, 0}});
+  }
+  return ends;
+}
+
 Outcome<std::vector<Port>> open_ports(World& world, const LiveOptions& options) {
   std::vector<Port> ports;
   ports.reserve(world.devices().size());
   for (WorldDevice& device : world.devices()) {
     const PlayedDevice& played = device.played;
+    if (Configuration::is_on_can(played)) continue;
     if (played.port.empty())
       return wrong_usage(fmt::format(
           "{}: device '{}' has no port to play on; give transport = {{ kind = \"serial\", port = \"...\" }}",
@@ -103,6 +143,8 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
   }
   auto ports = open_ports(world, options);
   if (!ports) return tl::unexpected(ports.error());
+  auto can_ends = open_can_ends(world, options);
+  if (!can_ends) return tl::unexpected(can_ends.error());
 
   const double end_s =
       std::min(configuration.scenario.duration_s,
@@ -113,9 +155,11 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
     const double t_s = options.start_s + static_cast<double>(monotonic_ns() - begin_ns) / kNsPerSecond;
     if (t_s > end_s) break;
     for (Port& port : *ports) port.run_until(t_s);
+    for (CanEnd& end : *can_ends) end.run_until(t_s);
   }
   std::vector<LiveCounts> counts;
   for (const Port& port : *ports) counts.push_back(port.counts);
+  for (const CanEnd& end : *can_ends) counts.push_back(end.counts);
   return counts;
 }
 

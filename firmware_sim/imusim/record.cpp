@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <future>
 #include <limits>
 
+#include "firmware_sim/devices/can_encoder.h"
 #include "firmware_sim/imusim/capture_file.h"
 #include "firmware_sim/imusim/output_file.h"
 #include "firmware_sim/imusim/truth_files.h"
@@ -54,9 +56,57 @@ Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::fi
   return recorded;
 }
 
+/// The host's wall clock agrees with the scenario's: a log of candump is stamped with UTC.
+std::string candump_line(const CanFrame& frame, const std::string& interface, Utc stamp) {
+  const auto us = std::chrono::round<std::chrono::microseconds>(stamp.time_since_epoch()).count();
+  constexpr std::int64_t kUsPerSecond = 1'000'000;
+  std::string line =
+      fmt::format("({:010}.{:06}) {} {:03X}#", us / kUsPerSecond, us % kUsPerSecond, interface, frame.id);
+  for (const std::uint8_t byte : frame.data) line += fmt::format("{:02X}", byte);
+  return line + "\n";
+}
+
+/// The same for a device on a CAN bus: a log of candump, NAME.log.
+Outcome<Recorded> record_can_device(World& world, WorldDevice& device, const std::filesystem::path& folder,
+                                    std::atomic<double>& done_s) {
+  OutputFile log(folder / (device.played.name + ".log"));
+  Recorded recorded{device.played.name, 0, 0};
+  const std::string interface = device.played.can_interface.empty() ? "can0" : device.played.can_interface;
+  const auto on_frame = [&](const CanFrame& frame, double t_s) {
+    const std::string line = candump_line(frame, interface, utc_after(world.configuration().utc_begin, t_s));
+    log.write(line);
+    recorded.bytes += line.size();
+    ++recorded.reads;
+  };
+  CanLine line = world.can_line_of(device.played);
+  const double duration_s = world.motion().duration_s();
+  constexpr double kStep_s = 1.0;
+  std::vector<Emission> emissions;
+  for (double until_s = kStep_s; until_s < duration_s + kStep_s; until_s += kStep_s) {
+    emissions.clear();
+    device.device->run_until(std::min(until_s, duration_s), emissions);
+    for (const Emission& emission : emissions) line.send(emission);
+    line.deliver_until(std::min(until_s, duration_s), on_frame);
+    done_s.fetch_add(kStep_s, std::memory_order_relaxed);
+  }
+  line.deliver_until(std::numeric_limits<double>::infinity(), on_frame);
+  if (auto closed = log.close(); !closed) return tl::unexpected(closed.error());
+  return recorded;
+}
+
+/// The DBC file that the configuration names lies beside its copy.
+Outcome<void> copy_dbc(const Configuration& configuration, const std::filesystem::path& folder) {
+  for (const PlayedDevice& device : configuration.devices) {
+    if (device.protocol != Protocol::kCanOdometry || device.dbc.empty()) continue;
+    if (auto written = write_file(folder / device.dbc, std::string(wheel_dbc())); !written) return written;
+  }
+  return {};
+}
+
 std::string configuration_copy(const Configuration& configuration) {
   std::string inputs;
-  for (const PlayedDevice& device : configuration.devices) inputs += fmt::format(" {0}={0}.bin", device.name);
+  for (const PlayedDevice& device : configuration.devices)
+    inputs += fmt::format(" {0}={0}.{1}", device.name, Configuration::is_on_can(device) ? "log" : "bin");
   return fmt::format(
       "# Recorded by imusim record with seed {} over {} s. Read from this folder by\n"
       "#   imuscope process{} --config config.toml --out RESULT\n\n{}",
@@ -90,6 +140,8 @@ Outcome<std::vector<Recorded>> record(const Configuration& configuration, const 
   if (auto written = write_file(options.folder / "config.toml", configuration_copy(configuration)); !written)
     return tl::unexpected(written.error());
 
+  if (auto copied = copy_dbc(configuration, options.folder); !copied) return tl::unexpected(copied.error());
+
   std::vector<std::unique_ptr<OutputFile>> error_files;
   if (options.true_errors) {
     for (const StudyTruth& study : world.studies()) {
@@ -107,7 +159,8 @@ Outcome<std::vector<Recorded>> record(const Configuration& configuration, const 
   std::vector<std::future<Outcome<Recorded>>> work;
   for (WorldDevice& device : world.devices())
     work.push_back(std::async(std::launch::async, [&world, &device, &options, &done_s] {
-      return record_device(world, device, options.folder, done_s);
+      const bool on_can = Configuration::is_on_can(device.played);
+      return (on_can ? record_can_device : record_device)(world, device, options.folder, done_s);
     }));
   const double all_s = world.motion().duration_s() * static_cast<double>(work.size());
   std::vector<Recorded> recorded;

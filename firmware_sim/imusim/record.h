@@ -1,8 +1,8 @@
 #pragma once
 
 /// Records a simulated run into files: for each device what the host would have read (NAME.bin) and when
-/// (NAME.arrivals.csv), all of it as one capture (capture.lcm), the configuration that replays them, and the
-/// truth.
+/// (NAME.arrivals.csv), or what candump would have logged (NAME.log) of one on a CAN bus, all of it as one
+/// capture (capture.lcm), the configuration that replays them, and the truth.
 
 #include <filesystem>
 #include <functional>

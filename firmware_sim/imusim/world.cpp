@@ -5,8 +5,10 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
+#include "firmware_sim/devices/can_encoder.h"
 #include "firmware_sim/devices/greis_receiver.h"
 #include "firmware_sim/devices/stdbin_unit.h"
 #include "firmware_sim/devices/xsens_mtx.h"
@@ -145,6 +147,9 @@ World::World(const Configuration& configuration, Beginning beginning, double beg
       case Role::kGnss:
         add_gnss(played, begin_s);
         break;
+      case Role::kOdometry:
+        add_wheels(played, begin_s);
+        break;
     }
   }
 }
@@ -217,6 +222,29 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
     faults->apply(t_s, reading);
     return reading;
   };
+
+  if (played.protocol == Protocol::kXsensCan) {
+    CanNode::Options options;
+    options.rate_hz = played.rate_hz;
+    options.first_s = clock.first_sample_s;
+    options.clock_skew_ppm = clock.clock_skew_ppm;
+    options.latency_s = clock.latency_s;
+    auto node = std::make_unique<CanNode>(
+        options, [sample, C_frame_device, first = clock.first_counter, step_s = 1.0 / played.rate_hz](
+                     double t_s, double device_s, std::int64_t index) {
+          // Increments of the interval that ends now: what is felt in its middle, for its length.
+          const ImuReading reading = sample(t_s - 0.5 * step_s, first + index);
+          MtiGroup group;
+          group.sample_time_100us = static_cast<std::uint32_t>(std::llround(device_s * 1e4));
+          group.counter = static_cast<std::uint16_t>(first + index);
+          group.delta_v_mps = step_s * (C_frame_device * reading.f_mps2);
+          group.rotation_vector_rad = step_s * (C_frame_device * reading.omega_radps);
+          return mti_frames(group);
+        });
+    node->skip_to(begin_s);
+    add(played, std::move(node));
+    return;
+  }
 
   if (played.protocol == Protocol::kXsensMt) {
     XsensMtx::Options options;
@@ -310,6 +338,37 @@ void World::add_gnss(const PlayedDevice& played, double begin_s) {
   });
   receiver->skip_to(begin_s);
   add(played, std::move(receiver));
+}
+
+void World::add_wheels(const PlayedDevice& played, double begin_s) {
+  CanNode::Options options;
+  options.rate_hz = played.rate_hz;
+  options.latency_s = configuration_.wheels.latency_s;
+  options.first_s = Random(configuration_.scenario.seed, played.name + "/unit").uniform() / played.rate_hz;
+  // Front right, front left, rear right, rear left; b is forward-right-down, above the rear axle.
+  constexpr double kWheelbase_m = 2.7;
+  constexpr double kHalfTrack_m = 0.78;
+  constexpr double kBelow_m = 0.5;
+  auto wheels = std::make_shared<std::vector<WheelSpeed>>();
+  for (const auto& [x, y, name] : {std::tuple{kWheelbase_m, kHalfTrack_m, "/fr"},
+                                   {kWheelbase_m, -kHalfTrack_m, "/fl"},
+                                   {0.0, kHalfTrack_m, "/rr"},
+                                   {0.0, -kHalfTrack_m, "/rl"}}) {
+    wheels->emplace_back(*motion_, Eigen::Vector3d(x, y, kBelow_m), configuration_.wheels.errors,
+                         configuration_.scenario.seed, played.name + name);
+  }
+  auto node = std::make_unique<CanNode>(
+      options, [motion = motion_, wheels](double t_s, double /*device_s*/, std::int64_t /*index*/) {
+        std::array<double, 4> speeds_mps{};
+        for (std::size_t i = 0; i < speeds_mps.size(); ++i) speeds_mps[i] = (*wheels)[i].shown_at(t_s);
+        return std::vector<CanFrame>{wheel_frame(speeds_mps)};
+      });
+  node->skip_to(begin_s);
+  add(played, std::move(node));
+}
+
+CanLine World::can_line_of(const PlayedDevice& played) const {
+  return {configuration_.can, Random(configuration_.scenario.seed, played.name + "/line")};
 }
 
 SerialLine World::line_of(const PlayedDevice& played) const {

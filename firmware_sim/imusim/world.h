@@ -11,6 +11,7 @@
 #include "firmware_sim/devices/device.h"
 #include "firmware_sim/imu/imu_model.h"
 #include "firmware_sim/imusim/configuration.h"
+#include "firmware_sim/io/can_line.h"
 #include "firmware_sim/io/serial_line.h"
 #include "firmware_sim/motion/motion.h"
 
@@ -66,6 +67,9 @@ class World {
   /// The line of a device to the host.
   [[nodiscard]] SerialLine line_of(const PlayedDevice& played) const;
 
+  /// The way of a device on a CAN bus to the host.
+  [[nodiscard]] CanLine can_line_of(const PlayedDevice& played) const;
+
   /// Has every sample of an S-IMU shown as it is made, in the thread that runs the device.
   void observe(const std::string& name, OnTrueSample on_sample);
 
@@ -75,6 +79,7 @@ class World {
                  double begin_s);
   void add_reference(const PlayedDevice& played, Beginning beginning, double begin_s);
   void add_gnss(const PlayedDevice& played, double begin_s);
+  void add_wheels(const PlayedDevice& played, double begin_s);
   void add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const StudyTruth& clock,
                Beginning beginning, double begin_s);
 
