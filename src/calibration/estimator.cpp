@@ -7,6 +7,7 @@
 #include "calibration/event_log.h"
 #include "calibration/filter_core.h"
 #include "calibration/navigation_filter.h"
+#include "calibration/odometry_filter.h"
 #include "calibration/regime_detector.h"
 #include "calibration/smoother.h"
 #include "calibration/study_filter.h"
@@ -31,6 +32,7 @@ bool is_finite(const ImuData& imu) noexcept {
 void check(const EstimatorConfig& config) {
   IMUSCOPE_EXPECTS(config.studies.size() <= kMaxStudies);
   IMUSCOPE_EXPECTS(config.reference.rate_hz > 0.0);
+  IMUSCOPE_EXPECTS(!config.odometry.enabled || config.odometry.rate_hz > 0.0);
   IMUSCOPE_EXPECTS(config.gate_probability > 0.5 && config.gate_probability < 1.0);
   for (const StudyConfig& study : config.studies) {
     IMUSCOPE_EXPECTS(study.rate_hz > 0.0);
@@ -48,7 +50,8 @@ class Estimator::Impl final : public EpochSink {
         history_(history),
         core_(config),
         window_({config.reference.differentiator_points, 1.0 / config.reference.rate_hz}),
-        navigation_(config, core_, log_, counters_) {
+        navigation_(config, core_, log_, counters_),
+        odometry_(config, core_, navigation_, log_, counters_) {
     if (history_ != nullptr) core_.keep_history();
     epochs_.reserve(kEpochsPerTick);
     studies_.reserve(config.studies.size());
@@ -56,7 +59,12 @@ class Estimator::Impl final : public EpochSink {
   }
 
   void add(const Sample& sample) noexcept {
-    if (sample.kind == SampleKind::kGnss) {
+    if (sample.kind == SampleKind::kOdometry) {
+      if (config_.odometry.enabled && sample.device == config_.odometry.device) {
+        if (odometry_.add(sample)) regime_.add_wheel_speed(sample.odometry.speed_mps);
+        return;
+      }
+    } else if (sample.kind == SampleKind::kGnss) {
       if (config_.gnss.enabled && sample.device == config_.gnss.device) {
         navigation_.add_gnss(sample);
         return;
@@ -88,6 +96,7 @@ class Estimator::Impl final : public EpochSink {
     watch_covariance(cut);
     hand_out_history();
     navigation_.update_output();
+    odometry_.update_output();
     for (StudyFilter& study : studies_) study.update_output(core_);
     counters_.events_lost = log_.lost();
     shown_ = log_;
@@ -108,6 +117,7 @@ class Estimator::Impl final : public EpochSink {
   }
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept { return navigation_.output(); }
+  [[nodiscard]] const OdometryOutput& odometry() const noexcept { return odometry_.output(); }
   [[nodiscard]] std::size_t study_count() const noexcept { return studies_.size(); }
   [[nodiscard]] const StudyOutput& study(std::size_t i) const noexcept { return studies_[i].output(); }
   [[nodiscard]] std::span<const StudyEpoch> epochs() const noexcept { return epochs_; }
@@ -137,6 +147,7 @@ class Estimator::Impl final : public EpochSink {
     watch_gravity(sample);
     for (StudyFilter& study : studies_) study.add_reference(sample.time, omega.norm());
     navigation_.add_reference(sample);
+    odometry_.process(sample.time, regime_.regime());
   }
 
   void hand_out_history() noexcept {
@@ -174,6 +185,7 @@ class Estimator::Impl final : public EpochSink {
   EventLog shown_;
   EstimatorCounters counters_;
   NavigationFilter navigation_;
+  OdometryFilter odometry_;
   RegimeDetector regime_;
   std::vector<StudyFilter> studies_;
   std::vector<StudyEpoch> epochs_;
@@ -197,6 +209,7 @@ void Estimator::set_noise(std::size_t study, const StudyNoise& noise) noexcept {
   impl_->set_noise(study, noise);
 }
 const NavigationOutput& Estimator::navigation() const noexcept { return impl_->navigation(); }
+const OdometryOutput& Estimator::odometry() const noexcept { return impl_->odometry(); }
 std::size_t Estimator::study_count() const noexcept { return impl_->study_count(); }
 const StudyOutput& Estimator::study(std::size_t index) const noexcept { return impl_->study(index); }
 std::span<const StudyEpoch> Estimator::epochs() const noexcept { return impl_->epochs(); }

@@ -58,6 +58,22 @@ struct NavigationOutput {
   Vector3 nis_velocity{};
 };
 
+/// What the wheels say and what has been learned of them. Nothing but `enabled` is meaningful without an
+/// odometry device.
+struct OdometryOutput {
+  bool enabled = false;
+  bool standing = false;  ///< the wheels have stood for a while
+  HostTime time;          ///< of validity of the newest speed
+  double speed_mps = 0.0;
+  double scale = 0.0;  ///< the wheels show (1 + scale) times the speed
+  double sd_scale = 0.0;
+  Vector3 mount_rad{};  ///< rotation vector that takes b to the vehicle's axes; no turn about x
+  Vector3 sd_mount_rad{};
+  Vector3 r_bv_b_m{};
+  Vector3 sd_r_bv_b_m{};
+  Vector3 nis{};  ///< mean over the last seconds: speed, sideways, upwards
+};
+
 enum class StudyStatus : std::uint8_t {
   kWaiting,     ///< no sample yet, or none since a long gap
   kCoarse,      ///< gathering motion for the coarse time offset and mounting
@@ -162,7 +178,11 @@ enum class EstimatorEventKind : std::uint8_t {
   kStudyReturned,          ///< after a gap; its biases are uncertain again; value: gap in s
   kGnssRejected,           ///< start of a streak of rejected solutions; value: NIS
   kGnssReacquired,         ///< end of a streak; value: its length in s
-  kCovarianceRepaired,     ///< a variance had become non-positive or non-finite; value: state index
+  kOdometryLost,           ///< no speed for a while; the last one is not held; value: its age in s
+  kOdometryReturned,       ///< value: silence in s
+  kOdometryRejected,  ///< wheels contradict the navigation (slip, wrong unit or scale); value: excess in m/s
+  kOdometryAccepted,  ///< end of a streak of rejected speeds; value: its length in s
+  kCovarianceRepaired,  ///< a variance had become non-positive or non-finite; value: state index
 };
 
 struct EstimatorEvent {
@@ -184,6 +204,15 @@ struct EstimatorCounters {
   std::uint64_t gnss_rejected = 0;
   std::uint64_t gnss_too_old = 0;  ///< older than the ring of past states
   std::uint64_t gnss_not_finite = 0;
+  std::uint64_t odometry_samples = 0;
+  std::uint64_t odometry_speed_used = 0;
+  std::uint64_t odometry_speed_rejected = 0;
+  std::uint64_t odometry_slip_used = 0;  ///< non-holonomic updates
+  std::uint64_t odometry_slip_rejected = 0;
+  std::uint64_t zero_velocity_used = 0;
+  std::uint64_t zero_velocity_rejected = 0;
+  std::uint64_t odometry_too_old = 0;  ///< older than the ring of past states
+  std::uint64_t odometry_not_finite = 0;
   std::uint64_t unknown_device = 0;
   std::uint64_t covariance_repairs = 0;
   std::uint64_t events_lost = 0;
@@ -215,6 +244,7 @@ class Estimator {
   void set_noise(std::size_t study, const StudyNoise& noise) noexcept;
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept;
+  [[nodiscard]] const OdometryOutput& odometry() const noexcept;
   [[nodiscard]] std::size_t study_count() const noexcept;
   [[nodiscard]] const StudyOutput& study(std::size_t index) const noexcept;
   /// S samples processed by the last advance(), per S-IMU in the order of time. Valid until the next

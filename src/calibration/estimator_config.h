@@ -73,6 +73,38 @@ struct GnssConfig {
   Vector3 floor_sd_velocity_mps{0.02, 0.02, 0.02};
 };
 
+/// What the vehicle itself says of its motion: the speed that its wheels show, that it does not slip, and
+/// that it stands. Six states: scale of the wheels, two angles between the vehicle and b, lever arm. Each
+/// kind of update can be left out.
+struct OdometryConfig {
+  bool enabled = false;
+  DeviceIndex device = 0;
+  double rate_hz = 50.0;
+  bool use_speed = true;          ///< forward speed of the wheels
+  bool use_non_holonomic = true;  ///< neither sideways nor upwards
+  bool use_zero_velocity = true;  ///< at standstill
+  /// From b's origin to the point that does not slip sideways, to which the speed belongs: the middle of the
+  /// axle that does not steer.
+  Vector3 prior_r_bv_b_m{0.0, 0.0, 0.0};
+  Vector3 prior_r_bv_b_sd_m{0.2, 0.2, 0.2};
+  /// b against the vehicle's axes, about y and z of b.
+  double prior_mount_sd_rad = 2.0 * kRadPerDeg;
+  double prior_scale_sd = 0.03;
+  /// Growth of the scale's sd: tyres warm up and wear. 0.05 % in an hour.
+  double scale_walk_per_sqrt_s = 8e-6;
+  /// What wheels and tyres do beyond the model; slow errors of about correlation_time_s, not white noise.
+  double speed_sd_mps = 0.05;
+  double sideways_sd_mps = 0.05;
+  double upwards_sd_mps = 0.1;
+  double correlation_time_s = 0.5;
+  /// Slip angle of the axle in a turn per lateral acceleration (cornering compliance), rad per m/s^2; the
+  /// sideways speed that it allows adds to sideways_sd_mps.
+  double slip_rad_per_mps2 = 0.003;
+  double zero_velocity_sd_mps = 0.01;
+  /// Below this, wheel sensors may show zero while the vehicle moves: such a speed is not used as one.
+  double dead_band_mps = 0.6;
+};
+
 /// Start of the navigation. What is absent is found from the R-IMU's own attitude, from rest, or in motion.
 struct NavigationConfig {
   bool enabled = true;  ///< false: calibration alone, also where there is GNSS
@@ -146,6 +178,7 @@ struct StudyConfig {
 struct EstimatorConfig {
   ReferenceConfig reference;
   GnssConfig gnss;
+  OdometryConfig odometry;
   NavigationConfig navigation;
   std::vector<StudyConfig> studies;  ///< at most kMaxStudies; outputs are in this order
 

@@ -11,7 +11,15 @@ namespace {
 std::size_t filter_dimension(const EstimatorConfig& config) {
   std::size_t dimension = kNavigationStates;
   for (const StudyConfig& study : config.studies) dimension += StudyLayout::make(study.blocks, 0).size;
+  if (config.odometry.enabled) dimension += kOdometryErrorSize;
   return dimension;
+}
+
+/// Prior sd of the odometry's states.
+std::array<double, kOdometryErrorSize> odometry_prior(const OdometryConfig& config) {
+  const Vector3& arm = config.prior_r_bv_b_sd_m;
+  return {
+      config.prior_scale_sd, config.prior_mount_sd_rad, config.prior_mount_sd_rad, arm[0], arm[1], arm[2]};
 }
 
 /// Calls f(state index, prior sd) for every state of one S-IMU.
@@ -64,6 +72,13 @@ FilterCore::FilterCore(const EstimatorConfig& config)
                    [this](std::size_t state, double sd) { repair_variance_[state] = sd * sd; });
     reset_to_prior(*this, i, config.studies[i]);
   }
+  if (!config.odometry.enabled) return;
+  odometry_states_ = first;
+  odometry_.r_bv_b_m = to_eigen(config.odometry.prior_r_bv_b_m);
+  for (const double sd : odometry_prior(config.odometry)) {
+    repair_variance_[first] = sd * sd;
+    covariance_.reset_state(first++, sd * sd);
+  }
 }
 
 double FilterCore::sd(std::size_t state) const noexcept {
@@ -80,6 +95,8 @@ bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool
     for (std::size_t i = 0; i < correction.size(); ++i) accumulated_.injected[i] += correction[i];
   }
   for (std::size_t i = 0; i < studies_.size(); ++i) inject(studies_[i], layouts_[i], correction);
+  if (odometry_states_ != StudyLayout::kAbsent)
+    inject(odometry_, Eigen::Map<const OdometryErrorVector>(correction.data() + odometry_states_));
   return true;
 }
 

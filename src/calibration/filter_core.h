@@ -2,7 +2,8 @@
 
 /// The filter's state and covariance as one thing: every update corrects the navigation and every S-IMU.
 /// Order of the error state: 15 of the navigation (navigation/error_model.h), then the S-IMUs in order of
-/// configuration. Allocates: constructor only. Thread: one.
+/// configuration, then the odometry's 6 where there is one (navigation/odometry_measurement.h). Allocates:
+/// constructor only. Thread: one.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -13,6 +14,7 @@
 #include "calibration/study_model.h"
 #include "navigation/error_model.h"
 #include "navigation/navigation_state.h"
+#include "navigation/odometry_measurement.h"
 
 namespace imuscope {
 
@@ -31,6 +33,9 @@ class FilterCore {
   [[nodiscard]] const StudyState& study(std::size_t i) const noexcept { return studies_[i]; }
   [[nodiscard]] const StudyLayout& layout(std::size_t i) const noexcept { return layouts_[i]; }
   [[nodiscard]] std::size_t study_count() const noexcept { return studies_.size(); }
+  [[nodiscard]] const OdometryState& odometry() const noexcept { return odometry_; }
+  /// First index of the odometry's states; StudyLayout::kAbsent where there are none.
+  [[nodiscard]] std::size_t odometry_states() const noexcept { return odometry_states_; }
 
   /// Second half of an update (CovarianceKernel::project() is the first): corrects everything.
   /// @return false where nothing was changed
@@ -74,6 +79,8 @@ class FilterCore {
   NavigationErrorVector injected_ = NavigationErrorVector::Zero();
   std::vector<StudyState> studies_;
   std::vector<StudyLayout> layouts_;
+  OdometryState odometry_;
+  std::size_t odometry_states_ = StudyLayout::kAbsent;
   std::vector<double> repair_variance_;  ///< prior variance of every state
   bool keeps_history_ = false;
   Accumulated accumulated_;

@@ -291,7 +291,7 @@ HostTime NavigationFilter::host_time_of(const Sample& gnss) const noexcept {
   return nearest->time + (gnss.utc - nearest->utc);
 }
 
-NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out) noexcept {
+NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out) const noexcept {
   if (past_size_ == 0 || time > past(0).time + kGnssAhead) return Lookup::kTooNew;
   if (time < past(past_size_ - 1).time) return Lookup::kTooOld;
   out.back.setIdentity();
@@ -318,9 +318,6 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
     propagate(out.state, increment_from_samples(compensated(epoch.measured, out.state),
                                                 compensated(out.measured, out.state), rest_s));
   }
-  // Solutions come in order: nothing before this epoch will be asked for again, so that what was injected
-  // up to now need only be carried as far back as here.
-  past_size_ = k + 1;
   return Lookup::kFound;
 }
 

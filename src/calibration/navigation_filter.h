@@ -27,6 +27,16 @@ class NavigationFilter {
   void add_attitude(const Sample& sample) noexcept;
   void add_gnss(const Sample& sample) noexcept;
 
+  /// A past epoch seen from the present.
+  struct Delayed {
+    NavigationState state;
+    InertialRates measured;
+    NavigationErrorCovariance back;  ///< Phi^-1: error then = back * error now
+  };
+  enum class Lookup : std::uint8_t { kFound, kTooNew, kTooOld };
+  /// The state at a past time, with everything learned since. E-5.
+  [[nodiscard]] Lookup look_back(HostTime time, Delayed& out) const noexcept;
+
   [[nodiscard]] bool navigating() const noexcept { return output_.status == NavigationStatus::kNavigating; }
   /// Writes the newest state and its sd into output().
   void update_output() noexcept;
@@ -45,13 +55,6 @@ class NavigationFilter {
     double gyro_bias_decay;
     double accel_bias_decay;
   };
-  /// A past epoch seen from the present.
-  struct Delayed {
-    NavigationState state;
-    InertialRates measured;
-    NavigationErrorCovariance back;  ///< Phi^-1: error then = back * error now
-  };
-  enum class Lookup : std::uint8_t { kFound, kTooNew, kTooOld };
 
   void carry_over_interval(const InertialRates& measured, bool is_mean, double dt_s) noexcept;
   void predict(const InertialRates& rates, double dt_s, double extra_rate_noise) noexcept;
@@ -63,7 +66,6 @@ class NavigationFilter {
   void stop(HostTime time, double gap_s) noexcept;
   bool apply_gnss(const Sample& sample) noexcept;
   [[nodiscard]] HostTime host_time_of(const Sample& gnss) const noexcept;
-  Lookup look_back(HostTime time, Delayed& out) noexcept;
   bool apply(GnssGate& gate, const GnssInnovation& measured, const NavigationErrorCovariance& back,
              const Eigen::Vector3d& sd, HostTime time, Vector3& nis) noexcept;
   void widen_for_reacquisition(const Eigen::Vector3d& innovation) noexcept;

@@ -1,6 +1,7 @@
 #include "calibration/regime_detector.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace imuscope {
 
@@ -19,10 +20,22 @@ void RegimeDetector::add(const Eigen::Vector3d& omega_radps, const Eigen::Vector
   mean_f_ += gain(kMean_s) * (f_ - mean_f_);
   omega_variance_ += gain(kSpread_s) * ((omega_ - mean_omega_).squaredNorm() - omega_variance_);
   f_variance_ += gain(kSpread_s) * ((f_ - mean_f_).squaredNorm() - f_variance_);
-  const bool quiet = omega_variance_ < kRateLimit_radps * kRateLimit_radps &&
-                     f_variance_ < kForceLimit_mps2 * kForceLimit_mps2;
+  wheels_age_s_ += dt_s;
+  const bool has_wheels = wheels_age_s_ < kWheelsValid_s;
+  wheels_stood_s_ = has_wheels && wheels_stand_ ? wheels_stood_s_ + dt_s : 0.0;
+  const double room = wheels_stood_s_ >= kHold_s ? kShaking : 1.0;
+  const double rate_limit = room * kRateLimit_radps;
+  const double force_limit = room * kForceLimit_mps2;
+  const bool wheels_turn = has_wheels && !wheels_stand_;
+  const bool quiet =
+      !wheels_turn && omega_variance_ < rate_limit * rate_limit && f_variance_ < force_limit * force_limit;
   quiet_s_ = quiet ? quiet_s_ + dt_s : 0.0;
   regime_ = quiet_s_ >= kHold_s ? Regime::kStatic : Regime::kDynamic;
+}
+
+void RegimeDetector::add_wheel_speed(double speed_mps) noexcept {
+  wheels_age_s_ = 0.0;
+  wheels_stand_ = std::abs(speed_mps) <= kWheelsStand_mps;
 }
 
 }  // namespace imuscope

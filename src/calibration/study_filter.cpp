@@ -2,9 +2,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "calibration/axis_gate.h"
 #include "navigation/so3.h"
 
 namespace imuscope {
@@ -41,10 +41,6 @@ bool is_finite(const ImuData& imu) noexcept {
   for (std::size_t i = 0; i < 3; ++i)
     finite = finite && std::isfinite(imu.omega_radps[i]) && std::isfinite(imu.f_mps2[i]);
   return finite;
-}
-
-double axis_gate(double probability) {
-  return boost::math::quantile(boost::math::chi_squared(1.0), probability);
 }
 
 }  // namespace

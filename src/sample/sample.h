@@ -19,7 +19,7 @@ using DeviceIndex = std::uint8_t;
 
 using Vector3 = std::array<double, 3>;
 
-enum class SampleKind : std::uint8_t { kImu, kGnss, kAttitude };
+enum class SampleKind : std::uint8_t { kImu, kGnss, kAttitude, kOdometry };
 
 /// Bits of ImuData::flags.
 enum ImuFlag : std::uint32_t {
@@ -89,6 +89,18 @@ struct AttitudeData {
   std::uint32_t flags;  ///< AttitudeFlag bits
 };
 
+/// Bits of OdometryData::flags.
+enum OdometryFlag : std::uint32_t {
+  /// The wheels do not tell forward from backward: speed_mps is a magnitude.
+  kSpeedHasNoSign = 1U << 0U,
+};
+
+/// Speed of the vehicle over ground as its wheels show it.
+struct OdometryData {
+  double speed_mps;     ///< forward, mean of the wheels that were chosen
+  std::uint32_t flags;  ///< OdometryFlag bits
+};
+
 struct Sample {
   SampleKind kind;
   DeviceIndex device;
@@ -101,6 +113,7 @@ struct Sample {
     ImuData imu;
     GnssData gnss;
     AttitudeData attitude;
+    OdometryData odometry;
   };
 };
 

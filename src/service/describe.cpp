@@ -59,6 +59,19 @@ std::string describe(const Configuration& configuration, const EstimatorEvent& e
       return fmt::format("{}: solutions rejected (NIS {:.0f})", name, event.value);
     case EstimatorEventKind::kGnssReacquired:
       return fmt::format("{}: solutions accepted again after {:.1f} s", name, event.value);
+    case EstimatorEventKind::kOdometryLost:
+      return fmt::format("{}: no wheel speed for {:.2f} s; the last one is not held; check the bus", name,
+                         event.value);
+    case EstimatorEventKind::kOdometryReturned:
+      return fmt::format("{}: wheel speeds again after {:.2f} s", name, event.value);
+    case EstimatorEventKind::kOdometryRejected:
+      return fmt::format(
+          "{}: the wheels contradict the motion by {:+.2f} m/s and are not used: slip, or a wrong unit, "
+          "factor or "
+          "direction in the configuration or its DBC file",
+          name, event.value);
+    case EstimatorEventKind::kOdometryAccepted:
+      return fmt::format("{}: wheel speeds used again after {:.1f} s", name, event.value);
     case EstimatorEventKind::kCovarianceRepaired:
       return fmt::format("numerical trouble: variance of state {:.0f} was repaired; please keep the capture",
                          event.value);

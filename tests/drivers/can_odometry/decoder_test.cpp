@@ -1,0 +1,336 @@
+// Wheel speeds out of CAN frames: what becomes a sample, and what is refused and counted.
+#include "drivers/can_odometry/decoder.h"
+
+#include <gtest/gtest.h>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "drivers/dbc/parser.h"
+#include "tests/calibration/allocation_counter.h"
+#include "tests/drivers/support/streams.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::can_odometry {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::string_view kCar = R"(BO_ 170 REAR: 8 ECU
+ SG_ RL : 7|16@0- (0.01,0) [0|0] "km/h" X
+ SG_ RR : 23|16@0- (0.01,0) [0|0] "km/h" X
+ SG_ BROKEN : 39|1@0+ (1,0) [0|0] "" X
+ SG_ COUNT : 35|4@0+ (1,0) [0|0] "" X
+BO_ 171 FRONT: 4 ECU
+ SG_ FL : 0|16@1+ (0.5,0) [0|0] "rad/s" X
+ SG_ FR : 16|16@1+ (1,0) [0|0] "counts" X
+BO_ 2147483650 GEAR: 1 ECU
+ SG_ LEVER : 0|8@1+ (1,0) [0|0] "" X
+BO_ 300 MUXED: 3 ECU
+ SG_ PAGE M : 0|8@1+ (1,0) [0|0] "" X
+ SG_ V m1 : 8|16@1+ (1,0) [0|0] "m/s" X
+VAL_ 170 RL 32767 "not available" 0 "standstill" ;
+VAL_ 2147483650 LEVER 0 "park" 1 "reverse" 2 "drive" ;
+)";
+
+dbc::Database car() {
+  auto database = dbc::parse(kCar, "car.dbc");
+  EXPECT_TRUE(database) << database.error().text();
+  return std::move(*database);
+}
+
+struct Rig {
+  explicit Rig(Choice choice, DecoderConfig config = {}) {
+    auto made = Decoder::make(car(), choice, config);
+    EXPECT_TRUE(made) << made.error().text();
+    decoder = std::move(*made);
+  }
+  /// One frame, read 1 ms after its stamp.
+  void frame(std::uint32_t id, std::vector<std::uint8_t> data, HostTime stamp, bool is_extended = false) {
+    CanFrame can;
+    can.id = id;
+    can.is_extended = is_extended;
+    can.length = static_cast<std::uint8_t>(data.size());
+    std::copy(data.begin(), data.end(), can.data.begin());
+    can.stamp = stamp;
+    std::array<std::uint8_t, kCanRecordMaxBytes> record{};
+    const std::size_t size = write_can_record(can, record);
+    decoder->push(std::span(record).first(size), stamp + 1ms, sink);
+  }
+  void rear(int left_raw, int right_raw, std::uint8_t flags = 0) {
+    const auto high = [](int raw) {
+      return static_cast<std::uint8_t>(static_cast<unsigned>(raw) >> 8U & 0xFFU);
+    };
+    const auto low = [](int raw) { return static_cast<std::uint8_t>(static_cast<unsigned>(raw) & 0xFFU); };
+    frame(170, {high(left_raw), low(left_raw), high(right_raw), low(right_raw), flags, 0, 0, 0}, now);
+    now += 20ms;
+  }
+  HostTime now{1s};
+  std::unique_ptr<Decoder> decoder;
+  test::CollectingSink sink;
+};
+
+Choice rear_wheels() {
+  Choice choice;
+  choice.speed_signals = {"REAR.RL", "RR"};
+  return choice;
+}
+
+TEST(CanOdometry, TheMeanOfTheChosenWheelsIsTheSpeed) {
+  DecoderConfig config;
+  config.device = 3;
+  config.latency = 15ms;
+  Rig rig(rear_wheels(), config);
+  rig.rear(3600, 3960);
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  const Sample& sample = rig.sink.samples[0];
+  EXPECT_EQ(sample.kind, SampleKind::kOdometry);
+  EXPECT_EQ(sample.device, 3);
+  EXPECT_NEAR(sample.odometry.speed_mps, 10.5, 1e-12);
+  EXPECT_EQ(sample.time, HostTime{1s - 15ms});
+  EXPECT_EQ(sample.arrival, HostTime{1s + 1ms});
+  rig.rear(-360, -360);
+  EXPECT_NEAR(rig.sink.samples.at(1).odometry.speed_mps, -1.0, 1e-12) << "the signal has a sign";
+  EXPECT_EQ(rig.decoder->counters().samples, 2U);
+}
+
+TEST(CanOdometry, AsksTheKernelForItsMessagesAlone) {
+  Choice choice = rear_wheels();
+  choice.direction_signal = "GEAR.LEVER";
+  choice.backward_values = {"reverse"};
+  const Rig rig(choice);
+  EXPECT_EQ(rig.decoder->ids(), (std::vector<CanId>{{170, false}, {2, true}}));
+}
+
+TEST(CanOdometry, WheelsInTwoMessagesMakeOneSampleOfBoth) {
+  Choice choice;
+  choice.speed_signals = {"REAR.RL", "FRONT.FL"};
+  choice.wheel_radius_m = 0.3;
+  Rig rig(choice);
+  rig.frame(170, {0x0E, 0x10, 0, 0, 0, 0, 0, 0}, HostTime{1s});  // 36 km/h
+  EXPECT_TRUE(rig.sink.samples.empty());
+  rig.frame(171, {80, 0, 0, 0}, HostTime{1s + 3ms});  // 40 rad/s, 12 m/s
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_NEAR(rig.sink.samples[0].odometry.speed_mps, 11.0, 1e-12);
+  EXPECT_EQ(rig.sink.samples[0].time, HostTime{1s + 3ms});
+  // The front's frames stay away for a while: an old wheel is not held.
+  rig.frame(170, {0x0E, 0x10, 0, 0, 0, 0, 0, 0}, HostTime{1s + 20ms});
+  rig.frame(171, {80, 0, 0, 0}, HostTime{1s + 500ms});
+  EXPECT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_EQ(rig.decoder->odometry_counters().incomplete, 1U);
+  rig.frame(170, {0x0E, 0x10, 0, 0, 0, 0, 0, 0}, HostTime{1s + 501ms});
+  EXPECT_EQ(rig.sink.samples.size(), 2U);
+}
+
+TEST(CanOdometry, SpeedsThatTheVehicleMarksAsInvalidAreRefused) {
+  Choice choice = rear_wheels();
+  choice.fault_signals = {"BROKEN"};
+  choice.invalid_raw = {-1};
+  Rig rig(choice);
+  rig.rear(3600, 3600, 0x80);  // fault bit
+  rig.rear(32767, 3600);       // named "not available"
+  rig.rear(3600, -1);          // configured
+  EXPECT_TRUE(rig.sink.samples.empty());
+  EXPECT_EQ(rig.decoder->odometry_counters().invalid, 3U);
+  EXPECT_EQ(rig.decoder->problem(), "every speed was marked as invalid by the vehicle; is the ignition on?");
+  rig.rear(0, 0);  // "standstill" is a speed with a name
+  rig.rear(3600, 32767 - 32000);
+  EXPECT_EQ(rig.sink.samples.size(), 2U);
+  EXPECT_EQ(rig.decoder->problem(), "");
+}
+
+TEST(CanOdometry, AFrameTooShortForASignalGivesNoSampleAndIsCounted) {
+  Rig rig(rear_wheels());
+  rig.frame(170, {0x0E, 0x10, 0x0E}, HostTime{1s});
+  EXPECT_TRUE(rig.sink.samples.empty());
+  EXPECT_EQ(rig.decoder->odometry_counters().too_short, 1U);
+  EXPECT_EQ(rig.decoder->counters().bad_contents, 1U);
+  EXPECT_EQ(
+      rig.decoder->problem(),
+      "1 frames of REAR were too short for a chosen signal (3 bytes received, 8 in the DBC file); check "
+      "that the DBC file is this vehicle's");
+}
+
+TEST(CanOdometry, AnotherPageOfAMultiplexedMessageIsNoFault) {
+  Choice choice;
+  choice.speed_signals = {"MUXED.V"};
+  Rig rig(choice);
+  rig.frame(300, {0, 10, 0}, HostTime{1s});
+  EXPECT_TRUE(rig.sink.samples.empty());
+  rig.frame(300, {1, 10, 0}, HostTime{1s + 10ms});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_EQ(rig.sink.samples[0].odometry.speed_mps, 10.0);
+  EXPECT_EQ(rig.decoder->counters().bad_contents, 0U);
+}
+
+TEST(CanOdometry, ImpossibleSpeedsAreRefusedCountedAndNamed) {
+  DecoderConfig config;
+  config.max_speed_mps = 70.0;
+  Rig rig(rear_wheels(), config);
+  rig.rear(3600, 3600);
+  rig.rear(32000, 32000);  // 88.9 m/s
+  rig.rear(14400, 14400);  // from 10 to 40 m/s in 40 ms
+  rig.rear(3600, 3600);
+  EXPECT_EQ(rig.sink.samples.size(), 2U);
+  EXPECT_EQ(rig.decoder->odometry_counters().impossible, 2U);
+  EXPECT_EQ(
+      rig.decoder->problem(),
+      "2 impossible speeds, the last 40.0 m/s, were refused; check unit and factor of the speed signals");
+}
+
+TEST(CanOdometry, AJumpThatStaysIsBelieved) {
+  Rig rig(rear_wheels());
+  rig.rear(3600, 3600);
+  for (int i = 0; i < 20; ++i) rig.rear(7200, 7200);
+  EXPECT_EQ(rig.decoder->odometry_counters().impossible, 9U);
+  EXPECT_EQ(rig.sink.samples.size(), 12U);
+}
+
+TEST(CanOdometry, ALeaverOfTheDeadBandIsNoJump) {
+  Rig rig(rear_wheels());
+  rig.rear(0, 0);
+  rig.rear(200, 200);  // 2 km/h at once
+  EXPECT_EQ(rig.sink.samples.size(), 2U);
+}
+
+TEST(CanOdometry, TheDirectionSignalGivesTheSign) {
+  Choice choice = rear_wheels();
+  choice.direction_signal = "GEAR.LEVER";
+  choice.backward_values = {"reverse", "7"};
+  Rig rig(choice);
+  const auto speed_in = [&](std::uint8_t lever) {
+    rig.frame(2, {lever}, rig.now, true);
+    rig.now += 200ms;
+    rig.rear(360, 360);
+    return rig.sink.samples.back().odometry.speed_mps;
+  };
+  EXPECT_NEAR(speed_in(2), 1.0, 1e-12);
+  EXPECT_NEAR(speed_in(1), -1.0, 1e-12);
+  EXPECT_NEAR(speed_in(7), -1.0, 1e-12);
+  EXPECT_NEAR(speed_in(0), 1.0, 1e-12);
+  // A standard frame with the same number is another message.
+  rig.frame(2, {1}, rig.now);
+  rig.rear(360, 360);
+  EXPECT_NEAR(rig.sink.samples.back().odometry.speed_mps, 1.0, 1e-12);
+}
+
+TEST(CanOdometry, TheVehiclesOwnCounterTellsLosses) {
+  Choice choice = rear_wheels();
+  choice.counter_signal = "COUNT";
+  Rig rig(choice);
+  for (const std::uint8_t count : {13, 14, 15, 0, 1, 4, 5}) rig.rear(3600, 3600, count);
+  EXPECT_EQ(rig.decoder->counters().samples_lost, 2U);
+}
+
+TEST(CanOdometry, WhatCannotBeChosenIsRefusedWithTheRemedy) {
+  const auto refused = [](const Choice& choice) {
+    const auto made = Decoder::make(car(), choice, {});
+    EXPECT_FALSE(made);
+    EXPECT_EQ(made.error().kind, ErrorKind::kUsage);
+    return made.error().text();
+  };
+  Choice choice;
+  EXPECT_EQ(refused(choice),
+            "no speed_signals are chosen; name the wheel speeds in the DBC file, MESSAGE.SIGNAL");
+  choice.speed_signals = {"REAR.RX"};
+  EXPECT_EQ(refused(choice), "car.dbc: no signal 'REAR.RX'; did you mean 'REAR.RL'?");
+  choice.speed_signals = {"FRONT.FR"};
+  EXPECT_EQ(
+      refused(choice),
+      "car.dbc: signal FRONT.FR is in \"counts\", which is no unit of speed; give speed_unit: m/s, km/h, mph "
+      "or rad/s");
+  choice.speed_signals = {"FRONT.FL"};
+  EXPECT_EQ(refused(choice), "car.dbc: signal FRONT.FL is an angular rate; give wheel_radius_m");
+  choice = rear_wheels();
+  choice.direction_signal = "GEAR.LEVER";
+  choice.backward_values = {"backwards"};
+  EXPECT_EQ(refused(choice),
+            "car.dbc: signal GEAR.LEVER has no value called 'backwards'; it has park, reverse, drive");
+}
+
+TEST(CanOdometry, ErrorAndRemoteFramesAndDamagedRecordsGiveNothing) {
+  Rig rig(rear_wheels());
+  std::array<std::uint8_t, kCanRecordMaxBytes> record{};
+  CanFrame can;
+  can.id = 170;
+  can.length = 8;
+  can.is_remote = true;
+  rig.decoder->push(std::span(record).first(write_can_record(can, record)), HostTime{1s}, rig.sink);
+  can.is_remote = false;
+  can.is_error = true;
+  rig.decoder->push(std::span(record).first(write_can_record(can, record)), HostTime{1s}, rig.sink);
+  can.is_error = false;
+  const std::size_t size = write_can_record(can, record);
+  rig.decoder->push(std::span(record).first(size - 1), HostTime{1s}, rig.sink);
+  EXPECT_TRUE(rig.sink.samples.empty());
+  EXPECT_EQ(rig.decoder->counters().bytes_skipped, size - 1);
+}
+
+TEST(CanOdometry, DecodingAllocatesNothing) {
+  Rig rig(rear_wheels());
+  rig.sink.samples.reserve(1000);
+  std::vector<std::uint8_t> data{0x0E, 0x10, 0x0E, 0x10, 0, 0, 0, 0};
+  CanFrame can;
+  can.id = 170;
+  can.length = 8;
+  std::copy(data.begin(), data.end(), can.data.begin());
+  std::array<std::uint8_t, kCanRecordMaxBytes> record{};
+  const std::uint64_t before = test::allocation_count();
+  for (int i = 0; i < 500; ++i) {
+    can.stamp = HostTime{1s} + i * 20ms;
+    const std::size_t size = write_can_record(can, record);
+    rig.decoder->push(std::span(record).first(size), can.stamp, rig.sink);
+  }
+  EXPECT_EQ(test::allocation_count(), before);
+  EXPECT_EQ(rig.sink.samples.size(), 500U);
+}
+
+// A real car's log through the decoder, against the published speeds of its rear wheels.
+TEST(CanOdometry, ARealDriveDecodesToItsPublishedSpeeds) {
+  IMUSCOPE_NEEDS_SHARED("data/can_car/car.candump.log");
+  const auto text = dbc::read_text(test::source_path("config/toyota_rav4.dbc"));
+  ASSERT_TRUE(text);
+  const auto database = dbc::parse(*text, "toyota_rav4.dbc");
+  ASSERT_TRUE(database);
+  Choice choice;
+  choice.speed_signals = {"WHEEL_SPEEDS.RR", "WHEEL_SPEEDS.RL"};
+  choice.has_no_sign = true;
+  auto made = Decoder::make(*database, choice, {0, 80.0});
+  ASSERT_TRUE(made);
+  Rig rig(rear_wheels());
+  rig.decoder = std::move(*made);
+  std::ifstream log(test::shared_path("data/can_car/car.candump.log"));
+  for (std::string line; std::getline(log, line);) {
+    const auto hash = line.find('#');
+    const auto id_at = line.rfind(' ', hash) + 1;
+    std::vector<std::uint8_t> data;
+    for (std::size_t at = hash + 1; at + 1 < line.size(); at += 2)
+      data.push_back(static_cast<std::uint8_t>(std::stoul(line.substr(at, 2), nullptr, 16)));
+    const double time_s = std::stod(line.substr(1, line.find(')') - 1));
+    rig.frame(static_cast<std::uint32_t>(std::stoul(line.substr(id_at, hash - id_at), nullptr, 16)), data,
+              HostTime{from_seconds(time_s)}, hash - id_at == 8);
+  }
+  std::ifstream csv(test::shared_path("data/can_car/wheel_speed.csv"));
+  std::string row;
+  std::getline(csv, row);
+  std::size_t rows = 0;
+  double largest = 0.0;
+  for (; std::getline(csv, row); ++rows) {
+    std::array<double, 5> cells{};
+    std::istringstream in(row);
+    for (double& cell : cells) {
+      std::string text_of_cell;
+      std::getline(in, text_of_cell, ',');
+      cell = std::stod(text_of_cell);
+    }
+    const Sample& sample = rig.sink.samples.at(rows);
+    EXPECT_NEAR(to_seconds(sample.time.time_since_epoch()), cells[0], 1e-6);
+    largest = std::max(largest, std::abs(sample.odometry.speed_mps - 0.5 * (cells[3] + cells[4])));
+  }
+  EXPECT_EQ(rig.sink.samples.size(), rows);
+  EXPECT_LT(largest, 1e-6);
+  EXPECT_EQ(rig.decoder->problem(), "");
+}
+
+}  // namespace
+}  // namespace imuscope::can_odometry
