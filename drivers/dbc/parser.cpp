@@ -467,6 +467,36 @@ class Parser {
   std::map<std::string, std::vector<NamedValue>> tables_;
 };
 
+bool is_utf8(std::string_view text) {
+  std::size_t following = 0;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (following > 0) {
+      if ((byte & 0xC0U) != 0x80U) return false;
+      --following;
+    } else if (byte >= 0x80U) {
+      following = byte >= 0xF0U && byte < 0xF5U ? 3 : byte >= 0xE0U ? 2 : byte >= 0xC2U ? 1 : 0;
+      if (following == 0 || byte >= 0xF5U) return false;
+    }
+  }
+  return following == 0;
+}
+
+/// The degree sign in most DBC files is one byte.
+std::string utf8_of_latin1(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x80U) {
+      out += c;
+    } else {
+      out += static_cast<char>(0xC0U | byte >> 6U);
+      out += static_cast<char>(0x80U | (byte & 0x3FU));
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 Result<Database> parse(std::string_view text, const std::string& name) { return Parser(text, name).run(); }
@@ -483,7 +513,7 @@ Result<std::string> read_text(const std::filesystem::path& file) {
         "folder");
   std::ostringstream text;
   text << in.rdbuf();
-  return text.str();
+  return is_utf8(text.str()) ? text.str() : utf8_of_latin1(text.str());
 }
 
 }  // namespace imuscope::dbc

@@ -16,10 +16,11 @@ namespace imuscope {
 namespace {
 
 constexpr std::array kRoleNames{std::string_view("reference"), std::string_view("study"),
-                                std::string_view("gnss")};
-constexpr std::array kProtocolNames{std::string_view("xsens_mt"), std::string_view("ixblue_stdbin"),
-                                    std::string_view("greis"), std::string_view("csv_imu"),
-                                    std::string_view("csv_gnss")};
+                                std::string_view("gnss"), std::string_view("odometry")};
+constexpr std::array kProtocolNames{std::string_view("xsens_mt"),    std::string_view("ixblue_stdbin"),
+                                    std::string_view("greis"),       std::string_view("csv_imu"),
+                                    std::string_view("csv_gnss"),    std::string_view("xsens_can"),
+                                    std::string_view("can_odometry")};
 
 constexpr double kMaxRate_hz = 2000.0;
 constexpr int kMaxAveraged = 50;
@@ -206,21 +207,27 @@ void check_name(TomlReader& in, const std::string& name) {
   if (!good) in.fail("name", "must be 1 to 32 letters, digits, '_' or '-'", "it becomes part of file names");
 }
 
-DeviceConfig read_device(TomlReader in) {
+double default_rate_hz(Protocol protocol) {
+  if (is_gnss(protocol)) return 10.0;
+  return protocol == Protocol::kCanOdometry ? 50.0 : 100.0;
+}
+
+DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   DeviceConfig device;
   in.require("name", "every [[device]] needs a name of its own");
   in.text("name", device.name);
   if (in.has("name")) check_name(in, device.name);
-  in.require("role", "valid: reference, study, gnss");
+  in.require("role", fmt::format("valid: {}", fmt::join(kRoleNames, ", ")));
   device.role = static_cast<DeviceRole>(in.choice("role", words(kRoleNames), 0));
   in.require("protocol", fmt::format("valid: {}", fmt::join(kProtocolNames, ", ")));
   device.protocol = static_cast<Protocol>(in.choice("protocol", words(kProtocolNames), 0));
-  if (is_gnss(device.protocol) != (device.role == DeviceRole::kGnss)) {
-    in.fail("protocol",
-            fmt::format("{} does not fit role {}", name_of(device.protocol), name_of(device.role)),
-            "a gnss device speaks greis or csv_gnss, an IMU any other protocol");
+  if (is_gnss(device.protocol) != (device.role == DeviceRole::kGnss) ||
+      (device.protocol == Protocol::kCanOdometry) != (device.role == DeviceRole::kOdometry)) {
+    in.fail(
+        "protocol", fmt::format("{} does not fit role {}", name_of(device.protocol), name_of(device.role)),
+        "a gnss device speaks greis or csv_gnss, an odometry device can_odometry, an IMU any other protocol");
   }
-  device.rate_hz = is_gnss(device.protocol) ? 10.0 : 100.0;
+  device.rate_hz = default_rate_hz(device.protocol);
   in.number("rate_hz", device.rate_hz, 1.0, 0.1, kMaxRate_hz);
   // The StdBin telegram is in forward-port-up axes, b is forward-right-down.
   if (device.protocol == Protocol::kIxblueStdbin) device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
@@ -243,11 +250,14 @@ DeviceConfig read_device(TomlReader in) {
     in.number("velocity_sd_floor_mps", device.gnss.velocity_sd_floor_mps, 1.0, 0.0, 1e3);
     in.number("latency_ms", device.gnss.latency_s, 1e-3, 0.0, 1e4);
   }
+  if (device.role == DeviceRole::kOdometry) read_odometry(in.table("odometry"), files, device.odometry);
+  if (device.protocol == Protocol::kXsensCan) read_xsens_can(in.table("xsens_can"), device.xsens_can_ids);
   in.finish();
   return device;
 }
 
-void read_devices(TomlReader& root, TomlProblem& problem, Configuration& configuration) {
+void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
+                  Configuration& configuration) {
   root.require("device", "describe every device in a [[device]] table");
   const auto* list = root.array("device");
   if (list == nullptr) return;
@@ -259,7 +269,7 @@ void read_devices(TomlReader& root, TomlProblem& problem, Configuration& configu
       return;
     }
     TomlReader in(table, "device", problem);
-    configuration.devices.push_back(read_device(in));
+    configuration.devices.push_back(read_device(in, files));
     const auto& device = configuration.devices.back();
     if (!names.insert(device.name).second) {
       in.fail("name", fmt::format("'{}' is used twice", device.name), "names must differ");
@@ -278,6 +288,8 @@ void read_devices(TomlReader& root, TomlProblem& problem, Configuration& configu
               fmt::format("1 to {} IMUs can be under study", kMaxStudies));
   } else if (count(DeviceRole::kGnss) > 1) {
     root.fail("device", "lists more than one gnss device", "keep the better one");
+  } else if (count(DeviceRole::kOdometry) > 1) {
+    root.fail("device", "lists more than one odometry device", "put all speed_signals into one");
   }
 }
 
@@ -294,6 +306,32 @@ void read_noise_options(TomlReader in, NoiseOptions& options) {
   in.number("refit_interval_s", options.refit_interval_s, 1.0, 1.0, 1e5);
   in.boolean("remove_scale_error", options.remove_scale_error);
   in.finish();
+}
+
+/// A text as TOML writes it, whatever it holds.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (code < ' ' || code == 0x7F) {
+      out += fmt::format("\\u{:04X}", code);
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+/// The files that a configuration names, as a table at its end: with it, it is whole wherever it goes.
+std::string attached_text(const AttachedFiles& files) {
+  if (files.texts.empty()) return {};
+  std::string text = "\n[attached]\n";
+  for (const auto& [name, content] : files.texts)
+    text += fmt::format("{} = {}\n", quoted(name), quoted(content));
+  return text;
 }
 
 std::string sha256_of(const std::string& text) {
@@ -338,6 +376,13 @@ std::optional<std::size_t> Configuration::gnss_index() const {
   return std::nullopt;
 }
 
+std::optional<std::size_t> Configuration::odometry_index() const {
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    if (devices[i].role == DeviceRole::kOdometry) return i;
+  }
+  return std::nullopt;
+}
+
 Result<Configuration> load_configuration(const std::filesystem::path& file) {
   std::error_code code;
   const auto status = std::filesystem::status(file, code);
@@ -372,8 +417,8 @@ Result<Configuration> parse_configuration(const std::string& text, const std::fi
   }
   Configuration configuration;
   configuration.file = name;
-  configuration.text = text;
-  configuration.sha256 = sha256_of(text);
+  AttachedFiles files;
+  files.folder = name.parent_path();
   configuration.run_name = name.stem().string();
 
   TomlProblem problem{name.string(), std::nullopt};
@@ -391,9 +436,14 @@ Result<Configuration> parse_configuration(const std::string& text, const std::fi
   record.text("folder", configuration.record.folder);
   record.finish();
   root.ignore("simulation");  // belongs to imusim, which checks it
-  read_devices(root, problem, configuration);
+  auto attached = root.table("attached");
+  attached.every_text(files.texts);
+  const bool is_whole = attached.present();
+  read_devices(root, problem, files, configuration);
   root.finish();
   if (problem.error) return tl::unexpected<Error>(*problem.error);
+  configuration.text = is_whole ? text : text + attached_text(files);
+  configuration.sha256 = sha256_of(configuration.text);
   return configuration;
 }
 

@@ -13,11 +13,20 @@
 
 #include "base/result.h"
 #include "sample/sample.h"
+#include "service/config_vehicle.h"
 
 namespace imuscope {
 
-enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss };
-enum class Protocol : std::uint8_t { kXsensMt, kIxblueStdbin, kGreis, kCsvImu, kCsvGnss };
+enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss, kOdometry };
+enum class Protocol : std::uint8_t {
+  kXsensMt,
+  kIxblueStdbin,
+  kGreis,
+  kCsvImu,
+  kCsvGnss,
+  kXsensCan,
+  kCanOdometry
+};
 
 /// Name of a role or protocol as the configuration writes it.
 std::string_view name_of(DeviceRole role);
@@ -102,6 +111,8 @@ struct DeviceConfig {
   int average_samples = 1;    ///< study: samples taken into one measurement update, see StudyConfig
   CsvConfig csv;              ///< csv_imu, csv_gnss
   GnssOptions gnss;           ///< gnss
+  OdometryOptions odometry;   ///< odometry
+  xsens_can::ItemIds xsens_can_ids = xsens_can::default_ids();  ///< xsens_can
 };
 
 struct EstimatorOptions {
@@ -128,7 +139,7 @@ struct RecordOptions {
 struct Configuration {
   std::string run_name;
   std::filesystem::path file;
-  std::string text;    ///< as read
+  std::string text;    ///< as read, and the files that it names as [attached]
   std::string sha256;  ///< of the text
   std::vector<DeviceConfig> devices;
   EstimatorOptions estimator;
@@ -140,6 +151,7 @@ struct Configuration {
   [[nodiscard]] std::size_t reference_index() const;
   [[nodiscard]] std::vector<std::size_t> study_indices() const;
   [[nodiscard]] std::optional<std::size_t> gnss_index() const;
+  [[nodiscard]] std::optional<std::size_t> odometry_index() const;
 };
 
 /// Reads and checks a configuration file.

@@ -77,6 +77,7 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   snapshot_.cut = cut;
   snapshot_.n_studies = estimator_.study_count();
   snapshot_.navigation = estimator_.navigation();
+  snapshot_.odometry = estimator_.odometry();
   for (std::size_t i = 0; i < snapshot_.n_studies; ++i) snapshot_.studies[i] = estimator_.study(i);
   snapshot_.counters = estimator_.counters();
   sink.on_snapshot(snapshot_);

@@ -36,6 +36,7 @@ struct Snapshot {
   UtcTime first_reference_utc;
   std::size_t n_studies;
   NavigationOutput navigation;
+  OdometryOutput odometry;
   std::array<StudyOutput, kMaxStudies> studies;
   EstimatorCounters counters;
 };

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include "base/contracts.h"
+#include "drivers/can_odometry/decoder.h"
 #include "drivers/csv/decoder.h"
 #include "drivers/csv/validate.h"
 #include "drivers/greis/decoder.h"
 #include "drivers/greis/session.h"
 #include "drivers/ixblue_stdbin/decoder.h"
 #include "drivers/ixblue_stdbin/session.h"
+#include "drivers/xsens_can/decoder.h"
 #include "drivers/xsens_mt/decoder.h"
 #include "drivers/xsens_mt/session.h"
 
@@ -40,6 +43,30 @@ std::unique_ptr<DeviceDecoder> make_greis(const DeviceConfig& device, DeviceInde
                                           const ClockMapConfig& clock) {
   return std::make_unique<greis::Decoder>(
       greis::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), baud_of(device), clock});
+}
+
+std::unique_ptr<DeviceDecoder> make_can_odometry(const DeviceConfig& device, DeviceIndex index) {
+  can_odometry::DecoderConfig config;
+  config.device = index;
+  config.rate_hz = device.rate_hz;
+  config.latency = from_seconds(device.odometry.latency_s);
+  config.max_speed_mps = device.odometry.max_speed_mps;
+  config.max_acceleration_mps2 = device.odometry.max_acceleration_mps2;
+  auto made = can_odometry::Decoder::make(*device.odometry.database, device.odometry.choice, config);
+  // The configuration was made sure of when it was read.
+  IMUSCOPE_EXPECTS(made.has_value());
+  return std::move(*made);
+}
+
+std::unique_ptr<DeviceDecoder> make_xsens_can(const DeviceConfig& device, DeviceIndex index,
+                                              const ClockMapConfig& clock) {
+  xsens_can::DecoderConfig config;
+  config.device = index;
+  config.rate_hz = device.rate_hz;
+  config.ids = device.xsens_can_ids;
+  config.axes = device.axes;
+  config.clock = clock;
+  return std::make_unique<xsens_can::Decoder>(config);
 }
 
 csv::ImuConfig csv_imu(const DeviceConfig& device, DeviceIndex index, const ClockMapConfig& clock) {
@@ -86,6 +113,10 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
       return std::make_unique<csv::ImuDecoder>(csv_imu(device, index, clock));
     case Protocol::kCsvGnss:
       return std::make_unique<csv::GnssDecoder>(csv_gnss(device, index, clock));
+    case Protocol::kXsensCan:
+      return make_xsens_can(device, index, clock);
+    case Protocol::kCanOdometry:
+      return make_can_odometry(device, index);
   }
   return nullptr;
 }
@@ -105,6 +136,8 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device) {
       return std::make_unique<greis::Session>(greis::SessionConfig{from_seconds(1.0 / device.rate_hz), true});
     case Protocol::kCsvImu:
     case Protocol::kCsvGnss:
+    case Protocol::kXsensCan:
+    case Protocol::kCanOdometry:
       break;
   }
   return nullptr;
@@ -120,6 +153,10 @@ std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& dec
       const auto& error = static_cast<const csv::RowDecoder&>(decoder).error();
       return error.kind == csv::RowError::Kind::kNone ? std::string() : csv::describe(error);
     }
+    case Protocol::kXsensCan:
+      return static_cast<const xsens_can::Decoder&>(decoder).problem();
+    case Protocol::kCanOdometry:
+      return static_cast<const can_odometry::Decoder&>(decoder).problem();
     case Protocol::kXsensMt:
     case Protocol::kGreis:
       break;
@@ -157,6 +194,8 @@ Result<void> check_recorded_file(const DeviceConfig& device, const std::filesyst
     case Protocol::kXsensMt:
     case Protocol::kIxblueStdbin:
     case Protocol::kGreis:
+    case Protocol::kXsensCan:
+    case Protocol::kCanOdometry:
       break;
   }
   return {};

@@ -92,6 +92,27 @@ GnssConfig gnss_config(const DeviceConfig& device, std::size_t index) {
   return gnss;
 }
 
+OdometryConfig odometry_config(const DeviceConfig& device, std::size_t index) {
+  const OdometryOptions& options = device.odometry;
+  OdometryConfig odometry;
+  odometry.enabled = true;
+  odometry.device = static_cast<DeviceIndex>(index);
+  odometry.rate_hz = device.rate_hz;
+  odometry.use_speed = options.use_speed;
+  odometry.use_non_holonomic = options.use_non_holonomic;
+  odometry.use_zero_velocity = options.use_zero_velocity;
+  odometry.prior_r_bv_b_m = options.axle_lever_arm_b_m;
+  odometry.prior_r_bv_b_sd_m = all_axes(options.axle_lever_arm_sd_m);
+  odometry.prior_mount_sd_rad = options.mounting_sd_rad;
+  odometry.prior_scale_sd = options.scale_sd;
+  odometry.speed_sd_mps = options.speed_sd_mps;
+  odometry.sideways_sd_mps = options.sideways_sd_mps;
+  odometry.upwards_sd_mps = options.upwards_sd_mps;
+  odometry.zero_velocity_sd_mps = options.zero_velocity_sd_mps;
+  odometry.dead_band_mps = options.dead_band_mps;
+  return odometry;
+}
+
 }  // namespace
 
 EstimatorConfig estimator_config(const Configuration& configuration) {
@@ -103,6 +124,9 @@ EstimatorConfig estimator_config(const Configuration& configuration) {
   }
   if (const auto index = configuration.gnss_index()) {
     config.gnss = gnss_config(configuration.devices[*index], *index);
+  }
+  if (const auto index = configuration.odometry_index()) {
+    config.odometry = odometry_config(configuration.devices[*index], *index);
   }
   config.navigation.enabled = configuration.estimator.navigation && config.gnss.enabled;
   return config;

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/units.h"
 #include "noise/fit.h"
 #include "noise/json.h"
 #include "noise/wavelet_variance.h"
@@ -174,6 +175,31 @@ nlohmann::json device_json(const RunDescription& run, std::size_t i) {
   return entry;
 }
 
+/// What was learned of the wheels, and what became of their speeds.
+nlohmann::json odometry_json(const Snapshot& last) {
+  const OdometryOutput& out = last.odometry;
+  const EstimatorCounters& counters = last.counters;
+  const auto degrees = [](const Vector3& v) {
+    return nlohmann::json{v[0] * kDegPerRad, v[1] * kDegPerRad, v[2] * kDegPerRad};
+  };
+  return {{"scale", out.scale},
+          {"scale_sd", out.sd_scale},
+          {"mounting_rotation_vector_deg", degrees(out.mount_rad)},
+          {"mounting_sd_deg", degrees(out.sd_mount_rad)},
+          {"axle_lever_arm_b_m", out.r_bv_b_m},
+          {"axle_lever_arm_sd_m", out.sd_r_bv_b_m},
+          {"nis", {{"speed", out.nis[0]}, {"sideways", out.nis[1]}, {"upwards", out.nis[2]}}},
+          {"samples", counters.odometry_samples},
+          {"speed_used", counters.odometry_speed_used},
+          {"speed_rejected", counters.odometry_speed_rejected},
+          {"non_holonomic_used", counters.odometry_slip_used},
+          {"non_holonomic_rejected", counters.odometry_slip_rejected},
+          {"zero_velocity_used", counters.zero_velocity_used},
+          {"zero_velocity_rejected", counters.zero_velocity_rejected},
+          {"too_old", counters.odometry_too_old},
+          {"not_finite", counters.odometry_not_finite}};
+}
+
 std::vector<StudyOutput> final_studies(const Snapshot& last) {
   return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
 }
@@ -218,6 +244,7 @@ nlohmann::json run_json(const RunDescription& run) {
   json["devices"] = nlohmann::json::array();
   for (std::size_t i = 0; i < run.configuration->devices.size(); ++i)
     json["devices"].push_back(device_json(run, i));
+  if (run.last != nullptr && run.last->odometry.enabled) json["odometry"] = odometry_json(*run.last);
   json["events"] = nlohmann::json::array();
   for (const auto& event : run.events) {
     json["events"].push_back(

@@ -107,6 +107,39 @@ void TomlReader::texts(std::string_view key, std::array<std::string, 3>& value) 
   for (std::size_t i = 0; i < 3; ++i) value[i] = *(*list)[i].value<std::string>();
 }
 
+void TomlReader::texts(std::string_view key, std::vector<std::string>& value) {
+  const auto* found = node(key);
+  if (found == nullptr) return;
+  const auto* list = found->as_array();
+  if (list == nullptr || (!list->empty() && !list->is_homogeneous(toml::node_type::string))) {
+    fail(key, "must be a list of texts in quotes");
+    return;
+  }
+  value.clear();
+  for (const auto& entry : *list) value.push_back(*entry.value<std::string>());
+}
+
+void TomlReader::numbers(std::string_view key, std::vector<double>& value) {
+  const auto* found = node(key);
+  if (found == nullptr) return;
+  const auto* list = found->as_array();
+  value.clear();
+  bool good = list != nullptr;
+  for (std::size_t i = 0; good && i < list->size(); ++i) {
+    good = (*list)[i].is_number();
+    if (good) value.push_back(*(*list)[i].value<double>());
+  }
+  if (!good) fail(key, "must be a list of numbers");
+}
+
+void TomlReader::every_text(std::map<std::string, std::string>& values) {
+  if (table_ == nullptr) return;
+  for (const auto& [key, value] : *table_) {
+    const std::string name(key.str());
+    text(name, values[name]);
+  }
+}
+
 std::size_t TomlReader::choice(std::string_view key, const std::vector<std::string_view>& words,
                                std::size_t fallback) {
   std::string word;

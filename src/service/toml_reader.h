@@ -5,6 +5,7 @@
 
 #include <toml++/toml.h>
 #include <array>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -38,6 +39,11 @@ class TomlReader {
   void integer(std::string_view key, int& value, int low, int high);
   void vector(std::string_view key, std::array<double, 3>& value, double unit);
   void texts(std::string_view key, std::array<std::string, 3>& value);
+  /// A list of any length.
+  void texts(std::string_view key, std::vector<std::string>& value);
+  void numbers(std::string_view key, std::vector<double>& value);
+  /// Every key of the table with its text.
+  void every_text(std::map<std::string, std::string>& values);
   /// One of the given words; the index of the word found, or `fallback` when the key is absent.
   std::size_t choice(std::string_view key, const std::vector<std::string_view>& words, std::size_t fallback);
   [[nodiscard]] TomlReader table(std::string_view key);
@@ -48,6 +54,8 @@ class TomlReader {
   void require(std::string_view key, const std::string& purpose);
   /// Reports a problem at `key` (or at the table when the key is absent).
   void fail(std::string_view key, const std::string& what, const std::string& remedy = {});
+  /// A problem has been reported, here or elsewhere in the document.
+  [[nodiscard]] bool failed() const { return problem_->error.has_value(); }
   /// Refuses keys that were never asked for. Call last.
   void finish();
   /// Marks a key as known without reading it.

@@ -218,7 +218,8 @@ TEST(CanOdometry, TheVehiclesOwnCounterTellsLosses) {
   Choice choice = rear_wheels();
   choice.counter_signal = "COUNT";
   Rig rig(choice);
-  for (const std::uint8_t count : {13, 14, 15, 0, 1, 4, 5}) rig.rear(3600, 3600, count);
+  for (const unsigned count : {13U, 14U, 15U, 0U, 1U, 4U, 5U})
+    rig.rear(3600, 3600, static_cast<std::uint8_t>(count));
   EXPECT_EQ(rig.decoder->counters().samples_lost, 2U);
 }
 

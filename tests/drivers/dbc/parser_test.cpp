@@ -1,7 +1,9 @@
 // What a DBC file may hold, and what is said of one that is broken.
 #include <gtest/gtest.h>
+#include <fstream>
 
 #include "drivers/dbc/parser.h"
+#include "tests/support/shared_data.h"
 
 namespace imuscope::dbc {
 namespace {
@@ -176,6 +178,22 @@ INSTANTIATE_TEST_SUITE_P(
                "car.dbc:2: VAL_: no message has the identifier 7"},
         Broken{"NoSemicolon", "BO_ 1 A: 8 X\nCM_ \"text\"\n", "car.dbc:2: CM_ has no ';' at its end"}),
     [](const auto& broken) { return std::string(broken.param.name); });
+
+TEST(DbcParser, AFileInLatin1IsReadAsUtf8) {
+  const auto file = test::scratch_folder() / "latin1.dbc";
+  std::ofstream(file, std::ios::binary) << "BO_ 1 A: 8 X\n SG_ S : 0|8@1+ (1,0) [0|0] \"\xB0"
+                                           "C\" X\n";
+  const auto text = read_text(file);
+  ASSERT_TRUE(text);
+  const auto database = parse(*text, "latin1.dbc");
+  ASSERT_TRUE(database);
+  EXPECT_EQ(database->messages[0].signals[0].unit,
+            "\xC2\xB0"
+            "C");
+  std::ofstream(file, std::ios::binary) << *text;
+  EXPECT_EQ(*read_text(file), *text);
+  EXPECT_EQ(read_text(file.parent_path() / "absent.dbc").error().kind, ErrorKind::kUsage);
+}
 
 // Whatever is cut away, the parser ends with an answer.
 TEST(DbcParser, EveryPrefixOfAFileIsReadOrRefused) {

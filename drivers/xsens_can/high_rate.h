@@ -1,0 +1,30 @@
+#pragma once
+
+/// Which of the two high-rate messages is the acceleration: documents contradict one another, so the sensor
+/// is asked at rest, where one shows gravity and the other nothing. Core: no allocation.
+
+#include <cstdint>
+
+#include "drivers/xsens_can/messages.h"
+
+namespace imuscope::xsens_can {
+
+enum class HighRateOrder : std::uint8_t {
+  kUnknown,            ///< it has not rested yet
+  kAccelerationFirst,  ///< 061 is the acceleration
+  kRateFirst,
+};
+
+class HighRateResolver {
+ public:
+  /// One sample of both messages.
+  void add(const RawTriad& first, const RawTriad& second) noexcept;
+  [[nodiscard]] HighRateOrder order() const noexcept { return order_; }
+
+ private:
+  HighRateOrder order_ = HighRateOrder::kUnknown;
+  HighRateOrder candidate_ = HighRateOrder::kUnknown;
+  int in_a_row_ = 0;
+};
+
+}  // namespace imuscope::xsens_can

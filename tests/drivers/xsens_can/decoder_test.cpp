@@ -1,0 +1,361 @@
+// Groups of CAN frames of an MTi to samples.
+#include "drivers/xsens_can/decoder.h"
+
+#include <gtest/gtest.h>
+#include <cmath>
+#include <numbers>
+
+#include "drivers/dbc/parser.h"
+#include "tests/calibration/allocation_counter.h"
+#include "tests/drivers/support/streams.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::xsens_can {
+namespace {
+
+using namespace std::chrono_literals;
+using Data = std::vector<std::uint8_t>;
+
+Data be(std::initializer_list<std::pair<std::int64_t, int>> numbers) {
+  Data data;
+  for (const auto& [number, bytes] : numbers) {
+    for (int i = bytes - 1; i >= 0; --i)
+      data.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(number) >> (8 * i) & 0xFFU));
+  }
+  return data;
+}
+Data triad(int x, int y, int z) { return be({{x, 2}, {y, 2}, {z, 2}}); }
+
+constexpr int kDeltaVExponent = 15;
+constexpr double kRest_mps2 = 9.81;
+
+/// An MTi at 100 Hz, turning about z at 0.5 rad/s, standing upright.
+struct Unit {
+  explicit Unit(DecoderConfig config = {}) : decoder(config), ids(config.ids) { sink.samples.reserve(5000); }
+
+  void frame(Item item, const Data& data) { frame(ids[static_cast<std::size_t>(item)], data); }
+  void frame(CanId id, const Data& data) {
+    CanFrame can;
+    can.id = id.id;
+    can.is_extended = id.is_extended;
+    can.length = static_cast<std::uint8_t>(data.size());
+    std::copy(data.begin(), data.end(), can.data.begin());
+    can.stamp = HostTime{now};
+    now += 200us;
+    std::array<std::uint8_t, kCanRecordMaxBytes> record{};
+    const std::size_t size = write_can_record(can, record);
+    decoder.push(std::span(record).first(size), can.stamp + 1ms, sink);
+  }
+
+  void opening() {
+    frame(Item::kSampleTime, be({{sample_time, 4}}));
+    frame(Item::kGroupCounter, be({{counter, 2}}));
+  }
+  void increments() {
+    const double half = 0.5 * 0.5 * 0.01;
+    frame(Item::kDeltaV,
+          be({{0, 2}, {0, 2}, {std::lround(kRest_mps2 * 0.01 * 32768.0), 2}, {kDeltaVExponent, 1}}));
+    frame(Item::kDeltaQ, be({{std::lround(32767.0 * std::cos(half)), 2},
+                             {0, 2},
+                             {0, 2},
+                             {std::lround(32767.0 * std::sin(half)), 2}}));
+  }
+  void rates() {
+    frame(Item::kRateOfTurn, triad(0, 0, 256));
+    frame(Item::kAcceleration, triad(0, 0, static_cast<int>(std::lround(kRest_mps2 * 256.0))));
+  }
+  /// Time goes on by one period, whatever was sent.
+  void next_period() {
+    sample_time = (sample_time + 100 * ticks_per_100us) & 0xFFFF'FFFF;
+    counter = (counter + 1) & 0xFFFF;
+    period += 1;
+    now = HostTime{1s + period * 10ms}.time_since_epoch();
+  }
+  template <typename Send>
+  void groups(int n, Send send) {
+    for (int i = 0; i < n; ++i, next_period()) {
+      opening();
+      send();
+    }
+  }
+  [[nodiscard]] const std::vector<Sample>& samples() const { return sink.samples; }
+
+  Decoder decoder;
+  ItemIds ids;
+  test::CollectingSink sink;
+  std::int64_t sample_time = 1000;
+  std::int64_t counter = 10;
+  std::int64_t ticks_per_100us = 1;
+  std::int64_t period = 0;
+  Duration now = 1s;
+};
+
+TEST(XsensCanMessages, TheFixedPointNumbersOfTheVectorsDecode) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/can_xsens.json");
+  const auto expected = test::load_json(test::shared_path("oracle/protocols/can_xsens.json"));
+  int checked = 0;
+  for (const auto& vector : expected["vectors"]) {
+    const auto line = vector["line"].get<std::string>();
+    SCOPED_TRACE(line);
+    Data data;
+    for (std::size_t at = line.find('#') + 1; at + 1 < line.size(); at += 2)
+      data.push_back(static_cast<std::uint8_t>(std::stoul(line.substr(at, 2), nullptr, 16)));
+    const auto& signals = vector["signals"];
+    const auto id = vector["id"].get<std::uint32_t>();
+    ++checked;
+    if (id == 0x005) {
+      EXPECT_EQ(read_u32(data), signals["ticks"].get<std::uint32_t>());
+    } else if (id == 0x006) {
+      EXPECT_EQ(read_u16(data), signals["counter"].get<std::uint16_t>());
+    } else if (id == 0x011) {
+      EXPECT_EQ(read_u32(data), signals["status"].get<std::uint32_t>());
+    } else if (id == 0x031) {
+      const double scale = std::ldexp(1.0, -signals["exponent"].get<int>());
+      EXPECT_EQ(read_delta_v(data),
+                (Triad{scale * signals["dvx_raw"].get<double>(), scale * signals["dvy_raw"].get<double>(),
+                       scale * signals["dvz_raw"].get<double>()}));
+    } else if (id == 0x032) {
+      EXPECT_EQ(read_scaled(data, kRate_radps), (Triad{signals["gx"], signals["gy"], signals["gz"]}));
+    } else if (id == 0x034) {
+      EXPECT_EQ(read_scaled(data, kAcceleration_mps2), (Triad{signals["ax"], signals["ay"], signals["az"]}));
+    } else {
+      --checked;
+    }
+  }
+  EXPECT_EQ(checked, 8);
+}
+
+TEST(XsensCan, AGroupIsClosedByTheNextOneThatOpens) {
+  Unit unit;
+  unit.groups(2, [&] { unit.increments(); });
+  EXPECT_TRUE(unit.samples().empty())
+      << "the first group only teaches the length of a tick, the second is open";
+  unit.frame(Item::kSampleTime, be({{unit.sample_time, 4}}));
+  ASSERT_EQ(unit.samples().size(), 1U);
+  const Sample& sample = unit.samples()[0];
+  EXPECT_EQ(sample.imu.flags, kGyroValid | kAccelValid | kIsIncrement);
+  EXPECT_NEAR(sample.imu.omega_radps[2], 0.5, 0.5 / 32767.0 / 0.01);
+  EXPECT_NEAR(sample.imu.f_mps2[2], kRest_mps2, 1.0 / 32768.0 / 0.01);
+  EXPECT_EQ(sample.imu.counter, 11);
+  EXPECT_EQ(sample.time, HostTime{1s + 10ms}) << "the group's own first frame";
+  EXPECT_EQ(sample.arrival, HostTime{1s + 21ms}) << "the read that closed it";
+}
+
+TEST(XsensCan, IncrementsArePreferredToTheCoarseRates) {
+  Unit unit;
+  unit.groups(3, [&] { unit.rates(); });
+  EXPECT_EQ(unit.decoder.source(), Source::kRates);
+  EXPECT_EQ(unit.samples().at(0).imu.flags, kGyroValid | kAccelValid);
+  EXPECT_EQ(unit.samples().at(0).imu.omega_radps[2], 0.5);
+  unit.groups(2, [&] {
+    unit.rates();
+    unit.increments();
+  });
+  unit.opening();
+  EXPECT_EQ(unit.decoder.source(), Source::kIncrements);
+  EXPECT_NE(unit.samples().back().imu.flags & kIsIncrement, 0U);
+  // One frame of increments lost: no mixture of means and instants, a gap instead.
+  const std::size_t before = unit.samples().size();
+  unit.rates();
+  unit.next_period();
+  unit.groups(2, [&] {
+    unit.rates();
+    unit.increments();
+  });
+  ASSERT_EQ(unit.samples().size(), before + 1);
+  EXPECT_NE(unit.samples().back().imu.flags & kGapBefore, 0U);
+  EXPECT_NE(unit.samples().back().imu.flags & kIsIncrement, 0U);
+  // The increments stay away: after a second the rates are taken.
+  unit.groups(150, [&] { unit.rates(); });
+  EXPECT_EQ(unit.decoder.source(), Source::kRates);
+}
+
+TEST(XsensCan, TimeAndCounterRollOver) {
+  Unit unit;
+  unit.sample_time = 0xFFFF'FFFF - 450;
+  unit.counter = 0xFFFF - 7;
+  unit.groups(30, [&] { unit.increments(); });
+  ASSERT_EQ(unit.samples().size(), 28U);
+  for (std::size_t i = 1; i < unit.samples().size(); ++i) {
+    EXPECT_EQ(unit.samples()[i].imu.counter, unit.samples()[i - 1].imu.counter + 1);
+    EXPECT_EQ(unit.samples()[i].time - unit.samples()[i - 1].time, 10ms);
+    EXPECT_EQ(unit.samples()[i].imu.flags & kGapBefore, 0U);
+  }
+  EXPECT_EQ(unit.decoder.counters().samples_lost, 0U);
+  EXPECT_EQ(unit.decoder.counters().clock_resets, 0U);
+}
+
+TEST(XsensCan, BothLengthsOfATickAreToldApartAtAKnownRate) {
+  Unit coarse;
+  coarse.groups(5, [&] { coarse.increments(); });
+  EXPECT_EQ(coarse.decoder.tick_ns(), 100'000);
+  Unit fine;
+  fine.ticks_per_100us = 100;
+  fine.groups(5, [&] { fine.increments(); });
+  EXPECT_EQ(fine.decoder.tick_ns(), 1'000);
+  EXPECT_EQ(fine.samples().at(1).time - fine.samples().at(0).time, 10ms);
+  EXPECT_NEAR(fine.samples().at(1).imu.f_mps2[2], kRest_mps2, 1.0 / 32768.0 / 0.01);
+}
+
+TEST(XsensCan, LostGroupsAreCountedAndTheNextSampleSaysSo) {
+  Unit unit;
+  unit.groups(5, [&] { unit.increments(); });
+  for (int i = 0; i < 3; ++i) unit.next_period();
+  unit.groups(5, [&] { unit.increments(); });
+  EXPECT_EQ(unit.decoder.counters().samples_lost, 3U);
+  std::size_t gaps = 0;
+  for (const Sample& sample : unit.samples()) {
+    if ((sample.imu.flags & kGapBefore) == 0) continue;
+    ++gaps;
+    EXPECT_EQ(sample.imu.counter, 18);
+    EXPECT_NEAR(sample.imu.f_mps2[2], kRest_mps2, 1.0 / 32768.0 / 0.01)
+        << "an increment spans one period, not the gap";
+  }
+  EXPECT_EQ(gaps, 1U);
+}
+
+/// Gravity in one message and a rate near zero in the other.
+void rest(Unit& unit, Item acceleration, Item rate, int copies = 1) {
+  for (int i = 0; i < copies; ++i) {
+    unit.frame(acceleration, triad(0, 0, 2511));
+    unit.frame(rate, triad(2, -1, 1));
+  }
+}
+
+TEST(XsensCan, ARestTellsWhichHighRateMessageIsTheAcceleration) {
+  for (const bool first : {true, false}) {
+    Unit unit;
+    const Item acceleration = first ? Item::kHighRateFirst : Item::kHighRateSecond;
+    const Item rate = first ? Item::kHighRateSecond : Item::kHighRateFirst;
+    // On the move: rotation and force leave it open.
+    unit.groups(100, [&] {
+      unit.frame(acceleration, triad(300, 0, 2511));
+      unit.frame(rate, triad(0, 0, 256));
+    });
+    EXPECT_TRUE(unit.samples().empty());
+    EXPECT_NE(unit.decoder.problem().find("061 and 062"), std::string::npos) << unit.decoder.problem();
+    unit.groups(60, [&] { rest(unit, acceleration, rate); });
+    EXPECT_EQ(unit.decoder.high_rate_order(),
+              first ? HighRateOrder::kAccelerationFirst : HighRateOrder::kRateFirst);
+    ASSERT_FALSE(unit.samples().empty());
+    EXPECT_NEAR(unit.samples().back().imu.f_mps2[2], 2511.0 / 256.0, 1e-12);
+    EXPECT_NEAR(unit.samples().back().imu.omega_radps[0], 2.0 / 512.0, 1e-12);
+    EXPECT_EQ(unit.decoder.problem(), "");
+  }
+}
+
+TEST(XsensCan, SeveralHighRateFramesOfAGroupAreAveraged) {
+  Unit unit;
+  unit.groups(60, [&] { rest(unit, Item::kHighRateFirst, Item::kHighRateSecond, 4); });
+  unit.groups(2, [&] {
+    for (const int x : {10, 20, 30, 40}) {
+      unit.frame(Item::kHighRateFirst, triad(x, 0, 2511));
+      unit.frame(Item::kHighRateSecond, triad(0, x, 0));
+    }
+  });
+  unit.opening();
+  EXPECT_NEAR(unit.samples().back().imu.f_mps2[0], 25.0 / 256.0, 1e-12);
+  EXPECT_NEAR(unit.samples().back().imu.omega_radps[1], 25.0 / 512.0, 1e-12);
+  EXPECT_NE(unit.samples().back().imu.flags & kIsIncrement, 0U);
+}
+
+TEST(XsensCan, OtherIdentifiersTheAxesAndTheClippedAxesAreHeeded) {
+  DecoderConfig config;
+  config.device = 4;
+  config.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+  for (std::size_t i = 0; i < kItemCount; ++i)
+    config.ids[i] = {0x18FF0000U + static_cast<std::uint32_t>(i), true};
+  Unit unit(config);
+  EXPECT_EQ(unit.decoder.ids().size(), kItemCount);
+  unit.frame(CanId{0x005, false}, be({{1, 4}}));  // another unit on the same bus
+  unit.groups(3, [&] {
+    unit.frame(Item::kStatusWord, be({{1U << 8U | 1U << 13U, 4}}));
+    unit.increments();
+  });
+  ASSERT_EQ(unit.samples().size(), 1U);
+  const Sample& sample = unit.samples()[0];
+  EXPECT_EQ(sample.device, 4);
+  EXPECT_LT(sample.imu.f_mps2[2], -9.7);
+  EXPECT_LT(sample.imu.omega_radps[2], -0.4);
+  EXPECT_EQ(sample.imu.flags, kGyroValid | kAccelValid | kIsIncrement | kAccelClipX | kGyroClipZ);
+}
+
+TEST(XsensCan, WithoutACounterTheTimeCountsAndWithoutATimeTheCounterTimes) {
+  Unit timed;
+  for (int i = 0; i < 10; ++i, timed.next_period()) {
+    if (i == 6) timed.next_period();
+    timed.frame(Item::kSampleTime, be({{timed.sample_time, 4}}));
+    timed.increments();
+  }
+  EXPECT_EQ(timed.decoder.counters().samples_lost, 1U);
+  EXPECT_EQ(timed.samples().back().imu.counter - timed.samples().front().imu.counter, 8);
+  Unit counted;
+  for (int i = 0; i < 10; ++i, counted.next_period()) {
+    counted.frame(Item::kGroupCounter, be({{counted.counter, 2}}));
+    counted.increments();
+  }
+  EXPECT_EQ(counted.samples().size(), 9U);
+  EXPECT_EQ(counted.samples()[1].time - counted.samples()[0].time, 10ms);
+}
+
+TEST(XsensCan, ProblemsAreNamedWithTheirRemedy) {
+  Unit overflow;
+  overflow.groups(3, [&] {
+    overflow.increments();
+    overflow.frame(Item::kError, {1});
+  });
+  EXPECT_NE(overflow.decoder.problem().find("output buffer overflowed"), std::string::npos);
+  EXPECT_EQ(overflow.samples().size(), 1U);
+
+  Unit short_frames;
+  short_frames.groups(3, [&] { short_frames.frame(Item::kDeltaV, {0, 1, 2}); });
+  EXPECT_EQ(short_frames.decoder.counters().bad_lengths, 3U);
+  EXPECT_NE(short_frames.decoder.problem().find("too short"), std::string::npos);
+
+  Unit half;
+  half.groups(5, [&] { half.frame(Item::kRateOfTurn, triad(0, 0, 0)); });
+  EXPECT_TRUE(half.samples().empty());
+  EXPECT_NE(half.decoder.problem().find("switch on delta_v and delta_q"), std::string::npos);
+}
+
+TEST(XsensCan, AnErrorBetweenTheOpeningFramesSplitsNoGroup) {
+  Unit unit;
+  for (int i = 0; i < 5; ++i, unit.next_period()) {
+    unit.frame(Item::kSampleTime, be({{unit.sample_time, 4}}));
+    unit.frame(Item::kError, {1});
+    unit.frame(Item::kGroupCounter, be({{unit.counter, 2}}));
+    unit.increments();
+  }
+  EXPECT_EQ(unit.samples().size(), 3U);
+  EXPECT_EQ(unit.decoder.counters().bad_contents, 0U);
+}
+
+TEST(XsensCan, DecodingAllocatesNothing) {
+  std::vector<Data> records;
+  for (int i = 0; i < 500; ++i) {
+    for (const auto& [id, data] : std::initializer_list<std::pair<std::uint32_t, Data>>{
+             {0x005, be({{100 * i, 4}})},
+             {0x006, be({{i, 2}})},
+             {0x031, be({{0, 2}, {0, 2}, {3214, 2}, {15, 1}})},
+             {0x033, be({{32767, 2}, {0, 2}, {0, 2}, {0, 2}})}}) {
+      CanFrame can;
+      can.id = id;
+      can.length = static_cast<std::uint8_t>(data.size());
+      std::copy(data.begin(), data.end(), can.data.begin());
+      can.stamp = HostTime{1s + i * 10ms};
+      Data record(kCanRecordMaxBytes);
+      record.resize(write_can_record(can, record));
+      records.push_back(std::move(record));
+    }
+  }
+  Decoder decoder{DecoderConfig{}};
+  test::CollectingSink sink;
+  sink.samples.reserve(1000);
+  const std::uint64_t before = test::allocation_count();
+  for (const Data& record : records) decoder.push(record, HostTime{10s}, sink);
+  EXPECT_EQ(test::allocation_count(), before);
+  EXPECT_EQ(sink.samples.size(), 498U);
+}
+
+}  // namespace
+}  // namespace imuscope::xsens_can
