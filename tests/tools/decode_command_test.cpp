@@ -113,4 +113,53 @@ TEST(DecodeCommand, SaysWhatIsWrongAndWithWhichExitCode) {
   EXPECT_NE(wrong.err.find("choose one of: "), std::string::npos) << wrong.err;
 }
 
+TEST(DecodeCommand, ShowsEverySignalOfTheCanVectorsBitForBit) {
+  for (const std::string name : {"odometry", "xsens"}) {
+    const std::string vectors = "oracle/protocols/can_" + name;
+    IMUSCOPE_NEEDS_SHARED(vectors + ".json");
+    const auto dbc = shared_path("oracle/protocols/" + name + (name == "xsens" ? "_can.dbc" : ".dbc"));
+    const json oracle = json::parse(std::ifstream(shared_path(vectors + ".json")));
+    const Outcome outcome = decode(shared_path(vectors + ".candump"), "--dbc '" + dbc.string() + "' --json");
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    ASSERT_EQ(outcome.lines.size(), oracle["vectors"].size() + 1);
+    for (std::size_t i = 0; i < oracle["vectors"].size(); ++i) {
+      const json& expected = oracle["vectors"][i];
+      const json& line = outcome.lines[i];
+      SCOPED_TRACE(expected["line"].get<std::string>());
+      EXPECT_EQ(line["protocol"], "candump");
+      for (const char* field : {"message", "time", "id", "extended", "fd", "signals"})
+        EXPECT_EQ(line[field], expected[field]) << field;
+    }
+    EXPECT_EQ(outcome.lines.back(), (json{{"messages", oracle["vectors"].size()}, {"bytes_skipped", 0}}));
+  }
+}
+
+TEST(DecodeCommand, FindsACanLogByItselfAndShowsItsFrames) {
+  const auto file = std::filesystem::path(testing::TempDir()) / "imuscope_short.log";
+  std::ofstream(file)
+      << "(1.000001) can0 123#0102\n(1.000002) can0 18FF0100##1AABBCC\n(1.000003) can1 7FF#R5\n"
+         "(1.000004) can0 20000040#0000000000000000\nnonsense\n";
+  const Outcome outcome = decode(file, "--json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  ASSERT_EQ(outcome.lines.size(), 5U);
+  EXPECT_EQ(outcome.lines[0]["message"], "123");
+  EXPECT_EQ(outcome.lines[0]["data"], "0102");
+  EXPECT_EQ(outcome.lines[1]["message"], "18FF0100");
+  EXPECT_EQ(outcome.lines[1]["fd"], true);
+  EXPECT_EQ(outcome.lines[2]["message"], "remote 7FF");
+  EXPECT_EQ(outcome.lines[3]["message"], "error frame");
+  EXPECT_EQ(outcome.lines[4], (json{{"messages", 4}, {"bytes_skipped", 9}}));
+}
+
+TEST(DecodeCommand, ABrokenDbcFileIsRefusedWithItsLine) {
+  const auto log = std::filesystem::path(testing::TempDir()) / "imuscope_frame.log";
+  const auto dbc = std::filesystem::path(testing::TempDir()) / "broken.dbc";
+  std::ofstream(log) << "(1.000001) can0 123#0102\n";
+  std::ofstream(dbc) << "BO_ 1 A: 8 X\n SG_ S : 0,8@1+ (1,0) [0|0] \"\" X\n";
+  const Outcome outcome = decode(log, "--dbc '" + dbc.string() + "'");
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_NE(outcome.err.find("broken.dbc:2: SG_ S: expected '|', found ','"), std::string::npos)
+      << outcome.err;
+}
+
 }  // namespace

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "commands.h"
+#include "decode/candump.h"
 #include "decode/stream_protocols.h"
+#include "drivers/dbc/parser.h"
 
 namespace imuscope::cli {
 namespace {
@@ -25,6 +27,7 @@ constexpr std::size_t kLook = 1U << 20U;
 struct Options {
   std::string file;
   std::string protocol;
+  std::string dbc;
   bool json = false;
 };
 
@@ -144,16 +147,44 @@ class Printer {
   std::uint64_t end_ = 0;  ///< of what was printed
 };
 
+/// A log of CAN frames as the messages of a vehicle's DBC file.
+Result<Totals> decode_with_dbc(const Options& options, Stream stream) {
+  const auto text = dbc::read_text(options.dbc);
+  if (!text) return tl::unexpected<Error>(text.error());
+  const auto database = dbc::parse(*text, options.dbc);
+  if (!database) return tl::unexpected<Error>(database.error());
+  const StreamProtocol candump{"candump", decode_candump_frames, false};
+  Totals totals;
+  std::uint64_t covered = 0;
+  decode_candump(stream, &*database, [&](const DecodedMessage& message) {
+    print(candump, message, options.json);
+    ++totals.messages;
+    covered += message.size;
+  });
+  if (totals.messages == 0) {
+    return work_error(fmt::format("no CAN frame in {}", options.file),
+                      "--dbc wants a log as `candump -l` writes it");
+  }
+  totals.bytes_skipped = stream.size() - covered;
+  return totals;
+}
+
+Result<Totals> decode_stream(const Options& options, Stream stream) {
+  if (!options.dbc.empty()) return decode_with_dbc(options, stream);
+  const auto protocol = choose_protocol(options, stream);
+  if (!protocol) return tl::unexpected<Error>(protocol.error());
+  return Printer(stream, **protocol, options.json).run();
+}
+
 Result<void> decode(const Options& options) {
   const auto bytes = read_file(options.file);
   if (!bytes) return tl::unexpected<Error>(bytes.error());
-  const auto protocol = choose_protocol(options, *bytes);
-  if (!protocol) return tl::unexpected<Error>(protocol.error());
-  const Totals totals = Printer(*bytes, **protocol, options.json).run();
+  const auto totals = decode_stream(options, *bytes);
+  if (!totals) return tl::unexpected<Error>(totals.error());
   if (options.json) {
-    fmt::print("{{\"messages\": {}, \"bytes_skipped\": {}}}\n", totals.messages, totals.bytes_skipped);
+    fmt::print("{{\"messages\": {}, \"bytes_skipped\": {}}}\n", totals->messages, totals->bytes_skipped);
   } else {
-    fmt::print("{} messages, {} bytes skipped\n", totals.messages, totals.bytes_skipped);
+    fmt::print("{} messages, {} bytes skipped\n", totals->messages, totals->bytes_skipped);
   }
   return {};
 }
@@ -165,6 +196,8 @@ void add_decode(CLI::App& app, Work& chosen) {
   auto options = std::make_shared<Options>();
   command->add_option("FILE", options->file, "raw bytes as a device sent them")->required();
   command->add_option("--protocol", options->protocol, "which one; found by itself where not given");
+  command->add_option("--dbc", options->dbc,
+                      "of a CAN log: the vehicle's DBC file, for signals instead of bytes");
   command->add_flag("--json", options->json, "one JSON object a line");
   on_chosen(*command, chosen, [options] { return decode(*options); });
 }

@@ -89,6 +89,7 @@ TEST(CanOdometry, TheMeanOfTheChosenWheelsIsTheSpeed) {
   EXPECT_NEAR(sample.odometry.speed_mps, 10.5, 1e-12);
   EXPECT_EQ(sample.time, HostTime{1s - 15ms});
   EXPECT_EQ(sample.arrival, HostTime{1s + 1ms});
+  rig.now += 2s;
   rig.rear(-360, -360);
   EXPECT_NEAR(rig.sink.samples.at(1).odometry.speed_mps, -1.0, 1e-12) << "the signal has a sign";
   EXPECT_EQ(rig.decoder->counters().samples, 2U);
@@ -134,7 +135,7 @@ TEST(CanOdometry, SpeedsThatTheVehicleMarksAsInvalidAreRefused) {
   EXPECT_EQ(rig.decoder->odometry_counters().invalid, 3U);
   EXPECT_EQ(rig.decoder->problem(), "every speed was marked as invalid by the vehicle; is the ignition on?");
   rig.rear(0, 0);  // "standstill" is a speed with a name
-  rig.rear(3600, 32767 - 32000);
+  rig.rear(100, 100);
   EXPECT_EQ(rig.sink.samples.size(), 2U);
   EXPECT_EQ(rig.decoder->problem(), "");
 }

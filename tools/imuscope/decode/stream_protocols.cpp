@@ -7,6 +7,7 @@ namespace imuscope::cli {
 std::span<const StreamProtocol> stream_protocols() {
   static constexpr auto kProtocols = std::to_array<StreamProtocol>({
       {"xsens_mt", decode_xsens_mt, false},
+      {"candump", decode_candump_frames, false},
   });
   return kProtocols;
 }

@@ -34,6 +34,7 @@ struct StreamProtocol {
 /// In the order in which they are tried.
 std::span<const StreamProtocol> stream_protocols();
 
+void decode_candump_frames(std::span<const std::uint8_t> stream, const OnMessage& on_message);
 void decode_xsens_mt(std::span<const std::uint8_t> stream, const OnMessage& on_message);
 
 /// Lower-case hexadecimal digits.
