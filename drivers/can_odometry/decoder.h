@@ -63,8 +63,7 @@ class Decoder final : public DeviceDecoder {
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
   [[nodiscard]] const OdometryCounters& odometry_counters() const noexcept { return odometry_counters_; }
 
-  /// Frames that are needed, for the kernel's filters.
-  [[nodiscard]] std::vector<CanId> ids() const;
+  [[nodiscard]] std::vector<CanId> ids() const override;
 
   /// What is wrong with the frames, in one sentence with the remedy; empty when all is well.
   [[nodiscard]] std::string problem() const;

@@ -40,8 +40,7 @@ class Decoder final : public DeviceDecoder {
   void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
 
-  /// Frames that are needed, for the kernel's filters.
-  [[nodiscard]] std::vector<CanId> ids() const { return {config_.ids.begin(), config_.ids.end()}; }
+  [[nodiscard]] std::vector<CanId> ids() const override { return {config_.ids.begin(), config_.ids.end()}; }
 
   [[nodiscard]] Source source() const noexcept { return source_; }
   /// Length of one tick of SampleTime, which documents do not agree on; 0 until it is known.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/contracts.h"
+#include "drivers/can_bus/session.h"
 #include "drivers/can_odometry/decoder.h"
 #include "drivers/csv/decoder.h"
 #include "drivers/csv/validate.h"
@@ -134,10 +135,11 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device) {
       return std::make_unique<ixblue_stdbin::Session>();
     case Protocol::kGreis:
       return std::make_unique<greis::Session>(greis::SessionConfig{from_seconds(1.0 / device.rate_hz), true});
-    case Protocol::kCsvImu:
-    case Protocol::kCsvGnss:
     case Protocol::kXsensCan:
     case Protocol::kCanOdometry:
+      return std::make_unique<CanSession>();
+    case Protocol::kCsvImu:
+    case Protocol::kCsvGnss:
       break;
   }
   return nullptr;
