@@ -16,6 +16,8 @@ constexpr std::int64_t kTickFine_ns = 1'000;
 constexpr double kNsPerSecond = 1e9;
 /// Half an order of magnitude between the two ticks' ratio of 100: a step decides by which side it is on.
 constexpr double kTickDecision = 10.0;
+/// A step between two rounded times is off by a tick at the most.
+constexpr double kTickRounding = 1.5;
 /// What samples are made of changes for the worse when it has been missing so long: a lost frame is no
 /// reason.
 constexpr int kSourceGone = 100;
@@ -191,7 +193,11 @@ bool Decoder::locate(Instant& now) noexcept {
       has_last_ ? static_cast<double>(now.time_ns - last_time_ns_) / kNsPerSecond : period_s;
   if (!group_.counter) groups = std::max<std::int64_t>(1, std::llround(step_s / period_s));
   now.counter = group_.counter ? counter_.count() : last_counter_ + (has_last_ ? groups : 0);
-  now.dt_s = has_last_ && groups == 1 && step_s > 0.0 ? step_s : period_s;
+  // The step is rounded to a tick, a percent of the period at 100 Hz: it overrules the nominal period only
+  // where it is another one.
+  const bool is_nominal =
+      std::abs(step_s - period_s) <= kTickRounding * static_cast<double>(tick_ns_) / kNsPerSecond;
+  now.dt_s = groups == 1 && step_s > 0.0 && !is_nominal ? step_s : period_s;
   if (has_last_ && groups > 1) {
     counters_.samples_lost += static_cast<std::uint64_t>(groups - 1);
     gap_pending_ = true;

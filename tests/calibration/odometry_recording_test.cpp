@@ -204,7 +204,8 @@ TEST(OdometryRecording, WheelsHoldARealCarThroughThirtySecondsWithoutGnss) {
   // A windscreen mount looks up or down by degrees; the wheels of a car are right to a few percent.
   EXPECT_LT(std::abs(wheels.odometry.scale), 0.03);
   EXPECT_LT(wheels.odometry.sd_scale, 0.002);
-  EXPECT_LT(wheels.odometry.sd_mount_rad[2], 0.5 * kRadPerDeg);
+  // Half a minute with GNSS: less than half of the prior of 2 deg is left.
+  EXPECT_LT(wheels.odometry.sd_mount_rad[2], 1.0 * kRadPerDeg);
   const auto rejected = wheels.counters.odometry_speed_rejected + wheels.counters.odometry_slip_rejected;
   EXPECT_LT(rejected, wheels.counters.odometry_speed_used / 50);
 }

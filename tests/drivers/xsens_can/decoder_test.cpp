@@ -197,6 +197,23 @@ TEST(XsensCan, BothLengthsOfATickAreToldApartAtAKnownRate) {
   EXPECT_NEAR(fine.samples().at(1).imu.f_mps2[2], kRest_mps2, 1.0 / 32768.0 / 0.01);
 }
 
+TEST(XsensCan, ATimeRoundedToTheTickDoesNotReachTheRates) {
+  Unit unit;
+  for (int i = 0; i < 20; ++i) {
+    unit.sample_time += i % 2 == 0 ? 1 : -1;
+    unit.groups(1, [&] { unit.increments(); });
+  }
+  for (const Sample& sample : unit.samples()) EXPECT_NEAR(sample.imu.f_mps2[2], kRest_mps2, 0.01);
+  // A device that sends at another rate than configured is taken at its word.
+  Unit slow;
+  for (int i = 0; i < 20; ++i) {
+    slow.sample_time += 100;  // 50 Hz
+    slow.period += 1;
+    slow.groups(1, [&] { slow.increments(); });
+  }
+  EXPECT_NEAR(slow.samples().back().imu.f_mps2[2], 0.5 * kRest_mps2, 0.01);
+}
+
 TEST(XsensCan, LostGroupsAreCountedAndTheNextSampleSaysSo) {
   Unit unit;
   unit.groups(5, [&] { unit.increments(); });
