@@ -8,6 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "firmware_sim/devices/gnss_talker.h"
+
 namespace imusim {
 namespace {
 
@@ -28,19 +30,12 @@ Bytes text_reply(std::string_view id, std::string_view text) {
   return bytes;
 }
 
-/// Epochs lie at the multiples of the interval in the time of day.
-double first_epoch_s(const GreisReceiver::Options& options) {
-  const double time_of_day = std::chrono::duration<double>(utc_parts(options.utc_begin).time_of_day).count();
-  const double interval = 1.0 / options.rate_hz;
-  return std::ceil(time_of_day / interval - 1e-9) * interval - time_of_day;
-}
-
 }  // namespace
 
 GreisReceiver::GreisReceiver(const Options& options, Solver solver)
     : options_(options),
       solver_(std::move(solver)),
-      grid_(first_epoch_s(options), 1.0 / options.rate_hz),
+      grid_(first_epoch_s(options.utc_begin, options.rate_hz), 1.0 / options.rate_hz),
       enabled_(kKnown.begin(), kKnown.end()) {}
 
 void GreisReceiver::skip_to(double t_s) { next_index_ = std::max(next_index_, grid_.first_from(t_s)); }

@@ -3,12 +3,6 @@
 #include <cmath>
 
 namespace imusim::xsens {
-namespace {
-
-constexpr std::uint8_t kPreamble = 0xFA;
-constexpr std::uint8_t kExtendedLength = 0xFF;
-
-/// One number in the format of OutputSettings bits 8 and 9.
 void put_number(Bytes& bytes, double value, std::uint32_t settings) {
   switch (settings & kSettingsDouble) {
     case kSettingsF1220:
@@ -28,6 +22,11 @@ void put_number(Bytes& bytes, double value, std::uint32_t settings) {
       put_be(bytes, static_cast<float>(value));
   }
 }
+
+namespace {
+
+constexpr std::uint8_t kPreamble = 0xFA;
+constexpr std::uint8_t kExtendedLength = 0xFF;
 
 template <typename Vector>
 void put_vector(Bytes& bytes, const Vector& values, std::uint32_t settings) {

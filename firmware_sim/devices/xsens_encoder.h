@@ -86,6 +86,9 @@ struct MtSample {
 /// A whole frame with preamble, length (extended where needed) and checksum.
 Bytes frame(std::uint8_t mid, std::span<const std::uint8_t> data, std::uint8_t bid = 0xFF);
 
+/// One number in the format of OutputSettings bits 8 and 9.
+void put_number(Bytes& bytes, double value, std::uint32_t output_settings);
+
 /// Payload of an MTData message: the fields that mode and settings select, in the protocol's fixed order.
 Bytes mtdata_payload(const MtSample& sample, std::uint16_t output_mode, std::uint32_t output_settings);
 

@@ -60,6 +60,23 @@ double default_rate_hz(Role role) {
   return 100.0;
 }
 
+bool fits(Protocol protocol, Role role) {
+  switch (protocol) {
+    case Protocol::kXsensMt:
+    case Protocol::kIxblueStdbin:
+    case Protocol::kXsensCan:
+      return role == Role::kReference || role == Role::kStudy;
+    case Protocol::kCanOdometry:
+      return role == Role::kOdometry;
+    case Protocol::kGreis:
+    case Protocol::kNmea:
+    case Protocol::kUbx:
+    case Protocol::kRtklibPos:
+      break;
+  }
+  return role == Role::kGnss;
+}
+
 PlayedDevice read_device(TableReader& in) {
   PlayedDevice device;
   in.text("name", device.name);
@@ -69,13 +86,14 @@ PlayedDevice read_device(TableReader& in) {
   });
   if (!plain) in.fail("name", "must consist of letters, digits, '_' and '-': it becomes a file name");
   device.role = static_cast<Role>(in.choice("role", {"reference", "study", "gnss", "odometry"}, 1));
-  device.protocol = static_cast<Protocol>(
-      in.choice("protocol", {"xsens_mt", "ixblue_stdbin", "greis", "xsens_can", "can_odometry"}, 0));
-  if ((device.role == Role::kGnss) != (device.protocol == Protocol::kGreis) ||
-      (device.role == Role::kOdometry) != (device.protocol == Protocol::kCanOdometry))
+  device.protocol = static_cast<Protocol>(in.choice(
+      "protocol",
+      {"xsens_mt", "ixblue_stdbin", "greis", "nmea", "ubx", "rtklib_pos", "xsens_can", "can_odometry"}, 0));
+  if (!fits(device.protocol, device.role))
     in.fail(
         "protocol",
-        "does not fit the role: a gnss device speaks greis, an odometry device can_odometry, an IMU neither");
+        "does not fit the role: xsens_mt, ixblue_stdbin and xsens_can are IMUs, can_odometry odometry, the "
+        "others gnss");
   if (device.protocol == Protocol::kXsensCan && device.role == Role::kReference)
     in.fail("protocol", "is played for an S-IMU only");
   device.rate_hz = default_rate_hz(device.role);
@@ -85,7 +103,14 @@ PlayedDevice read_device(TableReader& in) {
   read_axes(in, device.C_device_frame);
   in.vector("antenna_lever_arm_b_m", device.antenna_b_m, 1.0);
   TableReader transport = in.table("transport");
-  transport.text("port", device.port);
+  if (transport.choice("kind", {"serial", "tcp", "can"}, 0) == 1) {
+    std::int64_t port = 0;
+    transport.whole("port", port, 1, std::numeric_limits<std::uint16_t>::max());
+    device.tcp_port = static_cast<std::uint16_t>(port);
+    transport.text("host", device.address);
+  } else {
+    transport.text("port", device.port);
+  }
   double baud = device.baud;
   transport.number("baud", baud, 1.0, 4800.0, 4e6);
   device.baud = static_cast<int>(baud);
@@ -126,6 +151,7 @@ StudySimulation read_study(TableReader& in, const MtxClass& common) {
   StudySimulation study;
   study.draw = common;
   in.text("name", study.name);
+  study.model = static_cast<XsensModel>(in.choice("model", {"mtx", "mti"}, 0));
   read_optional_vector(in, "rotation_vector_b_s_deg", kRadPerDeg, study.rotation_vector_b_s_rad);
   read_optional_vector(in, "lever_arm_b_m", 1.0, study.r_bs_b_m);
   in.number("latency_ms", study.latency_s, kMilli, 0.0, 1e3);

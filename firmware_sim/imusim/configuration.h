@@ -13,11 +13,10 @@
 /// [simulation.wheels]: scale_error_percent, slow_sd_mps, white_sd_mps, step_kmph, dead_band_mps, latency_ms
 /// [simulation.can]: bit_rate, bus_load_percent (by others), stamp_jitter_us
 /// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm
-/// [[simulation.imu]], one for each S-IMU, found by `name`: rotation_vector_b_s_deg, lever_arm_b_m,
-/// latency_ms,
-///   clock_skew_ppm, first_counter, accel_white_mps2, gyro_bias_sd_deg_per_s, accel_bias_sd_mps2,
-///   gyro_scale_sd_percent, accel_scale_sd_percent, and instead of what is drawn from those:
-///   gyro_bias_deg_per_s, accel_bias_mps2, gyro_scale_percent, accel_scale_percent; and
+/// [[simulation.imu]], one for each S-IMU, found by `name`: model ("mtx", "mti"), rotation_vector_b_s_deg,
+///   lever_arm_b_m, latency_ms, clock_skew_ppm, first_counter, accel_white_mps2, gyro_bias_sd_deg_per_s,
+///   accel_bias_sd_mps2, gyro_scale_sd_percent, accel_scale_sd_percent, and instead of what is drawn from
+///   those: gyro_bias_deg_per_s, accel_bias_mps2, gyro_scale_percent, accel_scale_percent; and
 ///   gyro_misalignment_deg, accel_misalignment_deg, g_sensitivity_deg_per_s_per_g (three rows of three),
 ///   gyro_range_deg_per_s, accel_range_mps2, gyro_step_deg_per_s, accel_step_mps2, gyro_low_pass_hz,
 ///   accel_low_pass_hz
@@ -41,16 +40,20 @@
 namespace imusim {
 
 enum class Role { kReference, kStudy, kGnss, kOdometry };
-enum class Protocol { kXsensMt, kIxblueStdbin, kGreis, kXsensCan, kCanOdometry };
+enum class Protocol { kXsensMt, kIxblueStdbin, kGreis, kNmea, kUbx, kRtklibPos, kXsensCan, kCanOdometry };
+/// Which XSens device plays a S-IMU: an MTx with legacy MTData, or an MTi with MTData2.
+enum class XsensModel { kMtx, kMti };
 
 struct PlayedDevice {
   std::string name;
   Role role = Role::kStudy;
   Protocol protocol = Protocol::kXsensMt;
   double rate_hz = 100.0;
-  std::string port;           ///< empty where the configuration names none
-  std::string can_interface;  ///< of a device on a CAN bus
-  std::string dbc;            ///< kCanOdometry: the file that the configuration names
+  std::string port;            ///< of a serial line; empty where the configuration names none
+  std::string address;         ///< of this PC, where a TCP server plays the device
+  std::uint16_t tcp_port = 0;  ///< 0: no TCP server
+  std::string can_interface;   ///< of a device on a CAN bus
+  std::string dbc;             ///< kCanOdometry: the file that the configuration names
   int baud = 115200;
   Eigen::Matrix3d C_device_frame = Eigen::Matrix3d::Identity();  ///< rotates the device's axes to b or s
   Eigen::Vector3d antenna_b_m = Eigen::Vector3d::Zero();
@@ -77,6 +80,7 @@ struct WheelSimulation {
 
 struct StudySimulation {
   std::string name;
+  XsensModel model = XsensModel::kMtx;
   std::optional<Eigen::Vector3d> rotation_vector_b_s_rad;
   std::optional<Eigen::Vector3d> r_bs_b_m;
   double latency_s = 0.002;

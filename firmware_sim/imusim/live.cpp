@@ -2,11 +2,16 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
 #include <ctime>
+#include <memory>
 
+#include "firmware_sim/devices/gnss_encoders.h"
 #include "firmware_sim/imusim/truth_files.h"
 #include "firmware_sim/io/can_port.h"
 #include "firmware_sim/io/pseudo_terminal.h"
+#include "firmware_sim/io/tcp_server.h"
+#include "firmware_sim/random/random.h"
 
 namespace imusim {
 namespace {
@@ -15,43 +20,73 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 // As a USB host controller would, the player looks after its ports once a millisecond.
 constexpr std::int64_t kTick_ns = 1'000'000;
 
+/// What a program opens: a pseudo-terminal, or a connection to a TCP server.
+tl::expected<std::unique_ptr<LineEnd>, std::string> open_end(const PlayedDevice& played, int baud) {
+  const auto moved = [](auto&& opened) -> tl::expected<std::unique_ptr<LineEnd>, std::string> {
+    using End = typename std::decay_t<decltype(opened)>::value_type;
+    if (!opened) return tl::unexpected(opened.error());
+    return std::make_unique<End>(std::move(*opened));
+  };
+  if (played.tcp_port == 0) return moved(PseudoTerminal::open(played.port, baud));
+  const Bytes greeting = played.protocol == Protocol::kRtklibPos ? rtklib_header() : Bytes{};
+  return moved(TcpServer::open(played.address, played.tcp_port, greeting));
+}
+
+/// A receiver samples the last of ten bits right as long as the speeds differ by less.
+bool same_speed(int a_baud, int b_baud) {
+  constexpr double kTolerance = 0.03;
+  if (a_baud == 0) return true;  // a line without speeds
+  return std::abs(static_cast<double>(a_baud) / b_baud - 1.0) < kTolerance;
+}
+
 /// A device, the line it drives and the pseudo-terminal at the end of the line, which is gone while the
 /// device is unplugged.
 struct Port {
   WorldDevice* device;
   SerialLine line;
   std::vector<Unplugged> unplugged;
-  std::optional<PseudoTerminal> terminal;
+  std::unique_ptr<LineEnd> terminal;
   LiveCounts counts;
 
   void plug_in_or_out(double t_s) {
     const bool out = std::any_of(unplugged.begin(), unplugged.end(), [&](const Unplugged& span) {
       return t_s >= span.begin_s && t_s < span.end_s;
     });
-    if (out == !terminal.has_value()) return;
+    if (out == (terminal == nullptr)) return;
     terminal.reset();
     if (out) return;
-    auto again = PseudoTerminal::open(device->played.port);
-    if (again) terminal.emplace(std::move(*again));
+    if (auto again = open_end(device->played, device->device->baud())) terminal = std::move(*again);
   }
 
   void run_until(double t_s) {
     plug_in_or_out(t_s);
     const Bytes heard = terminal ? terminal->read() : Bytes{};
     counts.received_bytes += heard.size();
-    if (!heard.empty()) device->device->receive(heard, t_s);
+    // At another speed than its own a device hears nothing that makes sense, nor does the host.
+    const bool understood = terminal && same_speed(terminal->baud(), device->device->baud());
+    if (!heard.empty() && understood) device->device->receive(heard, t_s);
     emissions.clear();
     device->device->run_until(t_s, emissions);
     line.set_baud(device->device->baud());
     for (const Emission& emission : emissions) line.send(emission);
-    line.deliver_until(t_s, [this](std::span<const std::uint8_t> bytes, std::int64_t /*arrival_ns*/) {
+    line.deliver_until(t_s, [&](std::span<const std::uint8_t> bytes, std::int64_t /*arrival_ns*/) {
+      if (!understood) bytes = garbled(bytes);
       const std::size_t dropped = terminal ? terminal->write(bytes) : bytes.size();
       counts.dropped_bytes += dropped;
       counts.sent_bytes += bytes.size() - dropped;
     });
   }
 
+  /// What a receiver at another speed makes of bytes: as many others.
+  std::span<const std::uint8_t> garbled(std::span<const std::uint8_t> bytes) {
+    noise.resize(bytes.size());
+    for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random.bits() & 0xFFU);
+    return noise;
+  }
+
   std::vector<Emission> emissions{};
+  Bytes noise{};
+  Random random{0, "another speed"};
 };
 
 std::int64_t monotonic_ns() {
@@ -104,21 +139,24 @@ Outcome<std::vector<CanEnd>> open_can_ends(World& world, const LiveOptions& opti
   return ends;
 }
 
+std::string describe(const PlayedDevice& played) {
+  if (played.tcp_port != 0) return fmt::format("tcp {}:{}", played.address, played.tcp_port);
+  return fmt::format("{}, {} baud", played.port, played.baud);
+}
+
 Outcome<std::vector<Port>> open_ports(World& world, const LiveOptions& options) {
   std::vector<Port> ports;
   ports.reserve(world.devices().size());
   for (WorldDevice& device : world.devices()) {
     const PlayedDevice& played = device.played;
     if (Configuration::is_on_can(played)) continue;
-    if (played.port.empty())
+    if (played.port.empty() && played.tcp_port == 0)
       return wrong_usage(fmt::format(
           "{}: device '{}' has no port to play on; give transport = {{ kind = \"serial\", port = \"...\" }}",
           world.configuration().file.string(), played.name));
-    auto terminal = PseudoTerminal::open(played.port);
+    auto terminal = open_end(played, played.baud);
     if (!terminal) return failed_work(fmt::format("device '{}': {}", played.name, terminal.error()));
-    if (options.on_line)
-      options.on_line(fmt::format("{:<10} {} -> {}, {} baud", played.name, played.port, terminal->terminal(),
-                                  played.baud));
+    if (options.on_line) options.on_line(fmt::format("{:<10} {}", played.name, describe(played)));
     ports.push_back({&device, world.line_of(played), {}, std::move(*terminal), {played.name, 0, 0, 0}});
     for (const Fault& fault : world.configuration().faults_of(played.name)) {
       if (fault.kind == FaultKind::kUnplug) ports.back().unplugged.push_back({fault.begin_s, fault.end_s});

@@ -9,8 +9,10 @@
 #include <utility>
 
 #include "firmware_sim/devices/can_encoder.h"
+#include "firmware_sim/devices/gnss_talker.h"
 #include "firmware_sim/devices/greis_receiver.h"
 #include "firmware_sim/devices/stdbin_unit.h"
+#include "firmware_sim/devices/xsens_mti.h"
 #include "firmware_sim/devices/xsens_mtx.h"
 #include "firmware_sim/faults/faulty_device.h"
 #include "firmware_sim/imusim/sensor_faults.h"
@@ -175,6 +177,7 @@ void World::add_study(const PlayedDevice& played, const StudySimulation& study, 
 
   StudyTruth truth;
   truth.name = played.name;
+  truth.model = study.model;
   truth.mounting.C_b_s = rotation_from_vector(study.rotation_vector_b_s_rad.value_or(drawn_rotation));
   truth.mounting.r_bs_b_m = study.r_bs_b_m.value_or(drawn_lever_arm);
   truth.errors = errors_of(study, study.draw.regime_switch, random);
@@ -246,31 +249,42 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
     return;
   }
 
+  constexpr std::uint32_t kFirstDeviceId = 0x00300001;
+  const auto device_id = kFirstDeviceId + static_cast<std::uint32_t>(devices_.size());
   if (played.protocol == Protocol::kXsensMt) {
+    const Eigen::Matrix3d C_device_b = imu->mounting().C_b_s.transpose() * played.C_device_frame;
+    const auto message = [motion, sample, C_frame_device, C_device_b](double t_s, std::int64_t counter) {
+      const ImuReading reading = sample(t_s, counter);
+      xsens::MtSample made;
+      made.acc_mps2 = C_frame_device * reading.f_mps2;
+      made.gyr_radps = C_frame_device * reading.omega_radps;
+      made.sensor_to_world = Eigen::Matrix3d(C_ned_nwu() * motion->state_at(t_s).C_b_n * C_device_b);
+      return made;
+    };
+    if (clock.model == XsensModel::kMti) {
+      XsensMti::Options options;
+      options.device_id = device_id;
+      options.latency_s = clock.latency_s;
+      options.clock_skew_ppm = clock.clock_skew_ppm;
+      options.first_sample_s = clock.first_sample_s;
+      options.first_packet = clock.first_counter;
+      options.baud = played.baud;
+      auto device = std::make_unique<XsensMti>(options, message, begin_s);
+      if (beginning == Beginning::kStreaming)
+        device->start_inertial(begin_s, static_cast<std::uint16_t>(std::lround(played.rate_hz)));
+      return add(played, std::move(device));
+    }
     XsensMtx::Options options;
-    constexpr std::uint32_t kFirstDeviceId = 0x00300001;
-    options.device_id = kFirstDeviceId + static_cast<std::uint32_t>(devices_.size());
+    options.device_id = device_id;
     options.latency_s = clock.latency_s;
     options.clock_skew_ppm = clock.clock_skew_ppm;
     options.first_sample_s = clock.first_sample_s;
     options.first_counter = clock.first_counter;
     options.baud = played.baud;
     options.period = static_cast<std::uint16_t>(std::lround(115200.0 / played.rate_hz));
-    const Eigen::Matrix3d C_device_b = imu->mounting().C_b_s.transpose() * played.C_device_frame;
-    auto device = std::make_unique<XsensMtx>(
-        options,
-        [motion, sample, C_frame_device, C_device_b](double t_s, std::int64_t counter) {
-          const ImuReading reading = sample(t_s, counter);
-          xsens::MtSample message;
-          message.acc_mps2 = C_frame_device * reading.f_mps2;
-          message.gyr_radps = C_frame_device * reading.omega_radps;
-          message.sensor_to_world = Eigen::Matrix3d(C_ned_nwu() * motion->state_at(t_s).C_b_n * C_device_b);
-          return message;
-        },
-        begin_s);
+    auto device = std::make_unique<XsensMtx>(options, message, begin_s);
     if (beginning == Beginning::kStreaming) device->start_calibrated(begin_s);
-    add(played, std::move(device));
-    return;
+    return add(played, std::move(device));
   }
 
   StdbinUnit::Options options;
@@ -304,15 +318,10 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
 
 void World::add_gnss(const PlayedDevice& played, double begin_s) {
   const GnssSimulation gnss = configuration_.gnss;
-  GreisReceiver::Options options;
-  options.utc_begin = configuration_.utc_begin;
-  options.rate_hz = played.rate_hz;
-  options.latency_s = gnss.latency_s;
-  options.baud = played.baud;
   auto random = std::make_shared<Random>(configuration_.scenario.seed, played.name + "/noise");
   const std::shared_ptr<const Motion> motion = motion_;
   const auto faults = std::make_shared<const SensorFaults>(configuration_.faults_of(played.name));
-  auto receiver = std::make_unique<GreisReceiver>(options, [=, antenna = played.antenna_b_m](double t_s) {
+  const auto solve = [=, antenna = played.antenna_b_m](double t_s) {
     const MotionState state = motion->state_at(t_s);
     const GeodeticPosition place =
         displaced(position_at(state, antenna), draw3(*random, 1.0).cwiseProduct(gnss.position_sd_m));
@@ -335,9 +344,26 @@ void World::add_gnss(const PlayedDevice& played, double begin_s) {
     solution.vertical_velocity_sd_mps = sd(gnss.velocity_sd_mps.z());
     faults->apply(t_s, solution);
     return solution;
-  });
-  receiver->skip_to(begin_s);
-  add(played, std::move(receiver));
+  };
+  const auto set_up = [&](auto options) {
+    options.utc_begin = configuration_.utc_begin;
+    options.rate_hz = played.rate_hz;
+    options.latency_s = gnss.latency_s;
+    options.baud = played.baud;
+    return options;
+  };
+  if (played.protocol == Protocol::kGreis) {
+    auto receiver = std::make_unique<GreisReceiver>(set_up(GreisReceiver::Options{}), solve);
+    receiver->skip_to(begin_s);
+    return add(played, std::move(receiver));
+  }
+  GnssTalker::Options options = set_up(GnssTalker::Options{});
+  options.language = played.protocol == Protocol::kNmea  ? GnssTalker::Language::kNmea
+                     : played.protocol == Protocol::kUbx ? GnssTalker::Language::kUbx
+                                                         : GnssTalker::Language::kRtklib;
+  auto talker = std::make_unique<GnssTalker>(options, solve);
+  talker->skip_to(begin_s);
+  add(played, std::move(talker));
 }
 
 void World::add_wheels(const PlayedDevice& played, double begin_s) {

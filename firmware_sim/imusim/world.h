@@ -39,6 +39,7 @@ struct StudyTruth {
   double first_sample_s = 0.0;  ///< instant of the sample with first_counter
   double period_s = 0.0;        ///< between two samples, its clock's skew included
   std::uint16_t first_counter = 0;
+  XsensModel model = XsensModel::kMtx;
 };
 
 struct WorldDevice {

@@ -1,10 +1,12 @@
 #include "firmware_sim/io/pseudo_terminal.h"
 
+// termios2 (any baud rate) comes from the kernel's header, which does not go together with <termios.h>.
+#include <asm/termbits.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
-#include <termios.h>
 #include <unistd.h>
 #include <array>
 #include <cerrno>
@@ -28,13 +30,15 @@ std::error_code make_private_folders(const std::filesystem::path& folder) {
 
 /// Opens the far end once and closes it: from then on the near end tells whether somebody has it open. Sets
 /// it raw, so that nothing is echoed to the device before the program has set it up itself.
-bool prepare_far_end(const char* terminal) {
+bool prepare_far_end(const char* terminal, int baud) {
   const int far_end = ::open(terminal, O_RDWR | O_NOCTTY | O_CLOEXEC);
   if (far_end < 0) return false;
-  termios settings{};
-  const bool ready = ::tcgetattr(far_end, &settings) == 0;
-  ::cfmakeraw(&settings);
-  const bool set = ready && ::tcsetattr(far_end, TCSANOW, &settings) == 0;
+  termios2 settings{};
+  settings.c_cflag = CS8 | CREAD | CLOCAL | BOTHER | (BOTHER << IBSHIFT);
+  settings.c_ispeed = static_cast<speed_t>(baud);
+  settings.c_ospeed = static_cast<speed_t>(baud);
+  settings.c_cc[VMIN] = 1;
+  const bool set = ::ioctl(far_end, TCSETS2, &settings) == 0;
   ::close(far_end);
   return set;
 }
@@ -55,7 +59,7 @@ std::error_code replace_link(const std::string& target, const std::filesystem::p
 
 }  // namespace
 
-tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesystem::path& link) {
+tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesystem::path& link, int baud) {
   if (const std::error_code error = make_private_folders(link.parent_path()))
     return tl::unexpected(
         fmt::format("cannot make the folder {}: {}", link.parent_path().string(), error.message()));
@@ -63,7 +67,7 @@ tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesy
   constexpr std::size_t kNameSize = 64;
   std::array<char, kNameSize> name{};
   if (near_end < 0 || ::grantpt(near_end) != 0 || ::unlockpt(near_end) != 0 ||
-      ::ptsname_r(near_end, name.data(), name.size()) != 0 || !prepare_far_end(name.data())) {
+      ::ptsname_r(near_end, name.data(), name.size()) != 0 || !prepare_far_end(name.data(), baud)) {
     const int cause = errno;
     if (near_end >= 0) ::close(near_end);
     return tl::unexpected(fmt::format("cannot open a pseudo-terminal: {}", std::strerror(cause)));
@@ -77,7 +81,8 @@ tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesy
 }
 
 PseudoTerminal::PseudoTerminal(PseudoTerminal&& other) noexcept
-    : near_end_(std::exchange(other.near_end_, -1)),
+    : LineEnd(std::move(other)),
+      near_end_(std::exchange(other.near_end_, -1)),
       terminal_(std::move(other.terminal_)),
       link_(std::move(other.link_)) {}
 
@@ -86,6 +91,11 @@ PseudoTerminal::~PseudoTerminal() {
   ::close(near_end_);
   std::error_code error;
   if (std::filesystem::read_symlink(link_, error) == terminal_) std::filesystem::remove(link_, error);
+}
+
+int PseudoTerminal::baud() const {
+  termios2 settings{};
+  return ::ioctl(near_end_, TCGETS2, &settings) == 0 ? static_cast<int>(settings.c_ospeed) : 0;
 }
 
 bool PseudoTerminal::is_open_elsewhere() const {

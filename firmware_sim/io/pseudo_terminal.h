@@ -8,30 +8,28 @@
 #include <string>
 #include <tl/expected.hpp>
 
-#include "firmware_sim/devices/bytes.h"
+#include "firmware_sim/io/line_end.h"
 
 namespace imusim {
 
-class PseudoTerminal {
+class PseudoTerminal : public LineEnd {
  public:
   /// Opens a pseudo-terminal and puts a symbolic link to it at `link`, replacing one that is there. The
   /// link's folder is made, for its owner alone, where it does not exist.
+  /// @param baud  speed that the port has until a program sets another
   /// @return what went wrong, in one sentence
-  static tl::expected<PseudoTerminal, std::string> open(const std::filesystem::path& link);
+  static tl::expected<PseudoTerminal, std::string> open(const std::filesystem::path& link, int baud);
 
   PseudoTerminal(PseudoTerminal&& other) noexcept;
   PseudoTerminal& operator=(PseudoTerminal&&) = delete;
   PseudoTerminal(const PseudoTerminal&) = delete;
   PseudoTerminal& operator=(const PseudoTerminal&) = delete;
   /// Closes it and removes the link, if it still leads here.
-  ~PseudoTerminal();
+  ~PseudoTerminal() override;
 
-  /// Writes towards the program; never waits. What does not fit, or nobody has the port open, is dropped.
-  /// @return how many bytes were dropped
-  std::size_t write(std::span<const std::uint8_t> bytes);
-
-  /// What the program has written since the last call; never waits.
-  Bytes read();
+  std::size_t write(std::span<const std::uint8_t> bytes) override;
+  Bytes read() override;
+  [[nodiscard]] int baud() const override;
 
   /// Whether a program has the port open.
   [[nodiscard]] bool is_open_elsewhere() const;

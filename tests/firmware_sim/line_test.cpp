@@ -1,7 +1,14 @@
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#include <algorithm>
 #include <limits>
+#include <string>
 
 #include "firmware_sim/io/serial_line.h"
+#include "firmware_sim/io/tcp_server.h"
 
 namespace imusim {
 namespace {
@@ -42,8 +49,9 @@ void expect_causal_and_complete(const std::vector<Read>& reads, int baud) {
   for (const Read& read : reads) {
     for (const std::uint8_t byte : read.bytes) {
       EXPECT_EQ(byte, static_cast<std::uint8_t>(count));
+      const std::size_t message = count / 31;
       const double done_s =
-          0.0103 + 0.01 * static_cast<double>(count / 31) + 10.0 / baud * static_cast<double>(count % 31 + 1);
+          0.0103 + 0.01 * static_cast<double>(message) + 10.0 / baud * static_cast<double>(count % 31 + 1);
       EXPECT_GE(read.at_s, done_s - 2e-9);
       ++count;
     }
@@ -75,8 +83,9 @@ TEST(SerialLine, AnFtdiAdapterSendsFullPacketsOrAfterItsTimer) {
   std::size_t count = 0;
   for (const Read& read : reads) {
     EXPECT_LE(read.bytes.size(), 62U);
+    const std::size_t message = count / 31;
     const double first_done_s =
-        0.0103 + 0.01 * static_cast<double>(count / 31) + 10.0 / 115200 * static_cast<double>(count % 31 + 1);
+        0.0103 + 0.01 * static_cast<double>(message) + 10.0 / 115200 * static_cast<double>(count % 31 + 1);
     EXPECT_LE(read.at_s - first_done_s, 0.017 + 1e-8);  // timer and one USB frame
     count += read.bytes.size();
   }
@@ -114,6 +123,62 @@ TEST(SerialLine, TheHostsClockHasItsOwnOriginAndRate) {
   line.deliver_until(200.0,
                      [&](std::span<const std::uint8_t>, std::int64_t arrival_ns) { arrival = arrival_ns; });
   EXPECT_NEAR(static_cast<double>(arrival), 5e9 + (100.0 + 10.0 / 115200) * 1e9 * (1.0 + 100e-6), 2.0);
+}
+
+/// A program that connects to a server of this PC.
+class Client {
+ public:
+  explicit Client(std::uint16_t port) : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in there{};
+    there.sin_family = AF_INET;
+    there.sin_port = htons(port);
+    there.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(::connect(fd_, reinterpret_cast<const sockaddr*>(&there), sizeof there), 0);
+  }
+  ~Client() { ::close(fd_); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+  void say(const std::string& text) const {
+    EXPECT_EQ(::send(fd_, text.data(), text.size(), 0), std::ssize(text));
+  }
+  [[nodiscard]] std::string hear(std::size_t count) const {
+    std::string text(count, ' ');
+    text.resize(static_cast<std::size_t>(std::max<ssize_t>(0, ::recv(fd_, text.data(), count, MSG_WAITALL))));
+    return text;
+  }
+
+ private:
+  int fd_;
+};
+
+TEST(TcpServer, GreetsEachClientAndCarriesBytesBothWays) {
+  auto server = TcpServer::open("127.0.0.1", 0, Bytes{'%', '\n'});
+  ASSERT_TRUE(server) << server.error();
+  EXPECT_EQ(server->write(Bytes{1, 2, 3}), 3U);  // nobody is there
+  {
+    const Client client(server->port());
+    EXPECT_EQ(server->write(Bytes{'a', 'b'}), 0U);
+    EXPECT_EQ(client.hear(4), "%\nab");
+    client.say("xyz");
+    Bytes heard;
+    while (heard.size() < 3) put_bytes(heard, server->read());
+    EXPECT_EQ(heard, (Bytes{'x', 'y', 'z'}));
+  }
+  while (server->write(Bytes{'c'}) == 0) {  // until it notices that the client left
+  }
+  const Client again(server->port());
+  while (server->write(Bytes{'d'}) != 0) {
+  }
+  EXPECT_EQ(again.hear(3), "%\nd");
+}
+
+TEST(TcpServer, SaysWhyItCannotListen) {
+  const auto server = TcpServer::open("127.0.0.1", 0, {});
+  ASSERT_TRUE(server);
+  const auto second = TcpServer::open("127.0.0.1", server->port(), {});
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().find("cannot listen on 127.0.0.1:"), std::string::npos);
+  EXPECT_NE(TcpServer::open("nowhere", 1, {}).error().find("'nowhere'"), std::string::npos);
 }
 
 }  // namespace

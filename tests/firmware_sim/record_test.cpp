@@ -330,17 +330,17 @@ TEST(Live, AProgramFindsThePortsShakesHandsAndGetsData) {
 TEST(PseudoTerminal, TakesTheLinksPlaceButNotAFiles) {
   const std::filesystem::path folder = scratch_folder();
   std::filesystem::create_symlink("/nowhere", folder / "stale");
-  auto terminal = PseudoTerminal::open(folder / "stale");
+  auto terminal = PseudoTerminal::open(folder / "stale", 115200);
   ASSERT_TRUE(terminal.has_value()) << terminal.error();
   EXPECT_EQ(std::filesystem::read_symlink(folder / "stale"), terminal->terminal());
   std::ofstream(folder / "file") << "precious";
-  EXPECT_FALSE(PseudoTerminal::open(folder / "file").has_value());
+  EXPECT_FALSE(PseudoTerminal::open(folder / "file", 115200).has_value());
   EXPECT_EQ(content_of(folder / "file"), "precious");
 }
 
 TEST(PseudoTerminal, DropsWhatNobodyReadsWithoutWaiting) {
   const std::filesystem::path folder = scratch_folder();
-  auto terminal = PseudoTerminal::open(folder / "port");
+  auto terminal = PseudoTerminal::open(folder / "port", 115200);
   ASSERT_TRUE(terminal.has_value()) << terminal.error();
   const Bytes bytes(1000, 0x55);
   EXPECT_FALSE(terminal->is_open_elsewhere());
