@@ -5,6 +5,7 @@ include(GoogleTest)
 
 option(IMUSCOPE_TESTS "Build the tests" ON)
 option(IMUSCOPE_WERROR "Treat warnings as errors" ON)
+option(IMUSCOPE_FUZZ "Build the libFuzzer targets (clang only)" OFF)
 set(IMUSCOPE_SANITIZE "" CACHE STRING "Sanitizers to build with: empty, 'address,undefined' or 'thread'")
 
 set(CMAKE_CXX_STANDARD 20)
@@ -43,6 +44,9 @@ if(IMUSCOPE_SANITIZE)
   target_compile_options(imuscope_flags INTERFACE
     -fsanitize=${IMUSCOPE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(imuscope_flags INTERFACE -fsanitize=${IMUSCOPE_SANITIZE})
+endif()
+if(IMUSCOPE_FUZZ)
+  target_compile_options(imuscope_flags INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 target_link_libraries(imuscope_flags INTERFACE Threads::Threads)
 
