@@ -94,6 +94,15 @@ std::vector<std::string> serial_ports() {
   return ports;
 }
 
+std::optional<int> latency_timer_ms(const std::string& port, const std::string& adapters) {
+  std::error_code ignored;
+  const fs::path real = fs::canonical(port, ignored);
+  int timer_ms = 0;
+  if (ignored || !(std::ifstream(fs::path(adapters) / real.filename() / "latency_timer") >> timer_ms))
+    return std::nullopt;
+  return timer_ms;
+}
+
 Error explain_open_failure(const std::string& path, int error) {
   switch (error) {
     case ENOENT:

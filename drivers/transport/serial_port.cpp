@@ -73,6 +73,10 @@ bool ask_for_low_latency(int fd) {
   return ioctl(fd, TIOCSSERIAL, &serial) == 0;
 }
 
+std::int64_t overruns(const std::optional<LineErrors>& errors) {
+  return errors ? std::int64_t{errors->overrun} + errors->buffer_overrun : 0;
+}
+
 bool says_gone(int error) { return error == EIO || error == ENXIO || error == ENODEV || error == EBADF; }
 
 }  // namespace
@@ -97,6 +101,7 @@ Result<SerialPort> SerialPort::open(const SerialSettings& settings) {
   ioctl(fd, TIOCEXCL);
   port.low_latency_ = ask_for_low_latency(fd);
   ioctl(fd, TCFLSH, TCIOFLUSH);
+  port.overruns_at_open_ = overruns(port.line_errors());
   return port;
 }
 
@@ -105,7 +110,8 @@ SerialPort::SerialPort(SerialPort&& other) noexcept
       path_(std::move(other.path_)),
       fd_(std::exchange(other.fd_, -1)),
       baud_(other.baud_),
-      low_latency_(other.low_latency_) {}
+      low_latency_(other.low_latency_),
+      overruns_at_open_(other.overruns_at_open_) {}
 
 SerialPort& SerialPort::operator=(SerialPort&& other) noexcept {
   if (this == &other) return *this;
@@ -114,6 +120,7 @@ SerialPort& SerialPort::operator=(SerialPort&& other) noexcept {
   fd_ = std::exchange(other.fd_, -1);
   baud_ = other.baud_;
   low_latency_ = other.low_latency_;
+  overruns_at_open_ = other.overruns_at_open_;
   return *this;
 }
 
@@ -125,7 +132,17 @@ void SerialPort::close() noexcept {
   ::close(std::exchange(fd_, -1));
 }
 
-std::string SerialPort::describe() const { return fmt::format("{} at {:.0f} baud", path_, baud_); }
+LineHealth SerialPort::health() noexcept {
+  const std::int64_t dropped = overruns(line_errors()) - overruns_at_open_;
+  return {true, static_cast<std::uint64_t>(std::max<std::int64_t>(dropped, 0))};
+}
+
+std::string SerialPort::describe() const {
+  const auto held_ms = low_latency_ ? std::nullopt : latency_timer_ms(path_);
+  if (!held_ms || *held_ms <= 1) return fmt::format("{} at {:.0f} baud", path_, baud_);
+  return fmt::format("{} at {:.0f} baud (its adapter holds bytes for up to {} ms; {})", path_, baud_,
+                     *held_ms, kLatencyRule);
+}
 
 IoResult SerialPort::read(std::span<std::uint8_t> buffer) noexcept {
   for (;;) {

@@ -49,6 +49,9 @@ class SerialPort final : public Transport {
   [[nodiscard]] IoResult write(std::span<const std::uint8_t> bytes) noexcept override;
   /// -1 after a move.
   [[nodiscard]] int fd() const noexcept override { return fd_; }
+  /// Dropped: overruns of the UART and of the kernel's buffer since the port was opened, where the driver
+  /// counts them.
+  [[nodiscard]] LineHealth health() noexcept override;
   [[nodiscard]] std::string describe() const override;
 
   /// As the driver gives it, within 2 % of what was asked for.
@@ -67,6 +70,7 @@ class SerialPort final : public Transport {
   int fd_ = -1;
   double baud_ = 0.0;
   bool low_latency_ = false;
+  std::int64_t overruns_at_open_ = 0;
 };
 
 }  // namespace imuscope

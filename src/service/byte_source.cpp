@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <vector>
 
 #include "capture/capture_reader.h"
 #include "capture/raw_dump.h"
+#include "drivers/xsens_mt/mtb_file.h"
 
 namespace imuscope {
 
@@ -15,7 +19,9 @@ constexpr std::size_t kUnstampedPiece = 4096;
 
 class RawDumpSource final : public ByteSource {
  public:
-  RawDumpSource(RawDump dump, std::uint64_t total) : dump_(std::move(dump)), total_(total) {}
+  /// @param header  bytes of a header at the beginning, not handed out
+  RawDumpSource(RawDump dump, std::uint64_t total, std::size_t header)
+      : dump_(std::move(dump)), total_(total - header), header_(header) {}
 
   Result<std::optional<RecordedRead>> next() override {
     if (rest_.empty()) {
@@ -23,6 +29,10 @@ class RawDumpSource final : public ByteSource {
       if (!read) return std::optional<RecordedRead>{};
       arrival_ = read->arrival;
       rest_ = read->bytes;
+      const std::size_t passed = std::min(header_, rest_.size());
+      rest_ = rest_.subspan(passed);
+      header_ -= passed;
+      if (rest_.empty()) return next();
     }
     const std::size_t n = arrival_ ? rest_.size() : std::min(rest_.size(), kUnstampedPiece);
     const RecordedRead piece{arrival_, rest_.first(n)};
@@ -36,6 +46,7 @@ class RawDumpSource final : public ByteSource {
  private:
   RawDump dump_;
   std::uint64_t total_;
+  std::size_t header_;
   std::uint64_t read_ = 0;
   std::optional<HostTime> arrival_;
   std::span<const std::uint8_t> rest_;
@@ -68,6 +79,25 @@ class CaptureSource final : public ByteSource {
   RawRead current_;
 };
 
+/// Bytes of the header of a .mtb log; 0 for any other file.
+Result<std::size_t> header_of(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char letter) { return static_cast<char>(std::tolower(letter)); });
+  if (extension != ".mtb") return 0;
+  constexpr std::size_t kLook = 1U << 20U;
+  std::vector<std::uint8_t> beginning(kLook);
+  std::ifstream in(file, std::ios::binary);
+  in.read(reinterpret_cast<char*>(beginning.data()), static_cast<std::streamsize>(beginning.size()));
+  beginning.resize(static_cast<std::size_t>(std::max<std::streamsize>(in.gcount(), 0)));
+  const auto offset = xsens::data_offset_of_mtb(beginning);
+  if (!offset) {
+    return work_error(fmt::format("{}: no XSens message follows its header", file.string()),
+                      "check that it is a log of an MT device");
+  }
+  return *offset;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file) {
@@ -75,7 +105,9 @@ Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& f
   if (!dump) return tl::unexpected<Error>(dump.error());
   std::error_code code;
   const auto size = std::filesystem::file_size(file, code);
-  return std::make_unique<RawDumpSource>(std::move(*dump), code ? 0 : size);
+  const auto header = header_of(file);
+  if (!header) return tl::unexpected<Error>(header.error());
+  return std::make_unique<RawDumpSource>(std::move(*dump), code ? *header : size, *header);
 }
 
 Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::path& capture,

@@ -29,7 +29,8 @@ class ByteSource {
   [[nodiscard]] virtual std::uint64_t bytes_total() const = 0;
 };
 
-/// A raw dump: X.bin or a CSV file, with X.arrivals.csv beside it where the arrivals were kept.
+/// A raw dump: X.bin or a text file, with X.arrivals.csv beside it where the arrivals were kept; or a .mtb
+/// log, whose header is passed over.
 Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file);
 
 /// The reads of one device out of a capture.

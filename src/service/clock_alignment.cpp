@@ -48,14 +48,30 @@ bool shares_the_reference_clock(const DeviceConfig& device) {
          device.csv.common_clock;
 }
 
+/// Clocks that only count begin anywhere: where their times as they stand show no match, the recordings are
+/// taken to have begun together.
+Result<TimeOffset> find_offset(const RateSeries& reference, const RateSeries& study,
+                               const TimeOffsetOptions& options) {
+  const RateMagnitudeSeries fixed{reference.time_s, reference.rate_radps};
+  auto found = find_time_offset(fixed, {study.time_s, study.rate_radps}, options);
+  if (found || study.time_s.empty() || reference.time_s.empty()) return found;
+  const double lead_s = reference.time_s.front() - study.time_s.front();
+  RateSeries together = study;
+  for (double& time_s : together.time_s) time_s += lead_s;
+  auto again = find_time_offset(fixed, {together.time_s, together.rate_radps}, options);
+  if (!again) return again;
+  again->offset_s += lead_s;
+  again->study_origin_s -= lead_s;
+  return again;
+}
+
 Result<DeviceClock> align_by_rate(const std::string& name, const RateSeries& reference,
                                   const std::vector<Sample>& samples) {
   const auto study = rate_series(samples);
   TimeOffsetOptions options;
   options.estimate_clock_rate =
       !study.time_s.empty() && study.time_s.back() - study.time_s.front() >= kClockRateMin_s;
-  const auto found =
-      find_time_offset({reference.time_s, reference.rate_radps}, {study.time_s, study.rate_radps}, options);
+  const auto found = find_offset(reference, study, options);
   if (!found) {
     return work_error(
         fmt::format("{}: its clock cannot be brought to the reference's: {}", name, found.error().what),

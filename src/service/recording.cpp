@@ -235,6 +235,10 @@ Result<OpenedRecording> open_capture(const std::string& input,
 
 }  // namespace
 
+Result<OpenedRecording> open_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
+  return open_raw_dumps(inputs, std::move(configuration));
+}
+
 Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
                                        const std::optional<std::filesystem::path>& configuration) {
   const auto is_dump = [](const std::string& input) { return input.find('=') != std::string::npos; };

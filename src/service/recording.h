@@ -27,4 +27,7 @@ struct OpenedRecording {
 Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
                                        const std::optional<std::filesystem::path>& configuration);
 
+/// The same for raw dumps and a configuration at hand.
+Result<OpenedRecording> open_dumps(const std::vector<std::string>& inputs, Configuration configuration);
+
 }  // namespace imuscope

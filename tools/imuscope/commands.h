@@ -42,6 +42,12 @@ void add_process(CLI::App& app, Work& chosen);
 /// `imuscope report RUN_DIR`
 void add_report(CLI::App& app, Work& chosen);
 
+/// `imuscope import --out CAPTURE NAME=FILE...`
+void add_import(CLI::App& app, Work& chosen);
+
+/// `imuscope probe`
+void add_probe(CLI::App& app, Work& chosen);
+
 /// `imuscope decode FILE`
 void add_decode(CLI::App& app, Work& chosen);
 

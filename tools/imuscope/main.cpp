@@ -34,6 +34,8 @@ int run(int argc, char** argv) {
   imuscope::cli::add_process(app, work);
   imuscope::cli::add_report(app, work);
   imuscope::cli::add_decode(app, work);
+  imuscope::cli::add_import(app, work);
+  imuscope::cli::add_probe(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/support/shared_data.h"
 
 namespace imuscope {
 namespace {
@@ -16,6 +20,20 @@ TEST(PortProblems, EveryRefusalComesWithItsRemedy) {
   EXPECT_NE(explain_open_failure("/dev/ttyS9", ENXIO).remedy.find("plug"), std::string::npos);
   EXPECT_NE(explain_open_failure("/dev/ttyUSB77", ENOENT).remedy.find("plug the device in"),
             std::string::npos);
+}
+
+TEST(PortProblems, AnAdaptersLatencyTimerIsRead) {
+  const auto folder = test::scratch_folder();
+  std::filesystem::create_directories(folder / "adapters" / "ttyUSB3");
+  std::ofstream(folder / "adapters" / "ttyUSB3" / "latency_timer") << "16\n";
+  std::ofstream(folder / "ttyUSB3").put('x');
+  std::ofstream(folder / "ttyACM0").put('x');
+  // By its stable name, as udev links it.
+  std::filesystem::create_symlink(folder / "ttyUSB3", folder / "usb-FTDI_mtx1");
+  const std::string adapters = (folder / "adapters").string();
+  EXPECT_EQ(latency_timer_ms((folder / "usb-FTDI_mtx1").string(), adapters), 16);
+  EXPECT_FALSE(latency_timer_ms((folder / "ttyACM0").string(), adapters).has_value());
+  EXPECT_FALSE(latency_timer_ms((folder / "none").string(), adapters).has_value());
 }
 
 }  // namespace

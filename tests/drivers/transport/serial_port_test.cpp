@@ -5,11 +5,15 @@
 #include <poll.h>
 #include <pty.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
 #include <termios.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <numeric>
 #include <thread>
 
@@ -102,6 +106,98 @@ TEST_F(SerialPortTest, ASecondProgramIsTurnedAwayAndToldWhoHoldsThePort) {
   EXPECT_NE(second.error().what.find("in use by process this program"), std::string::npos)
       << second.error().what;
   port = SerialPort::open({(name_.string() + ".none"), 115200, 1});
+}
+
+/// A process of its own that runs `work` and ends with its result; killed where it does not end.
+class OtherProcess {
+ public:
+  explicit OtherProcess(const std::function<bool()>& work) : pid_(fork()) {
+    if (pid_ == 0) _exit(work() ? 0 : 1);
+  }
+  ~OtherProcess() {
+    if (pid_ <= 0) return;
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  OtherProcess(const OtherProcess&) = delete;
+  OtherProcess& operator=(const OtherProcess&) = delete;
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  bool succeeds() {
+    int status = 0;
+    const bool ended = waitpid(pid_, &status, 0) == pid_;
+    pid_ = 0;
+    return ended && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  }
+
+ private:
+  pid_t pid_;
+};
+
+TEST_F(SerialPortTest, ABusyPortNamesTheProgramThatHoldsItAndItsNumber) {
+  std::array<int, 2> ready{};
+  ASSERT_EQ(pipe(ready.data()), 0);
+  const OtherProcess holder([&] {
+    const auto port = SerialPort::open(settings_);
+    if (write(ready[1], port ? "y" : "n", 1) == 1) pause();
+    return false;
+  });
+  char answer = 0;
+  ASSERT_EQ(read(ready[0], &answer, 1), 1);
+  ASSERT_EQ(answer, 'y');
+  const auto second = SerialPort::open(settings_);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().what.find(std::to_string(holder.pid()) + " (transport_tests)"), std::string::npos)
+      << second.error().what;
+  EXPECT_NE(second.error().remedy.find("stop that program"), std::string::npos);
+  EXPECT_EQ(second.error().text().find('\n'), std::string::npos);
+  close(ready[0]);
+  close(ready[1]);
+}
+
+TEST_F(SerialPortTest, APortThatIsNotPermittedSaysHowToGetIt) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can become somebody who is not permitted";
+  const auto terminal = std::filesystem::canonical(name_);
+  ASSERT_EQ(chmod(terminal.c_str(), 0600), 0);
+  OtherProcess stranger([&] {
+    constexpr uid_t kNobody = 65534;
+    if (setgid(kNobody) != 0 || setuid(kNobody) != 0) return false;
+    // The folder of the link need not be open to everybody.
+    const auto port = SerialPort::open({terminal.string(), 115200, 1});
+    return !port &&
+           port.error().what.find("no permission for port " + terminal.string()) != std::string::npos &&
+           port.error().remedy.find("usermod -aG") != std::string::npos &&
+           port.error().remedy.find("udev rule") != std::string::npos;
+  });
+  EXPECT_TRUE(stranger.succeeds());
+}
+
+TEST_F(SerialPortTest, WhatAPseudoTerminalCannotDoIsNoReasonToFail) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  EXPECT_FALSE(port->low_latency());
+  EXPECT_FALSE(port->line_errors().has_value());
+  EXPECT_EQ(port->health().frames_dropped, 0U);
+  EXPECT_TRUE(port->health().is_up);
+}
+
+TEST_F(SerialPortTest, LeftoverSettingsOfAnotherProgramAreCleared) {
+  termios left{};
+  const int fd = open(name_.c_str(), O_RDWR | O_NOCTTY);
+  ASSERT_EQ(tcgetattr(fd, &left), 0);
+  left.c_lflag |= ECHO | ICANON | ISIG;
+  left.c_iflag |= IXON | ICRNL | ISTRIP;
+  left.c_oflag |= OPOST | ONLCR;
+  ASSERT_EQ(tcsetattr(fd, TCSANOW, &left), 0);
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port) << port.error().text();
+  termios now{};
+  ASSERT_EQ(tcgetattr(fd, &now), 0);
+  EXPECT_EQ(now.c_lflag & (ECHO | ICANON | ISIG), 0U);
+  EXPECT_EQ(now.c_iflag & (IXON | ICRNL | ISTRIP), 0U);
+  EXPECT_EQ(now.c_oflag & OPOST, 0U);
+  EXPECT_EQ(now.c_cflag & HUPCL, 0U);
+  EXPECT_NE(now.c_cflag & CLOCAL, 0U);
+  close(fd);
 }
 
 TEST_F(SerialPortTest, ClosingLetsTheNextOneIn) {

@@ -1,0 +1,67 @@
+#include "service/protocol_finder.h"
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+
+#include "service/device_factory.h"
+
+namespace imuscope {
+namespace {
+
+/// A false frame passes an 8-bit sum now and then: messages must make up this much of a stream.
+constexpr double kShareToBelieve = 0.5;
+
+/// Counts what a device is there for: rates and forces, or positions.
+class Counter final : public SampleSink {
+ public:
+  explicit Counter(SampleKind kind) : kind_(kind) {}
+  void on_sample(const Sample& sample) noexcept override { count += sample.kind == kind_ ? 1 : 0; }
+  std::uint64_t count = 0;
+
+ private:
+  SampleKind kind_;
+};
+
+FoundStream decode_as(const StreamProtocol& as, std::span<const std::uint8_t> bytes) {
+  DeviceConfig device;
+  device.protocol = as.protocol;
+  device.rate_hz = 100.0;
+  const auto decoder = make_decoder(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0));
+  Counter counter(as.purpose);
+  decoder->push(bytes, HostTime{}, counter);
+  decoder->finish(HostTime{}, counter);
+  const DecoderCounters& counters = decoder->counters();
+  const std::uint64_t covered = bytes.size() - std::min<std::uint64_t>(counters.bytes_skipped, bytes.size());
+  return {as.protocol, counters.frames, counter.count,
+          bytes.empty() ? 0.0 : static_cast<double>(covered) / static_cast<double>(bytes.size())};
+}
+
+}  // namespace
+
+std::span<const StreamProtocol> stream_protocols() {
+  static constexpr std::array<StreamProtocol, 3> kProtocols{{{Protocol::kXsensMt, SampleKind::kImu},
+                                                             {Protocol::kIxblueStdbin, SampleKind::kImu},
+                                                             {Protocol::kGreis, SampleKind::kGnss}}};
+  return kProtocols;
+}
+
+bool is_receiver(Protocol protocol) {
+  const auto all = stream_protocols();
+  return std::any_of(all.begin(), all.end(), [&](const StreamProtocol& stream) {
+    return stream.protocol == protocol && stream.purpose == SampleKind::kGnss;
+  });
+}
+
+std::optional<FoundStream> find_protocol(std::span<const std::uint8_t> bytes) {
+  std::optional<FoundStream> best;
+  const auto rank = [](const FoundStream& found) { return std::tuple(found.samples > 0, found.share); };
+  for (const StreamProtocol& protocol : stream_protocols()) {
+    const FoundStream found = decode_as(protocol, bytes);
+    if (found.messages < kMessagesToBelieve || found.share < kShareToBelieve) continue;
+    if (!best || rank(found) > rank(*best)) best = found;
+  }
+  return best;
+}
+
+}  // namespace imuscope

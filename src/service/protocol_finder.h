@@ -1,0 +1,40 @@
+#pragma once
+
+/// Which protocol a stream of bytes is in, and what it says of its device: for drafting a configuration.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "service/config.h"
+
+namespace imuscope {
+
+/// What was recognised in a stream.
+struct FoundStream {
+  Protocol protocol{};
+  std::uint64_t messages = 0;
+  std::uint64_t samples = 0;  ///< of what the device is there for: rates and forces, or positions
+  double share = 0.0;         ///< of the bytes that belong to its messages
+};
+
+/// A protocol of devices on a line, and what its devices are there for.
+struct StreamProtocol {
+  Protocol protocol{};
+  SampleKind purpose{};  ///< kImu or kGnss
+};
+
+/// In the order in which they are tried.
+[[nodiscard]] std::span<const StreamProtocol> stream_protocols();
+
+/// Whether devices of a stream protocol are GNSS receivers; the others are IMUs.
+[[nodiscard]] bool is_receiver(Protocol protocol);
+
+/// The protocol of a stream: the one with samples whose messages cover the most bytes; nothing where no
+/// protocol finds kMessagesToBelieve messages.
+[[nodiscard]] std::optional<FoundStream> find_protocol(std::span<const std::uint8_t> bytes);
+
+inline constexpr std::uint64_t kMessagesToBelieve = 3;
+
+}  // namespace imuscope

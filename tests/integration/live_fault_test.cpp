@@ -1,0 +1,178 @@
+/// The live service on a simulated vehicle whose devices fail one after another: each is brought back, what
+/// is lost is counted, the others notice nothing, and the recording replays to the same estimates.
+
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <imuscope/status_t.hpp>
+#include <lcm/lcm-cpp.hpp>
+#include <regex>
+
+#include "programs.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::test {
+namespace {
+
+/// The drive begins at 60 s with --skip-static.
+constexpr double kBegin_s = 60.0;
+constexpr int kRun_s = 48;
+constexpr const char* kFaults = R"(
+[[fault]]
+kind = "unplug"
+device = "mtx1"
+at_s = 80.0
+for_s = 3.0
+[[fault]]
+kind = "flip"
+device = "mtx2"
+at_s = 80.0
+for_s = 8.0
+share = 0.001
+[[fault]]
+kind = "stall"
+device = "mtx3"
+at_s = 80.0
+for_s = 1.0
+[[fault]]
+kind = "cut"
+device = "gnss"
+at_s = 80.0
+for_s = 5.0
+share = 0.3
+[[fault]]
+kind = "restart"
+device = "mtx2"
+at_s = 92.0
+for_s = 0.5
+[[fault]]
+kind = "clock_jump"
+device = "mtx3"
+at_s = 92.0
+by_s = 2.0
+)";
+
+struct Heard {
+  double t_s;  ///< scenario time, to some tenths of a second
+  status_t status;
+};
+
+/// Statuses as they came.
+struct Listener {
+  void on_status(const lcm::ReceiveBuffer* /*buffer*/, const std::string& /*channel*/,
+                 const status_t* status) {
+    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - started;
+    heard.push_back({kBegin_s + since.count(), *status});
+  }
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+  std::vector<Heard> heard;
+};
+
+class LiveFaults : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network namespace needs root";
+    ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
+    std::string text = read_text(source_path("config/demo.toml"));
+    text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder_ / "ports").string());
+    std::ofstream(folder_ / "live.toml") << text;
+    std::ofstream(folder_ / "faults.toml") << kFaults;
+  }
+
+  /// A device in the last status at or before a time.
+  [[nodiscard]] const device_status_t& at(double t_s, const std::string& name) const {
+    const auto after = std::find_if(listener_.heard.begin(), listener_.heard.end(),
+                                    [&](const Heard& heard) { return heard.t_s > t_s; });
+    EXPECT_NE(after, listener_.heard.begin()) << "no status by " << t_s;
+    const auto& devices = std::prev(after)->status.devices;
+    const auto found = std::find_if(devices.begin(), devices.end(),
+                                    [&](const device_status_t& device) { return device.name == name; });
+    EXPECT_NE(found, devices.end());
+    return *found;
+  }
+  [[nodiscard]] const device_status_t& at_end(const std::string& name) const { return at(1e9, name); }
+
+  std::filesystem::path folder_ = scratch_folder();
+  Listener listener_;
+};
+
+TEST_F(LiveFaults, EachDeviceComesBackIsCountedAndDisturbsNoOther) {
+  lcm::LCM bus("udpm://239.255.76.67:7667?ttl=0");
+  ASSERT_TRUE(bus.good());
+  bus.subscribe("IMUSCOPE_STATUS", &Listener::on_status, &listener_);
+  listener_.started = std::chrono::steady_clock::now();
+  BackgroundProgram vehicle("imusim",
+                            {"live", (folder_ / "live.toml").string(), "--skip-static", "--faults",
+                             (folder_ / "faults.toml").string()},
+                            folder_ / "imusim.log");
+  BackgroundProgram service("imuscope",
+                            {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live").string()},
+                            folder_ / "imuscope.log");
+  while (std::chrono::steady_clock::now() - listener_.started < std::chrono::seconds(kRun_s))
+    bus.handleTimeout(100);
+  service.interrupt();
+  ASSERT_EQ(service.wait(), 0) << read_text(folder_ / "imuscope.log");
+  vehicle.interrupt();
+  vehicle.wait();
+  SCOPED_TRACE(read_text(folder_ / "imuscope.log"));
+  ASSERT_GT(listener_.heard.size(), 30U);
+
+  for (const char* name : {"airins", "mtx1", "mtx2", "mtx3", "gnss"}) {
+    EXPECT_EQ(at(79.0, name).state, "streaming") << name;
+    EXPECT_EQ(at_end(name).state, "streaming") << name;
+    EXPECT_EQ(at_end(name).samples_refused, 0) << name;
+  }
+
+  // The reference ran beside all of it and lost nothing.
+  EXPECT_EQ(at_end("airins").samples_lost, 0);
+  EXPECT_EQ(at_end("airins").bad_checksums, 0);
+  EXPECT_EQ(at_end("airins").clock_resets, 0);
+
+  // Unplugged for 3 s: said, opened again by its name, taken over as it streams; the 300 samples are counted.
+  const bool said = std::any_of(listener_.heard.begin(), listener_.heard.end(), [](const Heard& heard) {
+    return std::any_of(heard.status.devices.begin(), heard.status.devices.end(),
+                       [](const device_status_t& d) { return d.name == "mtx1" && d.state == "no line"; });
+  });
+  EXPECT_TRUE(said);
+  const auto lost = at_end("mtx1").samples_lost - at(79.0, "mtx1").samples_lost;
+  EXPECT_GE(lost, 298);
+  EXPECT_LE(lost, 700) << "3 s, and as long again at most of back-off, which doubles";
+  EXPECT_NE(read_text(folder_ / "imuscope.log").find("mtx1 at 115200 baud is gone"), std::string::npos);
+
+  // Flipped bits cost the messages that they hit: 8 s of 3100 bytes/s hold some 25 of them.
+  const auto damaged = at(90.0, "mtx2").samples_lost - at(79.0, "mtx2").samples_lost;
+  EXPECT_GE(damaged, 8);
+  EXPECT_LE(damaged, 50);
+  EXPECT_GE(at(90.0, "mtx2").bad_checksums, 8);
+  // Without power its settings stay and its counter does not: set up anew, a new segment of its clock.
+  EXPECT_GE(at_end("mtx2").clock_resets, 1);
+
+  // A stall loses nothing; a jump of its count by 200 looks like 200 lost samples, or like a new segment.
+  EXPECT_EQ(at(90.0, "mtx3").samples_lost, at(79.0, "mtx3").samples_lost);
+  EXPECT_EQ(at(90.0, "mtx3").bad_checksums, 0);
+  EXPECT_TRUE(at_end("mtx3").samples_lost - at(90.0, "mtx3").samples_lost == 200 ||
+              at_end("mtx3").clock_resets == 1);
+
+  // Epochs that lost a piece are dropped, whole ones used.
+  EXPECT_GT(at(90.0, "gnss").bytes_skipped, 0);
+  EXPECT_GT(at_end("gnss").samples, at(90.0, "gnss").samples + 50);
+
+  // What happened is in the recording: it replays to the same files.
+  ASSERT_EQ(run_program("imuscope",
+                        {"replay", (folder_ / "live" / "capture.lcm").string(), "--out",
+                         (folder_ / "replay").string()},
+                        folder_ / "replay.log"),
+            0)
+      << read_text(folder_ / "replay.log");
+  for (const char* name : {"navigation.csv", "calibration_mtx1.csv", "calibration_mtx2.csv",
+                           "errors_mtx1.csv", "errors_mtx2.csv", "errors_mtx3.csv"}) {
+    const auto live = read_text(folder_ / "live" / name);
+    EXPECT_GT(live.size(), 1000U) << name;
+    EXPECT_TRUE(live == read_text(folder_ / "replay" / name)) << name << " differs between live and replay";
+  }
+}
+
+}  // namespace
+}  // namespace imuscope::test
