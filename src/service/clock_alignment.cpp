@@ -131,4 +131,29 @@ Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration
   return clocks;
 }
 
+Result<DeviceClock> align_log(const DeviceConfig& device, bool stamps_are_utc,
+                              const std::vector<Sample>& reference,
+                              const std::function<Result<std::vector<Sample>>()>& read_own) {
+  if (device.can && device.can->log_has_common_clock) {
+    return DeviceClock{ClockMapConfig::fixed(HostTime{}, 1.0), 0.0, 0.0,
+                       "the reference's clock, as configured"};
+  }
+  const auto reference_utc = utc_minus_own(reference);
+  if (stamps_are_utc && reference_utc) {
+    const Duration shift = -*reference_utc;
+    return DeviceClock{ClockMapConfig::fixed(HostTime{shift}, 1.0), to_seconds(shift), 0.0,
+                       "the log's stamps, taken as UTC"};
+  }
+  if (device.role != DeviceRole::kStudy) {
+    return work_error(
+        fmt::format("{}: {}", device.name,
+                    stamps_are_utc ? "the log is stamped with UTC, which the reference's samples lack"
+                                   : "the stamps of the log are no UTC"),
+        "set log_clock = \"common\" in its transport where they are the reference's times");
+  }
+  const auto samples = read_own();
+  if (!samples) return tl::unexpected<Error>(samples.error());
+  return align_by_rate(device.name, rate_series(reference), *samples);
+}
+
 }  // namespace imuscope

@@ -32,4 +32,13 @@ using ReadSamples = std::function<Result<std::vector<Sample>>(DeviceIndex)>;
 Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration,
                                               const std::vector<bool>& unstamped, const ReadSamples& read);
 
+/// The time scale of a log whose stamps are the wall clock of the PC that wrote it.
+/// @param stamps_are_utc  otherwise times of any origin
+/// @param reference       its samples, on the time scale of the run
+/// @param read_own        decodes the log with its own stamps
+/// Errors (kWork): nothing brings the log to the reference's time, with the remedy.
+Result<DeviceClock> align_log(const DeviceConfig& device, bool stamps_are_utc,
+                              const std::vector<Sample>& reference,
+                              const std::function<Result<std::vector<Sample>>()>& read_own);
+
 }  // namespace imuscope

@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <algorithm>
+#include <utility>
 
 #include "base/nearest_word.h"
 #include "capture/capture_reader.h"
 #include "capture/raw_dump.h"
+#include "drivers/transport/candump.h"
+#include "service/candump_source.h"
 #include "service/device_factory.h"
 #include "service/toml_reader.h"
 
@@ -23,16 +26,18 @@ class SampleCollector final : public SampleSink {
   std::vector<Sample>& samples_;
 };
 
+/// @param clock  fixed for a source without arrivals
 Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex index,
-                                       const std::vector<std::string>& inputs, ByteSource& source) {
+                                       const std::vector<std::string>& inputs, const ClockMapConfig& clock,
+                                       ByteSource& source) {
   std::vector<Sample> samples;
   SampleCollector collector(samples);
-  const auto decoder = make_decoder(device, index, ClockMapConfig::fixed(HostTime{}, 1.0));
+  const auto decoder = make_decoder(device, index, clock);
   for (;;) {
     auto read = source.next();
     if (!read) return tl::unexpected<Error>(read.error());
     if (!*read) break;
-    decoder->push((*read)->bytes, HostTime{}, collector);
+    decoder->push((*read)->bytes, (*read)->arrival.value_or(HostTime{}), collector);
   }
   decoder->finish(HostTime{}, collector);
   if (samples.empty()) return tl::unexpected<Error>(no_sample_error(device, inputs, *decoder));
@@ -77,19 +82,63 @@ Result<void> check_roles(const Configuration& configuration, const std::vector<b
   return {};
 }
 
+/// Per device: what its log of candump holds, where it is given as one.
+using Logs = std::vector<std::optional<CandumpSurvey>>;
+
 /// Arrival stamps are times of the host, which nothing ties to a device's own.
 Result<void> check_stamps(const std::vector<std::filesystem::path>& files, const std::vector<bool>& present,
-                          const std::vector<bool>& unstamped) {
+                          const std::vector<bool>& unstamped, const Logs& logs) {
   const std::filesystem::path* with = nullptr;
   const std::filesystem::path* without = nullptr;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    if (present[i]) (unstamped[i] ? without : with) = &files[i];
+    if (present[i] && !logs[i]) (unstamped[i] ? without : with) = &files[i];
   }
   if (with == nullptr || without == nullptr) return {};
   return usage_error(fmt::format("{} has arrival stamps ({}) and {} has none", with->string(),
                                  RawDump::arrivals_path(*with).filename().string(), without->string()),
                      fmt::format("put {} beside it, or give only files without stamps",
                                  RawDump::arrivals_path(*without).filename().string()));
+}
+
+/// Brings the logs of candump to the time scale of the other devices. From then on they are stamped
+/// recordings.
+Result<void> align_logs(const Configuration& configuration, const std::vector<std::string>& inputs,
+                        const std::vector<std::filesystem::path>& files, const Logs& logs,
+                        OpenedRecording& opened) {
+  auto& recording = opened.recording;
+  const auto reference = configuration.reference_index();
+  const auto own_times = ClockMapConfig::fixed(HostTime{}, 1.0);
+  std::vector<ClockMapConfig> log_clocks(files.size(), own_times);
+  std::optional<std::vector<Sample>> reference_samples;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!logs[i] || i == reference) continue;
+    if (!reference_samples) {
+      auto source = logs[reference] ? open_candump(files[reference], logs[reference]->interface, own_times)
+                                    : recording.open(static_cast<DeviceIndex>(reference));
+      if (!source) return tl::unexpected<Error>(source.error());
+      auto samples = decode_all(configuration.devices[reference], static_cast<DeviceIndex>(reference), inputs,
+                                recording.clocks[reference].map, **source);
+      if (!samples) return tl::unexpected<Error>(samples.error());
+      reference_samples = std::move(*samples);
+    }
+    const auto read_own = [&]() -> Result<std::vector<Sample>> {
+      auto source = open_candump(files[i], logs[i]->interface, own_times);
+      if (!source) return tl::unexpected<Error>(source.error());
+      return decode_all(configuration.devices[i], static_cast<DeviceIndex>(i), inputs, ClockMapConfig{},
+                        **source);
+    };
+    auto clock = align_log(configuration.devices[i], logs[i]->stamps_are_utc, *reference_samples, read_own);
+    if (!clock) return tl::unexpected<Error>(clock.error());
+    opened.remarks.push_back(fmt::format("{}: times from {}, {:+.3f} s", configuration.devices[i].name,
+                                         clock->how, clock->shift_s));
+    log_clocks[i] = std::exchange(clock->map, ClockMapConfig{});
+    recording.clocks[i] = std::move(*clock);
+  }
+  recording.open = [files, logs, log_clocks](DeviceIndex index) {
+    return logs[index] ? open_candump(files[index], logs[index]->interface, log_clocks[index])
+                       : open_raw_dump(files[index]);
+  };
+  return {};
 }
 
 Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
@@ -101,11 +150,19 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   recording.inputs = inputs;
   recording.present.resize(n);
   std::vector<bool> unstamped(n);
+  Logs logs(n);
   for (std::size_t i = 0; i < n; ++i) {
     recording.present[i] = !(*files)[i].empty();
     if (!recording.present[i]) {
       opened.remarks.push_back(
           fmt::format("{}: no file given; the run goes without it", configuration.devices[i].name));
+      continue;
+    }
+    if (CandumpLog::looks_like_one((*files)[i])) {
+      auto survey = survey_candump((*files)[i], configuration.devices[i]);
+      if (!survey) return tl::unexpected<Error>(survey.error());
+      opened.remarks.insert(opened.remarks.end(), survey->remarks.begin(), survey->remarks.end());
+      logs[i] = std::move(*survey);
       continue;
     }
     // Opened here already, so that a wrong path is told before anything is computed.
@@ -119,22 +176,26 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
     return tl::unexpected<Error>(checked.error());
   }
   for (std::size_t i = 0; i < n; ++i) {
-    if (!recording.present[i]) continue;
+    if (!recording.present[i] || logs[i]) continue;
     if (auto valid = check_recorded_file(configuration.devices[i], (*files)[i]); !valid) {
       return tl::unexpected<Error>(valid.error());
     }
   }
-  if (auto stamps = check_stamps(*files, recording.present, unstamped); !stamps) {
+  if (auto stamps = check_stamps(*files, recording.present, unstamped, logs); !stamps) {
     return tl::unexpected<Error>(stamps.error());
   }
   recording.open = [files = *files](DeviceIndex index) { return open_raw_dump(files[index]); };
   auto clocks = align_clocks(configuration, unstamped, [&](DeviceIndex index) -> Result<std::vector<Sample>> {
     auto source = recording.open(index);
     if (!source) return tl::unexpected<Error>(source.error());
-    return decode_all(configuration.devices[index], index, inputs, **source);
+    return decode_all(configuration.devices[index], index, inputs, ClockMapConfig::fixed(HostTime{}, 1.0),
+                      **source);
   });
   if (!clocks) return tl::unexpected<Error>(clocks.error());
   recording.clocks = std::move(*clocks);
+  if (auto aligned = align_logs(configuration, inputs, *files, logs, opened); !aligned) {
+    return tl::unexpected<Error>(aligned.error());
+  }
   for (std::size_t i = 0; i < n; ++i) {
     if (!recording.present[i] || !unstamped[i]) continue;
     opened.remarks.push_back(fmt::format("{}: times from {}, {:+.3f} s", configuration.devices[i].name,
