@@ -54,6 +54,28 @@ std::vector<double> intersection_weights(const std::vector<Information>& all) {
   return weights;
 }
 
+double upper_tail(double chi2, double dof) {
+  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(dof), chi2));
+}
+
+/// Drive i against the inverse-variance mean of all others: their errors are independent, so that the
+/// difference has the sum of the covariances. E-24.
+DriveDeviation deviation_of(const std::vector<Information>& all, std::size_t i) {
+  DriveDeviation out;
+  if (all.size() < 2) return out;
+  std::vector<double> others(all.size(), 1.0);
+  others[i] = 0.0;
+  Matrix6 P;
+  const Vector6 mean = weighted_mean(all, others, P);
+  P += all[i].information.ldlt().solve(Matrix6::Identity());
+  const Vector6 difference = all[i].x - mean;
+  Eigen::Map<Vector6>(out.deviation.data()) = difference;
+  Eigen::Map<Vector6>(out.deviation_sd.data()) = P.diagonal().cwiseSqrt();
+  out.chi2 = difference.dot(P.ldlt().solve(difference));
+  out.p_value = upper_tail(out.chi2, 6.0);
+  return out;
+}
+
 }  // namespace
 
 Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, CombineMethod method) {
@@ -80,10 +102,9 @@ Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, Co
   Vector6 x = weighted_mean(all, ones, P);
   for (const Information& one : all) out.homogeneity_chi2 += (one.x - x).dot(one.information * (one.x - x));
   out.homogeneity_dof = 6 * (all.size() - 1);
-  if (out.homogeneity_dof > 0) {
-    const boost::math::chi_squared distribution(static_cast<double>(out.homogeneity_dof));
-    out.homogeneity_p_value = boost::math::cdf(boost::math::complement(distribution, out.homogeneity_chi2));
-  }
+  if (out.homogeneity_dof > 0)
+    out.homogeneity_p_value = upper_tail(out.homogeneity_chi2, static_cast<double>(out.homogeneity_dof));
+  for (std::size_t i = 0; i < all.size(); ++i) out.drives.push_back(deviation_of(all, i));
   out.weights = ones;
   if (method == CombineMethod::kCovarianceIntersection) {
     out.weights = intersection_weights(all);

@@ -27,9 +27,20 @@ enum class CombineMethod {
                             ///< over-confident
 };
 
+/// How far one drive lies from the others.
+struct DriveDeviation {
+  /// (psi, r) of the drive minus the inverse-variance mean of the others, rad and m; by the sd of the
+  /// difference.
+  std::array<double, 6> deviation{};
+  std::array<double, 6> deviation_sd{};
+  double chi2 = 0.0;  ///< 6 degrees of freedom where this drive saw the others' mounting
+  double p_value = 1.0;
+};
+
 struct CombinedMounting {
   MountingEstimate estimate;
-  std::vector<double> weights;  ///< per drive; covariance intersection only, else 1 each
+  std::vector<DriveDeviation> drives;  ///< in the order given; of a single drive all zero
+  std::vector<double> weights;         ///< per drive; covariance intersection only, else 1 each
   /// Sum of squared deviations from the inverse-variance mean, each by its own covariance. Chi-square with
   /// 6 (n - 1) degrees of freedom where all drives saw one mounting and their errors are independent.
   double homogeneity_chi2 = 0.0;

@@ -17,8 +17,6 @@ namespace {
 
 /// S samples that one tick can show: 0.5 s of six sensors at 400 Hz, so that a stall is caught up in one go.
 constexpr std::size_t kEpochsPerTick = 1200;
-/// The smoother gets five epochs a second.
-constexpr Duration kHistoryEvery = std::chrono::milliseconds{200};
 /// At standstill f_z of forward-right-down axes is about -9.8; above this it points elsewhere.
 constexpr double kGravityWrong_mps2 = -8.0;
 
@@ -152,10 +150,12 @@ class Estimator::Impl final : public EpochSink {
 
   void hand_out_history() noexcept {
     if (history_ == nullptr || !has_reference_ || last_reference_ < next_history_) return;
-    next_history_ = last_reference_ + kHistoryEvery;
-    const FilterCore::Accumulated& since = core_.accumulated();
-    history_->on_history({last_reference_, since.connected, core_, since.transition, since.noise, since.decay,
-                          since.decay_noise, since.injected});
+    next_history_ = last_reference_ + history_->interval();
+    std::array<bool, kMaxStudies> calibrating{};
+    for (std::size_t i = 0; i < studies_.size(); ++i)
+      calibrating[i] = studies_[i].output().status >= StudyStatus::kConverging;
+    history_->on_history(
+        {last_reference_, navigation_.navigating(), calibrating, core_, core_.accumulated()});
     core_.restart_accumulation();
   }
 

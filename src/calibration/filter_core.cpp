@@ -120,9 +120,16 @@ void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
   };
   injected_ = carried(injected_);
   if (!keeps_history_) return;
-  const NavigationErrorCovariance Phi = full_matrix(step);
-  accumulated_.transition = Phi * accumulated_.transition;
-  accumulated_.noise = Phi * accumulated_.noise * Phi.transpose() + step.process_covariance;
+  const auto carried_matrix = [&step](const NavigationErrorCovariance& M) {
+    NavigationErrorCovariance out;
+    out.topRows<kNavigationKinematicSize>().noalias() = step.kinematic_rows * M;
+    out.middleRows<3>(kGyroBiasError) = step.gyro_bias_decay * M.middleRows<3>(kGyroBiasError);
+    out.middleRows<3>(kAccelBiasError) = step.accel_bias_decay * M.middleRows<3>(kAccelBiasError);
+    return out;
+  };
+  accumulated_.transition = carried_matrix(accumulated_.transition);
+  accumulated_.noise =
+      carried_matrix(carried_matrix(accumulated_.noise).transpose()) + step.process_covariance;
   Eigen::Map<NavigationErrorVector> injected(accumulated_.injected.data());
   injected = carried(injected);
 }
@@ -138,24 +145,30 @@ void FilterCore::predict_states(std::size_t first, std::span<const double> decay
   for (std::size_t k = 0; k < decay.size(); ++k) accumulate(first + k, decay[k], variance[k]);
 }
 
+void FilterCore::reset_state(std::size_t i, double variance) noexcept {
+  covariance_.reset_state(i, variance);
+  // A decay to nothing: what was known before tells nothing of what comes after.
+  if (keeps_history_) accumulate(i, 0.0, variance);
+}
+
 void FilterCore::accumulate(std::size_t i, double decay, double variance) noexcept {
-  accumulated_.injected[i] *= decay;
+  // A product with 0 would let a lost state's NaN through.
+  const auto decayed = [decay](double value) { return decay == 0.0 ? 0.0 : decay * value; };
+  accumulated_.injected[i] = decayed(accumulated_.injected[i]);
   if (i < kNavigationStates) {
     const auto k = static_cast<Eigen::Index>(i);
-    accumulated_.transition.row(k) *= decay;
-    accumulated_.noise.row(k) *= decay;
-    accumulated_.noise.col(k) *= decay;
-    accumulated_.noise(k, k) += variance;
+    NavigationErrorCovariance& noise = accumulated_.noise;
+    for (Eigen::Index j = 0; j < kNavigationErrorSize; ++j) {
+      accumulated_.transition(k, j) = decayed(accumulated_.transition(k, j));
+      noise(k, j) = decayed(noise(k, j));
+    }
+    for (Eigen::Index j = 0; j < kNavigationErrorSize; ++j) noise(j, k) = decayed(noise(j, k));
+    noise(k, k) += variance;
   } else {
     const std::size_t k = i - kNavigationStates;
     accumulated_.decay[k] *= decay;
     accumulated_.decay_noise[k] = decay * decay * accumulated_.decay_noise[k] + variance;
   }
-}
-
-void FilterCore::reset_state(std::size_t i, double variance) noexcept {
-  covariance_.reset_state(i, variance);
-  accumulated_.connected = false;
 }
 
 void FilterCore::restart_accumulation() noexcept {
@@ -164,7 +177,6 @@ void FilterCore::restart_accumulation() noexcept {
   std::fill(accumulated_.decay.begin(), accumulated_.decay.end(), 1.0);
   std::fill(accumulated_.decay_noise.begin(), accumulated_.decay_noise.end(), 0.0);
   std::fill(accumulated_.injected.begin(), accumulated_.injected.end(), 0.0);
-  accumulated_.connected = true;
 }
 
 std::size_t FilterCore::repair(std::size_t& first) noexcept {

@@ -48,7 +48,7 @@ class FilterCore {
   /// The same of several neighbours at once.
   void predict_states(std::size_t first, std::span<const double> decay,
                       std::span<const double> variance) noexcept;
-  /// Makes a state uncorrelated, of the given variance; the history breaks there.
+  /// Makes a state uncorrelated, of the given variance; to the history that is a new state.
   void reset_state(std::size_t i, double variance) noexcept;
 
   /// Sum of the navigation corrections injected so far, carried to the present: e <- Phi e + d. E-4.
@@ -62,7 +62,6 @@ class FilterCore {
     std::vector<double> decay;  ///< of the states from 15 on
     std::vector<double> decay_noise;
     std::vector<double> injected;  ///< of every state, carried to the present
-    bool connected = true;         ///< no state was reset
   };
   void keep_history() noexcept { keeps_history_ = true; }
   [[nodiscard]] const Accumulated& accumulated() const noexcept { return accumulated_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/navigation_output.h"
 #include "navigation/so3.h"
 #include "navigation/strapdown.h"
 
@@ -437,40 +438,15 @@ void NavigationFilter::update_output() noexcept {
   output_.utc = last_utc_;
   output_.has_utc = last_has_utc_;
   if (!navigating()) return;
-  const NavigationState& state = core_.navigation();
-  output_.latitude_rad = state.position.latitude_rad;
-  output_.longitude_rad = state.position.longitude_rad;
-  output_.height_m = state.position.height_m;
-  output_.v_n_mps = to_array(state.v_n_mps);
-  output_.C_b_n = to_array(state.C_b_n);
-  const EulerAngles rpy = euler_from_rotation(state.C_b_n);
-  output_.rpy_rad = {rpy.roll_rad, rpy.pitch_rad, rpy.heading_rad};
-  output_.gyro_bias_radps = to_array(state.gyro_bias_b_radps);
-  output_.accel_bias_mps2 = to_array(state.accel_bias_b_mps2);
+  std::array<double, kNavigationStates> sd{};
+  for (std::size_t i = 0; i < sd.size(); ++i) sd[i] = core_.sd(i);
   Matrix3d P_phi;
   for (std::size_t i = 0; i < 3; ++i) {
-    output_.sd_position_m[i] = core_.sd(kPositionError + i);
-    output_.sd_velocity_mps[i] = core_.sd(kVelocityError + i);
-    output_.sd_gyro_bias_radps[i] = core_.sd(kGyroBiasError + i);
-    output_.sd_accel_bias_mps2[i] = core_.sd(kAccelBiasError + i);
     for (std::size_t j = 0; j < 3; ++j)
       P_phi(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
           core_.covariance()(kAttitudeError + i, kAttitudeError + j);
   }
-  // phi = T d(roll, pitch, heading), with C_b_n = Rz(heading) Ry(pitch) Rx(roll) perturbed from the left.
-  // E-7.
-  const double sh = std::sin(rpy.heading_rad);
-  const double ch = std::cos(rpy.heading_rad);
-  const double cp = std::max(std::cos(rpy.pitch_rad), 1e-6);
-  const double sp = std::sin(rpy.pitch_rad);
-  Matrix3d T;
-  T << ch * cp, -sh, 0.0, sh * cp, ch, 0.0, -sp, 0.0, 1.0;
-  const Matrix3d T_inverse = T.inverse();
-  const Matrix3d P_rpy = T_inverse * P_phi * T_inverse.transpose();
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    output_.sd_rpy_rad[i] = std::sqrt(std::max(P_rpy(k, k), 0.0));
-  }
+  write_state(core_.navigation(), sd, P_phi, output_);
 }
 
 }  // namespace imuscope

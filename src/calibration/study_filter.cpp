@@ -485,7 +485,7 @@ void StudyFilter::update_output(const FilterCore& core) noexcept {
     const double sd = i < 3 ? output_.sd_psi_rad[i] : output_.sd_r_bs_b_m[i - 3];
     const double goal = i < 3 ? config_.goal_boresight_sd_rad : config_.goal_r_bs_b_sd_m;
     calibrated = calibrated && sd <= goal;
-    output_.observable[i] = sd < kObservableShare * prior_sd_psi_r_[i];
+    output_.observable[i] = sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal;
     for (std::size_t j = 0; j < 6; ++j) {
       const std::size_t other = j < 3 ? layout.psi : layout.r;
       const bool absent = block == StudyLayout::kAbsent || other == StudyLayout::kAbsent;
@@ -493,7 +493,8 @@ void StudyFilter::update_output(const FilterCore& core) noexcept {
     }
   }
   output_.t_d_observable =
-      layout.t_d != StudyLayout::kAbsent && output_.sd_t_d_s < kObservableShare * prior_sd_t_d_;
+      layout.t_d != StudyLayout::kAbsent &&
+      (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= config_.goal_t_d_sd_s);
   output_.status = calibrated ? StudyStatus::kCalibrated : StudyStatus::kConverging;
   if (output_.time >= next_direction_) {
     next_direction_ = output_.time + kDirectionEvery;

@@ -184,6 +184,33 @@ navigation_t to_message(const NavigationReport& report, std::int64_t sequence) {
   return message;
 }
 
+namespace {
+
+/// Where the motion has shown nothing of a state, its number would say something that nobody knows.
+void add_observability(const CalibrationReport& report, calibration_t& message) {
+  const std::array<double*, 7> values{&message.psi_x_deg, &message.psi_y_deg, &message.psi_z_deg,
+                                      &message.r_x_m,     &message.r_y_m,     &message.r_z_m,
+                                      &message.t_d_ms};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!report.observable[i]) *values[i] = kUnknown;
+  }
+  message.psi_x_observable = static_cast<std::int8_t>(report.observable[0]);
+  message.psi_y_observable = static_cast<std::int8_t>(report.observable[1]);
+  message.psi_z_observable = static_cast<std::int8_t>(report.observable[2]);
+  message.r_x_observable = static_cast<std::int8_t>(report.observable[3]);
+  message.r_y_observable = static_cast<std::int8_t>(report.observable[4]);
+  message.r_z_observable = static_cast<std::int8_t>(report.observable[5]);
+  message.t_d_observable = static_cast<std::int8_t>(report.observable[6]);
+  message.goal_sd_psi_deg = report.goal_sd_psi_rad * kDegPerRad;
+  message.goal_sd_r_m = report.goal_sd_r_m;
+  message.goal_sd_t_d_ms = report.goal_sd_t_d_s * kMsPerS;
+  message.weakest_direction = report.weakest_direction;
+  message.weakest_relative_sd = report.weakest_relative_sd;
+  message.advice = report.advice;
+}
+
+}  // namespace
+
 calibration_t to_message(const CalibrationReport& report, const std::string& name, std::int64_t sequence) {
   calibration_t message;
   message.utime = to_utime(report.utc);
@@ -236,6 +263,7 @@ calibration_t to_message(const CalibrationReport& report, const std::string& nam
   message.sd_sa_x = sd.accel_scale[0];
   message.sd_sa_y = sd.accel_scale[1];
   message.sd_sa_z = sd.accel_scale[2];
+  add_observability(report, message);
   return message;
 }
 

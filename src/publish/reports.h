@@ -3,8 +3,8 @@
 /// What the service has to say, as plain values in SI and radians. The publisher turns them into LCM
 /// messages, which speak degrees, milliseconds and microseconds. Unknown numbers are NaN.
 ///
-/// NavigationReport, CalibrationReport and ErrorReport are trivially copyable: they cross the ring from the
-/// estimator to the publisher. The others are made in the soft world.
+/// NavigationReport and ErrorReport are trivially copyable: they cross the ring from the estimator to the
+/// publisher. The others are made in the soft world.
 
 #include <array>
 #include <cstdint>
@@ -55,8 +55,15 @@ struct CalibrationReport {
   std::array<double, 4> q_b_s;  ///< C_b_s as a Hamilton quaternion w, x, y, z
   CalibrationStates value;
   CalibrationStates sd;
+  /// psi_x, psi_y, psi_z, r_x, r_y, r_z, t_d: the motion has shown it. Where not, no value is published.
+  std::array<bool, 7> observable{};
+  double goal_sd_psi_rad = kUnknown;
+  double goal_sd_r_m = kUnknown;
+  double goal_sd_t_d_s = kUnknown;
+  std::string weakest_direction;  ///< in words
+  double weakest_relative_sd = kUnknown;
+  std::string advice;  ///< the manoeuvre that would help most
 };
-static_assert(std::is_trivially_copyable_v<CalibrationReport>);
 
 /// One row of the error process of one S-IMU, resolved in s.
 struct ErrorReport {

@@ -32,13 +32,31 @@ struct Quantity {
   const char* sd_key;
   double unit;           ///< factor from the file's unit to the shown one
   bool wanders = false;  ///< its truth is that of the turn-on
+  std::array<bool, 3> observable{true, true, true};
 };
 
+/// Said where the motion has not shown a state: its number would say what nobody knows.
+constexpr const char* kNotObservable = "not observable yet";
+
+bool is_observable(const nlohmann::json& calibration, const std::string& state) {
+  return field(field(calibration, "observable"), state.c_str()) != nlohmann::json(false);
+}
+
+/// Components of "psi" or "r" that the motion has shown.
+std::array<bool, 3> observable_axes(const nlohmann::json& calibration, const char* quantity) {
+  std::array<bool, 3> axes{};
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    axes[i] = is_observable(calibration, fmt::format("{}_{}", quantity, kAxisNames[i]));
+  return axes;
+}
+
 std::vector<Html> row_of_three(Html name, const std::optional<Three>& values, const std::optional<Three>& sd,
-                               double unit) {
+                               double unit, const std::array<bool, 3>& observable = {true, true, true}) {
   std::vector<Html> row{std::move(name)};
   for (std::size_t i = 0; i < kAxisNames.size(); ++i) {
-    if (!values) {
+    if (!observable[i]) {
+      row.push_back(text(kNotObservable));
+    } else if (!values) {
       row.push_back(text(kUnknown));
     } else {
       row.push_back(with_sd(unit * (*values)[i], sd ? std::optional(unit * (*sd)[i]) : std::nullopt));
@@ -59,7 +77,7 @@ void add_quantity(Table& table, const StudyFiles& study, const Quantity& quantit
   const auto found = numbers_at<3>(study.calibration, quantity.value_key);
   const auto sd = numbers_at<3>(study.calibration, quantity.sd_key);
   if (!found) return;
-  table.add_row(row_of_three(quantity.name, found, sd, quantity.unit));
+  table.add_row(row_of_three(quantity.name, found, sd, quantity.unit, quantity.observable));
   const auto known = numbers_at<3>(study.truth, quantity.value_key);
   if (!known) return;
   // A bias wanders during the drive: its end cannot be judged by where it began.
@@ -77,11 +95,12 @@ void add_quantity(Table& table, const StudyFiles& study, const Quantity& quantit
 void add_boresight(Table& table, const StudyFiles& study, const Rotation& C_b_s) {
   const auto sd_deg = numbers_at<3>(study.calibration, "boresight_sd_deg");
   const Rotation square = nearest_square_mounting(C_b_s);
+  const auto observable = observable_axes(study.calibration, "psi");
   table.add_row(row_of_three(text("boresight from the square mounting, deg"), boresight_deg(square, C_b_s),
-                             sd_deg, 1.0));
+                             sd_deg, 1.0, observable));
   if (const auto prior = numbers_at<9>(study.calibration, "C_prior")) {
     table.add_row(row_of_three(text("boresight from the coarse alignment (Figure 1), deg"),
-                               boresight_deg(*prior, C_b_s), sd_deg, 1.0));
+                               boresight_deg(*prior, C_b_s), sd_deg, 1.0, observable));
   }
   const auto true_C = numbers_at<9>(study.truth, "C_b_s");
   if (!true_C) return;
@@ -103,8 +122,11 @@ void add_time_offset(Table& table, const StudyFiles& study) {
   const auto in_ms = [](std::optional<double> seconds) {
     return seconds ? std::optional(kMsPerS * *seconds) : std::nullopt;
   };
-  table.add_row(
-      {bold_sub("time offset t", "d") + text(", ms"), with_sd(kMsPerS * *t_d_s, in_ms(sd_s)), {}, {}});
+  table.add_row({bold_sub("time offset t", "d") + text(", ms"),
+                 is_observable(study.calibration, "t_d") ? with_sd(kMsPerS * *t_d_s, in_ms(sd_s))
+                                                         : text(kNotObservable),
+                 {},
+                 {}});
   const auto known_s = number_at(study.truth, "t_d_s");
   if (!known_s) return;
   table.add_row({subordinate("truth"), number(kMsPerS * *known_s), {}, {}});
@@ -114,7 +136,10 @@ void add_time_offset(Table& table, const StudyFiles& study) {
 Html study_table(const StudyFiles& study) {
   Table table({text("± one sd"), text("x"), text("y"), text("z")});
   if (const auto C_b_s = numbers_at<9>(study.calibration, "C_b_s")) add_boresight(table, study, *C_b_s);
-  add_quantity(table, study, {text("lever arm r, mm"), "r_bs_b_m", "r_bs_b_sd_m", kMmPerM}, "mm", kMmPerM);
+  add_quantity(table, study,
+               {text("lever arm r, mm"), "r_bs_b_m", "r_bs_b_sd_m", kMmPerM, false,
+                observable_axes(study.calibration, "r")},
+               "mm", kMmPerM);
   add_time_offset(table, study);
   add_quantity(
       table, study,
@@ -143,6 +168,31 @@ Html mounting_words(const StudyFiles& study) {
   const std::string method = text_at(study.calibration, "method");
   if (!method.empty()) words += fmt::format(" Method: {}.", method);
   return paragraph(words);
+}
+
+/// sd against goal of every state, what is known least, what would help.
+Html observability_table(const StudyFiles& study) {
+  const auto& observability = field(study.calibration, "observability");
+  if (!observability.is_object()) return {};
+  Table table({text("what the drive has shown"), text("sd"), text("goal"), text("")});
+  for (const auto& state : field(observability, "states")) {
+    const auto sd = number_at(state, "sd");
+    const auto goal = number_at(state, "goal");
+    const bool seen = field(state, "observable") == nlohmann::json(true);
+    const bool reached = field(state, "goal_reached") == nlohmann::json(true);
+    const std::string unit = " " + text_at(state, "unit");
+    if (!sd || !goal) continue;
+    table.add_row({text(text_at(state, "words")), seen ? number(*sd, 2) + text(unit) : text(kNotObservable),
+                   number(*goal, 2) + text(unit),
+                   text(reached ? "goal reached"
+                        : seen  ? "goal not reached"
+                                : "")});
+  }
+  std::string words =
+      fmt::format("Least is known of the {}.", text_at(field(observability, "weakest"), "words"));
+  if (const std::string advice = text_at(observability, "advice"); !advice.empty())
+    words += fmt::format(" What would help: {}.", advice);
+  return table.html() + paragraph(words);
 }
 
 Html estimate_panels(const StudyFiles& study, FigureSheet& figures) {
@@ -195,7 +245,8 @@ Html calibration_section(const RunFiles& run, FigureSheet& figures) {
   if (!run.has_truth)
     section += paragraph("No truth.json in this run: nothing to compare the estimates with.", "note");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + mounting_words(study) + study_table(study);
+    section += element("h3", text(study.name)) + mounting_words(study) + study_table(study) +
+               observability_table(study);
   }
   section += element("h2", text("Figure 1: boresight and lever arm over time"));
   section += element("p", text("Line: the estimate at that time; band: ± one sd") +

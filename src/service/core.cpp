@@ -68,9 +68,7 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
 
   for (const auto& event : estimator_.events()) sink.on_event(event);
   for (const auto& epoch : estimator_.epochs()) {
-    if (epoch.calibrating) {
-      sink.on_error({epoch.study, snapshot_.first_reference_time, live_error_row(epoch)});
-    }
+    if (epoch.calibrating) sink.on_epoch(epoch, snapshot_.first_reference_time);
   }
   if (index % kTicksPerSnapshot != 0) return;
   snapshot_.tick = index;

@@ -62,6 +62,11 @@ struct LateSample {
 class CoreSink {
  public:
   virtual ~CoreSink() = default;
+  /// One S sample of a calibrated S-IMU. Unless overridden, its row goes to on_error(), made with the
+  /// estimate as it stands.
+  virtual void on_epoch(const StudyEpoch& epoch, HostTime first_reference_time) noexcept {
+    on_error({epoch.study, first_reference_time, live_error_row(epoch)});
+  }
   virtual void on_error(const ErrorRecord& record) noexcept = 0;
   virtual void on_event(const EstimatorEvent& event) noexcept = 0;
   virtual void on_snapshot(const Snapshot& snapshot) noexcept = 0;

@@ -62,6 +62,7 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       can_watches_(configuration.devices.size()),
       line_problems_(configuration.devices.size()),
       study_states_(study_devices_.size(), StudyStatus::kWaiting),
+      observability_(study_devices_.size()),
       started_(host_now()) {
   anchor_ = {started_, wall_clock_now()};
 }
@@ -178,11 +179,12 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
     anchored_by_device_ = true;
   }
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
+    const auto& name = configuration_.devices[study_devices_[i]].name;
     const auto state = snapshot.studies[i].status;
-    if (state == study_states_[i]) continue;
+    if (state != study_states_[i]) spdlog::info("{}: {}", name, kStudyNames[static_cast<std::size_t>(state)]);
     study_states_[i] = state;
-    spdlog::info("{}: {}", configuration_.devices[study_devices_[i]].name,
-                 kStudyNames[static_cast<std::size_t>(state)]);
+    for (const auto& sentence : observability_[i].update(snapshot.studies[i]))
+      spdlog::info("{}: {}", name, sentence);
   }
   if (!bus_) return;
   if (snapshot.navigation.status == NavigationStatus::kNavigating) {

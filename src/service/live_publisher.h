@@ -18,6 +18,7 @@
 #include "service/io_thread.h"
 #include "service/live.h"
 #include "service/modeller.h"
+#include "service/observability.h"
 #include "service/report_values.h"
 #include "service/run_folder.h"
 
@@ -84,6 +85,7 @@ class LivePublisher {
   std::mutex line_problems_mutex_;
   std::vector<std::string> line_problems_;
   std::vector<StudyStatus> study_states_;
+  std::vector<ObservabilityWatch> observability_;
   std::uint64_t refits_ = 0;
   double refit_duration_s_ = kUnknown;
   HostTime started_;

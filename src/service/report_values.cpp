@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 
 #include "service/noise_series.h"
+#include "service/observability.h"
 
 namespace imuscope {
 
@@ -47,6 +48,16 @@ CalibrationReport calibration_report(const Snapshot& snapshot, std::size_t study
   report.sd = {estimate.sd_psi_rad,         estimate.sd_r_bs_b_m,        estimate.sd_t_d_s,
                estimate.sd_gyro_bias_radps, estimate.sd_accel_bias_mps2, estimate.sd_gyro_scale,
                estimate.sd_accel_scale};
+  const Observability observability = observability_of(estimate);
+  for (std::size_t i = 0; i < report.observable.size(); ++i)
+    report.observable[i] = observability.states[i].observable;
+  const StudyConfig goals;
+  report.goal_sd_psi_rad = goals.goal_boresight_sd_rad;
+  report.goal_sd_r_m = goals.goal_r_bs_b_sd_m;
+  report.goal_sd_t_d_s = goals.goal_t_d_sd_s;
+  report.weakest_direction = observability.weakest;
+  report.weakest_relative_sd = observability.weakest_relative_sd;
+  report.advice = observability.advice;
   return report;
 }
 

@@ -5,17 +5,13 @@
 #include <cmath>
 
 #include "base/units.h"
+#include "service/observability.h"
 
 namespace imuscope {
 
 namespace {
 
 constexpr std::array kAxes{'x', 'y', 'z'};
-
-std::string navigation_header() {
-  return "time_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_deg,"
-         "sd_n_m,sd_e_m,sd_d_m,sd_v_n_mps,sd_v_e_mps,sd_v_d_mps,sd_roll_deg,sd_pitch_deg,sd_heading_deg\n";
-}
 
 /// Columns of calibration_NAME.csv that carry an sd, in order.
 std::vector<std::string> calibration_columns() {
@@ -31,17 +27,6 @@ std::vector<std::string> calibration_columns() {
 }
 
 constexpr std::size_t kPsiColumns = 3;
-
-std::string calibration_header() {
-  const auto names = calibration_columns();
-  std::string header = "time_s";
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i == kPsiColumns) header += ",q_w,q_x,q_y,q_z";
-    header += "," + names[i];
-  }
-  for (const auto& name : names) header += ",sd_" + name;
-  return header + "\n";
-}
 
 Eigen::Quaterniond quaternion_of(const Matrix3& C_b_s) {
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(C_b_s.data());
@@ -108,6 +93,59 @@ void SampleTimeLine::add(std::int64_t counter, double time_s) {
 double SampleTimeLine::period_s() const { return sum_ct_ / sum_cc_; }
 double SampleTimeLine::t0_s() const { return mean_t_ - period_s() * mean_c_; }
 
+std::string navigation_csv_header() {
+  return "time_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_deg,"
+         "sd_n_m,sd_e_m,sd_d_m,sd_v_n_mps,sd_v_e_mps,sd_v_d_mps,sd_roll_deg,sd_pitch_deg,sd_heading_deg\n";
+}
+
+std::string navigation_csv_row(const NavigationOutput& nav, double time_s) {
+  fmt::memory_buffer row;
+  fmt::format_to(std::back_inserter(row), "{},{},{},{}", time_s, nav.latitude_rad * kDegPerRad,
+                 nav.longitude_rad * kDegPerRad, nav.height_m);
+  append(row, nav.v_n_mps, 1.0);
+  append(row, nav.rpy_rad, kDegPerRad);
+  append(row, nav.sd_position_m, 1.0);
+  append(row, nav.sd_velocity_mps, 1.0);
+  append(row, nav.sd_rpy_rad, kDegPerRad);
+  row.push_back('\n');
+  return fmt::to_string(row);
+}
+
+std::string calibration_csv_header() {
+  const auto names = calibration_columns();
+  std::string header = "time_s";
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (i == kPsiColumns) header += ",q_w,q_x,q_y,q_z";
+    header += "," + names[i];
+  }
+  for (const auto& name : names) header += ",sd_" + name;
+  return header + "\n";
+}
+
+std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, double time_s) {
+  const auto q = quaternion_of(study.C_b_s);
+  constexpr double kMsPerS = 1e3;
+  fmt::memory_buffer row;
+  fmt::format_to(std::back_inserter(row), "{}", time_s);
+  append(row, study.psi_rad, kDegPerRad);
+  fmt::format_to(std::back_inserter(row), ",{},{},{},{}", q.w(), q.x(), q.y(), q.z());
+  append(row, study.r_bs_b_m, 1.0);
+  fmt::format_to(std::back_inserter(row), ",{}", (study.t_d_s + info.clock_shift_s) * kMsPerS);
+  append(row, study.gyro_bias_radps, 1.0);
+  append(row, study.accel_bias_mps2, 1.0);
+  append(row, study.gyro_scale, 1.0);
+  append(row, study.accel_scale, 1.0);
+  append(row, study.sd_psi_rad, kDegPerRad);
+  append(row, study.sd_r_bs_b_m, 1.0);
+  fmt::format_to(std::back_inserter(row), ",{}", study.sd_t_d_s * kMsPerS);
+  append(row, study.sd_gyro_bias_radps, 1.0);
+  append(row, study.sd_accel_bias_mps2, 1.0);
+  append(row, study.sd_gyro_scale, 1.0);
+  append(row, study.sd_accel_scale, 1.0);
+  row.push_back('\n');
+  return fmt::to_string(row);
+}
+
 std::string error_csv_header() {
   return "time_s,counter,e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,"
          "e_accel_z_mps2,regime\n";
@@ -162,7 +200,9 @@ nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& st
     observable[kDirectionNames[i]] = study.observable[i];
   observable["t_d"] = study.t_d_observable;
   imu["observable"] = observable;
-  imu["weakest_direction"] = kDirectionNames[static_cast<std::size_t>(study.weakest_component)];
+  imu["observability"] = study.status >= StudyStatus::kConverging
+                             ? observability_json(observability_of(study))
+                             : nlohmann::json(nullptr);
   constexpr std::array kStatusNames{"waiting", "coarse", "converging", "calibrated"};
   imu["status"] = kStatusNames[static_cast<std::size_t>(study.status)];
   imu["method"] = "filter end value";
@@ -192,13 +232,13 @@ Result<std::unique_ptr<RunFolder>> RunFolder::create(const std::filesystem::path
   run->calibrations_.resize(n);
   run->errors_.resize(n);
   run->sample_times_.resize(n);
-  if (auto opened = run->navigation_.open(folder / "navigation.csv", navigation_header()); !opened) {
+  if (auto opened = run->navigation_.open(folder / "navigation.csv", navigation_csv_header()); !opened) {
     return tl::unexpected<Error>(opened.error());
   }
   for (std::size_t i = 0; i < n; ++i) {
     const auto& name = run->studies_[i].name;
-    auto opened =
-        run->calibrations_[i].open(folder / fmt::format("calibration_{}.csv", name), calibration_header());
+    auto opened = run->calibrations_[i].open(folder / fmt::format("calibration_{}.csv", name),
+                                             calibration_csv_header());
     if (opened && write_errors) {
       opened = run->errors_[i].open(folder / fmt::format("errors_{}.csv", name), error_csv_header());
     }
@@ -224,56 +264,22 @@ double RunFolder::seconds_since_start(HostTime time) const {
 void RunFolder::on_snapshot(const Snapshot& snapshot) noexcept {
   last_ = snapshot;
   if (!snapshot.has_reference) return;
-  if (snapshot.navigation.status == NavigationStatus::kNavigating) write_navigation(snapshot);
+  if (snapshot.navigation.status == NavigationStatus::kNavigating) {
+    navigation_.append(
+        navigation_csv_row(snapshot.navigation, seconds_since_start(snapshot.navigation.time)));
+  }
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& study = snapshot.studies[i];
     if (study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated)
-      write_study(i, study);
+      calibrations_[i].append(calibration_csv_row(study, studies_[i], seconds_since_start(study.time)));
   }
 }
 
-void RunFolder::write_navigation(const Snapshot& snapshot) {
-  const auto& nav = snapshot.navigation;
-  fmt::memory_buffer row;
-  fmt::format_to(std::back_inserter(row), "{},{},{},{}", seconds_since_start(nav.time),
-                 nav.latitude_rad * kDegPerRad, nav.longitude_rad * kDegPerRad, nav.height_m);
-  append(row, nav.v_n_mps, 1.0);
-  append(row, nav.rpy_rad, kDegPerRad);
-  append(row, nav.sd_position_m, 1.0);
-  append(row, nav.sd_velocity_mps, 1.0);
-  append(row, nav.sd_rpy_rad, kDegPerRad);
-  row.push_back('\n');
-  navigation_.append({row.data(), row.size()});
-}
-
-void RunFolder::write_study(std::size_t index, const StudyOutput& study) {
-  const auto q = quaternion_of(study.C_b_s);
-  constexpr double kMsPerS = 1e3;
-  fmt::memory_buffer row;
-  fmt::format_to(std::back_inserter(row), "{}", seconds_since_start(study.time));
-  append(row, study.psi_rad, kDegPerRad);
-  fmt::format_to(std::back_inserter(row), ",{},{},{},{}", q.w(), q.x(), q.y(), q.z());
-  append(row, study.r_bs_b_m, 1.0);
-  fmt::format_to(std::back_inserter(row), ",{}", (study.t_d_s + studies_[index].clock_shift_s) * kMsPerS);
-  append(row, study.gyro_bias_radps, 1.0);
-  append(row, study.accel_bias_mps2, 1.0);
-  append(row, study.gyro_scale, 1.0);
-  append(row, study.accel_scale, 1.0);
-  append(row, study.sd_psi_rad, kDegPerRad);
-  append(row, study.sd_r_bs_b_m, 1.0);
-  fmt::format_to(std::back_inserter(row), ",{}", study.sd_t_d_s * kMsPerS);
-  append(row, study.sd_gyro_bias_radps, 1.0);
-  append(row, study.sd_accel_bias_mps2, 1.0);
-  append(row, study.sd_gyro_scale, 1.0);
-  append(row, study.sd_accel_scale, 1.0);
-  row.push_back('\n');
-  calibrations_[index].append({row.data(), row.size()});
-}
-
-Result<void> RunFolder::write_calibration() {
+Result<void> RunFolder::write_calibration(const std::vector<nlohmann::json>& weighted_means) {
   nlohmann::json imus = nlohmann::json::array();
   for (std::size_t i = 0; last_ && i < last_->n_studies; ++i) {
     imus.push_back(calibration_json(studies_[i], last_->studies[i], sample_times_[i]));
+    imus.back()["weighted_mean"] = i < weighted_means.size() ? weighted_means[i] : nlohmann::json(nullptr);
   }
   return write_json(folder_ / "calibration.json", {{"schema", "imuscope.calibration/1"}, {"imus", imus}});
 }

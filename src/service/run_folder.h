@@ -80,15 +80,14 @@ class RunFolder final : public CoreSink {
   [[nodiscard]] const std::vector<EstimatorEvent>& events() const { return events_; }
 
   /// Writes calibration.json from the last snapshot.
-  [[nodiscard]] Result<void> write_calibration();
+  /// @param weighted_means  per S-IMU, of a study; empty otherwise
+  [[nodiscard]] Result<void> write_calibration(const std::vector<nlohmann::json>& weighted_means = {});
   /// Closes the CSV files; the first failed write, if any, is the error.
   [[nodiscard]] Result<void> close();
 
  private:
   RunFolder() = default;
   [[nodiscard]] double seconds_since_start(HostTime time) const;
-  void write_navigation(const Snapshot& snapshot);
-  void write_study(std::size_t index, const StudyOutput& study);
 
   std::filesystem::path folder_;
   std::vector<StudyFileInfo> studies_;
@@ -101,6 +100,12 @@ class RunFolder final : public CoreSink {
   std::optional<Snapshot> last_;
 };
 
+/// Header and rows of navigation.csv.
+std::string navigation_csv_header();
+std::string navigation_csv_row(const NavigationOutput& navigation, double time_s);
+/// Header and rows of calibration_NAME.csv.
+std::string calibration_csv_header();
+std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, double time_s);
 /// Row of errors_NAME.csv.
 std::string error_csv_row(const ErrorRow& row, double time_s);
 /// Header of errors_NAME.csv.

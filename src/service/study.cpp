@@ -12,6 +12,7 @@
 #include "service/dynamics_files.h"
 #include "service/estimator_setup.h"
 #include "service/noise_series.h"
+#include "service/smoothing.h"
 
 namespace imuscope {
 
@@ -26,18 +27,25 @@ std::string utc_text(UtcTime utc) {
                      time.hours().count(), time.minutes().count(), time.seconds().count());
 }
 
-/// Rows of the second pass: mounting frozen at its final value, the whole drive covered.
+/// Rows of the last pass: mounting frozen at its final value, the reference compensated with its smoothed
+/// biases, the whole drive covered.
 class ErrorCollector final : public CoreSink {
  public:
-  /// @param rows  one spool a S-IMU; must outlive the collector
-  ErrorCollector(std::vector<StudyOutput> finals, bool remove_scale, RunFolder& folder,
-                 std::vector<RowSpool>& rows)
+  /// @param rows  one spool a S-IMU; must outlive the collector, as must `biases`
+  ErrorCollector(std::vector<StudyOutput> finals, const ReferenceBiasTrack& biases, bool remove_scale,
+                 RunFolder& folder, std::vector<RowSpool>& rows)
       : finals_(std::move(finals)),
+        biases_(biases),
         remove_scale_(remove_scale),
         folder_(folder),
         rows_(rows),
         series_(finals_.size()) {}
 
+  void on_epoch(const StudyEpoch& epoch, HostTime first_reference_time) noexcept override {
+    const HostTime shown = epoch.time + from_seconds(epoch.t_d_s);
+    on_error({epoch.study, first_reference_time,
+              error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, biases_.at(shown))});
+  }
   void on_error(const ErrorRecord& record) noexcept override {
     folder_.on_error(record);
     const auto& final = finals_[record.study];
@@ -54,6 +62,7 @@ class ErrorCollector final : public CoreSink {
 
  private:
   std::vector<StudyOutput> finals_;
+  const ReferenceBiasTrack& biases_;
   bool remove_scale_;
   RunFolder& folder_;
   std::vector<RowSpool>& rows_;
@@ -77,7 +86,7 @@ bool calibrated(const StudyOutput& study) {
   return study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
 }
 
-/// The estimator of the second pass: mounting, time offset and scales known, biases free, so that the
+/// The estimator of the last pass: mounting, time offset and scales known, biases free, so that the
 /// reference is evaluated at the right instant from the first sample on.
 EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& finals) {
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
@@ -278,13 +287,25 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
   }
 
+  const RecordStorage storage{Smoother::kMemory_bytes, options.out};
+  const auto track = smooth_drive(configuration, estimator, recording, finals, storage, [&](double share) {
+    if (options.progress) options.progress("smoothing", share);
+  });
+  if (!track) return tl::unexpected<Error>(track.error());
+  const auto infos = study_file_infos(configuration, recording);
+  if (auto written = write_smoothed(*track, last, infos, options.out); !written) return written;
+  const auto means = weighted_means(*track, finals);
+  if (!means) return tl::unexpected<Error>(means.error());
+  const auto biases = ReferenceBiasTrack::of(*track);
+  if (!biases) return tl::unexpected<Error>(biases.error());
+
   std::vector<RowSpool> rows;
   for (std::size_t i = 0; i < finals.size(); ++i) {
     auto spool = RowSpool::create(options.out);
     if (!spool) return tl::unexpected<Error>(spool.error());
     rows.push_back(std::move(*spool));
   }
-  ErrorCollector collector(finals, configuration.noise.remove_scale_error, **folder, rows);
+  ErrorCollector collector(finals, *biases, configuration.noise.remove_scale_error, **folder, rows);
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("error process", share); };
   const auto second = replay(configuration, frozen(estimator, finals), recording, collector, replay_options);
@@ -300,7 +321,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   run.static_s = static_cast<double>(series.front().count(Regime::kStatic)) / rate_hz;
   run.dynamic_s = static_cast<double>(series.front().count(Regime::kDynamic)) / rate_hz;
 
-  if (auto written = (*folder)->write_calibration(); !written) return written;
+  if (auto written = (*folder)->write_calibration(*means); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
   if (auto written =
           write_json(options.out / "models.json", {{"schema", "imuscope.models/1"}, {"models", models}});
@@ -320,9 +341,12 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
   // What an earlier study left in this folder would be taken for this run's.
-  for (const char* of_a_study : {"models.json", "regression.json", "report.html"}) {
+  std::vector<std::string> of_a_study{"models.json", "regression.json", "report.html", "smoothed_navigation.csv"};
+  for (const auto& info : study_file_infos(configuration, recording))
+    of_a_study.push_back(fmt::format("smoothed_{}.csv", info.name));
+  for (const auto& file : of_a_study) {
     std::error_code absent_is_well;
-    std::filesystem::remove(options.out / of_a_study, absent_is_well);
+    std::filesystem::remove(options.out / file, absent_is_well);
   }
   ReplayOptions replay_options;
   replay_options.realtime = realtime;

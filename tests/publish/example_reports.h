@@ -20,7 +20,21 @@ inline CalibrationStates example_states(double base) {
 }
 
 inline CalibrationReport example_calibration() {
-  return {kExampleUtc, 12.5, 2, {0.5, -0.5, 0.1, 0.7}, example_states(0.0), example_states(100.0)};
+  CalibrationReport report{};
+  report.utc = kExampleUtc;
+  report.time_s = 12.5;
+  report.device = 2;
+  report.q_b_s = {0.5, -0.5, 0.1, 0.7};
+  report.value = example_states(0.0);
+  report.sd = example_states(100.0);
+  report.observable.fill(true);
+  report.goal_sd_psi_rad = 2e-4;
+  report.goal_sd_r_m = 1e-3;
+  report.goal_sd_t_d_s = 1e-4;
+  report.weakest_direction = "boresight about down";
+  report.weakest_relative_sd = 0.25;
+  report.advice = "brake firmly";
+  return report;
 }
 
 inline NavigationReport example_navigation() {

@@ -33,7 +33,7 @@ std::vector<std::string> fields_of(const std::string& type) {
   std::ifstream file(test::source_path("src/publish/lcm/" + type + ".lcm"));
   EXPECT_TRUE(file.is_open()) << type;
   std::vector<std::string> fields;
-  const std::regex declaration(R"(^\s+(?:double|string|int64_t)\s+(\w+)\s*;.*)");
+  const std::regex declaration(R"(^\s+(?:double|string|int64_t|boolean)\s+(\w+)\s*;.*)");
   for (std::string line; std::getline(file, line);) {
     std::smatch match;
     if (std::regex_match(line, match, declaration)) fields.push_back(match[1]);
@@ -61,7 +61,9 @@ TEST(MessageTypes, FieldsAreThoseOfTheFilesOfARun) {
             "t_d_ms bg_x_radps bg_y_radps bg_z_radps ba_x_mps2 ba_y_mps2 ba_z_mps2 sg_x sg_y sg_z sa_x "
             "sa_y sa_z sd_psi_x_deg sd_psi_y_deg sd_psi_z_deg sd_r_x_m sd_r_y_m sd_r_z_m sd_t_d_ms "
             "sd_bg_x_radps sd_bg_y_radps sd_bg_z_radps sd_ba_x_mps2 sd_ba_y_mps2 sd_ba_z_mps2 sd_sg_x "
-            "sd_sg_y sd_sg_z sd_sa_x sd_sa_y sd_sa_z"));
+            "sd_sg_y sd_sg_z sd_sa_x sd_sa_y sd_sa_z psi_x_observable psi_y_observable psi_z_observable "
+            "r_x_observable r_y_observable r_z_observable t_d_observable goal_sd_psi_deg goal_sd_r_m "
+            "goal_sd_t_d_ms weakest_direction weakest_relative_sd advice"));
 }
 
 TEST(MessageBuilders, UtimeIsWholeMicrosecondsRoundedDown) {
@@ -112,6 +114,25 @@ TEST(MessageBuilders, CalibrationArrivesWithEveryStateAndSdInItsPlace) {
                           m.sd_sg_y, m.sd_sg_z, m.sd_sa_x, m.sd_sa_y, m.sd_sa_z}),
               ElementsAre(104, 105, 106, 107, 108, 109, 110, 111, 112, 113, 114, 115, 116, 117, 118));
   EXPECT_DOUBLE_EQ(m.sd_t_d_ms, 119'000);
+}
+
+TEST(MessageBuilders, AStateThatIsNotObservableYetHasNoNumberButItsSd) {
+  CalibrationReport report = test::example_calibration();
+  report.observable = {true, true, false, true, true, true, false};
+  const calibration_t m = over_the_wire(to_message(report, "mtx1", 5));
+  EXPECT_TRUE(std::isnan(m.psi_z_deg));
+  EXPECT_TRUE(std::isnan(m.t_d_ms));
+  EXPECT_FALSE(m.psi_z_observable);
+  EXPECT_FALSE(m.t_d_observable);
+  EXPECT_DOUBLE_EQ(m.psi_x_deg, 1 * kDegreesPerRadian);
+  EXPECT_TRUE(m.psi_x_observable);
+  EXPECT_DOUBLE_EQ(m.sd_psi_z_deg, 103 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.goal_sd_psi_deg, 2e-4 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.goal_sd_r_m, 1e-3);
+  EXPECT_DOUBLE_EQ(m.goal_sd_t_d_ms, 0.1);
+  EXPECT_EQ(m.weakest_direction, "boresight about down");
+  EXPECT_DOUBLE_EQ(m.weakest_relative_sd, 0.25);
+  EXPECT_EQ(m.advice, "brake firmly");
 }
 
 TEST(MessageBuilders, ErrorRowArrivesWithItsRegimeInWords) {

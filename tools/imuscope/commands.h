@@ -39,6 +39,9 @@ void add_replay(CLI::App& app, Work& chosen);
 /// `imuscope process INPUT...`
 void add_process(CLI::App& app, Work& chosen);
 
+/// `imuscope combine RUN_DIR...`
+void add_combine(CLI::App& app, Work& chosen);
+
 /// `imuscope report RUN_DIR`
 void add_report(CLI::App& app, Work& chosen);
 

@@ -32,6 +32,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_run(app, work);
   imuscope::cli::add_replay(app, work);
   imuscope::cli::add_process(app, work);
+  imuscope::cli::add_combine(app, work);
   imuscope::cli::add_report(app, work);
   imuscope::cli::add_decode(app, work);
   imuscope::cli::add_import(app, work);

@@ -1,11 +1,14 @@
 #include "study_table.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace imuscope::cli {
 
@@ -56,9 +59,34 @@ const json* by_name(const json& document, const std::string& name) {
   return nullptr;
 }
 
-std::string triple(const json& values, double unit, int digits) {
-  return fmt::format("{:9.{}f} {:9.{}f} {:9.{}f}", values.at(0).get<double>() * unit, digits,
-                     values.at(1).get<double>() * unit, digits, values.at(2).get<double>() * unit, digits);
+/// What the motion has not shown has no number: the words below the table say so.
+bool is_observable(const json& imu, const std::string& state) {
+  return !imu.contains("observable") || imu.at("observable").value(state, true);
+}
+
+/// @param quantity  "psi" or "r": components that are not observable are left out
+std::string triple(const json& imu, const char* key, const std::string& quantity, double unit, int digits) {
+  std::string text;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const bool shown = is_observable(imu, quantity + "_" + "xyz"[i]);
+    const double value = imu.at(key).at(i).get<double>() * unit;
+    text +=
+        (i == 0 ? "" : " ") + (shown ? fmt::format("{:9.{}f}", value, digits) : fmt::format("{:>9}", "-"));
+  }
+  return text;
+}
+
+void print_observability(const json& imu) {
+  if (!imu.contains("observability") || !imu.at("observability").is_object()) return;
+  const json& observability = imu.at("observability");
+  std::vector<std::string> unseen;
+  for (const auto& state : observability.at("states")) {
+    if (!state.at("observable").get<bool>()) unseen.push_back(state.at("words"));
+  }
+  if (!unseen.empty()) fmt::print("  not observable yet: {}\n", fmt::join(unseen, ", "));
+  fmt::print("  least is known of  {}\n", observability.at("weakest").at("words").get<std::string>());
+  if (!observability.at("advice").is_null())
+    fmt::print("  what would help    {}\n", observability.at("advice").get<std::string>());
 }
 
 void print_truth(const json& imu, const json& truth) {
@@ -81,11 +109,14 @@ void print_imu(const json& imu, const std::optional<json>& truth) {
   fmt::print("\n{}  ({})\n", name, imu.at("status").get<std::string>());
   const auto angles = euler_deg(matrix(imu.at("C_b_s")));
   fmt::print("  C_b_s, zyx Euler x y z {:9.3f} {:9.3f} {:9.3f}  deg\n", angles[0], angles[1], angles[2]);
-  fmt::print("    sd               {}  mdeg\n", triple(imu.at("boresight_sd_deg"), 1e3, 1));
-  fmt::print("  lever arm b, x y z {}  mm\n", triple(imu.at("r_bs_b_m"), 1e3, 2));
-  fmt::print("    sd               {}  mm\n", triple(imu.at("r_bs_b_sd_m"), 1e3, 2));
-  fmt::print("  time offset        {:9.3f}  sd {:.3f}  ms\n", imu.at("t_d_s").get<double>() * 1e3,
-             imu.at("t_d_sd_s").get<double>() * 1e3);
+  fmt::print("    sd               {}  mdeg\n", triple(imu, "boresight_sd_deg", "psi", 1e3, 1));
+  fmt::print("  lever arm b, x y z {}  mm\n", triple(imu, "r_bs_b_m", "r", 1e3, 2));
+  fmt::print("    sd               {}  mm\n", triple(imu, "r_bs_b_sd_m", "r", 1e3, 2));
+  if (is_observable(imu, "t_d")) {
+    fmt::print("  time offset        {:9.3f}  sd {:.3f}  ms\n", imu.at("t_d_s").get<double>() * 1e3,
+               imu.at("t_d_sd_s").get<double>() * 1e3);
+  }
+  print_observability(imu);
   if (!truth) return;
   if (const auto* true_imu = by_name(*truth, name)) print_truth(imu, *true_imu);
 }
