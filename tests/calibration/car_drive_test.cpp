@@ -156,9 +156,18 @@ TEST_P(CarDrive, FindsTheKnownMountingLeverArmAndTimeOffsetWithoutPrior) {
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(out.C_b_s.data());
   const Vector3d psi_deg = kDegPerRad * log_so3(C.transpose() * C_b_s);
   ASSERT_GE(out.status, StudyStatus::kConverging);
-  EXPECT_LT(psi_deg.norm(), 0.5);
-  EXPECT_LT((Vector3d(out.r_bs_b_m[0], out.r_bs_b_m[1], out.r_bs_b_m[2]) - r_bs_b_m).norm(), 0.030);
-  EXPECT_NEAR(out.t_d_s, GetParam().t_d_s, 0.015);
+  // Three published sd and the known values' spread over many drives, turned from the study's axes (its x lies
+  // along the reference's y) to b; millimetres as given, offsets to the millisecond.
+  const Vector3d spread_deg(0.18, 0.05, 0.08);
+  constexpr double kSpread_m = 0.004;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    EXPECT_LT(std::abs(psi_deg(k)), 3.0 * kDegPerRad * out.sd_psi_rad[i] + spread_deg(k)) << "axis " << i;
+    EXPECT_LT(std::abs(out.r_bs_b_m[i] - r_bs_b_m(k)), 3.0 * out.sd_r_bs_b_m[i] + kSpread_m) << "axis " << i;
+    EXPECT_LT(out.sd_psi_rad[i] * kDegPerRad, 0.5);
+    EXPECT_LT(out.sd_r_bs_b_m[i], 0.02);
+  }
+  EXPECT_NEAR(out.t_d_s, GetParam().t_d_s, 3.0 * out.sd_t_d_s + 0.001);
 }
 
 INSTANTIATE_TEST_SUITE_P(Recorded, CarDrive,

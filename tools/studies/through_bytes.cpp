@@ -1,0 +1,191 @@
+/// From raw bytes to a mounting, many times: simulated devices write their byte streams, with their clocks,
+/// wires and batches of bytes; the study's first pass reads them back; errors are held against the
+/// simulator's truth.
+///
+///   imuscope_through_bytes --seeds 20 [--first 1] [--minutes 15] [--config config/demo.toml]
+///
+/// t_d holds the stream's latency, which is the same in every run of one device: the table shows t_d as it
+/// is, and with each device's mean over the runs taken off.
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <Eigen/Dense>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/units.h"
+#include "calibration/filter_core.h"
+#include "navigation/so3.h"
+#include "service/estimator_setup.h"
+#include "service/recording.h"
+#include "service/replay.h"
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using nlohmann::json;
+
+/// Sample-level goals; through bytes they may be missed by a fifth.
+const Vector3d kGoalPsi_mdeg(9.5, 8.5, 7.5);
+const Vector3d kGoalR_mm(0.65, 0.55, 0.45);
+constexpr double kThroughBytes = 1.2;
+constexpr double kGoalTimeOffset_us = 200.0;
+
+/// Keeps the last snapshot.
+class Last final : public imuscope::CoreSink {
+ public:
+  void on_error(const imuscope::ErrorRecord&) noexcept override {}
+  void on_event(const imuscope::EstimatorEvent&) noexcept override {}
+  void on_snapshot(const imuscope::Snapshot& snapshot) noexcept override { last = snapshot; }
+  void on_late_sample(const imuscope::LateSample&) noexcept override {}
+  imuscope::Snapshot last{};
+};
+
+struct Options {
+  int seeds = 20;
+  std::uint64_t first = 1;
+  double minutes = 15.0;
+  std::string config = "config/demo.toml";
+  std::string simulator;
+  std::string folder;
+};
+
+struct Totals {
+  int n = 0;
+  int not_started = 0;
+  Vector3d psi2 = Vector3d::Zero();
+  Vector3d psi_var = Vector3d::Zero();
+  Vector3d r2 = Vector3d::Zero();
+  Vector3d r_var = Vector3d::Zero();
+  double nees = 0.0;
+  double t_d_var = 0.0;
+  std::map<std::string, std::vector<double>> t_d_error_s;  ///< per device
+};
+
+void account(const imuscope::StudyOutput& out, double clock_shift_s, const json& truth, Totals& totals) {
+  if (out.status < imuscope::StudyStatus::kConverging) {
+    ++totals.not_started;
+    return;
+  }
+  const auto C_true = imuscope::to_eigen(truth.at("C_b_s").get<imuscope::Matrix3>());
+  const auto r_true = imuscope::to_eigen(truth.at("r_bs_b_m").get<imuscope::Vector3>());
+  Eigen::Matrix<double, 6, 1> error;
+  error.head<3>() = -imuscope::log_so3(imuscope::to_eigen(out.C_b_s).transpose() * C_true);
+  error.tail<3>() = r_true - imuscope::to_eigen(out.r_bs_b_m);
+  const Eigen::Map<const Eigen::Matrix<double, 6, 6>> P(out.covariance_psi_r.data());
+  totals.nees += error.dot(P.ldlt().solve(error));
+  totals.psi2 += error.head<3>().cwiseAbs2();
+  totals.r2 += error.tail<3>().cwiseAbs2();
+  totals.psi_var += P.diagonal().head<3>();
+  totals.r_var += P.diagonal().tail<3>();
+  totals.t_d_var += out.sd_t_d_s * out.sd_t_d_s;
+  totals.t_d_error_s[truth.at("name")].push_back(out.t_d_s + clock_shift_s - truth.at("t_d_s").get<double>());
+  ++totals.n;
+}
+
+/// One drive: recorded, read back, accounted for.
+imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& totals) {
+  const std::filesystem::path recording = std::filesystem::path(options.folder) / "through_bytes";
+  std::filesystem::remove_all(recording);
+  const std::string command =
+      fmt::format("'{}' record '{}' --minutes {} --seed {} --out '{}' >/dev/null", options.simulator,
+                  options.config, options.minutes, seed, recording.string());
+  if (std::system(command.c_str()) != 0) return imuscope::work_error("this failed: " + command);
+  const auto config = recording / "config.toml";
+  const auto configuration = imuscope::load_configuration(config);
+  if (!configuration) return tl::unexpected<imuscope::Error>(configuration.error());
+  std::vector<std::string> inputs;
+  for (const auto& device : configuration->devices) {
+    const auto file = recording / (device.name + ".bin");
+    if (std::filesystem::exists(file)) inputs.push_back(fmt::format("{}={}", device.name, file.string()));
+  }
+  const auto opened = imuscope::open_recording(inputs, config);
+  if (!opened) return tl::unexpected<imuscope::Error>(opened.error());
+  Last sink;
+  const auto replayed = imuscope::replay(
+      opened->configuration, imuscope::estimator_config(opened->configuration), opened->recording, sink);
+  if (!replayed) return tl::unexpected<imuscope::Error>(replayed.error());
+  std::ifstream in(recording / "truth.json");
+  const json truth = json::parse(in);
+  const auto studies = opened->configuration.study_indices();
+  for (std::size_t i = 0; i < studies.size(); ++i) {
+    const auto& name = opened->configuration.devices[studies[i]].name;
+    for (const auto& imu : truth.at("imus")) {
+      if (imu.at("name") != name) continue;
+      account(sink.last.studies[i], opened->recording.clocks[studies[i]].shift_s, imu, totals);
+    }
+  }
+  std::filesystem::remove_all(recording);
+  return {};
+}
+
+std::string three(const Vector3d& v, int digits) {
+  return fmt::format("{:.{}f} / {:.{}f} / {:.{}f}", v.x(), digits, v.y(), digits, v.z(), digits);
+}
+
+Vector3d rms(const Vector3d& sum, int n) { return (sum / n).cwiseSqrt(); }
+
+void print(const Options& options, const Totals& t) {
+  constexpr double kMdeg = 1e3 * imuscope::kDegPerRad;
+  constexpr double kMm = 1e3;
+  constexpr double kUs = 1e6;
+  fmt::print("{} drives of {} min from raw bytes, {} S-IMUs, {} not started\n", options.seeds,
+             options.minutes, t.n, t.not_started);
+  if (t.n == 0) return;
+  fmt::print("  psi  mdeg  rms {:24} sd {:24} goal {}\n", three(kMdeg * rms(t.psi2, t.n), 2),
+             three(kMdeg * rms(t.psi_var, t.n), 2), three(kThroughBytes * kGoalPsi_mdeg, 1));
+  fmt::print("  r    mm    rms {:24} sd {:24} goal {}\n", three(kMm * rms(t.r2, t.n), 3),
+             three(kMm * rms(t.r_var, t.n), 3), three(kThroughBytes * kGoalR_mm, 2));
+  double raw = 0.0;
+  double centred = 0.0;
+  int freedom = 0;
+  std::string latencies;
+  for (const auto& [name, errors] : t.t_d_error_s) {
+    double mean = 0.0;
+    for (const double error : errors) mean += error / static_cast<double>(errors.size());
+    for (const double error : errors) {
+      raw += error * error;
+      centred += (error - mean) * (error - mean);
+    }
+    freedom += static_cast<int>(errors.size()) - 1;
+    latencies += fmt::format(" {} {:+.0f}", name, kUs * mean);
+  }
+  fmt::print("  t_d  us    rms {:<24.1f} sd {:<24.1f} goal {:.0f}\n", kUs * std::sqrt(raw / t.n),
+             kUs * std::sqrt(t.t_d_var / t.n), kGoalTimeOffset_us);
+  if (freedom > 0) {
+    fmt::print("             rms {:.1f} with each device's mean taken off ({} us)\n",
+               kUs * std::sqrt(centred / freedom), latencies.substr(1));
+  }
+  fmt::print("  NEES (6) mean {:.2f}, 95 % band of the mean {:.2f} to {:.2f}\n", t.nees / t.n,
+             6.0 - 1.96 * std::sqrt(12.0 / t.n), 6.0 + 1.96 * std::sqrt(12.0 / t.n));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"From raw bytes to a mounting, many times, against the simulator's truth"};
+  Options options;
+  options.simulator = (std::filesystem::read_symlink("/proc/self/exe").parent_path() / "imusim").string();
+  options.folder = std::filesystem::temp_directory_path().string();
+  app.add_option("--seeds", options.seeds, "drives");
+  app.add_option("--first", options.first, "first seed");
+  app.add_option("--minutes", options.minutes, "length of each drive");
+  app.add_option("--config", options.config, "what is simulated")->check(CLI::ExistingFile);
+  app.add_option("--folder", options.folder, "for one recording at a time (80 MB)");
+  CLI11_PARSE(app, argc, argv);
+  Totals totals;
+  for (int i = 0; i < options.seeds; ++i) {
+    if (const auto done = run(options, options.first + static_cast<std::uint64_t>(i), totals); !done) {
+      fmt::print(stderr, "{}\n", done.error().text());
+      return 1;
+    }
+  }
+  print(options, totals);
+  return 0;
+}
