@@ -2,11 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <utility>
 
 #include "base/contracts.h"
+#include "calibration/history_record.h"
 
 namespace imuscope {
 namespace {
@@ -14,165 +14,16 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Matrix15 = Eigen::Matrix<double, 15, 15>;
 
-constexpr std::size_t kNavigation = static_cast<std::size_t>(kNavigationErrorSize);
+constexpr auto kNavigation = static_cast<std::size_t>(kNavigationErrorSize);
 /// Of the memory, one part in eight is for the smoothed track.
 constexpr std::size_t kTrackShare = 8;
 
-/// Fills a record from its beginning.
-class Writer {
- public:
-  explicit Writer(std::span<double> record) : left_(record) {}
-  void put(double value) {
-    left_.front() = value;
-    left_ = left_.subspan(1);
-  }
-  template <typename Derived>
-  void put(const Eigen::DenseBase<Derived>& values) {
-    for (Index j = 0; j < values.cols(); ++j) {
-      for (Index i = 0; i < values.rows(); ++i) put(values(i, j));
-    }
-  }
-  void put(std::span<const double> values) {
-    for (const double value : values) put(value);
-  }
-
- private:
-  std::span<double> left_;
-};
-
-/// Reads a record in the order in which it was filled.
-class Reader {
- public:
-  explicit Reader(std::span<const double> record) : left_(record) {}
-  double take() {
-    const double value = left_.front();
-    left_ = left_.subspan(1);
-    return value;
-  }
-  template <typename Derived>
-  void take(Eigen::DenseBase<Derived>& values) {
-    for (Index j = 0; j < values.cols(); ++j) {
-      for (Index i = 0; i < values.rows(); ++i) values(i, j) = take();
-    }
-  }
-
- private:
-  std::span<const double> left_;
-};
-
-// A state in a record: time, which parts have a meaning, navigation, S-IMUs.
-constexpr std::size_t kNavigationDoubles = 3 + 3 + 9 + 3 + 3;
-constexpr std::size_t kStudyDoubles = 9 + 3 + 3 + 3 + 1 + 3 + 3;
-constexpr std::size_t state_doubles(std::size_t studies) {
-  return 2 + kNavigationDoubles + studies * (1 + kStudyDoubles);
-}
-
-void put_navigation(Writer& out, const NavigationState& state) {
-  out.put(state.position.latitude_rad);
-  out.put(state.position.longitude_rad);
-  out.put(state.position.height_m);
-  out.put(state.v_n_mps);
-  out.put(state.C_b_n);
-  out.put(state.gyro_bias_b_radps);
-  out.put(state.accel_bias_b_mps2);
-}
-
-void take_navigation(Reader& in, NavigationState& state) {
-  state.position.latitude_rad = in.take();
-  state.position.longitude_rad = in.take();
-  state.position.height_m = in.take();
-  in.take(state.v_n_mps);
-  in.take(state.C_b_n);
-  in.take(state.gyro_bias_b_radps);
-  in.take(state.accel_bias_b_mps2);
-}
-
-void put_study(Writer& out, const StudyState& state) {
-  out.put(state.C_b_s);
-  out.put(state.r_bs_b_m);
-  out.put(state.gyro_bias_s_radps);
-  out.put(state.accel_bias_s_mps2);
-  out.put(state.t_d_s);
-  out.put(state.gyro_scale);
-  out.put(state.accel_scale);
-}
-
-void take_study(Reader& in, StudyState& state) {
-  in.take(state.C_b_s);
-  in.take(state.r_bs_b_m);
-  in.take(state.gyro_bias_s_radps);
-  in.take(state.accel_bias_s_mps2);
-  state.t_d_s = in.take();
-  in.take(state.gyro_scale);
-  in.take(state.accel_scale);
-}
-
-void put_epoch(Writer& out, const SmoothedEpoch& epoch) {
-  out.put(std::bit_cast<double>(to_ns(epoch.time)));
-  out.put(epoch.navigating ? 1.0 : 0.0);
-  put_navigation(out, epoch.navigation);
-  for (std::size_t i = 0; i < epoch.studies.size(); ++i) {
-    out.put(epoch.calibrating[i] ? 1.0 : 0.0);
-    put_study(out, epoch.studies[i]);
-  }
-}
-
-/// @param epoch  with its S-IMUs counted
-void take_epoch(Reader& in, SmoothedEpoch& epoch) {
-  epoch.time = host_time_from_ns(std::bit_cast<std::int64_t>(in.take()));
-  epoch.navigating = in.take() != 0.0;
-  take_navigation(in, epoch.navigation);
-  for (std::size_t i = 0; i < epoch.studies.size(); ++i) {
-    epoch.calibrating[i] = in.take() != 0.0;
-    take_study(in, epoch.studies[i]);
-  }
-}
-
-/// A record of the history: the filtered state, its covariance, and what led to it.
-std::size_t history_doubles(std::size_t states, std::size_t studies) {
-  return state_doubles(studies) + states * (states + 1) / 2 + 2 * kNavigation * kNavigation +
-         2 * (states - kNavigation) + states;
-}
-
-/// A record of the smoothed track: the state, the sd of every state, the covariance of the attitude.
+/// Doubles of a record of the smoothed track: the state, the sd of every state, the covariance of the
+/// attitude.
 std::size_t smoothed_doubles(std::size_t states, std::size_t studies) {
-  return state_doubles(studies) + states + 9;
+  return history::state_doubles(studies) + states + 9;
 }
-
-/// A record of the history, unpacked.
-struct Filtered {
-  SmoothedEpoch state;
-  MatrixXd P;
-  Matrix15 transition;
-  Matrix15 noise;
-  VectorXd decay;
-  VectorXd decay_noise;
-  VectorXd injected;
-
-  Filtered(std::size_t states, std::size_t studies)
-      : P(static_cast<Index>(states), static_cast<Index>(states)),
-        decay(static_cast<Index>(states - kNavigation)),
-        decay_noise(static_cast<Index>(states - kNavigation)),
-        injected(static_cast<Index>(states)) {
-    state.studies.resize(studies);
-    state.calibrating.resize(studies);
-  }
-
-  void unpack(std::span<const double> record) {
-    Reader in(record);
-    take_epoch(in, state);
-    for (Index i = 0; i < P.rows(); ++i) {
-      for (Index j = 0; j <= i; ++j) P(i, j) = P(j, i) = in.take();
-    }
-    in.take(transition);
-    in.take(noise);
-    in.take(decay);
-    in.take(decay_noise);
-    in.take(injected);
-  }
-};
 
 /// Solves X A = B for symmetric, positive semi-definite A, scaled to unit diagonal first: states differ by
 /// ten orders of magnitude, and those without uncertainty stay without.
@@ -250,8 +101,8 @@ Result<SmoothedEpoch> SmoothedTrack::at(std::size_t index) const {
   epoch.studies.resize(layouts_.size());
   epoch.calibrating.resize(layouts_.size());
   epoch.sd.resize(static_cast<Index>(states_));
-  Reader in(record);
-  take_epoch(in, epoch);
+  history::Reader in(record);
+  history::take_epoch(in, epoch);
   in.take(epoch.sd);
   in.take(epoch.P_phi);
   return epoch;
@@ -265,29 +116,12 @@ void Smoother::on_history(const HistoryEpoch& epoch) noexcept {
   if (!records_) {
     for (std::size_t i = 0; i < core.study_count(); ++i) layouts_.push_back(core.layout(i));
     states_ = core.covariance().dimension();
-    record_.resize(history_doubles(states_, layouts_.size()));
+    record_.resize(history::history_doubles(states_, layouts_.size()));
     records_.emplace(
         record_.size(),
         RecordStorage{storage_.memory_bytes_max - storage_.memory_bytes_max / kTrackShare, storage_.folder});
   }
-  Writer out(record_);
-  SmoothedEpoch state;
-  state.time = epoch.time;
-  state.navigating = epoch.navigating;
-  state.navigation = core.navigation();
-  for (std::size_t i = 0; i < layouts_.size(); ++i) {
-    state.studies.push_back(core.study(i));
-    state.calibrating.push_back(epoch.calibrating[i]);
-  }
-  put_epoch(out, state);
-  for (std::size_t i = 0; i < states_; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) out.put(core.covariance()(i, j));
-  }
-  out.put(epoch.since.transition);
-  out.put(epoch.since.noise);
-  out.put(epoch.since.decay);
-  out.put(epoch.since.decay_noise);
-  out.put(epoch.since.injected);
+  history::pack(epoch, record_);
   if (auto appended = records_->append(record_); !appended) problem_ = appended.error();
 }
 
@@ -297,32 +131,21 @@ Result<SmoothedTrack> Smoother::smooth() const {
                       {storage_.memory_bytes_max / kTrackShare, storage_.folder});
   if (size() == 0) return track;
 
-  Filtered now(states_, layouts_.size());
-  Filtered after(states_, layouts_.size());
+  history::Filtered now(states_, layouts_.size());
+  history::Filtered after(states_, layouts_.size());
   std::vector<double> record(record_.size());
   std::vector<double> smoothed_record(smoothed_doubles(states_, layouts_.size()));
-  VectorXd d = VectorXd::Zero(static_cast<Index>(states_));
+  VectorXd d;
   MatrixXd P;
   for (std::size_t k = size(); k-- > 0;) {
     if (auto read = records_->read(k, record); !read) return tl::unexpected<Error>(read.error());
     now.unpack(record);
-    if (k + 1 == size()) {
-      P = now.P;
-    } else {
-      smooth_back({now.P, after.transition, after.noise, after.decay, after.decay_noise, after.injected}, d,
-                  P);
-    }
-    SmoothedEpoch smoothed = now.state;
-    NavigationErrorVector navigation_error = d.head<kNavigationErrorSize>();
-    // Without navigation the R biases alone have a meaning.
-    if (!smoothed.navigating) navigation_error.head<kNavigationKinematicSize>().setZero();
-    inject(smoothed.navigation, navigation_error);
-    for (std::size_t i = 0; i < layouts_.size(); ++i)
-      inject(smoothed.studies[i], layouts_[i], {d.data(), states_});
-    Writer out(smoothed_record);
-    put_epoch(out, smoothed);
-    out.put(P.diagonal().cwiseMax(0.0).cwiseSqrt().eval());
-    out.put(P.block<3, 3>(kAttitudeError, kAttitudeError));
+    history::step_back(now, k + 1 == size() ? nullptr : &after, d, P);
+    const SmoothedEpoch smoothed = history::smoothed_epoch(now, d, P, layouts_);
+    history::Writer out(smoothed_record);
+    history::put_epoch(out, smoothed);
+    out.put(smoothed.sd);
+    out.put(smoothed.P_phi);
     if (auto appended = track.records_.append(smoothed_record); !appended)
       return tl::unexpected<Error>(appended.error());
     std::swap(now, after);

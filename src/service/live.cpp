@@ -16,6 +16,7 @@
 #include "service/io_thread.h"
 #include "service/line_factory.h"
 #include "service/live_publisher.h"
+#include "service/live_smoothing.h"
 #include "service/study.h"
 
 namespace imuscope {
@@ -138,7 +139,9 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
   if (!spec) return tl::unexpected<Error>(spec.error());
   if (auto sized = set_thread_stack_size(kThreadStackBytes); !sized) spdlog::warn("{}", sized.error().text());
 
-  Core core(estimator_config(configuration), configuration.devices.size());
+  LiveHistory history;
+  const EstimatorConfig estimator_settings = estimator_config(configuration);
+  Core core(estimator_settings, configuration.devices.size(), {}, &history);
   std::vector<std::unique_ptr<DeviceDecoder>> decoders;
   std::vector<std::vector<CanId>> ids;
   for (std::size_t i = 0; i < configuration.devices.size(); ++i) {
@@ -151,6 +154,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
 
   auto publisher = LivePublisher::create(configuration, *spec, options, io, estimator);
   if (!publisher) return tl::unexpected<Error>(publisher.error());
+  if (auto opened = (*publisher)->smooth(history, estimator_settings); !opened) return opened;
   (*publisher)->watch_can(ids);
   auto recorder = Recorder::start(
       {options.out / "capture.lcm", configuration.lcm.channel_prefix, run_header(configuration, options, t0)},

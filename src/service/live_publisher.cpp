@@ -96,6 +96,15 @@ Result<std::unique_ptr<LivePublisher>> LivePublisher::create(const Configuration
   return publisher;
 }
 
+Result<void> LivePublisher::smooth(LiveHistory& history, const EstimatorConfig& estimator) {
+  std::vector<std::uint32_t> blocks;
+  for (const auto& study : estimator.studies) blocks.push_back(study.blocks);
+  smoothing_.emplace(history, blocks);
+  std::vector<StudyFileInfo> infos;
+  for (const auto index : study_devices_) infos.push_back({configuration_.devices[index].name, 0.0});
+  return smoothing_->open(options_.out, std::move(infos));
+}
+
 void LivePublisher::set_refusals(const std::vector<Error>& refusals) {
   const std::lock_guard lock(refusals_mutex_);
   for (const auto& refusal : refusals) refusals_.push_back(refusal.text());
@@ -159,6 +168,7 @@ void LivePublisher::drain() {
     on_snapshot(*snapshot);
     rings.snapshots.pop();
   }
+  if (smoothing_ && last_) smoothing_->drain(*last_);
   for (const auto& refit : modeller_.take()) on_refit(refit);
 }
 
@@ -324,6 +334,9 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
   publish_status(host_now());
   if (auto written = folder_->write_calibration(); !written) return written;
   if (auto closed = folder_->close(); !closed) return closed;
+  if (smoothing_) {
+    if (auto closed = smoothing_->close(); !closed) return closed;
+  }
 
   Recording recording;
   recording.inputs = {"live"};

@@ -17,6 +17,7 @@
 #include "service/core_thread.h"
 #include "service/io_thread.h"
 #include "service/live.h"
+#include "service/live_smoothing.h"
 #include "service/modeller.h"
 #include "service/observability.h"
 #include "service/report_values.h"
@@ -36,6 +37,8 @@ class LivePublisher {
   LivePublisher& operator=(const LivePublisher&) = delete;
 
   void set_recorder(const Recorder& recorder) { recorder_ = &recorder; }
+  /// Writes smoothed_navigation.csv and smoothed_NAME.csv from `history`, seconds late. Call before start().
+  [[nodiscard]] Result<void> smooth(LiveHistory& history, const EstimatorConfig& estimator);
   /// What the system refused at start; repeated in every status message.
   void set_refusals(const std::vector<Error>& refusals);
   /// What the decoders need of their CAN buses, per device; for those watched. Call before start().
@@ -69,6 +72,7 @@ class LivePublisher {
   std::optional<LcmPublisher> bus_;
   std::unique_ptr<RunFolder> folder_;
   Modeller modeller_;
+  std::optional<LiveSmoothing> smoothing_;
   std::optional<Snapshot> last_;
   UtcAnchor anchor_;
   bool anchored_by_device_ = false;

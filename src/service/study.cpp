@@ -213,6 +213,19 @@ std::vector<StudyOutput> final_studies(const Snapshot& last) {
   return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
 }
 
+/// The drive's own mountings, replaced by those that several drives settled.
+std::vector<StudyOutput> with_settled(std::vector<StudyOutput> finals,
+                                      const std::vector<StudyFileInfo>& infos,
+                                      const std::map<std::string, MountingEstimate>& settled) {
+  for (std::size_t i = 0; i < finals.size(); ++i) {
+    const auto found = settled.find(infos[i].name);
+    if (found == settled.end()) continue;
+    finals[i].C_b_s = found->second.C_b_s;
+    finals[i].r_bs_b_m = found->second.r_bs_b_m;
+  }
+  return finals;
+}
+
 void warn_of_uncalibrated(const Configuration& configuration, const std::vector<StudyOutput>& finals,
                           std::vector<std::string>& warnings) {
   const auto indices = configuration.study_indices();
@@ -299,16 +312,17 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const auto biases = ReferenceBiasTrack::of(*track);
   if (!biases) return tl::unexpected<Error>(biases.error());
 
+  const auto settled = with_settled(finals, infos, options.mountings);
   std::vector<RowSpool> rows;
   for (std::size_t i = 0; i < finals.size(); ++i) {
     auto spool = RowSpool::create(options.out);
     if (!spool) return tl::unexpected<Error>(spool.error());
     rows.push_back(std::move(*spool));
   }
-  ErrorCollector collector(finals, *biases, configuration.noise.remove_scale_error, **folder, rows);
+  ErrorCollector collector(settled, *biases, configuration.noise.remove_scale_error, **folder, rows);
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("error process", share); };
-  const auto second = replay(configuration, frozen(estimator, finals), recording, collector, replay_options);
+  const auto second = replay(configuration, frozen(estimator, settled), recording, collector, replay_options);
   if (!second) return tl::unexpected<Error>(second.error());
 
   const auto models = fit_models(configuration, collector.series(), *spec, options, run.warnings);
@@ -333,7 +347,9 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
       !written) {
     return written;
   }
-  return write_json(options.out / "run.json", run_json(run));
+  auto about = run_json(run);
+  about["error_process_mounting"] = options.mountings.empty() ? "of this drive" : "of all drives combined";
+  return write_json(options.out / "run.json", about);
 }
 
 Result<void> run_replay(const Configuration& configuration, const Recording& recording,
@@ -341,7 +357,8 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
   // What an earlier study left in this folder would be taken for this run's.
-  std::vector<std::string> of_a_study{"models.json", "regression.json", "report.html", "smoothed_navigation.csv"};
+  std::vector<std::string> of_a_study{"models.json", "regression.json", "report.html",
+                                      "smoothed_navigation.csv"};
   for (const auto& info : study_file_infos(configuration, recording))
     of_a_study.push_back(fmt::format("smoothed_{}.csv", info.name));
   for (const auto& file : of_a_study) {

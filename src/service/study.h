@@ -5,10 +5,12 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
 #include "base/result.h"
+#include "calibration/combine.h"
 #include "service/replay.h"
 #include "service/run_folder.h"
 
@@ -19,6 +21,8 @@ struct StudyRunOptions {
   std::string version;
   /// Called with what is being done and the share of it that is done.
   std::function<void(const std::string& step, double share)> progress;
+  /// Mountings settled beforehand, by name: the error process is made with these. Others use the drive's own.
+  std::map<std::string, MountingEstimate> mountings;
 };
 
 /// What a run is made of, for run.json.

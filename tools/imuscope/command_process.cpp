@@ -2,10 +2,12 @@
 #include <spdlog/spdlog.h>
 #include <memory>
 
+#include "combination_table.h"
 #include "commands.h"
 #include "progress.h"
 #include "report/report.h"
 #include "service/recording.h"
+#include "service/several_drives.h"
 #include "service/study.h"
 #include "study_table.h"
 
@@ -21,10 +23,10 @@ struct Options {
   bool json = false;
 };
 
-Result<OpenedRecording> open(const Options& options) {
+Result<OpenedRecording> open(const Options& options, const std::vector<std::string>& inputs) {
   std::optional<std::filesystem::path> config;
   if (!options.config.empty()) config = options.config;
-  auto opened = open_recording(options.inputs, config);
+  auto opened = open_recording(inputs, config);
   if (opened) {
     for (const auto& remark : opened->remarks) spdlog::info("{}", remark);
   }
@@ -39,13 +41,50 @@ void add_inputs(CLI::App& command, Options& options) {
       ->type_name("FILE");
 }
 
+/// Several drives of one mounting: a run folder each, and one mounting of all.
+Result<void> process_drives(const Options& options, const std::vector<std::vector<std::string>>& inputs) {
+  std::vector<OpenedRecording> drives;
+  for (const auto& of_drive : inputs) {
+    auto opened = open(options, of_drive);
+    if (!opened) return tl::unexpected<Error>(opened.error());
+    drives.push_back(std::move(*opened));
+  }
+  const auto combined = [&] {
+    ProgressBar bar;
+    StudyRunOptions run;
+    run.out = options.out;
+    run.version = IMUSCOPE_VERSION;
+    run.progress = [&](const std::string& step, double share) { bar.show(step, share); };
+    return run_studies(drives, run);
+  }();
+  if (!combined) return tl::unexpected<Error>(combined.error());
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    const auto folder = drive_folder(options.out, i);
+    if (auto written = write_report(folder); !written) return written;
+    if (options.json) continue;
+    fmt::print("\n--- drive {}\n", i + 1);
+    if (auto printed = print_study(folder, false); !printed) return printed;
+  }
+  if (options.json) {
+    fmt::print("{}\n", combination_json(*combined).dump(2));
+  } else {
+    fmt::print("\n--- all drives\n");
+    print_combination(*combined);
+  }
+  return {};
+}
+
 Result<void> process(const Options& options) {
-  const auto opened = open(options);
+  const auto drives = drives_of(options.inputs);
+  if (drives.size() > 1) return process_drives(options, drives);
+  const auto opened = open(options, options.inputs);
   if (!opened) return tl::unexpected<Error>(opened.error());
   {
     ProgressBar bar;
-    const StudyRunOptions run{options.out, IMUSCOPE_VERSION,
-                              [&](const std::string& step, double share) { bar.show(step, share); }};
+    const StudyRunOptions run{options.out,
+                              IMUSCOPE_VERSION,
+                              [&](const std::string& step, double share) { bar.show(step, share); },
+                              {}};
     if (auto done = run_study(opened->configuration, opened->recording, run); !done) return done;
   }
   if (auto written = write_report(options.out); !written) return written;
@@ -53,12 +92,14 @@ Result<void> process(const Options& options) {
 }
 
 Result<void> replay_command(const Options& options) {
-  const auto opened = open(options);
+  const auto opened = open(options, options.inputs);
   if (!opened) return tl::unexpected<Error>(opened.error());
   {
     ProgressBar bar;
-    const StudyRunOptions run{options.out, IMUSCOPE_VERSION,
-                              [&](const std::string& step, double share) { bar.show(step, share); }};
+    const StudyRunOptions run{options.out,
+                              IMUSCOPE_VERSION,
+                              [&](const std::string& step, double share) { bar.show(step, share); },
+                              {}};
     if (auto done = run_replay(opened->configuration, opened->recording, run, options.realtime); !done)
       return done;
   }
@@ -68,8 +109,10 @@ Result<void> replay_command(const Options& options) {
 }  // namespace
 
 void add_process(CLI::App& app, Work& chosen) {
-  auto* command =
-      app.add_subcommand("process", "The study: calibration, error process, noise models, report");
+  auto* command = app.add_subcommand(
+      "process",
+      "The study: calibration, error process, noise models, report; of several captures (or "
+      "several files of every NAME), one mounting of all drives");
   auto options = std::make_shared<Options>();
   add_inputs(*command, *options);
   command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
