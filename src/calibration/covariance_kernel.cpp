@@ -132,6 +132,10 @@ bool CovarianceKernel::update(const std::array<double, 3>& innovation,
   }
   if (!any) return false;
   loops_->whiten(pht_, m.data(), whitened.data(), w_, correction_, padded_);
+  // One number that is not finite leaves its mark on the sum.
+  double sum = 0.0;
+  for (std::size_t i = 0; i < dimension_; ++i) sum += std::abs(correction_[i]);
+  if (!std::isfinite(sum)) return false;
   loops_->downdate(p_, w_, padded_);
   return true;
 }

@@ -24,7 +24,7 @@ inline constexpr std::size_t kNavigationStates = kLoopNavigationStates;
 inline constexpr std::size_t kNavigationCoupledStates = kLoopCoupledStates;
 inline constexpr std::size_t kCovariancePadding = 8;
 inline constexpr std::size_t kMaxMeasurementRows = kLoopMeasurementRows;
-inline constexpr std::size_t kMaxMeasurementBlocks = 8;
+inline constexpr std::size_t kMaxMeasurementBlocks = 10;
 
 /// Up to three consecutive columns of a three-row measurement matrix.
 struct MeasurementBlock {
@@ -75,8 +75,8 @@ class CovarianceKernel {
   [[nodiscard]] const std::array<double, 9>& innovation_covariance() const noexcept { return s_; }
 
   /// Second half: takes the rows with use[a] into account. K-4.
-  /// @return false, with nothing changed, where S of the used rows is not positive definite or no row is
-  /// used.
+  /// @return false, with nothing changed, where S of the used rows is not positive definite, the correction
+  /// is not finite or no row is used.
   [[nodiscard]] bool update(const std::array<double, 3>& innovation, const std::array<bool, 3>& use) noexcept;
   /// Correction of the error state by the last successful update(): P H^T S^-1 y.
   [[nodiscard]] std::span<const double> correction() const noexcept { return {correction_, dimension_}; }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/contracts.h"
+#include "calibration/covariance_watch.h"
 #include "calibration/event_log.h"
 #include "calibration/filter_core.h"
 #include "calibration/navigation_filter.h"
@@ -19,6 +20,10 @@ namespace {
 constexpr std::size_t kEpochsPerTick = 1200;
 /// At standstill f_z of forward-right-down axes is about -9.8; above this it points elsewhere.
 constexpr double kGravityWrong_mps2 = -8.0;
+/// And its magnitude, whatever the axes, is gravity's to this.
+constexpr double kGravityTolerance_mps2 = 0.5;
+/// The covariance's definiteness is looked at this often.
+constexpr Duration kWatchEvery = std::chrono::seconds{1};
 
 bool is_finite(const ImuData& imu) noexcept {
   bool finite = true;
@@ -47,6 +52,7 @@ class Estimator::Impl final : public EpochSink {
       : config_(config),
         history_(history),
         core_(config),
+        watch_(core_.covariance().dimension()),
         window_({config.reference.differentiator_points, 1.0 / config.reference.rate_hz}),
         navigation_(config, core_, log_, counters_),
         odometry_(config, core_, navigation_, log_, counters_) {
@@ -95,7 +101,8 @@ class Estimator::Impl final : public EpochSink {
     hand_out_history();
     navigation_.update_output();
     odometry_.update_output();
-    for (StudyFilter& study : studies_) study.update_output(core_);
+    for (StudyFilter& study : studies_) study.update_output(core_, log_);
+    watch_swaps(cut);
     counters_.events_lost = log_.lost();
     shown_ = log_;
     log_.clear();
@@ -161,15 +168,44 @@ class Estimator::Impl final : public EpochSink {
 
   void watch_gravity(const Sample& sample) noexcept {
     if (gravity_told_ || regime_.regime() != Regime::kStatic) return;
-    if (regime_.mean_f_mps2().z() < kGravityWrong_mps2) return;
+    const double magnitude = regime_.mean_f_mps2().norm();
+    const bool is_gravity = std::abs(magnitude - kNominalGravity_mps2) < kGravityTolerance_mps2;
+    if (is_gravity && regime_.mean_f_mps2().z() < kGravityWrong_mps2) return;
     gravity_told_ = true;
-    log_.add(EstimatorEventKind::kReferenceGravityWrong, sample.device, sample.time,
-             regime_.mean_f_mps2().z());
+    if (is_gravity) {
+      log_.add(EstimatorEventKind::kReferenceGravityWrong, sample.device, sample.time,
+               regime_.mean_f_mps2().z());
+    } else {
+      log_.add(EstimatorEventKind::kGravityMagnitudeWrong, sample.device, sample.time, magnitude);
+    }
+  }
+
+  void watch_swaps(HostTime now) noexcept {
+    for (std::size_t i = 0; i < studies_.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const bool told = swap_told_[i] || swap_told_[j];
+        if (told || !studies_[i].contradicts_prior() || !studies_[j].contradicts_prior()) continue;
+        if (!studies_[i].fits_prior_of(studies_[j].config()) ||
+            !studies_[j].fits_prior_of(studies_[i].config()))
+          continue;
+        swap_told_[i] = swap_told_[j] = true;
+        log_.add(EstimatorEventKind::kStudiesSwapped, studies_[j].config().device, now,
+                 static_cast<double>(studies_[i].config().device));
+      }
+    }
   }
 
   void watch_covariance(HostTime time) noexcept {
     std::size_t state = 0;
-    const std::size_t repaired = core_.repair(state);
+    std::size_t repaired = core_.repair(state);
+    if (repaired == 0 && time >= next_watch_) {
+      next_watch_ = time + kWatchEvery;
+      if (const auto bad = watch_.first_bad_state(core_.covariance())) {
+        state = *bad;
+        core_.repair_state(state);
+        repaired = 1;
+      }
+    }
     if (repaired == 0) return;
     counters_.covariance_repairs += repaired;
     log_.add(EstimatorEventKind::kCovarianceRepaired, config_.reference.device, time,
@@ -180,6 +216,9 @@ class Estimator::Impl final : public EpochSink {
   HistorySink* history_;
   HostTime next_history_{HostTime::min()};
   FilterCore core_;
+  CovarianceWatch watch_;
+  HostTime next_watch_{HostTime::min()};
+  std::array<bool, kMaxStudies> swap_told_{};
   ReferenceWindow window_;
   EventLog log_;
   EventLog shown_;

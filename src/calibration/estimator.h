@@ -122,6 +122,10 @@ struct StudyOutput {
   Vector3 sd_gyro_scale{};
   Vector3 accel_scale{};
   Vector3 sd_accel_scale{};
+  Vector3 accel_boresight_rad{};  ///< alpha of the accelerometer triad; sd 0: not estimated
+  Vector3 sd_accel_boresight_rad{};
+  double accel_t_d_s = 0.0;  ///< of the accelerometer triad, on top of t_d_s; sd 0: not estimated
+  double sd_accel_t_d_s = 0.0;
   std::array<double, 36> covariance_psi_r{};  ///< row-major, rad and m
   Vector3 nis_gyro{};  ///< mean over the last seconds of innovation^2 / its predicted variance, per axis of s
   Vector3 nis_accel{};
@@ -182,7 +186,14 @@ enum class EstimatorEventKind : std::uint8_t {
   kOdometryReturned,       ///< value: silence in s
   kOdometryRejected,  ///< wheels contradict the navigation (slip, wrong unit or scale); value: excess in m/s
   kOdometryAccepted,  ///< end of a streak of rejected speeds; value: its length in s
-  kCovarianceRepaired,  ///< a variance had become non-positive or non-finite; value: state index
+  kCovarianceRepaired,     ///< a state's variance was no longer positive; value: state index (state_name.h)
+  kGravityMagnitudeWrong,  ///< at standstill a device feels another force than gravity: its unit; value: |f|
+  kBoresightPriorWrong,    ///< the mounting found contradicts the configured one; value: angle, rad
+  kLeverArmPriorWrong,     ///< the lever arm found contradicts the configured one; value: distance, m
+  kStudiesSwapped,    ///< two S-IMUs sit where the configuration has the other; value: the other's device
+  kGyroBiasChanged,   ///< since before a silence; value: by how much, rad/s
+  kAccelBiasChanged,  ///< since before a silence; value: by how much, m/s^2
+  kGnssInconsistent,  ///< positions disagree with the motion more than their sd say; value: share of them
 };
 
 struct EstimatorEvent {
@@ -238,9 +249,10 @@ class Estimator {
   /// Cuts do not decrease.
   void advance(HostTime cut) noexcept;
 
-  /// Replaces the stochastic model of one S-IMU, at a tick boundary. Where the bias process became larger,
-  /// the bias variance grows by the difference (at most twofold); it is never reset and correlations stay.
-  /// Precondition: every sd finite, every white sd positive.
+  /// Replaces the stochastic model of one S-IMU, at a tick boundary, no white noise below noise_floor_share
+  /// of the configured. Where the bias process became larger, the bias variance grows by the difference (at
+  /// most twofold); it is never reset and correlations stay. Precondition: every sd finite, every white sd
+  /// positive.
   void set_noise(std::size_t study, const StudyNoise& noise) noexcept;
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept;

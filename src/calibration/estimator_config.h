@@ -20,6 +20,9 @@ namespace imuscope {
 /// Row-major 3 x 3.
 using Matrix3 = std::array<double, 9>;
 
+/// What a body at rest feels, anywhere on Earth to 0.05 m/s^2.
+inline constexpr double kNominalGravity_mps2 = 9.81;
+
 /// Most S-IMUs that one estimator can hold.
 inline constexpr std::size_t kMaxStudies = 6;
 
@@ -32,6 +35,11 @@ enum StudyBlock : std::uint32_t {
   kTimeOffsetBlock = 1U << 4U,  ///< t_d: the S sample at t shows the motion at t + t_d
   kGyroScaleBlock = 1U << 5U,   ///< s_g, in s
   kAccelScaleBlock = 1U << 6U,  ///< s_a, in s
+  /// The accelerometer triad's own boresight alpha and time offset, on top of the gyro triad's psi and t_d,
+  /// for sensors whose triads do not share their axes or their filters: C_accel = C_b_s A, A = A^
+  /// Exp(-alpha).
+  kAccelBoresightBlock = 1U << 7U,
+  kAccelTimeOffsetBlock = 1U << 8U,
 };
 /// The 19 states that are the default.
 inline constexpr std::uint32_t kFullStudyBlocks = 0x7FU;
@@ -141,6 +149,9 @@ struct StudyConfig {
   double rate_hz = 100.0;
   std::uint32_t blocks = kFullStudyBlocks;
   StudyNoise noise = mtx_class_noise();
+  /// A model that is handed in later is not believed where its white noise lies below this share of what is
+  /// configured: the filter's own residuals must not talk it into over-confidence.
+  double noise_floor_share = 0.5;
   /// Samples whose innovations are averaged into one update, 1 to 50. 1 suits a quiet reference. Where the
   /// reference's own noise or engine vibration exceeds the motion in single samples (a MEMS reference), 0.1 s
   /// of samples keep that noise out of the measurement matrix. No sample is left out.
@@ -159,6 +170,11 @@ struct StudyConfig {
   std::optional<double> prior_t_d_s;
   double prior_t_d_sd_s = 0.01;
   double coarse_search_s = 2.0;
+
+  /// Accelerometer triad against gyro triad, where these blocks are switched on; both start at zero. A data
+  /// sheet's alignment error is of the order of 0.1 deg.
+  Vector3 prior_accel_boresight_sd_rad{0.1 * kRadPerDeg, 0.1 * kRadPerDeg, 0.1 * kRadPerDeg};
+  double prior_accel_t_d_sd_s = 2e-3;
 
   Vector3 prior_gyro_bias_radps{0.0, 0.0, 0.0};
   Vector3 turn_on_gyro_sd_radps{0.3 * kRadPerDeg, 0.3 * kRadPerDeg, 0.3 * kRadPerDeg};

@@ -40,6 +40,8 @@ void for_each_prior(const StudyLayout& layout, const StudyConfig& config, Functi
   if (layout.t_d != StudyLayout::kAbsent) f(layout.t_d, config.prior_t_d_sd_s);
   block(layout.gyro_scale, config.prior_gyro_scale_sd);
   block(layout.accel_scale, config.prior_accel_scale_sd);
+  block(layout.accel_boresight, config.prior_accel_boresight_sd_rad);
+  if (layout.accel_t_d != StudyLayout::kAbsent) f(layout.accel_t_d, config.prior_accel_t_d_sd_s);
 }
 
 // Where a variance of the navigation is lost, these wide values stand in: m, m/s, rad.
@@ -185,7 +187,7 @@ std::size_t FilterCore::repair(std::size_t& first) noexcept {
     const double variance = covariance_(i, i);
     if (variance >= 0.0 && std::isfinite(variance)) continue;
     if (count++ == 0) first = i;
-    reset_state(i, repair_variance_[i]);
+    repair_state(i);
   }
   return count;
 }

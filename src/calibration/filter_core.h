@@ -69,6 +69,8 @@ class FilterCore {
 
   /// Makes every variance positive and finite again. @return states repaired; `first` is one of them.
   std::size_t repair(std::size_t& first) noexcept;
+  /// Makes one state as uncertain as it was at the start, and uncorrelated.
+  void repair_state(std::size_t i) noexcept { reset_state(i, repair_variance_[i]); }
 
  private:
   void accumulate(std::size_t i, double decay, double variance) noexcept;

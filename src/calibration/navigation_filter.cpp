@@ -26,6 +26,13 @@ constexpr double kUnseenForce = 0.5;
 constexpr Duration kGnssAhead = std::chrono::milliseconds{1};
 /// Stamps of R epochs are mapped; a solution at the same instant must not fall off the ring by rounding.
 constexpr double kConfiguredStartVelocitySd_mps = 0.05;
+/// One position in twenty has a NIS (3 degrees of freedom) above this where sd and lever arm are right. When
+/// a quarter of a minute's have, something is wrong with them.
+constexpr double kImprobableNis = 7.815;
+constexpr double kImprobableShareMax = 0.25;
+constexpr double kConsistencyMean_s = 60.0;
+constexpr double kConsistencyStep_s = 1.0;
+constexpr double kFloatCorrelation_s = 30.0;
 /// Re-acquisition: velocity is uncertain by this much.
 constexpr double kReacquireVelocitySd_mps = 3.0;
 
@@ -79,6 +86,13 @@ Vector3d trusted_sd(bool given, const Vector3& reported, const Vector3& fallback
                     GnssSolution solution) noexcept {
   const Vector3d sd = given ? to_eigen(reported) : Vector3d(sd_factor(solution) * to_eigen(fallback));
   return floored_sd(sd, to_eigen(floor));
+}
+
+/// A float solution is wrong by much the same amount for half a minute (E-15). Its sd is widened so that all
+/// of that time's solutions together tell what one of them is worth.
+double correlated_sd_factor(GnssSolution solution, double since_last_s) noexcept {
+  if (solution != GnssSolution::kFloat || since_last_s <= 0.0) return 1.0;
+  return std::sqrt(std::max(1.0, 2.0 * kFloatCorrelation_s / since_last_s));
 }
 
 InitialisationMethod method_of(AlignmentMethod method) noexcept {
@@ -335,6 +349,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
                  gnss_.floor_sd_velocity_mps, gnss.solution);
   if (!has_last_) return true;
   const HostTime time = host_time_of(sample);
+  const double widened = correlated_sd_factor(gnss.solution, to_seconds(time - last_position_));
 
   if (!navigating()) {
     if (navigation_.initial_rpy_rad && has_position) {
@@ -369,7 +384,9 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
   bool used = false;
   if (has_position) {
     const GnssInnovation position = gnss_position_innovation(then.state, antenna, arm);
-    used = apply(position_gate_, position, then.back, sd_position, time, output_.nis_position) || used;
+    used =
+        apply(position_gate_, position, then.back, widened * sd_position, time, output_.nis_position) || used;
+    watch_consistency(time);
     if (used)
       inject(then.state,
              then.back * Eigen::Map<const NavigationErrorVector>(core_.covariance().correction().data()));
@@ -422,6 +439,18 @@ bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured,
     P.project(sparse, to_array(R));
   }
   return core_.update(measured.innovation, {true, true, true});
+}
+
+void NavigationFilter::watch_consistency(HostTime time) noexcept {
+  const double dt_s = std::clamp(to_seconds(time - last_position_), 0.0, kConsistencyStep_s);
+  last_position_ = time;
+  watched_s_ += dt_s;
+  const double improbable = position_gate_.last_nis() > kImprobableNis ? 1.0 : 0.0;
+  improbable_share_ += dt_s / kConsistencyMean_s * (improbable - improbable_share_);
+  if (inconsistent_told_ || watched_s_ < kConsistencyMean_s) return;
+  if (improbable_share_ < kImprobableShareMax) return;
+  inconsistent_told_ = true;
+  log_.add(EstimatorEventKind::kGnssInconsistent, gnss_.device, time, improbable_share_);
 }
 
 void NavigationFilter::widen_for_reacquisition(const Vector3d& innovation) noexcept {

@@ -68,6 +68,7 @@ class NavigationFilter {
   [[nodiscard]] HostTime host_time_of(const Sample& gnss) const noexcept;
   bool apply(GnssGate& gate, const GnssInnovation& measured, const NavigationErrorCovariance& back,
              const Eigen::Vector3d& sd, HostTime time, Vector3& nis) noexcept;
+  void watch_consistency(HostTime time) noexcept;
   void widen_for_reacquisition(const Eigen::Vector3d& innovation) noexcept;
   [[nodiscard]] PastEpoch& past(std::size_t back) noexcept;  ///< 0 = newest
   [[nodiscard]] const PastEpoch& past(std::size_t back) const noexcept;
@@ -85,6 +86,10 @@ class NavigationFilter {
   InitialAligner aligner_;
   GnssGate position_gate_;
   GnssGate velocity_gate_;
+  double improbable_share_ = 0.0;  ///< of the positions of the last minute
+  double watched_s_ = 0.0;
+  HostTime last_position_{};
+  bool inconsistent_told_ = false;
   NavigationOutput output_;
 
   bool has_last_ = false;

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calibration/axis_gate.h"
 #include "navigation/so3.h"
@@ -35,12 +36,46 @@ constexpr double kCoarseOffsetSdFactor = 3.0;
 constexpr Duration kDirectionEvery = std::chrono::seconds{1};
 /// Less than this share of the prior left: observable.
 constexpr double kObservableShare = 0.5;
+/// Two values that differ by more than this many sd of their difference are not the same.
+constexpr double kContradictionSds = 5.0;
+/// A boresight is compared with the configured one once it is known to this.
+constexpr double kComparableBoresightSd_rad = 1.0 * kRadPerDeg;
+/// Biases are compared with those before a silence after so long.
+constexpr Duration kBiasSettles = std::chrono::seconds{20};
+/// At rest, for so long, the mean force of a healthy accelerometer differs from gravity by less than this.
+constexpr double kRestForGravity_s = 5.0;
+constexpr double kGravityTolerance_mps2 = 1.0;
+
+/// Largest |a - b| in units of the sd of the difference.
+double largest_contradiction(const Vector3& a, const Vector3& sd_a, const Vector3& b, const Vector3& sd_b) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < 3; ++i)
+    largest = std::max(largest, std::abs(a[i] - b[i]) / std::hypot(sd_a[i], sd_b[i]));
+  return largest;
+}
+
+double distance(const Vector3& a, const Vector3& b) { return (to_eigen(a) - to_eigen(b)).norm(); }
 
 bool is_finite(const ImuData& imu) noexcept {
   bool finite = true;
   for (std::size_t i = 0; i < 3; ++i)
     finite = finite && std::isfinite(imu.omega_radps[i]) && std::isfinite(imu.f_mps2[i]);
   return finite;
+}
+
+/// C-17: one process for a constant and a wandering part: the variance of both, and as fast at first as the
+/// wandering one.
+std::array<GaussMarkovConfig, 3> with_turn_on(const std::array<GaussMarkovConfig, 3>& slow,
+                                              const Vector3& turn_on_sd) {
+  std::array<GaussMarkovConfig, 3> whole = slow;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double variance = slow[i].sd * slow[i].sd + turn_on_sd[i] * turn_on_sd[i];
+    whole[i].sd = std::sqrt(variance);
+    whole[i].time_constant_s = slow[i].sd > 0.0
+                                   ? slow[i].time_constant_s * variance / (slow[i].sd * slow[i].sd)
+                                   : std::numeric_limits<double>::infinity();
+  }
+  return whole;
 }
 
 }  // namespace
@@ -54,11 +89,15 @@ StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
       force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
       increment_centre_(from_seconds(0.5 / config_.rate_hz)),
       has_biases_((config_.blocks & kBiasStudyBlocks) == kBiasStudyBlocks),
-      queue_(kQueue) {
+      queue_(kQueue),
+      gyro_floor_(config_.noise.gyro),
+      accel_floor_(config_.noise.accel) {
   precompute_noise();
 }
 
 void StudyFilter::precompute_noise() noexcept {
+  gyro_bias_ = with_turn_on(config_.noise.gyro_bias, config_.turn_on_gyro_sd_radps);
+  accel_bias_ = with_turn_on(config_.noise.accel_bias, config_.turn_on_accel_sd_mps2);
   const double dt_s = 1.0 / config_.rate_hz;
   for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
     for (const Triad triad : {Triad::kGyro, Triad::kAccel}) {
@@ -128,8 +167,8 @@ void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
     output_.t_d_s = t_d_s;
     // Before the reference is asked: a coarse offset that points outside its window must be able to heal.
     if (!calibrating_) live_offset_.add_study(valid, to_eigen(sample.imu.omega_radps).norm());
-    ReferenceKinematics b;
-    switch (context.window.evaluate(valid + from_seconds(t_d_s), b)) {
+    Seen b;
+    switch (look(context, valid + from_seconds(t_d_s), b)) {
       case ReferenceResult::kTooNew:
         if (!gives_up(sample, cut)) return;
         ++output_.counters.late;
@@ -148,8 +187,16 @@ void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
   }
 }
 
+ReferenceResult StudyFilter::look(const StudyContext& context, HostTime time, Seen& seen) const noexcept {
+  const ReferenceResult result = context.window.evaluate(time, seen.gyro);
+  seen.accel = seen.gyro;
+  const bool apart = calibrating_ && context.core.layout(index_).accel_t_d != StudyLayout::kAbsent;
+  if (result != ReferenceResult::kOk || !apart) return result;
+  return context.window.evaluate(time + from_seconds(context.core.study(index_).accel_t_d_s), seen.accel);
+}
+
 void StudyFilter::process_sample(StudyContext& context, const Sample& sample, HostTime valid,
-                                 const ReferenceKinematics& measured) noexcept {
+                                 Seen seen) noexcept {
   FilterCore& core = context.core;
   const double dt_s = has_last_ ? to_seconds(valid - last_time_) : 0.0;
   if (dt_s > kBlockGap_s) blocks_ = {};
@@ -163,18 +210,21 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
         core.predict_state(layout.accel_bias + i, 1.0,
                            config_.turn_on_accel_sd_mps2[i] * config_.turn_on_accel_sd_mps2[i]);
     }
-    context.log.add(EstimatorEventKind::kStudyReturned, config_.device, valid, dt_s);
+    note_return(context, valid, dt_s);
   }
   has_last_ = true;
   last_time_ = valid;
   output_.time = valid;
   output_.regime = context.regime;
+  watch_gravity(context, sample, dt_s);
   if (calibrating_) predict(core, dt_s);
 
   const NavigationState& navigation = core.navigation();
-  ReferenceKinematics b = measured;
-  b.omega_radps -= navigation.gyro_bias_b_radps;
-  b.f_mps2 -= navigation.accel_bias_b_mps2;
+  for (ReferenceKinematics* b : {&seen.gyro, &seen.accel}) {
+    b->omega_radps -= navigation.gyro_bias_b_radps;
+    b->f_mps2 -= navigation.accel_bias_b_mps2;
+  }
+  const ReferenceKinematics& b = seen.gyro;
 
   StudyEpoch epoch;
   epoch.study = index_;
@@ -195,7 +245,7 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
   if (calibrating_) {
     const auto before = output_.counters;
     correct(context, Triad::kGyro, b, epoch);
-    correct(context, Triad::kAccel, b, epoch);
+    correct(context, Triad::kAccel, seen.accel, epoch);
     ++output_.counters.used;
     bool gated = false;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -203,6 +253,7 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
               before.gated_accel[i] != output_.counters.gated_accel[i];
     }
     context.epochs.on_epoch(epoch);
+    watch_return(context, valid);
     watch_mounting(context, gated, valid, dt_s);
   } else {
     context.epochs.on_epoch(epoch);
@@ -305,8 +356,8 @@ void StudyFilter::predict(FilterCore& core, double dt_s) noexcept {
     }
     core.predict_states(first, decay, variance);
   };
-  bias(layout.gyro_bias, config_.noise.gyro_bias, state.gyro_bias_s_radps);
-  bias(layout.accel_bias, config_.noise.accel_bias, state.accel_bias_s_mps2);
+  bias(layout.gyro_bias, gyro_bias_, state.gyro_bias_s_radps);
+  bias(layout.accel_bias, accel_bias_, state.accel_bias_s_mps2);
   const double creep = config_.boresight_creep_rad_per_sqrt_s;
   if (creep > 0.0 && layout.psi != StudyLayout::kAbsent) {
     for (std::size_t i = 0; i < 3; ++i) core.predict_state(layout.psi + i, 1.0, creep * creep * dt_s);
@@ -404,12 +455,16 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
 
 void StudyFilter::attenuate_time_offset(Triad triad, double noise, const FilterCore& core,
                                         SparseMeasurement& H) noexcept {
-  const std::size_t column = core.layout(index_).t_d;
-  if (column == StudyLayout::kAbsent) return;
-  MeasurementBlock* block = nullptr;
+  // The columns of t_d and of the accelerometer's own offset hold the same derivative.
+  std::array<MeasurementBlock*, 2> blocks{};
+  std::size_t n = 0;
+  const StudyLayout& layout = core.layout(index_);
   for (std::size_t k = 0; k < H.count; ++k) {
-    if (H.blocks[k].column == column) block = &H.blocks[k];
+    const std::size_t column = H.blocks[k].column;
+    if (column == layout.t_d || column == layout.accel_t_d) blocks[n++] = &H.blocks[k];
   }
+  if (n == 0) return;
+  const MeasurementBlock* block = blocks.front();
   double power = 0.0;
   for (const auto& row : block->h) power += row[0] * row[0];
   double& mean = t_d_column_power_[static_cast<std::size_t>(triad)];
@@ -417,7 +472,75 @@ void StudyFilter::attenuate_time_offset(Triad triad, double noise, const FilterC
   // C-13: the column that the noise would be expected to leave out; at standstill nothing remains, so that
   // the reference's noise is not taken for motion.
   const double share = std::max(0.0, 1.0 - kColumnNoiseMargin * 3.0 * noise * noise / std::max(mean, 1e-300));
-  for (auto& row : block->h) row[0] *= share;
+  for (std::size_t k = 0; k < n; ++k) {
+    for (auto& row : blocks[k]->h) row[0] *= share;
+  }
+}
+
+void StudyFilter::watch_gravity(StudyContext& context, const Sample& sample, double dt_s) noexcept {
+  if (context.regime != Regime::kStatic || (sample.imu.flags & kAccelValid) == 0) {
+    resting_s_ = 0.0;
+    resting_f_.setZero();
+    return;
+  }
+  if (gravity_told_ || dt_s > kBlockGap_s) return;
+  resting_s_ += dt_s;
+  if (resting_s_ <= 0.0) return;
+  resting_f_ += dt_s / resting_s_ * (to_eigen(sample.imu.f_mps2) - resting_f_);
+  if (resting_s_ < kRestForGravity_s) return;
+  if (std::abs(resting_f_.norm() - kNominalGravity_mps2) < kGravityTolerance_mps2) return;
+  gravity_told_ = true;
+  context.log.add(EstimatorEventKind::kGravityMagnitudeWrong, config_.device, sample.time, resting_f_.norm());
+}
+
+void StudyFilter::note_return(StudyContext& context, HostTime now, double silence_s) noexcept {
+  context.log.add(EstimatorEventKind::kStudyReturned, config_.device, now, silence_s);
+  before_silence_ = BiasesThen{now + kBiasSettles, output_.gyro_bias_radps, output_.sd_gyro_bias_radps,
+                               output_.accel_bias_mps2, output_.sd_accel_bias_mps2};
+}
+
+void StudyFilter::watch_return(StudyContext& context, HostTime now) noexcept {
+  if (!before_silence_ || now < before_silence_->compare_at) return;
+  const BiasesThen then = *before_silence_;
+  before_silence_.reset();
+  if (!has_biases_) return;
+  const auto tell = [&](EstimatorEventKind kind, const Vector3& value, const Vector3& sd,
+                        const Vector3& before, const Vector3& sd_before) {
+    if (largest_contradiction(value, sd, before, sd_before) > kContradictionSds)
+      context.log.add(kind, config_.device, now, distance(value, before));
+  };
+  tell(EstimatorEventKind::kGyroBiasChanged, output_.gyro_bias_radps, output_.sd_gyro_bias_radps,
+       then.gyro_radps, then.sd_gyro_radps);
+  tell(EstimatorEventKind::kAccelBiasChanged, output_.accel_bias_mps2, output_.sd_accel_bias_mps2,
+       then.accel_mps2, then.sd_accel_mps2);
+}
+
+void StudyFilter::watch_priors(EventLog& log) noexcept {
+  if (!has_biases_) return;
+  const StudyConfig& prior = config_;
+  if (!lever_arm_told_ && largest_contradiction(output_.r_bs_b_m, output_.sd_r_bs_b_m, prior.prior_r_bs_b_m,
+                                                prior.prior_r_bs_b_sd_m) > kContradictionSds) {
+    lever_arm_told_ = true;
+    log.add(EstimatorEventKind::kLeverArmPriorWrong, config_.device, output_.time,
+            distance(output_.r_bs_b_m, prior.prior_r_bs_b_m));
+  }
+  const bool comparable = to_eigen(output_.sd_psi_rad).maxCoeff() < kComparableBoresightSd_rad;
+  if (boresight_told_ || !prior.prior_C_b_s || !comparable) return;
+  const Vector3d off = log_so3(to_eigen(*prior.prior_C_b_s).transpose() * to_eigen(output_.C_b_s));
+  if (largest_contradiction(to_array(off), output_.sd_psi_rad, Vector3{}, prior.prior_boresight_sd_rad) <=
+      kContradictionSds)
+    return;
+  boresight_told_ = true;
+  log.add(EstimatorEventKind::kBoresightPriorWrong, config_.device, output_.time, off.norm());
+}
+
+bool StudyFilter::fits_prior_of(const StudyConfig& other) const noexcept {
+  if (!calibrating_ || !other.prior_C_b_s) return false;
+  const Vector3d off = log_so3(to_eigen(*other.prior_C_b_s).transpose() * to_eigen(output_.C_b_s));
+  return largest_contradiction(to_array(off), output_.sd_psi_rad, Vector3{}, other.prior_boresight_sd_rad) <=
+             kContradictionSds &&
+         largest_contradiction(output_.r_bs_b_m, output_.sd_r_bs_b_m, other.prior_r_bs_b_m,
+                               other.prior_r_bs_b_sd_m) <= kContradictionSds;
 }
 
 void StudyFilter::watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept {
@@ -452,10 +575,19 @@ void StudyFilter::set_noise(FilterCore& core, const StudyNoise& noise) noexcept 
   rescale(layout.gyro_bias, config_.noise.gyro_bias, noise.gyro_bias);
   rescale(layout.accel_bias, config_.noise.accel_bias, noise.accel_bias);
   config_.noise = noise;
+  const double share = config_.noise_floor_share;
+  for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      double& gyro = config_.noise.gyro[regime].white_sd[i];
+      double& accel = config_.noise.accel[regime].white_sd[i];
+      gyro = std::max(gyro, share * gyro_floor_[regime].white_sd[i]);
+      accel = std::max(accel, share * accel_floor_[regime].white_sd[i]);
+    }
+  }
   precompute_noise();
 }
 
-void StudyFilter::update_output(const FilterCore& core) noexcept {
+void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept {
   if (!calibrating_) return;
   const StudyState& state = core.study(index_);
   const StudyLayout& layout = core.layout(index_);
@@ -477,6 +609,10 @@ void StudyFilter::update_output(const FilterCore& core) noexcept {
   sd_of(layout.accel_bias, output_.sd_accel_bias_mps2);
   sd_of(layout.gyro_scale, output_.sd_gyro_scale);
   sd_of(layout.accel_scale, output_.sd_accel_scale);
+  output_.accel_boresight_rad = to_array(Vector3d(-log_so3(state.accel_turn)));
+  sd_of(layout.accel_boresight, output_.sd_accel_boresight_rad);
+  output_.accel_t_d_s = state.accel_t_d_s;
+  output_.sd_accel_t_d_s = core.sd(layout.accel_t_d);
   output_.sd_t_d_s = core.sd(layout.t_d);
 
   bool calibrated = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
@@ -499,6 +635,7 @@ void StudyFilter::update_output(const FilterCore& core) noexcept {
   if (output_.time >= next_direction_) {
     next_direction_ = output_.time + kDirectionEvery;
     update_weakest_direction(core);
+    watch_priors(log);
   }
 }
 

@@ -4,6 +4,7 @@
 /// updates and what is told about them. Core. Thread: one.
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "alignment/coarse_mounting.h"
@@ -42,7 +43,11 @@ class StudyFilter {
   void process(StudyContext& context, HostTime cut) noexcept;
 
   void set_noise(FilterCore& core, const StudyNoise& noise) noexcept;
-  void update_output(const FilterCore& core) noexcept;
+  void update_output(const FilterCore& core, EventLog& log) noexcept;
+  /// The mounting found contradicts what was configured.
+  [[nodiscard]] bool contradicts_prior() const noexcept { return boresight_told_ || lever_arm_told_; }
+  /// The mounting found lies within a few sd of what is configured for `other`.
+  [[nodiscard]] bool fits_prior_of(const StudyConfig& other) const noexcept;
   [[nodiscard]] const StudyOutput& output() const noexcept { return output_; }
   [[nodiscard]] const StudyConfig& config() const noexcept { return config_; }
 
@@ -50,8 +55,13 @@ class StudyFilter {
   enum class Triad : std::uint8_t { kGyro, kAccel };
 
   [[nodiscard]] bool gives_up(const Sample& sample, HostTime cut) const noexcept;
-  void process_sample(StudyContext& context, const Sample& sample, HostTime valid,
-                      const ReferenceKinematics& measured) noexcept;
+  /// The reference as the two triads see it.
+  struct Seen {
+    ReferenceKinematics gyro;
+    ReferenceKinematics accel;
+  };
+  [[nodiscard]] ReferenceResult look(const StudyContext& context, HostTime time, Seen& seen) const noexcept;
+  void process_sample(StudyContext& context, const Sample& sample, HostTime valid, Seen b) noexcept;
   void gather(StudyContext& context, const Sample& sample, HostTime valid,
               const ReferenceKinematics& b) noexcept;
   void attempt(StudyContext& context, HostTime valid) noexcept;
@@ -63,6 +73,10 @@ class StudyFilter {
   void update_from_block(StudyContext& context, Triad triad, StudyEpoch& epoch) noexcept;
   void attenuate_time_offset(Triad triad, double noise, const FilterCore& core,
                              SparseMeasurement& H) noexcept;
+  void watch_gravity(StudyContext& context, const Sample& sample, double dt_s) noexcept;
+  void note_return(StudyContext& context, HostTime now, double silence_s) noexcept;
+  void watch_return(StudyContext& context, HostTime now) noexcept;
+  void watch_priors(EventLog& log) noexcept;
   void watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
   void update_weakest_direction(const FilterCore& core) noexcept;
   [[nodiscard]] ReferenceNoise reference_noise(const ReferenceKinematics& b) const noexcept;
@@ -106,6 +120,9 @@ class StudyFilter {
     Eigen::Vector3d plain;
   };
   std::array<std::array<NoiseVariances, 2>, kRegimeCount> variances_;
+  /// Turn-on and slow process as one: C-17.
+  std::array<GaussMarkovConfig, 3> gyro_bias_;
+  std::array<GaussMarkovConfig, 3> accel_bias_;
 
   /// Sums over the samples of one update; C-15.
   struct Block {
@@ -118,6 +135,25 @@ class StudyFilter {
   };
   std::array<Block, 2> blocks_;
   std::array<double, 2> t_d_column_power_{};  ///< recent mean of |column of t_d|^2, per triad
+
+  std::array<TriadNoise, kRegimeCount> gyro_floor_;  ///< as configured
+  std::array<TriadNoise, kRegimeCount> accel_floor_;
+
+  /// Biases before a silence, to be compared with those after it.
+  struct BiasesThen {
+    HostTime compare_at;
+    Vector3 gyro_radps;
+    Vector3 sd_gyro_radps;
+    Vector3 accel_mps2;
+    Vector3 sd_accel_mps2;
+  };
+  std::optional<BiasesThen> before_silence_;
+
+  Eigen::Vector3d resting_f_ = Eigen::Vector3d::Zero();  ///< mean force of this standstill
+  double resting_s_ = 0.0;
+  bool gravity_told_ = false;
+  bool boresight_told_ = false;
+  bool lever_arm_told_ = false;
 
   double gated_share_ = 0.0;
   std::array<double, 6> prior_sd_psi_r_{};

@@ -48,6 +48,8 @@ StudyLayout StudyLayout::make(std::uint32_t blocks, std::size_t first) noexcept 
   layout.t_d = place(kTimeOffsetBlock, 1);
   layout.gyro_scale = place(kGyroScaleBlock, 3);
   layout.accel_scale = place(kAccelScaleBlock, 3);
+  layout.accel_boresight = place(kAccelBoresightBlock, 3);
+  layout.accel_t_d = place(kAccelTimeOffsetBlock, 1);
   layout.size = next - first;
   return layout;
 }
@@ -74,24 +76,28 @@ StudyMeasurement accel_measurement(const StudyState& state, const StudyLayout& l
                                    const ReferenceBiasColumns& reference, const ReferenceKinematics& b,
                                    const ReferenceNoise& noise) noexcept {
   const Vector3d scale = Vector3d::Ones() + state.accel_scale;
-  const Matrix3d SC = scale.asDiagonal() * state.C_b_s;
+  const Matrix3d C = state.C_b_s * state.accel_turn;
+  const Matrix3d SC = scale.asDiagonal() * C;
   const Matrix3d W = skew(b.omega_radps);
   const Matrix3d W_dot = skew(b.omega_dot_radps2);
   const Matrix3d M = W * W + W_dot;
   const Matrix3d M_dot = W_dot * W + W * W_dot + skew(b.omega_ddot_radps3);
   const Vector3d& r = state.r_bs_b_m;
   const Vector3d f_at_s = b.f_mps2 + M * r;  // in b
-  const Vector3d f_s = state.C_b_s * f_at_s;
+  const Vector3d f_s = C * f_at_s;
+  const Vector3d by_t = SC * (b.f_dot_mps3 + M_dot * r);
   const Matrix3d r_cross = skew(r);
   // d(w x (w x r))/dw, C-10.
   const Matrix3d centripetal_slope = -(skew(b.omega_radps.cross(r)) + W * r_cross);
 
   StudyMeasurement m;
   m.predicted = scale.cwiseProduct(f_s) + state.accel_bias_s_mps2;
-  append(m.H, layout.psi, Matrix3d(SC * skew(f_at_s)));
+  append(m.H, layout.psi, Matrix3d(scale.asDiagonal() * state.C_b_s * skew(state.accel_turn * f_at_s)));
+  append(m.H, layout.accel_boresight, Matrix3d(SC * skew(f_at_s)));
   append(m.H, layout.r, Matrix3d(SC * M));
   append(m.H, layout.accel_bias, Matrix3d(Matrix3d::Identity()));
-  append(m.H, layout.t_d, Vector3d(SC * (b.f_dot_mps3 + M_dot * r)));
+  append(m.H, layout.t_d, by_t);
+  append(m.H, layout.accel_t_d, by_t);
   append(m.H, layout.accel_scale, Matrix3d(f_s.asDiagonal()));
   append(m.H, reference.gyro, Matrix3d(-SC * centripetal_slope));
   append(m.H, reference.accel, Matrix3d(-SC));
@@ -114,6 +120,9 @@ void inject(StudyState& state, const StudyLayout& layout, std::span<const double
   if (layout.t_d != StudyLayout::kAbsent) state.t_d_s += error[layout.t_d];
   if (layout.gyro_scale != StudyLayout::kAbsent) state.gyro_scale += error_at(error, layout.gyro_scale);
   if (layout.accel_scale != StudyLayout::kAbsent) state.accel_scale += error_at(error, layout.accel_scale);
+  if (layout.accel_boresight != StudyLayout::kAbsent)
+    state.accel_turn = tidied(state.accel_turn * exp_so3(-error_at(error, layout.accel_boresight)));
+  if (layout.accel_t_d != StudyLayout::kAbsent) state.accel_t_d_s += error[layout.accel_t_d];
 }
 
 double inflated_variance(double white_sd, double fast_sd, double fast_time_constant_s, double dt_s) noexcept {

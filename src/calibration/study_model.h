@@ -2,7 +2,7 @@
 
 /// The measurement model of one S-IMU: what it should show, given the reference, and how that changes with
 /// every state. Truth = estimate + error, except the boresight: C_b_s = C^_b_s Exp(-psi), psi in b.
-/// EQUATIONS.md C-1 to C-12. Core: no allocation.
+/// EQUATIONS.md C-1 to C-12, C-16. Core: no allocation.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -24,6 +24,8 @@ struct StudyState {
   double t_d_s = 0.0;
   Eigen::Vector3d gyro_scale = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_scale = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d accel_turn = Eigen::Matrix3d::Identity();  ///< A: C_accel = C_b_s A
+  double accel_t_d_s = 0.0;                                  ///< on top of t_d_s
 };
 
 /// Where the states of one S-IMU stand in the filter's error state.
@@ -36,8 +38,10 @@ struct StudyLayout {
   std::size_t t_d = kAbsent;
   std::size_t gyro_scale = kAbsent;
   std::size_t accel_scale = kAbsent;
+  std::size_t accel_boresight = kAbsent;
+  std::size_t accel_t_d = kAbsent;
   std::size_t first = 0;
-  std::size_t size = 0;  ///< 19 with every block
+  std::size_t size = 0;  ///< 19 with the default blocks
 
   /// States of the StudyBlock bits, from index `first` on.
   static StudyLayout make(std::uint32_t blocks, std::size_t first) noexcept;
@@ -69,7 +73,8 @@ struct ReferenceBiasColumns {
                                                 const ReferenceKinematics& b,
                                                 const ReferenceNoise& noise) noexcept;
 
-/// z_f = (I + S_a) C (f + M r) + b_a, `b` compensated, with M = [w x][w x] + [w' x]. C-7 to C-11.
+/// z_f = (I + S_a) C A (f + M r) + b_a, `b` compensated, at t + t_d + accel_t_d, with M = [w x][w x] + [w'
+/// x]. C-7 to C-11, C-16.
 [[nodiscard]] StudyMeasurement accel_measurement(const StudyState& state, const StudyLayout& layout,
                                                  const ReferenceBiasColumns& reference,
                                                  const ReferenceKinematics& b,

@@ -95,6 +95,10 @@ void read_prior(TomlReader in, MountingPriorConfig& prior) {
   in.number("time_offset_ms", offset_s, 1e-3, -1e6, 1e6);
   if (in.has("time_offset_ms")) prior.time_offset_s = offset_s;
   in.number("time_offset_sd_ms", prior.time_offset_sd_s, 1e-3, 1e-6, 1e6);
+  in.number("accel_boresight_sd_deg", prior.accel_boresight_sd_rad, kRadPerDeg, 1e-6, 180.0);
+  in.number("accel_time_offset_sd_ms", prior.accel_time_offset_sd_s, 1e-3, 1e-6, 1e3);
+  in.number("mount_creep_deg_per_sqrt_h", prior.creep_rad_per_sqrt_s, kRadPerDeg / std::sqrt(kSecondsPerHour),
+            0.0, 1e3);
   in.finish();
 }
 

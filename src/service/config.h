@@ -71,6 +71,11 @@ struct MountingPriorConfig {
   std::optional<double> lever_arm_sd_m;
   std::optional<double> time_offset_s;  ///< to be added to the S time; searched for where absent
   std::optional<double> time_offset_sd_s;
+  /// Given: the accelerometer triad has a boresight / a time offset of its own, of this sd against the
+  /// gyro's.
+  std::optional<double> accel_boresight_sd_rad;
+  std::optional<double> accel_time_offset_sd_s;
+  double creep_rad_per_sqrt_s = 0.0;  ///< of the mount; 0: rigid
 };
 
 /// Columns of a CSV device. See drivers/csv.

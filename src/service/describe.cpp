@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include "base/units.h"
+#include "calibration/state_name.h"
+#include "service/estimator_setup.h"
 #include "service/study.h"
 
 namespace imuscope {
@@ -72,9 +74,44 @@ std::string describe(const Configuration& configuration, const EstimatorEvent& e
           name, event.value);
     case EstimatorEventKind::kOdometryAccepted:
       return fmt::format("{}: wheel speeds used again after {:.1f} s", name, event.value);
-    case EstimatorEventKind::kCovarianceRepaired:
-      return fmt::format("numerical trouble: variance of state {:.0f} was repaired; please keep the capture",
+    case EstimatorEventKind::kCovarianceRepaired: {
+      const EstimatorConfig estimator = estimator_config(configuration);
+      const StateName state = state_name(estimator, static_cast<std::size_t>(event.value));
+      const std::string& owner =
+          configuration
+              .devices[state.study ? estimator.studies[*state.study].device : estimator.reference.device]
+              .name;
+      return fmt::format(
+          "{}: numerical trouble: the variance of {} was no longer positive and starts again; please keep the "
+          "capture",
+          owner, state.name);
+    }
+    case EstimatorEventKind::kGravityMagnitudeWrong:
+      return fmt::format(
+          "{}: at standstill it feels {:.2f} m/s^2 and should feel 9.8: check the unit of its specific force",
+          name, event.value);
+    case EstimatorEventKind::kBoresightPriorWrong:
+      return fmt::format("{}: it sits {:.1f} deg from where [device.prior] says; check mounting and prior",
+                         name, event.value * kDegPerRad);
+    case EstimatorEventKind::kLeverArmPriorWrong:
+      return fmt::format(
+          "{}: its lever arm is {:.2f} m from what [device.prior] says; check mounting and prior", name,
+          event.value);
+    case EstimatorEventKind::kStudiesSwapped:
+      return fmt::format(
+          "{} and {} sit where the configuration has the other: swapped cables, ports or names?", name,
+          configuration.devices[static_cast<std::size_t>(event.value)].name);
+    case EstimatorEventKind::kGyroBiasChanged:
+      return fmt::format("{}: its gyro bias changed by {:.3f} deg/s over the silence", name,
+                         event.value * kDegPerRad);
+    case EstimatorEventKind::kAccelBiasChanged:
+      return fmt::format("{}: its accelerometer bias changed by {:.3f} m/s^2 over the silence", name,
                          event.value);
+    case EstimatorEventKind::kGnssInconsistent:
+      return fmt::format(
+          "{}: {:.0f} % of its positions disagree with the motion: check antenna_lever_arm_b_m and the "
+          "receiver's sd",
+          name, 100.0 * event.value);
   }
   return "unknown event";
 }

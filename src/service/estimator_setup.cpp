@@ -77,6 +77,15 @@ StudyConfig study_config(const DeviceConfig& device, std::size_t index, bool pap
   if (prior.lever_arm_sd_m) study.prior_r_bs_b_sd_m = all_axes(*prior.lever_arm_sd_m);
   study.prior_t_d_s = prior.time_offset_s;
   if (prior.time_offset_sd_s) study.prior_t_d_sd_s = *prior.time_offset_sd_s;
+  if (prior.accel_boresight_sd_rad) {
+    study.blocks |= kAccelBoresightBlock;
+    study.prior_accel_boresight_sd_rad = all_axes(*prior.accel_boresight_sd_rad);
+  }
+  if (prior.accel_time_offset_sd_s) {
+    study.blocks |= kAccelTimeOffsetBlock;
+    study.prior_accel_t_d_sd_s = *prior.accel_time_offset_sd_s;
+  }
+  study.boresight_creep_rad_per_sqrt_s = prior.creep_rad_per_sqrt_s;
   return study;
 }
 

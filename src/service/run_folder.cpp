@@ -194,6 +194,14 @@ nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& st
   imu["gyro_scale_sd"] = study.sd_gyro_scale;
   imu["accel_scale"] = study.accel_scale;
   imu["accel_scale_sd"] = study.sd_accel_scale;
+  if (study.sd_accel_boresight_rad[0] > 0.0) {
+    imu["accel_boresight_deg"] = numbers(study.accel_boresight_rad, kDegPerRad);
+    imu["accel_boresight_sd_deg"] = numbers(study.sd_accel_boresight_rad, kDegPerRad);
+  }
+  if (study.sd_accel_t_d_s > 0.0) {
+    imu["accel_time_offset_s"] = study.accel_t_d_s;
+    imu["accel_time_offset_sd_s"] = study.sd_accel_t_d_s;
+  }
   imu["covariance_psi_r"] = study.covariance_psi_r;
   nlohmann::json observable;
   for (std::size_t i = 0; i < kDirectionNames.size(); ++i)

@@ -108,6 +108,121 @@ TEST(Estimator, AllTwentyFourAxisPermutationsAreFoundWithinSixtySecondsOfDriving
   }
 }
 
+TEST(Estimator, RandomRotationsAreFoundWithinSixtySecondsOfDriving) {
+  std::vector<SimulatedStudy> truth(kMaxStudies);
+  for (std::size_t i = 0; i < kMaxStudies; ++i) {
+    // Golden-angle turns about axes that spiral over the sphere.
+    const double k = static_cast<double>(i);
+    const double z = 1.0 - (2.0 * k + 1.0) / static_cast<double>(kMaxStudies);
+    const double radius = std::sqrt(1.0 - z * z);
+    truth[i].C_b_s =
+        exp_so3((0.5 + 0.5 * k) * Vector3d(radius * std::cos(2.4 * k), radius * std::sin(2.4 * k), z));
+  }
+  SimulatedDrive drive(150.0, truth, 36);
+  Estimator estimator(drive.config());
+  test::run(drive, estimator, 10.0 + 60.0);
+  for (std::size_t i = 0; i < kMaxStudies; ++i) {
+    ASSERT_GE(estimator.study(i).status, StudyStatus::kConverging) << "rotation " << i;
+    EXPECT_LT(kDegPerRad * test::mounting_error_rad(estimator.study(i), truth[i].C_b_s).norm(), 2.0);
+    EXPECT_LT(worst_in_sd(estimator.study(i), truth[i]), 5.0) << "rotation " << i;
+  }
+}
+
+TEST(Estimator, OnAStraightRoadItsSdSaysWhatCannotBeSeen) {
+  const std::vector<SimulatedStudy> truth{{exp_so3(Vector3d(0.02, -0.01, 0.03)), {0.35, -0.22, 0.12}, 0.004}};
+  double gyro_scale_z[2];
+  double psi_x[2];
+  for (const bool straight : {true, false}) {
+    SimulatedDrive drive(240.0, truth, 16,
+                         straight ? imusim::ScenarioKind::kStraightRoad : imusim::ScenarioKind::kDrive);
+    EstimatorConfig config = drive.config();
+    config.studies[0].prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    config.studies[0].prior_t_d_s = 0.0;
+    Estimator estimator(config);
+    test::run(drive, estimator);
+    gyro_scale_z[straight] = estimator.study(0).sd_gyro_scale[2] / config.studies[0].prior_gyro_scale_sd[2];
+    psi_x[straight] = estimator.study(0).sd_psi_rad[0];
+    EXPECT_LT(worst_in_sd(estimator.study(0), truth[0]), 4.0);
+  }
+  // Without a turn, nothing is learned about the scale of the axis that turns would excite, and the roll
+  // boresight, which yaw rate shows best, stays far less known.
+  EXPECT_GT(gyro_scale_z[1], 0.95);
+  EXPECT_LT(gyro_scale_z[0], 0.6);
+  EXPECT_GT(psi_x[1], 1.5 * psi_x[0]);
+}
+
+TEST(Estimator, BiasesDecayExactlyAsTheirProcessSays) {
+  SimulatedDrive drive(60.0, {{}}, 17);
+  EstimatorConfig config = drive.config();
+  StudyConfig& study = config.studies[0];
+  study.prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  study.prior_t_d_s = 0.0;
+  study.prior_gyro_bias_radps = {0.01, 0.01, 0.01};
+  const double sd = 0.002;
+  study.noise.gyro_bias.fill({sd, 0.4});  // shorter than the steps, where Euler's form fails
+  Estimator estimator(config);
+  double first_s = -1.0;
+  double last_s = -1.0;
+  while (drive.time_s() < 5.0) {
+    const double t_s = drive.time_s();
+    std::vector<Sample> samples = drive.next();
+    samples[1].imu.flags = 0;  // tells the time and nothing else
+    const bool heard = static_cast<int>(t_s * SimulatedDrive::kRate_hz) % 70 == 0;
+    for (const Sample& sample : samples) {
+      if (heard || sample.device != SimulatedDrive::kFirstStudy) estimator.add(sample);
+    }
+    estimator.advance(samples.back().arrival);
+    for (const StudyEpoch& epoch : estimator.epochs()) {
+      last_s = static_cast<double>(to_ns(epoch.time)) * 1e-9;
+      if (first_s < 0.0) first_s = last_s;
+    }
+  }
+  ASSERT_GT(last_s, first_s + 3.0);
+  // With the turn-on in it the process is stationary from the start: C-17.
+  const double variance = std::pow(study.turn_on_gyro_sd_radps[0], 2) + sd * sd;
+  const double decay = std::exp(-(last_s - first_s) / (0.4 * variance / (sd * sd)));
+  EXPECT_NEAR(estimator.study(0).sd_gyro_bias_radps[0], std::sqrt(variance), 1e-12);
+  EXPECT_NEAR(estimator.study(0).gyro_bias_radps[0], 0.01 * decay, 1e-15);
+}
+
+TEST(Estimator, AnAccelerometerTriadOfItsOwnIsFoundWhereItIsAskedFor) {
+  SimulatedStudy truth{exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.22, 0.12}, 0.004};
+  truth.alpha_rad = Vector3d(0.003, -0.002, 0.004);
+  truth.accel_t_d_s = 0.003;
+  SimulatedDrive drive(600.0, {truth}, 18);
+  EstimatorConfig config = drive.config();
+  config.studies[0].blocks |= kAccelBoresightBlock | kAccelTimeOffsetBlock;
+  Estimator estimator(config);
+  test::run(drive, estimator);
+  const StudyOutput& out = estimator.study(0);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(out.accel_boresight_rad[i], truth.alpha_rad(static_cast<Eigen::Index>(i)),
+                4.0 * out.sd_accel_boresight_rad[i]);
+  }
+  EXPECT_LT(out.sd_accel_boresight_rad[2], 0.8 * config.studies[0].prior_accel_boresight_sd_rad[2]);
+  EXPECT_LT(out.sd_accel_t_d_s, 0.3 * config.studies[0].prior_accel_t_d_sd_s);
+  EXPECT_NEAR(out.t_d_s + out.accel_t_d_s, truth.t_d_s + truth.accel_t_d_s, 4e-4);
+  EXPECT_NEAR(out.accel_t_d_s, truth.accel_t_d_s, 4.0 * out.sd_accel_t_d_s);
+  EXPECT_LT(worst_in_sd(out, truth), 4.0);
+}
+
+TEST(Estimator, ANoiseModelBelowTheFloorIsNotBelieved) {
+  const std::vector<SimulatedStudy> truth{{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.004}};
+  SimulatedDrive drive(150.0, truth, 19);
+  EstimatorConfig config = drive.config();
+  config.studies[0].prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  config.studies[0].prior_t_d_s = 0.0;
+  Estimator estimator(config);
+  StudyNoise bold = config.studies[0].noise;
+  for (TriadNoise& gyro : bold.gyro) {
+    for (double& sd : gyro.white_sd) sd *= 0.01;
+  }
+  estimator.set_noise(0, bold);
+  test::run(drive, estimator, 50.0);
+  // Half of the configured sd at least: NIS of about four, where a hundredth would give ten thousand.
+  EXPECT_NEAR(estimator.study(0).nis_gyro[0], 4.0, 1.0);
+}
+
 TEST(Estimator, ANoiseModelHandedInLaterTakesForce) {
   const std::vector<SimulatedStudy> truth{{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.004}};
   SimulatedDrive drive(150.0, truth, 15);

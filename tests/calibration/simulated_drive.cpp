@@ -35,9 +35,11 @@ Sample imu_sample(DeviceIndex device, std::uint64_t sequence, double t_s, const 
 
 }  // namespace
 
-SimulatedDrive::SimulatedDrive(double duration_s, std::vector<SimulatedStudy> studies, std::uint64_t seed)
+SimulatedDrive::SimulatedDrive(double duration_s, std::vector<SimulatedStudy> studies, std::uint64_t seed,
+                               imusim::ScenarioKind kind)
     : motion_([&] {
         imusim::Scenario scenario;
+        scenario.kind = kind;
         scenario.duration_s = duration_s;
         return scenario;
       }()),
@@ -51,8 +53,11 @@ SimulatedDrive::SimulatedDrive(double duration_s, std::vector<SimulatedStudy> st
   mtx.gyro_noise = imusim::GyroNoiseChoice::kAllDynamic;
   for (std::size_t i = 0; i < truth_.size(); ++i) {
     errors_.push_back(imusim::draw_mtx(mtx, random_));
+    errors_.back().accel.misalignment = -skew(truth_[i].C_b_s * truth_[i].alpha_rad);
     studies_.emplace_back(motion_, imusim::Mounting{truth_[i].C_b_s, truth_[i].r_bs_b_m}, errors_.back(),
                           seed, "study" + std::to_string(i));
+    accels_.emplace_back(motion_, imusim::Mounting{truth_[i].C_b_s, truth_[i].r_bs_b_m}, errors_.back(), seed,
+                         "accel" + std::to_string(i));
   }
 }
 
@@ -61,8 +66,10 @@ std::vector<Sample> SimulatedDrive::next() {
   std::vector<Sample> samples;
   samples.push_back(imu_sample(kReference, epoch_, t_s, reference_->sample_at(t_s)));
   for (std::size_t i = 0; i < studies_.size(); ++i) {
-    samples.push_back(imu_sample(static_cast<DeviceIndex>(kFirstStudy + i), epoch_, t_s,
-                                 studies_[i].sample_at(t_s + truth_[i].t_d_s)));
+    imusim::ImuReading reading = studies_[i].sample_at(t_s + truth_[i].t_d_s);
+    if (truth_[i].accel_t_d_s != 0.0)
+      reading.f_mps2 = accels_[i].sample_at(t_s + truth_[i].t_d_s + truth_[i].accel_t_d_s).f_mps2;
+    samples.push_back(imu_sample(static_cast<DeviceIndex>(kFirstStudy + i), epoch_, t_s, reading));
   }
   if (epoch_ % kGnssEvery == 0) {
     Sample sample = stamped(kGnss, SampleKind::kGnss, epoch_ / kGnssEvery, t_s);

@@ -17,6 +17,9 @@ struct SimulatedStudy {
   Eigen::Matrix3d C_b_s = Eigen::Matrix3d::Identity();
   Eigen::Vector3d r_bs_b_m = Eigen::Vector3d(0.35, -0.22, 0.12);
   double t_d_s = 0.004;  ///< the sample stamped t shows the motion at t + t_d
+  /// Of the accelerometer triad on top: C_accel = C_b_s Exp(-alpha), and its time offset.
+  Eigen::Vector3d alpha_rad = Eigen::Vector3d::Zero();
+  double accel_t_d_s = 0.0;
 };
 
 class SimulatedDrive {
@@ -26,7 +29,8 @@ class SimulatedDrive {
   static constexpr DeviceIndex kGnss = 9;
   static constexpr double kRate_hz = 100.0;
 
-  SimulatedDrive(double duration_s, std::vector<SimulatedStudy> studies, std::uint64_t seed = 1);
+  SimulatedDrive(double duration_s, std::vector<SimulatedStudy> studies, std::uint64_t seed = 1,
+                 imusim::ScenarioKind kind = imusim::ScenarioKind::kDrive);
 
   /// The next 10 ms, in order of arrival: one R sample, one of every S-IMU, GNSS five times a second. The
   /// first sample is at host time 10 s.
@@ -52,6 +56,7 @@ class SimulatedDrive {
   std::unique_ptr<imusim::ImuModel> reference_;
   std::vector<imusim::ImuErrors> errors_;
   std::vector<imusim::ImuModel> studies_;
+  std::vector<imusim::ImuModel> accels_;  ///< the accelerometer triads, where their time is their own
 };
 
 /// Error of the estimated mounting: psi with C_true = C_estimated Exp(-psi).

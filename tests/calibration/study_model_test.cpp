@@ -17,7 +17,8 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr std::size_t kFirstStudyState = 15;
-constexpr std::size_t kStates = kFirstStudyState + 19;
+constexpr std::uint32_t kEveryBlock = kFullStudyBlocks | kAccelBoresightBlock | kAccelTimeOffsetBlock;
+constexpr std::size_t kStates = kFirstStudyState + 23;
 constexpr ReferenceBiasColumns kReferenceColumns{9, 12};
 
 /// A motion whose derivatives are known exactly: harmonics of rate and force.
@@ -60,6 +61,8 @@ Case random_case(std::mt19937_64& random, const Vector3d& mounting) {
   c.state.t_d_s = 0.004;
   c.state.gyro_scale = random_vector(random, 0.003);
   c.state.accel_scale = random_vector(random, 0.003);
+  c.state.accel_turn = exp_so3(random_vector(random, 0.01));
+  c.state.accel_t_d_s = 0.0015;
   c.motion = {random_vector(random, 0.5), random_vector(random, 2.0), Vector3d(0.1, -0.3, -9.8), 4.0};
   return c;
 }
@@ -68,13 +71,15 @@ Case random_case(std::mt19937_64& random, const Vector3d& mounting) {
 /// model, by its own arithmetic: rotation, cross products, no Jacobian.
 VectorXd predicted(const Case& c, const std::array<double, kStates>& error) {
   StudyState x = c.state;
-  inject(x, StudyLayout::make(kFullStudyBlocks, kFirstStudyState), error);
+  inject(x, StudyLayout::make(kEveryBlock, kFirstStudyState), error);
+  const Vector3d gyro_bias(error[9], error[10], error[11]);
   const ReferenceKinematics b = c.motion.at(x.t_d_s);
-  const Vector3d omega = b.omega_radps - Vector3d(error[9], error[10], error[11]);
-  const Vector3d f = b.f_mps2 - Vector3d(error[12], error[13], error[14]);
-  const Vector3d f_at_s = f + omega.cross(omega.cross(x.r_bs_b_m)) + b.omega_dot_radps2.cross(x.r_bs_b_m);
-  const Vector3d omega_s = x.C_b_s * omega;
-  const Vector3d f_s = x.C_b_s * f_at_s;
+  const Vector3d omega_s = x.C_b_s * (b.omega_radps - gyro_bias);
+  const ReferenceKinematics a = c.motion.at(x.t_d_s + x.accel_t_d_s);
+  const Vector3d omega = a.omega_radps - gyro_bias;
+  const Vector3d f = a.f_mps2 - Vector3d(error[12], error[13], error[14]);
+  const Vector3d f_at_s = f + omega.cross(omega.cross(x.r_bs_b_m)) + a.omega_dot_radps2.cross(x.r_bs_b_m);
+  const Vector3d f_s = x.C_b_s * (x.accel_turn * f_at_s);
   VectorXd z(6);
   for (Eigen::Index i = 0; i < 3; ++i) {
     z(i) = (1.0 + x.gyro_scale(i)) * omega_s(i) + x.gyro_bias_s_radps(i);
@@ -97,7 +102,7 @@ MatrixXd dense(const SparseMeasurement& H) {
 
 TEST(StudyMeasurement, JacobiansMatchCentralDifferencesAtIdentityRightAnglesAndRandomMountings) {
   std::mt19937_64 random(21);
-  const StudyLayout layout = StudyLayout::make(kFullStudyBlocks, kFirstStudyState);
+  const StudyLayout layout = StudyLayout::make(kEveryBlock, kFirstStudyState);
   std::vector<Vector3d> mountings{Vector3d::Zero(), Vector3d(0, 0, 1.5707963267948966),
                                   Vector3d(3.14159265358979, 0, 0)};
   for (int i = 0; i < 20; ++i) mountings.push_back(random_vector(random, 1.5));
@@ -114,24 +119,29 @@ TEST(StudyMeasurement, JacobiansMatchCentralDifferencesAtIdentityRightAnglesAndR
     scale[layout.accel_bias + i] = 0.05;
     scale[layout.gyro_scale + i] = 0.003;
     scale[layout.accel_scale + i] = 0.003;
+    scale[layout.accel_boresight + i] = 0.002;
   }
   scale[layout.t_d] = 0.01;
-  const std::array<std::pair<std::size_t, std::size_t>, 9> blocks{{{9, 3},
-                                                                   {12, 3},
-                                                                   {layout.psi, 3},
-                                                                   {layout.r, 3},
-                                                                   {layout.gyro_bias, 3},
-                                                                   {layout.accel_bias, 3},
-                                                                   {layout.t_d, 1},
-                                                                   {layout.gyro_scale, 3},
-                                                                   {layout.accel_scale, 3}}};
+  scale[layout.accel_t_d] = 0.002;
+  const std::array<std::pair<std::size_t, std::size_t>, 11> blocks{{{9, 3},
+                                                                    {12, 3},
+                                                                    {layout.psi, 3},
+                                                                    {layout.r, 3},
+                                                                    {layout.gyro_bias, 3},
+                                                                    {layout.accel_bias, 3},
+                                                                    {layout.t_d, 1},
+                                                                    {layout.gyro_scale, 3},
+                                                                    {layout.accel_scale, 3},
+                                                                    {layout.accel_boresight, 3},
+                                                                    {layout.accel_t_d, 1}}};
 
   for (const Vector3d& mounting : mountings) {
     const Case c = random_case(random, mounting);
     const ReferenceKinematics b = c.motion.at(c.state.t_d_s);
+    const ReferenceKinematics a = c.motion.at(c.state.t_d_s + c.state.accel_t_d_s);
     MatrixXd H(6, static_cast<Eigen::Index>(kStates));
     H << dense(gyro_measurement(c.state, layout, kReferenceColumns, b, {}).H),
-        dense(accel_measurement(c.state, layout, kReferenceColumns, b, {}).H);
+        dense(accel_measurement(c.state, layout, kReferenceColumns, a, {}).H);
     for (const auto& [first, width] : blocks) {
       MatrixXd analytic(6, static_cast<Eigen::Index>(width));
       MatrixXd numeric(6, static_cast<Eigen::Index>(width));
@@ -151,10 +161,11 @@ TEST(StudyMeasurement, JacobiansMatchCentralDifferencesAtIdentityRightAnglesAndR
       }
       // Gyro and accelerometer rows carry different units, so each half is held to its own largest entry.
       for (const Eigen::Index row : {0, 3}) {
-        const auto a = analytic.middleRows(row, 3);
+        const auto exact = analytic.middleRows(row, 3);
         const auto n = numeric.middleRows(row, 3);
-        const double tolerance = 1e-7 * std::max(a.cwiseAbs().maxCoeff(), 1e-6);
-        EXPECT_LT((a - n).cwiseAbs().maxCoeff(), tolerance) << "block at " << first << ", rows from " << row;
+        const double tolerance = 1e-7 * std::max(exact.cwiseAbs().maxCoeff(), 1e-6);
+        EXPECT_LT((exact - n).cwiseAbs().maxCoeff(), tolerance)
+            << "block at " << first << ", rows from " << row;
       }
     }
   }
@@ -166,7 +177,8 @@ TEST(StudyMeasurement, AtRestTheRotationAboutTheForceIsInvisibleWhateverTheEstim
   ReferenceKinematics rest;
   rest.f_mps2 = Vector3d(0.3, -0.2, -9.8);
   for (int i = 0; i < 10; ++i) {
-    const Case c = random_case(random, random_vector(random, 1.5));
+    Case c = random_case(random, random_vector(random, 1.5));
+    c.state.accel_turn.setIdentity();
     const MatrixXd H = dense(accel_measurement(c.state, layout, kReferenceColumns, rest, {}).H);
     const Vector3d about_force = rest.f_mps2.normalized();
     EXPECT_LT((H.middleCols(static_cast<Eigen::Index>(layout.psi), 3) * about_force).norm(), 1e-14);

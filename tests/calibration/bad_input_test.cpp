@@ -1,0 +1,236 @@
+/// What goes wrong on vehicles, fed to the estimator: it stays sane and says what happened.
+
+#include <gtest/gtest.h>
+#include <cmath>
+#include <functional>
+#include <set>
+
+#include "base/units.h"
+#include "calibration/estimator.h"
+#include "navigation/so3.h"
+#include "tests/calibration/simulated_drive.h"
+
+namespace imuscope {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using test::SimulatedDrive;
+using test::SimulatedStudy;
+
+constexpr double kEarthRadius_m = 6.37e6;
+
+Matrix3 row_major(const Matrix3d& m) {
+  return {m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)};
+}
+
+SimulatedStudy tilted() { return {exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.22, 0.12}, 0.004}; }
+
+/// What a spoiler makes of a sample at a time of the drive; false: it is lost on the way.
+using Spoiler = std::function<bool(Sample&, double)>;
+
+struct Told {
+  std::set<EstimatorEventKind> kinds;
+  double last_value = 0.0;
+  [[nodiscard]] bool has(EstimatorEventKind kind) const { return kinds.contains(kind); }
+};
+
+Told told_by(SimulatedDrive& drive, Estimator& estimator, const Spoiler& spoil = {}, double until_s = 1e9) {
+  Told told;
+  while (!drive.done() && drive.time_s() < until_s) {
+    const double t_s = drive.time_s();
+    std::vector<Sample> samples = drive.next();
+    for (Sample& sample : samples) {
+      if (!spoil || spoil(sample, t_s)) estimator.add(sample);
+    }
+    estimator.advance(samples.back().arrival);
+    for (const EstimatorEvent& event : estimator.events()) {
+      told.kinds.insert(event.kind);
+      told.last_value = event.value;
+    }
+  }
+  return told;
+}
+
+bool finite(const StudyOutput& out) {
+  double sum = out.t_d_s + out.sd_t_d_s;
+  for (const double value : out.C_b_s) sum += value;
+  for (const double value : out.covariance_psi_r) sum += value;
+  for (std::size_t i = 0; i < 3; ++i)
+    sum += out.r_bs_b_m[i] + out.gyro_bias_radps[i] + out.accel_bias_mps2[i];
+  return std::isfinite(sum);
+}
+
+double worst_in_sd(const StudyOutput& out, const SimulatedStudy& truth) {
+  const Vector3d psi = test::mounting_error_rad(out, truth.C_b_s);
+  double worst = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    worst = std::max({worst, std::abs(psi(k)) / out.sd_psi_rad[i],
+                      std::abs(truth.r_bs_b_m(k) - out.r_bs_b_m[i]) / out.sd_r_bs_b_m[i]});
+  }
+  return worst;
+}
+
+double horizontal_error_m(const NavigationOutput& out, const imusim::MotionState& truth) {
+  return kEarthRadius_m *
+         std::hypot(out.latitude_rad - truth.position.latitude_rad,
+                    (out.longitude_rad - truth.position.longitude_rad) * std::cos(out.latitude_rad));
+}
+
+TEST(BadInput, TwoSwappedStudiesAreToldByName) {
+  const std::vector<SimulatedStudy> truth{{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.0},
+                                          {exp_so3(Vector3d(0, 0, 1.5)), {-0.30, 0.25, 0.10}, 0.0}};
+  for (const bool swapped : {true, false}) {
+    SimulatedDrive drive(240.0, truth, 41);
+    EstimatorConfig config = drive.config();
+    for (std::size_t i = 0; i < 2; ++i) {
+      const SimulatedStudy& believed = truth[swapped ? 1 - i : i];
+      config.studies[i].prior_C_b_s = row_major(believed.C_b_s);
+      config.studies[i].prior_r_bs_b_m = {believed.r_bs_b_m.x(), believed.r_bs_b_m.y(),
+                                          believed.r_bs_b_m.z()};
+      config.studies[i].prior_r_bs_b_sd_m = {0.05, 0.05, 0.05};
+      config.studies[i].prior_t_d_s = 0.0;
+    }
+    Estimator estimator(config);
+    const Told told = told_by(drive, estimator);
+    EXPECT_EQ(told.has(EstimatorEventKind::kStudiesSwapped), swapped);
+    EXPECT_EQ(told.has(EstimatorEventKind::kBoresightPriorWrong), swapped);
+    EXPECT_EQ(told.has(EstimatorEventKind::kLeverArmPriorWrong), swapped);
+    for (std::size_t i = 0; i < 2; ++i)
+      EXPECT_LT(test::mounting_error_rad(estimator.study(i), truth[i].C_b_s).norm(), 0.5 * kRadPerDeg);
+  }
+}
+
+class SilentStudy : public testing::TestWithParam<bool> {};
+
+TEST_P(SilentStudy, ThatReturnsIsToldAndItsBiasesAreComparedWithThoseBefore) {
+  const bool changed = GetParam();
+  SimulatedDrive drive(300.0, {tilted()}, 42);
+  Estimator estimator(drive.config());
+  const Told told = told_by(drive, estimator, [&](Sample& sample, double t_s) {
+    if (sample.device != SimulatedDrive::kFirstStudy) return true;
+    if (t_s > 170.0 && changed) {
+      sample.imu.omega_radps[1] += 0.5 * kRadPerDeg;
+      sample.imu.f_mps2[0] += 0.12;
+    }
+    return t_s < 160.0 || t_s > 170.0;
+  });
+  EXPECT_TRUE(told.has(EstimatorEventKind::kStudyReturned));
+  EXPECT_EQ(told.has(EstimatorEventKind::kGyroBiasChanged), changed);
+  EXPECT_EQ(told.has(EstimatorEventKind::kAccelBiasChanged), changed);
+  EXPECT_FALSE(told.has(EstimatorEventKind::kMountingChanged));
+  EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
+}
+INSTANTIATE_TEST_SUITE_P(WithOtherBiasesOrTheSame, SilentStudy, testing::Bool());
+
+TEST(BadInput, AStudyThatReturnsTurnedIsFoundAnew) {
+  SimulatedDrive drive(360.0, {tilted()}, 43);
+  Estimator estimator(drive.config());
+  told_by(drive, estimator, {}, 160.0);
+  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  const Matrix3d turned = exp_so3(Vector3d(0.2, -0.3, 0.8)) * tilted().C_b_s;
+  drive.remount(0, turned);
+  const Told told = told_by(drive, estimator, [](Sample& sample, double t_s) {
+    return sample.device != SimulatedDrive::kFirstStudy || t_s > 170.0;
+  });
+  EXPECT_TRUE(told.has(EstimatorEventKind::kStudyReturned));
+  EXPECT_TRUE(told.has(EstimatorEventKind::kMountingChanged));
+  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  EXPECT_LT(test::mounting_error_rad(estimator.study(0), turned).norm(), 0.5 * kRadPerDeg);
+}
+
+class AntennaLeverArm : public testing::TestWithParam<double> {};
+
+TEST_P(AntennaLeverArm, IsToldWhenItIsWrongAndLeavesTheCalibrationAlone) {
+  SimulatedDrive drive(300.0, {tilted()}, 44);
+  EstimatorConfig config = drive.config();
+  config.gnss.antenna_lever_arm_b_m = {GetParam(), 0.5 * GetParam(), 0.0};
+  Estimator estimator(config);
+  const Told told = told_by(drive, estimator);
+  EXPECT_EQ(told.has(EstimatorEventKind::kGnssInconsistent), GetParam() != 0.0);
+  EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
+  const imusim::MotionState truth = drive.motion().state_at(drive.time_s() - 0.01);
+  EXPECT_LT(horizontal_error_m(estimator.navigation(), truth), 2.0 * std::hypot(GetParam(), 0.1));
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(estimator.navigation().C_b_n.data());
+  EXPECT_LT(log_so3(truth.C_b_n * C.transpose()).norm(), 2.0 * kRadPerDeg);
+}
+INSTANTIATE_TEST_SUITE_P(RightAndWrong, AntennaLeverArm, testing::Values(0.0, 1.0));
+
+TEST(BadInput, AFixThatFallsBackToFloatIsTrustedLess) {
+  SimulatedDrive drive(200.0, {}, 45);
+  Estimator estimator(drive.config());
+  double worst_m = 0.0;
+  while (!drive.done()) {
+    const double t_s = drive.time_s();
+    std::vector<Sample> samples = drive.next();
+    for (Sample& sample : samples) {
+      if (sample.kind == SampleKind::kGnss && t_s > 100.0 && t_s < 130.0) {
+        sample.gnss.solution = GnssSolution::kFloat;
+        sample.gnss.flags = kPositionValid;  // and no sd
+        sample.gnss.latitude_rad += 0.4 / kEarthRadius_m;
+      }
+      estimator.add(sample);
+    }
+    estimator.advance(samples.back().arrival);
+    if (t_s > 61.0)
+      worst_m = std::max(worst_m, horizontal_error_m(estimator.navigation(), drive.motion().state_at(t_s)));
+  }
+  // The one fix that follows the last float may stand out; a streak may not.
+  EXPECT_LE(estimator.counters().gnss_rejected, 1U);
+  EXPECT_LT(worst_m, 0.4);
+  EXPECT_LT(horizontal_error_m(estimator.navigation(), drive.motion().state_at(drive.time_s() - 0.01)), 0.05);
+}
+
+TEST(BadInput, ForcesInAnotherUnitAreToldAtStandstill) {
+  for (const DeviceIndex device : {SimulatedDrive::kReference, SimulatedDrive::kFirstStudy}) {
+    SimulatedDrive drive(200.0, {tilted()}, 46);
+    Estimator estimator(drive.config());
+    const Told told = told_by(
+        drive, estimator,
+        [&](Sample& sample, double /*t_s*/) {
+          if (sample.device == device) {
+            for (double& f : sample.imu.f_mps2) f /= kMps2PerG;
+          }
+          return true;
+        },
+        30.0);
+    EXPECT_TRUE(told.has(EstimatorEventKind::kGravityMagnitudeWrong)) << "device " << device;
+  }
+}
+
+TEST(BadInput, AMirroredStudyIsToldAndNotCalledCalibrated) {
+  SimulatedDrive drive(150.0, {tilted()}, 47);
+  Estimator estimator(drive.config());
+  const Told told = told_by(drive, estimator, [](Sample& sample, double /*t_s*/) {
+    if (sample.device == SimulatedDrive::kFirstStudy) {
+      sample.imu.omega_radps[2] = -sample.imu.omega_radps[2];
+      sample.imu.f_mps2[2] = -sample.imu.f_mps2[2];
+    }
+    return true;
+  });
+  EXPECT_TRUE(told.has(EstimatorEventKind::kCoarseAlignmentPoor));
+  EXPECT_NE(estimator.study(0).status, StudyStatus::kCalibrated);
+}
+
+TEST(BadInput, TimeRunningBackwardsAndNanForAWholeSecondChangeNothingButCounters) {
+  SimulatedDrive drive(200.0, {tilted()}, 48);
+  Estimator estimator(drive.config());
+  const Told told = told_by(drive, estimator, [](Sample& sample, double t_s) {
+    if (t_s > 120.0 && t_s < 121.0 && sample.kind == SampleKind::kImu)
+      sample.imu.f_mps2[1] = std::numeric_limits<double>::quiet_NaN();
+    if (t_s > 140.0 && t_s < 141.0 && sample.kind == SampleKind::kImu)
+      sample.time -= std::chrono::seconds{30};
+    return true;
+  });
+  EXPECT_TRUE(told.has(EstimatorEventKind::kReferenceGap));
+  EXPECT_GT(estimator.counters().reference_not_finite, 90U);
+  EXPECT_GT(estimator.counters().reference_not_increasing, 90U);
+  EXPECT_GT(estimator.study(0).counters.not_finite, 90U);
+  EXPECT_GT(estimator.study(0).counters.not_increasing, 90U);
+  EXPECT_TRUE(finite(estimator.study(0)));
+  EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
+}
+
+}  // namespace
+}  // namespace imuscope
