@@ -1,10 +1,12 @@
 #pragma once
 
-/// Numbers out of bytes, by shifting: no overlay, so alignment and the host's byte order do not matter.
+/// Numbers out of bytes, by copying and turning them round: no overlay, so alignment and the host's byte
+/// order do not matter. And the sums over bytes that several protocols end their frames with.
 
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <type_traits>
 
@@ -16,25 +18,57 @@ using UnsignedOfSize =
     std::conditional_t<Size == 1, std::uint8_t,
                        std::conditional_t<Size == 2, std::uint16_t,
                                           std::conditional_t<Size == 4, std::uint32_t, std::uint64_t>>>;
+
+template <typename Raw>
+constexpr Raw reversed(Raw raw) noexcept {
+  if constexpr (sizeof(Raw) == 2) return __builtin_bswap16(raw);
+  if constexpr (sizeof(Raw) == 4) return __builtin_bswap32(raw);
+  if constexpr (sizeof(Raw) == 8) return __builtin_bswap64(raw);
+  return raw;
+}
+
+template <typename T>
+[[nodiscard]] T read_ordered(const std::uint8_t* at, std::endian order) noexcept {
+  UnsignedOfSize<sizeof(T)> raw;
+  std::memcpy(&raw, at, sizeof raw);
+  return std::bit_cast<T>(order == std::endian::native ? raw : reversed(raw));
+}
 }  // namespace detail
 
 /// Most significant byte first. T is an integer or a floating point type of 1, 2, 4 or 8 bytes; `bytes` holds
 /// at least sizeof(T) behind `offset` (the caller has checked the length of the frame).
 template <typename T>
 [[nodiscard]] T read_be(std::span<const std::uint8_t> bytes, std::size_t offset = 0) noexcept {
-  using Raw = detail::UnsignedOfSize<sizeof(T)>;
-  std::uint64_t raw = 0;
-  for (std::size_t i = 0; i < sizeof(T); ++i) raw = raw << 8U | bytes[offset + i];
-  return std::bit_cast<T>(static_cast<Raw>(raw));
+  return detail::read_ordered<T>(bytes.data() + offset, std::endian::big);
 }
 
 /// Least significant byte first; otherwise as read_be().
 template <typename T>
 [[nodiscard]] T read_le(std::span<const std::uint8_t> bytes, std::size_t offset = 0) noexcept {
-  using Raw = detail::UnsignedOfSize<sizeof(T)>;
-  std::uint64_t raw = 0;
-  for (std::size_t i = sizeof(T); i-- > 0;) raw = raw << 8U | bytes[offset + i];
-  return std::bit_cast<T>(static_cast<Raw>(raw));
+  return detail::read_ordered<T>(bytes.data() + offset, std::endian::little);
+}
+
+/// Sum of the bytes modulo 2^32, eight at a time.
+[[nodiscard]] inline std::uint32_t sum_of_bytes(std::span<const std::uint8_t> bytes) noexcept {
+  // Bytes are added in lanes of 16 bits, each of which holds 128 sums of two bytes.
+  constexpr std::uint64_t kEvenBytes = 0x00FF00FF00FF00FFULL;
+  constexpr std::size_t kWordsUntilFull = 128;
+  constexpr std::size_t kWord = sizeof(std::uint64_t);
+  std::uint32_t sum = 0;
+  const std::uint8_t* at = bytes.data();
+  std::size_t left = bytes.size();
+  while (left >= kWord) {
+    std::uint64_t lanes = 0;
+    for (std::size_t n = 0; n < kWordsUntilFull && left >= kWord; ++n, at += kWord, left -= kWord) {
+      std::uint64_t word;
+      std::memcpy(&word, at, kWord);
+      lanes += (word & kEvenBytes) + (word >> 8U & kEvenBytes);
+    }
+    sum += static_cast<std::uint32_t>((lanes & 0xFFFFU) + (lanes >> 16U & 0xFFFFU) +
+                                      (lanes >> 32U & 0xFFFFU) + (lanes >> 48U));
+  }
+  for (; left > 0; ++at, --left) sum += *at;
+  return sum;
 }
 
 }  // namespace imuscope

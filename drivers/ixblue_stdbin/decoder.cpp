@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/units.h"
+#include "drivers/device/attitude_angles.h"
 #include "drivers/device/bytes.h"
 #include "drivers/device/calendar.h"
 
@@ -25,54 +26,6 @@ constexpr std::int64_t kNearMidnightTicks = 600 * 10'000;
 /// Date block to days since 1970; nothing where it is not a date.
 std::optional<std::int64_t> days_of(std::span<const std::uint8_t> block) noexcept {
   return days_since_1970(read_be<std::uint16_t>(block, 2), block[1], block[0]);
-}
-
-using Matrix3 = std::array<double, 9>;
-
-Matrix3 multiply(const Matrix3& a, const Matrix3& b) noexcept {
-  Matrix3 c{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      for (std::size_t k = 0; k < 3; ++k) c[3 * i + j] += a[3 * i + k] * b[3 * k + j];
-    }
-  }
-  return c;
-}
-
-Matrix3 transpose(const Matrix3& a) noexcept {
-  return {a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8]};
-}
-
-struct RollPitchHeading {
-  double roll_rad;
-  double pitch_rad;
-  double heading_rad;
-};
-
-/// Body (forward-right-down) to north-east-down: Rz(heading) Ry(pitch) Rx(roll).
-Matrix3 rotation_b_to_n(const RollPitchHeading& rph) noexcept {
-  const double cr = std::cos(rph.roll_rad), sr = std::sin(rph.roll_rad);
-  const double cp = std::cos(rph.pitch_rad), sp = std::sin(rph.pitch_rad);
-  const double ch = std::cos(rph.heading_rad), sh = std::sin(rph.heading_rad);
-  return {cp * ch,
-          sr * sp * ch - cr * sh,
-          cr * sp * ch + sr * sh,
-          cp * sh,
-          sr * sp * sh + cr * ch,
-          cr * sp * sh - sr * ch,
-          -sp,
-          sr * cp,
-          cr * cp};
-}
-
-RollPitchHeading angles_of(const Matrix3& c) noexcept {
-  return {std::atan2(c[7], c[8]), -std::asin(std::clamp(c[6], -1.0, 1.0)), std::atan2(c[3], c[0])};
-}
-
-double to_positive_turn(double angle_rad) noexcept {
-  const double turned = std::fmod(angle_rad, 2.0 * kPi);
-  const double positive = turned < 0.0 ? turned + 2.0 * kPi : turned;
-  return positive >= 2.0 * kPi ? 0.0 : positive;
 }
 
 /// XV (forward, port, up) to forward-right-down.
@@ -244,13 +197,12 @@ RawBlocks Decoder::RepeatedBlock::take(std::span<const std::uint8_t> bytes) noex
 }
 
 Vector3 Decoder::to_b(std::span<const std::uint8_t> block, double unit) const noexcept {
-  Vector3 v_b{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
-      v_b[i] += config_.axes[3 * i + j] * static_cast<double>(read_be<float>(block, 4 * j));
-    }
-    v_b[i] *= unit;
-  }
+  Vector3 v_b;
+  rotate(config_.axes,
+         {unit * static_cast<double>(read_be<float>(block, 0)),
+          unit * static_cast<double>(read_be<float>(block, 4)),
+          unit * static_cast<double>(read_be<float>(block, 8))},
+         v_b);
   return v_b;
 }
 
@@ -310,7 +262,7 @@ void Decoder::emit_attitude(const Telegram& telegram, Sample& sample, SampleSink
   const bool turned = config_.axes != kXvToFrd;
   if (turned) {
     const Matrix3 frd_to_b = multiply(config_.axes, transpose(kXvToFrd));
-    rph = angles_of(multiply(rotation_b_to_n(rph), transpose(frd_to_b)));
+    rph = angles_of(multiply(rotation_of(rph), transpose(frd_to_b)));
   }
   attitude.roll_rad = rph.roll_rad;
   attitude.pitch_rad = rph.pitch_rad;

@@ -1,5 +1,6 @@
 #include "drivers/ixblue_stdbin/messages.h"
 
+#include <bit>
 #include <cstring>
 
 #include "drivers/device/bytes.h"
@@ -7,14 +8,12 @@
 namespace imuscope::ixblue_stdbin {
 namespace {
 
-constexpr std::size_t kMaskBits = 32;
-
 /// Places the blocks of one mask from `at` on. False where a bit or the size ends the walk.
 template <std::size_t N>
 bool place_blocks(std::uint32_t mask, const BlockLayout (&layouts)[N], std::array<std::uint16_t, N>& offsets,
                   std::size_t end, std::size_t& at) noexcept {
-  for (std::size_t bit = 0; bit < kMaskBits; ++bit) {
-    if ((mask >> bit & 1U) == 0) continue;
+  for (; mask != 0; mask &= mask - 1) {
+    const auto bit = static_cast<std::size_t>(std::countr_zero(mask));
     if (bit >= N || layouts[bit].size == 0 || at + layouts[bit].size > end) return false;
     offsets[bit] = static_cast<std::uint16_t>(at);
     at += layouts[bit].size;

@@ -1,6 +1,7 @@
 #include "drivers/ixblue_stdbin/scanner.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "drivers/device/bytes.h"
 
@@ -14,8 +15,8 @@ struct MaskSize {
 
 MaskSize size_of_blocks(std::uint32_t mask, std::span<const BlockLayout> layouts) noexcept {
   MaskSize size;
-  for (std::size_t bit = 0; mask != 0; ++bit, mask >>= 1U) {
-    if ((mask & 1U) == 0) continue;
+  for (; mask != 0; mask &= mask - 1) {
+    const auto bit = static_cast<std::size_t>(std::countr_zero(mask));
     if (bit < layouts.size() && layouts[bit].size != 0) {
       size.bytes += layouts[bit].size;
     } else {
@@ -47,12 +48,6 @@ bool sizes_are_possible(std::span<const std::uint8_t> header_bytes, const Header
 }
 
 }  // namespace
-
-std::uint32_t checksum(std::span<const std::uint8_t> bytes) noexcept {
-  std::uint32_t sum = 0;
-  for (const std::uint8_t byte : bytes) sum += byte;
-  return sum;
-}
 
 bool Scanner::next(Frame& frame, bool at_end) noexcept {
   buffer_.consume(taken_);
@@ -110,7 +105,7 @@ Scanner::Examined Scanner::examine_telegram(std::span<const std::uint8_t> pendin
   if (total > kTelegramMax || !sizes_are_possible(pending, header, total)) return {Verdict::kBadLength};
   if (pending.size() < total) return {Verdict::kNeedMore};
   const std::size_t summed = total - kChecksumSize;
-  if (checksum(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
+  if (sum_of_bytes(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
     return {Verdict::kBadChecksum};
   }
   return {Verdict::kFrame, total, Frame::Kind::kTelegram};
@@ -124,7 +119,7 @@ Scanner::Examined Scanner::examine_answer(std::span<const std::uint8_t> pending)
   if (total < kAnswerHeaderSize + kChecksumSize || total > kAnswerMax) return {Verdict::kBadLength};
   if (pending.size() < total) return {Verdict::kNeedMore};
   const std::size_t summed = total - kChecksumSize;
-  if (checksum(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
+  if (sum_of_bytes(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
     return {Verdict::kBadChecksum};
   }
   return {Verdict::kFrame, total, Frame::Kind::kAnswer};

@@ -63,7 +63,4 @@ class Scanner {
   ScanCounters counters_;
 };
 
-/// Sum of the bytes modulo 2^32.
-[[nodiscard]] std::uint32_t checksum(std::span<const std::uint8_t> bytes) noexcept;
-
 }  // namespace imuscope::ixblue_stdbin

@@ -1,34 +1,16 @@
 #pragma once
 
-/// NAV-PVT, position, velocity and time of one epoch, in wire units.
+/// NAV-PVT as it stands on the wire.
 
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "drivers/device/bytes.h"
+#include "drivers/device/nav_pvt.h"
 #include "drivers/ubx/wire.h"
 
 namespace imuscope::ubx {
-
-struct NavPvt {
-  std::uint32_t itow;  ///< ms of the GPS week: the navigation epoch
-  std::uint16_t year;
-  std::uint8_t month, day, hour, minute, sec;
-  std::uint8_t valid;
-  std::uint32_t tacc;  ///< ns
-  std::int32_t nano;   ///< remainder of the UTC second, may be negative
-  std::uint8_t fix, flags, flags2, nsv;
-  std::int32_t lon, lat;     ///< 1e-7 deg
-  std::int32_t h, hmsl;      ///< mm above ellipsoid and mean sea level
-  std::uint32_t hacc, vacc;  ///< mm
-  std::int32_t vn, ve, vd;   ///< mm/s
-  std::int32_t gs;           ///< mm/s
-  std::int32_t hm;           ///< 1e-5 deg
-  std::uint32_t sacc;        ///< mm/s
-  std::uint32_t hda;         ///< 1e-5 deg
-  std::uint16_t pdop;        ///< 0.01
-};
 
 /// @param payload  at least kPvtMin bytes
 [[nodiscard]] inline NavPvt parse_nav_pvt(std::span<const std::uint8_t> payload) noexcept {

@@ -19,17 +19,4 @@ inline constexpr std::uint8_t kClassNav = 0x01;
 inline constexpr std::uint8_t kIdPvt = 0x07;
 inline constexpr std::size_t kPvtMin = 84;  ///< u-blox 7; 92 from u-blox 8 on
 
-// NAV-PVT: valid, flags.
-inline constexpr std::uint8_t kValidDate = 1U << 0U;
-inline constexpr std::uint8_t kValidTime = 1U << 1U;
-inline constexpr std::uint8_t kFixOk = 1U << 0U;
-inline constexpr std::uint8_t kDifferential = 1U << 1U;
-inline constexpr unsigned kCarrierShift = 6;  ///< two bits: 0 none, 1 float, 2 fixed
-
-// NAV-PVT: fix type.
-inline constexpr std::uint8_t kFix3D = 3;
-inline constexpr std::uint8_t kFixWithDeadReckoning = 4;
-
-inline constexpr std::int64_t kMsPerWeek = 604'800'000;
-
 }  // namespace imuscope::ubx

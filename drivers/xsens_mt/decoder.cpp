@@ -16,22 +16,15 @@ constexpr int kRepeatsOfALostDevice = 3;
 
 constexpr std::int64_t kNsPerTick = 100000;  // SampleTimeFine, 100 us
 
-std::int64_t to_whole(double value) { return static_cast<std::int64_t>(std::llround(value)); }
+// Nearest whole number of a value that is not negative; llround() would be a call of a library for each
+// sample. NOLINTNEXTLINE(bugprone-incorrect-roundings)
+std::int64_t to_whole(double value) { return static_cast<std::int64_t>(value + 0.5); }
 
 // FNV-1a, 64 bits.
 std::uint64_t fingerprint_of(std::span<const std::uint8_t> data) {
   std::uint64_t hash = 14695981039346656037ULL;
   for (const std::uint8_t byte : data) hash = (hash ^ byte) * 1099511628211ULL;
   return hash;
-}
-
-/// Rotation vector of a small rotation.
-std::array<double, 3> rotation_vector(const std::array<double, 4>& q) {
-  const double sign = q[0] < 0.0 ? -1.0 : 1.0;
-  const double sine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  // angle / sine(angle/2), with its limit at zero
-  const double scale = sign * (sine > 0.0 ? 2.0 * std::atan2(sine, sign * q[0]) / sine : 2.0);
-  return {scale * q[1], scale * q[2], scale * q[3]};
 }
 
 std::uint32_t clip_flags(std::uint32_t status_word) {
@@ -52,10 +45,13 @@ UnwrapConfig counter_config(double counts_per_s, const ClockMapConfig& clock) {
 }  // namespace
 
 MtDecoder::MtDecoder(const MtDecoderConfig& config)
-    : axes_(config.axes),
+    : wants_imu_(config.wants_imu),
+      wants_attitude_(config.wants_attitude),
+      wants_gnss_(config.wants_gnss),
       per_byte_(byte_time(config.baud)),
       scanner_(per_byte_),
       clock_(config.clock),
+      gnss_clock_(config.clock),
       count_period_s_(1.0 / config.rate_hz),
       counter_(counter_config(config.rate_hz, config.clock)),
       rate_hz_(config.rate_hz),
@@ -64,18 +60,23 @@ MtDecoder::MtDecoder(const MtDecoderConfig& config)
                     config.clock.mode == ClockMapConfig::Mode::kOnline}) {
   IMUSCOPE_EXPECTS(config.rate_hz > 0.0);
   IMUSCOPE_EXPECTS(data_length(config.layout).has_value());
-  IMUSCOPE_EXPECTS(config.bus_devices.size() <= kBusDevicesMax);
+  IMUSCOPE_EXPECTS(config.bus.size() <= kBusDevicesMax);
   for (std::size_t k = 0; k < kBusDevicesMax; ++k) {
     Block& block = blocks_[k];
     block.layout = config.layout;
     block.length = *data_length(config.layout);
-    block.wanted = config.bus_devices.empty() ? k == 0 : k < config.bus_devices.size();
-    block.device = k < config.bus_devices.size() ? config.bus_devices[k] : config.device;
+    block.wanted = config.bus.empty() && k == 0;
+    block.device = config.device;
+    block.axes = config.axes;
+    if (k < config.bus.size() && config.bus[k]) {
+      block.wanted = true;
+      block.device = config.bus[k]->device;
+      block.axes = config.bus[k]->axes;
+    }
   }
-  if (config.bus_devices.size() > 1) {
-    n_blocks_ = config.bus_devices.size();
-    xbus_ = true;
-  }
+  xbus_ = !config.bus.empty();
+  n_blocks_ = std::max<std::size_t>(config.bus.size(), 1);
+  message_length_ = n_blocks_ * blocks_[0].length + (xbus_ ? sizeof(std::uint16_t) : 0);
 }
 
 void MtDecoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
@@ -124,16 +125,26 @@ void MtDecoder::on_frame(const Frame& frame, HostTime arrival, SampleSink& sink)
 
 void MtDecoder::learn(const Configuration& configuration) noexcept {
   if (configuration.n_devices == 0 || configuration.period == 0) return;
+  const auto devices = std::span(configuration.devices).first(configuration.n_devices);
+  const bool contradicts_itself = std::any_of(devices.begin(), devices.end(), [](const DeviceRecord& record) {
+    const auto length = data_length({record.output_mode, record.output_settings});
+    return record.data_length != 0 && length != record.data_length;
+  });
+  if (contradicts_itself) {
+    ++counters_.bad_contents;
+    return;
+  }
   rate_hz_ = configuration.rate_hz();
   packet_counter_.set_rate(rate_hz_);
-  if (configuration.devices[0].data_length == 0) return;  // sends MTData2
-  for (std::size_t k = 0; k < configuration.n_devices; ++k) {
-    const DeviceRecord& record = configuration.devices[k];
-    blocks_[k].layout = {record.output_mode, record.output_settings};
-    blocks_[k].length = record.data_length;
-  }
-  n_blocks_ = configuration.n_devices;
+  if (devices[0].data_length == 0) return;  // sends MTData2
+  n_blocks_ = devices.size();
   xbus_ = configuration.is_xbus_master();
+  message_length_ = xbus_ ? sizeof(std::uint16_t) : 0;
+  for (std::size_t k = 0; k < n_blocks_; ++k) {
+    blocks_[k].layout = {devices[k].output_mode, devices[k].output_settings};
+    blocks_[k].length = devices[k].data_length;
+    message_length_ += devices[k].data_length;
+  }
   counts_per_message_ = configuration.skip_factor + 1;
   // Device time goes on from where it is, at the new period.
   base_time_ns_ += to_whole(static_cast<double>(counter_.count() - base_count_) * count_period_s_ * 1e9);
@@ -142,77 +153,116 @@ void MtDecoder::learn(const Configuration& configuration) noexcept {
   counter_.set_rate(1.0 / count_period_s_);
 }
 
-// ---------------------------------------------------------------------------------------------- legacy
-// MTData
+// ------------------------------------------------------------------------------------------ legacy MTData
 
 void MtDecoder::on_mtdata(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept {
-  std::size_t expected = xbus_ ? sizeof(std::uint16_t) : 0;
-  for (std::size_t k = 0; k < n_blocks_; ++k) expected += blocks_[k].length;
-  if (frame.data.size() != expected) {
+  if (frame.data.size() != message_length_ || !take_counter(counter_of(frame), frame.first_byte)) {
     ++counters_.bad_contents;
     return;
   }
-  const auto at = instant_of_counter(counter_of(frame), frame, arrival);
-  if (!at) return;
+  const double since_base_s = static_cast<double>(counter_.count() - base_count_) * count_period_s_;
+  const HostTime time = clock_.observe(base_time_ns_ + to_whole(since_base_s * 1e9), frame.first_byte);
+  const Instant at{time, arrival_of(frame, time, arrival), counter_.count(),
+                   std::exchange(gap_pending_, false)};
   auto rest = frame.data.subspan(xbus_ ? sizeof(std::uint16_t) : 0);
   for (std::size_t k = 0; k < n_blocks_; ++k) {
     Block& block = blocks_[k];
-    if (block.wanted) emit_block(block, rest.first(block.length), *at, sink);
+    if (block.wanted) {
+      emit_block(block, rest.first(block.length), at, sink);
+      if (wants_gnss_) emit_legacy_gnss(message_, frame, arrival, sink);
+    }
     rest = rest.subspan(block.length);
   }
 }
 
-// The Xbus head's counter, or the device's own; nothing where the layout has none.
-std::optional<std::uint16_t> MtDecoder::counter_of(const Frame& frame) noexcept {
+// The Xbus head's counter, or the device's own; without one, messages are counted here.
+std::uint16_t MtDecoder::counter_of(const Frame& frame) noexcept {
   if (xbus_) return read_be<std::uint16_t>(frame.data, 0);
   const DataLayout& layout = blocks_[0].layout;
-  if ((layout.settings & output_settings::kSampleCounter) == 0) return std::nullopt;
+  if ((layout.settings & output_settings::kSampleCounter) == 0) return uncounted_++;
   const std::size_t behind = (layout.settings & output_settings::kUtcTime) != 0 ? kUtcSize : 0;
   return read_be<std::uint16_t>(frame.data, frame.data.size() - behind - sizeof(std::uint16_t));
 }
 
-std::optional<MtDecoder::Instant> MtDecoder::instant_of_counter(std::optional<std::uint16_t> counter,
-                                                                const Frame& frame,
-                                                                HostTime arrival) noexcept {
-  const CountStep step = counter_.take(counter ? *counter : uncounted_++, frame.first_byte);
-  if (step == CountStep::kRejected || step == CountStep::kRepeated) {
-    ++counters_.bad_contents;
-    return std::nullopt;
+// False for a counter that cannot be true, and for one that came twice.
+bool MtDecoder::take_counter(std::uint16_t counter, HostTime first_byte) noexcept {
+  switch (counter_.take(counter, first_byte)) {
+    case CountStep::kRejected:
+    case CountStep::kRepeated:
+      return false;
+    case CountStep::kRestarted:
+      restart_clock();
+      break;
+    case CountStep::kForward:
+      if (const std::int64_t step = counter_.step(); step > counts_per_message_) {
+        const std::int64_t lost = std::max<std::int64_t>(step / counts_per_message_ - 1, 0);
+        counters_.samples_lost += static_cast<std::uint64_t>(lost);
+        if (lost > 0) gap_pending_ = true;
+      }
+      break;
+    case CountStep::kFirst:
+      break;
   }
-  if (step == CountStep::kRestarted) restart_clock();
-  if (step == CountStep::kForward) {
-    const std::int64_t lost = std::max<std::int64_t>(counter_.step() / counts_per_message_ - 1, 0);
-    counters_.samples_lost += static_cast<std::uint64_t>(lost);
-    if (lost > 0) gap_pending_ = true;
-  }
-  const std::int64_t device_time_ns =
-      base_time_ns_ + to_whole(static_cast<double>(counter_.count() - base_count_) * count_period_s_ * 1e9);
-  const HostTime time = map(device_time_ns, frame);
-  return Instant{time, arrival_of(frame, time, arrival), counter_.count(),
-                 std::exchange(gap_pending_, false)};
+  return true;
 }
 
 void MtDecoder::emit_block(Block& block, std::span<const std::uint8_t> data, const Instant& at,
                            SampleSink& sink) noexcept {
-  MtData message;
-  if (!read_mtdata(data, block.layout, message) || (xbus_ && is_repeated(block, data))) {
+  if (xbus_ && is_repeated(block, data)) {
     ++counters_.bad_contents;
+    message_.fields = 0;
     return;
   }
-  const bool has_rate = message.has(Field::kRate);
-  const bool has_force = message.has(Field::kAcceleration);
-  if (!has_rate && !has_force) return;
+  const MtData& message = message_;
+  read_mtdata_of_known_length(data, block.layout, message_);
   Sample sample{};
-  sample.imu.flags = (has_rate ? kGyroValid : 0U) | (has_force ? kAccelValid : 0U);
-  sample.imu.omega_radps = rotated(message.rate_radps);
-  sample.imu.f_mps2 = rotated(message.acceleration_mps2);
+  sample.arrival = at.arrival;
+  sample.time = at.time;
   if (message.has(Field::kUtc)) {
     if (const auto ns = utc_ns(message.utc)) {
       sample.has_utc = true;
       sample.utc = utc_time_from_ns(*ns);
     }
   }
-  put(sample, block, at, sink);
+  const bool has_rate = message.has(Field::kRate);
+  const bool has_force = message.has(Field::kAcceleration);
+  if (wants_imu_ && (has_rate || has_force)) {
+    sample.kind = SampleKind::kImu;
+    sample.imu.counter = at.counter;
+    sample.imu.flags =
+        (has_rate ? kGyroValid : 0U) | (has_force ? kAccelValid : 0U) | (at.gap_before ? kGapBefore : 0U);
+    if (has_rate) rotate(block.axes, message.rate_radps, sample.imu.omega_radps);
+    if (has_force) rotate(block.axes, message.acceleration_mps2, sample.imu.f_mps2);
+    put(sample, block, sink);
+  }
+  if (!wants_attitude_) return;
+  if (const auto C_s_l = orientation_of(message)) {
+    const bool valid = !message.has(Field::kStatus) || (message.status & kStatusFilterValid) != 0;
+    emit_attitude(block, *C_s_l, local_frame_of(block.layout), valid, sample, sink);
+  }
+}
+
+// The receiver of an MTi-G: no fix type and no date, its solution is repeated until there is a new one.
+void MtDecoder::emit_legacy_gnss(const MtData& message, const Frame& frame, HostTime arrival,
+                                 SampleSink& sink) noexcept {
+  if (!message.has(Field::kGpsPvt)) return;
+  constexpr std::int32_t kMmPerCm = 10;
+  const GpsPvt& gps = message.gps;
+  const bool fix = !message.has(Field::kStatus) || (message.status & kStatusGpsFix) != 0;
+  NavPvt pvt{};
+  pvt.itow = gps.time_of_week_ms;
+  pvt.fix = fix ? kPvtFix3D : 0;
+  pvt.flags = fix ? kPvtFixOk : 0;
+  pvt.lat = gps.latitude_1e7_deg;
+  pvt.lon = gps.longitude_1e7_deg;
+  pvt.h = gps.altitude_mm;
+  pvt.hacc = gps.horizontal_accuracy_mm;
+  pvt.vacc = gps.vertical_accuracy_mm;
+  pvt.vn = gps.velocity_ned_cmps[0] * kMmPerCm;
+  pvt.ve = gps.velocity_ned_cmps[1] * kMmPerCm;
+  pvt.vd = gps.velocity_ned_cmps[2] * kMmPerCm;
+  pvt.sacc = gps.speed_accuracy_cmps * static_cast<std::uint32_t>(kMmPerCm);
+  emit_gnss(pvt, frame, arrival, sink);
 }
 
 bool MtDecoder::is_repeated(Block& block, std::span<const std::uint8_t> data) noexcept {
@@ -225,88 +275,66 @@ bool MtDecoder::is_repeated(Block& block, std::span<const std::uint8_t> data) no
 // ---------------------------------------------------------------------------------------------- MTData2
 
 void MtDecoder::on_mtdata2(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept {
-  Inertial message;
-  if (!read_items(frame.data, message) || !count_message(message, frame.first_byte)) {
+  if (!read_inertial(frame.data, inertial_) || !count_message(frame.first_byte)) {
     ++counters_.bad_contents;
     return;
   }
-  Sample sample{};
-  const bool increments = message.delta_v.has_value() || message.delta_q.has_value();
-  if (!message.rate && !message.acceleration && !increments) return;
-  if (!advance_sample_time(message, frame.first_byte)) {
+  if (wants_gnss_ && inertial_.has(InertialMessage::kGnss)) {
+    const unsigned rtk = inertial_.status_word >> kStatusRtkShift & kStatusRtkMask;
+    emit_gnss(nav_pvt_of(*read_gnss_pvt(inertial_.gnss), rtk), frame, arrival, sink);
+  }
+  constexpr std::uint32_t kImuItems = InertialMessage::kRate | InertialMessage::kAcceleration |
+                                      InertialMessage::kDeltaV | InertialMessage::kDeltaQ;
+  if ((inertial_.items & kImuItems) == 0) return;
+  if (!advance_sample_time(frame.first_byte)) {
     ++counters_.bad_contents;
     return;
   }
-  const bool has_ticks = message.sample_time_fine.has_value();
-  const double dt_s = has_ticks && last_step_ticks_ > 0
-                          ? static_cast<double>(last_step_ticks_) / kSampleTimeFinePerSecond
-                          : 1.0 / rate_hz_;
-  fill_imu(message, dt_s, sample.imu);
-  const std::int64_t device_time_ns = has_ticks
-                                          ? sample_time_.count() * kNsPerTick
-                                          : to_whole(static_cast<double>(sample_count_) / rate_hz_ * 1e9);
-  const HostTime time = map(device_time_ns, frame);
-  const Instant at{time, arrival_of(frame, time, arrival), sample_count_, std::exchange(gap_pending_, false)};
-  if (message.utc_ns) {
-    sample.has_utc = true;
-    sample.utc = utc_time_from_ns(*message.utc_ns);
-  }
-  put(sample, blocks_[0], at, sink);
+  const HostTime time = clock_.observe(device_time_ns(), frame.first_byte);
+  emit_inertial({time, arrival_of(frame, time, arrival), sample_count_, gap_pending_}, sink);
 }
 
-bool MtDecoder::read_items(std::span<const std::uint8_t> data, Inertial& out) noexcept {
-  if (!items_are_whole(data)) return false;
-  ItemReader reader(data);
-  Item item;
-  while (reader.next(item)) {
-    switch (item.kind()) {
-      case xdi::kAcceleration:
-        out.acceleration = read_numbers<3>(item);
-        break;
-      case xdi::kRateOfTurn:
-        out.rate = read_numbers<3>(item);
-        break;
-      case xdi::kDeltaV:
-        out.delta_v = read_numbers<3>(item);
-        break;
-      case xdi::kDeltaQ:
-        out.delta_q = read_numbers<4>(item);
-        break;
-      case xdi::kPacketCounter:
-        if (item.data.size() == 2) out.packet_counter = read_be<std::uint16_t>(item.data);
-        break;
-      case xdi::kSampleTimeFine:
-        if (item.data.size() == 4) out.sample_time_fine = read_be<std::uint32_t>(item.data);
-        break;
-      case xdi::kStatusWord:
-        if (item.data.size() == 4) out.status_word = read_be<std::uint32_t>(item.data);
-        break;
-      case xdi::kUtcTime:
-        if (item.data.size() == kUtcSize) out.utc_ns = utc_ns(read_utc(item.data));
-        break;
-      default:
-        break;
+void MtDecoder::emit_inertial(const Instant& at, SampleSink& sink) noexcept {
+  Block& block = blocks_[0];
+  Sample sample{};
+  sample.arrival = at.arrival;
+  sample.time = at.time;
+  if (inertial_.has(InertialMessage::kUtc)) {
+    if (const auto ns = utc_ns(inertial_.utc)) {
+      sample.has_utc = true;
+      sample.utc = utc_time_from_ns(*ns);
     }
   }
-  return true;
+  if (wants_imu_) {
+    sample.kind = SampleKind::kImu;
+    fill_imu(sample.imu);
+    sample.imu.counter = at.counter;
+    if (at.gap_before) sample.imu.flags |= kGapBefore;
+    gap_pending_ = false;
+    put(sample, block, sink);
+  }
+  if (!wants_attitude_ || !inertial_.has(InertialMessage::kOrientation)) return;
+  const bool valid =
+      !inertial_.has(InertialMessage::kStatus) || (inertial_.status_word & kStatusFilterValid) != 0;
+  emit_attitude(block, inertial_.C_s_l, inertial_.frame, valid, sample, sink);
 }
 
 // packet_counter counts messages whatever they hold: GNSS takes numbers of its own, so a hole among the
 // inertial messages alone is no loss.
-bool MtDecoder::count_message(const Inertial& message, HostTime first_byte) noexcept {
-  if (!message.packet_counter) return true;
-  const CountStep step = packet_counter_.take(*message.packet_counter, first_byte);
+bool MtDecoder::count_message(HostTime first_byte) noexcept {
+  if (!inertial_.has(InertialMessage::kPacketCounter)) return true;
+  const CountStep step = packet_counter_.take(inertial_.packet_counter, first_byte);
   if (step == CountStep::kRejected) return false;
   if (step == CountStep::kForward) lost_messages_ += packet_counter_.step() - 1;
-  if (step == CountStep::kRestarted && !message.sample_time_fine) restart_clock();
+  if (step == CountStep::kRestarted && !inertial_.has(InertialMessage::kSampleTimeFine)) restart_clock();
   return true;
 }
 
 // Moves sample_count_ and the device time to this message's sample and counts what is missing before it.
-bool MtDecoder::advance_sample_time(const Inertial& message, HostTime first_byte) noexcept {
+bool MtDecoder::advance_sample_time(HostTime first_byte) noexcept {
   std::int64_t samples = 1 + std::exchange(lost_messages_, 0);
-  if (message.sample_time_fine) {
-    const CountStep step = sample_time_.take(*message.sample_time_fine, first_byte);
+  if (inertial_.has(InertialMessage::kSampleTimeFine)) {
+    const CountStep step = sample_time_.take(inertial_.sample_time_fine, first_byte);
     if (step == CountStep::kRejected) return false;
     if (step == CountStep::kRestarted) restart_clock();
     last_step_ticks_ =
@@ -324,35 +352,73 @@ bool MtDecoder::advance_sample_time(const Inertial& message, HostTime first_byte
   return true;
 }
 
-void MtDecoder::fill_imu(const Inertial& message, double dt_s, ImuData& imu) const noexcept {
-  imu.flags = clip_flags(message.status_word);
-  if (message.rate || message.acceleration) {
-    if (message.rate) {
-      imu.omega_radps = rotated(*message.rate);
-      imu.flags |= kGyroValid;
-    }
-    if (message.acceleration) {
-      imu.f_mps2 = rotated(*message.acceleration);
-      imu.flags |= kAccelValid;
-    }
+std::int64_t MtDecoder::device_time_ns() const noexcept {
+  if (inertial_.has(InertialMessage::kSampleTimeFine)) return sample_time_.count() * kNsPerTick;
+  return to_whole(static_cast<double>(sample_count_) / rate_hz_ * 1e9);
+}
+
+void MtDecoder::fill_imu(ImuData& imu) const noexcept {
+  imu.flags = clip_flags(inertial_.status_word);
+  const bool has_rate = inertial_.has(InertialMessage::kRate);
+  const bool has_force = inertial_.has(InertialMessage::kAcceleration);
+  if (!has_rate && !has_force) {
+    fill_increments(imu);
     return;
   }
-  imu.flags |= kIsIncrement;
-  const auto per_second = [dt_s](std::array<double, 3> v) {
-    for (double& value : v) value /= dt_s;
-    return v;
-  };
-  if (message.delta_q) {
-    imu.omega_radps = rotated(per_second(rotation_vector(*message.delta_q)));
+  if (has_rate) {
+    rotate(blocks_[0].axes, inertial_.rate_radps, imu.omega_radps);
     imu.flags |= kGyroValid;
   }
-  if (message.delta_v) {
-    imu.f_mps2 = rotated(per_second(*message.delta_v));
+  if (has_force) {
+    rotate(blocks_[0].axes, inertial_.acceleration_mps2, imu.f_mps2);
+    imu.flags |= kAccelValid;
+  }
+}
+
+void MtDecoder::fill_increments(ImuData& imu) const noexcept {
+  const double per_second = inertial_.has(InertialMessage::kSampleTimeFine) && last_step_ticks_ > 0
+                                ? kSampleTimeFinePerSecond / static_cast<double>(last_step_ticks_)
+                                : rate_hz_;
+  const auto mean = [&](std::array<double, 3> increment) {
+    for (double& value : increment) value *= per_second;
+    return increment;
+  };
+  imu.flags |= kIsIncrement;
+  if (inertial_.has(InertialMessage::kDeltaQ)) {
+    rotate(blocks_[0].axes, mean(rotation_vector(inertial_.delta_q)), imu.omega_radps);
+    imu.flags |= kGyroValid;
+  }
+  if (inertial_.has(InertialMessage::kDeltaV)) {
+    rotate(blocks_[0].axes, mean(inertial_.delta_v_mps), imu.f_mps2);
     imu.flags |= kAccelValid;
   }
 }
 
 // ---------------------------------------------------------------------------------------------- both
+
+void MtDecoder::emit_attitude(Block& block, const Matrix3& C_s_l, LocalFrame local, bool filter_valid,
+                              const Sample& like, SampleSink& sink) noexcept {
+  Sample sample = like;
+  sample.kind = SampleKind::kAttitude;
+  sample.attitude = attitude_of(C_s_l, local, block.axes);
+  if (!filter_valid) sample.attitude.flags = 0;
+  put(sample, block, sink);
+}
+
+void MtDecoder::emit_gnss(const NavPvt& pvt, const Frame& frame, HostTime arrival,
+                          SampleSink& sink) noexcept {
+  if (!gnss_time_.take(pvt.itow)) return;  // the same solution again
+  Sample sample{};
+  sample.kind = SampleKind::kGnss;
+  sample.time = gnss_clock_.observe(gnss_time_.time_ns(), frame.first_byte);
+  sample.arrival = arrival_of(frame, sample.time, arrival);
+  if (const auto utc = utc_of(pvt)) {
+    sample.has_utc = true;
+    sample.utc = *utc;
+  }
+  sample.gnss = gnss_of(pvt);
+  put(sample, blocks_[0], sink);
+}
 
 void MtDecoder::restart_clock() noexcept {
   ++counters_.clock_resets;
@@ -360,30 +426,13 @@ void MtDecoder::restart_clock() noexcept {
   gap_pending_ = true;
 }
 
-HostTime MtDecoder::map(std::int64_t device_time_ns, const Frame& frame) noexcept {
-  return clock_.observe(device_time_ns, frame.first_byte);
-}
-
 HostTime MtDecoder::arrival_of(const Frame& frame, HostTime time, HostTime arrival) const noexcept {
   return clock_.is_fixed() ? time + per_byte_ * static_cast<std::int64_t>(frame.size) : arrival;
 }
 
-Vector3 MtDecoder::rotated(const std::array<double, 3>& v) const noexcept {
-  Vector3 out;
-  for (std::size_t row = 0; row < 3; ++row) {
-    out[row] = axes_[3 * row] * v[0] + axes_[3 * row + 1] * v[1] + axes_[3 * row + 2] * v[2];
-  }
-  return out;
-}
-
-void MtDecoder::put(Sample& sample, Block& block, const Instant& at, SampleSink& sink) noexcept {
-  sample.kind = SampleKind::kImu;
+void MtDecoder::put(Sample& sample, Block& block, SampleSink& sink) noexcept {
   sample.device = block.device;
   sample.sequence = block.sequence++;
-  sample.arrival = at.arrival;
-  sample.time = at.time;
-  sample.imu.counter = at.counter;
-  if (at.gap_before) sample.imu.flags |= kGapBefore;
   ++counters_.samples;
   sink.on_sample(sample);
 }

@@ -3,6 +3,10 @@
 /// Samples out of an XSens MT byte stream: legacy MTData of an MTx or MTi, of several MTx behind an Xbus
 /// Master, and MTData2.
 ///
+/// Rates and forces become kImu samples. Where they are wanted, the device's own orientation becomes
+/// kAttitude (its roll and pitch; its heading is not marked valid), and the solution of a receiver inside
+/// becomes kGnss.
+///
 /// Legacy data does not say what it holds. The decoder takes the layout it is given, until a Configuration
 /// message in the stream names the real one (a session asks for it before every measurement).
 ///
@@ -15,7 +19,10 @@
 #include <span>
 #include <vector>
 
+#include "drivers/device/attitude_angles.h"
 #include "drivers/device/device.h"
+#include "drivers/device/nav_pvt.h"
+#include "drivers/xsens_mt/inertial.h"
 #include "drivers/xsens_mt/messages.h"
 #include "drivers/xsens_mt/mtdata.h"
 #include "drivers/xsens_mt/mtdata2.h"
@@ -28,14 +35,24 @@ namespace imuscope::xsens {
 /// Calibrated rates, forces and field with the sample counter: known to every firmware.
 inline constexpr DataLayout kDefaultLayout{output_mode::kCalibrated, output_settings::kSampleCounter};
 
+/// A device behind an Xbus Master.
+struct BusDevice {
+  DeviceIndex device = 0;
+  Matrix3 axes{1, 0, 0, 0, 1, 0, 0, 0, 1};
+};
+
 struct MtDecoderConfig {
   DeviceIndex device = 0;
-  /// Behind an Xbus Master: the devices in the order of their bus ids. Empty: `device` is the only one.
-  std::vector<DeviceIndex> bus_devices;
-  DataLayout layout = kDefaultLayout;                     ///< expected; a Configuration message overrules it
-  double rate_hz = 100.0;                                 ///< expected; a Configuration message overrules it
-  double baud = 115200.0;                                 ///< of the line; 0 where there is none
-  std::array<double, 9> axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rotates the sensor's components, row-major
+  /// Behind an Xbus Master, element k is the device with bus id k + 1, if it is wanted. Empty: `device` is
+  /// the only one.
+  std::vector<std::optional<BusDevice>> bus;
+  bool wants_imu = true;
+  bool wants_attitude = false;
+  bool wants_gnss = false;
+  DataLayout layout = kDefaultLayout;       ///< expected; a Configuration message overrules it
+  double rate_hz = 100.0;                   ///< expected; a Configuration message overrules it
+  double baud = 115200.0;                   ///< of the line; 0 where there is none
+  Matrix3 axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rotates the sensor's components
   ClockMapConfig clock;
 };
 
@@ -52,24 +69,16 @@ class MtDecoder final : public DeviceDecoder {
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
 
  private:
-  /// What one device's block in MTData holds.
+  /// What one device's block in MTData holds, and whose it is.
   struct Block {
     DataLayout layout;
     std::size_t length = 0;
     DeviceIndex device = 0;
+    Matrix3 axes{};
     bool wanted = false;
     std::uint64_t sequence = 0;
     std::uint64_t fingerprint = 0;  ///< of the last data, to notice a device that fell off the bus
     int repeats = 0;
-  };
-  /// What MTData2 items of one message said.
-  struct Inertial {
-    std::optional<std::array<double, 3>> acceleration, rate, delta_v;
-    std::optional<std::array<double, 4>> delta_q;
-    std::optional<std::uint32_t> sample_time_fine;
-    std::optional<std::uint16_t> packet_counter;
-    std::optional<std::int64_t> utc_ns;
-    std::uint32_t status_word = 0;
   };
   /// Where in time a message is.
   struct Instant {
@@ -83,36 +92,46 @@ class MtDecoder final : public DeviceDecoder {
   void on_frame(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
   void learn(const Configuration& configuration) noexcept;
   void on_mtdata(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
-  [[nodiscard]] std::optional<std::uint16_t> counter_of(const Frame& frame) noexcept;
+  [[nodiscard]] std::uint16_t counter_of(const Frame& frame) noexcept;
+  [[nodiscard]] bool take_counter(std::uint16_t counter, HostTime first_byte) noexcept;
   void emit_block(Block& block, std::span<const std::uint8_t> data, const Instant& at,
                   SampleSink& sink) noexcept;
+  void emit_legacy_gnss(const MtData& message, const Frame& frame, HostTime arrival,
+                        SampleSink& sink) noexcept;
   [[nodiscard]] static bool is_repeated(Block& block, std::span<const std::uint8_t> data) noexcept;
-  [[nodiscard]] std::optional<Instant> instant_of_counter(std::optional<std::uint16_t> counter,
-                                                          const Frame& frame, HostTime arrival) noexcept;
 
   void on_mtdata2(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
-  [[nodiscard]] static bool read_items(std::span<const std::uint8_t> data, Inertial& out) noexcept;
-  [[nodiscard]] bool count_message(const Inertial& message, HostTime first_byte) noexcept;
-  [[nodiscard]] bool advance_sample_time(const Inertial& message, HostTime first_byte) noexcept;
-  void fill_imu(const Inertial& message, double dt_s, ImuData& imu) const noexcept;
+  [[nodiscard]] bool count_message(HostTime first_byte) noexcept;
+  [[nodiscard]] bool advance_sample_time(HostTime first_byte) noexcept;
+  [[nodiscard]] std::int64_t device_time_ns() const noexcept;
+  void emit_inertial(const Instant& at, SampleSink& sink) noexcept;
+  void fill_imu(ImuData& imu) const noexcept;
+  void fill_increments(ImuData& imu) const noexcept;
 
+  void emit_attitude(Block& block, const Matrix3& C_s_l, LocalFrame local, bool filter_valid,
+                     const Sample& like, SampleSink& sink) noexcept;
+  void emit_gnss(const NavPvt& pvt, const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
   void restart_clock() noexcept;
-  [[nodiscard]] HostTime map(std::int64_t device_time_ns, const Frame& frame) noexcept;
   [[nodiscard]] HostTime arrival_of(const Frame& frame, HostTime time, HostTime arrival) const noexcept;
-  [[nodiscard]] Vector3 rotated(const std::array<double, 3>& v) const noexcept;
-  void put(Sample& sample, Block& block, const Instant& at, SampleSink& sink) noexcept;
+  void put(Sample& sample, Block& block, SampleSink& sink) noexcept;
 
-  std::array<double, 9> axes_;
+  bool wants_imu_;
+  bool wants_attitude_;
+  bool wants_gnss_;
   Duration per_byte_;
   Scanner scanner_;
   ClockMap clock_;
   DecoderCounters counters_;
   std::optional<std::uint8_t> last_error_;
+  ClockMap gnss_clock_;
+  WeekTime gnss_time_;
 
   // Legacy data.
   std::array<Block, kBusDevicesMax> blocks_{};
+  MtData message_;  ///< the block at hand; kept, since clearing it anew costs more than reading one
   std::size_t n_blocks_ = 1;
-  bool xbus_ = false;  ///< a counter of the Xbus head leads the blocks
+  std::size_t message_length_ = 0;  ///< of the counter of an Xbus head and all blocks
+  bool xbus_ = false;               ///< a counter of the Xbus head leads the blocks
   std::int64_t counts_per_message_ = 1;
   double count_period_s_;
   CountUnwrapper counter_;
@@ -121,6 +140,7 @@ class MtDecoder final : public DeviceDecoder {
   std::int64_t base_time_ns_ = 0;
 
   // MTData2.
+  InertialMessage inertial_{};  ///< the message at hand
   double rate_hz_;
   CountUnwrapper packet_counter_;
   CountUnwrapper sample_time_;

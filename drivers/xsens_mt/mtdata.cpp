@@ -9,8 +9,6 @@ namespace {
 
 constexpr std::size_t kRawSize = 20;
 constexpr std::size_t kGpsPvtSize = 44;
-constexpr double kFixed1220Step = 1.0 / (1U << 20U);
-constexpr double kFixed1632Step = 1.0 / static_cast<double>(std::uint64_t{1} << 32U);
 
 constexpr std::size_t numbers_of_orientation(std::uint32_t settings) {
   switch (settings & output_settings::kOrientationMask) {
@@ -43,6 +41,11 @@ class Cursor {
   }
   template <std::size_t N>
   void numbers(std::array<double, N>& out) noexcept {
+    if (format_ == NumberFormat::kFloat32) {  // the usual one, without a decision per number
+      for (std::size_t i = 0; i < N; ++i) out[i] = read_be<float>(data_, at_ + i * sizeof(float));
+      at_ += N * sizeof(float);
+      return;
+    }
     for (double& value : out) value = number();
   }
   template <typename T, std::size_t N>
@@ -150,24 +153,6 @@ std::optional<std::size_t> data_length(const DataLayout& layout) noexcept {
   return bytes + numbers * size_of(layout.format());
 }
 
-double read_number(std::span<const std::uint8_t> data, std::size_t offset, NumberFormat format) noexcept {
-  switch (format) {
-    case NumberFormat::kFloat32:
-      return static_cast<double>(read_be<float>(data, offset));
-    case NumberFormat::kFixed1220:
-      return read_be<std::int32_t>(data, offset) * kFixed1220Step;
-    case NumberFormat::kFixed1632: {
-      // The four fraction bytes come before the two integer bytes.
-      const std::int64_t fraction = read_be<std::uint32_t>(data, offset);
-      const std::int64_t integer = read_be<std::int16_t>(data, offset + 4);
-      return static_cast<double>(integer * (std::int64_t{1} << 32) + fraction) * kFixed1632Step;
-    }
-    case NumberFormat::kFloat64:
-      return read_be<double>(data, offset);
-  }
-  return 0.0;
-}
-
 UtcFields read_utc(std::span<const std::uint8_t> data) noexcept {
   return {read_be<std::uint32_t>(data, 0),
           read_be<std::uint16_t>(data, 4),
@@ -201,7 +186,13 @@ std::optional<std::int64_t> utc_ns(const UtcFields& utc) noexcept {
 bool read_mtdata(std::span<const std::uint8_t> data, const DataLayout& layout, MtData& out) noexcept {
   const auto length = data_length(layout);
   if (!length || *length != data.size()) return false;
-  out = MtData{};
+  read_mtdata_of_known_length(data, layout, out);
+  return true;
+}
+
+void read_mtdata_of_known_length(std::span<const std::uint8_t> data, const DataLayout& layout,
+                                 MtData& out) noexcept {
+  out.fields = 0;
   const auto has = [&layout](std::uint16_t bit) { return (layout.mode & bit) != 0; };
   const auto mark = [&out](Field field) { out.fields |= static_cast<std::uint32_t>(field); };
   Cursor cursor(data, layout.format());
@@ -240,7 +231,6 @@ bool read_mtdata(std::span<const std::uint8_t> data, const DataLayout& layout, M
     out.utc = read_utc(cursor.bytes(kUtcSize));
     mark(Field::kUtc);
   }
-  return true;
 }
 
 }  // namespace imuscope::xsens

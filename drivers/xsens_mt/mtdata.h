@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 
+#include "drivers/device/bytes.h"
 #include "drivers/xsens_mt/wire.h"
 
 namespace imuscope::xsens {
@@ -111,12 +112,36 @@ struct MtData {
   }
 };
 
-/// Reads one device's data into `out` (all of it is set anew).
+/// Reads one device's data into `out`: its fields, and what has() says of it; the rest stays as it was.
 /// @return false where the data's length is not that of the layout
 [[nodiscard]] bool read_mtdata(std::span<const std::uint8_t> data, const DataLayout& layout,
                                MtData& out) noexcept;
 
+/// The same for data that is known to be data_length(layout) long.
+void read_mtdata_of_known_length(std::span<const std::uint8_t> data, const DataLayout& layout,
+                                 MtData& out) noexcept;
+
+inline constexpr double kFixed1220Step = 1.0 / (1U << 20U);
+inline constexpr double kFixed1632Step = 1.0 / static_cast<double>(std::uint64_t{1} << 32U);
+
 /// One real number at `data[offset]`.
-double read_number(std::span<const std::uint8_t> data, std::size_t offset, NumberFormat format) noexcept;
+inline double read_number(std::span<const std::uint8_t> data, std::size_t offset,
+                          NumberFormat format) noexcept {
+  switch (format) {
+    case NumberFormat::kFloat32:
+      return static_cast<double>(read_be<float>(data, offset));
+    case NumberFormat::kFixed1220:
+      return read_be<std::int32_t>(data, offset) * kFixed1220Step;
+    case NumberFormat::kFixed1632: {
+      // The four fraction bytes come before the two integer bytes.
+      const std::int64_t fraction = read_be<std::uint32_t>(data, offset);
+      const std::int64_t integer = read_be<std::int16_t>(data, offset + 4);
+      return static_cast<double>(integer * (std::int64_t{1} << 32) + fraction) * kFixed1632Step;
+    }
+    case NumberFormat::kFloat64:
+      return read_be<double>(data, offset);
+  }
+  return 0.0;
+}
 
 }  // namespace imuscope::xsens

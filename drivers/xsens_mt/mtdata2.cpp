@@ -7,8 +7,6 @@
 namespace imuscope::xsens {
 namespace {
 
-constexpr std::size_t kItemHeader = 3;
-
 using enum ItemContent;
 constexpr auto kItemKinds = std::to_array<ItemKind>({
     {0x0810, "Temperature", kNumbers, 1},
@@ -50,19 +48,12 @@ constexpr auto kItemKinds = std::to_array<ItemKind>({
 
 }  // namespace
 
-bool ItemReader::next(Item& item) noexcept {
-  if (rest_.size() < kItemHeader) return false;
-  const std::size_t size = rest_[2];
-  if (rest_.size() < kItemHeader + size) return false;
-  item = {read_be<std::uint16_t>(rest_, 0), rest_.subspan(kItemHeader, size)};
-  rest_ = rest_.subspan(kItemHeader + size);
-  return true;
-}
-
 bool items_are_whole(std::span<const std::uint8_t> data) noexcept {
-  std::size_t at = 0;
-  while (at + kItemHeader <= data.size()) at += kItemHeader + data[at + 2];
-  return at == data.size();
+  ItemReader reader(data);
+  Item item;
+  while (reader.next(item)) {
+  }
+  return reader.at_end();
 }
 
 const ItemKind* find_item_kind(std::uint16_t id) noexcept {
@@ -107,6 +98,39 @@ std::optional<GnssPvt> read_gnss_pvt(std::span<const std::uint8_t> data) noexcep
     pvt.dop_centi[i] = read_be<std::uint16_t>(data, 80 + 2 * i);
   }
   return pvt;
+}
+
+NavPvt nav_pvt_of(const GnssPvt& pvt, unsigned rtk) noexcept {
+  constexpr std::uint8_t kFlags = kPvtFixOk | kPvtDifferential;
+  NavPvt out{};
+  out.itow = pvt.time_of_week_ms;
+  out.year = pvt.year;
+  out.month = pvt.month;
+  out.day = pvt.day;
+  out.hour = pvt.hour;
+  out.minute = pvt.minute;
+  out.sec = pvt.second;
+  out.valid = pvt.valid;
+  out.tacc = pvt.time_accuracy_ns;
+  out.nano = pvt.nanoseconds;
+  out.fix = pvt.fix_type;
+  out.flags = static_cast<std::uint8_t>((pvt.flags & kFlags) | rtk << kPvtCarrierShift);
+  out.nsv = pvt.n_satellites;
+  out.lon = pvt.longitude_1e7_deg;
+  out.lat = pvt.latitude_1e7_deg;
+  out.h = pvt.height_mm;
+  out.hmsl = pvt.height_msl_mm;
+  out.hacc = pvt.horizontal_accuracy_mm;
+  out.vacc = pvt.vertical_accuracy_mm;
+  out.vn = pvt.velocity_ned_mmps[0];
+  out.ve = pvt.velocity_ned_mmps[1];
+  out.vd = pvt.velocity_ned_mmps[2];
+  out.gs = pvt.ground_speed_mmps;
+  out.hm = pvt.course_1e5_deg;
+  out.sacc = pvt.speed_accuracy_mmps;
+  out.hda = pvt.course_accuracy_1e5_deg;
+  out.pdop = pvt.dop_centi[1];
+  return out;
 }
 
 }  // namespace imuscope::xsens

@@ -10,6 +10,7 @@
 #include <span>
 #include <string_view>
 
+#include "drivers/device/nav_pvt.h"
 #include "drivers/xsens_mt/mtdata.h"
 #include "drivers/xsens_mt/wire.h"
 
@@ -26,13 +27,22 @@ struct Item {
 };
 
 /// Walks over the items of a message. An item that reaches beyond the end makes the whole message invalid:
-/// check items_are_whole() first where a part of a message must not be used.
+/// check at_end() after the last one, or items_are_whole() before the first.
 class ItemReader {
  public:
   explicit ItemReader(std::span<const std::uint8_t> data) noexcept : rest_(data) {}
-  [[nodiscard]] bool next(Item& item) noexcept;
+  [[nodiscard]] bool next(Item& item) noexcept {
+    if (rest_.size() < kItemHeader) return false;
+    const std::size_t size = rest_[2];
+    if (rest_.size() < kItemHeader + size) return false;
+    item = {read_be<std::uint16_t>(rest_, 0), rest_.subspan(kItemHeader, size)};
+    rest_ = rest_.subspan(kItemHeader + size);
+    return true;
+  }
+  [[nodiscard]] bool at_end() const noexcept { return rest_.empty(); }
 
  private:
+  static constexpr std::size_t kItemHeader = 3;
   std::span<const std::uint8_t> rest_;
 };
 
@@ -62,14 +72,14 @@ struct ItemKind {
 /// Nothing where the identifier is not known.
 const ItemKind* find_item_kind(std::uint16_t id) noexcept;
 
-/// Reads N real numbers; nothing where the item's size is another.
+/// Reads N real numbers; false where the item's size is another.
 template <std::size_t N>
-std::optional<std::array<double, N>> read_numbers(const Item& item) noexcept {
-  if (item.data.size() != N * size_of(item.format())) return std::nullopt;
-  std::array<double, N> values;
-  for (std::size_t i = 0; i < N; ++i)
-    values[i] = read_number(item.data, i * size_of(item.format()), item.format());
-  return values;
+[[nodiscard]] bool read_numbers(const Item& item, std::array<double, N>& out) noexcept {
+  const NumberFormat format = item.format();
+  const std::size_t size = size_of(format);
+  if (item.data.size() != N * size) return false;
+  for (std::size_t i = 0; i < N; ++i) out[i] = read_number(item.data, i * size, format);
+  return true;
 }
 
 inline constexpr std::size_t kGnssPvtSize = 94;
@@ -103,5 +113,9 @@ struct GnssPvt {
 
 /// Nothing where the size is not kGnssPvtSize.
 std::optional<GnssPvt> read_gnss_pvt(std::span<const std::uint8_t> data) noexcept;
+
+/// As the receiver inside computed it.
+/// @param rtk  0 none, 1 float, 2 fixed: of the status word
+[[nodiscard]] NavPvt nav_pvt_of(const GnssPvt& pvt, unsigned rtk) noexcept;
 
 }  // namespace imuscope::xsens

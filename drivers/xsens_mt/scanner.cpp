@@ -57,9 +57,7 @@ Scanner::Examined Scanner::examine(std::span<const std::uint8_t> bytes) noexcept
   }
   const std::size_t size = header + length + kChecksumSize;
   if (bytes.size() < size) return {Verdict::kNeedMore};
-  std::uint8_t sum = 0;
-  for (const std::uint8_t byte : bytes.subspan(1, size - 1)) sum = static_cast<std::uint8_t>(sum + byte);
-  if (sum != 0) return {Verdict::kBadChecksum};
+  if ((sum_of_bytes(bytes.subspan(1, size - 1)) & 0xFFU) != 0) return {Verdict::kBadChecksum};
   return {Verdict::kFrame, header, size};
 }
 

@@ -7,6 +7,7 @@
 
 #include "base/contracts.h"
 #include "drivers/device/bytes.h"
+#include "drivers/xsens_mt/inertial.h"
 
 namespace imuscope::xsens {
 namespace {
@@ -479,20 +480,12 @@ std::optional<std::int64_t> MtSession::wanted_count(const Frame& frame) const no
     return data.counter;
   }
   if (frame.mid != mid::kMtData2 || config_.output == MtSessionConfig::Output::kLegacy) return std::nullopt;
-  if (!items_are_whole(frame.data)) return std::nullopt;
-  std::optional<std::array<double, 3>> rate;
-  std::optional<std::array<double, 3>> force;
-  std::optional<std::uint32_t> ticks;
-  ItemReader reader(frame.data);
-  Item item;
-  while (reader.next(item)) {
-    if (item.kind() == xdi::kRateOfTurn) rate = read_numbers<3>(item);
-    if (item.kind() == xdi::kAcceleration) force = read_numbers<3>(item);
-    if (item.kind() == xdi::kSampleTimeFine && item.data.size() == 4)
-      ticks = read_be<std::uint32_t>(item.data);
-  }
-  if (!rate || !force || !ticks || !is_plausible(*rate, *force)) return std::nullopt;
-  return std::llround(*ticks * config_.rate_hz / kSampleTimeFinePerSecond);
+  InertialMessage message;
+  constexpr std::uint32_t kNeeded =
+      InertialMessage::kRate | InertialMessage::kAcceleration | InertialMessage::kSampleTimeFine;
+  if (!read_inertial(frame.data, message) || (message.items & kNeeded) != kNeeded) return std::nullopt;
+  if (!is_plausible(message.rate_radps, message.acceleration_mps2)) return std::nullopt;
+  return std::llround(message.sample_time_fine * config_.rate_hz / kSampleTimeFinePerSecond);
 }
 
 bool MtSession::takes_over(std::int64_t count, HostTime now) noexcept {

@@ -45,10 +45,11 @@ CountStep CountUnwrapper::take(std::int64_t raw, HostTime arrival) noexcept {
   const double elapsed_s = to_seconds(arrival - arrival_);
   const double most_s = elapsed_s + behind_s_;
   // Whole turns of the counter fit into a long silence: take the number that host time is nearest to.
-  const double turns = std::floor((most_s * config_.counts_per_s - static_cast<double>(step)) /
-                                      static_cast<double>(config_.modulus) +
-                                  0.5);
-  if (turns > 0.0) step += static_cast<std::int64_t>(turns) * config_.modulus;
+  const auto modulus = static_cast<double>(config_.modulus);
+  const double unexplained = most_s * config_.counts_per_s - static_cast<double>(step);
+  if (unexplained >= 0.5 * modulus) {
+    step += static_cast<std::int64_t>(std::floor(unexplained / modulus + 0.5)) * config_.modulus;
+  }
   const double step_s = static_cast<double>(step) / config_.counts_per_s;
   if (step_s > most_s + kAheadAllowance_s + kRateAllowance * elapsed_s) return suspect(raw, arrival);
 

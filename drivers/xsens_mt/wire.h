@@ -92,6 +92,8 @@ inline constexpr std::uint32_t kFormatMask = 0x300;
 inline constexpr std::uint32_t kFormatShift = 8;
 inline constexpr std::uint32_t kNoAnalogue1 = 0x400;
 inline constexpr std::uint32_t kNoAnalogue2 = 0x800;
+/// Local frame of the orientation: north-east-down instead of north-west-up.
+inline constexpr std::uint32_t kNorthEastDown = 0x80000000;
 }  // namespace output_settings
 
 /// How a real number is written; the two low bits of a data identifier and bits 8-9 of OutputSettings.
@@ -116,13 +118,27 @@ inline constexpr std::uint16_t kFormatBits = 0x000F;
 inline constexpr std::uint16_t kUtcTime = 0x1010;
 inline constexpr std::uint16_t kPacketCounter = 0x1020;
 inline constexpr std::uint16_t kSampleTimeFine = 0x1060;
+inline constexpr std::uint16_t kQuaternion = 0x2010;
+inline constexpr std::uint16_t kRotationMatrix = 0x2020;
+inline constexpr std::uint16_t kEulerAngles = 0x2030;
 inline constexpr std::uint16_t kDeltaV = 0x4010;
 inline constexpr std::uint16_t kAcceleration = 0x4020;
+inline constexpr std::uint16_t kAccelerationHr = 0x4040;
+inline constexpr std::uint16_t kGnssPvt = 0x7010;
 inline constexpr std::uint16_t kRateOfTurn = 0x8020;
 inline constexpr std::uint16_t kDeltaQ = 0x8030;
+inline constexpr std::uint16_t kRateOfTurnHr = 0x8040;
+inline constexpr std::uint16_t kStatusByte = 0xE010;
 inline constexpr std::uint16_t kStatusWord = 0xE020;
 }  // namespace xdi
 
+/// StatusWord, and the status byte of legacy data: the device's own filter has an orientation.
+inline constexpr std::uint32_t kStatusFilterValid = 1U << 1U;
+/// Status byte: the GPS receiver has a fix.
+inline constexpr std::uint32_t kStatusGpsFix = 1U << 2U;
+/// StatusWord: two bits, 0 none, 1 float, 2 fixed.
+inline constexpr unsigned kStatusRtkShift = 27;
+inline constexpr unsigned kStatusRtkMask = 0x3;
 /// StatusWord: an axis at the end of its range; x, y, z from the given bit upwards.
 inline constexpr unsigned kStatusAccelClipBit = 8;
 inline constexpr unsigned kStatusGyroClipBit = 11;

@@ -6,6 +6,7 @@
 #include "drivers/nmea/decoder.h"
 #include "drivers/nmea/messages.h"
 #include "drivers/nmea/scanner.h"
+#include "tests/drivers/nmea/sentence_builder.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/support/shared_data.h"
 
@@ -15,14 +16,8 @@ namespace {
 using nlohmann::json;
 using test::Bytes;
 using test::bytes_of;
+using test::sentence;
 using namespace std::chrono_literals;
-
-std::string sentence(const std::string& content) {
-  unsigned sum = 0;
-  for (const char c : content) sum ^= static_cast<unsigned char>(c);
-  constexpr std::string_view kHex = "0123456789ABCDEF";
-  return "$" + content + "*" + kHex[sum >> 4U] + kHex[sum & 0xFU] + "\r\n";
-}
 
 std::vector<std::string> scan_text(const Bytes& bytes, bool checksum_required = true) {
   Scanner scanner(Duration::zero(), checksum_required);

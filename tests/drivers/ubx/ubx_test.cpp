@@ -6,6 +6,7 @@
 #include "base/units.h"
 #include "drivers/ubx/decoder.h"
 #include "tests/drivers/support/streams.h"
+#include "tests/drivers/ubx/message_builder.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::ubx {
@@ -14,25 +15,6 @@ namespace {
 using nlohmann::json;
 using test::Bytes;
 using namespace std::chrono_literals;
-
-Bytes message(std::uint8_t message_class, std::uint8_t id, const Bytes& payload) {
-  Bytes bytes;
-  bytes.reserve(payload.size() + 8);
-  const auto size = static_cast<unsigned>(payload.size());
-  for (const unsigned byte :
-       {0xB5U, 0x62U, unsigned{message_class}, unsigned{id}, size & 0xFFU, size >> 8U}) {
-    bytes.push_back(static_cast<std::uint8_t>(byte));
-  }
-  for (const std::uint8_t byte : payload) bytes.push_back(byte);
-  unsigned a = 0, b = 0;
-  for (std::size_t i = 2; i < bytes.size(); ++i) {
-    a = (a + bytes[i]) & 0xFFU;
-    b = (b + a) & 0xFFU;
-  }
-  bytes.push_back(static_cast<std::uint8_t>(a));
-  bytes.push_back(static_cast<std::uint8_t>(b));
-  return bytes;
-}
 
 std::vector<Bytes> scan(std::span<const Bytes> reads) {
   Scanner scanner;
@@ -115,11 +97,11 @@ test::StreamUnderTest stream() {
   test::StreamUnderTest under_test;
   under_test.scan = scan;
   under_test.frames = {
-      message(1, 3, {1, 2, 3, 0xB5, 0x62, 1, 7, 92, 0}),
-      message(5, 1, {6, 1}),
+      test::ubx_message(1, 3, {1, 2, 3, 0xB5, 0x62, 1, 7, 92, 0}),
+      test::ubx_message(5, 1, {6, 1}),
       test::bytes_of("$GPZDA,123456.10,14,03,2026,00,00*60"),
-      message(1, 4, Bytes(18, 0x80)),
-      message(0x0A, 4, {}),
+      test::ubx_message(1, 4, Bytes(18, 0x80)),
+      test::ubx_message(0x0A, 4, {}),
   };
   return under_test;
 }
@@ -151,7 +133,7 @@ TEST(UbxDecoder, TheWeekOfTheGpsIsUnwrappedAndMissingEpochsAreCounted) {
   const auto pvt = [](std::uint32_t itow_ms) {
     Bytes payload(92, 0);
     for (std::size_t i = 0; i < 4; ++i) payload[i] = static_cast<std::uint8_t>(itow_ms >> (8 * i));
-    return message(1, 7, payload);
+    return test::ubx_message(1, 7, payload);
   };
   DecoderConfig config;
   config.period = 100ms;

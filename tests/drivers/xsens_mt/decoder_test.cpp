@@ -144,7 +144,8 @@ TEST(MtDecoder, DataOfAnotherLengthThanTheLayoutIsCountedAndNotGuessed) {
 
 TEST(MtDecoder, SplitsWhatAnXbusMasterSendsAndDropsADeviceThatFellOffTheBus) {
   MtDecoderConfig config;
-  config.bus_devices = {4, 5, 6};
+  config.bus = {BusDevice{4, {}}, BusDevice{5, {}}, BusDevice{6, {}}};
+  for (auto& device : config.bus) device->axes = config.axes;
   Line line(config);
   line.send(configuration(1152, 0, 3, 36, output_mode::kCalibrated, 0, 0x00100456), Duration{});
   constexpr int kMessages = 50;
