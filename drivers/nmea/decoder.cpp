@@ -72,47 +72,42 @@ Decoder::Type Decoder::type_of(std::string_view name) noexcept {
   return Type::kNone;
 }
 
-/// Puts a sentence into an epoch; returns the sentence's time.
-std::optional<TimeOfDay> Decoder::take(Type type, const Fields& fields, Epoch& epoch) const noexcept {
+void Decoder::take(Type type, const Fields& fields) noexcept {
   switch (type) {
     case Type::kGga:
-      epoch.gga = parse_gga(fields);
+      epoch_.gga = parse_gga(fields);
       // Refers to the sentence, which goes away before the epoch does.
-      epoch.gga->station = {};
-      return epoch.gga->time;
+      epoch_.gga->station = {};
+      break;
     case Type::kRmc: {
       const Rmc rmc = parse_rmc(fields);
-      if (rmc.valid) epoch.rmc = Course{rmc.sog_kn, rmc.cog_deg};
-      if (rmc.date) epoch.date = rmc.date;
-      return rmc.time;
+      if (rmc.valid) epoch_.rmc = Course{rmc.sog_kn, rmc.cog_deg};
+      if (rmc.date) epoch_.date = rmc.date;
+      break;
     }
     case Type::kVtg: {
       const Vtg vtg = parse_vtg(fields);
-      epoch.vtg = Course{vtg.sog_kn, vtg.cog_deg};
-      return std::nullopt;
+      epoch_.vtg = Course{vtg.sog_kn, vtg.cog_deg};
+      break;
     }
     case Type::kGst:
-      epoch.gst = parse_gst(fields);
-      return epoch.gst->time;
-    case Type::kZda: {
-      const Zda zda = parse_zda(fields);
-      if (zda.date) epoch.date = zda.date;
-      return zda.time;
-    }
+      epoch_.gst = parse_gst(fields);
+      break;
+    case Type::kZda:
+      if (const Zda zda = parse_zda(fields); zda.date) epoch_.date = zda.date;
+      break;
     case Type::kNone:
       break;
   }
-  return std::nullopt;
 }
 
 void Decoder::on_sentence(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept {
   const Fields fields(frame.sentence);
   const Type type = type_of(fields.type());
   if (type == Type::kNone) return;
-  Epoch alone;
-  const auto time = take(type, fields, alone);
-  if (!time && type != Type::kVtg) return;  // a receiver that does not know the time has no solution either
-  if (time) {
+  if (type != Type::kVtg) {
+    const auto time = time_of(fields);
+    if (!time) return;  // a receiver that does not know the time has no solution either
     const std::int64_t tod_ns = from_seconds(time->seconds()).count();
     if (!epoch_.open || tod_ns != epoch_.tod_ns) {
       if (epoch_.open) last_of_epoch_ = epoch_.last;
@@ -124,7 +119,7 @@ void Decoder::on_sentence(const Frame& frame, HostTime arrival, SampleSink& sink
     }
   }
   if (!epoch_.open) return;
-  (void)take(type, fields, epoch_);
+  take(type, fields);
   epoch_.last = type;
   epoch_.bytes += frame.sentence.size() + 2;  // CR LF
   if (type == last_of_epoch_) publish(arrival, sink);

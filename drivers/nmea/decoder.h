@@ -73,7 +73,7 @@ class Decoder final : public DeviceDecoder {
   void drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept;
   void on_sentence(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
   [[nodiscard]] static Type type_of(std::string_view name) noexcept;
-  [[nodiscard]] std::optional<TimeOfDay> take(Type type, const Fields& fields, Epoch& epoch) const noexcept;
+  void take(Type type, const Fields& fields) noexcept;
   void publish(HostTime arrival, SampleSink& sink) noexcept;
   [[nodiscard]] bool unwrap_time() noexcept;
   void update_date() noexcept;

@@ -1,32 +1,19 @@
 #include "drivers/nmea/messages.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+
+#include "drivers/device/decimal.h"
 
 namespace imuscope::nmea {
 namespace {
 
-std::optional<double> to_number(std::string_view text) noexcept {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
-std::optional<int> to_integer(std::string_view text) noexcept {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 std::optional<TimeOfDay> to_time(std::string_view text) noexcept {
   if (text.size() < 6) return std::nullopt;
-  const auto hour = to_integer(text.substr(0, 2));
-  const auto minute = to_integer(text.substr(2, 2));
-  const auto second = to_number(text.substr(4));
+  const auto hour = read_integer<int>(text.substr(0, 2));
+  const auto minute = read_integer<int>(text.substr(2, 2));
+  const auto second = read_decimal(text.substr(4));
   if (!hour || !minute || !second) return std::nullopt;
   const bool possible =
       *hour >= 0 && *hour < 24 && *minute >= 0 && *minute < 60 && *second >= 0.0 && *second < 61.0;
@@ -38,8 +25,8 @@ std::optional<TimeOfDay> to_time(std::string_view text) noexcept {
 std::optional<double> to_degrees(std::string_view text, std::string_view hemisphere) noexcept {
   const std::size_t point = std::min(text.find('.'), text.size());
   if (point < 3 || hemisphere.size() != 1) return std::nullopt;
-  const auto degrees = to_integer(text.substr(0, point - 2));
-  const auto minutes = to_number(text.substr(point - 2));
+  const auto degrees = read_integer<int>(text.substr(0, point - 2));
+  const auto minutes = read_decimal(text.substr(point - 2));
   if (!degrees || !minutes || *degrees < 0 || *minutes < 0.0 || *minutes >= 60.0) return std::nullopt;
   const double value = *degrees + *minutes / 60.0;
   switch (hemisphere[0]) {
@@ -59,9 +46,9 @@ constexpr int kFirstTwoDigitYear = 80;
 
 std::optional<Date> to_date(std::string_view text) noexcept {
   if (text.size() != 6) return std::nullopt;
-  const auto day = to_integer(text.substr(0, 2));
-  const auto month = to_integer(text.substr(2, 2));
-  const auto year = to_integer(text.substr(4, 2));
+  const auto day = read_integer<int>(text.substr(0, 2));
+  const auto month = read_integer<int>(text.substr(2, 2));
+  const auto year = read_integer<int>(text.substr(4, 2));
   if (!day || !month || !year) return std::nullopt;
   return Date{*year < kFirstTwoDigitYear ? 2000 + *year : 1900 + *year, *month, *day};
 }
@@ -77,28 +64,42 @@ void put_digits(detail::ShortText& text, int value, int digits) noexcept {
 }  // namespace
 
 Fields::Fields(std::string_view sentence) noexcept {
-  sentence.remove_prefix(1);
-  sentence = sentence.substr(0, sentence.find('*'));
-  const std::string_view address = sentence.substr(0, sentence.find(','));
-  constexpr std::size_t kTalkerAndType = 5;
-  if (address == "PASHR") {
-    type_ = address;
-  } else if (address.size() == kTalkerAndType && address[0] != 'P') {
-    type_ = address.substr(2);
+  const char* at = sentence.data() + 1;
+  const char* end = sentence.data() + sentence.size();
+  const char* begin = at;
+  bool in_address = true;
+  const auto close = [&] {
+    const std::string_view cell(begin, static_cast<std::size_t>(at - begin));
+    if (in_address) {
+      address_ = cell;
+    } else if (size_ < kMax) {
+      fields_[size_++] = cell;
+    }
+    in_address = false;
+  };
+  for (; at < end && *at != '*'; ++at) {
+    if (*at != ',') continue;
+    close();
+    begin = at + 1;
   }
-  while (size_ < kMax) {
-    const std::size_t comma = sentence.find(',');
-    if (comma == std::string_view::npos) break;
-    sentence.remove_prefix(comma + 1);
-    fields_[size_++] = sentence.substr(0, sentence.find(','));
+  close();
+  constexpr std::size_t kTalkerAndType = 5;
+  if (address_ == "PASHR") {
+    type_ = address_;
+  } else if (address_ == "PIXSE" && size_ > 0) {
+    type_ = {address_.data(), address_.size() + 1 + fields_[0].size()};
+  } else if (address_.size() == kTalkerAndType && address_[0] != 'P') {
+    type_ = address_.substr(2);
   }
 }
 
 std::string_view Fields::at(std::size_t index) const noexcept {
   return index < size_ ? fields_[index] : std::string_view{};
 }
-std::optional<double> Fields::number(std::size_t index) const noexcept { return to_number(at(index)); }
-std::optional<int> Fields::integer(std::size_t index) const noexcept { return to_integer(at(index)); }
+std::optional<double> Fields::number(std::size_t index) const noexcept { return read_decimal(at(index)); }
+std::optional<int> Fields::integer(std::size_t index) const noexcept { return read_integer<int>(at(index)); }
+
+std::optional<TimeOfDay> time_of(const Fields& f) noexcept { return to_time(f.at(0)); }
 
 Gga parse_gga(const Fields& f) noexcept {
   return {to_time(f.at(0)),
@@ -168,6 +169,25 @@ ShortText text_of(const Date& date) noexcept {
   text.chars[text.size++] = '-';
   put_digits(text, date.day, 2);
   return text;
+}
+
+ShortText phins_time_text(std::string_view field) noexcept {
+  ShortText text;
+  // hhmmss.ssssss; more decimals are cut.
+  if (!to_time(field)) return text;
+  for (std::size_t i = 0; i < field.size() && text.size + 2 < text.chars.size(); ++i) {
+    if (i == 2 || i == 4) text.chars[text.size++] = ':';
+    text.chars[text.size++] = field[i];
+  }
+  return text;
+}
+
+std::optional<std::uint32_t> hex_word(std::string_view field) noexcept {
+  constexpr int kHexadecimal = 16;
+  std::uint32_t value = 0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value, kHexadecimal);
+  if (error != std::errc{} || end != field.data() + field.size()) return std::nullopt;
+  return value;
 }
 
 }  // namespace detail

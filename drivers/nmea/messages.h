@@ -16,7 +16,10 @@ class Fields {
   /// @param sentence  from '$' to the checksum
   explicit Fields(std::string_view sentence) noexcept;
 
-  /// "GGA", "RMC", ... ; "PASHR" for that proprietary one; empty for other addresses.
+  /// "GNGGA"
+  [[nodiscard]] std::string_view address() const noexcept { return address_; }
+  /// "GGA", "RMC", ... ; of proprietary ones "PASHR", and "PIXSE,ATITUD" and the like; empty for other
+  /// addresses.
   [[nodiscard]] std::string_view type() const noexcept { return type_; }
   /// Field behind the address, from 0; empty behind the last one.
   [[nodiscard]] std::string_view at(std::size_t index) const noexcept;
@@ -25,6 +28,7 @@ class Fields {
 
  private:
   static constexpr std::size_t kMax = 40;
+  std::string_view address_;
   std::string_view type_;
   std::array<std::string_view, kMax> fields_;
   std::size_t size_ = 0;
@@ -103,6 +107,9 @@ struct Pashr {
   std::optional<int> ins_quality;
 };
 
+/// Time of the epoch that the sentence belongs to: the first field of GGA, RMC, GST and ZDA.
+[[nodiscard]] std::optional<TimeOfDay> time_of(const Fields& fields) noexcept;
+
 [[nodiscard]] Gga parse_gga(const Fields& fields) noexcept;
 [[nodiscard]] Rmc parse_rmc(const Fields& fields) noexcept;
 [[nodiscard]] Vtg parse_vtg(const Fields& fields) noexcept;
@@ -132,6 +139,56 @@ struct ShortText {
 [[nodiscard]] ShortText text_of(const TimeOfDay& time) noexcept;
 /// "2026-03-14"
 [[nodiscard]] ShortText text_of(const Date& date) noexcept;
+}  // namespace detail
+
+namespace detail {
+
+/// Names of the numbers of one $PIXSE sentence (the "PHINS STANDARD" output of older Ixsea units). The order in
+/// STDSPD differs between sources, so its numbers are not named here.
+struct PhinsLayout {
+  std::string_view type;
+  std::array<std::string_view, 3> names;
+};
+inline constexpr std::array<PhinsLayout, 6> kPhinsLayouts{{
+    {"PIXSE,ATITUD", {"roll_deg", "pitch_deg", ""}},
+    {"PIXSE,POSITI", {"lat_deg", "lon_deg", "alt_m"}},
+    {"PIXSE,SPEED_", {"east_ms", "north_ms", "up_ms"}},
+    {"PIXSE,HEAVE_", {"surge_m", "sway_m", "heave_m"}},
+    {"PIXSE,STDHRP", {"heading_std", "roll_std", "pitch_std"}},
+    {"PIXSE,STDPOS", {"lat_std_m", "lon_std_m", "alt_std_m"}},
+}};
+/// Sentences of two or one words of hexadecimal digits.
+inline constexpr std::array<std::string_view, 3> kPhinsWordSentences{"PIXSE,ALGSTS", "PIXSE,STATUS",
+                                                                     "PIXSE,HT_STS"};
+/// "12:34:56.100000" of "123456.100000"; empty for what is no time.
+[[nodiscard]] ShortText phins_time_text(std::string_view field) noexcept;
+[[nodiscard]] std::optional<std::uint32_t> hex_word(std::string_view field) noexcept;
+
+/// Fields of a $PIXSE sentence begin behind its kind.
+template <typename Visit>
+void for_each_phins_field(const Fields& fields, Visit&& visit) {
+  using Kind = NamedValue::Kind;
+  const std::string_view type = fields.type();
+  for (const PhinsLayout& layout : kPhinsLayouts) {
+    if (layout.type != type) continue;
+    for (std::size_t i = 0; i < layout.names.size(); ++i) {
+      const auto value = fields.number(1 + i);
+      if (value && !layout.names[i].empty()) visit(NamedValue{layout.names[i], Kind::kReal, *value, {}});
+    }
+  }
+  if (type == "PIXSE,TIME__") {
+    const ShortText text = phins_time_text(fields.at(1));
+    if (text.size > 0) visit(NamedValue{"hms", Kind::kText, 0.0, text.view()});
+  }
+  for (const std::string_view word_sentence : kPhinsWordSentences) {
+    if (word_sentence != type) continue;
+    const auto lsb = hex_word(fields.at(1));
+    const auto msb = hex_word(fields.at(2));
+    if (lsb) visit(NamedValue{"lsb", Kind::kInteger, static_cast<double>(*lsb), {}});
+    if (msb) visit(NamedValue{"msb", Kind::kInteger, static_cast<double>(*msb), {}});
+  }
+}
+
 }  // namespace detail
 
 /// Calls visit(const NamedValue&) for each field of a sentence that is read; nothing for others.
@@ -184,6 +241,8 @@ void for_each_field(const Fields& fields, Visit&& visit) {
     real("pitch_deg", p.pitch_deg), real("heave_m", p.heave_m), real("roll_std", p.roll_std);
     real("pitch_std", p.pitch_std), real("heading_std", p.heading_std);
     integer("gps_quality", p.gps_quality), integer("ins_quality", p.ins_quality);
+  } else if (type.starts_with("PIXSE,")) {
+    detail::for_each_phins_field(fields, visit);
   }
 }
 

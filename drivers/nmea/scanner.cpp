@@ -1,6 +1,7 @@
 #include "drivers/nmea/scanner.h"
 
 #include <algorithm>
+#include <array>
 
 namespace imuscope::nmea {
 namespace {
@@ -8,6 +9,16 @@ namespace {
 constexpr bool is_start(std::uint8_t byte) noexcept { return byte == '$' || byte == '!'; }
 constexpr bool is_line_end(std::uint8_t byte) noexcept { return byte == '\r' || byte == '\n'; }
 constexpr bool is_printable(std::uint8_t byte) noexcept { return byte >= ' ' && byte <= '~'; }
+
+/// What may stand between the start and '*': printable characters that neither start nor end a sentence.
+constexpr auto kIsContent = [] {
+  std::array<bool, 256> table{};
+  for (unsigned byte = 0; byte < table.size(); ++byte) {
+    const auto b = static_cast<std::uint8_t>(byte);
+    table[byte] = is_printable(b) && !is_start(b) && b != '*';
+  }
+  return table;
+}();
 
 /// Shortest address: 'P' and three letters of a maker.
 constexpr std::size_t kAddressMin = 4;
@@ -23,27 +34,20 @@ constexpr int hex_value(std::uint8_t byte) noexcept {
 }  // namespace
 
 Examined examine_sentence(std::span<const std::uint8_t> pending, bool checksum_required) noexcept {
-  std::uint8_t sum = 0;
   const std::size_t searched = std::min(pending.size(), kSentenceMax);
-  for (std::size_t i = 1; i < searched; ++i) {
-    const std::uint8_t byte = pending[i];
-    if (byte == '*') {
-      if (i <= kAddressMin) return {Verdict::kFalseStart};
-      constexpr std::size_t kDigits = 2;
-      for (std::size_t digit = 1; digit <= kDigits; ++digit) {
-        if (i + digit >= pending.size()) return {Verdict::kNeedMore};
-        if (hex_value(pending[i + digit]) < 0) return {Verdict::kFalseStart};
-      }
-      const bool right = 16 * hex_value(pending[i + 1]) + hex_value(pending[i + 2]) == sum;
-      return {right ? Verdict::kSentence : Verdict::kBadChecksum, i + 1 + kDigits};
-    }
-    if (is_line_end(byte)) {
-      return checksum_required ? Examined{Verdict::kFalseStart} : Examined{Verdict::kSentence, i};
-    }
-    if (!is_printable(byte) || is_start(byte)) return {Verdict::kFalseStart};
-    sum = static_cast<std::uint8_t>(sum ^ byte);
+  std::uint8_t sum = 0;
+  std::size_t i = 1;
+  for (; i < searched && kIsContent[pending[i]]; ++i) sum = static_cast<std::uint8_t>(sum ^ pending[i]);
+  if (i == searched) return {searched == kSentenceMax ? Verdict::kFalseStart : Verdict::kNeedMore};
+  if (is_line_end(pending[i]) && !checksum_required) return {Verdict::kSentence, i};
+  if (pending[i] != '*' || i <= kAddressMin) return {Verdict::kFalseStart};
+  constexpr std::size_t kDigits = 2;
+  for (std::size_t digit = 1; digit <= kDigits; ++digit) {
+    if (i + digit >= pending.size()) return {Verdict::kNeedMore};
+    if (hex_value(pending[i + digit]) < 0) return {Verdict::kFalseStart};
   }
-  return {searched == kSentenceMax ? Verdict::kFalseStart : Verdict::kNeedMore};
+  const bool right = 16 * hex_value(pending[i + 1]) + hex_value(pending[i + 2]) == sum;
+  return {right ? Verdict::kSentence : Verdict::kBadChecksum, i + 1 + kDigits};
 }
 
 bool Scanner::next(Frame& frame, bool at_end) noexcept {

@@ -1,9 +1,9 @@
 #include "drivers/rtklib_pos/messages.h"
 
-#include <charconv>
 #include <cmath>
 
 #include "drivers/device/calendar.h"
+#include "drivers/device/decimal.h"
 #include "drivers/device/gps_time.h"
 
 namespace imuscope::rtklib_pos {
@@ -22,18 +22,6 @@ std::string_view trimmed(std::string_view text) noexcept {
   return text;
 }
 
-template <typename T>
-std::optional<T> to_number(std::string_view text) noexcept {
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  if constexpr (std::is_floating_point_v<T>) {
-    if (!std::isfinite(value)) return std::nullopt;
-  }
-  return value;
-}
-
 /// Hands out the cells of a line.
 class Cells {
  public:
@@ -49,7 +37,7 @@ class Cells {
 
   /// False where the cell is not a number.
   bool next(double& value) noexcept {
-    const auto number = to_number<double>(next());
+    const auto number = read_decimal(next());
     value = number.value_or(0.0);
     return number.has_value();
   }
@@ -73,12 +61,12 @@ std::optional<std::int64_t> calendar_time(std::string_view date, std::string_vie
   const std::size_t colon = time.find(':');
   const std::size_t second_colon = time.find(':', colon + 1);
   if (second_slash == std::string_view::npos || second_colon == std::string_view::npos) return std::nullopt;
-  const auto year = to_number<int>(date.substr(0, slash));
-  const auto month = to_number<unsigned>(date.substr(slash + 1, second_slash - slash - 1));
-  const auto day = to_number<unsigned>(date.substr(second_slash + 1));
-  const auto hour = to_number<int>(time.substr(0, colon));
-  const auto minute = to_number<int>(time.substr(colon + 1, second_colon - colon - 1));
-  const auto second = to_number<double>(time.substr(second_colon + 1));
+  const auto year = read_integer<int>(date.substr(0, slash));
+  const auto month = read_integer<unsigned>(date.substr(slash + 1, second_slash - slash - 1));
+  const auto day = read_integer<unsigned>(date.substr(second_slash + 1));
+  const auto hour = read_integer<int>(time.substr(0, colon));
+  const auto minute = read_integer<int>(time.substr(colon + 1, second_colon - colon - 1));
+  const auto second = read_decimal(time.substr(second_colon + 1));
   if (!year || !month || !day || !hour || !minute || !second) return std::nullopt;
   const auto days = days_since_1970(*year, *month, *day);
   const bool possible =
@@ -89,8 +77,8 @@ std::optional<std::int64_t> calendar_time(std::string_view date, std::string_vie
 
 std::optional<std::int64_t> week_time(std::string_view week_text, std::string_view tow_text) noexcept {
   constexpr double kSecondsPerWeek = 604'800.0;
-  const auto week = to_number<std::int64_t>(week_text);
-  const auto tow_s = to_number<double>(tow_text);
+  const auto week = read_integer<std::int64_t>(week_text);
+  const auto tow_s = read_decimal(tow_text);
   constexpr std::int64_t kWeekMax = 10'000;
   if (!week || !tow_s || *week < 0 || *week > kWeekMax || *tow_s < 0.0 || *tow_s > kSecondsPerWeek) {
     return std::nullopt;
@@ -112,7 +100,7 @@ bool read_dms(Cells& cells, double& degrees) noexcept {
   const std::string_view first = cells.next();
   double minutes = 0.0;
   double seconds = 0.0;
-  const auto whole = to_number<double>(first);
+  const auto whole = read_decimal(first);
   if (!whole || !cells.next(minutes) || !cells.next(seconds)) return false;
   const double size = std::abs(*whole) + minutes / kMinutesPerDegree + seconds / kSecondsPerDegree;
   degrees = first.front() == '-' ? -size : size;

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -97,6 +99,178 @@ TEST(DecodeCommand, LosesNoMessageOfTheMtRecordings) {
     ASSERT_EQ(outcome.lines.size(), 101U);
     EXPECT_EQ(outcome.lines.back(), (json{{"messages", 100}, {"bytes_skipped", 0}}));
   }
+}
+
+/// Every key that is expected is there, with its value to the last bit or, where the vector rounds, to 1e-12 of
+/// it.
+void expect_fields(const json& line, const json& expected) {
+  for (const auto& [key, value] : expected.items()) {
+    ASSERT_TRUE(line.contains(key) || value.is_null()) << key << " in " << line;
+    if (value.is_number_float()) {
+      EXPECT_NEAR(line[key].get<double>(), value.get<double>(), 1e-12 * (1.0 + std::abs(value.get<double>())))
+          << key;
+    } else if (value == "NaN") {
+      EXPECT_TRUE(line[key].is_null()) << key;
+    } else if (!value.is_null()) {
+      EXPECT_EQ(line[key], value) << key;
+    }
+  }
+}
+
+json oracle_of(const std::string& name) {
+  return json::parse(std::ifstream(shared_path("oracle/protocols/" + name + ".json")));
+}
+
+TEST(DecodeCommand, NamesTheBlocksOfStdBinAsTheVectorsDo) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ixblue_stdbin.json");
+  int checked = 0;
+  for (const json& v : oracle_of("ixblue_stdbin")["vectors"]) {
+    if (!v.contains("expected")) continue;
+    SCOPED_TRACE(v["name"].get<std::string>());
+    const Outcome outcome = decode(recording_of("ixblue_stdbin", v["name"]), "--json");
+    ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
+    EXPECT_EQ(outcome.lines[0]["protocol"], "ixblue_stdbin");
+    for (const auto& [key, value] : v["expected"].items()) EXPECT_EQ(outcome.lines[0][key], value) << key;
+    ++checked;
+  }
+  EXPECT_EQ(checked, 25);
+}
+
+TEST(DecodeCommand, NamesTheFieldsOfGreisAsTheVectorsDo) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.json");
+  int checked = 0;
+  for (const json& v : oracle_of("greis")["vectors"]) {
+    if (!v.contains("fields")) continue;
+    SCOPED_TRACE(v["name"].get<std::string>());
+    const Outcome outcome = decode(recording_of("greis", v["name"]), "--json");
+    ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
+    EXPECT_EQ(outcome.lines[0]["protocol"], "greis");
+    EXPECT_EQ(outcome.lines[0]["message"], v["id"]);
+    EXPECT_EQ(outcome.lines[0]["checksum"], v["checksum"]);
+    expect_fields(outcome.lines[0], v["fields"]);
+    ++checked;
+  }
+  EXPECT_EQ(checked, 17);
+}
+
+TEST(DecodeCommand, NamesTheFieldsOfNavPvtAsTheVectorsDo) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ubx_nav_pvt.json");
+  int checked = 0;
+  for (const json& v : oracle_of("ubx_nav_pvt")["vectors"]) {
+    if (!v.contains("fields")) continue;
+    const Outcome outcome = decode(recording_of("ubx_nav_pvt", v["name"]), "--json");
+    ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
+    EXPECT_EQ(outcome.lines[0]["protocol"], "ubx");
+    EXPECT_EQ(outcome.lines[0]["message"], "NAV-PVT");
+    for (const auto& [key, value] : outcome.lines[0].items()) {
+      if (v["fields"].contains(key)) EXPECT_EQ(value, v["fields"][key]) << key;
+    }
+    for (const char* key : {"itow", "nano", "lat", "lon", "h", "vn", "ve", "vd", "flags", "sacc"}) {
+      EXPECT_TRUE(outcome.lines[0].contains(key)) << key;
+    }
+    ++checked;
+  }
+  EXPECT_EQ(checked, 2);
+}
+
+TEST(DecodeCommand, NamesTheFieldsOfNmeaAsTheVectorsDo) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/nmea.json");
+  int checked = 0;
+  for (const json& v : oracle_of("nmea")["vectors"]) {
+    if (!v.contains("expected")) continue;
+    SCOPED_TRACE(v["name"].get<std::string>());
+    const Outcome outcome = decode(recording_of("nmea", v["name"]), "--json");
+    ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
+    EXPECT_EQ(outcome.lines[0]["protocol"], "nmea");
+    expect_fields(outcome.lines[0], v["expected"]);
+    EXPECT_EQ(outcome.lines[1], (json{{"messages", 1}, {"bytes_skipped", 0}}));
+    ++checked;
+  }
+  EXPECT_EQ(checked, 13);
+}
+
+TEST(DecodeCommand, ReadsThePhinsStandardGroupOfOlderUnits) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/phins_standard.nmea");
+  const json sentences = oracle_of("phins_standard")["sentences"];
+  const Outcome outcome = decode(shared_path("oracle/protocols/phins_standard.nmea"), "--json");
+  ASSERT_EQ(outcome.lines.size(), sentences.size() + 1) << outcome.err;
+  for (std::size_t i = 0; i < sentences.size(); ++i) {
+    EXPECT_EQ(outcome.lines[i]["sentence"], sentences[i]["sentence"]);
+    expect_fields(outcome.lines[i], sentences[i]["expected"]);
+  }
+  EXPECT_EQ(outcome.lines.back(), (json{{"messages", 9}, {"bytes_skipped", 0}}));
+}
+
+TEST(DecodeCommand, NamesTheColumnsOfRtklibAsTheVectorsDo) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/rtklib_pos.json");
+  const json files = oracle_of("rtklib_pos")["files"];
+  for (const auto& [name, file] : files.items()) {
+    SCOPED_TRACE(name);
+    const Outcome outcome = decode(shared_path("oracle/protocols/" + name), "--json");
+    ASSERT_FALSE(outcome.lines.empty()) << outcome.err;
+    EXPECT_EQ(outcome.lines.back()["bytes_skipped"], 0);
+    std::size_t row = 0;
+    for (const json& line : outcome.lines) {
+      if (line.value("message", "") != "solution") continue;
+      ASSERT_LT(row, file["rows"].size());
+      EXPECT_EQ(line["protocol"], "rtklib_pos");
+      expect_fields(line, file["rows"][row++]);
+    }
+    EXPECT_EQ(row, file["rows"].size());
+  }
+}
+
+/// Messages, by name, and the sums of a recording of `streams`, decoded without naming its protocol.
+struct Counted {
+  std::map<std::string, int> messages;
+  json sums;
+};
+Counted count(const std::string& file) {
+  Counted counted;
+  const Outcome outcome = decode(shared_path(file), "--json");
+  for (const json& line : outcome.lines) {
+    if (line.contains("bytes_skipped")) {
+      counted.sums = line;
+    } else {
+      ++counted.messages[line["protocol"].get<std::string>() + " " + line["message"].get<std::string>()];
+    }
+  }
+  return counted;
+}
+
+TEST(DecodeCommand, FindsTheKnownCountsInTheRecordedStreams) {
+  IMUSCOPE_NEEDS_SHARED("data/streams");
+  const auto v3 = count("data/streams/ixblue_stdbin/v3.bin");
+  EXPECT_EQ(v3.messages.at("ixblue_stdbin telegram"), 17);
+  EXPECT_EQ(v3.sums, (json{{"messages", 17}, {"bytes_skipped", 0}}));
+  for (const char* version : {"v2", "v3_old", "v4", "v5"}) {
+    EXPECT_EQ(count(std::string("data/streams/ixblue_stdbin/") + version + ".bin").sums,
+              (json{{"messages", 1}, {"bytes_skipped", 0}}));
+  }
+  const auto drive = count("data/streams/nmea/drive.nmea");
+  EXPECT_EQ(drive.messages.at("nmea GGA"), 3634);
+  EXPECT_EQ(drive.messages.at("nmea RMC"), 3634);
+  EXPECT_EQ(drive.sums["bytes_skipped"], 0);
+  const auto walk = count("data/streams/ubx/walk.ubx");
+  EXPECT_EQ(walk.messages.at("ubx NAV-PVT"), 536);
+  EXPECT_EQ(walk.sums, (json{{"messages", 3400 + 2010}, {"bytes_skipped", 0}}));
+}
+
+// The file is cut inside its last epoch: what follows the last whole message is skipped.
+TEST(DecodeCommand, FindsEveryEpochOfTheJavadLogAndNoBadByteBeforeItsCut) {
+  IMUSCOPE_NEEDS_SHARED("data/streams/greis/javad.jps");
+  const Outcome outcome = decode(shared_path("data/streams/greis/javad.jps"), "--json");
+  int epochs = 0;
+  std::uint64_t end = 0;
+  for (std::size_t i = 0; i + 1 < outcome.lines.size(); ++i) {
+    const json& line = outcome.lines[i];
+    ASSERT_EQ(line["protocol"], "greis");
+    epochs += line["message"] == "~~" ? 1 : 0;
+    end = line["offset"].get<std::uint64_t>();
+  }
+  EXPECT_EQ(epochs, 130);
+  const auto file_size = std::filesystem::file_size(shared_path("data/streams/greis/javad.jps"));
+  EXPECT_LT(outcome.lines.back()["bytes_skipped"].get<std::uint64_t>(), file_size - end);
 }
 
 TEST(DecodeCommand, SaysWhatIsWrongAndWithWhichExitCode) {

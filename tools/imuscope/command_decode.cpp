@@ -46,10 +46,11 @@ Result<std::vector<std::uint8_t>> read_file(const std::string& file) {
   return std::vector<std::uint8_t>(std::istreambuf_iterator<char>(in), {});
 }
 
-std::size_t covered_bytes(const StreamProtocol& protocol, Stream stream) {
-  std::size_t covered = 0;
-  protocol.decode(stream, [&](const DecodedMessage& message) { covered += message.size; });
-  return covered;
+/// Bytes of messages that prove the protocol.
+std::size_t proven_bytes(const StreamProtocol& protocol, Stream stream) {
+  std::size_t proven = 0;
+  protocol.decode(stream, [&](const DecodedMessage& message) { proven += message.proven ? message.size : 0; });
+  return proven;
 }
 
 /// The protocol whose messages cover the most bytes; null where none covers any.
@@ -57,7 +58,7 @@ const StreamProtocol* find_protocol(Stream stream) {
   const StreamProtocol* best = nullptr;
   std::size_t most = 0;
   for (const StreamProtocol& protocol : stream_protocols()) {
-    const std::size_t covered = covered_bytes(protocol, stream.first(std::min(stream.size(), kLook)));
+    const std::size_t covered = proven_bytes(protocol, stream.first(std::min(stream.size(), kLook)));
     if (covered <= most) continue;
     most = covered;
     best = &protocol;
@@ -123,7 +124,7 @@ class Printer {
     std::size_t most = 0;
     for (const StreamProtocol& other : stream_protocols()) {
       if (!other.mixes_with_others || other.name == protocol_.name) continue;
-      const std::size_t covered = covered_bytes(other, gap);
+      const std::size_t covered = proven_bytes(other, gap);
       if (covered > most) {
         most = covered;
         best = &other;

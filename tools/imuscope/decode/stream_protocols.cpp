@@ -7,6 +7,11 @@ namespace imuscope::cli {
 std::span<const StreamProtocol> stream_protocols() {
   static constexpr auto kProtocols = std::to_array<StreamProtocol>({
       {"xsens_mt", decode_xsens_mt, false},
+      {"ixblue_stdbin", decode_ixblue_stdbin, false},
+      {"nmea", decode_nmea, true},
+      {"ubx", decode_ubx, true},
+      {"greis", decode_greis, false},
+      {"rtklib_pos", decode_rtklib_pos, false},
       {"candump", decode_candump_frames, false},
   });
   return kProtocols;

@@ -16,8 +16,9 @@ namespace imuscope::cli {
 /// One message of a stream.
 struct DecodedMessage {
   std::uint64_t offset = 0;  ///< of its first byte
-  std::size_t size = 0;      ///< bytes of its frame
+  std::size_t size = 0;      ///< bytes of its frame, its line end included
   std::string message;       ///< what the protocol's documents call it
+  bool proven = true;        ///< by a checksum or a shape that chance does not make: it tells the protocol
   nlohmann::ordered_json fields = nlohmann::ordered_json::object();
 };
 
@@ -36,6 +37,11 @@ std::span<const StreamProtocol> stream_protocols();
 
 void decode_candump_frames(std::span<const std::uint8_t> stream, const OnMessage& on_message);
 void decode_xsens_mt(std::span<const std::uint8_t> stream, const OnMessage& on_message);
+void decode_ixblue_stdbin(std::span<const std::uint8_t> stream, const OnMessage& on_message);
+void decode_greis(std::span<const std::uint8_t> stream, const OnMessage& on_message);
+void decode_nmea(std::span<const std::uint8_t> stream, const OnMessage& on_message);
+void decode_ubx(std::span<const std::uint8_t> stream, const OnMessage& on_message);
+void decode_rtklib_pos(std::span<const std::uint8_t> stream, const OnMessage& on_message);
 
 /// Lower-case hexadecimal digits.
 std::string hex(std::span<const std::uint8_t> bytes);

@@ -11,6 +11,7 @@
 #include "drivers/xsens_mt/mtdata2.h"
 #include "drivers/xsens_mt/scanner.h"
 #include "stream_protocols.h"
+#include "whole_stream.h"
 
 namespace imuscope::cli {
 namespace {
@@ -22,18 +23,6 @@ using Bytes = std::span<const std::uint8_t>;
 /// Messages that a guess of the layout looks at.
 constexpr std::size_t kMessagesForGuess = 64;
 
-/// Calls back for each frame of a whole stream.
-template <typename OnFrame>
-void for_each_frame(Bytes stream, OnFrame&& on_frame) {
-  Scanner scanner;
-  Frame frame;
-  while (!stream.empty()) {
-    stream = stream.subspan(scanner.append(stream, HostTime{}));
-    while (scanner.next(frame)) on_frame(frame);
-  }
-  while (scanner.next(frame, true)) on_frame(frame);
-}
-
 /// What MTData holds: as a Configuration message said, else as its numbers suggest.
 class Layouts {
  public:
@@ -41,7 +30,7 @@ class Layouts {
   explicit Layouts(Bytes stream) {
     std::vector<std::vector<std::uint8_t>> kept;
     bool configured = false;
-    for_each_frame(stream, [&](const Frame& frame) {
+    scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
       configured = configured || frame.mid == mid::kConfiguration;
       if (configured || frame.mid != mid::kMtData || kept.size() == kMessagesForGuess) return;
       if (kept.empty() || kept[0].size() == frame.data.size())
@@ -348,8 +337,8 @@ bool add_fields(const Frame& frame, Layouts& layouts, Json& fields) {
 
 void decode_xsens_mt(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
   Layouts layouts(stream);
-  for_each_frame(stream, [&](const Frame& frame) {
-    DecodedMessage message{frame.offset, frame.size, std::string(message_name(frame.mid)), Json::object()};
+  scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+    DecodedMessage message{frame.offset, frame.size, std::string(message_name(frame.mid)), true, Json::object()};
     if (message.message.empty()) message.message = fmt::format("MID_{:02X}", frame.mid);
     message.fields["bid"] = frame.bid;
     message.fields["mid"] = frame.mid;

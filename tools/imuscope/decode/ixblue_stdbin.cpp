@@ -1,0 +1,63 @@
+#include "drivers/device/bytes.h"
+#include "drivers/ixblue_stdbin/messages.h"
+#include "drivers/ixblue_stdbin/scanner.h"
+#include "stream_protocols.h"
+#include "whole_stream.h"
+
+namespace imuscope::cli {
+namespace {
+
+using namespace ixblue_stdbin;
+using Json = nlohmann::ordered_json;
+
+bool is_real(FieldType type) { return type == FieldType::kF32 || type == FieldType::kF64; }
+bool is_text(FieldType type) { return type == FieldType::kText8 || type == FieldType::kText32; }
+
+Json blocks_json(const Telegram& telegram) {
+  Json blocks = Json::object();
+  telegram.for_each_block([&](const BlockLayout& layout, std::span<const std::uint8_t> bytes) {
+    Json& block = blocks[std::string(layout.name)];
+    for_each_field(layout, bytes, [&](const FieldLayout& field, const FieldValue& value) {
+      block[std::string(field.name)] =
+          is_text(field.type) ? Json(value.text) : json_number(value.number, !is_real(field.type));
+    });
+  });
+  return blocks;
+}
+
+Json telegram_json(const Telegram& telegram) {
+  Json fields = {{"version", telegram.version},
+                 {"nav_mask", telegram.nav_mask},
+                 {"ext_mask", telegram.extended_mask},
+                 {"external_mask", telegram.external_mask},
+                 {"nav_size", nullptr},
+                 {"telegram_size", telegram.total_size},
+                 {"validity_100us", telegram.validity_ticks},
+                 {"counter", telegram.counter},
+                 {"header_size", header_layout(telegram.version).size},
+                 {"checksum", telegram.checksum},
+                 {"blocks", blocks_json(telegram)}};
+  if (telegram.nav_size) fields["nav_size"] = *telegram.nav_size;
+  if (telegram.rest_unread) fields["rest_unread"] = true;
+  return fields;
+}
+
+Json answer_json(std::span<const std::uint8_t> bytes) {
+  const auto payload = bytes.subspan(kAnswerHeaderSize, bytes.size() - kAnswerHeaderSize - kChecksumSize);
+  return {{"kind", "answer"},
+          {"version", bytes[kVersionOffset]},
+          {"size", read_be<std::uint16_t>(bytes, kAnswerSizeOffset)},
+          {"payload", hex(payload)}};
+}
+
+}  // namespace
+
+void decode_ixblue_stdbin(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
+  scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+    const bool telegram = frame.kind == Frame::Kind::kTelegram;
+    on_message({frame.offset, frame.bytes.size(), telegram ? "telegram" : "answer", true,
+                telegram ? telegram_json(parse_telegram(frame.bytes)) : answer_json(frame.bytes)});
+  });
+}
+
+}  // namespace imuscope::cli

@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <string_view>
+
+#include "drivers/device/gps_time.h"
+#include "drivers/rtklib_pos/messages.h"
+#include "stream_protocols.h"
+#include "whole_stream.h"
+
+namespace imuscope::cli {
+namespace {
+
+using namespace rtklib_pos;
+using Json = nlohmann::ordered_json;
+
+constexpr std::int64_t kNsPerMs = 1'000'000;
+constexpr std::int64_t kNsPerDay = 86'400'000 * kNsPerMs;
+
+bool is_printable(std::string_view line) {
+  return std::all_of(line.begin(), line.end(), [](char c) { return (c >= ' ' && c <= '~') || c == '\t'; });
+}
+
+/// Integers of a solution; all other values are reals.
+bool is_integer(std::string_view name) { return name == "Q" || name == "ns"; }
+
+std::string_view name_of(TimeSystem system) {
+  switch (system) {
+    case TimeSystem::kGpst:
+      return "GPST";
+    case TimeSystem::kUtc:
+      return "UTC";
+    case TimeSystem::kJst:
+      return "JST";
+  }
+  return {};
+}
+
+/// "2026-03-14T12:34:56.100 GPST"
+std::string time_text(std::int64_t time_ns, TimeSystem system) {
+  using namespace std::chrono;
+  const std::int64_t days_since_1970 = time_ns / kNsPerDay;
+  const year_month_day date{sys_days{days{days_since_1970}}};
+  const std::int64_t ms = (time_ns - days_since_1970 * kNsPerDay + kNsPerMs / 2) / kNsPerMs;
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:03} {}", static_cast<int>(date.year()),
+                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()), ms / 3'600'000,
+                     ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, name_of(system));
+}
+
+/// As the line writes it: a calendar date, or week and time of week.
+void add_time(std::string_view line, const Solution& solution, TimeSystem system, Json& fields) {
+  if (line.find('/') != std::string_view::npos) {
+    fields["time"] = time_text(solution.time_ns, system);
+    return;
+  }
+  const std::int64_t since_epoch_ns = solution.time_ns - kGpsEpochDays * kNsPerDay;
+  const std::int64_t week = since_epoch_ns / (7 * kNsPerDay);
+  fields["week"] = week;
+  fields["tow"] = static_cast<double>((since_epoch_ns - 7 * week * kNsPerDay) / 1000) / 1e6;
+}
+
+Json solution_json(std::string_view line, const Solution& solution, const Format& format) {
+  Json fields = Json::object();
+  add_time(line, solution, format.time_system, fields);
+  for_each_field(solution, format.layout, [&](std::string_view name, double value) {
+    fields[std::string(name)] = json_number(value, is_integer(name));
+  });
+  if (format.has_velocity) {
+    fields["velocity_ms"] = solution.velocity;
+    fields["velocity_std_ms"] = solution.velocity_sd;
+  }
+  return fields;
+}
+
+}  // namespace
+
+void decode_rtklib_pos(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
+  const std::string_view text(reinterpret_cast<const char*>(stream.data()), stream.size());
+  Format format;
+  std::optional<ReferencePosition> base;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
+    const std::size_t next = behind_line_end(stream, end);
+    const std::string_view line = text.substr(at, end - at);
+    if (!line.empty() && line[0] == '%' && is_printable(line)) {
+      const bool columns = read_comment(line, format, base);
+      on_message({at, next - at, columns ? "columns" : "comment", columns, {{"text", line}}});
+    } else if (const auto solution = parse_solution(line, format)) {
+      on_message({at, next - at, "solution", true, solution_json(line, *solution, format)});
+    }
+    at = next;
+  }
+}
+
+}  // namespace imuscope::cli
