@@ -51,6 +51,10 @@ class DeviceDecoder {
   /// Of a device on a CAN bus: the frames that it needs, so that the kernel lets through only those. Empty
   /// for every other device. Not for the real-time thread.
   [[nodiscard]] virtual std::vector<CanId> ids() const { return {}; }
+
+  /// What is wrong with the data although they can be read, in one sentence with the remedy; empty where nothing
+  /// is. Static storage.
+  [[nodiscard]] virtual std::string_view remark() const noexcept { return {}; }
 };
 
 enum class SessionState : std::uint8_t {
@@ -75,6 +79,10 @@ class DeviceSession {
   [[nodiscard]] virtual std::span<const std::uint8_t> poll(HostTime now) noexcept = 0;
 
   [[nodiscard]] virtual SessionState state() const noexcept = 0;
+
+  /// True where all signs are that the line runs at another baud rate: nothing that came was a message. The
+  /// owner of the line may open it at another one, with a new session.
+  [[nodiscard]] virtual bool wants_other_baud() const noexcept { return false; }
 
   /// Last problem in one sentence, with the remedy; empty when there is none. Static or member storage.
   [[nodiscard]] virtual std::string_view problem() const noexcept = 0;

@@ -3,16 +3,16 @@
 /// Finds GREIS messages and lines of text in a byte stream. After a false start the search goes on at the
 /// byte behind it. CR and LF between messages are separators. Core: bounded memory, no allocation, noexcept.
 ///
-/// A message counts as found when its checksum is right: the last byte of the body, or its last two hex
-/// digits
-/// ([MF], [PM]). [JP], [RE] and [ER] have none; they must be text to the last byte.
+/// A message counts as found when its checksum is right: the last byte of the body, its last two hex digits
+/// ([MF], [PM]), or its last two bytes ([rE], [rM], [rV]: CRC-16). [JP], [RE] and [ER] have none; they must be
+/// text to the last byte.
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "base/time.h"
-#include "drivers/device/frame_buffer.h"
+#include "drivers/device/scan_loop.h"
 #include "drivers/greis/wire.h"
 
 namespace imuscope::greis {
@@ -27,35 +27,30 @@ struct Frame {
   HostTime first_byte{};                ///< when its first byte arrived at the latest
 };
 
-struct ScanCounters {
-  std::uint64_t bytes_skipped = 0;
-  std::uint64_t bad_checksums = 0;
-  std::uint64_t bad_lengths = 0;
-};
-
 class Scanner {
  public:
   /// @param per_byte  time of one byte on the wire, zero for a network stream
-  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : buffer_(per_byte) {}
+  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : loop_(per_byte) {}
 
   /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
   std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
-    return buffer_.append(bytes, arrival);
+    return loop_.append(bytes, arrival);
   }
 
   /// The next frame, or false where more bytes are needed.
   /// @param at_end  no more bytes will come: look for frames behind a start that announced more
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
-  [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const ScanCounters& counters() const noexcept { return loop_.counters(); }
 
  private:
-  FrameBuffer<2 * kMessageMax> buffer_;
-  std::size_t taken_ = 0;
-  ScanCounters counters_;
+  ScanLoop<2 * kMessageMax> loop_;
 };
 
 /// The protocol's 8-bit checksum of the bytes before it.
 [[nodiscard]] std::uint8_t checksum(std::span<const std::uint8_t> bytes) noexcept;
+
+/// CRC-16 of [rE], [rM] and [rV]: polynomial 0x1021, from 0.
+[[nodiscard]] std::uint16_t crc16(std::span<const std::uint8_t> bytes) noexcept;
 
 }  // namespace imuscope::greis

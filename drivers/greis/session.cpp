@@ -102,6 +102,7 @@ void Session::on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noexce
   while (!bytes.empty()) {
     bytes = bytes.subspan(scanner_.append(bytes, now));
     while (scanner_.next(frame)) {
+      ++frames_;
       if (frame.kind == Frame::Kind::kMessage) on_message(frame, now);
     }
   }
@@ -177,6 +178,7 @@ std::span<const std::uint8_t> Session::poll(HostTime now) noexcept {
   if (now - last_epoch_ > std::max(kSilenceMin, config_.period * kSilencePeriods)) {
     state_ = SessionState::kFailed;
     if (!refused_) set_problem(bytes_since_epoch_ == 0 ? kNoBytes : kNoEpoch);
+    wants_other_baud_ = bytes_since_epoch_ > 0 && frames_ == 0;
     // The receiver may have been switched off and on: ask again. The problem stays told meanwhile.
     start(now);
   }

@@ -26,6 +26,7 @@ class Session final : public DeviceSession {
   [[nodiscard]] std::span<const std::uint8_t> poll(HostTime now) noexcept override;
   [[nodiscard]] SessionState state() const noexcept override { return state_; }
   [[nodiscard]] std::string_view problem() const noexcept override;
+  [[nodiscard]] bool wants_other_baud() const noexcept override { return wants_other_baud_; }
 
  private:
   static constexpr std::size_t kCommands = 3;
@@ -58,6 +59,8 @@ class Session final : public DeviceSession {
   HostTime sent_{};
   HostTime last_epoch_{};  ///< or begin of the attempt
   std::uint64_t bytes_since_epoch_ = 0;
+  std::uint64_t frames_ = 0;
+  bool wants_other_baud_ = false;
 
   // The epoch that is coming in.
   bool has_position_ = false;

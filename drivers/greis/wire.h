@@ -51,6 +51,12 @@ inline constexpr std::uint16_t kErrorReply = id_of('E', 'R');
 inline constexpr std::uint16_t kMessagesFormat = id_of('M', 'F');
 inline constexpr std::uint16_t kParameter = id_of('P', 'M');
 
+// Messages that end with a CRC-16.
+inline constexpr std::uint16_t kReferenceEpoch = id_of('r', 'E');
+inline constexpr std::uint16_t kReferenceMeasurements = id_of('r', 'M');
+inline constexpr std::uint16_t kReferenceVelocity = id_of('r', 'V');
+inline constexpr std::size_t kCrcSize = 2;
+
 /// Shortest body, checksum included, of the messages that are read. 0: not one of them.
 constexpr std::size_t body_min(std::uint16_t id) noexcept {
   switch (id) {

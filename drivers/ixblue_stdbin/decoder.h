@@ -56,6 +56,8 @@ class Decoder final : public DeviceDecoder {
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
 
+  [[nodiscard]] std::string_view remark() const noexcept override { return describe(raw_blocks_); }
+
   [[nodiscard]] RawBlocks raw_blocks() const noexcept { return raw_blocks_; }
   /// Telegrams whose raw blocks were zero or frozen, so that they gave no kImu sample.
   [[nodiscard]] std::uint64_t raw_blocks_refused() const noexcept { return raw_blocks_refused_; }

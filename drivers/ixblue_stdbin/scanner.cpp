@@ -8,6 +8,9 @@
 namespace imuscope::ixblue_stdbin {
 namespace {
 
+constexpr auto kTelegramKind = static_cast<std::uint8_t>(Frame::Kind::kTelegram);
+constexpr auto kAnswerKind = static_cast<std::uint8_t>(Frame::Kind::kAnswer);
+
 struct MaskSize {
   std::size_t bytes = 0;
   bool all_known = true;
@@ -47,71 +50,7 @@ bool sizes_are_possible(std::span<const std::uint8_t> header_bytes, const Header
   return inside_known && external.all_known ? total == known : total >= known;
 }
 
-}  // namespace
-
-bool Scanner::next(Frame& frame, bool at_end) noexcept {
-  buffer_.consume(taken_);
-  taken_ = 0;
-  for (;;) {
-    const auto searched = buffer_.pending();
-    const auto* start =
-        std::find_if(searched.data(), searched.data() + searched.size(),
-                     [](std::uint8_t byte) { return byte == kTelegramSync[0] || byte == kAnswerSync[0]; });
-    skip(static_cast<std::size_t>(start - searched.data()));
-    const auto pending = buffer_.pending();
-    if (pending.empty()) return false;
-    const Examined found = examine(pending);
-    switch (found.verdict) {
-      case Verdict::kFrame:
-        frame = {found.kind, pending.first(found.size), buffer_.position(), buffer_.arrival_of(0)};
-        taken_ = found.size;
-        return true;
-      case Verdict::kNeedMore:
-        if (!at_end) return false;
-        break;
-      case Verdict::kBadChecksum:
-        ++counters_.bad_checksums;
-        break;
-      case Verdict::kBadLength:
-        ++counters_.bad_lengths;
-        break;
-      case Verdict::kFalseStart:
-        break;
-    }
-    skip(1);
-  }
-}
-
-void Scanner::skip(std::size_t n) noexcept {
-  counters_.bytes_skipped += n;
-  buffer_.consume(n);
-}
-
-Scanner::Examined Scanner::examine(std::span<const std::uint8_t> pending) noexcept {
-  const bool telegram = pending[0] == kTelegramSync[0];
-  if (pending.size() < 2) return {Verdict::kNeedMore};
-  if (pending[1] != (telegram ? kTelegramSync[1] : kAnswerSync[1])) return {Verdict::kFalseStart};
-  if (pending.size() <= kVersionOffset) return {Verdict::kNeedMore};
-  return telegram ? examine_telegram(pending) : examine_answer(pending);
-}
-
-Scanner::Examined Scanner::examine_telegram(std::span<const std::uint8_t> pending) noexcept {
-  const std::uint8_t version = pending[kVersionOffset];
-  if (version == kVersionMax + 1) ++counters_.unsupported_versions;
-  if (version < kVersionMin || version > kVersionMax) return {Verdict::kFalseStart};
-  const HeaderLayout& header = header_layout(version);
-  if (pending.size() < header.size) return {Verdict::kNeedMore};
-  const std::size_t total = read_be<std::uint16_t>(pending, header.total_size);
-  if (total > kTelegramMax || !sizes_are_possible(pending, header, total)) return {Verdict::kBadLength};
-  if (pending.size() < total) return {Verdict::kNeedMore};
-  const std::size_t summed = total - kChecksumSize;
-  if (sum_of_bytes(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
-    return {Verdict::kBadChecksum};
-  }
-  return {Verdict::kFrame, total, Frame::Kind::kTelegram};
-}
-
-Scanner::Examined Scanner::examine_answer(std::span<const std::uint8_t> pending) noexcept {
+Examined examine_answer(std::span<const std::uint8_t> pending) noexcept {
   const std::uint8_t version = pending[kVersionOffset];
   if (version < kAnswerVersionMin || version > kVersionMax) return {Verdict::kFalseStart};
   if (pending.size() < kAnswerHeaderSize) return {Verdict::kNeedMore};
@@ -122,7 +61,48 @@ Scanner::Examined Scanner::examine_answer(std::span<const std::uint8_t> pending)
   if (sum_of_bytes(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
     return {Verdict::kBadChecksum};
   }
-  return {Verdict::kFrame, total, Frame::Kind::kAnswer};
+  return {Verdict::kFrame, total, kAnswerKind};
+}
+
+}  // namespace
+
+bool Scanner::next(Frame& frame, bool at_end) noexcept {
+  const auto found =
+      loop_.next([this](std::span<const std::uint8_t> pending) noexcept { return examine(pending); }, at_end);
+  if (!found) return false;
+  frame = {static_cast<Frame::Kind>(found->kind), loop_.bytes(), loop_.position(), loop_.first_byte()};
+  return true;
+}
+
+Examined Scanner::examine(std::span<const std::uint8_t> pending) noexcept {
+  const bool telegram = pending[0] == kTelegramSync[0];
+  if (!telegram && pending[0] != kAnswerSync[0]) return {Verdict::kFalseStart};
+  if (pending.size() < 2) return {Verdict::kNeedMore};
+  if (pending[1] != (telegram ? kTelegramSync[1] : kAnswerSync[1])) return {Verdict::kFalseStart};
+  if (pending.size() <= kVersionOffset) return {Verdict::kNeedMore};
+  return telegram ? examine_telegram(pending) : examine_answer(pending);
+}
+
+Examined Scanner::examine_telegram(std::span<const std::uint8_t> pending) noexcept {
+  const std::uint8_t version = pending[kVersionOffset];
+  if (version == kVersionMax + 1) ++unsupported_versions_;
+  if (version < kVersionMin || version > kVersionMax) return {Verdict::kFalseStart};
+  const HeaderLayout& header = header_layout(version);
+  if (pending.size() < header.size) return {Verdict::kNeedMore};
+  const std::size_t total = read_be<std::uint16_t>(pending, header.total_size);
+  const std::size_t sizes_end = header.total_size + sizeof(std::uint16_t);
+  const bool as_before = std::equal(pending.begin(), pending.begin() + static_cast<std::ptrdiff_t>(sizes_end),
+                                    possible_.begin());
+  if (!as_before && (total > kTelegramMax || !sizes_are_possible(pending, header, total))) {
+    return {Verdict::kBadLength};
+  }
+  if (pending.size() < total) return {Verdict::kNeedMore};
+  const std::size_t summed = total - kChecksumSize;
+  if (sum_of_bytes(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
+    return {Verdict::kBadChecksum};
+  }
+  std::copy_n(pending.begin(), sizes_end, possible_.begin());
+  return {Verdict::kFrame, total, kTelegramKind};
 }
 
 }  // namespace imuscope::ixblue_stdbin

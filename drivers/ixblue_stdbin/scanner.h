@@ -4,12 +4,13 @@
 /// after a false start the search goes on at the byte behind it, so that no good frame inside garbage is
 /// lost. Core: bounded memory, no allocation, noexcept.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "base/time.h"
-#include "drivers/device/frame_buffer.h"
+#include "drivers/device/scan_loop.h"
 #include "drivers/ixblue_stdbin/wire.h"
 
 namespace imuscope::ixblue_stdbin {
@@ -22,45 +23,32 @@ struct Frame {
   HostTime first_byte{};                ///< when its first byte arrived at the latest
 };
 
-struct ScanCounters {
-  std::uint64_t bytes_skipped = 0;
-  std::uint64_t bad_checksums = 0;
-  std::uint64_t bad_lengths = 0;
-  std::uint64_t unsupported_versions = 0;  ///< headers of a later protocol version than this code reads
-};
-
 class Scanner {
  public:
   /// @param per_byte  time of one byte on the wire, zero for a network stream
-  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : buffer_(per_byte) {}
+  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : loop_(per_byte) {}
 
   /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
   std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
-    return buffer_.append(bytes, arrival);
+    return loop_.append(bytes, arrival);
   }
 
   /// The next frame, or false where more bytes are needed.
   /// @param at_end  no more bytes will come: look for frames behind a start that announced more
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
-  [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const ScanCounters& counters() const noexcept { return loop_.counters(); }
+  /// Headers of a later protocol version than this code reads.
+  [[nodiscard]] std::uint64_t unsupported_versions() const noexcept { return unsupported_versions_; }
 
  private:
-  enum class Verdict : std::uint8_t { kNeedMore, kFrame, kFalseStart, kBadChecksum, kBadLength };
-  struct Examined {
-    Verdict verdict;
-    std::size_t size = 0;
-    Frame::Kind kind = Frame::Kind::kTelegram;
-  };
-
   [[nodiscard]] Examined examine(std::span<const std::uint8_t> pending) noexcept;
   [[nodiscard]] Examined examine_telegram(std::span<const std::uint8_t> pending) noexcept;
-  [[nodiscard]] static Examined examine_answer(std::span<const std::uint8_t> pending) noexcept;
-  void skip(std::size_t n) noexcept;
 
-  FrameBuffer<2 * kTelegramMax> buffer_;
-  std::size_t taken_ = 0;
-  ScanCounters counters_;
+  ScanLoop<2 * kTelegramMax> loop_;
+  std::uint64_t unsupported_versions_ = 0;
+  /// Masks and sizes of the last telegram that was taken: the next one's are the same, as a rule.
+  std::array<std::uint8_t, kSizesEnd> possible_{};
 };
 
 }  // namespace imuscope::ixblue_stdbin

@@ -40,6 +40,9 @@ constexpr const HeaderLayout& header_layout(std::uint8_t version) noexcept {
   return version == 2 ? kHeaderV2 : version == 3 ? kHeaderV3 : kHeaderV4;
 }
 
+/// Behind the last size in the longest header; in shorter ones what follows is the validity.
+inline constexpr std::size_t kSizesEnd = 19;
+
 /// The unit of validity and of every block's own time.
 inline constexpr std::int64_t kTickNs = 100'000;
 inline constexpr std::int64_t kTicksPerDay = 864'000'000;

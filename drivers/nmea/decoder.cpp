@@ -183,11 +183,17 @@ void Decoder::update_date() noexcept {
   since_1970_minus_time_ns_ = *days * kNsPerDay + epoch_.tod_ns - time_ns_;
 }
 
-void Decoder::fill_position(GnssData& gnss) const noexcept {
+std::string_view Decoder::remark() const noexcept {
+  if (!separation_is_missing_) return {};
+  return "the receiver gives heights above sea level and no geoid separation; set geoid_separation_m";
+}
+
+void Decoder::fill_position(GnssData& gnss) noexcept {
   if (!epoch_.gga) return;
   const Gga& gga = *epoch_.gga;
   gnss.solution = solution_of(gga.quality.value_or(0));
   const auto separation = gga.geoid_sep_m ? gga.geoid_sep_m : config_.geoid_separation_m;
+  separation_is_missing_ = gga.alt_msl_m && !separation;
   if (gnss.solution == GnssSolution::kNone || !gga.lat_deg || !gga.lon_deg || !gga.alt_msl_m || !separation) {
     return;
   }

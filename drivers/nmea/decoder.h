@@ -49,6 +49,7 @@ class Decoder final : public DeviceDecoder {
   void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
+  [[nodiscard]] std::string_view remark() const noexcept override;
 
  private:
   enum class Type : std::uint8_t { kNone, kGga, kRmc, kVtg, kGst, kZda };
@@ -77,7 +78,7 @@ class Decoder final : public DeviceDecoder {
   void publish(HostTime arrival, SampleSink& sink) noexcept;
   [[nodiscard]] bool unwrap_time() noexcept;
   void update_date() noexcept;
-  void fill_position(GnssData& gnss) const noexcept;
+  void fill_position(GnssData& gnss) noexcept;
   void fill_velocity(GnssData& gnss) const noexcept;
   void mirror_counts() noexcept;
 
@@ -94,6 +95,7 @@ class Decoder final : public DeviceDecoder {
   std::int64_t last_tod_ns_ = 0;
   std::int64_t time_ns_ = 0;  ///< time of day, unwrapped through midnight
   std::optional<std::int64_t> since_1970_minus_time_ns_;
+  bool separation_is_missing_ = false;
 };
 
 }  // namespace imuscope::nmea

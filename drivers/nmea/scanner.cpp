@@ -39,7 +39,7 @@ Examined examine_sentence(std::span<const std::uint8_t> pending, bool checksum_r
   std::size_t i = 1;
   for (; i < searched && kIsContent[pending[i]]; ++i) sum = static_cast<std::uint8_t>(sum ^ pending[i]);
   if (i == searched) return {searched == kSentenceMax ? Verdict::kFalseStart : Verdict::kNeedMore};
-  if (is_line_end(pending[i]) && !checksum_required) return {Verdict::kSentence, i};
+  if (is_line_end(pending[i]) && !checksum_required) return {Verdict::kFrame, i};
   if (pending[i] != '*' || i <= kAddressMin) return {Verdict::kFalseStart};
   constexpr std::size_t kDigits = 2;
   for (std::size_t digit = 1; digit <= kDigits; ++digit) {
@@ -47,31 +47,19 @@ Examined examine_sentence(std::span<const std::uint8_t> pending, bool checksum_r
     if (hex_value(pending[i + digit]) < 0) return {Verdict::kFalseStart};
   }
   const bool right = 16 * hex_value(pending[i + 1]) + hex_value(pending[i + 2]) == sum;
-  return {right ? Verdict::kSentence : Verdict::kBadChecksum, i + 1 + kDigits};
+  return {right ? Verdict::kFrame : Verdict::kBadChecksum, i + 1 + kDigits};
 }
 
 bool Scanner::next(Frame& frame, bool at_end) noexcept {
-  buffer_.consume(taken_);
-  taken_ = 0;
-  for (;;) {
-    const auto pending = buffer_.pending();
-    if (pending.empty()) return false;
-    if (is_start(pending[0])) {
-      const Examined found = examine_sentence(pending, checksum_required_);
-      if (found.verdict == Verdict::kSentence) {
-        frame = {{reinterpret_cast<const char*>(pending.data()), found.size},
-                 buffer_.position(),
-                 buffer_.arrival_of(0)};
-        taken_ = found.size;
-        return true;
-      }
-      if (found.verdict == Verdict::kNeedMore && !at_end) return false;
-      if (found.verdict == Verdict::kBadChecksum) ++counters_.bad_checksums;
-    }
+  const auto examine = [this](std::span<const std::uint8_t> pending) noexcept -> Examined {
+    if (is_start(pending[0])) return examine_sentence(pending, checksum_required_);
     // The end of the line belongs to the sentence before it.
-    if (!is_line_end(pending[0])) ++counters_.bytes_skipped;
-    buffer_.consume(1);
-  }
+    return {is_line_end(pending[0]) ? Verdict::kSeparator : Verdict::kFalseStart};
+  };
+  if (!loop_.next(examine, at_end)) return false;
+  const auto bytes = loop_.bytes();
+  frame = {{reinterpret_cast<const char*>(bytes.data()), bytes.size()}, loop_.position(), loop_.first_byte()};
+  return true;
 }
 
 }  // namespace imuscope::nmea

@@ -9,21 +9,15 @@
 #include <string_view>
 
 #include "base/time.h"
-#include "drivers/device/frame_buffer.h"
+#include "drivers/device/scan_loop.h"
 
 namespace imuscope::nmea {
 
 /// The standard allows 82; receivers in RTK send longer ones.
 inline constexpr std::size_t kSentenceMax = 256;
 
-enum class Verdict : std::uint8_t { kNeedMore, kSentence, kFalseStart, kBadChecksum };
-
-struct Examined {
-  Verdict verdict;
-  std::size_t size = 0;  ///< kSentence: from '$' to the last digit of the checksum
-};
-
-/// Whether `pending`, which begins with '$' or '!', begins with a sentence.
+/// Whether `pending`, which begins with '$' or '!', begins with a sentence; its size is from there to the last digit
+/// of the checksum.
 /// @param checksum_required  false: a sentence without '*', ended by CR or LF, is taken too
 [[nodiscard]] Examined examine_sentence(std::span<const std::uint8_t> pending,
                                         bool checksum_required = true) noexcept;
@@ -34,32 +28,25 @@ struct Frame {
   HostTime first_byte{};      ///< when its first byte arrived at the latest
 };
 
-struct ScanCounters {
-  std::uint64_t bytes_skipped = 0;
-  std::uint64_t bad_checksums = 0;
-};
-
 class Scanner {
  public:
   explicit Scanner(Duration per_byte = Duration::zero(), bool checksum_required = true) noexcept
-      : buffer_(per_byte), checksum_required_(checksum_required) {}
+      : loop_(per_byte), checksum_required_(checksum_required) {}
 
   /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
   std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
-    return buffer_.append(bytes, arrival);
+    return loop_.append(bytes, arrival);
   }
 
   /// The next sentence, or false where more bytes are needed.
   /// @param at_end  no more bytes will come
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
-  [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const ScanCounters& counters() const noexcept { return loop_.counters(); }
 
  private:
-  FrameBuffer<8 * kSentenceMax> buffer_;
+  ScanLoop<8 * kSentenceMax> loop_;
   bool checksum_required_;
-  std::size_t taken_ = 0;
-  ScanCounters counters_;
 };
 
 }  // namespace imuscope::nmea

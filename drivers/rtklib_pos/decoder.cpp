@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "base/units.h"
 #include "drivers/device/gps_time.h"
@@ -70,52 +69,41 @@ Vector3 ned_variance(const Vector3& variance, const Vector3& xy_yz_zx,
 }  // namespace
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
-    : config_(config), clock_(config.clock), format_(config.format), base_(config.base) {}
+    : config_(config), scanner_(byte_time(config.baud)), clock_(config.clock), format_(config.format), base_(config.base) {}
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
   while (!bytes.empty()) {
-    bytes = bytes.subspan(buffer_.append(bytes, arrival));
-    while (take_line(arrival, sink, false)) {
-    }
+    bytes = bytes.subspan(scanner_.append(bytes, arrival));
+    drain(arrival, sink, false);
   }
 }
 
-void Decoder::finish(HostTime arrival, SampleSink& sink) noexcept {
-  while (take_line(arrival, sink, true)) {
-  }
+std::string_view Decoder::remark() const noexcept {
+  if (base_is_missing_)
+    return "the solutions are relative to a base whose place is not known; set base_lat_lon_height";
+  if (format_.geodetic_height)
+    return "the heights are above the geoid; set RTKLIB's output height to ellipsoidal (out-height =ellipsoidal)";
+  return {};
 }
 
-/// False where no complete line is pending.
-bool Decoder::take_line(HostTime arrival, SampleSink& sink, bool at_end) noexcept {
-  const auto pending = buffer_.pending();
-  if (pending.empty()) return false;
-  const void* end = std::memchr(pending.data(), '\n', pending.size());
-  const bool too_long = end == nullptr && pending.size() > kLineMax;
-  if (end == nullptr && !too_long && !at_end) return false;
-  const std::size_t size =
-      end == nullptr ? pending.size()
-                     : static_cast<std::size_t>(static_cast<const std::uint8_t*>(end) - pending.data());
-  const std::size_t taken = end == nullptr ? size : size + 1;
-  const HostTime first_byte = buffer_.arrival_of(0);
-  const std::string_view line(reinterpret_cast<const char*>(pending.data()), size);
-  bool good = !(skipping_long_line_ || too_long || size > kLineMax);
-  skipping_long_line_ = end == nullptr && !at_end;
-  if (good) {
-    const std::size_t first = line.find_first_not_of(" \t\r");
-    if (first != std::string_view::npos && line[first] == '%') {
-      (void)read_comment(line.substr(first), format_, base_);
-    } else if (first != std::string_view::npos) {
-      const auto solution = parse_solution(line, format_);
-      good = solution && on_solution(*solution, first_byte, arrival, sink);
+void Decoder::finish(HostTime arrival, SampleSink& sink) noexcept { drain(arrival, sink, true); }
+
+void Decoder::drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept {
+  Frame frame;
+  while (scanner_.next(frame, at_end)) {
+    if (frame.line[0] == kCommentMark) {
+      (void)read_comment(frame.line, format_, base_);
+      continue;
     }
+    const auto solution = parse_solution(frame.line, format_);
+    if (solution && on_solution(*solution, frame.first_byte, arrival, sink)) continue;
+    ++bad_lines_;
+    bytes_of_bad_lines_ += frame.size;
   }
-  if (!good) {
-    ++counters_.bad_contents;
-    counters_.bytes_skipped += taken;
-  }
-  buffer_.consume(taken);
-  return true;
+  counters_.bytes_skipped = bytes_of_bad_lines_ + scanner_.counters().bytes_skipped;
+  counters_.bad_contents = bad_lines_;
+  counters_.bad_lengths = scanner_.counters().bad_lengths;
 }
 
 bool Decoder::on_solution(const Solution& solution, HostTime first_byte, HostTime arrival,

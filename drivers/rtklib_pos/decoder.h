@@ -11,13 +11,11 @@
 #include <optional>
 
 #include "drivers/device/device.h"
-#include "drivers/device/frame_buffer.h"
 #include "drivers/rtklib_pos/messages.h"
+#include "drivers/rtklib_pos/scanner.h"
 #include "sample/clock_map.h"
 
 namespace imuscope::rtklib_pos {
-
-inline constexpr std::size_t kLineMax = 1024;
 
 struct DecoderConfig {
   DeviceIndex device = 0;
@@ -26,6 +24,8 @@ struct DecoderConfig {
   /// What lines hold until a header says so: a client that connects late gets none.
   Format format{};
   std::optional<ReferencePosition> base;
+  /// Of the serial line; 0 over a network.
+  double baud = 0.0;
   ClockMapConfig clock{};
 };
 
@@ -37,24 +37,27 @@ class Decoder final : public DeviceDecoder {
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
 
+  [[nodiscard]] std::string_view remark() const noexcept override;
+
   [[nodiscard]] const Format& format() const noexcept { return format_; }
   /// Solutions east-north-up came and the place of the base is not known.
   [[nodiscard]] bool base_is_missing() const noexcept { return base_is_missing_; }
 
  private:
-  [[nodiscard]] bool take_line(HostTime arrival, SampleSink& sink, bool at_end) noexcept;
+  void drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept;
   [[nodiscard]] bool on_solution(const Solution& solution, HostTime first_byte, HostTime arrival,
                                  SampleSink& sink) noexcept;
   [[nodiscard]] bool fill(const Solution& solution, GnssData& gnss) noexcept;
 
   DecoderConfig config_;
-  FrameBuffer<2 * kLineMax> buffer_;
+  Scanner scanner_;
   ClockMap clock_;
   DecoderCounters counters_;
   Format format_;
   std::optional<ReferencePosition> base_;
   bool base_is_missing_ = false;
-  bool skipping_long_line_ = false;
+  std::uint64_t bad_lines_ = 0;
+  std::uint64_t bytes_of_bad_lines_ = 0;
   std::uint64_t sequence_ = 0;
   std::optional<std::int64_t> last_time_ns_;
 };

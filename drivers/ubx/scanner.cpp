@@ -6,30 +6,27 @@
 namespace imuscope::ubx {
 namespace {
 
-enum class Verdict : std::uint8_t {
-  kNeedMore,
-  kMessage,
-  kNmea,
-  kSeparator,
-  kFalseStart,
-  kBadChecksum,
-  kBadLength
-};
+constexpr auto kMessageKind = static_cast<std::uint8_t>(Frame::Kind::kMessage);
+constexpr auto kNmeaKind = static_cast<std::uint8_t>(Frame::Kind::kNmea);
 
-struct Examined {
-  Verdict verdict;
-  std::size_t size = 0;
-};
-
-/// 8-bit Fletcher over class, id, length and payload.
+/// 8-bit Fletcher over class, id, length and payload. The first sum counts every byte once, the second one as often
+/// as there are bytes from it to the end; the sums are only taken modulo 256 at the end.
 bool checksum_is_right(std::span<const std::uint8_t> frame) noexcept {
-  std::uint8_t a = 0;
-  std::uint8_t b = 0;
-  for (const std::uint8_t byte : frame.subspan(2, frame.size() - 2 - kChecksumSize)) {
-    a = static_cast<std::uint8_t>(a + byte);
-    b = static_cast<std::uint8_t>(b + a);
+  constexpr std::size_t kAtOnce = 4;
+  const auto summed = frame.subspan(2, frame.size() - 2 - kChecksumSize);
+  std::uint32_t a = 0;
+  std::uint32_t b = 0;
+  std::size_t i = 0;
+  for (; i + kAtOnce <= summed.size(); i += kAtOnce) {
+    const std::uint32_t w = summed[i], x = summed[i + 1], y = summed[i + 2], z = summed[i + 3];
+    b += 4 * a + 4 * w + 3 * x + 2 * y + z;
+    a += w + x + y + z;
   }
-  return a == frame[frame.size() - 2] && b == frame[frame.size() - 1];
+  for (; i < summed.size(); ++i) {
+    a += summed[i];
+    b += a;
+  }
+  return (a & 0xFFU) == frame[frame.size() - 2] && (b & 0xFFU) == frame[frame.size() - 1];
 }
 
 Examined examine_message(std::span<const std::uint8_t> pending) noexcept {
@@ -40,22 +37,12 @@ Examined examine_message(std::span<const std::uint8_t> pending) noexcept {
   if (payload > kPayloadMax) return {Verdict::kBadLength};
   const std::size_t size = kHeaderSize + payload + kChecksumSize;
   if (pending.size() < size) return {Verdict::kNeedMore};
-  return {checksum_is_right(pending.first(size)) ? Verdict::kMessage : Verdict::kBadChecksum, size};
+  return {checksum_is_right(pending.first(size)) ? Verdict::kFrame : Verdict::kBadChecksum, size, kMessageKind};
 }
 
-Examined examine_nmea(std::span<const std::uint8_t> pending) noexcept {
-  const nmea::Examined found = nmea::examine_sentence(pending);
-  switch (found.verdict) {
-    case nmea::Verdict::kNeedMore:
-      return {Verdict::kNeedMore};
-    case nmea::Verdict::kSentence:
-      return {Verdict::kNmea, found.size};
-    case nmea::Verdict::kBadChecksum:
-      return {Verdict::kBadChecksum};
-    case nmea::Verdict::kFalseStart:
-      break;
-  }
-  return {Verdict::kFalseStart};
+Examined with_kind(Examined found, std::uint8_t kind) noexcept {
+  found.kind = kind;
+  return found;
 }
 
 Examined examine(std::span<const std::uint8_t> pending) noexcept {
@@ -64,7 +51,7 @@ Examined examine(std::span<const std::uint8_t> pending) noexcept {
       return examine_message(pending);
     case '$':
     case '!':
-      return examine_nmea(pending);
+      return with_kind(nmea::examine_sentence(pending), kNmeaKind);
     case '\r':
     case '\n':
       return {Verdict::kSeparator};
@@ -76,47 +63,19 @@ Examined examine(std::span<const std::uint8_t> pending) noexcept {
 }  // namespace
 
 bool Scanner::next(Frame& frame, bool at_end) noexcept {
-  buffer_.consume(taken_);
-  taken_ = 0;
-  for (;;) {
-    const auto pending = buffer_.pending();
-    if (pending.empty()) return false;
-    const Examined found = examine(pending);
-    switch (found.verdict) {
-      case Verdict::kMessage:
-      case Verdict::kNmea: {
-        frame = Frame{};
-        frame.bytes = pending.first(found.size);
-        frame.offset = buffer_.position();
-        frame.first_byte = buffer_.arrival_of(0);
-        if (found.verdict == Verdict::kMessage) {
-          frame.message_class = pending[2];
-          frame.id = pending[3];
-          frame.payload = frame.bytes.subspan(kHeaderSize, found.size - kHeaderSize - kChecksumSize);
-        } else {
-          frame.kind = Frame::Kind::kNmea;
-        }
-        taken_ = found.size;
-        return true;
-      }
-      case Verdict::kSeparator:
-        buffer_.consume(1);
-        continue;
-      case Verdict::kNeedMore:
-        if (!at_end) return false;
-        break;
-      case Verdict::kBadChecksum:
-        ++counters_.bad_checksums;
-        break;
-      case Verdict::kBadLength:
-        ++counters_.bad_lengths;
-        break;
-      case Verdict::kFalseStart:
-        break;
-    }
-    ++counters_.bytes_skipped;
-    buffer_.consume(1);
+  const auto found = loop_.next(examine, at_end);
+  if (!found) return false;
+  frame = Frame{};
+  frame.kind = static_cast<Frame::Kind>(found->kind);
+  frame.bytes = loop_.bytes();
+  frame.offset = loop_.position();
+  frame.first_byte = loop_.first_byte();
+  if (frame.kind == Frame::Kind::kMessage) {
+    frame.message_class = frame.bytes[2];
+    frame.id = frame.bytes[3];
+    frame.payload = frame.bytes.subspan(kHeaderSize, found->size - kHeaderSize - kChecksumSize);
   }
+  return true;
 }
 
 }  // namespace imuscope::ubx

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "base/time.h"
-#include "drivers/device/frame_buffer.h"
+#include "drivers/device/scan_loop.h"
 #include "drivers/ubx/wire.h"
 
 namespace imuscope::ubx {
@@ -24,32 +24,24 @@ struct Frame {
   HostTime first_byte{};                  ///< when its first byte arrived at the latest
 };
 
-struct ScanCounters {
-  std::uint64_t bytes_skipped = 0;
-  std::uint64_t bad_checksums = 0;
-  std::uint64_t bad_lengths = 0;
-};
-
 class Scanner {
  public:
   /// @param per_byte  time of one byte on the wire, zero for a network stream
-  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : buffer_(per_byte) {}
+  explicit Scanner(Duration per_byte = Duration::zero()) noexcept : loop_(per_byte) {}
 
   /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
   std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
-    return buffer_.append(bytes, arrival);
+    return loop_.append(bytes, arrival);
   }
 
   /// The next frame, or false where more bytes are needed.
   /// @param at_end  no more bytes will come: look for frames behind a start that announced more
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
-  [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }
+  [[nodiscard]] const ScanCounters& counters() const noexcept { return loop_.counters(); }
 
  private:
-  FrameBuffer<2 * (kHeaderSize + kPayloadMax + kChecksumSize)> buffer_;
-  std::size_t taken_ = 0;
-  ScanCounters counters_;
+  ScanLoop<2 * (kHeaderSize + kPayloadMax + kChecksumSize)> loop_;
 };
 
 }  // namespace imuscope::ubx

@@ -64,6 +64,10 @@ class MtDecoder final : public DeviceDecoder {
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
 
+  [[nodiscard]] std::string_view remark() const noexcept override {
+    return last_error_ ? error_text(*last_error_) : std::string_view{};
+  }
+
   /// Code of the last Error message, if one came.
   [[nodiscard]] std::optional<std::uint8_t> last_error() const noexcept { return last_error_; }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }

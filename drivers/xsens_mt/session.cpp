@@ -24,6 +24,7 @@ constexpr double kRateTolerance = 0.15;
 // Some devices ignore GoToConfig while they boot, and repeat data meanwhile.
 constexpr Duration kGoToConfigEvery = milliseconds{150};
 constexpr int kGoToConfigAttempts = 20;
+constexpr int kGoToConfigAttemptsInSearch = 6;
 constexpr Duration kWakeUpWithin = seconds{3};
 constexpr Duration kReplyWithin = milliseconds{500};
 constexpr Duration kFirstDataWithin = seconds{2};
@@ -70,8 +71,10 @@ MtSession::MtSession(const MtSessionConfig& config) : config_(config) {
   listen_for_ = std::max(kListenAtLeast, from_seconds(kListenMessages / config.rate_hz));
   const double period = kPeriodTicksPerSecond / config.rate_hz;
   period_ = static_cast<std::uint16_t>(std::clamp(std::round(period), 1.0, 65535.0));
-  const double frame_bits =
-      kBitsPerByteOnTheWire * static_cast<double>(kHeaderSize + wanted_length_ + kChecksumSize);
+  const std::size_t data_bytes =
+      config.bus_devices == 0 ? wanted_length_ : sizeof(std::uint16_t) + config.bus_devices * wanted_length_;
+  const std::size_t header = data_bytes < kExtendedLength ? kHeaderSize : kExtendedHeaderSize;
+  const double frame_bits = kBitsPerByteOnTheWire * static_cast<double>(header + data_bytes + kChecksumSize);
   if (std::abs(period / period_ - 1.0) > kPeriodTolerance) {
     step_ = Step::kFailed;
     say("an MT device cannot send %.6g times a second; the nearest it can is %.6g: set rate_hz",
@@ -100,6 +103,7 @@ SessionState MtSession::state() const noexcept {
 
 void MtSession::on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noexcept {
   bytes_ += bytes.size();
+  look_for_text(bytes);
   Frame frame;
   while (!bytes.empty()) {
     bytes = bytes.subspan(scanner_.append(bytes, now));
@@ -107,6 +111,14 @@ void MtSession::on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noex
       ++frames_;
       on_frame(frame, now);
     }
+  }
+}
+
+// A line that begins with '$': no measurement looks like that for long, since every data frame ends the search.
+void MtSession::look_for_text(std::span<const std::uint8_t> bytes) noexcept {
+  for (const std::uint8_t byte : bytes) {
+    if (byte == '$' && last_byte_ == '\n') sends_text_ = true;
+    last_byte_ = byte;
   }
 }
 
@@ -140,8 +152,9 @@ std::span<const std::uint8_t> MtSession::poll(HostTime now) noexcept {
 // Called when the time to send has come: the first time it does nothing, later the reply is overdue.
 void MtSession::on_timeout(HostTime now) noexcept {
   if (step_ == Step::kGoToConfig) {
-    if (attempts_ < kGoToConfigAttempts) return;
+    if (attempts_ < (config_.searching_baud ? kGoToConfigAttemptsInSearch : kGoToConfigAttempts)) return;
     say_why_there_is_no_answer();
+    wants_other_baud_ = frames_ == 0;
     enter(Step::kReset, now);
   } else if (attempts_ >= kAttempts) {
     say("the device does not answer message 0x%02X; it will be set up again",
@@ -200,6 +213,9 @@ void MtSession::prepare() noexcept {
       break;
     case Step::kIdentify:
       set_request(kMasterBid, mid::kReqDid);
+      break;
+    case Step::kLeaveTextMode:
+      set_request(kMasterBid, mid::kStringOutputType, be16(0));
       break;
     case Step::kReadConfiguration:
     case Step::kCheckConfiguration:
@@ -311,6 +327,10 @@ void MtSession::on_reply(const Frame& frame, HostTime now) noexcept {
     case Step::kIdentify:
       if (frame.data.size() < 4) return;
       device_id_ = read_be<std::uint32_t>(frame.data);
+      enter(sends_text_ ? Step::kLeaveTextMode : Step::kReadConfiguration, now);
+      break;
+    case Step::kLeaveTextMode:
+      sends_text_ = false;
       enter(Step::kReadConfiguration, now);
       break;
     case Step::kReadConfiguration:
@@ -334,7 +354,7 @@ void MtSession::on_reply(const Frame& frame, HostTime now) noexcept {
       enter(Step::kSetSettings, now);
       break;
     case Step::kSetSettings:
-      next_device_or(config_.sync_in ? Step::kSetSyncInMode : Step::kCheckDataLength, now);
+      next_device_or(Step::kCheckDataLength, now);
       break;
     case Step::kSetSyncInMode:
       enter(Step::kSetSyncInSkip, now);
@@ -343,7 +363,8 @@ void MtSession::on_reply(const Frame& frame, HostTime now) noexcept {
       enter(Step::kSetSyncInOffset, now);
       break;
     case Step::kSetSyncInOffset:
-      enter(Step::kCheckDataLength, now);
+      sync_in_written_ = true;
+      set_output(now);
       break;
     case Step::kCheckDataLength:
       if (frame.data.size() < 2) return;
@@ -392,19 +413,49 @@ bool MtSession::speaks_mtdata2() const noexcept {
 }
 
 void MtSession::on_configuration_read(HostTime now) noexcept {
+  const std::size_t expected = std::max<std::size_t>(config_.bus_devices, 1);
   if (configuration_->n_devices == 0) {
     say("no device answers on the Xbus; check the bus cables");
     fail_round(now);
-  } else if (speaks_mtdata2()) {
+  } else if (configuration_->n_devices != expected || configuration_->is_xbus_master() != (config_.bus_devices > 0)) {
+    say("%zu devices answer behind this line, the configuration has %zu; check the bus cables, and give each "
+        "[[device]] its bus_id",
+        configuration_->n_devices, expected);
+    fail_round(now);
+  } else if (!sync_in_is_wanted()) {
+    enter(Step::kSetSyncInMode, now);
+  } else {
+    set_output(now);
+  }
+}
+
+void MtSession::set_output(HostTime now) noexcept {
+  if (speaks_mtdata2()) {
     enter(Step::kSetOutputConfiguration, now);
   } else if (sends_what_is_wanted(*configuration_)) {
-    enter(config_.sync_in ? Step::kSetSyncInMode : Step::kMeasure, now);
+    enter(sync_in_written_ ? Step::kCheckConfiguration : Step::kMeasure, now);
   } else {
     enter(Step::kSetPeriod, now);
   }
 }
 
+bool MtSession::sync_in_is_wanted() const noexcept {
+  return !config_.sync_in || (configuration_->sync_in_mode == config_.sync_in->mode &&
+                              configuration_->sync_in_skip == config_.sync_in->skip &&
+                              configuration_->sync_in_offset == config_.sync_in->offset);
+}
+
 void MtSession::on_configuration_checked(HostTime now) noexcept {
+  sync_in_written_ = false;
+  if (!sync_in_is_wanted()) {
+    say("the device took SyncIn mode 0x%04X, skip %u, offset %u; wanted are 0x%04X, %u, %u: check what its manual "
+        "allows",
+        static_cast<unsigned>(configuration_->sync_in_mode), static_cast<unsigned>(configuration_->sync_in_skip),
+        static_cast<unsigned>(configuration_->sync_in_offset), static_cast<unsigned>(config_.sync_in->mode),
+        static_cast<unsigned>(config_.sync_in->skip), static_cast<unsigned>(config_.sync_in->offset));
+    fail_round(now);
+    return;
+  }
   if (sends_what_is_wanted(*configuration_)) {
     enter(Step::kMeasure, now);
     return;
@@ -447,6 +498,7 @@ void MtSession::on_output_configuration(std::span<const std::uint8_t> data, Host
 
 void MtSession::on_data(const Frame& frame, HostTime now) noexcept {
   ++data_frames_;
+  sends_text_ = false;
   last_data_ = now;
   const auto count = wanted_count(frame);
   switch (step_) {
@@ -462,7 +514,7 @@ void MtSession::on_data(const Frame& frame, HostTime now) noexcept {
       if (attempts_ > 0) enter(Step::kStreaming, now);
       break;
     case Step::kStreaming:
-      if (count || (configuration_ && configuration_->is_xbus_master())) last_wanted_ = now;
+      if (count) last_wanted_ = now;
       break;
     default:
       break;  // a device in measurement goes on sending until it has heard GoToConfig
@@ -472,6 +524,7 @@ void MtSession::on_data(const Frame& frame, HostTime now) noexcept {
 // The count of a message that is what is wanted, in messages; nothing where it is something else. A message
 // names neither its layout nor its rate, so the numbers must make sense as well.
 std::optional<std::int64_t> MtSession::wanted_count(const Frame& frame) const noexcept {
+  if (frame.mid == mid::kMtData && config_.bus_devices > 0) return wanted_bus_count(frame.data);
   if (frame.mid == mid::kMtData && config_.output != MtSessionConfig::Output::kMtData2) {
     MtData data;
     if (!read_mtdata(frame.data, config_.layout, data) || !data.has(Field::kCounter)) return std::nullopt;
@@ -486,6 +539,19 @@ std::optional<std::int64_t> MtSession::wanted_count(const Frame& frame) const no
   if (!read_inertial(frame.data, message) || (message.items & kNeeded) != kNeeded) return std::nullopt;
   if (!is_plausible(message.rate_radps, message.acceleration_mps2)) return std::nullopt;
   return std::llround(message.sample_time_fine * config_.rate_hz / kSampleTimeFinePerSecond);
+}
+
+// An Xbus head's count, then the blocks of all devices.
+std::optional<std::int64_t> MtSession::wanted_bus_count(std::span<const std::uint8_t> data) const noexcept {
+  if (data.size() != sizeof(std::uint16_t) + config_.bus_devices * wanted_length_) return std::nullopt;
+  for (std::size_t k = 0; k < config_.bus_devices; ++k) {
+    MtData block;
+    read_mtdata_of_known_length(data.subspan(sizeof(std::uint16_t) + k * wanted_length_, wanted_length_),
+                                config_.layout, block);
+    const bool inertial = block.has(Field::kRate) && block.has(Field::kAcceleration);
+    if (inertial && !is_plausible(block.rate_radps, block.acceleration_mps2)) return std::nullopt;
+  }
+  return read_be<std::uint16_t>(data);
 }
 
 bool MtSession::takes_over(std::int64_t count, HostTime now) noexcept {

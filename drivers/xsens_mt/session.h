@@ -42,6 +42,8 @@ struct MtSessionConfig {
   double rate_hz = 100.0;              ///< messages per second; 115200 / rate must be whole to 0.1 %
   double baud = 115200.0;              ///< to tell beforehand whether the data fits the line
   std::optional<SyncIn> sync_in;
+  bool searching_baud = false;  ///< the rate is a guess: give up sooner
+  std::size_t bus_devices = 0;  ///< behind an Xbus Master; 0: the device has the line for itself
 };
 
 class MtSession final : public DeviceSession {
@@ -55,6 +57,8 @@ class MtSession final : public DeviceSession {
     return {problem_.data(), problem_size_};
   }
 
+  [[nodiscard]] bool wants_other_baud() const noexcept override { return wants_other_baud_; }
+
   /// What the device said it is; nothing before it answered.
   [[nodiscard]] std::optional<std::uint32_t> device_id() const noexcept { return device_id_; }
   [[nodiscard]] const std::optional<Configuration>& configuration() const noexcept { return configuration_; }
@@ -65,6 +69,7 @@ class MtSession final : public DeviceSession {
     kGoToConfig,
     kReset,
     kIdentify,
+    kLeaveTextMode,
     kReadConfiguration,
     kSetPeriod,
     kSetSkipFactor,
@@ -87,6 +92,8 @@ class MtSession final : public DeviceSession {
   void on_frame(const Frame& frame, HostTime now) noexcept;
   void on_reply(const Frame& frame, HostTime now) noexcept;
   void on_configuration_read(HostTime now) noexcept;
+  void set_output(HostTime now) noexcept;
+  [[nodiscard]] bool sync_in_is_wanted() const noexcept;
   void on_configuration_checked(HostTime now) noexcept;
   void on_output_configuration(std::span<const std::uint8_t> data, HostTime now) noexcept;
   void on_data(const Frame& frame, HostTime now) noexcept;
@@ -97,6 +104,8 @@ class MtSession final : public DeviceSession {
   void watch_stream(HostTime now) noexcept;
   [[nodiscard]] bool sends_what_is_wanted(const Configuration& configuration) const noexcept;
   [[nodiscard]] std::optional<std::int64_t> wanted_count(const Frame& frame) const noexcept;
+  [[nodiscard]] std::optional<std::int64_t> wanted_bus_count(std::span<const std::uint8_t> data) const noexcept;
+  void look_for_text(std::span<const std::uint8_t> bytes) noexcept;
   [[nodiscard]] bool takes_over(std::int64_t count, HostTime now) noexcept;
   [[nodiscard]] bool speaks_mtdata2() const noexcept;
   [[nodiscard]] std::uint8_t bid_of_device() const noexcept;
@@ -126,11 +135,15 @@ class MtSession final : public DeviceSession {
   std::optional<std::uint32_t> device_id_;
   std::optional<Configuration> configuration_;
   bool legacy_after_refusal_ = false;
+  bool sync_in_written_ = false;
+  bool wants_other_baud_ = false;
 
   // What the line did since the step began.
   std::uint64_t bytes_ = 0;
   std::uint64_t frames_ = 0;
   std::uint64_t data_frames_ = 0;
+  bool sends_text_ = false;  ///< NMEA instead of messages, as somebody left it
+  std::uint8_t last_byte_ = 0;
   // Data that is as wanted, one after the other.
   int wanted_in_a_row_ = 0;
   std::int64_t first_count_ = 0;

@@ -44,8 +44,8 @@ std::optional<Duration> utc_minus_own(const std::vector<Sample>& samples) {
 }
 
 bool shares_the_reference_clock(const DeviceConfig& device) {
-  return (device.protocol == Protocol::kCsvImu || device.protocol == Protocol::kCsvGnss) &&
-         device.csv.common_clock;
+  const bool csv = device.protocol == Protocol::kCsvImu || device.protocol == Protocol::kCsvGnss;
+  return csv ? device.csv.common_clock : device.gnss.common_clock;
 }
 
 /// Clocks that only count begin anywhere: where their times as they stand show no match, the recordings are
@@ -122,7 +122,7 @@ Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration
       return work_error(
           fmt::format("{}: neither UTC tags nor arrival stamps bring it to the reference's time",
                       device.name),
-          "set csv.clock = \"common\" where its times are the reference's");
+          "set clock = \"common\" (csv.clock of a CSV file) where its times are the reference's");
     }
     auto clock = align_by_rate(device.name, reference_rate, *samples);
     if (!clock) return tl::unexpected<Error>(clock.error());

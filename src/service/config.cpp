@@ -18,9 +18,10 @@ namespace {
 constexpr std::array kRoleNames{std::string_view("reference"), std::string_view("study"),
                                 std::string_view("gnss"), std::string_view("odometry")};
 constexpr std::array kProtocolNames{std::string_view("xsens_mt"),    std::string_view("ixblue_stdbin"),
-                                    std::string_view("greis"),       std::string_view("csv_imu"),
-                                    std::string_view("csv_gnss"),    std::string_view("xsens_can"),
-                                    std::string_view("can_odometry")};
+                                    std::string_view("greis"),       std::string_view("nmea"),
+                                    std::string_view("ubx"),         std::string_view("rtklib_pos"),
+                                    std::string_view("csv_imu"),     std::string_view("csv_gnss"),
+                                    std::string_view("xsens_can"),   std::string_view("can_odometry")};
 
 constexpr double kMaxRate_hz = 2000.0;
 constexpr int kMaxAveraged = 50;
@@ -31,7 +32,16 @@ std::vector<std::string_view> words(const std::array<std::string_view, N>& names
   return {names.begin(), names.end()};
 }
 
-bool is_gnss(Protocol protocol) { return protocol == Protocol::kGreis || protocol == Protocol::kCsvGnss; }
+/// A GNSS receiver speaks it. An XSens device with a receiver inside can be that, or an IMU.
+bool is_gnss(Protocol protocol) {
+  return protocol == Protocol::kGreis || protocol == Protocol::kNmea || protocol == Protocol::kUbx ||
+         protocol == Protocol::kRtklibPos || protocol == Protocol::kCsvGnss;
+}
+bool fits(Protocol protocol, DeviceRole role) {
+  if (protocol == Protocol::kXsensMt) return role != DeviceRole::kOdometry;
+  return is_gnss(protocol) == (role == DeviceRole::kGnss) &&
+         (protocol == Protocol::kCanOdometry) == (role == DeviceRole::kOdometry);
+}
 bool is_csv(Protocol protocol) { return protocol == Protocol::kCsvImu || protocol == Protocol::kCsvGnss; }
 
 /// White noise can be given per sample or as a density; not both.
@@ -170,7 +180,8 @@ void read_axes(TomlReader& in, std::array<double, 9>& axes) {
   axes = read;
 }
 
-constexpr std::array kTransportKinds{std::string_view("serial"), std::string_view("can")};
+constexpr std::array kTransportKinds{std::string_view("serial"), std::string_view("tcp"),
+                                     std::string_view("udp"), std::string_view("can")};
 
 void read_serial(TomlReader& in, DeviceConfig& device) {
   SerialConfig config;
@@ -191,11 +202,30 @@ void read_can(TomlReader& in, DeviceConfig& device) {
   device.can = config;
 }
 
+void read_net(TomlReader& in, bool udp, DeviceConfig& device) {
+  constexpr int kMaxPort = 65535;
+  NetConfig config;
+  config.udp = udp;
+  in.text("host", config.host);
+  if (!udp) in.require("host", "give the name or address of the server");
+  int port = 0;
+  in.integer("port", port, 1, kMaxPort);
+  in.require("port", udp ? "give the port that datagrams are sent to" : "give the server's port");
+  config.port = static_cast<std::uint16_t>(port);
+  device.net = config;
+}
+
 void read_transport(TomlReader in, DeviceConfig& device) {
   if (!in.present()) return;
   switch (in.choice("kind", words(kTransportKinds), 0)) {
     case 0:
       read_serial(in, device);
+      break;
+    case 1:
+      read_net(in, false, device);
+      break;
+    case 2:
+      read_net(in, true, device);
       break;
     default:
       read_can(in, device);
@@ -204,11 +234,37 @@ void read_transport(TomlReader in, DeviceConfig& device) {
   in.finish();
 }
 
+void read_xsens(TomlReader& in, XsensConfig& xsens) {
+  constexpr int kMaxBusId = 10;
+  in.integer("bus_id", xsens.bus_id, 1, kMaxBusId);
+  auto sync = in.table("sync_in");
+  if (!sync.present()) return;
+  constexpr int kMax16 = 65535;
+  constexpr double kMax32 = 4294967295.0;
+  int mode = 0;
+  int skip = 0;
+  double offset = 0.0;
+  sync.require("mode", "edge (1 rising, 2 falling, 3 both) plus 0 to sample, 4 to send the latest, 16 to keep time");
+  sync.integer("mode", mode, 0, kMax16);
+  sync.integer("skip", skip, 0, kMax16);
+  sync.number("offset_33_9ns", offset, 1.0, 0.0, kMax32);
+  sync.finish();
+  xsens.sync_in = {static_cast<std::uint16_t>(mode), static_cast<std::uint16_t>(skip),
+                   static_cast<std::uint32_t>(offset)};
+}
+
 void check_name(TomlReader& in, const std::string& name) {
   const bool good = !name.empty() && name.size() <= 32 && std::all_of(name.begin(), name.end(), [](char c) {
     return (std::isalnum(static_cast<unsigned char>(c)) != 0) || c == '_' || c == '-';
   });
   if (!good) in.fail("name", "must be 1 to 32 letters, digits, '_' or '-'", "it becomes part of file names");
+}
+
+void read_rtklib(TomlReader& in, GnssOptions& gnss) {
+  gnss.common_clock = in.choice("clock", {"utc", "common"}, 0) == 1;
+  if (!in.has("base_lat_lon_height")) return;
+  gnss.base_lat_lon_height.emplace();
+  in.vector("base_lat_lon_height", *gnss.base_lat_lon_height, 1.0);
 }
 
 double default_rate_hz(Protocol protocol) {
@@ -225,11 +281,11 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   device.role = static_cast<DeviceRole>(in.choice("role", words(kRoleNames), 0));
   in.require("protocol", fmt::format("valid: {}", fmt::join(kProtocolNames, ", ")));
   device.protocol = static_cast<Protocol>(in.choice("protocol", words(kProtocolNames), 0));
-  if (is_gnss(device.protocol) != (device.role == DeviceRole::kGnss) ||
-      (device.protocol == Protocol::kCanOdometry) != (device.role == DeviceRole::kOdometry)) {
-    in.fail(
-        "protocol", fmt::format("{} does not fit role {}", name_of(device.protocol), name_of(device.role)),
-        "a gnss device speaks greis or csv_gnss, an odometry device can_odometry, an IMU any other protocol");
+  if (!fits(device.protocol, device.role)) {
+    in.fail("protocol",
+            fmt::format("{} does not fit role {}", name_of(device.protocol), name_of(device.role)),
+            "a gnss device speaks greis, nmea, ubx, rtklib_pos, xsens_mt or csv_gnss, an odometry device "
+            "can_odometry, an IMU any other protocol");
   }
   device.rate_hz = default_rate_hz(device.protocol);
   in.number("rate_hz", device.rate_hz, 1.0, 0.1, kMaxRate_hz);
@@ -237,6 +293,7 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   if (device.protocol == Protocol::kIxblueStdbin) device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
   read_axes(in, device.axes);
   read_transport(in.table("transport"), device);
+  if (device.protocol == Protocol::kXsensMt) read_xsens(in, device.xsens);
   read_noise(in.table("noise"), device.rate_hz, device.noise);
   read_prior(in.table("prior"), device.prior);
   if (device.role == DeviceRole::kStudy)
@@ -253,11 +310,51 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
     in.number("position_sd_floor_m", device.gnss.position_sd_floor_m, 1.0, 0.0, 1e3);
     in.number("velocity_sd_floor_mps", device.gnss.velocity_sd_floor_mps, 1.0, 0.0, 1e3);
     in.number("latency_ms", device.gnss.latency_s, 1e-3, 0.0, 1e4);
+    if (device.protocol == Protocol::kNmea)
+      in.number("geoid_separation_m", device.gnss.geoid_separation_m, 1.0, -200.0, 200.0);
+    if (device.protocol == Protocol::kRtklibPos) read_rtklib(in, device.gnss);
   }
   if (device.role == DeviceRole::kOdometry) read_odometry(in.table("odometry"), files, device.odometry);
   if (device.protocol == Protocol::kXsensCan) read_xsens_can(in.table("xsens_can"), device.xsens_can_ids);
   in.finish();
   return device;
+}
+
+/// Devices on one serial port: behind an Xbus Master, each with its bus id, and the first one's settings hold.
+void share_lines(TomlReader& root, std::vector<DeviceConfig>& devices) {
+  for (std::size_t i = 0; i < devices.size(); ++i) devices[i].line_owner = i;
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    auto& device = devices[i];
+    if (!device.serial) continue;
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto& other = devices[j];
+      if (other.line_owner != j || !other.serial || other.serial->port != device.serial->port) continue;
+      if (device.xsens.bus_id == 0 || other.xsens.bus_id == 0) {
+        root.fail("device",
+                  fmt::format("lists '{}' and '{}' on the same port {}", other.name, device.name,
+                              device.serial->port),
+                  "give each a port of its own, or its bus_id where both are MTx behind an Xbus Master");
+        return;
+      }
+      device.line_owner = j;
+      device.serial = other.serial;
+    }
+  }
+  for (const auto& owner : devices) {
+    if (owner.xsens.bus_id == 0) continue;
+    std::set<int> ids;
+    for (auto& device : devices) {
+      if (device.xsens.bus_id == 0 || devices[device.line_owner].line_owner != owner.line_owner) continue;
+      if (!ids.insert(device.xsens.bus_id).second) {
+        root.fail("device", fmt::format("gives bus_id {} twice on one line", device.xsens.bus_id),
+                  "the bus ids of devices behind one Xbus Master differ");
+        return;
+      }
+    }
+    for (auto& device : devices) {
+      if (device.line_owner == owner.line_owner) device.xsens.bus_size = *ids.rbegin();
+    }
+  }
 }
 
 void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
@@ -279,6 +376,7 @@ void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
       in.fail("name", fmt::format("'{}' is used twice", device.name), "names must differ");
     }
   }
+  share_lines(root, configuration.devices);
   const auto count = [&](DeviceRole role) {
     return std::count_if(configuration.devices.begin(), configuration.devices.end(),
                          [&](const DeviceConfig& device) { return device.role == role; });

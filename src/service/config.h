@@ -22,6 +22,9 @@ enum class Protocol : std::uint8_t {
   kXsensMt,
   kIxblueStdbin,
   kGreis,
+  kNmea,
+  kUbx,
+  kRtklibPos,
   kCsvImu,
   kCsvGnss,
   kXsensCan,
@@ -44,6 +47,26 @@ struct CanConfig {
   std::string interface;
   /// Of logs (candump): true where their stamps are of the reference's clock, not UTC.
   bool log_has_common_clock = false;
+};
+
+/// The same over a network: a TCP server that we connect to, or UDP datagrams that are sent to us.
+struct NetConfig {
+  bool udp = false;
+  std::string host;  ///< UDP: empty, or the multicast group or own address that datagrams are sent to
+  std::uint16_t port = 0;
+};
+
+/// Of an XSens device.
+struct XsensConfig {
+  /// Behind an Xbus Master, from 1; 0: the device has its line for itself.
+  int bus_id = 0;
+  int bus_size = 0;  ///< devices behind the same Xbus Master
+  struct SyncIn {
+    std::uint16_t mode = 0;
+    std::uint16_t skip = 0;
+    std::uint32_t offset = 0;
+  };
+  std::optional<SyncIn> sync_in;
 };
 
 /// What the filter is told of an IMU's errors, where it differs from the estimator's defaults (a
@@ -101,6 +124,9 @@ struct GnssOptions {
   double position_sd_floor_m = 0.0;
   double velocity_sd_floor_mps = 0.0;
   double latency_s = 0.0;  ///< of the stamps, where no UTC brings them to the reference's time
+  std::optional<double> geoid_separation_m;     ///< nmea: for receivers that send none
+  bool common_clock = false;  ///< rtklib_pos: the lines' times are the reference's, where no stamps say more
+  std::optional<Vector3> base_lat_lon_height;   ///< rtklib_pos: deg, deg, m; for east-north-up solutions
 };
 
 struct DeviceConfig {
@@ -111,6 +137,10 @@ struct DeviceConfig {
   std::array<double, 9> axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rotates the device's components, row-major
   std::optional<SerialConfig> serial;
   std::optional<CanConfig> can;
+  std::optional<NetConfig> net;
+  /// The device whose line also carries this one's bytes: itself, or another one behind the same Xbus Master.
+  std::size_t line_owner = 0;
+  XsensConfig xsens;
   ImuNoiseConfig noise;       ///< reference and study
   MountingPriorConfig prior;  ///< study
   int average_samples = 1;    ///< study: samples taken into one measurement update, see StudyConfig

@@ -11,6 +11,12 @@
 #include "drivers/greis/session.h"
 #include "drivers/ixblue_stdbin/decoder.h"
 #include "drivers/ixblue_stdbin/session.h"
+#include "drivers/nmea/decoder.h"
+#include "drivers/nmea/session.h"
+#include "drivers/rtklib_pos/decoder.h"
+#include "drivers/rtklib_pos/session.h"
+#include "drivers/ubx/decoder.h"
+#include "drivers/ubx/session.h"
 #include "drivers/xsens_can/decoder.h"
 #include "drivers/xsens_mt/decoder.h"
 #include "drivers/xsens_mt/session.h"
@@ -31,6 +37,13 @@ std::unique_ptr<DeviceDecoder> make_xsens(const DeviceConfig& device, DeviceInde
   config.baud = baud_of(device);
   config.axes = device.axes;
   config.clock = clock;
+  config.wants_imu = device.role != DeviceRole::kGnss;
+  config.wants_attitude = device.role == DeviceRole::kReference;
+  config.wants_gnss = device.role == DeviceRole::kGnss;
+  if (device.xsens.bus_id > 0) {
+    config.bus.resize(static_cast<std::size_t>(device.xsens.bus_size));
+    config.bus[static_cast<std::size_t>(device.xsens.bus_id) - 1] = xsens::BusDevice{index, device.axes};
+  }
   return std::make_unique<xsens::MtDecoder>(config);
 }
 
@@ -68,6 +81,34 @@ std::unique_ptr<DeviceDecoder> make_xsens_can(const DeviceConfig& device, Device
   config.axes = device.axes;
   config.clock = clock;
   return std::make_unique<xsens_can::Decoder>(config);
+}
+
+std::unique_ptr<DeviceDecoder> make_nmea(const DeviceConfig& device, DeviceIndex index,
+                                         const ClockMapConfig& clock) {
+  nmea::DecoderConfig config;
+  config.device = index;
+  config.period = from_seconds(1.0 / device.rate_hz);
+  config.baud = baud_of(device);
+  config.geoid_separation_m = device.gnss.geoid_separation_m;
+  config.clock = clock;
+  return std::make_unique<nmea::Decoder>(config);
+}
+
+std::unique_ptr<DeviceDecoder> make_ubx(const DeviceConfig& device, DeviceIndex index,
+                                        const ClockMapConfig& clock) {
+  return std::make_unique<ubx::Decoder>(
+      ubx::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), baud_of(device), clock});
+}
+
+std::unique_ptr<DeviceDecoder> make_rtklib_pos(const DeviceConfig& device, DeviceIndex index,
+                                               const ClockMapConfig& clock) {
+  rtklib_pos::DecoderConfig config;
+  config.device = index;
+  config.period = from_seconds(1.0 / device.rate_hz);
+  if (const auto& base = device.gnss.base_lat_lon_height) config.base = {(*base)[0], (*base)[1], (*base)[2]};
+  config.baud = baud_of(device);
+  config.clock = clock;
+  return std::make_unique<rtklib_pos::Decoder>(config);
 }
 
 csv::ImuConfig csv_imu(const DeviceConfig& device, DeviceIndex index, const ClockMapConfig& clock) {
@@ -110,6 +151,12 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
       return make_stdbin(device, index, clock);
     case Protocol::kGreis:
       return make_greis(device, index, clock);
+    case Protocol::kNmea:
+      return make_nmea(device, index, clock);
+    case Protocol::kUbx:
+      return make_ubx(device, index, clock);
+    case Protocol::kRtklibPos:
+      return make_rtklib_pos(device, index, clock);
     case Protocol::kCsvImu:
       return std::make_unique<csv::ImuDecoder>(csv_imu(device, index, clock));
     case Protocol::kCsvGnss:
@@ -122,19 +169,28 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
   return nullptr;
 }
 
-std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device) {
+std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device, bool searching_baud) {
   switch (device.protocol) {
     case Protocol::kXsensMt: {
       xsens::MtSessionConfig config;
       config.output = xsens::MtSessionConfig::Output::kAsDevice;
       config.rate_hz = device.rate_hz;
       config.baud = baud_of(device);
+      config.searching_baud = searching_baud;
+      config.bus_devices = static_cast<std::size_t>(device.xsens.bus_size);
+      if (const auto& sync = device.xsens.sync_in) config.sync_in = {sync->mode, sync->skip, sync->offset};
       return std::make_unique<xsens::MtSession>(config);
     }
     case Protocol::kIxblueStdbin:
       return std::make_unique<ixblue_stdbin::Session>();
     case Protocol::kGreis:
       return std::make_unique<greis::Session>(greis::SessionConfig{from_seconds(1.0 / device.rate_hz), true});
+    case Protocol::kNmea:
+      return std::make_unique<nmea::Session>();
+    case Protocol::kUbx:
+      return std::make_unique<ubx::Session>();
+    case Protocol::kRtklibPos:
+      return std::make_unique<rtklib_pos::Session>();
     case Protocol::kXsensCan:
     case Protocol::kCanOdometry:
       return std::make_unique<CanSession>();
@@ -147,9 +203,6 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device) {
 
 std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& decoder) {
   switch (device.protocol) {
-    case Protocol::kIxblueStdbin:
-      return std::string(
-          ixblue_stdbin::describe(static_cast<const ixblue_stdbin::Decoder&>(decoder).raw_blocks()));
     case Protocol::kCsvImu:
     case Protocol::kCsvGnss: {
       const auto& error = static_cast<const csv::RowDecoder&>(decoder).error();
@@ -159,11 +212,9 @@ std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& dec
       return static_cast<const xsens_can::Decoder&>(decoder).problem();
     case Protocol::kCanOdometry:
       return static_cast<const can_odometry::Decoder&>(decoder).problem();
-    case Protocol::kXsensMt:
-    case Protocol::kGreis:
-      break;
+    default:
+      return std::string(decoder.remark());
   }
-  return {};
 }
 
 Error no_sample_error(const DeviceConfig& device, const std::vector<std::string>& inputs,
@@ -193,14 +244,9 @@ Result<void> check_recorded_file(const DeviceConfig& device, const std::filesyst
       return csv::validate_file(file, csv_imu(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0)));
     case Protocol::kCsvGnss:
       return csv::validate_file(file, csv_gnss(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0)));
-    case Protocol::kXsensMt:
-    case Protocol::kIxblueStdbin:
-    case Protocol::kGreis:
-    case Protocol::kXsensCan:
-    case Protocol::kCanOdometry:
-      break;
+    default:
+      return {};
   }
-  return {};
 }
 
 }  // namespace imuscope

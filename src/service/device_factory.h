@@ -19,7 +19,8 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
                                             const ClockMapConfig& clock);
 
 /// For a device on a line of its own. Protocols that exist only as files have none: nullptr.
-std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device);
+/// @param searching_baud  the line's baud rate is a guess
+std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device, bool searching_baud = false);
 
 /// What a decoder has to say about its device beyond counts, in one sentence with the remedy; empty when all
 /// is well. `decoder` must have been made for `device`.

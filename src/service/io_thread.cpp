@@ -72,7 +72,8 @@ class IoThread::Line final : public SampleSink {
       const HostTime arrival = host_now();
       const std::span<const std::uint8_t> bytes(buffer_.data(), result.n);
       tap.record(index_, Direction::kRead, bytes, arrival);
-      decoder_->push(bytes, arrival, *this);
+      decode(bytes, arrival);
+      for (Line* sharer : sharers_) sharer->decode(bytes, arrival);
       connection_->session->on_bytes(bytes, arrival);
       status_.last_arrival = arrival;
       ++status_.reads;
@@ -80,8 +81,19 @@ class IoThread::Line final : public SampleSink {
     }
   }
 
-  void say(RawTap& tap, HostTime now) noexcept {
+  /// A device behind the same head, whose bytes come on this line.
+  void share_with(Line& other) { sharers_.push_back(&other); }
+
+  void decode(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
+    decoder_->push(bytes, arrival, *this);
+  }
+
+  void say(RawTap& tap, int epoll, HostTime now) noexcept {
     if (connection_ == nullptr) return;
+    if (connection_->session->wants_other_baud()) {
+      give_back(epoll);
+      return;
+    }
     const auto bytes = connection_->session->poll(now);
     if (bytes.empty()) return;
     const auto result = connection_->line->write(bytes);
@@ -97,7 +109,8 @@ class IoThread::Line final : public SampleSink {
       status_.line = health.is_up ? LineState::kOpen : LineState::kDown;
       status_.frames_dropped = dropped_before_ + health.frames_dropped;
       status_.session = connection_->session->state();
-      const auto problem = connection_->session->problem();
+      auto problem = connection_->session->problem();
+      if (problem.empty()) problem = decoder_->remark();
       const std::size_t n = std::min(problem.size(), status_.problem.size() - 1);
       std::memcpy(status_.problem.data(), problem.data(), n);
       status_.problem[n] = '\0';
@@ -123,6 +136,7 @@ class IoThread::Line final : public SampleSink {
   SampleRing& ring_;
   ExceptionRing& exceptions_;
   std::unique_ptr<DeviceDecoder> decoder_;
+  std::vector<Line*> sharers_;
   Connection* connection_ = nullptr;
   std::atomic<Connection*> offered_{nullptr};
   std::atomic<Connection*> returned_{nullptr};
@@ -134,13 +148,17 @@ class IoThread::Line final : public SampleSink {
   LatestValue<LineStatus> published_;
 };
 
-IoThread::IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders)
+IoThread::IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders,
+                   const std::vector<std::size_t>& line_owners)
     : raw_ring_(std::make_unique<RawRing>()),
       exceptions_(std::make_unique<ExceptionRing>()),
       tap_(*raw_ring_) {
   for (std::size_t i = 0; i < decoders.size(); ++i) {
     const auto index = static_cast<DeviceIndex>(i);
     lines_.push_back(std::make_unique<Line>(index, core.ring(index), *exceptions_, std::move(decoders[i])));
+  }
+  for (std::size_t i = 0; i < lines_.size(); ++i) {
+    if (line_owners[i] != i) lines_[line_owners[i]]->share_with(*lines_[i]);
   }
 }
 
@@ -194,7 +212,7 @@ void IoThread::loop() {
     }
     const HostTime now = host_now();
     for (const auto& line : lines_) {
-      line->say(tap_, now);
+      line->say(tap_, epoll_, now);
       line->publish(now);
     }
   }

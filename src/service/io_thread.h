@@ -50,8 +50,10 @@ static_assert(std::is_trivially_copyable_v<LineStatus>);
 
 class IoThread {
  public:
-  /// @param decoders  one a device
-  IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders);
+  /// @param decoders     one a device
+  /// @param line_owners  per device, the one on whose line its bytes come: itself, or another one's
+  IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders,
+           const std::vector<std::size_t>& line_owners);
   ~IoThread();
   IoThread(const IoThread&) = delete;
   IoThread& operator=(const IoThread&) = delete;

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include "drivers/transport/can_socket.h"
+#include "drivers/transport/net_stream.h"
 #include "drivers/transport/serial_port.h"
 
 namespace imuscope {
 
-bool has_line(const DeviceConfig& device) { return device.serial.has_value() || device.can.has_value(); }
+bool has_line(const DeviceConfig& device) {
+  return device.serial.has_value() || device.net.has_value() || device.can.has_value();
+}
 
 Result<std::unique_ptr<Transport>> open_line(const DeviceConfig& device, const std::vector<CanId>& ids) {
   if (device.serial) {
@@ -19,6 +22,12 @@ Result<std::unique_ptr<Transport>> open_line(const DeviceConfig& device, const s
     auto socket = CanSocket::open({device.can->interface, ids});
     if (!socket) return tl::unexpected<Error>(std::move(socket.error()));
     return std::unique_ptr<Transport>(std::move(*socket));
+  }
+  if (device.net) {
+    const auto kind = device.net->udp ? NetSettings::Kind::kUdp : NetSettings::Kind::kTcp;
+    auto stream = NetStream::open({kind, device.net->host, device.net->port});
+    if (!stream) return tl::unexpected<Error>(std::move(stream.error()));
+    return std::unique_ptr<Transport>(std::move(*stream));
   }
   return usage_error(fmt::format("device '{}' has no line", device.name), "give it a transport");
 }

@@ -10,6 +10,7 @@
 #include "noise/model.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
+#include "service/baud_search.h"
 #include "service/core_thread.h"
 #include "service/device_factory.h"
 #include "service/estimator_setup.h"
@@ -41,11 +42,14 @@ class Supervisor {
              LivePublisher& publisher)
       : configuration_(configuration), ids_(std::move(ids)), io_(io), publisher_(publisher) {
     lines_.resize(configuration.devices.size());
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+      if (const auto& serial = configuration.devices[i].serial) lines_[i].baud = BaudSearch(serial->baud);
+    }
   }
 
   void step(HostTime now) {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
-      step_line(static_cast<DeviceIndex>(i), now);
+      if (configuration_.devices[i].line_owner == i) step_line(static_cast<DeviceIndex>(i), now);
     }
   }
 
@@ -55,18 +59,26 @@ class Supervisor {
     HostTime next_try{};
     Duration pause = kReopenFirst;
     std::string last_problem;
+    BaudSearch baud;
   };
 
   void step_line(DeviceIndex index, HostTime now) {
     auto& line = lines_[index];
-    const auto& device = configuration_.devices[index];
+    DeviceConfig device = configuration_.devices[index];
     if (auto gone = io_.take_back(index)) {
-      spdlog::warn("{}: {} is gone; trying to open it again", device.name, gone->line->describe());
+      if (device.serial && gone->session->wants_other_baud()) {
+        line.baud.next();
+        spdlog::warn("{}: no message at {}; trying {} baud (once it answers, set baud to that)", device.name,
+                     gone->line->describe(), line.baud.current());
+      } else {
+        spdlog::warn("{}: {} is gone; trying to open it again", device.name, gone->line->describe());
+      }
       line.open = false;
       line.pause = kReopenFirst;
       line.next_try = now + line.pause;
     }
     if (line.open || now < line.next_try) return;
+    if (device.serial) device.serial->baud = line.baud.current();
     auto opened = open_line(device, ids_[index]);
     if (!opened) {
       // Said once, and again when the reason changes: a log is no place for a heartbeat.
@@ -82,8 +94,8 @@ class Supervisor {
     }
     spdlog::info("{}: {} is open", device.name, (*opened)->describe());
     publisher_.set_line_problem(index, {});
-    io_.offer(index, std::make_unique<Connection>(Connection{std::move(*opened), make_session(device)}));
-    line = {true, {}, kReopenFirst, {}};
+    io_.offer(index, std::make_unique<Connection>(Connection{std::move(*opened), make_session(device, line.baud.searching())}));
+    line = {true, {}, kReopenFirst, {}, line.baud};
   }
 
   const Configuration& configuration_;
@@ -148,7 +160,9 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
     decoders.push_back(make_decoder(configuration.devices[i], static_cast<DeviceIndex>(i), ClockMapConfig{}));
     ids.push_back(decoders.back()->ids());
   }
-  IoThread io(core, std::move(decoders));
+  std::vector<std::size_t> line_owners;
+  for (const auto& device : configuration.devices) line_owners.push_back(device.line_owner);
+  IoThread io(core, std::move(decoders), line_owners);
   const HostTime t0{((host_now() + kStartDelay).time_since_epoch() / kTickPeriod) * kTickPeriod};
   CoreThread estimator(core, t0);
 

@@ -142,7 +142,7 @@ Result<void> align_logs(const Configuration& configuration, const std::vector<st
 }
 
 Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
-  const auto files = assign_files(inputs, configuration);
+  auto files = assign_files(inputs, configuration);
   if (!files) return tl::unexpected<Error>(files.error());
   const std::size_t n = configuration.devices.size();
   OpenedRecording opened;
@@ -152,7 +152,9 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   std::vector<bool> unstamped(n);
   Logs logs(n);
   for (std::size_t i = 0; i < n; ++i) {
-    recording.present[i] = !(*files)[i].empty();
+    auto& file = (*files)[i];
+    if (file.empty()) file = (*files)[configuration.devices[i].line_owner];
+    recording.present[i] = !file.empty();
     if (!recording.present[i]) {
       opened.remarks.push_back(
           fmt::format("{}: no file given; the run goes without it", configuration.devices[i].name));
@@ -252,7 +254,8 @@ Result<OpenedRecording> open_capture(const std::string& input,
   recording.clocks.resize(n);
   std::vector<std::uint64_t> bytes(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const auto found = summary->devices.find(configuration->devices[i].name);
+    const auto& carrier = configuration->devices[configuration->devices[i].line_owner];
+    const auto found = summary->devices.find(carrier.name);
     recording.present[i] = found != summary->devices.end() && found->second.reads > 0;
     if (recording.present[i]) {
       bytes[i] = found->second.bytes_read;
@@ -265,7 +268,9 @@ Result<OpenedRecording> open_capture(const std::string& input,
     return work_error(checked.error().what, "this capture cannot be studied with this configuration");
   }
   std::vector<std::string> names;
-  for (const auto& device : configuration->devices) names.push_back(device.name);
+  for (const auto& device : configuration->devices) {
+    names.push_back(configuration->devices[device.line_owner].name);
+  }
   recording.open = [input, names, bytes](DeviceIndex index) {
     return open_captured_device(input, names[index], bytes[index]);
   };

@@ -163,7 +163,9 @@ TEST(DecodeCommand, NamesTheFieldsOfNavPvtAsTheVectorsDo) {
     EXPECT_EQ(outcome.lines[0]["protocol"], "ubx");
     EXPECT_EQ(outcome.lines[0]["message"], "NAV-PVT");
     for (const auto& [key, value] : outcome.lines[0].items()) {
-      if (v["fields"].contains(key)) EXPECT_EQ(value, v["fields"][key]) << key;
+      if (v["fields"].contains(key)) {
+        EXPECT_EQ(value, v["fields"][key]) << key;
+      }
     }
     for (const char* key : {"itow", "nano", "lat", "lon", "h", "vn", "ve", "vd", "flags", "sacc"}) {
       EXPECT_TRUE(outcome.lines[0].contains(key)) << key;

@@ -57,6 +57,30 @@ TEST(GreisSession, AReceiverThatDoesNotAnswerIsTakenAsItIs) {
   EXPECT_EQ(session.state(), SessionState::kStreaming);
 }
 
+// A receiver that somebody left sending NMEA goes on with it until it hears the stop.
+TEST(GreisSession, AReceiverLeftSendingNmeaIsStoppedAndAskedForItsMessages) {
+  Session session({});
+  bool sends_text = true;
+  bool sends_epochs = false;
+  int sentences = 0;
+  for (int ms = 0; ms < 4000; ms += 10) {
+    const HostTime now{std::chrono::milliseconds(ms)};
+    const std::string command = said(session, now);
+    if (command.find("dm") != std::string::npos) sends_text = false;
+    if (command.find("em,,jps") != std::string::npos) sends_epochs = true;
+    if (!command.empty()) session.on_bytes(reply("RE", command.substr(0, 3) + "\n"), now);
+    if (ms % 100 != 0) continue;
+    if (sends_text) {
+      ++sentences;
+      session.on_bytes(bytes_of("$GPZDA,123456.10,14,03,2026,00,00*60\r\n"), now);
+    }
+    if (sends_epochs) session.on_bytes(epoch(static_cast<U32>(ms)), now);
+  }
+  EXPECT_LE(sentences, 1);
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+  EXPECT_TRUE(session.problem().empty());
+}
+
 TEST(GreisSession, SaysWhatIsWrongWhenNothingComesAndAsksAgain) {
   Session session({});
   int stops = 0;

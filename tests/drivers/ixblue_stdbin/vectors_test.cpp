@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 #include <map>
 
+#include "drivers/device/bytes.h"
 #include "drivers/ixblue_stdbin/messages.h"
 #include "drivers/ixblue_stdbin/scanner.h"
+#include "drivers/ixblue_stdbin/status_names.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/support/shared_data.h"
 
@@ -123,6 +125,56 @@ TEST(StdBinCaptures, EveryTelegramOfTheRecordedUnitsIsReadWithoutASkippedByte) {
     EXPECT_EQ(telegrams, capture.telegrams);
     EXPECT_EQ(scanner.counters().bytes_skipped, 0U);
   }
+}
+
+std::vector<std::string_view> names_in(std::uint32_t algorithm_word) {
+  std::vector<std::string_view> names;
+  for_each_set_bit(kAlgorithmStatus1, algorithm_word, [&](std::string_view name) { names.push_back(name); });
+  return names;
+}
+
+// The unit receives log, GPS, USBL and LBL while it aligns. Its GPS is valid in every telegram but the one in
+// which the receiver gave nothing new; with a name left out before bit 18, none of this would make sense.
+TEST(StdBinStatus, TheRecordedAlgorithmWordReadsAsAnAligningUnit) {
+  IMUSCOPE_NEEDS_SHARED("data/streams/ixblue_stdbin/v3.bin");
+  const auto bytes = test::load_bytes(test::shared_path("data/streams/ixblue_stdbin/v3.bin"));
+  Scanner scanner;
+  Frame frame;
+  std::span<const std::uint8_t> rest(bytes);
+  int with_gps = 0;
+  int without_gps = 0;
+  while (!rest.empty()) {
+    rest = rest.subspan(scanner.append(rest, {}));
+    while (scanner.next(frame)) {
+      const Telegram telegram = parse_telegram(frame.bytes);
+      const auto word = read_be<std::uint32_t>(telegram.block(Nav::kAlgorithmStatus));
+      if (word == 0x81011112U) {
+        ++without_gps;
+        EXPECT_EQ(names_in(word),
+                  (std::vector<std::string_view>{"alignment", "altitude_gps", "log_received", "gps_received",
+                                                 "usbl_received", "lbl_received", "heave_initialising"}));
+      } else {
+        ++with_gps;
+        EXPECT_EQ(names_in(word), (std::vector<std::string_view>{
+                                      "alignment", "altitude_gps", "log_received", "gps_received", "gps_valid",
+                                      "usbl_received", "lbl_received", "heave_initialising"}));
+      }
+    }
+  }
+  EXPECT_EQ(without_gps + with_gps, 17);
+  EXPECT_GE(without_gps, 1);
+}
+
+TEST(StdBinStatus, TheBitsThatTheDecoderActsOnAreTheNamedOnes) {
+  const auto name_of = [](std::uint32_t bit) {
+    std::string_view found;
+    for_each_set_bit(kUserStatus, bit, [&](std::string_view name) { found = name; });
+    return found;
+  };
+  EXPECT_EQ(name_of(kUserTimeReceived), "time_valid");
+  EXPECT_EQ(name_of(kUserHrpInvalid), "hrp_invalid");
+  EXPECT_EQ(name_of(kUserAlignment), "alignment");
+  EXPECT_EQ(name_of(kUserFailure), "failure");
 }
 
 TEST(StdBinCaptures, TheMakersOwnAssertionsHoldForTheV2Telegram) {

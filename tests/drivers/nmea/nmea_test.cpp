@@ -91,59 +91,17 @@ TEST(NmeaVectors, EveryVectorDecodesToItsPublishedValues) {
   }
 }
 
-test::StreamUnderTest stream() {
-  test::StreamUnderTest under_test;
-  under_test.separator = bytes_of("\r\n");
-  under_test.scan = [](std::span<const Bytes> reads) {
-    Scanner scanner;
-    std::vector<Bytes> frames;
-    Frame frame;
-    for (const Bytes& read : reads) {
-      std::span<const std::uint8_t> rest(read);
-      while (!rest.empty()) {
-        rest = rest.subspan(scanner.append(rest, {}));
-        while (scanner.next(frame)) frames.push_back(bytes_of(frame.sentence));
-      }
-    }
-    while (scanner.next(frame, true)) frames.push_back(bytes_of(frame.sentence));
-    return frames;
-  };
-  // The two digits of the checksum may change case.
-  under_test.may_appear = [](const Bytes& frame) {
-    std::string text(frame.begin(), frame.end());
-    for (char& c : text) c = static_cast<char>(std::toupper(c));
-    return text == "$GNRMC,123456.10,A,4851.39684,N,00221.13314,E,2.617,338.17,140326,,,R,V*1C";
-  };
-  under_test.frames = {
-      bytes_of("$GPGGA,123456.10,4851.39684,N,00221.13314,E,4,18,0.7,35.250,M,46.250,M,1.0,0123*77"),
-      bytes_of("$GNRMC,123456.10,A,4851.39684,N,00221.13314,E,2.617,338.17,140326,,,R,V*1C"),
-      bytes_of("$GPZDA,123456.10,14,03,2026,00,00*60"),
-  };
-  return under_test;
-}
-
-/// A checksum of exclusive ors does not see that two equal characters are missing: a sentence with a hole may
-/// appear. What must hold is that its neighbours do not suffer.
-test::StreamUnderTest stream_with_holes() {
-  auto under_test = stream();
-  under_test.may_appear = [](const Bytes&) { return true; };
-  return under_test;
-}
-
-TEST(NmeaStream, EverySplitIntoReadsGivesTheSameSentences) {
-  test::expect_every_split_keeps_all_frames(stream());
-}
-TEST(NmeaStream, EverySingleBitFlipLosesOnlyItsSentence) {
-  test::expect_every_bit_flip_loses_only_its_frame(stream());
-}
-TEST(NmeaStream, EveryCutLosesOnlyTheSentencesItTouches) {
-  test::expect_every_cut_loses_only_its_frames(stream_with_holes());
-}
-TEST(NmeaStream, EveryInsertionLosesOnlyItsSentence) {
-  test::expect_every_insertion_loses_only_its_frame(stream_with_holes(), 31);
-}
-TEST(NmeaStream, NoSentenceInsideGarbageIsLost) {
-  test::expect_no_frame_in_garbage_is_lost(stream(), "$*$!G0", 32);
+TEST(NmeaVectors, ThePhinsStandardGroupDecodesToItsPublishedValues) {
+  IMUSCOPE_NEEDS_SHARED("oracle/protocols/phins_standard.nmea");
+  const auto found = scan_text(test::load_bytes(test::shared_path("oracle/protocols/phins_standard.nmea")));
+  const json sentences =
+      test::load_json(test::shared_path("oracle/protocols/phins_standard.json"))["sentences"];
+  ASSERT_EQ(found.size(), 9U);
+  ASSERT_EQ(found.size(), sentences.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i], sentences[i]["sentence"]);
+    EXPECT_EQ(fields_of(found[i]), sentences[i]["expected"]);
+  }
 }
 
 DecoderConfig fixed_config() {

@@ -18,7 +18,7 @@ struct Placed {
 Bytes concatenate(const StreamUnderTest& stream, std::vector<Placed>& places) {
   Bytes all;
   for (const Bytes& frame : stream.frames) {
-    places.push_back({all.size(), all.size() + frame.size()});
+    places.push_back({all.size() - std::min(stream.lead, all.size()), all.size() + frame.size()});
     all.insert(all.end(), frame.begin(), frame.end());
     all.insert(all.end(), stream.separator.begin(), stream.separator.end());
   }
@@ -173,7 +173,8 @@ void expect_every_insertion_loses_only_its_frame(const StreamUnderTest& stream, 
       // An insertion inside a frame touches it; between two frames it touches none.
       std::vector<Bytes> expected;
       for (std::size_t i = 0; i < places.size(); ++i) {
-        if (at <= places[i].begin || at >= places[i].end) expected.push_back(stream.frames[i]);
+        const bool before = stream.lead > 0 ? at < places[i].begin : at <= places[i].begin;
+        if (before || at >= places[i].end) expected.push_back(stream.frames[i]);
       }
       ASSERT_NO_FATAL_FAILURE(
           expect_found(stream, faulty, expected,
@@ -183,8 +184,13 @@ void expect_every_insertion_loses_only_its_frame(const StreamUnderTest& stream, 
   expect_few_accidents(stream, trials);
 }
 
-void expect_no_frame_in_garbage_is_lost(const StreamUnderTest& stream, std::string_view lures,
-                                        std::uint32_t seed) {
+void expect_no_frame_in_garbage_is_lost(const StreamUnderTest& given, std::uint32_t seed) {
+  StreamUnderTest stream = given;
+  if (given.garbage_accidents_max > 0.0) {
+    stream.may_appear = [](const Bytes&) { return false; };
+    stream.accidents_max = given.garbage_accidents_max;
+  }
+  const std::string_view lures = stream.lures;
   Trials trials;
   std::mt19937 random(seed);
   for (int run = 0; run < 300; ++run) {

@@ -44,6 +44,7 @@ using Scan = std::function<std::vector<Bytes>(std::span<const Bytes> reads)>;
 /// Required: a frame that a fault does not touch is found; no frame appears that was not sent, unless
 /// `may_appear` allows it (a protocol whose messages are not all protected).
 struct StreamUnderTest {
+  std::string name;  ///< of the protocol
   std::vector<Bytes> frames;
   Bytes separator;
   Scan scan;
@@ -51,13 +52,19 @@ struct StreamUnderTest {
   /// Share of cuts and insertions whose debris may pass for a frame and hide what it swallows: what the
   /// protocol's checksum lets through, 1/256 for one of 8 bits, with room for the small number of trials.
   double accidents_max = 0.0;
+  /// The same for garbage made of lures, where false starts are many; zero: as accidents_max.
+  double garbage_accidents_max = 0.0;
+  /// Bytes before a frame that it cannot do without, such as the end of the line before it.
+  std::size_t lead = 0;
+  bool has_start_mark = true;
+  /// Bytes that begin a frame, for garbage that is rich in them.
+  std::string_view lures;
 };
 void expect_every_split_keeps_all_frames(const StreamUnderTest& stream);
 void expect_every_bit_flip_loses_only_its_frame(const StreamUnderTest& stream);
 void expect_every_cut_loses_only_its_frames(const StreamUnderTest& stream);
 void expect_every_insertion_loses_only_its_frame(const StreamUnderTest& stream, std::uint32_t seed);
-/// Random bytes, rich in `lures` (bytes that begin a frame), before, between and behind the frames.
-void expect_no_frame_in_garbage_is_lost(const StreamUnderTest& stream, std::string_view lures,
-                                        std::uint32_t seed);
+/// Random bytes, rich in the stream's lures, before, between and behind the frames.
+void expect_no_frame_in_garbage_is_lost(const StreamUnderTest& stream, std::uint32_t seed);
 
 }  // namespace imuscope::test

@@ -36,7 +36,9 @@ class FarEnd {
     socklen_t size = sizeof address;
     getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size);
     port_ = ntohs(address.sin_port);
-    if (type == SOCK_STREAM) EXPECT_EQ(listen(fd_, 1), 0);
+    if (type == SOCK_STREAM) {
+      EXPECT_EQ(listen(fd_, 1), 0);
+    }
   }
   FarEnd(const FarEnd&) = delete;
   FarEnd& operator=(const FarEnd&) = delete;

@@ -93,42 +93,6 @@ TEST(UbxVectors, AnRtkFixBecomesASampleWithTheSecondBeforeItsNegativeNanoseconds
   EXPECT_FALSE(none.sink.samples[0].has_utc);
 }
 
-test::StreamUnderTest stream() {
-  test::StreamUnderTest under_test;
-  under_test.scan = scan;
-  under_test.frames = {
-      test::ubx_message(1, 3, {1, 2, 3, 0xB5, 0x62, 1, 7, 92, 0}),
-      test::ubx_message(5, 1, {6, 1}),
-      test::bytes_of("$GPZDA,123456.10,14,03,2026,00,00*60"),
-      test::ubx_message(1, 4, Bytes(18, 0x80)),
-      test::ubx_message(0x0A, 4, {}),
-  };
-  return under_test;
-}
-
-/// The checksum of a sentence does not see that two equal characters are missing.
-test::StreamUnderTest stream_with_holes() {
-  auto under_test = stream();
-  under_test.may_appear = [](const Bytes& frame) { return frame[0] == '$'; };
-  return under_test;
-}
-
-TEST(UbxStream, EverySplitIntoReadsGivesTheSameFrames) {
-  test::expect_every_split_keeps_all_frames(stream());
-}
-TEST(UbxStream, EverySingleBitFlipLosesOnlyItsFrame) {
-  test::expect_every_bit_flip_loses_only_its_frame(stream());
-}
-TEST(UbxStream, EveryCutLosesOnlyTheFramesItTouches) {
-  test::expect_every_cut_loses_only_its_frames(stream_with_holes());
-}
-TEST(UbxStream, EveryInsertionLosesOnlyItsFrame) {
-  test::expect_every_insertion_loses_only_its_frame(stream_with_holes(), 41);
-}
-TEST(UbxStream, NoFrameInsideGarbageIsLost) {
-  test::expect_no_frame_in_garbage_is_lost(stream(), "\xB5\x62\xB5\x62$*", 42);
-}
-
 TEST(UbxDecoder, TheWeekOfTheGpsIsUnwrappedAndMissingEpochsAreCounted) {
   const auto pvt = [](std::uint32_t itow_ms) {
     Bytes payload(92, 0);

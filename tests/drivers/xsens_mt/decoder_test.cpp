@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/drivers/xsens_mt/mt_frames.h"
@@ -253,6 +254,129 @@ TEST(MtDecoder, IncrementsBecomeMeansOverTheirInterval) {
   EXPECT_EQ(imu.flags, kGyroValid | kAccelValid | kIsIncrement);
   EXPECT_NEAR(imu.omega_radps[1], angle / 0.01, 1e-5);  // float32 quaternion
   EXPECT_NEAR(imu.f_mps2[2], 9.8, 1e-5);
+}
+
+TEST(MtDecoder, OneDeviceOfSeveralBehindAnXbusMasterIsPickedOutByItsBusId) {
+  MtDecoderConfig config;
+  config.bus.resize(3);
+  config.bus[1] = BusDevice{7, {0, 1, 0, -1, 0, 0, 0, 0, 1}};
+  Line line(config);
+  for (int i = 0; i < 5; ++i) {
+    Bytes data = u16(static_cast<std::uint16_t>(i));
+    for (int device = 0; device < 3; ++device) {
+      const Bytes block = mtdata(static_cast<std::uint16_t>(i), {device + 0.5, 0.001 * i, 9.8});
+      data.insert(data.end(), block.begin() + 4, block.end() - 1);
+    }
+    line.send(frame(mid::kMtData, data), kPeriod * (i + 1));
+  }
+  ASSERT_EQ(line.sink.samples.size(), 5U);
+  for (const Sample& s : line.sink.samples) {
+    EXPECT_EQ(s.device, 7);
+    EXPECT_NEAR(s.imu.f_mps2[1], -1.5, 1e-6);  // turned by its own axes
+  }
+}
+
+/// Attitude of a body that is first turned by heading, then pitched, then rolled: Rz Ry Rx, as a quaternion.
+std::array<double, 4> quaternion_of(double roll, double pitch, double heading) {
+  const double cr = std::cos(roll / 2), sr = std::sin(roll / 2);
+  const double cp = std::cos(pitch / 2), sp = std::sin(pitch / 2);
+  const double ch = std::cos(heading / 2), sh = std::sin(heading / 2);
+  return {cr * cp * ch + sr * sp * sh, sr * cp * ch - cr * sp * sh, cr * sp * ch + sr * cp * sh,
+          cr * cp * sh - sr * sp * ch};
+}
+
+TEST(MtDecoder, OrientationInEachLocalFrameBecomesTheSameRollAndPitchWithoutAHeading) {
+  constexpr double kRoll = 0.1, kPitch = -0.2, kHeading = 1.1;
+  // In north-east-down the device's axes are forward-right-down. In the other two local frames the same device
+  // is described by axes forward-left-up, which the configuration turns.
+  const Matrix3 flu_to_frd{1, 0, 0, 0, -1, 0, 0, 0, -1};
+  struct Case {
+    std::uint16_t frame_bits;
+    std::array<double, 4> q;
+    Matrix3 axes;
+  };
+  const Case cases[] = {
+      {0x4, quaternion_of(kRoll, kPitch, kHeading), {1, 0, 0, 0, 1, 0, 0, 0, 1}},
+      // FLU in north-west-up: the y and z components change sign.
+      {0x8, quaternion_of(kRoll, -kPitch, -kHeading), flu_to_frd},
+      // East-north-up: north-west-up turned by a quarter.
+      {0x0, quaternion_of(kRoll, -kPitch, kPi / 2 - kHeading), flu_to_frd},
+  };
+  for (const Case& c : cases) {
+    MtDecoderConfig config;
+    config.wants_attitude = true;
+    config.axes = c.axes;
+    Line line(config);
+    Bytes data;
+    append_item(data, xdi::kSampleTimeFine, u32(1000));
+    append_item(data, static_cast<std::uint16_t>(xdi::kQuaternion | c.frame_bits),
+                floats({c.q[0], c.q[1], c.q[2], c.q[3]}));
+    append_item(data, xdi::kAcceleration, floats({0, 0, 9.8}));
+    append_item(data, xdi::kRateOfTurn, floats({0, 0, 0}));
+    append_item(data, xdi::kStatusWord, u32(kStatusFilterValid));
+    line.send(frame(mid::kMtData2, data), kPeriod);
+    const auto attitude = line.sink.of_kind(SampleKind::kAttitude);
+    ASSERT_EQ(attitude.size(), 1U) << c.frame_bits;
+    EXPECT_NEAR(attitude[0].attitude.roll_rad, kRoll, 1e-6) << c.frame_bits;
+    EXPECT_NEAR(attitude[0].attitude.pitch_rad, kPitch, 1e-6) << c.frame_bits;
+    EXPECT_NEAR(attitude[0].attitude.heading_rad, kHeading, 1e-6) << c.frame_bits;
+    EXPECT_EQ(attitude[0].attitude.flags, kRollPitchValid);
+    EXPECT_EQ(line.sink.of_kind(SampleKind::kImu).size(), 1U);
+  }
+}
+
+TEST(MtDecoder, AMatrixIsReadByColumnsAndAnUnsettledFilterGivesNoAttitude) {
+  MtDecoderConfig config;
+  config.wants_attitude = true;
+  Line line(config);
+  const double a = 0.3;  // roll alone: R = [1 0 0; 0 c -s; 0 s c]
+  for (const std::uint32_t status : {kStatusFilterValid, 0U}) {
+    Bytes data;
+    append_item(data, 0x2024, floats({1, 0, 0, 0, std::cos(a), std::sin(a), 0, -std::sin(a), std::cos(a)}));
+    append_item(data, xdi::kAcceleration, floats({0, 0, 9.8}));
+    append_item(data, xdi::kRateOfTurn, floats({0, 0, 0}));
+    append_item(data, xdi::kStatusByte, {static_cast<std::uint8_t>(status)});
+    line.send(frame(mid::kMtData2, data), kPeriod);
+  }
+  const auto attitude = line.sink.of_kind(SampleKind::kAttitude);
+  ASSERT_EQ(attitude.size(), 2U);
+  EXPECT_NEAR(attitude[0].attitude.roll_rad, a, 1e-6);
+  EXPECT_EQ(attitude[0].attitude.flags, kRollPitchValid);
+  EXPECT_EQ(attitude[1].attitude.flags, 0U);
+}
+
+TEST(MtDecoder, AReceiverInsideGivesSolutionsWithUtcAndItsRtkState) {
+  MtDecoderConfig config;
+  config.wants_imu = false;
+  config.wants_gnss = true;
+  Line line(config);
+  Bytes pvt(kGnssPvtSize, 0);
+  const auto put = [&](std::size_t at, std::uint32_t value) {
+    const auto bytes = be32(value);
+    std::copy(bytes.begin(), bytes.end(), pvt.begin() + static_cast<std::ptrdiff_t>(at));
+  };
+  put(0, 400'000'000);
+  pvt[4] = 2026 >> 8, pvt[5] = 2026 & 0xFF, pvt[6] = 3, pvt[7] = 14;
+  pvt[8] = 12, pvt[9] = 34, pvt[10] = 56, pvt[11] = 7;
+  put(16, static_cast<std::uint32_t>(-1000));
+  pvt[20] = 3, pvt[21] = 0x03;
+  put(24, 23'522'190), put(28, 488'566'140), put(32, 81'500), put(40, 14), put(44, 20);
+  put(48, 1250), put(52, static_cast<std::uint32_t>(-500)), put(68, 50);
+  for (int i = 0; i < 3; ++i) {
+    Bytes data;
+    append_item(data, xdi::kPacketCounter, u16(static_cast<std::uint16_t>(i)));
+    append_item(data, xdi::kGnssPvt, pvt);
+    append_item(data, xdi::kStatusWord, u32(2U << 27U));
+    line.send(frame(mid::kMtData2, data), kPeriod * (i + 1));  // the same epoch three times
+  }
+  ASSERT_EQ(line.sink.samples.size(), 1U);
+  const Sample& s = line.sink.samples[0];
+  EXPECT_EQ(s.gnss.solution, GnssSolution::kFixed);
+  EXPECT_NEAR(s.gnss.latitude_rad / kRadPerDeg, 48.856614, 1e-12);
+  EXPECT_NEAR(s.gnss.longitude_rad / kRadPerDeg, 2.352219, 1e-12);
+  EXPECT_EQ(s.gnss.v_n_mps, (Vector3{1.25, -0.5, 0.0}));
+  const UtcTime day = std::chrono::sys_days{std::chrono::year{2026} / 3 / 14};
+  EXPECT_EQ(s.utc, day + std::chrono::seconds{45296} - std::chrono::microseconds{1});
 }
 
 TEST(MtDecoder, AnItemBeyondTheEndMakesTheWholeMessageInvalid) {

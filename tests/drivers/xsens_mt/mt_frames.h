@@ -70,15 +70,19 @@ inline Bytes floats(std::initializer_list<double> values) {
 /// Configuration message of devices that all have the same layout.
 inline Bytes configuration(std::uint16_t period, std::uint16_t skip, std::uint16_t n_devices,
                            std::uint16_t length, std::uint16_t mode, std::uint32_t settings,
-                           std::uint32_t master_id = 0x00300123) {
+                           std::uint32_t master_id = 0x00300123, std::uint16_t sync_mode = 0,
+                           std::uint16_t sync_skip = 0, std::uint32_t sync_offset = 0) {
   Bytes data;
   append(data, be32(master_id));
   append(data, be16(period));
   append(data, be16(skip));
+  append(data, be16(sync_mode));
+  append(data, be16(sync_skip));
+  append(data, be32(sync_offset));
   data.resize(96);
   append(data, be16(n_devices));
   for (std::uint16_t k = 0; k < n_devices; ++k) {
-    append(data, be32(n_devices == 1 ? master_id : 0x00300200U + k));
+    append(data, be32(n_devices == 1 && (master_id & 0x00F00000U) != 0x00100000U ? master_id : 0x00300200U + k));
     append(data, be16(length));
     append(data, be16(mode));
     append(data, be32(settings));

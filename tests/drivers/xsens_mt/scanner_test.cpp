@@ -43,44 +43,9 @@ std::vector<Found> scan(std::span<const Bytes> reads, ScanCounters* counters = n
   return found;
 }
 
-bool checksum_is_right(const Bytes& frame) {
-  return std::accumulate(frame.begin() + 1, frame.end(), 0U) % 256 == 0;
-}
-
 Bytes frame_of(std::uint8_t mid, const Bytes& data) {
   const OutgoingFrame frame(kMasterBid, mid, data);
   return {frame.bytes().begin(), frame.bytes().end()};
-}
-
-/// Frames as an MTx sends them, the preamble in their data included, with handshake frames among them.
-test::StreamUnderTest stream() {
-  std::mt19937 random(7);
-  test::StreamUnderTest s;
-  for (int i = 0; i < 8; ++i) {
-    Bytes data(i % 2 == 0 ? 38 : 54);
-    for (auto& byte : data) byte = static_cast<std::uint8_t>(random() % 5 == 0 ? kPreamble : random());
-    s.frames.push_back(frame_of(mid::kMtData, data));
-    if (i == 3) s.frames.push_back(frame_of(0x31, {}));
-  }
-  s.scan = [](std::span<const Bytes> reads) {
-    std::vector<Bytes> frames;
-    for (const Found& found : scan(reads)) frames.push_back(found.bytes);
-    return frames;
-  };
-  // One false frame in 256 has a right checksum; the layout and the counter tell it apart later.
-  s.may_appear = checksum_is_right;
-  return s;
-}
-
-TEST(MtScanner, EverySplitIntoReadsKeepsAllFrames) { test::expect_every_split_keeps_all_frames(stream()); }
-TEST(MtScanner, EverySingleBitFlipLosesOnlyItsFrame) {
-  test::expect_every_bit_flip_loses_only_its_frame(stream());
-}
-TEST(MtScanner, EveryCutLosesOnlyTheFramesItTouches) {
-  test::expect_every_cut_loses_only_its_frames(stream());
-}
-TEST(MtScanner, EveryInsertionLosesOnlyTheFrameItTouches) {
-  test::expect_every_insertion_loses_only_its_frame(stream(), 11);
 }
 
 // Random garbage holds, every now and then, a whole false frame with a right checksum that swallows the start

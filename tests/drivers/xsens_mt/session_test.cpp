@@ -25,6 +25,13 @@ struct ScriptedDevice {
   std::uint16_t mode = output_mode::kOrientation;  // as it comes from the factory
   std::uint32_t settings = output_settings::kSampleCounter;
   int ignores_go_to_config = 0;                  ///< that many
+  bool sends_text = false;                       ///< NMEA, as its string output type says
+  std::uint16_t n_devices = 1;                   ///< more than one, or an Xbus head: behind it
+  std::uint32_t id = 0x00300123;
+  std::uint16_t sync_mode = 0;
+  std::uint16_t sync_skip = 0;
+  std::uint32_t sync_offset = 0;
+  std::uint16_t sync_modes_known = 0xFFFF;
   std::uint16_t modes_known = 0xFFFF;            ///< other bits of an output mode are dropped
   std::map<std::uint8_t, std::uint8_t> refuses;  ///< message id to error code, each once
   std::uint16_t counter = 0;
@@ -59,10 +66,11 @@ struct ScriptedDevice {
     if (measuring || f.mid == mid::kWakeUpAck) return;
     switch (f.mid) {
       case mid::kReqDid:
-        send(frame(mid::kDeviceId, u32(0x00300123)));
+        send(frame(mid::kDeviceId, u32(id)));
         break;
       case mid::kReqConfiguration:
-        send(configuration(period, skip, 1, length(), mode, settings));
+        send(configuration(period, skip, n_devices, length(), mode, settings, id, sync_mode, sync_skip,
+                           sync_offset));
         break;
       case mid::kPeriod:
         period = read_be<std::uint16_t>(f.data);
@@ -81,7 +89,14 @@ struct ScriptedDevice {
         send(frame(0xD3));
         break;
       case mid::kSyncInSettings:
+        if (f.data[0] == 0) sync_mode = read_be<std::uint16_t>(f.data, 1) & sync_modes_known;
+        if (f.data[0] == 1) sync_skip = read_be<std::uint16_t>(f.data, 1);
+        if (f.data[0] == 2) sync_offset = read_be<std::uint32_t>(f.data, 1);
         send(frame(0xD7));
+        break;
+      case mid::kStringOutputType:
+        sends_text = read_be<std::uint16_t>(f.data) != 0;
+        send(frame(0x8F));
         break;
       case mid::kReqDataLength:
         send(frame(mid::kDataLength, u16(length())));
@@ -97,8 +112,23 @@ struct ScriptedDevice {
     }
   }
 
+  [[nodiscard]] bool is_xbus() const { return (id & 0x00F00000U) == 0x00100000U; }
+
   void sample() {
     Bytes data;
+    if (sends_text) {
+      send(test::bytes_of("$HCHDM,123.4,M*20\r\n"));
+      return;
+    }
+    if (is_xbus()) {
+      append(data, be16(counter++));
+      for (int k = 0; k < n_devices; ++k) {
+        const Bytes block = mtdata(counter);
+        data.insert(data.end(), block.begin() + 4, block.end() - 1);
+      }
+      send(frame(mid::kMtData, data));
+      return;
+    }
     const DataLayout layout{mode, settings};
     if (layout == kDefaultLayout) {
       send(mtdata(counter++));
@@ -294,6 +324,86 @@ TEST(MtSession, SetsTheSyncInput) {
   bench.run(seconds{3});
   EXPECT_EQ(bench.session.state(), SessionState::kStreaming);
   EXPECT_EQ(bench.times_heard(mid::kSyncInSettings), 3U);
+  EXPECT_EQ(bench.device.sync_mode, 0x05);
+  EXPECT_EQ(bench.device.sync_skip, 3);
+  EXPECT_EQ(bench.device.sync_offset, 29491U);
+
+  // What is there already is not written again, and what the device did not take is told.
+  Bench again(config);
+  again.device = bench.device;
+  again.device.measuring = false;
+  again.device.heard.clear();
+  again.run(seconds{3});
+  EXPECT_EQ(again.session.state(), SessionState::kStreaming);
+  EXPECT_EQ(again.times_heard(mid::kSyncInSettings), 0U);
+
+  Bench refuses(config);
+  refuses.device.sync_modes_known = 0x03;
+  refuses.run(seconds{10});
+  EXPECT_EQ(refuses.session.state(), SessionState::kFailed);
+  EXPECT_NE(refuses.session.problem().find("took SyncIn mode 0x0001"), std::string_view::npos)
+      << refuses.session.problem();
+}
+
+TEST(MtSession, SetsUpEveryDeviceBehindAnXbusMasterAndTakesItOverLater) {
+  MtSessionConfig config;
+  config.bus_devices = 3;
+  Bench bench(config);
+  bench.device.id = 0x00100456;
+  bench.device.n_devices = 3;
+  bench.run(seconds{3});
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+  EXPECT_EQ(bench.times_heard(mid::kOutputMode), 3U);  // one a device
+  EXPECT_EQ((DataLayout{bench.device.mode, bench.device.settings}), kDefaultLayout);
+
+  Bench later(config);
+  later.device = bench.device;
+  later.device.heard.clear();
+  later.run(seconds{2});
+  EXPECT_EQ(later.session.state(), SessionState::kStreaming);
+  EXPECT_TRUE(later.device.heard.empty());
+}
+
+TEST(MtSession, TellsWhenAnotherNumberOfDevicesIsBehindTheLine) {
+  Bench bench{MtSessionConfig{}};
+  bench.device.id = 0x00100456;
+  bench.device.n_devices = 2;
+  bench.run(seconds{10});
+  EXPECT_EQ(bench.session.state(), SessionState::kFailed);
+  EXPECT_NE(bench.session.problem().find("2 devices answer behind this line"), std::string_view::npos)
+      << bench.session.problem();
+}
+
+TEST(MtSession, BringsADeviceBackThatWasLeftSendingText) {
+  Bench bench;
+  bench.device.mode = kDefaultLayout.mode;
+  bench.device.settings = kDefaultLayout.settings;
+  bench.device.measuring = true;
+  bench.device.sends_text = true;
+  bench.run(seconds{4});
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+  EXPECT_EQ(bench.times_heard(mid::kStringOutputType), 1U);
+  EXPECT_FALSE(bench.device.sends_text);
+}
+
+TEST(MtSession, WantsAnotherBaudRateOnlyWhenNothingThatCameWasAMessage) {
+  Bench silent;
+  silent.device.powered = false;
+  silent.run(seconds{5});
+  EXPECT_TRUE(silent.session.wants_other_baud());
+
+  MtSessionConfig guess;
+  guess.searching_baud = true;
+  Bench sooner(guess);
+  sooner.device.powered = false;
+  sooner.run(milliseconds{2000});
+  EXPECT_TRUE(sooner.session.wants_other_baud());
+
+  Bench deaf;  // its data come, so the rate is right
+  deaf.device.measuring = true;
+  deaf.device.ignores_go_to_config = 1000;
+  deaf.run(seconds{5});
+  EXPECT_FALSE(deaf.session.wants_other_baud());
 }
 
 TEST(MtSession, AsksAnMtData2DeviceForItemsAndChecksTheRatesThatItTook) {

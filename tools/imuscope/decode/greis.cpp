@@ -35,7 +35,7 @@ Json message_json(const Frame& frame) {
 
 /// A sentence with its checksum is NMEA's, whatever the receiver it comes from.
 bool is_sentence(std::span<const std::uint8_t> line) {
-  return line[0] == '$' && nmea::examine_sentence(line).verdict == nmea::Verdict::kSentence;
+  return line[0] == '$' && nmea::examine_sentence(line).verdict == Verdict::kFrame;
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "drivers/device/bytes.h"
 #include "drivers/ixblue_stdbin/messages.h"
 #include "drivers/ixblue_stdbin/scanner.h"
+#include "drivers/ixblue_stdbin/status_names.h"
 #include "stream_protocols.h"
 #include "whole_stream.h"
 
@@ -25,6 +26,22 @@ Json blocks_json(const Telegram& telegram) {
   return blocks;
 }
 
+/// Names of the set bits of each status block that came.
+Json status_json(const Telegram& telegram) {
+  Json status = Json::object();
+  telegram.for_each_block([&](const BlockLayout& layout, std::span<const std::uint8_t> bytes) {
+    for (const StatusBlock& known : kStatusBlocks) {
+      if (known.block != layout.name) continue;
+      Json& names = status[std::string(layout.name)] = Json::array();
+      for (std::size_t word = 0; 4 * word < bytes.size() && known.words[word] != nullptr; ++word) {
+        for_each_set_bit(*known.words[word], read_be<std::uint32_t>(bytes, 4 * word),
+                         [&](std::string_view name) { names.push_back(name); });
+      }
+    }
+  });
+  return status;
+}
+
 Json telegram_json(const Telegram& telegram) {
   Json fields = {{"version", telegram.version},
                  {"nav_mask", telegram.nav_mask},
@@ -38,6 +55,7 @@ Json telegram_json(const Telegram& telegram) {
                  {"checksum", telegram.checksum},
                  {"blocks", blocks_json(telegram)}};
   if (telegram.nav_size) fields["nav_size"] = *telegram.nav_size;
+  if (Json status = status_json(telegram); !status.empty()) fields["status"] = std::move(status);
   if (telegram.rest_unread) fields["rest_unread"] = true;
   return fields;
 }
