@@ -15,13 +15,12 @@ namespace imuscope {
 
 /// The whole text as a number; nothing where it is none, or not finite. A leading '+' is allowed.
 [[nodiscard]] inline std::optional<double> read_decimal(std::string_view text) noexcept {
-  // Whole numbers below 2^53 and powers of ten up to 10^22 are doubles without rounding, so that their quotient
-  // is rounded once (Clinger 1990).
+  // Whole numbers below 2^53 and powers of ten up to 10^22 are doubles without rounding, so that their
+  // quotient is rounded once (Clinger 1990).
   constexpr std::uint64_t kExactBelow = std::uint64_t{1} << 53U;
   constexpr std::size_t kDigitsMax = 18;
-  constexpr auto kPowers =
-      std::to_array<double>({1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,
-                             1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18});
+  constexpr auto kPowers = std::to_array<double>({1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10,
+                                                  1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18});
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   const bool negative = !text.empty() && text.front() == '-';
   std::uint64_t digits = 0;
@@ -53,7 +52,18 @@ namespace imuscope {
 /// The whole text as an integer; nothing where it is none. A leading '+' is allowed.
 template <typename T>
 [[nodiscard]] std::optional<T> read_integer(std::string_view text) noexcept {
+  constexpr std::size_t kDigitsThatFit = 9;  // into 32 bits
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  bool plain = !text.empty() && text.size() <= kDigitsThatFit;
+  std::uint32_t digits = 0;
+  for (std::size_t i = 0; i < text.size() && plain; ++i) {
+    const auto digit = static_cast<unsigned>(text[i] - '0');
+    plain = digit < 10;
+    digits = 10 * digits + digit;
+  }
+  if constexpr (sizeof(T) >= sizeof digits) {
+    if (plain) return static_cast<T>(digits);
+  }
   T value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;

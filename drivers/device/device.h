@@ -52,8 +52,8 @@ class DeviceDecoder {
   /// for every other device. Not for the real-time thread.
   [[nodiscard]] virtual std::vector<CanId> ids() const { return {}; }
 
-  /// What is wrong with the data although they can be read, in one sentence with the remedy; empty where nothing
-  /// is. Static storage.
+  /// What is wrong with the data although they can be read, in one sentence with the remedy; empty where
+  /// nothing is. Static storage.
   [[nodiscard]] virtual std::string_view remark() const noexcept { return {}; }
 };
 

@@ -1,8 +1,8 @@
 #pragma once
 
-/// The loop that finds frames in a stream, shared by protocols whose frame begins with a mark and proves itself by
-/// a checksum: after a bad checksum or length the search goes on at the byte behind the false start, so that no
-/// good frame inside garbage is lost. Core: bounded memory, no allocation, noexcept.
+/// The loop that finds frames in a stream, shared by protocols whose frame begins with a mark and proves
+/// itself by a checksum: after a bad checksum or length the search goes on at the byte behind the false
+/// start, so that no good frame inside garbage is lost. Core: bounded memory, no allocation, noexcept.
 
 #include <cstddef>
 #include <cstdint>
@@ -45,8 +45,8 @@ class ScanLoop {
     return buffer_.append(bytes, arrival);
   }
 
-  /// The next frame, or nothing where more bytes are needed. bytes(), position() and first_byte() are about it
-  /// until the next call.
+  /// The next frame, or nothing where more bytes are needed. bytes(), position() and first_byte() are about
+  /// it until the next call.
   /// @param examine  of the pending bytes (not empty) to Examined
   /// @param at_end   no more bytes will come: look for frames behind a start that announced more
   template <typename Examine>
@@ -80,7 +80,9 @@ class ScanLoop {
     return std::nullopt;
   }
 
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return buffer_.pending().first(taken_); }
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
+    return buffer_.pending().first(taken_);
+  }
   [[nodiscard]] std::uint64_t position() const noexcept { return buffer_.position(); }
   [[nodiscard]] HostTime first_byte() const noexcept { return buffer_.arrival_of(0); }
   [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }

@@ -4,8 +4,8 @@
 /// byte behind it. CR and LF between messages are separators. Core: bounded memory, no allocation, noexcept.
 ///
 /// A message counts as found when its checksum is right: the last byte of the body, its last two hex digits
-/// ([MF], [PM]), or its last two bytes ([rE], [rM], [rV]: CRC-16). [JP], [RE] and [ER] have none; they must be
-/// text to the last byte.
+/// ([MF], [PM]), or its last two bytes ([rE], [rM], [rV]: CRC-16). [JP], [RE] and [ER] have none; they must
+/// be text to the last byte.
 
 #include <cstddef>
 #include <cstdint>

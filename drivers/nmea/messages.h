@@ -143,8 +143,8 @@ struct ShortText {
 
 namespace detail {
 
-/// Names of the numbers of one $PIXSE sentence (the "PHINS STANDARD" output of older Ixsea units). The order in
-/// STDSPD differs between sources, so its numbers are not named here.
+/// Names of the numbers of one $PIXSE sentence (the "PHINS STANDARD" output of older Ixsea units). The order
+/// in STDSPD differs between sources, so its numbers are not named here.
 struct PhinsLayout {
   std::string_view type;
   std::array<std::string_view, 3> names;

@@ -16,8 +16,8 @@ namespace imuscope::nmea {
 /// The standard allows 82; receivers in RTK send longer ones.
 inline constexpr std::size_t kSentenceMax = 256;
 
-/// Whether `pending`, which begins with '$' or '!', begins with a sentence; its size is from there to the last digit
-/// of the checksum.
+/// Whether `pending`, which begins with '$' or '!', begins with a sentence; its size is from there to the
+/// last digit of the checksum.
 /// @param checksum_required  false: a sentence without '*', ended by CR or LF, is taken too
 [[nodiscard]] Examined examine_sentence(std::span<const std::uint8_t> pending,
                                         bool checksum_required = true) noexcept;

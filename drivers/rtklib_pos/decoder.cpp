@@ -69,7 +69,11 @@ Vector3 ned_variance(const Vector3& variance, const Vector3& xy_yz_zx,
 }  // namespace
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
-    : config_(config), scanner_(byte_time(config.baud)), clock_(config.clock), format_(config.format), base_(config.base) {}
+    : config_(config),
+      scanner_(byte_time(config.baud)),
+      clock_(config.clock),
+      format_(config.format),
+      base_(config.base) {}
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
@@ -83,7 +87,8 @@ std::string_view Decoder::remark() const noexcept {
   if (base_is_missing_)
     return "the solutions are relative to a base whose place is not known; set base_lat_lon_height";
   if (format_.geodetic_height)
-    return "the heights are above the geoid; set RTKLIB's output height to ellipsoidal (out-height =ellipsoidal)";
+    return "the heights are above the geoid; set RTKLIB's output height to ellipsoidal (out-height "
+           "=ellipsoidal)";
   return {};
 }
 

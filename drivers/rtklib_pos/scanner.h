@@ -1,8 +1,8 @@
 #pragma once
 
-/// Cuts a stream of RTKLIB solutions into lines. Whether a line is a solution is the reader's to say: the format
-/// has no checksum. Empty lines are passed over; of a line that is too long nothing is used. Core: bounded
-/// memory, no allocation, noexcept.
+/// Cuts a stream of RTKLIB solutions into lines. Whether a line is a solution is the reader's to say: the
+/// format has no checksum. Empty lines are passed over; of a line that is too long nothing is used. Core:
+/// bounded memory, no allocation, noexcept.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,8 +18,9 @@ inline constexpr std::size_t kLineMax = 1024;
 inline constexpr char kCommentMark = '%';
 
 struct Frame {
-  std::string_view line;     ///< without blanks before it and its end; never empty; valid until the next append()
-  std::size_t size = 0;      ///< of the line, its end included
+  std::string_view
+      line;              ///< without blanks before it and its end; never empty; valid until the next append()
+  std::size_t size = 0;  ///< of the line, its end included
   std::uint64_t offset = 0;  ///< of its first byte in the stream
   HostTime first_byte{};     ///< when its first byte arrived at the latest
 };

@@ -146,8 +146,9 @@ Result<int> open_udp(const NetSettings& settings, const addrinfo& address) {
                             : "give an address of this PC, a multicast group, or leave host out");
   }
   if (multicast && !join_group(socket.fd(), address)) {
-    return work_error(fmt::format("{}: the group cannot be joined ({})", name_of(settings), std::strerror(errno)),
-                      "check that a network interface with a multicast route is up");
+    return work_error(
+        fmt::format("{}: the group cannot be joined ({})", name_of(settings), std::strerror(errno)),
+        "check that a network interface with a multicast route is up");
   }
   return socket.release();
 }

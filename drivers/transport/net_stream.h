@@ -1,8 +1,8 @@
 #pragma once
 
-/// Bytes over a network: a TCP connection that we open to a device (or to rtkrcv, str2str, a serial server), or
-/// UDP datagrams that a device sends to us. A TCP server that goes away, or does not answer keep-alives for some
-/// ten seconds, is gone; open it again. UDP has no connection: silence is all that shows.
+/// Bytes over a network: a TCP connection that we open to a device (or to rtkrcv, str2str, a serial server),
+/// or UDP datagrams that a device sends to us. A TCP server that goes away, or does not answer keep-alives
+/// for some ten seconds, is gone; open it again. UDP has no connection: silence is all that shows.
 
 #include <cstdint>
 #include <memory>

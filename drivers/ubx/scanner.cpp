@@ -9,8 +9,8 @@ namespace {
 constexpr auto kMessageKind = static_cast<std::uint8_t>(Frame::Kind::kMessage);
 constexpr auto kNmeaKind = static_cast<std::uint8_t>(Frame::Kind::kNmea);
 
-/// 8-bit Fletcher over class, id, length and payload. The first sum counts every byte once, the second one as often
-/// as there are bytes from it to the end; the sums are only taken modulo 256 at the end.
+/// 8-bit Fletcher over class, id, length and payload. The first sum counts every byte once, the second one as
+/// often as there are bytes from it to the end; the sums are only taken modulo 256 at the end.
 bool checksum_is_right(std::span<const std::uint8_t> frame) noexcept {
   constexpr std::size_t kAtOnce = 4;
   const auto summed = frame.subspan(2, frame.size() - 2 - kChecksumSize);
@@ -37,7 +37,8 @@ Examined examine_message(std::span<const std::uint8_t> pending) noexcept {
   if (payload > kPayloadMax) return {Verdict::kBadLength};
   const std::size_t size = kHeaderSize + payload + kChecksumSize;
   if (pending.size() < size) return {Verdict::kNeedMore};
-  return {checksum_is_right(pending.first(size)) ? Verdict::kFrame : Verdict::kBadChecksum, size, kMessageKind};
+  return {checksum_is_right(pending.first(size)) ? Verdict::kFrame : Verdict::kBadChecksum, size,
+          kMessageKind};
 }
 
 Examined with_kind(Examined found, std::uint8_t kind) noexcept {

@@ -114,7 +114,8 @@ void MtSession::on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noex
   }
 }
 
-// A line that begins with '$': no measurement looks like that for long, since every data frame ends the search.
+// A line that begins with '$': no measurement looks like that for long, since every data frame ends the
+// search.
 void MtSession::look_for_text(std::span<const std::uint8_t> bytes) noexcept {
   for (const std::uint8_t byte : bytes) {
     if (byte == '$' && last_byte_ == '\n') sends_text_ = true;
@@ -417,7 +418,8 @@ void MtSession::on_configuration_read(HostTime now) noexcept {
   if (configuration_->n_devices == 0) {
     say("no device answers on the Xbus; check the bus cables");
     fail_round(now);
-  } else if (configuration_->n_devices != expected || configuration_->is_xbus_master() != (config_.bus_devices > 0)) {
+  } else if (configuration_->n_devices != expected ||
+             configuration_->is_xbus_master() != (config_.bus_devices > 0)) {
     say("%zu devices answer behind this line, the configuration has %zu; check the bus cables, and give each "
         "[[device]] its bus_id",
         configuration_->n_devices, expected);
@@ -448,9 +450,11 @@ bool MtSession::sync_in_is_wanted() const noexcept {
 void MtSession::on_configuration_checked(HostTime now) noexcept {
   sync_in_written_ = false;
   if (!sync_in_is_wanted()) {
-    say("the device took SyncIn mode 0x%04X, skip %u, offset %u; wanted are 0x%04X, %u, %u: check what its manual "
+    say("the device took SyncIn mode 0x%04X, skip %u, offset %u; wanted are 0x%04X, %u, %u: check what its "
+        "manual "
         "allows",
-        static_cast<unsigned>(configuration_->sync_in_mode), static_cast<unsigned>(configuration_->sync_in_skip),
+        static_cast<unsigned>(configuration_->sync_in_mode),
+        static_cast<unsigned>(configuration_->sync_in_skip),
         static_cast<unsigned>(configuration_->sync_in_offset), static_cast<unsigned>(config_.sync_in->mode),
         static_cast<unsigned>(config_.sync_in->skip), static_cast<unsigned>(config_.sync_in->offset));
     fail_round(now);

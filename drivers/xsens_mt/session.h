@@ -104,7 +104,8 @@ class MtSession final : public DeviceSession {
   void watch_stream(HostTime now) noexcept;
   [[nodiscard]] bool sends_what_is_wanted(const Configuration& configuration) const noexcept;
   [[nodiscard]] std::optional<std::int64_t> wanted_count(const Frame& frame) const noexcept;
-  [[nodiscard]] std::optional<std::int64_t> wanted_bus_count(std::span<const std::uint8_t> data) const noexcept;
+  [[nodiscard]] std::optional<std::int64_t> wanted_bus_count(
+      std::span<const std::uint8_t> data) const noexcept;
   void look_for_text(std::span<const std::uint8_t> bytes) noexcept;
   [[nodiscard]] bool takes_over(std::int64_t count, HostTime now) noexcept;
   [[nodiscard]] bool speaks_mtdata2() const noexcept;
@@ -146,7 +147,6 @@ class MtSession final : public DeviceSession {
   std::uint8_t last_byte_ = 0;
   // Data that is as wanted, one after the other.
   int wanted_in_a_row_ = 0;
-  std::int64_t first_count_ = 0;
   std::int64_t last_count_ = 0;
   HostTime first_wanted_{};
   HostTime last_wanted_{};

@@ -18,9 +18,13 @@ class BaudSearch {
   /// The rate is not the configured one.
   [[nodiscard]] bool searching() const noexcept { return current() != configured_; }
 
+  /// Every rate has been tried: from now on the search repeats itself.
+  [[nodiscard]] bool repeats() const noexcept { return repeats_; }
+
   /// Goes on to the next rate: after the configured one the others, and round again.
   void next() noexcept {
     tried_ = (tried_ + 1) % (kRates.size() + 1);
+    repeats_ = repeats_ || tried_ == 0;
     if (tried_ > 0 && current() == configured_) next();
   }
 
@@ -30,6 +34,7 @@ class BaudSearch {
       {115200, 460800, 230400, 921600, 57600, 38400, 19200, 9600, 2000000, 76800, 28800, 14400, 4800});
 
   std::uint32_t configured_;
+  bool repeats_ = false;
   std::size_t tried_ = 0;  ///< of kRates, plus the configured one
 };
 

@@ -17,11 +17,11 @@ namespace {
 
 constexpr std::array kRoleNames{std::string_view("reference"), std::string_view("study"),
                                 std::string_view("gnss"), std::string_view("odometry")};
-constexpr std::array kProtocolNames{std::string_view("xsens_mt"),    std::string_view("ixblue_stdbin"),
-                                    std::string_view("greis"),       std::string_view("nmea"),
-                                    std::string_view("ubx"),         std::string_view("rtklib_pos"),
-                                    std::string_view("csv_imu"),     std::string_view("csv_gnss"),
-                                    std::string_view("xsens_can"),   std::string_view("can_odometry")};
+constexpr std::array kProtocolNames{std::string_view("xsens_mt"),  std::string_view("ixblue_stdbin"),
+                                    std::string_view("greis"),     std::string_view("nmea"),
+                                    std::string_view("ubx"),       std::string_view("rtklib_pos"),
+                                    std::string_view("csv_imu"),   std::string_view("csv_gnss"),
+                                    std::string_view("xsens_can"), std::string_view("can_odometry")};
 
 constexpr double kMaxRate_hz = 2000.0;
 constexpr int kMaxAveraged = 50;
@@ -244,7 +244,8 @@ void read_xsens(TomlReader& in, XsensConfig& xsens) {
   int mode = 0;
   int skip = 0;
   double offset = 0.0;
-  sync.require("mode", "edge (1 rising, 2 falling, 3 both) plus 0 to sample, 4 to send the latest, 16 to keep time");
+  sync.require("mode",
+               "edge (1 rising, 2 falling, 3 both) plus 0 to sample, 4 to send the latest, 16 to keep time");
   sync.integer("mode", mode, 0, kMax16);
   sync.integer("skip", skip, 0, kMax16);
   sync.number("offset_33_9ns", offset, 1.0, 0.0, kMax32);
@@ -320,7 +321,8 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   return device;
 }
 
-/// Devices on one serial port: behind an Xbus Master, each with its bus id, and the first one's settings hold.
+/// Devices on one serial port: behind an Xbus Master, each with its bus id, and the first one's settings
+/// hold.
 void share_lines(TomlReader& root, std::vector<DeviceConfig>& devices) {
   for (std::size_t i = 0; i < devices.size(); ++i) devices[i].line_owner = i;
   for (std::size_t i = 0; i < devices.size(); ++i) {

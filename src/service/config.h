@@ -124,9 +124,9 @@ struct GnssOptions {
   double position_sd_floor_m = 0.0;
   double velocity_sd_floor_mps = 0.0;
   double latency_s = 0.0;  ///< of the stamps, where no UTC brings them to the reference's time
-  std::optional<double> geoid_separation_m;     ///< nmea: for receivers that send none
+  std::optional<double> geoid_separation_m;  ///< nmea: for receivers that send none
   bool common_clock = false;  ///< rtklib_pos: the lines' times are the reference's, where no stamps say more
-  std::optional<Vector3> base_lat_lon_height;   ///< rtklib_pos: deg, deg, m; for east-north-up solutions
+  std::optional<Vector3> base_lat_lon_height;  ///< rtklib_pos: deg, deg, m; for east-north-up solutions
 };
 
 struct DeviceConfig {

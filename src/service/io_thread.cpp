@@ -90,7 +90,7 @@ class IoThread::Line final : public SampleSink {
 
   void say(RawTap& tap, int epoll, HostTime now) noexcept {
     if (connection_ == nullptr) return;
-    if (connection_->session->wants_other_baud()) {
+    if (connection_->has_baud && connection_->session->wants_other_baud()) {
       give_back(epoll);
       return;
     }

@@ -26,6 +26,7 @@ namespace imuscope {
 struct Connection {
   std::unique_ptr<Transport> line;
   std::unique_ptr<DeviceSession> session;
+  bool has_baud = false;  ///< of a line that may be opened at another baud rate when the session wants it
 };
 
 enum class LineState : std::uint8_t {

@@ -68,8 +68,11 @@ class Supervisor {
     if (auto gone = io_.take_back(index)) {
       if (device.serial && gone->session->wants_other_baud()) {
         line.baud.next();
-        spdlog::warn("{}: no message at {}; trying {} baud (once it answers, set baud to that)", device.name,
-                     gone->line->describe(), line.baud.current());
+        // The first round is told; a device that is switched off would fill the log for ever.
+        if (!line.baud.repeats()) {
+          spdlog::warn("{}: no message at {}; trying {} baud (once it answers, set baud to that)",
+                       device.name, gone->line->describe(), line.baud.current());
+        }
       } else {
         spdlog::warn("{}: {} is gone; trying to open it again", device.name, gone->line->describe());
       }
@@ -92,9 +95,11 @@ class Supervisor {
       line.pause = std::min(line.pause * 2, kReopenLongest);
       return;
     }
-    spdlog::info("{}: {} is open", device.name, (*opened)->describe());
+    if (!line.baud.repeats()) spdlog::info("{}: {} is open", device.name, (*opened)->describe());
     publisher_.set_line_problem(index, {});
-    io_.offer(index, std::make_unique<Connection>(Connection{std::move(*opened), make_session(device, line.baud.searching())}));
+    io_.offer(index, std::make_unique<Connection>(Connection{std::move(*opened),
+                                                             make_session(device, line.baud.searching()),
+                                                             device.serial.has_value()}));
     line = {true, {}, kReopenFirst, {}, line.baud};
   }
 

@@ -28,10 +28,10 @@ using namespace std::chrono_literals;
 constexpr double kEarthRadius_m = 6.37e6;
 
 /// Skips where RTKLIB (Debian package rtklib) is not installed.
-#define IMUSCOPE_NEEDS_RTKLIB(program)                                     \
-  do {                                                                     \
-    if (!std::filesystem::exists("/usr/bin/" program))                     \
-      GTEST_SKIP() << "needs " program " of the Debian package rtklib";    \
+#define IMUSCOPE_NEEDS_RTKLIB(program)                                  \
+  do {                                                                  \
+    if (!std::filesystem::exists("/usr/bin/" program))                  \
+      GTEST_SKIP() << "needs " program " of the Debian package rtklib"; \
   } while (false)
 
 std::vector<Sample> rtklib_samples(const std::filesystem::path& file) {
@@ -53,8 +53,8 @@ TEST(Rtklib, AJavadLogBecomesASinglePointSolutionThatAgreesWithTheReceiversOwn) 
   std::filesystem::copy_file(shared_path("data/streams/greis/javad.jps"), folder / "rover.jps");
   const auto in = [&](const char* name) { return (folder / name).string(); };
   ASSERT_EQ(run_program("/usr/bin/convbin",
-                        {"-r", "javad", "-v", "3.03", "-od", "-os", "-o", in("rover.obs"), "-n", in("rover.nav"),
-                         in("rover.jps")},
+                        {"-r", "javad", "-v", "3.03", "-od", "-os", "-o", in("rover.obs"), "-n",
+                         in("rover.nav"), in("rover.jps")},
                         log),
             0);
   ASSERT_EQ(run_program("/usr/bin/rnx2rtkp",
@@ -108,7 +108,8 @@ class Fifo {
 
 std::unique_ptr<NetStream> connect_when_it_listens(std::uint16_t port) {
   for (int attempt = 0; attempt < 100; ++attempt) {
-    if (auto stream = NetStream::open({NetSettings::Kind::kTcp, "127.0.0.1", port})) return std::move(*stream);
+    if (auto stream = NetStream::open({NetSettings::Kind::kTcp, "127.0.0.1", port}))
+      return std::move(*stream);
     std::this_thread::sleep_for(100ms);
   }
   return nullptr;
@@ -157,10 +158,10 @@ TEST(Rtklib, AFixedSolutionThatStr2strSendsOverTcpDrivesTheFilter) {
   const auto folder = scratch_folder();
   constexpr std::uint16_t kPort = 29125;
   Fifo fifo(folder / "gnss.fifo");
-  const BackgroundProgram server("/usr/bin/str2str",
-                                 {"-in", "file://" + fifo.path().string(), "-out",
-                                  "tcpsvr://:" + std::to_string(kPort)},
-                                 folder / "str2str.log");
+  const BackgroundProgram server(
+      "/usr/bin/str2str",
+      {"-in", "file://" + fifo.path().string(), "-out", "tcpsvr://:" + std::to_string(kPort)},
+      folder / "str2str.log");
   const auto stream = connect_when_it_listens(kPort);
   ASSERT_NE(stream, nullptr) << read_text(folder / "str2str.log");
   const Bytes sent = load_bytes(shared_path("data/rtk_drive/gnss.pos"));
@@ -182,13 +183,14 @@ TEST(Rtklib, AFixedSolutionThatStr2strSendsOverTcpDrivesTheFilter) {
   const auto run = folder / "run";
   const std::string imu = shared_path("data/rtk_drive/imu.csv").string();
   ASSERT_EQ(run_program("imuscope",
-                        {"process", "reference=" + imu, "again=" + imu, "gnss=" + received.string(), "--config",
-                         source_path("config/rtklib_drive.toml").string(), "--out", run.string()},
+                        {"process", "reference=" + imu, "again=" + imu, "gnss=" + received.string(),
+                         "--config", source_path("config/rtklib_drive.toml").string(), "--out", run.string()},
                         folder / "process.log"),
             0)
       << read_text(folder / "process.log");
 
-  // The solution of an IMU of this class follows the fixed positions to decimetres where they come every 0.25 s.
+  // The solution of an IMU of this class follows the fixed positions to decimetres where they come every 0.25
+  // s.
   const auto navigation = navigation_of(run);
   ASSERT_GT(navigation.size(), 4000U);
   const double t0_s = 1752003261.854;  // of the IMU's first row, in GPS time as the lines'

@@ -1,7 +1,10 @@
-// How devices are connected: serial, TCP, UDP, several behind one Xbus Master, and the search for a baud rate.
+// How devices are connected: serial, TCP, UDP, several behind one Xbus Master, and the search for a baud
+// rate.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "drivers/nmea/decoder.h"
@@ -11,6 +14,9 @@
 #include "service/config.h"
 #include "service/device_factory.h"
 #include "service/line_factory.h"
+#include "service/recording.h"
+#include "tests/drivers/xsens_mt/mt_frames.h"
+#include "tests/support/shared_data.h"
 
 namespace imuscope {
 namespace {
@@ -74,7 +80,8 @@ TEST(Lines, ANetworkLineNeedsItsPortAndTcpItsHost) {
   EXPECT_EQ(c->devices[3].net->port, 5013);
   EXPECT_TRUE(has_line(c->devices[3]));
   EXPECT_TRUE(c->devices[0].net->udp);
-  EXPECT_THAT(parse(gnss + "transport = { kind = \"tcp\", port = 5013 }\n").error().text(), HasSubstr("host"));
+  EXPECT_THAT(parse(gnss + "transport = { kind = \"tcp\", port = 5013 }\n").error().text(),
+              HasSubstr("host"));
   EXPECT_THAT(parse(gnss + "transport = { kind = \"tcp\", host = \"x\", port = 70000 }\n").error().text(),
               HasSubstr("port"));
   EXPECT_THAT(parse(gnss + "transport = { kind = \"avian\", port = 1 }\n").error().text(),
@@ -116,7 +123,8 @@ TEST(Lines, SolutionsRelativeToAnUnknownBaseAreToldWithTheRemedy) {
     int n = 0;
   } sink;
   const std::string text =
-      "%  GPST  e-baseline(m)  n-baseline(m)  u-baseline(m)  Q ns sde(m) sdn(m) sdu(m) sden(m) sdnu(m) sdue(m) "
+      "%  GPST  e-baseline(m)  n-baseline(m)  u-baseline(m)  Q ns sde(m) sdn(m) sdu(m) sden(m) sdnu(m) "
+      "sdue(m) "
       "age(s) ratio\n2026/03/14 12:34:56.100 1 2 3 1 12 0.01 0.01 0.02 0 0 0 0.1 12\n";
   const std::vector<std::uint8_t> bytes(text.begin(), text.end());
   const auto decoder = make_decoder(c->devices[3], 3, ClockMapConfig::fixed(HostTime{}, 1.0));
@@ -124,11 +132,76 @@ TEST(Lines, SolutionsRelativeToAnUnknownBaseAreToldWithTheRemedy) {
   EXPECT_EQ(sink.n, 0);
   EXPECT_THAT(decoder_problem(c->devices[3], *decoder), HasSubstr("base_lat_lon_height"));
 
-  const auto known = parse(std::string(kBus) +
-                           "protocol = \"rtklib_pos\"\nbase_lat_lon_height = [48.0, 2.0, 80.0]\n");
+  const auto known =
+      parse(std::string(kBus) + "protocol = \"rtklib_pos\"\nbase_lat_lon_height = [48.0, 2.0, 80.0]\n");
   ASSERT_TRUE(known) << known.error().text();
   make_decoder(known->devices[3], 3, ClockMapConfig::fixed(HostTime{}, 1.0))->push(bytes, HostTime{}, sink);
   EXPECT_EQ(sink.n, 1);
+}
+
+/// A dump with the arrival of each frame beside it.
+void write_dump(const std::filesystem::path& file, const std::vector<std::vector<std::uint8_t>>& frames) {
+  std::ofstream bytes(file, std::ios::binary);
+  std::ofstream arrivals(std::filesystem::path(file).replace_extension(".arrivals.csv"));
+  arrivals << "byte_offset,n_bytes,arrival_ns\n";
+  std::size_t offset = 0;
+  std::int64_t arrival_ns = 1'000'000'000;
+  for (const auto& frame : frames) {
+    bytes.write(reinterpret_cast<const char*>(frame.data()), static_cast<std::streamsize>(frame.size()));
+    arrivals << offset << ',' << frame.size() << ',' << arrival_ns << '\n';
+    offset += frame.size();
+    arrival_ns += 10'000'000;
+  }
+}
+
+TEST(Lines, ADumpOfAnXbusLineFeedsEveryDeviceBehindIt) {
+  namespace mt = xsens::test_frames;
+  const auto folder = test::scratch_folder();
+  std::vector<std::vector<std::uint8_t>> alone;
+  std::vector<std::vector<std::uint8_t>> bus;
+  for (int i = 0; i < 50; ++i) {
+    const auto counter = static_cast<std::uint16_t>(i);
+    alone.push_back(mt::mtdata(counter));
+    auto data = mt::u16(counter);
+    for (int device = 0; device < 3; ++device) {
+      const auto block = mt::mtdata(counter, {device + 0.25, 0.001 * i, 9.8});
+      data.insert(data.end(), block.begin() + 4, block.end() - 1);
+    }
+    bus.push_back(mt::frame(0x32, data));
+  }
+  write_dump(folder / "r.bin", alone);
+  write_dump(folder / "bus.bin", bus);
+  std::string text = kBus;
+  text.replace(text.find("ixblue_stdbin"), 13, "xsens_mt");
+  std::ofstream(folder / "bus.toml") << text << "protocol = \"nmea\"\n";
+
+  const auto opened = open_recording(
+      {"r=" + (folder / "r.bin").string(), "a=" + (folder / "bus.bin").string()}, folder / "bus.toml");
+  ASSERT_TRUE(opened) << opened.error().text();
+  const auto& recording = opened->recording;
+  EXPECT_EQ(recording.present, (std::vector<bool>{true, true, true, false}));
+  struct Sink final : SampleSink {
+    void on_sample(const Sample& sample) noexcept override {
+      ++n;
+      last = sample;
+    }
+    int n = 0;
+    Sample last{};
+  };
+  // Bus ids 1 and 3: the first and the third block.
+  for (const auto& [index, force] : {std::pair{1, 0.25}, std::pair{2, 2.25}}) {
+    const auto device = static_cast<DeviceIndex>(index);
+    const auto decoder = make_decoder(opened->configuration.devices[device], device, ClockMapConfig{});
+    auto source = recording.open(device);
+    ASSERT_TRUE(source) << source.error().text();
+    Sink sink;
+    for (auto read = (*source)->next(); read && *read; read = (*source)->next()) {
+      decoder->push((*read)->bytes, (*read)->arrival.value_or(HostTime{}), sink);
+    }
+    EXPECT_EQ(sink.n, 50);
+    EXPECT_EQ(sink.last.device, device);
+    EXPECT_NEAR(sink.last.imu.f_mps2[0], force, 1e-6);
+  }
 }
 
 TEST(BaudSearch, ComesToEveryRateAndBackToTheConfiguredOne) {
@@ -136,11 +209,13 @@ TEST(BaudSearch, ComesToEveryRateAndBackToTheConfiguredOne) {
     BaudSearch search(configured);
     EXPECT_EQ(search.current(), configured);
     EXPECT_FALSE(search.searching());
+    EXPECT_FALSE(search.repeats());
     std::set<std::uint32_t> tried;
     for (search.next(); search.searching(); search.next()) {
       EXPECT_TRUE(tried.insert(search.current()).second) << search.current();
     }
     EXPECT_EQ(search.current(), configured);
+    EXPECT_TRUE(search.repeats());
     for (const std::uint32_t rate : {9600U, 19200U, 57600U, 115200U, 230400U, 460800U, 921600U}) {
       EXPECT_TRUE(rate == configured || tried.contains(rate)) << rate;
     }

@@ -101,8 +101,8 @@ TEST(DecodeCommand, LosesNoMessageOfTheMtRecordings) {
   }
 }
 
-/// Every key that is expected is there, with its value to the last bit or, where the vector rounds, to 1e-12 of
-/// it.
+/// Every key that is expected is there, with its value to the last bit or, where the vector rounds, to 1e-12
+/// of it.
 void expect_fields(const json& line, const json& expected) {
   for (const auto& [key, value] : expected.items()) {
     ASSERT_TRUE(line.contains(key) || value.is_null()) << key << " in " << line;

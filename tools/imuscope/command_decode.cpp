@@ -49,7 +49,8 @@ Result<std::vector<std::uint8_t>> read_file(const std::string& file) {
 /// Bytes of messages that prove the protocol.
 std::size_t proven_bytes(const StreamProtocol& protocol, Stream stream) {
   std::size_t proven = 0;
-  protocol.decode(stream, [&](const DecodedMessage& message) { proven += message.proven ? message.size : 0; });
+  protocol.decode(stream,
+                  [&](const DecodedMessage& message) { proven += message.proven ? message.size : 0; });
   return proven;
 }
 

@@ -1,5 +1,5 @@
-// After any fault the search goes on at the byte behind the false start: for every protocol, at every position of
-// a stream, a fault loses only the frames that it touches.
+// After any fault the search goes on at the byte behind the false start: for every protocol, at every
+// position of a stream, a fault loses only the frames that it touches.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -86,9 +86,10 @@ StreamUnderTest ixblue_stdbin() {
   }
   s.scan = scan_with<ixblue_stdbin::Scanner, ixblue_stdbin::Frame>(
       [](const ixblue_stdbin::Frame& frame) { return frame.bytes.size(); });
-  s.lures = std::string_view("IXIX\x02\x03\x04\x05"
-                             "AN",
-                             10);
+  s.lures = std::string_view(
+      "IXIX\x02\x03\x04\x05"
+      "AN",
+      10);
   return s;
 }
 
@@ -106,7 +107,8 @@ StreamUnderTest greis() {
       vg(1.5F, -0.5F, 0.25F, 0.02F, 4),
       et(45'000'100),
   };
-  s.scan = scan_with<greis::Scanner, greis::Frame>([](const greis::Frame& frame) { return frame.bytes.size(); });
+  s.scan =
+      scan_with<greis::Scanner, greis::Frame>([](const greis::Frame& frame) { return frame.bytes.size(); });
   // Text, and messages that are text, have no check of their own that a fault could break.
   s.may_appear = [](const Bytes& frame) {
     const std::string_view text(reinterpret_cast<const char*>(frame.data()), frame.size());
@@ -131,9 +133,10 @@ StreamUnderTest nmea() {
       bare("GNRMC,123456.10,A,4851.39684,N,00221.13314,E,2.617,338.17,140326,,,R,V"),
       bare("GPZDA,123456.10,14,03,2026,00,00"),
   };
-  s.scan = scan_with<nmea::Scanner, nmea::Frame>([](const nmea::Frame& frame) { return frame.sentence.size(); });
-  // A checksum of exclusive ors does not see that two equal characters are missing, nor that a digit of its own
-  // changed case: a sentence with a hole may appear. What must hold is that its neighbours do not suffer.
+  s.scan =
+      scan_with<nmea::Scanner, nmea::Frame>([](const nmea::Frame& frame) { return frame.sentence.size(); });
+  // A checksum of exclusive ors does not see that two equal characters are missing, nor that a digit of its
+  // own changed case: a sentence with a hole may appear. What must hold is that its neighbours do not suffer.
   s.may_appear = [](const Bytes& frame) { return frame[0] == '$' || frame[0] == '!'; };
   s.lures = "$*$!G0";
   return s;
@@ -161,8 +164,9 @@ StreamUnderTest rtklib_pos() {
   StreamUnderTest s;
   s.name = "rtklib_pos";
   for (int i = 0; i < 4; ++i) {
-    s.frames.push_back(bytes_of("2026/03/14 12:34:5" + std::to_string(i) +
-                                ".100  48.856614000  2.352219000  81.5000  1 12 0.01 0.01 0.02 0 0 0 0.1 12.3\n"));
+    s.frames.push_back(
+        bytes_of("2026/03/14 12:34:5" + std::to_string(i) +
+                 ".100  48.856614000  2.352219000  81.5000  1 12 0.01 0.01 0.02 0 0 0 0.1 12.3\n"));
   }
   s.scan = scan_with<rtklib_pos::Scanner, rtklib_pos::Frame>(
       [](const rtklib_pos::Frame& frame) { return frame.size; });

@@ -23,7 +23,8 @@ TEST(Decimal, EveryPlainDecimalIsTheNearestDouble) {
 }
 
 TEST(Decimal, WhatIsNoNumberIsNone) {
-  for (const char* text : {"", "-", "+", ".", "-.", "1.2.3", "12a", " 1", "1 ", "nan", "inf", "1e400", "--1"}) {
+  for (const char* text :
+       {"", "-", "+", ".", "-.", "1.2.3", "12a", " 1", "1 ", "nan", "inf", "1e400", "--1"}) {
     EXPECT_FALSE(read_decimal(text)) << text;
   }
   EXPECT_EQ(read_decimal("+5."), 5.0);

@@ -104,7 +104,8 @@ std::vector<Bytes> scan(std::span<const Bytes> reads) {
   return frames;
 }
 
-// CRC-16 with polynomial 0x1021 from 0 is the XMODEM one, whose published check value over "123456789" is 0x31C3.
+// CRC-16 with polynomial 0x1021 from 0 is the XMODEM one, whose published check value over "123456789" is
+// 0x31C3.
 TEST(GreisStream, ReferenceMessagesProveThemselvesByACrcOf16Bits) {
   EXPECT_EQ(crc16(test::bytes_of("123456789")), 0x31C3);
   Bytes message = test::bytes_of("rE006abcd");

@@ -29,7 +29,8 @@ std::vector<Bytes> scan(std::span<const Bytes> reads) {
 TEST(StdBinStream, EveryByteBelongsToATelegramOrIsSkipped) {
   Bytes all{'I', 'X', 9, 1, 2, 3};
   for (std::uint8_t version = 2; version <= 5; ++version) {
-    const Bytes frame = TelegramBuilder(version, version, 1).nav(0, TelegramBuilder::floats({1, 2, 3})).build();
+    const Bytes frame =
+        TelegramBuilder(version, version, 1).nav(0, TelegramBuilder::floats({1, 2, 3})).build();
     all.insert(all.end(), frame.begin(), frame.end());
   }
   all.push_back('I');

@@ -155,9 +155,9 @@ TEST(StdBinStatus, TheRecordedAlgorithmWordReadsAsAnAligningUnit) {
                                                  "usbl_received", "lbl_received", "heave_initialising"}));
       } else {
         ++with_gps;
-        EXPECT_EQ(names_in(word), (std::vector<std::string_view>{
-                                      "alignment", "altitude_gps", "log_received", "gps_received", "gps_valid",
-                                      "usbl_received", "lbl_received", "heave_initialising"}));
+        EXPECT_EQ(names_in(word), (std::vector<std::string_view>{"alignment", "altitude_gps", "log_received",
+                                                                 "gps_received", "gps_valid", "usbl_received",
+                                                                 "lbl_received", "heave_initialising"}));
       }
     }
   }

@@ -49,7 +49,9 @@ class FarEnd {
 
   void accept_one() { peer_ = accept(fd_, nullptr, nullptr); }
   void hang_up() { ::close(std::exchange(peer_, -1)); }
-  void say(std::string_view text) const { EXPECT_EQ(send(peer_, text.data(), text.size(), 0), ssize_t(text.size())); }
+  void say(std::string_view text) const {
+    EXPECT_EQ(send(peer_, text.data(), text.size(), 0), ssize_t(text.size()));
+  }
   void say_to(std::uint16_t port, std::string_view text) const {
     const sockaddr_in to = local(port);
     EXPECT_EQ(sendto(fd_, text.data(), text.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to),
@@ -109,7 +111,8 @@ TEST(NetStream, AServerThatComesBackIsReachedAgain) {
   }
   const auto refused = NetStream::open({Kind::kTcp, "127.0.0.1", port});
   ASSERT_FALSE(refused);
-  EXPECT_NE(refused.error().text().find("start the server there"), std::string::npos) << refused.error().text();
+  EXPECT_NE(refused.error().text().find("start the server there"), std::string::npos)
+      << refused.error().text();
   FarEnd again(SOCK_STREAM, port);
   auto stream = NetStream::open({Kind::kTcp, "localhost", port});
   ASSERT_TRUE(stream) << stream.error().text();

@@ -287,8 +287,8 @@ std::array<double, 4> quaternion_of(double roll, double pitch, double heading) {
 
 TEST(MtDecoder, OrientationInEachLocalFrameBecomesTheSameRollAndPitchWithoutAHeading) {
   constexpr double kRoll = 0.1, kPitch = -0.2, kHeading = 1.1;
-  // In north-east-down the device's axes are forward-right-down. In the other two local frames the same device
-  // is described by axes forward-left-up, which the configuration turns.
+  // In north-east-down the device's axes are forward-right-down. In the other two local frames the same
+  // device is described by axes forward-left-up, which the configuration turns.
   const Matrix3 flu_to_frd{1, 0, 0, 0, -1, 0, 0, 0, -1};
   struct Case {
     std::uint16_t frame_bits;

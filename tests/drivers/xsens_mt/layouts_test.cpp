@@ -192,13 +192,15 @@ void expect_decodes(std::uint16_t mode, std::uint32_t settings) {
 }
 
 TEST(MtDataLayouts, EveryOutputModeSettingAndNumberFormatIsRead) {
-  constexpr std::uint16_t kFreeModes[] = {0x0001, 0x0002, 0x0004, 0x0008, 0x0010, 0x0020, 0x0800, 0x1000, 0x4000};
+  constexpr std::uint16_t kFreeModes[] = {0x0001, 0x0002, 0x0004, 0x0008, 0x0010,
+                                          0x0020, 0x0800, 0x1000, 0x4000};
   int layouts = 0;
   for (unsigned choice = 0; choice < 512; ++choice) {
     unsigned mode = 0;
     for (unsigned i = 0; i < 9; ++i) mode |= (choice >> i & 1U) != 0 ? kFreeModes[i] : 0U;
     if ((mode & 0x4000) != 0 && (mode & 0x0006) != 0) {
-      EXPECT_FALSE(data_length({static_cast<std::uint16_t>(mode), 0}));  // raw excludes calibrated, orientation
+      EXPECT_FALSE(
+          data_length({static_cast<std::uint16_t>(mode), 0}));  // raw excludes calibrated, orientation
       continue;
     }
     const unsigned n_orientations = (mode & 0x0004) != 0 ? 3 : 1;

@@ -82,7 +82,8 @@ inline Bytes configuration(std::uint16_t period, std::uint16_t skip, std::uint16
   data.resize(96);
   append(data, be16(n_devices));
   for (std::uint16_t k = 0; k < n_devices; ++k) {
-    append(data, be32(n_devices == 1 && (master_id & 0x00F00000U) != 0x00100000U ? master_id : 0x00300200U + k));
+    append(data,
+           be32(n_devices == 1 && (master_id & 0x00F00000U) != 0x00100000U ? master_id : 0x00300200U + k));
     append(data, be16(length));
     append(data, be16(mode));
     append(data, be32(settings));

@@ -24,9 +24,9 @@ struct ScriptedDevice {
   std::uint16_t skip = 0;
   std::uint16_t mode = output_mode::kOrientation;  // as it comes from the factory
   std::uint32_t settings = output_settings::kSampleCounter;
-  int ignores_go_to_config = 0;                  ///< that many
-  bool sends_text = false;                       ///< NMEA, as its string output type says
-  std::uint16_t n_devices = 1;                   ///< more than one, or an Xbus head: behind it
+  int ignores_go_to_config = 0;  ///< that many
+  bool sends_text = false;       ///< NMEA, as its string output type says
+  std::uint16_t n_devices = 1;   ///< more than one, or an Xbus head: behind it
   std::uint32_t id = 0x00300123;
   std::uint16_t sync_mode = 0;
   std::uint16_t sync_skip = 0;

@@ -14,7 +14,8 @@ std::string text_of(std::span<const std::uint8_t> bytes) { return {bytes.begin()
 
 /// Messages whose bodies are text.
 bool is_text_message(std::uint16_t id) {
-  return id == kFileIdentifier || id == kReply || id == kErrorReply || id == kMessagesFormat || id == kParameter;
+  return id == kFileIdentifier || id == kReply || id == kErrorReply || id == kMessagesFormat ||
+         id == kParameter;
 }
 
 Json message_json(const Frame& frame) {
