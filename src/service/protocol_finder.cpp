@@ -40,9 +40,12 @@ FoundStream decode_as(const StreamProtocol& as, std::span<const std::uint8_t> by
 }  // namespace
 
 std::span<const StreamProtocol> stream_protocols() {
-  static constexpr std::array<StreamProtocol, 3> kProtocols{{{Protocol::kXsensMt, SampleKind::kImu},
+  static constexpr std::array<StreamProtocol, 6> kProtocols{{{Protocol::kXsensMt, SampleKind::kImu},
                                                              {Protocol::kIxblueStdbin, SampleKind::kImu},
-                                                             {Protocol::kGreis, SampleKind::kGnss}}};
+                                                             {Protocol::kNmea, SampleKind::kGnss},
+                                                             {Protocol::kUbx, SampleKind::kGnss},
+                                                             {Protocol::kGreis, SampleKind::kGnss},
+                                                             {Protocol::kRtklibPos, SampleKind::kGnss}}};
   return kProtocols;
 }
 

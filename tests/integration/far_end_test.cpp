@@ -145,10 +145,11 @@ TEST(FarEnd, SeveralMtxBehindAnXbusAreSetUpEachByItself) {
       },
       0.0);
   xsens::MtDecoderConfig config;
-  config.bus_devices = {0, 1, 2};
+  config.bus = {xsens::BusDevice{0}, xsens::BusDevice{1}, xsens::BusDevice{2}};
   config.baud = options.baud;
   xsens::MtDecoder decoder(config);
   xsens::MtSessionConfig session_config;
+  session_config.bus_devices = options.bus_devices.size();
   session_config.baud = options.baud;
   xsens::MtSession session(session_config);
   Bench bench(device, decoder, session);
