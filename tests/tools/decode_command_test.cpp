@@ -124,7 +124,8 @@ json oracle_of(const std::string& name) {
 TEST(DecodeCommand, NamesTheBlocksOfStdBinAsTheVectorsDo) {
   IMUSCOPE_NEEDS_SHARED("oracle/protocols/ixblue_stdbin.json");
   int checked = 0;
-  for (const json& v : oracle_of("ixblue_stdbin")["vectors"]) {
+  const json oracle = oracle_of("ixblue_stdbin");
+  for (const json& v : oracle["vectors"]) {
     if (!v.contains("expected")) continue;
     SCOPED_TRACE(v["name"].get<std::string>());
     const Outcome outcome = decode(recording_of("ixblue_stdbin", v["name"]), "--json");
@@ -139,7 +140,8 @@ TEST(DecodeCommand, NamesTheBlocksOfStdBinAsTheVectorsDo) {
 TEST(DecodeCommand, NamesTheFieldsOfGreisAsTheVectorsDo) {
   IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.json");
   int checked = 0;
-  for (const json& v : oracle_of("greis")["vectors"]) {
+  const json oracle = oracle_of("greis");
+  for (const json& v : oracle["vectors"]) {
     if (!v.contains("fields")) continue;
     SCOPED_TRACE(v["name"].get<std::string>());
     const Outcome outcome = decode(recording_of("greis", v["name"]), "--json");
@@ -156,7 +158,8 @@ TEST(DecodeCommand, NamesTheFieldsOfGreisAsTheVectorsDo) {
 TEST(DecodeCommand, NamesTheFieldsOfNavPvtAsTheVectorsDo) {
   IMUSCOPE_NEEDS_SHARED("oracle/protocols/ubx_nav_pvt.json");
   int checked = 0;
-  for (const json& v : oracle_of("ubx_nav_pvt")["vectors"]) {
+  const json oracle = oracle_of("ubx_nav_pvt");
+  for (const json& v : oracle["vectors"]) {
     if (!v.contains("fields")) continue;
     const Outcome outcome = decode(recording_of("ubx_nav_pvt", v["name"]), "--json");
     ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
@@ -178,7 +181,8 @@ TEST(DecodeCommand, NamesTheFieldsOfNavPvtAsTheVectorsDo) {
 TEST(DecodeCommand, NamesTheFieldsOfNmeaAsTheVectorsDo) {
   IMUSCOPE_NEEDS_SHARED("oracle/protocols/nmea.json");
   int checked = 0;
-  for (const json& v : oracle_of("nmea")["vectors"]) {
+  const json oracle = oracle_of("nmea");
+  for (const json& v : oracle["vectors"]) {
     if (!v.contains("expected")) continue;
     SCOPED_TRACE(v["name"].get<std::string>());
     const Outcome outcome = decode(recording_of("nmea", v["name"]), "--json");
