@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/contracts.h"
+#include "drivers/xsens_mt/inertial.h"
 #include "drivers/xsens_mt/wire.h"
 
 namespace imuscope::xsens_can {
@@ -23,15 +24,6 @@ constexpr double kTickRounding = 1.5;
 constexpr int kSourceGone = 100;
 /// Code of the error message.
 constexpr std::uint8_t kOutputBufferOverflow = 1;
-
-/// Rotation vector of a rotation increment, scalar first.
-Triad rotation_vector(const std::array<double, 4>& q) noexcept {
-  const double sign = q[0] < 0.0 ? -1.0 : 1.0;
-  const double sine = std::sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  // angle / sine(angle/2), with its limit at zero
-  const double scale = sign * (sine > 0.0 ? 2.0 * std::atan2(sine, sign * q[0]) / sine : 2.0);
-  return {scale * q[1], scale * q[2], scale * q[3]};
-}
 
 /// Axes that the status word calls clipped.
 std::uint32_t clip_flags(std::uint32_t status_word) noexcept {
@@ -260,7 +252,7 @@ bool Decoder::fill(const Instant& now, ImuData& imu) noexcept {
   switch (source_) {
     case Source::kIncrements:
       imu.flags |= kIsIncrement;
-      imu.omega_radps = rotated(per_second(rotation_vector(*group_.delta_q)));
+      imu.omega_radps = rotated(per_second(xsens::rotation_vector(*group_.delta_q)));
       imu.f_mps2 = rotated(per_second(*group_.delta_v));
       return true;
     case Source::kRates:
