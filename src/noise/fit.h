@@ -64,6 +64,8 @@ struct FitResult {
   double rate_hz = 0.0;
   ModelSpec spec;
   Weighting weighting = Weighting::kOptimal;
+  double confidence = 0.95;  ///< of the intervals
+  double efficiency = 1.0;   ///< of the wavelet variance's estimator; 1 = classical
   std::vector<FittedLevel> wv;
   std::vector<ParameterEstimate> parameters;
   Model model;  ///< the estimate in sample terms
@@ -71,6 +73,9 @@ struct FitResult {
   /// order of `parameters`; NaN rows where not identifiable.
   std::vector<double> covariance;
   double objective = 0.0;
+  /// Where the J-test rejects the model outright (p < 0.001, optimal weights): the share by which the model
+  /// misses the levels, part of the weights and of the intervals. 0 elsewhere.
+  double model_error = 0.0;
   std::optional<JTest> j_test;  ///< absent with fewer levels than parameters + 1
   /// For the ranking of models of the same signal, smaller is better: -2 log likelihood of the wavelet
   /// variance under the model plus ln(levels) for each parameter.
@@ -79,6 +84,9 @@ struct FitResult {
   std::string simpler_model;  ///< where not identifiable: the model to use instead
   std::vector<std::string> warnings;
 };
+
+/// The wavelet variance that was fitted, without its segments.
+WaveletVariance observed_wv(const FitResult& fit);
 
 /// Errors: rate not positive (kUsage); fewer levels than parameters, constant signal (kWork).
 Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double rate_hz,

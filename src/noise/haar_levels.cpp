@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 namespace imuscope::noise {
 namespace {
@@ -23,67 +24,124 @@ void subtract_first(std::span<const double> run, std::vector<double>& out) {
 
 double scale_of(int level) { return std::ldexp(1.0, -2 * level); }  // 1 / (2n)^2
 
+/// Four neighbouring samples at once; the same arithmetic in two halves where the processor has no wider
+/// registers, so that the result does not depend on it.
+using Lanes = double __attribute__((vector_size(32)));
+constexpr std::size_t kLanes = 4;
+
 /// Squares of one level over [from, to), without moving on to the next.
-double squares(std::vector<double>& f, std::size_t n, std::size_t from, std::size_t to) {
+double squares(const std::vector<double>& f, std::size_t n, std::size_t from, std::size_t to) {
   double sum = 0.0;
   for (std::size_t s = from; s < to; s += kStretch) {
-    const std::size_t length = std::min(kStretch, to - s);
-    sum += (stretch(f, s, length) - stretch(f, s + n, length)).square().sum();
+    const auto length = static_cast<Eigen::Index>(std::min(kStretch, to - s));
+    const Eigen::Map<const Eigen::ArrayXd> older(f.data() + s, length);
+    const Eigen::Map<const Eigen::ArrayXd> newer(f.data() + s + n, length);
+    sum += (older - newer).square().sum();
   }
   return sum;
 }
 
-/// Squares of two levels in one pass over memory; leaves in f the block sums of 4n samples.
 struct PairOfSums {
   double lower = 0.0;
   double upper = 0.0;
 };
-PairOfSums squares_of_two_levels(std::vector<double>& f, std::size_t n, std::size_t count) {
-  PairOfSums sums;
-  Eigen::Array<double, Eigen::Dynamic, 1, 0, kStretch, 1> older;
-  Eigen::Array<double, Eigen::Dynamic, 1, 0, kStretch, 1> newer;
-  for (std::size_t s = 0; s < count; s += kStretch) {
-    const std::size_t length = std::min(kStretch, count - s);
-    Array b0 = stretch(f, s, length);
-    const Array b1 = stretch(f, s + n, length);
-    sums.lower += (b0 - b1).square().sum();
-    older = b0 + b1;
-    newer = stretch(f, s + 2 * n, length) + stretch(f, s + 3 * n, length);
-    sums.upper += (older - newer).square().sum();
-    // Later stretches read only indices that are not yet overwritten here.
-    b0 = older + newer;
+
+/// Squares of two levels over a stretch of at most kStretch; leaves at f the block sums of 4n samples. Reads
+/// run ahead of writes, so that the next stretch finds what it needs.
+__attribute__((target_clones("avx2", "default"))) PairOfSums two_levels_of_stretch(double* f, std::size_t n,
+                                                                                   std::size_t length) {
+  Lanes lower{};
+  Lanes upper{};
+  std::size_t s = 0;
+  for (; s + kLanes <= length; s += kLanes) {
+    Lanes b0;
+    Lanes b1;
+    Lanes b2;
+    Lanes b3;
+    std::memcpy(&b0, f + s, sizeof(Lanes));
+    std::memcpy(&b1, f + s + n, sizeof(Lanes));
+    std::memcpy(&b2, f + s + 2 * n, sizeof(Lanes));
+    std::memcpy(&b3, f + s + 3 * n, sizeof(Lanes));
+    const Lanes low = b1 - b0;
+    lower += low * low;
+    const Lanes older = b0 + b1;
+    const Lanes newer = b2 + b3;
+    const Lanes up = newer - older;
+    upper += up * up;
+    const Lanes sum = older + newer;
+    std::memcpy(f + s, &sum, sizeof(Lanes));
+  }
+  PairOfSums sums{(lower[0] + lower[1]) + (lower[2] + lower[3]),
+                  (upper[0] + upper[1]) + (upper[2] + upper[3])};
+  for (; s < length; ++s) {
+    const double low = f[s + n] - f[s];
+    sums.lower += low * low;
+    const double older = f[s] + f[s + n];
+    const double newer = f[s + 2 * n] + f[s + 3 * n];
+    sums.upper += (newer - older) * (newer - older);
+    f[s] = older + newer;
   }
   return sums;
 }
 
-/// Levels whose supports are short beside a block that fits the second-level cache.
-constexpr int kLowLevels = 10;
-constexpr std::size_t kBlock = 16384;
-
-/// Levels 1..low_levels, block by block in cache (neighbouring blocks share one support). Leaves in `work`
-/// the sums of 2^low_levels samples. `add` takes level, sum and count.
+/// Takes the levels of n and 2n from `length` block sums of n samples at `f`, and leaves the length - 3n sums
+/// of 4n samples there. Squares count for the first `own` positions only, sums go on beyond them.
+/// Precondition: length > 3n.
 template <typename Add>
-void low_level_squares(std::span<const double> run, int low_levels, std::vector<double>& work,
-                       const Add& add) {
-  const std::size_t support = std::size_t{1} << static_cast<unsigned>(low_levels);
+void take_two_levels(std::vector<double>& f, int level, std::size_t length, std::size_t own, const Add& add) {
+  const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
+  const std::size_t lower_count = std::min(own, length - n);
+  const std::size_t upper_count = std::min(own, length - 3 * n);
+  // The lower level reaches further than the upper one; its last part comes first, before the sums move on.
+  PairOfSums total{squares(f, n, upper_count, lower_count), 0.0};
+  for (std::size_t s = 0; s < upper_count; s += kStretch) {
+    const PairOfSums sums = two_levels_of_stretch(f.data() + s, n, std::min(kStretch, upper_count - s));
+    total.lower += sums.lower;
+    total.upper += sums.upper;
+  }
+  for (std::size_t s = upper_count; s < length - 3 * n; s += kStretch) {
+    (void)two_levels_of_stretch(f.data() + s, n, std::min(kStretch, length - 3 * n - s));
+  }
+  add(level, total.lower, lower_count);
+  add(level + 1, total.upper, upper_count);
+}
+
+/// Levels first..last, as far as `length` sums of 2^(first-1) samples reach.
+template <typename Add>
+void take_levels(std::vector<double>& f, int first, int last, std::size_t length, std::size_t own,
+                 const Add& add) {
+  for (int level = first; level <= last; level += 2) {
+    const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
+    if (level == last || length <= 3 * n) {
+      if (length > n) add(level, squares(f, n, 0, std::min(own, length - n)), std::min(own, length - n));
+      return;
+    }
+    take_two_levels(f, level, length, own, add);
+    length -= 3 * n;
+  }
+}
+
+/// Levels whose supports are short beside a block that fits the second-level cache. Even.
+constexpr int kLowLevels = 12;
+constexpr std::size_t kBlock = 32768;
+
+/// Levels 1..kLowLevels, block by block in cache (neighbouring blocks share one support). Leaves in `work`
+/// the sums of 2^kLowLevels samples. `add` takes level, sum and count. Precondition: the run has levels
+/// beyond these.
+template <typename Add>
+void low_level_squares(std::span<const double> run, std::vector<double>& work, const Add& add) {
+  constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
   work.resize(run.size());
   std::vector<double> local;
   for (std::size_t start = 0; start < run.size(); start += kBlock) {
     const std::size_t own = std::min(kBlock, run.size() - start);
-    std::size_t length = std::min(own + support - 1, run.size() - start);
+    std::size_t length = std::min(own + kSupport - 1, run.size() - start);
     local.resize(length);
     const Eigen::Map<const Eigen::ArrayXd> in(run.data() + start, static_cast<Eigen::Index>(length));
     stretch(local, 0, length) = in - run.front();
-    for (int level = 1; level <= low_levels; ++level) {
-      const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
-      if (length <= n) break;
-      length -= n;  // sums of 2n samples that lie inside
-      const std::size_t count = std::min(own, length);
-      add(level, squares(local, n, 0, count), count);
-      stretch(local, 0, length) += stretch(local, n, length);
-    }
-    const std::size_t kept = std::min(own, length);
-    stretch(work, start, kept) = stretch(local, 0, kept);
+    const std::size_t kept = length >= kSupport ? std::min(own, length - kSupport + 1) : 0;
+    take_levels(local, 1, kLowLevels, length, own, add);
+    std::copy_n(local.begin(), kept, work.begin() + static_cast<std::ptrdiff_t>(start));
   }
 }
 
@@ -101,22 +159,15 @@ void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vec
     total.sum_of_squares += sum * scale_of(level);
     total.count += count;
   };
-  const int low_levels = std::min(levels, kLowLevels);
-  low_level_squares(run, low_levels, work, add);
-  for (int level = low_levels + 1; level <= levels; level += 2) {
-    const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
-    const std::size_t count = run.size() - 2 * n + 1;
-    if (level == levels) {
-      add(level, squares(work, n, 0, count), count);
-      break;
-    }
-    const std::size_t upper_count = count - 2 * n;
-    // The lower level reaches further than the upper one; its last part comes first, before the sums move on.
-    const double rest = squares(work, n, upper_count, count);
-    const PairOfSums pair = squares_of_two_levels(work, n, upper_count);
-    add(level, pair.lower + rest, count);
-    add(level + 1, pair.upper, upper_count);
+  if (levels <= kLowLevels) {
+    subtract_first(run, work);
+    take_levels(work, 1, levels, run.size(), run.size(), add);
+    return;
   }
+  low_level_squares(run, work, add);
+  constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
+  const std::size_t sums_left = run.size() - kSupport + 1;
+  take_levels(work, kLowLevels + 1, levels, sums_left, sums_left, add);
 }
 
 HaarLevels::HaarLevels(std::span<const double> run) {

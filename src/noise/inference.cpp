@@ -282,11 +282,9 @@ ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const 
 std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& residual,
                             const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
                             const std::vector<bool>& present) {
-  constexpr double kEnough = 3.0;
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < residual.size(); ++i) {
-    const WvLevel& level = wv.levels[static_cast<std::size_t>(i)];
-    if (static_cast<double>(level.n_coefficients) >= kEnough * level.tau_samples) rows.push_back(i);
+    if (has_enough_coefficients(wv.levels[static_cast<std::size_t>(i)])) rows.push_back(i);
   }
   const auto columns = indices_of(present);
   if (rows.empty() || columns.empty()) return std::nullopt;

@@ -70,6 +70,7 @@ FitResult read_fit(const json& j) {
   if (!spec) throw std::invalid_argument(spec.error().text());
   fit.spec = *spec;
   fit.weighting = j.at("weights").get<std::string>() == "ci" ? Weighting::kCi : Weighting::kOptimal;
+  fit.efficiency = j.value("efficiency", 1.0);
   for (const json& row : j.at("wv")) {
     FittedLevel level;
     level.observed.level = row.at("level").get<int>();
@@ -99,6 +100,7 @@ FitResult read_fit(const json& j) {
     for (const json& v : j.at("covariance")) fit.covariance.push_back(number_or_nan(v));
   }
   fit.objective = number_or_nan(j.at("objective"));
+  fit.model_error = j.value("model_error", 0.0);
   const json& test = j.at("j_test");
   if (test.is_object()) {
     fit.j_test = JTest{test.at("statistic").get<double>(), test.at("dof").get<int>(),
@@ -134,11 +136,13 @@ json fit_to_json(const FitResult& fit) {
            {"parameters", json::array()},
            {"covariance", json::array()},
            {"objective", number(fit.objective)},
+           {"model_error", number(fit.model_error)},
            {"j_test", nullptr},
            {"criterion", number(fit.criterion)},
            {"identifiable", fit.identifiable},
            {"warnings", fit.warnings}};
   if (!fit.simpler_model.empty()) out["simpler_model"] = fit.simpler_model;
+  if (fit.efficiency < 1.0) out["efficiency"] = fit.efficiency;
   for (const FittedLevel& level : fit.wv) {
     json row = level_to_json(level.observed, fit.rate_hz);
     row["fitted"] = number(level.fitted);

@@ -18,7 +18,8 @@ nlohmann::json wv_to_json(const WaveletVariance& wv, double rate_hz);
 
 /// {"n", "rate_hz", "model", "weights", "wv": [.. and "fitted", "model_ci_low", "model_ci_high"],
 ///  "parameters": [{"process", "name", "unit", "value", "sd", "ci_low", "ci_high"}], "covariance" (row-major,
-///  of the logarithms), "objective", "j_test", "criterion", "identifiable", "simpler_model", "warnings"}.
+///  of the logarithms), "objective", "model_error", "j_test", "criterion", "identifiable", "simpler_model",
+///  "warnings"}.
 nlohmann::json fit_to_json(const FitResult& fit);
 
 /// [{"process", "name", "unit", "value", "ci_low", "ci_high"}].

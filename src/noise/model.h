@@ -25,7 +25,7 @@ struct ModelSpec {
 /// kMaxRepeated GM and SIN. Errors (kUsage): an unknown or repeated term, named, with the terms that exist.
 Result<ModelSpec> parse_model(std::string_view text);
 
-inline constexpr int kMaxRepeated = 4;
+inline constexpr int kMaxRepeated = 8;
 
 /// A process with values, in sample terms; see process.h for what amplitude and shape mean.
 struct Component {

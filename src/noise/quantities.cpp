@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
-#include <limits>
 
 #include "base/units.h"
+#include "noise/inference.h"
 
 namespace imuscope::noise {
 namespace {
@@ -21,13 +22,8 @@ constexpr std::array<std::pair<SignalUnit, std::string_view>, 5> kUnits{{{Signal
 constexpr double kFlickerAllanDeviation = 0.664;
 const double kSqrtSecondsPerHour = std::sqrt(kSecondsPerHour);
 
-bool is_gyro(SignalUnit unit) { return unit == SignalUnit::kRadps || unit == SignalUnit::kDegps; }
-
 /// Factor to the data sheet's own unit: degrees, or metres per second squared.
-double sheet_factor(SignalUnit unit) {
-  if (unit == SignalUnit::kRadps) return kDegPerRad;
-  return unit == SignalUnit::kG ? kMps2PerG : 1.0;
-}
+double sheet_factor(SignalUnit unit) { return si_factor(unit) * (is_gyro(unit) ? kDegPerRad : 1.0); }
 
 class Builder {
  public:
@@ -87,19 +83,50 @@ class Builder {
       return;
     }
     add(p, "sd", u_, 1.0, 0.5);
-    out_.push_back({p.process, "driving density", fmt::format("({})^2 Hz", u_), 2.0 * beta_ * p.value,
-                    std::nullopt, std::nullopt});
+    // beta stands directly before its sigma2; the logarithm of the density is the sum of theirs.
+    const auto at = static_cast<Eigen::Index>(&p - fit_.parameters.data());
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit_.parameters.size()));
+    gradient[at] = 1.0;
+    if (at > 0) gradient[at - 1] = 1.0;
+    Quantity q{p.process, "driving density", fmt::format("({})^2 Hz", u_), 2.0 * beta_ * p.value, {}, {}};
+    set_interval(q, gradient);
+    out_.push_back(std::move(q));
+  }
+
+  /// Interval of a quantity whose logarithm has this gradient over the parameters' interval scales.
+  void set_interval(Quantity& q, const Eigen::VectorXd& gradient) const {
+    const auto n = gradient.size();
+    if (static_cast<Eigen::Index>(fit_.covariance.size()) != n * n) return;
+    const Eigen::Map<const Eigen::MatrixXd> all(fit_.covariance.data(), n, n);
+    double variance = 0.0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index k = 0; k < n; ++k) {
+        if (gradient[i] != 0.0 && gradient[k] != 0.0) variance += gradient[i] * gradient[k] * all(i, k);
+      }
+    }
+    if (!(variance > 0.0)) return;  // NaN where a parameter is not determined
+    const double half_width =
+        boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + fit_.confidence)) * std::sqrt(variance);
+    q.ci_low = q.value * std::exp(-half_width);
+    q.ci_high = q.value * std::exp(half_width);
   }
 
   void add_bias_instability() {
     if (unit_ == SignalUnit::kNone || fit_.wv.empty()) return;
-    double smallest = std::numeric_limits<double>::infinity();
-    for (const FittedLevel& level : fit_.wv) smallest = std::min(smallest, level.fitted);
+    const auto smallest =
+        std::min_element(fit_.wv.begin(), fit_.wv.end(),
+                         [](const FittedLevel& a, const FittedLevel& b) { return a.fitted < b.fitted; });
     // The Allan variance is twice the wavelet variance.
-    const double deviation = std::sqrt(2.0 * smallest) / kFlickerAllanDeviation * sheet_factor(unit_);
+    const double deviation = std::sqrt(2.0 * smallest->fitted) / kFlickerAllanDeviation * sheet_factor(unit_);
     const double per_hour = is_gyro(unit_) ? kSecondsPerHour : 1.0 / kMps2PerMicroG;
-    out_.push_back({"model", "bias instability", is_gyro(unit_) ? "deg/h" : "micro-g", deviation * per_hour,
-                    std::nullopt, std::nullopt});
+    Quantity q{"model", "bias instability", is_gyro(unit_) ? "deg/h" : "micro-g", deviation * per_hour, {},
+               {}};
+    const auto places = parameter_places(fit_.model);
+    if (places.size() == fit_.parameters.size() && smallest->fitted > 0.0) {
+      const Eigen::MatrixXd slope = wv_jacobian(fit_.model, {smallest->observed.level}, places);
+      set_interval(q, slope.row(0).transpose() / (2.0 * smallest->fitted));
+    }
+    out_.push_back(std::move(q));
   }
 
   const FitResult& fit_;
@@ -110,6 +137,13 @@ class Builder {
 };
 
 }  // namespace
+
+bool is_gyro(SignalUnit unit) noexcept { return unit == SignalUnit::kRadps || unit == SignalUnit::kDegps; }
+
+double si_factor(SignalUnit unit) noexcept {
+  if (unit == SignalUnit::kDegps) return kRadPerDeg;
+  return unit == SignalUnit::kG ? kMps2PerG : 1.0;
+}
 
 Result<SignalUnit> parse_unit(std::string_view text) {
   for (const auto& [unit, name] : kUnits) {

@@ -17,14 +17,17 @@ enum class SignalUnit : std::uint8_t { kNone, kRadps, kDegps, kMps2, kG };
 /// "rad/s", "deg/s", "m/s^2", "g" or "" (none). Errors: kUsage, with the units that exist.
 Result<SignalUnit> parse_unit(std::string_view text);
 std::string_view unit_name(SignalUnit unit) noexcept;
+bool is_gyro(SignalUnit unit) noexcept;
+/// Factor from the unit to rad/s or m/s^2; 1 without a unit.
+double si_factor(SignalUnit unit) noexcept;
 
 struct Quantity {
   std::string process;  ///< "WN", "GM1", ...; "model" for what the sum of the processes has
   std::string name;     ///< "density", "correlation time", "driving density", "angle random walk", ...
   std::string unit;
   double value = 0.0;
-  std::optional<double> ci_low;   ///< from the parameter's interval; absent where that is, or where it is no
-  std::optional<double> ci_high;  ///< function of one parameter alone
+  std::optional<double> ci_low;  ///< on the logarithm; absent where a parameter it is made of has none
+  std::optional<double> ci_high;
 };
 
 /// At sampling rate f, signal unit u:

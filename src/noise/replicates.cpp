@@ -9,16 +9,37 @@
 
 #include "base/contracts.h"
 #include "noise/compare.h"
+#include "noise/inference.h"
 #include "noise/wv_covariance.h"
 
 namespace imuscope::noise {
 namespace {
 
-/// Levels with at least this many times 2^j coefficients are near enough to Gaussian for a test.
-constexpr double kEnough = 3.0;
+/// Level of the J-test from which a model counts as explaining its samples.
+constexpr double kExplained = 0.01;
 
 double p_value_of(double statistic, int dof) {
   return boost::math::cdf(complement(boost::math::chi_squared(dof), statistic));
+}
+
+/// value - expected with the skewness of a wavelet variance of few degrees of freedom taken out: the
+/// difference of cube roots (Wilson and Hilferty 1931), scaled so that it keeps the variance.
+double near_gaussian_residual(double value, double expected, double variance) {
+  const double dof = 2.0 * expected * expected / variance;
+  return 3.0 * expected * (std::cbrt(value / expected) - 1.0 + 2.0 / (9.0 * dof));
+}
+
+/// Covariance of the model's curve at `levels` from that of its parameters.
+Eigen::MatrixXd curve_covariance(const FitResult& fit, const std::vector<int>& levels) {
+  const auto places = parameter_places(fit.model);
+  const auto size = static_cast<Eigen::Index>(places.size());
+  const auto rows = static_cast<Eigen::Index>(levels.size());
+  if (static_cast<Eigen::Index>(fit.covariance.size()) != size * size)
+    return Eigen::MatrixXd::Zero(rows, rows);
+  const Eigen::Map<const Eigen::MatrixXd> given(fit.covariance.data(), size, size);
+  const Eigen::MatrixXd known = given.array().isFinite().select(given, 0.0);
+  const Eigen::MatrixXd jacobian = wv_jacobian(fit.model, levels, places);
+  return jacobian * known * jacobian.transpose();
 }
 
 /// Parameters that every fit determines.
@@ -117,35 +138,31 @@ Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const 
   return joint;
 }
 
-std::optional<JTest> distance_from_model(const WaveletVariance& window, const Model& model) {
-  std::size_t levels = 0;
-  while (levels < window.levels.size() && static_cast<double>(window.levels[levels].n_coefficients) >=
-                                              kEnough * window.levels[levels].tau_samples) {
-    ++levels;
+std::optional<JTest> distance_from_model(const WaveletVariance& window, const FitResult& reference) {
+  const bool explained = !reference.j_test || reference.j_test->p_value >= kExplained;
+  std::vector<int> levels;
+  for (std::size_t i = 0; i < window.levels.size() && has_enough_coefficients(window.levels[i]); ++i) {
+    if (!explained && (i >= reference.wv.size() || !has_enough_coefficients(reference.wv[i].observed))) break;
+    levels.push_back(window.levels[i].level);
   }
-  if (levels == 0) return std::nullopt;
-  const Eigen::LLT<Eigen::MatrixXd> llt(wv_covariance(model, window, levels));
+  if (levels.empty()) return std::nullopt;
+  Eigen::MatrixXd v = wv_covariance(reference.model, window, levels.size());
+  const Eigen::VectorXd own_variance = v.diagonal();
+  v += explained ? curve_covariance(reference, levels)
+                 : wv_covariance(reference.model, observed_wv(reference), levels.size());
+  const Eigen::LLT<Eigen::MatrixXd> llt(v);
   if (llt.info() != Eigen::Success) return std::nullopt;
-  Eigen::VectorXd residual(static_cast<Eigen::Index>(levels));
-  for (std::size_t i = 0; i < levels; ++i) {
-    residual[static_cast<Eigen::Index>(i)] = window.levels[i].value - model_wv(model, window.levels[i].level);
+  Eigen::VectorXd residual(v.rows());
+  for (Eigen::Index i = 0; i < residual.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double expected = explained ? model_wv(reference.model, levels[k]) : reference.wv[k].observed.value;
+    residual[i] = near_gaussian_residual(window.levels[k].value, expected, own_variance[i]);
   }
   JTest test;
-  test.dof = static_cast<int>(levels);
+  test.dof = static_cast<int>(levels.size());
   test.statistic = llt.matrixL().solve(residual).squaredNorm();
   test.p_value = p_value_of(test.statistic, test.dof);
   return test;
-}
-
-Model over_bounding_model(const FitResult& fit) {
-  double factor = 1.0;
-  for (const FittedLevel& level : fit.wv) {
-    if (level.model_ci_high > 0.0 && level.fitted > 0.0)
-      factor = std::max(factor, level.model_ci_high / level.fitted);
-  }
-  Model model = fit.model;
-  for (Component& c : model.components) c.amplitude *= factor;
-  return model;
 }
 
 }  // namespace imuscope::noise

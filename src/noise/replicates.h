@@ -28,13 +28,11 @@ struct JointFit {
 Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const ModelSpec& spec,
                              double rate_hz, const FitOptions& options = {});
 
-/// How far a window's wavelet variance is from a model, under the model's own covariance, on the levels with
-/// M_j >= 3 * 2^j. A small p_value says that the behaviour has changed. The model's own uncertainty is not
-/// counted: it should come from far more data than the window. Absent where the window has no such level.
-std::optional<JTest> distance_from_model(const WaveletVariance& window, const Model& model);
-
-/// A model that over-bounds: every amplitude scaled up by the same factor until its curve reaches the upper
-/// end of the model-based interval at every fitted level. For filters that must not be optimistic.
-Model over_bounding_model(const FitResult& fit);
+/// How far a recent window's wavelet variance is from a model that was fitted to other samples, on the levels
+/// with enough coefficients: under the model's own covariance of the window plus the uncertainty of its
+/// parameters. Where the model does not explain its own samples (J-test), those samples' wavelet variance
+/// stands in for its curve, so that a poor model is not taken for a change. A small p_value says that the
+/// behaviour has changed. Absent where the window has no such level.
+std::optional<JTest> distance_from_model(const WaveletVariance& window, const FitResult& reference);
 
 }  // namespace imuscope::noise

@@ -14,7 +14,7 @@ namespace imuscope::noise {
 namespace {
 
 /// Moments E[r^(2k) ; |r| <= c] of N(0,1), k = 0..kMoments-1.
-constexpr int kMoments = 11;
+constexpr int kMoments = 16;
 std::array<double, kMoments> truncated_moments(double c) {
   std::array<double, kMoments> m{};
   const double density = std::exp(-0.5 * c * c) / std::sqrt(2.0 * std::numbers::pi);
@@ -131,24 +131,70 @@ double solve(std::span<const double> w, double low, double high, double f_low, d
   return std::exp(std::abs(f_low) < std::abs(f_high) ? x_low : x_high);
 }
 
+/// The scale around `centre` at which the excess is largest, by golden section on its logarithm.
+double maximiser(std::span<const double> w, double centre, double c, double target) {
+  constexpr double kHalfWidth = 0.1;
+  constexpr double kRelative = 1e-9;
+  const double ratio = 1.0 / std::numbers::phi;
+  double low = std::log(centre) - kHalfWidth;
+  double high = std::log(centre) + kHalfWidth;
+  const auto f = [&](double x) { return excess(w, std::exp(x), c, target); };
+  double left = high - ratio * (high - low);
+  double right = low + ratio * (high - low);
+  double f_left = f(left);
+  double f_right = f(right);
+  while (high - low > kRelative) {
+    if (f_left >= f_right) {
+      high = right;
+      right = left;
+      f_right = f_left;
+      f_left = f(left = high - ratio * (high - low));
+    } else {
+      low = left;
+      left = right;
+      f_left = f_right;
+      f_right = f(right = low + ratio * (high - low));
+    }
+  }
+  return std::exp(0.5 * (low + high));
+}
+
+/// The largest root; where the excess stays negative, as it may for few independent coefficients, the scale
+/// at which it comes closest: there the two roots have just met.
 double root(std::span<const double> w, double c, double target) {
   const std::vector<Bin> bins = histogram(w);
-  if (bins.empty()) return 0.0;
   double mean_square = 0.0;
-  for (const Bin& bin : bins) mean_square += bin.count * bin.centre;
+  double non_zero = 0.0;
+  for (const Bin& bin : bins) {
+    mean_square += bin.count * bin.centre;
+    non_zero += bin.count;
+  }
   const auto total = static_cast<double>(w.size());
+  if (non_zero < 0.5 * total) return 0.0;
   mean_square /= total;
   // No root lies above mean(w^2)/a(c), since chi(r) <= r^2: walk down from there to the first change of sign.
   constexpr double kStep = 1.02;
   double high = 1.01 * mean_square / target;
+  double best = high;
+  double best_excess = -1.0;
   const double lowest = bins.front().centre / (c * c);
-  while (high > lowest && excess_of_bins(bins, total, high / kStep, c, target) < 0.0) high /= kStep;
-  if (high <= lowest) return 0.0;
-  double low = high / kStep;
-  // The bins blur the equation by their width: widen until the exact equation changes sign too.
+  for (; high > lowest; high /= kStep) {
+    const double e = excess_of_bins(bins, total, high / kStep, c, target);
+    if (e > best_excess) {
+      best_excess = e;
+      best = high / kStep;
+    }
+    if (e >= 0.0) break;
+  }
+  double low = best;
   double f_low = excess(w, low, c, target);
-  while (f_low < 0.0 && low > lowest) f_low = excess(w, low /= kStep, c, target);
-  if (f_low < 0.0) return 0.0;
+  if (f_low < 0.0) {
+    // The bins blur the equation by their width, or there is no root.
+    low = maximiser(w, best, c, target);
+    f_low = excess(w, low, c, target);
+    if (f_low < 0.0) return low;
+  }
+  high = std::max(high, low * kStep);
   double f_high = excess(w, high, c, target);
   while (f_high >= 0.0) f_high = excess(w, high *= kStep, c, target);
   return solve(w, low, high, f_low, f_high, c, target);
@@ -184,6 +230,40 @@ double biweight_efficiency(double c) {
   }
   // The Gaussian variance estimator has asymptotic variance 2 s2^2.
   return 2.0 * slope * slope / (second - mean * mean);
+}
+
+std::vector<double> biweight_correlation_terms(double efficiency) {
+  const double c = biweight_constant(efficiency);
+  const auto m = truncated_moments(c);
+  // Mean of r^(2k) chi(r).
+  const auto chi_moment = [&](std::size_t k) {
+    double sum = 0.0;
+    double scale = 1.0;
+    for (std::size_t i = 0; i < kPower4.size(); ++i) {
+      sum += kPower4[i] * scale * m[i + 1 + k];
+      scale /= c * c;
+    }
+    return sum;
+  };
+  // Even Hermite polynomials He_2 .. He_10 by the powers 0, 2, 4, ... of r, and their squared lengths (2m)!.
+  constexpr std::array<std::array<double, 6>, 5> kHermite{{{-1, 1, 0, 0, 0, 0},
+                                                           {3, -6, 1, 0, 0, 0},
+                                                           {-15, 45, -15, 1, 0, 0},
+                                                           {105, -420, 210, -28, 1, 0},
+                                                           {-945, 4725, -3150, 630, -45, 1}}};
+  constexpr std::array<double, 5> kSquaredLength{2, 24, 720, 40320, 3628800};
+  std::vector<double> terms;
+  double left = 2.0 / efficiency;
+  double slope = 0.0;
+  for (std::size_t order = 0; order < kHermite.size(); ++order) {
+    double projection = 0.0;
+    for (std::size_t k = 0; k < kHermite[order].size(); ++k) projection += kHermite[order][k] * chi_moment(k);
+    if (order == 0) slope = 0.5 * projection;  // E[r chi'] / 2, by Stein's identity
+    terms.push_back(projection * projection / (kSquaredLength[order] * slope * slope));
+    left -= terms.back();
+  }
+  terms.push_back(std::max(left, 0.0));
+  return terms;
 }
 
 double biweight_constant(double efficiency) {

@@ -2,9 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
+
+#include "noise/replicates.h"
+#include "noise/wv_covariance.h"
 
 namespace imuscope::noise {
 namespace {
@@ -62,6 +67,83 @@ void apply_parsimony(std::vector<RankedModel>& ranked) {
   }
 }
 
+/// One replicate and the pool of the others.
+class LeftOut {
+ public:
+  LeftOut(WaveletVariance others_pooled, const WaveletVariance& own, const Eigen::MatrixXd& v)
+      : others(std::move(others_pooled)), llt_(v) {
+    for (Eigen::Index i = 0; i < v.rows(); ++i) own_.push_back(own.levels[static_cast<std::size_t>(i)]);
+  }
+
+  [[nodiscard]] bool valid() const { return !own_.empty() && llt_.info() == Eigen::Success; }
+  [[nodiscard]] double distance(const Model& model) const {
+    Eigen::VectorXd residual(static_cast<Eigen::Index>(own_.size()));
+    for (std::size_t i = 0; i < own_.size(); ++i) {
+      residual[static_cast<Eigen::Index>(i)] = own_[i].value - model_wv(model, own_[i].level);
+    }
+    return llt_.matrixL().solve(residual).squaredNorm();
+  }
+
+  WaveletVariance others;
+
+ private:
+  std::vector<WvLevel> own_;
+  Eigen::LLT<Eigen::MatrixXd> llt_;
+};
+
+Result<std::vector<LeftOut>> leave_one_out(std::span<const WaveletVariance> replicates,
+                                           const Model& reference) {
+  std::vector<LeftOut> out;
+  for (std::size_t k = 0; k < replicates.size(); ++k) {
+    std::vector<WaveletVariance> others(replicates.begin(), replicates.end());
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    const auto levels = static_cast<std::size_t>(
+        std::count_if(replicates[k].levels.begin(), replicates[k].levels.end(), has_enough_coefficients));
+    out.emplace_back(pool(others), replicates[k], wv_covariance(reference, replicates[k], levels));
+    if (!out.back().valid())
+      return work_error(fmt::format("replicate {} is too short to be predicted", k + 1));
+  }
+  return out;
+}
+
+void set_differences(std::vector<CrossValidated>& ranked, const std::vector<Eigen::VectorXd>& scores) {
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < ranked.size(); ++i) {
+    if (ranked[i].score < ranked[best].score) best = i;
+  }
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    const Eigen::VectorXd d = scores[i] - scores[best];
+    const auto n = static_cast<double>(d.size());
+    ranked[i].worse_by = d.mean();
+    ranked[i].worse_by_sd = std::sqrt((d.array() - d.mean()).square().sum() / (n - 1.0) / n);
+  }
+}
+
+void order_by_parsimony(std::vector<CrossValidated>& ranked) {
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const CrossValidated& a, const CrossValidated& b) { return a.score < b.score; });
+  std::size_t simplest = 0;
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    CrossValidated& m = ranked[i];
+    const bool equivalent = i == 0 || m.worse_by <= m.worse_by_sd;
+    m.reason = i == 0 ? "predicts a replicate left out best"
+                      : fmt::format("{} {:.3g} (sd {:.2g})", equivalent ? "equivalent: worse by" : "worse by",
+                                    m.worse_by, m.worse_by_sd);
+    if (!m.pooled.identifiable) {
+      m.reason += ", not identifiable";
+      continue;
+    }
+    const auto& chosen = ranked[simplest].pooled;
+    if (equivalent &&
+        (!chosen.identifiable || m.pooled.spec.parameter_count() < chosen.spec.parameter_count()))
+      simplest = i;
+  }
+  if (simplest == 0) return;
+  ranked[simplest].reason += fmt::format(", and simpler than {}", ranked.front().pooled.spec.name());
+  const auto at = ranked.begin() + static_cast<std::ptrdiff_t>(simplest);
+  std::rotate(ranked.begin(), at, at + 1);
+}
+
 }  // namespace
 
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
@@ -77,6 +159,37 @@ Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const Mo
   }
   std::stable_sort(ranked.begin(), ranked.end(), before);
   apply_parsimony(ranked);
+  return ranked;
+}
+
+Result<std::vector<CrossValidated>> cross_validate(std::span<const WaveletVariance> replicates,
+                                                   const ModelSpec& full, double rate_hz,
+                                                   const FitOptions& options) {
+  constexpr std::size_t kFewest = 3;
+  if (replicates.size() < kFewest) {
+    return usage_error(fmt::format("{} replicates are too few to leave one out", replicates.size()),
+                       fmt::format("give at least {}", kFewest));
+  }
+  const auto reference = fit(pool(replicates), full, rate_hz, options);
+  if (!reference) return tl::unexpected(reference.error());
+  const auto left_out = leave_one_out(replicates, reference->model);
+  if (!left_out) return tl::unexpected(left_out.error());
+  std::vector<CrossValidated> ranked;
+  std::vector<Eigen::VectorXd> scores;
+  for (const ModelSpec& spec : sub_models(full)) {
+    auto pooled = fit(pool(replicates), spec, rate_hz, options);
+    if (!pooled) return tl::unexpected(pooled.error());
+    Eigen::VectorXd score(static_cast<Eigen::Index>(left_out->size()));
+    for (std::size_t k = 0; k < left_out->size(); ++k) {
+      const auto trained = fit((*left_out)[k].others, spec, rate_hz, options);
+      if (!trained) return tl::unexpected(trained.error());
+      score[static_cast<Eigen::Index>(k)] = (*left_out)[k].distance(trained->model);
+    }
+    ranked.push_back({std::move(*pooled), score.mean(), 0.0, 0.0, {}});
+    scores.push_back(std::move(score));
+  }
+  set_differences(ranked, scores);
+  order_by_parsimony(ranked);
   return ranked;
 }
 

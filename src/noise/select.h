@@ -1,8 +1,9 @@
 #pragma once
 
 /// Which terms of a model a signal supports: all sub-models compared by likelihood with a price for each
-/// parameter.
+/// parameter, or, with replicates, by what they predict of a replicate left out.
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -22,5 +23,22 @@ struct RankedModel {
 /// two whose criteria differ by less than 2 the one with fewer parameters comes first.
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options = {});
+
+struct CrossValidated {
+  FitResult pooled;  ///< of all replicates together
+  /// Cross-validated WVIC: mean over the replicates of (wv - model)' V^-1 (wv - model), the model fitted to
+  /// the other replicates, V one for all models (that of the full model).
+  double score = 0.0;
+  double worse_by = 0.0;     ///< mean of the score's differences to the best, replicate by replicate
+  double worse_by_sd = 0.0;  ///< sd of that mean
+  std::string reason;
+};
+
+/// Sub-models of `full` by how well they predict a replicate that they have not seen, best first. Models
+/// whose difference to the best lies within one sd of itself are equivalent; of those the one with the fewest
+/// parameters comes first. Errors: those of fit(), and fewer than three replicates (kUsage).
+Result<std::vector<CrossValidated>> cross_validate(std::span<const WaveletVariance> replicates,
+                                                   const ModelSpec& full, double rate_hz,
+                                                   const FitOptions& options = {});
 
 }  // namespace imuscope::noise

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "base/contracts.h"
 
@@ -15,8 +16,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Grid points a coordinate by the number of coordinates; chosen so that every local minimum of three GM over
-/// twenty octaves has a point in its basin.
-constexpr std::array<int, 8> kGridPoints{1, 200, 60, 32, 16, 10, 7, 5};
+/// twenty octaves has a point in its basin. Models of more coordinates grow from smaller ones.
+constexpr std::array<int, 6> kGridPoints{1, 200, 60, 32, 16, 10};
 constexpr std::size_t kPolished = 8;
 
 /// One searched coordinate: shape value `shape` of process `process` of the spec.
@@ -329,11 +330,39 @@ SeparableSolution solution_of(const SeparableProblem& problem, const std::vector
   return s;
 }
 
-/// The smaller model with a GM added: at the slowest rate, and where the amplitudes alone gain most from it.
-std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& smaller) {
+SeparableSolution best_of_grid(const SeparableProblem& problem, const std::vector<Coordinate>& coordinates) {
+  const Polisher polisher(problem, coordinates);
+  std::vector<ColumnVector> starts(1);
+  if (!coordinates.empty()) starts = GridSearch(problem, coordinates).best(kPolished);
+  Evaluation best;
+  best.objective = kInfinity;
+  ColumnVector best_u;
+  for (ColumnVector& u : starts) {
+    const Evaluation e = polisher.run(u);
+    if (e.objective < best.objective) {
+      best = e;
+      best_u = u;
+    }
+  }
+  return solution_of(problem, coordinates, best_u, best);
+}
+
+/// The kind of which a smaller model has one less: the last repeated one, or, where the grid cannot hold the
+/// model, the last that can be repeated.
+std::optional<ProcessKind> removable_kind(const ModelSpec& spec, bool on_grid) {
+  const int kept = on_grid ? 1 : 0;
+  for (const ProcessKind kind : {ProcessKind::kGaussMarkov, ProcessKind::kSinusoid}) {
+    if (spec.count(kind) > kept) return kind;
+  }
+  return std::nullopt;
+}
+
+/// The smaller model with one more of `kind`: at the slowest rate, and where the amplitudes alone gain most
+/// from it.
+std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& smaller, ProcessKind kind) {
   constexpr int kRates = 40;
   constexpr std::size_t kKept = 3;
-  const CoordinateRange range = coordinate_range(ProcessKind::kGaussMarkov, 0, problem.levels.back());
+  const CoordinateRange range = coordinate_range(kind, 0, problem.levels.back());
   const RowVector target = problem.whitener * problem.y;
   struct Candidate {
     double objective;
@@ -343,7 +372,7 @@ std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& s
   for (int i = 0; i <= kRates; ++i) {
     Model model = smaller;
     model.components.push_back(
-        {ProcessKind::kGaussMarkov, 0.0, {std::exp(range.low + (range.high - range.low) * i / kRates), 0.0}});
+        {kind, 0.0, {shape_of_coordinate(kind, 0, range.low + (range.high - range.low) * i / kRates), 0.0}});
     order_components(model);
     std::vector<Shape> shapes;
     for (const Component& c : model.components) shapes.push_back(c.shape);
@@ -394,28 +423,19 @@ CoordinateRange coordinate_range(ProcessKind kind, int i, int highest_level) noe
 
 SeparableSolution find_global_minimum(const SeparableProblem& problem) {
   const auto coordinates = coordinates_of(problem);
-  const Polisher polisher(problem, coordinates);
-  std::vector<ColumnVector> starts(1);
-  if (!coordinates.empty()) starts = GridSearch(problem, coordinates).best(kPolished);
-  Evaluation best;
-  best.objective = kInfinity;
-  ColumnVector best_u;
-  for (ColumnVector& u : starts) {
-    const Evaluation e = polisher.run(u);
-    if (e.objective < best.objective) {
-      best = e;
-      best_u = u;
-    }
-  }
-  SeparableSolution found = solution_of(problem, coordinates, best_u, best);
-  if (problem.spec.count(ProcessKind::kGaussMarkov) < 2) return found;
+  const bool on_grid = coordinates.size() < kGridPoints.size();
+  SeparableSolution found;
+  found.objective = kInfinity;
+  if (on_grid) found = best_of_grid(problem, coordinates);
+  const auto kind = removable_kind(problem.spec, on_grid);
+  if (!kind) return found;
   // Where the last GM has no support the surface has a kink that stops the polish short of the smaller
   // model's minimum; that minimum is a point of this model too.
   SeparableProblem smaller = problem;
   smaller.spec.processes.erase(
-      std::find(smaller.spec.processes.begin(), smaller.spec.processes.end(), ProcessKind::kGaussMarkov));
-  SeparableSolution nested = find_global_minimum(smaller);
-  for (const Model& start : with_one_more(problem, nested.model)) {
+      std::find(smaller.spec.processes.begin(), smaller.spec.processes.end(), *kind));
+  const SeparableSolution nested = find_global_minimum(smaller);
+  for (const Model& start : with_one_more(problem, nested.model, *kind)) {
     SeparableSolution candidate = polish(problem, start);
     if (candidate.objective < found.objective) found = std::move(candidate);
   }

@@ -4,10 +4,10 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
 
+#include "noise/chi_squared.h"
 #include "noise/haar_levels.h"
 #include "noise/process.h"
 #include "noise/robust_scale.h"
@@ -89,6 +89,11 @@ std::vector<WvLevel> robust_levels(std::span<const double> x, const std::vector<
 
 }  // namespace
 
+bool has_enough_coefficients(const WvLevel& level) noexcept {
+  constexpr double kEnough = 3.0;
+  return static_cast<double>(level.n_coefficients) >= kEnough * level.tau_samples;
+}
+
 std::vector<Segment> valid_segments(std::span<const double> x, std::span<const std::uint8_t> mask) {
   if (mask.empty() && !x.empty() && all_finite(x)) return {{0, x.size()}};
   std::vector<Segment> segments;
@@ -108,9 +113,8 @@ void set_intervals(std::vector<WvLevel>& levels, double efficiency, double confi
   double smallest_low = std::numeric_limits<double>::infinity();
   for (WvLevel& level : levels) {
     const double eta = std::max(static_cast<double>(level.n_coefficients) / level.tau_samples, 1.0);
-    const boost::math::chi_squared distribution(eta);
-    const double low = level.value * eta / boost::math::quantile(distribution, 1.0 - tail);
-    const double high = level.value * eta / boost::math::quantile(distribution, tail);
+    const double low = level.value * eta / chi_squared_quantile(eta, 1.0 - tail);
+    const double high = level.value * eta / chi_squared_quantile(eta, tail);
     if (efficiency >= 1.0) {
       level.ci_low = low;
       level.ci_high = high;

@@ -32,6 +32,9 @@ struct WvLevel {
   double rejected_share = 0.0;       ///< robust only: share of coefficients with weight zero
 };
 
+/// M_j >= 3 * 2^j: near enough to Gaussian for tests and bounds.
+bool has_enough_coefficients(const WvLevel& level) noexcept;
+
 struct WaveletVariance {
   std::uint64_t n_samples = 0;    ///< length of the signal
   std::uint64_t n_valid = 0;      ///< samples that were used

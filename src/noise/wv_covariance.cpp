@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "noise/robust_scale.h"
+
 namespace imuscope::noise {
 namespace {
 
@@ -397,22 +399,44 @@ class LagSum {
   double exact_;
 };
 
-/// N_jk(h) [2 C^2 + 4 m_j m_k C] as LagSum takes it.
+/// Variance of the coefficients of two levels and the terms of biweight_correlation_terms(), empty for the
+/// classical estimator.
+struct RobustTerms {
+  double variance_j = 1.0;
+  double variance_k = 1.0;
+  std::vector<double> terms;
+};
+
+/// N_jk(h) [2 C^2 + 4 m_j m_k C] at the distance x >= 0 from the centre lag n_k - n_j, both sides together: C
+/// is symmetric about that lag. In the form that LagSum takes.
 class PairTerm {
  public:
-  PairTerm(CrossCovariance c, const PairCounts& pairs, double means)
-      : c_(std::move(c)), pairs_(pairs), means_(means) {}
+  PairTerm(CrossCovariance c, const PairCounts& pairs, double centre, double means, const RobustTerms& robust)
+      : c_(std::move(c)), pairs_(pairs), centre_(centre), means_(means), robust_(robust) {}
 
-  void enter(double p, double q) { c_.enter(p, q); }
-  [[nodiscard]] double inside(double h) const { return weighted(h, c_.inside(h)); }
-  [[nodiscard]] double at(double h) const { return weighted(h, c_(h)); }
+  void enter(double p, double q) { c_.enter(centre_ + p, centre_ + q); }
+  [[nodiscard]] double inside(double x) const { return weighted(x, c_.inside(centre_ + x)); }
+  [[nodiscard]] double at(double x) const { return weighted(x, c_(centre_ + x)); }
 
  private:
-  [[nodiscard]] double weighted(double h, double c) const { return pairs_(h) * c * (2.0 * c + means_); }
+  [[nodiscard]] double weighted(double x, double c) const {
+    const double mirrored = x > 0.0 ? pairs_(centre_ - x) : 0.0;
+    return (pairs_(centre_ + x) + mirrored) * (covariance_of_squares(c) + means_ * c);
+  }
+  [[nodiscard]] double covariance_of_squares(double c) const {
+    if (robust_.terms.empty()) return 2.0 * c * c;
+    const double scale = robust_.variance_j * robust_.variance_k;
+    const double rho2 = c * c / scale;
+    double sum = 0.0;
+    for (auto term = robust_.terms.rbegin(); term != robust_.terms.rend(); ++term) sum = (sum + *term) * rho2;
+    return sum * scale;
+  }
 
   CrossCovariance c_;
   const PairCounts& pairs_;
+  double centre_;
   double means_;
+  const RobustTerms& robust_;
 };
 
 /// |transfer function of level's coefficients|^2 at angular frequency b.
@@ -463,15 +487,21 @@ double uniform_correction(double q2, const WaveletVariance& wv, const WvLevel& j
   return kExcessKurtosis * q2 * q2 * scale * sum / (count_j * count_k);
 }
 
-double covariance_of_pair(const Parts& parts, const WaveletVariance& wv, const WvLevel& j, const WvLevel& k) {
+double covariance_of_pair(const Parts& parts, const WaveletVariance& wv, const WvLevel& j, const WvLevel& k,
+                          const std::vector<double>& robust_terms) {
   const double n_j = 0.5 * j.tau_samples;
   const double n_k = 0.5 * k.tau_samples;
   const PairCounts pairs(wv, j, k);
   const double means = 4.0 * (0.5 * parts.ramp * n_j) * (0.5 * parts.ramp * n_k);
-  PairTerm term(CrossCovariance(parts, n_j, n_k), pairs, means);
-  std::vector<double> breaks;
+  const double centre = n_k - n_j;
+  RobustTerms robust;
+  if (!robust_terms.empty()) {
+    robust = {CrossCovariance(parts, n_j, n_j)(0.0), CrossCovariance(parts, n_k, n_k)(0.0), robust_terms};
+  }
+  PairTerm term(CrossCovariance(parts, n_j, n_k), pairs, centre, means, robust);
+  std::vector<double> breaks;  // distances from the centre
   for (int a = 0; a < 3; ++a) {
-    for (int b = 0; b < 3; ++b) breaks.push_back(b * n_k - a * n_j);
+    for (int b = 0; b < 3; ++b) breaks.push_back(std::abs(b * n_k - a * n_j - centre));
   }
   std::sort(breaks.begin(), breaks.end());
   breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
@@ -485,14 +515,14 @@ double covariance_of_pair(const Parts& parts, const WaveletVariance& wv, const W
     reach = std::max(reach, kTimeConstants / a);
     alternating = alternating || e.a < 0.0;
   }
-  const double low = std::max(pairs.lowest(), breaks.front() - std::ceil(reach));
-  const double high = std::min(pairs.highest(), breaks.back() + std::ceil(reach));
+  const double furthest_pair = std::max(pairs.highest() - centre, centre - pairs.lowest());
+  const double high = std::min(furthest_pair, breaks.back() + std::ceil(reach));
   constexpr int kExactNear = 5;
   constexpr int kExactNearAlternating = 64;
   LagSum sum(term, alternating ? kExactNearAlternating : kExactNear);
   const double count_j = static_cast<double>(j.n_coefficients);
   const double count_k = static_cast<double>(k.n_coefficients);
-  double result = sum.between(breaks, low, high) / (count_j * count_k);
+  double result = sum.between(breaks, 0.0, high) / (count_j * count_k);
   if (parts.uniform > 0.0) result += uniform_correction(parts.uniform, wv, j, k);
   for (const Component& s : parts.sinusoids) {
     const double b = s.shape[0];
@@ -512,10 +542,12 @@ double coefficient_covariance(const Model& model, int level_j, int level_k, doub
 Eigen::MatrixXd wv_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels) {
   const Parts parts = parts_of(model);
   const auto size = static_cast<Eigen::Index>(levels);
+  std::vector<double> robust_terms;
+  if (wv.efficiency < 1.0) robust_terms = biweight_correlation_terms(wv.efficiency);
   Eigen::MatrixXd v(size, size);
   for (std::size_t j = 0; j < levels; ++j) {
     for (std::size_t k = 0; k <= j; ++k) {
-      const double value = covariance_of_pair(parts, wv, wv.levels[j], wv.levels[k]) / wv.efficiency;
+      const double value = covariance_of_pair(parts, wv, wv.levels[j], wv.levels[k], robust_terms);
       v(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) = value;
       v(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = value;
     }

@@ -21,8 +21,9 @@ namespace imuscope::noise {
 double coefficient_covariance(const Model& model, int level_j, int level_k, double lag);
 
 /// Rows and columns in the order of `wv.levels`, the first `levels` of them. The pair counts follow the
-/// segments; where those are not known, the coefficients of each level count as one run. Divided by the
-/// efficiency of a robust estimator. Relative error of an entry about 1e-3.
+/// segments; where those are not known, the coefficients of each level count as one run. Of a robust wavelet
+/// variance the squares' 2 C^2 gives way to the series of biweight_correlation_terms(). Relative error of an
+/// entry about 1e-3.
 Eigen::MatrixXd wv_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels);
 
 }  // namespace imuscope::noise

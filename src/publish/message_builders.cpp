@@ -119,6 +119,10 @@ axis_noise_model_t to_message(const AxisNoiseModel& model) {
   message.j_dof = model.j_dof;
   message.j_p_value = model.j_p_value;
   message.criterion = model.criterion;
+  message.change_statistic = model.change_statistic;
+  message.change_dof = model.change_dof;
+  message.change_p_value = model.change_p_value;
+  message.changed = model.changed;
   message.identifiable = model.identifiable ? 1 : 0;
   message.n_warnings = size_of(model.warnings);
   message.warnings = model.warnings;

@@ -132,6 +132,11 @@ struct AxisNoiseModel {
   double j_dof = kUnknown;
   double j_p_value = kUnknown;
   double criterion = kUnknown;
+  /// Distance of the samples since the last refit from the model before them; unknown at the first.
+  double change_statistic = kUnknown;
+  double change_dof = kUnknown;
+  double change_p_value = kUnknown;
+  bool changed = false;
   bool identifiable = false;
   std::vector<std::string> warnings;
 };

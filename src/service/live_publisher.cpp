@@ -218,6 +218,11 @@ void LivePublisher::on_refit(const Refit& refit) {
       to_seconds(refit.time - refit.first_reference_time);
   spdlog::info("{}: noise models fitted anew ({} of them, {:.0f} ms)", refit.noise_model.name,
                refit.noise_model.models.size(), refit.duration_s * 1e3);
+  for (const auto& model : refit.noise_model.models) {
+    if (!model.changed) continue;
+    spdlog::warn("{}: {} ({}) behaves differently since the last refit (p = {:.1g})", refit.noise_model.name,
+                 model.axis, model.regime, model.change_p_value);
+  }
   if (!bus_) return;
   bus_->publish(stamped.wavelet_variance);
   bus_->publish(stamped.noise_model);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "noise/fit.h"
+#include "noise/replicates.h"
 #include "rt/host_clock.h"
 #include "service/report_values.h"
 
@@ -32,7 +33,7 @@ void ModelBook::push(Study& study, const ErrorRow& row) {
   const bool joined = study.started && row.counter == study.next_counter && row.regime == study.regime;
   const auto regime = static_cast<std::size_t>(row.regime);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    auto& stream = study.streams[axis][regime];
+    auto& stream = study.tracks[axis][regime].recent;
     const bool valid = axis < 3 ? row.gyro_valid : row.accel_valid;
     if (!joined || !valid) stream.gap();
     if (valid) stream.push(axis < 3 ? row.e_gyro_radps[axis] : row.e_accel_mps2[axis - 3]);
@@ -50,21 +51,46 @@ void ModelBook::add(const ErrorRecord& record) {
   ++study.samples_since_refit;
 }
 
-Refit ModelBook::fit(std::size_t index) const {
-  const auto& study = studies_[index];
+void ModelBook::refit_track(const Study& study, Track& track, std::size_t axis, Regime regime,
+                            Refit& refit) const {
+  noise::WvSums window;
+  window.levels.resize(static_cast<std::size_t>(noise::StreamingOptions{}.levels));
+  track.recent.take(window);
+  noise::JTest change{kUnknown, 0, kUnknown};
+  if (track.fit) {
+    if (const auto distance = noise::distance_from_model(window.wavelet_variance(), *track.fit))
+      change = *distance;
+  }
+  const bool changed = change.p_value < kChangeLevel;
+  track.before.merge(window);
+  const auto wv = track.before.wavelet_variance();
+  if (wv.levels.empty()) return;  // a regime that has not been met yet has no model
+  refit.wavelet_variance.axes.push_back(axis_wavelet_variance(wv, axis, regime, study.rate_hz));
+  const bool search = !track.fit || changed || wv.n_samples >= 2 * track.searched_at;
+  noise::FitOptions options;
+  options.signal_unit = axis_unit(axis);
+  options.warm_start = search ? nullptr : &*track.fit;
+  auto fitted = noise::fit(wv, spec_, study.rate_hz, options);
+  if (!fitted) return;
+  if (search) track.searched_at = wv.n_samples;
+  track.fit = std::move(*fitted);
+  auto model = axis_noise_model(*track.fit, axis, regime);
+  model.change_statistic = change.statistic;
+  model.change_dof = change.dof > 0 ? change.dof : kUnknown;
+  model.change_p_value = change.p_value;
+  model.changed = changed;
+  refit.noise_model.models.push_back(std::move(model));
+}
+
+Refit ModelBook::fit(std::size_t index) {
+  auto& study = studies_[index];
   const HostTime started = host_now();
   Refit refit{index, study.last_time, study.first_reference_time, {}, {}, 0.0};
   refit.wavelet_variance.name = study.name;
   refit.noise_model.name = study.name;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {
-      const auto wv = study.streams[axis][static_cast<std::size_t>(regime)].wavelet_variance();
-      if (wv.levels.empty()) continue;  // a regime that has not been met yet has no model
-      refit.wavelet_variance.axes.push_back(axis_wavelet_variance(wv, axis, regime, study.rate_hz));
-      noise::FitOptions options;
-      options.signal_unit = axis_unit(axis);
-      const auto fitted = noise::fit(wv, spec_, study.rate_hz, options);
-      if (fitted) refit.noise_model.models.push_back(axis_noise_model(*fitted, axis, regime));
+      refit_track(study, study.tracks[axis][static_cast<std::size_t>(regime)], axis, regime, refit);
     }
   }
   refit.duration_s = to_seconds(host_now() - started);

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "noise/model.h"
+#include "noise/fit.h"
 #include "noise/streaming_wv.h"
 #include "publish/reports.h"
 #include "rt/spsc_ring.h"
@@ -33,6 +33,10 @@ struct Refit {
 
 /// The statistics alone, without the thread: rows in, refits out by sample count. Memory is bounded: one
 /// streaming wavelet variance of 16 levels (512 KiB) an axis and regime, whatever the length of the run.
+///
+/// A refit starts from the earlier model; a search over all rates is made at the first, whenever the samples
+/// have doubled, and after a change. What came in since the last refit is held against the model of before: a
+/// distance whose chance is below kChangeLevel is a change of behaviour.
 class ModelBook {
  public:
   ModelBook(const Configuration& configuration, noise::ModelSpec spec);
@@ -42,16 +46,25 @@ class ModelBook {
   /// The refit that fell due, if any.
   [[nodiscard]] std::optional<Refit> refit();
 
+  /// Of 36 axes and regimes looked at once a minute one is called changed by chance about every five hours.
+  static constexpr double kChangeLevel = 1e-4;
+
  private:
   /// One axis in one regime.
-  using Streams = std::array<std::array<noise::StreamingWv, kRegimeCount>, kAxisCount>;
+  struct Track {
+    noise::StreamingWv recent;  ///< since the last refit
+    noise::WvSums before;       ///< everything up to there
+    std::optional<noise::FitResult> fit;
+    std::uint64_t searched_at = 0;  ///< samples at the last search over all rates
+  };
+  using Tracks = std::array<std::array<Track, kRegimeCount>, kAxisCount>;
 
   struct Study {
     std::string name;
     double rate_hz = 0.0;
     std::size_t samples_per_refit = 0;
     std::size_t samples_since_refit = 0;
-    Streams streams;
+    Tracks tracks;
     bool started = false;
     std::int64_t next_counter = 0;
     Regime regime = Regime::kStatic;
@@ -60,7 +73,8 @@ class ModelBook {
   };
 
   static void push(Study& study, const ErrorRow& row);
-  [[nodiscard]] Refit fit(std::size_t index) const;
+  [[nodiscard]] Refit fit(std::size_t index);
+  void refit_track(const Study& study, Track& track, std::size_t axis, Regime regime, Refit& refit) const;
 
   std::vector<Study> studies_;
   noise::ModelSpec spec_;

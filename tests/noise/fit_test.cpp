@@ -110,6 +110,21 @@ std::vector<double> white(std::size_t n, unsigned seed) {
   return x;
 }
 
+TEST(Fit, ManyProcessesAtOnceAreFittedToTheirCurve) {
+  Model truth{{{ProcessKind::kWhiteNoise, 1.0, {}}}};
+  for (int i = 0; i < 6; ++i)
+    truth.components.push_back({ProcessKind::kGaussMarkov, 0.5, {std::pow(0.12, i), 0}});
+  const auto wv = exact_wv(truth, std::size_t{1} << 24U, 22);
+  // The second is not the truth: it comes within an interval or so of all levels together.
+  for (const auto& [name, limit] : {std::pair{"WN+6*GM", 0.05}, std::pair{"WN+MA1+ARMA11+3*GM+SIN", 2.0}}) {
+    const auto result = fit(wv, parse_model(name).value(), 100.0, {.weighting = Weighting::kCi});
+    ASSERT_TRUE(result) << result.error().text();
+    const auto& last = result->wv.back();
+    EXPECT_NEAR(last.fitted / last.observed.value, 1.0, 0.5) << name;
+    EXPECT_LT(result->objective, limit) << name;
+  }
+}
+
 TEST(Fit, WhiteNoiseAloneHasTheEfficientEstimateAndInterval) {
   // Under pure white noise the optimal weights approach the maximum-likelihood estimate, whose relative sd is
   // sqrt(2/n).
@@ -151,6 +166,37 @@ TEST(Fit, TwoGaussMarkovProcessesThatAreOneAreNotGivenIntervals) {
   const auto result = fit(wv, parse_model("WN+2*GM").value(), 100.0).value();
   EXPECT_FALSE(result.identifiable);
   EXPECT_FALSE(result.simpler_model.empty());
+}
+
+TEST(Fit, AModelThatCannotFollowTheDataPassesTheMiddleOfThemAndSaysByHowMuch) {
+  // Band-limited vibration has no power at long tau and falls twice as fast as white noise. The shortest
+  // levels are known to a permille; the fit must not buy them with factors elsewhere.
+  const Model truth{{{ProcessKind::kQuantization, 1.0, {}}, {ProcessKind::kWhiteNoise, 1e-3, {}}}};
+  const auto wv = exact_wv(truth, 20000, 12);
+  const auto result = fit(wv, parse_model("WN+GM").value(), 100.0).value();
+  ASSERT_TRUE(result.j_test.has_value());
+  EXPECT_LT(result.j_test->p_value, 1e-6);
+  EXPECT_GT(result.model_error, 0.1);
+  double sum = 0.0;
+  for (const auto& level : result.wv) sum += std::log(level.fitted / level.observed.value);
+  EXPECT_NEAR(sum / static_cast<double>(result.wv.size()), 0.0, 0.7) << "neither above nor below the data";
+  EXPECT_THAT(result.warnings.back(), HasSubstr("does not explain"));
+  // A refit from there ends at the same place.
+  FitOptions warm;
+  warm.warm_start = &result;
+  const auto again = fit(wv, parse_model("WN+GM").value(), 100.0, warm).value();
+  EXPECT_NEAR(again.model_error / result.model_error, 1.0, 0.2);
+  const auto right = fit(wv, parse_model("QN+WN").value(), 100.0).value();
+  EXPECT_EQ(right.model_error, 0.0);
+}
+
+TEST(Fit, AModelWithoutNoiseOfItsOwnHasIntervalsAllTheSame) {
+  // A pure ramp: its wavelet variance has no sampling error, and so endless degrees of freedom.
+  const Model truth{{{ProcessKind::kRamp, 1e-6, {}}}};
+  const auto result = fit(exact_wv(truth, 1U << 20U, 19), parse_model("DR").value(), 100.0);
+  ASSERT_TRUE(result) << result.error().text();
+  EXPECT_NEAR(result->parameters[0].value, 1e-3, 1e-6);
+  for (const auto& level : result->wv) EXPECT_TRUE(std::isfinite(level.model_ci_high));
 }
 
 TEST(Fit, BadInputIsRefusedWithWhatToDo) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "noise/conservative.h"
+
 namespace imuscope::noise {
 namespace {
 
@@ -61,28 +63,43 @@ TEST(Replicates, OneReplicateIsRefused) {
 }
 
 TEST(DistanceFromModel, IsChiSquareWhileNothingChangesAndLargeWhenItDoes) {
-  const Model model{{{ProcessKind::kWhiteNoise, 1.0, {}},
-                     {ProcessKind::kGaussMarkov, 0.09 / (1.0 - 0.95 * 0.95), {-std::log(0.95), 0.0}}}};
+  const auto spec = parse_model("WN+GM").value();
   int alarms = 0;
   constexpr int kWindows = 300;
   for (unsigned i = 0; i < kWindows; ++i) {
-    const auto wv = haar_wavelet_variance(series(2048, 1.0, 100 + i)).value();
-    alarms += distance_from_model(wv, model)->p_value < 0.05 ? 1 : 0;
+    // The reference is no longer than a window: its own uncertainty matters as much as the window's.
+    const auto reference =
+        fit(haar_wavelet_variance(series(4096, 1.0, 5000 + i)).value(), spec, 100.0).value();
+    const auto wv = haar_wavelet_variance(series(4096, 1.0, 100 + i)).value();
+    alarms += distance_from_model(wv, reference)->p_value < 0.05 ? 1 : 0;
   }
   // 15 expected; the chance of more than 30 is 2e-4 at the nominal level.
   EXPECT_LE(alarms, 30);
   EXPECT_GE(alarms, 3);
+  const auto reference = fit(haar_wavelet_variance(series(8192, 1.0, 1)).value(), spec, 100.0).value();
   const auto changed = haar_wavelet_variance(series(2048, 1.3, 999)).value();
-  EXPECT_LT(distance_from_model(changed, model)->p_value, 1e-6);
+  EXPECT_LT(distance_from_model(changed, reference)->p_value, 1e-6);
 }
 
-TEST(OverBoundingModel, LiesAboveEveryUpperIntervalEnd) {
+TEST(OverBounding, ReachesEveryUpperIntervalEndThatHasEnoughCoefficientsAndIsNotWasteful) {
   const auto wv = haar_wavelet_variance(series(8192, 1.0, 5)).value();
   const auto result = fit(wv, parse_model("WN+GM").value(), 100.0).value();
-  const Model bound = over_bounding_model(result);
+  const FitResult bound = over_bounding(result);
+  double closest = 1e9;
   for (const auto& level : result.wv) {
-    EXPECT_GE(model_wv(bound, level.observed.level), level.model_ci_high * (1.0 - 1e-12));
+    if (!has_enough_coefficients(level.observed)) continue;
+    const double ratio = model_wv(bound.model, level.observed.level) / level.model_ci_high;
+    EXPECT_GE(ratio, 1.0 - 1e-9);
+    closest = std::min(closest, ratio);
   }
+  // It touches where it is held up, and no common factor below the largest one is enough.
+  EXPECT_NEAR(closest, 1.0, 1e-6);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_GE(bound.model.components[i].amplitude, result.model.components[i].amplitude);
+  }
+  EXPECT_EQ(bound.parameters[1].value, result.parameters[1].value) << "rates stay";
+  EXPECT_NEAR(bound.parameters[0].value, bound.model.components[0].amplitude, 1e-12);
+  EXPECT_FALSE(bound.parameters[0].ci_low.has_value());
 }
 
 }  // namespace

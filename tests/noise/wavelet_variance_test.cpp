@@ -180,6 +180,29 @@ TEST(WaveletVariance, RobustLevelsOneToThreeSurviveOnePercentOfSpikesOf1e4) {
   }
 }
 
+/// Mean of r^2 (1 - (r/c)^2)^4 at scale s2, as the definition has it.
+double mean_chi(const std::vector<double>& w, double s2, double c) {
+  double sum = 0.0;
+  for (const double v : w) {
+    const double y = 1.0 - v * v / s2 / (c * c);
+    if (y > 0.0) sum += v * v / s2 * std::pow(y, 4);
+  }
+  return sum / static_cast<double>(w.size());
+}
+
+TEST(RobustScale, WhereTheEquationHasNoRootIsTheScaleThatComesClosest) {
+  // Amplitudes spread evenly over six decades have at no scale enough of them in reach.
+  constexpr double kC = 4.400278056;
+  std::vector<double> w;
+  for (int i = 0; i < 600; ++i) w.push_back(std::pow(10.0, 0.01 * i));
+  const double s2 = biweight_scale(w, kC).s2;
+  ASSERT_GT(s2, 0.0);
+  ASSERT_LT(mean_chi(w, s2, kC), biweight_expectation(kC)) << "this case is meant to have no root";
+  for (double other = 1e-2; other < 1e13; other *= 1.01) {
+    EXPECT_LE(mean_chi(w, other, kC), mean_chi(w, s2, kC) * (1.0 + 1e-3)) << other;
+  }
+}
+
 TEST(WaveletVariance, RobustLevelsOfAPureRampAreNotZero) {
   std::vector<double> x(3000);
   std::iota(x.begin(), x.end(), 0.0);

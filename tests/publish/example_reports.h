@@ -78,6 +78,10 @@ inline NoiseModelReport example_noise_model() {
   model.j_dof = 7;
   model.j_p_value = 0.72;
   model.criterion = -2.5;
+  model.change_statistic = 61.5;
+  model.change_dof = 9.0;
+  model.change_p_value = 7e-10;
+  model.changed = true;
   model.identifiable = true;
   model.warnings = {"the slowest process is longer than the data"};
   return {kExampleUtc, 61.0, "mtx1", {model}};

@@ -174,6 +174,9 @@ TEST(MessageBuilders, NoiseModelKeepsItsParametersAndWhatIsUnknown) {
   EXPECT_THAT(model.fitted, ElementsAre(0.25));
   EXPECT_THAT((std::array{model.objective, model.j_statistic, model.j_dof, model.j_p_value, model.criterion}),
               ElementsAre(3.5, 4.5, 7, 0.72, -2.5));
+  EXPECT_THAT((std::array{model.change_statistic, model.change_dof, model.change_p_value}),
+              ElementsAre(61.5, 9.0, 7e-10));
+  EXPECT_EQ(model.changed, 1);
   EXPECT_EQ(model.identifiable, 1);
   EXPECT_THAT(model.warnings, ElementsAre("the slowest process is longer than the data"));
 }

@@ -1,6 +1,8 @@
 #include "service/modeller.h"
 
 #include <gtest/gtest.h>
+
+#include <cmath>
 #include <random>
 
 #include "noise/wavelet_variance.h"
@@ -69,6 +71,67 @@ TEST(ModelBook, RefitsByCountAndAgreesWithTheBatchOverTheSameGapsAndRegimes) {
       EXPECT_EQ(streamed.levels[j].n_coefficients,
                 static_cast<std::int64_t>(expected->levels[j].n_coefficients));
     }
+  }
+}
+
+/// Feeds `seconds` of 100 Hz rows of sd `sd` and returns the refit at their end, which is due.
+Refit fed(ModelBook& book, std::int64_t& counter, int seconds, double sd, std::mt19937& random) {
+  for (int i = 0; i < 100 * seconds; ++i) {
+    auto row = row_of(counter++, Regime::kStatic, random);
+    for (auto* triad : {&row.e_gyro_radps, &row.e_accel_mps2}) {
+      for (double& e : *triad) e *= sd;
+    }
+    book.add({0, HostTime{}, row});
+  }
+  auto refit = book.refit();
+  EXPECT_TRUE(refit);
+  return refit ? std::move(*refit) : Refit{};
+}
+
+TEST(ModelBook, TellsAChangeOfBehaviourAtTheRefitAfterItAndNoneBefore) {
+  ModelBook book(two_devices(), *noise::parse_model("WN"));
+  std::mt19937 random(17);
+  std::int64_t counter = 0;
+  const auto first = fed(book, counter, 10, 1.0, random);
+  ASSERT_EQ(first.noise_model.models.size(), kAxisCount);
+  EXPECT_TRUE(std::isnan(first.noise_model.models[0].change_p_value))
+      << "there is nothing before to compare with";
+  for (int quiet = 0; quiet < 10; ++quiet) {
+    for (const auto& model : fed(book, counter, 10, 1.0, random).noise_model.models) {
+      EXPECT_FALSE(model.changed) << model.axis << " p " << model.change_p_value;
+      EXPECT_GT(model.change_dof, 5.0);
+    }
+  }
+  // A fifth more noise in ten seconds of 1000 samples.
+  for (const auto& model : fed(book, counter, 10, 1.2, random).noise_model.models) {
+    EXPECT_TRUE(model.changed) << model.axis << " p " << model.change_p_value;
+  }
+}
+
+TEST(ModelBook, AWarmRefitEndsWhereASearchOverAllRatesDoes) {
+  const auto spec = *noise::parse_model("WN+GM");
+  ModelBook book(two_devices(), spec);
+  NoiseSeries batch;
+  std::mt19937 random(23);
+  std::normal_distribution<double> normal;
+  double state = 0.0;
+  std::optional<Refit> last;
+  for (int i = 0; i < 5000; ++i) {
+    auto row = row_of(i, Regime::kStatic, random);
+    state = 0.98 * state + 0.2 * normal(random);
+    row.e_gyro_radps[0] += state;
+    book.add({0, HostTime{}, row});
+    batch.add(row);
+    if (auto refit = book.refit()) last = std::move(refit);
+  }
+  ASSERT_TRUE(last);
+  const auto wv = noise::haar_wavelet_variance(batch.values(0)).value();
+  const auto cold = noise::fit(wv, spec, 100.0).value();
+  const auto& warm = last->noise_model.models[0];
+  ASSERT_EQ(warm.parameters.size(), cold.parameters.size());
+  for (std::size_t i = 0; i < cold.parameters.size(); ++i) {
+    ASSERT_TRUE(cold.parameters[i].sd);
+    EXPECT_NEAR(warm.parameters[i].value, cold.parameters[i].value, 0.05 * *cold.parameters[i].sd);
   }
 }
 

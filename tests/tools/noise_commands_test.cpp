@@ -124,6 +124,123 @@ TEST_F(NoiseCommands, ARawFloat64FileGivesTheSameAsItsText) {
   EXPECT_EQ(from_raw.out, run("wv " + write("x.csv", text) + " -r 10 --json").out);
 }
 
+TEST_F(NoiseCommands, ExportWritesWhatFitPrintedForEveryTool) {
+  const auto fit =
+      run("fit " + white("w.csv", 5) + " -c gyro_x --rate 100 --model WN+RW --unit deg/s --json");
+  ASSERT_EQ(fit.exit_code, 0) << fit.err;
+  const auto file = write("gyro_x.json", fit.out);
+  for (const auto& [tool, key] : std::vector<std::pair<std::string, std::string>>{
+           {"kalibr", "gyroscope_noise_density: "},
+           {"ros", "angular_velocity_covariance: ["},
+           {"px4", "EKF2_GYR_NOISE\t"},
+           {"kf-gins", "  arw: ["},
+           {"state-space", "\"schema\": \"imuscope/state-space 1\""}}) {
+    const auto result = run(std::string("export ").append(file).append(" --to ").append(tool));
+    EXPECT_EQ(result.exit_code, 0) << tool << ": " << result.err;
+    EXPECT_THAT(result.out, HasSubstr(key)) << tool;
+  }
+  // 1 deg/s of white noise at 100 Hz is a density of 0.1 deg/s/sqrt(Hz).
+  const auto kalibr = run("export " + file + " --to kalibr").out;
+  const auto at = kalibr.find("gyroscope_noise_density: ");
+  EXPECT_NEAR(std::stod(kalibr.substr(at + 25)), 0.1 * 0.017453, 0.00005);
+}
+
+TEST_F(NoiseCommands, ExportTakesOneImuAndRegimeOfARunAndAsksWhereThereAreSeveral) {
+  const auto fit = run("fit " + white("w.csv", 6) + " -c gyro_x --rate 100 --model WN --unit rad/s --json");
+  ASSERT_EQ(fit.exit_code, 0) << fit.err;
+  nlohmann::json models{{"schema", "imuscope/models 1"}, {"models", nlohmann::json::array()}};
+  for (const char* regime : {"static", "dynamic"}) {
+    auto model = nlohmann::json::parse(fit.out);
+    model["name"] = "mtx1";
+    model["axis"] = "gyro_x";
+    model["regime"] = regime;
+    models["models"].push_back(model);
+  }
+  const auto file = write("models.json", models.dump());
+  const auto asked = run("export " + file + " --to kalibr");
+  EXPECT_EQ(asked.exit_code, 2);
+  EXPECT_THAT(asked.err, HasSubstr("dynamic, static; give --regime"));
+  const auto wrong = run("export " + file + " --to kalibr --regime parked");
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("parked"));
+  EXPECT_EQ(run("export " + file + " --to kalibr --regime static --name mtx1").exit_code, 0);
+}
+
+TEST_F(NoiseCommands, SeveralFilesAreFittedTogetherAndTestedForBeingOneProcess) {
+  const std::string files = white("a.csv", 7) + " " + white("b.csv", 8) + " " + white("c.csv", 9);
+  const auto result = run("fit " + files + " -c gyro_x --rate 100 --model WN+RW --select --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json.at("model"), "WN");
+  EXPECT_EQ(json.at("n"), 3 * 4096);
+  EXPECT_EQ(json.at("replicates").size(), 3U);
+  EXPECT_EQ(json.at("homogeneity").at("dof"), 2);
+  EXPECT_GT(json.at("homogeneity").at("p_value").get<double>(), 1e-3);
+  ASSERT_EQ(json.at("ranking").size(), 3U);
+  EXPECT_TRUE(json.at("ranking").at(0).contains("cv_wvic"));
+  const auto table = run("fit " + files + " -c gyro_x --rate 100 --model WN+RW --select");
+  EXPECT_THAT(table.out, HasSubstr("near-stationarity"));
+  EXPECT_THAT(table.out, HasSubstr("replicate 3"));
+}
+
+TEST_F(NoiseCommands, ConservativeAmplitudesComeOnRequestAndAreLarger) {
+  const auto result =
+      run("fit " + white("w.csv", 10) + " -c gyro_x --rate 100 --model WN -u m/s^2 --conservative --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_GT(json.at("conservative").at("parameters").at(0).at("value").get<double>(),
+            json.at("parameters").at(0).at("ci_high").get<double>());
+  EXPECT_TRUE(json.at("conservative").at("parameters").at(0).at("ci_low").is_null());
+}
+
+TEST_F(NoiseCommands, ARegimeAndACounterMakeGapsInTheSignal) {
+  // Rows 0..7 static, 8..11 dynamic, 12..19 static, with the counter jumping by 3 after row 15.
+  std::string text = "counter,e,regime\n";
+  for (int i = 0; i < 20; ++i) {
+    text += std::to_string(i + (i > 15 ? 3 : 0)) + "," + std::to_string((i * 37) % 11) + "," +
+            (i < 8 || i > 11 ? "static" : "dynamic") + "\n";
+  }
+  const auto result =
+      run("wv " + write("errors.csv", text) + " -r 1 -c e --where regime=static --counter counter --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json.at("n"), 16);
+  ASSERT_EQ(json.at("wv").size(), 3U);
+  EXPECT_EQ(json.at("wv").at(0).at("n_coefficients"), 7 + 3 + 3);
+  EXPECT_EQ(json.at("wv").at(2).at("n_coefficients"), 1);
+}
+
+TEST_F(NoiseCommands, NotANumberCountsAsAGapOnRequest) {
+  const auto file = write("gap.csv", "1\n2\nnan\n3\n5\n4\n");
+  const auto refused = run("wv " + file + " -r 1");
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("--nan-is-gap"));
+  const auto taken = run("wv " + file + " -r 1 --nan-is-gap --json");
+  ASSERT_EQ(taken.exit_code, 0) << taken.err;
+  EXPECT_EQ(nlohmann::json::parse(taken.out).at("wv").at(0).at("n_coefficients"), 1 + 2);
+}
+
+TEST_F(NoiseCommands, ShortAndConstantSignalsHaveTheVarianceThatThereIs) {
+  const auto two = run("wv " + write("two.csv", "1\n3\n") + " -r 1 --json");
+  ASSERT_EQ(two.exit_code, 0) << two.err;
+  EXPECT_EQ(nlohmann::json::parse(two.out).at("wv").at(0).at("value"), 1.0);
+  std::string eight;
+  for (const int v : {1, 2, 4, 1, 0, 3, 5, 2}) eight += std::to_string(v) + "\n";
+  const auto power = run("wv " + write("eight.csv", eight) + " -r 1 --json");
+  ASSERT_EQ(power.exit_code, 0) << power.err;
+  const auto levels = nlohmann::json::parse(power.out).at("wv");
+  ASSERT_EQ(levels.size(), 3U);
+  EXPECT_EQ(levels.at(2).at("n_coefficients"), 1);
+  EXPECT_TRUE(levels.at(2).at("ci_high").is_number());
+  for (const char* value : {"0", "7"}) {
+    std::string text;
+    for (int i = 0; i < 16; ++i) text += std::string(value) + "\n";
+    const auto constant = run("wv " + write("constant.csv", text) + " -r 1 --json");
+    ASSERT_EQ(constant.exit_code, 0) << constant.err;
+    EXPECT_EQ(nlohmann::json::parse(constant.out).at("wv").at(3).at("value"), 0.0);
+  }
+}
+
 struct BadInput {
   const char* name;
   const char* file;  ///< nullptr: not written
@@ -166,6 +283,22 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"RateIsText", "w.csv", "1\n2\n", "wv {} -r fast", 2, "rate"},
         BadInput{"OneSample", "o.csv", "1\n", "wv {} -r 1", 1, "at least 2"},
         BadInput{"NotANumber", "q.csv", "1\n2\nnan\n3\n", "wv {} -r 1", 1, "sample 2"},
+        BadInput{"Infinity", "i.csv", "1\ninf\n2\n3\n", "fit {} -r 1 -m WN", 1, "sample 1"},
+        BadInput{"AllNotANumber", "g.csv", "nan\nnan\nnan\n", "wv {} -r 1 --nan-is-gap", 1, "at least 2"},
+        BadInput{"AllZeros", "0.csv", "0\n0\n0\n0\n", "fit {} -r 1 -m WN", 1, "constant"},
+        BadInput{"TwoSamples", "2.csv", "1\n2\n", "fit {} -r 1 -m WN+RW", 1, "2 parameters"},
+        BadInput{"NegativeRate", "p.csv", "1\n2\n", "fit {} -r -100 -m WN", 2, "rate"},
+        BadInput{"RateNotANumber", "x.csv", "1\n2\n", "wv {} -r nan", 2, "rate"},
+        BadInput{"TooManyLevels", "l.csv", "1\n2\n3\n5\n", "wv {} -r 1 -l 9", 1, "at most 2 levels"},
+        BadInput{"WvUnknownUnit", "h.csv", "1\n2\n", "wv {} -r 1 -u furlong", 2, "furlong"},
+        BadInput{"WhereWithoutEquals", "a.csv", "a,b\n1,2\n", "wv {} -r 1 -c a --where b", 2, "COLUMN=VALUE"},
+        BadInput{"FallingCounter", "d.csv", "a,b\n1,2\n2,1\n", "wv {} -r 1 -c a --counter b", 1,
+                 "line 3: the counter goes from 2 to 1"},
+        BadInput{"ColumnOfARawFile", "b.f64", "12345678", "wv {} -r 1 -c 1", 2, "no columns"},
+        BadInput{"HalfANumber", "9.f64", "123456789", "wv {} -r 1", 1, "9 bytes"},
+        BadInput{"ExportToNobody", "j1.json", "{}", "export {} --to matlab", 2, "kalibr, ros, px4"},
+        BadInput{"ExportOfNoFit", "j2.json", "{}", "export {} --to kalibr", 1, "not a fit"},
+        BadInput{"ExportOfNoJson", "j3.json", "WN", "export {} --to kalibr", 1, "is not JSON"},
         BadInput{"Constant", "k.csv", "2\n2\n2\n2\n", "fit {} -r 1 -m WN", 1, "constant"},
         BadInput{"UnknownTerm", "u.csv", "1\n2\n3\n", "fit {} -r 1 -m WN+FLICKER", 2, "FLICKER"},
         BadInput{"UnknownWeights", "v.csv", "1\n2\n3\n", "fit {} -r 1 -m WN -w best", 2, "optimal"},

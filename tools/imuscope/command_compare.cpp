@@ -1,14 +1,13 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "commands.h"
+#include "fit_file.h"
 #include "noise/compare.h"
-#include "noise/json.h"
 
 namespace imuscope::cli {
 namespace {
@@ -20,15 +19,13 @@ struct CompareCommand {
 };
 
 Result<noise::FitResult> read_fit(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!std::filesystem::is_regular_file(file) || !in) {
-    return work_error(fmt::format("{} is not a file that can be read", file.string()));
+  auto fits = read_fits(file);
+  if (!fits) return tl::unexpected(fits.error());
+  if (fits->size() > 1) {
+    return usage_error(fmt::format("{} holds {} models", file.string(), fits->size()),
+                       "give files of one fit each");
   }
-  const auto json = nlohmann::json::parse(in, nullptr, false);
-  if (json.is_discarded()) return work_error(fmt::format("{} is not JSON", file.string()));
-  auto fit = noise::fit_from_json(json);
-  if (!fit) return work_error(fmt::format("{}: {}", file.string(), fit.error().text()));
-  return fit;
+  return std::move(fits->front().fit);
 }
 
 std::string cell(const std::optional<double>& value) { return value ? fmt::format("{:.6g}", *value) : "-"; }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "commands.h"
 #include "noise/json.h"
@@ -11,8 +12,12 @@
 namespace imuscope::cli {
 namespace {
 
-void print_table(const noise::WaveletVariance& wv, double rate_hz) {
+void print_table(const noise::WaveletVariance& wv, double rate_hz, const std::string& unit) {
   const bool robust = wv.efficiency < 1.0;
+  if (!unit.empty()) fmt::print("wv in ({0})^2, allan_dev in {0}\n", unit);
+  if (wv.n_valid < wv.n_samples) {
+    fmt::print("{} of {} samples used, in {} runs\n", wv.n_valid, wv.n_samples, wv.segments.size());
+  }
   fmt::print("{:>5} {:>12} {:>12} {:>13} {:>13} {:>13} {:>13} {:>12}{}\n", "level", "tau_s", "allan_tau_s",
              "wv", "ci_low", "ci_high", "allan_dev", "coefficients", robust ? "   rejected" : "");
   for (const noise::WvLevel& level : wv.levels) {
@@ -31,14 +36,17 @@ void add_wv(CLI::App& app, Work& chosen) {
   auto* command =
       app.add_subcommand("wv", "Wavelet variance of a signal (half the Allan variance at half of tau)");
   auto options = std::make_shared<SignalOptions>();
-  add_signal_options(*command, *options);
+  add_signal_options(*command, *options, false);
   on_chosen(*command, chosen, [options]() -> Result<void> {
-    const auto wv = wavelet_variance_of(*options);
-    if (!wv) return tl::unexpected(wv.error());
+    const auto wvs = wavelet_variances_of(*options);
+    if (!wvs) return tl::unexpected(wvs.error());
+    const auto& wv = wvs->front();
     if (options->json) {
-      fmt::print("{}\n", noise::wv_to_json(*wv, options->rate_hz).dump(2));
+      auto json = noise::wv_to_json(wv, options->rate_hz);
+      json["unit"] = options->unit;
+      fmt::print("{}\n", json.dump(2));
     } else {
-      print_table(*wv, options->rate_hz);
+      print_table(wv, options->rate_hz, options->unit);
     }
     return {};
   });

@@ -30,6 +30,9 @@ void add_fit(CLI::App& app, Work& chosen);
 /// `imuscope compare A.json B.json`
 void add_compare(CLI::App& app, Work& chosen);
 
+/// `imuscope export MODEL.json --to kalibr|ros|px4|kf-gins|state-space`
+void add_export(CLI::App& app, Work& chosen);
+
 /// `imuscope run CONFIG`
 void add_run(CLI::App& app, Work& chosen);
 

@@ -29,6 +29,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_wv(app, work);
   imuscope::cli::add_fit(app, work);
   imuscope::cli::add_compare(app, work);
+  imuscope::cli::add_export(app, work);
   imuscope::cli::add_run(app, work);
   imuscope::cli::add_replay(app, work);
   imuscope::cli::add_process(app, work);

@@ -7,6 +7,7 @@
 #include <bit>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <numeric>
@@ -99,11 +100,14 @@ Result<std::size_t> find_column(const std::vector<std::string>& names, bool has_
                      fmt::format("did you mean '{}'? {}", nearest(names, wanted), list));
 }
 
+/// A hole longer than this is not padded sample by sample: the counter began anew.
+constexpr std::int64_t kLongestHole = 10'000'000;
+
 class CsvReader {
  public:
-  CsvReader(std::string file, const std::string& column) : file_(std::move(file)), column_(column) {}
+  CsvReader(std::string file, const SignalChoice& choice) : file_(std::move(file)), choice_(choice) {}
 
-  Result<std::vector<double>> read(std::istream& in) {
+  Result<Signal> read(std::istream& in) {
     std::string line;
     while (std::getline(in, line)) {
       ++line_number_;
@@ -111,15 +115,15 @@ class CsvReader {
       if (content.empty()) continue;
       if (auto taken = take(content); !taken) return tl::unexpected(taken.error());
     }
-    if (values_.empty()) return work_error(fmt::format("{} holds no numbers", file_));
-    return std::move(values_);
+    if (signal_.values.empty()) return work_error(fmt::format("{} holds no numbers", file_));
+    return std::move(signal_);
   }
 
  private:
   Result<void> take(std::string_view line) {
     if (!started_) return start(line);
     split(line, separator_, cells_);
-    return add_value();
+    return add_row();
   }
 
   Result<void> start(std::string_view line) {
@@ -135,53 +139,118 @@ class CsvReader {
         name = name.substr(1, name.size() - 2);
       names.push_back(has_header ? std::string(name) : std::to_string(i + 1));
     }
-    const auto index = find_column(names, has_header, column_, file_);
-    if (!index) return tl::unexpected(index.error());
-    index_ = *index;
-    return has_header ? Result<void>{} : add_value();
+    if (auto found = find_columns(names, has_header); !found) return found;
+    return has_header ? Result<void>{} : add_row();
   }
 
-  Result<void> add_value() {
-    if (index_ >= cells_.size()) {
-      return work_error(fmt::format("{}, line {}: {} columns, and column {} is wanted", file_, line_number_,
-                                    cells_.size(), index_ + 1));
+  Result<void> find_columns(const std::vector<std::string>& names, bool has_header) {
+    const auto index = find_column(names, has_header, choice_.column, file_);
+    if (!index) return tl::unexpected(index.error());
+    index_ = *index;
+    if (!choice_.where.empty()) {
+      const std::size_t equals = choice_.where.find('=');
+      if (equals == std::string::npos || equals == 0) {
+        return usage_error(fmt::format("--where {} has no COLUMN=VALUE", choice_.where),
+                           "write for instance --where regime=static");
+      }
+      const auto column = find_column(names, has_header, choice_.where.substr(0, equals), file_);
+      if (!column) return tl::unexpected(column.error());
+      where_index_ = *column;
+      wanted_ = choice_.where.substr(equals + 1);
     }
-    const auto value = to_number(cells_[index_]);
-    if (!value) {
-      return work_error(fmt::format("{}, line {}, column {}: '{}' is not a number", file_, line_number_,
-                                    index_ + 1, cells_[index_]));
+    if (!choice_.counter.empty()) {
+      const auto column = find_column(names, has_header, choice_.counter, file_);
+      if (!column) return tl::unexpected(column.error());
+      counter_index_ = *column;
     }
-    values_.push_back(*value);
     return {};
   }
 
+  Result<std::string_view> cell(std::size_t index) const {
+    if (index < cells_.size()) return cells_[index];
+    return work_error(fmt::format("{}, line {}: {} columns, and column {} is wanted", file_, line_number_,
+                                  cells_.size(), index + 1));
+  }
+
+  Result<double> number(std::size_t index) const {
+    const auto text = cell(index);
+    if (!text) return tl::unexpected(text.error());
+    if (const auto value = to_number(*text)) return *value;
+    return work_error(
+        fmt::format("{}, line {}, column {}: '{}' is not a number", file_, line_number_, index + 1, *text));
+  }
+
+  Result<void> add_row() {
+    const auto value = number(index_);
+    if (!value) return tl::unexpected(value.error());
+    if (counter_index_) {
+      if (auto padded = pad_hole(); !padded) return padded;
+    }
+    bool valid = true;
+    if (where_index_) {
+      const auto text = cell(*where_index_);
+      if (!text) return tl::unexpected(text.error());
+      valid = *text == wanted_;
+    }
+    add(*value, valid);
+    return {};
+  }
+
+  /// Samples that the counter says are missing before this row.
+  Result<void> pad_hole() {
+    const auto count = number(*counter_index_);
+    if (!count) return tl::unexpected(count.error());
+    const auto counter = static_cast<std::int64_t>(std::llround(*count));
+    const std::int64_t hole = next_counter_ ? counter - *next_counter_ : 0;
+    if (hole < 0 || hole > kLongestHole) {
+      return work_error(fmt::format("{}, line {}: the counter goes from {} to {}", file_, line_number_,
+                                    *next_counter_ - 1, counter),
+                        "it must rise from row to row");
+    }
+    for (std::int64_t i = 0; i < hole; ++i) add(0.0, false);
+    next_counter_ = counter + 1;
+    return {};
+  }
+
+  void add(double value, bool valid) {
+    signal_.values.push_back(value);
+    if (where_index_ || counter_index_) signal_.mask.push_back(valid ? 1 : 0);
+  }
+
   std::string file_;
-  const std::string& column_;
+  const SignalChoice& choice_;
   std::vector<std::string_view> cells_;
-  std::vector<double> values_;
+  Signal signal_;
   std::size_t index_ = 0;
+  std::optional<std::size_t> where_index_;
+  std::string wanted_;
+  std::optional<std::size_t> counter_index_;
+  std::optional<std::int64_t> next_counter_;
   std::size_t line_number_ = 0;
   char separator_ = ',';
   bool started_ = false;
 };
 
-Result<std::vector<double>> read_raw(std::istream& in, std::uintmax_t size, const std::string& file,
-                                     const std::string& column) {
-  if (!column.empty())
-    return usage_error(fmt::format("{} is raw float64 and has no columns", file), "leave out --column");
+Result<Signal> read_raw(std::istream& in, std::uintmax_t size, const std::string& file,
+                        const SignalChoice& choice) {
+  if (!choice.column.empty() || !choice.where.empty() || !choice.counter.empty()) {
+    return usage_error(fmt::format("{} is raw float64 and has no columns", file),
+                       "leave out --column, --where and --counter");
+  }
   if (size % sizeof(double) != 0) {
     return work_error(fmt::format("{} has {} bytes, which is no whole number of float64 values", file, size));
   }
-  std::vector<double> values(size / sizeof(double));
-  if (!in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(size))) {
+  Signal signal;
+  signal.values.resize(size / sizeof(double));
+  if (!in.read(reinterpret_cast<char*>(signal.values.data()), static_cast<std::streamsize>(size))) {
     return work_error(fmt::format("{} could not be read to its end", file));
   }
-  return values;
+  return signal;
 }
 
 }  // namespace
 
-Result<std::vector<double>> read_signal(const std::filesystem::path& file, const std::string& column) {
+Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice& choice) {
   const std::string name = file.string();
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
@@ -192,8 +261,8 @@ Result<std::vector<double>> read_signal(const std::filesystem::path& file, const
   std::ifstream in(file, std::ios::binary);
   if (!in) return work_error(fmt::format("{} cannot be opened: {}", name, std::strerror(errno)));
   if (in.peek() == std::ifstream::traits_type::eof()) return work_error(fmt::format("{} is empty", name));
-  if (file.extension() == ".f64") return read_raw(in, std::filesystem::file_size(file, error), name, column);
-  return CsvReader(name, column).read(in);
+  if (file.extension() == ".f64") return read_raw(in, std::filesystem::file_size(file, error), name, choice);
+  return CsvReader(name, choice).read(in);
 }
 
 }  // namespace imuscope::cli

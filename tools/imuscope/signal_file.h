@@ -2,6 +2,7 @@
 
 /// A signal from a file: one column of a CSV, or raw little-endian float64 (`.f64`).
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -10,11 +11,21 @@
 
 namespace imuscope::cli {
 
+struct SignalChoice {
+  std::string column;   ///< a header name, or a number from 1; may be empty where there is one column only
+  std::string where;    ///< "COLUMN=VALUE": rows whose cell is something else count as gaps; may be empty
+  std::string counter;  ///< column that counts the samples: numbers left out are gaps; may be empty
+};
+
+struct Signal {
+  std::vector<double> values;
+  std::vector<std::uint8_t> mask;  ///< 1 = a value; empty: all are
+};
+
 /// CSV: separated by comma, semicolon, tab or blanks; `#` starts a comment; a first line that is not all
-/// numbers is the header. `column`: a header name, or a number from 1; may be empty where there is one column
-/// only. "nan" is a value (the caller decides). Errors (kWork): a missing or empty file, a folder, text where
-/// a number belongs (line and column told). kUsage: a column that does not exist (columns listed, nearest
-/// name suggested).
-Result<std::vector<double>> read_signal(const std::filesystem::path& file, const std::string& column);
+/// numbers is the header. "nan" is a value (the caller decides). Errors (kWork): a missing or empty file, a
+/// folder, text where a number belongs (line and column told), a counter that does not rise. kUsage: a column
+/// that does not exist (columns listed, nearest name suggested), a choice of columns in a raw file.
+Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice& choice);
 
 }  // namespace imuscope::cli

@@ -5,15 +5,19 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
+#include "noise/quantities.h"
 #include "noise/wavelet_variance.h"
+#include "signal_file.h"
 
 namespace imuscope::cli {
 
 struct SignalOptions {
-  std::filesystem::path file;
-  std::string column;
+  std::vector<std::filesystem::path> files;  ///< one, or several of one sensor
+  SignalChoice choice;
+  std::string unit;
   double rate_hz = 0.0;
   int levels = 0;
   bool robust = false;
@@ -22,10 +26,13 @@ struct SignalOptions {
   bool json = false;
 };
 
-/// Registers FILE, --column, --rate, --levels, --robust, --efficiency, --nan-is-gap and --json.
-void add_signal_options(CLI::App& command, SignalOptions& options);
+/// Registers FILE, --column, --where, --counter, --rate, --unit, --levels, --robust, --efficiency,
+/// --nan-is-gap and
+/// --json. `several`: FILE may be given more than once.
+void add_signal_options(CLI::App& command, SignalOptions& options, bool several);
 
-/// Reads the file and makes its wavelet variance.
-Result<noise::WaveletVariance> wavelet_variance_of(const SignalOptions& options);
+/// Reads the files and makes their wavelet variances. Errors: those of the reader and of the wavelet
+/// variance, and an impossible rate or unit (kUsage).
+Result<std::vector<noise::WaveletVariance>> wavelet_variances_of(const SignalOptions& options);
 
 }  // namespace imuscope::cli

@@ -1,0 +1,14 @@
+#pragma once
+
+/// Parameters that a filter may trust: a model that lies above what the data allow, not through its middle.
+
+#include "noise/fit.h"
+
+namespace imuscope::noise {
+
+/// The fit with larger amplitudes, rates unchanged: the smallest relative increase (sum of squares) with
+/// which the model reaches the upper end of the model-based interval at every level that has enough
+/// coefficients (M_j >= 3 * 2^j). Terms of amplitude zero stay out. The parameters carry no intervals.
+FitResult over_bounding(const FitResult& fit);
+
+}  // namespace imuscope::noise

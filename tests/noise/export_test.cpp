@@ -1,0 +1,354 @@
+#include "noise/export.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <random>
+#include <sstream>
+
+#include "noise/replicates.h"
+
+namespace imuscope::noise {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kRateHz = 200.0;
+constexpr std::size_t kLength = 1U << 14U;
+constexpr double kRadPerDegree = std::numbers::pi / 180.0;
+
+/// A signal of white noise, a Gauss-Markov or (rate 0) a random-walk bias; variances of one sample.
+std::vector<double> signal(double white, double bias, double rate_per_sample, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  std::vector<double> x(kLength);
+  const double phi = std::exp(-rate_per_sample);
+  const double step = rate_per_sample > 0.0 ? bias * (1.0 - phi * phi) : bias;
+  double state = rate_per_sample > 0.0 ? std::sqrt(bias) * normal(random) : 0.0;
+  for (double& v : x) {
+    v = state + std::sqrt(white) * normal(random);
+    state = phi * state + std::sqrt(step) * normal(random);
+  }
+  return x;
+}
+
+FitResult fitted(const std::vector<double>& x, const char* model, double rate_hz = kRateHz) {
+  return fit(haar_wavelet_variance(x).value(), parse_model(model).value(), rate_hz).value();
+}
+
+/// The numbers of "key: value" and "id id key value type" lines; of a list its first.
+std::map<std::string, double> numbers_of(const std::string& text) {
+  std::map<std::string, double> out;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    line = line.substr(0, line.find('#'));
+    for (char& c : line) {
+      if (c == ':' || c == '[' || c == ',' || c == '\t') c = ' ';
+    }
+    std::istringstream words(line);
+    std::string key;
+    while (words >> key && key.find_first_not_of("0123456789") == std::string::npos) {
+    }
+    double value = 0.0;
+    if (words >> value) out[key] = value;
+  }
+  return out;
+}
+
+/// What a tool's file means, in SI and by the tool's own equations: densities, and the bias' correlation
+/// time.
+struct Meaning {
+  double white_density = 0.0;
+  double walk_density = 0.0;
+  double bias_variance = 0.0;
+  double correlation_time_s = 0.0;
+};
+
+Meaning meaning_of_kalibr(const std::string& text) {
+  auto n = numbers_of(text);
+  EXPECT_EQ(n.at("update_rate"), kRateHz);
+  return {std::pow(n.at("gyroscope_noise_density"), 2), std::pow(n.at("gyroscope_random_walk"), 2), 0.0, 0.0};
+}
+
+/// Of an EKF2 update of 10 ms: rate noise NOISE in each, a step of B_NOISE * dt of the bias in each.
+Meaning meaning_of_px4(const std::string& text) {
+  constexpr double kUpdate_s = 0.01;
+  auto n = numbers_of(text);
+  return {std::pow(n.at("EKF2_ACC_NOISE"), 2) * kUpdate_s,
+          std::pow(n.at("EKF2_ACC_B_NOISE") * kUpdate_s, 2) / kUpdate_s, 0.0, 0.0};
+}
+
+/// Bias of the simulation plugins: db/dt = -b / T + random_walk * white.
+Meaning meaning_of_ros(const std::string& text) {
+  auto n = numbers_of(text);
+  const double t = n.at("gyroscope_bias_correlation_time");
+  EXPECT_NEAR(n.at("angular_velocity_covariance") / (std::pow(n.at("gyroscope_noise_density"), 2) * kRateHz),
+              1.0, 1e-6);
+  EXPECT_EQ(n.at("linear_acceleration_covariance"), -1.0);
+  return {std::pow(n.at("gyroscope_noise_density"), 2), 0.0,
+          std::pow(n.at("gyroscope_random_walk"), 2) * t / 2.0, t};
+}
+
+/// KF-GINS: deg/sqrt(h) and deg/h; hours.
+Meaning meaning_of_kf_gins(const std::string& text) {
+  auto n = numbers_of(text);
+  return {std::pow(n.at("arw") * kRadPerDegree / 60.0, 2), 0.0,
+          std::pow(n.at("gbstd") * kRadPerDegree / 3600.0, 2), n.at("corrtime") * 3600.0};
+}
+
+struct RoundTrip {
+  ExportFormat format;
+  SignalUnit unit;
+  double unit_si;  ///< of the signal's unit
+  const char* model;
+  double white;            ///< truth, signal unit squared
+  double bias;             ///< step variance of a walk, variance of a Gauss-Markov process
+  double rate_per_sample;  ///< 0: a walk
+  std::function<Meaning(const std::string&)> meaning;
+};
+
+class ExportRoundTrip : public testing::TestWithParam<RoundTrip> {};
+
+/// Fit, export, read as the other tool reads, simulate by its equations, refit: the exported parameters lie
+/// in the refit's 95 % intervals as often as those promise.
+TEST_P(ExportRoundTrip, ARefitOfWhatTheFileMeansHasTheExportedModelInsideItsIntervals) {
+  const RoundTrip& p = GetParam();
+  constexpr int kTrips = 20;
+  std::mt19937_64 random(42);
+  std::vector<int> inside;
+  for (int trip = 0; trip < kTrips; ++trip) {
+    const FitResult first = fitted(signal(p.white, p.bias, p.rate_per_sample, random), p.model);
+    ASSERT_TRUE(first.identifiable);
+    const auto text = export_models({{"x", p.unit, first}}, p.format, false).value();
+    const Meaning m = p.meaning(text);
+    const double a = m.correlation_time_s > 0.0 ? 1.0 / (m.correlation_time_s * kRateHz) : 0.0;
+    const FitResult again = fitted(
+        signal(m.white_density * kRateHz, a > 0.0 ? m.bias_variance : m.walk_density / kRateHz, a, random),
+        p.model);
+    inside.resize(first.parameters.size());
+    for (std::size_t i = 0; i < first.parameters.size(); ++i) {
+      const auto& before = first.parameters[i];
+      const auto& after = again.parameters[i];
+      const double si = before.name == "beta" ? 1.0 : p.unit_si * p.unit_si;
+      ASSERT_TRUE(after.ci_low.has_value()) << after.process << " " << after.name;
+      inside[i] += *after.ci_low <= before.value * si && before.value * si <= *after.ci_high ? 1 : 0;
+    }
+  }
+  // 19 of 20 expected; fewer than 16 has a chance of 0.3 % at the nominal 95 %.
+  for (const int n : inside) EXPECT_GE(n, 16);
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, ExportRoundTrip,
+                         testing::Values(RoundTrip{ExportFormat::kKalibr, SignalUnit::kDegps, kRadPerDegree,
+                                                   "WN+RW", 0.04, 4e-6, 0.0, meaning_of_kalibr},
+                                         RoundTrip{ExportFormat::kPx4, SignalUnit::kG, 9.80665, "WN+RW", 1e-6,
+                                                   1e-10, 0.0, meaning_of_px4},
+                                         RoundTrip{ExportFormat::kRos, SignalUnit::kRadps, 1.0, "WN+GM", 1e-5,
+                                                   4e-6, 0.01, meaning_of_ros},
+                                         RoundTrip{ExportFormat::kKfGins, SignalUnit::kDegps, kRadPerDegree,
+                                                   "WN+GM", 0.04, 0.02, 0.01, meaning_of_kf_gins}),
+                         [](const auto& test) {
+                           switch (test.param.format) {
+                             case ExportFormat::kKalibr:
+                               return "Kalibr";
+                             case ExportFormat::kPx4:
+                               return "Px4";
+                             case ExportFormat::kRos:
+                               return "Ros";
+                             default:
+                               return "KfGins";
+                           }
+                         });
+
+Eigen::MatrixXd matrix_of(const nlohmann::json& rows) {
+  Eigen::MatrixXd m(static_cast<Eigen::Index>(rows.size()), static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (std::size_t c = 0; c < rows.size(); ++c) {
+      m(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = rows[r][c].get<double>();
+    }
+  }
+  return m;
+}
+
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& m) {
+  const Eigen::LDLT<Eigen::MatrixXd> ldlt(m);
+  const Eigen::MatrixXd l = ldlt.matrixL();
+  return ldlt.transpositionsP().transpose() * l *
+         Eigen::MatrixXd(ldlt.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal());
+}
+
+/// A series of the system in the file. A state without noise of its own (a ramp's slope, a vibration) starts
+/// where its covariance says it typically is: the model has one amplitude, not a distribution of them.
+std::vector<double> simulated(const nlohmann::json& axis, std::size_t n, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  const Eigen::MatrixXd f = matrix_of(axis.at("F"));
+  const Eigen::MatrixXd q = matrix_of(axis.at("Q"));
+  const Eigen::MatrixXd p0 = matrix_of(axis.at("P0"));
+  const Eigen::MatrixXd q_root = root_of(q);
+  const auto h_values = axis.at("H").get<std::vector<double>>();
+  const auto size = f.rows();
+  const Eigen::Map<const Eigen::RowVectorXd> h(h_values.data(), size);
+  const auto draw = [&] {
+    return Eigen::VectorXd(Eigen::VectorXd::NullaryExpr(size, [&] { return normal(random); }));
+  };
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(size);
+  if (q.isZero() && size > 0) {
+    x[size - 1] = std::sqrt(p0.trace());
+  } else {
+    x = root_of(p0) * draw();
+  }
+  std::vector<double> z(n);
+  for (double& v : z) {
+    v = h.dot(x) + std::sqrt(axis.at("R").get<double>()) * normal(random);
+    x = f * x + q_root * draw();
+  }
+  return z;
+}
+
+TEST(ExportStateSpace, EveryProcessComesBackFromASimulationOfItsMatrices) {
+  struct Case {
+    const char* name;
+    Model model;
+  };
+  const std::vector<Case> cases{
+      {"WN+2*GM",
+       {{{ProcessKind::kWhiteNoise, 1.0, {}},
+         {ProcessKind::kGaussMarkov, 0.5, {0.1, 0}},
+         {ProcessKind::kGaussMarkov, 0.3, {0.002, 0}}}}},
+      {"QN+WN+RW",
+       {{{ProcessKind::kQuantization, 1.0, {}},
+         {ProcessKind::kWhiteNoise, 0.09, {}},
+         {ProcessKind::kRandomWalk, 1e-5, {}}}}},
+      {"WN+DR", {{{ProcessKind::kWhiteNoise, 1.0, {}}, {ProcessKind::kRamp, 1e-8, {}}}}},
+      {"MA1", {{{ProcessKind::kMa1, 2.0, {-0.5, 0}}}}},
+      {"ARMA11", {{{ProcessKind::kArma11, 1.0, {0.9, -0.4}}}}},
+      {"WN+SIN", {{{ProcessKind::kWhiteNoise, 0.2, {}}, {ProcessKind::kSinusoid, 0.5, {0.21, 0}}}}}};
+  constexpr std::size_t kSamples = 1U << 16U;
+  std::mt19937_64 random(7);
+  for (const Case& c : cases) {
+    FitResult fit;
+    fit.rate_hz = kRateHz;
+    fit.spec = parse_model(c.name).value();
+    fit.model = c.model;
+    const auto text =
+        export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace, false).value();
+    const auto json = nlohmann::json::parse(text);
+    const auto wv = haar_wavelet_variance(simulated(json.at("axes").at(0), kSamples, random)).value();
+    const auto distance = distance_from_model(wv, fit);
+    ASSERT_TRUE(distance.has_value());
+    EXPECT_GT(distance->p_value, 1e-3) << c.name;
+  }
+}
+
+TEST(ExportStateSpace, RefitsOfTheSimulatedMatricesHoldTheExportedParametersInTheirIntervals) {
+  constexpr int kTrips = 20;
+  std::mt19937_64 random(11);
+  std::vector<int> inside(5);
+  for (int trip = 0; trip < kTrips; ++trip) {
+    FitResult fit;
+    fit.rate_hz = 100.0;
+    fit.spec = parse_model("WN+2*GM").value();
+    fit.model = {{{ProcessKind::kWhiteNoise, 1.0, {}},
+                  {ProcessKind::kGaussMarkov, 0.5, {0.1, 0}},
+                  {ProcessKind::kGaussMarkov, 0.3, {0.002, 0}}}};
+    const std::vector<double> truth{1.0, 10.0, 0.5, 0.2, 0.3};
+    const auto json = nlohmann::json::parse(
+        export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace, false).value());
+    const auto again = fitted(simulated(json.at("axes").at(0), 1U << 16U, random), "WN+2*GM", 100.0);
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const auto& p = again.parameters[i];
+      inside[i] += p.ci_low && *p.ci_low <= truth[i] && truth[i] <= *p.ci_high ? 1 : 0;
+    }
+  }
+  for (const int n : inside) EXPECT_GE(n, 16);
+}
+
+TEST(ExportStateSpace, TheContinuousFormSampledIsTheDiscreteOne) {
+  FitResult fit;
+  fit.rate_hz = 50.0;
+  fit.spec = parse_model("GM+RW").value();
+  fit.model = {{{ProcessKind::kGaussMarkov, 0.5, {0.02, 0}}, {ProcessKind::kRandomWalk, 1e-5, {}}}};
+  const auto axis =
+      nlohmann::json::parse(
+          export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace, false).value())
+          .at("axes")
+          .at(0);
+  const auto a = matrix_of(axis.at("continuous").at("A"));
+  const auto qc = matrix_of(axis.at("continuous").at("Qc"));
+  EXPECT_NEAR(matrix_of(axis.at("F"))(0, 0), std::exp(a(0, 0) / 50.0), 1e-15);
+  EXPECT_NEAR(matrix_of(axis.at("Q"))(0, 0),
+              qc(0, 0) * (1.0 - std::exp(2.0 * a(0, 0) / 50.0)) / (-2.0 * a(0, 0)), 1e-15);
+  EXPECT_NEAR(matrix_of(axis.at("Q"))(1, 1), qc(1, 1) / 50.0, 1e-18);
+}
+
+TEST(Export, AFormThatHoldsLessIsFittedAnewAndSaysSo) {
+  std::mt19937_64 random(3);
+  const auto first = fitted(signal(1.0, 0.5, 0.01, random), "WN+GM");
+  const auto text =
+      export_models({{"gyro_x", SignalUnit::kRadps, first}}, ExportFormat::kKalibr, false).value();
+  EXPECT_THAT(text, HasSubstr("WN+RW fitted to the wavelet variance in place of WN+GM"));
+  EXPECT_THAT(text, HasSubstr("accelerometer: not given"));
+  EXPECT_THAT(text, testing::Not(HasSubstr("accelerometer_noise_density")));
+}
+
+TEST(Export, ASensorsOwnLowPassBecomesWhiteNoiseAndNotAFiltersBias) {
+  // Noise of 0.3 samples' memory and a slow bias: what a filter needs is the density at low frequency, sigma2
+  // times (1 + phi) / (1 - phi), and the slow bias.
+  constexpr double kFast = 1.8;
+  std::mt19937_64 random(8);
+  auto x = signal(0.0, 1.0, kFast, random);
+  const auto slow = signal(0.0, 0.02, 0.01, random);
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] += slow[i];
+  const auto first = fitted(x, "WN+2*GM");
+  const auto text =
+      export_models({{"gyro_x", SignalUnit::kDegps, first}}, ExportFormat::kKfGins, false).value();
+  EXPECT_THAT(text, HasSubstr("from tau = "));
+  const Meaning m = meaning_of_kf_gins(text);
+  const double phi = std::exp(-kFast);
+  const double si = kRadPerDegree * kRadPerDegree;
+  EXPECT_NEAR(m.white_density * kRateHz / si, (1.0 + phi) / (1.0 - phi), 0.1);
+  EXPECT_NEAR(m.bias_variance / si, 0.02, 0.012);
+  EXPECT_GT(m.correlation_time_s, 0.1);
+}
+
+TEST(Export, ThreeAxesOfATriadBecomeTheMeanOfTheirVariances) {
+  std::mt19937_64 random(4);
+  std::vector<AxisFit> axes;
+  for (const double white : {0.5, 1.0, 1.5}) {
+    axes.push_back({"gyro", SignalUnit::kRadps, fitted(signal(white, 1e-4, 0.0, random), "WN+RW")});
+  }
+  const auto n = numbers_of(export_models(axes, ExportFormat::kKalibr, false).value());
+  EXPECT_NEAR(std::pow(n.at("gyroscope_noise_density"), 2) * kRateHz, 1.0, 0.03);
+}
+
+TEST(Export, ConservativeParametersAreLargerThanTheFit) {
+  std::mt19937_64 random(5);
+  const auto first = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");
+  for (const auto format : {ExportFormat::kKalibr, ExportFormat::kPx4}) {
+    const auto plain = numbers_of(export_models({{"x", SignalUnit::kRadps, first}}, format, false).value());
+    const auto bound = numbers_of(export_models({{"x", SignalUnit::kRadps, first}}, format, true).value());
+    for (const char* key :
+         {"gyroscope_noise_density", "gyroscope_random_walk", "EKF2_GYR_NOISE", "EKF2_GYR_B_NOISE"}) {
+      if (!plain.contains(key)) continue;
+      EXPECT_GT(bound.at(key), plain.at(key)) << key;
+    }
+  }
+}
+
+TEST(Export, WithoutAUnitOnlyTheMatricesCanBeWritten) {
+  std::mt19937_64 random(6);
+  const auto first = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");
+  const auto refused = export_models({{"x", SignalUnit::kNone, first}}, ExportFormat::kRos, false);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
+  EXPECT_THAT(refused.error().text(), HasSubstr("--unit"));
+  EXPECT_FALSE(parse_export_format("matlab"));
+}
+
+}  // namespace
+}  // namespace imuscope::noise

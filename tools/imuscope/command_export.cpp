@@ -1,0 +1,86 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "commands.h"
+#include "fit_file.h"
+#include "noise/export.h"
+
+namespace imuscope::cli {
+namespace {
+
+struct ExportCommand {
+  std::vector<std::filesystem::path> files;
+  std::string format;
+  std::string name;
+  std::string regime;
+  std::string unit;
+  bool conservative = false;
+};
+
+/// Keeps the fits whose `member` is `wanted`; without a wish there must be one choice only.
+Result<void> keep(std::vector<StoredFit>& fits, std::string StoredFit::*member, const std::string& wanted,
+                  const char* option) {
+  std::set<std::string> choices;
+  for (const StoredFit& fit : fits) choices.insert(fit.*member);
+  if (wanted.empty()) {
+    if (choices.size() <= 1) return {};
+    return usage_error(fmt::format("there is a choice of {}", fmt::join(choices, ", ")),
+                       fmt::format("give {}", option));
+  }
+  if (!choices.contains(wanted)) {
+    return usage_error(fmt::format("{} {} is not there", option, wanted),
+                       fmt::format("there is {}", fmt::join(choices, ", ")));
+  }
+  std::erase_if(fits, [&](const StoredFit& fit) { return fit.*member != wanted; });
+  return {};
+}
+
+Result<void> run_export(const ExportCommand& options) {
+  const auto format = noise::parse_export_format(options.format);
+  if (!format) return tl::unexpected(format.error());
+  const auto unit = noise::parse_unit(options.unit);
+  if (!unit) return tl::unexpected(unit.error());
+  std::vector<StoredFit> fits;
+  for (const auto& file : options.files) {
+    auto read = read_fits(file);
+    if (!read) return tl::unexpected(read.error());
+    fits.insert(fits.end(), read->begin(), read->end());
+  }
+  if (auto kept = keep(fits, &StoredFit::name, options.name, "--name"); !kept) return kept;
+  if (auto kept = keep(fits, &StoredFit::regime, options.regime, "--regime"); !kept) return kept;
+  std::vector<noise::AxisFit> axes;
+  for (StoredFit& fit : fits) {
+    axes.push_back({fit.axis, options.unit.empty() ? fit.unit : *unit, std::move(fit.fit)});
+  }
+  const auto text = noise::export_models(axes, *format, options.conservative);
+  if (!text) return tl::unexpected(text.error());
+  fmt::print("{}", *text);
+  return {};
+}
+
+}  // namespace
+
+void add_export(CLI::App& app, Work& chosen) {
+  auto* command = app.add_subcommand("export", "Noise models as another tool's configuration");
+  auto options = std::make_shared<ExportCommand>();
+  command
+      ->add_option("MODEL", options->files,
+                   "What `imuscope fit --json` printed (one file an axis), or a run's models.json")
+      ->required();
+  command->add_option("--to,-t", options->format, "kalibr, ros, px4, kf-gins or state-space")->required();
+  command->add_option("--name,-n", options->name, "The S-IMU to export, where the file holds several");
+  command->add_option("--regime", options->regime, "all, static or dynamic, where the file holds several");
+  command->add_option("--unit,-u", options->unit,
+                      "Unit of the signal, where the file does not say: rad/s, deg/s, m/s^2 or g");
+  command->add_flag(
+      "--conservative", options->conservative,
+      "Over-bounding amplitudes: the model above the upper interval ends, not through the middle");
+  on_chosen(*command, chosen, [options] { return run_export(*options); });
+}
+
+}  // namespace imuscope::cli

@@ -1,0 +1,170 @@
+#include "fit_output.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "noise/json.h"
+
+namespace imuscope::cli {
+namespace {
+
+/// Below this the replicates are not taken for one process.
+constexpr double kHomogeneous = 0.05;
+
+std::string interval(const std::optional<double>& low, const std::optional<double>& high) {
+  return low && high ? fmt::format("[{:.6g}, {:.6g}]", *low, *high) : "-";
+}
+
+std::string p_value(const std::optional<noise::JTest>& test) {
+  return test ? fmt::format("{:.3g}", test->p_value) : "-";
+}
+
+void print_parameters(const noise::FitResult& fit) {
+  fmt::print("{:<7} {:<10} {:>14} {:>14}  {:<30} {}\n", "process", "parameter", "value", "sd",
+             "95 % interval", "unit");
+  for (const auto& p : fit.parameters) {
+    fmt::print("{:<7} {:<10} {:>14.7g} {:>14}  {:<30} {}\n", p.process, p.name, p.value,
+               p.sd ? fmt::format("{:.4g}", *p.sd) : "-", interval(p.ci_low, p.ci_high), p.unit);
+  }
+}
+
+void print_quantities(const noise::FitResult& fit, noise::SignalUnit unit) {
+  fmt::print("\n{:<7} {:<26} {:>14}  {:<30} {}\n", "process", "for filter and data sheet", "value",
+             "95 % interval", "unit");
+  for (const auto& q : noise::filter_quantities(fit, unit)) {
+    fmt::print("{:<7} {:<26} {:>14.7g}  {:<30} {}\n", q.process, q.name, q.value,
+               interval(q.ci_low, q.ci_high), q.unit);
+  }
+}
+
+void print_levels(const noise::FitResult& fit) {
+  fmt::print("\n{:>5} {:>12} {:>13} {:>13}  {}\n", "level", "tau_s", "wv", "fitted",
+             "95 % interval under the model");
+  for (const auto& level : fit.wv) {
+    const bool known = level.model_ci_high > 0.0;
+    fmt::print("{:>5} {:>12.6g} {:>13.6g} {:>13.6g}  {}\n", level.observed.level,
+               level.observed.tau_samples / fit.rate_hz, level.observed.value, level.fitted,
+               known ? fmt::format("[{:.6g}, {:.6g}]", level.model_ci_low, level.model_ci_high) : "-");
+  }
+}
+
+nlohmann::json test_json(const std::optional<noise::JTest>& test) {
+  if (!test) return nullptr;
+  return {{"statistic", test->statistic}, {"dof", test->dof}, {"p_value", test->p_value}};
+}
+
+}  // namespace
+
+void print_fit(const noise::FitResult& fit, noise::SignalUnit unit) {
+  fmt::print("model {}   n {}   rate {:g} Hz   weights {}{}\n\n", fit.spec.name(), fit.n, fit.rate_hz,
+             fit.weighting == noise::Weighting::kCi ? "ci" : "optimal",
+             fit.efficiency < 1.0 ? fmt::format("   robust, efficiency {:g}", fit.efficiency) : "");
+  print_parameters(fit);
+  print_quantities(fit, unit);
+  print_levels(fit);
+  fmt::print("\nobjective {:.8g}", fit.objective);
+  if (fit.j_test) {
+    fmt::print("   J-test {:.4g} on {} dof, p = {:.3g}", fit.j_test->statistic, fit.j_test->dof,
+               fit.j_test->p_value);
+  }
+  fmt::print("\n{}\n", fit.identifiable ? "identifiable" : "not identifiable");
+  for (const auto& warning : fit.warnings) fmt::print("! {}\n", warning);
+}
+
+void print_conservative(const noise::FitResult& bound, noise::SignalUnit unit) {
+  fmt::print(
+      "\nover-bounding model, above the upper interval end of every level with enough coefficients\n\n");
+  print_parameters(bound);
+  print_quantities(bound, unit);
+}
+
+void print_ranking(const std::vector<noise::RankedModel>& ranked) {
+  fmt::print("{:<4} {:<20} {:>12} {:>12}  {}\n", "rank", "model", "criterion", "J p-value", "why");
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    const auto& m = ranked[i];
+    fmt::print("{:<4} {:<20} {:>12.5g} {:>12}  {}\n", i + 1, m.fit.spec.name(), m.criterion,
+               p_value(m.fit.j_test), m.reason);
+  }
+  fmt::print("\n");
+}
+
+void print_ranking(const std::vector<noise::CrossValidated>& ranked) {
+  fmt::print("{:<4} {:<20} {:>12} {:>12}  {}\n", "rank", "model", "CV-WVIC", "J p-value", "why");
+  for (std::size_t i = 0; i < ranked.size(); ++i) {
+    const auto& m = ranked[i];
+    fmt::print("{:<4} {:<20} {:>12.5g} {:>12}  {}\n", i + 1, m.pooled.spec.name(), m.score,
+               p_value(m.pooled.j_test), m.reason);
+  }
+  fmt::print("\n");
+}
+
+void print_replicates(const noise::JointFit& joint) {
+  fmt::print("\n{:<7} {:<10} {:>14}", "process", "parameter", "together");
+  for (std::size_t k = 0; k < joint.separate.size(); ++k)
+    fmt::print(" {:>14}", fmt::format("replicate {}", k + 1));
+  fmt::print("\n");
+  for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {
+    const auto& pooled = joint.pooled.parameters[p];
+    fmt::print("{:<7} {:<10} {:>14.6g}", pooled.process, pooled.name, pooled.value);
+    for (const auto& fit : joint.separate) fmt::print(" {:>14.6g}", fit.parameters[p].value);
+    fmt::print("\n");
+  }
+  if (!joint.homogeneity) {
+    fmt::print("\nno test of near-stationarity: no parameter is determined in every replicate\n");
+    return;
+  }
+  const auto& test = *joint.homogeneity;
+  fmt::print("\nnear-stationarity: {:.4g} on {} dof, p = {:.3g}: {}\n", test.statistic, test.dof,
+             test.p_value,
+             test.p_value < kHomogeneous ? "the replicates differ by more than their uncertainty"
+                                         : "the replicates may be one process");
+}
+
+nlohmann::json fit_json(const noise::FitResult& fit, noise::SignalUnit unit) {
+  auto json = noise::fit_to_json(fit);
+  json["unit"] = noise::unit_name(unit);
+  json["quantities"] = noise::quantities_to_json(noise::filter_quantities(fit, unit));
+  return json;
+}
+
+nlohmann::json conservative_json(const noise::FitResult& bound, noise::SignalUnit unit) {
+  return {{"parameters", noise::fit_to_json(bound).at("parameters")},
+          {"quantities", noise::quantities_to_json(noise::filter_quantities(bound, unit))}};
+}
+
+nlohmann::json ranking_json(const std::vector<noise::RankedModel>& ranked) {
+  auto json = nlohmann::json::array();
+  for (const auto& m : ranked) {
+    json.push_back({{"model", m.fit.spec.name()},
+                    {"criterion", m.criterion},
+                    {"identifiable", m.fit.identifiable},
+                    {"p_value", m.fit.j_test ? nlohmann::json(m.fit.j_test->p_value) : nlohmann::json()},
+                    {"reason", m.reason}});
+  }
+  return json;
+}
+
+nlohmann::json ranking_json(const std::vector<noise::CrossValidated>& ranked) {
+  auto json = nlohmann::json::array();
+  for (const auto& m : ranked) {
+    json.push_back(
+        {{"model", m.pooled.spec.name()},
+         {"cv_wvic", m.score},
+         {"worse_by", m.worse_by},
+         {"worse_by_sd", m.worse_by_sd},
+         {"identifiable", m.pooled.identifiable},
+         {"p_value", m.pooled.j_test ? nlohmann::json(m.pooled.j_test->p_value) : nlohmann::json()},
+         {"reason", m.reason}});
+  }
+  return json;
+}
+
+nlohmann::json replicates_json(const noise::JointFit& joint, noise::SignalUnit unit) {
+  nlohmann::json json{{"replicates", nlohmann::json::array()}, {"homogeneity", test_json(joint.homogeneity)}};
+  for (const auto& fit : joint.separate) json["replicates"].push_back(fit_json(fit, unit));
+  return json;
+}
+
+}  // namespace imuscope::cli
