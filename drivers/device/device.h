@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -55,6 +56,12 @@ class DeviceDecoder {
   /// What is wrong with the data although they can be read, in one sentence with the remedy; empty where
   /// nothing is. Static storage.
   [[nodiscard]] virtual std::string_view remark() const noexcept { return {}; }
+
+  /// Host time per device time, minus 1, in parts per million; NaN where the device has no clock or too
+  /// little was seen of it.
+  [[nodiscard]] virtual double clock_drift_ppm() const noexcept {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
 };
 
 enum class SessionState : std::uint8_t {

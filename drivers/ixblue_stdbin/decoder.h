@@ -67,6 +67,7 @@ class Decoder final : public DeviceDecoder {
     return user_status_.has_value() && (*user_status_ & kUserAlignment) != 0;
   }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
+  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
 
  private:
   /// A raw block that stays the same to the last bit.

@@ -46,7 +46,6 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
   if (!log) return tl::unexpected(log.error());
   CaptureSummary summary;
   LossFinder losses;
-  bool has_run = false;
   LogEvent event;
   while (log->next(event)) {
     auto record = decode_record(event.data);
@@ -54,10 +53,12 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
       summary.other_messages += 1;
     } else if (auto* run = std::get_if<RunHeader>(&*record)) {
       summary.run = std::move(*run);  // the same in every file
-      has_run = true;
+      summary.has_run = true;
     } else if (auto* piece = std::get_if<RawPiece>(&*record)) {
       losses.look(*piece, summary.losses);
       count_piece(*piece, summary);
+    } else if (auto* applied = std::get_if<applied_model_t>(&*record)) {
+      summary.applied_models.push_back(std::move(*applied));
     } else {
       summary.exceptions.push_back(std::move(std::get<StoredException>(*record)));
     }
@@ -68,10 +69,6 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
     return work_error(path.string() + " is an LCM event log without device bytes (" +
                           std::to_string(summary.other_messages) + " other messages)",
                       "replay needs a capture, which 'imuscope run' records");
-  }
-  if (!has_run) {
-    return work_error(path.string() + " holds device bytes but not what was run",
-                      "its first record (channel IMUSCOPE_RUN) is missing: use the first file of the run");
   }
   return summary;
 }

@@ -37,9 +37,11 @@ struct CapturedDevice {
 
 /// A capture seen as a whole, by one pass over its files.
 struct CaptureSummary {
-  RunHeader run;
+  RunHeader run;         ///< empty where has_run is false
+  bool has_run = false;  ///< false for a log of raw_t messages by another recorder, such as lcm-logger
   std::map<std::string, CapturedDevice> devices;
-  std::vector<StoredException> exceptions;  ///< in file order; a replay needs them ahead of their ticks
+  std::vector<StoredException> exceptions;      ///< in file order; a replay needs them ahead of their ticks
+  std::vector<applied_model_t> applied_models;  ///< in file order, needed like the exceptions
   std::vector<CaptureLoss> losses;
   std::uint64_t other_messages = 0;  ///< messages of other types, such as published ones
   std::uint64_t bytes_skipped = 0;   ///< damage in the midst of the file
@@ -48,7 +50,7 @@ struct CaptureSummary {
 
 /// @param path of the first file of the capture; those that follow are found beside it
 /// @return an error that says what the file is where it is not a capture, and of kind kWork for an event log
-///         that holds no device bytes or no run header
+///         that holds no device bytes
 [[nodiscard]] Result<CaptureSummary> summarise_capture(const std::filesystem::path& path);
 
 /// Iterates over reads and writes ordered by arrival, equal arrivals by the order of the configuration, then

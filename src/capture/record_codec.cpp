@@ -1,36 +1,17 @@
 #include "capture/record_codec.h"
 
 #include <algorithm>
-#include <exception>
 #include <imuscope/exception_t.hpp>
 #include <imuscope/raw_t.hpp>
 #include <imuscope/run_t.hpp>
 
 #include "publish/message_builders.h"
+#include "publish/message_codec.h"
 
 namespace imuscope {
 namespace {
 
 constexpr std::int64_t kNsPerUs = 1000;
-
-template <typename Message>
-std::vector<std::uint8_t> encoded(const Message& message) {
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  (void)message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));  // cannot fail: the size is its own
-  return bytes;
-}
-
-/// The message, if the bytes are one of this type and nothing more.
-template <typename Message>
-std::optional<Message> decoded(const std::vector<std::uint8_t>& bytes) {
-  Message message;
-  try {
-    const int size = static_cast<int>(bytes.size());
-    if (message.decode(bytes.data(), 0, size) == size) return message;
-  } catch (const std::exception&) {  // a damaged array length asks for more memory than there is
-  }
-  return std::nullopt;
-}
 
 std::int64_t fingerprint_of(const std::vector<std::uint8_t>& message) {
   std::uint64_t fingerprint = 0;
@@ -118,7 +99,7 @@ std::vector<std::uint8_t> encode(const RunHeader& header, std::int64_t file) {
   message.configuration_hash = header.configuration_hash;
   message.n_devices = static_cast<std::int32_t>(header.devices.size());
   message.devices = header.devices;
-  return encoded(message);
+  return encode_message(message);
 }
 
 std::vector<std::uint8_t> encode(const RawChunk& chunk, const std::string& device, const RecordClock& clock) {
@@ -131,7 +112,7 @@ std::vector<std::uint8_t> encode(const RawChunk& chunk, const std::string& devic
   message.continues = chunk.continues ? 1 : 0;
   message.n_bytes = chunk.n_bytes;
   message.bytes.assign(chunk.bytes.begin(), chunk.bytes.begin() + chunk.n_bytes);
-  return encoded(message);
+  return encode_message(message);
 }
 
 std::vector<std::uint8_t> encode(const RunException& exception, const std::string& device, HostTime at,
@@ -144,19 +125,21 @@ std::vector<std::uint8_t> encode(const RunException& exception, const std::strin
   message.sample_sequence = exception.sample_sequence;
   message.tick = exception.tick;
   message.count = exception.count;
-  return encoded(message);
+  return encode_message(message);
 }
 
 std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& message) {
   if (message.size() < sizeof(std::int64_t)) return std::nullopt;
   const std::int64_t fingerprint = fingerprint_of(message);
   if (fingerprint == raw_t::getHash()) {
-    if (const auto raw = decoded<raw_t>(message)) return to_record(*raw);
+    if (const auto raw = decode_message<raw_t>(message)) return to_record(*raw);
   } else if (fingerprint == run_t::getHash()) {
-    const auto run = decoded<run_t>(message);
+    const auto run = decode_message<run_t>(message);
     if (run && run->format == kCaptureFormat) return to_record(*run);
   } else if (fingerprint == exception_t::getHash()) {
-    if (const auto exception = decoded<exception_t>(message)) return to_record(*exception);
+    if (const auto exception = decode_message<exception_t>(message)) return to_record(*exception);
+  } else if (fingerprint == applied_model_t::getHash()) {
+    if (auto applied = decode_message<applied_model_t>(message)) return std::move(*applied);
   }
   return std::nullopt;
 }

@@ -3,6 +3,7 @@
 /// Between the records of a capture and their LCM messages. Any thread of the soft world.
 
 #include <cstdint>
+#include <imuscope/applied_model_t.hpp>
 #include <optional>
 #include <string>
 #include <variant>
@@ -25,7 +26,7 @@ struct StoredException {
   std::string device;  ///< empty with kSkippedTicks
 };
 
-using CaptureRecord = std::variant<RunHeader, RawPiece, StoredException>;
+using CaptureRecord = std::variant<RunHeader, RawPiece, StoredException, applied_model_t>;
 
 /// Maps the host's clock to the utime of records: the wall clock of the PC as it was at t0, running on with
 /// the host's clock, so that a clock set during the run does not disturb it.

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Publishes reports over LCM. The only place that knows the LCM library.
+/// Publishes reports over LCM. This file and lcm_listener.cpp are the only places that know the LCM library.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,12 +12,10 @@
 
 #include "base/result.h"
 #include "publish/channel_name.h"
+#include "publish/lcm_url.h"
 #include "publish/reports.h"
 
 namespace imuscope {
-
-/// Multicast that stays on this PC; with ttl=1 it reaches the local network.
-inline constexpr std::string_view kDefaultLcmUrl = "udpm://239.255.76.67:7667?ttl=0";
 
 /// Messages stay within one UDP datagram: a larger one is lost whole when any of its fragments is.
 inline constexpr std::size_t kMaxMessageBytes = 65'000;
@@ -35,9 +33,7 @@ class LcmPublisher {
   /// Opens the bus.
   /// @param url     udpm://ADDRESS:PORT?ttl=N, or file://PATH?mode=w to write messages into an LCM log
   /// @param prefix  of every channel, without the underscore
-  /// @return an error of kind kUsage for a URL that cannot serve (tcpq is refused: its library call aborts
-  /// the
-  ///         process when the server goes), of kind kWork where this PC has no multicast route
+  /// @return the errors of check_lcm_url()
   static Result<LcmPublisher> open(std::string_view url = kDefaultLcmUrl,
                                    std::string_view prefix = kDefaultChannelPrefix);
 
@@ -52,6 +48,9 @@ class LcmPublisher {
   void publish(const ErrorReport& report, const std::string& name);        ///< <PREFIX>_ERROR_<NAME>
   void publish(const WaveletVarianceReport& report);                       ///< <PREFIX>_WV_<NAME>
   void publish(const NoiseModelReport& report);                            ///< <PREFIX>_NOISE_MODEL_<NAME>
+  void publish(const DynamicsReport& report);                              ///< <PREFIX>_DYNAMICS_<NAME>
+  void publish(const PersonEvent& event);                                  ///< <PREFIX>_EVENT
+  void publish(const BridgeReport& report);                                ///< <PREFIX>_POSE and <PREFIX>_INS
 
   /// Gives every message that is sent to `tap`, too: channel, utime and encoded bytes. For the recorder.
   using Tap = std::function<void(std::string_view, std::int64_t, std::span<const std::uint8_t>)>;

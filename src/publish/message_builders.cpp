@@ -1,5 +1,6 @@
 #include "publish/message_builders.h"
 
+#include <algorithm>
 #include <chrono>
 
 #include "base/units.h"
@@ -12,7 +13,7 @@ constexpr double kUsPerS = 1e6;
 constexpr double kBytesPerMb = 1e6;
 
 std::int64_t as_count(std::uint64_t count) { return static_cast<std::int64_t>(count); }
-double in_us(Duration duration) { return to_seconds(duration) * kUsPerS; }
+constexpr double kPercent = 100.0;
 
 // LCM counts arrays in int32.
 template <typename Range>
@@ -43,17 +44,47 @@ device_status_t to_message(const StatusReport::Device& device) {
   return message;
 }
 
+study_status_t to_message(const StatusReport::Study& study) {
+  study_status_t message;
+  message.name = study.name;
+  message.state = study.state;
+  message.regime = study.regime;
+  message.sd_psi_deg = study.sd_psi_rad * kDegPerRad;
+  message.goal_psi_deg = study.goal_psi_rad * kDegPerRad;
+  message.sd_r_m = study.sd_r_m;
+  message.goal_r_m = study.goal_r_m;
+  message.sd_t_d_ms = study.sd_t_d_s * kMsPerS;
+  message.goal_t_d_ms = study.goal_t_d_s * kMsPerS;
+  message.weakest = study.weakest;
+  message.weakest_relative = study.weakest_relative;
+  message.manoeuvre = study.manoeuvre;
+  message.samples = as_count(study.samples);
+  message.used = as_count(study.used);
+  message.late = as_count(study.late);
+  message.gated = as_count(study.gated);
+  return message;
+}
+
 thread_status_t to_message(const StatusReport::Thread& thread) {
   thread_status_t message;
   message.name = thread.name;
   message.scheduling = thread.scheduling;
+  message.cpu_percent = thread.cpu_share * kPercent;
   message.ticks = as_count(thread.ticks);
   message.overruns = as_count(thread.overruns);
   message.skipped = as_count(thread.skipped);
-  message.lateness_p50_us = in_us(thread.lateness_p50);
-  message.lateness_p99_us = in_us(thread.lateness_p99);
-  message.lateness_p999_us = in_us(thread.lateness_p999);
-  message.lateness_max_us = in_us(thread.lateness_max);
+  message.lateness_p50_us = thread.lateness.p50_s * kUsPerS;
+  message.lateness_p99_us = thread.lateness.p99_s * kUsPerS;
+  message.lateness_p999_us = thread.lateness.p999_s * kUsPerS;
+  message.lateness_max_us = thread.lateness.max_s * kUsPerS;
+  message.done_p50_us = thread.done.p50_s * kUsPerS;
+  message.done_p99_us = thread.done.p99_s * kUsPerS;
+  message.done_p999_us = thread.done.p999_s * kUsPerS;
+  message.done_max_us = thread.done.max_s * kUsPerS;
+  message.n_octaves = size_of(thread.lateness_octaves);
+  for (const std::uint64_t count : thread.lateness_octaves) {
+    message.lateness_octaves.push_back(as_count(count));
+  }
   return message;
 }
 
@@ -95,6 +126,19 @@ noise_parameter_t to_message(const AxisNoiseModel::Parameter& parameter) {
   message.sd = parameter.sd;
   message.ci_low = parameter.ci_low;
   message.ci_high = parameter.ci_high;
+  return message;
+}
+
+axis_dynamics_t to_message(const AxisMotion& axis) {
+  axis_dynamics_t message;
+  message.axis = axis.axis;
+  message.unit = axis.unit;
+  message.mean = axis.mean;
+  message.rms = axis.rms;
+  message.largest = axis.largest;
+  message.slope = axis.slope;
+  message.slope_sd = axis.slope_sd;
+  message.correlation = axis.correlation;
   return message;
 }
 
@@ -141,18 +185,24 @@ status_t to_message(const StatusReport& report, std::int64_t sequence) {
   message.sequence = sequence;
   message.run = report.run;
   message.version = report.version;
+  message.build = report.build;
+  message.configuration_hash = report.configuration_hash;
   message.state = report.state;
   message.reason = report.reason;
   message.uptime_s = report.uptime_s;
   message.tick = report.tick;
   message.refits = as_count(report.refits);
   message.refit_duration_s = report.refit_duration_s;
+  message.refit_utime = report.refit_utc ? to_utime(*report.refit_utc) : 0;
   message.resident_memory_mb = static_cast<double>(report.resident_memory_bytes) / kBytesPerMb;
   message.capture_path = report.capture_path;
   message.capture_bytes = as_count(report.capture_bytes);
   message.capture_lost = as_count(report.capture_lost);
+  message.last_event = report.last_event;
   message.n_devices = size_of(report.devices);
   for (const auto& device : report.devices) message.devices.push_back(to_message(device));
+  message.n_studies = size_of(report.studies);
+  for (const auto& study : report.studies) message.studies.push_back(to_message(study));
   message.n_threads = size_of(report.threads);
   for (const auto& thread : report.threads) message.threads.push_back(to_message(thread));
   message.n_rings = size_of(report.rings);
@@ -307,6 +357,50 @@ noise_model_t to_message(const NoiseModelReport& report, std::int64_t sequence) 
   message.time_s = report.time_s;
   message.n_models = size_of(report.models);
   for (const auto& model : report.models) message.models.push_back(to_message(model));
+  return message;
+}
+
+dynamics_t to_message(const DynamicsReport& report, std::int64_t sequence) {
+  dynamics_t message;
+  message.utime = to_utime(report.utc);
+  message.sequence = sequence;
+  message.name = report.name;
+  message.time_s = report.time_s;
+  message.n_static = report.n_static;
+  message.n_dynamic = report.n_dynamic;
+  message.n_axes = size_of(report.axes);
+  for (const auto& axis : report.axes) message.axes.push_back(to_message(axis));
+  return message;
+}
+
+event_t to_message(const PersonEvent& event, std::int64_t sequence) {
+  event_t message;
+  message.utime = to_utime(event.utc);
+  message.sequence = sequence;
+  message.source = event.source;
+  message.text = event.text;
+  return message;
+}
+
+pose_t to_pose(const BridgeReport& report) {
+  pose_t message;
+  message.utime = to_utime(report.utc);
+  std::copy(report.position_l_m.begin(), report.position_l_m.end(), message.pos);
+  std::copy(report.velocity_b_mps.begin(), report.velocity_b_mps.end(), message.vel);
+  std::copy(report.q_b_l.begin(), report.q_b_l.end(), message.orientation);
+  std::copy(report.rate_lb_b_radps.begin(), report.rate_lb_b_radps.end(), message.rotation_rate);
+  std::copy(report.acceleration_b_mps2.begin(), report.acceleration_b_mps2.end(), message.accel);
+  return message;
+}
+
+ins_t to_ins(const BridgeReport& report) {
+  ins_t message{};
+  message.utime = to_utime(report.utc);
+  message.device_time = report.counter;
+  std::copy(report.measured_omega_b_radps.begin(), report.measured_omega_b_radps.end(), message.gyro);
+  std::copy(report.measured_f_b_mps2.begin(), report.measured_f_b_mps2.end(), message.accel);
+  std::copy(report.q_b_l.begin(), report.q_b_l.end(), message.quat);
+  message.rel_alt = report.position_l_m[2];
   return message;
 }
 

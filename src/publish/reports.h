@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -149,6 +150,49 @@ struct NoiseModelReport {
   std::vector<AxisNoiseModel> models;
 };
 
+/// Motion of one axis of a S-IMU and how its error follows it; fields as axis_dynamics_t.
+struct AxisMotion {
+  std::string axis;
+  std::string unit;
+  double mean = kUnknown;
+  double rms = kUnknown;
+  double largest = kUnknown;
+  double slope = kUnknown;
+  double slope_sd = kUnknown;
+  double correlation = kUnknown;
+};
+
+/// Motion of one S-IMU at a refit.
+struct DynamicsReport {
+  UtcTime utc;  ///< of the last sample used
+  double time_s = 0.0;
+  std::string name;
+  std::int64_t n_static = 0;
+  std::int64_t n_dynamic = 0;
+  std::vector<AxisMotion> axes;
+};
+
+/// What the bridge to the widespread pose_t and ins_t shows, in their frames: body forward-left-up, local
+/// east-north-up from the first solution on.
+struct BridgeReport {
+  UtcTime utc;  ///< time of validity
+  Vector3 position_l_m{};
+  Vector3 velocity_b_mps{};
+  std::array<double, 4> q_b_l{1.0, 0.0, 0.0, 0.0};  ///< rotates body to local; w, x, y, z
+  Vector3 rate_lb_b_radps{};                        ///< of the body relative to the local frame
+  Vector3 acceleration_b_mps2{};                    ///< gravity removed
+  std::int64_t counter = 0;                         ///< of the R-IMU
+  Vector3 measured_omega_b_radps{};
+  Vector3 measured_f_b_mps2{};
+};
+
+/// What a person marked.
+struct PersonEvent {
+  UtcTime utc;
+  std::string source;
+  std::string text;
+};
+
 /// Health of the service. Counts are since the start of the run.
 struct StatusReport {
   struct Device {
@@ -169,18 +213,43 @@ struct StatusReport {
     std::uint64_t clock_resets = 0;
     double latency_s = kUnknown;
     double clock_drift_ppm = kUnknown;
-    double clock_sd_s = kUnknown;
+    double clock_sd_s = kUnknown;  ///< spread of the latency
+  };
+  /// How far one S-IMU's calibration has come.
+  struct Study {
+    std::string name;
+    std::string state;
+    std::string regime;
+    double sd_psi_rad = kUnknown;  ///< largest of the three axes, like the next
+    double goal_psi_rad = kUnknown;
+    double sd_r_m = kUnknown;
+    double goal_r_m = kUnknown;
+    double sd_t_d_s = kUnknown;
+    double goal_t_d_s = kUnknown;
+    std::string weakest;
+    double weakest_relative = kUnknown;
+    std::string manoeuvre;
+    std::uint64_t samples = 0;
+    std::uint64_t used = 0;
+    std::uint64_t late = 0;
+    std::uint64_t gated = 0;
+  };
+  struct Quantiles {
+    double p50_s = kUnknown;
+    double p99_s = kUnknown;
+    double p999_s = kUnknown;
+    double max_s = kUnknown;
   };
   struct Thread {
     std::string name;
-    std::string scheduling;  ///< what was granted: "fifo 80", "normal", "idle"
+    std::string scheduling;       ///< what was granted: "fifo 80", "normal", "idle"
+    double cpu_share = kUnknown;  ///< of one core, over the last status interval
     std::uint64_t ticks = 0;
     std::uint64_t overruns = 0;
     std::uint64_t skipped = 0;
-    Duration lateness_p50{0};
-    Duration lateness_p99{0};
-    Duration lateness_p999{0};
-    Duration lateness_max{0};
+    Quantiles lateness;                           ///< unknown for a thread without deadlines
+    Quantiles done;                               ///< from the deadline until the work was handed on
+    std::vector<std::uint64_t> lateness_octaves;  ///< see LatenessHistogram::octaves()
   };
   struct Ring {
     std::string name;
@@ -192,17 +261,22 @@ struct StatusReport {
   UtcTime utc;  ///< of this report
   std::string run;
   std::string version;
+  std::string build;  ///< compiler
+  std::string configuration_hash;
   std::string state;   ///< starting, aligning, running, degraded, failed
   std::string reason;  ///< why it is in that state
   double uptime_s = 0.0;
   std::int64_t tick = 0;
   std::uint64_t refits = 0;
   double refit_duration_s = kUnknown;
+  std::optional<UtcTime> refit_utc;  ///< when the last one was finished
   std::uint64_t resident_memory_bytes = 0;
   std::string capture_path;
   std::uint64_t capture_bytes = 0;
   std::uint64_t capture_lost = 0;
+  std::string last_event;  ///< what a person marked
   std::vector<Device> devices;
+  std::vector<Study> studies;
   std::vector<Thread> threads;
   std::vector<Ring> rings;
   std::vector<std::string> problems;  ///< each with its remedy

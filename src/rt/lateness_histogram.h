@@ -41,7 +41,21 @@ class LatenessHistogram {
     return max_;
   }
 
+  /// Values per octave, for a picture: the first counts values below 1.024 us, element i > 0 those from
+  /// 1.024 us * 2^(i-1) to below 1.024 us * 2^i, the last one everything beyond.
+  static constexpr std::size_t kOctaves = 18;
+  [[nodiscard]] std::array<std::uint64_t, kOctaves> octaves() const noexcept {
+    std::array<std::uint64_t, kOctaves> octaves{};
+    for (std::size_t bucket = 0; bucket < kBuckets; ++bucket) {
+      const auto edge_ns = static_cast<std::uint64_t>(upper_edge(bucket).count());
+      const auto octave = static_cast<std::size_t>(std::bit_width(edge_ns >> kOctaveShift));
+      octaves[std::min(octave, kOctaves - 1)] += counts_[bucket];
+    }
+    return octaves;
+  }
+
  private:
+  static constexpr unsigned kOctaveShift = 10;  // 1.024 us in ns
   static constexpr unsigned kSubBits = 3;
   static constexpr std::uint64_t kSubBuckets = 1U << kSubBits;
   static constexpr unsigned kTopBit = 36;

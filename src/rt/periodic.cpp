@@ -14,6 +14,7 @@ TickSchedule::TickSchedule(HostTime t0, Duration period) noexcept : next_deadlin
 
 void TickSchedule::finish(HostTime now) noexcept {
   if (now > next_deadline_) statistics_.overruns += 1;
+  statistics_.done.add(now - (next_deadline_ - period_));
 }
 
 Tick TickSchedule::wake(HostTime now) noexcept {

@@ -23,7 +23,8 @@ struct PeriodicStatistics {
   std::uint64_t ticks = 0;     ///< delivered
   std::uint64_t overruns = 0;  ///< ticks whose work went past the next deadline
   std::uint64_t skipped = 0;   ///< ticks never delivered, by overrun or late wake-up
-  LatenessHistogram lateness;
+  LatenessHistogram lateness;  ///< wake-up after the first deadline due
+  LatenessHistogram done;      ///< end of a tick's work after its cut
 };
 
 /// The arithmetic of the beat without clock and sleep: which tick is next and what a wake-up delivers.
@@ -38,7 +39,8 @@ class TickSchedule {
   /// Deadline of the next tick.
   [[nodiscard]] HostTime deadline() const noexcept { return next_deadline_; }
 
-  /// The work of the tick before is over at `now`. Counts an overrun if the next deadline has passed.
+  /// The work of the tick that wake() delivered last is over at `now`. Counts an overrun if the next deadline
+  /// has passed.
   void finish(HostTime now) noexcept;
 
   /// The tick that a wake-up at `now` delivers.

@@ -409,6 +409,7 @@ void read_noise_options(TomlReader in, NoiseOptions& options) {
   in.text("model", options.model);
   in.number("refit_interval_s", options.refit_interval_s, 1.0, 1.0, 1e5);
   in.boolean("remove_scale_error", options.remove_scale_error);
+  in.boolean("apply_to_filter", options.apply_to_filter);
   in.finish();
 }
 
@@ -535,6 +536,7 @@ Result<Configuration> parse_configuration(const std::string& text, const std::fi
   auto lcm = root.table("lcm");
   lcm.text("url", configuration.lcm.url);
   lcm.text("channel_prefix", configuration.lcm.channel_prefix);
+  lcm.boolean("bridge", configuration.lcm.bridge);
   lcm.finish();
   auto record = root.table("record");
   record.text("folder", configuration.record.folder);

@@ -160,11 +160,13 @@ struct NoiseOptions {
   std::string model = "WN+2*GM";
   double refit_interval_s = 60.0;
   bool remove_scale_error = true;  ///< from the error process before models are fitted
+  bool apply_to_filter = false;    ///< live refits replace the estimator's noise model (noise_feedback.h)
 };
 
 struct LcmOptions {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string channel_prefix = "IMUSCOPE";
+  bool bridge = false;  ///< publishes pose_t and ins_t, too
 };
 
 struct RecordOptions {

@@ -1,20 +1,27 @@
 #include "service/core.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "base/contracts.h"
 
 namespace imuscope {
 
-Core::Core(const EstimatorConfig& config, std::size_t n_devices, std::vector<LateSample> late_samples,
-           HistorySink* history)
-    : estimator_(config, history), reference_(config.reference.device), late_samples_(n_devices) {
+Core::Core(const EstimatorConfig& config, std::size_t n_devices, CoreSchedule schedule, HistorySink* history)
+    : estimator_(config, history),
+      reference_(config.reference.device),
+      late_samples_(n_devices),
+      applied_noises_(std::move(schedule.applied_noises)) {
   for (std::size_t i = 0; i < n_devices; ++i) rings_.push_back(std::make_unique<SampleRing>());
-  std::sort(late_samples.begin(), late_samples.end(),
+  for (std::size_t i = 0; i < config.studies.size(); ++i)
+    noises_.push_back(std::make_unique<LatestValue<NewNoise>>());
+  std::sort(schedule.late_samples.begin(), schedule.late_samples.end(),
             [](const LateSample& a, const LateSample& b) { return a.sequence < b.sequence; });
-  for (const auto& late : late_samples) {
+  for (const auto& late : schedule.late_samples) {
     if (late.device < n_devices) late_samples_[late.device].push_back(late);
   }
+  std::stable_sort(applied_noises_.begin(), applied_noises_.end(),
+                   [](const AppliedNoise& a, const AppliedNoise& b) { return a.tick < b.tick; });
 }
 
 bool Core::held_back(const Sample& sample, std::int64_t index) const noexcept {
@@ -50,6 +57,7 @@ void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
 
 void Core::note_first_reference(const Sample& sample) noexcept {
   if (sample.device != reference_ || sample.kind != SampleKind::kImu) return;
+  snapshot_.reference = sample.imu;
   if (!snapshot_.has_reference) {
     snapshot_.has_reference = true;
     snapshot_.first_reference_time = sample.time;
@@ -60,8 +68,24 @@ void Core::note_first_reference(const Sample& sample) noexcept {
   }
 }
 
+/// Before anything of the tick is computed, so that a replay needs the tick's number alone.
+void Core::take_over_noises(std::int64_t index, CoreSink& sink) noexcept {
+  const auto apply = [&](const AppliedNoise& applied) {
+    estimator_.set_noise(applied.study, applied.model.noise);
+    sink.on_noise_applied(applied);
+  };
+  for (std::size_t i = 0; i < noises_.size(); ++i) {
+    if (noises_[i]->take()) apply({i, index, noises_[i]->value()});
+  }
+  for (; next_applied_ < applied_noises_.size() && applied_noises_[next_applied_].tick <= index;
+       ++next_applied_) {
+    apply(applied_noises_[next_applied_]);
+  }
+}
+
 void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   IMUSCOPE_EXPECTS(cut > previous_cut_);
+  take_over_noises(index, sink);
   consume(index, cut, sink);
   previous_cut_ = cut;
   estimator_.advance(cut);

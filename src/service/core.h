@@ -12,6 +12,7 @@
 
 #include "calibration/estimator.h"
 #include "error_process/error_row.h"
+#include "rt/latest_value.h"
 #include "rt/spsc_ring.h"
 #include "sample/sample.h"
 
@@ -37,6 +38,7 @@ struct Snapshot {
   std::size_t n_studies;
   NavigationOutput navigation;
   OdometryOutput odometry;
+  ImuData reference;  ///< newest sample of the R-IMU as measured; zero before the first
   std::array<StudyOutput, kMaxStudies> studies;
   EstimatorCounters counters;
 };
@@ -58,6 +60,27 @@ struct LateSample {
   std::int64_t tick;
 };
 
+/// A noise model on its way from a refit to the estimator.
+struct NewNoise {
+  std::int64_t samples;  ///< of the S-IMU's error process that the refit had seen
+  StudyNoise noise;
+};
+static_assert(std::is_trivially_copyable_v<NewNoise>);
+
+/// A noise model that the estimator took over at the beginning of `tick`. A replay takes it over there, too.
+struct AppliedNoise {
+  std::size_t study;
+  std::int64_t tick;
+  NewNoise model;
+};
+static_assert(std::is_trivially_copyable_v<AppliedNoise>);
+
+/// What broke the rule of the ticks in the run that is replayed, or was decided beside the samples.
+struct CoreSchedule {
+  std::vector<LateSample> late_samples;      ///< any order
+  std::vector<AppliedNoise> applied_noises;  ///< any order
+};
+
 /// What comes out of a tick. On the real-time side an implementation pushes into rings; in a replay it works.
 class CoreSink {
  public:
@@ -71,18 +94,23 @@ class CoreSink {
   virtual void on_event(const EstimatorEvent& event) noexcept = 0;
   virtual void on_snapshot(const Snapshot& snapshot) noexcept = 0;
   virtual void on_late_sample(const LateSample& late) noexcept = 0;
+  virtual void on_noise_applied(const AppliedNoise& applied) noexcept { (void)applied; }
 };
 
 /// Consumer of the sample rings and owner of the estimator. Thread: one, save for the rings' producer side.
 /// Allocates: in the constructor alone.
 class Core {
  public:
-  /// @param late_samples  of the run that is replayed, empty otherwise; any order
-  Core(const EstimatorConfig& config, std::size_t n_devices, std::vector<LateSample> late_samples = {},
+  /// @param schedule  of the run that is replayed, empty otherwise
+  Core(const EstimatorConfig& config, std::size_t n_devices, CoreSchedule schedule = {},
        HistorySink* history = nullptr);
 
   /// Producer side of device `device`'s ring.
   [[nodiscard]] SampleRing& ring(DeviceIndex device) noexcept { return *rings_[device]; }
+
+  /// Hands in the noise model of a refit; the next tick takes over the newest. Thread: one, of the soft
+  /// world.
+  void offer_noise(std::size_t study, const NewNoise& model) noexcept { noises_[study]->write(model); }
 
   /// Consumes every sample that had arrived by `cut`, advances the estimator and reports to `sink`.
   /// Ticks increase; a skipped tick is simply not called.
@@ -93,12 +121,16 @@ class Core {
  private:
   [[nodiscard]] bool held_back(const Sample& sample, std::int64_t index) const noexcept;
   void consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
+  void take_over_noises(std::int64_t index, CoreSink& sink) noexcept;
   void note_first_reference(const Sample& sample) noexcept;
 
   Estimator estimator_;
   DeviceIndex reference_;
   std::vector<std::unique_ptr<SampleRing>> rings_;
   std::vector<std::vector<LateSample>> late_samples_;  ///< per device, by sequence
+  std::vector<AppliedNoise> applied_noises_;           ///< of the replayed run, by tick
+  std::size_t next_applied_ = 0;
+  std::vector<std::unique_ptr<LatestValue<NewNoise>>> noises_;  ///< per study
   HostTime previous_cut_{HostTime::min()};
   Snapshot snapshot_{};
 };

@@ -18,8 +18,9 @@ namespace imuscope {
 struct CoreRings {
   SpscRing<ErrorRecord, 4096> errors;  ///< six S-IMUs at 100 Hz: 6 s
   SpscRing<EstimatorEvent, 256> events;
-  SpscRing<Snapshot, 64> snapshots;  ///< 10 Hz: 6 s
-  ExceptionRing exceptions;          ///< to the recorder
+  SpscRing<Snapshot, 64> snapshots;   ///< 10 Hz: 6 s
+  SpscRing<AppliedNoise, 16> noises;  ///< a few a minute
+  ExceptionRing exceptions;           ///< to the recorder
 };
 
 /// Pushes into the rings; what they refuse is counted by them.
@@ -33,6 +34,9 @@ class RingCoreSink final : public CoreSink {
     (void)rings_.exceptions.try_push(
         {ExceptionKind::kLateSample, late.device, static_cast<std::int64_t>(late.sequence), late.tick, 1});
   }
+  void on_noise_applied(const AppliedNoise& applied) noexcept override {
+    (void)rings_.noises.try_push(applied);
+  }
 
  private:
   CoreRings& rings_;
@@ -42,7 +46,7 @@ class CoreThread {
  public:
   /// The thread wakes this long after a cut: the I/O thread needs a moment from the stamp of a read to the
   /// push of its samples, and a sample that is pushed too late for its tick is an exception to be recorded.
-  static constexpr Duration kGuard = std::chrono::microseconds(500);
+  static constexpr Duration kGuard = std::chrono::microseconds(50);
 
   CoreThread(Core& core, HostTime t0);
   ~CoreThread();
@@ -55,6 +59,8 @@ class CoreThread {
   void finish(std::int64_t last);
 
   [[nodiscard]] CoreRings& rings() { return *rings_; }
+  /// Hands the noise model of a refit to the estimator. Thread: the publisher's.
+  void offer_noise(std::size_t study, const NewNoise& model) noexcept { core_.offer_noise(study, model); }
   /// Newest statistics of the beat. One reader: the publisher.
   [[nodiscard]] PeriodicStatistics statistics();
   /// Index of the last tick done; -1 before the first.

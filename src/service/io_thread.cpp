@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 #include <sys/epoll.h>
+#include <sys/timerfd.h>
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <future>
+#include <limits>
 
 #include "rt/host_clock.h"
 
@@ -17,9 +20,51 @@ namespace {
 /// A read takes what a burst can bring: 4 kB is 350 ms of a line at 115200 baud.
 constexpr std::size_t kReadBytes = 4096;
 /// Sessions are polled at least this often (device.h asks for 10 ms).
-constexpr int kPoll_ms = 5;
+constexpr Duration kPollPeriod = std::chrono::milliseconds(5);
 constexpr Duration kStatusPeriod = std::chrono::milliseconds(100);
 constexpr std::size_t kPrefaultedStack = 128 * 1024;
+
+/// From `first` on, every `period`, on CLOCK_MONOTONIC.
+void set_timer(int timer, HostTime first, Duration period) noexcept {
+  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  itimerspec times{};
+  times.it_value.tv_sec = to_ns(first) / kNsPerSecond;
+  times.it_value.tv_nsec = to_ns(first) % kNsPerSecond;
+  times.it_interval.tv_nsec = period.count();
+  (void)timerfd_settime(timer, TFD_TIMER_ABSTIME, &times, nullptr);
+}
+
+/// How late the samples of one device came, second by second.
+class LatencyWindow {
+ public:
+  void add(HostTime arrival, Duration latency) noexcept {
+    if (arrival - begin_ >= std::chrono::seconds(1)) close(arrival);
+    const double value_s = to_seconds(latency);
+    n_ += 1.0;
+    const double step = value_s - mean_s_;
+    mean_s_ += step / n_;
+    sum_of_squares_ += step * (value_s - mean_s_);
+  }
+  [[nodiscard]] double mean_s() const noexcept { return closed_mean_s_; }
+  [[nodiscard]] double sd_s() const noexcept { return closed_sd_s_; }
+
+ private:
+  void close(HostTime now) noexcept {
+    if (n_ > 1.0) {
+      closed_mean_s_ = mean_s_;
+      closed_sd_s_ = std::sqrt(sum_of_squares_ / (n_ - 1.0));
+    }
+    begin_ = now;
+    n_ = mean_s_ = sum_of_squares_ = 0.0;
+  }
+
+  HostTime begin_{};
+  double n_ = 0.0;
+  double mean_s_ = 0.0;
+  double sum_of_squares_ = 0.0;
+  double closed_mean_s_ = std::numeric_limits<double>::quiet_NaN();
+  double closed_sd_s_ = std::numeric_limits<double>::quiet_NaN();
+};
 
 }  // namespace
 
@@ -38,7 +83,8 @@ class IoThread::Line final : public SampleSink {
 
   void on_sample(const Sample& sample) noexcept override {
     newest_arrival_ = std::max(newest_arrival_, sample.arrival);
-    status_.latency_s = to_seconds(sample.arrival - sample.time);
+    latency_.add(sample.arrival, sample.arrival - sample.time);
+    if (sample.kind != SampleKind::kAttitude) ++status_.epochs;
     if (ring_.try_push(sample)) return;
     ++status_.refused;
     (void)exceptions_.try_push(
@@ -104,6 +150,9 @@ class IoThread::Line final : public SampleSink {
     if (now - last_status_ < kStatusPeriod) return;
     last_status_ = now;
     status_.counters = decoder_->counters();
+    status_.latency_s = latency_.mean_s();
+    status_.latency_sd_s = latency_.sd_s();
+    status_.clock_drift_ppm = decoder_->clock_drift_ppm();
     if (connection_ != nullptr) {
       const auto health = connection_->line->health();
       status_.line = health.is_up ? LineState::kOpen : LineState::kDown;
@@ -143,6 +192,7 @@ class IoThread::Line final : public SampleSink {
   std::array<std::uint8_t, kReadBytes> buffer_{};
   LineStatus status_;
   std::uint64_t dropped_before_ = 0;  ///< on the connections before this one
+  LatencyWindow latency_;
   HostTime last_status_{};
   HostTime newest_arrival_{HostTime::min()};
   LatestValue<LineStatus> published_;
@@ -164,6 +214,7 @@ IoThread::IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decod
 
 IoThread::~IoThread() {
   stop();
+  if (timer_ >= 0) ::close(timer_);
   if (epoll_ >= 0) ::close(epoll_);
 }
 
@@ -171,6 +222,13 @@ Result<void> IoThread::start(const ThreadPlan& plan, std::vector<Error>& refusal
   epoll_ = epoll_create1(EPOLL_CLOEXEC);
   if (epoll_ < 0) {
     return work_error(fmt::format("no epoll descriptor: {}", std::strerror(errno)),
+                      "raise the limit of open files");
+  }
+  timer_ = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK);
+  epoll_event event{};  // no pointer: told apart from the lines by that
+  event.events = EPOLLIN;
+  if (timer_ < 0 || epoll_ctl(epoll_, EPOLL_CTL_ADD, timer_, &event) != 0) {
+    return work_error(fmt::format("no timer for the I/O thread: {}", std::strerror(errno)),
                       "raise the limit of open files");
   }
   running_.store(true, std::memory_order_release);
@@ -202,18 +260,42 @@ std::unique_ptr<Connection> IoThread::take_back(DeviceIndex device) {
 
 LineStatus IoThread::status(DeviceIndex device) { return lines_[device]->status(); }
 
+PeriodicStatistics IoThread::statistics() {
+  (void)statistics_.take();
+  return statistics_.value();
+}
+
 void IoThread::loop() {
-  std::array<epoll_event, kMaxDevices> events{};
+  std::array<epoll_event, kMaxDevices + 1> events{};
+  const HostTime first = host_now() + kPollPeriod;
+  set_timer(timer_, first, kPollPeriod);
+  TickSchedule beat(first, kPollPeriod);
+  HostTime last_statistics{};
   while (running_.load(std::memory_order_acquire)) {
     for (const auto& line : lines_) line->adopt(epoll_);
-    const int n = epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), kPoll_ms);
+    const int n = epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), -1);
+    bool beaten = false;
     for (int i = 0; i < n; ++i) {
-      static_cast<Line*>(events[static_cast<std::size_t>(i)].data.ptr)->read(tap_, epoll_);
+      auto* const line = static_cast<Line*>(events[static_cast<std::size_t>(i)].data.ptr);
+      if (line != nullptr) {
+        line->read(tap_, epoll_);
+      } else if (std::uint64_t expirations = 0; ::read(timer_, &expirations, sizeof expirations) > 0) {
+        // An expiration between the timer's read and this look at the clock was counted with the one before.
+        const HostTime woken = host_now();
+        if (woken < beat.deadline()) continue;
+        (void)beat.wake(woken);
+        beaten = true;
+      }
     }
     const HostTime now = host_now();
     for (const auto& line : lines_) {
       line->say(tap_, epoll_, now);
       line->publish(now);
+    }
+    if (beaten) beat.finish(host_now());
+    if (now - last_statistics >= kStatusPeriod) {
+      statistics_.write(beat.statistics());
+      last_statistics = now;
     }
   }
 }

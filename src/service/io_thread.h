@@ -17,6 +17,7 @@
 #include "drivers/device/device.h"
 #include "drivers/transport/transport.h"
 #include "rt/latest_value.h"
+#include "rt/periodic.h"
 #include "rt/thread_setup.h"
 #include "service/core.h"
 
@@ -43,7 +44,10 @@ struct LineStatus {
   std::uint64_t refused = 0;         ///< samples that found the ring to the core full
   std::uint64_t frames_dropped = 0;  ///< lost by this PC before they were read
   std::uint64_t reads = 0;
-  double latency_s = 0.0;  ///< arrival minus mapped time of the last sample
+  std::uint64_t epochs = 0;   ///< samples without the attitude that a reference sends beside its IMU samples
+  double latency_s = 0.0;     ///< arrival minus mapped time, mean over the last second that had samples
+  double latency_sd_s = 0.0;  ///< its spread about that mean
+  double clock_drift_ppm = 0.0;  ///< of the device's clock against the host's; NaN where unknown
   HostTime last_arrival{};
   std::array<char, 200> problem{};  ///< of the session; NUL-terminated
 };
@@ -71,6 +75,8 @@ class IoThread {
 
   /// Newest status of a device. One reader: the publisher.
   [[nodiscard]] LineStatus status(DeviceIndex device);
+  /// Newest statistics of the beat at which sessions are polled. One reader: the publisher.
+  [[nodiscard]] PeriodicStatistics statistics();
 
   [[nodiscard]] RawRing& raw_ring() { return *raw_ring_; }
   [[nodiscard]] ExceptionRing& exceptions() { return *exceptions_; }
@@ -86,6 +92,8 @@ class IoThread {
   std::unique_ptr<ExceptionRing> exceptions_;
   RawTap tap_;
   int epoll_ = -1;
+  int timer_ = -1;
+  LatestValue<PeriodicStatistics> statistics_;
   HostTime newest_arrival_{HostTime::min()};
   std::atomic<bool> running_{false};
   std::thread thread_;

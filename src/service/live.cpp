@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <thread>
 
 #include "capture/recorder.h"
@@ -18,7 +19,9 @@
 #include "service/line_factory.h"
 #include "service/live_publisher.h"
 #include "service/live_smoothing.h"
+#include "service/reload.h"
 #include "service/study.h"
+#include "service/systemd_notify.h"
 
 namespace imuscope {
 
@@ -110,11 +113,21 @@ class Supervisor {
   std::vector<Line> lines_;
 };
 
+/// Replays are exact for the same build on the same CPU model: the capture says which.
+std::string processor_model() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  }
+  return "unknown";
+}
+
 RunHeader run_header(const Configuration& configuration, const LiveOptions& options, HostTime t0) {
   RunHeader header;
   header.name = configuration.run_name;
   header.version = options.version;
-  header.build = __VERSION__;
+  header.build = fmt::format("g++ {}", __VERSION__);
+  header.processor = processor_model();
   header.t0 = t0;
   header.period = kTickPeriod;
   header.t0_wall = wall_clock_now() + (t0 - host_now());
@@ -126,6 +139,35 @@ RunHeader run_header(const Configuration& configuration, const LiveOptions& opti
 
 void log_refusals(const std::vector<Error>& refusals) {
   for (const auto& refusal : refusals) spdlog::warn("{}", refusal.text());
+}
+
+/// Has core and publisher done anything since the last look? What stops is started anew by systemd.
+class Pulse {
+ public:
+  bool beats(const CoreThread& estimator, const LivePublisher& publisher) {
+    const auto tick = estimator.last_tick();
+    const auto turns = publisher.turns();
+    const bool moved = tick != tick_ && turns != turns_;
+    tick_ = tick;
+    turns_ = turns;
+    return moved;
+  }
+
+ private:
+  std::int64_t tick_ = -1;
+  std::uint64_t turns_ = 0;
+};
+
+void reload(const Configuration& configuration, LivePublisher& publisher) {
+  const auto read = reload_configuration(configuration);
+  if (!read) {
+    spdlog::error("reload: {}; the running configuration stays", read.error().text());
+    return;
+  }
+  publisher.reconfigure(read->tunables);
+  spdlog::info("reload: [lcm] and [noise] of {} are in force", configuration.file.string());
+  for (const auto& name : read->at_next_start)
+    spdlog::warn("reload: [{}] has changed, too; that takes effect at the next start", name);
 }
 
 /// A recording is never written over, nor the files beside it.
@@ -148,8 +190,7 @@ Result<void> check_lines(const Configuration& configuration) {
 
 }  // namespace
 
-Result<void> run_live(const Configuration& configuration, const LiveOptions& options,
-                      const std::atomic<bool>& stop) {
+Result<void> run_live(const Configuration& configuration, const LiveOptions& options, LiveSignals& signals) {
   if (auto checked = check_lines(configuration); !checked) return checked;
   if (auto checked = check_folder(options.out); !checked) return checked;
   const auto spec = noise::parse_model(configuration.noise.model);
@@ -183,23 +224,41 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
 
   std::vector<Error> refusals;
   if (auto locked = lock_memory(); !locked) refusals.push_back(locked.error());
-  if (auto started = io.start({"imuscope-io", Scheduling::kFifo, kIoPriority, {}}, refusals); !started)
+  if (auto started = io.start({kIoThreadName, Scheduling::kFifo, kIoPriority, {}}, refusals); !started)
     return started;
-  estimator.start({"imuscope-est", Scheduling::kFifo, kEstimatorPriority, {}}, refusals);
+  estimator.start({kEstimatorThreadName, Scheduling::kFifo, kEstimatorPriority, {}}, refusals);
   (*publisher)->start();
   log_refusals(refusals);
   (*publisher)->set_refusals(refusals);
   spdlog::info("running '{}' into {}; Ctrl-C ends it", configuration.run_name, options.out.string());
+  SystemdNotify systemd;
+  systemd.ready(fmt::format("recording into {}", options.out.string()));
 
   Supervisor supervisor(configuration, ids, io, **publisher);
+  Pulse pulse;
+  std::string told;
   const HostTime started = host_now();
   const auto over = [&] {
     return options.duration_s && host_now() - started > from_seconds(*options.duration_s);
   };
-  while (!stop.load(std::memory_order_relaxed) && !over()) {
-    supervisor.step(host_now());
+  while (!signals.stop.load(std::memory_order_relaxed) && !over()) {
+    const HostTime now = host_now();
+    supervisor.step(now);
+    if (signals.reload.exchange(false, std::memory_order_relaxed)) {
+      systemd.reloading(now);
+      reload(configuration, **publisher);
+      systemd.ready(told);
+    }
+    const auto health = (*publisher)->health();
+    if (auto text = health.state + ": " + health.reason; text != told) {
+      spdlog::info("{}", text);
+      systemd.status(text);
+      told = std::move(text);
+    }
+    if (pulse.beats(estimator, **publisher)) systemd.alive(now);
     std::this_thread::sleep_for(kSupervisorPeriod);
   }
+  systemd.stopping();
 
   // In the order of the flow, so that nothing is lost: no more bytes, then their last tick, then what came of
   // it.

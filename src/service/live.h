@@ -16,17 +16,28 @@
 
 namespace imuscope {
 
+/// Names of the threads, as top, the kernel and STATUS show them.
+inline constexpr const char* kIoThreadName = "imuscope-io";
+inline constexpr const char* kEstimatorThreadName = "imuscope-est";
+inline constexpr const char* kPublisherThreadName = "imuscope-pub";
+
 struct LiveOptions {
   std::filesystem::path out;  ///< run folder; the capture goes there too
   std::string version;
   std::optional<double> duration_s;  ///< ends by itself after this time
 };
 
-/// Runs until `stop` becomes true, or for options.duration_s. Ends cleanly: what had arrived is estimated,
-/// recorded, published and written.
+/// What the outside asks for; a signal handler may set these.
+struct LiveSignals {
+  std::atomic<bool> stop{false};
+  std::atomic<bool> reload{false};  ///< read the configuration file again (reload.h)
+};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+/// Runs until signals.stop becomes true, or for options.duration_s. Ends cleanly: what had arrived is
+/// estimated, recorded, published and written.
 /// Errors: no device of the configuration has a line (kUsage); the run folder or the capture cannot be made,
 /// no device ever answered (kWork).
-Result<void> run_live(const Configuration& configuration, const LiveOptions& options,
-                      const std::atomic<bool>& stop);
+Result<void> run_live(const Configuration& configuration, const LiveOptions& options, LiveSignals& signals);
 
 }  // namespace imuscope

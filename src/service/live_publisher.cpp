@@ -6,15 +6,21 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <utility>
 
+#include "publish/message_builders.h"
+#include "publish/message_codec.h"
 #include "rt/host_clock.h"
+#include "service/estimator_setup.h"
+#include "service/noise_feedback.h"
 #include "service/study.h"
 
 namespace imuscope {
 
 namespace {
 
-constexpr auto kDrainPeriod = std::chrono::milliseconds(10);
+constexpr Duration kDrainPeriod = std::chrono::milliseconds(10);
+constexpr int kEventQueue = 100;
 constexpr Duration kStatusPeriod = std::chrono::seconds(1);
 
 constexpr std::array kSessionNames{"connecting", "configuring", "streaming", "failed"};
@@ -56,6 +62,8 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       io_(io),
       estimator_(estimator),
       study_devices_(configuration.study_indices()),
+      estimator_config_(estimator_config(configuration)),
+      tunables_{configuration.lcm, configuration.noise, spec},
       modeller_(configuration, std::move(spec)),
       watches_(configuration.devices.size()),
       lines_(configuration.devices.size()),
@@ -65,6 +73,7 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       observability_(study_devices_.size()),
       started_(host_now()) {
   anchor_ = {started_, wall_clock_now()};
+  for (const auto& study : estimator_config_.studies) noises_.push_back(study.noise);
 }
 
 LivePublisher::~LivePublisher() {
@@ -84,15 +93,7 @@ Result<std::unique_ptr<LivePublisher>> LivePublisher::create(const Configuration
   auto folder = RunFolder::create(options.out, std::move(infos), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
   publisher->folder_ = std::move(*folder);
-  auto bus = LcmPublisher::open(configuration.lcm.url, configuration.lcm.channel_prefix);
-  if (bus) {
-    publisher->bus_.emplace(std::move(*bus));
-  } else if (bus.error().kind == ErrorKind::kUsage) {
-    return tl::unexpected<Error>(bus.error());
-  } else {
-    spdlog::warn("nothing is published over LCM: {}", bus.error().text());
-    publisher->refusals_.push_back(bus.error().text());
-  }
+  if (auto opened = publisher->open_bus(); !opened) return tl::unexpected<Error>(opened.error());
   return publisher;
 }
 
@@ -105,8 +106,80 @@ Result<void> LivePublisher::smooth(LiveHistory& history, const EstimatorConfig& 
   return smoothing_->open(options_.out, std::move(infos));
 }
 
+/// Without a route the service works on and says so; a URL that cannot serve is an error.
+Result<void> LivePublisher::open_bus() {
+  bus_.reset();
+  ear_.reset();
+  bus_problem_.clear();
+  auto bus = LcmPublisher::open(tunables_.lcm.url, tunables_.lcm.channel_prefix);
+  if (!bus) {
+    if (bus.error().kind == ErrorKind::kUsage) return tl::unexpected<Error>(bus.error());
+    bus_problem_ = bus.error().text();
+    spdlog::warn("nothing is published over LCM: {}", bus_problem_);
+    return {};
+  }
+  bus_.emplace(std::move(*bus));
+  if (recorder_ != nullptr) set_recorder(*recorder_);
+  if (tunables_.lcm.url.starts_with("file://")) return {};  // a log is written to, not listened to
+  auto ear = LcmListener::open(tunables_.lcm.url, tunables_.lcm.channel_prefix);
+  if (!ear) return tl::unexpected<Error>(ear.error());
+  ear_.emplace(std::move(*ear));
+  ear_->subscribe(
+      "EVENT",
+      [this](const std::string& channel, std::span<const std::uint8_t> bytes) {
+        on_person_event(channel, bytes);
+      },
+      kEventQueue);
+  return {};
+}
+
+void LivePublisher::set_recorder(Recorder& recorder) {
+  recorder_ = &recorder;
+  if (!bus_) return;
+  bus_->set_tap([this](std::string_view channel, std::int64_t utime, std::span<const std::uint8_t> message) {
+    recorder_->record_message(channel, utime, message);
+  });
+}
+
+void LivePublisher::on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes) {
+  const auto event = decode_message<event_t>(bytes);
+  if (!event) {
+    spdlog::warn("a message on {} is no event_t of this version; it was recorded as it came", channel);
+  } else {
+    last_event_ = event->text;
+    spdlog::info("event: {} (from {})", event->text, event->source);
+  }
+  // By the time at which it was heard: the sender's clock may be another PC's.
+  if (recorder_ != nullptr) recorder_->record_message(channel, to_utime(wall_clock_now()), bytes);
+}
+
+void LivePublisher::reconfigure(const Tunables& tunables) {
+  const std::lock_guard lock(shared_mutex_);
+  new_tunables_ = tunables;
+}
+
+void LivePublisher::take_over_tunables() {
+  std::optional<Tunables> tunables;
+  {
+    const std::lock_guard lock(shared_mutex_);
+    tunables = std::exchange(new_tunables_, std::nullopt);
+  }
+  if (!tunables) return;
+  tunables_ = std::move(*tunables);
+  modeller_.set_options(tunables_.model, tunables_.noise.refit_interval_s);
+  if (auto opened = open_bus(); !opened) {
+    bus_problem_ = opened.error().text();
+    spdlog::error("nothing is published over LCM: {}", bus_problem_);
+  }
+}
+
+Health LivePublisher::health() const {
+  const std::lock_guard lock(shared_mutex_);
+  return health_;
+}
+
 void LivePublisher::set_refusals(const std::vector<Error>& refusals) {
-  const std::lock_guard lock(refusals_mutex_);
+  const std::lock_guard lock(shared_mutex_);
   for (const auto& refusal : refusals) refusals_.push_back(refusal.text());
 }
 
@@ -137,21 +210,26 @@ void LivePublisher::start() {
   modeller_.start({"imuscope-model", Scheduling::kIdle, 0, {}});
   running_.store(true, std::memory_order_release);
   thread_ = std::thread([this] {
-    (void)setup_this_thread({"imuscope-pub", Scheduling::kNormal, 0, {}});
+    (void)setup_this_thread({kPublisherThreadName, Scheduling::kNormal, 0, {}});
     loop();
   });
 }
 
 void LivePublisher::loop() {
+  PeriodicLoop beat(host_now(), kDrainPeriod);
   while (running_.load(std::memory_order_acquire)) {
+    (void)beat.wait();
+    beat_ = beat.statistics();
+    take_over_tunables();
     drain();
+    if (ear_) (void)ear_->wait(std::chrono::milliseconds(0));
+    turns_.fetch_add(1, std::memory_order_relaxed);
     const HostTime now = host_now();
     if (now - last_status_ >= kStatusPeriod) {
       watch_devices(now);
       publish_status(now);
       last_status_ = now;
     }
-    std::this_thread::sleep_for(kDrainPeriod);
   }
 }
 
@@ -169,7 +247,20 @@ void LivePublisher::drain() {
     rings.snapshots.pop();
   }
   if (smoothing_ && last_) smoothing_->drain(*last_);
+  AppliedNoise applied;
+  while (rings.noises.try_pop(applied)) on_noise_applied(applied);
   for (const auto& refit : modeller_.take()) on_refit(refit);
+}
+
+void LivePublisher::on_noise_applied(const AppliedNoise& applied) {
+  const auto& name = configuration_.devices[study_devices_[applied.study]].name;
+  spdlog::info("{}: the filter took over the noise model at tick {}", name, applied.tick);
+  if (recorder_ == nullptr) return;
+  auto record = applied_model_record(applied, name);
+  record.utime = to_utime(wall_clock_now());
+  record.sequence = applied_++;
+  recorder_->record_message(channel_name(configuration_.lcm.channel_prefix, "APPLIED_MODEL"), record.utime,
+                            encode_message(record));
 }
 
 void LivePublisher::on_error(const ErrorRecord& record) {
@@ -199,6 +290,10 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
   if (!bus_) return;
   if (snapshot.navigation.status == NavigationStatus::kNavigating) {
     bus_->publish(navigation_report(snapshot, anchor_));
+    if (tunables_.lcm.bridge) {
+      if (!bridge_origin_) bridge_origin_ = snapshot;
+      bus_->publish(bridge_report(snapshot, *bridge_origin_, anchor_));
+    }
   }
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto state = snapshot.studies[i].status;
@@ -212,10 +307,23 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
 void LivePublisher::on_refit(const Refit& refit) {
   ++refits_;
   refit_duration_s_ = refit.duration_s;
+  refit_utc_ = anchor_.at(host_now());
+  models_.take(refit);
+  // At each refit, not only at the end: a run that is killed leaves its newest models.
+  if (auto written = models_.write(options_.out); !written) spdlog::error("{}", written.error().text());
+  if (tunables_.noise.apply_to_filter) {
+    auto& noise = noises_[refit.study];
+    noise = updated_noise(noise, refit.noise_model);
+    estimator_.offer_noise(refit.study, {refit.samples, noise});
+  }
   Refit stamped = refit;
-  stamped.wavelet_variance.utc = stamped.noise_model.utc = anchor_.at(refit.time);
-  stamped.wavelet_variance.time_s = stamped.noise_model.time_s =
-      to_seconds(refit.time - refit.first_reference_time);
+  const auto stamp = [&](auto& report) {
+    report.utc = anchor_.at(refit.time);
+    report.time_s = to_seconds(refit.time - refit.first_reference_time);
+  };
+  stamp(stamped.wavelet_variance);
+  stamp(stamped.noise_model);
+  stamp(stamped.dynamics);
   spdlog::info("{}: noise models fitted anew ({} of them, {:.0f} ms)", refit.noise_model.name,
                refit.noise_model.models.size(), refit.duration_s * 1e3);
   for (const auto& model : refit.noise_model.models) {
@@ -226,6 +334,7 @@ void LivePublisher::on_refit(const Refit& refit) {
   if (!bus_) return;
   bus_->publish(stamped.wavelet_variance);
   bus_->publish(stamped.noise_model);
+  bus_->publish(stamped.dynamics);
 }
 
 void LivePublisher::watch_devices(HostTime now) {
@@ -235,8 +344,8 @@ void LivePublisher::watch_devices(HostTime now) {
     auto& watch = watches_[i];
     const auto& name = configuration_.devices[i].name;
     const double seconds = std::max(to_seconds(now - last_status_), 1e-3);
-    watch.rate_hz = static_cast<double>(status.counters.samples - watch.samples) / seconds;
-    watch.samples = status.counters.samples;
+    watch.rate_hz = static_cast<double>(status.epochs - watch.epochs) / seconds;
+    watch.epochs = status.epochs;
     const std::string problem = problem_of(i, now);
     if (problem != watch.problem && !problem.empty()) spdlog::warn("{}: {}", name, problem);
     watch.problem = problem;
@@ -265,7 +374,11 @@ StatusReport::Device LivePublisher::device_status(std::size_t index) const {
   report.samples_lost = status.counters.samples_lost;
   report.samples_refused = status.refused;
   report.clock_resets = status.counters.clock_resets;
-  if (status.counters.samples > 0) report.latency_s = status.latency_s;
+  if (status.counters.samples > 0) {
+    report.latency_s = status.latency_s;
+    report.clock_sd_s = status.latency_sd_s;
+    report.clock_drift_ppm = status.clock_drift_ppm;
+  }
   const auto study = std::find(study_devices_.begin(), study_devices_.end(), index);
   if (last_ && study != study_devices_.end()) {
     report.samples_late =
@@ -274,59 +387,81 @@ StatusReport::Device LivePublisher::device_status(std::size_t index) const {
   return report;
 }
 
+/// The beats of the threads that have one, by the threads' names.
+void LivePublisher::add_threads(StatusReport& report, HostTime now) {
+  report.threads = threads_.look(now);
+  const auto add_beat = [&](std::string_view name, const PeriodicStatistics& beat, Duration before_deadline) {
+    const auto found = std::find_if(report.threads.begin(), report.threads.end(),
+                                    [&](const auto& thread) { return thread.name == name; });
+    if (found == report.threads.end()) return;
+    found->ticks = beat.ticks;
+    found->overruns = beat.overruns;
+    found->skipped = beat.skipped;
+    found->lateness = quantiles_of(beat.lateness);
+    found->done = quantiles_of(beat.done);
+    for (double* time_s : {&found->done.p50_s, &found->done.p99_s, &found->done.p999_s, &found->done.max_s})
+      *time_s += to_seconds(before_deadline);
+    const auto octaves = beat.lateness.octaves();
+    found->lateness_octaves.assign(octaves.begin(), octaves.end());
+  };
+  add_beat(kEstimatorThreadName, estimator_.statistics(), CoreThread::kGuard);
+  add_beat(kIoThreadName, io_.statistics(), Duration::zero());
+  add_beat(kPublisherThreadName, beat_, Duration::zero());
+}
+
+void LivePublisher::add_rings(StatusReport& report) {
+  auto& rings = estimator_.rings();
+  report.rings.push_back(ring_status("errors", rings.errors));
+  report.rings.push_back(ring_status("snapshots", rings.snapshots));
+  report.rings.push_back(ring_status("events", rings.events));
+  report.rings.push_back(ring_status("applied models", rings.noises));
+  report.rings.push_back(ring_status("exceptions", rings.exceptions));
+  report.rings.push_back(ring_status("raw bytes", io_.raw_ring()));
+  const auto rows = modeller_.ring();
+  report.rings.push_back({"modeller", Modeller::ring_capacity(), rows.level, rows.high_water, rows.refused});
+}
+
 StatusReport LivePublisher::status(HostTime now) {
   StatusReport report;
   report.utc = anchor_.at(now);
   report.run = configuration_.run_name;
   report.version = options_.version;
+  report.build = fmt::format("g++ {}", __VERSION__);
+  report.configuration_hash = configuration_.sha256;
   report.uptime_s = to_seconds(now - started_);
   report.tick = estimator_.last_tick();
   report.refits = refits_;
   report.refit_duration_s = refit_duration_s_;
+  report.refit_utc = refit_utc_;
   report.resident_memory_bytes = resident_memory_bytes();
+  report.last_event = last_event_;
   if (recorder_ != nullptr) {
     const auto recorded = recorder_->status();
     report.capture_path = recorded.path.string();
     report.capture_bytes = recorded.bytes;
-    report.capture_lost = recorded.records_lost + io_.raw_ring().counters().refused;
+    report.capture_lost = recorded.records_lost + recorded.messages_lost + io_.raw_ring().counters().refused;
     if (recorded.problem) report.problems.push_back(recorded.problem->text());
   }
-  bool all_streaming = true;
-  for (std::size_t i = 0; i < lines_.size(); ++i) {
-    report.devices.push_back(device_status(i));
-    if (lines_[i].session == SessionState::kStreaming) continue;
-    all_streaming = false;
-    if (report.reason.empty()) {
-      report.reason = fmt::format("{} is {}", report.devices.back().name, report.devices.back().state);
-    }
+  for (std::size_t i = 0; i < lines_.size(); ++i) report.devices.push_back(device_status(i));
+  for (std::size_t i = 0; i < study_devices_.size(); ++i) {
+    report.studies.push_back(study_status(configuration_.devices[study_devices_[i]].name,
+                                          last_ ? last_->studies[i] : StudyOutput{},
+                                          estimator_config_.studies[i]));
   }
-  const auto beat = estimator_.statistics();
-  report.threads.push_back({"estimator", "100 Hz", beat.ticks, beat.overruns, beat.skipped,
-                            beat.lateness.quantile(0.5), beat.lateness.quantile(0.99),
-                            beat.lateness.quantile(0.999), beat.lateness.max()});
-  auto& rings = estimator_.rings();
-  report.rings.push_back(ring_status("errors", rings.errors));
-  report.rings.push_back(ring_status("snapshots", rings.snapshots));
-  report.rings.push_back(ring_status("events", rings.events));
-  report.rings.push_back(ring_status("raw bytes", io_.raw_ring()));
-  {
-    const std::lock_guard lock(refusals_mutex_);
-    report.problems.insert(report.problems.end(), refusals_.begin(), refusals_.end());
-  }
-  const bool calibrating = std::any_of(study_states_.begin(), study_states_.end(), [](StudyStatus state) {
-    return state == StudyStatus::kConverging || state == StudyStatus::kCalibrated;
-  });
-  if (!all_streaming) {
-    report.state = calibrating ? "degraded" : "starting";
-  } else {
-    report.state = calibrating ? "running" : "aligning";
-    report.reason = calibrating ? "all devices stream" : "waiting for motion that shows how the S-IMUs sit";
-  }
+  add_threads(report, now);
+  add_rings(report);
+  if (!bus_problem_.empty()) report.problems.push_back(bus_problem_);
+  const std::lock_guard lock(shared_mutex_);
+  report.problems.insert(report.problems.end(), refusals_.begin(), refusals_.end());
+  health_ = judge(report);
+  report.state = health_.state;
+  report.reason = health_.reason;
   return report;
 }
 
 void LivePublisher::publish_status(HostTime now) {
-  if (bus_) bus_->publish(status(now));
+  const auto report = status(now);
+  if (bus_) bus_->publish(report);
 }
 
 Result<void> LivePublisher::finish(std::int64_t last_tick) {

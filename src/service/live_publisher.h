@@ -11,15 +11,18 @@
 #include <vector>
 
 #include "capture/recorder.h"
+#include "publish/lcm_listener.h"
 #include "publish/lcm_publisher.h"
 #include "service/can_watch.h"
 #include "service/config.h"
 #include "service/core_thread.h"
+#include "service/health.h"
 #include "service/io_thread.h"
 #include "service/live.h"
 #include "service/live_smoothing.h"
 #include "service/modeller.h"
 #include "service/observability.h"
+#include "service/reload.h"
 #include "service/report_values.h"
 #include "service/run_folder.h"
 
@@ -36,9 +39,10 @@ class LivePublisher {
   LivePublisher(const LivePublisher&) = delete;
   LivePublisher& operator=(const LivePublisher&) = delete;
 
-  void set_recorder(const Recorder& recorder) { recorder_ = &recorder; }
   /// Writes smoothed_navigation.csv and smoothed_NAME.csv from `history`, seconds late. Call before start().
   [[nodiscard]] Result<void> smooth(LiveHistory& history, const EstimatorConfig& estimator);
+  /// Everything that is published, heard and applied goes into the capture, too. Call before start().
+  void set_recorder(Recorder& recorder);
   /// What the system refused at start; repeated in every status message.
   void set_refusals(const std::vector<Error>& refusals);
   /// What the decoders need of their CAN buses, per device; for those watched. Call before start().
@@ -46,6 +50,12 @@ class LivePublisher {
   /// Why a device's line does not open; empty once it is open. Any thread of the soft world.
   void set_line_problem(DeviceIndex device, const std::string& problem);
   void start();
+  /// Takes over what changed, at the thread's next turn. Any thread.
+  void reconfigure(const Tunables& tunables);
+  /// Turns of the thread so far: it is alive as long as they grow.
+  [[nodiscard]] std::uint64_t turns() const { return turns_.load(std::memory_order_relaxed); }
+  /// The last overall state and its reason, for the log and systemd. Any thread.
+  [[nodiscard]] Health health() const;
   /// Publishes and writes what is left, closes the files. Call after the core's thread has ended.
   [[nodiscard]] Result<void> finish(std::int64_t last_tick);
 
@@ -54,6 +64,10 @@ class LivePublisher {
                 IoThread& io, CoreThread& estimator);
   void loop();
   void drain();
+  Result<void> open_bus();
+  void take_over_tunables();
+  void on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes);
+  void on_noise_applied(const AppliedNoise& applied);
   void on_error(const ErrorRecord& record);
   void on_snapshot(const Snapshot& snapshot);
   void on_refit(const Refit& refit);
@@ -62,25 +76,35 @@ class LivePublisher {
   [[nodiscard]] std::string problem_of(std::size_t device, HostTime now);
   [[nodiscard]] StatusReport status(HostTime now);
   [[nodiscard]] StatusReport::Device device_status(std::size_t index) const;
+  void add_threads(StatusReport& report, HostTime now);
+  void add_rings(StatusReport& report);
 
   const Configuration& configuration_;
   LiveOptions options_;
   IoThread& io_;
   CoreThread& estimator_;
-  const Recorder* recorder_ = nullptr;
+  Recorder* recorder_ = nullptr;
   std::vector<std::size_t> study_devices_;
+  EstimatorConfig estimator_config_;
+  Tunables tunables_;
   std::optional<LcmPublisher> bus_;
+  std::optional<LcmListener> ear_;
+  std::string bus_problem_;
+  std::string last_event_;
   std::unique_ptr<RunFolder> folder_;
   Modeller modeller_;
   std::optional<LiveSmoothing> smoothing_;
+  std::vector<StudyNoise> noises_;  ///< what the estimator was given last, per study
+  std::int64_t applied_ = 0;
   std::optional<Snapshot> last_;
+  std::optional<Snapshot> bridge_origin_;
   UtcAnchor anchor_;
   bool anchored_by_device_ = false;
 
   struct DeviceWatch {
     SessionState session = SessionState::kConnecting;
     std::string problem;
-    std::uint64_t samples = 0;  ///< at the last status
+    std::uint64_t epochs = 0;  ///< at the last status
     double rate_hz = 0.0;
   };
   std::vector<DeviceWatch> watches_;
@@ -91,11 +115,18 @@ class LivePublisher {
   std::vector<StudyStatus> study_states_;
   std::vector<ObservabilityWatch> observability_;
   std::uint64_t refits_ = 0;
+  NewestModels models_;
   double refit_duration_s_ = kUnknown;
+  std::optional<UtcTime> refit_utc_;
+  ThreadWatch threads_;
+  PeriodicStatistics beat_;
   HostTime started_;
   HostTime last_status_{};
-  std::mutex refusals_mutex_;
+  mutable std::mutex shared_mutex_;  ///< what other threads of the soft world ask for or hand in
   std::vector<std::string> refusals_;
+  std::optional<Tunables> new_tunables_;
+  Health health_{"starting", "the threads start"};
+  std::atomic<std::uint64_t> turns_{0};
   std::atomic<bool> running_{false};
   std::thread thread_;
 };

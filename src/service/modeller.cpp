@@ -8,6 +8,7 @@
 #include "noise/replicates.h"
 #include "rt/host_clock.h"
 #include "service/report_values.h"
+#include "service/run_folder.h"
 
 namespace imuscope {
 
@@ -17,16 +18,40 @@ constexpr auto kIdleSleep = std::chrono::milliseconds(50);
 
 }  // namespace
 
+Result<void> NewestModels::write(const std::filesystem::path& folder) const {
+  if (models_.empty()) return {};
+  nlohmann::json all = nlohmann::json::array();
+  for (const auto& [study, models] : models_) all.insert(all.end(), models.begin(), models.end());
+  return write_models(folder, all);
+}
+
 ModelBook::ModelBook(const Configuration& configuration, noise::ModelSpec spec) : spec_(std::move(spec)) {
   for (const auto index : configuration.study_indices()) {
     const auto& device = configuration.devices[index];
     Study study;
     study.name = device.name;
     study.rate_hz = device.rate_hz;
-    study.samples_per_refit =
-        static_cast<std::size_t>(std::llround(configuration.noise.refit_interval_s * device.rate_hz));
     studies_.push_back(std::move(study));
   }
+  set_refit_interval(configuration.noise.refit_interval_s);
+}
+
+void ModelBook::set_refit_interval(double interval_s) {
+  for (auto& study : studies_) {
+    study.samples_per_refit = static_cast<std::size_t>(std::llround(interval_s * study.rate_hz));
+  }
+}
+
+void ModelBook::set_options(noise::ModelSpec spec, double refit_interval_s) {
+  if (!(spec == spec_)) {
+    for (auto& study : studies_) {
+      for (auto& axis : study.tracks) {
+        for (auto& track : axis) track.fit.reset();  // another model cannot start from this one
+      }
+    }
+  }
+  spec_ = std::move(spec);
+  set_refit_interval(refit_interval_s);
 }
 
 void ModelBook::push(Study& study, const ErrorRow& row) {
@@ -46,6 +71,8 @@ void ModelBook::push(Study& study, const ErrorRow& row) {
 void ModelBook::add(const ErrorRecord& record) {
   auto& study = studies_[record.study];
   push(study, record.row);
+  study.motion.add(record.row);
+  ++study.samples;
   study.last_time = record.row.time;
   study.first_reference_time = record.first_reference_time;
   ++study.samples_since_refit;
@@ -80,12 +107,19 @@ void ModelBook::refit_track(const Study& study, Track& track, std::size_t axis, 
   model.change_p_value = change.p_value;
   model.changed = changed;
   refit.noise_model.models.push_back(std::move(model));
+  refit.models.push_back(model_json(*track.fit, study.name, axis, regime_name(regime)));
 }
 
 Refit ModelBook::fit(std::size_t index) {
   auto& study = studies_[index];
   const HostTime started = host_now();
-  Refit refit{index, study.last_time, study.first_reference_time, {}, {}, 0.0};
+  Refit refit;
+  refit.study = index;
+  refit.time = study.last_time;
+  refit.first_reference_time = study.first_reference_time;
+  refit.dynamics = study.motion.report();
+  refit.samples = study.samples;
+  refit.dynamics.name = study.name;
   refit.wavelet_variance.name = study.name;
   refit.noise_model.name = study.name;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
@@ -120,6 +154,11 @@ void Modeller::start(const ThreadPlan& plan) {
   });
 }
 
+void Modeller::set_options(noise::ModelSpec spec, double refit_interval_s) {
+  const std::lock_guard lock(mutex_);
+  new_options_ = Options{std::move(spec), refit_interval_s};
+}
+
 void Modeller::stop() {
   running_.store(false, std::memory_order_release);
   if (thread_.joinable()) thread_.join();
@@ -131,11 +170,20 @@ std::vector<Refit> Modeller::take() {
 }
 
 void Modeller::drain() {
-  ErrorRecord record;
-  while (rows_->try_pop(record)) book_.add(record);
-  while (auto refit = book_.refit()) {
+  std::optional<Options> options;
+  {
     const std::lock_guard lock(mutex_);
-    refits_.push_back(std::move(*refit));
+    options = std::exchange(new_options_, std::nullopt);
+  }
+  if (options) book_.set_options(std::move(options->spec), options->refit_interval_s);
+  ErrorRecord record;
+  while (rows_->try_pop(record)) {
+    book_.add(record);
+    // At the very row, so that a replay fits the same samples.
+    while (auto refit = book_.refit()) {
+      const std::lock_guard lock(mutex_);
+      refits_.push_back(std::move(*refit));
+    }
   }
 }
 

@@ -4,8 +4,11 @@
 /// priority. Soft world.
 
 #include <atomic>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 #include <vector>
@@ -17,6 +20,7 @@
 #include "rt/thread_setup.h"
 #include "service/config.h"
 #include "service/core.h"
+#include "service/motion_book.h"
 #include "service/noise_series.h"
 
 namespace imuscope {
@@ -28,7 +32,21 @@ struct Refit {
   HostTime first_reference_time{};
   WaveletVarianceReport wavelet_variance;
   NoiseModelReport noise_model;
+  DynamicsReport dynamics;
+  nlohmann::json models = nlohmann::json::array();  ///< entries of models.json
+  std::int64_t samples = 0;                         ///< of the error process so far
   double duration_s = 0.0;
+};
+
+/// What the refits of a run say last, S-IMU by S-IMU.
+class NewestModels {
+ public:
+  void take(const Refit& refit) { models_[refit.study] = refit.models; }
+  /// Writes models.json, if there was a refit.
+  [[nodiscard]] Result<void> write(const std::filesystem::path& folder) const;
+
+ private:
+  std::map<std::size_t, nlohmann::json> models_;
 };
 
 /// The statistics alone, without the thread: rows in, refits out by sample count. Memory is bounded: one
@@ -41,6 +59,8 @@ class ModelBook {
  public:
   ModelBook(const Configuration& configuration, noise::ModelSpec spec);
 
+  /// From the next refit on; the statistics gathered so far stay.
+  void set_options(noise::ModelSpec spec, double refit_interval_s);
   /// Takes one row. A refit falls due with every refit interval's worth of samples of its S-IMU.
   void add(const ErrorRecord& record);
   /// The refit that fell due, if any.
@@ -65,6 +85,8 @@ class ModelBook {
     std::size_t samples_per_refit = 0;
     std::size_t samples_since_refit = 0;
     Tracks tracks;
+    std::int64_t samples = 0;
+    MotionBook motion;
     bool started = false;
     std::int64_t next_counter = 0;
     Regime regime = Regime::kStatic;
@@ -72,6 +94,7 @@ class ModelBook {
     HostTime first_reference_time{};
   };
 
+  void set_refit_interval(double interval_s);
   static void push(Study& study, const ErrorRow& row);
   [[nodiscard]] Refit fit(std::size_t index);
   void refit_track(const Study& study, Track& track, std::size_t axis, Regime regime, Refit& refit) const;
@@ -82,6 +105,8 @@ class ModelBook {
 
 /// The thread around the book. Rows come from one thread through a ring; refits are taken by the same thread.
 class Modeller {
+  using RowRing = SpscRing<ErrorRecord, 16384>;
+
  public:
   Modeller(const Configuration& configuration, noise::ModelSpec spec);
   ~Modeller();
@@ -89,6 +114,8 @@ class Modeller {
   Modeller& operator=(const Modeller&) = delete;
 
   void start(const ThreadPlan& plan);
+  /// Another model or refit interval, from the next refit on. Any thread of the soft world.
+  void set_options(noise::ModelSpec spec, double refit_interval_s);
   /// Fits what is due and ends.
   void stop();
 
@@ -96,10 +123,10 @@ class Modeller {
   void add(const ErrorRecord& record) { (void)rows_->try_push(record); }
   /// Refits since the last call.
   [[nodiscard]] std::vector<Refit> take();
+  static constexpr std::size_t ring_capacity() { return RowRing::capacity(); }
   [[nodiscard]] RingCounters ring() const { return rows_->counters(); }
 
  private:
-  using RowRing = SpscRing<ErrorRecord, 16384>;
   void loop();
   void drain();
 
@@ -107,6 +134,11 @@ class Modeller {
   std::unique_ptr<RowRing> rows_;
   std::mutex mutex_;
   std::vector<Refit> refits_;
+  struct Options {
+    noise::ModelSpec spec;
+    double refit_interval_s;
+  };
+  std::optional<Options> new_options_;
   std::atomic<bool> running_{false};
   std::thread thread_;
 };

@@ -11,6 +11,7 @@
 #include "drivers/transport/candump.h"
 #include "service/candump_source.h"
 #include "service/device_factory.h"
+#include "service/noise_feedback.h"
 #include "service/toml_reader.h"
 
 namespace imuscope {
@@ -219,7 +220,7 @@ RecordedSchedule schedule_of(const CaptureSummary& summary, const Configuration&
     const DeviceIndex device = index_of(stored.device);
     switch (exception.kind) {
       case ExceptionKind::kLateSample:
-        schedule.late_samples.push_back(
+        schedule.core.late_samples.push_back(
             {device, static_cast<std::uint64_t>(exception.sample_sequence), exception.tick});
         break;
       case ExceptionKind::kRefusedSample:
@@ -235,6 +236,13 @@ RecordedSchedule schedule_of(const CaptureSummary& summary, const Configuration&
     }
   }
   std::sort(schedule.skipped_ticks.begin(), schedule.skipped_ticks.end());
+  const auto studies = configuration.study_indices();
+  for (const auto& record : summary.applied_models) {
+    const auto study = std::find(studies.begin(), studies.end(), index_of(record.device));
+    if (study == studies.end()) continue;
+    schedule.core.applied_noises.push_back(
+        applied_noise_of(record, static_cast<std::size_t>(study - studies.begin())));
+  }
   return schedule;
 }
 
@@ -242,6 +250,11 @@ Result<OpenedRecording> open_capture(const std::string& input,
                                      const std::optional<std::filesystem::path>& file) {
   const auto summary = summarise_capture(input);
   if (!summary) return tl::unexpected<Error>(summary.error());
+  if (!summary->has_run && !file) {
+    return usage_error(
+        fmt::format("{} holds device bytes but not what was run", input),
+        "add --config FILE.toml; where it is a part of a capture, give the capture's first file");
+  }
   auto configuration = file ? load_configuration(*file)
                             : parse_configuration(summary->run.configuration,
                                                   fmt::format("{} (kept in the capture)", summary->run.name));
@@ -275,7 +288,10 @@ Result<OpenedRecording> open_capture(const std::string& input,
     return open_captured_device(input, names[index], bytes[index]);
   };
   // Exceptions name devices by their index in the recorded configuration: they hold for that one alone.
-  if (configuration->sha256 == summary->run.configuration_hash) {
+  if (!summary->has_run) {
+    opened.remarks.push_back(fmt::format(
+        "{}: recorded by another program than imuscope run; ticks begin with its first bytes", input));
+  } else if (configuration->sha256 == summary->run.configuration_hash) {
     recording.schedule = schedule_of(*summary, *configuration);
   } else {
     opened.remarks.emplace_back(

@@ -106,8 +106,7 @@ class Replayer {
         sink_(sink),
         options_(options),
         core_(estimator, configuration.devices.size(),
-              recording.schedule ? recording.schedule->late_samples : std::vector<LateSample>{},
-              options.history),
+              recording.schedule ? recording.schedule->core : CoreSchedule{}, options.history),
         feeds_(configuration.devices.size()) {}
 
   Result<ReplayResult> run() {

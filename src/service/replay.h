@@ -34,7 +34,7 @@ inline constexpr std::int64_t kTailTicks = 20;
 /// What a recording says about the live run it came from, so that a replay repeats it tick by tick.
 struct RecordedSchedule {
   HostTime t0{};  ///< cut of tick 0
-  std::vector<LateSample> late_samples;
+  CoreSchedule core;
   std::vector<std::int64_t> skipped_ticks;  ///< ascending
   std::vector<RefusedSample> refused_samples;
 };

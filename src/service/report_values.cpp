@@ -2,6 +2,9 @@
 
 #include <Eigen/Geometry>
 
+#include "navigation/gravity.h"
+#include "navigation/wgs84.h"
+#include "noise/json.h"
 #include "service/noise_series.h"
 #include "service/observability.h"
 
@@ -31,6 +34,39 @@ NavigationReport navigation_report(const Snapshot& snapshot, const UtcAnchor& an
   report.sd_position_m = nav.sd_position_m;
   report.sd_velocity_mps = nav.sd_velocity_mps;
   report.sd_rpy_rad = nav.sd_rpy_rad;
+  return report;
+}
+
+BridgeReport bridge_report(const Snapshot& snapshot, const Snapshot& origin, const UtcAnchor& anchor) {
+  const auto& nav = snapshot.navigation;
+  const auto& first = origin.navigation;
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C_b_n(nav.C_b_n.data());
+  // The widespread types look forward-left-up (F) and east-north-up (U).
+  const Eigen::Matrix3d C_b_F = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+  Eigen::Matrix3d C_n_U;
+  C_n_U << 0, 1, 0, 1, 0, 0, 0, 0, -1;
+  const Eigen::Matrix3d C_n_b = C_b_n.transpose();
+
+  const Eigen::Vector3d position_n = ned_offset({first.latitude_rad, first.longitude_rad, first.height_m},
+                                                {nav.latitude_rad, nav.longitude_rad, nav.height_m});
+  const auto vector = [](const Vector3& v) { return Eigen::Vector3d(v[0], v[1], v[2]); };
+  const Eigen::Vector3d omega_ib_b = vector(snapshot.reference.omega_radps) - vector(nav.gyro_bias_radps);
+  const Eigen::Vector3d f_b = vector(snapshot.reference.f_mps2) - vector(nav.accel_bias_mps2);
+  const Eigen::Vector3d omega_ie_n = earth_rate_n(nav.latitude_rad);
+  const Eigen::Vector3d g_n(0.0, 0.0, normal_gravity(nav.latitude_rad, nav.height_m).g_mps2);
+
+  const auto array = [](const Eigen::Vector3d& v) { return Vector3{v[0], v[1], v[2]}; };
+  const Eigen::Quaterniond q(Eigen::Matrix3d(C_n_U * C_b_n * C_b_F.transpose()));
+  BridgeReport report;
+  report.utc = nav.has_utc ? nav.utc : anchor.at(nav.time);
+  report.position_l_m = array(C_n_U * position_n);
+  report.velocity_b_mps = array(C_b_F * C_n_b * vector(nav.v_n_mps));
+  report.q_b_l = {q.w(), q.x(), q.y(), q.z()};
+  report.rate_lb_b_radps = array(C_b_F * (omega_ib_b - C_n_b * omega_ie_n));
+  report.acceleration_b_mps2 = array(C_b_F * (f_b + C_n_b * g_n));
+  report.counter = snapshot.reference.counter;
+  report.measured_omega_b_radps = array(C_b_F * vector(snapshot.reference.omega_radps));
+  report.measured_f_b_mps2 = array(C_b_F * vector(snapshot.reference.f_mps2));
   return report;
 }
 
@@ -88,6 +124,16 @@ AxisWaveletVariance axis_wavelet_variance(const noise::WaveletVariance& wv, std:
                           static_cast<std::int64_t>(level.n_coefficients)});
   }
   return out;
+}
+
+nlohmann::json model_json(const noise::FitResult& fit, const std::string& name, std::size_t axis,
+                          const std::string& regime) {
+  nlohmann::json model = noise::fit_to_json(fit);
+  model["name"] = name;
+  model["axis"] = axis_name(axis);
+  model["regime"] = regime;
+  model["unit"] = axis_unit(axis);
+  return model;
 }
 
 AxisNoiseModel axis_noise_model(const noise::FitResult& fit, std::size_t axis, Regime regime) {

@@ -11,7 +11,9 @@
 #include "noise/wavelet_variance.h"
 #include "service/dynamics_files.h"
 #include "service/estimator_setup.h"
+#include "service/modeller.h"
 #include "service/noise_series.h"
+#include "service/report_values.h"
 #include "service/smoothing.h"
 
 namespace imuscope {
@@ -123,12 +125,7 @@ void fit_axis(const NoiseSeries& series, std::size_t axis, const std::vector<std
         fmt::format("{} {} {}: no noise model: {}", name, axis_name(axis), regime, fit.error().what));
     return;
   }
-  nlohmann::json model = noise::fit_to_json(*fit);
-  model["name"] = name;
-  model["axis"] = axis_name(axis);
-  model["regime"] = regime;
-  model["unit"] = axis_unit(axis);
-  models.push_back(std::move(model));
+  models.push_back(model_json(*fit, name, axis, regime));
 }
 
 nlohmann::json fit_models(const Configuration& configuration, const std::vector<NoiseSeries>& all_series,
@@ -337,9 +334,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
 
   if (auto written = (*folder)->write_calibration(*means); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
-  if (auto written =
-          write_json(options.out / "models.json", {{"schema", "imuscope.models/1"}, {"models", models}});
-      !written) {
+  if (auto written = write_models(options.out, models); !written) {
     return written;
   }
   if (auto written = write_json(options.out / "regression.json",
@@ -351,6 +346,33 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   about["error_process_mounting"] = options.mountings.empty() ? "of this drive" : "of all drives combined";
   return write_json(options.out / "run.json", about);
 }
+
+namespace {
+
+/// A replay's results: the files of a run, and the refits of the live run at the same samples.
+class ReplaySink final : public CoreSink {
+ public:
+  ReplaySink(RunFolder& folder, const Configuration& configuration, noise::ModelSpec spec)
+      : folder_(folder), book_(configuration, std::move(spec)) {}
+
+  void on_error(const ErrorRecord& record) noexcept override {
+    folder_.on_error(record);
+    book_.add(record);
+    while (const auto refit = book_.refit()) models_.take(*refit);
+  }
+  void on_event(const EstimatorEvent& event) noexcept override { folder_.on_event(event); }
+  void on_snapshot(const Snapshot& snapshot) noexcept override { folder_.on_snapshot(snapshot); }
+  void on_late_sample(const LateSample& late) noexcept override { folder_.on_late_sample(late); }
+
+  [[nodiscard]] const NewestModels& models() const { return models_; }
+
+ private:
+  RunFolder& folder_;
+  ModelBook book_;
+  NewestModels models_;
+};
+
+}  // namespace
 
 Result<void> run_replay(const Configuration& configuration, const Recording& recording,
                         const StudyRunOptions& options, bool realtime) {
@@ -368,9 +390,12 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   ReplayOptions replay_options;
   replay_options.realtime = realtime;
   if (options.progress) replay_options.progress = [&](double share) { options.progress("replay", share); };
-  const auto result =
-      replay(configuration, estimator_config(configuration), recording, **folder, replay_options);
+  const auto spec = noise::parse_model(configuration.noise.model);
+  if (!spec) return tl::unexpected<Error>(spec.error());
+  ReplaySink sink(**folder, configuration, *spec);
+  const auto result = replay(configuration, estimator_config(configuration), recording, sink, replay_options);
   if (!result) return tl::unexpected<Error>(result.error());
+  if (auto written = sink.models().write(options.out); !written) return written;
   if (auto written = (*folder)->write_calibration(); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
   const auto& last = (*folder)->last_snapshot();

@@ -296,8 +296,9 @@ TEST(CaptureReader, AnEventLogThatIsNoCaptureIsToldApart) {
   headless.chunk(0, 0, 1, {1});
   headless.done();
   const auto no_header = summarise_capture(folder / "headless.lcm");
-  ASSERT_FALSE(no_header.has_value());
-  EXPECT_THAT(no_header.error().text(), HasSubstr("IMUSCOPE_RUN"));
+  ASSERT_TRUE(no_header.has_value()) << "its bytes are worth something with a configuration";
+  EXPECT_FALSE(no_header->has_run);
+  EXPECT_EQ(no_header->devices.size(), 1U);
 }
 
 }  // namespace

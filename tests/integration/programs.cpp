@@ -51,7 +51,9 @@ BackgroundProgram::~BackgroundProgram() {
   wait_for(process_);
 }
 
-void BackgroundProgram::interrupt() const { kill(process_, SIGINT); }
+void BackgroundProgram::send(int signal) const { kill(process_, signal); }
+
+void BackgroundProgram::interrupt() const { send(SIGINT); }
 
 int BackgroundProgram::wait() {
   const int code = wait_for(process_);

@@ -22,6 +22,7 @@ class BackgroundProgram {
   ~BackgroundProgram();
   BackgroundProgram(const BackgroundProgram&) = delete;
   BackgroundProgram& operator=(const BackgroundProgram&) = delete;
+  void send(int signal) const;
   void interrupt() const;  ///< as Ctrl-C does
   int wait();              ///< its exit code, or -1
  private:

@@ -16,6 +16,9 @@
 #include <map>
 
 #include "example_reports.h"
+#include "publish/lcm_listener.h"
+#include "publish/message_builders.h"
+#include "publish/message_codec.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -45,12 +48,22 @@ TEST(LcmPublisher, EachReportGoesToItsChannel) {
     publisher->publish(test::example_error(), "mtx2");
     publisher->publish(test::example_wavelet_variance());
     publisher->publish(test::example_noise_model());
-    EXPECT_EQ(publisher->counters().published, 7U);
+    publisher->publish(DynamicsReport{test::kExampleUtc, 61.0, "mtx1", 1, 2, {}});
+    publisher->publish(PersonEvent{test::kExampleUtc, "somebody", "here"});
+    publisher->publish(BridgeReport{});
+    EXPECT_EQ(publisher->counters().published, 11U);
     EXPECT_EQ(publisher->counters().failed, 0U);
   }
-  const std::map<std::string, int> expected{{"CAR2_STATUS", 1},           {"CAR2_NAVIGATION", 2},
-                                            {"CAR2_CALIBRATION_MTX1", 1}, {"CAR2_ERROR_MTX2", 1},
-                                            {"CAR2_WV_MTX1", 1},          {"CAR2_NOISE_MODEL_MTX1", 1}};
+  const std::map<std::string, int> expected{{"CAR2_STATUS", 1},
+                                            {"CAR2_NAVIGATION", 2},
+                                            {"CAR2_CALIBRATION_MTX1", 1},
+                                            {"CAR2_ERROR_MTX2", 1},
+                                            {"CAR2_WV_MTX1", 1},
+                                            {"CAR2_NOISE_MODEL_MTX1", 1},
+                                            {"CAR2_DYNAMICS_MTX1", 1},
+                                            {"CAR2_EVENT", 1},
+                                            {"CAR2_POSE", 1},
+                                            {"CAR2_INS", 1}};
   EXPECT_EQ(channels_of(path), expected);
 }
 
@@ -172,6 +185,56 @@ int publish_over_multicast() {
   return received.last.sequence == 9 && received.last.counter == 70'001 && received.last.regime == "dynamic"
              ? 0
              : 5;
+}
+
+int hear_an_event() {
+  if (std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo") != 0) return 1;
+  auto ear = LcmListener::open();
+  auto voice = LcmPublisher::open();
+  if (!ear || !voice) return 2;
+  std::vector<std::string> texts;
+  ear->subscribe(
+      "EVENT",
+      [&](const std::string& channel, std::span<const std::uint8_t> bytes) {
+        if (channel != "IMUSCOPE_EVENT") return;
+        if (const auto event = decode_message<event_t>(bytes)) texts.push_back(event->text);
+      },
+      10);
+  voice->publish(PersonEvent{test::kExampleUtc, "test", "first"});
+  voice->publish(test::example_status());  // another channel: not for this ear
+  voice->publish(PersonEvent{test::kExampleUtc, "test", "second"});
+  for (int i = 0; i < 20 && texts.size() < 2; ++i) (void)ear->wait(std::chrono::milliseconds(100));
+  if (texts != std::vector<std::string>{"first", "second"}) return 3;
+  return ear->wait(std::chrono::milliseconds(0)) == 0 ? 0 : 4;
+}
+
+TEST(LcmListener, HearsItsChannelsInOrderAndNothingElse) {
+  const int outcome = in_private_network(hear_an_event);
+  if (outcome == kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
+  EXPECT_EQ(outcome, 0) << "1: ip failed, 2: not open, 3: messages, 4: something is left";
+}
+
+TEST(LcmListener, RefusesTheUrlThatWouldAbortTheProcess) {
+  const auto ear = LcmListener::open("tcpq://localhost:7700");
+  ASSERT_FALSE(ear.has_value());
+  EXPECT_EQ(ear.error().kind, ErrorKind::kUsage);
+}
+
+TEST(LcmListener, PlaysALogToItsEnd) {
+  const auto path = test::scratch_folder() / "bus.lcm";
+  {
+    auto publisher = LcmPublisher::open("file://" + path.string() + "?mode=w");
+    ASSERT_TRUE(publisher.has_value());
+    for (int i = 0; i < 3; ++i) publisher->publish(PersonEvent{test::kExampleUtc, "test", "again"});
+  }
+  auto ear = LcmListener::open("file://" + path.string() + "?speed=0");
+  ASSERT_TRUE(ear.has_value());
+  int heard = 0;
+  ear->subscribe(
+      "EVENT", [&](const auto&, auto) { ++heard; }, 10);
+  while (ear->wait(std::chrono::milliseconds(100)) >= 0) {
+  }
+  EXPECT_EQ(heard, 3);
 }
 
 TEST(LcmPublisher, ReachesAReceiverByMulticast) {

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <regex>
 #include <sstream>
+#include <tuple>
 
 #include "example_reports.h"
 #include "publish/channel_name.h"
@@ -201,10 +202,131 @@ TEST(MessageBuilders, StatusKeepsDevicesThreadsRingsAndProblems) {
   EXPECT_DOUBLE_EQ(m.threads[0].lateness_p99_us, 14);
   EXPECT_DOUBLE_EQ(m.threads[0].lateness_p999_us, 15);
   EXPECT_DOUBLE_EQ(m.threads[0].lateness_max_us, 16);
+  EXPECT_DOUBLE_EQ(m.threads[0].cpu_percent, 0.4);
+  EXPECT_DOUBLE_EQ(m.threads[0].done_p50_us, 17);
+  EXPECT_DOUBLE_EQ(m.threads[0].done_p99_us, 18);
+  EXPECT_DOUBLE_EQ(m.threads[0].done_p999_us, 19);
+  EXPECT_DOUBLE_EQ(m.threads[0].done_max_us, 20);
+  EXPECT_THAT(m.threads[0].lateness_octaves, ElementsAre(1, 0, 9));
+  EXPECT_EQ(m.build, "g++ 12");
+  EXPECT_EQ(m.configuration_hash, "abc");
+  EXPECT_EQ(m.refit_utime, to_utime(test::kExampleUtc));
+  EXPECT_EQ(m.last_event, "roundabout");
   ASSERT_EQ(m.rings.size(), 1U);
   EXPECT_THAT((std::array{m.rings[0].capacity, m.rings[0].level, m.rings[0].high_water, m.rings[0].refused}),
               ElementsAre(1024, 17, 18, 19));
   EXPECT_THAT(m.problems, ElementsAre("no route; run ip route add"));
+}
+
+TEST(MessageBuilders, StatusKeepsHowFarEachCalibrationHasCome) {
+  const status_t m = over_the_wire(to_message(test::example_status(), 1));
+  ASSERT_EQ(m.studies.size(), 1U);
+  const study_status_t& study = m.studies[0];
+  EXPECT_EQ(study.name + study.state + study.regime + study.weakest + study.manoeuvre,
+            "mtx1convergingdynamicpsi_zbrake");
+  EXPECT_DOUBLE_EQ(study.sd_psi_deg, 0.01 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(study.goal_psi_deg, 0.001 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(study.sd_r_m, 0.02);
+  EXPECT_DOUBLE_EQ(study.goal_r_m, 0.002);
+  EXPECT_DOUBLE_EQ(study.sd_t_d_ms, 3.0);
+  EXPECT_DOUBLE_EQ(study.goal_t_d_ms, 0.3);
+  EXPECT_DOUBLE_EQ(study.weakest_relative, 0.5);
+  EXPECT_THAT((std::array{study.samples, study.used, study.late, study.gated}), ElementsAre(21, 22, 23, 24));
+}
+
+TEST(MessageBuilders, AStatusBeforeTheFirstRefitSaysSoByAZeroTime) {
+  EXPECT_EQ(to_message(StatusReport{}, 0).refit_utime, 0);
+}
+
+TEST(MessageBuilders, DynamicsKeepEveryAxis) {
+  DynamicsReport report{test::kExampleUtc, 61.0, "mtx1", 5, 7, {}};
+  report.axes.push_back({"gyro_x", "rad/s", 1.0, 2.0, 3.0, 4.0, 5.0, 0.6});
+  const dynamics_t m = over_the_wire(to_message(report, 9));
+  EXPECT_EQ(m.sequence, 9);
+  EXPECT_EQ(m.name, "mtx1");
+  EXPECT_EQ(m.n_static, 5);
+  EXPECT_EQ(m.n_dynamic, 7);
+  ASSERT_EQ(m.axes.size(), 1U);
+  const auto& a = m.axes[0];
+  EXPECT_EQ(a.axis + " " + a.unit, "gyro_x rad/s");
+  EXPECT_THAT((std::array{a.mean, a.rms, a.largest, a.slope, a.slope_sd, a.correlation}),
+              ElementsAre(1.0, 2.0, 3.0, 4.0, 5.0, 0.6));
+}
+
+TEST(MessageBuilders, AnEventKeepsWhoSentItAndWhat) {
+  const event_t m = over_the_wire(to_message(PersonEvent{test::kExampleUtc, "top on pc", "kerb"}, 3));
+  EXPECT_EQ(m.utime, to_utime(test::kExampleUtc));
+  EXPECT_EQ(m.sequence, 3);
+  EXPECT_EQ(m.source, "top on pc");
+  EXPECT_EQ(m.text, "kerb");
+}
+
+/// A fingerprint as LCM's documentation defines it, from the fields of libbot's types (package and name of a
+/// type do not enter it).
+std::int64_t fingerprint(const std::vector<std::tuple<std::string, std::string, int>>& fields) {
+  std::int64_t v = 0x12345678;
+  const auto update = [&](int c) {
+    v = static_cast<std::int64_t>(
+        ((static_cast<std::uint64_t>(v) << 8U) ^ static_cast<std::uint64_t>(v >> 55)) +
+        static_cast<std::uint64_t>(static_cast<std::int64_t>(c)));
+  };
+  const auto update_string = [&](const std::string& s) {
+    update(static_cast<int>(s.size()));
+    for (const char c : s) update(c);
+  };
+  for (const auto& [name, type, size] : fields) {
+    update_string(name);
+    update_string(type);
+    update(size > 0 ? 1 : 0);  // number of dimensions
+    if (size == 0) continue;
+    update(0);  // a constant size
+    update_string(std::to_string(size));
+  }
+  const auto u = static_cast<std::uint64_t>(v);
+  return static_cast<std::int64_t>((u << 1U) + ((u >> 63U) & 1U));
+}
+
+TEST(Bridge, HasTheFingerprintsOfLibbotsTypes) {
+  EXPECT_EQ(pose_t::getHash(), fingerprint({{"utime", "int64_t", 0},
+                                            {"pos", "double", 3},
+                                            {"vel", "double", 3},
+                                            {"orientation", "double", 4},
+                                            {"rotation_rate", "double", 3},
+                                            {"accel", "double", 3}}));
+  EXPECT_EQ(ins_t::getHash(), fingerprint({{"utime", "int64_t", 0},
+                                           {"device_time", "int64_t", 0},
+                                           {"gyro", "double", 3},
+                                           {"mag", "double", 3},
+                                           {"accel", "double", 3},
+                                           {"quat", "double", 4},
+                                           {"pressure", "double", 0},
+                                           {"rel_alt", "double", 0}}));
+}
+
+TEST(Bridge, KeepsEveryFieldInItsPlace) {
+  BridgeReport report;
+  report.utc = test::kExampleUtc;
+  report.position_l_m = {1, 2, 3};
+  report.velocity_b_mps = {4, 5, 6};
+  report.q_b_l = {0.5, -0.5, 0.5, -0.5};
+  report.rate_lb_b_radps = {7, 8, 9};
+  report.acceleration_b_mps2 = {10, 11, 12};
+  report.counter = 13;
+  report.measured_omega_b_radps = {14, 15, 16};
+  report.measured_f_b_mps2 = {17, 18, 19};
+  const pose_t pose = over_the_wire(to_pose(report));
+  EXPECT_EQ(pose.utime, to_utime(test::kExampleUtc));
+  EXPECT_THAT(pose.pos, ElementsAre(1, 2, 3));
+  EXPECT_THAT(pose.vel, ElementsAre(4, 5, 6));
+  EXPECT_THAT(pose.orientation, ElementsAre(0.5, -0.5, 0.5, -0.5));
+  EXPECT_THAT(pose.rotation_rate, ElementsAre(7, 8, 9));
+  EXPECT_THAT(pose.accel, ElementsAre(10, 11, 12));
+  const ins_t ins = over_the_wire(to_ins(report));
+  EXPECT_EQ(ins.device_time, 13);
+  EXPECT_THAT(ins.gyro, ElementsAre(14, 15, 16));
+  EXPECT_THAT(ins.accel, ElementsAre(17, 18, 19));
+  EXPECT_THAT(ins.quat, ElementsAre(0.5, -0.5, 0.5, -0.5));
+  EXPECT_DOUBLE_EQ(ins.rel_alt, 3.0);
 }
 
 TEST(ChannelName, IsUpperCaseWithUnderscores) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <algorithm>
 #include <chrono>
+#include <numeric>
 #include <random>
 #include <thread>
 #include <vector>
@@ -63,6 +64,14 @@ TEST(TickSchedule, WorkBeyondTheNextDeadlineIsOneOverrun) {
   EXPECT_EQ(tick.skipped, 3);
   EXPECT_EQ(schedule.statistics().ticks + schedule.statistics().skipped, 6U)
       << "ticks 0..5 are accounted for";
+}
+
+TEST(TickSchedule, TheEndOfTheWorkIsTimedFromTheCutOfTheTickDelivered) {
+  TickSchedule schedule(kStart, kPeriod);
+  (void)schedule.wake(kStart + milliseconds(21));
+  schedule.finish(kStart + milliseconds(23));
+  EXPECT_EQ(schedule.statistics().done.max(), Duration(milliseconds(3))) << "tick 2 was cut at 20 ms";
+  EXPECT_EQ(schedule.statistics().done.count(), 1U);
 }
 
 TEST(TickSchedule, EveryTickIsDeliveredOrSkippedInARandomWalk) {
@@ -138,6 +147,20 @@ TEST(LatenessHistogram, QuantilesAreWithinOneBucketAboveThoseOfTheSortedValues) 
     EXPECT_LE(found, exact * 1.125 + 1.0) << "p " << p;
   }
   EXPECT_EQ(histogram.max().count(), sorted.back());
+}
+
+TEST(LatenessHistogram, OctavesHoldEveryValueAtItsPowerOfTwo) {
+  LatenessHistogram histogram;
+  for (const std::int64_t ns : {0, 1000, 1024, 2047, 2048, 5000, 1'000'000}) histogram.add(Duration(ns));
+  histogram.add(std::chrono::hours(1));
+  const auto octaves = histogram.octaves();
+  EXPECT_EQ(octaves[0], 2U) << "0 and 1000 ns";
+  EXPECT_EQ(octaves[1], 2U) << "1024 and 2047 ns";
+  EXPECT_EQ(octaves[2], 1U) << "2048 ns";
+  EXPECT_EQ(octaves[3], 1U) << "5000 ns lie between 4096 and 8192";
+  EXPECT_EQ(octaves[10], 1U) << "1 ms lies between 524288 and 1048576 ns";
+  EXPECT_EQ(octaves.back(), 1U) << "what is beyond the last octave is in it";
+  EXPECT_EQ(std::accumulate(octaves.begin(), octaves.end(), std::uint64_t{0}), histogram.count());
 }
 
 TEST(LatenessHistogram, TakesNegativeSmallAndEndlessDurations) {

@@ -14,7 +14,9 @@ class Notes final : public CoreSink {
   void on_snapshot(const Snapshot& snapshot) noexcept override { snapshots.push_back(snapshot); }
   void on_late_sample(const LateSample& sample) noexcept override { late.push_back(sample); }
   std::vector<Snapshot> snapshots;
+  void on_noise_applied(const AppliedNoise& applied) noexcept override { noises.push_back(applied); }
   std::vector<LateSample> late;
+  std::vector<AppliedNoise> noises;
 };
 
 EstimatorConfig one_study() {
@@ -72,13 +74,37 @@ TEST(Core, ASamplePushedAfterItsTickIsNotedAndAReplayTakesItAtTheSameTick) {
   EXPECT_EQ(live.late[0].tick, 2);
 
   Notes replayed;
-  Core second(one_study(), 2, live.late);
+  Core second(one_study(), 2, {live.late, {}});
   ASSERT_TRUE(second.ring(0).try_push(imu_sample(0, 0, 5.0)));
   ASSERT_TRUE(second.ring(0).try_push(imu_sample(0, 1, 9.9)));
   second.tick(1, at_ms(10.0), replayed);
   EXPECT_EQ(second.estimator().counters().reference_samples, 1U) << "taken before the live run took it";
   second.tick(2, at_ms(20.0), replayed);
   EXPECT_EQ(second.estimator().counters().reference_samples, 2U);
+}
+
+TEST(Core, ARefitsModelIsTakenOverAtTheNextTickAndAReplayTakesItThere) {
+  Notes live;
+  Core first(one_study(), 2);
+  StudyNoise noise = mtx_class_noise();
+  noise.gyro[0].white_sd[1] = 0.123;
+  first.tick(1, at_ms(10.0), live);
+  first.offer_noise(0, {6000, mtx_class_noise()});
+  first.offer_noise(0, {12000, noise});  // the older one was never taken over
+  first.tick(2, at_ms(20.0), live);
+  first.tick(3, at_ms(30.0), live);
+  ASSERT_EQ(live.noises.size(), 1U);
+  EXPECT_EQ(live.noises[0].tick, 2);
+  EXPECT_EQ(live.noises[0].model.samples, 12000);
+  EXPECT_DOUBLE_EQ(live.noises[0].model.noise.gyro[0].white_sd[1], 0.123);
+
+  Notes replayed;
+  Core second(one_study(), 2, {{}, live.noises});
+  second.tick(1, at_ms(10.0), replayed);
+  EXPECT_TRUE(replayed.noises.empty());
+  second.tick(2, at_ms(20.0), replayed);
+  ASSERT_EQ(replayed.noises.size(), 1U);
+  EXPECT_DOUBLE_EQ(replayed.noises[0].model.noise.gyro[0].white_sd[1], 0.123);
 }
 
 TEST(Core, TheOriginOfTimesIsTheFirstReferenceEpoch) {

@@ -12,11 +12,11 @@ namespace imuscope::cli {
 
 namespace {
 
-// A signal handler may only set a lock-free flag.
-std::atomic<bool> stop_requested{false};  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
-static_assert(std::atomic<bool>::is_always_lock_free);
+// A signal handler may only set lock-free flags.
+LiveSignals signals;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
 
-extern "C" void request_stop(int) { stop_requested.store(true); }
+extern "C" void request_stop(int) { signals.stop.store(true); }
+extern "C" void request_reload(int) { signals.reload.store(true); }
 
 /// What --seconds accepts: something worth recording, to a year.
 constexpr double kShortestRun_s = 0.1;
@@ -46,7 +46,8 @@ Result<void> run(const Options& options) {
   if (options.seconds > 0.0) live.duration_s = options.seconds;
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
-  return run_live(*configuration, live, stop_requested);
+  std::signal(SIGHUP, request_reload);
+  return run_live(*configuration, live, signals);
 }
 
 }  // namespace

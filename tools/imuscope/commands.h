@@ -57,4 +57,10 @@ void add_probe(CLI::App& app, Work& chosen);
 /// `imuscope decode FILE`
 void add_decode(CLI::App& app, Work& chosen);
 
+/// `imuscope doctor [CONFIG]`
+void add_doctor(CLI::App& app, Work& chosen);
+
+/// `imuscope top`
+void add_top(CLI::App& app, Work& chosen);
+
 }  // namespace imuscope::cli

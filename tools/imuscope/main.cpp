@@ -38,6 +38,8 @@ int run(int argc, char** argv) {
   imuscope::cli::add_decode(app, work);
   imuscope::cli::add_import(app, work);
   imuscope::cli::add_probe(app, work);
+  imuscope::cli::add_top(app, work);
+  imuscope::cli::add_doctor(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,67 @@
+#include "doctor/examination.h"
+
+#include <utility>
+
+#include "doctor/checks.h"
+#include "service/device_factory.h"
+#include "service/line_factory.h"
+
+namespace imuscope::doctor {
+
+namespace {
+
+/// Published messages of three S-IMUs, which the capture keeps, too.
+constexpr double kMessagesBytes_per_s = 60e3;
+constexpr double kRawRecordBytes = 75.0;  // LCM and raw_t around each read
+constexpr double kReads_per_s = 100.0;    // one a sample
+constexpr double kBitsPerByte = 10.0;     // 8N1
+constexpr double kDefaultRaw_per_s = 60e3;
+
+double recorded_bytes_per_s(const std::optional<Configuration>& configuration) {
+  if (!configuration) return kDefaultRaw_per_s + kMessagesBytes_per_s;
+  double bytes = kMessagesBytes_per_s;
+  for (const auto& device : configuration->devices) {
+    bytes += kReads_per_s * kRawRecordBytes;
+    if (device.serial) bytes += device.serial->baud / kBitsPerByte;
+  }
+  return bytes;
+}
+
+void append(std::vector<Finding>& to, std::vector<Finding> findings) {
+  for (auto& finding : findings) to.push_back(std::move(finding));
+}
+
+}  // namespace
+
+std::vector<Finding> examine(const Examination& examination) {
+  const auto& configuration = examination.configuration;
+  std::vector<Finding> findings{check_real_time(),
+                                check_memory_lock(),
+                                check_cores(),
+                                check_clock_source(examination.root),
+                                check_governor(examination.root),
+                                check_lcm(configuration ? configuration->lcm.url : LcmOptions{}.url),
+                                check_receive_buffer(examination.root)};
+  std::vector<std::string> ports;
+  std::vector<std::string> interfaces;
+  if (configuration) {
+    for (std::size_t i = 0; i < configuration->devices.size(); ++i) {
+      const auto& device = configuration->devices[i];
+      if (device.can) interfaces.push_back(device.can->interface);
+      if (!has_line(device)) continue;
+      const auto line =
+          open_line(device, make_decoder(device, static_cast<DeviceIndex>(i), ClockMapConfig{})->ids());
+      findings.push_back(
+          check_line(device.name, line ? Result<void>{} : Result<void>(tl::unexpected<Error>(line.error()))));
+      if (device.serial) ports.push_back(device.serial->port);
+    }
+  }
+  append(findings, check_ftdi_latency(examination.root, ports));
+  append(findings, check_can(examination.root, interfaces));
+  const auto folder =
+      configuration && !configuration->record.folder.empty() ? configuration->record.folder : "runs";
+  findings.push_back(check_disk(measure_disk(folder), recorded_bytes_per_s(configuration)));
+  return findings;
+}
+
+}  // namespace imuscope::doctor

@@ -1,0 +1,22 @@
+#pragma once
+
+/// Everything that on this PC stands between the service and its deadlines.
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "doctor/finding.h"
+#include "service/config.h"
+
+namespace imuscope::doctor {
+
+struct Examination {
+  std::optional<Configuration> configuration;  ///< absent: the PC alone, default settings
+  std::filesystem::path root = "/";            ///< where /proc and /sys lie
+};
+
+/// Takes about a second. Opens every configured line for a moment: not beside a running service.
+[[nodiscard]] std::vector<Finding> examine(const Examination& examination);
+
+}  // namespace imuscope::doctor

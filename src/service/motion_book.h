@@ -1,0 +1,43 @@
+#pragma once
+
+/// The motion that one S-IMU has met and how its error follows it, kept up sample by sample in fixed memory.
+
+#include <array>
+#include <cstdint>
+
+#include "error_process/error_row.h"
+#include "publish/reports.h"
+#include "service/noise_series.h"
+
+namespace imuscope {
+
+/// Sums of (prediction p, error e) pairs about their running means (Welford), so that nothing cancels in a
+/// long run.
+class MotionSums {
+ public:
+  void add(double prediction, double error) noexcept;
+  /// Slope of e on p, least squares with a constant; its sd as for white errors.
+  [[nodiscard]] AxisMotion report() const;
+
+ private:
+  double n_ = 0.0;
+  double mean_p_ = 0.0;
+  double mean_e_ = 0.0;
+  double sum_pp_ = 0.0;
+  double sum_pe_ = 0.0;
+  double sum_ee_ = 0.0;
+  double largest_p_ = 0.0;
+};
+
+class MotionBook {
+ public:
+  void add(const ErrorRow& row) noexcept;
+  /// name, utc and time_s are left to the caller.
+  [[nodiscard]] DynamicsReport report() const;
+
+ private:
+  std::array<MotionSums, kAxisCount> axes_;
+  std::array<std::int64_t, kRegimeCount> rows_{};
+};
+
+}  // namespace imuscope

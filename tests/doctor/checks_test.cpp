@@ -1,0 +1,252 @@
+/// Each check against a PC on which it fails, and against one on which it does not.
+
+#include "doctor/checks.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <fstream>
+#include <functional>
+
+#include "doctor/examination.h"
+#include "service/line_factory.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::doctor {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr int kNotPermitted = 77;
+
+/// Runs `body` in a child process, so that what it gives up is not given up here.
+int in_child(const std::function<int()>& body) {
+  const pid_t child = fork();
+  if (child == 0) _exit(body());
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// A PC's /proc and /sys as a folder.
+class FakePc : public testing::Test {
+ protected:
+  void write(const std::string& file, const std::string& text) const {
+    fs::create_directories((root_ / file).parent_path());
+    std::ofstream(root_ / file) << text << "\n";
+  }
+  fs::path root_ = test::scratch_folder();
+};
+
+/// An ordinary user without any limit raised: exit code 0 when `check` is bad and its fix holds `fix`.
+int as_nobody(Finding (*check)(), const std::string& fix) {
+  constexpr rlimit kNone{0, 0};
+  if (geteuid() != 0 || setrlimit(RLIMIT_RTPRIO, &kNone) != 0 || setrlimit(RLIMIT_MEMLOCK, &kNone) != 0 ||
+      setuid(65534) != 0)
+    return kNotPermitted;
+  const auto finding = check();
+  if (finding.verdict != Verdict::kBad) return 1;
+  return finding.fix.find(fix) != std::string::npos ? 0 : 2;
+}
+
+TEST(DoctorRights, RealTimeRefusedNamesTheLimitToRaise) {
+  const int outcome = in_child([] { return as_nobody(check_real_time, "LimitRTPRIO=80"); });
+  if (outcome == kNotPermitted) GTEST_SKIP() << "becoming another user needs root";
+  EXPECT_EQ(outcome, 0) << "1: not found bad, 2: without the fix";
+}
+
+TEST(DoctorRights, MemoryLockRefusedNamesTheLimitToRaise) {
+  const int outcome = in_child([] { return as_nobody(check_memory_lock, "LimitMEMLOCK=infinity"); });
+  if (outcome == kNotPermitted) GTEST_SKIP() << "becoming another user needs root";
+  EXPECT_EQ(outcome, 0) << "1: not found bad, 2: without the fix";
+}
+
+TEST(DoctorRights, RootIsGrantedBoth) {
+  if (geteuid() != 0) GTEST_SKIP() << "not root";
+  if (check_real_time().verdict != Verdict::kGood) GTEST_SKIP() << "this container withholds real time";
+  EXPECT_EQ(check_memory_lock().verdict, Verdict::kGood);
+}
+
+TEST(DoctorCores, OneCoreIsAWarning) {
+  const int outcome = in_child([] {
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    sched_getaffinity(0, sizeof one, &one);
+    for (int core = CPU_SETSIZE - 1; CPU_COUNT(&one) > 1; --core) CPU_CLR(core, &one);
+    if (sched_setaffinity(0, sizeof one, &one) != 0) return kNotPermitted;
+    return check_cores().verdict == Verdict::kWarning && !check_cores().fix.empty() ? 0 : 1;
+  });
+  EXPECT_EQ(outcome, 0);
+}
+
+TEST_F(FakePc, ASlowClockSourceIsBadAndTheBetterOneIsNamed) {
+  const std::string folder = "sys/devices/system/clocksource/clocksource0/";
+  write(folder + "current_clocksource", "tsc");
+  EXPECT_EQ(check_clock_source(root_).verdict, Verdict::kGood);
+  write(folder + "current_clocksource", "acpi_pm");
+  write(folder + "available_clocksource", "hpet tsc acpi_pm");
+  const auto finding = check_clock_source(root_);
+  EXPECT_EQ(finding.verdict, Verdict::kBad);
+  EXPECT_THAT(finding.fix, HasSubstr("echo tsc > "));
+  write(folder + "available_clocksource", "hpet acpi_pm");
+  EXPECT_THAT(check_clock_source(root_).fix, HasSubstr("clocksource=tsc"));
+  fs::remove_all(root_ / "sys");
+  EXPECT_EQ(check_clock_source(root_).verdict, Verdict::kWarning);
+}
+
+TEST_F(FakePc, APowersavingGovernorIsNamedWithItsCores) {
+  EXPECT_EQ(check_governor(root_).verdict, Verdict::kGood) << "a virtual machine has none";
+  write("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance");
+  write("sys/devices/system/cpu/cpu1/cpufreq/scaling_governor", "performance");
+  EXPECT_EQ(check_governor(root_).verdict, Verdict::kGood);
+  write("sys/devices/system/cpu/cpu1/cpufreq/scaling_governor", "powersave");
+  const auto finding = check_governor(root_);
+  EXPECT_EQ(finding.verdict, Verdict::kWarning);
+  EXPECT_THAT(finding.what, HasSubstr("powersave on cpu1:"));
+  EXPECT_THAT(finding.fix, HasSubstr("cpupower frequency-set -g performance"));
+}
+
+TEST_F(FakePc, ASmallReceiveBufferComesWithTheSysctl) {
+  write("proc/sys/net/core/rmem_max", "4194304");
+  EXPECT_EQ(check_receive_buffer(root_).verdict, Verdict::kGood);
+  write("proc/sys/net/core/rmem_max", "212992");
+  const auto finding = check_receive_buffer(root_);
+  EXPECT_EQ(finding.verdict, Verdict::kWarning);
+  EXPECT_THAT(finding.fix, HasSubstr("sysctl -w net.core.rmem_max=2097152"));
+}
+
+TEST_F(FakePc, AnFtdiBridgeThatHoldsBytesBackIsBad) {
+  write("sys/bus/usb-serial/devices/ttyUSB0/latency_timer", "16");
+  write("sys/bus/usb-serial/devices/ttyUSB1/latency_timer", "1");
+  fs::create_directories(root_ / "sys/bus/usb-serial/devices/ttyUSB2");  // another maker's bridge
+  const auto all = check_ftdi_latency(root_, {});
+  ASSERT_THAT(all, SizeIs(2));
+  EXPECT_EQ(all[0].verdict, Verdict::kBad);
+  EXPECT_THAT(all[0].what, HasSubstr("16 ms"));
+  EXPECT_THAT(all[0].fix, HasSubstr("echo 1 > "));
+  EXPECT_THAT(all[0].fix, HasSubstr("60-imuscope.rules"));
+  EXPECT_EQ(all[1].verdict, Verdict::kGood);
+  EXPECT_THAT(check_ftdi_latency(root_, {"/dev/ttyUSB1"}), SizeIs(1)) << "only what is configured";
+}
+
+TEST_F(FakePc, ACanInterfaceThatIsDownOrMissingComesWithTheCommand) {
+  write("sys/class/net/can0/type", "280");
+  write("sys/class/net/can0/flags", "0x40080");
+  write("sys/class/net/eth0/type", "1");
+  const auto all = check_can(root_, {});
+  ASSERT_THAT(all, SizeIs(1)) << "eth0 is no CAN interface";
+  EXPECT_EQ(all[0].verdict, Verdict::kBad);
+  EXPECT_THAT(all[0].fix, HasSubstr("ip link set can0 up type can bitrate"));
+  write("sys/class/net/can0/flags", "0x40081");
+  EXPECT_EQ(check_can(root_, {}).front().verdict, Verdict::kGood);
+  const auto wanted = check_can(root_, {"can0", "can1"});
+  ASSERT_THAT(wanted, SizeIs(2));
+  EXPECT_EQ(wanted[1].verdict, Verdict::kBad);
+  EXPECT_THAT(wanted[1].what, HasSubstr("no such interface"));
+}
+
+TEST(DoctorLcm, WithoutARouteTheTwoCommandsAreTheFix) {
+  const int outcome = in_child([] {
+    if (unshare(CLONE_NEWNET) != 0) return kNotPermitted;
+    const auto finding = check_lcm("udpm://239.255.76.67:7667?ttl=0");
+    return finding.verdict == Verdict::kBad &&
+                   finding.fix.find("ip route add 224.0.0.0/4 dev lo") != std::string::npos
+               ? 0
+               : 1;
+  });
+  if (outcome == kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
+  EXPECT_EQ(outcome, 0);
+  EXPECT_EQ(check_lcm("tcpq://localhost").verdict, Verdict::kBad);
+}
+
+TEST(DoctorLines, APortThatDoesNotOpenSaysWhy) {
+  DeviceConfig device;
+  device.name = "mtx1";
+  device.serial = SerialConfig{"/dev/imuscope-is-not-here", 115200, 1};
+  const auto line = open_line(device, {});
+  ASSERT_FALSE(line);
+  const auto finding = check_line(device.name, tl::unexpected<Error>(line.error()));
+  EXPECT_EQ(finding.verdict, Verdict::kBad);
+  EXPECT_THAT(finding.what, HasSubstr("/dev/imuscope-is-not-here does not exist"));
+  EXPECT_FALSE(finding.fix.empty());
+  EXPECT_EQ(check_line("mtx1", {}).verdict, Verdict::kGood);
+}
+
+constexpr double kRate = 0.1e6;
+
+TEST(DoctorDisk, JudgesRoomAndSpeedByWhatARunWrites) {
+  const Disk good{"/data", {}, 100e9, 50e6};
+  EXPECT_EQ(check_disk(good, kRate).verdict, Verdict::kGood);
+  Disk slow = good;
+  slow.write_bytes_per_s = 0.5e6;
+  EXPECT_EQ(check_disk(slow, kRate).verdict, Verdict::kBad);
+  EXPECT_THAT(check_disk(slow, kRate).fix, HasSubstr("another disk"));
+  Disk small = good;
+  small.free_bytes = 2.0 * 3600.0 * kRate;
+  EXPECT_EQ(check_disk(small, kRate).verdict, Verdict::kWarning);
+  small.free_bytes = 0.5 * 3600.0 * kRate;
+  EXPECT_EQ(check_disk(small, kRate).verdict, Verdict::kBad);
+}
+
+TEST(DoctorDisk, MeasuresAFolderThatIsStillToBeMadeAndLeavesNothing) {
+  const auto folder = test::scratch_folder();
+  const auto disk = measure_disk(folder / "runs" / "monday");
+  EXPECT_EQ(disk.problem, "");
+  EXPECT_EQ(disk.folder, folder);
+  EXPECT_GT(disk.free_bytes, 0.0);
+  EXPECT_GT(disk.write_bytes_per_s, 0.0);
+  EXPECT_TRUE(fs::is_empty(folder));
+}
+
+TEST(DoctorDisk, AFullDiskIsBad) {
+  const auto folder = test::scratch_folder();
+  const int outcome = in_child([&] {
+    if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=1m") != 0)
+      return kNotPermitted;
+    const auto finding = check_disk(measure_disk(folder), kRate);
+    return finding.verdict == Verdict::kBad && finding.fix.find("make room") != std::string::npos ? 0 : 1;
+  });
+  if (outcome == kNotPermitted) GTEST_SKIP() << "mounting needs root";
+  EXPECT_EQ(outcome, 0);
+}
+
+TEST(DoctorExamination, LooksAtEverythingThatTheConfigurationNames) {
+  auto configuration = parse_configuration(R"(
+[[device]]
+name = "r"
+role = "reference"
+protocol = "ixblue_stdbin"
+transport = { kind = "serial", port = "/dev/imuscope-no-r" }
+[[device]]
+name = "s"
+role = "study"
+protocol = "xsens_mt"
+transport = { kind = "serial", port = "/dev/imuscope-no-s" }
+)",
+                                           "car.toml");
+  ASSERT_TRUE(configuration);
+  configuration->record.folder = test::scratch_folder().string();
+  Examination examination;
+  examination.configuration = *configuration;
+  std::vector<std::string> checks;
+  for (const auto& finding : examine(examination)) {
+    checks.push_back(finding.check);
+    EXPECT_EQ(finding.fix.empty(), finding.verdict == Verdict::kGood)
+        << finding.check << ": " << finding.what;
+  }
+  for (const char* check : {"real time", "memory lock", "cores", "clock source", "CPU governor", "LCM",
+                            "receive buffer", "line of r", "line of s", "disk"}) {
+    EXPECT_THAT(checks, testing::Contains(check));
+  }
+}
+
+}  // namespace
+}  // namespace imuscope::doctor

@@ -1,0 +1,136 @@
+/// A committed capture guards the numbers over time, and shows that replay does not depend on speed or on the way by
+/// which the capture came.
+
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdlib>
+#include <map>
+#include <sstream>
+#include <thread>
+
+#include "programs.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::test {
+namespace {
+
+constexpr std::array kFiles{"navigation.csv", "calibration_mtx1.csv", "errors_mtx1.csv"};
+constexpr double kShareOfSd = 1e-6;
+
+struct Table {
+  std::vector<std::string> columns;
+  std::map<double, std::vector<double>> rows;  ///< by time_s
+};
+
+Table read_table(const std::filesystem::path& file) {
+  Table table;
+  std::istringstream lines(read_text(file));
+  std::string line;
+  std::getline(lines, line);
+  std::istringstream names(line);
+  for (std::string name; std::getline(names, name, ',');) table.columns.push_back(name);
+  while (std::getline(lines, line)) {
+    std::istringstream fields(line);
+    std::vector<double> row;
+    for (std::string field; std::getline(fields, field, ',');) row.push_back(std::strtod(field.c_str(), nullptr));
+    if (!row.empty()) table.rows[row.front()] = row;
+  }
+  return table;
+}
+
+/// Column of the sd that belongs to `name`; the column count where there is none.
+std::size_t sd_column(const Table& table, const std::string& name) {
+  static const std::map<std::string, std::string> kOtherNames{
+      {"lat_deg", "sd_n_m"}, {"lon_deg", "sd_e_m"}, {"height_m", "sd_d_m"}};
+  const auto other = kOtherNames.find(name);
+  const std::string wanted = other != kOtherNames.end() ? other->second : "sd_" + name;
+  const auto found = std::find(table.columns.begin(), table.columns.end(), wanted);
+  return static_cast<std::size_t>(found - table.columns.begin());
+}
+
+/// How far a value of column `c` may be from the expected one.
+double tolerance(const Table& expected, std::size_t c, const std::vector<double>& row) {
+  constexpr double kMetresPerDeg = 111'320.0;
+  const std::string& name = expected.columns[c];
+  const std::size_t sd = sd_column(expected, name);
+  if (sd < expected.columns.size()) {
+    const bool is_position = name == "lat_deg" || name == "lon_deg";
+    return kShareOfSd * row[sd] / (is_position ? kMetresPerDeg : 1.0);
+  }
+  double largest = 0.0;
+  for (const auto& [time, values] : expected.rows) largest = std::max(largest, std::abs(values[c]));
+  return kShareOfSd * largest;
+}
+
+class Golden : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network namespace needs root";
+    ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
+    const auto unpack = "gzip -dc " + source_path("tests/golden/capture.lcm.gz").string() + " > " + capture_.string();
+    ASSERT_EQ(std::system(unpack.c_str()), 0);
+  }
+
+  std::map<std::string, std::string> replay(const std::filesystem::path& capture, const std::string& name,
+                                            const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments{"replay", capture.string(), "--out", (folder_ / name).string()};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    EXPECT_EQ(run_program("imuscope", arguments, folder_ / (name + ".log")), 0)
+        << read_text(folder_ / (name + ".log"));
+    std::map<std::string, std::string> texts;
+    for (const char* file : kFiles) texts[file] = read_text(folder_ / name / file);
+    return texts;
+  }
+
+  std::filesystem::path folder_ = scratch_folder();
+  std::filesystem::path capture_ = folder_ / "capture.lcm";
+};
+
+TEST_F(Golden, ReplaysToTheNumbersThatWereCommitted) {
+  (void)replay(capture_, "replay");
+  for (const char* file : kFiles) {
+    const auto expected = read_table(source_path("tests/golden") / file);
+    const auto found = read_table(folder_ / "replay" / file);
+    ASSERT_EQ(found.columns, expected.columns) << file;
+    ASSERT_GE(expected.rows.size(), 10U) << file;
+    for (const auto& [time, row] : expected.rows) {
+      const auto same = found.rows.find(time);
+      ASSERT_NE(same, found.rows.end()) << file << " at " << time << " s";
+      for (std::size_t c = 0; c < row.size(); ++c) {
+        EXPECT_NEAR(same->second[c], row[c], tolerance(expected, c, row))
+            << file << " " << expected.columns[c] << " at " << time << " s";
+      }
+    }
+  }
+}
+
+TEST_F(Golden, PacedAsRecordedItGivesTheSameAndTakesItsTime) {
+  const auto fast = replay(capture_, "fast");
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(replay(capture_, "paced", {"--realtime"}), fast);
+  EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(15)) << "18 s were recorded";
+}
+
+TEST_F(Golden, PlayedByLcmLogplayerAndRecordedByLcmLoggerItReplaysToTheSame) {
+  const auto copy = folder_ / "copy.lcm";
+  const auto raw = folder_ / "raw.lcm";
+  const std::string command = "lcm-logger -q " + copy.string() + " & a=$!; lcm-logger -q -c \"IMUSCOPE_RAW_.*\" " +
+                              raw.string() + " & b=$!; sleep 1; lcm-logplayer -s 4 " + capture_.string() +
+                              " >/dev/null; sleep 1; kill -INT $a $b; wait $a $b";
+  ASSERT_EQ(std::system(("bash -c '" + command + "' >" + (folder_ / "tools.log").string() + " 2>&1").c_str()), 0)
+      << read_text(folder_ / "tools.log");
+  const auto fast = replay(capture_, "fast");
+  EXPECT_EQ(replay(copy, "copied"), fast);
+
+  // The bytes alone, without what was run: they need the configuration, and have ticks of their own.
+  EXPECT_EQ(run_program("imuscope", {"replay", raw.string(), "--out", (folder_ / "no").string()}, folder_ / "no.log"), 2);
+  EXPECT_NE(read_text(folder_ / "no.log").find("add --config"), std::string::npos);
+  const auto alone = replay(raw, "alone", {"--config", source_path("tests/golden/golden.toml").string()});
+  EXPECT_GT(alone.at("errors_mtx1.csv").size(), fast.at("errors_mtx1.csv").size() / 2);
+}
+
+}  // namespace
+}  // namespace imuscope::test

@@ -1,0 +1,149 @@
+#include "service/health.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <thread>
+
+#include "rt/host_clock.h"
+#include "rt/thread_setup.h"
+
+namespace imuscope {
+namespace {
+
+using testing::HasSubstr;
+
+StatusReport::Device device(const std::string& name, const std::string& role, const std::string& state) {
+  StatusReport::Device d;
+  d.name = name;
+  d.role = role;
+  d.state = state;
+  return d;
+}
+
+StatusReport healthy() {
+  StatusReport report;
+  report.devices = {device("airins", "reference", "streaming"), device("mtx1", "study", "streaming"),
+                    device("mtx2", "study", "streaming")};
+  report.studies.resize(2);
+  for (auto& study : report.studies) study.state = "converging";
+  report.rings = {{"raw bytes", 2048, 1, 9, 0}};
+  return report;
+}
+
+TEST(Health, RunningWhenAllStreamAndCalibrate) { EXPECT_EQ(judge(healthy()).state, "running"); }
+
+TEST(Health, AligningUntilOneMountingIsFound) {
+  auto report = healthy();
+  for (auto& study : report.studies) study.state = "looking for its mounting";
+  EXPECT_EQ(judge(report).state, "aligning");
+}
+
+TEST(Health, StartingWhileADeviceIsSetUpAndDegradedWhenOneFallsSilentLater) {
+  auto report = healthy();
+  report.devices[1].state = "configuring";
+  for (auto& study : report.studies) study.state = "waiting for samples";
+  EXPECT_EQ(judge(report).state, "starting");
+  EXPECT_EQ(judge(report).reason, "mtx1: configuring");
+  for (auto& study : report.studies) study.state = "converging";
+  report.devices[1].problem = "no answer; check its cable";
+  EXPECT_EQ(judge(report).state, "degraded");
+  EXPECT_EQ(judge(report).reason, "mtx1: configuring: no answer; check its cable");
+}
+
+TEST(Health, FailedWithoutAReferenceOrWithoutAnyStudy) {
+  auto report = healthy();
+  report.devices[0].state = "failed";
+  report.devices[0].problem = "wrong protocol";
+  EXPECT_EQ(judge(report).state, "failed");
+  EXPECT_THAT(judge(report).reason, HasSubstr("airins: failed: wrong protocol"));
+  report = healthy();
+  report.devices[1].state = report.devices[2].state = "failed";
+  EXPECT_EQ(judge(report).state, "failed");
+  report.devices[2].state = "streaming";
+  EXPECT_EQ(judge(report).state, "degraded") << "the other S-IMU is still worth the run";
+}
+
+TEST(Health, DegradedWhenAnythingIsLostOrRefused) {
+  auto report = healthy();
+  report.capture_lost = 3;
+  EXPECT_EQ(judge(report).state, "degraded");
+  EXPECT_THAT(judge(report).reason, HasSubstr("3 records"));
+  report = healthy();
+  report.rings[0].refused = 7;
+  EXPECT_EQ(judge(report).reason, "the ring 'raw bytes' refused 7 elements");
+  report = healthy();
+  report.devices[2].samples_refused = 2;
+  EXPECT_THAT(judge(report).reason, HasSubstr("2 samples of mtx2"));
+  report = healthy();
+  report.problems = {"memory is not locked; ..."};
+  EXPECT_EQ(judge(report).state, "degraded");
+  EXPECT_EQ(judge(report).reason, "memory is not locked; ...");
+}
+
+TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection) {
+  StudyOutput study;
+  study.status = StudyStatus::kConverging;
+  study.sd_psi_rad = {0.1, 0.3, 0.2};
+  study.sd_r_bs_b_m = {0.6, 0.4, 0.5};
+  study.sd_t_d_s = 0.7;
+  study.weakest_component = StudyDirection::kPsiZ;
+  study.weakest_relative_sd = 0.9;
+  study.counters.gated_gyro = {1, 2, 3};
+  study.counters.gated_accel = {4, 5, 6};
+  StudyConfig config;
+  const auto status = study_status("mtx1", study, config);
+  EXPECT_DOUBLE_EQ(status.sd_psi_rad, 0.3);
+  EXPECT_DOUBLE_EQ(status.sd_r_m, 0.6);
+  EXPECT_DOUBLE_EQ(status.sd_t_d_s, 0.7);
+  EXPECT_DOUBLE_EQ(status.goal_psi_rad, config.goal_boresight_sd_rad);
+  EXPECT_EQ(status.weakest, "psi_z");
+  EXPECT_THAT(status.manoeuvre, HasSubstr("brake"));
+  EXPECT_EQ(status.gated, 21U);
+  study.status = StudyStatus::kCalibrated;
+  EXPECT_EQ(study_status("mtx1", study, config).manoeuvre, "") << "nothing is missing any more";
+  study.status = StudyStatus::kCoarse;
+  const auto coarse = study_status("mtx1", study, config);
+  EXPECT_TRUE(std::isnan(coarse.sd_psi_rad)) << "what is not estimated has no sd";
+  EXPECT_THAT(coarse.manoeuvre, HasSubstr("turn both ways"));
+}
+
+TEST(ThreadWatch, KnowsEachThreadsNameSchedulingAndProcessorTime) {
+  ThreadWatch watch;
+  std::atomic<bool> stop{false};
+  std::thread busy([&] {
+    (void)setup_this_thread({"watch-busy", Scheduling::kIdle, 0, {}});
+    while (!stop.load()) {
+    }
+  });
+  std::thread asleep([&] {
+    (void)setup_this_thread({"watch-asleep", Scheduling::kNormal, 0, {}});
+    while (!stop.load()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  (void)watch.look(host_now());
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const auto threads = watch.look(host_now());
+  stop.store(true);
+  busy.join();
+  asleep.join();
+  const auto named = [&](const std::string& name) {
+    const auto found =
+        std::find_if(threads.begin(), threads.end(), [&](const auto& t) { return t.name == name; });
+    return found == threads.end() ? StatusReport::Thread{} : *found;
+  };
+  EXPECT_EQ(named("watch-busy").scheduling, "idle");
+  EXPECT_EQ(named("watch-asleep").scheduling, "normal");
+  EXPECT_GT(named("watch-busy").cpu_share, named("watch-asleep").cpu_share);
+  EXPECT_LE(named("watch-busy").cpu_share, 1.1);
+}
+
+TEST(Quantiles, AreUnknownWithoutAValue) {
+  EXPECT_TRUE(std::isnan(quantiles_of(LatenessHistogram{}).p50_s));
+  LatenessHistogram histogram;
+  histogram.add(std::chrono::microseconds(100));
+  EXPECT_DOUBLE_EQ(quantiles_of(histogram).max_s, 100e-6);
+}
+
+}  // namespace
+}  // namespace imuscope

@@ -1,0 +1,87 @@
+#include "service/motion_book.h"
+
+#include <gtest/gtest.h>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace imuscope {
+namespace {
+
+/// Against the textbook's sums over all data at once.
+TEST(MotionSums, AgreeWithTheClosedFormOfTheRegression) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  std::vector<double> p(500);
+  std::vector<double> e(500);
+  MotionSums sums;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    p[i] = 9.8 + 0.3 * normal(random);
+    e[i] = 0.02 + 0.01 * p[i] + 0.005 * normal(random);
+    sums.add(p[i], e[i]);
+  }
+  const double n = static_cast<double>(p.size());
+  double mean_p = 0.0;
+  double mean_e = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    mean_p += p[i] / n;
+    mean_e += e[i] / n;
+  }
+  double pp = 0.0;
+  double pe = 0.0;
+  double ee = 0.0;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    pp += (p[i] - mean_p) * (p[i] - mean_p);
+    pe += (p[i] - mean_p) * (e[i] - mean_e);
+    ee += (e[i] - mean_e) * (e[i] - mean_e);
+    largest = std::max(largest, std::abs(p[i]));
+  }
+  const double slope = pe / pp;
+  double residual = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const double r = e[i] - mean_e - slope * (p[i] - mean_p);
+    residual += r * r;
+  }
+  const auto report = sums.report();
+  EXPECT_NEAR(report.mean, mean_p, 1e-12);
+  EXPECT_NEAR(report.rms, std::sqrt(pp / n), 1e-12);
+  EXPECT_DOUBLE_EQ(report.largest, largest);
+  EXPECT_NEAR(report.slope, slope, 1e-12);
+  EXPECT_NEAR(report.slope_sd, std::sqrt(residual / (n - 2.0) / pp), 1e-12);
+  EXPECT_NEAR(report.correlation, pe / std::sqrt(pp * ee), 1e-12);
+  EXPECT_NEAR(report.slope, 0.01, 4.0 * report.slope_sd);
+}
+
+TEST(MotionSums, WithoutMotionTheSlopeIsUnknown) {
+  MotionSums sums;
+  EXPECT_TRUE(std::isnan(sums.report().mean));
+  for (int i = 0; i < 10; ++i) sums.add(1.0, i);
+  EXPECT_DOUBLE_EQ(sums.report().mean, 1.0);
+  EXPECT_TRUE(std::isnan(sums.report().slope));
+  EXPECT_TRUE(std::isnan(sums.report().correlation));
+}
+
+TEST(MotionBook, CountsRegimesAndLeavesOutAxesWithoutAValue) {
+  MotionBook book;
+  ErrorRow row{};
+  row.gyro_valid = true;
+  row.accel_valid = false;
+  row.predicted_omega_s_radps = {1.0, 2.0, -3.0};
+  row.regime = Regime::kDynamic;
+  book.add(row);
+  row.regime = Regime::kStatic;
+  book.add(row);
+  book.add(row);
+  const auto report = book.report();
+  EXPECT_EQ(report.n_static, 2);
+  EXPECT_EQ(report.n_dynamic, 1);
+  ASSERT_EQ(report.axes.size(), 6U);
+  EXPECT_EQ(report.axes[2].axis, "gyro_z");
+  EXPECT_EQ(report.axes[2].unit, "rad/s");
+  EXPECT_DOUBLE_EQ(report.axes[2].largest, 3.0);
+  EXPECT_TRUE(std::isnan(report.axes[3].mean)) << "no specific force was ever valid";
+}
+
+}  // namespace
+}  // namespace imuscope

@@ -1,0 +1,78 @@
+#include "tools/imuscope/top/view.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "example_reports.h"
+#include "publish/message_builders.h"
+#include "tools/imuscope/top/terminal.h"
+
+namespace imuscope::top {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+Heard example() {
+  Heard heard;
+  heard.status = to_message(test::example_status(), 7);
+  heard.calibrations["mtx1"] = to_message(test::example_calibration(), "mtx1", 1);
+  heard.models["mtx1"] = to_message(test::example_noise_model(), 1);
+  return heard;
+}
+
+std::string page(const Heard& heard) {
+  std::string text;
+  for (const auto& line : lines_of(heard)) text += line + "\n";
+  return text;
+}
+
+TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndProblems) {
+  const auto text = page(example());
+  for (const char* part :
+       {"run 'demo'  degraded: mtx2 is silent", "run/capture.lcm", "lost 4", "last event: roundabout",
+        "streaming", "99.9", "4.20", "25", "-11.5", "converging", "0.5730/0.0573", "20.00/2", "3.000/0.3",
+        "weakest psi_z (50 % of its prior left); still missing: brake", "fifo 80", "13 us", "18 us", "1024",
+        "problem: no route; run ip route add"}) {
+    EXPECT_THAT(text, HasSubstr(part));
+  }
+}
+
+TEST(TopView, SaysWhatToDoBeforeAnythingIsHeard) {
+  EXPECT_THAT(page({}), HasSubstr("no service has been heard yet"));
+}
+
+TEST(TopView, AServiceThatFellSilentIsToldToBeOld) {
+  auto heard = example();
+  EXPECT_THAT(page(heard), Not(HasSubstr("silent for")));
+  heard.status_age_s = 12.0;
+  EXPECT_THAT(page(heard), HasSubstr("!! silent for 12 s"));
+}
+
+TEST(TopView, UnknownNumbersAreDashesAndNulls) {
+  auto heard = example();
+  heard.status->devices[0].clock_drift_ppm = std::nan("");
+  heard.status->devices[0].latency_ms = std::nan("");
+  const auto json = nlohmann::json::parse(json_of(heard));
+  EXPECT_TRUE(json.at("devices").at(0).at("latency_ms").is_null());
+  EXPECT_DOUBLE_EQ(json.at("devices").at(1).at("latency_ms").get<double>(), 4.2);
+  EXPECT_THAT(page(heard), Not(HasSubstr("nan")));
+}
+
+TEST(TopHistogram, BarsGrowWithTheLogarithmOfTheirCount) {
+  EXPECT_EQ(histogram_bars({0, 1, 1000}), " \u2582\u2588");
+  EXPECT_EQ(histogram_bars({}), "");
+  EXPECT_EQ(histogram_bars({0, 0}), "  ");
+}
+
+TEST(TopTerminal, CutsAtCharactersNotAtBytes) {
+  EXPECT_EQ(cut("\u2588\u2588\u2588", 2), "\u2588\u2588");
+  EXPECT_EQ(cut("abc", 5), "abc");
+  EXPECT_EQ(cut("abc", 0), "");
+}
+
+}  // namespace
+}  // namespace imuscope::top
