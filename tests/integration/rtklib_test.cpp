@@ -173,7 +173,8 @@ TEST(Rtklib, AFixedSolutionThatStr2strSendsOverTcpDrivesTheFilter) {
       fifo.write_all(std::span(sent).subspan(at, std::min(kBlock, sent.size() - at)));
       std::this_thread::sleep_for(5ms);
     }
-    fifo.write_all(Bytes(2 * kBlock, '\n'));
+    constexpr std::size_t kWholeBlock = 32768;
+    fifo.write_all(Bytes(kWholeBlock, '\n'));
   });
   const Bytes came = read_stream(*stream, sent.size());
   writer.join();

@@ -42,7 +42,20 @@ Json status_json(const Telegram& telegram) {
   return status;
 }
 
+/// Behind the last block of a group that was read, or `from` where it has none.
+template <typename Layouts, typename Offsets>
+std::size_t end_of(const Layouts& layouts, const Offsets& offsets, std::size_t from) {
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    if (offsets[i] != 0) from = offsets[i] + layouts[i].size;
+  }
+  return from;
+}
+
 Json telegram_json(const Telegram& telegram) {
+  const std::size_t header = header_layout(telegram.version).size;
+  const std::size_t nav_end =
+      end_of(kExtendedBlocks, telegram.extended_at, end_of(kNavBlocks, telegram.nav_at, header));
+  const std::size_t consumed = end_of(kExternalBlocks, telegram.external_at, nav_end);
   Json fields = {{"version", telegram.version},
                  {"nav_mask", telegram.nav_mask},
                  {"ext_mask", telegram.extended_mask},
@@ -51,9 +64,13 @@ Json telegram_json(const Telegram& telegram) {
                  {"telegram_size", telegram.total_size},
                  {"validity_100us", telegram.validity_ticks},
                  {"counter", telegram.counter},
-                 {"header_size", header_layout(telegram.version).size},
+                 {"header_len", header},
                  {"checksum", telegram.checksum},
-                 {"blocks", blocks_json(telegram)}};
+                 {"checksum_ok", true},
+                 {"blocks", blocks_json(telegram)},
+                 {"nav_end", nav_end},
+                 {"consumed", consumed},
+                 {"leftover", telegram.bytes.size() - kChecksumSize - consumed}};
   if (telegram.nav_size) fields["nav_size"] = *telegram.nav_size;
   if (Json status = status_json(telegram); !status.empty()) fields["status"] = std::move(status);
   if (telegram.rest_unread) fields["rest_unread"] = true;
