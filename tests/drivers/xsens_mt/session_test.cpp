@@ -332,6 +332,7 @@ TEST(MtSession, SetsTheSyncInput) {
   Bench again(config);
   again.device = bench.device;
   again.device.measuring = false;
+  again.device.next_sample = {};
   again.device.heard.clear();
   again.run(seconds{3});
   EXPECT_EQ(again.session.state(), SessionState::kStreaming);
@@ -348,6 +349,7 @@ TEST(MtSession, SetsTheSyncInput) {
 TEST(MtSession, SetsUpEveryDeviceBehindAnXbusMasterAndTakesItOverLater) {
   MtSessionConfig config;
   config.bus_devices = 3;
+  config.baud = 460800.0;
   Bench bench(config);
   bench.device.id = 0x00100456;
   bench.device.n_devices = 3;
@@ -358,6 +360,7 @@ TEST(MtSession, SetsUpEveryDeviceBehindAnXbusMasterAndTakesItOverLater) {
 
   Bench later(config);
   later.device = bench.device;
+  later.device.next_sample = {};
   later.device.heard.clear();
   later.run(seconds{2});
   EXPECT_EQ(later.session.state(), SessionState::kStreaming);
