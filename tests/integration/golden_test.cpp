@@ -1,5 +1,5 @@
-/// A committed capture guards the numbers over time, and shows that replay does not depend on speed or on the way by
-/// which the capture came.
+/// A committed capture guards the numbers over time, and shows that replay does not depend on speed or on the
+/// way by which the capture came.
 
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -35,7 +35,8 @@ Table read_table(const std::filesystem::path& file) {
   while (std::getline(lines, line)) {
     std::istringstream fields(line);
     std::vector<double> row;
-    for (std::string field; std::getline(fields, field, ',');) row.push_back(std::strtod(field.c_str(), nullptr));
+    for (std::string field; std::getline(fields, field, ',');)
+      row.push_back(std::strtod(field.c_str(), nullptr));
     if (!row.empty()) table.rows[row.front()] = row;
   }
   return table;
@@ -70,7 +71,8 @@ class Golden : public testing::Test {
   void SetUp() override {
     if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network namespace needs root";
     ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
-    const auto unpack = "gzip -dc " + source_path("tests/golden/capture.lcm.gz").string() + " > " + capture_.string();
+    const auto unpack =
+        "gzip -dc " + source_path("tests/golden/capture.lcm.gz").string() + " > " + capture_.string();
     ASSERT_EQ(std::system(unpack.c_str()), 0);
   }
 
@@ -117,16 +119,20 @@ TEST_F(Golden, PacedAsRecordedItGivesTheSameAndTakesItsTime) {
 TEST_F(Golden, PlayedByLcmLogplayerAndRecordedByLcmLoggerItReplaysToTheSame) {
   const auto copy = folder_ / "copy.lcm";
   const auto raw = folder_ / "raw.lcm";
-  const std::string command = "lcm-logger -q " + copy.string() + " & a=$!; lcm-logger -q -c \"IMUSCOPE_RAW_.*\" " +
-                              raw.string() + " & b=$!; sleep 1; lcm-logplayer -s 4 " + capture_.string() +
+  const std::string command = "lcm-logger -q " + copy.string() +
+                              " & a=$!; lcm-logger -q -c \"IMUSCOPE_RAW_.*\" " + raw.string() +
+                              " & b=$!; sleep 1; lcm-logplayer -s 4 " + capture_.string() +
                               " >/dev/null; sleep 1; kill -INT $a $b; wait $a $b";
-  ASSERT_EQ(std::system(("bash -c '" + command + "' >" + (folder_ / "tools.log").string() + " 2>&1").c_str()), 0)
+  ASSERT_EQ(std::system(("bash -c '" + command + "' >" + (folder_ / "tools.log").string() + " 2>&1").c_str()),
+            0)
       << read_text(folder_ / "tools.log");
   const auto fast = replay(capture_, "fast");
   EXPECT_EQ(replay(copy, "copied"), fast);
 
   // The bytes alone, without what was run: they need the configuration, and have ticks of their own.
-  EXPECT_EQ(run_program("imuscope", {"replay", raw.string(), "--out", (folder_ / "no").string()}, folder_ / "no.log"), 2);
+  EXPECT_EQ(run_program("imuscope", {"replay", raw.string(), "--out", (folder_ / "no").string()},
+                        folder_ / "no.log"),
+            2);
   EXPECT_NE(read_text(folder_ / "no.log").find("add --config"), std::string::npos);
   const auto alone = replay(raw, "alone", {"--config", source_path("tests/golden/golden.toml").string()});
   EXPECT_GT(alone.at("errors_mtx1.csv").size(), fast.at("errors_mtx1.csv").size() / 2);
