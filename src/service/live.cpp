@@ -73,8 +73,10 @@ class Supervisor {
         line.baud.next();
         // The first round is told; a device that is switched off would fill the log for ever.
         if (!line.baud.repeats()) {
-          spdlog::warn("{}: no message at {}; trying {} baud (once it answers, set baud to that)",
-                       device.name, gone->line->describe(), line.baud.current());
+          spdlog::warn(
+              "{}: no answer at {}; check the device's power, its cable and the port; trying {} "
+              "baud (once it answers, set baud to that)",
+              device.name, gone->line->describe(), line.baud.current());
         }
       } else {
         spdlog::warn("{}: {} is gone; trying to open it again", device.name, gone->line->describe());

@@ -22,6 +22,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/epoll.h>
+#include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -29,6 +30,7 @@
 #include <ucontext.h>
 #include <unistd.h>
 #include <atomic>
+#include <iterator>
 
 extern "C" {
 void* __libc_malloc(size_t);
@@ -109,6 +111,8 @@ constexpr int kAllowedBoth[] = {SYS_clock_gettime, SYS_rt_sigreturn, SYS_restart
 constexpr int kAllowedEstimator[] = {SYS_clock_nanosleep};
 constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait, SYS_epoll_ctl, SYS_read,
                               SYS_write,      SYS_recvmsg,     SYS_recvmmsg,  SYS_fcntl};
+/// Health of a line: the driver's error counts and an interface's flags, copied from the kernel's memory.
+constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS};
 
 void install_filter(bool is_io) {
   sock_filter program[64];
@@ -122,6 +126,13 @@ void install_filter(bool is_io) {
   for (const int call : kAllowedBoth) allow(call);
   if (is_io) {
     for (const int call : kAllowedIo) allow(call);
+    constexpr unsigned char kSkipIoctls = 1 + 2 * std::size(kAllowedIoctls);
+    add(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_ioctl, 0, kSkipIoctls));
+    add(BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, args[1])));
+    for (const unsigned request : kAllowedIoctls) {
+      add(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, request, 0, 1));
+      add(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+    }
   } else {
     for (const int call : kAllowedEstimator) allow(call);
   }

@@ -154,7 +154,12 @@ class FaultScript : public testing::Test {
     return parsed ? "accepted" : parsed.error().text;
   }
 
-  std::filesystem::path folder_ = scratch_folder();
+  // What is clean is read before the test's own folder is made, which empties it.
+  FaultScript() {
+    for (const char* name : {"ref", "a", "b", "gnss"}) (void)clean(name);
+    folder_ = scratch_folder();
+  }
+  std::filesystem::path folder_;
 };
 
 std::size_t differing(const Bytes& a, const Bytes& b) {

@@ -1,5 +1,7 @@
 /// `imuscope import`: recordings of all kinds into one capture that replays to the same estimates.
 
+#include <unistd.h>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -35,10 +37,12 @@ Outcome run_in(const fs::path& folder, const std::string& program, const std::st
           content_of(folder / "stderr.txt")};
 }
 
-/// One recorded drive for all tests: 3 minutes, the first of them at rest.
+/// One recorded drive for all tests of this process: 3 minutes, the first of them at rest. CTest runs each
+/// test in a process of its own, side by side.
 const fs::path& drive() {
   static const fs::path folder = [] {
-    fs::path made = fs::path(program_path("imusim")).parent_path().parent_path() / "scratch" / "import_drive";
+    fs::path made = fs::path(program_path("imusim")).parent_path().parent_path() / "scratch" /
+                    ("import_drive_" + std::to_string(getpid()));
     fs::remove_all(made);
     fs::create_directories(made);
     const auto recorded = run_in(
