@@ -14,8 +14,8 @@ namespace imuscope::dbc {
 /// @param name  stands for the file in messages
 Result<Database> parse(std::string_view text, const std::string& name);
 
-/// The whole text of a DBC file, as UTF-8 (files in Latin-1 are converted); an error that says why it cannot be
-/// read.
+/// The whole text of a DBC file, as UTF-8 (files in Latin-1 are converted); an error that says why it cannot
+/// be read.
 Result<std::string> read_text(const std::filesystem::path& file);
 
 }  // namespace imuscope::dbc

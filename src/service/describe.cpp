@@ -82,7 +82,8 @@ std::string describe(const Configuration& configuration, const EstimatorEvent& e
               .devices[state.study ? estimator.studies[*state.study].device : estimator.reference.device]
               .name;
       return fmt::format(
-          "{}: numerical trouble: the variance of {} was no longer positive and starts again; please keep the "
+          "{}: numerical trouble: the variance of {} was no longer positive and starts again; please keep "
+          "the "
           "capture",
           owner, state.name);
     }

@@ -156,8 +156,8 @@ TEST_P(CarDrive, FindsTheKnownMountingLeverArmAndTimeOffsetWithoutPrior) {
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(out.C_b_s.data());
   const Vector3d psi_deg = kDegPerRad * log_so3(C.transpose() * C_b_s);
   ASSERT_GE(out.status, StudyStatus::kConverging);
-  // Three published sd and the known values' spread over many drives, turned from the study's axes (its x lies
-  // along the reference's y) to b; millimetres as given, offsets to the millisecond.
+  // Three published sd and the known values' spread over many drives, turned from the study's axes (its x
+  // lies along the reference's y) to b; millimetres as given, offsets to the millisecond.
   const Vector3d spread_deg(0.18, 0.05, 0.08);
   constexpr double kSpread_m = 0.004;
   for (std::size_t i = 0; i < 3; ++i) {

@@ -194,7 +194,7 @@ Result<void> decode(const Options& options) {
 }  // namespace
 
 void add_decode(CLI::App& app, Work& chosen) {
-  auto* command = app.add_subcommand("decode", "the messages of a raw recording, one a line");
+  auto* command = app.add_subcommand("decode", "The messages of a raw recording, one a line");
   auto options = std::make_shared<Options>();
   command->add_option("FILE", options->file, "raw bytes as a device sent them")->required();
   command->add_option("--protocol", options->protocol, "which one; found by itself where not given");

@@ -41,7 +41,7 @@ return {};
 }  // namespace
 
 void add_import(CLI::App& app, Work& chosen) {
-  auto* command = app.add_subcommand("import", "raw dumps and logs into one capture");
+  auto* command = app.add_subcommand("import", "Raw dumps and logs into one capture");
   auto options = std::make_shared<Options>();
   command
       ->add_option("NAME=FILE", options->inputs,

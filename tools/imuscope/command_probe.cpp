@@ -101,7 +101,7 @@ Result<void> probe(const Options& options) {
 
 void add_probe(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
-      "probe", "looks at serial ports: baud rates, protocols, devices; drafts a configuration");
+      "probe", "Serial ports: their baud rates, protocols and devices; drafts a configuration");
   auto options = std::make_shared<Options>();
   command->add_option("PORT", options->ports, "ports to look at (default: all USB serial ports)");
   command->add_option("--write", options->write, "draft a configuration that runs with what was found")

@@ -2,8 +2,8 @@
 
 /// Logs of CAN frames for `imuscope decode`: as frames, or with a vehicle's DBC file as its messages.
 
-#include "stream_protocols.h"
 #include "drivers/dbc/database.h"
+#include "stream_protocols.h"
 
 namespace imuscope::cli {
 
