@@ -57,7 +57,8 @@ void add_time(std::string_view line, const Solution& solution, TimeSystem system
   const std::int64_t since_epoch_ns = solution.time_ns - kGpsEpochDays * kNsPerDay;
   const std::int64_t week = since_epoch_ns / (7 * kNsPerDay);
   fields["week"] = week;
-  fields["tow"] = static_cast<double>((since_epoch_ns - 7 * week * kNsPerDay) / 1000) / 1e6;
+  const std::int64_t tow_us = (since_epoch_ns - 7 * week * kNsPerDay) / 1000;
+  fields["tow"] = static_cast<double>(tow_us) / 1e6;
 }
 
 Json solution_json(std::string_view line, const Solution& solution, const Format& format) {
