@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <unistd.h>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -119,9 +120,13 @@ TEST_F(Golden, PacedAsRecordedItGivesTheSameAndTakesItsTime) {
 TEST_F(Golden, PlayedByLcmLogplayerAndRecordedByLcmLoggerItReplaysToTheSame) {
   const auto copy = folder_ / "copy.lcm";
   const auto raw = folder_ / "raw.lcm";
-  const std::string command = "lcm-logger -q " + copy.string() +
-                              " & a=$!; lcm-logger -q -c \"IMUSCOPE_RAW_.*\" " + raw.string() +
-                              " & b=$!; sleep 1; lcm-logplayer -s 4 " + capture_.string() +
+  // A bus of its own: other programs on this PC may be speaking on the usual one.
+  constexpr int kFirstPort = 20000;
+  const std::string bus =
+      " -l \"udpm://239.255.76.67:" + std::to_string(kFirstPort + getpid() % 10000) + "?ttl=0\" ";
+  const std::string command = "lcm-logger -q" + bus + copy.string() + " & a=$!; lcm-logger -q" + bus +
+                              "-c \"IMUSCOPE_RAW_.*\" " + raw.string() +
+                              " & b=$!; sleep 1; lcm-logplayer -s 4" + bus + capture_.string() +
                               " >/dev/null; sleep 1; kill -INT $a $b; wait $a $b";
   ASSERT_EQ(std::system(("bash -c '" + command + "' >" + (folder_ / "tools.log").string() + " 2>&1").c_str()),
             0)

@@ -73,7 +73,8 @@ TEST(Probe, FindsSpeedsProtocolsAndIdsAndDraftsAConfigurationThatRuns) {
   const auto run = read_json(folder / "run" / "run.json");
   for (const auto& device : run["devices"]) {
     EXPECT_GT(device["samples"].get<int>(), 20) << device << read_text(folder / "run.log");
-    EXPECT_EQ(device["bad_checksums"], 0) << device;
+    // A device that streams already is joined in the middle of a message, which counts as one damaged.
+    EXPECT_LE(device["bad_checksums"].get<int>(), 1) << device;
   }
 }
 
