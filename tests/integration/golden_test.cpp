@@ -69,6 +69,43 @@ double tolerance(const Table& expected, std::size_t c, const std::vector<double>
 
 class Golden : public testing::Test {
  protected:
+  /// How many recorded reads an event log holds. Layout: LCM's log format, big-endian, 28 bytes before the
+  /// channel.
+  static int raw_events(const std::filesystem::path& log) {
+    constexpr std::size_t kHeader = 28;
+    constexpr std::size_t kChannelLength = 20;
+    const std::string bytes = read_text(log);
+    const auto number = [&](std::size_t at) {
+      std::size_t value = 0;
+      for (std::size_t i = 0; i < 4; ++i) value = value << 8U | static_cast<unsigned char>(bytes[at + i]);
+      return value;
+    };
+    int count = 0;
+    for (std::size_t at = 0; at + kHeader <= bytes.size();) {
+      const std::size_t channel = number(at + kChannelLength);
+      count += bytes.compare(at + kHeader, 13, "IMUSCOPE_RAW_") == 0 ? 1 : 0;
+      at += kHeader + channel + number(at + kChannelLength + 4);
+    }
+    return count;
+  }
+
+  /// Plays the capture onto a bus of its own (other programs on this PC may be speaking on the usual one),
+  /// with two loggers that listen: to everything, and to the devices' bytes alone.
+  void play_and_log(const std::string& speed, const std::filesystem::path& all,
+                    const std::filesystem::path& raw) const {
+    constexpr int kFirstPort = 20000;
+    const std::string bus =
+        " --lcm-url=\"udpm://239.255.76.67:" + std::to_string(kFirstPort + getpid() % 10000) +
+        "?ttl=0&recv_buf_size=4194304\" ";
+    const std::string command = "lcm-logger -f -q" + bus + all.string() + " & a=$!; lcm-logger -f -q" + bus +
+                                "-c \"IMUSCOPE_RAW_.*\" " + raw.string() +
+                                " & b=$!; sleep 1; lcm-logplayer -s " + speed + bus + capture_.string() +
+                                " >/dev/null; sleep 1; kill -INT $a $b; wait $a $b";
+    ASSERT_EQ(
+        std::system(("bash -c '" + command + "' >" + (folder_ / "tools.log").string() + " 2>&1").c_str()), 0)
+        << read_text(folder_ / "tools.log");
+  }
+
   void SetUp() override {
     if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network namespace needs root";
     ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
@@ -120,17 +157,15 @@ TEST_F(Golden, PacedAsRecordedItGivesTheSameAndTakesItsTime) {
 TEST_F(Golden, PlayedByLcmLogplayerAndRecordedByLcmLoggerItReplaysToTheSame) {
   const auto copy = folder_ / "copy.lcm";
   const auto raw = folder_ / "raw.lcm";
-  // A bus of its own: other programs on this PC may be speaking on the usual one.
-  constexpr int kFirstPort = 20000;
-  const std::string bus =
-      " -l \"udpm://239.255.76.67:" + std::to_string(kFirstPort + getpid() % 10000) + "?ttl=0\" ";
-  const std::string command = "lcm-logger -q" + bus + copy.string() + " & a=$!; lcm-logger -q" + bus +
-                              "-c \"IMUSCOPE_RAW_.*\" " + raw.string() +
-                              " & b=$!; sleep 1; lcm-logplayer -s 4" + bus + capture_.string() +
-                              " >/dev/null; sleep 1; kill -INT $a $b; wait $a $b";
-  ASSERT_EQ(std::system(("bash -c '" + command + "' >" + (folder_ / "tools.log").string() + " 2>&1").c_str()),
-            0)
-      << read_text(folder_ / "tools.log");
+  // The bus may lose a datagram, which is nobody's fault here: then the 18 s are played again.
+  constexpr int kAttempts = 7;
+  const auto wanted = raw_events(capture_);
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    play_and_log("1", copy, raw);
+    if (raw_events(copy) == wanted && raw_events(raw) == wanted) break;
+  }
+  ASSERT_EQ(raw_events(copy), wanted) << read_text(folder_ / "tools.log");
+  ASSERT_EQ(raw_events(raw), wanted) << read_text(folder_ / "tools.log");
   const auto fast = replay(capture_, "fast");
   EXPECT_EQ(replay(copy, "copied"), fast);
 
