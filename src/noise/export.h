@@ -2,13 +2,12 @@
 
 /// Fitted models as another tool's configuration, in that tool's units and for that tool's equations.
 ///
-///   kalibr       imu.yaml: white noise and random walk of each triad
-///   ros          ROS 2 parameters: covariances as in sensor_msgs/Imu, and white noise plus one Gauss-Markov
-///   bias a
-///                triad as IMU simulation plugins take them
-///   px4          EKF2 parameters: white noise and bias random walk of each triad
-///   kf-gins      kf-gins.yaml `imunoise`: white noise and Gauss-Markov bias of each axis, one correlation
-///   time state-space  JSON: the whole model of each axis as F, Q, H, R
+/// - kalibr: imu.yaml, white noise and random walk of each triad
+/// - ros: ROS 2 parameters, covariances as in sensor_msgs/Imu; white noise and one Gauss-Markov bias a triad,
+///   as IMU simulation plugins take them
+/// - px4: EKF2 parameters, white noise and bias random walk of each triad
+/// - kf-gins: kf-gins.yaml `imunoise`, white noise and Gauss-Markov bias of each axis, one correlation time
+/// - state-space: JSON, the whole model of each axis as F, Q, H, R
 ///
 /// A form that holds fewer terms than the model gets the best model of that form for the same wavelet
 /// variance; the file says so in its comments.

@@ -4,16 +4,18 @@
 /// derivatives, in forms that stay exact where the textbook forms cancel.
 ///
 /// A process is one linear amplitude (it enters the wavelet variance linearly and is never negative) times a
-/// unit curve that depends on at most two shape values. Everything here is in sample terms (no rate):
+/// unit curve that depends on at most two shape values. Everything here is in sample terms (no rate);
+/// tau = 2^level, n = tau / 2:
 ///
-///   kind          amplitude                     shape                        unit curve, tau = 2^level, n =
-///   tau / 2 WN            sigma2                        -                            1 / tau QN q2 - 6 /
-///   tau^2 RW            gamma2                        -                            (tau^2 + 2) / (12 tau) DR
-///   omega^2 (omega per sample)    -                            tau^2 / 16 GM            variance of the
-///   process       a = beta / rate              see gauss_markov_wv() MA1           innovation variance theta
-///   in (-1, 1)             ((1+theta)^2 tau - 6 theta) / tau^2 ARMA11        innovation variance phi, theta
-///   in (-1, 1)        see process.cpp SIN           alpha^2 (random phase)        b, radians per sample
-///   sin^4(n b/2) / (2 n^2 sin^2(b/2))
+/// - WN: amplitude sigma2; curve 1 / tau
+/// - QN: amplitude q2; curve 6 / tau^2
+/// - RW: amplitude gamma2; curve (tau^2 + 2) / (12 tau)
+/// - DR: amplitude omega^2 (omega per sample); curve tau^2 / 16
+/// - GM: amplitude variance of the process, shape a = beta / rate; curve see gauss_markov_wv()
+/// - MA1: amplitude innovation variance, shape theta in (-1, 1); curve ((1+theta)^2 tau - 6 theta) / tau^2
+/// - ARMA11: amplitude innovation variance, shape phi, theta in (-1, 1); curve see process.cpp
+/// - SIN: amplitude alpha^2 (random phase), shape b in radians per sample;
+///   curve sin^4(n b/2) / (2 n^2 sin^2(b/2))
 ///
 /// QN with q2 is sqrt(12 q2) times the difference of uniform(0, 1) numbers: variance 2 q2.
 

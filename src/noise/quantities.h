@@ -31,11 +31,14 @@ struct Quantity {
 };
 
 /// At sampling rate f, signal unit u:
-///   WN   density sigma2 / f (u^2/Hz); its root is the angle or velocity random walk (deg/sqrt(h),
-///   m/s/sqrt(h)) RW   driving density gamma2 f (u^2 Hz); its root is the rate random walk GM   correlation
-///   time 1 / beta (s), driving density 2 beta sigma2, sd sqrt(sigma2) QN   quantization sqrt(q2) / f (u s)
-///   DR   ramp omega f (u/s)
-///   model: bias instability = smallest Allan deviation of the model over the fitted levels / 0.664
+/// - WN: density sigma2 / f (u^2/Hz); its root is the angle or velocity random walk
+///   (deg/sqrt(h), m/s/sqrt(h))
+/// - RW: driving density gamma2 f (u^2 Hz); its root is the rate random walk
+/// - GM: correlation time 1 / beta (s), driving density 2 beta sigma2, sd sqrt(sigma2)
+/// - QN: quantization sqrt(q2) / f (u s)
+/// - DR: ramp omega f (u/s)
+/// - model: bias instability = smallest Allan deviation of the model over the fitted levels / 0.664
+///
 /// Data-sheet names appear with a known unit only.
 std::vector<Quantity> filter_quantities(const FitResult& fit, SignalUnit unit);
 

@@ -6,7 +6,7 @@
 ///   x_{k+1} = F x_k + w_k, w ~ N(0, Q)       y_k = H x_k + v_k, v ~ N(0, R)       x_0 ~ N(0, P0)
 ///
 ///   WN      R = sigma2, no state
-///   QN      x = (e_k, e_{k-1}), y = e_k - e_{k-1}, variance of e = q2 (gmwm.md, section 2)
+///   QN      x = (e_k, e_{k-1}), y = e_k - e_{k-1}, variance of e = q2
 ///   MA1     x = (e_k, e_{k-1}), y = e_k + theta e_{k-1}
 ///   ARMA11  x = (y_k, theta e_k)
 ///   SIN     x = (alpha sin, alpha cos) of a uniform phase: turns by b radians a sample, no noise
