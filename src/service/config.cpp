@@ -51,11 +51,9 @@ void read_white(TomlReader& in, std::optional<double>& sd, std::string_view per_
     in.fail(density_key, fmt::format("says again what {} says", per_sample_key), "keep one of the two");
   }
   in.number(per_sample_key, sd, per_sample_unit, 0.0, 1e6);
-  if (in.has(density_key)) {
-    in.number(density_key, sd, density_unit * std::sqrt(rate_hz), 0.0, 1e9);
-  } else {
-    in.ignore(density_key);
-  }
+  std::optional<double> density;
+  in.number(density_key, density, density_unit * std::sqrt(rate_hz), 0.0, 1e9);
+  if (density) sd = density;
 }
 
 void read_noise(TomlReader in, double rate_hz, ImuNoiseConfig& noise) {
@@ -128,9 +126,21 @@ void read_csv(TomlReader in, CsvConfig& csv) {
   in.finish();
 }
 
+/// A permutation of axes as the configuration writes it.
+std::string axes_text(const std::array<double, 9>& axes) {
+  std::string text = "\"";
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (axes[i] == 0.0) continue;
+    if (text.size() > 1) text += ' ';
+    text += axes[i] > 0.0 ? '+' : '-';
+    text += static_cast<char>('x' + static_cast<char>(i % 3));
+  }
+  return text + '"';
+}
+
 /// "+x -y -z" or three rows of three numbers.
 void read_axes(TomlReader& in, std::array<double, 9>& axes) {
-  const auto* node = in.node("axes");
+  const auto* node = in.node("axes", "three signed axes, or three rows of three numbers", axes_text(axes));
   if (node == nullptr) return;
   std::array<double, 9> read{};
   bool good = false;
@@ -508,7 +518,8 @@ Result<Configuration> load_configuration(const std::filesystem::path& file) {
   return parse_configuration(text.str(), file);
 }
 
-Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name) {
+Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name,
+                                          std::vector<AskedKey>* asked) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
     return usage_error(fmt::format("configuration {} is empty", name.string()), "config/ holds examples");
   }
@@ -526,7 +537,7 @@ Result<Configuration> parse_configuration(const std::string& text, const std::fi
   files.folder = name.parent_path();
   configuration.run_name = name.stem().string();
 
-  TomlProblem problem{name.string(), std::nullopt};
+  TomlProblem problem{name.string(), std::nullopt, asked};
   TomlReader root(&document, "", problem);
   auto run = root.table("run");
   run.text("name", configuration.run_name);

@@ -17,6 +17,8 @@
 
 namespace imuscope {
 
+struct AskedKey;
+
 enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss, kOdometry };
 enum class Protocol : std::uint8_t {
   kXsensMt,
@@ -195,6 +197,8 @@ struct Configuration {
 Result<Configuration> load_configuration(const std::filesystem::path& file);
 
 /// The same for a text that was kept in a capture; `name` stands for the file in messages.
-Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name);
+/// @param asked  receives every key that was asked for (config_reference.h); may be null
+Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name,
+                                          std::vector<AskedKey>* asked = nullptr);
 
 }  // namespace imuscope

@@ -8,6 +8,19 @@
 
 namespace imuscope {
 
+namespace {
+
+std::string in_quotes(std::string_view text) { return fmt::format("\"{}\"", text); }
+
+/// Six digits show every preset, and hide that degrees were kept as radians.
+std::string short_number(double value) { return fmt::format("{:g}", value); }
+
+std::string range(double low, double high) {
+  return fmt::format("{} to {}", short_number(low), short_number(high));
+}
+
+}  // namespace
+
 void TomlProblem::report(const toml::source_region& where, const std::string& what,
                          const std::string& remedy) {
   if (error) return;
@@ -31,17 +44,23 @@ toml::source_region TomlReader::where(std::string_view key) const {
   return table_ != nullptr ? table_->source() : toml::source_region{};
 }
 
-const toml::node* TomlReader::node(std::string_view key) {
+const toml::node* TomlReader::find(std::string_view key) {
   known_.emplace_back(key);
   return table_ != nullptr ? table_->get(key) : nullptr;
+}
+
+const toml::node* TomlReader::node(std::string_view key, const std::string& values,
+                                   const std::string& preset) {
+  if (problem_->asked != nullptr) problem_->asked->push_back({full_name(key), values, preset, false});
+  return find(key);
 }
 
 void TomlReader::fail(std::string_view key, const std::string& what, const std::string& remedy) {
   problem_->report(where(key), fmt::format("{} {}", full_name(key), what), remedy);
 }
 
-void TomlReader::text(std::string_view key, std::string& value) {
-  const auto* found = node(key);
+void TomlReader::read_text(std::string_view key, std::string& value) {
+  const auto* found = find(key);
   if (found == nullptr) return;
   if (const auto read = found->value_exact<std::string>()) {
     value = *read;
@@ -50,8 +69,13 @@ void TomlReader::text(std::string_view key, std::string& value) {
   }
 }
 
+void TomlReader::text(std::string_view key, std::string& value) {
+  (void)node(key, "text", value.empty() ? "" : in_quotes(value));
+  read_text(key, value);
+}
+
 void TomlReader::boolean(std::string_view key, bool& value) {
-  const auto* found = node(key);
+  const auto* found = node(key, "true or false", value ? "true" : "false");
   if (found == nullptr) return;
   if (const auto read = found->value_exact<bool>()) {
     value = *read;
@@ -60,33 +84,42 @@ void TomlReader::boolean(std::string_view key, bool& value) {
   }
 }
 
-void TomlReader::number(std::string_view key, double& value, double unit, double low, double high) {
-  const auto* found = node(key);
-  if (found == nullptr) return;
+bool TomlReader::read_number(std::string_view key, double& value, double unit, double low, double high) {
+  const auto* found = find(key);
+  if (found == nullptr) return false;
   const auto read = found->is_number() ? found->value<double>() : std::nullopt;
   if (!read || !(*read >= low && *read <= high)) {
     fail(key, fmt::format("must be a number from {} to {}", low, high));
-    return;
+    return false;
   }
   value = *read * unit;
+  return true;
+}
+
+void TomlReader::number(std::string_view key, double& value, double unit, double low, double high) {
+  (void)node(key, range(low, high), short_number(value / unit));
+  read_number(key, value, unit, low, high);
 }
 
 void TomlReader::number(std::string_view key, std::optional<double>& value, double unit, double low,
                         double high) {
+  (void)node(key, range(low, high), value ? short_number(*value / unit) : "");
   double read = 0.0;
-  number(key, read, unit, low, high);
-  if (has(key)) value = read;
+  if (read_number(key, read, unit, low, high)) value = read;
 }
 
 void TomlReader::integer(std::string_view key, int& value, int low, int high) {
+  (void)node(key, fmt::format("whole number, {} to {}", low, high), std::to_string(value));
   double read = value;
-  number(key, read, 1.0, low, high);
+  read_number(key, read, 1.0, low, high);
   value = static_cast<int>(read);
   if (static_cast<double>(value) != read) fail(key, "must be a whole number");
 }
 
 void TomlReader::vector(std::string_view key, std::array<double, 3>& value, double unit) {
-  const auto* found = node(key);
+  const auto* found = node(key, "three numbers",
+                           fmt::format("[{}, {}, {}]", short_number(value[0] / unit),
+                                       short_number(value[1] / unit), short_number(value[2] / unit)));
   if (found == nullptr) return;
   const auto* list = found->as_array();
   if (list == nullptr || list->size() != 3 || !list->is_homogeneous() || !(*list)[0].is_number()) {
@@ -97,7 +130,8 @@ void TomlReader::vector(std::string_view key, std::array<double, 3>& value, doub
 }
 
 void TomlReader::texts(std::string_view key, std::array<std::string, 3>& value) {
-  const auto* found = node(key);
+  const auto* found =
+      node(key, "three texts", value[0].empty() ? "" : fmt::format("[\"{}\"]", fmt::join(value, "\", \"")));
   if (found == nullptr) return;
   const auto* list = found->as_array();
   if (list == nullptr || list->size() != 3 || !list->is_homogeneous(toml::node_type::string)) {
@@ -108,7 +142,7 @@ void TomlReader::texts(std::string_view key, std::array<std::string, 3>& value) 
 }
 
 void TomlReader::texts(std::string_view key, std::vector<std::string>& value) {
-  const auto* found = node(key);
+  const auto* found = node(key, "list of texts");
   if (found == nullptr) return;
   const auto* list = found->as_array();
   if (list == nullptr || (!list->empty() && !list->is_homogeneous(toml::node_type::string))) {
@@ -120,7 +154,7 @@ void TomlReader::texts(std::string_view key, std::vector<std::string>& value) {
 }
 
 void TomlReader::numbers(std::string_view key, std::vector<double>& value) {
-  const auto* found = node(key);
+  const auto* found = node(key, "list of numbers");
   if (found == nullptr) return;
   const auto* list = found->as_array();
   value.clear();
@@ -136,37 +170,39 @@ void TomlReader::every_text(std::map<std::string, std::string>& values) {
   if (table_ == nullptr) return;
   for (const auto& [key, value] : *table_) {
     const std::string name(key.str());
-    text(name, values[name]);
+    read_text(name, values[name]);
   }
 }
 
 std::size_t TomlReader::choice(std::string_view key, const std::vector<std::string_view>& words,
                                std::size_t fallback) {
+  const auto* found =
+      node(key, fmt::format("\"{}\"", fmt::join(words, "\", \"")), in_quotes(words[fallback]));
   std::string word;
-  const bool given = has(key);
-  text(key, word);
-  if (!given || problem_->error) return fallback;
-  const auto found = std::find(words.begin(), words.end(), word);
-  if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
+  read_text(key, word);
+  if (found == nullptr || problem_->error) return fallback;
+  const auto named = std::find(words.begin(), words.end(), word);
+  if (named != words.end()) return static_cast<std::size_t>(named - words.begin());
   fail(key, fmt::format("is '{}'", word), fmt::format("valid: {}", fmt::join(words, ", ")));
   return fallback;
 }
 
 TomlReader TomlReader::table(std::string_view key) {
-  const auto* found = node(key);
+  const auto* found = find(key);
   const auto* inner = found != nullptr ? found->as_table() : nullptr;
   if (found != nullptr && inner == nullptr) fail(key, "must be a table");
   return TomlReader(inner, full_name(key), *problem_);
 }
 
 const toml::array* TomlReader::array(std::string_view key) {
-  const auto* found = node(key);
+  const auto* found = find(key);
   const auto* list = found != nullptr ? found->as_array() : nullptr;
   if (found != nullptr && list == nullptr) fail(key, "must be a list");
   return list;
 }
 
 void TomlReader::require(std::string_view key, const std::string& purpose) {
+  if (problem_->asked != nullptr) problem_->asked->push_back({full_name(key), {}, {}, true});
   if (!has(key)) problem_->report(where(key), fmt::format("{} is missing", full_name(key)), purpose);
 }
 

@@ -15,10 +15,19 @@
 
 namespace imuscope {
 
-/// The first problem of one document.
+/// A key that was asked for, whether or not the document has it: what may stand there.
+struct AskedKey {
+  std::string name;    ///< with its tables, such as "device.noise.gyro_bias_sd_degps"
+  std::string values;  ///< "true or false", "0.1 to 2000", "\"a\", \"b\"" ...
+  std::string preset;  ///< what holds without the key, as TOML writes it; empty: nothing in particular
+  bool required = false;
+};
+
+/// What is told of one document: its first problem and, on demand, every key that was asked for.
 struct TomlProblem {
   std::string file;
   std::optional<Error> error;
+  std::vector<AskedKey>* asked = nullptr;
 
   void report(const toml::source_region& where, const std::string& what, const std::string& remedy = {});
 };
@@ -48,7 +57,9 @@ class TomlReader {
   std::size_t choice(std::string_view key, const std::vector<std::string_view>& words, std::size_t fallback);
   [[nodiscard]] TomlReader table(std::string_view key);
   [[nodiscard]] const toml::array* array(std::string_view key);
-  [[nodiscard]] const toml::node* node(std::string_view key);
+  /// @param values, preset  as in AskedKey
+  [[nodiscard]] const toml::node* node(std::string_view key, const std::string& values,
+                                       const std::string& preset = {});
 
   /// Reports that `key` is missing, with what it is for.
   void require(std::string_view key, const std::string& purpose);
@@ -62,6 +73,9 @@ class TomlReader {
   void ignore(std::string_view key) { known_.emplace_back(key); }
 
  private:
+  [[nodiscard]] const toml::node* find(std::string_view key);
+  void read_text(std::string_view key, std::string& value);
+  bool read_number(std::string_view key, double& value, double unit, double low, double high);
   [[nodiscard]] std::string full_name(std::string_view key) const;
   [[nodiscard]] toml::source_region where(std::string_view key) const;
 

@@ -3,6 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <ctime>
 #include <thread>
 
 #include "rt/host_clock.h"
@@ -10,6 +15,12 @@
 
 namespace imuscope {
 namespace {
+
+double processor_time_of_this_thread_s() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
 
 using testing::HasSubstr;
 
@@ -111,20 +122,28 @@ TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection
 TEST(ThreadWatch, KnowsEachThreadsNameSchedulingAndProcessorTime) {
   ThreadWatch watch;
   std::atomic<bool> stop{false};
+  std::atomic<double> busy_s{-1.0};
+  std::atomic<bool> asleep_named{false};
   std::thread busy([&] {
     (void)setup_this_thread({"watch-busy", Scheduling::kIdle, 0, {}});
-    while (!stop.load()) {
-    }
+    while (!stop.load()) busy_s = processor_time_of_this_thread_s();
   });
   std::thread asleep([&] {
     (void)setup_this_thread({"watch-asleep", Scheduling::kNormal, 0, {}});
-    while (!stop.load()) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    asleep_named = true;
+    stop.wait(false);
   });
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  // Until the busy one has had a share of a processor that others may be using, too.
+  const auto wait_for_busy = [&](double until_s) {
+    while (busy_s < until_s || !asleep_named) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  };
+  wait_for_busy(0.0);
   (void)watch.look(host_now());
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  constexpr double kTicks_s = 0.05;  // the kernel counts a thread's time in steps of 10 ms
+  wait_for_busy(busy_s + kTicks_s);
   const auto threads = watch.look(host_now());
   stop.store(true);
+  stop.notify_all();
   busy.join();
   asleep.join();
   const auto named = [&](const std::string& name) {

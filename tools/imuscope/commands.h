@@ -60,6 +60,9 @@ void add_decode(CLI::App& app, Work& chosen);
 /// `imuscope doctor [CONFIG]`
 void add_doctor(CLI::App& app, Work& chosen);
 
+/// `imuscope config [CONFIG]`
+void add_config(CLI::App& app, Work& chosen);
+
 /// `imuscope top`
 void add_top(CLI::App& app, Work& chosen);
 

@@ -40,6 +40,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_probe(app, work);
   imuscope::cli::add_top(app, work);
   imuscope::cli::add_doctor(app, work);
+  imuscope::cli::add_config(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

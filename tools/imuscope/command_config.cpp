@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "commands.h"
+#include "service/config.h"
+#include "service/config_reference.h"
+
+namespace imuscope::cli {
+
+namespace {
+
+/// In a cell of a Markdown table.
+std::string code(const std::string& text) { return fmt::format("`{}`", text); }
+
+void print_reference() {
+  fmt::print(
+      "# Configuration\n\n"
+      "This page is what `imuscope config` prints. Angles are in degrees and times in milliseconds where the "
+      "key says "
+      "so. A key that does not exist is refused with the nearest one that does. "
+      "`config/` holds configurations to begin with; `imuscope config FILE` checks one; `[simulation]` is "
+      "for `imusim` "
+      "alone, and `config/demo.toml` shows it.\n");
+  std::string table;
+  for (const auto& key : configuration_reference()) {
+    const auto dot = key.name.rfind('.');
+    if (key.name.substr(0, dot) != table) {
+      table = key.name.substr(0, dot);
+      fmt::print("\n## `{}`\n\n| key | what it is | values | without it |\n|---|---|---|---|\n",
+                 table == "device" ? "[[device]]" : fmt::format("[{}]", table));
+    }
+    std::vector<std::string> presets;
+    for (const auto& preset : key.presets) presets.push_back(code(preset));
+    if (key.required) presets = {"must be given"};
+    fmt::print("| `{}` | {} | {} | {} |\n", key.name.substr(dot + 1), key.about, key.values,
+               fmt::join(presets, ", "));
+  }
+}
+
+Result<void> check(const std::filesystem::path& file) {
+  const auto configuration = load_configuration(file);
+  if (!configuration) return tl::unexpected<Error>(configuration.error());
+  fmt::print("{}: good, {} devices\n", file.string(), configuration->devices.size());
+  for (const auto& device : configuration->devices) {
+    fmt::print("  {:<12} {:<10} {:<14} {:g} Hz\n", device.name, name_of(device.role),
+               name_of(device.protocol), device.rate_hz);
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_config(CLI::App& app, Work& chosen) {
+  auto* command =
+      app.add_subcommand("config", "Check a configuration, or print what can stand in one (Markdown)");
+  auto file = std::make_shared<std::filesystem::path>();
+  command->add_option("CONFIG", *file,
+                      "Configuration to check; without it, the reference of all keys is printed");
+  on_chosen(*command, chosen, [file]() -> Result<void> {
+    if (!file->empty()) return check(*file);
+    print_reference();
+    return {};
+  });
+}
+
+}  // namespace imuscope::cli
