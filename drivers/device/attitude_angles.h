@@ -78,6 +78,7 @@ struct RollPitchHeading {
 
 /// Into [0, 2 pi).
 [[nodiscard]] inline double to_positive_turn(double angle_rad) noexcept {
+  if (angle_rad >= 0.0 && angle_rad < 2.0 * kPi) return angle_rad;  // as a rule: fmod() is slow
   const double turned = std::fmod(angle_rad, 2.0 * kPi);
   const double positive = turned < 0.0 ? turned + 2.0 * kPi : turned;
   return positive >= 2.0 * kPi ? 0.0 : positive;

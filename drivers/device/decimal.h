@@ -13,14 +13,17 @@
 
 namespace imuscope {
 
+namespace detail {
+inline constexpr auto kPowersOfTen = std::to_array<double>(
+    {1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18});
+}  // namespace detail
+
 /// The whole text as a number; nothing where it is none, or not finite. A leading '+' is allowed.
 [[nodiscard]] inline std::optional<double> read_decimal(std::string_view text) noexcept {
   // Whole numbers below 2^53 and powers of ten up to 10^22 are doubles without rounding, so that their
   // quotient is rounded once (Clinger 1990).
   constexpr std::uint64_t kExactBelow = std::uint64_t{1} << 53U;
   constexpr std::size_t kDigitsMax = 18;
-  constexpr auto kPowers = std::to_array<double>({1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10,
-                                                  1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18});
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   const bool negative = !text.empty() && text.front() == '-';
   std::uint64_t digits = 0;
@@ -40,7 +43,7 @@ namespace imuscope {
     }
   }
   if (plain && n_digits > 0 && digits < kExactBelow) {
-    const double value = static_cast<double>(digits) / kPowers[n_decimals];
+    const double value = static_cast<double>(digits) / detail::kPowersOfTen[n_decimals];
     return negative ? -value : value;
   }
   double value = 0.0;

@@ -74,27 +74,30 @@ Decoder::Type Decoder::type_of(std::string_view name) noexcept {
 
 void Decoder::take(Type type, const Fields& fields) noexcept {
   switch (type) {
-    case Type::kGga:
-      epoch_.gga = parse_gga(fields);
-      // Refers to the sentence, which goes away before the epoch does.
-      epoch_.gga->station = {};
+    case Type::kGga: {
+      const Gga gga{fields};
+      epoch_.position = Position{gga.quality().value_or(0), gga.lat_deg(), gga.lon_deg(), gga.alt_msl_m(),
+                                 gga.geoid_sep_m()};
       break;
+    }
     case Type::kRmc: {
-      const Rmc rmc = parse_rmc(fields);
-      if (rmc.valid) epoch_.rmc = Course{rmc.sog_kn, rmc.cog_deg};
-      if (rmc.date) epoch_.date = rmc.date;
+      const Rmc rmc{fields};
+      if (rmc.valid()) epoch_.rmc = Course{rmc.sog_kn(), rmc.cog_deg()};
+      if (const auto date = rmc.date()) epoch_.date = date;
       break;
     }
     case Type::kVtg: {
-      const Vtg vtg = parse_vtg(fields);
-      epoch_.vtg = Course{vtg.sog_kn, vtg.cog_deg};
+      const Vtg vtg{fields};
+      epoch_.vtg = Course{vtg.sog_kn(), vtg.cog_deg()};
       break;
     }
-    case Type::kGst:
-      epoch_.gst = parse_gst(fields);
+    case Type::kGst: {
+      const Gst gst{fields};
+      epoch_.sd = PositionSd{gst.std_lat_m(), gst.std_lon_m(), gst.std_alt_m()};
       break;
+    }
     case Type::kZda:
-      if (const Zda zda = parse_zda(fields); zda.date) epoch_.date = zda.date;
+      if (const auto date = Zda{fields}.date()) epoch_.date = date;
       break;
     case Type::kNone:
       break;
@@ -106,7 +109,7 @@ void Decoder::on_sentence(const Frame& frame, HostTime arrival, SampleSink& sink
   const Type type = type_of(fields.type());
   if (type == Type::kNone) return;
   if (type != Type::kVtg) {
-    const auto time = time_of(fields);
+    const auto time = fields.time(0);
     if (!time) return;  // a receiver that does not know the time has no solution either
     const std::int64_t tod_ns = from_seconds(time->seconds()).count();
     if (!epoch_.open || tod_ns != epoch_.tod_ns) {
@@ -133,7 +136,7 @@ void Decoder::publish(HostTime arrival, SampleSink& sink) noexcept {
     return;
   }
   update_date();
-  if (!epoch_.gga && !epoch_.rmc && !epoch_.vtg) return;
+  if (!epoch_.position && !epoch_.rmc && !epoch_.vtg) return;
   Sample sample{};
   sample.kind = SampleKind::kGnss;
   sample.device = config_.device;
@@ -189,30 +192,30 @@ std::string_view Decoder::remark() const noexcept {
 }
 
 void Decoder::fill_position(GnssData& gnss) noexcept {
-  if (!epoch_.gga) return;
-  const Gga& gga = *epoch_.gga;
-  gnss.solution = solution_of(gga.quality.value_or(0));
-  const auto separation = gga.geoid_sep_m ? gga.geoid_sep_m : config_.geoid_separation_m;
-  separation_is_missing_ = gga.alt_msl_m && !separation;
-  if (gnss.solution == GnssSolution::kNone || !gga.lat_deg || !gga.lon_deg || !gga.alt_msl_m || !separation) {
+  if (!epoch_.position) return;
+  const Position& position = *epoch_.position;
+  gnss.solution = solution_of(position.quality);
+  const auto separation = position.geoid_sep_m ? position.geoid_sep_m : config_.geoid_separation_m;
+  separation_is_missing_ = position.alt_msl_m && !separation;
+  if (gnss.solution == GnssSolution::kNone || !position.lat_deg || !position.lon_deg || !position.alt_msl_m ||
+      !separation) {
     return;
   }
-  gnss.latitude_rad = *gga.lat_deg * kRadPerDeg;
-  gnss.longitude_rad = *gga.lon_deg * kRadPerDeg;
-  gnss.height_m = *gga.alt_msl_m + *separation;
+  gnss.latitude_rad = *position.lat_deg * kRadPerDeg;
+  gnss.longitude_rad = *position.lon_deg * kRadPerDeg;
+  gnss.height_m = *position.alt_msl_m + *separation;
   gnss.flags |= kPositionValid;
-  if (!epoch_.gst) return;
-  const Gst& gst = *epoch_.gst;
-  if (gst.std_lat_m && gst.std_lon_m && gst.std_alt_m && *gst.std_lat_m > 0.0 && *gst.std_lon_m > 0.0 &&
-      *gst.std_alt_m > 0.0) {
-    gnss.sd_position_m = {*gst.std_lat_m, *gst.std_lon_m, *gst.std_alt_m};
+  if (!epoch_.sd) return;
+  const auto& [lat_m, lon_m, alt_m] = *epoch_.sd;
+  if (lat_m && lon_m && alt_m && *lat_m > 0.0 && *lon_m > 0.0 && *alt_m > 0.0) {
+    gnss.sd_position_m = {*lat_m, *lon_m, *alt_m};
     gnss.flags |= kHasPositionSd;
   }
 }
 
 void Decoder::fill_velocity(GnssData& gnss) const noexcept {
   const auto& course = epoch_.rmc ? epoch_.rmc : epoch_.vtg;
-  if (!course || !course->sog_kn || (epoch_.gga && gnss.solution == GnssSolution::kNone)) return;
+  if (!course || !course->sog_kn || (epoch_.position && gnss.solution == GnssSolution::kNone)) return;
   const double speed_mps = *course->sog_kn * kMpsPerKnot;
   if (course->cog_deg) {
     const double cog_rad = *course->cog_deg * kRadPerDeg;

@@ -57,6 +57,18 @@ class Decoder final : public DeviceDecoder {
     std::optional<double> sog_kn;
     std::optional<double> cog_deg;
   };
+  struct Position {
+    int quality;
+    std::optional<double> lat_deg;
+    std::optional<double> lon_deg;
+    std::optional<double> alt_msl_m;
+    std::optional<double> geoid_sep_m;
+  };
+  struct PositionSd {
+    std::optional<double> lat_m;
+    std::optional<double> lon_m;
+    std::optional<double> alt_m;
+  };
   struct Epoch {
     bool open = false;
     bool published = false;
@@ -64,10 +76,10 @@ class Decoder final : public DeviceDecoder {
     HostTime first_byte{};
     std::uint64_t bytes = 0;
     Type last = Type::kNone;
-    std::optional<Gga> gga;
+    std::optional<Position> position;
     std::optional<Course> rmc;
     std::optional<Course> vtg;
-    std::optional<Gst> gst;
+    std::optional<PositionSd> sd;
     std::optional<Date> date;
   };
 

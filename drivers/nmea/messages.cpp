@@ -1,24 +1,33 @@
 #include "drivers/nmea/messages.h"
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 
 #include "drivers/device/decimal.h"
 
 namespace imuscope::nmea {
 namespace {
 
+/// The two characters from `at` on as a number; -1 where they are not two digits.
+int two_digits(std::string_view text, std::size_t at) noexcept {
+  const auto tens = static_cast<unsigned>(text[at] - '0');
+  const auto ones = static_cast<unsigned>(text[at + 1] - '0');
+  return tens < 10 && ones < 10 ? static_cast<int>(10 * tens + ones) : -1;
+}
+
 std::optional<TimeOfDay> to_time(std::string_view text) noexcept {
   if (text.size() < 6) return std::nullopt;
-  const auto hour = read_integer<int>(text.substr(0, 2));
-  const auto minute = read_integer<int>(text.substr(2, 2));
+  const int hour = two_digits(text, 0);
+  const int minute = two_digits(text, 2);
   const auto second = read_decimal(text.substr(4));
-  if (!hour || !minute || !second) return std::nullopt;
+  if (!second) return std::nullopt;
   const bool possible =
-      *hour >= 0 && *hour < 24 && *minute >= 0 && *minute < 60 && *second >= 0.0 && *second < 61.0;
+      hour >= 0 && hour < 24 && minute >= 0 && minute < 60 && *second >= 0.0 && *second < 61.0;
   if (!possible) return std::nullopt;
-  return TimeOfDay{*hour, *minute, *second};
+  return TimeOfDay{hour, minute, *second};
 }
 
 /// ddmm.mmmm or dddmm.mmmm: the minutes begin two digits before the point.
@@ -46,11 +55,29 @@ constexpr int kFirstTwoDigitYear = 80;
 
 std::optional<Date> to_date(std::string_view text) noexcept {
   if (text.size() != 6) return std::nullopt;
-  const auto day = read_integer<int>(text.substr(0, 2));
-  const auto month = read_integer<int>(text.substr(2, 2));
-  const auto year = read_integer<int>(text.substr(4, 2));
-  if (!day || !month || !year) return std::nullopt;
-  return Date{*year < kFirstTwoDigitYear ? 2000 + *year : 1900 + *year, *month, *day};
+  const int day = two_digits(text, 0);
+  const int month = two_digits(text, 2);
+  const int year = two_digits(text, 4);
+  if (day < 0 || month < 0 || year < 0) return std::nullopt;
+  return Date{year < kFirstTwoDigitYear ? 2000 + year : 1900 + year, month, day};
+}
+
+constexpr std::size_t kWord = sizeof(std::uint64_t);
+
+/// Eight characters at once: bit 8 i + 7 is set where character i is a comma (the exact search for a zero
+/// byte, Warren, Hacker's Delight, 6-1).
+std::uint64_t commas(std::string_view text) noexcept {
+  constexpr std::uint64_t kEveryByte = 0x0101010101010101ULL;
+  constexpr std::uint64_t kLow = 0x7F * kEveryByte;
+  std::uint64_t word = 0;
+  if (text.size() == kWord) {
+    std::memcpy(&word, text.data(), kWord);
+  } else {
+    std::memcpy(&word, text.data(), text.size());
+  }
+  if constexpr (std::endian::native == std::endian::big) word = __builtin_bswap64(word);
+  word ^= static_cast<std::uint64_t>(',') * kEveryByte;
+  return ~(((word & kLow) + kLow) | word | kLow);
 }
 
 void put_digits(detail::ShortText& text, int value, int digits) noexcept {
@@ -63,87 +90,39 @@ void put_digits(detail::ShortText& text, int value, int digits) noexcept {
 
 }  // namespace
 
-Fields::Fields(std::string_view sentence) noexcept {
-  const char* at = sentence.data() + 1;
-  const char* end = sentence.data() + sentence.size();
-  const char* begin = at;
-  bool in_address = true;
-  const auto close = [&] {
-    const std::string_view cell(begin, static_cast<std::size_t>(at - begin));
-    if (in_address) {
-      address_ = cell;
-    } else if (size_ < kMax) {
-      fields_[size_++] = cell;
+Fields::Fields(std::string_view sentence) noexcept : sentence_(sentence) {
+  std::size_t n = 0;  // commas; the address stands before the first one
+  const std::size_t end = std::min(sentence.rfind('*'), sentence.size());
+  for (std::size_t at = 0; at < end; at += kWord) {
+    for (std::uint64_t marks = commas(sentence.substr(at, std::min(kWord, end - at))); marks != 0;
+         marks &= marks - 1) {
+      begin_[n] = static_cast<std::uint16_t>(at + static_cast<std::size_t>(std::countr_zero(marks)) / 8 + 1);
+      n += n <= kMax ? 1 : 0;
     }
-    in_address = false;
-  };
-  for (; at < end && *at != '*'; ++at) {
-    if (*at != ',') continue;
-    close();
-    begin = at + 1;
   }
-  close();
+  begin_[n] = static_cast<std::uint16_t>(end + 1);
+  size_ = std::min(n, kMax);
+  address_ = sentence.substr(1, begin_[0] - 2U);
   constexpr std::size_t kTalkerAndType = 5;
   if (address_ == "PASHR") {
     type_ = address_;
   } else if (address_ == "PIXSE" && size_ > 0) {
-    type_ = {address_.data(), address_.size() + 1 + fields_[0].size()};
+    type_ = {address_.data(), address_.size() + 1 + this->at(0).size()};
   } else if (address_.size() == kTalkerAndType && address_[0] != 'P') {
     type_ = address_.substr(2);
   }
 }
 
 std::string_view Fields::at(std::size_t index) const noexcept {
-  return index < size_ ? fields_[index] : std::string_view{};
+  if (index >= size_) return {};
+  return {sentence_.data() + begin_[index], begin_[index + 1] - begin_[index] - 1U};
 }
 std::optional<double> Fields::number(std::size_t index) const noexcept { return read_decimal(at(index)); }
 std::optional<int> Fields::integer(std::size_t index) const noexcept { return read_integer<int>(at(index)); }
-
-std::optional<TimeOfDay> time_of(const Fields& f) noexcept { return to_time(f.at(0)); }
-
-Gga parse_gga(const Fields& f) noexcept {
-  return {to_time(f.at(0)),
-          to_degrees(f.at(1), f.at(2)),
-          to_degrees(f.at(3), f.at(4)),
-          f.integer(5),
-          f.integer(6),
-          f.number(7),
-          f.number(8),
-          f.number(10),
-          f.number(12),
-          f.at(13)};
-}
-
-Rmc parse_rmc(const Fields& f) noexcept {
-  return {to_time(f.at(0)),
-          f.at(1) == "A",
-          to_degrees(f.at(2), f.at(3)),
-          to_degrees(f.at(4), f.at(5)),
-          f.number(6),
-          f.number(7),
-          to_date(f.at(8)),
-          f.at(11)};
-}
-
-Vtg parse_vtg(const Fields& f) noexcept { return {f.number(0), f.number(4), f.number(6)}; }
-
-Gst parse_gst(const Fields& f) noexcept {
-  return {to_time(f.at(0)), f.number(1), f.number(2), f.number(3),
-          f.number(4),      f.number(5), f.number(6), f.number(7)};
-}
-
-Zda parse_zda(const Fields& f) noexcept {
-  Zda zda{to_time(f.at(0)), std::nullopt, f.integer(4), f.integer(5)};
-  const auto day = f.integer(1), month = f.integer(2), year = f.integer(3);
-  if (day && month && year) zda.date = Date{*year, *month, *day};
-  return zda;
-}
-
-Hdt parse_hdt(const Fields& f) noexcept { return {f.number(0)}; }
-
-Pashr parse_pashr(const Fields& f) noexcept {
-  return {to_time(f.at(0)), f.number(1), f.number(3), f.number(4),  f.number(5),
-          f.number(6),      f.number(7), f.number(8), f.integer(9), f.integer(10)};
+std::optional<TimeOfDay> Fields::time(std::size_t index) const noexcept { return to_time(at(index)); }
+std::optional<Date> Fields::date(std::size_t index) const noexcept { return to_date(at(index)); }
+std::optional<double> Fields::degrees(std::size_t index) const noexcept {
+  return to_degrees(at(index), at(index + 1));
 }
 
 namespace detail {

@@ -10,6 +10,19 @@
 
 namespace imuscope::nmea {
 
+/// hhmmss.sss; seconds may be 60 in a leap second.
+struct TimeOfDay {
+  int hour;
+  int minute;
+  double second;
+  [[nodiscard]] double seconds() const noexcept { return 3600.0 * hour + 60.0 * minute + second; }
+};
+struct Date {
+  int year;
+  int month;
+  int day;
+};
+
 /// A sentence cut at its commas. Refers to the sentence's text.
 class Fields {
  public:
@@ -25,98 +38,93 @@ class Fields {
   [[nodiscard]] std::string_view at(std::size_t index) const noexcept;
   [[nodiscard]] std::optional<double> number(std::size_t index) const noexcept;
   [[nodiscard]] std::optional<int> integer(std::size_t index) const noexcept;
+  /// hhmmss.sss
+  [[nodiscard]] std::optional<TimeOfDay> time(std::size_t index) const noexcept;
+  /// ddmmyy
+  [[nodiscard]] std::optional<Date> date(std::size_t index) const noexcept;
+  /// ddmm.mmmm or dddmm.mmmm, and the hemisphere in the field behind it.
+  [[nodiscard]] std::optional<double> degrees(std::size_t index) const noexcept;
 
  private:
   static constexpr std::size_t kMax = 40;
+  std::string_view sentence_;
   std::string_view address_;
   std::string_view type_;
-  std::array<std::string_view, kMax> fields_;
+  /// Field i is from begin_[i] to the comma before begin_[i + 1]; the last place takes what is too much.
+  std::array<std::uint16_t, kMax + 2> begin_;
   std::size_t size_ = 0;
 };
 
-/// hhmmss.sss; seconds may be 60 in a leap second.
-struct TimeOfDay {
-  int hour;
-  int minute;
-  double second;
-  [[nodiscard]] double seconds() const noexcept { return 3600.0 * hour + 60.0 * minute + second; }
-};
-struct Date {
-  int year;
-  int month;
-  int day;
-};
-
+/// The sentences, as views: a field is read when it is asked for. They refer to the Fields.
 struct Gga {
-  std::optional<TimeOfDay> time;
-  std::optional<double> lat_deg;
-  std::optional<double> lon_deg;
-  std::optional<int> quality;
-  std::optional<int> nsat;
-  std::optional<double> hdop;
-  std::optional<double> alt_msl_m;
-  std::optional<double> geoid_sep_m;
-  std::optional<double> age_s;
-  std::string_view station;
+  const Fields& fields;
+  [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
+  [[nodiscard]] std::optional<double> lat_deg() const noexcept { return fields.degrees(1); }
+  [[nodiscard]] std::optional<double> lon_deg() const noexcept { return fields.degrees(3); }
+  [[nodiscard]] std::optional<int> quality() const noexcept { return fields.integer(5); }
+  [[nodiscard]] std::optional<int> nsat() const noexcept { return fields.integer(6); }
+  [[nodiscard]] std::optional<double> hdop() const noexcept { return fields.number(7); }
+  [[nodiscard]] std::optional<double> alt_msl_m() const noexcept { return fields.number(8); }
+  [[nodiscard]] std::optional<double> geoid_sep_m() const noexcept { return fields.number(10); }
+  [[nodiscard]] std::optional<double> age_s() const noexcept { return fields.number(12); }
+  [[nodiscard]] std::string_view station() const noexcept { return fields.at(13); }
 };
 struct Rmc {
-  std::optional<TimeOfDay> time;
-  bool valid;
-  std::optional<double> lat_deg;
-  std::optional<double> lon_deg;
-  std::optional<double> sog_kn;
-  std::optional<double> cog_deg;
-  std::optional<Date> date;
-  std::string_view mode;
+  const Fields& fields;
+  [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
+  [[nodiscard]] bool valid() const noexcept { return fields.at(1) == "A"; }
+  [[nodiscard]] std::optional<double> lat_deg() const noexcept { return fields.degrees(2); }
+  [[nodiscard]] std::optional<double> lon_deg() const noexcept { return fields.degrees(4); }
+  [[nodiscard]] std::optional<double> sog_kn() const noexcept { return fields.number(6); }
+  [[nodiscard]] std::optional<double> cog_deg() const noexcept { return fields.number(7); }
+  [[nodiscard]] std::optional<Date> date() const noexcept { return fields.date(8); }
+  [[nodiscard]] std::string_view mode() const noexcept { return fields.at(11); }
 };
 struct Vtg {
-  std::optional<double> cog_deg;
-  std::optional<double> sog_kn;
-  std::optional<double> sog_kmh;
+  const Fields& fields;
+  [[nodiscard]] std::optional<double> cog_deg() const noexcept { return fields.number(0); }
+  [[nodiscard]] std::optional<double> sog_kn() const noexcept { return fields.number(4); }
+  [[nodiscard]] std::optional<double> sog_kmh() const noexcept { return fields.number(6); }
 };
 struct Gst {
-  std::optional<TimeOfDay> time;
-  std::optional<double> rms;
-  std::optional<double> semi_major_m;
-  std::optional<double> semi_minor_m;
-  std::optional<double> orient_deg;
-  std::optional<double> std_lat_m;
-  std::optional<double> std_lon_m;
-  std::optional<double> std_alt_m;
+  const Fields& fields;
+  [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
+  [[nodiscard]] std::optional<double> rms() const noexcept { return fields.number(1); }
+  [[nodiscard]] std::optional<double> semi_major_m() const noexcept { return fields.number(2); }
+  [[nodiscard]] std::optional<double> semi_minor_m() const noexcept { return fields.number(3); }
+  [[nodiscard]] std::optional<double> orient_deg() const noexcept { return fields.number(4); }
+  [[nodiscard]] std::optional<double> std_lat_m() const noexcept { return fields.number(5); }
+  [[nodiscard]] std::optional<double> std_lon_m() const noexcept { return fields.number(6); }
+  [[nodiscard]] std::optional<double> std_alt_m() const noexcept { return fields.number(7); }
 };
 struct Zda {
-  std::optional<TimeOfDay> time;
-  std::optional<Date> date;
-  std::optional<int> tz_h;
-  std::optional<int> tz_min;
+  const Fields& fields;
+  [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
+  [[nodiscard]] std::optional<Date> date() const noexcept {
+    const auto day = fields.integer(1), month = fields.integer(2), year = fields.integer(3);
+    return day && month && year ? std::optional(Date{*year, *month, *day}) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<int> tz_h() const noexcept { return fields.integer(4); }
+  [[nodiscard]] std::optional<int> tz_min() const noexcept { return fields.integer(5); }
 };
 struct Hdt {
-  std::optional<double> heading_deg;
+  const Fields& fields;
+  [[nodiscard]] std::optional<double> heading_deg() const noexcept { return fields.number(0); }
 };
 /// Signs of roll and pitch are by maker.
 struct Pashr {
-  std::optional<TimeOfDay> time;
-  std::optional<double> heading_deg;
-  std::optional<double> roll_deg;
-  std::optional<double> pitch_deg;
-  std::optional<double> heave_m;
-  std::optional<double> roll_std;
-  std::optional<double> pitch_std;
-  std::optional<double> heading_std;
-  std::optional<int> gps_quality;
-  std::optional<int> ins_quality;
+  const Fields& fields;
+  [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
+  [[nodiscard]] std::optional<double> heading_deg() const noexcept { return fields.number(1); }
+  [[nodiscard]] std::optional<double> roll_deg() const noexcept { return fields.number(3); }
+  [[nodiscard]] std::optional<double> pitch_deg() const noexcept { return fields.number(4); }
+  [[nodiscard]] std::optional<double> heave_m() const noexcept { return fields.number(5); }
+  [[nodiscard]] std::optional<double> roll_std() const noexcept { return fields.number(6); }
+  [[nodiscard]] std::optional<double> pitch_std() const noexcept { return fields.number(7); }
+  [[nodiscard]] std::optional<double> heading_std() const noexcept { return fields.number(8); }
+  [[nodiscard]] std::optional<int> gps_quality() const noexcept { return fields.integer(9); }
+  [[nodiscard]] std::optional<int> ins_quality() const noexcept { return fields.integer(10); }
 };
-
-/// Time of the epoch that the sentence belongs to: the first field of GGA, RMC, GST and ZDA.
-[[nodiscard]] std::optional<TimeOfDay> time_of(const Fields& fields) noexcept;
-
-[[nodiscard]] Gga parse_gga(const Fields& fields) noexcept;
-[[nodiscard]] Rmc parse_rmc(const Fields& fields) noexcept;
-[[nodiscard]] Vtg parse_vtg(const Fields& fields) noexcept;
-[[nodiscard]] Gst parse_gst(const Fields& fields) noexcept;
-[[nodiscard]] Zda parse_zda(const Fields& fields) noexcept;
-[[nodiscard]] Hdt parse_hdt(const Fields& fields) noexcept;
-[[nodiscard]] Pashr parse_pashr(const Fields& fields) noexcept;
 
 inline constexpr double kMpsPerKnot = 1852.0 / 3600.0;
 
@@ -209,38 +217,39 @@ void for_each_field(const Fields& fields, Visit&& visit) {
   };
   const std::string_view type = fields.type();
   if (type == "GGA") {
-    const Gga gga = parse_gga(fields);
-    stamp("hms", gga.time), real("lat_deg", gga.lat_deg), real("lon_deg", gga.lon_deg);
-    integer("quality", gga.quality), integer("nsat", gga.nsat), real("hdop", gga.hdop);
-    real("alt_msl_m", gga.alt_msl_m), real("geoid_sep_m", gga.geoid_sep_m);
-    if (gga.alt_msl_m && gga.geoid_sep_m) real("h_ellipsoid_m", *gga.alt_msl_m + *gga.geoid_sep_m);
-    real("age_s", gga.age_s), text("station", gga.station);
+    const Gga gga = Gga{fields};
+    stamp("hms", gga.time()), real("lat_deg", gga.lat_deg()), real("lon_deg", gga.lon_deg());
+    integer("quality", gga.quality()), integer("nsat", gga.nsat()), real("hdop", gga.hdop());
+    real("alt_msl_m", gga.alt_msl_m()), real("geoid_sep_m", gga.geoid_sep_m());
+    if (gga.alt_msl_m() && gga.geoid_sep_m()) real("h_ellipsoid_m", *gga.alt_msl_m() + *gga.geoid_sep_m());
+    real("age_s", gga.age_s()), text("station", gga.station());
   } else if (type == "RMC") {
-    const Rmc rmc = parse_rmc(fields);
-    stamp("hms", rmc.time), visit(NamedValue{"valid", Kind::kBool, rmc.valid ? 1.0 : 0.0, {}});
-    real("lat_deg", rmc.lat_deg), real("lon_deg", rmc.lon_deg), real("sog_kn", rmc.sog_kn);
-    if (rmc.sog_kn) real("sog_ms", *rmc.sog_kn * kMpsPerKnot);
-    real("cog_deg", rmc.cog_deg), stamp("date", rmc.date), text("mode", rmc.mode);
+    const Rmc rmc = Rmc{fields};
+    stamp("hms", rmc.time()), visit(NamedValue{"valid", Kind::kBool, rmc.valid() ? 1.0 : 0.0, {}});
+    real("lat_deg", rmc.lat_deg()), real("lon_deg", rmc.lon_deg()), real("sog_kn", rmc.sog_kn());
+    if (rmc.sog_kn()) real("sog_ms", *rmc.sog_kn() * kMpsPerKnot);
+    real("cog_deg", rmc.cog_deg()), stamp("date", rmc.date()), text("mode", rmc.mode());
   } else if (type == "VTG") {
-    const Vtg vtg = parse_vtg(fields);
-    real("cog_deg", vtg.cog_deg), real("sog_kn", vtg.sog_kn), real("sog_kmh", vtg.sog_kmh);
+    const Vtg vtg = Vtg{fields};
+    real("cog_deg", vtg.cog_deg()), real("sog_kn", vtg.sog_kn()), real("sog_kmh", vtg.sog_kmh());
   } else if (type == "GST") {
-    const Gst gst = parse_gst(fields);
-    stamp("hms", gst.time), real("rms", gst.rms), real("semi_major_m", gst.semi_major_m);
-    real("semi_minor_m", gst.semi_minor_m), real("orient_deg", gst.orient_deg);
-    real("std_lat_m", gst.std_lat_m), real("std_lon_m", gst.std_lon_m), real("std_alt_m", gst.std_alt_m);
+    const Gst gst = Gst{fields};
+    stamp("hms", gst.time()), real("rms", gst.rms()), real("semi_major_m", gst.semi_major_m());
+    real("semi_minor_m", gst.semi_minor_m()), real("orient_deg", gst.orient_deg());
+    real("std_lat_m", gst.std_lat_m()), real("std_lon_m", gst.std_lon_m()),
+        real("std_alt_m", gst.std_alt_m());
   } else if (type == "ZDA") {
-    const Zda zda = parse_zda(fields);
-    stamp("hms", zda.time), stamp("date", zda.date), integer("tz_h", zda.tz_h);
-    integer("tz_min", zda.tz_min);
+    const Zda zda = Zda{fields};
+    stamp("hms", zda.time()), stamp("date", zda.date()), integer("tz_h", zda.tz_h());
+    integer("tz_min", zda.tz_min());
   } else if (type == "HDT") {
-    real("heading_deg", parse_hdt(fields).heading_deg);
+    real("heading_deg", Hdt{fields}.heading_deg());
   } else if (type == "PASHR") {
-    const Pashr p = parse_pashr(fields);
-    stamp("hms", p.time), real("heading_deg", p.heading_deg), real("roll_deg", p.roll_deg);
-    real("pitch_deg", p.pitch_deg), real("heave_m", p.heave_m), real("roll_std", p.roll_std);
-    real("pitch_std", p.pitch_std), real("heading_std", p.heading_std);
-    integer("gps_quality", p.gps_quality), integer("ins_quality", p.ins_quality);
+    const Pashr p = Pashr{fields};
+    stamp("hms", p.time()), real("heading_deg", p.heading_deg()), real("roll_deg", p.roll_deg());
+    real("pitch_deg", p.pitch_deg()), real("heave_m", p.heave_m()), real("roll_std", p.roll_std());
+    real("pitch_std", p.pitch_std()), real("heading_std", p.heading_std());
+    integer("gps_quality", p.gps_quality()), integer("ins_quality", p.ins_quality());
   } else if (type.starts_with("PIXSE,")) {
     detail::for_each_phins_field(fields, visit);
   }

@@ -25,18 +25,6 @@ constexpr int kSourceGone = 100;
 /// Code of the error message.
 constexpr std::uint8_t kOutputBufferOverflow = 1;
 
-/// Axes that the status word calls clipped.
-std::uint32_t clip_flags(std::uint32_t status_word) noexcept {
-  constexpr std::array<ImuFlag, 3> kAccel{kAccelClipX, kAccelClipY, kAccelClipZ};
-  constexpr std::array<ImuFlag, 3> kGyro{kGyroClipX, kGyroClipY, kGyroClipZ};
-  std::uint32_t flags = 0;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    if ((status_word >> (xsens::kStatusAccelClipBit + axis) & 1U) != 0) flags |= kAccel[axis];
-    if ((status_word >> (xsens::kStatusGyroClipBit + axis) & 1U) != 0) flags |= kGyro[axis];
-  }
-  return flags;
-}
-
 constexpr std::size_t at(Item item) noexcept { return static_cast<std::size_t>(item); }
 
 }  // namespace
@@ -244,7 +232,7 @@ bool Decoder::choose_source() noexcept {
 }
 
 bool Decoder::fill(const Instant& now, ImuData& imu) noexcept {
-  imu.flags = kGyroValid | kAccelValid | (group_.status_word ? clip_flags(*group_.status_word) : 0U);
+  imu.flags = kGyroValid | kAccelValid | (group_.status_word ? xsens::clip_flags(*group_.status_word) : 0U);
   const auto per_second = [&now](Triad v) {
     for (double& value : v) value /= now.dt_s;
     return v;

@@ -27,17 +27,6 @@ std::uint64_t fingerprint_of(std::span<const std::uint8_t> data) {
   return hash;
 }
 
-std::uint32_t clip_flags(std::uint32_t status_word) {
-  constexpr std::array<ImuFlag, 3> kAccel{kAccelClipX, kAccelClipY, kAccelClipZ};
-  constexpr std::array<ImuFlag, 3> kGyro{kGyroClipX, kGyroClipY, kGyroClipZ};
-  std::uint32_t flags = 0;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    if ((status_word >> (kStatusAccelClipBit + axis) & 1U) != 0) flags |= kAccel[axis];
-    if ((status_word >> (kStatusGyroClipBit + axis) & 1U) != 0) flags |= kGyro[axis];
-  }
-  return flags;
-}
-
 UnwrapConfig counter_config(double counts_per_s, const ClockMapConfig& clock) {
   return {kCounterModulus, 0, counts_per_s, clock.mode == ClockMapConfig::Mode::kOnline};
 }

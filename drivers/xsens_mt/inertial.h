@@ -59,6 +59,15 @@ struct InertialMessage {
 /// device refers it to magnetic or to true north is not in its data.
 [[nodiscard]] AttitudeData attitude_of(const Matrix3& C_s_l, LocalFrame frame, const Matrix3& axes) noexcept;
 
+/// ImuFlag bits of the axes that a status word calls clipped.
+[[nodiscard]] constexpr std::uint32_t clip_flags(std::uint32_t status_word) noexcept {
+  constexpr std::uint32_t kAxes = 0x7;  // x, y, z stand side by side in both
+  static_assert(kAccelClipY == 2U * kAccelClipX && kAccelClipZ == 4U * kAccelClipX);
+  static_assert(kGyroClipY == 2U * kGyroClipX && kGyroClipZ == 4U * kGyroClipX);
+  return (status_word >> kStatusAccelClipBit & kAxes) * kAccelClipX |
+         (status_word >> kStatusGyroClipBit & kAxes) * kGyroClipX;
+}
+
 /// Rotation vector of a rotation.
 [[nodiscard]] std::array<double, 3> rotation_vector(const std::array<double, 4>& q) noexcept;
 

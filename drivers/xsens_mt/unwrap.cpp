@@ -20,7 +20,8 @@ constexpr double kLongestGap_s = 600.0;
 
 }  // namespace
 
-CountUnwrapper::CountUnwrapper(const UnwrapConfig& config) noexcept : config_(config) {
+CountUnwrapper::CountUnwrapper(const UnwrapConfig& config) noexcept
+    : config_(config), s_per_count_(1.0 / config.counts_per_s) {
   IMUSCOPE_EXPECTS(config.modulus > 0 && config.counts_per_s > 0.0);
 }
 
@@ -50,7 +51,7 @@ CountStep CountUnwrapper::take(std::int64_t raw, HostTime arrival) noexcept {
   if (unexplained >= 0.5 * modulus) {
     step += static_cast<std::int64_t>(std::floor(unexplained / modulus + 0.5)) * config_.modulus;
   }
-  const double step_s = static_cast<double>(step) / config_.counts_per_s;
+  const double step_s = static_cast<double>(step) * s_per_count_;
   if (step_s > most_s + kAheadAllowance_s + kRateAllowance * elapsed_s) return suspect(raw, arrival);
 
   suspected_ = false;

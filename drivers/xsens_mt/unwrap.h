@@ -38,7 +38,10 @@ class CountUnwrapper {
   /// Counts since the count before; meaningful after kForward.
   [[nodiscard]] std::int64_t step() const noexcept { return step_; }
 
-  void set_rate(double counts_per_s) noexcept { config_.counts_per_s = counts_per_s; }
+  void set_rate(double counts_per_s) noexcept {
+    config_.counts_per_s = counts_per_s;
+    s_per_count_ = 1.0 / counts_per_s;
+  }
 
  private:
   [[nodiscard]] std::int64_t smallest_step(std::int64_t raw) const noexcept;
@@ -46,6 +49,7 @@ class CountUnwrapper {
   void accept(std::int64_t raw, HostTime arrival, std::int64_t step) noexcept;
 
   UnwrapConfig config_;
+  double s_per_count_;
   bool has_last_ = false;
   std::int64_t raw_ = 0;
   std::int64_t count_ = 0;

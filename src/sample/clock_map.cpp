@@ -40,10 +40,67 @@ constexpr double kSlowest = 0.5;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
+// Nearest nanosecond; from_seconds() without the library call, as this runs for every sample.
+Duration duration(double value_s) {
+  return Duration{static_cast<std::int64_t>(value_s * 1e9 + std::copysign(0.5, value_s))};
+}
+
 }  // namespace
 
 ClockMap::ClockMap(const ClockMapConfig& config) noexcept : config_(config) {
   IMUSCOPE_EXPECTS(config.rate_ratio > 0.9 && config.rate_ratio < 1.1);
+}
+
+// Inline: what runs for every sample.
+inline void ClockMap::move_line(const Line& line, double x_s) noexcept {
+  correction_s_ += line_.at(x_s) - line.at(x_s);
+  line_ = line;
+}
+
+inline bool ClockMap::jumped(double x_s, double residual_s) noexcept {
+  const double unseen_s = x_s - seconds(last_device_ns_ - device_origin_ns_);
+  const bool early = x_s > kSettled_s && residual_s < -(kEarlyAllowance_s + kRateAllowance * unseen_s);
+  early_in_a_row_ = early ? early_in_a_row_ + 1 : 0;
+  if (early_in_a_row_ >= kEarlyToRestart) return true;
+  if (residual_s < kLate_s) {
+    late_ = false;
+    return false;
+  }
+  if (!late_) late_since_s_ = x_s;
+  late_ = true;
+  return x_s - late_since_s_ > kLateToRestart_s;
+}
+
+inline void ClockMap::take(const Point& point) noexcept {
+  if (point.x_s - open_bin_start_s_ >= kBin_s) {
+    close_bin();
+    refit();
+    open_bin_start_s_ = kBin_s * std::floor(point.x_s / kBin_s);
+  }
+  const double residual_s = point.y_s - line_.at(point.x_s);
+  if (open_bin_empty_ || residual_s < open_bin_.y_s - line_.at(open_bin_.x_s)) open_bin_ = point;
+  open_bin_empty_ = false;
+  // The envelope never lies above an observation.
+  if (residual_s < 0.0) move_line({line_.a_s + residual_s, line_.b}, point.x_s);
+}
+
+inline HostTime ClockMap::emit(std::int64_t device_time_ns, double x_s) noexcept {
+  if (has_last_ && device_time_ns == last_device_ns_) return last_mapped_;
+  const bool continues = has_last_ && device_time_ns > last_device_ns_;
+  const double step_s = continues ? seconds(device_time_ns - last_device_ns_) : 0.0;
+  const double tau_s = std::clamp(kCorrectionPerAge * x_s, kCorrectionMin_s, kCorrectionMax_s);
+  correction_s_ *= tau_s / (tau_s + step_s);
+
+  const Duration since_origin{device_time_ns - device_origin_ns_};
+  HostTime mapped = host_origin_ + since_origin + duration(line_.at(x_s) + correction_s_);
+  if (has_last_) {
+    const HostTime floor = last_mapped_ + std::max(Duration{1}, duration(kSlowest * step_s));
+    mapped = std::max(mapped, floor);
+  }
+  has_last_ = true;
+  last_device_ns_ = device_time_ns;
+  last_mapped_ = mapped;
+  return mapped;
 }
 
 HostTime ClockMap::observe(std::int64_t device_time_ns, HostTime first_byte) noexcept {
@@ -55,16 +112,15 @@ HostTime ClockMap::observe(std::int64_t device_time_ns, HostTime first_byte) noe
   if (in_segment_ && device_time_ns < last_device_ns_) restart();
   if (!in_segment_) begin_segment(device_time_ns, first_byte);
 
-  const double x_s = seconds(device_time_ns - device_origin_ns_);
-  const Point point{x_s, seconds((first_byte - host_origin_).count() - (device_time_ns - device_origin_ns_))};
-  if (jumped(x_s, point.y_s - line_.at(x_s))) {
+  const std::int64_t since_origin_ns = device_time_ns - device_origin_ns_;
+  Point point{seconds(since_origin_ns), seconds((first_byte - host_origin_).count() - since_origin_ns)};
+  if (jumped(point.x_s, point.y_s - line_.at(point.x_s))) {
     restart();
     begin_segment(device_time_ns, first_byte);
-    take({0.0, 0.0});
-    return emit(device_time_ns, 0.0);
+    point = {0.0, 0.0};
   }
   if (early_in_a_row_ == 0) take(point);
-  return emit(device_time_ns, x_s);
+  return emit(device_time_ns, point.x_s);
 }
 
 void ClockMap::restart() noexcept {
@@ -87,33 +143,6 @@ void ClockMap::begin_segment(std::int64_t device_time_ns, HostTime first_byte) n
   open_bin_empty_ = true;
   early_in_a_row_ = 0;
   late_ = false;
-}
-
-bool ClockMap::jumped(double x_s, double residual_s) noexcept {
-  const double unseen_s = x_s - seconds(last_device_ns_ - device_origin_ns_);
-  const bool early = x_s > kSettled_s && residual_s < -(kEarlyAllowance_s + kRateAllowance * unseen_s);
-  early_in_a_row_ = early ? early_in_a_row_ + 1 : 0;
-  if (early_in_a_row_ >= kEarlyToRestart) return true;
-  if (residual_s < kLate_s) {
-    late_ = false;
-    return false;
-  }
-  if (!late_) late_since_s_ = x_s;
-  late_ = true;
-  return x_s - late_since_s_ > kLateToRestart_s;
-}
-
-void ClockMap::take(const Point& point) noexcept {
-  if (point.x_s - open_bin_start_s_ >= kBin_s) {
-    close_bin();
-    refit();
-    open_bin_start_s_ = kBin_s * std::floor(point.x_s / kBin_s);
-  }
-  const double residual_s = point.y_s - line_.at(point.x_s);
-  if (open_bin_empty_ || residual_s < open_bin_.y_s - line_.at(open_bin_.x_s)) open_bin_ = point;
-  open_bin_empty_ = false;
-  // The envelope never lies above an observation.
-  if (residual_s < 0.0) move_line({line_.a_s + residual_s, line_.b}, point.x_s);
 }
 
 void ClockMap::close_bin() noexcept {
@@ -192,30 +221,6 @@ double ClockMap::rate_near(const Line& line) const noexcept {
   }
   const double spread = count * sum_xx - sum_x * sum_x;
   return spread > 0.0 ? line.b + (count * sum_xr - sum_x * sum_r) / spread : line.b;
-}
-
-void ClockMap::move_line(const Line& line, double x_s) noexcept {
-  correction_s_ += line_.at(x_s) - line.at(x_s);
-  line_ = line;
-}
-
-HostTime ClockMap::emit(std::int64_t device_time_ns, double x_s) noexcept {
-  if (has_last_ && device_time_ns == last_device_ns_) return last_mapped_;
-  const bool continues = has_last_ && device_time_ns > last_device_ns_;
-  const double step_s = continues ? seconds(device_time_ns - last_device_ns_) : 0.0;
-  const double tau_s = std::clamp(kCorrectionPerAge * x_s, kCorrectionMin_s, kCorrectionMax_s);
-  correction_s_ *= tau_s / (tau_s + step_s);
-
-  const Duration since_origin{device_time_ns - device_origin_ns_};
-  HostTime mapped = host_origin_ + since_origin + from_seconds(line_.at(x_s) + correction_s_);
-  if (has_last_) {
-    const HostTime floor = last_mapped_ + std::max(Duration{1}, from_seconds(kSlowest * step_s));
-    mapped = std::max(mapped, floor);
-  }
-  has_last_ = true;
-  last_device_ns_ = device_time_ns;
-  last_mapped_ = mapped;
-  return mapped;
 }
 
 }  // namespace imuscope
