@@ -34,6 +34,9 @@ constexpr Duration kAfterWakeUp = milliseconds{50};
 // A stream is gone after this, or after kSilentMessages of a slow device.
 constexpr Duration kSilence = seconds{1};
 constexpr double kSilentMessages = 20.0;
+// Then it is asked to measure, which does not disturb one that does, before it is set up again.
+constexpr Duration kAskToMeasureEvery = seconds{1};
+constexpr int kAskToMeasureAttempts = 10;
 // Of the line's capacity; more leaves no room for the device's own jitter.
 constexpr double kLineLoadMax = 0.9;
 constexpr double kPeriodTolerance = 1e-3;
@@ -91,6 +94,7 @@ SessionState MtSession::state() const noexcept {
     case Step::kListen:
     case Step::kGoToConfig:
     case Step::kReset:
+    case Step::kSilent:
       return SessionState::kConnecting;
     case Step::kStreaming:
       return SessionState::kStreaming;
@@ -145,9 +149,20 @@ std::span<const std::uint8_t> MtSession::poll(HostTime now) noexcept {
   if (to_send_ && now >= next_send_) on_timeout(now);
   if (!to_send_ || now < next_send_) return {};
   ++attempts_;
-  next_send_ = now + (step_ == Step::kGoToConfig ? kGoToConfigEvery : kReplyWithin);
+  next_send_ = now + repeat_after(step_);
   if (step_ == Step::kReset) to_send_ = false;
   return request_.bytes();
+}
+
+Duration MtSession::repeat_after(Step step) noexcept {
+  switch (step) {
+    case Step::kGoToConfig:
+      return kGoToConfigEvery;
+    case Step::kSilent:
+      return kAskToMeasureEvery;
+    default:
+      return kReplyWithin;
+  }
 }
 
 // Called when the time to send has come: the first time it does nothing, later the reply is overdue.
@@ -157,6 +172,8 @@ void MtSession::on_timeout(HostTime now) noexcept {
     say_why_there_is_no_answer();
     wants_other_baud_ = frames_ == 0;
     enter(Step::kReset, now);
+  } else if (step_ == Step::kSilent) {
+    if (attempts_ >= kAskToMeasureAttempts) enter(Step::kGoToConfig, now);
   } else if (attempts_ >= kAttempts) {
     say("the device does not answer message 0x%02X; it will be set up again",
         static_cast<unsigned>(awaited_ - 1));
@@ -261,6 +278,7 @@ void MtSession::prepare() noexcept {
       break;
     }
     case Step::kMeasure:
+    case Step::kSilent:
       set_request(kMasterBid, mid::kGoToMeasurement);
       break;
     case Step::kListen:
@@ -520,6 +538,9 @@ void MtSession::on_data(const Frame& frame, HostTime now) noexcept {
     case Step::kStreaming:
       if (count) last_wanted_ = now;
       break;
+    case Step::kSilent:
+      if (count) enter(Step::kStreaming, now);
+      break;
     default:
       break;  // a device in measurement goes on sending until it has heard GoToConfig
   }
@@ -575,7 +596,7 @@ void MtSession::watch_stream(HostTime now) noexcept {
   const Duration patience = std::max(kSilence, from_seconds(kSilentMessages / config_.rate_hz));
   if (now - last_data_ > patience) {
     say("the device stopped sending; check its power and cable");
-    enter(Step::kListen, now);
+    enter(Step::kSilent, now);
   } else if (now - last_wanted_ > patience) {
     say("the device sends other data than was asked for; it is set up again");
     enter(Step::kGoToConfig, now);

@@ -3,9 +3,11 @@
 /// Brings an XSens MT device (MTx, MTi, Xbus Master) to send what is wanted: listens first and takes over a
 /// device that sends exactly that already; else goes to config (skipping data, with retries and a Reset as
 /// the last resort), reads the configuration, sets only what differs, checks what the device really took, and
-/// starts the measurement. Watches the stream afterwards: a device that falls silent, restarts (WakeUp) or
-/// sends something else is set up again. Settings are kept by the device, so nothing is written that is there
-/// already.
+/// starts the measurement. Watches the stream afterwards: a device that restarts (WakeUp) or sends something
+/// else is set up again. One that falls silent may only be held up by its line: it is sent GoToMeasurement,
+/// which wakes a device that waits in its configuration state and is nothing to one that measures, so that a
+/// stall that ends by itself costs no sample; after ten seconds without an answer it is set up again.
+/// Settings are kept by the device, so nothing is written that is there already.
 ///
 /// Owns a scanner of its own; does no I/O. Core: no allocation, noexcept.
 
@@ -83,9 +85,11 @@ class MtSession final : public DeviceSession {
     kSetOutputConfiguration,
     kMeasure,
     kStreaming,
+    kSilent,  ///< was streaming
     kFailed,
   };
 
+  [[nodiscard]] static Duration repeat_after(Step step) noexcept;
   void enter(Step step, HostTime now) noexcept;
   void prepare() noexcept;
   void set_request(std::uint8_t bid, std::uint8_t mid, std::span<const std::uint8_t> data = {}) noexcept;

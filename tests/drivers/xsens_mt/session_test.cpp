@@ -158,6 +158,7 @@ struct Bench {
       device.sample();
       device.next_sample = now + from_seconds(device.period * (device.skip + 1) / kPeriodTicksPerSecond);
     }
+    if (stalled) return;
     if (!device.out.empty()) session.on_bytes(device.out, now);
     device.out.clear();
   }
@@ -165,6 +166,7 @@ struct Bench {
     return static_cast<std::size_t>(std::count(device.heard.begin(), device.heard.end(), mid));
   }
 
+  bool stalled = false;  ///< the host reads nothing; what came meanwhile comes all at once
   HostTime now = host_time_from_ns(1'000'000'000'000);
   ScriptedDevice device;
   MtSession session;
@@ -303,6 +305,52 @@ TEST(MtSession, ADeviceThatFallsSilentOrRestartsIsSetUpAgain) {
   bench.run(seconds{2});
   EXPECT_EQ(bench.session.state(), SessionState::kStreaming);
   EXPECT_EQ(bench.session.problem(), "");
+}
+
+TEST(MtSession, AStallThatEndsByItselfNeverTakesTheDeviceOutOfItsMeasurement) {
+  for (const Duration stall : {Duration(milliseconds{900}), Duration(milliseconds{1100}),
+                               Duration(seconds{3}), Duration(seconds{9})}) {
+    SCOPED_TRACE(to_seconds(stall));
+    Bench bench;
+    bench.run(seconds{3});
+    ASSERT_EQ(bench.session.state(), SessionState::kStreaming);
+    const auto set_up = bench.times_heard(mid::kGoToConfig);
+    const std::uint16_t before = bench.device.counter;
+    bench.stalled = true;
+    bench.run(stall);
+    bench.stalled = false;
+    bench.run(seconds{2});
+    EXPECT_EQ(bench.session.state(), SessionState::kStreaming);
+    EXPECT_EQ(bench.session.problem(), "");
+    EXPECT_EQ(bench.times_heard(mid::kGoToConfig), set_up);
+    EXPECT_EQ(bench.times_heard(mid::kReset), 0U);
+    EXPECT_NEAR(bench.device.counter - before, 100.0 * to_seconds(stall + seconds{2}), 1.0)
+        << "the device measured all the time";
+  }
+}
+
+TEST(MtSession, ADeviceThatWaitsInItsConfigurationStateIsStartedWithoutBeingSetUpAgain) {
+  Bench bench;
+  bench.run(seconds{3});
+  const auto set_up = bench.times_heard(mid::kReqConfiguration);
+  bench.device.measuring = false;
+  bench.run(seconds{3});
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming);
+  EXPECT_TRUE(bench.device.measuring);
+  EXPECT_EQ(bench.times_heard(mid::kReqConfiguration), set_up);
+}
+
+TEST(MtSession, ADeviceThatStaysSilentIsSetUpAgainInTheEnd) {
+  Bench bench;
+  bench.run(seconds{3});
+  bench.device.measuring = false;
+  bench.device.powered = false;
+  bench.run(seconds{13});
+  EXPECT_EQ(bench.session.state(), SessionState::kConnecting);
+  bench.device.powered = true;  // without a word
+  bench.run(seconds{6});
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+  EXPECT_GE(bench.times_heard(mid::kReqConfiguration), 2U);
 }
 
 TEST(MtSession, RefusesBeforehandWhatTheLineOrTheDeviceCannotDo) {
