@@ -7,6 +7,7 @@
 #include <cctype>
 #include <fstream>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <set>
 #include <sstream>
@@ -23,6 +24,9 @@ constexpr double kPercent = 0.01;
 constexpr double kMilli = 1e-3;
 constexpr double kMicro = 1e-6;
 constexpr double kAnyHigh = 1e9;
+/// Of a line over a network, bit/s: messages go out as they are made.
+constexpr int kNetworkBaud = 100'000'000;
+constexpr int kBusIdMax = 10;
 
 /// "+x -y -z" or three rows of three numbers.
 void read_axes(TableReader& in, Eigen::Matrix3d& axes) {
@@ -103,11 +107,13 @@ PlayedDevice read_device(TableReader& in) {
   read_axes(in, device.C_device_frame);
   in.vector("antenna_lever_arm_b_m", device.antenna_b_m, 1.0);
   TableReader transport = in.table("transport");
-  if (transport.choice("kind", {"serial", "tcp", "can"}, 0) == 1) {
+  const std::size_t kind = transport.choice("kind", {"serial", "tcp", "udp", "can"}, 0);
+  if (kind == 1 || kind == 2) {
     std::int64_t port = 0;
     transport.whole("port", port, 1, std::numeric_limits<std::uint16_t>::max());
-    device.tcp_port = static_cast<std::uint16_t>(port);
+    (kind == 1 ? device.tcp_port : device.udp_port) = static_cast<std::uint16_t>(port);
     transport.text("host", device.address);
+    device.baud = kNetworkBaud;
   } else {
     transport.text("port", device.port);
   }
@@ -116,7 +122,33 @@ PlayedDevice read_device(TableReader& in) {
   device.baud = static_cast<int>(baud);
   transport.text("interface", device.can_interface);
   in.table("odometry").text("dbc", device.dbc);
+  std::int64_t bus_id = 0;
+  in.whole("bus_id", bus_id, 1, kBusIdMax);
+  device.bus_id = static_cast<int>(bus_id);
+  if (device.bus_id > 0 && (device.role != Role::kStudy || device.protocol != Protocol::kXsensMt))
+    in.fail("xsens", "has a bus_id: only a S-IMU with protocol = \"xsens_mt\" behind an Xbus Master");
   return device;
+}
+
+/// The devices with a bus id on one port are behind one Xbus Master; the first one's settings hold for the
+/// line.
+void share_lines(TableReader& root, std::vector<PlayedDevice>& devices) {
+  std::map<std::string, std::vector<PlayedDevice*>> lines;
+  for (PlayedDevice& device : devices) {
+    if (device.bus_id > 0) lines[device.port].push_back(&device);
+  }
+  for (auto& [port, members] : lines) {
+    std::set<int> ids;
+    for (PlayedDevice* member : members) {
+      ids.insert(member->bus_id);
+      member->line_owner = members.front()->name;
+      member->baud = members.front()->baud;
+      member->rate_hz = members.front()->rate_hz;
+    }
+    if (ids.size() != members.size() || *ids.rbegin() != static_cast<int>(members.size()))
+      root.fail("device",
+                fmt::format("needs the bus ids 1 to {} on the line {}, each once", members.size(), port));
+  }
 }
 
 void read_devices(TableReader& root, Configuration& configuration) {
@@ -129,6 +161,7 @@ void read_devices(TableReader& root, Configuration& configuration) {
     references += device.role == Role::kReference ? 1 : 0;
     if (references > 1) in.fail("role", "says reference, as another device's does: one IMU is the reference");
   }
+  share_lines(root, configuration.devices);
   if (references == 0) root.fail("device", "must hold one device with role = \"reference\"");
 }
 

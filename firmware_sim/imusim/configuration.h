@@ -50,13 +50,20 @@ struct PlayedDevice {
   Protocol protocol = Protocol::kXsensMt;
   double rate_hz = 100.0;
   std::string port;            ///< of a serial line; empty where the configuration names none
-  std::string address;         ///< of this PC, where a TCP server plays the device
+  std::string address;         ///< tcp: of this PC, where a server plays the device; udp: where it sends to
   std::uint16_t tcp_port = 0;  ///< 0: no TCP server
-  std::string can_interface;   ///< of a device on a CAN bus
-  std::string dbc;             ///< kCanOdometry: the file that the configuration names
+  std::uint16_t udp_port = 0;  ///< 0: no datagrams
+  int bus_id = 0;              ///< place behind an Xbus Master, from 1; 0: the device has a line of its own
+  std::string line_owner;     ///< the first device behind the same Xbus Master; its own name where it is that
+  std::string can_interface;  ///< of a device on a CAN bus
+  std::string dbc;            ///< kCanOdometry: the file that the configuration names
   int baud = 115200;
   Eigen::Matrix3d C_device_frame = Eigen::Matrix3d::Identity();  ///< rotates the device's axes to b or s
   Eigen::Vector3d antenna_b_m = Eigen::Vector3d::Zero();
+
+  [[nodiscard]] bool is_on_network() const { return tcp_port != 0 || udp_port != 0; }
+  /// Its data come over the line of another device.
+  [[nodiscard]] bool shares_line() const { return bus_id > 0 && line_owner != name; }
 };
 
 struct ReferenceSimulation {

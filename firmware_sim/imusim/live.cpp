@@ -11,6 +11,7 @@
 #include "firmware_sim/io/can_port.h"
 #include "firmware_sim/io/pseudo_terminal.h"
 #include "firmware_sim/io/tcp_server.h"
+#include "firmware_sim/io/udp_sender.h"
 #include "firmware_sim/random/random.h"
 
 namespace imusim {
@@ -20,13 +21,14 @@ constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 // As a USB host controller would, the player looks after its ports once a millisecond.
 constexpr std::int64_t kTick_ns = 1'000'000;
 
-/// What a program opens: a pseudo-terminal, or a connection to a TCP server.
+/// What a program opens: a pseudo-terminal, a connection to a TCP server, or a port that datagrams come to.
 tl::expected<std::unique_ptr<LineEnd>, std::string> open_end(const PlayedDevice& played, int baud) {
   const auto moved = [](auto&& opened) -> tl::expected<std::unique_ptr<LineEnd>, std::string> {
     using End = typename std::decay_t<decltype(opened)>::value_type;
     if (!opened) return tl::unexpected(opened.error());
     return std::make_unique<End>(std::move(*opened));
   };
+  if (played.udp_port != 0) return moved(UdpSender::open(played.address, played.udp_port));
   if (played.tcp_port == 0) return moved(PseudoTerminal::open(played.port, baud));
   const Bytes greeting = played.protocol == Protocol::kRtklibPos ? rtklib_header() : Bytes{};
   return moved(TcpServer::open(played.address, played.tcp_port, greeting));
@@ -141,6 +143,7 @@ Outcome<std::vector<CanEnd>> open_can_ends(World& world, const LiveOptions& opti
 
 std::string describe(const PlayedDevice& played) {
   if (played.tcp_port != 0) return fmt::format("tcp {}:{}", played.address, played.tcp_port);
+  if (played.udp_port != 0) return fmt::format("udp {}:{}", played.address, played.udp_port);
   return fmt::format("{}, {} baud", played.port, played.baud);
 }
 
@@ -150,7 +153,7 @@ Outcome<std::vector<Port>> open_ports(World& world, const LiveOptions& options) 
   for (WorldDevice& device : world.devices()) {
     const PlayedDevice& played = device.played;
     if (Configuration::is_on_can(played)) continue;
-    if (played.port.empty() && played.tcp_port == 0)
+    if (played.port.empty() && !played.is_on_network())
       return wrong_usage(fmt::format(
           "{}: device '{}' has no port to play on; give transport = {{ kind = \"serial\", port = \"...\" }}",
           world.configuration().file.string(), played.name));

@@ -105,8 +105,10 @@ Outcome<void> copy_dbc(const Configuration& configuration, const std::filesystem
 
 std::string configuration_copy(const Configuration& configuration) {
   std::string inputs;
-  for (const PlayedDevice& device : configuration.devices)
+  for (const PlayedDevice& device : configuration.devices) {
+    if (device.shares_line()) continue;
     inputs += fmt::format(" {0}={0}.{1}", device.name, Configuration::is_on_can(device) ? "log" : "bin");
+  }
   return fmt::format(
       "# Recorded by imusim record with seed {} over {} s. Read from this folder by\n"
       "#   imuscope process{} --config config.toml --out RESULT\n\n{}",
@@ -121,7 +123,9 @@ CaptureHeader capture_header(const Configuration& configuration) {
   header.host_begin_ns = kHostBegin_ns;
   header.channel_prefix = configuration.channel_prefix;
   header.configuration = configuration_copy(configuration);
-  for (const PlayedDevice& device : configuration.devices) header.devices.push_back(device.name);
+  for (const PlayedDevice& device : configuration.devices) {
+    if (!device.shares_line()) header.devices.push_back(device.name);
+  }
   return header;
 }
 

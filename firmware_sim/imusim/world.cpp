@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <tuple>
@@ -14,6 +15,7 @@
 #include "firmware_sim/devices/stdbin_unit.h"
 #include "firmware_sim/devices/xsens_mti.h"
 #include "firmware_sim/devices/xsens_mtx.h"
+#include "firmware_sim/devices/xsens_xbus.h"
 #include "firmware_sim/faults/faulty_device.h"
 #include "firmware_sim/imusim/sensor_faults.h"
 
@@ -68,6 +70,13 @@ ImuErrors errors_of(const StudySimulation& study, RegimeSwitch regime_switch, Ra
   take_over(errors.gyro, study.gyro, study.gyro_bias_radps, study.gyro_scale);
   take_over(errors.accel, study.accel, study.accel_bias_mps2, study.accel_scale);
   return errors;
+}
+
+/// The line that a device shares; the end where it is the first on its line, or on none.
+std::vector<XbusLine>::iterator bus_of(std::vector<XbusLine>& buses, const PlayedDevice& played) {
+  return std::find_if(buses.begin(), buses.end(), [&](const XbusLine& bus) {
+    return played.bus_id > 0 && bus.owner.name == played.line_owner;
+  });
 }
 
 /// What the R-IMU adds to the truth in its own navigation solution: constant attitude errors, and position
@@ -154,6 +163,7 @@ World::World(const Configuration& configuration, Beginning beginning, double beg
         break;
     }
   }
+  add_buses(beginning, begin_s);
 }
 
 void World::add(const PlayedDevice& played, std::unique_ptr<Device> device) {
@@ -186,6 +196,13 @@ void World::add_study(const PlayedDevice& played, const StudySimulation& study, 
   truth.period_s = 1.0 / played.rate_hz / (1.0 + truth.clock_skew_ppm * 1e-6);
   truth.first_sample_s = drawn_phase * truth.period_s;
   truth.first_counter = study.first_counter.value_or(drawn_counter);
+  if (const auto bus = bus_of(buses_, played); bus != buses_.end()) {  // its head samples for all
+    truth.latency_s = bus->clock.latency_s;
+    truth.clock_skew_ppm = bus->clock.clock_skew_ppm;
+    truth.period_s = bus->clock.period_s;
+    truth.first_sample_s = bus->clock.first_sample_s;
+    truth.first_counter = bus->clock.first_counter;
+  }
   studies_.push_back(truth);
   add_imu(played,
           std::make_shared<ImuModel>(*motion_, truth.mounting, truth.errors, configuration_.scenario.seed,
@@ -261,6 +278,7 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
       made.sensor_to_world = Eigen::Matrix3d(C_ned_nwu() * motion->state_at(t_s).C_b_n * C_device_b);
       return made;
     };
+    if (played.bus_id > 0) return join_bus(played, message, clock);
     if (clock.model == XsensModel::kMti) {
       XsensMti::Options options;
       options.device_id = device_id;
@@ -314,6 +332,38 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
       });
   unit->skip_to(begin_s);
   add(played, std::move(unit));
+}
+
+void World::join_bus(const PlayedDevice& played, XbusSampler sampler, const StudyTruth& clock) {
+  auto bus = bus_of(buses_, played);
+  if (bus == buses_.end()) bus = buses_.insert(bus, XbusLine{played, clock, {}});
+  bus->by_bus_id.emplace(played.bus_id, std::move(sampler));
+}
+
+void World::add_buses(Beginning beginning, double begin_s) {
+  constexpr std::uint32_t kFirstBusDeviceId = 0x00300101;
+  for (const XbusLine& bus : buses_) {
+    XsensXbus::Options options;
+    std::vector<XbusSampler> samplers;
+    for (const auto& [bus_id, sampler] : bus.by_bus_id) {
+      options.bus_devices.push_back(kFirstBusDeviceId + static_cast<std::uint32_t>(samplers.size()));
+      samplers.push_back(sampler);
+    }
+    options.latency_s = bus.clock.latency_s;
+    options.clock_skew_ppm = bus.clock.clock_skew_ppm;
+    options.first_sample_s = bus.clock.first_sample_s;
+    options.first_counter = bus.clock.first_counter;
+    options.baud = bus.owner.baud;
+    options.period = static_cast<std::uint16_t>(std::lround(115200.0 / bus.owner.rate_hz));
+    auto head = std::make_unique<XsensXbus>(
+        options,
+        [samplers](std::size_t place, double t_s, std::int64_t counter) {
+          return samplers[place](t_s, counter);
+        },
+        begin_s);
+    if (beginning == Beginning::kStreaming) head->start_calibrated(begin_s);
+    add(bus.owner, std::move(head));
+  }
 }
 
 void World::add_gnss(const PlayedDevice& played, double begin_s) {
@@ -400,6 +450,7 @@ CanLine World::can_line_of(const PlayedDevice& played) const {
 SerialLine World::line_of(const PlayedDevice& played) const {
   LineOptions options = configuration_.line;
   options.baud = played.baud;
+  if (played.is_on_network()) options.reads = ReadModel::kMessages;
   options.host_begin_ns = kHostBegin_ns;
   // All devices hang on one host controller: its frames are common.
   options.usb_phase_s = Random(configuration_.scenario.seed, "usb").uniform(0.0, 1e-3);
@@ -415,6 +466,15 @@ Outcome<void> check_faults(World& world) {
                                        device.played.name, fmt::join(fault.blocks, "', '")));
     }
     (void)device.device->leave_out({});
+  }
+  for (const PlayedDevice& played : world.configuration().devices) {
+    if (!played.shares_line()) continue;
+    for (const Fault& fault : world.configuration().faults_of(played.name)) {
+      if (fault.kind != FaultKind::kStuck && fault.kind != FaultKind::kSaturation)
+        return wrong_usage(
+            fmt::format("device '{}' has no line of its own: give the fault to '{}', which owns it",
+                        played.name, played.line_owner));
+    }
   }
   return {};
 }

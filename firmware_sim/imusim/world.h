@@ -4,11 +4,13 @@
 /// line. Truth comes from here too, as nothing else knows it.
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "firmware_sim/devices/device.h"
+#include "firmware_sim/devices/xsens_encoder.h"
 #include "firmware_sim/imu/imu_model.h"
 #include "firmware_sim/imusim/configuration.h"
 #include "firmware_sim/io/can_line.h"
@@ -42,9 +44,20 @@ struct StudyTruth {
   XsensModel model = XsensModel::kMtx;
 };
 
+/// A device, or all those behind one Xbus Master under the name of the first.
 struct WorldDevice {
   PlayedDevice played;
   std::unique_ptr<Device> device;
+};
+
+/// What one MTx behind an Xbus Master measures.
+using XbusSampler = std::function<xsens::MtSample(double t_s, std::int64_t counter)>;
+
+/// An Xbus Master's line, while its devices are being found.
+struct XbusLine {
+  PlayedDevice owner;
+  StudyTruth clock;  ///< the head's, which all share
+  std::map<int, XbusSampler> by_bus_id;
 };
 
 class World {
@@ -81,12 +94,15 @@ class World {
   void add_reference(const PlayedDevice& played, Beginning beginning, double begin_s);
   void add_gnss(const PlayedDevice& played, double begin_s);
   void add_wheels(const PlayedDevice& played, double begin_s);
+  void join_bus(const PlayedDevice& played, XbusSampler sampler, const StudyTruth& clock);
+  void add_buses(Beginning beginning, double begin_s);
   void add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const StudyTruth& clock,
                Beginning beginning, double begin_s);
 
   Configuration configuration_;
   std::shared_ptr<const Motion> motion_;
   std::vector<WorldDevice> devices_;
+  std::vector<XbusLine> buses_;
   std::vector<StudyTruth> studies_;
   std::vector<std::pair<std::string, std::shared_ptr<OnTrueSample>>> observers_;
   double first_reference_sample_s_ = 0.0;
