@@ -164,7 +164,17 @@ class IoThread::Line final : public SampleSink {
       std::memcpy(status_.problem.data(), problem.data(), n);
       status_.problem[n] = '\0';
     }
+    for (Line* sharer : sharers_) sharer->show_line_of(status_);
     published_.write(status_);
+  }
+
+  /// The line is another device's, and so is what is known of it.
+  void show_line_of(const LineStatus& owner) noexcept {
+    status_.line = owner.line;
+    status_.session = owner.session;
+    status_.problem = owner.problem;
+    status_.last_arrival = owner.last_arrival;
+    status_.reads = owner.reads;
   }
 
   [[nodiscard]] HostTime newest_arrival() const { return newest_arrival_; }
