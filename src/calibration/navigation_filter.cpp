@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/gnss_trust.h"
 #include "calibration/navigation_output.h"
 #include "navigation/so3.h"
 #include "navigation/strapdown.h"
@@ -32,25 +33,8 @@ constexpr double kImprobableNis = 7.815;
 constexpr double kImprobableShareMax = 0.25;
 constexpr double kConsistencyMean_s = 60.0;
 constexpr double kConsistencyStep_s = 1.0;
-constexpr double kFloatCorrelation_s = 30.0;
 /// Re-acquisition: velocity is uncertain by this much.
 constexpr double kReacquireVelocitySd_mps = 3.0;
-
-/// Receivers without sd: how much worse than a fixed solution.
-double sd_factor(GnssSolution solution) noexcept {
-  switch (solution) {
-    case GnssSolution::kFixed:
-      return 1.0;
-    case GnssSolution::kFloat:
-      return 15.0;
-    case GnssSolution::kDifferential:
-      return 50.0;
-    case GnssSolution::kSingle:
-    case GnssSolution::kNone:
-      break;
-  }
-  return 150.0;
-}
 
 NavigationProcessNoise process_noise(const ReferenceConfig& config) noexcept {
   return {config.gyro_white_radps_per_sqrt_hz,
@@ -80,19 +64,6 @@ bool is_finite(const GnssData& gnss) noexcept {
       std::isfinite(gnss.latitude_rad) && std::isfinite(gnss.longitude_rad) && std::isfinite(gnss.height_m);
   for (std::size_t i = 0; i < 3; ++i) finite = finite && std::isfinite(gnss.v_n_mps[i]);
   return finite;
-}
-
-Vector3d trusted_sd(bool given, const Vector3& reported, const Vector3& fallback, const Vector3& floor,
-                    GnssSolution solution) noexcept {
-  const Vector3d sd = given ? to_eigen(reported) : Vector3d(sd_factor(solution) * to_eigen(fallback));
-  return floored_sd(sd, to_eigen(floor));
-}
-
-/// A float solution is wrong by much the same amount for half a minute (E-15). Its sd is widened so that all
-/// of that time's solutions together tell what one of them is worth.
-double correlated_sd_factor(GnssSolution solution, double since_last_s) noexcept {
-  if (solution != GnssSolution::kFloat || since_last_s <= 0.0) return 1.0;
-  return std::sqrt(std::max(1.0, 2.0 * kFloatCorrelation_s / since_last_s));
 }
 
 InitialisationMethod method_of(AlignmentMethod method) noexcept {
@@ -341,12 +312,8 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
   const bool has_position = (gnss.flags & kPositionValid) != 0;
   const bool has_velocity = gnss_.use_velocity && (gnss.flags & kVelocityValid) != 0;
   const GeodeticPosition antenna{gnss.latitude_rad, gnss.longitude_rad, gnss.height_m};
-  const Vector3d sd_position =
-      trusted_sd((gnss.flags & kHasPositionSd) != 0, gnss.sd_position_m, gnss_.default_sd_position_m,
-                 gnss_.floor_sd_position_m, gnss.solution);
-  const Vector3d sd_velocity =
-      trusted_sd((gnss.flags & kHasVelocitySd) != 0, gnss.sd_velocity_mps, gnss_.default_sd_velocity_mps,
-                 gnss_.floor_sd_velocity_mps, gnss.solution);
+  const Vector3d sd_position = trusted_position_sd(gnss, gnss_);
+  const Vector3d sd_velocity = trusted_velocity_sd(gnss, gnss_);
   if (!has_last_) return true;
   const HostTime time = host_time_of(sample);
   const double widened = correlated_sd_factor(gnss.solution, to_seconds(time - last_position_));

@@ -59,19 +59,32 @@ std::string times_of(const BinnedSignals& signals) {
   return array + "]";
 }
 
+std::string components_of(const Fit& fit) {
+  std::string list = "[";
+  for (const FitComponent& component : fit.components) {
+    // A fit whose levels are not all shown has no place for them.
+    if (component.values.size() != fit.levels.size()) continue;
+    list += fmt::format("{}{{\"name\":{},\"values\":{}}}", list.size() > 1 ? "," : "", quoted(component.name),
+                        array_of(component.values.size(), kDigitsOfSignal,
+                                 [&](std::size_t i) { return component.values[i]; }));
+  }
+  return list + "]";
+}
+
 std::string wavelet_series(const Fit& fit) {
   const auto values = [&](auto member) {
     return array_of(fit.levels.size(), kDigitsOfSignal,
                     [&](std::size_t i) { return or_nan(member(fit.levels[i])); });
   };
   return fmt::format(
-      "{{\"name\":{},\"tau\":{},\"mid\":{},\"low\":{},\"high\":{},\"fitted\":{}}}",
+      "{{\"name\":{},\"tau\":{},\"mid\":{},\"low\":{},\"high\":{},\"fitted\":{},"
+      "\"components\":{}}}",
       quoted(fit.regime.empty() ? "all" : fit.regime),
       array_of(fit.levels.size(), kDigitsOfEstimate, [&](std::size_t i) { return fit.levels[i].tau_s; }),
       values([](const FitLevel& level) { return level.value; }),
       values([](const FitLevel& level) { return level.ci_low; }),
       values([](const FitLevel& level) { return level.ci_high; }),
-      values([](const FitLevel& level) { return level.fitted; }));
+      values([](const FitLevel& level) { return level.fitted; }), components_of(fit));
 }
 
 }  // namespace

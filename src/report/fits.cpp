@@ -4,6 +4,8 @@
 #include <iterator>
 
 #include "base/units.h"
+#include "noise/json.h"
+#include "noise/process.h"
 #include "report/json_fields.h"
 
 namespace imuscope::report {
@@ -31,8 +33,38 @@ std::string with_raised_twos(std::string unit) {
   return unit;
 }
 
+}  // namespace
+
+double shown_unit(std::string& unit) {
+  const double factor = shown_in_degrees(unit);
+  unit = with_raised_twos(unit);
+  return factor;
+}
+
+namespace {
+
 std::optional<double> scaled(std::optional<double> value, double factor) {
   return value ? std::optional(*value * factor) : value;
+}
+
+/// @param factor  of the signal's unit
+std::vector<FitComponent> components_of(const noise::FitResult& result, double factor) {
+  std::vector<FitComponent> components;
+  int n_gauss_markov = 0;
+  int n_sinusoid = 0;
+  for (const noise::Component& component : result.model.components) {
+    FitComponent out;
+    out.name = std::string(noise::short_name(component.kind));
+    if (component.kind == noise::ProcessKind::kGaussMarkov) out.name += std::to_string(++n_gauss_markov);
+    if (component.kind == noise::ProcessKind::kSinusoid) out.name += std::to_string(++n_sinusoid);
+    if (!(component.amplitude > 0.0)) continue;
+    for (const noise::FittedLevel& level : result.wv) {
+      out.values.push_back(factor * factor * component.amplitude *
+                           noise::unit_wv(component.kind, component.shape, level.observed.level).value);
+    }
+    components.push_back(std::move(out));
+  }
+  return components;
 }
 
 FitParameter read_parameter(const json& entry) {
@@ -40,8 +72,7 @@ FitParameter read_parameter(const json& entry) {
   parameter.process = text_at(entry, "process");
   parameter.name = text_at(entry, "name");
   parameter.unit = text_at(entry, "unit");
-  const double factor = shown_in_degrees(parameter.unit);
-  parameter.unit = with_raised_twos(parameter.unit);
+  const double factor = shown_unit(parameter.unit);
   parameter.value = scaled(number_at(entry, "value"), factor);
   parameter.ci_low = scaled(number_at(entry, "ci_low"), factor);
   parameter.ci_high = scaled(number_at(entry, "ci_high"), factor);
@@ -56,8 +87,8 @@ Fit read_fit(const json& entry) {
   fit.unit = text_at(entry, "unit");
   fit.model = text_at(entry, "model");
   fit.n = number_at(entry, "n");
-  const double factor = shown_in_degrees(fit.unit);
-  fit.unit = with_raised_twos(fit.unit);
+  const double factor = shown_unit(fit.unit);
+  if (const auto result = noise::fit_from_json(entry)) fit.components = components_of(*result, factor);
   for (const json& level : field(entry, "wv")) {
     const auto tau_s = number_at(level, "tau_s");
     if (!tau_s) continue;

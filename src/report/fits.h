@@ -26,6 +26,12 @@ struct FitParameter {
   std::optional<double> ci_high;
 };
 
+/// What one process contributes to the fitted wavelet variance, level by level.
+struct FitComponent {
+  std::string name;  ///< "WN", "GM1", ...
+  std::vector<double> values;
+};
+
 struct Fit {
   std::string imu;
   std::string axis;    ///< "gyro_x"
@@ -34,6 +40,7 @@ struct Fit {
   std::string model;
   std::optional<double> n;
   std::vector<FitLevel> levels;
+  std::vector<FitComponent> components;  ///< empty where the entry is no whole fit
   std::vector<FitParameter> parameters;
   std::optional<double> j_p_value;
   bool identifiable = true;
@@ -51,6 +58,9 @@ const Fit* find_fit(const std::vector<Fit>& fits, const std::string& imu, const 
                     const std::string& regime);
 
 inline constexpr const char* kAxes[] = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+
+/// Brings a unit to what people read, "rad/s" to "deg/s" and "^2" to "²"; returns the factor of its numbers.
+double shown_unit(std::string& unit);
 
 /// "gyroscope x" for "gyro_x"; any other axis as it is.
 std::string axis_words(const std::string& axis);

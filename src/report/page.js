@@ -8,6 +8,7 @@
   const REGIME_COLOURS = ['#3a86d8', '#d1600a', '#0b9a6e', '#9a6fd0', '#c14b78'];
   const WHISKER_STEP = 2.4;  // pixels
   const TRUTH_DASH = [6, 4];
+  const COMPONENT_DASH = [4, 3];
 
   const escaped = (any) => String(any).replace(/[&<>"']/g, (c) => '&#' + c.charCodeAt(0) + ';');
   const variable = (name) => getComputedStyle(document.body).getPropertyValue(name).trim();
@@ -145,27 +146,37 @@
     const options = common(figure, legendPlace);
     options.series = {};
     options.colors = [];
+    const bar = (value) => value === null || value === undefined ? null : [value, value, value];
     figure.series.forEach((series, k) => {
       const colour = REGIME_COLOURS[k % REGIME_COLOURS.length];
       labels.push(series.name, series.name + ' fitted');
       options.colors.push(colour, colour);
       options.series[series.name] = {plotter: whiskers(WHISKER_STEP * (k - (figure.series.length - 1) / 2)), strokeWidth: 0};
       options.series[series.name + ' fitted'] = {plotter: Dygraph.Plotters.linePlotter};
+      for (const component of series.components) {
+        const label = series.name + ' ' + component.name;
+        labels.push(label);
+        options.colors.push(colour);
+        options.series[label] = {plotter: Dygraph.Plotters.linePlotter, strokeWidth: 0.8, strokePattern: COMPONENT_DASH,
+                                 drawPoints: false, highlightCircleSize: 0};
+      }
     });
     const rows = taus.map((tau) => {
       const row = [tau];
       for (const series of figure.series) {
         const i = series.tau.indexOf(tau);
         const mid = i < 0 ? null : series.mid[i];
-        const fitted = i < 0 ? null : series.fitted[i];
         // A lower end at zero has no place on a logarithmic axis.
         const low = mid === null ? null : series.low[i] > 0 ? series.low[i] : mid / 100;
         const high = mid === null ? null : series.high[i] === null ? mid : series.high[i];
-        row.push(mid === null ? null : [low, mid, high], fitted === null ? null : [fitted, fitted, fitted]);
+        row.push(mid === null ? null : [low, mid, high], bar(i < 0 ? null : series.fitted[i]));
+        // What has no height left on a logarithmic axis is not drawn.
+        for (const component of series.components) row.push(bar(i < 0 || !(component.values[i] > 0) ? null : component.values[i]));
       }
       return row;
     });
-    const ends = rows.flatMap((row) => row.slice(1).filter((bar) => bar !== null).flat());
+    const isMain = (label) => figure.series.some((series) => series.name === label || series.name + ' fitted' === label);
+    const ends = rows.flatMap((row) => row.filter((cell, i) => i > 0 && cell !== null && isMain(labels[i])).flat());
     options.labels = labels;
     options.connectSeparatedPoints = true;
     options.logscale = true;
@@ -176,11 +187,13 @@
     options.axes.y.ticker = decades;
     options.axes.y.axisLabelWidth = 36;
     options.interactionModel = {};
-    const names = () => legend(figure.series.map((series, k) => ({colour: options.colors[2 * k], text: series.name})));
+    const isObserved = (label) => figure.series.some((series) => series.name === label);
+    const names = () => legend(figure.series.map((series, k) => ({
+      colour: REGIME_COLOURS[k % REGIME_COLOURS.length], text: series.name,
+    })));
     options.legendFormatter = (data) => {
       if (data.x === undefined || data.x === null) return names();
-      return legend(data.series.filter((series) => series.y !== undefined && series.y !== null)
-          .filter((series, k) => k % 2 === 0)
+      return legend(data.series.filter((series) => isObserved(series.label) && series.y !== undefined && series.y !== null)
           .map((series) => ({colour: series.color, text: series.label + ' ' + shown(series.y)}))) +
           ' at τ = ' + shown(data.x) + ' s';
     };

@@ -76,6 +76,11 @@ Html with_interval(double value, std::optional<double> low, std::optional<double
          Html::markup("]</span>") + times_power(exponent);
 }
 
+Html p_words(std::optional<double> p) {
+  if (!p) return text(kUnknown);
+  return *p < kSmallestP ? text("< 10⁻⁶") : number(p, 2);
+}
+
 std::string duration_words(double seconds) {
   if (!std::isfinite(seconds) || seconds < 0.0) return kUnknown;
   const auto whole = static_cast<long long>(std::llround(seconds));

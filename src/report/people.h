@@ -22,6 +22,10 @@ Html with_sd(double value, std::optional<double> sd);
 /// "5.055 [5.051, 5.059]", with a common power of ten where the value is far from one.
 Html with_interval(double value, std::optional<double> low, std::optional<double> high);
 
+/// Below this a p value says no more than that it is small.
+inline constexpr double kSmallestP = 1e-6;
+Html p_words(std::optional<double> p);
+
 /// "12 min 30 s".
 std::string duration_words(double seconds);
 

@@ -53,8 +53,11 @@ std::string make_page(const RunFiles& run) {
   body += element("section", errors_section(run, figures));
   body += element("section", dynamics_section(run, figures));
   body += element("section", models_section(run, fits, figures));
+  body += element("section", dependence_section(run, figures));
+  body += element("section", outages_section(run));
   body += element("section", health_section(run));
   body += element("section", making_section(run));
+  body += element("section", take_away_section(run));
   const std::string data = json_for_script(figures.json());
   return filled(page_template(), {{"plotting_notice", plotting_notice()},
                                   {"plotting_style", plotting_style()},

@@ -12,7 +12,8 @@ namespace imuscope {
 /// Writes `report.html` into `run_dir`.
 ///
 /// Reads what is there of: calibration.json (required), run.json, navigation.csv, per S-IMU
-/// calibration_NAME.csv and errors_NAME.csv, models.json, regression.json and truth.json. What is absent is
+/// calibration_NAME.csv and errors_NAME.csv, models.json, regression.json, regimes.json, comparison.json,
+/// dependence.json, vibration.json, evaluation.json and truth.json. What is absent is
 /// named in the page and nothing is put in its place. Everything that comes from these files is escaped; the
 /// page loads nothing from anywhere. Memory is bounded: long signals are kept as smallest, mean and largest
 /// value of short stretches.

@@ -229,6 +229,17 @@ Result<RunFiles> read_run_files(const std::filesystem::path& folder) {
   run.run = std::move(*document);
   run.models = field(*models, "models");
   run.regressions = field(*regressions, "regressions");
+  run.regression_remarks = field(*regressions, "remarks");
+  const std::pair<const char*, json*> kStudies[] = {{"regimes.json", &run.regimes},
+                                                    {"comparison.json", &run.comparison},
+                                                    {"dependence.json", &run.dependence},
+                                                    {"vibration.json", &run.vibration},
+                                                    {"evaluation.json", &run.evaluation}};
+  for (const auto& [name, document_of] : kStudies) {
+    auto read = read_json(folder / name, run.absent);
+    if (!read) return passed_on(read);
+    *document_of = std::move(*read);
+  }
   if (auto read = read_navigation(run); !read) return passed_on(read);
   if (auto read = read_studies(run, *calibration); !read) return passed_on(read);
   return run;

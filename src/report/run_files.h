@@ -59,6 +59,13 @@ struct RunFiles {
   nlohmann::json run;          ///< run.json; null where absent
   nlohmann::json models;       ///< array of fits; null where absent
   nlohmann::json regressions;  ///< array; null where absent
+  nlohmann::json regression_remarks;
+  /// regimes.json, comparison.json, dependence.json, vibration.json, evaluation.json; null where absent.
+  nlohmann::json regimes;
+  nlohmann::json comparison;
+  nlohmann::json dependence;
+  nlohmann::json vibration;
+  nlohmann::json evaluation;
   bool has_truth = false;
   std::optional<BinnedSignals> navigation;
   std::array<double, 2> origin_deg{};  ///< latitude and longitude of the first position

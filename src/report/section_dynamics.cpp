@@ -11,8 +11,6 @@ namespace {
 
 using nlohmann::json;
 
-/// Below this a p value says no more than that it is small.
-constexpr double kSmallestP = 1e-6;
 /// Coefficients that are shown: those that one axis' fifteen tests at 5 % would not give by chance.
 constexpr double kShownP = 0.05 / 15.0;
 constexpr std::size_t kShownMax = 4;
@@ -33,11 +31,6 @@ constexpr Quantity kQuantities[] = {{"angular rate", "rad/s"},
                                     {"angular jerk", "rad/s³"},
                                     {"specific force", "m/s²"},
                                     {"linear jerk", "m/s³"}};
-
-Html p_words(std::optional<double> p) {
-  if (!p) return text(kUnknown);
-  return *p < kSmallestP ? text("< 10⁻⁶") : number(p, 2);
-}
 
 Html percent(std::optional<double> r2) {
   return r2 ? text(fmt::format("{:.2f} %", 100.0 * *r2)) : text(kUnknown);
@@ -149,6 +142,9 @@ Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
       "(boresight, scale, time offset, lever arm) would produce is taken out first; what is left is the "
       "sensor's own. "
       "The last column names the fault that a coefficient would stand for, where it is clear of chance.");
+  for (const auto& remark : run.regression_remarks) {
+    if (remark.is_string()) section += paragraph(remark.get<std::string>(), "note");
+  }
   for (const StudyFiles& study : run.studies) {
     section += element("h3", text(study.name)) + regression_table(run.regressions, study.name);
   }

@@ -127,6 +127,10 @@ Html making_section(const RunFiles& run) {
     table.add_row({text("in motion"), duration_cell(number_at(regimes, "dynamic_s"))});
     section += element("div", table.html(), "words") + element("h3", text("Warnings")) + warnings_of(run) +
                events_of(run);
+    if (const std::string words = text_at(run.run, "configuration_text"); !words.empty()) {
+      section += element("details", element("summary", text("The configuration, word by word")) +
+                                        element("pre", text(words)));
+    }
   }
   return section + absent_files(run);
 }

@@ -91,61 +91,123 @@ std::vector<FitParameter> all_parameters(const std::vector<const Fit*>& fits) {
   return parameters;
 }
 
-/// Whether the intervals of the same parameter in two regimes lie apart.
-std::string difference_words(const FitParameter* one, const FitParameter* other) {
-  if (one == nullptr || other == nullptr || !one->ci_low || !one->ci_high || !other->ci_low ||
-      !other->ci_high) {
-    return kUnknown;
+/// The tests of difference of one axis, in comparison.json; null where there are none.
+const nlohmann::json& find_comparison(const RunFiles& run, const std::string& imu, const std::string& axis) {
+  static const nlohmann::json kNone;
+  for (const auto& entry : field(run.comparison, "comparisons")) {
+    if (text_at(entry, "name") == imu && text_at(entry, "axis") == axis) return entry;
   }
-  return *one->ci_high < *other->ci_low || *other->ci_high < *one->ci_low ? "differ" : "overlap";
+  return kNone;
+}
+
+/// How the second regime's parameter stands to the first's, and what the test says of it.
+std::vector<Html> difference_cells(const nlohmann::json& comparison, const FitParameter& parameter) {
+  for (const auto& entry : field(comparison, "parameters")) {
+    if (text_at(entry, "process") != parameter.process || text_at(entry, "name") != parameter.name) continue;
+    const auto ratio = number_at(entry, "ratio");
+    const std::string verdict = text_at(entry, "verdict");
+    return {ratio ? with_interval(*ratio, number_at(entry, "ratio_ci_low"), number_at(entry, "ratio_ci_high"))
+                  : text(kUnknown),
+            p_words(number_at(entry, "p_holm")),
+            verdict == "differ" ? element("strong", text(verdict))
+                                : text(verdict.empty() ? kUnknown : verdict)};
+  }
+  return {text(kUnknown), text(kUnknown), text(kUnknown)};
+}
+
+std::string joint_words(const nlohmann::json& comparison) {
+  const auto& joint = field(comparison, "joint");
+  const auto p = number_at(joint, "p_holm");
+  if (!p) return {};
+  const std::string words = *p < kSmallestP ? "< 10⁻⁶" : fmt::format("= {:.2g}", *p);
+  return fmt::format(" · all parameters together: χ² = {:.4g} with {:.0f} degrees of freedom, p {}",
+                     number_at(joint, "statistic").value_or(0.0), number_at(joint, "dof").value_or(0.0), words);
 }
 
 std::string test_words(const Fit& fit) {
-  // Below this the p value says no more than that it is small.
-  constexpr double kSmallest = 1e-6;
   std::string words = "not tested";
   if (fit.j_p_value) {
-    words = *fit.j_p_value < kSmallest ? "J-test p < 10⁻⁶" : fmt::format("J-test p = {:.2g}", *fit.j_p_value);
+    words = *fit.j_p_value < kSmallestP ? "J-test p < 10⁻⁶" : fmt::format("J-test p = {:.2g}", *fit.j_p_value);
   }
   if (fit.n) words += fmt::format(", n = {:.0f}", *fit.n);
   if (!fit.identifiable) words += ", not identifiable";
   return words;
 }
 
-Html axis_heading(const std::string& axis, const std::vector<const Fit*>& fits) {
+Html axis_heading(const std::string& axis, const std::vector<const Fit*>& fits, const std::string& joint) {
   std::string words = axis_words(axis);
   for (const Fit* fit : fits) {
     if (fit == nullptr) continue;
     words +=
         fmt::format(" · {}: {}, {}", fit->regime.empty() ? "all" : fit->regime, fit->model, test_words(*fit));
   }
-  return text(words);
+  return text(words + joint);
 }
 
-Html parameter_table(const std::vector<Fit>& fits, const std::string& imu,
+Html parameter_table(const RunFiles& run, const std::vector<Fit>& fits, const std::string& imu,
                      const std::vector<std::string>& regimes) {
-  const bool comparable = regimes.size() >= 2 && regimes[0] == "static" && regimes[1] == "dynamic";
+  const bool tested = !field(run.comparison, "comparisons").empty();
   std::vector<Html> headings{text("parameter"), text("unit")};
   for (const std::string& regime : regimes) headings.push_back(text(regime.empty() ? "all" : regime));
-  if (comparable) headings.push_back(text("intervals"));
+  if (tested) {
+    for (const char* heading : {"ratio", "p, corrected", "test"}) headings.push_back(text(heading));
+  }
   Table table(std::move(headings));
   for (const char* axis : kAxes) {
     std::vector<const Fit*> of_axis;
     for (const std::string& regime : regimes) of_axis.push_back(find_fit(fits, imu, axis, regime));
     const auto parameters = all_parameters(of_axis);
     if (parameters.empty()) continue;
-    table.add_group(axis_heading(axis, of_axis));
+    const auto& comparison = find_comparison(run, imu, axis);
+    table.add_group(axis_heading(axis, of_axis, joint_words(comparison)));
     for (const FitParameter& parameter : parameters) {
       std::vector<Html> row{parameter_name(parameter), text(parameter.unit)};
       for (const Fit* fit : of_axis) row.push_back(parameter_cell(fit, find_parameter(fit, parameter)));
-      if (comparable) {
-        row.push_back(text(
-            difference_words(find_parameter(of_axis[0], parameter), find_parameter(of_axis[1], parameter))));
+      if (tested) {
+        for (Html& cell : difference_cells(comparison, parameter)) row.push_back(std::move(cell));
       }
       table.add_row(std::move(row));
     }
   }
   return table.empty() ? paragraph("No model of this sensor.") : table.html();
+}
+
+/// Levels that a regime's stretches are too short for.
+Html left_out(const RunFiles& run, const std::string& imu) {
+  Html items;
+  for (const auto& entry : field(run.regimes, "left_out")) {
+    if (text_at(entry, "name") == imu) items += element("li", text(text_at(entry, "sentence")));
+  }
+  return items.empty() ? Html{} : element("details", element("summary", text("Levels left out")) +
+                                                         element("ul", items, "note"));
+}
+
+/// How the drive was divided, and how much there is of each part.
+Html regimes_table(const RunFiles& run) {
+  if (run.regimes.is_null()) return {};
+  Table table({text("regime"), text("altogether"), text("longest stretch"), text("stretches")});
+  for (const auto& regime : field(run.regimes, "regimes")) {
+    const auto total_s = number_at(regime, "total_s");
+    const auto longest_s = number_at(regime, "longest_s");
+    table.add_row({text(text_at(regime, "name")), text(total_s ? duration_words(*total_s) : kUnknown),
+                   text(longest_s ? duration_words(*longest_s) : kUnknown),
+                   count(static_cast<double>(field(regime, "stretches").size()))});
+  }
+  Html remarks;
+  for (const auto& remark : field(run.regimes, "remarks")) {
+    if (remark.is_string()) remarks += element("li", text(remark.get<std::string>()));
+  }
+  return (table.empty() ? Html{} : table.html()) + (remarks.empty() ? Html{} : element("ul", remarks));
+}
+
+/// Regimes that Figure 4 draws: that of everything together only where there is nothing more particular.
+std::vector<std::string> drawn_regimes(std::vector<std::string> regimes) {
+  constexpr std::size_t kTwo = 2;
+  const auto is_whole = [](const std::string& regime) { return regime == "all" || regime.empty(); };
+  const auto n_parts = regimes.size() - static_cast<std::size_t>(
+                                            std::count_if(regimes.begin(), regimes.end(), is_whole));
+  if (n_parts >= kTwo) std::erase_if(regimes, is_whole);
+  return regimes;
 }
 
 Html fit_warnings(const std::vector<Fit>& fits, const std::string& imu) {
@@ -172,7 +234,7 @@ Html wavelet_panels(const std::vector<Fit>& fits, const std::string& imu,
     panels += figures.wavelet_figure(fmt::format("wavelet-{}-{}", axis, imu), of_axis,
                                      text(fmt::format("{}, ({})²", axis_words(axis), of_axis.front()->unit)));
   }
-  return panels.empty() ? paragraph("No wavelet variance of this sensor.") : element("div", panels, "panels");
+  return panels.empty() ? paragraph("No wavelet variance of this sensor.") : element("div", panels, "panels wide");
 }
 
 }  // namespace
@@ -203,22 +265,26 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
   const auto regimes = regimes_of(fits);
   section += paragraph(
       "Haar wavelet variance of the error signals at the scales τ, in s: points with their 95 % intervals; "
-      "line: the "
-      "variance that the fitted model implies. Where the line leaves the intervals the model does not "
-      "explain the signal.");
+      "line: the variance that the fitted model implies; dashed: its processes one by one. Where the line "
+      "leaves the intervals the model does not explain the signal.");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + wavelet_panels(fits, study.name, regimes, figures);
+    section += element("h3", text(study.name)) +
+               wavelet_panels(fits, study.name, drawn_regimes(regimes), figures);
   }
   section += element("h2", text("Table II: parameters of the noise models"));
   section += paragraph(
       "With 95 % intervals. WN: white noise; GM: first-order Gauss-Markov process (β its rate, τ = 1/β its "
       "correlation "
-      "time, σ² its variance); RW: random walk; QN: quantisation noise. “Differ” means that the intervals of "
-      "the static and "
-      "the dynamic model do not overlap.");
+      "time, σ² its variance); RW: random walk; QN: quantisation noise.");
+  section += regimes_table(run);
+  section += field(run.comparison, "comparisons").empty()
+                 ? paragraph("No comparison.json with two regimes in this run: the models are shown side by "
+                             "side without a test of difference.")
+                 : paragraph("Ratio: the second regime's parameter over the first's. The p values are corrected "
+                             "for the number of tests (Holm); “no difference shown” is not “equal”.");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + parameter_table(fits, study.name, regimes) +
-               fit_warnings(fits, study.name);
+    section += element("h3", text(study.name)) + parameter_table(run, fits, study.name, regimes) +
+               left_out(run, study.name) + fit_warnings(fits, study.name);
   }
   return section;
 }

@@ -20,9 +20,15 @@ Html errors_section(const RunFiles& run, FigureSheet& figures);
 Html dynamics_section(const RunFiles& run, FigureSheet& figures);
 /// Noise models: Figure 4 and Table II.
 Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureSheet& figures);
+/// Parameters against the motion, and vibration lines.
+Html dependence_section(const RunFiles& run, FigureSheet& figures);
+/// What the models are worth in GNSS outages.
+Html outages_section(const RunFiles& run);
 /// Health of the devices.
 Html health_section(const RunFiles& run);
 /// Configuration, versions, inputs, warnings, absent files.
 Html making_section(const RunFiles& run);
+/// The models in data-sheet terms and as the configuration of other tools.
+Html take_away_section(const RunFiles& run);
 
 }  // namespace imuscope::report

@@ -78,6 +78,35 @@ void read_noise(TomlReader in, double rate_hz, ImuNoiseConfig& noise) {
   in.finish();
 }
 
+/// Of devices that are one make: "MTi and MTx User Manual", MT0100P, specifications of the MTx; MTi-600 series
+/// data sheet, MTi-630.
+DataSheetConfig default_data_sheet(Protocol protocol) {
+  DataSheetConfig sheet;
+  if (protocol == Protocol::kXsensMt) {
+    sheet.gyro_density_radps_per_sqrt_hz = 0.05 * kRadPerDeg;
+    sheet.gyro_bias_stability_radps = 1.0 * kRadPerDeg;
+    sheet.accel_density_mps2_per_sqrt_hz = 0.002;
+    sheet.accel_bias_stability_mps2 = 0.02;
+  }
+  if (protocol == Protocol::kXsensCan) {
+    sheet.gyro_density_radps_per_sqrt_hz = 0.007 * kRadPerDeg;
+    sheet.gyro_bias_stability_radps = 8.0 * kRadPerDeg / kSecondsPerHour;
+    sheet.accel_density_mps2_per_sqrt_hz = 60.0 * kMps2PerMicroG;
+    sheet.accel_bias_stability_mps2 = 15.0 * kMps2PerMicroG;
+  }
+  return sheet;
+}
+
+void read_data_sheet(TomlReader in, DataSheetConfig& sheet) {
+  in.number("gyro_density_degps_per_sqrt_hz", sheet.gyro_density_radps_per_sqrt_hz, kRadPerDeg, 1e-9, 1e3);
+  in.number("gyro_bias_stability_deg_per_h", sheet.gyro_bias_stability_radps, kRadPerDeg / kSecondsPerHour,
+            0.0, 1e6);
+  in.number("accel_density_ug_per_sqrt_hz", sheet.accel_density_mps2_per_sqrt_hz, kMps2PerMicroG, 1e-6, 1e7);
+  in.number("accel_bias_stability_ug", sheet.accel_bias_stability_mps2, kMps2PerMicroG, 0.0, 1e7);
+  in.number("bias_time_s", sheet.bias_time_s, 1.0, 1e-3, 1e7);
+  in.finish();
+}
+
 std::array<double, 9> rotation_from_vector(const Vector3& rotation_rad) {
   const double angle = std::sqrt(rotation_rad[0] * rotation_rad[0] + rotation_rad[1] * rotation_rad[1] +
                                  rotation_rad[2] * rotation_rad[2]);
@@ -307,8 +336,11 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   if (device.protocol == Protocol::kXsensMt) read_xsens(in, device.xsens);
   read_noise(in.table("noise"), device.rate_hz, device.noise);
   read_prior(in.table("prior"), device.prior);
-  if (device.role == DeviceRole::kStudy)
+  if (device.role == DeviceRole::kStudy) {
     in.integer("average_samples", device.average_samples, 1, kMaxAveraged);
+    device.data_sheet = default_data_sheet(device.protocol);
+    read_data_sheet(in.table("data_sheet"), device.data_sheet);
+  }
   if (is_csv(device.protocol)) read_csv(in.table("csv"), device.csv);
   if (device.role == DeviceRole::kGnss) {
     device.gnss.position_sd_m = {0.02, 0.02, 0.04};

@@ -88,6 +88,16 @@ struct ImuNoiseConfig {
   std::optional<double> accel_scale_sd;
 };
 
+/// What the maker's data sheet says of an IMU under study: `imuscope evaluate` holds it against fitted models.
+struct DataSheetConfig {
+  std::optional<double> gyro_density_radps_per_sqrt_hz;
+  std::optional<double> gyro_bias_stability_radps;  ///< 1 sigma of what wanders
+  std::optional<double> accel_density_mps2_per_sqrt_hz;
+  std::optional<double> accel_bias_stability_mps2;
+  /// Sheets do not say how fast a bias wanders; filters are commonly tuned with an hour's third.
+  double bias_time_s = 1000.0;
+};
+
 /// What is known of a mounting beforehand. Without a rotation the estimator finds the mounting by itself.
 struct MountingPriorConfig {
   std::optional<std::array<double, 9>> C_b_s;  ///< row-major
@@ -145,6 +155,7 @@ struct DeviceConfig {
   XsensConfig xsens;
   ImuNoiseConfig noise;       ///< reference and study
   MountingPriorConfig prior;  ///< study
+  DataSheetConfig data_sheet;  ///< study
   int average_samples = 1;    ///< study: samples taken into one measurement update, see StudyConfig
   CsvConfig csv;              ///< csv_imu, csv_gnss
   GnssOptions gnss;           ///< gnss

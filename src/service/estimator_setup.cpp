@@ -141,4 +141,14 @@ EstimatorConfig estimator_config(const Configuration& configuration) {
   return config;
 }
 
+StudyConfig with_mounting(StudyConfig study, const KnownMounting& known) {
+  study.blocks = kBiasStudyBlocks;
+  study.prior_C_b_s = known.C_b_s;
+  study.prior_r_bs_b_m = known.r_bs_b_m;
+  study.prior_t_d_s = known.t_d_s;
+  study.prior_gyro_scale = known.gyro_scale;
+  study.prior_accel_scale = known.accel_scale;
+  return study;
+}
+
 }  // namespace imuscope

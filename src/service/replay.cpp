@@ -16,11 +16,13 @@ namespace {
 class RingSink final : public SampleSink {
  public:
   /// @param refused  sequence numbers that the live run's ring refused
-  RingSink(SampleRing& ring, std::set<std::uint64_t> refused)
-      : ring_(&ring), refused_live_(std::move(refused)) {}
+  /// @param tap      sees every sample; must outlive the sink, may be empty
+  RingSink(SampleRing& ring, std::set<std::uint64_t> refused, const std::function<void(const Sample&)>& tap)
+      : ring_(&ring), refused_live_(std::move(refused)), tap_(&tap) {}
 
   void on_sample(const Sample& sample) noexcept override {
     newest_arrival_ = std::max(newest_arrival_, sample.arrival);
+    if (*tap_) (*tap_)(sample);
     if (refused_live_.contains(sample.sequence) || !ring_->try_push(sample)) ++refused_;
   }
   [[nodiscard]] HostTime newest_arrival() const { return newest_arrival_; }
@@ -30,6 +32,7 @@ class RingSink final : public SampleSink {
  private:
   SampleRing* ring_;
   std::set<std::uint64_t> refused_live_;
+  const std::function<void(const Sample&)>* tap_;
   HostTime newest_arrival_{HostTime::min()};
   std::uint64_t refused_ = 0;
 };
@@ -132,7 +135,7 @@ class Replayer {
       if (!source) return tl::unexpected<Error>(source.error());
       feeds_[i] = std::make_unique<Feed>(
           std::move(*source), make_decoder(configuration_.devices[i], index, recording_.clocks[i].map),
-          RingSink(core_.ring(index), refused(index)));
+          RingSink(core_.ring(index), refused(index), options_.on_sample));
       if (auto started = feeds_[i]->start(); !started) return started;
     }
     return {};

@@ -65,6 +65,8 @@ struct ReplayOptions {
   bool realtime = false;                 ///< paced as recorded
   std::function<void(double)> progress;  ///< share of the bytes read, 0 to 1; called now and then
   HistorySink* history = nullptr;
+  /// Sees every sample as it was decoded, device by device in stream order; may be empty.
+  std::function<void(const Sample&)> on_sample;
 };
 
 /// Runs the recording through a core made from `estimator`. Errors: a recording that cannot be read, or that

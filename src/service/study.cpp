@@ -88,19 +88,13 @@ bool calibrated(const StudyOutput& study) {
   return study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
 }
 
-/// The estimator of the last pass: mounting, time offset and scales known, biases free, so that the
-/// reference is evaluated at the right instant from the first sample on.
+/// The estimator of the last pass: every mounting that was found is known.
 EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& finals) {
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
-    auto& study = config.studies[i];
     const auto& final = finals[i];
     if (!calibrated(final)) continue;
-    study.blocks = kBiasStudyBlocks;
-    study.prior_C_b_s = final.C_b_s;
-    study.prior_r_bs_b_m = final.r_bs_b_m;
-    study.prior_t_d_s = final.t_d_s;
-    study.prior_gyro_scale = final.gyro_scale;
-    study.prior_accel_scale = final.accel_scale;
+    config.studies[i] = with_mounting(config.studies[i], {final.C_b_s, final.r_bs_b_m, final.t_d_s,
+                                                          final.gyro_scale, final.accel_scale});
   }
   return config;
 }
@@ -252,6 +246,7 @@ nlohmann::json run_json(const RunDescription& run) {
                       {"build", fmt::format("{} {}", __VERSION__, sizeof(void*) == 8 ? "64 bit" : "32 bit")},
                       {"configuration", run.configuration->file.filename().string()},
                       {"configuration_sha256", run.configuration->sha256},
+                      {"configuration_text", run.configuration->text},
                       {"inputs", run.recording->inputs},
                       {"ticks", run.result->ticks},
                       {"duration_s", static_cast<double>(run.result->ticks) / kTickRate_hz},

@@ -45,6 +45,9 @@ void add_process(CLI::App& app, Work& chosen);
 /// `imuscope combine RUN_DIR...`
 void add_combine(CLI::App& app, Work& chosen);
 
+/// `imuscope evaluate RUN_DIR`
+void add_evaluate(CLI::App& app, Work& chosen);
+
 /// `imuscope report RUN_DIR`
 void add_report(CLI::App& app, Work& chosen);
 

@@ -1,0 +1,257 @@
+/// Outages played on simulated drives whose S-IMU errors are drawn from a known model: the filter that holds
+/// that model must predict its own errors, a filter that holds another must be found out.
+
+#include "evaluation/outages.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "base/units.h"
+#include "navigation/gravity.h"
+#include "navigation/so3.h"
+#include "navigation/strapdown.h"
+#include "noise/chi_squared.h"
+
+namespace imuscope {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kPeriod_s = 0.01;
+constexpr double kFixPeriod_s = 0.2;
+constexpr double kFixSd_m = 0.05;
+constexpr double kSettle_s = 40.0;
+constexpr double kOutage_s = 20.0;
+
+/// MTx class: white noise, one slow Gauss-Markov process, a turn-on bias.
+CoastingModel mtx_like() {
+  CoastingModel model;
+  model.name = "true";
+  for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
+    const double unit = axis < 3 ? kRadPerDeg : 0.04;
+    AxisNoise& noise = model.axes[axis];
+    noise.white_density = std::pow(0.07 * unit, 2);
+    noise.turn_on_variance = std::pow(0.3 * unit, 2);
+    noise.slow.push_back({std::pow(0.1 * unit, 2), 1.0 / 50.0});
+  }
+  return model;
+}
+
+/// The noise of one axis, sample by sample.
+class AxisError {
+ public:
+  AxisError(const AxisNoise& noise, std::mt19937_64& random) : noise_(noise), random_(random) {
+    constant_ = std::sqrt(noise.turn_on_variance) * normal_(random_);
+    for (const SlowProcess& process : noise.slow) slow_.push_back(std::sqrt(process.variance) * normal_(random_));
+  }
+  double next(double white_density) {
+    double sum = constant_ + std::sqrt(white_density / kPeriod_s) * normal_(random_);
+    for (std::size_t i = 0; i < slow_.size(); ++i) {
+      const double phi = std::exp(-noise_.slow[i].rate_per_s * kPeriod_s);
+      sum += slow_[i];
+      slow_[i] = phi * slow_[i] + std::sqrt(noise_.slow[i].variance * (1.0 - phi * phi)) * normal_(random_);
+    }
+    return sum;
+  }
+
+ private:
+  const AxisNoise& noise_;
+  std::mt19937_64& random_;
+  std::normal_distribution<double> normal_;
+  double constant_ = 0.0;
+  std::vector<double> slow_;
+};
+
+/// Winding road at some 12 m/s. The truth is what the strapdown makes of noise-free rates.
+struct Road {
+  static Vector3d omega(double t) { return {0.05 * std::sin(1.1 * t), 0.04 * std::cos(0.9 * t), 0.25 * std::sin(0.3 * t)}; }
+  /// Keeps the speed near 12 m/s along the heading.
+  static Vector3d force(double t, const NavigationState& at) {
+    const Vector3d along = at.C_b_n.col(0);
+    const Vector3d wanted = (12.0 + 3.0 * std::sin(0.2 * t)) * Vector3d(along.x(), along.y(), 0.0);
+    const double g = normal_gravity(at.position.latitude_rad, at.position.height_m).g_mps2;
+    return at.C_b_n.transpose() * (1.5 * (wanted - at.v_n_mps) - Vector3d(0.0, 0.0, g));
+  }
+};
+
+/// @param density_of  white density in force at a time, per axis
+template <typename Density>
+Drive simulated(const CoastingModel& truth, std::uint64_t seed, double duration_s, Density density_of) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<AxisError> errors;
+  for (const AxisNoise& axis : truth.axes) errors.emplace_back(axis, random);
+  Drive drive;
+  drive.r_sa_s_m = {0.4, -0.2, -1.1};
+  NavigationState state;
+  state.position = {46.5 * kRadPerDeg, 6.6 * kRadPerDeg, 400.0};
+  state.v_n_mps = {12.0, 0.0, 0.0};
+  InertialRates rates{Road::omega(0.0), Road::force(0.0, state)};
+  const auto n = static_cast<int>(duration_s / kPeriod_s);
+  for (int k = 0; k < n; ++k) {
+    const double t = k * kPeriod_s;
+    const auto density = density_of(t);
+    DriveSample sample{t, rates};
+    for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
+      auto& triad = axis < 3 ? sample.measured.omega_ib_b_radps : sample.measured.f_b_mps2;
+      triad[static_cast<Eigen::Index>(axis % 3)] += errors[axis].next(density[axis]);
+    }
+    drive.samples.push_back(sample);
+    if (k % 20 == 0) {
+      DriveReference reference{t, state, KinematicVector::Constant(1e-4)};
+      drive.reference.push_back(reference);
+      DriveFix fix;
+      fix.time_s = t;
+      fix.antenna = displaced(state.position, state.C_b_n * drive.r_sa_s_m +
+                                                  kFixSd_m * Vector3d(normal(random), normal(random), normal(random)));
+      fix.sd_position_m = Vector3d::Constant(kFixSd_m);
+      drive.fixes.push_back(fix);
+    }
+    NavigationState ahead = state;
+    propagate(ahead, increment_from_samples(rates, rates, kPeriod_s));
+    const InertialRates next{Road::omega(t + kPeriod_s), Road::force(t + kPeriod_s, ahead)};
+    propagate(state, increment_from_samples(rates, next, kPeriod_s));
+    rates = next;
+  }
+  static_assert(kFixPeriod_s == 20 * kPeriod_s);
+  return drive;
+}
+
+Drive simulated(const CoastingModel& truth, std::uint64_t seed, double duration_s) {
+  std::array<double, kImuAxes> density{};
+  for (std::size_t axis = 0; axis < kImuAxes; ++axis) density[axis] = truth.axes[axis].white_density;
+  return simulated(truth, seed, duration_s, [&](double) { return density; });
+}
+
+OutageOptions one_outage() {
+  OutageOptions options;
+  options.durations_s = {5.0, kOutage_s};
+  options.settle_s = kSettle_s;
+  options.spacing_s = 1e6;
+  return options;
+}
+
+/// NEES of many drives with one outage each, per duration.
+template <typename MakeDrive>
+std::vector<Consistency> over_drives(const CoastingModel& held, MakeDrive make_drive) {
+  constexpr std::uint64_t kDrives = 80;
+  std::vector<OutageResult> results;
+  for (std::uint64_t seed = 1; seed <= kDrives; ++seed) {
+    auto of_drive = play_outages(make_drive(seed), held, one_outage());
+    // Drives are independent of one another: their outages do not overlap.
+    for (OutageResult& result : of_drive) result.start_s += 1e4 * static_cast<double>(seed);
+    results.insert(results.end(), of_drive.begin(), of_drive.end());
+  }
+  return consistency_of(results, one_outage().durations_s);
+}
+
+/// Where the mean NEES of 80 outages of a right model lies, but for one in a thousand.
+bool lies_where_a_right_model_does(double nees, std::size_t n) {
+  const double dof = 3.0 * static_cast<double>(n);
+  return nees > noise::chi_squared_quantile(dof, 5e-4) / dof &&
+         nees < noise::chi_squared_quantile(dof, 1.0 - 5e-4) / dof;
+}
+
+TEST(Outages, AFilterThatHoldsTheTrueModelPredictsItsErrors) {
+  const CoastingModel model = mtx_like();
+  const auto table = over_drives(
+      model, [&](std::uint64_t seed) { return simulated(model, seed, kSettle_s + kOutage_s + 2.0); });
+  ASSERT_EQ(table.size(), 2U);
+  for (const Consistency& row : table) {
+    EXPECT_EQ(row.n, 80U);
+    EXPECT_EQ(row.n_independent, 80U);
+    EXPECT_TRUE(lies_where_a_right_model_does(row.nees_position, row.n)) << row.nees_position;
+    EXPECT_TRUE(lies_where_a_right_model_does(row.nees_velocity, row.n)) << row.nees_velocity;
+    EXPECT_TRUE(lies_where_a_right_model_does(row.nees_attitude, row.n)) << row.nees_attitude;
+    EXPECT_LT(row.nees_low, 1.0);
+    EXPECT_GT(row.nees_high, 1.0);
+  }
+}
+
+TEST(Outages, AFilterThatTrustsTheSensorTooMuchIsFoundOutAndSurprisedMore) {
+  const CoastingModel truth = mtx_like();
+  CoastingModel proud = truth;
+  for (AxisNoise& axis : proud.axes) {
+    axis.white_density /= 9.0;
+    axis.slow.front().variance /= 9.0;
+  }
+  const auto make = [&](std::uint64_t seed) { return simulated(truth, seed, kSettle_s + kOutage_s + 2.0); };
+  const auto wrong = over_drives(proud, make);
+  const auto right = over_drives(truth, make);
+  for (std::size_t i = 0; i < wrong.size(); ++i) {
+    EXPECT_GT(wrong[i].nees_position, wrong[i].nees_high);
+    EXPECT_GT(wrong[i].surprise, right[i].surprise);
+  }
+}
+
+TEST(Outages, WhiteNoiseThatFollowsTheMotionIsHeldAsSuch) {
+  // Every four seconds of eight the white noise is sixteen times as strong.
+  const CoastingModel calm = mtx_like();
+  CoastingModel following = calm;
+  const auto density = [&](double t) {
+    std::array<double, kImuAxes> out{};
+    const double factor = std::fmod(t, 8.0) < 4.0 ? 1.0 : 16.0;
+    for (std::size_t axis = 0; axis < kImuAxes; ++axis) out[axis] = factor * calm.axes[axis].white_density;
+    return out;
+  };
+  for (double t = 0.0; t < kSettle_s + kOutage_s + 4.0; t += 4.0) following.changes.push_back({t, density(t)});
+  const auto make = [&](std::uint64_t seed) {
+    return simulated(calm, seed, kSettle_s + kOutage_s + 2.0, density);
+  };
+  const auto right = over_drives(following, make);
+  const auto wrong = over_drives(calm, make);
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    EXPECT_TRUE(lies_where_a_right_model_does(right[i].nees_position, right[i].n)) << right[i].nees_position;
+    EXPECT_TRUE(lies_where_a_right_model_does(right[i].nees_attitude, right[i].n)) << right[i].nees_attitude;
+    EXPECT_GT(wrong[i].nees_attitude, wrong[i].nees_high);
+  }
+}
+
+TEST(Outages, NoneReachesOverAGapOfTheSamplesAndAfterItTheFilterSettlesAnew) {
+  const CoastingModel model = mtx_like();
+  Drive drive = simulated(model, 7, 160.0);
+  constexpr double kGapBegin_s = 70.0;
+  constexpr double kGapEnd_s = 75.0;
+  std::erase_if(drive.samples,
+                [](const DriveSample& s) { return s.time_s > kGapBegin_s && s.time_s < kGapEnd_s; });
+  OutageOptions options = one_outage();
+  options.spacing_s = 2.0;
+  const auto results = play_outages(drive, model, options);
+  ASSERT_FALSE(results.empty());
+  bool before = false;
+  bool after = false;
+  for (const OutageResult& result : results) {
+    const double end_s = result.start_s + result.duration_s;
+    before = before || end_s <= kGapBegin_s;
+    after = after || result.start_s > kGapEnd_s;
+    EXPECT_TRUE(end_s <= kGapBegin_s + 0.5 || result.start_s >= kGapEnd_s + kSettle_s - 1.0)
+        << result.start_s << " to " << end_s;
+  }
+  EXPECT_TRUE(before && after);
+}
+
+TEST(Outages, ADriveThatIsTooShortYieldsNone) {
+  const CoastingModel model = mtx_like();
+  EXPECT_TRUE(play_outages(simulated(model, 3, kSettle_s - 5.0), model, one_outage()).empty());
+  EXPECT_TRUE(play_outages(Drive{}, model, one_outage()).empty());
+  EXPECT_TRUE(consistency_of({}, {10.0}).empty());
+}
+
+TEST(Outages, AJumpOfTheReceiverIsRefused) {
+  const CoastingModel model = mtx_like();
+  Drive drive = simulated(model, 11, kSettle_s + kOutage_s + 2.0);
+  const auto clean = play_outages(drive, model, one_outage());
+  for (DriveFix& fix : drive.fixes) {
+    if (fix.time_s > 30.0 && fix.time_s < 31.0) fix.antenna = displaced(fix.antenna, {8.0, 0.0, 0.0});
+  }
+  const auto jumped = play_outages(drive, model, one_outage());
+  ASSERT_EQ(clean.size(), jumped.size());
+  ASSERT_FALSE(clean.empty());
+  // Five fixes of fifty a window are lost, no more.
+  EXPECT_LT((clean.front().error - jumped.front().error).head<3>().norm(), 0.2);
+}
+
+}  // namespace
+}  // namespace imuscope
