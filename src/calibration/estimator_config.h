@@ -52,6 +52,7 @@ inline constexpr std::uint32_t kBiasStudyBlocks = kGyroBiasBlock | kAccelBiasBlo
 struct GaussMarkovConfig {
   double sd = 0.0;  ///< stationary sd of the process, in the unit of the quantity
   double time_constant_s = std::numeric_limits<double>::infinity();
+  friend bool operator==(const GaussMarkovConfig&, const GaussMarkovConfig&) = default;
 };
 
 /// The R-IMU's own errors, and how it is sampled.
@@ -128,6 +129,7 @@ struct TriadNoise {
   /// low-frequency equivalent and enters the NIS as it is.
   Vector3 fast_sd{0.0, 0.0, 0.0};
   Vector3 fast_time_constant_s{0.0, 0.0, 0.0};  ///< 0: none
+  friend bool operator==(const TriadNoise&, const TriadNoise&) = default;
 };
 
 /// The stochastic model of one S-IMU. This is what a fitted noise model replaces (Estimator::set_noise).
@@ -137,6 +139,7 @@ struct StudyNoise {
   /// Slow part of the bias: Gauss-Markov, per axis.
   std::array<GaussMarkovConfig, 3> gyro_bias;
   std::array<GaussMarkovConfig, 3> accel_bias;
+  friend bool operator==(const StudyNoise&, const StudyNoise&) = default;
 };
 
 /// MTx class: the dynamic and static gyro models of the paper's Table II, accelerometer of its data sheet's

@@ -64,6 +64,7 @@ struct LateSample {
 struct NewNoise {
   std::int64_t samples;  ///< of the S-IMU's error process that the refit had seen
   StudyNoise noise;
+  std::int64_t version = 0;  ///< counts the models given back to this S-IMU's filter, from 1
 };
 static_assert(std::is_trivially_copyable_v<NewNoise>);
 

@@ -73,7 +73,8 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       observability_(study_devices_.size()),
       started_(host_now()) {
   anchor_ = {started_, wall_clock_now()};
-  for (const auto& study : estimator_config_.studies) noises_.push_back(study.noise);
+  for (const auto& study : estimator_config_.studies)
+    feedback_.emplace_back(study.noise, study.noise_floor_share);
 }
 
 LivePublisher::~LivePublisher() {
@@ -254,7 +255,8 @@ void LivePublisher::drain() {
 
 void LivePublisher::on_noise_applied(const AppliedNoise& applied) {
   const auto& name = configuration_.devices[study_devices_[applied.study]].name;
-  spdlog::info("{}: the filter took over the noise model at tick {}", name, applied.tick);
+  spdlog::info("{}: the filter took over version {} of the noise model at tick {}", name,
+               applied.model.version, applied.tick);
   if (recorder_ == nullptr) return;
   auto record = applied_model_record(applied, name);
   record.utime = to_utime(wall_clock_now());
@@ -312,9 +314,8 @@ void LivePublisher::on_refit(const Refit& refit) {
   // At each refit, not only at the end: a run that is killed leaves its newest models.
   if (auto written = models_.write(options_.out); !written) spdlog::error("{}", written.error().text());
   if (tunables_.noise.apply_to_filter) {
-    auto& noise = noises_[refit.study];
-    noise = updated_noise(noise, refit.noise_model);
-    estimator_.offer_noise(refit.study, {refit.samples, noise});
+    if (const auto accepted = feedback_[refit.study].consider(refit.noise_model, refit.samples))
+      estimator_.offer_noise(refit.study, *accepted);
   }
   Refit stamped = refit;
   const auto stamp = [&](auto& report) {

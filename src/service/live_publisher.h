@@ -21,6 +21,7 @@
 #include "service/live.h"
 #include "service/live_smoothing.h"
 #include "service/modeller.h"
+#include "service/noise_feedback.h"
 #include "service/observability.h"
 #include "service/reload.h"
 #include "service/report_values.h"
@@ -94,7 +95,7 @@ class LivePublisher {
   std::unique_ptr<RunFolder> folder_;
   Modeller modeller_;
   std::optional<LiveSmoothing> smoothing_;
-  std::vector<StudyNoise> noises_;  ///< what the estimator was given last, per study
+  std::vector<NoiseFeedback> feedback_;  ///< per study
   std::int64_t applied_ = 0;
   std::optional<Snapshot> last_;
   std::optional<Snapshot> bridge_origin_;

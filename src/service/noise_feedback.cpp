@@ -113,18 +113,92 @@ StudyNoise updated_noise(const StudyNoise& current, const NoiseModelReport& fitt
   return updated;
 }
 
+namespace {
+
+/// Whether one is more than `step` times the other, as variances.
+bool moved(double sd, double other_sd, double step) {
+  const double ratio = sd * sd / (other_sd * other_sd);
+  return !(ratio <= step && ratio >= 1.0 / step) && !(sd == 0.0 && other_sd == 0.0);
+}
+
+bool moved(const TriadNoise& now, const TriadNoise& before) {
+  for (std::size_t i = 0; i < now.white_sd.size(); ++i) {
+    const double sd = std::hypot(now.white_sd[i], now.fast_sd[i]);
+    if (moved(sd, std::hypot(before.white_sd[i], before.fast_sd[i]), NoiseFeedback::kVarianceStep)) return true;
+  }
+  return false;
+}
+
+bool moved(const std::array<GaussMarkovConfig, 3>& now, const std::array<GaussMarkovConfig, 3>& before) {
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (moved(now[i].sd, before[i].sd, NoiseFeedback::kBiasStep)) return true;
+    const double tau = now[i].time_constant_s;
+    const double tau_before = before[i].time_constant_s;
+    if (tau != tau_before && !(std::abs(std::log(tau / tau_before)) <= std::log(NoiseFeedback::kBiasStep)))
+      return true;
+  }
+  return false;
+}
+
+bool moved(const StudyNoise& now, const StudyNoise& before) {
+  for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
+    if (moved(now.gyro[regime], before.gyro[regime]) || moved(now.accel[regime], before.accel[regime]))
+      return true;
+  }
+  return moved(now.gyro_bias, before.gyro_bias) || moved(now.accel_bias, before.accel_bias);
+}
+
+void raise(TriadNoise& triad, const TriadNoise& configured, double share) {
+  for (std::size_t i = 0; i < triad.white_sd.size(); ++i)
+    triad.white_sd[i] = std::max(triad.white_sd[i], share * configured.white_sd[i]);
+}
+
+void raise(std::array<GaussMarkovConfig, 3>& bias, const std::array<GaussMarkovConfig, 3>& configured,
+           double share) {
+  for (std::size_t i = 0; i < bias.size(); ++i) {
+    bias[i].sd = std::max(bias[i].sd, share * configured[i].sd);
+    bias[i].time_constant_s = std::min(bias[i].time_constant_s, configured[i].time_constant_s / share);
+  }
+}
+
+}  // namespace
+
+NoiseFeedback::NoiseFeedback(const StudyNoise& configured, double floor_share)
+    : configured_(configured), in_force_(configured), floor_share_(floor_share) {}
+
+StudyNoise NoiseFeedback::floored(StudyNoise noise) const {
+  for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
+    raise(noise.gyro[regime], configured_.gyro[regime], floor_share_);
+    raise(noise.accel[regime], configured_.accel[regime], floor_share_);
+  }
+  raise(noise.gyro_bias, configured_.gyro_bias, floor_share_);
+  raise(noise.accel_bias, configured_.accel_bias, floor_share_);
+  return noise;
+}
+
+std::optional<NewNoise> NoiseFeedback::consider(const NoiseModelReport& fitted, std::int64_t samples) {
+  const StudyNoise proposed = updated_noise(in_force_, fitted);
+  const bool anything_new = !(proposed == in_force_);
+  const StudyNoise candidate = floored(proposed);
+  if (!anything_new || (version_ > 0 && !moved(candidate, in_force_))) return std::nullopt;
+  in_force_ = candidate;
+  ++version_;
+  return NewNoise{samples, in_force_, version_};
+}
+
 applied_model_t applied_model_record(const AppliedNoise& applied, const std::string& device) {
   static_assert(kRegimeCount == 2, "applied_model_t has room for two regimes");
   applied_model_t record{};
   record.device = device;
   record.tick = applied.tick;
   record.samples = applied.model.samples;
+  record.version = applied.model.version;
   copy_fields(record, applied.model.noise, [](double& field, const double& value) { field = value; });
   return record;
 }
 
 AppliedNoise applied_noise_of(const applied_model_t& record, std::size_t study) {
-  AppliedNoise applied{study, record.tick, {record.samples, {}}};
+  AppliedNoise applied{study, record.tick, {record.samples, {}, record.version}};
   copy_fields(record, applied.model.noise, [](const double& field, double& value) { value = field; });
   return applied;
 }

@@ -1,8 +1,9 @@
 #pragma once
 
-/// Fitted noise models on their way back to the estimator, and into captures. Soft world; no state.
+/// Fitted noise models on their way back to the estimator, and into captures. Soft world.
 
 #include <imuscope/applied_model_t.hpp>
+#include <optional>
 
 #include "publish/reports.h"
 #include "service/config.h"
@@ -15,6 +16,43 @@ namespace imuscope {
 /// process (of the dynamic regime where there is one). A variance more than a hundred times, or less than a
 /// hundredth, of the present one is not believed: the filter keeps what it has for that axis.
 [[nodiscard]] StudyNoise updated_noise(const StudyNoise& current, const NoiseModelReport& fitted);
+
+/// Decides, refit by refit, what goes back to the filter of one S-IMU. Four rules keep the loop from talking
+/// the filter into confidence:
+///
+/// - validated: what updated_noise() takes, nothing else;
+/// - floor: no white noise and no bias process below `floor_share` of the configured sd, no bias slower than
+///   the configured one by more than 1 / floor_share, however small the residuals are: they are the filter's
+///   own;
+/// - hysteresis: the first model that passes replaces the configured guess; a later one goes back only where
+///   some axis has moved by kVarianceStep in its noise or kBiasStep in its bias process, so that the filter
+///   does not follow the scatter of the fits;
+/// - version: every model that goes back counts one up; the capture records it with the tick that took it.
+///
+/// The tick boundary is the core's to keep: it takes a model over before anything of a tick is computed.
+class NoiseFeedback {
+ public:
+  NoiseFeedback(const StudyNoise& configured, double floor_share);
+
+  /// What the estimator shall be given after this refit; nothing where what it has may stay.
+  /// @param samples  of the error process that the refit has seen
+  [[nodiscard]] std::optional<NewNoise> consider(const NoiseModelReport& fitted, std::int64_t samples);
+
+  /// Given out last, the configured one before that.
+  [[nodiscard]] const StudyNoise& in_force() const { return in_force_; }
+  [[nodiscard]] std::int64_t version() const { return version_; }
+
+  static constexpr double kVarianceStep = 1.2;
+  static constexpr double kBiasStep = 2.0;
+
+ private:
+  [[nodiscard]] StudyNoise floored(StudyNoise noise) const;
+
+  StudyNoise configured_;
+  StudyNoise in_force_;
+  double floor_share_;
+  std::int64_t version_ = 0;
+};
 
 /// The capture's record of an applied model. utime and sequence are left to the caller.
 [[nodiscard]] applied_model_t applied_model_record(const AppliedNoise& applied, const std::string& device);

@@ -69,8 +69,70 @@ TEST(NoiseFeedback, WhatIsNotIdentifiableNotPositiveOrBeyondBeliefIsLeftAside) {
   EXPECT_TRUE(same(model));
 }
 
+/// A refit that says `factor` times the present sd of every axis of the gyroscope in motion.
+NoiseModelReport louder(const StudyNoise& base, double factor, double slow_factor = 1.0) {
+  NoiseModelReport fitted;
+  const char* axes[] = {"gyro_x", "gyro_y", "gyro_z"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double white = factor * base.gyro[kDynamic].white_sd[i];
+    fitted.models.push_back(model_of(axes[i], "dynamic", white, 0.01 * white, 0.05,
+                                     slow_factor * base.gyro_bias[i].sd, 80.0));
+  }
+  return fitted;
+}
+
+TEST(NoiseFeedback, TheFirstModelReplacesTheConfiguredAndLaterOnesOnlyWhereSomethingMoved) {
+  const auto configured = mtx_class_noise();
+  NoiseFeedback feedback(configured, 0.5);
+  EXPECT_EQ(feedback.version(), 0);
+  const auto first = feedback.consider(louder(configured, 1.02), 6000);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->version, 1);
+  EXPECT_EQ(first->samples, 6000);
+  // The scatter of the fits: 4 % in sd up and down.
+  for (const double scatter : {1.06, 0.98, 1.05, 1.00}) {
+    EXPECT_FALSE(feedback.consider(louder(configured, scatter), 12000)) << scatter;
+    EXPECT_TRUE(feedback.in_force() == first->noise);
+  }
+  // A slow creep counts from what is in force, not from the refit before.
+  std::optional<NewNoise> second;
+  double factor = 1.02;
+  for (; !second && factor < 1.5; factor += 0.02) second = feedback.consider(louder(configured, factor), 18000);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->version, 2);
+  EXPECT_NEAR(factor - 0.02, 1.02 * std::sqrt(NoiseFeedback::kVarianceStep), 0.021);
+  // The bias process alone.
+  const auto third = feedback.consider(louder(configured, factor - 0.02, 1.6), 24000);
+  ASSERT_TRUE(third);
+  EXPECT_EQ(third->version, 3);
+}
+
+TEST(NoiseFeedback, ResidualsThatGrowEverSmallerStopAtTheFloor) {
+  // What a filter does that confirms itself: every refit finds less noise than the model in force.
+  const auto configured = mtx_class_noise();
+  NoiseFeedback feedback(configured, 0.5);
+  for (int refit = 1; refit <= 40; ++refit)
+    (void)feedback.consider(louder(feedback.in_force(), 0.7, 0.5), 6000 * refit);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_DOUBLE_EQ(feedback.in_force().gyro[kDynamic].white_sd[i],
+                     0.5 * configured.gyro[kDynamic].white_sd[i]);
+    EXPECT_DOUBLE_EQ(feedback.in_force().gyro_bias[i].sd, 0.5 * configured.gyro_bias[i].sd);
+  }
+}
+
+TEST(NoiseFeedback, ARefitThatSaysNothingUsableGoesNowhere) {
+  const auto configured = mtx_class_noise();
+  NoiseFeedback feedback(configured, 0.5);
+  EXPECT_FALSE(feedback.consider({}, 6000));
+  auto vague = louder(configured, 1.5);
+  for (auto& model : vague.models) model.identifiable = false;
+  EXPECT_FALSE(feedback.consider(vague, 6000));
+  EXPECT_EQ(feedback.version(), 0);
+  EXPECT_TRUE(feedback.in_force() == configured);
+}
+
 TEST(NoiseFeedback, TheCapturesRecordGivesEveryNumberBackToTheBit) {
-  AppliedNoise applied{2, 12345, {60000, {}}};
+  AppliedNoise applied{2, 12345, {60000, {}, 7}};
   double next = 0.1;
   for (auto* triads : {&applied.model.noise.gyro, &applied.model.noise.accel}) {
     for (auto& triad : *triads) {
@@ -92,6 +154,7 @@ TEST(NoiseFeedback, TheCapturesRecordGivesEveryNumberBackToTheBit) {
   EXPECT_EQ(back.study, 2U);
   EXPECT_EQ(back.tick, 12345);
   EXPECT_EQ(back.model.samples, 60000);
+  EXPECT_EQ(back.model.version, 7);
   static_assert(std::has_unique_object_representations_v<std::int64_t>);
   EXPECT_EQ(std::memcmp(&back.model.noise, &applied.model.noise, sizeof back.model.noise), 0);
 }
