@@ -372,6 +372,10 @@ Html summary_section(const RunFiles& run, const std::vector<Fit>& fits) {
   Html section = element("h2", text("In short"));
   section += verdict_block("Is the calibration usable?", calibration_verdict(run));
   section += verdict_block("Is the noise model adequate?", model_verdict(fits));
+  if (!run.comparison.is_null())
+    section += verdict_block("Do rest and motion differ?", difference_verdict(run));
+  if (!run.evaluation.is_null())
+    section += verdict_block("Does it matter which model a filter holds?", outage_verdict(run));
   section +=
       element("div", element("h3", text("What to do next")) + list_of(next_steps(run, fits)), "answer next");
   section += paragraph(

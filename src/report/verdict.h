@@ -31,10 +31,14 @@ inline constexpr double kTestLevel = 0.05;
 
 Verdict calibration_verdict(const RunFiles& run);
 Verdict model_verdict(const std::vector<Fit>& fits);
+/// Do the models of rest and motion differ? By comparison.json; kOpen where it is absent or empty.
+Verdict difference_verdict(const RunFiles& run);
+/// Does it matter which model a filter holds? By evaluation.json; kOpen where it is absent.
+Verdict outage_verdict(const RunFiles& run);
 /// What to do next; never empty.
 std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>& fits);
 
-/// The three of them as the first section of the page.
+/// All of them as the first section of the page.
 Html summary_section(const RunFiles& run, const std::vector<Fit>& fits);
 
 }  // namespace imuscope::report

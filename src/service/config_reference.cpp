@@ -86,7 +86,7 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"noise.refit_interval_s", "Live: from one refit to the next, seconds."},
     {"noise.remove_scale_error",
      "Takes the estimated scale errors out of the error process before noise is fitted to it."},
-    {"noise.apply_to_filter", "Live: models that pass their checks go back to the filter."},
+    {"noise.apply_to_filter", "Live: models that pass their checks go back to the filter, when they have moved."},
     {"lcm.url", "Where results are published. `ttl=0` stays on this PC, `ttl=1` reaches its network."},
     {"lcm.channel_prefix", "What the channels' names begin with."},
     {"lcm.bridge", "Publishes the widespread `pose_t` and `ins_t`, too."},
@@ -141,6 +141,14 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"device.noise.gyro_scale_sd_percent",
      "study: how far from 1 the gyros' scales may be, 1 sigma; 0: exact."},
     {"device.noise.accel_scale_sd_percent", "study: the same of the accelerometers."},
+    {"device.data_sheet.gyro_density_degps_per_sqrt_hz",
+     "study: the maker's gyro noise density. `imuscope evaluate` holds the data sheet against fitted models; "
+     "xsens_mt and xsens_can have the MTx's and the MTi-630's."},
+    {"device.data_sheet.gyro_bias_stability_deg_per_h", "study: the maker's gyro bias stability, 1 sigma."},
+    {"device.data_sheet.accel_density_ug_per_sqrt_hz", "study: the maker's accelerometer noise density."},
+    {"device.data_sheet.accel_bias_stability_ug", "study: the maker's accelerometer bias stability, 1 sigma."},
+    {"device.data_sheet.bias_time_s",
+     "study: the correlation time that such a bias is given, seconds; data sheets do not say."},
     {"device.prior.rotation_vector_b_s_deg",
      "study: the boresight, where it is known: the rotation that takes b to s. Without it any mounting is "
      "found."},

@@ -274,6 +274,7 @@ json run_document(const SyntheticRun& options) {
           {"version", "0.1.0"},
           {"build", "release"},
           {"configuration", "config/demo.toml"},
+          {"configuration_text", "[run]\nname = \"demo\"\n"},
           {"configuration_sha256", "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"},
           {"inputs", {"airins=airins.bin", "gnss=gnss.bin"}},
           {"duration_s", options.duration_s},
@@ -327,6 +328,122 @@ void write_scatter(const std::filesystem::path& file) {
   }
 }
 
+json comparison_entry(const std::string& name, const std::string& axis) {
+  const json parameter{{"process", "WN"},       {"name", "sigma2"},   {"unit", "(rad/s)^2"}, {"first", 1.0},
+                       {"second", 1.29},        {"ratio", 1.293},     {"ratio_ci_low", 1.28},
+                       {"ratio_ci_high", 1.31}, {"p_value", 1e-12},   {"p_holm", 1e-11},
+                       {"verdict", "differ"}};
+  const json unsure{{"process", "GM2"},       {"name", "beta"},        {"unit", "1/s"},
+                    {"ratio", nullptr},       {"ratio_ci_low", nullptr}, {"ratio_ci_high", nullptr},
+                    {"p_value", nullptr},     {"p_holm", nullptr},     {"verdict", "not determined"}};
+  return {{"name", name},
+          {"axis", axis},
+          {"first", "static"},
+          {"second", "dynamic"},
+          {"parameters", {parameter, unsure}},
+          {"joint", {{"statistic", 812.5}, {"dof", 5}, {"p_value", 1e-99}, {"p_holm", 1e-98}}},
+          {"remarks", json::array()}};
+}
+
+void write_dependence(const std::filesystem::path& folder, const SyntheticRun& options) {
+  json dependences = json::array();
+  json points = json::array();
+  for (const std::string& name : options.names) {
+    dependences.push_back({{"name", name},        {"axis", "gyro_x"},
+                           {"driver", "vibration"}, {"driver_unit", "m/s^2"},
+                           {"process", "WN"},     {"parameter", "sigma2"},
+                           {"unit", "(rad/s)^2"}, {"n_windows", 30},
+                           {"at_mean_driver", 1.9e-4}, {"mean_driver", 0.4},
+                           {"slope", 0.3},        {"slope_sd", 0.04},
+                           {"ci_low", 0.22},      {"ci_high", 0.38},
+                           {"p_value", 1e-9},     {"p_holm", 4e-9},
+                           {"percent_per_unit", 35.0}, {"sentence", "louder on rough road"}});
+    for (int i = 0; i < 30; ++i) {
+      const double vibration = 0.02 * i;
+      points.push_back({{"name", name},
+                        {"axis", "gyro_x"},
+                        {"process", "WN"},
+                        {"driver", {{"rate", 0.1}, {"vibration", vibration}, {"speed", 10.0}}},
+                        {"time_s", 2.0 * i},
+                        {"value", 1.9e-4 * std::exp(0.3 * (vibration - 0.4))},
+                        {"ci_low", 1.8e-4},
+                        {"ci_high", 2.0e-4}});
+    }
+  }
+  write_json(folder / "dependence.json",
+             {{"schema", "imuscope.dependence/1"},
+              {"window_s", 20.0},
+              {"dependences", dependences},
+              {"points", points},
+              {"not_determined",
+               {{{"name", options.names.front()}, {"axis", "accel_z"}, {"driver", "temperature"},
+                 {"process", "WN"}, {"why", "the temperature did not change"}}}},
+              {"remarks", json::array()}});
+}
+
+void write_evaluation(const std::filesystem::path& folder, const SyntheticRun& options) {
+  json evaluations = json::array();
+  for (const std::string& name : options.names) {
+    for (const double duration_s : {10.0, 30.0, 60.0}) {
+      for (const auto& [model, nees] : {std::pair{"dynamic", 1.02}, std::pair{"data sheet", 9.5}}) {
+        evaluations.push_back({{"name", name},
+                               {"model", model},
+                               {"source", "made up"},
+                               {"duration_s", duration_s},
+                               {"n", 100},
+                               {"n_independent", 20},
+                               {"horizontal_rms_m", 0.05 * duration_s * duration_s},
+                               {"horizontal_sd_m", 0.05 * duration_s * duration_s / std::sqrt(nees)},
+                               {"nees_position", nees},
+                               {"nees_velocity", nees},
+                               {"nees_attitude", nees},
+                               {"nees_low", 0.7},
+                               {"nees_high", 1.4},
+                               {"surprise", 3.0 + nees}});
+      }
+    }
+  }
+  write_json(folder / "evaluation.json",
+             {{"schema", "imuscope.evaluation/1"},
+              {"durations_s", {10.0, 30.0, 60.0}},
+              {"evaluations", evaluations},
+              {"absent",
+               {{{"name", options.names.front()}, {"model", "static"}, {"why", "no model of rest"}}}}});
+}
+
+void write_findings(const std::filesystem::path& folder, const SyntheticRun& options) {
+  json comparisons = json::array();
+  for (const std::string& name : options.names) {
+    for (const char* axis : kAxes) comparisons.push_back(comparison_entry(name, axis));
+  }
+  write_json(folder / "comparison.json", {{"schema", "imuscope.comparison/1"},
+                                          {"correction", "Holm"},
+                                          {"level", 0.05},
+                                          {"comparisons", comparisons}});
+  write_json(folder / "regimes.json",
+             {{"schema", "imuscope.regimes/1"},
+              {"by", "motion"},
+              {"regimes",
+               {{{"name", "static"}, {"total_s", 12.0}, {"longest_s", 12.0},
+                 {"stretches", {{{"begin_s", 0.0}, {"end_s", 12.0}}}}},
+                {{"name", "dynamic"}, {"total_s", 48.0}, {"longest_s", 48.0},
+                 {"stretches", {{{"begin_s", 12.0}, {"end_s", 60.0}}}}}}},
+              {"left_out",
+               {{{"name", options.names.front()}, {"axis", "gyro_x"}, {"regime", "static"},
+                 {"above_level", 9}, {"above_tau_s", 5.12},
+                 {"sentence", "gyro_x, static: levels above 5.12 s are left out, its stretches are too short"}}}},
+              {"remarks", {"The drive has one standstill."}}});
+  write_json(folder / "vibration.json",
+             {{"schema", "imuscope.vibration/1"},
+              {"lines",
+               {{{"name", options.names.front()}, {"axis", "accel_z"}, {"regime", "dynamic"},
+                 {"frequency_hz", 28.31}, {"frequency_sd_hz", 0.02}, {"amplitude", 0.05},
+                 {"amplitude_unit", "m/s^2"}, {"share_of_variance", 0.12}, {"p_value", 1e-8}}}},
+              {"remarks", json::array()}});
+  write_dependence(folder, options);
+  write_evaluation(folder, options);
+}
+
 }  // namespace
 
 void write_synthetic_run(const std::filesystem::path& folder, const SyntheticRun& options) {
@@ -358,6 +475,7 @@ void write_synthetic_run(const std::filesystem::path& folder, const SyntheticRun
     write_json(folder / "regression.json",
                {{"schema", "imuscope.regression/1"}, {"regressions", regressions}});
   }
+  if (options.with_findings) write_findings(folder, options);
   write_navigation(folder, options);
 }
 

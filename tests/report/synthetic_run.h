@@ -17,6 +17,7 @@ struct SyntheticRun {
   bool psi_z_observable = true;
   bool with_truth = true;
   bool with_regression = true;
+  bool with_findings = true;  ///< regimes, comparison, dependence, vibration and evaluation
   double gap_begin_s = -1.0;  ///< error signals have no sample from here ...
   double gap_end_s = -1.0;    ///< ... to here
 };

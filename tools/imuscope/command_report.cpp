@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "commands.h"
+#include "report/paper_figures.h"
 #include "report/report.h"
 
 namespace imuscope::cli {
@@ -12,9 +13,15 @@ void add_report(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand("report", "Write report.html from the files of a run folder");
   auto run_dir = std::make_shared<std::filesystem::path>();
   command->add_option("RUN_DIR", *run_dir, "Folder that a run wrote with --out")->required();
-  on_chosen(*command, chosen, [run_dir]() -> Result<void> {
+  auto figures = std::make_shared<bool>(false);
+  command->add_flag("--figures", *figures, "draw the figures as SVG and PDF for papers, too (RUN_DIR/figures)");
+  on_chosen(*command, chosen, [run_dir, figures]() -> Result<void> {
     if (auto written = write_report(*run_dir); !written) return written;
     fmt::print("{}\n", (*run_dir / "report.html").string());
+    if (!*figures) return {};
+    const auto drawn = write_figures(*run_dir);
+    if (!drawn) return tl::unexpected<Error>(drawn.error());
+    for (const auto& file : *drawn) fmt::print("{}\n", file.string());
     return {};
   });
 }
