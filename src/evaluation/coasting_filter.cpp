@@ -37,8 +37,7 @@ CoastingFilter::CoastingFilter(const CoastingModel& model, const NavigationState
     const AxisNoise& noise = model.axes[axis];
     IMUSCOPE_EXPECTS(noise.slow.size() <= kSlowMax);
     const auto component = static_cast<Eigen::Index>(axis % 3);
-    const double first =
-        axis < 3 ? start.gyro_bias_b_radps[component] : start.accel_bias_b_mps2[component];
+    const double first = axis < 3 ? start.gyro_bias_b_radps[component] : start.accel_bias_b_mps2[component];
     biases_.push_back({axis, 0.0, 0.0, noise.walk_density, first});
     variances.push_back(noise.turn_on_variance);
     for (const SlowProcess& process : noise.slow) {
@@ -110,8 +109,7 @@ void CoastingFilter::settle() {
   P_.bottomRightCorner(m, m) = decay.asDiagonal() * P_.bottomRightCorner(m, m) * decay.asDiagonal();
 
   KinematicCovariance white = KinematicCovariance::Zero();
-  white.block<3, 3>(kVelocityError, kVelocityError) =
-      turned_density(middle.C_b_n, &pending_.density_sum[3]);
+  white.block<3, 3>(kVelocityError, kVelocityError) = turned_density(middle.C_b_n, &pending_.density_sum[3]);
   white.block<3, 3>(kAttitudeError, kAttitudeError) =
       turned_density(middle.C_b_n, pending_.density_sum.data());
   const auto A = rows.leftCols<kKinematic>();
@@ -167,8 +165,7 @@ bool CoastingFilter::update(GnssGate& gate, HostTime time, const GnssInnovation&
   }
   const Eigen::LLT<Matrix3d> S_root(S);
   // W W^T = P H^T S^-1 H P
-  const Eigen::Matrix<double, Eigen::Dynamic, 3> W =
-      S_root.matrixL().solve(PHt.transpose()).transpose();
+  const Eigen::Matrix<double, Eigen::Dynamic, 3> W = S_root.matrixL().solve(PHt.transpose()).transpose();
   const Eigen::VectorXd correction = PHt * S_root.solve(measured.innovation);
   P_ -= W * W.transpose();
   NavigationErrorVector kinematic = NavigationErrorVector::Zero();

@@ -21,8 +21,8 @@ struct SlowProcess {
 };
 
 struct AxisNoise {
-  double white_density = 0.0;    ///< u²/Hz: white noise, with every process too fast to be a state
-  double walk_density = 0.0;     ///< u²/s: random walk of the bias
+  double white_density = 0.0;     ///< u²/Hz: white noise, with every process too fast to be a state
+  double walk_density = 0.0;      ///< u²/s: random walk of the bias
   double turn_on_variance = 0.0;  ///< u²: of the constant part of the bias, at the start
   std::vector<SlowProcess> slow;  ///< at most kSlowMax
 };
@@ -33,8 +33,8 @@ struct CoastingModel {
   std::string name;    ///< "static", "dynamic", "by dynamics", "data sheet"
   std::string source;  ///< where its numbers come from, for people
   std::array<AxisNoise, kImuAxes> axes;
-  /// White densities in force from `from_s` on, in order of time, where they change with the vehicle's motion.
-  /// Empty: those of `axes` throughout.
+  /// White densities in force from `from_s` on, in order of time, where they change with the vehicle's
+  /// motion. Empty: those of `axes` throughout.
   struct Change {
     double from_s = -std::numeric_limits<double>::infinity();
     std::array<double, kImuAxes> white_density{};

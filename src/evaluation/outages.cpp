@@ -221,9 +221,9 @@ Consistency summary(const std::vector<const OutageResult*>& outages) {
   }
   const auto n = static_cast<double>(out.n);
   for (double* mean : {&out.nees_position, &out.nees_velocity, &out.nees_attitude, &out.surprise}) *mean /= n;
-  for (double* root : {&out.horizontal_rms_m, &out.horizontal_sd_m, &out.vertical_rms_m, &out.vertical_sd_m,
-                       &out.velocity_rms_mps, &out.velocity_sd_mps, &out.attitude_rms_rad,
-                       &out.attitude_sd_rad}) {
+  for (double* root :
+       {&out.horizontal_rms_m, &out.horizontal_sd_m, &out.vertical_rms_m, &out.vertical_sd_m,
+        &out.velocity_rms_mps, &out.velocity_sd_mps, &out.attitude_rms_rad, &out.attitude_sd_rad}) {
     *root = std::sqrt(*root / n);
   }
   const double dof = kFreedom * static_cast<double>(out.n_independent);

@@ -47,7 +47,7 @@ struct OutageOptions {
   double spacing_s = 5.0;                             ///< between starts
   /// With GNSS and in motion before the first start: at rest a heading can only be lost.
   double settle_s = 60.0;
-  std::function<void(double)> progress;               ///< share done; may be empty
+  std::function<void(double)> progress;  ///< share done; may be empty
 };
 
 /// State of one outage after one duration.

@@ -232,9 +232,11 @@
     const margin = 36;
     const flattest = 0.52;  // of height to width: the map shall fit a screen
     const scale = (width - 2 * margin) / Math.max(east - west, (north - south) / flattest, 1);
-    const height = Math.max((north - south) * scale, 140) + 2 * margin;
+    const foot = 30;  // a strip of its own for scale bar and north, so that the way never runs under them
+    const field = Math.max((north - south) * scale, 140) + 2 * margin;
+    const height = field + foot;
     const x = (e) => margin + (e - west) * scale + ((width - 2 * margin) - (east - west) * scale) / 2;
-    const y = (n) => height - margin - (n - south) * scale - ((height - 2 * margin) - (north - south) * scale) / 2;
+    const y = (n) => field - margin - (n - south) * scale - ((field - 2 * margin) - (north - south) * scale) / 2;
     const level = (v) => Math.min(SPEED_COLOURS.length - 1, Math.floor((v || 0) / (fastest || 1) * SPEED_COLOURS.length));
 
     // One path for each run of points of the same speed class; a gap in time breaks the way.
@@ -256,16 +258,17 @@
     }
     const bar = roundLength((width - 2 * margin) / 3 / scale);
     const mark = (point, label) => '<circle cx="' + x(point.e) + '" cy="' + y(point.n) + '" r="5" fill="none" stroke-width="2" ' +
-        'stroke="currentColor"/><text x="' + (x(point.e) + 9) + '" y="' + (y(point.n) - 7) + '">' + label + '</text>';
+        'stroke="currentColor"/><text ' + (x(point.e) > width - 60 ? 'text-anchor="end" x="' + (x(point.e) - 9) : 'x="' + (x(point.e) + 9)) +
+        '" y="' + (y(point.n) - 7) + '">' + label + '</text>';
     place.innerHTML = '<svg viewBox="0 0 ' + width + ' ' + height.toFixed(0) + '" role="img" aria-label="map">' +
         '<rect class="frame" x="0.5" y="0.5" width="' + (width - 1) + '" height="' + (height - 1).toFixed(0) + '"/>' +
         paths.map((path) => '<path d="' + path.d + '" fill="none" stroke-width="2.5" vector-effect="non-scaling-stroke" ' +
                             'stroke-linejoin="round" stroke="' + path.colour + '"/>').join('') +
         mark(points[0], 'start') + mark(points[points.length - 1], 'end') +
-        '<path d="M20 ' + (height - 18) + 'h' + (bar * scale) + '" stroke="currentColor" stroke-width="3"/>' +
-        '<text x="20" y="' + (height - 26) + '">' + (bar >= 1000 ? bar / 1000 + ' km' : bar + ' m') + '</text>' +
-        '<path d="M' + (width - 26) + ' 44V18l-6 9m6-9l6 9" fill="none" stroke="currentColor" stroke-width="2"/>' +
-        '<text x="' + (width - 31) + '" y="60">N</text></svg>';
+        '<path d="M20 ' + (height - 14) + 'h' + (bar * scale) + '" stroke="currentColor" stroke-width="3"/>' +
+        '<text x="' + (28 + bar * scale) + '" y="' + (height - 10) + '">' + (bar >= 1000 ? bar / 1000 + ' km' : bar + ' m') + '</text>' +
+        '<path d="M' + (width - 20) + ' ' + (height - 6) + 'v-22l-5 8m5-8l5 8" fill="none" stroke="currentColor" stroke-width="2"/>' +
+        '<text x="' + (width - 42) + '" y="' + (height - 10) + '">N</text></svg>';
     legendPlace.innerHTML = legend(SPEED_COLOURS.map((colour, k) => ({
       colour,
       text: (k * fastest / SPEED_COLOURS.length).toFixed(0) + '–' + ((k + 1) * fastest / SPEED_COLOURS.length).toFixed(0) +

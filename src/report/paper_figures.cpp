@@ -58,10 +58,9 @@ std::string block_of(const std::string& name, const BinnedSignals& signals, std:
   for (std::size_t i = 0; i < signals.size(); ++i) {
     const double value = unit * signals.bin(signal, i).last;
     const double sd = unit * signals.bin(sd_signal, i).last;
-    block += std::isfinite(value)
-                 ? fmt::format("{} {} {} {}\n", cell(signals.time_s(i)), cell(value), cell(value - sd),
-                               cell(value + sd))
-                 : std::string("\n");
+    block += std::isfinite(value) ? fmt::format("{} {} {} {}\n", cell(signals.time_s(i)), cell(value),
+                                                cell(value - sd), cell(value + sd))
+                                  : std::string("\n");
   }
   return block + "EOD\n";
 }
@@ -119,8 +118,7 @@ Picture error_picture(const StudyFiles& study) {
   for (std::size_t i = 0; i < kErrorSignals; ++i) {
     const std::string block = fmt::format("error{}", i);
     picture.body += block_of(block, *study.errors, i);
-    picture.body +=
-        fmt::format("set ylabel '{}, {}'\n", axis_words(kAxes[i]), i < kTriad ? "deg/s" : "m/s²");
+    picture.body += fmt::format("set ylabel '{}, {}'\n", axis_words(kAxes[i]), i < kTriad ? "deg/s" : "m/s²");
     picture.body += band_plot(block, kColours[i % kTriad]);
   }
   return picture;
@@ -149,7 +147,8 @@ Picture scatter_picture(const StudyFiles& study) {
         picture.body += fmt::format("{:.5g} {:.5g}\n", x[i], y[i]);
     }
     picture.body += fmt::format(
-        "EOD\nset xlabel '{}'\nset ylabel 'error of {}, {}'\nplot $points{} using 1:2 with points pointtype 7 "
+        "EOD\nset xlabel '{}'\nset ylabel 'error of {}, {}'\nplot $points{} using 1:2 with points pointtype "
+        "7 "
         "pointsize 0.15 linecolor rgb '{}' notitle\n",
         panel.words, axis_words(kAxes[panel.error]), panel.error < kTriad ? "deg/s" : "m/s²", n,
         kColours[panel.error % kTriad]);
@@ -183,8 +182,8 @@ std::string wavelet_plots(const std::string& block, const Fit& fit, const char* 
       block, colour, quoted(fit.regime.empty() ? "all" : fit.regime));
   for (std::size_t i = 0; i < fit.components.size(); ++i) {
     if (fit.components[i].values.size() != fit.levels.size()) continue;
-    plots += fmt::format(", ${} using 1:{} with lines dashtype 2 linewidth 0.8 linecolor rgb '{}' notitle", block,
-                         kFirstComponent + static_cast<int>(i), colour);
+    plots += fmt::format(", ${} using 1:{} with lines dashtype 2 linewidth 0.8 linecolor rgb '{}' notitle",
+                         block, kFirstComponent + static_cast<int>(i), colour);
   }
   return plots;
 }
@@ -232,10 +231,10 @@ std::optional<Picture> wavelet_picture(const std::vector<Fit>& fits, const std::
       picture.body += wavelet_block(block, *of_axis[i]);
       plots += (plots.empty() ? "" : ", ") + wavelet_plots(block, *of_axis[i], kColours[(i + 2) % kTriad]);
     }
-    picture.body += wavelet_range(of_axis) + fmt::format("set ylabel {}\nplot {}\n",
-                                                         quoted(fmt::format("{}, ({})²", axis_words(axis),
-                                                                            of_axis.front()->unit)),
-                                                         plots);
+    picture.body +=
+        wavelet_range(of_axis) +
+        fmt::format("set ylabel {}\nplot {}\n",
+                    quoted(fmt::format("{}, ({})²", axis_words(axis), of_axis.front()->unit)), plots);
   }
   return any ? std::optional(picture) : std::nullopt;
 }
@@ -268,10 +267,11 @@ std::string script_of(const Picture& picture) {
        "svg"},
       {fmt::format("pdfcairo size {:g}in,{:g}in font 'sans,8'", width, height), "pdf"}};
   for (const auto& [terminal, suffix] : kOutputs) {
-    script += fmt::format("reset\nset terminal {}\nset output '{}.{}'\nset grid linecolor rgb '#dddddd'\n"
-                          "set border 3\nset tics nomirror\nset multiplot layout {},{}\n{}unset multiplot\n"
-                          "set output\n",
-                          terminal, picture.name, suffix, picture.rows, picture.columns, picture.body);
+    script += fmt::format(
+        "reset\nset terminal {}\nset output '{}.{}'\nset grid linecolor rgb '#dddddd'\n"
+        "set border 3\nset tics nomirror\nset multiplot layout {},{}\n{}unset multiplot\n"
+        "set output\n",
+        terminal, picture.name, suffix, picture.rows, picture.columns, picture.body);
   }
   return script;
 }

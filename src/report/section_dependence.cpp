@@ -42,11 +42,10 @@ Html dependence_table(const RunFiles& run, const std::string& imu) {
     const auto slope = number_at(entry, "slope");
     const auto low = number_at(entry, "ci_low");
     const auto high = number_at(entry, "ci_high");
-    const Html change =
-        slope ? with_interval(percent_of(*slope), low ? std::optional(percent_of(*low)) : low,
-                              high ? std::optional(percent_of(*high)) : high) +
-                    text(" % per " + text_at(entry, "driver_unit"))
-              : text(kUnknown);
+    const Html change = slope ? with_interval(percent_of(*slope), low ? std::optional(percent_of(*low)) : low,
+                                              high ? std::optional(percent_of(*high)) : high) +
+                                    text(" % per " + text_at(entry, "driver_unit"))
+                              : text(kUnknown);
     table.add_row({text(text_at(entry, "process") + " " + text_at(entry, "parameter")),
                    text(text_at(entry, "driver")),
                    at_mean ? number(factor * *at_mean, 4) + text(" " + unit) : text(kUnknown), change,
@@ -74,10 +73,9 @@ Html dependence_figure(const RunFiles& run, const json& entry, FigureSheet& figu
   }
   if (x.empty()) return {};
   const std::string driver_words = driver + ", " + text_at(entry, "driver_unit");
-  return figures.scatter_figure(fmt::format("dependence-{}-{}-{}", axis, driver, imu), driver_words, unit, x,
-                                y, 2,
-                                text(fmt::format("{}: variance of the white noise, {}, against {}",
-                                                 axis_words(axis), unit, driver)));
+  return figures.scatter_figure(
+      fmt::format("dependence-{}-{}-{}", axis, driver, imu), driver_words, unit, x, y, 2,
+      text(fmt::format("{}: variance of the white noise, {}, against {}", axis_words(axis), unit, driver)));
 }
 
 Html dependence_panels(const RunFiles& run, const std::string& imu, FigureSheet& figures) {
@@ -100,13 +98,13 @@ Html not_determined(const RunFiles& run, const std::string& imu) {
   Html items;
   for (const json& entry : field(run.dependence, "not_determined")) {
     if (text_at(entry, "name") != imu) continue;
-    items += element("li", text(fmt::format("{} {} against {}: {}", axis_words(text_at(entry, "axis")),
-                                            text_at(entry, "process"), text_at(entry, "driver"),
-                                            text_at(entry, "why"))));
+    items += element(
+        "li", text(fmt::format("{} {} against {}: {}", axis_words(text_at(entry, "axis")),
+                               text_at(entry, "process"), text_at(entry, "driver"), text_at(entry, "why"))));
   }
-  return items.empty() ? Html{}
-                       : element("details", element("summary", text("Not determined")) +
-                                                element("ul", items, "note"));
+  return items.empty()
+             ? Html{}
+             : element("details", element("summary", text("Not determined")) + element("ul", items, "note"));
 }
 
 Html vibration_lines(const RunFiles& run) {
@@ -136,8 +134,10 @@ Html vibration_lines(const RunFiles& run) {
 Html dependence_section(const RunFiles& run, FigureSheet& figures) {
   Html section = element("h2", text("How the noise depends on the motion"));
   if (run.dependence.is_null()) {
-    return section + paragraph("No dependence.json in this run: parameters were not studied against the "
-                               "motion.") +
+    return section +
+           paragraph(
+               "No dependence.json in this run: parameters were not studied against the "
+               "motion.") +
            vibration_lines(run);
   }
   const auto window_s = number_at(run.dependence, "window_s");

@@ -106,11 +106,11 @@ std::vector<Html> difference_cells(const nlohmann::json& comparison, const FitPa
     if (text_at(entry, "process") != parameter.process || text_at(entry, "name") != parameter.name) continue;
     const auto ratio = number_at(entry, "ratio");
     const std::string verdict = text_at(entry, "verdict");
-    return {ratio ? with_interval(*ratio, number_at(entry, "ratio_ci_low"), number_at(entry, "ratio_ci_high"))
-                  : text(kUnknown),
-            p_words(number_at(entry, "p_holm")),
-            verdict == "differ" ? element("strong", text(verdict))
-                                : text(verdict.empty() ? kUnknown : verdict)};
+    return {
+        ratio ? with_interval(*ratio, number_at(entry, "ratio_ci_low"), number_at(entry, "ratio_ci_high"))
+              : text(kUnknown),
+        p_words(number_at(entry, "p_holm")),
+        verdict == "differ" ? element("strong", text(verdict)) : text(verdict.empty() ? kUnknown : verdict)};
   }
   return {text(kUnknown), text(kUnknown), text(kUnknown)};
 }
@@ -121,13 +121,15 @@ std::string joint_words(const nlohmann::json& comparison) {
   if (!p) return {};
   const std::string words = *p < kSmallestP ? "< 10⁻⁶" : fmt::format("= {:.2g}", *p);
   return fmt::format(" · all parameters together: χ² = {:.4g} with {:.0f} degrees of freedom, p {}",
-                     number_at(joint, "statistic").value_or(0.0), number_at(joint, "dof").value_or(0.0), words);
+                     number_at(joint, "statistic").value_or(0.0), number_at(joint, "dof").value_or(0.0),
+                     words);
 }
 
 std::string test_words(const Fit& fit) {
   std::string words = "not tested";
   if (fit.j_p_value) {
-    words = *fit.j_p_value < kSmallestP ? "J-test p < 10⁻⁶" : fmt::format("J-test p = {:.2g}", *fit.j_p_value);
+    words =
+        *fit.j_p_value < kSmallestP ? "J-test p < 10⁻⁶" : fmt::format("J-test p = {:.2g}", *fit.j_p_value);
   }
   if (fit.n) words += fmt::format(", n = {:.0f}", *fit.n);
   if (!fit.identifiable) words += ", not identifiable";
@@ -178,8 +180,9 @@ Html left_out(const RunFiles& run, const std::string& imu) {
   for (const auto& entry : field(run.regimes, "left_out")) {
     if (text_at(entry, "name") == imu) items += element("li", text(text_at(entry, "sentence")));
   }
-  return items.empty() ? Html{} : element("details", element("summary", text("Levels left out")) +
-                                                         element("ul", items, "note"));
+  return items.empty()
+             ? Html{}
+             : element("details", element("summary", text("Levels left out")) + element("ul", items, "note"));
 }
 
 /// How the drive was divided, and how much there is of each part.
@@ -204,8 +207,8 @@ Html regimes_table(const RunFiles& run) {
 std::vector<std::string> drawn_regimes(std::vector<std::string> regimes) {
   constexpr std::size_t kTwo = 2;
   const auto is_whole = [](const std::string& regime) { return regime == "all" || regime.empty(); };
-  const auto n_parts = regimes.size() - static_cast<std::size_t>(
-                                            std::count_if(regimes.begin(), regimes.end(), is_whole));
+  const auto n_parts =
+      regimes.size() - static_cast<std::size_t>(std::count_if(regimes.begin(), regimes.end(), is_whole));
   if (n_parts >= kTwo) std::erase_if(regimes, is_whole);
   return regimes;
 }
@@ -234,7 +237,8 @@ Html wavelet_panels(const std::vector<Fit>& fits, const std::string& imu,
     panels += figures.wavelet_figure(fmt::format("wavelet-{}-{}", axis, imu), of_axis,
                                      text(fmt::format("{}, ({})²", axis_words(axis), of_axis.front()->unit)));
   }
-  return panels.empty() ? paragraph("No wavelet variance of this sensor.") : element("div", panels, "panels wide");
+  return panels.empty() ? paragraph("No wavelet variance of this sensor.")
+                        : element("div", panels, "panels wide");
 }
 
 }  // namespace
@@ -268,8 +272,8 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
       "line: the variance that the fitted model implies; dashed: its processes one by one. Where the line "
       "leaves the intervals the model does not explain the signal.");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) +
-               wavelet_panels(fits, study.name, drawn_regimes(regimes), figures);
+    section +=
+        element("h3", text(study.name)) + wavelet_panels(fits, study.name, drawn_regimes(regimes), figures);
   }
   section += element("h2", text("Table II: parameters of the noise models"));
   section += paragraph(
@@ -278,10 +282,12 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
       "time, σ² its variance); RW: random walk; QN: quantisation noise.");
   section += regimes_table(run);
   section += field(run.comparison, "comparisons").empty()
-                 ? paragraph("No comparison.json with two regimes in this run: the models are shown side by "
-                             "side without a test of difference.")
-                 : paragraph("Ratio: the second regime's parameter over the first's. The p values are corrected "
-                             "for the number of tests (Holm); “no difference shown” is not “equal”.");
+                 ? paragraph(
+                       "No comparison.json with two regimes in this run: the models are shown side by "
+                       "side without a test of difference.")
+                 : paragraph(
+                       "Ratio: the second regime's parameter over the first's. The p values are corrected "
+                       "for the number of tests (Holm); “no difference shown” is not “equal”.");
   for (const StudyFiles& study : run.studies) {
     section += element("h3", text(study.name)) + parameter_table(run, fits, study.name, regimes) +
                left_out(run, study.name) + fit_warnings(fits, study.name);

@@ -14,13 +14,15 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::pair<noise::ExportFormat, const char*> kFormats[] = {{noise::ExportFormat::kKalibr, "kalibr"},
-                                                                    {noise::ExportFormat::kRos, "ros"},
-                                                                    {noise::ExportFormat::kPx4, "px4"},
-                                                                    {noise::ExportFormat::kKfGins, "kf-gins"}};
+constexpr std::pair<noise::ExportFormat, const char*> kFormats[] = {
+    {noise::ExportFormat::kKalibr, "kalibr"},
+    {noise::ExportFormat::kRos, "ros"},
+    {noise::ExportFormat::kPx4, "px4"},
+    {noise::ExportFormat::kKfGins, "kf-gins"}};
 
 /// The fits of one sensor in one regime that can be exported.
-std::vector<noise::AxisFit> axis_fits(const RunFiles& run, const std::string& imu, const std::string& regime) {
+std::vector<noise::AxisFit> axis_fits(const RunFiles& run, const std::string& imu,
+                                      const std::string& regime) {
   std::vector<noise::AxisFit> fits;
   for (const json& entry : run.models) {
     if (text_at(entry, "name") != imu || text_at(entry, "regime") != regime) continue;
@@ -48,13 +50,14 @@ Html quantity_table(const std::vector<noise::AxisFit>& fits) {
         value[i] = number(quantity.value, 3);
         unit[i] = quantity.unit;
       }
-      if (quantity.process.rfind("GM", 0) != 0) continue;  // in order of falling rate: the last is the slowest
+      if (quantity.process.rfind("GM", 0) != 0)
+        continue;  // in order of falling rate: the last is the slowest
       if (quantity.name == "sd") slow_sd = number(quantity.value, 3) + text(" " + quantity.unit);
       if (quantity.name == "correlation time") slow_time = number(quantity.value, 3);
     }
     const std::size_t walk = noise::is_gyro(axis.unit) ? 0 : 1;
-    table.add_row({text(axis_words(axis.axis)), value[walk], text(unit[walk]), value[2], text(unit[2]), slow_sd,
-                   slow_time});
+    table.add_row({text(axis_words(axis.axis)), value[walk], text(unit[walk]), value[2], text(unit[2]),
+                   slow_sd, slow_time});
   }
   return table.empty() ? Html{} : table.html();
 }
@@ -63,7 +66,8 @@ Html exports(const std::vector<noise::AxisFit>& fits) {
   Html all;
   for (const auto& [format, name] : kFormats) {
     const auto exported = noise::export_models(fits, format, false);
-    const Html content = exported ? element("pre", text(*exported)) : paragraph(exported.error().text(), "note");
+    const Html content =
+        exported ? element("pre", text(*exported)) : paragraph(exported.error().text(), "note");
     all += element("details", element("summary", text(name)) + content);
   }
   return all;
@@ -88,7 +92,8 @@ Html take_away_section(const RunFiles& run) {
   }
   section += paragraph(
       "In the terms of data sheets, and as the configuration of other tools. `imuscope export models.json` "
-      "writes the same as files, the whole model as state space, and with --conservative models that lie above "
+      "writes the same as files, the whole model as state space, and with --conservative models that lie "
+      "above "
       "what the data allow.");
   for (const StudyFiles& study : run.studies) {
     for (const std::string& regime : regimes_in(run, study.name)) {

@@ -29,9 +29,8 @@ bool differs(const json& comparison) {
 bool undetermined(const json& comparison) {
   const json& parameters = field(comparison, "parameters");
   return field(comparison, "joint").is_null() &&
-         std::all_of(parameters.begin(), parameters.end(), [](const json& parameter) {
-           return text_at(parameter, "verdict") == "not determined";
-         });
+         std::all_of(parameters.begin(), parameters.end(),
+                     [](const json& parameter) { return text_at(parameter, "verdict") == "not determined"; });
 }
 
 /// One model after one duration, over all S-IMUs.
@@ -91,10 +90,9 @@ Verdict difference_verdict(const RunFiles& run) {
     return verdict;
   }
   for (const auto& [name, counts] : by_imu) {
-    std::string sentence = fmt::format("{}: {} of {} axes differ{}", name, counts.differing.size(), counts.n,
-                                       counts.differing.empty()
-                                           ? ""
-                                           : fmt::format(" ({})", fmt::join(counts.differing, ", ")));
+    std::string sentence =
+        fmt::format("{}: {} of {} axes differ{}", name, counts.differing.size(), counts.n,
+                    counts.differing.empty() ? "" : fmt::format(" ({})", fmt::join(counts.differing, ", ")));
     if (counts.undetermined > 0) sentence += fmt::format("; {} could not be tested", counts.undetermined);
     verdict.reasons.push_back(sentence + ".");
   }
@@ -103,8 +101,8 @@ Verdict difference_verdict(const RunFiles& run) {
     verdict.headline = "Cannot be said: none of the axes could be tested.";
   } else {
     verdict.answer = Answer::kYes;
-    verdict.headline = n_differing == 0 ? "No difference was shown."
-                                        : fmt::format("Yes, on {} of {} axes.", n_differing, n);
+    verdict.headline =
+        n_differing == 0 ? "No difference was shown." : fmt::format("Yes, on {} of {} axes.", n_differing, n);
   }
   return verdict;
 }

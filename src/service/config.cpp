@@ -78,8 +78,8 @@ void read_noise(TomlReader in, double rate_hz, ImuNoiseConfig& noise) {
   in.finish();
 }
 
-/// Of devices that are one make: "MTi and MTx User Manual", MT0100P, specifications of the MTx; MTi-600 series
-/// data sheet, MTi-630.
+/// Of devices that are one make: "MTi and MTx User Manual", MT0100P, specifications of the MTx; MTi-600
+/// series data sheet, MTi-630.
 DataSheetConfig default_data_sheet(Protocol protocol) {
   DataSheetConfig sheet;
   if (protocol == Protocol::kXsensMt) {

@@ -88,7 +88,8 @@ struct ImuNoiseConfig {
   std::optional<double> accel_scale_sd;
 };
 
-/// What the maker's data sheet says of an IMU under study: `imuscope evaluate` holds it against fitted models.
+/// What the maker's data sheet says of an IMU under study: `imuscope evaluate` holds it against fitted
+/// models.
 struct DataSheetConfig {
   std::optional<double> gyro_density_radps_per_sqrt_hz;
   std::optional<double> gyro_bias_stability_radps;  ///< 1 sigma of what wanders
@@ -153,13 +154,13 @@ struct DeviceConfig {
   /// The device whose line also carries this one's bytes: itself, or another one behind the same Xbus Master.
   std::size_t line_owner = 0;
   XsensConfig xsens;
-  ImuNoiseConfig noise;       ///< reference and study
-  MountingPriorConfig prior;  ///< study
+  ImuNoiseConfig noise;        ///< reference and study
+  MountingPriorConfig prior;   ///< study
   DataSheetConfig data_sheet;  ///< study
-  int average_samples = 1;    ///< study: samples taken into one measurement update, see StudyConfig
-  CsvConfig csv;              ///< csv_imu, csv_gnss
-  GnssOptions gnss;           ///< gnss
-  OdometryOptions odometry;   ///< odometry
+  int average_samples = 1;     ///< study: samples taken into one measurement update, see StudyConfig
+  CsvConfig csv;               ///< csv_imu, csv_gnss
+  GnssOptions gnss;            ///< gnss
+  OdometryOptions odometry;    ///< odometry
   xsens_can::ItemIds xsens_can_ids = xsens_can::default_ids();  ///< xsens_can
 };
 

@@ -89,10 +89,11 @@ void evaluate_study(const StudyDrive& drive, const std::vector<EvaluationModel>&
     const auto table = consistency_of(results, outages.durations_s);
     for (const Consistency& row : table) evaluations.push_back(entry_of(drive.name, *candidate.model, row));
     if (table.empty()) {
-      absent.push_back({{"name", drive.name},
-                        {"model", candidate.name},
-                        {"why", fmt::format("no outage fits: it needs {:g} s of driving with GNSS, then {:g} s",
-                                            outages.settle_s, outages.durations_s.front())}});
+      absent.push_back(
+          {{"name", drive.name},
+           {"model", candidate.name},
+           {"why", fmt::format("no outage fits: it needs {:g} s of driving with GNSS, then {:g} s",
+                               outages.settle_s, outages.durations_s.front())}});
     }
   }
 }
@@ -127,22 +128,19 @@ Result<json> evaluate_run(const EvaluationRunOptions& options) {
     for (std::size_t i = 0; i < indices.size(); ++i) {
       const DeviceConfig& device = opened->configuration.devices[indices[i]];
       if (device.name != drive.name) continue;
-      const auto candidates = evaluation_models(drive, device.data_sheet, turn_on_sd(estimator.studies[i]),
-                                                *models, dependence);
+      const auto candidates =
+          evaluation_models(drive, device.data_sheet, turn_on_sd(estimator.studies[i]), *models, dependence);
       evaluate_study(drive, candidates, options, evaluations, absent);
     }
   }
   if (evaluations.empty()) {
-    return work_error(absent.empty() ? "no S-IMU of this run was calibrated"
-                                     : absent.front().at("why").get<std::string>(),
-                      "a longer drive, or a shorter --settle");
+    return work_error(
+        absent.empty() ? "no S-IMU of this run was calibrated" : absent.front().at("why").get<std::string>(),
+        "a longer drive, or a shorter --settle");
   }
-  json document{{"schema", "imuscope.evaluation/1"},
-                {"durations_s", options.outages.durations_s},
-                {"settle_s", options.outages.settle_s},
-                {"spacing_s", options.outages.spacing_s},
-                {"evaluations", evaluations},
-                {"absent", absent}};
+  json document{{"schema", "imuscope.evaluation/1"},    {"durations_s", options.outages.durations_s},
+                {"settle_s", options.outages.settle_s}, {"spacing_s", options.outages.spacing_s},
+                {"evaluations", evaluations},           {"absent", absent}};
   if (auto written = write_json(options.run_dir / "evaluation.json", document); !written)
     return tl::unexpected<Error>(written.error());
   return document;

@@ -123,9 +123,9 @@ Result<std::vector<TrajectoryRow>> read_trajectory(const std::filesystem::path& 
   auto file = run_dir / "smoothed_navigation.csv";
   if (!std::filesystem::exists(file)) file = run_dir / "navigation.csv";
   auto reader = report::CsvReader::open(
-      file, {"time_s",       "lat_deg",    "lon_deg",     "height_m",     "v_n_mps",  "v_e_mps",  "v_d_mps",
-             "roll_deg",     "pitch_deg",  "heading_deg", "sd_n_m",       "sd_e_m",   "sd_d_m",   "sd_v_n_mps",
-             "sd_v_e_mps",   "sd_v_d_mps", "sd_roll_deg", "sd_pitch_deg", "sd_heading_deg"});
+      file, {"time_s", "lat_deg", "lon_deg", "height_m", "v_n_mps", "v_e_mps", "v_d_mps", "roll_deg",
+             "pitch_deg", "heading_deg", "sd_n_m", "sd_e_m", "sd_d_m", "sd_v_n_mps", "sd_v_e_mps",
+             "sd_v_d_mps", "sd_roll_deg", "sd_pitch_deg", "sd_heading_deg"});
   if (!reader) return tl::unexpected<Error>(reader.error());
   std::vector<TrajectoryRow> rows;
   while (reader->next()) {
@@ -215,8 +215,8 @@ StudyDrive study_drive(const Gatherer& gathered, const FoundMounting& found,
   out.drive.samples = drive_samples(samples, found.mounting, origin);
   out.drive.fixes = drive_fixes(gathered, estimator.gnss);
   out.drive.reference = at_study(rows, found.mounting, samples, origin);
-  out.drive.r_sa_s_m = matrix(found.mounting.C_b_s) * (vector(estimator.gnss.antenna_lever_arm_b_m) -
-                                                       vector(found.mounting.r_bs_b_m));
+  out.drive.r_sa_s_m = matrix(found.mounting.C_b_s) *
+                       (vector(estimator.gnss.antenna_lever_arm_b_m) - vector(found.mounting.r_bs_b_m));
   for (const auto& sample : samples) {
     if (out.regimes.empty() || out.regimes.back().second != sample.regime)
       out.regimes.emplace_back(to_seconds(sample.shown - origin), sample.regime);

@@ -44,7 +44,8 @@ void add_process(const std::string& process, const Parameters& values, double ra
     noise.white_density +=
         value("sigma2") * std::pow((1.0 + value("theta")) / (1.0 - value("phi")), 2) * period_s;
   }
-  if (process.rfind("GM", 0) != 0) return;  // quantisation and vibration lines have nothing at low frequencies
+  if (process.rfind("GM", 0) != 0)
+    return;  // quantisation and vibration lines have nothing at low frequencies
   const double beta = value("beta");
   const double variance = value("sigma2");
   if (!(beta > 0.0) || !(variance > 0.0)) return;
@@ -109,8 +110,8 @@ EvaluationModel of_data_sheet(const DataSheetConfig& sheet) {
   }
   CoastingModel model;
   model.name = out.name;
-  model.source = fmt::format("densities and bias stability of the data sheet, bias time {:g} s",
-                             sheet.bias_time_s);
+  model.source =
+      fmt::format("densities and bias stability of the data sheet, bias time {:g} s", sheet.bias_time_s);
   for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
     const bool gyro = axis < 3;
     const double density =
@@ -227,9 +228,10 @@ EvaluationModel by_dynamics(const StudyDrive& drive, const EvaluationModel& at_r
   model.changes = merged(tracks);
   model.source = n_following == 0
                      ? "white noise of the static or the dynamic model, as the vehicle stands or moves"
-                     : fmt::format("white noise follows the motion on {} of 6 axes (dependence.json), the "
-                                   "regime on the others; slow processes of the dynamic model",
-                                   n_following);
+                     : fmt::format(
+                           "white noise follows the motion on {} of 6 axes (dependence.json), the "
+                           "regime on the others; slow processes of the dynamic model",
+                           n_following);
   out.model = std::move(model);
   return out;
 }

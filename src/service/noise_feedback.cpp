@@ -124,7 +124,8 @@ bool moved(double sd, double other_sd, double step) {
 bool moved(const TriadNoise& now, const TriadNoise& before) {
   for (std::size_t i = 0; i < now.white_sd.size(); ++i) {
     const double sd = std::hypot(now.white_sd[i], now.fast_sd[i]);
-    if (moved(sd, std::hypot(before.white_sd[i], before.fast_sd[i]), NoiseFeedback::kVarianceStep)) return true;
+    if (moved(sd, std::hypot(before.white_sd[i], before.fast_sd[i]), NoiseFeedback::kVarianceStep))
+      return true;
   }
   return false;
 }

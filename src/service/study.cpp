@@ -93,8 +93,8 @@ EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& f
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
     const auto& final = finals[i];
     if (!calibrated(final)) continue;
-    config.studies[i] = with_mounting(config.studies[i], {final.C_b_s, final.r_bs_b_m, final.t_d_s,
-                                                          final.gyro_scale, final.accel_scale});
+    config.studies[i] = with_mounting(
+        config.studies[i], {final.C_b_s, final.r_bs_b_m, final.t_d_s, final.gyro_scale, final.accel_scale});
   }
   return config;
 }

@@ -44,7 +44,8 @@ class AxisError {
  public:
   AxisError(const AxisNoise& noise, std::mt19937_64& random) : noise_(noise), random_(random) {
     constant_ = std::sqrt(noise.turn_on_variance) * normal_(random_);
-    for (const SlowProcess& process : noise.slow) slow_.push_back(std::sqrt(process.variance) * normal_(random_));
+    for (const SlowProcess& process : noise.slow)
+      slow_.push_back(std::sqrt(process.variance) * normal_(random_));
   }
   double next(double white_density) {
     double sum = constant_ + std::sqrt(white_density / kPeriod_s) * normal_(random_);
@@ -66,7 +67,9 @@ class AxisError {
 
 /// Winding road at some 12 m/s. The truth is what the strapdown makes of noise-free rates.
 struct Road {
-  static Vector3d omega(double t) { return {0.05 * std::sin(1.1 * t), 0.04 * std::cos(0.9 * t), 0.25 * std::sin(0.3 * t)}; }
+  static Vector3d omega(double t) {
+    return {0.05 * std::sin(1.1 * t), 0.04 * std::cos(0.9 * t), 0.25 * std::sin(0.3 * t)};
+  }
   /// Keeps the speed near 12 m/s along the heading.
   static Vector3d force(double t, const NavigationState& at) {
     const Vector3d along = at.C_b_n.col(0);
@@ -104,8 +107,9 @@ Drive simulated(const CoastingModel& truth, std::uint64_t seed, double duration_
       drive.reference.push_back(reference);
       DriveFix fix;
       fix.time_s = t;
-      fix.antenna = displaced(state.position, state.C_b_n * drive.r_sa_s_m +
-                                                  kFixSd_m * Vector3d(normal(random), normal(random), normal(random)));
+      fix.antenna =
+          displaced(state.position, state.C_b_n * drive.r_sa_s_m +
+                                        kFixSd_m * Vector3d(normal(random), normal(random), normal(random)));
       fix.sd_position_m = Vector3d::Constant(kFixSd_m);
       drive.fixes.push_back(fix);
     }
@@ -196,7 +200,8 @@ TEST(Outages, WhiteNoiseThatFollowsTheMotionIsHeldAsSuch) {
     for (std::size_t axis = 0; axis < kImuAxes; ++axis) out[axis] = factor * calm.axes[axis].white_density;
     return out;
   };
-  for (double t = 0.0; t < kSettle_s + kOutage_s + 4.0; t += 4.0) following.changes.push_back({t, density(t)});
+  for (double t = 0.0; t < kSettle_s + kOutage_s + 4.0; t += 4.0)
+    following.changes.push_back({t, density(t)});
   const auto make = [&](std::uint64_t seed) {
     return simulated(calm, seed, kSettle_s + kOutage_s + 2.0, density);
   };

@@ -44,11 +44,11 @@ std::string content_of(const std::filesystem::path& file) {
 
 /// What was measured of the page.
 struct Measured {
-  int width = 0;    ///< of what can be scrolled to
+  int width = 0;  ///< of what can be scrolled to
   int height = 0;
   int places = 0;   ///< for figures
   int blank = 0;    ///< of them without ink
-  int figures = 0;   ///< drawn, by the page's own count
+  int figures = 0;  ///< drawn, by the page's own count
   std::string console;
 };
 
@@ -67,8 +67,10 @@ class Browser : public testing::Test {
   /// A page that shows the report in a frame of the wanted width: a window cannot be as narrow as a phone.
   std::filesystem::path frame_of(int width, int height) const {
     const auto file = folder_ / ("frame_" + std::to_string(width) + ".html");
-    std::ofstream(file) << R"(<!DOCTYPE html><meta charset="utf-8"><body style="margin:0"><iframe id="page" src="report.html" )"
-                        << "style=\"border:0;width:" << width << "px;height:" << height << "px\"></iframe>" << R"(<script>
+    std::ofstream(file)
+        << R"(<!DOCTYPE html><meta charset="utf-8"><body style="margin:0"><iframe id="page" src="report.html" )"
+        << "style=\"border:0;width:" << width << "px;height:" << height << "px\"></iframe>"
+        << R"(<script>
 const frame = document.getElementById('page');
 frame.onload = () => setTimeout(() => {
   const page = frame.contentDocument;
@@ -151,8 +153,9 @@ TEST_F(Browser, AScriptThatFailsIsSeen) {
 
 TEST_F(Browser, PrintsAsPdf) {
   const auto pdf = folder_ / "page.pdf";
-  output_of(command("--virtual-time-budget=20000 --no-pdf-header-footer --print-to-pdf='" + pdf.string() + "'",
-                    folder_ / "report.html", folder_ / "print.txt"));
+  output_of(
+      command("--virtual-time-budget=20000 --no-pdf-header-footer --print-to-pdf='" + pdf.string() + "'",
+              folder_ / "report.html", folder_ / "print.txt"));
   ASSERT_TRUE(std::filesystem::exists(pdf));
   const std::string content = content_of(pdf);
   EXPECT_EQ(content.rfind("%PDF", 0), 0U);

@@ -329,13 +329,13 @@ void write_scatter(const std::filesystem::path& file) {
 }
 
 json comparison_entry(const std::string& name, const std::string& axis) {
-  const json parameter{{"process", "WN"},       {"name", "sigma2"},   {"unit", "(rad/s)^2"}, {"first", 1.0},
-                       {"second", 1.29},        {"ratio", 1.293},     {"ratio_ci_low", 1.28},
-                       {"ratio_ci_high", 1.31}, {"p_value", 1e-12},   {"p_holm", 1e-11},
-                       {"verdict", "differ"}};
-  const json unsure{{"process", "GM2"},       {"name", "beta"},        {"unit", "1/s"},
-                    {"ratio", nullptr},       {"ratio_ci_low", nullptr}, {"ratio_ci_high", nullptr},
-                    {"p_value", nullptr},     {"p_holm", nullptr},     {"verdict", "not determined"}};
+  const json parameter{{"process", "WN"},      {"name", "sigma2"},      {"unit", "(rad/s)^2"},
+                       {"first", 1.0},         {"second", 1.29},        {"ratio", 1.293},
+                       {"ratio_ci_low", 1.28}, {"ratio_ci_high", 1.31}, {"p_value", 1e-12},
+                       {"p_holm", 1e-11},      {"verdict", "differ"}};
+  const json unsure{{"process", "GM2"},   {"name", "beta"},          {"unit", "1/s"},
+                    {"ratio", nullptr},   {"ratio_ci_low", nullptr}, {"ratio_ci_high", nullptr},
+                    {"p_value", nullptr}, {"p_holm", nullptr},       {"verdict", "not determined"}};
   return {{"name", name},
           {"axis", axis},
           {"first", "static"},
@@ -349,15 +349,24 @@ void write_dependence(const std::filesystem::path& folder, const SyntheticRun& o
   json dependences = json::array();
   json points = json::array();
   for (const std::string& name : options.names) {
-    dependences.push_back({{"name", name},        {"axis", "gyro_x"},
-                           {"driver", "vibration"}, {"driver_unit", "m/s^2"},
-                           {"process", "WN"},     {"parameter", "sigma2"},
-                           {"unit", "(rad/s)^2"}, {"n_windows", 30},
-                           {"at_mean_driver", 1.9e-4}, {"mean_driver", 0.4},
-                           {"slope", 0.3},        {"slope_sd", 0.04},
-                           {"ci_low", 0.22},      {"ci_high", 0.38},
-                           {"p_value", 1e-9},     {"p_holm", 4e-9},
-                           {"percent_per_unit", 35.0}, {"sentence", "louder on rough road"}});
+    dependences.push_back({{"name", name},
+                           {"axis", "gyro_x"},
+                           {"driver", "vibration"},
+                           {"driver_unit", "m/s^2"},
+                           {"process", "WN"},
+                           {"parameter", "sigma2"},
+                           {"unit", "(rad/s)^2"},
+                           {"n_windows", 30},
+                           {"at_mean_driver", 1.9e-4},
+                           {"mean_driver", 0.4},
+                           {"slope", 0.3},
+                           {"slope_sd", 0.04},
+                           {"ci_low", 0.22},
+                           {"ci_high", 0.38},
+                           {"p_value", 1e-9},
+                           {"p_holm", 4e-9},
+                           {"percent_per_unit", 35.0},
+                           {"sentence", "louder on rough road"}});
     for (int i = 0; i < 30; ++i) {
       const double vibration = 0.02 * i;
       points.push_back({{"name", name},
@@ -370,15 +379,17 @@ void write_dependence(const std::filesystem::path& folder, const SyntheticRun& o
                         {"ci_high", 2.0e-4}});
     }
   }
-  write_json(folder / "dependence.json",
-             {{"schema", "imuscope.dependence/1"},
-              {"window_s", 20.0},
-              {"dependences", dependences},
-              {"points", points},
-              {"not_determined",
-               {{{"name", options.names.front()}, {"axis", "accel_z"}, {"driver", "temperature"},
-                 {"process", "WN"}, {"why", "the temperature did not change"}}}},
-              {"remarks", json::array()}});
+  write_json(folder / "dependence.json", {{"schema", "imuscope.dependence/1"},
+                                          {"window_s", 20.0},
+                                          {"dependences", dependences},
+                                          {"points", points},
+                                          {"not_determined",
+                                           {{{"name", options.names.front()},
+                                             {"axis", "accel_z"},
+                                             {"driver", "temperature"},
+                                             {"process", "WN"},
+                                             {"why", "the temperature did not change"}}}},
+                                          {"remarks", json::array()}});
 }
 
 void write_evaluation(const std::filesystem::path& folder, const SyntheticRun& options) {
@@ -403,12 +414,12 @@ void write_evaluation(const std::filesystem::path& folder, const SyntheticRun& o
       }
     }
   }
-  write_json(folder / "evaluation.json",
-             {{"schema", "imuscope.evaluation/1"},
-              {"durations_s", {10.0, 30.0, 60.0}},
-              {"evaluations", evaluations},
-              {"absent",
-               {{{"name", options.names.front()}, {"model", "static"}, {"why", "no model of rest"}}}}});
+  write_json(
+      folder / "evaluation.json",
+      {{"schema", "imuscope.evaluation/1"},
+       {"durations_s", {10.0, 30.0, 60.0}},
+       {"evaluations", evaluations},
+       {"absent", {{{"name", options.names.front()}, {"model", "static"}, {"why", "no model of rest"}}}}});
 }
 
 void write_findings(const std::filesystem::path& folder, const SyntheticRun& options) {
@@ -420,26 +431,39 @@ void write_findings(const std::filesystem::path& folder, const SyntheticRun& opt
                                           {"correction", "Holm"},
                                           {"level", 0.05},
                                           {"comparisons", comparisons}});
-  write_json(folder / "regimes.json",
-             {{"schema", "imuscope.regimes/1"},
-              {"by", "motion"},
-              {"regimes",
-               {{{"name", "static"}, {"total_s", 12.0}, {"longest_s", 12.0},
-                 {"stretches", {{{"begin_s", 0.0}, {"end_s", 12.0}}}}},
-                {{"name", "dynamic"}, {"total_s", 48.0}, {"longest_s", 48.0},
-                 {"stretches", {{{"begin_s", 12.0}, {"end_s", 60.0}}}}}}},
-              {"left_out",
-               {{{"name", options.names.front()}, {"axis", "gyro_x"}, {"regime", "static"},
-                 {"above_level", 9}, {"above_tau_s", 5.12},
-                 {"sentence", "gyro_x, static: levels above 5.12 s are left out, its stretches are too short"}}}},
-              {"remarks", {"The drive has one standstill."}}});
-  write_json(folder / "vibration.json",
-             {{"schema", "imuscope.vibration/1"},
-              {"lines",
-               {{{"name", options.names.front()}, {"axis", "accel_z"}, {"regime", "dynamic"},
-                 {"frequency_hz", 28.31}, {"frequency_sd_hz", 0.02}, {"amplitude", 0.05},
-                 {"amplitude_unit", "m/s^2"}, {"share_of_variance", 0.12}, {"p_value", 1e-8}}}},
-              {"remarks", json::array()}});
+  write_json(
+      folder / "regimes.json",
+      {{"schema", "imuscope.regimes/1"},
+       {"by", "motion"},
+       {"regimes",
+        {{{"name", "static"},
+          {"total_s", 12.0},
+          {"longest_s", 12.0},
+          {"stretches", {{{"begin_s", 0.0}, {"end_s", 12.0}}}}},
+         {{"name", "dynamic"},
+          {"total_s", 48.0},
+          {"longest_s", 48.0},
+          {"stretches", {{{"begin_s", 12.0}, {"end_s", 60.0}}}}}}},
+       {"left_out",
+        {{{"name", options.names.front()},
+          {"axis", "gyro_x"},
+          {"regime", "static"},
+          {"above_level", 9},
+          {"above_tau_s", 5.12},
+          {"sentence", "gyro_x, static: levels above 5.12 s are left out, its stretches are too short"}}}},
+       {"remarks", {"The drive has one standstill."}}});
+  write_json(folder / "vibration.json", {{"schema", "imuscope.vibration/1"},
+                                         {"lines",
+                                          {{{"name", options.names.front()},
+                                            {"axis", "accel_z"},
+                                            {"regime", "dynamic"},
+                                            {"frequency_hz", 28.31},
+                                            {"frequency_sd_hz", 0.02},
+                                            {"amplitude", 0.05},
+                                            {"amplitude_unit", "m/s^2"},
+                                            {"share_of_variance", 0.12},
+                                            {"p_value", 1e-8}}}},
+                                         {"remarks", json::array()}});
   write_dependence(folder, options);
   write_evaluation(folder, options);
 }

@@ -75,8 +75,8 @@ NoiseModelReport louder(const StudyNoise& base, double factor, double slow_facto
   const char* axes[] = {"gyro_x", "gyro_y", "gyro_z"};
   for (std::size_t i = 0; i < 3; ++i) {
     const double white = factor * base.gyro[kDynamic].white_sd[i];
-    fitted.models.push_back(model_of(axes[i], "dynamic", white, 0.01 * white, 0.05,
-                                     slow_factor * base.gyro_bias[i].sd, 80.0));
+    fitted.models.push_back(
+        model_of(axes[i], "dynamic", white, 0.01 * white, 0.05, slow_factor * base.gyro_bias[i].sd, 80.0));
   }
   return fitted;
 }
@@ -97,7 +97,8 @@ TEST(NoiseFeedback, TheFirstModelReplacesTheConfiguredAndLaterOnesOnlyWhereSomet
   // A slow creep counts from what is in force, not from the refit before.
   std::optional<NewNoise> second;
   double factor = 1.02;
-  for (; !second && factor < 1.5; factor += 0.02) second = feedback.consider(louder(configured, factor), 18000);
+  for (; !second && factor < 1.5; factor += 0.02)
+    second = feedback.consider(louder(configured, factor), 18000);
   ASSERT_TRUE(second);
   EXPECT_EQ(second->version, 2);
   EXPECT_NEAR(factor - 0.02, 1.02 * std::sqrt(NoiseFeedback::kVarianceStep), 0.021);

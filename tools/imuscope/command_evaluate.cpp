@@ -22,13 +22,15 @@ void print_row(const nlohmann::json& row) {
   const double low = number("nees_low");
   const double high = number("nees_high");
   const auto mark = [&](double nees) { return nees > high ? '+' : nees < low ? '-' : ' '; };
-  fmt::print("  {:<12} {:>4.0f} {:>5} {:>10.2f} {:>8.2f} {:>6.2f} {:>9.2f}{} {:>9.2f}{} {:>9.2f}{} {:>6.2f} {:>5.2f} {:>9.2f}\n",
-             row.at("model").get<std::string>(), number("duration_s"),
-             fmt::format("{}/{}", row.at("n_independent").get<int>(), row.at("n").get<int>()),
-             number("horizontal_rms_m"), number("horizontal_sd_m"),
-             number("horizontal_rms_m") / number("horizontal_sd_m"), number("nees_position"),
-             mark(number("nees_position")), number("nees_velocity"), mark(number("nees_velocity")),
-             number("nees_attitude"), mark(number("nees_attitude")), low, high, number("surprise"));
+  fmt::print(
+      "  {:<12} {:>4.0f} {:>5} {:>10.2f} {:>8.2f} {:>6.2f} {:>9.2f}{} {:>9.2f}{} {:>9.2f}{} {:>6.2f} "
+      "{:>5.2f} {:>9.2f}\n",
+      row.at("model").get<std::string>(), number("duration_s"),
+      fmt::format("{}/{}", row.at("n_independent").get<int>(), row.at("n").get<int>()),
+      number("horizontal_rms_m"), number("horizontal_sd_m"),
+      number("horizontal_rms_m") / number("horizontal_sd_m"), number("nees_position"),
+      mark(number("nees_position")), number("nees_velocity"), mark(number("nees_velocity")),
+      number("nees_attitude"), mark(number("nees_attitude")), low, high, number("surprise"));
 }
 
 void print_table(const nlohmann::json& document) {
@@ -43,11 +45,12 @@ void print_table(const nlohmann::json& document) {
     print_row(row);
   }
   for (const auto& absent : document.at("absent")) {
-    fmt::print("\n{}, {}: {}\n", absent.at("name").get<std::string>(),
-               absent.at("model").get<std::string>(), absent.at("why").get<std::string>());
+    fmt::print("\n{}, {}: {}\n", absent.at("name").get<std::string>(), absent.at("model").get<std::string>(),
+               absent.at("why").get<std::string>());
   }
   fmt::print(
-      "\nn: outages that do not overlap / all. sd: predicted. NEES per degree of freedom: 1 where the model is "
+      "\nn: outages that do not overlap / all. sd: predicted. NEES per degree of freedom: 1 where the model "
+      "is "
       "right,\n+ above, - below where 95 % of right models lie. surprise: mean -log density of the position "
       "error; the smallest predicts best.\n");
 }
@@ -90,7 +93,8 @@ void add_evaluate(CLI::App& app, Work& chosen) {
   command->add_option("--spacing", options->run.outages.spacing_s, "between the starts of outages, s")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
-  command->add_option("--settle", options->run.outages.settle_s, "driven with GNSS before the first outage, s")
+  command
+      ->add_option("--settle", options->run.outages.settle_s, "driven with GNSS before the first outage, s")
       ->check(CLI::Range(0.0, 36000.0))
       ->capture_default_str();
   command->add_flag("--json", options->json, "print evaluation.json");

@@ -14,7 +14,8 @@ void add_report(CLI::App& app, Work& chosen) {
   auto run_dir = std::make_shared<std::filesystem::path>();
   command->add_option("RUN_DIR", *run_dir, "Folder that a run wrote with --out")->required();
   auto figures = std::make_shared<bool>(false);
-  command->add_flag("--figures", *figures, "draw the figures as SVG and PDF for papers, too (RUN_DIR/figures)");
+  command->add_flag("--figures", *figures,
+                    "draw the figures as SVG and PDF for papers, too (RUN_DIR/figures)");
   on_chosen(*command, chosen, [run_dir, figures]() -> Result<void> {
     if (auto written = write_report(*run_dir); !written) return written;
     fmt::print("{}\n", (*run_dir / "report.html").string());
