@@ -39,6 +39,7 @@ class Decoder final : public DeviceDecoder {
 
   void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
+  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
 
   [[nodiscard]] std::vector<CanId> ids() const override { return {config_.ids.begin(), config_.ids.end()}; }
 

@@ -4,13 +4,17 @@
 #include <utility>
 #include <vector>
 
+#include "publish/lcm_socket_filter.h"
+
 namespace imuscope {
 
 struct LcmListener::Impl {
-  Impl(const std::string& url, std::string_view prefix_in) : lcm(url), prefix(prefix_in) {}
+  Impl(const std::string& url, std::string_view prefix_in) : filter(url), lcm(url), prefix(prefix_in) {}
 
+  LcmSocketFilter filter;  // before the library opens its socket
   lcm::LCM lcm;
   std::string prefix;
+  std::vector<std::string> channels;
   std::vector<std::unique_ptr<Handler>> handlers;  // their addresses are the subscriptions' contexts
 };
 
@@ -39,9 +43,11 @@ LcmListener::~LcmListener() = default;
 
 void LcmListener::subscribe(std::string_view kind, Handler handler, int queue) {
   impl_->handlers.push_back(std::make_unique<Handler>(std::move(handler)));
-  auto* subscription = impl_->lcm.subscribeFunction(impl_->prefix + "_" + std::string(kind), on_message,
-                                                    impl_->handlers.back().get());
+  impl_->channels.push_back(impl_->prefix + "_" + std::string(kind));
+  auto* subscription =
+      impl_->lcm.subscribeFunction(impl_->channels.back(), on_message, impl_->handlers.back().get());
   subscription->setQueueCapacity(queue);
+  impl_->filter.let_through(impl_->channels);
 }
 
 int LcmListener::wait(std::chrono::milliseconds timeout) {

@@ -66,6 +66,13 @@ Result<void> check_multicast_route(const sockaddr_in& address) {
 
 }  // namespace
 
+std::optional<std::uint16_t> udpm_port(std::string_view url) {
+  if (!url.starts_with("udpm://")) return std::nullopt;
+  const auto address = parse_udpm_address(url);
+  if (!address) return std::nullopt;
+  return ntohs(address->sin_port);
+}
+
 Result<void> check_lcm_url(std::string_view url) {
   if (url.starts_with("udpm://")) {
     return parse_udpm_address(url).and_then(check_multicast_route);

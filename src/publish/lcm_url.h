@@ -2,6 +2,8 @@
 
 /// Which LCM URLs serve, asked before the library is, which would print advice of its own to the terminal.
 
+#include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "base/result.h"
@@ -15,5 +17,8 @@ inline constexpr std::string_view kDefaultLcmUrl = "udpm://239.255.76.67:7667?tt
 ///         process when the server goes), of kind kWork where this PC has no multicast route, with the two
 ///         commands that make one
 [[nodiscard]] Result<void> check_lcm_url(std::string_view url);
+
+/// Port of a udpm URL that check_lcm_url() does not call wrong; nothing for the others.
+[[nodiscard]] std::optional<std::uint16_t> udpm_port(std::string_view url);
 
 }  // namespace imuscope

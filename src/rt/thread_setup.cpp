@@ -125,6 +125,11 @@ std::vector<Error> setup_this_thread(const ThreadPlan& plan) {
   return refused;
 }
 
+void run_as_normal(std::thread& thread) noexcept {
+  const sched_param parameters{};
+  (void)pthread_setschedparam(thread.native_handle(), SCHED_OTHER, &parameters);
+}
+
 Result<void> lock_memory() {
   rlimit limit{};
   getrlimit(RLIMIT_MEMLOCK, &limit);

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/result.h"
@@ -29,6 +30,10 @@ struct ThreadPlan {
 /// thread gets a timer slack of 1 us instead of the default 50 us, which is what remains to be had.
 /// @return one Error for each wish that was refused; empty when all is granted
 [[nodiscard]] std::vector<Error> setup_this_thread(const ThreadPlan& plan);
+
+/// Gives an idle thread the priority of any other, so that its end can be waited for. A system that refuses
+/// leaves it idle.
+void run_as_normal(std::thread& thread) noexcept;
 
 /// Locks present and future memory of the process (mlockall), so that the core never waits for a page. Locked
 /// memory counts whole thread stacks: call set_thread_stack_size() first.

@@ -8,15 +8,19 @@
 #include <filesystem>
 #include <fstream>
 
+#include "service/observability.h"
+
 namespace imuscope {
 
 namespace {
 
 constexpr std::array kStudyNames{"waiting for samples", "looking for its mounting", "converging",
                                  "calibrated"};
-constexpr std::array kDirectionNames{"psi_x", "psi_y", "psi_z", "r_x", "r_y", "r_z"};
 constexpr std::string_view kReference = "reference";
 constexpr std::string_view kStudy = "study";
+/// The coarse mounting comes from the rates of both IMUs about more than one axis.
+constexpr const char* kManoeuvreForMounting =
+    "turn both ways: figures of eight or roundabouts at 20 to 30 deg/s";
 
 bool streams(const StatusReport::Device& device) { return device.state == "streaming"; }
 
@@ -66,21 +70,6 @@ Health judge(const StatusReport& report) {
   return {"running", "all devices stream"};
 }
 
-std::string manoeuvre_for(StudyDirection direction) {
-  switch (direction) {
-    case StudyDirection::kPsiX:
-    case StudyDirection::kPsiY:
-    case StudyDirection::kRX:
-    case StudyDirection::kRY:
-      return "turn both ways: figures of eight or roundabouts at 0.3 to 0.5 rad/s";
-    case StudyDirection::kPsiZ:
-      return "brake and start firmly, some six times";
-    case StudyDirection::kRZ:
-      break;
-  }
-  return "pitch and roll the vehicle: speed bumps, kerbs, a rough track";
-}
-
 StatusReport::Study study_status(const std::string& name, const StudyOutput& study,
                                  const StudyConfig& config) {
   const auto largest = [](const Vector3& sd) { return *std::max_element(sd.begin(), sd.end()); };
@@ -99,15 +88,16 @@ StatusReport::Study study_status(const std::string& name, const StudyOutput& stu
   const bool has_estimate =
       study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
   if (!has_estimate) {
-    status.manoeuvre = manoeuvre_for(StudyDirection::kPsiX);
+    status.manoeuvre = kManoeuvreForMounting;
     return status;
   }
+  const auto observability = observability_of(study);
   status.sd_psi_rad = largest(study.sd_psi_rad);
   status.sd_r_m = largest(study.sd_r_bs_b_m);
   status.sd_t_d_s = study.sd_t_d_s;
-  status.weakest = kDirectionNames[static_cast<std::size_t>(study.weakest_component)];
-  status.weakest_relative = study.weakest_relative_sd;
-  if (study.status != StudyStatus::kCalibrated) status.manoeuvre = manoeuvre_for(study.weakest_component);
+  status.weakest = observability.weakest;
+  status.weakest_relative = observability.weakest_relative_sd;
+  status.manoeuvre = observability.advice;
   return status;
 }
 

@@ -28,9 +28,6 @@ struct Health {
 [[nodiscard]] StatusReport::Study study_status(const std::string& name, const StudyOutput& study,
                                                const StudyConfig& config);
 
-/// What to drive so that this component of (psi, r) is seen.
-[[nodiscard]] std::string manoeuvre_for(StudyDirection direction);
-
 [[nodiscard]] StatusReport::Quantiles quantiles_of(const LatenessHistogram& histogram);
 
 /// Scheduling and processor time of every thread of this process, as the kernel has them.

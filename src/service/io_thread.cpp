@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/epoll.h>
-#include <sys/timerfd.h>
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
@@ -10,6 +9,7 @@
 #include <cstring>
 #include <future>
 #include <limits>
+#include <optional>
 
 #include "rt/host_clock.h"
 
@@ -19,19 +19,34 @@ namespace {
 
 /// A read takes what a burst can bring: 4 kB is 350 ms of a line at 115200 baud.
 constexpr std::size_t kReadBytes = 4096;
-/// Sessions are polled at least this often (device.h asks for 10 ms).
-constexpr Duration kPollPeriod = std::chrono::milliseconds(5);
+// When lines are read. A frame of a device trickles in over milliseconds, and a wake-up for each handful of
+// bytes would cost the processor more than all else the service does. What the core needs is less: every byte
+// by the next cut, and now and then the instant of a first byte, which the clock map follows. So all serial
+// lines are read at a beat just before each cut, and in between a line is listened to only now and then, for
+// the first bytes of a frame, and rests until then.
+
+/// The beat; sessions are polled at it, at least this often as device.h asks for.
+constexpr Duration kBeat = kTickPeriod;
+/// The beat's lead over the cut: reading and decoding all lines takes a tenth of it.
+constexpr Duration kLead = std::chrono::microseconds(500);
+/// A line in which bytes follow each other is in the midst of a frame: it is listened to again after about
+/// the time that a frame takes on it (43 bytes of an MTx at 115200 baud: 3.7 ms), at the first wake-up from
+/// then on and at the latest after the second time.
+constexpr Duration kQuiet = std::chrono::milliseconds(2);
+constexpr Duration kRest = std::chrono::milliseconds(4);
+constexpr Duration kLongestRest = std::chrono::milliseconds(6);
+/// After the first bytes of a frame the line rests for this many beats: at 100 Hz every tenth frame is
+/// stamped at its first bytes, twenty in each interval of the clock map.
+constexpr int kBeatsOfRest = 9;
 constexpr Duration kStatusPeriod = std::chrono::milliseconds(100);
 constexpr std::size_t kPrefaultedStack = 128 * 1024;
 
-/// From `first` on, every `period`, on CLOCK_MONOTONIC.
-void set_timer(int timer, HostTime first, Duration period) noexcept {
+/// Waits for events until `until`.
+int wait(int epoll, std::span<epoll_event> events, HostTime until) noexcept {
   constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-  itimerspec times{};
-  times.it_value.tv_sec = to_ns(first) / kNsPerSecond;
-  times.it_value.tv_nsec = to_ns(first) % kNsPerSecond;
-  times.it_interval.tv_nsec = period.count();
-  (void)timerfd_settime(timer, TFD_TIMER_ABSTIME, &times, nullptr);
+  const std::int64_t ns = std::max<std::int64_t>((until - host_now()).count(), 0);
+  const timespec timeout{ns / kNsPerSecond, ns % kNsPerSecond};
+  return epoll_pwait2(epoll, events.data(), static_cast<int>(events.size()), &timeout, nullptr);
 }
 
 /// How late the samples of one device came, second by second.
@@ -103,12 +118,35 @@ class IoThread::Line final : public SampleSink {
   void adopt(int epoll) noexcept {
     if (connection_ != nullptr || offered_.load(std::memory_order_relaxed) == nullptr) return;
     connection_ = offered_.exchange(nullptr, std::memory_order_acq_rel);
-    epoll_event event{};
-    event.events = EPOLLIN;
-    event.data.ptr = this;
-    (void)epoll_ctl(epoll, EPOLL_CTL_ADD, connection_->line->fd(), &event);
+    listen(epoll, EPOLL_CTL_ADD, host_now());
     dropped_before_ = status_.frames_dropped;
   }
+
+  /// After an event of the line.
+  void on_event(RawTap& tap, int epoll, HostTime now) noexcept {
+    read(tap, epoll);
+    // An event of a serial line has switched its events off.
+    if (connection_ == nullptr || !connection_->is_serial) return;
+    since_ = now - listens_since_ < kQuiet ? std::optional(now) : std::nullopt;
+    beats_ = since_ ? 0 : beats_of_rest();
+  }
+
+  /// At every wake-up: reads on where a frame was cut in its midst, and listens again.
+  void on_wake(RawTap& tap, int epoll, HostTime now) noexcept {
+    if (!since_ || now - *since_ < kRest) return;
+    read(tap, epoll);
+    listen(epoll, EPOLL_CTL_MOD, now);
+  }
+
+  /// At every beat: reads what has come during a rest, and listens again when it is over.
+  void on_beat(RawTap& tap, int epoll, HostTime now) noexcept {
+    if (beats_ == 0) return;
+    read(tap, epoll);
+    if (--beats_ == 0) listen(epoll, EPOLL_CTL_MOD, now);
+  }
+
+  /// When the line is to be looked at, whatever else happens.
+  [[nodiscard]] HostTime due() const noexcept { return since_ ? *since_ + kLongestRest : HostTime::max(); }
 
   void read(RawTap& tap, int epoll) noexcept {
     for (int i = 0; i < kReadsPerWake && connection_ != nullptr; ++i) {
@@ -136,7 +174,7 @@ class IoThread::Line final : public SampleSink {
 
   void say(RawTap& tap, int epoll, HostTime now) noexcept {
     if (connection_ == nullptr) return;
-    if (connection_->has_baud && connection_->session->wants_other_baud()) {
+    if (connection_->is_serial && connection_->session->wants_other_baud()) {
       give_back(epoll);
       return;
     }
@@ -182,6 +220,22 @@ class IoThread::Line final : public SampleSink {
  private:
   static constexpr int kReadsPerWake = 4;
 
+  void listen(int epoll, int operation, HostTime now) noexcept {
+    since_.reset();
+    beats_ = 0;
+    if (connection_ == nullptr) return;
+    listens_since_ = now;
+    epoll_event event{};
+    event.events = EPOLLIN | (connection_->is_serial ? EPOLLONESHOT : 0U);
+    event.data.ptr = this;
+    (void)epoll_ctl(epoll, operation, connection_->line->fd(), &event);
+  }
+
+  /// A device that is being set up is answered sooner.
+  [[nodiscard]] int beats_of_rest() const noexcept {
+    return connection_->session->state() == SessionState::kStreaming ? kBeatsOfRest : 1;
+  }
+
   void give_back(int epoll) noexcept {
     (void)epoll_ctl(epoll, EPOLL_CTL_DEL, connection_->line->fd(), nullptr);
     // The slot is empty: the supervisor offers a new connection only after it took the old one back.
@@ -199,6 +253,9 @@ class IoThread::Line final : public SampleSink {
   Connection* connection_ = nullptr;
   std::atomic<Connection*> offered_{nullptr};
   std::atomic<Connection*> returned_{nullptr};
+  HostTime listens_since_{};
+  std::optional<HostTime> since_;  ///< in the midst of a frame, rests since then
+  int beats_ = 0;                  ///< of rest that are left
   std::array<std::uint8_t, kReadBytes> buffer_{};
   LineStatus status_;
   std::uint64_t dropped_before_ = 0;  ///< on the connections before this one
@@ -224,21 +281,14 @@ IoThread::IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decod
 
 IoThread::~IoThread() {
   stop();
-  if (timer_ >= 0) ::close(timer_);
   if (epoll_ >= 0) ::close(epoll_);
 }
 
-Result<void> IoThread::start(const ThreadPlan& plan, std::vector<Error>& refusals) {
+Result<void> IoThread::start(const ThreadPlan& plan, HostTime first_cut, std::vector<Error>& refusals) {
+  first_cut_ = first_cut;
   epoll_ = epoll_create1(EPOLL_CLOEXEC);
   if (epoll_ < 0) {
     return work_error(fmt::format("no epoll descriptor: {}", std::strerror(errno)),
-                      "raise the limit of open files");
-  }
-  timer_ = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK);
-  epoll_event event{};  // no pointer: told apart from the lines by that
-  event.events = EPOLLIN;
-  if (timer_ < 0 || epoll_ctl(epoll_, EPOLL_CTL_ADD, timer_, &event) != 0) {
-    return work_error(fmt::format("no timer for the I/O thread: {}", std::strerror(errno)),
                       "raise the limit of open files");
   }
   running_.store(true, std::memory_order_release);
@@ -275,38 +325,38 @@ PeriodicStatistics IoThread::statistics() {
   return statistics_.value();
 }
 
+HostTime IoThread::next_look(HostTime beat) const noexcept {
+  HostTime next = beat;
+  for (const auto& line : lines_) next = std::min(next, line->due());
+  return next;
+}
+
 void IoThread::loop() {
-  std::array<epoll_event, kMaxDevices + 1> events{};
-  const HostTime first = host_now() + kPollPeriod;
-  set_timer(timer_, first, kPollPeriod);
-  TickSchedule beat(first, kPollPeriod);
+  std::array<epoll_event, kMaxDevices> events{};
+  TickSchedule beat(first_cut_ - kLead, kBeat);
   HostTime last_statistics{};
   while (running_.load(std::memory_order_acquire)) {
-    for (const auto& line : lines_) line->adopt(epoll_);
-    const int n = epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), -1);
-    bool beaten = false;
+    const int n = wait(epoll_, events, next_look(beat.deadline()));
+    const HostTime now = host_now();
+    const bool beaten = now >= beat.deadline();
+    if (beaten) (void)beat.wake(now);
     for (int i = 0; i < n; ++i) {
       auto* const line = static_cast<Line*>(events[static_cast<std::size_t>(i)].data.ptr);
-      if (line != nullptr) {
-        line->read(tap_, epoll_);
-      } else if (std::uint64_t expirations = 0; ::read(timer_, &expirations, sizeof expirations) > 0) {
-        // An expiration between the timer's read and this look at the clock was counted with the one before.
-        const HostTime woken = host_now();
-        if (woken < beat.deadline()) continue;
-        (void)beat.wake(woken);
-        beaten = true;
-      }
+      line->on_event(tap_, epoll_, now);
+      line->say(tap_, epoll_, now);
     }
-    const HostTime now = host_now();
+    for (const auto& line : lines_) line->on_wake(tap_, epoll_, now);
+    if (!beaten) continue;
     for (const auto& line : lines_) {
+      line->adopt(epoll_);
+      line->on_beat(tap_, epoll_, now);
       line->say(tap_, epoll_, now);
       line->publish(now);
     }
-    if (beaten) beat.finish(host_now());
-    if (now - last_statistics >= kStatusPeriod) {
-      statistics_.write(beat.statistics());
-      last_statistics = now;
-    }
+    beat.finish(host_now());
+    if (now - last_statistics < kStatusPeriod) continue;
+    statistics_.write(beat.statistics());
+    last_statistics = now;
   }
 }
 

@@ -27,7 +27,8 @@ namespace imuscope {
 struct Connection {
   std::unique_ptr<Transport> line;
   std::unique_ptr<DeviceSession> session;
-  bool has_baud = false;  ///< of a line that may be opened at another baud rate when the session wants it
+  /// Its bytes trickle in at the line's speed; it may be opened at another one when the session wants it.
+  bool is_serial = false;
 };
 
 enum class LineState : std::uint8_t {
@@ -63,8 +64,9 @@ class IoThread {
   IoThread(const IoThread&) = delete;
   IoThread& operator=(const IoThread&) = delete;
 
+  /// @param first_cut      of the core's ticks: lines are read just before each cut
   /// @param[out] refusals  what the system refused of the plan, appended
-  Result<void> start(const ThreadPlan& plan, std::vector<Error>& refusals);
+  Result<void> start(const ThreadPlan& plan, HostTime first_cut, std::vector<Error>& refusals);
   /// Ends the loop and joins. No byte is read after it returns.
   void stop();
 
@@ -86,13 +88,15 @@ class IoThread {
  private:
   class Line;
   void loop();
+  /// @param beat  its next deadline
+  [[nodiscard]] HostTime next_look(HostTime beat) const noexcept;
 
   std::vector<std::unique_ptr<Line>> lines_;
   std::unique_ptr<RawRing> raw_ring_;
   std::unique_ptr<ExceptionRing> exceptions_;
   RawTap tap_;
   int epoll_ = -1;
-  int timer_ = -1;
+  HostTime first_cut_{};
   LatestValue<PeriodicStatistics> statistics_;
   HostTime newest_arrival_{HostTime::min()};
   std::atomic<bool> running_{false};

@@ -226,7 +226,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
 
   std::vector<Error> refusals;
   if (auto locked = lock_memory(); !locked) refusals.push_back(locked.error());
-  if (auto started = io.start({kIoThreadName, Scheduling::kFifo, kIoPriority, {}}, refusals); !started)
+  if (auto started = io.start({kIoThreadName, Scheduling::kFifo, kIoPriority, {}}, t0, refusals); !started)
     return started;
   estimator.start({kEstimatorThreadName, Scheduling::kFifo, kEstimatorPriority, {}}, refusals);
   (*publisher)->start();

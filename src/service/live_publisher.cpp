@@ -19,7 +19,11 @@ namespace imuscope {
 
 namespace {
 
-constexpr Duration kDrainPeriod = std::chrono::milliseconds(10);
+/// What the core has put out waits at most this long; each turn costs a wake-up and, for the messages sent in
+/// it, one of every listener.
+constexpr Duration kDrainPeriod = std::chrono::milliseconds(20);
+/// A person's events are looked for in every so many turns.
+constexpr std::uint64_t kTurnsPerEar = 5;
 constexpr int kEventQueue = 100;
 constexpr Duration kStatusPeriod = std::chrono::seconds(1);
 
@@ -223,8 +227,8 @@ void LivePublisher::loop() {
     beat_ = beat.statistics();
     take_over_tunables();
     drain();
-    if (ear_) (void)ear_->wait(std::chrono::milliseconds(0));
-    turns_.fetch_add(1, std::memory_order_relaxed);
+    const auto turn = turns_.fetch_add(1, std::memory_order_relaxed);
+    if (ear_ && turn % kTurnsPerEar == 0) (void)ear_->wait(std::chrono::milliseconds(0));
     const HostTime now = host_now();
     if (now - last_status_ >= kStatusPeriod) {
       watch_devices(now);

@@ -14,7 +14,7 @@ namespace imuscope {
 
 namespace {
 
-constexpr auto kIdleSleep = std::chrono::milliseconds(50);
+constexpr auto kIdleSleep = std::chrono::milliseconds(200);
 
 }  // namespace
 
@@ -161,7 +161,10 @@ void Modeller::set_options(noise::ModelSpec spec, double refit_interval_s) {
 
 void Modeller::stop() {
   running_.store(false, std::memory_order_release);
-  if (thread_.joinable()) thread_.join();
+  if (!thread_.joinable()) return;
+  // The end of the run waits for it now: on a busy PC an idle thread's last fit would take minutes.
+  run_as_normal(thread_);
+  thread_.join();
 }
 
 std::vector<Refit> Modeller::take() {

@@ -109,8 +109,8 @@ constexpr int kAllowedBoth[] = {SYS_clock_gettime, SYS_rt_sigreturn, SYS_restart
                                 SYS_getrusage,     SYS_exit,         SYS_exit_group,
                                 SYS_madvise,       SYS_munmap,       SYS_rt_sigprocmask};
 constexpr int kAllowedEstimator[] = {SYS_clock_nanosleep};
-constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait, SYS_epoll_ctl, SYS_read,
-                              SYS_write,      SYS_recvmsg,     SYS_recvmmsg,  SYS_fcntl};
+constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait2, SYS_epoll_ctl, SYS_read,
+                              SYS_write,      SYS_recvmsg,      SYS_recvmmsg,  SYS_fcntl};
 /// Health of a line: the driver's error counts and an interface's flags, copied from the kernel's memory.
 constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS};
 
@@ -300,6 +300,12 @@ int epoll_wait(int epoll, epoll_event* events, int max, int timeout) {
   static auto* const real = next<int(int, epoll_event*, int, int)>("epoll_wait");
   count_wait();
   return real(epoll, events, max, timeout);
+}
+int epoll_pwait2(int epoll, epoll_event* events, int max, const timespec* timeout, const sigset_t* mask) {
+  static auto* const real =
+      next<int(int, epoll_event*, int, const timespec*, const sigset_t*)>("epoll_pwait2");
+  count_wait();
+  return real(epoll, events, max, timeout, mask);
 }
 ssize_t read(int fd, void* buffer, size_t size) {
   static auto* const real = next<ssize_t(int, void*, size_t)>("read");

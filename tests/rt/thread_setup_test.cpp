@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <functional>
 #include <thread>
 
@@ -120,6 +121,27 @@ TEST(ThreadSetup, PriorityOutOfRangeSaysSo) {
   std::thread([&] { refused = setup_this_thread({"io", Scheduling::kFifo, 100, {}}); }).join();
   ASSERT_EQ(refused.size(), 1U);
   EXPECT_THAT(refused.front().text(), HasSubstr("priority 100 does not exist; choose a number from 1 to 99"));
+}
+
+TEST(ThreadSetup, AnIdleThreadWhoseEndIsWaitedForIsIdleNoMore) {
+  std::atomic<bool> idle{false};
+  std::atomic<bool> stop{false};
+  std::thread thread([&] {
+    idle.store(setup_this_thread({"idler", Scheduling::kIdle, 0, {}}).empty());
+    while (!stop.load()) std::this_thread::yield();
+  });
+  while (!idle.load()) std::this_thread::yield();
+  const auto policy = [&] {
+    int value = -1;
+    sched_param parameters{};
+    pthread_getschedparam(thread.native_handle(), &value, &parameters);
+    return value;
+  };
+  EXPECT_EQ(policy(), SCHED_IDLE);
+  run_as_normal(thread);
+  EXPECT_EQ(policy(), SCHED_OTHER);
+  stop.store(true);
+  thread.join();
 }
 
 TEST(ThreadSetup, StackSizeHoldsForLaterThreads) {

@@ -12,6 +12,7 @@
 
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
+#include "service/observability.h"
 
 namespace imuscope {
 namespace {
@@ -98,7 +99,9 @@ TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection
   study.sd_psi_rad = {0.1, 0.3, 0.2};
   study.sd_r_bs_b_m = {0.6, 0.4, 0.5};
   study.sd_t_d_s = 0.7;
-  study.weakest_component = StudyDirection::kPsiZ;
+  study.weakest_direction = {0.0, 0.0, 1.0, 0.0, 0.0, 0.0};
+  study.observable = {true, true, false, true, true, true};
+  study.t_d_observable = true;
   study.weakest_relative_sd = 0.9;
   study.counters.gated_gyro = {1, 2, 3};
   study.counters.gated_accel = {4, 5, 6};
@@ -108,10 +111,16 @@ TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection
   EXPECT_DOUBLE_EQ(status.sd_r_m, 0.6);
   EXPECT_DOUBLE_EQ(status.sd_t_d_s, 0.7);
   EXPECT_DOUBLE_EQ(status.goal_psi_rad, config.goal_boresight_sd_rad);
-  EXPECT_EQ(status.weakest, "psi_z");
+  EXPECT_EQ(status.weakest, "boresight about down");
+  EXPECT_DOUBLE_EQ(status.weakest_relative, 0.9);
   EXPECT_THAT(status.manoeuvre, HasSubstr("brake"));
   EXPECT_EQ(status.gated, 21U);
+  EXPECT_EQ(status.manoeuvre, observability_of(study).advice) << "said in one way everywhere";
   study.status = StudyStatus::kCalibrated;
+  study.observable.fill(true);
+  study.sd_psi_rad.fill(0.5 * config.goal_boresight_sd_rad);
+  study.sd_r_bs_b_m.fill(0.5 * config.goal_r_bs_b_sd_m);
+  study.sd_t_d_s = 0.5 * config.goal_t_d_sd_s;
   EXPECT_EQ(study_status("mtx1", study, config).manoeuvre, "") << "nothing is missing any more";
   study.status = StudyStatus::kCoarse;
   const auto coarse = study_status("mtx1", study, config);
