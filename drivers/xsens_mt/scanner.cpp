@@ -1,12 +1,14 @@
 #include "drivers/xsens_mt/scanner.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "drivers/device/bytes.h"
 
 namespace imuscope::xsens {
 
 bool Scanner::next(Frame& frame, bool at_end) noexcept {
+  if (next_nested(frame)) return true;
   for (;;) {
     const auto behind = buffer_.pending().subspan(taken_);
     if (behind.empty()) return false;
@@ -14,13 +16,8 @@ bool Scanner::next(Frame& frame, bool at_end) noexcept {
     if (found.verdict == Verdict::kFrame) {
       buffer_.consume(taken_);
       taken_ = found.size;
-      const auto bytes = buffer_.pending().first(found.size);
-      frame.bid = bytes[1];
-      frame.mid = bytes[2];
-      frame.data = bytes.subspan(found.header, found.size - found.header - kChecksumSize);
-      frame.size = found.size;
-      frame.offset = buffer_.position();
-      frame.first_byte = buffer_.arrival_of(0);
+      nested_at_ = 1;
+      fill(frame, 0, found);
       return true;
     }
     if (found.verdict == Verdict::kNeedMore && !at_end) return false;
@@ -32,6 +29,7 @@ bool Scanner::next(Frame& frame, bool at_end) noexcept {
     count(found.verdict);
     buffer_.consume(taken_ + 1);
     taken_ = 0;
+    nested_at_ = 0;
     counters_.bytes_skipped += 1;
     // Whatever is no preamble goes at once.
     const auto rest = buffer_.pending();
@@ -40,6 +38,34 @@ bool Scanner::next(Frame& frame, bool at_end) noexcept {
     counters_.bytes_skipped += n;
     buffer_.consume(n);
   }
+}
+
+void Scanner::fill(Frame& frame, std::size_t start, const Examined& found) const noexcept {
+  const auto bytes = buffer_.pending().subspan(start, found.size);
+  frame.bid = bytes[1];
+  frame.mid = bytes[2];
+  frame.data = bytes.subspan(found.header, found.size - found.header - kChecksumSize);
+  frame.size = found.size;
+  frame.offset = buffer_.position() + start;
+  frame.first_byte = buffer_.arrival_of(start);
+  frame.nested = start > 0;
+}
+
+// Frames that lie whole inside the one taken last.
+bool Scanner::next_nested(Frame& frame) noexcept {
+  const auto inside = buffer_.pending().first(taken_);
+  while (nested_at_ < taken_) {
+    const void* preamble = std::memchr(inside.data() + nested_at_, kPreamble, taken_ - nested_at_);
+    if (preamble == nullptr) break;
+    const auto start = static_cast<std::size_t>(static_cast<const std::uint8_t*>(preamble) - inside.data());
+    nested_at_ = start + 1;
+    if (const Examined found = examine(inside.subspan(start)); found.verdict == Verdict::kFrame) {
+      fill(frame, start, found);
+      return true;
+    }
+  }
+  nested_at_ = taken_;
+  return false;
 }
 
 Scanner::Examined Scanner::examine(std::span<const std::uint8_t> bytes) noexcept {
@@ -61,29 +87,19 @@ Scanner::Examined Scanner::examine(std::span<const std::uint8_t> bytes) noexcept
   return {Verdict::kFrame, header, size};
 }
 
-// Whether good frames follow each other from `start` to across `end`.
-Scanner::Verdict Scanner::chain_across(std::span<const std::uint8_t> bytes, std::size_t start,
-                                       std::size_t end) noexcept {
-  while (start < end) {
-    const Examined found = examine(bytes.subspan(start));
-    if (found.verdict != Verdict::kFrame) return found.verdict;
-    start += found.size;
-  }
-  return start > end ? Verdict::kFrame : Verdict::kFalseStart;
-}
-
 // Behind the last frame comes no frame, so it may have been a false one that swallowed the start of a good
 // one. Where there is such a good one, drops what is before it and says kFrame.
 Scanner::Verdict Scanner::look_back(bool at_end) noexcept {
   const auto bytes = buffer_.pending();
   for (std::size_t start = 1; start < taken_; ++start) {
     if (bytes[start] != kPreamble) continue;
-    const Verdict chain = chain_across(bytes, start, taken_);
-    if (chain == Verdict::kNeedMore && !at_end) return chain;
-    if (chain != Verdict::kFrame) continue;
+    const Examined found = examine(bytes.subspan(start));
+    if (found.verdict == Verdict::kNeedMore && !at_end) return found.verdict;
+    if (found.verdict != Verdict::kFrame || start + found.size <= taken_) continue;
     buffer_.consume(start);
     taken_ = 0;
-    return chain;
+    nested_at_ = 0;
+    return found.verdict;
   }
   return Verdict::kFalseStart;
 }

@@ -1,9 +1,19 @@
 #pragma once
 
 /// Finds frames of the XSens MT protocol in a byte stream. After a bad checksum or length the search goes on
-/// at the byte behind the false preamble. The checksum has 8 bits only, so that one false frame in 256 passes
-/// it: where the bytes behind a taken frame are no frame, the bytes inside it are looked at again, and a good
-/// frame that began in there is not lost. Core: bounded memory, no allocation, noexcept.
+/// at the byte behind the false preamble.
+///
+/// The checksum has 8 bits only, so that one false start in 256 passes it and covers what lies in its length.
+/// No good frame is lost to that:
+/// - A frame that lies whole inside another one is given as well, marked `nested`: one of the two is false,
+/// and
+///   only their contents tell which. Those who act on frames take data out of nested ones, and no command.
+/// - Where the bytes behind a taken frame are no frame, a good one that began inside it and ends behind it is
+/// found. What remains is a false frame that passes, covers the beginning of a good one, and is followed,
+/// inside that good one, by a second false start that passes too: 2^-16 for each false start whose length
+/// does so.
+///
+/// Core: bounded memory, no allocation, noexcept.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,6 +32,7 @@ struct Frame {
   std::size_t size = 0;                ///< of the whole frame
   std::uint64_t offset = 0;            ///< of its preamble in the stream
   HostTime first_byte{};               ///< when its preamble arrived at the latest
+  bool nested = false;                 ///< lies inside the frame that was given before
 };
 
 struct ScanCounters {
@@ -55,14 +66,15 @@ class Scanner {
   };
 
   [[nodiscard]] static Examined examine(std::span<const std::uint8_t> bytes) noexcept;
-  [[nodiscard]] static Verdict chain_across(std::span<const std::uint8_t> bytes, std::size_t start,
-                                            std::size_t end) noexcept;
+  void fill(Frame& frame, std::size_t start, const Examined& found) const noexcept;
+  [[nodiscard]] bool next_nested(Frame& frame) noexcept;
   [[nodiscard]] Verdict look_back(bool at_end) noexcept;
   void count(Verdict verdict) noexcept;
 
   // Pending bytes: the last frame taken (taken_ bytes; zero: none to look back into), then what follows it.
   FrameBuffer<2 * kFrameMax> buffer_;
   std::size_t taken_ = 0;
+  std::size_t nested_at_ = 0;  ///< in the frame taken: where to look on for frames inside it
   ScanCounters counters_;
 };
 

@@ -112,6 +112,7 @@ void MtSession::on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noex
   while (!bytes.empty()) {
     bytes = bytes.subspan(scanner_.append(bytes, now));
     while (scanner_.next(frame)) {
+      if (frame.nested) continue;  // the device repeats what it was asked for
       ++frames_;
       on_frame(frame, now);
     }

@@ -123,6 +123,7 @@ Result<std::string> draft_from_files(const std::vector<std::string>& inputs) {
                         "say what it holds with --config");
     }
     device.protocol = found->protocol;
+    device.rate_hz = found->rate_hz;
     device.remark = fmt::format("{}: {} messages at its beginning", file, found->messages);
     devices.push_back(std::move(device));
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
+#include <vector>
 
 #include "service/device_factory.h"
 
@@ -12,15 +13,29 @@ namespace {
 /// A false frame passes an 8-bit sum now and then: messages must make up this much of a stream.
 constexpr double kShareToBelieve = 0.5;
 
-/// Counts what a device is there for: rates and forces, or positions.
+/// Counts what a device is there for, rates and forces or positions, and keeps the steps between their times.
 class Counter final : public SampleSink {
  public:
   explicit Counter(SampleKind kind) : kind_(kind) {}
-  void on_sample(const Sample& sample) noexcept override { count += sample.kind == kind_ ? 1 : 0; }
+  void on_sample(const Sample& sample) noexcept override {
+    if (sample.kind != kind_) return;
+    if (count > 0 && sample.time > last_) steps_.push_back(to_seconds(sample.time - last_));
+    last_ = sample.time;
+    ++count;
+  }
+  /// From the median step: gaps do not count.
+  [[nodiscard]] std::optional<double> rate_hz() {
+    if (steps_.empty()) return std::nullopt;
+    const auto middle = steps_.begin() + static_cast<std::ptrdiff_t>(steps_.size() / 2);
+    std::nth_element(steps_.begin(), middle, steps_.end());
+    return 1.0 / *middle;
+  }
   std::uint64_t count = 0;
 
  private:
   SampleKind kind_;
+  HostTime last_{};
+  std::vector<double> steps_;
 };
 
 FoundStream decode_as(const StreamProtocol& as, std::span<const std::uint8_t> bytes) {
@@ -34,7 +49,8 @@ FoundStream decode_as(const StreamProtocol& as, std::span<const std::uint8_t> by
   const DecoderCounters& counters = decoder->counters();
   const std::uint64_t covered = bytes.size() - std::min<std::uint64_t>(counters.bytes_skipped, bytes.size());
   return {as.protocol, counters.frames, counter.count,
-          bytes.empty() ? 0.0 : static_cast<double>(covered) / static_cast<double>(bytes.size())};
+          bytes.empty() ? 0.0 : static_cast<double>(covered) / static_cast<double>(bytes.size()),
+          as.protocol == Protocol::kXsensMt ? std::nullopt : counter.rate_hz()};
 }
 
 }  // namespace

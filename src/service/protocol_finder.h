@@ -17,6 +17,8 @@ struct FoundStream {
   std::uint64_t messages = 0;
   std::uint64_t samples = 0;  ///< of what the device is there for: rates and forces, or positions
   double share = 0.0;         ///< of the bytes that belong to its messages
+  /// Samples per second by the device's own times; nothing where it only counts, as an XSens MT does.
+  std::optional<double> rate_hz;
 };
 
 /// A protocol of devices on a line, and what its devices are there for.

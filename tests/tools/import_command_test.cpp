@@ -113,6 +113,62 @@ TEST(ImportCommand, DumpsWithoutArrivalsAndWithoutConfigurationBecomeACaptureTha
   }
 }
 
+TEST(ImportCommand, AnRtkSolutionFileReplaysToTheSameFilesAsItsCapture) {
+  IMUSCOPE_NEEDS_SHARED("data/rtk_drive/gnss.pos");
+  const auto folder = scratch_folder();
+  const auto data = [](const char* name) {
+    return shared_path(std::string("data/rtk_drive/") + name).string();
+  };
+  const std::string inputs =
+      "reference=" + data("imu.csv") + " again=" + data("imu.csv") + " gnss=" + data("gnss.pos");
+  const std::string config = " --config '" + source_path("config/rtklib_drive.toml").string() + "'";
+  const auto imported = run_in(folder, "imuscope", "import --out drive.lcm " + inputs + config);
+  ASSERT_EQ(imported.exit_code, 0) << imported.err;
+  EXPECT_THAT(imported.out,
+              HasSubstr("557772 bytes in 2197 reads"));  // wc -c, and its lines that are no comment
+  const auto replayed = run_in(folder, "imuscope", "replay drive.lcm --out captured");
+  ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
+  const auto direct = run_in(folder, "imuscope", "replay " + inputs + config + " --out direct");
+  ASSERT_EQ(direct.exit_code, 0) << direct.err;
+  for (const char* name : {"navigation.csv", "calibration_again.csv", "errors_again.csv"})
+    expect_same_file(folder / "captured" / name, folder / "direct" / name);
+}
+
+// A receiver's log through Debian's rtklib, and its solution beside IMUs that were recorded at the same time.
+TEST(ImportCommand, ASolutionOfRnx2rtkpIsFoundAndBroughtToTheReferenceByItsUtc) {
+  IMUSCOPE_NEEDS_SHARED("data/streams/greis/javad.jps");
+  if (!fs::exists("/usr/bin/rnx2rtkp") || !fs::exists("/usr/bin/convbin"))
+    GTEST_SKIP() << "needs rnx2rtkp and convbin of the Debian package rtklib";
+  const auto folder = scratch_folder();
+  const auto log = shared_path("data/streams/greis/javad.jps").string();
+  const std::string solve =
+      "cd '" + folder.string() + "' && cp '" + log + "' rover.jps && " +
+      "/usr/bin/convbin -r javad -v 3.03 -od -os -o rover.obs -n rover.nav rover.jps && " +
+      "/usr/bin/rnx2rtkp -p 0 -t -o rover.pos rover.obs rover.nav";
+  ASSERT_EQ(std::system(("(" + solve + ") > '" + (folder / "solve.log").string() + "' 2>&1").c_str()), 0)
+      << content_of(folder / "solve.log");
+  // The log is of 2011-01-15, 02:26:43 to 02:28:52 GPS time, which was 15 s ahead of UTC.
+  std::string config = content_of(source_path("config/demo.toml"));
+  const std::string key = "duration_s = 900.0";
+  ASSERT_NE(config.find(key), std::string::npos);
+  config.replace(config.find(key), key.size(), "duration_s = 150.0\nstart_utc = 2011-01-15T02:26:20Z");
+  std::ofstream(folder / "vehicle.toml") << config;
+  ASSERT_EQ(run_in(folder, "imusim", "record vehicle.toml --out recorded").exit_code, 0);
+  for (const char* name : {"airins.bin", "mtx1.bin"}) fs::rename(folder / "recorded" / name, folder / name);
+
+  const auto imported =
+      run_in(folder, "imuscope", "import --out all.lcm airins=airins.bin mtx1=mtx1.bin gnss=rover.pos");
+  ASSERT_EQ(imported.exit_code, 0) << imported.err;
+  EXPECT_THAT(imported.out, testing::ContainsRegex("gnss .*in 130 reads; times: UTC tags"));
+  ASSERT_EQ(run_in(folder, "imuscope", "replay all.lcm --out run").exit_code, 0);
+  const auto run = nlohmann::json::parse(content_of(folder / "run" / "run.json"));
+  const auto& gnss = run["devices"][2];
+  EXPECT_EQ(gnss["name"], "gnss");
+  EXPECT_EQ(gnss["protocol"], "rtklib_pos");
+  EXPECT_EQ(gnss["samples"], 130);
+  EXPECT_EQ(gnss["samples_lost"], 0) << "the draft has the file's own rate, one solution a second";
+}
+
 TEST(ImportCommand, TheHeaderOfAnMtbIsPassedOver) {
   const auto folder = without_arrivals(scratch_folder());
   // A header of text and of bytes that look like the beginning of messages, one of them with a right

@@ -52,8 +52,6 @@ struct StreamUnderTest {
   /// Share of cuts and insertions whose debris may pass for a frame and hide what it swallows: what the
   /// protocol's checksum lets through, 1/256 for one of 8 bits, with room for the small number of trials.
   double accidents_max = 0.0;
-  /// The same for garbage made of lures, where false starts are many; zero: as accidents_max.
-  double garbage_accidents_max = 0.0;
   /// Bytes before a frame that it cannot do without, such as the end of the line before it.
   std::size_t lead = 0;
   bool has_start_mark = true;

@@ -149,6 +149,7 @@ TEST(MtRecordings, EveryNumberOfTheFourRecordingsEqualsThePublishedDecode) {
     while (!rest.empty()) {
       rest = rest.subspan(scanner.append(rest, HostTime{}));
       while (scanner.next(frame)) {
+        if (frame.nested) continue;
         SCOPED_TRACE(n);
         ASSERT_LT(n, golden.size());
         ItemReader reader(frame.data);

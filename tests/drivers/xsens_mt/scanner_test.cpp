@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 #include <random>
 
@@ -17,6 +18,7 @@ using test::Bytes;
 struct Found {
   std::uint64_t offset;
   Bytes bytes;
+  bool nested;
 };
 
 std::vector<Found> scan(std::span<const Bytes> reads, ScanCounters* counters = nullptr) {
@@ -28,7 +30,8 @@ std::vector<Found> scan(std::span<const Bytes> reads, ScanCounters* counters = n
   const auto take = [&](bool at_end) {
     while (scanner.next(frame, at_end)) {
       const auto begin = all.begin() + static_cast<std::ptrdiff_t>(frame.offset);
-      found.push_back({frame.offset, Bytes(begin, begin + static_cast<std::ptrdiff_t>(frame.size))});
+      found.push_back(
+          {frame.offset, Bytes(begin, begin + static_cast<std::ptrdiff_t>(frame.size)), frame.nested});
     }
   };
   for (const Bytes& read : reads) {
@@ -67,6 +70,69 @@ TEST(MtScanner, FindsTheFrameThatAFalseFrameWithARightChecksumSwallowed) {
     EXPECT_EQ(found[1].bytes, good) << swallowed;
     EXPECT_EQ(found[2].bytes, next) << swallowed;
   }
+}
+
+// The false frame covers a good one whole, or two, or ends just where a good one begins.
+TEST(MtScanner, GivesEveryFrameThatAFalseFrameWithARightChecksumCovers) {
+  const Bytes good = frame_of(mid::kMtData, Bytes(20, 0x11));
+  const Bytes other = frame_of(mid::kMtData, Bytes(20, 0x22));
+  const Bytes next = frame_of(mid::kMtData, Bytes(20, 0x33));
+  for (const std::size_t behind : {0U, 1U, 7U}) {
+    for (const bool two : {false, true}) {
+      Bytes covered(3, 0x55);
+      covered.insert(covered.end(), good.begin(), good.end());
+      if (two) covered.insert(covered.end(), other.begin(), other.end());
+      covered.insert(covered.end(), behind, 0x66);
+      Bytes bytes{kPreamble, kMasterBid, mid::kMtData, static_cast<std::uint8_t>(covered.size())};
+      bytes.insert(bytes.end(), covered.begin(), covered.end());
+      const auto sum = std::accumulate(bytes.begin() + 1, bytes.end(), 0U);
+      bytes.push_back(static_cast<std::uint8_t>(0U - sum));
+      const Bytes false_frame = bytes;
+      bytes.insert(bytes.end(), next.begin(), next.end());
+      const Bytes reads[] = {bytes};
+      const auto found = scan(reads);
+      ASSERT_EQ(found.size(), two ? 4U : 3U) << behind;
+      EXPECT_EQ(found[0].bytes, false_frame);
+      EXPECT_EQ(found[1].bytes, good);
+      if (two) {
+        EXPECT_EQ(found[2].bytes, other);
+      }
+      EXPECT_EQ(found.back().bytes, next);
+    }
+  }
+}
+
+// What no scanner of this protocol can tell: a false start passes the sum (1 in 256), covers the beginning of
+// a good frame, and behind it, inside the good frame, the next one passes too. In garbage that is a quarter
+// preambles and lengths some twenty starts a run pass for headers, so that 20 / 65536 of the runs may lose a
+// frame.
+TEST(MtScanner, GarbageHidesAFrameOnlyWhereTwoFalseStartsInARowPassTheChecksum) {
+  constexpr int kRuns = 20'000;
+  constexpr double kStartsARun = 20.0;
+  const Bytes lures{0xFA, 0xFF, 0xFA, 0x32, 0x26, 0x31, 0x00};
+  std::mt19937 random(5);
+  int lost = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    std::vector<Bytes> sent;
+    Bytes stream;
+    for (int i = 0; i < 8; ++i) {
+      for (std::size_t n = random() % 200; n > 0; --n) {
+        stream.push_back(
+            static_cast<std::uint8_t>(random() % 4 == 0 ? lures[random() % lures.size()] : random()));
+      }
+      Bytes data(i % 2 == 0 ? 38 : 54);
+      for (auto& byte : data) byte = static_cast<std::uint8_t>(random() % 5 == 0 ? 0xFA : random());
+      sent.push_back(frame_of(mid::kMtData, data));
+      stream.insert(stream.end(), sent.back().begin(), sent.back().end());
+    }
+    const Bytes reads[] = {stream};
+    std::size_t next = 0;
+    for (const Found& found : scan(reads)) next += next < sent.size() && found.bytes == sent[next] ? 1 : 0;
+    lost += next < sent.size() ? 1 : 0;
+  }
+  // Poisson with this mean exceeds it by four roots once in 30 000 seeds.
+  const double expected = kRuns * kStartsARun / 65536.0;
+  EXPECT_LT(lost, expected + 4.0 * std::sqrt(expected));
 }
 
 TEST(MtScanner, CountsEveryByteAsFrameOrSkipped) {
@@ -147,7 +213,9 @@ TEST(MtScanner, ReadsTheControlVectors) {
     SCOPED_TRACE(expected["name"].get<std::string>());
     const Bytes& bytes = test::vector_named(vectors, expected["name"].get<std::string>());
     const Bytes reads[] = {bytes};
-    const auto found = scan(reads);
+    auto found = scan(reads);
+    // One payload holds what would pass for a frame by itself.
+    std::erase_if(found, [](const Found& one) { return one.nested; });
     if (expected.contains("frames")) {
       ASSERT_EQ(found.size(), expected["frames"].size());
       for (std::size_t i = 0; i < found.size(); ++i) {

@@ -338,6 +338,7 @@ bool add_fields(const Frame& frame, Layouts& layouts, Json& fields) {
 void decode_xsens_mt(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
   Layouts layouts(stream);
   scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+    if (frame.nested && frame.mid != mid::kMtData && frame.mid != mid::kMtData2) return;
     DecodedMessage message{frame.offset, frame.size, std::string(message_name(frame.mid)), true,
                            Json::object()};
     if (message.message.empty()) message.message = fmt::format("MID_{:02X}", frame.mid);
