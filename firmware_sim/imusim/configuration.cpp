@@ -300,6 +300,8 @@ Utc read_start(TableReader& in) {
 void read_simulation(TableReader in, Configuration& configuration) {
   Scenario& scenario = configuration.scenario;
   in.number("duration_s", scenario.duration_s, 1.0, 2.0, 86400.0);
+  if (in.has("initial_standstill_s"))
+    in.number("initial_standstill_s", scenario.initial_standstill_s.emplace(), 1.0, 0.0, scenario.duration_s);
   auto seed = static_cast<std::int64_t>(scenario.seed);
   in.whole("seed", seed, 0, std::numeric_limits<std::int64_t>::max());
   scenario.seed = static_cast<std::uint64_t>(seed);

@@ -4,8 +4,8 @@
 /// the table [simulation], which imuscope itself does not look at. Everything is SI and radians here.
 ///
 /// Keys of [simulation], all optional:
-///   duration_s, seed, scenario ("drive", "static"), start_utc, start_latitude_deg, start_longitude_deg,
-///   start_height_m, gyro_noise ("by_regime", "static", "dynamic"), regime_switch ("continuous",
+///   duration_s, initial_standstill_s, seed, scenario ("drive", "static"), start_utc, start_latitude_deg,
+///   start_longitude_deg, start_height_m, gyro_noise ("by_regime", "static", "dynamic"), regime_switch ("continuous",
 ///   "independent")
 /// [simulation.reference]: gyro_white_deg_per_sqrt_h, accel_white_ug_per_sqrt_hz, gyro_bias_sd_deg_per_h,
 ///   accel_bias_sd_mps2, attitude_sd_deg (roll, pitch, heading), latency_ms, alignment_s

@@ -87,7 +87,7 @@ struct LiveCommand {
   Outcome<void> run() {
     const auto configuration = common.load();
     if (!configuration) return tl::unexpected(configuration.error());
-    if (skip_static) options.start_s = initial_standstill_s(configuration->scenario.duration_s);
+    if (skip_static) options.start_s = initial_standstill_s(configuration->scenario);
     if (folder) options.folder = *folder;
     options.on_line = [](const std::string& line) {
       fmt::print("{}\n", line);

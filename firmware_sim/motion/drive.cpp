@@ -128,11 +128,12 @@ Grid grid_for(double duration_s) {
 double final_standstill_s(double duration_s) { return std::min(60.0, duration_s / 15.0); }
 
 /// Trapezoids of speed, one a cycle, before smoothing.
-std::vector<double> speed_trapezoids(double duration_s, const Grid& grid, Random random) {
+std::vector<double> speed_trapezoids(double duration_s, double standstill_s, const Grid& grid,
+                                     Random random) {
   std::vector<double> speed(grid.fine_points, 0.0);
   // The Gaussian reaches to either side; the standstill begins and ends when it has died away.
   const double margin_s = 4.0 * kSpeedSmoothing_s;
-  double begin = initial_standstill_s(duration_s) + margin_s;
+  double begin = standstill_s + margin_s;
   const double end = duration_s - final_standstill_s(duration_s) - margin_s;
   while (end - begin > kShortestCycle_s) {
     double top = random.uniform(kTopSpeedLow_mps, kTopSpeedHigh_mps);
@@ -180,8 +181,10 @@ std::vector<double> gaussian_smoothed(const std::vector<double>& values, double 
 
 std::vector<double> make_speed(const Scenario& scenario, const Grid& grid) {
   if (scenario.kind == ScenarioKind::kStatic) return std::vector<double>(grid.fine_points, 0.0);
-  std::vector<double> speed = gaussian_smoothed(
-      speed_trapezoids(scenario.duration_s, grid, Random(scenario.seed, "speed")), kSpeedSmoothing_s);
+  std::vector<double> speed =
+      gaussian_smoothed(speed_trapezoids(scenario.duration_s, initial_standstill_s(scenario), grid,
+                                         Random(scenario.seed, "speed")),
+                        kSpeedSmoothing_s);
   Random random(scenario.seed, "speed ripple");
   const double corner_hz = 1.0 / (2.0 * kPi * kSpeedRippleScale_s);
   const SmoothNoise ripple(random, 0.5 * corner_hz, 1.5 * corner_hz);
@@ -232,9 +235,9 @@ std::vector<MovingSpan> moving_spans(const std::vector<double>& speed) {
 
 }  // namespace
 
-double initial_standstill_s(double duration_s) {
+double initial_standstill_s(const Scenario& scenario) {
   constexpr double kLong_s = 180.0;
-  return duration_s < kLong_s ? 10.0 : 60.0;
+  return scenario.initial_standstill_s.value_or(scenario.duration_s < kLong_s ? 10.0 : 60.0);
 }
 
 DriveNodes make_drive(const Scenario& scenario) {

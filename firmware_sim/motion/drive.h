@@ -4,6 +4,7 @@
 /// standstill. All numbers are those of the study that the project's goals come from, stated in drive.cpp.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "firmware_sim/motion/earth.h"
@@ -20,13 +21,15 @@ enum class ScenarioKind {
 struct Scenario {
   ScenarioKind kind = ScenarioKind::kDrive;
   double duration_s = 900.0;  ///< above 1 s
+  /// Standstill at the beginning of a drive; absent: 60 s, or 10 s where the whole lasts less than 180 s.
+  std::optional<double> initial_standstill_s;
   std::uint64_t seed = 1;
   GeodeticPosition start = {46.52 * 3.14159265358979323846 / 180.0, 6.57 * 3.14159265358979323846 / 180.0,
                             420.0};
 };
 
-/// Standstill at the beginning of a drive: 60 s, or 10 s where the whole lasts less than 180 s.
-double initial_standstill_s(double duration_s);
+/// Standstill at the beginning of a drive.
+double initial_standstill_s(const Scenario& scenario);
 
 /// Times between which the vehicle moves without standing still for long.
 struct MovingSpan {

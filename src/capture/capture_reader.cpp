@@ -59,6 +59,10 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
       count_piece(*piece, summary);
     } else if (auto* applied = std::get_if<applied_model_t>(&*record)) {
       summary.applied_models.push_back(std::move(*applied));
+    } else if (const auto* marked = std::get_if<event_t>(&*record)) {
+      summary.other_messages += 1;
+      const RecordClock clock{summary.run.t0, summary.run.t0_wall};
+      if (summary.has_run) summary.events.push_back({clock.host_time(event.utime), marked->text});
     } else {
       summary.exceptions.push_back(std::move(std::get<StoredException>(*record)));
     }

@@ -35,6 +35,12 @@ struct CapturedDevice {
   HostTime last{};
 };
 
+/// A message of a person on <PREFIX>_EVENT.
+struct RecordedEvent {
+  HostTime time{};  ///< when the run heard it
+  std::string text;
+};
+
 /// A capture seen as a whole, by one pass over its files.
 struct CaptureSummary {
   RunHeader run;         ///< empty where has_run is false
@@ -42,6 +48,7 @@ struct CaptureSummary {
   std::map<std::string, CapturedDevice> devices;
   std::vector<StoredException> exceptions;      ///< in file order; a replay needs them ahead of their ticks
   std::vector<applied_model_t> applied_models;  ///< in file order, needed like the exceptions
+  std::vector<RecordedEvent> events;            ///< in file order; of a capture with a run alone
   std::vector<CaptureLoss> losses;
   std::uint64_t other_messages = 0;  ///< messages of other types, such as published ones
   std::uint64_t bytes_skipped = 0;   ///< damage in the midst of the file

@@ -83,6 +83,10 @@ std::optional<CaptureRecord> to_record(const exception_t& message) {
 
 std::int64_t RecordClock::utime(HostTime time) const noexcept { return to_utime(t0_wall + (time - t0)); }
 
+HostTime RecordClock::host_time(std::int64_t utime) const noexcept {
+  return t0 + (utc_time_from_ns(utime * kNsPerUs) - t0_wall);
+}
+
 std::vector<std::uint8_t> encode(const RunHeader& header, std::int64_t file) {
   run_t message;
   message.utime = to_utime(header.t0_wall);
@@ -140,6 +144,8 @@ std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& mess
     if (const auto exception = decode_message<exception_t>(message)) return to_record(*exception);
   } else if (fingerprint == applied_model_t::getHash()) {
     if (auto applied = decode_message<applied_model_t>(message)) return std::move(*applied);
+  } else if (fingerprint == event_t::getHash()) {
+    if (auto event = decode_message<event_t>(message)) return std::move(*event);
   }
   return std::nullopt;
 }

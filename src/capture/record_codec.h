@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <imuscope/applied_model_t.hpp>
+#include <imuscope/event_t.hpp>
 #include <optional>
 #include <string>
 #include <variant>
@@ -26,7 +27,7 @@ struct StoredException {
   std::string device;  ///< empty with kSkippedTicks
 };
 
-using CaptureRecord = std::variant<RunHeader, RawPiece, StoredException, applied_model_t>;
+using CaptureRecord = std::variant<RunHeader, RawPiece, StoredException, applied_model_t, event_t>;
 
 /// Maps the host's clock to the utime of records: the wall clock of the PC as it was at t0, running on with
 /// the host's clock, so that a clock set during the run does not disturb it.
@@ -34,6 +35,7 @@ struct RecordClock {
   HostTime t0{};
   UtcTime t0_wall{};
   [[nodiscard]] std::int64_t utime(HostTime time) const noexcept;
+  [[nodiscard]] HostTime host_time(std::int64_t utime) const noexcept;
 };
 
 /// @param file number of the file within the run

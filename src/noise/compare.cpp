@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
 namespace imuscope::noise {
@@ -56,6 +57,14 @@ std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b,
   return test;
 }
 
+/// @param sd  of the difference on the scale of the intervals
+void set_ratio_interval(ComparedParameter& row, double sd, double z) {
+  if (!row.ratio || row.name == "theta" || row.name == "phi") return;
+  const double log_sd = row.name == "omega" || row.name == "alpha" ? 0.5 * sd : sd;
+  row.ratio_ci_low = *row.ratio * std::exp(-z * log_sd);
+  row.ratio_ci_high = *row.ratio * std::exp(z * log_sd);
+}
+
 }  // namespace
 
 /// The covariance of omega and alpha is that of their squares.
@@ -68,9 +77,14 @@ double on_interval_scale(const ParameterEstimate& p) {
 Comparison compare(const FitResult& first, const FitResult& second) {
   Comparison out;
   std::vector<Pair> testable;
+  const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + first.confidence));
   for (std::size_t i = 0; i < first.parameters.size(); ++i) {
     const ParameterEstimate& p = first.parameters[i];
-    ComparedParameter row{p.process, p.name, p.unit, p.value, std::nullopt, std::nullopt, std::nullopt};
+    ComparedParameter row;
+    row.process = p.process;
+    row.name = p.name;
+    row.unit = p.unit;
+    row.first = p.value;
     if (const auto k = index_of(second, p)) {
       const ParameterEstimate& q = second.parameters[*k];
       row.second = q.value;
@@ -82,6 +96,7 @@ Comparison compare(const FitResult& first, const FitResult& second) {
                  std::isfinite(variance) && variance > 0.0) {
         const double d = on_interval_scale(q) - on_interval_scale(p);
         row.p_value = p_value_of(d * d / variance, 1);
+        set_ratio_interval(row, std::sqrt(variance), z);
         testable.push_back({i, *k});
       }
     }
@@ -89,7 +104,12 @@ Comparison compare(const FitResult& first, const FitResult& second) {
   }
   for (const ParameterEstimate& q : second.parameters) {
     if (index_of(first, q)) continue;
-    out.parameters.push_back({q.process, q.name, q.unit, std::nullopt, q.value, std::nullopt, std::nullopt});
+    ComparedParameter row;
+    row.process = q.process;
+    row.name = q.name;
+    row.unit = q.unit;
+    row.second = q.value;
+    out.parameters.push_back(row);
   }
   if (!(first.spec == second.spec)) {
     out.warnings.push_back(

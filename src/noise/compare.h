@@ -17,7 +17,10 @@ struct ComparedParameter {
   std::string unit;
   std::optional<double> first;  ///< absent where that fit does not have the parameter
   std::optional<double> second;
-  std::optional<double> ratio;    ///< second / first
+  std::optional<double> ratio;  ///< second / first
+  /// Interval of the ratio at the first fit's confidence; absent where a sd is, and for theta and phi.
+  std::optional<double> ratio_ci_low;
+  std::optional<double> ratio_ci_high;
   std::optional<double> p_value;  ///< of no difference; absent where a sd is
 };
 

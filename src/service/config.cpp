@@ -455,6 +455,36 @@ void read_noise_options(TomlReader in, NoiseOptions& options) {
   in.finish();
 }
 
+void read_regimes(TomlReader in, RegimeOptions& options) {
+  // Limits for rest are half of those for motion.
+  constexpr double kRestShare = 0.5;
+  options.by = static_cast<RegimesBy>(in.choice("by", {"motion", "intensity", "labels"}, 0));
+  MotionLimits& limits = options.limits;
+  const auto both = [&](const char* key, double& motion, double& rest, double unit, double most) {
+    if (!in.has(key)) return;
+    in.number(key, motion, unit, 1e-6, most);
+    rest = kRestShare * motion;
+  };
+  both("motion_speed_mps", limits.motion_speed_mps, limits.rest_speed_mps, 1.0, 100.0);
+  both("motion_rate_deg_per_s", limits.motion_rate_spread_radps, limits.rest_rate_spread_radps, kRadPerDeg,
+       1e3);
+  both("motion_force_mps2", limits.motion_force_spread_mps2, limits.rest_force_spread_mps2, 1.0, 1e3);
+  both("motion_vibration_mps2", limits.motion_vibration_mps2, limits.rest_vibration_mps2, 1.0, 1e3);
+  in.number("shortest_static_s", limits.shortest_static_s, 1.0, 0.0, 1e5);
+  options.intensity = static_cast<Intensity>(in.choice("intensity", {"rate", "vibration", "speed"}, 0));
+  constexpr int kMaxBins = 10;
+  in.integer("bins", options.bins, 2, kMaxBins);
+  in.number("block_s", options.block_s, 1.0, 1.0, 1e4);
+  in.number("window_s", options.window_s, 1.0, 2.0, 1e4);
+  in.finish();
+}
+
+void read_error_process(TomlReader in, double slowest_rate_hz, ErrorProcessOptions& options) {
+  constexpr double kHighestShare = 0.4;  // of the rate: below half of it the filter still is what it says
+  in.number("low_pass_hz", options.low_pass_hz, 1.0, 0.0, kHighestShare * slowest_rate_hz);
+  in.finish();
+}
+
 /// A text as TOML writes it, whatever it holds.
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -589,6 +619,11 @@ Result<Configuration> parse_configuration(const std::string& text, const std::fi
   attached.every_text(files.texts);
   const bool is_whole = attached.present();
   read_devices(root, problem, files, configuration);
+  read_regimes(root.table("regimes"), configuration.regimes);
+  double slowest_rate_hz = kMaxRate_hz;
+  for (const auto index : configuration.study_indices())
+    slowest_rate_hz = std::min(slowest_rate_hz, configuration.devices[index].rate_hz);
+  read_error_process(root.table("error_process"), slowest_rate_hz, configuration.error_process);
   root.finish();
   if (problem.error) return tl::unexpected<Error>(*problem.error);
   configuration.text = is_whole ? text : text + attached_text(files);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "regimes/motion_regimes.h"
 #include "sample/sample.h"
 #include "service/config_vehicle.h"
 
@@ -177,6 +178,22 @@ struct NoiseOptions {
   bool apply_to_filter = false;    ///< live refits replace the estimator's noise model (noise_feedback.h)
 };
 
+/// What the regimes of a study are, see regimes/.
+enum class RegimesBy : std::uint8_t { kMotion, kIntensity, kLabels };
+
+struct RegimeOptions {
+  RegimesBy by = RegimesBy::kMotion;
+  MotionLimits limits;
+  Intensity intensity = Intensity::kRate;
+  int bins = 3;
+  double block_s = 10.0;
+  double window_s = 20.0;  ///< of the fits that parameters are held against the dynamics with
+};
+
+struct ErrorProcessOptions {
+  double low_pass_hz = 0.0;  ///< corner of the common low-pass of errors and prediction; 0: none
+};
+
 struct LcmOptions {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string channel_prefix = "IMUSCOPE";
@@ -195,6 +212,8 @@ struct Configuration {
   std::vector<DeviceConfig> devices;
   EstimatorOptions estimator;
   NoiseOptions noise;
+  RegimeOptions regimes;
+  ErrorProcessOptions error_process;
   LcmOptions lcm;
   RecordOptions record;
 

@@ -1,9 +1,11 @@
 #include "service/dynamics_files.h"
 
 #include <fmt/format.h>
+#include <algorithm>
 
 #include "dynamics/covariates.h"
 #include "dynamics/json.h"
+#include "regimes/motion_regimes.h"
 #include "service/noise_series.h"
 #include "service/run_folder.h"
 
@@ -37,31 +39,88 @@ std::size_t count_rows(RowSpool& rows) {
   return n;
 }
 
+/// The rows of one regime.
+class RowsOfRegime final : public ErrorRowSource {
+ public:
+  /// Everything must outlive the rows.
+  RowsOfRegime(ErrorRowSource& rows, const RegimeTrack& track, std::size_t regime)
+      : rows_(rows), track_(track), regime_(regime) {}
+  void rewind() override { rows_.rewind(); }
+  bool next(ErrorRow& row) override {
+    while (rows_.next(row)) {
+      if (track_.at(row.time) == regime_) return true;
+    }
+    return false;
+  }
+
+ private:
+  ErrorRowSource& rows_;
+  const RegimeTrack& track_;
+  std::size_t regime_;
+};
+
+/// Covariates that have no coefficient beside one another, told once for an S-IMU: before projection alone,
+/// as what the projection takes out is no finding.
+void say_left_out(const std::string& name, const std::array<AxisDynamics, kErrorAxes>& axes,
+                  std::vector<std::string>& remarks) {
+  std::vector<std::string> told;
+  for (const auto& axis : axes) {
+    if (!axis.ols) continue;
+    for (const auto& [covariate, why] : axis.ols->left_out) {
+      auto sentence = fmt::format("{}: {} {}; it has no coefficient", name, covariate_name(covariate),
+                                  why == LeftOut::kConstant ? "does not vary in the dynamic part"
+                                                            : "is a combination of the covariates before it");
+      if (std::find(told.begin(), told.end(), sentence) == told.end()) told.push_back(std::move(sentence));
+    }
+  }
+  remarks.insert(remarks.end(), told.begin(), told.end());
+}
+
+void say_what_is_missing(const std::string& name, const std::array<AxisDynamics, kErrorAxes>& axes,
+                         std::vector<std::string>& remarks) {
+  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+    if (!axes[axis].ols) {
+      remarks.push_back(fmt::format("{} {}: no regression on the dynamics: too few rows of the dynamic part",
+                                    name, axis_name(axis)));
+    } else if (!axes[axis].residual_noise) {
+      remarks.push_back(fmt::format("{} {}: the regression has no generalised form: {}", name,
+                                    axis_name(axis), axes[axis].no_gls_because));
+    }
+  }
+  say_left_out(name, axes, remarks);
+}
+
 }  // namespace
 
-nlohmann::json regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
-                              const noise::ModelSpec& residual_model, std::vector<std::string>& warnings) {
-  nlohmann::json regressions = nlohmann::json::array();
+DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
+                                   const RegimeTrack& motion, const noise::ModelSpec& residual_model) {
+  DynamicsRegressions out;
   const auto indices = configuration.study_indices();
+  const auto dynamic = motion.index_of(kDynamicName);
+  if (!dynamic || motion.total_s(*dynamic) <= 0.0) {
+    out.remarks.emplace_back("no regression on the dynamics: there is no dynamic part");
+    return out;
+  }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& device = configuration.devices[indices[i]];
     if (!rows[i].whole()) {
-      warnings.push_back(
+      out.remarks.push_back(
           fmt::format("{}: no regression on the dynamics: its rows could not be kept on the "
                       "disk of the run folder; check its free space",
                       device.name));
       continue;
     }
-    const auto axes = study_dynamics(rows[i], {device.rate_hz, residual_model});
-    for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
-      if (axes[axis].ols && !axes[axis].residual_noise) {
-        warnings.push_back(fmt::format("{} {}: the regression has no generalised form: {}", device.name,
-                                       axis_name(axis), axes[axis].no_gls_because));
-      }
+    RowsOfRegime moving(rows[i], motion, *dynamic);
+    const auto axes = study_dynamics(moving, {device.rate_hz, residual_model});
+    say_what_is_missing(device.name, axes, out.remarks);
+    nlohmann::json of_device = nlohmann::json::array();
+    append_regressions(device.name, axes, of_device);
+    for (auto& regression : of_device) {
+      regression["regime"] = kDynamicName;
+      out.regressions.push_back(std::move(regression));
     }
-    append_regressions(device.name, axes, regressions);
   }
-  return regressions;
+  return out;
 }
 
 Result<void> write_scatter(const Configuration& configuration, std::vector<RowSpool>& rows,

@@ -9,14 +9,22 @@
 
 #include "base/result.h"
 #include "noise/model.h"
+#include "regimes/regime_track.h"
 #include "service/config.h"
 #include "service/row_spool.h"
 
 namespace imuscope {
 
-/// The entries of regression.json for every S-IMU. What could not be studied becomes a warning.
-nlohmann::json regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
-                              const noise::ModelSpec& residual_model, std::vector<std::string>& warnings);
+/// The entries of regression.json, and sentences about what could not be studied.
+struct DynamicsRegressions {
+  nlohmann::json regressions = nlohmann::json::array();
+  std::vector<std::string> remarks;
+};
+
+/// For every S-IMU, over the dynamic part of the run: at rest there are no dynamics, and the noise is
+/// another.
+DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
+                                   const RegimeTrack& motion, const noise::ModelSpec& residual_model);
 
 /// Writes scatter_NAME.csv for every S-IMU: time_s, the fifteen covariates and the six errors of at most
 /// kScatterRows rows, evenly spaced over the drive, at rest and in motion alike.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/contracts.h"
+
 namespace imuscope {
 
 namespace {
@@ -16,13 +18,16 @@ constexpr std::int64_t kLongestHole = 360'000;
 std::string axis_name(std::size_t axis) { return kAxisNames[axis]; }
 std::string axis_unit(std::size_t axis) { return axis < 3 ? "rad/s" : "m/s^2"; }
 
-void NoiseSeries::add(const ErrorRow& row) {
+void NoiseSeries::add(const ErrorRow& row, std::optional<std::size_t> regime) {
+  IMUSCOPE_EXPECTS(!regime || *regime < kMaxRegimes);
   if (started_ && row.counter < next_counter_) return;
   const std::int64_t hole = started_ ? std::min(row.counter - next_counter_, kLongestHole) : 0;
   missing_ += static_cast<std::size_t>(hole);
   const std::size_t padded = size() + static_cast<std::size_t>(hole);
-  regimes_.resize(padded, Cell::kMissing);
-  regimes_.push_back(row.regime == Regime::kStatic ? Cell::kStatic : Cell::kDynamic);
+  times_.resize(padded, times_.empty() ? row.time : times_.back());
+  times_.push_back(row.time);
+  regimes_.resize(padded, kNoRegime);
+  regimes_.push_back(regime ? static_cast<std::uint8_t>(*regime) : kNoRegime);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     values_[axis].resize(padded, 0.0);
     valid_[axis].resize(padded, 0);
@@ -35,16 +40,10 @@ void NoiseSeries::add(const ErrorRow& row) {
 
 std::vector<std::uint8_t> NoiseSeries::mask(std::size_t axis) const { return valid_[axis]; }
 
-std::vector<std::uint8_t> NoiseSeries::mask(std::size_t axis, Regime regime) const {
-  const Cell wanted = regime == Regime::kStatic ? Cell::kStatic : Cell::kDynamic;
+std::vector<std::uint8_t> NoiseSeries::mask(std::size_t axis, std::size_t regime) const {
   std::vector<std::uint8_t> mask = valid_[axis];
-  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = mask[i] != 0 && regimes_[i] == wanted ? 1 : 0;
+  for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = mask[i] != 0 && regimes_[i] == regime ? 1 : 0;
   return mask;
-}
-
-std::size_t NoiseSeries::count(Regime regime) const {
-  const Cell wanted = regime == Regime::kStatic ? Cell::kStatic : Cell::kDynamic;
-  return static_cast<std::size_t>(std::count(regimes_.begin(), regimes_.end(), wanted));
 }
 
 }  // namespace imuscope

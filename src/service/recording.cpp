@@ -297,6 +297,7 @@ Result<OpenedRecording> open_capture(const std::string& input,
     opened.remarks.emplace_back(
         "another configuration than the recorded one: results will differ from the live run's");
   }
+  for (const auto& event : summary->events) recording.moments.push_back({event.time, event.text});
   for (const auto& loss : summary->losses) {
     opened.remarks.push_back(
         fmt::format("{}: the recorder lost {} records; the replay is not exact from there on", loss.device,

@@ -11,6 +11,7 @@
 
 #include "base/result.h"
 #include "drivers/device/device.h"
+#include "regimes/labels.h"
 #include "service/byte_source.h"
 #include "service/clock_alignment.h"
 #include "service/config.h"
@@ -46,6 +47,7 @@ struct Recording {
   std::vector<bool> present;                 ///< per device of the configuration
   std::vector<DeviceClock> clocks;           ///< per device
   std::optional<RecordedSchedule> schedule;  ///< of a capture of a live run
+  std::vector<MarkedMoment> moments;         ///< that a person marked while it was recorded
 };
 
 /// Counts of one device after a replay.

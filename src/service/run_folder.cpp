@@ -155,7 +155,7 @@ std::string error_csv_header() {
          "e_accel_z_mps2,regime\n";
 }
 
-std::string error_csv_row(const ErrorRow& row, double time_s) {
+std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view regime) {
   fmt::memory_buffer text;
   fmt::format_to(std::back_inserter(text), "{},{}", time_s, row.counter);
   // An invalid triad is an empty field: nothing is invented.
@@ -167,7 +167,7 @@ std::string error_csv_row(const ErrorRow& row, double time_s) {
     row.accel_valid ? fmt::format_to(std::back_inserter(text), ",{}", row.e_accel_mps2[i])
                     : fmt::format_to(std::back_inserter(text), ",");
   }
-  fmt::format_to(std::back_inserter(text), ",{}\n", row.regime == Regime::kStatic ? "static" : "dynamic");
+  fmt::format_to(std::back_inserter(text), ",{}\n", regime);
   return fmt::to_string(text);
 }
 
@@ -260,9 +260,14 @@ Result<std::unique_ptr<RunFolder>> RunFolder::create(const std::filesystem::path
 }
 
 void RunFolder::on_error(const ErrorRecord& record) noexcept {
+  write_error(record, regime_name(record.row.regime));
+}
+
+void RunFolder::write_error(const ErrorRecord& record, std::string_view regime) {
   const double time_s = to_seconds(record.row.time - record.first_reference_time);
   sample_times_[record.study].add(record.row.counter, time_s);
-  if (errors_[record.study].is_open()) errors_[record.study].append(error_csv_row(record.row, time_s));
+  if (errors_[record.study].is_open())
+    errors_[record.study].append(error_csv_row(record.row, time_s, regime));
 }
 
 void RunFolder::on_event(const EstimatorEvent& event) noexcept { events_.push_back(event); }

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -78,6 +79,9 @@ class RunFolder final : public CoreSink {
   void on_snapshot(const Snapshot& snapshot) noexcept override;
   void on_late_sample(const LateSample& late) noexcept override;
 
+  /// A row of the error process under the name of its regime.
+  void write_error(const ErrorRecord& record, std::string_view regime);
+
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] const std::optional<Snapshot>& last_snapshot() const { return last_; }
   [[nodiscard]] const std::vector<LateSample>& late_samples() const { return late_; }
@@ -111,7 +115,8 @@ std::string navigation_csv_row(const NavigationOutput& navigation, double time_s
 std::string calibration_csv_header();
 std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, double time_s);
 /// Row of errors_NAME.csv.
-std::string error_csv_row(const ErrorRow& row, double time_s);
+/// @param regime  its last column; empty where none holds
+std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view regime);
 /// Header of errors_NAME.csv.
 std::string error_csv_header();
 

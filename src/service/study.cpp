@@ -6,14 +6,14 @@
 #include <cmath>
 
 #include "base/units.h"
-#include "noise/fit.h"
-#include "noise/json.h"
-#include "noise/wavelet_variance.h"
+#include "error_process/row_low_pass.h"
+#include "service/dependence_study.h"
 #include "service/dynamics_files.h"
 #include "service/estimator_setup.h"
 #include "service/modeller.h"
 #include "service/noise_series.h"
-#include "service/report_values.h"
+#include "service/noise_study.h"
+#include "service/regime_study.h"
 #include "service/smoothing.h"
 
 namespace imuscope {
@@ -33,42 +33,31 @@ std::string utc_text(UtcTime utc) {
 /// biases, the whole drive covered.
 class ErrorCollector final : public CoreSink {
  public:
-  /// @param rows  one spool a S-IMU; must outlive the collector, as must `biases`
-  ErrorCollector(std::vector<StudyOutput> finals, const ReferenceBiasTrack& biases, bool remove_scale,
-                 RunFolder& folder, std::vector<RowSpool>& rows)
-      : finals_(std::move(finals)),
-        biases_(biases),
-        remove_scale_(remove_scale),
-        folder_(folder),
-        rows_(rows),
-        series_(finals_.size()) {}
+  /// @param rows      one spool a S-IMU; must outlive the collector, as must `biases`
+  /// @param low_pass  one a S-IMU, or none
+  ErrorCollector(const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows,
+                 std::vector<RowLowPass> low_pass)
+      : biases_(biases), rows_(rows), low_pass_(std::move(low_pass)) {}
 
-  void on_epoch(const StudyEpoch& epoch, HostTime first_reference_time) noexcept override {
-    const HostTime shown = epoch.time + from_seconds(epoch.t_d_s);
-    on_error({epoch.study, first_reference_time,
-              error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, biases_.at(shown))});
+  void on_epoch(const StudyEpoch& epoch, HostTime) noexcept override {
+    const ReferenceBias bias = biases_.at(epoch.time + from_seconds(epoch.t_d_s));
+    watch_.add(epoch, bias);
+    ErrorRow row = error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, bias);
+    if (!low_pass_.empty()) low_pass_[epoch.study].apply(row);
+    rows_[epoch.study].add(row);
   }
-  void on_error(const ErrorRecord& record) noexcept override {
-    folder_.on_error(record);
-    const auto& final = finals_[record.study];
-    const ErrorRow row =
-        remove_scale_ ? without_scale_error(record.row, {final.gyro_scale, final.accel_scale}) : record.row;
-    series_[record.study].add(row);
-    rows_[record.study].add(row);
-  }
+  void on_error(const ErrorRecord&) noexcept override {}
   void on_event(const EstimatorEvent&) noexcept override {}
-  void on_snapshot(const Snapshot&) noexcept override {}
+  void on_snapshot(const Snapshot& snapshot) noexcept override { watch_.add(snapshot); }
   void on_late_sample(const LateSample&) noexcept override {}
 
-  [[nodiscard]] const std::vector<NoiseSeries>& series() const { return series_; }
+  [[nodiscard]] const MotionWatch& watch() const { return watch_; }
 
  private:
-  std::vector<StudyOutput> finals_;
   const ReferenceBiasTrack& biases_;
-  bool remove_scale_;
-  RunFolder& folder_;
   std::vector<RowSpool>& rows_;
-  std::vector<NoiseSeries> series_;
+  std::vector<RowLowPass> low_pass_;
+  MotionWatch watch_;
 };
 
 /// First pass: everything but errors goes to the folder.
@@ -84,6 +73,29 @@ class CalibrationPass final : public CoreSink {
   RunFolder& folder_;
 };
 
+/// The common low-pass of every S-IMU; none where none is configured.
+std::vector<RowLowPass> low_passes(const Configuration& configuration) {
+  std::vector<RowLowPass> filters;
+  if (configuration.error_process.low_pass_hz <= 0.0) return filters;
+  for (const auto index : configuration.study_indices())
+    filters.emplace_back(configuration.devices[index].rate_hz, configuration.error_process.low_pass_hz);
+  return filters;
+}
+
+/// errors_NAME.csv under the names of the regimes, and the series for the noise models.
+/// @param of  its row is set here
+NoiseSeries write_errors(ErrorRecord of, const RunRegimes& regimes, const ScaleError& scale, RowSpool& rows,
+                         RunFolder& folder) {
+  NoiseSeries series;
+  rows.rewind();
+  while (rows.next(of.row)) {
+    const auto regime = regimes.chosen.at(of.row.time);
+    folder.write_error(of, regime ? std::string_view(regimes.chosen.names()[*regime]) : std::string_view());
+    series.add(without_scale_error(of.row, scale), regime);
+  }
+  return series;
+}
+
 bool calibrated(const StudyOutput& study) {
   return study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
 }
@@ -97,51 +109,6 @@ EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& f
         config.studies[i], {final.C_b_s, final.r_bs_b_m, final.t_d_s, final.gyro_scale, final.accel_scale});
   }
   return config;
-}
-
-/// Fits one axis in one regime; what cannot be fitted becomes a warning.
-void fit_axis(const NoiseSeries& series, std::size_t axis, const std::vector<std::uint8_t>& mask,
-              const std::string& regime, const std::string& name, double rate_hz,
-              const noise::ModelSpec& spec, nlohmann::json& models, std::vector<std::string>& warnings) {
-  noise::WvOptions options;
-  options.mask = mask;
-  const auto wv = noise::haar_wavelet_variance(series.values(axis), options);
-  if (!wv) {
-    warnings.push_back(
-        fmt::format("{} {} {}: no wavelet variance: {}", name, axis_name(axis), regime, wv.error().what));
-    return;
-  }
-  noise::FitOptions fit_options;
-  fit_options.signal_unit = axis_unit(axis);
-  const auto fit = noise::fit(*wv, spec, rate_hz, fit_options);
-  if (!fit) {
-    warnings.push_back(
-        fmt::format("{} {} {}: no noise model: {}", name, axis_name(axis), regime, fit.error().what));
-    return;
-  }
-  models.push_back(model_json(*fit, name, axis, regime));
-}
-
-nlohmann::json fit_models(const Configuration& configuration, const std::vector<NoiseSeries>& all_series,
-                          const noise::ModelSpec& spec, const StudyRunOptions& options,
-                          std::vector<std::string>& warnings) {
-  nlohmann::json models = nlohmann::json::array();
-  const auto indices = configuration.study_indices();
-  const double total = static_cast<double>(all_series.size() * kAxisCount);
-  double done = 0.0;
-  for (std::size_t i = 0; i < all_series.size(); ++i) {
-    const auto& series = all_series[i];
-    const auto& device = configuration.devices[indices[i]];
-    for (std::size_t axis = 0; axis < kAxisCount && series.size() > 0; ++axis) {
-      fit_axis(series, axis, series.mask(axis), "all", device.name, device.rate_hz, spec, models, warnings);
-      for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {
-        fit_axis(series, axis, series.mask(axis, regime), regime_name(regime), device.name, device.rate_hz,
-                 spec, models, warnings);
-      }
-      if (options.progress) options.progress("noise models", (done += 1.0) / total);
-    }
-  }
-  return models;
 }
 
 nlohmann::json device_json(const RunDescription& run, std::size_t i) {
@@ -311,31 +278,54 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     if (!spool) return tl::unexpected<Error>(spool.error());
     rows.push_back(std::move(*spool));
   }
-  ErrorCollector collector(settled, *biases, configuration.noise.remove_scale_error, **folder, rows);
+  ErrorCollector collector(*biases, rows, low_passes(configuration));
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("error process", share); };
   const auto second = replay(configuration, frozen(estimator, settled), recording, collector, replay_options);
   if (!second) return tl::unexpected<Error>(second.error());
 
-  const auto models = fit_models(configuration, collector.series(), *spec, options, run.warnings);
-  const auto regressions = regressions_of(configuration, rows, *spec, run.warnings);
-  if (auto written = write_scatter(configuration, rows, last.first_reference_time, options.out); !written) {
-    return written;
+  const HostTime origin = last.first_reference_time;
+  auto regimes =
+      find_regimes(configuration.regimes, collector.watch(), options.labels, recording.moments, origin);
+  if (!regimes) return tl::unexpected<Error>(regimes.error());
+  std::vector<NoiseSeries> series;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const ScaleError scale = configuration.noise.remove_scale_error
+                                 ? ScaleError{settled[i].gyro_scale, settled[i].accel_scale}
+                                 : ScaleError{};
+    series.push_back(write_errors({i, origin, {}}, *regimes, scale, rows[i], **folder));
   }
-  const auto& series = collector.series();
-  const double rate_hz = configuration.devices[configuration.study_indices().front()].rate_hz;
-  run.static_s = static_cast<double>(series.front().count(Regime::kStatic)) / rate_hz;
-  run.dynamic_s = static_cast<double>(series.front().count(Regime::kDynamic)) / rate_hz;
+
+  const auto& names = regimes->chosen.names();
+  const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
+    if (options.progress) options.progress("noise models", share);
+  });
+  const auto dependence = study_dependence(configuration, series, collector.watch().levels(), regimes->motion,
+                                           noise_study, origin);
+  const auto regressions = regressions_of(configuration, rows, regimes->motion, *spec);
+  auto regime_document = regimes_json(*regimes, origin);
+  regime_document["left_out"] = noise_study.left_out;
+  for (const std::vector<std::string>& remarks :
+       {regimes->remarks, noise_study.remarks, dependence.remarks, regressions.remarks})
+    run.warnings.insert(run.warnings.end(), remarks.begin(), remarks.end());
+  run.static_s = regimes->motion.total_s(0);
+  run.dynamic_s = regimes->motion.total_s(1);
+  if (auto written = write_scatter(configuration, rows, origin, options.out); !written) return written;
 
   if (auto written = (*folder)->write_calibration(*means); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
-  if (auto written = write_models(options.out, models); !written) {
-    return written;
-  }
-  if (auto written = write_json(options.out / "regression.json",
-                                {{"schema", "imuscope.regression/1"}, {"regressions", regressions}});
-      !written) {
-    return written;
+  if (auto written = write_models(options.out, models_json(noise_study)); !written) return written;
+  const std::pair<const char*, nlohmann::json> documents[] = {
+      {"regimes.json", std::move(regime_document)},
+      {"comparison.json", comparison_json(noise_study, names)},
+      {"dependence.json", dependence.document},
+      {"vibration.json", {{"schema", "imuscope.vibration/1"}, {"lines", noise_study.lines}}},
+      {"regression.json",
+       {{"schema", "imuscope.regression/1"},
+        {"regressions", regressions.regressions},
+        {"remarks", regressions.remarks}}}};
+  for (const auto& [file, document] : documents) {
+    if (auto written = write_json(options.out / file, document); !written) return written;
   }
   auto about = run_json(run);
   about["error_process_mounting"] = options.mountings.empty() ? "of this drive" : "of all drives combined";
@@ -374,8 +364,9 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
   // What an earlier study left in this folder would be taken for this run's.
-  std::vector<std::string> of_a_study{"models.json", "regression.json", "report.html",
-                                      "smoothed_navigation.csv"};
+  std::vector<std::string> of_a_study{"models.json",     "regression.json",        "regimes.json",
+                                      "dependence.json", "vibration.json",         "comparison.json",
+                                      "report.html",     "smoothed_navigation.csv"};
   for (const auto& info : study_file_infos(configuration, recording))
     of_a_study.push_back(fmt::format("smoothed_{}.csv", info.name));
   for (const auto& file : of_a_study) {

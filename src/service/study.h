@@ -11,6 +11,7 @@
 
 #include "base/result.h"
 #include "calibration/combine.h"
+#include "regimes/labels.h"
 #include "service/replay.h"
 #include "service/run_folder.h"
 
@@ -23,6 +24,8 @@ struct StudyRunOptions {
   std::function<void(const std::string& step, double share)> progress;
   /// Mountings settled beforehand, by name: the error process is made with these. Others use the drive's own.
   std::map<std::string, MountingEstimate> mountings;
+  /// Regimes that a person named in a file; empty: as the configuration says.
+  std::vector<Label> labels;
 };
 
 /// What a run is made of, for run.json.

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <fstream>
 #include <memory>
+#include <sstream>
 
 #include "combination_table.h"
 #include "commands.h"
@@ -19,6 +21,7 @@ struct Options {
   std::vector<std::string> inputs;
   std::string config;
   std::string out;
+  std::string labels;
   bool realtime = false;
   bool json = false;
 };
@@ -74,9 +77,22 @@ Result<void> process_drives(const Options& options, const std::vector<std::vecto
   return {};
 }
 
+Result<std::vector<Label>> read_labels(const std::string& file) {
+  if (file.empty()) return std::vector<Label>{};
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in) return usage_error(fmt::format("labels {} cannot be read", file), "give the path of a CSV file");
+  return parse_labels(text.str(), file);
+}
+
 Result<void> process(const Options& options) {
   const auto drives = drives_of(options.inputs);
+  if (drives.size() > 1 && !options.labels.empty())
+    return usage_error("labels are of one drive", "process the drives one by one");
   if (drives.size() > 1) return process_drives(options, drives);
+  const auto labels = read_labels(options.labels);
+  if (!labels) return tl::unexpected<Error>(labels.error());
   const auto opened = open(options, options.inputs);
   if (!opened) return tl::unexpected<Error>(opened.error());
   {
@@ -84,7 +100,8 @@ Result<void> process(const Options& options) {
     const StudyRunOptions run{options.out,
                               IMUSCOPE_VERSION,
                               [&](const std::string& step, double share) { bar.show(step, share); },
-                              {}};
+                              {},
+                              *labels};
     if (auto done = run_study(opened->configuration, opened->recording, run); !done) return done;
   }
   if (auto written = write_report(options.out); !written) return written;
@@ -99,6 +116,7 @@ Result<void> replay_command(const Options& options) {
     const StudyRunOptions run{options.out,
                               IMUSCOPE_VERSION,
                               [&](const std::string& step, double share) { bar.show(step, share); },
+                              {},
                               {}};
     if (auto done = run_replay(opened->configuration, opened->recording, run, options.realtime); !done)
       return done;
@@ -116,6 +134,8 @@ void add_process(CLI::App& app, Work& chosen) {
   auto options = std::make_shared<Options>();
   add_inputs(*command, *options);
   command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
+  command->add_option("--labels", options->labels, "regimes that a person named: CSV begin_s,end_s,regime")
+      ->type_name("FILE");
   command->add_flag("--json", options->json, "print the summary as JSON");
   on_chosen(*command, chosen, [options] { return process(*options); });
 }

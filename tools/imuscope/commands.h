@@ -51,6 +51,9 @@ void add_evaluate(CLI::App& app, Work& chosen);
 /// `imuscope report RUN_DIR`
 void add_report(CLI::App& app, Work& chosen);
 
+/// `imuscope tables RUN_DIR`
+void add_tables(CLI::App& app, Work& chosen);
+
 /// `imuscope import --out CAPTURE NAME=FILE...`
 void add_import(CLI::App& app, Work& chosen);
 

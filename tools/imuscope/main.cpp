@@ -36,6 +36,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_combine(app, work);
   imuscope::cli::add_evaluate(app, work);
   imuscope::cli::add_report(app, work);
+  imuscope::cli::add_tables(app, work);
   imuscope::cli::add_decode(app, work);
   imuscope::cli::add_import(app, work);
   imuscope::cli::add_probe(app, work);

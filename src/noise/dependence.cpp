@@ -1,0 +1,348 @@
+#include "noise/dependence.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+
+#include "noise/inference.h"
+#include "noise/separable_fit.h"
+#include "noise/wv_covariance.h"
+
+namespace imuscope::noise {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// A level or rate whose logarithm would have a larger sd is held at the start model; a slope is left out
+/// where the change that it makes over one sd of the driver is known no better.
+constexpr double kUndeterminedSd = 0.4;
+constexpr int kMaxSteps = 60;
+constexpr double kLongestStep = 0.7;  // of a logarithm
+/// Squared distance to the solution in standard deviations: settled, and near enough where steps no longer
+/// help.
+constexpr double kSettled = 1e-10;
+constexpr double kNearlySettled = 1e-4;
+
+/// The windows as the search sees them.
+struct Problem {
+  std::vector<int> levels;
+  std::vector<ParameterPlace> places;
+  std::vector<VectorXd> wv;  ///< one a window
+  VectorXd x;                ///< driver minus its mean, in its own standard deviations
+  double x_scale = 1.0;
+  MatrixXd correlation_inverse;  ///< of the levels' errors under the start model
+  VectorXd relative_sd;          ///< of the levels under the start model
+};
+
+/// What is searched for: for every place a level and, where it has one, a slope.
+struct Unknowns {
+  std::vector<bool> level;
+  std::vector<bool> slope;
+  [[nodiscard]] Index count() const {
+    return static_cast<Index>(std::count(level.begin(), level.end(), true) +
+                              std::count(slope.begin(), slope.end(), true));
+  }
+};
+
+struct Values {
+  VectorXd level;  ///< interval scale of each place
+  VectorXd slope;
+};
+
+Model model_at(const Model& start, const std::vector<ParameterPlace>& places, const Values& values,
+               double x) {
+  Model model = start;
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    const auto k = static_cast<Index>(p);
+    const double u = values.level(k) + values.slope(k) * x;
+    Component& c = model.components[places[p].component];
+    if (places[p].shape < 0) {
+      c.amplitude = std::exp(u);
+    } else {
+      const auto s = static_cast<std::size_t>(places[p].shape);
+      c.shape[s] = shape_of_coordinate(c.kind, places[p].shape, u);
+    }
+  }
+  return model;
+}
+
+Values start_values(const Model& model, const std::vector<ParameterPlace>& places) {
+  Values values{VectorXd::Zero(static_cast<Index>(places.size())),
+                VectorXd::Zero(static_cast<Index>(places.size()))};
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    const Component& c = model.components[places[p].component];
+    values.level(static_cast<Index>(p)) =
+        places[p].shape < 0 ? std::log(c.amplitude)
+                            : coordinate_of_shape(c.kind, places[p].shape,
+                                                  c.shape[static_cast<std::size_t>(places[p].shape)]);
+  }
+  return values;
+}
+
+/// Scores of all windows and the information, at one point.
+struct Scores {
+  VectorXd gradient;
+  MatrixXd information;
+  MatrixXd outer;  ///< sum of the windows' scores times themselves
+};
+
+Scores scores_at(const Problem& problem, const Model& start, const Values& values, const Unknowns& unknowns) {
+  const Index n = unknowns.count();
+  Scores out{VectorXd::Zero(n), MatrixXd::Zero(n, n), MatrixXd::Zero(n, n)};
+  const auto rows = static_cast<Index>(problem.levels.size());
+  MatrixXd design(rows, n);
+  for (std::size_t w = 0; w < problem.wv.size(); ++w) {
+    const double x = problem.x(static_cast<Index>(w));
+    const Model model = model_at(start, problem.places, values, x);
+    const MatrixXd jacobian = wv_jacobian(model, problem.levels, problem.places);
+    VectorXd expected(rows);
+    for (Index r = 0; r < rows; ++r)
+      expected(r) = model_wv(model, problem.levels[static_cast<std::size_t>(r)]);
+    // Levels in units of their standard deviation: the shares of the start model, at this window's height.
+    const VectorXd unit = expected.cwiseProduct(problem.relative_sd).cwiseInverse();
+    Index column = 0;
+    for (std::size_t p = 0; p < problem.places.size(); ++p) {
+      const VectorXd of_place = unit.cwiseProduct(jacobian.col(static_cast<Index>(p)));
+      if (unknowns.level[p]) design.col(column++) = of_place;
+      if (unknowns.slope[p]) design.col(column++) = x * of_place;
+    }
+    const VectorXd residual = unit.cwiseProduct(problem.wv[w] - expected);
+    const MatrixXd weighted = design.transpose() * problem.correlation_inverse;
+    const VectorXd score = weighted * residual;
+    out.gradient += score;
+    out.information.noalias() += weighted * design;
+    out.outer.noalias() += score * score.transpose();
+  }
+  return out;
+}
+
+MatrixXd inverse_of(const MatrixXd& information) {
+  const VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  return scale.asDiagonal() *
+         MatrixXd(scaled.ldlt().solve(MatrixXd::Identity(scaled.rows(), scaled.cols()))) * scale.asDiagonal();
+}
+
+/// Leaves out, one by one, what is known worst, as long as it is not determined.
+void leave_out_undetermined(const Problem& problem, const Model& start, const Values& values,
+                            Unknowns& unknowns) {
+  while (unknowns.count() > 0) {
+    const MatrixXd covariance = inverse_of(scores_at(problem, start, values, unknowns).information);
+    double worst = kUndeterminedSd * kUndeterminedSd;
+    std::size_t worst_place = problem.places.size();
+    bool is_slope = false;
+    Index column = 0;
+    const auto look = [&](std::size_t place, bool slope) {
+      const double variance = covariance(column, column);
+      ++column;
+      if (variance >= 0.0 && variance <= worst) return;
+      worst = variance >= 0.0 ? variance : std::numeric_limits<double>::infinity();
+      worst_place = place;
+      is_slope = slope;
+    };
+    for (std::size_t p = 0; p < problem.places.size(); ++p) {
+      if (unknowns.level[p]) look(p, false);
+      if (unknowns.slope[p]) look(p, true);
+    }
+    if (worst_place == problem.places.size()) return;
+    unknowns.slope[worst_place] = false;
+    if (!is_slope) unknowns.level[worst_place] = false;
+  }
+}
+
+void add_to(const Unknowns& unknowns, const VectorXd& move, Values& values) {
+  Index column = 0;
+  for (std::size_t p = 0; p < unknowns.level.size(); ++p) {
+    if (unknowns.level[p]) values.level(static_cast<Index>(p)) += move(column++);
+    if (unknowns.slope[p]) values.slope(static_cast<Index>(p)) += move(column++);
+  }
+}
+
+/// Fisher scoring; a step after which the scores are no smaller (in the metric of the information) is halved.
+/// False where it does not settle.
+bool search(const Problem& problem, const Model& start, const Unknowns& unknowns, Values& values,
+            Scores& last) {
+  last = scores_at(problem, start, values, unknowns);
+  MatrixXd inverse = inverse_of(last.information);
+  double size = last.gradient.dot(inverse * last.gradient);
+  for (int step = 0; step < kMaxSteps; ++step) {
+    VectorXd move = inverse * last.gradient;
+    if (!move.allFinite()) return false;
+    const double longest = move.cwiseAbs().maxCoeff();
+    if (longest > kLongestStep) move *= kLongestStep / longest;
+    for (int halving = 0;; ++halving) {
+      constexpr int kMaxHalvings = 12;
+      Values trial = values;
+      add_to(unknowns, move, trial);
+      Scores there = scores_at(problem, start, trial, unknowns);
+      const MatrixXd inverse_there = inverse_of(there.information);
+      const double size_there = there.gradient.dot(inverse_there * there.gradient);
+      if (size_there < size || size < kSettled) {
+        values = std::move(trial);
+        last = std::move(there);
+        inverse = inverse_there;
+        size = size_there;
+        break;
+      }
+      if (halving == kMaxHalvings) return size < kNearlySettled;
+      move *= 0.5;
+    }
+    if (size < kSettled) return true;
+  }
+  return size < kNearlySettled;
+}
+
+Result<Problem> problem_of(std::span<const DrivenWindow> windows, const Model& model) {
+  if (windows.size() < kFewestWindows) {
+    return work_error(fmt::format("there are {} windows and {} are needed", windows.size(), kFewestWindows),
+                      "use shorter windows or a longer drive");
+  }
+  Problem problem;
+  const WaveletVariance& first = windows.front().wv;
+  for (const auto& level : first.levels) {
+    if (has_enough_coefficients(level)) problem.levels.push_back(level.level);
+  }
+  if (problem.levels.empty()) return work_error("the windows are too short", "use longer windows");
+  const auto rows = static_cast<Index>(problem.levels.size());
+  const auto n = static_cast<double>(windows.size());
+  double mean = 0.0;
+  for (const auto& w : windows) mean += w.driver / n;
+  double variance = 0.0;
+  for (const auto& w : windows) variance += (w.driver - mean) * (w.driver - mean) / n;
+  constexpr double kConstant = 1e-9;
+  if (!(variance > kConstant * kConstant * (mean * mean + variance)) || !std::isfinite(variance))
+    return work_error("the driver does not vary", "a dependence shows only where what it is on changes");
+  problem.x_scale = std::sqrt(variance);
+  problem.x.resize(static_cast<Index>(windows.size()));
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    problem.x(static_cast<Index>(w)) = (windows[w].driver - mean) / problem.x_scale;
+    VectorXd wv(rows);
+    for (Index r = 0; r < rows; ++r) wv(r) = windows[w].wv.levels.at(static_cast<std::size_t>(r)).value;
+    problem.wv.push_back(std::move(wv));
+  }
+  problem.places = parameter_places(model);
+  const MatrixXd v = wv_covariance(model, first, problem.levels.size());
+  problem.relative_sd.resize(rows);
+  for (Index r = 0; r < rows; ++r)
+    problem.relative_sd(r) =
+        std::sqrt(v(r, r)) / model_wv(model, problem.levels[static_cast<std::size_t>(r)]);
+  const VectorXd scale = v.diagonal().cwiseSqrt().cwiseInverse();
+  problem.correlation_inverse =
+      (scale.asDiagonal() * v * scale.asDiagonal()).eval().ldlt().solve(MatrixXd::Identity(rows, rows));
+  return problem;
+}
+
+/// The start model without what has no amplitude.
+Model present_part(const Model& model) {
+  Model present;
+  for (const auto& c : model.components) {
+    if (c.amplitude > 0.0) present.components.push_back(c);
+  }
+  return present;
+}
+
+/// Places' names as the fit prints them: the components of `start.model` in order, those of amplitude zero
+/// left out.
+std::vector<const ParameterEstimate*> names_of(const FitResult& start) {
+  std::vector<const ParameterEstimate*> names;
+  const auto places = parameter_places(start.model);
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    if (start.model.components[places[p].component].amplitude > 0.0) names.push_back(&start.parameters[p]);
+  }
+  return names;
+}
+
+/// Value of a place as it is printed, from the value in the start fit and the change on its scale.
+double printed(const ParameterEstimate& like, double start_scale, double now_scale) {
+  const double change = now_scale - start_scale;
+  if (like.name == "theta" || like.name == "phi") return std::tanh(std::atanh(like.value) + change);
+  return like.value * std::exp(like.name == "omega" || like.name == "alpha" ? 0.5 * change : change);
+}
+
+}  // namespace
+
+Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const FitResult& start,
+                                  const DependenceOptions& options) {
+  const Model model = present_part(start.model);
+  const auto problem = problem_of(windows, model);
+  if (!problem) return tl::unexpected<Error>(problem.error());
+  const std::size_t places = problem->places.size();
+  Unknowns unknowns{std::vector<bool>(places, true), std::vector<bool>(places, true)};
+  Values values = start_values(model, problem->places);
+  const Values begin = values;
+  leave_out_undetermined(*problem, model, values, unknowns);
+  Scores last;
+  if (unknowns.count() > 0 && !search(*problem, model, unknowns, values, last)) {
+    return work_error("the dependence on the driver could not be fitted: the search does not settle",
+                      "use a simpler model or longer windows");
+  }
+
+  Dependence out;
+  out.n_windows = windows.size();
+  for (const auto& w : windows) out.mean_driver += w.driver / static_cast<double>(windows.size());
+  out.at_mean_driver = model_at(model, problem->places, values, 0.0);
+  const auto names = names_of(start);
+  const Index n = unknowns.count();
+  const auto free = static_cast<double>(windows.size()) - static_cast<double>(n);
+  const MatrixXd bread = n > 0 ? inverse_of(last.information) : MatrixXd();
+  // Windows vary more than the model says wherever the dependence is not the whole truth: their own scatter
+  // decides (White 1980), with the small-sample factor of Hinkley (1977).
+  const MatrixXd covariance =
+      n > 0
+          ? MatrixXd(bread * last.outer * bread * (static_cast<double>(windows.size()) / std::max(free, 1.0)))
+          : MatrixXd();
+  const boost::math::students_t t(std::max(free, 1.0));
+  const double quantile = boost::math::quantile(t, 0.5 * (1.0 + options.confidence));
+  Index column = 0;
+  for (std::size_t p = 0; p < places; ++p) {
+    const auto k = static_cast<Index>(p);
+    if (unknowns.level[p]) ++column;
+    if (!unknowns.slope[p]) {
+      out.undetermined.push_back({names[p]->process, names[p]->name,
+                                  unknowns.level[p]
+                                      ? "its change with the driver is not determined by this run"
+                                      : "windows of this length do not determine it"});
+      continue;
+    }
+    ParameterSlope slope;
+    slope.process = names[p]->process;
+    slope.name = names[p]->name;
+    slope.unit = names[p]->unit;
+    slope.at_mean_driver = printed(*names[p], begin.level(k), values.level(k));
+    slope.slope = values.slope(k) / problem->x_scale;
+    slope.sd = std::sqrt(covariance(column, column)) / problem->x_scale;
+    ++column;
+    slope.ci_low = slope.slope - quantile * slope.sd;
+    slope.ci_high = slope.slope + quantile * slope.sd;
+    slope.p_value = 2.0 * boost::math::cdf(boost::math::complement(t, std::abs(slope.slope) / slope.sd));
+    out.slopes.push_back(slope);
+  }
+  return out;
+}
+
+std::optional<WindowWhiteNoise> white_noise_of(const WaveletVariance& window, const Model& model,
+                                               double confidence) {
+  if (window.levels.empty()) return std::nullopt;
+  const auto at = std::find_if(model.components.begin(), model.components.end(),
+                               [](const Component& c) { return c.kind == ProcessKind::kWhiteNoise; });
+  if (at == model.components.end()) return std::nullopt;
+  // The first level alone holds more than half of what all tell of it, and no slow process.
+  const WvLevel& level = window.levels.front();
+  const double of_white = unit_wv(ProcessKind::kWhiteNoise, {}, level.level).value;
+  const double rest = model_wv(model, level.level) - at->amplitude * of_white;
+  const double value = (level.value - rest) / of_white;
+  if (!(value > 0.0)) return std::nullopt;
+  const MatrixXd v = wv_covariance(model, window, 1);
+  const double log_sd =
+      std::sqrt(v(0, 0)) / (model_wv(model, level.level)) * level.value / (level.value - rest);
+  const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + confidence));
+  return WindowWhiteNoise{value, value * std::exp(-z * log_sd), value * std::exp(z * log_sd)};
+}
+
+}  // namespace imuscope::noise

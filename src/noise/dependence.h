@@ -1,0 +1,78 @@
+#pragma once
+
+/// Noise parameters as functions of a driver (rate, vibration, speed ...): over many short windows,
+///
+///   log theta_p(w) = log theta_p + slope_p (x_w - mean x),
+///
+/// for amplitudes and rates alike, fitted to the wavelet variances of all windows at once (N-22 to N-24 in
+/// EQUATIONS.md). What windows of that length do not determine is held at the start model and said.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "noise/fit.h"
+#include "noise/model.h"
+#include "noise/wavelet_variance.h"
+
+namespace imuscope::noise {
+
+/// One window: its wavelet variance without gaps inside, and the driver there.
+struct DrivenWindow {
+  WaveletVariance wv;
+  double driver = 0.0;
+};
+
+struct DependenceOptions {
+  double confidence = 0.95;
+  std::string signal_unit{};
+};
+
+struct ParameterSlope {
+  std::string process;  ///< as in FitResult: "WN", "GM1", ...
+  std::string name;     ///< "sigma2", "beta", ...
+  std::string unit;
+  double at_mean_driver = 0.0;  ///< value where the driver has its mean
+  double slope = 0.0;           ///< of the logarithm, per unit of the driver
+  double sd = 0.0;
+  double ci_low = 0.0;
+  double ci_high = 0.0;
+  double p_value = 1.0;  ///< of no dependence
+};
+
+struct UndeterminedSlope {
+  std::string process;
+  std::string name;
+  std::string why;
+};
+
+struct Dependence {
+  std::size_t n_windows = 0;
+  double mean_driver = 0.0;
+  std::vector<ParameterSlope> slopes;
+  std::vector<UndeterminedSlope> undetermined;
+  Model at_mean_driver;
+};
+
+inline constexpr std::size_t kFewestWindows = 12;
+
+/// @param windows  all of one length, so that one covariance serves them
+/// @param start    a fit of the same signal: which processes, and where the search begins
+/// Errors (kWork): fewer than kFewestWindows windows; a driver that does not vary; no level with enough
+/// coefficients; a search that does not settle.
+Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const FitResult& start,
+                                  const DependenceOptions& options = {});
+
+/// The white-noise variance of one window, everything else as in `model`; absent where the rest of the model
+/// explains more than the window shows. For pictures.
+struct WindowWhiteNoise {
+  double value = 0.0;
+  double ci_low = 0.0;
+  double ci_high = 0.0;
+};
+std::optional<WindowWhiteNoise> white_noise_of(const WaveletVariance& window, const Model& model,
+                                               double confidence);
+
+}  // namespace imuscope::noise

@@ -1,0 +1,114 @@
+#include "regimes/labels.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+namespace imuscope {
+
+namespace {
+
+constexpr std::string_view kHeader = "begin_s,end_s,regime";
+constexpr std::string_view kEvent = "regime ";
+constexpr std::string_view kEnd = "end";
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r";
+  const auto first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+std::optional<double> number(std::string_view text) {
+  double value = 0.0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (code != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+std::optional<Label> parse_line(std::string_view line) {
+  const auto first = line.find(',');
+  if (first == std::string_view::npos) return std::nullopt;
+  const auto second = line.find(',', first + 1);
+  if (second == std::string_view::npos) return std::nullopt;
+  const auto begin = number(trimmed(line.substr(0, first)));
+  const auto end = number(trimmed(line.substr(first + 1, second - first - 1)));
+  const auto name = trimmed(line.substr(second + 1));
+  if (!begin || !end || *end <= *begin || name.empty() || name.find(',') != std::string_view::npos)
+    return std::nullopt;
+  return Label{*begin, *end, std::string(name)};
+}
+
+}  // namespace
+
+Result<std::vector<Label>> parse_labels(std::string_view text, const std::string& file) {
+  const std::string remedy = fmt::format(
+      "a file of labels begins with the line {}, then one stretch a line, "
+      "such as 12.0,340.5,motorway",
+      kHeader);
+  std::vector<Label> labels;
+  bool has_header = false;
+  int line_number = 0;
+  while (!text.empty()) {
+    const auto end = text.find('\n');
+    const auto line = trimmed(text.substr(0, end));
+    text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
+    ++line_number;
+    if (line.empty() || line.front() == '#') continue;
+    if (!has_header) {
+      if (line != kHeader)
+        return usage_error(fmt::format("{}:{}: '{}' is not the header {}", file, line_number, line, kHeader),
+                           remedy);
+      has_header = true;
+      continue;
+    }
+    const auto label = parse_line(line);
+    if (!label)
+      return usage_error(fmt::format("{}:{}: '{}' is no stretch of a regime", file, line_number, line),
+                         remedy);
+    if (!labels.empty() && label->begin_s < labels.back().end_s) {
+      return usage_error(fmt::format("{}:{}: begins at {} s, before the stretch above it ends ({} s)", file,
+                                     line_number, label->begin_s, labels.back().end_s),
+                         "stretches are in order and do not overlap");
+    }
+    labels.push_back(*label);
+  }
+  if (labels.empty()) return usage_error(fmt::format("{} holds no regime", file), remedy);
+  return labels;
+}
+
+std::vector<Label> labels_of_moments(const std::vector<MarkedMoment>& moments, HostTime origin,
+                                     HostTime end) {
+  std::vector<Label> labels;
+  bool open = false;
+  auto ordered = moments;
+  std::stable_sort(ordered.begin(), ordered.end(),
+                   [](const MarkedMoment& a, const MarkedMoment& b) { return a.time < b.time; });
+  for (const auto& moment : ordered) {
+    const auto text = trimmed(moment.text);
+    if (!text.starts_with(kEvent)) continue;
+    const double time_s = to_seconds(moment.time - origin);
+    if (open) labels.back().end_s = time_s;
+    const auto name = trimmed(text.substr(kEvent.size()));
+    open = !name.empty() && name != kEnd;
+    if (open) labels.push_back({time_s, time_s, std::string(name)});
+  }
+  if (open) labels.back().end_s = std::max(labels.back().begin_s, to_seconds(end - origin));
+  return labels;
+}
+
+RegimeTrack labelled_regimes(const std::vector<Label>& labels, HostTime origin) {
+  std::vector<std::string> names;
+  std::vector<RegimeStretch> stretches;
+  for (const auto& label : labels) {
+    auto found = std::find(names.begin(), names.end(), label.name);
+    if (found == names.end()) found = names.insert(names.end(), label.name);
+    stretches.push_back({origin + from_seconds(label.begin_s), origin + from_seconds(label.end_s),
+                         static_cast<std::size_t>(found - names.begin())});
+  }
+  return {std::move(names), stretches};
+}
+
+}  // namespace imuscope

@@ -1,0 +1,47 @@
+#pragma once
+
+/// The noise models of a run: every S-IMU and axis, over the whole run and per regime, and what differs
+/// between the regimes (Table II). models.json, comparison.json, vibration.json, and
+/// "left_out" of regimes.json.
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "noise/fit.h"
+#include "service/config.h"
+#include "service/noise_series.h"
+
+namespace imuscope {
+
+/// A model of models.json.
+struct StudyModel {
+  std::string name;  ///< of the S-IMU
+  std::size_t axis = 0;
+  std::string regime;  ///< "all", or a regime's name
+  noise::FitResult fit;
+};
+
+struct NoiseStudy {
+  std::vector<StudyModel> models;
+  nlohmann::json left_out = nlohmann::json::array();
+  nlohmann::json lines = nlohmann::json::array();  ///< entries of vibration.json
+  std::vector<std::string> remarks;                ///< what could not be fitted, levels that are left out
+};
+
+/// Vibration lines are looked for in every regime and taken out before models are fitted.
+/// @param series    one an S-IMU, in the order of the configuration; regimes by their index in `regimes`
+/// @param progress  called with the share that is done
+NoiseStudy study_noise(const Configuration& configuration, const std::vector<NoiseSeries>& series,
+                       const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
+                       const std::function<void(double)>& progress);
+
+/// The content of models.json's "models".
+nlohmann::json models_json(const NoiseStudy& study);
+
+/// comparison.json: for every S-IMU and axis, every two regimes parameter by parameter and jointly. Holm's
+/// correction holds over all parameters of one S-IMU, and over all its joint tests.
+nlohmann::json comparison_json(const NoiseStudy& study, const std::vector<std::string>& regimes);
+
+}  // namespace imuscope

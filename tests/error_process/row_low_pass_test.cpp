@@ -1,0 +1,72 @@
+#include "error_process/row_low_pass.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace imuscope {
+namespace {
+
+constexpr double kRate_hz = 100.0;
+
+ErrorRow row_at(std::int64_t counter, double value) {
+  ErrorRow row{};
+  row.counter = counter;
+  row.gyro_valid = row.accel_valid = true;
+  row.e_gyro_radps = row.e_accel_mps2 = {value, -value, 2.0 * value};
+  row.predicted_omega_s_radps = row.predicted_f_s_mps2 = {value, value, value};
+  return row;
+}
+
+/// Amplitude of the filter's answer to a sinusoid of 1, once it has settled.
+double gain_at(double frequency_hz, double corner_hz) {
+  RowLowPass filter(kRate_hz, corner_hz);
+  double largest = 0.0;
+  for (std::int64_t k = 0; k < 6000; ++k) {
+    ErrorRow row =
+        row_at(k, std::sin(2.0 * std::numbers::pi * frequency_hz * static_cast<double>(k) / kRate_hz));
+    filter.apply(row);
+    if (row.gyro_valid && k > 1000) largest = std::max(largest, std::abs(row.e_gyro_radps[0]));
+  }
+  return largest;
+}
+
+TEST(RowLowPass, HasTheGainOfASecondOrderButterworth) {
+  constexpr double kCorner_hz = 10.0;
+  // |H|^2 = 1 / (1 + (w/wc)^4) with both frequencies warped by the bilinear transform.
+  for (const double f : {0.5, 3.0, 10.0, 20.0, 31.0}) {
+    const double w =
+        std::tan(std::numbers::pi * f / kRate_hz) / std::tan(std::numbers::pi * kCorner_hz / kRate_hz);
+    EXPECT_NEAR(gain_at(f, kCorner_hz), 1.0 / std::sqrt(1.0 + w * w * w * w), 3e-3) << f << " Hz";
+  }
+}
+
+TEST(RowLowPass, ErrorAndPredictionPassTheSameFilter) {
+  RowLowPass filter(kRate_hz, 8.0);
+  for (std::int64_t k = 0; k < 500; ++k) {
+    ErrorRow row = row_at(k, std::sin(0.3 * static_cast<double>(k)) + 0.2);
+    filter.apply(row);
+    EXPECT_DOUBLE_EQ(row.e_gyro_radps[0], row.predicted_omega_s_radps[0]);
+    EXPECT_DOUBLE_EQ(row.e_accel_mps2[2], 2.0 * row.predicted_f_s_mps2[2]);
+  }
+}
+
+TEST(RowLowPass, AfterAGapRowsAreNotValidUntilItHasSettled) {
+  RowLowPass filter(kRate_hz, 10.0);
+  const auto valid_at = [&](std::int64_t counter) {
+    ErrorRow row = row_at(counter, 1.0);
+    filter.apply(row);
+    EXPECT_NEAR(row.e_gyro_radps[0], 1.0, 1e-12) << "a constant passes at once";
+    return row.gyro_valid;
+  };
+  EXPECT_FALSE(valid_at(0));
+  for (std::int64_t k = 1; k < 100; ++k) (void)valid_at(k);
+  EXPECT_TRUE(valid_at(100));
+  EXPECT_FALSE(valid_at(103)) << "two samples are missing";
+  for (std::int64_t k = 104; k < 200; ++k) (void)valid_at(k);
+  EXPECT_TRUE(valid_at(200));
+}
+
+}  // namespace
+}  // namespace imuscope

@@ -1,0 +1,94 @@
+#include "noise/dependence.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace imuscope::noise {
+namespace {
+
+constexpr double kRate_hz = 100.0;
+constexpr std::size_t kWindow = 2000;
+
+/// Windows of white noise whose variance is exp(slope x), x from 0 to 2.
+std::vector<std::vector<double>> white_windows(std::size_t n, double slope, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<std::vector<double>> windows;
+  for (std::size_t w = 0; w < n; ++w) {
+    const double x = 2.0 * static_cast<double>(w) / static_cast<double>(n - 1);
+    std::vector<double> values(kWindow);
+    for (double& value : values) value = std::exp(0.5 * slope * x) * normal(random);
+    windows.push_back(std::move(values));
+  }
+  return windows;
+}
+
+struct Example {
+  std::vector<DrivenWindow> windows;
+  FitResult start;
+};
+
+Example example_of(const std::vector<std::vector<double>>& signals, const char* model) {
+  Example out;
+  std::vector<double> all;
+  for (std::size_t w = 0; w < signals.size(); ++w) {
+    all.insert(all.end(), signals[w].begin(), signals[w].end());
+    out.windows.push_back({haar_wavelet_variance(signals[w]).value(),
+                           2.0 * static_cast<double>(w) / static_cast<double>(signals.size() - 1)});
+  }
+  out.start = fit(haar_wavelet_variance(all).value(), parse_model(model).value(), kRate_hz).value();
+  return out;
+}
+
+TEST(Dependence, OfWhiteNoiseHasTheSlopeAndTheSdOfItsRegression) {
+  const auto example = example_of(white_windows(60, 0.5, 1), "WN");
+  const auto found = fit_dependence(example.windows, example.start);
+  ASSERT_TRUE(found) << found.error().text();
+  ASSERT_EQ(found->slopes.size(), 1u);
+  const auto& slope = found->slopes[0];
+  EXPECT_EQ(slope.process, "WN");
+  EXPECT_EQ(slope.name, "sigma2");
+  EXPECT_LT(slope.p_value, 1e-6);
+  EXPECT_NEAR(slope.slope, 0.5, 3.5 * slope.sd);
+  // log of a sample variance of n values has sd sqrt(2/n); x is uniform on [0, 2].
+  double squares = 0.0;
+  for (const auto& w : example.windows) squares += (w.driver - 1.0) * (w.driver - 1.0);
+  const double expected_sd = std::sqrt(2.0 / static_cast<double>(kWindow) / squares);
+  EXPECT_NEAR(slope.sd, expected_sd, 0.35 * expected_sd);
+  EXPECT_NEAR(slope.at_mean_driver, std::exp(0.5), 0.02);
+}
+
+TEST(Dependence, WhatWindowsDoNotDetermineIsSaid) {
+  // A process slower than the windows by far: its level shows in none of them.
+  auto signals = white_windows(40, 0.0, 2);
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  double slow = 0.0;
+  for (auto& window : signals) {
+    for (double& value : window)
+      value += slow = 0.99999 * slow + std::sqrt(1.0 - 0.99998) * 0.2 * normal(random);
+  }
+  const auto example = example_of(signals, "WN+GM");
+  const auto found = fit_dependence(example.windows, example.start);
+  ASSERT_TRUE(found) << found.error().text();
+  EXPECT_FALSE(found->undetermined.empty());
+  for (const auto& slope : found->slopes) EXPECT_EQ(slope.process, "WN");
+}
+
+TEST(Dependence, WindowsThatDoNotVaryAndTooFewOfThemAreRefused) {
+  auto example = example_of(white_windows(20, 0.0, 3), "WN");
+  const std::span<const DrivenWindow> few(example.windows.data(), 5);
+  const auto refused = fit_dependence(few, example.start);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), ::testing::HasSubstr("there are 5 windows and 12 are needed"));
+  for (auto& window : example.windows) window.driver = 4.0;
+  const auto constant = fit_dependence(example.windows, example.start);
+  ASSERT_FALSE(constant);
+  EXPECT_THAT(constant.error().text(), ::testing::HasSubstr("does not vary"));
+}
+
+}  // namespace
+}  // namespace imuscope::noise

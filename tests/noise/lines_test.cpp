@@ -1,0 +1,104 @@
+#include "noise/lines.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "noise/wavelet_variance.h"
+
+namespace imuscope::noise {
+namespace {
+
+constexpr double kRate_hz = 100.0;
+
+/// White noise of variance 1 over a slow Gauss-Markov process, as an axis at rest has it.
+std::vector<double> noise_of(std::size_t n, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> x(n);
+  double slow = 0.0;
+  for (double& value : x) {
+    slow = 0.99 * slow + 0.1 * normal(random);
+    value = normal(random) + slow;
+  }
+  return x;
+}
+
+void add_line(std::vector<double>& x, double frequency_hz, double amplitude) {
+  for (std::size_t i = 0; i < x.size(); ++i)
+    x[i] +=
+        amplitude * std::sin(2.0 * std::numbers::pi * frequency_hz * static_cast<double>(i) / kRate_hz + 0.4);
+}
+
+std::vector<std::uint8_t> all_valid(std::size_t n) { return std::vector<std::uint8_t>(n, 1); }
+
+TEST(Lines, AreFoundWhereTheyAreWithTheirAmplitude) {
+  for (const double frequency_hz : {27.31, 12.0, 41.118}) {
+    auto x = noise_of(120'000, 1);
+    add_line(x, frequency_hz, 0.3);
+    const auto lines = find_lines(x, all_valid(x.size()), {});
+    ASSERT_EQ(lines.size(), 1u) << frequency_hz;
+    EXPECT_NEAR(lines[0].frequency_hz, frequency_hz, 0.1 * kRate_hz / 4096.0);
+    EXPECT_NEAR(lines[0].amplitude, 0.3, 0.03);
+    EXPECT_LT(lines[0].p_value, 1e-6);
+    EXPECT_LT(lines[0].frequency_sd_hz, 0.1 * kRate_hz / 4096.0);
+  }
+}
+
+TEST(Lines, NoiseAloneRarelyHasOne) {
+  int found = 0;
+  constexpr int kSeries = 200;
+  for (unsigned seed = 1; seed <= kSeries; ++seed) {
+    const auto x = noise_of(40'000, seed);
+    LineOptions options;
+    options.false_alarm = 0.02;
+    found += find_lines(x, all_valid(x.size()), options).empty() ? 0 : 1;
+  }
+  // Four expected; eleven or more have a chance below 0.5 %.
+  EXPECT_LT(found, 11);
+}
+
+TEST(Lines, ABroadPeakIsNoLine) {
+  // A resonance of 20 Hz, 1 Hz wide: an AR(2) process.
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  const double r = std::exp(-std::numbers::pi * 1.0 / kRate_hz);
+  const double a1 = 2.0 * r * std::cos(2.0 * std::numbers::pi * 20.0 / kRate_hz);
+  std::vector<double> x(120'000);
+  double y1 = 0.0;
+  double y2 = 0.0;
+  for (double& value : x) {
+    const double y = a1 * y1 - r * r * y2 + 0.2 * normal(random);
+    y2 = y1;
+    y1 = y;
+    value = y + normal(random);
+  }
+  EXPECT_TRUE(find_lines(x, all_valid(x.size()), {}).empty());
+}
+
+TEST(Lines, TakenOutTheyLeaveTheWaveletVarianceOfTheNoise) {
+  const auto clean = noise_of(120'000, 3);
+  auto x = clean;
+  add_line(x, 23.4, 1.0);
+  const auto lines = find_lines(x, all_valid(x.size()), {});
+  ASSERT_EQ(lines.size(), 1u);
+  const auto before = haar_wavelet_variance(x).value();
+  remove_lines(x, all_valid(x.size()), lines, {});
+  const auto after = haar_wavelet_variance(x).value();
+  const auto truth = haar_wavelet_variance(clean).value();
+  EXPECT_GT(before.levels[1].value, 1.3 * truth.levels[1].value) << "the line shows";
+  for (std::size_t j = 0; j < 8; ++j)
+    EXPECT_NEAR(after.levels[j].value, truth.levels[j].value, 0.01 * truth.levels[j].value)
+        << "level " << j + 1;
+}
+
+TEST(Lines, ASignalShorterThanASegmentHasNone) {
+  auto x = noise_of(4000, 1);
+  add_line(x, 20.0, 3.0);
+  EXPECT_TRUE(find_lines(x, all_valid(x.size()), {}).empty());
+}
+
+}  // namespace
+}  // namespace imuscope::noise
