@@ -461,7 +461,6 @@ void read_regimes(TomlReader in, RegimeOptions& options) {
   options.by = static_cast<RegimesBy>(in.choice("by", {"motion", "intensity", "labels"}, 0));
   MotionLimits& limits = options.limits;
   const auto both = [&](const char* key, double& motion, double& rest, double unit, double most) {
-    if (!in.has(key)) return;
     in.number(key, motion, unit, 1e-6, most);
     rest = kRestShare * motion;
   };

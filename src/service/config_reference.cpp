@@ -91,6 +91,25 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"lcm.url", "Where results are published. `ttl=0` stays on this PC, `ttl=1` reaches its network."},
     {"lcm.channel_prefix", "What the channels' names begin with."},
     {"lcm.bridge", "Publishes the widespread `pose_t` and `ins_t`, too."},
+    {"regimes.by",
+     "What a study tells regimes apart by: `motion` finds static and dynamic, `intensity` splits the dynamic "
+     "part, "
+     "`labels` are what a person named in `--labels FILE` or by messages on IMUSCOPE_EVENT."},
+    {"regimes.motion_speed_mps", "A speed above this is motion; rest is below half of it."},
+    {"regimes.motion_rate_deg_per_s", "The same for the spread of the angular rate within a second."},
+    {"regimes.motion_force_mps2", "The same for the spread of the specific force."},
+    {"regimes.motion_vibration_mps2",
+     "The same for vibration, rms; three times as much where the speed is zero."},
+    {"regimes.shortest_static_s", "A shorter standstill belongs to the drive around it, seconds."},
+    {"regimes.intensity", "With `intensity`: what it is measured by."},
+    {"regimes.bins", "With `intensity`: bins, each with as much of the drive as the others."},
+    {"regimes.block_s", "With `intensity`: the drive is looked at in blocks of so many seconds."},
+    {"regimes.window_s",
+     "Noise parameters are held against rate, vibration and speed over windows of so many seconds."},
+    {"error_process.low_pass_hz",
+     "A low-pass for errors and reference alike, so that sensors of different bandwidth compare; 0 is none. "
+     "At most "
+     "0.4 of the slowest rate."},
     {"record.folder", "Where live runs are recorded, relative to the working folder. `--out` comes first."},
     {"device.name", "Becomes part of file names: letters, digits, `_`, `-`."},
     {"device.role",

@@ -196,6 +196,20 @@ void append_comparisons(const std::vector<AxisComparison>& all, nlohmann::json& 
 
 }  // namespace
 
+std::string coverage_remark(const std::string& name, const NoiseSeries& series, double rate_hz, double run_s,
+                            HostTime origin) {
+  if (series.size() == 0)
+    return fmt::format("{}: has no sample in this run's error process; nothing is said of it", name);
+  const double has_s = static_cast<double>(series.size() - series.missing()) / rate_hz;
+  if (has_s >= kWholeRunShare * run_s) return {};
+  return fmt::format(
+      "{}: has samples for {:.0f} s of the run's {:.0f} s, between {:.0f} s and {:.0f} s; its models and "
+      "regressions "
+      "are of that part alone",
+      name, has_s, run_s, to_seconds(series.time(0) - origin),
+      to_seconds(series.time(series.size() - 1) - origin));
+}
+
 NoiseStudy study_noise(const Configuration& configuration, const std::vector<NoiseSeries>& series,
                        const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
                        const std::function<void(double)>& progress) {

@@ -30,6 +30,11 @@ struct NoiseStudy {
   std::vector<std::string> remarks;                ///< what could not be fitted, levels that are left out
 };
 
+/// A sentence where a S-IMU has samples for less than kWholeRunShare of the run; empty otherwise.
+inline constexpr double kWholeRunShare = 0.9;
+std::string coverage_remark(const std::string& name, const NoiseSeries& series, double rate_hz, double run_s,
+                            HostTime origin);
+
 /// Vibration lines are looked for in every regime and taken out before models are fitted.
 /// @param series    one an S-IMU, in the order of the configuration; regimes by their index in `regimes`
 /// @param progress  called with the share that is done

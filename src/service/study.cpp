@@ -296,6 +296,13 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     series.push_back(write_errors({i, origin, {}}, *regimes, scale, rows[i], **folder));
   }
 
+  const double run_s = regimes->motion.total_s(0) + regimes->motion.total_s(1);
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const auto& device = configuration.devices[configuration.study_indices()[i]];
+    const auto remark = coverage_remark(device.name, series[i], device.rate_hz, run_s, origin);
+    if (!remark.empty()) regimes->remarks.push_back(remark);
+  }
+
   const auto& names = regimes->chosen.names();
   const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
     if (options.progress) options.progress("noise models", share);

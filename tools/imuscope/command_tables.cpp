@@ -167,7 +167,7 @@ void print_table2(const Options& options, const json& comparisons, const Truth& 
     }
     const json& joint = c.at("joint");
     if (!joint.is_null()) {
-      fmt::print("jointly: chi2({}) = {:.4g}, p = {} (corrected {})\n", joint.at("dof").get<int>(),
+      fmt::print("jointly: chi2({}) = {:.4g}, p: {} (corrected: {})\n", joint.at("dof").get<int>(),
                  joint.at("statistic").get<double>(), p_text(number(joint, "p_value")),
                  p_text(number(joint, "p_holm")));
     }

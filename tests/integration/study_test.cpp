@@ -1,0 +1,200 @@
+/// The study of a simulated drive against the simulator's truth, through bytes and the command line: the
+/// error process, the regimes, the tables, and what is said where a device or a part of the drive is missing.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "programs.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::test {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+constexpr std::size_t kAxes = 6;
+using Row = std::array<double, kAxes>;
+
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells;
+  std::stringstream in(line);
+  for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
+  return cells;
+}
+
+/// Errors by counter; rows with an empty field are left out.
+std::map<std::int64_t, Row> read_errors(const std::filesystem::path& file) {
+  std::map<std::int64_t, Row> rows;
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    const auto cells = cells_of(line);
+    if (cells.size() < 2 + kAxes) continue;
+    Row row{};
+    bool whole = true;
+    for (std::size_t i = 0; i < kAxes; ++i) {
+      whole = whole && !cells[2 + i].empty();
+      if (whole) row[i] = std::stod(cells[2 + i]);
+    }
+    if (whole) rows[std::stoll(cells[1])] = row;
+  }
+  return rows;
+}
+
+/// Smallest white-noise variance of an axis in any regime.
+double white_noise_of(const nlohmann::json& imu, const std::string& axis) {
+  double smallest = 1e9;
+  for (const auto& model : imu.at("noise")) {
+    if (model.at("axis") != axis) continue;
+    for (const auto& p : model.at("parameters")) {
+      if (p.at("process") == "WN") smallest = std::min(smallest, p.at("value").get<double>());
+    }
+  }
+  return smallest;
+}
+
+std::vector<std::string> inputs_of(const std::filesystem::path& recording) {
+  std::vector<std::string> inputs;
+  for (const char* name : {"airins", "mtx1", "mtx2", "mtx3", "gnss"})
+    inputs.push_back(std::string(name) + "=" + (recording / (std::string(name) + ".bin")).string());
+  return inputs;
+}
+
+int process(const std::filesystem::path& recording, const std::filesystem::path& out,
+            const std::vector<std::string>& more = {}) {
+  std::vector<std::string> arguments{"process"};
+  for (const auto& input : inputs_of(recording)) arguments.push_back(input);
+  arguments.insert(arguments.end(),
+                   {"--config", (recording / "config.toml").string(), "--out", out.string()});
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_program("imuscope", arguments, out.string() + ".log");
+}
+
+void record(const std::filesystem::path& folder, const char* minutes) {
+  ASSERT_EQ(run_program("imusim",
+                        {"record", source_path("config/demo.toml").string(), "--minutes", minutes, "--seed",
+                         "11", "--errors", "--out", folder.string()},
+                        folder.string() + ".log"),
+            0)
+      << read_text(folder.string() + ".log");
+}
+
+/// Keeps the first half of a device's bytes and of its reads.
+void cut_in_half(const std::filesystem::path& recording, const std::string& device) {
+  const auto file = recording / (device + ".bin");
+  const auto half = std::filesystem::file_size(file) / 2;
+  const auto arrivals = recording / (device + ".arrivals.csv");
+  std::stringstream in(read_text(arrivals));
+  std::string line;
+  std::string kept;
+  std::getline(in, line);
+  kept = line + "\n";
+  std::uintmax_t end = 0;
+  while (std::getline(in, line)) {
+    const auto cells = cells_of(line);
+    const auto after = std::stoull(cells.at(0)) + std::stoull(cells.at(1));
+    if (after > half) break;
+    end = after;
+    kept += line + "\n";
+  }
+  std::filesystem::resize_file(file, end);
+  std::ofstream(arrivals) << kept;
+}
+
+nlohmann::json tables_of(const std::filesystem::path& run, const std::filesystem::path& truth) {
+  const auto log = run.string() + ".tables.json";
+  EXPECT_EQ(run_program("imuscope", {"tables", run.string(), "--truth", truth.string(), "--json"}, log), 0)
+      << read_text(log);
+  return read_json(log);
+}
+
+TEST(StudyOfADrive, TheErrorProcessIsTheTrueErrorToAHundredthOfTheNoise) {
+  const auto folder = scratch_folder() / "drive";
+  record(folder, "6");
+  const auto out = scratch_folder() / "run";
+  ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
+  const auto truth = read_json(folder / "truth.json");
+  constexpr std::array<const char*, kAxes> kNames{"gyro_x",  "gyro_y",  "gyro_z",
+                                                  "accel_x", "accel_y", "accel_z"};
+  for (const auto& imu : truth.at("imus")) {
+    const auto name = imu.at("name").get<std::string>();
+    const auto found = read_errors(out / ("errors_" + name + ".csv"));
+    const auto wanted = read_errors(folder / ("errors_truth_" + name + ".csv"));
+    EXPECT_GT(found.size(), 35'900U) << "the whole drive but its first and last moment";
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      double mean = 0.0;
+      double squares = 0.0;
+      double n = 0.0;
+      for (const auto& [counter, row] : found) {
+        const double d = row[axis] - wanted.at(counter)[axis];
+        n += 1.0;
+        const double before = d - mean;
+        mean += before / n;
+        squares += before * (d - mean);
+      }
+      EXPECT_LE(squares / (n - 1.0), 0.01 * white_noise_of(imu, kNames[axis])) << name << " " << kNames[axis];
+    }
+  }
+}
+
+TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
+  const auto folder = scratch_folder() / "drive";
+  record(folder, "4");
+  cut_in_half(folder, "mtx3");
+  const auto out = scratch_folder() / "run";
+  ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
+
+  const auto regimes = read_json(out / "regimes.json");
+  EXPECT_EQ(regimes.at("by"), "motion");
+  // 60 s of rest, the drive, 16 s of rest; changes are placed within half the window of 6 s.
+  EXPECT_NEAR(regimes.at("regimes")[0].at("total_s").get<double>(), 76.0, 6.5);
+  EXPECT_THAT(regimes.at("remarks").get<std::vector<std::string>>(),
+              Contains(HasSubstr("mtx3: has samples for 1")));
+  EXPECT_THAT(read_json(out / "run.json").at("warnings").get<std::vector<std::string>>(),
+              Contains(HasSubstr("mtx3: has samples for 1")));
+  EXPECT_FALSE(regimes.at("left_out").empty()) << "60 s of rest are too short for the drive's longest scales";
+  for (const auto& regression : read_json(out / "regression.json").at("regressions"))
+    EXPECT_EQ(regression.at("regime"), "dynamic");
+  EXPECT_FALSE(read_json(out / "dependence.json").at("points").empty());
+  EXPECT_TRUE(read_json(out / "vibration.json").at("lines").empty()) << "the simulated vehicle has no engine";
+
+  const auto tables = tables_of(out, folder / "truth.json");
+  EXPECT_EQ(tables.at("comparisons").size(), 18U);
+  for (const auto& c : tables.at("comparisons")) {
+    for (const auto& p : c.at("parameters")) {
+      if (p.at("process") == "WN") EXPECT_GT(p.at("first_truth").get<double>(), 0.0);
+    }
+  }
+
+  const auto labels = scratch_folder() / "labels.csv";
+  std::ofstream(labels) << "begin_s,end_s,regime\n0,55,parked\n70,130,town\n130,200,road\n";
+  const auto labelled = scratch_folder() / "labelled";
+  ASSERT_EQ(process(folder, labelled, {"--labels", labels.string()}), 0)
+      << read_text(labelled.string() + ".log");
+  const auto named = read_json(labelled / "regimes.json");
+  EXPECT_EQ(named.at("by"), "labels");
+  ASSERT_EQ(named.at("regimes").size(), 3U);
+  EXPECT_EQ(named.at("regimes")[2].at("name"), "road");
+  std::map<std::string, int> rows;
+  std::ifstream in(labelled / "errors_mtx1.csv");
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) ++rows[line.substr(line.rfind(',') + 1)];
+  EXPECT_NEAR(rows["town"], 6000, 2);
+  EXPECT_NEAR(rows["road"], 7000, 2);
+  EXPECT_GT(rows[""], 5000) << "between labels no regime holds";
+  EXPECT_EQ(read_json(labelled / "comparison.json").at("comparisons")[0].at("first"), "parked");
+}
+
+}  // namespace
+}  // namespace imuscope::test
