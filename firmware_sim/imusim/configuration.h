@@ -5,8 +5,8 @@
 ///
 /// Keys of [simulation], all optional:
 ///   duration_s, initial_standstill_s, seed, scenario ("drive", "static"), start_utc, start_latitude_deg,
-///   start_longitude_deg, start_height_m, gyro_noise ("by_regime", "static", "dynamic"), regime_switch ("continuous",
-///   "independent")
+///   start_longitude_deg, start_height_m, gyro_noise ("by_regime", "static", "dynamic"), regime_switch
+///   ("continuous", "independent")
 /// [simulation.reference]: gyro_white_deg_per_sqrt_h, accel_white_ug_per_sqrt_hz, gyro_bias_sd_deg_per_h,
 ///   accel_bias_sd_mps2, attitude_sd_deg (roll, pitch, heading), latency_ms, alignment_s
 /// [simulation.gnss]: position_sd_m, velocity_sd_mps (north, east, down), latency_ms

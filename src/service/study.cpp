@@ -82,18 +82,32 @@ std::vector<RowLowPass> low_passes(const Configuration& configuration) {
   return filters;
 }
 
-/// errors_NAME.csv under the names of the regimes, and the series for the noise models.
-/// @param of  its row is set here
+/// errors_NAME.csv under the names of the regimes, with the scale error; and without it the series for the
+/// noise models and the rows for everything that follows.
+/// @param of        its row is set here
+/// @param studied   takes the rows without the scale error
 NoiseSeries write_errors(ErrorRecord of, const RunRegimes& regimes, const ScaleError& scale, RowSpool& rows,
-                         RunFolder& folder) {
+                         RunFolder& folder, RowSpool& studied) {
   NoiseSeries series;
   rows.rewind();
   while (rows.next(of.row)) {
     const auto regime = regimes.chosen.at(of.row.time);
     folder.write_error(of, regime ? std::string_view(regimes.chosen.names()[*regime]) : std::string_view());
-    series.add(without_scale_error(of.row, scale), regime);
+    const ErrorRow row = without_scale_error(of.row, scale);
+    series.add(row, regime);
+    studied.add(row);
   }
   return series;
+}
+
+Result<std::vector<RowSpool>> make_spools(std::size_t n, const std::filesystem::path& folder) {
+  std::vector<RowSpool> spools;
+  for (std::size_t i = 0; i < n; ++i) {
+    auto spool = RowSpool::create(folder);
+    if (!spool) return tl::unexpected<Error>(spool.error());
+    spools.push_back(std::move(*spool));
+  }
+  return spools;
 }
 
 bool calibrated(const StudyOutput& study) {
@@ -272,13 +286,9 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   if (!biases) return tl::unexpected<Error>(biases.error());
 
   const auto settled = with_settled(finals, infos, options.mountings);
-  std::vector<RowSpool> rows;
-  for (std::size_t i = 0; i < finals.size(); ++i) {
-    auto spool = RowSpool::create(options.out);
-    if (!spool) return tl::unexpected<Error>(spool.error());
-    rows.push_back(std::move(*spool));
-  }
-  ErrorCollector collector(*biases, rows, low_passes(configuration));
+  auto rows = make_spools(finals.size(), options.out);
+  if (!rows) return tl::unexpected<Error>(rows.error());
+  ErrorCollector collector(*biases, *rows, low_passes(configuration));
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("error process", share); };
   const auto second = replay(configuration, frozen(estimator, settled), recording, collector, replay_options);
@@ -288,12 +298,14 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   auto regimes =
       find_regimes(configuration.regimes, collector.watch(), options.labels, recording.moments, origin);
   if (!regimes) return tl::unexpected<Error>(regimes.error());
+  auto studied = make_spools(finals.size(), options.out);
+  if (!studied) return tl::unexpected<Error>(studied.error());
   std::vector<NoiseSeries> series;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+  for (std::size_t i = 0; i < finals.size(); ++i) {
     const ScaleError scale = configuration.noise.remove_scale_error
                                  ? ScaleError{settled[i].gyro_scale, settled[i].accel_scale}
                                  : ScaleError{};
-    series.push_back(write_errors({i, origin, {}}, *regimes, scale, rows[i], **folder));
+    series.push_back(write_errors({i, origin, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]));
   }
 
   const double run_s = regimes->motion.total_s(0) + regimes->motion.total_s(1);
@@ -309,7 +321,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   });
   const auto dependence = study_dependence(configuration, series, collector.watch().levels(), regimes->motion,
                                            noise_study, origin);
-  const auto regressions = regressions_of(configuration, rows, regimes->motion, *spec);
+  const auto regressions = regressions_of(configuration, *studied, regimes->motion, *spec);
   auto regime_document = regimes_json(*regimes, origin);
   regime_document["left_out"] = noise_study.left_out;
   for (const std::vector<std::string>& remarks :
@@ -317,7 +329,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     run.warnings.insert(run.warnings.end(), remarks.begin(), remarks.end());
   run.static_s = regimes->motion.total_s(0);
   run.dynamic_s = regimes->motion.total_s(1);
-  if (auto written = write_scatter(configuration, rows, origin, options.out); !written) return written;
+  if (auto written = write_scatter(configuration, *studied, origin, options.out); !written) return written;
 
   if (auto written = (*folder)->write_calibration(*means); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
