@@ -128,6 +128,13 @@ std::vector<std::string> regimes_of(const std::vector<Fit>& fits) {
   return regimes;
 }
 
+std::vector<std::string> particular_regimes(std::vector<std::string> regimes) {
+  const auto is_whole = [](const std::string& regime) { return regime == "all" || regime.empty(); };
+  const auto n_whole = std::count_if(regimes.begin(), regimes.end(), is_whole);
+  if (std::ssize(regimes) - n_whole >= 2) std::erase_if(regimes, is_whole);
+  return regimes;
+}
+
 const Fit* find_fit(const std::vector<Fit>& fits, const std::string& imu, const std::string& axis,
                     const std::string& regime) {
   const auto found = std::find_if(fits.begin(), fits.end(), [&](const Fit& fit) {

@@ -53,6 +53,9 @@ std::vector<Fit> read_fits(const nlohmann::json& models);
 /// Regimes that occur, "static" and "dynamic" first, then the others as they come.
 std::vector<std::string> regimes_of(const std::vector<Fit>& fits);
 
+/// The regimes without that of everything together, where there are two others at least.
+std::vector<std::string> particular_regimes(std::vector<std::string> regimes);
+
 /// nullptr where there is none.
 const Fit* find_fit(const std::vector<Fit>& fits, const std::string& imu, const std::string& axis,
                     const std::string& regime);

@@ -86,7 +86,7 @@ Picture drive_picture(const RunFiles& run) {
   picture.body +=
       "set size ratio -1\nset xlabel 'east, m'\nset ylabel 'north, m'\nset cblabel 'speed, m/s'\n"
       "plot $way using 1:2:3 with lines linecolor palette linewidth 2 notitle\nset size noratio\n"
-      "set xlabel 'time, s'\nset ylabel 'speed, m/s'\n";
+      "set autoscale xfix\nset xlabel 'time, s'\nset ylabel 'speed, m/s'\n";
   picture.body += band_plot("speed", kColours[2]);
   return picture;
 }
@@ -96,7 +96,7 @@ Picture estimate_picture(const StudyFiles& study) {
   Picture picture{"figure1_" + study.name, 2, 3, {}};
   constexpr double kMmPerM = 1e3;
   constexpr const char* kAxisNames[] = {"x", "y", "z"};
-  picture.body += "set xlabel 'time, s'\n";
+  picture.body += "set autoscale xfix\nset xlabel 'time, s'\n";
   for (std::size_t i = 0; i < 2 * kTriad; ++i) {
     const bool angle = i < kTriad;
     const std::string block = fmt::format("estimate{}", i);
@@ -114,7 +114,7 @@ Picture estimate_picture(const StudyFiles& study) {
 }
 
 Picture error_picture(const StudyFiles& study) {
-  Picture picture{"figure2_" + study.name, 2, 3, "set xlabel 'time, s'\n"};
+  Picture picture{"figure2_" + study.name, 2, 3, "set autoscale xfix\nset xlabel 'time, s'\n"};
   for (std::size_t i = 0; i < kErrorSignals; ++i) {
     const std::string block = fmt::format("error{}", i);
     picture.body += block_of(block, *study.errors, i);

@@ -57,7 +57,7 @@ std::string make_page(const RunFiles& run) {
   body += element("section", outages_section(run));
   body += element("section", health_section(run));
   body += element("section", making_section(run));
-  body += element("section", take_away_section(run));
+  body += element("section", take_away_section(run, fits));
   const std::string data = json_for_script(figures.json());
   return filled(page_template(), {{"plotting_notice", plotting_notice()},
                                   {"plotting_style", plotting_style()},

@@ -203,25 +203,19 @@ Html regimes_table(const RunFiles& run) {
   return (table.empty() ? Html{} : table.html()) + (remarks.empty() ? Html{} : element("ul", remarks));
 }
 
-/// Regimes that Figure 4 draws: that of everything together only where there is nothing more particular.
-std::vector<std::string> drawn_regimes(std::vector<std::string> regimes) {
-  constexpr std::size_t kTwo = 2;
-  const auto is_whole = [](const std::string& regime) { return regime == "all" || regime.empty(); };
-  const auto n_parts =
-      regimes.size() - static_cast<std::size_t>(std::count_if(regimes.begin(), regimes.end(), is_whole));
-  if (n_parts >= kTwo) std::erase_if(regimes, is_whole);
-  return regimes;
-}
-
 Html fit_warnings(const std::vector<Fit>& fits, const std::string& imu) {
   Html items;
+  std::size_t n = 0;
   for (const Fit& fit : fits) {
     if (fit.imu != imu) continue;
+    n += fit.warnings.size();
     for (const std::string& warning : fit.warnings) {
       items += element("li", text(axis_words(fit.axis) + " (" + fit.regime + "): " + warning));
     }
   }
-  return items.empty() ? Html{} : element("ul", items, "note");
+  if (items.empty()) return {};
+  return element("details", element("summary", text(fmt::format("Remarks of the fits ({})", n))) +
+                                element("ul", items, "note"));
 }
 
 Html wavelet_panels(const std::vector<Fit>& fits, const std::string& imu,
@@ -272,8 +266,8 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
       "line: the variance that the fitted model implies; dashed: its processes one by one. Where the line "
       "leaves the intervals the model does not explain the signal.");
   for (const StudyFiles& study : run.studies) {
-    section +=
-        element("h3", text(study.name)) + wavelet_panels(fits, study.name, drawn_regimes(regimes), figures);
+    section += element("h3", text(study.name)) +
+               wavelet_panels(fits, study.name, particular_regimes(regimes), figures);
   }
   section += element("h2", text("Table II: parameters of the noise models"));
   section += paragraph(

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
-#include <algorithm>
-#include <map>
+#include <array>
+#include <string_view>
 
 #include "noise/export.h"
 #include "noise/json.h"
@@ -33,6 +33,14 @@ std::vector<noise::AxisFit> axis_fits(const RunFiles& run, const std::string& im
   return fits;
 }
 
+/// "deg/√h" for "deg/sqrt(h)".
+std::string with_roots(const std::string& unit) {
+  constexpr std::string_view kRoot = "sqrt(";
+  const std::size_t at = unit.find(kRoot);
+  if (at == std::string::npos || unit.back() != ')') return unit;
+  return unit.substr(0, at) + "√" + unit.substr(at + kRoot.size(), unit.size() - at - kRoot.size() - 1);
+}
+
 /// What data sheets name, axis by axis.
 Html quantity_table(const std::vector<noise::AxisFit>& fits) {
   constexpr const char* kWanted[] = {"angle random walk", "velocity random walk", "bias instability"};
@@ -48,12 +56,16 @@ Html quantity_table(const std::vector<noise::AxisFit>& fits) {
       for (std::size_t i = 0; i < std::size(kWanted); ++i) {
         if (quantity.name != kWanted[i]) continue;
         value[i] = number(quantity.value, 3);
-        unit[i] = quantity.unit;
+        unit[i] = with_roots(quantity.unit);
       }
       if (quantity.process.rfind("GM", 0) != 0)
         continue;  // in order of falling rate: the last is the slowest
-      if (quantity.name == "sd") slow_sd = number(quantity.value, 3) + text(" " + quantity.unit);
-      if (quantity.name == "correlation time") slow_time = number(quantity.value, 3);
+      if (quantity.name == "sd") {
+        std::string sd_unit = quantity.unit;
+        const double factor = shown_unit(sd_unit);
+        slow_sd = number(factor * quantity.value, 3) + text(" " + sd_unit);
+      }
+      if (quantity.name == "correlation time") slow_time = number(quantity.value, 2);
     }
     const std::size_t walk = noise::is_gyro(axis.unit) ? 0 : 1;
     table.add_row({text(axis_words(axis.axis)), value[walk], text(unit[walk]), value[2], text(unit[2]),
@@ -73,19 +85,9 @@ Html exports(const std::vector<noise::AxisFit>& fits) {
   return all;
 }
 
-std::vector<std::string> regimes_in(const RunFiles& run, const std::string& imu) {
-  std::vector<std::string> regimes;
-  for (const json& entry : run.models) {
-    const std::string regime = text_at(entry, "regime");
-    if (text_at(entry, "name") == imu && std::find(regimes.begin(), regimes.end(), regime) == regimes.end())
-      regimes.push_back(regime);
-  }
-  return regimes;
-}
-
 }  // namespace
 
-Html take_away_section(const RunFiles& run) {
+Html take_away_section(const RunFiles& run, const std::vector<Fit>& all_fits) {
   Html section = element("h2", text("Models to take away"));
   if (!run.models.is_array() || run.models.empty()) {
     return section + paragraph("No noise model in this run: there is nothing to take away.");
@@ -96,7 +98,7 @@ Html take_away_section(const RunFiles& run) {
       "above "
       "what the data allow.");
   for (const StudyFiles& study : run.studies) {
-    for (const std::string& regime : regimes_in(run, study.name)) {
+    for (const std::string& regime : particular_regimes(regimes_of(all_fits))) {
       const auto fits = axis_fits(run, study.name, regime);
       if (fits.empty()) continue;
       section += element("h3", text(study.name + ", " + (regime.empty() ? "all" : regime))) +

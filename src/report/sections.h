@@ -29,6 +29,6 @@ Html health_section(const RunFiles& run);
 /// Configuration, versions, inputs, warnings, absent files.
 Html making_section(const RunFiles& run);
 /// The models in data-sheet terms and as the configuration of other tools.
-Html take_away_section(const RunFiles& run);
+Html take_away_section(const RunFiles& run, const std::vector<Fit>& fits);
 
 }  // namespace imuscope::report

@@ -120,15 +120,20 @@ Verdict outage_verdict(const RunFiles& run) {
   const auto worst = std::max_element(scores.begin(), scores.end(), [](const auto& a, const auto& b) {
     return a.second.surprise() < b.second.surprise();
   });
-  // One nat in the mean is odds of e to one an outage.
+  // One nat in the mean is odds of e to one an outage; a tenth is within what the starts scatter.
   constexpr double kMatters_nat = 1.0;
+  constexpr double kAlike_nat = 0.1;
   const bool matters = worst->second.surprise() - best->second.surprise() > kMatters_nat;
+  std::vector<std::string> leaders;
+  for (const auto& [name, score] : scores) {
+    if (score.surprise() - best->second.surprise() <= kAlike_nat) leaders.push_back("“" + name + "”");
+  }
+  const std::string leading =
+      fmt::format("the model{} {} predict{} the errors best", leaders.size() > 1 ? "s" : "",
+                  fmt::join(leaders, " and "), leaders.size() > 1 ? "" : "s");
   verdict.answer = best->second.too_proud == 0 ? Answer::kYes : Answer::kPartly;
-  verdict.headline =
-      matters ? fmt::format("Yes: in GNSS outages the model “{}” predicts the errors best, “{}” worst.",
-                            best->first, worst->first)
-              : fmt::format("Hardly: in GNSS outages all models predict the errors much alike, “{}” best.",
-                            best->first);
+  verdict.headline = matters ? fmt::format("Yes: in GNSS outages {}, “{}” worst.", leading, worst->first)
+                             : "Hardly: in GNSS outages all models predict the errors much alike.";
   for (const auto& [name, score] : scores) verdict.reasons.push_back(score_sentence(name, score));
   return verdict;
 }
