@@ -102,11 +102,11 @@ void evaluate_study(const StudyDrive& drive, const std::vector<EvaluationModel>&
 
 Result<json> evaluate_run(const EvaluationRunOptions& options) {
   const auto run = read_document(options.run_dir / "run.json");
-  if (!run) return run;
+  if (!run) return tl::unexpected<Error>(run.error());
   const auto calibration = read_document(options.run_dir / "calibration.json");
-  if (!calibration) return calibration;
+  if (!calibration) return tl::unexpected<Error>(calibration.error());
   const auto models = read_document(options.run_dir / "models.json");
-  if (!models) return models;
+  if (!models) return tl::unexpected<Error>(models.error());
   json dependence;
   if (std::filesystem::exists(options.run_dir / "dependence.json")) {
     auto read = read_document(options.run_dir / "dependence.json");
