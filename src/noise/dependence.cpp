@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
@@ -89,12 +90,13 @@ Values start_values(const Model& model, const std::vector<ParameterPlace>& place
 struct Scores {
   VectorXd gradient;
   MatrixXd information;
-  MatrixXd outer;  ///< sum of the windows' scores times themselves
+  std::vector<VectorXd> of_window;
+  std::vector<MatrixXd> information_of_window;
 };
 
 Scores scores_at(const Problem& problem, const Model& start, const Values& values, const Unknowns& unknowns) {
   const Index n = unknowns.count();
-  Scores out{VectorXd::Zero(n), MatrixXd::Zero(n, n), MatrixXd::Zero(n, n)};
+  Scores out{VectorXd::Zero(n), MatrixXd::Zero(n, n), {}, {}};
   const auto rows = static_cast<Index>(problem.levels.size());
   MatrixXd design(rows, n);
   for (std::size_t w = 0; w < problem.wv.size(); ++w) {
@@ -116,8 +118,10 @@ Scores scores_at(const Problem& problem, const Model& start, const Values& value
     const MatrixXd weighted = design.transpose() * problem.correlation_inverse;
     const VectorXd score = weighted * residual;
     out.gradient += score;
-    out.information.noalias() += weighted * design;
-    out.outer.noalias() += score * score.transpose();
+    const MatrixXd information = weighted * design;
+    out.information += information;
+    out.of_window.push_back(score);
+    out.information_of_window.push_back(information);
   }
   return out;
 }
@@ -127,6 +131,21 @@ MatrixXd inverse_of(const MatrixXd& information) {
   const MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   return scale.asDiagonal() *
          MatrixXd(scaled.ldlt().solve(MatrixXd::Identity(scaled.rows(), scaled.cols()))) * scale.asDiagonal();
+}
+
+/// Covariance of the unknowns from the scatter of the windows' scores, each freed of the part by which its
+/// own window has drawn the fit to itself (Mancl and DeRouen 2001): it holds where windows vary more than the
+/// model says, and with few of them.
+MatrixXd scatter_covariance(const Scores& scores) {
+  const Index n = scores.gradient.size();
+  const MatrixXd inverse = inverse_of(scores.information);
+  MatrixXd outer = MatrixXd::Zero(n, n);
+  for (std::size_t w = 0; w < scores.of_window.size(); ++w) {
+    const MatrixXd rest = MatrixXd::Identity(n, n) - scores.information_of_window[w] * inverse;
+    const VectorXd score = rest.partialPivLu().solve(scores.of_window[w]);
+    outer.noalias() += score * score.transpose();
+  }
+  return inverse * outer * inverse;
 }
 
 /// Leaves out, one by one, what is known worst, as long as it is not determined.
@@ -290,13 +309,7 @@ Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const F
   const auto names = names_of(start);
   const Index n = unknowns.count();
   const auto free = static_cast<double>(windows.size()) - static_cast<double>(n);
-  const MatrixXd bread = n > 0 ? inverse_of(last.information) : MatrixXd();
-  // Windows vary more than the model says wherever the dependence is not the whole truth: their own scatter
-  // decides (White 1980), with the small-sample factor of Hinkley (1977).
-  const MatrixXd covariance =
-      n > 0
-          ? MatrixXd(bread * last.outer * bread * (static_cast<double>(windows.size()) / std::max(free, 1.0)))
-          : MatrixXd();
+  const MatrixXd covariance = n > 0 ? scatter_covariance(last) : MatrixXd();
   const boost::math::students_t t(std::max(free, 1.0));
   const double quantile = boost::math::quantile(t, 0.5 * (1.0 + options.confidence));
   Index column = 0;

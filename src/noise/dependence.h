@@ -4,7 +4,8 @@
 ///
 ///   log theta_p(w) = log theta_p + slope_p (x_w - mean x),
 ///
-/// for amplitudes and rates alike, fitted to the wavelet variances of all windows at once (N-24 in EQUATIONS.md). What windows of that length do not determine is held at the start model and said.
+/// for amplitudes and rates alike, fitted to the wavelet variances of all windows at once (N-24 in
+/// EQUATIONS.md). What windows of that length do not determine is held at the start model and said.
 
 #include <optional>
 #include <span>

@@ -21,6 +21,14 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
+/// As a cell of a table: without what would break its line.
+std::string as_cell(std::string_view text) {
+  std::string cell(text);
+  std::replace_if(
+      cell.begin(), cell.end(), [](char c) { return c == ',' || c == '"' || c == '\n' || c == '\r'; }, ' ');
+  return cell;
+}
+
 std::optional<double> number(std::string_view text) {
   double value = 0.0;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -93,7 +101,7 @@ std::vector<Label> labels_of_moments(const std::vector<MarkedMoment>& moments, H
     if (open) labels.back().end_s = time_s;
     const auto name = trimmed(text.substr(kEvent.size()));
     open = !name.empty() && name != kEnd;
-    if (open) labels.push_back({time_s, time_s, std::string(name)});
+    if (open) labels.push_back({time_s, time_s, as_cell(name)});
   }
   if (open) labels.back().end_s = std::max(labels.back().begin_s, to_seconds(end - origin));
   return labels;
