@@ -57,27 +57,38 @@ Spectrum spectrum_of(std::span<const double> x, const std::vector<Segment>& runs
   return out;
 }
 
-/// Median power of the noise around bin k, as a mean.
-double floor_at(const Spectrum& spectrum, std::size_t k, std::size_t first, double dof) {
-  std::vector<double> around;
-  const std::size_t low = k > first + kLobe + kFloorBins ? k - kLobe - kFloorBins : first;
-  const std::size_t high = std::min(spectrum.power.size() - 2, k + kLobe + kFloorBins);
-  for (std::size_t i = low; i <= high; ++i) {
-    if (i + kLobe < k || i > k + kLobe) around.push_back(spectrum.power[i]);
-  }
-  if (around.empty()) return 0.0;
-  const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
-  std::nth_element(around.begin(), middle, around.end());
+/// Median of bins [first, last), as a mean.
+double median_power(const Spectrum& spectrum, std::size_t first, std::size_t last, double dof) {
+  std::vector<double> bins(spectrum.power.begin() + static_cast<std::ptrdiff_t>(first),
+                           spectrum.power.begin() + static_cast<std::ptrdiff_t>(last));
+  const auto middle = bins.begin() + static_cast<std::ptrdiff_t>(bins.size() / 2);
+  std::nth_element(bins.begin(), middle, bins.end());
   return *middle * dof / boost::math::quantile(boost::math::chi_squared(dof), 0.5);
 }
 
-/// Bins beside k that stand out of the noise, k's own included.
-std::size_t width_of(const Spectrum& spectrum, std::size_t k, double threshold) {
-  std::size_t low = k;
-  std::size_t high = k;
-  while (low > 0 && spectrum.power[low - 1] > threshold) --low;
-  while (high + 1 < spectrum.power.size() && spectrum.power[high + 1] > threshold) ++high;
-  return high - low + 1;
+/// Power of the noise at bin k: the geometric mean of what is to its left and to its right, so that a slope
+/// does not make a line. At the upper end the left side alone: noise falls with frequency.
+double floor_at(const Spectrum& spectrum, std::size_t k, double dof) {
+  const double left = median_power(spectrum, k - kLobe - kFloorBins, k - kLobe, dof);
+  const std::size_t end = k + kLobe + 1 + kFloorBins;
+  if (end > spectrum.power.size()) return left;
+  return std::sqrt(left * median_power(spectrum, k + kLobe + 1, end, dof));
+}
+
+/// Mean power right beside the window's main lobe. A line leaks a hundredth of its power there at most; of a
+/// resonance it is as high as the peak.
+double power_beside(const Spectrum& spectrum, std::size_t k) {
+  constexpr std::size_t kBeside = 6;
+  double sum = 0.0;
+  double n = 0.0;
+  for (std::size_t d = kLobe + 1; d <= kLobe + kBeside; ++d) {
+    sum += spectrum.power[k - d];
+    n += 1.0;
+    if (k + d >= spectrum.power.size()) continue;
+    sum += spectrum.power[k + d];
+    n += 1.0;
+  }
+  return sum / n;
 }
 
 /// Offset of a peak from its bin, for a Hann window: (b - a) / (a + 2 c + b) times 2 of the neighbours'
@@ -142,7 +153,8 @@ std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uin
   const double dof = degrees_of_freedom(static_cast<double>(spectrum.segments));
   const boost::math::chi_squared chi(dof);
   const std::size_t last = spectrum.power.size() - 1 - kLobe;
-  const auto bins = static_cast<double>(last - options.first_bin + 1);
+  const std::size_t first = std::max(options.first_bin, kLobe + kFloorBins + 1);
+  const auto bins = static_cast<double>(last - first + 1);
   // The floor is itself a median of some bins: its spread widens the threshold (variance of a median, pi/2
   // times that of a mean of as many).
   const double floor_spread =
@@ -152,13 +164,12 @@ std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uin
   const double total = variance_of(x, runs);
 
   std::vector<Line> lines;
-  for (std::size_t k = options.first_bin; k <= last; ++k) {
+  for (std::size_t k = first; k <= last; ++k) {
     const double power = spectrum.power[k];
     if (power < spectrum.power[k - 1] || power <= spectrum.power[k + 1]) continue;
-    const double floor = floor_at(spectrum, k, options.first_bin, dof);
+    const double floor = floor_at(spectrum, k, dof);
     if (!(floor > 0.0) || power < threshold * floor) continue;
-    constexpr std::size_t kWidest = 2 * kLobe + 3;
-    if (width_of(spectrum, k, std::max(threshold * floor, 0.02 * power)) > kWidest) continue;
+    if (power < threshold * power_beside(spectrum, k)) continue;
     Line line;
     const double offset = offset_of(spectrum.power[k - 1] - floor, power, spectrum.power[k + 1] - floor);
     line.frequency_hz =

@@ -23,8 +23,8 @@ struct LineOptions {
   double false_alarm = 1e-3;
   /// Samples a segment of the spectrum, a power of two: lines closer than 4 rate / segment are one.
   std::size_t segment = 4096;
-  /// Below this many bins the noise of sensors rises: slow processes, not lines.
-  std::size_t first_bin = 24;
+  /// Below this bin the noise of sensors rises: slow processes, not lines. Never below 43.
+  std::size_t first_bin = 43;
   std::size_t most_lines = 6;
 };
 
