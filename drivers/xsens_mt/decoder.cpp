@@ -107,6 +107,9 @@ void MtDecoder::on_frame(const Frame& frame, HostTime arrival, SampleSink& sink)
         ++counters_.bad_contents;
       }
       break;
+    case mid::reply_to(mid::kOutputConfiguration):
+      learn_output(frame.data);
+      break;
     case mid::kError:
       if (!frame.data.empty()) last_error_ = frame.data[0];
       break;
@@ -126,9 +129,7 @@ void MtDecoder::learn(const Configuration& configuration) noexcept {
     ++counters_.bad_contents;
     return;
   }
-  rate_hz_ = configuration.rate_hz();
-  packet_counter_.set_rate(rate_hz_);
-  if (devices[0].data_length == 0) return;  // sends MTData2
+  if (devices[0].data_length == 0) return;  // sends MTData2, whose rates the period does not tell
   n_blocks_ = devices.size();
   xbus_ = configuration.is_xbus_master();
   message_length_ = xbus_ ? sizeof(std::uint16_t) : 0;
@@ -143,6 +144,21 @@ void MtDecoder::learn(const Configuration& configuration) noexcept {
   base_count_ = counter_.count();
   count_period_s_ = configuration.period / kPeriodTicksPerSecond;
   counter_.set_rate(1.0 / count_period_s_);
+}
+
+// What the device really sends, item by item: inertial items come at one rate, the fastest of those listed.
+void MtDecoder::learn_output(std::span<const std::uint8_t> data) noexcept {
+  std::uint16_t fastest_hz = 0;
+  for (; data.size() >= kOutputItemSize; data = data.subspan(kOutputItemSize)) {
+    const auto kind = static_cast<std::uint16_t>(read_be<std::uint16_t>(data) & ~xdi::kFormatBits);
+    const auto rate_hz = read_be<std::uint16_t>(data, sizeof(std::uint16_t));
+    const bool inertial = kind == xdi::kAcceleration || kind == xdi::kRateOfTurn || kind == xdi::kDeltaV ||
+                          kind == xdi::kDeltaQ || kind == xdi::kAccelerationHr || kind == xdi::kRateOfTurnHr;
+    if (inertial && rate_hz != kEveryMessage) fastest_hz = std::max(fastest_hz, rate_hz);
+  }
+  if (fastest_hz == 0) return;
+  rate_hz_ = fastest_hz;
+  packet_counter_.set_rate(rate_hz_);
 }
 
 // ------------------------------------------------------------------------------------------ legacy MTData

@@ -49,9 +49,9 @@ struct MtDecoderConfig {
   bool wants_imu = true;
   bool wants_attitude = false;
   bool wants_gnss = false;
-  DataLayout layout = kDefaultLayout;       ///< expected; a Configuration message overrules it
-  double rate_hz = 100.0;                   ///< expected; a Configuration message overrules it
-  double baud = 115200.0;                   ///< of the line; 0 where there is none
+  DataLayout layout = kDefaultLayout;  ///< expected; a Configuration message overrules it
+  double rate_hz = 100.0;  ///< expected; Configuration (MTData) or OutputConfiguration (MTData2) overrules it
+  double baud = 115200.0;  ///< of the line; 0 where there is none
   Matrix3 axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rotates the sensor's components
   ClockMapConfig clock;
 };
@@ -96,6 +96,7 @@ class MtDecoder final : public DeviceDecoder {
   void drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept;
   void on_frame(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
   void learn(const Configuration& configuration) noexcept;
+  void learn_output(std::span<const std::uint8_t> data) noexcept;
   void on_mtdata(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
   [[nodiscard]] std::uint16_t counter_of(const Frame& frame) noexcept;
   [[nodiscard]] bool take_counter(std::uint16_t counter, HostTime first_byte) noexcept;

@@ -54,8 +54,6 @@ constexpr std::array<WantedItem, 5> kWantedItems{{{xdi::kPacketCounter, false},
                                                   {xdi::kAcceleration, true},
                                                   {xdi::kRateOfTurn, true},
                                                   {xdi::kStatusWord, false}}};
-constexpr std::uint16_t kEveryMessage = 0xFFFF;
-constexpr std::size_t kOutputItemSize = 4;
 
 double norm(const std::array<double, 3>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 

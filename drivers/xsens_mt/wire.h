@@ -55,6 +55,10 @@ inline constexpr std::uint8_t kSyncInSettings = 0xD6;
 constexpr std::uint8_t reply_to(std::uint8_t request) { return static_cast<std::uint8_t>(request + 1U); }
 }  // namespace mid
 
+/// OutputConfiguration: items of a data identifier and a rate in Hz, u16 each.
+inline constexpr std::size_t kOutputItemSize = 4;
+inline constexpr std::uint16_t kEveryMessage = 0xFFFF;  ///< in place of a rate; also: as fast as it can
+
 /// SetPeriod counts in 1/115200 s: 1152 is 100 Hz.
 inline constexpr double kPeriodTicksPerSecond = 115200.0;
 /// The sample counter has 16 bits: it wraps every 655.36 s at 100 Hz.

@@ -46,6 +46,42 @@ TEST(MtDecoder, GivesRatesAndForcesInSiAndInTheRotatedAxes) {
   EXPECT_NEAR(to_seconds(s.arrival - s.time), 430.0 / 115200.0, 43 * 0.5e-9);
 }
 
+// Devices with an output configuration report period 1152 (100 Hz) in Configuration, whatever they send.
+TEST(MtDecoder, TakesTheRateOfMtData2FromTheOutputConfigurationAndNotFromThePeriod) {
+  for (const bool told : {false, true}) {
+    SCOPED_TRACE(told);
+    MtDecoderConfig config;
+    config.rate_hz = told ? 100.0 : 400.0;
+    config.clock = ClockMapConfig::fixed(HostTime{}, 1.0);
+    Line line(config);
+    line.send(configuration(1152, 0, 1, 0, 0, 0), Duration{});
+    if (told) {
+      Bytes taken;
+      for (const auto& [id, rate] : {std::pair<int, int>{0x1020, 0xFFFF},
+                                     {0x2010, 100},
+                                     {0x4020, 400},
+                                     {0x8020, 400},
+                                     {0xE020, 0xFFFF}}) {
+        append(taken, be16(static_cast<std::uint16_t>(id)));
+        append(taken, be16(static_cast<std::uint16_t>(rate)));
+      }
+      line.send(frame(0xC1, taken), Duration{});
+    }
+    for (std::uint16_t i = 0; i < 40; ++i) {
+      if (i == 30) continue;
+      Bytes data;
+      append_item(data, 0x1020, u16(i));
+      append_item(data, 0x4020, floats({0.1, 0.2, 9.8}));
+      append_item(data, 0x8020, floats({0.01, 0.001 * i, 0.0}));
+      line.send(frame(mid::kMtData2, data), Duration{});
+    }
+    ASSERT_EQ(line.sink.samples.size(), 39U);
+    EXPECT_EQ(line.decoder.counters().samples_lost, 1U);
+    EXPECT_EQ(line.sink.samples.back().time - line.sink.samples.front().time,
+              std::chrono::microseconds{39 * 2500});
+  }
+}
+
 TEST(MtDecoder, UnwrapsTheCounterAndTellsLossFromWrap) {
   Line line;
   const std::array<std::uint16_t, 6> counters{65533, 65534, 65535, 0, 1, 4};
