@@ -110,6 +110,9 @@ MountingResult CoarseMountingEstimator::solve(CoarseMounting& out) const noexcep
     rate_weight = observation_weight(residual_sum(rate_.bb, rate_.sb, rate_.ss, C));
     force_weight = observation_weight(residual_sum(force_.bb, force_.sb, force_.ss, C));
   }
+  const double power = std::sqrt(rate_.bb.trace() * rate_.ss.trace());
+  const double correlation = power > 0.0 ? (C * rate_.sb.transpose()).trace() / power : 0.0;
+  out.rate_correlation = correlation;
   if (is_mirrored(B, C)) return MountingResult::kInconsistent;
 
   //
@@ -119,11 +122,8 @@ MountingResult CoarseMountingEstimator::solve(CoarseMounting& out) const noexcep
   // Where there is no information at all, half a turn is what is known anyway.
   const Matrix3d known_anyway = Matrix3d::Identity() / (kPi * kPi);
   const Matrix3d covariance = (information + known_anyway).inverse();
-  const double power = std::sqrt(rate_.bb.trace() * rate_.ss.trace());
-  const double correlation = power > 0.0 ? (C * rate_.sb.transpose()).trace() / power : 0.0;
   out.C_b_s = C;
   out.covariance_rad2 = covariance;
-  out.rate_correlation = correlation;
   out.gyro_bias_s_radps = rate_.mean_s - C * rate_.mean_b;
 
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);

@@ -90,14 +90,20 @@ void CovarianceKernel::project(const SparseMeasurement& H, const std::array<doub
     }
   }
   loops_->project(p_, columns.data(), h.data(), n, pht_, padded_);
-  for (std::size_t a = 0; a < kMaxMeasurementRows; ++a) {
-    for (std::size_t e = a; e < kMaxMeasurementRows; ++e) {
-      double sum = R[a * 3 + e];
-      for (std::size_t k = 0; k < n; ++k) sum += h[3 * k + a] * pht_[e * padded_ + columns[k]];
-      s_[a * 3 + e] = sum;
-      s_[e * 3 + a] = sum;
-    }
+  // Six sums side by side: one after the other, each would wait for its own additions.
+  std::array<double, 6> sum{R[0], R[1], R[2], R[4], R[5], R[8]};
+  for (std::size_t k = 0; k < n; ++k) {
+    const double* const a = h.data() + 3 * k;
+    const double* const row = pht_ + columns[k];
+    const std::array<double, 3> b{row[0], row[padded_], row[2 * padded_]};
+    sum[0] += a[0] * b[0];
+    sum[1] += a[0] * b[1];
+    sum[2] += a[0] * b[2];
+    sum[3] += a[1] * b[1];
+    sum[4] += a[1] * b[2];
+    sum[5] += a[2] * b[2];
   }
+  s_ = {sum[0], sum[1], sum[2], sum[1], sum[3], sum[4], sum[2], sum[4], sum[5]};
 }
 
 bool CovarianceKernel::update(const std::array<double, 3>& innovation,
@@ -131,11 +137,7 @@ bool CovarianceKernel::update(const std::array<double, 3>& innovation,
     }
   }
   if (!any) return false;
-  loops_->whiten(pht_, m.data(), whitened.data(), w_, correction_, padded_);
-  // One number that is not finite leaves its mark on the sum.
-  double sum = 0.0;
-  for (std::size_t i = 0; i < dimension_; ++i) sum += std::abs(correction_[i]);
-  if (!std::isfinite(sum)) return false;
+  if (!loops_->whiten(pht_, m.data(), whitened.data(), w_, correction_, padded_)) return false;
   loops_->downdate(p_, w_, padded_);
   return true;
 }

@@ -39,7 +39,8 @@ struct CovarianceLoops {
   /// P -= W W', W' three rows. K-4.
   void (*downdate)(double* p, const double* w, std::size_t padded);
   /// W' = M (P H')' with M 3 x 3 row-major, and correction = sum of whitened[i] W'_i. K-4.
-  void (*whiten)(const double* pht, const double* m, const double* whitened, double* w, double* correction,
+  /// @return whether every correction is finite
+  bool (*whiten)(const double* pht, const double* m, const double* whitened, double* w, double* correction,
                  std::size_t padded);
 };
 

@@ -14,7 +14,7 @@ namespace imuscope {
 
 class CovarianceWatch {
  public:
-  explicit CovarianceWatch(std::size_t dimension) : factor_(dimension * dimension) {}
+  explicit CovarianceWatch(std::size_t dimension) : factor_(dimension * dimension), per_sd_(dimension) {}
 
   /// First state whose pivot is not above the limit, or not a number; none where all is well. States of zero
   /// variance (known exactly, or not in use) are passed over. Costs n^3 / 6 multiplications.
@@ -25,6 +25,7 @@ class CovarianceWatch {
 
  private:
   std::vector<double> factor_;  ///< rows of L
+  std::vector<double> per_sd_;  ///< 1 / sd of each state; 0 where it has none
 };
 
 }  // namespace imuscope

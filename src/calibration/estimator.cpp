@@ -98,6 +98,7 @@ class Estimator::Impl final : public EpochSink {
     StudyContext context{core_, window_, log_, *this, regime_.regime()};
     for (StudyFilter& study : studies_) study.process(context, cut);
     watch_covariance(cut);
+    core_.settle();
     hand_out_history();
     navigation_.update_output();
     odometry_.update_output();

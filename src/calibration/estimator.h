@@ -134,7 +134,8 @@ struct StudyOutput {
   std::array<double, 6> weakest_direction{};
   StudyDirection weakest_component = StudyDirection::kPsiX;
   double weakest_relative_sd = 1.0;
-  /// Per component of (psi, r): sd has fallen below half of its prior. Otherwise: not observable yet.
+  /// Per component of (psi, r): sd has fallen below half of its prior. Otherwise: not observable yet. None is
+  /// while the samples contradict the reference (kStudyInconsistent).
   std::array<bool, 6> observable{};
   bool t_d_observable = false;
   StudyCounters counters;
@@ -177,7 +178,7 @@ enum class EstimatorEventKind : std::uint8_t {
   kReferenceGap,           ///< value: length in s
   kReferenceGravityWrong,  ///< at standstill f_z of b is not -g: axes or sign convention; value: f_z
   kCoarseAlignmentDone,    ///< value: residual of the vectors, rad
-  kCoarseAlignmentPoor,    ///< enough motion but no consistent rotation or offset; value: residual, rad
+  kCoarseAlignmentPoor,    ///< enough motion but no consistent rotation; value: correlation of the rates, to 1
   kMountingChanged,        ///< innovations say that the S-IMU sits differently; starts again; value: mean NIS
   kStudyReturned,          ///< after a gap; its biases are uncertain again; value: gap in s
   kGnssRejected,           ///< start of a streak of rejected solutions; value: NIS
@@ -194,6 +195,9 @@ enum class EstimatorEventKind : std::uint8_t {
   kGyroBiasChanged,   ///< since before a silence; value: by how much, rad/s
   kAccelBiasChanged,  ///< since before a silence; value: by how much, m/s^2
   kGnssInconsistent,  ///< positions disagree with the motion more than their sd say; value: share of them
+  /// An S-IMU's samples keep contradicting the reference whatever the mounting: axes, signs, unit or range.
+  /// Nothing of it is called observable until they have fitted for minutes; value: share of them.
+  kStudyInconsistent,
 };
 
 struct EstimatorEvent {

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/contracts.h"
-
 namespace imuscope {
 namespace {
 
@@ -55,6 +53,8 @@ FilterCore::FilterCore(const EstimatorConfig& config)
   accumulated_.decay.resize(covariance_.dimension() - kNavigationStates);
   accumulated_.decay_noise.resize(covariance_.dimension() - kNavigationStates);
   accumulated_.injected.resize(covariance_.dimension());
+  waiting_.resize(covariance_.dimension());
+  study_waits_.resize(config.studies.size());
   restart_accumulation();
   for (std::size_t i = 0; i < 9; ++i)
     repair_variance_[i] = kRepairNavigationSd[i / 3] * kRepairNavigationSd[i / 3];
@@ -91,15 +91,48 @@ bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool
   if (!covariance_.update(to_array(innovation), use)) return false;
   const std::span<const double> correction = covariance_.correction();
   const Eigen::Map<const NavigationErrorVector> navigation_correction(correction.data());
-  inject(navigation_, navigation_correction);
   injected_ += navigation_correction;
+  navigation_.gyro_bias_b_radps += navigation_correction.segment<3>(kGyroBiasError);
+  navigation_.accel_bias_b_mps2 += navigation_correction.segment<3>(kAccelBiasError);
   if (keeps_history_) {
     for (std::size_t i = 0; i < correction.size(); ++i) accumulated_.injected[i] += correction[i];
   }
-  for (std::size_t i = 0; i < studies_.size(); ++i) inject(studies_[i], layouts_[i], correction);
+  for (std::size_t i = 0; i < correction.size(); ++i) waiting_[i] += correction[i];
+  navigation_waits_ = true;
+  std::fill(study_waits_.begin(), study_waits_.end(), 1);
   if (odometry_states_ != StudyLayout::kAbsent)
     inject(odometry_, Eigen::Map<const OdometryErrorVector>(correction.data() + odometry_states_));
   return true;
+}
+
+void FilterCore::settle() noexcept {
+  settle_navigation();
+  for (std::size_t i = 0; i < studies_.size(); ++i) settle_study(i);
+}
+
+void FilterCore::settle_navigation() noexcept {
+  if (!navigation_waits_) return;
+  navigation_waits_ = false;
+  Eigen::Map<NavigationErrorVector> waiting(waiting_.data());
+  // The biases have theirs already.
+  waiting.segment<3>(kGyroBiasError).setZero();
+  waiting.segment<3>(kAccelBiasError).setZero();
+  inject(navigation_, waiting);
+  waiting.setZero();
+}
+
+void FilterCore::settle_study(std::size_t i) noexcept {
+  if (study_waits_[i] == 0) return;
+  study_waits_[i] = 0;
+  const StudyLayout& layout = layouts_[i];
+  inject(studies_[i], layout, waiting_);
+  std::fill_n(waiting_.begin() + static_cast<std::ptrdiff_t>(layout.first), layout.size, 0.0);
+}
+
+NavigationErrorVector FilterCore::take_injected() noexcept {
+  const NavigationErrorVector taken = injected_;
+  injected_.setZero();
+  return taken;
 }
 
 void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
@@ -113,14 +146,6 @@ void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
       step.process_covariance;
   covariance_.predict_navigation(kernel);
 
-  const auto carried = [&step](const NavigationErrorVector& error) {
-    NavigationErrorVector out;
-    out.head<kNavigationKinematicSize>() = step.kinematic_rows * error;
-    out.segment<3>(kGyroBiasError) = step.gyro_bias_decay * error.segment<3>(kGyroBiasError);
-    out.segment<3>(kAccelBiasError) = step.accel_bias_decay * error.segment<3>(kAccelBiasError);
-    return out;
-  };
-  injected_ = carried(injected_);
   if (!keeps_history_) return;
   const auto carried_matrix = [&step](const NavigationErrorCovariance& M) {
     NavigationErrorCovariance out;
@@ -133,7 +158,10 @@ void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
   accumulated_.noise =
       carried_matrix(carried_matrix(accumulated_.noise).transpose()) + step.process_covariance;
   Eigen::Map<NavigationErrorVector> injected(accumulated_.injected.data());
-  injected = carried(injected);
+  const NavigationErrorVector before = injected;
+  injected.head<kNavigationKinematicSize>().noalias() = step.kinematic_rows * before;
+  injected.segment<3>(kGyroBiasError) *= step.gyro_bias_decay;
+  injected.segment<3>(kAccelBiasError) *= step.accel_bias_decay;
 }
 
 void FilterCore::predict_state(std::size_t i, double decay, double variance) noexcept {

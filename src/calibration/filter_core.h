@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/contracts.h"
 #include "calibration/covariance_kernel.h"
 #include "calibration/estimator_config.h"
 #include "calibration/study_model.h"
@@ -27,10 +28,33 @@ class FilterCore {
   [[nodiscard]] const CovarianceKernel& covariance() const noexcept { return covariance_; }
   [[nodiscard]] double sd(std::size_t state) const noexcept;
 
-  [[nodiscard]] NavigationState& navigation() noexcept { return navigation_; }
-  [[nodiscard]] const NavigationState& navigation() const noexcept { return navigation_; }
-  [[nodiscard]] StudyState& study(std::size_t i) noexcept { return studies_[i]; }
-  [[nodiscard]] const StudyState& study(std::size_t i) const noexcept { return studies_[i]; }
+  /// An update of one S-IMU moves every state by a little, and most are not looked at before the next update:
+  /// their corrections wait. Whoever may change the core gets a state with its corrections in it; for those
+  /// who only look, settle() must have been called since the last update().
+  [[nodiscard]] NavigationState& navigation() noexcept {
+    settle_navigation();
+    return navigation_;
+  }
+  [[nodiscard]] const NavigationState& navigation() const noexcept {
+    IMUSCOPE_EXPECTS(!navigation_waits_);
+    return navigation_;
+  }
+  [[nodiscard]] StudyState& study(std::size_t i) noexcept {
+    settle_study(i);
+    return studies_[i];
+  }
+  [[nodiscard]] const StudyState& study(std::size_t i) const noexcept {
+    IMUSCOPE_EXPECTS(study_waits_[i] == 0);
+    return studies_[i];
+  }
+  void settle() noexcept;
+  /// Of the R-IMU; never waiting.
+  [[nodiscard]] const Eigen::Vector3d& reference_gyro_bias_radps() const noexcept {
+    return navigation_.gyro_bias_b_radps;
+  }
+  [[nodiscard]] const Eigen::Vector3d& reference_accel_bias_mps2() const noexcept {
+    return navigation_.accel_bias_b_mps2;
+  }
   [[nodiscard]] const StudyLayout& layout(std::size_t i) const noexcept { return layouts_[i]; }
   [[nodiscard]] std::size_t study_count() const noexcept { return studies_.size(); }
   [[nodiscard]] const OdometryState& odometry() const noexcept { return odometry_; }
@@ -51,9 +75,9 @@ class FilterCore {
   /// Makes a state uncorrelated, of the given variance; to the history that is a new state.
   void reset_state(std::size_t i, double variance) noexcept;
 
-  /// Sum of the navigation corrections injected so far, carried to the present: e <- Phi e + d. E-4.
+  /// Sum of the navigation corrections since the last take. E-4.
   [[nodiscard]] const NavigationErrorVector& injected() const noexcept { return injected_; }
-  void clear_injected() noexcept { injected_.setZero(); }
+  NavigationErrorVector take_injected() noexcept;
 
   /// What the smoother needs to know of the time since the last take: kept only where asked for.
   struct Accumulated {
@@ -74,11 +98,16 @@ class FilterCore {
 
  private:
   void accumulate(std::size_t i, double decay, double variance) noexcept;
+  void settle_navigation() noexcept;
+  void settle_study(std::size_t i) noexcept;
 
   CovarianceKernel covariance_;
   NavigationState navigation_;
   NavigationErrorVector injected_ = NavigationErrorVector::Zero();
   std::vector<StudyState> studies_;
+  std::vector<double> waiting_;  ///< corrections of every state that are not yet in it
+  bool navigation_waits_ = false;
+  std::vector<unsigned char> study_waits_;
   std::vector<StudyLayout> layouts_;
   OdometryState odometry_;
   std::size_t odometry_states_ = StudyLayout::kAbsent;

@@ -137,6 +137,7 @@ void NavigationFilter::carry_over_interval(const InertialRates& measured, bool i
   NavigationState& state = core_.navigation();
   const bool gap = dt_s > 1.5 / reference_.rate_hz;
   if (!gap) {
+    past(0).injected = core_.take_injected();
     const InertialRates start = compensated(last_, state);
     const InertialRates end = compensated(measured, state);
     predict(is_mean ? end : mixed(start, end, 0.5), dt_s, 0.0);
@@ -154,7 +155,7 @@ void NavigationFilter::carry_over_interval(const InertialRates& measured, bool i
   }
   // Past states are no longer one R epoch apart; a solution from before the gap is given up.
   past_size_ = 0;
-  core_.clear_injected();
+  core_.take_injected();
 }
 
 void NavigationFilter::predict(const InertialRates& rates, double dt_s, double unseen) noexcept {
@@ -189,7 +190,6 @@ void NavigationFilter::remember(const Sample& sample, const InertialRates& measu
   next.has_utc = sample.has_utc;
   next.state = core_.navigation();
   next.measured = measured;
-  next.injected = core_.injected();
   past_head_ = (past_head_ + 1) % kPastEpochs;
   past_size_ = std::min(past_size_ + 1, kPastEpochs);
 }
@@ -219,7 +219,7 @@ void NavigationFilter::start(const NavigationState& state, const NavigationError
     const double value = sd(static_cast<Eigen::Index>(i));
     core_.reset_state(i, value * value);
   }
-  core_.clear_injected();
+  core_.take_injected();
   past_size_ = 0;
   output_.status = NavigationStatus::kNavigating;
   output_.method = method;
@@ -233,7 +233,7 @@ void NavigationFilter::stop(HostTime time, double gap_s) noexcept {
   navigation_.initial_rpy_rad.reset();
   past_size_ = 0;
   for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) core_.reset_state(i, 0.0);
-  core_.clear_injected();
+  core_.take_injected();
   log_.add(EstimatorEventKind::kNavigationStopped, reference_.device, time, gap_s);
 }
 
@@ -265,7 +265,7 @@ void NavigationFilter::add_gnss(const Sample& sample) noexcept {
 }
 
 HostTime NavigationFilter::host_time_of(const Sample& gnss) const noexcept {
-  if (!gnss.has_utc || !last_has_utc_) return gnss.time;
+  if (!gnss.has_utc || !last_has_utc_) return gnss.time - from_seconds(gnss_.latency_s);
   // The tag of the nearest R epoch carries the solution to host time, so that clock maps cannot part them.
   const PastEpoch* nearest = nullptr;
   for (std::size_t back = 0; back < past_size_; ++back) {
@@ -281,21 +281,29 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
   if (past_size_ == 0 || time > past(0).time + kGnssAhead) return Lookup::kTooNew;
   if (time < past(past_size_ - 1).time) return Lookup::kTooOld;
   out.back.setIdentity();
+  // What has been learned since epoch k was written, as an error then. Only the ring's span is walked: carried
+  // along for hours instead, the vertical channel would grow by e every ten minutes.
+  NavigationErrorVector learned = core_.injected();
   std::size_t k = 0;
   for (; past(k).time > time; ++k) {
     const PastEpoch& step = past(k);
     // [x_k; b] = [A B; 0 D] [x_k-1; b_k-1], undone from the left.
     const Eigen::Matrix<double, 9, 9> A_inverse = step.kinematic_rows.leftCols<9>().inverse();
-    out.back.middleRows<3>(kGyroBiasError) /= step.gyro_bias_decay;
-    out.back.middleRows<3>(kAccelBiasError) /= step.accel_bias_decay;
-    const Eigen::Matrix<double, 9, 15> kinematic =
-        A_inverse * (out.back.topRows<9>() - step.kinematic_rows.rightCols<6>() * out.back.bottomRows<6>());
-    out.back.topRows<9>() = kinematic;
+    const auto undo = [&](auto& error) {
+      error.template middleRows<3>(kGyroBiasError) /= step.gyro_bias_decay;
+      error.template middleRows<3>(kAccelBiasError) /= step.accel_bias_decay;
+      error.template topRows<9>() = (A_inverse * (error.template topRows<9>() - step.kinematic_rows.rightCols<6>() *
+                                                                    error.template bottomRows<6>()))
+                                        .eval();
+    };
+    undo(out.back);
+    undo(learned);
+    learned += past(k + 1).injected;
   }
   const PastEpoch& epoch = past(k);
   out.state = epoch.state;
   out.measured = epoch.measured;
-  inject(out.state, out.back * core_.injected() - epoch.injected);
+  inject(out.state, learned);
   const double rest_s = to_seconds(time - epoch.time);
   if (k > 0 && rest_s > 0.0) {
     const PastEpoch& after = past(k - 1);

@@ -50,7 +50,7 @@ class NavigationFilter {
     bool has_utc;
     NavigationState state;
     InertialRates measured;
-    NavigationErrorVector injected;  ///< FilterCore::injected() when the entry was written
+    NavigationErrorVector injected;  ///< after `state` was written, until the next epoch
     NavigationDynamics kinematic_rows;
     double gyro_bias_decay;
     double accel_bias_decay;

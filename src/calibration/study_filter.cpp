@@ -27,6 +27,11 @@ constexpr double kNisMean_s = 10.0;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
 constexpr double kMountingChangedShare = 0.8;
 constexpr double kMountingWatch_s = 3.0;
+/// A good S-IMU has one sample in 20 000 gated. Above the first share of half a minute's motion its samples do
+/// not fit any mounting; below the second, which takes two minutes of motion that fits, they do again.
+constexpr double kMisfitMean_s = 30.0;
+constexpr double kMisfitShare = 0.1;
+constexpr double kFitShare = 0.002;
 /// The coarse alignment is tried this often.
 constexpr Duration kCoarseEvery = std::chrono::seconds{1};
 /// A coarse offset that moves by more than this makes the gathered pairs useless.
@@ -219,10 +224,9 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
   watch_gravity(context, sample, dt_s);
   if (calibrating_) predict(core, dt_s);
 
-  const NavigationState& navigation = core.navigation();
   for (ReferenceKinematics* b : {&seen.gyro, &seen.accel}) {
-    b->omega_radps -= navigation.gyro_bias_b_radps;
-    b->f_mps2 -= navigation.accel_bias_b_mps2;
+    b->omega_radps -= core.reference_gyro_bias_radps();
+    b->f_mps2 -= core.reference_accel_bias_mps2();
   }
   const ReferenceKinematics& b = seen.gyro;
 
@@ -236,25 +240,20 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
   epoch.omega_ddot_ib_b_radps3 = to_array(b.omega_ddot_radps3);
   epoch.f_b_mps2 = to_array(b.f_mps2);
   epoch.f_dot_b_mps3 = to_array(b.f_dot_mps3);
-  epoch.reference_gyro_bias_radps = to_array(navigation.gyro_bias_b_radps);
-  epoch.reference_accel_bias_mps2 = to_array(navigation.accel_bias_b_mps2);
-  epoch.C_b_s = to_array(core.study(index_).C_b_s);
-  epoch.r_bs_b_m = to_array(core.study(index_).r_bs_b_m);
+  epoch.reference_gyro_bias_radps = to_array(core.reference_gyro_bias_radps());
+  epoch.reference_accel_bias_mps2 = to_array(core.reference_accel_bias_mps2());
+  const StudyState& now = core.study(index_);
+  epoch.C_b_s = to_array(now.C_b_s);
+  epoch.r_bs_b_m = to_array(now.r_bs_b_m);
   epoch.regime = context.regime;
   epoch.calibrating = calibrating_;
   if (calibrating_) {
-    const auto before = output_.counters;
     correct(context, Triad::kGyro, b, epoch);
     correct(context, Triad::kAccel, seen.accel, epoch);
     ++output_.counters.used;
-    bool gated = false;
-    for (std::size_t i = 0; i < 3; ++i) {
-      gated = gated || before.gated_gyro[i] != output_.counters.gated_gyro[i] ||
-              before.gated_accel[i] != output_.counters.gated_accel[i];
-    }
     context.epochs.on_epoch(epoch);
     watch_return(context, valid);
-    watch_mounting(context, gated, valid, dt_s);
+    watch_mounting(context, valid, dt_s);
   } else {
     context.epochs.on_epoch(epoch);
     gather(context, sample, valid, b);
@@ -301,6 +300,9 @@ void StudyFilter::try_coarse_alignment(StudyContext& context, HostTime now) noex
   } else if (result == MountingResult::kInconsistent) {
     context.log.add(EstimatorEventKind::kCoarseAlignmentPoor, config_.device, now, mounting.rate_correlation);
     coarse_mounting_.clear();
+    // Should a mounting be found after all, it has to prove itself first.
+    misfit_share_ = std::max(misfit_share_, kMisfitShare);
+    misfits_ = true;
   }
 }
 
@@ -333,6 +335,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   output_.nis_gyro.fill(1.0);
   output_.nis_accel.fill(1.0);
   output_.status = StudyStatus::kConverging;
+  gated_ = {};
   gated_share_ = 0.0;
   blocks_ = {};
   t_d_column_power_ = {};
@@ -343,21 +346,24 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
 void StudyFilter::predict(FilterCore& core, double dt_s) noexcept {
   const StudyLayout& layout = core.layout(index_);
   StudyState& state = core.study(index_);
-  Vector3 decay;
-  Vector3 variance;
+  // Both triads' biases stand side by side in the state, so that one pass over the covariance carries them.
+  std::array<double, 6> decay{};
+  std::array<double, 6> variance{};
+  std::size_t n = 0;
   const auto bias = [&](std::size_t first, const std::array<GaussMarkovConfig, 3>& process, Vector3d& value) {
     if (first == StudyLayout::kAbsent) return;
-    for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3; ++i, ++n) {
       // The axes of a triad mostly share one time constant.
       const bool again = i > 0 && process[i].time_constant_s == process[i - 1].time_constant_s;
-      decay[i] = again ? decay[i - 1] : std::exp(-dt_s / process[i].time_constant_s);
-      variance[i] = process[i].sd * process[i].sd * (1.0 - decay[i] * decay[i]);
-      value(static_cast<Eigen::Index>(i)) *= decay[i];
+      decay[n] = again ? decay[n - 1] : std::exp(-dt_s / process[i].time_constant_s);
+      variance[n] = process[i].sd * process[i].sd * (1.0 - decay[n] * decay[n]);
+      value(static_cast<Eigen::Index>(i)) *= decay[n];
     }
-    core.predict_states(first, decay, variance);
   };
   bias(layout.gyro_bias, gyro_bias_, state.gyro_bias_s_radps);
   bias(layout.accel_bias, accel_bias_, state.accel_bias_s_mps2);
+  const std::size_t first = std::min(layout.gyro_bias, layout.accel_bias);
+  if (n > 0) core.predict_states(first, {decay.data(), n}, {variance.data(), n});
   const double creep = config_.boresight_creep_rad_per_sqrt_s;
   if (creep > 0.0 && layout.psi != StudyLayout::kAbsent) {
     for (std::size_t i = 0; i < 3; ++i) core.predict_state(layout.psi + i, 1.0, creep * creep * dt_s);
@@ -390,7 +396,10 @@ void StudyFilter::correct(StudyContext& context, Triad triad, const ReferenceKin
 
   Block& block = blocks_[static_cast<std::size_t>(triad)];
   if (block.n == 0) {
-    block = Block{};
+    block.innovation.setZero();
+    block.R.setZero();
+    block.excess.setZero();
+    block.clipped = {};
     block.H = m.H;
   } else {
     for (std::size_t k = 0; k < m.H.count; ++k) {
@@ -439,6 +448,8 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
 
   StudyCounters& counters = output_.counters;
   std::array<bool, 3>& use = gyro ? epoch.used_gyro : epoch.used_accel;
+  bool& gated = gated_[static_cast<std::size_t>(triad)];
+  gated = false;
   Vector3& nis = gyro ? output_.nis_gyro : output_.nis_accel;
   const double share = std::min(1.0, n / (kNisMean_s * config_.rate_hz));
   for (std::size_t i = 0; i < 3; ++i) {
@@ -446,6 +457,7 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     use[i] = !block.clipped[i];
     if (!use[i]) continue;
     use[i] = !has_biases_ || y(k) * y(k) <= gate_ * S(k, k);
+    gated = gated || !use[i];
     if (!use[i]) ++(gyro ? counters.gated_gyro : counters.gated_accel)[i];
     nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
   }
@@ -543,7 +555,21 @@ bool StudyFilter::fits_prior_of(const StudyConfig& other) const noexcept {
                                other.prior_r_bs_b_sd_m) <= kContradictionSds;
 }
 
-void StudyFilter::watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept {
+void StudyFilter::watch_fit(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept {
+  // At rest everything fits: that is no evidence.
+  if (context.regime == Regime::kStatic && !gated) return;
+  misfit_share_ += std::min(1.0, dt_s / kMisfitMean_s) * ((gated ? 1.0 : 0.0) - misfit_share_);
+  if (misfits_ && misfit_share_ < kFitShare) misfits_ = false;
+  if (misfits_ || misfit_share_ < kMisfitShare) return;
+  misfits_ = true;
+  context.log.add(EstimatorEventKind::kStudyInconsistent, config_.device, now, misfit_share_);
+}
+
+void StudyFilter::watch_mounting(StudyContext& context, HostTime now, double dt_s) noexcept {
+  const bool gated = gated_[0] || gated_[1];
+  watch_fit(context, gated, now, dt_s);
+  // A frozen mounting cannot be found anew.
+  if (context.core.layout(index_).psi == StudyLayout::kAbsent) return;
   gated_share_ += std::min(1.0, dt_s / kMountingWatch_s) * ((gated ? 1.0 : 0.0) - gated_share_);
   if (gated_share_ < kMountingChangedShare) return;
   double worst = 0.0;
@@ -620,8 +646,8 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
     const std::size_t block = i < 3 ? layout.psi : layout.r;
     const double sd = i < 3 ? output_.sd_psi_rad[i] : output_.sd_r_bs_b_m[i - 3];
     const double goal = i < 3 ? config_.goal_boresight_sd_rad : config_.goal_r_bs_b_sd_m;
-    calibrated = calibrated && sd <= goal;
-    output_.observable[i] = sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal;
+    calibrated = calibrated && !misfits_ && sd <= goal;
+    output_.observable[i] = !misfits_ && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal);
     for (std::size_t j = 0; j < 6; ++j) {
       const std::size_t other = j < 3 ? layout.psi : layout.r;
       const bool absent = block == StudyLayout::kAbsent || other == StudyLayout::kAbsent;
@@ -629,7 +655,7 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
     }
   }
   output_.t_d_observable =
-      layout.t_d != StudyLayout::kAbsent &&
+      layout.t_d != StudyLayout::kAbsent && !misfits_ &&
       (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= config_.goal_t_d_sd_s);
   output_.status = calibrated ? StudyStatus::kCalibrated : StudyStatus::kConverging;
   if (output_.time >= next_direction_) {

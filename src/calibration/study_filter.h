@@ -77,7 +77,8 @@ class StudyFilter {
   void note_return(StudyContext& context, HostTime now, double silence_s) noexcept;
   void watch_return(StudyContext& context, HostTime now) noexcept;
   void watch_priors(EventLog& log) noexcept;
-  void watch_mounting(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
+  void watch_mounting(StudyContext& context, HostTime now, double dt_s) noexcept;
+  void watch_fit(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
   void update_weakest_direction(const FilterCore& core) noexcept;
   [[nodiscard]] ReferenceNoise reference_noise(const ReferenceKinematics& b) const noexcept;
   void precompute_noise() noexcept;
@@ -155,7 +156,10 @@ class StudyFilter {
   bool boresight_told_ = false;
   bool lever_arm_told_ = false;
 
-  double gated_share_ = 0.0;
+  std::array<bool, 2> gated_{};  ///< an axis of this triad, in the newest update
+  double gated_share_ = 0.0;     ///< over seconds: the mounting changed
+  double misfit_share_ = 0.0;    ///< over half a minute of motion: the device is not what is configured
+  bool misfits_ = false;
   std::array<double, 6> prior_sd_psi_r_{};
   double prior_sd_t_d_ = 0.0;
   HostTime next_direction_{};

@@ -48,9 +48,9 @@ std::string describe(const Configuration& configuration, const EstimatorEvent& e
       return fmt::format("{}: mounting found, residual {:.2f} deg", name, event.value * kDegPerRad);
     case EstimatorEventKind::kCoarseAlignmentPoor:
       return fmt::format(
-          "{}: motion does not fit one mounting (residual {:.1f} deg): loose mount, swapped sensor or "
-          "mirrored axes?",
-          name, event.value * kDegPerRad);
+          "{}: motion does not fit one mounting (its rates correlate with the reference's to {:.2f}): loose "
+          "mount, swapped sensor or mirrored axes?",
+          name, event.value);
     case EstimatorEventKind::kMountingChanged:
       return fmt::format(
           "{}: it sits differently than before (mean NIS {:.1f}); its calibration starts again", name,
@@ -112,6 +112,11 @@ std::string describe(const Configuration& configuration, const EstimatorEvent& e
       return fmt::format(
           "{}: {:.0f} % of its positions disagree with the motion: check antenna_lever_arm_b_m and the "
           "receiver's sd",
+          name, 100.0 * event.value);
+    case EstimatorEventKind::kStudyInconsistent:
+      return fmt::format(
+          "{}: {:.0f} % of its samples contradict the reference; its numbers are not usable: check its axes, "
+          "signs and units in the configuration, and that it is bolted to the reference's vehicle",
           name, 100.0 * event.value);
   }
   return "unknown event";

@@ -11,6 +11,7 @@
 #include "calibration/filter_core.h"
 #include "calibration/navigation_output.h"
 #include "navigation/so3.h"
+#include "service/live_smoothing.h"
 
 namespace imuscope {
 
@@ -34,13 +35,15 @@ Vector3 interpolated(const Vector3& a, const Vector3& b, double share) {
 }
 
 /// Priors stay as wide as they were; only where the filter is linearised changes.
-EstimatorConfig relinearised(EstimatorConfig config, const std::vector<StudyOutput>& finals) {
+EstimatorConfig relinearised(EstimatorConfig config, const std::vector<StudyOutput>& finals,
+                             const FormerMountings& former) {
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
-    if (finals[i].status < StudyStatus::kConverging) continue;
+    const StudyOutput& at_start = former[i].empty() ? finals[i] : former[i].front().estimate;
+    if (at_start.status < StudyStatus::kConverging) continue;
     StudyConfig& study = config.studies[i];
-    study.prior_C_b_s = finals[i].C_b_s;
-    study.prior_r_bs_b_m = finals[i].r_bs_b_m;
-    study.prior_t_d_s = finals[i].t_d_s;
+    study.prior_C_b_s = at_start.C_b_s;
+    study.prior_r_bs_b_m = at_start.r_bs_b_m;
+    study.prior_t_d_s = at_start.t_d_s;
   }
   return config;
 }
@@ -58,6 +61,13 @@ StudyOutput with_smoothed_biases(StudyOutput study, const SmoothedEpoch& epoch, 
   take_sd(layout.gyro_bias, study.sd_gyro_bias_radps);
   take_sd(layout.accel_bias, study.sd_accel_bias_mps2);
   return study;
+}
+
+/// The former mounting at a time; null where it was the final one already.
+const FormerMounting* in_force(const std::vector<FormerMounting>& former, HostTime time) noexcept {
+  const auto found = std::find_if(former.begin(), former.end(),
+                                  [time](const FormerMounting& mounting) { return time <= mounting.until; });
+  return found == former.end() ? nullptr : &*found;
 }
 
 /// Means of (psi, r) of one S-IMU; psi relative to its end value.
@@ -135,21 +145,25 @@ ReferenceBias ReferenceBiasTrack::at(HostTime time) const noexcept {
           interpolated(biases_[k - 1].accel_mps2, biases_[k].accel_mps2, share)};
 }
 
+bool is_final_mounting(const std::vector<FormerMounting>& former, HostTime time) noexcept {
+  return in_force(former, time) == nullptr;
+}
+
 Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const EstimatorConfig& estimator,
                                    const Recording& recording, const std::vector<StudyOutput>& finals,
-                                   const RecordStorage& storage,
+                                   const FormerMountings& former, const RecordStorage& storage,
                                    const std::function<void(double)>& progress) {
   Smoother smoother(storage);
   NoSink sink;
   ReplayOptions options;
   options.history = &smoother;
   options.progress = progress;
-  const auto replayed = replay(configuration, relinearised(estimator, finals), recording, sink, options);
+  const auto replayed = replay(configuration, relinearised(estimator, finals, former), recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());
   return smoother.smooth();
 }
 
-Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last,
+Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const FormerMountings& former,
                             const std::vector<StudyFileInfo>& infos, const std::filesystem::path& folder) {
   CsvFile navigation;
   if (auto opened = navigation.open(folder / "smoothed_navigation.csv", navigation_csv_header()); !opened)
@@ -171,9 +185,15 @@ Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last,
       navigation.append(navigation_csv_row(shown, time_s));
     }
     for (std::size_t i = 0; i < files.size(); ++i) {
-      if (!epoch->calibrating[i] || last.studies[i].status < StudyStatus::kConverging) continue;
-      files[i].append(calibration_csv_row(with_smoothed_biases(last.studies[i], *epoch, i, track.layout(i)),
-                                          infos[i], time_s));
+      if (!epoch->calibrating[i]) continue;
+      StudyOutput shown;
+      if (const FormerMounting* then = in_force(former[i], epoch->time)) {
+        shown = smoothed_output(then->estimate, *epoch, i, track.layout(i));
+      } else {
+        if (last.studies[i].status < StudyStatus::kConverging) continue;
+        shown = with_smoothed_biases(last.studies[i], *epoch, i, track.layout(i));
+      }
+      files[i].append(calibration_csv_row(shown, infos[i], time_s));
     }
   }
   auto result = navigation.close();
@@ -185,13 +205,15 @@ Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last,
 }
 
 Result<std::vector<nlohmann::json>> weighted_means(const SmoothedTrack& track,
-                                                   const std::vector<StudyOutput>& finals) {
+                                                   const std::vector<StudyOutput>& finals,
+                                                   const FormerMountings& former) {
   std::vector<MountingMean> means(finals.size());
   for (std::size_t k = 0; k < track.size(); ++k) {
     const auto epoch = track.at(k);
     if (!epoch) return tl::unexpected<Error>(epoch.error());
     for (std::size_t i = 0; i < finals.size(); ++i) {
-      if (epoch->calibrating[i]) means[i].add(*epoch, i, track.layout(i), finals[i]);
+      if (epoch->calibrating[i] && is_final_mounting(former[i], epoch->time))
+        means[i].add(*epoch, i, track.layout(i), finals[i]);
     }
   }
   std::vector<nlohmann::json> documents;

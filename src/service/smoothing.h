@@ -31,21 +31,35 @@ class ReferenceBiasTrack {
   std::vector<ReferenceBias> biases_;
 };
 
-/// Replays `recording` with every state free, the mounting's first values being those of `finals`, so that
-/// the whole drive is covered from its first sample on, and smooths what the filter saw.
+/// A mounting that an S-IMU had before it was found to sit differently.
+struct FormerMounting {
+  HostTime until;        ///< when the change was noticed
+  StudyOutput estimate;  ///< the last one of that mounting
+};
+/// Per S-IMU, in order of time; none where it stayed where it was.
+using FormerMountings = std::vector<std::vector<FormerMounting>>;
+
+/// Whether an S-IMU has the mounting of the drive's end at a time.
+[[nodiscard]] bool is_final_mounting(const std::vector<FormerMounting>& former, HostTime time) noexcept;
+
+/// Replays `recording` with every state free, the mounting's first values being those in force at its start,
+/// so that the whole drive is covered from its first sample on, and smooths what the filter saw.
 Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const EstimatorConfig& estimator,
                                    const Recording& recording, const std::vector<StudyOutput>& finals,
-                                   const RecordStorage& storage, const std::function<void(double)>& progress);
+                                   const FormerMountings& former, const RecordStorage& storage,
+                                   const std::function<void(double)>& progress);
 
 /// Writes smoothed_navigation.csv (columns of navigation.csv; where there was navigation) and, per S-IMU,
 /// smoothed_NAME.csv (columns of calibration_NAME.csv): biases smoothed, the constants of the mounting at
-/// their end values, with the end value's sd.
-Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last,
+/// their end values, with the end value's sd; while a former mounting was in force, its own.
+Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const FormerMountings& former,
                             const std::vector<StudyFileInfo>& infos, const std::filesystem::path& folder);
 
 /// The paper's final value of each S-IMU: mean over the drive of the smoothed values, weighted by their
-/// inverse variances; calibration.json's "weighted_mean". Null for an S-IMU that was never calibrated.
+/// inverse variances, of the final mounting; calibration.json's "weighted_mean". Null for an S-IMU that was
+/// never calibrated.
 Result<std::vector<nlohmann::json>> weighted_means(const SmoothedTrack& track,
-                                                   const std::vector<StudyOutput>& finals);
+                                                   const std::vector<StudyOutput>& finals,
+                                                   const FormerMountings& former);
 
 }  // namespace imuscope

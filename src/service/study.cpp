@@ -33,15 +33,17 @@ std::string utc_text(UtcTime utc) {
 /// biases, the whole drive covered.
 class ErrorCollector final : public CoreSink {
  public:
-  /// @param rows      one spool a S-IMU; must outlive the collector, as must `biases`
+  /// @param former    mountings that the rows leave out; must outlive the collector, as must what follows
+  /// @param rows      one spool a S-IMU
   /// @param low_pass  one a S-IMU, or none
-  ErrorCollector(const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows,
+  ErrorCollector(const FormerMountings& former, const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows,
                  std::vector<RowLowPass> low_pass)
-      : biases_(biases), rows_(rows), low_pass_(std::move(low_pass)) {}
+      : former_(former), biases_(biases), rows_(rows), low_pass_(std::move(low_pass)) {}
 
   void on_epoch(const StudyEpoch& epoch, HostTime) noexcept override {
     const ReferenceBias bias = biases_.at(epoch.time + from_seconds(epoch.t_d_s));
     watch_.add(epoch, bias);
+    if (!is_final_mounting(former_[epoch.study], epoch.time)) return;
     ErrorRow row = error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, bias);
     if (!low_pass_.empty()) low_pass_[epoch.study].apply(row);
     rows_[epoch.study].add(row);
@@ -54,6 +56,7 @@ class ErrorCollector final : public CoreSink {
   [[nodiscard]] const MotionWatch& watch() const { return watch_; }
 
  private:
+  const FormerMountings& former_;
   const ReferenceBiasTrack& biases_;
   std::vector<RowSpool>& rows_;
   std::vector<RowLowPass> low_pass_;
@@ -63,14 +66,25 @@ class ErrorCollector final : public CoreSink {
 /// First pass: everything but errors goes to the folder.
 class CalibrationPass final : public CoreSink {
  public:
-  explicit CalibrationPass(RunFolder& folder) : folder_(folder) {}
+  CalibrationPass(RunFolder& folder, const Configuration& configuration)
+      : folder_(folder), studies_(configuration.study_indices()), former_(studies_.size()) {}
   void on_error(const ErrorRecord&) noexcept override {}
-  void on_event(const EstimatorEvent& event) noexcept override { folder_.on_event(event); }
+  void on_event(const EstimatorEvent& event) noexcept override {
+    folder_.on_event(event);
+    if (event.kind != EstimatorEventKind::kMountingChanged || !folder_.last_snapshot()) return;
+    const auto found = std::find(studies_.begin(), studies_.end(), event.device);
+    const auto i = static_cast<std::size_t>(found - studies_.begin());
+    if (i < former_.size()) former_[i].push_back({event.time, folder_.last_snapshot()->studies[i]});
+  }
   void on_snapshot(const Snapshot& snapshot) noexcept override { folder_.on_snapshot(snapshot); }
   void on_late_sample(const LateSample& late) noexcept override { folder_.on_late_sample(late); }
 
+  [[nodiscard]] const FormerMountings& former_mountings() const { return former_; }
+
  private:
   RunFolder& folder_;
+  std::vector<std::size_t> studies_;
+  FormerMountings former_;
 };
 
 /// The common low-pass of every S-IMU; none where none is configured.
@@ -210,6 +224,17 @@ void warn_of_uncalibrated(const Configuration& configuration, const std::vector<
   }
 }
 
+void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMountings& former,
+                       HostTime first_reference_time, std::vector<std::string>& warnings) {
+  for (std::size_t i = 0; i < former.size(); ++i) {
+    if (former[i].empty()) continue;
+    warnings.push_back(
+        fmt::format("{}: found to sit differently {:.1f} s into the run; calibration.json, its errors and its "
+                    "noise models are of the mounting after that",
+                    infos[i].name, to_seconds(former[i].back().until - first_reference_time)));
+  }
+}
+
 }  // namespace
 
 std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording) {
@@ -257,7 +282,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   if (!folder) return tl::unexpected<Error>(folder.error());
   const auto estimator = estimator_config(configuration);
 
-  CalibrationPass first(**folder);
+  CalibrationPass first(**folder, configuration);
   ReplayOptions replay_options;
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
@@ -268,19 +293,22 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
 
   RunDescription run{options.version, &configuration,      &recording, &*calibrated_run,
                      &last,           (*folder)->events(), {}};
+  const auto infos = study_file_infos(configuration, recording);
+  const FormerMountings& former = first.former_mountings();
   warn_of_uncalibrated(configuration, finals, run.warnings);
+  warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
   if (std::none_of(finals.begin(), finals.end(), calibrated)) {
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
   }
 
   const RecordStorage storage{Smoother::kMemory_bytes, options.out};
-  const auto track = smooth_drive(configuration, estimator, recording, finals, storage, [&](double share) {
-    if (options.progress) options.progress("smoothing", share);
-  });
+  const auto track =
+      smooth_drive(configuration, estimator, recording, finals, former, storage, [&](double share) {
+        if (options.progress) options.progress("smoothing", share);
+      });
   if (!track) return tl::unexpected<Error>(track.error());
-  const auto infos = study_file_infos(configuration, recording);
-  if (auto written = write_smoothed(*track, last, infos, options.out); !written) return written;
-  const auto means = weighted_means(*track, finals);
+  if (auto written = write_smoothed(*track, last, former, infos, options.out); !written) return written;
+  const auto means = weighted_means(*track, finals, former);
   if (!means) return tl::unexpected<Error>(means.error());
   const auto biases = ReferenceBiasTrack::of(*track);
   if (!biases) return tl::unexpected<Error>(biases.error());
@@ -288,7 +316,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const auto settled = with_settled(finals, infos, options.mountings);
   auto rows = make_spools(finals.size(), options.out);
   if (!rows) return tl::unexpected<Error>(rows.error());
-  ErrorCollector collector(*biases, *rows, low_passes(configuration));
+  ErrorCollector collector(former, *biases, *rows, low_passes(configuration));
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("error process", share); };
   const auto second = replay(configuration, frozen(estimator, settled), recording, collector, replay_options);

@@ -1,6 +1,7 @@
 /// What goes wrong on vehicles, fed to the estimator: it stays sane and says what happened.
 
 #include <gtest/gtest.h>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <set>
@@ -199,19 +200,104 @@ TEST(BadInput, ForcesInAnotherUnitAreToldAtStandstill) {
   }
 }
 
-TEST(BadInput, AMirroredStudyIsToldAndNotCalledCalibrated) {
-  SimulatedDrive drive(150.0, {tilted()}, 47);
+struct WrongSigns {
+  const char* name;
+  std::array<double, 3> gyro;
+  std::array<double, 3> accel;
+};
+
+class Mirrored : public testing::TestWithParam<WrongSigns> {};
+
+TEST_P(Mirrored, StudyIsToldAndNoneOfItsNumbersIsEverCalledUsable) {
+  SimulatedDrive drive(400.0, {tilted()}, 47);
   Estimator estimator(drive.config());
-  const Told told = told_by(drive, estimator, [](Sample& sample, double /*t_s*/) {
-    if (sample.device == SimulatedDrive::kFirstStudy) {
-      sample.imu.omega_radps[2] = -sample.imu.omega_radps[2];
-      sample.imu.f_mps2[2] = -sample.imu.f_mps2[2];
+  std::set<EstimatorEventKind> told;
+  while (!drive.done()) {
+    std::vector<Sample> samples = drive.next();
+    for (Sample& sample : samples) {
+      if (sample.device == SimulatedDrive::kFirstStudy) {
+        for (std::size_t i = 0; i < 3; ++i) {
+          sample.imu.omega_radps[i] *= GetParam().gyro[i];
+          sample.imu.f_mps2[i] *= GetParam().accel[i];
+        }
+      }
+      estimator.add(sample);
     }
-    return true;
-  });
-  EXPECT_TRUE(told.has(EstimatorEventKind::kCoarseAlignmentPoor));
-  EXPECT_NE(estimator.study(0).status, StudyStatus::kCalibrated);
+    estimator.advance(samples.back().arrival);
+    for (const EstimatorEvent& event : estimator.events()) told.insert(event.kind);
+    const StudyOutput& out = estimator.study(0);
+    ASSERT_NE(out.status, StudyStatus::kCalibrated) << "at " << drive.time_s() << " s";
+    ASSERT_FALSE(out.t_d_observable) << "at " << drive.time_s() << " s";
+    for (const bool observable : out.observable) ASSERT_FALSE(observable) << "at " << drive.time_s() << " s";
+  }
+  EXPECT_TRUE(told.contains(EstimatorEventKind::kCoarseAlignmentPoor) ||
+              told.contains(EstimatorEventKind::kStudyInconsistent));
 }
+INSTANTIATE_TEST_SUITE_P(
+    WrongSigns, Mirrored,
+    testing::Values(WrongSigns{"XOfBoth", {-1, 1, 1}, {-1, 1, 1}}, WrongSigns{"YOfBoth", {1, -1, 1}, {1, -1, 1}},
+                    WrongSigns{"ZOfBoth", {1, 1, -1}, {1, 1, -1}}, WrongSigns{"XOfTheGyros", {-1, 1, 1}, {1, 1, 1}},
+                    WrongSigns{"ZOfTheGyros", {1, 1, -1}, {1, 1, 1}},
+                    WrongSigns{"AllForces", {1, 1, 1}, {-1, -1, -1}}),
+    [](const testing::TestParamInfo<WrongSigns>& param) { return param.param.name; });
+
+TEST(BadInput, AStudyThatFitsIsCalledUsable) {
+  SimulatedDrive drive(300.0, {tilted()}, 47);
+  Estimator estimator(drive.config());
+  const Told told = told_by(drive, estimator);
+  EXPECT_FALSE(told.has(EstimatorEventKind::kStudyInconsistent));
+  for (const bool observable : estimator.study(0).observable) EXPECT_TRUE(observable);
+}
+
+TEST(BadInput, ATurnedMountIsNoticedWhereSamplesAreAveraged) {
+  SimulatedDrive drive(300.0, {tilted()}, 49);
+  EstimatorConfig config = drive.config();
+  config.studies[0].average_samples = 10;
+  Estimator estimator(config);
+  told_by(drive, estimator, {}, 160.0);
+  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  const Matrix3d turned = exp_so3(Vector3d(0.2, -0.3, 0.8)) * tilted().C_b_s;
+  drive.remount(0, turned);
+  const Told told = told_by(drive, estimator);
+  EXPECT_TRUE(told.has(EstimatorEventKind::kMountingChanged));
+  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  EXPECT_LT(test::mounting_error_rad(estimator.study(0), turned).norm(), 0.5 * kRadPerDeg);
+}
+
+class LateStamps : public testing::TestWithParam<double> {};
+
+/// Solutions that are stamped on arrival, 0.3 s after their validity, and carry no UTC.
+TEST_P(LateStamps, OfGnssAreTakenBackToValidityByTheConfiguredLatency) {
+  SimulatedDrive drive(120.0, {}, 50);
+  EstimatorConfig config = drive.config();
+  config.gnss.latency_s = GetParam();
+  Estimator estimator(config);
+  double sum_m2 = 0.0;
+  int n = 0;
+  while (!drive.done()) {
+    const double t_s = drive.time_s();
+    std::vector<Sample> samples = drive.next();
+    for (Sample& sample : samples) {
+      if (sample.kind == SampleKind::kGnss) {
+        sample.time += std::chrono::milliseconds{300};
+        sample.has_utc = false;
+      }
+      estimator.add(sample);
+    }
+    estimator.advance(samples.back().arrival);
+    if (t_s < 70.0) continue;
+    const double error_m = horizontal_error_m(estimator.navigation(), drive.motion().state_at(t_s));
+    sum_m2 += error_m * error_m;
+    ++n;
+  }
+  const double rms_m = std::sqrt(sum_m2 / n);
+  if (GetParam() > 0.0) {
+    EXPECT_LT(rms_m, 0.03);
+  } else {
+    EXPECT_GT(rms_m, 0.5);
+  }
+}
+INSTANTIATE_TEST_SUITE_P(ConfiguredOrNot, LateStamps, testing::Values(0.0, 0.3));
 
 TEST(BadInput, TimeRunningBackwardsAndNanForAWholeSecondChangeNothingButCounters) {
   SimulatedDrive drive(200.0, {tilted()}, 48);

@@ -10,7 +10,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -56,6 +58,15 @@ struct Options {
   std::string folder;
 };
 
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+/// One device over all drives: what is the same in each of them shows here.
+struct Device {
+  std::vector<double> t_d_error_s;
+  Vector6d error_in_sd = Vector6d::Zero();  ///< sum of (psi, r) errors, each in its own sd
+  double nees = 0.0;
+};
+
 struct Totals {
   int n = 0;
   int not_started = 0;
@@ -65,7 +76,8 @@ struct Totals {
   Vector3d r_var = Vector3d::Zero();
   double nees = 0.0;
   double t_d_var = 0.0;
-  std::map<std::string, std::vector<double>> t_d_error_s;  ///< per device
+  std::vector<double> processor_s;  ///< from the files' bytes to the calibration, per drive
+  std::map<std::string, Device> devices;
 };
 
 void account(const imuscope::StudyOutput& out, double clock_shift_s, const json& truth, Totals& totals) {
@@ -75,18 +87,29 @@ void account(const imuscope::StudyOutput& out, double clock_shift_s, const json&
   }
   const auto C_true = imuscope::to_eigen(truth.at("C_b_s").get<imuscope::Matrix3>());
   const auto r_true = imuscope::to_eigen(truth.at("r_bs_b_m").get<imuscope::Vector3>());
-  Eigen::Matrix<double, 6, 1> error;
+  Vector6d error;
   error.head<3>() = -imuscope::log_so3(imuscope::to_eigen(out.C_b_s).transpose() * C_true);
   error.tail<3>() = r_true - imuscope::to_eigen(out.r_bs_b_m);
   const Eigen::Map<const Eigen::Matrix<double, 6, 6>> P(out.covariance_psi_r.data());
-  totals.nees += error.dot(P.ldlt().solve(error));
+  Device& device = totals.devices[truth.at("name")];
+  const double nees = error.dot(P.ldlt().solve(error));
+  device.nees += nees;
+  device.error_in_sd += error.cwiseQuotient(P.diagonal().cwiseSqrt());
+  device.t_d_error_s.push_back(out.t_d_s + clock_shift_s - truth.at("t_d_s").get<double>());
+  totals.nees += nees;
   totals.psi2 += error.head<3>().cwiseAbs2();
   totals.r2 += error.tail<3>().cwiseAbs2();
   totals.psi_var += P.diagonal().head<3>();
   totals.r_var += P.diagonal().tail<3>();
   totals.t_d_var += out.sd_t_d_s * out.sd_t_d_s;
-  totals.t_d_error_s[truth.at("name")].push_back(out.t_d_s + clock_shift_s - truth.at("t_d_s").get<double>());
   ++totals.n;
+}
+
+/// Of every thread of this process.
+double processor_time_s() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 /// One drive: recorded, read back, accounted for.
@@ -105,12 +128,14 @@ imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& t
     const auto file = recording / (device.name + ".bin");
     if (std::filesystem::exists(file)) inputs.push_back(fmt::format("{}={}", device.name, file.string()));
   }
+  const double begin_s = processor_time_s();
   const auto opened = imuscope::open_recording(inputs, config);
   if (!opened) return tl::unexpected<imuscope::Error>(opened.error());
   Last sink;
   const auto replayed = imuscope::replay(
       opened->configuration, imuscope::estimator_config(opened->configuration), opened->recording, sink);
   if (!replayed) return tl::unexpected<imuscope::Error>(replayed.error());
+  totals.processor_s.push_back(processor_time_s() - begin_s);
   std::ifstream in(recording / "truth.json");
   const json truth = json::parse(in);
   const auto studies = opened->configuration.study_indices();
@@ -131,6 +156,14 @@ std::string three(const Vector3d& v, int digits) {
 
 Vector3d rms(const Vector3d& sum, int n) { return (sum / n).cwiseSqrt(); }
 
+void print(const std::string& name, const Device& device) {
+  const auto n = static_cast<double>(device.t_d_error_s.size());
+  // The mean of n errors of one sd each has an sd of 1/sqrt(n): times sqrt(n) is a normal variable.
+  const Vector6d mean = device.error_in_sd / std::sqrt(n);
+  fmt::print("  {:8} NEES {:5.2f}, mean error in its own sd: psi {:18} r {:18}\n", name, device.nees / n,
+             three(mean.head<3>(), 1), three(mean.tail<3>(), 1));
+}
+
 void print(const Options& options, const Totals& t) {
   constexpr double kMdeg = 1e3 * imuscope::kDegPerRad;
   constexpr double kMm = 1e3;
@@ -146,7 +179,8 @@ void print(const Options& options, const Totals& t) {
   double centred = 0.0;
   int freedom = 0;
   std::string latencies;
-  for (const auto& [name, errors] : t.t_d_error_s) {
+  for (const auto& [name, device] : t.devices) {
+    const std::vector<double>& errors = device.t_d_error_s;
     double mean = 0.0;
     for (const double error : errors) mean += error / static_cast<double>(errors.size());
     for (const double error : errors) {
@@ -164,6 +198,11 @@ void print(const Options& options, const Totals& t) {
   }
   fmt::print("  NEES (6) mean {:.2f}, 95 % band of the mean {:.2f} to {:.2f}\n", t.nees / t.n,
              6.0 - 1.96 * std::sqrt(12.0 / t.n), 6.0 + 1.96 * std::sqrt(12.0 / t.n));
+  for (const auto& [name, device] : t.devices) print(name, device);
+  std::vector<double> times = t.processor_s;
+  std::sort(times.begin(), times.end());
+  fmt::print("  bytes to calibration: {:.2f} s of processor a drive in the median, {:.2f} s at the least\n",
+             times[times.size() / 2], times.front());
 }
 
 }  // namespace
