@@ -32,8 +32,7 @@ std::optional<std::size_t> CovarianceWatch::first_bad_state(const CovarianceKern
     for (std::size_t j = 0; j < i; ++j) {
       const double* const other = factor_.data() + j * n;
       const double per_variance = per_sd_[i] * per_sd_[j];
-      const double sum =
-          per_variance == 0.0 ? 0.0 : (P(i, j) * per_variance - dot(row, other, j)) / other[j];
+      const double sum = per_variance == 0.0 ? 0.0 : (P(i, j) * per_variance - dot(row, other, j)) / other[j];
       row[j] = sum;
       pivot -= sum * sum;
     }

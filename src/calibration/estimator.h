@@ -134,8 +134,8 @@ struct StudyOutput {
   std::array<double, 6> weakest_direction{};
   StudyDirection weakest_component = StudyDirection::kPsiX;
   double weakest_relative_sd = 1.0;
-  /// Per component of (psi, r): sd has fallen below half of its prior. Otherwise: not observable yet. None is
-  /// while the samples contradict the reference (kStudyInconsistent).
+  /// Per component of (psi, r): sd below half of its prior, and 10 s of motion fitted this mounting; none
+  /// while the samples contradict the reference (kStudyInconsistent). Otherwise: not observable yet.
   std::array<bool, 6> observable{};
   bool t_d_observable = false;
   StudyCounters counters;
@@ -178,13 +178,13 @@ enum class EstimatorEventKind : std::uint8_t {
   kReferenceGap,           ///< value: length in s
   kReferenceGravityWrong,  ///< at standstill f_z of b is not -g: axes or sign convention; value: f_z
   kCoarseAlignmentDone,    ///< value: residual of the vectors, rad
-  kCoarseAlignmentPoor,    ///< enough motion but no consistent rotation; value: correlation of the rates, to 1
-  kMountingChanged,        ///< innovations say that the S-IMU sits differently; starts again; value: mean NIS
-  kStudyReturned,          ///< after a gap; its biases are uncertain again; value: gap in s
-  kGnssRejected,           ///< start of a streak of rejected solutions; value: NIS
-  kGnssReacquired,         ///< end of a streak; value: its length in s
-  kOdometryLost,           ///< no speed for a while; the last one is not held; value: its age in s
-  kOdometryReturned,       ///< value: silence in s
+  kCoarseAlignmentPoor,  ///< enough motion but no consistent rotation; value: correlation of the rates, to 1
+  kMountingChanged,      ///< innovations say that the S-IMU sits differently; starts again; value: mean NIS
+  kStudyReturned,        ///< after a gap; its biases are uncertain again; value: gap in s
+  kGnssRejected,         ///< start of a streak of rejected solutions; value: NIS
+  kGnssReacquired,       ///< end of a streak; value: its length in s
+  kOdometryLost,         ///< no speed for a while; the last one is not held; value: its age in s
+  kOdometryReturned,     ///< value: silence in s
   kOdometryRejected,  ///< wheels contradict the navigation (slip, wrong unit or scale); value: excess in m/s
   kOdometryAccepted,  ///< end of a streak of rejected speeds; value: its length in s
   kCovarianceRepaired,     ///< a state's variance was no longer positive; value: state index (state_name.h)

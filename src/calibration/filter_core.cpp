@@ -130,7 +130,7 @@ void FilterCore::settle_study(std::size_t i) noexcept {
 }
 
 NavigationErrorVector FilterCore::take_injected() noexcept {
-  const NavigationErrorVector taken = injected_;
+  NavigationErrorVector taken = injected_;
   injected_.setZero();
   return taken;
 }

@@ -281,8 +281,8 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
   if (past_size_ == 0 || time > past(0).time + kGnssAhead) return Lookup::kTooNew;
   if (time < past(past_size_ - 1).time) return Lookup::kTooOld;
   out.back.setIdentity();
-  // What has been learned since epoch k was written, as an error then. Only the ring's span is walked: carried
-  // along for hours instead, the vertical channel would grow by e every ten minutes.
+  // What has been learned since epoch k was written, as an error then. Only the ring's span is walked:
+  // carried along for hours instead, the vertical channel would grow by e every ten minutes.
   NavigationErrorVector learned = core_.injected();
   std::size_t k = 0;
   for (; past(k).time > time; ++k) {
@@ -292,9 +292,10 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
     const auto undo = [&](auto& error) {
       error.template middleRows<3>(kGyroBiasError) /= step.gyro_bias_decay;
       error.template middleRows<3>(kAccelBiasError) /= step.accel_bias_decay;
-      error.template topRows<9>() = (A_inverse * (error.template topRows<9>() - step.kinematic_rows.rightCols<6>() *
-                                                                    error.template bottomRows<6>()))
-                                        .eval();
+      error.template topRows<9>() =
+          (A_inverse * (error.template topRows<9>() -
+                        step.kinematic_rows.rightCols<6>() * error.template bottomRows<6>()))
+              .eval();
     };
     undo(out.back);
     undo(learned);

@@ -27,11 +27,15 @@ constexpr double kNisMean_s = 10.0;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
 constexpr double kMountingChangedShare = 0.8;
 constexpr double kMountingWatch_s = 3.0;
-/// A good S-IMU has one sample in 20 000 gated. Above the first share of half a minute's motion its samples do
-/// not fit any mounting; below the second, which takes two minutes of motion that fits, they do again.
+/// A good S-IMU has one sample in 20 000 gated. Above the first share of half a minute's motion its samples
+/// do not fit any mounting; below the second, which takes two minutes of motion that fits, they do again.
 constexpr double kMisfitMean_s = 30.0;
 constexpr double kMisfitShare = 0.1;
 constexpr double kFitShare = 0.002;
+/// It is told only above this share: a mount that was turned is noticed as such first.
+constexpr double kMisfitToldShare = 0.2;
+/// Motion that a new mounting is held against before anything of it is called observable.
+constexpr double kProof_s = 20.0;
 /// The coarse alignment is tried this often.
 constexpr Duration kCoarseEvery = std::chrono::seconds{1};
 /// A coarse offset that moves by more than this makes the gathered pairs useless.
@@ -337,6 +341,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   output_.status = StudyStatus::kConverging;
   gated_ = {};
   gated_share_ = 0.0;
+  proof_s_ = 0.0;
   blocks_ = {};
   t_d_column_power_ = {};
   next_direction_ = now;
@@ -558,10 +563,12 @@ bool StudyFilter::fits_prior_of(const StudyConfig& other) const noexcept {
 void StudyFilter::watch_fit(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept {
   // At rest everything fits: that is no evidence.
   if (context.regime == Regime::kStatic && !gated) return;
+  proof_s_ += dt_s;
   misfit_share_ += std::min(1.0, dt_s / kMisfitMean_s) * ((gated ? 1.0 : 0.0) - misfit_share_);
-  if (misfits_ && misfit_share_ < kFitShare) misfits_ = false;
-  if (misfits_ || misfit_share_ < kMisfitShare) return;
-  misfits_ = true;
+  if (misfit_share_ < kFitShare) misfits_ = misfit_told_ = false;
+  misfits_ = misfits_ || misfit_share_ >= kMisfitShare;
+  if (misfit_told_ || misfit_share_ < kMisfitToldShare) return;
+  misfit_told_ = true;
   context.log.add(EstimatorEventKind::kStudyInconsistent, config_.device, now, misfit_share_);
 }
 
@@ -641,13 +648,14 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   output_.sd_accel_t_d_s = core.sd(layout.accel_t_d);
   output_.sd_t_d_s = core.sd(layout.t_d);
 
+  const bool fits = !misfits_ && proof_s_ >= kProof_s;
   bool calibrated = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
   for (std::size_t i = 0; i < 6; ++i) {
     const std::size_t block = i < 3 ? layout.psi : layout.r;
     const double sd = i < 3 ? output_.sd_psi_rad[i] : output_.sd_r_bs_b_m[i - 3];
     const double goal = i < 3 ? config_.goal_boresight_sd_rad : config_.goal_r_bs_b_sd_m;
-    calibrated = calibrated && !misfits_ && sd <= goal;
-    output_.observable[i] = !misfits_ && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal);
+    calibrated = calibrated && fits && sd <= goal;
+    output_.observable[i] = fits && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal);
     for (std::size_t j = 0; j < 6; ++j) {
       const std::size_t other = j < 3 ? layout.psi : layout.r;
       const bool absent = block == StudyLayout::kAbsent || other == StudyLayout::kAbsent;
@@ -655,7 +663,7 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
     }
   }
   output_.t_d_observable =
-      layout.t_d != StudyLayout::kAbsent && !misfits_ &&
+      layout.t_d != StudyLayout::kAbsent && fits &&
       (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= config_.goal_t_d_sd_s);
   output_.status = calibrated ? StudyStatus::kCalibrated : StudyStatus::kConverging;
   if (output_.time >= next_direction_) {

@@ -160,6 +160,8 @@ class StudyFilter {
   double gated_share_ = 0.0;     ///< over seconds: the mounting changed
   double misfit_share_ = 0.0;    ///< over half a minute of motion: the device is not what is configured
   bool misfits_ = false;
+  bool misfit_told_ = false;
+  double proof_s_ = 0.0;  ///< motion that this mounting has been held against
   std::array<double, 6> prior_sd_psi_r_{};
   double prior_sd_t_d_ = 0.0;
   HostTime next_direction_{};

@@ -158,7 +158,8 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
   ReplayOptions options;
   options.history = &smoother;
   options.progress = progress;
-  const auto replayed = replay(configuration, relinearised(estimator, finals, former), recording, sink, options);
+  const auto replayed =
+      replay(configuration, relinearised(estimator, finals, former), recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());
   return smoother.smooth();
 }

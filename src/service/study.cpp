@@ -228,10 +228,10 @@ void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMoun
                        HostTime first_reference_time, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < former.size(); ++i) {
     if (former[i].empty()) continue;
-    warnings.push_back(
-        fmt::format("{}: found to sit differently {:.1f} s into the run; calibration.json, its errors and its "
-                    "noise models are of the mounting after that",
-                    infos[i].name, to_seconds(former[i].back().until - first_reference_time)));
+    warnings.push_back(fmt::format(
+        "{}: found to sit differently {:.1f} s into the run; calibration.json, its errors and its "
+        "noise models are of the mounting after that",
+        infos[i].name, to_seconds(former[i].back().until - first_reference_time)));
   }
 }
 

@@ -233,13 +233,14 @@ TEST_P(Mirrored, StudyIsToldAndNoneOfItsNumbersIsEverCalledUsable) {
   EXPECT_TRUE(told.contains(EstimatorEventKind::kCoarseAlignmentPoor) ||
               told.contains(EstimatorEventKind::kStudyInconsistent));
 }
-INSTANTIATE_TEST_SUITE_P(
-    WrongSigns, Mirrored,
-    testing::Values(WrongSigns{"XOfBoth", {-1, 1, 1}, {-1, 1, 1}}, WrongSigns{"YOfBoth", {1, -1, 1}, {1, -1, 1}},
-                    WrongSigns{"ZOfBoth", {1, 1, -1}, {1, 1, -1}}, WrongSigns{"XOfTheGyros", {-1, 1, 1}, {1, 1, 1}},
-                    WrongSigns{"ZOfTheGyros", {1, 1, -1}, {1, 1, 1}},
-                    WrongSigns{"AllForces", {1, 1, 1}, {-1, -1, -1}}),
-    [](const testing::TestParamInfo<WrongSigns>& param) { return param.param.name; });
+INSTANTIATE_TEST_SUITE_P(WrongSigns, Mirrored,
+                         testing::Values(WrongSigns{"XOfBoth", {-1, 1, 1}, {-1, 1, 1}},
+                                         WrongSigns{"YOfBoth", {1, -1, 1}, {1, -1, 1}},
+                                         WrongSigns{"ZOfBoth", {1, 1, -1}, {1, 1, -1}},
+                                         WrongSigns{"XOfTheGyros", {-1, 1, 1}, {1, 1, 1}},
+                                         WrongSigns{"ZOfTheGyros", {1, 1, -1}, {1, 1, 1}},
+                                         WrongSigns{"AllForces", {1, 1, 1}, {-1, -1, -1}}),
+                         [](const testing::TestParamInfo<WrongSigns>& param) { return param.param.name; });
 
 TEST(BadInput, AStudyThatFitsIsCalledUsable) {
   SimulatedDrive drive(300.0, {tilted()}, 47);

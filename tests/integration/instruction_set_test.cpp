@@ -1,4 +1,5 @@
-/// The golden drive through every instruction set that this processor has: the same numbers, far below their sd.
+/// The golden drive through every instruction set that this processor has: the same numbers, far below their
+/// sd.
 
 #include <gtest/gtest.h>
 #include <cmath>

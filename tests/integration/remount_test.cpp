@@ -1,4 +1,5 @@
-/// A study of a drive in the middle of which an S-IMU was turned on its mount, as CSV files through the program.
+/// A study of a drive in the middle of which an S-IMU was turned on its mount, as CSV files through the
+/// program.
 
 #include <fmt/format.h>
 #include <fmt/os.h>
@@ -129,7 +130,8 @@ TEST(Remount, TheStudyKeepsToTheMountingThatWasInForceAtEachInstant) {
   EXPECT_GT(late, static_cast<std::size_t>(4.5 * (kDrive_s - kRemount_s - kSettled_s)));
 
   bool told = false;
-  for (const auto& warning : read_json(out / "run.json").at("warnings"))
+  const auto run = read_json(out / "run.json");
+  for (const auto& warning : run.at("warnings"))
     told = told || warning.get<std::string>().find("sit differently") != std::string::npos;
   EXPECT_TRUE(told);
   // No row of the error process may take the old mounting for the new one.

@@ -68,8 +68,8 @@ std::vector<Scenario> scenarios() {
   standstill.duration_s = 59.0;
   Scenario straight{'G', "straight road", {{16, 9, 10}, {}, 0.0}};
   straight.kind = imusim::ScenarioKind::kStraightRoad;
-  Scenario paper{'D', "the paper's 6 states, biased sensors, every run on its own road (314 / 303 / 32 expected)",
-                 {}};
+  Scenario paper{
+      'D', "the paper's 6 states, biased sensors, every run on its own road (314 / 303 / 32 expected)", {}};
   paper.paper = true;
   return {{'K', "all 19 states", full}, vibration, paper, standstill, straight, no_prior, five_minutes};
 }

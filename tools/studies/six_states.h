@@ -1,7 +1,7 @@
 #pragma once
 
-/// What the paper's six states (boresight, lever arm) make of sensors with biases, in closed form: the error of
-/// weighted least squares whose model leaves the biases out. No filter and no random number is involved.
+/// What the paper's six states (boresight, lever arm) make of sensors with biases, in closed form: the error
+/// of weighted least squares whose model leaves the biases out. No filter and no random number is involved.
 
 #include <Eigen/Core>
 
