@@ -8,7 +8,7 @@
 namespace imuscope::xsens {
 
 bool Scanner::next(Frame& frame, bool at_end) noexcept {
-  if (next_nested(frame)) return true;
+  if (nested_at_ < taken_ && next_nested(frame)) return true;
   for (;;) {
     const auto behind = buffer_.pending().subspan(taken_);
     if (behind.empty()) return false;
@@ -59,6 +59,12 @@ bool Scanner::next_nested(Frame& frame) noexcept {
     if (preamble == nullptr) break;
     const auto start = static_cast<std::size_t>(static_cast<const std::uint8_t*>(preamble) - inside.data());
     nested_at_ = start + 1;
+    // Most preambles in data are none, and say so in their next bytes.
+    if (start + kHeaderSize + kChecksumSize > taken_) break;
+    const std::uint8_t bid = inside[start + 1];
+    const std::size_t length = inside[start + 3];
+    const bool fits = length == kExtendedLength || start + kHeaderSize + length + kChecksumSize <= taken_;
+    if ((bid > kBusBidMax && bid != kMasterBid) || !fits) continue;
     if (const Examined found = examine(inside.subspan(start)); found.verdict == Verdict::kFrame) {
       fill(frame, start, found);
       return true;

@@ -60,8 +60,8 @@ StreamUnderTest xsens_mt() {
     if (i == 3) s.frames.push_back(xsens::test_frames::frame(0x31));
   }
   s.scan = scan_with<xsens::Scanner, xsens::Frame>([](const xsens::Frame& frame) { return frame.size; });
-  // One false frame in 256 has a right checksum; the layout and the counter tell it apart later. No frame is lost
-  // to it: see MtScanner.GarbageHidesAFrameOnlyWhereTwoFalseStartsInARowPassTheChecksum for what can be.
+  // One false frame in 256 has a right checksum; the layout and the counter tell it apart later. No frame is
+  // lost to it: see MtScanner.GarbageHidesAFrameOnlyWhereTwoFalseStartsInARowPassTheChecksum for what can be.
   s.may_appear = [](const Bytes& frame) {
     return std::accumulate(frame.begin() + 1, frame.end(), 0U) % 256 == 0;
   };
