@@ -1,9 +1,5 @@
 #include "drivers/can_bus/session.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-
 namespace imuscope {
 namespace {
 
@@ -52,23 +48,20 @@ std::span<const std::uint8_t> CanSession::poll(HostTime now) noexcept {
 }
 
 void CanSession::tell() noexcept {
-  const auto say = [this]<typename... Args>(fmt::format_string<Args...> text, Args&&... args) {
-    const auto result = fmt::format_to_n(problem_.data(), problem_.size(), text, std::forward<Args>(args)...);
-    problem_size_ = std::min(result.size, problem_.size());
-  };
-  problem_size_ = 0;
+  problem_.clear();
   if (bus_state_ == CanBusState::kOff) {
-    say("bus-off (time {}): the controller has gone silent after too many errors; check wiring, termination "
-        "and "
-        "bit rate, then restart it: ip link set ... type can restart",
+    problem_.say(
+        "bus-off (time {}): the controller has gone silent after too many errors; check wiring, termination "
+        "and bit rate, then restart it: ip link set ... type can restart",
         bus_offs_);
   } else if (errors_alone_ && state_ != SessionState::kStreaming) {
-    say("only error frames come: the bit rate is probably not the bus's");
+    problem_.say("only error frames come: the bit rate is probably not the bus's");
   } else if (overflowed_) {
-    say("the controller had no room for frames, {} times so far: frames are lost before this PC sees them",
+    problem_.say(
+        "the controller had no room for frames, {} times so far: frames are lost before this PC sees them",
         overflows_);
   } else if (bus_state_ == CanBusState::kPassive) {
-    say("error-passive: frames are damaged; check wiring and termination");
+    problem_.say("error-passive: frames are damaged; check wiring and termination");
   }
 }
 

@@ -3,13 +3,13 @@
 /// The session of a device on a CAN bus: it only listens. The device streams while its frames come; what the
 /// error frames say of the bus becomes the problem.
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
 
 #include "drivers/can_bus/error_frame.h"
 #include "drivers/device/device.h"
+#include "drivers/device/sentence.h"
 
 namespace imuscope {
 
@@ -22,9 +22,7 @@ class CanSession final : public DeviceSession {
   /// Never has anything to say.
   [[nodiscard]] std::span<const std::uint8_t> poll(HostTime now) noexcept override;
   [[nodiscard]] SessionState state() const noexcept override { return state_; }
-  [[nodiscard]] std::string_view problem() const noexcept override {
-    return {problem_.data(), problem_size_};
-  }
+  [[nodiscard]] std::string_view problem() const noexcept override { return problem_.view(); }
 
   [[nodiscard]] CanBusState bus_state() const noexcept { return bus_state_; }
   [[nodiscard]] std::uint64_t error_frames() const noexcept { return error_frames_; }
@@ -44,8 +42,7 @@ class CanSession final : public DeviceSession {
   std::uint64_t error_frames_ = 0;
   std::uint64_t bus_offs_ = 0;
   std::uint64_t overflows_ = 0;
-  std::array<char, 200> problem_{};
-  std::size_t problem_size_ = 0;
+  Sentence problem_;
 };
 
 }  // namespace imuscope

@@ -184,39 +184,8 @@ std::vector<CanId> Decoder::ids() const {
   return ids;
 }
 
-std::string Decoder::problem() const {
-  if (odometry_counters_.too_short > 0) {
-    const dbc::Message& message = messages_[short_message_];
-    return fmt::format(
-        "{} frames of {} were too short for a chosen signal ({} bytes received, {} in the DBC file); check "
-        "that "
-        "the DBC file is this vehicle's",
-        odometry_counters_.too_short, message.name, short_length_, message.length);
-  }
-  if (odometry_counters_.impossible > 0) {
-    return fmt::format(
-        "{} impossible speeds, the last {:.1f} m/s, were refused; check unit and factor of the speed signals",
-        odometry_counters_.impossible, impossible_mps_);
-  }
-  if (counters_.frames > 0 && counters_.samples == 0 && odometry_counters_.invalid > 0)
-    return "every speed was marked as invalid by the vehicle; is the ignition on?";
-  return {};
-}
-
-void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
-  counters_.bytes += bytes.size();
-  CanFrameReader reader(bytes);
-  CanFrame frame;
-  while (reader.next(frame)) {
-    if (frame.is_error || frame.is_remote) continue;
-    ++counters_.frames;
-    on_frame(frame, arrival, sink);
-  }
-  counters_.bytes_skipped += reader.bytes_skipped();
-}
-
 void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink) noexcept {
-  bool spoiled = false;
+  const dbc::Message* too_short = nullptr;
   bool has_speed = false;
   for (const Signal& signal : signals_) {
     const dbc::Message& message = messages_[signal.message];
@@ -226,9 +195,7 @@ void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink
     if (!raw) {
       // Another multiplex is no fault; a frame without room for the signal is.
       if (frame.length >= dbc::bytes_needed(layout)) continue;
-      spoiled = true;
-      short_message_ = signal.message;
-      short_length_ = frame.length;
+      too_short = &message;
       continue;
     }
     switch (signal.use) {
@@ -247,11 +214,33 @@ void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink
         break;
     }
   }
-  if (spoiled) {
-    ++odometry_counters_.too_short;
-    ++counters_.bad_contents;
-  }
+  if (too_short != nullptr) on_short_frame(*too_short, frame);
   if (has_speed) emit(arrival, sink);
+}
+
+// Without numbers that grow: a sentence that stays the same is said once.
+void Decoder::on_short_frame(const dbc::Message& message, const CanFrame& frame) noexcept {
+  ++odometry_counters_.too_short;
+  ++counters_.bad_contents;
+  remark_.say(
+      "frames of {} are too short for a chosen signal ({} bytes received, {} in the DBC file); check that "
+      "the "
+      "DBC file is this vehicle's",
+      message.name, frame.length, message.length);
+}
+
+void Decoder::on_impossible(double speed_mps) noexcept {
+  ++counters_.bad_contents;
+  if (++odometry_counters_.impossible > 1) return;
+  remark_.say(
+      "impossible speeds were refused, such as {:.1f} m/s; check unit and factor of the speed signals",
+      speed_mps);
+}
+
+void Decoder::on_invalid() noexcept {
+  ++odometry_counters_.invalid;
+  if (counters_.samples == 0)
+    remark_.say("every speed was marked as invalid by the vehicle; is the ignition on?");
 }
 
 void Decoder::on_counter(const Signal& signal, std::uint64_t raw) noexcept {
@@ -300,17 +289,16 @@ void Decoder::emit(HostTime arrival, SampleSink& sink) noexcept {
     sum_mps += wheel.speed_mps;
   }
   if (!good) {
-    ++odometry_counters_.invalid;
+    on_invalid();
     return;
   }
   const double mean_mps = sum_mps / static_cast<double>(wheels_.size());
   const double speed_mps = backward_ ? -std::abs(mean_mps) : mean_mps;
   if (!is_possible(speed_mps, newest)) {
-    ++odometry_counters_.impossible;
-    ++counters_.bad_contents;
-    impossible_mps_ = speed_mps;
+    on_impossible(speed_mps);
     return;
   }
+  if (counters_.samples == 0) remark_.clear();
   Sample sample{};
   sample.kind = SampleKind::kOdometry;
   sample.device = config_.device;

@@ -18,8 +18,8 @@
 
 #include "base/result.h"
 #include "drivers/dbc/database.h"
-#include "drivers/device/can_frame.h"
-#include "drivers/device/device.h"
+#include "drivers/device/can_decoder.h"
+#include "drivers/device/sentence.h"
 
 namespace imuscope::can_odometry {
 
@@ -53,20 +53,18 @@ struct OdometryCounters {
   std::uint64_t incomplete = 0;  ///< sets of wheels of which one did not come in time
 };
 
-class Decoder final : public DeviceDecoder {
+class Decoder final : public CanDecoder {
  public:
   /// Errors (kUsage): an unknown signal, with the nearest name; a unit that is not known.
   static Result<std::unique_ptr<Decoder>> make(const dbc::Database& database, const Choice& choice,
                                                const DecoderConfig& config);
 
-  void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
-  [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
   [[nodiscard]] const OdometryCounters& odometry_counters() const noexcept { return odometry_counters_; }
 
   [[nodiscard]] std::vector<CanId> ids() const override;
 
   /// What is wrong with the frames, in one sentence with the remedy; empty when all is well.
-  [[nodiscard]] std::string problem() const;
+  [[nodiscard]] std::string_view remark() const noexcept override { return remark_.view(); }
 
  private:
   enum class Use : std::uint8_t { kSpeed, kDirection, kFault, kCounter };
@@ -89,9 +87,12 @@ class Decoder final : public DeviceDecoder {
   Result<void> add_speed(const dbc::Database& database, const std::string& name, const Choice& choice);
   Result<void> add_direction(const dbc::Database& database, const Choice& choice);
   Result<std::size_t> add(const dbc::Database& database, const std::string& name, Use use);
-  void on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink) noexcept;
+  void on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink) noexcept override;
   void on_counter(const Signal& signal, std::uint64_t raw) noexcept;
   void take_speed(const Signal& signal, std::uint64_t raw, HostTime stamp) noexcept;
+  void on_short_frame(const dbc::Message& message, const CanFrame& frame) noexcept;
+  void on_impossible(double speed_mps) noexcept;
+  void on_invalid() noexcept;
   void emit(HostTime arrival, SampleSink& sink) noexcept;
   [[nodiscard]] bool is_possible(double speed_mps, HostTime stamp) noexcept;
 
@@ -102,7 +103,6 @@ class Decoder final : public DeviceDecoder {
   bool has_no_sign_ = false;
   bool backward_ = false;
   bool fault_ = false;
-  DecoderCounters counters_;
   OdometryCounters odometry_counters_;
   std::uint64_t sequence_ = 0;
   std::optional<std::uint64_t> last_count_;
@@ -110,9 +110,7 @@ class Decoder final : public DeviceDecoder {
   double last_speed_mps_ = 0.0;
   HostTime last_stamp_{};
   int impossible_in_a_row_ = 0;
-  double impossible_mps_ = 0.0;    ///< the last one
-  std::size_t short_message_ = 0;  ///< the last one
-  std::size_t short_length_ = 0;
+  Sentence remark_;
 };
 
 }  // namespace imuscope::can_odometry

@@ -172,7 +172,8 @@ std::string bus_off_text(const CanInterface& interface) {
 std::string silence_text(const CanInterface& interface, const CanObservation& seen) {
   const bool errors = seen.error_frames > 0 || interface.state == CanControllerState::kPassive ||
                       interface.state == CanControllerState::kWarning;
-  if (errors && seen.other_frames == 0) {
+  // The two counts are not of the same instant, and some drivers count errors as received.
+  if (errors && seen.other_frames <= seen.error_frames) {
     return fmt::format(
         "{} hears only errors{} (state {}): the bit rate is probably not the bus's; sudo ip link set {} "
         "down, then "

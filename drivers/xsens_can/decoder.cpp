@@ -34,18 +34,6 @@ Decoder::Decoder(const DecoderConfig& config)
   IMUSCOPE_EXPECTS(config.rate_hz > 0.0);
 }
 
-void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
-  counters_.bytes += bytes.size();
-  CanFrameReader reader(bytes);
-  CanFrame frame;
-  while (reader.next(frame)) {
-    if (frame.is_error || frame.is_remote) continue;
-    ++counters_.frames;
-    on_frame(frame, arrival, sink);
-  }
-  counters_.bytes_skipped += reader.bytes_skipped();
-}
-
 void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink) noexcept {
   const CanId id{frame.id, frame.is_extended};
   const auto found = std::find(config_.ids.begin(), config_.ids.end(), id);
@@ -279,7 +267,7 @@ Vector3 Decoder::rotated(const Triad& v) const noexcept {
   return out;
 }
 
-std::string Decoder::problem() const {
+std::string_view Decoder::remark() const noexcept {
   if (overflows_ > 0)
     return "its CAN output buffer overflowed: lower its output rate, send fewer messages or raise the bit "
            "rate";
@@ -290,8 +278,7 @@ std::string Decoder::problem() const {
   if (counters_.frames > 0 && counters_.samples == 0 && high_rate_.order() == HighRateOrder::kUnknown &&
       group_.high_rate[0].n > 0) {
     return "it sends high-rate messages only, and which of 061 and 062 is the acceleration shows at rest: "
-           "let it stand "
-           "still for a second, or switch on delta_v and delta_q";
+           "let it stand still for a second, or switch on delta_v and delta_q";
   }
   if (counters_.frames > 0 && counters_.samples == 0 && counters_.bad_contents > 0)
     return "its groups lack rates or accelerations: switch on delta_v and delta_q";

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/device/device.h"
+#include "drivers/device/can_decoder.h"
 #include "drivers/xsens_can/high_rate.h"
 #include "drivers/xsens_can/messages.h"
 #include "drivers/xsens_mt/unwrap.h"
@@ -33,14 +33,11 @@ struct DecoderConfig {
 /// What the samples are made of, the best last.
 enum class Source : std::uint8_t { kNone, kHighRate, kRates, kIncrements };
 
-class Decoder final : public DeviceDecoder {
+class Decoder final : public CanDecoder {
  public:
   explicit Decoder(const DecoderConfig& config);
 
-  void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
-  [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
-
   [[nodiscard]] std::vector<CanId> ids() const override { return {config_.ids.begin(), config_.ids.end()}; }
 
   [[nodiscard]] Source source() const noexcept { return source_; }
@@ -49,7 +46,7 @@ class Decoder final : public DeviceDecoder {
   [[nodiscard]] HighRateOrder high_rate_order() const noexcept { return high_rate_.order(); }
 
   /// What is wrong, in one sentence with the remedy; empty when all is well.
-  [[nodiscard]] std::string problem() const;
+  [[nodiscard]] std::string_view remark() const noexcept override;
 
  private:
   /// Mean of the high-rate frames of a group.
@@ -77,7 +74,7 @@ class Decoder final : public DeviceDecoder {
     double dt_s = 0.0;  ///< of the increments
   };
 
-  void on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink) noexcept;
+  void on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink) noexcept override;
   void open(HostTime stamp) noexcept;
   [[nodiscard]] bool take(Item item, std::span<const std::uint8_t> data) noexcept;
   void close(HostTime arrival, SampleSink& sink) noexcept;
@@ -92,7 +89,6 @@ class Decoder final : public DeviceDecoder {
 
   DecoderConfig config_;
   ClockMap clock_;
-  DecoderCounters counters_;
   Group group_;
   HighRateResolver high_rate_;
   xsens::CountUnwrapper counter_;

@@ -10,15 +10,17 @@ namespace {
 /// At rest: the force is gravity's within bias and scale of any unit and place, the rate within its bias.
 constexpr double kGravityTolerance_mps2 = 0.5;
 constexpr double kRateAtRest_radps = 2.0 * kRadPerDeg;
-/// Samples in a row that have to agree.
-constexpr int kAgreeing = 50;
+/// Samples whose mean is looked at: noise and vibration are gone from it, a motion is not.
+constexpr int kWindow = 50;
 
-double norm(const RawTriad& raw, double scale) noexcept {
-  return scale *
-         std::hypot(static_cast<double>(raw[0]), static_cast<double>(raw[1]), static_cast<double>(raw[2]));
+double norm(const std::array<std::int64_t, 3>& sum, double scale) noexcept {
+  constexpr double kShare = 1.0 / kWindow;
+  return scale * kShare *
+         std::hypot(static_cast<double>(sum[0]), static_cast<double>(sum[1]), static_cast<double>(sum[2]));
 }
 
-bool is_rest(const RawTriad& acceleration, const RawTriad& rate) noexcept {
+bool is_rest(const std::array<std::int64_t, 3>& acceleration,
+             const std::array<std::int64_t, 3>& rate) noexcept {
   return std::abs(norm(acceleration, kAcceleration_mps2) - kMps2PerG) < kGravityTolerance_mps2 &&
          norm(rate, kRate_radps) < kRateAtRest_radps;
 }
@@ -27,15 +29,18 @@ bool is_rest(const RawTriad& acceleration, const RawTriad& rate) noexcept {
 
 void HighRateResolver::add(const RawTriad& first, const RawTriad& second) noexcept {
   if (order_ != HighRateOrder::kUnknown) return;
-  HighRateOrder now = HighRateOrder::kUnknown;
-  if (is_rest(first, second)) {
-    now = HighRateOrder::kAccelerationFirst;
-  } else if (is_rest(second, first)) {
-    now = HighRateOrder::kRateFirst;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    first_[i] += first[i];
+    second_[i] += second[i];
   }
-  in_a_row_ = now == candidate_ ? in_a_row_ + 1 : 1;
-  candidate_ = now;
-  if (now != HighRateOrder::kUnknown && in_a_row_ >= kAgreeing) order_ = now;
+  if (++n_ < kWindow) return;
+  if (is_rest(first_, second_)) {
+    order_ = HighRateOrder::kAccelerationFirst;
+  } else if (is_rest(second_, first_)) {
+    order_ = HighRateOrder::kRateFirst;
+  }
+  first_ = second_ = {};
+  n_ = 0;
 }
 
 }  // namespace imuscope::xsens_can

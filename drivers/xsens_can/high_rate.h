@@ -3,6 +3,7 @@
 /// Which of the two high-rate messages is the acceleration: documents contradict one another, so the sensor
 /// is asked at rest, where one shows gravity and the other nothing. Core: no allocation.
 
+#include <array>
 #include <cstdint>
 
 #include "drivers/xsens_can/messages.h"
@@ -23,8 +24,9 @@ class HighRateResolver {
 
  private:
   HighRateOrder order_ = HighRateOrder::kUnknown;
-  HighRateOrder candidate_ = HighRateOrder::kUnknown;
-  int in_a_row_ = 0;
+  std::array<std::int64_t, 3> first_{};  ///< sums over the samples of a window
+  std::array<std::int64_t, 3> second_{};
+  int n_ = 0;
 };
 
 }  // namespace imuscope::xsens_can

@@ -22,10 +22,43 @@ constexpr std::uint16_t kDeltaQId = 0x033;
 constexpr std::uint8_t kDeltaVExponent = 15;
 constexpr double kDeltaQUnits = 32767.0;
 
+constexpr std::uint16_t kHighRateFirstId = 0x061;
+constexpr std::uint16_t kHighRateSecondId = 0x062;
+constexpr double kAccelerationUnits = 256.0;  // 2^-8 m/s^2
+constexpr double kRateUnits = 512.0;          // 2^-9 rad/s
+
 std::int16_t to_int16(double value) {
   constexpr double kMin = -32768.0;
   constexpr double kMax = 32767.0;
   return static_cast<std::int16_t>(std::lround(std::clamp(value, kMin, kMax)));
+}
+
+CanFrame triad_frame(std::uint16_t id, const Eigen::Vector3d& value, double units) {
+  CanFrame frame{id, {}};
+  for (int i = 0; i < 3; ++i) put_be(frame.data, to_int16(value[i] * units));
+  return frame;
+}
+
+void add_high_rate(const MtiGroup& group, std::vector<CanFrame>& frames) {
+  const bool swapped = group.output == MtiOutput::kHighRateSwapped;
+  const CanFrame acceleration =
+      triad_frame(swapped ? kHighRateSecondId : kHighRateFirstId, group.f_mps2, kAccelerationUnits);
+  const CanFrame rate =
+      triad_frame(swapped ? kHighRateFirstId : kHighRateSecondId, group.omega_radps, kRateUnits);
+  frames.push_back(swapped ? rate : acceleration);
+  frames.push_back(swapped ? acceleration : rate);
+}
+
+void add_increments(const MtiGroup& group, std::vector<CanFrame>& frames) {
+  CanFrame delta_v = triad_frame(kDeltaVId, group.delta_v_mps, std::ldexp(1.0, kDeltaVExponent));
+  delta_v.data.push_back(kDeltaVExponent);
+  frames.push_back(std::move(delta_v));
+  CanFrame delta_q{kDeltaQId, {}};
+  const double angle = group.rotation_vector_rad.norm();
+  const Eigen::Quaterniond q(angle > 0.0 ? Eigen::AngleAxisd(angle, group.rotation_vector_rad / angle)
+                                         : Eigen::AngleAxisd::Identity());
+  for (const double part : {q.w(), q.x(), q.y(), q.z()}) put_be(delta_q.data, to_int16(part * kDeltaQUnits));
+  frames.push_back(std::move(delta_q));
 }
 
 }  // namespace
@@ -58,23 +91,14 @@ BO_ 170 WHEEL_SPEEDS: 8 CAR
 }
 
 std::vector<CanFrame> mti_frames(const MtiGroup& group) {
-  std::vector<CanFrame> frames(5);
+  std::vector<CanFrame> frames(3);
   frames[0].id = kSampleTimeId;
   put_be(frames[0].data, group.sample_time_100us);
   frames[1].id = kGroupCounterId;
   put_be(frames[1].data, group.counter);
   frames[2].id = kStatusWordId;
   put_be(frames[2].data, group.status);
-  frames[3].id = kDeltaVId;
-  for (int i = 0; i < 3; ++i)
-    put_be(frames[3].data, to_int16(std::ldexp(group.delta_v_mps[i], kDeltaVExponent)));
-  frames[3].data.push_back(kDeltaVExponent);
-  frames[4].id = kDeltaQId;
-  const double angle = group.rotation_vector_rad.norm();
-  const Eigen::Quaterniond q(angle > 0.0 ? Eigen::AngleAxisd(angle, group.rotation_vector_rad / angle)
-                                         : Eigen::AngleAxisd::Identity());
-  for (const double part : {q.w(), q.x(), q.y(), q.z()})
-    put_be(frames[4].data, to_int16(part * kDeltaQUnits));
+  (group.output == MtiOutput::kIncrements ? add_increments : add_high_rate)(group, frames);
   return frames;
 }
 

@@ -185,6 +185,8 @@ StudySimulation read_study(TableReader& in, const MtxClass& common) {
   study.draw = common;
   in.text("name", study.name);
   study.model = static_cast<XsensModel>(in.choice("model", {"mtx", "mti"}, 0));
+  study.can_output =
+      static_cast<MtiOutput>(in.choice("can_output", {"increments", "high_rate", "high_rate_swapped"}, 0));
   read_optional_vector(in, "rotation_vector_b_s_deg", kRadPerDeg, study.rotation_vector_b_s_rad);
   read_optional_vector(in, "lever_arm_b_m", 1.0, study.r_bs_b_m);
   in.number("latency_ms", study.latency_s, kMilli, 0.0, 1e3);

@@ -14,7 +14,8 @@
 /// [simulation.can]: bit_rate, bus_load_percent (by others), stamp_jitter_us
 /// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm
 /// [[simulation.imu]], one for each S-IMU, found by `name`: model ("mtx", "mti"), rotation_vector_b_s_deg,
-///   lever_arm_b_m, latency_ms, clock_skew_ppm, first_counter, accel_white_mps2, gyro_bias_sd_deg_per_s,
+///   lever_arm_b_m, can_output ("increments", "high_rate", "high_rate_swapped": 061 is the rate of turn),
+///   latency_ms, clock_skew_ppm, first_counter, accel_white_mps2, gyro_bias_sd_deg_per_s,
 ///   accel_bias_sd_mps2, gyro_scale_sd_percent, accel_scale_sd_percent, and instead of what is drawn from
 ///   those: gyro_bias_deg_per_s, accel_bias_mps2, gyro_scale_percent, accel_scale_percent; and
 ///   gyro_misalignment_deg, accel_misalignment_deg, g_sensitivity_deg_per_s_per_g (three rows of three),
@@ -28,6 +29,7 @@
 #include <string>
 #include <vector>
 
+#include "firmware_sim/devices/can_encoder.h"
 #include "firmware_sim/devices/utc.h"
 #include "firmware_sim/faults/fault.h"
 #include "firmware_sim/imu/sensor_classes.h"
@@ -88,6 +90,7 @@ struct WheelSimulation {
 struct StudySimulation {
   std::string name;
   XsensModel model = XsensModel::kMtx;
+  MtiOutput can_output = MtiOutput::kIncrements;
   std::optional<Eigen::Vector3d> rotation_vector_b_s_rad;
   std::optional<Eigen::Vector3d> r_bs_b_m;
   double latency_s = 0.002;

@@ -188,6 +188,7 @@ void World::add_study(const PlayedDevice& played, const StudySimulation& study, 
   StudyTruth truth;
   truth.name = played.name;
   truth.model = study.model;
+  truth.can_output = study.can_output;
   truth.mounting.C_b_s = rotation_from_vector(study.rotation_vector_b_s_rad.value_or(drawn_rotation));
   truth.mounting.r_bs_b_m = study.r_bs_b_m.value_or(drawn_lever_arm);
   truth.errors = errors_of(study, study.draw.regime_switch, random);
@@ -250,15 +251,19 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
     options.clock_skew_ppm = clock.clock_skew_ppm;
     options.latency_s = clock.latency_s;
     auto node = std::make_unique<CanNode>(
-        options, [sample, C_frame_device, first = clock.first_counter, step_s = 1.0 / played.rate_hz](
-                     double t_s, double device_s, std::int64_t index) {
+        options, [sample, C_frame_device, output = clock.can_output, first = clock.first_counter,
+                  step_s = 1.0 / played.rate_hz](double t_s, double device_s, std::int64_t index) {
           // Increments of the interval that ends now: what is felt in its middle, for its length.
-          const ImuReading reading = sample(t_s - 0.5 * step_s, first + index);
+          const double felt_s = output == MtiOutput::kIncrements ? t_s - 0.5 * step_s : t_s;
+          const ImuReading reading = sample(felt_s, first + index);
           MtiGroup group;
+          group.output = output;
           group.sample_time_100us = static_cast<std::uint32_t>(std::llround(device_s * 1e4));
           group.counter = static_cast<std::uint16_t>(first + index);
           group.delta_v_mps = step_s * (C_frame_device * reading.f_mps2);
-          group.rotation_vector_rad = step_s * (C_frame_device * reading.omega_radps);
+          group.f_mps2 = C_frame_device * reading.f_mps2;
+          group.omega_radps = C_frame_device * reading.omega_radps;
+          group.rotation_vector_rad = step_s * group.omega_radps;
           return mti_frames(group);
         });
     node->skip_to(begin_s);

@@ -42,6 +42,7 @@ struct StudyTruth {
   double period_s = 0.0;        ///< between two samples, its clock's skew included
   std::uint16_t first_counter = 0;
   XsensModel model = XsensModel::kMtx;
+  MtiOutput can_output = MtiOutput::kIncrements;
 };
 
 /// A device, or all those behind one Xbus Master under the name of the first.

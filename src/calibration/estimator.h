@@ -63,7 +63,10 @@ struct NavigationOutput {
 struct OdometryOutput {
   bool enabled = false;
   bool standing = false;  ///< the wheels have stood for a while
-  HostTime time;          ///< of validity of the newest speed
+  bool resting = false;   ///< and rest is what the last update said
+  bool lost = false;      ///< no speed for a while; the last one is not held
+  bool has_speed = false;
+  HostTime time;  ///< of validity of the newest speed
   double speed_mps = 0.0;
   double scale = 0.0;  ///< the wheels show (1 + scale) times the speed
   double sd_scale = 0.0;

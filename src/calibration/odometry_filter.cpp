@@ -94,6 +94,8 @@ bool OdometryFilter::add(const Sample& sample) noexcept {
   }
   wheels_stand_ = stands;
   output_.standing = stands && sample.time - standing_since_ >= kStandingHold;
+  output_.lost = false;
+  output_.has_speed = true;
   output_.time = sample.time;
   output_.speed_mps = sample.odometry.speed_mps;
   has_last_ = true;
@@ -128,6 +130,8 @@ void OdometryFilter::watch_silence(HostTime time) noexcept {
   lost_ = true;
   wheels_stand_ = false;
   output_.standing = false;
+  output_.resting = false;
+  output_.lost = true;
   log_.add(EstimatorEventKind::kOdometryLost, config_.device, time, silence_s);
 }
 
@@ -137,6 +141,7 @@ void OdometryFilter::apply(const Sample& sample, Regime regime) noexcept {
   // has to be quiet too.
   const bool rests = config_.use_zero_velocity && stands && regime == Regime::kStatic &&
                      sample.time - standing_since_ >= kStandingHold + kStandingConfirmed;
+  output_.resting = rests;
   if (stands && !rests) return;
   const HostTime at = rests ? sample.time - kStandingConfirmed : sample.time;
   NavigationFilter::Delayed then;

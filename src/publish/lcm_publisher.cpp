@@ -71,6 +71,11 @@ void LcmPublisher::publish(const NavigationReport& report) {
               [&](std::int64_t sequence) { return to_message(report, sequence); });
 }
 
+void LcmPublisher::publish(const OdometryReport& report) {
+  impl_->send(channel_name(impl_->prefix, "ODOMETRY"),
+              [&](std::int64_t sequence) { return to_message(report, sequence); });
+}
+
 void LcmPublisher::publish(const CalibrationReport& report, const std::string& name) {
   impl_->send(channel_name(impl_->prefix, "CALIBRATION", name),
               [&](std::int64_t sequence) { return to_message(report, name, sequence); });

@@ -43,6 +43,7 @@ class LcmPublisher {
 
   void publish(const StatusReport& report);      ///< <PREFIX>_STATUS
   void publish(const NavigationReport& report);  ///< <PREFIX>_NAVIGATION
+  void publish(const OdometryReport& report);    ///< <PREFIX>_ODOMETRY
   /// @param name of the S-IMU that report.device stands for
   void publish(const CalibrationReport& report, const std::string& name);  ///< <PREFIX>_CALIBRATION_<NAME>
   void publish(const ErrorReport& report, const std::string& name);        ///< <PREFIX>_ERROR_<NAME>

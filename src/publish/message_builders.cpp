@@ -32,6 +32,7 @@ device_status_t to_message(const StatusReport::Device& device) {
   message.bytes = as_count(device.bytes);
   message.bytes_skipped = as_count(device.bytes_skipped);
   message.frames = as_count(device.frames);
+  message.frames_dropped = as_count(device.frames_dropped);
   message.bad_checksums = as_count(device.bad_checksums);
   message.samples = as_count(device.samples);
   message.samples_lost = as_count(device.samples_lost);
@@ -235,6 +236,39 @@ navigation_t to_message(const NavigationReport& report, std::int64_t sequence) {
   message.sd_roll_deg = report.sd_rpy_rad[0] * kDegPerRad;
   message.sd_pitch_deg = report.sd_rpy_rad[1] * kDegPerRad;
   message.sd_heading_deg = report.sd_rpy_rad[2] * kDegPerRad;
+  return message;
+}
+
+odometry_t to_message(const OdometryReport& report, std::int64_t sequence) {
+  odometry_t message;
+  message.utime = to_utime(report.utc);
+  message.sequence = sequence;
+  message.time_s = report.time_s;
+  message.speed_mps = report.speed_mps;
+  message.standing = static_cast<std::int8_t>(report.standing);
+  message.zero_velocity = static_cast<std::int8_t>(report.zero_velocity);
+  message.lost = static_cast<std::int8_t>(report.lost);
+  message.scale_percent = report.scale * kPercent;
+  message.sd_scale_percent = report.sd_scale * kPercent;
+  message.mount_y_deg = report.mount_rad[1] * kDegPerRad;
+  message.mount_z_deg = report.mount_rad[2] * kDegPerRad;
+  message.sd_mount_y_deg = report.sd_mount_rad[1] * kDegPerRad;
+  message.sd_mount_z_deg = report.sd_mount_rad[2] * kDegPerRad;
+  message.axle_x_m = report.r_bv_b_m[0];
+  message.axle_y_m = report.r_bv_b_m[1];
+  message.axle_z_m = report.r_bv_b_m[2];
+  message.sd_axle_x_m = report.sd_r_bv_b_m[0];
+  message.sd_axle_y_m = report.sd_r_bv_b_m[1];
+  message.sd_axle_z_m = report.sd_r_bv_b_m[2];
+  message.nis_speed = report.nis[0];
+  message.nis_sideways = report.nis[1];
+  message.nis_upwards = report.nis[2];
+  message.speed_used = as_count(report.speed_used);
+  message.speed_rejected = as_count(report.speed_rejected);
+  message.non_holonomic_used = as_count(report.non_holonomic_used);
+  message.non_holonomic_rejected = as_count(report.non_holonomic_rejected);
+  message.zero_velocity_used = as_count(report.zero_velocity_used);
+  message.zero_velocity_rejected = as_count(report.zero_velocity_rejected);
   return message;
 }
 

@@ -11,6 +11,7 @@
 #include <imuscope/ins_t.hpp>
 #include <imuscope/navigation_t.hpp>
 #include <imuscope/noise_model_t.hpp>
+#include <imuscope/odometry_t.hpp>
 #include <imuscope/pose_t.hpp>
 #include <imuscope/status_t.hpp>
 #include <imuscope/wavelet_variance_t.hpp>
@@ -25,6 +26,7 @@ namespace imuscope {
 
 [[nodiscard]] status_t to_message(const StatusReport& report, std::int64_t sequence);
 [[nodiscard]] navigation_t to_message(const NavigationReport& report, std::int64_t sequence);
+[[nodiscard]] odometry_t to_message(const OdometryReport& report, std::int64_t sequence);
 /// @param name of the S-IMU that report.device stands for
 [[nodiscard]] calibration_t to_message(const CalibrationReport& report, const std::string& name,
                                        std::int64_t sequence);

@@ -37,6 +37,30 @@ struct NavigationReport {
 };
 static_assert(std::is_trivially_copyable_v<NavigationReport>);
 
+/// What the wheels show and what has been learned of them; fields as odometry_t.
+struct OdometryReport {
+  UtcTime utc;    ///< time of validity of the speed
+  double time_s;  ///< time of validity, seconds since the run's first R-IMU epoch
+  double speed_mps;
+  bool standing;
+  bool zero_velocity;
+  bool lost;
+  double scale;
+  double sd_scale;
+  Vector3 mount_rad;  ///< rotation vector that takes b to the vehicle's axes
+  Vector3 sd_mount_rad;
+  Vector3 r_bv_b_m;  ///< to the middle of the axle
+  Vector3 sd_r_bv_b_m;
+  Vector3 nis;  ///< speed, sideways, upwards
+  std::uint64_t speed_used;
+  std::uint64_t speed_rejected;
+  std::uint64_t non_holonomic_used;
+  std::uint64_t non_holonomic_rejected;
+  std::uint64_t zero_velocity_used;
+  std::uint64_t zero_velocity_rejected;
+};
+static_assert(std::is_trivially_copyable_v<OdometryReport>);
+
 /// The states of one S-IMU; used once for values and once for standard deviations.
 struct CalibrationStates {
   Vector3 psi_b_rad;          ///< boresight, rotation vector -Log(C_prior^T C_b_s), resolved in b
@@ -205,6 +229,7 @@ struct StatusReport {
     std::uint64_t bytes = 0;
     std::uint64_t bytes_skipped = 0;
     std::uint64_t frames = 0;
+    std::uint64_t frames_dropped = 0;  ///< lost by this PC before they could be read
     std::uint64_t bad_checksums = 0;
     std::uint64_t samples = 0;
     std::uint64_t samples_lost = 0;

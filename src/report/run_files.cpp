@@ -104,6 +104,31 @@ Result<void> read_navigation(RunFiles& run) {
   return {};
 }
 
+/// A run without odometry has no such file, and lacks nothing.
+Result<void> read_odometry(RunFiles& run) {
+  const auto file = run.folder / "odometry.csv";
+  if (!std::filesystem::exists(file)) return {};
+  auto reader = CsvReader::open(
+      file, {"time_s", "speed_mps", "standing", "zero_velocity", "scale_percent", "sd_scale_percent"});
+  if (!reader) return passed_on(reader);
+  BinnedSignals signals(kOdometrySignals, kBinsMax, kFirstBin_s);
+  std::optional<double> previous_s;
+  while (reader->next()) {
+    const double time_s = reader->number(0);
+    if (!std::isfinite(time_s)) continue;
+    // A row stands for the time since the one before; a gap is nobody's.
+    constexpr double kRowMax_s = 0.2;
+    const double step_s = std::clamp(time_s - previous_s.value_or(time_s), 0.0, kRowMax_s);
+    previous_s = time_s;
+    if (reader->number(2) > 0.0) run.wheels_stood_s += step_s;
+    if (reader->number(3) > 0.0) run.zero_velocity_s += step_s;
+    signals.add(time_s, std::array{reader->number(1), reader->number(4), reader->number(5)});
+  }
+  signals.coarsen();
+  if (signals.size() > 0) run.odometry = std::move(signals);
+  return {};
+}
+
 Result<void> read_calibration_series(const RunFiles& run, StudyFiles& study,
                                      std::vector<std::string>& absent) {
   const auto file = run.folder / ("calibration_" + study.name + ".csv");
@@ -241,6 +266,7 @@ Result<RunFiles> read_run_files(const std::filesystem::path& folder) {
     *document_of = std::move(*read);
   }
   if (auto read = read_navigation(run); !read) return passed_on(read);
+  if (auto read = read_odometry(run); !read) return passed_on(read);
   if (auto read = read_studies(run, *calibration); !read) return passed_on(read);
   return run;
 }

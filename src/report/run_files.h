@@ -28,6 +28,9 @@ enum NavigationSignal : std::size_t {
   kNavigationSignals
 };
 
+/// Signals of RunFiles::odometry.
+enum OdometrySignal : std::size_t { kWheelSpeed_mps, kScale_percent, kSdScale_percent, kOdometrySignals };
+
 /// Signals of StudyFiles::calibration; the sd of signal i is signal i + kSdOffset.
 enum CalibrationSignal : std::size_t { kPsi_deg = 0, kLeverArm_m = 3, kTimeOffset_ms = 6, kSdOffset = 7 };
 inline constexpr std::size_t kCalibrationSignals = 14;
@@ -68,10 +71,13 @@ struct RunFiles {
   nlohmann::json evaluation;
   bool has_truth = false;
   std::optional<BinnedSignals> navigation;
-  std::array<double, 2> origin_deg{};  ///< latitude and longitude of the first position
-  double distance_m = 0.0;             ///< driven, from the speed
-  std::vector<StudyFiles> studies;     ///< in the order of calibration.json
-  std::vector<std::string> absent;     ///< names of files that a run may have and this one has not
+  std::optional<BinnedSignals> odometry;  ///< of a vehicle whose wheel speeds were recorded
+  double wheels_stood_s = 0.0;            ///< as the wheels showed it
+  double zero_velocity_s = 0.0;           ///< rest that the filter used
+  std::array<double, 2> origin_deg{};     ///< latitude and longitude of the first position
+  double distance_m = 0.0;                ///< driven, from the speed
+  std::vector<StudyFiles> studies;        ///< in the order of calibration.json
+  std::vector<std::string> absent;        ///< names of files that a run may have and this one has not
 };
 
 /// Errors as write_report().

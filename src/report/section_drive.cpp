@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
 
@@ -24,6 +25,43 @@ std::vector<Stretch> standstills(const RunFiles& run) {
     if (study.errors) return study.static_stretches;
   }
   return {};
+}
+
+/// What the wheels taught, and what became of their speeds.
+Html odometry_part(const RunFiles& run, FigureSheet& figures) {
+  const BinnedSignals& odometry = *run.odometry;
+  const std::size_t last = odometry.size() - 1;
+  Html part = element("h3", text("Odometry"));
+  part += paragraph(
+      fmt::format("The wheels show {:+.2f} % (sd {:.2f} %) of the speed too much. They stood for {}; for {} "
+                  "of it the R-IMU was "
+                  "quiet, too, and rest was used as zero velocity.",
+                  odometry.bin(kScale_percent, last).last, odometry.bin(kSdScale_percent, last).last,
+                  duration_words(run.wheels_stood_s), duration_words(run.zero_velocity_s)));
+  const auto& json = field(run.run, "odometry");
+  const auto row = [&](const char* what, const char* used, const char* rejected) {
+    return fmt::format("{}: {} used, {} refused by the gate", what, text_at(json, used),
+                       text_at(json, rejected));
+  };
+  if (json.is_object()) {
+    part += paragraph(
+        fmt::format("{}; {}; {}.", row("Speeds", "speed_used", "speed_rejected"),
+                    row("no slip sideways and upwards", "non_holonomic_used", "non_holonomic_rejected"),
+                    row("zero velocity", "zero_velocity_used", "zero_velocity_rejected")));
+  }
+  Figure speed;
+  speed.id = "wheel_speed";
+  speed.group = "profile";
+  speed.y_label = "m/s";
+  speed.shaded = standstills(run);
+  part += figures.range_figure(speed, odometry, kWheelSpeed_mps, kColour,
+                               text("Speed as the wheels show it; standstill on a darker ground"));
+  Figure scale = speed;
+  scale.id = "wheel_scale";
+  scale.y_label = "%";
+  scale.window = settled_window(odometry, kScale_percent, kSdScale_percent, 1.0, std::nullopt);
+  return part + figures.estimate_figure(scale, odometry, kScale_percent, kSdScale_percent, 1.0, kColour,
+                                        text("Error of the wheel scale, with its sd"));
 }
 
 }  // namespace
@@ -61,6 +99,7 @@ Html drive_section(const RunFiles& run, FigureSheet& figures) {
   height.y_label = "m";
   section += figures.estimate_figure(height, navigation, kHeight_m, kSdDown_m, 1.0, kColour,
                                      text("Height above the ellipsoid, with its sd"));
+  if (run.odometry) section += odometry_part(run, figures);
   return section;
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "drivers/transport/can_interface.h"
 
 namespace imuscope {
@@ -10,6 +12,8 @@ namespace {
 
 /// More than these are not worth their room in a sentence.
 constexpr std::size_t kIdsNamed = 8;
+/// An error frame has 8 bytes of data.
+constexpr std::uint64_t kErrorRecordBytes = kCanRecordHeaderBytes + 8;
 
 std::string text_of(const std::vector<CanId>& ids) {
   std::string text;
@@ -36,14 +40,18 @@ std::string CanWatch::look(const LineStatus& line, HostTime now) {
   if (!has_looked_ || heard) heard_at_ = now;
   if (has_looked_) {
     seen.silent_s = to_seconds(now - heard_at_);
-    seen.other_frames = heard ? 0 : interface->frames_received - interface_frames_;
-    // What is read and is no frame for the decoder is an error frame.
-    seen.error_frames = heard ? 0 : line.reads - reads_;
+    if (!heard) {
+      // What is read and is no frame for the decoder is an error frame. Some drivers count those as received,
+      // too.
+      seen.error_frames = (line.counters.bytes - bytes_) / kErrorRecordBytes;
+      const std::uint64_t received = interface->frames_received - interface_frames_;
+      seen.other_frames = received - std::min(received, seen.error_frames);
+    }
     seen.frames_dropped = line.frames_dropped - dropped_;
   }
   has_looked_ = true;
   frames_ = line.counters.frames;
-  reads_ = line.reads;
+  bytes_ = line.counters.bytes;
   dropped_ = line.frames_dropped;
   interface_frames_ = interface->frames_received;
   return explain_can_trouble(*interface, seen);

@@ -26,7 +26,7 @@ class CanWatch {
   bool has_looked_ = false;
   HostTime heard_at_{};
   std::uint64_t frames_ = 0;
-  std::uint64_t reads_ = 0;
+  std::uint64_t bytes_ = 0;  ///< that were read
   std::uint64_t dropped_ = 0;
   std::uint64_t interface_frames_ = 0;
 };

@@ -31,18 +31,6 @@ RateSeries rate_series(const std::vector<Sample>& samples) {
   return series;
 }
 
-/// UTC minus the device's own time: the median, since a single tag may be damaged.
-std::optional<Duration> utc_minus_own(const std::vector<Sample>& samples) {
-  std::vector<std::int64_t> differences;
-  for (const auto& sample : samples) {
-    if (sample.has_utc) differences.push_back(to_ns(sample.utc) - to_ns(sample.time));
-  }
-  if (differences.empty()) return std::nullopt;
-  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-  std::nth_element(differences.begin(), middle, differences.end());
-  return Duration{*middle};
-}
-
 bool shares_the_reference_clock(const DeviceConfig& device) {
   const bool csv = device.protocol == Protocol::kCsvImu || device.protocol == Protocol::kCsvGnss;
   return csv ? device.csv.common_clock : device.gnss.common_clock;
@@ -91,6 +79,17 @@ Result<DeviceClock> align_by_rate(const std::string& name, const RateSeries& ref
 
 }  // namespace
 
+std::optional<Duration> utc_minus_time(const std::vector<Sample>& samples) {
+  std::vector<std::int64_t> differences;
+  for (const auto& sample : samples) {
+    if (sample.has_utc) differences.push_back(to_ns(sample.utc) - to_ns(sample.time));
+  }
+  if (differences.empty()) return std::nullopt;
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return Duration{*middle};
+}
+
 Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration,
                                               const std::vector<bool>& unstamped, const ReadSamples& read) {
   std::vector<DeviceClock> clocks(configuration.devices.size());
@@ -99,7 +98,7 @@ Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration
   const auto reference_samples = read(static_cast<DeviceIndex>(reference));
   if (!reference_samples) return tl::unexpected<Error>(reference_samples.error());
   const auto reference_rate = rate_series(*reference_samples);
-  const auto reference_utc = utc_minus_own(*reference_samples);
+  const auto reference_utc = utc_minus_time(*reference_samples);
   const auto own_times = ClockMapConfig::fixed(HostTime{}, 1.0);
   clocks[reference] = {own_times, 0.0, 0.0, "the recording's own times, which are the run's"};
 
@@ -112,7 +111,7 @@ Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration
     }
     const auto samples = read(static_cast<DeviceIndex>(i));
     if (!samples) return tl::unexpected<Error>(samples.error());
-    const auto utc = utc_minus_own(*samples);
+    const auto utc = utc_minus_time(*samples);
     if (utc && reference_utc) {
       const auto shift = *utc - *reference_utc;
       clocks[i] = {ClockMapConfig::fixed(HostTime{shift}, 1.0), to_seconds(shift), 0.0, "UTC tags"};
@@ -131,29 +130,33 @@ Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration
   return clocks;
 }
 
-Result<DeviceClock> align_log(const DeviceConfig& device, bool stamps_are_utc,
-                              const std::vector<Sample>& reference,
+Result<DeviceClock> align_log(const DeviceConfig& device, const LogStamps& stamps,
+                              const std::function<Result<std::vector<Sample>>()>& read_reference,
                               const std::function<Result<std::vector<Sample>>()>& read_own) {
-  if (device.can && device.can->log_has_common_clock) {
+  if (stamps.are_the_runs || (device.can && device.can->log_has_common_clock)) {
     return DeviceClock{ClockMapConfig::fixed(HostTime{}, 1.0), 0.0, 0.0,
-                       "the reference's clock, as configured"};
+                       stamps.are_the_runs ? "the log's stamps, which are the run's"
+                                           : "the reference's clock, as configured"};
   }
-  const auto reference_utc = utc_minus_own(reference);
-  if (stamps_are_utc && reference_utc) {
-    const Duration shift = -*reference_utc;
-    return DeviceClock{ClockMapConfig::fixed(HostTime{shift}, 1.0), to_seconds(shift), 0.0,
+  // The stamps are those of arrivals: brought to the run's scale, nothing of them belongs to the device's
+  // clock.
+  if (stamps.are_utc && stamps.utc_of_run) {
+    return DeviceClock{ClockMapConfig::fixed(HostTime{-*stamps.utc_of_run}, 1.0), 0.0, 0.0,
                        "the log's stamps, taken as UTC"};
   }
   if (device.role != DeviceRole::kStudy) {
     return work_error(
         fmt::format("{}: {}", device.name,
-                    stamps_are_utc ? "the log is stamped with UTC, which the reference's samples lack"
-                                   : "the stamps of the log are no UTC"),
-        "set log_clock = \"common\" in its transport where they are the reference's times");
+                    stamps.are_utc
+                        ? "the log is stamped with UTC, which no other device of the recording tells"
+                        : "the stamps of the log are no UTC"),
+        "set log_clock = \"common\" in its transport where they are the times of the other recordings");
   }
+  const auto reference = read_reference();
+  if (!reference) return tl::unexpected<Error>(reference.error());
   const auto samples = read_own();
   if (!samples) return tl::unexpected<Error>(samples.error());
-  return align_by_rate(device.name, rate_series(reference), *samples);
+  return align_by_rate(device.name, rate_series(*reference), *samples);
 }
 
 }  // namespace imuscope

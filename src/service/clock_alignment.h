@@ -5,6 +5,7 @@
 /// shares.
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,13 +33,23 @@ using ReadSamples = std::function<Result<std::vector<Sample>>(DeviceIndex)>;
 Result<std::vector<DeviceClock>> align_clocks(const Configuration& configuration,
                                               const std::vector<bool>& unstamped, const ReadSamples& read);
 
+/// UTC minus the time of the samples: their median, since a single tag may be damaged. Nothing where none has
+/// a tag.
+[[nodiscard]] std::optional<Duration> utc_minus_time(const std::vector<Sample>& samples);
+
+/// What is known when a log is to be brought to the run's time scale.
+struct LogStamps {
+  bool are_utc = false;                ///< otherwise times of any origin
+  bool are_the_runs = false;           ///< the reference is in the same log
+  std::optional<Duration> utc_of_run;  ///< UTC minus the run's time, where a device of the run tells it
+};
+
 /// The time scale of a log whose stamps are the wall clock of the PC that wrote it.
-/// @param stamps_are_utc  otherwise times of any origin
-/// @param reference       its samples, on the time scale of the run
+/// @param read_reference  its samples, on the time scale of the run
 /// @param read_own        decodes the log with its own stamps
-/// Errors (kWork): nothing brings the log to the reference's time, with the remedy.
-Result<DeviceClock> align_log(const DeviceConfig& device, bool stamps_are_utc,
-                              const std::vector<Sample>& reference,
+/// Errors (kWork): nothing brings the log to the run's time, with the remedy.
+Result<DeviceClock> align_log(const DeviceConfig& device, const LogStamps& stamps,
+                              const std::function<Result<std::vector<Sample>>()>& read_reference,
                               const std::function<Result<std::vector<Sample>>()>& read_own);
 
 }  // namespace imuscope

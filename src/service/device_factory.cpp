@@ -208,10 +208,6 @@ std::string decoder_problem(const DeviceConfig& device, const DeviceDecoder& dec
       const auto& error = static_cast<const csv::RowDecoder&>(decoder).error();
       return error.kind == csv::RowError::Kind::kNone ? std::string() : csv::describe(error);
     }
-    case Protocol::kXsensCan:
-      return static_cast<const xsens_can::Decoder&>(decoder).problem();
-    case Protocol::kCanOdometry:
-      return static_cast<const can_odometry::Decoder&>(decoder).problem();
     default:
       return std::string(decoder.remark());
   }

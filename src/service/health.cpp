@@ -37,6 +37,9 @@ std::string loss_reason(const StatusReport& report) {
     if (ring.refused > 0) return fmt::format("the ring '{}' refused {} elements", ring.name, ring.refused);
   }
   for (const auto& device : report.devices) {
+    if (device.frames_dropped > 0)
+      return fmt::format("{} frames of {} were lost by this PC before they could be read",
+                         device.frames_dropped, device.name);
     if (device.samples_refused > 0)
       return fmt::format("{} samples of {} found their ring full", device.samples_refused, device.name);
   }

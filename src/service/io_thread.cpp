@@ -187,6 +187,10 @@ class IoThread::Line final : public SampleSink {
   void publish(HostTime now) noexcept {
     if (now - last_status_ < kStatusPeriod) return;
     last_status_ = now;
+    publish_status();
+  }
+
+  void publish_status() noexcept {
     status_.counters = decoder_->counters();
     status_.latency_s = latency_.mean_s();
     status_.latency_sd_s = latency_.sd_s();
@@ -307,6 +311,8 @@ Result<void> IoThread::start(const ThreadPlan& plan, HostTime first_cut, std::ve
 void IoThread::stop() {
   running_.store(false, std::memory_order_release);
   if (thread_.joinable()) thread_.join();
+  // What came since the last status counts, too.
+  for (const auto& line : lines_) line->publish_status();
   for (const auto& line : lines_) newest_arrival_ = std::max(newest_arrival_, line->newest_arrival());
 }
 

@@ -301,6 +301,7 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
       bus_->publish(bridge_report(snapshot, *bridge_origin_, anchor_));
     }
   }
+  if (snapshot.odometry.has_speed) bus_->publish(odometry_report(snapshot, anchor_));
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto state = snapshot.studies[i].status;
     if (state != StudyStatus::kConverging && state != StudyStatus::kCalibrated) continue;
@@ -374,6 +375,7 @@ StatusReport::Device LivePublisher::device_status(std::size_t index) const {
   report.bytes = status.counters.bytes;
   report.bytes_skipped = status.counters.bytes_skipped;
   report.frames = status.counters.frames;
+  report.frames_dropped = status.frames_dropped;
   report.bad_checksums = status.counters.bad_checksums;
   report.samples = status.counters.samples;
   report.samples_lost = status.counters.samples_lost;
@@ -489,7 +491,7 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
   ReplayResult result;
   result.ticks = last_tick + 1;
   for (const auto& line : lines_)
-    result.devices.push_back({line.counters, line.refused, line.problem.data()});
+    result.devices.push_back({line.counters, line.refused, line.frames_dropped, line.problem.data()});
   RunDescription run{options_.version,          &configuration_,   &recording, &result,
                      last_ ? &*last_ : nullptr, folder_->events(), {}};
   return write_json(options_.out / "run.json", run_json(run));

@@ -88,11 +88,16 @@ using Logs = std::vector<std::optional<CandumpSurvey>>;
 
 /// Arrival stamps are times of the host, which nothing ties to a device's own.
 Result<void> check_stamps(const std::vector<std::filesystem::path>& files, const std::vector<bool>& present,
-                          const std::vector<bool>& unstamped, const Logs& logs) {
+                          const std::vector<bool>& unstamped, const Logs& logs, std::size_t reference) {
   const std::filesystem::path* with = nullptr;
   const std::filesystem::path* without = nullptr;
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (present[i] && !logs[i]) (unstamped[i] ? without : with) = &files[i];
+  }
+  if (without != nullptr && logs[reference]) {
+    return usage_error(fmt::format("the reference's frames in {} are stamped, and {} has no arrival stamps",
+                                   files[reference].string(), without->string()),
+                       fmt::format("put {} beside it", RawDump::arrivals_path(*without).filename().string()));
   }
   if (with == nullptr || without == nullptr) return {};
   return usage_error(fmt::format("{} has arrival stamps ({}) and {} has none", with->string(),
@@ -103,44 +108,98 @@ Result<void> check_stamps(const std::vector<std::filesystem::path>& files, const
 
 /// Brings the logs of candump to the time scale of the other devices. From then on they are stamped
 /// recordings.
-Result<void> align_logs(const Configuration& configuration, const std::vector<std::string>& inputs,
-                        const std::vector<std::filesystem::path>& files, const Logs& logs,
-                        OpenedRecording& opened) {
-  auto& recording = opened.recording;
-  const auto reference = configuration.reference_index();
-  const auto own_times = ClockMapConfig::fixed(HostTime{}, 1.0);
-  std::vector<ClockMapConfig> log_clocks(files.size(), own_times);
-  std::optional<std::vector<Sample>> reference_samples;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (!logs[i] || i == reference) continue;
-    if (!reference_samples) {
-      auto source = logs[reference] ? open_candump(files[reference], logs[reference]->interface, own_times)
-                                    : recording.open(static_cast<DeviceIndex>(reference));
-      if (!source) return tl::unexpected<Error>(source.error());
-      auto samples = decode_all(configuration.devices[reference], static_cast<DeviceIndex>(reference), inputs,
-                                recording.clocks[reference].map, **source);
-      if (!samples) return tl::unexpected<Error>(samples.error());
-      reference_samples = std::move(*samples);
+class LogAlignment {
+ public:
+  LogAlignment(const Configuration& configuration, const std::vector<std::string>& inputs,
+               const std::vector<std::filesystem::path>& files, const Logs& logs, OpenedRecording& opened)
+      : configuration_(configuration),
+        inputs_(inputs),
+        files_(files),
+        logs_(logs),
+        opened_(opened),
+        reference_(configuration.reference_index()),
+        clocks_(files.size(), own_times()) {}
+
+  Result<void> run() {
+    if (std::none_of(logs_.begin(), logs_.end(), [](const auto& log) { return log.has_value(); })) return {};
+    if (auto found = find_utc_of_run(); !found) return found;
+    // The reference first: what cannot be brought to UTC is brought to it.
+    if (logs_[reference_]) {
+      if (auto aligned = align(reference_); !aligned) return aligned;
     }
-    const auto read_own = [&]() -> Result<std::vector<Sample>> {
-      auto source = open_candump(files[i], logs[i]->interface, own_times);
-      if (!source) return tl::unexpected<Error>(source.error());
-      return decode_all(configuration.devices[i], static_cast<DeviceIndex>(i), inputs, ClockMapConfig{},
-                        **source);
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      if (!logs_[i] || i == reference_) continue;
+      if (auto aligned = align(i); !aligned) return aligned;
+    }
+    opened_.recording.open = [files = files_, logs = logs_, clocks = clocks_](DeviceIndex index) {
+      return logs[index] ? open_candump(files[index], logs[index]->interface, clocks[index])
+                         : open_raw_dump(files[index]);
     };
-    auto clock = align_log(configuration.devices[i], logs[i]->stamps_are_utc, *reference_samples, read_own);
-    if (!clock) return tl::unexpected<Error>(clock.error());
-    opened.remarks.push_back(fmt::format("{}: times from {}, {:+.3f} s", configuration.devices[i].name,
-                                         clock->how, clock->shift_s));
-    log_clocks[i] = std::exchange(clock->map, ClockMapConfig{});
-    recording.clocks[i] = std::move(*clock);
+    return {};
   }
-  recording.open = [files, logs, log_clocks](DeviceIndex index) {
-    return logs[index] ? open_candump(files[index], logs[index]->interface, log_clocks[index])
-                       : open_raw_dump(files[index]);
-  };
-  return {};
-}
+
+ private:
+  static ClockMapConfig own_times() { return ClockMapConfig::fixed(HostTime{}, 1.0); }
+
+  /// UTC tags of a recording that is no log: the reference's, or else a receiver's.
+  Result<void> find_utc_of_run() {
+    std::vector<std::size_t> candidates{reference_};
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      if (configuration_.devices[i].role == DeviceRole::kGnss) candidates.push_back(i);
+    }
+    for (const std::size_t i : candidates) {
+      if (utc_of_run_ || logs_[i] || !opened_.recording.present[i]) continue;
+      const auto samples = decode(i, own_times());
+      if (!samples) return tl::unexpected<Error>(samples.error());
+      utc_of_run_ = utc_minus_time(*samples);
+    }
+    return {};
+  }
+
+  [[nodiscard]] bool only_logs() const {
+    for (std::size_t i = 0; i < files_.size(); ++i) {
+      if (opened_.recording.present[i] && !logs_[i]) return false;
+    }
+    return true;
+  }
+
+  /// Logs of one PC's clock need no other to agree with one another.
+  [[nodiscard]] bool has_the_runs_stamps(std::size_t i) const {
+    if (!logs_[reference_] || !only_logs()) return false;
+    return i == reference_ || files_[i] == files_[reference_] ||
+           (logs_[i]->stamps_are_utc && logs_[reference_]->stamps_are_utc);
+  }
+
+  Result<void> align(std::size_t i) {
+    const DeviceConfig& device = configuration_.devices[i];
+    auto clock = align_log(
+        device, {logs_[i]->stamps_are_utc, has_the_runs_stamps(i), utc_of_run_},
+        [&] { return decode(reference_, clocks_[reference_]); }, [&] { return decode(i, own_times()); });
+    if (!clock) return tl::unexpected<Error>(clock.error());
+    opened_.remarks.push_back(fmt::format("{}: times from {}", device.name, clock->how));
+    clocks_[i] = std::exchange(clock->map, ClockMapConfig{});
+    opened_.recording.clocks[i] = std::move(*clock);
+    return {};
+  }
+
+  /// @param log_clock  of a device in a log
+  Result<std::vector<Sample>> decode(std::size_t i, const ClockMapConfig& log_clock) {
+    const auto index = static_cast<DeviceIndex>(i);
+    auto source =
+        logs_[i] ? open_candump(files_[i], logs_[i]->interface, log_clock) : open_raw_dump(files_[i]);
+    if (!source) return tl::unexpected<Error>(source.error());
+    return decode_all(configuration_.devices[i], index, inputs_, opened_.recording.clocks[i].map, **source);
+  }
+
+  const Configuration& configuration_;
+  const std::vector<std::string>& inputs_;
+  const std::vector<std::filesystem::path>& files_;
+  const Logs& logs_;
+  OpenedRecording& opened_;
+  std::size_t reference_;
+  std::vector<ClockMapConfig> clocks_;  ///< of logs: the run's time of their stamps
+  std::optional<Duration> utc_of_run_;
+};
 
 Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
   auto files = assign_files(inputs, configuration);
@@ -184,7 +243,8 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
       return tl::unexpected<Error>(valid.error());
     }
   }
-  if (auto stamps = check_stamps(*files, recording.present, unstamped, logs); !stamps) {
+  if (auto stamps = check_stamps(*files, recording.present, unstamped, logs, configuration.reference_index());
+      !stamps) {
     return tl::unexpected<Error>(stamps.error());
   }
   recording.open = [files = *files](DeviceIndex index) { return open_raw_dump(files[index]); };
@@ -196,7 +256,7 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   });
   if (!clocks) return tl::unexpected<Error>(clocks.error());
   recording.clocks = std::move(*clocks);
-  if (auto aligned = align_logs(configuration, inputs, *files, logs, opened); !aligned) {
+  if (auto aligned = LogAlignment(configuration, inputs, *files, logs, opened).run(); !aligned) {
     return tl::unexpected<Error>(aligned.error());
   }
   for (std::size_t i = 0; i < n; ++i) {

@@ -53,8 +53,9 @@ struct Recording {
 /// Counts of one device after a replay.
 struct DeviceResult {
   DecoderCounters counters;
-  std::uint64_t refused = 0;  ///< samples that found their ring full
-  std::string problem;        ///< decoder_problem()
+  std::uint64_t refused = 0;         ///< samples that found their ring full
+  std::uint64_t frames_dropped = 0;  ///< of a live run: lost by this PC before they could be read
+  std::string problem;               ///< decoder_problem()
 };
 
 struct ReplayResult {

@@ -37,6 +37,32 @@ NavigationReport navigation_report(const Snapshot& snapshot, const UtcAnchor& an
   return report;
 }
 
+OdometryReport odometry_report(const Snapshot& snapshot, const UtcAnchor& anchor) {
+  const OdometryOutput& out = snapshot.odometry;
+  const EstimatorCounters& counters = snapshot.counters;
+  OdometryReport report{};
+  report.utc = anchor.at(out.time);
+  report.time_s = to_seconds(out.time - snapshot.first_reference_time);
+  report.speed_mps = out.speed_mps;
+  report.standing = out.standing;
+  report.zero_velocity = out.resting;
+  report.lost = out.lost;
+  report.scale = out.scale;
+  report.sd_scale = out.sd_scale;
+  report.mount_rad = out.mount_rad;
+  report.sd_mount_rad = out.sd_mount_rad;
+  report.r_bv_b_m = out.r_bv_b_m;
+  report.sd_r_bv_b_m = out.sd_r_bv_b_m;
+  report.nis = out.nis;
+  report.speed_used = counters.odometry_speed_used;
+  report.speed_rejected = counters.odometry_speed_rejected;
+  report.non_holonomic_used = counters.odometry_slip_used;
+  report.non_holonomic_rejected = counters.odometry_slip_rejected;
+  report.zero_velocity_used = counters.zero_velocity_used;
+  report.zero_velocity_rejected = counters.zero_velocity_rejected;
+  return report;
+}
+
 BridgeReport bridge_report(const Snapshot& snapshot, const Snapshot& origin, const UtcAnchor& anchor) {
   const auto& nav = snapshot.navigation;
   const auto& first = origin.navigation;

@@ -22,6 +22,7 @@ struct UtcAnchor {
 };
 
 NavigationReport navigation_report(const Snapshot& snapshot, const UtcAnchor& anchor);
+OdometryReport odometry_report(const Snapshot& snapshot, const UtcAnchor& anchor);
 CalibrationReport calibration_report(const Snapshot& snapshot, std::size_t study, DeviceIndex device,
                                      const UtcAnchor& anchor);
 /// For the bridge to pose_t and ins_t.

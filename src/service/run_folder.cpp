@@ -27,6 +27,7 @@ std::vector<std::string> calibration_columns() {
 }
 
 constexpr std::size_t kPsiColumns = 3;
+constexpr const char* kOdometryFile = "odometry.csv";
 
 Eigen::Quaterniond quaternion_of(const Matrix3& C_b_s) {
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(C_b_s.data());
@@ -111,6 +112,26 @@ std::string navigation_csv_row(const NavigationOutput& nav, double time_s) {
   append(row, nav.sd_position_m, 1.0);
   append(row, nav.sd_velocity_mps, 1.0);
   append(row, nav.sd_rpy_rad, kDegPerRad);
+  row.push_back('\n');
+  return fmt::to_string(row);
+}
+
+std::string odometry_csv_header() {
+  return "time_s,speed_mps,standing,zero_velocity,lost,scale_percent,mount_y_deg,mount_z_deg,"
+         "axle_x_m,axle_y_m,axle_z_m,sd_scale_percent,sd_mount_y_deg,sd_mount_z_deg,"
+         "sd_axle_x_m,sd_axle_y_m,sd_axle_z_m\n";
+}
+
+std::string odometry_csv_row(const OdometryOutput& odometry, double time_s) {
+  constexpr double kPercent = 100.0;
+  fmt::memory_buffer row;
+  fmt::format_to(std::back_inserter(row), "{},{},{:d},{:d},{:d},{},{},{}", time_s, odometry.speed_mps,
+                 odometry.standing, odometry.resting, odometry.lost, kPercent * odometry.scale,
+                 odometry.mount_rad[1] * kDegPerRad, odometry.mount_rad[2] * kDegPerRad);
+  append(row, odometry.r_bv_b_m, 1.0);
+  fmt::format_to(std::back_inserter(row), ",{},{},{}", kPercent * odometry.sd_scale,
+                 odometry.sd_mount_rad[1] * kDegPerRad, odometry.sd_mount_rad[2] * kDegPerRad);
+  append(row, odometry.sd_r_bv_b_m, 1.0);
   row.push_back('\n');
   return fmt::to_string(row);
 }
@@ -247,6 +268,7 @@ Result<std::unique_ptr<RunFolder>> RunFolder::create(const std::filesystem::path
   if (auto opened = run->navigation_.open(folder / "navigation.csv", navigation_csv_header()); !opened) {
     return tl::unexpected<Error>(opened.error());
   }
+  std::filesystem::remove(folder / kOdometryFile, code);
   for (std::size_t i = 0; i < n; ++i) {
     const auto& name = run->studies_[i].name;
     auto opened = run->calibrations_[i].open(folder / fmt::format("calibration_{}.csv", name),
@@ -285,11 +307,20 @@ void RunFolder::on_snapshot(const Snapshot& snapshot) noexcept {
     navigation_.append(
         navigation_csv_row(snapshot.navigation, seconds_since_start(snapshot.navigation.time)));
   }
+  if (snapshot.odometry.has_speed) add_odometry();
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& study = snapshot.studies[i];
     if (study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated)
       calibrations_[i].append(calibration_csv_row(study, studies_[i], seconds_since_start(study.time)));
   }
+}
+
+/// The file is made with the first speed: a run without odometry has none.
+void RunFolder::add_odometry() {
+  if (odometry_opened_ && !odometry_.is_open())
+    odometry_opened_ = odometry_.open(folder_ / kOdometryFile, odometry_csv_header());
+  if (!odometry_opened_) return;
+  odometry_.append(odometry_csv_row(last_->odometry, seconds_since_start(last_->odometry.time)));
 }
 
 Result<void> RunFolder::write_calibration(const std::vector<nlohmann::json>& weighted_means) {
@@ -303,6 +334,8 @@ Result<void> RunFolder::write_calibration(const std::vector<nlohmann::json>& wei
 
 Result<void> RunFolder::close() {
   auto result = navigation_.close();
+  if (result && !odometry_opened_) result = odometry_opened_;
+  if (auto closed = odometry_.close(); result && !closed) result = closed;
   for (auto* files : {&calibrations_, &errors_}) {
     for (auto& file : *files) {
       auto closed = file.close();

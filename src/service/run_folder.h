@@ -1,8 +1,8 @@
 #pragma once
 
-/// The files of a run: navigation.csv, calibration_NAME.csv, errors_NAME.csv while it goes, calibration.json
-/// and run.json at its end. Columns and keys are promised to users; see docs in README.md, "Files of a run".
-/// Soft world: one thread, allocates, writes files.
+/// The files of a run: navigation.csv, odometry.csv (where there is odometry), calibration_NAME.csv,
+/// errors_NAME.csv while it goes, calibration.json and run.json at its end. Columns and keys are promised to
+/// users; see docs in README.md, "Files of a run". Soft world: one thread, allocates, writes files.
 
 #include <cstdint>
 #include <filesystem>
@@ -96,10 +96,13 @@ class RunFolder final : public CoreSink {
  private:
   RunFolder() = default;
   [[nodiscard]] double seconds_since_start(HostTime time) const;
+  void add_odometry();
 
   std::filesystem::path folder_;
   std::vector<StudyFileInfo> studies_;
   CsvFile navigation_;
+  CsvFile odometry_;
+  Result<void> odometry_opened_;
   std::vector<CsvFile> calibrations_;
   std::vector<CsvFile> errors_;
   std::vector<SampleTimeLine> sample_times_;
@@ -111,6 +114,9 @@ class RunFolder final : public CoreSink {
 /// Header and rows of navigation.csv.
 std::string navigation_csv_header();
 std::string navigation_csv_row(const NavigationOutput& navigation, double time_s);
+/// Header and rows of odometry.csv.
+std::string odometry_csv_header();
+std::string odometry_csv_row(const OdometryOutput& odometry, double time_s);
 /// Header and rows of calibration_NAME.csv.
 std::string calibration_csv_header();
 std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, double time_s);

@@ -156,6 +156,7 @@ nlohmann::json device_json(const RunDescription& run, std::size_t i) {
                        {"bad_contents", counters.bad_contents},
                        {"samples_lost", counters.samples_lost},
                        {"clock_resets", counters.clock_resets},
+                       {"frames_dropped", result.frames_dropped},
                        {"refused", result.refused},
                        {"problem", result.problem},
                        {"clock", run.recording->clocks[i].how},

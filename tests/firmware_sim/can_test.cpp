@@ -41,6 +41,27 @@ TEST(CanEncoder, MtiGroupIsTheVectorsOfTheSameValues) {
   EXPECT_EQ(frames[4].data, (Bytes{0x7F, 0xFD, 0x00, 0x00, 0x01, 0x48, 0x00, 0x00}));
 }
 
+TEST(CanEncoder, HighRateMessagesComeInEitherOfTheDocumentedOrders) {
+  MtiGroup group;
+  group.output = MtiOutput::kHighRate;
+  group.f_mps2 = Eigen::Vector3d(0.0, 1.0, -9.8125);        // 0, 256, -2512
+  group.omega_radps = Eigen::Vector3d(0.001953125, -1, 0);  // 1, -512, 0
+  const Bytes acceleration{0x00, 0x00, 0x01, 0x00, 0xF6, 0x30};
+  const Bytes rate{0x00, 0x01, 0xFE, 0x00, 0x00, 0x00};
+  const auto frames = mti_frames(group);
+  ASSERT_EQ(frames.size(), 5U);
+  EXPECT_EQ(frames[3].id, 0x061);
+  EXPECT_EQ(frames[3].data, acceleration);
+  EXPECT_EQ(frames[4].id, 0x062);
+  EXPECT_EQ(frames[4].data, rate);
+  group.output = MtiOutput::kHighRateSwapped;
+  const auto swapped = mti_frames(group);
+  EXPECT_EQ(swapped[3].id, 0x061);
+  EXPECT_EQ(swapped[3].data, rate);
+  EXPECT_EQ(swapped[4].id, 0x062);
+  EXPECT_EQ(swapped[4].data, acceleration);
+}
+
 TEST(CanNode, SendsItsFramesAtItsInstantsAndLeavesOutWhatItIsTold) {
   CanNode node({100.0, 0.003, 0.0, 0.002}, [](double, double device_s, std::int64_t index) {
     EXPECT_NEAR(device_s, 0.003 + 0.01 * static_cast<double>(index), 1e-12);

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
     navigation.v_n_mps[0] = 10.0 * std::sin(phase);
     navigation.rpy_rad[2] = phase;
     bus->publish(navigation);
+    bus->publish(test::example_odometry());
     auto calibration = test::example_calibration();
     calibration.value.psi_b_rad[0] = 0.01 * std::cos(phase);
     bus->publish(calibration, "mtx1");

@@ -50,6 +50,28 @@ inline NavigationReport example_navigation() {
           {0.07, 0.08, 0.09}};
 }
 
+inline OdometryReport example_odometry() {
+  return {kExampleUtc,
+          4.75,
+          12.25,
+          true,
+          true,
+          false,
+          0.012,
+          0.003,
+          {0.0, 0.01, 0.02},
+          {0.0, 0.03, 0.04},
+          {1, 2, 3},
+          {4, 5, 6},
+          {0.7, 0.8, 0.9},
+          21,
+          22,
+          23,
+          24,
+          25,
+          26};
+}
+
 inline ErrorReport example_error() {
   return {kExampleUtc, 7.75, 1, Regime::kDynamic, 70'001, {1e-3, 2e-3, 3e-3}, {0.1, 0.2, 0.3}};
 }
@@ -134,6 +156,7 @@ inline StatusReport example_status() {
   device.bytes = 1;
   device.bytes_skipped = 2;
   device.frames = 3;
+  device.frames_dropped = 10;
   device.bad_checksums = 4;
   device.samples = 5;
   device.samples_lost = 6;

@@ -44,6 +44,7 @@ TEST(LcmPublisher, EachReportGoesToItsChannel) {
     publisher->publish(test::example_status());
     publisher->publish(test::example_navigation());
     publisher->publish(test::example_navigation());
+    publisher->publish(test::example_odometry());
     publisher->publish(test::example_calibration(), "mtx1");
     publisher->publish(test::example_error(), "mtx2");
     publisher->publish(test::example_wavelet_variance());
@@ -51,11 +52,12 @@ TEST(LcmPublisher, EachReportGoesToItsChannel) {
     publisher->publish(DynamicsReport{test::kExampleUtc, 61.0, "mtx1", 1, 2, {}});
     publisher->publish(PersonEvent{test::kExampleUtc, "somebody", "here"});
     publisher->publish(BridgeReport{});
-    EXPECT_EQ(publisher->counters().published, 11U);
+    EXPECT_EQ(publisher->counters().published, 12U);
     EXPECT_EQ(publisher->counters().failed, 0U);
   }
   const std::map<std::string, int> expected{{"CAR2_STATUS", 1},
                                             {"CAR2_NAVIGATION", 2},
+                                            {"CAR2_ODOMETRY", 1},
                                             {"CAR2_CALIBRATION_MTX1", 1},
                                             {"CAR2_ERROR_MTX2", 1},
                                             {"CAR2_WV_MTX1", 1},

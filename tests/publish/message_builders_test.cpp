@@ -93,6 +93,28 @@ TEST(MessageBuilders, NavigationArrivesInDegreesWithEveryFieldInItsPlace) {
   EXPECT_DOUBLE_EQ(message.sd_heading_deg, 0.09 * kDegreesPerRadian);
 }
 
+TEST(MessageBuilders, OdometryArrivesInPercentAndDegreesWithEveryFieldInItsPlace) {
+  const odometry_t m = over_the_wire(to_message(test::example_odometry(), 42));
+  EXPECT_EQ(m.utime, 1'700'000'000'123'456);
+  EXPECT_EQ(m.sequence, 42);
+  EXPECT_EQ(m.time_s, 4.75);
+  EXPECT_EQ(m.speed_mps, 12.25);
+  EXPECT_THAT((std::array<bool, 3>{m.standing != 0, m.zero_velocity != 0, m.lost != 0}),
+              ElementsAre(true, true, false));
+  EXPECT_DOUBLE_EQ(m.scale_percent, 1.2);
+  EXPECT_DOUBLE_EQ(m.sd_scale_percent, 0.3);
+  EXPECT_DOUBLE_EQ(m.mount_y_deg, 0.01 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.mount_z_deg, 0.02 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.sd_mount_y_deg, 0.03 * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.sd_mount_z_deg, 0.04 * kDegreesPerRadian);
+  EXPECT_THAT((std::array{m.axle_x_m, m.axle_y_m, m.axle_z_m, m.sd_axle_x_m, m.sd_axle_y_m, m.sd_axle_z_m}),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT((std::array{m.nis_speed, m.nis_sideways, m.nis_upwards}), ElementsAre(0.7, 0.8, 0.9));
+  EXPECT_THAT((std::array{m.speed_used, m.speed_rejected, m.non_holonomic_used, m.non_holonomic_rejected,
+                          m.zero_velocity_used, m.zero_velocity_rejected}),
+              ElementsAre(21, 22, 23, 24, 25, 26));
+}
+
 TEST(MessageBuilders, CalibrationArrivesWithEveryStateAndSdInItsPlace) {
   const calibration_t m = over_the_wire(to_message(test::example_calibration(), "mtx1", 5));
   EXPECT_EQ(m.name, "mtx1");

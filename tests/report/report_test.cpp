@@ -185,6 +185,32 @@ TEST(Report, ErrorFigureShowsTheExtremesOfTheSamples) {
   FAIL() << "no such figure";
 }
 
+TEST(Report, WheelsOfADriveWithOdometryAreDrawnAndSummedUp) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  EXPECT_FALSE(holds(page_of(folder), "Odometry")) << "without odometry nothing is said of it";
+  // 60 s at 10 Hz: 20 s standing, the last 15 of them used; the scale goes from 0 to 1.2 %.
+  std::ofstream out(folder / "odometry.csv");
+  out << "time_s,speed_mps,standing,zero_velocity,scale_percent,sd_scale_percent\n";
+  for (int i = 0; i <= 600; ++i) {
+    const double t = 0.1 * i;
+    out << t << ',' << (t <= 20.0 ? 0.0 : 10.0) << ',' << (t <= 20.0) << ',' << (t > 5.0 && t <= 20.0) << ','
+        << 1.2 * t / 60.0 << ",0.05\n";
+  }
+  out.close();
+  const std::string page = page_of(folder);
+  EXPECT_TRUE(holds(page, "+1.20 % (sd 0.05 %)"));
+  EXPECT_TRUE(holds(page, "They stood for 20 s; for 15 s of it"));
+  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  int found = 0;
+  for (const auto& figure : figures_of(page)) {
+    if (figure["id"] != "wheel_speed" && figure["id"] != "wheel_scale") continue;
+    ++found;
+    EXPECT_GT(figure["times"].size(), 100U);
+  }
+  EXPECT_EQ(found, 2);
+}
+
 TEST(Report, AGapInTheErrorsIsAGapInTheFigure) {
   test::SyntheticRun options;
   options.gap_begin_s = 20.0;

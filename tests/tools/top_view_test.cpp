@@ -41,6 +41,26 @@ TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndProblems) {
   }
 }
 
+TEST(TopView, OdometryShowsSpeedStateAndScaleWhereThereIsAny) {
+  auto heard = example();
+  EXPECT_THAT(page(heard), Not(HasSubstr("ODOMETRY")));
+  heard.odometry = to_message(test::example_odometry(), 1);
+  EXPECT_THAT(page(heard), HasSubstr("ODOMETRY    +12.25 m/s  at rest, zero velocity in use  scale +1.20"));
+  EXPECT_THAT(page(heard), HasSubstr("speed 21/22  no slip 23/24  zero velocity 25/26"));
+  heard.odometry->zero_velocity = 0;
+  EXPECT_THAT(page(heard), HasSubstr("standing"));
+  heard.odometry->lost = 1;
+  EXPECT_THAT(page(heard), HasSubstr("lost: no speed comes"));
+  EXPECT_EQ(nlohmann::json::parse(json_of(heard)).at("odometry").at("speed_rejected"), 22);
+}
+
+TEST(TopView, FramesThatThisPcLostAreShown) {
+  auto heard = example();
+  heard.status->devices[0].frames_dropped = 4711;
+  EXPECT_THAT(page(heard), HasSubstr("4711"));
+  EXPECT_EQ(nlohmann::json::parse(json_of(heard)).at("devices").at(0).at("frames_dropped"), 4711);
+}
+
 TEST(TopView, SaysWhatToDoBeforeAnythingIsHeard) {
   EXPECT_THAT(page({}), HasSubstr("no service has been heard yet"));
 }

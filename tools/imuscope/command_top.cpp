@@ -64,6 +64,12 @@ class Top {
         },
         kQueue);
     ear_.subscribe(
+        "ODOMETRY",
+        [this](const auto&, auto bytes) {
+          if (auto message = decode_message<odometry_t>(bytes)) heard_.odometry = *message;
+        },
+        kQueue);
+    ear_.subscribe(
         "NOISE_MODEL_.*",
         [this](const auto&, auto bytes) {
           if (auto message = decode_message<noise_model_t>(bytes)) heard_.models[message->name] = *message;

@@ -1,6 +1,6 @@
 /// What odometry is worth without GNSS: the simulated drive with GNSS cut for a minute, again and again, with
-/// and without each kind of update. Prints the position error at the end of the cut, per class of reference,
-/// beside the filter's own sd.
+/// each kind of update alone, with none and with all. Prints the position error at the end of the cut, per
+/// class of reference, beside the filter's own sd.
 ///
 /// Every drive is another road and other sensors. In each, GNSS is cut at 130 s + k * 120 s + a part of a
 /// minute that differs from drive to drive, and the minute behind a cut lets the filter settle again.
@@ -37,10 +37,10 @@ struct Aiding {
   bool zero_velocity;
 };
 constexpr std::array<Aiding, 5> kAidings{{{"inertial alone", false, false, false},
-                                          {"+ zero velocity", false, false, true},
-                                          {"+ non-holonomic", false, true, true},
-                                          {"+ speed", true, false, true},
-                                          {"all", true, true, true}}};
+                                          {"speed only", true, false, false},
+                                          {"no slip only", false, true, false},
+                                          {"standstill only", false, false, true},
+                                          {"all three", true, true, true}}};
 
 struct Outage {
   double horizontal_m;

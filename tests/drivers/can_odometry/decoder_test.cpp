@@ -133,11 +133,11 @@ TEST(CanOdometry, SpeedsThatTheVehicleMarksAsInvalidAreRefused) {
   rig.rear(3600, -1);          // configured
   EXPECT_TRUE(rig.sink.samples.empty());
   EXPECT_EQ(rig.decoder->odometry_counters().invalid, 3U);
-  EXPECT_EQ(rig.decoder->problem(), "every speed was marked as invalid by the vehicle; is the ignition on?");
+  EXPECT_EQ(rig.decoder->remark(), "every speed was marked as invalid by the vehicle; is the ignition on?");
   rig.rear(0, 0);  // "standstill" is a speed with a name
   rig.rear(100, 100);
   EXPECT_EQ(rig.sink.samples.size(), 2U);
-  EXPECT_EQ(rig.decoder->problem(), "");
+  EXPECT_EQ(rig.decoder->remark(), "");
 }
 
 TEST(CanOdometry, AFrameTooShortForASignalGivesNoSampleAndIsCounted) {
@@ -146,10 +146,9 @@ TEST(CanOdometry, AFrameTooShortForASignalGivesNoSampleAndIsCounted) {
   EXPECT_TRUE(rig.sink.samples.empty());
   EXPECT_EQ(rig.decoder->odometry_counters().too_short, 1U);
   EXPECT_EQ(rig.decoder->counters().bad_contents, 1U);
-  EXPECT_EQ(
-      rig.decoder->problem(),
-      "1 frames of REAR were too short for a chosen signal (3 bytes received, 8 in the DBC file); check "
-      "that the DBC file is this vehicle's");
+  EXPECT_EQ(rig.decoder->remark(),
+            "frames of REAR are too short for a chosen signal (3 bytes received, 8 in the DBC file); check "
+            "that the DBC file is this vehicle's");
 }
 
 TEST(CanOdometry, AnotherPageOfAMultiplexedMessageIsNoFault) {
@@ -174,9 +173,8 @@ TEST(CanOdometry, ImpossibleSpeedsAreRefusedCountedAndNamed) {
   rig.rear(3600, 3600);
   EXPECT_EQ(rig.sink.samples.size(), 2U);
   EXPECT_EQ(rig.decoder->odometry_counters().impossible, 2U);
-  EXPECT_EQ(
-      rig.decoder->problem(),
-      "2 impossible speeds, the last 40.0 m/s, were refused; check unit and factor of the speed signals");
+  EXPECT_EQ(rig.decoder->remark(),
+            "impossible speeds were refused, such as 88.9 m/s; check unit and factor of the speed signals");
 }
 
 TEST(CanOdometry, AJumpThatStaysIsBelieved) {
@@ -331,7 +329,7 @@ TEST(CanOdometry, ARealDriveDecodesToItsPublishedSpeeds) {
   }
   EXPECT_EQ(rig.sink.samples.size(), rows);
   EXPECT_LT(largest, 1e-6);
-  EXPECT_EQ(rig.decoder->problem(), "");
+  EXPECT_EQ(rig.decoder->remark(), "");
 }
 
 }  // namespace

@@ -250,14 +250,14 @@ TEST(XsensCan, ARestTellsWhichHighRateMessageIsTheAcceleration) {
       unit.frame(rate, triad(0, 0, 256));
     });
     EXPECT_TRUE(unit.samples().empty());
-    EXPECT_NE(unit.decoder.problem().find("061 and 062"), std::string::npos) << unit.decoder.problem();
+    EXPECT_NE(unit.decoder.remark().find("061 and 062"), std::string::npos) << unit.decoder.remark();
     unit.groups(60, [&] { rest(unit, acceleration, rate); });
     EXPECT_EQ(unit.decoder.high_rate_order(),
               first ? HighRateOrder::kAccelerationFirst : HighRateOrder::kRateFirst);
     ASSERT_FALSE(unit.samples().empty());
     EXPECT_NEAR(unit.samples().back().imu.f_mps2[2], 2511.0 / 256.0, 1e-12);
     EXPECT_NEAR(unit.samples().back().imu.omega_radps[0], 2.0 / 512.0, 1e-12);
-    EXPECT_EQ(unit.decoder.problem(), "");
+    EXPECT_EQ(unit.decoder.remark(), "");
   }
 }
 
@@ -321,18 +321,18 @@ TEST(XsensCan, ProblemsAreNamedWithTheirRemedy) {
     overflow.increments();
     overflow.frame(Item::kError, {1});
   });
-  EXPECT_NE(overflow.decoder.problem().find("output buffer overflowed"), std::string::npos);
+  EXPECT_NE(overflow.decoder.remark().find("output buffer overflowed"), std::string::npos);
   EXPECT_EQ(overflow.samples().size(), 1U);
 
   Unit short_frames;
   short_frames.groups(3, [&] { short_frames.frame(Item::kDeltaV, {0, 1, 2}); });
   EXPECT_EQ(short_frames.decoder.counters().bad_lengths, 3U);
-  EXPECT_NE(short_frames.decoder.problem().find("too short"), std::string::npos);
+  EXPECT_NE(short_frames.decoder.remark().find("too short"), std::string::npos);
 
   Unit half;
   half.groups(5, [&] { half.frame(Item::kRateOfTurn, triad(0, 0, 0)); });
   EXPECT_TRUE(half.samples().empty());
-  EXPECT_NE(half.decoder.problem().find("switch on delta_v and delta_q"), std::string::npos);
+  EXPECT_NE(half.decoder.remark().find("switch on delta_v and delta_q"), std::string::npos);
 }
 
 TEST(XsensCan, AnErrorBetweenTheOpeningFramesSplitsNoGroup) {

@@ -53,13 +53,13 @@ void add_head(const Heard& heard, const status_t& status, std::vector<std::strin
 
 void add_devices(const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back();
-  lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>12}{:>11}{:>11}", "DEVICE",
-                              "role", "state", "rate/Hz", "lost", "late", "bad", "refused", "latency/ms",
-                              "jitter/us", "drift/ppm"));
+  lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", "DEVICE",
+                              "role", "state", "rate/Hz", "lost", "late", "bad", "refused", "dropped",
+                              "latency/ms", "jitter/us", "drift/ppm"));
   for (const auto& d : status.devices) {
-    lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>12}{:>11}{:>11}", d.name,
+    lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", d.name,
                                 d.role, d.state, number(d.rate_hz, 1), d.samples_lost, d.samples_late,
-                                d.bad_checksums, d.samples_refused, number(d.latency_ms, 2),
+                                d.bad_checksums, d.samples_refused, d.frames_dropped, number(d.latency_ms, 2),
                                 number(d.clock_sd_us, 0), number(d.clock_drift_ppm, 1)));
     if (!d.problem.empty()) lines.push_back("  " + d.problem);
   }
@@ -87,6 +87,45 @@ void add_studies(const Heard& heard, const status_t& status, std::vector<std::st
                         : fmt::format("  weakest {} ({} % of its prior left); still missing: {}", s.weakest,
                                       number(s.weakest_relative * kPercent, 0), s.manoeuvre));
   }
+}
+
+nlohmann::json known(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
+void add_odometry(const Heard& heard, std::vector<std::string>& lines) {
+  if (!heard.odometry) return;
+  const odometry_t& o = *heard.odometry;
+  const char* state = "rolling";
+  if (o.lost != 0) {
+    state = "lost: no speed comes";
+  } else if (o.zero_velocity != 0) {
+    state = "at rest, zero velocity in use";
+  } else if (o.standing != 0) {
+    state = "standing";
+  }
+  lines.emplace_back();
+  lines.push_back(
+      fmt::format("ODOMETRY    {:+.2f} m/s  {}  scale {:+.2f} sd {:.2f} %  mounting {:+.2f} {:+.2f} deg",
+                  o.speed_mps, state, o.scale_percent, o.sd_scale_percent, o.mount_y_deg, o.mount_z_deg));
+  lines.push_back(fmt::format("  used/rejected: speed {}/{}  no slip {}/{}  zero velocity {}/{}",
+                              o.speed_used, o.speed_rejected, o.non_holonomic_used, o.non_holonomic_rejected,
+                              o.zero_velocity_used, o.zero_velocity_rejected));
+}
+
+nlohmann::json odometry_json(const odometry_t& o) {
+  return {{"speed_mps", known(o.speed_mps)},
+          {"standing", o.standing != 0},
+          {"zero_velocity", o.zero_velocity != 0},
+          {"lost", o.lost != 0},
+          {"scale_percent", known(o.scale_percent)},
+          {"sd_scale_percent", known(o.sd_scale_percent)},
+          {"speed_used", o.speed_used},
+          {"speed_rejected", o.speed_rejected},
+          {"non_holonomic_used", o.non_holonomic_used},
+          {"non_holonomic_rejected", o.non_holonomic_rejected},
+          {"zero_velocity_used", o.zero_velocity_used},
+          {"zero_velocity_rejected", o.zero_velocity_rejected}};
 }
 
 std::string model_line(const axis_noise_model_t& model) {
@@ -145,10 +184,6 @@ void add_rings(const status_t& status, std::vector<std::string>& lines) {
   }
 }
 
-nlohmann::json known(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
-
 nlohmann::json device_json(const device_status_t& d) {
   return {{"name", d.name},
           {"role", d.role},
@@ -160,6 +195,7 @@ nlohmann::json device_json(const device_status_t& d) {
           {"samples_lost", d.samples_lost},
           {"samples_late", d.samples_late},
           {"samples_refused", d.samples_refused},
+          {"frames_dropped", d.frames_dropped},
           {"bad_checksums", d.bad_checksums},
           {"clock_resets", d.clock_resets},
           {"latency_ms", known(d.latency_ms)},
@@ -228,6 +264,7 @@ std::vector<std::string> lines_of(const Heard& heard) {
     add_head(heard, status, lines);
     add_devices(status, lines);
     add_studies(heard, status, lines);
+    add_odometry(heard, lines);
     add_threads(status, lines);
     add_rings(status, lines);
     add_models(heard, lines);
@@ -259,6 +296,7 @@ std::string json_of(const Heard& heard) {
                       {"capture_lost", s.capture_lost},
                       {"last_event", s.last_event},
                       {"problems", s.problems}};
+  if (heard.odometry) json["odometry"] = odometry_json(*heard.odometry);
   for (const auto& device : s.devices) json["devices"].push_back(device_json(device));
   for (const auto& study : s.studies) json["studies"].push_back(study_json(study));
   for (const auto& thread : s.threads) json["threads"].push_back(thread_json(thread));

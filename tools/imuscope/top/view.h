@@ -4,6 +4,7 @@
 
 #include <imuscope/calibration_t.hpp>
 #include <imuscope/noise_model_t.hpp>
+#include <imuscope/odometry_t.hpp>
 #include <imuscope/status_t.hpp>
 #include <map>
 #include <optional>
@@ -18,6 +19,7 @@ struct Heard {
   double status_age_s = 0.0;                          ///< since it was heard
   std::map<std::string, calibration_t> calibrations;  ///< by S-IMU
   std::map<std::string, noise_model_t> models;        ///< by S-IMU
+  std::optional<odometry_t> odometry;
   std::string note;  ///< of the program itself: an event sent, a text being typed
 };
 
