@@ -19,17 +19,20 @@ ErrorRow row_at(std::int64_t counter, double value) {
   return row;
 }
 
-/// Amplitude of the filter's answer to a sinusoid of 1, once it has settled.
+/// Amplitude of the filter's answer to a sinusoid of 1, once it has settled, from whole periods.
 double gain_at(double frequency_hz, double corner_hz) {
   RowLowPass filter(kRate_hz, corner_hz);
-  double largest = 0.0;
+  double squares = 0.0;
+  double n = 0.0;
   for (std::int64_t k = 0; k < 6000; ++k) {
     ErrorRow row =
         row_at(k, std::sin(2.0 * std::numbers::pi * frequency_hz * static_cast<double>(k) / kRate_hz));
     filter.apply(row);
-    if (row.gyro_valid && k > 1000) largest = std::max(largest, std::abs(row.e_gyro_radps[0]));
+    if (k < 1000) continue;
+    squares += row.e_gyro_radps[0] * row.e_gyro_radps[0];
+    n += 1.0;
   }
-  return largest;
+  return std::sqrt(2.0 * squares / n);
 }
 
 TEST(RowLowPass, HasTheGainOfASecondOrderButterworth) {
