@@ -484,6 +484,28 @@ void read_error_process(TomlReader in, double slowest_rate_hz, ErrorProcessOptio
   in.finish();
 }
 
+/// A list of processor cores.
+void read_cores(TomlReader& in, std::string_view key, std::vector<int>& cores) {
+  constexpr double kMostCores = 1024.0;
+  std::vector<double> numbers;
+  in.numbers(key, numbers);
+  cores.clear();
+  for (const double number : numbers) {
+    if (number < 0.0 || number >= kMostCores || number != std::floor(number)) {
+      in.fail(key, fmt::format("names a core {:g}", number),
+              "cores are counted 0, 1, 2, ...; nproc says how many");
+      return;
+    }
+    cores.push_back(static_cast<int>(number));
+  }
+}
+
+void read_threads(TomlReader in, ThreadOptions& options) {
+  read_cores(in, "io_cores", options.io_cores);
+  read_cores(in, "estimator_cores", options.estimator_cores);
+  in.finish();
+}
+
 /// A text as TOML writes it, whatever it holds.
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -613,6 +635,7 @@ Result<Configuration> parse_configuration(const std::string& text, const std::fi
   auto record = root.table("record");
   record.text("folder", configuration.record.folder);
   record.finish();
+  read_threads(root.table("threads"), configuration.threads);
   root.ignore("simulation");  // belongs to imusim, which checks it
   auto attached = root.table("attached");
   attached.every_text(files.texts);

@@ -204,6 +204,12 @@ struct RecordOptions {
   std::string folder;  ///< where live runs are recorded; relative to the working folder
 };
 
+/// Processor cores that the core's threads keep to; empty: any.
+struct ThreadOptions {
+  std::vector<int> io_cores;
+  std::vector<int> estimator_cores;
+};
+
 struct Configuration {
   std::string run_name;
   std::filesystem::path file;
@@ -216,6 +222,7 @@ struct Configuration {
   ErrorProcessOptions error_process;
   LcmOptions lcm;
   RecordOptions record;
+  ThreadOptions threads;
 
   [[nodiscard]] const DeviceConfig* find(std::string_view name) const;
   [[nodiscard]] std::size_t reference_index() const;

@@ -111,6 +111,8 @@ constexpr auto kSentences = std::to_array<Sentence>({
      "At most "
      "0.4 of the slowest rate."},
     {"record.folder", "Where live runs are recorded, relative to the working folder. `--out` comes first."},
+    {"threads.io_cores", "Live: processor cores that the I/O thread keeps to; empty: any."},
+    {"threads.estimator_cores", "Live: processor cores that the estimator's thread keeps to; empty: any."},
     {"device.name", "Becomes part of file names: letters, digits, `_`, `-`."},
     {"device.role",
      "`reference`: the better IMU, exactly one. `study`: an IMU under study, one to six. `gnss`, `odometry`: "

@@ -226,9 +226,13 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
 
   std::vector<Error> refusals;
   if (auto locked = lock_memory(); !locked) refusals.push_back(locked.error());
-  if (auto started = io.start({kIoThreadName, Scheduling::kFifo, kIoPriority, {}}, t0, refusals); !started)
+  if (auto started = io.start({kIoThreadName, Scheduling::kFifo, kIoPriority, configuration.threads.io_cores},
+                              t0, refusals);
+      !started)
     return started;
-  estimator.start({kEstimatorThreadName, Scheduling::kFifo, kEstimatorPriority, {}}, refusals);
+  estimator.start(
+      {kEstimatorThreadName, Scheduling::kFifo, kEstimatorPriority, configuration.threads.estimator_cores},
+      refusals);
   (*publisher)->start();
   log_refusals(refusals);
   (*publisher)->set_refusals(refusals);

@@ -68,6 +68,7 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       study_devices_(configuration.study_indices()),
       estimator_config_(estimator_config(configuration)),
       tunables_{configuration.lcm, configuration.noise, spec},
+      broadcast_(configuration, {host_now(), wall_clock_now()}),
       modeller_(configuration, std::move(spec)),
       watches_(configuration.devices.size()),
       lines_(configuration.devices.size()),
@@ -76,7 +77,6 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       study_states_(study_devices_.size(), StudyStatus::kWaiting),
       observability_(study_devices_.size()),
       started_(host_now()) {
-  anchor_ = {started_, wall_clock_now()};
   for (const auto& study : estimator_config_.studies)
     feedback_.emplace_back(study.noise, study.noise_floor_share);
 }
@@ -113,7 +113,7 @@ Result<void> LivePublisher::smooth(LiveHistory& history, const EstimatorConfig& 
 
 /// Without a route the service works on and says so; a URL that cannot serve is an error.
 Result<void> LivePublisher::open_bus() {
-  bus_.reset();
+  broadcast_.close();
   ear_.reset();
   bus_problem_.clear();
   auto bus = LcmPublisher::open(tunables_.lcm.url, tunables_.lcm.channel_prefix);
@@ -123,7 +123,7 @@ Result<void> LivePublisher::open_bus() {
     spdlog::warn("nothing is published over LCM: {}", bus_problem_);
     return {};
   }
-  bus_.emplace(std::move(*bus));
+  broadcast_.open(std::move(*bus), tunables_.lcm.bridge);
   if (recorder_ != nullptr) set_recorder(*recorder_);
   if (tunables_.lcm.url.starts_with("file://")) return {};  // a log is written to, not listened to
   auto ear = LcmListener::open(tunables_.lcm.url, tunables_.lcm.channel_prefix);
@@ -140,10 +140,10 @@ Result<void> LivePublisher::open_bus() {
 
 void LivePublisher::set_recorder(Recorder& recorder) {
   recorder_ = &recorder;
-  if (!bus_) return;
-  bus_->set_tap([this](std::string_view channel, std::int64_t utime, std::span<const std::uint8_t> message) {
-    recorder_->record_message(channel, utime, message);
-  });
+  broadcast_.set_tap(
+      [this](std::string_view channel, std::int64_t utime, std::span<const std::uint8_t> message) {
+        recorder_->record_message(channel, utime, message);
+      });
 }
 
 void LivePublisher::on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes) {
@@ -272,19 +272,13 @@ void LivePublisher::on_noise_applied(const AppliedNoise& applied) {
 void LivePublisher::on_error(const ErrorRecord& record) {
   folder_->on_error(record);
   modeller_.add(record);
-  if (!bus_) return;
-  const auto device = study_devices_[record.study];
-  bus_->publish(error_report(record, static_cast<DeviceIndex>(device), anchor_),
-                configuration_.devices[device].name);
+  broadcast_.on_error(record);
 }
 
 void LivePublisher::on_snapshot(const Snapshot& snapshot) {
   last_ = snapshot;
   folder_->on_snapshot(snapshot);
-  if (snapshot.has_utc && !anchored_by_device_) {
-    anchor_ = {snapshot.first_reference_time, snapshot.first_reference_utc};
-    anchored_by_device_ = true;
-  }
+  broadcast_.on_snapshot(snapshot);
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& name = configuration_.devices[study_devices_[i]].name;
     const auto state = snapshot.studies[i].status;
@@ -293,28 +287,12 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
     for (const auto& sentence : observability_[i].update(snapshot.studies[i]))
       spdlog::info("{}: {}", name, sentence);
   }
-  if (!bus_) return;
-  if (snapshot.navigation.status == NavigationStatus::kNavigating) {
-    bus_->publish(navigation_report(snapshot, anchor_));
-    if (tunables_.lcm.bridge) {
-      if (!bridge_origin_) bridge_origin_ = snapshot;
-      bus_->publish(bridge_report(snapshot, *bridge_origin_, anchor_));
-    }
-  }
-  if (snapshot.odometry.has_speed) bus_->publish(odometry_report(snapshot, anchor_));
-  for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
-    const auto state = snapshot.studies[i].status;
-    if (state != StudyStatus::kConverging && state != StudyStatus::kCalibrated) continue;
-    const auto device = study_devices_[i];
-    bus_->publish(calibration_report(snapshot, i, static_cast<DeviceIndex>(device), anchor_),
-                  configuration_.devices[device].name);
-  }
 }
 
 void LivePublisher::on_refit(const Refit& refit) {
   ++refits_;
   refit_duration_s_ = refit.duration_s;
-  refit_utc_ = anchor_.at(host_now());
+  refit_utc_ = broadcast_.anchor().at(host_now());
   models_.take(refit);
   // At each refit, not only at the end: a run that is killed leaves its newest models.
   if (auto written = models_.write(options_.out); !written) spdlog::error("{}", written.error().text());
@@ -322,14 +300,7 @@ void LivePublisher::on_refit(const Refit& refit) {
     if (const auto accepted = feedback_[refit.study].consider(refit.noise_model, refit.samples))
       estimator_.offer_noise(refit.study, *accepted);
   }
-  Refit stamped = refit;
-  const auto stamp = [&](auto& report) {
-    report.utc = anchor_.at(refit.time);
-    report.time_s = to_seconds(refit.time - refit.first_reference_time);
-  };
-  stamp(stamped.wavelet_variance);
-  stamp(stamped.noise_model);
-  stamp(stamped.dynamics);
+  broadcast_.on_refit(refit);
   spdlog::info("{}: noise models fitted anew ({} of them, {:.0f} ms)", refit.noise_model.name,
                refit.noise_model.models.size(), refit.duration_s * 1e3);
   for (const auto& model : refit.noise_model.models) {
@@ -337,10 +308,6 @@ void LivePublisher::on_refit(const Refit& refit) {
     spdlog::warn("{}: {} ({}) behaves differently since the last refit (p = {:.1g})", refit.noise_model.name,
                  model.axis, model.regime, model.change_p_value);
   }
-  if (!bus_) return;
-  bus_->publish(stamped.wavelet_variance);
-  bus_->publish(stamped.noise_model);
-  bus_->publish(stamped.dynamics);
 }
 
 void LivePublisher::watch_devices(HostTime now) {
@@ -425,12 +392,13 @@ void LivePublisher::add_rings(StatusReport& report) {
   report.rings.push_back(ring_status("exceptions", rings.exceptions));
   report.rings.push_back(ring_status("raw bytes", io_.raw_ring()));
   const auto rows = modeller_.ring();
-  report.rings.push_back({"modeller", Modeller::ring_capacity(), rows.level, rows.high_water, rows.refused});
+  report.rings.push_back(
+      {"modeller (blocks)", Modeller::ring_capacity(), rows.level, rows.high_water, rows.refused});
 }
 
 StatusReport LivePublisher::status(HostTime now) {
   StatusReport report;
-  report.utc = anchor_.at(now);
+  report.utc = broadcast_.anchor().at(now);
   report.run = configuration_.run_name;
   report.version = options_.version;
   report.build = fmt::format("g++ {}", __VERSION__);
@@ -468,7 +436,7 @@ StatusReport LivePublisher::status(HostTime now) {
 
 void LivePublisher::publish_status(HostTime now) {
   const auto report = status(now);
-  if (bus_) bus_->publish(report);
+  broadcast_.publish(report);
 }
 
 Result<void> LivePublisher::finish(std::int64_t last_tick) {

@@ -12,7 +12,7 @@
 
 #include "capture/recorder.h"
 #include "publish/lcm_listener.h"
-#include "publish/lcm_publisher.h"
+#include "service/broadcast.h"
 #include "service/can_watch.h"
 #include "service/config.h"
 #include "service/core_thread.h"
@@ -88,7 +88,7 @@ class LivePublisher {
   std::vector<std::size_t> study_devices_;
   EstimatorConfig estimator_config_;
   Tunables tunables_;
-  std::optional<LcmPublisher> bus_;
+  Broadcast broadcast_;
   std::optional<LcmListener> ear_;
   std::string bus_problem_;
   std::string last_event_;
@@ -98,9 +98,6 @@ class LivePublisher {
   std::vector<NoiseFeedback> feedback_;  ///< per study
   std::int64_t applied_ = 0;
   std::optional<Snapshot> last_;
-  std::optional<Snapshot> bridge_origin_;
-  UtcAnchor anchor_;
-  bool anchored_by_device_ = false;
 
   struct DeviceWatch {
     SessionState session = SessionState::kConnecting;

@@ -141,9 +141,12 @@ std::optional<Refit> ModelBook::refit() {
 }
 
 Modeller::Modeller(const Configuration& configuration, noise::ModelSpec spec)
-    : book_(configuration, std::move(spec)), rows_(std::make_unique<RowRing>()) {}
+    : book_(configuration, std::move(spec)), blocks_(std::make_unique<BlockRing>()) {}
 
-Modeller::~Modeller() { stop(); }
+Modeller::~Modeller() {
+  stop();
+  for (RowBlock* block = nullptr; blocks_->try_pop(block);) delete block;
+}
 
 void Modeller::start(const ThreadPlan& plan) {
   running_.store(true, std::memory_order_release);
@@ -160,11 +163,26 @@ void Modeller::set_options(noise::ModelSpec spec, double refit_interval_s) {
 }
 
 void Modeller::stop() {
+  hand_over();
   running_.store(false, std::memory_order_release);
   if (!thread_.joinable()) return;
   // The end of the run waits for it now: on a busy PC an idle thread's last fit would take minutes.
   run_as_normal(thread_);
   thread_.join();
+}
+
+void Modeller::add(const ErrorRecord& record) {
+  if (!filling_) {
+    filling_ = std::make_unique<RowBlock>();
+    filling_->reserve(kRowsPerBlock);
+  }
+  filling_->push_back(record);
+  if (filling_->size() == kRowsPerBlock) hand_over();
+}
+
+void Modeller::hand_over() {
+  if (filling_ && blocks_->try_push(filling_.get())) (void)filling_.release();
+  filling_.reset();
 }
 
 std::vector<Refit> Modeller::take() {
@@ -179,13 +197,15 @@ void Modeller::drain() {
     options = std::exchange(new_options_, std::nullopt);
   }
   if (options) book_.set_options(std::move(options->spec), options->refit_interval_s);
-  ErrorRecord record;
-  while (rows_->try_pop(record)) {
-    book_.add(record);
-    // At the very row, so that a replay fits the same samples.
-    while (auto refit = book_.refit()) {
-      const std::lock_guard lock(mutex_);
-      refits_.push_back(std::move(*refit));
+  for (RowBlock* next = nullptr; blocks_->try_pop(next);) {
+    const std::unique_ptr<RowBlock> block(next);
+    for (const auto& record : *block) {
+      book_.add(record);
+      // At the very row, so that a replay fits the same samples.
+      while (auto refit = book_.refit()) {
+        const std::lock_guard lock(mutex_);
+        refits_.push_back(std::move(*refit));
+      }
     }
   }
 }

@@ -104,8 +104,13 @@ class ModelBook {
 };
 
 /// The thread around the book. Rows come from one thread through a ring; refits are taken by the same thread.
+///
+/// The thread runs when nothing else wants to, and on a busy PC a fit may take minutes. Rows are handed over
+/// in blocks made on demand, so that they wait for it without a ring that is large all the time.
 class Modeller {
-  using RowRing = SpscRing<ErrorRecord, 16384>;
+  using RowBlock = std::vector<ErrorRecord>;
+  static constexpr std::size_t kRowsPerBlock = 64;
+  using BlockRing = SpscRing<RowBlock*, 4096>;
 
  public:
   Modeller(const Configuration& configuration, noise::ModelSpec spec);
@@ -119,19 +124,23 @@ class Modeller {
   /// Fits what is due and ends.
   void stop();
 
-  /// Hands in a row. A modeller that cannot keep up loses rows, counted by the ring.
-  void add(const ErrorRecord& record) { (void)rows_->try_push(record); }
+  /// Hands in a row. A modeller that is a quarter of an hour behind (of three S-IMUs) loses blocks of rows,
+  /// counted by the ring.
+  void add(const ErrorRecord& record);
   /// Refits since the last call.
   [[nodiscard]] std::vector<Refit> take();
-  static constexpr std::size_t ring_capacity() { return RowRing::capacity(); }
-  [[nodiscard]] RingCounters ring() const { return rows_->counters(); }
+  /// The ring holds blocks of rows.
+  static constexpr std::size_t ring_capacity() { return BlockRing::capacity(); }
+  [[nodiscard]] RingCounters ring() const { return blocks_->counters(); }
 
  private:
   void loop();
   void drain();
+  void hand_over();
 
   ModelBook book_;
-  std::unique_ptr<RowRing> rows_;
+  std::unique_ptr<RowBlock> filling_;
+  std::unique_ptr<BlockRing> blocks_;  ///< owns the blocks that it holds
   std::mutex mutex_;
   std::vector<Refit> refits_;
   struct Options {

@@ -14,6 +14,7 @@
 #include "service/noise_series.h"
 #include "service/noise_study.h"
 #include "service/regime_study.h"
+#include "service/replay_broadcast.h"
 #include "service/smoothing.h"
 
 namespace imuscope {
@@ -385,16 +386,24 @@ namespace {
 /// A replay's results: the files of a run, and the refits of the live run at the same samples.
 class ReplaySink final : public CoreSink {
  public:
-  ReplaySink(RunFolder& folder, const Configuration& configuration, noise::ModelSpec spec)
-      : folder_(folder), book_(configuration, std::move(spec)) {}
+  ReplaySink(RunFolder& folder, const Configuration& configuration, noise::ModelSpec spec,
+             ReplayBroadcast& broadcast)
+      : folder_(folder), book_(configuration, std::move(spec)), broadcast_(broadcast) {}
 
   void on_error(const ErrorRecord& record) noexcept override {
     folder_.on_error(record);
+    broadcast_.on_error(record);
     book_.add(record);
-    while (const auto refit = book_.refit()) models_.take(*refit);
+    while (const auto refit = book_.refit()) {
+      models_.take(*refit);
+      broadcast_.on_refit(*refit);
+    }
   }
   void on_event(const EstimatorEvent& event) noexcept override { folder_.on_event(event); }
-  void on_snapshot(const Snapshot& snapshot) noexcept override { folder_.on_snapshot(snapshot); }
+  void on_snapshot(const Snapshot& snapshot) noexcept override {
+    folder_.on_snapshot(snapshot);
+    broadcast_.on_snapshot(snapshot);
+  }
   void on_late_sample(const LateSample& late) noexcept override { folder_.on_late_sample(late); }
 
   [[nodiscard]] const NewestModels& models() const { return models_; }
@@ -402,13 +411,14 @@ class ReplaySink final : public CoreSink {
  private:
   RunFolder& folder_;
   ModelBook book_;
+  ReplayBroadcast& broadcast_;
   NewestModels models_;
 };
 
 }  // namespace
 
 Result<void> run_replay(const Configuration& configuration, const Recording& recording,
-                        const StudyRunOptions& options, bool realtime) {
+                        const StudyRunOptions& options, const PlayOptions& play) {
   auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
   // What an earlier study left in this folder would be taken for this run's.
@@ -422,11 +432,15 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
     std::filesystem::remove(options.out / file, absent_is_well);
   }
   ReplayOptions replay_options;
-  replay_options.realtime = realtime;
+  replay_options.realtime = play.realtime;
   if (options.progress) replay_options.progress = [&](double share) { options.progress("replay", share); };
   const auto spec = noise::parse_model(configuration.noise.model);
   if (!spec) return tl::unexpected<Error>(spec.error());
-  ReplaySink sink(**folder, configuration, *spec);
+  ReplayBroadcast broadcast(configuration, recording, options.version);
+  if (!play.lcm_url.empty()) {
+    if (auto opened = broadcast.open(play.lcm_url); !opened) return opened;
+  }
+  ReplaySink sink(**folder, configuration, *spec, broadcast);
   const auto result = replay(configuration, estimator_config(configuration), recording, sink, replay_options);
   if (!result) return tl::unexpected<Error>(result.error());
   if (auto written = sink.models().write(options.out); !written) return written;

@@ -55,9 +55,15 @@ std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, 
 Result<void> run_study(const Configuration& configuration, const Recording& recording,
                        const StudyRunOptions& options);
 
+/// How a recording is played.
+struct PlayOptions {
+  bool realtime = false;  ///< paced as recorded
+  std::string lcm_url;    ///< publishes what a live run would, here; empty: nothing
+};
+
 /// Replays `recording` once and writes navigation.csv, calibration_NAME.csv, errors_NAME.csv with the
 /// estimates as they stood, calibration.json and run.json.
 Result<void> run_replay(const Configuration& configuration, const Recording& recording,
-                        const StudyRunOptions& options, bool realtime);
+                        const StudyRunOptions& options, const PlayOptions& play);
 
 }  // namespace imuscope

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <unistd.h>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -69,9 +70,9 @@ double tolerance(const Table& expected, std::size_t c, const std::vector<double>
 
 class Golden : public testing::Test {
  protected:
-  /// How many recorded reads an event log holds. Layout: LCM's log format, big-endian, 28 bytes before the
-  /// channel.
-  static int raw_events(const std::filesystem::path& log) {
+  /// How many events an event log holds whose channel begins so. Layout: LCM's log format, big-endian, 28
+  /// bytes before the channel.
+  static int events(const std::filesystem::path& log, const std::string& channel_begin) {
     constexpr std::size_t kHeader = 28;
     constexpr std::size_t kChannelLength = 20;
     const std::string bytes = read_text(log);
@@ -83,11 +84,12 @@ class Golden : public testing::Test {
     int count = 0;
     for (std::size_t at = 0; at + kHeader <= bytes.size();) {
       const std::size_t channel = number(at + kChannelLength);
-      count += bytes.compare(at + kHeader, 13, "IMUSCOPE_RAW_") == 0 ? 1 : 0;
+      count += bytes.compare(at + kHeader, channel_begin.size(), channel_begin) == 0 ? 1 : 0;
       at += kHeader + channel + number(at + kChannelLength + 4);
     }
     return count;
   }
+  static int raw_events(const std::filesystem::path& log) { return events(log, "IMUSCOPE_RAW_"); }
 
   /// Plays the capture onto a bus of its own (other programs on this PC may be speaking on the usual one),
   /// with two loggers that listen: to everything, and to the devices' bytes alone.
@@ -152,6 +154,25 @@ TEST_F(Golden, PacedAsRecordedItGivesTheSameAndTakesItsTime) {
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_EQ(replay(capture_, "paced", {"--realtime"}), fast);
   EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(15)) << "18 s were recorded";
+}
+
+TEST_F(Golden, PublishesWhatItReplaysAndGivesTheSame) {
+  const auto bus = folder_ / "bus.lcm";
+  const auto texts = replay(capture_, "published", {"--lcm", "file://" + bus.string() + "?mode=w"});
+  EXPECT_EQ(texts, replay(capture_, "quiet"));
+  const auto rows = [&](const char* file) {
+    const auto& text = texts.at(file);
+    return static_cast<int>(std::count(text.begin(), text.end(), '\n')) - 1;
+  };
+  EXPECT_EQ(events(bus, "IMUSCOPE_NAVIGATION"), rows("navigation.csv"));
+  EXPECT_EQ(events(bus, "IMUSCOPE_CALIBRATION_MTX1"), rows("calibration_mtx1.csv"));
+  EXPECT_EQ(events(bus, "IMUSCOPE_ERROR_MTX1"), rows("errors_mtx1.csv"));
+  EXPECT_GE(events(bus, "IMUSCOPE_STATUS"), 15) << "one for each of the 18 s";
+  EXPECT_EQ(run_program("imuscope",
+                        {"replay", capture_.string(), "--out", (folder_ / "no").string(), "--lcm",
+                         "tcpq://localhost:7700"},
+                        folder_ / "no.log"),
+            2);
 }
 
 TEST_F(Golden, PlayedByLcmLogplayerAndRecordedByLcmLoggerItReplaysToTheSame) {

@@ -108,6 +108,18 @@ TEST(Configuration, AnImpossibleValueNamesItsRange) {
               HasSubstr("rate_hz must be a number from 0.1"));
 }
 
+TEST(Configuration, CoresOfTheThreadsAreAList) {
+  const auto configuration =
+      parsed(std::string("[threads]\nio_cores = [1]\nestimator_cores = [0, 1]\n") + kMinimal);
+  EXPECT_EQ(configuration.threads.io_cores, std::vector<int>{1});
+  EXPECT_EQ(configuration.threads.estimator_cores, (std::vector<int>{0, 1}));
+  EXPECT_TRUE(parsed(kMinimal).threads.io_cores.empty()) << "any core unless some are named";
+  EXPECT_THAT(refused(std::string("[threads]\nio_cores = [-1]\n") + kMinimal),
+              HasSubstr("threads.io_cores names a core -1"));
+  EXPECT_THAT(refused(std::string("[threads]\nio_cores = [0.5]\n") + kMinimal),
+              HasSubstr("names a core 0.5"));
+}
+
 TEST(Configuration, AxesThatAreNoRotationAreRefused) {
   EXPECT_THAT(refused(std::string(kMinimal) + "axes = \"+x +y -z\"\n"), HasSubstr("is not a rotation"));
   EXPECT_THAT(refused(std::string(kMinimal) + "axes = \"forward\"\n"), HasSubstr("signed axes"));

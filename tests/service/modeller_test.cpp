@@ -135,5 +135,18 @@ TEST(ModelBook, AWarmRefitEndsWhereASearchOverAllRatesDoes) {
   }
 }
 
+TEST(Modeller, LosesNoRowWhileItsThreadDoesNotGetToRun) {
+  Modeller modeller(two_devices(), *noise::parse_model("WN"));
+  std::mt19937 random(4);
+  constexpr int kRows = 60'030;  // ten minutes at 100 Hz, and a block that is not full
+  for (int i = 0; i < kRows; ++i) modeller.add({0, HostTime{}, row_of(i, Regime::kDynamic, random)});
+  EXPECT_EQ(modeller.ring().refused, 0U);
+  modeller.start({"modeller", Scheduling::kIdle, 0, {}});
+  modeller.stop();
+  const auto refits = modeller.take();
+  ASSERT_EQ(refits.size(), 60U) << "one for every 10 s of samples";
+  EXPECT_EQ(refits.back().samples, 60'000);
+}
+
 }  // namespace
 }  // namespace imuscope

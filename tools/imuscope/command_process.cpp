@@ -23,6 +23,7 @@ struct Options {
   std::string out;
   std::string labels;
   bool realtime = false;
+  std::string lcm;
   bool json = false;
 };
 
@@ -118,7 +119,9 @@ Result<void> replay_command(const Options& options) {
                               [&](const std::string& step, double share) { bar.show(step, share); },
                               {},
                               {}};
-    if (auto done = run_replay(opened->configuration, opened->recording, run, options.realtime); !done)
+    if (auto done =
+            run_replay(opened->configuration, opened->recording, run, {options.realtime, options.lcm});
+        !done)
       return done;
   }
   return print_study(options.out, options.json);
@@ -146,6 +149,8 @@ void add_replay(CLI::App& app, Work& chosen) {
   add_inputs(*command, *options);
   command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
   command->add_flag("--realtime", options->realtime, "paced as recorded");
+  command->add_option("--lcm", options->lcm, "publish here what the live run published, for top and lcm-spy")
+      ->type_name("URL");
   command->add_flag("--json", options->json, "print the summary as JSON");
   on_chosen(*command, chosen, [options] { return replay_command(*options); });
 }

@@ -1,9 +1,8 @@
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 #include <exception>
 
 #include "commands.h"
+#include "log_format.h"
 
 namespace {
 
@@ -50,11 +49,10 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
   // Results go to stdout, the log to stderr.
-  spdlog::set_default_logger(spdlog::stderr_color_mt("imuscope"));
-  spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  imuscope::cli::set_up_log();
   const auto result = work();
   if (result) return 0;
-  fmt::print(stderr, "imuscope: {}\n", result.error().text());
+  fmt::print(stderr, "{}imuscope: {}\n", imuscope::cli::error_prefix(), result.error().text());
   return result.error().kind == imuscope::ErrorKind::kUsage ? 2 : 1;
 }
 

@@ -1,0 +1,43 @@
+#pragma once
+
+/// What a run says over LCM while it goes on, live and in a replay alike. Soft world.
+
+#include <optional>
+#include <vector>
+
+#include "publish/lcm_publisher.h"
+#include "service/config.h"
+#include "service/modeller.h"
+#include "service/report_values.h"
+
+namespace imuscope {
+
+/// Thread: one. Without a bus it says nothing and still knows the run's UTC.
+class Broadcast {
+ public:
+  /// @param anchor  UTC as long as no device has told it
+  Broadcast(const Configuration& configuration, const UtcAnchor& anchor);
+
+  /// @param bridge  pose_t and ins_t, too
+  void open(LcmPublisher bus, bool bridge);
+  void close() { bus_.reset(); }
+  void set_tap(LcmPublisher::Tap tap);
+
+  void on_error(const ErrorRecord& record);
+  void on_snapshot(const Snapshot& snapshot);
+  void on_refit(const Refit& refit);
+  void publish(const StatusReport& report);
+
+  [[nodiscard]] const UtcAnchor& anchor() const { return anchor_; }
+
+ private:
+  const Configuration& configuration_;
+  std::vector<std::size_t> study_devices_;
+  std::optional<LcmPublisher> bus_;
+  bool bridge_ = false;
+  std::optional<Snapshot> bridge_origin_;
+  UtcAnchor anchor_;
+  bool anchored_by_device_ = false;
+};
+
+}  // namespace imuscope

@@ -1,0 +1,105 @@
+/// The manual page names every command, and the log speaks the journal's language where the journal listens.
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <regex>
+#include <set>
+#include <sstream>
+
+#include "programs.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+/// The commands that `imuscope --help` lists: two spaces, a word, at least two spaces.
+std::set<std::string> commands_of_the_program() {
+  const auto log = scratch_folder() / "help.txt";
+  EXPECT_EQ(run_program("imuscope", {"--help"}, log), 0);
+  const std::string text = read_text(log);
+  std::istringstream lines(text.substr(text.find("Subcommands:")));
+  std::set<std::string> commands;
+  std::smatch match;
+  for (std::string line; std::getline(lines, line);) {
+    if (std::regex_search(line, match, std::regex("^  ([a-z]+)  "))) commands.insert(match[1]);
+  }
+  return commands;
+}
+
+std::set<std::string> commands_of_the_manual() {
+  std::istringstream lines(read_text(source_path("config/imuscope.1")));
+  std::set<std::string> commands;
+  std::smatch match;
+  for (std::string line; std::getline(lines, line);) {
+    if (std::regex_search(line, match, std::regex("^\\.It Cm ([a-z]+)"))) commands.insert(match[1]);
+  }
+  return commands;
+}
+
+TEST(ManualPage, NamesEveryCommandAndNoOther) {
+  const auto commands = commands_of_the_program();
+  EXPECT_GT(commands.size(), 10U);
+  EXPECT_EQ(commands_of_the_manual(), commands);
+}
+
+TEST(ManualPage, IsMarkedUpWithoutAMistake) {
+  if (std::system("command -v mandoc >/dev/null") != 0)
+    GTEST_SKIP() << "mandoc is missing: apt-get install mandoc";
+  const auto log = scratch_folder() / "mandoc.txt";
+  const std::string command =
+      "mandoc -T lint -W error " + source_path("config/imuscope.1").string() + " >" + log.string();
+  EXPECT_EQ(std::system(command.c_str()), 0) << read_text(log);
+}
+
+/// A run whose devices are not there: it logs information, warnings and errors, and fails.
+std::string log_of_a_run(const std::filesystem::path& log, const std::string& journal_stream) {
+  const auto folder = log.parent_path();
+  const auto configuration = folder / "absent.toml";
+  std::ofstream(configuration) << std::regex_replace(read_text(source_path("config/demo.toml")),
+                                                     std::regex("/tmp/imuscope-demo"),
+                                                     (folder / "absent").string());
+  setenv("JOURNAL_STREAM", journal_stream.c_str(), 1);
+  EXPECT_EQ(run_program(
+                "imuscope",
+                {"run", configuration.string(), "--seconds", "0.3", "--out", (folder / "run").string()}, log),
+            1);
+  unsetenv("JOURNAL_STREAM");
+  return read_text(log);
+}
+
+/// Device and inode of a file as systemd writes them.
+std::string stream_of(const std::filesystem::path& file) {
+  std::ofstream(file) << "";
+  struct stat status {};
+  EXPECT_EQ(stat(file.c_str(), &status), 0);
+  return std::to_string(status.st_dev) + ":" + std::to_string(status.st_ino);
+}
+
+TEST(JournalLog, EveryLineCarriesItsPriorityAndNoTime) {
+  const auto log = scratch_folder() / "journal.log";
+  const std::string text = log_of_a_run(log, stream_of(log));
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_TRUE(std::regex_search(line, std::regex("^<[3467]>[^0-9]"))) << line;
+  EXPECT_THAT(text, HasSubstr("<6>running 'demo'"));
+  EXPECT_THAT(text, HasSubstr("<3>airins: port "));
+  EXPECT_THAT(text, HasSubstr("<3>imuscope: no device ever sent a sample"));
+}
+
+TEST(JournalLog, APipeThatOnlyInheritedTheVariableGetsTheLogForPeople) {
+  const auto log = scratch_folder() / "people.log";
+  const std::string text = log_of_a_run(log, "1:1");
+  EXPECT_THAT(text, Not(HasSubstr("<6>")));
+  EXPECT_THAT(text, testing::ContainsRegex("[0-9]:[0-9][0-9]\\.[0-9]+ info running 'demo'"));
+}
+
+}  // namespace
+}  // namespace imuscope::test

@@ -1,0 +1,68 @@
+#include "log_format.h"
+
+#include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cstdlib>
+#include <memory>
+
+namespace imuscope::cli {
+
+namespace {
+
+/// The level as sd-daemon(3) writes it.
+class PriorityFlag final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
+              spdlog::memory_buf_t& out) override {
+    const std::string_view prefix = of(message.level);
+    out.append(prefix.data(), prefix.data() + prefix.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PriorityFlag>();
+  }
+
+  static std::string_view of(spdlog::level::level_enum level) {
+    switch (level) {
+      case spdlog::level::critical:
+        return "<2>";
+      case spdlog::level::err:
+        return "<3>";
+      case spdlog::level::warn:
+        return "<4>";
+      case spdlog::level::info:
+        return "<6>";
+      default:
+        return "<7>";
+    }
+  }
+};
+
+}  // namespace
+
+bool logs_to_journal() {
+  const char* const stream = std::getenv("JOURNAL_STREAM");
+  struct stat file {};
+  if (stream == nullptr || fstat(STDERR_FILENO, &file) != 0) return false;
+  return fmt::format("{}:{}", file.st_dev, file.st_ino) == stream;
+}
+
+void set_up_log() {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("imuscope"));
+  if (!logs_to_journal()) {
+    spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+    return;
+  }
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<PriorityFlag>('*').set_pattern("%*%v");
+  spdlog::set_formatter(std::move(formatter));
+}
+
+std::string_view error_prefix() {
+  return logs_to_journal() ? PriorityFlag::of(spdlog::level::err) : std::string_view{};
+}
+
+}  // namespace imuscope::cli
