@@ -283,7 +283,8 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
                        "Ratio: the second regime's parameter over the first's. The p values are corrected "
                        "for the number of tests (Holm); “no difference shown” is not “equal”.");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + parameter_table(run, fits, study.name, regimes) +
+    section += element("h3", text(study.name)) +
+               parameter_table(run, fits, study.name, particular_regimes(regimes)) +
                left_out(run, study.name) + fit_warnings(fits, study.name);
   }
   return section;
