@@ -172,7 +172,9 @@ TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
   EXPECT_EQ(tables.at("comparisons").size(), 18U);
   for (const auto& c : tables.at("comparisons")) {
     for (const auto& p : c.at("parameters")) {
-      if (p.at("process") == "WN") EXPECT_GT(p.at("first_truth").get<double>(), 0.0);
+      if (p.at("process") == "WN") {
+        EXPECT_GT(p.at("first_truth").get<double>(), 0.0);
+      }
     }
   }
 

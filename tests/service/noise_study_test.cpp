@@ -103,7 +103,9 @@ TEST(NoiseStudy, ALineIsSaidAndDoesNotEnterTheModel) {
   EXPECT_NEAR(study.lines[0].at("amplitude").get<double>(), 0.5, 0.05);
   EXPECT_THAT(study.remarks, Contains(HasSubstr("a vibration line at 31 Hz")));
   for (const auto& model : study.models) {
-    if (model.axis == 0) EXPECT_NEAR(model.fit.parameters[0].value, 1.0, 0.05) << model.regime;
+    if (model.axis == 0) {
+      EXPECT_NEAR(model.fit.parameters[0].value, 1.0, 0.05) << model.regime;
+    }
   }
 }
 
