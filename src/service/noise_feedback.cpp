@@ -19,15 +19,19 @@ struct FittedProcess {
   std::string name;
   double sd = 0.0;
   double tau_s = 0.0;  ///< of a GM
+  bool known = true;   ///< each of its parameters is positive and identifiable
 };
 
-/// WN and GM processes of a model whose parameters are all known.
+/// WN and GM processes of a model. A record can be too short for a slow process and yet tell the white noise
+/// well.
 std::vector<FittedProcess> processes_of(const AxisNoiseModel& model) {
   std::vector<FittedProcess> processes;
   for (const auto& parameter : model.parameters) {
-    if (!std::isfinite(parameter.value) || parameter.value <= 0.0) return {};
     if (processes.empty() || processes.back().name != parameter.process)
-      processes.push_back({parameter.process, 0.0, 0.0});
+      processes.push_back({parameter.process, 0.0, 0.0, true});
+    const bool identifiable = model.identifiable || std::isfinite(parameter.ci_low);
+    if (!identifiable || !std::isfinite(parameter.value) || parameter.value <= 0.0)
+      processes.back().known = false;
     if (parameter.name == "sigma2") processes.back().sd = std::sqrt(parameter.value);
     if (parameter.name == "beta") processes.back().tau_s = 1.0 / parameter.value;
   }
@@ -42,18 +46,20 @@ bool believed(double sd, double present_sd) {
 }
 
 void update_triad(const std::vector<FittedProcess>& processes, std::size_t axis, TriadNoise& triad) {
-  const double fast_part = triad.fast_sd[axis];
-  const double present_sd = std::hypot(triad.white_sd[axis], fast_part);
+  const double present_sd = std::hypot(triad.white_sd[axis], triad.fast_sd[axis]);
   double white_sd = 0.0;
-  double fast_sd = 0.0;
-  double fast_tau_s = 0.0;
+  const FittedProcess* fast = nullptr;
   for (const auto& process : processes) {
-    if (process.name == "WN") white_sd = process.sd;
+    if (process.name == "WN" && process.known) white_sd = process.sd;
     const bool is_fast = process.tau_s > 0.0 && process.tau_s <= kFastTau_s;
-    if (is_fast && (fast_sd == 0.0 || process.tau_s < fast_tau_s)) {
-      fast_sd = process.sd;
-      fast_tau_s = process.tau_s;
-    }
+    if (is_fast && (fast == nullptr || process.tau_s < fast->tau_s)) fast = &process;
+  }
+  // One that the record cannot tell leaves what the filter has; none in the model is none.
+  double fast_sd = fast == nullptr ? 0.0 : triad.fast_sd[axis];
+  double fast_tau_s = fast == nullptr ? 0.0 : triad.fast_time_constant_s[axis];
+  if (fast != nullptr && fast->known) {
+    fast_sd = fast->sd;
+    fast_tau_s = fast->tau_s;
   }
   if (!(white_sd > 0.0) || !believed(std::hypot(white_sd, fast_sd), present_sd)) return;
   triad.white_sd[axis] = white_sd;
@@ -64,7 +70,7 @@ void update_triad(const std::vector<FittedProcess>& processes, std::size_t axis,
 void update_bias(const std::vector<FittedProcess>& processes, GaussMarkovConfig& bias) {
   const FittedProcess* slowest = nullptr;
   for (const auto& process : processes) {
-    if (process.tau_s > kFastTau_s && (slowest == nullptr || process.tau_s > slowest->tau_s))
+    if (process.known && process.tau_s > kFastTau_s && (slowest == nullptr || process.tau_s > slowest->tau_s))
       slowest = &process;
   }
   if (slowest == nullptr || !believed(slowest->sd, bias.sd)) return;
@@ -101,7 +107,7 @@ StudyNoise updated_noise(const StudyNoise& current, const NoiseModelReport& fitt
           std::find_if(fitted.models.begin(), fitted.models.end(), [&](const AxisNoiseModel& m) {
             return m.axis == axis_name(axis) && m.regime == regime_name(regime);
           });
-      if (found == fitted.models.end() || !found->identifiable) continue;
+      if (found == fitted.models.end()) continue;
       const auto processes = processes_of(*found);
       const bool is_gyro = axis < 3;
       auto& triads = is_gyro ? updated.gyro : updated.accel;

@@ -11,10 +11,11 @@
 
 namespace imuscope {
 
-/// `current` with what a refit says of it. Per axis and regime, of an identifiable model: WN becomes the
-/// white noise, the fastest GM of at most one second the fast process, the slowest GM beyond that the bias
-/// process (of the dynamic regime where there is one). A variance more than a hundred times, or less than a
-/// hundredth, of the present one is not believed: the filter keeps what it has for that axis.
+/// `current` with what a refit says of it. Per axis and regime, of the processes that are identifiable: WN
+/// becomes the white noise, the fastest GM of at most one second the fast process, the slowest GM beyond that
+/// the bias process (of the dynamic regime where there is one). Without its white noise a model says nothing
+/// of the noise. A variance more than a hundred times, or less than a hundredth, of the present one is not
+/// believed: the filter keeps what it has for that axis.
 [[nodiscard]] StudyNoise updated_noise(const StudyNoise& current, const NoiseModelReport& fitted);
 
 /// Decides, refit by refit, what goes back to the filter of one S-IMU. Four rules keep the loop from talking

@@ -119,9 +119,10 @@ nlohmann::json tables_of(const std::filesystem::path& run, const std::filesystem
 }
 
 TEST(StudyOfADrive, TheErrorProcessIsTheTrueErrorToAHundredthOfTheNoise) {
-  const auto folder = scratch_folder() / "drive";
+  const auto scratch = scratch_folder();
+  const auto folder = scratch / "drive";
   record(folder, "6");
-  const auto out = scratch_folder() / "run";
+  const auto out = scratch / "run";
   ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
   const auto truth = read_json(folder / "truth.json");
   constexpr std::array<const char*, kAxes> kNames{"gyro_x",  "gyro_y",  "gyro_z",
@@ -148,10 +149,11 @@ TEST(StudyOfADrive, TheErrorProcessIsTheTrueErrorToAHundredthOfTheNoise) {
 }
 
 TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
-  const auto folder = scratch_folder() / "drive";
+  const auto scratch = scratch_folder();
+  const auto folder = scratch / "drive";
   record(folder, "4");
   cut_in_half(folder, "mtx3");
-  const auto out = scratch_folder() / "run";
+  const auto out = scratch / "run";
   ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
 
   const auto regimes = read_json(out / "regimes.json");
@@ -178,9 +180,9 @@ TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
     }
   }
 
-  const auto labels = scratch_folder() / "labels.csv";
+  const auto labels = scratch / "labels.csv";
   std::ofstream(labels) << "begin_s,end_s,regime\n0,55,parked\n70,130,town\n130,200,road\n";
-  const auto labelled = scratch_folder() / "labelled";
+  const auto labelled = scratch / "labelled";
   ASSERT_EQ(process(folder, labelled, {"--labels", labels.string()}), 0)
       << read_text(labelled.string() + ".log");
   const auto named = read_json(labelled / "regimes.json");

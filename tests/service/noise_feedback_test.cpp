@@ -69,6 +69,20 @@ TEST(NoiseFeedback, WhatIsNotIdentifiableNotPositiveOrBeyondBeliefIsLeftAside) {
   EXPECT_TRUE(same(model));
 }
 
+TEST(NoiseFeedback, ARecordTooShortForTheSlowProcessesStillTellsTheWhiteNoise) {
+  const auto current = mtx_class_noise();
+  const double white = 1.5 * current.gyro[kDynamic].white_sd[0];
+  auto model = model_of("gyro_x", "dynamic", white, 2.0 * white, 0.05, 3.0 * current.gyro_bias[0].sd, 80.0);
+  model.identifiable = false;
+  model.parameters[0].ci_low = 0.9 * white * white;
+  model.parameters[0].ci_high = 1.1 * white * white;
+  NoiseModelReport fitted;
+  fitted.models = {model};
+  auto expected = current;
+  expected.gyro[kDynamic].white_sd[0] = white;
+  EXPECT_TRUE(updated_noise(current, fitted) == expected);
+}
+
 /// A refit that says `factor` times the present sd of every axis of the gyroscope in motion.
 NoiseModelReport louder(const StudyNoise& base, double factor, double slow_factor = 1.0) {
   NoiseModelReport fitted;
