@@ -15,7 +15,7 @@ Html nees_cell(const json& row, const char* key) {
   const auto low = number_at(row, "nees_low");
   const auto high = number_at(row, "nees_high");
   if (!nees || !low || !high) return text(kUnknown);
-  const Html value = number(*nees, 3);
+  Html value = number(*nees, 3);
   if (*nees > *high) return element("strong", value + text(" ▲"), "no");
   if (*nees < *low) return element("strong", value + text(" ▼"), "partly");
   return value;
