@@ -13,7 +13,7 @@
 namespace imuscope::test {
 namespace {
 
-constexpr int kRun_s = 48;
+constexpr std::chrono::seconds kRun{48};
 constexpr const char* kFaults = R"(
 [[fault]]
 kind = "unplug"
@@ -69,23 +69,7 @@ class LiveFaults : public testing::Test {
 };
 
 TEST_F(LiveFaults, EachDeviceComesBackIsCountedAndDisturbsNoOther) {
-  lcm::LCM bus("udpm://239.255.76.67:7667?ttl=0");
-  ASSERT_TRUE(bus.good());
-  bus.subscribe("IMUSCOPE_STATUS", &Listener::on_status, &listener_);
-  listener_.started = std::chrono::steady_clock::now();
-  BackgroundProgram vehicle("imusim",
-                            {"live", (folder_ / "live.toml").string(), "--skip-static", "--faults",
-                             (folder_ / "faults.toml").string()},
-                            folder_ / "imusim.log");
-  BackgroundProgram service("imuscope",
-                            {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live").string()},
-                            folder_ / "imuscope.log");
-  while (std::chrono::steady_clock::now() - listener_.started < std::chrono::seconds(kRun_s))
-    bus.handleTimeout(100);
-  service.interrupt();
-  ASSERT_EQ(service.wait(), 0) << read_text(folder_ / "imuscope.log");
-  vehicle.interrupt();
-  vehicle.wait();
+  ASSERT_NO_FATAL_FAILURE(run_beside(folder_, "live.toml", kRun, listener_));
   SCOPED_TRACE(read_text(folder_ / "imuscope.log"));
   ASSERT_GT(listener_.heard.size(), 30U);
 

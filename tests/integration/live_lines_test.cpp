@@ -16,7 +16,7 @@
 namespace imuscope::test {
 namespace {
 
-constexpr int kRun_s = 38;
+constexpr std::chrono::seconds kRun{38};
 /// Before the first fault; by then every line is open and the baud rate found.
 constexpr double kSettled_s = 83.0;
 /// Behind those of the first group.
@@ -175,23 +175,7 @@ std::vector<Row> heights_of(const std::filesystem::path& run) {
 }
 
 TEST_F(LiveLines, EveryKindOfLineAndFaultInOneRun) {
-  lcm::LCM bus("udpm://239.255.76.67:7667?ttl=0");
-  ASSERT_TRUE(bus.good());
-  bus.subscribe("IMUSCOPE_STATUS", &Listener::on_status, &listener_);
-  listener_.started = std::chrono::steady_clock::now();
-  BackgroundProgram vehicle("imusim",
-                            {"live", (folder_ / "vehicle.toml").string(), "--skip-static", "--faults",
-                             (folder_ / "faults.toml").string()},
-                            folder_ / "imusim.log");
-  BackgroundProgram service("imuscope",
-                            {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live").string()},
-                            folder_ / "imuscope.log");
-  while (std::chrono::steady_clock::now() - listener_.started < std::chrono::seconds(kRun_s))
-    bus.handleTimeout(100);
-  service.interrupt();
-  ASSERT_EQ(service.wait(), 0) << read_text(folder_ / "imuscope.log");
-  vehicle.interrupt();
-  vehicle.wait();
+  ASSERT_NO_FATAL_FAILURE(run_beside(folder_, "vehicle.toml", kRun, listener_));
   const std::string log = read_text(folder_ / "imuscope.log");
   SCOPED_TRACE(log);
   ASSERT_GT(listener_.heard.size(), 25U);

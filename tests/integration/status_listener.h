@@ -7,11 +7,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <filesystem>
 #include <imuscope/status_t.hpp>
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 #include <string>
 #include <vector>
+
+#include "programs.h"
 
 namespace imuscope::test {
 
@@ -69,5 +72,27 @@ struct Listener {
     return *found;
   }
 };
+
+/// Runs the service with `folder`/live.toml into `folder`/live for a while, beside a driving vehicle of
+/// `folder`/`vehicle` with the faults of `folder`/faults.toml, and keeps what the service says of itself.
+inline void run_beside(const std::filesystem::path& folder, const std::string& vehicle,
+                       std::chrono::seconds length, Listener& listener) {
+  lcm::LCM bus("udpm://239.255.76.67:7667?ttl=0");
+  ASSERT_TRUE(bus.good());
+  bus.subscribe("IMUSCOPE_STATUS", &Listener::on_status, &listener);
+  listener.started = std::chrono::steady_clock::now();
+  BackgroundProgram simulator(
+      "imusim",
+      {"live", (folder / vehicle).string(), "--skip-static", "--faults", (folder / "faults.toml").string()},
+      folder / "imusim.log");
+  BackgroundProgram service("imuscope",
+                            {"run", (folder / "live.toml").string(), "--out", (folder / "live").string()},
+                            folder / "imuscope.log");
+  while (std::chrono::steady_clock::now() - listener.started < length) bus.handleTimeout(100);
+  service.interrupt();
+  ASSERT_EQ(service.wait(), 0) << read_text(folder / "imuscope.log");
+  simulator.interrupt();
+  simulator.wait();
+}
 
 }  // namespace imuscope::test
