@@ -8,6 +8,7 @@
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
@@ -83,6 +84,7 @@ tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesy
 PseudoTerminal::PseudoTerminal(PseudoTerminal&& other) noexcept
     : LineEnd(std::move(other)),
       near_end_(std::exchange(other.near_end_, -1)),
+      waiting_(std::move(other.waiting_)),
       terminal_(std::move(other.terminal_)),
       link_(std::move(other.link_)) {}
 
@@ -103,14 +105,27 @@ bool PseudoTerminal::is_open_elsewhere() const {
   return ::poll(&state, 1, 0) >= 0 && (state.revents & POLLHUP) == 0;
 }
 
+void PseudoTerminal::push_waiting() {
+  if (waiting_.empty() || !is_open_elsewhere()) return;
+  const ssize_t written = ::write(near_end_, waiting_.data(), waiting_.size());
+  if (written > 0) waiting_.erase(waiting_.begin(), waiting_.begin() + written);
+}
+
 std::size_t PseudoTerminal::write(std::span<const std::uint8_t> bytes) {
-  if (bytes.empty() || !is_open_elsewhere()) return bytes.size();
-  const ssize_t written = ::write(near_end_, bytes.data(), bytes.size());
-  return bytes.size() - static_cast<std::size_t>(written > 0 ? written : 0);
+  if (!is_open_elsewhere()) {
+    const std::size_t dropped = waiting_.size() + bytes.size();
+    waiting_.clear();
+    return dropped;
+  }
+  const std::size_t kept = std::min(bytes.size(), kWaitingMax - waiting_.size());
+  waiting_.insert(waiting_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(kept));
+  push_waiting();
+  return bytes.size() - kept;
 }
 
 Bytes PseudoTerminal::read() {
   constexpr std::size_t kChunk = 1024;
+  push_waiting();
   Bytes result;
   std::array<std::uint8_t, kChunk> chunk{};
   while (true) {

@@ -338,6 +338,23 @@ TEST(PseudoTerminal, TakesTheLinksPlaceButNotAFiles) {
   EXPECT_EQ(content_of(folder / "file"), "precious");
 }
 
+TEST(PseudoTerminal, AFloodThatTheKernelDoesNotTakeAtOnceArrivesWhole) {
+  const std::filesystem::path folder = scratch_folder();
+  auto terminal = PseudoTerminal::open(folder / "port", 115200);
+  ASSERT_TRUE(terminal.has_value()) << terminal.error();
+  Reader reader(folder / "port");
+  constexpr std::size_t kFlood = 60'000;  // while nobody reads, the kernel takes some 14 kB of it
+  Bytes bytes(kFlood);
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(i * i >> 3U);
+  EXPECT_EQ(terminal->write(bytes), 0U);
+  std::atomic<bool> heard = false;
+  std::jthread device([&] {
+    while (!heard.load()) (void)terminal->read();
+  });
+  EXPECT_TRUE(reader.hears(bytes));
+  heard = true;
+}
+
 TEST(PseudoTerminal, DropsWhatNobodyReadsWithoutWaiting) {
   const std::filesystem::path folder = scratch_folder();
   auto terminal = PseudoTerminal::open(folder / "port", 115200);

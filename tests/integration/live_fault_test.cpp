@@ -13,39 +13,41 @@
 namespace imuscope::test {
 namespace {
 
-constexpr std::chrono::seconds kRun{48};
+// The drive shows how the S-IMUs sit by its second 85; the faults come after that. What a line that is opened in the
+// middle of a message makes of its tail is counted before them.
+constexpr std::chrono::seconds kRun{58};
 constexpr const char* kFaults = R"(
 [[fault]]
 kind = "unplug"
 device = "mtx1"
-at_s = 80.0
+at_s = 90.0
 for_s = 3.0
 [[fault]]
 kind = "flip"
 device = "mtx2"
-at_s = 80.0
+at_s = 90.0
 for_s = 8.0
 share = 0.001
 [[fault]]
 kind = "stall"
 device = "mtx3"
-at_s = 80.0
+at_s = 90.0
 for_s = 3.0
 [[fault]]
 kind = "cut"
 device = "gnss"
-at_s = 80.0
+at_s = 90.0
 for_s = 5.0
 share = 0.3
 [[fault]]
 kind = "restart"
 device = "mtx2"
-at_s = 92.0
+at_s = 102.0
 for_s = 0.5
 [[fault]]
 kind = "clock_jump"
 device = "mtx3"
-at_s = 92.0
+at_s = 102.0
 by_s = 2.0
 )";
 
@@ -74,7 +76,7 @@ TEST_F(LiveFaults, EachDeviceComesBackIsCountedAndDisturbsNoOther) {
   ASSERT_GT(listener_.heard.size(), 30U);
 
   for (const char* name : {"airins", "mtx1", "mtx2", "mtx3", "gnss"}) {
-    EXPECT_EQ(at(79.0, name).state, "streaming") << name;
+    EXPECT_EQ(at(89.0, name).state, "streaming") << name;
     EXPECT_EQ(at_end(name).state, "streaming") << name;
     EXPECT_EQ(at_end(name).samples_refused, 0) << name;
   }
@@ -86,29 +88,29 @@ TEST_F(LiveFaults, EachDeviceComesBackIsCountedAndDisturbsNoOther) {
 
   // Unplugged for 3 s: said, opened again by its name, taken over as it streams; the 300 samples are counted.
   EXPECT_TRUE(listener_.any_status("mtx1", [](const device_status_t& d) { return d.state == "no line"; }));
-  const auto lost = at_end("mtx1").samples_lost - at(79.0, "mtx1").samples_lost;
+  const auto lost = at_end("mtx1").samples_lost - at(89.0, "mtx1").samples_lost;
   EXPECT_GE(lost, 298);
   EXPECT_LE(lost, 700) << "3 s, and as long again at most of back-off, which doubles";
   EXPECT_NE(read_text(folder_ / "imuscope.log").find("mtx1 at 115200 baud is gone"), std::string::npos);
 
   // Flipped bits cost the messages that they hit: 8 s of 3100 bytes/s hold some 25 of them.
-  const auto damaged = at(90.0, "mtx2").samples_lost - at(79.0, "mtx2").samples_lost;
+  const auto damaged = at(100.0, "mtx2").samples_lost - at(89.0, "mtx2").samples_lost;
   EXPECT_GE(damaged, 8);
   EXPECT_LE(damaged, 50);
-  EXPECT_GE(at(90.0, "mtx2").bad_checksums, 8);
+  EXPECT_GE(at(100.0, "mtx2").bad_checksums - at(89.0, "mtx2").bad_checksums, 8);
   // Without power its settings stay and its counter does not: set up anew, a new segment of its clock.
   EXPECT_GE(at_end("mtx2").clock_resets, 1);
 
   // A stall that ends by itself loses nothing, though it lasts longer than the second after which a device
   // counts as silent; a jump of its count by 200 looks like 200 lost samples, or like a new segment.
-  EXPECT_EQ(at(90.0, "mtx3").samples_lost, at(79.0, "mtx3").samples_lost);
-  EXPECT_EQ(at(90.0, "mtx3").bad_checksums, 0);
-  EXPECT_TRUE(at_end("mtx3").samples_lost - at(90.0, "mtx3").samples_lost == 200 ||
+  EXPECT_EQ(at(100.0, "mtx3").samples_lost, at(89.0, "mtx3").samples_lost);
+  EXPECT_EQ(at(100.0, "mtx3").bad_checksums, at(89.0, "mtx3").bad_checksums);
+  EXPECT_TRUE(at_end("mtx3").samples_lost - at(100.0, "mtx3").samples_lost == 200 ||
               at_end("mtx3").clock_resets == 1);
 
   // Epochs that lost a piece are dropped, whole ones used.
-  EXPECT_GT(at(90.0, "gnss").bytes_skipped, 0);
-  EXPECT_GT(at_end("gnss").samples, at(90.0, "gnss").samples + 50);
+  EXPECT_GT(at(100.0, "gnss").bytes_skipped, at(89.0, "gnss").bytes_skipped);
+  EXPECT_GT(at_end("gnss").samples, at(100.0, "gnss").samples + 50);
 
   // What happened is in the recording: it replays to the same files.
   ASSERT_EQ(run_program("imuscope",
