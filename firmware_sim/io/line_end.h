@@ -13,8 +13,8 @@ class LineEnd {
  public:
   virtual ~LineEnd() = default;
 
-  /// Writes towards the program; never waits. What does not fit, or nobody is there to read, is dropped (a line that
-  /// keeps some of it says so).
+  /// Writes towards the program; never waits. What does not fit, or nobody is there to read, is dropped (a
+  /// line that keeps some of it says so).
   /// @return how many bytes were dropped
   virtual std::size_t write(std::span<const std::uint8_t> bytes) = 0;
 

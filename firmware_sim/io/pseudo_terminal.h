@@ -27,8 +27,9 @@ class PseudoTerminal : public LineEnd {
   /// Closes it and removes the link, if it still leads here.
   ~PseudoTerminal() override;
 
-  /// What the kernel does not take at once waits here, as in a USB adapter and its driver, and goes out with the next
-  /// calls of write() or read(); what exceeds kWaitingMax, or waits when the far end is closed, is dropped.
+  /// What the kernel does not take at once waits here, as in a USB adapter and its driver, and goes out with
+  /// the next calls of write() or read(); what exceeds kWaitingMax, or waits when the far end is closed, is
+  /// dropped.
   std::size_t write(std::span<const std::uint8_t> bytes) override;
   Bytes read() override;
   [[nodiscard]] int baud() const override;
@@ -43,7 +44,8 @@ class PseudoTerminal : public LineEnd {
   PseudoTerminal(int near_end, std::string terminal, std::filesystem::path link)
       : near_end_(near_end), terminal_(std::move(terminal)), link_(std::move(link)) {}
 
-  /// What the Linux tty layer keeps for one port at most (TTYB_DEFAULT_MEM_LIMIT in drivers/tty/tty_buffer.c).
+  /// What the Linux tty layer keeps for one port at most (TTYB_DEFAULT_MEM_LIMIT in
+  /// drivers/tty/tty_buffer.c).
   static constexpr std::size_t kWaitingMax = 64UL * 1024;
 
   void push_waiting();

@@ -13,8 +13,8 @@
 namespace imuscope::test {
 namespace {
 
-// The drive shows how the S-IMUs sit by its second 85; the faults come after that. What a line that is opened in the
-// middle of a message makes of its tail is counted before them.
+// The drive shows how the S-IMUs sit by its second 85; the faults come after that. What a line that is opened
+// in the middle of a message makes of its tail is counted before them.
 constexpr std::chrono::seconds kRun{58};
 constexpr const char* kFaults = R"(
 [[fault]]
