@@ -11,6 +11,8 @@ using namespace std::chrono_literals;
 /// Replies come within a few epochs; a receiver busy with another port takes longer.
 constexpr Duration kReplyTimeout = 500ms;
 constexpr int kTriesMax = 3;
+/// Nothing pauses for so long in the midst of a message, whatever buffers it comes through.
+constexpr Duration kLineQuiet = 100ms;
 /// Without a complete epoch for this long, or ten periods, something is wrong.
 constexpr Duration kSilenceMin = 5s;
 constexpr int kSilencePeriods = 10;
@@ -92,19 +94,25 @@ void Session::start(HostTime now) noexcept {
   tries_ = 0;
   refused_ = false;
   last_epoch_ = now;
+  last_bytes_ = now;
   bytes_since_epoch_ = 0;
 }
 
 void Session::on_bytes(std::span<const std::uint8_t> bytes, HostTime now) noexcept {
   if (!started_) start(now);
   bytes_since_epoch_ += bytes.size();
-  Frame frame;
+  last_bytes_ = now;
   while (!bytes.empty()) {
     bytes = bytes.subspan(scanner_.append(bytes, now));
-    while (scanner_.next(frame)) {
-      ++frames_;
-      if (frame.kind == Frame::Kind::kMessage) on_message(frame, now);
-    }
+    drain(now, false);
+  }
+}
+
+void Session::drain(HostTime now, bool at_end) noexcept {
+  Frame frame;
+  while (scanner_.next(frame, at_end)) {
+    ++frames_;
+    if (frame.kind == Frame::Kind::kMessage) on_message(frame, now);
   }
 }
 
@@ -163,6 +171,11 @@ void Session::on_complete_epoch(HostTime now) noexcept {
 
 std::span<const std::uint8_t> Session::poll(HostTime now) noexcept {
   if (!started_) start(now);
+  if (command_ < kCommands) {
+    // A message cut off by the opening of the line would take the replies for its rest: the stop has been
+    // heard, and nothing else comes that could fill it.
+    if (now - last_bytes_ >= kLineQuiet) drain(now, true);
+  }
   if (command_ < kCommands) {
     if (tries_ > 0 && now - sent_ < kReplyTimeout) return {};
     if (tries_ == kTriesMax) next_command();

@@ -39,6 +39,7 @@ class Session final : public DeviceSession {
   };
 
   void start(HostTime now) noexcept;
+  void drain(HostTime now, bool at_end) noexcept;
   void on_message(const Frame& frame, HostTime now) noexcept;
   void on_reply(const Frame& frame) noexcept;
   void on_complete_epoch(HostTime now) noexcept;
@@ -57,6 +58,7 @@ class Session final : public DeviceSession {
   int tries_ = 0;            ///< of that command
   bool refused_ = false;     ///< problem_ tells which command the receiver refused
   HostTime sent_{};
+  HostTime last_bytes_{};
   HostTime last_epoch_{};  ///< or begin of the attempt
   std::uint64_t bytes_since_epoch_ = 0;
   std::uint64_t frames_ = 0;

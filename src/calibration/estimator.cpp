@@ -105,8 +105,7 @@ class Estimator::Impl final : public EpochSink {
     for (StudyFilter& study : studies_) study.update_output(core_, log_);
     watch_swaps(cut);
     counters_.events_lost = log_.lost();
-    shown_ = log_;
-    log_.clear();
+    shown_.take(log_);
   }
 
   void set_noise(std::size_t study, const StudyNoise& noise) noexcept {

@@ -2,9 +2,11 @@
 
 /// The events of one tick, in fixed memory.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 
 #include "calibration/estimator.h"
 
@@ -23,7 +25,11 @@ class EventLog {
   }
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept { return {events_.data(), size_}; }
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
-  void clear() noexcept { size_ = 0; }
+  /// Takes over what `other` holds, and no more of its memory than that; other is empty afterwards.
+  void take(EventLog& other) noexcept {
+    std::copy_n(other.events_.begin(), other.size_, events_.begin());
+    size_ = std::exchange(other.size_, 0);
+  }
 
  private:
   std::array<EstimatorEvent, kCapacity> events_{};

@@ -13,7 +13,7 @@ namespace imuscope {
 namespace {
 
 // The rings hold seconds; a kill loses at most what came since the last flush, which must stay below 1 s.
-constexpr Duration kDrainInterval = std::chrono::milliseconds(50);
+constexpr Duration kDrainInterval = std::chrono::milliseconds(100);
 constexpr Duration kFlushInterval = std::chrono::milliseconds(250);
 constexpr std::size_t kFlushBytes = std::size_t{1} << 20U;
 constexpr std::size_t kMaxWaitingMessageBytes = std::size_t{4} << 20U;

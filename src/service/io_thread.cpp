@@ -36,8 +36,11 @@ constexpr Duration kQuiet = std::chrono::milliseconds(2);
 constexpr Duration kRest = std::chrono::milliseconds(4);
 constexpr Duration kLongestRest = std::chrono::milliseconds(6);
 /// After the first bytes of a frame the line rests for this many beats: at 100 Hz every tenth frame is
-/// stamped at its first bytes, twenty in each interval of the clock map.
+/// stamped at its first bytes, twenty in each interval of the clock map. Once the map rests on many
+/// intervals, six in each serve it as well.
 constexpr int kBeatsOfRest = 9;
+constexpr int kBeatsOfLongRest = 29;
+constexpr Duration kClockIsLearned = std::chrono::seconds(60);
 constexpr Duration kStatusPeriod = std::chrono::milliseconds(100);
 constexpr std::size_t kPrefaultedStack = 128 * 1024;
 
@@ -118,7 +121,8 @@ class IoThread::Line final : public SampleSink {
   void adopt(int epoll) noexcept {
     if (connection_ != nullptr || offered_.load(std::memory_order_relaxed) == nullptr) return;
     connection_ = offered_.exchange(nullptr, std::memory_order_acq_rel);
-    listen(epoll, EPOLL_CTL_ADD, host_now());
+    adopted_ = host_now();
+    listen(epoll, EPOLL_CTL_ADD, adopted_);
     dropped_before_ = status_.frames_dropped;
   }
 
@@ -128,7 +132,7 @@ class IoThread::Line final : public SampleSink {
     // An event of a serial line has switched its events off.
     if (connection_ == nullptr || !connection_->is_serial) return;
     since_ = now - listens_since_ < kQuiet ? std::optional(now) : std::nullopt;
-    beats_ = since_ ? 0 : beats_of_rest();
+    beats_ = since_ ? 0 : beats_of_rest(now);
   }
 
   /// At every wake-up: reads on where a frame was cut in its midst, and listens again.
@@ -236,8 +240,9 @@ class IoThread::Line final : public SampleSink {
   }
 
   /// A device that is being set up is answered sooner.
-  [[nodiscard]] int beats_of_rest() const noexcept {
-    return connection_->session->state() == SessionState::kStreaming ? kBeatsOfRest : 1;
+  [[nodiscard]] int beats_of_rest(HostTime now) const noexcept {
+    if (connection_->session->state() != SessionState::kStreaming) return 1;
+    return now - adopted_ < kClockIsLearned ? kBeatsOfRest : kBeatsOfLongRest;
   }
 
   void give_back(int epoll) noexcept {
@@ -257,6 +262,7 @@ class IoThread::Line final : public SampleSink {
   Connection* connection_ = nullptr;
   std::atomic<Connection*> offered_{nullptr};
   std::atomic<Connection*> returned_{nullptr};
+  HostTime adopted_{};
   HostTime listens_since_{};
   std::optional<HostTime> since_;  ///< in the midst of a frame, rests since then
   int beats_ = 0;                  ///< of rest that are left

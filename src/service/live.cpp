@@ -31,7 +31,7 @@ constexpr int kIoPriority = 80;
 constexpr int kEstimatorPriority = 70;
 /// Stacks are locked in full; the deepest core call needs far less.
 constexpr std::size_t kThreadStackBytes = 1024 * 1024;
-constexpr auto kSupervisorPeriod = std::chrono::milliseconds(100);
+constexpr auto kSupervisorPeriod = std::chrono::milliseconds(200);
 constexpr Duration kReopenFirst = std::chrono::milliseconds(200);
 constexpr Duration kReopenLongest = std::chrono::seconds(5);
 /// From now to tick 0: the threads start meanwhile.

@@ -21,9 +21,9 @@ namespace {
 
 /// What the core has put out waits at most this long; each turn costs a wake-up and, for the messages sent in
 /// it, one of every listener.
-constexpr Duration kDrainPeriod = std::chrono::milliseconds(20);
+constexpr Duration kDrainPeriod = std::chrono::milliseconds(50);
 /// A person's events are looked for in every so many turns.
-constexpr std::uint64_t kTurnsPerEar = 5;
+constexpr std::uint64_t kTurnsPerEar = 2;
 constexpr int kEventQueue = 100;
 constexpr Duration kStatusPeriod = std::chrono::seconds(1);
 
@@ -391,9 +391,8 @@ void LivePublisher::add_rings(StatusReport& report) {
   report.rings.push_back(ring_status("applied models", rings.noises));
   report.rings.push_back(ring_status("exceptions", rings.exceptions));
   report.rings.push_back(ring_status("raw bytes", io_.raw_ring()));
-  const auto rows = modeller_.ring();
-  report.rings.push_back(
-      {"modeller (blocks)", Modeller::ring_capacity(), rows.level, rows.high_water, rows.refused});
+  const auto rows = modeller_.rows();
+  report.rings.push_back({"modeller", Modeller::row_capacity(), rows.level, rows.high_water, rows.refused});
 }
 
 StatusReport LivePublisher::status(HostTime now) {

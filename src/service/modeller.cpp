@@ -177,12 +177,24 @@ void Modeller::add(const ErrorRecord& record) {
     filling_->reserve(kRowsPerBlock);
   }
   filling_->push_back(record);
+  ++rows_added_;
   if (filling_->size() == kRowsPerBlock) hand_over();
 }
 
 void Modeller::hand_over() {
-  if (filling_ && blocks_->try_push(filling_.get())) (void)filling_.release();
+  if (!filling_) return;
+  if (blocks_->try_push(filling_.get())) {
+    (void)filling_.release();
+  } else {
+    rows_refused_ += filling_->size();
+  }
   filling_.reset();
+}
+
+RingCounters Modeller::rows() const {
+  const auto blocks = blocks_->counters();
+  return {rows_added_ - rows_refused_, rows_refused_, blocks.level * kRowsPerBlock,
+          blocks.high_water * kRowsPerBlock};
 }
 
 std::vector<Refit> Modeller::take() {

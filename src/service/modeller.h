@@ -124,14 +124,14 @@ class Modeller {
   /// Fits what is due and ends.
   void stop();
 
-  /// Hands in a row. A modeller that is a quarter of an hour behind (of three S-IMUs) loses blocks of rows,
-  /// counted by the ring.
+  /// Hands in a row. A modeller that is a quarter of an hour behind (of three S-IMUs) loses blocks of rows;
+  /// their rows are counted.
   void add(const ErrorRecord& record);
   /// Refits since the last call.
   [[nodiscard]] std::vector<Refit> take();
-  /// The ring holds blocks of rows.
-  static constexpr std::size_t ring_capacity() { return BlockRing::capacity(); }
-  [[nodiscard]] RingCounters ring() const { return blocks_->counters(); }
+  /// What waits for the thread and what was refused, in rows. Thread: that of add().
+  static constexpr std::size_t row_capacity() { return BlockRing::capacity() * kRowsPerBlock; }
+  [[nodiscard]] RingCounters rows() const;
 
  private:
   void loop();
@@ -141,6 +141,8 @@ class Modeller {
   ModelBook book_;
   std::unique_ptr<RowBlock> filling_;
   std::unique_ptr<BlockRing> blocks_;  ///< owns the blocks that it holds
+  std::uint64_t rows_added_ = 0;
+  std::uint64_t rows_refused_ = 0;
   std::mutex mutex_;
   std::vector<Refit> refits_;
   struct Options {

@@ -140,12 +140,25 @@ TEST(Modeller, LosesNoRowWhileItsThreadDoesNotGetToRun) {
   std::mt19937 random(4);
   constexpr int kRows = 60'030;  // ten minutes at 100 Hz, and a block that is not full
   for (int i = 0; i < kRows; ++i) modeller.add({0, HostTime{}, row_of(i, Regime::kDynamic, random)});
-  EXPECT_EQ(modeller.ring().refused, 0U);
+  EXPECT_EQ(modeller.rows().refused, 0U);
+  EXPECT_GE(modeller.rows().level, 60'000U - 64U);
   modeller.start({"modeller", Scheduling::kIdle, 0, {}});
   modeller.stop();
   const auto refits = modeller.take();
   ASSERT_EQ(refits.size(), 60U) << "one for every 10 s of samples";
   EXPECT_EQ(refits.back().samples, 60'000);
+}
+
+TEST(Modeller, CountsEachRowThatFoundNoRoom) {
+  Modeller modeller(two_devices(), *noise::parse_model("WN"));
+  const ErrorRecord record{0, HostTime{}, ErrorRow{}};
+  constexpr std::size_t kTooMany = 100;  // one block, and one that is not full
+  for (std::size_t i = 0; i < Modeller::row_capacity() + kTooMany; ++i) modeller.add(record);
+  EXPECT_EQ(modeller.rows().refused, 64U);
+  modeller.stop();
+  EXPECT_EQ(modeller.rows().refused, kTooMany);
+  EXPECT_EQ(modeller.rows().pushed, Modeller::row_capacity());
+  EXPECT_EQ(modeller.rows().level, Modeller::row_capacity());
 }
 
 }  // namespace

@@ -46,6 +46,26 @@ TEST(GreisSession, AsksForTheMessagesAtTheConfiguredPeriodOneCommandAfterTheOthe
   EXPECT_TRUE(session.problem().empty());
 }
 
+// A line that is opened in the midst of a message shows its end at most: here the beginning of one whose end
+// was lost, after which the receiver, stopped, says nothing but its replies.
+TEST(GreisSession, RepliesBehindAMessageCutOffAreHeardWithinATenthOfASecond) {
+  Session session({});
+  const Bytes whole = pg(0.85, 0.04, 106.5, 0.5F, 4);
+  session.on_bytes(Bytes(whole.begin(), whole.begin() + 9), HostTime{0ms});
+  bool streams = false;
+  HostTime streaming{};
+  for (int ms = 10; ms < 4000 && session.state() != SessionState::kStreaming; ms += 10) {
+    const HostTime now{std::chrono::milliseconds(ms)};
+    const std::string command = said(session, now);
+    if (!command.empty()) session.on_bytes(reply("RE", command.substr(0, 3) + "\n"), now);
+    if (command.find("em,,jps") != std::string::npos) streams = true;
+    if (streams && ms % 100 == 0) session.on_bytes(epoch(static_cast<U32>(ms)), now);
+    streaming = now;
+  }
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+  EXPECT_LE(streaming, HostTime{400ms});
+}
+
 TEST(GreisSession, AReceiverThatDoesNotAnswerIsTakenAsItIs) {
   Session session({});
   int commands = 0;
