@@ -46,7 +46,7 @@ class CoreThread {
  public:
   /// The thread wakes this long after a cut: the I/O thread needs a moment from the stamp of a read to the
   /// push of its samples, and a sample that is pushed too late for its tick is an exception to be recorded.
-  static constexpr Duration kGuard = std::chrono::microseconds(50);
+  static constexpr Duration kGuard = std::chrono::microseconds(30);
 
   CoreThread(Core& core, HostTime t0);
   ~CoreThread();
