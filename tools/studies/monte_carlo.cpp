@@ -14,6 +14,7 @@
 #include "calibration/combine.h"
 #include "firmware_sim/imu/sensor_classes.h"
 #include "navigation/so3.h"
+#include "tools/benchmarks/bench_report.h"
 #include "tools/studies/six_states.h"
 #include "tools/studies/study_drive.h"
 
@@ -240,10 +241,10 @@ Totals run(const Scenario& scenario, const study_drive::Truth& truth, std::uint6
   constexpr std::size_t kWeightEvery = 10;
   for (std::size_t k = 0; k < truth.ticks(); ++k) {
     const study_drive::Tick& tick = instruments.next();
-    const double begin_s = study_drive::processor_time_s();
+    const double begin_s = bench::processor_time_s();
     for (const imuscope::Sample& sample : tick) estimator.add(sample);
     estimator.advance(tick.front().arrival);
-    totals.estimator_s += study_drive::processor_time_s() - begin_s;
+    totals.estimator_s += bench::processor_time_s() - begin_s;
     account_nis(estimator, totals);
     if (scenario.paper && k % kWeightEvery == 0) weighted.add(estimator);
   }

@@ -1,7 +1,7 @@
 /// The project's ring beside boost::lockfree::spsc_queue: a 128-byte element, 1024 places, two threads.
-/// Usage: ring_speed [ROUNDS]      prints medians over interleaved rounds; for reading, no gate
+/// Medians over interleaved rounds; for reading, no gate.
 
-#include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -10,16 +10,18 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
 #include "rt/spsc_ring.h"
+#include "tools/benchmarks/bench_report.h"
 
 namespace {
 
 constexpr std::size_t kPlaces = 1024;
-constexpr int kElements = 1'000'000;
-constexpr int kRoundTrips = 100'000;
+/// A round trip waits for the other thread twice; so many fewer are made of them.
+constexpr std::uint64_t kElementsPerRoundTrip = 10;
 
 struct Element {
   std::array<std::uint64_t, 16> words;
@@ -56,90 +58,113 @@ void until(const Step& step) {
 }
 
 template <typename Queue>
-double throughput_ns() {
+double throughput_ns(std::uint64_t elements) {
   const auto queue = std::make_unique<Queue>();
   std::atomic<bool> wrong{false};
   std::thread consumer([&] {
     Element element{};
-    for (std::uint64_t i = 0; i < kElements; ++i) {
+    for (std::uint64_t i = 0; i < elements; ++i) {
       until([&] { return queue->pop(element); });
       if (element.words[0] != i) wrong = true;
     }
   });
   Element element{};
   const auto begin = std::chrono::steady_clock::now();
-  for (std::uint64_t i = 0; i < kElements; ++i) {
+  for (std::uint64_t i = 0; i < elements; ++i) {
     element.words[0] = i;
     until([&] { return queue->push(element); });
   }
   consumer.join();
   if (wrong) std::abort();
-  return ns_since(begin) / kElements;
+  return ns_since(begin) / static_cast<double>(elements);
 }
 
 template <typename Queue>
-double round_trip_ns() {
+double round_trip_ns(std::uint64_t elements) {
   const auto there = std::make_unique<Queue>();
   const auto back = std::make_unique<Queue>();
+  const std::uint64_t trips = std::max<std::uint64_t>(1, elements / kElementsPerRoundTrip);
   std::thread echo([&] {
     Element element{};
-    for (int i = 0; i < kRoundTrips; ++i) {
+    for (std::uint64_t i = 0; i < trips; ++i) {
       until([&] { return there->pop(element); });
       until([&] { return back->push(element); });
     }
   });
   Element element{};
   const auto begin = std::chrono::steady_clock::now();
-  for (int i = 0; i < kRoundTrips; ++i) {
+  for (std::uint64_t i = 0; i < trips; ++i) {
     until([&] { return there->push(element); });
     until([&] { return back->pop(element); });
   }
-  const double ns = ns_since(begin) / kRoundTrips;
+  const double ns = ns_since(begin) / static_cast<double>(trips);
   echo.join();
   return ns;
 }
 
 template <typename Queue>
-double one_thread_ns() {
+double one_thread_ns(std::uint64_t elements) {
   const auto queue = std::make_unique<Queue>();
   Element element{};
   const auto begin = std::chrono::steady_clock::now();
-  for (int i = 0; i < kElements; ++i) {
+  for (std::uint64_t i = 0; i < elements; ++i) {
     (void)queue->push(element);
     (void)queue->pop(element);
   }
-  return ns_since(begin) / kElements;
+  return ns_since(begin) / static_cast<double>(elements);
 }
 
-struct Series {
-  std::vector<double> values;
-  [[nodiscard]] double median() {
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                     values.end());
-    return values[values.size() / 2];
-  }
+/// One way to use a queue, timed in both.
+struct Use {
+  const char* what;
+  double (*ours)(std::uint64_t elements);
+  double (*boosts)(std::uint64_t elements);
+  double goal_ns;  ///< measured of a good ring of this kind on two virtual cores; 0: none
+  std::vector<double> ours_ns{};
+  std::vector<double> boosts_ns{};
 };
+
+bench::Row row_of(const Use& use) {
+  bench::Row row;
+  row.group = "ring";
+  row.what = use.what;
+  row.value = bench::median(use.ours_ns);
+  row.reference = bench::median(use.boosts_ns);
+  row.ratio = row.value / *row.reference;
+  row.against = "x boost::lockfree::spsc_queue";
+  row.unit = "ns";
+  if (use.goal_ns > 0.0)
+    row.goal = bench::Goal{bench::Goal::Side::kAtMost, use.goal_ns, bench::Goal::Of::kValue};
+  return row;
+}
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int rounds = argc > 1 ? std::max(1, std::atoi(argv[1])) : 9;
-  std::array<Series, 6> series;
+  CLI::App app{
+      "The project's ring beside boost::lockfree::spsc_queue: 1024 places of 128 bytes, two threads"};
+  int rounds = 9;
+  std::uint64_t elements = 1'000'000;
+  std::string json;
+  app.add_option("--rounds", rounds, "interleaved rounds of which the median counts")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--elements", elements, "through each queue a round, and a tenth as many round trips")
+      ->check(CLI::Range(1, 1'000'000'000));
+  app.add_option("--json", json, "write the rows here")->type_name("FILE");
+  CLI11_PARSE(app, argc, argv);
+
+  std::array<Use, 3> uses{
+      {{"an element from thread to thread", throughput_ns<Ours>, throughput_ns<Boosts>, 50.0},
+       {"round trip through two", round_trip_ns<Ours>, round_trip_ns<Boosts>, 450.0},
+       {"push and pop, one thread", one_thread_ns<Ours>, one_thread_ns<Boosts>, 0.0}}};
   for (int round = 0; round < rounds; ++round) {
-    series[0].values.push_back(throughput_ns<Ours>());
-    series[1].values.push_back(throughput_ns<Boosts>());
-    series[2].values.push_back(round_trip_ns<Ours>());
-    series[3].values.push_back(round_trip_ns<Boosts>());
-    series[4].values.push_back(one_thread_ns<Ours>());
-    series[5].values.push_back(one_thread_ns<Boosts>());
+    for (Use& use : uses) {
+      use.ours_ns.push_back(use.ours(elements));
+      use.boosts_ns.push_back(use.boosts(elements));
+    }
   }
-  fmt::print(
-      "| ring of {} x {} B, median of {} | throughput, ns | round trip, ns | push + pop, one thread, ns |\n",
-      kPlaces, sizeof(Element), rounds);
-  fmt::print("|---|---|---|---|\n");
-  fmt::print("| imuscope::SpscRing | {:.1f} | {:.0f} | {:.1f} |\n", series[0].median(), series[2].median(),
-             series[4].median());
-  fmt::print("| boost::lockfree::spsc_queue | {:.1f} | {:.0f} | {:.1f} |\n", series[1].median(),
-             series[3].median(), series[5].median());
-  return 0;
+  std::vector<bench::Row> rows;
+  for (const Use& use : uses) rows.push_back(row_of(use));
+  rows.front().memory_mb = bench::peak_memory_mb([&] { (void)throughput_ns<Ours>(elements); });
+  return bench::finish(rows, json);
 }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <cmath>
-#include <ctime>
 
 #include "navigation/so3.h"
 
@@ -78,12 +77,6 @@ imuscope::Matrix3 to_array(const Matrix3d& m) {
   imuscope::Matrix3 out;
   Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.data()) = m;
   return out;
-}
-
-double processor_time_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 Truth::Truth(const imusim::Scenario& scenario, double duration_s) : motion_(scenario) {

@@ -31,8 +31,6 @@ inline constexpr imuscope::DeviceIndex kGnssDevice = 1 + kStudies;
 [[nodiscard]] Eigen::Vector3d normal3(imusim::Random& random);
 [[nodiscard]] imuscope::Vector3 to_array(const Eigen::Vector3d& v);
 [[nodiscard]] imuscope::Matrix3 to_array(const Eigen::Matrix3d& m);
-/// Of this thread, so that other load on the machine does not count.
-[[nodiscard]] double processor_time_s();
 
 /// The samples of 10 ms, in order of arrival.
 using Tick = std::vector<imuscope::Sample>;

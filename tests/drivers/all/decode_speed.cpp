@@ -7,20 +7,18 @@
 /// sum byte by byte at every level of optimisation.
 ///
 /// What the floor leaves out is paid per sample and not per byte: unwrapping the device's count, the clock
-/// map, the sample itself and handing it over. The last line gives the clock map's and the sink's share
-/// alone. Where samples are short on the wire (43 bytes of MTData), that share is what keeps a decoder from
-/// the floor; where they are text, it is the turning of digits into numbers.
-///
-///   decode_speed [repetitions = 15] [only protocols whose name holds this]
+/// map, the sample itself and handing it over. The rows of a sample give that beside the clock map's and the
+/// sink's share alone. Where samples are short on the wire (43 bytes of MTData), that share is what keeps a
+/// decoder from the floor; where they are text, it is the turning of digits into numbers.
 
 #include <fmt/format.h>
-#include <ctime>
-
+#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdlib>
+#include <cmath>
 
 #include "sample/clock_map.h"
 #include "tests/drivers/all/protocol_streams.h"
+#include "tools/benchmarks/bench_report.h"
 
 namespace {
 
@@ -40,20 +38,15 @@ struct KeepingSink final : imuscope::SampleSink {
   std::size_t n = 0;
 };
 
-double processor_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 template <typename Job>
 double timed(Job&& job) {
-  const double start = processor_s();
+  const double start = bench::processor_time_s();
   job();
-  return processor_s() - start;
+  return bench::processor_time_s() - start;
 }
 
-bool report(const ProtocolStream& stream, int repetitions) {
+/// Fastest of interleaved repetitions. `complete` turns false where samples were lost.
+std::vector<bench::Row> measure(const ProtocolStream& stream, int repetitions, bool& complete) {
   double decode_s = 1e9;
   double floor_s = 1e9;
   volatile std::uint32_t checksum = 0;
@@ -65,20 +58,36 @@ bool report(const ProtocolStream& stream, int repetitions) {
     if (!stream.checksum) continue;
     floor_s = std::min(floor_s, timed([&] { checksum = stream.checksum(stream.bytes); }));
   }
+  complete = complete && sink.n + 1 >= stream.samples;  // the last epoch of some protocols ends with the next
   const double megabytes = static_cast<double>(stream.bytes.size()) * 1e-6;
-  fmt::print("{:<20} {:>9} {:>9.0f} {:>9.0f}", stream.name, sink.n, megabytes / decode_s,
-             1e9 * decode_s / static_cast<double>(sink.n));
+  bench::Row row;
+  row.group = "decoding";
+  row.what = stream.name;
+  row.ratio = std::nan("");
+  row.against = "no checksum to compare with";
+  row.value = megabytes / decode_s;
+  row.unit = "MB/s";
+  row.memory_mb = bench::peak_memory_mb([&] {
+    const auto decoder = stream.make_decoder();
+    push_in_reads(stream, kReadSize, *decoder, sink);
+  });
   if (stream.checksum) {
-    const double ratio = decode_s / floor_s;
-    fmt::print(" {:>9.0f} {:>7.2f}{}\n", megabytes / floor_s, ratio, ratio <= kGoal ? "" : "  above 3");
-  } else {
-    fmt::print(" {:>9} {:>7}\n", "no sum", "-");
+    row.ratio = decode_s / floor_s;
+    row.against = "x its checksum alone, byte by byte";
+    row.goal = bench::Goal{bench::Goal::Side::kAtMost, kGoal};
+    row.reference = megabytes / floor_s;
   }
-  return sink.n + 1 >= stream.samples;  // the last epoch of some protocols ends with the next
+  bench::Row sample = row;
+  sample.group = "decoding, a sample";
+  sample.goal.reset();
+  sample.value = 1e9 * decode_s / static_cast<double>(sink.n);
+  sample.unit = "ns";
+  sample.memory_mb.reset();
+  return {row, sample};
 }
 
-/// What every decoder pays for a sample, whatever its bytes are.
-void report_sample_alone(int repetitions) {
+/// What every decoder pays for a sample, whatever its bytes are: clock map and sink, ns.
+double sample_alone_ns(int repetitions) {
   constexpr int kSamples = 60'000;
   constexpr std::int64_t kPeriod_ns = 10'000'000;
   double alone_s = 1e9;
@@ -96,21 +105,38 @@ void report_sample_alone(int repetitions) {
                          }
                        }));
   }
-  fmt::print("{:<20} {:>9} {:>9} {:>9.0f}\n", "clock map and sink", kSamples, "-", 1e9 * alone_s / kSamples);
+  return 1e9 * alone_s / kSamples;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int repetitions = argc > 1 ? std::max(std::atoi(argv[1]), 1) : 15;
-  const std::string only = argc > 2 ? argv[2] : "";
-  fmt::print("{:<20} {:>9} {:>9} {:>9} {:>9} {:>7}\n", "protocol", "samples", "MB/s", "ns/sample",
-             "floor MB/s", "ratio");
+  CLI::App app{"Decoding beside the protocol's own checksum over the same bytes"};
+  int repetitions = 15;
+  std::string only;
+  std::string json;
+  app.add_option("--repetitions", repetitions, "of which the fastest counts")->check(CLI::Range(1, 10000));
+  app.add_option("--only", only, "only protocols whose name holds this");
+  app.add_option("--json", json, "write the rows here")->type_name("FILE");
+  CLI11_PARSE(app, argc, argv);
+
   bool complete = true;
+  std::vector<bench::Row> throughput;
+  std::vector<bench::Row> samples;
   for (const ProtocolStream& stream : imuscope::test::protocol_streams(kSeconds)) {
-    if (stream.name.find(only) != std::string::npos) complete = report(stream, repetitions) && complete;
+    if (stream.name.find(only) == std::string::npos) continue;
+    const auto rows = measure(stream, repetitions, complete);
+    throughput.push_back(rows[0]);
+    samples.push_back(rows[1]);
   }
-  report_sample_alone(repetitions);
+  const double alone_ns = sample_alone_ns(repetitions);
+  for (bench::Row& row : samples) {
+    row.ratio = row.value / alone_ns;
+    row.against = "x clock map and sink alone";
+    row.reference = alone_ns;
+  }
+  throughput.insert(throughput.end(), samples.begin(), samples.end());
   if (!complete) fmt::print(stderr, "a decoder lost samples of its stream\n");
-  return complete ? 0 : 1;
+  const int status = bench::finish(throughput, json);
+  return complete ? status : 1;
 }

@@ -1,0 +1,256 @@
+/// Whole programs from raw bytes: how many times faster than real time a replay and a study of a simulated
+/// drive are, what memory they take, and how both grow with the number of S-IMUs and with the length of the
+/// drive. Every run is a process of its own, so that its memory is its own; processor time of all its
+/// threads.
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+
+#include "tools/benchmarks/bench_report.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kGoalReplay = 830.0;  // times real time, 72 states, without refits
+constexpr double kGoalStudy = 90.0;    // a drive of 15 minutes in 10 s, refits and report included
+
+struct Cost {
+  double processor_s = std::numeric_limits<double>::infinity();
+  double memory_mb = 0.0;
+};
+
+/// Runs a program without its output to its end. Throws where it fails: a benchmark of a failure says
+/// nothing.
+Cost run(const std::vector<std::string>& command) {
+  std::vector<char*> arguments;
+  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  const pid_t child = fork();
+  if (child < 0) throw std::runtime_error("no process can be started");
+  if (child == 0) {
+    const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    dup2(nowhere, STDOUT_FILENO);
+    dup2(nowhere, STDERR_FILENO);
+    execv(arguments[0], arguments.data());
+    _exit(127);
+  }
+  int status = 0;
+  rusage usage{};
+  if (wait4(child, &status, 0, &usage) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
+    throw std::runtime_error(fmt::format("this failed: {}", fmt::join(command, " ")));
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  constexpr double kMbPerKib = 1024.0 * 1e-6;
+  return {seconds(usage.ru_utime) + seconds(usage.ru_stime),
+          static_cast<double>(usage.ru_maxrss) * kMbPerKib};
+}
+
+/// A vehicle with `studies` MTx, a reference and a receiver; noise models refitted every `refit_s`.
+std::string configuration(int studies, double refit_s) {
+  constexpr const char* kDevice =
+      "[[device]]\nname = \"{0}\"\nrole = \"{1}\"\nprotocol = \"{2}\"\nrate_hz = {3}\n{4}\n"
+      "transport = {{ kind = \"serial\", port = \"/tmp/imuscope-bench/{0}\", baud = {5} }}\n\n";
+  std::string text = fmt::format(
+      "[run]\nname = \"bench\"\n\n[estimator]\nstates = \"full\"\n\n[noise]\nrefit_interval_s = {}\n\n",
+      refit_s);
+  text += fmt::format(kDevice, "airins", "reference", "ixblue_stdbin", 100.0, "axes = \"+x -y -z\"", 460800);
+  text +=
+      "[device.noise]\ngyro_white_deg_per_sqrt_h = 0.0015\naccel_white_ug_per_sqrt_hz = 10.0\n"
+      "gyro_bias_sd_deg_per_h = 0.005\naccel_bias_sd_mps2 = 5e-4\n\n";
+  for (int i = 1; i <= studies; ++i)
+    text += fmt::format(kDevice, fmt::format("mtx{}", i), "study", "xsens_mt", 100.0, "", 115200);
+  text += fmt::format(kDevice, "gnss", "gnss", "greis", 10.0, "antenna_lever_arm_b_m = [-0.50, 0.20, -1.30]",
+                      115200);
+  text += "[simulation]\nduration_s = 900.0\nseed = 1\n";
+  for (int i = 1; i <= studies; ++i) {
+    text += fmt::format(
+        "[[simulation.imu]]\nname = \"mtx{}\"\nrotation_vector_b_s_deg = [0.8, -1.1, {:.1f}]\n"
+        "lever_arm_b_m = [{:.2f}, -0.22, 0.12]\nlatency_ms = {:.1f}\n",
+        i, 0.6 + 25.0 * (i - 1), 0.4 - 0.12 * (i - 1), 1.0 + 0.4 * i);
+  }
+  return text;
+}
+
+/// A recorded drive, with and without refits.
+struct Drive {
+  int studies;
+  double minutes;
+  fs::path folder;
+  std::vector<std::string> inputs;
+  fs::path with_refits;
+  fs::path without_refits;
+};
+
+class Programs {
+ public:
+  explicit Programs(fs::path scratch) : scratch_(std::move(scratch)) {
+    bin_ = fs::read_symlink("/proc/self/exe").parent_path();
+  }
+
+  [[nodiscard]] Drive record(int studies, double minutes) const {
+    Drive drive{studies, minutes, scratch_ / fmt::format("drive_{}_{:g}", studies, minutes), {}, {}, {}};
+    fs::create_directories(drive.folder);
+    const fs::path config = drive.folder / "bench.toml";
+    drive.with_refits = config;
+    drive.without_refits = drive.folder / "no_refits.toml";
+    constexpr double kRefit_s = 60.0;
+    constexpr double kNever_s = 1e5;
+    write(drive.with_refits, configuration(studies, kRefit_s));
+    write(drive.without_refits, configuration(studies, kNever_s));
+    run({bin_ / "imusim", "record", config, "--minutes", fmt::format("{:g}", minutes), "--out",
+         drive.folder});
+    // One of the devices alone would be taken for the whole; the capture is measured on its own.
+    for (const auto& file : fs::directory_iterator(drive.folder)) {
+      if (file.path().extension() == ".bin")
+        drive.inputs.push_back(file.path().stem().string() + "=" + file.path().string());
+    }
+    std::sort(drive.inputs.begin(), drive.inputs.end());
+    return drive;
+  }
+
+  [[nodiscard]] Cost replay(const Drive& drive, bool refits) const {
+    return work("replay", drive.inputs, refits ? drive.with_refits : drive.without_refits);
+  }
+  [[nodiscard]] Cost replay_capture(const Drive& drive) const {
+    return work("replay", {drive.folder / "capture.lcm"}, drive.without_refits);
+  }
+  [[nodiscard]] Cost process(const Drive& drive) const {
+    return work("process", drive.inputs, drive.with_refits);
+  }
+
+ private:
+  static void write(const fs::path& file, const std::string& text) {
+    std::ofstream out(file);
+    if (!(out << text).flush()) throw std::runtime_error(file.string() + " cannot be written");
+  }
+
+  [[nodiscard]] Cost work(const char* command, const std::vector<std::string>& inputs,
+                          const fs::path& config) const {
+    std::vector<std::string> words{bin_ / "imuscope", command};
+    words.insert(words.end(), inputs.begin(), inputs.end());
+    words.insert(words.end(), {"--config", config, "--out", scratch_ / "run"});
+    return run(words);
+  }
+
+  fs::path scratch_;
+  fs::path bin_;
+};
+
+/// The fastest of the rounds: what other programs take from the caches makes a run slower, never faster.
+void keep_fastest(Cost& kept, const Cost& now) {
+  kept.processor_s = std::min(kept.processor_s, now.processor_s);
+  kept.memory_mb = std::max(kept.memory_mb, now.memory_mb);
+}
+
+bench::Row row_of(const std::string& what, double minutes, const Cost& cost, double goal) {
+  constexpr double kSecondsPerMinute = 60.0;
+  bench::Row row;
+  row.group = "replay";
+  row.what = what;
+  row.reference = kSecondsPerMinute * minutes;
+  row.ratio = *row.reference / cost.processor_s;
+  row.against = "times faster than real time";
+  row.value = cost.processor_s;
+  row.unit = "s";
+  row.memory_mb = cost.memory_mb;
+  if (goal > 0.0) row.goal = bench::Goal{bench::Goal::Side::kAtLeast, goal};
+  return row;
+}
+
+/// One S-IMU more, or the drive twice as long: cost by size.
+struct Growth {
+  std::vector<double> sizes;
+  std::vector<double> seconds;
+  std::vector<double> megabytes;
+  void add(double size, const Cost& cost) {
+    sizes.push_back(size);
+    seconds.push_back(cost.processor_s);
+    megabytes.push_back(cost.memory_mb);
+  }
+};
+
+std::vector<bench::Row> measure(const Programs& programs, double minutes, int rounds) {
+  const std::vector<int> crowds{1, 2, 3, 6};
+  std::vector<Drive> by_studies;
+  for (const int n : crowds) by_studies.push_back(programs.record(n, minutes));
+  const Drive& usual = by_studies[2];
+  std::vector<Drive> by_length{programs.record(usual.studies, 0.5 * minutes), usual,
+                               programs.record(usual.studies, 2.0 * minutes)};
+  std::vector<Cost> crowd_costs(by_studies.size());
+  std::vector<Cost> length_costs(by_length.size());
+  Cost refits;
+  Cost capture;
+  Cost study;
+  for (int round = 0; round < rounds; ++round) {
+    for (std::size_t i = 0; i < by_studies.size(); ++i)
+      keep_fastest(crowd_costs[i], programs.replay(by_studies[i], false));
+    for (std::size_t i = 0; i < by_length.size(); ++i)
+      keep_fastest(length_costs[i], programs.replay(by_length[i], false));
+    keep_fastest(refits, programs.replay(usual, true));
+    keep_fastest(capture, programs.replay_capture(usual));
+    keep_fastest(study, programs.process(usual));
+  }
+  std::vector<bench::Row> rows;
+  const auto of = [&](const char* what) { return fmt::format("{}, 3 S-IMUs, {:g} min", what, minutes); };
+  rows.push_back(row_of(of("raw bytes, no refits"), minutes, crowd_costs[2], kGoalReplay));
+  rows.push_back(row_of(of("raw bytes, refits every minute"), minutes, refits, kGoalStudy));
+  rows.push_back(row_of(of("capture, no refits"), minutes, capture, 0.0));
+  rows.push_back(row_of(of("whole study with report"), minutes, study, kGoalStudy));
+  Growth studies;
+  for (std::size_t i = 0; i < by_studies.size(); ++i) {
+    studies.add(crowds[i], crowd_costs[i]);
+    if (crowds[i] == usual.studies) continue;
+    rows.push_back(row_of(fmt::format("raw bytes, no refits, {} S-IMU{}, {:g} min", crowds[i],
+                                      crowds[i] == 1 ? "" : "s", minutes),
+                          minutes, crowd_costs[i], 0.0));
+  }
+  Growth lengths;
+  for (std::size_t i = 0; i < by_length.size(); ++i) {
+    lengths.add(by_length[i].minutes, length_costs[i]);
+    if (by_length[i].minutes == minutes) continue;
+    rows.push_back(row_of(fmt::format("raw bytes, no refits, 3 S-IMUs, {:g} min", by_length[i].minutes),
+                          by_length[i].minutes, length_costs[i], 0.0));
+  }
+  rows.push_back(bench::growth_row("replay, with S-IMUs 1 to 6", studies.sizes, studies.seconds, 1.5));
+  rows.push_back(bench::growth_row("replay, with the drive's length", lengths.sizes, lengths.seconds, 1.1));
+  rows.push_back(
+      bench::growth_row("replay's memory, with the drive's length", lengths.sizes, lengths.megabytes, 1.0));
+  return rows;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Replay and study of simulated drives beside real time"};
+  double minutes = 15.0;
+  int rounds = 3;
+  std::string scratch = (fs::temp_directory_path() / "imuscope_replay_speed").string();
+  std::string json;
+  app.add_option("--minutes", minutes, "length of the drive; half and twice it are also driven")
+      ->check(CLI::Range(0.5, 240.0));
+  app.add_option("--rounds", rounds, "of which the fastest counts")->check(CLI::Range(1, 100));
+  app.add_option("--scratch", scratch, "folder for recordings and results; removed at the end")
+      ->type_name("DIR");
+  app.add_option("--json", json, "write the rows here")->type_name("FILE");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    const auto rows = measure(Programs(scratch), minutes, rounds);
+    fs::remove_all(scratch);
+    return bench::finish(rows, json);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "replay_speed: {}\n", error.what());
+    return 1;
+  }
+}
