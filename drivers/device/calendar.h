@@ -22,4 +22,16 @@ inline std::optional<std::int64_t> days_since_1970(int year, unsigned month, uns
   return std::chrono::sys_days{date}.time_since_epoch().count();
 }
 
+/// Whether a time of day that goes back tells a leap second: at the end of a UTC day, by less than the second
+/// that was inserted. Some devices count 23:59:60, others show 23:59:59 or 00:00:00 twice; a second has
+/// passed in each case.
+///
+/// @param time_of_day  after the step
+/// @param step         from the time of day before, taken through midnight
+inline bool is_leap_second(std::chrono::nanoseconds time_of_day, std::chrono::nanoseconds step) noexcept {
+  using namespace std::chrono_literals;
+  const bool near_midnight = time_of_day < 2s || time_of_day > 24h - 2s;
+  return near_midnight && step <= 0s && step > -1s;
+}
+
 }  // namespace imuscope

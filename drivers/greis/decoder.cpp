@@ -214,7 +214,7 @@ void Decoder::end_epoch(bool complete, std::uint64_t end_offset, HostTime arriva
   sample.time = epoch_time - Duration(delay_ms * kNsPerMs);
   if (since_1970_minus_time_ms_) {
     std::int64_t utc_ms = time_ms_ - delay_ms + *since_1970_minus_time_ms_;
-    if (base_ == TimeBase::kGps) utc_ms -= 1000LL * leap_s_.value_or(gps_minus_utc_s(utc_ms / kMsPerDay));
+    if (base_ == TimeBase::kGps) utc_ms -= 1000LL * leap_s_.value_or(gps_minus_utc_s(utc_ms / 1000));
     if (base_ == TimeBase::kGlonass) utc_ms -= kGlonassMinusUtcMs;
     sample.has_utc = true;
     sample.utc = utc_time_from_ns(utc_ms * kNsPerMs + offset_ns);

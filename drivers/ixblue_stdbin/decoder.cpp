@@ -21,7 +21,7 @@ constexpr std::int32_t kReorderedMax = 16;
 constexpr std::int32_t kLostMax = 360'000;
 
 /// Where date and time of day may belong to different days (a public driver allows the same).
-constexpr std::int64_t kNearMidnightTicks = 600 * 10'000;
+constexpr std::int64_t kNearMidnightTicks = 600 * kTicksPerSecond;
 
 /// Date block to days since 1970; nothing where it is not a date.
 std::optional<std::int64_t> days_of(std::span<const std::uint8_t> block) noexcept {
@@ -87,7 +87,8 @@ void Decoder::mirror_scan_counters() noexcept {
 void Decoder::on_telegram(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept {
   const Telegram telegram = parse_telegram(frame.bytes);
   if (telegram.rest_unread) ++bad_messages_;
-  if (telegram.validity_ticks >= kTicksPerDay) {
+  // A day with a leap second has one second more.
+  if (telegram.validity_ticks >= kTicksPerDay + kTicksPerSecond) {
     ++bad_messages_;
     return;
   }
@@ -150,6 +151,10 @@ void Decoder::unwrap_validity(std::uint32_t ticks) noexcept {
     std::int64_t step = static_cast<std::int64_t>(ticks) - last_validity_;
     if (step < -kTicksPerDay / 2) step += kTicksPerDay;
     if (step > kTicksPerDay / 2) step -= kTicksPerDay;
+    if (is_leap_second(Duration(ticks * kTickNs), Duration(step * kTickNs))) {
+      step += kTicksPerSecond;
+      utc_ticks_ -= kTicksPerSecond;  // UTC shows one second twice
+    }
     // The counter went on but the time of day went back: the unit has just been given the time.
     if (step < 0) has_utc_ = false;
     ticks_ += step;

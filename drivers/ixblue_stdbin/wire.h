@@ -45,7 +45,8 @@ inline constexpr std::size_t kSizesEnd = 19;
 
 /// The unit of validity and of every block's own time.
 inline constexpr std::int64_t kTickNs = 100'000;
-inline constexpr std::int64_t kTicksPerDay = 864'000'000;
+inline constexpr std::int64_t kTicksPerSecond = 10'000;
+inline constexpr std::int64_t kTicksPerDay = 86'400 * kTicksPerSecond;
 
 enum class FieldType : std::uint8_t { kU8, kU16, kU32, kI32, kF32, kF64, kText8, kText32 };
 

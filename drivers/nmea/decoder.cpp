@@ -8,7 +8,8 @@
 namespace imuscope::nmea {
 namespace {
 
-constexpr std::int64_t kNsPerDay = 86'400'000'000'000;
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+constexpr std::int64_t kNsPerDay = 86'400 * kNsPerSecond;
 /// Below this speed a receiver without a course is taken to stand, m/s.
 constexpr double kStandstill_mps = 0.3;
 
@@ -158,10 +159,15 @@ void Decoder::publish(HostTime arrival, SampleSink& sink) noexcept {
 /// False for an epoch that came twice.
 bool Decoder::unwrap_time() noexcept {
   if (has_time_) {
+    if (epoch_.tod_ns == last_tod_ns_) return false;
     std::int64_t step = epoch_.tod_ns - last_tod_ns_;
     if (step < -kNsPerDay / 2) step += kNsPerDay;
     if (step > kNsPerDay / 2) step -= kNsPerDay;
-    if (step == 0) return false;
+    if (is_leap_second(Duration(epoch_.tod_ns), Duration(step))) {
+      step += kNsPerSecond;
+      // Until the next date comes; UTC shows one second twice.
+      if (since_1970_minus_time_ns_) *since_1970_minus_time_ns_ -= kNsPerSecond;
+    }
     const double periods =
         config_.period > Duration::zero() ? to_seconds(Duration(step)) / to_seconds(config_.period) : 0.0;
     constexpr double kGapPeriods = 1.5;

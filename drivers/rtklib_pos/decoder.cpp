@@ -11,7 +11,6 @@ namespace imuscope::rtklib_pos {
 namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-constexpr std::int64_t kNsPerDay = 86'400 * kNsPerSecond;
 constexpr std::int64_t kJstMinusUtcNs = 9 * 3600 * kNsPerSecond;
 constexpr double kGapPeriods = 1.5;
 /// Coordinates nearer to the centre of the Earth are none.
@@ -37,7 +36,7 @@ GnssSolution solution_of(int q) noexcept {
 UtcTime utc_of(std::int64_t time_ns, TimeSystem system) noexcept {
   switch (system) {
     case TimeSystem::kGpst:
-      time_ns -= gps_minus_utc_s(time_ns / kNsPerDay) * kNsPerSecond;
+      time_ns -= gps_minus_utc_s(time_ns / kNsPerSecond) * kNsPerSecond;
       break;
     case TimeSystem::kJst:
       time_ns -= kJstMinusUtcNs;

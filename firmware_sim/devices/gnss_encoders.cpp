@@ -29,9 +29,11 @@ struct TimeOfDay {
   double second;
 };
 
-TimeOfDay time_of(const UtcParts& parts) {
+TimeOfDay time_of(const CalendarTime& parts) {
   const double seconds = static_cast<double>(parts.time_of_day.count()) * 1e-9;
-  const int whole_minutes = static_cast<int>(seconds / 60.0);
+  // A leap second belongs to the day's last minute.
+  constexpr int kMinutesPerDay = 24 * 60;
+  const int whole_minutes = std::min(static_cast<int>(seconds / 60.0), kMinutesPerDay - 1);
   return {whole_minutes / 60, whole_minutes % 60, seconds - 60.0 * whole_minutes};
 }
 
@@ -62,17 +64,17 @@ struct GpsWeekTime {
   std::int64_t ns;
 };
 
-GpsWeekTime gps_time(Utc utc) {
+GpsWeekTime gps_time(Gps gps) {
   using namespace std::chrono;
-  const nanoseconds since = utc - sys_days(year(1980) / 1 / 6) + seconds(kGpsMinusUtc_s);
+  const nanoseconds since = gps - local_days(year(1980) / 1 / 6);
   const nanoseconds week = hours(24 * 7);
   return {since / week, (since % week).count()};
 }
 
 }  // namespace
 
-Bytes encode_nmea(const greis::Solution& solution, Utc utc, const std::vector<std::string>& left_out) {
-  const UtcParts parts = utc_parts(utc);
+Bytes encode_nmea(const greis::Solution& solution, Gps gps, const std::vector<std::string>& left_out) {
+  const CalendarTime parts = utc_time(gps);
   const TimeOfDay time = time_of(parts);
   const std::string stamp = fmt::format("{:02}{:02}{:05.2f}", time.hour, time.minute, time.second);
   const std::string place = degrees_and_minutes(solution.latitude_rad, 2, 'N', 'S') + "," +
@@ -104,7 +106,7 @@ Bytes encode_nmea(const greis::Solution& solution, Utc utc, const std::vector<st
   return bytes;
 }
 
-Bytes encode_ubx_nav_pvt(const greis::Solution& solution, Utc utc) {
+Bytes encode_ubx_nav_pvt(const greis::Solution& solution, Gps gps) {
   constexpr std::uint16_t kLength = 92;
   constexpr std::uint8_t kAllValid = 0x07;
   const std::size_t type = type_of(solution);
@@ -114,8 +116,8 @@ Bytes encode_ubx_nav_pvt(const greis::Solution& solution, Utc utc) {
     return static_cast<std::int32_t>(std::llround(angle_rad * kDegPerRad * 1e7));
   };
   // UTC to the whole second, and the rest as a signed count of nanoseconds.
-  const auto second = std::chrono::round<std::chrono::seconds>(utc);
-  const UtcParts parts = utc_parts(Utc(second));
+  const auto second = std::chrono::round<std::chrono::seconds>(gps);
+  const CalendarTime parts = utc_time(Gps(second));
   const TimeOfDay time = time_of(parts);
   const bool has_fix = type != 0;
   const unsigned carrier = type == 4 ? 2U : type == 3 ? 1U : 0U;
@@ -124,13 +126,13 @@ Bytes encode_ubx_nav_pvt(const greis::Solution& solution, Utc utc) {
 
   Bytes bytes = {0xB5, 0x62, 0x01, 0x07};
   put_le(bytes, kLength);
-  put_le(bytes, static_cast<std::uint32_t>(gps_time(utc).ns / kNsPerMs));
+  put_le(bytes, static_cast<std::uint32_t>(gps_time(gps).ns / kNsPerMs));
   put_le(bytes, static_cast<std::uint16_t>(parts.year));
   put_bytes(bytes, Bytes{static_cast<std::uint8_t>(parts.month), static_cast<std::uint8_t>(parts.day),
                          static_cast<std::uint8_t>(time.hour), static_cast<std::uint8_t>(time.minute),
                          static_cast<std::uint8_t>(std::lround(time.second)), kAllValid});
   put_le(bytes, std::uint32_t{25});  // time accuracy, ns
-  put_le(bytes, static_cast<std::int32_t>((utc - second).count()));
+  put_le(bytes, static_cast<std::int32_t>((gps - second).count()));
   put_bytes(bytes, Bytes{static_cast<std::uint8_t>(has_fix ? 3 : 0), static_cast<std::uint8_t>(flags), 0,
                          static_cast<std::uint8_t>(kSatellites)});
   put_le(bytes, e7(solution.longitude_rad));
@@ -168,11 +170,11 @@ Bytes rtklib_header() {
   return bytes;
 }
 
-Bytes encode_rtklib(const greis::Solution& solution, Utc utc) {
+Bytes encode_rtklib(const greis::Solution& solution, Gps gps) {
   Bytes bytes;
   const int quality = kRtklibQuality[type_of(solution)];
   if (quality == 0) return bytes;  // no solution, no line
-  const UtcParts parts = utc_parts(utc + std::chrono::seconds(kGpsMinusUtc_s));
+  const CalendarTime parts = calendar_time(gps);
   const TimeOfDay time = time_of(parts);
   const double sd_m = axis_sd(solution.horizontal_position_sd_m);
   const double sd_mps = axis_sd(solution.horizontal_velocity_sd_mps);

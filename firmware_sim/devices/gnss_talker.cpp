@@ -19,7 +19,7 @@ constexpr std::array<std::string_view, 4> kSentences = {"GGA", "GST", "RMC", "ZD
 
 double first_epoch_s(Utc utc_begin, double rate_hz) {
   constexpr double kRounding = 1e-9;
-  const double time_of_day = std::chrono::duration<double>(utc_parts(utc_begin).time_of_day).count();
+  const double time_of_day = std::chrono::duration<double>(calendar_time(utc_begin).time_of_day).count();
   return std::ceil(time_of_day * rate_hz - kRounding) / rate_hz - time_of_day;
 }
 
@@ -48,16 +48,16 @@ bool GnssTalker::leave_out(const std::vector<std::string>& blocks) {
 
 Bytes GnssTalker::epoch(std::int64_t index) const {
   const greis::Solution solution = solver_(grid_.instant(index));
-  const Utc utc = utc_after(options_.utc_begin, grid_.device_time(index));
+  const Gps gps = gps_after(options_.utc_begin, grid_.device_time(index));
   switch (options_.language) {
     case Language::kNmea:
-      return encode_nmea(solution, utc, left_out_);
+      return encode_nmea(solution, gps, left_out_);
     case Language::kUbx:
-      return encode_ubx_nav_pvt(solution, utc);
+      return encode_ubx_nav_pvt(solution, gps);
     case Language::kRtklib:
       break;
   }
-  return encode_rtklib(solution, utc);
+  return encode_rtklib(solution, gps);
 }
 
 void GnssTalker::run_until(double t_s, std::vector<Emission>& out) {

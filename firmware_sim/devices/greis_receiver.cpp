@@ -111,8 +111,7 @@ bool GreisReceiver::enable(const std::string& arguments) {
 Bytes GreisReceiver::epoch_bytes(std::int64_t index) const {
   greis::Solution solution = solver_(grid_.instant(index));
   // Time base GPS: what the receiver calls its date and time of day is ahead of UTC by the leap seconds.
-  const UtcParts gps = utc_parts(utc_after(options_.utc_begin, grid_.device_time(index)) +
-                                 std::chrono::seconds(kGpsMinusUtc_s));
+  const CalendarTime gps = calendar_time(gps_after(options_.utc_begin, grid_.device_time(index)));
   solution.time_of_day_ms =
       static_cast<std::uint32_t>(std::chrono::round<std::chrono::milliseconds>(gps.time_of_day).count());
   solution.year = static_cast<std::uint16_t>(gps.year);

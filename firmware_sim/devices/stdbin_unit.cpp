@@ -61,7 +61,9 @@ bool StdbinUnit::leave_out(const std::vector<std::string>& blocks) {
 Telegram StdbinUnit::telegram_of(std::int64_t index) {
   const double sampled_s = grid_.instant(index);
   Telegram telegram = sampler_(sampled_s);
-  const UtcParts utc = utc_parts(utc_after(options_.utc_begin, grid_.device_time(index)));
+  // Its time of day ends at 24 h: in a leap second it repeats the last one.
+  const CalendarTime utc =
+      calendar_time(utc_without_leap_second(gps_after(options_.utc_begin, grid_.device_time(index))));
   using Ticks = std::chrono::duration<std::int64_t, std::ratio<1, 10000>>;
   telegram.validity_100us = static_cast<std::uint32_t>(std::chrono::round<Ticks>(utc.time_of_day).count());
   telegram.date = stdbin::Date{static_cast<std::uint8_t>(utc.day), static_cast<std::uint8_t>(utc.month),

@@ -87,7 +87,7 @@ json study_json(const World& world, const StudyTruth& study) {
 }
 
 std::string utc_text(Utc utc) {
-  const UtcParts parts = utc_parts(utc);
+  const CalendarTime parts = calendar_time(utc);
   const auto micro = std::chrono::duration_cast<std::chrono::microseconds>(parts.time_of_day).count();
   constexpr std::int64_t kMicro = 1'000'000;
   const std::int64_t second = micro / kMicro;
@@ -128,7 +128,8 @@ Outcome<void> write_truth_json(const World& world, const std::filesystem::path& 
   truth["schema"] = "imuscope.truth/1";
   truth["seed"] = configuration.scenario.seed;
   truth["duration_s"] = configuration.scenario.duration_s;
-  truth["t0_utc"] = utc_text(utc_after(configuration.utc_begin, world.first_reference_sample_s()));
+  truth["t0_utc"] =
+      utc_text(utc_without_leap_second(gps_after(configuration.utc_begin, world.first_reference_sample_s())));
   truth["imus"] = json::array();
   for (const StudyTruth& study : world.studies()) truth["imus"].push_back(study_json(world, study));
   return write_file(folder / "truth.json", truth.dump(1) + "\n");

@@ -25,6 +25,10 @@ constexpr double kUnseenRate = 0.05;
 constexpr double kUnseenForce = 0.5;
 /// A GNSS solution may be newer than the newest R epoch by this much and still be taken there.
 constexpr Duration kGnssAhead = std::chrono::milliseconds{1};
+/// Where the tags of two devices may be a leap second apart.
+constexpr Duration kAroundMidnight = std::chrono::minutes{1};
+/// Between a solution by its own clock map and by its UTC tag: what moves without a leap second.
+constexpr Duration kLagWanders = std::chrono::milliseconds{100};
 /// Stamps of R epochs are mapped; a solution at the same instant must not fall off the ring by rounding.
 constexpr double kConfiguredStartVelocitySd_mps = 0.05;
 /// One position in twenty has a NIS (3 degrees of freedom) above this where sd and lever arm are right. When
@@ -277,6 +281,24 @@ HostTime NavigationFilter::host_time_of(const Sample& gnss) const noexcept {
   return nearest->time + (gnss.utc - nearest->utc);
 }
 
+/// In a leap second the tags of two devices may be a second apart: one repeats the last second of the day,
+/// another the first of the next. What lies between the solution by its own clock map and by its tag says so.
+HostTime NavigationFilter::plausible_time(const Sample& gnss, HostTime time) noexcept {
+  using namespace std::chrono_literals;
+  if (!gnss.has_utc || !last_has_utc_) return time;
+  const Duration time_of_day = gnss.utc - std::chrono::floor<std::chrono::days>(gnss.utc);
+  const Duration lag = gnss.time - time;
+  const bool near_midnight = time_of_day < kAroundMidnight || time_of_day > 24h - kAroundMidnight;
+  if (!near_midnight && time <= gnss.arrival + kLagWanders) gnss_lag_ = lag;
+  if (!gnss_lag_) return time;
+  // Solved after it arrived: the receiver's UTC has jumped. Its own clock map goes on.
+  if (time > gnss.arrival + kLagWanders) return gnss.time - *gnss_lag_;
+  const Duration off = lag - *gnss_lag_;
+  if (std::chrono::abs(off - 1s) < kLagWanders) return time + 1s;
+  if (std::chrono::abs(off + 1s) < kLagWanders) return time - 1s;
+  return time;
+}
+
 NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out) const noexcept {
   if (past_size_ == 0 || time > past(0).time + kGnssAhead) return Lookup::kTooNew;
   if (time < past(past_size_ - 1).time) return Lookup::kTooOld;
@@ -324,7 +346,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
   const Vector3d sd_position = trusted_position_sd(gnss, gnss_);
   const Vector3d sd_velocity = trusted_velocity_sd(gnss, gnss_);
   if (!has_last_) return true;
-  const HostTime time = host_time_of(sample);
+  const HostTime time = plausible_time(sample, host_time_of(sample));
   const double widened = correlated_sd_factor(gnss.solution, to_seconds(time - last_position_));
 
   if (!navigating()) {

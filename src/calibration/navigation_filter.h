@@ -7,6 +7,7 @@
 /// to the present, H_eff = H Phi^-1 (E-5; the process noise during the delay is left out). Core. Thread: one.
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "calibration/event_log.h"
@@ -66,6 +67,7 @@ class NavigationFilter {
   void stop(HostTime time, double gap_s) noexcept;
   bool apply_gnss(const Sample& sample) noexcept;
   [[nodiscard]] HostTime host_time_of(const Sample& gnss) const noexcept;
+  [[nodiscard]] HostTime plausible_time(const Sample& gnss, HostTime time) noexcept;
   bool apply(GnssGate& gate, const GnssInnovation& measured, const NavigationErrorCovariance& back,
              const Eigen::Vector3d& sd, HostTime time, Vector3& nis) noexcept;
   void watch_consistency(HostTime time) noexcept;
@@ -96,6 +98,7 @@ class NavigationFilter {
   HostTime last_time_{};
   UtcTime last_utc_{};
   bool last_has_utc_ = false;
+  std::optional<Duration> gnss_lag_;  ///< of the last solution that was not near a UTC midnight
   InertialRates last_;
 
   std::vector<PastEpoch> past_;

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "firmware_sim/devices/gnss_encoders.h"
 #include "firmware_sim/devices/gnss_talker.h"
 #include "firmware_sim/devices/greis_receiver.h"
 #include "firmware_sim/devices/stdbin_unit.h"
@@ -214,6 +215,40 @@ TEST(StdbinUnit, StampsTimeOfDayInUtcAndTurnsTheDateAtMidnight) {
   EXPECT_EQ(day(99), 31);
   EXPECT_EQ(day(100), 1);
   EXPECT_NEAR(emissions[0].ready_s, 0.0037 + options.latency_s, 1e-12);
+}
+
+/// 2016-12-31 ended with 23:59:60. StdBin's time of day ends at 24 h: the unit repeats its last second.
+TEST(StdbinUnit, ShowsTheLastSecondTwiceWhereALeapSecondIsInserted) {
+  using namespace std::chrono;
+  StdbinUnit::Options options;
+  options.utc_begin = sys_days(year(2016) / 12 / 31) + hours(23) + minutes(59) + seconds(59);
+  StdbinUnit unit(options, [](double) { return stdbin::Telegram{}; });
+  std::vector<Emission> emissions;
+  unit.run_until(3.0, emissions);
+  const auto validity = [&](std::size_t i) {
+    return get_be<std::uint32_t>(std::span(emissions[i].bytes).subspan(17));
+  };
+  EXPECT_EQ(validity(99), 863'999'900U);
+  EXPECT_EQ(validity(100), 863'990'000U);
+  EXPECT_EQ(validity(199), 863'999'900U);
+  EXPECT_EQ(validity(200), 0U);
+  EXPECT_EQ(emissions[199].bytes[25], 31);
+  EXPECT_EQ(emissions[200].bytes[25], 1);
+}
+
+TEST(Utc, GpsTimeRunsOnThroughALeapSecondAndUtcCountsSixty) {
+  using namespace std::chrono;
+  const Utc begin = sys_days(year(2016) / 12 / 31) + hours(23) + minutes(59) + seconds(59);
+  EXPECT_EQ(gps_after(begin, 0.0), Gps(local_days(year(2017) / 1 / 1) + seconds(16)));
+  EXPECT_EQ(gps_after(begin, 2.0), Gps(local_days(year(2017) / 1 / 1) + seconds(18)));
+  const CalendarTime leap = utc_time(gps_after(begin, 1.25));
+  EXPECT_EQ(leap.day, 31U);
+  EXPECT_EQ(leap.time_of_day, hours(24) + milliseconds(250));
+  const CalendarTime after = utc_time(gps_after(begin, 2.0));
+  EXPECT_EQ(after.day, 1U);
+  EXPECT_EQ(after.time_of_day, seconds(0));
+  const Bytes sentences = encode_nmea(greis::Solution{}, gps_after(begin, 1.25), {});
+  EXPECT_EQ(std::string(sentences.begin(), sentences.begin() + 17), "$GNGGA,235960.25,");
 }
 
 class GreisReceiverTest : public testing::Test {

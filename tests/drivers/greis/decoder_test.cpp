@@ -92,6 +92,20 @@ TEST(GreisDecoder, TheDateIsCarriedThroughMidnightWithoutANewOne) {
   EXPECT_EQ(rig.decoder.counters().samples_lost, 0U);
 }
 
+/// 2016-12-31T23:59:60Z is 2017-01-01 00:00:17 in GPS time, which does not pause: a second of UTC comes
+/// twice.
+TEST(GreisDecoder, TheLeapSecondIsInUtcAtItsInstantAndNotAtMidnightOfGpsTime) {
+  Rig rig;
+  for (const U32 tod_ms : {0U, 16'000U, 17'000U, 18'000U})
+    rig.push({rt(tod_ms), rd(2017, 1, 1, 0), pg(0.85, 0.04, 106.5, 0.5F, 4), et(tod_ms)});
+  ASSERT_EQ(rig.sink.samples.size(), 4U);
+  const UtcTime new_year = std::chrono::sys_days{std::chrono::year{2017} / 1 / 1};
+  EXPECT_EQ(rig.sink.samples[0].utc, new_year - 17s);
+  EXPECT_EQ(rig.sink.samples[1].utc, new_year - 1s);
+  EXPECT_EQ(rig.sink.samples[2].utc, new_year);
+  EXPECT_EQ(rig.sink.samples[3].utc, new_year);
+}
+
 TEST(GreisDecoder, GpsTimeGivesTheDateWhereTheReceiverSentNone) {
   Rig rig;
   // Week 2409 of the GPS, 2026-03-08, as its ten bits.

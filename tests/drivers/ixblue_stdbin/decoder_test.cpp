@@ -139,6 +139,38 @@ TEST(StdBinDecoder, TimeGoesOnThroughMidnightWithTheDateBehind) {
   EXPECT_EQ(rig.decoder.counters().clock_resets, 0U);
 }
 
+/// 31 December 2016 ended with 23:59:60. A unit may count it, or show a second twice.
+TEST(StdBinDecoder, ALeapSecondIsASecondHoweverItIsShown) {
+  constexpr std::uint32_t kLast = 863'999'900;  // 23:59:59.99
+  struct Way {
+    const char* name;
+    std::uint32_t first_of_leap_second;
+    std::uint8_t day;  // shown during it
+  };
+  for (const Way& way : {Way{"second 60", 864'000'000, 31}, Way{"second 59 twice", 863'990'000, 31},
+                         Way{"second 0 twice", 0, 1}}) {
+    SCOPED_TRACE(way.name);
+    Rig rig;
+    std::uint32_t count = 0;
+    const auto push = [&](std::uint32_t ticks, std::uint8_t day) {
+      TelegramBuilder one = telegram(++count, ticks);
+      rig.push(one.nav(13, TelegramBuilder::date(day, day == 31 ? 12 : 1, day == 31 ? 2016 : 2017)));
+    };
+    push(kLast - 100, 31);
+    push(kLast, 31);
+    for (std::uint32_t i = 0; i < 100; ++i) push(way.first_of_leap_second + 100 * i, way.day);
+    for (std::uint32_t i = 0; i < 3; ++i) push(100 * i, 1);
+    const auto imu = rig.sink.of_kind(SampleKind::kImu);
+    ASSERT_EQ(imu.size(), 105U);
+    for (std::size_t i = 1; i < imu.size(); ++i)
+      EXPECT_EQ(imu[i].time - imu[i - 1].time, Duration(10ms)) << i;
+    EXPECT_EQ(rig.decoder.counters().clock_resets, 0U);
+    const UtcTime new_year = std::chrono::sys_days{std::chrono::year{2017} / 1 / 1};
+    EXPECT_EQ(imu[1].utc, new_year - 10ms);
+    EXPECT_EQ(imu[103].utc, new_year + 10ms);
+  }
+}
+
 TEST(StdBinDecoder, ADateThatChangesOneTelegramEarlyMakesNoExtraDay) {
   Rig rig;
   rig.push(telegram(1, 863'999'800));

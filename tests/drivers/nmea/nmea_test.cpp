@@ -174,6 +174,25 @@ TEST(NmeaDecoder, TheDateIsCarriedThroughMidnight) {
   EXPECT_EQ(samples[1].time - samples[0].time, Duration(100ms));
 }
 
+TEST(NmeaDecoder, ALeapSecondIsASecondAndNoEpochOfItIsLost) {
+  const auto zda = [](const std::string& time, const char* date) {
+    return sentence("GPZDA," + time + "," + date + ",00,00");
+  };
+  const char* const last = "31,12,2016";
+  const char* const first = "01,01,2017";
+  const auto samples =
+      decode(zda("235959.00", last) + gga("235959.00") + zda("235960.00", last) + gga("235960.00") +
+             zda("000000.00", first) + gga("000000.00") + zda("000001.00", first) + gga("000001.00"));
+  ASSERT_EQ(samples.size(), 4U);
+  for (std::size_t i = 1; i < samples.size(); ++i)
+    EXPECT_EQ(samples[i].time - samples[i - 1].time, Duration(1s)) << i;
+  const UtcTime new_year = std::chrono::sys_days{std::chrono::year{2017} / 1 / 1};
+  EXPECT_EQ(samples[0].utc, new_year - 1s);
+  EXPECT_EQ(samples[1].utc, new_year) << "second 60 is the first of the next day, as elsewhere";
+  EXPECT_EQ(samples[2].utc, new_year);
+  EXPECT_EQ(samples[3].utc, new_year + 1s);
+}
+
 TEST(NmeaDecoder, QualitiesThatAreNotOfSatellitesGiveNoPosition) {
   for (const char* quality : {"0", "6", "7", "8", ""}) {
     const auto samples = decode(gga("000001.00", std::string(quality) + ",18,0.7,35.250,M,46.250,M,,"));
