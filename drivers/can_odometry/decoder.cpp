@@ -20,6 +20,13 @@ constexpr int kJumpBelieved = 10;
 constexpr double kDeadBand_mps = 1.0;
 /// Speeds further apart in time are not compared.
 constexpr double kCompared_s = 1.0;
+/// A gap lacks a set when it is longer than these periods and mean deviations from the period together; one
+/// of more than kGapTaken periods says nothing more about the rate.
+constexpr double kGapPeriods = 1.5;
+constexpr double kGapJitters = 4.0;
+constexpr double kGapTaken = 4.0;
+constexpr double kLearned = 1.0 / 16.0;
+constexpr std::uint64_t kSetsToLearn = 64;
 
 struct UnitName {
   std::string_view name;
@@ -293,6 +300,7 @@ void Decoder::emit(HostTime arrival, SampleSink& sink) noexcept {
     return;
   }
   const double mean_mps = sum_mps / static_cast<double>(wheels_.size());
+  count_by_time(newest);
   const double speed_mps = backward_ ? -std::abs(mean_mps) : mean_mps;
   if (!is_possible(speed_mps, newest)) {
     on_impossible(speed_mps);
@@ -309,6 +317,25 @@ void Decoder::emit(HostTime arrival, SampleSink& sink) noexcept {
   sample.odometry.flags = has_no_sign_ ? kSpeedHasNoSign : 0U;
   ++counters_.samples;
   sink.on_sample(sample);
+}
+
+void Decoder::count_by_time(HostTime stamp) noexcept {
+  const double gap_s = to_seconds(stamp - last_set_);
+  const bool has_gap = sets_ > 0;
+  last_set_ = stamp;
+  ++sets_;
+  if (!has_gap) {
+    period_s_ = 1.0 / config_.rate_hz;
+    return;
+  }
+  const double periods = gap_s / period_s_;
+  const bool lacks = gap_s > kGapPeriods * period_s_ + kGapJitters * jitter_s_;
+  if (lacks && sets_ > kSetsToLearn && !last_count_) {
+    counters_.samples_lost += static_cast<std::uint64_t>(std::llround(periods)) - 1;
+  }
+  // A rate that really changes is learned within seconds.
+  period_s_ += kLearned * (std::min(gap_s, kGapTaken * period_s_) - period_s_);
+  if (!lacks) jitter_s_ += kLearned * (std::abs(gap_s - period_s_) - jitter_s_);
 }
 
 bool Decoder::is_possible(double speed_mps, HostTime stamp) noexcept {

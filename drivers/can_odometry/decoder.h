@@ -94,6 +94,7 @@ class Decoder final : public CanDecoder {
   void on_impossible(double speed_mps) noexcept;
   void on_invalid() noexcept;
   void emit(HostTime arrival, SampleSink& sink) noexcept;
+  void count_by_time(HostTime stamp) noexcept;
   [[nodiscard]] bool is_possible(double speed_mps, HostTime stamp) noexcept;
 
   DecoderConfig config_;
@@ -106,6 +107,11 @@ class Decoder final : public CanDecoder {
   OdometryCounters odometry_counters_;
   std::uint64_t sequence_ = 0;
   std::optional<std::uint64_t> last_count_;
+  // Without a counter, what is missing shows in the stamps.
+  std::uint64_t sets_ = 0;
+  HostTime last_set_{};
+  double period_s_ = 0.0;  ///< between sets, as it has been lately
+  double jitter_s_ = 0.0;  ///< mean deviation from it
   bool has_last_ = false;
   double last_speed_mps_ = 0.0;
   HostTime last_stamp_{};

@@ -44,6 +44,8 @@ void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink
     return;
   }
   const bool opens = item == Item::kSampleTime || item == Item::kGroupCounter;
+  // A node that hears no acknowledgement repeats its frame: it opens no second group.
+  if (opens && is_repeated(item, frame.payload())) return;
   if (opens) {
     const bool again =
         item == Item::kSampleTime ? group_.sample_time.has_value() : group_.counter.has_value();
@@ -51,6 +53,12 @@ void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink
     if (!group_.is_open) open(frame.stamp);
   }
   if (!take(item, frame.payload())) ++counters_.bad_contents;
+}
+
+bool Decoder::is_repeated(Item item, std::span<const std::uint8_t> data) const noexcept {
+  if (!group_.is_open) return false;
+  if (item == Item::kSampleTime) return group_.sample_time && group_.sample_time == read_u32(data);
+  return group_.counter && group_.counter == read_u16(data);
 }
 
 void Decoder::open(HostTime stamp) noexcept {
@@ -113,6 +121,7 @@ void Decoder::close(HostTime arrival, SampleSink& sink) noexcept {
   if (!choose_source() || !fill(now, sample.imu)) {
     // Rates without forces are no sample: what is lost here is told as a gap.
     ++counters_.bad_contents;
+    if (source_ != Source::kNone) ++counters_.samples_lost;
     gap_pending_ = true;
     return;
   }
@@ -120,6 +129,8 @@ void Decoder::close(HostTime arrival, SampleSink& sink) noexcept {
   sample.sequence = sequence_++;
   sample.arrival = arrival;
   sample.time = clock_.observe(now.time_ns, group_.stamp);
+  // A fixed clock map begins no segments of its own.
+  counters_.clock_resets = std::max(restarts_, clock_.restarts());
   sample.imu.counter = now.counter;
   if (gap_pending_) sample.imu.flags |= kGapBefore;
   gap_pending_ = false;
@@ -154,6 +165,11 @@ bool Decoder::locate(Instant& now) noexcept {
     if (step == xsens::CountStep::kRejected || step == xsens::CountStep::kRepeated) return false;
     if (step == xsens::CountStep::kRestarted) restart();
     now.time_ns = sample_time_->count() * tick_ns_;
+  } else if (sample_time_) {
+    // Its SampleTime was lost on the way: the count goes on from the group before, on the same time scale.
+    gap_pending_ = gap_pending_ || !has_last_;
+    if (!has_last_) return false;
+    now.time_ns = last_time_ns_ + std::llround(static_cast<double>(groups) * period_s * kNsPerSecond);
   } else {
     now.time_ns = std::llround(static_cast<double>(counter_.count()) * period_s * kNsPerSecond);
   }
@@ -166,8 +182,9 @@ bool Decoder::locate(Instant& now) noexcept {
   const bool is_nominal =
       std::abs(step_s - period_s) <= kTickRounding * static_cast<double>(tick_ns_) / kNsPerSecond;
   now.dt_s = groups == 1 && step_s > 0.0 && !is_nominal ? step_s : period_s;
-  if (has_last_ && groups > 1) {
-    counters_.samples_lost += static_cast<std::uint64_t>(groups - 1);
+  // Since the last group, which may have lacked its counter: that one is not missing.
+  if (const std::int64_t step = now.counter - last_counter_; has_last_ && step > 1) {
+    counters_.samples_lost += static_cast<std::uint64_t>(step - 1);
     gap_pending_ = true;
   }
   has_last_ = true;
@@ -190,7 +207,7 @@ bool Decoder::settle_tick(std::uint32_t raw, std::int64_t groups) noexcept {
 }
 
 void Decoder::restart() noexcept {
-  ++counters_.clock_resets;
+  ++restarts_;
   clock_.restart();
   has_last_ = false;
   gap_pending_ = true;

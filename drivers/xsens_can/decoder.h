@@ -76,6 +76,7 @@ class Decoder final : public CanDecoder {
 
   void on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink) noexcept override;
   void open(HostTime stamp) noexcept;
+  [[nodiscard]] bool is_repeated(Item item, std::span<const std::uint8_t> data) const noexcept;
   [[nodiscard]] bool take(Item item, std::span<const std::uint8_t> data) noexcept;
   void close(HostTime arrival, SampleSink& sink) noexcept;
   [[nodiscard]] bool locate(Instant& at) noexcept;
@@ -96,6 +97,7 @@ class Decoder final : public CanDecoder {
   std::int64_t tick_ns_ = 0;
   std::optional<std::uint32_t> last_raw_time_;
   std::optional<std::uint16_t> last_raw_counter_;
+  std::uint64_t restarts_ = 0;  ///< segments begun because count or time were not continuable
   bool has_last_ = false;
   std::int64_t last_counter_ = 0;
   std::int64_t last_time_ns_ = 0;

@@ -88,6 +88,8 @@ void MtDecoder::drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept 
     on_frame(frame, arrival, sink);
   }
   counters_.bytes_skipped = scanner_.counters().bytes_skipped;
+  // A fixed clock map begins no segments of its own.
+  counters_.clock_resets = std::max(restarts_, clock_.restarts());
   counters_.bad_checksums = scanner_.counters().bad_checksums;
   counters_.bad_lengths = scanner_.counters().bad_lengths;
 }
@@ -333,6 +335,8 @@ bool MtDecoder::count_message(HostTime first_byte) noexcept {
   if (!inertial_.has(InertialMessage::kPacketCounter)) return true;
   const CountStep step = packet_counter_.take(inertial_.packet_counter, first_byte);
   if (step == CountStep::kRejected) return false;
+  // A message that came twice; SampleTimeFine knows better where there is one.
+  if (step == CountStep::kRepeated && !inertial_.has(InertialMessage::kSampleTimeFine)) return false;
   if (step == CountStep::kForward) lost_messages_ += packet_counter_.step() - 1;
   if (step == CountStep::kRestarted && !inertial_.has(InertialMessage::kSampleTimeFine)) restart_clock();
   return true;
@@ -343,7 +347,7 @@ bool MtDecoder::advance_sample_time(HostTime first_byte) noexcept {
   std::int64_t samples = 1 + std::exchange(lost_messages_, 0);
   if (inertial_.has(InertialMessage::kSampleTimeFine)) {
     const CountStep step = sample_time_.take(inertial_.sample_time_fine, first_byte);
-    if (step == CountStep::kRejected) return false;
+    if (step == CountStep::kRejected || step == CountStep::kRepeated) return false;
     if (step == CountStep::kRestarted) restart_clock();
     last_step_ticks_ =
         step == CountStep::kForward && has_sample_ ? sample_time_.count() - last_sample_time_ : 0;
@@ -429,7 +433,7 @@ void MtDecoder::emit_gnss(const NavPvt& pvt, const Frame& frame, HostTime arriva
 }
 
 void MtDecoder::restart_clock() noexcept {
-  ++counters_.clock_resets;
+  ++restarts_;
   clock_.restart();
   gap_pending_ = true;
 }

@@ -128,6 +128,7 @@ class MtDecoder final : public DeviceDecoder {
   Scanner scanner_;
   ClockMap clock_;
   DecoderCounters counters_;
+  std::uint64_t restarts_ = 0;  ///< segments begun because the count was not continuable
   std::optional<std::uint8_t> last_error_;
   ClockMap gnss_clock_;
   WeekTime gnss_time_;

@@ -27,6 +27,7 @@ constexpr double kEarlyAllowance_s = 0.020;
 constexpr double kRateAllowance = 200e-6;
 constexpr double kSettled_s = 10.0;
 constexpr int kEarlyToRestart = 3;
+constexpr Duration kWrongDeviceTime = std::chrono::seconds{1};
 // Every observation later than the line by this much for this long: the device's clock jumped.
 constexpr double kLate_s = 0.050;
 constexpr double kLateToRestart_s = 10.0;
@@ -84,7 +85,7 @@ inline void ClockMap::take(const Point& point) noexcept {
   if (residual_s < 0.0) move_line({line_.a_s + residual_s, line_.b}, point.x_s);
 }
 
-inline HostTime ClockMap::emit(std::int64_t device_time_ns, double x_s) noexcept {
+inline HostTime ClockMap::emit(std::int64_t device_time_ns, double x_s, HostTime first_byte) noexcept {
   if (has_last_ && device_time_ns == last_device_ns_) return last_mapped_;
   const bool continues = has_last_ && device_time_ns > last_device_ns_;
   const double step_s = continues ? seconds(device_time_ns - last_device_ns_) : 0.0;
@@ -93,9 +94,12 @@ inline HostTime ClockMap::emit(std::int64_t device_time_ns, double x_s) noexcept
 
   const Duration since_origin{device_time_ns - device_origin_ns_};
   HostTime mapped = host_origin_ + since_origin + duration(line_.at(x_s) + correction_s_);
+  // Nothing is sampled a second after it arrived: not the stamp but the device time is wrong.
+  const bool believed = early_in_a_row_ == 0 || mapped - first_byte < kWrongDeviceTime;
+  if (!believed) mapped = std::min(mapped, first_byte);
   if (has_last_) {
-    const HostTime floor = last_mapped_ + std::max(Duration{1}, duration(kSlowest * step_s));
-    mapped = std::max(mapped, floor);
+    const Duration slowest = believed ? duration(kSlowest * step_s) : Duration{1};
+    mapped = std::max(mapped, last_mapped_ + std::max(Duration{1}, slowest));
   }
   has_last_ = true;
   last_device_ns_ = device_time_ns;
@@ -120,7 +124,7 @@ HostTime ClockMap::observe(std::int64_t device_time_ns, HostTime first_byte) noe
     point = {0.0, 0.0};
   }
   if (early_in_a_row_ == 0) take(point);
-  return emit(device_time_ns, point.x_s);
+  return emit(device_time_ns, point.x_s, first_byte);
 }
 
 void ClockMap::restart() noexcept {

@@ -89,7 +89,7 @@ class ClockMap {
   [[nodiscard]] double rate_near(const Line& line) const noexcept;
   [[nodiscard]] const Point& bin(std::size_t i) const noexcept { return bins_[(bins_begin_ + i) % kBins]; }
   void move_line(const Line& line, double x_s) noexcept;
-  [[nodiscard]] HostTime emit(std::int64_t device_time_ns, double x_s) noexcept;
+  [[nodiscard]] HostTime emit(std::int64_t device_time_ns, double x_s, HostTime first_byte) noexcept;
 
   ClockMapConfig config_;
   std::uint64_t restarts_ = 0;

@@ -280,6 +280,17 @@ TEST(ClockMap, OneFalselyEarlyStampIsNotBelieved) {
   EXPECT_LT(mapped.scatter_s(40.0), 1e-6);
 }
 
+TEST(ClockMap, OneDeviceTimeFarAheadIsMappedToItsArrival) {
+  ClockMap map;
+  std::int64_t k = 0;
+  for (; k < 2000; ++k) (void)map.observe(k * kPeriod.count(), host_at(static_cast<double>(k) * kPeriod_s));
+  const HostTime arrival = host_at(static_cast<double>(k) * kPeriod_s);
+  EXPECT_EQ(map.observe(k * kPeriod.count() + Duration(seconds{100}).count(), arrival), arrival);
+  ++k;
+  const HostTime next = host_at(static_cast<double>(k) * kPeriod_s);
+  EXPECT_EQ(map.observe(k * kPeriod.count(), next), next);
+}
+
 TEST(ClockMap, AfterALongSilenceItIsRightAtOnce) {
   ClockMap map;
   constexpr double kSkew = 40e-6;

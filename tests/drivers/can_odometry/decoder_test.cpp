@@ -222,6 +222,20 @@ TEST(CanOdometry, TheVehiclesOwnCounterTellsLosses) {
   EXPECT_EQ(rig.decoder->counters().samples_lost, 2U);
 }
 
+TEST(CanOdometry, WithoutACounterTheStampsTellLossesOnceTheRateIsKnown) {
+  for (const double configured_hz : {50.0, 20.0, 200.0}) {
+    Rig rig(rear_wheels(), {0, configured_hz});
+    for (int i = 0; i < 200; ++i) rig.rear(3600, 3600);  // every 20 ms
+    EXPECT_EQ(rig.decoder->counters().samples_lost, 0U) << configured_hz;
+    rig.now += 20ms;
+    for (int i = 0; i < 50; ++i) rig.rear(3600, 3600);
+    EXPECT_EQ(rig.decoder->counters().samples_lost, 1U) << configured_hz;
+    rig.now += 1s;
+    rig.rear(3600, 3600);
+    EXPECT_NEAR(static_cast<double>(rig.decoder->counters().samples_lost), 51.0, 1.0) << configured_hz;
+  }
+}
+
 TEST(CanOdometry, WhatCannotBeChosenIsRefusedWithTheRemedy) {
   const auto refused = [](const Choice& choice) {
     const auto made = Decoder::make(car(), choice, {});
@@ -330,6 +344,7 @@ TEST(CanOdometry, ARealDriveDecodesToItsPublishedSpeeds) {
   EXPECT_EQ(rig.sink.samples.size(), rows);
   EXPECT_LT(largest, 1e-6);
   EXPECT_EQ(rig.decoder->remark(), "");
+  EXPECT_EQ(rig.decoder->counters().samples_lost, 0U) << "stamps that jitter by a period are no loss";
 }
 
 }  // namespace

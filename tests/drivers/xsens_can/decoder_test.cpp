@@ -239,6 +239,36 @@ void rest(Unit& unit, Item acceleration, Item rate, int copies = 1) {
   }
 }
 
+TEST(XsensCan, AFrameThatIsLostOrComesTwiceCostsNoMoreThanItsOwnGroup) {
+  enum class What { kTime, kCounter, kIncrement };
+  for (const What what : {What::kTime, What::kCounter, What::kIncrement}) {
+    for (const bool twice : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "frame " << static_cast<int>(what) << (twice ? " twice" : " lost"));
+      Unit unit;
+      unit.groups(5, [&] { unit.increments(); });
+      const int times = twice ? 2 : 0;
+      for (int i = 0; i < (what == What::kTime ? times : 1); ++i)
+        unit.frame(Item::kSampleTime, be({{unit.sample_time, 4}}));
+      for (int i = 0; i < (what == What::kCounter ? times : 1); ++i)
+        unit.frame(Item::kGroupCounter, be({{unit.counter, 2}}));
+      if (what != What::kIncrement || twice) unit.increments();
+      unit.next_period();
+      unit.groups(5, [&] { unit.increments(); });
+
+      const std::size_t lost = what == What::kIncrement && !twice ? 1 : 0;
+      EXPECT_EQ(unit.samples().size(), 9U - lost);  // the first teaches, the last is open
+      EXPECT_EQ(unit.decoder.counters().samples_lost, lost);
+      EXPECT_EQ(unit.decoder.counters().clock_resets, 0U);
+      for (std::size_t i = 1; i < unit.samples().size(); ++i) {
+        const Sample& before = unit.samples()[i - 1];
+        const Sample& sample = unit.samples()[i];
+        EXPECT_EQ(sample.time - before.time, (sample.imu.counter - before.imu.counter) * 10ms);
+        EXPECT_NEAR(sample.imu.f_mps2[2], kRest_mps2, 1.0 / 32768.0 / 0.01);
+      }
+    }
+  }
+}
+
 TEST(XsensCan, ARestTellsWhichHighRateMessageIsTheAcceleration) {
   for (const bool first : {true, false}) {
     Unit unit;
