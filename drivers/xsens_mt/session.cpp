@@ -130,7 +130,7 @@ std::span<const std::uint8_t> MtSession::poll(HostTime now) noexcept {
   if (step_ == Step::kFailed) return {};
   if (!started_) {
     started_ = true;
-    enter(Step::kListen, now);
+    enter(config_.device_id ? Step::kGoToConfig : Step::kListen, now);
   }
   if (acknowledge_wake_up_) {
     acknowledge_wake_up_ = false;
@@ -187,6 +187,15 @@ void MtSession::fail_round(HostTime now) noexcept {
     step_ = Step::kFailed;
     to_send_ = false;
   }
+}
+
+void MtSession::refuse_device() noexcept {
+  say("this is device %08X, and %08X was expected: are two sensors' plugs exchanged? Exchange them again, or "
+      "their "
+      "device_id",
+      static_cast<unsigned>(*device_id_), static_cast<unsigned>(*config_.device_id));
+  step_ = Step::kFailed;
+  to_send_ = false;
 }
 
 void MtSession::enter(Step step, HostTime now) noexcept {
@@ -345,6 +354,7 @@ void MtSession::on_reply(const Frame& frame, HostTime now) noexcept {
     case Step::kIdentify:
       if (frame.data.size() < 4) return;
       device_id_ = read_be<std::uint32_t>(frame.data);
+      if (config_.device_id && device_id_ != config_.device_id) return refuse_device();
       enter(sends_text_ ? Step::kLeaveTextMode : Step::kReadConfiguration, now);
       break;
     case Step::kLeaveTextMode:

@@ -44,8 +44,9 @@ struct MtSessionConfig {
   double rate_hz = 100.0;              ///< messages per second; 115200 / rate must be whole to 0.1 %
   double baud = 115200.0;              ///< to tell beforehand whether the data fits the line
   std::optional<SyncIn> sync_in;
-  bool searching_baud = false;  ///< the rate is a guess: give up sooner
-  std::size_t bus_devices = 0;  ///< behind an Xbus Master; 0: the device has the line for itself
+  bool searching_baud = false;             ///< the rate is a guess: give up sooner
+  std::optional<std::uint32_t> device_id;  ///< that it must have; asked before its data is taken
+  std::size_t bus_devices = 0;             ///< behind an Xbus Master; 0: the device has the line for itself
 };
 
 class MtSession final : public DeviceSession {
@@ -105,6 +106,7 @@ class MtSession final : public DeviceSession {
   void on_timeout(HostTime now) noexcept;
   void next_device_or(Step step, HostTime now) noexcept;
   void fail_round(HostTime now) noexcept;
+  void refuse_device() noexcept;
   void watch_stream(HostTime now) noexcept;
   [[nodiscard]] bool sends_what_is_wanted(const Configuration& configuration) const noexcept;
   [[nodiscard]] std::optional<std::int64_t> wanted_count(const Frame& frame) const noexcept;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -273,9 +274,31 @@ void read_transport(TomlReader in, DeviceConfig& device) {
   in.finish();
 }
 
+/// Eight hexadecimal digits, as the device's label and `imuscope probe` have them.
+void read_device_id(TomlReader& in, XsensConfig& xsens) {
+  constexpr std::size_t kDigits = 8;
+  constexpr int kHexadecimal = 16;
+  std::string text;
+  in.text("device_id", text);
+  if (text.empty()) return;
+  std::uint32_t id = 0;
+  const char* const text_end = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data(), text_end, id, kHexadecimal);
+  if (error != std::errc{} || end != text_end || text.size() != kDigits) {
+    in.fail("device_id", "must be eight hexadecimal digits, such as \"00300A2B\"",
+            "the device's label and imuscope probe show them");
+  }
+  if (xsens.bus_id > 0) {
+    in.fail("device_id", "is for a device that has its line for itself",
+            "devices behind an Xbus Master are told apart by their bus_id");
+  }
+  xsens.device_id = id;
+}
+
 void read_xsens(TomlReader& in, XsensConfig& xsens) {
   constexpr int kMaxBusId = 10;
   in.integer("bus_id", xsens.bus_id, 1, kMaxBusId);
+  read_device_id(in, xsens);
   auto sync = in.table("sync_in");
   if (!sync.present()) return;
   constexpr int kMax16 = 65535;

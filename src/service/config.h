@@ -64,6 +64,8 @@ struct XsensConfig {
   /// Behind an Xbus Master, from 1; 0: the device has its line for itself.
   int bus_id = 0;
   int bus_size = 0;  ///< devices behind the same Xbus Master
+  /// That the device must have; refused otherwise.
+  std::optional<std::uint32_t> device_id;
   struct SyncIn {
     std::uint16_t mode = 0;
     std::uint16_t skip = 0;

@@ -135,6 +135,10 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"device.transport.log_clock",
      "can: of a recorded log, whether its stamps are UTC or of the reference's own clock."},
     {"device.bus_id", "xsens_mt: place behind an Xbus Master, from 1; 0: the device has its line to itself."},
+    {"device.device_id",
+     "xsens_mt: eight hexadecimal digits that the device must have, as its label and `imuscope probe` show "
+     "them; "
+     "another device on the same port is refused. Then the device is asked before its data is taken."},
     {"device.sync_in.mode",
      "xsens_mt: edge (1 rising, 2 falling, 3 both) plus 0 to sample, 4 to send the latest, 16 to keep time."},
     {"device.sync_in.skip", "xsens_mt: pulses passed over between two that count."},

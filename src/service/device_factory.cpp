@@ -177,6 +177,7 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device, bool sea
       config.rate_hz = device.rate_hz;
       config.baud = baud_of(device);
       config.searching_baud = searching_baud;
+      config.device_id = device.xsens.device_id;
       config.bus_devices = static_cast<std::size_t>(device.xsens.bus_size);
       if (const auto& sync = device.xsens.sync_in) config.sync_in = {sync->mode, sync->skip, sync->offset};
       return std::make_unique<xsens::MtSession>(config);

@@ -198,6 +198,33 @@ TEST(MtSession, TakesOverADeviceThatSendsWhatIsWantedWithoutAWord) {
   EXPECT_TRUE(bench.device.heard.empty());
 }
 
+TEST(MtSession, ADeviceWithAnExpectedIdIsAskedForItBeforeItsDataCounts) {
+  MtSessionConfig config;
+  config.device_id = 0x00300123;
+  Bench bench(config);
+  bench.device.mode = kDefaultLayout.mode;
+  bench.device.settings = kDefaultLayout.settings;
+  bench.device.measuring = true;
+  bench.run(seconds{2});
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+  EXPECT_EQ(bench.times_heard(mid::kReqDid), 1U);
+}
+
+TEST(MtSession, AnotherDeviceInItsPlaceIsRefusedByItsIdAndSendsNothingMore) {
+  MtSessionConfig config;
+  config.device_id = 0x00300124;
+  Bench bench(config);
+  bench.device.mode = kDefaultLayout.mode;
+  bench.device.settings = kDefaultLayout.settings;
+  bench.device.measuring = true;
+  bench.run(seconds{20});
+  EXPECT_EQ(bench.session.state(), SessionState::kFailed);
+  EXPECT_NE(bench.session.problem().find("this is device 00300123, and 00300124 was expected"),
+            std::string_view::npos)
+      << bench.session.problem();
+  EXPECT_FALSE(bench.device.measuring) << "its data would be taken for the other's";
+}
+
 TEST(MtSession, DoesNotTakeOverADeviceThatSendsAtAnotherRateOrOtherNumbersOfTheSameLength) {
   Bench rate;
   rate.device.mode = kDefaultLayout.mode;
