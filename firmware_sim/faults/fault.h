@@ -3,6 +3,8 @@
 /// What goes wrong in a simulated run, and when. A script (see imusim/fault_script.h) makes a list of these.
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,6 +33,14 @@ enum class FaultKind {
   kSolution,    ///< the receiver's solution is of `solution_type`
 };
 
+/// What a fault did, as the simulator knows it.
+struct FaultTally {
+  std::uint64_t messages = 0;   ///< sent while it lasted
+  std::uint64_t hit = 0;        ///< of them, that it changed, repeated, or followed with garbage
+  std::uint64_t bytes_hit = 0;  ///< turned, lost or added
+  double silent_s = 0.0;  ///< kRestart: from the last message before to the first after which it sends on
+};
+
 struct Fault {
   FaultKind kind{};
   std::string device;
@@ -45,7 +55,8 @@ struct Fault {
   bool accel = true;
   double gyro_range_radps = 1e9;
   double accel_range_mps2 = 1e9;
-  Eigen::Vector3d by_n_m = Eigen::Vector3d::Zero();  ///< north, east, down
+  Eigen::Vector3d by_n_m = Eigen::Vector3d::Zero();                    ///< north, east, down
+  std::shared_ptr<FaultTally> tally = std::make_shared<FaultTally>();  ///< copies of a fault share it
   int solution_type = 0;  ///< GREIS: 0 none, 1 single, 2 differential, 3 float, 4 fixed
 
   [[nodiscard]] bool acts_at(double t_s) const { return t_s >= begin_s && t_s < end_s; }

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <sstream>
 
+#include "firmware_sim/imusim/fault_log.h"
 #include "firmware_sim/imusim/table_reader.h"
 
 namespace imusim {
@@ -126,6 +127,8 @@ void read_fault(TableReader& in, Configuration& configuration) {
 }
 
 }  // namespace
+
+std::string_view name_of(FaultKind kind) { return kKinds[static_cast<std::size_t>(kind)]; }
 
 Outcome<void> parse_faults(const std::string& text, const std::filesystem::path& file,
                            Configuration& configuration) {

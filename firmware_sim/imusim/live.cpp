@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "firmware_sim/devices/gnss_encoders.h"
+#include "firmware_sim/imusim/fault_log.h"
 #include "firmware_sim/imusim/truth_files.h"
 #include "firmware_sim/io/can_port.h"
 #include "firmware_sim/io/pseudo_terminal.h"
@@ -46,14 +47,13 @@ bool same_speed(int a_baud, int b_baud) {
 struct Port {
   WorldDevice* device;
   SerialLine line;
-  std::vector<Unplugged> unplugged;
+  std::vector<Fault> unplugged;  ///< faults of that kind
   std::unique_ptr<LineEnd> terminal;
   LiveCounts counts;
 
   void plug_in_or_out(double t_s) {
-    const bool out = std::any_of(unplugged.begin(), unplugged.end(), [&](const Unplugged& span) {
-      return t_s >= span.begin_s && t_s < span.end_s;
-    });
+    const bool out = std::any_of(unplugged.begin(), unplugged.end(),
+                                 [&](const Fault& fault) { return fault.acts_at(t_s); });
     if (out == (terminal == nullptr)) return;
     terminal.reset();
     if (out) return;
@@ -75,8 +75,16 @@ struct Port {
       if (!understood) bytes = garbled(bytes);
       const std::size_t dropped = terminal ? terminal->write(bytes) : bytes.size();
       counts.dropped_bytes += dropped;
+      note_unheard(dropped, t_s);
       counts.sent_bytes += bytes.size() - dropped;
     });
+  }
+
+  /// Until the program has opened the port again after it was unplugged, what is lost is lost to that.
+  void note_unheard(std::size_t bytes, double t_s) {
+    const auto last = std::find_if(unplugged.rbegin(), unplugged.rend(),
+                                   [&](const Fault& fault) { return t_s >= fault.begin_s; });
+    if (last != unplugged.rend()) last->tally->bytes_hit += bytes;
   }
 
   /// What a receiver at another speed makes of bytes: as many others.
@@ -162,7 +170,7 @@ Outcome<std::vector<Port>> open_ports(World& world, const LiveOptions& options) 
     if (options.on_line) options.on_line(fmt::format("{:<10} {}", played.name, describe(played)));
     ports.push_back({&device, world.line_of(played), {}, std::move(*terminal), {played.name, 0, 0, 0}});
     for (const Fault& fault : world.configuration().faults_of(played.name)) {
-      if (fault.kind == FaultKind::kUnplug) ports.back().unplugged.push_back({fault.begin_s, fault.end_s});
+      if (fault.kind == FaultKind::kUnplug) ports.back().unplugged.push_back(fault);
     }
   }
   return ports;
@@ -197,6 +205,10 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
     if (t_s > end_s) break;
     for (Port& port : *ports) port.run_until(t_s);
     for (CanEnd& end : *can_ends) end.run_until(t_s);
+  }
+  if (options.folder && !configuration.faults.empty()) {
+    if (auto logged = write_fault_log(configuration, *options.folder); !logged)
+      return tl::unexpected(logged.error());
   }
   std::vector<LiveCounts> counts;
   for (const Port& port : *ports) counts.push_back(port.counts);

@@ -9,6 +9,7 @@
 
 #include "firmware_sim/devices/can_encoder.h"
 #include "firmware_sim/imusim/capture_file.h"
+#include "firmware_sim/imusim/fault_log.h"
 #include "firmware_sim/imusim/output_file.h"
 #include "firmware_sim/imusim/truth_files.h"
 
@@ -73,7 +74,8 @@ Outcome<Recorded> record_can_device(World& world, WorldDevice& device, const std
   Recorded recorded{device.played.name, 0, 0};
   const std::string interface = device.played.can_interface.empty() ? "can0" : device.played.can_interface;
   const auto on_frame = [&](const CanFrame& frame, double t_s) {
-    const std::string line = candump_line(frame, interface, utc_after(world.configuration().utc_begin, t_s));
+    const std::string line = candump_line(
+        frame, interface, utc_without_leap_second(gps_after(world.configuration().utc_begin, t_s)));
     log.write(line);
     recorded.bytes += line.size();
     ++recorded.reads;
@@ -181,6 +183,10 @@ Outcome<std::vector<Recorded>> record(const Configuration& configuration, const 
   }
   for (const auto& file : error_files)
     if (auto closed = file->close(); !closed && result) result = tl::unexpected(closed.error());
+  if (result && !configuration.faults.empty()) {
+    if (auto logged = write_fault_log(configuration, options.folder); !logged)
+      return tl::unexpected(logged.error());
+  }
   if (result) {
     if (auto captured = write_capture(capture_header(configuration), options.folder); !captured)
       return tl::unexpected(captured.error());

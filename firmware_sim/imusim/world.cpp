@@ -169,8 +169,9 @@ World::World(const Configuration& configuration, Beginning beginning, double beg
 void World::add(const PlayedDevice& played, std::unique_ptr<Device> device) {
   const std::vector<Fault> faults = configuration_.faults_of(played.name);
   if (!faults.empty()) {
-    device = std::make_unique<FaultyDevice>(std::move(device), faults,
-                                            Random(configuration_.scenario.seed, played.name + "/faults"));
+    device = std::make_unique<FaultyDevice>(
+        std::move(device), faults, Random(configuration_.scenario.seed, played.name + "/faults"),
+        Configuration::is_on_can(played) ? FaultyDevice::Wire::kFrames : FaultyDevice::Wire::kBytes);
   }
   devices_.push_back({played, std::move(device)});
 }

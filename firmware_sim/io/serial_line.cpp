@@ -17,17 +17,26 @@ constexpr double kFtdiTimer_s = 16e-3;
 void SerialLine::send(const Emission& emission) {
   const double byte_s = kBitsPerByte / options_.baud;
   double done = std::max(emission.ready_s, free_at_s_);
+  const Unplugged* lost_to = nullptr;
+  std::size_t lost = 0;
   for (const std::uint8_t value : emission.bytes) {
     done += byte_s;
-    if (!is_unplugged(done)) waiting_.push_back({done, value, false});
+    if (const Unplugged* span = unplugged_at(done)) {
+      lost_to = span;
+      ++lost;
+    } else {
+      waiting_.push_back({done, value, false});
+    }
   }
+  if (lost_to != nullptr && lost_to->on_unheard) lost_to->on_unheard(lost);
   if (!waiting_.empty()) waiting_.back().ends_message = true;
   free_at_s_ = done;
 }
 
-bool SerialLine::is_unplugged(double t_s) const {
-  return std::any_of(options_.unplugged.begin(), options_.unplugged.end(),
-                     [&](const Unplugged& span) { return t_s >= span.begin_s && t_s < span.end_s; });
+const Unplugged* SerialLine::unplugged_at(double t_s) const {
+  for (const Unplugged& span : options_.unplugged)
+    if (t_s >= span.begin_s && t_s < span.end_s) return &span;
+  return nullptr;
 }
 
 double SerialLine::held_until(double t_s) const {

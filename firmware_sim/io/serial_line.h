@@ -33,6 +33,8 @@ struct HeldReads {
 struct Unplugged {
   double begin_s;
   double end_s;
+  std::function<void(std::size_t bytes)>
+      on_unheard{};  ///< told of each message that lost bytes; may be empty
 };
 
 struct LineOptions {
@@ -76,7 +78,7 @@ class SerialLine {
   [[nodiscard]] NextRead next_read() const;
   [[nodiscard]] NextRead unheld_read() const;
   [[nodiscard]] double held_until(double t_s) const;
-  [[nodiscard]] bool is_unplugged(double t_s) const;
+  [[nodiscard]] const Unplugged* unplugged_at(double t_s) const;
   [[nodiscard]] NextRead next_ftdi_read() const;
   [[nodiscard]] double next_usb_frame(double t_s) const;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
@@ -192,6 +193,23 @@ TEST_F(FaultScript, FlipsTurnOneBitOfTheirShareOfBytesWhileTheyLast) {
   const std::size_t third = a.bytes.size() / 3 - 1000;
   EXPECT_TRUE(std::equal(a.bytes.begin(), a.bytes.begin() + static_cast<std::ptrdiff_t>(third),
                          clean("a").bytes.begin()));
+}
+
+TEST_F(FaultScript, TheLogTellsWhatEachFaultDid) {
+  const auto made = with(
+      "[[fault]]\nkind = \"flip\"\ndevice = \"a\"\nat_s = 10\nfor_s = 5\nshare = 0.01\n"
+      "[[fault]]\nkind = \"unplug\"\ndevice = \"b\"\nat_s = 10\nfor_s = 2\n",
+      {"a", "b"});
+  std::ifstream in(folder_ / "faulty" / "fault_log.json");
+  const auto log = nlohmann::json::parse(in).at("faults");
+  ASSERT_EQ(log.size(), 2U);
+  EXPECT_EQ(log[0].at("device"), "a");
+  EXPECT_EQ(log[0].at("kind"), "flip");
+  EXPECT_EQ(log[0].at("bytes_hit").get<std::size_t>(), differing(made.at("a").bytes, clean("a").bytes));
+  EXPECT_LE(log[0].at("hit"), log[0].at("bytes_hit"));
+  EXPECT_EQ(log[1].at("bytes_hit").get<std::size_t>(), clean("b").bytes.size() - made.at("b").bytes.size());
+  EXPECT_EQ(log[1].at("hit").get<std::size_t>(),
+            clean("b").mt_counters().size() - made.at("b").mt_counters().size());
 }
 
 TEST_F(FaultScript, DroppedBytesAreGone) {
