@@ -26,6 +26,7 @@ constexpr double kGapPeriods = 1.5;
 constexpr double kGapJitters = 4.0;
 constexpr double kGapTaken = 4.0;
 constexpr double kLearned = 1.0 / 16.0;
+constexpr double kLearnedOfGaps = 1.0 / 128.0;
 constexpr std::uint64_t kSetsToLearn = 64;
 
 struct UnitName {
@@ -333,8 +334,9 @@ void Decoder::count_by_time(HostTime stamp) noexcept {
   if (lacks && sets_ > kSetsToLearn && !last_count_) {
     counters_.samples_lost += static_cast<std::uint64_t>(std::llround(periods)) - 1;
   }
-  // A rate that really changes is learned within seconds.
-  period_s_ += kLearned * (std::min(gap_s, kGapTaken * period_s_) - period_s_);
+  // Losses hardly count for the rate; one that really changes is learned within seconds all the same.
+  const double learned = lacks && sets_ > kSetsToLearn ? kLearnedOfGaps : kLearned;
+  period_s_ += learned * (std::min(gap_s, kGapTaken * period_s_) - period_s_);
   if (!lacks) jitter_s_ += kLearned * (std::abs(gap_s - period_s_) - jitter_s_);
 }
 

@@ -191,6 +191,9 @@ nlohmann::json device_json(const device_status_t& d) {
           {"state", d.state},
           {"problem", d.problem},
           {"rate_hz", known(d.rate_hz)},
+          {"bytes", d.bytes},
+          {"bytes_skipped", d.bytes_skipped},
+          {"frames", d.frames},
           {"samples", d.samples},
           {"samples_lost", d.samples_lost},
           {"samples_late", d.samples_late},
@@ -235,6 +238,14 @@ nlohmann::json thread_json(const thread_status_t& t) {
             {"p99", known(t.done_p99_us)},
             {"p99.9", known(t.done_p999_us)},
             {"max", known(t.done_max_us)}}}};
+}
+
+nlohmann::json ring_json(const ring_status_t& r) {
+  return {{"name", r.name},
+          {"capacity", r.capacity},
+          {"level", r.level},
+          {"high_water", r.high_water},
+          {"refused", r.refused}};
 }
 
 }  // namespace
@@ -300,6 +311,7 @@ std::string json_of(const Heard& heard) {
   for (const auto& device : s.devices) json["devices"].push_back(device_json(device));
   for (const auto& study : s.studies) json["studies"].push_back(study_json(study));
   for (const auto& thread : s.threads) json["threads"].push_back(thread_json(thread));
+  for (const auto& ring : s.rings) json["rings"].push_back(ring_json(ring));
   for (const auto& r : s.rings) {
     json["rings"].push_back({{"name", r.name},
                              {"capacity", r.capacity},
