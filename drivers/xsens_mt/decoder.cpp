@@ -27,6 +27,11 @@ std::uint64_t fingerprint_of(std::span<const std::uint8_t> data) {
   return hash;
 }
 
+void set_temperature(double degC, ImuData& imu) {
+  imu.temperature_degC = static_cast<float>(degC);
+  imu.flags |= kHasTemperature;
+}
+
 UnwrapConfig counter_config(double counts_per_s, const ClockMapConfig& clock) {
   return {kCounterModulus, 0, counts_per_s, clock.mode == ClockMapConfig::Mode::kOnline};
 }
@@ -243,6 +248,7 @@ void MtDecoder::emit_block(Block& block, std::span<const std::uint8_t> data, con
         (has_rate ? kGyroValid : 0U) | (has_force ? kAccelValid : 0U) | (at.gap_before ? kGapBefore : 0U);
     if (has_rate) rotate(block.axes, message.rate_radps, sample.imu.omega_radps);
     if (has_force) rotate(block.axes, message.acceleration_mps2, sample.imu.f_mps2);
+    if (message.has(Field::kTemperature)) set_temperature(message.temperature_degc, sample.imu);
     put(sample, block, sink);
   }
   if (!wants_attitude_) return;
@@ -371,6 +377,7 @@ std::int64_t MtDecoder::device_time_ns() const noexcept {
 
 void MtDecoder::fill_imu(ImuData& imu) const noexcept {
   imu.flags = clip_flags(inertial_.status_word);
+  if (inertial_.has(InertialMessage::kTemperature)) set_temperature(inertial_.temperature_degC[0], imu);
   const bool has_rate = inertial_.has(InertialMessage::kRate);
   const bool has_force = inertial_.has(InertialMessage::kAcceleration);
   if (!has_rate && !has_force) {

@@ -25,6 +25,9 @@ class ItemTaker {
 
   void take(const Item& item) noexcept {
     switch (item.kind()) {
+      case xdi::kTemperature:
+        mark(InertialMessage::kTemperature, read_numbers(item, out_.temperature_degC));
+        break;
       case xdi::kAcceleration:
         mark(InertialMessage::kAcceleration, read_numbers(item, out_.acceleration_mps2));
         break;

@@ -29,9 +29,11 @@ struct InertialMessage {
     kOrientation = 1U << 7U,
     kGnss = 1U << 8U,
     kStatus = 1U << 9U,
+    kTemperature = 1U << 10U,
   };
   std::uint32_t items = 0;
   std::uint32_t status_word = 0;  ///< 0 where none was sent
+  std::array<double, 1> temperature_degC;
   std::array<double, 3> acceleration_mps2;
   std::array<double, 3> rate_radps;
   std::array<double, 3> delta_v_mps;

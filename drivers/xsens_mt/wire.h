@@ -119,6 +119,7 @@ constexpr std::size_t size_of(NumberFormat format) {
 /// Data identifiers of MTData2 without their format bits (0-3).
 namespace xdi {
 inline constexpr std::uint16_t kFormatBits = 0x000F;
+inline constexpr std::uint16_t kTemperature = 0x0810;
 inline constexpr std::uint16_t kUtcTime = 0x1010;
 inline constexpr std::uint16_t kPacketCounter = 0x1020;
 inline constexpr std::uint16_t kSampleTimeFine = 0x1060;

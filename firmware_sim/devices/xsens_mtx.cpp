@@ -79,6 +79,7 @@ void XsensMtx::add_skew(double ppm) { grid_.set_skew(grid_.skew_ppm() + ppm, nex
 
 void XsensMtx::start_calibrated(double t_s) {
   settings_.output_mode = kModeCalibrated;
+  if (options_.sends_temperature) settings_.output_mode |= kModeTemperature;
   settings_.output_settings = kSettingsCounter | kSettingsNoMag;
   replies_.clear();
   // Early enough for the line to be free when the first data come.

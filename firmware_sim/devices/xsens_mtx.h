@@ -34,6 +34,7 @@ class XsensMtx : public Device {
     std::uint16_t first_counter = 0;
     std::uint16_t period = 1152;  ///< stored period, 1/115200 s
     int baud = 115200;
+    bool sends_temperature = false;  ///< where it measures without having been told what
   };
 
   enum class State { kOff, kWaking, kConfig, kMeasurement };

@@ -35,10 +35,11 @@ Eigen::Vector3d clipped_and_quantised(const Eigen::Vector3d& value, const TriadE
   return result;
 }
 
-Eigen::Vector3d next_noise(std::array<NoiseSource, 3>& sources, Regime regime, double step_s) {
-  const double x = sources[0].next(regime, step_s);
-  const double y = sources[1].next(regime, step_s);
-  const double z = sources[2].next(regime, step_s);
+Eigen::Vector3d next_noise(std::array<NoiseSource, 3>& sources, Regime regime, double step_s,
+                           double white_factor) {
+  const double x = sources[0].next(regime, step_s, white_factor);
+  const double y = sources[1].next(regime, step_s, white_factor);
+  const double z = sources[2].next(regime, step_s, white_factor);
   return {x, y, z};
 }
 
@@ -50,6 +51,10 @@ Eigen::Vector3d with_errors(const Eigen::Vector3d& truth, const Eigen::Vector3d&
 }
 
 }  // namespace
+
+double Temperature::at(double t_s) const {
+  return begin_degC - (end_degC - begin_degC) * std::expm1(-t_s / time_constant_s);
+}
 
 IdealReading ideal_reading(const MotionState& state, const Mounting& mounting) {
   return {mounting.C_b_s * state.omega_ib_b_radps,
@@ -94,8 +99,11 @@ ImuReading ImuModel::sample_at(double t_s) {
 ImuReading ImuModel::sample_of(const IdealReading& ideal, const IdealReading& seen, Regime regime,
                                double t_s) {
   const double step_s = has_last_ ? t_s - last_t_s_ : 0.0;
-  const Eigen::Vector3d gyro_noise = next_noise(gyro_noise_, regime, step_s);
-  const Eigen::Vector3d accel_noise = next_noise(accel_noise_, regime, step_s);
+  const double warmer_degC = errors_.temperature.at(t_s) - errors_.temperature.begin_degC;
+  const double gyro_white_factor = std::exp(errors_.gyro_white.per_degC * warmer_degC +
+                                            errors_.gyro_white.per_radps * ideal.omega_radps.norm());
+  const Eigen::Vector3d gyro_noise = next_noise(gyro_noise_, regime, step_s, gyro_white_factor);
+  const Eigen::Vector3d accel_noise = next_noise(accel_noise_, regime, step_s, 1.0);
   last_t_s_ = t_s;
   has_last_ = true;
 

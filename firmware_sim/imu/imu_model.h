@@ -35,9 +35,26 @@ struct TriadErrors {
   double low_pass_hz = std::numeric_limits<double>::infinity();  ///< corner of the first-order low-pass
 };
 
+/// Temperature of a sensor that warms up after it was switched on at the scenario's beginning.
+struct Temperature {
+  double begin_degC = 25.0;
+  double end_degC = 25.0;
+  double time_constant_s = 300.0;
+  [[nodiscard]] double at(double t_s) const;
+};
+
+/// How the variance of the gyros' white noise follows what the sensor goes through: its logarithm changes by
+/// so much a unit, from the value of the regime on.
+struct NoiseDependence {
+  double per_degC = 0.0;   ///< above the temperature at the beginning
+  double per_radps = 0.0;  ///< of the magnitude of the angular rate
+};
+
 struct ImuErrors {
   TriadErrors gyro;
   TriadErrors accel;
+  Temperature temperature;
+  NoiseDependence gyro_white;
   RegimeSwitch regime_switch = RegimeSwitch::kContinuous;
 };
 

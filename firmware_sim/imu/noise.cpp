@@ -35,7 +35,7 @@ void NoiseSource::advance(States& states, const AxisNoise& noise, double step_s)
   }
 }
 
-double NoiseSource::next(Regime regime, double step_s) {
+double NoiseSource::next(Regime regime, double step_s, double white_factor) {
   const bool moves = regime == Regime::kDynamic;
   const AxisNoise& now = moves ? noise_.in_motion : noise_.at_rest;
   if (!started_) {
@@ -47,7 +47,7 @@ double NoiseSource::next(Regime regime, double step_s) {
     advance(motion_states_, noise_.in_motion, step_s);
   }
   const bool own = moves && regime_switch_ == RegimeSwitch::kIndependent;
-  double sum = std::sqrt(now.white_variance) * random_.normal();
+  double sum = std::sqrt(white_factor * now.white_variance) * random_.normal();
   for (const double state : own ? motion_states_ : states_) sum += state;
   return sum;
 }

@@ -42,8 +42,9 @@ class NoiseSource {
  public:
   NoiseSource(const RegimeNoise& noise, RegimeSwitch regime_switch, Random random);
 
-  /// @param step_s  time since the last sample; of no account for the first
-  double next(Regime regime, double step_s);
+  /// @param step_s        time since the last sample; of no account for the first
+  /// @param white_factor  by which the white noise's variance is larger than that of the regime
+  double next(Regime regime, double step_s, double white_factor = 1.0);
 
  private:
   using States = std::vector<double>;

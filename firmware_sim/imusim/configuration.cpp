@@ -180,6 +180,21 @@ void read_optional_vector(TableReader& in, std::string_view key, double unit,
   if (in.has(key)) target = value;
 }
 
+/// What the noise follows.
+void read_dependence(TableReader& in, StudySimulation& study) {
+  constexpr double kAny = 10.0;
+  constexpr double kColdest_degC = -55.0;
+  constexpr double kWarmest_degC = 125.0;
+  in.number("gyro_white_log_per_degC", study.gyro_white.per_degC, 1.0, -kAny, kAny);
+  in.number("gyro_white_log_per_deg_per_s", study.gyro_white.per_radps, 1.0 / kRadPerDeg, -kAny, kAny);
+  if (!in.has("begin_temperature_degC")) return;
+  Temperature& temperature = study.temperature.emplace();
+  in.number("begin_temperature_degC", temperature.begin_degC, 1.0, kColdest_degC, kWarmest_degC);
+  temperature.end_degC = temperature.begin_degC;
+  in.number("end_temperature_degC", temperature.end_degC, 1.0, kColdest_degC, kWarmest_degC);
+  in.number("warm_up_s", temperature.time_constant_s, 1.0, 1.0, 1e5);
+}
+
 StudySimulation read_study(TableReader& in, const MtxClass& common) {
   StudySimulation study;
   study.draw = common;
@@ -208,6 +223,7 @@ StudySimulation read_study(TableReader& in, const MtxClass& common) {
   in.matrix("g_sensitivity_deg_per_s_per_g", study.gyro.g_sensitivity, kRadPerDeg / kMps2PerG);
   read_triad(in, "gyro", kRadPerDeg, "deg_per_s", study.gyro);
   read_triad(in, "accel", 1.0, "mps2", study.accel);
+  read_dependence(in, study);
   in.refuse_unknown_keys();
   return study;
 }

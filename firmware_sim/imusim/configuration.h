@@ -20,7 +20,10 @@
 ///   those: gyro_bias_deg_per_s, accel_bias_mps2, gyro_scale_percent, accel_scale_percent; and
 ///   gyro_misalignment_deg, accel_misalignment_deg, g_sensitivity_deg_per_s_per_g (three rows of three),
 ///   gyro_range_deg_per_s, accel_range_mps2, gyro_step_deg_per_s, accel_step_mps2, gyro_low_pass_hz,
-///   accel_low_pass_hz
+///   accel_low_pass_hz; begin_temperature_degC (where it is given, an MTx on a line of its own sends its
+///   temperature with its data), end_temperature_degC, warm_up_s (time constant between the two),
+///   gyro_white_log_per_degC and gyro_white_log_per_deg_per_s (change of the logarithm of the gyros'
+///   white-noise variance)
 /// A mounting that is not given is drawn: 2 deg and 0.3 m, one sigma per axis.
 
 #include <Eigen/Core>
@@ -106,6 +109,8 @@ struct StudySimulation {
   /// not used.
   TriadErrors gyro;
   TriadErrors accel;
+  std::optional<Temperature> temperature;
+  NoiseDependence gyro_white;
 };
 
 struct Configuration {

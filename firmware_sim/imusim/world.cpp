@@ -69,6 +69,8 @@ ImuErrors errors_of(const StudySimulation& study, RegimeSwitch regime_switch, Ra
   };
   take_over(errors.gyro, study.gyro, study.gyro_bias_radps, study.gyro_scale);
   take_over(errors.accel, study.accel, study.accel_bias_mps2, study.accel_scale);
+  errors.temperature = study.temperature.value_or(Temperature{});
+  errors.gyro_white = study.gyro_white;
   return errors;
 }
 
@@ -189,6 +191,7 @@ void World::add_study(const PlayedDevice& played, const StudySimulation& study, 
   StudyTruth truth;
   truth.name = played.name;
   truth.model = study.model;
+  truth.sends_temperature = study.temperature.has_value();
   truth.can_output = study.can_output;
   truth.mounting.C_b_s = rotation_from_vector(study.rotation_vector_b_s_rad.value_or(drawn_rotation));
   truth.mounting.r_bs_b_m = study.r_bs_b_m.value_or(drawn_lever_arm);
@@ -276,9 +279,10 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
   const auto device_id = kFirstDeviceId + static_cast<std::uint32_t>(devices_.size());
   if (played.protocol == Protocol::kXsensMt) {
     const Eigen::Matrix3d C_device_b = imu->mounting().C_b_s.transpose() * played.C_device_frame;
-    const auto message = [motion, sample, C_frame_device, C_device_b](double t_s, std::int64_t counter) {
+    const auto message = [motion, imu, sample, C_frame_device, C_device_b](double t_s, std::int64_t counter) {
       const ImuReading reading = sample(t_s, counter);
       xsens::MtSample made;
+      made.temperature_degC = imu->errors().temperature.at(t_s);
       made.acc_mps2 = C_frame_device * reading.f_mps2;
       made.gyr_radps = C_frame_device * reading.omega_radps;
       made.sensor_to_world = Eigen::Matrix3d(C_ned_nwu() * motion->state_at(t_s).C_b_n * C_device_b);
@@ -306,6 +310,7 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
     options.first_counter = clock.first_counter;
     options.baud = played.baud;
     options.period = static_cast<std::uint16_t>(std::lround(115200.0 / played.rate_hz));
+    options.sends_temperature = clock.sends_temperature;
     auto device = std::make_unique<XsensMtx>(options, message, begin_s);
     if (beginning == Beginning::kStreaming) device->start_calibrated(begin_s);
     return add(played, std::move(device));

@@ -43,6 +43,7 @@ struct StudyTruth {
   std::uint16_t first_counter = 0;
   XsensModel model = XsensModel::kMtx;
   MtiOutput can_output = MtiOutput::kIncrements;
+  bool sends_temperature = false;
 };
 
 /// A device, or all those behind one Xbus Master under the name of the first.

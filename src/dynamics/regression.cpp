@@ -1,6 +1,8 @@
 #include "dynamics/regression.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -48,7 +50,7 @@ Columns independent_columns(const MatrixXd& gram, Index nuisance, Index covariat
 
 struct Solution {
   VectorXd beta;
-  VectorXd variance_factor;  ///< diagonal of the inverse normal matrix
+  MatrixXd phi;  ///< inverse normal matrix
   double rss = 0.0;
 };
 
@@ -71,8 +73,35 @@ Solution least_squares(const MatrixXd& gram, const std::vector<Index>& kept) {
   const Eigen::LLT<MatrixXd> factor(normal);
   const VectorXd scaled = factor.solve(right);
   const MatrixXd inverse = factor.solve(MatrixXd::Identity(n, n));
-  return {scale.cwiseProduct(scaled), scale.cwiseAbs2().cwiseProduct(inverse.diagonal()),
+  return {scale.cwiseProduct(scaled), scale.asDiagonal() * inverse * scale.asDiagonal(),
           gram(y, y) - right.dot(scaled)};
+}
+
+/// Degrees of freedom of a variance from its relative variance by the noise's model and from the residual's
+/// own (Satterthwaite 1946).
+double degrees_of_freedom(double relative_variance, double of_residual) {
+  return 1.0 / (0.5 * relative_variance + 1.0 / of_residual);
+}
+
+/// Denominator of the F test of the columns from `first` on: independent contrasts, each with its degrees of
+/// freedom, give an F of that expectation (Fai and Cornelius 1996).
+double f_degrees_of_freedom(const MatrixXd& phi, Index first, const NoiseUncertainty& noise,
+                            double of_residual) {
+  const Index tested = phi.rows() - first;
+  const MatrixXd block = phi.bottomRightCorner(tested, tested);
+  const VectorXd scale = block.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> contrasts(scale.asDiagonal() * block * scale.asDiagonal());
+  double expectation = 0.0;
+  double fewest = of_residual;
+  for (Index i = 0; i < tested; ++i) {
+    VectorXd a = VectorXd::Zero(phi.rows());
+    a.tail(tested) = scale.cwiseProduct(contrasts.eigenvectors().col(i));
+    const double dof = degrees_of_freedom(noise.relative_variance(phi, a), of_residual);
+    fewest = std::min(fewest, dof);
+    if (dof > 2.0) expectation += dof / (dof - 2.0);
+  }
+  const auto q = static_cast<double>(tested);
+  return expectation > q ? std::min(of_residual, 2.0 * expectation / (expectation - q)) : fewest;
 }
 
 }  // namespace
@@ -112,7 +141,16 @@ Eigen::VectorXd RegressionSums::all_coefficients() const {
   return coefficients;
 }
 
-std::optional<Regression> RegressionSums::solve(double confidence) const {
+Eigen::MatrixXd RegressionSums::all_covariances() const {
+  const MatrixXd sums = gram();
+  const Columns columns =
+      independent_columns(sums, static_cast<Index>(nuisance_), static_cast<Index>(covariates_));
+  MatrixXd covariances = MatrixXd::Zero(sums.rows() - 1, sums.rows() - 1);
+  if (!columns.kept.empty()) covariances(columns.kept, columns.kept) = least_squares(sums, columns.kept).phi;
+  return covariances;
+}
+
+std::optional<Regression> RegressionSums::solve(double confidence, const NoiseUncertainty* noise) const {
   const MatrixXd sums = gram();
   const auto nuisance = static_cast<Index>(nuisance_);
   const Columns columns = independent_columns(sums, nuisance, static_cast<Index>(covariates_));
@@ -136,17 +174,27 @@ std::optional<Regression> RegressionSums::solve(double confidence) const {
   result.r2 = null_rss > 0.0 ? 1.0 - full.rss / null_rss : 0.0;
   if (!(result.residual_variance > 0.0)) return std::nullopt;
   result.f = (null_rss - full.rss) / static_cast<double>(tested) / result.residual_variance;
+  const double of_residual = result.dof_rest;
+  const auto first = static_cast<Index>(null_columns.size());
+  std::optional<NoiseUncertainty> of_kept;
+  if (noise != nullptr) {
+    of_kept = noise->of(columns.kept);
+    result.dof_rest = f_degrees_of_freedom(full.phi, first, *of_kept, of_residual);
+  }
   const boost::math::fisher_f f_distribution(static_cast<double>(tested), result.dof_rest);
   result.p_value = boost::math::cdf(boost::math::complement(f_distribution, std::max(result.f, 0.0)));
 
-  const boost::math::students_t t_distribution(result.dof_rest);
-  const double quantile = boost::math::quantile(t_distribution, 0.5 * (1.0 + confidence));
-  for (std::size_t i = null_columns.size(); i < columns.kept.size(); ++i) {
-    const auto at = static_cast<Index>(i);
+  for (Index at = first; at < full.phi.rows(); ++at) {
     RegressionCoefficient c;
-    c.covariate = static_cast<std::size_t>(columns.kept[i] - nuisance);
+    c.covariate = static_cast<std::size_t>(columns.kept[static_cast<std::size_t>(at)] - nuisance);
     c.value = full.beta(at);
-    c.sd = std::sqrt(result.residual_variance * full.variance_factor(at));
+    c.sd = std::sqrt(result.residual_variance * full.phi(at, at));
+    c.dof = of_kept
+                ? degrees_of_freedom(
+                      of_kept->relative_variance(full.phi, VectorXd::Unit(full.phi.rows(), at)), of_residual)
+                : of_residual;
+    const boost::math::students_t t_distribution(c.dof);
+    const double quantile = boost::math::quantile(t_distribution, 0.5 * (1.0 + confidence));
     c.ci_low = c.value - quantile * c.sd;
     c.ci_high = c.value + quantile * c.sd;
     c.p_value = 2.0 * boost::math::cdf(boost::math::complement(t_distribution, std::abs(c.value) / c.sd));

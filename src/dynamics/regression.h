@@ -16,6 +16,8 @@
 #include <string>
 #include <vector>
 
+#include "dynamics/noise_uncertainty.h"
+
 namespace imuscope {
 
 struct RegressionCoefficient {
@@ -24,6 +26,7 @@ struct RegressionCoefficient {
   double sd = 0.0;
   double ci_low = 0.0;
   double ci_high = 0.0;
+  double dof = 0.0;      ///< of its sd
   double p_value = 0.0;  ///< of value = 0, two-sided
 };
 
@@ -38,7 +41,7 @@ struct Regression {
   double r2 = 0.0;
   double f = 0.0;
   int dof_model = 0;      ///< covariates tested
-  double dof_rest = 0.0;  ///< n - columns
+  double dof_rest = 0.0;  ///< n - columns; fewer where the noise's model is an estimate
   double p_value = 1.0;
   double residual_variance = 0.0;
   std::vector<RegressionCoefficient> coefficients;
@@ -55,11 +58,15 @@ class RegressionSums {
   [[nodiscard]] std::size_t count() const { return n_; }
 
   /// @param confidence  of the intervals, in (0, 1)
+  /// @param noise       of the model that whitened the rows, over all columns; null where it is known
   /// Absent with fewer rows than columns + 1, or with no covariate that varies.
-  [[nodiscard]] std::optional<Regression> solve(double confidence = 0.95) const;
+  [[nodiscard]] std::optional<Regression> solve(double confidence = 0.95,
+                                                const NoiseUncertainty* noise = nullptr) const;
 
   /// Coefficients of all columns, nuisance first; zero for columns without information of their own.
   [[nodiscard]] Eigen::VectorXd all_coefficients() const;
+  /// Their covariance where the rows' noise has variance 1; zero likewise.
+  [[nodiscard]] Eigen::MatrixXd all_covariances() const;
 
  private:
   std::size_t nuisance_;

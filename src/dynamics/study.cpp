@@ -1,9 +1,12 @@
 #include "dynamics/study.h"
 
 #include <algorithm>
+#include <numeric>
 #include <span>
 
+#include "dynamics/column_wavelets.h"
 #include "dynamics/covariates.h"
+#include "dynamics/noise_uncertainty.h"
 #include "noise/wavelet_variance.h"
 #include "noise/whitener.h"
 
@@ -13,6 +16,8 @@ namespace {
 /// A hole in the counters longer than this (10 min at 100 Hz) starts the whitening filter's prediction no
 /// further: by then nothing is known of the noise.
 constexpr std::int64_t kLongestHole = 60'000;
+/// Of the residual's wavelet variance; the fit does not use them.
+constexpr double kIntervals = 0.95;
 
 /// Layout of one axis' row: intercept, calibration columns, covariates, error.
 class AxisColumns {
@@ -141,41 +146,66 @@ std::vector<ResidualSeries> residuals(ErrorRowSource& rows, const std::vector<Ax
   return series;
 }
 
-void fit_residual(const ResidualSeries& series, const DynamicsOptions& options, AxisDynamics& axis) {
-  noise::WvOptions wv_options;
-  wv_options.mask = series.mask;
-  const auto wv = noise::haar_wavelet_variance(series.values, wv_options);
-  if (!wv) {
-    axis.no_gls_because = wv.error().what;
-    return;
-  }
-  auto fit = noise::fit(*wv, options.noise_model, options.rate_hz);
-  if (!fit) {
-    axis.no_gls_because = fit.error().what;
-    return;
-  }
-  // A Gauss-Markov process too many takes up chance fluctuations of the residual, always as more noise, and
-  // the tests become too careful: it has to earn its place.
-  for (noise::ModelSpec spec = fit->spec; spec.count(noise::ProcessKind::kGaussMarkov) > 1;) {
-    spec.processes.erase(
-        std::find(spec.processes.begin(), spec.processes.end(), noise::ProcessKind::kGaussMarkov));
-    auto simpler = noise::fit(*wv, spec, options.rate_hz);
-    if (!simpler || simpler->criterion > fit->criterion) break;
-    fit = std::move(simpler);
-  }
-  axis.residual_noise = std::move(*fit);
+/// The columns of every axis, without the error.
+std::vector<std::vector<ColumnLevel>> column_levels(ErrorRowSource& rows) {
+  auto columns = all_columns();
+  std::vector<ColumnWavelets> wavelets;
+  for (const auto& axis : columns) wavelets.emplace_back(axis.size() - 1);
+  for_each_counter(
+      rows,
+      [&](const ErrorRow& row) {
+        for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+          if (columns[axis].fill(row)) {
+            wavelets[axis].add(columns[axis].all().first(columns[axis].size() - 1));
+          } else {
+            wavelets[axis].skip();
+          }
+        }
+      },
+      [&] {
+        for (auto& axis : wavelets) axis.skip();
+      });
+  std::vector<std::vector<ColumnLevel>> levels;
+  for (const auto& axis : wavelets) levels.push_back(axis.levels());
+  return levels;
 }
 
-/// Whitened rows of the axes whose noise is known.
-void whitened_regressions(ErrorRowSource& rows, double confidence,
-                          std::array<AxisDynamics, kErrorAxes>& result) {
+/// A noise model, and the wavelet variance that it was fitted to.
+struct ResidualNoise {
+  noise::WaveletVariance wv;
+  noise::FitResult fit;
+};
+
+/// A regression takes some of the noise along: what it took is given back (D-7).
+void give_back(const std::vector<ColumnLevel>& columns, const Eigen::MatrixXd& phi,
+               noise::WaveletVariance& wv) {
+  for (const ColumnLevel& column : columns) {
+    for (noise::WvLevel& level : wv.levels) {
+      if (level.level == column.level) level.value += column.products.cwiseProduct(phi).sum();
+    }
+  }
+  noise::set_intervals(wv.levels, wv.efficiency, kIntervals);
+}
+
+std::optional<ResidualNoise> fit_residual(noise::WaveletVariance wv, const DynamicsOptions& options,
+                                          std::string& why_not) {
+  auto fit = noise::fit(wv, options.noise_model, options.rate_hz);
+  if (!fit) {
+    why_not = fit.error().what;
+    return std::nullopt;
+  }
+  return ResidualNoise{std::move(wv), std::move(*fit)};
+}
+
+using AllNoise = std::array<std::optional<ResidualNoise>, kErrorAxes>;
+
+/// Sums of the whitened rows, of the axes whose noise is known.
+std::vector<AxisSums> whitened_sums(ErrorRowSource& rows, const AllNoise& noises) {
   auto columns = all_columns();
   auto sums = all_sums(columns);
   std::array<std::optional<noise::Whitener>, kErrorAxes> whiteners;
   for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
-    if (result[axis].residual_noise) {
-      whiteners[axis].emplace(result[axis].residual_noise->model, columns[axis].size());
-    }
+    if (noises[axis]) whiteners[axis].emplace(noises[axis]->fit.model, columns[axis].size());
   }
   const auto skip = [&](std::size_t axis) {
     if (whiteners[axis]) whiteners[axis]->skip();
@@ -195,11 +225,41 @@ void whitened_regressions(ErrorRowSource& rows, double confidence,
       [&] {
         for (std::size_t axis = 0; axis < kErrorAxes; ++axis) skip(axis);
       });
+  return sums;
+}
+
+/// What the rows were whitened with for a regression, and the columns of it.
+struct Whitened {
+  const AllNoise& noises;
+  const std::vector<std::vector<ColumnLevel>>& columns;
+};
+
+/// The noise of every axis from what its regression left.
+/// @param by  null where the rows of the regression were not whitened
+AllNoise fit_residuals(ErrorRowSource& rows, const std::vector<AxisSums>& sums, const Whitened* by,
+                       const DynamicsOptions& options, std::array<AxisDynamics, kErrorAxes>& result) {
+  const auto series = residuals(rows, sums);
+  AllNoise noises;
   for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
-    if (!whiteners[axis]) continue;
-    result[axis].gls = sums[axis].raw().solve(confidence);
-    result[axis].gls_projected = sums[axis].projected().solve(confidence);
+    if (by != nullptr && !by->noises[axis]) continue;  // why is said already
+    noise::WvOptions wv_options;
+    wv_options.mask = series[axis].mask;
+    auto wv = noise::haar_wavelet_variance(series[axis].values, wv_options);
+    if (!wv) {
+      result[axis].no_gls_because = wv.error().what;
+      continue;
+    }
+    if (by != nullptr) give_back(by->columns[axis], sums[axis].projected().all_covariances(), *wv);
+    noises[axis] = fit_residual(std::move(*wv), options, result[axis].no_gls_because);
   }
+  return noises;
+}
+
+/// Of the columns with those of the calibration, the intercept and the covariates.
+std::vector<Eigen::Index> raw_columns(std::size_t calibration) {
+  std::vector<Eigen::Index> kept(1 + kCovariates);
+  std::iota(kept.begin() + 1, kept.end(), static_cast<Eigen::Index>(1 + calibration));
+  return kept;
 }
 
 }  // namespace
@@ -211,9 +271,19 @@ std::array<AxisDynamics, kErrorAxes> study_dynamics(ErrorRowSource& rows, const 
     result[axis].ols = sums[axis].raw().solve(options.confidence);
     result[axis].ols_projected = sums[axis].projected().solve(options.confidence);
   }
-  const auto series = residuals(rows, sums);
-  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) fit_residual(series[axis], options, result[axis]);
-  whitened_regressions(rows, options.confidence, result);
+  const auto columns = column_levels(rows);
+  AllNoise noises = fit_residuals(rows, sums, nullptr, options, result);
+  const Whitened by{noises, columns};
+  noises = fit_residuals(rows, whitened_sums(rows, noises), &by, options, result);
+  const auto whitened = whitened_sums(rows, noises);
+  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+    if (!noises[axis]) continue;
+    const NoiseUncertainty noise(columns[axis], noises[axis]->fit, noises[axis]->wv);
+    const NoiseUncertainty of_raw = noise.of(raw_columns(calibration_column_count(axis)));
+    result[axis].gls = whitened[axis].raw().solve(options.confidence, &of_raw);
+    result[axis].gls_projected = whitened[axis].projected().solve(options.confidence, &noise);
+    result[axis].residual_noise = std::move(noises[axis]->fit);
+  }
   return result;
 }
 

@@ -42,8 +42,10 @@ struct DynamicsOptions {
   double confidence = 0.95;
 };
 
-/// Three passes over the rows: least squares; the residual's noise model; least squares on whitened rows.
-/// Memory: one double a row and axis between the second and the third.
+/// Least squares; the noise of its residual; least squares on rows whitened by that; and again with the noise
+/// of what the generalised fit leaves, the noise that the fit itself took being given back. Tests and
+/// intervals count what is not known of the noise.
+/// Memory: one double a row and axis, and one a column, axis and sixteen rows.
 std::array<AxisDynamics, kErrorAxes> study_dynamics(ErrorRowSource& rows, const DynamicsOptions& options);
 
 }  // namespace imuscope

@@ -121,12 +121,30 @@ void CoastingFilter::settle() {
     bias.value *= decay[j];
   }
   sum_biases();
+  add_second_order(mean.f_b_mps2.norm(), dt_s);
   pending_ = {};
+}
+
+// V-7
+void CoastingFilter::add_second_order(double specific_force_mps2, double dt_s) {
+  const double north = P_(kAttitudeError, kAttitudeError);
+  const double east = P_(kAttitudeError + 1, kAttitudeError + 1);
+  const double both = P_(kAttitudeError, kAttitudeError + 1);
+  const double fourth_moment = 3.0 * (north * north + east * east) + 2.0 * north * east + 4.0 * both * both;
+  const double force_mps2 = 0.5 * specific_force_mps2 * std::sqrt(fourth_moment);
+  second_order_r_m_ += (second_order_v_mps_ + 0.5 * force_mps2 * dt_s) * dt_s;
+  second_order_v_mps_ += force_mps2 * dt_s;
 }
 
 KinematicCovariance CoastingFilter::covariance() {
   settle();
-  return P_.topLeftCorner<kKinematic, kKinematic>();
+  constexpr Eigen::Index kDown = 2;
+  KinematicCovariance all = P_.topLeftCorner<kKinematic, kKinematic>();
+  all(kPositionError + kDown, kPositionError + kDown) += second_order_r_m_ * second_order_r_m_;
+  all(kVelocityError + kDown, kVelocityError + kDown) += second_order_v_mps_ * second_order_v_mps_;
+  all(kPositionError + kDown, kVelocityError + kDown) += second_order_r_m_ * second_order_v_mps_;
+  all(kVelocityError + kDown, kPositionError + kDown) += second_order_r_m_ * second_order_v_mps_;
+  return all;
 }
 
 bool CoastingFilter::update_position(HostTime time, const GeodeticPosition& antenna, const Vector3d& sd_m,
@@ -174,6 +192,7 @@ bool CoastingFilter::update(GnssGate& gate, HostTime time, const GnssInnovation&
   for (std::size_t j = 0; j < biases_.size(); ++j)
     biases_[j].value += correction[kKinematic + static_cast<Eigen::Index>(j)];
   sum_biases();
+  second_order_v_mps_ = second_order_r_m_ = 0.0;
   return true;
 }
 

@@ -44,7 +44,8 @@ class CoastingFilter {
 
   /// With the sum of each axis's bias states as its biases.
   [[nodiscard]] const NavigationState& state() const noexcept { return state_; }
-  /// Of position, velocity and attitude.
+  /// Of position, velocity and attitude; with what a tilt does to the vertical in second order, which grows
+  /// where nothing is measured (V-7).
   [[nodiscard]] KinematicCovariance covariance();
   [[nodiscard]] std::size_t state_count() const noexcept { return static_cast<std::size_t>(P_.rows()); }
 
@@ -59,6 +60,7 @@ class CoastingFilter {
   using StateMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic>;
 
   void settle();
+  void add_second_order(double specific_force_mps2, double dt_s);
   void sum_biases();
   bool update(GnssGate& gate, HostTime time, const GnssInnovation& measured, const Eigen::Vector3d& sd);
 
@@ -67,6 +69,9 @@ class CoastingFilter {
   StateMatrix P_;
   GnssGate position_gate_;
   GnssGate velocity_gate_;
+  /// Rms since the last fix of what the squares of the tilt add to the way down.
+  double second_order_v_mps_ = 0.0;
+  double second_order_r_m_ = 0.0;
 
   /// What has been carried by the state but not yet by the covariance.
   struct Pending {

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
+#include "noise/process.h"
 #include "noise/wavelet_variance.h"
 
 namespace imuscope::noise {
@@ -125,15 +126,30 @@ double variance_of(std::span<const double> x, const std::vector<Segment>& runs) 
   return n > 1.0 ? squares / (n - 1.0) : 0.0;
 }
 
+/// Variance a sample of white noise with this floor: E|X|^2 = sigma^2 sum(w^2), sum(w^2) = 3/8 n.
+double noise_variance_of(double floor, const LineOptions& options) {
+  return floor / (0.375 * static_cast<double>(options.segment));
+}
+
+/// Half of the overlapping segments are new.
+double independent_segments(const Spectrum& spectrum) {
+  return std::max(1.0, 0.5 * static_cast<double>(spectrum.segments));
+}
+
 /// Cramer and Rao's bound for one segment, averaged over them (independent phases).
 double frequency_sd_hz(double amplitude, double floor, const Spectrum& spectrum, const LineOptions& options) {
   const auto length = static_cast<double>(options.segment);
-  // Noise variance a sample of white noise with this floor: E|X|^2 = sigma^2 sum(w^2), sum(w^2) = 3/8 n.
-  const double noise_variance = floor / (0.375 * length);
-  const double var_omega = 24.0 * noise_variance / (amplitude * amplitude * length * length * length);
-  // Half of the overlapping segments are new.
-  const double independent = std::max(1.0, 0.5 * static_cast<double>(spectrum.segments));
-  return std::sqrt(var_omega / independent) * options.rate_hz / (2.0 * std::numbers::pi);
+  const double var_omega =
+      24.0 * noise_variance_of(floor, options) / (amplitude * amplitude * length * length * length);
+  return std::sqrt(var_omega / independent_segments(spectrum)) * options.rate_hz / (2.0 * std::numbers::pi);
+}
+
+/// The same bound, 2 sigma^2 / n, times what the window gives away (its equivalent noise bandwidth, 3/2
+/// bins).
+double amplitude_sd_of(double floor, const Spectrum& spectrum, const LineOptions& options) {
+  constexpr double kBandwidth = 1.5;
+  return std::sqrt(2.0 * kBandwidth * noise_variance_of(floor, options) /
+                   static_cast<double>(options.segment) / independent_segments(spectrum));
 }
 
 std::vector<Segment> runs_of(std::span<const double> x, std::span<const std::uint8_t> mask,
@@ -177,6 +193,7 @@ std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uin
     line.amplitude = amplitude_of(spectrum, k, floor, options.segment);
     if (!(line.amplitude > 0.0)) continue;
     line.frequency_sd_hz = frequency_sd_hz(line.amplitude, floor, spectrum, options);
+    line.amplitude_sd = amplitude_sd_of(floor, spectrum, options);
     line.share_of_variance = total > 0.0 ? 0.5 * line.amplitude * line.amplitude / total : 0.0;
     line.p_value = std::min(
         1.0, bins * boost::math::cdf(boost::math::complement(chi, dof * power / (floor * floor_spread))));
@@ -186,6 +203,12 @@ std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uin
             [](const Line& a, const Line& b) { return a.amplitude > b.amplitude; });
   if (lines.size() > options.most_lines) lines.resize(options.most_lines);
   return lines;
+}
+
+double line_wv(const Line& line, double rate_hz, int level) {
+  Shape shape{};
+  shape[0] = 2.0 * std::numbers::pi * line.frequency_hz / rate_hz;
+  return line.amplitude * line.amplitude * unit_wv(ProcessKind::kSinusoid, shape, level).value;
 }
 
 void remove_lines(std::span<double> x, std::span<const std::uint8_t> mask, const std::vector<Line>& lines,

@@ -13,6 +13,7 @@ struct Line {
   double frequency_hz = 0.0;
   double frequency_sd_hz = 0.0;  ///< from noise alone; an engine's speed wanders by more
   double amplitude = 0.0;        ///< of the sinusoid, signal unit, rms over the segments times sqrt(2)
+  double amplitude_sd = 0.0;     ///< from noise alone
   double share_of_variance = 0.0;
   double p_value = 1.0;  ///< of noise alone reaching this anywhere in the spectrum
 };
@@ -32,6 +33,9 @@ struct LineOptions {
 /// found. A peak wider than the window's main lobe is a band, not a line, and is passed over.
 std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
                              const LineOptions& options);
+
+/// What a line contributes to the wavelet variance of a level, as a sinusoid of random phase (N-5).
+double line_wv(const Line& line, double rate_hz, int level);
 
 /// Takes the lines out in place: in blocks of `segment` samples of every valid run, sine and cosine of each
 /// by least squares, so that amplitude and phase may wander from block to block.

@@ -140,6 +140,19 @@ axis_dynamics_t to_message(const AxisMotion& axis) {
   message.slope = axis.slope;
   message.slope_sd = axis.slope_sd;
   message.correlation = axis.correlation;
+  message.r2 = axis.r2;
+  message.f = axis.f;
+  message.p_value = axis.p_value;
+  return message;
+}
+
+covariate_motion_t to_message(const CovariateMotion& covariate) {
+  covariate_motion_t message;
+  message.name = covariate.name;
+  message.unit = covariate.unit;
+  message.mean = covariate.mean;
+  message.rms = covariate.rms;
+  message.largest = covariate.largest;
   return message;
 }
 
@@ -404,6 +417,8 @@ dynamics_t to_message(const DynamicsReport& report, std::int64_t sequence) {
   message.n_dynamic = report.n_dynamic;
   message.n_axes = size_of(report.axes);
   for (const auto& axis : report.axes) message.axes.push_back(to_message(axis));
+  message.n_covariates = size_of(report.covariates);
+  for (const auto& covariate : report.covariates) message.covariates.push_back(to_message(covariate));
   return message;
 }
 

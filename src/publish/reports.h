@@ -184,6 +184,18 @@ struct AxisMotion {
   double slope = kUnknown;
   double slope_sd = kUnknown;
   double correlation = kUnknown;
+  double r2 = kUnknown;
+  double f = kUnknown;
+  double p_value = kUnknown;
+};
+
+/// One covariate of the regression; fields as covariate_motion_t.
+struct CovariateMotion {
+  std::string name;
+  std::string unit;
+  double mean = kUnknown;
+  double rms = kUnknown;
+  double largest = kUnknown;
 };
 
 /// Motion of one S-IMU at a refit.
@@ -194,6 +206,7 @@ struct DynamicsReport {
   std::int64_t n_static = 0;
   std::int64_t n_dynamic = 0;
   std::vector<AxisMotion> axes;
+  std::vector<CovariateMotion> covariates{};
 };
 
 /// What the bridge to the widespread pose_t and ins_t shows, in their frames: body forward-left-up, local

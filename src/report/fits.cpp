@@ -79,6 +79,21 @@ FitParameter read_parameter(const json& entry) {
   return parameter;
 }
 
+/// A vibration line: parameters and a component like any other process of the model.
+void read_sinusoid(const json& entry, double factor, Fit& fit) {
+  const std::string process = text_at(entry, "process");
+  for (const json& parameter : field(entry, "parameters")) {
+    fit.parameters.push_back(read_parameter(parameter));
+    fit.parameters.back().process = process;
+  }
+  FitComponent component;
+  component.name = process;
+  for (const json& value : field(entry, "wv")) {
+    if (value.is_number()) component.values.push_back(factor * factor * value.get<double>());
+  }
+  if (component.values.size() == fit.levels.size()) fit.components.push_back(std::move(component));
+}
+
 Fit read_fit(const json& entry) {
   Fit fit;
   fit.imu = text_at(entry, "name");
@@ -99,6 +114,7 @@ Fit read_fit(const json& entry) {
   }
   for (const json& parameter : field(entry, "parameters"))
     fit.parameters.push_back(read_parameter(parameter));
+  for (const json& sinusoid : field(entry, "sinusoids")) read_sinusoid(sinusoid, factor, fit);
   fit.j_p_value = number_at(field(entry, "j_test"), "p_value");
   fit.identifiable = field(entry, "identifiable") != json(false);
   for (const json& warning : field(entry, "warnings")) {

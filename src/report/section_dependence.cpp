@@ -107,6 +107,11 @@ Html not_determined(const RunFiles& run, const std::string& imu) {
              : element("details", element("summary", text("Not determined")) + element("ul", items, "note"));
 }
 
+std::optional<double> scaled_sd(const json& line, double factor) {
+  const auto sd = number_at(line, "amplitude_sd");
+  return sd ? std::optional(factor * *sd) : sd;
+}
+
 Html vibration_lines(const RunFiles& run) {
   if (run.vibration.is_null()) return {};
   Table table({text("sensor"), text("regime"), text("frequency, Hz"), text("amplitude"), text("unit"),
@@ -120,8 +125,8 @@ Html vibration_lines(const RunFiles& run) {
     table.add_row({text(text_at(line, "name") + " " + axis_words(text_at(line, "axis"))),
                    text(text_at(line, "regime")),
                    frequency ? with_sd(*frequency, number_at(line, "frequency_sd_hz")) : text(kUnknown),
-                   amplitude ? number(factor * *amplitude, 3) : text(kUnknown), text(unit),
-                   text(share ? fmt::format("{:.1f} %", 100.0 * *share) : kUnknown),
+                   amplitude ? with_sd(factor * *amplitude, scaled_sd(line, factor)) : text(kUnknown),
+                   text(unit), text(share ? fmt::format("{:.1f} %", 100.0 * *share) : kUnknown),
                    p_words(number_at(line, "p_value"))});
   }
   return element("h3", text("Vibration lines")) +

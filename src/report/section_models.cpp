@@ -110,7 +110,7 @@ std::vector<Html> difference_cells(const nlohmann::json& comparison, const FitPa
         ratio ? with_interval(*ratio, number_at(entry, "ratio_ci_low"), number_at(entry, "ratio_ci_high"))
               : text(kUnknown),
         p_words(number_at(entry, "p_holm")),
-        verdict == "differ" ? element("strong", text(verdict)) : text(verdict.empty() ? kUnknown : verdict)};
+        verdict == "differs" ? element("strong", text(verdict)) : text(verdict.empty() ? kUnknown : verdict)};
   }
   return {text(kUnknown), text(kUnknown), text(kUnknown)};
 }

@@ -226,9 +226,11 @@ void model_steps(const RunFiles& run, const std::vector<Fit>& fits, std::vector<
         "scales the fitted line leaves the intervals.");
   }
   const auto vague = those(fits, [](const Fit& fit) { return !fit.identifiable; });
-  if (!vague.empty()) {
+  const auto records = records_needed(fits);
+  steps.insert(steps.end(), records.begin(), records.end());
+  if (!vague.empty() && records.empty()) {
     steps.push_back(
-        fmt::format("Record longer, or use a simpler model, where parameters cannot be told apart: {}.",
+        fmt::format("Use a simpler model where parameters cannot be told apart ({}); each fit names it.",
                     fit_names(vague)));
   }
   for (const char* regime : {"static", "dynamic"}) {
@@ -307,6 +309,7 @@ Verdict model_verdict(const std::vector<Fit>& all_fits) {
     verdict.headline = "Cannot be said: this run has no noise model.";
     return verdict;
   }
+  verdict.reasons = what_is_known(fits);
   const auto tested = those(fits, [](const Fit& fit) { return fit.j_p_value.has_value(); });
   const auto vague = those(fits, [](const Fit& fit) { return !fit.identifiable; });
   const double corrected = kTestLevel / static_cast<double>(std::max<std::size_t>(tested.size(), 1));
@@ -340,8 +343,8 @@ Verdict model_verdict(const std::vector<Fit>& all_fits) {
         fmt::format("{} models have too few levels to be tested.", fits.size() - tested.size()));
   }
   if (!vague.empty()) {
-    verdict.reasons.push_back(
-        fmt::format("Not identifiable in {} of {}: {}.", vague.size(), fits.size(), fit_names(vague)));
+    verdict.reasons.push_back(fmt::format("A parameter or more cannot be told in {} of {}: {}.", vague.size(),
+                                          fits.size(), fit_names(vague)));
   }
   return verdict;
 }

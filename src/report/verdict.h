@@ -31,6 +31,10 @@ inline constexpr double kTestLevel = 0.05;
 
 Verdict calibration_verdict(const RunFiles& run);
 Verdict model_verdict(const std::vector<Fit>& fits);
+/// Which parts of the models the data determine, and how well.
+std::vector<std::string> what_is_known(const std::vector<Fit>& fits);
+/// How long a record the slow processes would need that this one does not determine; empty where it does.
+std::vector<std::string> records_needed(const std::vector<Fit>& fits);
 /// Do the models of rest and motion differ? By comparison.json; kOpen where it is absent or empty.
 Verdict difference_verdict(const RunFiles& run);
 /// Does it matter which model a filter holds? By evaluation.json; kOpen where it is absent.

@@ -23,7 +23,7 @@ bool differs(const json& comparison) {
   if (joint_p) return *joint_p < kTestLevel;
   const json& parameters = field(comparison, "parameters");
   return std::any_of(parameters.begin(), parameters.end(),
-                     [](const json& parameter) { return text_at(parameter, "verdict") == "differ"; });
+                     [](const json& parameter) { return text_at(parameter, "verdict") == "differs"; });
 }
 
 bool undetermined(const json& comparison) {

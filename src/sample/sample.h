@@ -38,6 +38,8 @@ enum ImuFlag : std::uint32_t {
   kIsIncrement = 1U << 9U,
   /// angular_acceleration_radps2 is given by the device.
   kHasAngularAcceleration = 1U << 10U,
+  /// temperature_degC was part of the message; devices send it with every sample, or now and then.
+  kHasTemperature = 1U << 11U,
 };
 
 /// One IMU sample. Times of validity are in Sample.
@@ -47,6 +49,7 @@ struct ImuData {
   Vector3 angular_acceleration_radps2;  ///< only with kHasAngularAcceleration
   std::int64_t counter;                 ///< the device's sample counter, unwrapped; +1 per sample taken
   std::uint32_t flags;                  ///< ImuFlag bits
+  float temperature_degC;               ///< of the sensor; only with kHasTemperature
 };
 
 enum class GnssSolution : std::uint8_t { kNone, kSingle, kDifferential, kFloat, kFixed };

@@ -79,12 +79,13 @@ void read_noise(TomlReader in, double rate_hz, ImuNoiseConfig& noise) {
   in.finish();
 }
 
-/// Of devices that are one make: "MTi and MTx User Manual", MT0100P, specifications of the MTx; MTi-600
-/// series data sheet, MTi-630.
+/// Of devices that are one make: "MTi and MTx User Manual", MT0100P revision N, section 4.4, gyroscopes of
+/// 1200 deg/s, which are the MTx's default (those of 300 deg/s have half the density); MTi 600-series data
+/// sheet, MT1603P, MTi-630, accelerometer z.
 DataSheetConfig default_data_sheet(Protocol protocol) {
   DataSheetConfig sheet;
   if (protocol == Protocol::kXsensMt) {
-    sheet.gyro_density_radps_per_sqrt_hz = 0.05 * kRadPerDeg;
+    sheet.gyro_density_radps_per_sqrt_hz = 0.1 * kRadPerDeg;
     sheet.gyro_bias_stability_radps = 1.0 * kRadPerDeg;
     sheet.accel_density_mps2_per_sqrt_hz = 0.002;
     sheet.accel_bias_stability_mps2 = 0.02;

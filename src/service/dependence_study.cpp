@@ -16,9 +16,13 @@ namespace imuscope {
 
 namespace {
 
-constexpr std::size_t kDrivers = 3;
-constexpr std::array<const char*, kDrivers> kDriverNames{"rate", "vibration", "speed"};
-constexpr std::array<const char*, kDrivers> kDriverUnits{"deg/s", "m/s^2", "m/s"};
+constexpr std::size_t kDrivers = 4;
+constexpr std::size_t kSpeed = 2;
+constexpr std::size_t kTemperature = 3;
+constexpr std::array<const char*, kDrivers> kDriverNames{"rate", "vibration", "speed", "temperature"};
+constexpr std::array<const char*, kDrivers> kDriverUnits{"deg/s", "m/s^2", "m/s", "degC"};
+/// A sensor whose temperature stays within this says nothing of what follows it.
+constexpr double kLeastWarming_degC = 1.0;
 constexpr double kConfidence = 0.95;
 constexpr double kLevel = 0.05;
 
@@ -27,8 +31,8 @@ using Drivers = std::array<std::optional<double>, kDrivers>;
 /// Levels of the motion over one window; a driver that is not known throughout is absent.
 Drivers drivers_of(const std::vector<MotionCell>& cells, const MotionLevels& levels, HostTime begin,
                    HostTime end) {
-  std::array<double, kDrivers> sums{};
-  std::array<int, kDrivers> counts{};
+  std::array<double, kTemperature> sums{};
+  std::array<int, kTemperature> counts{};
   const double offset_s = to_seconds(begin - levels.begin_of(0)) / MotionLevels::kCell_s;
   const double end_s = to_seconds(end - levels.begin_of(0)) / MotionLevels::kCell_s;
   const auto first = static_cast<std::size_t>(std::max(0.0, std::ceil(offset_s)));
@@ -41,14 +45,14 @@ Drivers drivers_of(const std::vector<MotionCell>& cells, const MotionLevels& lev
     ++counts[0];
     ++counts[1];
     if (!cell.speed_mps) continue;
-    sums[2] += *cell.speed_mps;
-    ++counts[2];
+    sums[kSpeed] += *cell.speed_mps;
+    ++counts[kSpeed];
   }
   Drivers drivers;
   if (counts[0] == 0) return drivers;
   drivers[0] = kDegPerRad * std::sqrt(sums[0] / counts[0]);
   drivers[1] = std::sqrt(sums[1] / counts[1]);
-  if (counts[2] == counts[0]) drivers[2] = sums[2] / counts[2];
+  if (counts[kSpeed] == counts[0]) drivers[kSpeed] = sums[kSpeed] / counts[kSpeed];
   return drivers;
 }
 
@@ -58,16 +62,24 @@ struct Window {
   Drivers drivers;
 };
 
+/// What windows are cut from and held against.
+struct Run {
+  const std::vector<MotionCell>& cells;
+  const MotionLevels& levels;
+  const RegimeTrack& motion;
+  std::size_t regime;
+  HostTime origin;
+};
+
 /// Windows without a gap inside one stretch of the regime.
-std::vector<Window> windows_of(const NoiseSeries& series, std::size_t axis, std::size_t length,
-                               const std::vector<MotionCell>& cells, const MotionLevels& levels,
-                               const RegimeTrack& motion, std::size_t regime, HostTime origin) {
+std::vector<Window> windows_of(const NoiseSeries& series, const TemperatureTrack& temperature,
+                               std::size_t axis, std::size_t length, const Run& run) {
   std::vector<Window> windows;
   const auto mask = series.mask(axis);
   const auto& values = series.values(axis);
   std::size_t begin = 0;
   for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (mask[i] == 0 || motion.at(series.time(i)) != regime) {
+    if (mask[i] == 0 || run.motion.at(series.time(i)) != run.regime) {
       begin = i + 1;
       continue;
     }
@@ -76,8 +88,10 @@ std::vector<Window> windows_of(const NoiseSeries& series, std::size_t axis, std:
     if (wv) {
       const HostTime first = series.time(begin);
       const HostTime last = series.time(i);
-      windows.push_back({std::move(*wv), to_seconds(first - origin) + 0.5 * to_seconds(last - first),
-                         drivers_of(cells, levels, first, last)});
+      Drivers drivers = drivers_of(run.cells, run.levels, first, last);
+      drivers[kTemperature] = temperature.mean(first, last);
+      windows.push_back(
+          {std::move(*wv), to_seconds(first - run.origin) + 0.5 * to_seconds(last - first), drivers});
     }
     begin = i + 1;
   }
@@ -148,7 +162,8 @@ class ImuStudy {
       for (const auto& w : windows) {
         if (w.drivers[driver]) driven.push_back({w.wv, *w.drivers[driver]});
       }
-      if (driven.empty() && driver == 2) continue;  // no speed: said with the regimes
+      if (driven.empty() && driver == kSpeed) continue;  // said with the regimes
+      if (driver == kTemperature && (windows.empty() || !warms_up(driven))) continue;
       const auto found = noise::fit_dependence(driven, start);
       if (!found) {
         remark(fmt::format("{} {}: no dependence on the {}: {}", name_, axis_name(axis), kDriverNames[driver],
@@ -177,7 +192,30 @@ class ImuStudy {
       out_.document["dependences"].push_back(slope_json(name_, slopes_[i], holm[i].value_or(1.0)));
   }
 
+  /// Once for the sensor.
+  void say(const std::string& sentence) {
+    if (std::find(out_.remarks.begin(), out_.remarks.end(), sentence) == out_.remarks.end()) remark(sentence);
+  }
+
  private:
+  /// Whether its temperature changed enough to be held against; says why where it did not.
+  bool warms_up(const std::vector<noise::DrivenWindow>& windows) {
+    if (windows.empty()) {
+      say(fmt::format("{}: no temperature in this record: its noise parameters are not held against it",
+                      name_));
+      return false;
+    }
+    const auto [coldest, warmest] = std::minmax_element(
+        windows.begin(), windows.end(), [](const auto& a, const auto& b) { return a.driver < b.driver; });
+    const double change_degC = warmest->driver - coldest->driver;
+    if (change_degC >= kLeastWarming_degC) return true;
+    say(
+        fmt::format("{}: its temperature changed by {:.1f} degC over the drive, too little to hold its noise "
+                    "parameters against it",
+                    name_, change_degC));
+    return false;
+  }
+
   void remark(const std::string& sentence) {
     out_.remarks.push_back(sentence);
     out_.document["remarks"].push_back(sentence);
@@ -209,6 +247,7 @@ class ImuStudy {
 }  // namespace
 
 DependenceStudy study_dependence(const Configuration& configuration, const std::vector<NoiseSeries>& series,
+                                 const std::vector<TemperatureTrack>& temperatures,
                                  const MotionLevels& levels, const RegimeTrack& motion,
                                  const NoiseStudy& models, HostTime origin) {
   DependenceStudy out;
@@ -223,6 +262,7 @@ DependenceStudy study_dependence(const Configuration& configuration, const std::
     return out;
   }
   const auto cells = levels.cells();
+  const Run run{cells, levels, motion, *dynamic, origin};
   const auto indices = configuration.study_indices();
   for (std::size_t i = 0; i < series.size(); ++i) {
     if (series[i].size() == 0) continue;
@@ -232,7 +272,7 @@ DependenceStudy study_dependence(const Configuration& configuration, const std::
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       const auto* start = start_of(models, device.name, axis);
       if (start == nullptr) continue;  // why there is no model is said where it was to be made
-      imu.axis(axis, windows_of(series[i], axis, length, cells, levels, motion, *dynamic, origin), *start);
+      imu.axis(axis, windows_of(series[i], temperatures[i], axis, length, run), *start);
     }
     imu.finish();
   }

@@ -11,6 +11,7 @@
 #include "service/config.h"
 #include "service/noise_series.h"
 #include "service/noise_study.h"
+#include "service/temperature_track.h"
 
 namespace imuscope {
 
@@ -19,10 +20,12 @@ struct DependenceStudy {
   std::vector<std::string> remarks;
 };
 
-/// Over windows that lie wholly inside the dynamic part, against rms rate, rms vibration and mean speed.
-/// Holm's correction holds over all slopes of one S-IMU.
-/// @param models  where the search begins: the dynamic model of the axis, or that of the whole run
+/// Over windows that lie wholly inside the dynamic part, against rms rate, rms vibration, mean speed and the
+/// sensor's own temperature. Holm's correction holds over all slopes of one S-IMU.
+/// @param temperatures  one a S-IMU, in the order of `series`
+/// @param models        where the search begins: the dynamic model of the axis, or that of the whole run
 DependenceStudy study_dependence(const Configuration& configuration, const std::vector<NoiseSeries>& series,
+                                 const std::vector<TemperatureTrack>& temperatures,
                                  const MotionLevels& levels, const RegimeTrack& motion,
                                  const NoiseStudy& models, HostTime origin);
 

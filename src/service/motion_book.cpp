@@ -32,12 +32,27 @@ AxisMotion MotionSums::report() const {
   return report;
 }
 
-void MotionBook::add(const ErrorRow& row) noexcept {
-  ++rows_[static_cast<std::size_t>(row.regime)];
+MotionBook::MotionBook() : regressions_(kAxisCount, RegressionSums(1, kCovariates)) {}
+
+void MotionBook::add(const ErrorRow& row) {
+  const std::int64_t before = rows_[static_cast<std::size_t>(row.regime)]++;
+  if (row.regime == Regime::kDynamic && before % kRegressionStep == 0) add_to_regression(row);
   for (std::size_t i = 0; i < 3; ++i) {
     if (row.gyro_valid) axes_[i].add(row.predicted_omega_s_radps[i], row.e_gyro_radps[i]);
     if (row.accel_valid) axes_[3 + i].add(row.predicted_f_s_mps2[i], row.e_accel_mps2[i]);
   }
+}
+
+void MotionBook::add_to_regression(const ErrorRow& row) {
+  const auto x = covariates(row);
+  std::array<double, 1 + kCovariates + 1> columns{1.0};
+  std::copy(x.begin(), x.end(), columns.begin() + 1);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (!(axis < 3 ? row.gyro_valid : row.accel_valid)) continue;
+    columns.back() = axis < 3 ? row.e_gyro_radps[axis] : row.e_accel_mps2[axis - 3];
+    regressions_[axis].add(columns);
+  }
+  for (std::size_t i = 0; i < kCovariates; ++i) covariates_[i].add(x[i], 0.0);
 }
 
 DynamicsReport MotionBook::report() const {
@@ -48,6 +63,17 @@ DynamicsReport MotionBook::report() const {
     report.axes.push_back(axes_[axis].report());
     report.axes.back().axis = axis_name(axis);
     report.axes.back().unit = axis_unit(axis);
+    if (const auto regression = regressions_[axis].solve()) {
+      report.axes.back().r2 = regression->r2;
+      report.axes.back().f = regression->f;
+      report.axes.back().p_value = regression->p_value;
+    }
+  }
+  if (report.n_dynamic == 0) return report;
+  for (std::size_t i = 0; i < kCovariates; ++i) {
+    const AxisMotion motion = covariates_[i].report();
+    report.covariates.push_back({std::string(covariate_name(i)), std::string(covariate_unit(i)), motion.mean,
+                                 motion.rms, motion.largest});
   }
   return report;
 }

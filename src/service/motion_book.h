@@ -4,7 +4,10 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
+#include "dynamics/covariates.h"
+#include "dynamics/regression.h"
 #include "error_process/error_row.h"
 #include "publish/reports.h"
 #include "service/noise_series.h"
@@ -31,13 +34,21 @@ class MotionSums {
 
 class MotionBook {
  public:
-  void add(const ErrorRow& row) noexcept;
+  MotionBook();
+  /// Thread: modeller. Allocates: never.
+  void add(const ErrorRow& row);
   /// name, utc and time_s are left to the caller.
   [[nodiscard]] DynamicsReport report() const;
 
  private:
+  /// Of the samples in motion every fifth enters the regression: neighbours tell the same of the motion.
+  static constexpr std::int64_t kRegressionStep = 5;
+  void add_to_regression(const ErrorRow& row);
+
   std::array<MotionSums, kAxisCount> axes_;
   std::array<std::int64_t, kRegimeCount> rows_{};
+  std::array<MotionSums, kCovariates> covariates_;
+  std::vector<RegressionSums> regressions_;  ///< one an axis
 };
 
 }  // namespace imuscope

@@ -52,7 +52,8 @@ void say_left_out(const Job& job, std::size_t axis, const std::string& regime,
 
 /// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
 std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::uint8_t>& mask,
-                     const std::string& regime, std::size_t levels_of_whole) {
+                     const std::string& regime, const std::vector<noise::Line>& lines,
+                     std::size_t levels_of_whole) {
   // A regime that the run does not have is said once, not for every axis.
   if (std::none_of(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; })) return 0;
   const auto remark = [&](const std::string& what) {
@@ -74,16 +75,17 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
                        wv->levels.size() < levels_of_whole ? "; its stretches are too short" : ""));
     return wv->levels.size();
   }
-  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit)});
+  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), lines});
   return wv->levels.size();
 }
 
 /// Finds the lines of one regime, says them and takes them out of `values`.
-void take_out_lines(const DeviceConfig& device, std::size_t axis, const std::string& regime,
-                    const std::vector<std::uint8_t>& mask, std::vector<double>& values, NoiseStudy& study) {
+std::vector<noise::Line> take_out_lines(const DeviceConfig& device, std::size_t axis,
+                                        const std::string& regime, const std::vector<std::uint8_t>& mask,
+                                        std::vector<double>& values, NoiseStudy& study) {
   noise::LineOptions options;
   options.rate_hz = device.rate_hz;
-  const auto lines = noise::find_lines(values, mask, options);
+  auto lines = noise::find_lines(values, mask, options);
   for (const auto& line : lines) {
     study.lines.push_back({{"name", device.name},
                            {"axis", axis_name(axis)},
@@ -91,17 +93,40 @@ void take_out_lines(const DeviceConfig& device, std::size_t axis, const std::str
                            {"frequency_hz", line.frequency_hz},
                            {"frequency_sd_hz", line.frequency_sd_hz},
                            {"amplitude", line.amplitude},
+                           {"amplitude_sd", line.amplitude_sd},
                            {"amplitude_unit", axis_unit(axis)},
                            {"share_of_variance", line.share_of_variance},
                            {"p_value", line.p_value}});
-    study.remarks.push_back(
-        fmt::format("{} {}, {}: a vibration line at {:.4g} Hz, amplitude {:.3g} {} ({:.2g} % of the "
-                    "variance); it is modelled as a "
-                    "sinusoid and taken out before the noise model is fitted",
-                    device.name, axis_name(axis), regime, line.frequency_hz, line.amplitude, axis_unit(axis),
-                    100.0 * line.share_of_variance));
+    study.remarks.push_back(fmt::format(
+        "{} {}, {}: a vibration line at {:.4g} Hz, amplitude {:.3g} {} ({:.2g} % of the "
+        "variance); it is a sinusoid of the model, beside the noise that is fitted to what it leaves",
+        device.name, axis_name(axis), regime, line.frequency_hz, line.amplitude, axis_unit(axis),
+        100.0 * line.share_of_variance));
   }
   noise::remove_lines(values, mask, lines, options);
+  return lines;
+}
+
+/// @param levels  of the wavelet variance
+nlohmann::json sinusoid_json(const noise::Line& line, std::size_t number, double rate_hz, std::size_t axis,
+                             std::size_t levels) {
+  constexpr double kNormal95 = 1.959963984540054;
+  const auto parameter = [](const char* name, const std::string& unit, double value, double sd) {
+    return nlohmann::json{{"name", name},
+                          {"unit", unit},
+                          {"value", value},
+                          {"sd", sd},
+                          {"ci_low", std::max(0.0, value - kNormal95 * sd)},
+                          {"ci_high", value + kNormal95 * sd}};
+  };
+  nlohmann::json wv = nlohmann::json::array();
+  for (std::size_t level = 1; level <= levels; ++level)
+    wv.push_back(noise::line_wv(line, rate_hz, static_cast<int>(level)));
+  return {{"process", fmt::format("SIN{}", number)},
+          {"parameters",
+           {parameter("alpha", axis_unit(axis), line.amplitude, line.amplitude_sd),
+            parameter("frequency", "Hz", line.frequency_hz, line.frequency_sd_hz)}},
+          {"wv", std::move(wv)}};
 }
 
 /// Three axes that leave out the same levels make one sentence.
@@ -222,12 +247,14 @@ NoiseStudy study_noise(const Configuration& configuration, const std::vector<Noi
     const auto& device = configuration.devices[indices[i]];
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       std::vector<double> values = series[i].values(axis);
+      std::vector<std::vector<noise::Line>> lines;
       for (std::size_t regime = 0; regime < regimes.size(); ++regime)
-        take_out_lines(device, axis, regimes[regime], series[i].mask(axis, regime), values, study);
+        lines.push_back(
+            take_out_lines(device, axis, regimes[regime], series[i].mask(axis, regime), values, study));
       const Job job{device, values, spec, study};
-      const std::size_t levels = fit_axis(job, axis, series[i].mask(axis), kWholeRun, 0);
+      const std::size_t levels = fit_axis(job, axis, series[i].mask(axis), kWholeRun, {}, 0);
       for (std::size_t regime = 0; regime < regimes.size(); ++regime)
-        fit_axis(job, axis, series[i].mask(axis, regime), regimes[regime], levels);
+        fit_axis(job, axis, series[i].mask(axis, regime), regimes[regime], lines[regime], levels);
       if (progress) progress((done += 1.0) / total);
     }
   }
@@ -237,7 +264,16 @@ NoiseStudy study_noise(const Configuration& configuration, const std::vector<Noi
 
 nlohmann::json models_json(const NoiseStudy& study) {
   nlohmann::json models = nlohmann::json::array();
-  for (const auto& m : study.models) models.push_back(model_json(m.fit, m.name, m.axis, m.regime));
+  for (const auto& m : study.models) {
+    nlohmann::json model = model_json(m.fit, m.name, m.axis, m.regime);
+    if (!m.lines.empty()) {
+      model["sinusoids"] = nlohmann::json::array();
+      for (std::size_t i = 0; i < m.lines.size(); ++i)
+        model["sinusoids"].push_back(
+            sinusoid_json(m.lines[i], i + 1, m.fit.rate_hz, m.axis, m.fit.wv.size()));
+    }
+    models.push_back(std::move(model));
+  }
   return models;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "noise/fit.h"
+#include "noise/lines.h"
 #include "service/config.h"
 #include "service/noise_series.h"
 
@@ -19,8 +20,9 @@ namespace imuscope {
 struct StudyModel {
   std::string name;  ///< of the S-IMU
   std::size_t axis = 0;
-  std::string regime;  ///< "all", or a regime's name
-  noise::FitResult fit;
+  std::string regime;                ///< "all", or a regime's name
+  noise::FitResult fit;              ///< of what the sinusoids leave
+  std::vector<noise::Line> lines{};  ///< sinusoids that belong to the model beside the fit
 };
 
 struct NoiseStudy {
@@ -42,7 +44,8 @@ NoiseStudy study_noise(const Configuration& configuration, const std::vector<Noi
                        const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
                        const std::function<void(double)>& progress);
 
-/// The content of models.json's "models".
+/// The content of models.json's "models": every entry holds its sinusoids, with intervals and with what they
+/// add to each level, as "sinusoids".
 nlohmann::json models_json(const NoiseStudy& study);
 
 /// comparison.json: for every S-IMU and axis, every two regimes parameter by parameter and jointly. Holm's

@@ -39,11 +39,17 @@ class ErrorCollector final : public CoreSink {
   /// @param low_pass  one a S-IMU, or none
   ErrorCollector(const FormerMountings& former, const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows,
                  std::vector<RowLowPass> low_pass)
-      : former_(former), biases_(biases), rows_(rows), low_pass_(std::move(low_pass)) {}
+      : former_(former),
+        biases_(biases),
+        rows_(rows),
+        low_pass_(std::move(low_pass)),
+        temperatures_(rows.size()) {}
 
   void on_epoch(const StudyEpoch& epoch, HostTime) noexcept override {
     const ReferenceBias bias = biases_.at(epoch.time + from_seconds(epoch.t_d_s));
     watch_.add(epoch, bias);
+    if ((epoch.sample.flags & kHasTemperature) != 0)
+      temperatures_[epoch.study].add(epoch.time, epoch.sample.temperature_degC);
     if (!is_final_mounting(former_[epoch.study], epoch.time)) return;
     ErrorRow row = error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, bias);
     if (!low_pass_.empty()) low_pass_[epoch.study].apply(row);
@@ -55,6 +61,7 @@ class ErrorCollector final : public CoreSink {
   void on_late_sample(const LateSample&) noexcept override {}
 
   [[nodiscard]] const MotionWatch& watch() const { return watch_; }
+  [[nodiscard]] const std::vector<TemperatureTrack>& temperatures() const { return temperatures_; }
 
  private:
   const FormerMountings& former_;
@@ -62,6 +69,7 @@ class ErrorCollector final : public CoreSink {
   std::vector<RowSpool>& rows_;
   std::vector<RowLowPass> low_pass_;
   MotionWatch watch_;
+  std::vector<TemperatureTrack> temperatures_;
 };
 
 /// First pass: everything but errors goes to the folder.
@@ -349,8 +357,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
     if (options.progress) options.progress("noise models", share);
   });
-  const auto dependence = study_dependence(configuration, series, collector.watch().levels(), regimes->motion,
-                                           noise_study, origin);
+  const auto dependence = study_dependence(configuration, series, collector.temperatures(),
+                                           collector.watch().levels(), regimes->motion, noise_study, origin);
   const auto regressions = regressions_of(configuration, *studied, regimes->motion, *spec);
   auto regime_document = regimes_json(*regimes, origin);
   regime_document["left_out"] = noise_study.left_out;

@@ -138,6 +138,66 @@ TEST(StudyDynamics, StandstillGivesNoRegressionAndNothingIsInvented) {
   EXPECT_TRUE(json.empty());
 }
 
+/// A vehicle on rails: no rotation about x, and as much force along y as along x.
+Drive on_rails(unsigned seed) {
+  Drive drive(seed);
+  for (auto& row : drive.rows) {
+    row.predicted_omega_s_radps[0] = row.omega_dot_s_radps2[0] = row.omega_ddot_s_radps3[0] = 0.0;
+    row.predicted_f_s_mps2[1] = row.predicted_f_s_mps2[0];
+    row.f_dot_s_mps3[1] = 2.0 * row.f_dot_s_mps3[0] - 0.5 * row.predicted_omega_s_radps[1];
+  }
+  return drive;
+}
+
+TEST(StudyDynamics, ConstantAndCollinearCovariatesAreLeftOutAndTheOthersKeepTheirCoefficients) {
+  Drive drive = on_rails(6);
+  constexpr double kPlanted = 0.5;
+  for (auto& row : drive.rows) row.e_gyro_radps[0] += kPlanted * row.predicted_f_s_mps2[2];
+  Rows rows(drive.rows);
+  const auto result = study_dynamics(rows, options());
+  using Entry = std::pair<std::size_t, LeftOut>;
+  const std::vector<Entry> expected{{0, LeftOut::kConstant},
+                                    {3, LeftOut::kConstant},
+                                    {6, LeftOut::kConstant},
+                                    {10, LeftOut::kCollinear},
+                                    {13, LeftOut::kCollinear}};
+  for (const auto& axis : result) {
+    for (const auto* regression : {&axis.ols, &axis.gls}) {
+      ASSERT_TRUE(*regression);
+      EXPECT_EQ((*regression)->left_out, expected);
+      EXPECT_EQ((*regression)->dof_model, 10);
+      EXPECT_EQ((*regression)->coefficients.size(), 10U);
+    }
+  }
+  const auto* c = find(result[0].gls, 11);
+  ASSERT_NE(c, nullptr);
+  EXPECT_LT(std::abs(c->value - kPlanted), 4.0 * c->sd);
+  nlohmann::json json = nlohmann::json::array();
+  append_regressions("mtx1", result, json);
+  EXPECT_EQ(json[0]["left_out"][0]["why"], "does not vary in this drive");
+  EXPECT_EQ(json[0]["left_out"][3]["why"], "a combination of other covariates in this drive");
+}
+
+// What is not known of the noise's model counts: fewer degrees of freedom than rows, fewest for what varies
+// slowly.
+TEST(StudyDynamics, DegreesOfFreedomAreThoseOfTheNoiseAtTheScalesOfTheCovariate) {
+  Drive drive(7);
+  double fast = 0.0;
+  for (auto& row : drive.rows) row.omega_ddot_s_radps3[0] = fast = drive.normal(drive.generator);
+  Rows rows(drive.rows);
+  const auto result = study_dynamics(rows, options());
+  const auto& gls = *result[0].gls;
+  const auto* slow_covariate = find(result[0].gls, 0);
+  const auto* fast_covariate = find(result[0].gls, 6);
+  ASSERT_NE(slow_covariate, nullptr);
+  ASSERT_NE(fast_covariate, nullptr);
+  EXPECT_LT(slow_covariate->dof, 0.5 * static_cast<double>(gls.n));
+  EXPECT_GT(slow_covariate->dof, 10.0);
+  EXPECT_GT(fast_covariate->dof, slow_covariate->dof);
+  EXPECT_LT(gls.dof_rest, static_cast<double>(gls.n));
+  EXPECT_EQ(result[0].ols->dof_rest, static_cast<double>(result[0].ols->n - 16));
+}
+
 TEST(StudyDynamics, JsonHasTheFieldsOfTheInterface) {
   Drive drive(5);
   Rows rows(drive.rows);

@@ -7,7 +7,9 @@
 #include <cmath>
 #include <fstream>
 #include <imuscope/calibration_t.hpp>
+#include <imuscope/dynamics_t.hpp>
 #include <imuscope/error_t.hpp>
+#include <imuscope/event_t.hpp>
 #include <imuscope/navigation_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <imuscope/status_t.hpp>
@@ -34,6 +36,7 @@ struct Listener {
   std::map<std::string, std::vector<calibration_t>> calibrations;
   std::map<std::string, std::vector<error_t>> errors;
   std::vector<noise_model_t> models;
+  std::map<std::string, std::vector<dynamics_t>> dynamics;
 
   void on_status(const lcm::ReceiveBuffer*, const std::string&, const status_t* m) { statuses.push_back(*m); }
   void on_navigation(const lcm::ReceiveBuffer*, const std::string&, const navigation_t* m) {
@@ -47,6 +50,9 @@ struct Listener {
   }
   void on_model(const lcm::ReceiveBuffer*, const std::string&, const noise_model_t* m) {
     models.push_back(*m);
+  }
+  void on_dynamics(const lcm::ReceiveBuffer*, const std::string& channel, const dynamics_t* m) {
+    dynamics[channel].push_back(*m);
   }
 };
 
@@ -70,11 +76,11 @@ std::vector<TruthRow> read_truth(const std::filesystem::path& file) {
   return rows;
 }
 
-/// The demo's configuration with its ports in `folder` and a refit every 15 s.
+/// The demo's configuration with its ports in `folder`, a refit every 15 s and regimes that a person names.
 std::filesystem::path configuration_in(const std::filesystem::path& folder) {
   std::string text = read_text(source_path("config/demo.toml"));
   text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder / "ports").string());
-  text += "\n[noise]\nrefit_interval_s = 15.0\n";
+  text += "\n[noise]\nrefit_interval_s = 15.0\n\n[regimes]\nby = \"labels\"\n";
   const auto file = folder / "live.toml";
   std::ofstream(file) << text;
   return file;
@@ -97,6 +103,7 @@ class LiveRun : public testing::Test {
     bus.subscribe("IMUSCOPE_CALIBRATION_.*", &Listener::on_calibration, &heard_)->setQueueCapacity(kQueue);
     bus.subscribe("IMUSCOPE_ERROR_.*", &Listener::on_error, &heard_)->setQueueCapacity(kQueue);
     bus.subscribe("IMUSCOPE_NOISE_MODEL_.*", &Listener::on_model, &heard_);
+    bus.subscribe("IMUSCOPE_DYNAMICS_.*", &Listener::on_dynamics, &heard_);
   }
 
   void check_status() {
@@ -207,8 +214,68 @@ class LiveRun : public testing::Test {
     EXPECT_NEAR(white_deg2, 0.654, 0.15 * 0.654);
   }
 
+  /// @param up  which of the S-IMU's third axis is up: -1 where it points down as that of b does
+  void check_dynamics(const std::string& name, double up) {
+    const auto& messages = heard_.dynamics["IMUSCOPE_DYNAMICS_" + name];
+    ASSERT_FALSE(messages.empty()) << name;
+    for (std::size_t i = 1; i < messages.size(); ++i)
+      EXPECT_EQ(messages[i].sequence, messages[i - 1].sequence + 1);
+    const dynamics_t& last = messages.back();
+    EXPECT_EQ(last.name, name);
+    EXPECT_GT(last.n_dynamic, 1000);
+    ASSERT_EQ(last.n_covariates, 15);
+    const auto& omega_z = last.covariates[2];
+    EXPECT_EQ(omega_z.name + " " + omega_z.unit, "omega_z rad/s");
+    EXPECT_GT(omega_z.rms, 0.02) << "the vehicle turns";
+    EXPECT_GE(omega_z.largest, omega_z.rms);
+    const auto& f_z = last.covariates[11];
+    EXPECT_EQ(f_z.name + " " + f_z.unit, "f_z m/s^2");
+    EXPECT_NEAR(f_z.mean, 9.8 * up, 0.3) << "the specific force of a vehicle on the road";
+    ASSERT_EQ(last.n_axes, 6);
+    for (const auto& axis : last.axes) {
+      EXPECT_GT(axis.r2, 0.0) << axis.axis;
+      EXPECT_LT(axis.r2, 1.0) << axis.axis;
+      EXPECT_GT(axis.f, 0.0) << axis.axis;
+      EXPECT_GE(axis.p_value, 0.0) << axis.axis;
+      EXPECT_LE(axis.p_value, 1.0) << axis.axis;
+    }
+  }
+
+  /// What a person named while the run was recorded becomes the regimes of its study.
+  static void check_labels(const std::filesystem::path& folder) {
+    const auto out = folder / "study";
+    ASSERT_EQ(run_program("imuscope",
+                          {"process", (folder / "live" / "capture.lcm").string(), "--out", out.string()},
+                          folder / "process.log"),
+              0)
+        << read_text(folder / "process.log");
+    const auto regimes = read_json(out / "regimes.json");
+    EXPECT_EQ(regimes.at("by"), "labels");
+    ASSERT_EQ(regimes.at("regimes").size(), 1U);
+    EXPECT_EQ(regimes.at("regimes")[0].at("name"), "town");
+    const double town_s = regimes.at("regimes")[0].at("total_s").get<double>();
+    EXPECT_GT(town_s, 1.0);
+    EXPECT_LT(town_s, static_cast<double>(kRun_s));
+    std::ifstream in(out / "errors_mtx1.csv");
+    std::map<std::string, int> rows;
+    std::string line;
+    std::getline(in, line);
+    while (std::getline(in, line)) ++rows[line.substr(line.rfind(',') + 1)];
+    EXPECT_NEAR(rows["town"], 100.0 * town_s, 3.0);
+    EXPECT_GT(rows[""], 100) << "before and after nothing was named";
+  }
+
   Listener heard_;
 };
+
+/// As a person does from another terminal.
+void mark(lcm::LCM& bus, std::int64_t sequence, const std::string& text) {
+  event_t event{};
+  event.sequence = sequence;
+  event.source = "test";
+  event.text = text;
+  bus.publish("IMUSCOPE_EVENT", &event);
+}
 
 TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
   const auto folder = scratch_folder();
@@ -225,7 +292,14 @@ TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
   BackgroundProgram service("imuscope", {"run", configuration.string(), "--out", (folder / "live").string()},
                             folder / "imuscope.log");
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(kRun_s);
-  while (std::chrono::steady_clock::now() < end) bus.handleTimeout(100);
+  const auto town = end - std::chrono::seconds(20);
+  const auto left_town = end - std::chrono::seconds(8);
+  std::int64_t marked = 0;
+  for (auto now = std::chrono::steady_clock::now(); now < end; now = std::chrono::steady_clock::now()) {
+    bus.handleTimeout(100);
+    if (marked == 0 && now >= town) mark(bus, marked++, "regime town");
+    if (marked == 1 && now >= left_town) mark(bus, marked++, "regime end");
+  }
   service.interrupt();
   ASSERT_EQ(service.wait(), 0) << read_text(folder / "imuscope.log");
   while (bus.handleTimeout(200) > 0) {
@@ -242,6 +316,9 @@ TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
     check_errors(imu);
   }
   check_models();
+  check_dynamics("mtx1", -1.0);
+  check_dynamics("mtx3", 1.0);  // hangs upside down
+  check_labels(folder);
 
   // The recording gives the same estimates, to the last digit of every file.
   ASSERT_EQ(run_program(

@@ -200,5 +200,71 @@ TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
   EXPECT_EQ(read_json(labelled / "comparison.json").at("comparisons")[0].at("first"), "parked");
 }
 
+/// The demo with gyroscopes whose white noise follows what they go through: of mtx1 its own temperature,
+/// which it sends, of mtx2 the rate; mtx3 does neither.
+std::filesystem::path dependent_vehicle(const std::filesystem::path& folder) {
+  std::string text = read_text(source_path("config/demo.toml"));
+  const auto add = [&](const char* name, const char* keys) {
+    const std::string head = std::string("[[simulation.imu]]\nname = \"") + name + "\"\n";
+    const auto at = text.find(head);
+    ASSERT_NE(at, std::string::npos);
+    text.insert(at + head.size(), keys);
+  };
+  add("mtx1",
+      "begin_temperature_degC = 20.0\nend_temperature_degC = 60.0\nwarm_up_s = 200.0\n"
+      "gyro_white_log_per_degC = 0.04\n");
+  add("mtx2", "gyro_white_log_per_deg_per_s = 0.05\n");
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "vehicle.toml") << text;
+  return folder / "vehicle.toml";
+}
+
+TEST(StudyOfADrive, WhatTheNoiseFollowsIsFoundThroughBytesAndTheFilterOfAnOutageFollowsIt) {
+  const auto scratch = scratch_folder();
+  const auto folder = scratch / "drive";
+  ASSERT_EQ(run_program("imusim",
+                        {"record", dependent_vehicle(scratch).string(), "--minutes", "8", "--seed", "3",
+                         "--out", folder.string()},
+                        folder.string() + ".log"),
+            0)
+      << read_text(folder.string() + ".log");
+  const auto out = scratch / "run";
+  ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
+  const auto document = read_json(out / "dependence.json");
+  int of_temperature = 0;
+  int of_rate = 0;
+  for (const auto& entry : document.at("dependences")) {
+    const auto name = entry.at("name").get<std::string>();
+    const auto axis = entry.at("axis").get<std::string>();
+    if (entry.at("process") != "WN" || axis.rfind("gyro", 0) != 0) continue;
+    const double slope = entry.at("slope").get<double>();
+    const double sd = entry.at("slope_sd").get<double>();
+    if (name == "mtx1" && entry.at("driver") == "temperature") {
+      ++of_temperature;
+      EXPECT_NEAR(slope, 0.04, 4.0 * sd) << axis;
+      EXPECT_LT(entry.at("p_holm").get<double>(), 0.01) << axis;
+    }
+    // The driver is the rms of the rate over a window, the truth follows it sample by sample: the same sign.
+    if (name == "mtx2" && entry.at("driver") == "rate") {
+      ++of_rate;
+      EXPECT_GT(slope, 2.0 * sd) << axis;
+    }
+  }
+  EXPECT_EQ(of_temperature, 3);
+  EXPECT_EQ(of_rate, 3);
+  EXPECT_THAT(document.at("remarks").get<std::vector<std::string>>(),
+              Contains(HasSubstr("mtx3: no temperature in this record")));
+
+  const auto log = scratch / "evaluate.log";
+  ASSERT_EQ(run_program("imuscope", {"evaluate", out.string(), "--settle", "60"}, log), 0) << read_text(log);
+  std::string source_of_mtx1;
+  for (const auto& entry : read_json(out / "evaluation.json").at("evaluations")) {
+    if (entry.at("name") == "mtx1" && entry.at("model") == "by dynamics")
+      source_of_mtx1 = entry.at("source").get<std::string>();
+  }
+  EXPECT_THAT(source_of_mtx1, HasSubstr("of 6 axes (dependence.json)")) << "it follows what was found";
+  EXPECT_THAT(source_of_mtx1, testing::Not(HasSubstr("follows the motion on 0")));
+}
+
 }  // namespace
 }  // namespace imuscope::test

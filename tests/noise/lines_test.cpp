@@ -47,6 +47,43 @@ TEST(Lines, AreFoundWhereTheyAreWithTheirAmplitude) {
   }
 }
 
+// Sd of amplitude and frequency over many records with one line; the bound is nearly reached.
+TEST(Lines, SayHowWellTheyAreKnown) {
+  constexpr int kSeries = 60;
+  constexpr double kFrequency_hz = 17.77;
+  constexpr double kAmplitude = 0.3;
+  double amplitude_nees = 0.0;
+  double frequency_nees = 0.0;
+  for (unsigned seed = 1; seed <= kSeries; ++seed) {
+    auto x = noise_of(40'000, 100 + seed);
+    add_line(x, kFrequency_hz, kAmplitude);
+    const auto lines = find_lines(x, all_valid(x.size()), {});
+    ASSERT_EQ(lines.size(), 1u) << seed;
+    amplitude_nees += std::pow((lines[0].amplitude - kAmplitude) / lines[0].amplitude_sd, 2) / kSeries;
+    frequency_nees +=
+        std::pow((lines[0].frequency_hz - kFrequency_hz) / lines[0].frequency_sd_hz, 2) / kSeries;
+  }
+  // 60 draws of a right sd: 0.6 to 1.5 but for one in a thousand; a bound may be missed by half as much
+  // again.
+  EXPECT_GT(amplitude_nees, 0.5);
+  EXPECT_LT(amplitude_nees, 2.0);
+  EXPECT_GT(frequency_nees, 0.3);
+  EXPECT_LT(frequency_nees, 3.0);
+}
+
+TEST(Lines, ContributeTheWaveletVarianceOfASinusoid) {
+  std::vector<double> x(50'000, 0.0);
+  add_line(x, 17.77, 0.3);
+  Line line;
+  line.frequency_hz = 17.77;
+  line.amplitude = 0.3;
+  const auto wv = haar_wavelet_variance(x).value();
+  for (int level = 1; level <= 6; ++level) {
+    const double observed = wv.levels[static_cast<std::size_t>(level - 1)].value;
+    EXPECT_NEAR(line_wv(line, kRate_hz, level), observed, 2e-3 * observed) << level;
+  }
+}
+
 TEST(Lines, NoiseAloneRarelyHasOne) {
   int found = 0;
   constexpr int kSeries = 200;

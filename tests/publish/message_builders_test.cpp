@@ -262,7 +262,8 @@ TEST(MessageBuilders, AStatusBeforeTheFirstRefitSaysSoByAZeroTime) {
 
 TEST(MessageBuilders, DynamicsKeepEveryAxis) {
   DynamicsReport report{test::kExampleUtc, 61.0, "mtx1", 5, 7, {}};
-  report.axes.push_back({"gyro_x", "rad/s", 1.0, 2.0, 3.0, 4.0, 5.0, 0.6});
+  report.axes.push_back({"gyro_x", "rad/s", 1.0, 2.0, 3.0, 4.0, 5.0, 0.6, 0.7, 8.0, 0.09});
+  report.covariates.push_back({"omega_x", "rad/s", 10.0, 11.0, 12.0});
   const dynamics_t m = over_the_wire(to_message(report, 9));
   EXPECT_EQ(m.sequence, 9);
   EXPECT_EQ(m.name, "mtx1");
@@ -273,6 +274,11 @@ TEST(MessageBuilders, DynamicsKeepEveryAxis) {
   EXPECT_EQ(a.axis + " " + a.unit, "gyro_x rad/s");
   EXPECT_THAT((std::array{a.mean, a.rms, a.largest, a.slope, a.slope_sd, a.correlation}),
               ElementsAre(1.0, 2.0, 3.0, 4.0, 5.0, 0.6));
+  EXPECT_THAT((std::array{a.r2, a.f, a.p_value}), ElementsAre(0.7, 8.0, 0.09));
+  ASSERT_EQ(m.covariates.size(), 1U);
+  const auto& c = m.covariates[0];
+  EXPECT_EQ(c.name + " " + c.unit, "omega_x rad/s");
+  EXPECT_THAT((std::array{c.mean, c.rms, c.largest}), ElementsAre(10.0, 11.0, 12.0));
 }
 
 TEST(MessageBuilders, AnEventKeepsWhoSentItAndWhat) {

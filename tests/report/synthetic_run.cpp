@@ -332,7 +332,7 @@ json comparison_entry(const std::string& name, const std::string& axis) {
   const json parameter{{"process", "WN"},      {"name", "sigma2"},      {"unit", "(rad/s)^2"},
                        {"first", 1.0},         {"second", 1.29},        {"ratio", 1.293},
                        {"ratio_ci_low", 1.28}, {"ratio_ci_high", 1.31}, {"p_value", 1e-12},
-                       {"p_holm", 1e-11},      {"verdict", "differ"}};
+                       {"p_holm", 1e-11},      {"verdict", "differs"}};
   const json unsure{{"process", "GM2"},   {"name", "beta"},          {"unit", "1/s"},
                     {"ratio", nullptr},   {"ratio_ci_low", nullptr}, {"ratio_ci_high", nullptr},
                     {"p_value", nullptr}, {"p_holm", nullptr},       {"verdict", "not determined"}};

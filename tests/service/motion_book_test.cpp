@@ -76,11 +76,51 @@ TEST(MotionBook, CountsRegimesAndLeavesOutAxesWithoutAValue) {
   const auto report = book.report();
   EXPECT_EQ(report.n_static, 2);
   EXPECT_EQ(report.n_dynamic, 1);
+  EXPECT_TRUE(std::isnan(report.axes[0].r2)) << "one sample makes no regression";
   ASSERT_EQ(report.axes.size(), 6U);
   EXPECT_EQ(report.axes[2].axis, "gyro_z");
   EXPECT_EQ(report.axes[2].unit, "rad/s");
   EXPECT_DOUBLE_EQ(report.axes[2].largest, 3.0);
   EXPECT_TRUE(std::isnan(report.axes[3].mean)) << "no specific force was ever valid";
+}
+
+/// Held against the regression itself: in motion alone, every fifth sample.
+TEST(MotionBook, RegressesEveryAxisOnTheFifteenCovariatesInMotion) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  MotionBook book;
+  RegressionSums expected(1, kCovariates);
+  double largest = 0.0;
+  std::int64_t n = 0;
+  for (int i = 0; i < 4000; ++i) {
+    ErrorRow row{};
+    row.gyro_valid = row.accel_valid = true;
+    row.regime = i % 2 == 0 ? Regime::kDynamic : Regime::kStatic;
+    for (auto* v : {&row.predicted_omega_s_radps, &row.omega_dot_s_radps2, &row.omega_ddot_s_radps3,
+                    &row.predicted_f_s_mps2, &row.f_dot_s_mps3}) {
+      for (double& component : *v) component = normal(random);
+    }
+    row.e_gyro_radps[0] = 0.2 * row.f_dot_s_mps3[1] + normal(random);
+    book.add(row);
+    if (row.regime == Regime::kStatic || n++ % 5 != 0) continue;
+    std::array<double, 1 + kCovariates + 1> columns{1.0};
+    const auto x = covariates(row);
+    std::copy(x.begin(), x.end(), columns.begin() + 1);
+    columns.back() = row.e_gyro_radps[0];
+    expected.add(columns);
+    largest = std::max(largest, std::abs(x[13]));
+  }
+  const auto report = book.report();
+  const auto regression = expected.solve().value();
+  EXPECT_DOUBLE_EQ(report.axes[0].r2, regression.r2);
+  EXPECT_DOUBLE_EQ(report.axes[0].f, regression.f);
+  EXPECT_DOUBLE_EQ(report.axes[0].p_value, regression.p_value);
+  EXPECT_LT(report.axes[0].p_value, 0.01) << "it depends on the jerk";
+  ASSERT_EQ(report.covariates.size(), kCovariates);
+  EXPECT_EQ(report.covariates[13].name, "f_dot_y");
+  EXPECT_EQ(report.covariates[13].unit, "m/s^3");
+  EXPECT_DOUBLE_EQ(report.covariates[13].largest, largest);
+  EXPECT_NEAR(report.covariates[13].rms, 1.0, 0.2);
 }
 
 }  // namespace

@@ -109,6 +109,37 @@ TEST(NoiseStudy, ALineIsSaidAndDoesNotEnterTheModel) {
   }
 }
 
+TEST(NoiseStudy, ALineIsASinusoidOfItsModelWithIntervalsAndItsWaveletVariance) {
+  constexpr double kAmplitude = 0.5;
+  const auto study = study_of(series_of(40'000, 20'000, 1.0, 1.0, kAmplitude));
+  int found = 0;
+  for (const auto& model : models_json(study)) {
+    const bool has_line = model.at("axis") == "gyro_y" && model.at("regime") == "dynamic";
+    if (model.at("axis").get<std::string>().starts_with("accel") || model.at("regime") == "static") {
+      EXPECT_FALSE(model.contains("sinusoids"));
+    }
+    if (!has_line) continue;
+    ++found;
+    ASSERT_EQ(model.at("sinusoids").size(), 1U);
+    const auto& line = model.at("sinusoids")[0];
+    EXPECT_EQ(line.at("process"), "SIN1");
+    for (const auto& [name, truth] : {std::pair{"alpha", kAmplitude}, std::pair{"frequency", 31.0}}) {
+      const auto& p = line.at("parameters")[std::string(name) == "alpha" ? 0 : 1];
+      EXPECT_EQ(p.at("name"), name);
+      const double sd = p.at("sd").get<double>();
+      EXPECT_NEAR(p.at("value").get<double>(), truth, 4.0 * sd);
+      EXPECT_LT(sd, 0.1 * truth);
+      EXPECT_NEAR(p.at("ci_high").get<double>() - p.at("ci_low").get<double>(), 3.92 * sd, 0.01 * sd);
+    }
+    // Level 1 of a sinusoid: alpha^2 / 2 sin^2(b/2), b its phase a sample.
+    const double b = 2.0 * std::numbers::pi * 31.0 / kRate_hz;
+    const double expected = 0.5 * kAmplitude * kAmplitude * std::pow(std::sin(0.5 * b), 2);
+    EXPECT_NEAR(line.at("wv")[0].get<double>(), expected, 0.1 * expected);
+    EXPECT_EQ(line.at("wv").size(), model.at("wv").size());
+  }
+  EXPECT_EQ(found, 1);
+}
+
 TEST(NoiseStudy, AnImuThatMissesHalfOfTheRunIsSaid) {
   const auto series = series_of(20'000, 10'000, 1.0, 1.0);
   EXPECT_EQ(coverage_remark("mtx1", series, kRate_hz, 200.0, HostTime{}), "");

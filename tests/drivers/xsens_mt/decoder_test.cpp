@@ -270,6 +270,35 @@ TEST(MtDecoder, LostMessagesAreCountedByTheSampleTime) {
   EXPECT_EQ(line.sink.samples[4].imu.counter, 7);
 }
 
+TEST(MtDecoder, ATemperatureIsOfTheSampleItCameWithInBothFormats) {
+  MtDecoderConfig config;
+  config.layout = {output_mode::kTemperature | output_mode::kCalibrated,
+                   output_settings::kSampleCounter | output_settings::kNoField};
+  Line legacy(config);
+  Bytes data = floats({31.5, 0.1, 0.2, 9.8, 0.01, 0.02, 0.03});
+  append(data, be16(std::uint16_t{7}));
+  legacy.send(frame(mid::kMtData, data), Duration{});
+  ASSERT_EQ(legacy.sink.samples.size(), 1U);
+  EXPECT_EQ(legacy.sink.samples[0].imu.flags, kGyroValid | kAccelValid | kHasTemperature);
+  EXPECT_EQ(legacy.sink.samples[0].imu.temperature_degC, 31.5F);
+  EXPECT_EQ(legacy.sink.samples[0].imu.omega_radps[2], static_cast<double>(0.03F));
+
+  // MTData2 sends it at a rate of its own.
+  Line line;
+  for (const bool with : {false, true, false}) {
+    Bytes items;
+    append_item(items, xdi::kAcceleration, floats({0.1, 0.2, 9.8}));
+    if (with) append_item(items, xdi::kTemperature, floats({42.25}));
+    append_item(items, xdi::kRateOfTurn, floats({0.01, 0.02, 0.03}));
+    line.send(frame(mid::kMtData2, items), kPeriod * static_cast<int>(line.sink.samples.size()));
+  }
+  ASSERT_EQ(line.sink.samples.size(), 3U);
+  EXPECT_EQ(line.sink.samples[0].imu.flags & kHasTemperature, 0U);
+  EXPECT_NE(line.sink.samples[1].imu.flags & kHasTemperature, 0U);
+  EXPECT_EQ(line.sink.samples[1].imu.temperature_degC, 42.25F);
+  EXPECT_EQ(line.sink.samples[2].imu.flags & kHasTemperature, 0U);
+}
+
 TEST(MtDecoder, ClippedAxesAreFlagged) {
   Line line;
   line.send(inertial(0, 0, 1U << 9U | 1U << 13U), Duration{});

@@ -1,0 +1,73 @@
+#include "dynamics/column_wavelets.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "noise/wavelet_variance.h"
+
+namespace imuscope {
+namespace {
+
+/// A random walk and its own past: slow, and correlated with one another.
+std::vector<std::array<double, 2>> two_columns(std::size_t n) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  std::vector<std::array<double, 2>> rows(n);
+  double x = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    x = 0.999 * x + normal(random);
+    rows[i] = {x, 0.5 * x + normal(random)};
+  }
+  return rows;
+}
+
+// The wavelet variance of a sum is the quadratic form of the products: held against the noise engine's.
+TEST(ColumnWavelets, GiveTheWaveletVarianceOfAnyCombinationOfTheColumns) {
+  const auto rows = two_columns(20'000);
+  ColumnWavelets wavelets(2);
+  std::vector<double> combination;
+  for (const auto& row : rows) {
+    wavelets.add(row);
+    combination.push_back(2.0 * row[0] - 3.0 * row[1]);
+  }
+  const auto exact = noise::haar_wavelet_variance(combination).value();
+  const Eigen::Vector2d a(2.0, -3.0);
+  const auto levels = wavelets.levels();
+  ASSERT_GE(levels.size(), 8U);
+  EXPECT_EQ(levels.front().level, ColumnWavelets::kBlockLevel + 1);
+  for (const auto& level : levels) {
+    const double expected = exact.levels[static_cast<std::size_t>(level.level - 1)].value;
+    // Of every coefficient of the exact one a part is used: 5 % at scales with many of them.
+    if (level.level > 10) continue;
+    EXPECT_NEAR(a.dot(level.products * a), expected, 0.05 * expected) << level.level;
+  }
+}
+
+TEST(ColumnWavelets, ARowThatIsMissingTakesItsCoefficientsAlong) {
+  const auto rows = two_columns(4096);
+  ColumnWavelets whole(2);
+  ColumnWavelets holed(2);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    whole.add(rows[i]);
+    if (i == 2000) {
+      holed.skip();
+    } else {
+      holed.add(rows[i]);
+    }
+  }
+  // 4096 rows without a hole reach to a coefficient of 4096; behind the hole 2080 are left in a row.
+  EXPECT_EQ(whole.levels().back().level, 12);
+  EXPECT_EQ(holed.levels().back().level, 11);
+  for (const auto& level : holed.levels()) EXPECT_TRUE(level.products.allFinite());
+}
+
+TEST(ColumnWavelets, TooFewRowsGiveNoScale) {
+  ColumnWavelets wavelets(2);
+  for (const auto& row : two_columns(31)) wavelets.add(row);
+  EXPECT_TRUE(wavelets.levels().empty());
+}
+
+}  // namespace
+}  // namespace imuscope
