@@ -77,10 +77,10 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
   return summary;
 }
 
-Result<CaptureReader> CaptureReader::open(const std::filesystem::path& path) {
+Result<CaptureReader> CaptureReader::open(const std::filesystem::path& path, std::string device) {
   auto log = CaptureFiles::open(path);
   if (!log) return tl::unexpected(log.error());
-  return CaptureReader(std::move(*log));
+  return CaptureReader(std::move(*log), std::move(device));
 }
 
 std::optional<RawRead> CaptureReader::next() {
@@ -99,6 +99,8 @@ std::optional<RawRead> CaptureReader::next() {
 bool CaptureReader::read_one() {
   LogEvent event;
   if (!log_.next(event)) return false;
+  const auto device = device_of_bytes(event.data);
+  if (!wanted_.empty() && !device.empty() && device != wanted_) return true;
   auto record = decode_record(event.data);
   if (!record) return true;
   if (const auto* run = std::get_if<RunHeader>(&*record)) {

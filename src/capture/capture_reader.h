@@ -70,7 +70,8 @@ class CaptureReader {
   static constexpr Duration kReorderWindow = std::chrono::seconds(5);
 
   /// @param path of the first file of the capture
-  static Result<CaptureReader> open(const std::filesystem::path& path);
+  /// @param device whose reads and writes alone are wanted; empty: all. The others are passed over undecoded.
+  static Result<CaptureReader> open(const std::filesystem::path& path, std::string device = {});
 
   /// The next read or write; nothing at the end of the capture. A read of which a piece was lost comes as the
   /// pieces that are there.
@@ -94,7 +95,7 @@ class CaptureReader {
     bool open = false;  // pieces are still to come
   };
 
-  explicit CaptureReader(CaptureFiles log) : log_(std::move(log)) {}
+  CaptureReader(CaptureFiles log, std::string wanted) : log_(std::move(log)), wanted_(std::move(wanted)) {}
   bool read_one();
   void add_piece(RawPiece&& piece);
   void close_assemblies();
@@ -102,6 +103,7 @@ class CaptureReader {
   std::size_t index_of(const std::string& device);
 
   CaptureFiles log_;
+  std::string wanted_;  ///< device; empty: all
   std::vector<std::string> devices_;
   std::map<std::string, Assembly> assemblies_;
   std::map<Key, RawRead> held_;

@@ -150,4 +150,15 @@ std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& mess
   return std::nullopt;
 }
 
+std::string_view device_of_bytes(const std::vector<std::uint8_t>& message) {
+  // Fingerprint, utime and sequence stand before the name: its length with the zero at its end, its letters.
+  constexpr std::size_t kLengthAt = 3 * sizeof(std::int64_t);
+  constexpr std::size_t kNameAt = kLengthAt + sizeof(std::int32_t);
+  if (message.size() < kNameAt || fingerprint_of(message) != raw_t::getHash()) return {};
+  std::size_t length = 0;
+  for (std::size_t i = kLengthAt; i < kNameAt; ++i) length = length << 8U | message[i];
+  if (length == 0 || length > message.size() - kNameAt) return {};
+  return {reinterpret_cast<const char*>(message.data()) + kNameAt, length - 1};
+}
+
 }  // namespace imuscope

@@ -7,6 +7,7 @@
 #include <imuscope/event_t.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -50,5 +51,9 @@ struct RecordClock {
 /// What a message of a capture says, recognised by the fingerprint of its type, not by its channel. Nothing
 /// for a message of another type (a capture may hold published messages) and for one that is damaged.
 [[nodiscard]] std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& message);
+
+/// Name of the device whose bytes a message holds, without decoding it; empty for any other message. Valid as
+/// long as the message.
+[[nodiscard]] std::string_view device_of_bytes(const std::vector<std::uint8_t>& message);
 
 }  // namespace imuscope

@@ -1,6 +1,7 @@
 #include "noise/process.h"
 
 #include <cmath>
+#include <cstdint>
 
 #include "base/contracts.h"
 
@@ -11,6 +12,11 @@ namespace {
 constexpr double kSeriesBelow = 0.5;
 /// phi from which ARMA(1,1) is evaluated as Gauss-Markov plus white noise; below it the closed form is exact.
 constexpr double kArmaSplitAbovePhi = 0.5;
+
+/// 2^(level-1).
+double half_support(int level) noexcept {
+  return static_cast<double>(std::uint64_t{1} << static_cast<unsigned>(level - 1));
+}
 
 CurvePoint white_noise(double tau) noexcept { return {1.0 / tau, {}}; }
 
@@ -40,12 +46,28 @@ CurvePoint series_numerator(double a, double n) noexcept {
   return sum;
 }
 
-CurvePoint closed_numerator(double a, double n) noexcept {
-  const double phi = std::exp(-a);
-  const double u = -std::expm1(-n * a);
-  const double du = n * std::exp(-n * a);
+/// exp(-x) and what it lacks to one, both to the last digit, by one evaluation.
+struct Decay {
+  double left = 1.0;
+  double lost = 0.0;
+};
+
+Decay decay_of(double x) noexcept {
+  constexpr double kHalf = 0.5;
+  if (x < kHalf) {
+    const double lost = -std::expm1(-x);
+    return {1.0 - lost, lost};
+  }
+  const double left = std::exp(-x);
+  return {left, 1.0 - left};
+}
+
+CurvePoint closed_numerator(double a, double n, const Decay& one) noexcept {
+  const auto [phi, v] = one;
+  const auto [phi_n, u] = decay_of(n * a);
+  const double du = n * phi_n;
   CurvePoint numerator;
-  numerator.value = -n * std::expm1(-2.0 * a) - phi * u * (2.0 + u);
+  numerator.value = n * v * (1.0 + phi) - phi * u * (2.0 + u);
   numerator.derivative[0] = 2.0 * n * phi * phi + phi * u * (2.0 + u) - phi * (2.0 + 2.0 * u) * du;
   return numerator;
 }
@@ -144,18 +166,19 @@ int shape_count(ProcessKind kind) noexcept {
 
 CurvePoint gauss_markov_wv(double a, int level) noexcept {
   IMUSCOPE_EXPECTS(a > 0.0 && level >= 1 && level <= kMaxLevel);
-  const double n = std::ldexp(1.0, level - 1);
-  const CurvePoint numerator = n * a < kSeriesBelow ? series_numerator(a, n) : closed_numerator(a, n);
-  const double v = -std::expm1(-a);
+  const double n = half_support(level);
+  const Decay one = decay_of(a);
+  const auto [phi, v] = one;
+  const CurvePoint numerator = n * a < kSeriesBelow ? series_numerator(a, n) : closed_numerator(a, n, one);
   const double denominator = 2.0 * n * n * v * v;
   const double value = numerator.value / denominator;
-  return {value, {numerator.derivative[0] / denominator - value * 2.0 * std::exp(-a) / v, 0.0}};
+  return {value, {numerator.derivative[0] / denominator - value * 2.0 * phi / v, 0.0}};
 }
 
 CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
   IMUSCOPE_EXPECTS(level >= 1 && level <= kMaxLevel);
-  const double tau = std::ldexp(1.0, level);
-  const double n = 0.5 * tau;
+  const double n = half_support(level);
+  const double tau = 2.0 * n;
   switch (kind) {
     case ProcessKind::kWhiteNoise:
       return white_noise(tau);

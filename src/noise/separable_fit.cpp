@@ -39,21 +39,23 @@ std::vector<Coordinate> coordinates_of(const SeparableProblem& problem) {
   return out;
 }
 
-RowVector whitened_curve(const SeparableProblem& problem, ProcessKind kind, const Shape& shape) {
-  RowVector curve(problem.y.size());
-  for (Eigen::Index r = 0; r < curve.size(); ++r) {
-    curve[r] = unit_wv(kind, shape, problem.levels[static_cast<std::size_t>(r)]).value;
-  }
-  return problem.whitener * curve;
-}
+/// A process's wavelet variance at every level, and its derivatives by its shape values.
+struct Curve {
+  RowVector value;
+  std::array<RowVector, 2> slope;
+};
 
-RowVector whitened_slope(const SeparableProblem& problem, ProcessKind kind, const Shape& shape, int i) {
-  RowVector curve(problem.y.size());
-  for (Eigen::Index r = 0; r < curve.size(); ++r) {
-    curve[r] = unit_wv(kind, shape, problem.levels[static_cast<std::size_t>(r)])
-                   .derivative[static_cast<std::size_t>(i)];
+Curve curve_of(const SeparableProblem& problem, ProcessKind kind, const Shape& shape) {
+  Curve curve;
+  const auto shapes = static_cast<std::size_t>(shape_count(kind));
+  curve.value.resize(problem.y.size());
+  for (std::size_t i = 0; i < shapes; ++i) curve.slope[i].resize(problem.y.size());
+  for (Eigen::Index r = 0; r < curve.value.size(); ++r) {
+    const CurvePoint point = unit_wv(kind, shape, problem.levels[static_cast<std::size_t>(r)]);
+    curve.value[r] = point.value;
+    for (std::size_t i = 0; i < shapes; ++i) curve.slope[i][r] = point.derivative[i];
   }
-  return problem.whitener * curve;
+  return curve;
 }
 
 /// Shapes of all processes at a point of the coordinates.
@@ -75,6 +77,8 @@ struct Evaluation {
   ColumnVector amplitude;  ///< of the columns of length 1
   RowVector residual;
   double objective = 0.0;
+  std::array<std::array<RowVector, 2>, kMaxColumns>
+      slope;  ///< of each process by its shape values, not whitened
 };
 
 Evaluation evaluate(const SeparableProblem& problem, const RowVector& target,
@@ -85,7 +89,9 @@ Evaluation evaluate(const SeparableProblem& problem, const RowVector& target,
   e.length.resize(p);
   for (Eigen::Index i = 0; i < p; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    e.columns.col(i) = whitened_curve(problem, problem.spec.processes[k], shapes[k]);
+    const Curve curve = curve_of(problem, problem.spec.processes[k], shapes[k]);
+    e.slope[k] = curve.slope;
+    e.columns.col(i) = problem.whitener * curve.value;
     e.length[i] = e.columns.col(i).norm();
     e.columns.col(i) /= e.length[i];
   }
@@ -148,7 +154,6 @@ class Polisher {
   /// d(model)/du with the part that the active amplitudes can follow removed; zero columns where the
   /// amplitude is zero and where a coordinate presses against the end of its range.
   [[nodiscard]] Design projected_jacobian(const Evaluation& e, const ColumnVector& u) const {
-    const auto shapes = shapes_at(problem_, coordinates_, u);
     Design active(e.columns.rows(), e.columns.cols());
     Eigen::Index n_active = 0;
     for (Eigen::Index i = 0; i < e.columns.cols(); ++i) {
@@ -163,8 +168,8 @@ class Polisher {
       const auto p = static_cast<Eigen::Index>(k.process);
       if (e.amplitude[p] <= 0.0) continue;
       const double v = u[static_cast<Eigen::Index>(c)];
-      RowVector column = whitened_slope(problem_, k.kind, shapes[k.process], k.shape) *
-                         (e.amplitude[p] / e.length[p] * shape_slope(k.kind, k.shape, v));
+      RowVector column = problem_.whitener * e.slope[k.process][static_cast<std::size_t>(k.shape)];
+      column *= e.amplitude[p] / e.length[p] * shape_slope(k.kind, k.shape, v);
       column -= active * ColumnVector(qr.solve(column));
       const double downhill = column.dot(e.residual);
       if ((v <= k.range.low && downhill < 0.0) || (v >= k.range.high && downhill > 0.0)) continue;
@@ -247,17 +252,21 @@ class GridSearch {
     return true;
   }
 
-  /// Every column that any grid point needs, once: column_of_[process][grid index of its shapes].
+  /// Every column that any grid point needs, once: processes of one kind share theirs.
   void prepare_columns() {
     std::vector<RowVector> columns;
     for (std::size_t p = 0; p < problem_.spec.processes.size(); ++p) {
       const ProcessKind kind = problem_.spec.processes[p];
-      first_.push_back(columns.size());
       std::vector<std::size_t> own;
       for (std::size_t c = 0; c < coordinates_.size(); ++c) {
         if (coordinates_[c].process == p) own.push_back(c);
       }
       own_.push_back(own);
+      if (p > 0 && problem_.spec.processes[p - 1] == kind) {
+        first_.push_back(first_.back());
+        continue;
+      }
+      first_.push_back(columns.size());
       const int n0 = own.empty() ? 1 : points_;
       const int n1 = own.size() < 2 ? 1 : points_;
       for (int j = 0; j < n1; ++j) {
@@ -265,7 +274,8 @@ class GridSearch {
           Shape shape{};
           if (!own.empty()) shape[0] = shape_of_coordinate(kind, 0, value(own[0], i));
           if (own.size() > 1) shape[1] = shape_of_coordinate(kind, 1, value(own[1], j));
-          columns.push_back(whitened_curve(problem_, kind, shape).normalized());
+          columns.push_back(
+              RowVector(problem_.whitener * curve_of(problem_, kind, shape).value).normalized());
         }
       }
     }

@@ -122,11 +122,30 @@ double exponential_remainder(double z) {
   return sum;
 }
 
+/// The parts of exp(x) - 1 - x - x^2/2, even and odd in x. To the last digit for |x| <= 0.5.
+struct ExponentialTail {
+  double even = 0.0;  ///< cosh(x) - 1 - x^2/2
+  double odd = 0.0;   ///< sinh(x) - x
+};
+
+ExponentialTail exponential_tail(double x) {
+  const double y = x * x;
+  const double even =
+      y * y / 24.0 *
+      (1.0 + y / 30.0 * (1.0 + y / 56.0 * (1.0 + y / 90.0 * (1.0 + y / 132.0 * (1.0 + y / 182.0)))));
+  const double odd =
+      x * y / 6.0 *
+      (1.0 + y / 20.0 * (1.0 + y / 42.0 * (1.0 + y / 72.0 * (1.0 + y / 110.0 * (1.0 + y / 156.0)))));
+  return {even, odd};
+}
+
 /// Cross-covariance of the coefficients of two levels as a function of the lag.
 ///
 /// Its break points are the lags b n_k - a n_j. Between two neighbouring ones the signs of all nine arguments
-/// of G are known, so that the sum collapses to a cubic and two decaying exponentials a process; enter()
-/// prepares that.
+/// of G are known, so that the sum collapses to a cubic and two exponentials a process; enter() prepares
+/// that. Of a process that is slow beside both levels the exponentials nearly cancel with the cubic: it is
+/// expanded about the break point instead, where what remains beyond the square is again two exponentials'
+/// tails.
 class CrossCovariance {
  public:
   CrossCovariance(const Parts& parts, double n_j, double n_k)
@@ -160,12 +179,15 @@ class CrossCovariance {
     origin_ = p;
     end_ = q;
     cubic_ = {};
-    for (Term& t : terms_) t.left = t.right = 0.0;
+    for (Term& t : terms_) t.left = t.right = t.ahead = t.behind = 0.0;
     for (std::size_t i = 0; i < shift_.size(); ++i) {
       const double at = p + shift_[i];  // argument of G at p
       const double sign = at >= 0.0 ? 1.0 : -1.0;
       add_polynomial(at, sign * weight_[i]);
       add_exponentials(at, q + shift_[i], weight_[i]);
+    }
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      if (terms_[k].form == Form::kRemainder) expand(k, p);
     }
   }
 
@@ -178,7 +200,10 @@ class CrossCovariance {
       const Term& t = terms_[i];
       const Exponential& e = parts_.exponentials[i];
       if (t.form == Form::kSplit) {
-        sum -= e.variance * e.gain * (t.left * std::exp(-e.a * d) + t.right * std::exp(-e.a * (end_ - h)));
+        sum -= t.left * decayed(e.a * d) + t.right * decayed(e.a * (end_ - h));
+      } else if (t.form == Form::kRemainder) {
+        const ExponentialTail tail = exponential_tail(e.a * d);
+        sum -= (t.ahead + t.behind) * tail.even + (t.behind - t.ahead) * tail.odd;
       } else {
         sum += e.variance * nonlinear_part(e, t.form, h);
       }
@@ -208,10 +233,37 @@ class CrossCovariance {
   enum class Form { kSplit, kRemainder, kAlternating };
   struct Term {
     Form form = Form::kSplit;
-    double tail = 0.0;   ///< beyond the overlap of the supports
-    double left = 0.0;   ///< of exp(-a (h - p))
-    double right = 0.0;  ///< of exp(-a (q - h))
+    double tail = 0.0;    ///< beyond the overlap of the supports
+    double left = 0.0;    ///< of exp(-a (h - p)), split
+    double right = 0.0;   ///< of exp(-a (q - h)), split
+    double ahead = 0.0;   ///< of the tail of exp(-a (h - p)), remainder
+    double behind = 0.0;  ///< of the tail of exp(a (h - p)), remainder
   };
+
+  /// exp(-z); nothing where it is lost beside the cubic.
+  static double decayed(double z) {
+    constexpr double kNothing = 60.0;
+    return z < kNothing ? std::exp(-z) : 0.0;
+  }
+
+  /// Adds the remainder of process k about p: with R(z) = exp(-z) - 1 + z - z^2/2,
+  ///   R(z + x) = R(z) + R'(z) x + R''(z) x^2/2 + exp(-z) T(-x),  T(x) = exp(x) - 1 - x - x^2/2.
+  void expand(std::size_t k, double p) {
+    const Exponential& e = parts_.exponentials[k];
+    const double factor = e.variance * e.gain;
+    for (std::size_t i = 0; i < shift_.size(); ++i) {
+      const double at = p + shift_[i];
+      const double sign = at >= 0.0 ? 1.0 : -1.0;
+      const double z = e.a * std::abs(at);
+      const double remainder = exponential_remainder(z);
+      const double lost = std::expm1(-z);  // R''(z)
+      const double weight = factor * weight_[i];
+      cubic_[0] -= weight * remainder;
+      cubic_[1] += weight * sign * e.a * (remainder + 0.5 * z * z);  // -R'(z)
+      cubic_[2] -= weight * 0.5 * e.a * e.a * lost;
+      (sign > 0.0 ? terms_[k].ahead : terms_[k].behind) += weight * (1.0 + lost);
+    }
+  }
 
   [[nodiscard]] double linear_coefficient(std::size_t k) const {
     const Exponential& e = parts_.exponentials[k];
@@ -232,11 +284,11 @@ class CrossCovariance {
   void add_exponentials(double at_p, double at_q, double weight) {
     for (std::size_t k = 0; k < terms_.size(); ++k) {
       if (terms_[k].form != Form::kSplit) continue;
-      const double a = parts_.exponentials[k].a;
+      const Exponential& e = parts_.exponentials[k];
       if (at_p >= 0.0) {
-        terms_[k].left += weight * std::exp(-a * at_p);
+        terms_[k].left += weight * e.variance * e.gain * decayed(e.a * at_p);
       } else {
-        terms_[k].right += weight * std::exp(a * at_q);
+        terms_[k].right += weight * e.variance * e.gain * decayed(-e.a * at_q);
       }
     }
   }

@@ -112,7 +112,7 @@ Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& f
 
 Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::path& capture,
                                                          const std::string& device, std::uint64_t bytes) {
-  auto reader = CaptureReader::open(capture);
+  auto reader = CaptureReader::open(capture, device);
   if (!reader) return tl::unexpected<Error>(reader.error());
   return std::make_unique<CaptureSource>(std::move(*reader), device, bytes);
 }

@@ -1,5 +1,6 @@
 #include "service/run_folder.h"
 
+#include <fmt/compile.h>
 #include <fmt/format.h>
 #include <Eigen/Geometry>
 #include <cmath>
@@ -37,7 +38,7 @@ Eigen::Quaterniond quaternion_of(const Matrix3& C_b_s) {
 }
 
 void append(fmt::memory_buffer& row, const Vector3& v, double unit) {
-  for (const double value : v) fmt::format_to(std::back_inserter(row), ",{}", value * unit);
+  for (const double value : v) fmt::format_to(fmt::appender(row), FMT_COMPILE(",{}"), value * unit);
 }
 
 nlohmann::json numbers(const Vector3& v, double unit = 1.0) {
@@ -105,7 +106,7 @@ std::string navigation_csv_header() {
 
 std::string navigation_csv_row(const NavigationOutput& nav, double time_s) {
   fmt::memory_buffer row;
-  fmt::format_to(std::back_inserter(row), "{},{},{},{}", time_s, nav.latitude_rad * kDegPerRad,
+  fmt::format_to(fmt::appender(row), FMT_COMPILE("{},{},{},{}"), time_s, nav.latitude_rad * kDegPerRad,
                  nav.longitude_rad * kDegPerRad, nav.height_m);
   append(row, nav.v_n_mps, 1.0);
   append(row, nav.rpy_rad, kDegPerRad);
@@ -125,11 +126,11 @@ std::string odometry_csv_header() {
 std::string odometry_csv_row(const OdometryOutput& odometry, double time_s) {
   constexpr double kPercent = 100.0;
   fmt::memory_buffer row;
-  fmt::format_to(std::back_inserter(row), "{},{},{:d},{:d},{:d},{},{},{}", time_s, odometry.speed_mps,
+  fmt::format_to(fmt::appender(row), FMT_COMPILE("{},{},{:d},{:d},{:d},{},{},{}"), time_s, odometry.speed_mps,
                  odometry.standing, odometry.resting, odometry.lost, kPercent * odometry.scale,
                  odometry.mount_rad[1] * kDegPerRad, odometry.mount_rad[2] * kDegPerRad);
   append(row, odometry.r_bv_b_m, 1.0);
-  fmt::format_to(std::back_inserter(row), ",{},{},{}", kPercent * odometry.sd_scale,
+  fmt::format_to(fmt::appender(row), FMT_COMPILE(",{},{},{}"), kPercent * odometry.sd_scale,
                  odometry.sd_mount_rad[1] * kDegPerRad, odometry.sd_mount_rad[2] * kDegPerRad);
   append(row, odometry.sd_r_bv_b_m, 1.0);
   row.push_back('\n');
@@ -151,18 +152,18 @@ std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& i
   const auto q = quaternion_of(study.C_b_s);
   constexpr double kMsPerS = 1e3;
   fmt::memory_buffer row;
-  fmt::format_to(std::back_inserter(row), "{}", time_s);
+  fmt::format_to(fmt::appender(row), FMT_COMPILE("{}"), time_s);
   append(row, study.psi_rad, kDegPerRad);
-  fmt::format_to(std::back_inserter(row), ",{},{},{},{}", q.w(), q.x(), q.y(), q.z());
+  fmt::format_to(fmt::appender(row), FMT_COMPILE(",{},{},{},{}"), q.w(), q.x(), q.y(), q.z());
   append(row, study.r_bs_b_m, 1.0);
-  fmt::format_to(std::back_inserter(row), ",{}", (study.t_d_s + info.clock_shift_s) * kMsPerS);
+  fmt::format_to(fmt::appender(row), FMT_COMPILE(",{}"), (study.t_d_s + info.clock_shift_s) * kMsPerS);
   append(row, study.gyro_bias_radps, 1.0);
   append(row, study.accel_bias_mps2, 1.0);
   append(row, study.gyro_scale, 1.0);
   append(row, study.accel_scale, 1.0);
   append(row, study.sd_psi_rad, kDegPerRad);
   append(row, study.sd_r_bs_b_m, 1.0);
-  fmt::format_to(std::back_inserter(row), ",{}", study.sd_t_d_s * kMsPerS);
+  fmt::format_to(fmt::appender(row), FMT_COMPILE(",{}"), study.sd_t_d_s * kMsPerS);
   append(row, study.sd_gyro_bias_radps, 1.0);
   append(row, study.sd_accel_bias_mps2, 1.0);
   append(row, study.sd_gyro_scale, 1.0);
@@ -178,17 +179,17 @@ std::string error_csv_header() {
 
 std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view regime) {
   fmt::memory_buffer text;
-  fmt::format_to(std::back_inserter(text), "{},{}", time_s, row.counter);
+  fmt::format_to(fmt::appender(text), FMT_COMPILE("{},{}"), time_s, row.counter);
   // An invalid triad is an empty field: nothing is invented.
   for (std::size_t i = 0; i < 3; ++i) {
-    row.gyro_valid ? fmt::format_to(std::back_inserter(text), ",{}", row.e_gyro_radps[i])
-                   : fmt::format_to(std::back_inserter(text), ",");
+    text.push_back(',');
+    if (row.gyro_valid) fmt::format_to(fmt::appender(text), FMT_COMPILE("{}"), row.e_gyro_radps[i]);
   }
   for (std::size_t i = 0; i < 3; ++i) {
-    row.accel_valid ? fmt::format_to(std::back_inserter(text), ",{}", row.e_accel_mps2[i])
-                    : fmt::format_to(std::back_inserter(text), ",");
+    text.push_back(',');
+    if (row.accel_valid) fmt::format_to(fmt::appender(text), FMT_COMPILE("{}"), row.e_accel_mps2[i]);
   }
-  fmt::format_to(std::back_inserter(text), ",{}\n", regime);
+  fmt::format_to(fmt::appender(text), FMT_COMPILE(",{}\n"), regime);
   return fmt::to_string(text);
 }
 

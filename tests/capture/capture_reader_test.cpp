@@ -126,6 +126,36 @@ TEST(CaptureReader, OrdersByArrivalThenConfigurationThenHappening) {
   EXPECT_EQ(reader->disordered(), 0U);
 }
 
+TEST(CaptureReader, OneDeviceAloneIsWhatTheWholeHoldsOfIt) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  for (std::int64_t i = 0; i < 20; ++i) {
+    const auto byte = static_cast<std::uint8_t>(i);
+    capture.chunk(static_cast<DeviceIndex>(i % 2), i / 2, 10 * i, {byte, 7});
+  }
+  capture.done();
+  auto whole = CaptureReader::open(path);
+  ASSERT_TRUE(whole.has_value());
+  std::vector<RawRead> expected;
+  for (RawRead& read : read_all(*whole)) {
+    if (read.device == "mtx1") expected.push_back(std::move(read));
+  }
+  ASSERT_EQ(expected.size(), 10U);
+  auto reader = CaptureReader::open(path, "mtx1");
+  ASSERT_TRUE(reader.has_value());
+  const auto reads = read_all(*reader);
+  ASSERT_EQ(reads.size(), expected.size());
+  for (std::size_t i = 0; i < reads.size(); ++i) {
+    EXPECT_EQ(reads[i].device, "mtx1");
+    EXPECT_EQ(reads[i].arrival, expected[i].arrival);
+    EXPECT_EQ(reads[i].bytes, expected[i].bytes);
+  }
+  auto none = CaptureReader::open(path, "mtx");
+  ASSERT_TRUE(none.has_value());
+  EXPECT_TRUE(read_all(*none).empty());
+}
+
 TEST(CaptureReader, IsInOrderWhenOneRingIsRecordedSecondsAfterTheOther) {
   const auto path = test::scratch_folder() / "capture.lcm";
   Capture capture(path);
