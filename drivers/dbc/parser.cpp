@@ -3,15 +3,13 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <map>
-#include <sstream>
 
+#include "base/text.h"
 #include "drivers/dbc/tokens.h"
 
 namespace imuscope::dbc {
@@ -467,21 +465,6 @@ class Parser {
   std::map<std::string, std::vector<NamedValue>> tables_;
 };
 
-bool is_utf8(std::string_view text) {
-  std::size_t following = 0;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (following > 0) {
-      if ((byte & 0xC0U) != 0x80U) return false;
-      --following;
-    } else if (byte >= 0x80U) {
-      following = byte >= 0xF0U && byte < 0xF5U ? 3 : byte >= 0xE0U ? 2 : byte >= 0xC2U ? 1 : 0;
-      if (following == 0 || byte >= 0xF5U) return false;
-    }
-  }
-  return following == 0;
-}
-
 /// The degree sign in most DBC files is one byte.
 std::string utf8_of_latin1(std::string_view text) {
   std::string out;
@@ -502,18 +485,11 @@ std::string utf8_of_latin1(std::string_view text) {
 Result<Database> parse(std::string_view text, const std::string& name) { return Parser(text, name).run(); }
 
 Result<std::string> read_text(const std::filesystem::path& file) {
-  std::error_code code;
-  if (std::filesystem::is_directory(file, code))
-    return usage_error(fmt::format("{} is a folder", file.string()), "give a DBC file");
-  std::ifstream in(file, std::ios::binary);
-  if (!in)
-    return usage_error(
-        fmt::format("DBC file {} cannot be read: {}", file.string(), std::strerror(errno)),
-        "give the path of the vehicle's DBC file; a relative one starts at the configuration's "
-        "folder");
-  std::ostringstream text;
-  text << in.rdbuf();
-  return is_utf8(text.str()) ? text.str() : utf8_of_latin1(text.str());
+  auto text = read_text_file(file, "DBC file",
+                             "give the path of the vehicle's DBC file; a relative one starts at the "
+                             "configuration's folder");
+  if (text && !is_utf8(*text)) return utf8_of_latin1(*text);
+  return text;
 }
 
 }  // namespace imuscope::dbc

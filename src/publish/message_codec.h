@@ -14,7 +14,9 @@ namespace imuscope {
 template <typename Message>
 [[nodiscard]] std::vector<std::uint8_t> encode_message(const Message& message) {
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  (void)message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));  // cannot fail: the size is its own
+  // Cannot fail: the size is its own. LCM ends a string at a NUL within it, so that less may be written.
+  const int written = message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(written));
   return bytes;
 }
 

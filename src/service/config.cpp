@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <set>
-#include <sstream>
 
+#include "base/text.h"
 #include "base/units.h"
 #include "service/toml_reader.h"
 
@@ -606,23 +605,10 @@ std::optional<std::size_t> Configuration::odometry_index() const {
 }
 
 Result<Configuration> load_configuration(const std::filesystem::path& file) {
-  std::error_code code;
-  const auto status = std::filesystem::status(file, code);
-  if (!std::filesystem::exists(status)) {
-    return usage_error(fmt::format("configuration {} does not exist", file.string()),
-                       "give the path of a TOML file; config/ holds examples");
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    return usage_error(fmt::format("configuration {} is not a file", file.string()),
-                       "give the path of a TOML file");
-  }
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in)
-    return usage_error(fmt::format("configuration {} cannot be read", file.string()),
-                       "check its permissions");
-  return parse_configuration(text.str(), file);
+  const auto text =
+      read_text_file(file, "configuration", "give the path of a TOML file; config/ holds examples");
+  if (!text) return tl::unexpected<Error>(text.error());
+  return parse_configuration(*text, file);
 }
 
 Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name,

@@ -149,7 +149,7 @@ TEST(Configuration, BrokenTomlNamesTheLine) {
 TEST(Configuration, AMissingOrEmptyFileAndAFolderAreToldApart) {
   const auto folder = test::scratch_folder();
   EXPECT_THAT(load_configuration(folder / "absent.toml").error().text(), HasSubstr("does not exist"));
-  EXPECT_THAT(load_configuration(folder).error().text(), HasSubstr("is not a file"));
+  EXPECT_THAT(load_configuration(folder).error().text(), HasSubstr("is a folder"));
   std::ofstream(folder / "empty.toml").close();
   EXPECT_THAT(load_configuration(folder / "empty.toml").error().text(), HasSubstr("is empty"));
 }

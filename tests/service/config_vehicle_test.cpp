@@ -116,7 +116,7 @@ TEST_F(VehicleConfiguration, MistakesAreToldWithFileLineAndRemedy) {
               HasSubstr("car.dbc: no signal 'REAR.RX'; did you mean 'REAR.RL'?"));
   EXPECT_THAT(refused(whole_, "\"REAR.RL\"", "\"REAR.RX\""),
               HasSubstr("car.toml:18: device.odometry.speed_signals"));
-  EXPECT_THAT(refused(whole_, "car.dbc", "cat.dbc"), HasSubstr("cat.dbc cannot be read: No such file"));
+  EXPECT_THAT(refused(whole_, "car.dbc", "cat.dbc"), HasSubstr("cat.dbc does not exist"));
   EXPECT_THAT(refused(whole_, "speed_signals", "speed_signal"),
               HasSubstr("device.odometry.speed_signals is missing"));
   EXPECT_THAT(refused(whole_, "scale_sd_percent", "scale_sd_percents"),

@@ -200,7 +200,7 @@ TEST_F(BadInput, ConfigurationsAndArgumentsAreUsageWithARemedy) {
   const std::vector<Case> cases = {
       {"imuscope run none.toml", kUsage, "configuration none.toml does not exist; give the path"},
       {"imuscope run empty", kUsage, "configuration empty is empty; config/ holds examples"},
-      {"imuscope run folder", kUsage, "configuration folder is not a file"},
+      {"imuscope run folder", kUsage, "configuration folder is a folder; give the path of a TOML file"},
       {"imuscope run not.toml", kUsage, "not.toml:1: not TOML"},
       {"imuscope run unknown_key.toml", kUsage,
        "unknown_key.toml:9: unknown key 'estimator.staets'; did you mean 'states'?"},

@@ -30,6 +30,22 @@ std::string page(const Heard& heard) {
   return text;
 }
 
+TEST(TopView, WhatANetworkSendsMovesNoCursorAndIsStillJson) {
+  Heard heard = example();
+  heard.status->state = "\x1b[2Jrunning";
+  heard.status->last_event = "first\nproblem: forged";
+  heard.status->devices[0].name = "\xff\xfe";
+  const auto lines = lines_of(heard);
+  for (const auto& line : lines) {
+    EXPECT_THAT(line, Not(HasSubstr("\x1b")));
+    EXPECT_THAT(line, Not(HasSubstr("\n")));
+    EXPECT_THAT(line, Not(HasSubstr("\xff")));
+  }
+  EXPECT_THAT(lines, Contains(HasSubstr("?[2Jrunning")));
+  const auto json = nlohmann::json::parse(json_of(heard));
+  EXPECT_EQ(json["last_event"], "first\nproblem: forged") << "JSON has escapes of its own";
+}
+
 TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndProblems) {
   const auto text = page(example());
   for (const char* part :

@@ -1,20 +1,21 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
+#include <unistd.h>
 #include <algorithm>
-#include <cerrno>
+#include <boost/interprocess/file_mapping.hpp>
+#include <boost/interprocess/mapped_region.hpp>
 #include <cstdio>
-#include <cstring>
+#include <exception>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "commands.h"
 #include "decode/candump.h"
 #include "decode/stream_protocols.h"
 #include "drivers/dbc/parser.h"
+#include "progress.h"
 
 namespace imuscope::cli {
 namespace {
@@ -36,15 +37,35 @@ struct Totals {
   std::uint64_t bytes_skipped = 0;
 };
 
-Result<std::vector<std::uint8_t>> read_file(const std::string& file) {
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error))
-    return usage_error(file + " is a folder", "give a raw recording");
-  std::ifstream in(file, std::ios::binary);
-  if (!in)
-    return work_error(fmt::format("{} cannot be read: {}", file, std::strerror(errno)), "check the name");
-  return std::vector<std::uint8_t>(std::istreambuf_iterator<char>(in), {});
-}
+/// A recording as the kernel maps it: of hours of bytes, only what is being looked at is in memory.
+class MappedFile {
+ public:
+  static Result<MappedFile> open(const std::string& file) {
+    std::error_code error;
+    const auto status = std::filesystem::status(file, error);
+    if (std::filesystem::is_directory(status))
+      return usage_error(file + " is a folder", "give a raw recording");
+    if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+      return usage_error(file + " is a device or a pipe", "record its bytes to a file first");
+    MappedFile mapped;
+    try {
+      // An empty file cannot be mapped.
+      if (std::filesystem::file_size(file) == 0) return mapped;
+      const boost::interprocess::file_mapping mapping(file.c_str(), boost::interprocess::read_only);
+      mapped.region_ = boost::interprocess::mapped_region(mapping, boost::interprocess::read_only);
+    } catch (const std::exception& cause) {
+      return work_error(fmt::format("{} cannot be read: {}", file, cause.what()), "check the name");
+    }
+    mapped.region_.advise(boost::interprocess::mapped_region::advice_sequential);
+    return mapped;
+  }
+  [[nodiscard]] Stream bytes() const {
+    return {static_cast<const std::uint8_t*>(region_.get_address()), region_.get_size()};
+  }
+
+ private:
+  boost::interprocess::mapped_region region_;
+};
 
 /// Bytes of messages that prove the protocol.
 std::size_t proven_bytes(const StreamProtocol& protocol, Stream stream) {
@@ -103,10 +124,15 @@ void print(const StreamProtocol& protocol, const DecodedMessage& message, bool j
 class Printer {
  public:
   Printer(Stream stream, const StreamProtocol& protocol, bool json)
-      : stream_(stream), protocol_(protocol), json_(json) {}
+      : stream_(stream), protocol_(protocol), json_(json) {
+    // On a terminal the messages themselves show how far it is.
+    if (::isatty(STDOUT_FILENO) == 0) bar_.emplace();
+  }
 
   Totals run() {
     protocol_.decode(stream_, [this](const DecodedMessage& message) {
+      if (bar_)
+        bar_->show("decoding", static_cast<double>(message.offset) / static_cast<double>(stream_.size()));
       fill_gap(message.offset);
       print(protocol_, message, json_);
       ++totals_.messages;
@@ -145,6 +171,7 @@ class Printer {
   Stream stream_;
   const StreamProtocol& protocol_;
   bool json_;
+  std::optional<ProgressBar> bar_;
   Totals totals_;
   std::uint64_t end_ = 0;  ///< of what was printed
 };
@@ -179,9 +206,9 @@ Result<Totals> decode_stream(const Options& options, Stream stream) {
 }
 
 Result<void> decode(const Options& options) {
-  const auto bytes = read_file(options.file);
-  if (!bytes) return tl::unexpected<Error>(bytes.error());
-  const auto totals = decode_stream(options, *bytes);
+  const auto file = MappedFile::open(options.file);
+  if (!file) return tl::unexpected<Error>(file.error());
+  const auto totals = decode_stream(options, file->bytes());
   if (!totals) return tl::unexpected<Error>(totals.error());
   if (options.json) {
     fmt::print("{{\"messages\": {}, \"bytes_skipped\": {}}}\n", totals->messages, totals->bytes_skipped);

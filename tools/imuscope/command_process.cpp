@@ -1,9 +1,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <fstream>
 #include <memory>
-#include <sstream>
 
+#include "base/text.h"
 #include "combination_table.h"
 #include "commands.h"
 #include "progress.h"
@@ -80,11 +79,9 @@ Result<void> process_drives(const Options& options, const std::vector<std::vecto
 
 Result<std::vector<Label>> read_labels(const std::string& file) {
   if (file.empty()) return std::vector<Label>{};
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) return usage_error(fmt::format("labels {} cannot be read", file), "give the path of a CSV file");
-  return parse_labels(text.str(), file);
+  const auto text = read_text_file(file, "file of labels", "give the path of a CSV file");
+  if (!text) return tl::unexpected<Error>(text.error());
+  return parse_labels(*text, file);
 }
 
 Result<void> process(const Options& options) {

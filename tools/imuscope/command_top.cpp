@@ -4,7 +4,10 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <map>
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "commands.h"
 #include "publish/lcm_listener.h"
@@ -39,6 +42,14 @@ struct Options {
   bool json = false;
 };
 
+/// Keeps the newest message of each S-IMU. A network may name more than there can be: those are left out.
+template <typename Message>
+void keep(std::map<std::string, Message>& by_name, Message message) {
+  constexpr std::size_t kNamesMax = 64;
+  if (by_name.size() < kNamesMax || by_name.contains(message.name))
+    by_name.insert_or_assign(message.name, std::move(message));
+}
+
 class Top {
  public:
   Top(LcmListener ear, LcmPublisher voice) : ear_(std::move(ear)), voice_(std::move(voice)) {
@@ -60,7 +71,7 @@ class Top {
         "CALIBRATION_.*",
         [this](const auto&, auto bytes) {
           if (auto message = decode_message<calibration_t>(bytes))
-            heard_.calibrations[message->name] = *message;
+            keep(heard_.calibrations, std::move(*message));
         },
         kQueue);
     ear_.subscribe(
@@ -72,7 +83,7 @@ class Top {
     ear_.subscribe(
         "NOISE_MODEL_.*",
         [this](const auto&, auto bytes) {
-          if (auto message = decode_message<noise_model_t>(bytes)) heard_.models[message->name] = *message;
+          if (auto message = decode_message<noise_model_t>(bytes)) keep(heard_.models, std::move(*message));
         },
         kQueue);
   }

@@ -8,6 +8,10 @@
 #include <unistd.h>
 #include <cstdlib>
 #include <memory>
+#include <string>
+#include <utility>
+
+#include "base/text.h"
 
 namespace imuscope::cli {
 
@@ -41,6 +45,20 @@ class PriorityFlag final : public spdlog::custom_flag_formatter {
   }
 };
 
+/// The message, with nothing in it that the terminal would obey: it may quote what came from a device or a
+/// network.
+class PrintableFlag final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
+              spdlog::memory_buf_t& out) override {
+    const std::string text = printable({message.payload.data(), message.payload.size()});
+    out.append(text.data(), text.data() + text.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableFlag>();
+  }
+};
+
 }  // namespace
 
 bool logs_to_journal() {
@@ -52,12 +70,9 @@ bool logs_to_journal() {
 
 void set_up_log() {
   spdlog::set_default_logger(spdlog::stderr_color_mt("imuscope"));
-  if (!logs_to_journal()) {
-    spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
-    return;
-  }
   auto formatter = std::make_unique<spdlog::pattern_formatter>();
-  formatter->add_flag<PriorityFlag>('*').set_pattern("%*%v");
+  formatter->add_flag<PriorityFlag>('*').add_flag<PrintableFlag>('?');
+  formatter->set_pattern(logs_to_journal() ? "%*%?" : "%H:%M:%S.%e %^%l%$ %?");
   spdlog::set_formatter(std::move(formatter));
 }
 

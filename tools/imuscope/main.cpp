@@ -1,6 +1,8 @@
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <exception>
 
+#include "base/text.h"
 #include "commands.h"
 #include "log_format.h"
 
@@ -48,11 +50,14 @@ int run(int argc, char** argv) {
     constexpr int kExitUsage = 2;
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
+  // Whatever the umask: nobody else writes to what a run leaves.
+  ::umask(::umask(S_IWOTH) | S_IWOTH);
   // Results go to stdout, the log to stderr.
   imuscope::cli::set_up_log();
   const auto result = work();
   if (result) return 0;
-  fmt::print(stderr, "{}imuscope: {}\n", imuscope::cli::error_prefix(), result.error().text());
+  fmt::print(stderr, "{}imuscope: {}\n", imuscope::cli::error_prefix(),
+             imuscope::printable(result.error().text()));
   return result.error().kind == imuscope::ErrorKind::kUsage ? 2 : 1;
 }
 

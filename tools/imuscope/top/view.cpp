@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/text.h"
+
 namespace imuscope::top {
 
 namespace {
@@ -286,6 +288,7 @@ std::vector<std::string> lines_of(const Heard& heard) {
     lines.emplace_back();
     lines.push_back(heard.note);
   }
+  for (std::string& line : lines) line = printable(line);
   return lines;
 }
 
@@ -319,7 +322,7 @@ std::string json_of(const Heard& heard) {
                              {"high_water", r.high_water},
                              {"refused", r.refused}});
   }
-  return json.dump(2);
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace imuscope::top

@@ -1,0 +1,19 @@
+# Run as a script on the C++ headers that lcm-gen wrote: cmake -D headers=DIR -P BoundLcmArrays.cmake
+# A decoder made by lcm-gen resizes an array to the length that the message claims before it looks whether so many
+# elements can follow: twenty bytes from the network could ask for 16 GB. Here every such resize is preceded by the
+# question whether the length is possible at all, as an element takes a byte at least.
+file(GLOB files "${headers}/*.hpp")
+foreach(file IN LISTS files)
+  file(READ "${file}" text)
+  string(REGEX MATCHALL "[.]resize[(]" resizes "${text}")
+  string(REGEX REPLACE "(this->[A-Za-z0-9_]+[.]resize[(](this->[A-Za-z0-9_]+)[)])"
+                       "if (\\2 < 0 || \\2 > maxlen - pos) return -1; \\1" bounded "${text}")
+  string(REGEX MATCHALL "[|][|] this->[A-Za-z0-9_]+ > maxlen - pos" guards "${bounded}")
+  list(LENGTH resizes resize_count)
+  list(LENGTH guards guard_count)
+  if(NOT resize_count EQUAL guard_count)
+    message(FATAL_ERROR "${file}: ${guard_count} of ${resize_count} arrays are bounded; lcm-gen writes its decoders "
+                        "differently than lcm 1.3 to 1.5 did, and this script is to be adapted")
+  endif()
+  file(WRITE "${file}" "${bounded}")
+endforeach()
