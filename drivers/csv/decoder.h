@@ -84,6 +84,7 @@ class RowDecoder : public DeviceDecoder {
   void finish(HostTime arrival, SampleSink& sink) noexcept final;
   [[nodiscard]] const DecoderCounters& counters() const noexcept final { return counters_; }
   [[nodiscard]] double clock_drift_ppm() const noexcept final { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_sd_s() const noexcept final { return clock_.scatter_s(); }
 
   /// The first mistake of the stream; rows with mistakes give no sample and are counted as bad_contents.
   [[nodiscard]] const RowError& error() const noexcept { return reader_.error(); }

@@ -62,6 +62,11 @@ class DeviceDecoder {
   [[nodiscard]] virtual double clock_drift_ppm() const noexcept {
     return std::numeric_limits<double>::quiet_NaN();
   }
+
+  /// How well the device's clock is known on the host's: scatter of what binds their relation; NaN as above.
+  [[nodiscard]] virtual double clock_sd_s() const noexcept {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
 };
 
 enum class SessionState : std::uint8_t {

@@ -68,6 +68,7 @@ class Decoder final : public DeviceDecoder {
   }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 
  private:
   /// A raw block that stays the same to the last bit.

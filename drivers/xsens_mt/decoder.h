@@ -72,6 +72,7 @@ class MtDecoder final : public DeviceDecoder {
   [[nodiscard]] std::optional<std::uint8_t> last_error() const noexcept { return last_error_; }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 
  private:
   /// What one device's block in MTData holds, and whose it is.

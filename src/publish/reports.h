@@ -251,7 +251,7 @@ struct StatusReport {
     std::uint64_t clock_resets = 0;
     double latency_s = kUnknown;
     double clock_drift_ppm = kUnknown;
-    double clock_sd_s = kUnknown;  ///< spread of the latency
+    double clock_sd_s = kUnknown;  ///< scatter about the line that maps its clock to the host's
   };
   /// How far one S-IMU's calibration has come.
   struct Study {

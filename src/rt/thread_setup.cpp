@@ -125,9 +125,10 @@ std::vector<Error> setup_this_thread(const ThreadPlan& plan) {
   return refused;
 }
 
-void run_as_normal(std::thread& thread) noexcept {
+void run_as(std::thread& thread, Scheduling scheduling) noexcept {
   const sched_param parameters{};
-  (void)pthread_setschedparam(thread.native_handle(), SCHED_OTHER, &parameters);
+  const int policy = scheduling == Scheduling::kIdle ? SCHED_IDLE : SCHED_OTHER;
+  (void)pthread_setschedparam(thread.native_handle(), policy, &parameters);
 }
 
 Result<void> lock_memory() {

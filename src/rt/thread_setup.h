@@ -31,9 +31,10 @@ struct ThreadPlan {
 /// @return one Error for each wish that was refused; empty when all is granted
 [[nodiscard]] std::vector<Error> setup_this_thread(const ThreadPlan& plan);
 
-/// Gives an idle thread the priority of any other, so that its end can be waited for. A system that refuses
-/// leaves it idle.
-void run_as_normal(std::thread& thread) noexcept;
+/// Makes an idle thread one like any other, so that it gets on where somebody waits for it, or idle again. A
+/// system that refuses leaves it as it is.
+/// @param scheduling  kNormal or kIdle
+void run_as(std::thread& thread, Scheduling scheduling) noexcept;
 
 /// Locks present and future memory of the process (mlockall), so that the core never waits for a page. Locked
 /// memory counts whole thread stacks: call set_thread_stack_size() first.

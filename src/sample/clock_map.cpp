@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/contracts.h"
 
@@ -140,6 +141,7 @@ void ClockMap::begin_segment(std::int64_t device_time_ns, HostTime first_byte) n
   device_origin_ns_ = device_time_ns;
   host_origin_ = first_byte;
   line_.a_s = 0.0;
+  scatter_s_ = std::numeric_limits<double>::quiet_NaN();
   correction_s_ = 0.0;
   bins_begin_ = 0;
   bins_count_ = 0;
@@ -171,7 +173,24 @@ void ClockMap::refit() noexcept {
   const double b = std::clamp(rate_near(hull_edge(hull, n)), -kRateAllowance, kRateAllowance);
   double a_s = hull[0].y_s - b * hull[0].x_s;
   for (std::size_t i = 1; i < n; ++i) a_s = std::min(a_s, hull[i].y_s - b * hull[i].x_s);
+  scatter_s_ = scatter_about({a_s, b});
   move_line({a_s, b}, newest_s);
+}
+
+// Of the points that the rate is fitted to: those no more than kEnvelope_s above the line.
+double ClockMap::scatter_about(const Line& line) const noexcept {
+  double count = 0.0;
+  double mean = 0.0;
+  double sum_of_squares = 0.0;
+  for (std::size_t i = 0; i < bins_count_; ++i) {
+    const double r = bin(i).y_s - line.at(bin(i).x_s);
+    if (r > kEnvelope_s) continue;
+    count += 1.0;
+    const double step = r - mean;
+    mean += step / count;
+    sum_of_squares += step * (r - mean);
+  }
+  return count > 1.0 ? std::sqrt(sum_of_squares / (count - 1.0)) : std::numeric_limits<double>::quiet_NaN();
 }
 
 // Vertices from left to right; there are at least two. Old points are lifted, so that they bind less.

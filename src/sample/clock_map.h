@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "base/time.h"
 
@@ -62,6 +63,10 @@ class ClockMap {
   /// Host time per device time, minus 1, in parts per million: the device's clock is slow where positive.
   [[nodiscard]] double skew_ppm() const noexcept;
 
+  /// How well the line is known: the scatter about it of the lowest observation of each two seconds. NaN
+  /// before a rate was fitted in this segment, and in mode kFixed.
+  [[nodiscard]] double scatter_s() const noexcept { return scatter_s_; }
+
   /// Segments begun after the first, by restart() or by the map itself.
   [[nodiscard]] std::uint64_t restarts() const noexcept { return restarts_; }
 
@@ -87,6 +92,7 @@ class ClockMap {
   [[nodiscard]] std::size_t lower_hull(std::array<Point, kBins>& hull) const noexcept;
   [[nodiscard]] Line hull_edge(const std::array<Point, kBins>& hull, std::size_t n) const noexcept;
   [[nodiscard]] double rate_near(const Line& line) const noexcept;
+  [[nodiscard]] double scatter_about(const Line& line) const noexcept;
   [[nodiscard]] const Point& bin(std::size_t i) const noexcept { return bins_[(bins_begin_ + i) % kBins]; }
   void move_line(const Line& line, double x_s) noexcept;
   [[nodiscard]] HostTime emit(std::int64_t device_time_ns, double x_s, HostTime first_byte) noexcept;
@@ -99,6 +105,7 @@ class ClockMap {
   std::int64_t device_origin_ns_ = 0;
   HostTime host_origin_{};
   Line line_;
+  double scatter_s_ = std::numeric_limits<double>::quiet_NaN();
   double correction_s_ = 0.0;  ///< mapped time minus line; decays, so that a moved line makes no step
 
   // Lowest point of each closed interval, oldest first from bins_begin_, and of the open one.

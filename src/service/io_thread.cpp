@@ -5,7 +5,6 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <future>
 #include <limits>
@@ -56,32 +55,21 @@ int wait(int epoll, std::span<epoll_event> events, HostTime until) noexcept {
 class LatencyWindow {
  public:
   void add(HostTime arrival, Duration latency) noexcept {
-    if (arrival - begin_ >= std::chrono::seconds(1)) close(arrival);
-    const double value_s = to_seconds(latency);
+    if (arrival - begin_ >= std::chrono::seconds(1)) {
+      if (n_ > 0.0) closed_mean_s_ = sum_s_ / n_;
+      begin_ = arrival;
+      n_ = sum_s_ = 0.0;
+    }
+    sum_s_ += to_seconds(latency);
     n_ += 1.0;
-    const double step = value_s - mean_s_;
-    mean_s_ += step / n_;
-    sum_of_squares_ += step * (value_s - mean_s_);
   }
   [[nodiscard]] double mean_s() const noexcept { return closed_mean_s_; }
-  [[nodiscard]] double sd_s() const noexcept { return closed_sd_s_; }
 
  private:
-  void close(HostTime now) noexcept {
-    if (n_ > 1.0) {
-      closed_mean_s_ = mean_s_;
-      closed_sd_s_ = std::sqrt(sum_of_squares_ / (n_ - 1.0));
-    }
-    begin_ = now;
-    n_ = mean_s_ = sum_of_squares_ = 0.0;
-  }
-
   HostTime begin_{};
   double n_ = 0.0;
-  double mean_s_ = 0.0;
-  double sum_of_squares_ = 0.0;
+  double sum_s_ = 0.0;
   double closed_mean_s_ = std::numeric_limits<double>::quiet_NaN();
-  double closed_sd_s_ = std::numeric_limits<double>::quiet_NaN();
 };
 
 }  // namespace
@@ -197,8 +185,8 @@ class IoThread::Line final : public SampleSink {
   void publish_status() noexcept {
     status_.counters = decoder_->counters();
     status_.latency_s = latency_.mean_s();
-    status_.latency_sd_s = latency_.sd_s();
     status_.clock_drift_ppm = decoder_->clock_drift_ppm();
+    status_.clock_sd_s = decoder_->clock_sd_s();
     if (connection_ != nullptr) {
       const auto health = connection_->line->health();
       status_.line = health.is_up ? LineState::kOpen : LineState::kDown;

@@ -45,10 +45,12 @@ struct LineStatus {
   std::uint64_t refused = 0;         ///< samples that found the ring to the core full
   std::uint64_t frames_dropped = 0;  ///< lost by this PC before they were read
   std::uint64_t reads = 0;
-  std::uint64_t epochs = 0;   ///< samples without the attitude that a reference sends beside its IMU samples
-  double latency_s = 0.0;     ///< arrival minus mapped time, mean over the last second that had samples
-  double latency_sd_s = 0.0;  ///< its spread about that mean
+  std::uint64_t epochs = 0;  ///< samples without the attitude that a reference sends beside its IMU samples
+  /// From the time of validity to the read that brought the sample, mean over the last second that had
+  /// samples: device, line, and the wait for the beat.
+  double latency_s = 0.0;
   double clock_drift_ppm = 0.0;  ///< of the device's clock against the host's; NaN where unknown
+  double clock_sd_s = 0.0;       ///< how well their relation is known; NaN where it is not
   HostTime last_arrival{};
   std::array<char, 200> problem{};  ///< of the session; NUL-terminated
 };

@@ -160,6 +160,14 @@ class Pulse {
   std::uint64_t turns_ = 0;
 };
 
+/// A count that grows is the same thing said again.
+bool says_the_same(std::string a, std::string b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::erase_if(a, is_digit);
+  std::erase_if(b, is_digit);
+  return a == b;
+}
+
 void reload(const Configuration& configuration, LivePublisher& publisher) {
   const auto read = reload_configuration(configuration);
   if (!read) {
@@ -257,7 +265,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
     }
     const auto health = (*publisher)->health();
     if (auto text = health.state + ": " + health.reason; text != told) {
-      spdlog::info("{}", text);
+      if (!says_the_same(text, told)) spdlog::info("{}", text);
       systemd.status(text);
       told = std::move(text);
     }

@@ -350,7 +350,7 @@ StatusReport::Device LivePublisher::device_status(std::size_t index) const {
   report.clock_resets = status.counters.clock_resets;
   if (status.counters.samples > 0) {
     report.latency_s = status.latency_s;
-    report.clock_sd_s = status.latency_sd_s;
+    report.clock_sd_s = status.clock_sd_s;
     report.clock_drift_ppm = status.clock_drift_ppm;
   }
   const auto study = std::find(study_devices_.begin(), study_devices_.end(), index);

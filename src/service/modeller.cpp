@@ -15,6 +15,9 @@ namespace imuscope {
 namespace {
 
 constexpr auto kIdleSleep = std::chrono::milliseconds(200);
+/// A busy PC may leave an idle thread nothing for many minutes, and rows that wait are memory: behind by this
+/// much, two minutes of three S-IMUs at 100 Hz, the thread runs as any other until it has caught up.
+constexpr std::uint64_t kBlocksBehind = 512;
 
 }  // namespace
 
@@ -167,7 +170,7 @@ void Modeller::stop() {
   running_.store(false, std::memory_order_release);
   if (!thread_.joinable()) return;
   // The end of the run waits for it now: on a busy PC an idle thread's last fit would take minutes.
-  run_as_normal(thread_);
+  run_as(thread_, Scheduling::kNormal);
   thread_.join();
 }
 
@@ -189,6 +192,19 @@ void Modeller::hand_over() {
     rows_refused_ += filling_->size();
   }
   filling_.reset();
+  keep_up();
+}
+
+void Modeller::keep_up() {
+  if (!thread_.joinable()) return;
+  const auto waiting = blocks_->counters().level;
+  if (!hurries_ && waiting >= kBlocksBehind) {
+    run_as(thread_, Scheduling::kNormal);
+    hurries_ = true;
+  } else if (hurries_ && waiting <= 1) {
+    run_as(thread_, Scheduling::kIdle);
+    hurries_ = false;
+  }
 }
 
 RingCounters Modeller::rows() const {

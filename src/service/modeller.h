@@ -106,7 +106,8 @@ class ModelBook {
 /// The thread around the book. Rows come from one thread through a ring; refits are taken by the same thread.
 ///
 /// The thread runs when nothing else wants to, and on a busy PC a fit may take minutes. Rows are handed over
-/// in blocks made on demand, so that they wait for it without a ring that is large all the time.
+/// in blocks made on demand, so that they wait for it without a ring that is large all the time. A thread
+/// that falls minutes behind runs as any other until it has caught up.
 class Modeller {
   using RowBlock = std::vector<ErrorRecord>;
   static constexpr std::size_t kRowsPerBlock = 64;
@@ -137,12 +138,14 @@ class Modeller {
   void loop();
   void drain();
   void hand_over();
+  void keep_up();
 
   ModelBook book_;
   std::unique_ptr<RowBlock> filling_;
   std::unique_ptr<BlockRing> blocks_;  ///< owns the blocks that it holds
   std::uint64_t rows_added_ = 0;
   std::uint64_t rows_refused_ = 0;
+  bool hurries_ = false;  ///< not at the lowest priority
   std::mutex mutex_;
   std::vector<Refit> refits_;
   struct Options {

@@ -138,7 +138,7 @@ TEST(ThreadSetup, AnIdleThreadWhoseEndIsWaitedForIsIdleNoMore) {
     return value;
   };
   EXPECT_EQ(policy(), SCHED_IDLE);
-  run_as_normal(thread);
+  run_as(thread, Scheduling::kNormal);
   EXPECT_EQ(policy(), SCHED_OTHER);
   stop.store(true);
   thread.join();

@@ -57,7 +57,7 @@ void add_devices(const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back();
   lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", "DEVICE",
                               "role", "state", "rate/Hz", "lost", "late", "bad", "refused", "dropped",
-                              "latency/ms", "jitter/us", "drift/ppm"));
+                              "latency/ms", "clock/us", "drift/ppm"));
   for (const auto& d : status.devices) {
     lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", d.name,
                                 d.role, d.state, number(d.rate_hz, 1), d.samples_lost, d.samples_late,
