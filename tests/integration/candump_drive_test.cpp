@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iomanip>
 #include <sstream>
 
 #include "mounting_compare.h"
@@ -228,6 +229,31 @@ TEST(CandumpDrive, AWallClockWithoutUtcIsBroughtToTheReferenceByTheMotionAndWhee
   EXPECT_NE(log_of(drive).find("wheels: the stamps of the log are no UTC"), std::string::npos)
       << log_of(drive);
   EXPECT_NE(log_of(drive).find("log_clock"), std::string::npos) << log_of(drive);
+}
+
+/// NTP or a person sets the PC's clock while candump runs.
+TEST(CandumpDrive, AWallClockThatIsPutBackIsToldAndCostsNoMounting) {
+  const auto drive = recorded();
+  std::istringstream lines(read_text(drive / "mti.log"));
+  std::ofstream stepped(drive / "mti_set.log");
+  const std::size_t half = lines_in(drive / "mti.log") / 2;
+  std::size_t n = 0;
+  for (std::string line; std::getline(lines, line); ++n) {
+    stepped << "(" << std::fixed << std::setprecision(6)
+            << std::stod(line.substr(1)) - (n >= half ? 1.5 : 0.0) << line.substr(line.find(')')) << '\n';
+  }
+  stepped.close();
+  ASSERT_EQ(
+      run_there(drive, "imuscope",
+                "replay airins=airins.bin mtx1=mtx1.bin mti=mti_set.log gnss=gnss.bin wheels=wheels.log "
+                "--config config.toml --out run"),
+      0)
+      << log_of(drive);
+  EXPECT_NE(log_of(drive).find("the stamps go back 1 times, by 1.5"), std::string::npos) << log_of(drive);
+  const auto mti = device_of(drive / "run" / "run.json", "mti");
+  EXPECT_EQ(mti.at("samples_lost"), 0);
+  EXPECT_EQ(mti.at("clock_resets"), 0);
+  expect_mounting_found(drive, drive / "run", "mti");
 }
 
 /// The MTi on CAN as the reference: its log is the run's time, or is brought to the dumps by the receiver's
