@@ -337,6 +337,8 @@ void Decoder::count_by_time(HostTime stamp) noexcept {
   // Losses hardly count for the rate; one that really changes is learned within seconds all the same.
   const double learned = lacks && sets_ > kSetsToLearn ? kLearnedOfGaps : kLearned;
   period_s_ += learned * (std::min(gap_s, kGapTaken * period_s_) - period_s_);
+  // Stamps that bunch, as those of one read do, are no higher rate.
+  period_s_ = std::max(period_s_, 1.0 / config_.rate_hz);
   if (!lacks) jitter_s_ += kLearned * (std::abs(gap_s - period_s_) - jitter_s_);
 }
 
