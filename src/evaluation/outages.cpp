@@ -26,6 +26,8 @@ constexpr double kStartPositionSd_m = 0.5;
 constexpr double kStartVelocitySd_mps = 0.2;
 constexpr double kStartAttitudeSd_rad = 0.02;
 
+bool moves(const DriveReference& at) { return at.state.v_n_mps.norm() > kMoving_mps; }
+
 /// Plays the samples into a filter, to any instant: between samples rates are taken as linear.
 class Player {
  public:
@@ -119,10 +121,12 @@ class Stretch {
   /// @return the first sample after the stretch
   std::size_t play(std::size_t first) {
     const double first_s = drive_.samples[first].time_s;
-    const auto start = std::lower_bound(drive_.reference.begin(), drive_.reference.end(), first_s,
-                                        [](const DriveReference& r, double t) { return r.time_s < t; });
+    auto start = std::lower_bound(drive_.reference.begin(), drive_.reference.end(), first_s,
+                                  [](const DriveReference& r, double t) { return r.time_s < t; });
+    // At rest a heading can only be lost, and with a model of large biases it is lost for good.
+    start = std::find_if(start, drive_.reference.end(), moves);
     if (start == drive_.reference.end()) return drive_.samples.size();
-    // Samples before the reference's first epoch are passed over.
+    // Samples before that are passed over.
     while (first + 1 < drive_.samples.size() && drive_.samples[first + 1].time_s <= start->time_s) ++first;
     Player player(drive_, model_, first);
     CoastingFilter filter = started(model_, *start);
@@ -138,7 +142,7 @@ class Stretch {
       const bool continuous = since_last_s < kFixGap_s;
       last_fix_s = fix->time_s;
       const DriveReference* here = reference_near(drive_, fix->time_s);
-      if (continuous && here != nullptr && here->state.v_n_mps.norm() > kMoving_mps) driven_s += since_last_s;
+      if (continuous && here != nullptr && moves(*here)) driven_s += since_last_s;
       // An outage begins right after a fix.
       if (driven_s < options_.settle_s || fix->time_s < next_outage_s || !continuous) continue;
       coast(filter, player);

@@ -8,6 +8,8 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
+#include "noise/inference.h"
+
 namespace imuscope::noise {
 namespace {
 
@@ -26,6 +28,21 @@ std::optional<std::size_t> index_of(const FitResult& fit, const ParameterEstimat
   });
   if (at == fit.parameters.end()) return std::nullopt;
   return static_cast<std::size_t>(at - fit.parameters.begin());
+}
+
+/// Whether one of the records is too short for the process that the other one shows. Its own estimate is
+/// determined then only where chance made its rate large, and would differ from the other's for that alone.
+bool is_too_short_for_the_other(const FitResult& first, const FitResult& second, const std::string& process) {
+  const auto rate_of = [&](const FitResult& fit) -> std::optional<double> {
+    for (const ParameterEstimate& p : fit.parameters) {
+      if (p.process == process && p.name == "beta") return p.value;
+    }
+    return std::nullopt;
+  };
+  const auto is_short = [](const FitResult& fit, const std::optional<double>& beta) {
+    return beta && *beta * static_cast<double>(fit.n) < kFewestCorrelationTimes * fit.rate_hz;
+  };
+  return is_short(first, rate_of(second)) || is_short(second, rate_of(first));
 }
 
 struct Pair {
@@ -92,6 +109,12 @@ Comparison compare(const FitResult& first, const FitResult& second) {
       if (p.unit != q.unit) {
         out.warnings.push_back(
             fmt::format("{} {} is in '{}' and in '{}': not compared", p.process, p.name, p.unit, q.unit));
+      } else if (is_too_short_for_the_other(first, second, p.process)) {
+        if (p.name == "beta") {
+          out.warnings.push_back(fmt::format(
+              "{}: one record is shorter than {:.0f} correlation times of what the other shows: not compared",
+              p.process, kFewestCorrelationTimes));
+        }
       } else if (const double variance = covariance_of(first, i, i) + covariance_of(second, *k, *k);
                  std::isfinite(variance) && variance > 0.0) {
         const double d = on_interval_scale(q) - on_interval_scale(p);

@@ -21,7 +21,8 @@ struct ComparedParameter {
   /// Interval of the ratio at the first fit's confidence; absent where a sd is, and for theta and phi.
   std::optional<double> ratio_ci_low;
   std::optional<double> ratio_ci_high;
-  std::optional<double> p_value;  ///< of no difference; absent where a sd is
+  /// Of no difference; absent where a sd is, and where one record is too short for the process of the other.
+  std::optional<double> p_value;
 };
 
 /// Joint test over the parameters that both fits determine: (a-b)' (Sa+Sb)^-1 (a-b).

@@ -22,10 +22,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kUndeterminedLogSd = 1.5;
 /// Rates of two GM closer than this are one.
 constexpr double kSameRate = 1.05;
-/// In fewer correlation times a process looks like a random walk of any level: of the records that seem to
-/// show more, most have a rate by chance (of 100 with 3.3, a half, and their intervals held the truth in two
-/// thirds).
-constexpr double kFewestCorrelationTimes = 20.0;
 /// phi below 0.01: white to within a percent.
 constexpr double kWhiteRate = 4.6;
 

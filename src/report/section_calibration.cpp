@@ -170,6 +170,19 @@ Html mounting_words(const StudyFiles& study) {
   return paragraph(words);
 }
 
+/// The unit in which people read a small length or time; returns the factor of its numbers.
+double small_unit(std::string& unit) {
+  if (unit == "m") {
+    unit = "mm";
+    return kMmPerM;
+  }
+  if (unit == "s") {
+    unit = "ms";
+    return kMsPerS;
+  }
+  return 1.0;
+}
+
 /// sd against goal of every state, what is known least, what would help.
 Html observability_table(const StudyFiles& study) {
   const auto& observability = field(study.calibration, "observability");
@@ -180,10 +193,12 @@ Html observability_table(const StudyFiles& study) {
     const auto goal = number_at(state, "goal");
     const bool seen = field(state, "observable") == nlohmann::json(true);
     const bool reached = field(state, "goal_reached") == nlohmann::json(true);
-    const std::string unit = " " + text_at(state, "unit");
+    std::string unit = text_at(state, "unit");
+    const double factor = small_unit(unit);
     if (!sd || !goal) continue;
-    table.add_row({text(text_at(state, "words")), seen ? number(*sd, 2) + text(unit) : text(kNotObservable),
-                   number(*goal, 2) + text(unit),
+    table.add_row({text(text_at(state, "words")),
+                   seen ? number(factor * *sd, 2) + text(" " + unit) : text(kNotObservable),
+                   number(factor * *goal, 2) + text(" " + unit),
                    text(reached ? "goal reached"
                         : seen  ? "goal not reached"
                                 : "")});

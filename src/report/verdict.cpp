@@ -343,8 +343,11 @@ Verdict model_verdict(const std::vector<Fit>& all_fits) {
         fmt::format("{} models have too few levels to be tested.", fits.size() - tested.size()));
   }
   if (!vague.empty()) {
-    verdict.reasons.push_back(fmt::format("A parameter or more cannot be told in {} of {}: {}.", vague.size(),
-                                          fits.size(), fit_names(vague)));
+    verdict.reasons.push_back(
+        vague.size() == fits.size()
+            ? fmt::format("A parameter or more cannot be told in each of the {} models.", fits.size())
+            : fmt::format("A parameter or more cannot be told in {} of {} models: {}.", vague.size(),
+                          fits.size(), fit_names(vague)));
   }
   return verdict;
 }

@@ -33,7 +33,7 @@ struct WhiteNoise {
   std::size_t known = 0;
   double lowest = 0.0;
   double highest = 0.0;
-  double half_width = 0.0;  ///< widest, relative
+  std::vector<double> half_widths;  ///< relative
   std::string unit;
 
   void add(const Fit& fit) {
@@ -44,17 +44,23 @@ struct WhiteNoise {
     lowest = known == 0 ? sd : std::min(lowest, sd);
     highest = known == 0 ? sd : std::max(highest, sd);
     // Half the interval of the sd's logarithm, which is a quarter of that of the variance.
-    half_width = std::max(half_width, 0.25 * std::log(*white->ci_high / *white->ci_low));
+    half_widths.push_back(0.25 * std::log(*white->ci_high / *white->ci_low));
     unit = fit.unit;
     ++known;
   }
 
   [[nodiscard]] std::string words(const char* sensors) const {
-    if (known == 0) return fmt::format("{}: of none of {}", sensors, n);
+    if (known == 0) return fmt::format("{}: of none of {} axes", sensors, n);
+    std::vector<double> sorted = half_widths;
+    std::sort(sorted.begin(), sorted.end());
+    std::string width = fmt::format("± {:.2g} %", 100.0 * sorted[sorted.size() / 2]);
+    constexpr double kUneven = 2.0;
+    if (sorted.back() > kUneven * sorted[sorted.size() / 2])
+      width += fmt::format(" in the middle, ± {:.2g} % at worst", 100.0 * sorted.back());
     const std::string range = fmt::format("{:.3g}", lowest) == fmt::format("{:.3g}", highest)
                                   ? fmt::format("{:.3g}", lowest)
                                   : fmt::format("{:.3g} to {:.3g}", lowest, highest);
-    return fmt::format("{} {} {} a sample, ± {:.2g} % or better{}", sensors, range, unit, 100.0 * half_width,
+    return fmt::format("{} {} {} a sample, {}{}", sensors, range, unit, width,
                        known == n ? "" : fmt::format(" ({} of {} axes)", known, n));
   }
 };
@@ -117,35 +123,53 @@ std::vector<std::string> what_is_known(const std::vector<Fit>& fits) {
 }
 
 std::vector<std::string> records_needed(const std::vector<Fit>& fits) {
-  std::vector<std::string> regimes;
-  std::map<std::string, std::vector<double>> needed_s;
-  std::map<std::string, double> has_s;
+  struct Regime {
+    double record_s = 0.0;
+    std::vector<double> seen_s;  ///< correlation times that the record lasts once at least
+    std::size_t unseen = 0;      ///< models whose slow process is slower than that
+  };
+  std::vector<std::string> names;
+  std::map<std::string, Regime> regimes;
   for (const Fit& fit : fits) {
-    double slowest = 0.0;
+    double slowest_s = 0.0;
     for (const FitParameter& parameter : fit.parameters) {
       if (parameter.name != "beta" || parameter.ci_low || !parameter.value || !(*parameter.value > 0.0))
         continue;
-      slowest = std::max(slowest, 1.0 / *parameter.value);
+      slowest_s = std::max(slowest_s, 1.0 / *parameter.value);
     }
     const double record_s = seconds_of(fit);
-    if (!(kCorrelationTimes * slowest > record_s)) continue;
-    if (needed_s.find(fit.regime) == needed_s.end()) regimes.push_back(fit.regime);
-    needed_s[fit.regime].push_back(kCorrelationTimes * slowest);
-    has_s[fit.regime] = std::max(has_s[fit.regime], record_s);
+    if (!(kCorrelationTimes * slowest_s > record_s)) continue;
+    if (regimes.find(fit.regime) == regimes.end()) names.push_back(fit.regime);
+    Regime& regime = regimes[fit.regime];
+    regime.record_s = std::max(regime.record_s, record_s);
+    if (slowest_s <= record_s) {
+      regime.seen_s.push_back(slowest_s);
+    } else {
+      ++regime.unseen;
+    }
   }
   std::vector<std::string> sentences;
-  for (const std::string& regime : regimes) {
-    auto& all = needed_s[regime];
-    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-    std::nth_element(all.begin(), middle, all.end());
+  for (const std::string& name : names) {
+    Regime& regime = regimes[name];
+    std::vector<std::string> parts;
+    if (!regime.seen_s.empty()) {
+      const auto middle = regime.seen_s.begin() + static_cast<std::ptrdiff_t>(regime.seen_s.size() / 2);
+      std::nth_element(regime.seen_s.begin(), middle, regime.seen_s.end());
+      parts.push_back(fmt::format("about {} as fitted in {} models (median)",
+                                  duration_words(std::round(kCorrelationTimes * *middle)),
+                                  regime.seen_s.size()));
+    }
+    if (regime.unseen > 0) {
+      parts.push_back(
+          fmt::format("more than {} in {} models, whose slow process is slower than this record is long",
+                      duration_words(std::round(kCorrelationTimes * regime.record_s)), regime.unseen));
+    }
     sentences.push_back(fmt::format(
-        "For rate and variance of the slow process, {}: {:.0f} of its correlation times, which is about {} "
-        "as "
-        "fitted (median of {} models; a process as slow as the record is long is itself known by its order "
-        "of "
-        "magnitude alone). This run has {}. What a filter needs for shorter times is in the model as it is.",
-        regime.empty() ? "all" : regime, kCorrelationTimes, duration_words(*middle), all.size(),
-        duration_words(has_s[regime])));
+        "Record longer ({}) where rate and variance of the slow process are wanted: it takes {:.0f} of its "
+        "correlation times, {}. This run has {}. For times shorter than this record the models hold as they "
+        "are.",
+        name.empty() ? "all" : name, kCorrelationTimes, fmt::join(parts, "; "),
+        duration_words(regime.record_s)));
   }
   return sentences;
 }

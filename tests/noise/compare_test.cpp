@@ -46,6 +46,38 @@ TEST(Compare, TwoStretchesOfOneSensorDifferAsRarelyAsTheTestPromises) {
   EXPECT_LE(rejected, 22);
 }
 
+// A record of 10 correlation times shows a rate where chance made it large, and that alone would differ.
+TEST(Compare, AProcessIsNotComparedWithARecordThatIsTooShortForIt) {
+  const auto with = [](double beta, std::uint64_t n) {
+    FitResult fit;
+    fit.n = n;
+    fit.rate_hz = 100.0;
+    fit.spec = parse_model("WN+GM").value();
+    for (const auto& [process, name, value] :
+         {std::tuple{"WN", "sigma2", 1.0}, std::tuple{"GM1", "beta", beta},
+          std::tuple{"GM1", "sigma2", 0.1}}) {
+      ParameterEstimate p;
+      p.process = process;
+      p.name = name;
+      p.value = value;
+      fit.parameters.push_back(p);
+    }
+    fit.covariance = {1e-4, 0.0, 0.0, 0.0, 0.04, 0.0, 0.0, 0.0, 0.04};
+    return fit;
+  };
+  const FitResult of_two_hours = with(0.005, 720'000);  // 36 correlation times
+  const auto too_short = compare(of_two_hours, with(0.012, 213'900));
+  EXPECT_TRUE(too_short.parameters[0].p_value);
+  EXPECT_FALSE(too_short.parameters[1].p_value);
+  EXPECT_FALSE(too_short.parameters[2].p_value);
+  EXPECT_EQ(too_short.test->dof, 1);
+  EXPECT_THAT(too_short.warnings, testing::ElementsAre(HasSubstr("GM1: one record is shorter than 20")));
+  const auto long_enough = compare(of_two_hours, with(0.012, 500'000));
+  EXPECT_TRUE(long_enough.parameters[1].p_value);
+  EXPECT_EQ(long_enough.test->dof, 3);
+  EXPECT_TRUE(long_enough.warnings.empty());
+}
+
 TEST(Compare, TenPercentMoreWhiteNoiseIsFoundAndBelongsToTheRightParameter) {
   const auto a = fitted(white_and_walk(30000, 1.0, 0.01, 1), "WN+RW");
   const auto b = fitted(white_and_walk(30000, 1.1, 0.01, 2), "WN+RW");

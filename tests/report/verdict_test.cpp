@@ -86,6 +86,44 @@ TEST(Verdict, AModelOverAllRegimesIsNotJudgedBesideThoseOfTheRegimes) {
   EXPECT_EQ(model_verdict({whole}).answer, Answer::kNo);
 }
 
+/// A model of which the white noise is known to a hundredth, and of whose slow process only that it is there.
+Fit partly_known(double slow_beta, double record_s) {
+  constexpr double kRate_hz = 100.0;
+  Fit fit;
+  fit.imu = "mtx1";
+  fit.axis = "gyro_x";
+  fit.regime = "dynamic";
+  fit.unit = "deg/s";
+  fit.model = "WN+GM";
+  fit.n = record_s * kRate_hz;
+  fit.identifiable = false;
+  fit.levels.push_back({2.0 / kRate_hz, 0.32, 0.31, 0.33, 0.32});
+  fit.parameters = {{"WN", "sigma2", "(deg/s)²", 0.64, 0.64 * 0.98, 0.64 / 0.98},
+                    {"GM1", "beta", "1/s", slow_beta, std::nullopt, std::nullopt},
+                    {"GM1", "sigma2", "(deg/s)²", 0.01, std::nullopt, std::nullopt}};
+  return fit;
+}
+
+TEST(Verdict, SaysFirstWhatIsKnownAndHowWell) {
+  const auto known = what_is_known({partly_known(0.01, 900.0)});
+  ASSERT_EQ(known.size(), 2U);
+  // The interval of the variance is 2 % either way, that of the sd half of it.
+  EXPECT_EQ(known[0], "Known of the white noise, dynamic: gyroscopes 0.8 deg/s a sample, ± 1 %.");
+  EXPECT_THAT(known[1], HasSubstr("GM1 in 0 of 1 models"));
+  EXPECT_EQ(model_verdict({partly_known(0.01, 900.0)}).reasons.front(), known[0]);
+}
+
+TEST(Verdict, SaysHowLongARecordTheSlowProcessWouldNeed) {
+  // 100 s of correlation, seen in a quarter of an hour, want 2000 s.
+  EXPECT_THAT(records_needed({partly_known(0.01, 900.0)}),
+              testing::ElementsAre(
+                  AllOf(HasSubstr("about 33 min 20 s as fitted"), HasSubstr("This run has 15 min"))));
+  // A process slower than the record is known by no more than that.
+  EXPECT_THAT(records_needed({partly_known(1e-4, 900.0)}),
+              testing::ElementsAre(HasSubstr("more than 5 h 0 min in 1 models")));
+  EXPECT_TRUE(records_needed({partly_known(0.1, 900.0)}).empty());
+}
+
 TEST(Verdict, WithoutModelsNothingIsClaimed) { EXPECT_EQ(model_verdict({}).answer, Answer::kOpen); }
 
 }  // namespace
