@@ -16,8 +16,8 @@ namespace {
 
 constexpr auto kIdleSleep = std::chrono::milliseconds(200);
 /// A busy PC may leave an idle thread nothing for many minutes, and rows that wait are memory: behind by this
-/// much, two minutes of three S-IMUs at 100 Hz, the thread runs as any other until it has caught up.
-constexpr std::uint64_t kBlocksBehind = 512;
+/// much, half a minute of three S-IMUs at 100 Hz, the thread runs as any other until it has caught up.
+constexpr std::uint64_t kBlocksBehind = 128;
 
 }  // namespace
 
@@ -157,6 +157,9 @@ void Modeller::start(const ThreadPlan& plan) {
     // The lowest priority is never refused in a way that matters: without it the thread runs as any other.
     (void)setup_this_thread(plan);
     loop();
+    // What is left is waited for, even where stop() came before this thread had become idle.
+    (void)setup_this_thread({plan.name, Scheduling::kNormal, 0, {}});
+    drain();
   });
 }
 
@@ -243,7 +246,6 @@ void Modeller::loop() {
     drain();
     std::this_thread::sleep_for(kIdleSleep);
   }
-  drain();
 }
 
 }  // namespace imuscope

@@ -107,7 +107,7 @@ class ModelBook {
 ///
 /// The thread runs when nothing else wants to, and on a busy PC a fit may take minutes. Rows are handed over
 /// in blocks made on demand, so that they wait for it without a ring that is large all the time. A thread
-/// that falls minutes behind runs as any other until it has caught up.
+/// that falls half a minute behind runs as any other until it has caught up.
 class Modeller {
   using RowBlock = std::vector<ErrorRecord>;
   static constexpr std::size_t kRowsPerBlock = 64;
