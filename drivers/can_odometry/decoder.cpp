@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 namespace imuscope::can_odometry {
 namespace {
@@ -28,6 +29,8 @@ constexpr double kGapTaken = 4.0;
 constexpr double kLearned = 1.0 / 16.0;
 constexpr double kLearnedOfGaps = 1.0 / 128.0;
 constexpr std::uint64_t kSetsToLearn = 64;
+/// What was wrong is told for so long after it was seen last.
+constexpr Duration kRemarkStays = std::chrono::seconds(60);
 
 struct UnitName {
   std::string_view name;
@@ -230,6 +233,7 @@ void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink
 void Decoder::on_short_frame(const dbc::Message& message, const CanFrame& frame) noexcept {
   ++odometry_counters_.too_short;
   ++counters_.bad_contents;
+  remarked_ = frame.stamp;
   remark_.say(
       "frames of {} are too short for a chosen signal ({} bytes received, {} in the DBC file); check that "
       "the "
@@ -237,9 +241,11 @@ void Decoder::on_short_frame(const dbc::Message& message, const CanFrame& frame)
       message.name, frame.length, message.length);
 }
 
-void Decoder::on_impossible(double speed_mps) noexcept {
+void Decoder::on_impossible(double speed_mps, HostTime stamp) noexcept {
   ++counters_.bad_contents;
-  if (++odometry_counters_.impossible > 1) return;
+  ++odometry_counters_.impossible;
+  remarked_ = stamp;
+  if (std::exchange(impossible_told_, true)) return;
   remark_.say(
       "impossible speeds were refused, such as {:.1f} m/s; check unit and factor of the speed signals",
       speed_mps);
@@ -304,10 +310,13 @@ void Decoder::emit(HostTime arrival, SampleSink& sink) noexcept {
   count_by_time(newest);
   const double speed_mps = backward_ ? -std::abs(mean_mps) : mean_mps;
   if (!is_possible(speed_mps, newest)) {
-    on_impossible(speed_mps);
+    on_impossible(speed_mps, newest);
     return;
   }
-  if (counters_.samples == 0) remark_.clear();
+  if (counters_.samples == 0 || newest - remarked_ > kRemarkStays) {
+    remark_.clear();
+    impossible_told_ = false;
+  }
   Sample sample{};
   sample.kind = SampleKind::kOdometry;
   sample.device = config_.device;

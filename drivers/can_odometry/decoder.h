@@ -91,7 +91,7 @@ class Decoder final : public CanDecoder {
   void on_counter(const Signal& signal, std::uint64_t raw) noexcept;
   void take_speed(const Signal& signal, std::uint64_t raw, HostTime stamp) noexcept;
   void on_short_frame(const dbc::Message& message, const CanFrame& frame) noexcept;
-  void on_impossible(double speed_mps) noexcept;
+  void on_impossible(double speed_mps, HostTime stamp) noexcept;
   void on_invalid() noexcept;
   void emit(HostTime arrival, SampleSink& sink) noexcept;
   void count_by_time(HostTime stamp) noexcept;
@@ -117,6 +117,8 @@ class Decoder final : public CanDecoder {
   HostTime last_stamp_{};
   int impossible_in_a_row_ = 0;
   Sentence remark_;
+  HostTime remarked_{};  ///< when it was last true
+  bool impossible_told_ = false;
 };
 
 }  // namespace imuscope::can_odometry

@@ -177,6 +177,24 @@ TEST(CanOdometry, ImpossibleSpeedsAreRefusedCountedAndNamed) {
             "impossible speeds were refused, such as 88.9 m/s; check unit and factor of the speed signals");
 }
 
+TEST(CanOdometry, WhatWasWrongIsToldUntilAMinuteWithoutIt) {
+  DecoderConfig config;
+  config.max_speed_mps = 70.0;
+  Rig rig(rear_wheels(), config);
+  const auto drive = [&](int frames) {
+    for (int i = 0; i < frames; ++i) rig.rear(3600, 3600);
+  };
+  drive(1);
+  rig.rear(32000, 32000);
+  drive(50 * 59);  // 20 ms apart
+  EXPECT_NE(rig.decoder->remark(), "");
+  drive(50 * 2);
+  EXPECT_EQ(rig.decoder->remark(), "");
+  rig.rear(28800, 28800);
+  EXPECT_EQ(rig.decoder->remark(),
+            "impossible speeds were refused, such as 80.0 m/s; check unit and factor of the speed signals");
+}
+
 TEST(CanOdometry, AJumpThatStaysIsBelieved) {
   Rig rig(rear_wheels());
   rig.rear(3600, 3600);
