@@ -108,6 +108,23 @@ const noise::FitResult* start_of(const NoiseStudy& models, const std::string& na
   return whole;
 }
 
+/// A Gauss-Markov process whose correlation time is below a quarter of a sample is white noise: where a fit
+/// has it in the place of white noise, it is studied as what it is.
+noise::FitResult with_white_noise(noise::FitResult fit) {
+  constexpr double kWhiteRate = 4.6;  // of a sample: phi below 0.01
+  noise::Component* white = nullptr;
+  for (noise::Component& component : fit.model.components) {
+    if (component.kind == noise::ProcessKind::kWhiteNoise) white = &component;
+  }
+  if (white == nullptr) return fit;
+  for (noise::Component& component : fit.model.components) {
+    if (component.kind != noise::ProcessKind::kGaussMarkov || component.shape[0] < kWhiteRate) continue;
+    white->amplitude += component.amplitude;
+    component.amplitude = 0.0;
+  }
+  return fit;
+}
+
 struct Slope {
   std::size_t axis;
   std::size_t driver;
@@ -272,7 +289,7 @@ DependenceStudy study_dependence(const Configuration& configuration, const std::
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       const auto* start = start_of(models, device.name, axis);
       if (start == nullptr) continue;  // why there is no model is said where it was to be made
-      imu.axis(axis, windows_of(series[i], temperatures[i], axis, length, run), *start);
+      imu.axis(axis, windows_of(series[i], temperatures[i], axis, length, run), with_white_noise(*start));
     }
     imu.finish();
   }
