@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <fstream>
@@ -219,7 +220,9 @@ class LiveRun : public testing::Test {
     for (std::size_t i = 1; i < messages.size(); ++i)
       EXPECT_EQ(messages[i].sequence, messages[i - 1].sequence + 1);
     const dynamics_t& last = messages.back();
-    EXPECT_EQ("IMUSCOPE_DYNAMICS_" + last.name, channel);
+    std::string capitals = last.name;
+    for (char& c : capitals) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    EXPECT_EQ("IMUSCOPE_DYNAMICS_" + capitals, channel);
     EXPECT_GT(last.n_dynamic, 500);
     ASSERT_EQ(last.n_covariates, 15);
     const auto& omega_z = last.covariates[2];
