@@ -165,7 +165,8 @@ TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
   EXPECT_THAT(read_json(out / "run.json").at("warnings").get<std::vector<std::string>>(),
               Contains(HasSubstr("mtx3: has samples for 1")));
   EXPECT_FALSE(regimes.at("left_out").empty()) << "60 s of rest are too short for the drive's longest scales";
-  for (const auto& regression : read_json(out / "regression.json").at("regressions"))
+  const auto regression_document = read_json(out / "regression.json");
+  for (const auto& regression : regression_document.at("regressions"))
     EXPECT_EQ(regression.at("regime"), "dynamic");
   EXPECT_FALSE(read_json(out / "dependence.json").at("points").empty());
   EXPECT_TRUE(read_json(out / "vibration.json").at("lines").empty()) << "the simulated vehicle has no engine";
@@ -258,7 +259,8 @@ TEST(StudyOfADrive, WhatTheNoiseFollowsIsFoundThroughBytesAndTheFilterOfAnOutage
   const auto log = scratch / "evaluate.log";
   ASSERT_EQ(run_program("imuscope", {"evaluate", out.string(), "--settle", "60"}, log), 0) << read_text(log);
   std::string source_of_mtx1;
-  for (const auto& entry : read_json(out / "evaluation.json").at("evaluations")) {
+  const auto evaluation = read_json(out / "evaluation.json");
+  for (const auto& entry : evaluation.at("evaluations")) {
     if (entry.at("name") == "mtx1" && entry.at("model") == "by dynamics")
       source_of_mtx1 = entry.at("source").get<std::string>();
   }
