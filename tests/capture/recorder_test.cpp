@@ -206,11 +206,13 @@ TEST(Recorder, KeepsPublishedMessagesBesideTheBytesAndReplayPassesOverThem) {
   EXPECT_EQ(summary->other_messages, 1U);
 }
 
-TEST(Recorder, GoesOnInAnotherFileAndTheReaderJoinsThem) {
+/// Records 1500 numbered reads, in 1.5 s at least, with limits that split them into three files or more.
+void expect_files_that_join(std::uint64_t max_file_bytes, Duration max_file_age) {
   const auto folder = test::scratch_folder();
   const auto ring = std::make_unique<RawRing>();
   auto options = options_for(folder / "capture.lcm");
-  options.max_file_bytes = 20'000;
+  options.max_file_bytes = max_file_bytes;
+  options.max_file_age = max_file_age;
   auto recorder = Recorder::start(options, {ring.get()}, {});
   ASSERT_TRUE(recorder.has_value()) << recorder.error().text();
   RawTap tap(*ring);
@@ -237,6 +239,14 @@ TEST(Recorder, GoesOnInAnotherFileAndTheReaderJoinsThem) {
   std::uintmax_t bytes = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) bytes += entry.file_size();
   EXPECT_EQ((*recorder)->status().bytes, bytes);
+}
+
+TEST(Recorder, AFullFileGoesOnInAnotherAndTheReaderJoinsThem) {
+  expect_files_that_join(20'000, Duration::zero());
+}
+
+TEST(Recorder, AnOldFileGoesOnInAnotherAndTheReaderJoinsThem) {
+  expect_files_that_join(0, milliseconds(400));
 }
 
 TEST(Recorder, AFileInTheWayOfTheNextOneIsToldAndThePresentOneGoesOn) {
