@@ -5,6 +5,13 @@
 #include <cmath>
 #include <cstring>
 
+// What chooses between clones runs before ThreadSanitizer has set itself up, and would end the program.
+#if defined(__SANITIZE_THREAD__)
+#define IMUSCOPE_CLONES
+#else
+#define IMUSCOPE_CLONES __attribute__((target_clones("avx2", "default")))
+#endif
+
 namespace imuscope::noise {
 namespace {
 
@@ -48,8 +55,7 @@ struct PairOfSums {
 
 /// Squares of two levels over a stretch of at most kStretch; leaves at f the block sums of 4n samples. Reads
 /// run ahead of writes, so that the next stretch finds what it needs.
-__attribute__((target_clones("avx2", "default"))) PairOfSums two_levels_of_stretch(double* f, std::size_t n,
-                                                                                   std::size_t length) {
+IMUSCOPE_CLONES PairOfSums two_levels_of_stretch(double* f, std::size_t n, std::size_t length) {
   Lanes lower{};
   Lanes upper{};
   std::size_t s = 0;
