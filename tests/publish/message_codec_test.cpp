@@ -55,11 +55,11 @@ TEST(MessageCodec, AStringHasAtLeastItsZero) {
   constexpr std::size_t kNameLengthAt = 24;  // behind fingerprint, utime and sequence
   const std::vector<std::uint8_t> message = encode_message(raw_of(0));
   ASSERT_EQ(message[kNameLengthAt + 3], std::string("mtx1").size() + 1);
-  for (const std::uint8_t sign : {0x00, 0x80, 0xFF}) {  // 0, the least number there is, one of the negative
+  for (const unsigned sign : {0x00U, 0x80U, 0xFFU}) {  // 0, the least number there is, one of the negative
     std::vector<std::uint8_t> hostile = message;
-    hostile[kNameLengthAt] = sign;
+    hostile[kNameLengthAt] = static_cast<std::uint8_t>(sign);
     hostile[kNameLengthAt + 3] = 0;
-    EXPECT_FALSE(decode_message<raw_t>(hostile).has_value()) << unsigned{sign};
+    EXPECT_FALSE(decode_message<raw_t>(hostile).has_value()) << sign;
   }
 }
 
