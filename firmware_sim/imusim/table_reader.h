@@ -3,12 +3,13 @@
 /// Reads one TOML table key by key and remembers which keys were asked for, so that a key that nobody knows
 /// is refused with its place and the nearest one that would be known.
 
-#include <toml++/toml.h>
 #include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "firmware_sim/imusim/toml.h"
 
 namespace imusim {
 

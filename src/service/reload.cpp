@@ -1,7 +1,8 @@
 #include "service/reload.h"
 
-#include <toml++/toml.h>
 #include <set>
+
+#include "service/toml.h"
 
 namespace imuscope {
 

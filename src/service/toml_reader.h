@@ -3,7 +3,6 @@
 /// Reads a TOML table key by key and remembers what was asked for, so that anything left over is refused with
 /// the nearest key that exists. The first problem wins and carries file and line.
 
-#include <toml++/toml.h>
 #include <array>
 #include <map>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "service/toml.h"
 
 namespace imuscope {
 
