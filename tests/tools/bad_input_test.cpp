@@ -124,6 +124,7 @@ class BadInput : public testing::Test {
     write_file(folder_ / "unknown_role.toml", replaced(demo, "\"study\"", "\"studdy\""));
     write_file(folder_ / "unknown_truth.toml", replaced(demo, "latency_ms", "latencyms"));
     write_file(folder_ / "not.toml", "this is not TOML\n");
+    write_file(folder_ / "no_key.toml", "[@]\n");
     write_file(folder_ / "tcpq.toml", demo + "[lcm]\nurl = \"tcpq://127.0.0.1:7700\"\n");
 
     write_file(folder_ / "csv.toml", kCsvConfiguration);
@@ -202,6 +203,7 @@ TEST_F(BadInput, ConfigurationsAndArgumentsAreUsageWithARemedy) {
       {"imuscope run empty", kUsage, "configuration empty is empty; config/ holds examples"},
       {"imuscope run folder", kUsage, "configuration folder is a folder; give the path of a TOML file"},
       {"imuscope run not.toml", kUsage, "not.toml:1: not TOML"},
+      {"imuscope run no_key.toml", kUsage, "no_key.toml:1: not TOML"},
       {"imuscope run unknown_key.toml", kUsage,
        "unknown_key.toml:9: unknown key 'estimator.staets'; did you mean 'states'?"},
       {"imuscope run unknown_role.toml", kUsage, "valid: reference, study, gnss"},
@@ -230,6 +232,7 @@ TEST_F(BadInput, ConfigurationsAndArgumentsAreUsageWithARemedy) {
       {"empty", kUsage, "configuration empty is empty; config/ holds examples"},
       {"folder", kUsage, "configuration folder is a folder; give the path"},
       {"not.toml", kUsage, "not.toml:1: not TOML"},
+      {"no_key.toml", kUsage, "no_key.toml:1: not TOML"},
       {"unknown_truth.toml", kUsage, "has no key 'latencyms'; the nearest is 'latency_ms'"},
   };
   for (const std::string command : {"imusim record ", "imusim live "}) {
