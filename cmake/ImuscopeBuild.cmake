@@ -32,6 +32,11 @@ find_package(Boost 1.74 REQUIRED)
 find_path(IMUSCOPE_TOMLPLUSPLUS_DIR toml++/toml.h REQUIRED)
 find_path(IMUSCOPE_EXPECTED_DIR tl/expected.hpp REQUIRED)
 
+# toml++ as the service and the simulator, which share nothing else, both have to take it.
+add_library(careful_toml INTERFACE)
+target_include_directories(careful_toml INTERFACE ${CMAKE_SOURCE_DIR}/cmake/toml)
+target_include_directories(careful_toml SYSTEM INTERFACE ${IMUSCOPE_TOMLPLUSPLUS_DIR})
+
 add_library(imuscope_flags INTERFACE)
 target_compile_options(imuscope_flags INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual

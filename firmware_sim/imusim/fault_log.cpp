@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "firmware_sim/imusim/fault_script.h"
 #include "firmware_sim/imusim/truth_files.h"
 
 namespace imusim {

@@ -3,15 +3,11 @@
 /// What the faults of a script did, as the simulator knows it: beside it can be laid what a program counted.
 
 #include <filesystem>
-#include <string_view>
 
 #include "firmware_sim/imusim/configuration.h"
 #include "firmware_sim/imusim/failure.h"
 
 namespace imusim {
-
-/// The word for a kind in a fault script.
-std::string_view name_of(FaultKind kind);
 
 /// fault_log.json: `{"schema", "faults": [{"device", "kind", "begin_s", "end_s", "messages" (sent while it
 /// lasted), "hit" (of them, that it changed, repeated, followed with garbage or kept from the host),

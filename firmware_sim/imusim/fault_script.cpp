@@ -6,7 +6,6 @@
 #include <numbers>
 #include <sstream>
 
-#include "firmware_sim/imusim/fault_log.h"
 #include "firmware_sim/imusim/table_reader.h"
 
 namespace imusim {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "firmware_sim/imusim/toml.h"
+#include "careful_toml.h"
 
 namespace imusim {
 

@@ -2,7 +2,7 @@
 
 #include <set>
 
-#include "service/toml.h"
+#include "careful_toml.h"
 
 namespace imuscope {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "service/toml.h"
+#include "careful_toml.h"
 
 namespace imuscope {
 

@@ -3,14 +3,16 @@
 /// "gone": EIO, as from a disk that was pulled out; "full": ENOSPC; anything else: it works.
 
 #include <dlfcn.h>
-#include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/types.h>
-#include <time.h>
 #include <unistd.h>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+
+#include "fault_control.h"
 
 namespace {
 
@@ -25,16 +27,7 @@ bool is_capture(int fd) {
   return name != nullptr && strcmp(name, "/capture.lcm") == 0;
 }
 
-/// First letter of the control file; 0 where there is none.
-char mode() {
-  const char* const path = getenv("DISK_FAULT_CONTROL");
-  const int fd = path != nullptr ? open(path, O_RDONLY | O_CLOEXEC) : -1;
-  if (fd < 0) return 0;
-  char letter = 0;
-  if (read(fd, &letter, 1) != 1) letter = 0;
-  close(fd);
-  return letter;
-}
+char mode() { return fault_letter("DISK_FAULT_CONTROL"); }
 
 }  // namespace
 

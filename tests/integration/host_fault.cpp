@@ -6,24 +6,18 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <pthread.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <sys/types.h>
-#include <time.h>
 #include <unistd.h>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+
+#include "fault_control.h"
 
 namespace {
 
-char mode() {
-  const char* const path = getenv("HOST_FAULT_CONTROL");
-  const int fd = path != nullptr ? open(path, O_RDONLY | O_CLOEXEC) : -1;
-  if (fd < 0) return 0;
-  char letter = 0;
-  if (read(fd, &letter, 1) != 1) letter = 0;
-  close(fd);
-  return letter;
-}
+char mode() { return fault_letter("HOST_FAULT_CONTROL"); }
 
 bool this_thread_is(const char* name) {
   char own[16] = {};

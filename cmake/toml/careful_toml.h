@@ -2,7 +2,8 @@
 
 /// toml++, told to report what a careless file makes it meet. Version 3.3 asserts, ahead of the error that it
 /// has for the same place, where '[' is followed by what begins no key; and it takes for unreachable what the
-/// letters from U+00A1 to U+0499 reach outside of strings. Included here and nowhere else.
+/// letters from U+00A1 to U+0499 reach outside of strings. The target careful_toml gives it to whoever reads
+/// TOML; toml++ itself is included nowhere else.
 
 #include <cstdint>
 
