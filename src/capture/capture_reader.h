@@ -35,7 +35,7 @@ struct CapturedDevice {
   HostTime last{};
 };
 
-/// A message of a person on <PREFIX>_EVENT.
+/// A message of a person on PREFIX_EVENT.
 struct RecordedEvent {
   HostTime time{};  ///< when the run heard it
   std::string text;

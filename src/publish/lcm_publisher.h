@@ -41,17 +41,17 @@ class LcmPublisher {
   LcmPublisher& operator=(LcmPublisher&&) noexcept;
   ~LcmPublisher();
 
-  void publish(const StatusReport& report);      ///< <PREFIX>_STATUS
-  void publish(const NavigationReport& report);  ///< <PREFIX>_NAVIGATION
-  void publish(const OdometryReport& report);    ///< <PREFIX>_ODOMETRY
+  void publish(const StatusReport& report);      ///< PREFIX_STATUS
+  void publish(const NavigationReport& report);  ///< PREFIX_NAVIGATION
+  void publish(const OdometryReport& report);    ///< PREFIX_ODOMETRY
   /// @param name of the S-IMU that report.device stands for
-  void publish(const CalibrationReport& report, const std::string& name);  ///< <PREFIX>_CALIBRATION_<NAME>
-  void publish(const ErrorReport& report, const std::string& name);        ///< <PREFIX>_ERROR_<NAME>
-  void publish(const WaveletVarianceReport& report);                       ///< <PREFIX>_WV_<NAME>
-  void publish(const NoiseModelReport& report);                            ///< <PREFIX>_NOISE_MODEL_<NAME>
-  void publish(const DynamicsReport& report);                              ///< <PREFIX>_DYNAMICS_<NAME>
-  void publish(const PersonEvent& event);                                  ///< <PREFIX>_EVENT
-  void publish(const BridgeReport& report);                                ///< <PREFIX>_POSE and <PREFIX>_INS
+  void publish(const CalibrationReport& report, const std::string& name);  ///< PREFIX_CALIBRATION_NAME
+  void publish(const ErrorReport& report, const std::string& name);        ///< PREFIX_ERROR_NAME
+  void publish(const WaveletVarianceReport& report);                       ///< PREFIX_WV_NAME
+  void publish(const NoiseModelReport& report);                            ///< PREFIX_NOISE_MODEL_NAME
+  void publish(const DynamicsReport& report);                              ///< PREFIX_DYNAMICS_NAME
+  void publish(const PersonEvent& event);                                  ///< PREFIX_EVENT
+  void publish(const BridgeReport& report);                                ///< PREFIX_POSE and PREFIX_INS
 
   /// Gives every message that is sent to `tap`, too: channel, utime and encoded bytes. For the recorder.
   using Tap = std::function<void(std::string_view, std::int64_t, std::span<const std::uint8_t>)>;

@@ -31,13 +31,13 @@ class Html {
 /// Text of any origin, safe inside elements and quoted attributes.
 Html text(std::string_view any);
 
-/// <tag class="css_class">content</tag>; `tag` and `css_class` are written in this program.
+/// `<tag class="css_class">content</tag>`; `tag` and `css_class` are written in this program.
 Html element(std::string_view tag, const Html& content, std::string_view css_class = {});
 
 /// A paragraph of plain text.
 Html paragraph(std::string_view any, std::string_view css_class = {});
 
-/// A JSON document as the content of a <script> element: no text in it can end the element.
+/// A JSON document as the content of a `<script>` element: no text in it can end the element.
 std::string json_for_script(const std::string& json);
 
 /// A table with a heading row. The first cell of a row is its heading.

@@ -29,7 +29,7 @@ struct EvaluationModel {
 ///
 /// @param models      models.json
 /// @param dependence  dependence.json; null where absent
-/// @param turn_on     sd of the constant part of the biases, per axis
+/// @param turn_on_sd  sd of the constant part of the biases, per axis
 std::vector<EvaluationModel> evaluation_models(const StudyDrive& drive, const DataSheetConfig& sheet,
                                                const std::array<double, kImuAxes>& turn_on_sd,
                                                const nlohmann::json& models,
