@@ -20,7 +20,7 @@ class FixedLagSmoother {
   static constexpr Duration kLag = std::chrono::seconds{5};
   /// The window is smoothed when the newest epoch is this much newer than at the last time: the longer, the
   /// less work, the later the result.
-  static constexpr Duration kEvery = std::chrono::seconds{2};
+  static constexpr Duration kEvery = std::chrono::seconds{5};
 
   /// @param layouts  of the S-IMUs, in order
   /// @param states   dimension of the filter

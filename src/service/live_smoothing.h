@@ -1,7 +1,7 @@
 #pragma once
 
 /// Fixed-lag smoothing of a live run: the core hands the filter's history out through a ring, and the
-/// publisher's thread writes what it says of the navigation and the biases five to seven seconds later,
+/// publisher's thread writes what it says of the navigation and the biases five to ten seconds later,
 /// smoothed.
 
 #include <array>
