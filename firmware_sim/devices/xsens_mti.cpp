@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace imusim {
@@ -11,12 +10,9 @@ namespace {
 
 using namespace xsens;
 
-constexpr double kNever_s = std::numeric_limits<double>::infinity();
 constexpr std::uint16_t kBaseRate_hz = 400;
 constexpr std::uint16_t kGnssRate_hz = 4;
 constexpr std::uint16_t kEveryMessage = 0xFFFF;
-constexpr double kWakeUpTimeout_s = 0.5;
-constexpr double kBoot_s = 1.7;
 constexpr double kAnswerDelay_s = 0.003;
 constexpr std::size_t kOutputsMax = 32;
 constexpr std::size_t kEntrySize = 4;
@@ -67,32 +63,21 @@ const KnownItem* find_item(std::uint16_t item) {
 }  // namespace
 
 XsensMti::XsensMti(const Options& options, Sampler sampler, double power_on_s)
-    : options_(options),
+    : XsensUnit({options.first_sample_s, 1.0 / kBaseRate_hz, options.clock_skew_ppm}, kAnswerDelay_s,
+                power_on_s),
+      options_(options),
       sampler_(std::move(sampler)),
       outputs_{{kPacketCounter, kEveryMessage}, {kSampleTimeFine, kEveryMessage}, {kQuaternion, 100}},
       baud_code_(code_of_baud(options.baud)),
       baud_(options.baud),
-      measurement_end_s_(kNever_s),
-      grid_(options.first_sample_s, 1.0 / kBaseRate_hz, options.clock_skew_ppm),
       time_origin_s_(options.first_sample_s - options.first_sample_time / kTicksPerSecond),
-      packet_(options.first_packet) {
-  power_on(power_on_s);
+      packet_(options.first_packet) {}
+
+void XsensMti::acknowledge(const Command& command, double t_s) {
+  reply(static_cast<std::uint8_t>(command.mid + 1), {}, t_s);
 }
 
-void XsensMti::power_on(double t_s) {
-  state_ = State::kWaking;
-  measurement_end_s_ = kNever_s;
-  wake_deadline_s_ = t_s + kWakeUpTimeout_s;
-  scanner_ = {};
-  replies_.push_back({t_s, frame(kWakeUp, {})});
-}
-
-void XsensMti::power_cycle(double t_s, double off_s) {
-  state_ = State::kOff;
-  replies_.clear();
-  power_on_s_ = t_s + off_s + kBoot_s;
-  baud_ = baud_of_code(baud_code_);
-  next_index_ = std::max(next_index_, grid_.first_from(power_on_s_));
+void XsensMti::count_anew() {
   time_origin_s_ = grid_.device_time(next_index_);
   packet_ = 0;
 }
@@ -104,52 +89,10 @@ void XsensMti::start_inertial(double t_s, std::uint16_t rate_hz) {
               {kRateOfTurn, rate_hz},
               {kStatusWord, kEveryMessage}};
   if (options_.has_gnss) outputs_.push_back({kGnssPvt, kGnssRate_hz});
-  replies_.clear();
-  enter_measurement(t_s);
+  start_measuring(t_s, {});
 }
 
-void XsensMti::enter_measurement(double t_s) {
-  state_ = State::kMeasurement;
-  measurement_end_s_ = kNever_s;
-  next_index_ = std::max(next_index_, grid_.first_from(t_s));
-}
-
-void XsensMti::reply(std::uint8_t mid, const Bytes& data, double t_s) {
-  replies_.push_back({t_s + kAnswerDelay_s, frame(mid, data)});
-}
-
-void XsensMti::receive(std::span<const std::uint8_t> bytes, double t_s) {
-  if (state_ == State::kOff) {
-    if (t_s < power_on_s_) return;
-    power_on(power_on_s_);
-  }
-  scanner_.hear(bytes);
-  Command command;
-  while (scanner_.next(command)) {
-    if (command.is_for(1)) handle(command, t_s);
-  }
-}
-
-void XsensMti::handle(const Command& command, double t_s) {
-  switch (command.mid) {
-    case kReset:
-      reply(kReset + 1, {}, t_s);
-      baud_ = baud_of_code(baud_code_);
-      return power_on(t_s + kAnswerDelay_s);
-    case kGoToConfig:
-      reply(kGoToConfig + 1, {}, t_s);
-      if (state_ == State::kMeasurement)
-        measurement_end_s_ = t_s + kAnswerDelay_s;
-      else
-        state_ = State::kConfig;
-      return;
-    case kWakeUpAck:
-      if (state_ == State::kWaking) state_ = State::kConfig;
-      return;
-    default:
-      if (state_ == State::kConfig || measurement_end_s_ != kNever_s) handle_in_config(command, t_s);
-  }
-}
+void XsensMti::reply(std::uint8_t mid, const Bytes& data, double t_s) { answer(frame(mid, data), t_s); }
 
 void XsensMti::handle_in_config(const Command& command, double t_s) {
   const auto ack = static_cast<std::uint8_t>(command.mid + 1);
@@ -181,7 +124,7 @@ void XsensMti::handle_in_config(const Command& command, double t_s) {
       return reply(ack, {}, t_s);
     case kGoToMeasurement:
       reply(ack, {}, t_s);
-      return enter_measurement(t_s + kAnswerDelay_s);
+      return enter_measurement_when_answered(t_s);
     default:
       reply(kError, {kErrorMessage}, t_s);
   }
@@ -286,9 +229,9 @@ void XsensMti::put_item(Bytes& payload, const Output& output, const MtSample& sa
 }
 
 void XsensMti::emit_samples_until(double t_s, std::vector<Emission>& out) {
-  while (state_ == State::kMeasurement) {
+  for (;;) {
     const double ready_s = grid_.instant(next_index_) + options_.latency_s;
-    if (ready_s > t_s || ready_s >= measurement_end_s_) return;
+    if (ready_s > t_s || !measures_at(ready_s)) return;
     const std::int64_t index = next_index_++;
     const auto send = [&](bool gnss) {
       const auto wanted = [&](const Output& output) {
@@ -305,27 +248,6 @@ void XsensMti::emit_samples_until(double t_s, std::vector<Emission>& out) {
     send(false);
     send(true);
   }
-}
-
-void XsensMti::run_until(double t_s, std::vector<Emission>& out) {
-  if (state_ == State::kOff) {
-    if (t_s < power_on_s_) return;
-    power_on(power_on_s_);
-  }
-  while (!replies_.empty() && replies_.front().ready_s <= t_s) {
-    emit_samples_until(replies_.front().ready_s, out);
-    if (measurement_end_s_ <= replies_.front().ready_s && state_ == State::kMeasurement) {
-      state_ = State::kConfig;
-      measurement_end_s_ = kNever_s;
-    }
-    out.push_back(std::move(replies_.front()));
-    replies_.pop_front();
-  }
-  if (state_ == State::kWaking && t_s >= wake_deadline_s_) {
-    out.push_back({wake_deadline_s_, frame(kReqConfiguration + 1, configuration())});
-    enter_measurement(wake_deadline_s_);
-  }
-  emit_samples_until(t_s, out);
 }
 
 }  // namespace imusim

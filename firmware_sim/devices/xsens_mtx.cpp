@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace imusim {
@@ -11,15 +10,11 @@ namespace {
 
 using namespace xsens;
 
-constexpr double kNever_s = std::numeric_limits<double>::infinity();
 constexpr double kPeriodTicksPerSecond = 115200.0;
 constexpr std::uint16_t kPeriodFastest = 225;    // 512 Hz
 constexpr std::uint16_t kPeriodSlowest = 11520;  // 10 Hz
-constexpr double kWakeUpTimeout_s = 0.5;
 // Time the firmware takes to answer a command.
 constexpr double kAnswerDelay_s = 0.003;
-// From power to WakeUp.
-constexpr double kBoot_s = 1.7;
 // A device has room for one message beside the one that it is sending.
 constexpr double kMessagesInHand = 1.0;
 constexpr double kBitsPerByte = 10.0;
@@ -44,105 +39,42 @@ bool any_value(std::uint16_t /*value*/) { return true; }
 }  // namespace
 
 XsensMtx::XsensMtx(const Options& options, Sampler sampler, double power_on_s)
-    : options_(options),
+    : XsensUnit({options.first_sample_s, options.period / kPeriodTicksPerSecond, options.clock_skew_ppm},
+                kAnswerDelay_s, power_on_s),
+      options_(options),
       sampler_(std::move(sampler)),
       baud_(options.baud),
-      measurement_end_s_(kNever_s),
-      grid_(options.first_sample_s, options.period / kPeriodTicksPerSecond, options.clock_skew_ppm),
       counter_offset_(options.first_counter) {
   settings_.period = options.period;
   settings_.baud_code = code_of_baud(options.baud);
-  power_on(power_on_s);
-}
-
-void XsensMtx::power_on(double t_s) {
-  state_ = State::kWaking;
-  measurement_end_s_ = kNever_s;
-  wake_deadline_s_ = t_s + kWakeUpTimeout_s;
-  scanner_ = {};
-  replies_.push_back({t_s, frame(kWakeUp, {})});
-}
-
-void XsensMtx::power_cycle(double t_s, double off_s) {
-  state_ = State::kOff;
-  replies_.clear();
-  power_on_s_ = t_s + off_s + kBoot_s;
-  baud_ = baud_of_code(settings_.baud_code);
-  // It counts from 0 again.
-  next_index_ = std::max(next_index_, grid_.first_from(power_on_s_));
-  counter_offset_ = -next_index_;
 }
 
 void XsensMtx::jump_clock(double by_s) { counter_offset_ += std::llround(by_s / grid_.period()); }
-
-void XsensMtx::add_skew(double ppm) { grid_.set_skew(grid_.skew_ppm() + ppm, next_index_); }
 
 void XsensMtx::start_calibrated(double t_s) {
   settings_.output_mode = kModeCalibrated;
   if (options_.sends_temperature) settings_.output_mode |= kModeTemperature;
   settings_.output_settings = kSettingsCounter | kSettingsNoMag;
-  replies_.clear();
-  // Early enough for the line to be free when the first data come.
-  constexpr double kAhead_s = 0.05;
-  replies_.push_back({t_s - kAhead_s, frame(kConfiguration, configuration())});
-  replies_.push_back({t_s - kAhead_s, frame(kGoToMeasurement + 1, {})});
-  enter_measurement(t_s);
+  start_measuring(t_s, {frame(kConfiguration, configuration()), frame(kGoToMeasurement + 1, {})});
 }
 
-void XsensMtx::enter_measurement(double t_s) {
-  state_ = State::kMeasurement;
-  measurement_end_s_ = kNever_s;
-  // The sampling clock never stopped: go on with the first sample that lies ahead.
-  next_index_ = std::max(grid_.first_from(t_s), next_index_);
+void XsensMtx::acknowledge(const Command& command, double t_s) {
+  reply(static_cast<std::uint8_t>(command.mid + 1), {}, t_s);
 }
 
-void XsensMtx::receive(std::span<const std::uint8_t> bytes, double t_s) {
-  if (state_ == State::kOff) {
-    if (t_s < power_on_s_) return;
-    power_on(power_on_s_);
+bool XsensMtx::handle_measuring(const Command& command, double t_s) {
+  if (command.mid != kReqData) return false;
+  if (settings_.skip_factor == kSkipAll) {
+    next_index_ = std::max(next_index_, grid_.first_from(t_s));
+    send({grid_.instant(next_index_) + options_.latency_s, data_frame(next_index_)});
+    ++next_index_;
   }
-  scanner_.hear(bytes);
-  Command command;
-  while (scanner_.next(command)) handle(command, t_s);
+  return true;
 }
 
-void XsensMtx::reply(std::uint8_t mid, const Bytes& data, double t_s) {
-  replies_.push_back({t_s + kAnswerDelay_s, frame(mid, data)});
-}
+void XsensMtx::reply(std::uint8_t mid, const Bytes& data, double t_s) { answer(frame(mid, data), t_s); }
 
 void XsensMtx::error(std::uint8_t code, double t_s) { reply(kError, {code}, t_s); }
-
-void XsensMtx::handle(const Command& command, double t_s) {
-  if (!command.is_for(1)) return;
-  switch (command.mid) {
-    case kReset:
-      reply(kReset + 1, {}, t_s);
-      baud_ = baud_of_code(settings_.baud_code);
-      power_on(t_s + kAnswerDelay_s);
-      return;
-    case kGoToConfig:
-      reply(kGoToConfig + 1, {}, t_s);
-      if (state_ == State::kMeasurement)
-        measurement_end_s_ = t_s + kAnswerDelay_s;
-      else
-        state_ = State::kConfig;
-      return;
-    case kWakeUpAck:
-      if (state_ == State::kWaking) state_ = State::kConfig;
-      return;
-    case kReqData:
-      if (state_ == State::kMeasurement && settings_.skip_factor == kSkipAll) {
-        next_index_ = std::max(next_index_, grid_.first_from(t_s));
-        replies_.push_back({grid_.instant(next_index_) + options_.latency_s, data_frame(next_index_)});
-        ++next_index_;
-      }
-      return;
-    default:
-      // A command may follow the GoToConfig that is being acknowledged; while measuring all others are
-      // ignored.
-      if (state_ == State::kConfig || measurement_end_s_ != kNever_s) handle_in_config(command, t_s);
-  }
-}
 
 template <typename T>
 void XsensMtx::request_or_set(const Command& command, T& setting, bool (*is_valid)(T),
@@ -250,9 +182,11 @@ void XsensMtx::handle_in_config(const Command& command, double t_s) {
     case kErrorMode:
       return request_or_set<std::uint16_t>(command, settings_.error_mode, valid_error_mode, kErrorParameter,
                                            t_s);
+    case kReqData:
+      return;  // has a meaning while it measures
     case kGoToMeasurement:
       reply(kGoToMeasurement + 1, {}, t_s);
-      return enter_measurement(t_s + kAnswerDelay_s);
+      return enter_measurement_when_answered(t_s);
     default:
       error(kErrorMessage, t_s);
   }
@@ -298,9 +232,9 @@ bool XsensMtx::line_is_free(double ready_s, std::size_t bytes) {
 }
 
 void XsensMtx::emit_samples_until(double t_s, std::vector<Emission>& out) {
-  while (state_ == State::kMeasurement && settings_.skip_factor != kSkipAll) {
+  while (settings_.skip_factor != kSkipAll) {
     const double ready_s = grid_.instant(next_index_) + options_.latency_s;
-    if (ready_s > t_s || ready_s >= measurement_end_s_) return;
+    if (ready_s > t_s || !measures_at(ready_s)) return;
     const std::int64_t index = next_index_++;
     if (index % (std::int64_t{settings_.skip_factor} + 1) != 0) continue;
     Bytes message = data_frame(index);
@@ -311,29 +245,8 @@ void XsensMtx::emit_samples_until(double t_s, std::vector<Emission>& out) {
     // More than the line takes: the sample is gone, and the error mode says who hears of it.
     if (settings_.error_mode >= kErrorModeMessage)
       out.push_back({ready_s, frame(kError, Bytes{kErrorTimerOverflow})});
-    if (settings_.error_mode >= kErrorModeConfig) state_ = State::kConfig;
+    if (settings_.error_mode >= kErrorModeConfig) leave_measurement();
   }
-}
-
-void XsensMtx::run_until(double t_s, std::vector<Emission>& out) {
-  if (state_ == State::kOff) {
-    if (t_s < power_on_s_) return;
-    power_on(power_on_s_);
-  }
-  while (!replies_.empty() && replies_.front().ready_s <= t_s) {
-    emit_samples_until(replies_.front().ready_s, out);
-    if (measurement_end_s_ <= replies_.front().ready_s && state_ == State::kMeasurement) {
-      state_ = State::kConfig;
-      measurement_end_s_ = kNever_s;
-    }
-    out.push_back(std::move(replies_.front()));
-    replies_.pop_front();
-  }
-  if (state_ == State::kWaking && t_s >= wake_deadline_s_) {
-    out.push_back({wake_deadline_s_, frame(kConfiguration, configuration())});
-    enter_measurement(wake_deadline_s_);
-  }
-  emit_samples_until(t_s, out);
 }
 
 }  // namespace imusim

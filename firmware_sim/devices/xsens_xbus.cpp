@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 namespace imusim {
@@ -10,13 +9,10 @@ namespace {
 
 using namespace xsens;
 
-constexpr double kNever_s = std::numeric_limits<double>::infinity();
 constexpr double kPeriodTicksPerSecond = 115200.0;
 constexpr std::uint16_t kPeriodFastest = 225;    // 512 Hz
 constexpr std::uint16_t kPeriodSlowest = 11520;  // 10 Hz
-constexpr double kWakeUpTimeout_s = 0.5;
-constexpr double kBoot_s = 1.7;
-constexpr double kAnswerDelay_s = 0.005;  // a question to the bus takes its time
+constexpr double kAnswerDelay_s = 0.005;         // a question to the bus takes its time
 constexpr std::uint8_t kHeadBid = 0xFF;
 constexpr std::uint8_t kBusPower = 0x08;
 constexpr std::uint8_t kErrorNoBus = 0x01;
@@ -31,34 +27,17 @@ std::uint16_t XsensXbus::BusDevice::data_length() const {
 }
 
 XsensXbus::XsensXbus(const Options& options, Sampler sampler, double power_on_s)
-    : options_(options),
+    : XsensUnit({options.first_sample_s, options.period / kPeriodTicksPerSecond, options.clock_skew_ppm},
+                kAnswerDelay_s, power_on_s),
+      options_(options),
       sampler_(std::move(sampler)),
       period_(options.period),
-      measurement_end_s_(kNever_s),
-      grid_(options.first_sample_s, options.period / kPeriodTicksPerSecond, options.clock_skew_ppm),
       counter_offset_(options.first_counter) {
   for (const std::uint32_t id : options.bus_devices) {
     BusDevice device;
     device.id = id;
     bus_.push_back(device);
   }
-  power_on(power_on_s);
-}
-
-void XsensXbus::power_on(double t_s) {
-  state_ = State::kWaking;
-  measurement_end_s_ = kNever_s;
-  wake_deadline_s_ = t_s + kWakeUpTimeout_s;
-  scanner_ = {};
-  replies_.push_back({t_s, frame(kWakeUp, {})});
-}
-
-void XsensXbus::power_cycle(double t_s, double off_s) {
-  state_ = State::kOff;
-  replies_.clear();
-  power_on_s_ = t_s + off_s + kBoot_s;
-  next_index_ = std::max(next_index_, grid_.first_from(power_on_s_));
-  counter_offset_ = -next_index_;
 }
 
 void XsensXbus::jump_clock(double by_s) { counter_offset_ += std::llround(by_s / grid_.period()); }
@@ -79,63 +58,25 @@ void XsensXbus::start_calibrated(double t_s) {
     device.output_mode = kModeCalibrated;
     device.output_settings = kSettingsCounter | kSettingsNoMag;
   }
-  replies_.clear();
-  constexpr double kAhead_s = 0.05;
-  replies_.push_back({t_s - kAhead_s, frame(kConfiguration, configuration())});
-  enter_measurement(t_s);
-}
-
-void XsensXbus::enter_measurement(double t_s) {
-  state_ = State::kMeasurement;
-  measurement_end_s_ = kNever_s;
-  next_index_ = std::max(next_index_, grid_.first_from(t_s));
+  start_measuring(t_s, {frame(kConfiguration, configuration())});
 }
 
 void XsensXbus::reply(const Command& command, const Bytes& data, double t_s) {
-  replies_.push_back(
-      {t_s + kAnswerDelay_s, frame(static_cast<std::uint8_t>(command.mid + 1), data, command.bid)});
+  answer(frame(static_cast<std::uint8_t>(command.mid + 1), data, command.bid), t_s);
 }
 
 void XsensXbus::error(const Command& command, std::uint8_t code, double t_s) {
-  replies_.push_back({t_s + kAnswerDelay_s, frame(kError, Bytes{code}, command.bid)});
+  answer(frame(kError, Bytes{code}, command.bid), t_s);
 }
 
-void XsensXbus::receive(std::span<const std::uint8_t> bytes, double t_s) {
-  if (state_ == State::kOff) {
-    if (t_s < power_on_s_) return;
-    power_on(power_on_s_);
-  }
-  scanner_.hear(bytes);
-  Command command;
-  while (scanner_.next(command)) handle(command, t_s);
-}
-
-void XsensXbus::handle(const Command& command, double t_s) {
-  switch (command.mid) {
-    case kReset:
-      reply(command, {}, t_s);
-      return power_on(t_s + kAnswerDelay_s);
-    case kGoToConfig:
-      reply(command, {}, t_s);
-      if (state_ == State::kMeasurement)
-        measurement_end_s_ = t_s + kAnswerDelay_s;
-      else
-        state_ = State::kConfig;
-      return;
-    case kWakeUpAck:
-      if (state_ == State::kWaking) state_ = State::kConfig;
-      return;
-    default:
-      break;
-  }
-  if (state_ != State::kConfig && measurement_end_s_ == kNever_s) return;
-  if (command.bid == kHeadBid) return handle_in_config(command, t_s);
+void XsensXbus::handle_in_config(const Command& command, double t_s) {
+  if (command.bid == kHeadBid) return handle_for_head(command, t_s);
   const bool on_bus = command.bid >= 1 && command.bid <= bus_.size();
   if (!on_bus || bus_[command.bid - 1U].is_off) return error(command, kErrorNoBus, t_s);
   handle_for_device(command, bus_[command.bid - 1U], t_s);
 }
 
-void XsensXbus::handle_in_config(const Command& command, double t_s) {
+void XsensXbus::handle_for_head(const Command& command, double t_s) {
   Bytes data;
   switch (command.mid) {
     case kReqDid:
@@ -176,7 +117,7 @@ void XsensXbus::handle_in_config(const Command& command, double t_s) {
       return reply(command, {1, 4, 0}, t_s);
     case kGoToMeasurement:
       reply(command, {}, t_s);
-      return enter_measurement(t_s + kAnswerDelay_s);
+      return enter_measurement_when_answered(t_s);
     default:
       error(command, kErrorMessage, t_s);
   }
@@ -238,9 +179,9 @@ Bytes XsensXbus::configuration() const {
 }
 
 void XsensXbus::emit_samples_until(double t_s, std::vector<Emission>& out) {
-  while (state_ == State::kMeasurement) {
+  for (;;) {
     const double ready_s = grid_.instant(next_index_) + options_.latency_s;
-    if (ready_s > t_s || ready_s >= measurement_end_s_) return;
+    if (ready_s > t_s || !measures_at(ready_s)) return;
     const std::int64_t index = next_index_++;
     if (index % (std::int64_t{skip_factor_} + 1) != 0) continue;
     const auto counter = static_cast<std::uint16_t>((index + counter_offset_) & 0xFFFF);
@@ -257,27 +198,6 @@ void XsensXbus::emit_samples_until(double t_s, std::vector<Emission>& out) {
     }
     out.push_back({ready_s, frame(kMtData, payload)});
   }
-}
-
-void XsensXbus::run_until(double t_s, std::vector<Emission>& out) {
-  if (state_ == State::kOff) {
-    if (t_s < power_on_s_) return;
-    power_on(power_on_s_);
-  }
-  while (!replies_.empty() && replies_.front().ready_s <= t_s) {
-    emit_samples_until(replies_.front().ready_s, out);
-    if (measurement_end_s_ <= replies_.front().ready_s && state_ == State::kMeasurement) {
-      state_ = State::kConfig;
-      measurement_end_s_ = kNever_s;
-    }
-    out.push_back(std::move(replies_.front()));
-    replies_.pop_front();
-  }
-  if (state_ == State::kWaking && t_s >= wake_deadline_s_) {
-    out.push_back({wake_deadline_s_, frame(kConfiguration, configuration())});
-    enter_measurement(wake_deadline_s_);
-  }
-  emit_samples_until(t_s, out);
 }
 
 }  // namespace imusim

@@ -9,18 +9,15 @@
 /// repeats what it last held.
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <vector>
 
-#include "firmware_sim/devices/device.h"
-#include "firmware_sim/devices/sample_grid.h"
-#include "firmware_sim/devices/xsens_command.h"
 #include "firmware_sim/devices/xsens_encoder.h"
+#include "firmware_sim/devices/xsens_unit.h"
 
 namespace imusim {
 
-class XsensXbus : public Device {
+class XsensXbus final : public XsensUnit {
  public:
   /// @param device   place on the bus, from 0
   /// @param counter  counts samples from the first one on, not wrapped
@@ -39,11 +36,7 @@ class XsensXbus : public Device {
 
   XsensXbus(const Options& options, Sampler sampler, double power_on_s);
 
-  void receive(std::span<const std::uint8_t> bytes, double t_s) override;
-  void run_until(double t_s, std::vector<Emission>& out) override;
-  void power_cycle(double t_s, double off_s) override;
   void jump_clock(double by_s) override;
-  void add_skew(double ppm) override { grid_.set_skew(grid_.skew_ppm() + ppm, next_index_); }
   bool leave_out(const std::vector<std::string>& blocks) override;
   [[nodiscard]] int baud() const override { return options_.baud; }
 
@@ -51,8 +44,6 @@ class XsensXbus : public Device {
   void start_calibrated(double t_s);
 
  private:
-  enum class State { kOff, kWaking, kConfig, kMeasurement };
-  using Command = xsens::Command;
   struct BusDevice {
     std::uint32_t id = 0;
     std::uint16_t output_mode = xsens::kModeOrientation;
@@ -62,29 +53,22 @@ class XsensXbus : public Device {
     [[nodiscard]] std::uint16_t data_length() const;
   };
 
-  void power_on(double t_s);
-  void handle(const Command& command, double t_s);
-  void handle_in_config(const Command& command, double t_s);
+  [[nodiscard]] bool is_addressed(const Command& /*command*/) const override { return true; }
+  void acknowledge(const Command& command, double t_s) override { reply(command, {}, t_s); }
+  void count_anew() override { counter_offset_ = -next_index_; }
+  void handle_in_config(const Command& command, double t_s) override;
+  void handle_for_head(const Command& command, double t_s);
   void handle_for_device(const Command& command, BusDevice& device, double t_s);
-  void enter_measurement(double t_s);
   void reply(const Command& command, const Bytes& data, double t_s);
   void error(const Command& command, std::uint8_t code, double t_s);
-  void emit_samples_until(double t_s, std::vector<Emission>& out);
-  [[nodiscard]] Bytes configuration() const;
+  void emit_samples_until(double t_s, std::vector<Emission>& out) override;
+  [[nodiscard]] Bytes configuration() const override;
 
   Options options_;
   Sampler sampler_;
   std::vector<BusDevice> bus_;
   std::uint16_t period_;
   std::uint16_t skip_factor_ = 0;
-  State state_ = State::kWaking;
-  double wake_deadline_s_ = 0.0;
-  double power_on_s_ = 0.0;
-  double measurement_end_s_;
-  xsens::CommandScanner scanner_;
-  std::deque<Emission> replies_;
-  SampleGrid grid_;
-  std::int64_t next_index_ = 0;
   std::int64_t counter_offset_;
 };
 
