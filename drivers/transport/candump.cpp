@@ -7,6 +7,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/line_reader.h"
+
 namespace imuscope {
 namespace {
 
@@ -23,6 +25,7 @@ constexpr std::size_t kNsDigits = 9;
 /// Lines in which a log must show its first frame.
 constexpr int kLinesToLookAt = 100;
 constexpr std::size_t kLongestLine = 512;
+constexpr std::size_t kLongestInterface = 15;  // IFNAMSIZ, less the zero at its end
 
 int hex_digit(char c) noexcept {
   if (c >= '0' && c <= '9') return c - '0';
@@ -189,6 +192,8 @@ CandumpLine read_candump_line(std::string_view line) {
   in.expect(' ', "between time, interface and frame stands a blank");
   read.frame.interface = in.word(" ");
   if (read.frame.interface.empty()) in.fail("between time and frame stands the interface");
+  if (read.frame.interface.size() > kLongestInterface)
+    in.fail("the name of an interface has at most 15 letters");
   in.expect(' ', "between time, interface and frame stands a blank");
   if (in.ok()) read_id(in, frame);
   if (in.ok()) read_content(in, frame);
@@ -229,9 +234,8 @@ bool CandumpLog::looks_like_one(const std::filesystem::path& file) {
 }
 
 const CandumpFrame* CandumpLog::next() {
-  while (std::getline(in_, text_)) {
+  while (read_line(in_, text_, kLongestLine, bytes_read_)) {
     ++line_;
-    bytes_read_ += text_.size() + 1;
     current_ = read_candump_line(text_);
     if (current_.kind == CandumpLine::Kind::kFrame) return &current_.frame;
     drops_total_ = std::max(drops_total_, current_.drops_total);

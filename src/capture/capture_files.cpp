@@ -1,6 +1,8 @@
 #include "capture/capture_files.h"
 
+#include <algorithm>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <variant>
 
@@ -34,6 +36,21 @@ Result<CaptureFiles> CaptureFiles::open(const std::filesystem::path& first) {
   return CaptureFiles(first, std::move(*log));
 }
 
+void CaptureFiles::on_read(const std::function<void(double share)>& listener) {
+  on_read_ = listener;
+  report_reads();
+}
+
+void CaptureFiles::report_reads() {
+  if (!on_read_) return;
+  std::error_code error;
+  const auto size = std::filesystem::file_size(capture_file(first_, number_), error);
+  if (error || size == 0) return;
+  log_.on_read([tell = on_read_, size](std::uint64_t bytes) {
+    tell(std::min(1.0, static_cast<double>(bytes) / static_cast<double>(size)));
+  });
+}
+
 bool CaptureFiles::next(LogEvent& event) {
   if (!log_.next(event)) {
     if (!open_following()) return false;
@@ -56,6 +73,7 @@ bool CaptureFiles::open_following() {
   bytes_cut_off_ += log_.bytes_cut_off();
   log_ = std::move(*log);
   number_ += 1;
+  report_reads();
   return true;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -23,6 +24,9 @@ class CaptureFiles {
  public:
   static Result<CaptureFiles> open(const std::filesystem::path& first);
 
+  /// Is told how much of the present file has been read, 0 to 1.
+  void on_read(const std::function<void(double share)>& listener);
+
   /// Fetches the next event. Returns false at the end of the last file.
   [[nodiscard]] bool next(LogEvent& event);
 
@@ -34,8 +38,10 @@ class CaptureFiles {
   CaptureFiles(std::filesystem::path first, EventLogReader log)
       : first_(std::move(first)), log_(std::move(log)) {}
   bool open_following();
+  void report_reads();
 
   std::filesystem::path first_;
+  std::function<void(double)> on_read_;
   int number_ = 0;
   EventLogReader log_;
   bool at_beginning_ = true;

@@ -6,6 +6,17 @@
 namespace imuscope {
 namespace {
 
+/// A read of a device that is longer than any.
+constexpr std::size_t kLongestRead = std::size_t{16} << 20U;
+/// A configuration can name no more (DeviceIndex).
+constexpr std::size_t kDevicesMax = 255;
+
+/// Memory that a read takes while it is held.
+std::size_t cost_of(const RawRead& read) {
+  constexpr std::size_t kPlace = 192;  // in the map, and with the allocator
+  return kPlace + read.device.size() + read.bytes.size();
+}
+
 /// Follows the sequence numbers of each device through a capture.
 class LossFinder {
  public:
@@ -41,9 +52,11 @@ void count_piece(const RawPiece& piece, CaptureSummary& summary) {
 
 }  // namespace
 
-Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
+Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
+                                         const std::function<void(double share)>& progress) {
   auto log = CaptureFiles::open(path);
   if (!log) return tl::unexpected(log.error());
+  log->on_read(progress);
   CaptureSummary summary;
   LossFinder losses;
   LogEvent event;
@@ -55,6 +68,10 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path) {
       summary.run = std::move(*run);  // the same in every file
       summary.has_run = true;
     } else if (auto* piece = std::get_if<RawPiece>(&*record)) {
+      if (summary.devices.size() >= kDevicesMax && !summary.devices.contains(piece->read.device)) {
+        summary.other_messages += 1;
+        continue;
+      }
       losses.look(*piece, summary.losses);
       count_piece(*piece, summary);
     } else if (auto* applied = std::get_if<applied_model_t>(&*record)) {
@@ -84,12 +101,14 @@ Result<CaptureReader> CaptureReader::open(const std::filesystem::path& path, std
 }
 
 std::optional<RawRead> CaptureReader::next() {
-  while (!ended_ && (held_.empty() || newest_ - held_.begin()->first.arrival < kReorderWindow)) {
+  while (!ended_ && held_bytes_ < kHeldMax &&
+         (held_.empty() || newest_ - held_.begin()->first.arrival < kReorderWindow)) {
     ended_ = !read_one();
     if (ended_) close_assemblies();
   }
   if (held_.empty()) return std::nullopt;
   auto oldest = held_.extract(held_.begin());
+  held_bytes_ -= cost_of(oldest.mapped());
   if (oldest.key().arrival < given_) disordered_ += 1;
   given_ = std::max(given_, oldest.key().arrival);
   return std::move(oldest.mapped());
@@ -122,7 +141,8 @@ void CaptureReader::add_piece(RawPiece&& piece) {
     if (assembly.open) add_whole(std::move(assembly.read));
     assembly.read = std::move(piece.read);
   }
-  assembly.open = piece.continues;
+  // A read that never ends is damage: it is given as far as it goes.
+  assembly.open = piece.continues && assembly.read.bytes.size() < kLongestRead;
   if (!assembly.open) add_whole(std::move(assembly.read));
 }
 
@@ -136,6 +156,7 @@ void CaptureReader::close_assemblies() {
 void CaptureReader::add_whole(RawRead&& read) {
   const Key key{read.arrival, index_of(read.device), completed_++};
   newest_ = std::max(newest_, read.arrival);
+  held_bytes_ += cost_of(read);
   held_.emplace(key, std::move(read));
 }
 

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -55,10 +56,12 @@ struct CaptureSummary {
   std::uint64_t bytes_cut_off = 0;   ///< unfinished record at the end: the recorder was killed
 };
 
-/// @param path of the first file of the capture; those that follow are found beside it
+/// @param path     of the first file of the capture; those that follow are found beside it
+/// @param progress is told the share of the present file that has been read; may be empty
 /// @return an error that says what the file is where it is not a capture, and of kind kWork for an event log
 ///         that holds no device bytes
-[[nodiscard]] Result<CaptureSummary> summarise_capture(const std::filesystem::path& path);
+[[nodiscard]] Result<CaptureSummary> summarise_capture(
+    const std::filesystem::path& path, const std::function<void(double share)>& progress = {});
 
 /// Iterates over reads and writes ordered by arrival, equal arrivals by the order of the configuration, then
 /// in the order in which they happened. Thread: one, of the soft world.
@@ -68,6 +71,9 @@ struct CaptureSummary {
 class CaptureReader {
  public:
   static constexpr Duration kReorderWindow = std::chrono::seconds(5);
+  /// What six lines at their full rate bring in that window, many times over; where damaged stamps say that
+  /// more belongs together, the oldest is given.
+  static constexpr std::size_t kHeldMax = std::size_t{32} << 20U;
 
   /// @param path of the first file of the capture
   /// @param device whose reads and writes alone are wanted; empty: all. The others are passed over undecoded.
@@ -107,6 +113,7 @@ class CaptureReader {
   std::vector<std::string> devices_;
   std::map<std::string, Assembly> assemblies_;
   std::map<Key, RawRead> held_;
+  std::size_t held_bytes_ = 0;
   std::uint64_t completed_ = 0;
   HostTime newest_ = HostTime::min();
   HostTime given_ = HostTime::min();

@@ -126,6 +126,8 @@ bool EventLogReader::ensure(std::size_t n) {
     file_.read(reinterpret_cast<char*>(buffer_.data() + have),
                static_cast<std::streamsize>(buffer_.size() - have));
     buffer_.resize(have + static_cast<std::size_t>(file_.gcount()));
+    read_ += buffer_.size() - have;
+    if (on_read_) on_read_(read_);
   }
   return buffer_.size() >= n;
 }
@@ -150,11 +152,22 @@ bool EventLogReader::may_begin_record(std::size_t position) {
   return big_endian(buffer_.data() + begin_ + position, available) == expected;
 }
 
+/// Where a sync word may begin at the earliest, `position` or later: what lies before it in the buffer is
+/// none.
+std::size_t EventLogReader::next_sync(std::size_t position) {
+  constexpr auto kFirst = static_cast<std::uint8_t>(kEventLogSync >> 24U);
+  const auto from =
+      buffer_.begin() + static_cast<std::ptrdiff_t>(std::min(begin_ + position, buffer_.size()));
+  return static_cast<std::size_t>(std::find(from, buffer_.end(), kFirst) - buffer_.begin()) - begin_;
+}
+
 /// Where the first record begins after `position` and before `limit` that another record, or the end of the
 /// file, follows without a gap.
 std::optional<std::size_t> EventLogReader::next_sure_record(std::size_t position, std::size_t limit) {
   std::size_t length = 0;
   for (std::size_t next = position + 1; next < limit && ensure(next + kEventLogHeaderBytes); ++next) {
+    next = next_sync(next);
+    if (next >= limit || !ensure(next + kEventLogHeaderBytes)) break;
     if (look_at(next, length) == Look::kRecord && may_begin_record(next + length)) return next;
   }
   return std::nullopt;
@@ -182,6 +195,7 @@ bool EventLogReader::next(LogEvent& event) {
       }
       skip = *behind;
     }
+    if (look == Look::kNoRecord) skip = next_sync(skip);
     begin_ += skip;
     bytes_skipped_ += skip;
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,6 +24,9 @@ class EventLogReader {
  public:
   /// Errors name what is there instead: nothing, a folder, an empty file, another kind of file.
   static Result<EventLogReader> open(const std::filesystem::path& path);
+
+  /// Is told, now and then, how many bytes of the file have been read.
+  void on_read(std::function<void(std::uint64_t bytes)> listener) { on_read_ = std::move(listener); }
 
   /// Fetches the next event. Returns false at the end of the file.
   [[nodiscard]] bool next(LogEvent& event);
@@ -42,11 +46,14 @@ class EventLogReader {
   Look look_at(std::size_t position, std::size_t& length);
   bool may_begin_record(std::size_t position);
   std::optional<std::size_t> next_sure_record(std::size_t position, std::size_t limit);
+  [[nodiscard]] std::size_t next_sync(std::size_t position);
   void take(LogEvent& event);
 
   std::ifstream file_;
   std::vector<std::uint8_t> buffer_;  // what is read and not yet consumed begins at begin_
   std::size_t begin_ = 0;
+  std::uint64_t read_ = 0;  // of the file
+  std::function<void(std::uint64_t)> on_read_;
   std::uint64_t events_ = 0;
   std::uint64_t bytes_skipped_ = 0;
   std::uint64_t bytes_cut_off_ = 0;

@@ -7,12 +7,18 @@
 #include <string_view>
 #include <system_error>
 
+#include "base/line_reader.h"
+#include "capture/stamp_range.h"
+
 namespace imuscope {
 namespace {
 
 constexpr std::string_view kHeader = "byte_offset,n_bytes,arrival_ns";
 constexpr std::size_t kBlockBytes = 4096;  // of a dump without arrivals
 constexpr std::size_t kColumns = 3;
+constexpr std::size_t kLongestLine = 256;
+/// No read of a device brings as much at once; a dump that is claimed to be one is given in pieces of this.
+constexpr std::uint64_t kLongestRead = std::uint64_t{1} << 20U;
 
 std::string_view without_line_end(std::string_view line) {
   while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
@@ -78,7 +84,7 @@ Result<std::vector<RawDump::Arrival>> RawDump::load_arrivals(const std::filesyst
   std::vector<Arrival> arrivals;
   std::uint64_t offset = 0;
   std::string text;
-  while (std::getline(file, text)) {
+  while (read_line(file, text, kLongestLine)) {
     // A last line without its end is what a kill leaves of it.
     const bool is_unfinished = file.eof() && offset > 0;
     line_number += 1;
@@ -98,6 +104,7 @@ Result<std::vector<RawDump::Arrival>> RawDump::load_arrivals(const std::filesyst
       return wrong("byte_offset is " + std::to_string(byte_offset) + ", but the read before ends at " +
                    std::to_string(offset));
     }
+    if (!is_stamp_ns(arrival_ns)) return wrong("an arrival_ns that no clock has reached");
     const HostTime arrival = host_time_from_ns(arrival_ns);
     if (!arrivals.empty() && arrival < arrivals.back().arrival) return wrong("arrival_ns goes back");
     arrivals.push_back({static_cast<std::uint64_t>(n_bytes), arrival});
@@ -119,8 +126,10 @@ std::optional<RawDump::Read> RawDump::next() {
   std::uint64_t wanted = kBlockBytes;
   if (has_arrivals()) {
     if (next_arrival_ == arrivals_.size()) return std::nullopt;
-    const Arrival& arrival = arrivals_[next_arrival_++];
-    wanted = arrival.n_bytes;
+    Arrival& arrival = arrivals_[next_arrival_];
+    wanted = std::min(arrival.n_bytes, kLongestRead);
+    arrival.n_bytes -= wanted;
+    if (arrival.n_bytes == 0) ++next_arrival_;
     read.arrival = arrival.arrival;
   }
   // In blocks, since n_bytes is only what a file says.

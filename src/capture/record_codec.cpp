@@ -5,6 +5,7 @@
 #include <imuscope/raw_t.hpp>
 #include <imuscope/run_t.hpp>
 
+#include "capture/stamp_range.h"
 #include "publish/message_builders.h"
 #include "publish/message_codec.h"
 
@@ -12,6 +13,11 @@ namespace imuscope {
 namespace {
 
 constexpr std::int64_t kNsPerUs = 1000;
+/// Nothing that is counted one by one gets as far: beyond is damage, and so is the record.
+constexpr std::int64_t kCountEnd = std::int64_t{1} << 62U;
+
+bool is_count(std::int64_t n) { return n >= 0 && n < kCountEnd; }
+bool is_stamp_us(std::int64_t us) { return us > -kStampEnd_ns / kNsPerUs && us < kStampEnd_ns / kNsPerUs; }
 
 std::int64_t fingerprint_of(const std::vector<std::uint8_t>& message) {
   std::uint64_t fingerprint = 0;
@@ -19,7 +25,8 @@ std::int64_t fingerprint_of(const std::vector<std::uint8_t>& message) {
   return static_cast<std::int64_t>(fingerprint);
 }
 
-RunHeader to_record(const run_t& message) {
+std::optional<CaptureRecord> to_record(const run_t& message) {
+  if (!is_stamp_ns(message.t0_ns) || !is_stamp_us(message.t0_utime)) return std::nullopt;
   RunHeader header;
   header.name = message.name;
   header.version = message.version;
@@ -34,7 +41,8 @@ RunHeader to_record(const run_t& message) {
   return header;
 }
 
-RawPiece to_record(const raw_t& message) {
+std::optional<CaptureRecord> to_record(const raw_t& message) {
+  if (!is_stamp_ns(message.arrival_ns) || !is_count(message.sequence)) return std::nullopt;
   RawPiece piece;
   piece.read.device = message.device;
   piece.read.direction = message.direction == raw_t::WRITE ? Direction::kWrite : Direction::kRead;
@@ -58,6 +66,10 @@ std::int8_t kind_of(ExceptionKind kind) {
 }
 
 std::optional<CaptureRecord> to_record(const exception_t& message) {
+  for (const std::int64_t number : {message.sample_sequence, message.tick}) {
+    if (number != -1 && !is_count(number)) return std::nullopt;
+  }
+  if (!is_count(message.count)) return std::nullopt;
   StoredException stored;
   switch (message.kind) {
     case exception_t::LATE_SAMPLE:
@@ -145,7 +157,8 @@ std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& mess
   } else if (fingerprint == applied_model_t::getHash()) {
     if (auto applied = decode_message<applied_model_t>(message)) return std::move(*applied);
   } else if (fingerprint == event_t::getHash()) {
-    if (auto event = decode_message<event_t>(message)) return std::move(*event);
+    auto event = decode_message<event_t>(message);
+    if (event && is_stamp_us(event->utime)) return std::move(*event);
   }
   return std::nullopt;
 }

@@ -4,8 +4,13 @@
 #include <charconv>
 #include <limits>
 
+#include "base/line_reader.h"
+
 namespace imuscope::report {
 namespace {
+
+/// No row of a run is as long: longer ones are damage.
+constexpr std::size_t kLongestRow = 65536;
 
 /// Takes the text before the next comma off the front of `rest`.
 std::string_view take_cell(std::string_view& rest) {
@@ -26,7 +31,7 @@ Result<CsvReader> CsvReader::open(const std::filesystem::path& file,
   CsvReader reader;
   reader.stream_.open(file);
   std::string header;
-  if (!reader.stream_ || !std::getline(reader.stream_, header)) {
+  if (!reader.stream_ || !read_line(reader.stream_, header, kLongestRow)) {
     return work_error(file.string() + " cannot be read or is empty",
                       "make the run again, or remove the file");
   }
@@ -52,7 +57,7 @@ Result<CsvReader> CsvReader::open(const std::filesystem::path& file,
 }
 
 bool CsvReader::next() {
-  if (!std::getline(stream_, row_)) return false;
+  if (!read_line(stream_, row_, kLongestRow) || row_.size() > kLongestRow) return false;
   drop_carriage_return(row_);
   std::string_view rest = row_;
   for (std::size_t i = 0; i < wanted_.size(); ++i) {

@@ -7,6 +7,7 @@
 #include "base/units.h"
 #include "report/csv_reader.h"
 #include "report/json_fields.h"
+#include "report/json_file.h"
 
 namespace imuscope::report {
 namespace {
@@ -28,12 +29,11 @@ tl::unexpected<Error> passed_on(const Result<T>& failed) {
 
 /// The document in `file`; null where the file is absent, which is noted in `absent`.
 Result<json> read_json(const std::filesystem::path& file, std::vector<std::string>& absent) {
-  std::ifstream stream(file);
   if (!std::filesystem::exists(file)) {
     absent.push_back(file.filename().string());
     return json{};
   }
-  json document = json::parse(stream, nullptr, /*allow_exceptions=*/false);
+  json document = read_json_file(file);
   if (document.is_discarded() || !document.is_object()) {
     return work_error(file.string() + " is not a JSON object", "make the run again, or remove the file");
   }

@@ -95,14 +95,21 @@ Result<std::string> interface_of(const std::filesystem::path& file, const Device
 
 }  // namespace
 
-Result<CandumpSurvey> survey_candump(const std::filesystem::path& file, const DeviceConfig& device) {
+Result<CandumpSurvey> survey_candump(
+    const std::filesystem::path& file, const DeviceConfig& device,
+    const std::function<void(const std::string& what, double share)>& progress) {
   auto log = CandumpLog::open(file);
   if (!log) return tl::unexpected<Error>(log.error());
   CandumpSurvey survey;
   std::map<std::string, std::uint64_t> found;
   survey.stamps_are_utc = true;
   PutBack put_back;
-  while (const CandumpFrame* entry = log->next()) {
+  std::error_code code;
+  const auto size = static_cast<double>(std::filesystem::file_size(file, code));
+  constexpr std::uint64_t kFramesPerProgress = 65536;
+  for (std::uint64_t frames = 0; const CandumpFrame* entry = log->next(); ++frames) {
+    if (progress && !code && frames % kFramesPerProgress == 0)
+      progress("looking through", static_cast<double>(log->bytes_read()) / size);
     ++found[entry->interface];
     put_back.look_at(entry->frame.stamp);
     if (to_ns(entry->frame.stamp) < kEarliestUtc_ns) survey.stamps_are_utc = false;

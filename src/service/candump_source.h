@@ -27,7 +27,9 @@ struct CandumpSurvey {
 /// Goes through a log once. A configured interface must be in it; without one, and with frames of one
 /// interface only, that one is meant.
 /// Errors name the file and what is wrong.
-Result<CandumpSurvey> survey_candump(const std::filesystem::path& file, const DeviceConfig& device);
+Result<CandumpSurvey> survey_candump(
+    const std::filesystem::path& file, const DeviceConfig& device,
+    const std::function<void(const std::string& what, double share)>& progress = {});
 
 /// The frames of a log, one a read, stamped and arriving at `clock` of the log's stamp.
 /// @param interface  empty: of every interface

@@ -9,6 +9,7 @@
 #include "base/units.h"
 #include "calibration/filter_core.h"
 #include "navigation/so3.h"
+#include "report/json_file.h"
 
 namespace imuscope {
 
@@ -22,7 +23,7 @@ Result<json> read_document(const std::filesystem::path& file, const std::string&
     return work_error(fmt::format("{} cannot be read", file.string()),
                       "name folders that `imuscope process`, `run` or `replay` wrote");
   }
-  auto document = json::parse(in, nullptr, false);
+  auto document = report::read_json_file(file);
   if (!document.is_object()) return work_error(fmt::format("{} is not a JSON object", file.string()));
   if (document.value("schema", std::string()) != schema) {
     return work_error(fmt::format("{} is not of schema {}", file.string(), schema),

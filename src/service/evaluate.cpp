@@ -4,6 +4,7 @@
 #include <fstream>
 
 #include "base/units.h"
+#include "report/json_file.h"
 #include "service/estimator_setup.h"
 #include "service/evaluation_drive.h"
 #include "service/evaluation_models.h"
@@ -21,22 +22,23 @@ Result<json> read_document(const std::filesystem::path& file) {
     return work_error(file.string() + " cannot be read",
                       "give the folder that `imuscope process` wrote with --out");
   }
-  auto document = json::parse(in, nullptr, false);
+  auto document = report::read_json_file(file);
   if (document.is_discarded()) return work_error(file.string() + " is no JSON", "make the run again");
   return document;
 }
 
 Result<OpenedRecording> open_run(const EvaluationRunOptions& options, const json& run) {
+  const OpeningProgress& progress = options.progress;
   std::vector<std::string> inputs = options.inputs;
   if (inputs.empty()) inputs = run.value("inputs", std::vector<std::string>{});
-  if (!options.configuration.empty()) return open_recording(inputs, options.configuration);
+  if (!options.configuration.empty()) return open_recording(inputs, options.configuration, progress);
   const bool dumps = !inputs.empty() && inputs.front().find('=') != std::string::npos;
-  if (!dumps) return open_recording(inputs, std::nullopt);
+  if (!dumps) return open_recording(inputs, std::nullopt, progress);
   const auto text = run.value("configuration_text", std::string{});
   if (text.empty()) return usage_error("run.json holds no configuration", "give it with --config");
   auto configuration = parse_configuration(text, run.value("configuration", std::string{"run.json"}));
   if (!configuration) return tl::unexpected<Error>(configuration.error());
-  return open_dumps(inputs, std::move(*configuration));
+  return open_dumps(inputs, std::move(*configuration), progress);
 }
 
 std::array<double, kImuAxes> turn_on_sd(const StudyConfig& study) {

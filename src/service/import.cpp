@@ -33,8 +33,12 @@ struct StampedRead {
 /// The reads of one device, in order.
 class DeviceReads {
  public:
-  DeviceReads(std::unique_ptr<ByteSource> source, std::unique_ptr<DeviceDecoder> decoder)
-      : source_(std::move(source)), decoder_(std::move(decoder)) {}
+  /// @param first_sample  arrival of its first sample, for what stands before it
+  DeviceReads(std::unique_ptr<ByteSource> source, std::unique_ptr<DeviceDecoder> decoder,
+              HostTime first_sample)
+      : source_(std::move(source)), decoder_(std::move(decoder)) {
+    stamp_.arrival = first_sample;
+  }
 
   /// The next read; nothing at the end.
   Result<std::optional<StampedRead>> next() {
@@ -43,6 +47,7 @@ class DeviceReads {
         auto read = source_->next();
         if (!read) return tl::unexpected<Error>(read.error());
         if (!*read) return last();
+        if (!(*read)->arrival && stamp_.arrival == HostTime::min()) return std::optional<StampedRead>{};
         if ((*read)->arrival) {
           return StampedRead{*(*read)->arrival, {(*read)->bytes.begin(), (*read)->bytes.end()}};
         }
@@ -72,13 +77,13 @@ class DeviceReads {
       decoder_->push(rest_.subspan(at_, 1), HostTime{}, stamp_);
       pending_.push_back(rest_[at_++]);
       if (std::exchange(stamp_.came, false)) return true;
-      if (pending_.size() >= kLongestRead && stamp_.arrival > HostTime::min()) return true;
+      if (pending_.size() >= kLongestRead) return true;
     }
     return false;
   }
   StampedRead give() { return {stamp_.arrival, std::exchange(pending_, {})}; }
   std::optional<StampedRead> last() {
-    if (pending_.empty() || stamp_.arrival == HostTime::min()) return std::nullopt;
+    if (pending_.empty()) return std::nullopt;
     return give();
   }
 
@@ -89,6 +94,29 @@ class DeviceReads {
   std::vector<std::uint8_t> pending_;
   Stamp stamp_;
 };
+
+/// Arrival of a source's first read, or of its first sample where reads have no arrivals; HostTime::min()
+/// where it has none.
+Result<HostTime> first_arrival(ByteSource& source, DeviceDecoder& decoder) {
+  class First final : public SampleSink {
+   public:
+    void on_sample(const Sample& sample) noexcept override {
+      if (arrival == HostTime::min()) arrival = sample.arrival;
+    }
+    HostTime arrival = HostTime::min();
+  } first;
+  while (first.arrival == HostTime::min()) {
+    auto read = source.next();
+    if (!read) return tl::unexpected<Error>(read.error());
+    if (!*read) {
+      decoder.finish(HostTime{}, first);
+      break;
+    }
+    if ((*read)->arrival) return *(*read)->arrival;
+    decoder.push((*read)->bytes, HostTime{}, first);
+  }
+  return first.arrival;
+}
 
 Result<std::vector<std::uint8_t>> beginning_of(const std::string& file) {
   auto source = open_raw_dump(file);
@@ -131,12 +159,15 @@ Result<std::string> draft_from_files(const std::vector<std::string>& inputs) {
 }
 
 Result<OpenedRecording> open_inputs(const ImportOptions& options) {
-  if (options.configuration) return open_recording(options.inputs, options.configuration);
+  const auto progress = [&options](const std::string& /*what*/, double share) {
+    if (options.progress) options.progress(share);
+  };
+  if (options.configuration) return open_recording(options.inputs, options.configuration, progress);
   const auto draft = draft_from_files(options.inputs);
   if (!draft) return tl::unexpected<Error>(draft.error());
   auto configuration = parse_configuration(*draft, "the draft");
   if (!configuration) return tl::unexpected<Error>(configuration.error());
-  return open_dumps(options.inputs, std::move(*configuration));
+  return open_dumps(options.inputs, std::move(*configuration), progress);
 }
 
 /// Writes the reads of all devices in the order of their arrival, equal ones in configuration order.
@@ -178,11 +209,16 @@ class Merger {
       if (!recording.present[i]) continue;
       const auto index = static_cast<DeviceIndex>(i);
       const DeviceConfig& config = opened_.configuration.devices[i];
+      const ClockMapConfig& clock = recording.clocks[i].map;
+      auto ahead = recording.open(index);
+      if (!ahead) return tl::unexpected<Error>(ahead.error());
+      const auto first = first_arrival(**ahead, *make_decoder(config, index, clock));
+      if (!first) return tl::unexpected<Error>(first.error());
       auto source = recording.open(index);
       if (!source) return tl::unexpected<Error>(source.error());
       devices_[i].index = index;
-      devices_[i].reads = std::make_unique<DeviceReads>(std::move(*source),
-                                                        make_decoder(config, index, recording.clocks[i].map));
+      devices_[i].reads =
+          std::make_unique<DeviceReads>(std::move(*source), make_decoder(config, index, clock), *first);
       devices_[i].counts = {config.name, 0, 0, recording.clocks[i].how};
       if (auto read = advance(devices_[i]); !read) return read;
     }

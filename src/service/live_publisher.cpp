@@ -76,7 +76,8 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       line_problems_(configuration.devices.size()),
       study_states_(study_devices_.size(), StudyStatus::kWaiting),
       observability_(study_devices_.size()),
-      started_(host_now()) {
+      started_(host_now()),
+      last_status_(started_) {
   for (const auto& study : estimator_config_.studies)
     feedback_.emplace_back(study.noise, study.noise_floor_share);
 }

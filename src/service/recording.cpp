@@ -18,6 +18,8 @@ namespace imuscope {
 
 namespace {
 
+constexpr std::uint64_t kReadsPerProgress = 1024;
+
 class SampleCollector final : public SampleSink {
  public:
   explicit SampleCollector(std::vector<Sample>& samples) : samples_(samples) {}
@@ -30,15 +32,19 @@ class SampleCollector final : public SampleSink {
 /// @param clock  fixed for a source without arrivals
 Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex index,
                                        const std::vector<std::string>& inputs, const ClockMapConfig& clock,
-                                       ByteSource& source) {
+                                       ByteSource& source, const OpeningProgress& progress) {
   std::vector<Sample> samples;
   SampleCollector collector(samples);
   const auto decoder = make_decoder(device, index, clock);
-  for (;;) {
+  for (std::uint64_t reads = 0;; ++reads) {
     auto read = source.next();
     if (!read) return tl::unexpected<Error>(read.error());
     if (!*read) break;
     decoder->push((*read)->bytes, (*read)->arrival.value_or(HostTime{}), collector);
+    if (progress && reads % kReadsPerProgress == 0 && source.bytes_total() > 0) {
+      progress("clock of " + device.name,
+               static_cast<double>(source.bytes_read()) / static_cast<double>(source.bytes_total()));
+    }
   }
   decoder->finish(HostTime{}, collector);
   if (samples.empty()) return tl::unexpected<Error>(no_sample_error(device, inputs, *decoder));
@@ -111,11 +117,13 @@ Result<void> check_stamps(const std::vector<std::filesystem::path>& files, const
 class LogAlignment {
  public:
   LogAlignment(const Configuration& configuration, const std::vector<std::string>& inputs,
-               const std::vector<std::filesystem::path>& files, const Logs& logs, OpenedRecording& opened)
+               const std::vector<std::filesystem::path>& files, const Logs& logs,
+               const OpeningProgress& progress, OpenedRecording& opened)
       : configuration_(configuration),
         inputs_(inputs),
         files_(files),
         logs_(logs),
+        progress_(progress),
         opened_(opened),
         reference_(configuration.reference_index()),
         clocks_(files.size(), own_times()) {}
@@ -188,20 +196,23 @@ class LogAlignment {
     auto source =
         logs_[i] ? open_candump(files_[i], logs_[i]->interface, log_clock) : open_raw_dump(files_[i]);
     if (!source) return tl::unexpected<Error>(source.error());
-    return decode_all(configuration_.devices[i], index, inputs_, opened_.recording.clocks[i].map, **source);
+    return decode_all(configuration_.devices[i], index, inputs_, opened_.recording.clocks[i].map, **source,
+                      progress_);
   }
 
   const Configuration& configuration_;
   const std::vector<std::string>& inputs_;
   const std::vector<std::filesystem::path>& files_;
   const Logs& logs_;
+  const OpeningProgress& progress_;
   OpenedRecording& opened_;
   std::size_t reference_;
   std::vector<ClockMapConfig> clocks_;  ///< of logs: the run's time of their stamps
   std::optional<Duration> utc_of_run_;
 };
 
-Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
+Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration,
+                                       const OpeningProgress& progress) {
   auto files = assign_files(inputs, configuration);
   if (!files) return tl::unexpected<Error>(files.error());
   const std::size_t n = configuration.devices.size();
@@ -221,7 +232,7 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
       continue;
     }
     if (CandumpLog::looks_like_one((*files)[i])) {
-      auto survey = survey_candump((*files)[i], configuration.devices[i]);
+      auto survey = survey_candump((*files)[i], configuration.devices[i], progress);
       if (!survey) return tl::unexpected<Error>(survey.error());
       opened.remarks.insert(opened.remarks.end(), survey->remarks.begin(), survey->remarks.end());
       logs[i] = std::move(*survey);
@@ -252,11 +263,11 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
     auto source = recording.open(index);
     if (!source) return tl::unexpected<Error>(source.error());
     return decode_all(configuration.devices[index], index, inputs, ClockMapConfig::fixed(HostTime{}, 1.0),
-                      **source);
+                      **source, progress);
   });
   if (!clocks) return tl::unexpected<Error>(clocks.error());
   recording.clocks = std::move(*clocks);
-  if (auto aligned = LogAlignment(configuration, inputs, *files, logs, opened).run(); !aligned) {
+  if (auto aligned = LogAlignment(configuration, inputs, *files, logs, progress, opened).run(); !aligned) {
     return tl::unexpected<Error>(aligned.error());
   }
   for (std::size_t i = 0; i < n; ++i) {
@@ -284,18 +295,14 @@ RecordedSchedule schedule_of(const CaptureSummary& summary, const Configuration&
             {device, static_cast<std::uint64_t>(exception.sample_sequence), exception.tick});
         break;
       case ExceptionKind::kRefusedSample:
-        for (std::int64_t k = 0; k < std::max<std::int64_t>(exception.count, 1); ++k) {
-          schedule.refused_samples.push_back(
-              {device, static_cast<std::uint64_t>(exception.sample_sequence + k)});
-        }
+        schedule.refused_samples[device].add(exception.sample_sequence,
+                                             std::max<std::int64_t>(exception.count, 1));
         break;
       case ExceptionKind::kSkippedTicks:
-        for (std::int64_t k = exception.count; k > 0; --k)
-          schedule.skipped_ticks.push_back(exception.tick - k);
+        schedule.skipped_ticks.add(exception.tick - exception.count, exception.count);
         break;
     }
   }
-  std::sort(schedule.skipped_ticks.begin(), schedule.skipped_ticks.end());
   const auto studies = configuration.study_indices();
   for (const auto& record : summary.applied_models) {
     const auto study = std::find(studies.begin(), studies.end(), index_of(record.device));
@@ -307,8 +314,10 @@ RecordedSchedule schedule_of(const CaptureSummary& summary, const Configuration&
 }
 
 Result<OpenedRecording> open_capture(const std::string& input,
-                                     const std::optional<std::filesystem::path>& file) {
-  const auto summary = summarise_capture(input);
+                                     const std::optional<std::filesystem::path>& file,
+                                     const OpeningProgress& progress) {
+  const auto of_file = [&progress](double share) { progress("looking through", share); };
+  const auto summary = progress ? summarise_capture(input, of_file) : summarise_capture(input);
   if (!summary) return tl::unexpected<Error>(summary.error());
   if (!summary->has_run && !file) {
     return usage_error(
@@ -378,19 +387,21 @@ Result<OpenedRecording> open_capture(const std::string& input,
 
 }  // namespace
 
-Result<OpenedRecording> open_dumps(const std::vector<std::string>& inputs, Configuration configuration) {
-  return open_raw_dumps(inputs, std::move(configuration));
+Result<OpenedRecording> open_dumps(const std::vector<std::string>& inputs, Configuration configuration,
+                                   const OpeningProgress& progress) {
+  return open_raw_dumps(inputs, std::move(configuration), progress);
 }
 
 Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
-                                       const std::optional<std::filesystem::path>& configuration) {
+                                       const std::optional<std::filesystem::path>& configuration,
+                                       const OpeningProgress& progress) {
   const auto is_dump = [](const std::string& input) { return input.find('=') != std::string::npos; };
   const auto n_dumps = std::count_if(inputs.begin(), inputs.end(), is_dump);
   if (n_dumps == 0) {
     if (inputs.size() != 1) {
       return usage_error("more than one capture is given", "give one capture, or raw dumps as NAME=FILE");
     }
-    return open_capture(inputs.front(), configuration);
+    return open_capture(inputs.front(), configuration, progress);
   }
   if (static_cast<std::size_t>(n_dumps) != inputs.size()) {
     return usage_error("captures and raw dumps (NAME=FILE) are mixed", "give one capture, or raw dumps only");
@@ -400,7 +411,7 @@ Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
   }
   auto loaded = load_configuration(*configuration);
   if (!loaded) return tl::unexpected<Error>(loaded.error());
-  return open_raw_dumps(inputs, std::move(*loaded));
+  return open_raw_dumps(inputs, std::move(*loaded), progress);
 }
 
 }  // namespace imuscope

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <set>
 
 #include "rt/host_clock.h"
 #include "rt/periodic.h"
@@ -17,13 +16,14 @@ class RingSink final : public SampleSink {
  public:
   /// @param refused  sequence numbers that the live run's ring refused
   /// @param tap      sees every sample; must outlive the sink, may be empty
-  RingSink(SampleRing& ring, std::set<std::uint64_t> refused, const std::function<void(const Sample&)>& tap)
+  RingSink(SampleRing& ring, NumberRanges refused, const std::function<void(const Sample&)>& tap)
       : ring_(&ring), refused_live_(std::move(refused)), tap_(&tap) {}
 
   void on_sample(const Sample& sample) noexcept override {
     newest_arrival_ = std::max(newest_arrival_, sample.arrival);
     if (*tap_) (*tap_)(sample);
-    if (refused_live_.contains(sample.sequence) || !ring_->try_push(sample)) ++refused_;
+    if (refused_live_.contains(static_cast<std::int64_t>(sample.sequence)) || !ring_->try_push(sample))
+      ++refused_;
   }
   [[nodiscard]] HostTime newest_arrival() const { return newest_arrival_; }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
@@ -31,7 +31,7 @@ class RingSink final : public SampleSink {
 
  private:
   SampleRing* ring_;
-  std::set<std::uint64_t> refused_live_;
+  NumberRanges refused_live_;
   const std::function<void(const Sample&)>* tap_;
   HostTime newest_arrival_{HostTime::min()};
   std::uint64_t refused_ = 0;
@@ -68,6 +68,11 @@ class Feed {
   }
 
   [[nodiscard]] bool at_end() const { return !pending_; }
+  /// Whether nothing of it comes by then that has not come already.
+  [[nodiscard]] bool is_idle_at(HostTime cut) const {
+    if (!pending_) return true;
+    return pending_->arrival ? *pending_->arrival > cut : sink_.newest_arrival() > cut;
+  }
   [[nodiscard]] const ByteSource& source() const { return *source_; }
   [[nodiscard]] const DeviceDecoder& decoder() const { return *decoder_; }
   [[nodiscard]] const RingSink& sink() const { return sink_; }
@@ -141,13 +146,10 @@ class Replayer {
     return {};
   }
 
-  [[nodiscard]] std::set<std::uint64_t> refused(DeviceIndex device) const {
-    std::set<std::uint64_t> sequences;
-    if (!recording_.schedule) return sequences;
-    for (const auto& sample : recording_.schedule->refused_samples) {
-      if (sample.device == device) sequences.insert(sample.sequence);
-    }
-    return sequences;
+  [[nodiscard]] NumberRanges refused(DeviceIndex device) const {
+    if (!recording_.schedule) return {};
+    const auto found = recording_.schedule->refused_samples.find(device);
+    return found == recording_.schedule->refused_samples.end() ? NumberRanges{} : found->second;
   }
 
   [[nodiscard]] std::optional<HostTime> first_cut() const {
@@ -169,13 +171,11 @@ class Replayer {
   }
 
   Result<void> run_ticks(HostTime t0, std::int64_t& ticks) {
-    const auto skipped = recording_.schedule
-                             ? std::set<std::int64_t>(recording_.schedule->skipped_ticks.begin(),
-                                                      recording_.schedule->skipped_ticks.end())
-                             : std::set<std::int64_t>{};
+    const auto skipped = recording_.schedule ? recording_.schedule->skipped_ticks : NumberRanges{};
     const HostTime started = host_now();
     for (std::int64_t index = 0; !finished(index); ++index) {
       const HostTime cut = t0 + index * kTickPeriod;
+      if (index % kProgressTicks == 0 && pauses_too_long(cut)) break;
       for (auto& feed : feeds_) {
         if (!feed) continue;
         if (auto fed = feed->feed(cut); !fed) return fed;
@@ -195,6 +195,15 @@ class Replayer {
     return {};
   }
 
+  /// Whether nothing happens for longer than any drive pauses.
+  [[nodiscard]] bool pauses_too_long(HostTime cut) const {
+    return std::all_of(feeds_.begin(), feeds_.end(),
+                       [cut](const auto& feed) { return !feed || feed->is_idle_at(cut + kLongestPause); }) &&
+           std::any_of(feeds_.begin(), feeds_.end(), [cut](const auto& feed) {
+             return feed && (!feed->at_end() || feed->sink().newest_arrival() > cut + kLongestPause);
+           });
+  }
+
   [[nodiscard]] double share_read() const {
     double read = 0.0;
     double total = 0.0;
@@ -211,7 +220,12 @@ class Replayer {
     if (!feeds_[i]) return result;
     result.counters = feeds_[i]->decoder().counters();
     result.refused = feeds_[i]->sink().refused();
-    result.problem = decoder_problem(configuration_.devices[i], feeds_[i]->decoder());
+    result.problem =
+        feeds_[i]->at_end()
+            ? decoder_problem(configuration_.devices[i], feeds_[i]->decoder())
+            : fmt::format("only {} of {} bytes are used: the next stamp lies more than {} h ahead",
+                          feeds_[i]->decoder().counters().bytes, feeds_[i]->source().bytes_total(),
+                          std::chrono::duration_cast<std::chrono::hours>(kLongestPause).count());
     return result;
   }
 

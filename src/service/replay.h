@@ -5,6 +5,7 @@
 /// by content (clock_alignment.h).
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,28 +17,26 @@
 #include "service/clock_alignment.h"
 #include "service/config.h"
 #include "service/core.h"
+#include "service/number_ranges.h"
 
 namespace imuscope {
 
 /// Opens the recorded bytes of device `index` from their beginning; a study reads them more than once.
 using OpenSource = std::function<Result<std::unique_ptr<ByteSource>>(DeviceIndex index)>;
 
-/// A sample that found its ring full in the live run: the core never saw it.
-struct RefusedSample {
-  DeviceIndex device;
-  std::uint64_t sequence;
-};
-
 /// After the newest arrival the core runs on for this many ticks, live and in replay: what waits for a
 /// reference that does not come is given up by then.
 inline constexpr std::int64_t kTailTicks = 20;
+
+inline constexpr Duration kLongestPause = std::chrono::hours(24);
 
 /// What a recording says about the live run it came from, so that a replay repeats it tick by tick.
 struct RecordedSchedule {
   HostTime t0{};  ///< cut of tick 0
   CoreSchedule core;
-  std::vector<std::int64_t> skipped_ticks;  ///< ascending
-  std::vector<RefusedSample> refused_samples;
+  NumberRanges skipped_ticks;
+  /// By device: sequence numbers of samples that found their ring full, which the core never saw.
+  std::map<DeviceIndex, NumberRanges> refused_samples;
 };
 
 /// A recording, ready to be replayed any number of times.
@@ -55,7 +54,7 @@ struct DeviceResult {
   DecoderCounters counters;
   std::uint64_t refused = 0;         ///< samples that found their ring full
   std::uint64_t frames_dropped = 0;  ///< of a live run: lost by this PC before they could be read
-  std::string problem;               ///< decoder_problem()
+  std::string problem;               ///< decoder_problem(), or that its reads end before the recording does
 };
 
 struct ReplayResult {
@@ -74,6 +73,9 @@ struct ReplayOptions {
 
 /// Runs the recording through a core made from `estimator`. Errors: a recording that cannot be read, or that
 /// holds no sample of the reference or of any study (kWork).
+///
+/// What follows a pause of all devices of more than kLongestPause is left out, and told as a problem of each
+/// device that has more: no drive has such a pause, a damaged stamp has.
 Result<ReplayResult> replay(const Configuration& configuration, const EstimatorConfig& estimator,
                             const Recording& recording, CoreSink& sink, const ReplayOptions& options = {});
 

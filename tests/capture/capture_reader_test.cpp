@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <imuscope/raw_t.hpp>
+#include <limits>
 #include <random>
 
 #include "capture/capture_writer.h"
@@ -105,6 +106,32 @@ TEST(CaptureReader, GivesBackTheRunHeaderAndEveryReadWithItsBoundaries) {
   EXPECT_EQ(reads[0].bytes, (Bytes{1, 2, 3}));
   EXPECT_EQ(reads[1].direction, Direction::kWrite);
   EXPECT_EQ(reads[2].bytes, (Bytes{4}));
+}
+
+TEST(CaptureReader, TakesRecordsWithImpossibleTimesAndCountsForDamage) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(0, 0, 1, {1});
+  constexpr std::int64_t kAfterAll_ms = std::numeric_limits<std::int64_t>::max() / 1'000'000 - 60'000;
+  capture.chunk(0, 1, kAfterAll_ms, {2});
+  capture.chunk(0, -3, 2, {3});
+  capture.chunk(0, std::numeric_limits<std::int64_t>::max(), 2, {4});
+  capture.exception({ExceptionKind::kSkippedTicks, 0, -1, 7, -1});
+  capture.exception({ExceptionKind::kSkippedTicks, 0, -1, 7, std::numeric_limits<std::int64_t>::max()});
+  capture.exception({ExceptionKind::kLateSample, 0, 5, std::numeric_limits<std::int64_t>::min(), 1});
+  capture.chunk(0, 1, 3, {5});
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value()) << summary.error().text();
+  EXPECT_EQ(summary->devices.at("airins").reads, 2U);
+  EXPECT_TRUE(summary->exceptions.empty());
+  EXPECT_EQ(summary->other_messages, 6U) << "none is passed over in silence";
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  const auto reads = read_all(*reader);
+  ASSERT_EQ(reads.size(), 2U);
+  EXPECT_EQ(reads[1].bytes, (Bytes{5}));
 }
 
 TEST(CaptureReader, OrdersByArrivalThenConfigurationThenHappening) {

@@ -87,6 +87,7 @@ TEST_F(RawDumpTest, NamesTheLineThatCannotBe) {
   EXPECT_THAT(error_of(header + "0,0,1\n"), HasSubstr("a read of 0 bytes"));
   EXPECT_THAT(error_of(header + "0,4,9\n4,4,8\n"), HasSubstr(":3: arrival_ns goes back"));
   EXPECT_THAT(error_of(header + "0,4,9\n"), HasSubstr("the reads end at byte 4 of 8"));
+  EXPECT_THAT(error_of(header + "0,4,9\n4,4,9223372036854775807\n"), HasSubstr("that no clock has reached"));
   EXPECT_THAT(error_of(""), HasSubstr("the file is empty"));
 }
 
@@ -96,6 +97,21 @@ TEST_F(RawDumpTest, ALengthThatNoFileHasDoesNotAskForItsMemory) {
   auto dump = RawDump::open(folder_ / "mtx1.bin");
   ASSERT_TRUE(dump.has_value());
   EXPECT_EQ(dump->next()->bytes.size(), 4U);
+}
+
+TEST_F(RawDumpTest, AReadThatIsLongerThanAnyComesInPiecesOfItsArrival) {
+  constexpr std::size_t kMiB = 1U << 20U;
+  write("mtx1.bin", std::string(2 * kMiB + 5, 'x'));
+  write("mtx1.arrivals.csv", "byte_offset,n_bytes,arrival_ns\n0,2097157,7\n");
+  auto dump = RawDump::open(folder_ / "mtx1.bin");
+  ASSERT_TRUE(dump.has_value());
+  std::size_t bytes = 0;
+  while (const auto read = dump->next()) {
+    EXPECT_LE(read->bytes.size(), kMiB);
+    EXPECT_EQ(read->arrival, host_time_from_ns(7));
+    bytes += read->bytes.size();
+  }
+  EXPECT_EQ(bytes, 2 * kMiB + 5);
 }
 
 TEST_F(RawDumpTest, SaysWhatIsThereInstead) {

@@ -1,30 +1,13 @@
 /// A file that claims to be a capture: read as an event log, summarised, and read device by device.
 
-#include <sys/mman.h>
-#include <unistd.h>
 #include <string>
 
 #include "capture/capture_reader.h"
 #include "capture/event_log_reader.h"
-#include "tests/fuzz/fuzz.h"
+#include "tests/fuzz/file_in_memory.h"
 
 namespace imuscope::fuzz {
 namespace {
-
-/// The input as a file that never touches a disk.
-class FileInMemory {
- public:
-  FileInMemory(const std::uint8_t* data, std::size_t size) : fd_(::memfd_create("capture", MFD_CLOEXEC)) {
-    require(::write(fd_, data, size) == static_cast<ssize_t>(size), "the input is in the file");
-  }
-  FileInMemory(const FileInMemory&) = delete;
-  FileInMemory& operator=(const FileInMemory&) = delete;
-  ~FileInMemory() { ::close(fd_); }
-  [[nodiscard]] std::string path() const { return "/proc/self/fd/" + std::to_string(fd_); }
-
- private:
-  int fd_;
-};
 
 void read_events(const std::string& path, std::size_t size) {
   auto log = EventLogReader::open(path);

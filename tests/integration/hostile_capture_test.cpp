@@ -5,10 +5,13 @@
 #include <sys/stat.h>
 #include <fstream>
 #include <functional>
+#include <imuscope/exception_t.hpp>
 #include <imuscope/raw_t.hpp>
 #include <imuscope/run_t.hpp>
 #include <lcm/lcm-cpp.hpp>
+#include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "capture/event_log_reader.h"
 #include "programs.h"
@@ -108,6 +111,41 @@ TEST_F(HostileCapture, ADeviceThatTheConfigurationDoesNotNameBecomesNoFile) {
   });
   (void)replay();  // whether the reference alone is worth a run is not the question here
   EXPECT_EQ(strays(), std::set<std::string>{});
+}
+
+TEST_F(HostileCapture, AStampYearsAheadCostsWhatFollowsItOnThatDeviceAndNoTime) {
+  std::int64_t reads = 0;
+  constexpr std::int64_t kTenYears_ns = 10 * 365 * 86'400 * std::int64_t{1'000'000'000};
+  forge([&](LogEvent& event) {
+    auto raw = decode_message<raw_t>(event.data);
+    if (!raw || raw->device != "mtx1" || ++reads != 200) return;
+    raw->arrival_ns += kTenYears_ns;
+    event.data = encode_message(*raw);
+  });
+  ASSERT_EQ(replay(), 0) << read_text(home_ / "log");
+  const auto run = nlohmann::json::parse(read_text(home_ / "out" / "run.json"));
+  for (const auto& device : run.at("devices")) {
+    const auto problem = device.at("problem").get<std::string>();
+    const bool is_told = problem.find("the next stamp lies more than 24 h ahead") != std::string::npos;
+    EXPECT_EQ(is_told, device.at("name") == "mtx1") << device.at("name") << ": " << problem;
+  }
+}
+
+TEST_F(HostileCapture, ARowOfRefusedSamplesOrSkippedTicksMayClaimAnyLength) {
+  bool told = false;
+  forge([&](LogEvent& event) {
+    if (!decode_message<raw_t>(event.data) || std::exchange(told, true)) return;
+    exception_t refused;
+    refused.utime = event.utime;
+    refused.sequence = 0;
+    refused.kind = exception_t::REFUSED_SAMPLE;
+    refused.device = "mtx1";
+    refused.sample_sequence = 1'000'000'000;
+    refused.tick = -1;
+    refused.count = std::int64_t{1} << 61U;
+    event.data = encode_message(refused);
+  });
+  ASSERT_EQ(replay(), 0) << read_text(home_ / "log");
 }
 
 TEST_F(HostileCapture, NothingThatARunLeavesIsWorldWritable) {

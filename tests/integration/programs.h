@@ -25,6 +25,8 @@ class BackgroundProgram {
   void send(int signal) const;
   void interrupt() const;  ///< as Ctrl-C does
   int wait();              ///< its exit code, or -1
+  [[nodiscard]] pid_t id() const { return process_; }
+
  private:
   pid_t process_;
 };

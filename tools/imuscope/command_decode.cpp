@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/mman.h>
 #include <unistd.h>
 #include <algorithm>
 #include <boost/interprocess/file_mapping.hpp>
@@ -62,16 +63,24 @@ class MappedFile {
   [[nodiscard]] Stream bytes() const {
     return {static_cast<const std::uint8_t*>(region_.get_address()), region_.get_size()};
   }
+  /// Gives the memory of everything before `offset` back; a look at it reads it again.
+  void release(std::uint64_t offset) const {
+    // posix_madvise(), which boost uses, leaves pages where they are.
+    (void)::madvise(region_.get_address(), std::min<std::uint64_t>(offset, region_.get_size()),
+                    MADV_DONTNEED);
+  }
 
  private:
   boost::interprocess::mapped_region region_;
 };
 
 /// Bytes of messages that prove the protocol.
-std::size_t proven_bytes(const StreamProtocol& protocol, Stream stream) {
+std::size_t proven_bytes(
+    const StreamProtocol& protocol, Stream stream,
+    const std::function<void(std::uint64_t)>& on_position = [](std::uint64_t) {}) {
   std::size_t proven = 0;
-  protocol.decode(stream,
-                  [&](const DecodedMessage& message) { proven += message.proven ? message.size : 0; });
+  const auto on_message = [&](const DecodedMessage& message) { proven += message.proven ? message.size : 0; };
+  protocol.decode(stream, {on_message, on_position});
   return proven;
 }
 
@@ -123,21 +132,20 @@ void print(const StreamProtocol& protocol, const DecodedMessage& message, bool j
 /// others.
 class Printer {
  public:
-  Printer(Stream stream, const StreamProtocol& protocol, bool json)
-      : stream_(stream), protocol_(protocol), json_(json) {
+  Printer(const MappedFile& file, const StreamProtocol& protocol, bool json)
+      : file_(file), stream_(file.bytes()), protocol_(protocol), json_(json) {
     // On a terminal the messages themselves show how far it is.
     if (::isatty(STDOUT_FILENO) == 0) bar_.emplace();
   }
 
   Totals run() {
-    protocol_.decode(stream_, [this](const DecodedMessage& message) {
-      if (bar_)
-        bar_->show("decoding", static_cast<double>(message.offset) / static_cast<double>(stream_.size()));
+    const auto on_message = [this](const DecodedMessage& message) {
       fill_gap(message.offset);
       print(protocol_, message, json_);
       ++totals_.messages;
       end_ = std::max<std::uint64_t>(end_, message.offset + message.size);
-    });
+    };
+    protocol_.decode(stream_, {on_message, [this](std::uint64_t offset) { pass("decoding", offset); }});
     fill_gap(stream_.size());
     return totals_;
   }
@@ -151,23 +159,33 @@ class Printer {
     std::size_t most = 0;
     for (const StreamProtocol& other : stream_protocols()) {
       if (!other.mixes_with_others || other.name == protocol_.name) continue;
-      const std::size_t covered = proven_bytes(other, gap);
+      const auto on_position = [&](std::uint64_t offset) {
+        pass(fmt::format("looking for {}", other.name), end_ + offset);
+      };
+      const std::size_t covered = proven_bytes(other, gap, on_position);
       if (covered > most) {
         most = covered;
         best = &other;
       }
     }
     if (best != nullptr) {
-      best->decode(gap, [&](DecodedMessage message) {
+      const auto on_message = [&](DecodedMessage message) {
         message.offset += end_;
         print(*best, message, json_);
         ++totals_.messages;
-      });
+      };
+      best->decode(gap, {on_message, [this](std::uint64_t offset) { pass("decoding", end_ + offset); }});
     }
     totals_.bytes_skipped += gap.size() - most;
     end_ = to;
   }
 
+  void pass(const std::string& step, std::uint64_t offset) {
+    if (bar_) bar_->show(step, static_cast<double>(offset) / static_cast<double>(stream_.size()));
+    file_.release(offset);
+  }
+
+  const MappedFile& file_;
   Stream stream_;
   const StreamProtocol& protocol_;
   bool json_;
@@ -177,7 +195,7 @@ class Printer {
 };
 
 /// A log of CAN frames as the messages of a vehicle's DBC file.
-Result<Totals> decode_with_dbc(const Options& options, Stream stream) {
+Result<Totals> decode_with_dbc(const Options& options, const MappedFile& file) {
   const auto text = dbc::read_text(options.dbc);
   if (!text) return tl::unexpected<Error>(text.error());
   const auto database = dbc::parse(*text, options.dbc);
@@ -185,30 +203,31 @@ Result<Totals> decode_with_dbc(const Options& options, Stream stream) {
   const StreamProtocol candump{"candump", decode_candump_frames, false};
   Totals totals;
   std::uint64_t covered = 0;
-  decode_candump(stream, &*database, [&](const DecodedMessage& message) {
+  const auto on_message = [&](const DecodedMessage& message) {
     print(candump, message, options.json);
     ++totals.messages;
     covered += message.size;
-  });
+  };
+  decode_candump(file.bytes(), &*database, {on_message, [&](std::uint64_t offset) { file.release(offset); }});
   if (totals.messages == 0) {
     return work_error(fmt::format("no CAN frame in {}", options.file),
                       "--dbc wants a log as `candump -l` writes it");
   }
-  totals.bytes_skipped = stream.size() - covered;
+  totals.bytes_skipped = file.bytes().size() - covered;
   return totals;
 }
 
-Result<Totals> decode_stream(const Options& options, Stream stream) {
-  if (!options.dbc.empty()) return decode_with_dbc(options, stream);
-  const auto protocol = choose_protocol(options, stream);
+Result<Totals> decode_stream(const Options& options, const MappedFile& file) {
+  if (!options.dbc.empty()) return decode_with_dbc(options, file);
+  const auto protocol = choose_protocol(options, file.bytes());
   if (!protocol) return tl::unexpected<Error>(protocol.error());
-  return Printer(stream, **protocol, options.json).run();
+  return Printer(file, **protocol, options.json).run();
 }
 
 Result<void> decode(const Options& options) {
   const auto file = MappedFile::open(options.file);
   if (!file) return tl::unexpected<Error>(file.error());
-  const auto totals = decode_stream(options, file->bytes());
+  const auto totals = decode_stream(options, *file);
   if (!totals) return tl::unexpected<Error>(totals.error());
   if (options.json) {
     fmt::print("{{\"messages\": {}, \"bytes_skipped\": {}}}\n", totals->messages, totals->bytes_skipped);

@@ -29,7 +29,10 @@ struct Options {
 Result<OpenedRecording> open(const Options& options, const std::vector<std::string>& inputs) {
   std::optional<std::filesystem::path> config;
   if (!options.config.empty()) config = options.config;
-  auto opened = open_recording(inputs, config);
+  ProgressBar bar;
+  auto opened =
+      open_recording(inputs, config, [&](const std::string& what, double share) { bar.show(what, share); });
+  bar.clear();
   if (opened) {
     for (const auto& remark : opened->remarks) spdlog::info("{}", remark);
   }

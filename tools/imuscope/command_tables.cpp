@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 
 #include "base/units.h"
 #include "commands.h"
+#include "report/json_file.h"
 
 namespace imuscope::cli {
 namespace {
@@ -24,8 +24,7 @@ struct Options {
 };
 
 Result<json> read(const std::filesystem::path& file, const std::string& remedy) {
-  std::ifstream in(file);
-  auto document = in ? json::parse(in, nullptr, false) : json(json::value_t::discarded);
+  auto document = report::read_json_file(file);
   if (document.is_discarded()) return work_error(file.string() + " is absent or no JSON", remedy);
   return document;
 }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "noise/json.h"
+#include "report/json_file.h"
 
 namespace imuscope::cli {
 namespace {
@@ -32,7 +33,7 @@ Result<std::vector<StoredFit>> read_fits(const std::filesystem::path& file) {
     return work_error(fmt::format("{} is not a file that can be read", file.string()),
                       "give what `imuscope fit --json` printed or a run's models.json");
   }
-  const auto json = nlohmann::json::parse(in, nullptr, false);
+  const auto json = report::read_json_file(file);
   if (json.is_discarded()) return work_error(fmt::format("{} is not JSON", file.string()));
   const bool is_run = json.is_object() && json.contains("models") && json.at("models").is_array();
   const auto entries = is_run ? json.at("models") : nlohmann::json::array({json});

@@ -16,8 +16,10 @@ class ProgressBar {
   /// @param share  0 to 1
   void show(const std::string& step, double share);
 
- private:
+  /// Takes it off the screen.
   void clear();
+
+ private:
   bool is_terminal_;
   int shown_percent_ = -1;
   std::string shown_step_;

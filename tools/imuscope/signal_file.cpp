@@ -16,6 +16,8 @@
 #include <string_view>
 #include <system_error>
 
+#include "base/line_reader.h"
+
 namespace imuscope::cli {
 namespace {
 
@@ -100,8 +102,9 @@ Result<std::size_t> find_column(const std::vector<std::string>& names, bool has_
                      fmt::format("did you mean '{}'? {}", nearest(names, wanted), list));
 }
 
-/// A hole longer than this is not padded sample by sample: the counter began anew.
-constexpr std::int64_t kLongestHole = 10'000'000;
+/// Holes longer than this, alone or together, are not padded sample by sample: the counter is none.
+constexpr std::int64_t kHolesMax = 10'000'000;
+constexpr std::size_t kLongestLine = std::size_t{1} << 20U;
 
 class CsvReader {
  public:
@@ -109,8 +112,12 @@ class CsvReader {
 
   Result<Signal> read(std::istream& in) {
     std::string line;
-    while (std::getline(in, line)) {
+    while (read_line(in, line, kLongestLine)) {
       ++line_number_;
+      if (line.size() > kLongestLine) {
+        return work_error(fmt::format("{}, line {}: longer than {} bytes", file_, line_number_, kLongestLine),
+                          "a CSV file has one row a line");
+      }
       const std::string_view content = trimmed(std::string_view(line).substr(0, line.find('#')));
       if (content.empty()) continue;
       if (auto taken = take(content); !taken) return tl::unexpected(taken.error());
@@ -200,9 +207,14 @@ class CsvReader {
   Result<void> pad_hole() {
     const auto count = number(*counter_index_);
     if (!count) return tl::unexpected(count.error());
+    constexpr double kWholeNumbersEnd = 9007199254740992.0;  // 2^53: doubles beyond it do not count by ones
+    if (!(std::abs(*count) < kWholeNumbersEnd)) {
+      return work_error(fmt::format("{}, line {}: {} is no count", file_, line_number_, *count));
+    }
     const auto counter = static_cast<std::int64_t>(std::llround(*count));
     const std::int64_t hole = next_counter_ ? counter - *next_counter_ : 0;
-    if (hole < 0 || hole > kLongestHole) {
+    padded_ += hole;
+    if (hole < 0 || padded_ > kHolesMax) {
       return work_error(fmt::format("{}, line {}: the counter goes from {} to {}", file_, line_number_,
                                     *next_counter_ - 1, counter),
                         "it must rise from row to row");
@@ -226,6 +238,7 @@ class CsvReader {
   std::string wanted_;
   std::optional<std::size_t> counter_index_;
   std::optional<std::int64_t> next_counter_;
+  std::int64_t padded_ = 0;
   std::size_t line_number_ = 0;
   char separator_ = ',';
   bool started_ = false;

@@ -4,11 +4,12 @@
 #include <fmt/ranges.h>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "report/json_file.h"
 
 namespace imuscope::cli {
 
@@ -19,9 +20,7 @@ using nlohmann::json;
 constexpr double kMdegPerRad = 180.0 / 3.14159265358979323846 * 1e3;
 
 std::optional<json> read(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  if (!in) return std::nullopt;
-  auto document = json::parse(in, nullptr, false);
+  auto document = report::read_json_file(file);
   if (document.is_discarded()) return std::nullopt;
   return document;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "drivers/transport/candump.h"
+#include "whole_stream.h"
 
 namespace imuscope::cli {
 namespace {
@@ -69,26 +70,29 @@ void describe_frame(std::string_view line, const CandumpFrame& logged, const dbc
 }  // namespace
 
 void decode_candump(std::span<const std::uint8_t> stream, const dbc::Database* database,
-                    const OnMessage& on_message) {
+                    const Visitor& visitor) {
   const std::string_view text(reinterpret_cast<const char*>(stream.data()), stream.size());
+  std::uint64_t told = 0;
   for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
+    tell_position(visitor, at, told);
+    const std::size_t end = line_end(text, at, "\n");
+    const std::size_t next = end < text.size() && text[end] == '\n' ? end + 1 : end;
     std::string_view line = text.substr(at, end - at);
     if (line.ends_with('\r')) line.remove_suffix(1);
     const CandumpLine read = read_candump_line(line);
     if (read.kind == CandumpLine::Kind::kFrame) {
       DecodedMessage message;
       message.offset = at;
-      message.size = std::min(end + 1, text.size()) - at;
+      message.size = next - at;
       describe_frame(line, read.frame, database, message);
-      on_message(message);
+      visitor.message(message);
     }
-    at = end + 1;
+    at = next;
   }
 }
 
-void decode_candump_frames(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
-  decode_candump(stream, nullptr, on_message);
+void decode_candump_frames(std::span<const std::uint8_t> stream, const Visitor& visitor) {
+  decode_candump(stream, nullptr, visitor);
 }
 
 }  // namespace imuscope::cli

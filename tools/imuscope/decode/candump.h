@@ -9,6 +9,6 @@ namespace imuscope::cli {
 
 /// @param database  null: frames as they are
 void decode_candump(std::span<const std::uint8_t> stream, const dbc::Database* database,
-                    const OnMessage& on_message);
+                    const Visitor& visitor);
 
 }  // namespace imuscope::cli

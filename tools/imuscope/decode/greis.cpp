@@ -41,15 +41,15 @@ bool is_sentence(std::span<const std::uint8_t> line) {
 
 }  // namespace
 
-void decode_greis(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
-  scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+void decode_greis(std::span<const std::uint8_t> stream, const Visitor& visitor) {
+  scan_whole<Scanner, Frame>(stream, visitor, [&](const Frame& frame) {
     const auto size = behind_line_end(stream, frame.offset + frame.bytes.size()) - frame.offset;
     if (frame.kind == Frame::Kind::kText) {
       if (is_sentence(frame.bytes)) return;
-      on_message({frame.offset, size, "TEXT", false, {{"text", text_of(frame.bytes)}}});
+      visitor.message({frame.offset, size, "TEXT", false, {{"text", text_of(frame.bytes)}}});
       return;
     }
-    on_message({frame.offset, size, text_of(frame.bytes.first(kIdSize)), true, message_json(frame)});
+    visitor.message({frame.offset, size, text_of(frame.bytes.first(kIdSize)), true, message_json(frame)});
   });
 }
 

@@ -87,11 +87,11 @@ Json answer_json(std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
-void decode_ixblue_stdbin(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
-  scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+void decode_ixblue_stdbin(std::span<const std::uint8_t> stream, const Visitor& visitor) {
+  scan_whole<Scanner, Frame>(stream, visitor, [&](const Frame& frame) {
     const bool telegram = frame.kind == Frame::Kind::kTelegram;
-    on_message({frame.offset, frame.bytes.size(), telegram ? "telegram" : "answer", true,
-                telegram ? telegram_json(parse_telegram(frame.bytes)) : answer_json(frame.bytes)});
+    visitor.message({frame.offset, frame.bytes.size(), telegram ? "telegram" : "answer", true,
+                     telegram ? telegram_json(parse_telegram(frame.bytes)) : answer_json(frame.bytes)});
   });
 }
 

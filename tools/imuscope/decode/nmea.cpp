@@ -25,8 +25,8 @@ Json value_json(const NamedValue& value) {
 
 }  // namespace
 
-void decode_nmea(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
-  scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+void decode_nmea(std::span<const std::uint8_t> stream, const Visitor& visitor) {
+  scan_whole<Scanner, Frame>(stream, visitor, [&](const Frame& frame) {
     const Fields sentence(frame.sentence);
     DecodedMessage message;
     message.offset = frame.offset;
@@ -36,7 +36,7 @@ void decode_nmea(std::span<const std::uint8_t> stream, const OnMessage& on_messa
     for_each_field(sentence, [&](const NamedValue& value) {
       message.fields[std::string(value.name)] = value_json(value);
     });
-    on_message(message);
+    visitor.message(message);
   });
 }
 

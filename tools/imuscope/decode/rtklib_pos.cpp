@@ -76,19 +76,21 @@ Json solution_json(std::string_view line, const Solution& solution, const Format
 
 }  // namespace
 
-void decode_rtklib_pos(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
+void decode_rtklib_pos(std::span<const std::uint8_t> stream, const Visitor& visitor) {
   const std::string_view text(reinterpret_cast<const char*>(stream.data()), stream.size());
   Format format;
   std::optional<ReferencePosition> base;
+  std::uint64_t told = 0;
   for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
+    tell_position(visitor, at, told);
+    const std::size_t end = line_end(text, at, "\r\n");
     const std::size_t next = behind_line_end(stream, end);
     const std::string_view line = text.substr(at, end - at);
     if (!line.empty() && line[0] == '%' && is_printable(line)) {
       const bool columns = read_comment(line, format, base);
-      on_message({at, next - at, columns ? "columns" : "comment", columns, {{"text", line}}});
+      visitor.message({at, next - at, columns ? "columns" : "comment", columns, {{"text", line}}});
     } else if (const auto solution = parse_solution(line, format)) {
-      on_message({at, next - at, "solution", true, solution_json(line, *solution, format)});
+      visitor.message({at, next - at, "solution", true, solution_json(line, *solution, format)});
     }
     at = next;
   }

@@ -18,8 +18,8 @@ bool is_nav_pvt(const Frame& frame) {
 }  // namespace
 
 /// UBX messages alone: the sentences between them are NMEA's.
-void decode_ubx(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
-  scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+void decode_ubx(std::span<const std::uint8_t> stream, const Visitor& visitor) {
+  scan_whole<Scanner, Frame>(stream, visitor, [&](const Frame& frame) {
     if (frame.kind != Frame::Kind::kMessage) return;
     Json fields = {{"cls", frame.message_class}, {"id", frame.id}};
     const bool pvt = is_nav_pvt(frame);
@@ -30,9 +30,9 @@ void decode_ubx(std::span<const std::uint8_t> stream, const OnMessage& on_messag
     } else {
       fields["data"] = hex(frame.payload);
     }
-    on_message({frame.offset, frame.bytes.size(),
-                pvt ? "NAV-PVT" : fmt::format("{:02X}-{:02X}", frame.message_class, frame.id), true,
-                std::move(fields)});
+    visitor.message({frame.offset, frame.bytes.size(),
+                     pvt ? "NAV-PVT" : fmt::format("{:02X}-{:02X}", frame.message_class, frame.id), true,
+                     std::move(fields)});
   });
 }
 

@@ -27,10 +27,10 @@ constexpr std::size_t kMessagesForGuess = 64;
 class Layouts {
  public:
   /// Guesses from the MTData that comes before any Configuration.
-  explicit Layouts(Bytes stream) {
+  Layouts(Bytes stream, const Visitor& visitor) {
     std::vector<std::vector<std::uint8_t>> kept;
     bool configured = false;
-    scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+    scan_whole<Scanner, Frame>(stream, visitor, [&](const Frame& frame) {
       configured = configured || frame.mid == mid::kConfiguration;
       if (configured || frame.mid != mid::kMtData || kept.size() == kMessagesForGuess) return;
       if (kept.empty() || kept[0].size() == frame.data.size())
@@ -335,16 +335,16 @@ bool add_fields(const Frame& frame, Layouts& layouts, Json& fields) {
 
 }  // namespace
 
-void decode_xsens_mt(std::span<const std::uint8_t> stream, const OnMessage& on_message) {
-  Layouts layouts(stream);
-  scan_whole<Scanner, Frame>(stream, [&](const Frame& frame) {
+void decode_xsens_mt(std::span<const std::uint8_t> stream, const Visitor& visitor) {
+  Layouts layouts(stream, visitor);
+  scan_whole<Scanner, Frame>(stream, visitor, [&](const Frame& frame) {
     if (frame.nested && frame.mid != mid::kMtData && frame.mid != mid::kMtData2) return;
     DecodedMessage message{frame.offset, frame.size, std::string(message_name(frame.mid)), true,
                            Json::object()};
     if (message.message.empty()) message.message = fmt::format("MID_{:02X}", frame.mid);
     message.fields["bid"] = frame.bid;
     message.fields["mid"] = frame.mid;
-    if (add_fields(frame, layouts, message.fields)) on_message(message);
+    if (add_fields(frame, layouts, message.fields)) visitor.message(message);
   });
 }
 

@@ -1,0 +1,15 @@
+#pragma once
+
+/// Which times of a recording can be believed.
+
+#include <cstdint>
+
+namespace imuscope {
+
+/// No clock of a PC has counted as far (146 years), and differences of such times fit their type: a stamp
+/// beyond is damage.
+inline constexpr std::int64_t kStampEnd_ns = std::int64_t{1} << 62U;
+
+constexpr bool is_stamp_ns(std::int64_t ns) { return ns > -kStampEnd_ns && ns < kStampEnd_ns; }
+
+}  // namespace imuscope
