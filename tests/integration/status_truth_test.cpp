@@ -12,6 +12,7 @@
 #include <fstream>
 #include <imuscope/event_t.hpp>
 #include <imuscope/raw_t.hpp>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -47,6 +48,8 @@ for_s = 6.0
 share = 0.1
 )";
 constexpr double kWallTolerance_s = 2.0;
+constexpr const char* kSimulatedStart = "2021-06-01T12:00:00";
+constexpr double kSimulatedUtc_s = 1622548800.0;  // date -u -d 2021-06-01T12:00:00Z +%s
 
 std::string output_of(const std::string& command) {
   FILE* pipe = ::popen(command.c_str(), "r");
@@ -83,14 +86,14 @@ double resident_mb(pid_t process) {
   return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) * 1e-6;
 }
 
-/// Seconds of processor time that the whole process has taken.
+/// Seconds of processor time that the whole process has taken; NaN once it has ended.
 double processor_s(pid_t process) {
   std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
   std::string text;
-  std::getline(stat, text);
+  if (!std::getline(stat, text)) return std::numeric_limits<double>::quiet_NaN();
   std::istringstream fields(text.substr(text.rfind(')') + 2));
   std::string field;
-  constexpr int kUserTime = 12;  // of those behind the name: utime, then stime (proc(5))
+  constexpr int kUserTime = 11;  // of those behind the name: utime, then stime (proc(5))
   for (int i = 0; i <= kUserTime; ++i) fields >> field;
   double ticks = std::stod(field);
   if (fields >> field) ticks += std::stod(field);
@@ -117,6 +120,8 @@ class StatusTruth : public testing::Test {
     if (!enter_private_network()) GTEST_SKIP() << "a private network namespace needs root";
     std::string text = read_text(source_path("config/demo.toml"));
     text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder_ / "ports").string());
+    text = std::regex_replace(text, std::regex("\\n\\[simulation\\]\n"),
+                              std::string("\n[simulation]\nstart_utc = ") + kSimulatedStart + "\n");
     std::ofstream(folder_ / "live.toml") << text << "\n[noise]\nrefit_interval_s = 5.0\n";
     std::ofstream(folder_ / "faults.toml") << kDamage;
     do_to_service('-');
@@ -192,10 +197,11 @@ class StatusTruth : public testing::Test {
 
   template <typename Named>
   static const Named& named(const std::vector<Named>& list, const std::string& name) {
+    static const Named kNone{};
     const auto found =
         std::find_if(list.begin(), list.end(), [&](const Named& one) { return one.name == name; });
     EXPECT_NE(found, list.end()) << name;
-    return *found;
+    return found == list.end() ? kNone : *found;
   }
 
   void check_identity() const {
@@ -209,14 +215,20 @@ class StatusTruth : public testing::Test {
   }
 
   void check_time() const {
+    bool told_by_device = false;
     for (std::size_t i = 0; i < heard_.size(); ++i) {
       const auto& one = heard_[i];
       EXPECT_EQ(one.status.sequence, static_cast<std::int64_t>(i));
       // While the publisher is held, and for a moment after it, its messages come late.
       if (one.at_s > 34.0 && one.at_s < 40.0) continue;
-      EXPECT_NEAR(static_cast<double>(one.status.utime) * 1e-6, one.wall_s, kWallTolerance_s);
+      // By this PC's clock, until the reference tells UTC.
+      const double utc_s = static_cast<double>(one.status.utime) * 1e-6;
+      told_by_device = told_by_device || utc_s < one.wall_s - 86'400.0;
+      EXPECT_NEAR(utc_s, told_by_device ? kSimulatedUtc_s + kBegin_s + one.at_s : one.wall_s,
+                  kWallTolerance_s);
       EXPECT_NEAR(one.status.uptime_s, one.at_s, kWallTolerance_s);
     }
+    EXPECT_TRUE(told_by_device);
     const auto& early = before(seconds(12));
     const auto& late = before(seconds(24));
     EXPECT_NEAR(static_cast<double>(late.status.tick - early.status.tick),
@@ -254,9 +266,10 @@ class StatusTruth : public testing::Test {
     EXPECT_NEAR(static_cast<double>(after.skipped - ahead.skipped), held_ticks, 30.0);
     EXPECT_NEAR(after.lateness_max_us, 1e6 * static_cast<double>(kHeld.count()), 0.3e6);
     EXPECT_LT(ahead.lateness_max_us, 1e6);
+    constexpr double kReadTogether = 15.0;  // ticks between readings of a thread that waits for a processor
     const auto status_tick = [&](seconds at) { return before(at).status.tick; };
     EXPECT_NEAR(static_cast<double>(after.ticks + after.skipped - ahead.ticks - ahead.skipped),
-                static_cast<double>(status_tick(kBlockedAt) - status_tick(kHeldAt)), 3.0)
+                static_cast<double>(status_tick(kBlockedAt) - status_tick(kHeldAt)), kReadTogether)
         << "every tick is delivered or skipped";
     for (const auto& thread : before(kBlockedAt).status.threads) {
       if (thread.ticks == 0) continue;
@@ -271,12 +284,12 @@ class StatusTruth : public testing::Test {
     // Work that lasts past the next deadline is an overrun: of the publisher, whose deadlines are 50 ms
     // apart.
     const auto& publisher_before = named(before(kBlockedAt).status.threads, "imuscope-pub");
-    const auto& publisher_after = named(last().threads, "imuscope-pub");
+    const auto& publisher_after = named(before(kRun).status.threads, "imuscope-pub");
     EXPECT_GE(publisher_after.overruns - publisher_before.overruns, 1);
     EXPECT_GE(publisher_after.done_max_us, 0.9e6 * static_cast<double>(kBlocked.count()));
     EXPECT_NEAR(static_cast<double>(publisher_after.skipped - publisher_before.skipped),
                 static_cast<double>(kBlocked.count()) / 0.05, 15.0);
-    EXPECT_EQ(named(last().threads, "imuscope-est").overruns, ahead.overruns);
+    EXPECT_EQ(named(before(kRun).status.threads, "imuscope-est").overruns, ahead.overruns);
   }
 
   void check_rings() const {
@@ -309,7 +322,7 @@ class StatusTruth : public testing::Test {
     }
     EXPECT_EQ(last().capture_path, (folder_ / "live" / "capture.lcm").string());
     const auto& one = before(kHeldAt);
-    constexpr double kPerSecond = 60e3;  // of all devices, recorded; what waits is flushed twice a second
+    constexpr double kPerSecond = 170e3;  // of all devices, recorded; what waits is flushed once a second
     EXPECT_NEAR(static_cast<double>(one.status.capture_bytes), one.capture_bytes, 2.0 * kPerSecond);
     EXPECT_EQ(last().capture_lost, 0);
   }
@@ -342,9 +355,11 @@ class StatusTruth : public testing::Test {
     EXPECT_GT(damaged.bytes_skipped, intact.bytes_skipped);
     EXPECT_GE(damaged.bad_checksums, intact.bad_checksums);
     EXPECT_NEAR(static_cast<double>(damaged.samples - intact.samples + hit),
-                100.0 * (before(kHeldAt).status.uptime_s - before(seconds(14)).status.uptime_s), 5.0);
+                100.0 * (before(kHeldAt).status.uptime_s - before(seconds(14)).status.uptime_s), 15.0);
     for (const char* name : {"airins", "mtx2", "mtx3", "gnss"}) {
-      EXPECT_EQ(named(before(kHeldAt).status.devices, name).samples_lost, 0) << name;
+      EXPECT_EQ(named(before(kHeldAt).status.devices, name).samples_lost,
+                named(before(seconds(14)).status.devices, name).samples_lost)
+          << name;
       EXPECT_EQ(named(before(kHeldAt).status.devices, name).samples_refused, 0) << name;
     }
     // A message of an MTx takes its time on the wire, 10 bits a byte at 115200 baud, and is read at the next

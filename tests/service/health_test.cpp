@@ -93,6 +93,50 @@ TEST(Health, DegradedWhenAnythingIsLostOrRefused) {
   EXPECT_EQ(judge(report).reason, "memory is not locked; ...");
 }
 
+TEST(Health, SaysOneReasonForEachState) {
+  // Ordered as they are looked for: each stands behind all that may come before it.
+  auto report = healthy();
+  EXPECT_EQ(judge(report).reason, "all devices stream");
+  for (auto& study : report.studies) study.state = "waiting for samples";
+  EXPECT_EQ(judge(report).reason, "waiting for motion that shows how the S-IMUs sit");
+  report.problems = {"no route; run ip route add"};
+  EXPECT_EQ(judge(report).state, "degraded") << "even before there is a mounting";
+  EXPECT_EQ(judge(report).reason, "no route; run ip route add");
+  report.devices[2].frames_dropped = 5;
+  EXPECT_EQ(judge(report).reason, "5 frames of mtx2 were lost by this PC before they could be read");
+  report.rings[0].refused = 1;
+  EXPECT_EQ(judge(report).reason, "the ring 'raw bytes' refused 1 elements");
+  report.capture_lost = 2;
+  EXPECT_EQ(judge(report).reason, "2 records could not be kept in the capture");
+  report.devices[1].state = "line down";
+  EXPECT_EQ(judge(report).state, "starting");
+  EXPECT_EQ(judge(report).reason, "mtx1: line down");
+  report.devices[1].state = "failed";
+  EXPECT_EQ(judge(report).state, "degraded") << "the other S-IMU goes on";
+  EXPECT_EQ(judge(report).reason, "mtx1: failed");
+  report.devices[2].state = "failed";
+  EXPECT_EQ(judge(report).state, "failed");
+  EXPECT_EQ(judge(report).reason, "no IMU under study can be set up");
+  report.devices[0].state = "failed";
+  EXPECT_EQ(judge(report).reason, "airins: failed");
+}
+
+TEST(Quantiles, AreThoseOfAThousandKnownValues) {
+  // 1 us to 1 ms in steps of 1 us: 500, 990, 999 and 1000 us, each at most an eighth of an octave above.
+  LatenessHistogram histogram;
+  for (int us = 1; us <= 1000; ++us) histogram.add(std::chrono::microseconds(us));
+  const auto quantiles = quantiles_of(histogram);
+  constexpr double kBucket = 1.0 + 1.0 / 8.0;
+  const auto expect_near_above = [](double value_s, double truth_s) {
+    EXPECT_GE(value_s, truth_s);
+    EXPECT_LE(value_s, truth_s * kBucket);
+  };
+  expect_near_above(quantiles.p50_s, 500e-6);
+  expect_near_above(quantiles.p99_s, 990e-6);
+  expect_near_above(quantiles.p999_s, 999e-6);
+  EXPECT_DOUBLE_EQ(quantiles.max_s, 1000e-6);
+}
+
 TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection) {
   StudyOutput study;
   study.status = StudyStatus::kConverging;
