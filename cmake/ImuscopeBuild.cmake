@@ -66,14 +66,23 @@ function(imuscope_layer target folder)
   set_property(GLOBAL PROPERTY IMUSCOPE_LAYER_${target} ${layer})
 endfunction()
 
-# imuscope_library(NAME SOURCES a.cpp ... PUBLIC libs... PRIVATE libs...)
-# Declares the library of the current folder. Without SOURCES it is header-only.
+# Presets that compile several files as one (CMAKE_UNITY_BUILD) compile those of this target one by one: some have
+# helpers of the same names.
+function(imuscope_apart name)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
+endfunction()
+
+# imuscope_library(NAME SOURCES a.cpp ... PUBLIC libs... PRIVATE libs... [APART])
+# Declares the library of the current folder. Without SOURCES it is header-only. APART: see imuscope_apart.
 function(imuscope_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  cmake_parse_arguments(ARG "APART" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   file(RELATIVE_PATH folder ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
   imuscope_layer(${name} ${folder})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
+    if(ARG_APART)
+      imuscope_apart(${name})
+    endif()
     target_include_directories(${name} PUBLIC ${CMAKE_BINARY_DIR}/layers/${name})
     target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE imuscope_flags ${ARG_PRIVATE})
   else()
@@ -90,11 +99,11 @@ function(imuscope_program name)
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS})
 endfunction()
 
-# imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds] [SLOW] [ALONE])
+# imuscope_test(NAME SOURCES a_test.cpp ... LIBS libs... [TIMEOUT seconds] [SLOW] [ALONE] [APART])
 # One GoogleTest program; every test case is a CTest test of its own. SLOW: left out by tools/test --quick.
-# ALONE: runs in real time, so that no other test may run beside it.
+# ALONE: runs in real time, so that no other test may run beside it. APART: see imuscope_apart.
 function(imuscope_test name)
-  cmake_parse_arguments(ARG "SLOW;ALONE" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "SLOW;ALONE;APART" "TIMEOUT" "SOURCES;LIBS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
@@ -109,8 +118,18 @@ function(imuscope_test name)
     list(APPEND labels ENVIRONMENT TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan.supp)
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  if(ARG_APART)
+    imuscope_apart(${name})
+  endif()
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS} test_support
                         GTest::gmock GTest::gtest_main)
   gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
                        PROPERTIES TIMEOUT ${ARG_TIMEOUT} ${labels})
+endfunction()
+
+# imuscope_test_not_here(NAME REASON)
+# Stands where a test cannot be in this build: CTest counts it as skipped and tells the reason.
+function(imuscope_test_not_here name reason)
+  add_test(NAME ${name} COMMAND ${CMAKE_COMMAND} -E echo "${name}: Skipped\n${reason}")
+  set_tests_properties(${name} PROPERTIES SKIP_REGULAR_EXPRESSION ": Skipped")
 endfunction()
