@@ -19,7 +19,7 @@ constexpr std::size_t kSmoothing = 9;
 constexpr double kOverlapMin_s = 10.0;
 /// |omega| must vary by this much to carry time information (0.3 deg/s).
 constexpr double kMotionMin_radps = 0.005;
-constexpr double kCorrelationMin = 0.3;
+constexpr double kPeakCorrelationMin = 0.3;
 constexpr double kDistinctnessMin = 1.05;
 // Live, a wrong answer costs more than a late one: an idling engine correlates with itself at many lags, and
 // a filter that begins there has to begin again.
@@ -223,7 +223,7 @@ std::vector<SegmentOffset> segment_offsets(const Grid& reference, const Grid& st
     const double motion = standard_deviation(part);
     if (motion < kMotionMin_radps) continue;
     const Peak peak = search(reference, part, start_s, offset_s, kSegmentSearch_s, kOverlapMin_s);
-    if (!peak.inside || peak.correlation < kCorrelationMin) continue;
+    if (!peak.inside || peak.correlation < kPeakCorrelationMin) continue;
     // Time information: motion against what does not correlate.
     const double noise = 1.0 - peak.correlation * peak.correlation + 1e-3;
     out.push_back({start_s + 0.5 * kSegment_s, peak.offset_s, motion * motion / noise});
@@ -260,7 +260,7 @@ Result<TimeOffset> find_time_offset(const RateMagnitudeSeries& reference, const 
   const Grid coarse_study = coarsened(fine_study, kFinePerCoarse);
   const Peak coarse = search(coarse_reference, coarse_study.values, coarse_study.start_s, 0.0,
                              options.search_s, kOverlapMin_s);
-  if (coarse.correlation < kCorrelationMin || coarse.distinctness < kDistinctnessMin || !coarse.inside) {
+  if (coarse.correlation < kPeakCorrelationMin || coarse.distinctness < kDistinctnessMin || !coarse.inside) {
     return work_error(
         fmt::format(
             "time offset: no clear match within +-{} s (best correlation {:.2f}, {:.2f} times the next best)",

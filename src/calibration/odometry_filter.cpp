@@ -25,7 +25,7 @@ constexpr double kLostAtLeast_s = 0.1;
 /// A magnitude takes the sign of the predicted speed where that is certain by this many sd.
 constexpr double kSignCertain = 3.0;
 /// NIS is averaged over this time.
-constexpr double kNisMean_s = 10.0;
+constexpr double kOdometryNisMean_s = 10.0;
 /// A speed is told to be rejected after so many in a row: single ones are slip.
 constexpr int kRejectedTold = 25;
 /// Re-acquisition at standstill: velocity is uncertain by this much more than the contradiction.
@@ -202,7 +202,7 @@ void OdometryFilter::apply_motion(const Sample& sample, const NavigationFilter::
   }
   std::array<bool, 3> use{config_.use_speed && speed_means_something, config_.use_non_holonomic,
                           config_.use_non_holonomic};
-  const double share = std::min(1.0, 1.0 / (kNisMean_s * config_.rate_hz));
+  const double share = std::min(1.0, 1.0 / (kOdometryNisMean_s * config_.rate_hz));
   for (std::size_t i = 0; i < 3; ++i) {
     if (!use[i]) continue;
     const auto k = static_cast<Eigen::Index>(i);
