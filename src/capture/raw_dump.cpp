@@ -64,24 +64,23 @@ Result<RawDump> RawDump::open(const std::filesystem::path& path) {
   const auto size = std::filesystem::is_regular_file(status) ? std::filesystem::file_size(path, error) : 0;
   if (size == 0) return work_error(name + " is empty: it holds no device bytes", "check how it was recorded");
 
-  std::vector<Arrival> arrivals;
+  std::optional<std::ifstream> arrivals;
   if (std::filesystem::exists(arrivals_path(path), error)) {
-    auto loaded = load_arrivals(arrivals_path(path), size);
-    if (!loaded) return tl::unexpected(loaded.error());
-    arrivals = std::move(*loaded);
+    if (auto checked = check_arrivals(arrivals_path(path), size); !checked)
+      return tl::unexpected(checked.error());
+    arrivals.emplace(arrivals_path(path));
   }
   return RawDump(std::move(file), std::move(arrivals));
 }
 
-Result<std::vector<RawDump::Arrival>> RawDump::load_arrivals(const std::filesystem::path& path,
-                                                             std::uint64_t dump_bytes) {
+Result<void> RawDump::check_arrivals(const std::filesystem::path& path, std::uint64_t dump_bytes) {
   std::ifstream file(path);
   std::size_t line_number = 0;
   const auto wrong = [&](const std::string& what) {
     return usage_error(path.string() + ":" + std::to_string(line_number) + ": " + what,
                        "correct the file, or remove it to take the times from the bytes");
   };
-  std::vector<Arrival> arrivals;
+  HostTime newest = HostTime::min();
   std::uint64_t offset = 0;
   std::string text;
   while (read_line(file, text, kLongestLine)) {
@@ -106,8 +105,8 @@ Result<std::vector<RawDump::Arrival>> RawDump::load_arrivals(const std::filesyst
     }
     if (!is_stamp_ns(arrival_ns)) return wrong("an arrival_ns that no clock has reached");
     const HostTime arrival = host_time_from_ns(arrival_ns);
-    if (!arrivals.empty() && arrival < arrivals.back().arrival) return wrong("arrival_ns goes back");
-    arrivals.push_back({static_cast<std::uint64_t>(n_bytes), arrival});
+    if (arrival < newest) return wrong("arrival_ns goes back");
+    newest = arrival;
     offset += static_cast<std::uint64_t>(n_bytes);
     if (offset >= dump_bytes) break;
   }
@@ -118,19 +117,28 @@ Result<std::vector<RawDump::Arrival>> RawDump::load_arrivals(const std::filesyst
   if (offset < dump_bytes) {
     return wrong("the reads end at byte " + std::to_string(offset) + " of " + std::to_string(dump_bytes));
   }
-  return arrivals;
+  return {};
+}
+
+/// Goes on to the next line that tells of a read; what stands there was checked when the dump was opened.
+bool RawDump::next_arrival() {
+  while (read_line(*arrivals_, line_, kLongestLine)) {
+    const auto numbers = parse_line(without_line_end(line_));
+    if (!numbers) continue;
+    current_ = {static_cast<std::uint64_t>((*numbers)[1]), host_time_from_ns((*numbers)[2])};
+    return true;
+  }
+  return false;
 }
 
 std::optional<RawDump::Read> RawDump::next() {
   Read read;
   std::uint64_t wanted = kBlockBytes;
   if (has_arrivals()) {
-    if (next_arrival_ == arrivals_.size()) return std::nullopt;
-    Arrival& arrival = arrivals_[next_arrival_];
-    wanted = std::min(arrival.n_bytes, kLongestRead);
-    arrival.n_bytes -= wanted;
-    if (arrival.n_bytes == 0) ++next_arrival_;
-    read.arrival = arrival.arrival;
+    if (current_.n_bytes == 0 && !next_arrival()) return std::nullopt;
+    wanted = std::min(current_.n_bytes, kLongestRead);
+    current_.n_bytes -= wanted;
+    read.arrival = current_.arrival;
   }
   // In blocks, since n_bytes is only what a file says.
   buffer_.clear();

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -37,24 +38,25 @@ class RawDump {
   /// The next read; nothing at the end.
   [[nodiscard]] std::optional<Read> next();
 
-  [[nodiscard]] bool has_arrivals() const noexcept { return !arrivals_.empty(); }
+  [[nodiscard]] bool has_arrivals() const noexcept { return arrivals_.has_value(); }
 
   /// The file that may stand beside a dump: mtx1.bin has mtx1.arrivals.csv.
   static std::filesystem::path arrivals_path(const std::filesystem::path& dump);
 
  private:
   struct Arrival {
-    std::uint64_t n_bytes;
+    std::uint64_t n_bytes;  ///< still to be given
     HostTime arrival;
   };
-  RawDump(std::ifstream file, std::vector<Arrival> arrivals)
+  RawDump(std::ifstream file, std::optional<std::ifstream> arrivals)
       : file_(std::move(file)), arrivals_(std::move(arrivals)) {}
-  static Result<std::vector<Arrival>> load_arrivals(const std::filesystem::path& path,
-                                                    std::uint64_t dump_bytes);
+  static Result<void> check_arrivals(const std::filesystem::path& path, std::uint64_t dump_bytes);
+  bool next_arrival();
 
   std::ifstream file_;
-  std::vector<Arrival> arrivals_;
-  std::size_t next_arrival_ = 0;
+  std::optional<std::ifstream> arrivals_;  ///< read along with the dump: of ten hours they are many
+  Arrival current_{};
+  std::string line_;
   std::vector<std::uint8_t> buffer_;
 };
 
