@@ -5,6 +5,7 @@ install(TARGETS imuscope imusim RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(PROGRAMS tools/spy DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME imuscope-spy)
 install(FILES config/imuscope.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
 install(FILES config/demo.toml config/csv_drive.toml config/faults.toml DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples)
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs FILES_MATCHING PATTERN guide.md PATTERN configuration.md PATTERN security.md)
 install(FILES README.md ARCHITECTURE.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 # These three have their place whatever the prefix.
 install(FILES config/vehicle.toml DESTINATION /etc/imuscope)

@@ -47,16 +47,20 @@ std::vector<std::string> holders(const std::string& path) {
   std::error_code ignored;
   const fs::path real = fs::canonical(path, ignored);
   const std::string self = std::to_string(getpid());
+  bool own = false;
   for (const std::string& process : entries("/proc", "")) {
     const std::string pid = fs::path(process).filename().string();
     if (pid.empty() || std::isdigit(static_cast<unsigned char>(pid[0])) == 0) continue;
     for (const std::string& fd : entries(process + "/fd", "")) {
       std::error_code unreadable;
       if (fs::read_symlink(fd, unreadable) != real) continue;
-      found.push_back(pid == self ? "this program" : fmt::format("{} ({})", pid, process_name(process)));
+      if (pid != self) found.push_back(fmt::format("{} ({})", pid, process_name(process)));
+      own = own || pid == self;
       break;
     }
   }
+  // Whoever asks for the port may have it open while it is refused: where others hold it, they are meant.
+  if (own && found.empty()) found.emplace_back("this program");
   return found;
 }
 
@@ -122,7 +126,8 @@ Error explain_open_failure(const std::string& path, int error) {
       return {ErrorKind::kWork,
               by.empty() ? fmt::format("port {} is in use by another program", path)
                          : fmt::format("port {} is in use by process {}", path, fmt::join(by, ", ")),
-              "stop that program; ModemManager leaves a port alone with the udev rule "
+              "stop that program (the service: systemctl stop imuscope); ModemManager leaves a port alone "
+              "with the udev rule "
               "ENV{ID_MM_DEVICE_IGNORE}=\"1\""};
     }
     case ENXIO:

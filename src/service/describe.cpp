@@ -110,8 +110,8 @@ std::string describe(const Configuration& configuration, const EstimatorEvent& e
                          event.value);
     case EstimatorEventKind::kGnssInconsistent:
       return fmt::format(
-          "{}: {:.0f} % of its positions disagree with the motion: check antenna_lever_arm_b_m and the "
-          "receiver's sd",
+          "{}: {:.0f} % of its positions disagree with the motion: check antenna_lever_arm_b_m, the "
+          "receiver's sd and whose clock its times are of (GPS time is 18 s ahead of UTC)",
           name, 100.0 * event.value);
     case EstimatorEventKind::kStudyInconsistent:
       return fmt::format(

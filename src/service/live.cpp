@@ -289,7 +289,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
     return work_error("no device ever sent a sample",
                       "check power, cables and baud rates; the log above names each line");
   }
-  spdlog::info("recorded {} ({:.1f} MB); replay it with: imuscope replay {}",
+  spdlog::info("recorded {} ({:.1f} MB); study it with: imuscope process {} --out study",
                (*recorder)->status().path.string(), static_cast<double>((*recorder)->status().bytes) * 1e-6,
                (*recorder)->status().path.string());
   return {};

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -155,6 +156,16 @@ void print_devices(const json& devices) {
   }
 }
 
+/// The first of them; a short record can have one for every axis and regime, all of them in the report.
+void print_warnings(const json& warnings) {
+  constexpr std::size_t kPrintedMax = 8;
+  const std::size_t printed = std::min(warnings.size(), kPrintedMax);
+  if (printed > 0) fmt::print("\n");
+  for (std::size_t i = 0; i < printed; ++i) fmt::print("Note: {}\n", warnings[i].get<std::string>());
+  if (printed < warnings.size())
+    fmt::print("Note: {} more, in run.json and the report\n", warnings.size() - printed);
+}
+
 }  // namespace
 
 Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) {
@@ -174,7 +185,7 @@ Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) 
   print_devices(run->at("devices"));
   for (const auto& imu : calibration->at("imus")) print_imu(imu, truth);
   if (models) print_model(*models);
-  for (const auto& warning : run->at("warnings")) fmt::print("\nNote: {}\n", warning.get<std::string>());
+  print_warnings(run->at("warnings"));
   const auto report = run_folder / "report.html";
   fmt::print("\nResults: {}\n", run_folder.string());
   if (std::filesystem::exists(report)) fmt::print("Report:  {}\n", report.string());
