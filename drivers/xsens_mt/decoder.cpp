@@ -117,6 +117,9 @@ void MtDecoder::on_frame(const Frame& frame, HostTime arrival, SampleSink& sink)
     case mid::reply_to(mid::kOutputConfiguration):
       learn_output(frame.data);
       break;
+    case mid::reply_to(mid::kGoToConfig):
+      told_to_pause_ = true;
+      break;
     case mid::kError:
       if (!frame.data.empty()) last_error_ = frame.data[0];
       break;
@@ -210,15 +213,21 @@ bool MtDecoder::take_counter(std::uint16_t counter, HostTime first_byte) noexcep
       break;
     case CountStep::kForward:
       if (const std::int64_t step = counter_.step(); step > counts_per_message_) {
-        const std::int64_t lost = std::max<std::int64_t>(step / counts_per_message_ - 1, 0);
-        counters_.samples_lost += static_cast<std::uint64_t>(lost);
-        if (lost > 0) gap_pending_ = true;
+        note_gap(std::max<std::int64_t>(step / counts_per_message_ - 1, 0));
       }
       break;
     case CountStep::kFirst:
       break;
   }
+  told_to_pause_ = false;
   return true;
+}
+
+// A device that is being set up counts on and sends nothing: that is a gap, but nothing was lost in it.
+void MtDecoder::note_gap(std::int64_t samples) noexcept {
+  if (samples <= 0) return;
+  gap_pending_ = true;
+  if (!told_to_pause_) counters_.samples_lost += static_cast<std::uint64_t>(samples);
 }
 
 void MtDecoder::emit_block(Block& block, std::span<const std::uint8_t> data, const Instant& at,
@@ -362,10 +371,8 @@ bool MtDecoder::advance_sample_time(HostTime first_byte) noexcept {
     samples = std::max<std::int64_t>(to_whole(periods), 1);
   }
   sample_count_ += has_sample_ ? samples : 0;
-  if (has_sample_ && samples > 1) {
-    counters_.samples_lost += static_cast<std::uint64_t>(samples - 1);
-    gap_pending_ = true;
-  }
+  if (has_sample_) note_gap(samples - 1);
+  told_to_pause_ = false;
   has_sample_ = true;
   return true;
 }

@@ -10,6 +10,9 @@
 /// Legacy data does not say what it holds. The decoder takes the layout it is given, until a Configuration
 /// message in the stream names the real one (a session asks for it before every measurement).
 ///
+/// Lost is what the device's own count misses, but for the pause that begins with its acknowledgement of
+/// GoToConfig.
+///
 /// Time: the sample counter (MTData, period of the configuration) or SampleTimeFine (MTData2) through the
 /// clock map; the first byte of a frame is back-dated by the bytes that followed it in its read.
 
@@ -101,6 +104,7 @@ class MtDecoder final : public DeviceDecoder {
   void on_mtdata(const Frame& frame, HostTime arrival, SampleSink& sink) noexcept;
   [[nodiscard]] std::uint16_t counter_of(const Frame& frame) noexcept;
   [[nodiscard]] bool take_counter(std::uint16_t counter, HostTime first_byte) noexcept;
+  void note_gap(std::int64_t samples) noexcept;
   void emit_block(Block& block, std::span<const std::uint8_t> data, const Instant& at,
                   SampleSink& sink) noexcept;
   void emit_legacy_gnss(const MtData& message, const Frame& frame, HostTime arrival,
@@ -158,6 +162,7 @@ class MtDecoder final : public DeviceDecoder {
   std::int64_t last_step_ticks_ = 0;
   bool has_sample_ = false;
   bool gap_pending_ = false;
+  bool told_to_pause_ = false;  ///< it acknowledged GoToConfig, and has sent no data since
 };
 
 }  // namespace imuscope::xsens

@@ -260,6 +260,27 @@ TEST(MtDecoder, SampleTimeFineWrapsAtADayOrAtThirtyTwoBits) {
   }
 }
 
+TEST(MtDecoder, WhatADeviceDoesNotMeasureWhileItIsSetUpIsAGapAndNoLoss) {
+  for (const bool mtdata2 : {false, true}) {
+    Line line;
+    const auto send = [&](int i) {
+      const auto count = static_cast<std::uint16_t>(i);
+      line.send(mtdata2 ? inertial(count, static_cast<std::uint32_t>(100 * i)) : mtdata(count), kPeriod * i);
+    };
+    for (int i = 0; i < 20; ++i) send(i);
+    line.send(frame(mid::reply_to(mid::kGoToConfig)), kPeriod * 20);
+    line.send(frame(mid::reply_to(mid::kGoToMeasurement)), kPeriod * 31);
+    for (int i = 32; i < 40; ++i) send(i);
+    EXPECT_EQ(line.decoder.counters().samples_lost, 0U);
+    ASSERT_EQ(line.sink.samples.size(), 28U);
+    EXPECT_NE(line.sink.samples[20].imu.flags & kGapBefore, 0U);
+    EXPECT_EQ(line.sink.samples[20].imu.counter, 32);
+    // The pause is over: what is missing now is lost.
+    send(45);
+    EXPECT_EQ(line.decoder.counters().samples_lost, 5U);
+  }
+}
+
 TEST(MtDecoder, LostMessagesAreCountedByTheSampleTime) {
   Line line;
   for (const int i : {0, 1, 2, 6, 7}) {
