@@ -219,8 +219,9 @@ struct EstimatorCounters {
   std::uint64_t reference_not_finite = 0;
   std::uint64_t gnss_samples = 0;
   std::uint64_t gnss_used = 0;
-  std::uint64_t gnss_rejected = 0;
-  std::uint64_t gnss_too_old = 0;  ///< older than the ring of past states
+  std::uint64_t gnss_rejected = 0;            ///< neither position nor velocity was used
+  std::uint64_t gnss_positions_rejected = 0;  ///< the position was not used, whatever became of the velocity
+  std::uint64_t gnss_too_old = 0;             ///< older than the ring of past states
   std::uint64_t gnss_not_finite = 0;
   std::uint64_t odometry_samples = 0;
   std::uint64_t odometry_speed_used = 0;

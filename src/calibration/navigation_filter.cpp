@@ -384,6 +384,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     const GnssInnovation position = gnss_position_innovation(then.state, antenna, arm);
     used =
         apply(position_gate_, position, then.back, widened * sd_position, time, output_.nis_position) || used;
+    if (!used) ++counters_.gnss_positions_rejected;
     watch_consistency(time);
     if (used)
       inject(then.state,

@@ -234,6 +234,23 @@ void warn_of_uncalibrated(const Configuration& configuration, const std::vector<
   }
 }
 
+/// What the receiver says and what the vehicle does do not fit: everything else rests on both.
+void warn_of_refused_gnss(const Configuration& configuration, const EstimatorCounters& counters,
+                          std::vector<std::string>& warnings) {
+  // Of honest sd the gate refuses about one position in a thousand.
+  constexpr double kRefusedShareMax = 0.05;
+  const auto index = configuration.gnss_index();
+  const auto examined = static_cast<double>(counters.gnss_used + counters.gnss_rejected);
+  const auto refused = static_cast<double>(counters.gnss_positions_rejected);
+  if (!index || refused <= kRefusedShareMax * examined) return;
+  warnings.push_back(fmt::format(
+      "{}: {:.0f} of {:.0f} positions were refused, as they contradict the motion; check whose clock its "
+      "times "
+      "are of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, and do not trust "
+      "this run before",
+      configuration.devices[*index].name, refused, examined));
+}
+
 void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMountings& former,
                        HostTime first_reference_time, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < former.size(); ++i) {
@@ -305,6 +322,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
                      &last,           (*folder)->events(), {}};
   const auto infos = study_file_infos(configuration, recording);
   const FormerMountings& former = first.former_mountings();
+  warn_of_refused_gnss(configuration, last.counters, run.warnings);
   warn_of_uncalibrated(configuration, finals, run.warnings);
   warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
   if (std::none_of(finals.begin(), finals.end(), calibrated)) {
@@ -457,7 +475,10 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   const auto& last = (*folder)->last_snapshot();
   RunDescription run{options.version,         &configuration,      &recording, &*result,
                      last ? &*last : nullptr, (*folder)->events(), {}};
-  if (last) warn_of_uncalibrated(configuration, final_studies(*last), run.warnings);
+  if (last) {
+    warn_of_refused_gnss(configuration, last->counters, run.warnings);
+    warn_of_uncalibrated(configuration, final_studies(*last), run.warnings);
+  }
   return write_json(options.out / "run.json", run_json(run));
 }
 

@@ -366,6 +366,7 @@ TEST(Estimator, RejectsGnssJumpsAndSaysSo) {
   }
   EXPECT_TRUE(told);
   EXPECT_EQ(estimator.counters().gnss_rejected, 15U);
+  EXPECT_EQ(estimator.counters().gnss_positions_rejected, 15U);
   EXPECT_LT(horizontal_error_m(estimator.navigation(), drive.motion().state_at(drive.time_s() - 0.01)), 0.05);
 }
 
