@@ -96,11 +96,13 @@ class Manual {
     if (known != texts_.end()) return known->second;
     if (script) return texts_[key] = read_text(source_path(name));
     const auto log = folder_ / "help.txt";
-    // An unknown command is refused, a known one explains itself.
     const bool option = command.words[1].starts_with("-");
     const std::vector<std::string> ask =
         option ? std::vector<std::string>{"--help"} : std::vector<std::string>{command.words[1], "--help"};
-    return texts_[key] = run_program(name, ask, log) == 0 ? read_text(log) : std::string();
+    std::string text = run_program(name, ask, log) == 0 ? read_text(log) : std::string();
+    // Of a command that it does not know the program explains itself instead.
+    if (!option && text.find("/" + key + " ") == std::string::npos) text.clear();
+    return texts_[key] = text;
   }
 
  private:
