@@ -49,7 +49,7 @@ TEST(ConfigReference, NoReaderIsPassedBy) {
   const std::regex asks(
       R"re(\.(?:text|texts|boolean|number|numbers|integer|vector|choice|node)\(\s*"(\w+)")re");
   std::size_t count = 0;
-  for (const auto* name : {"config.cpp", "config_vehicle.cpp"}) {
+  for (const auto* name : {"config.cpp", "config_devices.cpp", "config_vehicle.cpp"}) {
     const auto source = text_of(test::source_path("src/service") / name);
     for (std::sregex_iterator found(source.begin(), source.end(), asks), end; found != end; ++found, ++count)
       EXPECT_TRUE(known.count((*found)[1])) << (*found)[1] << " of " << name;

@@ -1,0 +1,24 @@
+#pragma once
+
+/// The [[device]] tables of a configuration. Thread: one, before a run.
+
+#include <vector>
+
+#include "service/config.h"
+
+namespace imuscope {
+
+class TomlReader;
+struct AttachedFiles;
+struct TomlProblem;
+
+/// Fastest samples that a device may be configured to send.
+inline constexpr double kMaxRate_hz = 2000.0;
+
+/// Reads the list, and checks what its devices are to each other: names, roles, shared lines.
+/// @param files    text of files that devices name, read or attached
+/// @param devices  in the order of the file
+void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
+                  std::vector<DeviceConfig>& devices);
+
+}  // namespace imuscope
