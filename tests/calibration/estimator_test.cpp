@@ -8,7 +8,7 @@
 
 #include "base/units.h"
 #include "navigation/so3.h"
-#include "tests/calibration/allocation_counter.h"
+#include "tests/support/allocation_counter.h"
 #include "tests/calibration/simulated_drive.h"
 
 namespace imuscope {

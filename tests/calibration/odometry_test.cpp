@@ -9,7 +9,7 @@
 
 #include "calibration/regime_detector.h"
 #include "navigation/so3.h"
-#include "tests/calibration/allocation_counter.h"
+#include "tests/support/allocation_counter.h"
 #include "tools/studies/wheeled_drive.h"
 
 namespace imuscope {

@@ -1,24 +1,9 @@
 // No decoder allocates once it is made, whatever comes.
 #include <gtest/gtest.h>
-#include <cstdlib>
-#include <new>
 #include <random>
 
 #include "tests/drivers/all/protocol_streams.h"
-
-namespace {
-thread_local std::uint64_t g_allocations = 0;  // of this thread, in this program
-}
-
-// Every allocation of this test program is counted.
-void* operator new(std::size_t size) {
-  ++g_allocations;
-  void* memory = std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "tests/support/allocation_counter.h"
 
 namespace imuscope::test {
 namespace {
@@ -37,12 +22,14 @@ TEST(DecoderAllocation, DecodingAllocatesNothingFaultsIncluded) {
       stream.bytes[random() % stream.bytes.size()] ^= static_cast<std::uint8_t>(1 + random() % 255);
     }
     for (const std::size_t read_size : {std::size_t{1}, std::size_t{62}, std::size_t{4096}}) {
+      const std::uint64_t unmade = allocation_count();
       const auto decoder = stream.make_decoder();
       CountingSink sink;
-      const std::uint64_t before = g_allocations;
+      const std::uint64_t before = allocation_count();
+      EXPECT_GT(before, unmade) << "allocations are not counted";
       push_in_reads(stream, read_size, *decoder, sink);
       decoder->finish(host_time_from_ns(stream.lasts.count()), sink);
-      EXPECT_EQ(g_allocations, before);
+      EXPECT_EQ(allocation_count(), before);
       EXPECT_GT(sink.n, stream.samples * 9 / 10);
       EXPECT_EQ(decoder->counters().samples, sink.n);
       EXPECT_EQ(decoder->counters().bytes, stream.bytes.size());

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "drivers/dbc/parser.h"
-#include "tests/calibration/allocation_counter.h"
+#include "tests/support/allocation_counter.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/support/shared_data.h"
 

@@ -1,25 +1,9 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <new>
-
 #include "drivers/xsens_mt/decoder.h"
 #include "drivers/xsens_mt/session.h"
 #include "tests/drivers/xsens_mt/mt_frames.h"
-
-namespace {
-thread_local std::uint64_t g_allocations = 0;  // of this thread, in this program
-}
-
-// Every allocation of this test program is counted.
-void* operator new(std::size_t size) {
-  ++g_allocations;
-  void* memory = std::malloc(size);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "tests/support/allocation_counter.h"
 
 namespace imuscope::xsens {
 namespace {
@@ -42,7 +26,7 @@ TEST(MtAllocation, TwentyThousandMessagesFaultsIncludedAllocateNothing) {
   MtDecoder decoder{MtDecoderConfig{}};
   MtSession session{MtSessionConfig{}};
   CountingSink sink;
-  const std::uint64_t before = g_allocations;
+  const std::uint64_t before = test::allocation_count();
   HostTime now{};
   for (std::size_t at = 0; at < stream.size(); at += 62) {
     now += std::chrono::milliseconds{14};  // 62 bytes of 43 a message at 100 Hz
@@ -51,7 +35,7 @@ TEST(MtAllocation, TwentyThousandMessagesFaultsIncludedAllocateNothing) {
     session.on_bytes(read, now);
     (void)session.poll(now);
   }
-  EXPECT_EQ(g_allocations, before);
+  EXPECT_EQ(test::allocation_count(), before);
   EXPECT_EQ(sink.n, 20000 - 400);
   EXPECT_EQ(decoder.counters().samples_lost, 400U);
 }
