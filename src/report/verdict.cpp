@@ -299,6 +299,13 @@ Verdict calibration_verdict(const RunFiles& run) {
     verdict.answer = Answer::kPartly;
     verdict.headline = "Precise, but not as accurate as it says: an error exceeds its sd.";
   }
+  if (field(field(run.run, "gnss"), "contradicts_motion") == nlohmann::json(true)) {
+    if (verdict.answer == Answer::kYes) verdict.answer = Answer::kPartly;
+    verdict.headline = "Not to be trusted: the receiver's positions contradict the motion.";
+    verdict.reasons.push_back(
+        "The warnings of the run say what to check: whose clock the receiver's times are of, its antenna's "
+        "lever arm, its sd.");
+  }
   return verdict;
 }
 

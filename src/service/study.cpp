@@ -235,20 +235,31 @@ void warn_of_uncalibrated(const Configuration& configuration, const std::vector<
 }
 
 /// What the receiver says and what the vehicle does do not fit: everything else rests on both.
-void warn_of_refused_gnss(const Configuration& configuration, const EstimatorCounters& counters,
-                          std::vector<std::string>& warnings) {
+bool contradicts_motion(const EstimatorCounters& counters) {
   // Of honest sd the gate refuses about one position in a thousand.
   constexpr double kRefusedShareMax = 0.05;
+  return static_cast<double>(counters.gnss_positions_rejected) >
+         kRefusedShareMax * static_cast<double>(counters.gnss_used + counters.gnss_rejected);
+}
+
+nlohmann::json gnss_json(const EstimatorCounters& counters) {
+  return {{"used", counters.gnss_used},
+          {"rejected", counters.gnss_rejected},
+          {"positions_rejected", counters.gnss_positions_rejected},
+          {"contradicts_motion", contradicts_motion(counters)}};
+}
+
+void warn_of_refused_gnss(const Configuration& configuration, const EstimatorCounters& counters,
+                          std::vector<std::string>& warnings) {
   const auto index = configuration.gnss_index();
-  const auto examined = static_cast<double>(counters.gnss_used + counters.gnss_rejected);
-  const auto refused = static_cast<double>(counters.gnss_positions_rejected);
-  if (!index || refused <= kRefusedShareMax * examined) return;
+  if (!index || !contradicts_motion(counters)) return;
   warnings.push_back(fmt::format(
-      "{}: {:.0f} of {:.0f} positions were refused, as they contradict the motion; check whose clock its "
-      "times "
-      "are of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, and do not trust "
-      "this run before",
-      configuration.devices[*index].name, refused, examined));
+      "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its times are "
+      "of "
+      "(GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, and do not trust this "
+      "run before",
+      configuration.devices[*index].name, counters.gnss_positions_rejected,
+      counters.gnss_used + counters.gnss_rejected));
 }
 
 void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMountings& former,
@@ -291,6 +302,7 @@ nlohmann::json run_json(const RunDescription& run) {
   json["devices"] = nlohmann::json::array();
   for (std::size_t i = 0; i < run.configuration->devices.size(); ++i)
     json["devices"].push_back(device_json(run, i));
+  if (run.last != nullptr && run.configuration->gnss_index()) json["gnss"] = gnss_json(run.last->counters);
   if (run.last != nullptr && run.last->odometry.enabled) json["odometry"] = odometry_json(*run.last);
   json["events"] = nlohmann::json::array();
   for (const auto& event : run.events) {

@@ -10,7 +10,7 @@
 namespace imuscope::test {
 namespace {
 
-std::vector<std::string> warnings_of(const std::string& name, const std::string& faults) {
+nlohmann::json run_with(const std::string& name, const std::string& faults) {
   const auto folder = scratch_folder() / name;
   std::filesystem::create_directories(folder);
   std::vector<std::string> record{"record",    source_path("config/demo.toml").string(),
@@ -28,21 +28,29 @@ std::vector<std::string> warnings_of(const std::string& name, const std::string&
                         folder / "imuscope.log"),
             0)
       << read_text(folder / "imuscope.log");
-  return read_json(folder / "run" / "run.json").at("warnings").get<std::vector<std::string>>();
+  return read_json(folder / "run" / "run.json");
 }
+
+using Texts = std::vector<std::string>;
 
 TEST(RefusedGnss, IsWhatAStudySaysFirst) {
   // 60 s of 240 are 30 m off, at velocities that are right.
-  const auto warnings = warnings_of("jump",
-                                    "[[fault]]\ndevice = \"gnss\"\nkind = \"rtk_jump\"\nat_s = 130.0\n"
-                                    "for_s = 60.0\nby_n_m = [30.0, 0.0, 0.0]\n");
+  const auto run = run_with("jump",
+                            "[[fault]]\ndevice = \"gnss\"\nkind = \"rtk_jump\"\nat_s = 130.0\n"
+                            "for_s = 60.0\nby_n_m = [30.0, 0.0, 0.0]\n");
+  EXPECT_TRUE(run.at("gnss").at("contradicts_motion").get<bool>());
+  const auto warnings = run.at("warnings").get<Texts>();
   ASSERT_FALSE(warnings.empty());
   EXPECT_THAT(warnings.front(), testing::HasSubstr("positions were refused"));
   EXPECT_THAT(warnings.front(), testing::HasSubstr("GPS time is 18 s ahead of UTC"));
 }
 
 TEST(RefusedGnss, IsNoWordWhereTheReceiverIsRight) {
-  EXPECT_THAT(warnings_of("right", ""), testing::Not(testing::Contains(testing::HasSubstr("refused"))));
+  const auto run = run_with("right", "");
+  EXPECT_FALSE(run.at("gnss").at("contradicts_motion").get<bool>());
+  EXPECT_GT(run.at("gnss").at("used").get<int>(), 2000);
+  EXPECT_THAT(run.at("warnings").get<Texts>(),
+              testing::Not(testing::Contains(testing::HasSubstr("refused"))));
 }
 
 }  // namespace

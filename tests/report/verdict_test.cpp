@@ -57,6 +57,16 @@ TEST(Verdict, AnErrorFarBeyondItsSdIsTold) {
   EXPECT_THAT(verdict.reasons, Contains(HasSubstr("more than their sd allows")));
 }
 
+TEST(Verdict, AReceiverThatContradictsTheMotionMakesNothingUsable) {
+  auto run = run_with({});
+  run.run["gnss"] = {{"contradicts_motion", false}};
+  EXPECT_EQ(calibration_verdict(run).answer, Answer::kYes);
+  run.run["gnss"] = {{"contradicts_motion", true}};
+  const Verdict verdict = calibration_verdict(run);
+  EXPECT_EQ(verdict.answer, Answer::kPartly);
+  EXPECT_THAT(verdict.headline, HasSubstr("contradict the motion"));
+}
+
 TEST(Verdict, ModelsThatTheDataDoNotContradictAreAdequate) {
   EXPECT_EQ(model_verdict(read_fits(run_with({}).models)).answer, Answer::kYes);
 }
