@@ -8,8 +8,8 @@
 
 #include "base/units.h"
 #include "navigation/so3.h"
-#include "tests/support/allocation_counter.h"
 #include "tests/calibration/simulated_drive.h"
+#include "tests/support/allocation_counter.h"
 
 namespace imuscope {
 namespace {

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "drivers/dbc/parser.h"
-#include "tests/support/allocation_counter.h"
 #include "tests/drivers/support/streams.h"
+#include "tests/support/allocation_counter.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::can_odometry {

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "drivers/dbc/parser.h"
-#include "tests/support/allocation_counter.h"
 #include "tests/drivers/support/streams.h"
+#include "tests/support/allocation_counter.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::xsens_can {
