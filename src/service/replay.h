@@ -28,6 +28,7 @@ using OpenSource = std::function<Result<std::unique_ptr<ByteSource>>(DeviceIndex
 /// reference that does not come is given up by then.
 inline constexpr std::int64_t kTailTicks = 20;
 
+/// Between two arrivals; no drive pauses as long.
 inline constexpr Duration kLongestPause = std::chrono::hours(24);
 
 /// What a recording says about the live run it came from, so that a replay repeats it tick by tick.
