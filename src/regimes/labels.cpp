@@ -13,6 +13,8 @@ namespace {
 constexpr std::string_view kHeader = "begin_s,end_s,regime";
 constexpr std::string_view kEvent = "regime ";
 constexpr std::string_view kEnd = "end";
+/// Some thirty years: no run is as long, and every time of the host can be counted from there.
+constexpr double kRunMax_s = 1e9;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";
@@ -44,8 +46,9 @@ std::optional<Label> parse_line(std::string_view line) {
   const auto begin = number(trimmed(line.substr(0, first)));
   const auto end = number(trimmed(line.substr(first + 1, second - first - 1)));
   const auto name = trimmed(line.substr(second + 1));
-  if (!begin || !end || *end <= *begin || name.empty() || name.find(',') != std::string_view::npos)
-    return std::nullopt;
+  const auto is_of_a_run = [](double time_s) { return std::abs(time_s) <= kRunMax_s; };
+  if (!begin || !end || !is_of_a_run(*begin) || !is_of_a_run(*end)) return std::nullopt;
+  if (*end <= *begin || name.empty() || name.find(',') != std::string_view::npos) return std::nullopt;
   return Label{*begin, *end, std::string(name)};
 }
 

@@ -32,6 +32,7 @@ TEST(Labels, WhatIsWrongInAFileIsToldWithItsLine) {
   EXPECT_THAT(error_of("begin_s,end_s,regime\n1,2\n"), HasSubstr("l.csv:2: '1,2' is no stretch"));
   EXPECT_THAT(error_of("begin_s,end_s,regime\n3,2,road\n"), HasSubstr("l.csv:2"));
   EXPECT_THAT(error_of("begin_s,end_s,regime\n1,nan,road\n"), HasSubstr("l.csv:2"));
+  EXPECT_THAT(error_of("begin_s,end_s,regime\n-1e300,1e300,road\n"), HasSubstr("l.csv:2"));
   EXPECT_THAT(error_of("begin_s,end_s,regime\n1,5,road\n4,6,gravel\n"),
               HasSubstr("l.csv:3: begins at 4 s, before the stretch above it ends (5 s)"));
 }
