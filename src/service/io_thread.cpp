@@ -41,7 +41,6 @@ constexpr int kBeatsOfRest = 9;
 constexpr int kBeatsOfLongRest = 29;
 constexpr Duration kClockIsLearned = std::chrono::seconds(60);
 constexpr Duration kStatusPeriod = std::chrono::milliseconds(100);
-constexpr std::size_t kPrefaultedStack = 128 * 1024;
 
 /// Waits for events until `until`.
 int wait(int epoll, std::span<epoll_event> events, HostTime until) noexcept {
@@ -195,7 +194,7 @@ class IoThread::Line final : public SampleSink {
       auto problem = connection_->session->problem();
       if (problem.empty()) problem = decoder_->remark();
       const std::size_t n = std::min(problem.size(), status_.problem.size() - 1);
-      std::memcpy(status_.problem.data(), problem.data(), n);
+      std::copy_n(problem.begin(), n, status_.problem.begin());
       status_.problem[n] = '\0';
     }
     for (Line* sharer : sharers_) sharer->show_line_of(status_);

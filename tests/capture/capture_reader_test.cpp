@@ -9,6 +9,7 @@
 #include <random>
 
 #include "capture/capture_writer.h"
+#include "publish/message_codec.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -51,6 +52,17 @@ class Capture {
     chunk.n_bytes = static_cast<std::uint16_t>(bytes.size());
     std::copy(bytes.begin(), bytes.end(), chunk.bytes.begin());
     writer_.append("IMUSCOPE_RAW_X", 1, encode(chunk, run_.devices.at(device), {run_.t0, run_.t0_wall}));
+  }
+  /// A read whose arrival is what no clock says.
+  void chunk_stamped(DeviceIndex device, std::int64_t arrival_ns) {
+    raw_t message{};
+    message.sequence = 1;
+    message.device = run_.devices.at(device);
+    message.direction = raw_t::READ;
+    message.arrival_ns = arrival_ns;
+    message.n_bytes = 1;
+    message.bytes = {2};
+    writer_.append("IMUSCOPE_RAW_X", 1, encode_message(message));
   }
   void exception(const RunException& exception) {
     const std::string device =
@@ -113,8 +125,7 @@ TEST(CaptureReader, TakesRecordsWithImpossibleTimesAndCountsForDamage) {
   Capture capture(path);
   capture.header();
   capture.chunk(0, 0, 1, {1});
-  constexpr std::int64_t kAfterAll_ms = std::numeric_limits<std::int64_t>::max() / 1'000'000 - 60'000;
-  capture.chunk(0, 1, kAfterAll_ms, {2});
+  capture.chunk_stamped(0, std::numeric_limits<std::int64_t>::max() - 60'000'000'000);
   capture.chunk(0, -3, 2, {3});
   capture.chunk(0, std::numeric_limits<std::int64_t>::max(), 2, {4});
   capture.exception({ExceptionKind::kSkippedTicks, 0, -1, 7, -1});

@@ -290,7 +290,8 @@ TEST(WaveletVariance, AConstantSignalHasZeroAtEveryLevelClassicalAndRobust) {
   const std::vector<double> x(256, -3.25);
   WvOptions options;
   for (int pass = 0; pass < 2; ++pass) {
-    for (const auto& level : haar_wavelet_variance(x, options).value().levels) EXPECT_EQ(level.value, 0.0);
+    const auto wv = haar_wavelet_variance(x, options).value();
+    for (const auto& level : wv.levels) EXPECT_EQ(level.value, 0.0);
     options.robust = RobustOptions{};
   }
 }
