@@ -5,10 +5,26 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "base/result.h"
+
 namespace imuscope::report {
 
 /// The document in a file; discarded (is_discarded()) where it cannot be read, is no JSON, or is larger than
 /// any that a run writes (kTextFileMax): what is made of a file must not take more memory than there is.
 [[nodiscard]] nlohmann::json read_json_file(const std::filesystem::path& file);
+
+/// That a document lacks a field or holds something else there than a run writes, in words for a person.
+[[nodiscard]] Error malformed(const std::filesystem::path& run_folder, const nlohmann::json::exception& why);
+
+/// What `work` returns, which takes fields of a run folder's documents for granted; malformed() where one is
+/// not there or is of another type.
+template <typename Work>
+auto with_documents_of(const std::filesystem::path& run_folder, Work&& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const nlohmann::json::exception& why) {
+    return tl::unexpected<Error>(malformed(run_folder, why));
+  }
+}
 
 }  // namespace imuscope::report

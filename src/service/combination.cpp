@@ -125,9 +125,7 @@ json study_json(const Combination& combination, const CombinedStudy& study) {
   return out;
 }
 
-}  // namespace
-
-Result<DriveMountings> read_mountings(const std::filesystem::path& run) {
+Result<DriveMountings> mountings_of(const std::filesystem::path& run) {
   const auto file = run / "calibration.json";
   const auto calibration = read_document(file, "imuscope.calibration/1");
   if (!calibration) return tl::unexpected<Error>(calibration.error());
@@ -159,6 +157,12 @@ Result<DriveMountings> read_mountings(const std::filesystem::path& run) {
     out.studies.push_back(study);
   }
   return out;
+}
+
+}  // namespace
+
+Result<DriveMountings> read_mountings(const std::filesystem::path& run) {
+  return report::with_documents_of(run, [&] { return mountings_of(run); });
 }
 
 const char* name_of(CombineMethod method) {

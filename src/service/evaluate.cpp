@@ -100,9 +100,7 @@ void evaluate_study(const StudyDrive& drive, const std::vector<EvaluationModel>&
   }
 }
 
-}  // namespace
-
-Result<json> evaluate_run(const EvaluationRunOptions& options) {
+Result<json> evaluate_documents(const EvaluationRunOptions& options) {
   const auto run = read_document(options.run_dir / "run.json");
   if (!run) return tl::unexpected<Error>(run.error());
   const auto calibration = read_document(options.run_dir / "calibration.json");
@@ -146,6 +144,12 @@ Result<json> evaluate_run(const EvaluationRunOptions& options) {
   if (auto written = write_json(options.run_dir / "evaluation.json", document); !written)
     return tl::unexpected<Error>(written.error());
   return document;
+}
+
+}  // namespace
+
+Result<json> evaluate_run(const EvaluationRunOptions& options) {
+  return report::with_documents_of(options.run_dir, [&] { return evaluate_documents(options); });
 }
 
 }  // namespace imuscope

@@ -244,6 +244,20 @@ TEST_F(BadInput, ConfigurationsAndArgumentsAreUsageWithARemedy) {
   }
 }
 
+TEST_F(BadInput, ARunFolderWhoseDocumentsAreOfAnotherShapeIsNamed) {
+  std::filesystem::create_directories(folder_ / "odd");
+  for (const char* name :
+       {"run.json", "calibration.json", "models.json", "regression.json", "comparison.json"})
+    write_file(folder_ / "odd" / name,
+               R"({"schema":7,"inputs":3,"imus":5,"regressions":[{"method":"ols"}]})");
+  const std::string text =
+      "a JSON file of odd, or the truth.json given with it, is not as this version writes it: ";
+  for (const std::string command : {"tables odd", "combine odd odd", "evaluate odd"}) {
+    SCOPED_TRACE(command);
+    expect_refusal(run_in(folder_, "imuscope " + command), "imuscope", kFailedWork, text);
+  }
+}
+
 TEST_F(BadInput, ATruncatedStreamIsUsedAndCounted) {
   const auto outcome = run_in(folder_,
                               "imuscope replay airins=rec/airins.bin mtx1=cut.bin gnss=rec/gnss.bin "

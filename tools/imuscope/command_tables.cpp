@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Options {
+struct TablesCommand {
   std::filesystem::path run;
   std::string truth;
   std::vector<std::string> axes{"gyro_x", "gyro_y", "gyro_z"};
@@ -108,7 +108,7 @@ std::string p_text(std::optional<double> p) {
   return *p < kSmallest ? "< 1e-16" : fmt::format("{:.2g}", *p);
 }
 
-bool wanted(const Options& options, const json& entry) {
+bool wanted(const TablesCommand& options, const json& entry) {
   return std::find(options.axes.begin(), options.axes.end(), entry.at("axis").get<std::string>()) !=
          options.axes.end();
 }
@@ -122,7 +122,7 @@ const json* find_regression(const json& regressions, const json& like, const cha
   return nullptr;
 }
 
-void print_table1(const Options& options, const json& regressions) {
+void print_table1(const TablesCommand& options, const json& regressions) {
   fmt::print("Table I: linear regression of the errors on fifteen measures of the dynamics\n");
   fmt::print("{:<8} {:<8} {:>8} {:>9} {:>11} {:>9}   {:>11} {:>9}   {:>11} {:>9}\n", "", "", "n", "R2 (OLS)",
              "F (OLS)", "p (OLS)", "F (GLS)", "p (GLS)", "F projected", "p");
@@ -141,7 +141,7 @@ void print_table1(const Options& options, const json& regressions) {
   }
 }
 
-void print_table2(const Options& options, const json& comparisons, const Truth& truth) {
+void print_table2(const TablesCommand& options, const json& comparisons, const Truth& truth) {
   fmt::print("\nTable II: noise models per regime (95 % intervals; p corrected after Holm over the S-IMU)\n");
   std::map<std::string, Held> held;
   for (const auto& c : comparisons) {
@@ -180,7 +180,7 @@ void print_table2(const Options& options, const json& comparisons, const Truth& 
   }
 }
 
-Result<void> tables(const Options& options) {
+Result<void> tables(const TablesCommand& options) {
   const std::string remedy = "run imuscope process into this folder first";
   const auto regression = read(options.run / "regression.json", remedy);
   if (!regression) return tl::unexpected<Error>(regression.error());
@@ -225,7 +225,7 @@ Result<void> tables(const Options& options) {
 void add_tables(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
       "tables", "Tables I and II of a finished study, with the truth of a simulation beside the estimate");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TablesCommand>();
   command->add_option("RUN_DIR", options->run, "folder of a finished run")->required()->type_name("DIR");
   command
       ->add_option("--truth", options->truth,
@@ -233,7 +233,8 @@ void add_tables(CLI::App& app, Work& chosen) {
       ->type_name("FILE");
   command->add_option("--axis", options->axes, "axes to show: gyro_x .. accel_z")->capture_default_str();
   command->add_flag("--json", options->json, "print JSON");
-  on_chosen(*command, chosen, [options] { return tables(*options); });
+  on_chosen(*command, chosen,
+            [options] { return report::with_documents_of(options->run, [&] { return tables(*options); }); });
 }
 
 }  // namespace imuscope::cli

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/units.h"
 #include "report/json_file.h"
 
 namespace imuscope::cli {
@@ -17,8 +18,6 @@ namespace imuscope::cli {
 namespace {
 
 using nlohmann::json;
-
-constexpr double kMdegPerRad = 180.0 / 3.14159265358979323846 * 1e3;
 
 std::optional<json> read(const std::filesystem::path& file) {
   auto document = report::read_json_file(file);
@@ -47,9 +46,8 @@ std::array<double, 3> small_rotation_b(const Row& from, const Row& to) {
 
 /// zyx Euler angles of C_b_s, degrees: what a person can picture.
 std::array<double, 3> euler_deg(const Row& C) {
-  constexpr double kDeg = kMdegPerRad * 1e-3;
-  return {std::atan2(C[7], C[8]) * kDeg, -std::asin(std::clamp(C[6], -1.0, 1.0)) * kDeg,
-          std::atan2(C[3], C[0]) * kDeg};
+  return {std::atan2(C[7], C[8]) * kDegPerRad, -std::asin(std::clamp(C[6], -1.0, 1.0)) * kDegPerRad,
+          std::atan2(C[3], C[0]) * kDegPerRad};
 }
 
 const json* by_name(const json& document, const std::string& name) {
@@ -166,9 +164,7 @@ void print_warnings(const json& warnings) {
     fmt::print("Note: {} more, in run.json and the report\n", warnings.size() - printed);
 }
 
-}  // namespace
-
-Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) {
+Result<void> print_documents(const std::filesystem::path& run_folder, bool as_json) {
   const auto calibration = read(run_folder / "calibration.json");
   const auto models = read(run_folder / "models.json");
   const auto run = read(run_folder / "run.json");
@@ -190,6 +186,12 @@ Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) 
   fmt::print("\nResults: {}\n", run_folder.string());
   if (std::filesystem::exists(report)) fmt::print("Report:  {}\n", report.string());
   return {};
+}
+
+}  // namespace
+
+Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) {
+  return report::with_documents_of(run_folder, [&] { return print_documents(run_folder, as_json); });
 }
 
 }  // namespace imuscope::cli
