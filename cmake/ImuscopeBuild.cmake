@@ -6,6 +6,7 @@ include(GoogleTest)
 option(IMUSCOPE_TESTS "Build the tests" ON)
 option(IMUSCOPE_WERROR "Treat warnings as errors" ON)
 option(IMUSCOPE_FUZZ "Build the libFuzzer targets (clang only)" OFF)
+option(IMUSCOPE_STUDIES "Build the studies and benchmarks that no test runs" ON)
 option(IMUSCOPE_TOGETHER "Compile several files of a library as one, where it says that they can be" OFF)
 set(IMUSCOPE_SANITIZE "" CACHE STRING "Sanitizers to build with: empty, 'address,undefined' or 'thread'")
 
@@ -67,18 +68,25 @@ function(imuscope_layer target folder)
   set_property(GLOBAL PROPERTY IMUSCOPE_LAYER_${target} ${layer})
 endfunction()
 
+# With IMUSCOPE_TOGETHER, which presets with instrumented code set, up to ten files of a target are compiled as one:
+# less than half the time where the same templates are in all of them. Their constants and helpers have different names.
+function(imuscope_together target)
+  if(IMUSCOPE_TOGETHER)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+  endif()
+endfunction()
+
 # imuscope_library(NAME SOURCES a.cpp ... PUBLIC libs... PRIVATE libs... [TOGETHER])
-# Declares the library of the current folder. Without SOURCES it is header-only. TOGETHER: with IMUSCOPE_TOGETHER,
-# which presets with instrumented code set, up to ten of its files are compiled as one: less than half the time where
-# the same templates of Eigen are in all of them. Their constants and helpers have different names.
+# Declares the library of the current folder. Without SOURCES it is header-only. TOGETHER: see
+# imuscope_together.
 function(imuscope_library name)
   cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   file(RELATIVE_PATH folder ${CMAKE_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
   imuscope_layer(${name} ${folder})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
-    if(ARG_TOGETHER AND IMUSCOPE_TOGETHER)
-      set_target_properties(${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+    if(ARG_TOGETHER)
+      imuscope_together(${name})
     endif()
     target_include_directories(${name} PUBLIC ${CMAKE_BINARY_DIR}/layers/${name})
     target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE imuscope_flags ${ARG_PRIVATE})
@@ -89,10 +97,13 @@ function(imuscope_library name)
   endif()
 endfunction()
 
-# imuscope_program(NAME SOURCES a.cpp ... LIBS libs...)
+# imuscope_program(NAME SOURCES a.cpp ... LIBS libs... [TOGETHER])
 function(imuscope_program name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  cmake_parse_arguments(ARG "TOGETHER" "" "SOURCES;LIBS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
+  if(ARG_TOGETHER)
+    imuscope_together(${name})
+  endif()
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS})
 endfunction()
 

@@ -16,4 +16,8 @@ double chi_squared_quantile(double dof, double p) {
   return dof * root * root * root;
 }
 
+double chi_squared_p_value(double statistic, double dof) {
+  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(dof), statistic));
+}
+
 }  // namespace imuscope::noise

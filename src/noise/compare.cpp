@@ -4,10 +4,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
+#include "noise/chi_squared.h"
 #include "noise/inference.h"
 
 namespace imuscope::noise {
@@ -16,10 +16,6 @@ namespace {
 double covariance_of(const FitResult& fit, std::size_t i, std::size_t k) {
   const std::size_t size = fit.parameters.size();
   return fit.covariance.size() == size * size ? fit.covariance[i * size + k] : std::nan("");
-}
-
-double p_value_of(double statistic, int dof) {
-  return boost::math::cdf(complement(boost::math::chi_squared(dof), statistic));
 }
 
 std::optional<std::size_t> index_of(const FitResult& fit, const ParameterEstimate& p) {
@@ -70,7 +66,7 @@ std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b,
   DifferenceTest test;
   test.dof = static_cast<int>(n);
   test.statistic = difference.dot(ldlt.solve(difference));
-  test.p_value = p_value_of(test.statistic, test.dof);
+  test.p_value = chi_squared_p_value(test.statistic, test.dof);
   return test;
 }
 
@@ -118,7 +114,7 @@ Comparison compare(const FitResult& first, const FitResult& second) {
       } else if (const double variance = covariance_of(first, i, i) + covariance_of(second, *k, *k);
                  std::isfinite(variance) && variance > 0.0) {
         const double d = on_interval_scale(q) - on_interval_scale(p);
-        row.p_value = p_value_of(d * d / variance, 1);
+        row.p_value = chi_squared_p_value(d * d / variance, 1);
         set_ratio_interval(row, std::sqrt(variance), z);
         testable.push_back({i, *k});
       }

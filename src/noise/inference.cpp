@@ -6,12 +6,12 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "noise/chi_squared.h"
 #include "noise/separable_fit.h"
 
 namespace imuscope::noise {
@@ -314,7 +314,7 @@ std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& re
   test.dof = static_cast<int>(rotated.size() - qr.rank());
   if (test.dof < 1) return std::nullopt;
   test.statistic = rotated.tail(test.dof).squaredNorm();
-  test.p_value = boost::math::cdf(complement(boost::math::chi_squared(test.dof), test.statistic));
+  test.p_value = chi_squared_p_value(test.statistic, test.dof);
   return test;
 }
 

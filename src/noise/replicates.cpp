@@ -4,10 +4,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 #include "base/contracts.h"
+#include "noise/chi_squared.h"
 #include "noise/compare.h"
 #include "noise/inference.h"
 #include "noise/wv_covariance.h"
@@ -17,10 +17,6 @@ namespace {
 
 /// Level of the J-test from which a model counts as explaining its samples.
 constexpr double kExplained = 0.01;
-
-double p_value_of(double statistic, int dof) {
-  return boost::math::cdf(complement(boost::math::chi_squared(dof), statistic));
-}
 
 /// value - expected with the skewness of a wavelet variance of few degrees of freedom taken out: the
 /// difference of cube roots (Wilson and Hilferty 1931), scaled so that it keeps the variance.
@@ -83,7 +79,7 @@ std::optional<JTest> homogeneity_of(const std::vector<FitResult>& fits) {
     const Eigen::VectorXd d = values[k] - mean;
     test.statistic += d.dot(weights[k] * d);
   }
-  test.p_value = p_value_of(test.statistic, test.dof);
+  test.p_value = chi_squared_p_value(test.statistic, test.dof);
   return test;
 }
 
@@ -161,7 +157,7 @@ std::optional<JTest> distance_from_model(const WaveletVariance& window, const Fi
   JTest test;
   test.dof = static_cast<int>(levels.size());
   test.statistic = llt.matrixL().solve(residual).squaredNorm();
-  test.p_value = p_value_of(test.statistic, test.dof);
+  test.p_value = chi_squared_p_value(test.statistic, test.dof);
   return test;
 }
 

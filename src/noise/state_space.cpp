@@ -20,7 +20,7 @@ struct Block {
   double R = 0.0;
 };
 
-Block moving_average(double variance, double theta) {
+Block moving_average_block(double variance, double theta) {
   Block block;
   block.F = (Matrix2d() << 0.0, 0.0, 1.0, 0.0).finished();
   block.Q = Vector2d(variance, 0.0).asDiagonal();
@@ -42,7 +42,7 @@ Block arma(double variance, double phi, double theta) {
   return block;
 }
 
-Block sinusoid(double alpha2, double b) {
+Block sinusoid_block(double alpha2, double b) {
   Block block;
   block.F = (Matrix2d() << std::cos(b), std::sin(b), -std::sin(b), std::cos(b)).finished();
   block.Q = Matrix2d::Zero();
@@ -75,18 +75,18 @@ Block ramp(double omega2) {
 Block block_of(const Component& c) {
   switch (c.kind) {
     case ProcessKind::kQuantization:
-      return moving_average(c.amplitude, -1.0);
+      return moving_average_block(c.amplitude, -1.0);
     case ProcessKind::kWhiteNoise: {
       Block block;
       block.R = c.amplitude;
       return block;
     }
     case ProcessKind::kMa1:
-      return moving_average(c.amplitude, c.shape[0]);
+      return moving_average_block(c.amplitude, c.shape[0]);
     case ProcessKind::kArma11:
       return arma(c.amplitude, c.shape[0], c.shape[1]);
     case ProcessKind::kSinusoid:
-      return sinusoid(c.amplitude, c.shape[0]);
+      return sinusoid_block(c.amplitude, c.shape[0]);
     case ProcessKind::kGaussMarkov:
       return first_order(std::exp(-c.shape[0]), -c.amplitude * std::expm1(-2.0 * c.shape[0]), c.amplitude,
                          false);

@@ -8,7 +8,6 @@
 namespace imuscope {
 namespace {
 
-constexpr double kMsPerS = 1e3;
 constexpr double kUsPerS = 1e6;
 constexpr double kBytesPerMb = 1e6;
 

@@ -31,10 +31,6 @@ std::string array_of(std::size_t n, int digits, Value value) {
   return array + "]";
 }
 
-double or_nan(std::optional<double> value) {
-  return value.value_or(std::numeric_limits<double>::quiet_NaN());
-}
-
 std::string head_of(const Figure& figure, const char* kind) {
   std::string head = fmt::format("\"id\":{},\"kind\":\"{}\",\"group\":{},\"y_label\":{}", quoted(figure.id),
                                  kind, quoted(figure.group), quoted(figure.y_label));

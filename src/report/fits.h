@@ -2,6 +2,7 @@
 
 /// The noise models of a run, in the units they are shown in: gyroscopes in deg/s as in the paper.
 
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -46,6 +47,11 @@ struct Fit {
   bool identifiable = true;
   std::vector<std::string> warnings;
 };
+
+/// NaN where a number is not known.
+inline double or_nan(std::optional<double> value) {
+  return value.value_or(std::numeric_limits<double>::quiet_NaN());
+}
 
 /// The fits in `models` (the array of models.json); empty where it is null.
 std::vector<Fit> read_fits(const nlohmann::json& models);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 
+#include "base/units.h"
 #include "report/figures.h"
 #include "report/fits.h"
 #include "report/run_files.h"
@@ -21,7 +22,6 @@ namespace {
 
 /// Told apart by the colour-blind (Okabe and Ito).
 constexpr const char* kColours[] = {"#d1600a", "#0b9a6e", "#3a86d8"};
-constexpr std::size_t kTriad = 3;
 
 /// A script under construction: panels of one picture.
 struct Picture {
@@ -34,7 +34,7 @@ struct Picture {
 std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : "NaN"; }
 
 /// Text inside single quotes of gnuplot.
-std::string quoted(std::string any) {
+std::string gnuplot_text(std::string any) {
   for (std::size_t at = 0; (at = any.find('\'', at)) != std::string::npos; at += 2) any.insert(at, 1, '\'');
   return "'" + any + "'";
 }
@@ -94,7 +94,6 @@ Picture drive_picture(const RunFiles& run) {
 /// The paper's Figure 1: three angles, three lengths.
 Picture estimate_picture(const StudyFiles& study) {
   Picture picture{"figure1_" + study.name, 2, 3, {}};
-  constexpr double kMmPerM = 1e3;
   constexpr const char* kAxisNames[] = {"x", "y", "z"};
   picture.body += "set autoscale xfix\nset xlabel 'time, s'\n";
   for (std::size_t i = 0; i < 2 * kTriad; ++i) {
@@ -157,8 +156,6 @@ Picture scatter_picture(const StudyFiles& study) {
   return picture;
 }
 
-double or_nan(std::optional<double> value) { return value.value_or(std::nan("")); }
-
 /// Observed, interval, total and every component of one fit.
 std::string wavelet_block(const std::string& name, const Fit& fit) {
   std::string block = "$" + name + " << EOD\n";
@@ -179,7 +176,7 @@ std::string wavelet_plots(const std::string& block, const Fit& fit, const char* 
   std::string plots = fmt::format(
       "${0} using 1:2:3:4 with yerrorbars pointtype 7 pointsize 0.4 linecolor rgb '{1}' title {2}, "
       "${0} using 1:5 with lines linewidth 1.5 linecolor rgb '{1}' notitle",
-      block, colour, quoted(fit.regime.empty() ? "all" : fit.regime));
+      block, colour, gnuplot_text(fit.regime.empty() ? "all" : fit.regime));
   for (std::size_t i = 0; i < fit.components.size(); ++i) {
     if (fit.components[i].values.size() != fit.levels.size()) continue;
     plots += fmt::format(", ${} using 1:{} with lines dashtype 2 linewidth 0.8 linecolor rgb '{}' notitle",
@@ -234,7 +231,7 @@ std::optional<Picture> wavelet_picture(const std::vector<Fit>& fits, const std::
     picture.body +=
         wavelet_range(of_axis) +
         fmt::format("set ylabel {}\nplot {}\n",
-                    quoted(fmt::format("{}, ({})²", axis_words(axis), of_axis.front()->unit)), plots);
+                    gnuplot_text(fmt::format("{}, ({})²", axis_words(axis), of_axis.front()->unit)), plots);
   }
   return any ? std::optional(picture) : std::nullopt;
 }
@@ -252,7 +249,7 @@ std::vector<Picture> pictures_of(const RunFiles& run) {
   return pictures;
 }
 
-/// Draws the panels once for each format. Run in its own folder, so that no path has to be quoted.
+/// Draws the panels once for each format. Run in its own folder, so that no path has to be gnuplot_text.
 std::string script_of(const Picture& picture) {
   constexpr double kPanelWidth_in = 3.0;
   constexpr double kPanelHeight_in = 2.2;

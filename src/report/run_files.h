@@ -37,6 +37,8 @@ inline constexpr std::size_t kCalibrationSignals = 14;
 
 /// Signals of StudyFiles::errors: three of the gyroscope in deg/s, three of the accelerometer in m/s².
 inline constexpr std::size_t kErrorSignals = 6;
+/// Axes of one sensor: the first three signals are the gyroscope's.
+inline constexpr std::size_t kTriad = 3;
 
 /// Time from begin_s to end_s.
 struct Stretch {

@@ -13,8 +13,6 @@ namespace {
 using Three = std::array<double, 3>;
 
 constexpr std::array<char, 3> kAxisNames{'x', 'y', 'z'};
-constexpr double kMmPerM = 1e3;
-constexpr double kMsPerS = 1e3;
 constexpr double kPpm = 1e6;
 constexpr double kMdegPerDeg = 1e3;
 

@@ -22,15 +22,15 @@ struct Pair {
 };
 constexpr Pair kPairs[] = {{0, 0}, {0, 3}, {0, 6},  {1, 1},  {1, 4},  {1, 7},  {2, 2}, {2, 5},
                            {2, 8}, {3, 9}, {3, 12}, {4, 10}, {4, 13}, {5, 11}, {5, 14}};
-struct Quantity {
+struct DrivingQuantity {
   const char* name;
   const char* unit;
 };
-constexpr Quantity kQuantities[] = {{"angular rate", "rad/s"},
-                                    {"angular acceleration", "rad/s²"},
-                                    {"angular jerk", "rad/s³"},
-                                    {"specific force", "m/s²"},
-                                    {"linear jerk", "m/s³"}};
+constexpr DrivingQuantity kQuantities[] = {{"angular rate", "rad/s"},
+                                           {"angular acceleration", "rad/s²"},
+                                           {"angular jerk", "rad/s³"},
+                                           {"specific force", "m/s²"},
+                                           {"linear jerk", "m/s³"}};
 
 Html percent(std::optional<double> r2) {
   return r2 ? text(fmt::format("{:.2f} %", 100.0 * *r2)) : text(kUnknown);
@@ -97,7 +97,7 @@ Html scatter_panels(const StudyFiles& study, FigureSheet& figures) {
     const auto& x = study.scatter->covariates[pair.covariate];
     const auto& y = study.scatter->errors[pair.error];
     const double r = correlation(x, y);
-    const Quantity& quantity = kQuantities[pair.covariate / 3];
+    const DrivingQuantity& quantity = kQuantities[pair.covariate / 3];
     const char* unit = pair.error < 3 ? "deg/s" : "m/s²";
     const std::string caption =
         fmt::format("{}, {}, against its axis' {}{}", axis_words(kAxes[pair.error]), unit, quantity.name,

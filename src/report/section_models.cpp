@@ -9,8 +9,6 @@
 namespace imuscope::report {
 namespace {
 
-constexpr std::size_t kTriad = 3;
-
 const char* signal_unit(std::size_t signal) { return signal < kTriad ? "deg/s" : "m/s²"; }
 
 Html error_panels(const StudyFiles& study, FigureSheet& figures) {

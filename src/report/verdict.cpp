@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/units.h"
 #include "report/json_fields.h"
 #include "report/mounting.h"
 #include "report/people.h"
@@ -12,8 +13,6 @@
 namespace imuscope::report {
 namespace {
 
-constexpr double kMmPerM = 1e3;
-constexpr double kMsPerS = 1e3;
 /// An error beyond this many sd is not chance.
 constexpr double kSdMax = 4.0;
 /// Fewer seconds of a regime than this leave its slow processes unseen.

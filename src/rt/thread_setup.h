@@ -43,6 +43,9 @@ void run_as(std::thread& thread, Scheduling scheduling) noexcept;
 /// Stack size of all threads created from now on. The default of 8 MB each would be locked in full.
 [[nodiscard]] Result<void> set_thread_stack_size(std::size_t bytes);
 
+/// What a thread of the core touches of its stack before its loop.
+inline constexpr std::size_t kPrefaultedStack = 128 * 1024;
+
 /// Touches this much of the calling thread's stack, so that no page fault is left for the core's loop. Must
 /// be well below the thread's stack size.
 void prefault_stack(std::size_t bytes) noexcept;

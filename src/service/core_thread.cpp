@@ -4,12 +4,6 @@
 
 namespace imuscope {
 
-namespace {
-
-constexpr std::size_t kPrefaultedStack = 128 * 1024;
-
-}  // namespace
-
 CoreThread::CoreThread(Core& core, HostTime t0)
     : core_(core), t0_(t0), rings_(std::make_unique<CoreRings>()) {}
 

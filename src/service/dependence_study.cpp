@@ -11,6 +11,7 @@
 #include "noise/holm.h"
 #include "noise/wavelet_variance.h"
 #include "regimes/motion_regimes.h"
+#include "service/report_values.h"
 
 namespace imuscope {
 
@@ -24,7 +25,6 @@ constexpr std::array<const char*, kDrivers> kDriverUnits{"deg/s", "m/s^2", "m/s"
 /// A sensor whose temperature stays within this says nothing of what follows it.
 constexpr double kLeastWarming_degC = 1.0;
 constexpr double kConfidence = 0.95;
-constexpr double kLevel = 0.05;
 
 using Drivers = std::array<std::optional<double>, kDrivers>;
 
@@ -137,7 +137,7 @@ double percent(double slope) { return 100.0 * std::expm1(slope); }
 
 std::string sentence_of(const std::string& name, const Slope& s, double p_holm) {
   const char* unit = kDriverUnits[s.driver];
-  if (p_holm >= kLevel) {
+  if (p_holm >= kSignificance) {
     return fmt::format("{} {}: {} {} shows no dependence on the {} (p = {:.2g}, corrected)", name,
                        axis_name(s.axis), s.slope.process, s.slope.name, kDriverNames[s.driver], p_holm);
   }

@@ -6,16 +6,14 @@
 #include <limits>
 #include <map>
 
+#include "service/noise_feedback.h"
 #include "service/noise_series.h"
+#include "service/report_values.h"
 
 namespace imuscope {
 namespace {
 
 using nlohmann::json;
-
-/// A process of at most this correlation time is white to a filter that coasts for ten seconds and more.
-constexpr double kFastTau_s = 1.0;
-constexpr double kLevel = 0.05;
 
 double number_or(const json& object, const char* key, double fallback) {
   const auto found = object.find(key);
@@ -135,7 +133,7 @@ const json* clearest_dependence(const json& dependence, const std::string& name,
   const auto found = dependence.find("dependences");
   if (found == dependence.end()) return nullptr;
   const json* best = nullptr;
-  double best_p = kLevel;
+  double best_p = kSignificance;
   for (const json& entry : *found) {
     const double p = number_or(entry, "p_holm", 1.0);
     if (entry.value("name", "") != name || entry.value("axis", "") != axis_name(axis) ||

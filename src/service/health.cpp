@@ -14,8 +14,6 @@ namespace imuscope {
 
 namespace {
 
-constexpr std::array kStudyNames{"waiting for samples", "looking for its mounting", "converging",
-                                 "calibrated"};
 constexpr std::string_view kReference = "reference";
 constexpr std::string_view kStudy = "study";
 /// The coarse mounting comes from the rates of both IMUs about more than one axis.
@@ -62,7 +60,8 @@ Health judge(const StatusReport& report) {
   if (!any_study && !devices.empty()) return {"failed", "no IMU under study can be set up"};
 
   const bool calibrating = std::any_of(report.studies.begin(), report.studies.end(), [](const auto& study) {
-    return study.state == kStudyNames[2] || study.state == kStudyNames[3];
+    return study.state == name_of(StudyStatus::kConverging) ||
+           study.state == name_of(StudyStatus::kCalibrated);
   });
   if (const auto silent = find([](const auto& d) { return !streams(d); }); silent != devices.end()) {
     return {calibrating || failed(*silent) ? "degraded" : "starting", device_reason(*silent)};
@@ -73,12 +72,26 @@ Health judge(const StatusReport& report) {
   return {"running", "all devices stream"};
 }
 
+const char* name_of(StudyStatus status) {
+  switch (status) {
+    case StudyStatus::kWaiting:
+      return "waiting for samples";
+    case StudyStatus::kCoarse:
+      return "looking for its mounting";
+    case StudyStatus::kConverging:
+      return "converging";
+    case StudyStatus::kCalibrated:
+      break;
+  }
+  return "calibrated";
+}
+
 StatusReport::Study study_status(const std::string& name, const StudyOutput& study,
                                  const StudyConfig& config) {
   const auto largest = [](const Vector3& sd) { return *std::max_element(sd.begin(), sd.end()); };
   StatusReport::Study status;
   status.name = name;
-  status.state = kStudyNames[static_cast<std::size_t>(study.status)];
+  status.state = name_of(study.status);
   status.regime = regime_name(study.regime);
   status.goal_psi_rad = config.goal_boresight_sd_rad;
   status.goal_r_m = config.goal_r_bs_b_sd_m;

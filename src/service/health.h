@@ -24,6 +24,9 @@ struct Health {
 /// than they could be, or are being lost), aligning, running.
 [[nodiscard]] Health judge(const StatusReport& report);
 
+/// Calibration of one S-IMU in a word.
+[[nodiscard]] const char* name_of(StudyStatus status);
+
 /// Calibration of one S-IMU beside its goals.
 [[nodiscard]] StatusReport::Study study_status(const std::string& name, const StudyOutput& study,
                                                const StudyConfig& config);

@@ -22,7 +22,7 @@ constexpr std::size_t kLook = 1U << 20U;
 /// A read without a sample in it is cut here: the file holds something else.
 constexpr std::size_t kLongestRead = 1U << 20U;
 constexpr std::size_t kFlushBytes = 1U << 20U;
-constexpr std::uint64_t kReadsPerProgress = 4096;
+constexpr std::uint64_t kRecordsPerProgress = 4096;
 
 /// A read with its arrival, of one device.
 struct StampedRead {
@@ -229,7 +229,7 @@ class Merger {
     auto read = device.reads->next();
     if (!read) return tl::unexpected<Error>(read.error());
     device.head = std::move(*read);
-    if (options_.progress && ++reads_ % kReadsPerProgress == 0) options_.progress(share());
+    if (options_.progress && ++reads_ % kRecordsPerProgress == 0) options_.progress(share());
     return {};
   }
 

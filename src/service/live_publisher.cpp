@@ -25,11 +25,9 @@ constexpr Duration kDrainPeriod = std::chrono::milliseconds(50);
 /// A person's events are looked for in every so many turns.
 constexpr std::uint64_t kTurnsPerEar = 2;
 constexpr int kEventQueue = 100;
-constexpr Duration kStatusPeriod = std::chrono::seconds(1);
+constexpr Duration kStatusMessagePeriod = std::chrono::seconds(1);
 
 constexpr std::array kSessionNames{"connecting", "configuring", "streaming", "failed"};
-constexpr std::array kStudyNames{"waiting for samples", "looking for its mounting", "converging",
-                                 "calibrated"};
 
 std::string state_name(const LineStatus& status) {
   switch (status.line) {
@@ -231,7 +229,7 @@ void LivePublisher::loop() {
     const auto turn = turns_.fetch_add(1, std::memory_order_relaxed);
     if (ear_ && turn % kTurnsPerEar == 0) (void)ear_->wait(std::chrono::milliseconds(0));
     const HostTime now = host_now();
-    if (now - last_status_ >= kStatusPeriod) {
+    if (now - last_status_ >= kStatusMessagePeriod) {
       watch_devices(now);
       publish_status(now);
       last_status_ = now;
@@ -283,7 +281,7 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& name = configuration_.devices[study_devices_[i]].name;
     const auto state = snapshot.studies[i].status;
-    if (state != study_states_[i]) spdlog::info("{}: {}", name, kStudyNames[static_cast<std::size_t>(state)]);
+    if (state != study_states_[i]) spdlog::info("{}: {}", name, name_of(state));
     study_states_[i] = state;
     for (const auto& sentence : observability_[i].update(snapshot.studies[i]))
       spdlog::info("{}: {}", name, sentence);

@@ -11,8 +11,6 @@ namespace imuscope {
 
 namespace {
 
-/// A process of at most this time constant acts like noise on the filter, a slower one like a bias.
-constexpr double kFastTau_s = 1.0;
 constexpr double kBelievedVarianceRatio = 100.0;
 
 struct FittedProcess {

@@ -11,6 +11,10 @@
 
 namespace imuscope {
 
+/// A process of at most this time constant acts like white noise on a filter that integrates for longer, a
+/// slower one like a bias.
+inline constexpr double kFastTau_s = 1.0;
+
 /// `current` with what a refit says of it. Per axis and regime, of the processes that are identifiable: WN
 /// becomes the white noise, the fastest GM of at most one second the fast process, the slowest GM beyond that
 /// the bias process (of the dynamic regime where there is one). Without its white noise a model says nothing

@@ -13,7 +13,6 @@ namespace imuscope {
 
 namespace {
 
-constexpr double kLevel = 0.05;
 constexpr const char* kWholeRun = "all";
 
 nlohmann::json or_null(const std::optional<double>& value) {
@@ -183,7 +182,7 @@ nlohmann::json parameter_json(const AxisComparison& of, const noise::ComparedPar
   };
   add_interval("first", of.first->fit);
   add_interval("second", of.second->fit);
-  json["verdict"] = !p_holm ? "not determined" : *p_holm < kLevel ? "differs" : "no difference shown";
+  json["verdict"] = !p_holm ? "not determined" : *p_holm < kSignificance ? "differs" : "no difference shown";
   return json;
 }
 
@@ -280,7 +279,7 @@ nlohmann::json models_json(const NoiseStudy& study) {
 nlohmann::json comparison_json(const NoiseStudy& study, const std::vector<std::string>& regimes) {
   nlohmann::json json{{"schema", "imuscope.comparison/1"},
                       {"correction", "Holm"},
-                      {"level", kLevel},
+                      {"level", kSignificance},
                       {"comparisons", nlohmann::json::array()}};
   std::vector<std::string> names;
   for (const auto& m : study.models) {

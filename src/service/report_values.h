@@ -13,6 +13,9 @@
 
 namespace imuscope {
 
+/// A difference whose corrected p is below counts as shown.
+inline constexpr double kSignificance = 0.05;
+
 /// Where UTC is on the host's time scale: from the R-IMU's tags, or from the PC's clock as long as there are
 /// none.
 struct UtcAnchor {

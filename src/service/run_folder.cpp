@@ -150,7 +150,6 @@ std::string calibration_csv_header() {
 
 std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, double time_s) {
   const auto q = quaternion_of(study.C_b_s);
-  constexpr double kMsPerS = 1e3;
   fmt::memory_buffer row;
   fmt::format_to(fmt::appender(row), FMT_COMPILE("{}"), time_s);
   append(row, study.psi_rad, kDegPerRad);

@@ -12,8 +12,6 @@ namespace {
 
 /// Below this, the drives did not see one mounting: once in a hundred cases by chance.
 constexpr double kSuspicious = 0.01;
-constexpr double kMdegPerRad = 1e3 * kDegPerRad;
-constexpr double kMmPerM = 1e3;
 
 std::string three(const std::array<double, 6>& values, std::size_t first, double unit, int digits) {
   return fmt::format("{:9.{}f} {:9.{}f} {:9.{}f}", values[first] * unit, digits, values[first + 1] * unit,

@@ -8,14 +8,14 @@
 namespace imuscope::cli {
 namespace {
 
-struct Options {
+struct CombineCommand {
   std::vector<std::string> runs;
   bool correlated = false;
   bool independent = false;
   bool json = false;
 };
 
-Result<void> combine_runs(const Options& options) {
+Result<void> combine_runs(const CombineCommand& options) {
   std::vector<DriveMountings> drives;
   for (const auto& run : options.runs) {
     auto drive = read_mountings(run);
@@ -40,7 +40,7 @@ Result<void> combine_runs(const Options& options) {
 void add_combine(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
       "combine", "One mounting from several drives, with the test whether it is one mounting");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CombineCommand>();
   command->add_option("RUN_DIR", options->runs, "folders of finished runs, one a drive")
       ->required()
       ->expected(2, -1)

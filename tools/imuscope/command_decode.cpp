@@ -26,7 +26,7 @@ using Stream = std::span<const std::uint8_t>;
 /// The protocol is found from this much of a recording's beginning.
 constexpr std::size_t kLook = 1U << 20U;
 
-struct Options {
+struct DecodeCommand {
   std::string file;
   std::string protocol;
   std::string dbc;
@@ -97,7 +97,7 @@ const StreamProtocol* find_protocol(Stream stream) {
   return best;
 }
 
-Result<const StreamProtocol*> choose_protocol(const Options& options, Stream stream) {
+Result<const StreamProtocol*> choose_protocol(const DecodeCommand& options, Stream stream) {
   std::vector<std::string_view> names;
   for (const StreamProtocol& protocol : stream_protocols()) {
     if (protocol.name == options.protocol) return &protocol;
@@ -195,7 +195,7 @@ class Printer {
 };
 
 /// A log of CAN frames as the messages of a vehicle's DBC file.
-Result<Totals> decode_with_dbc(const Options& options, const MappedFile& file) {
+Result<Totals> decode_with_dbc(const DecodeCommand& options, const MappedFile& file) {
   const auto text = dbc::read_text(options.dbc);
   if (!text) return tl::unexpected<Error>(text.error());
   const auto database = dbc::parse(*text, options.dbc);
@@ -217,14 +217,14 @@ Result<Totals> decode_with_dbc(const Options& options, const MappedFile& file) {
   return totals;
 }
 
-Result<Totals> decode_stream(const Options& options, const MappedFile& file) {
+Result<Totals> decode_stream(const DecodeCommand& options, const MappedFile& file) {
   if (!options.dbc.empty()) return decode_with_dbc(options, file);
   const auto protocol = choose_protocol(options, file.bytes());
   if (!protocol) return tl::unexpected<Error>(protocol.error());
   return Printer(file, **protocol, options.json).run();
 }
 
-Result<void> decode(const Options& options) {
+Result<void> decode(const DecodeCommand& options) {
   const auto file = MappedFile::open(options.file);
   if (!file) return tl::unexpected<Error>(file.error());
   const auto totals = decode_stream(options, *file);
@@ -241,7 +241,7 @@ Result<void> decode(const Options& options) {
 
 void add_decode(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand("decode", "The messages of a raw recording, one a line");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DecodeCommand>();
   command->add_option("FILE", options->file, "raw bytes as a device sent them")->required();
   command->add_option("--protocol", options->protocol, "which one; found by itself where not given");
   command->add_option("--dbc", options->dbc,

@@ -15,7 +15,7 @@ using doctor::Verdict;
 
 constexpr std::array kVerdicts{"good", "warning", "BAD"};
 
-struct Options {
+struct DoctorCommand {
   std::string config;
   std::string root = "/";
   bool json = false;
@@ -41,7 +41,7 @@ void print_json(const std::vector<doctor::Finding>& findings) {
   fmt::print("{}\n", list.dump(2));
 }
 
-Result<void> run(const Options& options) {
+Result<void> run(const DoctorCommand& options) {
   doctor::Examination examination;
   examination.root = options.root;
   if (!options.config.empty()) {
@@ -62,7 +62,7 @@ Result<void> run(const Options& options) {
 void add_doctor(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
       "doctor", "What on this PC stands between the service and its deadlines; each finding with its fix");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DoctorCommand>();
   command->add_option("config", options->config, "configuration whose lines, disk and bus are looked at, too")
       ->type_name("CONFIG");
   command

@@ -12,7 +12,7 @@ namespace imuscope::cli {
 
 namespace {
 
-struct Options {
+struct EvaluateCommand {
   EvaluationRunOptions run;
   bool json = false;
 };
@@ -55,7 +55,7 @@ void print_table(const nlohmann::json& document) {
       "error; the smallest predicts best.\n");
 }
 
-Result<void> evaluate(const Options& options) {
+Result<void> evaluate(const EvaluateCommand& options) {
   EvaluationRunOptions run = options.run;
   const auto document = [&] {
     ProgressBar bar;
@@ -77,7 +77,7 @@ Result<void> evaluate(const Options& options) {
 void add_evaluate(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
       "evaluate", "Puts the noise models of a run to the test: each S-IMU coasts through GNSS outages");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EvaluateCommand>();
   command->add_option("RUN_DIR", options->run.run_dir, "folder that `imuscope process` wrote with --out")
       ->required();
   command

@@ -9,13 +9,13 @@
 namespace imuscope::cli {
 namespace {
 
-struct Options {
+struct ImportCommand {
   std::vector<std::string> inputs;
   std::string out;
   std::string config;
 };
 
-Result<void> import_files(const Options& options) {
+Result<void> import_files(const ImportCommand& options) {
   ImportOptions import;
   import.inputs = options.inputs;
   import.out = options.out;
@@ -42,7 +42,7 @@ return {};
 
 void add_import(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand("import", "Raw dumps and logs into one capture");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportCommand>();
   command
       ->add_option("NAME=FILE", options->inputs,
                    "recording of each device: raw bytes (with NAME.arrivals.csv beside it where the arrivals "

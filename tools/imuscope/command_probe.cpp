@@ -14,7 +14,7 @@
 namespace imuscope::cli {
 namespace {
 
-struct Options {
+struct ProbeCommand {
   std::vector<std::string> ports;
   std::string write;
   bool json = false;
@@ -72,7 +72,7 @@ Result<void> write_draft(const std::string& file, const std::vector<ProbedPort>&
   return {};
 }
 
-Result<void> probe(const Options& options) {
+Result<void> probe(const ProbeCommand& options) {
   const auto names = options.ports.empty() ? serial_ports() : options.ports;
   std::vector<CanInterface> interfaces;
   for (const auto& name : can_interfaces()) {
@@ -102,7 +102,7 @@ Result<void> probe(const Options& options) {
 void add_probe(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
       "probe", "Serial ports: their baud rates, protocols and devices; drafts a configuration");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ProbeCommand>();
   command->add_option("PORT", options->ports, "ports to look at (default: all USB serial ports)");
   command->add_option("--write", options->write, "draft a configuration that runs with what was found")
       ->type_name("FILE.toml");

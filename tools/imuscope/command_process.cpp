@@ -16,7 +16,7 @@ namespace imuscope::cli {
 
 namespace {
 
-struct Options {
+struct ProcessCommand {
   std::vector<std::string> inputs;
   std::string config;
   std::string out;
@@ -26,7 +26,7 @@ struct Options {
   bool json = false;
 };
 
-Result<OpenedRecording> open(const Options& options, const std::vector<std::string>& inputs) {
+Result<OpenedRecording> open(const ProcessCommand& options, const std::vector<std::string>& inputs) {
   std::optional<std::filesystem::path> config;
   if (!options.config.empty()) config = options.config;
   ProgressBar bar;
@@ -39,7 +39,7 @@ Result<OpenedRecording> open(const Options& options, const std::vector<std::stri
   return opened;
 }
 
-void add_inputs(CLI::App& command, Options& options) {
+void add_inputs(CLI::App& command, ProcessCommand& options) {
   command.add_option("input", options.inputs, "a capture, or raw dumps as NAME=FILE (NAME of a device)")
       ->required()
       ->type_name("INPUT");
@@ -48,7 +48,8 @@ void add_inputs(CLI::App& command, Options& options) {
 }
 
 /// Several drives of one mounting: a run folder each, and one mounting of all.
-Result<void> process_drives(const Options& options, const std::vector<std::vector<std::string>>& inputs) {
+Result<void> process_drives(const ProcessCommand& options,
+                            const std::vector<std::vector<std::string>>& inputs) {
   std::vector<OpenedRecording> drives;
   for (const auto& of_drive : inputs) {
     auto opened = open(options, of_drive);
@@ -87,7 +88,7 @@ Result<std::vector<Label>> read_labels(const std::string& file) {
   return parse_labels(*text, file);
 }
 
-Result<void> process(const Options& options) {
+Result<void> process(const ProcessCommand& options) {
   const auto drives = drives_of(options.inputs);
   if (drives.size() > 1 && !options.labels.empty())
     return usage_error("labels are of one drive", "process the drives one by one");
@@ -109,7 +110,7 @@ Result<void> process(const Options& options) {
   return print_study(options.out, options.json);
 }
 
-Result<void> replay_command(const Options& options) {
+Result<void> replay_command(const ProcessCommand& options) {
   const auto opened = open(options, options.inputs);
   if (!opened) return tl::unexpected<Error>(opened.error());
   {
@@ -134,7 +135,7 @@ void add_process(CLI::App& app, Work& chosen) {
       "process",
       "The study: calibration, error process, noise models, report; of several captures (or "
       "several files of every NAME), one mounting of all drives");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ProcessCommand>();
   add_inputs(*command, *options);
   command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
   command->add_option("--labels", options->labels, "regimes that a person named: CSV begin_s,end_s,regime")
@@ -145,7 +146,7 @@ void add_process(CLI::App& app, Work& chosen) {
 
 void add_replay(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand("replay", "The live pipeline again, fed from a recording");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ProcessCommand>();
   add_inputs(*command, *options);
   command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
   command->add_flag("--realtime", options->realtime, "paced as recorded");

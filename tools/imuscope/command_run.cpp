@@ -22,7 +22,7 @@ extern "C" void request_reload(int) { signals.reload.store(true); }
 constexpr double kShortestRun_s = 0.1;
 constexpr double kLongestRun_s = 365.0 * 86400.0;
 
-struct Options {
+struct RunCommand {
   std::string config;
   std::string out;
   double seconds = 0.0;
@@ -37,7 +37,7 @@ std::filesystem::path default_folder(const Configuration& configuration) {
                      fmt::localtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
 }
 
-Result<void> run(const Options& options) {
+Result<void> run(const RunCommand& options) {
   const auto configuration = load_configuration(options.config);
   if (!configuration) return tl::unexpected<Error>(configuration.error());
   LiveOptions live;
@@ -54,7 +54,7 @@ Result<void> run(const Options& options) {
 
 void add_run(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand("run", "The live service: devices, estimator, recording, LCM");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RunCommand>();
   command->add_option("config", options->config, "configuration (TOML)")->required()->type_name("CONFIG");
   command->add_option("--out,-o", options->out, "folder for capture and results (default: runs/NAME-TIME)")
       ->type_name("DIR");

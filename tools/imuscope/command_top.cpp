@@ -33,7 +33,7 @@ constexpr double kDefaultWait_s = 5.0;
 /// What is live is worth showing only while it is new.
 constexpr int kQueue = 4;
 
-struct Options {
+struct TopCommand {
   std::string url{kDefaultLcmUrl};
   std::string prefix{kDefaultChannelPrefix};
   std::string event;
@@ -161,7 +161,7 @@ class Top {
   std::string typed_;
 };
 
-Result<void> run(const Options& options) {
+Result<void> run(const TopCommand& options) {
   auto ear = LcmListener::open(options.url, options.prefix);
   if (!ear) return tl::unexpected<Error>(ear.error());
   auto voice = LcmPublisher::open(options.url, options.prefix);
@@ -185,7 +185,7 @@ Result<void> run(const Options& options) {
 void add_top(CLI::App& app, Work& chosen) {
   auto* command =
       app.add_subcommand("top", "A running service in the terminal, heard over LCM; e marks an event");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TopCommand>();
   command->add_option("--lcm", options->url, "the bus to listen to")->capture_default_str()->type_name("URL");
   command->add_option("--prefix", options->prefix, "of the channels")
       ->capture_default_str()

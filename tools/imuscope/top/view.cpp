@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/text.h"
+#include "base/units.h"
 
 namespace imuscope::top {
 
@@ -15,7 +16,6 @@ namespace {
 
 constexpr double kUsPerMs = 1e3;
 constexpr double kBytesPerMb = 1e6;
-constexpr double kMmPerM = 1e3;
 constexpr double kPercent = 100.0;
 
 /// A number with its decimals, or a dash where it is not known.
