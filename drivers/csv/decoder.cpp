@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/units.h"
+#include "drivers/device/feed.h"
 
 namespace imuscope::csv {
 namespace {
@@ -100,10 +101,7 @@ RowDecoder::RowDecoder(std::vector<Column> columns, double time_unit_s, Duration
 
 void RowDecoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  while (!bytes.empty()) {
-    bytes = bytes.subspan(reader_.append(bytes, arrival));
-    drain(arrival, sink, false);
-  }
+  feed(reader_, bytes, arrival, [&] { drain(arrival, sink, false); });
 }
 
 void RowDecoder::finish(HostTime arrival, SampleSink& sink) noexcept { drain(arrival, sink, true); }

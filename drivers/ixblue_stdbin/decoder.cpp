@@ -7,6 +7,7 @@
 #include "drivers/device/attitude_angles.h"
 #include "drivers/device/bytes.h"
 #include "drivers/device/calendar.h"
+#include "drivers/device/feed.h"
 
 namespace imuscope::ixblue_stdbin {
 namespace {
@@ -58,10 +59,7 @@ Decoder::Decoder(const DecoderConfig& config) noexcept
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  while (!bytes.empty()) {
-    bytes = bytes.subspan(scanner_.append(bytes, arrival));
-    drain(arrival, sink, false);
-  }
+  feed(scanner_, bytes, arrival, [&] { drain(arrival, sink, false); });
 }
 
 void Decoder::finish(HostTime arrival, SampleSink& sink) noexcept { drain(arrival, sink, true); }

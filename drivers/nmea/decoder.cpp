@@ -4,6 +4,7 @@
 
 #include "base/units.h"
 #include "drivers/device/calendar.h"
+#include "drivers/device/feed.h"
 
 namespace imuscope::nmea {
 namespace {
@@ -36,10 +37,7 @@ Decoder::Decoder(const DecoderConfig& config) noexcept
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  while (!bytes.empty()) {
-    bytes = bytes.subspan(scanner_.append(bytes, arrival));
-    drain(arrival, sink, false);
-  }
+  feed(scanner_, bytes, arrival, [&] { drain(arrival, sink, false); });
 }
 
 void Decoder::finish(HostTime arrival, SampleSink& sink) noexcept {

@@ -1,5 +1,7 @@
 #include "drivers/ubx/decoder.h"
 
+#include "drivers/device/feed.h"
+
 namespace imuscope::ubx {
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
@@ -7,10 +9,7 @@ Decoder::Decoder(const DecoderConfig& config) noexcept
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  while (!bytes.empty()) {
-    bytes = bytes.subspan(scanner_.append(bytes, arrival));
-    drain(arrival, sink, false);
-  }
+  feed(scanner_, bytes, arrival, [&] { drain(arrival, sink, false); });
 }
 
 void Decoder::finish(HostTime arrival, SampleSink& sink) noexcept { drain(arrival, sink, true); }

@@ -6,6 +6,7 @@
 
 #include "base/contracts.h"
 #include "drivers/device/bytes.h"
+#include "drivers/device/feed.h"
 
 namespace imuscope::xsens {
 namespace {
@@ -75,10 +76,7 @@ MtDecoder::MtDecoder(const MtDecoderConfig& config)
 
 void MtDecoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  while (!bytes.empty()) {
-    bytes = bytes.subspan(scanner_.append(bytes, arrival));
-    drain(arrival, sink, false);
-  }
+  feed(scanner_, bytes, arrival, [&] { drain(arrival, sink, false); });
 }
 
 void MtDecoder::finish(HostTime arrival, SampleSink& sink) noexcept { drain(arrival, sink, true); }

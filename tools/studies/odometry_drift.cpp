@@ -4,6 +4,8 @@
 ///
 /// Every drive is another road and other sensors. In each, GNSS is cut at 130 s + k * 120 s + a part of a
 /// minute that differs from drive to drive, and the minute behind a cut lets the filter settle again.
+///
+/// Exits 0 only where all three together drift less than the inertial sensors alone, for either reference.
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -169,7 +171,9 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", seeds, "drives per line; each gives six outages");
   app.add_option("--first", first, "first seed");
   CLI11_PARSE(app, argc, argv);
+  bool helps = true;
   for (const ReferenceClass reference : {ReferenceClass::kNavigationGrade, ReferenceClass::kIndustrial}) {
+    double inertial_rms_m = 0.0;
     fmt::print("{}; {} s without GNSS, position error at its end\n",
                reference == ReferenceClass::kNavigationGrade
                    ? "Reference of navigation grade (Airins class)"
@@ -183,6 +187,9 @@ int main(int argc, char** argv) {
       Results results;
       for (int i = 0; i < seeds; ++i) run(reference, aiding, first + static_cast<std::uint64_t>(i), results);
       print(aiding, results);
+      const double rms_m = rms(column(results.outages, &Outage::horizontal_m));
+      if (&aiding == &kAidings.front()) inertial_rms_m = rms_m;
+      if (&aiding == &kAidings.back()) helps = helps && rms_m < inertial_rms_m;
       const double runs = results.runs;
       if (aiding.speed || aiding.non_holonomic)
         fmt::print(
@@ -193,5 +200,6 @@ int main(int argc, char** argv) {
     }
     fmt::print("\n");
   }
-  return 0;
+  fmt::print("{}\n", helps ? "odometry helps either reference" : "ODOMETRY MAKES A REFERENCE WORSE");
+  return helps ? 0 : 1;
 }
