@@ -68,7 +68,9 @@ odometry = { dbc = "vehicle.dbc", speed_signals = ["WHEELS.RL"] }
 
 using Sentence = std::pair<std::string_view, std::string_view>;
 constexpr auto kSentences = std::to_array<Sentence>({
-    {"run.name", "What the run is called in its files. Preset: the file's own name."},
+    {"run.name",
+     "What the run is called in its files. Without it: the name of the configuration's file, which is "
+     "`reference` on this page."},
     {"estimator.states",
      "`full`: boresight, lever arm, biases, time offset and scales of every S-IMU. `paper`: the six states "
      "of the "
@@ -93,8 +95,8 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"lcm.bridge", "Publishes the widespread `pose_t` and `ins_t`, too."},
     {"regimes.by",
      "What a study tells regimes apart by: `motion` finds static and dynamic, `intensity` splits the dynamic "
-     "part, "
-     "`labels` are what a person named in `--labels FILE` or by messages on IMUSCOPE_EVENT."},
+     "part, `labels` are what a person named by messages on IMUSCOPE_EVENT while it was recorded. `process "
+     "--labels FILE` comes before all of them."},
     {"regimes.motion_speed_mps", "A speed above this is motion; rest is below half of it."},
     {"regimes.motion_rate_deg_per_s", "The same for the spread of the angular rate within a second."},
     {"regimes.motion_force_mps2", "The same for the spread of the specific force."},
@@ -105,12 +107,14 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"regimes.bins", "With `intensity`: bins, each with as much of the drive as the others."},
     {"regimes.block_s", "With `intensity`: the drive is looked at in blocks of so many seconds."},
     {"regimes.window_s",
-     "Noise parameters are held against rate, vibration and speed over windows of so many seconds."},
+     "Noise parameters are held against rate, vibration, speed and temperature over windows of so many "
+     "seconds."},
     {"error_process.low_pass_hz",
      "A low-pass for errors and reference alike, so that sensors of different bandwidth compare; 0 is none. "
-     "At most "
-     "0.4 of the slowest rate."},
-    {"record.folder", "Where live runs are recorded, relative to the working folder. `--out` comes first."},
+     "At most 0.4 of the slowest S-IMU's rate."},
+    {"record.folder",
+     "Where live runs are recorded, relative to the working folder; each makes a folder `NAME-TIME` there. "
+     "Without it: `runs`. `--out` comes first."},
     {"threads.io_cores", "Live: processor cores that the I/O thread keeps to; empty: any."},
     {"threads.estimator_cores", "Live: processor cores that the estimator's thread keeps to; empty: any."},
     {"device.name", "Becomes part of file names: letters, digits, `_`, `-`."},
@@ -118,13 +122,18 @@ constexpr auto kSentences = std::to_array<Sentence>({
      "`reference`: the better IMU, exactly one. `study`: an IMU under study, one to six. `gnss`, `odometry`: "
      "at most "
      "one each."},
-    {"device.protocol", "What the device speaks."},
-    {"device.rate_hz", "Samples per second that the device sends."},
+    {"device.protocol",
+     "What the device speaks. A `gnss` device: greis, nmea, ubx, rtklib_pos, csv_gnss, or xsens_mt where it "
+     "has a receiver inside. An `odometry` device: can_odometry. An IMU: any other."},
+    {"device.rate_hz",
+     "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, 50 of wheel "
+     "speeds."},
     {"device.axes",
      "Rotates the device's components to its frame; the reference's and the vehicle's is forward-right-down. "
-     "Three "
-     "signed axes, or the rows of a rotation matrix."},
-    {"device.transport.kind", "How the bytes come in."},
+     "Three signed axes, or the rows of a rotation matrix. Without it an ixblue_stdbin telegram, which is "
+     "forward-port-up, is turned, and nothing else is."},
+    {"device.transport.kind",
+     "How the bytes come in. Only a device that is never run live, but given as a file, needs no transport."},
     {"device.transport.port",
      "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number."},
     {"device.transport.baud", "serial: bits per second; any rate that the hardware can make."},
@@ -134,11 +143,12 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"device.transport.interface", "can: the interface, such as `can0`; devices share it."},
     {"device.transport.log_clock",
      "can: of a recorded log, whether its stamps are UTC or of the reference's own clock."},
-    {"device.bus_id", "xsens_mt: place behind an Xbus Master, from 1; 0: the device has its line to itself."},
+    {"device.bus_id",
+     "xsens_mt: place behind an Xbus Master, from 1. Without it the device has its line to itself."},
     {"device.device_id",
      "xsens_mt: eight hexadecimal digits that the device must have, as its label and `imuscope probe` show "
-     "them; "
-     "another device on the same port is refused. Then the device is asked before its data is taken."},
+     "them; another device on the same port is refused. Then the device is asked before its data is taken. "
+     "Not together with `bus_id`."},
     {"device.sync_in.mode",
      "xsens_mt: edge (1 rising, 2 falling, 3 both) plus 0 to sample, 4 to send the latest, 16 to keep time."},
     {"device.sync_in.skip", "xsens_mt: pulses passed over between two that count."},
@@ -149,15 +159,17 @@ constexpr auto kSentences = std::to_array<Sentence>({
      "pull the "
      "boresight."},
     {"device.noise.gyro_white_sd_degps", "IMUs: white noise of a sample's angular rate, 1 sigma."},
-    {"device.noise.gyro_white_deg_per_sqrt_h", "IMUs: the same as a density (angular random walk)."},
+    {"device.noise.gyro_white_deg_per_sqrt_h",
+     "IMUs: the same as a density (angular random walk); give one of the two."},
     {"device.noise.accel_white_sd_mps2", "IMUs: white noise of a sample's specific force, 1 sigma."},
-    {"device.noise.accel_white_ug_per_sqrt_hz", "IMUs: the same as a density."},
+    {"device.noise.accel_white_ug_per_sqrt_hz", "IMUs: the same as a density; give one of the two."},
     {"device.noise.gyro_white_sd_static_degps", "IMUs: the rate's white noise at rest, where it differs."},
     {"device.noise.accel_white_sd_static_mps2",
      "IMUs: the specific force's white noise at rest, where it differs."},
     {"device.noise.gyro_bias_sd_degps",
      "IMUs: how far from zero the gyros' biases may be at switch-on, 1 sigma."},
-    {"device.noise.gyro_bias_sd_deg_per_h", "IMUs: the same, in the unit of better gyros."},
+    {"device.noise.gyro_bias_sd_deg_per_h",
+     "IMUs: the same, in the unit of better gyros; give one of the two."},
     {"device.noise.accel_bias_sd_mps2", "IMUs: the same of the accelerometers."},
     {"device.noise.gyro_gm_sd_degps",
      "IMUs: 1 sigma of the wandering part of the gyros' biases (Gauss-Markov)."},
@@ -213,13 +225,16 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"device.geoid_separation_m", "nmea: geoid above the ellipsoid, for receivers that do not send it."},
     {"device.clock", "rtklib_pos: whether a file's times are UTC or of the reference's own clock."},
     {"device.base_lat_lon_height",
-     "rtklib_pos: degrees, degrees, metres; the base of east-north-up solutions."},
+     "rtklib_pos: degrees, degrees, metres; the base of east-north-up solutions whose header names none."},
     {"device.odometry.dbc",
      "The vehicle's DBC file, beside the configuration. Its text is kept in captures."},
     {"device.odometry.speed_signals",
-     "`MESSAGE.SIGNAL`; the speed is their mean. Take the wheels of the axle that does not steer."},
-    {"device.odometry.speed_unit", "Where the DBC's own unit is missing or wrong."},
-    {"device.odometry.wheel_radius_m", "For signals in rad/s."},
+     "`MESSAGE.SIGNAL`, or `SIGNAL` where it is unique; the speed is their mean. Take the wheels of the axle "
+     "that does not steer."},
+    {"device.odometry.speed_unit",
+     "Where the DBC's own unit is missing or wrong. Without it the DBC's own unit holds, whatever stands in "
+     "the last column."},
+    {"device.odometry.wheel_radius_m", "For signals in rad/s, which need it."},
     {"device.odometry.speed_has_no_sign",
      "The signals are magnitudes; the filter's own speed gives the sign."},
     {"device.odometry.direction_signal", "A gear or direction signal."},
@@ -245,7 +260,9 @@ constexpr auto kSentences = std::to_array<Sentence>({
     {"device.odometry.upwards_sd_mps", "The same upwards."},
     {"device.odometry.zero_velocity_sd_mps", "Of standstill, 1 sigma."},
     {"device.odometry.dead_band_mps", "Slower wheels may show zero: such a speed is not used as one."},
-    {"device.xsens_can.ids.error", "Identifier of the message: 3 hexadecimal digits for 11 bits, 8 for 29."},
+    {"device.xsens_can.ids.error",
+     "Identifier of the message: 3 hexadecimal digits for 11 bits, 8 for 29. Without it the MTi's own "
+     "default."},
     {"device.xsens_can.ids.sample_time", "As above."},
     {"device.xsens_can.ids.group_counter", "As above."},
     {"device.xsens_can.ids.status_word", "As above."},
