@@ -70,8 +70,13 @@ std::vector<Shown> commands_in(const std::filesystem::path& document) {
 }
 
 std::vector<Shown> documented_commands() {
-  std::vector<std::filesystem::path> documents{source_path("README.md"), source_path("ARCHITECTURE.md"),
+  std::vector<std::filesystem::path> documents{source_path("README.md"),
+                                               source_path("ARCHITECTURE.md"),
                                                source_path("drivers/README.md"),
+                                               source_path("drivers/csv/README.md"),
+                                               source_path("drivers/can_odometry/README.md"),
+                                               source_path("drivers/rtklib_pos/README.md"),
+                                               source_path("cmake/debian/README.md.in"),
                                                source_path("tests/golden/README.md")};
   for (const auto& entry : std::filesystem::directory_iterator(source_path("docs"))) {
     if (entry.path().extension() == ".md") documents.push_back(entry.path());
