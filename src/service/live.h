@@ -36,8 +36,8 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 /// Runs until signals.stop becomes true, or for options.duration_s. Ends cleanly: what had arrived is
 /// estimated, recorded, published and written.
-/// Errors: no device of the configuration has a line (kUsage); the run folder or the capture cannot be made,
-/// no device ever answered (kWork).
+/// Errors: a device of the configuration has no line, the run folder already holds a recording (kUsage); the
+/// run folder or the capture cannot be made, no device ever answered (kWork).
 Result<void> run_live(const Configuration& configuration, const LiveOptions& options, LiveSignals& signals);
 
 }  // namespace imuscope
