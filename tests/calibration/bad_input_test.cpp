@@ -4,10 +4,15 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "base/units.h"
 #include "calibration/estimator.h"
+#include "calibration/event_log.h"
+#include "calibration/gnss_trust.h"
 #include "navigation/so3.h"
 #include "tests/calibration/simulated_drive.h"
 
@@ -317,6 +322,282 @@ TEST(BadInput, TimeRunningBackwardsAndNanForAWholeSecondChangeNothingButCounters
   EXPECT_GT(estimator.study(0).counters.not_increasing, 90U);
   EXPECT_TRUE(finite(estimator.study(0)));
   EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
+}
+
+/// A date and a time of day for the drive's clock.
+UtcTime utc_at(UtcTime start, double t_s) { return start + from_seconds(t_s); }
+
+struct Tags {
+  const char* name;
+  double reference_from_s;  ///< the R-IMU knows UTC from then on
+  double latency_s;         ///< what is configured for the time before
+};
+class TaggedSolutions : public testing::TestWithParam<Tags> {};
+
+/// Solutions that are stamped 0.3 s after their validity and come 0.2 s after it.
+TEST_P(TaggedSolutions, AreTakenBackToValidityByTheirTags) {
+  constexpr UtcTime kNoon{std::chrono::hours{12}};
+  constexpr std::size_t kDelay = 20;
+  SimulatedDrive drive(120.0, {}, 51);
+  EstimatorConfig config = drive.config();
+  config.gnss.latency_s = GetParam().latency_s;
+  Estimator estimator(config);
+  std::vector<std::pair<std::size_t, Sample>> on_the_way;
+  double sum_m2 = 0.0;
+  int n = 0;
+  std::uint64_t rejected_before = 0;
+  for (std::size_t k = 0; !drive.done(); ++k) {
+    const double t_s = drive.time_s();
+    const std::vector<Sample> samples = drive.next();
+    for (Sample sample : samples) {
+      sample.utc = utc_at(kNoon, t_s);
+      if (sample.kind == SampleKind::kGnss) {
+        sample.has_utc = true;
+        sample.time += std::chrono::milliseconds{300};
+        on_the_way.emplace_back(k + kDelay, sample);
+        continue;
+      }
+      sample.has_utc = t_s >= GetParam().reference_from_s;
+      if (!sample.has_utc) sample.utc = {};
+      estimator.add(sample);
+    }
+    while (!on_the_way.empty() && on_the_way.front().first <= k) {
+      estimator.add(on_the_way.front().second);
+      on_the_way.erase(on_the_way.begin());
+    }
+    estimator.advance(samples.back().arrival);
+    if (t_s < 70.0) {
+      rejected_before = estimator.counters().gnss_rejected;
+      continue;
+    }
+    const double error_m = horizontal_error_m(estimator.navigation(), drive.motion().state_at(t_s));
+    sum_m2 += error_m * error_m;
+    ++n;
+  }
+  EXPECT_LT(std::sqrt(sum_m2 / n), 0.03);
+  // One good solution in a thousand stands out, and the first is from before the start.
+  EXPECT_LE(estimator.counters().gnss_rejected, rejected_before + 2);
+  EXPECT_LE(estimator.counters().gnss_too_old, 1U);
+}
+INSTANTIATE_TEST_SUITE_P(Reference, TaggedSolutions,
+                         testing::Values(Tags{"TaggedThroughout", 0.0, 0.0},
+                                         Tags{"TaggedFromSomewhereOn", 80.1, 0.3}),
+                         [](const testing::TestParamInfo<Tags>& param) { return param.param.name; });
+
+/// UTC that cannot write 23:59:60 repeats a second: some devices the last of the day, others the first of the
+/// next.
+enum class Repeats : std::uint8_t { kLastSecond, kFirstSecond };
+struct LeapSecond {
+  const char* name;
+  Repeats reference;
+  Repeats gnss;
+};
+class Leap : public testing::TestWithParam<LeapSecond> {};
+
+TEST_P(Leap, SecondIsNoticedByNothing) {
+  constexpr UtcTime kMidnight{std::chrono::days{17'167}};  // 2017-01-01
+  constexpr double kLeap_s = 90.0;
+  const auto tag = [](Repeats repeats, double t_s) {
+    const double jumps_at_s = repeats == Repeats::kLastSecond ? kLeap_s : kLeap_s + 1.0;
+    return utc_at(kMidnight, t_s - kLeap_s - (t_s >= jumps_at_s ? 1.0 : 0.0));
+  };
+  SimulatedDrive drive(120.0, {}, 52);
+  Estimator estimator(drive.config());
+  double worst_m = 0.0;
+  double fastest_mps = 0.0;
+  std::uint64_t rejected_before = 0;
+  while (!drive.done()) {
+    const double t_s = drive.time_s();
+    std::vector<Sample> samples = drive.next();
+    for (Sample& sample : samples) {
+      sample.has_utc = true;
+      sample.utc = tag(sample.kind == SampleKind::kGnss ? GetParam().gnss : GetParam().reference, t_s);
+      estimator.add(sample);
+    }
+    estimator.advance(samples.back().arrival);
+    if (t_s < 70.0) {
+      rejected_before = estimator.counters().gnss_rejected;
+      continue;
+    }
+    const imusim::MotionState truth = drive.motion().state_at(t_s);
+    worst_m = std::max(worst_m, horizontal_error_m(estimator.navigation(), truth));
+    if (std::abs(t_s - kLeap_s) < 2.0) fastest_mps = std::max(fastest_mps, truth.v_n_mps.norm());
+  }
+  ASSERT_GT(fastest_mps, 1.0) << "a second must matter";
+  EXPECT_EQ(estimator.counters().gnss_rejected, rejected_before);
+  EXPECT_EQ(estimator.counters().gnss_too_old, 0U);
+  EXPECT_LT(worst_m, 0.05);
+}
+INSTANTIATE_TEST_SUITE_P(
+    Repeating, Leap,
+    testing::Values(LeapSecond{"LastByBoth", Repeats::kLastSecond, Repeats::kLastSecond},
+                    LeapSecond{"LastByReference", Repeats::kLastSecond, Repeats::kFirstSecond},
+                    LeapSecond{"LastByGnss", Repeats::kFirstSecond, Repeats::kLastSecond}),
+    [](const testing::TestParamInfo<LeapSecond>& param) { return param.param.name; });
+
+TEST(BadInput, SolutionsThatSayNothingAreCountedAndLeaveTheNavigationAlone) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const auto navigation_after = [&](bool with_bad_ones, EstimatorCounters& counters) {
+    SimulatedDrive drive(90.0, {}, 53);
+    Estimator estimator(drive.config());
+    while (!drive.done()) {
+      const double t_s = drive.time_s();
+      std::vector<Sample> samples = drive.next();
+      for (const Sample& sample : samples) {
+        estimator.add(sample);
+        if (sample.kind != SampleKind::kGnss || t_s < 70.0 || !with_bad_ones) continue;
+        Sample bad = sample;
+        bad.gnss.latitude_rad = kNan;
+        estimator.add(bad);
+        bad = sample;
+        bad.gnss.v_n_mps[2] = kNan;
+        estimator.add(bad);
+        bad = sample;
+        bad.gnss.height_m += 50.0;
+        bad.gnss.solution = GnssSolution::kNone;
+        estimator.add(bad);
+        bad.gnss.solution = GnssSolution::kFixed;
+        bad.gnss.flags = 0;
+        estimator.add(bad);
+      }
+      estimator.advance(samples.back().arrival);
+    }
+    counters = estimator.counters();
+    return estimator.navigation();
+  };
+  EstimatorCounters counters;
+  const NavigationOutput plain = navigation_after(false, counters);
+  const std::uint64_t used = counters.gnss_used;
+  const NavigationOutput spoilt = navigation_after(true, counters);
+  EXPECT_EQ(counters.gnss_not_finite, 200U);
+  EXPECT_EQ(counters.gnss_used, used);
+  EXPECT_EQ(counters.gnss_rejected, 0U);
+  EXPECT_EQ(spoilt.latitude_rad, plain.latitude_rad);
+  EXPECT_EQ(spoilt.height_m, plain.height_m);
+  EXPECT_EQ(spoilt.sd_position_m, plain.sd_position_m);
+}
+
+TEST(BadInput, VelocitiesAloneHoldTheNavigationAndAWrongOneIsTold) {
+  SimulatedDrive drive(130.0, {}, 54);
+  Estimator estimator(drive.config());
+  std::set<EstimatorEventKind> told;
+  double worst_mps = 0.0;
+  std::uint64_t positions_rejected = 0;
+  while (!drive.done()) {
+    const double t_s = drive.time_s();
+    std::vector<Sample> samples = drive.next();
+    const imusim::MotionState truth = drive.motion().state_at(t_s);
+    for (Sample& sample : samples) {
+      if (sample.kind == SampleKind::kGnss && t_s > 70.0) {
+        sample.gnss.flags = kVelocityValid | kHasVelocitySd;
+        sample.gnss.v_n_mps = {truth.v_n_mps.x(), truth.v_n_mps.y(), truth.v_n_mps.z()};
+        sample.gnss.sd_velocity_mps = {0.02, 0.02, 0.02};
+        if (t_s > 110.0 && t_s < 111.0) sample.gnss.v_n_mps[0] += 5.0;
+      }
+      estimator.add(sample);
+    }
+    estimator.advance(samples.back().arrival);
+    for (const EstimatorEvent& event : estimator.events()) {
+      if (event.kind == EstimatorEventKind::kGnssRejected) {
+        EXPECT_GT(event.value, 100.0) << "NIS of the velocity";
+      }
+      told.insert(event.kind);
+    }
+    if (t_s < 71.0) continue;
+    positions_rejected = estimator.counters().gnss_positions_rejected;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      worst_mps = std::max(worst_mps, std::abs(estimator.navigation().v_n_mps[static_cast<std::size_t>(i)] -
+                                               truth.v_n_mps(i)));
+    }
+  }
+  EXPECT_TRUE(told.contains(EstimatorEventKind::kGnssRejected));
+  EXPECT_TRUE(told.contains(EstimatorEventKind::kGnssReacquired));
+  EXPECT_EQ(estimator.counters().gnss_rejected, 4U);
+  EXPECT_EQ(positions_rejected, 0U);
+  EXPECT_LT(worst_mps, 0.1);
+}
+
+TEST(GnssTrust, WithoutAnSdASolutionIsTrustedByItsKind) {
+  GnssConfig config;
+  GnssData gnss{};
+  gnss.flags = kPositionValid | kVelocityValid;
+  double before_m = 0.0;
+  double before_mps = 0.0;
+  for (const GnssSolution solution :
+       {GnssSolution::kFixed, GnssSolution::kFloat, GnssSolution::kDifferential, GnssSolution::kSingle}) {
+    gnss.solution = solution;
+    const double sd_m = trusted_position_sd(gnss, config).x();
+    const double sd_mps = trusted_velocity_sd(gnss, config).x();
+    EXPECT_GT(sd_m, 2.0 * before_m);
+    EXPECT_GT(sd_mps, 2.0 * before_mps);
+    before_m = sd_m;
+    before_mps = sd_mps;
+  }
+  gnss.flags |= kHasPositionSd;
+  gnss.sd_position_m = {0.7, 0.7, 0.7};
+  EXPECT_DOUBLE_EQ(trusted_position_sd(gnss, config).x(), 0.7);
+  EXPECT_DOUBLE_EQ(trusted_velocity_sd(gnss, config).x(), before_mps);
+}
+
+TEST(GnssTrust, FloatsThatFollowEachOtherQuicklySayLittleThatIsNew) {
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFixed, 0.2), 1.0);
+  // 60 s hold as much as one independent value each 30 s on either side.
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 0.6), 10.0);
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 1000.0), 1.0);
+}
+
+TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
+  const std::vector<SimulatedStudy> truth(kMaxStudies, tilted());
+  SimulatedDrive drive(120.0, truth, 55);
+  EstimatorConfig config = drive.config();
+  for (StudyConfig& study : config.studies) {
+    study.prior_C_b_s = row_major(tilted().C_b_s);
+    study.prior_t_d_s = tilted().t_d_s;
+  }
+  Estimator estimator(config);
+  test::run(drive, estimator, 70.0);
+  ASSERT_EQ(estimator.counters().epochs_lost, 0U);
+  const std::uint64_t used_before = estimator.study(0).counters.used;
+  // Within what is held of the reference, but more samples than one tick can show.
+  std::vector<Sample> samples;
+  while (drive.time_s() < 72.4) {
+    samples = drive.next();
+    for (const Sample& sample : samples) estimator.add(sample);
+  }
+  estimator.advance(samples.back().arrival);
+  std::uint64_t used = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) used += estimator.study(i).counters.used - used_before;
+  EXPECT_GT(estimator.counters().epochs_lost, 0U);
+  EXPECT_EQ(estimator.epochs().size() + estimator.counters().epochs_lost, used);
+  // Much later still, the oldest samples have no reference any more and the newest no place in the queue.
+  const StudyCounters before = estimator.study(0).counters;
+  std::uint64_t added = 0;
+  while (drive.time_s() < 100.0) {
+    samples = drive.next();
+    for (const Sample& sample : samples) estimator.add(sample);
+    ++added;
+  }
+  estimator.advance(samples.back().arrival);
+  const StudyCounters& after = estimator.study(0).counters;
+  EXPECT_GT(after.refused_full, 0U);
+  EXPECT_GT(after.no_reference, before.no_reference);
+  EXPECT_EQ(after.samples - before.samples, added);
+  test::run(drive, estimator);
+  for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_LT(worst_in_sd(estimator.study(i), truth[i]), 4.0);
+}
+
+TEST(EventLog, CountsWhatItHasNoRoomForAndIsEmptyOnceTaken) {
+  EventLog log;
+  EventLog shown;
+  for (std::size_t i = 0; i < EventLog::kCapacity + 3; ++i)
+    log.add(EstimatorEventKind::kReferenceGap, 0, HostTime{}, static_cast<double>(i));
+  EXPECT_EQ(log.lost(), 3U);
+  shown.take(log);
+  ASSERT_EQ(shown.events().size(), EventLog::kCapacity);
+  EXPECT_EQ(shown.events().back().value, static_cast<double>(EventLog::kCapacity - 1));
+  EXPECT_TRUE(log.events().empty());
+  log.add(EstimatorEventKind::kReferenceGap, 0, HostTime{}, 0.0);
+  EXPECT_EQ(log.lost(), 3U);
 }
 
 }  // namespace
