@@ -123,8 +123,28 @@ TEST(Combine, RefusesNothingAndNamesABrokenCovariance) {
   EXPECT_NE(combined.error().text().find("mounting 2"), std::string::npos);
 }
 
+TEST(Combine, OneDriveAloneIsItselfAndContradictsNothing) {
+  const Matrix6 P = covariance_with_sd(1e-4, 5e-4);
+  Vector6 error = Vector6::Zero();
+  error(1) = 2e-4;
+  const std::vector<MountingEstimate> drives{estimate_of(error, P)};
+  for (const CombineMethod method :
+       {CombineMethod::kInverseVariance, CombineMethod::kCovarianceIntersection}) {
+    const auto combined = combine(drives, method);
+    ASSERT_TRUE(combined.has_value());
+    EXPECT_LT((error_of(combined->estimate) - error).norm(), 1e-12);
+    const Eigen::Map<const Matrix6> combined_P(combined->estimate.covariance_psi_r.data());
+    EXPECT_LT((combined_P - P).norm(), 1e-9 * P.norm());
+    EXPECT_EQ(combined->homogeneity_dof, 0U);
+    EXPECT_EQ(combined->homogeneity_p_value, 1.0);
+    ASSERT_EQ(combined->drives.size(), 1U);
+    EXPECT_EQ(combined->drives[0].p_value, 1.0);
+  }
+}
+
 TEST(WeightedMean, ClaimsIndependentValues) {
   WeightedMean mean;
+  EXPECT_EQ(mean.claimed_sd(), 0.0) << "of nothing";
   mean.add(1.0, 1.0);
   mean.add(4.0, 2.0);
   EXPECT_DOUBLE_EQ(mean.mean(), (1.0 + 4.0 / 4.0) / 1.25);

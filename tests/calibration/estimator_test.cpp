@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/units.h"
+#include "calibration/filter_core.h"
 #include "navigation/so3.h"
 #include "tests/calibration/simulated_drive.h"
 #include "tests/support/allocation_counter.h"
@@ -523,6 +524,157 @@ TEST(Estimator, EpochsCarryEverySampleOnceWithTheReferenceAtItsInstant) {
   // the differentiator's 0.03 % at 5 Hz of at most 0.5 rad/s^2.
   EXPECT_LT(worst_rate, 6.0 * 4.4e-6 + 1e-5);
   EXPECT_LT(worst_acceleration, 6.0 * 95.0 * 4.4e-6 + 1e-3);
+}
+
+TEST(Estimator, AKnownMountingBeginsOnceTheTimeOffsetIsFound) {
+  const std::vector<SimulatedStudy> truth{{exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.22, 0.12}, -0.35}};
+  SimulatedDrive drive(150.0, truth, 20);
+  EstimatorConfig config = drive.config();
+  // Half a degree from the truth, and known to a degree.
+  config.studies[0].prior_C_b_s =
+      to_array(Matrix3d(truth[0].C_b_s * exp_so3(Vector3d(0.5 * kRadPerDeg, 0.0, 0.0))));
+  config.studies[0].prior_boresight_sd_rad = {kRadPerDeg, kRadPerDeg, kRadPerDeg};
+  Estimator estimator(config);
+  bool told_coarse = false;
+  while (!drive.done() && estimator.study(0).status < StudyStatus::kConverging) {
+    test::run(drive, estimator, drive.time_s() + 0.5 / SimulatedDrive::kRate_hz);
+    told_coarse = told_coarse || has_event(estimator, EstimatorEventKind::kCoarseAlignmentDone);
+  }
+  ASSERT_FALSE(drive.done());
+  EXPECT_FALSE(told_coarse) << "the mounting is the configured one, not a new one";
+  const StudyOutput& out = estimator.study(0);
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(out.C_prior[i], (*config.studies[0].prior_C_b_s)[i], 1e-12);
+  EXPECT_NEAR(out.t_d_s, truth[0].t_d_s, 4.0 * out.sd_t_d_s);
+  EXPECT_NEAR(out.sd_psi_rad[2], kRadPerDeg, 0.1 * kRadPerDeg);
+  test::run(drive, estimator);
+  EXPECT_LT(worst_in_sd(out, truth[0]), 4.0);
+  EXPECT_NEAR(out.t_d_s, truth[0].t_d_s, 4.0 * out.sd_t_d_s);
+}
+
+TEST(Estimator, AFrozenMountingStaysAsGivenWhateverTheSamplesSay) {
+  const std::vector<SimulatedStudy> truth{{exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.22, 0.12}, 0.004}};
+  SimulatedDrive drive(200.0, truth, 21);
+  EstimatorConfig config = drive.config();
+  StudyConfig& study = config.studies[0];
+  study.blocks = kFullStudyBlocks & ~static_cast<std::uint32_t>(kBoresightBlock);
+  study.prior_C_b_s = to_array(truth[0].C_b_s);
+  study.prior_t_d_s = 0.0;
+  Estimator estimator(config);
+  test::run(drive, estimator, 120.0);
+  const StudyOutput& out = estimator.study(0);
+  const Vector3d arm_error = truth[0].r_bs_b_m - eigen(out.r_bs_b_m);
+  EXPECT_LT(arm_error.cwiseQuotient(eigen(out.sd_r_bs_b_m)).cwiseAbs().maxCoeff(), 4.0);
+  EXPECT_LT(eigen(out.sd_r_bs_b_m).maxCoeff(), 0.05);
+  EXPECT_NEAR(out.t_d_s, truth[0].t_d_s, 4.0 * out.sd_t_d_s);
+  drive.remount(0, exp_so3(Vector3d(0.0, 0.0, 0.3)) * truth[0].C_b_s);
+  EXPECT_FALSE(run_until_event(drive, estimator, EstimatorEventKind::kMountingChanged, 200.0));
+  EXPECT_EQ(out.counters.resets, 0U);
+  EXPECT_LT(test::mounting_error_rad(out, truth[0].C_b_s).norm(), 1e-12);
+  EXPECT_EQ(out.sd_psi_rad, Vector3{});
+  EXPECT_EQ(out.covariance_psi_r[0], 0.0);
+  EXPECT_FALSE(out.observable[3]) << "nothing of samples that do not fit is usable";
+}
+
+TEST(Estimator, ANoiseModelThatLetsTheBiasWanderMoreMakesItLessCertain) {
+  SimulatedDrive drive(100.0, {{}}, 22);
+  EstimatorConfig config = drive.config();
+  config.studies[0].prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  config.studies[0].prior_t_d_s = 0.0;
+  Estimator estimator(config);
+  test::run(drive, estimator, 80.0);
+  const Vector3 gyro_before = estimator.study(0).sd_gyro_bias_radps;
+  const Vector3 accel_before = estimator.study(0).sd_accel_bias_mps2;
+  StudyNoise restless = config.studies[0].noise;
+  restless.gyro_bias[1].sd *= 100.0;  // more than the filter's own: as much again, no more
+  estimator.set_noise(0, restless);
+  estimator.advance(drive.next().back().arrival);
+  EXPECT_NEAR(estimator.study(0).sd_gyro_bias_radps[1], std::sqrt(2.0) * gyro_before[1],
+              1e-6 * gyro_before[1]);
+  EXPECT_NEAR(estimator.study(0).sd_gyro_bias_radps[0], gyro_before[0], 1e-6 * gyro_before[0]);
+  EXPECT_EQ(estimator.study(0).sd_accel_bias_mps2, accel_before);
+}
+
+TEST(Estimator, AtRestAGoodReferenceFindsNorthByItself) {
+  SimulatedDrive drive(120.0, {}, 23, imusim::ScenarioKind::kStatic);
+  EstimatorConfig config = drive.config();
+  config.navigation.initial_rpy_rad.reset();
+  Estimator estimator(config);
+  ASSERT_TRUE(run_until_event(drive, estimator, EstimatorEventKind::kNavigationStarted, 120.0));
+  EXPECT_EQ(estimator.navigation().method, InitialisationMethod::kGyrocompass);
+  test::run(drive, estimator);
+  const NavigationOutput& out = estimator.navigation();
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(out.C_b_n.data());
+  const imusim::MotionState truth = drive.motion().state_at(drive.time_s() - 0.01);
+  EXPECT_LT(log_so3(truth.C_b_n * C.transpose()).norm(), 0.5 * kRadPerDeg);
+  EXPECT_LT(horizontal_error_m(out, truth), 0.05);
+}
+
+TEST(Estimator, OnlyAWholeAttitudeOfTheReferenceStartsTheNavigation) {
+  SimulatedDrive drive(120.0, {}, 24);
+  EstimatorConfig config = drive.config();
+  config.navigation.initial_rpy_rad.reset();
+  struct Case {
+    std::uint32_t flags;
+    double roll_offset_rad;
+    double sd_rad;
+    bool starts;
+    double heading_sd_rad;
+  };
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kSd_rad = 0.5 * kRadPerDeg;
+  const double configured_rad = config.navigation.initial_rpy_sd_rad[2];
+  const auto whole = static_cast<std::uint32_t>(kRollPitchValid | kHeadingValid);
+  const auto with_sd = static_cast<std::uint32_t>(whole | kHasAttitudeSd);
+  for (const Case& c :
+       {Case{kRollPitchValid, 0.0, kSd_rad, false, 0.0}, Case{kHeadingValid, 0.0, kSd_rad, false, 0.0},
+        Case{whole, kNan, kSd_rad, false, 0.0}, Case{whole, 0.0, kSd_rad, true, configured_rad},
+        Case{with_sd, 0.0, kSd_rad, true, kSd_rad}, Case{with_sd, 0.0, 0.0, true, configured_rad}}) {
+    SimulatedDrive same(120.0, {}, 24);
+    Estimator estimator(config);
+    while (same.time_s() < 5.0 && estimator.navigation().status != NavigationStatus::kNavigating) {
+      const double t_s = same.time_s();
+      for (const Sample& sample : same.next()) {
+        estimator.add(sample);
+        if (sample.device != SimulatedDrive::kReference) continue;
+        const imusim::MotionState truth = same.motion().state_at(t_s);
+        Sample attitude = sample;
+        attitude.kind = SampleKind::kAttitude;
+        attitude.attitude.roll_rad = truth.roll_rad + c.roll_offset_rad;
+        attitude.attitude.pitch_rad = truth.pitch_rad;
+        attitude.attitude.heading_rad = truth.heading_rad;
+        attitude.attitude.sd_rpy_rad = {c.sd_rad, c.sd_rad, c.sd_rad};
+        attitude.attitude.flags = c.flags;
+        estimator.add(attitude);
+        estimator.advance(sample.arrival);
+      }
+    }
+    const NavigationOutput& out = estimator.navigation();
+    SCOPED_TRACE(testing::Message() << "flags " << c.flags << ", sd " << c.sd_rad);
+    ASSERT_EQ(out.status == NavigationStatus::kNavigating, c.starts);
+    if (!c.starts) continue;
+    EXPECT_EQ(out.method, InitialisationMethod::kReferenceAttitude);
+    EXPECT_NEAR(out.sd_rpy_rad[2], c.heading_sd_rad, 0.05 * c.heading_sd_rad);
+  }
+}
+
+TEST(FilterCore, RepairsVariancesThatAreNoneAndLeavesTheOthers) {
+  EstimatorConfig config;
+  config.studies.resize(1);
+  FilterCore core(config);
+  const FilterCore untouched(config);
+  const std::size_t lever_arm = core.layout(0).r;
+  const std::size_t gyro_bias = core.layout(0).gyro_bias;
+  core.covariance().set(lever_arm, lever_arm, -1e-9);
+  core.covariance().set(lever_arm, gyro_bias, 1e-7);
+  core.covariance().set(gyro_bias, gyro_bias, std::numeric_limits<double>::quiet_NaN());
+  std::size_t first = 0;
+  EXPECT_EQ(core.repair(first), 2U);
+  EXPECT_EQ(first, lever_arm);
+  for (std::size_t i = 0; i < core.covariance().dimension(); ++i) {
+    for (std::size_t j = 0; j < core.covariance().dimension(); ++j)
+      EXPECT_EQ(core.covariance()(i, j), untouched.covariance()(i, j)) << i << ", " << j;
+  }
+  EXPECT_EQ(core.repair(first), 0U);
 }
 
 }  // namespace

@@ -232,6 +232,7 @@ TEST(InflatedVariance, ReproducesTheLowFrequencyEquivalentsOfTableII) {
   EXPECT_NEAR(inflated_variance(std::sqrt(0.65382), std::sqrt(0.00168), 1.0 / 1.68012, 0.01), 0.854, 5e-4);
   EXPECT_NEAR(inflated_variance(std::sqrt(0.50552), std::sqrt(0.05528), 1.0 / 113.51523, 0.01), 0.613, 5e-4);
   EXPECT_EQ(inflated_variance(2.0, 0.0, 0.0, 0.01), 4.0);
+  EXPECT_EQ(inflated_variance(2.0, 3.0, 0.0, 0.01), 4.0) << "no time constant: no such process";
 }
 
 }  // namespace
