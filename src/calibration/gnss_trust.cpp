@@ -32,7 +32,9 @@ Vector3d vector(const Vector3& v) noexcept { return {v[0], v[1], v[2]}; }
 
 Vector3d trusted_sd(bool given, const Vector3& reported, const Vector3& fallback, const Vector3& floor,
                     GnssSolution solution) noexcept {
-  const Vector3d sd = given ? vector(reported) : Vector3d(sd_factor(solution) * vector(fallback));
+  // An sd that is no number is none: the floor alone would trust that solution most of all.
+  const bool usable = given && vector(reported).allFinite();
+  const Vector3d sd = usable ? vector(reported) : Vector3d(sd_factor(solution) * vector(fallback));
   return floored_sd(sd, vector(floor));
 }
 

@@ -537,6 +537,12 @@ TEST(GnssTrust, WithoutAnSdASolutionIsTrustedByItsKind) {
   gnss.sd_position_m = {0.7, 0.7, 0.7};
   EXPECT_DOUBLE_EQ(trusted_position_sd(gnss, config).x(), 0.7);
   EXPECT_DOUBLE_EQ(trusted_velocity_sd(gnss, config).x(), before_mps);
+  for (const double none :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    gnss.sd_position_m[1] = none;
+    EXPECT_DOUBLE_EQ(trusted_position_sd(gnss, config).y(),
+                     before_m / config.default_sd_position_m[0] * config.default_sd_position_m[1]);
+  }
 }
 
 TEST(GnssTrust, FloatsThatFollowEachOtherQuicklySayLittleThatIsNew) {
