@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -274,6 +275,67 @@ TEST(InMotionAlignment, AGapInTheImuStartsItAfresh) {
   run.aligner->add_imu(at(run.car.t + 2.0), run.car.rates());
   EXPECT_EQ(run.aligner->result(), nullptr);
   EXPECT_EQ(run.aligner->stage(), AlignmentStage::kWaitingForRest);
+}
+
+TEST(InMotionAlignment, WhatIsNoNumberOrOutOfTimeChangesNothing) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kStale_s = 5.0;
+  const auto start_of = [&](bool with_bad_ones) {
+    Car car;
+    car.heading = 1.0;
+    InitialAlignmentOptions options;
+    options.reference_noise = mems_noise();
+    InitialAligner aligner(options);
+    const Vector3d sd = Vector3d::Constant(0.02);
+    const Vector3d bad_vector(0.0, kNan, 0.0);
+    for (int i = 0; i < 6000 && aligner.result() == nullptr; ++i) {
+      const InertialRates rates = car.rates();
+      aligner.add_imu(at(car.t), rates);
+      const GeodeticPosition antenna = displaced(kOrigin, car.position);
+      if (i % 20 == 0) aligner.add_gnss_position(at(car.t), antenna, sd);
+      if (with_bad_ones) {
+        aligner.add_imu(at(car.t + 0.004), {bad_vector, rates.f_b_mps2});
+        aligner.add_imu(at(car.t + 0.004), {rates.omega_ib_b_radps, bad_vector});
+        aligner.add_imu(at(car.t), {rates.omega_ib_b_radps, 2.0 * rates.f_b_mps2});
+        aligner.add_imu(at(car.t - 0.002), {rates.omega_ib_b_radps, 2.0 * rates.f_b_mps2});
+        const GeodeticPosition far{antenna.latitude_rad + 1.0, antenna.longitude_rad, antenna.height_m};
+        aligner.add_gnss_position(at(car.t - kStale_s), far, sd);
+        aligner.add_gnss_position(at(car.t), {kNan, far.longitude_rad, far.height_m}, sd);
+        aligner.add_gnss_position(at(car.t), {far.latitude_rad, kNan, far.height_m}, sd);
+        aligner.add_gnss_position(at(car.t), {far.latitude_rad, far.longitude_rad, kNan}, sd);
+        aligner.add_gnss_position(at(car.t), far, bad_vector);
+        const Vector3d fast(30.0, 0.0, 0.0);
+        aligner.add_gnss_velocity(at(car.t - kStale_s), fast, sd);
+        aligner.add_gnss_velocity(at(car.t), bad_vector, sd);
+        aligner.add_gnss_velocity(at(car.t), fast, bad_vector);
+        aligner.add_attitude(at(car.t - kStale_s), {0.5, 0.5, 0.5}, sd);
+        aligner.add_attitude(at(car.t), {kNan, 0.5, 0.5}, sd);
+        aligner.add_attitude(at(car.t), {0.5, 0.5, 0.5}, bad_vector);
+      }
+      car.advance(0.01);
+    }
+    EXPECT_NE(aligner.result(), nullptr);
+    return aligner.result() != nullptr ? *aligner.result() : InitialNavigation{};
+  };
+  const InitialNavigation plain = start_of(false);
+  const InitialNavigation spoilt = start_of(true);
+  EXPECT_EQ(spoilt.time, plain.time);
+  EXPECT_EQ(spoilt.method, plain.method);
+  EXPECT_EQ(spoilt.state.C_b_n, plain.state.C_b_n);
+  EXPECT_EQ(spoilt.state.v_n_mps, plain.state.v_n_mps);
+  EXPECT_EQ(spoilt.state.position.latitude_rad, plain.state.position.latitude_rad);
+  EXPECT_EQ(spoilt.sd, plain.sd);
+}
+
+TEST(InMotionAlignment, BeforeTheImuSpeaksNothingIsTaken) {
+  InitialAligner aligner{InitialAlignmentOptions{}};
+  const Vector3d sd = Vector3d::Constant(0.02);
+  aligner.add_attitude(at(0.0), {0.0, 0.0, 1.0}, sd);
+  aligner.add_gnss_position(at(0.0), kOrigin, sd);
+  aligner.add_gnss_velocity(at(0.0), Vector3d::Zero(), sd);
+  EXPECT_EQ(aligner.stage(), AlignmentStage::kWaitingForRest);
+  aligner.add_imu(at(0.01), {Vector3d::Zero(), Vector3d(0.0, 0.0, -9.81)});
+  EXPECT_EQ(aligner.stage(), AlignmentStage::kWaitingForRest) << "the attitude came too early";
 }
 
 TEST(GyrocompassAlignment, AFogStartsAtRestWithinItsSd) {
