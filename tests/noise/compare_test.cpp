@@ -100,6 +100,30 @@ TEST(Compare, ModelsWithDifferentTermsAreListedSideBySideWithAWarning) {
   EXPECT_THAT(result.warnings[0], HasSubstr("WN+GM"));
 }
 
+TEST(Compare, WhatIsInAnotherUnitOrAtAnotherRateIsNotTakenForADifference) {
+  const auto a = fitted(white_and_walk(4096, 1.0, 0.02, 5), "WN+RW");
+  FitResult b = a;
+  ParameterEstimate& white = b.parameters[0];
+  white.unit = "another";
+  white.value *= 100.0;
+  const auto other_unit = compare(a, b);
+  EXPECT_FALSE(other_unit.parameters[0].p_value);
+  ASSERT_TRUE(other_unit.test.has_value());
+  EXPECT_EQ(other_unit.test->dof, 1);
+  EXPECT_NEAR(other_unit.test->p_value, 1.0, 1e-9);
+  EXPECT_THAT(other_unit.warnings, testing::ElementsAre(HasSubstr("'another': not compared")));
+  b = a;
+  b.rate_hz = 2.0 * a.rate_hz;
+  EXPECT_THAT(compare(a, b).warnings, testing::ElementsAre(HasSubstr("the rates differ (100 and 200 Hz)")));
+}
+
+TEST(Compare, WithoutATermInCommonThereIsNoTest) {
+  const auto x = white_and_walk(4096, 1.0, 0.02, 6);
+  const auto result = compare(fitted(x, "WN"), fitted(x, "RW"));
+  EXPECT_FALSE(result.test.has_value());
+  EXPECT_EQ(result.parameters.size(), 2U);
+}
+
 TEST(NoiseJson, AFitSurvivesTheTripThroughText) {
   const auto x = white_and_walk(4096, 1.0, 0.02, 4);
   for (const char* model : {"WN+RW", "WN+2*GM", "QN+WN+DR", "WN+SIN", "ARMA11"}) {
