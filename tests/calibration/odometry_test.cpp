@@ -208,6 +208,75 @@ TEST(Odometry, DelayedSpeedsGiveTheNavigationOfPromptOnes) {
   EXPECT_NEAR(delayed.latitude_rad, prompt.latitude_rad, 2.0 * prompt.sd_position_m[0] / 6.37e6);
 }
 
+TEST(Odometry, SpeedsThatRunAheadWaitForTheReference) {
+  const auto result = [](std::size_t reference_delay, EstimatorCounters& counters) {
+    WheeledDrive drive(options_of(ReferenceClass::kIndustrial, 11));
+    Estimator estimator(drive.config(drive.r_bv_b_m()));
+    std::vector<std::pair<std::size_t, Sample>> waiting;
+    std::size_t k = 0;
+    for (; drive.time_s() < 120.0; ++k) {
+      const std::vector<Sample> samples = drive.next();
+      for (const Sample& sample : samples) {
+        if (sample.kind == SampleKind::kOdometry) {
+          estimator.add(sample);
+        } else {
+          waiting.emplace_back(k + reference_delay, sample);
+        }
+      }
+      while (!waiting.empty() && waiting.front().first <= k) {
+        estimator.add(waiting.front().second);
+        waiting.erase(waiting.begin());
+      }
+      estimator.advance(samples.front().arrival);
+    }
+    for (const auto& [due, sample] : waiting) estimator.add(sample);
+    estimator.advance(waiting.back().second.arrival);
+    counters = estimator.counters();
+    return estimator.navigation();
+  };
+  EstimatorCounters prompt_counters;
+  EstimatorCounters late_counters;
+  const NavigationOutput prompt = result(1, prompt_counters);
+  const NavigationOutput late = result(10, late_counters);
+  EXPECT_GT(prompt_counters.odometry_slip_used, 1000U);
+  EXPECT_NEAR(static_cast<double>(late_counters.odometry_slip_used),
+              static_cast<double>(prompt_counters.odometry_slip_used), 10.0);
+  EXPECT_EQ(late_counters.odometry_too_old, prompt_counters.odometry_too_old);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(late.v_n_mps[i], prompt.v_n_mps[i], 0.5 * prompt.sd_velocity_mps[i]);
+}
+
+TEST(Odometry, MoreSpeedsThanCanWaitCostTheOldest) {
+  WheeledDrive drive(options_of(ReferenceClass::kNavigationGrade, 12));
+  Estimator estimator(drive.config(drive.r_bv_b_m()));
+  run(drive, estimator, 100.0);
+  ASSERT_EQ(estimator.counters().odometry_too_old, 0U);
+  constexpr double kOnlyWheels_s = 2.0;
+  run(drive, estimator, 100.0 + kOnlyWheels_s,
+      [](double /*t_s*/, Sample& sample) { return sample.kind == SampleKind::kOdometry; });
+  constexpr auto kHeld = 64U;
+  EXPECT_EQ(estimator.counters().odometry_too_old,
+            static_cast<std::uint64_t>(kOnlyWheels_s * WheeledDrive::kWheelRate_hz) - kHeld);
+}
+
+// A pull at the R-IMU that is not motion leaves a velocity behind that the filter is sure of.
+TEST(Odometry, AVelocityThatALongRestContradictsIsGivenUp) {
+  WheeledDrive drive(options_of(ReferenceClass::kNavigationGrade, 13));
+  Estimator estimator(drive.config(drive.r_bv_b_m()));
+  run(drive, estimator, 20.0);
+  double wrong_mps = 0.0;
+  while (drive.time_s() < 50.0) {
+    run(drive, estimator, drive.time_s() + 0.005, [](double t_s, Sample& sample) {
+      if (sample.kind == SampleKind::kImu && t_s > 20.0 && t_s < 21.0) sample.imu.f_mps2[0] += 3.0;
+      return sample.kind != SampleKind::kGnss;
+    });
+    wrong_mps = std::max(wrong_mps, eigen(estimator.navigation().v_n_mps).norm());
+  }
+  EXPECT_GT(wrong_mps, 2.0);
+  EXPECT_GT(estimator.counters().zero_velocity_rejected, 0U);
+  EXPECT_LT(eigen(estimator.navigation().v_n_mps).norm(), 0.02);
+}
+
 // The R-IMU looks forward and the vehicle reverses all the way; the wheels know no sign.
 TEST(Odometry, AMagnitudeTakesTheSignOfTheMotion) {
   WheeledDriveOptions options = options_of(ReferenceClass::kNavigationGrade, 8);
