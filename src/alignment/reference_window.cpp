@@ -131,11 +131,6 @@ HostTime ReferenceWindow::newest_time() const noexcept {
   return centre + (next - centre) / 2 - Duration{1};
 }
 
-void ReferenceWindow::clear() noexcept {
-  head_ = 0;
-  size_ = 0;
-}
-
 ReferenceResult ReferenceWindow::evaluate(HostTime time, ReferenceKinematics& out) const noexcept {
   const auto half = static_cast<std::size_t>(options_.points / 2);
   const auto points = static_cast<std::size_t>(options_.points);

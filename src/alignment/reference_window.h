@@ -64,7 +64,6 @@ class ReferenceWindow {
   [[nodiscard]] HostTime newest_time() const noexcept;
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
-  void clear() noexcept;
 
  private:
   struct Entry {
