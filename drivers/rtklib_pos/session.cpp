@@ -13,8 +13,10 @@ constexpr Duration kSilence = std::chrono::seconds(5);
 Session::Session() noexcept : ListeningSession(kSilence) {}
 
 bool Session::hear(std::span<const std::uint8_t> bytes, HostTime now) noexcept {
-  return scanner_hears<Frame>(scanner_, bytes, now, [](const Frame& frame) {
-    return frame.line[0] == kCommentMark || parse_solution(frame.line, Format{}).has_value();
+  return scanner_hears<Frame>(scanner_, bytes, now, [this](const Frame& frame) {
+    if (frame.line[0] != kCommentMark) return parse_solution(frame.line, format_).has_value();
+    (void)read_comment(frame.line, format_, base_);
+    return true;
   });
 }
 

@@ -1,8 +1,12 @@
 #pragma once
 
-/// Solutions of RTKLIB only come: the session waits for lines that are such.
+/// Solutions of RTKLIB only come: the session waits for lines that are such, in the format that the last
+/// header told.
+
+#include <optional>
 
 #include "drivers/device/listening_session.h"
+#include "drivers/rtklib_pos/messages.h"
 #include "drivers/rtklib_pos/scanner.h"
 
 namespace imuscope::rtklib_pos {
@@ -17,6 +21,8 @@ class Session final : public ListeningSession {
   [[nodiscard]] std::string_view nothing_is_understood() const noexcept override;
 
   Scanner scanner_;
+  Format format_;
+  std::optional<ReferencePosition> base_;
 };
 
 }  // namespace imuscope::rtklib_pos

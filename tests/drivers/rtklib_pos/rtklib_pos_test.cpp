@@ -6,6 +6,7 @@
 #include "base/units.h"
 #include "drivers/device/wgs84.h"
 #include "drivers/rtklib_pos/decoder.h"
+#include "drivers/rtklib_pos/session.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/support/shared_data.h"
 
@@ -184,6 +185,162 @@ TEST(RtklibPosDecoder, LinesThatAreNoSolutionAreCountedAndTheNextOneIsRead) {
   }
   Rig rig;
   EXPECT_EQ(rig.push(std::string(50'000, '1') + "\n" + std::string(kRow)).size(), 1U);
+}
+
+TEST(RtklibPosDecoder, NumbersThatCannotBeAreNoSolution) {
+  for (const char* bad :
+       {"2026/03/14 24:34:56 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:60:56 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:34:61 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:34:-1 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 -1:34:56 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:-4:56 45 5 81 1 12 1 1 1 0 0 0 0 0", "2026/03/14 1234:56 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03 12:34:56 45 5 81 1 12 1 1 1 0 0 0 0 0", "10001 1 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "-1 1 45 5 81 1 12 1 1 1 0 0 0 0 0", "2409 604801 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2409 -1 45 5 81 1 12 1 1 1 0 0 0 0 0", "2409 x 45 5 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:34:56 45 361 81 1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:34:56 45 5 81 -1 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:34:56 45 5 81 1001 12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:34:56 45 5 81 1 -12 1 1 1 0 0 0 0 0",
+        "2026/03/14 12:34:56 45 5 81 1 1001 1 1 1 0 0 0 0 0"}) {
+    Rig rig;
+    EXPECT_TRUE(rig.push(std::string(bad) + "\n").empty()) << bad;
+    EXPECT_EQ(rig.decoder.counters().bad_contents, 1U) << bad;
+  }
+  Rig centre;
+  EXPECT_TRUE(centre
+                  .push("%  GPST  x-ecef(m)  y-ecef(m)  z-ecef(m)   Q\n"
+                        "2409 563714.100 0 0 0 1 12 1 1 1 0 0 0 0 0\n")
+                  .empty());
+  EXPECT_EQ(centre.decoder.counters().bad_contents, 1U);
+  Rig minutes;
+  EXPECT_TRUE(minutes
+                  .push("%  GPST    latitude(d'\") longitude(d'\")  height(m)\n"
+                        "2026/03/14 12:34:56.100  45 x 36.0  -5 15 0.0  81.5 1 12 1 1 1 0 0 0 0 0\n"
+                        "2026/03/14 12:34:56.100  45 30 36.0  -5 15 x  81.5 1 12 1 1 1 0 0 0 0 0\n")
+                  .empty());
+  EXPECT_EQ(minutes.decoder.counters().bad_contents, 2U);
+}
+
+TEST(RtklibPosDecoder, TimesOfJapanAreNineHoursAheadOfUtc) {
+  Rig rig;
+  const auto& samples = rig.push("%  JST   latitude(deg) longitude(deg)  height(m)\n" + std::string(kRow));
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].utc, kDay + 45'296'100ms - 9h);
+}
+
+TEST(RtklibPosDecoder, TheSeparatorIsTheOneBehindTheTimeSystem) {
+  for (const char separator : {';', '\t'}) {
+    std::string row(kRow);
+    row = row.substr(0, row.find("   45.5")) + ",45.5,-5.25,81.5,1,12,0.01,0.02,0.03,0,0,0,0.1,12.3\n";
+    std::string text = "%  GPST  ,latitude(deg),longitude(deg),height(m)\n" + row;
+    std::replace(text.begin(), text.end(), ',', separator);
+    Rig rig;
+    const auto& samples = rig.push(text);
+    ASSERT_EQ(samples.size(), 1U) << separator;
+    EXPECT_DOUBLE_EQ(samples[0].gnss.longitude_rad, -5.25 * kRadPerDeg) << separator;
+    EXPECT_EQ(samples[0].utc, kDay + 45'296'100ms - 18s) << separator;
+  }
+}
+
+TEST(RtklibPosDecoder, MissingEpochsAreCountedAndARepeatedOneIsRefused) {
+  DecoderConfig config;
+  config.period = 100ms;
+  Rig rig(config);
+  const auto row = [](const char* second) {
+    return std::string("2026/03/14 12:34:") + second + " 45.5 -5.25 81.5 1 12 1 1 1 0 0 0 0 0\n";
+  };
+  const auto& samples = rig.push(row("56.1") + row("56.2") + row("56.2") + row("56.6"));
+  EXPECT_EQ(samples.size(), 3U);
+  EXPECT_EQ(rig.decoder.counters().samples_lost, 3U);
+  EXPECT_EQ(rig.decoder.counters().bad_contents, 1U);
+}
+
+TEST(RtklibPosDecoder, HeightsAboveTheGeoidGiveNoPositionAndTheRemedyIsSaid) {
+  Rig rig;
+  EXPECT_TRUE(rig.decoder.remark().empty());
+  const auto& samples =
+      rig.push("% (lat/lon/height=WGS84/geodetic)\n" + std::string(kLlhHeader) + std::string(kRow));
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].gnss.flags & kPositionValid, 0U);
+  EXPECT_NE(rig.decoder.remark().find("ellipsoidal"), std::string_view::npos);
+
+  Rig ellipsoid;
+  EXPECT_NE(
+      ellipsoid.push("% (lat/lon/height=WGS84/ellipsoidal)\n" + std::string(kLlhHeader) + std::string(kRow))
+              .at(0)
+              .gnss.flags &
+          kPositionValid,
+      0U);
+  EXPECT_TRUE(ellipsoid.decoder.remark().empty());
+
+  Rig relative;
+  relative.push("%  UTC   e-baseline(m)\n2026/03/14 12:34:56.1 1 2 3 4 8 1 1 1 0 0 0 2 0\n");
+  EXPECT_NE(relative.decoder.remark().find("base_lat_lon_height"), std::string_view::npos);
+}
+
+TEST(RtklibPosDecoder, ColumnsOfVelocityThatTheHeaderNamesAreNeeded) {
+  const std::string header = "%  GPST   latitude(deg) longitude(deg)  height(m)   Q  vn(m/s)  ve(m/s)\n";
+  const std::string row =
+      "2026/03/14 12:34:56.100   45.5   -5.25    81.5   1  12   0.01   0.02   0.03  0 0 0 0.1 12.3";
+  Rig rig;
+  const auto& samples = rig.push(header + row + " 1 2 3 0.1 0.2 0.3 0 0 0\n");
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].gnss.v_n_mps, (Vector3{1, 2, -3}));
+  EXPECT_EQ(samples[0].gnss.sd_velocity_mps, (Vector3{0.1, 0.2, 0.3}));
+
+  Rig unknown;
+  const auto& without_sd = unknown.push(header + row + " 1 2 3 0 0 0 0 0 0\n");
+  ASSERT_EQ(without_sd.size(), 1U);
+  EXPECT_EQ(without_sd[0].gnss.flags & (kVelocityValid | kHasVelocitySd), kVelocityValid);
+
+  Rig cut;
+  EXPECT_TRUE(cut.push(header + row + "\n").empty());
+  EXPECT_TRUE(cut.push(row + " 1 2 3 0.1\n").empty());
+  EXPECT_EQ(cut.decoder.counters().bad_contents, 2U);
+}
+
+TEST(RtklibPosDecoder, StandardDeviationsOfZeroAreNone) {
+  Rig rig;
+  const auto& samples = rig.push("2026/03/14 12:34:56.100 45.5 -5.25 81.5 1 12 0.1 0 0.1 0 0 0 0 0\n");
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].gnss.flags, kPositionValid);
+}
+
+TEST(RtklibPosSession, LinesInTheFormatOfTheHeaderKeepItStreaming) {
+  for (const std::string& header_and_row :
+       {std::string("%  GPST                  ,latitude(deg),longitude(deg)\n"
+                    "2026/03/14 12:34:56.100, 45.5,-5.25, 81.5,1,12,1,1,1,0,0,0,0,0\n"),
+        std::string("%  GPST    latitude(d'\") longitude(d'\")  height(m)\n"
+                    "2026/03/14 12:34:56.100  45 30 36.0  -5 15 0.0  81.5 1 12 1 1 1 0 0 0 0 0\n")}) {
+    const std::size_t row_at = header_and_row.find('\n') + 1;
+    Session session;
+    HostTime now = host_time_from_ns(0);
+    session.on_bytes(bytes_of(header_and_row.substr(0, row_at)), now);
+    EXPECT_EQ(session.state(), SessionState::kStreaming);
+    now += 4s;
+    session.on_bytes(bytes_of(header_and_row.substr(row_at)), now);
+    now += 4s;
+    (void)session.poll(now);
+    EXPECT_EQ(session.state(), SessionState::kStreaming) << header_and_row;
+    EXPECT_EQ(session.problem(), "") << header_and_row;
+  }
+}
+
+TEST(RtklibPosSession, SilenceAndOtherLinesAreToldApart) {
+  Session session;
+  const HostTime begin = host_time_from_ns(0);
+  (void)session.poll(begin);
+  EXPECT_EQ(session.state(), SessionState::kConnecting);
+  (void)session.poll(begin + 6s);
+  EXPECT_EQ(session.state(), SessionState::kFailed);
+  EXPECT_NE(session.problem().find("rtkrcv"), std::string_view::npos);
+  session.on_bytes(bytes_of("$GPHDT,1.0,T*1F\r\n"), begin + 7s);
+  (void)session.poll(begin + 8s);
+  EXPECT_NE(session.problem().find("output format"), std::string_view::npos);
+  session.on_bytes(bytes_of(kRow), begin + 9s);
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+  EXPECT_EQ(session.problem(), "");
 }
 
 TEST(RtklibPosDecoder, EverySplitIntoReadsGivesTheSameSamples) {
