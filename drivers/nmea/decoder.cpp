@@ -58,7 +58,6 @@ void Decoder::drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept {
 void Decoder::mirror_counts() noexcept {
   counters_.bytes_skipped = scanner_.counters().bytes_skipped;
   counters_.bad_checksums = scanner_.counters().bad_checksums;
-  counters_.bad_contents = bad_messages_;
   counters_.clock_resets = clock_.restarts();
 }
 
@@ -130,10 +129,7 @@ void Decoder::on_sentence(const Frame& frame, HostTime arrival, SampleSink& sink
 void Decoder::publish(HostTime arrival, SampleSink& sink) noexcept {
   if (!epoch_.open || epoch_.published) return;
   epoch_.published = true;
-  if (!unwrap_time()) {
-    ++bad_messages_;
-    return;
-  }
+  unwrap_time();
   update_date();
   if (!epoch_.position && !epoch_.rmc && !epoch_.vtg) return;
   Sample sample{};
@@ -154,10 +150,8 @@ void Decoder::publish(HostTime arrival, SampleSink& sink) noexcept {
   sink.on_sample(sample);
 }
 
-/// False for an epoch that came twice.
-bool Decoder::unwrap_time() noexcept {
+void Decoder::unwrap_time() noexcept {
   if (has_time_) {
-    if (epoch_.tod_ns == last_tod_ns_) return false;
     std::int64_t step = epoch_.tod_ns - last_tod_ns_;
     if (step < -kNsPerDay / 2) step += kNsPerDay;
     if (step > kNsPerDay / 2) step -= kNsPerDay;
@@ -177,7 +171,6 @@ bool Decoder::unwrap_time() noexcept {
   }
   has_time_ = true;
   last_tod_ns_ = epoch_.tod_ns;
-  return true;
 }
 
 void Decoder::update_date() noexcept {

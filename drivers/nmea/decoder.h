@@ -90,7 +90,7 @@ class Decoder final : public DeviceDecoder {
   [[nodiscard]] static Type type_of(std::string_view name) noexcept;
   void take(Type type, const Fields& fields) noexcept;
   void publish(HostTime arrival, SampleSink& sink) noexcept;
-  [[nodiscard]] bool unwrap_time() noexcept;
+  void unwrap_time() noexcept;
   void update_date() noexcept;
   void fill_position(GnssData& gnss) noexcept;
   void fill_velocity(GnssData& gnss) const noexcept;
@@ -100,7 +100,6 @@ class Decoder final : public DeviceDecoder {
   Scanner scanner_;
   ClockMap clock_;
   DecoderCounters counters_;
-  std::uint64_t bad_messages_ = 0;
   std::uint64_t sequence_ = 0;
   Epoch epoch_;
   Type last_of_epoch_ = Type::kNone;

@@ -6,6 +6,7 @@
 #include "drivers/nmea/decoder.h"
 #include "drivers/nmea/messages.h"
 #include "drivers/nmea/scanner.h"
+#include "drivers/nmea/session.h"
 #include "tests/drivers/nmea/sentence_builder.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/support/shared_data.h"
@@ -220,6 +221,124 @@ TEST(NmeaDecoder, AReceiverThatStandsGivesZeroVelocityWithoutACourse) {
   EXPECT_NE(velocity("0.025").flags & kVelocityValid, 0U);
   EXPECT_EQ(velocity("0.025").v_n_mps, (Vector3{0, 0, 0}));
   EXPECT_EQ(velocity("5.0").flags & kVelocityValid, 0U);
+}
+
+TEST(NmeaDecoder, WithoutRmcTheVelocityIsOfVtg) {
+  // VTG has no time of its own: what comes before the first time belongs to no epoch.
+  const auto samples = decode(sentence("GPVTG,0.0,T,,M,99.0,N,,K,A") + gga("000001.00") +
+                              sentence("GPVTG,90.0,T,,M,10.0,N,18.5,K,A"));
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_NE(samples[0].gnss.flags & kVelocityValid, 0U);
+  EXPECT_NEAR(samples[0].gnss.v_n_mps[0], 0.0, 1e-12);
+  EXPECT_NEAR(samples[0].gnss.v_n_mps[1], 18520.0 / 3600.0, 1e-12);
+}
+
+TEST(NmeaDecoder, AnRmcThatWarnsGivesNoVelocity) {
+  const auto rmc = [](const char* status) {
+    return decode(gga("000001.00") + sentence(std::string("GPRMC,000001.00,") + status +
+                                              ",4530.0,N,00515.0,W,10.0,90.0,140326,,,R,V"));
+  };
+  ASSERT_EQ(rmc("V").size(), 1U);
+  EXPECT_NE(rmc("A")[0].gnss.flags & kVelocityValid, 0U);
+  EXPECT_EQ(rmc("V")[0].gnss.flags & kVelocityValid, 0U);
+  // A speed without a solution is none either.
+  EXPECT_EQ(decode(gga("000001.00", "0,00,,,M,,M,,") +
+                   sentence("GPRMC,000001.00,A,4530.0,N,00515.0,W,10.0,90.0,140326,,,R,V"))
+                .at(0)
+                .gnss.flags,
+            0U);
+}
+
+TEST(NmeaDecoder, SentencesWithoutAPossibleTimeMakeNoEpoch) {
+  for (const char* time : {"", "1234", "245959.00", "126000.00", "123461.00", "1234xx", "12x456.00"}) {
+    EXPECT_TRUE(decode(gga(time)).empty()) << time;
+  }
+}
+
+TEST(NmeaDecoder, APlaceThatCannotBeIsNotUsed) {
+  for (const char* place : {",,,", "4530.0,X,00515.0,W", "4560.0,N,00515.0,W", "45,N,00515.0,W",
+                            "4530.0,,00515.0,W", "4530.0,N,x515.0,W", "-4530.0,N,00515.0,W"}) {
+    const auto samples =
+        decode(sentence(std::string("GPGGA,000001.00,") + place + ",4,18,0.7,35.2,M,46.2,M,,"));
+    ASSERT_EQ(samples.size(), 1U) << place;
+    EXPECT_EQ(samples[0].gnss.flags, 0U) << place;
+  }
+}
+
+TEST(NmeaDecoder, ADateThatCannotBeGivesNoUtc) {
+  for (const char* date : {"140026", "310226", "14x326", "1403"}) {
+    const auto samples =
+        decode(gga("000001.00") +
+               sentence(std::string("GPRMC,000001.00,A,4530.0,N,00515.0,W,1.0,90.0,") + date + ",,,R,V"));
+    ASSERT_EQ(samples.size(), 1U) << date;
+    EXPECT_FALSE(samples[0].has_utc) << date;
+  }
+  EXPECT_FALSE(decode(sentence("GPZDA,000001.00,-1,03,2026,00,00") + gga("000001.00")).at(0).has_utc);
+  EXPECT_FALSE(decode(sentence("GPZDA,000001.00,,,,00,00") + gga("000001.00")).at(0).has_utc);
+}
+
+TEST(NmeaDecoder, StandardDeviationsOfZeroOrLeftOutAreNone) {
+  for (const char* sd : {"0.012,0.013,0.0", "0.012,,0.02", "0.0,0.013,0.02", ",,"}) {
+    const auto samples = decode(gga("000001.00") + sentence(std::string("GPGST,000001.00,,,,,") + sd));
+    ASSERT_EQ(samples.size(), 1U) << sd;
+    EXPECT_EQ(samples[0].gnss.flags, kPositionValid) << sd;
+  }
+}
+
+TEST(NmeaDecoder, MissingEpochsAreCountedByTimeThroughMidnightToo) {
+  DecoderConfig config = fixed_config();
+  config.period = 100ms;
+  Decoder decoder(config);
+  test::CollectingSink sink;
+  decoder.push(bytes_of(gga("235959.80") + gga("235959.90") + gga("000000.30") + gga("000000.40")), {}, sink);
+  decoder.finish({}, sink);
+  ASSERT_EQ(sink.samples.size(), 4U);
+  EXPECT_EQ(decoder.counters().samples_lost, 3U);
+  // One epoch late, from the day before: time steps back by it and not forward by a day.
+  Decoder late(config);
+  test::CollectingSink back;
+  late.push(bytes_of(gga("000001.00") + gga("235959.90")), {}, back);
+  late.finish({}, back);
+  ASSERT_EQ(back.samples.size(), 2U);
+  EXPECT_EQ(back.samples[1].time - back.samples[0].time, Duration(-1100ms));
+}
+
+TEST(NmeaDecoder, TheRemedyForHeightsWithoutAGeoidIsSaid) {
+  Decoder decoder(fixed_config());
+  test::CollectingSink sink;
+  decoder.push(bytes_of(gga("000001.00") + gga("000002.00")), {}, sink);
+  EXPECT_EQ(decoder.remark(), "");
+  decoder.push(bytes_of(gga("000003.00", "4,18,0.7,35.250,M,,M,,")), {}, sink);
+  decoder.finish({}, sink);
+  EXPECT_NE(decoder.remark().find("geoid_separation_m"), std::string_view::npos);
+}
+
+TEST(NmeaSession, SilenceAWrongBaudRateAndAGoodStreamAreToldApart) {
+  const HostTime begin = host_time_from_ns(0);
+  Session session;
+  EXPECT_TRUE(session.poll(begin).empty());
+  EXPECT_EQ(session.state(), SessionState::kConnecting);
+  (void)session.poll(begin + 6s);
+  EXPECT_EQ(session.state(), SessionState::kFailed);
+  EXPECT_NE(session.problem().find("cable"), std::string_view::npos);
+  EXPECT_FALSE(session.wants_other_baud()) << "silence says nothing of the rate";
+
+  session.on_bytes(Bytes(200, 0xA5), begin + 7s);
+  (void)session.poll(begin + 8s);
+  EXPECT_NE(session.problem().find("baud rate"), std::string_view::npos);
+  EXPECT_TRUE(session.wants_other_baud());
+
+  session.on_bytes(bytes_of(gga("000001.00")), begin + 9s);
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+  EXPECT_EQ(session.problem(), "");
+  (void)session.poll(begin + 13s);
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+
+  // The rate has once been right: what comes now is another trouble.
+  session.on_bytes(Bytes(200, 0xA5), begin + 14s);
+  (void)session.poll(begin + 15s);
+  EXPECT_EQ(session.state(), SessionState::kFailed);
+  EXPECT_FALSE(session.wants_other_baud());
 }
 
 TEST(NmeaDecoder, TheRecordedDriveGivesOneSampleASecond) {
