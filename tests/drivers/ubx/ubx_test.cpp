@@ -5,6 +5,7 @@
 
 #include "base/units.h"
 #include "drivers/ubx/decoder.h"
+#include "drivers/ubx/session.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/drivers/ubx/message_builder.h"
 #include "tests/support/shared_data.h"
@@ -108,6 +109,89 @@ TEST(UbxDecoder, TheWeekOfTheGpsIsUnwrappedAndMissingEpochsAreCounted) {
   EXPECT_EQ(rig.sink.samples[2].time - rig.sink.samples[1].time, Duration(400ms));
   EXPECT_EQ(rig.decoder.counters().samples_lost, 3U);
   EXPECT_EQ(rig.decoder.counters().bad_contents, 1U);  // the same epoch again
+}
+
+/// A good solution with one byte after the other changed.
+Bytes altered(std::initializer_list<std::pair<std::size_t, int>> changes) {
+  const Bytes good = test::ubx_nav_pvt(1000);
+  Bytes payload(good.begin() + kHeaderSize, good.end() - kChecksumSize);
+  for (const auto& [at, value] : changes) payload[at] = static_cast<std::uint8_t>(value);
+  return test::ubx_message(1, 7, payload);
+}
+
+Sample one_sample(const Bytes& message) {
+  Rig rig;
+  rig.push(message);
+  return rig.sink.samples.at(0);
+}
+
+TEST(UbxDecoder, TheSolutionIsOfTheFixItsFlagsAndTheCarrierPhase) {
+  static constexpr std::size_t kFixAt = 20, kFlagsAt = 21;
+  const auto solution = [](int fix, int flags) {
+    return one_sample(altered({{kFixAt, fix}, {kFlagsAt, flags}})).gnss.solution;
+  };
+  EXPECT_EQ(solution(3, 0x01), GnssSolution::kSingle);
+  EXPECT_EQ(solution(3, 0x03), GnssSolution::kDifferential);
+  EXPECT_EQ(solution(3, 0x43), GnssSolution::kFloat);
+  EXPECT_EQ(solution(3, 0x83), GnssSolution::kFixed);
+  EXPECT_EQ(solution(4, 0x01), GnssSolution::kSingle);
+  EXPECT_EQ(solution(3, 0x82), GnssSolution::kNone) << "the receiver itself does not trust it";
+  EXPECT_EQ(solution(2, 0x01), GnssSolution::kNone) << "a plane has no height";
+  EXPECT_EQ(solution(1, 0x01), GnssSolution::kNone) << "dead reckoning is not of satellites";
+}
+
+TEST(UbxDecoder, AccuraciesOfZeroAreNone) {
+  constexpr std::size_t kHorizontalAt = 40, kVerticalAt = 44, kSpeedAt = 68;
+  const auto flags = [](std::size_t at) { return one_sample(altered({{at, 0}})).gnss.flags; };
+  constexpr std::uint32_t kBoth = kPositionValid | kVelocityValid;
+  EXPECT_EQ(flags(kHorizontalAt), kBoth | kHasVelocitySd);
+  EXPECT_EQ(flags(kVerticalAt), kBoth | kHasVelocitySd);
+  EXPECT_EQ(flags(kSpeedAt), kBoth | kHasPositionSd);
+}
+
+TEST(UbxDecoder, UtcNeedsAValidDateAndTimeThatCanBe) {
+  constexpr std::size_t kMonthAt = 6, kValidAt = 11;
+  EXPECT_TRUE(one_sample(altered({})).has_utc);
+  EXPECT_FALSE(one_sample(altered({{kMonthAt, 13}})).has_utc);
+  EXPECT_FALSE(one_sample(altered({{kValidAt, 0x01}})).has_utc);
+  EXPECT_FALSE(one_sample(altered({{kValidAt, 0x02}})).has_utc);
+}
+
+TEST(UbxDecoder, AShortMessageAndATimeBeyondTheWeekAreCounted) {
+  Rig rig;
+  rig.push(test::ubx_message(1, 7, Bytes(kPvtMin - 1, 0)));
+  EXPECT_TRUE(rig.sink.samples.empty());
+  EXPECT_EQ(rig.decoder.counters().bad_contents, 1U);
+  rig.push(test::ubx_nav_pvt(604'800'000));
+  EXPECT_TRUE(rig.sink.samples.empty());
+  EXPECT_EQ(rig.decoder.counters().bad_contents, 2U);
+  rig.push(test::ubx_nav_pvt(604'799'999));
+  EXPECT_EQ(rig.sink.samples.size(), 1U);
+}
+
+TEST(UbxDecoder, AnEpochFromBeforeTheWeeksEndStepsBackAndNotAWeekForward) {
+  Rig rig;
+  rig.push(test::ubx_nav_pvt(100));
+  rig.push(test::ubx_nav_pvt(604'799'900));
+  ASSERT_EQ(rig.sink.samples.size(), 2U);
+  EXPECT_EQ(rig.sink.samples[1].time - rig.sink.samples[0].time, Duration(-200ms));
+}
+
+TEST(UbxSession, OnlyNavPvtIsWhatItWaitsFor) {
+  const HostTime begin = host_time_from_ns(0);
+  Session session;
+  (void)session.poll(begin);
+  (void)session.poll(begin + 6s);
+  EXPECT_EQ(session.state(), SessionState::kFailed);
+  EXPECT_NE(session.problem().find("cable"), std::string_view::npos);
+  session.on_bytes(test::ubx_message(1, 0x35, Bytes(100, 0)), begin + 7s);  // NAV-SAT
+  session.on_bytes(test::ubx_message(2, 7, Bytes(100, 0)), begin + 7s);
+  (void)session.poll(begin + 8s);
+  EXPECT_EQ(session.state(), SessionState::kFailed);
+  EXPECT_NE(session.problem().find("UBX-NAV-PVT"), std::string_view::npos);
+  session.on_bytes(test::ubx_nav_pvt(1000), begin + 9s);
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+  EXPECT_EQ(session.problem(), "");
 }
 
 TEST(UbxCapture, TheWalkWithNmeaMixedInLosesNoByte) {
