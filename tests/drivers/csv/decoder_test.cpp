@@ -129,6 +129,48 @@ TEST(CsvImu, ACounterColumnCountsLossesAndIsUnwrapped) {
   EXPECT_EQ(decoder.counters().clock_resets, 0U);
 }
 
+TEST(CsvImu, ACounterThatRepeatsOrCannotBeIsAMistakeAndOneThatBeginsAnewIsNot) {
+  ImuConfig config;
+  config.counter_column = "n";
+  for (const char* bad : {"1", "1.5", "1e18", "-1e18"}) {
+    ImuDecoder decoder(config);
+    std::string text = "n," + std::string(kHeader);
+    for (const std::string& row :
+         {std::string("0,0.00"), std::string("1,0.01"), std::string(bad) + ",0.02", std::string("2,0.03")})
+      text += row + ",1,2,3,4,5,6\n";
+    const auto samples = decode(decoder, text);
+    EXPECT_EQ(samples.size(), 3U) << bad;
+    EXPECT_EQ(decoder.counters().bad_contents, 1U) << bad;
+    EXPECT_EQ(decoder.error().kind, RowError::Kind::kOutOfRange) << bad;
+    EXPECT_STREQ(decoder.error().column.data(), "n") << bad;
+    EXPECT_EQ(decoder.counters().samples_lost, 0U) << bad;
+  }
+  ImuDecoder decoder(config);
+  std::string text = "n," + std::string(kHeader);
+  for (const char* row : {"20000,0.00", "20001,0.01", "5,0.02", "6,0.03"})
+    text += std::string(row) + ",1,2,3,4,5,6\n";
+  const auto samples = decode(decoder, text);
+  ASSERT_EQ(samples.size(), 4U) << describe(decoder.error());
+  EXPECT_EQ(decoder.counters().clock_resets, 1U);
+  EXPECT_EQ(decoder.counters().samples_lost, 0U);
+  EXPECT_NE(samples[2].imu.flags & kGapBefore, 0U);
+  EXPECT_EQ(samples[3].imu.flags & kGapBefore, 0U);
+}
+
+TEST(CsvImu, ACounterOf32BitsIsUnwrapped) {
+  ImuConfig config;
+  config.counter_column = "n";
+  ImuDecoder decoder(config);
+  std::string text = "n," + std::string(kHeader);
+  for (const char* row : {"4294967294,0.00", "4294967295,0.01", "0,0.02"})
+    text += std::string(row) + ",1,2,3,4,5,6\n";
+  const auto samples = decode(decoder, text);
+  ASSERT_EQ(samples.size(), 3U) << describe(decoder.error());
+  EXPECT_EQ(samples[2].imu.counter, std::int64_t{1} << 32U);
+  EXPECT_EQ(samples[2].imu.flags & kGapBefore, 0U);
+  EXPECT_EQ(decoder.counters().samples_lost, 0U);
+}
+
 struct BadRow {
   const char* row;
   RowError::Kind kind;
@@ -177,6 +219,7 @@ TEST(CsvImu, ALineWithoutEndIsGivenUpInBoundedMemory) {
   EXPECT_EQ(samples.size(), 2U);
   EXPECT_EQ(decoder.error().kind, RowError::Kind::kLineTooLong);
   EXPECT_EQ(decoder.error().line, 3U);
+  EXPECT_NE(describe(decoder.error()).find("line 3: the line is longer"), std::string::npos);
 }
 
 TEST(CsvGnss, ARowWithEverythingBecomesASolution) {
@@ -225,6 +268,28 @@ TEST(CsvGnss, APlaceThatCannotBeIsAMistake) {
   EXPECT_TRUE(decode(decoder, "t_s,lat_deg,lon_deg,height_m\n0,95,5,100\n").empty());
   EXPECT_EQ(decoder.error().kind, RowError::Kind::kOutOfRange);
   EXPECT_STREQ(decoder.error().column.data(), "lat_deg");
+  GnssDecoder around({});
+  EXPECT_TRUE(decode(around, "t_s,lat_deg,lon_deg,height_m\n0,45,361,100\n").empty());
+  EXPECT_EQ(around.error().kind, RowError::Kind::kOutOfRange);
+  EXPECT_STREQ(around.error().column.data(), "lon_deg");
+}
+
+TEST(CsvGnss, StandardDeviationsThatAreNotPositiveAndSolutionsThatAreInNoListAreNone) {
+  GnssConfig config;
+  config.velocity_columns = {"vn", "ve", "vd"};
+  config.position_sd_columns = {"sn", "se", "sd"};
+  config.velocity_sd_columns = {"svn", "sve", "svd"};
+  config.solution_column = "Q";
+  GnssDecoder decoder(config);
+  const auto samples = decode(decoder,
+                              "t_s,lat_deg,lon_deg,height_m,vn,ve,vd,sn,se,sd,svn,sve,svd,Q\n"
+                              "0.0,45,5,100,1,2,3,0.1,0,0.3,0.4,0.5,-0.6,1\n"
+                              "0.2,45,5,100,1,2,3,0.1,0.2,0.3,0.4,0.5,0.6,99\n"
+                              "0.4,45,5,100,1,2,3,0.1,0.2,0.3,0.4,0.5,0.6,-1\n");
+  ASSERT_EQ(samples.size(), 3U) << describe(decoder.error());
+  EXPECT_EQ(samples[0].gnss.flags, kPositionValid | kVelocityValid);
+  EXPECT_EQ(samples[1].gnss.solution, GnssSolution::kNone);
+  EXPECT_EQ(samples[2].gnss.solution, GnssSolution::kNone);
 }
 
 TEST(CsvRecordings, TheRealDriveIsReadRowByRow) {

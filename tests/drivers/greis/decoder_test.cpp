@@ -180,6 +180,54 @@ TEST(GreisDecoder, AnEpochThatLostBytesGivesNoSampleAndTheNextOneDoes) {
   }
 }
 
+TEST(GreisDecoder, EpochsThatCannotBeAreCountedAndGiveNoSample) {
+  const Bytes position = pg(0.85, 0.04, 106.5, 0.5F, 4);
+  Rig twice;
+  for (int i = 0; i < 2; ++i) twice.push({rt(1000), position, et(1000)});
+  EXPECT_EQ(twice.sink.samples.size(), 1U);
+  EXPECT_EQ(twice.decoder.counters().bad_contents, 1U);
+
+  Rig future;  // a solution of an epoch to come
+  future.push({rt(1000), st(1100, 4), position, et(1000)});
+  EXPECT_TRUE(future.sink.samples.empty());
+  EXPECT_EQ(future.decoder.counters().bad_contents, 1U);
+
+  Rig stale;
+  stale.push({rt(40'000'000), st(1000, 4), position, et(40'000'000)});
+  EXPECT_TRUE(stale.sink.samples.empty());
+
+  Rig beyond_the_day;
+  beyond_the_day.push({rt(86'400'000), position, et(86'400'000)});
+  EXPECT_TRUE(beyond_the_day.sink.samples.empty());
+  EXPECT_EQ(beyond_the_day.decoder.epochs_damaged(), 1U);
+}
+
+TEST(GreisDecoder, AClockOffsetThatCannotBeIsNotApplied) {
+  for (const double offset_s : {1e9, static_cast<double>(NAN)}) {
+    Rig rig;
+    rig.push({rt(1000), rd(2026, 3, 14, 1), pg(0.85, 0.04, 106.5, 0.5F, 4), to(offset_s), et(1000)});
+    ASSERT_EQ(rig.sink.samples.size(), 1U);
+    EXPECT_EQ(rig.sink.samples[0].utc, kDay + 1s);
+  }
+}
+
+TEST(GreisDecoder, APositionThatIsNotANumberIsNoSolution) {
+  Rig rig;
+  rig.push({rt(1000), pg(NAN, 0.04, 106.5, 0.5F, 4), vg(1.5F, -0.5F, 0.25F, 0.5F, 0), et(1000)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_EQ(rig.sink.samples[0].gnss.solution, GnssSolution::kNone);
+  EXPECT_EQ(rig.sink.samples[0].gnss.flags, 0U);
+}
+
+TEST(GreisDecoder, ADateThatCannotBeGivesNoUtc) {
+  for (const auto& [month, base] : {std::pair<U8, U8>{13, 0}, std::pair<U8, U8>{3, 200}}) {
+    Rig rig;
+    rig.push({rt(1000), rd(2026, month, 14, base), pg(0.85, 0.04, 106.5, 0.5F, 4), et(1000)});
+    ASSERT_EQ(rig.sink.samples.size(), 1U);
+    EXPECT_FALSE(rig.sink.samples[0].has_utc) << int{month} << ' ' << int{base};
+  }
+}
+
 TEST(GreisDecoder, MissingEpochsAreCountedByTime) {
   Rig rig;
   for (const U32 tod : {1000U, 1100U, 1500U}) rig.push({rt(tod), pg(0.85, 0.04, 106.5, 0.5F, 4), et(tod)});

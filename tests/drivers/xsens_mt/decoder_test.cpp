@@ -465,6 +465,206 @@ TEST(MtDecoder, AReceiverInsideGivesSolutionsWithUtcAndItsRtkState) {
   EXPECT_EQ(s.utc, day + std::chrono::seconds{45296} - std::chrono::microseconds{1});
 }
 
+/// Status byte, counter and, where wanted, UTC behind the orientation of a legacy message.
+Bytes legacy_orientation(const Bytes& orientation, std::uint8_t status, std::uint16_t counter) {
+  Bytes data = orientation;
+  data.push_back(status);
+  append(data, be16(counter));
+  return frame(mid::kMtData, data);
+}
+
+TEST(MtDecoder, LegacyOrientationBecomesAttitudeInEachFormAndLocalFrame) {
+  constexpr double kRoll = 0.1, kPitch = -0.2, kHeading = 1.1;
+  constexpr std::uint8_t kValid = 0x02;
+  const auto attitude_of_form = [&](std::uint32_t form, const Bytes& orientation, std::uint8_t status) {
+    MtDecoderConfig config;
+    config.wants_attitude = true;
+    config.layout = {output_mode::kOrientation | output_mode::kStatus,
+                     form | output_settings::kSampleCounter | output_settings::kNorthEastDown};
+    Line line(config);
+    line.send(legacy_orientation(orientation, status, 5), kPeriod);
+    EXPECT_TRUE(line.sink.of_kind(SampleKind::kImu).empty()) << "neither rates nor forces came";
+    return line.sink.of_kind(SampleKind::kAttitude).at(0).attitude;
+  };
+  const auto q = quaternion_of(kRoll, kPitch, kHeading);
+  // Column by column, R = Rz(heading) Ry(pitch) Rx(roll).
+  const double cr = std::cos(kRoll), sr = std::sin(kRoll), cp = std::cos(kPitch), sp = std::sin(kPitch);
+  const double ch = std::cos(kHeading), sh = std::sin(kHeading);
+  const Bytes matrix = floats({ch * cp, sh * cp, -sp, ch * sp * sr - sh * cr, sh * sp * sr + ch * cr, cp * sr,
+                               ch * sp * cr + sh * sr, sh * sp * cr - ch * sr, cp * cr});
+  const Bytes euler = floats({kRoll / kRadPerDeg, kPitch / kRadPerDeg, kHeading / kRadPerDeg});
+  const Bytes quaternion = floats({q[0], q[1], q[2], q[3]});
+  for (const auto& [form, bytes] :
+       {std::pair{output_settings::kQuaternion, quaternion}, std::pair{output_settings::kEuler, euler},
+        std::pair{output_settings::kMatrix, matrix}}) {
+    const AttitudeData attitude = attitude_of_form(form, bytes, kValid);
+    EXPECT_NEAR(attitude.roll_rad, kRoll, 1e-6) << form;
+    EXPECT_NEAR(attitude.pitch_rad, kPitch, 1e-6) << form;
+    EXPECT_NEAR(attitude.heading_rad, kHeading, 1e-6) << form;
+    EXPECT_EQ(attitude.flags, kRollPitchValid) << form;
+  }
+  EXPECT_EQ(attitude_of_form(output_settings::kEuler, euler, 0).flags, 0U) << "its filter has not settled";
+  EXPECT_EQ(attitude_of_form(output_settings::kEuler, floats({NAN, 0.0, 0.0}), kValid).flags, 0U);
+
+  // North-west-up where the setting does not say otherwise: the same numbers are another attitude.
+  MtDecoderConfig config;
+  config.wants_attitude = true;
+  config.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+  config.layout = {output_mode::kOrientation | output_mode::kStatus,
+                   output_settings::kEuler | output_settings::kSampleCounter};
+  Line line(config);
+  line.send(legacy_orientation(floats({kRoll / kRadPerDeg, -kPitch / kRadPerDeg, -kHeading / kRadPerDeg}),
+                               kValid, 5),
+            kPeriod);
+  const auto up = line.sink.of_kind(SampleKind::kAttitude).at(0).attitude;
+  EXPECT_NEAR(up.roll_rad, kRoll, 1e-6);
+  EXPECT_NEAR(up.pitch_rad, kPitch, 1e-6);
+  EXPECT_NEAR(up.heading_rad, kHeading, 1e-6);
+}
+
+/// Data of an MTi-G: the receiver's solution, the status byte, the counter.
+Bytes mtig(std::uint32_t itow_ms, std::uint8_t status, std::uint16_t counter) {
+  Bytes data = u16(0);  // pressure
+  data.push_back(0);
+  for (const std::int32_t value :
+       {static_cast<std::int32_t>(itow_ms), 488'566'140, 23'522'190, 81'500, 125, -50, -25, 1400, 2000, 7}) {
+    append(data, be32(static_cast<std::uint32_t>(value)));
+  }
+  data.push_back(0);
+  data.push_back(status);
+  append(data, be16(counter));
+  return frame(mid::kMtData, data);
+}
+
+TEST(MtDecoder, TheReceiverOfAnMtiGGivesEachSolutionOnceInSi) {
+  MtDecoderConfig config;
+  config.wants_imu = false;
+  config.wants_gnss = true;
+  config.layout = {output_mode::kGpsPvt | output_mode::kStatus, output_settings::kSampleCounter};
+  Line line(config);
+  constexpr std::uint8_t kFix = 0x04;
+  std::uint16_t counter = 0;
+  for (const std::uint32_t itow_ms : {1000U, 1000U, 1250U}) {
+    line.send(mtig(itow_ms, kFix, counter), kPeriod * counter);
+    ++counter;
+  }
+  line.send(mtig(1500, 0, counter), kPeriod * counter);
+  ASSERT_EQ(line.sink.samples.size(), 3U);
+  const GnssData& gnss = line.sink.samples[0].gnss;
+  EXPECT_EQ(gnss.solution, GnssSolution::kSingle);
+  EXPECT_NEAR(gnss.latitude_rad / kRadPerDeg, 48.856614, 1e-12);
+  EXPECT_NEAR(gnss.longitude_rad / kRadPerDeg, 2.352219, 1e-12);
+  EXPECT_DOUBLE_EQ(gnss.height_m, 81.5);
+  EXPECT_EQ(gnss.v_n_mps, (Vector3{1.25, -0.5, -0.25}));
+  EXPECT_NEAR(gnss.sd_position_m[0], 1.4 / std::sqrt(2.0), 1e-12);
+  EXPECT_NEAR(gnss.sd_position_m[2], 2.0, 1e-12);
+  EXPECT_NEAR(gnss.sd_velocity_mps[0], 0.07 / std::sqrt(3.0), 1e-12);
+  EXPECT_FALSE(line.sink.samples[0].has_utc) << "the message has no date";
+  EXPECT_EQ(line.sink.samples[2].gnss.solution, GnssSolution::kNone) << "the status byte says: no fix";
+}
+
+TEST(MtDecoder, UtcOfALegacyMessageIsTakenWhereItIsValidAndPossible) {
+  const auto utc_of_message = [](std::initializer_list<std::pair<std::size_t, int>> changes) {
+    MtDecoderConfig config;
+    config.layout = {output_mode::kCalibrated,
+                     output_settings::kSampleCounter | output_settings::kUtcTime | output_settings::kNoField};
+    Line line(config);
+    Bytes data = floats({0.1, 0.2, 9.8, 0.01, 0.02, 0.03});
+    append(data, be16(std::uint16_t{7}));
+    Bytes utc = u32(250'000'000);
+    append(utc, be16(std::uint16_t{2026}));
+    utc.insert(utc.end(), {3, 14, 12, 34, 56, 0x07});
+    for (const auto& [at, value] : changes) utc[at] = static_cast<std::uint8_t>(value);
+    data.insert(data.end(), utc.begin(), utc.end());
+    line.send(frame(mid::kMtData, data), kPeriod);
+    return line.sink.samples.at(0);
+  };
+  constexpr std::size_t kMonthAt = 6, kHourAt = 8, kMinuteAt = 9, kSecondAt = 10, kFlagsAt = 11;
+  const Sample good = utc_of_message({});
+  const UtcTime day = std::chrono::sys_days{std::chrono::year{2026} / 3 / 14};
+  ASSERT_TRUE(good.has_utc);
+  EXPECT_EQ(good.utc, day + seconds{45296} + milliseconds{250});
+  EXPECT_EQ(good.imu.counter, 7) << "the counter stands before the time";
+  for (const auto& [at, value] :
+       {std::pair{kMonthAt, 13}, std::pair{kHourAt, 24}, std::pair{kMinuteAt, 60}, std::pair{kSecondAt, 61},
+        std::pair{kFlagsAt, 0}, std::pair{std::size_t{0}, 0xFF}}) {
+    EXPECT_FALSE(utc_of_message({{at, value}}).has_utc) << at;
+  }
+}
+
+TEST(MtDecoder, ItemsOfTheFastOutputAreTakenWhereTheUsualOnesAreMissing) {
+  Line line;
+  for (const bool usual : {false, true}) {
+    Bytes data;
+    append_item(data, xdi::kAccelerationHr, floats({1, 2, 3}));
+    append_item(data, xdi::kRateOfTurnHr, floats({0.25, 0.5, 0.75}));
+    if (usual) {
+      data.clear();
+      append_item(data, xdi::kAcceleration, floats({4, 5, 6}));
+      append_item(data, xdi::kRateOfTurn, floats({1.25, 1.5, 1.75}));
+      append_item(data, xdi::kAccelerationHr, floats({1, 2, 3}));
+      append_item(data, xdi::kRateOfTurnHr, floats({0.25, 0.5, 0.75}));
+    }
+    line.send(frame(mid::kMtData2, data), kPeriod * static_cast<int>(line.sink.samples.size()));
+  }
+  ASSERT_EQ(line.sink.samples.size(), 2U);
+  EXPECT_EQ(line.sink.samples[0].imu.f_mps2, (Vector3{1, 2, 3}));
+  EXPECT_EQ(line.sink.samples[0].imu.omega_radps, (Vector3{0.25, 0.5, 0.75}));
+  EXPECT_EQ(line.sink.samples[1].imu.f_mps2, (Vector3{4, 5, 6}));
+  EXPECT_EQ(line.sink.samples[1].imu.omega_radps, (Vector3{1.25, 1.5, 1.75}));
+}
+
+TEST(MtDecoder, AMessageThatCameTwiceGivesOneSample) {
+  Line line;
+  for (const int i : {0, 1, 1, 2}) {
+    line.send(inertial(static_cast<std::uint16_t>(i), static_cast<std::uint32_t>(100 * i)), kPeriod * i);
+  }
+  EXPECT_EQ(line.sink.samples.size(), 3U);
+  EXPECT_EQ(line.decoder.counters().bad_contents, 1U);
+  EXPECT_EQ(line.decoder.counters().samples_lost, 0U);
+
+  Line counted;  // by the message counter alone
+  for (const int i : {0, 1, 1, 2}) {
+    Bytes data;
+    append_item(data, xdi::kPacketCounter, u16(static_cast<std::uint16_t>(i)));
+    append_item(data, xdi::kAcceleration, floats({0.5, 0.25, 9.75}));
+    append_item(data, xdi::kRateOfTurn, floats({0.125, -0.5, 1.0}));
+    counted.send(frame(mid::kMtData2, data), kPeriod * i);
+  }
+  EXPECT_EQ(counted.sink.samples.size(), 3U);
+  EXPECT_EQ(counted.decoder.counters().bad_contents, 1U);
+}
+
+TEST(MtDecoder, ARestartOfTheSampleTimeInADumpBeginsANewSegment) {
+  // Without host time a step back, or one of hours forward, can only be a restart.
+  for (const std::uint32_t behind : {100U, 500'000'000U}) {
+    MtDecoderConfig config;
+    config.clock = ClockMapConfig::fixed(host(Duration{}), 1.0);
+    Line line(config);
+    std::uint16_t count = 0;
+    for (const std::uint32_t ticks : {100'000U, 100'100U, behind, behind + 100U}) {
+      line.send(inertial(count++, ticks), Duration{});
+    }
+    ASSERT_EQ(line.sink.samples.size(), 4U) << behind;
+    EXPECT_EQ(line.decoder.counters().clock_resets, 1U) << behind;
+    EXPECT_EQ(line.decoder.counters().samples_lost, 0U) << behind;
+    EXPECT_NE(line.sink.samples[2].imu.flags & kGapBefore, 0U) << behind;
+    EXPECT_GT(line.sink.samples[2].time, line.sink.samples[1].time) << behind;
+    EXPECT_EQ(line.sink.samples[3].time - line.sink.samples[2].time, kPeriod) << behind;
+  }
+}
+
+TEST(MtDecoder, AConfigurationThatContradictsItselfIsCountedAndNotTaken) {
+  Line line;
+  line.send(configuration(1152, 0, 1, 99, output_mode::kCalibrated, output_settings::kSampleCounter),
+            Duration{});
+  EXPECT_EQ(line.decoder.counters().bad_contents, 1U);
+  line.send(frame(mid::kConfiguration, Bytes(20)), Duration{});
+  EXPECT_EQ(line.decoder.counters().bad_contents, 2U);
+  line.send(mtdata(1), kPeriod);
+  EXPECT_EQ(line.sink.samples.size(), 1U) << "the layout is still the one before";
+}
+
 TEST(MtDecoder, AnItemBeyondTheEndMakesTheWholeMessageInvalid) {
   Line line;
   Bytes data;
@@ -481,6 +681,11 @@ TEST(MtDecoder, AnErrorMessageIsKept) {
   line.send(frame(mid::kError, {0x29}), Duration{});
   EXPECT_EQ(line.decoder.last_error(), 0x29);
   EXPECT_NE(error_text(0x29).find("baud rate"), std::string_view::npos);
+  EXPECT_EQ(line.decoder.remark(), error_text(0x29));
+  line.send(frame(mid::kError), Duration{});
+  EXPECT_EQ(line.decoder.last_error(), 0x29) << "an error without a number says nothing new";
+  line.send(frame(mid::kError, {0xEE}), Duration{});
+  EXPECT_FALSE(line.decoder.remark().empty()) << "a number that is in no list";
 }
 
 }  // namespace
