@@ -377,5 +377,29 @@ TEST(CanOdometry, ARealDriveDecodesToItsPublishedSpeeds) {
   EXPECT_EQ(rig.decoder->counters().samples_lost, 0U) << "stamps that jitter by a period are no loss";
 }
 
+TEST(CanOdometry, MilesPerHourAreTakenWhereTheChoiceSaysSo) {
+  Choice choice = rear_wheels();
+  choice.unit = SpeedUnit::kMph;
+  Rig rig(choice);
+  rig.rear(3600, 3600);
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  EXPECT_NEAR(rig.sink.samples[0].odometry.speed_mps, 36.0 * 1609.344 / 3600.0, 1e-9);
+}
+
+TEST(CanOdometry, SignalsThatAreNotInTheFileAreRefusedByName) {
+  Choice fault = rear_wheels();
+  fault.fault_signals = {"REAR.BROKN"};
+  Choice counter = rear_wheels();
+  counter.counter_signal = "REAR.COUNTER";
+  Choice direction = rear_wheels();
+  direction.direction_signal = "GEAR.LEVR";
+  for (const auto& [choice, name] :
+       {std::pair{fault, "BROKN"}, std::pair{counter, "COUNTER"}, std::pair{direction, "LEVR"}}) {
+    const auto made = Decoder::make(car(), choice, {});
+    ASSERT_FALSE(made) << name;
+    EXPECT_NE(made.error().text().find(name), std::string::npos) << made.error().text();
+  }
+}
+
 }  // namespace
 }  // namespace imuscope::can_odometry

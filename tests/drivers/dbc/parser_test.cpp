@@ -205,5 +205,29 @@ TEST(DbcParser, EveryPrefixOfAFileIsReadOrRefused) {
   }
 }
 
+TEST(DbcParser, RemarksAndWholeNumbersWithAPointAreRead) {
+  const auto database = parse(
+      "// written by a tool\nBO_ 1.0E+002 GEAR: 8 ECU // of the shaft\n SG_ DIR : 0|8@1+ (1,0) [0|0] \"\" "
+      "NAV\n"
+      "VAL_ 100 DIR 1.0 \"forward\" ;",
+      "tool.dbc");
+  ASSERT_TRUE(database) << database.error().text();
+  ASSERT_EQ(database->messages.size(), 1U);
+  EXPECT_EQ(database->messages[0].id, 100U);
+  ASSERT_EQ(database->messages[0].signals.at(0).names.size(), 1U);
+  EXPECT_EQ(database->messages[0].signals[0].names[0].number, 1);
+}
+
+TEST(DbcParser, NumbersThatAreNotWholeOrDoNotFitAreRefused) {
+  for (const char* id : {"1.5", "-1.0", "1e300", "99999999999"}) {
+    const auto database = parse(std::string("BO_ ") + id + " GEAR: 8 ECU\n", "bad.dbc");
+    ASSERT_FALSE(database) << id;
+    EXPECT_NE(database.error().text().find(id), std::string::npos) << database.error().text();
+  }
+  const auto text = parse("BO_ \"GEAR\" GEAR: 8 ECU\n", "bad.dbc");
+  ASSERT_FALSE(text);
+  EXPECT_NE(text.error().text().find("\"GEAR\""), std::string::npos) << text.error().text();
+}
+
 }  // namespace
 }  // namespace imuscope::dbc

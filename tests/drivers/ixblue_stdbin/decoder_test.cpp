@@ -349,5 +349,43 @@ TEST(StdBinSession, SaysWhatIsWrongWhenNoTelegramComesAndRecovers) {
   EXPECT_NE(too_new.problem().find("V6"), std::string_view::npos);
 }
 
+TEST(StdBinDecoder, AnAttitudeThatIsNotANumberAndATimeBeyondTheDayAreCounted) {
+  Rig rig;
+  rig.push(TelegramBuilder(3, 5, 1000).nav(0, TelegramBuilder::floats({NAN, 2.0F, 3.0F})));
+  EXPECT_TRUE(rig.sink.samples.empty());
+  EXPECT_EQ(rig.decoder.counters().bad_contents, 1U);
+  rig.push(telegram(6, 864'010'000));  // a day and a second, in 100 us
+  EXPECT_TRUE(rig.sink.samples.empty());
+  EXPECT_EQ(rig.decoder.counters().bad_contents, 2U);
+}
+
+TEST(StdBinDecoder, AUnitThatFailsHasNoAttitudeAndNegativeSdAreNone) {
+  const auto attitude = [](std::uint32_t status, float sd) {
+    Rig rig;
+    rig.push(TelegramBuilder(3, 5, 1000)
+                 .nav(0, TelegramBuilder::floats({350.0F, 2.0F, 3.0F}))
+                 .nav(1, TelegramBuilder::floats({0.5F, sd, 0.03F}))
+                 .nav(17, TelegramBuilder::word(status)));
+    return rig.sink.samples.at(0).attitude.flags;
+  };
+  EXPECT_EQ(attitude(kReadyStatus, 0.02F), kRollPitchValid | kHeadingValid | kHasAttitudeSd);
+  EXPECT_EQ(attitude(kReadyStatus, -0.02F), kRollPitchValid | kHeadingValid);
+  EXPECT_EQ(attitude(kUserFailure, 0.02F), static_cast<std::uint32_t>(kHasAttitudeSd));
+}
+
+TEST(StdBinDecoder, InTurnedAxesTheLargerTiltSdHoldsForRollAndPitch) {
+  DecoderConfig config = fixed_config();
+  config.axes = {0, 1, 0, 1, 0, 0, 0, 0, -1};
+  Rig rig(config);
+  rig.push(TelegramBuilder(3, 5, 1000)
+               .nav(0, TelegramBuilder::floats({350.0F, 2.0F, 3.0F}))
+               .nav(1, TelegramBuilder::floats({0.5F, 0.02F, 0.03F})));
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  const auto& sd = rig.sink.samples[0].attitude.sd_rpy_rad;
+  EXPECT_NEAR(sd[0], 0.03 * kRadPerDeg, 1e-9);
+  EXPECT_NEAR(sd[1], 0.03 * kRadPerDeg, 1e-9);
+  EXPECT_NEAR(sd[2], 0.5 * kRadPerDeg, 1e-8);
+}
+
 }  // namespace
 }  // namespace imuscope::ixblue_stdbin

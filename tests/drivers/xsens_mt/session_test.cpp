@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include "drivers/device/bytes.h"
 #include "tests/drivers/xsens_mt/mt_frames.h"
@@ -34,6 +35,8 @@ struct ScriptedDevice {
   std::uint16_t sync_modes_known = 0xFFFF;
   std::uint16_t modes_known = 0xFFFF;            ///< other bits of an output mode are dropped
   std::map<std::uint8_t, std::uint8_t> refuses;  ///< message id to error code, each once
+  std::optional<std::uint8_t> never_answers;     ///< this message id
+  bool sends_nothing = false;                    ///< acknowledges the measurement and measures nothing
   std::uint16_t counter = 0;
   HostTime next_sample{};
   std::vector<std::uint8_t> heard;  ///< message ids, in order
@@ -46,6 +49,7 @@ struct ScriptedDevice {
 
   void hear(const Frame& f) {
     heard.push_back(f.mid);
+    if (f.mid == never_answers) return;
     if (const auto refused = refuses.find(f.mid); refused != refuses.end()) {
       send(frame(mid::kError, {refused->second}));
       refuses.erase(refused);
@@ -116,6 +120,7 @@ struct ScriptedDevice {
 
   void sample() {
     Bytes data;
+    if (sends_nothing) return;
     if (sends_text) {
       send(test::bytes_of("$HCHDM,123.4,M*20\r\n"));
       return;
@@ -482,6 +487,64 @@ TEST(MtSession, WantsAnotherBaudRateOnlyWhenNothingThatCameWasAMessage) {
   deaf.device.ignores_go_to_config = 1000;
   deaf.run(seconds{5});
   EXPECT_FALSE(deaf.session.wants_other_baud());
+}
+
+TEST(MtSession, AnOlderDeviceWithNothingSelectedIsAskedForLegacyDataOnceItRefusesItems) {
+  Bench bench;
+  bench.device.mode = 0;
+  bench.device.settings = 0;
+  bench.run(seconds{5});
+  EXPECT_EQ(bench.times_heard(mid::kOutputConfiguration), 1U);
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+  EXPECT_EQ((DataLayout{bench.device.mode, bench.device.settings}), kDefaultLayout);
+}
+
+TEST(MtSession, SaysWhichMessageTheDeviceNeverAnswers) {
+  Bench bench;
+  bench.device.period = 2304;
+  bench.device.never_answers = mid::kPeriod;
+  bench.run(seconds{8});
+  EXPECT_NE(bench.session.state(), SessionState::kStreaming);
+  EXPECT_NE(bench.session.problem().find("does not answer message 0x04"), std::string_view::npos)
+      << bench.session.problem();
+  EXPECT_GT(bench.times_heard(mid::kPeriod), 1U);
+}
+
+TEST(MtSession, SaysThatNoDataFollowsTheAcknowledgedMeasurement) {
+  Bench bench;
+  bench.device.sends_nothing = true;
+  bool said = false;
+  for (int i = 0; i < 100 && !said; ++i) {
+    bench.run(milliseconds{100});
+    said = bench.session.problem().find("acknowledged GoToMeasurement but sends nothing") !=
+           std::string_view::npos;
+  }
+  EXPECT_TRUE(said) << bench.session.problem();
+  bench.device.sends_nothing = false;
+  bench.run(seconds{40});
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+}
+
+TEST(MtSession, AStreamThatTurnsIntoAnotherIsSetUpAgain) {
+  Bench bench;
+  bench.run(seconds{3});
+  ASSERT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+  bench.device.mode = output_mode::kOrientation;
+  bench.run(seconds{5});
+  EXPECT_EQ(bench.session.state(), SessionState::kStreaming) << bench.session.problem();
+  EXPECT_EQ((DataLayout{bench.device.mode, bench.device.settings}), kDefaultLayout);
+}
+
+TEST(MtSession, AnXbusMasterWithoutDevicesIsToldFromOneWithTooFew) {
+  MtSessionConfig config;
+  config.bus_devices = 2;
+  Bench bench(config);
+  bench.device.id = 0x00100456;
+  bench.device.n_devices = 0;
+  bench.run(seconds{5});
+  EXPECT_NE(bench.session.state(), SessionState::kStreaming);
+  EXPECT_NE(bench.session.problem().find("no device answers on the Xbus"), std::string_view::npos)
+      << bench.session.problem();
 }
 
 TEST(MtSession, AsksAnMtData2DeviceForItemsAndChecksTheRatesThatItTook) {
