@@ -51,6 +51,8 @@ void Decoder::on_frame(const CanFrame& frame, HostTime arrival, SampleSink& sink
         item == Item::kSampleTime ? group_.sample_time.has_value() : group_.counter.has_value();
     if (group_.is_open && (group_.has_data || again)) close(arrival, sink);
     if (!group_.is_open) open(frame.stamp);
+  } else if (!group_.is_open && item != Item::kError) {
+    ++untimed_;
   }
   if (!take(item, frame.payload())) ++counters_.bad_contents;
 }
@@ -63,6 +65,7 @@ bool Decoder::is_repeated(Item item, std::span<const std::uint8_t> data) const n
 
 void Decoder::open(HostTime stamp) noexcept {
   group_ = Group{};
+  untimed_ = 0;
   group_.is_open = true;
   group_.stamp = stamp;
 }
@@ -138,14 +141,10 @@ void Decoder::close(HostTime arrival, SampleSink& sink) noexcept {
   sink.on_sample(sample);
 }
 
-/// The group's count and time. False for a group that only teaches (the first one), and for one that has
-/// neither time nor count.
+/// The group's count and time, of which it has at least one: they open it. False for a group that only
+/// teaches (the first one).
 bool Decoder::locate(Instant& now) noexcept {
   const double period_s = 1.0 / config_.rate_hz;
-  if (!group_.counter && !group_.sample_time) {
-    ++untimed_;
-    return false;
-  }
   // Groups since the last one by the counter, or by the time where there is no counter.
   std::int64_t groups = 1;
   if (group_.counter) {
@@ -163,7 +162,8 @@ bool Decoder::locate(Instant& now) noexcept {
     if (!known) return false;
     const xsens::CountStep step = sample_time_->take(*group_.sample_time, group_.stamp);
     if (step == xsens::CountStep::kRejected || step == xsens::CountStep::kRepeated) return false;
-    if (step == xsens::CountStep::kRestarted) restart();
+    // Where the counter began anew just before, this is the same restart.
+    if (step == xsens::CountStep::kRestarted && has_last_) restart();
     now.time_ns = sample_time_->count() * tick_ns_;
   } else if (sample_time_) {
     // Its SampleTime was lost on the way: the count goes on from the group before, on the same time scale.
@@ -291,7 +291,10 @@ std::string_view Decoder::remark() const noexcept {
   if (counters_.bad_lengths > 0)
     return "frames with its identifiers are too short for its messages: does another device use these "
            "identifiers?";
-  if (untimed_ > 0) return "its groups have neither SampleTime nor GroupCounter: switch both on";
+  // A stream may be joined in the midst of a group.
+  constexpr std::uint64_t kFramesOfAGroup = 8;
+  if (untimed_ > kFramesOfAGroup)
+    return "its groups have neither SampleTime nor GroupCounter: switch both on";
   if (counters_.frames > 0 && counters_.samples == 0 && high_rate_.order() == HighRateOrder::kUnknown &&
       group_.high_rate[0].n > 0) {
     return "it sends high-rate messages only, and which of 061 and 062 is the acceleration shows at rest: "

@@ -106,7 +106,8 @@ class Decoder final : public CanDecoder {
   Source source_ = Source::kNone;
   int lacking_ = 0;  ///< groups in a row without what the samples are made of
   std::uint64_t overflows_ = 0;
-  std::uint64_t untimed_ = 0;  ///< groups without SampleTime and GroupCounter both
+  std::uint64_t untimed_ =
+      0;  ///< data frames that came while no SampleTime or GroupCounter had opened a group
   std::uint64_t sequence_ = 0;
 };
 

@@ -2,6 +2,7 @@
 #include "drivers/xsens_can/decoder.h"
 
 #include <gtest/gtest.h>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -402,6 +403,33 @@ TEST(XsensCan, DecodingAllocatesNothing) {
   for (const Data& record : records) decoder.push(record, HostTime{10s}, sink);
   EXPECT_EQ(test::allocation_count(), before);
   EXPECT_EQ(sink.samples.size(), 498U);
+}
+
+TEST(XsensCanDecoder, ADeviceThatStartsAnewBeginsOneNewSegment) {
+  Unit unit;
+  unit.sample_time = 5'000'000;
+  unit.counter = 30'000;
+  unit.groups(500, [&] { unit.increments(); });
+  const std::size_t before = unit.samples().size();
+  unit.sample_time = 100;
+  unit.counter = 0;
+  unit.groups(500, [&] { unit.increments(); });
+  EXPECT_EQ(unit.decoder.counters().clock_resets, 1U);
+  EXPECT_EQ(unit.decoder.counters().samples_lost, 0U);
+  // Two doubtful groups by the counter and one by the time.
+  EXPECT_GE(unit.samples().size(), before + 496);
+  const auto gaps = std::count_if(unit.samples().begin() + 1, unit.samples().end(),
+                                  [](const Sample& sample) { return (sample.imu.flags & kGapBefore) != 0; });
+  EXPECT_EQ(gaps, 1);
+  for (std::size_t i = 1; i < unit.samples().size(); ++i)
+    ASSERT_GT(unit.samples()[i].time, unit.samples()[i - 1].time) << i;
+}
+
+TEST(XsensCanDecoder, GroupsWithoutTimeAndCountGiveNoSampleAndTheRemedyIsSaid) {
+  Unit unit;
+  for (int i = 0; i < 10; ++i, unit.next_period()) unit.increments();
+  EXPECT_TRUE(unit.samples().empty());
+  EXPECT_NE(unit.decoder.remark().find("SampleTime"), std::string_view::npos);
 }
 
 }  // namespace
