@@ -125,6 +125,9 @@ TEST(CanErrorFrame, IsDescribedInWords) {
   EXPECT_EQ(describe_can_error(kBusOff), "bus-off");
   EXPECT_EQ(describe_can_error(kBusError), "protocol violation, bus error");
   EXPECT_EQ(describe_can_error(error_frame(0x400, {})), "class 00000400");
+  EXPECT_EQ(describe_can_error(error_frame(0x004, {})), "controller") << "without a status";
+  EXPECT_EQ(describe_can_error(error_frame(0x200, {0, 0, 0, 0, 0, 0, 7, 9})),
+            "errors: transmit 7, receive 9");
 }
 
 }  // namespace

@@ -75,6 +75,21 @@ TEST(CanTrouble, LostFramesAreTold) {
   EXPECT_THAT(explain_can_trouble(working(), seen), AllOf(HasSubstr("37 frames"), HasSubstr("rmem_max")));
 }
 
+TEST(CanTrouble, ABusThatCarriesDamagedFramesNamesItsWiring) {
+  auto interface = working();
+  interface.state = CanControllerState::kPassive;
+  EXPECT_THAT(explain_can_trouble(interface, {}),
+              AllOf(HasSubstr("error-passive"), HasSubstr("termination")));
+}
+
+TEST(CanTrouble, WhereNoBitRateIsSetOneIsProposedAndNoneIsClaimed) {
+  auto interface = working();
+  interface.bit_rate = 0;
+  EXPECT_THAT(explain_can_trouble(interface, silent()), HasSubstr("nothing is heard on can0;"));
+  interface.is_up = false;
+  EXPECT_THAT(explain_can_trouble(interface, silent()), HasSubstr("up type can bitrate 500000"));
+}
+
 TEST(CanInterface, MissingOneIsAnErrorWithARemedy) {
   const auto missing = look_at_can_interface("can77");
   ASSERT_FALSE(missing);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -20,6 +21,12 @@ TEST(PortProblems, EveryRefusalComesWithItsRemedy) {
   EXPECT_NE(explain_open_failure("/dev/ttyS9", ENXIO).remedy.find("plug"), std::string::npos);
   EXPECT_NE(explain_open_failure("/dev/ttyUSB77", ENOENT).remedy.find("plug the device in"),
             std::string::npos);
+  const Error folder = explain_open_failure("/dev/serial/by-id", EISDIR);
+  EXPECT_NE(folder.text().find("is a folder"), std::string::npos);
+  EXPECT_NE(folder.remedy.find("/dev/serial/by-id"), std::string::npos);
+  const Error other = explain_open_failure("/dev/ttyS9", EMFILE);
+  EXPECT_NE(other.text().find("/dev/ttyS9"), std::string::npos);
+  EXPECT_NE(other.text().find(std::strerror(EMFILE)), std::string::npos);
 }
 
 TEST(PortProblems, AnAdaptersLatencyTimerIsRead) {
