@@ -40,7 +40,7 @@ dbc::Database car() {
 }
 
 struct Rig {
-  explicit Rig(Choice choice, DecoderConfig config = {}) {
+  explicit Rig(const Choice& choice, DecoderConfig config = {}) {
     auto made = Decoder::make(car(), choice, config);
     EXPECT_TRUE(made) << made.error().text();
     decoder = std::move(*made);
