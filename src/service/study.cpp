@@ -294,11 +294,12 @@ nlohmann::json run_json(const RunDescription& run) {
                       {"inputs", run.recording->inputs},
                       {"ticks", run.result->ticks},
                       {"duration_s", static_cast<double>(run.result->ticks) / kTickRate_hz},
-                      {"regimes", {{"static_s", run.static_s}, {"dynamic_s", run.dynamic_s}}},
                       {"warnings", run.warnings}};
   json["t0_utc"] = run.last != nullptr && run.last->has_utc
                        ? nlohmann::json(utc_text(run.last->first_reference_utc))
                        : nlohmann::json(nullptr);
+  if (run.static_s && run.dynamic_s)
+    json["regimes"] = {{"static_s", *run.static_s}, {"dynamic_s", *run.dynamic_s}};
   json["devices"] = nlohmann::json::array();
   for (std::size_t i = 0; i < run.configuration->devices.size(); ++i)
     json["devices"].push_back(device_json(run, i));

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,8 +38,8 @@ struct RunDescription {
   const Snapshot* last = nullptr;
   std::vector<EstimatorEvent> events;
   std::vector<std::string> warnings;
-  double static_s = 0.0;
-  double dynamic_s = 0.0;
+  std::optional<double> static_s{};  ///< of a study, which tells rest from motion
+  std::optional<double> dynamic_s{};
 };
 
 /// run.json's content.

@@ -71,6 +71,7 @@ TEST(Probe, FindsSpeedsProtocolsAndIdsAndDraftsAConfigurationThatRuns) {
       0)
       << read_text(folder / "run.log");
   const auto run = read_json(folder / "run" / "run.json");
+  EXPECT_FALSE(run.contains("regimes")) << "only a study tells rest from motion";
   for (const auto& device : run["devices"]) {
     EXPECT_GT(device["samples"].get<int>(), 20) << device << read_text(folder / "run.log");
     // A device that streams already is joined in the middle of a message, which counts as one damaged.

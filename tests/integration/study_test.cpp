@@ -162,6 +162,7 @@ TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
   EXPECT_NEAR(regimes.at("regimes")[0].at("total_s").get<double>(), 76.0, 6.5);
   EXPECT_THAT(regimes.at("remarks").get<std::vector<std::string>>(),
               Contains(HasSubstr("mtx3: has samples for 1")));
+  EXPECT_NEAR(read_json(out / "run.json").at("regimes").at("static_s").get<double>(), 76.0, 6.5);
   EXPECT_THAT(read_json(out / "run.json").at("warnings").get<std::vector<std::string>>(),
               Contains(HasSubstr("mtx3: has samples for 1")));
   EXPECT_FALSE(regimes.at("left_out").empty()) << "60 s of rest are too short for the drive's longest scales";
