@@ -83,7 +83,7 @@ class RowDecoder : public DeviceDecoder {
   void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept final;
   void finish(HostTime arrival, SampleSink& sink) noexcept final;
   [[nodiscard]] const DecoderCounters& counters() const noexcept final { return counters_; }
-  [[nodiscard]] double clock_drift_ppm() const noexcept final { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_drift_ppm() const noexcept final { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept final { return clock_.scatter_s(); }
 
   /// The first mistake of the stream; rows with mistakes give no sample and are counted as bad_contents.

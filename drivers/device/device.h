@@ -57,8 +57,8 @@ class DeviceDecoder {
   /// nothing is. Static storage.
   [[nodiscard]] virtual std::string_view remark() const noexcept { return {}; }
 
-  /// Host time per device time, minus 1, in parts per million; NaN where the device has no clock or too
-  /// little was seen of it.
+  /// Device time per host time, minus 1, in parts per million: the device's clock is fast where positive. NaN
+  /// where the device has no clock or too little was seen of it.
   [[nodiscard]] virtual double clock_drift_ppm() const noexcept {
     return std::numeric_limits<double>::quiet_NaN();
   }

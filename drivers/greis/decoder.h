@@ -43,7 +43,7 @@ class Decoder final : public DeviceDecoder {
   [[nodiscard]] std::uint64_t epochs() const noexcept { return epochs_; }
   [[nodiscard]] std::uint64_t epochs_damaged() const noexcept { return epochs_damaged_; }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
-  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 
  private:

@@ -67,7 +67,7 @@ class Decoder final : public DeviceDecoder {
     return user_status_.has_value() && (*user_status_ & kUserAlignment) != 0;
   }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
-  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 
  private:

@@ -49,7 +49,7 @@ class Decoder final : public DeviceDecoder {
   void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
-  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
   [[nodiscard]] std::string_view remark() const noexcept override;
 

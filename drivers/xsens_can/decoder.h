@@ -37,7 +37,7 @@ class Decoder final : public CanDecoder {
  public:
   explicit Decoder(const DecoderConfig& config);
 
-  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
   [[nodiscard]] std::vector<CanId> ids() const override { return {config_.ids.begin(), config_.ids.end()}; }
 

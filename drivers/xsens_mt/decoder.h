@@ -74,7 +74,7 @@ class MtDecoder final : public DeviceDecoder {
   /// Code of the last Error message, if one came.
   [[nodiscard]] std::optional<std::uint8_t> last_error() const noexcept { return last_error_; }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
-  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.skew_ppm(); }
+  [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 
  private:

@@ -134,7 +134,10 @@ void ClockMap::restart() noexcept {
   ++restarts_;
 }
 
-double ClockMap::skew_ppm() const noexcept { return (is_fixed() ? config_.rate_ratio - 1.0 : line_.b) * 1e6; }
+double ClockMap::drift_ppm() const noexcept {
+  const double host_per_device = is_fixed() ? config_.rate_ratio : 1.0 + line_.b;
+  return (1.0 / host_per_device - 1.0) * 1e6;
+}
 
 void ClockMap::begin_segment(std::int64_t device_time_ns, HostTime first_byte) noexcept {
   in_segment_ = true;

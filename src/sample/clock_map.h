@@ -60,8 +60,8 @@ class ClockMap {
   /// True in mode kFixed, where a decoder derives sample.arrival = mapped time + time on the wire.
   [[nodiscard]] bool is_fixed() const noexcept { return config_.mode == ClockMapConfig::Mode::kFixed; }
 
-  /// Host time per device time, minus 1, in parts per million: the device's clock is slow where positive.
-  [[nodiscard]] double skew_ppm() const noexcept;
+  /// Device time per host time, minus 1, in parts per million: the device's clock is fast where positive.
+  [[nodiscard]] double drift_ppm() const noexcept;
 
   /// How well the line is known: the scatter about it of the lowest observation of each two seconds. NaN
   /// before a rate was fitted in this segment, and in mode kFixed.

@@ -49,7 +49,7 @@ struct LineStatus {
   /// From the time of validity to the read that brought the sample, mean over the last second that had
   /// samples: device, line, and the wait for the beat.
   double latency_s = 0.0;
-  double clock_drift_ppm = 0.0;  ///< of the device's clock against the host's; NaN where unknown
+  double clock_drift_ppm = 0.0;  ///< of the device's clock, fast where positive; NaN where unknown
   double clock_sd_s = 0.0;       ///< how well their relation is known; NaN where it is not
   HostTime last_arrival{};
   std::array<char, 200> problem{};  ///< of the session; NUL-terminated

@@ -47,6 +47,26 @@ at_s = 76.0
 for_s = 6.0
 share = 0.1
 )";
+// Of the test with longer ones, which nothing of the first could make certain.
+constexpr seconds kHeldLongAt{20};
+constexpr seconds kHeldLong{13};
+constexpr seconds kDiskAt{36};
+constexpr seconds kDisk{10};
+constexpr seconds kLongRun{50};
+constexpr double kSkew_ppm = 200.0;
+constexpr double kStall_s = 2.0;
+constexpr const char* kLongDamage = R"(
+[[fault]]
+kind = "clock_skew"
+device = "mtx2"
+at_s = 0.0
+ppm = 200.0
+[[fault]]
+kind = "stall"
+device = "airins"
+at_s = 74.0
+for_s = 2.0
+)";
 constexpr double kWallTolerance_s = 2.0;
 constexpr const char* kSimulatedStart = "2021-06-01T12:00:00";
 constexpr double kSimulatedUtc_s = 1622548800.0;  // date -u -d 2021-06-01T12:00:00Z +%s
@@ -123,13 +143,20 @@ class StatusTruth : public testing::Test {
     text = std::regex_replace(text, std::regex("\\n\\[simulation\\]\n"),
                               std::string("\n[simulation]\nstart_utc = ") + kSimulatedStart + "\n");
     std::ofstream(folder_ / "live.toml") << text << "\n[noise]\nrefit_interval_s = 5.0\n";
-    std::ofstream(folder_ / "faults.toml") << kDamage;
     do_to_service('-');
   }
 
   void do_to_service(char fault) { std::ofstream(folder_ / "control") << fault; }
 
-  void run() {
+  /// A host in trouble: for how long, from when on, and which (host_fault.cpp).
+  struct Trouble {
+    seconds at;
+    seconds lasts;
+    char fault;
+  };
+
+  void run(const std::string& damage, const std::vector<Trouble>& troubles, seconds event_at, seconds until) {
+    std::ofstream(folder_ / "faults.toml") << damage;
     lcm::LCM bus("udpm://239.255.76.67:7667?ttl=0");
     ASSERT_TRUE(bus.good());
     bus.subscribe("IMUSCOPE_STATUS", &StatusTruth::on_status, this);
@@ -146,23 +173,21 @@ class StatusTruth : public testing::Test {
     ::unsetenv("LD_PRELOAD");
     ::unsetenv("HOST_FAULT_CONTROL");
     process_ = service.id();
-    listen_until(bus, kHeldAt);
-    threads_ = threads_of(process_);
-    do_to_service('e');
-    listen_until(bus, kHeldAt + kHeld);
-    do_to_service('-');
-    listen_until(bus, kBlockedAt);
-    do_to_service('p');
-    listen_until(bus, kBlockedAt + kBlocked);
-    do_to_service('-');
-    listen_until(bus, kEventAt);
+    for (const auto& trouble : troubles) {
+      listen_until(bus, trouble.at);
+      if (threads_.empty()) threads_ = threads_of(process_);
+      do_to_service(trouble.fault);
+      listen_until(bus, trouble.at + trouble.lasts);
+      do_to_service('-');
+    }
+    listen_until(bus, event_at);
     event_t event;
     event.utime = 0;
     event.sequence = 0;
     event.source = "test";
     event.text = "kerb on the left";
     ASSERT_EQ(bus.publish("IMUSCOPE_EVENT", &event), 0);
-    listen_until(bus, kRun);
+    listen_until(bus, until);
     service.interrupt();
     const int ended = service.wait();
     while (bus.handleTimeout(200) > 0) {
@@ -412,6 +437,63 @@ class StatusTruth : public testing::Test {
     }
   }
 
+  /// The reference's line stalls: what the S-IMUs measure meanwhile waits a tenth of a second for it.
+  void check_late() const {
+    constexpr double kLateAfter_s = 0.1;
+    for (const char* name : {"mtx1", "mtx2", "mtx3"}) {
+      const auto& device = named(before(kHeldLongAt).status.devices, name);
+      EXPECT_NEAR(static_cast<double>(device.samples_late), 100.0 * (kStall_s - kLateAfter_s), 20.0) << name;
+    }
+  }
+
+  /// Of what comes while the estimator is held, a ring keeps the first 1024.
+  void check_refused() const {
+    constexpr double kRing = 1024.0;
+    for (const char* name : {"airins", "mtx1", "mtx2", "mtx3"}) {
+      const auto& ahead = named(before(kHeldLongAt).status.devices, name);
+      EXPECT_EQ(ahead.samples_refused, 0) << name;
+      const auto& device = named(last().devices, name);
+      // The reference's attitude is a sample of its own.
+      const double rate_hz = std::string_view(name) == "airins" ? 200.0 : 100.0;
+      const double came = rate_hz * static_cast<double>(kHeldLong.count());
+      EXPECT_NEAR(static_cast<double>(device.samples_refused), came - kRing, 40.0) << name;
+      EXPECT_EQ(device.samples_lost, ahead.samples_lost) << name << ": the device sent them all";
+    }
+    EXPECT_EQ(named(last().devices, "gnss").samples_refused, 0);
+    for (const auto& study : last().studies) {
+      const auto& device = named(last().devices, study.name);
+      EXPECT_NEAR(static_cast<double>(study.samples + device.samples_refused),
+                  static_cast<double>(device.samples), 30.0)
+          << study.name << ": used or not, the estimator has had all others";
+    }
+  }
+
+  void check_drift() const {
+    constexpr double kTolerance_ppm = 40.0;
+    EXPECT_NEAR(named(last().devices, "mtx2").clock_drift_ppm, kSkew_ppm, kTolerance_ppm);
+    EXPECT_NEAR(named(last().devices, "mtx1").clock_drift_ppm, 0.0, kTolerance_ppm);
+  }
+
+  /// Records are counted on their channel: what is missing in the capture is what was lost of them.
+  void check_capture_lost() const {
+    std::map<std::string, std::int64_t> next;
+    std::int64_t missing = 0;
+    auto log = EventLogReader::open(folder_ / "live" / "capture.lcm");
+    ASSERT_TRUE(log.has_value());
+    LogEvent event;
+    while (log->next(event)) {
+      const auto raw = decode_message<raw_t>(event.data);
+      if (!raw) continue;
+      missing += raw->sequence - next[raw->device];
+      next[raw->device] = raw->sequence + 1;
+    }
+    EXPECT_EQ(before(kDiskAt).status.capture_lost, 0);
+    EXPECT_GT(missing, 100);
+    EXPECT_EQ(last().capture_lost, missing);
+    EXPECT_EQ(last().state, "degraded");
+    EXPECT_THAT(last().reason, HasSubstr("could not be kept in the capture"));
+  }
+
   std::filesystem::path folder_ = scratch_folder();
   std::chrono::steady_clock::time_point started_;
   pid_t process_ = 0;
@@ -420,7 +502,7 @@ class StatusTruth : public testing::Test {
 };
 
 TEST_F(StatusTruth, EveryFieldIsWhatOthersKnow) {
-  ASSERT_NO_FATAL_FAILURE(run());
+  ASSERT_NO_FATAL_FAILURE(run(kDamage, {{kHeldAt, kHeld, 'e'}, {kBlockedAt, kBlocked, 'p'}}, kEventAt, kRun));
   SCOPED_TRACE(read_text(folder_ / "imuscope.log"));
   ASSERT_GT(heard_.size(), 30U);
   check_identity();
@@ -432,6 +514,17 @@ TEST_F(StatusTruth, EveryFieldIsWhatOthersKnow) {
   check_devices();
   check_refits();
   check_state();
+}
+
+TEST_F(StatusTruth, WhatCameTooLateWasRefusedOrNotRecordedIsCounted) {
+  ASSERT_NO_FATAL_FAILURE(
+      run(kLongDamage, {{kHeldLongAt, kHeldLong, 'e'}, {kDiskAt, kDisk, 'r'}}, kDiskAt + kDisk, kLongRun));
+  SCOPED_TRACE(read_text(folder_ / "imuscope.log"));
+  ASSERT_GT(heard_.size(), 30U);
+  check_late();
+  check_refused();
+  check_drift();
+  check_capture_lost();
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ TEST(ClockMap, ScatterIsThatOfTheEarliestFrames) {
     (void)map.observe(k * kPeriod.count(), host_at(k * kPeriod_s * (1.0 + kSkew) + delay_s));
   }
   EXPECT_NEAR(map.scatter_s(), 0.2e-3, 0.01e-3);
-  EXPECT_NEAR(map.skew_ppm(), 20.0, 1.0);
+  EXPECT_NEAR(map.drift_ppm(), -20.0, 1.0);
   map.restart();
   (void)map.observe(0, host_at(0.0));
   EXPECT_TRUE(std::isnan(map.scatter_s()));
@@ -210,7 +210,7 @@ TEST(ClockMap, FindsTheRateOfTheDevicesClock) {
     with_delays(
         30000, ppm * 1e-6, [&](std::size_t) { return delay(random); }, map);
     // The lowest of 200 delays of 0.5 ms mean is 2.5 us; over 300 s that is 0.01 ppm.
-    EXPECT_NEAR(map.skew_ppm(), ppm, 0.1);
+    EXPECT_NEAR(map.drift_ppm(), -ppm, 0.1);
   }
 }
 
@@ -348,7 +348,7 @@ TEST(ClockMap, AFixedClockIsOriginPlusRatioTimesDeviceTimeToTheNanosecond) {
   constexpr std::int64_t kDay_ns = 86'400'000'000'000;
   EXPECT_EQ(map.observe(kDay_ns, HostTime{}) - origin, nanoseconds{kDay_ns - 2'160'000'000});
   EXPECT_EQ(map.observe(0, host_at(1e6)), origin);
-  EXPECT_NEAR(map.skew_ppm(), -25.0, 1e-6);
+  EXPECT_NEAR(map.drift_ppm(), 25.0, 1e-3);
 }
 
 }  // namespace

@@ -56,7 +56,10 @@ void add_run(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand("run", "The live service: devices, estimator, recording, LCM");
   auto options = std::make_shared<RunCommand>();
   command->add_option("config", options->config, "configuration (TOML)")->required()->type_name("CONFIG");
-  command->add_option("--out,-o", options->out, "folder for capture and results (default: runs/NAME-TIME)")
+  command
+      ->add_option(
+          "--out,-o", options->out,
+          "folder for capture and results (default: NAME-TIME in the folder of [record], or in runs)")
       ->type_name("DIR");
   command->add_option("--seconds", options->seconds, "end by itself after this time")
       ->check(CLI::Range(kShortestRun_s, kLongestRun_s));
