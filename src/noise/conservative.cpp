@@ -13,7 +13,8 @@ namespace {
 Eigen::MatrixXd contributions(const FitResult& fit) {
   std::vector<const FittedLevel*> used;
   for (const FittedLevel& level : fit.wv) {
-    if (level.model_ci_high > 0.0 && has_enough_coefficients(level.observed)) used.push_back(&level);
+    if (level.model_ci_high > 0.0 && has_enough_coefficients(level.observed, fit.efficiency))
+      used.push_back(&level);
   }
   const auto& components = fit.model.components;
   Eigen::MatrixXd g(static_cast<Eigen::Index>(used.size()), static_cast<Eigen::Index>(components.size()));

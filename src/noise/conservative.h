@@ -8,7 +8,7 @@ namespace imuscope::noise {
 
 /// The fit with larger amplitudes, rates unchanged: the smallest relative increase (sum of squares) with
 /// which the model reaches the upper end of the model-based interval at every level that has enough
-/// coefficients (M_j >= 3 * 2^j). Terms of amplitude zero stay out. The parameters carry no intervals.
+/// coefficients (wavelet_variance.h). Terms of amplitude zero stay out. The parameters carry no intervals.
 FitResult over_bounding(const FitResult& fit);
 
 }  // namespace imuscope::noise

@@ -225,7 +225,7 @@ Result<Problem> problem_of(std::span<const DrivenWindow> windows, const Model& m
   Problem problem;
   const WaveletVariance& first = windows.front().wv;
   for (const auto& level : first.levels) {
-    if (has_enough_coefficients(level)) problem.levels.push_back(level.level);
+    if (has_enough_coefficients(level, first.efficiency)) problem.levels.push_back(level.level);
   }
   if (problem.levels.empty()) return work_error("the windows are too short", "use longer windows");
   const auto rows = static_cast<Index>(problem.levels.size());

@@ -52,7 +52,8 @@ struct ParameterEstimate {
   std::optional<double> log_sd;  ///< sd on the scale the interval was made on
 };
 
-/// Test that the model explains the wavelet variance, on the levels with M_j >= 3 * 2^j.
+/// Test that the model explains the wavelet variance, on the levels with enough coefficients
+/// (wavelet_variance.h).
 struct JTest {
   double statistic = 0.0;
   int dof = 0;

@@ -293,7 +293,7 @@ std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& re
                             const std::vector<bool>& present) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < residual.size(); ++i) {
-    if (has_enough_coefficients(wv.levels[static_cast<std::size_t>(i)])) rows.push_back(i);
+    if (has_enough_coefficients(wv.levels[static_cast<std::size_t>(i)], wv.efficiency)) rows.push_back(i);
   }
   const auto columns = indices_of(present);
   if (rows.empty() || columns.empty()) return std::nullopt;

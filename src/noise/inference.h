@@ -41,8 +41,8 @@ struct ParameterCovariance {
 ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
                                          const Eigen::MatrixXd& omega, const std::vector<bool>& present);
 
-/// Test of the model on the levels with M_j >= 3 * 2^j. The part of the residual that the parameters could
-/// still follow is projected out, so the test holds for every weighting of the fit.
+/// Test of the model on the levels with enough coefficients (wavelet_variance.h). The part of the residual
+/// that the parameters could still follow is projected out, so the test holds for every weighting of the fit.
 std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& residual,
                             const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
                             const std::vector<bool>& present);

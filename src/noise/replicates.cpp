@@ -137,8 +137,11 @@ Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const 
 std::optional<JTest> distance_from_model(const WaveletVariance& window, const FitResult& reference) {
   const bool explained = !reference.j_test || reference.j_test->p_value >= kExplained;
   std::vector<int> levels;
-  for (std::size_t i = 0; i < window.levels.size() && has_enough_coefficients(window.levels[i]); ++i) {
-    if (!explained && (i >= reference.wv.size() || !has_enough_coefficients(reference.wv[i].observed))) break;
+  for (std::size_t i = 0;
+       i < window.levels.size() && has_enough_coefficients(window.levels[i], window.efficiency); ++i) {
+    if (!explained && (i >= reference.wv.size() ||
+                       !has_enough_coefficients(reference.wv[i].observed, reference.efficiency)))
+      break;
     levels.push_back(window.levels[i].level);
   }
   if (levels.empty()) return std::nullopt;

@@ -97,8 +97,9 @@ Result<std::vector<LeftOut>> leave_one_out(std::span<const WaveletVariance> repl
   for (std::size_t k = 0; k < replicates.size(); ++k) {
     std::vector<WaveletVariance> others(replicates.begin(), replicates.end());
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    const auto levels = static_cast<std::size_t>(
-        std::count_if(replicates[k].levels.begin(), replicates[k].levels.end(), has_enough_coefficients));
+    const auto levels = static_cast<std::size_t>(std::count_if(
+        replicates[k].levels.begin(), replicates[k].levels.end(),
+        [&](const WvLevel& level) { return has_enough_coefficients(level, replicates[k].efficiency); }));
     out.emplace_back(pool(others), replicates[k], wv_covariance(reference, replicates[k], levels));
     if (!out.back().valid())
       return work_error(fmt::format("replicate {} is too short to be predicted", k + 1));

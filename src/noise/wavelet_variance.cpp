@@ -89,9 +89,9 @@ std::vector<WvLevel> robust_levels(std::span<const double> x, const std::vector<
 
 }  // namespace
 
-bool has_enough_coefficients(const WvLevel& level) noexcept {
+bool has_enough_coefficients(const WvLevel& level, double efficiency) noexcept {
   constexpr double kEnough = 3.0;
-  return static_cast<double>(level.n_coefficients) >= kEnough * level.tau_samples;
+  return efficiency * static_cast<double>(level.n_coefficients) >= kEnough * level.tau_samples;
 }
 
 std::vector<Segment> valid_segments(std::span<const double> x, std::span<const std::uint8_t> mask) {

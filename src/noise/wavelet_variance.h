@@ -32,8 +32,9 @@ struct WvLevel {
   double rejected_share = 0.0;       ///< robust only: share of coefficients with weight zero
 };
 
-/// M_j >= 3 * 2^j: near enough to Gaussian for tests and bounds.
-bool has_enough_coefficients(const WvLevel& level) noexcept;
+/// Efficiency times M_j >= 3 * 2^j: near enough to Gaussian for tests and bounds. `efficiency` is that of the
+/// wavelet variance that the level belongs to: an estimator that resists needs more coefficients for it.
+bool has_enough_coefficients(const WvLevel& level, double efficiency) noexcept;
 
 struct WaveletVariance {
   std::uint64_t n_samples = 0;    ///< length of the signal

@@ -87,7 +87,7 @@ TEST(OverBounding, ReachesEveryUpperIntervalEndThatHasEnoughCoefficientsAndIsNot
   const FitResult bound = over_bounding(result);
   double closest = 1e9;
   for (const auto& level : result.wv) {
-    if (!has_enough_coefficients(level.observed)) continue;
+    if (!has_enough_coefficients(level.observed, result.efficiency)) continue;
     const double ratio = model_wv(bound.model, level.observed.level) / level.model_ci_high;
     EXPECT_GE(ratio, 1.0 - 1e-9);
     closest = std::min(closest, ratio);
