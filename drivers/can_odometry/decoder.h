@@ -38,6 +38,8 @@ struct Choice {
   std::string counter_signal;                ///< counts the frames of its message; empty: none
 };
 
+/// What the decoder is told of the vehicle's odometry: how often the wheels report, how late, and what speeds
+/// (m/s) and accelerations (m/s²) no vehicle exceeds.
 struct DecoderConfig {
   DeviceIndex device = 0;
   double rate_hz = 50.0;
@@ -46,6 +48,8 @@ struct DecoderConfig {
   double max_acceleration_mps2 = 20.0;
 };
 
+/// What kept frames and sets of wheel speeds from giving a sample, since construction; beside the counters
+/// that every decoder has.
 struct OdometryCounters {
   std::uint64_t too_short = 0;   ///< frame has fewer bytes than a chosen signal needs
   std::uint64_t invalid = 0;     ///< fault bit, invalid number, named number

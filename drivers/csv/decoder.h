@@ -21,6 +21,8 @@ namespace imuscope::csv {
 enum class AngularRateUnit : std::uint8_t { kRadps, kDegps };
 enum class AccelerationUnit : std::uint8_t { kMps2, kG };
 
+/// How an IMU's CSV file is to be read: names of its columns, their units, and how the file's axes
+/// turn into the device's.
 struct ImuConfig {
   DeviceIndex device = 0;
   std::string time_column = "t_s";
@@ -45,6 +47,8 @@ enum class SolutionCode : std::uint8_t {
   kNmea,    ///< 0 none, 1 single, 2 and 3 differential, 4 fixed, 5 float
 };
 
+/// How the CSV file of a GNSS solution is to be read: names of its columns, latitude and longitude in degrees
+/// (WGS-84).
 struct GnssConfig {
   DeviceIndex device = 0;
   std::string time_column = "t_s";
@@ -115,6 +119,7 @@ class RowDecoder : public DeviceDecoder {
   std::optional<std::int64_t> last_time_ns_;
 };
 
+/// Rows of an IMU's file to kImu samples, in SI units and the device's axes.
 class ImuDecoder final : public RowDecoder {
  public:
   explicit ImuDecoder(const ImuConfig& config);
@@ -132,6 +137,8 @@ class ImuDecoder final : public RowDecoder {
   std::int64_t unwrapped_by_ = 0;
 };
 
+/// Rows of a GNSS solution to kGnss samples. A row whose solution code says "none" gives a sample without a
+/// valid position.
 class GnssDecoder final : public RowDecoder {
  public:
   explicit GnssDecoder(const GnssConfig& config);

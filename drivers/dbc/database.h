@@ -22,11 +22,14 @@ struct NamedValue {
   std::string name;
 };
 
+/// Values of a multiplexing switch, as they stand in the frame, for which a signal is present (`m<k>`
+/// or SG_MUL_VAL_).
 struct RawRange {
   std::uint64_t low;
   std::uint64_t high;  ///< included
 };
 
+/// One SG_ line of the file, with the names that VAL_ gives to its values.
 struct Signal {
   std::string name;
   SignalLayout layout;
@@ -40,6 +43,7 @@ struct Signal {
   std::vector<NamedValue> names;
 };
 
+/// One BO_ line of the file: a CAN frame and the signals in it.
 struct Message {
   std::string name;
   std::uint32_t id = 0;      ///< identifier alone

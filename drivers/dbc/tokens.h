@@ -18,6 +18,7 @@ enum class TokenKind : std::uint8_t {
   kOpenText,  ///< a text whose closing quotation mark does not come
 };
 
+/// One piece of a DBC file; `text` points into the file's text, which must outlive it.
 struct Token {
   TokenKind kind = TokenKind::kEnd;
   std::string_view text;  ///< a text without its quotation marks

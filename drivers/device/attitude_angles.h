@@ -38,6 +38,8 @@ constexpr void rotate(const Matrix3& a, const std::array<double, 3>& v, std::arr
   out[2] = a[6] * x + a[7] * y + a[8] * z;
 }
 
+/// Euler angles of forward-right-down axes against north-east-down: roll right side down, pitch nose up,
+/// heading clockwise from north.
 struct RollPitchHeading {
   double roll_rad;
   double pitch_rad;

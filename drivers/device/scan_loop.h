@@ -29,6 +29,8 @@ struct Examined {
   std::uint8_t kind = 0;  ///< of a frame, the protocol's own
 };
 
+/// What a scanner met between good frames since its construction: bytes that belong to none, and frames that
+/// failed their checksum or announced an impossible length.
 struct ScanCounters {
   std::uint64_t bytes_skipped = 0;
   std::uint64_t bad_checksums = 0;

@@ -6,6 +6,7 @@
 
 namespace imuscope {
 
+/// A place in WGS-84 geodetic coordinates.
 struct Geodetic {
   double lat_rad;
   double lon_rad;

@@ -22,6 +22,8 @@
 
 namespace imuscope::greis {
 
+/// What the decoder is told of receiver and line; the messages themselves and the time base are found in the
+/// stream.
 struct DecoderConfig {
   DeviceIndex device = 0;
   /// Time between epochs, to tell missing ones; zero: not looked for.

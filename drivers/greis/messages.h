@@ -1,6 +1,7 @@
 #pragma once
 
-/// Bodies of the messages that are read, in wire units (which are SI here, but for milliseconds of day).
+/// Bodies of the messages that are read, in wire units: SI and radians, but for times in milliseconds.
+/// `soltype` is 1 single, 2 code differential, 3 RTK float, 4 RTK fixed; any other is taken for no solution.
 
 #include <array>
 #include <cstdint>
@@ -13,66 +14,80 @@ namespace imuscope::greis {
 
 using Body = std::span<const std::uint8_t>;
 
-struct TimeOfDay {  // RT, ET
+/// [~~] (RT) opens and [::] (ET) closes an epoch: receiver time of day, in the time base of [RD].
+struct TimeOfDay {
   std::uint32_t tod_ms;
 };
+/// [RD]: date of the receiver's time and the base that its times of day are in; sent at start and when it
+/// changes.
 struct ReceiverDate {
   std::uint16_t year;
   std::uint8_t month;
   std::uint8_t day;
   std::uint8_t base;  ///< TimeBase
 };
+/// [GT]: GPS time.
 struct GpsTime {
-  std::uint32_t tow_ms;
-  std::uint16_t wn;  ///< modulo 1024
+  std::uint32_t tow_ms;  ///< of the week
+  std::uint16_t wn;      ///< modulo 1024
 };
-/// Reference time = receiver time + offset.
+/// [TO]: reference time = receiver time + offset, as found at this epoch and smoothed.
 struct TimeOffset {
   double val_s;
   double sval_s;
 };
+/// [UO], of which only the leap seconds in force are read: GPS time minus UTC.
 struct UtcOffset {
   std::int8_t leap_s;
 };
+/// [ST]: time of day for which the solution of this epoch holds.
 struct SolutionTime {
   std::uint32_t time_ms;  ///< of the epoch that the position belongs to; may be before RT (delayed RTK)
   std::uint8_t soltype;
 };
+/// [PO]: position of the antenna, Earth-centred (ECEF).
 struct PositionEcef {
   std::array<double, 3> xyz_m;
-  float psigma;
+  float psigma;  ///< m, spherical error probable
   std::uint8_t soltype;
 };
+/// [VE]: velocity of the antenna along the axes of ECEF.
 struct VelocityEcef {
   std::array<float, 3> v_mps;
-  float vsigma;
+  float vsigma;  ///< m/s, spherical error probable
   std::uint8_t soltype;
 };
+/// [PV]: [PO] and [VE] in one message, which share one solution type.
 struct PositionVelocityEcef {
   PositionEcef position;
   VelocityEcef velocity;
 };
+/// [PG]: position of the antenna, geodetic.
 struct PositionGeodetic {
   double lat_rad;
   double lon_rad;
   double alt_m;  ///< above the ellipsoid
-  float psigma;
+  float psigma;  ///< m, spherical error probable
   std::uint8_t soltype;
 };
+/// [VG]: velocity of the antenna along north, east and up.
 struct VelocityGeodetic {
-  float north;
+  float north;  ///< m/s, as the next two
   float east;
   float up;
-  float vsigma;
+  float vsigma;  ///< m/s, spherical error probable
   std::uint8_t soltype;
 };
+/// [SG]: standard deviations of position and velocity. The horizontal ones are those of the plane, sqrt(2)
+/// times that of each axis.
 struct Sigmas {
-  float hpos;
+  float hpos;  ///< m, as the next one
   float vpos;
-  float hvel;
+  float hvel;  ///< m/s, as the next one
   float vvel;
   std::uint8_t soltype;
 };
+/// [DP]: dilutions of precision; old firmware sends it without the one of east.
 struct Dop {
   float hdop;
   float vdop;
@@ -81,7 +96,7 @@ struct Dop {
   bool has_edop;
   float edop;
 };
-/// Order of the names in kCovarianceNames.
+/// [SP] of position, [SV] of velocity; in the order of kCovarianceNames.
 struct Covariance {
   std::array<float, 10> values;
   std::uint8_t soltype;

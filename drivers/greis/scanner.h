@@ -17,6 +17,7 @@
 
 namespace imuscope::greis {
 
+/// One GREIS message or line of text; its spans point into the scanner's buffer.
 struct Frame {
   enum class Kind : std::uint8_t { kMessage, kText };
   Kind kind = Kind::kMessage;

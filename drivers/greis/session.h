@@ -12,6 +12,7 @@
 
 namespace imuscope::greis {
 
+/// What the session asks of the receiver.
 struct SessionConfig {
   Duration period = std::chrono::milliseconds(100);  ///< between epochs; 50 ms to 10 s
   /// False: only listen. For receivers that are set up by somebody else.

@@ -4,13 +4,11 @@
 ///
 /// A telegram gives up to two samples, both at its validity time:
 /// - kImu from the raw acceleration (nav bit 28) and the raw rotation rate (extended bit 2), with the
-/// rotation
-///   acceleration (extended bit 0) where it is sent. Only these blocks hold what a strapdown needs: gravity
-///   and Earth rate included. Units with export limits send them frozen or zero: such a telegram gives no
-///   kImu sample, and raw_blocks() says why.
+///   rotation acceleration (extended bit 0) where it is sent. Only these blocks hold what a strapdown needs:
+///   gravity and Earth rate included. Units with export limits send them frozen or zero: such a telegram
+///   gives no kImu sample, and raw_blocks() says why.
 /// - kAttitude from heading, roll, pitch (nav bit 0) with their sd (bit 1). The heading is valid only where
-/// the
-///   user status (bit 17) is sent and its alignment bit is clear.
+///   the user status (bit 17) is sent and its alignment bit is clear.
 ///
 /// Validity is time of day in 100 us; it is unwrapped through midnight. UTC needs the date block (bit 13),
 /// and, where the user status is sent, its "time received" bit: an unsynchronised unit counts from its
@@ -27,6 +25,8 @@
 
 namespace imuscope::ixblue_stdbin {
 
+/// What the decoder must know of the unit's installation and its line; which blocks come, each telegram says
+/// itself.
 struct DecoderConfig {
   DeviceIndex device = 0;
   /// Row-major rotation that takes the unit's XV axes (forward, port, up) to b (forward, right, down).

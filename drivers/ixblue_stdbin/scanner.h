@@ -15,6 +15,7 @@
 
 namespace imuscope::ixblue_stdbin {
 
+/// One telegram or answer with a right checksum; its span points into the scanner's buffer.
 struct Frame {
   enum class Kind : std::uint8_t { kTelegram, kAnswer };
   Kind kind = Kind::kTelegram;

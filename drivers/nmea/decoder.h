@@ -6,12 +6,11 @@
 /// An epoch ends when the sentence comes that was the last one of the epoch before, or when the time changes.
 ///
 /// - Position and solution from GGA. The height above the ellipsoid is MSL height plus geoid separation;
-/// where the
-///   receiver leaves the separation out, the configured one is taken, and without one the position is not
-///   valid.
+///   where the receiver leaves the separation out, the configured one is taken, and without one the position
+///   is not valid.
 /// - Velocity from RMC, or VTG: horizontal only. The downward part is 0 with a standard deviation that says
-/// so.
-///   Receivers leave the course out at standstill: then the velocity is zero below 0.3 m/s, else not valid.
+///   so. Receivers leave the course out at standstill: then the velocity is zero below 0.3 m/s, else not
+///   valid.
 /// - Standard deviations of the position from GST.
 /// - Date from RMC or ZDA, carried on through midnight.
 
@@ -25,6 +24,7 @@
 
 namespace imuscope::nmea {
 
+/// What the decoder must know of receiver and line, and what stands in for numbers that NMEA does not carry.
 struct DecoderConfig {
   DeviceIndex device = 0;
   /// Time between epochs, to tell missing ones; zero: not looked for.

@@ -17,6 +17,7 @@ struct TimeOfDay {
   double second;
   [[nodiscard]] double seconds() const noexcept { return 3600.0 * hour + 60.0 * minute + second; }
 };
+/// Year in full, month and day from 1, as sent: not checked against the calendar.
 struct Date {
   int year;
   int month;
@@ -69,6 +70,8 @@ struct Gga {
   [[nodiscard]] std::optional<double> age_s() const noexcept { return fields.number(12); }
   [[nodiscard]] std::string_view station() const noexcept { return fields.at(13); }
 };
+/// RMC: recommended minimum of position, course, speed and date; without a height. Where valid() is false the
+/// receiver warns of its own solution.
 struct Rmc {
   const Fields& fields;
   [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
@@ -80,12 +83,14 @@ struct Rmc {
   [[nodiscard]] std::optional<Date> date() const noexcept { return fields.date(8); }
   [[nodiscard]] std::string_view mode() const noexcept { return fields.at(11); }
 };
+/// VTG: course over ground, clockwise from true north, and speed; has no time of its own.
 struct Vtg {
   const Fields& fields;
   [[nodiscard]] std::optional<double> cog_deg() const noexcept { return fields.number(0); }
   [[nodiscard]] std::optional<double> sog_kn() const noexcept { return fields.number(4); }
   [[nodiscard]] std::optional<double> sog_kmh() const noexcept { return fields.number(6); }
 };
+/// GST: standard deviations of the position of the epoch.
 struct Gst {
   const Fields& fields;
   [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
@@ -97,6 +102,7 @@ struct Gst {
   [[nodiscard]] std::optional<double> std_lon_m() const noexcept { return fields.number(6); }
   [[nodiscard]] std::optional<double> std_alt_m() const noexcept { return fields.number(7); }
 };
+/// ZDA: UTC time and date, and the local zone.
 struct Zda {
   const Fields& fields;
   [[nodiscard]] std::optional<TimeOfDay> time() const noexcept { return fields.time(0); }
@@ -107,6 +113,7 @@ struct Zda {
   [[nodiscard]] std::optional<int> tz_h() const noexcept { return fields.integer(4); }
   [[nodiscard]] std::optional<int> tz_min() const noexcept { return fields.integer(5); }
 };
+/// HDT: heading, clockwise from true north.
 struct Hdt {
   const Fields& fields;
   [[nodiscard]] std::optional<double> heading_deg() const noexcept { return fields.number(0); }
@@ -138,6 +145,7 @@ struct NamedValue {
 };
 
 namespace detail {
+/// Text of a time or a date without the heap.
 struct ShortText {
   std::array<char, 24> chars{};
   std::size_t size = 0;

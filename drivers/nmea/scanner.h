@@ -22,6 +22,8 @@ inline constexpr std::size_t kSentenceMax = 256;
 [[nodiscard]] Examined examine_sentence(std::span<const std::uint8_t> pending,
                                         bool checksum_required = true) noexcept;
 
+/// One sentence with a right checksum (or without one, where none is required); it points into the scanner's
+/// buffer.
 struct Frame {
   std::string_view sentence;  ///< from '$' to the checksum; valid until the next append()
   std::uint64_t offset = 0;   ///< of its first byte in the stream

@@ -17,6 +17,8 @@
 
 namespace imuscope::rtklib_pos {
 
+/// What the decoder must know beforehand, as a stream joined late has no header. `base` stands in until a
+/// "ref pos" comment names another one.
 struct DecoderConfig {
   DeviceIndex device = 0;
   /// Time between solutions, to tell missing ones; zero: not looked for.

@@ -18,6 +18,7 @@ enum class Layout : std::uint8_t {
   kEnu,     ///< east, north, up from the base
 };
 
+/// How the lines that follow are to be read, as the comment that names the columns says.
 struct Format {
   TimeSystem time_system = TimeSystem::kGpst;
   Layout layout = Layout::kLlh;

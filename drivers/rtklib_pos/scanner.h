@@ -17,6 +17,7 @@ namespace imuscope::rtklib_pos {
 inline constexpr std::size_t kLineMax = 1024;
 inline constexpr char kCommentMark = '%';
 
+/// One line, comment or solution; it points into the scanner's buffer.
 struct Frame {
   std::string_view
       line;              ///< without blanks before it and its end; never empty; valid until the next append()
@@ -25,6 +26,7 @@ struct Frame {
   HostTime first_byte{};     ///< when its first byte arrived at the latest
 };
 
+/// What the scanner passed over since its construction; there is no checksum that could fail.
 struct ScanCounters {
   std::uint64_t bytes_skipped = 0;
   std::uint64_t bad_lengths = 0;  ///< lines that were too long

@@ -20,6 +20,7 @@
 
 namespace imuscope {
 
+/// Which interface to listen on, and to what.
 struct CanSettings {
   std::string interface;
   std::vector<CanId> ids;  ///< what to let through; at least one, at most 512

@@ -13,6 +13,7 @@
 
 namespace imuscope {
 
+/// The far end of a TCP connection, or where UDP datagrams are awaited.
 struct NetSettings {
   enum class Kind : std::uint8_t { kTcp, kUdp };
   Kind kind = Kind::kTcp;

@@ -18,6 +18,7 @@
 
 namespace imuscope {
 
+/// Which port to open and how to set its line; always eight data bits, no parity, no flow control.
 struct SerialSettings {
   std::string path;
   std::uint32_t baud = 115200;

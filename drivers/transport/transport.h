@@ -17,6 +17,7 @@ enum class IoStatus : std::uint8_t {
   kGone,     ///< the device vanished (unplugged, other end closed)
 };
 
+/// What one read() or write() did. `n`, the bytes moved, is above zero with kDone only.
 struct IoResult {
   IoStatus status = IoStatus::kNothing;
   std::size_t n = 0;

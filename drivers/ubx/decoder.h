@@ -12,6 +12,7 @@
 
 namespace imuscope::ubx {
 
+/// What the decoder is told of receiver and line: a message tells neither its rate nor the baud rate.
 struct DecoderConfig {
   DeviceIndex device = 0;
   /// Time between epochs, to tell missing ones; zero: not looked for.

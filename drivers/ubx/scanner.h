@@ -13,6 +13,7 @@
 
 namespace imuscope::ubx {
 
+/// One UBX message or NMEA sentence with a right checksum; its spans point into the scanner's buffer.
 struct Frame {
   enum class Kind : std::uint8_t { kMessage, kNmea };
   Kind kind = Kind::kMessage;

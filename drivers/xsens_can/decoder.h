@@ -22,6 +22,7 @@
 
 namespace imuscope::xsens_can {
 
+/// How the device was set up: its rate and the identifiers of its messages are not to be read off the bus.
 struct DecoderConfig {
   DeviceIndex device = 0;
   double rate_hz = 100.0;  ///< of the groups

@@ -16,6 +16,7 @@ enum class HighRateOrder : std::uint8_t {
   kRateFirst,
 };
 
+/// Averages blocks of 50 samples of both messages until one block shows a rest; what it says then, it keeps.
 class HighRateResolver {
  public:
   /// One sample of both messages.

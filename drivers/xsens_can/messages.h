@@ -28,6 +28,7 @@ enum class Item : std::uint8_t {
 };
 inline constexpr std::size_t kItemCount = 10;
 
+/// One of the CAN messages that are read: its name, and what the device sends it as.
 struct ItemKind {
   std::string_view name;  ///< as the configuration writes it
   std::uint32_t id;       ///< the device's default; another one can be set per message

@@ -44,6 +44,8 @@ struct BusDevice {
   Matrix3 axes{1, 0, 0, 0, 1, 0, 0, 0, 1};
 };
 
+/// What is wanted of the device, or of those behind an Xbus Master, and what is expected of the stream until
+/// it says otherwise.
 struct MtDecoderConfig {
   DeviceIndex device = 0;
   /// Behind an Xbus Master, element k is the device with bus id k + 1, if it is wanted. Empty: `device` is

@@ -49,6 +49,7 @@ enum class Field : std::uint32_t {
   kUtc = 1U << 15U,
 };
 
+/// Uncalibrated readings (output mode "raw"), counts of the converters; no sample is made of them.
 struct RawInertial {
   std::array<std::uint16_t, 3> acceleration{};  ///< ADC counts
   std::array<std::uint16_t, 3> rate{};
@@ -71,6 +72,8 @@ struct GpsPvt {
   std::uint8_t gps_age = 0;
 };
 
+/// UTC as a device sends it, in MTData and as item 0x1010 of MTData2; utc_ns() says whether it is to be
+/// believed.
 struct UtcFields {
   std::uint32_t nanoseconds = 0;
   std::uint16_t year = 0;
@@ -79,7 +82,7 @@ struct UtcFields {
   std::uint8_t hour = 0;
   std::uint8_t minute = 0;
   std::uint8_t second = 0;
-  std::uint8_t flags = 0;  ///< see kUtcFullyValid
+  std::uint8_t flags = 0;  ///< bit 0 date valid, 1 time of day valid, 2 leap seconds resolved
 };
 
 /// Reads kUtcSize bytes.

@@ -16,6 +16,7 @@
 
 namespace imuscope::xsens {
 
+/// One item of a message; `data` points into the message.
 struct Item {
   std::uint16_t id = 0;  ///< data identifier with its format bits
   std::span<const std::uint8_t> data;
@@ -62,6 +63,7 @@ enum class ItemContent : std::uint8_t {
   kBytes,             ///< known by name only
 };
 
+/// What is known of one data identifier; find_item_kind() hands out entries of a constant table.
 struct ItemKind {
   std::uint16_t kind;  ///< data identifier without format bits
   std::string_view name;

@@ -6,12 +6,12 @@
 /// The checksum has 8 bits only, so that one false start in 256 passes it and covers what lies in its length.
 /// No good frame is lost to that:
 /// - A frame that lies whole inside another one is given as well, marked `nested`: one of the two is false,
-/// and
-///   only their contents tell which. Those who act on frames take data out of nested ones, and no command.
+///   and only their contents tell which. Those who act on frames take data out of nested ones, and no
+///   command.
 /// - Where the bytes behind a taken frame are no frame, a good one that began inside it and ends behind it is
-/// found. What remains is a false frame that passes, covers the beginning of a good one, and is followed,
-/// inside that good one, by a second false start that passes too: 2^-16 for each false start whose length
-/// does so.
+///   found. What remains is a false frame that passes, covers the beginning of a good one, and is followed,
+///   inside that good one, by a second false start that passes too: 2^-16 for each false start whose length
+///   does so.
 ///
 /// Core: bounded memory, no allocation, noexcept.
 
@@ -25,6 +25,7 @@
 
 namespace imuscope::xsens {
 
+/// One message: bus identifier (0xFF: the only device, or the Xbus Master), message identifier, data.
 struct Frame {
   std::uint8_t bid = 0;
   std::uint8_t mid = 0;
@@ -35,6 +36,7 @@ struct Frame {
   bool nested = false;                 ///< lies inside the frame that was given before
 };
 
+/// What the scanner met between good frames since its construction.
 struct ScanCounters {
   std::uint64_t bytes_skipped = 0;
   std::uint64_t bad_checksums = 0;

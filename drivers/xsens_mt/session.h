@@ -33,6 +33,7 @@ struct SyncIn {
   std::uint32_t offset = 0;
 };
 
+/// What the device is to send, and how; the session writes to it only what differs.
 struct MtSessionConfig {
   enum class Output : std::uint8_t {
     kAsDevice,  ///< MTData2 where the device's configuration says that it sends it, else legacy

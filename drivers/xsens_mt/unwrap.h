@@ -18,6 +18,8 @@ enum class CountStep : std::uint8_t {
   kRejected,   ///< not to be believed; nothing was taken over
 };
 
+/// How the count runs: where it wraps and how fast. Moduli that differ between devices (SampleTimeFine wraps
+/// at 2^32 or after one day) may both be given.
 struct UnwrapConfig {
   std::int64_t modulus = 0;
   std::int64_t other_modulus = 0;  ///< second possible place of the wrap; 0: none
@@ -25,6 +27,8 @@ struct UnwrapConfig {
   bool host_time_is_meaningful = true;  ///< false for recordings without arrival stamps
 };
 
+/// Unwraps the counts of one device, handed in as they arrive. Core: no allocation, noexcept. Thread: owner
+/// only.
 class CountUnwrapper {
  public:
   explicit CountUnwrapper(const UnwrapConfig& config) noexcept;

@@ -20,6 +20,8 @@ enum class MountingResult : std::uint8_t {
   kInconsistent,         ///< no rotation makes the pairs match: another time offset, axes or a flipped sign
 };
 
+/// What the coarse alignment found: the mounting C_b_s (takes b to s) with its covariance, and a first gyro
+/// bias.
 struct CoarseMounting {
   Eigen::Matrix3d C_b_s = Eigen::Matrix3d::Identity();
   /// Covariance of the boresight psi (rotation vector in b, C = C^ Exp(-psi)), rad^2.
@@ -29,6 +31,7 @@ struct CoarseMounting {
   Eigen::Vector3d gyro_bias_s_radps = Eigen::Vector3d::Zero();
 };
 
+/// What is assumed of the two devices, and how certain the answer must be to count as one.
 struct CoarseMountingOptions {
   double accel_bias_sd_mps2 = 0.15;  ///< of S against R, as it turns gravity
   double sd_limit_rad = 0.05;        ///< of the weakest direction
@@ -36,6 +39,8 @@ struct CoarseMountingOptions {
   int pairs_min = 200;
 };
 
+/// Gathers pairs of the reference's motion and S samples in fixed memory, and solves for the mounting of s
+/// when asked.
 class CoarseMountingEstimator {
  public:
   CoarseMountingEstimator() = default;

@@ -19,6 +19,7 @@ struct RateMagnitudeSeries {
   std::span<const double> rate_radps;
 };
 
+/// How far apart the clocks may be, and whether their rates may differ.
 struct TimeOffsetOptions {
   double search_s = 30.0;           ///< offsets from -search_s to +search_s are tried
   bool estimate_clock_rate = true;  ///< where the overlap is long enough (two minutes or more)

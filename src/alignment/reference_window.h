@@ -41,6 +41,7 @@ enum class ReferenceResult : std::uint8_t {
   kGap,     ///< samples are missing around the instant
 };
 
+/// Width of the polynomial's window and spacing of the samples; fixed for the life of the window.
 struct ReferenceWindowOptions {
   int points = 5;          ///< 5, 7, 9 or 11
   double period_s = 0.01;  ///< nominal sample period; a spacing above 1.5 periods is a gap

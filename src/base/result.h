@@ -12,6 +12,7 @@ namespace imuscope {
 /// Decides the exit code of a program: 2 for wrong usage or configuration, 1 for work that failed.
 enum class ErrorKind { kUsage, kWork };
 
+/// An expected failure, worded for a person.
 struct Error {
   ErrorKind kind = ErrorKind::kWork;
   std::string what;    ///< what happened, with the file, line, key or device it concerns

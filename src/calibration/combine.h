@@ -37,6 +37,7 @@ struct DriveDeviation {
   double p_value = 1.0;
 };
 
+/// The one mounting made of all estimates, and how well they agree on it.
 struct CombinedMounting {
   MountingEstimate estimate;
   std::vector<DriveDeviation> drives;  ///< in the order given; of a single drive all zero

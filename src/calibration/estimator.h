@@ -203,6 +203,8 @@ enum class EstimatorEventKind : std::uint8_t {
   kStudyInconsistent,
 };
 
+/// One such event, at a time on the host's scale: the device it is about, and the value that its kind
+/// explains.
 struct EstimatorEvent {
   EstimatorEventKind kind = EstimatorEventKind::kNavigationStarted;
   DeviceIndex device = 0;

@@ -14,6 +14,7 @@
 
 namespace imuscope {
 
+/// Takes the filter's epochs and gives each back smoothed, five to ten seconds late. Thread: owner only.
 class FixedLagSmoother {
  public:
   /// A state is given out when it is at least this old.

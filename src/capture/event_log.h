@@ -17,6 +17,8 @@ inline constexpr std::size_t kEventLogHeaderBytes = 28;
 inline constexpr std::size_t kMaxEventChannelBytes = 1000;
 inline constexpr std::size_t kMaxEventDataBytes = std::size_t{64} << 20U;
 
+/// One record: its running number, its time in microseconds since 1970 (UTC) by the writer's clock, and an
+/// encoded LCM message with the channel it was sent on.
 struct LogEvent {
   std::int64_t number = 0;
   std::int64_t utime = 0;

@@ -25,6 +25,7 @@ namespace imuscope {
 /// and no arrival: the times have to come from the bytes themselves.
 class RawDump {
  public:
+  /// What one read of the device gave; without an arrivals file a block of arbitrary size, without arrival.
   struct Read {
     std::optional<HostTime> arrival;
     std::span<const std::uint8_t> bytes;  ///< valid until the next call

@@ -42,6 +42,7 @@ struct RecorderStatus {
 /// outlive the recorder, whose thread is their only consumer.
 class Recorder {
  public:
+  /// Where the capture goes, and when it goes on in another file.
   struct Options {
     std::filesystem::path path;  ///< must not exist yet
     std::string channel_prefix{kDefaultChannelPrefix};

@@ -20,6 +20,7 @@
 
 namespace imuscope {
 
+/// What the error changes by per unit of one covariate, with the interval at solve()'s confidence.
 struct RegressionCoefficient {
   std::size_t covariate = 0;  ///< index among the covariates
   double value = 0.0;

@@ -36,6 +36,8 @@ struct AxisDynamics {
   std::string no_gls_because;                      ///< why there is no residual_noise
 };
 
+/// What study_dynamics() must know of the rows: their rate, and which noise model fits what a regression
+/// leaves.
 struct DynamicsOptions {
   double rate_hz = 100.0;
   noise::ModelSpec noise_model;  ///< of the residual

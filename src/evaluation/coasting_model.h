@@ -20,6 +20,7 @@ struct SlowProcess {
   double rate_per_s = 0.0;  ///< 1 / correlation time, above zero
 };
 
+/// Noise of one axis; u is its unit, rad/s for a gyro and m/s² for an accelerometer.
 struct AxisNoise {
   double white_density = 0.0;     ///< u²/Hz: white noise, with every process too fast to be a state
   double walk_density = 0.0;      ///< u²/s: random walk of the bias

@@ -17,6 +17,8 @@ struct DriveSample {
   InertialRates measured;
 };
 
+/// One GNSS solution: the antenna's position, and its velocity where the receiver gave one; vectors are
+/// north, east, down.
 struct DriveFix {
   double time_s = 0.0;
   GeodeticPosition antenna;
@@ -42,6 +44,8 @@ struct Drive {
   double sample_period_s = 0.01;
 };
 
+/// When outages begin, and after how long they are looked at: each lasts for the longest duration and shows
+/// the shorter ones on its way.
 struct OutageOptions {
   std::vector<double> durations_s{10.0, 30.0, 60.0};  ///< rising
   double spacing_s = 5.0;                             ///< between starts

@@ -21,6 +21,7 @@ enum class GateDecision : std::uint8_t {
   kReacquire,  ///< the receiver has agreed with itself, against the state, for long enough
 };
 
+/// Bounds of the gate: what is improbable, and how long a receiver must insist.
 struct GnssGateOptions {
   /// Bound of the squared, normalised innovation (3 degrees of freedom). 16.27 is the 99.9 % point.
   double chi_square_limit = 16.266;

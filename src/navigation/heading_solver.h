@@ -19,12 +19,16 @@ struct VelocityChange {
   double sd_mps = 0.0;       ///< of seen_n from the receiver's sd
 };
 
-struct HeadingPriors {                // all > 0
+/// What else than the noise of GNSS makes felt and seen differ, and how much the windows repeat one another;
+/// all above zero.
+struct HeadingPriors {
   double gyro_bias_sd_radps = 0.0;    ///< of the vertical gyro bias that is left after the rest
   double acceleration_sd_mps2 = 0.0;  ///< of the constant error from tilt and accelerometer bias
   double window_overlap = 1.0;        ///< windows that share most of their data; inflates the sd
 };
 
+/// The heading of frame a with what was found beside it; `scale` far from 1 says that felt and seen are not
+/// the same motion.
 struct HeadingSolution {
   double heading_rad = 0.0;  ///< of frame a's first axis, clockwise from north, at age 0
   double sd_rad = 0.0;

@@ -59,6 +59,7 @@ struct InitialNavigation {
   AlignmentMethod method = AlignmentMethod::kReferenceAttitude;
 };
 
+/// What the aligner must know of the R-IMU and the antenna, and when it may be content.
 struct InitialAlignmentOptions {
   NavigationProcessNoise reference_noise;  ///< of the R-IMU; its bias sd decides on gyrocompassing
   Eigen::Vector3d r_ba_b_m = Eigen::Vector3d::Zero();  ///< GNSS antenna's lever arm
@@ -67,6 +68,8 @@ struct InitialAlignmentOptions {
   double gyrocompass_s_max = 300.0;                    ///< rest is averaged at most this long
 };
 
+/// Fed with the samples of R-IMU and GNSS in the order of arrival, it says by stage() what it waits for, and
+/// by result() where the filter can start.
 class InitialAligner {
  public:
   explicit InitialAligner(const InitialAlignmentOptions& options) noexcept;

@@ -32,6 +32,7 @@ struct DifferenceTest {
   double p_value = 0.0;
 };
 
+/// Parameters of both fits in one table, and the test over all of them.
 struct Comparison {
   std::vector<ComparedParameter> parameters;
   std::optional<DifferenceTest> test;  ///< absent where no parameter is determined in both

@@ -25,11 +25,13 @@ struct DrivenWindow {
   double driver = 0.0;
 };
 
+/// Confidence of the intervals, and the signal's unit as printed with the parameters.
 struct DependenceOptions {
   double confidence = 0.95;
   std::string signal_unit{};
 };
 
+/// How one parameter of the model follows the driver; exp(slope) is its factor per unit of the driver.
 struct ParameterSlope {
   std::string process;  ///< as in FitResult: "WN", "GM1", ...
   std::string name;     ///< "sigma2", "beta", ...
@@ -42,6 +44,7 @@ struct ParameterSlope {
   double p_value = 1.0;  ///< of no dependence
 };
 
+/// A parameter that windows of this length do not determine, and why, in words.
 struct UndeterminedSlope {
   std::string process;
   std::string name;

@@ -28,6 +28,7 @@ enum class ExportFormat : std::uint8_t { kKalibr, kRos, kPx4, kKfGins, kStateSpa
 /// "kalibr", "ros", "px4", "kf-gins", "state-space". Errors: kUsage, with the formats that exist.
 Result<ExportFormat> parse_export_format(std::string_view text);
 
+/// The fit of one axis to be written.
 struct AxisFit {
   std::string axis;  ///< as it is named in the file: "gyro_x", "accel_z"
   SignalUnit unit = SignalUnit::kNone;

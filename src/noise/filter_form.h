@@ -13,6 +13,7 @@ namespace imuscope::noise {
 
 inline constexpr double kFastSamples = 10.0;
 
+/// A fit to be cut down and the unit of its signal; `fit` is the caller's and never null.
 struct FormSource {
   SignalUnit unit = SignalUnit::kNone;
   const FitResult* fit = nullptr;

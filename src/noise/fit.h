@@ -23,6 +23,7 @@ enum class Weighting : std::uint8_t {
 
 struct FitResult;
 
+/// How a model is fitted: weights, levels, and the confidence of what is said of it.
 struct FitOptions {
   Weighting weighting = Weighting::kOptimal;
   int levels = 0;  ///< use only the first so many levels; 0: all
@@ -31,6 +32,7 @@ struct FitOptions {
   const FitResult* warm_start = nullptr;  ///< an earlier fit of the same model: polish from it, no grid
 };
 
+/// Observed and fitted wavelet variance of one level, signal unit squared.
 struct FittedLevel {
   WvLevel observed;
   double fitted = 0.0;
@@ -60,6 +62,8 @@ struct JTest {
   double p_value = 0.0;
 };
 
+/// A fitted model and all that is said of it, the observed wavelet variance included: a value that refers to
+/// nothing else.
 struct FitResult {
   std::uint64_t n = 0;  ///< samples used
   double rate_hz = 0.0;

@@ -9,6 +9,7 @@
 
 namespace imuscope::noise {
 
+/// A sinusoid that stands out of the spectrum, as it was over all segments of the signal.
 struct Line {
   double frequency_hz = 0.0;
   double frequency_sd_hz = 0.0;  ///< from noise alone; an engine's speed wanders by more
@@ -18,6 +19,7 @@ struct Line {
   double p_value = 1.0;  ///< of noise alone reaching this anywhere in the spectrum
 };
 
+/// Sampling rate of the signal, and what counts as a line in it.
 struct LineOptions {
   double rate_hz = 100.0;
   /// Chance of any false line in one signal.

@@ -21,6 +21,7 @@ bool is_gyro(SignalUnit unit) noexcept;
 /// Factor from the unit to rad/s or m/s^2; 1 without a unit.
 double si_factor(SignalUnit unit) noexcept;
 
+/// One number as a filter or a data sheet writes it, in `unit`, with its interval at the fit's confidence.
 struct Quantity {
   std::string process;  ///< "WN", "GM1", ...; "model" for what the sum of the processes has
   std::string name;     ///< "density", "correlation time", "driving density", "angle random walk", ...

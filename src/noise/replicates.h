@@ -16,6 +16,7 @@ namespace imuscope::noise {
 /// Precondition: not empty, all with segments, one efficiency.
 WaveletVariance pool(std::span<const WaveletVariance> replicates);
 
+/// One model fitted to all replicates, and to each alone.
 struct JointFit {
   FitResult pooled;
   std::vector<FitResult> separate;  ///< one a replicate

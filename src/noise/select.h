@@ -12,6 +12,7 @@
 
 namespace imuscope::noise {
 
+/// A sub-model and where it stands.
 struct RankedModel {
   FitResult fit;
   /// FitResult::criterion: a term must earn its place.
@@ -24,6 +25,7 @@ struct RankedModel {
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options = {});
 
+/// A sub-model, and how well it predicts replicates that it has not seen.
 struct CrossValidated {
   FitResult pooled;  ///< of all replicates together
   /// Cross-validated WVIC: mean over the replicates of (wv - model)' V^-1 (wv - model), the model fitted to

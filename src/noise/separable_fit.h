@@ -25,6 +25,7 @@ double shape_slope(ProcessKind kind, int i, double coordinate) noexcept;
 /// What the levels 1..highest_level can tell apart from the process at the end of the range.
 CoordinateRange coordinate_range(ProcessKind kind, int i, int highest_level) noexcept;
 
+/// One model against the whitened wavelet variances of some levels.
 struct SeparableProblem {
   ModelSpec spec;
   std::vector<int> levels;   ///< rows of y
@@ -32,6 +33,7 @@ struct SeparableProblem {
   Eigen::MatrixXd whitener;  ///< W; the objective is |W (y - model)|^2
 };
 
+/// A minimum and the parameters that reach it.
 struct SeparableSolution {
   Model model;  ///< components in the order of the spec, GM by falling rate
   double objective = 0.0;

@@ -10,6 +10,7 @@
 
 namespace imuscope::noise {
 
+/// How many levels a stream keeps, and how long it remembers.
 struct StreamingOptions {
   int levels = 16;  ///< 1..24
   /// Share of its weight that a coefficient loses with each one after it at its level, in [0, 1): 0 keeps all
@@ -21,6 +22,7 @@ struct StreamingOptions {
 
 /// Sums that a wavelet variance is made of; two of them (other stretches, other replicates) can be merged.
 struct WvSums {
+  /// Sums of one level, over its coefficients W and their weights w.
   struct Level {
     double squares = 0.0;         ///< sum of w W^2
     double weight = 0.0;          ///< sum of w

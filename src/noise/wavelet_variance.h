@@ -22,6 +22,7 @@ struct Segment {
   std::size_t end = 0;
 };
 
+/// Wavelet variance at one level, with its confidence interval.
 struct WvLevel {
   int level = 0;             ///< j, from 1
   double tau_samples = 0.0;  ///< 2^j
@@ -52,6 +53,7 @@ struct RobustOptions {
   std::optional<double> tuning_constant;
 };
 
+/// Which samples are used, how many levels, and by which estimator: the classical one unless `robust` is set.
 struct WvOptions {
   int levels = 0;  ///< 0: as many as the longest run of valid samples allows, floor(log2)
   std::optional<RobustOptions> robust;

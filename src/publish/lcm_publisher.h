@@ -20,6 +20,7 @@ namespace imuscope {
 /// Messages stay within one UDP datagram: a larger one is lost whole when any of its fragments is.
 inline constexpr std::size_t kMaxMessageBytes = 65'000;
 
+/// What became of the messages since the publisher was opened.
 struct PublishCounters {
   std::uint64_t published = 0;
   std::uint64_t failed = 0;     ///< the library would not send

@@ -104,6 +104,7 @@ static_assert(std::is_trivially_copyable_v<ErrorReport>);
 
 /// Wavelet variance of one axis in one regime.
 struct AxisWaveletVariance {
+  /// One level j of the wavelet variance; it looks at means over 2^(j-1) samples.
   struct Level {
     int level;      ///< 1, 2, ...
     double tau_s;   ///< 2^level / rate
@@ -130,6 +131,8 @@ struct WaveletVarianceReport {
 
 /// Stochastic model of one axis in one regime; fields as `imuscope fit --json`.
 struct AxisNoiseModel {
+  /// One parameter, in the terms of noise::ParameterEstimate; sd and interval are NaN where it is not
+  /// identifiable.
   struct Parameter {
     std::string process;
     std::string name;
@@ -139,6 +142,7 @@ struct AxisNoiseModel {
     double ci_low = kUnknown;
     double ci_high = kUnknown;
   };
+  /// The model's curve at one level of the wavelet variance.
   struct Fitted {
     double tau_s;
     double value;  ///< wavelet variance implied by the model, unit squared
@@ -232,6 +236,8 @@ struct PersonEvent {
 
 /// Health of the service. Counts are since the start of the run.
 struct StatusReport {
+  /// One device of the configuration and its line; `problem` is empty while all is well, and names the remedy
+  /// else.
   struct Device {
     std::string name;
     std::string role;
@@ -272,12 +278,15 @@ struct StatusReport {
     std::uint64_t late = 0;
     std::uint64_t gated = 0;
   };
+  /// How late, in the terms of LatenessHistogram: median, 99 %, 99.9 % and the worst since the start.
   struct Quantiles {
     double p50_s = kUnknown;
     double p99_s = kUnknown;
     double p999_s = kUnknown;
     double max_s = kUnknown;
   };
+  /// One thread of the process; `ticks` and what follows it are known of the periodic ones only: I/O,
+  /// estimator, publisher.
   struct Thread {
     std::string name;
     std::string scheduling;       ///< what was granted: "fifo 80", "normal", "idle"
@@ -289,6 +298,8 @@ struct StatusReport {
     Quantiles done;                               ///< from the deadline until the work was handed on
     std::vector<std::uint64_t> lateness_octaves;  ///< see LatenessHistogram::octaves()
   };
+  /// One queue between threads, counted in its elements: what waits now, at most so far, and what found it
+  /// full.
   struct Ring {
     std::string name;
     std::uint64_t capacity = 0;

@@ -19,6 +19,8 @@ namespace imuscope {
 inline constexpr const char* kStaticName = "static";
 inline constexpr const char* kDynamicName = "dynamic";
 
+/// Limits of rest and motion for each measure; the spreads are those within a second. Each limit for rest
+/// lies below the one for motion.
 struct MotionLimits {
   double rest_speed_mps = 0.15;
   double motion_speed_mps = 0.30;

@@ -14,6 +14,7 @@ namespace imuscope::report {
 
 class BinnedSignals {
  public:
+  /// One signal in one stretch of time; NaN and infinities stand there while `n` is zero.
   struct Bin {
     double smallest = std::numeric_limits<double>::infinity();
     double largest = -std::numeric_limits<double>::infinity();

@@ -24,6 +24,7 @@ struct Figure {
   std::optional<double> truth;    ///< drawn as a dashed line
 };
 
+/// Each function adds one figure to the sheet and returns the HTML of its place on the page.
 class FigureSheet {
  public:
   /// Mean of signal `signal` over time, as a line in a band from its smallest to its largest value.

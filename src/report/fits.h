@@ -10,6 +10,7 @@
 
 namespace imuscope::report {
 
+/// One level of the wavelet variance, shown unit squared; absent is what models.json does not hold.
 struct FitLevel {
   double tau_s = 0.0;
   std::optional<double> value;
@@ -18,6 +19,7 @@ struct FitLevel {
   std::optional<double> fitted;
 };
 
+/// One parameter as shown, unit included; absent is what models.json does not hold.
 struct FitParameter {
   std::string process;
   std::string name;
@@ -33,6 +35,7 @@ struct FitComponent {
   std::vector<double> values;
 };
 
+/// One entry of models.json: the model of one axis in one regime.
 struct Fit {
   std::string imu;
   std::string axis;    ///< "gyro_x"

@@ -19,6 +19,7 @@ enum class Scheduling {
   kIdle,    ///< SCHED_IDLE: runs only when a core has nothing else to do
 };
 
+/// What one thread wishes for; see setup_this_thread().
 struct ThreadPlan {
   std::string name;  ///< shown by top and ps; at most 15 characters, cut beyond
   Scheduling scheduling = Scheduling::kNormal;

@@ -17,6 +17,7 @@ namespace imuscope {
 struct DriveMountings {
   std::filesystem::path run;
   std::vector<std::string> inputs;
+  /// One S-IMU that the drive calibrated, by its name in the configuration.
   struct Study {
     std::string name;
     MountingEstimate estimate;

@@ -66,6 +66,7 @@ struct XsensConfig {
   int bus_size = 0;  ///< devices behind the same Xbus Master
   /// That the device must have; refused otherwise.
   std::optional<std::uint32_t> device_id;
+  /// Settings of the SyncIn input, in the device's own terms; see xsens::SyncIn.
   struct SyncIn {
     std::uint16_t mode = 0;
     std::uint16_t skip = 0;
@@ -133,11 +134,13 @@ struct CsvConfig {
   bool common_clock = true;  ///< false: the file's times are of a clock of its own, brought to the reference
 };
 
+/// What a device of role gnss has beside the rest: the antenna's place in b, and how far its numbers are
+/// believed.
 struct GnssOptions {
-  Vector3 antenna_lever_arm_b_m{};
-  Vector3 position_sd_m{};  ///< north, east, down; where the receiver gives none
-  Vector3 velocity_sd_mps{};
-  double position_sd_floor_m = 0.0;
+  Vector3 antenna_lever_arm_b_m{};   ///< from the R-IMU to the antenna
+  Vector3 position_sd_m{};           ///< north, east, down; where the receiver gives none
+  Vector3 velocity_sd_mps{};         ///< likewise
+  double position_sd_floor_m = 0.0;  ///< of each axis: a receiver that claims less is not believed
   double velocity_sd_floor_mps = 0.0;
   double latency_s = 0.0;  ///< of the stamps, where no UTC brings them to the reference's time
   std::optional<double> geoid_separation_m;  ///< nmea: for receivers that send none
@@ -167,12 +170,14 @@ struct DeviceConfig {
   xsens_can::ItemIds xsens_can_ids = xsens_can::default_ids();  ///< xsens_can
 };
 
+/// [estimator]: which states the filter has.
 struct EstimatorOptions {
   bool paper_states = false;      ///< the paper's six states per S-IMU
   bool navigation = true;         ///< R-IMU/GNSS navigation; needs a gnss device
   int differentiator_points = 5;  ///< of the reference: 5, 7, 9 or 11
 };
 
+/// [noise]: which models are fitted to the error process, live how often, and whether the filter uses them.
 struct NoiseOptions {
   std::string model = "WN+2*GM";
   double refit_interval_s = 60.0;
@@ -183,6 +188,8 @@ struct NoiseOptions {
 /// What the regimes of a study are, see regimes/.
 enum class RegimesBy : std::uint8_t { kMotion, kIntensity, kLabels };
 
+/// [regimes]: what a study tells regimes apart by; `intensity`, `bins` and `block_s` count with kIntensity
+/// only.
 struct RegimeOptions {
   RegimesBy by = RegimesBy::kMotion;
   MotionLimits limits;
@@ -192,16 +199,19 @@ struct RegimeOptions {
   double window_s = 20.0;  ///< of the fits that parameters are held against the dynamics with
 };
 
+/// [error_process]: how errors are made comparable between sensors.
 struct ErrorProcessOptions {
   double low_pass_hz = 0.0;  ///< corner of the common low-pass of errors and prediction; 0: none
 };
 
+/// [lcm]: where and under which names results are published.
 struct LcmOptions {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
   std::string channel_prefix = "IMUSCOPE";
   bool bridge = false;  ///< publishes pose_t and ins_t, too
 };
 
+/// [record]: where live runs go.
 struct RecordOptions {
   std::string folder;  ///< where live runs are recorded; relative to the working folder
 };
@@ -212,6 +222,8 @@ struct ThreadOptions {
   std::vector<int> estimator_cores;
 };
 
+/// A whole configuration, checked when it was read. DeviceIndex counts `devices`; the other tables hold their
+/// defaults where the file leaves them out.
 struct Configuration {
   std::string run_name;
   std::filesystem::path file;

@@ -10,6 +10,7 @@
 
 namespace imuscope {
 
+/// One key of the configuration, as the reference shows it.
 struct KeyReference {
   std::string name;    ///< with its tables, such as "device.noise.gyro_bias_sd_degps"
   std::string values;  ///< what may stand there

@@ -15,6 +15,7 @@
 
 namespace imuscope {
 
+/// Which run is evaluated, by the folder that its study wrote, and on which outages.
 struct EvaluationRunOptions {
   std::filesystem::path run_dir;
   std::vector<std::string> inputs;      ///< empty: those that run.json names

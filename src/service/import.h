@@ -13,6 +13,7 @@
 
 namespace imuscope {
 
+/// What is imported, and where to.
 struct ImportOptions {
   std::vector<std::string> inputs;                     ///< NAME=FILE of each device
   std::optional<std::filesystem::path> configuration;  ///< absent: drafted from what the files hold
@@ -21,7 +22,9 @@ struct ImportOptions {
   std::function<void(double)> progress;                ///< share of the bytes, 0 to 1; may be empty
 };
 
+/// What went into the capture, for the person who asked.
 struct Imported {
+  /// What one device contributed, by its name in the configuration.
   struct Device {
     std::string name;
     std::uint64_t reads = 0;

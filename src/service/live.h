@@ -21,6 +21,8 @@ inline constexpr const char* kIoThreadName = "imuscope-io";
 inline constexpr const char* kEstimatorThreadName = "imuscope-est";
 inline constexpr const char* kPublisherThreadName = "imuscope-pub";
 
+/// What the command line adds to the configuration of a live run; without `duration_s` it runs until it is
+/// told to stop.
 struct LiveOptions {
   std::filesystem::path out;  ///< run folder; the capture goes there too
   std::string version;

@@ -28,6 +28,7 @@ struct StateObservability {
   [[nodiscard]] bool reached() const { return observable && sd <= goal; }
 };
 
+/// What is known of one S-IMU's mounting at one moment.
 struct Observability {
   std::array<StateObservability, kObservedStates> states;
   /// The direction of (psi, r) of which least has been learned: "boresight about an axis 30 deg from forward

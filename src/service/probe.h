@@ -14,6 +14,7 @@
 
 namespace imuscope {
 
+/// What was found on one port. Without a protocol only `port` and `problem` say something.
 struct ProbedPort {
   std::string port;
   std::optional<Protocol> protocol;  ///< absent: nothing was understood, `problem` says what was heard

@@ -28,6 +28,7 @@ class MotionWatch {
   bool has_speed_ = false;
 };
 
+/// The regimes of one run, over its whole time.
 struct RunRegimes {
   RegimeTrack motion;  ///< static and dynamic, whatever the regimes of the run are
   RegimeTrack chosen;  ///< what the noise models are fitted by

@@ -58,12 +58,15 @@ struct DeviceResult {
   std::string problem;               ///< decoder_problem(), or that its reads end before the recording does
 };
 
+/// What a replay did: counts by device of the configuration, the cut of tick 0, and the ticks run (skipped
+/// ones do not count).
 struct ReplayResult {
   std::vector<DeviceResult> devices;
   HostTime t0{};
   std::int64_t ticks = 0;
 };
 
+/// How a recording is run through the core; replay() calls the callbacks from its caller's thread.
 struct ReplayOptions {
   bool realtime = false;                 ///< paced as recorded
   std::function<void(double)> progress;  ///< share of the bytes read, 0 to 1; called now and then

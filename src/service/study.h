@@ -18,6 +18,7 @@
 
 namespace imuscope {
 
+/// Where a study writes, and what it is given beside recording and configuration.
 struct StudyRunOptions {
   std::filesystem::path out;
   std::string version;
