@@ -150,7 +150,5 @@ inline constexpr unsigned kStatusGyroClipBit = 11;
 
 /// UTC time, 12 bytes: u32 ns, u16 year, u8 month, day, hour, minute, second, flags.
 inline constexpr std::size_t kUtcSize = 12;
-/// Date valid, time of day valid, leap seconds resolved.
-inline constexpr std::uint8_t kUtcFullyValid = 0x07;
 
 }  // namespace imuscope::xsens
