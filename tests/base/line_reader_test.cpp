@@ -41,5 +41,29 @@ TEST(LineReader, PassesOverWhatALineHasTooMuch) {
   EXPECT_EQ(line, "next");
 }
 
+TEST(LineReader, GivesWhatTheStandardLibraryGivesForLinesOfEveryLength) {
+  std::string text;
+  for (std::size_t length = 0; length < 1100; ++length) {
+    for (std::size_t i = 0; i < length; ++i) text += static_cast<char>('\v' + (length * 31 + i * 7) % 240);
+    if (length % 5 == 0 && length > 0) text.back() = '\0';
+    text += '\n';
+  }
+  for (const std::string& whole : {text, text + std::string(511, 'e'), text + std::string(1022, 'e')}) {
+    std::istringstream in(whole);
+    std::istringstream same(whole);
+    std::string line;
+    std::string expected;
+    std::uint64_t passed = 0;
+    while (std::getline(same, expected)) {
+      ASSERT_TRUE(read_line(in, line, 2000, passed));
+      ASSERT_EQ(line, expected);
+      ASSERT_EQ(in.eof(), same.eof());
+    }
+    EXPECT_FALSE(read_line(in, line, 2000, passed));
+    EXPECT_TRUE(in.eof());
+    EXPECT_EQ(passed, whole.size());
+  }
+}
+
 }  // namespace
 }  // namespace imuscope
