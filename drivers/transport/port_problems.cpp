@@ -41,12 +41,21 @@ std::string process_name(const fs::path& process) {
   return name.empty() ? "?" : name;
 }
 
+bool is_same_file(const std::string& one, const std::string& other) {
+  struct stat a {};
+  struct stat b {};
+  return stat(one.c_str(), &a) == 0 && stat(other.c_str(), &b) == 0 && a.st_dev == b.st_dev &&
+         a.st_ino == b.st_ino;
+}
+
 /// Processes that have the file open, as "1234 (name)"; only those that this user may look into.
 std::vector<std::string> holders(const std::string& path) {
   std::vector<std::string> found;
   std::error_code ignored;
   const fs::path real = fs::canonical(path, ignored);
   const std::string self = std::to_string(getpid());
+  // Every root that has its own /dev/pts counts pseudo-terminals anew: there, a name alone says little.
+  const bool is_pseudo = real.parent_path() == "/dev/pts";
   bool own = false;
   for (const std::string& process : entries("/proc", "")) {
     const std::string pid = fs::path(process).filename().string();
@@ -54,6 +63,7 @@ std::vector<std::string> holders(const std::string& path) {
     for (const std::string& fd : entries(process + "/fd", "")) {
       std::error_code unreadable;
       if (fs::read_symlink(fd, unreadable) != real) continue;
+      if (is_pseudo && !is_same_file(fd, real)) continue;
       if (pid != self) found.push_back(fmt::format("{} ({})", pid, process_name(process)));
       own = own || pid == self;
       break;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <optional>
 
 #include "base/units.h"
@@ -106,7 +107,8 @@ class Gatherer final : public CoreSink {
     return after->time + (fix.utc - after->utc);
   }
 
-  std::vector<std::vector<StudySample>> samples;
+  /// Of each study; without the spare room that a growing vector has for as much again.
+  std::vector<std::deque<StudySample>> samples;
   std::vector<Fix> fixes;
   std::vector<Tag> tags;
   HostTime first_reference_time{};
@@ -152,7 +154,7 @@ Result<std::vector<TrajectoryRow>> read_trajectory(const std::filesystem::path& 
 
 /// The trajectory at the S-IMU's place. The Earth's rate through the lever arm (below 0.1 mm/s) is left out.
 std::vector<DriveReference> at_study(const std::vector<TrajectoryRow>& rows, const KnownMounting& mounting,
-                                     const std::vector<Gatherer::StudySample>& samples, HostTime origin) {
+                                     const std::deque<Gatherer::StudySample>& samples, HostTime origin) {
   const Vector3d r_bs_b = vector(mounting.r_bs_b_m);
   const Matrix3d C_b_s = matrix(mounting.C_b_s);
   std::vector<DriveReference> reference;
@@ -191,7 +193,7 @@ std::vector<DriveFix> drive_fixes(const Gatherer& gathered, const GnssConfig& co
   return fixes;
 }
 
-std::vector<DriveSample> drive_samples(const std::vector<Gatherer::StudySample>& samples,
+std::vector<DriveSample> drive_samples(const std::deque<Gatherer::StudySample>& samples,
                                        const KnownMounting& mounting, HostTime origin) {
   const Vector3d gyro_gain = Vector3d::Ones() + vector(mounting.gyro_scale);
   const Vector3d accel_gain = Vector3d::Ones() + vector(mounting.accel_scale);
@@ -252,8 +254,9 @@ Result<std::vector<StudyDrive>> evaluation_drives(const OpenedRecording& opened,
 
   std::vector<StudyDrive> drives;
   for (const FoundMounting& study : found) {
-    if (!gathered.samples[study.study].empty())
-      drives.push_back(study_drive(gathered, study, *rows, estimator));
+    auto& samples = gathered.samples[study.study];
+    if (!samples.empty()) drives.push_back(study_drive(gathered, study, *rows, estimator));
+    samples = {};
   }
   return drives;
 }

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <pty.h>
+#include <sched.h>
 #include <sys/ioctl.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <termios.h>
@@ -150,6 +152,40 @@ TEST_F(SerialPortTest, ABusyPortNamesTheProgramThatHoldsItAndItsNumber) {
       << second.error().what;
   EXPECT_NE(second.error().remedy.find("stop that program"), std::string::npos);
   EXPECT_EQ(second.error().text().find('\n'), std::string::npos);
+  close(ready[0]);
+  close(ready[1]);
+}
+
+TEST_F(SerialPortTest, APseudoTerminalOfAnotherRootWithTheSameNameIsAnotherPort) {
+  const auto name = std::filesystem::canonical(name_);
+  std::array<int, 2> ready{};
+  ASSERT_EQ(pipe(ready.data()), 0);
+  const OtherProcess elsewhere([&] {
+    char answer = 'n';
+    if (unshare(CLONE_NEWNS) != 0 || mount("", "/", "", MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        mount("devpts", "/dev/pts", "devpts", 0, "newinstance,ptmxmode=0666") != 0) {
+      answer = '-';
+    } else {
+      // Numbers are given in order.
+      while (answer == 'n' && open("/dev/pts/ptmx", O_RDWR | O_NOCTTY) >= 0) {
+        if (std::filesystem::exists(name)) answer = open(name.c_str(), O_RDWR | O_NOCTTY) >= 0 ? 'y' : 'u';
+        for (int on = 0, fd = 0; fd < 256; ++fd) (void)ioctl(fd, TIOCSPTLCK, &on);
+      }
+      if (answer == 'u') answer = open(name.c_str(), O_RDWR | O_NOCTTY) >= 0 ? 'y' : 'n';
+    }
+    if (write(ready[1], &answer, 1) == 1) pause();
+    return false;
+  });
+  char answer = 0;
+  ASSERT_EQ(read(ready[0], &answer, 1), 1);
+  if (answer == '-') GTEST_SKIP() << "mounting needs root";
+  ASSERT_EQ(answer, 'y');
+  const auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  const auto second = SerialPort::open(settings_);
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().what.find("in use by process this program"), std::string::npos)
+      << second.error().what;
   close(ready[0]);
   close(ready[1]);
 }
