@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <optional>
 
 #include "base/units.h"
@@ -51,16 +50,73 @@ std::vector<FoundMounting> found_mountings(const Configuration& configuration, c
   return found;
 }
 
+/// One row of navigation.csv.
+struct TrajectoryRow {
+  double time_s;
+  NavigationState state;  ///< of b
+  KinematicVector sd;
+};
+
+/// Makes one S-IMU's drive of its epochs as they come, so that nothing is held that the drive does not need.
+class StudyDriveMaker {
+ public:
+  StudyDriveMaker(const FoundMounting& found, const std::vector<TrajectoryRow>& rows,
+                  const Vector3d& r_ba_b_m)
+      : rows_(rows),
+        C_b_s_(matrix(found.mounting.C_b_s)),
+        r_bs_b_m_(vector(found.mounting.r_bs_b_m)),
+        gyro_gain_(Vector3d::Ones() + vector(found.mounting.gyro_scale)),
+        accel_gain_(Vector3d::Ones() + vector(found.mounting.accel_scale)) {
+    made_.name = found.name;
+    made_.drive.r_sa_s_m = C_b_s_ * (r_ba_b_m - r_bs_b_m_);
+  }
+
+  void add(const StudyEpoch& epoch, HostTime origin) {
+    const HostTime shown = epoch.time + from_seconds(epoch.t_d_s);  // the motion's instant
+    const double time_s = to_seconds(shown - origin);
+    for (; next_row_ < rows_.size() && origin + from_seconds(rows_[next_row_].time_s) <= shown; ++next_row_)
+      made_.drive.reference.push_back(at_study(rows_[next_row_], vector(epoch.omega_ib_b_radps)));
+    if (made_.regimes.empty() || made_.regimes.back().second != epoch.regime)
+      made_.regimes.emplace_back(time_s, epoch.regime);
+    if (!is_whole(epoch.sample.flags)) return;
+    made_.drive.samples.push_back({time_s,
+                                   {vector(epoch.sample.omega_radps).cwiseQuotient(gyro_gain_),
+                                    vector(epoch.sample.f_mps2).cwiseQuotient(accel_gain_)}});
+  }
+
+  [[nodiscard]] StudyDrive& made() noexcept { return made_; }
+
+ private:
+  /// Neither triad missing nor at the end of its range.
+  static bool is_whole(std::uint32_t flags) noexcept {
+    constexpr std::uint32_t kBoth = kGyroValid | kAccelValid;
+    constexpr std::uint32_t kClipped =
+        kGyroClipX | kGyroClipY | kGyroClipZ | kAccelClipX | kAccelClipY | kAccelClipZ;
+    return (flags & kBoth) == kBoth && (flags & kClipped) == 0;
+  }
+
+  /// The trajectory at the S-IMU's place. The Earth's rate through the lever arm (below 0.1 mm/s) is left
+  /// out.
+  [[nodiscard]] DriveReference at_study(const TrajectoryRow& row, const Vector3d& omega_ib_b_radps) const {
+    DriveReference at{row.time_s, row.state, row.sd};
+    at.state.position = displaced(row.state.position, row.state.C_b_n * r_bs_b_m_);
+    at.state.v_n_mps += row.state.C_b_n * omega_ib_b_radps.cross(r_bs_b_m_);
+    at.state.C_b_n = row.state.C_b_n * C_b_s_.transpose();
+    return at;
+  }
+
+  const std::vector<TrajectoryRow>& rows_;
+  Matrix3d C_b_s_;
+  Vector3d r_bs_b_m_;
+  Vector3d gyro_gain_;
+  Vector3d accel_gain_;
+  std::size_t next_row_ = 0;
+  StudyDrive made_;
+};
+
 /// Everything that one replay yields.
 class Gatherer final : public CoreSink {
  public:
-  struct StudySample {
-    HostTime shown;  ///< instant of the motion
-    InertialRates measured;
-    Vector3d omega_ib_b;
-    Regime regime;
-    bool whole;  ///< neither triad missing nor at the end of its range
-  };
   struct Fix {
     HostTime time;
     UtcTime utc;
@@ -72,19 +128,11 @@ class Gatherer final : public CoreSink {
     HostTime time;
   };
 
-  explicit Gatherer(std::size_t n_studies) : samples(n_studies) {}
+  explicit Gatherer(std::size_t n_studies) : makers(n_studies) {}
 
   void on_epoch(const StudyEpoch& epoch, HostTime first_reference) noexcept override {
     first_reference_time = first_reference;
-    constexpr std::uint32_t kBoth = kGyroValid | kAccelValid;
-    constexpr std::uint32_t kClipped =
-        kGyroClipX | kGyroClipY | kGyroClipZ | kAccelClipX | kAccelClipY | kAccelClipZ;
-    const std::uint32_t flags = epoch.sample.flags;
-    samples[epoch.study].push_back({epoch.time + from_seconds(epoch.t_d_s),
-                                    {vector(epoch.sample.omega_radps), vector(epoch.sample.f_mps2)},
-                                    vector(epoch.omega_ib_b_radps),
-                                    epoch.regime,
-                                    (flags & kBoth) == kBoth && (flags & kClipped) == 0});
+    if (makers[epoch.study]) makers[epoch.study]->add(epoch, first_reference);
   }
   void on_error(const ErrorRecord&) noexcept override {}
   void on_event(const EstimatorEvent&) noexcept override {}
@@ -107,18 +155,10 @@ class Gatherer final : public CoreSink {
     return after->time + (fix.utc - after->utc);
   }
 
-  /// Of each study; without the spare room that a growing vector has for as much again.
-  std::vector<std::deque<StudySample>> samples;
+  std::vector<std::optional<StudyDriveMaker>> makers;  ///< by study; those that were calibrated
   std::vector<Fix> fixes;
   std::vector<Tag> tags;
   HostTime first_reference_time{};
-};
-
-/// One row of navigation.csv.
-struct TrajectoryRow {
-  double time_s;
-  NavigationState state;  ///< of b
-  KinematicVector sd;
 };
 
 Result<std::vector<TrajectoryRow>> read_trajectory(const std::filesystem::path& run_dir) {
@@ -152,26 +192,6 @@ Result<std::vector<TrajectoryRow>> read_trajectory(const std::filesystem::path& 
   return rows;
 }
 
-/// The trajectory at the S-IMU's place. The Earth's rate through the lever arm (below 0.1 mm/s) is left out.
-std::vector<DriveReference> at_study(const std::vector<TrajectoryRow>& rows, const KnownMounting& mounting,
-                                     const std::deque<Gatherer::StudySample>& samples, HostTime origin) {
-  const Vector3d r_bs_b = vector(mounting.r_bs_b_m);
-  const Matrix3d C_b_s = matrix(mounting.C_b_s);
-  std::vector<DriveReference> reference;
-  auto sample = samples.begin();
-  for (const TrajectoryRow& row : rows) {
-    const HostTime time = origin + from_seconds(row.time_s);
-    while (sample != samples.end() && sample->shown < time) ++sample;
-    if (sample == samples.end()) break;
-    DriveReference at{row.time_s, row.state, row.sd};
-    at.state.position = displaced(row.state.position, row.state.C_b_n * r_bs_b);
-    at.state.v_n_mps += row.state.C_b_n * sample->omega_ib_b.cross(r_bs_b);
-    at.state.C_b_n = row.state.C_b_n * C_b_s.transpose();
-    reference.push_back(at);
-  }
-  return reference;
-}
-
 std::vector<DriveFix> drive_fixes(const Gatherer& gathered, const GnssConfig& config) {
   std::vector<DriveFix> fixes;
   double last_s = -std::numeric_limits<double>::infinity();
@@ -193,39 +213,6 @@ std::vector<DriveFix> drive_fixes(const Gatherer& gathered, const GnssConfig& co
   return fixes;
 }
 
-std::vector<DriveSample> drive_samples(const std::deque<Gatherer::StudySample>& samples,
-                                       const KnownMounting& mounting, HostTime origin) {
-  const Vector3d gyro_gain = Vector3d::Ones() + vector(mounting.gyro_scale);
-  const Vector3d accel_gain = Vector3d::Ones() + vector(mounting.accel_scale);
-  std::vector<DriveSample> out;
-  out.reserve(samples.size());
-  for (const auto& sample : samples) {
-    if (!sample.whole) continue;
-    out.push_back({to_seconds(sample.shown - origin),
-                   {sample.measured.omega_ib_b_radps.cwiseQuotient(gyro_gain),
-                    sample.measured.f_b_mps2.cwiseQuotient(accel_gain)}});
-  }
-  return out;
-}
-
-StudyDrive study_drive(const Gatherer& gathered, const FoundMounting& found,
-                       const std::vector<TrajectoryRow>& rows, const EstimatorConfig& estimator) {
-  const HostTime origin = gathered.first_reference_time;
-  const auto& samples = gathered.samples[found.study];
-  StudyDrive out;
-  out.name = found.name;
-  out.drive.samples = drive_samples(samples, found.mounting, origin);
-  out.drive.fixes = drive_fixes(gathered, estimator.gnss);
-  out.drive.reference = at_study(rows, found.mounting, samples, origin);
-  out.drive.r_sa_s_m = matrix(found.mounting.C_b_s) *
-                       (vector(estimator.gnss.antenna_lever_arm_b_m) - vector(found.mounting.r_bs_b_m));
-  for (const auto& sample : samples) {
-    if (out.regimes.empty() || out.regimes.back().second != sample.regime)
-      out.regimes.emplace_back(to_seconds(sample.shown - origin), sample.regime);
-  }
-  return out;
-}
-
 }  // namespace
 
 Result<std::vector<StudyDrive>> evaluation_drives(const OpenedRecording& opened,
@@ -243,6 +230,8 @@ Result<std::vector<StudyDrive>> evaluation_drives(const OpenedRecording& opened,
     estimator.studies[study.study] = with_mounting(estimator.studies[study.study], study.mounting);
 
   Gatherer gathered(estimator.studies.size());
+  for (const FoundMounting& study : found)
+    gathered.makers[study.study].emplace(study, *rows, vector(estimator.gnss.antenna_lever_arm_b_m));
   ReplayOptions options;
   options.progress = progress;
   const auto reference = static_cast<DeviceIndex>(configuration.reference_index());
@@ -253,10 +242,12 @@ Result<std::vector<StudyDrive>> evaluation_drives(const OpenedRecording& opened,
   if (!replayed) return tl::unexpected<Error>(replayed.error());
 
   std::vector<StudyDrive> drives;
+  const auto fixes = drive_fixes(gathered, estimator.gnss);
   for (const FoundMounting& study : found) {
-    auto& samples = gathered.samples[study.study];
-    if (!samples.empty()) drives.push_back(study_drive(gathered, study, *rows, estimator));
-    samples = {};
+    StudyDrive& made = gathered.makers[study.study]->made();
+    if (made.regimes.empty()) continue;  // no epoch came
+    made.drive.fixes = fixes;
+    drives.push_back(std::move(made));
   }
   return drives;
 }
