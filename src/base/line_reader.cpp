@@ -8,8 +8,7 @@ namespace imuscope {
 bool read_line(std::istream& in, std::string& line, std::size_t longest, std::uint64_t& passed) {
   line.clear();
   std::uint64_t taken = 0;
-  // In pieces that the stream's own search for the line's end fills: letter by letter it takes four times as
-  // long.
+  // In pieces that the stream's own search for the line's end fills: letter by letter it takes far longer.
   std::array<char, 512> piece;
   while (in.good()) {
     in.getline(piece.data(), piece.size());

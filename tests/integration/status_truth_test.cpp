@@ -47,7 +47,7 @@ at_s = 76.0
 for_s = 6.0
 share = 0.1
 )";
-// Of the test with longer ones, which nothing of the first could make certain.
+// Of the second test: long enough to fill the rings, which the first must not.
 constexpr seconds kHeldLongAt{20};
 constexpr seconds kHeldLong{13};
 constexpr seconds kDiskAt{36};
@@ -55,18 +55,12 @@ constexpr seconds kDisk{10};
 constexpr seconds kLongRun{50};
 constexpr double kSkew_ppm = 200.0;
 constexpr double kStall_s = 2.0;
-constexpr const char* kLongDamage = R"(
-[[fault]]
-kind = "clock_skew"
-device = "mtx2"
-at_s = 0.0
-ppm = 200.0
-[[fault]]
-kind = "stall"
-device = "airins"
-at_s = 74.0
-for_s = 2.0
-)";
+std::string long_damage() {
+  return "[[fault]]\nkind = \"clock_skew\"\ndevice = \"mtx2\"\nat_s = 0.0\nppm = " +
+         std::to_string(kSkew_ppm) +
+         "\n[[fault]]\nkind = \"stall\"\ndevice = \"airins\"\nat_s = 74.0\nfor_s = " +
+         std::to_string(kStall_s) + "\n";
+}
 constexpr double kWallTolerance_s = 2.0;
 constexpr const char* kSimulatedStart = "2021-06-01T12:00:00";
 constexpr double kSimulatedUtc_s = 1622548800.0;  // date -u -d 2021-06-01T12:00:00Z +%s
@@ -518,7 +512,7 @@ TEST_F(StatusTruth, EveryFieldIsWhatOthersKnow) {
 
 TEST_F(StatusTruth, WhatCameTooLateWasRefusedOrNotRecordedIsCounted) {
   ASSERT_NO_FATAL_FAILURE(
-      run(kLongDamage, {{kHeldLongAt, kHeldLong, 'e'}, {kDiskAt, kDisk, 'r'}}, kDiskAt + kDisk, kLongRun));
+      run(long_damage(), {{kHeldLongAt, kHeldLong, 'e'}, {kDiskAt, kDisk, 'r'}}, kDiskAt + kDisk, kLongRun));
   SCOPED_TRACE(read_text(folder_ / "imuscope.log"));
   ASSERT_GT(heard_.size(), 30U);
   check_late();

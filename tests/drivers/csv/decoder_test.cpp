@@ -222,13 +222,17 @@ TEST(CsvImu, ALineWithoutEndIsGivenUpInBoundedMemory) {
   EXPECT_NE(describe(decoder.error()).find("line 3: the line is longer"), std::string::npos);
 }
 
-TEST(CsvGnss, ARowWithEverythingBecomesASolution) {
+GnssConfig every_column() {
   GnssConfig config;
   config.velocity_columns = {"vn", "ve", "vd"};
   config.position_sd_columns = {"sn", "se", "sd"};
   config.velocity_sd_columns = {"svn", "sve", "svd"};
   config.solution_column = "Q";
-  GnssDecoder decoder(config);
+  return config;
+}
+
+TEST(CsvGnss, ARowWithEverythingBecomesASolution) {
+  GnssDecoder decoder(every_column());
   const auto samples = decode(decoder,
                               "t_s,lat_deg,lon_deg,height_m,vn,ve,vd,sn,se,sd,svn,sve,svd,Q\n"
                               "0.0,45,270,100,1,2,3,0.1,0.2,0.3,0.4,0.5,0.6,2\n"
@@ -275,12 +279,7 @@ TEST(CsvGnss, APlaceThatCannotBeIsAMistake) {
 }
 
 TEST(CsvGnss, StandardDeviationsThatAreNotPositiveAndSolutionsThatAreInNoListAreNone) {
-  GnssConfig config;
-  config.velocity_columns = {"vn", "ve", "vd"};
-  config.position_sd_columns = {"sn", "se", "sd"};
-  config.velocity_sd_columns = {"svn", "sve", "svd"};
-  config.solution_column = "Q";
-  GnssDecoder decoder(config);
+  GnssDecoder decoder(every_column());
   const auto samples = decode(decoder,
                               "t_s,lat_deg,lon_deg,height_m,vn,ve,vd,sn,se,sd,svn,sve,svd,Q\n"
                               "0.0,45,5,100,1,2,3,0.1,0,0.3,0.4,0.5,-0.6,1\n"
