@@ -11,7 +11,6 @@
 namespace imuscope::rtklib_pos {
 namespace {
 
-constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kJstMinusUtcNs = 9 * 3600 * kNsPerSecond;
 constexpr double kGapPeriods = 1.5;
 /// Coordinates nearer to the centre of the Earth are none.

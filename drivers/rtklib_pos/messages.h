@@ -10,6 +10,8 @@
 
 namespace imuscope::rtklib_pos {
 
+inline constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+
 enum class TimeSystem : std::uint8_t { kGpst, kUtc, kJst };
 enum class Layout : std::uint8_t {
   kLlh,     ///< latitude, longitude in degrees, height

@@ -60,14 +60,14 @@ std::vector<can_filter> filters_of(const std::vector<CanId>& ids) {
 }
 
 template <typename T>
-bool set_option(int fd, int level, int option, const T& value) noexcept {
+bool set_can_option(int fd, int level, int option, const T& value) noexcept {
   return setsockopt(fd, level, option, &value, sizeof value) == 0;
 }
 
 /// @return what the kernel granted; it counts its own overhead, so that it grants twice what is asked for
 int grow_receive_buffer(int fd, int wanted_bytes) noexcept {
-  if (!set_option(fd, SOL_SOCKET, SO_RCVBUFFORCE, wanted_bytes)) {
-    (void)set_option(fd, SOL_SOCKET, SO_RCVBUF, wanted_bytes);
+  if (!set_can_option(fd, SOL_SOCKET, SO_RCVBUFFORCE, wanted_bytes)) {
+    (void)set_can_option(fd, SOL_SOCKET, SO_RCVBUF, wanted_bytes);
   }
   int granted = 0;
   socklen_t size = sizeof granted;
@@ -142,10 +142,10 @@ Result<void> CanSocket::set_up(const CanSettings& settings) {
   address.can_family = AF_CAN;
   address.can_ifindex = static_cast<int>(if_nametoindex(settings.interface.c_str()));
   const bool good = setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), filter_bytes) == 0 &&
-                    set_option(fd_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, kAllErrors) &&
-                    set_option(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, kOn) &&
-                    set_option(fd_, SOL_SOCKET, SO_TIMESTAMPING, kStamps) &&
-                    set_option(fd_, SOL_SOCKET, SO_RXQ_OVFL, kOn) &&
+                    set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, kAllErrors) &&
+                    set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, kOn) &&
+                    set_can_option(fd_, SOL_SOCKET, SO_TIMESTAMPING, kStamps) &&
+                    set_can_option(fd_, SOL_SOCKET, SO_RXQ_OVFL, kOn) &&
                     bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   if (!good) {
     return work_error(fmt::format("{} cannot be listened to: {}", settings.interface, std::strerror(errno)),

@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kUnitTolerance = 1e-3;
 // Ranges of an MTx on a vehicle, wide.
-constexpr double kForceMin_mps2 = 0.5;
-constexpr double kForceMax_mps2 = 200.0;
-constexpr double kRateMax_radps = 40.0;
+constexpr double kOrdinaryForceMin_mps2 = 0.5;
+constexpr double kOrdinaryForceMax_mps2 = 200.0;
+constexpr double kOrdinaryRateMax_radps = 40.0;
 constexpr double kFieldMin_au = 0.05;
 constexpr double kFieldMax_au = 10.0;
 constexpr double kVelocityMax_mps = 200.0;
@@ -91,9 +91,10 @@ std::optional<double> score(const MtData& m) {
   };
   check(Field::kAcceleration,
         is_measured(m.acceleration_mps2) &&
-            is_within(norm(m.acceleration_mps2), kForceMin_mps2, kForceMax_mps2),
+            is_within(norm(m.acceleration_mps2), kOrdinaryForceMin_mps2, kOrdinaryForceMax_mps2),
         kForcePlausible);
-  check(Field::kRate, is_measured(m.rate_radps) && norm(m.rate_radps) < kRateMax_radps, kRatePlausible);
+  check(Field::kRate, is_measured(m.rate_radps) && norm(m.rate_radps) < kOrdinaryRateMax_radps,
+        kRatePlausible);
   check(Field::kMagneticField,
         is_measured(m.field_au) && is_within(norm(m.field_au), kFieldMin_au, kFieldMax_au));
   check(Field::kTemperature,

@@ -11,8 +11,6 @@
 namespace imusim {
 namespace {
 
-/// From power to the first position, satellites and ambiguities included.
-constexpr double kWarmStart_s = 20.0;
 constexpr std::array<std::string_view, 4> kSentences = {"GGA", "GST", "RMC", "ZDA"};
 
 }  // namespace

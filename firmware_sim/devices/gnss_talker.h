@@ -15,6 +15,9 @@
 
 namespace imusim {
 
+/// From power to the first position, satellites and ambiguities included.
+inline constexpr double kWarmStart_s = 20.0;
+
 class GnssTalker : public Device {
  public:
   enum class Language { kNmea, kUbx, kRtklib };

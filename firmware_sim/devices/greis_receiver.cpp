@@ -13,9 +13,7 @@
 namespace imusim {
 namespace {
 
-constexpr double kAnswerDelay_s = 0.005;
-/// From power to the first position, satellites and ambiguities included.
-constexpr double kWarmStart_s = 20.0;
+constexpr double kReceiverAnswerDelay_s = 0.005;
 constexpr std::array<std::string_view, 8> kKnown = {"RT", "RD", "ST", "PG", "VG", "SG", "DP", "ET"};
 
 /// Reply and error messages have no checksum.
@@ -85,9 +83,9 @@ void GreisReceiver::handle(std::string line, double t_s) {
   else
     understood = command == "set" || command.empty();
   if (!understood) {
-    replies_.push_back({t_s + kAnswerDelay_s, text_reply("ER", prefix + "{4,wrong command}")});
+    replies_.push_back({t_s + kReceiverAnswerDelay_s, text_reply("ER", prefix + "{4,wrong command}")});
   } else if (!prefix.empty()) {
-    replies_.push_back({t_s + kAnswerDelay_s, text_reply("RE", prefix)});
+    replies_.push_back({t_s + kReceiverAnswerDelay_s, text_reply("RE", prefix)});
   }
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kTick_s = 1e-4;
 /// From power to the first telegram.
-constexpr double kBoot_s = 5.0;
+constexpr double kReferenceBoot_s = 5.0;
 
 using stdbin::Telegram;
 
@@ -44,7 +44,7 @@ StdbinUnit::StdbinUnit(const Options& options, Sampler sampler)
 void StdbinUnit::skip_to(double t_s) { next_index_ = std::max(next_index_, grid_.first_from(t_s)); }
 
 void StdbinUnit::power_cycle(double t_s, double off_s) {
-  const double up_s = t_s + off_s + kBoot_s;
+  const double up_s = t_s + off_s + kReferenceBoot_s;
   skip_to(up_s);
   counted_from_ = next_index_;
   options_.first_counter = 0;

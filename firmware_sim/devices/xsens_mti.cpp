@@ -13,14 +13,10 @@ using namespace xsens;
 constexpr std::uint16_t kBaseRate_hz = 400;
 constexpr std::uint16_t kGnssRate_hz = 4;
 constexpr std::uint16_t kEveryMessage = 0xFFFF;
-constexpr double kAnswerDelay_s = 0.003;
 constexpr std::size_t kOutputsMax = 32;
 constexpr std::size_t kEntrySize = 4;
 constexpr std::uint32_t kTicksPerDay = 864'000'000;
 constexpr double kTicksPerSecond = 10'000.0;
-constexpr std::uint8_t kErrorMessage = 0x04;
-constexpr std::uint8_t kErrorBaudrate = 0x20;
-constexpr std::uint8_t kErrorParameter = 0x21;
 
 // Items; the low nibble is the number format and the frame.
 constexpr std::uint16_t kFormatMask = 0x000F;

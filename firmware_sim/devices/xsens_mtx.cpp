@@ -10,19 +10,10 @@ namespace {
 
 using namespace xsens;
 
-constexpr double kPeriodTicksPerSecond = 115200.0;
-constexpr std::uint16_t kPeriodFastest = 225;    // 512 Hz
-constexpr std::uint16_t kPeriodSlowest = 11520;  // 10 Hz
-// Time the firmware takes to answer a command.
-constexpr double kAnswerDelay_s = 0.003;
 // A device has room for one message beside the one that it is sending.
 constexpr double kMessagesInHand = 1.0;
 constexpr double kBitsPerByte = 10.0;
 
-constexpr std::uint8_t kErrorPeriod = 0x03;
-constexpr std::uint8_t kErrorMessage = 0x04;
-constexpr std::uint8_t kErrorBaudrate = 0x20;
-constexpr std::uint8_t kErrorParameter = 0x21;
 constexpr std::uint8_t kErrorTimerOverflow = 0x1E;
 // Error modes: from the first on, an Error message is sent; from the second on, measuring ends too.
 constexpr std::uint16_t kErrorModeMessage = 2;

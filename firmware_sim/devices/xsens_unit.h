@@ -18,6 +18,24 @@
 
 namespace imusim {
 
+namespace xsens {
+
+/// Codes of an Error message (MT0101P).
+inline constexpr std::uint8_t kErrorPeriod = 0x03;
+inline constexpr std::uint8_t kErrorMessage = 0x04;
+inline constexpr std::uint8_t kErrorBaudrate = 0x20;
+inline constexpr std::uint8_t kErrorParameter = 0x21;
+
+/// A sampling period counts these (MT0101P).
+inline constexpr double kPeriodTicksPerSecond = 115200.0;
+inline constexpr std::uint16_t kPeriodFastest = 225;    ///< 512 Hz
+inline constexpr std::uint16_t kPeriodSlowest = 11520;  ///< 10 Hz
+
+/// Time that the firmware of a single device takes to answer a command.
+inline constexpr double kAnswerDelay_s = 0.003;
+
+}  // namespace xsens
+
 class XsensUnit : public Device {
  public:
   enum class State { kOff, kWaking, kConfig, kMeasurement };

@@ -9,16 +9,10 @@ namespace {
 
 using namespace xsens;
 
-constexpr double kPeriodTicksPerSecond = 115200.0;
-constexpr std::uint16_t kPeriodFastest = 225;    // 512 Hz
-constexpr std::uint16_t kPeriodSlowest = 11520;  // 10 Hz
-constexpr double kAnswerDelay_s = 0.005;         // a question to the bus takes its time
+constexpr double kBusAnswerDelay_s = 0.005;  // a question to the bus takes its time
 constexpr std::uint8_t kHeadBid = 0xFF;
 constexpr std::uint8_t kBusPower = 0x08;
 constexpr std::uint8_t kErrorNoBus = 0x01;
-constexpr std::uint8_t kErrorPeriod = 0x03;
-constexpr std::uint8_t kErrorMessage = 0x04;
-constexpr std::uint8_t kErrorParameter = 0x21;
 
 }  // namespace
 
@@ -28,7 +22,7 @@ std::uint16_t XsensXbus::BusDevice::data_length() const {
 
 XsensXbus::XsensXbus(const Options& options, Sampler sampler, double power_on_s)
     : XsensUnit({options.first_sample_s, options.period / kPeriodTicksPerSecond, options.clock_skew_ppm},
-                kAnswerDelay_s, power_on_s),
+                kBusAnswerDelay_s, power_on_s),
       options_(options),
       sampler_(std::move(sampler)),
       period_(options.period),

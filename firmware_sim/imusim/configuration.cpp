@@ -12,12 +12,12 @@
 #include <set>
 #include <sstream>
 
+#include "firmware_sim/imusim/degrees.h"
 #include "firmware_sim/imusim/table_reader.h"
 
 namespace imusim {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kSecondsPerHour = 3600.0;
 constexpr double kMps2PerG = 9.80665;
 constexpr double kPercent = 0.01;

@@ -6,12 +6,12 @@
 #include <numbers>
 #include <sstream>
 
+#include "firmware_sim/imusim/degrees.h"
 #include "firmware_sim/imusim/table_reader.h"
 
 namespace imusim {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr double kLongest_s = 86400.0;
 
 /// In the order of FaultKind.

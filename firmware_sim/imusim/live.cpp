@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 // As a USB host controller would, the player looks after its ports once a millisecond.
-constexpr std::int64_t kTick_ns = 1'000'000;
+constexpr std::int64_t kLiveTick_ns = 1'000'000;
 
 /// What a program opens: a pseudo-terminal, a connection to a TCP server, or a port that datagrams come to.
 tl::expected<std::unique_ptr<LineEnd>, std::string> open_end(const PlayedDevice& played, int baud) {
@@ -199,7 +199,7 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
       std::min(configuration.scenario.duration_s,
                options.start_s + options.seconds.value_or(configuration.scenario.duration_s));
   const std::int64_t begin_ns = monotonic_ns();
-  for (std::int64_t tick_ns = begin_ns; !stop.load(); tick_ns += kTick_ns) {
+  for (std::int64_t tick_ns = begin_ns; !stop.load(); tick_ns += kLiveTick_ns) {
     sleep_until(tick_ns);
     const double t_s = options.start_s + static_cast<double>(monotonic_ns() - begin_ns) / kNsPerSecond;
     if (t_s > end_s) break;

@@ -9,10 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "firmware_sim/imusim/degrees.h"
+
 namespace imusim {
 namespace {
-
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 using nlohmann::json;
 
@@ -96,11 +96,6 @@ std::string utc_text(Utc utc) {
 }
 
 const char* regime_word(Regime regime) { return regime == Regime::kStatic ? "static" : "dynamic"; }
-
-double wrapped_deg(double angle_rad) {
-  const double angle = std::fmod(angle_rad * kDegPerRad, 360.0);
-  return angle < 0.0 ? angle + 360.0 : angle;
-}
 
 }  // namespace
 

@@ -17,12 +17,12 @@
 #include "firmware_sim/devices/xsens_mtx.h"
 #include "firmware_sim/devices/xsens_xbus.h"
 #include "firmware_sim/faults/faulty_device.h"
+#include "firmware_sim/imusim/degrees.h"
 #include "firmware_sim/imusim/sensor_faults.h"
 
 namespace imusim {
 namespace {
 
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr double kDrawnRotationSd_rad = 2.0 / kDegPerRad;
 constexpr double kDrawnLeverArmSd_m = 0.3;
 constexpr double kClockSkewMax_ppm = 30.0;  // MTx manual: worst case
@@ -46,11 +46,6 @@ Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& vector) {
   const double angle = vector.norm();
   if (angle == 0.0) return Eigen::Matrix3d::Identity();
   return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
-}
-
-double wrapped_deg(double angle_rad) {
-  const double angle = std::fmod(angle_rad * kDegPerRad, 360.0);
-  return angle < 0.0 ? angle + 360.0 : angle;
 }
 
 ImuErrors errors_of(const StudySimulation& study, RegimeSwitch regime_switch, Random& random) {

@@ -7,6 +7,7 @@
 #include "calibration/covariance_watch.h"
 #include "calibration/event_log.h"
 #include "calibration/filter_core.h"
+#include "calibration/finite_imu.h"
 #include "calibration/navigation_filter.h"
 #include "calibration/odometry_filter.h"
 #include "calibration/regime_detector.h"
@@ -24,13 +25,6 @@ constexpr double kGravityWrong_mps2 = -8.0;
 constexpr double kGravityTolerance_mps2 = 0.5;
 /// The covariance's definiteness is looked at this often.
 constexpr Duration kWatchEvery = std::chrono::seconds{1};
-
-bool is_finite(const ImuData& imu) noexcept {
-  bool finite = true;
-  for (std::size_t i = 0; i < 3; ++i)
-    finite = finite && std::isfinite(imu.omega_radps[i]) && std::isfinite(imu.f_mps2[i]);
-  return finite;
-}
 
 void check(const EstimatorConfig& config) {
   IMUSCOPE_EXPECTS(config.studies.size() <= kMaxStudies);

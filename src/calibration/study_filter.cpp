@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "calibration/axis_gate.h"
+#include "calibration/finite_imu.h"
 #include "navigation/so3.h"
 
 namespace imuscope {
@@ -53,7 +54,7 @@ constexpr double kComparableBoresightSd_rad = 1.0 * kRadPerDeg;
 constexpr Duration kBiasSettles = std::chrono::seconds{20};
 /// At rest, for so long, the mean force of a healthy accelerometer differs from gravity by less than this.
 constexpr double kRestForGravity_s = 5.0;
-constexpr double kGravityTolerance_mps2 = 1.0;
+constexpr double kStudyGravityTolerance_mps2 = 1.0;
 
 /// Largest |a - b| in units of the sd of the difference.
 double largest_contradiction(const Vector3& a, const Vector3& sd_a, const Vector3& b, const Vector3& sd_b) {
@@ -64,13 +65,6 @@ double largest_contradiction(const Vector3& a, const Vector3& sd_a, const Vector
 }
 
 double distance(const Vector3& a, const Vector3& b) { return (to_eigen(a) - to_eigen(b)).norm(); }
-
-bool is_finite(const ImuData& imu) noexcept {
-  bool finite = true;
-  for (std::size_t i = 0; i < 3; ++i)
-    finite = finite && std::isfinite(imu.omega_radps[i]) && std::isfinite(imu.f_mps2[i]);
-  return finite;
-}
 
 /// C-17: one process for a constant and a wandering part: the variance of both, and as fast at first as the
 /// wandering one.
@@ -505,7 +499,7 @@ void StudyFilter::watch_gravity(StudyContext& context, const Sample& sample, dou
   if (resting_s_ <= 0.0) return;
   resting_f_ += dt_s / resting_s_ * (to_eigen(sample.imu.f_mps2) - resting_f_);
   if (resting_s_ < kRestForGravity_s) return;
-  if (std::abs(resting_f_.norm() - kNominalGravity_mps2) < kGravityTolerance_mps2) return;
+  if (std::abs(resting_f_.norm() - kNominalGravity_mps2) < kStudyGravityTolerance_mps2) return;
   gravity_told_ = true;
   context.log.add(EstimatorEventKind::kGravityMagnitudeWrong, config_.device, sample.time, resting_f_.norm());
 }

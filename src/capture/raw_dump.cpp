@@ -18,7 +18,7 @@ constexpr std::size_t kBlockBytes = 4096;  // of a dump without arrivals
 constexpr std::size_t kColumns = 3;
 constexpr std::size_t kLongestLine = 256;
 /// No read of a device brings as much at once; a dump that is claimed to be one is given in pieces of this.
-constexpr std::uint64_t kLongestRead = std::uint64_t{1} << 20U;
+constexpr std::uint64_t kLongestPiece = std::uint64_t{1} << 20U;
 
 std::string_view without_line_end(std::string_view line) {
   while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
@@ -136,7 +136,7 @@ std::optional<RawDump::Read> RawDump::next() {
   std::uint64_t wanted = kBlockBytes;
   if (has_arrivals()) {
     if (current_.n_bytes == 0 && !next_arrival()) return std::nullopt;
-    wanted = std::min(current_.n_bytes, kLongestRead);
+    wanted = std::min(current_.n_bytes, kLongestPiece);
     current_.n_bytes -= wanted;
     read.arrival = current_.arrival;
   }

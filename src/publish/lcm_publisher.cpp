@@ -9,11 +9,7 @@
 #include "publish/message_builders.h"
 
 namespace imuscope {
-namespace {
-
-const std::string kUrlRemedy = "write it as " + std::string(kDefaultLcmUrl);
-
-}  // namespace
+namespace {}  // namespace
 
 struct LcmPublisher::Impl {
   Impl(const std::string& url, std::string_view prefix_in) : lcm(url), prefix(prefix_in) {}
@@ -51,7 +47,7 @@ Result<LcmPublisher> LcmPublisher::open(std::string_view url, std::string_view p
   if (const auto checked = check_lcm_url(url); !checked) return tl::unexpected(checked.error());
   auto impl = std::make_unique<Impl>(std::string(url), prefix);
   if (!impl->lcm.good()) {
-    return work_error("LCM could not open " + std::string(url), "check its options; " + kUrlRemedy);
+    return work_error("LCM could not open " + std::string(url), "check its options; " + kLcmUrlRemedy);
   }
   return LcmPublisher(std::move(impl));
 }

@@ -18,8 +18,6 @@ constexpr std::uint16_t kDefaultPort = 7667;
 constexpr std::uint32_t kMulticastMask = 0xf000'0000;  // 224.0.0.0/4
 constexpr std::uint32_t kMulticastPrefix = 0xe000'0000;
 
-const std::string kUrlRemedy = "write it as " + std::string(kDefaultLcmUrl);
-
 /// The socket address of what stands between "udpm://" and '?'; both parts may be left out.
 Result<sockaddr_in> parse_udpm_address(std::string_view url) {
   std::string_view place = url.substr(std::string_view("udpm://").size());
@@ -34,7 +32,7 @@ Result<sockaddr_in> parse_udpm_address(std::string_view url) {
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
     if (error != std::errc() || end != digits.data() + digits.size() || port == 0) {
       return usage_error("LCM URL " + std::string(url) + ": '" + std::string(digits) + "' is not a port",
-                         kUrlRemedy);
+                         kLcmUrlRemedy);
     }
   }
   sockaddr_in socket_address{};
@@ -44,7 +42,7 @@ Result<sockaddr_in> parse_udpm_address(std::string_view url) {
       (ntohl(socket_address.sin_addr.s_addr) & kMulticastMask) != kMulticastPrefix) {
     return usage_error("LCM URL " + std::string(url) + ": '" + address +
                            "' is not a multicast address (224.0.0.0 to 239.255.255.255)",
-                       kUrlRemedy);
+                       kLcmUrlRemedy);
   }
   return socket_address;
 }
@@ -82,10 +80,10 @@ Result<void> check_lcm_url(std::string_view url) {
     return usage_error(
         "LCM URL " + std::string(url) +
             ": tcpq cannot be used, its library call aborts the whole process when the server is absent",
-        kUrlRemedy);
+        kLcmUrlRemedy);
   }
   return usage_error("LCM URL " + std::string(url) + ": imuscope speaks udpm:// (network) and file:// (log)",
-                     kUrlRemedy);
+                     kLcmUrlRemedy);
 }
 
 }  // namespace imuscope

@@ -38,12 +38,12 @@ Html odometry_part(const RunFiles& run, FigureSheet& figures) {
                   "quiet, too, and rest was used as zero velocity.",
                   odometry.bin(kScale_percent, last).last, odometry.bin(kSdScale_percent, last).last,
                   duration_words(run.wheels_stood_s), duration_words(run.zero_velocity_s)));
-  const auto& json = field(run.run, "odometry");
+  const auto& wheels = field(run.run, "odometry");
   const auto row = [&](const char* what, const char* used, const char* rejected) {
-    return fmt::format("{}: {} used, {} refused by the gate", what, text_at(json, used),
-                       text_at(json, rejected));
+    return fmt::format("{}: {} used, {} refused by the gate", what, text_at(wheels, used),
+                       text_at(wheels, rejected));
   };
-  if (json.is_object()) {
+  if (wheels.is_object()) {
     part += paragraph(
         fmt::format("{}; {}; {}.", row("Speeds", "speed_used", "speed_rejected"),
                     row("no slip sideways and upwards", "non_holonomic_used", "non_holonomic_rejected"),

@@ -66,8 +66,8 @@ protocol = "can_odometry"
 odometry = { dbc = "vehicle.dbc", speed_signals = ["WHEELS.RL"] }
 )"};
 
-using Sentence = std::pair<std::string_view, std::string_view>;
-constexpr auto kSentences = std::to_array<Sentence>({
+using KeySentence = std::pair<std::string_view, std::string_view>;
+constexpr auto kSentences = std::to_array<KeySentence>({
     {"run.name",
      "What the run is called in its files. Without it: the name of the configuration's file, which is "
      "`reference` on this page."},
@@ -276,7 +276,7 @@ constexpr auto kSentences = std::to_array<Sentence>({
 
 std::string_view sentence_of(const std::string& key) {
   const auto found = std::find_if(kSentences.begin(), kSentences.end(),
-                                  [&](const Sentence& sentence) { return sentence.first == key; });
+                                  [&](const KeySentence& sentence) { return sentence.first == key; });
   return found == kSentences.end() ? std::string_view{} : found->second;
 }
 

@@ -7,10 +7,10 @@
 #include <cerrno>
 #include <cstring>
 #include <future>
-#include <limits>
 #include <optional>
 
 #include "rt/host_clock.h"
+#include "service/latency_window.h"
 
 namespace imuscope {
 
@@ -49,27 +49,6 @@ int wait(int epoll, std::span<epoll_event> events, HostTime until) noexcept {
   const timespec timeout{ns / kNsPerSecond, ns % kNsPerSecond};
   return epoll_pwait2(epoll, events.data(), static_cast<int>(events.size()), &timeout, nullptr);
 }
-
-/// How late the samples of one device came, second by second.
-class LatencyWindow {
- public:
-  void add(HostTime arrival, Duration latency) noexcept {
-    if (arrival - begin_ >= std::chrono::seconds(1)) {
-      if (n_ > 0.0) closed_mean_s_ = sum_s_ / n_;
-      begin_ = arrival;
-      n_ = sum_s_ = 0.0;
-    }
-    sum_s_ += to_seconds(latency);
-    n_ += 1.0;
-  }
-  [[nodiscard]] double mean_s() const noexcept { return closed_mean_s_; }
-
- private:
-  HostTime begin_{};
-  double n_ = 0.0;
-  double sum_s_ = 0.0;
-  double closed_mean_s_ = std::numeric_limits<double>::quiet_NaN();
-};
 
 }  // namespace
 

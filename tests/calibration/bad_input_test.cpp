@@ -21,8 +21,10 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using test::horizontal_error_m;
 using test::SimulatedDrive;
 using test::SimulatedStudy;
+using test::worst_in_sd;
 
 constexpr double kEarthRadius_m = 6.37e6;
 
@@ -65,23 +67,6 @@ bool finite(const StudyOutput& out) {
   for (std::size_t i = 0; i < 3; ++i)
     sum += out.r_bs_b_m[i] + out.gyro_bias_radps[i] + out.accel_bias_mps2[i];
   return std::isfinite(sum);
-}
-
-double worst_in_sd(const StudyOutput& out, const SimulatedStudy& truth) {
-  const Vector3d psi = test::mounting_error_rad(out, truth.C_b_s);
-  double worst = 0.0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    worst = std::max({worst, std::abs(psi(k)) / out.sd_psi_rad[i],
-                      std::abs(truth.r_bs_b_m(k) - out.r_bs_b_m[i]) / out.sd_r_bs_b_m[i]});
-  }
-  return worst;
-}
-
-double horizontal_error_m(const NavigationOutput& out, const imusim::MotionState& truth) {
-  return kEarthRadius_m *
-         std::hypot(out.latitude_rad - truth.position.latitude_rad,
-                    (out.longitude_rad - truth.position.longitude_rad) * std::cos(out.latitude_rad));
 }
 
 TEST(BadInput, TwoSwappedStudiesAreToldByName) {
@@ -395,7 +380,7 @@ struct LeapSecond {
 class Leap : public testing::TestWithParam<LeapSecond> {};
 
 TEST_P(Leap, SecondIsNoticedByNothing) {
-  constexpr UtcTime kMidnight{std::chrono::days{17'167}};  // 2017-01-01
+  static constexpr UtcTime kMidnight{std::chrono::days{17'167}};  // 2017-01-01
   constexpr double kLeap_s = 90.0;
   const auto tag = [](Repeats repeats, double t_s) {
     const double jumps_at_s = repeats == Repeats::kLastSecond ? kLeap_s : kLeap_s + 1.0;

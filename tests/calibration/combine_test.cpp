@@ -15,13 +15,13 @@ using Eigen::Vector3d;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-const Matrix3d kMounting = exp_so3(Vector3d(0.3, -1.2, 2.0));
+const Matrix3d kCombinedMounting = exp_so3(Vector3d(0.3, -1.2, 2.0));
 const Vector3d kLeverArm(0.35, -0.22, 0.12);
 
 MountingEstimate estimate_of(const Vector6& error, const Matrix6& P) {
   MountingEstimate estimate;
   // C_true = C^ Exp(-psi), so C^ = C_true Exp(psi).
-  estimate.C_b_s = to_array(Matrix3d(kMounting * exp_so3(error.head<3>())));
+  estimate.C_b_s = to_array(Matrix3d(kCombinedMounting * exp_so3(error.head<3>())));
   estimate.r_bs_b_m = to_array(Vector3d(kLeverArm - error.tail<3>()));
   Eigen::Map<Matrix6>(estimate.covariance_psi_r.data()) = P;
   return estimate;
@@ -29,7 +29,7 @@ MountingEstimate estimate_of(const Vector6& error, const Matrix6& P) {
 
 Vector6 error_of(const MountingEstimate& estimate) {
   Vector6 error;
-  error.head<3>() = -log_so3(to_eigen(estimate.C_b_s).transpose() * kMounting);
+  error.head<3>() = -log_so3(to_eigen(estimate.C_b_s).transpose() * kCombinedMounting);
   error.tail<3>() = kLeverArm - to_eigen(estimate.r_bs_b_m);
   return error;
 }

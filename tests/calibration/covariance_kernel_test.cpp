@@ -68,10 +68,10 @@ Measurement random_measurement(std::size_t n, const MatrixXd& P, std::mt19937_64
   return m;
 }
 
-using Case = std::tuple<std::size_t, InstructionSet>;
+using KernelCase = std::tuple<std::size_t, InstructionSet>;
 
 /// Skips what this processor cannot run.
-class CovarianceKernelOfDimension : public testing::TestWithParam<Case> {
+class CovarianceKernelOfDimension : public testing::TestWithParam<KernelCase> {
  protected:
   void SetUp() override {
     if (covariance_loops(std::get<1>(GetParam())) == nullptr) GTEST_SKIP() << "not on this processor";

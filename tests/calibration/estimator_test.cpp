@@ -17,25 +17,12 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using test::horizontal_error_m;
 using test::SimulatedDrive;
 using test::SimulatedStudy;
+using test::worst_in_sd;
 
 Vector3d eigen(const Vector3& v) { return {v[0], v[1], v[2]}; }
-
-/// Largest error in sd of boresight and lever arm.
-double worst_in_sd(const StudyOutput& out, const SimulatedStudy& truth) {
-  const Vector3d psi = test::mounting_error_rad(out, truth.C_b_s);
-  const Vector3d r = truth.r_bs_b_m - eigen(out.r_bs_b_m);
-  return std::max(psi.cwiseQuotient(eigen(out.sd_psi_rad)).cwiseAbs().maxCoeff(),
-                  r.cwiseQuotient(eigen(out.sd_r_bs_b_m)).cwiseAbs().maxCoeff());
-}
-
-double horizontal_error_m(const NavigationOutput& out, const imusim::MotionState& truth) {
-  const double north = (out.latitude_rad - truth.position.latitude_rad) * 6.37e6;
-  const double east =
-      (out.longitude_rad - truth.position.longitude_rad) * 6.37e6 * std::cos(out.latitude_rad);
-  return std::hypot(north, east);
-}
 
 bool has_event(const Estimator& estimator, EstimatorEventKind kind) {
   for (const EstimatorEvent& event : estimator.events()) {

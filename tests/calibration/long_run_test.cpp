@@ -15,17 +15,17 @@ namespace {
 constexpr double kRate_hz = 10.0;
 constexpr double kLatitude_rad = 0.8;
 constexpr double kHeight_m = 400.0;
-constexpr DeviceIndex kReference = 0;
-constexpr DeviceIndex kGnss = 1;
+constexpr DeviceIndex kLongReference = 0;
+constexpr DeviceIndex kLongGnss = 1;
 
 /// An unaided vertical channel multiplies an error by e every ten minutes: after eight hours by 10^21. What
 /// the filter has learned must not be carried along like that, or a delayed solution meets its rounding.
 TEST(LongRun, DelayedGnssIsStillAppliedRightlyAfterEightHoursOfStandstill) {
   EstimatorConfig config;
-  config.reference.device = kReference;
+  config.reference.device = kLongReference;
   config.reference.rate_hz = kRate_hz;
   config.gnss.enabled = true;
-  config.gnss.device = kGnss;
+  config.gnss.device = kLongGnss;
   config.navigation.initial_rpy_rad = Vector3{0.0, 0.0, 0.0};
   Estimator estimator(config);
   imusim::Random random(1, "long run");
@@ -36,7 +36,7 @@ TEST(LongRun, DelayedGnssIsStillAppliedRightlyAfterEightHoursOfStandstill) {
     const HostTime now = host_time_from_ns(k * 100'000'000);
     Sample imu{};
     imu.kind = SampleKind::kImu;
-    imu.device = kReference;
+    imu.device = kLongReference;
     imu.sequence = static_cast<std::uint64_t>(k);
     imu.time = imu.arrival = now;
     imu.imu.flags = kGyroValid | kAccelValid;
@@ -48,7 +48,7 @@ TEST(LongRun, DelayedGnssIsStillAppliedRightlyAfterEightHoursOfStandstill) {
     if (k % 10 == 5) {
       Sample gnss{};
       gnss.kind = SampleKind::kGnss;
-      gnss.device = kGnss;
+      gnss.device = kLongGnss;
       gnss.time = now - std::chrono::milliseconds{400};
       gnss.arrival = now;
       gnss.gnss.latitude_rad = kLatitude_rad;

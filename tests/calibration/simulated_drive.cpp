@@ -1,5 +1,6 @@
 #include "tests/calibration/simulated_drive.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -116,6 +117,24 @@ void SimulatedDrive::remount(std::size_t study, const Eigen::Matrix3d& C_b_s) {
 Eigen::Vector3d mounting_error_rad(const StudyOutput& out, const Eigen::Matrix3d& C_b_s_true) {
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(out.C_b_s.data());
   return -log_so3(C.transpose() * C_b_s_true);
+}
+
+double worst_in_sd(const StudyOutput& out, const SimulatedStudy& truth) {
+  const Eigen::Vector3d psi = mounting_error_rad(out, truth.C_b_s);
+  double worst = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    worst = std::max({worst, std::abs(psi(k)) / out.sd_psi_rad[i],
+                      std::abs(truth.r_bs_b_m(k) - out.r_bs_b_m[i]) / out.sd_r_bs_b_m[i]});
+  }
+  return worst;
+}
+
+double horizontal_error_m(const NavigationOutput& out, const imusim::MotionState& truth) {
+  constexpr double kEarthRadius_m = 6.37e6;
+  return kEarthRadius_m *
+         std::hypot(out.latitude_rad - truth.position.latitude_rad,
+                    (out.longitude_rad - truth.position.longitude_rad) * std::cos(out.latitude_rad));
 }
 
 void run(SimulatedDrive& drive, Estimator& estimator, double until_s) {

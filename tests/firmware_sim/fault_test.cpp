@@ -25,7 +25,7 @@ constexpr double kHostBegin_s = 1000.0;
 /// An MTx's frame of calibrated data without a field, with a counter.
 constexpr std::size_t kMtFrame = 31;
 
-Configuration configuration() {
+Configuration plain_configuration() {
   const auto parsed = parse_configuration(R"(
 [[device]]
 name = "ref"
@@ -125,7 +125,7 @@ class FaultScript : public testing::Test {
  protected:
   /// Records with a script, and checks that devices which it does not name send what they send without it.
   std::map<std::string, Stream> with(const std::string& script, const std::set<std::string>& named) {
-    Configuration faulty = configuration();
+    Configuration faulty = plain_configuration();
     const auto parsed = parse_faults(script, "faults.toml", faulty);
     EXPECT_TRUE(parsed) << (parsed ? "" : parsed.error().text);
     const auto recorded = record(faulty, {folder_ / "faulty", false, {}});
@@ -142,7 +142,7 @@ class FaultScript : public testing::Test {
   static const Stream& clean(const std::string& name) {
     static const std::filesystem::path folder = [] {
       std::filesystem::path made = scratch_folder() / "clean";
-      EXPECT_TRUE(record(configuration(), {made, false, {}}));
+      EXPECT_TRUE(record(plain_configuration(), {made, false, {}}));
       return made;
     }();
     static std::map<std::string, Stream> streams;
@@ -150,7 +150,7 @@ class FaultScript : public testing::Test {
     return streams[name];
   }
   static std::string refusal(const std::string& script) {
-    Configuration faulty = configuration();
+    Configuration faulty = plain_configuration();
     const auto parsed = parse_faults(script, "faults.toml", faulty);
     return parsed ? "accepted" : parsed.error().text;
   }
@@ -443,7 +443,7 @@ TEST_F(FaultScript, RefusesWhatCannotBeWithItsPlace) {
             std::string::npos);
   EXPECT_NE(refusal("[[fault]]\nkind = \"stall\"\nat_s = 1\nfro_s = 1\n").find("nearest is 'for_s'"),
             std::string::npos);
-  Configuration faulty = configuration();
+  Configuration faulty = plain_configuration();
   ASSERT_TRUE(parse_faults("[[fault]]\nkind = \"missing\"\nat_s = 1\ndevice = \"ref\"\nblocks = [\"moon\"]\n",
                            "faults.toml", faulty));
   const auto recorded = record(faulty, {folder_ / "refused", false, {}});

@@ -14,11 +14,13 @@
 #include "firmware_sim/imusim/live.h"
 #include "firmware_sim/imusim/record.h"
 #include "firmware_sim/io/pseudo_terminal.h"
+#include "tests/support/file_content.h"
 #include "tests/support/shared_data.h"
 
 namespace imusim {
 namespace {
 
+using imuscope::test::content_of;
 using imuscope::test::scratch_folder;
 
 /// A reference, two S-IMUs (one of them turned and with axes of its own) and a receiver, for 15 s.
@@ -70,13 +72,6 @@ Configuration configuration(const std::string& simulation = "", const std::strin
   const auto parsed = parse_configuration(configuration_text(simulation, folder), "test.toml");
   EXPECT_TRUE(parsed.has_value()) << (parsed ? "" : parsed.error().text);
   return *parsed;
-}
-
-std::string content_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 std::string whole_folder(const std::filesystem::path& folder) {

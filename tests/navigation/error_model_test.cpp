@@ -23,13 +23,13 @@ using Eigen::Vector3d;
 
 constexpr std::array<const char*, 5> kBlockNames{"dr", "dv", "phi", "db_g", "db_a"};
 /// Steps of the central differences: small enough for the third order to vanish, large enough for rounding.
-constexpr std::array<double, 5> kSteps{100.0, 0.1, 1e-4, 1e-3, 1e-3};
+constexpr std::array<double, 5> kStateSteps{100.0, 0.1, 1e-4, 1e-3, 1e-3};
 /// The bound: of the largest entry of a block.
 constexpr double kRelative = 1e-7;
 
 NavigationErrorVector step_along(int column) {
   NavigationErrorVector x = NavigationErrorVector::Zero();
-  x(column) = kSteps[static_cast<std::size_t>(column / 3)];
+  x(column) = kStateSteps[static_cast<std::size_t>(column / 3)];
   return x;
 }
 

@@ -21,7 +21,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 const GeodeticPosition kOrigin{46.52 * kRadPerDeg, 6.57 * kRadPerDeg, 420.0};
-HostTime at(double seconds) { return HostTime{from_seconds(seconds)}; }
+HostTime host_time_at(double seconds) { return HostTime{from_seconds(seconds)}; }
 double heading_error(const Matrix3d& estimate, const Matrix3d& truth) {
   return wrapped_angle(euler_from_rotation(estimate).heading_rad - euler_from_rotation(truth).heading_rad);
 }
@@ -147,15 +147,15 @@ Outcome simulate(unsigned seed, const Simulation& s, Car car) {
   double next_gnss_s = 0.05;
   while (run.car.t < s.duration_s) {
     const InertialRates r = run.car.rates();
-    run.aligner->add_imu(at(run.car.t), {r.omega_ib_b_radps + gyro_bias + random.normal3(gyro_sd),
-                                         r.f_b_mps2 + accel_bias + random.normal3(accel_sd)});
+    run.aligner->add_imu(host_time_at(run.car.t), {r.omega_ib_b_radps + gyro_bias + random.normal3(gyro_sd),
+                                                   r.f_b_mps2 + accel_bias + random.normal3(accel_sd)});
     if (run.car.t >= next_gnss_s) {
       next_gnss_s += s.gnss_period_s;
       pending.push_back({run.car.t, run.car.position + run.car.C_b_n() * s.arm + random.normal3(s.gnss_sd_m) +
                                         s.gnss_fault(run.car.t)});
     }
     while (!pending.empty() && run.car.t >= pending.front().valid_s + s.gnss_latency_s) {
-      run.aligner->add_gnss_position(at(pending.front().valid_s),
+      run.aligner->add_gnss_position(host_time_at(pending.front().valid_s),
                                      displaced(kOrigin, pending.front().antenna_m),
                                      Vector3d::Constant(s.gnss_sd_m));
       pending.erase(pending.begin());
@@ -182,7 +182,7 @@ TEST(InMotionAlignment, FindsAnyMountingYawWithinItsSdSoonAfterPullingAway) {
     EXPECT_LT(run.done_at_s, 40.0) << "run " << seed;
     const InitialNavigation& start = *run.aligner->result();
     EXPECT_EQ(start.method, AlignmentMethod::kInMotion);
-    EXPECT_EQ(start.time, at(run.car.t));
+    EXPECT_EQ(start.time, host_time_at(run.car.t));
     const double sd = start.sd(kAttitudeError + 2);
     EXPECT_LT(sd, 5.0 * kRadPerDeg);
     const double error = heading_error(start.state.C_b_n, run.car.C_b_n());
@@ -272,7 +272,7 @@ TEST(InMotionAlignment, WorksWithOneHertzGnssOfMetres) {
 TEST(InMotionAlignment, AGapInTheImuStartsItAfresh) {
   Outcome run = simulate(802, {}, Car{});
   ASSERT_NE(run.aligner->result(), nullptr);
-  run.aligner->add_imu(at(run.car.t + 2.0), run.car.rates());
+  run.aligner->add_imu(host_time_at(run.car.t + 2.0), run.car.rates());
   EXPECT_EQ(run.aligner->result(), nullptr);
   EXPECT_EQ(run.aligner->stage(), AlignmentStage::kWaitingForRest);
 }
@@ -290,27 +290,27 @@ TEST(InMotionAlignment, WhatIsNoNumberOrOutOfTimeChangesNothing) {
     const Vector3d bad_vector(0.0, kNan, 0.0);
     for (int i = 0; i < 6000 && aligner.result() == nullptr; ++i) {
       const InertialRates rates = car.rates();
-      aligner.add_imu(at(car.t), rates);
+      aligner.add_imu(host_time_at(car.t), rates);
       const GeodeticPosition antenna = displaced(kOrigin, car.position);
-      if (i % 20 == 0) aligner.add_gnss_position(at(car.t), antenna, sd);
+      if (i % 20 == 0) aligner.add_gnss_position(host_time_at(car.t), antenna, sd);
       if (with_bad_ones) {
-        aligner.add_imu(at(car.t + 0.004), {bad_vector, rates.f_b_mps2});
-        aligner.add_imu(at(car.t + 0.004), {rates.omega_ib_b_radps, bad_vector});
-        aligner.add_imu(at(car.t), {rates.omega_ib_b_radps, 2.0 * rates.f_b_mps2});
-        aligner.add_imu(at(car.t - 0.002), {rates.omega_ib_b_radps, 2.0 * rates.f_b_mps2});
+        aligner.add_imu(host_time_at(car.t + 0.004), {bad_vector, rates.f_b_mps2});
+        aligner.add_imu(host_time_at(car.t + 0.004), {rates.omega_ib_b_radps, bad_vector});
+        aligner.add_imu(host_time_at(car.t), {rates.omega_ib_b_radps, 2.0 * rates.f_b_mps2});
+        aligner.add_imu(host_time_at(car.t - 0.002), {rates.omega_ib_b_radps, 2.0 * rates.f_b_mps2});
         const GeodeticPosition far{antenna.latitude_rad + 1.0, antenna.longitude_rad, antenna.height_m};
-        aligner.add_gnss_position(at(car.t - kStale_s), far, sd);
-        aligner.add_gnss_position(at(car.t), {kNan, far.longitude_rad, far.height_m}, sd);
-        aligner.add_gnss_position(at(car.t), {far.latitude_rad, kNan, far.height_m}, sd);
-        aligner.add_gnss_position(at(car.t), {far.latitude_rad, far.longitude_rad, kNan}, sd);
-        aligner.add_gnss_position(at(car.t), far, bad_vector);
+        aligner.add_gnss_position(host_time_at(car.t - kStale_s), far, sd);
+        aligner.add_gnss_position(host_time_at(car.t), {kNan, far.longitude_rad, far.height_m}, sd);
+        aligner.add_gnss_position(host_time_at(car.t), {far.latitude_rad, kNan, far.height_m}, sd);
+        aligner.add_gnss_position(host_time_at(car.t), {far.latitude_rad, far.longitude_rad, kNan}, sd);
+        aligner.add_gnss_position(host_time_at(car.t), far, bad_vector);
         const Vector3d fast(30.0, 0.0, 0.0);
-        aligner.add_gnss_velocity(at(car.t - kStale_s), fast, sd);
-        aligner.add_gnss_velocity(at(car.t), bad_vector, sd);
-        aligner.add_gnss_velocity(at(car.t), fast, bad_vector);
-        aligner.add_attitude(at(car.t - kStale_s), {0.5, 0.5, 0.5}, sd);
-        aligner.add_attitude(at(car.t), {kNan, 0.5, 0.5}, sd);
-        aligner.add_attitude(at(car.t), {0.5, 0.5, 0.5}, bad_vector);
+        aligner.add_gnss_velocity(host_time_at(car.t - kStale_s), fast, sd);
+        aligner.add_gnss_velocity(host_time_at(car.t), bad_vector, sd);
+        aligner.add_gnss_velocity(host_time_at(car.t), fast, bad_vector);
+        aligner.add_attitude(host_time_at(car.t - kStale_s), {0.5, 0.5, 0.5}, sd);
+        aligner.add_attitude(host_time_at(car.t), {kNan, 0.5, 0.5}, sd);
+        aligner.add_attitude(host_time_at(car.t), {0.5, 0.5, 0.5}, bad_vector);
       }
       car.advance(0.01);
     }
@@ -330,11 +330,11 @@ TEST(InMotionAlignment, WhatIsNoNumberOrOutOfTimeChangesNothing) {
 TEST(InMotionAlignment, BeforeTheImuSpeaksNothingIsTaken) {
   InitialAligner aligner{InitialAlignmentOptions{}};
   const Vector3d sd = Vector3d::Constant(0.02);
-  aligner.add_attitude(at(0.0), {0.0, 0.0, 1.0}, sd);
-  aligner.add_gnss_position(at(0.0), kOrigin, sd);
-  aligner.add_gnss_velocity(at(0.0), Vector3d::Zero(), sd);
+  aligner.add_attitude(host_time_at(0.0), {0.0, 0.0, 1.0}, sd);
+  aligner.add_gnss_position(host_time_at(0.0), kOrigin, sd);
+  aligner.add_gnss_velocity(host_time_at(0.0), Vector3d::Zero(), sd);
   EXPECT_EQ(aligner.stage(), AlignmentStage::kWaitingForRest);
-  aligner.add_imu(at(0.01), {Vector3d::Zero(), Vector3d(0.0, 0.0, -9.81)});
+  aligner.add_imu(host_time_at(0.01), {Vector3d::Zero(), Vector3d(0.0, 0.0, -9.81)});
   EXPECT_EQ(aligner.stage(), AlignmentStage::kWaitingForRest) << "the attitude came too early";
 }
 
@@ -368,12 +368,13 @@ TEST(ReferenceAttitudeAlignment, StartsInMotionWithTheDevicesOwnAttitude) {
   options.reference_noise = fog_noise();
   InitialAligner aligner(options);
   for (int i = 0; i < 500; ++i) {
-    aligner.add_imu(at(car.t), car.rates());
+    aligner.add_imu(host_time_at(car.t), car.rates());
     if (i % 10 == 0) {
-      aligner.add_attitude(at(car.t), euler_from_rotation(car.C_b_n()), Vector3d(1e-4, 1e-4, 5e-4));
+      aligner.add_attitude(host_time_at(car.t), euler_from_rotation(car.C_b_n()), Vector3d(1e-4, 1e-4, 5e-4));
     }
     if (i % 20 == 5)
-      aligner.add_gnss_position(at(car.t), displaced(kOrigin, car.position), Vector3d::Constant(0.01));
+      aligner.add_gnss_position(host_time_at(car.t), displaced(kOrigin, car.position),
+                                Vector3d::Constant(0.01));
     if (i < 499) car.advance(0.01);
   }
   ASSERT_NE(aligner.result(), nullptr);
@@ -393,14 +394,15 @@ TEST(ReferenceAttitudeAlignment, TakesTheGnssVelocityWhereThereIsOne) {
   options.r_ba_b_m = Vector3d(1.0, 0.0, -1.0);
   InitialAligner aligner(options);
   for (int i = 0; i < 300; ++i) {
-    aligner.add_imu(at(car.t), car.rates());
+    aligner.add_imu(host_time_at(car.t), car.rates());
     const InertialRates r = car.rates();
-    aligner.add_attitude(at(car.t), euler_from_rotation(car.C_b_n()), Vector3d::Constant(1e-4));
+    aligner.add_attitude(host_time_at(car.t), euler_from_rotation(car.C_b_n()), Vector3d::Constant(1e-4));
     const Vector3d w = r.omega_ib_b_radps - car.C_b_n().transpose() * earth_rate_n(kOrigin.latitude_rad);
-    aligner.add_gnss_velocity(at(car.t), car.velocity() + car.C_b_n() * w.cross(options.r_ba_b_m),
+    aligner.add_gnss_velocity(host_time_at(car.t), car.velocity() + car.C_b_n() * w.cross(options.r_ba_b_m),
                               Vector3d::Constant(0.03));
     if (i % 20 == 5) {
-      aligner.add_gnss_position(at(car.t), displaced(kOrigin, car.position + car.C_b_n() * options.r_ba_b_m),
+      aligner.add_gnss_position(host_time_at(car.t),
+                                displaced(kOrigin, car.position + car.C_b_n() * options.r_ba_b_m),
                                 Vector3d::Constant(0.01));
     }
     if (i < 299) car.advance(0.01);
@@ -458,9 +460,10 @@ TEST(InMotionAlignment, OnRealDrivesTheHeadingIsTheCourseOverGround) {
     for (const auto& row : imu) {
       const double t = row[0];
       // Forward-left-up to forward-right-down.
-      aligner.add_imu(at(t), {Vector3d(row[1], -row[2], -row[3]), Vector3d(row[4], -row[5], -row[6])});
+      aligner.add_imu(host_time_at(t),
+                      {Vector3d(row[1], -row[2], -row[3]), Vector3d(row[4], -row[5], -row[6])});
       while (g < gnss.size() && gnss[g][0] <= t) {
-        aligner.add_gnss_position(at(gnss[g][0]),
+        aligner.add_gnss_position(host_time_at(gnss[g][0]),
                                   {gnss[g][1] * kRadPerDeg, gnss[g][2] * kRadPerDeg, gnss[g][3]},
                                   Vector3d::Constant(0.1));
         ++g;

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kRelative = 1e-7;
+constexpr double kRelativeDifference = 1e-7;
 
 struct Scene {
   NavigationState state;
@@ -47,9 +47,10 @@ void expect_block(const Eigen::MatrixXd& analytic, const Eigen::MatrixXd& numeri
                   double row_scale) {
   const double largest = analytic.cwiseAbs().maxCoeff();
   const double difference = (analytic - numeric).cwiseAbs().maxCoeff();
-  EXPECT_LE(difference, largest > 0.0 ? kRelative * largest : 1e-12 * row_scale) << name << "\nanalytic\n"
-                                                                                 << analytic << "\nnumeric\n"
-                                                                                 << numeric;
+  EXPECT_LE(difference, largest > 0.0 ? kRelativeDifference * largest : 1e-12 * row_scale)
+      << name << "\nanalytic\n"
+      << analytic << "\nnumeric\n"
+      << numeric;
 }
 
 TEST(OdometryMeasurement, JacobianMatchesCentralDifferencesAtRandomStates) {

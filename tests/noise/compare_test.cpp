@@ -25,7 +25,7 @@ std::vector<double> white_and_walk(std::size_t n, double sd, double walk_sd, uns
   return x;
 }
 
-FitResult fitted(const std::vector<double>& x, const char* model) {
+FitResult fit_of(const std::vector<double>& x, const char* model) {
   FitOptions options;
   options.signal_unit = "rad/s";
   return fit(haar_wavelet_variance(x).value(), parse_model(model).value(), 100.0, options).value();
@@ -35,8 +35,8 @@ TEST(Compare, TwoStretchesOfOneSensorDifferAsRarelyAsTheTestPromises) {
   int rejected = 0;
   constexpr int kPairs = 200;
   for (unsigned i = 0; i < kPairs; ++i) {
-    const auto a = fitted(white_and_walk(4096, 1.0, 0.06, 2 * i), "WN+RW");
-    const auto b = fitted(white_and_walk(4096, 1.0, 0.06, 2 * i + 1), "WN+RW");
+    const auto a = fit_of(white_and_walk(4096, 1.0, 0.06, 2 * i), "WN+RW");
+    const auto b = fit_of(white_and_walk(4096, 1.0, 0.06, 2 * i + 1), "WN+RW");
     const auto result = compare(a, b);
     ASSERT_TRUE(result.test.has_value());
     EXPECT_EQ(result.test->dof, 2);
@@ -79,8 +79,8 @@ TEST(Compare, AProcessIsNotComparedWithARecordThatIsTooShortForIt) {
 }
 
 TEST(Compare, TenPercentMoreWhiteNoiseIsFoundAndBelongsToTheRightParameter) {
-  const auto a = fitted(white_and_walk(30000, 1.0, 0.01, 1), "WN+RW");
-  const auto b = fitted(white_and_walk(30000, 1.1, 0.01, 2), "WN+RW");
+  const auto a = fit_of(white_and_walk(30000, 1.0, 0.01, 1), "WN+RW");
+  const auto b = fit_of(white_and_walk(30000, 1.1, 0.01, 2), "WN+RW");
   const auto result = compare(a, b);
   ASSERT_TRUE(result.test.has_value());
   EXPECT_LT(result.test->p_value, 1e-6);
@@ -92,7 +92,7 @@ TEST(Compare, TenPercentMoreWhiteNoiseIsFoundAndBelongsToTheRightParameter) {
 
 TEST(Compare, ModelsWithDifferentTermsAreListedSideBySideWithAWarning) {
   const auto x = white_and_walk(4096, 1.0, 0.02, 3);
-  const auto result = compare(fitted(x, "WN+RW"), fitted(x, "WN+GM"));
+  const auto result = compare(fit_of(x, "WN+RW"), fit_of(x, "WN+GM"));
   ASSERT_EQ(result.parameters.size(), 4U);
   EXPECT_FALSE(result.parameters[1].second.has_value());
   EXPECT_FALSE(result.parameters[2].first.has_value());
@@ -101,7 +101,7 @@ TEST(Compare, ModelsWithDifferentTermsAreListedSideBySideWithAWarning) {
 }
 
 TEST(Compare, WhatIsInAnotherUnitOrAtAnotherRateIsNotTakenForADifference) {
-  const auto a = fitted(white_and_walk(4096, 1.0, 0.02, 5), "WN+RW");
+  const auto a = fit_of(white_and_walk(4096, 1.0, 0.02, 5), "WN+RW");
   FitResult b = a;
   ParameterEstimate& white = b.parameters[0];
   white.unit = "another";
@@ -119,7 +119,7 @@ TEST(Compare, WhatIsInAnotherUnitOrAtAnotherRateIsNotTakenForADifference) {
 
 TEST(Compare, WithoutATermInCommonThereIsNoTest) {
   const auto x = white_and_walk(4096, 1.0, 0.02, 6);
-  const auto result = compare(fitted(x, "WN"), fitted(x, "RW"));
+  const auto result = compare(fit_of(x, "WN"), fit_of(x, "RW"));
   EXPECT_FALSE(result.test.has_value());
   EXPECT_EQ(result.parameters.size(), 2U);
 }
@@ -127,7 +127,7 @@ TEST(Compare, WithoutATermInCommonThereIsNoTest) {
 TEST(NoiseJson, AFitSurvivesTheTripThroughText) {
   const auto x = white_and_walk(4096, 1.0, 0.02, 4);
   for (const char* model : {"WN+RW", "WN+2*GM", "QN+WN+DR", "WN+SIN", "ARMA11"}) {
-    const auto before = fitted(x, model);
+    const auto before = fit_of(x, model);
     const auto text = fit_to_json(before).dump();
     const auto after = fit_from_json(nlohmann::json::parse(text));
     ASSERT_TRUE(after) << after.error().text();

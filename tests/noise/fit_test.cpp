@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "made_series.h"
 #include "oracle_files.h"
 #include "tests/support/shared_data.h"
 
@@ -17,6 +18,7 @@ namespace {
 
 using test::read_series;
 using test::read_table;
+using test::white;
 using testing::HasSubstr;
 
 double value_of(const FitResult& fit, const std::string& process, const std::string& name) {
@@ -100,14 +102,6 @@ TEST(Fit, FindsTheModelBehindAnExactCurveWithBothWeightings) {
       }
     }
   }
-}
-
-std::vector<double> white(std::size_t n, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  std::vector<double> x(n);
-  for (double& v : x) v = normal(random);
-  return x;
 }
 
 TEST(Fit, ManyProcessesAtOnceAreFittedToTheirCurve) {

@@ -11,7 +11,7 @@
 namespace imuscope::noise {
 namespace {
 
-constexpr double kRate_hz = 100.0;
+constexpr double kLineRate_hz = 100.0;
 
 /// White noise of variance 1 over a slow Gauss-Markov process, as an axis at rest has it.
 std::vector<double> noise_of(std::size_t n, unsigned seed) {
@@ -28,8 +28,8 @@ std::vector<double> noise_of(std::size_t n, unsigned seed) {
 
 void add_line(std::vector<double>& x, double frequency_hz, double amplitude) {
   for (std::size_t i = 0; i < x.size(); ++i)
-    x[i] +=
-        amplitude * std::sin(2.0 * std::numbers::pi * frequency_hz * static_cast<double>(i) / kRate_hz + 0.4);
+    x[i] += amplitude *
+            std::sin(2.0 * std::numbers::pi * frequency_hz * static_cast<double>(i) / kLineRate_hz + 0.4);
 }
 
 std::vector<std::uint8_t> all_valid(std::size_t n) { return std::vector<std::uint8_t>(n, 1); }
@@ -40,10 +40,10 @@ TEST(Lines, AreFoundWhereTheyAreWithTheirAmplitude) {
     add_line(x, frequency_hz, 0.3);
     const auto lines = find_lines(x, all_valid(x.size()), {});
     ASSERT_EQ(lines.size(), 1u) << frequency_hz;
-    EXPECT_NEAR(lines[0].frequency_hz, frequency_hz, 0.1 * kRate_hz / 4096.0);
+    EXPECT_NEAR(lines[0].frequency_hz, frequency_hz, 0.1 * kLineRate_hz / 4096.0);
     EXPECT_NEAR(lines[0].amplitude, 0.3, 0.03);
     EXPECT_LT(lines[0].p_value, 1e-6);
-    EXPECT_LT(lines[0].frequency_sd_hz, 0.1 * kRate_hz / 4096.0);
+    EXPECT_LT(lines[0].frequency_sd_hz, 0.1 * kLineRate_hz / 4096.0);
   }
 }
 
@@ -80,7 +80,7 @@ TEST(Lines, ContributeTheWaveletVarianceOfASinusoid) {
   const auto wv = haar_wavelet_variance(x).value();
   for (int level = 1; level <= 6; ++level) {
     const double observed = wv.levels[static_cast<std::size_t>(level - 1)].value;
-    EXPECT_NEAR(line_wv(line, kRate_hz, level), observed, 2e-3 * observed) << level;
+    EXPECT_NEAR(line_wv(line, kLineRate_hz, level), observed, 2e-3 * observed) << level;
   }
 }
 
@@ -101,8 +101,8 @@ TEST(Lines, ABroadPeakIsNoLine) {
   // A resonance of 20 Hz, 1 Hz wide: an AR(2) process.
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
-  const double r = std::exp(-std::numbers::pi * 1.0 / kRate_hz);
-  const double a1 = 2.0 * r * std::cos(2.0 * std::numbers::pi * 20.0 / kRate_hz);
+  const double r = std::exp(-std::numbers::pi * 1.0 / kLineRate_hz);
+  const double a1 = 2.0 * r * std::cos(2.0 * std::numbers::pi * 20.0 / kLineRate_hz);
   std::vector<double> x(120'000);
   double y1 = 0.0;
   double y2 = 0.0;

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <vector>
 
+#include "made_series.h"
 #include "oracle_files.h"
 #include "tests/support/shared_data.h"
 
@@ -13,8 +14,7 @@ namespace imuscope::noise {
 namespace {
 
 using test::read_table;
-
-double relative(double value, double expected) { return std::abs(value - expected) / std::abs(expected); }
+using test::relative;
 
 /// Also reads subnormal numbers, which std::stod refuses.
 double number(const std::string& text) { return std::strtod(text.c_str(), nullptr); }

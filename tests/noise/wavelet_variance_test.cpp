@@ -9,6 +9,7 @@
 #include <numeric>
 #include <random>
 
+#include "made_series.h"
 #include "noise/robust_scale.h"
 #include "oracle_files.h"
 #include "tests/support/shared_data.h"
@@ -18,19 +19,13 @@ namespace {
 
 using test::read_series;
 using test::read_table;
+using test::relative;
+using test::white;
 using testing::HasSubstr;
 
 std::vector<double> integers_of_s07() {
   std::vector<double> x;
   for (int t = 0; t < 1000; ++t) x.push_back((7919 * t) % 101 - 50);
-  return x;
-}
-
-std::vector<double> white(std::size_t n, unsigned seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  std::vector<double> x(n);
-  for (double& v : x) v = normal(random);
   return x;
 }
 
@@ -51,8 +46,6 @@ double by_definition(const std::vector<double>& x, int level) {
   }
   return static_cast<double>(sum / static_cast<long double>(count));
 }
-
-double relative(double value, double expected) { return std::abs(value - expected) / std::abs(expected); }
 
 TEST(WaveletVariance, AgreesWithItsDefinitionOnWhiteNoiseOfOddLength) {
   const auto x = white(1013, 1);

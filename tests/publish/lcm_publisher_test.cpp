@@ -3,19 +3,17 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sched.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
-#include <functional>
 #include <imuscope/error_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <lcm/lcm-cpp.hpp>
 #include <map>
 
 #include "example_reports.h"
+#include "private_network.h"
 #include "publish/lcm_listener.h"
 #include "publish/message_builders.h"
 #include "publish/message_codec.h"
@@ -24,6 +22,8 @@
 namespace imuscope {
 namespace {
 
+using test::in_private_network;
+using test::kNotPermitted;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -145,20 +145,6 @@ TEST(LcmPublisher, RefusesUrlsThatCannotServeWithTheReasonAndTheRightForm) {
     EXPECT_THAT(publisher.error().text(),
                 AllOf(HasSubstr(reason), HasSubstr("udpm://239.255.76.67:7667?ttl=0")));
   }
-}
-
-constexpr int kNotPermitted = 77;
-
-/// Runs `body` in a child process with a network of its own: a loopback interface that is down, no routes.
-int in_private_network(const std::function<int()>& body) {
-  const pid_t child = fork();
-  if (child == 0) {
-    if (unshare(CLONE_NEWNET) != 0) _exit(kNotPermitted);
-    _exit(body());
-  }
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
 struct Received {

@@ -3,8 +3,6 @@
 #include "publish/lcm_socket_filter.h"
 
 #include <gtest/gtest.h>
-#include <sched.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -14,28 +12,26 @@
 #include <sstream>
 
 #include "example_reports.h"
+#include "private_network.h"
 #include "publish/lcm_listener.h"
 #include "publish/lcm_publisher.h"
 
 namespace imuscope {
 namespace {
 
-constexpr int kNotPermitted = 77;
+using test::in_private_network;
+using test::kNotPermitted;
+
 constexpr int kNoNetwork = 78;
 constexpr int kMessages = 50;
 
-/// Runs `body` in a child process with a network of its own.
-int in_private_network(const std::function<int()>& body) {
-  const pid_t child = fork();
-  if (child == 0) {
-    if (unshare(CLONE_NEWNET) != 0) _exit(kNotPermitted);
+/// Runs `body` in a child process with a network of its own, whose loopback interface carries multicast.
+int with_multicast(const std::function<int()>& body) {
+  return in_private_network([&] {
     if (std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo") != 0)
-      _exit(kNoNetwork);
-    _exit(body());
-  }
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+      return kNoNetwork;
+    return body();
+  });
 }
 
 /// Datagrams that the kernel kept from the sockets of this network: the last column of /proc/net/udp.
@@ -79,7 +75,7 @@ void publish(
 }
 
 TEST(LcmSocketFilter, TheKernelDropsWhatNobodyAskedForAndTheWantedChannelComes) {
-  const int outcome = in_private_network([] {
+  const int outcome = with_multicast([] {
     Ear ear("EVENT");
     auto voice = LcmPublisher::open();
     publish(*voice);
@@ -91,7 +87,7 @@ TEST(LcmSocketFilter, TheKernelDropsWhatNobodyAskedForAndTheWantedChannelComes) 
 }
 
 TEST(LcmSocketFilter, ABeginningLetsEveryNameThroughThatHasIt) {
-  const int outcome = in_private_network([] {
+  const int outcome = with_multicast([] {
     Ear ear("CALIBRATION_.*");
     auto voice = LcmPublisher::open();
     voice->publish(test::example_calibration(), "mtx1");
@@ -105,7 +101,7 @@ TEST(LcmSocketFilter, ABeginningLetsEveryNameThroughThatHasIt) {
 }
 
 TEST(LcmSocketFilter, AnotherExpressionLetsEverythingThrough) {
-  const int outcome = in_private_network([] {
+  const int outcome = with_multicast([] {
     Ear ear("(EVENT|STATUS)");
     auto voice = LcmPublisher::open();
     publish(*voice, [&, sent = 0]() mutable { ear.listen_for(++sent); });
@@ -122,7 +118,7 @@ struct Counter {
 };
 
 TEST(LcmSocketFilter, AReceiverThatWasThereBeforeIsLeftAlone) {
-  const int outcome = in_private_network([] {
+  const int outcome = with_multicast([] {
     lcm::LCM other{std::string(kDefaultLcmUrl)};
     Counter counter;
     other.subscribe("IMUSCOPE_STATUS", &Counter::on_message, &counter)->setQueueCapacity(2 * kMessages);

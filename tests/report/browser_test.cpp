@@ -15,10 +15,13 @@
 #include "report/paper_figures.h"
 #include "report/report.h"
 #include "tests/report/synthetic_run.h"
+#include "tests/support/file_content.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
 namespace {
+
+using test::content_of;
 
 constexpr const char* kBrowser = "/usr/bin/chromium";
 constexpr const char* kGnuplot = "/usr/bin/gnuplot";
@@ -33,13 +36,6 @@ std::string output_of(const std::string& command) {
     output.append(block.data(), n);
   pclose(pipe);
   return output;
-}
-
-std::string content_of(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream content;
-  content << stream.rdbuf();
-  return content.str();
 }
 
 /// What was measured of the page.

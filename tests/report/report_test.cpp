@@ -5,15 +5,16 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
-#include <sstream>
 
 #include "report/html.h"
 #include "tests/report/synthetic_run.h"
+#include "tests/support/file_content.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
 namespace {
 
+using test::content_of;
 using testing::HasSubstr;
 
 /// Whether the page holds `text`; a failure names the text, not the whole page.
@@ -21,13 +22,6 @@ testing::AssertionResult holds(const std::string& page, const std::string& text)
   const bool found = page.find(text) != std::string::npos;
   return (found ? testing::AssertionSuccess() : testing::AssertionFailure())
          << "the page " << (found ? "holds " : "does not hold ") << text;
-}
-
-std::string content_of(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream content;
-  content << stream.rdbuf();
-  return content.str();
 }
 
 /// Writes a run folder, makes its report, returns the page.

@@ -15,26 +15,26 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-constexpr double kRate_hz = 100.0;
+constexpr double kStudyRate_hz = 100.0;
 
-Configuration one_imu() {
+Configuration one_studied_imu() {
   Configuration configuration;
   DeviceConfig study;
   study.name = "mtx1";
   study.role = DeviceRole::kStudy;
-  study.rate_hz = kRate_hz;
+  study.rate_hz = kStudyRate_hz;
   configuration.devices = {study};
   return configuration;
 }
 
-HostTime at(double t_s) { return HostTime{} + from_seconds(t_s); }
+HostTime study_time(double t_s) { return HostTime{} + from_seconds(t_s); }
 
 /// A vehicle that never rolls, and whose side force is what its forward force is.
 ErrorRow row_on_rails(std::int64_t k, std::mt19937& random) {
   std::normal_distribution<double> normal;
   ErrorRow row{};
   row.counter = k;
-  row.time = at(static_cast<double>(k) / kRate_hz);
+  row.time = study_time(static_cast<double>(k) / kStudyRate_hz);
   row.gyro_valid = row.accel_valid = true;
   for (auto* v : {&row.predicted_omega_s_radps, &row.omega_dot_s_radps2, &row.omega_ddot_s_radps3,
                   &row.predicted_f_s_mps2, &row.f_dot_s_mps3, &row.e_gyro_radps, &row.e_accel_mps2}) {
@@ -49,11 +49,12 @@ DynamicsRegressions of_rails(double moving_s, double length_s) {
   std::vector<RowSpool> rows;
   rows.push_back(RowSpool::create(test::scratch_folder()).value());
   std::mt19937 random(2);
-  for (std::int64_t k = 0; static_cast<double>(k) < length_s * kRate_hz; ++k)
+  for (std::int64_t k = 0; static_cast<double>(k) < length_s * kStudyRate_hz; ++k)
     rows[0].add(row_on_rails(k, random));
-  const RegimeTrack motion({"static", "dynamic"}, {{at(0.0), at(length_s - moving_s), 0},
-                                                   {at(length_s - moving_s), at(length_s), 1}});
-  return regressions_of(one_imu(), rows, motion, noise::parse_model("WN").value());
+  const RegimeTrack motion({"static", "dynamic"},
+                           {{study_time(0.0), study_time(length_s - moving_s), 0},
+                            {study_time(length_s - moving_s), study_time(length_s), 1}});
+  return regressions_of(one_studied_imu(), rows, motion, noise::parse_model("WN").value());
 }
 
 TEST(DynamicsFiles, AConstantAndACollinearCovariateAreSaidOnceForTheSensor) {

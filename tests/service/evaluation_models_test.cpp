@@ -11,7 +11,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kRate_hz = 100.0;
+constexpr double kModelRate_hz = 100.0;
 constexpr double kFastBeta = 113.5;
 constexpr double kSlowBeta = 0.0049;
 constexpr std::array<double, kImuAxes> kTurnOn{1e-3, 1e-3, 1e-3, 0.02, 0.02, 0.02};
@@ -23,7 +23,7 @@ json fit_of(const std::string& axis, const std::string& regime, double white, do
   return {{"name", "mtx1"},
           {"axis", axis},
           {"regime", regime},
-          {"rate_hz", kRate_hz},
+          {"rate_hz", kModelRate_hz},
           {"parameters",
            {parameter("WN", "sigma2", white), parameter("GM1", "beta", kFastBeta),
             parameter("GM1", "sigma2", fast), parameter("GM2", "beta", kSlowBeta),
@@ -49,8 +49,8 @@ StudyDrive drive() {
 /// Density at frequency zero of a sampled Gauss-Markov process: the sum of its autocovariance.
 double summed(double variance, double beta) {
   double sum = variance;
-  for (int k = 1; k < 200; ++k) sum += 2.0 * variance * std::exp(-beta * k / kRate_hz);
-  return sum / kRate_hz;
+  for (int k = 1; k < 200; ++k) sum += 2.0 * variance * std::exp(-beta * k / kModelRate_hz);
+  return sum / kModelRate_hz;
 }
 
 const EvaluationModel& named(const std::vector<EvaluationModel>& all, const std::string& name) {
@@ -64,7 +64,7 @@ TEST(EvaluationModels, FastProcessesAreWhiteAtTheirLowFrequencyDensityAndSlowOne
   const auto all = evaluation_models(drive(), {}, kTurnOn, models(), {});
   const auto& model = *named(all, "dynamic").model;
   for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
-    EXPECT_NEAR(model.axes[axis].white_density, 2.0 / kRate_hz + summed(0.3, kFastBeta), 1e-12);
+    EXPECT_NEAR(model.axes[axis].white_density, 2.0 / kModelRate_hz + summed(0.3, kFastBeta), 1e-12);
     ASSERT_EQ(model.axes[axis].slow.size(), 1U);
     EXPECT_DOUBLE_EQ(model.axes[axis].slow[0].variance, 0.04);
     EXPECT_DOUBLE_EQ(model.axes[axis].slow[0].rate_per_s, kSlowBeta);
@@ -75,8 +75,8 @@ TEST(EvaluationModels, FastProcessesAreWhiteAtTheirLowFrequencyDensityAndSlowOne
 TEST(EvaluationModels, WithoutADependenceTheWhiteNoiseFollowsTheRegime) {
   const auto all = evaluation_models(drive(), {}, kTurnOn, models(), {});
   const auto& model = *named(all, "by dynamics").model;
-  const double at_rest = 1.0 / kRate_hz + summed(0.1, kFastBeta);
-  const double moving = 2.0 / kRate_hz + summed(0.3, kFastBeta);
+  const double at_rest = 1.0 / kModelRate_hz + summed(0.1, kFastBeta);
+  const double moving = 2.0 / kModelRate_hz + summed(0.3, kFastBeta);
   ASSERT_EQ(model.changes.size(), 4U);  // from the beginning of time on, then at each change
   EXPECT_NEAR(model.changes[0].white_density[0], at_rest, 1e-12);
   EXPECT_DOUBLE_EQ(model.changes[2].from_s, 60.0);
@@ -118,8 +118,8 @@ TEST(EvaluationModels, AClearDependenceIsFollowedWindowByWindow) {
     }
     return density;
   };
-  EXPECT_NEAR(at(5.0), 2.0 / kRate_hz + beside, 1e-12);
-  EXPECT_NEAR(at(25.0), 2.0 * std::exp(0.4) / kRate_hz + beside, 1e-12);
+  EXPECT_NEAR(at(5.0), 2.0 / kModelRate_hz + beside, 1e-12);
+  EXPECT_NEAR(at(25.0), 2.0 * std::exp(0.4) / kModelRate_hz + beside, 1e-12);
   EXPECT_NE(model.source.find("1 of 6"), std::string::npos);
 }
 

@@ -16,10 +16,10 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr double kRate_hz = 100.0;
+constexpr double kNoiseRate_hz = 100.0;
 const std::vector<std::string> kRegimes{"static", "dynamic"};
 
-Configuration one_imu() {
+Configuration one_imu_and_its_reference() {
   Configuration configuration;
   DeviceConfig reference;
   reference.name = "airins";
@@ -27,7 +27,7 @@ Configuration one_imu() {
   DeviceConfig study;
   study.name = "mtx1";
   study.role = DeviceRole::kStudy;
-  study.rate_hz = kRate_hz;
+  study.rate_hz = kNoiseRate_hz;
   configuration.devices = {reference, study};
   return configuration;
 }
@@ -41,12 +41,12 @@ NoiseSeries series_of(std::size_t n, std::size_t static_samples, double static_s
   for (std::size_t k = 0; k < n; ++k) {
     ErrorRow row{};
     row.counter = static_cast<std::int64_t>(k);
-    row.time = HostTime{} + from_seconds(static_cast<double>(k) / kRate_hz);
+    row.time = HostTime{} + from_seconds(static_cast<double>(k) / kNoiseRate_hz);
     row.gyro_valid = row.accel_valid = true;
     const bool stands = k < static_samples;
-    const double line =
-        stands ? 0.0
-               : line_amplitude * std::sin(2.0 * std::numbers::pi * 31.0 * static_cast<double>(k) / kRate_hz);
+    const double line = stands ? 0.0
+                               : line_amplitude * std::sin(2.0 * std::numbers::pi * 31.0 *
+                                                           static_cast<double>(k) / kNoiseRate_hz);
     for (std::size_t i = 0; i < 3; ++i) {
       row.e_gyro_radps[i] = (stands ? static_sd : dynamic_sd) * normal(random) + line;
       row.e_accel_mps2[i] = normal(random);
@@ -57,7 +57,7 @@ NoiseSeries series_of(std::size_t n, std::size_t static_samples, double static_s
 }
 
 NoiseStudy study_of(const NoiseSeries& series) {
-  return study_noise(one_imu(), {series}, kRegimes, noise::parse_model("WN").value(), {});
+  return study_noise(one_imu_and_its_reference(), {series}, kRegimes, noise::parse_model("WN").value(), {});
 }
 
 TEST(NoiseStudy, RegimesThatDifferAreToldApartAndThoseThatDoNotAreNot) {
@@ -89,7 +89,8 @@ TEST(NoiseStudy, LevelsThatARegimesStretchesAreTooShortForAreLeftOutAndSaid) {
 
 TEST(NoiseStudy, ARegimeTooShortForAModelHasNoneAndThatIsSaid) {
   const auto series = series_of(40'000, 3, 1.0, 1.0);
-  const auto study = study_noise(one_imu(), {series}, kRegimes, noise::parse_model("WN+2*GM").value(), {});
+  const auto study =
+      study_noise(one_imu_and_its_reference(), {series}, kRegimes, noise::parse_model("WN+2*GM").value(), {});
   for (const auto& model : study.models) EXPECT_NE(model.regime, "static");
   EXPECT_THAT(study.remarks, Contains(HasSubstr("mtx1 gyro_x, static: no noise model")));
   EXPECT_THAT(comparison_json(study, kRegimes).at("comparisons"), IsEmpty());
@@ -132,7 +133,7 @@ TEST(NoiseStudy, ALineIsASinusoidOfItsModelWithIntervalsAndItsWaveletVariance) {
       EXPECT_NEAR(p.at("ci_high").get<double>() - p.at("ci_low").get<double>(), 3.92 * sd, 0.01 * sd);
     }
     // Level 1 of a sinusoid: alpha^2 / 2 sin^2(b/2), b its phase a sample.
-    const double b = 2.0 * std::numbers::pi * 31.0 / kRate_hz;
+    const double b = 2.0 * std::numbers::pi * 31.0 / kNoiseRate_hz;
     const double expected = 0.5 * kAmplitude * kAmplitude * std::pow(std::sin(0.5 * b), 2);
     EXPECT_NEAR(line.at("wv")[0].get<double>(), expected, 0.1 * expected);
     EXPECT_EQ(line.at("wv").size(), model.at("wv").size());
@@ -142,12 +143,12 @@ TEST(NoiseStudy, ALineIsASinusoidOfItsModelWithIntervalsAndItsWaveletVariance) {
 
 TEST(NoiseStudy, AnImuThatMissesHalfOfTheRunIsSaid) {
   const auto series = series_of(20'000, 10'000, 1.0, 1.0);
-  EXPECT_EQ(coverage_remark("mtx1", series, kRate_hz, 200.0, HostTime{}), "");
-  EXPECT_EQ(coverage_remark("mtx1", series, kRate_hz, 400.0, HostTime{}),
+  EXPECT_EQ(coverage_remark("mtx1", series, kNoiseRate_hz, 200.0, HostTime{}), "");
+  EXPECT_EQ(coverage_remark("mtx1", series, kNoiseRate_hz, 400.0, HostTime{}),
             "mtx1: has samples for 200 s of the run's 400 s, between 0 s and 200 s; its models and "
             "regressions are of "
             "that part alone");
-  EXPECT_THAT(coverage_remark("mtx2", NoiseSeries{}, kRate_hz, 400.0, HostTime{}),
+  EXPECT_THAT(coverage_remark("mtx2", NoiseSeries{}, kNoiseRate_hz, 400.0, HostTime{}),
               HasSubstr("has no sample"));
 }
 

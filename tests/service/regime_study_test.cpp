@@ -12,7 +12,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-HostTime at(double s) { return HostTime{} + from_seconds(100.0 + s); }
+HostTime drive_time(double s) { return HostTime{} + from_seconds(100.0 + s); }
 
 /// A run of 60 s with a yaw rate of the given size between begin and end.
 MotionWatch run_with(double size_radps, double begin_s, double end_s, bool with_speed) {
@@ -21,7 +21,7 @@ MotionWatch run_with(double size_radps, double begin_s, double end_s, bool with_
     const double t_s = k / 100.0;
     const bool moves = t_s >= begin_s && t_s < end_s;
     StudyEpoch epoch{};
-    epoch.time = at(t_s);
+    epoch.time = drive_time(t_s);
     epoch.omega_ib_b_radps = {0.0, 0.0, moves ? size_radps * std::sin(2.0 * t_s) : 0.0};
     epoch.f_b_mps2 = {moves ? std::sin(1.3 * t_s) : 0.0, 0.0, -9.81};
     watch.add(epoch, {});
@@ -38,10 +38,10 @@ MotionWatch run_with(double size_radps, double begin_s, double end_s, bool with_
 }
 
 TEST(RegimeStudy, ADriveWithItsStandstillHasBothAndNoRemark) {
-  const auto regimes = find_regimes({}, run_with(0.3, 20.0, 45.0, true), {}, {}, at(0.0));
+  const auto regimes = find_regimes({}, run_with(0.3, 20.0, 45.0, true), {}, {}, drive_time(0.0));
   ASSERT_TRUE(regimes) << regimes.error().text();
   EXPECT_THAT(regimes->remarks, IsEmpty());
-  const auto json = regimes_json(*regimes, at(0.0));
+  const auto json = regimes_json(*regimes, drive_time(0.0));
   EXPECT_EQ(json.at("by"), "motion");
   ASSERT_EQ(json.at("regimes").size(), 2u);
   EXPECT_EQ(json.at("regimes")[1].at("name"), "dynamic");
@@ -50,22 +50,23 @@ TEST(RegimeStudy, ADriveWithItsStandstillHasBothAndNoRemark) {
 }
 
 TEST(RegimeStudy, AMissingPartIsSaid) {
-  const auto always = find_regimes({}, run_with(0.3, 0.0, 60.0, true), {}, {}, at(0.0));
+  const auto always = find_regimes({}, run_with(0.3, 0.0, 60.0, true), {}, {}, drive_time(0.0));
   ASSERT_TRUE(always);
   EXPECT_THAT(always->remarks,
               ElementsAre(HasSubstr("there is no static part: the vehicle never stood for 10 s")));
-  const auto never = find_regimes({}, run_with(0.3, 0.0, 0.0, true), {}, {}, at(0.0));
+  const auto never = find_regimes({}, run_with(0.3, 0.0, 0.0, true), {}, {}, drive_time(0.0));
   ASSERT_TRUE(never);
   EXPECT_THAT(never->remarks,
               ElementsAre(HasSubstr("there is no dynamic part: the vehicle stood all the time")));
-  const auto blind = find_regimes({}, run_with(0.3, 20.0, 45.0, false), {}, {}, at(0.0));
+  const auto blind = find_regimes({}, run_with(0.3, 20.0, 45.0, false), {}, {}, drive_time(0.0));
   ASSERT_TRUE(blind);
   EXPECT_THAT(blind->remarks, ElementsAre(HasSubstr("no speed was known")));
 }
 
 TEST(RegimeStudy, LabelsOfAPersonComeFromTheFileOrFromTheRecordedMessages) {
   const auto watch = run_with(0.3, 20.0, 45.0, true);
-  const auto of_file = find_regimes({}, watch, {{5.0, 15.0, "yard"}, {20.0, 40.0, "gravel"}}, {}, at(0.0));
+  const auto of_file =
+      find_regimes({}, watch, {{5.0, 15.0, "yard"}, {20.0, 40.0, "gravel"}}, {}, drive_time(0.0));
   ASSERT_TRUE(of_file);
   EXPECT_EQ(of_file->by, RegimesBy::kLabels);
   EXPECT_THAT(of_file->chosen.names(), ElementsAre("yard", "gravel"));
@@ -73,13 +74,13 @@ TEST(RegimeStudy, LabelsOfAPersonComeFromTheFileOrFromTheRecordedMessages) {
 
   RegimeOptions options;
   options.by = RegimesBy::kLabels;
-  const auto of_events =
-      find_regimes(options, watch, {}, {{at(10.0), "regime idle"}, {at(30.0), "a bump"}}, at(0.0));
+  const auto of_events = find_regimes(
+      options, watch, {}, {{drive_time(10.0), "regime idle"}, {drive_time(30.0), "a bump"}}, drive_time(0.0));
   ASSERT_TRUE(of_events);
   ASSERT_EQ(of_events->chosen.stretches().size(), 1u);
   EXPECT_NEAR(of_events->chosen.total_s(0), 50.0, 0.21) << "until the end of the run";
 
-  const auto none = find_regimes(options, watch, {}, {{at(30.0), "a bump"}}, at(0.0));
+  const auto none = find_regimes(options, watch, {}, {{drive_time(30.0), "a bump"}}, drive_time(0.0));
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().kind, ErrorKind::kUsage);
   EXPECT_THAT(none.error().text(), HasSubstr("give --labels FILE.csv"));

@@ -29,7 +29,7 @@ void print_drive(const Combination& combination, const CombinedStudy& study, std
              study.mounting.weights[i], drive.p_value < kSuspicious ? "   stands out" : "");
 }
 
-void print_study(const Combination& combination, const CombinedStudy& study) {
+void print_combined_study(const Combination& combination, const CombinedStudy& study) {
   const CombinedMounting& mounting = study.mounting;
   const MountingEstimate& estimate = mounting.estimate;
   fmt::print("\n{}  ({} drives, {})\n", study.name, study.drives.size(), name_of(combination.method));
@@ -54,7 +54,7 @@ void print_study(const Combination& combination, const CombinedStudy& study) {
 }  // namespace
 
 void print_combination(const Combination& combination) {
-  for (const auto& study : combination.studies) print_study(combination, study);
+  for (const auto& study : combination.studies) print_combined_study(combination, study);
   for (const auto& remark : combination.remarks) fmt::print("\nNote: {}\n", remark);
 }
 

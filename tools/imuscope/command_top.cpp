@@ -94,7 +94,7 @@ class Top {
   }
 
   /// Waits for one STATUS and prints it.
-  Result<void> print_once(double wait_s, bool json) {
+  Result<void> print_once(double wait_s, bool as_json) {
     const HostTime end = host_now() + from_seconds(wait_s);
     while (!heard_.status && host_now() < end && !top_stopped.load()) (void)ear_.wait(kRedraw);
     if (!heard_.status) {
@@ -104,7 +104,7 @@ class Top {
           "start `imuscope run`, and give the --lcm URL and --prefix of its configuration; from another "
           "PC its ttl must be 1");
     }
-    if (json) {
+    if (as_json) {
       fmt::print("{}\n", top::json_of(heard_));
     } else {
       for (const auto& line : top::lines_of(heard_)) fmt::print("{}\n", line);

@@ -17,11 +17,12 @@ std::filesystem::path file_with(std::string_view text) {
 
 std::string message(const Result<void>& result) { return result ? std::string() : result.error().text(); }
 
-constexpr std::string_view kHeader =
+constexpr std::string_view kValidHeader =
     "t_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2\n";
 
 TEST(CsvValidation, AGoodFilePasses) {
-  EXPECT_EQ(message(validate_file(file_with(std::string(kHeader) + "0,1,2,3,4,5,6\n"), ImuConfig{})), "");
+  EXPECT_EQ(message(validate_file(file_with(std::string(kValidHeader) + "0,1,2,3,4,5,6\n"), ImuConfig{})),
+            "");
 }
 
 TEST(CsvValidation, AMissingColumnNamesTheNearestAndListsAll) {
@@ -41,8 +42,8 @@ TEST(CsvValidation, AMissingColumnNamesTheNearestAndListsAll) {
 }
 
 TEST(CsvValidation, TextInANumberNamesLineColumnAndText) {
-  const std::string text = message(
-      validate_file(file_with(std::string(kHeader) + "0,1,2,3,4,5,6\n0.01,1,oops,3,4,5,6\n"), ImuConfig{}));
+  const std::string text = message(validate_file(
+      file_with(std::string(kValidHeader) + "0,1,2,3,4,5,6\n0.01,1,oops,3,4,5,6\n"), ImuConfig{}));
   for (const char* part : {"imu.csv", "line 3", "'oops'", "'gyro_y_radps'"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " in: " << text;
   }
@@ -60,7 +61,7 @@ TEST(CsvValidation, MissingEmptyAndRowlessFilesAndDirectoriesEachGetOneSentence)
             std::string::npos);
   EXPECT_NE(message(validate_file(folder, GnssConfig{})).find("is a directory"), std::string::npos);
   EXPECT_NE(message(validate_file(file_with(""), GnssConfig{})).find("is empty"), std::string::npos);
-  EXPECT_NE(message(validate_file(file_with(kHeader), ImuConfig{})).find("no row"), std::string::npos);
+  EXPECT_NE(message(validate_file(file_with(kValidHeader), ImuConfig{})).find("no row"), std::string::npos);
   EXPECT_NE(message(validate_file(file_with("# only a comment\n"), ImuConfig{})).find("is empty"),
             std::string::npos);
 }

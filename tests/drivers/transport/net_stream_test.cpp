@@ -16,7 +16,7 @@
 namespace imuscope {
 namespace {
 
-using Kind = NetSettings::Kind;
+using NetKind = NetSettings::Kind;
 
 sockaddr_in local(std::uint16_t port) {
   sockaddr_in address{};
@@ -87,7 +87,7 @@ Heard hear(NetStream& stream, std::size_t buffer_size = 100) {
 
 TEST(NetStream, ATcpClientReadsAndWritesAndSeesTheServerGo) {
   FarEnd server(SOCK_STREAM);
-  auto stream = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+  auto stream = NetStream::open({NetKind::kTcp, "127.0.0.1", server.port()});
   ASSERT_TRUE(stream) << stream.error().text();
   server.accept_one();
   std::array<std::uint8_t, 10> buffer{};
@@ -114,16 +114,16 @@ TEST(NetStream, AServerThatComesBackIsReachedAgain) {
   {
     FarEnd server(SOCK_STREAM);
     port = server.port();
-    auto stream = NetStream::open({Kind::kTcp, "127.0.0.1", port});
+    auto stream = NetStream::open({NetKind::kTcp, "127.0.0.1", port});
     ASSERT_TRUE(stream);
     server.accept_one();
   }
-  const auto refused = NetStream::open({Kind::kTcp, "127.0.0.1", port});
+  const auto refused = NetStream::open({NetKind::kTcp, "127.0.0.1", port});
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().text().find("start the server there"), std::string::npos)
       << refused.error().text();
   FarEnd again(SOCK_STREAM, port);
-  auto stream = NetStream::open({Kind::kTcp, own_name(), port});
+  auto stream = NetStream::open({NetKind::kTcp, own_name(), port});
   ASSERT_TRUE(stream) << stream.error().text();
   again.accept_one();
   again.say("again");
@@ -134,7 +134,7 @@ TEST(NetStream, DatagramsAreReadOneByOneAndCutOnesAreCounted) {
   FarEnd sender(SOCK_DGRAM);
   // A port that is free: one that was just given out and closed.
   const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
-  auto stream = NetStream::open({Kind::kUdp, "", port});
+  auto stream = NetStream::open({NetKind::kUdp, "", port});
   ASSERT_TRUE(stream) << stream.error().text();
   sender.say_to(port, "first");
   sender.say_to(port, "second");
@@ -150,7 +150,7 @@ TEST(NetStream, DatagramsAreReadOneByOneAndCutOnesAreCounted) {
 TEST(NetStream, DatagramsThatTheKernelHadNoRoomForAreCounted) {
   FarEnd sender(SOCK_DGRAM);
   const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
-  auto stream = NetStream::open({Kind::kUdp, "127.0.0.1", port});
+  auto stream = NetStream::open({NetKind::kUdp, "127.0.0.1", port});
   ASSERT_TRUE(stream) << stream.error().text();
   const int small = 1;
   ASSERT_EQ(setsockopt((*stream)->fd(), SOL_SOCKET, SO_RCVBUF, &small, sizeof small), 0);
@@ -163,14 +163,14 @@ TEST(NetStream, DatagramsThatTheKernelHadNoRoomForAreCounted) {
 }
 
 TEST(NetStream, SaysWhatIsWrongAndWhatToDo) {
-  EXPECT_EQ(NetStream::open({Kind::kTcp, "", 8000}).error().kind, ErrorKind::kUsage);
-  const auto unknown = NetStream::open({Kind::kTcp, "no.such.host.invalid", 8000});
+  EXPECT_EQ(NetStream::open({NetKind::kTcp, "", 8000}).error().kind, ErrorKind::kUsage);
+  const auto unknown = NetStream::open({NetKind::kTcp, "no.such.host.invalid", 8000});
   ASSERT_FALSE(unknown);
   EXPECT_NE(unknown.error().text().find("no.such.host.invalid"), std::string::npos);
   const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
-  const auto first = NetStream::open({Kind::kUdp, "", port});
+  const auto first = NetStream::open({NetKind::kUdp, "", port});
   ASSERT_TRUE(first);
-  const auto second = NetStream::open({Kind::kUdp, "", port});
+  const auto second = NetStream::open({NetKind::kUdp, "", port});
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().text().find("another program listens there"), std::string::npos);
 }
