@@ -11,24 +11,26 @@ namespace imuscope {
 namespace {
 
 constexpr std::string_view kHeader = "begin_s,end_s,regime";
+/// What spreadsheets write at the beginning of a file in UTF-8.
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::string_view kEvent = "regime ";
 constexpr std::string_view kEnd = "end";
 /// Some thirty years: no run is as long, and every time of the host can be counted from there.
 constexpr double kRunMax_s = 1e9;
 
 std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
+  constexpr std::string_view kBlank = " \t\r\n";
   const auto first = text.find_first_not_of(kBlank);
   if (first == std::string_view::npos) return {};
   return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
-/// As a cell of a table: without what would break its line.
+/// As a cell of a table: without what would break its line, and nothing around it.
 std::string as_cell(std::string_view text) {
   std::string cell(text);
   std::replace_if(
       cell.begin(), cell.end(), [](char c) { return c == ',' || c == '"' || c == '\n' || c == '\r'; }, ' ');
-  return cell;
+  return std::string(trimmed(cell));
 }
 
 std::optional<double> number(std::string_view text) {
@@ -59,6 +61,7 @@ Result<std::vector<Label>> parse_labels(std::string_view text, const std::string
       "a file of labels begins with the line {}, then one stretch a line, "
       "such as 12.0,340.5,motorway",
       kHeader);
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::vector<Label> labels;
   bool has_header = false;
   int line_number = 0;
@@ -102,9 +105,9 @@ std::vector<Label> labels_of_moments(const std::vector<MarkedMoment>& moments, H
     if (!text.starts_with(kEvent)) continue;
     const double time_s = to_seconds(moment.time - origin);
     if (open) labels.back().end_s = time_s;
-    const auto name = trimmed(text.substr(kEvent.size()));
+    const auto name = as_cell(text.substr(kEvent.size()));
     open = !name.empty() && name != kEnd;
-    if (open) labels.push_back({time_s, time_s, as_cell(name)});
+    if (open) labels.push_back({time_s, time_s, name});
   }
   if (open) labels.back().end_s = std::max(labels.back().begin_s, to_seconds(end - origin));
   return labels;

@@ -33,6 +33,12 @@ TEST(Labels, WhatIsWrongInAFileIsToldWithItsLine) {
   EXPECT_THAT(error_of("begin_s,end_s,regime\n3,2,road\n"), HasSubstr("l.csv:2"));
   EXPECT_THAT(error_of("begin_s,end_s,regime\n1,nan,road\n"), HasSubstr("l.csv:2"));
   EXPECT_THAT(error_of("begin_s,end_s,regime\n-1e300,1e300,road\n"), HasSubstr("l.csv:2"));
+  EXPECT_THAT(error_of("begin_s,end_s,regime\n12\n"), HasSubstr("l.csv:2: '12' is no stretch"));
+  EXPECT_THAT(error_of("begin_s,end_s,regime\n1,5s,road\n"), HasSubstr("l.csv:2"));
+  EXPECT_THAT(error_of("begin_s,end_s,regime\nnow,5,road\n"), HasSubstr("l.csv:2"));
+  EXPECT_THAT(error_of("begin_s,end_s,regime\n1,1e300,road\n"), HasSubstr("l.csv:2"));
+  EXPECT_THAT(error_of("begin_s,end_s,regime\n1,5, \n"), HasSubstr("l.csv:2")) << "without a name";
+  EXPECT_THAT(error_of("begin_s,end_s,regime\n1,5,road,wet\n"), HasSubstr("l.csv:2"));
   EXPECT_THAT(error_of("begin_s,end_s,regime\n1,5,road\n4,6,gravel\n"),
               HasSubstr("l.csv:3: begins at 4 s, before the stretch above it ends (5 s)"));
 }
@@ -60,6 +66,51 @@ TEST(Labels, MessagesOpenAndCloseRegimesAndOthersArePassedOver) {
   EXPECT_EQ(track.at(at(30.0)), 1u);
   EXPECT_EQ(track.at(at(45.0)), std::nullopt) << "between two labels no regime holds";
   EXPECT_DOUBLE_EQ(track.total_s(0), 30.0);
+  EXPECT_DOUBLE_EQ(track.longest_s(0), 20.0);
+}
+
+TEST(Labels, AFileOfASpreadsheetIsReadWithItsByteOrderMarkAndLineEnds) {
+  const auto labels = parse_labels(
+      "\xEF\xBB\xBF"
+      "begin_s,end_s,regime\r\n10,20.5,motorway\r\n20.5,31,gravel",
+      "l.csv");
+  ASSERT_TRUE(labels) << labels.error().text();
+  ASSERT_EQ(labels->size(), 2u);
+  EXPECT_EQ((*labels)[1].name, "gravel");
+}
+
+TEST(Labels, AMessageMayEndItsLineAndQuoteItsNameAndMeansTheSame) {
+  const auto labels = labels_of_moments({{at(10.0), "regime gravel\n"},
+                                         {at(20.0), "regime \"gravel\""},
+                                         {at(30.0), "regime end\n"},
+                                         {at(40.0), "regime wet, dirty"},
+                                         {at(50.0), "regime \"\""},
+                                         {at(60.0), "regime \n"}},
+                                        at(0.0), at(70.0));
+  ASSERT_EQ(labels.size(), 3u);
+  EXPECT_EQ(labels[0].name, "gravel");
+  EXPECT_EQ(labels[1].name, "gravel");
+  EXPECT_DOUBLE_EQ(labels[1].end_s, 30.0);
+  EXPECT_EQ(labels[2].name, "wet  dirty") << "a comma would break the line of a table";
+  EXPECT_DOUBLE_EQ(labels[2].end_s, 50.0) << "a name of nothing ends what was";
+}
+
+TEST(Labels, ARegimeNamedAfterTheEndOfTheRunHasNoLength) {
+  const auto labels =
+      labels_of_moments({{at(10.0), "regime gravel"}, {at(50.0), "regime snow"}}, at(0.0), at(40.0));
+  ASSERT_EQ(labels.size(), 2u);
+  EXPECT_DOUBLE_EQ(labels[1].begin_s, labels[1].end_s);
+  const auto track = labelled_regimes(labels, at(0.0));
+  EXPECT_EQ(track.at(at(50.0)), std::nullopt);
+  EXPECT_EQ(track.stretches().size(), 1u);
+  EXPECT_EQ(track.index_of("snow"), 1u);
+  EXPECT_EQ(track.index_of("rain"), std::nullopt);
+}
+
+TEST(Labels, TwoStretchesOfOneNameThatTouchAreOne) {
+  const auto track =
+      labelled_regimes({{0.0, 10.0, "road"}, {10.0, 20.0, "road"}, {25.0, 30.0, "road"}}, at(0.0));
+  ASSERT_EQ(track.stretches().size(), 2u);
   EXPECT_DOUBLE_EQ(track.longest_s(0), 20.0);
 }
 
