@@ -54,7 +54,7 @@ HostTime MotionLevels::begin_of(std::size_t index) const {
 std::vector<MotionCell> MotionLevels::cells() const {
   const auto held = static_cast<std::size_t>(kSpeedHeld_s / kCell_s);
   std::vector<MotionCell> cells(sums_.size());
-  std::size_t age = held + 1;
+  std::size_t age = held + 1;  // so that the first cell holds no speed of one before it
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Sums& sums = sums_[i];
     MotionCell& cell = cells[i];
@@ -68,7 +68,7 @@ std::vector<MotionCell> MotionLevels::cells() const {
     if (sums.speed_mps) {
       cell.speed_mps = sums.speed_mps;
       cell.speed_sd_mps = sums.speed_sd_mps;
-    } else if (age <= held && i > 0) {
+    } else if (age <= held) {
       cell.speed_mps = cells[i - 1].speed_mps;
       cell.speed_sd_mps = cells[i - 1].speed_sd_mps;
     }

@@ -98,19 +98,19 @@ std::vector<std::size_t> with_hysteresis(const std::vector<MotionCell>& cells, c
   const auto force = spreads(cells, &MotionCell::f_mps2);
   std::vector<std::size_t> regimes(cells.size(), kDynamic);
   std::size_t now = kDynamic;
-  std::size_t undecided = 0;  // cells since the last one at rest
+  std::size_t behind_rest = 0;  // the cell behind the last one at rest; holes count like what surrounds them
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (cells[i].n == 0) {
       regimes[i] = now;
       continue;
     }
     const Judgement j = judge(cells[i], rate[i], force[i], limits);
-    undecided = j.rest ? 0 : undecided + 1;
-    if (j.rest) now = kStatic;
-    if (j.motion && now == kStatic) {
+    if (j.rest) {
+      now = kStatic;
+      behind_rest = i + 1;
+    } else if (j.motion && now == kStatic) {
       now = kDynamic;
-      const std::size_t first = i + 1 - std::min(undecided, i + 1);
-      std::fill(regimes.begin() + static_cast<std::ptrdiff_t>(first),
+      std::fill(regimes.begin() + static_cast<std::ptrdiff_t>(behind_rest),
                 regimes.begin() + static_cast<std::ptrdiff_t>(i), kDynamic);
     }
     regimes[i] = now;
@@ -231,13 +231,15 @@ RegimeTrack intensity_bins(const MotionLevels& levels, const RegimeTrack& motion
   std::size_t now = 0;
   std::size_t end_of_last = 0;
   for (const auto& block : blocks) {
-    std::size_t bin = bin_of(block.measure);
+    const std::size_t alone = bin_of(block.measure);
+    const auto is_clear_of = [&](double edge) {
+      return std::abs(block.measure - edge) >= kIntensityEdge * edge;
+    };
     const bool follows = now != 0 && block.first == end_of_last;
-    if (follows && bin != now) {
-      // The edge that was crossed last, on the way from the bin that holds.
-      const double edge = bin > now ? edges[now - 1] : edges[now - 2];
-      if (std::abs(block.measure - edge) < kIntensityEdge * edge) bin = now;
-    }
+    std::size_t bin = follows ? now : alone;
+    // Edge by edge, from the bin that holds.
+    while (bin < alone && is_clear_of(edges[bin - 1])) ++bin;
+    while (bin > alone && is_clear_of(edges[bin - 2])) --bin;
     std::fill(regimes.begin() + static_cast<std::ptrdiff_t>(block.first),
               regimes.begin() + static_cast<std::ptrdiff_t>(block.last), std::optional(bin));
     now = bin;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -139,6 +140,149 @@ TEST(IntensityBins, BlocksAreSplitAtTheQuantilesOfTheirRate) {
   EXPECT_EQ(bins.at(host_time_at(150.0)), 2u);
   EXPECT_EQ(bins.at(host_time_at(220.0)), 3u);
   for (std::size_t k = 1; k <= 3; ++k) EXPECT_NEAR(bins.total_s(k), 60.0, 11.0);
+}
+
+TEST(StaticAndDynamic, MotionReachesBackToTheLastRestOverAHoleOfTheReference) {
+  // Stands for 40 s, creeps between the limits for 2 s, 3 s are missing, drives.
+  MotionLevels levels;
+  for (int k = 0; k < 8000; ++k) {
+    const double t_s = k / kRate_hz;
+    if (t_s >= 42.0 && t_s < 45.0) continue;
+    levels.add(at(t_s), {}, {0.0, 0.0, -9.81});
+    if (k % 10 == 0) levels.add_speed(at(t_s), t_s < 40.0 ? 0.0 : t_s < 42.0 ? 0.25 : 5.0, 0.001);
+  }
+  const auto track = static_and_dynamic(levels, {});
+  ASSERT_EQ(track.stretches().size(), 2u);
+  EXPECT_NEAR(to_seconds(track.stretches()[1].begin - at(0.0)), 40.0, 0.21);
+}
+
+TEST(StaticAndDynamic, AHoleOfTheReferenceGoesOnWithTheRegimeBeforeIt) {
+  MotionLevels levels;
+  for (int k = 0; k < 8000; ++k) {
+    const double t_s = k / kRate_hz;
+    if ((t_s >= 15.0 && t_s < 25.0) || (t_s >= 55.0 && t_s < 65.0)) continue;
+    const double size = t_s < 40.0 ? 0.0 : 1.0;
+    levels.add(at(t_s), {0.0, 0.0, size * 0.2 * std::sin(t_s)}, {size * std::sin(0.7 * t_s), 0.0, -9.81});
+  }
+  const auto track = static_and_dynamic(levels, {});
+  EXPECT_EQ(track.at(at(20.0)), 0u);
+  EXPECT_EQ(track.at(at(60.0)), 1u);
+  EXPECT_EQ(track.stretches().size(), 2u);
+}
+
+TEST(MotionLevels, SamplesMayComeInAnyOrderAndBeforeTheOriginOfTheTimeScale) {
+  struct Sample {
+    HostTime time;
+    double rate_radps;
+  };
+  std::vector<Sample> samples;
+  for (int k = -250; k < 250; ++k) samples.push_back({HostTime{} + from_seconds(k / kRate_hz), 0.01 * k});
+  MotionLevels ordered;
+  for (const auto& s : samples) ordered.add(s.time, {s.rate_radps, 0.0, 0.0}, {});
+  std::shuffle(samples.begin(), samples.end(), std::mt19937(4));
+  MotionLevels shuffled;
+  for (const auto& s : samples) shuffled.add(s.time, {s.rate_radps, 0.0, 0.0}, {});
+  const auto cells = ordered.cells();
+  const auto same = shuffled.cells();
+  ASSERT_EQ(cells.size(), 26u);
+  ASSERT_EQ(same.size(), cells.size());
+  EXPECT_EQ(ordered.begin_of(0), HostTime{} + from_seconds(-2.6));
+  EXPECT_EQ(shuffled.begin_of(0), ordered.begin_of(0));
+  // The first and the last cell are half full; a full one holds 20 samples, of which the mean is known.
+  EXPECT_EQ(cells.front().n, 10u);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    EXPECT_EQ(same[i].n, cells[i].n);
+    const double first = std::max(-250.0, -260.0 + 20.0 * static_cast<double>(i));
+    const double last = first + static_cast<double>(cells[i].n) - 1.0;
+    EXPECT_NEAR(cells[i].omega_radps[0], 0.01 * 0.5 * (first + last), 1e-12) << i;
+    EXPECT_NEAR(same[i].omega_radps[0], cells[i].omega_radps[0], 1e-12) << i;
+    EXPECT_NEAR(same[i].rate_rms_radps, cells[i].rate_rms_radps, 1e-12) << i;
+  }
+}
+
+TEST(MotionLevels, ASpeedHoldsForASecondAndNoLonger) {
+  MotionLevels levels;
+  for (int k = 0; k < 500; ++k) levels.add(at(k / kRate_hz), {}, {});
+  levels.add_speed(at(1.0), -7.0, 0.3);
+  const auto cells = levels.cells();
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const double begin_s = 0.2 * static_cast<double>(i);
+    const bool holds = begin_s > 0.9 && begin_s < 2.1;
+    EXPECT_EQ(cells[i].speed_mps.has_value(), holds) << begin_s;
+    if (!holds) continue;
+    EXPECT_EQ(*cells[i].speed_mps, 7.0) << "backwards is motion, too";
+    EXPECT_EQ(cells[i].speed_sd_mps, 0.3);
+  }
+}
+
+constexpr double kBlock_s = 10.0;
+
+/// A drive whose blocks of ten seconds have the measures given, after half a minute of rest; a measure of
+/// zero is rest. Rate, vibration and speed all have the block's measure.
+struct BlockedDrive {
+  explicit BlockedDrive(const std::vector<double>& measures, bool with_speed = true) {
+    std::vector<RegimeStretch> stretches{{at(0.0), begin(0), 0}};
+    for (std::size_t block = 0; block < measures.size(); ++block) {
+      stretches.push_back({begin(block), begin(block + 1), measures[block] > 0.0 ? 1u : 0u});
+      for (int k = 0; k < static_cast<int>(kBlock_s * kRate_hz); ++k) {
+        const HostTime time = begin(block) + from_seconds(k / kRate_hz);
+        // Of twenty samples about their mean the rms is greater than their size by this.
+        const double size = measures[block] * std::sqrt(19.0 / 20.0);
+        levels.add(time, {measures[block], 0.0, 0.0}, {k % 2 == 0 ? size : -size, 0.0, 0.0});
+        if (with_speed && k % 10 == 0) levels.add_speed(time, measures[block], 0.01);
+      }
+    }
+    motion = RegimeTrack({kStaticName, kDynamicName}, stretches);
+  }
+  static HostTime begin(std::size_t block) { return at(30.0 + kBlock_s * static_cast<double>(block)); }
+  [[nodiscard]] std::vector<std::optional<std::size_t>> bins(Intensity intensity, int n) const {
+    const auto track = intensity_bins(levels, motion, intensity, n, kBlock_s);
+    std::vector<std::optional<std::size_t>> found;
+    for (HostTime t = begin(0) + from_seconds(0.5 * kBlock_s); t < motion.stretches().back().end;
+         t += from_seconds(kBlock_s))
+      found.push_back(track.at(t));
+    return found;
+  }
+  MotionLevels levels;
+  RegimeTrack motion;
+};
+
+using Bins = std::vector<std::optional<std::size_t>>;
+
+TEST(IntensityBins, RateVibrationAndSpeedSplitADriveAlikeWhereTheyAreAlike) {
+  const BlockedDrive drive({1.0, 5.0, 1.1, 5.5, 0.0, 5.2, 0.9});
+  const Bins expected{1, 2, 1, 2, 0, 2, 1};
+  for (const Intensity intensity : {Intensity::kRate, Intensity::kVibration, Intensity::kSpeed})
+    EXPECT_EQ(drive.bins(intensity, 2), expected) << static_cast<int>(intensity);
+}
+
+TEST(IntensityBins, ABlockThatIsNotClearOfTheEdgeStaysInTheBinBeforeItExceptAfterAStandstill) {
+  // The edge is 2: half of the blocks lie below it.
+  const BlockedDrive drive({1.0, 2.02, 1.0, 3.0, 1.98, 3.0, 1.0, 0.0, 2.02, 3.0, 0.0, 1.0, 1.0, 3.0});
+  EXPECT_EQ(drive.bins(Intensity::kRate, 2), (Bins{1, 1, 1, 2, 2, 2, 1, 0, 2, 2, 0, 1, 1, 2}));
+}
+
+TEST(IntensityBins, AJumpOverOneEdgeEndsBeforeTheNextThatItIsNotClearOf) {
+  // Edges are 2 and 4.
+  const BlockedDrive drive({1.0, 4.1, 1.0, 6.0, 3.9, 6.0, 1.0, 3.0, 3.0});
+  EXPECT_EQ(drive.bins(Intensity::kRate, 3), (Bins{1, 2, 1, 3, 3, 3, 1, 2, 2}));
+  // 2 and 5.25.
+  const BlockedDrive down({6.0, 1.95, 6.0, 2.05, 6.5, 4.5, 1.0, 1.0, 3.5});
+  EXPECT_EQ(down.bins(Intensity::kRate, 3), (Bins{3, 2, 3, 2, 3, 2, 1, 1, 2}));
+}
+
+TEST(IntensityBins, WithoutASpeedNoBlockHasABinOfIt) {
+  const BlockedDrive drive({1.0, 0.0, 5.0}, false);
+  EXPECT_EQ(drive.bins(Intensity::kSpeed, 2), (Bins{std::nullopt, 0, std::nullopt}));
+  EXPECT_EQ(drive.bins(Intensity::kRate, 2), (Bins{1, 0, 2}));
+}
+
+TEST(IntensityBins, MoreBinsThanBlocksLeaveNoBlockWithoutOne) {
+  for (const auto& bin : BlockedDrive({3.0}).bins(Intensity::kRate, 5)) {
+    ASSERT_TRUE(bin);
+    EXPECT_GE(*bin, 1u);
+    EXPECT_LE(*bin, 5u);
+  }
 }
 
 }  // namespace
