@@ -50,6 +50,11 @@ class Player {
       if (next_ >= drive_->samples.size()) return false;
       const DriveSample& sample = drive_->samples[next_];
       if (sample.time_s - time_s_ > kGap_s) return false;
+      if (sample.time_s <= time_s_) {  // a second one of the same instant: nothing moved meanwhile
+        measured_ = sample.measured;
+        ++next_;
+        continue;
+      }
       const bool whole = sample.time_s <= to_s;
       const double end_s = whole ? sample.time_s : to_s;
       step(filter, end_s, sample);
@@ -59,6 +64,7 @@ class Player {
   }
 
  private:
+  /// To `end_s`, which lies behind the present and not behind the sample.
   void step(CoastingFilter& filter, double end_s, const DriveSample& towards) {
     const double share = (end_s - time_s_) / (towards.time_s - time_s_);
     const InertialRates end{
@@ -66,10 +72,8 @@ class Player {
         measured_.f_b_mps2 + share * (towards.measured.f_b_mps2 - measured_.f_b_mps2)};
     const int parts = static_cast<int>(std::ceil((end_s - time_s_) / CoastingFilter::kStepMax_s));
     const double dt_s = (end_s - time_s_) / parts;
-    if (dt_s > 0.0) {
-      set_density();
-      for (int i = 0; i < parts; ++i) filter.propagate(measured_, end, dt_s, density_);
-    }
+    set_density();
+    for (int i = 0; i < parts; ++i) filter.propagate(measured_, end, dt_s, density_);
     measured_ = end;
     time_s_ = end_s;
   }

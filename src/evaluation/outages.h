@@ -35,7 +35,7 @@ struct DriveReference {
   KinematicVector sd = KinematicVector::Zero();
 };
 
-/// All in order of time.
+/// All in order of time; of samples of one instant the last one counts.
 struct Drive {
   std::vector<DriveSample> samples;
   std::vector<DriveFix> fixes;
@@ -63,9 +63,10 @@ struct OutageResult {
   KinematicVector reference_sd;    ///< of what it is compared with
 };
 
-/// Plays the outages. Starts where samples, fixes or reference are missing for longer than half a second are
-/// left out; after such a gap of the samples the filter starts anew. An empty result: the drive is too short,
-/// or its parts do not overlap.
+/// Plays the outages. Starts without a fix in the two seconds before them are left out, and durations at
+/// whose end, or on whose way, reference or samples are missing for longer than half a second; after such a
+/// gap of the samples the filter starts anew. An empty result: the drive is too short, or its parts do not
+/// overlap.
 std::vector<OutageResult> play_outages(const Drive& drive, const CoastingModel& model,
                                        const OutageOptions& options);
 

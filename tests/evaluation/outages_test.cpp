@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -300,6 +301,146 @@ TEST(Outages, AJumpOfTheReceiverIsRefused) {
   ASSERT_FALSE(clean.empty());
   // Five fixes of fifty a window are lost, no more.
   EXPECT_LT((clean.front().error - jumped.front().error).head<3>().norm(), 0.2);
+}
+
+/// Outages every five seconds, so that they overlap.
+OutageOptions many_outages() {
+  OutageOptions options = one_outage();
+  options.spacing_s = 5.0;
+  return options;
+}
+
+TEST(Outages, ASampleThatComesTwiceChangesNothing) {
+  const CoastingModel model = mtx_like();
+  Drive drive = simulated(model, 13, kSettle_s + kOutage_s + 2.0);
+  const auto clean = play_outages(drive, model, one_outage());
+  drive.samples.insert(drive.samples.begin(), drive.samples.front());
+  drive.samples.insert(drive.samples.begin() + 3000, drive.samples[3000]);
+  const auto doubled = play_outages(drive, model, one_outage());
+  ASSERT_EQ(clean.size(), 2U);
+  ASSERT_EQ(doubled.size(), clean.size());
+  for (std::size_t i = 0; i < clean.size(); ++i) {
+    EXPECT_EQ(doubled[i].error, clean[i].error);
+    EXPECT_EQ(doubled[i].covariance, clean[i].covariance);
+  }
+}
+
+TEST(Outages, NoneBeginsBeforeTheVehicleHasDrivenAndWhereItOnlyStandsThereIsNone) {
+  const CoastingModel model = mtx_like();
+  Drive drive = simulated(model, 17, 100.0);
+  constexpr double kStart_s = 20.0;
+  for (DriveReference& at : drive.reference) {
+    if (at.time_s < kStart_s) at.state.v_n_mps.setZero();
+  }
+  const auto results = play_outages(drive, model, many_outages());
+  ASSERT_FALSE(results.empty());
+  EXPECT_NEAR(results.front().start_s, kStart_s + kSettle_s, 1.0);
+  for (DriveReference& at : drive.reference) at.state.v_n_mps.setZero();
+  EXPECT_TRUE(play_outages(drive, model, many_outages()).empty());
+}
+
+TEST(Outages, NoneBeginsWithoutAFixShortlyBeforeIt) {
+  const CoastingModel model = mtx_like();
+  Drive drive = simulated(model, 19, 120.0);
+  constexpr double kHoleBegin_s = 51.0;
+  constexpr double kHoleEnd_s = 64.0;
+  std::erase_if(drive.fixes,
+                [](const DriveFix& f) { return f.time_s > kHoleBegin_s && f.time_s < kHoleEnd_s; });
+  OutageOptions options = many_outages();
+  options.spacing_s = 0.2;
+  bool before = false;
+  bool after = false;
+  for (const OutageResult& result : play_outages(drive, model, options)) {
+    before = before || result.start_s < kHoleBegin_s;
+    after = after || result.start_s > kHoleEnd_s;
+    EXPECT_TRUE(result.start_s <= kHoleBegin_s || result.start_s > kHoleEnd_s + 0.1) << result.start_s;
+  }
+  EXPECT_TRUE(before && after);
+}
+
+TEST(Outages, WhereTheReferenceIsMissingNothingIsComparedAndNothingCountsAsDriven) {
+  const CoastingModel model = mtx_like();
+  const Drive whole = simulated(model, 23, 100.0);
+  const auto without = [&](double begin_s, double end_s) {
+    Drive drive = whole;
+    std::erase_if(drive.reference,
+                  [=](const DriveReference& r) { return r.time_s > begin_s && r.time_s < end_s; });
+    return play_outages(drive, model, one_outage());
+  };
+  const auto all = play_outages(whole, model, one_outage());
+  ASSERT_EQ(all.size(), 2U);
+  const double start_s = all.front().start_s;
+  // Missing at the end of the longer duration: the shorter one is still there.
+  const auto cut = without(start_s + kOutage_s - 3.0, start_s + kOutage_s + 3.0);
+  ASSERT_EQ(cut.size(), 1U);
+  EXPECT_EQ(cut.front().duration_s, 5.0);
+  EXPECT_EQ(cut.front().error, all.front().error);
+  // Missing for fifteen seconds while the filter settles: so much later.
+  const auto late = without(10.0, 25.0);
+  ASSERT_FALSE(late.empty());
+  EXPECT_NEAR(late.front().start_s - start_s, 15.0, 1.5);
+}
+
+TEST(Outages, VelocityFixesAreTakenAndTheFilterKnowsWhatTheyGave) {
+  const CoastingModel model = mtx_like();
+  constexpr double kVelocitySd_mps = 0.02;
+  const auto make = [&](std::uint64_t seed) {
+    Drive drive = simulated(model, seed, kSettle_s + kOutage_s + 2.0);
+    std::mt19937_64 random(1000 + seed);
+    std::normal_distribution<double> normal;
+    for (std::size_t i = 0; i < drive.fixes.size(); ++i) {
+      const NavigationState& at = drive.reference[i].state;
+      DriveFix& fix = drive.fixes[i];
+      fix.has_velocity = true;
+      // Of the antenna, which turns about the sensor; the Earth's own rotation is some 0.1 mm/s of it.
+      fix.v_n_mps = at.v_n_mps + at.C_b_n * Road::omega(fix.time_s).cross(drive.r_sa_s_m) +
+                    kVelocitySd_mps * Vector3d(normal(random), normal(random), normal(random));
+      fix.sd_velocity_mps.setConstant(kVelocitySd_mps);
+    }
+    return drive;
+  };
+  const auto with = over_drives(model, make);
+  const auto without = over_drives(
+      model, [&](std::uint64_t seed) { return simulated(model, seed, kSettle_s + kOutage_s + 2.0); });
+  ASSERT_EQ(with.size(), 2U);
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    EXPECT_TRUE(lies_where_a_right_model_does(with[i].nees_position, with[i].n)) << with[i].nees_position;
+    EXPECT_TRUE(lies_where_a_right_model_does(with[i].nees_velocity, with[i].n)) << with[i].nees_velocity;
+    EXPECT_TRUE(lies_where_a_right_model_does(with[i].nees_attitude, with[i].n)) << with[i].nees_attitude;
+    EXPECT_LT(with[i].velocity_sd_mps, without[i].velocity_sd_mps);
+  }
+  EXPECT_LT(with[0].velocity_rms_mps, without[0].velocity_rms_mps);
+}
+
+TEST(Outages, ThoseThatOverlapDoNotCountAsIndependent) {
+  const CoastingModel model = mtx_like();
+  const auto results = play_outages(simulated(model, 29, 100.0), model, many_outages());
+  const auto table = consistency_of(results, {5.0, 15.0, kOutage_s});
+  ASSERT_EQ(table.size(), 2U) << "no outage was looked at after 15 s";
+  for (const Consistency& row : table) {
+    EXPECT_GT(row.n, 5U);
+    // Starts are five seconds apart, or at the next fix.
+    const double apart_s = row.duration_s > 5.0 ? 5.2 * std::ceil(row.duration_s / 5.2) : 5.2;
+    EXPECT_NEAR(static_cast<double>(row.n_independent), std::ceil(5.2 * static_cast<double>(row.n) / apart_s),
+                1.0);
+  }
+  EXPECT_LT(table[1].n_independent, table[1].n);
+  // Fewer that are independent leave more room for chance.
+  EXPECT_LT(table[1].nees_low, table[0].nees_low);
+  EXPECT_GT(table[1].nees_high, table[0].nees_high);
+}
+
+TEST(Outages, ProgressRisesToTheEndOfTheDrive) {
+  const CoastingModel model = mtx_like();
+  OutageOptions options = many_outages();
+  std::vector<double> shares;
+  options.progress = [&](double share) { shares.push_back(share); };
+  (void)play_outages(simulated(model, 31, 90.0), model, options);
+  ASSERT_GE(shares.size(), 5U);
+  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
+  EXPECT_GT(shares.front(), 0.3);
+  EXPECT_GT(shares.back(), 0.9);
+  EXPECT_LE(shares.back(), 1.0);
 }
 
 }  // namespace
