@@ -105,5 +105,30 @@ TEST(ErrorRow, WithoutScaleErrorTheRemainderNoLongerFollowsThePrediction) {
   for (const double e : corrected.e_gyro_radps) EXPECT_NEAR(e, 0.1, 1e-15);
 }
 
+TEST(ErrorRow, LiveIsThatOfTheEstimateAsItStood) {
+  StudyEpoch epoch{};
+  epoch.sample.flags = kGyroValid | kAccelValid;
+  epoch.sample.counter = 77;
+  epoch.sample.omega_radps = {0.5, 0.0, 0.0};
+  epoch.sample.f_mps2 = {0.0, 0.0, -9.0};
+  // A quarter turn about z takes y of b to x of s; one metre along x of b, turning about z at 2 rad/s.
+  epoch.C_b_s = {0, 1, 0, -1, 0, 0, 0, 0, 1};
+  epoch.r_bs_b_m = {1.0, 0.0, 0.0};
+  epoch.omega_ib_b_radps = {0.0, 0.0, 2.0};
+  epoch.f_b_mps2 = {0.0, 0.0, -9.8};
+  epoch.reference_gyro_bias_radps = {0.3, 0.2, 0.1};
+  epoch.reference_accel_bias_mps2 = {0.3, 0.2, 0.1};
+  const auto row = live_error_row(epoch);
+  EXPECT_EQ(row.counter, 77);
+  EXPECT_EQ(row.predicted_omega_s_radps, (Vector3{0.0, 0.0, 2.0}))
+      << "the epoch's reference has its bias taken out";
+  EXPECT_EQ(row.e_gyro_radps, (Vector3{0.5, 0.0, -2.0}));
+  // Centripetal: omega^2 r towards the middle, along -x of b, which is y of s.
+  EXPECT_NEAR(row.predicted_f_s_mps2[0], 0.0, 1e-12);
+  EXPECT_NEAR(row.predicted_f_s_mps2[1], 4.0, 1e-12);
+  EXPECT_NEAR(row.predicted_f_s_mps2[2], -9.8, 1e-12);
+  EXPECT_NEAR(row.e_accel_mps2[2], 0.8, 1e-12);
+}
+
 }  // namespace
 }  // namespace imuscope

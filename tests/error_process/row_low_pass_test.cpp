@@ -71,5 +71,26 @@ TEST(RowLowPass, AfterAGapRowsAreNotValidUntilItHasSettled) {
   EXPECT_TRUE(valid_at(200));
 }
 
+TEST(RowLowPass, WhatAnInvalidTriadHeldReachesNoRowThatIsValid) {
+  for (const bool gyro : {true, false}) {
+    RowLowPass filter(kRate_hz, 10.0);
+    int valid = 0;
+    for (std::int64_t k = 0; k < 300; ++k) {
+      const bool is_clipped = k >= 100 && k < 105;
+      ErrorRow row = row_at(k, is_clipped ? 1e9 : 1.0);
+      (gyro ? row.gyro_valid : row.accel_valid) = !is_clipped;
+      filter.apply(row);
+      if (is_clipped) {
+        EXPECT_FALSE(gyro ? row.gyro_valid : row.accel_valid);
+      }
+      if (!row.gyro_valid || !row.accel_valid) continue;
+      ++valid;
+      EXPECT_NEAR(row.e_gyro_radps[0], 1.0, 1e-12) << k;
+      EXPECT_NEAR(row.e_accel_mps2[0], 1.0, 1e-12) << k;
+    }
+    EXPECT_GT(valid, 200);
+  }
+}
+
 }  // namespace
 }  // namespace imuscope
