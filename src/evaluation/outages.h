@@ -63,9 +63,9 @@ struct OutageResult {
   KinematicVector reference_sd;    ///< of what it is compared with
 };
 
-/// Plays the outages. Starts without a fix in the two seconds before them are left out, and durations at
-/// whose end, or on whose way, reference or samples are missing for longer than half a second; after such a
-/// gap of the samples the filter starts anew. An empty result: the drive is too short, or its parts do not
+/// Plays the outages. Starts without a fix in the two seconds before them are left out; so are durations
+/// without a reference within half a second of their end, or with a longer gap of the samples on their way.
+/// After such a gap the filter starts anew. An empty result: the drive is too short, or its parts do not
 /// overlap.
 std::vector<OutageResult> play_outages(const Drive& drive, const CoastingModel& model,
                                        const OutageOptions& options);
