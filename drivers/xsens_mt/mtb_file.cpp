@@ -4,21 +4,41 @@
 
 namespace imuscope::xsens {
 
+namespace {
+
+/// Frames of which each begins where the one before it ends.
+struct Chain {
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+  int frames = 0;
+
+  void add(const Frame& frame) noexcept {
+    if (frames == 0 || frame.offset != end) *this = {frame.offset, frame.offset, 0};
+    end = frame.offset + frame.size;
+    ++frames;
+  }
+};
+
+}  // namespace
+
 std::optional<std::size_t> data_offset_of_mtb(std::span<const std::uint8_t> beginning) noexcept {
   Scanner scanner;
   Frame frame;
-  std::uint64_t chain_begin = 0;
-  std::uint64_t chain_end = 0;
-  int chained = 0;
+  Chain outer;
+  // Inside the last frame of the other: data of it that look like frames, or, where that frame is a false
+  // one, the first good ones.
+  Chain inner;
   while (!beginning.empty()) {
     beginning = beginning.subspan(scanner.append(beginning, HostTime{}));
     while (scanner.next(frame)) {
-      if (chained == 0 || frame.offset != chain_end) {
-        chain_begin = frame.offset;
-        chained = 0;
+      if (frame.nested) {
+        inner.add(frame);
+        continue;
       }
-      chain_end = frame.offset + frame.size;
-      if (++chained == kChainedFrames) return static_cast<std::size_t>(chain_begin);
+      if (frame.offset != outer.end && frame.offset == inner.end) outer = inner;
+      outer.add(frame);
+      inner = {};
+      if (outer.frames >= kChainedFrames) return static_cast<std::size_t>(outer.begin);
     }
   }
   return std::nullopt;
