@@ -230,12 +230,17 @@ Result<Problem> problem_of(std::span<const DrivenWindow> windows, const Model& m
   if (problem.levels.empty()) return work_error("the windows are too short", "use longer windows");
   const auto rows = static_cast<Index>(problem.levels.size());
   const auto n = static_cast<double>(windows.size());
+  const auto unknown = std::find_if(windows.begin(), windows.end(),
+                                    [](const DrivenWindow& w) { return !std::isfinite(w.driver); });
+  if (unknown != windows.end())
+    return work_error(fmt::format("the driver of window {} is no number", unknown - windows.begin() + 1),
+                      "leave windows without a driver out");
   double mean = 0.0;
   for (const auto& w : windows) mean += w.driver / n;
   double variance = 0.0;
   for (const auto& w : windows) variance += (w.driver - mean) * (w.driver - mean) / n;
   constexpr double kConstant = 1e-9;
-  if (!(variance > kConstant * kConstant * (mean * mean + variance)) || !std::isfinite(variance))
+  if (!(variance > kConstant * kConstant * (mean * mean + variance)))
     return work_error("the driver does not vary", "a dependence shows only where what it is on changes");
   problem.x_scale = std::sqrt(variance);
   problem.x.resize(static_cast<Index>(windows.size()));

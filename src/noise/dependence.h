@@ -63,8 +63,8 @@ inline constexpr std::size_t kFewestWindows = 12;
 
 /// @param windows  all of one length, so that one covariance serves them
 /// @param start    a fit of the same signal: which processes, and where the search begins
-/// Errors (kWork): fewer than kFewestWindows windows; a driver that does not vary; no level with enough
-/// coefficients; a search that does not settle.
+/// Errors (kWork): fewer than kFewestWindows windows; a driver that is no number or does not vary; no level
+/// with enough coefficients; a search that does not settle.
 Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const FitResult& start,
                                   const DependenceOptions& options = {});
 

@@ -102,7 +102,8 @@ Result<std::vector<LeftOut>> leave_one_out(std::span<const WaveletVariance> repl
         [&](const WvLevel& level) { return has_enough_coefficients(level, replicates[k].efficiency); }));
     out.emplace_back(pool(others), replicates[k], wv_covariance(reference, replicates[k], levels));
     if (!out.back().valid())
-      return work_error(fmt::format("replicate {} is too short to be predicted", k + 1));
+      return work_error(fmt::format("replicate {} is too short to be predicted", k + 1),
+                        "leave it out, or give a longer record in its place");
   }
   return out;
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace imuscope::noise {
@@ -88,6 +89,69 @@ TEST(Dependence, WindowsThatDoNotVaryAndTooFewOfThemAreRefused) {
   const auto constant = fit_dependence(example.windows, example.start);
   ASSERT_FALSE(constant);
   EXPECT_THAT(constant.error().text(), ::testing::HasSubstr("does not vary"));
+}
+
+TEST(Dependence, WindowsTooShortForAnyLevelAreRefused) {
+  auto example = example_of(white_windows(20, 0.0, 4), "WN");
+  for (auto& window : example.windows)
+    window.wv = haar_wavelet_variance(std::vector<double>{0.1, -0.2, 0.3}).value();
+  const auto refused = fit_dependence(example.windows, example.start);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), ::testing::HasSubstr("windows are too short"));
+  EXPECT_FALSE(refused.error().remedy.empty());
+}
+
+TEST(Dependence, ADriverThatIsNoNumberSomewhereIsRefused) {
+  auto example = example_of(white_windows(20, 0.0, 5), "WN");
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    auto windows = example.windows;
+    windows[7].driver = bad;
+    const auto refused = fit_dependence(windows, example.start);
+    ASSERT_FALSE(refused) << bad;
+    EXPECT_THAT(refused.error().text(), ::testing::HasSubstr("driver of window 8 is no number"));
+  }
+}
+
+TEST(WhiteNoiseOfAWindow, IsThatOfTheWindowWithAnIntervalThatHoldsItAsOftenAsItSays) {
+  // A Gauss-Markov process beside white noise of another variance than the model's.
+  const Model model{{{ProcessKind::kWhiteNoise, 1.0, {}}, {ProcessKind::kGaussMarkov, 0.3, {0.02, 0.0}}}};
+  constexpr double kVariance = 1.2;
+  constexpr int kWindows = 300;
+  std::mt19937 random(21);
+  std::normal_distribution<double> normal;
+  const double phi = std::exp(-0.02);
+  double sum = 0.0;
+  int held = 0;
+  for (int w = 0; w < kWindows; ++w) {
+    std::vector<double> x(kWindow);
+    double state = std::sqrt(0.3) * normal(random);
+    for (double& value : x) {
+      state = phi * state + std::sqrt(0.3 * (1.0 - phi * phi)) * normal(random);
+      value = state + std::sqrt(kVariance) * normal(random);
+    }
+    const auto found = white_noise_of(haar_wavelet_variance(x).value(), model, 0.9);
+    ASSERT_TRUE(found);
+    EXPECT_LT(found->ci_low, found->value);
+    EXPECT_GT(found->ci_high, found->value);
+    sum += found->value;
+    held += found->ci_low <= kVariance && kVariance <= found->ci_high ? 1 : 0;
+  }
+  // The variance of 2000 values of white noise by their differences is known to 4 %.
+  EXPECT_NEAR(sum / kWindows, kVariance, 4.0 * 0.04 * kVariance / std::sqrt(kWindows));
+  // 270 of 300, sd 5.2.
+  EXPECT_NEAR(held, 270, 21);
+}
+
+TEST(WhiteNoiseOfAWindow, IsAbsentWhereNothingSaysWhatItIs) {
+  const Model white{{{ProcessKind::kWhiteNoise, 1.0, {}}}};
+  const Model loud{{{ProcessKind::kWhiteNoise, 1.0, {}}, {ProcessKind::kGaussMarkov, 100.0, {1.0, 0.0}}}};
+  const Model none{{{ProcessKind::kGaussMarkov, 1.0, {0.02, 0.0}}}};
+  const auto window = haar_wavelet_variance(white_windows(2, 0.0, 6).front()).value();
+  EXPECT_TRUE(white_noise_of(window, white, 0.95));
+  EXPECT_FALSE(white_noise_of(WaveletVariance{}, white, 0.95)) << "a window without a level";
+  EXPECT_FALSE(white_noise_of(window, none, 0.95)) << "a model without white noise";
+  EXPECT_FALSE(white_noise_of(window, loud, 0.95)) << "a model that explains more than is there";
 }
 
 }  // namespace

@@ -1,0 +1,105 @@
+#include "noise/select.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace imuscope::noise {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// White noise, and where `markov` is above zero a Gauss-Markov process of that sd and of 20 samples.
+WaveletVariance record(std::size_t n, double markov, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> x(n);
+  double state = markov * normal(random);
+  const double phi = std::exp(-1.0 / 20.0);
+  for (double& v : x) {
+    state = phi * state + markov * std::sqrt(1.0 - phi * phi) * normal(random);
+    v = normal(random) + state;
+  }
+  return haar_wavelet_variance(x).value();
+}
+
+std::vector<WaveletVariance> records(std::size_t count, double markov, unsigned seed) {
+  std::vector<WaveletVariance> out;
+  for (std::size_t i = 0; i < count; ++i)
+    out.push_back(record(8192, markov, seed + static_cast<unsigned>(i)));
+  return out;
+}
+
+TEST(RankModels, ATermThatEarnsNothingIsLeftOutWithTheReasonInWords) {
+  const auto ranked = rank_models(record(40'000, 0.0, 1), parse_model("WN+GM").value(), 100.0).value();
+  ASSERT_EQ(ranked.size(), 3U);
+  EXPECT_EQ(ranked.front().fit.spec.name(), "WN");
+  for (const auto& model : ranked) EXPECT_FALSE(model.reason.empty()) << model.fit.spec.name();
+}
+
+TEST(CrossValidation, ARightModelMissesAReplicateByOneVarianceALevel) {
+  const auto replicates = records(12, 0.0, 10);
+  const auto ranked = cross_validate(replicates, parse_model("WN").value(), 100.0).value();
+  ASSERT_EQ(ranked.size(), 1U);
+  std::size_t levels = 0;
+  for (const auto& level : replicates.front().levels)
+    levels += has_enough_coefficients(level, replicates.front().efficiency) ? 1 : 0;
+  // Chi-square with so many degrees of freedom, twelve of them; that the model is fitted to eleven others
+  // adds an eleventh of a degree.
+  const auto dof = static_cast<double>(levels);
+  EXPECT_NEAR(ranked.front().score, dof, 4.0 * std::sqrt(2.0 * dof / 12.0));
+  EXPECT_EQ(ranked.front().worse_by, 0.0);
+  EXPECT_EQ(ranked.front().reason, "predicts a replicate left out best");
+}
+
+TEST(CrossValidation, OfEquivalentModelsTheSimplestComesFirstAndSaysSo) {
+  int simplest = 0;
+  int said = 0;
+  for (unsigned seed = 100; seed < 2000; seed += 100) {
+    const auto ranked = cross_validate(records(6, 0.0, seed), parse_model("WN+GM").value(), 100.0).value();
+    ASSERT_EQ(ranked.size(), 3U);
+    const auto& first = ranked.front();
+    if (first.pooled.spec.name() == "WN") ++simplest;
+    if (first.worse_by == 0.0) continue;
+    // It stands before the one that predicts best.
+    ++said;
+    EXPECT_LE(first.worse_by, first.worse_by_sd);
+    EXPECT_THAT(first.reason, HasSubstr("equivalent: worse by "));
+    EXPECT_THAT(first.reason, HasSubstr(", and simpler than " + ranked[1].pooled.spec.name()));
+    EXPECT_EQ(ranked[1].reason.rfind("predicts a replicate left out best", 0), 0U);
+  }
+  EXPECT_GE(simplest, 15) << "of 19";
+  EXPECT_GE(said, 1);
+}
+
+TEST(CrossValidation, ATermThatTheDataHoldIsKeptAndTheModelWithoutItIsWorse) {
+  const auto ranked = cross_validate(records(6, 0.7, 50), parse_model("WN+GM").value(), 100.0).value();
+  ASSERT_EQ(ranked.size(), 3U);
+  EXPECT_EQ(ranked.front().pooled.spec.name(), "WN+GM");
+  EXPECT_EQ(ranked.front().worse_by, 0.0);
+  for (std::size_t i = 1; i < ranked.size(); ++i) {
+    EXPECT_GT(ranked[i].worse_by, 4.0 * ranked[i].worse_by_sd);
+    EXPECT_EQ(ranked[i].reason.rfind("worse by ", 0), 0U) << ranked[i].reason;
+    EXPECT_GE(ranked[i].score, ranked[i - 1].score);
+  }
+}
+
+TEST(CrossValidation, WhatCannotBeLeftOutIsRefused) {
+  const auto spec = parse_model("WN").value();
+  const auto two = cross_validate(records(2, 0.0, 1), spec, 100.0);
+  ASSERT_FALSE(two);
+  EXPECT_EQ(two.error().kind, ErrorKind::kUsage);
+  EXPECT_THAT(two.error().text(), HasSubstr("2 replicates are too few"));
+  EXPECT_THAT(two.error().remedy, HasSubstr("at least 3"));
+  auto replicates = records(4, 0.0, 1);
+  replicates[2] = record(5, 0.0, 9);
+  const auto shortest = cross_validate(replicates, spec, 100.0);
+  ASSERT_FALSE(shortest);
+  EXPECT_THAT(shortest.error().text(), HasSubstr("replicate 3 is too short"));
+  EXPECT_FALSE(shortest.error().remedy.empty());
+}
+
+}  // namespace
+}  // namespace imuscope::noise
