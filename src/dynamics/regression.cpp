@@ -39,9 +39,9 @@ Columns independent_columns(const MatrixXd& gram, Index nuisance, Index covariat
       continue;
     }
     if (i < nuisance) continue;
-    // Against the intercept alone, which is the first column.
-    const bool constant = before <= 0.0 || gram(0, 0) <= 0.0 ||
-                          before - gram(0, i) * gram(0, i) / gram(0, 0) <= kCollinearShare * before;
+    // Against the intercept alone, which is the first column and never zero where another one is not.
+    const bool constant =
+        before <= 0.0 || before - gram(0, i) * gram(0, i) / gram(0, 0) <= kCollinearShare * before;
     columns.left_out.emplace_back(static_cast<std::size_t>(i - nuisance),
                                   constant ? LeftOut::kConstant : LeftOut::kCollinear);
   }
@@ -162,8 +162,7 @@ std::optional<Regression> RegressionSums::solve(double confidence, const NoiseUn
   if (tested == 0 || n_ <= columns.kept.size()) return std::nullopt;
 
   const Solution full = least_squares(sums, columns.kept);
-  const double null_rss =
-      null_columns.empty() ? sums(sums.rows() - 1, sums.rows() - 1) : least_squares(sums, null_columns).rss;
+  const double null_rss = least_squares(sums, null_columns).rss;
 
   Regression result;
   result.n = n_;

@@ -54,7 +54,8 @@ class RegressionSums {
  public:
   RegressionSums(std::size_t nuisance, std::size_t covariates);
 
-  /// One row: nuisance columns, covariates, then y; size nuisance + covariates + 1. All finite.
+  /// One row: nuisance columns with the intercept first, covariates, then y; size nuisance + covariates + 1.
+  /// All finite.
   void add(std::span<const double> row);
   [[nodiscard]] std::size_t count() const { return n_; }
 

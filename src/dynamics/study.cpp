@@ -113,13 +113,14 @@ std::vector<AxisSums> all_sums(const std::array<AxisColumns, kErrorAxes>& column
 std::vector<AxisSums> ordinary_sums(ErrorRowSource& rows) {
   auto columns = all_columns();
   auto sums = all_sums(columns);
-  rows.rewind();
-  ErrorRow row{};
-  while (rows.next(row)) {
-    for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
-      if (columns[axis].fill(row)) sums[axis].add(columns[axis].all());
-    }
-  }
+  for_each_counter(
+      rows,
+      [&](const ErrorRow& row) {
+        for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+          if (columns[axis].fill(row)) sums[axis].add(columns[axis].all());
+        }
+      },
+      [] {});
   return sums;
 }
 

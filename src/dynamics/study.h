@@ -15,7 +15,8 @@
 
 namespace imuscope {
 
-/// Rows of one S-IMU in the order of their counters, readable from the start as often as is needed.
+/// Rows of one S-IMU in the order of their counters, readable from the start as often as is needed. A row
+/// that comes again counts once.
 class ErrorRowSource {
  public:
   virtual ~ErrorRowSource() = default;

@@ -8,6 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "noise/fit.h"
+#include "noise/wavelet_variance.h"
 #include "noise/whitener.h"
 
 namespace imuscope {
@@ -150,6 +152,93 @@ TEST(Regression, WhitenedRowsHoldTheirLevelUnderAutocorrelation) {
   }
   EXPECT_GT(ordinary, kRuns / 4);
   EXPECT_NEAR(generalised, 20, 18);  // 5 % of 400, sd 4.4
+}
+
+TEST(Regression, OfNoRowsHasCoefficientsOfZero) {
+  const RegressionSums sums(2, 3);
+  EXPECT_EQ(sums.count(), 0U);
+  EXPECT_TRUE(sums.all_coefficients().isZero(0.0));
+  EXPECT_TRUE(sums.all_covariances().isZero(0.0));
+  EXPECT_FALSE(sums.solve());
+}
+
+TEST(Regression, ColumnsOfZerosAreLeftOutAndTheOthersAreAsWithoutThem) {
+  MatrixXd rows = random_rows(300, 6);
+  rows.col(1).setZero();  // a nuisance, such as a lever arm's column at standstill
+  rows.col(3).setZero();
+  const auto result = sums_of(rows, 2).solve();
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->left_out.size(), 1U) << "of nuisance columns nothing is said";
+  EXPECT_EQ(result->left_out[0], std::pair(std::size_t{1}, LeftOut::kConstant));
+  MatrixXd X(300, 3);
+  X << rows.col(0), rows.col(2), rows.col(4);
+  const VectorXd beta = X.colPivHouseholderQr().solve(rows.col(5));
+  ASSERT_EQ(result->coefficients.size(), 2U);
+  EXPECT_NEAR(result->coefficients[0].value, beta(1), 1e-8 * std::abs(beta(1)));
+  EXPECT_NEAR(result->coefficients[1].value, beta(2), 1e-8 * std::abs(beta(2)) + 1e-12);
+  EXPECT_EQ(result->dof_rest, 297.0);
+}
+
+/// Columns [1, x1, x2, x3], slow but for the intercept, and y = 0.1 x1 + white noise of variance 1.
+MatrixXd slow_rows(Index n, unsigned seed) {
+  std::mt19937 generator(seed);
+  std::normal_distribution<double> normal;
+  MatrixXd rows(n, 5);
+  Eigen::Vector3d x = Eigen::Vector3d::Zero();
+  for (Index i = 0; i < n; ++i) {
+    for (double& value : x) value = 0.998 * value + 0.06 * normal(generator);
+    rows.row(i) << 1.0, x.transpose(), 0.1 * x(0) + normal(generator);
+  }
+  return rows;
+}
+
+/// Scales of the columns of rows, the last being the error.
+std::vector<ColumnLevel> scales_of(const MatrixXd& rows) {
+  ColumnWavelets wavelets(static_cast<std::size_t>(rows.cols()) - 1);
+  for (Index i = 0; i < rows.rows(); ++i) {
+    const VectorXd row = rows.row(i).head(rows.cols() - 1);
+    wavelets.add({row.data(), static_cast<std::size_t>(row.size())});
+  }
+  return wavelets.levels();
+}
+
+// The less is known of the noise, the less is certain: up to a model of which nothing is known, where the
+// denominator has next to no degree of freedom.
+TEST(Regression, WhereNothingIsKnownOfTheNoiseNothingIsRejected) {
+  const MatrixXd rows = slow_rows(8192, 12);
+  const auto sums = sums_of(rows, 1);
+  std::mt19937 generator(13);
+  std::normal_distribution<double> normal;
+  std::vector<double> noise(static_cast<std::size_t>(rows.rows()));
+  for (double& value : noise) value = normal(generator);
+  const auto wv = noise::haar_wavelet_variance(noise).value();
+  const auto fitted = noise::fit(wv, noise::parse_model("WN").value(), 100.0).value();
+  const auto levels = scales_of(rows);
+  const auto with_error = [&](double share) {
+    auto fit = fitted;
+    fit.model_error = share;
+    const NoiseUncertainty uncertainty(levels, fit, wv);
+    return *sums.solve(0.95, &uncertainty);
+  };
+  const auto certain = *sums.solve();
+  const auto good = with_error(0.01);
+  const auto poor = with_error(0.5);
+  const auto nothing = with_error(1e3);
+  EXPECT_LE(good.dof_rest, certain.dof_rest);
+  EXPECT_LT(poor.dof_rest, good.dof_rest);
+  EXPECT_LT(nothing.dof_rest, 2.0) << "an F of so few has no mean";
+  EXPECT_GT(nothing.dof_rest, 0.0);
+  EXPECT_LT(certain.p_value, 1e-10);
+  EXPECT_GT(nothing.p_value, 1e-3);
+  for (std::size_t i = 0; i < certain.coefficients.size(); ++i) {
+    const auto& c = certain.coefficients[i];
+    const auto& n = nothing.coefficients[i];
+    EXPECT_EQ(n.value, c.value);
+    EXPECT_EQ(n.sd, c.sd);
+    EXPECT_LT(n.ci_low, c.ci_low);
+    EXPECT_GT(n.ci_high, c.ci_high);
+    EXPECT_TRUE(std::isfinite(n.ci_low) && std::isfinite(n.ci_high));
+  }
 }
 
 }  // namespace

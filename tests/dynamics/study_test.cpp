@@ -216,5 +216,112 @@ TEST(StudyDynamics, JsonHasTheFieldsOfTheInterface) {
   EXPECT_NE(projected["coefficients"][0]["means"].get<std::string>().find("delay"), std::string::npos);
 }
 
+/// No number of the regressions is anything but a number, so that their file can be read.
+void expect_numbers(const std::array<AxisDynamics, kErrorAxes>& result) {
+  nlohmann::json json = nlohmann::json::array();
+  append_regressions("mtx1", result, json);
+  EXPECT_EQ(json.dump().find("null"), std::string::npos) << json.dump(2);
+}
+
+TEST(StudyDynamics, AnImuWithoutAccelerometersIsStudiedAsFarAsItGoesAndTheRestSaysWhy) {
+  Drive drive(8);
+  for (auto& row : drive.rows) {
+    row.accel_valid = false;
+    row.e_accel_mps2 = {std::nan(""), std::nan(""), std::nan("")};
+  }
+  Rows rows(drive.rows);
+  const auto result = study_dynamics(rows, options());
+  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+    const auto& a = result[axis];
+    const bool there = axis < 3;
+    EXPECT_EQ(a.ols.has_value(), there);
+    EXPECT_EQ(a.ols_projected.has_value(), there);
+    EXPECT_EQ(a.gls.has_value(), there);
+    EXPECT_EQ(a.gls_projected.has_value(), there);
+    EXPECT_EQ(a.residual_noise.has_value(), there);
+    EXPECT_EQ(a.no_gls_because.empty(), there) << a.no_gls_because;
+  }
+  expect_numbers(result);
+}
+
+TEST(StudyDynamics, ADriveTooShortForANoiseModelKeepsItsLeastSquaresAndSaysWhyThereIsNoMore) {
+  const Drive drive(9, 30);
+  Rows rows(drive.rows);
+  auto demanding = options();
+  demanding.noise_model = *noise::parse_model("WN+GM+GM+RW");
+  const auto result = study_dynamics(rows, demanding);
+  for (const auto& axis : result) {
+    ASSERT_TRUE(axis.ols);
+    EXPECT_EQ(axis.ols->n, 30U);
+    EXPECT_FALSE(axis.gls);
+    EXPECT_FALSE(axis.no_gls_because.empty());
+  }
+  expect_numbers(result);
+}
+
+TEST(StudyDynamics, WithoutAnyRowNothingIsSaidButWhy) {
+  Rows rows({});
+  for (const auto& axis : study_dynamics(rows, options())) {
+    EXPECT_FALSE(axis.ols || axis.ols_projected || axis.gls || axis.gls_projected || axis.residual_noise);
+    EXPECT_FALSE(axis.no_gls_because.empty());
+  }
+}
+
+TEST(StudyDynamics, ARowThatComesTwiceCountsOnce) {
+  const Drive drive(10);
+  std::vector<ErrorRow> doubled;
+  for (const auto& row : drive.rows) {
+    doubled.push_back(row);
+    if (row.counter % 3 == 0) doubled.push_back(row);
+  }
+  Rows once(drive.rows);
+  Rows twice(doubled);
+  const auto expected = study_dynamics(once, options());
+  const auto result = study_dynamics(twice, options());
+  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+    EXPECT_EQ(result[axis].ols->n, drive.rows.size());
+    EXPECT_EQ(result[axis].gls->n, drive.rows.size());
+    EXPECT_EQ(result[axis].ols->f, expected[axis].ols->f);
+    EXPECT_EQ(result[axis].gls_projected->f, expected[axis].gls_projected->f);
+  }
+}
+
+// A counter that jumps, as after a change of the device, must not be taken for samples that are missing one
+// by one.
+TEST(StudyDynamics, AHoleOfYearsCostsNoMoreThanOneAfterWhichNothingIsKnownOfTheNoise) {
+  const Drive drive(11);
+  const auto with_hole = [&](std::int64_t missing) {
+    auto rows = drive.rows;
+    for (std::size_t i = rows.size() / 2; i < rows.size(); ++i) rows[i].counter += missing;
+    Rows source(rows);
+    return study_dynamics(source, options());
+  };
+  const auto minutes = with_hole(60'000);
+  const auto years = with_hole(std::int64_t{1} << 50U);
+  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+    ASSERT_TRUE(years[axis].gls);
+    EXPECT_EQ(years[axis].gls->n, drive.rows.size());
+    EXPECT_EQ(years[axis].gls->f, minutes[axis].gls->f);
+    EXPECT_EQ(years[axis].ols->f, minutes[axis].ols->f);
+  }
+}
+
+TEST(StudyDynamics, AnErrorThatIsExplainedWholeOrNotThereGivesNumbersOrNothing) {
+  Drive drive(12);
+  for (auto& row : drive.rows) {
+    row.e_gyro_radps = {0.0, 0.25 * row.predicted_f_s_mps2[0], 7.0};
+    row.e_accel_mps2 = {};
+  }
+  Rows rows(drive.rows);
+  const auto result = study_dynamics(rows, options());
+  EXPECT_FALSE(result[0].ols) << "nothing is left to compare with";
+  EXPECT_FALSE(result[0].gls);
+  if (result[1].ols) {
+    EXPECT_NEAR(find(result[1].ols, 9)->value, 0.25, 1e-9);
+    EXPECT_GT(result[1].ols->r2, 1.0 - 1e-9);
+  }
+  expect_numbers(result);
+}
+
 }  // namespace
 }  // namespace imuscope
