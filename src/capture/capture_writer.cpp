@@ -1,6 +1,7 @@
 #include "capture/capture_writer.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -33,6 +34,10 @@ std::string remedy_of(int error) {
       return "choose a folder that this user may write";
     case EEXIST:
       return "choose another name: a capture is never overwritten";
+    case EFBIG:
+      return "raise the limit on the size of files (ulimit -f), or record on another file system";
+    case ENOENT:
+      return "leave the folder of a run alone while it is recorded";
     case EIO:
     case ENODEV:
     case ENXIO:
@@ -88,13 +93,26 @@ void CaptureWriter::append(std::string_view channel, std::int64_t utime, std::sp
   pending_records_ += 1;
 }
 
+bool CaptureWriter::is_removed() const noexcept {
+  struct stat mine {};
+  struct stat there {};
+  // Some file systems know no count of names, so that a file has none though it is there.
+  return ::fstat(file_, &mine) == 0 && mine.st_nlink == 0 &&
+         (::stat(path_.c_str(), &there) != 0 || there.st_ino != mine.st_ino || there.st_dev != mine.st_dev);
+}
+
 Result<void> CaptureWriter::flush() {
+  if (is_removed()) {
+    records_lost_ += std::exchange(records_written_, 0);
+    bytes_written_ = 0;
+    return give_up_pending("was removed while it was recorded", ENOENT);
+  }
   std::span<const std::uint8_t> rest(pending_);
   while (!rest.empty()) {
     const ssize_t n = ::write(file_, rest.data(), rest.size());
     if (n < 0) {
       if (errno == EINTR) continue;
-      return give_up_pending(errno);
+      return give_up_pending("records were lost", errno);
     }
     rest = rest.subspan(static_cast<std::size_t>(n));
   }
@@ -105,7 +123,7 @@ Result<void> CaptureWriter::flush() {
   return {};
 }
 
-Result<void> CaptureWriter::give_up_pending(int error) {
+Result<void> CaptureWriter::give_up_pending(const char* what, int error) {
   // A part of a record would hide the next one from simple readers. Where even cutting fails, the file is
   // unreachable and the next flush says so again.
   const auto whole = static_cast<off_t>(bytes_written_);
@@ -113,7 +131,7 @@ Result<void> CaptureWriter::give_up_pending(int error) {
   records_lost_ += pending_records_;
   pending_.clear();
   pending_records_ = 0;
-  return tl::unexpected(file_error(path_, "records were lost", error));
+  return tl::unexpected(file_error(path_, what, error));
 }
 
 Result<void> CaptureWriter::close() {

@@ -17,7 +17,8 @@ namespace imuscope {
 /// survives the death of the process. Thread: one, of the soft world.
 ///
 /// When the disk refuses (full, removed), the file is cut back to its last whole record, what could not be
-/// written is counted as lost, and the next flush tries again.
+/// written is counted as lost, and the next flush tries again. When somebody removed the file, all that was
+/// in it is counted as lost.
 class CaptureWriter {
  public:
   /// Creates the file and its folder. An existing file is never overwritten: that is an error.
@@ -38,6 +39,9 @@ class CaptureWriter {
   /// Hands all waiting records to the kernel.
   Result<void> flush();
 
+  /// Somebody removed the file: what is written goes nowhere.
+  [[nodiscard]] bool is_removed() const noexcept;
+
   /// Flushes, waits until the disk has everything, closes.
   Result<void> close();
 
@@ -48,7 +52,7 @@ class CaptureWriter {
 
  private:
   CaptureWriter(std::filesystem::path path, int file) : path_(std::move(path)), file_(file) {}
-  Result<void> give_up_pending(int error);
+  Result<void> give_up_pending(const char* what, int error);
 
   std::filesystem::path path_;
   int file_;

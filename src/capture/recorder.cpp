@@ -163,21 +163,25 @@ void Recorder::flush() {
   rotate_if_due();
 }
 
-/// Where the next file cannot be made, the present one goes on and the problem shows in the status.
+/// Where the next file cannot be made, the present one goes on and the problem shows in the status. In place
+/// of one that somebody removed, a new one begins.
 void Recorder::rotate_if_due() {
   const bool is_full = options_.max_file_bytes > 0 && writer_->bytes_written() >= options_.max_file_bytes;
   const bool is_old =
       options_.max_file_age > Duration::zero() && host_now() - file_begin_ >= options_.max_file_age;
-  if (!is_full && !is_old) return;
-  auto next = begin_file(options_, file_number_ + 1);
+  const bool is_removed = writer_->is_removed();
+  if (!is_full && !is_old && !is_removed) return;
+  const int number = file_number_ + (is_removed ? 0 : 1);
+  auto next = begin_file(options_, number);
   Result<void> outcome;
   if (next) {
     outcome = writer_->close();
+    if (is_removed && !outcome) finished_.problem = std::exchange(outcome, {}).error();
     finished_.bytes += writer_->bytes_written();
     finished_.records += writer_->records_written();
     finished_.records_lost += writer_->records_lost();
     writer_ = std::move(*next);
-    file_number_ += 1;
+    file_number_ = number;
     file_begin_ = host_now();
   } else {
     outcome = tl::unexpected(next.error());
@@ -191,7 +195,7 @@ void Recorder::update_status(const Result<void>& flushed) {
   status_.bytes = finished_.bytes + writer_->bytes_written();
   status_.records = finished_.records + writer_->records_written();
   status_.records_lost = finished_.records_lost + writer_->records_lost();
-  status_.problem = flushed ? std::nullopt : std::optional(flushed.error());
+  status_.problem = flushed ? finished_.problem : flushed.error();
 }
 
 }  // namespace imuscope

@@ -32,7 +32,8 @@ struct RecorderStatus {
   std::uint64_t records = 0;
   std::uint64_t records_lost = 0;   ///< refused by the disk
   std::uint64_t messages_lost = 0;  ///< given to record_message() too fast
-  std::optional<Error> problem;     ///< of the last flush, with the remedy; empty when it worked
+  /// Of the last flush, with the remedy; where it worked, that a file was removed while it was recorded.
+  std::optional<Error> problem;
 };
 
 /// Back-pressure ends here: a slow or full disk makes the recorder lose records (counted, visible to the

@@ -2,9 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <csignal>
 
+#include <cerrno>
+#include <cstring>
+
+#include "tests/support/file_size_limit.h"
+#include "tests/support/refused_calls.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -30,27 +33,6 @@ void expect_records(const RecordStore& store, std::size_t n) {
   }
 }
 
-/// A limit on the size of files refuses like a full disk: what still fits is written, the rest is not.
-class SizeLimit {
- public:
-  explicit SizeLimit(std::size_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit limited = before_;
-    limited.rlim_cur = bytes;
-    setrlimit(RLIMIT_FSIZE, &limited);
-  }
-  SizeLimit(const SizeLimit&) = delete;
-  SizeLimit& operator=(const SizeLimit&) = delete;
-  ~SizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
-
 TEST(RecordStore, GivesBackWhatItTookFromMemoryAndFromTheFileThatHasNoName) {
   const auto folder = test::scratch_folder();
   for (const std::size_t memory : {std::size_t{0}, kRecordBytes, 7 * kRecordBytes, 1000 * kRecordBytes}) {
@@ -68,7 +50,7 @@ TEST(RecordStore, AFullDiskIsAnErrorThatNamesTheFolderAndCostsNoRecordBeforeIt) 
   RecordStore store(kDoubles, {2 * kRecordBytes, folder});
   for (std::size_t i = 0; i < 5; ++i) ASSERT_TRUE(store.append(record_of(i)));
   {
-    const SizeLimit limit(store.file_bytes() + kRecordBytes / 2);
+    const test::FileSizeLimit limit(store.file_bytes() + kRecordBytes / 2);
     const auto refused = store.append(record_of(5));
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().kind, ErrorKind::kWork);
@@ -79,6 +61,28 @@ TEST(RecordStore, AFullDiskIsAnErrorThatNamesTheFolderAndCostsNoRecordBeforeIt) 
   // Room was made: what stands there of the record that was refused is written over.
   ASSERT_TRUE(store.append(record_of(5)));
   expect_records(store, 6);
+}
+
+TEST(RecordStore, ASignalCostsNothingAndADamagedDiskIsToldWithItsReason) {
+  const auto folder = test::scratch_folder();
+  RecordStore store(kDoubles, {0, folder});
+  std::vector<double> out(kDoubles);
+  {
+    const test::RefusedCalls interrupted(test::Call::kPwrite, EINTR, 3);
+    ASSERT_TRUE(store.append(record_of(0)));
+    EXPECT_EQ(interrupted.left(), 0);
+  }
+  {
+    const test::RefusedCalls interrupted(test::Call::kPread, EINTR, 3);
+    ASSERT_TRUE(store.read(0, out));
+    EXPECT_EQ(interrupted.left(), 0);
+  }
+  EXPECT_EQ(out, record_of(0));
+  const test::RefusedCalls damaged(test::Call::kPread, EIO);
+  const auto lost = store.read(0, out);
+  ASSERT_FALSE(lost);
+  EXPECT_THAT(lost.error().text(), testing::HasSubstr("cannot be read in " + folder.string()));
+  EXPECT_THAT(lost.error().text(), testing::HasSubstr(std::strerror(EIO)));
 }
 
 TEST(RecordStore, AFolderThatIsNotThereIsAnErrorAndOneThatVanishesLaterIsNot) {

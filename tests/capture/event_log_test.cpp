@@ -1,9 +1,6 @@
-#include <sys/resource.h>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <algorithm>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
@@ -11,6 +8,7 @@
 
 #include "capture/capture_writer.h"
 #include "capture/event_log_reader.h"
+#include "tests/support/file_size_limit.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -106,16 +104,11 @@ TEST(CaptureWriter, AFullDiskCostsTheRecordsItRefusesAndNothingElse) {
   };
   ASSERT_TRUE(append_and_flush("BEFORE").has_value());
 
-  // A limit on the file's size refuses like a full disk: the first bytes of the record go, the rest does not.
-  const auto previous_handler = std::signal(SIGXFSZ, SIG_IGN);
-  rlimit unlimited{};
-  getrlimit(RLIMIT_FSIZE, &unlimited);
-  rlimit full = unlimited;
-  full.rlim_cur = static_cast<rlim_t>(writer->bytes_written() + 50);
-  setrlimit(RLIMIT_FSIZE, &full);
-  const auto refused = append_and_flush("DURING");
-  setrlimit(RLIMIT_FSIZE, &unlimited);
-  std::signal(SIGXFSZ, previous_handler);
+  Result<void> refused;
+  {
+    const test::FileSizeLimit full(writer->bytes_written() + 50);
+    refused = append_and_flush("DURING");
+  }
 
   ASSERT_FALSE(refused.has_value());
   EXPECT_THAT(refused.error().text(), HasSubstr("records were lost"));

@@ -1,0 +1,44 @@
+#pragma once
+
+/// A process beside the test's own, for what cannot be taken back: other rights, other mounts, another
+/// network.
+
+#include <sys/mount.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <sched.h>
+#include <filesystem>
+#include <string>
+
+namespace imuscope::test {
+
+/// What a child returns where it may not do what the test needs.
+inline constexpr int kNotPermitted = 77;
+
+/// Runs `body` in a child process.
+/// @return what it returned; -1 where it died
+template <typename Body>
+int in_child(const Body& body) {
+  const pid_t child = fork();
+  if (child == 0) _exit(body());
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// In a child: an ordinary user from here on, whom permissions hold back.
+inline bool become_ordinary() {
+  constexpr uid_t kNobody = 65534;
+  return geteuid() != 0 || setuid(kNobody) == 0;
+}
+
+/// In a child: `folder` is a disk of its own, in memory and of this size.
+/// @param size  such as "1m"
+inline bool mount_disk(const std::filesystem::path& folder, const char* size) {
+  const std::string options = std::string("size=") + size;
+  return unshare(CLONE_NEWNS) == 0 && mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+         mount("tmpfs", folder.c_str(), "tmpfs", 0, options.c_str()) == 0;
+}
+
+}  // namespace imuscope::test

@@ -1,0 +1,64 @@
+#include "tests/support/refused_calls.h"
+
+#include <sys/syscall.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+namespace imuscope::test {
+namespace {
+
+struct Refusal {
+  int error = 0;
+  int left = 0;
+};
+
+thread_local std::array<Refusal, kRefusableCalls> refusals;
+
+Refusal& refusal_of(Call call) noexcept { return refusals[static_cast<std::size_t>(call)]; }
+
+bool refuses(Call call) noexcept {
+  Refusal& refusal = refusal_of(call);
+  if (refusal.left == 0) return false;
+  --refusal.left;
+  errno = refusal.error;
+  return true;
+}
+
+}  // namespace
+
+RefusedCalls::RefusedCalls(Call call, int error, int times) noexcept : call_(call) {
+  refusal_of(call) = {error, times};
+}
+
+RefusedCalls::~RefusedCalls() { refusal_of(call_) = {}; }
+
+int RefusedCalls::left() const noexcept { return refusal_of(call_).left; }
+
+}  // namespace imuscope::test
+
+// In place of those of the C library, for the whole program.
+
+extern "C" {
+
+ssize_t write(int fd, const void* bytes, std::size_t n) {
+  if (imuscope::test::refuses(imuscope::test::Call::kWrite)) return -1;
+  return syscall(SYS_write, fd, bytes, n);
+}
+
+ssize_t pwrite(int fd, const void* bytes, std::size_t n, off_t offset) {
+  if (imuscope::test::refuses(imuscope::test::Call::kPwrite)) return -1;
+  return syscall(SYS_pwrite64, fd, bytes, n, offset);
+}
+
+ssize_t pread(int fd, void* bytes, std::size_t n, off_t offset) {
+  if (imuscope::test::refuses(imuscope::test::Call::kPread)) return -1;
+  return syscall(SYS_pread64, fd, bytes, n, offset);
+}
+
+int fdatasync(int fd) {
+  if (imuscope::test::refuses(imuscope::test::Call::kFdatasync)) return -1;
+  return static_cast<int>(syscall(SYS_fdatasync, fd));
+}
+}

@@ -1,0 +1,29 @@
+#pragma once
+
+/// Calls of this thread to the kernel that are refused, as a disk with a damaged cable or a signal refuses
+/// them.
+
+#include <array>
+#include <cstddef>
+
+namespace imuscope::test {
+
+enum class Call { kWrite, kPwrite, kPread, kFdatasync };
+inline constexpr std::size_t kRefusableCalls = 4;
+
+/// While it lives, the next `times` calls fail with `error`. One at a time a call and thread.
+class RefusedCalls {
+ public:
+  RefusedCalls(Call call, int error, int times = 1) noexcept;
+  ~RefusedCalls();
+  RefusedCalls(const RefusedCalls&) = delete;
+  RefusedCalls& operator=(const RefusedCalls&) = delete;
+
+  /// Calls still to be refused.
+  [[nodiscard]] int left() const noexcept;
+
+ private:
+  Call call_;
+};
+
+}  // namespace imuscope::test
