@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstring>
+#include <system_error>
 #include <utility>
 
 #include "base/line_reader.h"
@@ -206,16 +207,23 @@ CandumpLine read_candump_line(std::string_view line) {
 }
 
 Result<CandumpLog> CandumpLog::open(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file)) {
-    return tl::unexpected<Error>(unreadable(file, "there is no such file"));
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (std::filesystem::is_directory(status)) return tl::unexpected<Error>(unreadable(file, "is a folder"));
+  if (!std::filesystem::is_regular_file(status)) {
+    const bool is_absent = !error || error == std::errc::no_such_file_or_directory;
+    return tl::unexpected<Error>(unreadable(file, is_absent ? "there is no such file" : error.message()));
   }
   std::ifstream in(file, std::ios::binary);
   if (!in) return tl::unexpected<Error>(unreadable(file, std::strerror(errno)));
   if (!looks_like_one(file)) {
     CandumpLog log(std::move(in));
-    (void)log.next();
+    const bool comes_late = log.next() != nullptr;
+    if (!log.first_problem_.empty()) return tl::unexpected<Error>(unreadable(file, log.first_problem_));
     return tl::unexpected<Error>(
-        unreadable(file, log.first_problem_.empty() ? "the file is empty" : log.first_problem_));
+        unreadable(file, comes_late      ? fmt::format("its first {} lines hold no frame", kLinesToLookAt)
+                         : log.line_ > 0 ? "it holds no frame"
+                                         : "the file is empty"));
   }
   return CandumpLog(std::move(in));
 }

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <system_error>
 
+#include "base/missing_file.h"
+
 namespace imuscope {
 namespace {
 
@@ -74,7 +76,7 @@ Result<std::string> read_text_file(const std::filesystem::path& file, std::strin
   const std::string name = std::string(what) + " " + file.string();
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status)) return usage_error(name + " does not exist", remedy);
+  if (!std::filesystem::exists(status)) return tl::unexpected<Error>(explain_missing(name, error, remedy));
   if (std::filesystem::is_directory(status)) return usage_error(name + " is a folder", remedy);
   if (!std::filesystem::is_regular_file(status))
     return usage_error(name + " is a device or a pipe, not a file", remedy);

@@ -7,6 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include "base/missing_file.h"
+
 namespace imuscope {
 namespace {
 
@@ -89,7 +91,8 @@ Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   const std::string name = path.string();
-  if (!std::filesystem::exists(status)) return usage_error(name + " does not exist", "check the path");
+  if (!std::filesystem::exists(status))
+    return tl::unexpected<Error>(explain_missing(name, error, "check the path"));
   if (std::filesystem::is_directory(status)) {
     return usage_error(name + " is a folder, not a capture", "name the .lcm file in it");
   }

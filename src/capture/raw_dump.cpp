@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "base/line_reader.h"
+#include "base/missing_file.h"
 #include "capture/stamp_range.h"
 
 namespace imuscope {
@@ -55,7 +56,8 @@ Result<RawDump> RawDump::open(const std::filesystem::path& path) {
   const std::string name = path.string();
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) return usage_error(name + " does not exist", "check the path");
+  if (!std::filesystem::exists(status))
+    return tl::unexpected<Error>(explain_missing(name, error, "check the path"));
   if (std::filesystem::is_directory(status)) {
     return usage_error(name + " is a folder, not a raw dump", "name the file in it");
   }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "tests/support/child_process.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -73,6 +74,34 @@ TEST(ReadTextFile, GivesTheContentOrSaysWhatIsThere) {
   std::ofstream(folder / "huge");
   std::filesystem::resize_file(folder / "huge", kTextFileMax + 1);  // sparse: it takes no room
   EXPECT_THAT(read(folder / "huge").error().text(), HasSubstr("larger than 64 MiB"));
+}
+
+TEST(ReadTextFile, AFileBehindAClosedDoorIsNotSaidToBeAbsent) {
+  const std::filesystem::path folder = test::scratch_folder();
+  const auto error_of = [](const std::filesystem::path& file) {
+    const auto text = read_text_file(file, "list", "give a list");
+    return text ? Error{} : text.error();
+  };
+  const Error nameless = error_of(folder / std::string(300, 'x'));
+  EXPECT_THAT(nameless.text(), HasSubstr("cannot be reached: " + std::string(std::strerror(ENAMETOOLONG))));
+  EXPECT_EQ(nameless.remedy, "give a list");
+  std::filesystem::create_symlink("loop", folder / "loop");
+  EXPECT_THAT(error_of(folder / "loop").text(), HasSubstr(std::strerror(ELOOP)));
+  std::ofstream(folder / "text") << "text";
+  EXPECT_THAT(error_of(folder / "text" / "below").text(), HasSubstr("does not exist"));
+  std::filesystem::create_directory(folder / "closed");
+  std::ofstream(folder / "closed" / "text") << "text";
+  std::filesystem::permissions(folder / "closed", std::filesystem::perms::none);
+  const int outcome = test::in_child([&] {
+    if (!test::become_ordinary()) return test::kNotPermitted;
+    const Error closed = error_of(folder / "closed" / "text");
+    return closed.what.find(std::strerror(EACCES)) != std::string::npos &&
+                   closed.remedy.find("permissions") != std::string::npos
+               ? 0
+               : 1;
+  });
+  std::filesystem::permissions(folder / "closed", std::filesystem::perms::owner_all);
+  EXPECT_EQ(outcome, 0);
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
@@ -8,6 +10,7 @@
 
 #include "capture/capture_writer.h"
 #include "capture/event_log_reader.h"
+#include "tests/support/child_process.h"
 #include "tests/support/file_size_limit.h"
 #include "tests/support/shared_data.h"
 
@@ -233,6 +236,23 @@ TEST(EventLogReader, SaysWhatAFileIsThatIsNoCapture) {
     EXPECT_THAT(reader.error().text(), HasSubstr(what));
     EXPECT_FALSE(reader.error().remedy.empty()) << name;
   }
+}
+
+TEST(EventLogReader, AFileThatMayNotBeReadOrReachedIsNotSaidToBeAbsent) {
+  const auto folder = test::scratch_folder();
+  EXPECT_THAT(EventLogReader::open(folder / std::string(300, 'x')).error().text(),
+              HasSubstr("cannot be reached: " + std::string(std::strerror(ENAMETOOLONG))));
+  write_example(folder / "capture.lcm", 3);
+  std::filesystem::permissions(folder / "capture.lcm", std::filesystem::perms::none);
+  const int outcome = test::in_child([&] {
+    if (!test::become_ordinary()) return test::kNotPermitted;
+    const auto reader = EventLogReader::open(folder / "capture.lcm");
+    return !reader && reader.error().text().find("cannot be read; check its permissions") != std::string::npos
+               ? 0
+               : 1;
+  });
+  std::filesystem::permissions(folder / "capture.lcm", std::filesystem::perms::owner_all);
+  EXPECT_EQ(outcome, 0);
 }
 
 }  // namespace

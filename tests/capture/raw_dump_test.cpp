@@ -5,6 +5,7 @@
 #include <fstream>
 #include <string>
 
+#include "tests/support/child_process.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -119,6 +120,20 @@ TEST_F(RawDumpTest, SaysWhatIsThereInstead) {
   EXPECT_THAT(RawDump::open(folder_ / "absent.bin").error().text(), HasSubstr("does not exist"));
   EXPECT_THAT(RawDump::open(folder_).error().text(), HasSubstr("is a folder"));
   EXPECT_THAT(RawDump::open(folder_ / "empty.bin").error().text(), HasSubstr("is empty"));
+  EXPECT_THAT(RawDump::open("/dev/null").error().text(), HasSubstr("is empty"));
+  EXPECT_THAT(RawDump::open(folder_ / std::string(300, 'x')).error().text(), HasSubstr("cannot be reached"));
+}
+
+TEST_F(RawDumpTest, ADumpThatMayNotBeReadSaysSo) {
+  write("mtx1.bin", "abcd");
+  std::filesystem::permissions(folder_ / "mtx1.bin", std::filesystem::perms::none);
+  const int outcome = test::in_child([&] {
+    if (!test::become_ordinary()) return test::kNotPermitted;
+    const auto dump = RawDump::open(folder_ / "mtx1.bin");
+    return !dump && dump.error().text().find("check its permissions") != std::string::npos ? 0 : 1;
+  });
+  std::filesystem::permissions(folder_ / "mtx1.bin", std::filesystem::perms::owner_all);
+  EXPECT_EQ(outcome, 0);
 }
 
 }  // namespace

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 
+#include "tests/support/child_process.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -150,6 +153,100 @@ TEST_F(CandumpFile, WhatIsNoLogSaysSoWithItsFirstLine) {
   EXPECT_THAT(CandumpLog::open(write("")).error().text(), HasSubstr("empty"));
   EXPECT_THAT(CandumpLog::open("/no/such/file").error().text(), HasSubstr("no such file"));
   EXPECT_FALSE(CandumpLog::open(write(std::string(100'000, '\x01'))));
+}
+
+TEST_F(CandumpFile, WhatIsNoFileOrMayNotBeReadIsAnErrorThatSaysWhat) {
+  const auto folder = test::scratch_folder();
+  const auto nameless = CandumpLog::open(folder / std::string(300, 'x'));
+  ASSERT_FALSE(nameless);
+  EXPECT_THAT(nameless.error().text(), HasSubstr(std::strerror(ENAMETOOLONG)));
+  EXPECT_THAT(CandumpLog::open(folder).error().text(), HasSubstr("is a folder"));
+  const auto file = write("(1.0) can0 123#01\n");
+  std::filesystem::permissions(file, std::filesystem::perms::none);
+  const int outcome = test::in_child([&] {
+    if (!test::become_ordinary()) return test::kNotPermitted;
+    const auto log = CandumpLog::open(file);
+    return !log && log.error().text().find(std::strerror(EACCES)) != std::string::npos ? 0 : 1;
+  });
+  std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  EXPECT_EQ(outcome, 0);
+}
+
+TEST_F(CandumpFile, ALogOfRemarksAloneIsNotSaidToBeEmpty) {
+  const auto log =
+      CandumpLog::open(write("DROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 7)\n\n"));
+  ASSERT_FALSE(log);
+  EXPECT_THAT(log.error().text(), HasSubstr("holds no frame"));
+  // A frame that comes late is none at the beginning.
+  const auto late = CandumpLog::open(write(std::string(200, '\n') + "(1.0) can0 123#01\n"));
+  ASSERT_FALSE(late);
+  EXPECT_THAT(late.error().text(), HasSubstr("first 100 lines hold no frame"));
+}
+
+TEST(Candump, WhatIsWrongWithALineIsNamed) {
+  const struct {
+    const char* line;
+    const char* why;
+  } cases[] = {{"1.0 can0 123#01", "begins with its time"},
+               {"(1,0) can0 123#01", "begins with its time"},
+               {"(1.0 can0 123#01", "begins with its time"},
+               {"(-1.0) can0 123#01", "begins with its time"},
+               {"(99999999999.0) can0 123#01", "begins with its time"},
+               {"(1.0000000001) can0 123#01", "begins with its time"},
+               {"(1.00x) can0 123#01", "begins with its time"},
+               {"(1.0)can0 123#01", "stands a blank"},
+               {"(1.0)  123#01", "stands the interface"},
+               {"(1.0) a-name-too-long-for-linux 123#01", "at most 15 letters"},
+               {"(1.0) can0", "stands a blank"},
+               {"(1.0) can0 12#01", "3 or 8 hexadecimal digits"},
+               {"(1.0) can0 1x3#01", "3 or 8 hexadecimal digits"},
+               {"(1.0) can0 1234567x#01", "3 or 8 hexadecimal digits"},
+               {"(1.0) can0 800#01", "at most 7FF"},
+               {"(1.0) can0 80000000#01", "at most 1FFFFFFF"},
+               {"(1.0) can0 40000000#01", "at most 1FFFFFFF"},
+               {"(1.0) can0 123", "stands a #"},
+               {"(1.0) can0 123#0", "two hexadecimal digits"},
+               {"(1.0) can0 123#0x", "two hexadecimal digits"},
+               {"(1.0) can0 123#001122334455667788", "at most 8 bytes"},
+               {"(1.0) can0 123##", "one digit of CAN FD flags"},
+               {"(1.0) can0 123##x", "one digit of CAN FD flags"},
+               {"(1.0) can0 123##0001122334455667788", "has this length"},
+               {"(1.0) can0 123#0011223344556677_8", "from 9 to F"},
+               {"(1.0) can0 123#0011223344556677_", "from 9 to F"},
+               {"(1.0) can0 123#00 X", "nothing but a direction"},
+               {"(1.0) can0 123#R9", "nothing but a direction"},
+               {"(1.0) can0 123#0_9", "two hexadecimal digits"}};
+  for (const auto& [line, why] : cases) {
+    const auto read = read_candump_line(line);
+    EXPECT_EQ(read.kind, Kind::kError) << line;
+    EXPECT_THAT(std::string(read.why), HasSubstr(why)) << line;
+  }
+}
+
+TEST(Candump, WhatOtherToolsWriteIsReadAlike) {
+  const auto frame_of = [](const std::string& line) {
+    const auto read = read_candump_line(line);
+    EXPECT_EQ(read.kind, Kind::kFrame) << line << ": " << read.why;
+    return read.frame.frame;
+  };
+  const CanFrame frame = frame_of("(1.5) can0 0AA#DE.AD.BE.EF R\r");
+  EXPECT_EQ(hex(frame.payload()), "deadbeef") << "cansend sets bytes apart";
+  EXPECT_EQ(to_ns(frame.stamp), 1'500'000'000);
+  EXPECT_EQ(hex(frame_of("(1) can0 0aa#deadbeef T").payload()), "deadbeef") << "small letters, whole seconds";
+  EXPECT_EQ(to_ns(frame_of("(1) can0 0aa#").stamp), 1'000'000'000);
+  EXPECT_EQ(frame_of("(1.0) can0 123#R8_B").raw_dlc, 11);
+  EXPECT_EQ(frame_of("(1.0) can0 123#R0").length, 0);
+  const CanFrame fd = frame_of("(1.0) can0 123##2" + std::string(128, '5'));
+  EXPECT_EQ(fd.length, 64);
+  EXPECT_TRUE(fd.sender_error_state);
+  EXPECT_FALSE(fd.bit_rate_switched);
+  EXPECT_EQ(read_candump_line("(1.0) can0 123##0" + std::string(130, '5')).kind, Kind::kError);
+  // candump's own words on what it lost; without a number there is none.
+  for (const char* remark : {"", "   ", "DROPCOUNT: dropped 1 CAN frame", "DROPCOUNT (total drops x)"}) {
+    const auto read = read_candump_line(remark);
+    EXPECT_EQ(read.kind, Kind::kRemark) << remark;
+    EXPECT_EQ(read.drops_total, 0U) << remark;
+  }
 }
 
 }  // namespace
