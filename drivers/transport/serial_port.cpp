@@ -51,7 +51,8 @@ Result<double> set_line(int fd, const SerialSettings& settings) {
   // The call succeeds when anything was applied: what counts is what can be read back.
   termios2 real{};
   if (ioctl(fd, TCGETS2, &real) != 0)
-    return work_error(fmt::format("{} vanished while it was set up", settings.path));
+    return work_error(fmt::format("{} vanished while it was set up", settings.path),
+                      "plug the device in again");
   const double baud = real.c_ospeed;
   if (std::abs(baud / settings.baud - 1.0) > kBaudTolerance) {
     return work_error(fmt::format("{} runs at {} baud instead of {}", settings.path, baud, settings.baud),
