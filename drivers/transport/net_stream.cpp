@@ -117,19 +117,27 @@ Result<int> open_tcp(const NetSettings& settings, const addrinfo* addresses) {
 }
 
 bool is_multicast(const addrinfo& address) {
-  if (address.ai_family != AF_INET) return false;
+  if (address.ai_family == AF_INET6) {
+    sockaddr_in6 in{};
+    std::memcpy(&in, address.ai_addr, sizeof in);
+    return IN6_IS_ADDR_MULTICAST(&in.sin6_addr);
+  }
   sockaddr_in in{};
   std::memcpy(&in, address.ai_addr, sizeof in);
   return IN_MULTICAST(ntohl(in.sin_addr.s_addr));
 }
 
+/// On the interface that the routes lead to, or that the address itself names ("ff02::1%eth0").
 bool join_group(int fd, const addrinfo& address) {
-  sockaddr_in in{};
-  std::memcpy(&in, address.ai_addr, sizeof in);
-  ip_mreq group{};
-  group.imr_multiaddr = in.sin_addr;
-  group.imr_interface.s_addr = htonl(INADDR_ANY);
-  return setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group) == 0;
+  const bool is_v6 = address.ai_family == AF_INET6;
+  group_req group{};
+  std::memcpy(&group.gr_group, address.ai_addr, address.ai_addrlen);
+  if (is_v6) {
+    sockaddr_in6 in{};
+    std::memcpy(&in, address.ai_addr, sizeof in);
+    group.gr_interface = in.sin6_scope_id;
+  }
+  return setsockopt(fd, is_v6 ? IPPROTO_IPV6 : IPPROTO_IP, MCAST_JOIN_GROUP, &group, sizeof group) == 0;
 }
 
 Result<int> open_udp(const NetSettings& settings, const addrinfo& address) {

@@ -1,5 +1,6 @@
 #include "tests/support/refused_calls.h"
 
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/types.h>
 #include <unistd.h>
@@ -42,6 +43,11 @@ int RefusedCalls::left() const noexcept { return refusal_of(call_).left; }
 
 extern "C" {
 
+ssize_t read(int fd, void* bytes, std::size_t n) {
+  if (imuscope::test::refuses(imuscope::test::Call::kRead)) return -1;
+  return syscall(SYS_read, fd, bytes, n);
+}
+
 ssize_t write(int fd, const void* bytes, std::size_t n) {
   if (imuscope::test::refuses(imuscope::test::Call::kWrite)) return -1;
   return syscall(SYS_write, fd, bytes, n);
@@ -55,6 +61,16 @@ ssize_t pwrite(int fd, const void* bytes, std::size_t n, off_t offset) {
 ssize_t pread(int fd, void* bytes, std::size_t n, off_t offset) {
   if (imuscope::test::refuses(imuscope::test::Call::kPread)) return -1;
   return syscall(SYS_pread64, fd, bytes, n, offset);
+}
+
+ssize_t recv(int fd, void* bytes, std::size_t n, int flags) {
+  if (imuscope::test::refuses(imuscope::test::Call::kRecv)) return -1;
+  return syscall(SYS_recvfrom, fd, bytes, n, flags, nullptr, nullptr);
+}
+
+ssize_t send(int fd, const void* bytes, std::size_t n, int flags) {
+  if (imuscope::test::refuses(imuscope::test::Call::kSend)) return -1;
+  return syscall(SYS_sendto, fd, bytes, n, flags, nullptr, 0);
 }
 
 int fdatasync(int fd) {

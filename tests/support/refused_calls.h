@@ -1,15 +1,15 @@
 #pragma once
 
-/// Calls of this thread to the kernel that are refused, as a disk with a damaged cable or a signal refuses
-/// them.
+/// Calls of this thread to the kernel that are refused, as a signal, a damaged disk or a port that vanished
+/// refuses them.
 
 #include <array>
 #include <cstddef>
 
 namespace imuscope::test {
 
-enum class Call { kWrite, kPwrite, kPread, kFdatasync };
-inline constexpr std::size_t kRefusableCalls = 4;
+enum class Call { kRead, kWrite, kPread, kPwrite, kRecv, kSend, kFdatasync };
+inline constexpr std::size_t kRefusableCalls = 7;
 
 /// While it lives, the next `times` calls fail with `error`. One at a time a call and thread.
 class RefusedCalls {

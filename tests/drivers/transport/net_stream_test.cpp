@@ -9,9 +9,16 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "tests/support/child_process.h"
+#include "tests/support/refused_calls.h"
 
 namespace imuscope {
 namespace {
@@ -50,6 +57,12 @@ class FarEnd {
 
   void accept_one() { peer_ = accept(fd_, nullptr, nullptr); }
   void hang_up() { ::close(std::exchange(peer_, -1)); }
+  /// Hangs up without waiting for what is under way.
+  void reset() {
+    const linger at_once{1, 0};
+    setsockopt(peer_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    hang_up();
+  }
   void say(std::string_view text) const {
     EXPECT_EQ(send(peer_, text.data(), text.size(), 0), ssize_t(text.size()));
   }
@@ -173,6 +186,197 @@ TEST(NetStream, SaysWhatIsWrongAndWhatToDo) {
   const auto second = NetStream::open({NetKind::kUdp, "", port});
   ASSERT_FALSE(second);
   EXPECT_NE(second.error().text().find("another program listens there"), std::string::npos);
+}
+
+TEST(NetStream, ADatagramWithoutBytesIsPassedOverAndWhatIsSaidToASenderGoesNowhere) {
+  FarEnd sender(SOCK_DGRAM);
+  const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
+  auto stream = NetStream::open({Kind::kUdp, "127.0.0.1", port});
+  ASSERT_TRUE(stream) << stream.error().text();
+  sender.say_to(port, "");
+  sender.say_to(port, "after");
+  sender.say_to(port, "");
+  EXPECT_EQ(hear(**stream).text, "after");
+  std::array<std::uint8_t, 10> buffer{};
+  EXPECT_EQ((*stream)->read(buffer).status, IoStatus::kNothing);
+  EXPECT_EQ((*stream)->write(buffer).status, IoStatus::kNothing);
+  EXPECT_EQ((*stream)->health().frames_dropped, 0U);
+  EXPECT_EQ((*stream)->describe(), "udp://127.0.0.1:" + std::to_string(port));
+}
+
+TEST(NetStream, AServerThatResetsTheConnectionIsGone) {
+  for (const bool by_reading : {true, false}) {
+    FarEnd server(SOCK_STREAM);
+    auto stream = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+    ASSERT_TRUE(stream) << stream.error().text();
+    EXPECT_TRUE((*stream)->health().is_up);
+    EXPECT_EQ((*stream)->health().frames_dropped, 0U);
+    EXPECT_EQ((*stream)->describe(), "tcp://127.0.0.1:" + std::to_string(server.port()));
+    server.accept_one();
+    server.reset();
+    pollfd waiting{(*stream)->fd(), POLLIN, 0};
+    ASSERT_EQ(poll(&waiting, 1, 5000), 1);
+    std::array<std::uint8_t, 10> buffer{};
+    if (by_reading) {
+      EXPECT_EQ((*stream)->read(buffer).status, IoStatus::kGone);
+    }
+    EXPECT_EQ((*stream)->write(buffer).status, IoStatus::kGone) << "and no signal ends the program";
+  }
+}
+
+TEST(NetStream, AServerThatDoesNotReadMakesNobodyWait) {
+  FarEnd server(SOCK_STREAM);
+  auto stream = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+  ASSERT_TRUE(stream);
+  server.accept_one();
+  const std::vector<std::uint8_t> much(100'000, 'x');
+  std::size_t sent = 0;
+  IoResult last;
+  for (int i = 0; i < 10'000; ++i) {
+    last = (*stream)->write(much);
+    if (last.status != IoStatus::kDone) break;
+    sent += last.n;
+  }
+  EXPECT_EQ(last.status, IoStatus::kNothing);
+  std::size_t heard = 0;
+  while (heard < sent) heard += server.hear().size();
+  EXPECT_EQ(heard, sent) << "what was said to be sent arrives";
+  EXPECT_EQ((*stream)->write({}).status, IoStatus::kNothing);
+}
+
+TEST(NetStream, ASignalIsNoEndAndAnErrorIsOneOfAConnectionAlone) {
+  FarEnd server(SOCK_STREAM);
+  auto tcp = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+  ASSERT_TRUE(tcp);
+  server.accept_one();
+  FarEnd sender(SOCK_DGRAM);
+  const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
+  auto udp = NetStream::open({Kind::kUdp, "", port});
+  ASSERT_TRUE(udp);
+  std::array<std::uint8_t, 10> buffer{};
+  {
+    const test::RefusedCalls interrupted(test::Call::kRecv, EINTR, 2);
+    EXPECT_EQ((*tcp)->read(buffer).status, IoStatus::kNothing);
+    EXPECT_EQ(interrupted.left(), 0);
+  }
+  {
+    const test::RefusedCalls interrupted(test::Call::kSend, EINTR, 2);
+    EXPECT_EQ((*tcp)->write(buffer).n, buffer.size());
+    EXPECT_EQ(interrupted.left(), 0);
+  }
+  for (const int error : {ETIMEDOUT, EHOSTUNREACH, ENETDOWN}) {
+    const test::RefusedCalls refused(test::Call::kRecv, error, 2);
+    EXPECT_EQ((*tcp)->read(buffer).status, IoStatus::kGone) << std::strerror(error);
+    EXPECT_EQ((*udp)->read(buffer).status, IoStatus::kNothing) << std::strerror(error);
+  }
+  sender.say_to(port, "still here");
+  EXPECT_EQ(hear(**udp).text, "still here");
+}
+
+TEST(NetStream, AServerThatDoesNotAnswerWithinASecondIsToldWithWhatMayBeTheReason) {
+  // A queue of connections that nobody accepts: what does not fit in gets no answer.
+  FarEnd server(SOCK_STREAM);
+  std::vector<std::unique_ptr<NetStream>> queue;
+  Result<std::unique_ptr<NetStream>> last = tl::unexpected<Error>(Error{});
+  for (int i = 0; i < 10; ++i) {
+    last = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+    if (!last) break;
+    queue.push_back(std::move(*last));
+  }
+  ASSERT_FALSE(last);
+  EXPECT_NE(last.error().text().find(std::strerror(ETIMEDOUT)), std::string::npos) << last.error().text();
+  EXPECT_NE(last.error().remedy.find("network cable"), std::string::npos);
+}
+
+TEST(NetStream, AnAddressOfAnotherPcCannotBeListenedTo) {
+  // Of the range that is kept for examples.
+  const auto other = NetStream::open({Kind::kUdp, "192.0.2.1", 9000});
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().remedy.find("give an address of this PC"), std::string::npos)
+      << other.error().text();
+}
+
+TEST(NetStream, OnAPcWithoutNetworkTheCableIsMeantAndNotTheName) {
+  const int outcome = test::in_child([] {
+    if (unshare(CLONE_NEWNET) != 0) return test::kNotPermitted;
+    const auto stream = NetStream::open({Kind::kTcp, "192.0.2.1", 9000});
+    if (stream) return 1;
+    if (stream.error().text().find(std::strerror(ENETUNREACH)) == std::string::npos) return 2;
+    return stream.error().remedy.find("network cable") != std::string::npos ? 0 : 3;
+  });
+  if (outcome == test::kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
+  EXPECT_EQ(outcome, 0);
+}
+
+/// A network of this child alone, whose loopback interface carries groups.
+bool have_own_network() {
+  return unshare(CLONE_NEWNET) == 0 && std::system("ip link set lo up multicast on") == 0 &&
+         std::system("ip route add 224.0.0.0/4 dev lo") == 0;
+}
+
+/// A datagram to `group` is heard by each of two streams that listen to it.
+template <typename Address>
+int hear_group(const std::string& group, const Address& to) {
+  const auto* const address = reinterpret_cast<const sockaddr*>(&to);
+  auto one = NetStream::open({Kind::kUdp, group, 9000});
+  if (!one) return 1;
+  auto other = NetStream::open({Kind::kUdp, group, 9000});
+  if (!other) return 2;
+  const int sender = ::socket(address->sa_family, SOCK_DGRAM, 0);
+  if (sendto(sender, "all", 3, 0, address, sizeof to) != 3) return 3;
+  for (const auto* stream : {&*one, &*other}) {
+    pollfd waiting{(*stream)->fd(), POLLIN, 0};
+    if (poll(&waiting, 1, 2000) != 1) return 4;
+    std::array<std::uint8_t, 10> buffer{};
+    if ((*stream)->read(buffer).n != 3) return 5;
+  }
+  return 0;
+}
+
+TEST(NetStream, AGroupIsJoinedAndMayHaveSeveralListeners) {
+  const int outcome = test::in_child([] {
+    if (!have_own_network()) return test::kNotPermitted;
+    sockaddr_in group{};
+    group.sin_family = AF_INET;
+    group.sin_port = htons(9000);
+    inet_pton(AF_INET, "239.1.2.3", &group.sin_addr);
+    return hear_group("239.1.2.3", group);
+  });
+  if (outcome == test::kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
+  EXPECT_EQ(outcome, 0);
+}
+
+TEST(NetStream, AGroupOfTheNewerProtocolIsJoinedLikewise) {
+  const int outcome = test::in_child([] {
+    // The loopback interface carries no group of this protocol.
+    if (unshare(CLONE_NEWNET) != 0 ||
+        std::system(
+            "ip link add one type veth peer name other && ip link set one up && ip link set other up && "
+            "ip -6 addr add fd00::1/64 dev one nodad && "
+            "ip -6 route add multicast ff05::/16 dev one table local metric 1") != 0)
+      return test::kNotPermitted;
+    sockaddr_in6 group{};
+    group.sin6_family = AF_INET6;
+    group.sin6_port = htons(9000);
+    inet_pton(AF_INET6, "ff05::1:2:3", &group.sin6_addr);
+    return hear_group("ff05::1:2:3", group);
+  });
+  if (outcome == test::kNotPermitted) GTEST_SKIP() << "a private network namespace with IPv6 needs root";
+  EXPECT_EQ(outcome, 0);
+}
+
+TEST(NetStream, AGroupThatNoInterfaceLeadsToSaysSo) {
+  const int outcome = test::in_child([] {
+    if (unshare(CLONE_NEWNET) != 0) return test::kNotPermitted;
+    const auto stream = NetStream::open({Kind::kUdp, "239.1.2.3", 9000});
+    if (stream) return 1;
+    return stream.error().text().find("the group cannot be joined") != std::string::npos &&
+                   stream.error().remedy.find("multicast route") != std::string::npos
+               ? 0
+               : 2;
+  });
+  if (outcome == test::kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
+  EXPECT_EQ(outcome, 0);
 }
 
 }  // namespace
