@@ -130,11 +130,14 @@ CanInterface read_link(const std::string& name, Bytes answer, const ifinfomsg& l
   return interface;
 }
 
-Error no_interface(const std::string& name, int error) {
+std::string use_another() {
   const auto others = can_interfaces();
-  const std::string remedy =
-      others.empty() ? "plug the CAN adapter in, or load its driver; this PC has no CAN interface at all"
-                     : fmt::format("plug the CAN adapter in, or use one of: {}", fmt::join(others, ", "));
+  return others.empty() ? "plug the CAN adapter in, or load its driver; this PC has no CAN interface at all"
+                        : fmt::format("plug the CAN adapter in, or use one of: {}", fmt::join(others, ", "));
+}
+
+Error no_interface(const std::string& name, int error) {
+  const std::string remedy = use_another();
   if (error == ENODEV) {
     return {ErrorKind::kWork, fmt::format("CAN interface {} does not exist", name), remedy};
   }
@@ -217,8 +220,7 @@ Result<CanInterface> look_at_can_interface(const std::string& name) {
   if (answer->size() < NLMSG_ALIGN(sizeof link)) return tl::unexpected<Error>(no_interface(name, EPROTO));
   std::memcpy(&link, answer->data(), sizeof link);
   if (link.ifi_type != ARPHRD_CAN) {
-    return usage_error(fmt::format("{} is not a CAN interface", name),
-                       fmt::format("CAN interfaces of this PC: {}", fmt::join(can_interfaces(), ", ")));
+    return usage_error(fmt::format("{} is not a CAN interface", name), use_another());
   }
   return read_link(name, *answer, link);
 }

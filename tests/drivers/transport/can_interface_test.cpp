@@ -101,6 +101,9 @@ TEST(CanInterface, AnotherKindOfInterfaceIsRefused) {
   ASSERT_FALSE(loopback);
   EXPECT_EQ(loopback.error().kind, ErrorKind::kUsage);
   EXPECT_THAT(loopback.error().what, HasSubstr("lo is not a CAN interface"));
+  const auto others = can_interfaces();
+  EXPECT_THAT(loopback.error().remedy,
+              HasSubstr(others.empty() ? "this PC has no CAN interface" : others.front()));
 }
 
 TEST(CanInterface, ImpossibleNamesAreRefused) {

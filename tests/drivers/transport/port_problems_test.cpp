@@ -1,6 +1,7 @@
 #include "drivers/transport/port_problems.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -41,6 +42,40 @@ TEST(PortProblems, AnAdaptersLatencyTimerIsRead) {
   EXPECT_EQ(latency_timer_ms((folder / "usb-FTDI_mtx1").string(), adapters), 16);
   EXPECT_FALSE(latency_timer_ms((folder / "ttyACM0").string(), adapters).has_value());
   EXPECT_FALSE(latency_timer_ms((folder / "none").string(), adapters).has_value());
+}
+
+TEST(PortProblems, AMissingPortNamesThoseOfItsKindAndWithoutAnySaysThatNoneIsThere) {
+  const auto folder = test::scratch_folder();
+  const std::string missing = (folder / "ttyX7").string();
+  const Error alone = explain_open_failure(missing, ENOENT);
+  EXPECT_EQ(alone.what, "port " + missing + " does not exist");
+  EXPECT_EQ(alone.remedy.find("ttyX1"), std::string::npos);
+  if (serial_ports().empty()) {
+    EXPECT_NE(alone.remedy.find("no serial port is there at all"), std::string::npos);
+  }
+  std::ofstream(folder / "ttyX1").put('x');
+  std::ofstream(folder / "ttyY1").put('x');
+  const Error among_others = explain_open_failure(missing, ENOENT);
+  EXPECT_NE(among_others.remedy.find((folder / "ttyX1").string()), std::string::npos) << among_others.remedy;
+  EXPECT_EQ(among_others.remedy.find("ttyY1"), std::string::npos) << "another kind of port";
+}
+
+TEST(PortProblems, APortThatNobodyIsSeenToHoldIsSaidToBeInUseAllTheSame) {
+  const auto file = test::scratch_folder() / "ttyX0";
+  std::ofstream(file).put('x');
+  EXPECT_NE(explain_open_failure(file.string(), EBUSY).what.find("in use by another program"),
+            std::string::npos);
+}
+
+TEST(PortProblems, TheGroupOfAPortThatIsNotThereIsTheUsualOne) {
+  const auto file = test::scratch_folder() / "ttyX0";
+  EXPECT_NE(explain_open_failure(file.string(), EACCES).remedy.find("usermod -aG dialout"),
+            std::string::npos);
+  // A group without a name.
+  std::ofstream(file).put('x');
+  if (chown(file.c_str(), static_cast<uid_t>(-1), 54'321) != 0)
+    GTEST_SKIP() << "giving a file away needs root";
+  EXPECT_NE(explain_open_failure(file.string(), EPERM).remedy.find("usermod -aG dialout"), std::string::npos);
 }
 
 }  // namespace

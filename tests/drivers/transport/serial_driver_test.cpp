@@ -19,6 +19,8 @@
 #include <functional>
 #include <vector>
 
+#include "tests/support/refused_calls.h"
+
 namespace imuscope {
 namespace {
 
@@ -198,6 +200,45 @@ TEST_F(SerialDriver, BytesThatWereOverrunSinceThePortWasOpenedAreCountedAsLost) 
   // A driver that was loaded anew counts from nothing.
   counts = {};
   EXPECT_EQ(port->health().frames_dropped, 0U);
+}
+
+TEST_F(SerialDriver, ASignalIsNoEndAndWhatAVanishedDeviceSaysIs) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  std::vector<std::uint8_t> buffer(10);
+  ASSERT_EQ(::write(near_end_, "hello", 5), 5);
+  {
+    const test::RefusedCalls interrupted(test::Call::kRead, EINTR, 2);
+    EXPECT_EQ(port->read(buffer).n, 5U);
+    EXPECT_EQ(interrupted.left(), 0);
+  }
+  {
+    const test::RefusedCalls interrupted(test::Call::kWrite, EINTR, 2);
+    EXPECT_EQ(port->write(buffer).n, 10U);
+    EXPECT_EQ(interrupted.left(), 0);
+  }
+  const struct {
+    int error;
+    IoStatus status;
+  } cases[] = {{EIO, IoStatus::kGone},   {ENXIO, IoStatus::kGone},     {ENODEV, IoStatus::kGone},
+               {EBADF, IoStatus::kGone}, {EAGAIN, IoStatus::kNothing}, {ENOMEM, IoStatus::kNothing}};
+  for (const auto& [error, status] : cases) {
+    const test::RefusedCalls no_read(test::Call::kRead, error);
+    EXPECT_EQ(port->read(buffer).status, status) << std::strerror(error);
+    const test::RefusedCalls no_write(test::Call::kWrite, error);
+    EXPECT_EQ(port->write(buffer).status, status) << std::strerror(error);
+  }
+  EXPECT_EQ(port->write({}).status, IoStatus::kNothing);
+}
+
+TEST_F(SerialDriver, APortThatIsGivenItselfStaysOpen) {
+  auto port = SerialPort::open(settings_);
+  ASSERT_TRUE(port);
+  SerialPort& same = *port;
+  *port = std::move(same);
+  EXPECT_GE(port->fd(), 0);
+  const std::vector<std::uint8_t> byte{1};
+  EXPECT_EQ(port->write(byte).n, 1U);
 }
 
 }  // namespace
