@@ -190,7 +190,8 @@ namespace {
 
 Finding check_can_interface(const fs::path& folder, const std::string& name) {
   const std::string check = "CAN " + name;
-  if (!fs::exists(folder))
+  std::error_code absent;
+  if (!fs::exists(folder, absent))
     return {
         check, Verdict::kBad, "there is no such interface",
         fmt::format(
@@ -221,7 +222,9 @@ std::vector<Finding> check_can(const fs::path& root, const std::vector<std::stri
 
 Disk measure_disk(const fs::path& folder) {
   fs::path existing = fs::absolute(folder);
-  while (!fs::exists(existing) && existing.has_relative_path()) existing = existing.parent_path();
+  // What lies in a folder that may not be entered is not seen: then that folder says why.
+  std::error_code unseen;
+  while (!fs::exists(existing, unseen) && existing.has_relative_path()) existing = existing.parent_path();
   Disk disk{existing, {}, 0.0, 0.0};
   struct statvfs space {};
   if (statvfs(existing.c_str(), &space) != 0) {
@@ -238,8 +241,9 @@ Disk measure_disk(const fs::path& folder) {
   const std::vector<char> bytes(kProbeBytes, 'x');
   const HostTime begin = host_now();
   const ssize_t written = ::write(fd, bytes.data(), bytes.size());
-  if (written != static_cast<ssize_t>(bytes.size()) || ::fdatasync(fd) != 0)
-    disk.problem = std::strerror(written < 0 ? errno : ENOSPC);
+  const bool is_whole = written == static_cast<ssize_t>(bytes.size());
+  if (!is_whole || ::fdatasync(fd) != 0)
+    disk.problem = std::strerror(written < 0 || is_whole ? errno : ENOSPC);
   const double seconds = to_seconds(host_now() - begin);
   ::close(fd);
   std::error_code gone;

@@ -5,15 +5,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
-#include <sys/mount.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
-#include <functional>
 
 #include "doctor/examination.h"
 #include "service/line_factory.h"
+#include "tests/support/child_process.h"
+#include "tests/support/refused_calls.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::doctor {
@@ -24,16 +25,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr int kNotPermitted = 77;
-
-/// Runs `body` in a child process, so that what it gives up is not given up here.
-int in_child(const std::function<int()>& body) {
-  const pid_t child = fork();
-  if (child == 0) _exit(body());
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
+using test::in_child;
+using test::kNotPermitted;
 
 /// A PC's /proc and /sys as a folder.
 class FakePc : public testing::Test {
@@ -208,14 +201,99 @@ TEST(DoctorDisk, MeasuresAFolderThatIsStillToBeMadeAndLeavesNothing) {
 TEST(DoctorDisk, AFullDiskIsBad) {
   const auto folder = test::scratch_folder();
   const int outcome = in_child([&] {
-    if (unshare(CLONE_NEWNS) != 0 || mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
-        mount("tmpfs", folder.c_str(), "tmpfs", 0, "size=1m") != 0)
-      return kNotPermitted;
+    if (!test::mount_disk(folder, "1m")) return kNotPermitted;
     const auto finding = check_disk(measure_disk(folder), kRate);
     return finding.verdict == Verdict::kBad && finding.fix.find("make room") != std::string::npos ? 0 : 1;
   });
   if (outcome == kNotPermitted) GTEST_SKIP() << "mounting needs root";
   EXPECT_EQ(outcome, 0);
+}
+
+TEST(DoctorDisk, ADiskThatTakesTheBytesAndLosesThemIsBadForItsOwnReason) {
+  const auto folder = test::scratch_folder();
+  const test::RefusedCalls lost(test::Call::kFdatasync, EIO);
+  const auto disk = measure_disk(folder);
+  EXPECT_EQ(disk.problem, std::strerror(EIO));
+  EXPECT_TRUE(fs::is_empty(folder));
+  const test::RefusedCalls damaged(test::Call::kWrite, EIO);
+  EXPECT_EQ(measure_disk(folder).problem, std::strerror(EIO));
+}
+
+TEST(DoctorDisk, AFolderThatMayNotBeEnteredOrWrittenIsBadAndNotTheEndOfTheExamination) {
+  const auto closed = test::scratch_folder() / "closed";
+  fs::create_directory(closed);
+  fs::permissions(closed, fs::perms::owner_read);
+  const int outcome = in_child([&] {
+    if (!test::become_ordinary()) return kNotPermitted;
+    for (const auto& folder : {closed, closed / "runs", closed / "runs" / "monday"}) {
+      const auto finding = check_disk(measure_disk(folder), kRate);
+      if (finding.verdict != Verdict::kBad || finding.what.find(std::strerror(EACCES)) == std::string::npos)
+        return 1;
+    }
+    return 0;
+  });
+  fs::permissions(closed, fs::perms::owner_all);
+  if (outcome == kNotPermitted) GTEST_SKIP() << "becoming another user needs root";
+  EXPECT_EQ(outcome, 0);
+}
+
+TEST_F(FakePc, WhatCannotBeReadIsAWarningAndNothingIsMadeUp) {
+  EXPECT_EQ(check_receive_buffer(root_).verdict, Verdict::kWarning);
+  EXPECT_THAT(check_receive_buffer(root_).fix, HasSubstr("mount /proc"));
+  EXPECT_THAT(check_clock_source(root_).fix, HasSubstr("mount /sys"));
+  EXPECT_THAT(check_can(root_, {}), IsEmpty());
+  EXPECT_THAT(check_ftdi_latency(root_, {}), IsEmpty());
+  // An interface of which nothing is told is not said to be up.
+  fs::create_directories(root_ / "sys/class/net/can0");
+  EXPECT_EQ(check_can(root_, {"can0"}).front().verdict, Verdict::kBad);
+  const auto nameless = check_can(root_, {std::string(300, 'x')});
+  ASSERT_THAT(nameless, SizeIs(1));
+  EXPECT_THAT(nameless.front().what, HasSubstr("no such interface"));
+}
+
+TEST_F(FakePc, APortIsFoundByItsStableNameAlsoWhereItIsUnplugged) {
+  write("sys/bus/usb-serial/devices/ttyUSB0/latency_timer", "16");
+  write("dev/ttyUSB0", "");
+  fs::create_symlink(root_ / "dev/ttyUSB0", root_ / "mtx1");
+  EXPECT_THAT(check_ftdi_latency(root_, {(root_ / "mtx1").string()}), SizeIs(1));
+  fs::create_symlink(root_ / "dev/ttyUSB9", root_ / "gone");
+  EXPECT_THAT(check_ftdi_latency(root_, {(root_ / "gone").string()}), IsEmpty());
+}
+
+TEST(DoctorExamination, WithoutAConfigurationLooksAtThePcAlone) {
+  std::vector<std::string> checks;
+  for (const auto& finding : examine({})) checks.push_back(finding.check);
+  for (const char* check : {"real time", "memory lock", "cores", "LCM", "disk"})
+    EXPECT_THAT(checks, testing::Contains(check));
+  for (const auto& check : checks) EXPECT_THAT(check, testing::Not(HasSubstr("line of")));
+}
+
+TEST(DoctorExamination, ADeviceOnACanBusIsLookedForByItsInterface) {
+  auto configuration = parse_configuration(R"(
+[[device]]
+name = "r"
+role = "reference"
+protocol = "ixblue_stdbin"
+transport = { kind = "serial", port = "/dev/imuscope-no-r" }
+[[device]]
+name = "s"
+role = "study"
+protocol = "xsens_can"
+transport = { kind = "can", interface = "imuscan7" }
+)",
+                                           "car.toml");
+  ASSERT_TRUE(configuration) << configuration.error().text();
+  configuration->record.folder = test::scratch_folder().string();
+  Examination examination;
+  examination.configuration = *configuration;
+  bool is_there = false;
+  for (const auto& finding : examine(examination)) {
+    if (finding.check != "CAN imuscan7") continue;
+    is_there = true;
+    EXPECT_EQ(finding.verdict, Verdict::kBad);
+    EXPECT_THAT(finding.what, HasSubstr("no such interface"));
+  }
+  EXPECT_TRUE(is_there);
 }
 
 TEST(DoctorExamination, LooksAtEverythingThatTheConfigurationNames) {

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <sched.h>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 
@@ -21,7 +22,13 @@ inline constexpr int kNotPermitted = 77;
 template <typename Body>
 int in_child(const Body& body) {
   const pid_t child = fork();
-  if (child == 0) _exit(body());
+  if (child == 0) {
+    try {
+      _exit(body());
+    } catch (...) {
+      std::abort();  // or the child would go on with the tests that follow
+    }
+  }
   int status = 0;
   waitpid(child, &status, 0);
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
