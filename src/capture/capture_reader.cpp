@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "capture/stamp_range.h"
+
 namespace imuscope {
 namespace {
 
@@ -79,7 +81,8 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
     } else if (const auto* marked = std::get_if<event_t>(&*record)) {
       summary.other_messages += 1;
       const RecordClock clock{summary.run.t0, summary.run.t0_wall};
-      if (summary.has_run) summary.events.push_back({clock.host_time(event.utime), marked->text});
+      if (summary.has_run && is_stamp_us(event.utime))
+        summary.events.push_back({clock.host_time(event.utime), marked->text});
     } else {
       summary.exceptions.push_back(std::move(std::get<StoredException>(*record)));
     }

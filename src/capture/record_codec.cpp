@@ -17,7 +17,6 @@ constexpr std::int64_t kNsPerUs = 1000;
 constexpr std::int64_t kCountEnd = std::int64_t{1} << 62U;
 
 bool is_count(std::int64_t n) { return n >= 0 && n < kCountEnd; }
-bool is_stamp_us(std::int64_t us) { return us > -kStampEnd_ns / kNsPerUs && us < kStampEnd_ns / kNsPerUs; }
 
 std::int64_t fingerprint_of(const std::vector<std::uint8_t>& message) {
   std::uint64_t fingerprint = 0;

@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <imuscope/exception_t.hpp>
 #include <imuscope/raw_t.hpp>
 #include <limits>
 #include <random>
@@ -69,7 +71,7 @@ class Capture {
         exception.kind == ExceptionKind::kSkippedTicks ? "" : run_.devices.at(exception.device);
     writer_.append("IMUSCOPE_EXCEPTION", 1, encode(exception, device, kT0, 0, {run_.t0, run_.t0_wall}));
   }
-  void foreign(const Bytes& bytes) { writer_.append("POSE", 1, bytes); }
+  void foreign(const Bytes& bytes, std::int64_t utime = 1) { writer_.append("POSE", utime, bytes); }
   void done() { ASSERT_TRUE(writer_.close().has_value()); }
 
  private:
@@ -367,6 +369,126 @@ TEST(CaptureReader, AnEventLogThatIsNoCaptureIsToldApart) {
   ASSERT_TRUE(no_header.has_value()) << "its bytes are worth something with a configuration";
   EXPECT_FALSE(no_header->has_run);
   EXPECT_EQ(no_header->devices.size(), 1U);
+}
+
+TEST(CaptureReader, ModelsThatWereTakenOverAndWhatAPersonMarkedComeBackWithTheirTimes) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  const RunHeader run = example_run();
+  constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max();
+  const std::int64_t heard = to_ns(run.t0_wall) / 1000 + 2'500'000;
+  event_t marked{};
+  marked.text = "before the header";
+  capture.foreign(encode_message(marked), heard);
+  capture.header();
+  capture.chunk(0, 0, 1, {1});
+  marked.text = "regime gravel";
+  capture.foreign(encode_message(marked), heard);
+  // Damaged times: of the record, and of the message.
+  capture.foreign(encode_message(marked), kLatest);
+  capture.foreign(encode_message(marked), -kLatest);
+  marked.utime = kLatest;
+  capture.foreign(encode_message(marked), heard);
+  applied_model_t applied{};
+  applied.tick = 4711;
+  capture.foreign(encode_message(applied));
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary) << summary.error().text();
+  ASSERT_EQ(summary->events.size(), 1U) << "one has no run to be counted from, three no time";
+  EXPECT_EQ(summary->events[0].text, "regime gravel");
+  EXPECT_EQ(summary->events[0].time, kT0 + std::chrono::milliseconds(2500));
+  ASSERT_EQ(summary->applied_models.size(), 1U);
+  EXPECT_EQ(summary->applied_models[0].tick, 4711);
+}
+
+TEST(CaptureReader, ExceptionsThatNoRunCanHaveAreDamage) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  capture.chunk(0, 0, 1, {1});
+  exception_t good{};
+  good.kind = exception_t::LATE_SAMPLE;
+  good.device = "mtx1";
+  good.count = 1;
+  capture.foreign(encode_message(good));
+  for (auto field : {&exception_t::sample_sequence, &exception_t::tick, &exception_t::count}) {
+    for (const std::int64_t impossible : {std::int64_t{-2}, std::numeric_limits<std::int64_t>::max()}) {
+      exception_t bad = good;
+      bad.*field = impossible;
+      capture.foreign(encode_message(bad));
+    }
+  }
+  exception_t unknown = good;
+  unknown.kind = 77;
+  capture.foreign(encode_message(unknown));
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary);
+  EXPECT_EQ(summary->exceptions.size(), 1U);
+  EXPECT_EQ(summary->other_messages, 7U);
+}
+
+TEST(CaptureReader, MoreDevicesThanAConfigurationCanNameAreNotGathered) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  raw_t message{};
+  message.direction = raw_t::READ;
+  message.arrival_ns = to_ns(kT0);
+  message.n_bytes = 1;
+  message.bytes = {2};
+  for (int i = 0; i < 300; ++i) {
+    message.device = "device " + std::to_string(i);
+    capture.foreign(encode_message(message));
+  }
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary);
+  EXPECT_EQ(summary->devices.size(), 255U);
+  EXPECT_EQ(summary->other_messages, 45U);
+}
+
+TEST(CaptureReader, AReadThatNeverEndsIsGivenInPartsAndNothingOfItIsLost) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  constexpr std::size_t kChunks = 40'000;
+  {
+    Capture capture(path);
+    capture.header();
+    for (std::size_t i = 0; i < kChunks; ++i)
+      capture.chunk(0, static_cast<std::int64_t>(i), 1, Bytes(kRawChunkBytes, 7), true);
+    capture.done();
+  }
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader);
+  std::size_t bytes = 0;
+  std::size_t longest = 0;
+  while (const auto read = reader->next()) {
+    bytes += read->bytes.size();
+    longest = std::max(longest, read->bytes.size());
+  }
+  EXPECT_EQ(bytes, kChunks * kRawChunkBytes);
+  EXPECT_LE(longest, std::size_t{16} << 20U);
+}
+
+TEST(CaptureReader, TellsHowFarItHasComeInEveryFile) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  for (int file = 0; file < 2; ++file) {
+    Capture capture(capture_file(path, file));
+    capture.header();
+    for (int i = 0; i < 1000; ++i) capture.chunk(0, 1000 * file + i, i, Bytes(1000, 7));
+    capture.done();
+  }
+  std::vector<double> shares;
+  const auto summary = summarise_capture(path, [&](double share) { shares.push_back(share); });
+  ASSERT_TRUE(summary);
+  EXPECT_EQ(summary->devices.at("airins").reads, 2000U);
+  EXPECT_TRUE(summary->losses.empty());
+  ASSERT_GE(shares.size(), 6U);
+  for (const double share : shares) {
+    EXPECT_GE(share, 0.0);
+    EXPECT_LE(share, 1.0);
+  }
+  EXPECT_EQ(shares.back(), 1.0);
 }
 
 }  // namespace
