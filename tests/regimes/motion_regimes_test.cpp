@@ -148,12 +148,12 @@ TEST(StaticAndDynamic, MotionReachesBackToTheLastRestOverAHoleOfTheReference) {
   for (int k = 0; k < 8000; ++k) {
     const double t_s = k / kRate_hz;
     if (t_s >= 42.0 && t_s < 45.0) continue;
-    levels.add(at(t_s), {}, {0.0, 0.0, -9.81});
-    if (k % 10 == 0) levels.add_speed(at(t_s), t_s < 40.0 ? 0.0 : t_s < 42.0 ? 0.25 : 5.0, 0.001);
+    levels.add(host_time_at(t_s), {}, {0.0, 0.0, -9.81});
+    if (k % 10 == 0) levels.add_speed(host_time_at(t_s), t_s < 40.0 ? 0.0 : t_s < 42.0 ? 0.25 : 5.0, 0.001);
   }
   const auto track = static_and_dynamic(levels, {});
   ASSERT_EQ(track.stretches().size(), 2u);
-  EXPECT_NEAR(to_seconds(track.stretches()[1].begin - at(0.0)), 40.0, 0.21);
+  EXPECT_NEAR(to_seconds(track.stretches()[1].begin - host_time_at(0.0)), 40.0, 0.21);
 }
 
 TEST(StaticAndDynamic, AHoleOfTheReferenceGoesOnWithTheRegimeBeforeIt) {
@@ -162,11 +162,12 @@ TEST(StaticAndDynamic, AHoleOfTheReferenceGoesOnWithTheRegimeBeforeIt) {
     const double t_s = k / kRate_hz;
     if ((t_s >= 15.0 && t_s < 25.0) || (t_s >= 55.0 && t_s < 65.0)) continue;
     const double size = t_s < 40.0 ? 0.0 : 1.0;
-    levels.add(at(t_s), {0.0, 0.0, size * 0.2 * std::sin(t_s)}, {size * std::sin(0.7 * t_s), 0.0, -9.81});
+    levels.add(host_time_at(t_s), {0.0, 0.0, size * 0.2 * std::sin(t_s)},
+               {size * std::sin(0.7 * t_s), 0.0, -9.81});
   }
   const auto track = static_and_dynamic(levels, {});
-  EXPECT_EQ(track.at(at(20.0)), 0u);
-  EXPECT_EQ(track.at(at(60.0)), 1u);
+  EXPECT_EQ(track.at(host_time_at(20.0)), 0u);
+  EXPECT_EQ(track.at(host_time_at(60.0)), 1u);
   EXPECT_EQ(track.stretches().size(), 2u);
 }
 
@@ -202,8 +203,8 @@ TEST(MotionLevels, SamplesMayComeInAnyOrderAndBeforeTheOriginOfTheTimeScale) {
 
 TEST(MotionLevels, ASpeedHoldsForASecondAndNoLonger) {
   MotionLevels levels;
-  for (int k = 0; k < 500; ++k) levels.add(at(k / kRate_hz), {}, {});
-  levels.add_speed(at(1.0), -7.0, 0.3);
+  for (int k = 0; k < 500; ++k) levels.add(host_time_at(k / kRate_hz), {}, {});
+  levels.add_speed(host_time_at(1.0), -7.0, 0.3);
   const auto cells = levels.cells();
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const double begin_s = 0.2 * static_cast<double>(i);
@@ -221,7 +222,7 @@ constexpr double kBlock_s = 10.0;
 /// zero is rest. Rate, vibration and speed all have the block's measure.
 struct BlockedDrive {
   explicit BlockedDrive(const std::vector<double>& measures, bool with_speed = true) {
-    std::vector<RegimeStretch> stretches{{at(0.0), begin(0), 0}};
+    std::vector<RegimeStretch> stretches{{host_time_at(0.0), begin(0), 0}};
     for (std::size_t block = 0; block < measures.size(); ++block) {
       stretches.push_back({begin(block), begin(block + 1), measures[block] > 0.0 ? 1u : 0u});
       for (int k = 0; k < static_cast<int>(kBlock_s * kRate_hz); ++k) {
@@ -234,7 +235,9 @@ struct BlockedDrive {
     }
     motion = RegimeTrack({kStaticName, kDynamicName}, stretches);
   }
-  static HostTime begin(std::size_t block) { return at(30.0 + kBlock_s * static_cast<double>(block)); }
+  static HostTime begin(std::size_t block) {
+    return host_time_at(30.0 + kBlock_s * static_cast<double>(block));
+  }
   [[nodiscard]] std::vector<std::optional<std::size_t>> bins(Intensity intensity, int n) const {
     const auto track = intensity_bins(levels, motion, intensity, n, kBlock_s);
     std::vector<std::optional<std::size_t>> found;

@@ -191,7 +191,7 @@ TEST(NetStream, SaysWhatIsWrongAndWhatToDo) {
 TEST(NetStream, ADatagramWithoutBytesIsPassedOverAndWhatIsSaidToASenderGoesNowhere) {
   FarEnd sender(SOCK_DGRAM);
   const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
-  auto stream = NetStream::open({Kind::kUdp, "127.0.0.1", port});
+  auto stream = NetStream::open({NetKind::kUdp, "127.0.0.1", port});
   ASSERT_TRUE(stream) << stream.error().text();
   sender.say_to(port, "");
   sender.say_to(port, "after");
@@ -207,7 +207,7 @@ TEST(NetStream, ADatagramWithoutBytesIsPassedOverAndWhatIsSaidToASenderGoesNowhe
 TEST(NetStream, AServerThatResetsTheConnectionIsGone) {
   for (const bool by_reading : {true, false}) {
     FarEnd server(SOCK_STREAM);
-    auto stream = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+    auto stream = NetStream::open({NetKind::kTcp, "127.0.0.1", server.port()});
     ASSERT_TRUE(stream) << stream.error().text();
     EXPECT_TRUE((*stream)->health().is_up);
     EXPECT_EQ((*stream)->health().frames_dropped, 0U);
@@ -226,7 +226,7 @@ TEST(NetStream, AServerThatResetsTheConnectionIsGone) {
 
 TEST(NetStream, AServerThatDoesNotReadMakesNobodyWait) {
   FarEnd server(SOCK_STREAM);
-  auto stream = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+  auto stream = NetStream::open({NetKind::kTcp, "127.0.0.1", server.port()});
   ASSERT_TRUE(stream);
   server.accept_one();
   const std::vector<std::uint8_t> much(100'000, 'x');
@@ -246,12 +246,12 @@ TEST(NetStream, AServerThatDoesNotReadMakesNobodyWait) {
 
 TEST(NetStream, ASignalIsNoEndAndAnErrorIsOneOfAConnectionAlone) {
   FarEnd server(SOCK_STREAM);
-  auto tcp = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+  auto tcp = NetStream::open({NetKind::kTcp, "127.0.0.1", server.port()});
   ASSERT_TRUE(tcp);
   server.accept_one();
   FarEnd sender(SOCK_DGRAM);
   const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
-  auto udp = NetStream::open({Kind::kUdp, "", port});
+  auto udp = NetStream::open({NetKind::kUdp, "", port});
   ASSERT_TRUE(udp);
   std::array<std::uint8_t, 10> buffer{};
   {
@@ -279,7 +279,7 @@ TEST(NetStream, AServerThatDoesNotAnswerWithinASecondIsToldWithWhatMayBeTheReaso
   std::vector<std::unique_ptr<NetStream>> queue;
   Result<std::unique_ptr<NetStream>> last = tl::unexpected<Error>(Error{});
   for (int i = 0; i < 10; ++i) {
-    last = NetStream::open({Kind::kTcp, "127.0.0.1", server.port()});
+    last = NetStream::open({NetKind::kTcp, "127.0.0.1", server.port()});
     if (!last) break;
     queue.push_back(std::move(*last));
   }
@@ -290,7 +290,7 @@ TEST(NetStream, AServerThatDoesNotAnswerWithinASecondIsToldWithWhatMayBeTheReaso
 
 TEST(NetStream, AnAddressOfAnotherPcCannotBeListenedTo) {
   // Of the range that is kept for examples.
-  const auto other = NetStream::open({Kind::kUdp, "192.0.2.1", 9000});
+  const auto other = NetStream::open({NetKind::kUdp, "192.0.2.1", 9000});
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().remedy.find("give an address of this PC"), std::string::npos)
       << other.error().text();
@@ -299,7 +299,7 @@ TEST(NetStream, AnAddressOfAnotherPcCannotBeListenedTo) {
 TEST(NetStream, OnAPcWithoutNetworkTheCableIsMeantAndNotTheName) {
   const int outcome = test::in_child([] {
     if (unshare(CLONE_NEWNET) != 0) return test::kNotPermitted;
-    const auto stream = NetStream::open({Kind::kTcp, "192.0.2.1", 9000});
+    const auto stream = NetStream::open({NetKind::kTcp, "192.0.2.1", 9000});
     if (stream) return 1;
     if (stream.error().text().find(std::strerror(ENETUNREACH)) == std::string::npos) return 2;
     return stream.error().remedy.find("network cable") != std::string::npos ? 0 : 3;
@@ -318,9 +318,9 @@ bool have_own_network() {
 template <typename Address>
 int hear_group(const std::string& group, const Address& to) {
   const auto* const address = reinterpret_cast<const sockaddr*>(&to);
-  auto one = NetStream::open({Kind::kUdp, group, 9000});
+  auto one = NetStream::open({NetKind::kUdp, group, 9000});
   if (!one) return 1;
-  auto other = NetStream::open({Kind::kUdp, group, 9000});
+  auto other = NetStream::open({NetKind::kUdp, group, 9000});
   if (!other) return 2;
   const int sender = ::socket(address->sa_family, SOCK_DGRAM, 0);
   if (sendto(sender, "all", 3, 0, address, sizeof to) != 3) return 3;
@@ -368,7 +368,7 @@ TEST(NetStream, AGroupOfTheNewerProtocolIsJoinedLikewise) {
 TEST(NetStream, AGroupThatNoInterfaceLeadsToSaysSo) {
   const int outcome = test::in_child([] {
     if (unshare(CLONE_NEWNET) != 0) return test::kNotPermitted;
-    const auto stream = NetStream::open({Kind::kUdp, "239.1.2.3", 9000});
+    const auto stream = NetStream::open({NetKind::kUdp, "239.1.2.3", 9000});
     if (stream) return 1;
     return stream.error().text().find("the group cannot be joined") != std::string::npos &&
                    stream.error().remedy.find("multicast route") != std::string::npos

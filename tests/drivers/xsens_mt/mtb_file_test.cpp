@@ -13,7 +13,7 @@ using test_frames::Bytes;
 using test_frames::frame;
 using test_frames::mtdata;
 
-void append(Bytes& to, const Bytes& more) { to.insert(to.end(), more.begin(), more.end()); }
+void add_to(Bytes& to, const Bytes& more) { to.insert(to.end(), more.begin(), more.end()); }
 
 /// What a header may hold: text, zeros, numbers; no byte of it a preamble.
 Bytes header_of(std::size_t size, unsigned seed) {
@@ -26,14 +26,14 @@ Bytes header_of(std::size_t size, unsigned seed) {
 
 Bytes ten_messages() {
   Bytes bytes;
-  for (std::uint16_t k = 0; k < 10; ++k) append(bytes, mtdata(k));
+  for (std::uint16_t k = 0; k < 10; ++k) add_to(bytes, mtdata(k));
   return bytes;
 }
 
 TEST(MtbFile, TheDevicesBytesBeginAtTheFirstMessageBehindTheHeader) {
   for (const std::size_t size : {0U, 1U, 7U, 512U, 5000U, 100'000U}) {
     Bytes file = header_of(size, 1);
-    append(file, ten_messages());
+    add_to(file, ten_messages());
     EXPECT_EQ(data_offset_of_mtb(file), size);
   }
 }
@@ -42,10 +42,10 @@ TEST(MtbFile, AMessageThatTheHeaderHoldsByChanceIsNoBeginning) {
   // Alone, and two in a row with bytes behind them that are no message.
   for (const int n : {1, 2}) {
     Bytes file = header_of(40, 2);
-    for (int i = 0; i < n; ++i) append(file, frame(0x3E, {1, 2, 3}));
-    append(file, header_of(60, 3));
+    for (int i = 0; i < n; ++i) add_to(file, frame(0x3E, {1, 2, 3}));
+    add_to(file, header_of(60, 3));
     const std::size_t begin = file.size();
-    append(file, ten_messages());
+    add_to(file, ten_messages());
     EXPECT_EQ(data_offset_of_mtb(file), begin) << n;
   }
 }
@@ -54,17 +54,17 @@ TEST(MtbFile, WithoutThreeMessagesInARowThereIsNoBeginning) {
   EXPECT_EQ(data_offset_of_mtb({}), std::nullopt);
   EXPECT_EQ(data_offset_of_mtb(header_of(50'000, 4)), std::nullopt);
   Bytes file = header_of(100, 5);
-  append(file, mtdata(1));
-  append(file, mtdata(2));
+  add_to(file, mtdata(1));
+  add_to(file, mtdata(2));
   EXPECT_EQ(data_offset_of_mtb(file), std::nullopt);
-  append(file, mtdata(3));
+  add_to(file, mtdata(3));
   EXPECT_EQ(data_offset_of_mtb(file), 100U);
 }
 
 /// A message of which the last bytes are a whole message themselves: its checksum is that of the other, too.
 Bytes message_that_ends_in_another(std::uint8_t value) {
   Bytes data{value, 0};
-  append(data, frame(0x10, {7, 8}));
+  add_to(data, frame(0x10, {7, 8}));
   const std::uint8_t checksum = data.back();
   data.pop_back();
   // The second byte makes the sums of both alike.
@@ -79,8 +79,8 @@ Bytes message_that_ends_in_another(std::uint8_t value) {
 /// A message in whose data a whole one stands.
 Bytes message_with_another_inside(std::uint8_t value) {
   Bytes data{value};
-  append(data, frame(0x10, {7, 8}));
-  append(data, {9, 9, 9});
+  add_to(data, frame(0x10, {7, 8}));
+  add_to(data, {9, 9, 9});
   return frame(mid::kMtData, data);
 }
 
@@ -88,13 +88,13 @@ Bytes message_with_another_inside(std::uint8_t value) {
 TEST(MtbFile, WhatLooksLikeAMessageInsideOfOneIsDataOfIt) {
   for (const auto& make : {message_that_ends_in_another, message_with_another_inside}) {
     Bytes file = header_of(321, 6);
-    for (std::uint8_t k = 0; k < 10; ++k) append(file, make(k));
+    for (std::uint8_t k = 0; k < 10; ++k) add_to(file, make(k));
     EXPECT_EQ(data_offset_of_mtb(file), 321U);
   }
   // In the first one alone: not even that one is lost.
   Bytes file = header_of(321, 7);
-  append(file, message_with_another_inside(1));
-  append(file, ten_messages());
+  add_to(file, message_with_another_inside(1));
+  add_to(file, ten_messages());
   EXPECT_EQ(data_offset_of_mtb(file), 321U);
 }
 
@@ -112,8 +112,8 @@ TEST(MtbFile, AFalseMessageOfTheHeaderThatCoversTheFirstMessagesLosesNone) {
     for (std::size_t i = 1; i < false_message.size(); ++i) sum += false_message[i];
     for (std::size_t i = 0; i < covered; ++i) sum += data[i];
     false_message.back() = static_cast<std::uint8_t>(0U - sum);
-    append(file, false_message);
-    append(file, data);
+    add_to(file, false_message);
+    add_to(file, data);
     EXPECT_EQ(data_offset_of_mtb(file), begin) << covered << " bytes covered";
   }
 }
