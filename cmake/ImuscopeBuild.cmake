@@ -115,6 +115,10 @@ function(imuscope_test name)
     list(APPEND labels ENVIRONMENT TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan.supp)
   endif()
   add_executable(${name} ${ARG_SOURCES})
+  # With a sanitizer, most of a test program's build is the optimisation of what runs once.
+  if(IMUSCOPE_SANITIZE)
+    target_compile_options(${name} PRIVATE -O0)
+  endif()
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS} test_support
                         GTest::gmock GTest::gtest_main)
   gtest_discover_tests(${name} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
