@@ -141,7 +141,10 @@ void order_by_parsimony(std::vector<CrossValidated>& ranked) {
       simplest = i;
   }
   if (simplest == 0) return;
-  ranked[simplest].reason += fmt::format(", and simpler than {}", ranked.front().pooled.spec.name());
+  const auto& best = ranked.front().pooled;
+  const bool is_simpler = ranked[simplest].pooled.spec.parameter_count() < best.spec.parameter_count();
+  ranked[simplest].reason +=
+      fmt::format(", and {} {}", is_simpler ? "simpler than" : "identifiable, unlike", best.spec.name());
   const auto at = ranked.begin() + static_cast<std::ptrdiff_t>(simplest);
   std::rotate(ranked.begin(), at, at + 1);
 }
