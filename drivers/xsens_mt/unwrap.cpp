@@ -56,9 +56,8 @@ CountStep CountUnwrapper::take(std::int64_t raw, HostTime arrival) noexcept {
 
   suspected_ = false;
   // Late now by what host time ran more than the count; forgotten slowly, so that a constant delay that came
-  // to stay is not taken for a backlog for ever.
-  // A frame found inside a false one arrived before the one that was counted last: then most_s may be
-  // negative.
+  // to stay is not taken for a backlog for ever. Never below zero: a frame found inside a false one arrived
+  // before the one that was counted last, and most_s may be negative then.
   behind_s_ = std::max(std::min(most_s - step_s - kRateAllowance * elapsed_s, most_s), 0.0);
   accept(raw, arrival, step);
   return step == 0 ? CountStep::kRepeated : CountStep::kForward;

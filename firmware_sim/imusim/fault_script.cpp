@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <fstream>
-#include <numbers>
 #include <sstream>
 
 #include "firmware_sim/imusim/degrees.h"

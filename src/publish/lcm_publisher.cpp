@@ -9,8 +9,6 @@
 #include "publish/message_builders.h"
 
 namespace imuscope {
-namespace {}  // namespace
-
 struct LcmPublisher::Impl {
   Impl(const std::string& url, std::string_view prefix_in) : lcm(url), prefix(prefix_in) {}
 

@@ -1,7 +1,6 @@
 #pragma once
 
-/// Mean latency of a device's samples over the last whole second, for the status. One thread adds and asks;
-/// nothing is allocated.
+/// How late the samples of one device come, for the status. One thread adds and asks; nothing is allocated.
 
 #include <chrono>
 #include <limits>
@@ -10,7 +9,7 @@
 
 namespace imuscope {
 
-/// How late the samples of one device came, second by second.
+/// Mean over the last whole second.
 class LatencyWindow {
  public:
   void add(HostTime arrival, Duration latency) noexcept {
@@ -22,6 +21,7 @@ class LatencyWindow {
     sum_s_ += to_seconds(latency);
     n_ += 1.0;
   }
+  /// NaN before the first second is over.
   [[nodiscard]] double mean_s() const noexcept { return closed_mean_s_; }
 
  private:

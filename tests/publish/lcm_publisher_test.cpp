@@ -13,10 +13,10 @@
 #include <map>
 
 #include "example_reports.h"
-#include "private_network.h"
 #include "publish/lcm_listener.h"
 #include "publish/message_builders.h"
 #include "publish/message_codec.h"
+#include "tests/support/child_process.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {

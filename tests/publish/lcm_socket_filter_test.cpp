@@ -12,9 +12,9 @@
 #include <sstream>
 
 #include "example_reports.h"
-#include "private_network.h"
 #include "publish/lcm_listener.h"
 #include "publish/lcm_publisher.h"
+#include "tests/support/child_process.h"
 
 namespace imuscope {
 namespace {

@@ -34,6 +34,13 @@ int in_child(const Body& body) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
+/// Runs `body` in a child with a network of its own: a loopback interface that is down, no routes.
+/// @return what it returned; kNotPermitted without root
+template <typename Body>
+int in_private_network(const Body& body) {
+  return in_child([&] { return unshare(CLONE_NEWNET) == 0 ? body() : kNotPermitted; });
+}
+
 /// In a child: an ordinary user from here on, whom permissions hold back.
 inline bool become_ordinary() {
   constexpr uid_t kNobody = 65534;
