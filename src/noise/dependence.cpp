@@ -5,9 +5,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <limits>
 
 #include "noise/inference.h"
 #include "noise/separable_fit.h"
@@ -29,6 +31,13 @@ constexpr double kLongestStep = 0.7;  // of a logarithm
 /// help.
 constexpr double kSettled = 1e-10;
 constexpr double kNearlySettled = 1e-4;
+/// A window farther from the fit than this quantile of the others' distances pulls no harder than one that
+/// lies there. So few are held back without need that it costs nothing.
+constexpr double kFarQuantile = 0.99;
+/// Weights and fit make each other: again until no weight moves by more than this.
+constexpr double kWeightsSettled = 1e-4;
+constexpr int kMaxRounds = 50;
+constexpr double kFarWeight = 0.5;
 
 /// The windows as the search sees them.
 struct Problem {
@@ -39,6 +48,7 @@ struct Problem {
   double x_scale = 1.0;
   MatrixXd correlation_inverse;  ///< of the levels' errors under the start model
   VectorXd relative_sd;          ///< of the levels under the start model
+  VectorXd weight;               ///< of each window, 0 to 1
 };
 
 /// What is searched for: for every place a level and, where it has one, a slope.
@@ -92,11 +102,12 @@ struct Scores {
   MatrixXd information;
   std::vector<VectorXd> of_window;
   std::vector<MatrixXd> information_of_window;
+  VectorXd distance2;  ///< of each window from the fit, squared, in standard deviations of the start model
 };
 
 Scores scores_at(const Problem& problem, const Model& start, const Values& values, const Unknowns& unknowns) {
   const Index n = unknowns.count();
-  Scores out{VectorXd::Zero(n), MatrixXd::Zero(n, n), {}, {}};
+  Scores out{VectorXd::Zero(n), MatrixXd::Zero(n, n), {}, {}, VectorXd(problem.weight.size())};
   const auto rows = static_cast<Index>(problem.levels.size());
   MatrixXd design(rows, n);
   for (std::size_t w = 0; w < problem.wv.size(); ++w) {
@@ -115,8 +126,13 @@ Scores scores_at(const Problem& problem, const Model& start, const Values& value
       if (unknowns.slope[p]) design.col(column++) = x * of_place;
     }
     const VectorXd residual = unit.cwiseProduct(problem.wv[w] - expected);
-    const MatrixXd weighted = design.transpose() * problem.correlation_inverse;
-    const VectorXd score = weighted * residual;
+    const double distance2 = residual.dot(problem.correlation_inverse * residual);
+    out.distance2(static_cast<Index>(w)) =
+        std::isfinite(distance2) ? distance2 : std::numeric_limits<double>::infinity();
+    const double weight = problem.weight(static_cast<Index>(w));
+    const MatrixXd weighted = weight * design.transpose() * problem.correlation_inverse;
+    // What is infinitely far has no weight, and its product with infinity would be no number.
+    const VectorXd score = weight > 0.0 ? VectorXd(weighted * residual) : VectorXd::Zero(n);
     out.gradient += score;
     const MatrixXd information = weighted * design;
     out.information += information;
@@ -146,6 +162,19 @@ MatrixXd scatter_covariance(const Scores& scores) {
     outer.noalias() += score * score.transpose();
   }
   return inverse * outer * inverse;
+}
+
+/// Huber's weights: the distances' scale is their median's, since windows vary more than the model says.
+VectorXd weights_of(const VectorXd& distance2, std::size_t levels) {
+  std::vector<double> sorted(distance2.begin(), distance2.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const boost::math::chi_squared chi2(static_cast<double>(levels));
+  const double limit = *middle * boost::math::quantile(chi2, kFarQuantile) / boost::math::median(chi2);
+  VectorXd weights(distance2.size());
+  for (Index w = 0; w < weights.size(); ++w)
+    weights(w) = distance2(w) <= limit ? 1.0 : std::sqrt(limit / distance2(w));
+  return weights;
 }
 
 /// Leaves out, one by one, what is known worst, as long as it is not determined.
@@ -217,6 +246,19 @@ bool search(const Problem& problem, const Model& start, const Unknowns& unknowns
   return size < kNearlySettled;
 }
 
+/// Searches and weights in turn. False where a search does not settle.
+bool search_and_weight(Problem& problem, const Model& start, const Unknowns& unknowns, Values& values,
+                       Scores& last) {
+  for (int round = 0; round < kMaxRounds; ++round) {
+    if (!search(problem, start, unknowns, values, last)) return false;
+    const VectorXd weight = weights_of(last.distance2, problem.levels.size());
+    const double change = (weight - problem.weight).cwiseAbs().maxCoeff();
+    if (change < kWeightsSettled) return true;
+    problem.weight = weight;
+  }
+  return true;
+}
+
 Result<Problem> problem_of(std::span<const DrivenWindow> windows, const Model& model) {
   if (windows.size() < kFewestWindows) {
     return work_error(fmt::format("there are {} windows and {} are needed", windows.size(), kFewestWindows),
@@ -250,6 +292,7 @@ Result<Problem> problem_of(std::span<const DrivenWindow> windows, const Model& m
     for (Index r = 0; r < rows; ++r) wv(r) = windows[w].wv.levels.at(static_cast<std::size_t>(r)).value;
     problem.wv.push_back(std::move(wv));
   }
+  problem.weight = VectorXd::Ones(problem.x.size());
   problem.places = parameter_places(model);
   const MatrixXd v = wv_covariance(model, first, problem.levels.size());
   problem.relative_sd.resize(rows);
@@ -294,21 +337,24 @@ double printed(const ParameterEstimate& like, double start_scale, double now_sca
 Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const FitResult& start,
                                   const DependenceOptions& options) {
   const Model model = present_part(start.model);
-  const auto problem = problem_of(windows, model);
+  auto problem = problem_of(windows, model);
   if (!problem) return tl::unexpected<Error>(problem.error());
   const std::size_t places = problem->places.size();
   Unknowns unknowns{std::vector<bool>(places, true), std::vector<bool>(places, true)};
   Values values = start_values(model, problem->places);
   const Values begin = values;
+  problem->weight =
+      weights_of(scores_at(*problem, model, values, unknowns).distance2, problem->levels.size());
   leave_out_undetermined(*problem, model, values, unknowns);
   Scores last;
-  if (unknowns.count() > 0 && !search(*problem, model, unknowns, values, last)) {
+  if (unknowns.count() > 0 && !search_and_weight(*problem, model, unknowns, values, last)) {
     return work_error("the dependence on the driver could not be fitted: the search does not settle",
                       "use a simpler model or longer windows");
   }
 
   Dependence out;
   out.n_windows = windows.size();
+  out.n_far = static_cast<std::size_t>((problem->weight.array() < kFarWeight).count());
   for (const auto& w : windows) out.mean_driver += w.driver / static_cast<double>(windows.size());
   out.at_mean_driver = model_at(model, problem->places, values, 0.0);
   const auto names = names_of(start);

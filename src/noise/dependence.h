@@ -5,7 +5,9 @@
 ///   log theta_p(w) = log theta_p + slope_p (x_w - mean x),
 ///
 /// for amplitudes and rates alike, fitted to the wavelet variances of all windows at once (N-24 in
-/// EQUATIONS.md). What windows of that length do not determine is held at the start model and said.
+/// EQUATIONS.md). What windows of that length do not determine is held at the start model and said. A window
+/// that lies far from all others (a blow, a fault) makes no dependence of its own: it pulls no harder than
+/// one at the edge of the others.
 
 #include <optional>
 #include <span>
@@ -53,6 +55,7 @@ struct UndeterminedSlope {
 
 struct Dependence {
   std::size_t n_windows = 0;
+  std::size_t n_far = 0;  ///< of them, so far from the fit that they count less than half
   double mean_driver = 0.0;
   std::vector<ParameterSlope> slopes;
   std::vector<UndeterminedSlope> undetermined;

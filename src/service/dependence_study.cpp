@@ -129,6 +129,7 @@ struct Slope {
   std::size_t axis;
   std::size_t driver;
   std::size_t n_windows;
+  std::size_t n_far;
   double mean_driver;
   noise::ParameterSlope slope;
 };
@@ -156,6 +157,7 @@ nlohmann::json slope_json(const std::string& name, const Slope& s, double p_holm
           {"parameter", s.slope.name},
           {"unit", s.slope.unit},
           {"n_windows", s.n_windows},
+          {"n_windows_far", s.n_far},
           {"mean_driver", s.mean_driver},
           {"at_mean_driver", s.slope.at_mean_driver},
           {"slope", s.slope.slope},
@@ -188,7 +190,7 @@ class ImuStudy {
         continue;
       }
       for (const auto& slope : found->slopes)
-        slopes_.push_back({axis, driver, found->n_windows, found->mean_driver, slope});
+        slopes_.push_back({axis, driver, found->n_windows, found->n_far, found->mean_driver, slope});
       for (const auto& u : found->undetermined) {
         out_.document["not_determined"].push_back({{"name", name_},
                                                    {"axis", axis_name(axis)},
@@ -207,6 +209,7 @@ class ImuStudy {
     const auto holm = noise::holm_adjusted(p);
     for (std::size_t i = 0; i < slopes_.size(); ++i)
       out_.document["dependences"].push_back(slope_json(name_, slopes_[i], holm[i].value_or(1.0)));
+    say_what_lies_far();
   }
 
   /// Once for the sensor.
@@ -231,6 +234,18 @@ class ImuStudy {
                     "parameters against it",
                     name_, change_degC));
     return false;
+  }
+
+  /// A word on the axis with the most windows that hardly count.
+  void say_what_lies_far() {
+    const auto most = std::max_element(slopes_.begin(), slopes_.end(),
+                                       [](const Slope& a, const Slope& b) { return a.n_far < b.n_far; });
+    if (most == slopes_.end() || most->n_far == 0) return;
+    remark(
+        fmt::format("{} {}: windows far from what the others say of the noise (a blow, a fault) count less "
+                    "than half: {} of "
+                    "{}; no axis has more",
+                    name_, axis_name(most->axis), most->n_far, most->n_windows));
   }
 
   void remark(const std::string& sentence) {

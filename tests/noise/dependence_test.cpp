@@ -113,6 +113,44 @@ TEST(Dependence, ADriverThatIsNoNumberSomewhereIsRefused) {
   }
 }
 
+TEST(Dependence, OneWindowFarFromTheOthersMakesNoneAndIsCounted) {
+  const auto clean = example_of(white_windows(20, 0.0, 6), "WN");
+  const auto without = fit_dependence(clean.windows, clean.start);
+  ASSERT_TRUE(without);
+  EXPECT_EQ(without->n_far, 0u);
+  for (const double factor : {1e2, 1e8, 1e100, 1e300, std::numeric_limits<double>::infinity()}) {
+    for (const std::size_t far : {0u, 7u, 19u}) {
+      auto windows = clean.windows;
+      for (auto& level : windows[far].wv.levels) level.value *= factor;
+      const auto found = fit_dependence(windows, clean.start);
+      ASSERT_TRUE(found) << found.error().text();
+      EXPECT_EQ(found->n_far, 1u) << factor << " window " << far;
+      ASSERT_EQ(found->slopes.size(), 1u);
+      EXPECT_GT(found->slopes[0].p_value, 0.05) << factor << " window " << far;
+      EXPECT_LT(std::abs(found->slopes[0].slope), 0.5) << factor << " window " << far;
+    }
+  }
+}
+
+TEST(Dependence, OfAPlantedSlopeIsFoundBesideAFarWindow) {
+  auto example = example_of(white_windows(60, 0.5, 7), "WN");
+  for (auto& level : example.windows[3].wv.levels) level.value *= 1e4;
+  const auto found = fit_dependence(example.windows, example.start);
+  ASSERT_TRUE(found) << found.error().text();
+  EXPECT_EQ(found->n_far, 1u);
+  EXPECT_LT(found->slopes.at(0).p_value, 1e-6);
+  EXPECT_NEAR(found->slopes.at(0).slope, 0.5, 3.5 * found->slopes.at(0).sd);
+}
+
+TEST(Dependence, WhereMostWindowsAreNoNumbersIsRefused) {
+  auto example = example_of(white_windows(20, 0.0, 8), "WN");
+  for (std::size_t w = 0; w < 11; ++w)
+    example.windows[w].wv.levels.front().value = std::numeric_limits<double>::infinity();
+  const auto refused = fit_dependence(example.windows, example.start);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), ::testing::HasSubstr("does not settle"));
+}
+
 TEST(WhiteNoiseOfAWindow, IsThatOfTheWindowWithAnIntervalThatHoldsItAsOftenAsItSays) {
   // A Gauss-Markov process beside white noise of another variance than the model's.
   const Model model{{{ProcessKind::kWhiteNoise, 1.0, {}}, {ProcessKind::kGaussMarkov, 0.3, {0.02, 0.0}}}};

@@ -11,6 +11,7 @@
 namespace imuscope {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -18,6 +19,7 @@ using ::testing::Not;
 
 constexpr double kRate_hz = 20.0;
 constexpr double kLength_s = 1000.0;
+constexpr double kBlow_s = 904.0;
 constexpr double kSlope = 0.05;  // of the logarithm of the variance, per degC
 
 HostTime at(double t_s) { return HostTime{} + from_seconds(t_s); }
@@ -34,8 +36,8 @@ Configuration one_imu() {
 
 double temperature_at(double t_s, double warming_degC) { return 25.0 + warming_degC * t_s / kLength_s; }
 
-/// White noise whose variance follows the temperature.
-DependenceStudy study_of(double warming_degC, bool tells_temperature) {
+/// White noise whose variance follows the temperature, a part of it multiplied: `blow`.
+DependenceStudy study_of(double warming_degC, bool tells_temperature, double blow = 1.0) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal;
   NoiseSeries series;
@@ -44,7 +46,8 @@ DependenceStudy study_of(double warming_degC, bool tells_temperature) {
   for (int k = 0; k < static_cast<int>(kLength_s * kRate_hz); ++k) {
     const double t_s = k / kRate_hz;
     const double degC = temperature_at(t_s, warming_degC);
-    const double sd = std::exp(0.5 * kSlope * (degC - 25.0));
+    const bool is_blow = t_s >= kBlow_s && t_s < kBlow_s + 2.0;
+    const double sd = (is_blow ? blow : 1.0) * std::exp(0.5 * kSlope * (degC - 25.0));
     ErrorRow row{};
     row.counter = k;
     row.time = at(t_s);
@@ -79,6 +82,19 @@ TEST(DependenceStudy, WhatFollowsTheTemperatureIsFoundOnTheAxesThatDoAlone) {
     EXPECT_EQ(entry.at("p_holm").get<double>() < 1e-3, follows) << entry.at("axis");
   }
   EXPECT_EQ(of_temperature, 6);
+}
+
+TEST(DependenceStudy, ABlowOfTwoSecondsMakesNoDependenceAndIsToldOnce) {
+  const auto study = study_of(0.0, false, 30.0);
+  ASSERT_FALSE(study.document.at("dependences").empty());
+  for (const auto& entry : study.document.at("dependences")) {
+    const bool hit = entry.at("axis").get<std::string>().starts_with("gyro");
+    EXPECT_EQ(entry.at("n_windows_far"), hit ? 1 : 0) << entry;
+    EXPECT_GT(entry.at("p_holm").get<double>(), 0.05) << entry;
+  }
+  EXPECT_THAT(study.remarks,
+              Contains(AllOf(HasSubstr("count less than half: 1 of"), HasSubstr("mtx1 gyro"))));
+  EXPECT_THAT(study_of(0.0, false).remarks, Not(Contains(HasSubstr("count less than half"))));
 }
 
 TEST(DependenceStudy, ARecordWithoutTemperatureSaysSoOnceForTheSensor) {
