@@ -184,10 +184,10 @@ enum class EstimatorEventKind : std::uint8_t {
   kCoarseAlignmentPoor,  ///< enough motion but no consistent rotation; value: correlation of the rates, to 1
   kMountingChanged,      ///< innovations say that the S-IMU sits differently; starts again; value: mean NIS
   kStudyReturned,        ///< after a gap; its biases are uncertain again; value: gap in s
-  kGnssRejected,         ///< start of a streak of rejected solutions; value: NIS
-  kGnssReacquired,       ///< end of a streak; value: its length in s
-  kOdometryLost,         ///< no speed for a while; the last one is not held; value: its age in s
-  kOdometryReturned,     ///< value: silence in s
+  kGnssRejected,  ///< start of a streak of rejected solutions; value: NIS, infinite for a place that is none
+  kGnssReacquired,    ///< end of a streak; value: its length in s
+  kOdometryLost,      ///< no speed for a while; the last one is not held; value: its age in s
+  kOdometryReturned,  ///< value: silence in s
   kOdometryRejected,  ///< wheels contradict the navigation (slip, wrong unit or scale); value: excess in m/s
   kOdometryAccepted,  ///< end of a streak of rejected speeds; value: its length in s
   kCovarianceRepaired,     ///< a state's variance was no longer positive; value: state index (state_name.h)

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calibration/gnss_trust.h"
 #include "calibration/navigation_output.h"
@@ -340,9 +341,11 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
 
 bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
   const GnssData& gnss = sample.gnss;
-  const bool has_position = (gnss.flags & kPositionValid) != 0;
   const bool has_velocity = gnss_.use_velocity && (gnss.flags & kVelocityValid) != 0;
   const GeodeticPosition antenna{gnss.latitude_rad, gnss.longitude_rad, gnss.height_m};
+  // A receiver may call valid what is nowhere, and no gate stands before its first position.
+  const bool claims_position = (gnss.flags & kPositionValid) != 0;
+  const bool has_position = claims_position && is_on_earth(antenna);
   const Vector3d sd_position = trusted_position_sd(gnss, gnss_);
   const Vector3d sd_velocity = trusted_velocity_sd(gnss, gnss_);
   if (!has_last_) return true;
@@ -365,6 +368,10 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     }
     if (has_position) aligner_.add_gnss_position(time, antenna, sd_position);
     if (has_velocity) aligner_.add_gnss_velocity(time, to_eigen(gnss.v_n_mps), sd_velocity);
+    if (claims_position && !has_position) {
+      ++counters_.gnss_positions_rejected;
+      ++counters_.gnss_rejected;
+    }
     return true;
   }
 
@@ -389,6 +396,8 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     if (used)
       inject(then.state,
              then.back * Eigen::Map<const NavigationErrorVector>(core_.covariance().correction().data()));
+  } else if (claims_position) {
+    ++counters_.gnss_positions_rejected;
   }
   if (has_velocity) {
     const GnssInnovation velocity =
@@ -401,12 +410,14 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
       streak_ = false;
       log_.add(EstimatorEventKind::kGnssReacquired, gnss_.device, time, to_seconds(time - streak_start_));
     }
-  } else if (has_position || has_velocity) {
+  } else if (claims_position || has_velocity) {
     ++counters_.gnss_rejected;
     if (!streak_) {
       streak_ = true;
       streak_start_ = time;
-      const double nis = has_position ? position_gate_.last_nis() : velocity_gate_.last_nis();
+      double nis = std::numeric_limits<double>::infinity();
+      if (has_position || has_velocity)
+        nis = has_position ? position_gate_.last_nis() : velocity_gate_.last_nis();
       log_.add(EstimatorEventKind::kGnssRejected, gnss_.device, time, nis);
     }
   }

@@ -1,13 +1,22 @@
 #include "navigation/wgs84.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace imuscope {
 
 namespace {
 constexpr double kE2 = kWgs84EccentricitySquared;
 constexpr double kSemiMinorAxis_m = kWgs84SemiMajorAxis_m * (1.0 - kWgs84Flattening);
+constexpr double kDeepestSea_m = -11e3;
+constexpr double kEdgeOfSpace_m = 100e3;  // as the FAI has it
 }  // namespace
+
+bool is_on_earth(const GeodeticPosition& position) noexcept {
+  return std::abs(position.latitude_rad) <= 0.5 * std::numbers::pi &&
+         std::abs(position.longitude_rad) <= 2.0 * std::numbers::pi && position.height_m >= kDeepestSea_m &&
+         position.height_m <= kEdgeOfSpace_m;
+}
 
 // N-5
 Curvature curvature_of(double sin_latitude, double cos_latitude) noexcept {

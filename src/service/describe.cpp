@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <cmath>
 
 #include "base/units.h"
 #include "calibration/state_name.h"
@@ -58,6 +59,8 @@ std::string describe(const Configuration& configuration, const EstimatorEvent& e
     case EstimatorEventKind::kStudyReturned:
       return fmt::format("{}: back after {:.2f} s of silence", name, event.value);
     case EstimatorEventKind::kGnssRejected:
+      if (std::isinf(event.value))
+        return fmt::format("{}: positions rejected, which are nowhere on Earth; is it still starting?", name);
       return fmt::format("{}: solutions rejected (NIS {:.0f})", name, event.value);
     case EstimatorEventKind::kGnssReacquired:
       return fmt::format("{}: solutions accepted again after {:.1f} s", name, event.value);

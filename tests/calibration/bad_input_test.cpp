@@ -93,6 +93,35 @@ TEST(BadInput, TwoSwappedStudiesAreToldByName) {
   }
 }
 
+TEST(BadInput, APositionThatIsNowhereIsRefusedFromTheFirstOnAndCounted) {
+  const std::vector<std::array<double, 3>> nowhere{
+      {0.0, 0.0, -6378137.0}, {5.0, 0.1, 400.0}, {0.8, 0.1, 1e300}, {0.8, -7.0, 400.0}};
+  for (const bool attitude_is_given : {true, false}) {
+    SimulatedDrive drive(120.0, {tilted()}, 47);
+    EstimatorConfig config = drive.config();
+    if (!attitude_is_given) config.navigation.initial_rpy_rad.reset();
+    Estimator estimator(config);
+    std::size_t spoilt = 0;
+    const Told told = told_by(drive, estimator, [&](Sample& sample, double t_s) {
+      // Before anything else is heard of the receiver, and in the midst of the drive.
+      if (sample.device != SimulatedDrive::kGnss || (t_s > 3.0 && t_s < 100.0) || t_s > 102.0) return true;
+      const auto& [latitude_rad, longitude_rad, height_m] = nowhere[spoilt++ % nowhere.size()];
+      sample.gnss.latitude_rad = latitude_rad;
+      sample.gnss.longitude_rad = longitude_rad;
+      sample.gnss.height_m = height_m;
+      return true;
+    });
+    ASSERT_GT(spoilt, 2 * nowhere.size());
+    EXPECT_EQ(estimator.counters().gnss_positions_rejected, spoilt);
+    EXPECT_EQ(estimator.counters().gnss_rejected, spoilt);
+    EXPECT_TRUE(told.has(EstimatorEventKind::kGnssRejected));
+    EXPECT_TRUE(told.has(EstimatorEventKind::kGnssReacquired));
+    EXPECT_LT(horizontal_error_m(estimator.navigation(), drive.motion().state_at(drive.time_s() - 0.01)),
+              0.2);
+    EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
+  }
+}
+
 class SilentStudy : public testing::TestWithParam<bool> {};
 
 TEST_P(SilentStudy, ThatReturnsIsToldAndItsBiasesAreComparedWithThoseBefore) {

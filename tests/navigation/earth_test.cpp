@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <cmath>
+#include <limits>
 
 #include "navigation/gravity.h"
 #include "navigation/so3.h"
@@ -19,6 +20,24 @@ TEST(Wgs84, EccentricityAndPolarRadiusAreThePublishedDerivedConstants) {
   EXPECT_NEAR(curvature_at(kPi / 2.0).transverse_m, 6399593.6258, 5e-5);
   EXPECT_NEAR(curvature_at(kPi / 2.0).meridian_m, 6399593.6258, 5e-5);
   EXPECT_NEAR(curvature_at(0.0).meridian_m, 6378137.0 * (1.0 - 6.69437999014e-3), 1e-4);
+}
+
+TEST(Wgs84, WhereAVehicleCanBeAndWhereNot) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const GeodeticPosition& place : {GeodeticPosition{0.0, 0.0, 0.0},
+                                        {kPi / 2.0, kPi, -430.0},
+                                        {-kPi / 2.0, -kPi, 8849.0},
+                                        {0.8, 6.0, 4e4}})
+    EXPECT_TRUE(is_on_earth(place)) << place.height_m;
+  for (const GeodeticPosition& place : {GeodeticPosition{1.6, 0.0, 0.0},
+                                        {0.8, 7.0, 0.0},
+                                        {0.8, 0.0, -12e3},
+                                        {0.8, 0.0, 101e3},
+                                        {nan, 0.0, 0.0},
+                                        {0.8, nan, 0.0},
+                                        {0.8, 0.0, nan},
+                                        geodetic_from_ecef({0.0, 0.0, 0.0})})
+    EXPECT_FALSE(is_on_earth(place)) << place.latitude_rad << ' ' << place.height_m;
 }
 
 TEST(Wgs84, RadiiAreWhatMovesAPointByOneMetre) {
