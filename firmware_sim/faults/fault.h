@@ -56,7 +56,7 @@ struct Fault {
   double gyro_range_radps = 1e9;
   double accel_range_mps2 = 1e9;
   Eigen::Vector3d by_n_m = Eigen::Vector3d::Zero();                    ///< north, east, down
-  std::shared_ptr<FaultTally> tally = std::make_shared<FaultTally>();  ///< copies of a fault share it
+  std::shared_ptr<FaultTally> tally = std::make_shared<FaultTally>();  ///< of this device; copies share it
   int solution_type = 0;  ///< GREIS: 0 none, 1 single, 2 differential, 3 float, 4 fixed
 
   [[nodiscard]] bool acts_at(double t_s) const { return t_s >= begin_s && t_s < end_s; }

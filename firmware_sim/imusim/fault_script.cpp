@@ -120,6 +120,7 @@ void read_fault(TableReader& in, Configuration& configuration) {
       in.fail("kind", fmt::format("cannot befall '{}': it is no such device", device.name));
     if (!is_for(device, fault.kind) || (!names.empty() && !named)) continue;
     fault.device = device.name;
+    fault.tally = std::make_shared<FaultTally>();  // its own: each device may run on a thread
     configuration.faults.push_back(fault);
   }
 }

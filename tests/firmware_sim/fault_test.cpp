@@ -212,6 +212,19 @@ TEST_F(FaultScript, TheLogTellsWhatEachFaultDid) {
             clean("b").mt_counters().size() - made.at("b").mt_counters().size());
 }
 
+TEST_F(FaultScript, WhatAFaultOfAllDevicesDidIsToldOfEach) {
+  const auto made =
+      with("[[fault]]\nkind = \"flip\"\nat_s = 5\nfor_s = 15\nshare = 0.02\n", {"ref", "a", "b", "gnss"});
+  std::ifstream in(folder_ / "faulty" / "fault_log.json");
+  const auto log = nlohmann::json::parse(in).at("faults");
+  ASSERT_EQ(log.size(), made.size());
+  for (const auto& entry : log) {
+    const std::string name = entry.at("device");
+    EXPECT_EQ(entry.at("bytes_hit").get<std::size_t>(), differing(made.at(name).bytes, clean(name).bytes))
+        << name;
+  }
+}
+
 TEST_F(FaultScript, DroppedBytesAreGone) {
   const auto a =
       with("[[fault]]\nkind = \"drop\"\ndevice = \"a\"\nat_s = 10\nfor_s = 10\nshare = 0.01\n", {"a"})
