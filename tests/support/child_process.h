@@ -3,11 +3,14 @@
 /// A process beside the test's own, for what cannot be taken back: other rights, other mounts, another
 /// network.
 
+#include <linux/capability.h>
 #include <sys/mount.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <sched.h>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
@@ -41,10 +44,12 @@ int in_private_network(const Body& body) {
   return in_child([&] { return unshare(CLONE_NEWNET) == 0 ? body() : kNotPermitted; });
 }
 
-/// In a child: an ordinary user from here on, whom permissions hold back.
+/// In a child: from here on permissions hold it back, root or not. It stays who it is, so that its own
+/// folders, which may lie in root's home, stay within reach.
 inline bool become_ordinary() {
-  constexpr uid_t kNobody = 65534;
-  return geteuid() != 0 || setuid(kNobody) == 0;
+  __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+  const std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> none{};
+  return syscall(SYS_capset, &header, none.data()) == 0;
 }
 
 /// In a child: `folder` is a disk of its own, in memory and of this size.
