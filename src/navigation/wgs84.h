@@ -21,8 +21,8 @@ struct GeodeticPosition {
   double height_m = 0.0;  ///< above the ellipsoid
 };
 
-/// Whether a vehicle can be there: a latitude that exists, a longitude within a turn, and a height between the
-/// deepest sea and the edge of space. False for what is no number.
+/// Whether a vehicle can be there: a latitude that exists, a longitude within a turn, and a height between
+/// the deepest sea and the edge of space. False for what is no number.
 [[nodiscard]] bool is_on_earth(const GeodeticPosition& position) noexcept;
 
 /// Radii of curvature of the ellipsoid at one latitude, with their derivatives; without the height.
