@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 #include <iostream>
 #include <vector>
 
@@ -37,8 +36,7 @@ std::vector<Snapshot> snapshots_with(InstructionSet set, const OpenedRecording& 
 }
 
 TEST(InstructionSets, AgreeOnTheGoldenDriveToAMillionthOfTheSd) {
-  const std::filesystem::path folder = testing::TempDir() + "imuscope_instruction_sets";
-  std::filesystem::create_directories(folder);
+  const auto folder = scratch_folder();
   const auto capture = folder / "capture.lcm";
   const std::string unpack =
       "gzip -dc '" + source_path("tests/golden/capture.lcm.gz").string() + "' > '" + capture.string() + "'";

@@ -12,6 +12,7 @@
 #include "navigation/so3.h"
 #include "programs.h"
 #include "tests/calibration/simulated_drive.h"
+#include "tests/support/shared_data.h"
 
 namespace imuscope::test {
 namespace {
@@ -76,9 +77,7 @@ std::vector<SmoothedRow> smoothed_rows(const std::filesystem::path& file) {
 double angle_between(const Matrix3d& a, const Matrix3d& b) { return log_so3(a.transpose() * b).norm(); }
 
 TEST(Remount, TheStudyKeepsToTheMountingThatWasInForceAtEachInstant) {
-  const std::filesystem::path folder = testing::TempDir() + "imuscope_remount";
-  std::filesystem::remove_all(folder);
-  std::filesystem::create_directories(folder);
+  const auto folder = scratch_folder();
   const Matrix3d before = exp_so3(Vector3d(0.1, 0.2, -1.5));
   const Matrix3d after = exp_so3(Vector3d(0.2, -0.3, 0.8)) * before;
   SimulatedDrive drive(kDrive_s, {{before, {0.35, -0.22, 0.12}, 0.0}}, 61);

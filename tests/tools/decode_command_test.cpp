@@ -26,8 +26,9 @@ struct Outcome {
   std::string err;
 };
 
-Outcome decode(const std::filesystem::path& file, const std::string& options) {
-  const auto folder = scratch_folder();
+/// What the program prints goes into the folder, too.
+Outcome decode_in(const std::filesystem::path& folder, const std::filesystem::path& file,
+                  const std::string& options) {
   const auto out = folder / "stdout.txt";
   const auto err = folder / "stderr.txt";
   const std::string command = "'" + program_path("imuscope").string() + "' decode '" + file.string() + "' " +
@@ -42,10 +43,15 @@ Outcome decode(const std::filesystem::path& file, const std::string& options) {
   return outcome;
 }
 
-/// Writes the named vector's bytes as a recording.
-std::filesystem::path recording_of(const std::string& protocol, const std::string& name) {
+Outcome decode(const std::filesystem::path& file, const std::string& options) {
+  return decode_in(scratch_folder(), file, options);
+}
+
+/// The named vector's bytes as a recording, decoded.
+Outcome decode_vector(const std::string& protocol, const std::string& name) {
   std::ifstream in(shared_path("oracle/protocols/" + protocol + ".hex"));
-  const auto file = std::filesystem::path(testing::TempDir()) / ("imuscope_" + name + ".bin");
+  const auto folder = scratch_folder();
+  const auto file = folder / (name + ".bin");
   for (std::string line; std::getline(in, line);) {
     if (line.rfind(name + ": ", 0) != 0) continue;
     std::ofstream out(file, std::ios::binary);
@@ -53,7 +59,7 @@ std::filesystem::path recording_of(const std::string& protocol, const std::strin
       out.put(static_cast<char>(std::stoi(line.substr(i, 2), nullptr, 16)));
     }
   }
-  return file;
+  return decode_in(folder, file, "--json");
 }
 
 TEST(DecodeCommand, NamesTheFieldsOfMtDataAsTheVectorsDo) {
@@ -65,7 +71,7 @@ TEST(DecodeCommand, NamesTheFieldsOfMtDataAsTheVectorsDo) {
     if (!v.contains("expected") || v["expected"].contains("counters") || name.rfind("corner_", 0) == 0)
       continue;
     SCOPED_TRACE(name);
-    const Outcome outcome = decode(recording_of("xsens_mtdata", name), "--json");
+    const Outcome outcome = decode_vector("xsens_mtdata", name);
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     ASSERT_EQ(outcome.lines.size(), 2U);
     EXPECT_EQ(outcome.lines[0]["protocol"], "xsens_mt");
@@ -83,7 +89,7 @@ TEST(DecodeCommand, ListsTheItemsOfMtData2AsTheVectorsDo) {
   int checked = 0;
   for (const json& v : oracle["vectors"]) {
     if (!v.contains("expected")) continue;
-    const Outcome outcome = decode(recording_of("xsens_mtdata2", v["name"]), "--json");
+    const Outcome outcome = decode_vector("xsens_mtdata2", v["name"]);
     ASSERT_EQ(outcome.lines.size(), 2U);
     EXPECT_EQ(outcome.lines[0]["items"], v["expected"]) << v["name"];
     ++checked;
@@ -128,7 +134,7 @@ TEST(DecodeCommand, NamesTheBlocksOfStdBinAsTheVectorsDo) {
   for (const json& v : oracle["vectors"]) {
     if (!v.contains("expected")) continue;
     SCOPED_TRACE(v["name"].get<std::string>());
-    const Outcome outcome = decode(recording_of("ixblue_stdbin", v["name"]), "--json");
+    const Outcome outcome = decode_vector("ixblue_stdbin", v["name"]);
     ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
     EXPECT_EQ(outcome.lines[0]["protocol"], "ixblue_stdbin");
     for (const auto& [key, value] : v["expected"].items()) EXPECT_EQ(outcome.lines[0][key], value) << key;
@@ -144,7 +150,7 @@ TEST(DecodeCommand, NamesTheFieldsOfGreisAsTheVectorsDo) {
   for (const json& v : oracle["vectors"]) {
     if (!v.contains("fields")) continue;
     SCOPED_TRACE(v["name"].get<std::string>());
-    const Outcome outcome = decode(recording_of("greis", v["name"]), "--json");
+    const Outcome outcome = decode_vector("greis", v["name"]);
     ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
     EXPECT_EQ(outcome.lines[0]["protocol"], "greis");
     EXPECT_EQ(outcome.lines[0]["message"], v["id"]);
@@ -161,7 +167,7 @@ TEST(DecodeCommand, NamesTheFieldsOfNavPvtAsTheVectorsDo) {
   const json oracle = oracle_of("ubx_nav_pvt");
   for (const json& v : oracle["vectors"]) {
     if (!v.contains("fields")) continue;
-    const Outcome outcome = decode(recording_of("ubx_nav_pvt", v["name"]), "--json");
+    const Outcome outcome = decode_vector("ubx_nav_pvt", v["name"]);
     ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
     EXPECT_EQ(outcome.lines[0]["protocol"], "ubx");
     EXPECT_EQ(outcome.lines[0]["message"], "NAV-PVT");
@@ -185,7 +191,7 @@ TEST(DecodeCommand, NamesTheFieldsOfNmeaAsTheVectorsDo) {
   for (const json& v : oracle["vectors"]) {
     if (!v.contains("expected")) continue;
     SCOPED_TRACE(v["name"].get<std::string>());
-    const Outcome outcome = decode(recording_of("nmea", v["name"]), "--json");
+    const Outcome outcome = decode_vector("nmea", v["name"]);
     ASSERT_EQ(outcome.lines.size(), 2U) << outcome.err;
     EXPECT_EQ(outcome.lines[0]["protocol"], "nmea");
     expect_fields(outcome.lines[0], v["expected"]);
@@ -280,15 +286,15 @@ TEST(DecodeCommand, FindsEveryEpochOfTheJavadLogAndNoBadByteBeforeItsCut) {
 }
 
 TEST(DecodeCommand, SaysWhatIsWrongAndWithWhichExitCode) {
-  const auto folder = std::filesystem::path(testing::TempDir());
-  const Outcome missing = decode(folder / "imuscope_no_such_file.bin", "");
+  const auto folder = scratch_folder();
+  const Outcome missing = decode_in(folder, folder / "no_such_file.bin", "");
   EXPECT_EQ(missing.exit_code, 1);
-  EXPECT_NE(missing.err.find("imuscope_no_such_file.bin cannot be read"), std::string::npos) << missing.err;
-  std::ofstream(folder / "imuscope_empty.bin").close();
-  const Outcome empty = decode(folder / "imuscope_empty.bin", "");
+  EXPECT_NE(missing.err.find("no_such_file.bin cannot be read"), std::string::npos) << missing.err;
+  std::ofstream(folder / "empty.bin").close();
+  const Outcome empty = decode_in(folder, folder / "empty.bin", "");
   EXPECT_EQ(empty.exit_code, 1);
   EXPECT_NE(empty.err.find("no message of a known protocol"), std::string::npos) << empty.err;
-  const Outcome wrong = decode(folder / "imuscope_empty.bin", "--protocol morse");
+  const Outcome wrong = decode_in(folder, folder / "empty.bin", "--protocol morse");
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_NE(wrong.err.find("choose one of: "), std::string::npos) << wrong.err;
 }
@@ -315,11 +321,12 @@ TEST(DecodeCommand, ShowsEverySignalOfTheCanVectorsBitForBit) {
 }
 
 TEST(DecodeCommand, FindsACanLogByItselfAndShowsItsFrames) {
-  const auto file = std::filesystem::path(testing::TempDir()) / "imuscope_short.log";
+  const auto folder = scratch_folder();
+  const auto file = folder / "short.log";
   std::ofstream(file)
       << "(1.000001) can0 123#0102\n(1.000002) can0 18FF0100##1AABBCC\n(1.000003) can1 7FF#R5\n"
          "(1.000004) can0 20000040#0000000000000000\nnonsense\n";
-  const Outcome outcome = decode(file, "--json");
+  const Outcome outcome = decode_in(folder, file, "--json");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   ASSERT_EQ(outcome.lines.size(), 5U);
   EXPECT_EQ(outcome.lines[0]["message"], "123");
@@ -332,11 +339,12 @@ TEST(DecodeCommand, FindsACanLogByItselfAndShowsItsFrames) {
 }
 
 TEST(DecodeCommand, ABrokenDbcFileIsRefusedWithItsLine) {
-  const auto log = std::filesystem::path(testing::TempDir()) / "imuscope_frame.log";
-  const auto dbc = std::filesystem::path(testing::TempDir()) / "broken.dbc";
+  const auto folder = scratch_folder();
+  const auto log = folder / "frame.log";
+  const auto dbc = folder / "broken.dbc";
   std::ofstream(log) << "(1.000001) can0 123#0102\n";
   std::ofstream(dbc) << "BO_ 1 A: 8 X\n SG_ S : 0,8@1+ (1,0) [0|0] \"\" X\n";
-  const Outcome outcome = decode(log, "--dbc '" + dbc.string() + "'");
+  const Outcome outcome = decode_in(folder, log, "--dbc '" + dbc.string() + "'");
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_NE(outcome.err.find("broken.dbc:2: SG_ S: expected '|', found ','"), std::string::npos)
       << outcome.err;

@@ -17,6 +17,7 @@
 #include <stdexcept>
 
 #include "tools/benchmarks/bench_report.h"
+#include "tools/benchmarks/own_folder.h"
 
 namespace {
 
@@ -236,18 +237,19 @@ int main(int argc, char** argv) {
   CLI::App app{"Replay and study of simulated drives beside real time"};
   double minutes = 15.0;
   int rounds = 3;
-  std::string scratch = (fs::temp_directory_path() / "imuscope_replay_speed").string();
+  std::string scratch = fs::temp_directory_path().string();
   std::string json;
   app.add_option("--minutes", minutes, "length of the drive; half and twice it are also driven")
       ->check(CLI::Range(0.5, 240.0));
   app.add_option("--rounds", rounds, "of which the fastest counts")->check(CLI::Range(1, 100));
-  app.add_option("--scratch", scratch, "folder for recordings and results; removed at the end")
+  app.add_option("--scratch", scratch,
+                 "where a folder for recordings and results is made, and removed at the end")
       ->type_name("DIR");
   app.add_option("--json", json, "write the rows here")->type_name("FILE");
   CLI11_PARSE(app, argc, argv);
   try {
-    const auto rows = measure(Programs(scratch), minutes, rounds);
-    fs::remove_all(scratch);
+    const bench::OwnFolder folder(scratch);
+    const auto rows = measure(Programs(folder.path()), minutes, rounds);
     return bench::finish(rows, json);
   } catch (const std::exception& error) {
     fmt::print(stderr, "replay_speed: {}\n", error.what());

@@ -26,6 +26,7 @@
 #include "service/estimator_setup.h"
 #include "service/recording.h"
 #include "service/replay.h"
+#include "tools/benchmarks/own_folder.h"
 
 namespace {
 
@@ -114,8 +115,8 @@ double processor_time_s() {
 
 /// One drive: recorded, read back, accounted for.
 imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& totals) {
-  const std::filesystem::path recording = std::filesystem::path(options.folder) / "through_bytes";
-  std::filesystem::remove_all(recording);
+  const bench::OwnFolder own(options.folder);
+  const auto& recording = own.path();
   const std::string command =
       fmt::format("'{}' record '{}' --minutes {} --seed {} --out '{}' >/dev/null", options.simulator,
                   options.config, options.minutes, seed, recording.string());
@@ -228,14 +229,20 @@ int main(int argc, char** argv) {
   app.add_option("--first", options.first, "first seed");
   app.add_option("--minutes", options.minutes, "length of each drive");
   app.add_option("--config", options.config, "what is simulated")->check(CLI::ExistingFile);
-  app.add_option("--folder", options.folder, "for one recording at a time (80 MB)");
+  app.add_option("--folder", options.folder,
+                 "where a folder for one recording at a time (80 MB) is made, and removed again");
   CLI11_PARSE(app, argc, argv);
-  Totals totals;
-  for (int i = 0; i < options.seeds; ++i) {
-    if (const auto done = run(options, options.first + static_cast<std::uint64_t>(i), totals); !done) {
-      fmt::print(stderr, "{}\n", done.error().text());
-      return 1;
+  try {
+    Totals totals;
+    for (int i = 0; i < options.seeds; ++i) {
+      if (const auto done = run(options, options.first + static_cast<std::uint64_t>(i), totals); !done) {
+        fmt::print(stderr, "{}\n", done.error().text());
+        return 1;
+      }
     }
+    return print(options, totals) ? 0 : 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "imuscope_through_bytes: {}\n", error.what());
+    return 1;
   }
-  return print(options, totals) ? 0 : 1;
 }
