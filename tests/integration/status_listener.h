@@ -12,6 +12,7 @@
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "programs.h"
@@ -80,7 +81,6 @@ inline void run_beside(const std::filesystem::path& folder, const std::string& v
   lcm::LCM bus("udpm://239.255.76.67:7667?ttl=0");
   ASSERT_TRUE(bus.good());
   bus.subscribe("IMUSCOPE_STATUS", &Listener::on_status, &listener);
-  listener.started = std::chrono::steady_clock::now();
   BackgroundProgram simulator(
       "imusim",
       {"live", (folder / vehicle).string(), "--skip-static", "--faults", (folder / "faults.toml").string()},
@@ -88,6 +88,15 @@ inline void run_beside(const std::filesystem::path& folder, const std::string& v
   BackgroundProgram service("imuscope",
                             {"run", (folder / "live.toml").string(), "--out", (folder / "live").string()},
                             folder / "imuscope.log");
+  // The drive begins when the lines are open, which a sanitized simulator takes seconds for; statuses of
+  // before wait.
+  constexpr std::chrono::seconds kOpens{30};
+  const auto launched = std::chrono::steady_clock::now();
+  while (read_text(folder / "imusim.log").empty()) {
+    ASSERT_LT(std::chrono::steady_clock::now() - launched, kOpens) << "the simulator opens no line";
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  listener.started = std::chrono::steady_clock::now();
   while (std::chrono::steady_clock::now() - listener.started < length) bus.handleTimeout(100);
   service.interrupt();
   ASSERT_EQ(service.wait(), 0) << read_text(folder / "imuscope.log");
