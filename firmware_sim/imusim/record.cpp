@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <future>
 #include <limits>
 
@@ -15,6 +16,56 @@
 
 namespace imusim {
 namespace {
+
+/// How a recording's copy of the configuration begins: by it a recording of imusim's own is known.
+constexpr std::string_view kRecordedBy = "# Recorded by imusim record";
+
+/// Every file that a recording of this configuration may have.
+std::vector<std::string> files_of(const Configuration& configuration) {
+  std::vector<std::string> names{"capture.lcm", "config.toml", "truth.json",
+                                 "truth.csv",   "faults.toml", "fault_log.json"};
+  for (const PlayedDevice& device : configuration.devices) {
+    for (const char* ending : {".bin", ".arrivals.csv", ".log"}) names.push_back(device.name + ending);
+    names.push_back(fmt::format("errors_truth_{}.csv", device.name));
+    if (!device.dbc.empty()) names.push_back(device.dbc);
+  }
+  return names;
+}
+
+bool holds_own_recording(const std::filesystem::path& folder) {
+  std::ifstream copy(folder / "config.toml");
+  std::string line;
+  std::getline(copy, line);
+  return line.rfind(kRecordedBy, 0) == 0;
+}
+
+/// The simulator's DBC file goes into the recording's folder, so its name may lead to no other.
+Outcome<void> check_dbc_names(const Configuration& configuration) {
+  for (const PlayedDevice& device : configuration.devices) {
+    if (std::filesystem::path(device.dbc).filename() == device.dbc && device.dbc != "..") continue;
+    return wrong_usage(fmt::format(
+        "{}: device '{}': imusim writes the DBC file of its frames beside the recording, and not to "
+        "{}; give dbc a name without a folder",
+        configuration.file.string(), device.name, device.dbc));
+  }
+  return {};
+}
+
+/// An earlier recording of imusim's own goes; a file of anybody else's that has such a name is not touched.
+Outcome<void> clear_folder(const std::filesystem::path& folder, const Configuration& configuration) {
+  const bool is_own = holds_own_recording(folder);
+  for (const std::string& name : files_of(configuration)) {
+    const std::filesystem::path file = folder / name;
+    if (!std::filesystem::exists(std::filesystem::symlink_status(file))) continue;
+    if (!is_own)
+      return failed_work(fmt::format("{} holds {}, which imusim did not record; choose another --out",
+                                     folder.string(), name));
+    std::error_code error;
+    if (!std::filesystem::remove(file, error))
+      return failed_work(fmt::format("cannot replace {}: {}", file.string(), error.message()));
+  }
+  return {};
+}
 
 /// Runs one device through the whole scenario and writes what the host reads.
 Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::filesystem::path& folder,
@@ -112,9 +163,10 @@ std::string configuration_copy(const Configuration& configuration) {
     inputs += fmt::format(" {0}={0}.{1}", device.name, Configuration::is_on_can(device) ? "log" : "bin");
   }
   return fmt::format(
-      "# Recorded by imusim record with seed {} over {} s. Read from this folder by\n"
+      "{} with seed {} over {} s. Read from this folder by\n"
       "#   imuscope process{} --config config.toml --out RESULT\n\n{}",
-      configuration.scenario.seed, configuration.scenario.duration_s, inputs, configuration.text);
+      kRecordedBy, configuration.scenario.seed, configuration.scenario.duration_s, inputs,
+      configuration.text);
 }
 
 CaptureHeader capture_header(const Configuration& configuration) {
@@ -134,18 +186,21 @@ CaptureHeader capture_header(const Configuration& configuration) {
 }  // namespace
 
 Outcome<std::vector<Recorded>> record(const Configuration& configuration, const RecordOptions& options) {
+  if (auto checked = check_dbc_names(configuration); !checked) return tl::unexpected(checked.error());
   if (auto made = make_folder(options.folder); !made) return tl::unexpected(made.error());
   World world(configuration, World::Beginning::kStreaming);
   if (auto checked = check_faults(world); !checked) return tl::unexpected(checked.error());
+  if (auto cleared = clear_folder(options.folder, configuration); !cleared)
+    return tl::unexpected(cleared.error());
+  // First of all: it marks the folder, should the rest be cut short.
+  if (auto written = write_file(options.folder / "config.toml", configuration_copy(configuration)); !written)
+    return tl::unexpected(written.error());
   if (!configuration.fault_text.empty()) {
     if (auto written = write_file(options.folder / "faults.toml", configuration.fault_text); !written)
       return tl::unexpected(written.error());
   }
   for (const auto& write : {write_truth_json, write_truth_csv})
     if (auto written = write(world, options.folder); !written) return tl::unexpected(written.error());
-  if (auto written = write_file(options.folder / "config.toml", configuration_copy(configuration)); !written)
-    return tl::unexpected(written.error());
-
   if (auto copied = copy_dbc(configuration, options.folder); !copied) return tl::unexpected(copied.error());
 
   std::vector<std::unique_ptr<OutputFile>> error_files;

@@ -26,7 +26,8 @@ struct Recorded {
   std::uint64_t reads = 0;
 };
 
-/// The same configuration gives the same files, byte by byte.
+/// The same configuration gives the same files, byte by byte. A recording of imusim's own in the folder is
+/// replaced; where a file that would be written is anybody else's, nothing is.
 Outcome<std::vector<Recorded>> record(const Configuration& configuration, const RecordOptions& options);
 
 }  // namespace imusim

@@ -11,6 +11,7 @@
 
 #include "firmware_sim/devices/xsens_encoder.h"
 #include "firmware_sim/imusim/configuration.h"
+#include "firmware_sim/imusim/fault_script.h"
 #include "firmware_sim/imusim/live.h"
 #include "firmware_sim/imusim/record.h"
 #include "firmware_sim/io/pseudo_terminal.h"
@@ -246,6 +247,49 @@ TEST(Record, SaysWhenItsFolderCannotBe) {
   const auto outcome = record(configuration(), {file, false, {}});
   ASSERT_FALSE(outcome.has_value());
   EXPECT_EQ(outcome.error().exit_code, 1);
+}
+
+TEST(Record, ReplacesItsOwnRecordingAndTouchesNobodyElsesFile) {
+  const std::filesystem::path folder = scratch_folder();
+  const std::string fault =
+      "[[fault]]\nkind = \"drop\"\ndevice = \"a\"\nat_s = 1.0\nfor_s = 1.0\nshare = 0.5\n";
+  Configuration with_fault = configuration();
+  ASSERT_TRUE(parse_faults(fault, "faults.toml", with_fault));
+  ASSERT_TRUE(record(with_fault, {folder / "own", true, {}}));
+  ASSERT_TRUE(std::filesystem::exists(folder / "own" / "fault_log.json"));
+  std::ofstream(folder / "own" / "notes.txt") << "mine";
+  ASSERT_TRUE(record(configuration(), {folder / "own", false, {}}));
+  // Nothing of the first one is taken for the second's.
+  for (const char* name : {"faults.toml", "fault_log.json", "errors_truth_a.csv"})
+    EXPECT_FALSE(std::filesystem::exists(folder / "own" / name)) << name;
+  EXPECT_EQ(content_of(folder / "own" / "notes.txt"), "mine");
+
+  std::filesystem::create_directories(folder / "drive");
+  std::ofstream(folder / "drive" / "a.bin") << "of a vehicle";
+  const auto refused = record(configuration(), {folder / "drive", false, {}});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_NE(refused.error().text.find("holds a.bin, which imusim did not record; choose another --out"),
+            std::string::npos)
+      << refused.error().text;
+  EXPECT_EQ(content_of(folder / "drive" / "a.bin"), "of a vehicle");
+  EXPECT_FALSE(std::filesystem::exists(folder / "drive" / "config.toml"));
+}
+
+TEST(Record, WritesItsDbcFileNowhereButBesideTheRecording) {
+  const std::filesystem::path folder = scratch_folder();
+  std::ofstream(folder / "car.dbc") << "of a car";
+  Configuration wheels = configuration();
+  wheels.devices.front().protocol = Protocol::kCanOdometry;
+  for (const std::string& name :
+       {(folder / "car.dbc").string(), std::string("../car.dbc"), std::string("..")}) {
+    wheels.devices.front().dbc = name;
+    const auto refused = record(wheels, {folder / "drive", false, {}});
+    ASSERT_FALSE(refused.has_value()) << name;
+    EXPECT_EQ(refused.error().exit_code, 2);
+    EXPECT_NE(refused.error().text.find("give dbc a name without a folder"), std::string::npos)
+        << refused.error().text;
+  }
+  EXPECT_EQ(content_of(folder / "car.dbc"), "of a car");
 }
 
 /// A program at the near end of a simulated port.
