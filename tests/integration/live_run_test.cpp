@@ -184,7 +184,7 @@ class LiveRun : public testing::Test {
     EXPECT_NEAR(c.t_d_ms, imu.at("t_d_s").get<double>() * 1e3, 5.0) << name;
   }
 
-  void check_errors(const nlohmann::json& imu) {
+  void check_errors(const nlohmann::json& imu, const nlohmann::json& run) {
     const std::string name = imu.at("name");
     const auto& rows = heard_.errors[name];
     ASSERT_GE(rows.size(), 1500U) << name;
@@ -197,7 +197,12 @@ class LiveRun : public testing::Test {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(mean[i] * kDeg, bias[i] * kDeg, 0.4) << name << " axis " << i;
     std::int64_t lost = 0;
     for (std::size_t i = 1; i < rows.size(); ++i) lost += rows[i].counter - rows[i - 1].counter - 1;
-    EXPECT_EQ(lost, 0) << name;
+    // Where the machine held the simulator back, the reference came too late for some samples; each is told.
+    const auto& devices = run.at("devices");
+    const auto own = std::find_if(devices.begin(), devices.end(),
+                                  [&](const nlohmann::json& device) { return device.at("name") == name; });
+    ASSERT_NE(own, devices.end()) << name;
+    EXPECT_LE(lost, own->at("late").get<std::int64_t>()) << name;
   }
 
   void check_models() {
@@ -310,12 +315,13 @@ TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
   vehicle.wait();
 
   const auto truth = read_json(truth_folder / "truth.json");
+  const auto run = read_json(folder / "live" / "run.json");
   SCOPED_TRACE(read_text(folder / "imuscope.log"));
   check_status();
   check_navigation(truth, read_truth(truth_folder / "truth.csv"));
   for (const auto& imu : truth.at("imus")) {
     check_calibration(imu);
-    check_errors(imu);
+    check_errors(imu, run);
   }
   check_models();
   // The modeller runs when nothing else wants to: on a loaded machine the last S-IMU's turn may come too
