@@ -42,7 +42,8 @@ bool holds_own_recording(const std::filesystem::path& folder) {
 /// The simulator's DBC file goes into the recording's folder, so its name may lead to no other.
 Outcome<void> check_dbc_names(const Configuration& configuration) {
   for (const PlayedDevice& device : configuration.devices) {
-    if (std::filesystem::path(device.dbc).filename() == device.dbc && device.dbc != "..") continue;
+    if (std::filesystem::path(device.dbc).filename() == device.dbc && device.dbc != "." && device.dbc != "..")
+      continue;
     return wrong_usage(fmt::format(
         "{}: device '{}': imusim writes the DBC file of its frames beside the recording, and not to "
         "{}; give dbc a name without a folder",

@@ -281,7 +281,7 @@ TEST(Record, WritesItsDbcFileNowhereButBesideTheRecording) {
   Configuration wheels = configuration();
   wheels.devices.front().protocol = Protocol::kCanOdometry;
   for (const std::string& name :
-       {(folder / "car.dbc").string(), std::string("../car.dbc"), std::string("..")}) {
+       {(folder / "car.dbc").string(), std::string("../car.dbc"), std::string(".."), std::string(".")}) {
     wheels.devices.front().dbc = name;
     const auto refused = record(wheels, {folder / "drive", false, {}});
     ASSERT_FALSE(refused.has_value()) << name;
