@@ -148,7 +148,7 @@ Finding check_receive_buffer(const fs::path& root) {
 }
 
 Finding check_lcm(const std::string& url) {
-  const auto checked = check_lcm_url(url);
+  const auto checked = check_lcm_bus(url);
   if (checked) return {"LCM", Verdict::kGood, fmt::format("{} can be reached", url), {}};
   return refused("LCM", checked.error());
 }

@@ -1,38 +1,89 @@
 #include "publish/lcm_listener.h"
 
-#include <lcm/lcm-cpp.hpp>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
 #include <utility>
 #include <vector>
 
+#include "publish/lcm_packet.h"
 #include "publish/lcm_socket_filter.h"
 
 namespace imuscope {
 
-struct LcmListener::Impl {
-  Impl(const std::string& url, std::string_view prefix_in) : filter(url), lcm(url), prefix(prefix_in) {}
-
-  LcmSocketFilter filter;  // before the library opens its socket
-  lcm::LCM lcm;
-  std::string prefix;
-  std::vector<std::string> channels;
-  std::vector<std::unique_ptr<Handler>> handlers;  // their addresses are the subscriptions' contexts
-};
-
 namespace {
 
-void on_message(const lcm::ReceiveBuffer* buffer, const std::string& channel, LcmListener::Handler* handler) {
-  (*handler)(channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
+constexpr std::string_view kAnyEnding = ".*";
+
+Result<void> refused(const char* what) {
+  return work_error(std::string("LCM: the system refuses ") + what + " (" + std::strerror(errno) +
+                    "), so nothing is listened to");
+}
+
+template <typename Value>
+bool set(int socket, int level, int name, const Value& value) {
+  return setsockopt(socket, level, name, &value, sizeof value) == 0;
+}
+
+/// Hears the bus on the interface that the PC's routes name for it, and nothing before the filter stands.
+Result<void> join(int socket, const UdpmBus& bus, Reach reach) {
+  if (auto deaf = attach_lcm_filter(socket, {}, reach); !deaf) return deaf;
+  const int yes = 1;
+  const int no = 0;
+  if (!set(socket, SOL_SOCKET, SO_REUSEADDR, yes)) return refused("to share the bus with others");
+  // Without this a socket hears what any program of this PC has joined, on any interface.
+  if (!set(socket, IPPROTO_IP, IP_MULTICAST_ALL, no)) return refused("to hear one interface alone");
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(bus.port);
+  address.sin_addr.s_addr =
+      htonl(bus.group);  // of the group: what is sent to this PC's own address stays out
+  if (bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    return refused("the bus's port");
+  ip_mreqn membership{};
+  membership.imr_multiaddr = address.sin_addr;
+  if (!set(socket, IPPROTO_IP, IP_ADD_MEMBERSHIP, membership)) return refused("to join the multicast group");
+  return {};
 }
 
 }  // namespace
 
-Result<LcmListener> LcmListener::open(std::string_view url, std::string_view prefix) {
-  if (const auto checked = check_lcm_url(url); !checked) return tl::unexpected(checked.error());
-  auto impl = std::make_unique<Impl>(std::string(url), prefix);
-  if (!impl->lcm.good()) {
-    return work_error("LCM could not open " + std::string(url),
-                      "check its options; write it as " + std::string(kDefaultLcmUrl));
+struct LcmListener::Impl {
+  Impl(int socket_in, Reach reach_in, std::string_view prefix_in)
+      : socket(socket_in), reach(reach_in), prefix(prefix_in) {}
+  ~Impl() { ::close(socket); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void handle(std::span<const std::uint8_t> datagram) const {
+    const auto packet = read_short_message(datagram);
+    if (!packet) return;
+    for (std::size_t i = 0; i < patterns.size(); ++i) {
+      if (patterns[i].matches(packet->channel)) handlers[i](std::string(packet->channel), packet->message);
+    }
   }
+
+  int socket;
+  Reach reach;
+  std::string prefix;
+  std::vector<ChannelPattern> patterns;
+  std::vector<Handler> handlers;  // one a pattern
+  std::array<std::uint8_t, kMaxPacketBytes> buffer{};
+};
+
+Result<LcmListener> LcmListener::open(std::string_view url, std::string_view prefix) {
+  const auto bus = check_lcm_bus(url);
+  if (!bus) return tl::unexpected<Error>(bus.error());
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (socket < 0) return tl::unexpected<Error>(refused("a socket").error());
+  const Reach reach = bus->ttl == 0 ? Reach::kThisPc : Reach::kNetwork;
+  auto impl = std::make_unique<Impl>(socket, reach, prefix);
+  if (auto joined = join(socket, *bus, reach); !joined) return tl::unexpected<Error>(joined.error());
   return LcmListener(std::move(impl));
 }
 
@@ -41,23 +92,35 @@ LcmListener::LcmListener(LcmListener&&) noexcept = default;
 LcmListener& LcmListener::operator=(LcmListener&&) noexcept = default;
 LcmListener::~LcmListener() = default;
 
-void LcmListener::subscribe(std::string_view kind, Handler handler, int queue) {
-  impl_->handlers.push_back(std::make_unique<Handler>(std::move(handler)));
-  impl_->channels.push_back(impl_->prefix + "_" + std::string(kind));
-  auto* subscription =
-      impl_->lcm.subscribeFunction(impl_->channels.back(), on_message, impl_->handlers.back().get());
-  subscription->setQueueCapacity(queue);
-  impl_->filter.let_through(impl_->channels);
+Result<void> LcmListener::subscribe(std::string_view kind, Handler handler) {
+  ChannelPattern pattern{impl_->prefix + "_", kind.ends_with(kAnyEnding)};
+  if (pattern.any_ending) kind.remove_suffix(kAnyEnding.size());
+  pattern.text += kind;
+  if (pattern.text.size() > kMaxChannelBytes) {
+    return usage_error("LCM: the channel " + pattern.text + " has " + std::to_string(pattern.text.size()) +
+                           " characters and may have " + std::to_string(kMaxChannelBytes),
+                       "choose a shorter prefix");
+  }
+  auto patterns = impl_->patterns;
+  patterns.push_back(std::move(pattern));
+  if (auto attached = attach_lcm_filter(impl_->socket, patterns, impl_->reach); !attached) return attached;
+  impl_->patterns = std::move(patterns);
+  impl_->handlers.push_back(std::move(handler));
+  return {};
 }
 
 int LcmListener::wait(std::chrono::milliseconds timeout) {
+  pollfd input{impl_->socket, POLLIN, 0};
+  if (poll(&input, 1, static_cast<int>(timeout.count())) <= 0) return 0;
+  const auto end = std::chrono::steady_clock::now() + kLongestAtOnce;
   int handled = 0;
-  int status = impl_->lcm.handleTimeout(static_cast<int>(timeout.count()));
-  while (status > 0) {
+  while (handled < kMostAtOnce && std::chrono::steady_clock::now() < end) {
+    const auto n = recv(impl_->socket, impl_->buffer.data(), impl_->buffer.size(), 0);
+    if (n < 0) break;
+    impl_->handle({impl_->buffer.data(), static_cast<std::size_t>(n)});
     ++handled;
-    status = impl_->lcm.handleTimeout(0);
   }
-  return status < 0 && handled == 0 ? -1 : handled;
+  return handled;
 }
 
 }  // namespace imuscope

@@ -1,8 +1,10 @@
 #pragma once
 
-/// Hears messages over LCM.
+/// Hears messages over LCM. With a socket of its own: the receiver of liblcm 1.3.1 starts before a filter can
+/// stand in its way, and writes beyond its memory when fragments lie about their place.
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -16,14 +18,21 @@
 
 namespace imuscope {
 
-/// Thread: one, of the soft world; the library adds one of its own that only receives.
+/// Thread: one, of the soft world.
 class LcmListener {
  public:
   /// The bytes are valid during the call; decode_message() (message_codec.h) turns them into a message.
   using Handler = std::function<void(const std::string& channel, std::span<const std::uint8_t> message)>;
 
-  /// @param url  udpm://ADDRESS:PORT?ttl=N, or file://PATH?speed=S, which plays an LCM log
-  /// @return the errors of check_lcm_url()
+  /// wait() handles no more of what has come than this and for no longer, however much comes: its caller has
+  /// other things to do.
+  static constexpr int kMostAtOnce = 200;
+  static constexpr std::chrono::milliseconds kLongestAtOnce{20};
+
+  /// Hears nothing until something is subscribed to. With ttl=0 it hears this PC alone, on whichever
+  /// interface the bus lies.
+  /// @param url  udpm://ADDRESS:PORT?ttl=N
+  /// @return the errors of check_lcm_bus(), and kWork where the system refuses a part of the socket
   static Result<LcmListener> open(std::string_view url = kDefaultLcmUrl,
                                   std::string_view prefix = kDefaultChannelPrefix);
 
@@ -31,13 +40,15 @@ class LcmListener {
   LcmListener& operator=(LcmListener&&) noexcept;
   ~LcmListener();
 
-  /// @param kind   of channels, without the prefix, as a regular expression: "STATUS", "CALIBRATION_.*"
-  /// @param queue  messages that may wait; when it is full the newest is lost, so a live display keeps it
-  /// short
-  void subscribe(std::string_view kind, Handler handler, int queue);
+  /// The kernel keeps what may wait (net.core.rmem_default bytes), and drops what comes when that is full.
+  /// @param kind  of channels, without the prefix: "STATUS", or "CALIBRATION_.*" for every name of that kind
+  /// @return kUsage for a name longer than a channel's can be, kWork where the kernel refuses the filter;
+  /// then
+  ///         this kind is not heard
+  [[nodiscard]] Result<void> subscribe(std::string_view kind, Handler handler);
 
   /// Handles what has come, waiting for the first message at most for `timeout`. Returns how many messages
-  /// were handled; -1 at the end of a log.
+  /// were handled.
   int wait(std::chrono::milliseconds timeout);
 
  private:

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Publishes reports over LCM. This file and lcm_listener.cpp are the only places that know the LCM library.
+/// Publishes reports over LCM. lcm_publisher.cpp is the only place that knows the LCM library.
 
 #include <cstddef>
 #include <cstdint>
@@ -32,7 +32,7 @@ struct PublishCounters {
 class LcmPublisher {
  public:
   /// Opens the bus.
-  /// @param url     udpm://ADDRESS:PORT?ttl=N, or file://PATH?mode=w to write messages into an LCM log
+  /// @param url     udpm://ADDRESS:PORT?ttl=N, or file://PATH?mode=w to write messages into a fresh LCM log
   /// @param prefix  of every channel, without the underscore
   /// @return the errors of check_lcm_url()
   static Result<LcmPublisher> open(std::string_view url = kDefaultLcmUrl,

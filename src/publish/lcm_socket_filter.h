@@ -1,31 +1,35 @@
 #pragma once
 
-/// Keeps what nobody here asked for away from an LCM receiver. LCM's own thread wakes up for every datagram
-/// of the multicast group, also for the hundreds a second that this very process publishes, and sorts them
-/// afterwards; a filter on its socket lets the kernel do that without a wake-up.
+/// Keeps what nobody here asked for away from a socket that hears an LCM bus: the kernel drops it, without a
+/// wake-up of this process.
 
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "base/result.h"
 
 namespace imuscope {
 
-/// Thread: one. To be made before the library opens its socket.
-class LcmSocketFilter {
- public:
-  /// @param url  as given to the library, after check_lcm_url()
-  explicit LcmSocketFilter(std::string url);
+/// Whose packets a socket hears.
+enum class Reach { kThisPc, kNetwork };
 
-  /// Lets only the wanted channels through to the socket that the library has opened since. Whole messages of
-  /// other channels are dropped by the kernel (and counted as drops in /proc/net/udp); fragments of large
-  /// ones pass. Where the socket is not found or the kernel refuses, everything passes as before: it is
-  /// thrift alone.
-  /// @param channels  whole names, or beginnings followed by ".*"; with other regular expressions everything
-  ///                  passes
-  void let_through(const std::vector<std::string>& channels) const;
+/// Which channels of an LCM bus are wanted: one whole name, or every name with this beginning.
+struct ChannelPattern {
+  std::string text;
+  bool any_ending = false;
 
- private:
-  std::string url_;
-  std::vector<int> others_;  ///< of another part of the program, or inherited from the one that started it
+  [[nodiscard]] bool matches(std::string_view channel) const {
+    return any_ending ? channel.starts_with(text) : channel == text;
+  }
 };
+
+/// Lets only whole messages (LC02) on these channels through to a UDP socket. Everything else, fragments of
+/// long messages above all, is dropped by the kernel and counted in /proc/net/udp. With kThisPc a packet must
+/// have been sent on this PC, which the kernel knows by its way, not by an address that a sender may choose.
+/// @param channels  none: nothing passes
+/// @return an error of kind kWork where the kernel refuses; what was attached before then stays
+[[nodiscard]] Result<void> attach_lcm_filter(int socket, const std::vector<ChannelPattern>& channels,
+                                             Reach reach);
 
 }  // namespace imuscope

@@ -1,9 +1,9 @@
 #pragma once
 
-/// Which LCM URLs serve, asked before the library is, which would print advice of its own to the terminal.
+/// Which LCM URLs serve, asked before the library is, which would print advice of its own to the terminal,
+/// abort the process, or write over a file.
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -17,12 +17,26 @@ inline constexpr std::string_view kDefaultLcmUrl = "udpm://239.255.76.67:7667?tt
 /// What to do about a URL that cannot serve.
 inline const std::string kLcmUrlRemedy = "write it as " + std::string(kDefaultLcmUrl);
 
-/// @return an error of kind kUsage for a URL that cannot serve (tcpq is refused: its library call aborts the
-///         process when the server goes), of kind kWork where this PC has no multicast route, with the two
-///         commands that make one
-[[nodiscard]] Result<void> check_lcm_url(std::string_view url);
+/// A bus on the network, as its URL tells it.
+struct UdpmBus {
+  std::uint32_t group = 0;  ///< multicast address, host byte order
+  std::uint16_t port = 0;
+  std::uint8_t ttl = 0;  ///< 0: on this PC alone
+};
 
-/// Port of a udpm URL that check_lcm_url() does not call wrong; nothing for the others.
-[[nodiscard]] std::optional<std::uint16_t> udpm_port(std::string_view url);
+/// @return an error of kind kUsage for everything but udpm://ADDRESS:PORT?ttl=N, whose parts may be left out
+[[nodiscard]] Result<UdpmBus> parse_udpm_url(std::string_view url);
+
+/// Of a bus to hear and to speak on.
+/// @return the errors of parse_udpm_url(); one of kind kWork where this PC has no multicast route, with the
+/// two
+///         commands that make one
+[[nodiscard]] Result<UdpmBus> check_lcm_bus(std::string_view url);
+
+/// Of anything to publish into: a bus, or file://PATH?mode=w, an LCM log that is not there yet.
+/// @return the errors of check_lcm_bus(); kUsage for a log that exists, which the library would empty, and
+/// for
+///         what else cannot serve (tcpq's library call aborts the process when the server goes)
+[[nodiscard]] Result<void> check_lcm_url(std::string_view url);
 
 }  // namespace imuscope

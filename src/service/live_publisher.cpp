@@ -24,7 +24,6 @@ namespace {
 constexpr Duration kDrainPeriod = std::chrono::milliseconds(50);
 /// A person's events are looked for in every so many turns.
 constexpr std::uint64_t kTurnsPerEar = 2;
-constexpr int kEventQueue = 100;
 constexpr Duration kStatusMessagePeriod = std::chrono::seconds(1);
 
 constexpr std::array kSessionNames{"connecting", "configuring", "streaming", "failed"};
@@ -115,26 +114,33 @@ Result<void> LivePublisher::open_bus() {
   broadcast_.close();
   ear_.reset();
   bus_problem_.clear();
-  auto bus = LcmPublisher::open(tunables_.lcm.url, tunables_.lcm.channel_prefix);
-  if (!bus) {
-    if (bus.error().kind == ErrorKind::kUsage) return tl::unexpected<Error>(bus.error());
-    bus_problem_ = bus.error().text();
+  // A bus alone, not a log: liblcm would write over the file that the configuration names.
+  const auto bus = check_lcm_bus(tunables_.lcm.url);
+  auto voice = bus ? LcmPublisher::open(tunables_.lcm.url, tunables_.lcm.channel_prefix)
+                   : tl::unexpected<Error>(bus.error());
+  if (!voice) {
+    if (voice.error().kind == ErrorKind::kUsage) return tl::unexpected<Error>(voice.error());
+    bus_problem_ = voice.error().text();
     spdlog::warn("nothing is published over LCM: {}", bus_problem_);
     return {};
   }
-  broadcast_.open(std::move(*bus), tunables_.lcm.bridge);
+  broadcast_.open(std::move(*voice), tunables_.lcm.bridge);
   if (recorder_ != nullptr) set_recorder(*recorder_);
-  if (tunables_.lcm.url.starts_with("file://")) return {};  // a log is written to, not listened to
+  if (auto heard = listen_for_events(); !heard) {
+    ear_.reset();
+    bus_problem_ = "a person's events are not heard: " + heard.error().text();
+    spdlog::warn("{}", bus_problem_);
+  }
+  return {};
+}
+
+Result<void> LivePublisher::listen_for_events() {
   auto ear = LcmListener::open(tunables_.lcm.url, tunables_.lcm.channel_prefix);
   if (!ear) return tl::unexpected<Error>(ear.error());
   ear_.emplace(std::move(*ear));
-  ear_->subscribe(
-      "EVENT",
-      [this](const std::string& channel, std::span<const std::uint8_t> bytes) {
-        on_person_event(channel, bytes);
-      },
-      kEventQueue);
-  return {};
+  return ear_->subscribe("EVENT", [this](const std::string& channel, std::span<const std::uint8_t> bytes) {
+    on_person_event(channel, bytes);
+  });
 }
 
 void LivePublisher::set_recorder(Recorder& recorder) {

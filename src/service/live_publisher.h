@@ -66,6 +66,7 @@ class LivePublisher {
   void loop();
   void drain();
   Result<void> open_bus();
+  Result<void> listen_for_events();
   void take_over_tunables();
   void on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes);
   void on_noise_applied(const AppliedNoise& applied);

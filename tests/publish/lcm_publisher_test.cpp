@@ -7,6 +7,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <imuscope/error_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <lcm/lcm-cpp.hpp>
@@ -137,7 +138,12 @@ TEST(LcmPublisher, RefusesUrlsThatCannotServeWithTheReasonAndTheRightForm) {
                {"udpm://192.168.1.7:7667?ttl=0", "'192.168.1.7' is not a multicast address"},
                {"udpm://239.255.76:7667", "'239.255.76' is not a multicast address"},
                {"udpm://239.255.76.67:port", "'port' is not a port"},
-               {"udpm://239.255.76.67:99999", "'99999' is not a port"}};
+               {"udpm://239.255.76.67:99999", "'99999' is not a port"},
+               {"udpm://239.255.76.67:7667?ttl=", "ttl '' is not a number"},
+               {"udpm://239.255.76.67:7667?ttl=256", "ttl '256' is not a number from 0 to 255"},
+               {"udpm://239.255.76.67:7667?ttl=-1", "ttl '-1' is not a number"},
+               {"udpm://239.255.76.67:7667?ttl=0&ttl=1", "ttl '0&ttl=1' is not a number"},
+               {"udpm://239.255.76.67:7667?TTL=1", "'TTL=1' is no option of it"}};
   for (const auto& [url, reason] : cases) {
     const auto publisher = LcmPublisher::open(url);
     ASSERT_FALSE(publisher.has_value()) << url;
@@ -181,13 +187,12 @@ int hear_an_event() {
   auto voice = LcmPublisher::open();
   if (!ear || !voice) return 2;
   std::vector<std::string> texts;
-  ear->subscribe(
-      "EVENT",
-      [&](const std::string& channel, std::span<const std::uint8_t> bytes) {
+  const auto subscribed =
+      ear->subscribe("EVENT", [&](const std::string& channel, std::span<const std::uint8_t> bytes) {
         if (channel != "IMUSCOPE_EVENT") return;
         if (const auto event = decode_message<event_t>(bytes)) texts.push_back(event->text);
-      },
-      10);
+      });
+  if (!subscribed) return 5;
   voice->publish(PersonEvent{test::kExampleUtc, "test", "first"});
   voice->publish(test::example_status());  // another channel: not for this ear
   voice->publish(PersonEvent{test::kExampleUtc, "test", "second"});
@@ -199,7 +204,8 @@ int hear_an_event() {
 TEST(LcmListener, HearsItsChannelsInOrderAndNothingElse) {
   const int outcome = in_private_network(hear_an_event);
   if (outcome == kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
-  EXPECT_EQ(outcome, 0) << "1: ip failed, 2: not open, 3: messages, 4: something is left";
+  EXPECT_EQ(outcome, 0) << "1: ip failed, 2: not open, 3: messages, 4: something is left, "
+                           "5: not subscribed";
 }
 
 TEST(LcmListener, RefusesTheUrlThatWouldAbortTheProcess) {
@@ -208,21 +214,33 @@ TEST(LcmListener, RefusesTheUrlThatWouldAbortTheProcess) {
   EXPECT_EQ(ear.error().kind, ErrorKind::kUsage);
 }
 
-TEST(LcmListener, PlaysALogToItsEnd) {
-  const auto path = test::scratch_folder() / "bus.lcm";
-  {
-    auto publisher = LcmPublisher::open("file://" + path.string() + "?mode=w");
-    ASSERT_TRUE(publisher.has_value());
-    for (int i = 0; i < 3; ++i) publisher->publish(PersonEvent{test::kExampleUtc, "test", "again"});
+TEST(LcmListener, HearsABusAndNoFile) {
+  const auto ear = LcmListener::open("file://" + (test::scratch_folder() / "bus.lcm").string());
+  ASSERT_FALSE(ear.has_value());
+  EXPECT_EQ(ear.error().kind, ErrorKind::kUsage);
+  EXPECT_THAT(ear.error().text(), HasSubstr("a bus is udpm://"));
+}
+
+TEST(LcmPublisher, WritesOverNoFile) {
+  const auto path = test::scratch_folder() / "kept.txt";
+  std::ofstream(path) << "kept";
+  std::filesystem::create_symlink("nowhere", path.string() + ".link");
+  for (const char* url : {"?mode=w", ".link?mode=w"}) {
+    const auto publisher = LcmPublisher::open("file://" + path.string() + url);
+    ASSERT_FALSE(publisher.has_value()) << url;
+    EXPECT_EQ(publisher.error().kind, ErrorKind::kUsage);
+    EXPECT_THAT(publisher.error().text(), HasSubstr("exists and would be written over"));
   }
-  auto ear = LcmListener::open("file://" + path.string() + "?speed=0");
-  ASSERT_TRUE(ear.has_value());
-  int heard = 0;
-  ear->subscribe(
-      "EVENT", [&](const auto&, auto) { ++heard; }, 10);
-  while (ear->wait(std::chrono::milliseconds(100)) >= 0) {
+  EXPECT_EQ(std::filesystem::file_size(path), 4U);
+}
+
+TEST(LcmPublisher, PublishesIntoNoLogThatIsToBeRead) {
+  // The library writes through a null pointer there.
+  for (const char* end : {"", "?mode=r", "?speed=1", "?mode=r&mode=w", "?speed=1?mode=w"}) {
+    const auto publisher = LcmPublisher::open("file:///nowhere/bus.lcm" + std::string(end));
+    ASSERT_FALSE(publisher.has_value()) << end;
+    EXPECT_THAT(publisher.error().text(), HasSubstr("write it as file://PATH?mode=w")) << end;
   }
-  EXPECT_EQ(heard, 3);
 }
 
 TEST(LcmPublisher, ReachesAReceiverByMulticast) {

@@ -99,12 +99,9 @@ class TopTerminal : public testing::Test {
     ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
     ear_.emplace(LcmListener::open().value());
     voice_.emplace(LcmPublisher::open().value());
-    ear_->subscribe(
-        "EVENT",
-        [this](const auto&, auto bytes) {
-          if (const auto event = decode_message<event_t>(bytes)) events_.push_back(event->text);
-        },
-        10);
+    ASSERT_TRUE(ear_->subscribe("EVENT", [this](const auto&, auto bytes) {
+      if (const auto event = decode_message<event_t>(bytes)) events_.push_back(event->text);
+    }));
   }
 
   /// Publishes a status now and again until `condition` holds.

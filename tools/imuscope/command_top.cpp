@@ -30,8 +30,6 @@ extern "C" void stop_top(int) { top_stopped.store(true); }
 constexpr auto kRedraw = milliseconds(200);
 /// STATUS comes once a second; a service that is slow to answer gets a few.
 constexpr double kDefaultWait_s = 5.0;
-/// What is live is worth showing only while it is new.
-constexpr int kQueue = 4;
 
 struct TopCommand {
   std::string url{kDefaultLcmUrl};
@@ -56,36 +54,30 @@ class Top {
     std::array<char, 256> name{};
     (void)gethostname(name.data(), name.size() - 1);
     source_ = fmt::format("imuscope top on {}", name.data());
-    ear_.subscribe(
-        "STATUS",
-        [this](const auto&, auto bytes) {
-          if (auto status = decode_message<status_t>(bytes)) {
-            heard_.status = std::move(*status);
-            heard_at_ = host_now();
-          } else {
-            heard_.note = "a STATUS message of another version was heard: use the imuscope of that PC";
-          }
-        },
-        kQueue);
-    ear_.subscribe(
-        "CALIBRATION_.*",
-        [this](const auto&, auto bytes) {
-          if (auto message = decode_message<calibration_t>(bytes))
-            keep(heard_.calibrations, std::move(*message));
-        },
-        kQueue);
-    ear_.subscribe(
-        "ODOMETRY",
-        [this](const auto&, auto bytes) {
-          if (auto message = decode_message<odometry_t>(bytes)) heard_.odometry = *message;
-        },
-        kQueue);
-    ear_.subscribe(
-        "NOISE_MODEL_.*",
-        [this](const auto&, auto bytes) {
-          if (auto message = decode_message<noise_model_t>(bytes)) keep(heard_.models, std::move(*message));
-        },
-        kQueue);
+  }
+
+  Result<void> listen() {
+    const auto keep_status = [this](const auto&, auto bytes) {
+      if (auto status = decode_message<status_t>(bytes)) {
+        heard_.status = std::move(*status);
+        heard_at_ = host_now();
+      } else {
+        heard_.note = "a STATUS message of another version was heard: use the imuscope of that PC";
+      }
+    };
+    const auto keep_calibration = [this](const auto&, auto bytes) {
+      if (auto message = decode_message<calibration_t>(bytes)) keep(heard_.calibrations, std::move(*message));
+    };
+    const auto keep_odometry = [this](const auto&, auto bytes) {
+      if (auto message = decode_message<odometry_t>(bytes)) heard_.odometry = *message;
+    };
+    const auto keep_model = [this](const auto&, auto bytes) {
+      if (auto message = decode_message<noise_model_t>(bytes)) keep(heard_.models, std::move(*message));
+    };
+    return ear_.subscribe("STATUS", keep_status)
+        .and_then([&] { return ear_.subscribe("CALIBRATION_.*", keep_calibration); })
+        .and_then([&] { return ear_.subscribe("ODOMETRY", keep_odometry); })
+        .and_then([&] { return ear_.subscribe("NOISE_MODEL_.*", keep_model); });
   }
 
   void mark(const std::string& text) {
@@ -169,6 +161,7 @@ Result<void> run(const TopCommand& options) {
   std::signal(SIGINT, stop_top);
   std::signal(SIGTERM, stop_top);
   Top top(std::move(*ear), std::move(*voice));
+  if (auto listening = top.listen(); !listening) return listening;
   if (!options.event.empty()) {
     top.mark(options.event);
     return {};

@@ -1,0 +1,127 @@
+/// Whoever is on the bus sends what he likes to the running service and to the terminal view: neither ends,
+/// and both still hear what is meant for them. Each in a network of its own, so that no other program hears
+/// it.
+
+#include <gtest/gtest.h>
+
+#include <sched.h>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <thread>
+
+#include "example_reports.h"
+#include "programs.h"
+#include "publish/lcm_publisher.h"
+#include "tests/support/lcm_packets.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr int kFailedWork = 1;
+
+/// Devices on the network that never send: the service runs on and waits for them.
+constexpr const char* kSilentVehicle = R"([run]
+name = "silent"
+[[device]]
+name = "airins"
+role = "reference"
+protocol = "ixblue_stdbin"
+transport = { kind = "udp", host = "", port = 18113 }
+[[device]]
+name = "mtx1"
+role = "study"
+protocol = "xsens_mt"
+transport = { kind = "udp", host = "", port = 18114 }
+)";
+
+class HostileBus : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network namespace needs root";
+    ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
+    folder_ = scratch_folder();
+    std::ofstream(folder_ / "car.toml") << kSilentVehicle;
+  }
+
+  /// Calls `again` now and then until `condition` holds.
+  static bool soon(
+      const std::function<bool()>& condition, const std::function<void()>& again = [] {}) {
+    const auto end = std::chrono::steady_clock::now() + seconds(20);
+    while (std::chrono::steady_clock::now() < end) {
+      again();
+      if (condition()) return true;
+      std::this_thread::sleep_for(milliseconds(50));
+    }
+    return false;
+  }
+  [[nodiscard]] bool log_has(const char* text) const {
+    return read_text(folder_ / "log.txt").find(text) != std::string::npos;
+  }
+
+  std::filesystem::path folder_;
+  BusSender stranger_;
+};
+
+TEST_F(HostileBus, TheServiceOutlivesTheTwoDatagramsAndHearsTheEventBehindThem) {
+  BackgroundProgram service("imuscope",
+                            {"run", (folder_ / "car.toml").string(), "--out", (folder_ / "run").string()},
+                            folder_ / "log.txt");
+  ASSERT_TRUE(soon([&] { return log_has("Ctrl-C ends it"); })) << read_text(folder_ / "log.txt");
+  for (const char* channel : {"IMUSCOPE_EVENT", "", "any"})
+    ASSERT_TRUE(stranger_.send_two_that_kill(channel));
+  LcmPublisher::open()->publish(PersonEvent{kExampleUtc, "test", "roundabout"});
+  EXPECT_TRUE(soon([&] { return log_has("event: roundabout (from test)"); }))
+      << read_text(folder_ / "log.txt");
+  service.interrupt();
+  EXPECT_EQ(service.wait(), kFailedWork) << "no device sent anything; " << read_text(folder_ / "log.txt");
+}
+
+TEST_F(HostileBus, TheTerminalViewOutlivesTheTwoDatagramsAndShowsTheStatusBehindThem) {
+  BackgroundProgram top("imuscope", {"top", "--once", "--wait", "20"}, folder_ / "log.txt");
+  auto voice = LcmPublisher::open();
+  std::this_thread::sleep_for(milliseconds(500));  // to its start; what comes before is not heard
+  for (int i = 0; i < 10; ++i) {
+    for (const char* channel : {"IMUSCOPE_STATUS", "", "any"})
+      ASSERT_TRUE(stranger_.send_two_that_kill(channel));
+  }
+  EXPECT_TRUE(soon([&] { return log_has("run 'demo'"); }, [&] { voice->publish(example_status()); }))
+      << read_text(folder_ / "log.txt");
+  EXPECT_EQ(top.wait(), 0) << read_text(folder_ / "log.txt");
+}
+
+TEST_F(HostileBus, TheServiceWritesIntoNoFileThatItsBusNames) {
+  std::ofstream(folder_ / "precious.txt") << "precious";
+  for (const char* url : {"?mode=w", "", "2?mode=w"}) {
+    std::ofstream(folder_ / "file.toml")
+        << "[lcm]\nurl = \"file://" << (folder_ / "precious.txt").string() << url << "\"\n"
+        << kSilentVehicle;
+    EXPECT_EQ(
+        run_program("imuscope", {"run", (folder_ / "file.toml").string(), "--out", (folder_ / "no").string()},
+                    folder_ / "log.txt"),
+        2);
+    EXPECT_TRUE(log_has("a bus is udpm://")) << read_text(folder_ / "log.txt");
+  }
+  EXPECT_EQ(read_text(folder_ / "precious.txt"), "precious");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "precious.txt2"));
+}
+
+TEST_F(HostileBus, TheTerminalViewRefusesALog) {
+  std::ofstream(folder_ / "bus.lcm") << "content";
+  for (const char* url : {"", "?mode=w", "?speed=1"}) {
+    EXPECT_EQ(run_program("imuscope", {"top", "--lcm", "file://" + (folder_ / "bus.lcm").string() + url},
+                          folder_ / "log.txt"),
+              2)
+        << url;
+  }
+  EXPECT_EQ(read_text(folder_ / "bus.lcm"), "content");
+}
+
+}  // namespace
+}  // namespace imuscope::test
