@@ -152,6 +152,7 @@ void LivePublisher::set_recorder(Recorder& recorder) {
 }
 
 void LivePublisher::on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes) {
+  if (!event_gate_.take(bytes.size(), host_now())) return;
   const auto event = decode_message<event_t>(bytes);
   if (!event) {
     spdlog::warn("a message on {} is no event_t of this version; it was recorded as it came", channel);
@@ -235,6 +236,12 @@ void LivePublisher::loop() {
     const auto turn = turns_.fetch_add(1, std::memory_order_relaxed);
     if (ear_ && turn % kTurnsPerEar == 0) (void)ear_->wait(std::chrono::milliseconds(0));
     const HostTime now = host_now();
+    if (const auto refused = event_gate_.due_report(now); refused > 0) {
+      spdlog::warn(
+          "{} events were neither logged nor recorded: more come on {}_EVENT than a person marks, or "
+          "longer ones; find who sends them",
+          refused, tunables_.lcm.channel_prefix);
+    }
     if (now - last_status_ >= kStatusMessagePeriod) {
       watch_devices(now);
       publish_status(now);

@@ -16,6 +16,7 @@
 #include "service/can_watch.h"
 #include "service/config.h"
 #include "service/core_thread.h"
+#include "service/event_gate.h"
 #include "service/health.h"
 #include "service/io_thread.h"
 #include "service/live.h"
@@ -91,6 +92,7 @@ class LivePublisher {
   Tunables tunables_;
   Broadcast broadcast_;
   std::optional<LcmListener> ear_;
+  EventGate event_gate_;
   std::string bus_problem_;
   std::string last_event_;
   std::unique_ptr<RunFolder> folder_;

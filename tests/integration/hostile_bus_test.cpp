@@ -5,16 +5,24 @@
 #include <gtest/gtest.h>
 
 #include <sched.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <functional>
+#include <optional>
 #include <thread>
 
+#include <imuscope/event_t.hpp>
 #include "example_reports.h"
 #include "programs.h"
 #include "publish/lcm_publisher.h"
+#include "publish/message_codec.h"
 #include "tests/support/lcm_packets.h"
 #include "tests/support/shared_data.h"
 
@@ -46,6 +54,7 @@ class HostileBus : public testing::Test {
   void SetUp() override {
     if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network namespace needs root";
     ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
+    stranger_.emplace();
     folder_ = scratch_folder();
     std::ofstream(folder_ / "car.toml") << kSilentVehicle;
   }
@@ -66,7 +75,7 @@ class HostileBus : public testing::Test {
   }
 
   std::filesystem::path folder_;
-  BusSender stranger_;
+  std::optional<BusSender> stranger_;  // of the private network, not of the PC's
 };
 
 TEST_F(HostileBus, TheServiceOutlivesTheTwoDatagramsAndHearsTheEventBehindThem) {
@@ -75,7 +84,7 @@ TEST_F(HostileBus, TheServiceOutlivesTheTwoDatagramsAndHearsTheEventBehindThem) 
                             folder_ / "log.txt");
   ASSERT_TRUE(soon([&] { return log_has("Ctrl-C ends it"); })) << read_text(folder_ / "log.txt");
   for (const char* channel : {"IMUSCOPE_EVENT", "", "any"})
-    ASSERT_TRUE(stranger_.send_two_that_kill(channel));
+    ASSERT_TRUE(stranger_->send_two_that_kill(channel));
   LcmPublisher::open()->publish(PersonEvent{kExampleUtc, "test", "roundabout"});
   EXPECT_TRUE(soon([&] { return log_has("event: roundabout (from test)"); }))
       << read_text(folder_ / "log.txt");
@@ -89,11 +98,82 @@ TEST_F(HostileBus, TheTerminalViewOutlivesTheTwoDatagramsAndShowsTheStatusBehind
   std::this_thread::sleep_for(milliseconds(500));  // to its start; what comes before is not heard
   for (int i = 0; i < 10; ++i) {
     for (const char* channel : {"IMUSCOPE_STATUS", "", "any"})
-      ASSERT_TRUE(stranger_.send_two_that_kill(channel));
+      ASSERT_TRUE(stranger_->send_two_that_kill(channel));
   }
   EXPECT_TRUE(soon([&] { return log_has("run 'demo'"); }, [&] { voice->publish(example_status()); }))
       << read_text(folder_ / "log.txt");
   EXPECT_EQ(top.wait(), 0) << read_text(folder_ / "log.txt");
+}
+
+/// What systemd does: a socket that hears the signs of life.
+class Systemd {
+ public:
+  explicit Systemd(std::chrono::microseconds watchdog)
+      : path_("/tmp/imuscope-bus-" + std::to_string(getpid())),
+        socket_(socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strcpy(address.sun_path, path_.c_str());
+    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    setenv("NOTIFY_SOCKET", path_.c_str(), 1);
+    setenv("WATCHDOG_USEC", std::to_string(watchdog.count()).c_str(), 1);
+  }
+  ~Systemd() {
+    unsetenv("NOTIFY_SOCKET");
+    unsetenv("WATCHDOG_USEC");
+    close(socket_);
+    unlink(path_.c_str());
+  }
+  Systemd(const Systemd&) = delete;
+  Systemd& operator=(const Systemd&) = delete;
+
+  /// Signs of life since the last call.
+  [[nodiscard]] int signs() const {
+    int count = 0;
+    std::array<char, 1024> text{};
+    for (ssize_t n = 0; (n = recv(socket_, text.data(), text.size(), 0)) > 0;)
+      count += std::string_view(text.data(), static_cast<std::size_t>(n)) == "WATCHDOG=1" ? 1 : 0;
+    return count;
+  }
+
+ private:
+  std::string path_;
+  int socket_;
+};
+
+TEST_F(HostileBus, AFloodOfEventsFillsNeitherLogNorCaptureAndStopsNoSignOfLife) {
+  constexpr seconds kLength{10};
+  constexpr seconds kWatchdog{2};
+  const Systemd systemd(kWatchdog);
+  BackgroundProgram service("imuscope",
+                            {"run", (folder_ / "car.toml").string(), "--out", (folder_ / "run").string()},
+                            folder_ / "log.txt");
+  ASSERT_TRUE(soon([&] { return log_has("Ctrl-C ends it"); })) << read_text(folder_ / "log.txt");
+  ASSERT_TRUE(soon([&] { return systemd.signs() > 0; }));
+
+  event_t event{};
+  event.text = std::string(400, 'x');
+  event.source = "stranger";
+  const auto bytes = encode_message(event);
+  const std::string packet =
+      lc02("IMUSCOPE_EVENT", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  std::uint64_t sent = 0;
+  int signs = 0;
+  const auto end = std::chrono::steady_clock::now() + kLength;
+  while (std::chrono::steady_clock::now() < end) {
+    for (int i = 0; i < 100; ++i) sent += stranger_->send(packet) ? 1 : 0;
+    signs += systemd.signs();
+  }
+  service.interrupt();
+  EXPECT_EQ(service.wait(), kFailedWork) << "no device sent anything";
+  RecordProperty("packets", std::to_string(sent));
+  EXPECT_GT(sent, 10'000U);
+  // One is due each second; where two in a row do not come, systemd would have ended the service.
+  EXPECT_GE(signs, static_cast<int>(kLength / kWatchdog));
+  constexpr std::uintmax_t kBytesAMinute = 1'000'000;
+  EXPECT_LT(std::filesystem::file_size(folder_ / "log.txt"), kBytesAMinute * kLength.count() / 60);
+  EXPECT_LT(std::filesystem::file_size(folder_ / "run" / "capture.lcm"), kBytesAMinute);
+  EXPECT_TRUE(log_has("events were neither logged nor recorded")) << read_text(folder_ / "log.txt");
 }
 
 TEST_F(HostileBus, TheServiceWritesIntoNoFileThatItsBusNames) {
