@@ -180,7 +180,10 @@ NetStream::~NetStream() { ::close(fd_); }
 
 IoResult NetStream::read(std::span<std::uint8_t> buffer) noexcept {
   const bool tcp = settings_.kind == NetSettings::Kind::kTcp;
-  for (;;) {
+  // An empty datagram says nothing, and whoever sends them without end must not keep the reader here: what is
+  // left waits for the next call.
+  constexpr int kAttempts = 16;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
     // With MSG_TRUNC a datagram's whole length comes back, also of what did not fit.
     const ssize_t n = recv(fd_, buffer.data(), buffer.size(), tcp ? 0 : MSG_TRUNC);
     if (n > 0) {
@@ -197,6 +200,7 @@ IoResult NetStream::read(std::span<std::uint8_t> buffer) noexcept {
     if (errno == EAGAIN || errno == EWOULDBLOCK) return {IoStatus::kNothing, 0};
     return {tcp ? IoStatus::kGone : IoStatus::kNothing, 0};
   }
+  return {IoStatus::kNothing, 0};
 }
 
 IoResult NetStream::write(std::span<const std::uint8_t> bytes) noexcept {

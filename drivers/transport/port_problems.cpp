@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 #include <grp.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -48,15 +49,19 @@ bool is_same_file(const std::string& one, const std::string& other) {
          a.st_ino == b.st_ino;
 }
 
-/// Processes that have the file open, as "1234 (name)"; only those that this user may look into.
-std::vector<std::string> holders(const std::string& path) {
-  std::vector<std::string> found;
+struct Holders {
+  std::vector<std::string> others;  ///< as "1234 (name)"
+  bool own = false;                 ///< this process, too
+};
+
+/// Processes that have the file open; only those that this user may look into.
+Holders holders(const std::string& path) {
+  Holders found;
   std::error_code ignored;
   const fs::path real = fs::canonical(path, ignored);
   const std::string self = std::to_string(getpid());
   // Every root that has its own /dev/pts counts pseudo-terminals anew: there, a name alone says little.
   const bool is_pseudo = real.parent_path() == "/dev/pts";
-  bool own = false;
   for (const std::string& process : entries("/proc", "")) {
     const std::string pid = fs::path(process).filename().string();
     if (pid.empty() || std::isdigit(static_cast<unsigned char>(pid[0])) == 0) continue;
@@ -64,14 +69,29 @@ std::vector<std::string> holders(const std::string& path) {
       std::error_code unreadable;
       if (fs::read_symlink(fd, unreadable) != real) continue;
       if (is_pseudo && !is_same_file(fd, real)) continue;
-      if (pid != self) found.push_back(fmt::format("{} ({})", pid, process_name(process)));
-      own = own || pid == self;
+      if (pid != self) found.others.push_back(fmt::format("{} ({})", pid, process_name(process)));
+      found.own = found.own || pid == self;
       break;
     }
   }
-  // Whoever asks for the port may have it open while it is refused: where others hold it, they are meant.
-  if (own && found.empty()) found.emplace_back("this program");
   return found;
+}
+
+Error busy(const std::string& path, const std::vector<std::string>& by) {
+  return {
+      ErrorKind::kWork,
+      by.empty() ? fmt::format("port {} is in use by another program", path)
+                 : fmt::format("port {} is in use by process {}", path, fmt::join(by, ", ")),
+      fmt::format("{}stop that program (the service: systemctl stop imuscope); ModemManager leaves a port "
+                  "alone with the udev rule ENV{{ID_MM_DEVICE_IGNORE}}=\"1\"",
+                  by.empty() ? fmt::format("see who with 'sudo fuser -v {}' and ", path) : "")};
+}
+
+/// Major number of a character device.
+std::optional<unsigned> character_device(const std::string& path) {
+  struct stat info {};
+  if (stat(path.c_str(), &info) != 0 || !S_ISCHR(info.st_mode)) return std::nullopt;
+  return major(info.st_rdev);
 }
 
 std::string group_of(const std::string& path) {
@@ -117,12 +137,26 @@ std::optional<int> latency_timer_ms(const std::string& port, const std::string& 
   return timer_ms;
 }
 
+std::optional<Error> shared_with_others(const std::string& path) {
+  const auto by = holders(path);
+  if (by.others.empty()) return std::nullopt;
+  return busy(path, by.others);
+}
+
 Error explain_open_failure(const std::string& path, int error) {
   switch (error) {
     case ENOENT:
       return missing(path);
-    case EACCES:
-    case EPERM: {
+    case EPERM:
+      if (const auto number = character_device(path)) {
+        return {ErrorKind::kWork, fmt::format("this program may not open ports of the kind of {}", path),
+                fmt::format(
+                    "allow them to its unit: 'systemctl edit imuscope', [Service], DeviceAllow=char-{} rw; "
+                    "in a container, to the container",
+                    *number)};
+      }
+      [[fallthrough]];
+    case EACCES: {
       const std::string group = group_of(path);
       return {
           ErrorKind::kWork, fmt::format("no permission for port {}", path),
@@ -132,13 +166,10 @@ Error explain_open_failure(const std::string& path, int error) {
               group)};
     }
     case EBUSY: {
-      const auto by = holders(path);
-      return {ErrorKind::kWork,
-              by.empty() ? fmt::format("port {} is in use by another program", path)
-                         : fmt::format("port {} is in use by process {}", path, fmt::join(by, ", ")),
-              "stop that program (the service: systemctl stop imuscope); ModemManager leaves a port alone "
-              "with the udev rule "
-              "ENV{ID_MM_DEVICE_IGNORE}=\"1\""};
+      auto by = holders(path);
+      // Whoever asks for the port may have it open while it is refused: where others hold it, they are meant.
+      if (by.own && by.others.empty()) by.others.emplace_back("this program");
+      return busy(path, by.others);
     }
     case ENXIO:
     case ENODEV:

@@ -14,6 +14,10 @@ namespace imuscope {
 /// @param error  errno of the failed open; EBUSY also for a port that another program has locked
 Error explain_open_failure(const std::string& path, int error);
 
+/// Of a port that opens, though another program has it open without a lock: each would get a part of the
+/// bytes, and one set the other's baud rate. Sees the programs that this user may look into.
+std::optional<Error> shared_with_others(const std::string& path);
+
 /// How long a USB adapter holds bytes back to send them together, ms, where its driver tells (FTDI: 16 unless
 /// it is told otherwise). A udev rule shortens it: see kLatencyRule.
 /// @param adapters  folder of the adapters' settings

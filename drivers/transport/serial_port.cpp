@@ -96,6 +96,7 @@ Result<SerialPort> SerialPort::open(const SerialSettings& settings) {
   if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
     return tl::unexpected<Error>(explain_open_failure(settings.path, EBUSY));
   }
+  if (auto shared = shared_with_others(settings.path)) return tl::unexpected<Error>(std::move(*shared));
   auto baud = set_line(fd, settings);
   if (!baud) return tl::unexpected<Error>(std::move(baud.error()));
   port.baud_ = *baud;

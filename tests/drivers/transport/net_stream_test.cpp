@@ -204,6 +204,19 @@ TEST(NetStream, ADatagramWithoutBytesIsPassedOverAndWhatIsSaidToASenderGoesNowhe
   EXPECT_EQ((*stream)->describe(), "udp://127.0.0.1:" + std::to_string(port));
 }
 
+TEST(NetStream, DatagramsWithoutBytesHoldNobody) {
+  FarEnd sender(SOCK_DGRAM);
+  const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
+  auto stream = NetStream::open({NetKind::kUdp, "127.0.0.1", port});
+  ASSERT_TRUE(stream) << stream.error().text();
+  for (int i = 0; i < 100; ++i) sender.say_to(port, "");
+  sender.say_to(port, "after");
+  std::array<std::uint8_t, 10> buffer{};
+  int calls = 0;
+  while ((*stream)->read(buffer).status == IoStatus::kNothing) ASSERT_LT(++calls, 100);
+  EXPECT_GT(calls, 1) << "a stream of them must not keep the reader in one call";
+}
+
 TEST(NetStream, AServerThatResetsTheConnectionIsGone) {
   for (const bool by_reading : {true, false}) {
     FarEnd server(SOCK_STREAM);

@@ -67,6 +67,12 @@ TEST(PortProblems, APortThatNobodyIsSeenToHoldIsSaidToBeInUseAllTheSame) {
             std::string::npos);
 }
 
+TEST(PortProblems, APortThatTheUnitDoesNotAllowNamesTheUnitsKey) {
+  const auto problem = explain_open_failure("/dev/null", EPERM);
+  EXPECT_NE(problem.remedy.find("DeviceAllow=char-1 rw"), std::string::npos) << problem.remedy;
+  EXPECT_NE(explain_open_failure("/dev/null", EACCES).remedy.find("usermod -aG"), std::string::npos);
+}
+
 TEST(PortProblems, TheGroupOfAPortThatIsNotThereIsTheUsualOne) {
   const auto file = test::scratch_folder() / "ttyX0";
   EXPECT_NE(explain_open_failure(file.string(), EACCES).remedy.find("usermod -aG dialout"),

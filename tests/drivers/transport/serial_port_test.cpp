@@ -156,6 +156,37 @@ TEST_F(SerialPortTest, ABusyPortNamesTheProgramThatHoldsItAndItsNumber) {
   close(ready[1]);
 }
 
+TEST_F(SerialPortTest, APortThatAnotherProgramReadsWithoutALockIsLeftAsItIs) {
+  const auto baud = [&] {
+    const int fd = ::open(name_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
+    termios line{};
+    tcgetattr(fd, &line);
+    ::close(fd);
+    return cfgetospeed(&line);
+  };
+  std::array<int, 2> ready{};
+  ASSERT_EQ(pipe(ready.data()), 0);
+  const OtherProcess reader([&] {
+    const int fd = ::open(name_.c_str(), O_RDWR | O_NOCTTY);
+    termios line{};
+    const bool set =
+        tcgetattr(fd, &line) == 0 && cfsetspeed(&line, B9600) == 0 && tcsetattr(fd, TCSANOW, &line) == 0;
+    if (write(ready[1], set ? "y" : "n", 1) == 1) pause();
+    return false;
+  });
+  char answer = 0;
+  ASSERT_EQ(read(ready[0], &answer, 1), 1);
+  ASSERT_EQ(answer, 'y');
+  const auto port = SerialPort::open(settings_);
+  ASSERT_FALSE(port);
+  EXPECT_NE(port.error().what.find("in use by process " + std::to_string(reader.pid()) + " ("),
+            std::string::npos)
+      << port.error().what;
+  EXPECT_EQ(baud(), B9600);
+  close(ready[0]);
+  close(ready[1]);
+}
+
 TEST_F(SerialPortTest, APseudoTerminalOfAnotherRootWithTheSameNameIsAnotherPort) {
   const auto name = std::filesystem::canonical(name_);
   std::array<int, 2> ready{};
