@@ -29,6 +29,28 @@ std::error_code make_private_folders(const std::filesystem::path& folder) {
   return {};
 }
 
+/// Why somebody else could put his own file where the link to the port is to stand; empty where nobody can.
+/// As of every folder on the way a stranger could exchange the next one, all of them are asked (sshd does the
+/// same for its keys).
+std::string who_else_writes(const std::filesystem::path& folder) {
+  std::error_code error;
+  const auto whole = std::filesystem::absolute(folder.empty() ? "." : folder, error);
+  std::filesystem::path above;
+  for (const auto& part : whole.lexically_normal()) {
+    above /= part;
+    struct stat link {};
+    struct stat facts {};
+    if (::lstat(above.c_str(), &link) != 0 || ::stat(above.c_str(), &facts) != 0) return {};  // not there yet
+    const auto foreign = [](const struct stat& found) {
+      return found.st_uid != 0 && found.st_uid != ::geteuid();
+    };
+    if (foreign(link) || foreign(facts)) return fmt::format("{} belongs to somebody else", above.string());
+    if ((facts.st_mode & S_IWOTH) != 0 && (facts.st_mode & S_ISVTX) == 0)
+      return fmt::format("everybody may write in {}", above.string());
+  }
+  return {};
+}
+
 /// Opens the far end once and closes it: from then on the near end tells whether somebody has it open. Sets
 /// it raw, so that nothing is echoed to the device before the program has set it up itself.
 bool prepare_far_end(const char* terminal, int baud) {
@@ -64,6 +86,12 @@ tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesy
   if (const std::error_code error = make_private_folders(link.parent_path()))
     return tl::unexpected(
         fmt::format("cannot make the folder {}: {}", link.parent_path().string(), error.message()));
+  if (const std::string danger = who_else_writes(link.parent_path()); !danger.empty()) {
+    return tl::unexpected(
+        fmt::format("cannot put a port at {}: {}, and could put another one in its place; name a "
+                    "folder of your own",
+                    link.string(), danger));
+  }
   const int near_end = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
   constexpr std::size_t kNameSize = 64;
   std::array<char, kNameSize> name{};

@@ -1,6 +1,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/stat.h>
 #include <termios.h>
 #include <unistd.h>
 #include <bit>
@@ -375,6 +376,32 @@ TEST(PseudoTerminal, TakesTheLinksPlaceButNotAFiles) {
   std::ofstream(folder / "file") << "precious";
   EXPECT_FALSE(PseudoTerminal::open(folder / "file", 115200).has_value());
   EXPECT_EQ(content_of(folder / "file"), "precious");
+}
+
+TEST(PseudoTerminal, TakesNoFolderInWhichSomebodyElseCouldPutAnotherPort) {
+  const std::filesystem::path folder = scratch_folder();
+  const auto refusal = [&](const std::filesystem::path& link) {
+    const auto terminal = PseudoTerminal::open(link, 115200);
+    return terminal ? std::string("taken") : terminal.error();
+  };
+  std::filesystem::create_directories(folder / "open" / "mine");
+  std::filesystem::permissions(folder / "open", std::filesystem::perms::all);
+  EXPECT_NE(refusal(folder / "open" / "port").find("everybody may write in"), std::string::npos);
+  EXPECT_NE(refusal(folder / "open" / "mine" / "port").find("everybody may write in"), std::string::npos);
+  EXPECT_NE(refusal(folder / "open" / "new" / "port").find("everybody may write in"), std::string::npos);
+  // As /tmp: others write there, too, but not over what is ours.
+  ASSERT_EQ(::chmod((folder / "open").c_str(), 01777), 0);
+  EXPECT_EQ(refusal(folder / "open" / "port"), "taken");
+
+  constexpr uid_t kSomebodyElse = 12'345;
+  std::filesystem::create_directories(folder / "theirs" / "mine");
+  std::filesystem::create_symlink(folder / "open", folder / "their_link");
+  if (::chown((folder / "theirs").c_str(), kSomebodyElse, kSomebodyElse) != 0)
+    GTEST_SKIP() << "to give a folder away needs root";
+  ASSERT_EQ(::lchown((folder / "their_link").c_str(), kSomebodyElse, kSomebodyElse), 0);
+  EXPECT_NE(refusal(folder / "theirs" / "port").find("belongs to somebody else"), std::string::npos);
+  EXPECT_NE(refusal(folder / "theirs" / "mine" / "port").find("belongs to somebody else"), std::string::npos);
+  EXPECT_NE(refusal(folder / "their_link" / "port").find("belongs to somebody else"), std::string::npos);
 }
 
 TEST(PseudoTerminal, AFloodThatTheKernelDoesNotTakeAtOnceArrivesWhole) {
