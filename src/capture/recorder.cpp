@@ -68,9 +68,10 @@ RecorderStatus Recorder::status() const {
 }
 
 void Recorder::run() {
-  (void)setup_this_thread({"imuscope-rec", Scheduling::kNormal, 0, {}});  // a name is never refused
+  (void)setup_this_thread({kRecorderThreadName, Scheduling::kNormal, 0, {}});  // a name is never refused
   HostTime flush_due = host_now() + kFlushInterval;
   while (!stop_.load()) {
+    heartbeat_.beat(host_now());
     drain();
     if (host_now() >= flush_due || writer_->pending_bytes() > kFlushBytes) {
       flush();

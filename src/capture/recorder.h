@@ -22,6 +22,8 @@
 #include "capture/record_codec.h"
 #include "capture/records.h"
 #include "publish/channel_name.h"
+#include "rt/heartbeat.h"
+#include "rt/host_clock.h"
 
 namespace imuscope {
 
@@ -35,6 +37,9 @@ struct RecorderStatus {
   /// Of the last flush, with the remedy; where it worked, that a file was removed while it was recorded.
   std::optional<Error> problem;
 };
+
+/// As top and the kernel show its thread.
+inline constexpr const char* kRecorderThreadName = "imuscope-rec";
 
 /// Back-pressure ends here: a slow or full disk makes the recorder lose records (counted, visible to the
 /// capture's reader as gaps in the sequences), never an I/O thread wait.
@@ -70,6 +75,7 @@ class Recorder {
   Result<void> stop();
 
   [[nodiscard]] RecorderStatus status() const;
+  [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
 
  private:
   Recorder(Options options, std::unique_ptr<CaptureWriter> writer, std::vector<RawRing*> raw_rings,
@@ -103,6 +109,7 @@ class Recorder {
 
   mutable std::mutex status_mutex_;
   RecorderStatus status_;
+  Heartbeat heartbeat_{host_now()};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -44,6 +44,7 @@ void CoreThread::loop() {
     }
     core_.tick(tick.index, tick.cut - kGuard, sink);
     last_tick_.store(tick.index, std::memory_order_release);
+    heartbeat_.beat(host_now());
     if (tick.index % kTicksPerSnapshot == 0) statistics_.write(beat.statistics());
   }
 }

@@ -7,6 +7,8 @@
 #include <thread>
 
 #include "capture/records.h"
+#include "rt/heartbeat.h"
+#include "rt/host_clock.h"
 #include "rt/latest_value.h"
 #include "rt/periodic.h"
 #include "rt/thread_setup.h"
@@ -63,6 +65,7 @@ class CoreThread {
   void offer_noise(std::size_t study, const NewNoise& model) noexcept { core_.offer_noise(study, model); }
   /// Newest statistics of the beat. One reader: the publisher.
   [[nodiscard]] PeriodicStatistics statistics();
+  [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
   /// Index of the last tick done; -1 before the first.
   [[nodiscard]] std::int64_t last_tick() const { return last_tick_.load(std::memory_order_acquire); }
 
@@ -73,6 +76,7 @@ class CoreThread {
   HostTime t0_;
   std::unique_ptr<CoreRings> rings_;
   LatestValue<PeriodicStatistics> statistics_;
+  Heartbeat heartbeat_{host_now()};
   std::atomic<std::int64_t> last_tick_{-1};
   std::atomic<std::int64_t> end_after_{std::numeric_limits<std::int64_t>::max()};
   std::thread thread_;

@@ -1,11 +1,7 @@
 #include "service/io_thread.h"
 
-#include <fmt/format.h>
 #include <sys/epoll.h>
-#include <unistd.h>
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <future>
 #include <optional>
 
@@ -41,14 +37,6 @@ constexpr int kBeatsOfRest = 9;
 constexpr int kBeatsOfLongRest = 29;
 constexpr Duration kClockIsLearned = std::chrono::seconds(60);
 constexpr Duration kStatusPeriod = std::chrono::milliseconds(100);
-
-/// Waits for events until `until`.
-int wait(int epoll, std::span<epoll_event> events, HostTime until) noexcept {
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-  const std::int64_t ns = std::max<std::int64_t>((until - host_now()).count(), 0);
-  const timespec timeout{ns / kNsPerSecond, ns % kNsPerSecond};
-  return epoll_pwait2(epoll, events.data(), static_cast<int>(events.size()), &timeout, nullptr);
-}
 
 }  // namespace
 
@@ -255,18 +243,11 @@ IoThread::IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decod
   }
 }
 
-IoThread::~IoThread() {
-  stop();
-  if (epoll_ >= 0) ::close(epoll_);
-}
+IoThread::~IoThread() { stop(); }
 
 Result<void> IoThread::start(const ThreadPlan& plan, HostTime first_cut, std::vector<Error>& refusals) {
   first_cut_ = first_cut;
-  epoll_ = epoll_create1(EPOLL_CLOEXEC);
-  if (epoll_ < 0) {
-    return work_error(fmt::format("no epoll descriptor: {}", std::strerror(errno)),
-                      "raise the limit of open files");
-  }
+  if (auto opened = events_.open(); !opened) return opened;
   running_.store(true, std::memory_order_release);
   std::promise<std::vector<Error>> ready;
   auto refused = ready.get_future();
@@ -310,25 +291,27 @@ HostTime IoThread::next_look(HostTime beat) const noexcept {
 }
 
 void IoThread::loop() {
-  std::array<epoll_event, kMaxDevices> events{};
+  std::array<epoll_event, kMaxDevices + 1> events{};
+  const int epoll = events_.epoll();
   TickSchedule beat(first_cut_ - kLead, kBeat);
   HostTime last_statistics{};
   while (running_.load(std::memory_order_acquire)) {
-    const int n = wait(epoll_, events, next_look(beat.deadline()));
+    const int n = events_.wait(events, next_look(beat.deadline()));
     const HostTime now = host_now();
+    heartbeat_.beat(now);
     const bool beaten = now >= beat.deadline();
     if (beaten) (void)beat.wake(now);
     for (int i = 0; i < n; ++i) {
       auto* const line = static_cast<Line*>(events[static_cast<std::size_t>(i)].data.ptr);
-      line->on_event(tap_, epoll_, now);
-      line->say(tap_, epoll_, now);
+      line->on_event(tap_, epoll, now);
+      line->say(tap_, epoll, now);
     }
-    for (const auto& line : lines_) line->on_wake(tap_, epoll_, now);
+    for (const auto& line : lines_) line->on_wake(tap_, epoll, now);
     if (!beaten) continue;
     for (const auto& line : lines_) {
-      line->adopt(epoll_);
-      line->on_beat(tap_, epoll_, now);
-      line->say(tap_, epoll_, now);
+      line->adopt(epoll);
+      line->on_beat(tap_, epoll, now);
+      line->say(tap_, epoll, now);
       line->publish(now);
     }
     beat.finish(host_now());

@@ -16,10 +16,13 @@
 #include "capture/records.h"
 #include "drivers/device/device.h"
 #include "drivers/transport/transport.h"
+#include "rt/heartbeat.h"
+#include "rt/host_clock.h"
 #include "rt/latest_value.h"
 #include "rt/periodic.h"
 #include "rt/thread_setup.h"
 #include "service/core.h"
+#include "service/line_events.h"
 
 namespace imuscope {
 
@@ -82,6 +85,8 @@ class IoThread {
   /// Newest statistics of the beat at which sessions are polled. One reader: the publisher.
   [[nodiscard]] PeriodicStatistics statistics();
 
+  [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
+
   [[nodiscard]] RawRing& raw_ring() { return *raw_ring_; }
   [[nodiscard]] ExceptionRing& exceptions() { return *exceptions_; }
   /// Arrival of the newest sample pushed; valid after stop().
@@ -97,9 +102,10 @@ class IoThread {
   std::unique_ptr<RawRing> raw_ring_;
   std::unique_ptr<ExceptionRing> exceptions_;
   RawTap tap_;
-  int epoll_ = -1;
+  LineEvents events_;
   HostTime first_cut_{};
   LatestValue<PeriodicStatistics> statistics_;
+  Heartbeat heartbeat_{host_now()};
   HostTime newest_arrival_{HostTime::min()};
   std::atomic<bool> running_{false};
   std::thread thread_;

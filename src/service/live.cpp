@@ -12,13 +12,17 @@
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
 #include "service/baud_search.h"
+#include "service/controlling_terminal.h"
 #include "service/core_thread.h"
 #include "service/device_factory.h"
 #include "service/estimator_setup.h"
 #include "service/io_thread.h"
 #include "service/line_factory.h"
+#include "service/line_opener.h"
 #include "service/live_publisher.h"
 #include "service/live_smoothing.h"
+#include "service/new_folder.h"
+#include "service/pulse.h"
 #include "service/reload.h"
 #include "service/study.h"
 #include "service/systemd_notify.h"
@@ -34,6 +38,8 @@ constexpr std::size_t kThreadStackBytes = 1024 * 1024;
 constexpr auto kSupervisorPeriod = std::chrono::milliseconds(200);
 constexpr Duration kReopenFirst = std::chrono::milliseconds(200);
 constexpr Duration kReopenLongest = std::chrono::seconds(5);
+/// An attempt to open that takes longer than a TCP connection is given is told.
+constexpr Duration kOpensWithin = std::chrono::seconds(3);
 /// From now to tick 0: the threads start meanwhile.
 constexpr Duration kStartDelay = std::chrono::milliseconds(100);
 
@@ -63,6 +69,8 @@ class Supervisor {
     Duration pause = kReopenFirst;
     std::string last_problem;
     BaudSearch baud;
+    LineOpener opener;
+    HostTime began{};  ///< the attempt that is under way
   };
 
   void step_line(DeviceIndex index, HostTime now) {
@@ -85,17 +93,43 @@ class Supervisor {
       line.pause = kReopenFirst;
       line.next_try = now + line.pause;
     }
-    if (line.open || now < line.next_try) return;
     if (device.serial) device.serial->baud = line.baud.current();
-    auto opened = open_line(device, ids_[index]);
-    if (!opened) {
-      // Said once, and again when the reason changes: a log is no place for a heartbeat.
-      const auto text = opened.error().text();
-      if (text != line.last_problem) {
-        spdlog::error("{}: {}", device.name, text);
-        publisher_.set_line_problem(index, text);
+    if (line.opener.is_under_way()) {
+      if (auto opened = line.opener.take()) {
+        take_over(index, device, std::move(*opened), now);
+      } else if (now - line.began > kOpensWithin) {
+        tell(index, device, told_while_opening(device));
       }
-      line.last_problem = text;
+      return;
+    }
+    if (line.open || now < line.next_try) return;
+    line.began = now;
+    line.opener.begin([device = std::move(device), ids = ids_[index]] { return open_line(device, ids); });
+  }
+
+  static std::string told_while_opening(const DeviceConfig& device) {
+    if (!device.net) return "its port has not opened for seconds; unplug the device and plug it in again";
+    return fmt::format(
+        "{} has not been found for seconds: the name server does not answer; give the host's address in "
+        "place "
+        "of its name, or check the network",
+        device.net->host);
+  }
+
+  /// Said once, and again when the reason changes: a log is no place for a heartbeat.
+  void tell(DeviceIndex index, const DeviceConfig& device, const std::string& problem) {
+    auto& line = lines_[index];
+    if (problem != line.last_problem) {
+      spdlog::error("{}: {}", device.name, problem);
+      publisher_.set_line_problem(index, problem);
+    }
+    line.last_problem = problem;
+  }
+
+  void take_over(DeviceIndex index, const DeviceConfig& device, LineOpener::Outcome opened, HostTime now) {
+    auto& line = lines_[index];
+    if (!opened) {
+      tell(index, device, opened.error().text());
       line.next_try = now + line.pause;
       line.pause = std::min(line.pause * 2, kReopenLongest);
       return;
@@ -105,7 +139,9 @@ class Supervisor {
     io_.offer(index, std::make_unique<Connection>(Connection{std::move(*opened),
                                                              make_session(device, line.baud.searching()),
                                                              device.serial.has_value()}));
-    line = {true, {}, kReopenFirst, {}, line.baud};
+    line.open = true;
+    line.pause = kReopenFirst;
+    line.last_problem.clear();
   }
 
   const Configuration& configuration_;
@@ -143,21 +179,20 @@ void log_refusals(const std::vector<Error>& refusals) {
   for (const auto& refusal : refusals) spdlog::warn("{}", refusal.text());
 }
 
-/// Has core and publisher done anything since the last look? What stops is started anew by systemd.
-class Pulse {
+/// Says in the log which threads stand still, once each time: STATUS may be what stands still.
+class StandingThreads {
  public:
-  bool beats(const CoreThread& estimator, const LivePublisher& publisher) {
-    const auto tick = estimator.last_tick();
-    const auto turns = publisher.turns();
-    const bool moved = tick != tick_ && turns != turns_;
-    tick_ = tick;
-    turns_ = turns;
-    return moved;
+  void look(std::span<const Pulse> pulses, HostTime now) {
+    const auto sentences = standing_threads(pulses, now);
+    if (sentences.size() > told_) {
+      for (const auto& sentence : sentences) spdlog::warn("{}", sentence);
+    }
+    if (sentences.empty() && told_ > 0) spdlog::info("all threads move again");
+    told_ = sentences.size();
   }
 
  private:
-  std::int64_t tick_ = -1;
-  std::uint64_t turns_ = 0;
+  std::size_t told_ = 0;
 };
 
 /// A count that grows is the same thing said again.
@@ -200,11 +235,17 @@ Result<void> check_lines(const Configuration& configuration) {
 
 }  // namespace
 
-Result<void> run_live(const Configuration& configuration, const LiveOptions& options, LiveSignals& signals) {
+Result<void> run_live(const Configuration& configuration, const LiveOptions& wanted, LiveSignals& signals) {
   if (auto checked = check_lines(configuration); !checked) return checked;
-  if (auto checked = check_folder(options.out); !checked) return checked;
   const auto spec = noise::parse_model(configuration.noise.model);
   if (!spec) return tl::unexpected<Error>(spec.error());
+  LiveOptions options = wanted;
+  if (options.out.empty()) {
+    auto made = make_new_folder(options.parent, configuration.run_name, std::chrono::system_clock::now());
+    if (!made) return tl::unexpected<Error>(made.error());
+    options.out = std::move(*made);
+  }
+  if (auto checked = check_folder(options.out); !checked) return checked;
   if (auto sized = set_thread_stack_size(kThreadStackBytes); !sized) spdlog::warn("{}", sized.error().text());
 
   LiveHistory history;
@@ -249,7 +290,9 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
   systemd.ready(fmt::format("recording into {}", options.out.string()));
 
   Supervisor supervisor(configuration, ids, io, **publisher);
-  Pulse pulse;
+  const auto pulses = (*publisher)->pulses();
+  const ControllingTerminal terminal;
+  StandingThreads standing;
   std::string told;
   const HostTime started = host_now();
   const auto over = [&] {
@@ -258,7 +301,11 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
   while (!signals.stop.load(std::memory_order_relaxed) && !over()) {
     const HostTime now = host_now();
     supervisor.step(now);
-    if (signals.reload.exchange(false, std::memory_order_relaxed)) {
+    if (signals.hang_up.exchange(false, std::memory_order_relaxed)) {
+      if (terminal.is_gone()) {
+        spdlog::info("the terminal was closed");
+        break;
+      }
       systemd.reloading(now);
       reload(configuration, **publisher);
       systemd.ready(told);
@@ -269,7 +316,8 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& opt
       systemd.status(text);
       told = std::move(text);
     }
-    if (pulse.beats(estimator, **publisher)) systemd.alive(now);
+    standing.look(pulses, now);
+    if (all_alive(pulses, now)) systemd.alive(now);
     std::this_thread::sleep_for(kSupervisorPeriod);
   }
   systemd.stopping();

@@ -20,11 +20,13 @@ namespace imuscope {
 inline constexpr const char* kIoThreadName = "imuscope-io";
 inline constexpr const char* kEstimatorThreadName = "imuscope-est";
 inline constexpr const char* kPublisherThreadName = "imuscope-pub";
+inline constexpr const char* kModellerThreadName = "imuscope-model";
 
 /// What the command line adds to the configuration of a live run; without `duration_s` it runs until it is
 /// told to stop.
 struct LiveOptions {
-  std::filesystem::path out;  ///< run folder; the capture goes there too
+  std::filesystem::path out;     ///< run folder; the capture goes there too. Empty: a new one in `parent`
+  std::filesystem::path parent;  ///< of a new folder (new_folder.h)
   std::string version;
   std::optional<double> duration_s;  ///< ends by itself after this time
 };
@@ -32,14 +34,15 @@ struct LiveOptions {
 /// What the outside asks for; a signal handler may set these.
 struct LiveSignals {
   std::atomic<bool> stop{false};
-  std::atomic<bool> reload{false};  ///< read the configuration file again (reload.h)
+  /// Read the configuration file again (reload.h); where the terminal is gone it is an end.
+  std::atomic<bool> hang_up{false};
 };
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-/// Runs until signals.stop becomes true, or for options.duration_s. Ends cleanly: what had arrived is
-/// estimated, recorded, published and written.
-/// Errors: a device of the configuration has no line, the run folder already holds a recording (kUsage); the
-/// run folder or the capture cannot be made, no device ever answered (kWork).
+/// Runs until signals.stop becomes true, its terminal is closed, or for options.duration_s. Ends cleanly:
+/// what had arrived is estimated, recorded, published and written. Errors: a device of the configuration has
+/// no line, the run folder already holds a recording, the run's name cannot name a folder (kUsage); the run
+/// folder or the capture cannot be made, no device ever answered (kWork).
 Result<void> run_live(const Configuration& configuration, const LiveOptions& options, LiveSignals& signals);
 
 }  // namespace imuscope

@@ -189,6 +189,18 @@ Health LivePublisher::health() const {
   return health_;
 }
 
+std::vector<Pulse> LivePublisher::pulses() const {
+  std::vector<Pulse> pulses{
+      {kIoThreadName, &io_.heartbeat(), kCoreTold, kCoreGivenUp},
+      {kEstimatorThreadName, &estimator_.heartbeat(), kCoreTold, kCoreGivenUp},
+      {kPublisherThreadName, &heartbeat_, kWriterTold, kWriterGivenUp},
+      {kModellerThreadName, &modeller_.heartbeat(), kModellerTold, kModellerGivenUp},
+  };
+  if (recorder_ != nullptr)
+    pulses.push_back({kRecorderThreadName, &recorder_->heartbeat(), kWriterTold, kWriterGivenUp});
+  return pulses;
+}
+
 void LivePublisher::set_refusals(const std::vector<Error>& refusals) {
   const std::lock_guard lock(shared_mutex_);
   for (const auto& refusal : refusals) refusals_.push_back(refusal.text());
@@ -218,7 +230,7 @@ std::string LivePublisher::problem_of(std::size_t device, HostTime now) {
 }
 
 void LivePublisher::start() {
-  modeller_.start({"imuscope-model", Scheduling::kIdle, 0, {}});
+  modeller_.start({kModellerThreadName, Scheduling::kIdle, 0, {}});
   running_.store(true, std::memory_order_release);
   thread_ = std::thread([this] {
     (void)setup_this_thread({kPublisherThreadName, Scheduling::kNormal, 0, {}});
@@ -228,14 +240,15 @@ void LivePublisher::start() {
 
 void LivePublisher::loop() {
   PeriodicLoop beat(host_now(), kDrainPeriod);
+  std::uint64_t turn = 0;
   while (running_.load(std::memory_order_acquire)) {
     (void)beat.wait();
     beat_ = beat.statistics();
     take_over_tunables();
     drain();
-    const auto turn = turns_.fetch_add(1, std::memory_order_relaxed);
-    if (ear_ && turn % kTurnsPerEar == 0) (void)ear_->wait(std::chrono::milliseconds(0));
+    if (ear_ && ++turn % kTurnsPerEar == 0) (void)ear_->wait(std::chrono::milliseconds(0));
     const HostTime now = host_now();
+    heartbeat_.beat(now);
     if (const auto refused = event_gate_.due_report(now); refused > 0) {
       spdlog::warn(
           "{} events were neither logged nor recorded: more come on {}_EVENT than a person marks, or "
@@ -436,6 +449,7 @@ StatusReport LivePublisher::status(HostTime now) {
   }
   add_threads(report, now);
   add_rings(report);
+  for (auto& sentence : standing_threads(pulses(), now)) report.problems.push_back(std::move(sentence));
   if (!bus_problem_.empty()) report.problems.push_back(bus_problem_);
   const std::lock_guard lock(shared_mutex_);
   report.problems.insert(report.problems.end(), refusals_.begin(), refusals_.end());

@@ -24,6 +24,7 @@
 #include "service/modeller.h"
 #include "service/noise_feedback.h"
 #include "service/observability.h"
+#include "service/pulse.h"
 #include "service/reload.h"
 #include "service/report_values.h"
 #include "service/run_folder.h"
@@ -54,8 +55,8 @@ class LivePublisher {
   void start();
   /// Takes over what changed, at the thread's next turn. Any thread.
   void reconfigure(const Tunables& tunables);
-  /// Turns of the thread so far: it is alive as long as they grow.
-  [[nodiscard]] std::uint64_t turns() const { return turns_.load(std::memory_order_relaxed); }
+  /// Of every thread of the run but the caller's. Call after set_recorder().
+  [[nodiscard]] std::vector<Pulse> pulses() const;
   /// The last overall state and its reason, for the log and systemd. Any thread.
   [[nodiscard]] Health health() const;
   /// Publishes and writes what is left, closes the files. Call after the core's thread has ended.
@@ -127,7 +128,7 @@ class LivePublisher {
   std::vector<std::string> refusals_;
   std::optional<Tunables> new_tunables_;
   Health health_{"starting", "the threads start"};
-  std::atomic<std::uint64_t> turns_{0};
+  Heartbeat heartbeat_{host_now()};
   std::atomic<bool> running_{false};
   std::thread thread_;
 };

@@ -243,6 +243,7 @@ void Modeller::drain() {
 
 void Modeller::loop() {
   while (running_.load(std::memory_order_acquire)) {
+    heartbeat_.beat(host_now());
     drain();
     std::this_thread::sleep_for(kIdleSleep);
   }

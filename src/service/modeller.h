@@ -16,6 +16,8 @@
 #include "noise/fit.h"
 #include "noise/streaming_wv.h"
 #include "publish/reports.h"
+#include "rt/heartbeat.h"
+#include "rt/host_clock.h"
 #include "rt/spsc_ring.h"
 #include "rt/thread_setup.h"
 #include "service/config.h"
@@ -133,6 +135,7 @@ class Modeller {
   /// What waits for the thread and what was refused, in rows. Thread: that of add().
   static constexpr std::size_t row_capacity() { return BlockRing::capacity() * kRowsPerBlock; }
   [[nodiscard]] RingCounters rows() const;
+  [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
 
  private:
   void loop();
@@ -153,6 +156,7 @@ class Modeller {
     double refit_interval_s;
   };
   std::optional<Options> new_options_;
+  Heartbeat heartbeat_{host_now()};
   std::atomic<bool> running_{false};
   std::thread thread_;
 };

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "base/text.h"
+
 namespace imuscope {
 
 SystemdNotify::SystemdNotify() {
@@ -29,8 +31,9 @@ SystemdNotify::~SystemdNotify() {
   if (socket_ >= 0) ::close(socket_);
 }
 
-void SystemdNotify::ready(const std::string& status) const { send("READY=1\nSTATUS=" + status); }
-void SystemdNotify::status(const std::string& text) const { send("STATUS=" + text); }
+// A line is an assignment of its own: a status may hold names of others.
+void SystemdNotify::ready(const std::string& status) const { send("READY=1\nSTATUS=" + printable(status)); }
+void SystemdNotify::status(const std::string& text) const { send("STATUS=" + printable(text)); }
 void SystemdNotify::stopping() const { send("STOPPING=1"); }
 
 void SystemdNotify::reloading(HostTime now) const {

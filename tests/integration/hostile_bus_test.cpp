@@ -5,14 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <sched.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
-#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <functional>
 #include <optional>
@@ -23,6 +18,7 @@
 #include "programs.h"
 #include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
+#include "systemd.h"
 #include "tests/support/lcm_packets.h"
 #include "tests/support/shared_data.h"
 
@@ -104,42 +100,6 @@ TEST_F(HostileBus, TheTerminalViewOutlivesTheTwoDatagramsAndShowsTheStatusBehind
       << read_text(folder_ / "log.txt");
   EXPECT_EQ(top.wait(), 0) << read_text(folder_ / "log.txt");
 }
-
-/// What systemd does: a socket that hears the signs of life.
-class Systemd {
- public:
-  explicit Systemd(std::chrono::microseconds watchdog)
-      : path_("/tmp/imuscope-bus-" + std::to_string(getpid())),
-        socket_(socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::strcpy(address.sun_path, path_.c_str());
-    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-    setenv("NOTIFY_SOCKET", path_.c_str(), 1);
-    setenv("WATCHDOG_USEC", std::to_string(watchdog.count()).c_str(), 1);
-  }
-  ~Systemd() {
-    unsetenv("NOTIFY_SOCKET");
-    unsetenv("WATCHDOG_USEC");
-    close(socket_);
-    unlink(path_.c_str());
-  }
-  Systemd(const Systemd&) = delete;
-  Systemd& operator=(const Systemd&) = delete;
-
-  /// Signs of life since the last call.
-  [[nodiscard]] int signs() const {
-    int count = 0;
-    std::array<char, 1024> text{};
-    for (ssize_t n = 0; (n = recv(socket_, text.data(), text.size(), 0)) > 0;)
-      count += std::string_view(text.data(), static_cast<std::size_t>(n)) == "WATCHDOG=1" ? 1 : 0;
-    return count;
-  }
-
- private:
-  std::string path_;
-  int socket_;
-};
 
 TEST_F(HostileBus, AFloodOfEventsFillsNeitherLogNorCaptureAndStopsNoSignOfLife) {
   constexpr seconds kLength{10};

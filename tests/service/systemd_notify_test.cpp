@@ -56,6 +56,14 @@ TEST_F(SystemdNotifyTest, SpeaksTheWordsOfSdNotify) {
   EXPECT_EQ(heard(), "STOPPING=1");
 }
 
+TEST_F(SystemdNotifyTest, ANamesNewLineIsNoAssignment) {
+  const SystemdNotify systemd;
+  systemd.ready("recording into runs/car\nMAINPID=1\n");
+  EXPECT_EQ(heard(), "READY=1\nSTATUS=recording into runs/car?MAINPID=1?");
+  systemd.status("a\nb");
+  EXPECT_EQ(heard(), "STATUS=a?b");
+}
+
 TEST_F(SystemdNotifyTest, GivesASignOfLifeTwiceInTheTimeGranted) {
   SystemdNotify systemd;
   const HostTime begin = host_time_from_ns(1'000'000'000'000);

@@ -1,5 +1,6 @@
 #include "tests/support/refused_calls.h"
 
+#include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/types.h>
@@ -71,6 +72,12 @@ ssize_t recv(int fd, void* bytes, std::size_t n, int flags) {
 ssize_t send(int fd, const void* bytes, std::size_t n, int flags) {
   if (imuscope::test::refuses(imuscope::test::Call::kSend)) return -1;
   return syscall(SYS_sendto, fd, bytes, n, flags, nullptr, 0);
+}
+
+int epoll_pwait2(int epoll, epoll_event* events, int n, const timespec* timeout, const sigset_t* mask) {
+  if (imuscope::test::refuses(imuscope::test::Call::kEpollPwait2)) return -1;
+  constexpr std::size_t kKernelsSignalSet = 8;  // bytes
+  return static_cast<int>(syscall(SYS_epoll_pwait2, epoll, events, n, timeout, mask, kKernelsSignalSet));
 }
 
 int fdatasync(int fd) {

@@ -8,8 +8,8 @@
 
 namespace imuscope::test {
 
-enum class Call { kRead, kWrite, kPread, kPwrite, kRecv, kSend, kFdatasync };
-inline constexpr std::size_t kRefusableCalls = 7;
+enum class Call { kRead, kWrite, kPread, kPwrite, kRecv, kSend, kFdatasync, kEpollPwait2 };
+inline constexpr std::size_t kRefusableCalls = 8;
 
 /// While it lives, the next `times` calls fail with `error`. One at a time a call and thread.
 class RefusedCalls {

@@ -1,7 +1,4 @@
-#include <fmt/chrono.h>
-#include <fmt/format.h>
 #include <atomic>
-#include <chrono>
 #include <csignal>
 #include <memory>
 
@@ -16,7 +13,7 @@ namespace {
 LiveSignals signals;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
 
 extern "C" void request_stop(int) { signals.stop.store(true); }
-extern "C" void request_reload(int) { signals.reload.store(true); }
+extern "C" void hang_up(int) { signals.hang_up.store(true); }
 
 /// What --seconds accepts: something worth recording, to a year.
 constexpr double kShortestRun_s = 0.1;
@@ -28,25 +25,20 @@ struct RunCommand {
   double seconds = 0.0;
 };
 
-/// runs/NAME-YYYYMMDD-HHMMSS, where the configuration names no folder.
-std::filesystem::path default_folder(const Configuration& configuration) {
-  const std::filesystem::path parent =
-      configuration.record.folder.empty() ? "runs" : configuration.record.folder;
-  return parent /
-         fmt::format("{}-{:%Y%m%d-%H%M%S}", configuration.run_name,
-                     fmt::localtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
-}
-
 Result<void> run(const RunCommand& options) {
   const auto configuration = load_configuration(options.config);
   if (!configuration) return tl::unexpected<Error>(configuration.error());
   LiveOptions live;
-  live.out = options.out.empty() ? default_folder(*configuration) : std::filesystem::path(options.out);
+  live.out = options.out;
+  live.parent = configuration->record.folder.empty() ? "runs" : configuration->record.folder;
   live.version = IMUSCOPE_VERSION;
   if (options.seconds > 0.0) live.duration_s = options.seconds;
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
-  std::signal(SIGHUP, request_reload);
+  // Under nohup it stays ignored.
+  if (std::signal(SIGHUP, hang_up) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+  // Ctrl-C ends `tee` behind a pipe, too: what is lost then is the log's end and not the run's.
+  std::signal(SIGPIPE, SIG_IGN);
   return run_live(*configuration, live, signals);
 }
 

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <cstdio>
 #include <exception>
+#include <string>
 
 #include "base/text.h"
 #include "commands.h"
@@ -20,6 +22,9 @@ std::string usage_sentence(const CLI::App* app, const CLI::Error& error) {
   }
   return fmt::format("imuscope: {}; see {} --help\n", what, command);
 }
+
+/// To the person who started the program, if still there: a closed terminal is no failure of its own.
+void say(const std::string& sentence) { (void)std::fputs(sentence.c_str(), stderr); }
 
 int run(int argc, char** argv) {
   CLI::App app{"imuscope: shows, live on a moving vehicle, how wrong a low-cost IMU is, and why"};
@@ -56,8 +61,8 @@ int run(int argc, char** argv) {
   imuscope::cli::set_up_log();
   const auto result = work();
   if (result) return 0;
-  fmt::print(stderr, "{}imuscope: {}\n", imuscope::cli::error_prefix(),
-             imuscope::printable(result.error().text()));
+  say(fmt::format("{}imuscope: {}\n", imuscope::cli::error_prefix(),
+                  imuscope::printable(result.error().text())));
   return result.error().kind == imuscope::ErrorKind::kUsage ? 2 : 1;
 }
 
@@ -67,7 +72,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "imuscope: unexpected failure: {}\n", error.what());
+    say(fmt::format("imuscope: unexpected failure: {}\n", error.what()));
     return 1;
   }
 }
