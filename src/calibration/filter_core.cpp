@@ -235,14 +235,4 @@ void reset_to_prior(FilterCore& core, std::size_t study, const StudyConfig& conf
                  [&core](std::size_t i, double sd) { core.reset_state(i, sd * sd); });
 }
 
-Eigen::Matrix3d to_eigen(const Matrix3& m) noexcept {
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data());
-}
-
-Matrix3 to_array(const Eigen::Matrix3d& m) noexcept {
-  Matrix3 out;
-  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.data()) = m;
-  return out;
-}
-
 }  // namespace imuscope

@@ -11,6 +11,7 @@
 
 #include "base/contracts.h"
 #include "calibration/covariance_kernel.h"
+#include "calibration/eigen_types.h"
 #include "calibration/estimator_config.h"
 #include "calibration/study_model.h"
 #include "navigation/error_model.h"
@@ -118,11 +119,5 @@ class FilterCore {
 
 /// Prior variances of one S-IMU's states, written to P with no correlation.
 void reset_to_prior(FilterCore& core, std::size_t study, const StudyConfig& config) noexcept;
-
-/// Eigen's and the samples' vectors.
-inline Eigen::Vector3d to_eigen(const Vector3& v) noexcept { return {v[0], v[1], v[2]}; }
-inline Vector3 to_array(const Eigen::Vector3d& v) noexcept { return {v.x(), v.y(), v.z()}; }
-Eigen::Matrix3d to_eigen(const Matrix3& m) noexcept;
-Matrix3 to_array(const Eigen::Matrix3d& m) noexcept;
 
 }  // namespace imuscope

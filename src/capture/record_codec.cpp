@@ -6,8 +6,8 @@
 #include <imuscope/run_t.hpp>
 
 #include "capture/stamp_range.h"
-#include "publish/message_builders.h"
 #include "publish/message_codec.h"
+#include "publish/message_values.h"
 
 namespace imuscope {
 namespace {

@@ -83,10 +83,10 @@ std::string header(const Sensors& sensors, std::string_view tool) {
 std::string kalibr_keys(const char* name, const char* unit, const Triad& triad) {
   if (!triad.given) return {};
   std::string text = fmt::format("{}_noise_density: {:.9e}  # {}/sqrt(Hz)\n", name,
-                                 std::sqrt(triad.terms.white_density), unit);
+                                 std::sqrt(triad.terms.white_density()), unit);
   text += fmt::format("{}_random_walk: {:.9e}  # {}/s/sqrt(Hz)\n", name, std::sqrt(triad.terms.walk_density),
                       unit);
-  if (triad.terms.walk_density <= 0.0 || triad.terms.white_density <= 0.0) {
+  if (triad.terms.walk_density <= 0.0 || triad.terms.white_density() <= 0.0) {
     text += "# the data support no such term where 0 stands; kalibr refuses it: record for longer\n";
   }
   return text;
@@ -110,11 +110,11 @@ std::string px4(const Sensors& sensors) {
   };
   if (sensors.accel.given) {
     add("EKF2_ACC_B_NOISE", sensors.accel.terms.walk_density);
-    add("EKF2_ACC_NOISE", sensors.accel.terms.white_density);
+    add("EKF2_ACC_NOISE", sensors.accel.terms.white_density());
   }
   if (sensors.gyro.given) {
     add("EKF2_GYR_B_NOISE", sensors.gyro.terms.walk_density);
-    add("EKF2_GYR_NOISE", sensors.gyro.terms.white_density);
+    add("EKF2_GYR_NOISE", sensors.gyro.terms.white_density());
   }
   return text;
 }
@@ -125,15 +125,15 @@ std::string ros_keys(const char* name, const char* field, const char* unit, cons
   if (!triad.given)
     return fmt::format("    {}_covariance: [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]\n", field);
   const FilterTerms& t = triad.terms;
-  const std::string v = fmt::format("{:.9e}", t.white_density * rate_hz);
+  const std::string v = fmt::format("{:.9e}", t.white_density() * rate_hz);
   std::string text = fmt::format("    {}_covariance: [{}, 0.0, 0.0, 0.0, {}, 0.0, 0.0, 0.0, {}]  # ({})^2\n",
                                  field, v, v, v, unit);
   text +=
-      fmt::format("    {}_noise_density: {:.9e}  # {}/sqrt(Hz)\n", name, std::sqrt(t.white_density), unit);
+      fmt::format("    {}_noise_density: {:.9e}  # {}/sqrt(Hz)\n", name, std::sqrt(t.white_density()), unit);
   text += fmt::format("    {}_random_walk: {:.9e}  # {}/s/sqrt(Hz), drives the bias\n", name,
-                      std::sqrt(2.0 * t.bias_rate * t.bias_variance), unit);
-  if (t.bias_rate > 0.0)
-    text += fmt::format("    {}_bias_correlation_time: {:.9e}  # s\n", name, 1.0 / t.bias_rate);
+                      std::sqrt(2.0 * t.bias().rate_per_s * t.bias().variance), unit);
+  if (t.bias().rate_per_s > 0.0)
+    text += fmt::format("    {}_bias_correlation_time: {:.9e}  # s\n", name, 1.0 / t.bias().rate_per_s);
   return text;
 }
 
@@ -203,8 +203,8 @@ Result<std::string> kf_gins(const std::vector<AxisFit>& axes, bool conservative)
     const bool gyro = is_gyro(axis.unit);
     const double sheet = gyro ? kDegPerRad : 1.0;
     triads[gyro ? 0 : 1].push_back(
-        {std::sqrt(t.white_density) * sheet * root_hour,
-         std::sqrt(t.bias_variance) * (gyro ? kDegPerRad * kSecondsPerHour : kMGalPerMps2)});
+        {std::sqrt(t.white_density()) * sheet * root_hour,
+         std::sqrt(t.bias().variance) * (gyro ? kDegPerRad * kSecondsPerHour : kMGalPerMps2)});
     text += fmt::format("# {}: {}{}\n", axis.axis, fitted->origin, conservative ? ", over-bounding" : "");
   }
   text += correlation.comment() +

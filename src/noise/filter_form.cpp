@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/contracts.h"
+#include "noise/inference.h"
 
 namespace imuscope::noise {
 namespace {
@@ -143,15 +144,56 @@ Result<FormFit> fit_of_form(const std::vector<FormSource>& sources, const ModelS
   return FormFit{std::move(*refitted), std::move(origin)};
 }
 
-FilterTerms filter_terms(const FitResult& si_fit) {
+double FilterTerms::low_frequency_density(const GaussMarkov& process) const {
+  return process.variance / rate_hz / std::tanh(0.5 * process.rate_per_s / rate_hz);
+}
+
+FilterTerms::GaussMarkov FilterTerms::bias() const {
+  GaussMarkov slowest;
+  for (const GaussMarkov& process : gauss_markov) {
+    if (process.variance > 0.0) slowest = process;
+  }
+  return slowest;
+}
+
+FilterTerms filter_terms(const FitResult& fit) {
   FilterTerms terms;
-  for (const Component& c : si_fit.model.components) {
-    if (c.amplitude <= 0.0) continue;
-    if (c.kind == ProcessKind::kWhiteNoise) terms.white_density = c.amplitude / si_fit.rate_hz;
-    if (c.kind == ProcessKind::kRandomWalk) terms.walk_density = c.amplitude * si_fit.rate_hz;
-    if (c.kind == ProcessKind::kGaussMarkov) {
-      terms.bias_variance = c.amplitude;
-      terms.bias_rate = c.shape[0] * si_fit.rate_hz;
+  terms.rate_hz = fit.rate_hz;
+  const auto places = parameter_places(fit.model);
+  // A record can be too short for a slow process and yet tell the white noise well.
+  const auto is_determined = [&](std::size_t component) {
+    for (std::size_t i = 0; i < places.size() && i < fit.parameters.size(); ++i) {
+      if (places[i].component != component) continue;
+      const ParameterEstimate& p = fit.parameters[i];
+      const bool told = fit.identifiable || (p.ci_low && std::isfinite(*p.ci_low));
+      if (!told || !std::isfinite(p.value) || p.value <= 0.0) return false;
+    }
+    return true;
+  };
+  for (std::size_t i = 0; i < fit.model.components.size(); ++i) {
+    const Component& c = fit.model.components[i];
+    switch (c.kind) {
+      case ProcessKind::kWhiteNoise:
+        terms.white_variance = c.amplitude;
+        terms.white_is_determined = is_determined(i);
+        break;
+      case ProcessKind::kRandomWalk:
+        terms.walk_density = c.amplitude * fit.rate_hz;
+        break;
+      case ProcessKind::kGaussMarkov:
+        terms.gauss_markov.push_back({c.amplitude, c.shape[0] * fit.rate_hz, is_determined(i)});
+        break;
+      case ProcessKind::kMa1:
+        terms.short_memory_density += c.amplitude * std::pow(1.0 + c.shape[0], 2) / fit.rate_hz;
+        break;
+      case ProcessKind::kArma11:
+        terms.short_memory_density +=
+            c.amplitude * std::pow((1.0 + c.shape[1]) / (1.0 - c.shape[0]), 2) / fit.rate_hz;
+        break;
+      case ProcessKind::kQuantization:
+      case ProcessKind::kSinusoid:
+      case ProcessKind::kRamp:
+        break;
     }
   }
   return terms;

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Publishes reports over LCM. lcm_publisher.cpp is the only place that knows the LCM library.
+/// Publishes messages over LCM. lcm_publisher.cpp is the only place that knows the LCM library.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +13,7 @@
 #include "base/result.h"
 #include "publish/channel_name.h"
 #include "publish/lcm_url.h"
-#include "publish/reports.h"
+#include "publish/message_codec.h"
 
 namespace imuscope {
 
@@ -42,17 +42,14 @@ class LcmPublisher {
   LcmPublisher& operator=(LcmPublisher&&) noexcept;
   ~LcmPublisher();
 
-  void publish(const StatusReport& report);      ///< PREFIX_STATUS
-  void publish(const NavigationReport& report);  ///< PREFIX_NAVIGATION
-  void publish(const OdometryReport& report);    ///< PREFIX_ODOMETRY
-  /// @param name of the S-IMU that report.device stands for
-  void publish(const CalibrationReport& report, const std::string& name);  ///< PREFIX_CALIBRATION_NAME
-  void publish(const ErrorReport& report, const std::string& name);        ///< PREFIX_ERROR_NAME
-  void publish(const WaveletVarianceReport& report);                       ///< PREFIX_WV_NAME
-  void publish(const NoiseModelReport& report);                            ///< PREFIX_NOISE_MODEL_NAME
-  void publish(const DynamicsReport& report);                              ///< PREFIX_DYNAMICS_NAME
-  void publish(const PersonEvent& event);                                  ///< PREFIX_EVENT
-  void publish(const BridgeReport& report);                                ///< PREFIX_POSE and PREFIX_INS
+  /// Sends `message` on PREFIX_KIND, or PREFIX_KIND_NAME where the kind exists for each S-IMU. A type that
+  /// has a sequence gets the next one of its channel.
+  template <typename Message>
+  void publish(Message message, std::string_view kind, std::string_view name = {}) {
+    const std::string channel = channel_of(kind, name);
+    if constexpr (requires { message.sequence; }) message.sequence = next_sequence(channel);
+    send(channel, message.utime, encode_message(message));
+  }
 
   /// Gives every message that is sent to `tap`, too: channel, utime and encoded bytes. For the recorder.
   using Tap = std::function<void(std::string_view, std::int64_t, std::span<const std::uint8_t>)>;
@@ -62,6 +59,9 @@ class LcmPublisher {
 
  private:
   struct Impl;
+  [[nodiscard]] std::string channel_of(std::string_view kind, std::string_view name) const;
+  [[nodiscard]] std::int64_t next_sequence(const std::string& channel);
+  void send(const std::string& channel, std::int64_t utime, std::span<const std::uint8_t> message);
   explicit LcmPublisher(std::unique_ptr<Impl> impl) noexcept;
   std::unique_ptr<Impl> impl_;
 };

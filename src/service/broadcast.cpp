@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "service/health.h"
+
 namespace imuscope {
 
 Broadcast::Broadcast(const Configuration& configuration, const UtcAnchor& anchor)
@@ -18,9 +20,8 @@ void Broadcast::set_tap(LcmPublisher::Tap tap) {
 
 void Broadcast::on_error(const ErrorRecord& record) {
   if (!bus_) return;
-  const auto device = study_devices_[record.study];
-  bus_->publish(error_report(record, static_cast<DeviceIndex>(device), anchor_),
-                configuration_.devices[device].name);
+  const std::string& name = configuration_.devices[study_devices_[record.study]].name;
+  bus_->publish(error_message(record, name, anchor_), "ERROR", name);
 }
 
 void Broadcast::on_snapshot(const Snapshot& snapshot) {
@@ -30,39 +31,33 @@ void Broadcast::on_snapshot(const Snapshot& snapshot) {
   }
   if (!bus_) return;
   if (snapshot.navigation.status == NavigationStatus::kNavigating) {
-    bus_->publish(navigation_report(snapshot, anchor_));
+    bus_->publish(navigation_message(snapshot, anchor_), "NAVIGATION");
     if (bridge_) {
       if (!bridge_origin_) bridge_origin_ = snapshot;
-      bus_->publish(bridge_report(snapshot, *bridge_origin_, anchor_));
+      bus_->publish(pose_message(snapshot, *bridge_origin_, anchor_), "POSE");
+      bus_->publish(ins_message(snapshot, *bridge_origin_, anchor_), "INS");
     }
   }
-  if (snapshot.odometry.has_speed) bus_->publish(odometry_report(snapshot, anchor_));
+  if (snapshot.odometry.has_speed) bus_->publish(odometry_message(snapshot, anchor_), "ODOMETRY");
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto state = snapshot.studies[i].status;
     if (state != StudyStatus::kConverging && state != StudyStatus::kCalibrated) continue;
-    const auto device = study_devices_[i];
-    bus_->publish(calibration_report(snapshot, i, static_cast<DeviceIndex>(device), anchor_),
-                  configuration_.devices[device].name);
+    const std::string& name = configuration_.devices[study_devices_[i]].name;
+    bus_->publish(calibration_message(snapshot, i, name, anchor_), "CALIBRATION", name);
   }
 }
 
 void Broadcast::on_refit(const Refit& refit) {
   if (!bus_) return;
-  Refit stamped = refit;
-  const auto stamp = [&](auto& report) {
-    report.utc = anchor_.at(refit.time);
-    report.time_s = to_seconds(refit.time - refit.first_reference_time);
-  };
-  stamp(stamped.wavelet_variance);
-  stamp(stamped.noise_model);
-  stamp(stamped.dynamics);
-  bus_->publish(stamped.wavelet_variance);
-  bus_->publish(stamped.noise_model);
-  bus_->publish(stamped.dynamics);
+  bus_->publish(wavelet_variance_message(refit, anchor_), "WV", refit.name);
+  bus_->publish(noise_model_message(refit, anchor_), "NOISE_MODEL", refit.name);
+  bus_->publish(dynamics_message(refit, anchor_), "DYNAMICS", refit.name);
 }
 
-void Broadcast::publish(const StatusReport& report) {
-  if (bus_) bus_->publish(report);
+void Broadcast::on_status(status_t status) {
+  if (!bus_) return;
+  count_elements(status);
+  bus_->publish(std::move(status), "STATUS");
 }
 
 }  // namespace imuscope

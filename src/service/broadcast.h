@@ -2,13 +2,14 @@
 
 /// What a run says over LCM while it goes on, live and in a replay alike. Soft world.
 
+#include <imuscope/status_t.hpp>
 #include <optional>
 #include <vector>
 
 #include "publish/lcm_publisher.h"
 #include "service/config.h"
-#include "service/modeller.h"
-#include "service/report_values.h"
+#include "service/refit.h"
+#include "service/telemetry.h"
 
 namespace imuscope {
 
@@ -26,7 +27,8 @@ class Broadcast {
   void on_error(const ErrorRecord& record);
   void on_snapshot(const Snapshot& snapshot);
   void on_refit(const Refit& refit);
-  void publish(const StatusReport& report);
+  /// Counts its arrays, too.
+  void on_status(status_t status);
 
   [[nodiscard]] const UtcAnchor& anchor() const { return anchor_; }
 

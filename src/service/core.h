@@ -24,6 +24,10 @@ inline constexpr Duration kTickPeriod{10'000'000};
 /// Every tenth tick leaves a snapshot: 10 Hz.
 inline constexpr std::int64_t kTicksPerSnapshot = 10;
 
+/// After the newest arrival the core runs on for this many ticks, live and in replay: what waits for a
+/// reference that does not come is given up by then.
+inline constexpr std::int64_t kTailTicks = 20;
+
 /// From one device to the core: ten seconds at 100 Hz, far beyond any stall of the core.
 using SampleRing = SpscRing<Sample, 1024>;
 

@@ -11,7 +11,6 @@
 #include "noise/holm.h"
 #include "noise/wavelet_variance.h"
 #include "regimes/motion_regimes.h"
-#include "service/report_values.h"
 
 namespace imuscope {
 
@@ -138,7 +137,7 @@ double percent(double slope) { return 100.0 * std::expm1(slope); }
 
 std::string sentence_of(const std::string& name, const Slope& s, double p_holm) {
   const char* unit = kDriverUnits[s.driver];
-  if (p_holm >= kSignificance) {
+  if (p_holm >= noise::kSignificance) {
     return fmt::format("{} {}: {} {} shows no dependence on the {} (p = {:.2g}, corrected)", name,
                        axis_name(s.axis), s.slope.process, s.slope.name, kDriverNames[s.driver], p_holm);
   }

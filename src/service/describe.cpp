@@ -1,10 +1,11 @@
+#include "service/describe.h"
+
 #include <fmt/format.h>
 #include <cmath>
 
 #include "base/units.h"
 #include "calibration/state_name.h"
 #include "service/estimator_setup.h"
-#include "service/study.h"
 
 namespace imuscope {
 

@@ -9,7 +9,6 @@
 #include "navigation/so3.h"
 #include "report/csv_reader.h"
 #include "service/estimator_setup.h"
-#include "service/study.h"
 
 namespace imuscope {
 namespace {

@@ -6,9 +6,10 @@
 #include <limits>
 #include <map>
 
-#include "service/noise_feedback.h"
+#include "noise/filter_form.h"
+#include "noise/holm.h"
+#include "service/models_file.h"
 #include "service/noise_series.h"
-#include "service/report_values.h"
 
 namespace imuscope {
 namespace {
@@ -20,59 +21,18 @@ double number_or(const json& object, const char* key, double fallback) {
   return found != object.end() && found->is_number() ? found->get<double>() : fallback;
 }
 
-/// Density at low frequencies of a Gauss-Markov process sampled every `period_s`: variance * period *
-/// (1 + phi) / (1 - phi).
-double white_equivalent(double variance, double rate_per_s, double period_s) {
-  return variance * period_s / std::tanh(0.5 * rate_per_s * period_s);
-}
-
-/// Parameters of one process of a fitted model, by name.
-using Parameters = std::map<std::string, double>;
-
-void add_process(const std::string& process, const Parameters& values, double rate_hz, AxisNoise& noise) {
-  const auto value = [&](const char* name) {
-    const auto found = values.find(name);
-    return found == values.end() ? 0.0 : found->second;
-  };
-  const double period_s = 1.0 / rate_hz;
-  if (process == "WN") noise.white_density += value("sigma2") * period_s;
-  if (process == "RW") noise.walk_density += value("gamma2") * rate_hz;
-  if (process == "MA1") noise.white_density += value("sigma2") * std::pow(1.0 + value("theta"), 2) * period_s;
-  if (process == "ARMA11") {
-    noise.white_density +=
-        value("sigma2") * std::pow((1.0 + value("theta")) / (1.0 - value("phi")), 2) * period_s;
-  }
-  if (process.rfind("GM", 0) != 0)
-    return;  // quantisation and vibration lines have nothing at low frequencies
-  const double beta = value("beta");
-  const double variance = value("sigma2");
-  if (!(beta > 0.0) || !(variance > 0.0)) return;
-  if (beta * kFastTau_s >= 1.0 || noise.slow.size() == kSlowMax) {
-    noise.white_density += white_equivalent(variance, beta, period_s);
-  } else {
-    noise.slow.push_back({variance, beta});
-  }
-}
-
-const json* entry_of(const json& models, const std::string& name, std::size_t axis,
-                     const std::string& regime) {
-  for (const json& entry : models) {
-    if (entry.value("name", "") == name && entry.value("axis", "") == axis_name(axis) &&
-        entry.value("regime", "") == regime)
-      return &entry;
-  }
-  return nullptr;
-}
-
-AxisNoise axis_noise(const json& entry) {
-  std::map<std::string, Parameters> processes;
-  for (const json& parameter : entry.at("parameters")) {
-    processes[parameter.at("process").get<std::string>()][parameter.at("name").get<std::string>()] =
-        number_or(parameter, "value", 0.0);
-  }
+AxisNoise axis_noise(const noise::FilterTerms& terms) {
   AxisNoise noise;
-  const double rate_hz = number_or(entry, "rate_hz", 0.0);
-  for (const auto& [process, values] : processes) add_process(process, values, rate_hz, noise);
+  noise.white_density = terms.white_density() + terms.short_memory_density;
+  noise.walk_density = terms.walk_density;
+  for (const auto& process : terms.gauss_markov) {
+    if (!(process.rate_per_s > 0.0) || !(process.variance > 0.0)) continue;
+    if (process.is_fast() || noise.slow.size() == kSlowMax) {
+      noise.white_density += terms.low_frequency_density(process);
+    } else {
+      noise.slow.push_back({process.variance, process.rate_per_s});
+    }
+  }
   return noise;
 }
 
@@ -87,13 +47,12 @@ EvaluationModel of_regime(const json& models, const std::string& name, const std
   model.name = regime;
   model.source = "fitted to the error process of this run";
   for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
-    const json* entry = entry_of(models, name, axis, regime);
-    if (entry == nullptr) {
-      out.absent_because =
-          fmt::format("no model of {} in the regime “{}” in models.json", axis_name(axis), regime);
+    const auto fit = read_model(models, name, axis, regime);
+    if (!fit) {
+      out.absent_because = fit.error().text();
       return out;
     }
-    model.axes[axis] = axis_noise(*entry);
+    model.axes[axis] = axis_noise(noise::filter_terms(*fit));
   }
   out.model = std::move(model);
   return out;
@@ -133,11 +92,11 @@ const json* clearest_dependence(const json& dependence, const std::string& name,
   const auto found = dependence.find("dependences");
   if (found == dependence.end()) return nullptr;
   const json* best = nullptr;
-  double best_p = kSignificance;
+  double best_p = noise::kSignificance;
   for (const json& entry : *found) {
     const double p = number_or(entry, "p_holm", 1.0);
     if (entry.value("name", "") != name || entry.value("axis", "") != axis_name(axis) ||
-        entry.value("process", "") != "WN" || p >= best_p) {
+        entry.value("process", "") != noise::short_name(noise::ProcessKind::kWhiteNoise) || p >= best_p) {
       continue;
     }
     best_p = p;
@@ -148,13 +107,13 @@ const json* clearest_dependence(const json& dependence, const std::string& name,
 
 /// The fast processes beside the white noise keep their share.
 DensityTrack following(const json& found, const json& dependence, const std::string& name, std::size_t axis,
-                       const AxisNoise& dynamic, double dynamic_white_density, double rate_hz) {
+                       const AxisNoise& dynamic, const noise::FilterTerms& terms) {
   DensityTrack track;
   track.driver = found.value("driver", "");
   const double mean = number_or(found, "mean_driver", 0.0);
   const double slope = number_or(found, "slope", 0.0);
-  const double at_mean = number_or(found, "at_mean_driver", 0.0) / rate_hz;
-  const double beside = dynamic.white_density - dynamic_white_density;
+  const double at_mean = number_or(found, "at_mean_driver", 0.0) / terms.rate_hz;
+  const double beside = dynamic.white_density - terms.white_density();
   for (const json& point : dependence.value("points", json::array())) {
     if (point.value("name", "") != name || point.value("axis", "") != axis_name(axis)) continue;
     const double driver = number_or(point.value("driver", json::object()), track.driver.c_str(), NAN);
@@ -167,13 +126,6 @@ DensityTrack following(const json& found, const json& dependence, const std::str
   for (std::size_t i = track.from.size(); i-- > 1;)
     track.from[i].first = 0.5 * (track.from[i].first + track.from[i - 1].first);
   return track;
-}
-
-double white_density_of(const json& entry, double rate_hz) {
-  for (const json& parameter : entry.at("parameters")) {
-    if (parameter.at("process") == "WN") return number_or(parameter, "value", 0.0) / rate_hz;
-  }
-  return 0.0;
 }
 
 /// Every axis's track as one list of changes.
@@ -204,11 +156,9 @@ EvaluationModel by_dynamics(const StudyDrive& drive, const EvaluationModel& at_r
   std::array<DensityTrack, kImuAxes> tracks;
   std::size_t n_following = 0;
   for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
-    const json& entry = *entry_of(models, drive.name, axis, "dynamic");
-    const double rate_hz = number_or(entry, "rate_hz", 0.0);
+    const noise::FilterTerms terms = noise::filter_terms(*read_model(models, drive.name, axis, "dynamic"));
     if (const json* found = clearest_dependence(dependence, drive.name, axis)) {
-      tracks[axis] = following(*found, dependence, drive.name, axis, model.axes[axis],
-                               white_density_of(entry, rate_hz), rate_hz);
+      tracks[axis] = following(*found, dependence, drive.name, axis, model.axes[axis], terms);
     }
     if (!tracks[axis].from.empty()) {
       ++n_following;

@@ -7,34 +7,41 @@
 #include <charconv>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 
+#include "base/units.h"
+#include "publish/message_values.h"
 #include "service/observability.h"
 
 namespace imuscope {
 
 namespace {
 
+constexpr double kPercent = 100.0;
+constexpr double kUsPerS = 1e6;
 constexpr std::string_view kReference = "reference";
 constexpr std::string_view kStudy = "study";
 /// The coarse mounting comes from the rates of both IMUs about more than one axis.
 constexpr const char* kManoeuvreForMounting =
     "turn both ways: figures of eight or roundabouts at 20 to 30 deg/s";
 
-bool streams(const StatusReport::Device& device) { return device.state == "streaming"; }
+std::int64_t as_count(std::uint64_t count) { return static_cast<std::int64_t>(count); }
 
-std::string device_reason(const StatusReport::Device& device) {
+bool streams(const device_status_t& device) { return device.state == "streaming"; }
+
+std::string device_reason(const device_status_t& device) {
   return device.problem.empty() ? fmt::format("{}: {}", device.name, device.state)
                                 : fmt::format("{}: {}: {}", device.name, device.state, device.problem);
 }
 
 /// Something is being lost, though every device streams; empty when nothing is.
-std::string loss_reason(const StatusReport& report) {
-  if (report.capture_lost > 0)
-    return fmt::format("{} records could not be kept in the capture", report.capture_lost);
-  for (const auto& ring : report.rings) {
+std::string loss_reason(const status_t& status) {
+  if (status.capture_lost > 0)
+    return fmt::format("{} records could not be kept in the capture", status.capture_lost);
+  for (const auto& ring : status.rings) {
     if (ring.refused > 0) return fmt::format("the ring '{}' refused {} elements", ring.name, ring.refused);
   }
-  for (const auto& device : report.devices) {
+  for (const auto& device : status.devices) {
     if (device.frames_dropped > 0)
       return fmt::format("{} frames of {} were lost by this PC before they could be read",
                          device.frames_dropped, device.name);
@@ -46,9 +53,9 @@ std::string loss_reason(const StatusReport& report) {
 
 }  // namespace
 
-Health judge(const StatusReport& report) {
-  const auto& devices = report.devices;
-  const auto failed = [](const StatusReport::Device& device) { return device.state == "failed"; };
+Health judge(const status_t& status) {
+  const auto& devices = status.devices;
+  const auto failed = [](const device_status_t& device) { return device.state == "failed"; };
   const auto find = [&](auto condition) { return std::find_if(devices.begin(), devices.end(), condition); };
 
   if (const auto reference = find([&](const auto& d) { return d.role == kReference && failed(d); });
@@ -59,15 +66,15 @@ Health judge(const StatusReport& report) {
                                      [&](const auto& d) { return d.role == kStudy && !failed(d); });
   if (!any_study && !devices.empty()) return {"failed", "no IMU under study can be set up"};
 
-  const bool calibrating = std::any_of(report.studies.begin(), report.studies.end(), [](const auto& study) {
+  const bool calibrating = std::any_of(status.studies.begin(), status.studies.end(), [](const auto& study) {
     return study.state == name_of(StudyStatus::kConverging) ||
            study.state == name_of(StudyStatus::kCalibrated);
   });
   if (const auto silent = find([](const auto& d) { return !streams(d); }); silent != devices.end()) {
     return {calibrating || failed(*silent) ? "degraded" : "starting", device_reason(*silent)};
   }
-  if (auto loss = loss_reason(report); !loss.empty()) return {"degraded", std::move(loss)};
-  if (!report.problems.empty()) return {"degraded", report.problems.front()};
+  if (auto loss = loss_reason(status); !loss.empty()) return {"degraded", std::move(loss)};
+  if (!status.problems.empty()) return {"degraded", status.problems.front()};
   if (!calibrating) return {"aligning", "waiting for motion that shows how the S-IMUs sit"};
   return {"running", "all devices stream"};
 }
@@ -86,41 +93,96 @@ const char* name_of(StudyStatus status) {
   return "calibrated";
 }
 
-StatusReport::Study study_status(const std::string& name, const StudyOutput& study,
-                                 const StudyConfig& config) {
+study_status_t study_status(const std::string& name, const StudyOutput& study, const StudyConfig& config) {
   const auto largest = [](const Vector3& sd) { return *std::max_element(sd.begin(), sd.end()); };
-  StatusReport::Study status;
+  study_status_t status{};
   status.name = name;
   status.state = name_of(study.status);
   status.regime = regime_name(study.regime);
-  status.goal_psi_rad = config.goal_boresight_sd_rad;
+  status.goal_psi_deg = config.goal_boresight_sd_rad * kDegPerRad;
   status.goal_r_m = config.goal_r_bs_b_sd_m;
-  status.goal_t_d_s = config.goal_t_d_sd_s;
-  status.samples = study.counters.samples;
-  status.used = study.counters.used;
-  status.late = study.counters.late;
+  status.goal_t_d_ms = config.goal_t_d_sd_s * kMsPerS;
+  status.samples = as_count(study.counters.samples);
+  status.used = as_count(study.counters.used);
+  status.late = as_count(study.counters.late);
   for (std::size_t i = 0; i < 3; ++i)
-    status.gated += study.counters.gated_gyro[i] + study.counters.gated_accel[i];
+    status.gated += as_count(study.counters.gated_gyro[i] + study.counters.gated_accel[i]);
   const bool has_estimate =
       study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
   if (!has_estimate) {
+    for (double* unknown : {&status.sd_psi_deg, &status.sd_r_m, &status.sd_t_d_ms, &status.weakest_relative})
+      *unknown = kUnknown;
     status.manoeuvre = kManoeuvreForMounting;
     return status;
   }
   const auto observability = observability_of(study);
-  status.sd_psi_rad = largest(study.sd_psi_rad);
+  status.sd_psi_deg = largest(study.sd_psi_rad) * kDegPerRad;
   status.sd_r_m = largest(study.sd_r_bs_b_m);
-  status.sd_t_d_s = study.sd_t_d_s;
+  status.sd_t_d_ms = study.sd_t_d_s * kMsPerS;
   status.weakest = observability.weakest;
   status.weakest_relative = observability.weakest_relative_sd;
   status.manoeuvre = observability.advice;
   return status;
 }
 
-StatusReport::Quantiles quantiles_of(const LatenessHistogram& histogram) {
-  if (histogram.count() == 0) return {};
-  return {to_seconds(histogram.quantile(0.5)), to_seconds(histogram.quantile(0.99)),
-          to_seconds(histogram.quantile(0.999)), to_seconds(histogram.max())};
+status_t status_of(const Configuration& configuration, const std::string& version) {
+  status_t status{};
+  status.run = configuration.run_name;
+  status.version = version;
+  status.build = fmt::format("g++ {}", __VERSION__);
+  status.configuration_hash = configuration.sha256;
+  status.refit_duration_s = kUnknown;
+  for (const DeviceConfig& device : configuration.devices) {
+    device_status_t entry{};
+    entry.name = device.name;
+    entry.role = name_of(device.role);
+    entry.protocol = name_of(device.protocol);
+    entry.latency_ms = entry.clock_drift_ppm = entry.clock_sd_us = kUnknown;
+    status.devices.push_back(std::move(entry));
+  }
+  return status;
+}
+
+void count_elements(status_t& status) {
+  status.n_devices = element_count(status.devices);
+  status.n_studies = element_count(status.studies);
+  for (thread_status_t& thread : status.threads) thread.n_octaves = element_count(thread.lateness_octaves);
+  status.n_threads = element_count(status.threads);
+  status.n_rings = element_count(status.rings);
+  status.n_problems = element_count(status.problems);
+}
+
+namespace {
+
+/// Median, 99 %, 99.9 % and the worst since the start, after `offset`; NaN where nothing was counted.
+std::array<double, 4> quantiles_us(const LatenessHistogram& histogram, Duration offset) {
+  constexpr std::array kShares{0.5, 0.99, 0.999};
+  std::array<double, 4> quantiles{kUnknown, kUnknown, kUnknown, kUnknown};
+  if (histogram.count() == 0) return quantiles;
+  const auto us = [&](Duration late) { return to_seconds(late + offset) * kUsPerS; };
+  for (std::size_t i = 0; i < kShares.size(); ++i) quantiles[i] = us(histogram.quantile(kShares[i]));
+  quantiles.back() = us(histogram.max());
+  return quantiles;
+}
+
+}  // namespace
+
+void set_beat(const PeriodicStatistics& beat, Duration before_deadline, thread_status_t& thread) {
+  thread.ticks = as_count(beat.ticks);
+  thread.overruns = as_count(beat.overruns);
+  thread.skipped = as_count(beat.skipped);
+  const auto lateness = quantiles_us(beat.lateness, Duration::zero());
+  const auto done = quantiles_us(beat.done, before_deadline);
+  thread.lateness_p50_us = lateness[0];
+  thread.lateness_p99_us = lateness[1];
+  thread.lateness_p999_us = lateness[2];
+  thread.lateness_max_us = lateness[3];
+  thread.done_p50_us = done[0];
+  thread.done_p99_us = done[1];
+  thread.done_p999_us = done[2];
+  thread.done_max_us = done[3];
+  const auto octaves = beat.lateness.octaves();
+  thread.lateness_octaves.assign(octaves.begin(), octaves.end());
 }
 
 namespace {
@@ -141,15 +203,18 @@ std::string scheduling_of(int thread) {
 
 }  // namespace
 
-std::vector<StatusReport::Thread> ThreadWatch::look(HostTime now) {
-  std::map<int, StatusReport::Thread> threads;
+std::vector<thread_status_t> ThreadWatch::look(HostTime now) {
+  std::map<int, thread_status_t> threads;
   std::map<int, Duration> cpu;
   std::error_code vanished;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task", vanished)) {
     const std::string id_text = entry.path().filename().string();
     int id = 0;
     std::from_chars(id_text.data(), id_text.data() + id_text.size(), id);
-    StatusReport::Thread thread;
+    thread_status_t thread{};
+    set_beat({}, Duration::zero(), thread);
+    thread.lateness_octaves.clear();
+    thread.cpu_percent = kUnknown;
     std::ifstream(entry.path() / "comm") >> thread.name;
     std::int64_t ran_ns = 0;
     std::ifstream(entry.path() / "schedstat") >> ran_ns;
@@ -157,12 +222,12 @@ std::vector<StatusReport::Thread> ThreadWatch::look(HostTime now) {
     cpu[id] = Duration{ran_ns};
     const auto before = cpu_.find(id);
     if (before != cpu_.end() && now > last_)
-      thread.cpu_share = to_seconds(cpu[id] - before->second) / to_seconds(now - last_);
+      thread.cpu_percent = kPercent * to_seconds(cpu[id] - before->second) / to_seconds(now - last_);
     threads[id] = std::move(thread);
   }
   cpu_ = std::move(cpu);
   last_ = now;
-  std::vector<StatusReport::Thread> list;
+  std::vector<thread_status_t> list;
   for (auto& [id, thread] : threads) list.push_back(std::move(thread));
   return list;
 }

@@ -2,13 +2,14 @@
 
 /// The health of a live run in words and numbers: what STATUS carries beyond plain counts. Soft world.
 
+#include <imuscope/status_t.hpp>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "calibration/estimator_config.h"
-#include "publish/reports.h"
 #include "rt/periodic.h"
+#include "service/config.h"
 #include "service/core.h"
 
 namespace imuscope {
@@ -19,25 +20,33 @@ struct Health {
   std::string reason;
 };
 
-/// Judges a report whose devices, studies, threads, rings, problems and capture are filled in. The worst
+/// Judges a status whose devices, studies, threads, rings, problems and capture are filled in. The worst
 /// thing wins: failed (nothing can come of this run as it stands), then starting, degraded (results are less
 /// than they could be, or are being lost), aligning, running.
-[[nodiscard]] Health judge(const StatusReport& report);
+[[nodiscard]] Health judge(const status_t& status);
 
 /// Calibration of one S-IMU in a word.
 [[nodiscard]] const char* name_of(StudyStatus status);
 
-/// Calibration of one S-IMU beside its goals.
-[[nodiscard]] StatusReport::Study study_status(const std::string& name, const StudyOutput& study,
-                                               const StudyConfig& config);
+/// What is known of a run before anything happens: its names, and its devices with nothing but theirs.
+[[nodiscard]] status_t status_of(const Configuration& configuration, const std::string& version);
 
-[[nodiscard]] StatusReport::Quantiles quantiles_of(const LatenessHistogram& histogram);
+/// Calibration of one S-IMU beside its goals.
+[[nodiscard]] study_status_t study_status(const std::string& name, const StudyOutput& study,
+                                          const StudyConfig& config);
+
+/// Ticks and lateness of a thread with deadlines.
+/// @param before_deadline  from the instant that its work is of to its deadline
+void set_beat(const PeriodicStatistics& beat, Duration before_deadline, thread_status_t& thread);
+
+/// Every array of a status has a field that counts it.
+void count_elements(status_t& status);
 
 /// Scheduling and processor time of every thread of this process, as the kernel has them.
 class ThreadWatch {
  public:
-  /// @return one entry a thread, in the order of their start; ticks and lateness are left empty
-  [[nodiscard]] std::vector<StatusReport::Thread> look(HostTime now);
+  /// @return one entry a thread, in the order of their start; ticks are zero and lateness is unknown
+  [[nodiscard]] std::vector<thread_status_t> look(HostTime now);
 
  private:
   std::map<int, Duration> cpu_;  ///< by thread id, at the last look

@@ -24,7 +24,6 @@
 #include "service/new_folder.h"
 #include "service/pulse.h"
 #include "service/reload.h"
-#include "service/study.h"
 #include "service/systemd_notify.h"
 
 namespace imuscope {

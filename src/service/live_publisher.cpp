@@ -6,14 +6,16 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
+#include <imuscope/event_t.hpp>
 #include <utility>
 
-#include "publish/message_builders.h"
+#include "base/units.h"
 #include "publish/message_codec.h"
 #include "rt/host_clock.h"
+#include "service/describe.h"
 #include "service/estimator_setup.h"
 #include "service/noise_feedback.h"
-#include "service/study.h"
+#include "service/run_record.h"
 
 namespace imuscope {
 
@@ -48,10 +50,21 @@ std::uint64_t resident_memory_bytes() {
   return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
+std::int64_t as_count(std::uint64_t count) { return static_cast<std::int64_t>(count); }
+
+ring_status_t ring_status(const char* name, std::size_t capacity, const RingCounters& counters) {
+  ring_status_t status{};
+  status.name = name;
+  status.capacity = as_count(capacity);
+  status.level = as_count(counters.level);
+  status.high_water = as_count(counters.high_water);
+  status.refused = as_count(counters.refused);
+  return status;
+}
+
 template <typename Ring>
-StatusReport::Ring ring_status(const char* name, const Ring& ring) {
-  const auto counters = ring.counters();
-  return {name, Ring::capacity(), counters.level, counters.high_water, counters.refused};
+ring_status_t ring_status(const char* name, const Ring& ring) {
+  return ring_status(name, Ring::capacity(), ring.counters());
 }
 
 }  // namespace
@@ -322,16 +335,18 @@ void LivePublisher::on_refit(const Refit& refit) {
   // At each refit, not only at the end: a run that is killed leaves its newest models.
   if (auto written = models_.write(options_.out); !written) spdlog::error("{}", written.error().text());
   if (tunables_.noise.apply_to_filter) {
-    if (const auto accepted = feedback_[refit.study].consider(refit.noise_model, refit.samples))
+    if (const auto accepted = feedback_[refit.study].consider(refit))
       estimator_.offer_noise(refit.study, *accepted);
   }
   broadcast_.on_refit(refit);
-  spdlog::info("{}: noise models fitted anew ({} of them, {:.0f} ms)", refit.noise_model.name,
-               refit.noise_model.models.size(), refit.duration_s * 1e3);
-  for (const auto& model : refit.noise_model.models) {
-    if (!model.changed) continue;
-    spdlog::warn("{}: {} ({}) behaves differently since the last refit (p = {:.1g})", refit.noise_model.name,
-                 model.axis, model.regime, model.change_p_value);
+  const auto n_fits = std::count_if(refit.axes.begin(), refit.axes.end(),
+                                    [](const AxisRefit& axis) { return axis.fit.has_value(); });
+  spdlog::info("{}: noise models fitted anew ({} of them, {:.0f} ms)", refit.name, n_fits,
+               refit.duration_s * 1e3);
+  for (const AxisRefit& axis : refit.axes) {
+    if (!axis.fit || !axis.changed) continue;
+    spdlog::warn("{}: {} ({}) behaves differently since the last refit (p = {:.1g})", refit.name,
+                 axis_name(axis.axis), regime_name(axis.regime), axis.change->p_value);
   }
 }
 
@@ -354,115 +369,95 @@ void LivePublisher::watch_devices(HostTime now) {
   }
 }
 
-StatusReport::Device LivePublisher::device_status(std::size_t index) const {
-  const auto& device = configuration_.devices[index];
-  const auto& status = lines_[index];
-  StatusReport::Device report;
-  report.name = device.name;
-  report.role = name_of(device.role);
-  report.protocol = name_of(device.protocol);
-  report.state = state_name(status);
-  report.problem = watches_[index].problem;
-  report.rate_hz = watches_[index].rate_hz;
-  report.bytes = status.counters.bytes;
-  report.bytes_skipped = status.counters.bytes_skipped;
-  report.frames = status.counters.frames;
-  report.frames_dropped = status.frames_dropped;
-  report.bad_checksums = status.counters.bad_checksums;
-  report.samples = status.counters.samples;
-  report.samples_lost = status.counters.samples_lost;
-  report.samples_refused = status.refused;
-  report.clock_resets = status.counters.clock_resets;
-  if (status.counters.samples > 0) {
-    report.latency_s = status.latency_s;
-    report.clock_sd_s = status.clock_sd_s;
-    report.clock_drift_ppm = status.clock_drift_ppm;
+void LivePublisher::fill_device(std::size_t index, device_status_t& device) const {
+  const auto& line = lines_[index];
+  device.state = state_name(line);
+  device.problem = watches_[index].problem;
+  device.rate_hz = watches_[index].rate_hz;
+  device.bytes = as_count(line.counters.bytes);
+  device.bytes_skipped = as_count(line.counters.bytes_skipped);
+  device.frames = as_count(line.counters.frames);
+  device.frames_dropped = as_count(line.frames_dropped);
+  device.bad_checksums = as_count(line.counters.bad_checksums);
+  device.samples = as_count(line.counters.samples);
+  device.samples_lost = as_count(line.counters.samples_lost);
+  device.samples_refused = as_count(line.refused);
+  device.clock_resets = as_count(line.counters.clock_resets);
+  if (line.counters.samples > 0) {
+    constexpr double kUsPerS = 1e6;
+    device.latency_ms = line.latency_s * kMsPerS;
+    device.clock_sd_us = line.clock_sd_s * kUsPerS;
+    device.clock_drift_ppm = line.clock_drift_ppm;
   }
   const auto study = std::find(study_devices_.begin(), study_devices_.end(), index);
   if (last_ && study != study_devices_.end()) {
-    report.samples_late =
-        last_->studies[static_cast<std::size_t>(study - study_devices_.begin())].counters.late;
+    device.samples_late =
+        as_count(last_->studies[static_cast<std::size_t>(study - study_devices_.begin())].counters.late);
   }
-  return report;
 }
 
 /// The beats of the threads that have one, by the threads' names.
-void LivePublisher::add_threads(StatusReport& report, HostTime now) {
-  report.threads = threads_.look(now);
+void LivePublisher::add_threads(status_t& status, HostTime now) {
+  status.threads = threads_.look(now);
   const auto add_beat = [&](std::string_view name, const PeriodicStatistics& beat, Duration before_deadline) {
-    const auto found = std::find_if(report.threads.begin(), report.threads.end(),
+    const auto found = std::find_if(status.threads.begin(), status.threads.end(),
                                     [&](const auto& thread) { return thread.name == name; });
-    if (found == report.threads.end()) return;
-    found->ticks = beat.ticks;
-    found->overruns = beat.overruns;
-    found->skipped = beat.skipped;
-    found->lateness = quantiles_of(beat.lateness);
-    found->done = quantiles_of(beat.done);
-    for (double* time_s : {&found->done.p50_s, &found->done.p99_s, &found->done.p999_s, &found->done.max_s})
-      *time_s += to_seconds(before_deadline);
-    const auto octaves = beat.lateness.octaves();
-    found->lateness_octaves.assign(octaves.begin(), octaves.end());
+    if (found != status.threads.end()) set_beat(beat, before_deadline, *found);
   };
   add_beat(kEstimatorThreadName, estimator_.statistics(), CoreThread::kGuard);
   add_beat(kIoThreadName, io_.statistics(), Duration::zero());
   add_beat(kPublisherThreadName, beat_, Duration::zero());
 }
 
-void LivePublisher::add_rings(StatusReport& report) {
+void LivePublisher::add_rings(status_t& status) {
   auto& rings = estimator_.rings();
-  report.rings.push_back(ring_status("errors", rings.errors));
-  report.rings.push_back(ring_status("snapshots", rings.snapshots));
-  report.rings.push_back(ring_status("events", rings.events));
-  report.rings.push_back(ring_status("applied models", rings.noises));
-  report.rings.push_back(ring_status("exceptions", rings.exceptions));
-  report.rings.push_back(ring_status("raw bytes", io_.raw_ring()));
-  const auto rows = modeller_.rows();
-  report.rings.push_back({"modeller", Modeller::row_capacity(), rows.level, rows.high_water, rows.refused});
+  status.rings.push_back(ring_status("errors", rings.errors));
+  status.rings.push_back(ring_status("snapshots", rings.snapshots));
+  status.rings.push_back(ring_status("events", rings.events));
+  status.rings.push_back(ring_status("applied models", rings.noises));
+  status.rings.push_back(ring_status("exceptions", rings.exceptions));
+  status.rings.push_back(ring_status("raw bytes", io_.raw_ring()));
+  status.rings.push_back(ring_status("modeller", Modeller::row_capacity(), modeller_.rows()));
 }
 
-StatusReport LivePublisher::status(HostTime now) {
-  StatusReport report;
-  report.utc = broadcast_.anchor().at(now);
-  report.run = configuration_.run_name;
-  report.version = options_.version;
-  report.build = fmt::format("g++ {}", __VERSION__);
-  report.configuration_hash = configuration_.sha256;
-  report.uptime_s = to_seconds(now - started_);
-  report.tick = estimator_.last_tick();
-  report.refits = refits_;
-  report.refit_duration_s = refit_duration_s_;
-  report.refit_utc = refit_utc_;
-  report.resident_memory_bytes = resident_memory_bytes();
-  report.last_event = last_event_;
+status_t LivePublisher::status(HostTime now) {
+  constexpr double kBytesPerMb = 1e6;
+  status_t status = status_of(configuration_, options_.version);
+  status.utime = to_utime(broadcast_.anchor().at(now));
+  status.uptime_s = to_seconds(now - started_);
+  status.tick = estimator_.last_tick();
+  status.refits = refits_;
+  status.refit_duration_s = refit_duration_s_;
+  status.refit_utime = refit_utc_ ? to_utime(*refit_utc_) : 0;
+  status.resident_memory_mb = static_cast<double>(resident_memory_bytes()) / kBytesPerMb;
+  status.last_event = last_event_;
   if (recorder_ != nullptr) {
     const auto recorded = recorder_->status();
-    report.capture_path = recorded.path.string();
-    report.capture_bytes = recorded.bytes;
-    report.capture_lost = recorded.records_lost + recorded.messages_lost + io_.raw_ring().counters().refused;
-    if (recorded.problem) report.problems.push_back(recorded.problem->text());
+    status.capture_path = recorded.path.string();
+    status.capture_bytes = as_count(recorded.bytes);
+    status.capture_lost =
+        as_count(recorded.records_lost + recorded.messages_lost + io_.raw_ring().counters().refused);
+    if (recorded.problem) status.problems.push_back(recorded.problem->text());
   }
-  for (std::size_t i = 0; i < lines_.size(); ++i) report.devices.push_back(device_status(i));
+  for (std::size_t i = 0; i < lines_.size(); ++i) fill_device(i, status.devices[i]);
   for (std::size_t i = 0; i < study_devices_.size(); ++i) {
-    report.studies.push_back(study_status(configuration_.devices[study_devices_[i]].name,
+    status.studies.push_back(study_status(configuration_.devices[study_devices_[i]].name,
                                           last_ ? last_->studies[i] : StudyOutput{},
                                           estimator_config_.studies[i]));
   }
-  add_threads(report, now);
-  add_rings(report);
-  for (auto& sentence : standing_threads(pulses(), now)) report.problems.push_back(std::move(sentence));
-  if (!bus_problem_.empty()) report.problems.push_back(bus_problem_);
+  add_threads(status, now);
+  add_rings(status);
+  for (auto& sentence : standing_threads(pulses(), now)) status.problems.push_back(std::move(sentence));
+  if (!bus_problem_.empty()) status.problems.push_back(bus_problem_);
   const std::lock_guard lock(shared_mutex_);
-  report.problems.insert(report.problems.end(), refusals_.begin(), refusals_.end());
-  health_ = judge(report);
-  report.state = health_.state;
-  report.reason = health_.reason;
-  return report;
+  status.problems.insert(status.problems.end(), refusals_.begin(), refusals_.end());
+  health_ = judge(status);
+  status.state = health_.state;
+  status.reason = health_.reason;
+  return status;
 }
 
-void LivePublisher::publish_status(HostTime now) {
-  const auto report = status(now);
-  broadcast_.publish(report);
-}
+void LivePublisher::publish_status(HostTime now) { broadcast_.on_status(status(now)); }
 
 Result<void> LivePublisher::finish(std::int64_t last_tick) {
   running_.store(false, std::memory_order_release);
@@ -478,16 +473,17 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
     if (auto closed = smoothing_->close(); !closed) return closed;
   }
 
-  Recording recording;
-  recording.inputs = {"live"};
-  recording.clocks.resize(lines_.size());
-  ReplayResult result;
-  result.ticks = last_tick + 1;
-  for (const auto& line : lines_)
-    result.devices.push_back({line.counters, line.refused, line.frames_dropped, line.problem.data()});
-  RunDescription run{options_.version,          &configuration_,   &recording, &result,
-                     last_ ? &*last_ : nullptr, folder_->events(), {}};
-  return write_json(options_.out / "run.json", run_json(run));
+  RunRecord run{configuration_, options_.version,          {"live"},         {},
+                last_tick + 1,  last_ ? &*last_ : nullptr, folder_->events()};
+  for (const auto& line : lines_) {
+    DeviceRecord device;
+    device.counters = line.counters;
+    device.refused = line.refused;
+    device.frames_dropped = line.frames_dropped;
+    device.problem = line.problem.data();
+    run.devices.push_back(std::move(device));
+  }
+  return write_run_record(options_.out, run);
 }
 
 }  // namespace imuscope

@@ -12,6 +12,7 @@
 
 #include "capture/recorder.h"
 #include "publish/lcm_listener.h"
+#include "publish/message_values.h"
 #include "service/broadcast.h"
 #include "service/can_watch.h"
 #include "service/config.h"
@@ -26,7 +27,6 @@
 #include "service/observability.h"
 #include "service/pulse.h"
 #include "service/reload.h"
-#include "service/report_values.h"
 #include "service/run_folder.h"
 
 namespace imuscope {
@@ -78,10 +78,10 @@ class LivePublisher {
   void watch_devices(HostTime now);
   void publish_status(HostTime now);
   [[nodiscard]] std::string problem_of(std::size_t device, HostTime now);
-  [[nodiscard]] StatusReport status(HostTime now);
-  [[nodiscard]] StatusReport::Device device_status(std::size_t index) const;
-  void add_threads(StatusReport& report, HostTime now);
-  void add_rings(StatusReport& report);
+  [[nodiscard]] status_t status(HostTime now);
+  void fill_device(std::size_t index, device_status_t& device) const;
+  void add_threads(status_t& status, HostTime now);
+  void add_rings(status_t& status);
 
   const Configuration& configuration_;
   LiveOptions options_;
@@ -116,7 +116,7 @@ class LivePublisher {
   std::vector<std::string> line_problems_;
   std::vector<StudyStatus> study_states_;
   std::vector<ObservabilityWatch> observability_;
-  std::uint64_t refits_ = 0;
+  std::int64_t refits_ = 0;
   NewestModels models_;
   double refit_duration_s_ = kUnknown;
   std::optional<UtcTime> refit_utc_;

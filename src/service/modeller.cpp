@@ -7,8 +7,7 @@
 #include "noise/fit.h"
 #include "noise/replicates.h"
 #include "rt/host_clock.h"
-#include "service/report_values.h"
-#include "service/run_folder.h"
+#include "service/models_file.h"
 
 namespace imuscope {
 
@@ -20,6 +19,13 @@ constexpr auto kIdleSleep = std::chrono::milliseconds(200);
 constexpr std::uint64_t kBlocksBehind = 128;
 
 }  // namespace
+
+void NewestModels::take(const Refit& refit) {
+  nlohmann::json& models = models_[refit.study] = nlohmann::json::array();
+  for (const AxisRefit& axis : refit.axes) {
+    if (axis.fit) models.push_back(model_json(*axis.fit, refit.name, axis.axis, regime_name(axis.regime)));
+  }
+}
 
 Result<void> NewestModels::write(const std::filesystem::path& folder) const {
   if (models_.empty()) return {};
@@ -81,36 +87,30 @@ void ModelBook::add(const ErrorRecord& record) {
   ++study.samples_since_refit;
 }
 
-void ModelBook::refit_track(const Study& study, Track& track, std::size_t axis, Regime regime,
-                            Refit& refit) const {
+std::optional<AxisRefit> ModelBook::refit_track(double rate_hz, Track& track, std::size_t axis,
+                                                Regime regime) const {
+  AxisRefit out;
+  out.axis = axis;
+  out.regime = regime;
+  out.rate_hz = rate_hz;
   noise::WvSums window;
   window.levels.resize(static_cast<std::size_t>(noise::StreamingOptions{}.levels));
   track.recent.take(window);
-  noise::JTest change{kUnknown, 0, kUnknown};
-  if (track.fit) {
-    if (const auto distance = noise::distance_from_model(window.wavelet_variance(), *track.fit))
-      change = *distance;
-  }
-  const bool changed = change.p_value < kChangeLevel;
+  if (track.fit) out.change = noise::distance_from_model(window.wavelet_variance(), *track.fit);
+  out.changed = out.change && out.change->p_value < kChangeLevel;
   track.before.merge(window);
-  const auto wv = track.before.wavelet_variance();
-  if (wv.levels.empty()) return;  // a regime that has not been met yet has no model
-  refit.wavelet_variance.axes.push_back(axis_wavelet_variance(wv, axis, regime, study.rate_hz));
-  const bool search = !track.fit || changed || wv.n_samples >= 2 * track.searched_at;
+  out.wv = track.before.wavelet_variance();
+  if (out.wv.levels.empty()) return std::nullopt;
+  const bool search = !track.fit || out.changed || out.wv.n_samples >= 2 * track.searched_at;
   noise::FitOptions options;
   options.signal_unit = axis_unit(axis);
   options.warm_start = search ? nullptr : &*track.fit;
-  auto fitted = noise::fit(wv, spec_, study.rate_hz, options);
-  if (!fitted) return;
-  if (search) track.searched_at = wv.n_samples;
+  auto fitted = noise::fit(out.wv, spec_, rate_hz, options);
+  if (!fitted) return out;
+  if (search) track.searched_at = out.wv.n_samples;
   track.fit = std::move(*fitted);
-  auto model = axis_noise_model(*track.fit, axis, regime);
-  model.change_statistic = change.statistic;
-  model.change_dof = change.dof > 0 ? change.dof : kUnknown;
-  model.change_p_value = change.p_value;
-  model.changed = changed;
-  refit.noise_model.models.push_back(std::move(model));
-  refit.models.push_back(model_json(*track.fit, study.name, axis, regime_name(regime)));
+  out.fit = track.fit;
+  return out;
 }
 
 Refit ModelBook::fit(std::size_t index) {
@@ -118,16 +118,16 @@ Refit ModelBook::fit(std::size_t index) {
   const HostTime started = host_now();
   Refit refit;
   refit.study = index;
+  refit.name = study.name;
   refit.time = study.last_time;
   refit.first_reference_time = study.first_reference_time;
-  refit.dynamics = study.motion.report();
+  refit.motion = study.motion.message();
   refit.samples = study.samples;
-  refit.dynamics.name = study.name;
-  refit.wavelet_variance.name = study.name;
-  refit.noise_model.name = study.name;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {
-      refit_track(study, study.tracks[axis][static_cast<std::size_t>(regime)], axis, regime, refit);
+      auto& track = study.tracks[axis][static_cast<std::size_t>(regime)];
+      if (auto refitted = refit_track(study.rate_hz, track, axis, regime))
+        refit.axes.push_back(std::move(*refitted));
     }
   }
   refit.duration_s = to_seconds(host_now() - started);

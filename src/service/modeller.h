@@ -15,7 +15,6 @@
 
 #include "noise/fit.h"
 #include "noise/streaming_wv.h"
-#include "publish/reports.h"
 #include "rt/heartbeat.h"
 #include "rt/host_clock.h"
 #include "rt/spsc_ring.h"
@@ -24,31 +23,19 @@
 #include "service/core.h"
 #include "service/motion_book.h"
 #include "service/noise_series.h"
+#include "service/refit.h"
 
 namespace imuscope {
-
-/// Wavelet variances and models of one S-IMU after a refit.
-struct Refit {
-  std::size_t study = 0;
-  HostTime time{};  ///< of the last sample used
-  HostTime first_reference_time{};
-  WaveletVarianceReport wavelet_variance;
-  NoiseModelReport noise_model;
-  DynamicsReport dynamics;
-  nlohmann::json models = nlohmann::json::array();  ///< entries of models.json
-  std::int64_t samples = 0;                         ///< of the error process so far
-  double duration_s = 0.0;
-};
 
 /// What the refits of a run say last, S-IMU by S-IMU.
 class NewestModels {
  public:
-  void take(const Refit& refit) { models_[refit.study] = refit.models; }
+  void take(const Refit& refit);
   /// Writes models.json, if there was a refit.
   [[nodiscard]] Result<void> write(const std::filesystem::path& folder) const;
 
  private:
-  std::map<std::size_t, nlohmann::json> models_;
+  std::map<std::size_t, nlohmann::json> models_;  ///< entries of models.json
 };
 
 /// The statistics alone, without the thread: rows in, refits out by sample count. Memory is bounded: one
@@ -99,7 +86,9 @@ class ModelBook {
   void set_refit_interval(double interval_s);
   static void push(Study& study, const ErrorRow& row);
   [[nodiscard]] Refit fit(std::size_t index);
-  void refit_track(const Study& study, Track& track, std::size_t axis, Regime regime, Refit& refit) const;
+  /// Absent where the regime has not been met yet: it has no model.
+  [[nodiscard]] std::optional<AxisRefit> refit_track(double rate_hz, Track& track, std::size_t axis,
+                                                     Regime regime) const;
 
   std::vector<Study> studies_;
   noise::ModelSpec spec_;

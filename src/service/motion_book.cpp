@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "publish/message_values.h"
 
 namespace imuscope {
 
@@ -17,19 +20,22 @@ void MotionSums::add(double prediction, double error) noexcept {
   largest_p_ = std::max(largest_p_, std::abs(prediction));
 }
 
-AxisMotion MotionSums::report() const {
-  AxisMotion report;
-  if (n_ == 0.0) return report;
-  report.mean = mean_p_;
-  report.rms = std::sqrt(sum_pp_ / n_);
-  report.largest = largest_p_;
+axis_dynamics_t MotionSums::message() const {
+  axis_dynamics_t message{};
+  for (double* unknown : {&message.mean, &message.rms, &message.largest, &message.slope, &message.slope_sd,
+                          &message.correlation, &message.r2, &message.f, &message.p_value})
+    *unknown = kUnknown;
+  if (n_ == 0.0) return message;
+  message.mean = mean_p_;
+  message.rms = std::sqrt(sum_pp_ / n_);
+  message.largest = largest_p_;
   constexpr double kParameters = 2.0;  // slope and constant
-  if (n_ <= kParameters || sum_pp_ <= 0.0) return report;
-  report.slope = sum_pe_ / sum_pp_;
-  const double residual = std::max(0.0, sum_ee_ - report.slope * sum_pe_);
-  report.slope_sd = std::sqrt(residual / (n_ - kParameters) / sum_pp_);
-  if (sum_ee_ > 0.0) report.correlation = sum_pe_ / std::sqrt(sum_pp_ * sum_ee_);
-  return report;
+  if (n_ <= kParameters || sum_pp_ <= 0.0) return message;
+  message.slope = sum_pe_ / sum_pp_;
+  const double residual = std::max(0.0, sum_ee_ - message.slope * sum_pe_);
+  message.slope_sd = std::sqrt(residual / (n_ - kParameters) / sum_pp_);
+  if (sum_ee_ > 0.0) message.correlation = sum_pe_ / std::sqrt(sum_pp_ * sum_ee_);
+  return message;
 }
 
 MotionBook::MotionBook() : regressions_(kAxisCount, RegressionSums(1, kCovariates)) {}
@@ -55,27 +61,35 @@ void MotionBook::add_to_regression(const ErrorRow& row) {
   for (std::size_t i = 0; i < kCovariates; ++i) covariates_[i].add(x[i], 0.0);
 }
 
-DynamicsReport MotionBook::report() const {
-  DynamicsReport report;
-  report.n_static = rows_[static_cast<std::size_t>(Regime::kStatic)];
-  report.n_dynamic = rows_[static_cast<std::size_t>(Regime::kDynamic)];
+dynamics_t MotionBook::message() const {
+  dynamics_t message{};
+  message.n_static = rows_[static_cast<std::size_t>(Regime::kStatic)];
+  message.n_dynamic = rows_[static_cast<std::size_t>(Regime::kDynamic)];
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    report.axes.push_back(axes_[axis].report());
-    report.axes.back().axis = axis_name(axis);
-    report.axes.back().unit = axis_unit(axis);
+    axis_dynamics_t motion = axes_[axis].message();
+    motion.axis = axis_name(axis);
+    motion.unit = axis_unit(axis);
     if (const auto regression = regressions_[axis].solve()) {
-      report.axes.back().r2 = regression->r2;
-      report.axes.back().f = regression->f;
-      report.axes.back().p_value = regression->p_value;
+      motion.r2 = regression->r2;
+      motion.f = regression->f;
+      motion.p_value = regression->p_value;
     }
+    message.axes.push_back(std::move(motion));
   }
-  if (report.n_dynamic == 0) return report;
+  message.n_axes = element_count(message.axes);
+  if (message.n_dynamic == 0) return message;
   for (std::size_t i = 0; i < kCovariates; ++i) {
-    const AxisMotion motion = covariates_[i].report();
-    report.covariates.push_back({std::string(covariate_name(i)), std::string(covariate_unit(i)), motion.mean,
-                                 motion.rms, motion.largest});
+    const axis_dynamics_t motion = covariates_[i].message();
+    covariate_motion_t covariate{};
+    covariate.name = covariate_name(i);
+    covariate.unit = covariate_unit(i);
+    covariate.mean = motion.mean;
+    covariate.rms = motion.rms;
+    covariate.largest = motion.largest;
+    message.covariates.push_back(std::move(covariate));
   }
-  return report;
+  message.n_covariates = element_count(message.covariates);
+  return message;
 }
 
 }  // namespace imuscope

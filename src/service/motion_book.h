@@ -4,12 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <imuscope/dynamics_t.hpp>
 #include <vector>
 
 #include "dynamics/covariates.h"
 #include "dynamics/regression.h"
 #include "error_process/error_row.h"
-#include "publish/reports.h"
 #include "service/noise_series.h"
 
 namespace imuscope {
@@ -19,8 +19,9 @@ namespace imuscope {
 class MotionSums {
  public:
   void add(double prediction, double error) noexcept;
-  /// Slope of e on p, least squares with a constant; its sd as for white errors.
-  [[nodiscard]] AxisMotion report() const;
+  /// Slope of e on p, least squares with a constant; its sd as for white errors. NaN where unknown; axis
+  /// and unit are left to the caller.
+  [[nodiscard]] axis_dynamics_t message() const;
 
  private:
   double n_ = 0.0;
@@ -37,8 +38,8 @@ class MotionBook {
   MotionBook();
   /// Thread: modeller. Allocates: never.
   void add(const ErrorRow& row);
-  /// name, utc and time_s are left to the caller.
-  [[nodiscard]] DynamicsReport report() const;
+  /// name, utime, sequence and time_s are left to the caller.
+  [[nodiscard]] dynamics_t message() const;
 
  private:
   /// Of the samples in motion every fifth enters the regression: neighbours tell the same of the motion.

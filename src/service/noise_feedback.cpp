@@ -5,36 +5,13 @@
 #include <cmath>
 #include <optional>
 
-#include "service/noise_series.h"
+#include "noise/filter_form.h"
 
 namespace imuscope {
 
 namespace {
 
 constexpr double kBelievedVarianceRatio = 100.0;
-
-struct FittedProcess {
-  std::string name;
-  double sd = 0.0;
-  double tau_s = 0.0;  ///< of a GM
-  bool known = true;   ///< each of its parameters is positive and identifiable
-};
-
-/// WN and GM processes of a model. A record can be too short for a slow process and yet tell the white noise
-/// well.
-std::vector<FittedProcess> processes_of(const AxisNoiseModel& model) {
-  std::vector<FittedProcess> processes;
-  for (const auto& parameter : model.parameters) {
-    if (processes.empty() || processes.back().name != parameter.process)
-      processes.push_back({parameter.process, 0.0, 0.0, true});
-    const bool identifiable = model.identifiable || std::isfinite(parameter.ci_low);
-    if (!identifiable || !std::isfinite(parameter.value) || parameter.value <= 0.0)
-      processes.back().known = false;
-    if (parameter.name == "sigma2") processes.back().sd = std::sqrt(parameter.value);
-    if (parameter.name == "beta") processes.back().tau_s = 1.0 / parameter.value;
-  }
-  return processes;
-}
 
 bool believed(double sd, double present_sd) {
   if (!(sd > 0.0)) return false;
@@ -43,21 +20,18 @@ bool believed(double sd, double present_sd) {
   return ratio < kBelievedVarianceRatio && ratio > 1.0 / kBelievedVarianceRatio;
 }
 
-void update_triad(const std::vector<FittedProcess>& processes, std::size_t axis, TriadNoise& triad) {
+using noise::FilterTerms;
+
+void update_triad(const FilterTerms& terms, std::size_t axis, TriadNoise& triad) {
   const double present_sd = std::hypot(triad.white_sd[axis], triad.fast_sd[axis]);
-  double white_sd = 0.0;
-  const FittedProcess* fast = nullptr;
-  for (const auto& process : processes) {
-    if (process.name == "WN" && process.known) white_sd = process.sd;
-    const bool is_fast = process.tau_s > 0.0 && process.tau_s <= kFastTau_s;
-    if (is_fast && (fast == nullptr || process.tau_s < fast->tau_s)) fast = &process;
-  }
+  const double white_sd = terms.white_is_determined ? std::sqrt(terms.white_variance) : 0.0;
   // One that the record cannot tell leaves what the filter has; none in the model is none.
-  double fast_sd = fast == nullptr ? 0.0 : triad.fast_sd[axis];
-  double fast_tau_s = fast == nullptr ? 0.0 : triad.fast_time_constant_s[axis];
-  if (fast != nullptr && fast->known) {
-    fast_sd = fast->sd;
-    fast_tau_s = fast->tau_s;
+  double fast_sd = 0.0;
+  double fast_tau_s = 0.0;
+  if (!terms.gauss_markov.empty() && terms.gauss_markov.front().is_fast()) {
+    const FilterTerms::GaussMarkov& fastest = terms.gauss_markov.front();
+    fast_sd = fastest.is_determined ? std::sqrt(fastest.variance) : triad.fast_sd[axis];
+    fast_tau_s = fastest.is_determined ? fastest.tau_s() : triad.fast_time_constant_s[axis];
   }
   if (!(white_sd > 0.0) || !believed(std::hypot(white_sd, fast_sd), present_sd)) return;
   triad.white_sd[axis] = white_sd;
@@ -65,14 +39,13 @@ void update_triad(const std::vector<FittedProcess>& processes, std::size_t axis,
   triad.fast_time_constant_s[axis] = fast_tau_s;
 }
 
-void update_bias(const std::vector<FittedProcess>& processes, GaussMarkovConfig& bias) {
-  const FittedProcess* slowest = nullptr;
-  for (const auto& process : processes) {
-    if (process.known && process.tau_s > kFastTau_s && (slowest == nullptr || process.tau_s > slowest->tau_s))
-      slowest = &process;
+void update_bias(const FilterTerms& terms, GaussMarkovConfig& bias) {
+  const FilterTerms::GaussMarkov* slowest = nullptr;
+  for (const auto& process : terms.gauss_markov) {
+    if (process.is_determined && !process.is_fast()) slowest = &process;
   }
-  if (slowest == nullptr || !believed(slowest->sd, bias.sd)) return;
-  bias = {slowest->sd, slowest->tau_s};
+  if (slowest == nullptr || !believed(std::sqrt(slowest->variance), bias.sd)) return;
+  bias = {std::sqrt(slowest->variance), slowest->tau_s()};
 }
 
 template <typename Message, typename Noise, typename Copy>
@@ -97,21 +70,17 @@ void copy_fields(Message& message, Noise& noise, const Copy& copy) {
 
 }  // namespace
 
-StudyNoise updated_noise(const StudyNoise& current, const NoiseModelReport& fitted) {
+StudyNoise updated_noise(const StudyNoise& current, const std::vector<AxisRefit>& axes) {
   StudyNoise updated = current;
   for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {  // the later one's bias process stays
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      const auto found =
-          std::find_if(fitted.models.begin(), fitted.models.end(), [&](const AxisNoiseModel& m) {
-            return m.axis == axis_name(axis) && m.regime == regime_name(regime);
-          });
-      if (found == fitted.models.end()) continue;
-      const auto processes = processes_of(*found);
-      const bool is_gyro = axis < 3;
+    for (const AxisRefit& refit : axes) {
+      if (refit.regime != regime || !refit.fit) continue;
+      const FilterTerms terms = noise::filter_terms(*refit.fit);
+      const bool is_gyro = refit.axis < 3;
       auto& triads = is_gyro ? updated.gyro : updated.accel;
       auto& biases = is_gyro ? updated.gyro_bias : updated.accel_bias;
-      update_triad(processes, axis % 3, triads[static_cast<std::size_t>(regime)]);
-      update_bias(processes, biases[axis % 3]);
+      update_triad(terms, refit.axis % 3, triads[static_cast<std::size_t>(regime)]);
+      update_bias(terms, biases[refit.axis % 3]);
     }
   }
   return updated;
@@ -181,14 +150,14 @@ StudyNoise NoiseFeedback::floored(StudyNoise noise) const {
   return noise;
 }
 
-std::optional<NewNoise> NoiseFeedback::consider(const NoiseModelReport& fitted, std::int64_t samples) {
-  const StudyNoise proposed = updated_noise(in_force_, fitted);
+std::optional<NewNoise> NoiseFeedback::consider(const Refit& refit) {
+  const StudyNoise proposed = updated_noise(in_force_, refit.axes);
   const bool anything_new = !(proposed == in_force_);
   const StudyNoise candidate = floored(proposed);
   if (!anything_new || (version_ > 0 && !moved(candidate, in_force_))) return std::nullopt;
   in_force_ = candidate;
   ++version_;
-  return NewNoise{samples, in_force_, version_};
+  return NewNoise{refit.samples, in_force_, version_};
 }
 
 applied_model_t applied_model_record(const AppliedNoise& applied, const std::string& device) {

@@ -4,23 +4,19 @@
 
 #include <imuscope/applied_model_t.hpp>
 #include <optional>
+#include <vector>
 
-#include "publish/reports.h"
-#include "service/config.h"
 #include "service/core.h"
+#include "service/refit.h"
 
 namespace imuscope {
-
-/// A process of at most this time constant acts like white noise on a filter that integrates for longer, a
-/// slower one like a bias.
-inline constexpr double kFastTau_s = 1.0;
 
 /// `current` with what a refit says of it. Per axis and regime, of the processes that are identifiable: WN
 /// becomes the white noise, the fastest GM of at most one second the fast process, the slowest GM beyond that
 /// the bias process (of the dynamic regime where there is one). Without its white noise a model says nothing
 /// of the noise. A variance more than a hundred times, or less than a hundredth, of the present one is not
 /// believed: the filter keeps what it has for that axis.
-[[nodiscard]] StudyNoise updated_noise(const StudyNoise& current, const NoiseModelReport& fitted);
+[[nodiscard]] StudyNoise updated_noise(const StudyNoise& current, const std::vector<AxisRefit>& axes);
 
 /// Decides, refit by refit, what goes back to the filter of one S-IMU. Four rules keep the loop from talking
 /// the filter into confidence:
@@ -40,8 +36,7 @@ class NoiseFeedback {
   NoiseFeedback(const StudyNoise& configured, double floor_share);
 
   /// What the estimator shall be given after this refit; nothing where what it has may stay.
-  /// @param samples  of the error process that the refit has seen
-  [[nodiscard]] std::optional<NewNoise> consider(const NoiseModelReport& fitted, std::int64_t samples);
+  [[nodiscard]] std::optional<NewNoise> consider(const Refit& refit);
 
   /// Given out last, the configured one before that.
   [[nodiscard]] const StudyNoise& in_force() const { return in_force_; }

@@ -7,7 +7,7 @@
 #include "noise/holm.h"
 #include "noise/lines.h"
 #include "noise/wavelet_variance.h"
-#include "service/report_values.h"
+#include "service/models_file.h"
 
 namespace imuscope {
 
@@ -182,7 +182,9 @@ nlohmann::json parameter_json(const AxisComparison& of, const noise::ComparedPar
   };
   add_interval("first", of.first->fit);
   add_interval("second", of.second->fit);
-  json["verdict"] = !p_holm ? "not determined" : *p_holm < kSignificance ? "differs" : "no difference shown";
+  json["verdict"] = !p_holm                          ? "not determined"
+                    : *p_holm < noise::kSignificance ? "differs"
+                                                     : "no difference shown";
   return json;
 }
 
@@ -279,7 +281,7 @@ nlohmann::json models_json(const NoiseStudy& study) {
 nlohmann::json comparison_json(const NoiseStudy& study, const std::vector<std::string>& regimes) {
   nlohmann::json json{{"schema", "imuscope.comparison/1"},
                       {"correction", "Holm"},
-                      {"level", kSignificance},
+                      {"level", noise::kSignificance},
                       {"comparisons", nlohmann::json::array()}};
   std::vector<std::string> names;
   for (const auto& m : study.models) {

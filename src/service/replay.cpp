@@ -126,7 +126,7 @@ class Replayer {
     ReplayResult result;
     result.t0 = *t0;
     if (auto ran = run_ticks(*t0, result.ticks); !ran) return tl::unexpected<Error>(ran.error());
-    for (std::size_t i = 0; i < feeds_.size(); ++i) result.devices.push_back(device_result(i));
+    for (std::size_t i = 0; i < feeds_.size(); ++i) result.devices.push_back(device_record(i));
     if (auto checked = check(result); !checked) return tl::unexpected<Error>(checked.error());
     return result;
   }
@@ -215,18 +215,20 @@ class Replayer {
     return total > 0.0 ? read / total : 1.0;
   }
 
-  [[nodiscard]] DeviceResult device_result(std::size_t i) const {
-    DeviceResult result;
-    if (!feeds_[i]) return result;
-    result.counters = feeds_[i]->decoder().counters();
-    result.refused = feeds_[i]->sink().refused();
-    result.problem =
+  [[nodiscard]] DeviceRecord device_record(std::size_t i) const {
+    DeviceRecord record;
+    record.clock = recording_.clocks[i].how;
+    record.clock_shift_s = recording_.clocks[i].shift_s;
+    if (!feeds_[i]) return record;
+    record.counters = feeds_[i]->decoder().counters();
+    record.refused = feeds_[i]->sink().refused();
+    record.problem =
         feeds_[i]->at_end()
             ? decoder_problem(configuration_.devices[i], feeds_[i]->decoder())
             : fmt::format("only {} of {} bytes are used: the next stamp lies more than {} h ahead",
                           feeds_[i]->decoder().counters().bytes, feeds_[i]->source().bytes_total(),
                           std::chrono::duration_cast<std::chrono::hours>(kLongestPause).count());
-    return result;
+    return record;
   }
 
   [[nodiscard]] Result<void> check(const ReplayResult& result) const {
@@ -250,6 +252,14 @@ class Replayer {
 };
 
 }  // namespace
+
+std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording) {
+  std::vector<StudyFileInfo> infos;
+  for (const auto index : configuration.study_indices()) {
+    infos.push_back({configuration.devices[index].name, recording.clocks[index].shift_s});
+  }
+  return infos;
+}
 
 Result<ReplayResult> replay(const Configuration& configuration, const EstimatorConfig& estimator,
                             const Recording& recording, CoreSink& sink, const ReplayOptions& options) {

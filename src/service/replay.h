@@ -18,15 +18,13 @@
 #include "service/config.h"
 #include "service/core.h"
 #include "service/number_ranges.h"
+#include "service/run_folder.h"
+#include "service/run_record.h"
 
 namespace imuscope {
 
 /// Opens the recorded bytes of device `index` from their beginning; a study reads them more than once.
 using OpenSource = std::function<Result<std::unique_ptr<ByteSource>>(DeviceIndex index)>;
-
-/// After the newest arrival the core runs on for this many ticks, live and in replay: what waits for a
-/// reference that does not come is given up by then.
-inline constexpr std::int64_t kTailTicks = 20;
 
 /// Between two arrivals; no drive pauses as long.
 inline constexpr Duration kLongestPause = std::chrono::hours(24);
@@ -50,18 +48,13 @@ struct Recording {
   std::vector<MarkedMoment> moments;         ///< that a person marked while it was recorded
 };
 
-/// Counts of one device after a replay.
-struct DeviceResult {
-  DecoderCounters counters;
-  std::uint64_t refused = 0;         ///< samples that found their ring full
-  std::uint64_t frames_dropped = 0;  ///< of a live run: lost by this PC before they could be read
-  std::string problem;               ///< decoder_problem(), or that its reads end before the recording does
-};
+/// Names and clock shifts of the S-IMUs, in the order of the configuration.
+std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording);
 
 /// What a replay did: counts by device of the configuration, the cut of tick 0, and the ticks run (skipped
 /// ones do not count).
 struct ReplayResult {
-  std::vector<DeviceResult> devices;
+  std::vector<DeviceRecord> devices;
   HostTime t0{};
   std::int64_t ticks = 0;
 };

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 #include <utility>
 
+#include "publish/message_values.h"
 #include "rt/host_clock.h"
 #include "service/estimator_setup.h"
 #include "service/health.h"
@@ -38,38 +39,28 @@ void ReplayBroadcast::on_refit(const Refit& refit) {
 
 void ReplayBroadcast::on_snapshot(const Snapshot& snapshot) {
   broadcast_.on_snapshot(snapshot);
-  if (snapshot.tick % kTicksPerStatus == 0) broadcast_.publish(status(snapshot));
+  if (snapshot.tick % kTicksPerStatus == 0) broadcast_.on_status(status(snapshot));
 }
 
 /// What only a running service has (lines, threads, rings, a capture being written) is left out.
-StatusReport ReplayBroadcast::status(const Snapshot& snapshot) const {
-  StatusReport report;
-  report.utc = broadcast_.anchor().at(snapshot.cut);
-  report.run = configuration_.run_name;
-  report.version = version_;
-  report.build = fmt::format("g++ {}", __VERSION__);
-  report.configuration_hash = configuration_.sha256;
-  report.state = "running";
-  report.reason = fmt::format("a replay of {}", fmt::join(recording_.inputs, ", "));
-  report.uptime_s = static_cast<double>(snapshot.tick) / kTickRate_hz;
-  report.tick = snapshot.tick;
-  report.refits = refits_;
-  for (std::size_t i = 0; i < configuration_.devices.size(); ++i) {
-    const auto& device = configuration_.devices[i];
-    StatusReport::Device replayed;
-    replayed.name = device.name;
-    replayed.role = name_of(device.role);
-    replayed.protocol = name_of(device.protocol);
-    replayed.state = recording_.present[i] ? "replayed" : "absent";
-    replayed.rate_hz = kUnknown;
-    report.devices.push_back(std::move(replayed));
+status_t ReplayBroadcast::status(const Snapshot& snapshot) const {
+  status_t status = status_of(configuration_, version_);
+  status.utime = to_utime(broadcast_.anchor().at(snapshot.cut));
+  status.state = "running";
+  status.reason = fmt::format("a replay of {}", fmt::join(recording_.inputs, ", "));
+  status.uptime_s = static_cast<double>(snapshot.tick) / kTickRate_hz;
+  status.tick = snapshot.tick;
+  status.refits = refits_;
+  for (std::size_t i = 0; i < status.devices.size(); ++i) {
+    status.devices[i].state = recording_.present[i] ? "replayed" : "absent";
+    status.devices[i].rate_hz = kUnknown;
   }
   const auto studies = configuration_.study_indices();
   for (std::size_t i = 0; i < studies.size(); ++i) {
-    report.studies.push_back(
+    status.studies.push_back(
         study_status(configuration_.devices[studies[i]].name, snapshot.studies[i], estimator_.studies[i]));
   }
-  return report;
+  return status;
 }
 
 }  // namespace imuscope

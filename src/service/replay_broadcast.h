@@ -24,14 +24,14 @@ class ReplayBroadcast {
   void on_snapshot(const Snapshot& snapshot);
 
  private:
-  [[nodiscard]] StatusReport status(const Snapshot& snapshot) const;
+  [[nodiscard]] status_t status(const Snapshot& snapshot) const;
 
   const Configuration& configuration_;
   const Recording& recording_;
   std::string version_;
   EstimatorConfig estimator_;
   Broadcast broadcast_;
-  std::uint64_t refits_ = 0;
+  std::int64_t refits_ = 0;
 };
 
 }  // namespace imuscope

@@ -80,10 +80,6 @@ Result<void> write_json(const std::filesystem::path& file, const nlohmann::json&
   return out.close();
 }
 
-Result<void> write_models(const std::filesystem::path& folder, const nlohmann::json& models) {
-  return write_json(folder / "models.json", {{"schema", "imuscope.models/1"}, {"models", models}});
-}
-
 void SampleTimeLine::add(std::int64_t counter, double time_s) {
   if (n_ == 0.0) counter0_ = counter;
   const auto c = static_cast<double>(counter - counter0_);

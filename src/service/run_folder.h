@@ -35,10 +35,6 @@ class CsvFile {
 /// Writes `document` to `file`, indented, numbers with the digits that give the same double back.
 Result<void> write_json(const std::filesystem::path& file, const nlohmann::json& document);
 
-/// Writes models.json.
-/// @param models  an array of model_json() (report_values.h)
-Result<void> write_models(const std::filesystem::path& folder, const nlohmann::json& models);
-
 /// Straight line through (counter, time of validity): when a sample of the device showed the motion.
 class SampleTimeLine {
  public:

@@ -2,33 +2,22 @@
 
 #include <fmt/format.h>
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 
-#include "base/units.h"
 #include "error_process/row_low_pass.h"
 #include "service/dependence_study.h"
 #include "service/dynamics_files.h"
 #include "service/estimator_setup.h"
-#include "service/modeller.h"
+#include "service/models_file.h"
 #include "service/noise_series.h"
 #include "service/noise_study.h"
 #include "service/regime_study.h"
-#include "service/replay_broadcast.h"
+#include "service/run_folder.h"
+#include "service/run_record.h"
 #include "service/smoothing.h"
 
 namespace imuscope {
 
 namespace {
-
-std::string utc_text(UtcTime utc) {
-  const auto since_epoch = std::chrono::floor<std::chrono::seconds>(utc);
-  const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(since_epoch));
-  const std::chrono::hh_mm_ss time(since_epoch - std::chrono::floor<std::chrono::days>(since_epoch));
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", static_cast<int>(date.year()),
-                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
-                     time.hours().count(), time.minutes().count(), time.seconds().count());
-}
 
 /// Rows of the last pass: mounting frozen at its final value, the reference compensated with its smoothed
 /// biases, the whole drive covered.
@@ -148,63 +137,6 @@ EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& f
   return config;
 }
 
-nlohmann::json device_json(const RunDescription& run, std::size_t i) {
-  const auto& device = run.configuration->devices[i];
-  const auto& result = run.result->devices[i];
-  const auto& counters = result.counters;
-  nlohmann::json entry{{"name", device.name},
-                       {"role", name_of(device.role)},
-                       {"protocol", name_of(device.protocol)},
-                       {"rate_hz", device.rate_hz},
-                       {"samples", counters.samples},
-                       {"frames", counters.frames},
-                       {"bytes", counters.bytes},
-                       {"bytes_skipped", counters.bytes_skipped},
-                       {"bad_checksums", counters.bad_checksums},
-                       {"bad_lengths", counters.bad_lengths},
-                       {"bad_contents", counters.bad_contents},
-                       {"samples_lost", counters.samples_lost},
-                       {"clock_resets", counters.clock_resets},
-                       {"frames_dropped", result.frames_dropped},
-                       {"refused", result.refused},
-                       {"problem", result.problem},
-                       {"clock", run.recording->clocks[i].how},
-                       {"clock_shift_s", run.recording->clocks[i].shift_s}};
-  const auto studies = run.configuration->study_indices();
-  const auto found = std::find(studies.begin(), studies.end(), i);
-  const bool is_study = found != studies.end() && run.last != nullptr;
-  entry["late"] =
-      is_study
-          ? nlohmann::json(run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters.late)
-          : nlohmann::json(nullptr);
-  return entry;
-}
-
-/// What was learned of the wheels, and what became of their speeds.
-nlohmann::json odometry_json(const Snapshot& last) {
-  const OdometryOutput& out = last.odometry;
-  const EstimatorCounters& counters = last.counters;
-  const auto degrees = [](const Vector3& v) {
-    return nlohmann::json{v[0] * kDegPerRad, v[1] * kDegPerRad, v[2] * kDegPerRad};
-  };
-  return {{"scale", out.scale},
-          {"scale_sd", out.sd_scale},
-          {"mounting_rotation_vector_deg", degrees(out.mount_rad)},
-          {"mounting_sd_deg", degrees(out.sd_mount_rad)},
-          {"axle_lever_arm_b_m", out.r_bv_b_m},
-          {"axle_lever_arm_sd_m", out.sd_r_bv_b_m},
-          {"nis", {{"speed", out.nis[0]}, {"sideways", out.nis[1]}, {"upwards", out.nis[2]}}},
-          {"samples", counters.odometry_samples},
-          {"speed_used", counters.odometry_speed_used},
-          {"speed_rejected", counters.odometry_speed_rejected},
-          {"non_holonomic_used", counters.odometry_slip_used},
-          {"non_holonomic_rejected", counters.odometry_slip_rejected},
-          {"zero_velocity_used", counters.zero_velocity_used},
-          {"zero_velocity_rejected", counters.zero_velocity_rejected},
-          {"too_old", counters.odometry_too_old},
-          {"not_finite", counters.odometry_not_finite}};
-}
-
 std::vector<StudyOutput> final_studies(const Snapshot& last) {
   return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
 }
@@ -222,46 +154,6 @@ std::vector<StudyOutput> with_settled(std::vector<StudyOutput> finals,
   return finals;
 }
 
-void warn_of_uncalibrated(const Configuration& configuration, const std::vector<StudyOutput>& finals,
-                          std::vector<std::string>& warnings) {
-  const auto indices = configuration.study_indices();
-  for (std::size_t i = 0; i < finals.size(); ++i) {
-    if (calibrated(finals[i])) continue;
-    warnings.push_back(
-        fmt::format("{}: no mounting was found; it needs about a minute of driving with turns, or a "
-                    "[device.prior] in the configuration",
-                    configuration.devices[indices[i]].name));
-  }
-}
-
-/// What the receiver says and what the vehicle does do not fit: everything else rests on both.
-bool contradicts_motion(const EstimatorCounters& counters) {
-  // Of honest sd the gate refuses about one position in a thousand.
-  constexpr double kRefusedShareMax = 0.05;
-  return static_cast<double>(counters.gnss_positions_rejected) >
-         kRefusedShareMax * static_cast<double>(counters.gnss_used + counters.gnss_rejected);
-}
-
-nlohmann::json gnss_json(const EstimatorCounters& counters) {
-  return {{"used", counters.gnss_used},
-          {"rejected", counters.gnss_rejected},
-          {"positions_rejected", counters.gnss_positions_rejected},
-          {"contradicts_motion", contradicts_motion(counters)}};
-}
-
-void warn_of_refused_gnss(const Configuration& configuration, const EstimatorCounters& counters,
-                          std::vector<std::string>& warnings) {
-  const auto index = configuration.gnss_index();
-  if (!index || !contradicts_motion(counters)) return;
-  warnings.push_back(fmt::format(
-      "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its times are "
-      "of "
-      "(GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, and do not trust this "
-      "run before",
-      configuration.devices[*index].name, counters.gnss_positions_rejected,
-      counters.gnss_used + counters.gnss_rejected));
-}
-
 void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMountings& former,
                        HostTime first_reference_time, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < former.size(); ++i) {
@@ -274,45 +166,6 @@ void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMoun
 }
 
 }  // namespace
-
-std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording) {
-  std::vector<StudyFileInfo> infos;
-  for (const auto index : configuration.study_indices()) {
-    infos.push_back({configuration.devices[index].name, recording.clocks[index].shift_s});
-  }
-  return infos;
-}
-
-nlohmann::json run_json(const RunDescription& run) {
-  nlohmann::json json{{"schema", "imuscope.run/1"},
-                      {"name", run.configuration->run_name},
-                      {"version", run.version},
-                      {"build", fmt::format("{} {}", __VERSION__, sizeof(void*) == 8 ? "64 bit" : "32 bit")},
-                      {"configuration", run.configuration->file.filename().string()},
-                      {"configuration_sha256", run.configuration->sha256},
-                      {"configuration_text", run.configuration->text},
-                      {"inputs", run.recording->inputs},
-                      {"ticks", run.result->ticks},
-                      {"duration_s", static_cast<double>(run.result->ticks) / kTickRate_hz},
-                      {"warnings", run.warnings}};
-  json["t0_utc"] = run.last != nullptr && run.last->has_utc
-                       ? nlohmann::json(utc_text(run.last->first_reference_utc))
-                       : nlohmann::json(nullptr);
-  if (run.static_s && run.dynamic_s)
-    json["regimes"] = {{"static_s", *run.static_s}, {"dynamic_s", *run.dynamic_s}};
-  json["devices"] = nlohmann::json::array();
-  for (std::size_t i = 0; i < run.configuration->devices.size(); ++i)
-    json["devices"].push_back(device_json(run, i));
-  if (run.last != nullptr && run.configuration->gnss_index()) json["gnss"] = gnss_json(run.last->counters);
-  if (run.last != nullptr && run.last->odometry.enabled) json["odometry"] = odometry_json(*run.last);
-  json["events"] = nlohmann::json::array();
-  for (const auto& event : run.events) {
-    json["events"].push_back(
-        {{"time_s", run.last != nullptr ? to_seconds(event.time - run.last->first_reference_time) : 0.0},
-         {"text", describe(*run.configuration, event)}});
-  }
-  return json;
-}
 
 Result<void> run_study(const Configuration& configuration, const Recording& recording,
                        const StudyRunOptions& options) {
@@ -331,12 +184,11 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const Snapshot last = *(*folder)->last_snapshot();
   const auto finals = final_studies(last);
 
-  RunDescription run{options.version, &configuration,      &recording, &*calibrated_run,
-                     &last,           (*folder)->events(), {}};
+  RunRecord run{
+      configuration,         options.version, recording.inputs,    calibrated_run->devices,
+      calibrated_run->ticks, &last,           (*folder)->events(), warnings_of(configuration, last)};
   const auto infos = study_file_infos(configuration, recording);
   const FormerMountings& former = first.former_mountings();
-  warn_of_refused_gnss(configuration, last.counters, run.warnings);
-  warn_of_uncalibrated(configuration, finals, run.warnings);
   warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
   if (std::none_of(finals.begin(), finals.end(), calibrated)) {
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
@@ -415,84 +267,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   for (const auto& [file, document] : documents) {
     if (auto written = write_json(options.out / file, document); !written) return written;
   }
-  auto about = run_json(run);
-  about["error_process_mounting"] = options.mountings.empty() ? "of this drive" : "of all drives combined";
-  return write_json(options.out / "run.json", about);
-}
-
-namespace {
-
-/// A replay's results: the files of a run, and the refits of the live run at the same samples.
-class ReplaySink final : public CoreSink {
- public:
-  ReplaySink(RunFolder& folder, const Configuration& configuration, noise::ModelSpec spec,
-             ReplayBroadcast& broadcast)
-      : folder_(folder), book_(configuration, std::move(spec)), broadcast_(broadcast) {}
-
-  void on_error(const ErrorRecord& record) noexcept override {
-    folder_.on_error(record);
-    broadcast_.on_error(record);
-    book_.add(record);
-    while (const auto refit = book_.refit()) {
-      models_.take(*refit);
-      broadcast_.on_refit(*refit);
-    }
-  }
-  void on_event(const EstimatorEvent& event) noexcept override { folder_.on_event(event); }
-  void on_snapshot(const Snapshot& snapshot) noexcept override {
-    folder_.on_snapshot(snapshot);
-    broadcast_.on_snapshot(snapshot);
-  }
-  void on_late_sample(const LateSample& late) noexcept override { folder_.on_late_sample(late); }
-
-  [[nodiscard]] const NewestModels& models() const { return models_; }
-
- private:
-  RunFolder& folder_;
-  ModelBook book_;
-  ReplayBroadcast& broadcast_;
-  NewestModels models_;
-};
-
-}  // namespace
-
-Result<void> run_replay(const Configuration& configuration, const Recording& recording,
-                        const StudyRunOptions& options, const PlayOptions& play) {
-  auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
-  if (!folder) return tl::unexpected<Error>(folder.error());
-  // What an earlier study left in this folder would be taken for this run's.
-  std::vector<std::string> of_a_study{"models.json",     "regression.json",        "regimes.json",
-                                      "dependence.json", "vibration.json",         "comparison.json",
-                                      "report.html",     "smoothed_navigation.csv"};
-  for (const auto& info : study_file_infos(configuration, recording))
-    of_a_study.push_back(fmt::format("smoothed_{}.csv", info.name));
-  for (const auto& file : of_a_study) {
-    std::error_code absent_is_well;
-    std::filesystem::remove(options.out / file, absent_is_well);
-  }
-  ReplayOptions replay_options;
-  replay_options.realtime = play.realtime;
-  if (options.progress) replay_options.progress = [&](double share) { options.progress("replay", share); };
-  const auto spec = noise::parse_model(configuration.noise.model);
-  if (!spec) return tl::unexpected<Error>(spec.error());
-  ReplayBroadcast broadcast(configuration, recording, options.version);
-  if (!play.lcm_url.empty()) {
-    if (auto opened = broadcast.open(play.lcm_url); !opened) return opened;
-  }
-  ReplaySink sink(**folder, configuration, *spec, broadcast);
-  const auto result = replay(configuration, estimator_config(configuration), recording, sink, replay_options);
-  if (!result) return tl::unexpected<Error>(result.error());
-  if (auto written = sink.models().write(options.out); !written) return written;
-  if (auto written = (*folder)->write_calibration(); !written) return written;
-  if (auto closed = (*folder)->close(); !closed) return closed;
-  const auto& last = (*folder)->last_snapshot();
-  RunDescription run{options.version,         &configuration,      &recording, &*result,
-                     last ? &*last : nullptr, (*folder)->events(), {}};
-  if (last) {
-    warn_of_refused_gnss(configuration, last->counters, run.warnings);
-    warn_of_uncalibrated(configuration, final_studies(*last), run.warnings);
-  }
-  return write_json(options.out / "run.json", run_json(run));
+  run.error_process_mounting = options.mountings.empty() ? "of this drive" : "of all drives combined";
+  return write_run_record(options.out, run);
 }
 
 }  // namespace imuscope

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include <imuscope/event_t.hpp>
-#include "example_reports.h"
+#include "example_messages.h"
 #include "programs.h"
 #include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
@@ -81,7 +81,7 @@ TEST_F(HostileBus, TheServiceOutlivesTheTwoDatagramsAndHearsTheEventBehindThem) 
   ASSERT_TRUE(soon([&] { return log_has("Ctrl-C ends it"); })) << read_text(folder_ / "log.txt");
   for (const char* channel : {"IMUSCOPE_EVENT", "", "any"})
     ASSERT_TRUE(stranger_->send_two_that_kill(channel));
-  LcmPublisher::open()->publish(PersonEvent{kExampleUtc, "test", "roundabout"});
+  LcmPublisher::open()->publish(example_event("roundabout"), "EVENT");
   EXPECT_TRUE(soon([&] { return log_has("event: roundabout (from test)"); }))
       << read_text(folder_ / "log.txt");
   service.interrupt();
@@ -96,7 +96,8 @@ TEST_F(HostileBus, TheTerminalViewOutlivesTheTwoDatagramsAndShowsTheStatusBehind
     for (const char* channel : {"IMUSCOPE_STATUS", "", "any"})
       ASSERT_TRUE(stranger_->send_two_that_kill(channel));
   }
-  EXPECT_TRUE(soon([&] { return log_has("run 'demo'"); }, [&] { voice->publish(example_status()); }))
+  EXPECT_TRUE(
+      soon([&] { return log_has("run 'demo'"); }, [&] { voice->publish(example_status(), "STATUS"); }))
       << read_text(folder_ / "log.txt");
   EXPECT_EQ(top.wait(), 0) << read_text(folder_ / "log.txt");
 }

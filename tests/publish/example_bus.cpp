@@ -7,7 +7,7 @@
 #include <iostream>
 #include <thread>
 
-#include "example_reports.h"
+#include "example_messages.h"
 #include "publish/lcm_publisher.h"
 
 using namespace imuscope;
@@ -22,22 +22,23 @@ int main(int argc, char** argv) {
   for (int i = 0; i < seconds * 10; ++i) {
     const double phase = 0.1 * i;
     auto navigation = test::example_navigation();
-    navigation.v_n_mps[0] = 10.0 * std::sin(phase);
-    navigation.rpy_rad[2] = phase;
-    bus->publish(navigation);
-    bus->publish(test::example_odometry());
+    navigation.v_n_mps = 10.0 * std::sin(phase);
+    navigation.heading_deg = phase;
+    bus->publish(navigation, "NAVIGATION");
+    bus->publish(test::example_odometry(), "ODOMETRY");
     auto calibration = test::example_calibration();
-    calibration.value.psi_b_rad[0] = 0.01 * std::cos(phase);
-    bus->publish(calibration, "mtx1");
+    calibration.psi_x_deg = std::cos(phase);
+    bus->publish(calibration, "CALIBRATION", "mtx1");
     auto error = test::example_error();
-    error.gyro_radps[0] = 0.02 * std::sin(3.0 * phase);
-    bus->publish(error, "mtx1");
-    bus->publish(test::example_status());
-    bus->publish(test::example_wavelet_variance());
-    bus->publish(test::example_noise_model());
-    bus->publish(DynamicsReport{error.utc, phase, "mtx1", i, 2 * i, {}});
-    bus->publish(PersonEvent{error.utc, "example_bus", "event"});
-    bus->publish(BridgeReport{});
+    error.e_gyro_x_radps = 0.02 * std::sin(3.0 * phase);
+    bus->publish(error, "ERROR", "mtx1");
+    bus->publish(test::example_status(), "STATUS");
+    bus->publish(test::example_wavelet_variance(), "WV", "mtx1");
+    bus->publish(test::example_noise_model(), "NOISE_MODEL", "mtx1");
+    bus->publish(test::example_dynamics(), "DYNAMICS", "mtx1");
+    bus->publish(test::example_event(), "EVENT");
+    bus->publish(pose_t{}, "POSE");
+    bus->publish(ins_t{}, "INS");
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   return 0;

@@ -14,7 +14,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <sstream>
 
-#include "example_reports.h"
+#include "example_messages.h"
 #include "publish/lcm_listener.h"
 #include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
@@ -72,11 +72,11 @@ struct Ear {
 void publish(
     LcmPublisher& voice, const std::function<void()>& after_status = [] {}) {
   for (int i = 0; i < kMessages; ++i) {
-    voice.publish(test::example_status());
+    voice.publish(test::example_status(), "STATUS");
     after_status();
   }
-  voice.publish(test::example_calibration(), "mtx1");
-  voice.publish(PersonEvent{test::kExampleUtc, "test", "here"});
+  voice.publish(test::example_calibration(), "CALIBRATION", "mtx1");
+  voice.publish(test::example_event(), "EVENT");
 }
 
 TEST(LcmSocketFilter, TheKernelDropsWhatNobodyAskedForAndTheWantedChannelComes) {
@@ -95,8 +95,8 @@ TEST(LcmSocketFilter, ABeginningLetsEveryNameThroughThatHasIt) {
   const int outcome = with_multicast([] {
     Ear ear("CALIBRATION_.*");
     auto voice = LcmPublisher::open();
-    voice->publish(test::example_calibration(), "mtx1");
-    voice->publish(test::example_calibration(), "another one");
+    voice->publish(test::example_calibration(), "CALIBRATION", "mtx1");
+    voice->publish(test::example_calibration(), "CALIBRATION", "another one");
     publish(*voice);
     if (ear.listen_for(3) != 3) return 1;
     return dropped() == kMessages + 1 ? 0 : 2;
@@ -132,7 +132,7 @@ TEST(LcmSocketFilter, TheTwoDatagramsThatKillTheLibrarysReceiverDoNothing) {
     for (const char* channel : {"IMUSCOPE_EVENT", "", "any"}) {
       if (!stranger.send_two_that_kill(channel)) return 1;
     }
-    LcmPublisher::open()->publish(PersonEvent{test::kExampleUtc, "test", "here"});
+    LcmPublisher::open()->publish(test::example_event(), "EVENT");
     if (ear.listen_for(1) != 1) return 2;
     return dropped() == 6 ? 0 : 3;
   });
@@ -255,7 +255,7 @@ TEST(LcmSocketFilter, WithoutTtlThisPcIsHeardOnAnInterfaceThatLeadsOut) {
     const OtherHost other;
     if (!other.connected()) return 1;
     Ear ear("EVENT");
-    LcmPublisher::open()->publish(PersonEvent{test::kExampleUtc, "test", "here"});
+    LcmPublisher::open()->publish(test::example_event(), "EVENT");
     return ear.listen_for(1) == 1 ? 0 : 2;
   });
   if (outcome == kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";

@@ -7,8 +7,7 @@
 #include <imuscope/raw_t.hpp>
 #include <imuscope/status_t.hpp>
 
-#include "example_reports.h"
-#include "publish/message_builders.h"
+#include "example_messages.h"
 
 namespace imuscope {
 namespace {
@@ -65,7 +64,7 @@ TEST(MessageCodec, AStringHasAtLeastItsZero) {
 
 TEST(MessageCodec, AnyFieldOfAStatusMayClaimTheMost) {
   constexpr long kSmall_kB = 64L * 1024;
-  const std::vector<std::uint8_t> message = encode_message(to_message(test::example_status(), 1));
+  const std::vector<std::uint8_t> message = encode_message(test::example_status());
   ASSERT_TRUE(decode_message<status_t>(message).has_value());
   const long before_kB = peak_kilobytes();
   constexpr std::size_t kFingerprint = 8;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/units.h"
+#include "service/models_file.h"
 
 namespace imuscope {
 namespace {
@@ -16,25 +17,28 @@ constexpr double kFastBeta = 113.5;
 constexpr double kSlowBeta = 0.0049;
 constexpr std::array<double, kImuAxes> kTurnOn{1e-3, 1e-3, 1e-3, 0.02, 0.02, 0.02};
 
-json fit_of(const std::string& axis, const std::string& regime, double white, double fast, double slow) {
-  const auto parameter = [](const char* process, const char* name, double value) {
-    return json{{"process", process}, {"name", name}, {"value", value}};
+/// An entry of models.json: white noise, a fast and a slow Gauss-Markov process.
+json entry_of(std::size_t axis, const std::string& regime, double white, double fast, double slow) {
+  using noise::ProcessKind;
+  noise::FitResult fit;
+  fit.rate_hz = kModelRate_hz;
+  fit.spec.processes = {ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov, ProcessKind::kGaussMarkov};
+  const auto add = [&](const char* process, const char* name, double value) {
+    fit.parameters.push_back({process, name, "", value, {}, {}, {}, {}});
   };
-  return {{"name", "mtx1"},
-          {"axis", axis},
-          {"regime", regime},
-          {"rate_hz", kModelRate_hz},
-          {"parameters",
-           {parameter("WN", "sigma2", white), parameter("GM1", "beta", kFastBeta),
-            parameter("GM1", "sigma2", fast), parameter("GM2", "beta", kSlowBeta),
-            parameter("GM2", "sigma2", slow)}}};
+  add("WN", "sigma2", white);
+  add("GM1", "beta", kFastBeta);
+  add("GM1", "sigma2", fast);
+  add("GM2", "beta", kSlowBeta);
+  add("GM2", "sigma2", slow);
+  return model_json(fit, "mtx1", axis, regime);
 }
 
 json models(bool with_static = true) {
   json fits = json::array();
-  for (const char* axis : {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"}) {
-    if (with_static) fits.push_back(fit_of(axis, "static", 1.0, 0.1, 0.02));
-    fits.push_back(fit_of(axis, "dynamic", 2.0, 0.3, 0.04));
+  for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
+    if (with_static) fits.push_back(entry_of(axis, "static", 1.0, 0.1, 0.02));
+    fits.push_back(entry_of(axis, "dynamic", 2.0, 0.3, 0.04));
   }
   return {{"models", fits}};
 }
@@ -131,6 +135,14 @@ TEST(EvaluationModels, WhatIsMissingIsNamedAndNothingStandsInForIt) {
   EXPECT_FALSE(named(all, "by dynamics").model);
   EXPECT_FALSE(named(all, "data sheet").model);
   EXPECT_NE(named(all, "data sheet").absent_because.find("data_sheet"), std::string::npos);
+}
+
+TEST(EvaluationModels, ADamagedModelIsNamedAsOne) {
+  json damaged = models();
+  damaged["models"][0].erase("rate_hz");
+  const auto all = evaluation_models(drive(), {}, kTurnOn, damaged, {});
+  EXPECT_FALSE(named(all, "static").model);
+  EXPECT_NE(named(all, "static").absent_because.find("rate_hz"), std::string::npos);
 }
 
 TEST(EvaluationModels, ADataSheetGivesDensitiesAndOneWanderingBias) {

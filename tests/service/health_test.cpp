@@ -10,6 +10,8 @@
 #include <ctime>
 #include <thread>
 
+#include "base/units.h"
+#include "publish/message_codec.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
 #include "service/observability.h"
@@ -23,23 +25,25 @@ double processor_time_of_this_thread_s() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 
-StatusReport::Device device(const std::string& name, const std::string& role, const std::string& state) {
-  StatusReport::Device d;
+device_status_t device(const std::string& name, const std::string& role, const std::string& state) {
+  device_status_t d{};
   d.name = name;
   d.role = role;
   d.state = state;
   return d;
 }
 
-StatusReport healthy() {
-  StatusReport report;
+status_t healthy() {
+  status_t report{};
   report.devices = {device("airins", "reference", "streaming"), device("mtx1", "study", "streaming"),
                     device("mtx2", "study", "streaming")};
   report.studies.resize(2);
   for (auto& study : report.studies) study.state = "converging";
-  report.rings = {{"raw bytes", 2048, 1, 9, 0}};
+  report.rings.resize(1);
+  report.rings[0].name = "raw bytes";
   return report;
 }
 
@@ -121,20 +125,43 @@ TEST(Health, SaysOneReasonForEachState) {
   EXPECT_EQ(judge(report).reason, "airins: failed");
 }
 
-TEST(Quantiles, AreThoseOfAThousandKnownValues) {
+TEST(Beat, QuantilesAreThoseOfAThousandKnownValues) {
   // 1 us to 1 ms in steps of 1 us: 500, 990, 999 and 1000 us, each at most an eighth of an octave above.
-  LatenessHistogram histogram;
-  for (int us = 1; us <= 1000; ++us) histogram.add(std::chrono::microseconds(us));
-  const auto quantiles = quantiles_of(histogram);
+  PeriodicStatistics beat;
+  beat.ticks = 1000;
+  beat.overruns = 11;
+  beat.skipped = 12;
+  for (int us = 1; us <= 1000; ++us) {
+    beat.lateness.add(std::chrono::microseconds(us));
+    beat.done.add(std::chrono::microseconds(10 * us));
+  }
+  thread_status_t thread{};
+  set_beat(beat, std::chrono::microseconds(30), thread);
+  EXPECT_THAT((std::array{thread.ticks, thread.overruns, thread.skipped}), ElementsAre(1000, 11, 12));
   constexpr double kBucket = 1.0 + 1.0 / 8.0;
-  const auto expect_near_above = [](double value_s, double truth_s) {
-    EXPECT_GE(value_s, truth_s);
-    EXPECT_LE(value_s, truth_s * kBucket);
+  const auto expect_near_above = [](double value_us, double truth_us, double offset_us) {
+    EXPECT_GE(value_us - offset_us, truth_us);
+    EXPECT_LE(value_us - offset_us, truth_us * kBucket);
   };
-  expect_near_above(quantiles.p50_s, 500e-6);
-  expect_near_above(quantiles.p99_s, 990e-6);
-  expect_near_above(quantiles.p999_s, 999e-6);
-  EXPECT_DOUBLE_EQ(quantiles.max_s, 1000e-6);
+  expect_near_above(thread.lateness_p50_us, 500, 0);
+  expect_near_above(thread.lateness_p99_us, 990, 0);
+  expect_near_above(thread.lateness_p999_us, 999, 0);
+  EXPECT_DOUBLE_EQ(thread.lateness_max_us, 1000);
+  // Work is counted from the instant that it is of, lateness from the deadline.
+  expect_near_above(thread.done_p50_us, 5000, 30);
+  expect_near_above(thread.done_p99_us, 9900, 30);
+  expect_near_above(thread.done_p999_us, 9990, 30);
+  EXPECT_DOUBLE_EQ(thread.done_max_us, 10'030);
+  const auto octaves = beat.lateness.octaves();
+  EXPECT_EQ(thread.lateness_octaves, std::vector<std::int64_t>(octaves.begin(), octaves.end()));
+}
+
+TEST(Beat, QuantilesAreUnknownWithoutAValue) {
+  thread_status_t thread{};
+  set_beat({}, Duration::zero(), thread);
+  EXPECT_TRUE(std::isnan(thread.lateness_p50_us));
+  EXPECT_TRUE(std::isnan(thread.lateness_max_us));
+  EXPECT_TRUE(std::isnan(thread.done_p999_us));
 }
 
 TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection) {
@@ -151,14 +178,16 @@ TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection
   study.counters.gated_accel = {4, 5, 6};
   StudyConfig config;
   const auto status = study_status("mtx1", study, config);
-  EXPECT_DOUBLE_EQ(status.sd_psi_rad, 0.3);
+  EXPECT_DOUBLE_EQ(status.sd_psi_deg, 0.3 * kDegPerRad);
   EXPECT_DOUBLE_EQ(status.sd_r_m, 0.6);
-  EXPECT_DOUBLE_EQ(status.sd_t_d_s, 0.7);
-  EXPECT_DOUBLE_EQ(status.goal_psi_rad, config.goal_boresight_sd_rad);
+  EXPECT_DOUBLE_EQ(status.sd_t_d_ms, 700.0);
+  EXPECT_DOUBLE_EQ(status.goal_psi_deg, config.goal_boresight_sd_rad * kDegPerRad);
+  EXPECT_DOUBLE_EQ(status.goal_r_m, config.goal_r_bs_b_sd_m);
+  EXPECT_DOUBLE_EQ(status.goal_t_d_ms, config.goal_t_d_sd_s * 1e3);
   EXPECT_EQ(status.weakest, "boresight about down");
   EXPECT_DOUBLE_EQ(status.weakest_relative, 0.9);
   EXPECT_THAT(status.manoeuvre, HasSubstr("brake"));
-  EXPECT_EQ(status.gated, 21U);
+  EXPECT_EQ(status.gated, 21);
   EXPECT_EQ(status.manoeuvre, observability_of(study).advice) << "said in one way everywhere";
   study.status = StudyStatus::kCalibrated;
   study.observable.fill(true);
@@ -168,7 +197,7 @@ TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection
   EXPECT_EQ(study_status("mtx1", study, config).manoeuvre, "") << "nothing is missing any more";
   study.status = StudyStatus::kCoarse;
   const auto coarse = study_status("mtx1", study, config);
-  EXPECT_TRUE(std::isnan(coarse.sd_psi_rad)) << "what is not estimated has no sd";
+  EXPECT_TRUE(std::isnan(coarse.sd_psi_deg)) << "what is not estimated has no sd";
   EXPECT_THAT(coarse.manoeuvre, HasSubstr("turn both ways"));
 }
 
@@ -202,19 +231,43 @@ TEST(ThreadWatch, KnowsEachThreadsNameSchedulingAndProcessorTime) {
   const auto named = [&](const std::string& name) {
     const auto found =
         std::find_if(threads.begin(), threads.end(), [&](const auto& t) { return t.name == name; });
-    return found == threads.end() ? StatusReport::Thread{} : *found;
+    return found == threads.end() ? thread_status_t{} : *found;
   };
   EXPECT_EQ(named("watch-busy").scheduling, "idle");
   EXPECT_EQ(named("watch-asleep").scheduling, "normal");
-  EXPECT_GT(named("watch-busy").cpu_share, named("watch-asleep").cpu_share);
-  EXPECT_LE(named("watch-busy").cpu_share, 1.1);
+  EXPECT_GT(named("watch-busy").cpu_percent, named("watch-asleep").cpu_percent);
+  EXPECT_LE(named("watch-busy").cpu_percent, 110.0);
 }
 
-TEST(Quantiles, AreUnknownWithoutAValue) {
-  EXPECT_TRUE(std::isnan(quantiles_of(LatenessHistogram{}).p50_s));
-  LatenessHistogram histogram;
-  histogram.add(std::chrono::microseconds(100));
-  EXPECT_DOUBLE_EQ(quantiles_of(histogram).max_s, 100e-6);
+TEST(Status, KnowsItsDevicesAndNothingElseBeforeTheRun) {
+  Configuration configuration;
+  configuration.run_name = "demo";
+  configuration.sha256 = "abc";
+  configuration.devices.resize(2);
+  configuration.devices[1].name = "mtx1";
+  const status_t status = status_of(configuration, "0.1.0");
+  EXPECT_EQ(status.run + status.version + status.configuration_hash, "demo0.1.0abc");
+  ASSERT_EQ(status.devices.size(), 2U);
+  EXPECT_EQ(status.devices[1].name, "mtx1");
+  EXPECT_TRUE(std::isnan(status.devices[1].latency_ms));
+  EXPECT_TRUE(std::isnan(status.devices[1].clock_drift_ppm));
+  EXPECT_TRUE(std::isnan(status.devices[1].clock_sd_us));
+  EXPECT_TRUE(std::isnan(status.refit_duration_s));
+  EXPECT_EQ(status.refit_utime, 0);
+}
+
+TEST(Status, CountsEveryArraySoThatAListenerGetsAllOfIt) {
+  status_t status = healthy();
+  status.threads.resize(3);
+  status.threads[1].lateness_octaves = {4, 5, 6, 7};
+  status.problems = {"one", "two", "three", "four", "five"};
+  count_elements(status);
+  const auto heard = decode_message<status_t>(encode_message(status));
+  ASSERT_TRUE(heard);
+  EXPECT_THAT((std::array{heard->devices.size(), heard->studies.size(), heard->threads.size(),
+                          heard->rings.size(), heard->problems.size()}),
+              ElementsAre(3, 2, 3, 1, 5));
+  EXPECT_THAT(heard->threads[1].lateness_octaves, ElementsAre(4, 5, 6, 7));
 }
 
 }  // namespace

@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <random>
 
 #include "noise/wavelet_variance.h"
+#include "service/models_file.h"
 #include "service/noise_series.h"
+#include "tests/support/shared_data.h"
 
 namespace imuscope {
 namespace {
@@ -57,19 +60,18 @@ TEST(ModelBook, RefitsByCountAndAgreesWithTheBatchOverTheSameGapsAndRegimes) {
   ASSERT_TRUE(refit);
   EXPECT_FALSE(book.refit());
   EXPECT_EQ(batch.missing(), 7U);
-  ASSERT_EQ(refit->wavelet_variance.axes.size(), 2 * kAxisCount);
-  for (std::size_t k = 0; k < refit->wavelet_variance.axes.size(); ++k) {
-    const auto& streamed = refit->wavelet_variance.axes[k];
+  ASSERT_EQ(refit->axes.size(), 2 * kAxisCount);
+  for (std::size_t k = 0; k < refit->axes.size(); ++k) {
+    const auto& streamed = refit->axes[k].wv;
     noise::WvOptions options;
     const auto mask = batch.mask(k / 2, k % 2 == 0 ? Regime::kStatic : Regime::kDynamic);
     options.mask = mask;
     const auto expected = noise::haar_wavelet_variance(batch.values(k / 2), options);
     ASSERT_TRUE(expected);
-    ASSERT_EQ(streamed.levels.size(), expected->levels.size()) << streamed.axis << " " << streamed.regime;
+    ASSERT_EQ(streamed.levels.size(), expected->levels.size()) << k;
     for (std::size_t j = 0; j < streamed.levels.size(); ++j) {
       EXPECT_NEAR(streamed.levels[j].value, expected->levels[j].value, 1e-12 * expected->levels[j].value);
-      EXPECT_EQ(streamed.levels[j].n_coefficients,
-                static_cast<std::int64_t>(expected->levels[j].n_coefficients));
+      EXPECT_EQ(streamed.levels[j].n_coefficients, expected->levels[j].n_coefficients);
     }
   }
 }
@@ -93,18 +95,21 @@ TEST(ModelBook, TellsAChangeOfBehaviourAtTheRefitAfterItAndNoneBefore) {
   std::mt19937 random(17);
   std::int64_t counter = 0;
   const auto first = fed(book, counter, 10, 1.0, random);
-  ASSERT_EQ(first.noise_model.models.size(), kAxisCount);
-  EXPECT_TRUE(std::isnan(first.noise_model.models[0].change_p_value))
-      << "there is nothing before to compare with";
+  ASSERT_EQ(first.axes.size(), kAxisCount);
+  EXPECT_FALSE(first.axes[0].change) << "there is nothing before to compare with";
   for (int quiet = 0; quiet < 10; ++quiet) {
-    for (const auto& model : fed(book, counter, 10, 1.0, random).noise_model.models) {
-      EXPECT_FALSE(model.changed) << model.axis << " p " << model.change_p_value;
-      EXPECT_GT(model.change_dof, 5.0);
+    const auto refit = fed(book, counter, 10, 1.0, random);
+    for (const auto& axis : refit.axes) {
+      ASSERT_TRUE(axis.change);
+      EXPECT_FALSE(axis.changed) << axis.axis << " p " << axis.change->p_value;
+      EXPECT_GT(axis.change->dof, 5);
     }
   }
   // A fifth more noise in ten seconds of 1000 samples.
-  for (const auto& model : fed(book, counter, 10, 1.2, random).noise_model.models) {
-    EXPECT_TRUE(model.changed) << model.axis << " p " << model.change_p_value;
+  const auto louder = fed(book, counter, 10, 1.2, random);
+  EXPECT_EQ(louder.axes.size(), kAxisCount);
+  for (const auto& axis : louder.axes) {
+    EXPECT_TRUE(axis.changed) << axis.axis << " p " << axis.change->p_value;
   }
 }
 
@@ -127,12 +132,34 @@ TEST(ModelBook, AWarmRefitEndsWhereASearchOverAllRatesDoes) {
   ASSERT_TRUE(last);
   const auto wv = noise::haar_wavelet_variance(batch.values(0)).value();
   const auto cold = noise::fit(wv, spec, 100.0).value();
-  const auto& warm = last->noise_model.models[0];
+  ASSERT_TRUE(last->axes[0].fit);
+  const auto& warm = *last->axes[0].fit;
   ASSERT_EQ(warm.parameters.size(), cold.parameters.size());
   for (std::size_t i = 0; i < cold.parameters.size(); ++i) {
     ASSERT_TRUE(cold.parameters[i].sd);
     EXPECT_NEAR(warm.parameters[i].value, cold.parameters[i].value, 0.05 * *cold.parameters[i].sd);
   }
+}
+
+TEST(NewestModels, AreThoseOfTheLastRefitOfEverySensorInTheFile) {
+  ModelBook book(two_devices(), *noise::parse_model("WN"));
+  std::mt19937 random(29);
+  std::int64_t counter = 0;
+  NewestModels newest;
+  newest.take(fed(book, counter, 10, 1.0, random));
+  const auto last = fed(book, counter, 10, 1.0, random);
+  newest.take(last);
+  const auto folder = test::scratch_folder();
+  ASSERT_TRUE(newest.write(folder));
+  std::ifstream file(folder / "models.json");
+  const auto models = nlohmann::json::parse(file).at("models");
+  ASSERT_EQ(models.size(), kAxisCount);
+  const auto read = read_model(models, "s", 5, "static");
+  ASSERT_TRUE(read) << read.error().text();
+  EXPECT_EQ(read->n, 2000U);
+  EXPECT_EQ(read->parameters.at(0).value, last.axes[5].fit->parameters.at(0).value);
+  EXPECT_EQ(models[5].at("unit"), "m/s^2");
+  EXPECT_FALSE(read_model(models, "s", 5, "dynamic"));
 }
 
 TEST(Modeller, LosesNoRowWhileItsThreadDoesNotGetToRun) {

@@ -12,31 +12,38 @@ namespace {
 constexpr auto kStatic = static_cast<std::size_t>(Regime::kStatic);
 constexpr auto kDynamic = static_cast<std::size_t>(Regime::kDynamic);
 
+constexpr double kFitRate_hz = 100.0;
+
 /// White noise, a fast and a slow GM about the present values of `noise`.
-AxisNoiseModel model_of(const std::string& axis, const std::string& regime, double white_sd, double fast_sd,
-                        double fast_tau_s, double slow_sd, double slow_tau_s) {
-  AxisNoiseModel model;
-  model.axis = axis;
-  model.regime = regime;
-  model.identifiable = true;
-  const auto add = [&](const std::string& process, const std::string& name, double value) {
-    model.parameters.push_back({process, name, "", value, kUnknown, kUnknown, kUnknown});
+/// @param axis  of the gyroscope
+AxisRefit refit_of(std::size_t axis, Regime regime, double white_sd, double fast_sd, double fast_tau_s,
+                   double slow_sd, double slow_tau_s) {
+  using noise::ProcessKind;
+  noise::FitResult fit;
+  fit.rate_hz = kFitRate_hz;
+  const auto add = [&](ProcessKind kind, double sd, double tau_s) {
+    fit.spec.processes.push_back(kind);
+    fit.model.components.push_back({kind, sd * sd, {1.0 / (tau_s * kFitRate_hz)}});
+    if (kind == ProcessKind::kGaussMarkov)
+      fit.parameters.push_back({"GM", "beta", "", 1.0 / tau_s, {}, {}, {}, {}});
+    fit.parameters.push_back({"", "sigma2", "", sd * sd, {}, {}, {}, {}});
   };
-  add("WN", "sigma2", white_sd * white_sd);
-  add("GM1", "beta", 1.0 / fast_tau_s);
-  add("GM1", "sigma2", fast_sd * fast_sd);
-  add("GM2", "beta", 1.0 / slow_tau_s);
-  add("GM2", "sigma2", slow_sd * slow_sd);
-  return model;
+  add(ProcessKind::kWhiteNoise, white_sd, 1.0);
+  add(ProcessKind::kGaussMarkov, fast_sd, fast_tau_s);
+  add(ProcessKind::kGaussMarkov, slow_sd, slow_tau_s);
+  AxisRefit refit;
+  refit.axis = axis;
+  refit.regime = regime;
+  refit.fit = std::move(fit);
+  return refit;
 }
 
 TEST(NoiseFeedback, WhiteFastAndSlowPartsGoToTheirPlaces) {
   const auto current = mtx_class_noise();
-  NoiseModelReport fitted;
   const double white = 1.5 * current.gyro[kDynamic].white_sd[1];
   const double slow = 1.2 * current.gyro_bias[1].sd;
-  fitted.models = {model_of("gyro_y", "dynamic", white, 0.5 * white, 0.05, slow, 80.0)};
-  const auto updated = updated_noise(current, fitted);
+  const auto updated =
+      updated_noise(current, {refit_of(1, Regime::kDynamic, white, 0.5 * white, 0.05, slow, 80.0)});
   EXPECT_NEAR(updated.gyro[kDynamic].white_sd[1], white, 1e-15);
   EXPECT_NEAR(updated.gyro[kDynamic].fast_sd[1], 0.5 * white, 1e-15);
   EXPECT_NEAR(updated.gyro[kDynamic].fast_time_constant_s[1], 0.05, 1e-15);
@@ -52,72 +59,68 @@ TEST(NoiseFeedback, WhatIsNotIdentifiableNotPositiveOrBeyondBeliefIsLeftAside) {
   const auto current = mtx_class_noise();
   const double white = current.gyro[kDynamic].white_sd[0];
   const double slow = current.gyro_bias[0].sd;
-  const auto same = [&](const AxisNoiseModel& model) {
-    NoiseModelReport fitted;
-    fitted.models = {model};
-    const auto updated = updated_noise(current, fitted);
+  const auto same = [&](const AxisRefit& refit) {
+    const auto updated = updated_noise(current, {refit});
     return updated.gyro[kDynamic].white_sd[0] == white && updated.gyro_bias[0].sd == slow;
   };
-  auto model = model_of("gyro_x", "dynamic", 1.1 * white, 0.1 * white, 0.05, 1.1 * slow, 80.0);
-  EXPECT_FALSE(same(model));
-  model.identifiable = false;
-  EXPECT_TRUE(same(model));
-  EXPECT_TRUE(same(model_of("gyro_x", "dynamic", 20.0 * white, white, 0.05, 20.0 * slow, 80.0)));
-  EXPECT_TRUE(same(model_of("gyro_x", "dynamic", white / 20.0, white / 20.0, 0.05, slow / 20.0, 80.0)));
-  model = model_of("gyro_x", "dynamic", 1.1 * white, white, 0.05, slow, 80.0);
-  model.parameters[0].value = std::nan("");
-  EXPECT_TRUE(same(model));
+  auto refit = refit_of(0, Regime::kDynamic, 1.1 * white, 0.1 * white, 0.05, 1.1 * slow, 80.0);
+  EXPECT_FALSE(same(refit));
+  refit.fit->identifiable = false;
+  EXPECT_TRUE(same(refit));
+  EXPECT_TRUE(same(refit_of(0, Regime::kDynamic, 20.0 * white, white, 0.05, 20.0 * slow, 80.0)));
+  EXPECT_TRUE(same(refit_of(0, Regime::kDynamic, white / 20.0, white / 20.0, 0.05, slow / 20.0, 80.0)));
+  refit = refit_of(0, Regime::kDynamic, 1.1 * white, white, 0.05, slow, 80.0);
+  refit.fit->parameters[0].value = std::nan("");
+  EXPECT_TRUE(same(refit));
 }
 
 TEST(NoiseFeedback, ARecordTooShortForTheSlowProcessesStillTellsTheWhiteNoise) {
   const auto current = mtx_class_noise();
   const double white = 1.5 * current.gyro[kDynamic].white_sd[0];
-  auto model = model_of("gyro_x", "dynamic", white, 2.0 * white, 0.05, 3.0 * current.gyro_bias[0].sd, 80.0);
-  model.identifiable = false;
-  model.parameters[0].ci_low = 0.9 * white * white;
-  model.parameters[0].ci_high = 1.1 * white * white;
-  NoiseModelReport fitted;
-  fitted.models = {model};
+  auto refit = refit_of(0, Regime::kDynamic, white, 2.0 * white, 0.05, 3.0 * current.gyro_bias[0].sd, 80.0);
+  refit.fit->identifiable = false;
+  refit.fit->parameters[0].ci_low = 0.9 * white * white;
+  refit.fit->parameters[0].ci_high = 1.1 * white * white;
   auto expected = current;
   expected.gyro[kDynamic].white_sd[0] = white;
-  EXPECT_TRUE(updated_noise(current, fitted) == expected);
+  EXPECT_TRUE(updated_noise(current, {refit}) == expected);
 }
 
 /// A refit that says `factor` times the present sd of every axis of the gyroscope in motion.
-NoiseModelReport louder(const StudyNoise& base, double factor, double slow_factor = 1.0) {
-  NoiseModelReport fitted;
-  const char* axes[] = {"gyro_x", "gyro_y", "gyro_z"};
+Refit louder(const StudyNoise& base, std::int64_t samples, double factor, double slow_factor = 1.0) {
+  Refit refit;
+  refit.samples = samples;
   for (std::size_t i = 0; i < 3; ++i) {
     const double white = factor * base.gyro[kDynamic].white_sd[i];
-    fitted.models.push_back(
-        model_of(axes[i], "dynamic", white, 0.01 * white, 0.05, slow_factor * base.gyro_bias[i].sd, 80.0));
+    refit.axes.push_back(
+        refit_of(i, Regime::kDynamic, white, 0.01 * white, 0.05, slow_factor * base.gyro_bias[i].sd, 80.0));
   }
-  return fitted;
+  return refit;
 }
 
 TEST(NoiseFeedback, TheFirstModelReplacesTheConfiguredAndLaterOnesOnlyWhereSomethingMoved) {
   const auto configured = mtx_class_noise();
   NoiseFeedback feedback(configured, 0.5);
   EXPECT_EQ(feedback.version(), 0);
-  const auto first = feedback.consider(louder(configured, 1.02), 6000);
+  const auto first = feedback.consider(louder(configured, 6000, 1.02));
   ASSERT_TRUE(first);
   EXPECT_EQ(first->version, 1);
   EXPECT_EQ(first->samples, 6000);
   // The scatter of the fits: 4 % in sd up and down.
   for (const double scatter : {1.06, 0.98, 1.05, 1.00}) {
-    EXPECT_FALSE(feedback.consider(louder(configured, scatter), 12000)) << scatter;
+    EXPECT_FALSE(feedback.consider(louder(configured, 12000, scatter))) << scatter;
     EXPECT_TRUE(feedback.in_force() == first->noise);
   }
   // A slow creep counts from what is in force, not from the refit before.
   std::optional<NewNoise> second;
   double factor = 1.02;
   for (; !second && factor < 1.5; factor += 0.02)
-    second = feedback.consider(louder(configured, factor), 18000);
+    second = feedback.consider(louder(configured, 18000, factor));
   ASSERT_TRUE(second);
   EXPECT_EQ(second->version, 2);
   EXPECT_NEAR(factor - 0.02, 1.02 * std::sqrt(NoiseFeedback::kVarianceStep), 0.021);
   // The bias process alone.
-  const auto third = feedback.consider(louder(configured, factor - 0.02, 1.6), 24000);
+  const auto third = feedback.consider(louder(configured, 24000, factor - 0.02, 1.6));
   ASSERT_TRUE(third);
   EXPECT_EQ(third->version, 3);
 }
@@ -127,7 +130,7 @@ TEST(NoiseFeedback, ResidualsThatGrowEverSmallerStopAtTheFloor) {
   const auto configured = mtx_class_noise();
   NoiseFeedback feedback(configured, 0.5);
   for (int refit = 1; refit <= 40; ++refit)
-    (void)feedback.consider(louder(feedback.in_force(), 0.7, 0.5), 6000 * refit);
+    (void)feedback.consider(louder(feedback.in_force(), 6000 * refit, 0.7, 0.5));
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_DOUBLE_EQ(feedback.in_force().gyro[kDynamic].white_sd[i],
                      0.5 * configured.gyro[kDynamic].white_sd[i]);
@@ -138,10 +141,10 @@ TEST(NoiseFeedback, ResidualsThatGrowEverSmallerStopAtTheFloor) {
 TEST(NoiseFeedback, ARefitThatSaysNothingUsableGoesNowhere) {
   const auto configured = mtx_class_noise();
   NoiseFeedback feedback(configured, 0.5);
-  EXPECT_FALSE(feedback.consider({}, 6000));
-  auto vague = louder(configured, 1.5);
-  for (auto& model : vague.models) model.identifiable = false;
-  EXPECT_FALSE(feedback.consider(vague, 6000));
+  EXPECT_FALSE(feedback.consider(Refit{}));
+  auto vague = louder(configured, 6000, 1.5);
+  for (auto& axis : vague.axes) axis.fit->identifiable = false;
+  EXPECT_FALSE(feedback.consider(vague));
   EXPECT_EQ(feedback.version(), 0);
   EXPECT_TRUE(feedback.in_force() == configured);
 }

@@ -19,10 +19,9 @@
 #include <string>
 #include <vector>
 
-#include "example_reports.h"
+#include "example_messages.h"
 #include "publish/lcm_listener.h"
 #include "publish/lcm_publisher.h"
-#include "publish/message_builders.h"
 #include "publish/message_codec.h"
 #include "tests/support/shared_data.h"
 
@@ -109,7 +108,7 @@ class TopTerminal : public testing::Test {
   bool soon(const Condition& condition) {
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
     while (std::chrono::steady_clock::now() < end) {
-      voice_->publish(test::example_status());
+      voice_->publish(test::example_status(), "STATUS");
       (void)ear_->wait(milliseconds(50));
       if (condition()) return true;
     }

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "example_reports.h"
-#include "publish/message_builders.h"
+#include "example_messages.h"
 #include "tools/imuscope/top/terminal.h"
 
 namespace imuscope::top {
@@ -18,9 +17,9 @@ using testing::Not;
 
 Heard example() {
   Heard heard;
-  heard.status = to_message(test::example_status(), 7);
-  heard.calibrations["mtx1"] = to_message(test::example_calibration(), "mtx1", 1);
-  heard.models["mtx1"] = to_message(test::example_noise_model(), 1);
+  heard.status = test::example_status();
+  heard.calibrations["mtx1"] = test::example_calibration();
+  heard.models["mtx1"] = test::example_noise_model();
   return heard;
 }
 
@@ -60,7 +59,7 @@ TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndProblems) {
 TEST(TopView, OdometryShowsSpeedStateAndScaleWhereThereIsAny) {
   auto heard = example();
   EXPECT_THAT(page(heard), Not(HasSubstr("ODOMETRY")));
-  heard.odometry = to_message(test::example_odometry(), 1);
+  heard.odometry = test::example_odometry();
   EXPECT_THAT(page(heard), HasSubstr("ODOMETRY    +12.25 m/s  at rest, zero velocity in use  scale +1.20"));
   EXPECT_THAT(page(heard), HasSubstr("speed 21/22  no slip 23/24  zero velocity 25/26"));
   heard.odometry->zero_velocity = 0;

@@ -8,6 +8,7 @@
 #include "progress.h"
 #include "report/report.h"
 #include "service/recording.h"
+#include "service/replay_run.h"
 #include "service/several_drives.h"
 #include "service/study.h"
 #include "study_table.h"
@@ -115,15 +116,10 @@ Result<void> replay_command(const ProcessCommand& options) {
   if (!opened) return tl::unexpected<Error>(opened.error());
   {
     ProgressBar bar;
-    const StudyRunOptions run{options.out,
-                              IMUSCOPE_VERSION,
-                              [&](const std::string& step, double share) { bar.show(step, share); },
-                              {},
-                              {}};
-    if (auto done =
-            run_replay(opened->configuration, opened->recording, run, {options.realtime, options.lcm});
-        !done)
-      return done;
+    const ReplayRunOptions run{options.out, IMUSCOPE_VERSION,
+                               [&](double share) { bar.show("replay", share); }, options.realtime,
+                               options.lcm};
+    if (auto done = run_replay(opened->configuration, opened->recording, run); !done) return done;
   }
   return print_study(options.out, options.json);
 }

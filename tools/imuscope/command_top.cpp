@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <imuscope/event_t.hpp>
 #include <map>
 #include <memory>
 #include <string>
@@ -13,6 +14,7 @@
 #include "publish/lcm_listener.h"
 #include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
+#include "publish/message_values.h"
 #include "rt/host_clock.h"
 #include "tools/imuscope/top/terminal.h"
 #include "tools/imuscope/top/view.h"
@@ -81,7 +83,11 @@ class Top {
   }
 
   void mark(const std::string& text) {
-    voice_.publish(PersonEvent{wall_clock_now(), source_, text});
+    event_t event{};
+    event.utime = to_utime(wall_clock_now());
+    event.source = source_;
+    event.text = text;
+    voice_.publish(event, "EVENT");
     heard_.note = fmt::format("event sent: {}", text);
   }
 

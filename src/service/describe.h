@@ -1,0 +1,15 @@
+#pragma once
+
+/// Events in words.
+
+#include <string>
+
+#include "calibration/estimator.h"
+#include "service/config.h"
+
+namespace imuscope {
+
+/// What a person should know of an event, in one sentence.
+std::string describe(const Configuration& configuration, const EstimatorEvent& event);
+
+}  // namespace imuscope

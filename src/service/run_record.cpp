@@ -1,0 +1,156 @@
+#include "service/run_record.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <chrono>
+
+#include "base/units.h"
+#include "service/describe.h"
+#include "service/run_folder.h"
+
+namespace imuscope {
+
+namespace {
+
+std::string utc_text(UtcTime utc) {
+  const auto since_epoch = std::chrono::floor<std::chrono::seconds>(utc);
+  const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(since_epoch));
+  const std::chrono::hh_mm_ss time(since_epoch - std::chrono::floor<std::chrono::days>(since_epoch));
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", static_cast<int>(date.year()),
+                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+                     time.hours().count(), time.minutes().count(), time.seconds().count());
+}
+
+nlohmann::json device_json(const RunRecord& run, std::size_t i) {
+  const auto& device = run.configuration.devices[i];
+  const DeviceRecord& record = run.devices[i];
+  const auto& counters = record.counters;
+  nlohmann::json entry{{"name", device.name},
+                       {"role", name_of(device.role)},
+                       {"protocol", name_of(device.protocol)},
+                       {"rate_hz", device.rate_hz},
+                       {"samples", counters.samples},
+                       {"frames", counters.frames},
+                       {"bytes", counters.bytes},
+                       {"bytes_skipped", counters.bytes_skipped},
+                       {"bad_checksums", counters.bad_checksums},
+                       {"bad_lengths", counters.bad_lengths},
+                       {"bad_contents", counters.bad_contents},
+                       {"samples_lost", counters.samples_lost},
+                       {"clock_resets", counters.clock_resets},
+                       {"frames_dropped", record.frames_dropped},
+                       {"refused", record.refused},
+                       {"problem", record.problem},
+                       {"clock", record.clock},
+                       {"clock_shift_s", record.clock_shift_s}};
+  const auto studies = run.configuration.study_indices();
+  const auto found = std::find(studies.begin(), studies.end(), i);
+  const bool is_study = found != studies.end() && run.last != nullptr;
+  entry["late"] =
+      is_study
+          ? nlohmann::json(run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters.late)
+          : nlohmann::json(nullptr);
+  return entry;
+}
+
+/// What was learned of the wheels, and what became of their speeds.
+nlohmann::json odometry_json(const Snapshot& last) {
+  const OdometryOutput& out = last.odometry;
+  const EstimatorCounters& counters = last.counters;
+  const auto degrees = [](const Vector3& v) {
+    return nlohmann::json{v[0] * kDegPerRad, v[1] * kDegPerRad, v[2] * kDegPerRad};
+  };
+  return {{"scale", out.scale},
+          {"scale_sd", out.sd_scale},
+          {"mounting_rotation_vector_deg", degrees(out.mount_rad)},
+          {"mounting_sd_deg", degrees(out.sd_mount_rad)},
+          {"axle_lever_arm_b_m", out.r_bv_b_m},
+          {"axle_lever_arm_sd_m", out.sd_r_bv_b_m},
+          {"nis", {{"speed", out.nis[0]}, {"sideways", out.nis[1]}, {"upwards", out.nis[2]}}},
+          {"samples", counters.odometry_samples},
+          {"speed_used", counters.odometry_speed_used},
+          {"speed_rejected", counters.odometry_speed_rejected},
+          {"non_holonomic_used", counters.odometry_slip_used},
+          {"non_holonomic_rejected", counters.odometry_slip_rejected},
+          {"zero_velocity_used", counters.zero_velocity_used},
+          {"zero_velocity_rejected", counters.zero_velocity_rejected},
+          {"too_old", counters.odometry_too_old},
+          {"not_finite", counters.odometry_not_finite}};
+}
+
+/// What the receiver says and what the vehicle does do not fit: everything else rests on both.
+bool contradicts_motion(const EstimatorCounters& counters) {
+  // Of honest sd the gate refuses about one position in a thousand.
+  constexpr double kRefusedShareMax = 0.05;
+  return static_cast<double>(counters.gnss_positions_rejected) >
+         kRefusedShareMax * static_cast<double>(counters.gnss_used + counters.gnss_rejected);
+}
+
+nlohmann::json gnss_json(const EstimatorCounters& counters) {
+  return {{"used", counters.gnss_used},
+          {"rejected", counters.gnss_rejected},
+          {"positions_rejected", counters.gnss_positions_rejected},
+          {"contradicts_motion", contradicts_motion(counters)}};
+}
+
+}  // namespace
+
+std::vector<std::string> warnings_of(const Configuration& configuration, const Snapshot& last) {
+  std::vector<std::string> warnings;
+  const EstimatorCounters& counters = last.counters;
+  if (const auto gnss = configuration.gnss_index(); gnss && contradicts_motion(counters)) {
+    warnings.push_back(fmt::format(
+        "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its times are "
+        "of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, and do not trust "
+        "this run before",
+        configuration.devices[*gnss].name, counters.gnss_positions_rejected,
+        counters.gnss_used + counters.gnss_rejected));
+  }
+  const auto indices = configuration.study_indices();
+  for (std::size_t i = 0; i < last.n_studies; ++i) {
+    if (last.studies[i].status >= StudyStatus::kConverging) continue;
+    warnings.push_back(
+        fmt::format("{}: no mounting was found; it needs about a minute of driving with turns, or a "
+                    "[device.prior] in the configuration",
+                    configuration.devices[indices[i]].name));
+  }
+  return warnings;
+}
+
+nlohmann::json run_json(const RunRecord& run) {
+  nlohmann::json json{{"schema", "imuscope.run/1"},
+                      {"name", run.configuration.run_name},
+                      {"version", run.version},
+                      {"build", fmt::format("{} {}", __VERSION__, sizeof(void*) == 8 ? "64 bit" : "32 bit")},
+                      {"configuration", run.configuration.file.filename().string()},
+                      {"configuration_sha256", run.configuration.sha256},
+                      {"configuration_text", run.configuration.text},
+                      {"inputs", run.inputs},
+                      {"ticks", run.ticks},
+                      {"duration_s", static_cast<double>(run.ticks) / kTickRate_hz},
+                      {"warnings", run.warnings}};
+  json["t0_utc"] = run.last != nullptr && run.last->has_utc
+                       ? nlohmann::json(utc_text(run.last->first_reference_utc))
+                       : nlohmann::json(nullptr);
+  if (run.static_s && run.dynamic_s)
+    json["regimes"] = {{"static_s", *run.static_s}, {"dynamic_s", *run.dynamic_s}};
+  json["devices"] = nlohmann::json::array();
+  for (std::size_t i = 0; i < run.configuration.devices.size(); ++i)
+    json["devices"].push_back(device_json(run, i));
+  if (run.last != nullptr && run.configuration.gnss_index()) json["gnss"] = gnss_json(run.last->counters);
+  if (run.last != nullptr && run.last->odometry.enabled) json["odometry"] = odometry_json(*run.last);
+  json["events"] = nlohmann::json::array();
+  for (const auto& event : run.events) {
+    json["events"].push_back(
+        {{"time_s", run.last != nullptr ? to_seconds(event.time - run.last->first_reference_time) : 0.0},
+         {"text", describe(run.configuration, event)}});
+  }
+  if (!run.error_process_mounting.empty()) json["error_process_mounting"] = run.error_process_mounting;
+  return json;
+}
+
+Result<void> write_run_record(const std::filesystem::path& folder, const RunRecord& run) {
+  return write_json(folder / "run.json", run_json(run));
+}
+
+}  // namespace imuscope

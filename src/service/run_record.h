@@ -1,0 +1,51 @@
+#pragma once
+
+/// run.json: what a run was made of and what became of it. A live run, a replay and the study of a recording
+/// fill in the same record.
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "drivers/device/device.h"
+#include "service/config.h"
+#include "service/core.h"
+
+namespace imuscope {
+
+/// What became of one device's bytes.
+struct DeviceRecord {
+  DecoderCounters counters;
+  std::uint64_t refused = 0;             ///< samples that found their ring full
+  std::uint64_t frames_dropped = 0;      ///< of a live run: lost by this PC before they could be read
+  std::string problem;                   ///< in one sentence with the remedy; empty when all is well
+  std::string clock = "arrival stamps";  ///< how its times were mapped
+  double clock_shift_s = 0.0;            ///< what was added to its own time at mid-record
+};
+
+struct RunRecord {
+  const Configuration& configuration;
+  std::string version;
+  std::vector<std::string> inputs;    ///< as given; "live"
+  std::vector<DeviceRecord> devices;  ///< of the configuration
+  std::int64_t ticks = 0;             ///< those that were skipped do not count
+  const Snapshot* last = nullptr;     ///< absent where there was no tick
+  std::vector<EstimatorEvent> events{};
+  std::vector<std::string> warnings{};
+  std::optional<double> static_s{};  ///< of a study, which tells rest from motion
+  std::optional<double> dynamic_s{};
+  std::string error_process_mounting{};  ///< of a study: whose mounting the error process was made with
+};
+
+/// run.json's content.
+nlohmann::json run_json(const RunRecord& run);
+Result<void> write_run_record(const std::filesystem::path& folder, const RunRecord& run);
+
+/// What a person should know of a finished run: GNSS that contradicts the motion, S-IMUs without a mounting.
+[[nodiscard]] std::vector<std::string> warnings_of(const Configuration& configuration, const Snapshot& last);
+
+}  // namespace imuscope
