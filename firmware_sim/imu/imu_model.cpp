@@ -45,12 +45,23 @@ Eigen::Vector3d next_noise(std::array<NoiseSource, 3>& sources, Regime regime, d
 
 Eigen::Vector3d with_errors(const Eigen::Vector3d& truth, const Eigen::Vector3d& f,
                             const Eigen::Vector3d& noise, const TriadErrors& errors) {
-  return clipped_and_quantised(truth + errors.scale.cwiseProduct(truth) + errors.misalignment * truth +
+  const Eigen::Vector3d u = errors.C_s_triad * truth;
+  return clipped_and_quantised(u + errors.scale.cwiseProduct(u) + errors.misalignment * u +
                                    errors.g_sensitivity * f + errors.bias + noise,
                                errors);
 }
 
 }  // namespace
+
+Eigen::Matrix3d triad_matrix(const TriadErrors& errors) {
+  Eigen::Matrix3d matrix = errors.misalignment;
+  matrix.diagonal() += Eigen::Vector3d::Ones() + errors.scale;
+  return matrix * errors.C_s_triad;
+}
+
+double slow_delay_s(const TriadErrors& errors) {
+  return errors.delay_s + 1.0 / (2.0 * std::numbers::pi * errors.low_pass_hz);
+}
 
 double Temperature::at(double t_s) const {
   return begin_degC - (end_degC - begin_degC) * std::expm1(-t_s / time_constant_s);
@@ -61,13 +72,50 @@ IdealReading ideal_reading(const MotionState& state, const Mounting& mounting) {
           mounting.C_b_s * specific_force_at(state, mounting.r_bs_b_m)};
 }
 
+Eigen::Vector3d size_effect(const MotionState& state, const Mounting& mounting,
+                            const Eigen::Matrix3d& places_s_m) {
+  const Eigen::Vector3d omega_s = mounting.C_b_s * state.omega_ib_b_radps;
+  const Eigen::Vector3d omega_dot_s = mounting.C_b_s * state.omega_dot_ib_b_radps2;
+  Eigen::Vector3d effect;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Vector3d place = places_s_m.col(i);
+    effect(i) = (omega_dot_s.cross(place) + omega_s.cross(omega_s.cross(place)))(i);
+  }
+  return effect;
+}
+
 ImuModel::ImuModel(const Motion& motion, const Mounting& mounting, const ImuErrors& errors,
                    std::uint64_t seed, std::string_view name)
     : motion_(&motion),
       mounting_(mounting),
       errors_(errors),
       gyro_noise_(noise_sources(errors.gyro, errors.regime_switch, seed, std::string(name) + "/gyro_")),
-      accel_noise_(noise_sources(errors.accel, errors.regime_switch, seed, std::string(name) + "/accel_")) {}
+      accel_noise_(noise_sources(errors.accel, errors.regime_switch, seed, std::string(name) + "/accel_")) {
+  if (motion.engine() != nullptr && errors.own_vibration > 0.0)
+    own_vibration_.emplace(VibrationClass{}.times(errors.own_vibration),
+                           Random(seed, std::string(name) + "/vibration"));
+  disturbed_ = own_vibration_.has_value() || errors.gyro.delay_s != 0.0 || errors.accel.delay_s != 0.0 ||
+               !errors.accel_places_s_m.isZero(0.0);
+}
+
+/// What reaches the low-pass at t_s.
+IdealReading ImuModel::input_at(double t_s) const {
+  const auto felt_at = [this](double then_s) {
+    const MotionState state = motion_->state_at(then_s);
+    IdealReading felt = ideal_reading(state, mounting_);
+    felt.f_mps2 += size_effect(state, mounting_, errors_.accel_places_s_m);
+    if (own_vibration_) {
+      const Vibration::Point own = own_vibration_->at(motion_->engine()->at(then_s));
+      felt.omega_radps += own.omega_radps;
+      felt.f_mps2 += own.f_mps2;
+    }
+    return felt;
+  };
+  IdealReading input = felt_at(t_s - errors_.gyro.delay_s);
+  if (errors_.accel.delay_s != errors_.gyro.delay_s)
+    input.f_mps2 = felt_at(t_s - errors_.accel.delay_s).f_mps2;
+  return input;
+}
 
 IdealReading ImuModel::through_low_pass(const IdealReading& now, double t_s) {
   const double gyro_hz = errors_.gyro.low_pass_hz;
@@ -81,8 +129,7 @@ IdealReading ImuModel::through_low_pass(const IdealReading& now, double t_s) {
   const int steps = std::max(1, static_cast<int>(std::ceil(span_s / kFilterStep_s)));
   const double step_s = span_s / steps;
   for (int k = 1; k <= steps; ++k) {
-    const IdealReading input =
-        k == steps ? now : ideal_reading(motion_->state_at(last_t_s_ + k * step_s), mounting_);
+    const IdealReading input = k == steps ? now : input_at(last_t_s_ + k * step_s);
     filtered_.omega_radps =
         low_passed(filtered_.omega_radps, last_input_.omega_radps, input.omega_radps, step_s, gyro_hz);
     filtered_.f_mps2 = low_passed(filtered_.f_mps2, last_input_.f_mps2, input.f_mps2, step_s, accel_hz);
@@ -93,7 +140,8 @@ IdealReading ImuModel::through_low_pass(const IdealReading& now, double t_s) {
 
 ImuReading ImuModel::sample_at(double t_s) {
   const IdealReading ideal = ideal_reading(motion_->state_at(t_s), mounting_);
-  return sample_of(ideal, through_low_pass(ideal, t_s), motion_->regime_at(t_s), t_s);
+  const IdealReading input = disturbed_ ? input_at(t_s) : ideal;
+  return sample_of(ideal, through_low_pass(input, t_s), motion_->regime_at(t_s), t_s);
 }
 
 ImuReading ImuModel::sample_of(const IdealReading& ideal, const IdealReading& seen, Regime regime,

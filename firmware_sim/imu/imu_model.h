@@ -2,14 +2,17 @@
 
 /// What an IMU somewhere on the vehicle reads: the motion at its place and orientation, and its errors.
 ///
-///   reading = quantise(clip((I + diag(scale) + misalignment) u + g_sensitivity f + bias + noise))
+///   reading = quantise(clip((I + diag(scale) + misalignment) C_s_triad u + g_sensitivity f + bias + noise))
 ///
-/// with u the true rate or force in the sensor's axes s, through the sensor's low-pass where it has one. By
-/// default samples are instantaneous and nothing is clipped or quantised.
+/// with u the true rate or force in the sensor's axes s, and f the force, as they were delay_s before and
+/// through the sensor's low-pass where it has one. The force of axis i is that at the place of the
+/// accelerometer i. By default samples are instantaneous, all accelerometers are at s's origin and nothing is
+/// clipped or quantised.
 
 #include <Eigen/Core>
 #include <array>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "firmware_sim/imu/noise.h"
@@ -30,10 +33,18 @@ struct TriadErrors {
   Eigen::Vector3d scale = Eigen::Vector3d::Zero();               ///< relative; 0.001 reads 0.1 % too much
   Eigen::Matrix3d misalignment = Eigen::Matrix3d::Zero();        ///< cross-coupling, rad; diagonal zero
   Eigen::Matrix3d g_sensitivity = Eigen::Matrix3d::Zero();       ///< gyro only: rad/s per m/s^2
+  Eigen::Matrix3d C_s_triad = Eigen::Matrix3d::Identity();       ///< rotates s to the triad's own axes
+  double delay_s = 0.0;                                          ///< a reading shows what was this long ago
   double quantisation = 0.0;                                     ///< step; 0 for none
   double range = std::numeric_limits<double>::infinity();        ///< readings end at +-range
   double low_pass_hz = std::numeric_limits<double>::infinity();  ///< corner of the first-order low-pass
 };
+
+/// Matrix of a triad: what it makes of a constant rate or force in s.
+Eigen::Matrix3d triad_matrix(const TriadErrors& errors);
+
+/// How far a triad's readings are behind a slow motion: its delay and that of its low-pass.
+double slow_delay_s(const TriadErrors& errors);
 
 /// Temperature of a sensor that warms up after it was switched on at the scenario's beginning.
 struct Temperature {
@@ -53,6 +64,10 @@ struct NoiseDependence {
 struct ImuErrors {
   TriadErrors gyro;
   TriadErrors accel;
+  /// Column i: from s's origin to the accelerometer i, in s.
+  Eigen::Matrix3d accel_places_s_m = Eigen::Matrix3d::Zero();
+  /// What the sensor's mount adds to the vehicle's vibration, as a share of it; 0 where no engine runs.
+  double own_vibration = 0.0;
   Temperature temperature;
   NoiseDependence gyro_white;
   RegimeSwitch regime_switch = RegimeSwitch::kContinuous;
@@ -74,6 +89,11 @@ struct IdealReading {
 };
 IdealReading ideal_reading(const MotionState& state, const Mounting& mounting);
 
+/// What accelerometers at places of their own feel beyond one at s's origin, axis by axis.
+/// @param places_s_m  column i: from s's origin to the accelerometer i, in s
+Eigen::Vector3d size_effect(const MotionState& state, const Mounting& mounting,
+                            const Eigen::Matrix3d& places_s_m);
+
 class ImuModel {
  public:
   /// @param motion  must outlive the model
@@ -92,6 +112,7 @@ class ImuModel {
 
  private:
   using TriadNoise = std::array<NoiseSource, 3>;
+  [[nodiscard]] IdealReading input_at(double t_s) const;
   IdealReading through_low_pass(const IdealReading& now, double t_s);
 
   const Motion* motion_;
@@ -99,6 +120,8 @@ class ImuModel {
   ImuErrors errors_;
   TriadNoise gyro_noise_;
   TriadNoise accel_noise_;
+  std::optional<Vibration> own_vibration_;  ///< in s
+  bool disturbed_ = false;  ///< what the sensor feels is not the motion at its place and instant
   bool has_last_ = false;
   double last_t_s_ = 0.0;
   IdealReading last_input_{};

@@ -1,9 +1,11 @@
 #include "firmware_sim/imu/sensor_classes.h"
 
+#include "firmware_sim/motion/degrees.h"
+#include "firmware_sim/motion/draw.h"
+
 namespace imusim {
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180.0;
 constexpr double kRad2PerDeg2 = kRadPerDeg * kRadPerDeg;
 
 // Table II of the paper, (deg/s)^2 and 1/s.
@@ -12,13 +14,6 @@ AxisNoise table2_static() {
 }
 AxisNoise table2_dynamic() {
   return {0.65382 * kRad2PerDeg2, {{0.00981 * kRad2PerDeg2, 0.00155}, {0.00168 * kRad2PerDeg2, 1.68012}}};
-}
-
-Eigen::Vector3d draw3(Random& random, double sd) {
-  const double x = random.normal();
-  const double y = random.normal();
-  const double z = random.normal();
-  return sd * Eigen::Vector3d(x, y, z);
 }
 
 std::array<RegimeNoise, 3> all_axes(const RegimeNoise& noise) { return {noise, noise, noise}; }
@@ -56,7 +51,22 @@ ImuErrors draw_mtx(const MtxClass& mtx, Random& random) {
   return errors;
 }
 
-ImuErrors draw_airins(const AirinsClass& airins, double rate_hz, Random& random) {
+ReferenceClass reference_class(int number) {
+  constexpr double kPerSqrtHour = kRadPerDeg / 60.0;
+  constexpr double kPerHour = kRadPerDeg / 3600.0;
+  constexpr double kMicroG = 9.80665e-6;
+  // Orders of magnitude of public data sheets of each kind; the last is an MTx at 100 Hz.
+  static const std::array<ReferenceClass, kReferenceClasses> classes = {
+      ReferenceClass{},
+      {0.03 * kPerSqrtHour, 30.0 * kMicroG, 0.5 * kPerHour, 2e-3},
+      {0.125 * kPerSqrtHour, 60.0 * kMicroG, 3.0 * kPerHour, 5e-3},
+      {0.3 * kPerSqrtHour, 100.0 * kMicroG, 30.0 * kPerHour, 1e-2},
+      {4.8 * kPerSqrtHour, 300.0 * kMicroG, 1080.0 * kPerHour, 5e-2},
+  };
+  return classes.at(static_cast<std::size_t>(number - 1));
+}
+
+ImuErrors draw_reference(const ReferenceClass& airins, double rate_hz, Random& random) {
   const auto white = [rate_hz](double density) { return same_in_both({density * density * rate_hz, {}}); };
   ImuErrors errors;
   errors.gyro.noise = all_axes(white(airins.gyro_white_radps_per_sqrt_hz));

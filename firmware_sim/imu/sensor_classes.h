@@ -37,13 +37,18 @@ struct MtxClass {
 };
 ImuErrors draw_mtx(const MtxClass& mtx, Random& random);
 
-/// The reference: white noise densities and constant biases.
-struct AirinsClass {
+/// A reference, by default of class 1: white noise densities and constant biases.
+struct ReferenceClass {
   double gyro_white_radps_per_sqrt_hz = 0.0015 / 60.0 * 3.14159265358979323846 / 180.0;
   double accel_white_mps2_per_sqrt_hz = 10e-6 * 9.80665;
   double gyro_bias_sd_radps = 0.005 / 3600.0 * 3.14159265358979323846 / 180.0;
   double accel_bias_sd_mps2 = 5e-4;
 };
-ImuErrors draw_airins(const AirinsClass& airins, double rate_hz, Random& random);
+/// What a reference may be: navigation-grade fibre-optic (0.0015 deg/sqrt(h)), fibre-optic AHRS (0.03),
+/// tactical MEMS (0.125), industrial MEMS (0.3), and an MTx's own class (4.8). Accelerometers alike.
+inline constexpr int kReferenceClasses = 5;
+/// @param number  1 to kReferenceClasses, by falling quality
+ReferenceClass reference_class(int number);
+ImuErrors draw_reference(const ReferenceClass& airins, double rate_hz, Random& random);
 
 }  // namespace imusim

@@ -11,8 +11,8 @@
 #include <set>
 #include <sstream>
 
-#include "firmware_sim/imusim/degrees.h"
 #include "firmware_sim/imusim/table_reader.h"
+#include "firmware_sim/motion/degrees.h"
 
 namespace imusim {
 namespace {
@@ -252,6 +252,9 @@ void read_studies(TableReader& in, const MtxClass& common, Configuration& config
 }
 
 void read_reference(TableReader in, ReferenceSimulation& reference) {
+  std::int64_t number = 1;
+  in.whole("class", number, 1, kReferenceClasses);
+  reference.noise = reference_class(static_cast<int>(number));
   in.number("gyro_white_deg_per_sqrt_h", reference.noise.gyro_white_radps_per_sqrt_hz, kRadPerDeg / 60.0, 0.0,
             100.0);
   in.number("accel_white_ug_per_sqrt_hz", reference.noise.accel_white_mps2_per_sqrt_hz, kMicro * kMps2PerG,
@@ -316,6 +319,7 @@ Utc read_start(TableReader& in) {
 
 void read_simulation(TableReader in, Configuration& configuration) {
   Scenario& scenario = configuration.scenario;
+  configuration.world = static_cast<WorldKind>(in.choice("world", {"ideal", "harsh"}, 0));
   in.number("duration_s", scenario.duration_s, 1.0, 2.0, 86400.0);
   if (in.has("initial_standstill_s"))
     in.number("initial_standstill_s", scenario.initial_standstill_s.emplace(), 1.0, 0.0, scenario.duration_s);

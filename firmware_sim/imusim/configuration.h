@@ -4,10 +4,12 @@
 /// the table [simulation], which imuscope itself does not look at. Everything is SI and radians here.
 ///
 /// Keys of [simulation], all optional:
-///   duration_s, initial_standstill_s, seed, scenario ("drive", "static"), start_utc, start_latitude_deg,
+///   world ("ideal", the default; "harsh": all that imu/imperfections.h draws), duration_s,
+///   initial_standstill_s, seed, scenario ("drive", "static"), start_utc, start_latitude_deg,
 ///   start_longitude_deg, start_height_m, gyro_noise ("by_regime", "static", "dynamic"), regime_switch
 ///   ("continuous", "independent")
-/// [simulation.reference]: gyro_white_deg_per_sqrt_h, accel_white_ug_per_sqrt_hz, gyro_bias_sd_deg_per_h,
+/// [simulation.reference]: class (1 to 5: imu/sensor_classes.h; the keys after it override it),
+/// gyro_white_deg_per_sqrt_h, accel_white_ug_per_sqrt_hz, gyro_bias_sd_deg_per_h,
 ///   accel_bias_sd_mps2, attitude_sd_deg (roll, pitch, heading), latency_ms, alignment_s
 /// [simulation.gnss]: position_sd_m, velocity_sd_mps (north, east, down), latency_ms
 /// [simulation.wheels]: scale_error_percent, slow_sd_mps, white_sd_mps, step_kmph, dead_band_mps, latency_ms
@@ -35,6 +37,7 @@
 #include "firmware_sim/devices/can_encoder.h"
 #include "firmware_sim/devices/utc.h"
 #include "firmware_sim/faults/fault.h"
+#include "firmware_sim/imu/imperfections.h"
 #include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/imu/wheel_speed.h"
 #include "firmware_sim/imusim/failure.h"
@@ -72,7 +75,7 @@ struct PlayedDevice {
 };
 
 struct ReferenceSimulation {
-  AirinsClass noise;
+  ReferenceClass noise;
   Eigen::Vector3d attitude_sd_rad;  ///< roll, pitch, heading
   double latency_s = 0.001;
   double alignment_s = 0.0;
@@ -119,6 +122,7 @@ struct Configuration {
   std::string run_name;
   std::string channel_prefix = "IMUSCOPE";
   std::vector<PlayedDevice> devices;
+  WorldKind world = WorldKind::kIdeal;
   Scenario scenario;
   Utc utc_begin;
   ReferenceSimulation reference;

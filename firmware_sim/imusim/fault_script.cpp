@@ -5,8 +5,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "firmware_sim/imusim/degrees.h"
 #include "firmware_sim/imusim/table_reader.h"
+#include "firmware_sim/motion/degrees.h"
 
 namespace imusim {
 namespace {

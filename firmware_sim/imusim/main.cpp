@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <map>
 
 #include "firmware_sim/imusim/fault_script.h"
 #include "firmware_sim/imusim/live.h"
@@ -37,6 +38,8 @@ struct Common {
   std::optional<double> minutes;
   std::optional<std::uint64_t> seed;
   std::optional<std::string> faults;
+  std::optional<WorldKind> world;
+  std::optional<int> reference;
 
   void add_to(CLI::App& command) {
     command.add_option("CONFIG", config, "configuration with a [simulation] table, such as config/demo.toml")
@@ -44,6 +47,16 @@ struct Common {
     command.add_option("--minutes", minutes, "length of the scenario, instead of the configuration's")
         ->check(CLI::Range(0.05, 1440.0));
     command.add_option("--seed", seed, "seed of all randomness, instead of the configuration's");
+    command
+        .add_option("--world", world,
+                    "ideal, or harsh: all that data sheets allow of a sensor; instead of the configuration's")
+        ->transform(CLI::CheckedTransformer(
+            std::map<std::string, WorldKind>{{"ideal", WorldKind::kIdeal}, {"harsh", WorldKind::kHarsh}}));
+    command
+        .add_option("--reference-class", reference,
+                    "noise of the reference, from 1 (0.0015 deg/sqrt(h)) to 5 (4.8), instead of the "
+                    "configuration's")
+        ->check(CLI::Range(1, kReferenceClasses));
     command.add_option("--faults", faults,
                        "fault script: what goes wrong, and when; config/faults.toml explains it");
   }
@@ -51,6 +64,8 @@ struct Common {
     Outcome<Configuration> configuration = load_configuration(config);
     if (configuration && minutes) configuration->scenario.duration_s = *minutes * kSecondsPerMinute;
     if (configuration && seed) configuration->scenario.seed = *seed;
+    if (configuration && world) configuration->world = *world;
+    if (configuration && reference) configuration->reference.noise = reference_class(*reference);
     if (configuration && faults) {
       if (auto loaded = load_faults(*faults, *configuration); !loaded) return tl::unexpected(loaded.error());
     }

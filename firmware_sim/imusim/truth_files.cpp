@@ -8,7 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "firmware_sim/imusim/degrees.h"
+#include "firmware_sim/motion/degrees.h"
 
 namespace imusim {
 namespace {
@@ -59,6 +59,33 @@ json noise_models(const ImuErrors& errors) {
   return models;
 }
 
+/// What the harsh world adds, and every sensor has: matrices of the triads, and where and when they measure.
+void add_sensor(const ImuErrors& errors, json& imu) {
+  imu["gyro_bias_radps"] = numbers_of(errors.gyro.bias);
+  imu["accel_bias_mps2"] = numbers_of(errors.accel.bias);
+  imu["gyro_scale"] = numbers_of(errors.gyro.scale);
+  imu["accel_scale"] = numbers_of(errors.accel.scale);
+  imu["gyro_misalignment"] = rows_of(errors.gyro.misalignment);
+  imu["accel_misalignment"] = rows_of(errors.accel.misalignment);
+  imu["g_sensitivity"] = rows_of(errors.gyro.g_sensitivity);
+  // Reading = matrix x truth in s (of the R-IMU: in b) + bias + noise.
+  imu["gyro_matrix"] = rows_of(triad_matrix(errors.gyro));
+  imu["accel_matrix"] = rows_of(triad_matrix(errors.accel));
+  imu["C_s_accel"] = rows_of(errors.accel.C_s_triad);
+  // One row per accelerometer.
+  imu["accel_places_s_m"] = rows_of(errors.accel_places_s_m.transpose());
+  // Behind a slow motion: pure delay and low-pass.
+  imu["gyro_delay_s"] = slow_delay_s(errors.gyro);
+  imu["accel_delay_s"] = slow_delay_s(errors.accel);
+  const auto corner = [](const TriadErrors& triad) {
+    return std::isfinite(triad.low_pass_hz) ? json(triad.low_pass_hz) : json(nullptr);
+  };
+  imu["gyro_low_pass_hz"] = corner(errors.gyro);
+  imu["accel_low_pass_hz"] = corner(errors.accel);
+  imu["own_vibration"] = errors.own_vibration;
+  imu["noise"] = noise_models(errors);
+}
+
 json study_json(const World& world, const StudyTruth& study) {
   const Eigen::Quaterniond q(study.mounting.C_b_s);
   const double sign = q.w() < 0.0 ? -1.0 : 1.0;
@@ -74,14 +101,7 @@ json study_json(const World& world, const StudyTruth& study) {
   imu["sample_time"] = {{"counter0", study.first_counter},
                         {"t0_s", study.first_sample_s - world.first_reference_sample_s()},
                         {"period_s", study.period_s}};
-  imu["gyro_bias_radps"] = numbers_of(study.errors.gyro.bias);
-  imu["accel_bias_mps2"] = numbers_of(study.errors.accel.bias);
-  imu["gyro_scale"] = numbers_of(study.errors.gyro.scale);
-  imu["accel_scale"] = numbers_of(study.errors.accel.scale);
-  imu["gyro_misalignment"] = rows_of(study.errors.gyro.misalignment);
-  imu["accel_misalignment"] = rows_of(study.errors.accel.misalignment);
-  imu["g_sensitivity"] = rows_of(study.errors.gyro.g_sensitivity);
-  imu["noise"] = noise_models(study.errors);
+  add_sensor(study.errors, imu);
   return imu;
 }
 
@@ -124,6 +144,9 @@ Outcome<void> write_truth_json(const World& world, const std::filesystem::path& 
   truth["duration_s"] = configuration.scenario.duration_s;
   truth["t0_utc"] =
       utc_text(utc_without_leap_second(gps_after(configuration.utc_begin, world.first_reference_sample_s())));
+  truth["world"] = configuration.world == WorldKind::kIdeal ? "ideal" : "harsh";
+  truth["reference"] = {{"name", world.reference().name}};
+  add_sensor(world.reference().errors, truth["reference"]);
   truth["imus"] = json::array();
   for (const StudyTruth& study : world.studies()) truth["imus"].push_back(study_json(world, study));
   return write_file(folder / "truth.json", truth.dump(1) + "\n");

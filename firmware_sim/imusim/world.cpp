@@ -16,8 +16,9 @@
 #include "firmware_sim/devices/xsens_mtx.h"
 #include "firmware_sim/devices/xsens_xbus.h"
 #include "firmware_sim/faults/faulty_device.h"
-#include "firmware_sim/imusim/degrees.h"
 #include "firmware_sim/imusim/sensor_faults.h"
+#include "firmware_sim/motion/degrees.h"
+#include "firmware_sim/motion/draw.h"
 
 namespace imusim {
 namespace {
@@ -32,19 +33,6 @@ constexpr double kRotationAccelerationSd_degps2 = 0.024;
 const Eigen::DiagonalMatrix<double, 3>& C_ned_nwu() {
   static const Eigen::DiagonalMatrix<double, 3> flip(1.0, -1.0, -1.0);
   return flip;
-}
-
-Eigen::Vector3d draw3(Random& random, double sd) {
-  const double x = random.normal();
-  const double y = random.normal();
-  const double z = random.normal();
-  return sd * Eigen::Vector3d(x, y, z);
-}
-
-Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (angle == 0.0) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }
 
 ImuErrors errors_of(const StudySimulation& study, RegimeSwitch regime_switch, Random& random) {
@@ -66,6 +54,12 @@ ImuErrors errors_of(const StudySimulation& study, RegimeSwitch regime_switch, Ra
   errors.temperature = study.temperature.value_or(Temperature{});
   errors.gyro_white = study.gyro_white;
   return errors;
+}
+
+std::shared_ptr<const Motion> motion_of(const Configuration& configuration) {
+  Scenario scenario = configuration.scenario;
+  scenario.engine_runs = configuration.world == WorldKind::kHarsh;
+  return std::make_shared<Motion>(scenario);
 }
 
 /// The line that a device shares; the end where it is the first on its line, or on none.
@@ -141,7 +135,7 @@ class NavigationSolution {
 }  // namespace
 
 World::World(const Configuration& configuration, Beginning beginning, double begin_s)
-    : configuration_(configuration), motion_(std::make_shared<Motion>(configuration.scenario)) {
+    : configuration_(configuration), motion_(motion_of(configuration)) {
   std::size_t next_study = 0;
   for (const PlayedDevice& played : configuration_.devices) {
     switch (played.role) {
@@ -190,6 +184,8 @@ void World::add_study(const PlayedDevice& played, const StudySimulation& study, 
   truth.mounting.C_b_s = rotation_from_vector(study.rotation_vector_b_s_rad.value_or(drawn_rotation));
   truth.mounting.r_bs_b_m = study.r_bs_b_m.value_or(drawn_lever_arm);
   truth.errors = errors_of(study, study.draw.regime_switch, random);
+  Random unseen(configuration_.scenario.seed, played.name + "/imperfections");
+  draw_imperfections(study_imperfections(configuration_.world), unseen, truth.errors);
   truth.latency_s = study.latency_s;
   truth.clock_skew_ppm = study.clock_skew_ppm.value_or(drawn_skew);
   truth.period_s = 1.0 / played.rate_hz / (1.0 + truth.clock_skew_ppm * 1e-6);
@@ -211,7 +207,10 @@ void World::add_study(const PlayedDevice& played, const StudySimulation& study, 
 
 void World::add_reference(const PlayedDevice& played, Beginning beginning, double begin_s) {
   Random random(configuration_.scenario.seed, played.name + "/unit");
-  const ImuErrors errors = draw_airins(configuration_.reference.noise, played.rate_hz, random);
+  ImuErrors errors = draw_reference(configuration_.reference.noise, played.rate_hz, random);
+  Random unseen(configuration_.scenario.seed, played.name + "/imperfections");
+  draw_imperfections(reference_imperfections(configuration_.world), unseen, errors);
+  reference_ = {played.name, errors};
   StudyTruth clock;
   clock.name = played.name;
   clock.latency_s = configuration_.reference.latency_s;

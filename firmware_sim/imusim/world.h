@@ -46,6 +46,12 @@ struct StudyTruth {
   bool sends_temperature = false;
 };
 
+/// What is true of the R-IMU.
+struct ReferenceTruth {
+  std::string name;
+  ImuErrors errors;
+};
+
 /// A device, or all those behind one Xbus Master under the name of the first.
 struct WorldDevice {
   PlayedDevice played;
@@ -74,6 +80,7 @@ class World {
   [[nodiscard]] const Motion& motion() const { return *motion_; }
   [[nodiscard]] std::vector<WorldDevice>& devices() { return devices_; }
   [[nodiscard]] const std::vector<StudyTruth>& studies() const { return studies_; }
+  [[nodiscard]] const ReferenceTruth& reference() const { return reference_; }
 
   /// Latency of the R-IMU, from the sampling instant to the first bit on the line.
   [[nodiscard]] double reference_latency_s() const { return configuration_.reference.latency_s; }
@@ -106,6 +113,7 @@ class World {
   std::vector<WorldDevice> devices_;
   std::vector<XbusLine> buses_;
   std::vector<StudyTruth> studies_;
+  ReferenceTruth reference_;
   std::vector<std::pair<std::string, std::shared_ptr<OnTrueSample>>> observers_;
   double first_reference_sample_s_ = 0.0;
 };
@@ -114,9 +122,10 @@ class World {
 Outcome<void> check_faults(World& world);
 
 /// The instant on the R-IMU's time scale that an S-IMU's sample shows is its stamp plus this, where both
-/// stamps are the host times of the first bit of a message: z_S(t) = h(R at t + t_d).
+/// stamps are the host times of the first bit of a message: z_S(t) = h(R at t + t_d). For a motion that is
+/// slow beside the low-pass of the S-IMU's gyros.
 inline double true_time_offset_s(const World& world, const StudyTruth& study) {
-  return world.reference_latency_s() - study.latency_s;
+  return world.reference_latency_s() - study.latency_s - slow_delay_s(study.errors.gyro);
 }
 
 }  // namespace imusim

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "firmware_sim/motion/degrees.h"
 #include "firmware_sim/random/random.h"
 
 namespace imusim {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kRadPerDeg = kPi / 180.0;
 
 // Time grids: the drive is integrated on the fine one, the splines run through the coarse one.
 constexpr double kFineStep_s = 0.005;

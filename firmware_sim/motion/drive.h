@@ -24,6 +24,7 @@ struct Scenario {
   /// Standstill at the beginning of a drive; absent: 60 s, or 10 s where the whole lasts less than 180 s.
   std::optional<double> initial_standstill_s;
   std::uint64_t seed = 1;
+  bool engine_runs = false;  ///< the vehicle vibrates as a rigid body, besides its drive
   GeodeticPosition start = {46.52 * 3.14159265358979323846 / 180.0, 6.57 * 3.14159265358979323846 / 180.0,
                             420.0};
 };

@@ -88,9 +88,26 @@ Motion::Motion(const Scenario& scenario, const DriveNodes& nodes)
       pitch_(nodes.step_s, nodes.pitch_rad),
       heading_(nodes.step_s, nodes.heading_rad),
       moving_(nodes.moving),
-      dynamic_(joined(nodes.moving)) {}
+      dynamic_(joined(nodes.moving)) {
+  if (!scenario_.engine_runs) return;
+  engine_.emplace([this](double t_s) { return undisturbed_at(t_s).v_n_mps.norm(); }, scenario_.duration_s,
+                  scenario_.seed);
+  vibration_.emplace(VibrationClass{}, Random(scenario_.seed, "vibration"));
+}
 
 MotionState Motion::state_at(double t_s) const {
+  MotionState state = undisturbed_at(t_s);
+  if (engine_) {
+    const Vibration::Point vibration = vibration_->at(engine_->at(t_s));
+    state.omega_nb_b_radps += vibration.omega_radps;
+    state.omega_ib_b_radps += vibration.omega_radps;
+    state.omega_dot_ib_b_radps2 += vibration.omega_dot_radps2;
+    state.f_b_mps2 += vibration.f_mps2;
+  }
+  return state;
+}
+
+MotionState Motion::undisturbed_at(double t_s) const {
   const QuinticSpline::Point lat = latitude_offset_.at(t_s);
   const QuinticSpline::Point lon = longitude_offset_.at(t_s);
   const QuinticSpline::Point height = height_.at(t_s);

@@ -5,13 +5,18 @@
 /// of one another (C4 splines through 20 Hz nodes, differentiated analytically); specific force follows from
 /// them with Earth rate, transport rate and normal gravity.
 ///
+/// Where the engine runs, its vibration adds to rate, angular acceleration and specific force alone: it moves
+/// nothing by more than a hundredth of a millimetre.
+///
 /// Frames: n = north-east-down at the vehicle, b = forward-right-down at the R-IMU's origin, i = inertial.
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "firmware_sim/motion/drive.h"
 #include "firmware_sim/motion/earth.h"
+#include "firmware_sim/motion/engine.h"
 #include "firmware_sim/motion/quintic_spline.h"
 
 namespace imusim {
@@ -51,8 +56,13 @@ class Motion {
   [[nodiscard]] double duration_s() const { return scenario_.duration_s; }
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
 
+  /// Null where no engine runs.
+  [[nodiscard]] const Engine* engine() const { return engine_ ? &*engine_ : nullptr; }
+
  private:
   Motion(const Scenario& scenario, const DriveNodes& nodes);
+
+  [[nodiscard]] MotionState undisturbed_at(double t_s) const;
 
   Scenario scenario_;
   QuinticSpline latitude_offset_;
@@ -63,6 +73,8 @@ class Motion {
   QuinticSpline heading_;
   std::vector<MovingSpan> moving_;
   std::vector<MovingSpan> dynamic_;
+  std::optional<Engine> engine_;
+  std::optional<Vibration> vibration_;  ///< of the body, at b's origin
 };
 
 /// Rotation from b to n of roll, pitch and heading (z-y-x).

@@ -49,7 +49,7 @@ SimulatedDrive::SimulatedDrive(double duration_s, std::vector<SimulatedStudy> st
       truth_(std::move(studies)),
       random_(seed, "drive") {
   reference_ = std::make_unique<imusim::ImuModel>(
-      motion_, imusim::Mounting{}, imusim::draw_airins({}, kRate_hz, random_), seed, "reference");
+      motion_, imusim::Mounting{}, imusim::draw_reference({}, kRate_hz, random_), seed, "reference");
   imusim::MtxClass mtx;
   mtx.gyro_noise = imusim::GyroNoiseChoice::kAllDynamic;
   for (std::size_t i = 0; i < truth_.size(); ++i) {

@@ -5,12 +5,12 @@
 #include "firmware_sim/imu/imu_model.h"
 #include "firmware_sim/imu/noise.h"
 #include "firmware_sim/imu/sensor_classes.h"
+#include "firmware_sim/motion/degrees.h"
 
 namespace imusim {
 namespace {
 
 constexpr double kStep_s = 0.01;
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180.0;
 
 std::vector<double> draw(NoiseSource& source, Regime regime, int count) {
   std::vector<double> values;
@@ -193,7 +193,7 @@ TEST(SensorClasses, TheMtxHasTableTwoOfThePaper) {
 
 TEST(SensorClasses, TheReferenceHasItsAngularRandomWalkAtAnyRate) {
   Random random(1, "airins");
-  const ImuErrors errors = draw_airins(AirinsClass{}, 100.0, random);
+  const ImuErrors errors = draw_reference(ReferenceClass{}, 100.0, random);
   // 0.0015 deg/sqrt(h) at 100 Hz is 4.4e-6 rad/s a sample.
   EXPECT_NEAR(std::sqrt(errors.gyro.noise[0].at_rest.white_variance), 4.36e-6, 0.01e-6);
   EXPECT_NEAR(std::sqrt(errors.accel.noise[2].in_motion.white_variance), 9.80665e-4, 1e-8);

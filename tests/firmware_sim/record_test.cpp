@@ -242,6 +242,37 @@ TEST(Record, TheTruthIsThatOfTheConfiguration) {
   EXPECT_NEAR(std::stod(t0.substr(17)), ticks * 1e-4 - (9 * 3600 + 30 * 60), 1e-6);
 }
 
+TEST(Record, TheHarshWorldDiffersFromTheIdealOneByWhatItsTruthTells) {
+  const auto recorded = [](const std::string& world) {
+    const std::filesystem::path folder = scratch_folder() / (world.empty() ? "none" : world);
+    const std::string key = world.empty() ? "" : "world = \"" + world + "\"\n";
+    EXPECT_TRUE(record(configuration(key), {folder, false, {}}));
+    return std::pair{content_of(folder / "a.bin") + content_of(folder / "ref.bin"),
+                     nlohmann::json::parse(content_of(folder / "truth.json"))};
+  };
+  const auto [bytes, untold] = recorded("");
+  const auto [ideal_bytes, ideal] = recorded("ideal");
+  const auto [harsh_bytes, harsh] = recorded("harsh");
+  EXPECT_EQ(bytes, ideal_bytes);
+  EXPECT_EQ(untold["world"], "ideal");
+  EXPECT_NE(bytes, harsh_bytes);
+  EXPECT_EQ(bytes.size(), harsh_bytes.size());
+  EXPECT_EQ(harsh["world"], "harsh");
+  const auto& tame = ideal["imus"][0];
+  const auto& ugly = harsh["imus"][0];
+  for (const char* same : {"C_b_s", "r_bs_b_m", "gyro_bias_radps", "accel_bias_mps2", "gyro_scale", "noise"})
+    EXPECT_EQ(tame[same], ugly[same]) << same;
+  for (const char* drawn : {"gyro_matrix", "accel_matrix", "C_s_accel", "accel_places_s_m", "g_sensitivity",
+                            "gyro_low_pass_hz", "own_vibration"})
+    EXPECT_NE(tame[drawn], ugly[drawn]) << drawn;
+  // 1 / (2 pi 40 Hz) = 3.98 ms behind a slow motion, and t_d says so.
+  EXPECT_NEAR(ugly["gyro_delay_s"].get<double>(), 3.979e-3, 1e-6);
+  EXPECT_NEAR(ugly["t_d_s"].get<double>(), tame["t_d_s"].get<double>() - 3.979e-3, 1e-6);
+  EXPECT_NE(ugly["accel_delay_s"], ugly["gyro_delay_s"]);
+  EXPECT_EQ(ideal["reference"]["gyro_matrix"], nlohmann::json({1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0}));
+  EXPECT_NE(harsh["reference"]["gyro_matrix"], ideal["reference"]["gyro_matrix"]);
+}
+
 TEST(Record, SaysWhenItsFolderCannotBe) {
   const std::filesystem::path file = scratch_folder() / "file";
   std::ofstream(file) << "x";

@@ -79,19 +79,53 @@ imuscope::Matrix3 to_array(const Matrix3d& m) {
   return out;
 }
 
-Truth::Truth(const imusim::Scenario& scenario, double duration_s) : motion_(scenario) {
-  const auto ticks = static_cast<std::size_t>(std::lround(duration_s * kRate_hz));
-  for (std::size_t k = 0; k < ticks; ++k) {
+Truth::Truth(const imusim::Scenario& scenario, double duration_s, imusim::WorldKind world)
+    : motion_([&] {
+        imusim::Scenario shaken = scenario;
+        shaken.engine_runs = world == imusim::WorldKind::kHarsh;
+        return shaken;
+      }()),
+      world_(world),
+      ticks_(static_cast<std::size_t>(std::lround(duration_s * kRate_hz))) {
+  for (std::size_t k = 0; k < ticks_; ++k) {
+    if (world_ == imusim::WorldKind::kHarsh && k % kGnssEvery != 0) continue;
     const imusim::MotionState now = motion_.state_at(time_of(k));
+    if (k % kGnssEvery == 0) antenna_.push_back(now.position);
+    if (world_ == imusim::WorldKind::kHarsh) continue;
     reference_.push_back(imusim::ideal_reading(now, imusim::Mounting{}));
     const imusim::MotionState then = motion_.state_at(time_of(k) + kTimeOffset_s);
     for (std::size_t i = 0; i < kStudies; ++i)
       studies_[i].push_back(imusim::ideal_reading(then, mounting(i)));
-    if (k % kGnssEvery == 0) antenna_.push_back(now.position);
   }
 }
 
 imusim::MotionState Truth::end() const { return motion_.state_at(time_of(ticks() - 1)); }
+
+Draw draw(const DrawOptions& options, imusim::Random& random, std::uint64_t seed) {
+  Draw errors;
+  errors.reference =
+      imusim::draw_reference(imusim::reference_class(options.reference_class), kRate_hz, random);
+  for (imusim::ImuErrors& study : errors.studies) study = imusim::draw_mtx(options.mtx, random);
+  imusim::Random unseen(seed, "imperfections");
+  imusim::draw_imperfections(imusim::reference_imperfections(options.world), unseen, errors.reference);
+  for (imusim::ImuErrors& study : errors.studies)
+    imusim::draw_imperfections(imusim::study_imperfections(options.world), unseen, study);
+  return errors;
+}
+
+study_score::StudyTruth truth_of(const Draw& draw, std::size_t study) {
+  const imusim::ImuErrors& errors = draw.studies[study];
+  const double gyro_delay_s = imusim::slow_delay_s(errors.gyro);
+  study_score::StudyTruth truth;
+  truth.C_b_s = mounting_of(study);
+  truth.r_bs_b_m = lever_arm_of(study);
+  truth.t_d_s = kTimeOffset_s - gyro_delay_s;
+  truth.gyro_scale = errors.gyro.scale;
+  truth.accel_scale = errors.accel.scale;
+  truth.C_s_accel = errors.accel.C_s_triad;
+  truth.accel_t_d_s = gyro_delay_s - imusim::slow_delay_s(errors.accel);
+  return truth;
+}
 
 Instruments::Instruments(const Truth& truth, const Draw& draw, std::uint64_t seed)
     : truth_(truth),
@@ -105,12 +139,14 @@ const Tick& Instruments::next() {
   // The noise of the studies does not depend on the regime.
   constexpr imusim::Regime kAny = imusim::Regime::kDynamic;
   tick_.clear();
-  const imusim::IdealReading& b = truth_.reference_[k_];
-  tick_.push_back(imu_sample(kReferenceDevice, k_, reference_.sample_of(b, b, kAny, time_of(k_))));
+  const bool harsh = truth_.world_ == imusim::WorldKind::kHarsh;
+  const auto read = [&](imusim::ImuModel& imu, const std::vector<imusim::IdealReading>& ideal, double t_s) {
+    return harsh ? imu.sample_at(t_s) : imu.sample_of(ideal[k_], ideal[k_], kAny, t_s);
+  };
+  tick_.push_back(imu_sample(kReferenceDevice, k_, read(reference_, truth_.reference_, time_of(k_))));
   for (std::size_t i = 0; i < kStudies; ++i) {
-    const imusim::IdealReading& s = truth_.studies_[i][k_];
     tick_.push_back(imu_sample(static_cast<imuscope::DeviceIndex>(kFirstStudyDevice + i), k_,
-                               studies_[i].sample_of(s, s, kAny, time_of(k_) + kTimeOffset_s)));
+                               read(studies_[i], truth_.studies_[i], time_of(k_) + kTimeOffset_s)));
   }
   if (k_ % kGnssEvery == 0) {
     const Vector3d noise = normal3(gnss_noise_).cwiseProduct(kGnssSd_m);
@@ -120,8 +156,13 @@ const Tick& Instruments::next() {
   return tick_;
 }
 
-imuscope::EstimatorConfig configuration(const imusim::Motion& motion) {
+imuscope::EstimatorConfig configuration(const imusim::Motion& motion, int reference_class) {
   imuscope::EstimatorConfig config;
+  const imusim::ReferenceClass reference = imusim::reference_class(reference_class);
+  config.reference.gyro_white_radps_per_sqrt_hz = reference.gyro_white_radps_per_sqrt_hz;
+  config.reference.accel_white_mps2_per_sqrt_hz = reference.accel_white_mps2_per_sqrt_hz;
+  config.reference.gyro_bias.sd = reference.gyro_bias_sd_radps;
+  config.reference.accel_bias.sd = reference.accel_bias_sd_mps2;
   config.reference.device = kReferenceDevice;
   config.gnss.enabled = true;
   config.gnss.device = kGnssDevice;

@@ -80,7 +80,7 @@ WheeledDrive::WheeledDrive(const WheeledDriveOptions& options)
   }
   reference_config_.device = kReference;
   const imusim::ImuErrors errors =
-      industrial ? industrial_errors() : imusim::draw_airins({}, kRate_hz, random_);
+      industrial ? industrial_errors() : imusim::draw_reference({}, kRate_hz, random_);
   reference_ = std::make_unique<imusim::ImuModel>(*motion_, mounting_, errors, options.seed, "reference");
   for (const double side : {-kHalfTrack_m, kHalfTrack_m})
     wheels_.emplace_back(*motion_, Vector3d(0.0, side, 0.0), options.wheels, options.seed,

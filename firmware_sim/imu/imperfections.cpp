@@ -1,0 +1,71 @@
+#include "firmware_sim/imu/imperfections.h"
+
+#include <algorithm>
+
+#include "firmware_sim/motion/degrees.h"
+#include "firmware_sim/motion/draw.h"
+
+namespace imusim {
+namespace {
+
+constexpr double kMps2PerG = 9.80665;
+
+Eigen::Matrix3d draw9(Random& random, double sd) {
+  Eigen::Matrix3d drawn;
+  for (int row = 0; row < 3; ++row) drawn.row(row) = draw3(random, sd).transpose();
+  return drawn;
+}
+
+/// Symmetric, with half of the departure of each pair of axes on either side of the diagonal.
+Eigen::Matrix3d leaning(const Eigen::Vector3d& departures_rad) {
+  const Eigen::Vector3d half = 0.5 * departures_rad;
+  Eigen::Matrix3d matrix;
+  matrix << 0.0, half.z(), half.y(),  //
+      half.z(), 0.0, half.x(),        //
+      half.y(), half.x(), 0.0;
+  return matrix;
+}
+
+}  // namespace
+
+Imperfections study_imperfections(WorldKind world) {
+  if (world == WorldKind::kIdeal) return {};
+  Imperfections mtx;
+  mtx.non_orthogonality_sd_rad = 0.1 * kRadPerDeg;
+  mtx.triads_apart_sd_rad = 0.1 * kRadPerDeg;
+  mtx.accel_place_sd_m = 0.02;
+  mtx.g_sensitivity_sd_s_per_m = 0.05 * kRadPerDeg / kMps2PerG;
+  mtx.delay_apart_sd_s = 1e-3;
+  mtx.low_pass_hz = 40.0;
+  mtx.own_vibration = 0.5;
+  return mtx;
+}
+
+Imperfections reference_imperfections(WorldKind world) {
+  if (world == WorldKind::kIdeal) return {};
+  constexpr double kSd = 300e-6;
+  Imperfections reference;
+  reference.non_orthogonality_sd_rad = kSd;
+  reference.triads_apart_sd_rad = kSd;
+  reference.scale_sd = kSd;
+  reference.own_vibration = 0.25;
+  return reference;
+}
+
+void draw_imperfections(const Imperfections& imperfections, Random& random, ImuErrors& errors) {
+  const auto draw_triad = [&](TriadErrors& triad) {
+    triad.misalignment += leaning(draw3(random, imperfections.non_orthogonality_sd_rad));
+    triad.scale += draw3(random, imperfections.scale_sd);
+    triad.low_pass_hz = std::min(triad.low_pass_hz, imperfections.low_pass_hz);
+  };
+  draw_triad(errors.gyro);
+  draw_triad(errors.accel);
+  errors.accel.C_s_triad = rotation_from_vector(draw3(random, imperfections.triads_apart_sd_rad));
+  errors.gyro.g_sensitivity += draw9(random, imperfections.g_sensitivity_sd_s_per_m);
+  const Eigen::Matrix3d places = draw9(random, imperfections.accel_place_sd_m);
+  errors.accel_places_s_m = places.colwise() - Eigen::Vector3d(places.rowwise().mean());
+  errors.accel.delay_s = imperfections.delay_apart_sd_s * random.normal();
+  errors.own_vibration = imperfections.own_vibration;
+}
+
+}  // namespace imusim
