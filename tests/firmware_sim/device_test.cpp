@@ -101,7 +101,6 @@ TEST_F(XsensMtxTest, AnswersWhatItIsAskedInConfig) {
 }
 
 TEST_F(XsensMtxTest, ItsConfigurationMessageIsThatOfTheVector) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata.hex");
   XsensMtx::Options options;
   options.device_id = 0x00300123;
   XsensMtx mtx = device(options);

@@ -24,7 +24,6 @@ Eigen::Vector3d vector3(const json& numbers) {
 }
 
 TEST(XsensEncoder, FramesEveryControlMessageAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_control.hex");
   int compared = 0;
   for (const auto& [name, vector] : load_vectors("xsens_control")) {
     if (!vector.meaning.contains("mid") || !vector.meaning.contains("data")) continue;
@@ -57,7 +56,6 @@ xsens::MtSample sample_of(const json& expected) {
 }
 
 TEST(XsensEncoder, EncodesLegacyDataInAllNumberFormatsAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata.hex");
   int compared = 0;
   for (const auto& [name, vector] : load_vectors("xsens_mtdata")) {
     const json& meaning = vector.meaning;
@@ -92,7 +90,6 @@ TEST(XsensEncoder, SendsTheRotationMatrixDownItsColumns) {
 }
 
 TEST(StdbinEncoder, EncodesEmptyAndAttitudeTelegramsAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ixblue_stdbin.hex");
   const auto vectors = load_vectors("ixblue_stdbin");
   for (const std::string name : {"v3_min_no_block", "v3_attitude_only"}) {
     const Vector& vector = vectors.at(name);
@@ -110,7 +107,6 @@ TEST(StdbinEncoder, EncodesEmptyAndAttitudeTelegramsAsTheVectorsDo) {
 }
 
 TEST(StdbinEncoder, EveryBlockItSendsEqualsThatOfTheFullVector) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ixblue_stdbin.hex");
   const Vector full = load_vectors("ixblue_stdbin").at("v3_all_nav");
   const json& blocks = full.meaning["expected"]["blocks"];
   // Sizes of the navigation blocks 0 to 30 and the extended blocks 0 to 2, as the protocol sheet lists them.
@@ -182,7 +178,6 @@ TEST(StdbinEncoder, SetsTheMaskBitsAndTheSizeOfWhatItSends) {
 }
 
 TEST(GreisEncoder, EncodesEveryMessageItSendsAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.hex");
   const auto vectors = load_vectors("greis");
   const auto fields = [&](const char* name) { return vectors.at(name).meaning["fields"]; };
   greis::Solution solution;

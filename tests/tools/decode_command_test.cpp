@@ -18,6 +18,7 @@ namespace {
 using imuscope::test::program_path;
 using imuscope::test::scratch_folder;
 using imuscope::test::shared_path;
+using imuscope::test::source_path;
 using nlohmann::json;
 
 struct Outcome {
@@ -49,7 +50,7 @@ Outcome decode(const std::filesystem::path& file, const std::string& options) {
 
 /// The named vector's bytes as a recording, decoded.
 Outcome decode_vector(const std::string& protocol, const std::string& name) {
-  std::ifstream in(shared_path("oracle/protocols/" + protocol + ".hex"));
+  std::ifstream in(source_path("tests/vectors/" + protocol + ".hex"));
   const auto folder = scratch_folder();
   const auto file = folder / (name + ".bin");
   for (std::string line; std::getline(in, line);) {
@@ -63,8 +64,7 @@ Outcome decode_vector(const std::string& protocol, const std::string& name) {
 }
 
 TEST(DecodeCommand, NamesTheFieldsOfMtDataAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata.json");
-  const json oracle = json::parse(std::ifstream(shared_path("oracle/protocols/xsens_mtdata.json")));
+  const json oracle = json::parse(std::ifstream(source_path("tests/vectors/xsens_mtdata.json")));
   int checked = 0;
   for (const json& v : oracle["vectors"]) {
     const auto name = v["name"].get<std::string>();
@@ -84,8 +84,7 @@ TEST(DecodeCommand, NamesTheFieldsOfMtDataAsTheVectorsDo) {
 }
 
 TEST(DecodeCommand, ListsTheItemsOfMtData2AsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata2.json");
-  const json oracle = json::parse(std::ifstream(shared_path("oracle/protocols/xsens_mtdata2.json")));
+  const json oracle = json::parse(std::ifstream(source_path("tests/vectors/xsens_mtdata2.json")));
   int checked = 0;
   for (const json& v : oracle["vectors"]) {
     if (!v.contains("expected")) continue;
@@ -124,11 +123,10 @@ void expect_fields(const json& line, const json& expected) {
 }
 
 json oracle_of(const std::string& name) {
-  return json::parse(std::ifstream(shared_path("oracle/protocols/" + name + ".json")));
+  return json::parse(std::ifstream(source_path("tests/vectors/" + name + ".json")));
 }
 
 TEST(DecodeCommand, NamesTheBlocksOfStdBinAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ixblue_stdbin.json");
   int checked = 0;
   const json oracle = oracle_of("ixblue_stdbin");
   for (const json& v : oracle["vectors"]) {
@@ -144,7 +142,6 @@ TEST(DecodeCommand, NamesTheBlocksOfStdBinAsTheVectorsDo) {
 }
 
 TEST(DecodeCommand, NamesTheFieldsOfGreisAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.json");
   int checked = 0;
   const json oracle = oracle_of("greis");
   for (const json& v : oracle["vectors"]) {
@@ -162,7 +159,6 @@ TEST(DecodeCommand, NamesTheFieldsOfGreisAsTheVectorsDo) {
 }
 
 TEST(DecodeCommand, NamesTheFieldsOfNavPvtAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ubx_nav_pvt.json");
   int checked = 0;
   const json oracle = oracle_of("ubx_nav_pvt");
   for (const json& v : oracle["vectors"]) {
@@ -185,7 +181,6 @@ TEST(DecodeCommand, NamesTheFieldsOfNavPvtAsTheVectorsDo) {
 }
 
 TEST(DecodeCommand, NamesTheFieldsOfNmeaAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/nmea.json");
   int checked = 0;
   const json oracle = oracle_of("nmea");
   for (const json& v : oracle["vectors"]) {
@@ -202,9 +197,8 @@ TEST(DecodeCommand, NamesTheFieldsOfNmeaAsTheVectorsDo) {
 }
 
 TEST(DecodeCommand, ReadsThePhinsStandardGroupOfOlderUnits) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/phins_standard.nmea");
   const json sentences = oracle_of("phins_standard")["sentences"];
-  const Outcome outcome = decode(shared_path("oracle/protocols/phins_standard.nmea"), "--json");
+  const Outcome outcome = decode(source_path("tests/vectors/phins_standard.nmea"), "--json");
   ASSERT_EQ(outcome.lines.size(), sentences.size() + 1) << outcome.err;
   for (std::size_t i = 0; i < sentences.size(); ++i) {
     EXPECT_EQ(outcome.lines[i]["sentence"], sentences[i]["sentence"]);
@@ -214,11 +208,10 @@ TEST(DecodeCommand, ReadsThePhinsStandardGroupOfOlderUnits) {
 }
 
 TEST(DecodeCommand, NamesTheColumnsOfRtklibAsTheVectorsDo) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/rtklib_pos.json");
   const json files = oracle_of("rtklib_pos")["files"];
   for (const auto& [name, file] : files.items()) {
     SCOPED_TRACE(name);
-    const Outcome outcome = decode(shared_path("oracle/protocols/" + name), "--json");
+    const Outcome outcome = decode(source_path("tests/vectors/" + name), "--json");
     ASSERT_FALSE(outcome.lines.empty()) << outcome.err;
     EXPECT_EQ(outcome.lines.back()["bytes_skipped"], 0);
     std::size_t row = 0;
@@ -301,11 +294,10 @@ TEST(DecodeCommand, SaysWhatIsWrongAndWithWhichExitCode) {
 
 TEST(DecodeCommand, ShowsEverySignalOfTheCanVectorsBitForBit) {
   for (const std::string name : {"odometry", "xsens"}) {
-    const std::string vectors = "oracle/protocols/can_" + name;
-    IMUSCOPE_NEEDS_SHARED(vectors + ".json");
-    const auto dbc = shared_path("oracle/protocols/" + name + (name == "xsens" ? "_can.dbc" : ".dbc"));
-    const json oracle = json::parse(std::ifstream(shared_path(vectors + ".json")));
-    const Outcome outcome = decode(shared_path(vectors + ".candump"), "--dbc '" + dbc.string() + "' --json");
+    const std::string vectors = "tests/vectors/can_" + name;
+    const auto dbc = source_path("tests/vectors/" + name + (name == "xsens" ? "_can.dbc" : ".dbc"));
+    const json oracle = json::parse(std::ifstream(source_path(vectors + ".json")));
+    const Outcome outcome = decode(source_path(vectors + ".candump"), "--dbc '" + dbc.string() + "' --json");
     ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
     ASSERT_EQ(outcome.lines.size(), oracle["vectors"].size() + 1);
     for (std::size_t i = 0; i < oracle["vectors"].size(); ++i) {

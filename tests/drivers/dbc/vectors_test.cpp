@@ -47,13 +47,13 @@ Database load(const std::filesystem::path& file) {
 }
 
 void expect_vectors(const std::string& name, std::size_t count) {
-  const json expected = test::load_json(test::shared_path("oracle/protocols/" + name));
+  const json expected = test::load_json(test::source_path("tests/vectors/" + name));
   std::map<std::string, Database> databases;
   std::size_t vectors = 0;
   for (const json& vector : expected["vectors"]) {
     SCOPED_TRACE(vector["line"].get<std::string>());
     const auto dbc = vector["dbc"].get<std::string>();
-    if (!databases.contains(dbc)) databases[dbc] = load(test::shared_path("oracle/protocols/" + dbc));
+    if (!databases.contains(dbc)) databases[dbc] = load(test::source_path("tests/vectors/" + dbc));
     const LoggedFrame frame = frame_of(vector["line"]);
     ASSERT_EQ(frame.id, vector["id"].get<std::uint32_t>());
     ASSERT_EQ(frame.is_extended, vector["extended"].get<bool>());
@@ -83,15 +83,9 @@ void expect_vectors(const std::string& name, std::size_t count) {
   EXPECT_EQ(vectors, count);
 }
 
-TEST(DbcVectors, EverySignalOfTheOdometryVectorsIsBitExact) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/can_odometry.json");
-  expect_vectors("can_odometry.json", 29);
-}
+TEST(DbcVectors, EverySignalOfTheOdometryVectorsIsBitExact) { expect_vectors("can_odometry.json", 29); }
 
-TEST(DbcVectors, EverySignalOfTheXsensVectorsIsBitExact) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/can_xsens.json");
-  expect_vectors("can_xsens.json", 16);
-}
+TEST(DbcVectors, EverySignalOfTheXsensVectorsIsBitExact) { expect_vectors("can_xsens.json", 16); }
 
 // The published speeds are printed with six decimals.
 TEST(DbcVectors, WheelSpeedsOfARealCarEqualThePublishedOnes) {

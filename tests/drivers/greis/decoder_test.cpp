@@ -236,8 +236,7 @@ TEST(GreisDecoder, MissingEpochsAreCountedByTime) {
 }
 
 TEST(GreisDecoder, TheEpochVectorGivesTheValuesOfItsMessages) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.hex");
-  const auto vectors = load_vectors(shared_path("oracle/protocols/greis.hex"));
+  const auto vectors = load_vectors(source_path("tests/vectors/greis.hex"));
   Rig rig;
   rig.decoder.push(vector_named(vectors, "epoch"), {}, rig.sink);
   ASSERT_EQ(rig.sink.samples.size(), 1U);

@@ -57,9 +57,8 @@ void expect_fields(const json& found, const json& expected) {
 }
 
 TEST(GreisVectors, EveryVectorDecodesToItsPublishedValues) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.hex");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/greis.hex"));
-  const json expected = test::load_json(test::shared_path("oracle/protocols/greis.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/greis.hex"));
+  const json expected = test::load_json(test::source_path("tests/vectors/greis.json"));
   ASSERT_EQ(vectors.size(), expected["vectors"].size());
   for (const json& vector : expected["vectors"]) {
     const std::string name = vector["name"];
@@ -82,8 +81,7 @@ TEST(GreisVectors, EveryVectorDecodesToItsPublishedValues) {
 }
 
 TEST(GreisVectors, AReplyWithoutChecksumIsFoundBehindTextAndAMessage) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/greis.hex");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/greis.hex"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/greis.hex"));
   const auto found = find_all(test::vector_named(vectors, "nmea_inside"));
   ASSERT_EQ(found.size(), 3U);
   EXPECT_EQ(found[2].id, "RE");

@@ -61,9 +61,8 @@ void expect_telegram(const Telegram& telegram, const json& expected) {
 }
 
 TEST(StdBinVectors, EveryVectorDecodesToItsPublishedValues) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ixblue_stdbin.hex");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/ixblue_stdbin.hex"));
-  const json expected = test::load_json(test::shared_path("oracle/protocols/ixblue_stdbin.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/ixblue_stdbin.hex"));
+  const json expected = test::load_json(test::source_path("tests/vectors/ixblue_stdbin.json"));
   ASSERT_EQ(vectors.size(), expected["vectors"].size());
   for (const json& vector : expected["vectors"]) {
     const std::string name = vector["name"];

@@ -54,9 +54,8 @@ json fields_of(std::string_view text) {
 }
 
 TEST(NmeaVectors, EveryVectorDecodesToItsPublishedValues) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/nmea.hex");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/nmea.hex"));
-  const json expected = test::load_json(test::shared_path("oracle/protocols/nmea.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/nmea.hex"));
+  const json expected = test::load_json(test::source_path("tests/vectors/nmea.json"));
   ASSERT_EQ(vectors.size(), expected["vectors"].size());
   for (const json& vector : expected["vectors"]) {
     const std::string name = vector["name"];
@@ -93,10 +92,8 @@ TEST(NmeaVectors, EveryVectorDecodesToItsPublishedValues) {
 }
 
 TEST(NmeaVectors, ThePhinsStandardGroupDecodesToItsPublishedValues) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/phins_standard.nmea");
-  const auto found = scan_text(test::load_bytes(test::shared_path("oracle/protocols/phins_standard.nmea")));
-  const json sentences =
-      test::load_json(test::shared_path("oracle/protocols/phins_standard.json"))["sentences"];
+  const auto found = scan_text(test::load_bytes(test::source_path("tests/vectors/phins_standard.nmea")));
+  const json sentences = test::load_json(test::source_path("tests/vectors/phins_standard.json"))["sentences"];
   ASSERT_EQ(found.size(), 9U);
   ASSERT_EQ(found.size(), sentences.size());
   for (std::size_t i = 0; i < found.size(); ++i) {

@@ -38,11 +38,10 @@ constexpr std::string_view kRow =
 const UtcTime kDay = std::chrono::sys_days{std::chrono::year{2026} / 3 / 14};
 
 TEST(RtklibPosVectors, EveryFileDecodesToItsPublishedRows) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/rtklib_pos.json");
-  const json expected = test::load_json(test::shared_path("oracle/protocols/rtklib_pos.json"));
+  const json expected = test::load_json(test::source_path("tests/vectors/rtklib_pos.json"));
   for (const auto& [name, file] : expected["files"].items()) {
     SCOPED_TRACE(name);
-    const auto bytes = test::load_bytes(test::shared_path("oracle/protocols/" + name));
+    const auto bytes = test::load_bytes(test::source_path("tests/vectors/" + name));
     std::string text(bytes.begin(), bytes.end());
     Format format;
     std::optional<ReferencePosition> base;

@@ -53,8 +53,7 @@ void expect_frame(const nlohmann::json& expected, const CanFrame& frame) {
 }
 
 TEST(Candump, EveryLineOfTheVectorsIsReadAsStated) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/candump_syntax.json");
-  std::ifstream in(test::shared_path("oracle/protocols/candump_syntax.json"));
+  std::ifstream in(test::source_path("tests/vectors/candump_syntax.json"));
   const auto vectors = nlohmann::json::parse(in);
   int n = 0;
   for (const auto& vector : vectors.at("lines")) {

@@ -41,9 +41,8 @@ struct Rig {
 };
 
 TEST(UbxVectors, EveryVectorDecodesToItsPublishedValues) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ubx_nav_pvt.hex");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/ubx_nav_pvt.hex"));
-  const json expected = test::load_json(test::shared_path("oracle/protocols/ubx_nav_pvt.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/ubx_nav_pvt.hex"));
+  const json expected = test::load_json(test::source_path("tests/vectors/ubx_nav_pvt.json"));
   ASSERT_EQ(vectors.size(), expected["vectors"].size());
   for (const json& vector : expected["vectors"]) {
     const std::string name = vector["name"];
@@ -71,8 +70,7 @@ TEST(UbxVectors, EveryVectorDecodesToItsPublishedValues) {
 }
 
 TEST(UbxVectors, AnRtkFixBecomesASampleWithTheSecondBeforeItsNegativeNanoseconds) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/ubx_nav_pvt.hex");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/ubx_nav_pvt.hex"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/ubx_nav_pvt.hex"));
   Rig rig;
   rig.push(test::vector_named(vectors, "nav_pvt_rtk_fixed"));
   ASSERT_EQ(rig.sink.samples.size(), 1U);

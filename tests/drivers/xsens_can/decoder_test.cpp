@@ -92,8 +92,7 @@ struct Unit {
 };
 
 TEST(XsensCanMessages, TheFixedPointNumbersOfTheVectorsDecode) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/can_xsens.json");
-  const auto expected = test::load_json(test::shared_path("oracle/protocols/can_xsens.json"));
+  const auto expected = test::load_json(test::source_path("tests/vectors/can_xsens.json"));
   int checked = 0;
   for (const auto& vector : expected["vectors"]) {
     const auto line = vector["line"].get<std::string>();

@@ -10,9 +10,8 @@ namespace imuscope::xsens {
 namespace {
 
 TEST(MtLayoutGuess, FindsTheLayoutOfEveryLegacyVectorWithSensibleNumbers) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata.json");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_mtdata.hex"));
-  const auto oracle = test::load_json(test::shared_path("oracle/protocols/xsens_mtdata.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/xsens_mtdata.hex"));
+  const auto oracle = test::load_json(test::source_path("tests/vectors/xsens_mtdata.json"));
   int guessed = 0;
   for (const auto& v : oracle["vectors"]) {
     const auto name = v["name"].get<std::string>();

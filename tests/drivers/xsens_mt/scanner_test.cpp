@@ -193,9 +193,8 @@ TEST(MtScanner, StampsTheFirstByteOfAFrameByWhatFollowedItInItsRead) {
 }
 
 TEST(MtScanner, ReadsTheControlVectors) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_control.json");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_control.hex"));
-  const auto oracle = test::load_json(test::shared_path("oracle/protocols/xsens_control.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/xsens_control.hex"));
+  const auto oracle = test::load_json(test::source_path("tests/vectors/xsens_control.json"));
   ASSERT_EQ(oracle["vectors"].size(), 48U);
   const auto expect_frame = [](const Found& found, const nlohmann::json& expected) {
     const std::size_t header = found.bytes[3] == kExtendedLength ? kExtendedHeaderSize : kHeaderSize;
@@ -232,8 +231,7 @@ TEST(MtScanner, ReadsTheControlVectors) {
 }
 
 TEST(MtMessages, BuildsTheFramesOfTheControlVectors) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_control.json");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_control.hex"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/xsens_control.hex"));
   const auto built = [](std::uint8_t mid, std::span<const std::uint8_t> data = {}) {
     const OutgoingFrame frame(kMasterBid, mid, data);
     return Bytes(frame.bytes().begin(), frame.bytes().end());

@@ -82,9 +82,8 @@ void expect_configuration(const Configuration& c, const json& expected) {
 }
 
 TEST(MtDataVectors, EveryLegacyVectorDecodesToItsValues) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata.json");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_mtdata.hex"));
-  const auto oracle = test::load_json(test::shared_path("oracle/protocols/xsens_mtdata.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/xsens_mtdata.hex"));
+  const auto oracle = test::load_json(test::source_path("tests/vectors/xsens_mtdata.json"));
   ASSERT_EQ(oracle["vectors"].size(), 26U);
   int checked = 0;
   for (const json& v : oracle["vectors"]) {
@@ -121,9 +120,8 @@ TEST(MtDataVectors, EveryLegacyVectorDecodesToItsValues) {
 }
 
 TEST(MtDataVectors, TheStreamUnwrapsItsCounterAndCountsTwoLost) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata.json");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_mtdata.hex"));
-  const auto oracle = test::load_json(test::shared_path("oracle/protocols/xsens_mtdata.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/xsens_mtdata.hex"));
+  const auto oracle = test::load_json(test::source_path("tests/vectors/xsens_mtdata.json"));
   for (const json& v : oracle["vectors"]) {
     if (v["name"] != "stream_wrap_and_gap") continue;
     MtDecoderConfig config;
@@ -209,9 +207,8 @@ void expect_item(const Item& item, const json& expected) {
 }
 
 TEST(MtData2Vectors, EveryVectorDecodesToItsItems) {
-  IMUSCOPE_NEEDS_SHARED("oracle/protocols/xsens_mtdata2.json");
-  const auto vectors = test::load_vectors(test::shared_path("oracle/protocols/xsens_mtdata2.hex"));
-  const auto oracle = test::load_json(test::shared_path("oracle/protocols/xsens_mtdata2.json"));
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/xsens_mtdata2.hex"));
+  const auto oracle = test::load_json(test::source_path("tests/vectors/xsens_mtdata2.json"));
   ASSERT_EQ(oracle["vectors"].size(), 8U);
   for (const json& v : oracle["vectors"]) {
     SCOPED_TRACE(v["name"].get<std::string>());
