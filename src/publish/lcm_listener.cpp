@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "publish/lcm_packet.h"
+#include "publish/lcm_datagram.h"
 #include "publish/lcm_socket_filter.h"
 
 namespace imuscope {
@@ -61,10 +61,10 @@ struct LcmListener::Impl {
   Impl& operator=(const Impl&) = delete;
 
   void handle(std::span<const std::uint8_t> datagram) const {
-    const auto packet = read_short_message(datagram);
-    if (!packet) return;
+    const auto heard = read_short_message(datagram);
+    if (!heard) return;
     for (std::size_t i = 0; i < patterns.size(); ++i) {
-      if (patterns[i].matches(packet->channel)) handlers[i](std::string(packet->channel), packet->message);
+      if (patterns[i].matches(heard->channel)) handlers[i](std::string(heard->channel), heard->message);
     }
   }
 
@@ -73,7 +73,7 @@ struct LcmListener::Impl {
   std::string prefix;
   std::vector<ChannelPattern> patterns;
   std::vector<Handler> handlers;  // one a pattern
-  std::array<std::uint8_t, kMaxPacketBytes> buffer{};
+  std::array<std::uint8_t, kMaxDatagramBytes> buffer{};
 };
 
 Result<LcmListener> LcmListener::open(std::string_view url, std::string_view prefix) {

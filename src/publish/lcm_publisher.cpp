@@ -8,9 +8,9 @@
 
 namespace imuscope {
 struct LcmPublisher::Impl {
-  Impl(const std::string& url, std::string_view prefix_in) : lcm(url), prefix(prefix_in) {}
+  explicit Impl(std::string_view prefix_in) : prefix(prefix_in) {}
 
-  lcm::LCM lcm;
+  std::unique_ptr<lcm::LCM> lcm;
   std::string prefix;
   std::map<std::string, std::int64_t> sequences;  // by channel; counts what was lost here, too
   PublishCounters counters;
@@ -18,12 +18,23 @@ struct LcmPublisher::Impl {
 };
 
 Result<LcmPublisher> LcmPublisher::open(std::string_view url, std::string_view prefix) {
-  if (const auto checked = check_lcm_url(url); !checked) return tl::unexpected(checked.error());
-  auto impl = std::make_unique<Impl>(std::string(url), prefix);
-  if (!impl->lcm.good()) {
+  auto publisher = unconnected(prefix);
+  if (auto connected = publisher.connect(url); !connected) return tl::unexpected<Error>(connected.error());
+  return publisher;
+}
+
+LcmPublisher LcmPublisher::unconnected(std::string_view prefix) {
+  return LcmPublisher(std::make_unique<Impl>(prefix));
+}
+
+Result<void> LcmPublisher::connect(std::string_view url) {
+  if (auto checked = check_lcm_url(url); !checked) return checked;
+  auto lcm = std::make_unique<lcm::LCM>(std::string(url));
+  if (!lcm->good()) {
     return work_error("LCM could not open " + std::string(url), "check its options; " + kLcmUrlRemedy);
   }
-  return LcmPublisher(std::move(impl));
+  impl_->lcm = std::move(lcm);
+  return {};
 }
 
 LcmPublisher::LcmPublisher(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
@@ -43,12 +54,11 @@ void LcmPublisher::send(const std::string& channel, std::int64_t utime,
     impl_->counters.too_large += 1;
     return;
   }
-  if (impl_->lcm.publish(channel, message.data(), static_cast<unsigned int>(message.size())) != 0) {
-    impl_->counters.failed += 1;
-    return;
-  }
-  impl_->counters.published += 1;
   if (impl_->tap) impl_->tap(channel, utime, message);
+  if (!impl_->lcm) return;
+  const bool sent =
+      impl_->lcm->publish(channel, message.data(), static_cast<unsigned int>(message.size())) == 0;
+  (sent ? impl_->counters.published : impl_->counters.failed) += 1;
 }
 
 void LcmPublisher::set_tap(Tap tap) { impl_->tap = std::move(tap); }

@@ -38,6 +38,12 @@ class LcmPublisher {
   static Result<LcmPublisher> open(std::string_view url = kDefaultLcmUrl,
                                    std::string_view prefix = kDefaultChannelPrefix);
 
+  /// Sends nothing before connect(); the tap gets every message all the same.
+  static LcmPublisher unconnected(std::string_view prefix);
+  /// Takes this bus, in place of one of before; sequences go on.
+  /// @return the errors of check_lcm_url(); then all stays as it was
+  [[nodiscard]] Result<void> connect(std::string_view url);
+
   LcmPublisher(LcmPublisher&&) noexcept;
   LcmPublisher& operator=(LcmPublisher&&) noexcept;
   ~LcmPublisher();
@@ -51,7 +57,8 @@ class LcmPublisher {
     send(channel, message.utime, encode_message(message));
   }
 
-  /// Gives every message that is sent to `tap`, too: channel, utime and encoded bytes. For the recorder.
+  /// Gives every message to `tap`, too, whether or not it can be sent: channel, utime and encoded bytes. For
+  /// the recorder.
   using Tap = std::function<void(std::string_view, std::int64_t, std::span<const std::uint8_t>)>;
   void set_tap(Tap tap);
 

@@ -10,12 +10,12 @@
 #include <cstring>
 
 #include "base/contracts.h"
-#include "publish/lcm_packet.h"
+#include "publish/lcm_datagram.h"
 
 namespace imuscope {
 namespace {
 
-// A socket's filter sees the UDP header before the packet.
+// A socket's filter sees the UDP header before the datagram.
 constexpr std::uint32_t kUdpHeaderBytes = 8;
 constexpr std::uint32_t kChannelOffset = kUdpHeaderBytes + kShortHeaderBytes;
 
@@ -32,7 +32,7 @@ sock_filter compare(std::uint32_t value, std::uint8_t if_equal, std::uint8_t if_
 sock_filter pass() { return BPF_STMT(BPF_RET | BPF_K, UINT32_MAX); }
 sock_filter drop() { return BPF_STMT(BPF_RET | BPF_K, 0); }
 
-/// A packet of this PC comes over the loopback interface, or as the copy that the kernel hands back of what
+/// A datagram of this PC comes over the loopback interface, or as the copy that the kernel hands back of what
 /// it has sent on another one.
 void append_origin(Program& program) {
   program.push_back(load_fact(SKF_AD_HATYPE));
@@ -42,14 +42,14 @@ void append_origin(Program& program) {
   program.push_back(drop());
 }
 
-/// A load beyond a packet's end drops it.
+/// A load beyond a datagram's end drops it.
 void append_kind(Program& program) {
   program.push_back(load(BPF_W, kUdpHeaderBytes));
   program.push_back(compare(kShortMessageMagic, 1, 0));
   program.push_back(drop());
 }
 
-/// Passes a packet whose channel begins with `bytes`; otherwise goes on behind these steps.
+/// Passes a datagram whose channel begins with `bytes`; otherwise goes on behind these steps.
 void append_channel(const std::string& bytes, Program& program) {
   struct Comparison {
     std::uint16_t size;
@@ -91,7 +91,7 @@ Result<void> attach_lcm_filter(int socket, const std::vector<ChannelPattern>& ch
   auto program = program_for(channels, reach);
   const sock_fprog filter{static_cast<std::uint16_t>(program.size()), program.data()};
   if (setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof filter) != 0) {
-    return work_error(std::string("LCM: the kernel refuses the filter that keeps foreign packets out (") +
+    return work_error(std::string("LCM: the kernel refuses the filter that keeps foreign datagrams out (") +
                           std::strerror(errno) + "), so nothing is listened to",
                       "a kernel without socket filters, or a container's rules, cannot serve here; "
                       "net.core.optmem_max below 20480 is too little");

@@ -11,7 +11,7 @@
 
 namespace imuscope {
 
-/// Whose packets a socket hears.
+/// Whose datagrams a socket hears.
 enum class Reach { kThisPc, kNetwork };
 
 /// Which channels of an LCM bus are wanted: one whole name, or every name with this beginning.
@@ -25,8 +25,9 @@ struct ChannelPattern {
 };
 
 /// Lets only whole messages (LC02) on these channels through to a UDP socket. Everything else, fragments of
-/// long messages above all, is dropped by the kernel and counted in /proc/net/udp. With kThisPc a packet must
-/// have been sent on this PC, which the kernel knows by its way, not by an address that a sender may choose.
+/// long messages above all, is dropped by the kernel and counted in /proc/net/udp. With kThisPc a datagram
+/// must have been sent on this PC, which the kernel knows by its way, not by an address that a sender may
+/// choose.
 /// @param channels  none: nothing passes
 /// @return an error of kind kWork where the kernel refuses; what was attached before then stays
 [[nodiscard]] Result<void> attach_lcm_filter(int socket, const std::vector<ChannelPattern>& channels,

@@ -74,6 +74,10 @@ Result<UdpmBus> check_multicast_route(UdpmBus bus) {
   if (probe < 0) return work_error(std::string("LCM: no socket (") + std::strerror(errno) + ")");
   const int status = ::connect(probe, reinterpret_cast<const sockaddr*>(&address), sizeof address);
   const int error = errno;
+  sockaddr_in local{};
+  socklen_t size = sizeof local;
+  if (getsockname(probe, reinterpret_cast<sockaddr*>(&local), &size) == 0)
+    bus.local = ntohl(local.sin_addr.s_addr);
   ::close(probe);
   if (status == 0) return bus;
   char text[INET_ADDRSTRLEN] = {};

@@ -22,6 +22,9 @@ struct UdpmBus {
   std::uint32_t group = 0;  ///< multicast address, host byte order
   std::uint16_t port = 0;
   std::uint8_t ttl = 0;  ///< 0: on this PC alone
+  /// This PC's address on the interface that its routes name for the group, host byte order; 0 where nobody
+  /// looked. Another one: the bus lies elsewhere now.
+  std::uint32_t local = 0;
 };
 
 /// @return an error of kind kUsage for everything but udpm://ADDRESS:PORT?ttl=N, whose parts may be left out

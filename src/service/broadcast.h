@@ -4,6 +4,7 @@
 
 #include <imuscope/status_t.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "publish/lcm_publisher.h"
@@ -21,7 +22,8 @@ class Broadcast {
 
   /// @param bridge  pose_t and ins_t, too
   void open(LcmPublisher bus, bool bridge);
-  void close() { bus_.reset(); }
+  /// Lets the bus that was given by open() send to `url`.
+  [[nodiscard]] Result<void> connect(const std::string& url) { return bus_.value().connect(url); }
   void set_tap(LcmPublisher::Tap tap);
 
   void on_error(const ErrorRecord& record);

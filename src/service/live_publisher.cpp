@@ -27,6 +27,8 @@ constexpr Duration kDrainPeriod = std::chrono::milliseconds(50);
 /// A person's events are looked for in every so many turns.
 constexpr std::uint64_t kTurnsPerEar = 2;
 constexpr Duration kStatusMessagePeriod = std::chrono::seconds(1);
+/// Is there a route to the bus, and the same one?
+constexpr Duration kBusPeriod = std::chrono::seconds(2);
 
 constexpr std::array kSessionNames{"connecting", "configuring", "streaming", "failed"};
 
@@ -109,7 +111,8 @@ Result<std::unique_ptr<LivePublisher>> LivePublisher::create(const Configuration
   auto folder = RunFolder::create(options.out, std::move(infos), true);
   if (!folder) return tl::unexpected<Error>(folder.error());
   publisher->folder_ = std::move(*folder);
-  if (auto opened = publisher->open_bus(); !opened) return tl::unexpected<Error>(opened.error());
+  if (auto url = parse_udpm_url(configuration.lcm.url); !url) return tl::unexpected<Error>(url.error());
+  publisher->open_bus();
   return publisher;
 }
 
@@ -122,29 +125,48 @@ Result<void> LivePublisher::smooth(LiveHistory& history, const EstimatorConfig& 
   return smoothing_->open(options_.out, std::move(infos));
 }
 
-/// Without a route the service works on and says so; a URL that cannot serve is an error.
-Result<void> LivePublisher::open_bus() {
-  broadcast_.close();
+/// What is published is recorded, whether or not there is a bus.
+void LivePublisher::open_bus() {
+  broadcast_.open(LcmPublisher::unconnected(tunables_.lcm.channel_prefix), tunables_.lcm.bridge);
+  if (recorder_ != nullptr) set_recorder(*recorder_);
+  connected_ = false;
   ear_.reset();
   bus_problem_.clear();
+  watch_bus();
+}
+
+/// Takes the bus when it is there: a route may come after the start, go, and lead another way.
+void LivePublisher::watch_bus() {
+  const auto& url = tunables_.lcm.url;
   // A bus alone, not a log: liblcm would write over the file that the configuration names.
-  const auto bus = check_lcm_bus(tunables_.lcm.url);
-  auto voice = bus ? LcmPublisher::open(tunables_.lcm.url, tunables_.lcm.channel_prefix)
-                   : tl::unexpected<Error>(bus.error());
-  if (!voice) {
-    if (voice.error().kind == ErrorKind::kUsage) return tl::unexpected<Error>(voice.error());
-    bus_problem_ = voice.error().text();
-    spdlog::warn("nothing is published over LCM: {}", bus_problem_);
-    return {};
+  const auto bus = check_lcm_bus(url);
+  if (!bus) {
+    ear_.reset();
+    tell_bus_problem("nothing is published over LCM: " + bus.error().text());
+    return;
   }
-  broadcast_.open(std::move(*voice), tunables_.lcm.bridge);
-  if (recorder_ != nullptr) set_recorder(*recorder_);
+  if (ear_ && bus->local == heard_on_) return;
+  // Once it is connected each message finds its own way.
+  if (!connected_) {
+    if (auto connected = broadcast_.connect(url); !connected) {
+      tell_bus_problem("nothing is published over LCM: " + connected.error().text());
+      return;
+    }
+    connected_ = true;
+  }
   if (auto heard = listen_for_events(); !heard) {
     ear_.reset();
-    bus_problem_ = "a person's events are not heard: " + heard.error().text();
-    spdlog::warn("{}", bus_problem_);
+    tell_bus_problem("a person's events are not heard: " + heard.error().text());
+    return;
   }
-  return {};
+  heard_on_ = bus->local;
+  if (!bus_problem_.empty()) spdlog::info("the LCM bus is there");
+  bus_problem_.clear();
+}
+
+void LivePublisher::tell_bus_problem(const std::string& problem) {
+  if (problem != bus_problem_) spdlog::warn("{}", problem);
+  bus_problem_ = problem;
 }
 
 Result<void> LivePublisher::listen_for_events() {
@@ -191,10 +213,7 @@ void LivePublisher::take_over_tunables() {
   if (!tunables) return;
   tunables_ = std::move(*tunables);
   modeller_.set_options(tunables_.model, tunables_.noise.refit_interval_s);
-  if (auto opened = open_bus(); !opened) {
-    bus_problem_ = opened.error().text();
-    spdlog::error("nothing is published over LCM: {}", bus_problem_);
-  }
+  open_bus();
 }
 
 Health LivePublisher::health() const {
@@ -267,6 +286,10 @@ void LivePublisher::loop() {
           "{} events were neither logged nor recorded: more come on {}_EVENT than a person marks, or "
           "longer ones; find who sends them",
           refused, tunables_.lcm.channel_prefix);
+    }
+    if (now - bus_looked_ >= kBusPeriod) {
+      watch_bus();
+      bus_looked_ = now;
     }
     if (now - last_status_ >= kStatusMessagePeriod) {
       watch_devices(now);

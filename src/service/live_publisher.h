@@ -33,8 +33,8 @@ namespace imuscope {
 
 class LivePublisher {
  public:
-  /// Makes the run folder and opens the bus. Without a multicast route it works on without publishing and
-  /// says so.
+  /// Makes the run folder and opens the bus. Without a multicast route it works on without publishing, says
+  /// so, and takes the bus when there is one.
   static Result<std::unique_ptr<LivePublisher>> create(const Configuration& configuration,
                                                        noise::ModelSpec spec, const LiveOptions& options,
                                                        IoThread& io, CoreThread& estimator);
@@ -67,7 +67,9 @@ class LivePublisher {
                 IoThread& io, CoreThread& estimator);
   void loop();
   void drain();
-  Result<void> open_bus();
+  void open_bus();
+  void watch_bus();
+  void tell_bus_problem(const std::string& problem);
   Result<void> listen_for_events();
   void take_over_tunables();
   void on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes);
@@ -94,6 +96,9 @@ class LivePublisher {
   Broadcast broadcast_;
   std::optional<LcmListener> ear_;
   EventGate event_gate_;
+  bool connected_ = false;      ///< messages are sent
+  std::uint32_t heard_on_ = 0;  ///< this PC's address where ear_ listens
+  HostTime bus_looked_{};
   std::string bus_problem_;
   std::string last_event_;
   std::unique_ptr<RunFolder> folder_;

@@ -52,8 +52,8 @@ void SystemdNotify::send(const std::string& message) const {
   address.sun_family = AF_UNIX;
   std::memcpy(address.sun_path, address_.data(), address_.size());
   const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address_.size());
-  // Lost where systemd does not listen: there is nobody else to tell.
-  (void)::sendto(socket_, message.data(), message.size(), MSG_NOSIGNAL,
+  // Lost where systemd does not listen: there is nobody else to tell, and nothing to wait for.
+  (void)::sendto(socket_, message.data(), message.size(), MSG_NOSIGNAL | MSG_DONTWAIT,
                  reinterpret_cast<const sockaddr*>(&address), length);
 }
 

@@ -145,6 +145,37 @@ TEST_F(Supervision, AStandingWriterIsToldAndOutlived) {
   EXPECT_EQ(service_->wait(), kFailedWork) << log();
 }
 
+TEST_F(Supervision, ABusThatComesLaterIsTakenAndWhatWasSaidBeforeIsRecorded) {
+  ASSERT_EQ(std::system("ip route del 224.0.0.0/4"), 0);
+  run(kSilentVehicle);
+  ASSERT_TRUE(soon([&] { return log_has("nothing is published over LCM: LCM: no route"); })) << log();
+  const auto capture = folder_ / "run" / "capture.lcm";
+  ASSERT_TRUE(soon([&] { return read_text(capture).find("IMUSCOPE_STATUS") != std::string::npos; }));
+
+  const auto hears = [&](const std::string& text) {
+    return soon([&] {
+      (void)run_program("imuscope", {"top", "--event", text}, folder_ / "top.txt");
+      return log_has("event: " + text);
+    });
+  };
+  ASSERT_EQ(std::system("ip route add 224.0.0.0/4 dev lo"), 0);
+  EXPECT_TRUE(hears("a route came")) << log();
+  EXPECT_EQ(run_program("imuscope", {"top", "--once"}, folder_ / "top.txt"), 0)
+      << read_text(folder_ / "top.txt");
+  // The bus moves: a network card comes up, and the route leads there.
+  ASSERT_EQ(
+      std::system("ip link add here type veth peer name there && ip addr add 10.77.0.1/24 dev here && "
+                  "ip link set here up && ip link set there up && ip route replace 224.0.0.0/4 dev here"),
+      0);
+  EXPECT_TRUE(hears("the route moved")) << log();
+  ASSERT_EQ(std::system("ip route del 224.0.0.0/4"), 0);
+  std::this_thread::sleep_for(seconds(5));
+  ASSERT_EQ(std::system("ip route add 224.0.0.0/4 dev lo"), 0);
+  EXPECT_TRUE(hears("the route is back")) << log();
+  service_->interrupt();
+  EXPECT_EQ(service_->wait(), kFailedWork) << log();
+}
+
 /// Holds the port of a name server and never answers.
 class SilentNameServer {
  public:

@@ -96,6 +96,24 @@ TEST(LcmPublisher, TheTapGetsWhatIsSent) {
   EXPECT_EQ(message.counter, 70'001);
 }
 
+TEST(LcmPublisher, WithoutABusTheTapGetsAllAndSequencesGoOnWithOne) {
+  auto publisher = LcmPublisher::unconnected("CAR");
+  std::vector<std::int64_t> tapped;
+  publisher.set_tap([&](std::string_view on, std::int64_t, std::span<const std::uint8_t> bytes) {
+    EXPECT_EQ(on, "CAR_ERROR_MTX1");
+    tapped.push_back(decode_message<error_t>(bytes).value().sequence);
+  });
+  publisher.publish(test::example_error(), "ERROR", "mtx1");
+  EXPECT_FALSE(publisher.connect("tcpq://localhost:7700"));
+  publisher.publish(test::example_error(), "ERROR", "mtx1");
+  EXPECT_EQ(publisher.counters().published, 0U);
+  const auto path = test::scratch_folder() / "bus.lcm";
+  ASSERT_TRUE(publisher.connect("file://" + path.string() + "?mode=w"));
+  publisher.publish(test::example_error(), "ERROR", "mtx1");
+  EXPECT_EQ(publisher.counters().published, 1U);
+  EXPECT_EQ(tapped, (std::vector<std::int64_t>{0, 1, 2}));
+}
+
 TEST(LcmPublisher, AMessageThatWouldNotFitADatagramIsCountedAndNotSent) {
   const auto path = test::scratch_folder() / "bus.lcm";
   {

@@ -19,7 +19,7 @@
 #include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
 #include "tests/support/child_process.h"
-#include "tests/support/lcm_packets.h"
+#include "tests/support/lcm_datagrams.h"
 
 namespace imuscope {
 namespace {
@@ -158,8 +158,8 @@ TEST(LcmSocketFilter, NothingButAWholeMessageOnAWantedChannelPasses) {
                                  test::lc02("", "content"),
                                  test::lc02("XIMUSCOPE_EVENT", "content"),
                                  test::lc02(std::string(60'000, 'x'), "content")};
-    for (const auto& packet : wrong) {
-      if (!stranger.send(packet)) return 1;
+    for (const auto& datagram : wrong) {
+      if (!stranger.send(datagram)) return 1;
     }
     if (ear.listener.wait(std::chrono::milliseconds(200)) != 0) return 2;
     if (dropped() != static_cast<int>(std::size(wrong))) return 3;

@@ -64,6 +64,12 @@ TEST_F(SystemdNotifyTest, ANamesNewLineIsNoAssignment) {
   EXPECT_EQ(heard(), "STATUS=a?b");
 }
 
+TEST_F(SystemdNotifyTest, ASystemdThatDoesNotReadHoldsNobody) {
+  const SystemdNotify systemd;
+  for (int i = 0; i < 10'000; ++i) systemd.status(std::to_string(i));
+  EXPECT_EQ(heard(), "STATUS=0");
+}
+
 TEST_F(SystemdNotifyTest, GivesASignOfLifeTwiceInTheTimeGranted) {
   SystemdNotify systemd;
   const HostTime begin = host_time_from_ns(1'000'000'000'000);

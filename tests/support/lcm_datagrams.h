@@ -1,6 +1,6 @@
 #pragma once
 
-/// Packets of LCM's multicast protocol as anybody on a network can send them, right or wrong.
+/// Datagrams of LCM's multicast protocol as anybody on a network can send them, right or wrong.
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -22,9 +22,9 @@ void append_big_endian(std::string& bytes, Number value) {
 
 /// A whole message.
 inline std::string lc02(std::string_view channel, std::string_view message) {
-  std::string packet = "LC02";
-  append_big_endian<std::uint32_t>(packet, 1);
-  return packet + std::string(channel) + '\0' + std::string(message);
+  std::string datagram = "LC02";
+  append_big_endian<std::uint32_t>(datagram, 1);
+  return datagram + std::string(channel) + '\0' + std::string(message);
 }
 
 struct Fragment {
@@ -36,13 +36,13 @@ struct Fragment {
 
 /// One fragment of a long message; the first carries the channel before its content.
 inline std::string lc03(const Fragment& fragment, std::string_view content) {
-  std::string packet = "LC03";
-  append_big_endian<std::uint32_t>(packet, 7);
-  append_big_endian(packet, fragment.message_bytes);
-  append_big_endian(packet, fragment.offset);
-  append_big_endian(packet, fragment.number);
-  append_big_endian(packet, fragment.fragments);
-  return packet + std::string(content);
+  std::string datagram = "LC03";
+  append_big_endian<std::uint32_t>(datagram, 7);
+  append_big_endian(datagram, fragment.message_bytes);
+  append_big_endian(datagram, fragment.offset);
+  append_big_endian(datagram, fragment.number);
+  append_big_endian(datagram, fragment.fragments);
+  return datagram + std::string(content);
 }
 
 /// Sends datagrams to the default bus.
@@ -56,14 +56,14 @@ class BusSender {
   BusSender& operator=(const BusSender&) = delete;
 
   /// Returns whether the system took it.
-  [[nodiscard]] bool send(std::string_view packet) const {
+  [[nodiscard]] bool send(std::string_view datagram) const {
     constexpr std::uint16_t kPort = 7667;
     sockaddr_in bus{};
     bus.sin_family = AF_INET;
     bus.sin_port = htons(kPort);
     inet_pton(AF_INET, "239.255.76.67", &bus.sin_addr);
-    return sendto(socket_, packet.data(), packet.size(), 0, reinterpret_cast<const sockaddr*>(&bus),
-                  sizeof bus) == static_cast<ssize_t>(packet.size());
+    return sendto(socket_, datagram.data(), datagram.size(), 0, reinterpret_cast<const sockaddr*>(&bus),
+                  sizeof bus) == static_cast<ssize_t>(datagram.size());
   }
 
   /// The two that make liblcm 1.3.1 write 4 GiB behind its buffer: the sum of the second one's offset and
