@@ -117,7 +117,7 @@ TEST(Telemetry, OdometryArrivesInPercentAndDegreesWithEveryFieldInItsPlace) {
 
 /// A second S-IMU whose states count 1, 2, 3, ... through psi, r, gyro bias, accel bias, gyro scale, accel
 /// scale, t_d, and their sd from 101 on.
-Snapshot calibrated() {
+Snapshot calibrated_snapshot() {
   Snapshot s = snapshot();
   StudyOutput& study = s.studies[1];
   study.status = StudyStatus::kConverging;
@@ -143,7 +143,7 @@ Snapshot calibrated() {
 }
 
 TEST(Telemetry, CalibrationArrivesWithEveryStateAndSdInItsPlace) {
-  const auto m = over_the_wire(calibration_message(calibrated(), 1, "mtx1", kAnchor));
+  const auto m = over_the_wire(calibration_message(calibrated_snapshot(), 1, "mtx1", kAnchor));
   EXPECT_EQ(m.utime, kUtime);
   EXPECT_EQ(m.name, "mtx1");
   EXPECT_EQ(m.time_s, 12.5);
@@ -174,7 +174,7 @@ TEST(Telemetry, AQuaternionHasNoNegativeScalar) {
 }
 
 TEST(Telemetry, AStateThatIsNotObservableYetHasNoNumberButItsSd) {
-  Snapshot s = calibrated();
+  Snapshot s = calibrated_snapshot();
   s.studies[1].observable = {true, true, false, true, true, true};
   s.studies[1].t_d_observable = false;
   const auto m = over_the_wire(calibration_message(s, 1, "mtx1", kAnchor));
