@@ -7,6 +7,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "base/contracts.h"
 #include "base/missing_file.h"
 
 namespace imuscope {
@@ -69,6 +70,29 @@ std::string printable(std::string_view text) {
     text.remove_prefix(std::max<std::size_t>(character.length, 1));
   }
   return result;
+}
+
+std::string one_line(std::string_view text, std::size_t longest) {
+  std::string line = printable(text);
+  if (line.size() <= longest) return line;
+  std::size_t end = longest;
+  while (end > 0 && (static_cast<std::uint8_t>(line[end]) & 0xC0U) == 0x80) --end;
+  line.resize(end);
+  return line;
+}
+
+bool is_device_name(std::string_view text) {
+  const auto is_of_a_name = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-';
+  };
+  return !text.empty() && text.size() <= kDeviceNameMax &&
+         std::all_of(text.begin(), text.end(), is_of_a_name);
+}
+
+std::string device_file_name(std::string_view stem, std::string_view name, std::string_view suffix) {
+  IMUSCOPE_EXPECTS(is_device_name(name));
+  std::string file(stem);
+  return file.append(1, '_').append(name).append(suffix);
 }
 
 Result<std::string> read_text_file(const std::filesystem::path& file, std::string_view what,

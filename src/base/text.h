@@ -19,6 +19,25 @@ namespace imuscope {
 /// colour and begins no line.
 [[nodiscard]] std::string printable(std::string_view text);
 
+/// Longest text that is shown or written as one line: a remark, a problem, a message of a person.
+inline constexpr std::size_t kLineMax = 4096;
+
+/// Text of any origin as one line: printable(), and cut before the character that does not fit.
+/// @param longest  in bytes
+[[nodiscard]] std::string one_line(std::string_view text, std::size_t longest = kLineMax);
+
+inline constexpr std::size_t kDeviceNameMax = 32;
+
+/// Whether the text is 1 to kDeviceNameMax letters of ASCII, digits, '_' or '-': names of devices become
+/// parts of file names.
+[[nodiscard]] bool is_device_name(std::string_view text);
+
+/// "STEM_NAMEsuffix": a file of one device of a run.
+/// @param stem, suffix  written in this program
+/// @param name          of the device: is_device_name()
+[[nodiscard]] std::string device_file_name(std::string_view stem, std::string_view name,
+                                           std::string_view suffix);
+
 /// No text file that a person writes, a vehicle's DBC file included, is as large.
 inline constexpr std::size_t kTextFileMax = std::size_t{64} << 20U;
 

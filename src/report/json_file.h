@@ -9,8 +9,15 @@
 
 namespace imuscope::report {
 
-/// The document in a file; discarded (is_discarded()) where it cannot be read, is no JSON, or is larger than
-/// any that a run writes (kTextFileMax): what is made of a file must not take more memory than there is.
+/// Deepest nesting of a document: those of a run have about ten levels.
+inline constexpr std::size_t kJsonDepthMax = 64;
+
+/// The document in a file; discarded (is_discarded()) where it cannot be read, is no JSON, is larger than any
+/// that a run writes (kTextFileMax) or nested deeper (kJsonDepthMax): what is made of a file must not take
+/// more memory than there is, heap or stack.
+///
+/// Its texts have passed the gate: each is one line (base/text.h, one_line()), but a configuration's, which
+/// keeps its lines.
 [[nodiscard]] nlohmann::json read_json_file(const std::filesystem::path& file);
 
 /// That a document lacks a field or holds something else there than a run writes, in words for a person.

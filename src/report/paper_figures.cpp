@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <optional>
 
+#include "base/text.h"
 #include "base/units.h"
 #include "report/figures.h"
 #include "report/fits.h"
+#include "report/gnuplot.h"
 #include "report/run_files.h"
 
 extern char** environ;
@@ -21,53 +24,51 @@ namespace report {
 namespace {
 
 /// Told apart by the colour-blind (Okabe and Ito).
-constexpr const char* kColours[] = {"#d1600a", "#0b9a6e", "#3a86d8"};
+constexpr GnuplotWord kColours[] = {"#d1600a", "#0b9a6e", "#3a86d8"};
 
 /// A script under construction: panels of one picture.
 struct Picture {
-  std::string name;
+  std::string name;  ///< of its files: written in this program, or with the name of a device in it
   int rows = 1;
   int columns = 1;
-  std::string body;
+  GnuplotScript body;
 };
 
-std::string cell(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : "NaN"; }
-
-/// Text inside single quotes of gnuplot.
-std::string gnuplot_text(std::string any) {
-  for (std::size_t at = 0; (at = any.find('\'', at)) != std::string::npos; at += 2) any.insert(at, 1, '\'');
-  return "'" + any + "'";
-}
-
 /// Mean, smallest and largest of a signal over time; a blank line where there is a gap.
-std::string block_of(const std::string& name, const BinnedSignals& signals, std::size_t signal) {
-  std::string block = "$" + name + " << EOD\n";
+GnuplotScript block_of(const GnuplotScript& name, const BinnedSignals& signals, std::size_t signal) {
+  auto block = GnuplotScript::of("${} << EOD\n", name);
   for (std::size_t i = 0; i < signals.size(); ++i) {
     const auto& bin = signals.bin(signal, i);
-    block += bin.n == 0 ? std::string("\n")
-                        : fmt::format("{} {} {} {}\n", cell(signals.time_s(i)), cell(bin.mean()),
-                                      cell(bin.smallest), cell(bin.largest));
+    if (bin.n == 0) {
+      block.add("\n");
+    } else {
+      block.add("{} {} {} {}\n", GnuplotNumber{signals.time_s(i)}, GnuplotNumber{bin.mean()},
+                GnuplotNumber{bin.smallest}, GnuplotNumber{bin.largest});
+    }
   }
-  return block + "EOD\n";
+  return block.add("EOD\n");
 }
 
 /// Estimate and its sd over time.
-std::string block_of(const std::string& name, const BinnedSignals& signals, std::size_t signal,
-                     std::size_t sd_signal, double unit) {
-  std::string block = "$" + name + " << EOD\n";
+GnuplotScript block_of(const GnuplotScript& name, const BinnedSignals& signals, std::size_t signal,
+                       std::size_t sd_signal, double unit) {
+  auto block = GnuplotScript::of("${} << EOD\n", name);
   for (std::size_t i = 0; i < signals.size(); ++i) {
     const double value = unit * signals.bin(signal, i).last;
     const double sd = unit * signals.bin(sd_signal, i).last;
-    block += std::isfinite(value) ? fmt::format("{} {} {} {}\n", cell(signals.time_s(i)), cell(value),
-                                                cell(value - sd), cell(value + sd))
-                                  : std::string("\n");
+    if (std::isfinite(value)) {
+      block.add("{} {} {} {}\n", GnuplotNumber{signals.time_s(i)}, GnuplotNumber{value},
+                GnuplotNumber{value - sd}, GnuplotNumber{value + sd});
+    } else {
+      block.add("\n");
+    }
   }
-  return block + "EOD\n";
+  return block.add("EOD\n");
 }
 
 /// Band of columns 3 and 4 behind the line of column 2.
-std::string band_plot(const std::string& block, const char* colour) {
-  return fmt::format(
+GnuplotScript band_plot(const GnuplotScript& block, const GnuplotWord& colour) {
+  return GnuplotScript::of(
       "plot ${0} using 1:3:4 with filledcurves fillcolor rgb '{1}' fillstyle transparent solid 0.25 noborder "
       "notitle, ${0} using 1:2 with lines linecolor rgb '{1}' linewidth 1 notitle\n",
       block, colour);
@@ -75,49 +76,59 @@ std::string band_plot(const std::string& block, const char* colour) {
 
 Picture drive_picture(const RunFiles& run) {
   const BinnedSignals& navigation = *run.navigation;
-  Picture picture{"drive", 2, 1, "$way << EOD\n"};
+  Picture picture{"drive", 2, 1, GnuplotScript::of("$way << EOD\n")};
   for (std::size_t i = 0; i < navigation.size(); ++i) {
     const double north = navigation.bin(kNorth_m, i).last;
-    picture.body += std::isfinite(north) ? fmt::format("{} {} {}\n", cell(navigation.bin(kEast_m, i).last),
-                                                       cell(north), cell(navigation.bin(kSpeed_mps, i).last))
-                                         : std::string("\n");
+    if (std::isfinite(north)) {
+      picture.body.add("{} {} {}\n", GnuplotNumber{navigation.bin(kEast_m, i).last}, GnuplotNumber{north},
+                       GnuplotNumber{navigation.bin(kSpeed_mps, i).last});
+    } else {
+      picture.body.add("\n");
+    }
   }
-  picture.body += "EOD\n" + block_of("speed", navigation, kSpeed_mps);
-  picture.body +=
+  const auto speed = GnuplotScript::of("speed");
+  picture.body.add("EOD\n") += block_of(speed, navigation, kSpeed_mps);
+  picture.body.add(
       "set size ratio -1\nset xlabel 'east, m'\nset ylabel 'north, m'\nset cblabel 'speed, m/s'\n"
       "plot $way using 1:2:3 with lines linecolor palette linewidth 2 notitle\nset size noratio\n"
-      "set autoscale xfix\nset xlabel 'time, s'\nset ylabel 'speed, m/s'\n";
-  picture.body += band_plot("speed", kColours[2]);
+      "set autoscale xfix\nset xlabel 'time, s'\nset ylabel 'speed, m/s'\n");
+  picture.body += band_plot(speed, kColours[2]);
   return picture;
 }
 
 /// The paper's Figure 1: three angles, three lengths.
 Picture estimate_picture(const StudyFiles& study) {
-  Picture picture{"figure1_" + study.name, 2, 3, {}};
-  constexpr const char* kAxisNames[] = {"x", "y", "z"};
-  picture.body += "set autoscale xfix\nset xlabel 'time, s'\n";
+  Picture picture{device_file_name("figure1", study.name, ""), 2, 3, {}};
+  constexpr GnuplotWord kAxisNames[] = {"x", "y", "z"};
+  constexpr GnuplotWord kAngle = "{/Symbol y}";
+  constexpr GnuplotWord kLength = "r";
+  picture.body.add("set autoscale xfix\nset xlabel 'time, s'\n");
   for (std::size_t i = 0; i < 2 * kTriad; ++i) {
     const bool angle = i < kTriad;
-    const std::string block = fmt::format("estimate{}", i);
+    const auto block = GnuplotScript::of("estimate{}", i);
     const std::size_t signal = angle ? kPsi_deg + i : kLeverArm_m + i - kTriad;
     const double unit = angle ? 1.0 : kMmPerM;
     picture.body += block_of(block, *study.calibration_series, signal, signal + kSdOffset, unit);
-    const auto window = settled_window(*study.calibration_series, signal, signal + kSdOffset, unit, {});
-    picture.body += window ? fmt::format("set yrange [{}:{}]\n", cell(window->begin_s), cell(window->end_s))
-                           : std::string("set yrange [*:*]\n");
-    picture.body += fmt::format("set ylabel '{} {}, {}'\n", angle ? "{/Symbol y}" : "r",
-                                kAxisNames[i % kTriad], angle ? "deg" : "mm");
+    if (const auto window = settled_window(*study.calibration_series, signal, signal + kSdOffset, unit, {})) {
+      picture.body.add("set yrange [{}:{}]\n", GnuplotNumber{window->begin_s}, GnuplotNumber{window->end_s});
+    } else {
+      picture.body.add("set yrange [*:*]\n");
+    }
+    picture.body.add("set ylabel '{} {}, {}'\n", angle ? kAngle : kLength, kAxisNames[i % kTriad],
+                     angle ? GnuplotWord("deg") : GnuplotWord("mm"));
     picture.body += band_plot(block, kColours[i % kTriad]);
   }
   return picture;
 }
 
 Picture error_picture(const StudyFiles& study) {
-  Picture picture{"figure2_" + study.name, 2, 3, "set autoscale xfix\nset xlabel 'time, s'\n"};
+  Picture picture{device_file_name("figure2", study.name, ""), 2, 3, {}};
+  picture.body.add("set autoscale xfix\nset xlabel 'time, s'\n");
   for (std::size_t i = 0; i < kErrorSignals; ++i) {
-    const std::string block = fmt::format("error{}", i);
+    const auto block = GnuplotScript::of("error{}", i);
     picture.body += block_of(block, *study.errors, i);
-    picture.body += fmt::format("set ylabel '{}, {}'\n", axis_words(kAxes[i]), i < kTriad ? "deg/s" : "m/s²");
+    picture.body.add("set ylabel {}\n",
+                     GnuplotText(fmt::format("{}, {}", axis_words(kAxes[i]), i < kTriad ? "deg/s" : "m/s²")));
     picture.body += band_plot(block, kColours[i % kTriad]);
   }
   return picture;
@@ -128,65 +139,66 @@ Picture scatter_picture(const StudyFiles& study) {
   struct Panel {
     std::size_t error;
     std::size_t covariate;
-    const char* words;
+    GnuplotWord words;
   };
   constexpr Panel kPanels[] = {{0, 0, "angular rate x, rad/s"},
                                {0, 3, "angular acceleration x, rad/s²"},
                                {0, 6, "angular jerk x, rad/s³"},
                                {5, 11, "specific force z, m/s²"},
                                {5, 14, "linear jerk z, m/s³"}};
-  Picture picture{"figure3_" + study.name, 2, 3, {}};
+  Picture picture{device_file_name("figure3", study.name, ""), 2, 3, {}};
   int n = 0;
   for (const Panel& panel : kPanels) {
-    picture.body += fmt::format("$points{} << EOD\n", n);
+    picture.body.add("$points{} << EOD\n", n);
     const auto& x = study.scatter->covariates[panel.covariate];
     const auto& y = study.scatter->errors[panel.error];
     for (std::size_t i = 0; i < x.size(); ++i) {
-      if (std::isfinite(x[i]) && std::isfinite(y[i]))
-        picture.body += fmt::format("{:.5g} {:.5g}\n", x[i], y[i]);
+      if (std::isfinite(x[i]) && std::isfinite(y[i])) picture.body.add("{:.5g} {:.5g}\n", x[i], y[i]);
     }
-    picture.body += fmt::format(
-        "EOD\nset xlabel '{}'\nset ylabel 'error of {}, {}'\nplot $points{} using 1:2 with points pointtype "
-        "7 "
+    const GnuplotText label(fmt::format("error of {}, {}", axis_words(kAxes[panel.error]),
+                                        panel.error < kTriad ? "deg/s" : "m/s²"));
+    picture.body.add(
+        "EOD\nset xlabel '{}'\nset ylabel {}\nplot $points{} using 1:2 with points pointtype 7 "
         "pointsize 0.15 linecolor rgb '{}' notitle\n",
-        panel.words, axis_words(kAxes[panel.error]), panel.error < kTriad ? "deg/s" : "m/s²", n,
-        kColours[panel.error % kTriad]);
+        panel.words, label, n, kColours[panel.error % kTriad]);
     ++n;
   }
   return picture;
 }
 
 /// Observed, interval, total and every component of one fit.
-std::string wavelet_block(const std::string& name, const Fit& fit) {
-  std::string block = "$" + name + " << EOD\n";
+GnuplotScript wavelet_block(const GnuplotScript& name, const Fit& fit) {
+  auto block = GnuplotScript::of("${} << EOD\n", name);
   for (std::size_t i = 0; i < fit.levels.size(); ++i) {
     const FitLevel& level = fit.levels[i];
-    block += fmt::format("{} {} {} {} {}", cell(level.tau_s), cell(or_nan(level.value)),
-                         cell(or_nan(level.ci_low)), cell(or_nan(level.ci_high)), cell(or_nan(level.fitted)));
+    block.add("{} {} {} {} {}", GnuplotNumber{level.tau_s}, GnuplotNumber{or_nan(level.value)},
+              GnuplotNumber{or_nan(level.ci_low)}, GnuplotNumber{or_nan(level.ci_high)},
+              GnuplotNumber{or_nan(level.fitted)});
     for (const FitComponent& component : fit.components) {
-      if (component.values.size() == fit.levels.size()) block += " " + cell(component.values[i]);
+      if (component.values.size() == fit.levels.size()) block.add(" {}", GnuplotNumber{component.values[i]});
     }
-    block += "\n";
+    block.add("\n");
   }
-  return block + "EOD\n";
+  return block.add("EOD\n");
 }
 
-std::string wavelet_plots(const std::string& block, const Fit& fit, const char* colour) {
-  constexpr int kFirstComponent = 6;
-  std::string plots = fmt::format(
-      "${0} using 1:2:3:4 with yerrorbars pointtype 7 pointsize 0.4 linecolor rgb '{1}' title {2}, "
+GnuplotScript wavelet_plots(const GnuplotScript& block, const Fit& fit, const GnuplotWord& colour) {
+  constexpr std::size_t kFirstComponent = 6;
+  auto plots = GnuplotScript::of(
+      "${0} using 1:2:3:4 with yerrorbars pointtype 7 pointsize 0.4 linecolor rgb '{1}' title {2} "
+      "noenhanced, "
       "${0} using 1:5 with lines linewidth 1.5 linecolor rgb '{1}' notitle",
-      block, colour, gnuplot_text(fit.regime.empty() ? "all" : fit.regime));
+      block, colour, GnuplotText(fit.regime.empty() ? "all" : fit.regime));
   for (std::size_t i = 0; i < fit.components.size(); ++i) {
     if (fit.components[i].values.size() != fit.levels.size()) continue;
-    plots += fmt::format(", ${} using 1:{} with lines dashtype 2 linewidth 0.8 linecolor rgb '{}' notitle",
-                         block, kFirstComponent + static_cast<int>(i), colour);
+    plots.add(", ${} using 1:{} with lines dashtype 2 linewidth 0.8 linecolor rgb '{}' notitle", block,
+              kFirstComponent + i, colour);
   }
   return plots;
 }
 
 /// Between half the smallest and twice the largest of what was observed and fitted: a component may leave it.
-std::string wavelet_range(const std::vector<const Fit*>& fits) {
+GnuplotScript wavelet_range(const std::vector<const Fit*>& fits) {
   double low = std::numeric_limits<double>::infinity();
   double high = 0.0;
   for (const Fit* fit : fits) {
@@ -198,40 +210,45 @@ std::string wavelet_range(const std::vector<const Fit*>& fits) {
       }
     }
   }
-  return high > 0.0 ? fmt::format("set yrange [{}:{}]\n", cell(0.5 * low), cell(2.0 * high))
-                    : std::string("set yrange [*:*]\n");
+  return high > 0.0
+             ? GnuplotScript::of("set yrange [{}:{}]\n", GnuplotNumber{0.5 * low}, GnuplotNumber{2.0 * high})
+             : GnuplotScript::of("set yrange [*:*]\n");
+}
+
+/// The fits of one axis that a panel shows: those of regimes, or that of everything together.
+std::vector<const Fit*> fits_shown(const std::vector<Fit>& fits, const std::string& imu, const char* axis) {
+  std::vector<const Fit*> shown;
+  for (const Fit& fit : fits) {
+    const bool part = fit.regime != "all" && !fit.regime.empty();
+    if (fit.imu == imu && fit.axis == axis && part && !fit.levels.empty()) shown.push_back(&fit);
+  }
+  const Fit* whole = find_fit(fits, imu, axis, "all");
+  if (shown.empty() && whole != nullptr && !whole->levels.empty()) shown.push_back(whole);
+  return shown;
 }
 
 std::optional<Picture> wavelet_picture(const std::vector<Fit>& fits, const std::string& imu) {
-  Picture picture{"figure4_" + imu, 2, 3,
-                  "set logscale xy\nset format '10^{%L}'\nset key top right samplen 1\nset xlabel 'scale τ, "
-                  "s'\n"};
+  Picture picture{device_file_name("figure4", imu, ""), 2, 3, {}};
+  picture.body.add(
+      "set logscale xy\nset format '10^{{%L}}'\nset key top right samplen 1\nset xlabel 'scale τ, s'\n");
   bool any = false;
-  for (const char* axis : kAxes) {
-    std::vector<const Fit*> of_axis;
-    for (const Fit& fit : fits) {
-      const bool part = fit.regime != "all" && !fit.regime.empty();
-      if (fit.imu == imu && fit.axis == axis && part && !fit.levels.empty()) of_axis.push_back(&fit);
-    }
-    if (of_axis.empty()) {
-      const Fit* whole = find_fit(fits, imu, axis, "all");
-      if (whole == nullptr || whole->levels.empty()) {
-        picture.body += "set multiplot next\n";
-        continue;
-      }
-      of_axis.push_back(whole);
+  for (std::size_t axis = 0; axis < std::size(kAxes); ++axis) {
+    const auto shown = fits_shown(fits, imu, kAxes[axis]);
+    if (shown.empty()) {
+      picture.body.add("set multiplot next\n");
+      continue;
     }
     any = true;
-    std::string plots;
-    for (std::size_t i = 0; i < of_axis.size(); ++i) {
-      const std::string block = fmt::format("{}_{}", axis, i);
-      picture.body += wavelet_block(block, *of_axis[i]);
-      plots += (plots.empty() ? "" : ", ") + wavelet_plots(block, *of_axis[i], kColours[(i + 2) % kTriad]);
+    GnuplotScript plots;
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      const auto block = GnuplotScript::of("axis{}_{}", axis, i);
+      picture.body += wavelet_block(block, *shown[i]);
+      if (!plots.empty()) plots.add(", ");
+      plots += wavelet_plots(block, *shown[i], kColours[(i + 2) % kTriad]);
     }
-    picture.body +=
-        wavelet_range(of_axis) +
-        fmt::format("set ylabel {}\nplot {}\n",
-                    gnuplot_text(fmt::format("{}, ({})²", axis_words(axis), of_axis.front()->unit)), plots);
+    picture.body += wavelet_range(shown);
+    const GnuplotText label(fmt::format("{}, ({})²", axis_words(kAxes[axis]), shown.front()->unit));
+    picture.body.add("set ylabel {} noenhanced\nplot {}\n", label, plots);
   }
   return any ? std::optional(picture) : std::nullopt;
 }
@@ -249,26 +266,26 @@ std::vector<Picture> pictures_of(const RunFiles& run) {
   return pictures;
 }
 
-/// Draws the panels once for each format. Run in its own folder, so that no path has to be gnuplot_text.
-std::string script_of(const Picture& picture) {
+/// Draws the panels once for each format. Run in its own folder, so that no path stands in it.
+GnuplotScript script_of(const Picture& picture) {
   constexpr double kPanelWidth_in = 3.0;
   constexpr double kPanelHeight_in = 2.2;
   constexpr double kPixelsPerInch = 96.0;
   const double width = picture.columns == 1 ? 2.0 * kPanelWidth_in : kPanelWidth_in * picture.columns;
   const double height =
       picture.columns == 1 ? 2.0 * kPanelHeight_in * picture.rows : kPanelHeight_in * picture.rows;
-  std::string script = "# imuscope: gnuplot draws this file as SVG and PDF.\nset encoding utf8\n";
-  const std::pair<std::string, const char*> kOutputs[] = {
-      {fmt::format("svg size {:.0f},{:.0f} dynamic background 'white' font 'sans,11'", width * kPixelsPerInch,
-                   height * kPixelsPerInch),
-       "svg"},
-      {fmt::format("pdfcairo size {:g}in,{:g}in font 'sans,8'", width, height), "pdf"}};
+  auto script = GnuplotScript::of("# imuscope: gnuplot draws this file as SVG and PDF.\nset encoding utf8\n");
+  const std::pair<GnuplotScript, std::string> kOutputs[] = {
+      {GnuplotScript::of("svg size {:.0f},{:.0f} dynamic background 'white' font 'sans,11'",
+                         width * kPixelsPerInch, height * kPixelsPerInch),
+       ".svg"},
+      {GnuplotScript::of("pdfcairo size {:g}in,{:g}in font 'sans,8'", width, height), ".pdf"}};
   for (const auto& [terminal, suffix] : kOutputs) {
-    script += fmt::format(
-        "reset\nset terminal {}\nset output '{}.{}'\nset grid linecolor rgb '#dddddd'\n"
+    script.add(
+        "reset\nset terminal {}\nset output {}\nset grid linecolor rgb '#dddddd'\n"
         "set border 3\nset tics nomirror\nset multiplot layout {},{}\n{}unset multiplot\n"
         "set output\n",
-        terminal, picture.name, suffix, picture.rows, picture.columns, picture.body);
+        terminal, GnuplotText(picture.name + suffix), picture.rows, picture.columns, picture.body);
   }
   return script;
 }
@@ -280,7 +297,9 @@ Result<void> draw(const std::filesystem::path& folder, const std::string& script
   posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
   std::string program = "gnuplot";
   std::string file = script;
-  char* arguments[] = {program.data(), file.data(), nullptr};
+  // Its own settings alone: what lies in a folder from elsewhere is no start-up file.
+  std::string defaults = "-d";
+  char* arguments[] = {program.data(), defaults.data(), file.data(), nullptr};
   pid_t child = 0;
   const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments, environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -307,7 +326,7 @@ Result<std::vector<std::filesystem::path>> write_figures(const std::filesystem::
   for (const report::Picture& picture : report::pictures_of(*run)) {
     const std::string script = picture.name + ".gp";
     std::ofstream out(folder / script);
-    out << report::script_of(picture);
+    out << report::script_of(picture).str();
     out.close();
     if (!out) {
       return work_error((folder / script).string() + " could not be written",

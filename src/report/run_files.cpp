@@ -1,9 +1,11 @@
 #include "report/run_files.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 
+#include "base/text.h"
 #include "base/units.h"
 #include "report/csv_reader.h"
 #include "report/json_fields.h"
@@ -131,7 +133,7 @@ Result<void> read_odometry(RunFiles& run) {
 
 Result<void> read_calibration_series(const RunFiles& run, StudyFiles& study,
                                      std::vector<std::string>& absent) {
-  const auto file = run.folder / ("calibration_" + study.name + ".csv");
+  const auto file = run.folder / device_file_name("calibration", study.name, ".csv");
   if (!present(file, absent)) return {};
   const std::vector<std::string> signals{"psi_x_deg", "psi_y_deg", "psi_z_deg", "r_x_m",
                                          "r_y_m",     "r_z_m",     "t_d_ms"};
@@ -178,7 +180,7 @@ class StaticStretches {
 };
 
 Result<void> read_errors(const RunFiles& run, StudyFiles& study, std::vector<std::string>& absent) {
-  const auto file = run.folder / ("errors_" + study.name + ".csv");
+  const auto file = run.folder / device_file_name("errors", study.name, ".csv");
   if (!present(file, absent)) return {};
   auto reader = CsvReader::open(file, {"time_s", "e_gyro_x_radps", "e_gyro_y_radps", "e_gyro_z_radps",
                                        "e_accel_x_mps2", "e_accel_y_mps2", "e_accel_z_mps2", "regime"});
@@ -216,11 +218,18 @@ Result<void> read_studies(RunFiles& run, const json& calibration) {
   for (const json& imu : field(calibration, "imus")) {
     StudyFiles study;
     study.name = text_at(imu, "name");
+    if (!is_device_name(study.name)) {
+      return work_error(
+          fmt::format("{} names an S-IMU '{}'; its name becomes part of file names and has 1 to {} "
+                      "letters, digits, '_' or '-'",
+                      (run.folder / "calibration.json").string(), study.name, kDeviceNameMax),
+          "no run writes such a name: ask where the folder comes from");
+    }
     study.calibration = imu;
     study.truth = named(field(*truth, "imus"), study.name);
     if (auto read = read_calibration_series(run, study, run.absent); !read) return read;
     if (auto read = read_errors(run, study, run.absent); !read) return read;
-    const auto scatter_file = run.folder / ("scatter_" + study.name + ".csv");
+    const auto scatter_file = run.folder / device_file_name("scatter", study.name, ".csv");
     if (present(scatter_file, run.absent)) {
       auto scatter = read_scatter(scatter_file);
       if (!scatter) return passed_on(scatter);

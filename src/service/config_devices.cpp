@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "base/text.h"
 #include "base/units.h"
 #include "service/config_vehicle.h"
 #include "service/toml_reader.h"
@@ -315,10 +316,8 @@ void read_xsens(TomlReader& in, XsensConfig& xsens) {
 }
 
 void check_name(TomlReader& in, const std::string& name) {
-  const bool good = !name.empty() && name.size() <= 32 && std::all_of(name.begin(), name.end(), [](char c) {
-    return (std::isalnum(static_cast<unsigned char>(c)) != 0) || c == '_' || c == '-';
-  });
-  if (!good) in.fail("name", "must be 1 to 32 letters, digits, '_' or '-'", "it becomes part of file names");
+  if (!is_device_name(name))
+    in.fail("name", "must be 1 to 32 letters, digits, '_' or '-'", "it becomes part of file names");
 }
 
 void read_rtklib(TomlReader& in, GnssOptions& gnss) {

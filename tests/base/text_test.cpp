@@ -29,6 +29,24 @@ TEST(Printable, NothingIsLeftThatATerminalObeys) {
   EXPECT_EQ(printable(std::string_view("a\0b", 3)), "a?b");
 }
 
+TEST(OneLine, IsCutBeforeTheCharacterThatDoesNotFit) {
+  EXPECT_EQ(one_line("Straße\n", 6), "Straß");
+  EXPECT_EQ(one_line("Straße\n", 5), "Stra");
+  EXPECT_EQ(one_line("\U0001F697", 3), "");
+  EXPECT_EQ(one_line("a\x1b"
+                     "b",
+                     3),
+            "a?b");
+}
+
+TEST(DeviceName, IsWhatCanBePartOfAFileNameAnywhere) {
+  for (const char* name : {"mtx1", "MTi-680_roof", "a", "12345678901234567890123456789012"})
+    EXPECT_TRUE(is_device_name(name)) << name;
+  for (const char* name : {"", "..", "a/b", "a b", "a.b", "ä", "a\n", "123456789012345678901234567890123"})
+    EXPECT_FALSE(is_device_name(name)) << name;
+  EXPECT_EQ(device_file_name("errors", "mtx1", ".csv"), "errors_mtx1.csv");
+}
+
 TEST(Printable, BytesThatAreNoCharacterAreTold) {
   EXPECT_EQ(printable("\xff\xc3"), "??");
   EXPECT_EQ(printable("\xc0\xaf"), "??") << "a slash in more bytes than it needs";
