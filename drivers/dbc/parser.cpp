@@ -20,6 +20,11 @@ constexpr std::uint32_t kStandardIdMax = 0x7FF;
 constexpr std::uint32_t kExtendedIdMax = 0x1FFF'FFFF;
 constexpr std::size_t kFdBytesMax = 64;
 constexpr unsigned kRawBitsMax = 64;
+/// Far more than any vehicle's file has: what a file claims must not take the memory of the PC, or its time.
+constexpr std::size_t kMessagesMax = 16'384;
+constexpr std::size_t kSignalsMax = 131'072;
+constexpr std::size_t kNamesMax = 1'048'576;
+constexpr std::size_t kSwitchesMax = 16;
 /// Holds the signals that belong to no message; not a frame.
 constexpr std::string_view kNoMessage = "VECTOR__INDEPENDENT_SIG_MSG";
 
@@ -216,13 +221,18 @@ class Parser {
       fail(line, fmt::format("BO_ {}: {} bytes are more than the {} of a CAN FD frame", message.name,
                              message.length, kFdBytesMax));
     }
-    if (const Message* other = database_.find(message.id, message.is_extended)) {
-      fail(line, fmt::format("BO_ {}: identifier {} is {}'s already (line {})", message.name, id, other->name,
-                             other->line));
+    const auto [place, is_new] = by_id_.try_emplace(id, database_.messages.size());
+    if (!is_new) {
+      const Message& other = database_.messages[place->second];
+      fail(line, fmt::format("BO_ {}: identifier {} is {}'s already (line {})", message.name, id, other.name,
+                             other.line));
     }
+    if (by_id_.size() > kMessagesMax)
+      fail(line, fmt::format("it describes more than {} messages", kMessagesMax));
     database_.messages.push_back(std::move(message));
     marks_.emplace_back();
     signal_lines_.emplace_back();
+    by_name_.emplace_back();
   }
 
   MuxMark mux_mark() {
@@ -268,7 +278,8 @@ class Parser {
     }
     if (!is_frame_) return;
     Message& message = database_.messages.back();
-    if (message.find(signal.name) != nullptr)
+    if (++n_signals_ > kSignalsMax) fail(line, fmt::format("it describes more than {} signals", kSignalsMax));
+    if (!by_name_.back().try_emplace(signal.name, message.signals.size()).second)
       fail(line,
            fmt::format("SG_ {}: message {} has a signal of that name already", signal.name, message.name));
     signal.is_switch = mark.is_switch;
@@ -299,17 +310,20 @@ class Parser {
     const std::size_t line = now().line;
     const auto id = expect_integer<std::uint32_t>("the identifier of a message");
     const std::string name = expect_word("a signal's name");
-    for (std::size_t m = 0; m < database_.messages.size(); ++m) {
-      const Message& message = database_.messages[m];
-      if ((message.id | (message.is_extended ? kExtendedBit : 0U)) != id) continue;
-      const Signal* signal = message.find(name);
-      if (signal == nullptr)
-        fail(line, fmt::format("{}message {} has no signal '{}'", context_, message.name, name));
-      return Named{m, static_cast<std::size_t>(signal - message.signals.data())};
+    if (const auto message = by_id_.find(id); message != by_id_.end()) {
+      const auto signal = signal_of(message->second, name);
+      if (!signal)
+        fail(line, fmt::format("{}message {} has no signal '{}'", context_,
+                               database_.messages[message->second].name, name));
+      return Named{message->second, *signal};
     }
     constexpr std::uint32_t kNoMessageId = 0xC000'0000U;
     if (id != kNoMessageId) fail(line, fmt::format("{}no message has the identifier {}", context_, id));
     return std::nullopt;
+  }
+  [[nodiscard]] std::optional<std::size_t> signal_of(std::size_t message, const std::string& name) const {
+    const auto found = by_name_[message].find(name);
+    return found == by_name_[message].end() ? std::nullopt : std::optional(found->second);
   }
   [[nodiscard]] Signal& at(const Named& named) {
     return database_.messages[named.message].signals[named.signal];
@@ -320,8 +334,14 @@ class Parser {
     while (!take_sign(';')) {
       const auto number = expect_integer<std::int64_t>("a number or ';'");
       names.push_back({number, expect_text("the name of that number, in quotation marks")});
+      count_names(1);
     }
     return names;
+  }
+
+  void count_names(std::size_t n) {
+    n_names_ += n;
+    if (n_names_ > kNamesMax) fail(now().line, fmt::format("it names more than {} values", kNamesMax));
   }
 
   void value_names() {
@@ -337,6 +357,7 @@ class Parser {
       const std::string table = expect_word("a table");
       if (!tables_.contains(table))
         fail(now().line, fmt::format("{}no VAL_TABLE_ is called '{}'", context_, table));
+      count_names(tables_[table].size());  // a copy for each signal
       names = tables_[table];
       expect_sign(';');
     } else {
@@ -391,12 +412,11 @@ class Parser {
     expect_sign(';');
     if (!signal) return;
     const Message& message = database_.messages[signal->message];
-    const Signal* by = message.find(name);
-    if (by == nullptr)
-      fail(line, fmt::format("{}message {} has no signal '{}'", context_, message.name, name));
+    const auto by = signal_of(signal->message, name);
+    if (!by) fail(line, fmt::format("{}message {} has no signal '{}'", context_, message.name, name));
     Signal& target = at(*signal);
-    if (by == &target) fail(line, fmt::format("{}{} cannot switch itself", context_, name));
-    target.switched_by = static_cast<std::size_t>(by - message.signals.data());
+    if (*by == signal->signal) fail(line, fmt::format("{}{} cannot switch itself", context_, name));
+    target.switched_by = by;
     target.present_for = std::move(ranges);
   }
 
@@ -449,9 +469,13 @@ class Parser {
   static void check_switches_end(const Message& message, std::size_t signal, std::size_t line) {
     std::size_t steps = 0;
     for (std::optional<std::size_t> at = signal; at; at = message.signals[*at].switched_by) {
-      if (++steps > message.signals.size())
+      ++steps;
+      if (steps > message.signals.size())
         fail(line, fmt::format("SG_ {}: its multiplexers switch one another in a circle",
                                message.signals[signal].name));
+      if (steps > kSwitchesMax)
+        fail(line, fmt::format("SG_ {}: more than {} multiplexers in a row", message.signals[signal].name,
+                               kSwitchesMax));
     }
   }
 
@@ -463,6 +487,10 @@ class Parser {
   std::vector<std::vector<MuxMark>> marks_;             ///< per message and signal
   std::vector<std::vector<std::size_t>> signal_lines_;  ///< per message and signal
   std::map<std::string, std::vector<NamedValue>> tables_;
+  std::map<std::uint32_t, std::size_t> by_id_;               ///< identifier as written: message
+  std::vector<std::map<std::string, std::size_t>> by_name_;  ///< per message: name of a signal, its place
+  std::size_t n_signals_ = 0;
+  std::size_t n_names_ = 0;
 };
 
 /// The degree sign in most DBC files is one byte.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include "base/text.h"
+
 namespace imuscope::dbc {
 namespace {
 
@@ -26,15 +28,17 @@ std::size_t number_length(std::string_view text) {
 }  // namespace
 
 std::string describe(const Token& token) {
+  constexpr std::size_t kShown = 80;  // bytes
+  const std::string text = one_line(token.text, kShown);
   switch (token.kind) {
     case TokenKind::kEnd:
       return "the end of the file";
     case TokenKind::kText:
-      return fmt::format("\"{}\"", token.text);
+      return fmt::format("\"{}\"", text);
     case TokenKind::kOpenText:
       return "a text without its closing quotation mark";
     default:
-      return fmt::format("'{}'", token.text);
+      return fmt::format("'{}'", text);
   }
 }
 

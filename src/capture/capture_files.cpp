@@ -11,6 +11,14 @@
 namespace imuscope {
 namespace {
 
+/// Files in a row that may be missing: a recording of a day in files of a minute has as many.
+constexpr int kMissingMax = 1440;
+constexpr double kSecondsPerMicrosecond = 1e-6;
+/// A file whose header is damaged follows where its first record lies near the last one before: the recorder
+/// writes rings after one another, and no break of a drive is longer.
+constexpr double kDisorderMax_s = 10.0;
+constexpr double kBreakMax_s = 24.0 * 3600.0;
+
 std::optional<HostTime> t0_of(const LogEvent& event) {
   const auto record = decode_record(event.data);
   if (!record) return std::nullopt;
@@ -52,29 +60,50 @@ void CaptureFiles::report_reads() {
 }
 
 bool CaptureFiles::next(LogEvent& event) {
-  if (!log_.next(event)) {
+  while (!log_.next(event)) {
     if (!open_following()) return false;
-    return next(event);
   }
   if (std::exchange(at_beginning_, false)) t0_ = t0_of(event);
+  last_utime_ = event.utime;
   return true;
+}
+
+/// Whether file `number` goes on with this capture, and what is missing before it.
+std::optional<CaptureBreak> CaptureFiles::joins(int number) const {
+  auto log = EventLogReader::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
+  LogEvent event;
+  if (!log || !log->next(event)) return std::nullopt;
+  const auto t0 = t0_of(event);
+  if (t0 && t0 != t0_) return std::nullopt;
+  // A header has the time of the run's beginning: what follows it tells how much is missing.
+  if (t0 && !log->next(event)) event.utime = last_utime_;
+  const double seconds = static_cast<double>(event.utime - last_utime_) * kSecondsPerMicrosecond;
+  // Where the header is among what is damaged, the records say whether they follow.
+  const bool follows = log->bytes_skipped() > 0 && seconds > -kDisorderMax_s && seconds < kBreakMax_s;
+  if (!t0 && !follows) return std::nullopt;
+  return CaptureBreak{number_ + 1, number - number_ - 1, number, seconds};
 }
 
 /// Goes on to the next file of the same run, if there is one.
 bool CaptureFiles::open_following() {
   if (!t0_) return false;
-  const auto path = capture_file(first_, number_ + 1);
-  LogEvent event;
-  auto probe = EventLogReader::open(path);
-  if (!probe || !probe->next(event) || t0_of(event) != t0_) return false;
-  auto log = EventLogReader::open(path);
-  if (!log) return false;
-  bytes_skipped_ += log_.bytes_skipped();
-  bytes_cut_off_ += log_.bytes_cut_off();
-  log_ = std::move(*log);
-  number_ += 1;
-  report_reads();
-  return true;
+  for (int number = number_ + 1; number <= number_ + 1 + kMissingMax; ++number) {
+    const auto found = joins(number);
+    if (!found) continue;
+    auto log = EventLogReader::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
+    if (!log) return false;
+    bytes_skipped_ += log_.bytes_skipped();
+    bytes_cut_off_ += log_.bytes_cut_off();
+    log_ = std::move(*log);
+    number_ = number;
+    LogEvent header;
+    auto again = EventLogReader::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
+    const bool is_whole = again && again->next(header) && again->bytes_skipped() == 0;
+    if (found->n_missing > 0 || !is_whole) breaks_.push_back(*found);
+    report_reads();
+    return true;
+  }
+  return false;
 }
 
 }  // namespace imuscope

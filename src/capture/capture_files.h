@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "base/result.h"
 #include "capture/event_log_reader.h"
@@ -17,9 +18,18 @@ namespace imuscope {
 /// Path of file n of a capture: run.lcm, run_001.lcm, run_002.lcm, ...
 [[nodiscard]] std::filesystem::path capture_file(const std::filesystem::path& first, int n);
 
+/// A place between two files of a capture where something is missing.
+struct CaptureBreak {
+  int first_missing = 0;  ///< number of the first file that is not there or cannot be read
+  int n_missing = 0;      ///< files in a row; 0: the file behind is there and its beginning is damaged
+  int behind = 0;         ///< number of the file with which it goes on
+  double seconds = 0.0;   ///< between the last record before and the first behind, by the recorder's clock
+};
+
 /// Iterates over the events of a capture through all its files, given the first. A file belongs to the
 /// capture if it begins with a run header of the same t0; what lies beside it from another run is left alone.
-/// Thread: one, of the soft world.
+/// Files that are missing or unreadable in between are passed over, and so is the damaged beginning of one
+/// whose records follow in time: breaks() tells of them. Thread: one, of the soft world.
 class CaptureFiles {
  public:
   static Result<CaptureFiles> open(const std::filesystem::path& first);
@@ -33,11 +43,14 @@ class CaptureFiles {
   /// Sums over the files; see EventLogReader.
   [[nodiscard]] std::uint64_t bytes_skipped() const noexcept { return bytes_skipped_ + log_.bytes_skipped(); }
   [[nodiscard]] std::uint64_t bytes_cut_off() const noexcept { return bytes_cut_off_ + log_.bytes_cut_off(); }
+  /// So far.
+  [[nodiscard]] const std::vector<CaptureBreak>& breaks() const noexcept { return breaks_; }
 
  private:
   CaptureFiles(std::filesystem::path first, EventLogReader log)
       : first_(std::move(first)), log_(std::move(log)) {}
   bool open_following();
+  [[nodiscard]] std::optional<CaptureBreak> joins(int number) const;
   void report_reads();
 
   std::filesystem::path first_;
@@ -46,6 +59,8 @@ class CaptureFiles {
   EventLogReader log_;
   bool at_beginning_ = true;
   std::optional<HostTime> t0_;
+  std::int64_t last_utime_ = 0;
+  std::vector<CaptureBreak> breaks_;
   std::uint64_t bytes_skipped_ = 0;
   std::uint64_t bytes_cut_off_ = 0;
 };

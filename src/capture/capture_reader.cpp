@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/text.h"
 #include "capture/stamp_range.h"
 
 namespace imuscope {
@@ -82,11 +83,12 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
       summary.other_messages += 1;
       const RecordClock clock{summary.run.t0, summary.run.t0_wall};
       if (summary.has_run && is_stamp_us(event.utime))
-        summary.events.push_back({clock.host_time(event.utime), marked->text});
+        summary.events.push_back({clock.host_time(event.utime), one_line(marked->text)});
     } else {
       summary.exceptions.push_back(std::move(std::get<StoredException>(*record)));
     }
   }
+  summary.breaks = log->breaks();
   summary.bytes_skipped = log->bytes_skipped();
   summary.bytes_cut_off = log->bytes_cut_off();
   if (summary.devices.empty()) {

@@ -38,8 +38,8 @@ struct CapturedDevice {
 
 /// A message of a person on PREFIX_EVENT.
 struct RecordedEvent {
-  HostTime time{};  ///< when the run heard it
-  std::string text;
+  HostTime time{};   ///< when the run heard it
+  std::string text;  ///< one line, whatever was sent
 };
 
 /// A capture seen as a whole, by one pass over its files.
@@ -51,6 +51,7 @@ struct CaptureSummary {
   std::vector<applied_model_t> applied_models;  ///< in file order, needed like the exceptions
   std::vector<RecordedEvent> events;            ///< in file order; of a capture with a run alone
   std::vector<CaptureLoss> losses;
+  std::vector<CaptureBreak> breaks;  ///< files that are missing or whose beginning is damaged
   std::uint64_t other_messages = 0;  ///< messages of other types, such as published ones
   std::uint64_t bytes_skipped = 0;   ///< damage in the midst of the file
   std::uint64_t bytes_cut_off = 0;   ///< unfinished record at the end: the recorder was killed

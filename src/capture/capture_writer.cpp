@@ -6,10 +6,10 @@
 
 #include <cerrno>
 #include <cstring>
-#include <system_error>
 #include <utility>
 
 #include "base/contracts.h"
+#include "base/output_folder.h"
 #include "capture/event_log.h"
 
 namespace imuscope {
@@ -55,15 +55,12 @@ Error file_error(const std::filesystem::path& path, const std::string& what, int
 }  // namespace
 
 Result<CaptureWriter> CaptureWriter::create(const std::filesystem::path& path) {
-  std::error_code folder_error;
-  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path(), folder_error);
-  if (folder_error) {
-    return tl::unexpected(file_error(path, "its folder cannot be made", folder_error.value()));
-  }
-  constexpr mode_t kPermissions = 0644;
-  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kPermissions);
-  if (file < 0) return tl::unexpected(file_error(path, "cannot be created", errno));
-  return CaptureWriter(path, file);
+  const auto folder = OutputFolder::open(path.parent_path());
+  if (!folder)
+    return work_error("capture " + path.string() + ": " + folder.error().what, folder.error().remedy);
+  Descriptor file = folder->create_new(path.filename().string());
+  if (!file.is_open()) return tl::unexpected(file_error(path, "cannot be created", errno));
+  return CaptureWriter(path, file.release());
 }
 
 CaptureWriter::CaptureWriter(CaptureWriter&& other) noexcept

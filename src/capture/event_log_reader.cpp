@@ -87,7 +87,7 @@ std::string describe_bytes(const std::vector<std::uint8_t>& first_bytes) {
   return "binary data that begins with the bytes " + in_hex(first_bytes);
 }
 
-Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path) {
+Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path, Beginning beginning) {
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
   const std::string name = path.string();
@@ -108,7 +108,7 @@ Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path) {
   constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
   const bool has_sync =
       reader.buffer_.size() >= kSyncBytes && big_endian(reader.buffer_.data(), kSyncBytes) == kEventLogSync;
-  if (!has_sync) {
+  if (!has_sync && beginning == Beginning::kIsARecord) {
     const std::vector<std::uint8_t> first(
         reader.buffer_.begin(),
         reader.buffer_.begin() + static_cast<std::ptrdiff_t>(std::min(reader.buffer_.size(), kSniffBytes)));
@@ -121,18 +121,24 @@ Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path) {
 
 bool EventLogReader::ensure(std::size_t n) {
   if (buffer_.size() - begin_ >= n) return true;
-  buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin_));
-  begin_ = 0;
-  while (buffer_.size() < n && file_) {
+  if (!file_) return false;
+  // Moving what is left costs as much as it is long: it pays where as much was consumed, and every byte is
+  // moved once for each that was read.
+  if (begin_ >= buffer_.size() - begin_) {
+    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin_));
+    begin_ = 0;
+  }
+  // By blocks: a record may claim a length that the file does not have.
+  while (buffer_.size() - begin_ < n && file_) {
     const std::size_t have = buffer_.size();
-    buffer_.resize(have + std::max(kReadBytes, n - have));
+    buffer_.resize(have + kReadBytes);
     file_.read(reinterpret_cast<char*>(buffer_.data() + have),
                static_cast<std::streamsize>(buffer_.size() - have));
     buffer_.resize(have + static_cast<std::size_t>(file_.gcount()));
     read_ += buffer_.size() - have;
     if (on_read_) on_read_(read_);
   }
-  return buffer_.size() >= n;
+  return buffer_.size() - begin_ >= n;
 }
 
 /// The record that begins `position` bytes after the last one consumed, by its header alone.

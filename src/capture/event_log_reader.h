@@ -22,8 +22,13 @@ namespace imuscope {
 /// normal end of a capture whose recorder was killed: it is counted apart. Thread: one, of the soft world.
 class EventLogReader {
  public:
+  /// Whether a file that does not begin with a record is another kind of file, or may be one of ours whose
+  /// beginning is damaged: then the bytes up to its first record are skipped.
+  enum class Beginning : std::uint8_t { kIsARecord, kMayBeDamaged };
+
   /// Errors name what is there instead: nothing, a folder, an empty file, another kind of file.
-  static Result<EventLogReader> open(const std::filesystem::path& path);
+  static Result<EventLogReader> open(const std::filesystem::path& path,
+                                     Beginning beginning = Beginning::kIsARecord);
 
   /// Is told, now and then, how many bytes of the file have been read.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { on_read_ = std::move(listener); }

@@ -1,6 +1,5 @@
 #include "doctor/checks.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <net/if.h>
@@ -16,6 +15,7 @@
 #include <set>
 #include <thread>
 
+#include "base/output_folder.h"
 #include "publish/lcm_url.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
@@ -232,12 +232,13 @@ Disk measure_disk(const fs::path& folder) {
     return disk;
   }
   disk.free_bytes = static_cast<double>(space.f_bavail) * static_cast<double>(space.f_frsize);
-  const fs::path file = existing / fmt::format(".imuscope-doctor-{}", getpid());
-  const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  if (fd < 0) {
-    disk.problem = std::strerror(errno);
+  const auto opened = OutputFolder::open(existing);
+  auto file = opened ? opened->scratch_file() : tl::unexpected<Error>(opened.error());
+  if (!file) {
+    disk.problem = file.error().what;
     return disk;
   }
+  const int fd = file->get();
   const std::vector<char> bytes(kProbeBytes, 'x');
   const HostTime begin = host_now();
   const ssize_t written = ::write(fd, bytes.data(), bytes.size());
@@ -245,9 +246,6 @@ Disk measure_disk(const fs::path& folder) {
   if (!is_whole || ::fdatasync(fd) != 0)
     disk.problem = std::strerror(written < 0 || is_whole ? errno : ENOSPC);
   const double seconds = to_seconds(host_now() - begin);
-  ::close(fd);
-  std::error_code gone;
-  fs::remove(file, gone);
   disk.write_bytes_per_s = static_cast<double>(bytes.size()) / seconds;
   return disk;
 }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/json_text.h"
 #include "base/units.h"
 #include "noise/conservative.h"
 #include "noise/continuous_form.h"
@@ -257,7 +258,7 @@ std::string state_space_json(const std::vector<AxisFit>& axes, bool conservative
     }
     out["axes"].push_back(std::move(entry));
   }
-  return out.dump(2) + "\n";
+  return json_text(out) + "\n";
 }
 
 }  // namespace

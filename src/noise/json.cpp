@@ -6,6 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <stdexcept>
 
 namespace imuscope::noise {
 namespace {
@@ -57,15 +58,25 @@ Model model_from_parameters(const FitResult& fit) {
   for (const ProcessKind kind : fit.spec.processes) {
     Component c{kind, 0.0, {}};
     for (int i = 0; i <= shape_count(kind); ++i) set_parameter(c, fit.parameters.at(p++), fit.rate_hz);
+    if (!is_in_range(kind, c.shape))
+      throw std::invalid_argument(fmt::format("a parameter of {} is out of its range", short_name(kind)));
     model.components.push_back(c);
   }
   return model;
+}
+
+int level_of(const json& row) {
+  const auto level = row.at("level").get<double>();
+  if (level >= 1.0 && level <= kMaxLevel && level == std::trunc(level)) return static_cast<int>(level);
+  throw std::invalid_argument(
+      fmt::format("a level is {:g} and must be a whole number of 1 to {}", level, kMaxLevel));
 }
 
 FitResult read_fit(const json& j) {
   FitResult fit;
   fit.n = j.at("n").get<std::uint64_t>();
   fit.rate_hz = j.at("rate_hz").get<double>();
+  if (!(fit.rate_hz > 0.0) || !std::isfinite(fit.rate_hz)) throw std::invalid_argument("rate_hz is no rate");
   const auto spec = parse_model(j.at("model").get<std::string>());
   if (!spec) throw std::invalid_argument(spec.error().text());
   fit.spec = *spec;
@@ -73,7 +84,7 @@ FitResult read_fit(const json& j) {
   fit.efficiency = j.value("efficiency", 1.0);
   for (const json& row : j.at("wv")) {
     FittedLevel level;
-    level.observed.level = row.at("level").get<int>();
+    level.observed.level = level_of(row);
     level.observed.tau_samples = std::ldexp(1.0, level.observed.level);
     level.observed.value = number_or_nan(row.at("value"));
     level.observed.ci_low = number_or_nan(row.at("ci_low"));

@@ -164,6 +164,20 @@ int shape_count(ProcessKind kind) noexcept {
   }
 }
 
+bool is_in_range(ProcessKind kind, const Shape& shape) noexcept {
+  switch (kind) {
+    case ProcessKind::kGaussMarkov:
+    case ProcessKind::kSinusoid:
+      return shape[0] > 0.0 && std::isfinite(shape[0]);
+    case ProcessKind::kMa1:
+      return std::abs(shape[0]) <= 1.0;
+    case ProcessKind::kArma11:
+      return std::abs(shape[0]) < 1.0 && std::abs(shape[1]) <= 1.0;
+    default:
+      return true;
+  }
+}
+
 CurvePoint gauss_markov_wv(double a, int level) noexcept {
   IMUSCOPE_EXPECTS(a > 0.0 && level >= 1 && level <= kMaxLevel);
   const double n = half_support(level);

@@ -53,6 +53,9 @@ std::string_view short_name(ProcessKind kind) noexcept;
 /// Number of shape values of a kind: 0, 1 or 2.
 int shape_count(ProcessKind kind) noexcept;
 
+/// Whether the shape lies in the range given above: what is read from a file may not.
+bool is_in_range(ProcessKind kind, const Shape& shape) noexcept;
+
 /// Unit curve at `level` (1..kMaxLevel). `shape` must lie in the range given above.
 CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept;
 

@@ -5,6 +5,9 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
+#include <set>
+
+#include "base/text.h"
 
 namespace imuscope {
 
@@ -30,7 +33,12 @@ std::string as_cell(std::string_view text) {
   std::string cell(text);
   std::replace_if(
       cell.begin(), cell.end(), [](char c) { return c == ',' || c == '"' || c == '\n' || c == '\r'; }, ' ');
-  return std::string(trimmed(cell));
+  return one_line(trimmed(cell), kRegimeNameMax);
+}
+
+bool is_regime_name(std::string_view text) {
+  return !text.empty() && text.find_first_of(",\"") == std::string_view::npos &&
+         one_line(text, kRegimeNameMax) == text;
 }
 
 std::optional<double> number(std::string_view text) {
@@ -50,7 +58,7 @@ std::optional<Label> parse_line(std::string_view line) {
   const auto name = trimmed(line.substr(second + 1));
   const auto is_of_a_run = [](double time_s) { return std::abs(time_s) <= kRunMax_s; };
   if (!begin || !end || !is_of_a_run(*begin) || !is_of_a_run(*end)) return std::nullopt;
-  if (*end <= *begin || name.empty() || name.find(',') != std::string_view::npos) return std::nullopt;
+  if (*end <= *begin || !is_regime_name(name)) return std::nullopt;
   return Label{*begin, *end, std::string(name)};
 }
 
@@ -73,15 +81,16 @@ Result<std::vector<Label>> parse_labels(std::string_view text, const std::string
     if (line.empty() || line.front() == '#') continue;
     if (!has_header) {
       if (line != kHeader)
-        return usage_error(fmt::format("{}:{}: '{}' is not the header {}", file, line_number, line, kHeader),
-                           remedy);
+        return usage_error(
+            fmt::format("{}:{}: '{}' is not the header {}", file, line_number, one_line(line), kHeader),
+            remedy);
       has_header = true;
       continue;
     }
     const auto label = parse_line(line);
     if (!label)
-      return usage_error(fmt::format("{}:{}: '{}' is no stretch of a regime", file, line_number, line),
-                         remedy);
+      return usage_error(
+          fmt::format("{}:{}: '{}' is no stretch of a regime", file, line_number, one_line(line)), remedy);
     if (!labels.empty() && label->begin_s < labels.back().end_s) {
       return usage_error(fmt::format("{}:{}: begins at {} s, before the stretch above it ends ({} s)", file,
                                      line_number, label->begin_s, labels.back().end_s),
@@ -111,6 +120,18 @@ std::vector<Label> labels_of_moments(const std::vector<MarkedMoment>& moments, H
   }
   if (open) labels.back().end_s = std::max(labels.back().begin_s, to_seconds(end - origin));
   return labels;
+}
+
+std::size_t keep_first_names(std::vector<Label>& labels, std::size_t n_names) {
+  std::set<std::string> kept;
+  std::set<std::string> left_out;
+  std::erase_if(labels, [&](const Label& label) {
+    if (kept.contains(label.name)) return false;
+    const bool is_kept = kept.size() < n_names;
+    (is_kept ? kept : left_out).insert(label.name);
+    return !is_kept;
+  });
+  return left_out.size();
 }
 
 RegimeTrack labelled_regimes(const std::vector<Label>& labels, HostTime origin) {

@@ -2,6 +2,7 @@
 
 /// Regimes that a person names: in a file, or while the run goes on by messages on IMUSCOPE_EVENT.
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,9 @@
 
 namespace imuscope {
 
+/// Longest name of a regime, in bytes.
+inline constexpr std::size_t kRegimeNameMax = 64;
+
 /// Begin and end in seconds since the run's first R-IMU epoch (time_s of every file).
 struct Label {
   double begin_s = 0.0;
@@ -20,7 +24,8 @@ struct Label {
 };
 
 /// Reads a table begin_s,end_s,regime with this header, # comments allowed, sorted by begin. Errors (kUsage):
-/// what is wrong and in which line; stretches that overlap.
+/// what is wrong and in which line; stretches that overlap; names that are no line of UTF-8 of at most
+/// kRegimeNameMax bytes.
 Result<std::vector<Label>> parse_labels(std::string_view text, const std::string& file);
 
 /// A moment that a person marked.
@@ -30,8 +35,12 @@ struct MarkedMoment {
 };
 
 /// "regime NAME" begins a regime that holds until the next such message, "regime end" ends one. Other texts
-/// mark moments and are passed over. The last one holds until `end`.
+/// mark moments and are passed over. The last one holds until `end`. Anybody on the vehicle's network may
+/// have sent them: a name becomes one line (base/text.h, one_line()) of at most kRegimeNameMax bytes.
 std::vector<Label> labels_of_moments(const std::vector<MarkedMoment>& moments, HostTime origin, HostTime end);
+
+/// Takes out the stretches of all names but the first n_names. Returns how many names that were.
+std::size_t keep_first_names(std::vector<Label>& labels, std::size_t n_names);
 
 /// Names in the order in which they first occur.
 RegimeTrack labelled_regimes(const std::vector<Label>& labels, HostTime origin);

@@ -7,6 +7,7 @@ namespace imuscope {
 namespace {
 
 constexpr std::int64_t kCell_ns = 200'000'000;
+constexpr auto kCellsMax = static_cast<std::int64_t>(MotionLevels::kLongestRun_s / MotionLevels::kCell_s);
 static_assert(static_cast<double>(kCell_ns) * 1e-9 == MotionLevels::kCell_s);
 
 std::int64_t number_of(HostTime time) {
@@ -16,20 +17,25 @@ std::int64_t number_of(HostTime time) {
 
 }  // namespace
 
-MotionLevels::Sums& MotionLevels::at(HostTime time) {
+/// The cell of that time; nullptr beyond the longest run.
+MotionLevels::Sums* MotionLevels::at(HostTime time) {
   const std::int64_t number = number_of(time);
   if (!first_) first_ = number;
+  const std::int64_t end = *first_ + static_cast<std::int64_t>(sums_.size());
+  if (number >= *first_ + kCellsMax || number < end - kCellsMax) return nullptr;
   if (number < *first_) {
     sums_.insert(sums_.begin(), static_cast<std::size_t>(*first_ - number), Sums{});
     first_ = number;
   }
   const auto index = static_cast<std::size_t>(number - *first_);
   if (index >= sums_.size()) sums_.resize(index + 1);
-  return sums_[index];
+  return &sums_[index];
 }
 
 void MotionLevels::add(HostTime time, const Vector3& omega_ib_b_radps, const Vector3& f_b_mps2) {
-  Sums& sums = at(time);
+  Sums* const cell = at(time);
+  if (cell == nullptr) return;
+  Sums& sums = *cell;
   ++sums.n;
   const auto n = static_cast<double>(sums.n);
   for (std::size_t i = 0; i < 3; ++i) {
@@ -42,9 +48,10 @@ void MotionLevels::add(HostTime time, const Vector3& omega_ib_b_radps, const Vec
 }
 
 void MotionLevels::add_speed(HostTime time, double speed_mps, double sd_mps) {
-  Sums& sums = at(time);
-  sums.speed_mps = std::abs(speed_mps);
-  sums.speed_sd_mps = sd_mps;
+  Sums* const cell = at(time);
+  if (cell == nullptr) return;
+  cell->speed_mps = std::abs(speed_mps);
+  cell->speed_sd_mps = sd_mps;
 }
 
 HostTime MotionLevels::begin_of(std::size_t index) const {

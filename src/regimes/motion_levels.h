@@ -23,11 +23,14 @@ struct MotionCell {
   double speed_sd_mps = 0.0;
 };
 
-/// Collects samples, in any order. Thread: one. Allocates with the length of the run.
+/// Collects samples, in any order. Thread: one. Allocates with the length of the run, kLongestRun_s at most.
 class MotionLevels {
  public:
   static constexpr double kCell_s = 0.2;
   static constexpr double kSpeedHeld_s = 1.0;
+  /// Between the first cell and the last; samples beyond it, which no drive has and a forged time may, are
+  /// left out.
+  static constexpr double kLongestRun_s = 4.0 * 86'400.0;
 
   /// The reference, compensated with its biases, at one instant.
   void add(HostTime time, const Vector3& omega_ib_b_radps, const Vector3& f_b_mps2);
@@ -48,7 +51,7 @@ class MotionLevels {
     std::optional<double> speed_mps;
     double speed_sd_mps = 0.0;
   };
-  Sums& at(HostTime time);
+  Sums* at(HostTime time);
 
   std::optional<std::int64_t> first_;  ///< number of the first cell since the time scale's origin
   std::vector<Sums> sums_;

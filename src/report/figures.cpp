@@ -5,6 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
+
 namespace imuscope::report {
 namespace {
 
@@ -12,9 +14,7 @@ namespace {
 constexpr int kDigitsOfSignal = 4;
 constexpr int kDigitsOfEstimate = 7;
 
-std::string quoted(const std::string& any) {
-  return nlohmann::json(any).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-}
+std::string quoted(const std::string& any) { return json_text(any, kJsonOneLine); }
 
 std::string short_number(double value, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : std::string("null");

@@ -1,5 +1,7 @@
 #include "report/json_fields.h"
 
+#include "base/json_text.h"
+
 namespace imuscope::report {
 namespace {
 
@@ -25,7 +27,7 @@ std::optional<double> number_at(const nlohmann::json& object, const char* key) {
 std::string text_at(const nlohmann::json& object, const char* key) {
   const nlohmann::json& value = field(object, key);
   if (value.is_string()) return value.get<std::string>();
-  return value.is_number() || value.is_boolean() ? value.dump() : std::string{};
+  return value.is_number() || value.is_boolean() ? json_text(value, kJsonOneLine) : std::string{};
 }
 
 const nlohmann::json& named(const nlohmann::json& list, const std::string& name) {

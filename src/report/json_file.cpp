@@ -70,7 +70,7 @@ void pass_gate(json& value) {
 
 json read_json_file(const std::filesystem::path& file) {
   const auto text = read_text_file(file, "JSON file", {});
-  if (!text || is_too_deep(*text)) return {json::value_t::discarded};
+  if (!text || is_too_deep(*text)) return json(json::value_t::discarded);
   json document = json::parse(*text, nullptr, /*allow_exceptions=*/false);
   pass_gate(document);
   return document;

@@ -147,19 +147,22 @@
     options.series = {};
     options.colors = [];
     const bar = (value) => value === null || value === undefined ? null : [value, value, value];
+    // To the library curves have names of our own: one of a regime may be anything, twice as well.
+    const observed = (k) => 'observed ' + k;
+    const fitted = (k) => 'fitted ' + k;
     figure.series.forEach((series, k) => {
       const colour = REGIME_COLOURS[k % REGIME_COLOURS.length];
-      labels.push(series.name, series.name + ' fitted');
+      labels.push(observed(k), fitted(k));
       options.colors.push(colour, colour);
-      options.series[series.name] = {plotter: whiskers(WHISKER_STEP * (k - (figure.series.length - 1) / 2)), strokeWidth: 0};
-      options.series[series.name + ' fitted'] = {plotter: Dygraph.Plotters.linePlotter};
-      for (const component of series.components) {
-        const label = series.name + ' ' + component.name;
+      options.series[observed(k)] = {plotter: whiskers(WHISKER_STEP * (k - (figure.series.length - 1) / 2)), strokeWidth: 0};
+      options.series[fitted(k)] = {plotter: Dygraph.Plotters.linePlotter};
+      series.components.forEach((component, i) => {
+        const label = 'component ' + k + ' ' + i;
         labels.push(label);
         options.colors.push(colour);
         options.series[label] = {plotter: Dygraph.Plotters.linePlotter, strokeWidth: 0.8, strokePattern: COMPONENT_DASH,
                                  drawPoints: false, highlightCircleSize: 0};
-      }
+      });
     });
     const rows = taus.map((tau) => {
       const row = [tau];
@@ -175,7 +178,7 @@
       }
       return row;
     });
-    const isMain = (label) => figure.series.some((series) => series.name === label || series.name + ' fitted' === label);
+    const isMain = (label) => !label.startsWith('component ');
     const ends = rows.flatMap((row) => row.filter((cell, i) => i > 0 && cell !== null && isMain(labels[i])).flat());
     options.labels = labels;
     options.connectSeparatedPoints = true;
@@ -187,14 +190,14 @@
     options.axes.y.ticker = decades;
     options.axes.y.axisLabelWidth = 36;
     options.interactionModel = {};
-    const isObserved = (label) => figure.series.some((series) => series.name === label);
+    const nameOf = new Map(figure.series.map((series, k) => [observed(k), series.name]));
     const names = () => legend(figure.series.map((series, k) => ({
       colour: REGIME_COLOURS[k % REGIME_COLOURS.length], text: series.name,
     })));
     options.legendFormatter = (data) => {
       if (data.x === undefined || data.x === null) return names();
-      return legend(data.series.filter((series) => isObserved(series.label) && series.y !== undefined && series.y !== null)
-          .map((series) => ({colour: series.color, text: series.label + ' ' + shown(series.y)}))) +
+      return legend(data.series.filter((series) => nameOf.has(series.label) && series.y !== undefined && series.y !== null)
+          .map((series) => ({colour: series.color, text: nameOf.get(series.label) + ' ' + shown(series.y)}))) +
           ' at τ = ' + shown(data.x) + ' s';
     };
     graphs.push({graph: new Dygraph(place, rows, options), figure});
@@ -204,8 +207,8 @@
     const colour = COLOURS[figure.colour % COLOURS.length];
     const options = common(figure, legendPlace);
     Object.assign(options, {
-      customBars: false, labels: [figure.x_label, figure.y_label], colors: [colour], strokeWidth: 0,
-      drawPoints: true, pointSize: 1.1, interactionModel: {}, xlabel: figure.x_label, xLabelHeight: 15,
+      customBars: false, labels: ['x', 'y'], colors: [colour], strokeWidth: 0,
+      drawPoints: true, pointSize: 1.1, interactionModel: {}, xlabel: escaped(figure.x_label), xLabelHeight: 15,
       xRangePad: 4, yRangePad: 4,
     });
     options.axes.x.axisLabelFormatter = shown;

@@ -5,11 +5,11 @@
 #include <sys/wait.h>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <limits>
 #include <optional>
 
+#include "base/output_folder.h"
 #include "base/text.h"
 #include "base/units.h"
 #include "report/figures.h"
@@ -291,10 +291,10 @@ GnuplotScript script_of(const Picture& picture) {
 }
 
 /// Runs gnuplot on a script in `folder`.
-Result<void> draw(const std::filesystem::path& folder, const std::string& script) {
+Result<void> draw(const OutputFolder& folder, const std::string& script, const std::string& shown) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+  posix_spawn_file_actions_addfchdir_np(&actions, folder.descriptor());
   std::string program = "gnuplot";
   std::string file = script;
   // Its own settings alone: what lies in a folder from elsewhere is no start-up file.
@@ -304,13 +304,30 @@ Result<void> draw(const std::filesystem::path& folder, const std::string& script
   const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments, environ);
   posix_spawn_file_actions_destroy(&actions);
   if (failed != 0) {
-    return work_error("gnuplot could not be started", "install it (apt-get install gnuplot-nox), or draw " +
-                                                          (folder / script).string() + " elsewhere");
+    return work_error("gnuplot could not be started",
+                      "install it (apt-get install gnuplot-nox), or draw " + shown + " elsewhere");
   }
   int status = 0;
   if (waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    return work_error("gnuplot refused " + (folder / script).string(), "its own message is above");
+    return work_error("gnuplot refused " + shown, "its own message is above");
   return {};
+}
+
+/// Draws in a folder made for it, since gnuplot follows links, and takes over what came of it.
+Result<void> draw_into(const OutputFolder& figures, const Picture& picture) {
+  const std::string script = picture.name + ".gp";
+  const auto scratch = figures.scratch_folder();
+  if (!scratch) return tl::unexpected<Error>(scratch.error());
+  Result<void> done = scratch->write_whole(script, script_of(picture).str());
+  if (done) done = draw(*scratch, script, (figures.path() / script).string());
+  for (const char* suffix : {".gp", ".svg", ".pdf"}) {
+    const std::string name = picture.name + suffix;
+    auto taken = figures.take(*scratch, name);
+    if (done && !taken) done = std::move(taken);
+    scratch->remove(name);
+  }
+  figures.remove(scratch->path().filename().string());
+  return done;
 }
 
 }  // namespace
@@ -319,21 +336,15 @@ Result<void> draw(const std::filesystem::path& folder, const std::string& script
 Result<std::vector<std::filesystem::path>> write_figures(const std::filesystem::path& run_dir) {
   const auto run = report::read_run_files(run_dir);
   if (!run) return tl::unexpected<Error>(run.error());
-  const auto folder = run_dir / "figures";
-  std::error_code code;
-  std::filesystem::create_directories(folder, code);
+  const auto folder = OutputFolder::open(run_dir);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  const auto figures = folder->sub_folder("figures");
+  if (!figures) return tl::unexpected<Error>(figures.error());
   std::vector<std::filesystem::path> files;
   for (const report::Picture& picture : report::pictures_of(*run)) {
-    const std::string script = picture.name + ".gp";
-    std::ofstream out(folder / script);
-    out << report::script_of(picture).str();
-    out.close();
-    if (!out) {
-      return work_error((folder / script).string() + " could not be written",
-                        "check the folder's permissions and the disk's free space");
-    }
-    if (auto drawn = report::draw(folder, script); !drawn) return tl::unexpected<Error>(drawn.error());
-    for (const char* suffix : {".svg", ".pdf"}) files.push_back(folder / (picture.name + suffix));
+    if (auto drawn = report::draw_into(*figures, picture); !drawn)
+      return tl::unexpected<Error>(drawn.error());
+    for (const char* suffix : {".svg", ".pdf"}) files.push_back(figures->path() / (picture.name + suffix));
   }
   return files;
 }

@@ -35,7 +35,8 @@ int common_exponent(double magnitude) {
 
 Html times_power(int exponent) {
   if (exponent == 0) return {};
-  return Html::markup(fmt::format(" × 10<sup>{}{}</sup>", exponent < 0 ? "−" : "", std::abs(exponent)));
+  return text(" × 10") +
+         element("sup", text(fmt::format("{}{}", exponent < 0 ? "−" : "", std::abs(exponent))));
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
 #include "report/report.h"
 
 #include <fmt/format.h>
-#include <fstream>
+#include <openssl/evp.h>
+#include <array>
 
+#include "base/output_folder.h"
 #include "report/assets.h"
 #include "report/figures.h"
 #include "report/fits.h"
@@ -43,6 +45,17 @@ std::string filled(std::string_view page_text,
   return page;
 }
 
+/// The script as a Content-Security-Policy names it: no other is run, whatever got into the page.
+std::string hash_of(std::string_view script) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int size = 0;
+  EVP_Digest(script.data(), script.size(), digest.data(), &size, EVP_sha256(), nullptr);
+  std::array<unsigned char, 2 * EVP_MAX_MD_SIZE> base64{};
+  const int length = EVP_EncodeBlock(base64.data(), digest.data(), static_cast<int>(size));
+  return fmt::format("'sha256-{}'", std::string_view(reinterpret_cast<const char*>(base64.data()),
+                                                     static_cast<std::size_t>(length)));
+}
+
 std::string make_page(const RunFiles& run) {
   const auto fits = read_fits(run.models);
   FigureSheet figures;
@@ -59,7 +72,9 @@ std::string make_page(const RunFiles& run) {
   body += element("section", making_section(run));
   body += element("section", take_away_section(run, fits));
   const std::string data = json_for_script(figures.json());
-  return filled(page_template(), {{"plotting_notice", plotting_notice()},
+  const std::string hashes = hash_of(plotting_script()) + " " + hash_of(page_script());
+  return filled(page_template(), {{"script_hashes", hashes},
+                                  {"plotting_notice", plotting_notice()},
                                   {"plotting_style", plotting_style()},
                                   {"page_style", page_style()},
                                   {"body", body.str()},
@@ -68,28 +83,15 @@ std::string make_page(const RunFiles& run) {
                                   {"page_script", page_script()}});
 }
 
-/// Writes beside the file and renames, so that a report is whole or not there.
-Result<void> write_page(const std::filesystem::path& file, const std::string& page) {
-  const std::filesystem::path unfinished = file.string() + ".unfinished";
-  std::ofstream out(unfinished, std::ios::binary | std::ios::trunc);
-  out << page;
-  out.close();
-  std::error_code code;
-  if (out) std::filesystem::rename(unfinished, file, code);
-  if (!out || code) {
-    return work_error(file.string() + " could not be written",
-                      "check the folder's permissions and the disk's free space");
-  }
-  return {};
-}
-
 }  // namespace
 }  // namespace report
 
 Result<void> write_report(const std::filesystem::path& run_dir) {
   const auto run = report::read_run_files(run_dir);
   if (!run) return tl::unexpected<Error>(run.error());
-  return report::write_page(run_dir / "report.html", report::make_page(*run));
+  const auto folder = OutputFolder::open(run_dir);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  return folder->write_whole("report.html", report::make_page(*run));
 }
 
 }  // namespace imuscope

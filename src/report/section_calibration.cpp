@@ -16,9 +16,7 @@ constexpr std::array<char, 3> kAxisNames{'x', 'y', 'z'};
 constexpr double kPpm = 1e6;
 constexpr double kMdegPerDeg = 1e3;
 
-Html bold_sub(const char* symbol, const char* index) {
-  return Html::markup(fmt::format("{}<sub>{}</sub>", symbol, index));
-}
+Html bold_sub(const char* symbol, const char* index) { return text(symbol) + element("sub", text(index)); }
 
 /// Name of a row that belongs to the quantity above it.
 Html subordinate(const char* name) { return element("span", text(name), "subordinate"); }
@@ -232,7 +230,7 @@ Html estimate_panels(const StudyFiles& study, FigureSheet& figures) {
     figure.window = settled_window(series, signal + axis, signal + axis + kSdOffset, unit, truth);
     panels += figures.estimate_figure(
         figure, series, signal + axis, signal + axis + kSdOffset, unit, static_cast<int>(axis),
-        Html::markup(fmt::format("{}<sub>{}</sub>, {}", symbol, kAxisNames[axis], unit_name)));
+        text(symbol) + element("sub", text({&kAxisNames[axis], 1})) + text(fmt::format(", {}", unit_name)));
   };
   for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
     add_panel("psi", "ψ", kPsi_deg, axis, 1.0, "deg",

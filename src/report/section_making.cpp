@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "base/json_text.h"
 #include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
@@ -14,9 +15,8 @@ constexpr const char* kNoRunFile = "No run.json in this run folder: nothing is k
 Html inputs_list(const nlohmann::json& inputs) {
   Html items;
   for (const auto& input : inputs) {
-    items += element(
-        "li", text(input.is_string() ? input.get<std::string>()
-                                     : input.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)));
+    items +=
+        element("li", text(input.is_string() ? input.get<std::string>() : json_text(input, kJsonOneLine)));
   }
   return items.empty() ? text(kUnknown) : element("ul", items);
 }

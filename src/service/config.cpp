@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "service/config_devices.h"
 #include "service/config_vehicle.h"
+#include "service/toml_depth.h"
 #include "service/toml_reader.h"
 
 namespace imuscope {
@@ -116,6 +117,60 @@ std::string sha256_of(const std::string& text) {
   return hex;
 }
 
+Result<Configuration> parse(const std::string& text, const std::filesystem::path& name, AttachedFiles files,
+                            std::vector<AskedKey>* asked) {
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
+    return usage_error(fmt::format("configuration {} is empty", name.string()), "config/ holds examples");
+  }
+  if (has_key_too_deep(text)) {
+    return usage_error(fmt::format("{}: a key has more than {} words", name.string(), kTomlDepthMax),
+                       "see config/ for examples");
+  }
+  toml::table document;
+  try {
+    document = toml::parse(text, name.string());
+  } catch (const toml::parse_error& error) {
+    return usage_error(
+        fmt::format("{}:{}: not TOML: {}", name.string(), error.source().begin.line, error.description()),
+        "see config/ for examples");
+  }
+  Configuration configuration;
+  configuration.file = name;
+  configuration.run_name = name.stem().string();
+
+  TomlProblem problem{name.string(), std::nullopt, asked};
+  TomlReader root(&document, "", problem);
+  auto run = root.table("run");
+  run.text("name", configuration.run_name);
+  run.finish();
+  read_estimator(root.table("estimator"), configuration.estimator);
+  read_noise_options(root.table("noise"), configuration.noise);
+  auto lcm = root.table("lcm");
+  lcm.text("url", configuration.lcm.url);
+  lcm.text("channel_prefix", configuration.lcm.channel_prefix);
+  lcm.boolean("bridge", configuration.lcm.bridge);
+  lcm.finish();
+  auto record = root.table("record");
+  record.text("folder", configuration.record.folder);
+  record.finish();
+  read_threads(root.table("threads"), configuration.threads);
+  root.ignore("simulation");  // belongs to imusim, which checks it
+  auto attached = root.table("attached");
+  attached.every_text(files.texts);
+  const bool is_whole = attached.present();
+  read_devices(root, problem, files, configuration.devices);
+  read_regimes(root.table("regimes"), configuration.regimes);
+  double slowest_rate_hz = kMaxRate_hz;
+  for (const auto index : configuration.study_indices())
+    slowest_rate_hz = std::min(slowest_rate_hz, configuration.devices[index].rate_hz);
+  read_error_process(root.table("error_process"), slowest_rate_hz, configuration.error_process);
+  root.finish();
+  if (problem.error) return tl::unexpected<Error>(*problem.error);
+  configuration.text = is_whole ? text : text + attached_text(files);
+  configuration.sha256 = sha256_of(configuration.text);
+  return configuration;
+}
+
 }  // namespace
 
 const DeviceConfig* Configuration::find(std::string_view name) const {
@@ -157,59 +212,14 @@ Result<Configuration> load_configuration(const std::filesystem::path& file) {
   const auto text =
       read_text_file(file, "configuration", "give the path of a TOML file; config/ holds examples");
   if (!text) return tl::unexpected<Error>(text.error());
-  return parse_configuration(*text, file);
+  AttachedFiles files;
+  files.folder = file.parent_path();
+  return parse(*text, file, std::move(files), nullptr);
 }
 
 Result<Configuration> parse_configuration(const std::string& text, const std::filesystem::path& name,
                                           std::vector<AskedKey>* asked) {
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) {
-    return usage_error(fmt::format("configuration {} is empty", name.string()), "config/ holds examples");
-  }
-  toml::table document;
-  try {
-    document = toml::parse(text, name.string());
-  } catch (const toml::parse_error& error) {
-    return usage_error(
-        fmt::format("{}:{}: not TOML: {}", name.string(), error.source().begin.line, error.description()),
-        "see config/ for examples");
-  }
-  Configuration configuration;
-  configuration.file = name;
-  AttachedFiles files;
-  files.folder = name.parent_path();
-  configuration.run_name = name.stem().string();
-
-  TomlProblem problem{name.string(), std::nullopt, asked};
-  TomlReader root(&document, "", problem);
-  auto run = root.table("run");
-  run.text("name", configuration.run_name);
-  run.finish();
-  read_estimator(root.table("estimator"), configuration.estimator);
-  read_noise_options(root.table("noise"), configuration.noise);
-  auto lcm = root.table("lcm");
-  lcm.text("url", configuration.lcm.url);
-  lcm.text("channel_prefix", configuration.lcm.channel_prefix);
-  lcm.boolean("bridge", configuration.lcm.bridge);
-  lcm.finish();
-  auto record = root.table("record");
-  record.text("folder", configuration.record.folder);
-  record.finish();
-  read_threads(root.table("threads"), configuration.threads);
-  root.ignore("simulation");  // belongs to imusim, which checks it
-  auto attached = root.table("attached");
-  attached.every_text(files.texts);
-  const bool is_whole = attached.present();
-  read_devices(root, problem, files, configuration.devices);
-  read_regimes(root.table("regimes"), configuration.regimes);
-  double slowest_rate_hz = kMaxRate_hz;
-  for (const auto index : configuration.study_indices())
-    slowest_rate_hz = std::min(slowest_rate_hz, configuration.devices[index].rate_hz);
-  read_error_process(root.table("error_process"), slowest_rate_hz, configuration.error_process);
-  root.finish();
-  if (problem.error) return tl::unexpected<Error>(*problem.error);
-  configuration.text = is_whole ? text : text + attached_text(files);
-  configuration.sha256 = sha256_of(configuration.text);
-  return configuration;
+  return parse(text, name, {}, asked);
 }
 
 }  // namespace imuscope

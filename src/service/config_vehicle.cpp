@@ -72,7 +72,11 @@ void read_choice(TomlReader& in, can_odometry::Choice& choice) {
 
 Result<std::string> text_of(const std::string& name, AttachedFiles& files) {
   if (const auto known = files.texts.find(name); known != files.texts.end()) return known->second;
-  auto text = dbc::read_text(files.folder / name);
+  if (!files.folder) {
+    return usage_error(fmt::format("{} is not attached to this configuration, which may read no file", name),
+                       "give the configuration itself with --config FILE.toml");
+  }
+  auto text = dbc::read_text(*files.folder / name);
   if (text) files.texts[name] = *text;
   return text;
 }

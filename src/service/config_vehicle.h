@@ -40,10 +40,11 @@ struct OdometryOptions {
   double dead_band_mps = 0.0;
 };
 
-/// Texts of files that a configuration names, by the name that it writes: kept in the configuration itself
-/// (a capture), or read from beside it.
+/// Texts of files that a configuration names, by the name that it writes: kept in the configuration itself,
+/// or read from beside it. The configuration of a capture or of a run folder reads nothing: it may come from
+/// elsewhere, and what it named would stand in the files made of it.
 struct AttachedFiles {
-  std::filesystem::path folder;
+  std::optional<std::filesystem::path> folder;  ///< of the configuration's file; absent: nothing is read
   std::map<std::string, std::string> texts;
 };
 

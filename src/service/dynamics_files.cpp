@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 
+#include "base/text.h"
 #include "dynamics/covariates.h"
 #include "dynamics/json.h"
 #include "regimes/motion_regimes.h"
@@ -124,13 +125,13 @@ DynamicsRegressions regressions_of(const Configuration& configuration, std::vect
 }
 
 Result<void> write_scatter(const Configuration& configuration, std::vector<RowSpool>& rows,
-                           HostTime first_reference_time, const std::filesystem::path& folder) {
+                           HostTime first_reference_time, const OutputFolder& folder) {
   const auto indices = configuration.study_indices();
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::size_t step = count_rows(rows[i]) / kScatterRows + 1;
     CsvFile file;
-    const auto path = folder / fmt::format("scatter_{}.csv", configuration.devices[indices[i]].name);
-    if (auto opened = file.open(path, scatter_header()); !opened) return opened;
+    const auto name = device_file_name("scatter", configuration.devices[indices[i]].name, ".csv");
+    if (auto opened = file.open(folder, name, scatter_header()); !opened) return opened;
     rows[i].rewind();
     std::size_t k = 0;
     for (ErrorRow row{}; rows[i].next(row); ++k) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/output_folder.h"
 #include "base/result.h"
 #include "noise/model.h"
 #include "regimes/regime_track.h"
@@ -30,6 +31,6 @@ DynamicsRegressions regressions_of(const Configuration& configuration, std::vect
 /// kScatterRows rows, evenly spaced over the drive, at rest and in motion alike.
 inline constexpr std::size_t kScatterRows = 3000;
 Result<void> write_scatter(const Configuration& configuration, std::vector<RowSpool>& rows,
-                           HostTime first_reference_time, const std::filesystem::path& folder);
+                           HostTime first_reference_time, const OutputFolder& folder);
 
 }  // namespace imuscope

@@ -141,7 +141,9 @@ Result<json> evaluate_documents(const EvaluationRunOptions& options) {
   json document{{"schema", "imuscope.evaluation/1"},    {"durations_s", options.outages.durations_s},
                 {"settle_s", options.outages.settle_s}, {"spacing_s", options.outages.spacing_s},
                 {"evaluations", evaluations},           {"absent", absent}};
-  if (auto written = write_json(options.run_dir / "evaluation.json", document); !written)
+  const auto folder = OutputFolder::open(options.run_dir);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  if (auto written = write_json(*folder, "evaluation.json", document); !written)
     return tl::unexpected<Error>(written.error());
   return document;
 }

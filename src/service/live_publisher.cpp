@@ -122,7 +122,7 @@ Result<void> LivePublisher::smooth(LiveHistory& history, const EstimatorConfig& 
   smoothing_.emplace(history, blocks);
   std::vector<StudyFileInfo> infos;
   for (const auto index : study_devices_) infos.push_back({configuration_.devices[index].name, 0.0});
-  return smoothing_->open(options_.out, std::move(infos));
+  return smoothing_->open(folder_->folder(), std::move(infos));
 }
 
 /// What is published is recorded, whether or not there is a bus.
@@ -356,7 +356,7 @@ void LivePublisher::on_refit(const Refit& refit) {
   refit_utc_ = broadcast_.anchor().at(host_now());
   models_.take(refit);
   // At each refit, not only at the end: a run that is killed leaves its newest models.
-  if (auto written = models_.write(options_.out); !written) spdlog::error("{}", written.error().text());
+  if (auto written = models_.write(folder_->folder()); !written) spdlog::error("{}", written.error().text());
   if (tunables_.noise.apply_to_filter) {
     if (const auto accepted = feedback_[refit.study].consider(refit))
       estimator_.offer_noise(refit.study, *accepted);
@@ -506,7 +506,7 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
     device.problem = line.problem.data();
     run.devices.push_back(std::move(device));
   }
-  return write_run_record(options_.out, run);
+  return write_run_record(folder_->folder(), run);
 }
 
 }  // namespace imuscope

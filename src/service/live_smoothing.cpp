@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "base/text.h"
 #include "calibration/filter_core.h"
 #include "calibration/navigation_output.h"
 #include "navigation/so3.h"
@@ -27,13 +28,13 @@ LiveSmoothing::LiveSmoothing(LiveHistory& history, const std::vector<std::uint32
   }
 }
 
-Result<void> LiveSmoothing::open(const std::filesystem::path& folder, std::vector<StudyFileInfo> infos) {
+Result<void> LiveSmoothing::open(const OutputFolder& folder, std::vector<StudyFileInfo> infos) {
   infos_ = std::move(infos);
   studies_.resize(infos_.size());
-  auto opened = navigation_.open(folder / "smoothed_navigation.csv", navigation_csv_header());
+  auto opened = navigation_.open(folder, "smoothed_navigation.csv", navigation_csv_header());
   for (std::size_t i = 0; i < infos_.size() && opened; ++i)
-    opened =
-        studies_[i].open(folder / fmt::format("smoothed_{}.csv", infos_[i].name), calibration_csv_header());
+    opened = studies_[i].open(folder, device_file_name("smoothed", infos_[i].name, ".csv"),
+                              calibration_csv_header());
   return opened;
 }
 

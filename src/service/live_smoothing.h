@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/output_folder.h"
 #include "calibration/fixed_lag.h"
 #include "rt/spsc_ring.h"
 #include "service/core.h"
@@ -49,7 +50,7 @@ class LiveSmoothing {
   /// @param blocks  state blocks of every S-IMU (StudyConfig::blocks)
   LiveSmoothing(LiveHistory& history, const std::vector<std::uint32_t>& blocks);
 
-  [[nodiscard]] Result<void> open(const std::filesystem::path& folder, std::vector<StudyFileInfo> infos);
+  [[nodiscard]] Result<void> open(const OutputFolder& folder, std::vector<StudyFileInfo> infos);
   /// Empties the ring. @param last  newest snapshot, for what smoothing does not change
   void drain(const Snapshot& last);
   [[nodiscard]] Result<void> close();

@@ -27,7 +27,7 @@ void NewestModels::take(const Refit& refit) {
   }
 }
 
-Result<void> NewestModels::write(const std::filesystem::path& folder) const {
+Result<void> NewestModels::write(const OutputFolder& folder) const {
   if (models_.empty()) return {};
   nlohmann::json all = nlohmann::json::array();
   for (const auto& [study, models] : models_) all.insert(all.end(), models.begin(), models.end());

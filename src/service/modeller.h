@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/output_folder.h"
 #include "noise/fit.h"
 #include "noise/streaming_wv.h"
 #include "rt/heartbeat.h"
@@ -32,7 +33,7 @@ class NewestModels {
  public:
   void take(const Refit& refit);
   /// Writes models.json, if there was a refit.
-  [[nodiscard]] Result<void> write(const std::filesystem::path& folder) const;
+  [[nodiscard]] Result<void> write(const OutputFolder& folder) const;
 
  private:
   std::map<std::size_t, nlohmann::json> models_;  ///< entries of models.json

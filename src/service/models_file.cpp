@@ -18,8 +18,8 @@ nlohmann::json model_json(const noise::FitResult& fit, const std::string& name, 
   return model;
 }
 
-Result<void> write_models(const std::filesystem::path& folder, const nlohmann::json& models) {
-  return write_json(folder / "models.json", {{"schema", "imuscope.models/1"}, {"models", models}});
+Result<void> write_models(const OutputFolder& folder, const nlohmann::json& models) {
+  return write_json(folder, "models.json", {{"schema", "imuscope.models/1"}, {"models", models}});
 }
 
 Result<noise::FitResult> read_model(const nlohmann::json& models, const std::string& name, std::size_t axis,

@@ -2,10 +2,10 @@
 
 /// models.json: fits by S-IMU, axis and regime.
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/output_folder.h"
 #include "base/result.h"
 #include "noise/fit.h"
 
@@ -17,7 +17,7 @@ nlohmann::json model_json(const noise::FitResult& fit, const std::string& name, 
                           const std::string& regime);
 
 /// @param models  an array of model_json()
-Result<void> write_models(const std::filesystem::path& folder, const nlohmann::json& models);
+Result<void> write_models(const OutputFolder& folder, const nlohmann::json& models);
 
 /// The fit of one entry. Errors (kWork): there is none, or it is damaged.
 /// @param models  the array

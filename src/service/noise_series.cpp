@@ -10,8 +10,11 @@ namespace {
 
 constexpr std::array kAxisNames{"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
 
-/// A hole longer than this is not padded sample by sample (one hour at 100 Hz): the counter began anew.
+/// A hole longer than this is not padded sample by sample (one hour at 100 Hz): the counter began anew. All
+/// holes together are padded with as many, and with twice as many as there are samples: a counter that jumps
+/// and jumps takes no memory that the recording does not have.
 constexpr std::int64_t kLongestHole = 360'000;
+constexpr std::int64_t kPaddedPerSample = 2;
 
 }  // namespace
 
@@ -21,7 +24,9 @@ std::string axis_unit(std::size_t axis) { return axis < 3 ? "rad/s" : "m/s^2"; }
 void NoiseSeries::add(const ErrorRow& row, std::optional<std::size_t> regime) {
   IMUSCOPE_EXPECTS(!regime || *regime < kMaxRegimes);
   if (started_ && row.counter < next_counter_) return;
-  const std::int64_t hole = started_ ? std::min(row.counter - next_counter_, kLongestHole) : 0;
+  const auto present = static_cast<std::int64_t>(size() - missing_);
+  const std::int64_t room = kLongestHole + kPaddedPerSample * present - static_cast<std::int64_t>(missing_);
+  const std::int64_t hole = started_ ? std::min({row.counter - next_counter_, kLongestHole, room}) : 0;
   missing_ += static_cast<std::size_t>(hole);
   const std::size_t padded = size() + static_cast<std::size_t>(hole);
   times_.resize(padded, times_.empty() ? row.time : times_.back());

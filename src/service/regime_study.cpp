@@ -81,20 +81,23 @@ Result<RunRegimes> find_regimes(const RegimeOptions& options, const MotionWatch&
       break;
     case RegimesBy::kLabels: {
       const HostTime end = watch.levels().begin_of(watch.levels().cells().size());
-      const auto named = labels.empty() ? labels_of_moments(moments, origin, end) : labels;
+      auto named = labels.empty() ? labels_of_moments(moments, origin, end) : labels;
       if (named.empty()) {
         return usage_error(
             "the regimes are to be those that a person named, and there are none",
             "give --labels FILE.csv, or send 'regime NAME' on IMUSCOPE_EVENT while recording, or "
             "choose another `by` in [regimes]");
       }
+      if (const auto n_left_out = keep_first_names(named, kMaxRegimes); n_left_out > 0) {
+        regimes.remarks.push_back(
+            fmt::format("{} different regimes are named and a run can have {}: what the last {} names hold "
+                        "for belongs to no "
+                        "regime",
+                        kMaxRegimes + n_left_out, kMaxRegimes, n_left_out));
+      }
       regimes.chosen = labelled_regimes(named, origin);
       break;
     }
-  }
-  if (regimes.chosen.names().size() > kMaxRegimes) {
-    return usage_error(fmt::format("{} different regimes are named", regimes.chosen.names().size()),
-                       fmt::format("a run can have {}", kMaxRegimes));
   }
   return regimes;
 }

@@ -38,7 +38,8 @@ struct RunRegimes {
 
 /// @param labels   of a file; empty: those of `moments`
 /// @param origin   of time_s
-/// Errors (kUsage): labels asked for and none given; more regimes than kMaxRegimes.
+/// Of more names than kMaxRegimes the first ones hold, and a remark tells of the others.
+/// Errors (kUsage): labels asked for and none given.
 Result<RunRegimes> find_regimes(const RegimeOptions& options, const MotionWatch& watch,
                                 const std::vector<Label>& labels, const std::vector<MarkedMoment>& moments,
                                 HostTime origin);

@@ -61,17 +61,21 @@ class Feed {
   /// Decodes everything that had arrived by `cut`, and a little more where arrivals come from the device's
   /// time.
   Result<void> feed(HostTime cut) {
+    has_fed_ = false;
     while (pending_ && due(cut)) {
+      has_fed_ = true;
       if (auto pushed = push_pending(); !pushed) return pushed;
     }
     return {};
   }
+  /// Whether the last feed() had something.
+  [[nodiscard]] bool has_fed() const { return has_fed_; }
 
   [[nodiscard]] bool at_end() const { return !pending_; }
-  /// Whether nothing of it comes by then that has not come already.
-  [[nodiscard]] bool is_idle_at(HostTime cut) const {
-    if (!pending_) return true;
-    return pending_->arrival ? *pending_->arrival > cut : sink_.newest_arrival() > cut;
+  /// When its next bytes are due; nothing at its end.
+  [[nodiscard]] std::optional<HostTime> next_due() const {
+    if (!pending_) return std::nullopt;
+    return pending_->arrival.value_or(sink_.newest_arrival());
   }
   [[nodiscard]] const ByteSource& source() const { return *source_; }
   [[nodiscard]] const DeviceDecoder& decoder() const { return *decoder_; }
@@ -103,6 +107,7 @@ class Feed {
   RingSink sink_;
   std::optional<RecordedRead> pending_;
   HostTime last_arrival_{};
+  bool has_fed_ = false;
 };
 
 class Replayer {
@@ -126,6 +131,7 @@ class Replayer {
     ReplayResult result;
     result.t0 = *t0;
     if (auto ran = run_ticks(*t0, result.ticks); !ran) return tl::unexpected<Error>(ran.error());
+    result.pauses = pauses_;
     for (std::size_t i = 0; i < feeds_.size(); ++i) result.devices.push_back(device_record(i));
     if (auto checked = check(result); !checked) return tl::unexpected<Error>(checked.error());
     return result;
@@ -175,7 +181,6 @@ class Replayer {
     const HostTime started = host_now();
     for (std::int64_t index = 0; !finished(index); ++index) {
       const HostTime cut = t0 + index * kTickPeriod;
-      if (index % kProgressTicks == 0 && pauses_too_long(cut)) break;
       for (auto& feed : feeds_) {
         if (!feed) continue;
         if (auto fed = feed->feed(cut); !fed) return fed;
@@ -184,6 +189,16 @@ class Replayer {
         if (feed->sink().newest_arrival() > HostTime::min()) {
           last_needed_tick_ =
               std::max(last_needed_tick_, (feed->sink().newest_arrival() - t0) / kTickPeriod + kTailTicks);
+        }
+      }
+      if (is_busy(cut)) last_busy_tick_ = index;
+      if (index > last_busy_tick_ + kTailTicks) {
+        const std::int64_t stepped = pause(index, cut);
+        if (stepped < 0) break;
+        if (stepped > 0) {
+          index += stepped - 1;
+          ticks += stepped;
+          continue;
         }
       }
       if (skipped.contains(index)) continue;
@@ -195,13 +210,51 @@ class Replayer {
     return {};
   }
 
-  /// Whether nothing happens for longer than any drive pauses.
-  [[nodiscard]] bool pauses_too_long(HostTime cut) const {
-    return std::all_of(feeds_.begin(), feeds_.end(),
-                       [cut](const auto& feed) { return !feed || feed->is_idle_at(cut + kLongestPause); }) &&
-           std::any_of(feeds_.begin(), feeds_.end(), [cut](const auto& feed) {
-             return feed && (!feed->at_end() || feed->sink().newest_arrival() > cut + kLongestPause);
-           });
+  /// Whether the tick of this cut has something to consume that came since the one before.
+  [[nodiscard]] bool is_busy(HostTime cut) {
+    for (std::size_t i = 0; i < feeds_.size(); ++i) {
+      if (!feeds_[i]) continue;
+      if (feeds_[i]->has_fed()) return true;
+      const Sample* sample = core_.ring(static_cast<DeviceIndex>(i)).front();
+      if (sample != nullptr && sample->arrival <= cut && sample->arrival > cut - kTickPeriod) return true;
+    }
+    return false;
+  }
+
+  /// When something next happens; nothing where nothing is left.
+  [[nodiscard]] std::optional<HostTime> next_event(HostTime cut) {
+    std::optional<HostTime> next;
+    const auto consider = [&](std::optional<HostTime> time) {
+      if (time && (!next || *time < *next)) next = time;
+    };
+    for (std::size_t i = 0; i < feeds_.size(); ++i) {
+      if (!feeds_[i]) continue;
+      consider(feeds_[i]->next_due());
+      const Sample* sample = core_.ring(static_cast<DeviceIndex>(i)).front();
+      // What is held back as late is no event: its tick is run, or was stepped over.
+      if (sample != nullptr && sample->arrival > cut) consider(sample->arrival);
+    }
+    return next;
+  }
+
+  /// One tick of a pause: how many ticks are stepped over from here; 0 to run this one, less where the
+  /// recording is at its end, or to be left here.
+  [[nodiscard]] std::int64_t pause(std::int64_t index, HostTime cut) {
+    const auto next = next_event(cut);
+    if (!next) return -1;
+    if (*next - cut > kLongestPause - idle_) return -1;
+    idle_ += kTickPeriod;
+    if ((index - last_busy_tick_) * kTickPeriod <= kLongestIdle) return 0;
+    // The first tick whose cut is not before the event is the next to be run.
+    const Duration rest = *next - cut;
+    const std::int64_t n = (rest + kTickPeriod - Duration{1}) / kTickPeriod;
+    if (n <= 1) return 0;
+    idle_ += (n - 1) * kTickPeriod;
+    const Duration whole = rest + (index - last_busy_tick_) * kTickPeriod;
+    pauses_.n += 1;
+    pauses_.total += whole;
+    pauses_.longest = std::max(pauses_.longest, whole);
+    return n;
   }
 
   [[nodiscard]] double share_read() const {
@@ -225,9 +278,11 @@ class Replayer {
     record.problem =
         feeds_[i]->at_end()
             ? decoder_problem(configuration_.devices[i], feeds_[i]->decoder())
-            : fmt::format("only {} of {} bytes are used: the next stamp lies more than {} h ahead",
+            : fmt::format("only {} of {} bytes are used: {} more than {} h{}",
                           feeds_[i]->decoder().counters().bytes, feeds_[i]->source().bytes_total(),
-                          std::chrono::duration_cast<std::chrono::hours>(kLongestPause).count());
+                          pauses_.n == 0 ? "the next stamp lies" : "with the next stamp, the pauses are",
+                          std::chrono::duration_cast<std::chrono::hours>(kLongestPause).count(),
+                          pauses_.n == 0 ? " ahead" : " together");
     return record;
   }
 
@@ -249,6 +304,9 @@ class Replayer {
   Core core_;
   std::vector<std::unique_ptr<Feed>> feeds_;
   std::int64_t last_needed_tick_ = 0;
+  std::int64_t last_busy_tick_ = 0;
+  Duration idle_{};  ///< of the pauses so far
+  SteppedPauses pauses_;
 };
 
 }  // namespace
@@ -264,6 +322,19 @@ std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, 
 Result<ReplayResult> replay(const Configuration& configuration, const EstimatorConfig& estimator,
                             const Recording& recording, CoreSink& sink, const ReplayOptions& options) {
   return Replayer(configuration, estimator, recording, sink, options).run();
+}
+
+std::vector<std::string> warnings_of(const Recording& recording, const ReplayResult& result) {
+  std::vector<std::string> warnings = recording.damage;
+  const SteppedPauses& pauses = result.pauses;
+  if (pauses.n == 0) return warnings;
+  constexpr double kSecondsPerHour = 3600.0;
+  warnings.push_back(fmt::format(
+      "{} times no device said anything for more than {} minutes, {:.2f} h in all and {:.2f} h at most; "
+      "these pauses were stepped over",
+      pauses.n, std::chrono::duration_cast<std::chrono::minutes>(kLongestIdle).count(),
+      to_seconds(pauses.total) / kSecondsPerHour, to_seconds(pauses.longest) / kSecondsPerHour));
+  return warnings;
 }
 
 }  // namespace imuscope

@@ -26,8 +26,12 @@ namespace imuscope {
 /// Opens the recorded bytes of device `index` from their beginning; a study reads them more than once.
 using OpenSource = std::function<Result<std::unique_ptr<ByteSource>>(DeviceIndex index)>;
 
-/// Between two arrivals; no drive pauses as long.
+/// A pause is when no device has said anything for longer than the core's tail (kTailTicks). All pauses of a
+/// drive together are not as long as this.
 inline constexpr Duration kLongestPause = std::chrono::hours(24);
+
+/// Of a longer pause the rest is stepped over: every filter has settled by then, and a tick does nothing.
+inline constexpr Duration kLongestIdle = std::chrono::minutes(2);
 
 /// What a recording says about the live run it came from, so that a replay repeats it tick by tick.
 struct RecordedSchedule {
@@ -46,17 +50,26 @@ struct Recording {
   std::vector<DeviceClock> clocks;           ///< per device
   std::optional<RecordedSchedule> schedule;  ///< of a capture of a live run
   std::vector<MarkedMoment> moments;         ///< that a person marked while it was recorded
+  std::vector<std::string> damage;  ///< what is missing of it or damaged, with what it costs, in sentences
 };
 
 /// Names and clock shifts of the S-IMUs, in the order of the configuration.
 std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording);
 
+/// Pauses of which a part was stepped over.
+struct SteppedPauses {
+  std::int64_t n = 0;
+  Duration total{};
+  Duration longest{};
+};
+
 /// What a replay did: counts by device of the configuration, the cut of tick 0, and the ticks run (skipped
-/// ones do not count).
+/// ones do not count; those of a pause that was stepped over do, as a live run has them).
 struct ReplayResult {
   std::vector<DeviceRecord> devices;
   HostTime t0{};
   std::int64_t ticks = 0;
+  SteppedPauses pauses;
 };
 
 /// How a recording is run through the core; replay() calls the callbacks from its caller's thread.
@@ -71,9 +84,13 @@ struct ReplayOptions {
 /// Runs the recording through a core made from `estimator`. Errors: a recording that cannot be read, or that
 /// holds no sample of the reference or of any study (kWork).
 ///
-/// What follows a pause of all devices of more than kLongestPause is left out, and told as a problem of each
-/// device that has more: no drive has such a pause, a damaged stamp has.
+/// What follows once the pauses add up to more than kLongestPause is left out, and told as a problem of each
+/// device that has more: no drive has such pauses, damaged or forged stamps have. So a replay's time and what
+/// it writes are bounded by the size of the recording.
 Result<ReplayResult> replay(const Configuration& configuration, const EstimatorConfig& estimator,
                             const Recording& recording, CoreSink& sink, const ReplayOptions& options = {});
+
+/// What a person should know of a replay: what is missing of its recording, pauses that were stepped over.
+[[nodiscard]] std::vector<std::string> warnings_of(const Recording& recording, const ReplayResult& result);
 
 }  // namespace imuscope

@@ -1,8 +1,8 @@
 #include "service/replay_run.h"
 
-#include <fmt/format.h>
 #include <utility>
 
+#include "base/text.h"
 #include "service/estimator_setup.h"
 #include "service/modeller.h"
 #include "service/replay_broadcast.h"
@@ -56,11 +56,8 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
                                       "dependence.json", "vibration.json",         "comparison.json",
                                       "report.html",     "smoothed_navigation.csv"};
   for (const auto& info : study_file_infos(configuration, recording))
-    of_a_study.push_back(fmt::format("smoothed_{}.csv", info.name));
-  for (const auto& file : of_a_study) {
-    std::error_code absent_is_well;
-    std::filesystem::remove(options.out / file, absent_is_well);
-  }
+    of_a_study.push_back(device_file_name("smoothed", info.name, ".csv"));
+  for (const auto& file : of_a_study) (*folder)->folder().remove(file);
   ReplayOptions replay_options;
   replay_options.realtime = options.realtime;
   replay_options.progress = options.progress;
@@ -73,14 +70,18 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   ReplaySink sink(**folder, configuration, *spec, broadcast);
   const auto result = replay(configuration, estimator_config(configuration), recording, sink, replay_options);
   if (!result) return tl::unexpected<Error>(result.error());
-  if (auto written = sink.models().write(options.out); !written) return written;
+  if (auto written = sink.models().write((*folder)->folder()); !written) return written;
   if (auto written = (*folder)->write_calibration(); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
   const auto& last = (*folder)->last_snapshot();
-  return write_run_record(options.out,
+  auto warnings = warnings_of(recording, *result);
+  if (last) {
+    const auto of_run = warnings_of(configuration, *last);
+    warnings.insert(warnings.end(), of_run.begin(), of_run.end());
+  }
+  return write_run_record((*folder)->folder(),
                           {configuration, options.version, recording.inputs, result->devices, result->ticks,
-                           last ? &*last : nullptr, (*folder)->events(),
-                           last ? warnings_of(configuration, *last) : std::vector<std::string>{}});
+                           last ? &*last : nullptr, (*folder)->events(), std::move(warnings)});
 }
 
 }  // namespace imuscope

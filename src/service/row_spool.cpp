@@ -8,16 +8,12 @@ namespace imuscope {
 
 static_assert(std::is_trivially_copyable_v<ErrorRow>);
 
-Result<RowSpool> RowSpool::create(const std::filesystem::path& folder) {
-  const auto path = folder / ".error_rows";
-  std::FILE* file = std::fopen(path.c_str(), "w+b");
-  if (file == nullptr) {
-    return work_error(path.string() + " could not be made: " + std::strerror(errno),
-                      "check the folder's permissions and the disk's free space");
-  }
-  // Open until closed, and gone then, also after a crash.
-  std::error_code nothing_to_be_done;
-  std::filesystem::remove(path, nothing_to_be_done);
+Result<RowSpool> RowSpool::create(const OutputFolder& folder) {
+  auto scratch = folder.scratch_file();
+  if (!scratch) return tl::unexpected<Error>(scratch.error());
+  std::FILE* file = ::fdopen(scratch->get(), "w+b");
+  if (file == nullptr) return work_error(folder.path().string() + ": " + std::strerror(errno));
+  (void)scratch->release();
   return RowSpool(file);
 }
 

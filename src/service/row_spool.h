@@ -4,9 +4,9 @@
 /// name any more, so that memory does not grow with the drive and nothing is left behind.
 
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 
+#include "base/output_folder.h"
 #include "base/result.h"
 #include "dynamics/study.h"
 
@@ -15,7 +15,7 @@ namespace imuscope {
 class RowSpool final : public ErrorRowSource {
  public:
   /// Errors (kWork): no file can be made in `folder`.
-  static Result<RowSpool> create(const std::filesystem::path& folder);
+  static Result<RowSpool> create(const OutputFolder& folder);
 
   void add(const ErrorRow& row) noexcept;
   /// False once a row could not be kept (disk full): what is read then is not the whole.

@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 #include <Eigen/Geometry>
 #include <cmath>
+#include <utility>
 
+#include "base/json_text.h"
+#include "base/text.h"
 #include "base/units.h"
 #include "service/observability.h"
 
@@ -49,35 +52,16 @@ constexpr std::array kDirectionNames{"psi_x", "psi_y", "psi_z", "r_x", "r_y", "r
 
 }  // namespace
 
-Result<void> CsvFile::open(const std::filesystem::path& file, const std::string& header) {
-  file_ = file;
-  out_.open(file, std::ios::binary | std::ios::trunc);
-  if (!out_) {
-    return work_error(fmt::format("{} cannot be written", file.string()),
-                      "check the folder's permissions and space");
-  }
-  out_ << header;
+Result<void> CsvFile::open(const OutputFolder& folder, const std::string& name, const std::string& header) {
+  auto begun = folder.begin(name);
+  if (!begun) return tl::unexpected<Error>(begun.error());
+  out_ = std::move(*begun);
+  out_.write(header);
   return {};
 }
 
-void CsvFile::append(std::string_view rows) {
-  out_.write(rows.data(), static_cast<std::streamsize>(rows.size()));
-}
-
-Result<void> CsvFile::close() {
-  if (!out_.is_open()) return {};
-  out_.close();
-  if (out_.fail()) {
-    return work_error(fmt::format("{} could not be written to its end", file_.string()),
-                      "check the disk's free space");
-  }
-  return {};
-}
-
-Result<void> write_json(const std::filesystem::path& file, const nlohmann::json& document) {
-  CsvFile out;
-  if (auto opened = out.open(file, document.dump(2) + "\n"); !opened) return opened;
-  return out.close();
+Result<void> write_json(const OutputFolder& folder, const std::string& name, const nlohmann::json& document) {
+  return folder.write_whole(name, json_text(document) + "\n");
 }
 
 void SampleTimeLine::add(std::int64_t counter, double time_s) {
@@ -248,29 +232,26 @@ nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& st
 
 Result<std::unique_ptr<RunFolder>> RunFolder::create(const std::filesystem::path& folder,
                                                      std::vector<StudyFileInfo> studies, bool write_errors) {
-  std::error_code code;
-  std::filesystem::create_directories(folder, code);
-  if (code) {
-    return work_error(fmt::format("folder {} cannot be made: {}", folder.string(), code.message()),
-                      "choose another --out folder");
-  }
-  std::unique_ptr<RunFolder> run(new RunFolder);
-  run->folder_ = folder;
+  auto opened_folder = OutputFolder::open(folder);
+  if (!opened_folder) return tl::unexpected<Error>(opened_folder.error());
+  std::unique_ptr<RunFolder> run(new RunFolder(std::move(*opened_folder)));
   run->studies_ = std::move(studies);
   const std::size_t n = run->studies_.size();
   run->calibrations_.resize(n);
   run->errors_.resize(n);
   run->sample_times_.resize(n);
-  if (auto opened = run->navigation_.open(folder / "navigation.csv", navigation_csv_header()); !opened) {
+  run->calibration_times_.resize(n, HostTime::min());
+  if (auto opened = run->navigation_.open(run->folder_, "navigation.csv", navigation_csv_header()); !opened) {
     return tl::unexpected<Error>(opened.error());
   }
-  std::filesystem::remove(folder / kOdometryFile, code);
+  run->folder_.remove(kOdometryFile);
   for (std::size_t i = 0; i < n; ++i) {
     const auto& name = run->studies_[i].name;
-    auto opened = run->calibrations_[i].open(folder / fmt::format("calibration_{}.csv", name),
+    auto opened = run->calibrations_[i].open(run->folder_, device_file_name("calibration", name, ".csv"),
                                              calibration_csv_header());
     if (opened && write_errors) {
-      opened = run->errors_[i].open(folder / fmt::format("errors_{}.csv", name), error_csv_header());
+      opened =
+          run->errors_[i].open(run->folder_, device_file_name("errors", name, ".csv"), error_csv_header());
     }
     if (!opened) return tl::unexpected<Error>(opened.error());
   }
@@ -296,17 +277,27 @@ double RunFolder::seconds_since_start(HostTime time) const {
   return to_seconds(time - last_->first_reference_time);
 }
 
+namespace {
+
+/// Whether `time` is not that of the row written last, which it becomes.
+bool is_new(HostTime time, HostTime& written) { return std::exchange(written, time) != time; }
+
+}  // namespace
+
 void RunFolder::on_snapshot(const Snapshot& snapshot) noexcept {
   last_ = snapshot;
   if (!snapshot.has_reference) return;
-  if (snapshot.navigation.status == NavigationStatus::kNavigating) {
+  // A row is of a time: while nothing comes, none is repeated.
+  if (snapshot.navigation.status == NavigationStatus::kNavigating &&
+      is_new(snapshot.navigation.time, navigation_time_)) {
     navigation_.append(
         navigation_csv_row(snapshot.navigation, seconds_since_start(snapshot.navigation.time)));
   }
-  if (snapshot.odometry.has_speed) add_odometry();
+  if (snapshot.odometry.has_speed && is_new(snapshot.odometry.time, odometry_time_)) add_odometry();
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& study = snapshot.studies[i];
-    if (study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated)
+    if ((study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated) &&
+        is_new(study.time, calibration_times_[i]))
       calibrations_[i].append(calibration_csv_row(study, studies_[i], seconds_since_start(study.time)));
   }
 }
@@ -314,7 +305,7 @@ void RunFolder::on_snapshot(const Snapshot& snapshot) noexcept {
 /// The file is made with the first speed: a run without odometry has none.
 void RunFolder::add_odometry() {
   if (odometry_opened_ && !odometry_.is_open())
-    odometry_opened_ = odometry_.open(folder_ / kOdometryFile, odometry_csv_header());
+    odometry_opened_ = odometry_.open(folder_, kOdometryFile, odometry_csv_header());
   if (!odometry_opened_) return;
   odometry_.append(odometry_csv_row(last_->odometry, seconds_since_start(last_->odometry.time)));
 }
@@ -325,7 +316,7 @@ Result<void> RunFolder::write_calibration(const std::vector<nlohmann::json>& wei
     imus.push_back(calibration_json(studies_[i], last_->studies[i], sample_times_[i]));
     imus.back()["weighted_mean"] = i < weighted_means.size() ? weighted_means[i] : nlohmann::json(nullptr);
   }
-  return write_json(folder_ / "calibration.json", {{"schema", "imuscope.calibration/1"}, {"imus", imus}});
+  return write_json(folder_, "calibration.json", {{"schema", "imuscope.calibration/1"}, {"imus", imus}});
 }
 
 Result<void> RunFolder::close() {

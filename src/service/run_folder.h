@@ -6,13 +6,13 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "base/output_folder.h"
 #include "base/result.h"
 #include "service/core.h"
 
@@ -21,19 +21,19 @@ namespace imuscope {
 /// Rows are formatted in memory and written in blocks; a failed write is told by close().
 class CsvFile {
  public:
-  Result<void> open(const std::filesystem::path& file, const std::string& header);
+  /// Begins a new file in place of whatever has its name in the folder.
+  Result<void> open(const OutputFolder& folder, const std::string& name, const std::string& header);
   /// Appends text that ends in a newline.
-  void append(std::string_view rows);
-  [[nodiscard]] Result<void> close();
+  void append(std::string_view rows) { out_.write(rows); }
+  [[nodiscard]] Result<void> close() { return out_.close(); }
   [[nodiscard]] bool is_open() const { return out_.is_open(); }
 
  private:
-  std::filesystem::path file_;
-  std::ofstream out_;
+  OutputFile out_;
 };
 
-/// Writes `document` to `file`, indented, numbers with the digits that give the same double back.
-Result<void> write_json(const std::filesystem::path& file, const nlohmann::json& document);
+/// Writes `document`, indented, numbers with the digits that give the same double back.
+Result<void> write_json(const OutputFolder& folder, const std::string& name, const nlohmann::json& document);
 
 /// Straight line through (counter, time of validity): when a sample of the device showed the motion.
 class SampleTimeLine {
@@ -78,7 +78,7 @@ class RunFolder final : public CoreSink {
   /// A row of the error process under the name of its regime.
   void write_error(const ErrorRecord& record, std::string_view regime);
 
-  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  [[nodiscard]] const OutputFolder& folder() const { return folder_; }
   [[nodiscard]] const std::optional<Snapshot>& last_snapshot() const { return last_; }
   [[nodiscard]] const std::vector<LateSample>& late_samples() const { return late_; }
   [[nodiscard]] const std::vector<EstimatorEvent>& events() const { return events_; }
@@ -90,17 +90,21 @@ class RunFolder final : public CoreSink {
   [[nodiscard]] Result<void> close();
 
  private:
-  RunFolder() = default;
+  explicit RunFolder(OutputFolder folder) : folder_(std::move(folder)) {}
   [[nodiscard]] double seconds_since_start(HostTime time) const;
   void add_odometry();
 
-  std::filesystem::path folder_;
+  OutputFolder folder_;
   std::vector<StudyFileInfo> studies_;
   CsvFile navigation_;
   CsvFile odometry_;
   Result<void> odometry_opened_;
   std::vector<CsvFile> calibrations_;
   std::vector<CsvFile> errors_;
+  /// Of the rows written last.
+  HostTime navigation_time_ = HostTime::min();
+  HostTime odometry_time_ = HostTime::min();
+  std::vector<HostTime> calibration_times_;
   std::vector<SampleTimeLine> sample_times_;
   std::vector<EstimatorEvent> events_;
   std::vector<LateSample> late_;

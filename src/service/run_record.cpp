@@ -149,8 +149,8 @@ nlohmann::json run_json(const RunRecord& run) {
   return json;
 }
 
-Result<void> write_run_record(const std::filesystem::path& folder, const RunRecord& run) {
-  return write_json(folder / "run.json", run_json(run));
+Result<void> write_run_record(const OutputFolder& folder, const RunRecord& run) {
+  return write_json(folder, "run.json", run_json(run));
 }
 
 }  // namespace imuscope

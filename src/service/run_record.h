@@ -4,12 +4,12 @@
 /// fill in the same record.
 
 #include <cstdint>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "base/output_folder.h"
 #include "base/result.h"
 #include "drivers/device/device.h"
 #include "service/config.h"
@@ -43,7 +43,7 @@ struct RunRecord {
 
 /// run.json's content.
 nlohmann::json run_json(const RunRecord& run);
-Result<void> write_run_record(const std::filesystem::path& folder, const RunRecord& run);
+Result<void> write_run_record(const OutputFolder& folder, const RunRecord& run);
 
 /// What a person should know of a finished run: GNSS that contradicts the motion, S-IMUs without a mounting.
 [[nodiscard]] std::vector<std::string> warnings_of(const Configuration& configuration, const Snapshot& last);

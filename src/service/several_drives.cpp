@@ -108,7 +108,9 @@ Result<Combination> run_studies(const std::vector<OpenedRecording>& drives, cons
     if (auto done = run_study(drives[i].configuration, drives[i].recording, of_drive); !done)
       return tl::unexpected<Error>(done.error());
   }
-  if (auto written = write_json(options.out / "combined.json", combination_json(*combination)); !written)
+  const auto folder = OutputFolder::open(options.out);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  if (auto written = write_json(*folder, "combined.json", combination_json(*combination)); !written)
     return tl::unexpected<Error>(written.error());
   return combination;
 }

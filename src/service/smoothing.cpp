@@ -6,6 +6,7 @@
 #include <array>
 
 #include "base/contracts.h"
+#include "base/text.h"
 #include "base/units.h"
 #include "calibration/combine.h"
 #include "calibration/filter_core.h"
@@ -165,14 +166,14 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
 }
 
 Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const FormerMountings& former,
-                            const std::vector<StudyFileInfo>& infos, const std::filesystem::path& folder) {
+                            const std::vector<StudyFileInfo>& infos, const OutputFolder& folder) {
   CsvFile navigation;
-  if (auto opened = navigation.open(folder / "smoothed_navigation.csv", navigation_csv_header()); !opened)
+  if (auto opened = navigation.open(folder, "smoothed_navigation.csv", navigation_csv_header()); !opened)
     return opened;
   std::vector<CsvFile> files(infos.size());
   for (std::size_t i = 0; i < infos.size(); ++i) {
     auto opened =
-        files[i].open(folder / fmt::format("smoothed_{}.csv", infos[i].name), calibration_csv_header());
+        files[i].open(folder, device_file_name("smoothed", infos[i].name, ".csv"), calibration_csv_header());
     if (!opened) return opened;
   }
   for (std::size_t k = 0; k < track.size(); ++k) {

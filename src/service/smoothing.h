@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "base/output_folder.h"
 #include "base/result.h"
 #include "calibration/smoother.h"
 #include "error_process/error_row.h"
@@ -53,7 +54,7 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
 /// smoothed_NAME.csv (columns of calibration_NAME.csv): biases smoothed, the constants of the mounting at
 /// their end values, with the end value's sd; while a former mounting was in force, its own.
 Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const FormerMountings& former,
-                            const std::vector<StudyFileInfo>& infos, const std::filesystem::path& folder);
+                            const std::vector<StudyFileInfo>& infos, const OutputFolder& folder);
 
 /// The paper's final value of each S-IMU: mean over the drive of the smoothed values, weighted by their
 /// inverse variances, of the final mounting; calibration.json's "weighted_mean". Null for an S-IMU that was

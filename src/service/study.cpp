@@ -112,7 +112,7 @@ NoiseSeries write_errors(ErrorRecord of, const RunRegimes& regimes, const ScaleE
   return series;
 }
 
-Result<std::vector<RowSpool>> make_spools(std::size_t n, const std::filesystem::path& folder) {
+Result<std::vector<RowSpool>> make_spools(std::size_t n, const OutputFolder& folder) {
   std::vector<RowSpool> spools;
   for (std::size_t i = 0; i < n; ++i) {
     auto spool = RowSpool::create(folder);
@@ -165,6 +165,15 @@ void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMoun
   }
 }
 
+tl::unexpected<Error> nothing_was_run(const ReplayResult& result) {
+  return work_error(
+      fmt::format(
+          "the estimator never came to a result: {} ticks were run, and a result comes with every {}th",
+          result.ticks, kTicksPerSnapshot),
+      "a recording whose own record says that every tick was skipped, or that ends at once, is damaged or "
+      "forged");
+}
+
 }  // namespace
 
 Result<void> run_study(const Configuration& configuration, const Recording& recording,
@@ -181,12 +190,15 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
   const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
   if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
+  if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
   const Snapshot last = *(*folder)->last_snapshot();
   const auto finals = final_studies(last);
 
   RunRecord run{
       configuration,         options.version, recording.inputs,    calibrated_run->devices,
-      calibrated_run->ticks, &last,           (*folder)->events(), warnings_of(configuration, last)};
+      calibrated_run->ticks, &last,           (*folder)->events(), warnings_of(recording, *calibrated_run)};
+  const auto of_run = warnings_of(configuration, last);
+  run.warnings.insert(run.warnings.end(), of_run.begin(), of_run.end());
   const auto infos = study_file_infos(configuration, recording);
   const FormerMountings& former = first.former_mountings();
   warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
@@ -200,14 +212,15 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
         if (options.progress) options.progress("smoothing", share);
       });
   if (!track) return tl::unexpected<Error>(track.error());
-  if (auto written = write_smoothed(*track, last, former, infos, options.out); !written) return written;
+  if (auto written = write_smoothed(*track, last, former, infos, (*folder)->folder()); !written)
+    return written;
   const auto means = weighted_means(*track, finals, former);
   if (!means) return tl::unexpected<Error>(means.error());
   const auto biases = ReferenceBiasTrack::of(*track);
   if (!biases) return tl::unexpected<Error>(biases.error());
 
   const auto settled = with_settled(finals, infos, options.mountings);
-  auto rows = make_spools(finals.size(), options.out);
+  auto rows = make_spools(finals.size(), (*folder)->folder());
   if (!rows) return tl::unexpected<Error>(rows.error());
   ErrorCollector collector(former, *biases, *rows, low_passes(configuration));
   if (options.progress)
@@ -219,7 +232,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   auto regimes =
       find_regimes(configuration.regimes, collector.watch(), options.labels, recording.moments, origin);
   if (!regimes) return tl::unexpected<Error>(regimes.error());
-  auto studied = make_spools(finals.size(), options.out);
+  auto studied = make_spools(finals.size(), (*folder)->folder());
   if (!studied) return tl::unexpected<Error>(studied.error());
   std::vector<NoiseSeries> series;
   for (std::size_t i = 0; i < finals.size(); ++i) {
@@ -250,11 +263,12 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     run.warnings.insert(run.warnings.end(), remarks.begin(), remarks.end());
   run.static_s = regimes->motion.total_s(0);
   run.dynamic_s = regimes->motion.total_s(1);
-  if (auto written = write_scatter(configuration, *studied, origin, options.out); !written) return written;
+  if (auto written = write_scatter(configuration, *studied, origin, (*folder)->folder()); !written)
+    return written;
 
   if (auto written = (*folder)->write_calibration(*means); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
-  if (auto written = write_models(options.out, models_json(noise_study)); !written) return written;
+  if (auto written = write_models((*folder)->folder(), models_json(noise_study)); !written) return written;
   const std::pair<const char*, nlohmann::json> documents[] = {
       {"regimes.json", std::move(regime_document)},
       {"comparison.json", comparison_json(noise_study, names)},
@@ -265,10 +279,10 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
         {"regressions", regressions.regressions},
         {"remarks", regressions.remarks}}}};
   for (const auto& [file, document] : documents) {
-    if (auto written = write_json(options.out / file, document); !written) return written;
+    if (auto written = write_json((*folder)->folder(), file, document); !written) return written;
   }
   run.error_process_mounting = options.mountings.empty() ? "of this drive" : "of all drives combined";
-  return write_run_record(options.out, run);
+  return write_run_record((*folder)->folder(), run);
 }
 
 }  // namespace imuscope

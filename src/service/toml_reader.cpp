@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/nearest_word.h"
+#include "base/text.h"
 
 namespace imuscope {
 
@@ -69,9 +70,17 @@ void TomlReader::read_text(std::string_view key, std::string& value) {
   }
 }
 
+/// The gate for text of a configuration, which a capture from elsewhere brings along.
+const std::string& TomlReader::checked_text(std::string_view key, const std::string& text) {
+  if (one_line(text) != text)
+    fail(key, fmt::format("must be one line of at most {} bytes without control characters", kLineMax));
+  return text;
+}
+
 void TomlReader::text(std::string_view key, std::string& value) {
   (void)node(key, "text", value.empty() ? "" : in_quotes(value));
   read_text(key, value);
+  (void)checked_text(key, value);
 }
 
 void TomlReader::boolean(std::string_view key, bool& value) {
@@ -138,7 +147,7 @@ void TomlReader::texts(std::string_view key, std::array<std::string, 3>& value) 
     fail(key, "must be three texts in quotes");
     return;
   }
-  for (std::size_t i = 0; i < 3; ++i) value[i] = *(*list)[i].value<std::string>();
+  for (std::size_t i = 0; i < 3; ++i) value[i] = checked_text(key, *(*list)[i].value<std::string>());
 }
 
 void TomlReader::texts(std::string_view key, std::vector<std::string>& value) {
@@ -150,7 +159,7 @@ void TomlReader::texts(std::string_view key, std::vector<std::string>& value) {
     return;
   }
   value.clear();
-  for (const auto& entry : *list) value.push_back(*entry.value<std::string>());
+  for (const auto& entry : *list) value.push_back(checked_text(key, *entry.value<std::string>()));
 }
 
 void TomlReader::numbers(std::string_view key, std::vector<double>& value) {

@@ -75,6 +75,7 @@ class TomlReader {
  private:
   [[nodiscard]] const toml::node* find(std::string_view key);
   void read_text(std::string_view key, std::string& value);
+  const std::string& checked_text(std::string_view key, const std::string& text);
   bool read_number(std::string_view key, double& value, double unit, double low, double high);
   [[nodiscard]] std::string full_name(std::string_view key) const;
   [[nodiscard]] toml::source_region where(std::string_view key) const;

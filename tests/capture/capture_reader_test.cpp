@@ -491,5 +491,79 @@ TEST(CaptureReader, TellsHowFarItHasComeInEveryFile) {
   EXPECT_EQ(shares.back(), 1.0);
 }
 
+/// A capture of five files, ten reads in each, a second apart; returns the first.
+std::filesystem::path five_files() {
+  const auto first = test::scratch_folder() / "drive.lcm";
+  const RunHeader run = example_run();
+  const RecordClock clock{run.t0, run.t0_wall};
+  for (int file = 0; file < 5; ++file) {
+    auto writer = std::move(*CaptureWriter::create(capture_file(first, file)));
+    writer.append("IMUSCOPE_RUN", clock.utime(run.t0), encode(run, file));
+    for (int i = 0; i < 10; ++i) {
+      RawChunk chunk{};
+      chunk.sequence = 10 * file + i;
+      chunk.arrival = kT0 + std::chrono::seconds(chunk.sequence);
+      chunk.n_bytes = 1;
+      chunk.bytes[0] = static_cast<std::uint8_t>(chunk.sequence);
+      writer.append("IMUSCOPE_RAW_X", clock.utime(chunk.arrival), encode(chunk, "airins", clock));
+    }
+    EXPECT_TRUE(writer.close().has_value());
+  }
+  return first;
+}
+
+std::size_t reads_of(const std::filesystem::path& first) {
+  auto reader = CaptureReader::open(first);
+  EXPECT_TRUE(reader.has_value());
+  return read_all(*reader).size();
+}
+
+TEST(CaptureReader, GoesOnBehindFilesThatAreMissingAndTellsWhatIsLost) {
+  const auto first = five_files();
+  ASSERT_EQ(reads_of(first), 50U);
+  ASSERT_TRUE(summarise_capture(first)->breaks.empty());
+  std::filesystem::remove(capture_file(first, 1));
+  std::ofstream(capture_file(first, 2)) << "no capture at all";
+  EXPECT_EQ(reads_of(first), 30U);
+  const auto summary = summarise_capture(first);
+  ASSERT_TRUE(summary.has_value());
+  ASSERT_EQ(summary->breaks.size(), 1U);
+  EXPECT_EQ(summary->breaks[0].first_missing, 1);
+  EXPECT_EQ(summary->breaks[0].n_missing, 2);
+  EXPECT_EQ(summary->breaks[0].behind, 3);
+  EXPECT_NEAR(summary->breaks[0].seconds, 21.0, 1e-6);
+  EXPECT_EQ(summary->losses.at(0).records, 20);
+}
+
+TEST(CaptureReader, GoesOnBehindTheDamagedBeginningOfAFileAndTellsIt) {
+  const auto first = five_files();
+  std::fstream(capture_file(first, 1), std::ios::in | std::ios::out | std::ios::binary).put('\0');
+  EXPECT_EQ(reads_of(first), 50U) << "its header is damaged, its reads are not";
+  const auto summary = summarise_capture(first);
+  ASSERT_TRUE(summary.has_value());
+  ASSERT_EQ(summary->breaks.size(), 1U);
+  EXPECT_EQ(summary->breaks[0].n_missing, 0);
+  EXPECT_EQ(summary->breaks[0].behind, 1);
+  EXPECT_NEAR(summary->breaks[0].seconds, 1.0, 1e-6);
+  EXPECT_GT(summary->bytes_skipped, 0U);
+}
+
+TEST(CaptureReader, LeavesFilesOfAnotherRunAloneWhereverTheyLie) {
+  const auto first = five_files();
+  const auto other = test::scratch_folder() / "other";
+  std::filesystem::create_directories(other);
+  RunHeader run = example_run();
+  run.t0 += std::chrono::hours(1);
+  for (const int file : {1, 3}) {
+    std::filesystem::remove(capture_file(first, file));
+    auto writer = std::move(*CaptureWriter::create(capture_file(first, file)));
+    writer.append("IMUSCOPE_RUN", 1, encode(run, file));
+    ASSERT_TRUE(writer.close().has_value());
+  }
+  std::filesystem::remove(capture_file(first, 4));
+  EXPECT_EQ(reads_of(first), 20U);
+  EXPECT_EQ(summarise_capture(first)->breaks.size(), 1U);
+}
+
 }  // namespace
 }  // namespace imuscope

@@ -212,6 +212,36 @@ TEST(EventLogReader, EveryByteIsAccountedForInRandomDamage) {
   }
 }
 
+/// Each claims more than the file has, and each has a whole record behind it: what is left is not moved once
+/// for every one of them.
+TEST(EventLogReader, ClaimsBeyondTheEndCostNoMoreThanTheyAreLong) {
+  const auto folder = test::scratch_folder();
+  const auto path = folder / "claims.lcm";
+  auto writer = CaptureWriter::create(folder / "one.lcm");
+  ASSERT_TRUE(writer.has_value());
+  writer->append("C", 1, Bytes{});
+  ASSERT_TRUE(writer->close());
+  const Bytes whole = read_file(folder / "one.lcm");
+  ASSERT_EQ(whole.size(), kEventLogHeaderBytes + 1);
+  Bytes claim = whole;
+  claim[24] = 0x03;  // of the length of the data: 50 MB
+  constexpr std::size_t kBytes = std::size_t{16} << 20U;
+  Bytes file = whole;
+  std::size_t n = 1;
+  for (; file.size() < kBytes; ++n) {
+    file.insert(file.end(), claim.begin(), claim.end());
+    file.insert(file.end(), whole.begin(), whole.end());
+    file.insert(file.end(), whole.begin(), whole.end());
+  }
+  write_file(path, file);
+  auto reader = EventLogReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  std::size_t found = 0;
+  for (LogEvent event; reader->next(event);) ++found;
+  EXPECT_EQ(found, 2 * n - 1);
+  EXPECT_EQ(reader->bytes_skipped(), (n - 1) * claim.size());
+}
+
 TEST(EventLogReader, SaysWhatAFileIsThatIsNoCapture) {
   const auto folder = test::scratch_folder();
   write_file(folder / "empty.lcm", {});

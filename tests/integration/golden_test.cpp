@@ -10,6 +10,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <map>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -70,24 +71,28 @@ double tolerance(const Table& expected, std::size_t c, const std::vector<double>
 
 class Golden : public testing::Test {
  protected:
-  /// How many events an event log holds whose channel begins so. Layout: LCM's log format, big-endian, 28
-  /// bytes before the channel.
+  /// How many events an event log holds whose channel begins so, those of one time counted once: a message is
+  /// repeated while nothing comes, a row is not. Layout: LCM's log format, big-endian, 28 bytes before the
+  /// channel; in a message the time of validity follows the 8 bytes of its fingerprint.
   static int events(const std::filesystem::path& log, const std::string& channel_begin) {
     constexpr std::size_t kHeader = 28;
     constexpr std::size_t kChannelLength = 20;
+    constexpr std::size_t kFingerprint = 8;
+    constexpr std::size_t kTime = 8;
     const std::string bytes = read_text(log);
     const auto number = [&](std::size_t at) {
       std::size_t value = 0;
       for (std::size_t i = 0; i < 4; ++i) value = value << 8U | static_cast<unsigned char>(bytes[at + i]);
       return value;
     };
-    int count = 0;
+    std::set<std::string> times;
     for (std::size_t at = 0; at + kHeader <= bytes.size();) {
       const std::size_t channel = number(at + kChannelLength);
-      count += bytes.compare(at + kHeader, channel_begin.size(), channel_begin) == 0 ? 1 : 0;
+      if (bytes.compare(at + kHeader, channel_begin.size(), channel_begin) == 0)
+        times.insert(bytes.substr(at + kHeader + channel + kFingerprint, kTime));
       at += kHeader + channel + number(at + kChannelLength + 4);
     }
-    return count;
+    return static_cast<int>(times.size());
   }
   static int raw_events(const std::filesystem::path& log) { return events(log, "IMUSCOPE_RAW_"); }
 

@@ -182,5 +182,39 @@ TEST(RankModels, PrefersTheTrueModelOverLargerAndSmallerOnes) {
   for (const auto& model : *ranked) EXPECT_FALSE(model.reason.empty()) << model.fit.spec.name();
 }
 
+TEST(FitJson, WhatCannotBeAFitIsRefusedBeforeItIsComputedWith) {
+  const auto refused_with = [](const char* key, const nlohmann::json& value) {
+    nlohmann::json fit{{"n", 1000},
+                       {"rate_hz", 100.0},
+                       {"model", "GM"},
+                       {"weights", "ci"},
+                       {"wv",
+                        {{{"level", 1},
+                          {"value", 1.0},
+                          {"ci_low", 0.5},
+                          {"ci_high", 2.0},
+                          {"n_coefficients", 10},
+                          {"fitted", 1.0}}}},
+                       {"parameters",
+                        {{{"process", "GM"}, {"name", "beta"}, {"unit", "1/s"}, {"value", 0.5}},
+                         {{"process", "GM"}, {"name", "sigma2"}, {"unit", "x"}, {"value", 1.0}}}},
+                       {"objective", 1.0},
+                       {"j_test", nullptr},
+                       {"criterion", 1.0},
+                       {"identifiable", true},
+                       {"warnings", nlohmann::json::array()}};
+    if (std::string_view(key).empty()) return !fit_from_json(fit).has_value();
+    (fit.contains(key)                  ? fit[key]
+     : key == std::string_view("level") ? fit["wv"][0]["level"]
+                                        : fit["parameters"][0]["value"]) = value;
+    return !fit_from_json(fit).has_value();
+  };
+  EXPECT_FALSE(refused_with("", nullptr)) << "it is a fit as it stands";
+  for (const double level : {2e9, 0.0, -1.0, 33.0, 1.5, 1e300})
+    EXPECT_TRUE(refused_with("level", level)) << level;
+  for (const double beta : {0.0, -1.0}) EXPECT_TRUE(refused_with("beta", beta)) << beta;
+  for (const double rate : {0.0, -1.0}) EXPECT_TRUE(refused_with("rate_hz", rate)) << rate;
+}
+
 }  // namespace
 }  // namespace imuscope::noise

@@ -114,5 +114,24 @@ TEST(Labels, TwoStretchesOfOneNameThatTouchAreOne) {
   EXPECT_DOUBLE_EQ(track.longest_s(0), 20.0);
 }
 
+TEST(Labels, ANameIsALineOfTextThatIsNotTooLong) {
+  for (const std::string& name : {std::string("\xff"), std::string("a\x1b[31m"), std::string("a\"b"),
+                                  std::string(kRegimeNameMax + 1, 'x'), std::string("\u0085x")}) {
+    const auto labels = parse_labels("begin_s,end_s,regime\n1,2," + name + "\n", "l.csv");
+    ASSERT_FALSE(labels) << name;
+    EXPECT_THAT(labels.error().what, HasSubstr("l.csv:2"));
+    EXPECT_EQ(labels.error().what.find('\x1b'), std::string::npos);
+  }
+  EXPECT_TRUE(parse_labels("begin_s,end_s,regime\n1,2," + std::string(kRegimeNameMax, 'x') + "\n", "l.csv"));
+}
+
+TEST(Labels, WhateverIsSentOnTheNetworkBecomesANameOfUtf8WithoutControlCharacters) {
+  const auto labels = labels_of_moments(
+      {{at(1.0), "regime \xff\x1b]0;x\a"}, {at(2.0), "regime " + std::string(9'000, 'x')}}, at(0.0), at(3.0));
+  ASSERT_EQ(labels.size(), 2U);
+  EXPECT_EQ(labels[0].name, "??]0;x?");
+  EXPECT_EQ(labels[1].name.size(), kRegimeNameMax);
+}
+
 }  // namespace
 }  // namespace imuscope

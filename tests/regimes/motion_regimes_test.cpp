@@ -288,5 +288,17 @@ TEST(IntensityBins, MoreBinsThanBlocksLeaveNoBlockWithoutOne) {
   }
 }
 
+TEST(MotionLevels, ATimeThatNoDriveHasTakesNoMemory) {
+  MotionLevels levels;
+  const HostTime begin = host_time_from_ns(5'000'000'000);
+  levels.add(begin, {}, {});
+  levels.add(begin + std::chrono::hours(24 * 365 * 100), {}, {});
+  levels.add_speed(begin - std::chrono::hours(24 * 365 * 100), 1.0, 0.1);
+  EXPECT_EQ(levels.cells().size(), 1U);
+  levels.add(begin + std::chrono::hours(95), {}, {});
+  levels.add(begin - std::chrono::hours(2), {}, {});
+  EXPECT_EQ(levels.cells().size(), 95U * 3600U * 5U + 1U) << "the earlier one would make it longer than any";
+}
+
 }  // namespace
 }  // namespace imuscope

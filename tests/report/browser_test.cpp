@@ -9,7 +9,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <regex>
+#include <set>
 #include <sstream>
 
 #include "report/paper_figures.h"
@@ -142,9 +144,146 @@ TEST_F(Browser, AScriptThatFailsIsSeen) {
   const auto at = page.find("const graphs = [];");
   ASSERT_NE(at, std::string::npos);
   page.insert(at, "throw new Error('made to fail');");
+  // A changed script is not run; one from the page's own file is, where the policy says so.
+  const std::string policy = "script-src ";
+  const auto allowed = page.find(policy);
+  ASSERT_NE(allowed, std::string::npos);
+  page.replace(allowed + policy.size(), page.find(';', allowed) - allowed - policy.size(), "'unsafe-inline'");
   std::ofstream(folder_ / "report.html") << page;
   const Measured broken = measured_at(1280);
   EXPECT_NE(broken.console.find("made to fail"), std::string::npos);
+}
+
+/// Markup and scripts in as many disguises; each would call pwned(i).
+std::vector<std::string> payloads() {
+  const std::vector<std::string> kBare{"<img src=x onerror=pwned(N)>",
+                                       "<svg onload=pwned(N)>",
+                                       "<script>pwned(N)</script>",
+                                       "<iframe srcdoc='<script>parent.pwned(N)</script>'></iframe>",
+                                       "<a href=javascript:pwned(N)>x</a>",
+                                       "<body onload=pwned(N)>",
+                                       "<details open ontoggle=pwned(N)>",
+                                       "<video src=x onerror=pwned(N)></video>",
+                                       "<object data=javascript:pwned(N)></object>",
+                                       "<math href=javascript:pwned(N)>x</math>",
+                                       "<style>@import 'x';</style><img src=x onerror=pwned(N)>",
+                                       "<base href=//example.invalid/>",
+                                       "<form action=javascript:pwned(N)><button>x</button></form>",
+                                       "<input autofocus onfocus=pwned(N)>",
+                                       "<template><img src=x onerror=pwned(N)></template>",
+                                       "<meta http-equiv=refresh content='0;url=javascript:pwned(N)'>",
+                                       "<link rel=stylesheet href=x onerror=pwned(N)>",
+                                       "javascript:pwned(N)",
+                                       "{{figures}}{{page_script}}<img src=x onerror=pwned(N)>",
+                                       "__proto__",
+                                       "constructor",
+                                       "&lt;img src=x onerror=pwned(N)&gt;",
+                                       "&#60;img src=x onerror=pwned(N)&#62;",
+                                       "\\u003cimg src=x onerror=pwned(N)\\u003e",
+                                       "${pwned(N)}`+pwned(N)+`"};
+  const std::vector<std::string> kPrefixes{
+      "", "\">", "'>", "</script>", "</td></table>", "-->", "</title></style>", "]]>\u2028"};
+  std::vector<std::string> all;
+  for (const std::string& prefix : kPrefixes) {
+    for (const std::string& bare : kBare) {
+      std::string payload = prefix + bare;
+      const std::string number = std::to_string(all.size());
+      for (std::size_t at = 0; (at = payload.find("(N)", at)) != std::string::npos;)
+        payload.replace(at + 1, 1, number);
+      all.push_back(payload);
+    }
+  }
+  return all;
+}
+
+/// Puts the next payload in place of every text, but where a report would have nothing to show then.
+void poison(nlohmann::json& value, const std::vector<std::string>& with, std::size_t& next) {
+  if (value.is_string()) {
+    value = with[next++ % with.size()];
+  } else if (value.is_array()) {
+    for (auto& element : value) poison(element, with, next);
+  } else if (value.is_object()) {
+    static const std::set<std::string> kKept{"schema", "axis", "status", "method", "model", "weights", "by"};
+    for (auto& [key, member] : value.items()) {
+      const bool is_name =
+          key == "name" && member.is_string() && member.get<std::string>().rfind("mtx", 0) == 0;
+      const bool is_driver = key == "driver" && member.is_string();
+      if (!kKept.contains(key) && !is_name && !is_driver) poison(member, with, next);
+    }
+  }
+}
+
+TEST_F(Browser, TwoHundredTextsThatWouldBeScriptsAreText) {
+  const auto all = payloads();
+  ASSERT_EQ(all.size(), 200U);
+  std::size_t next = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+    if (entry.path().extension() != ".json") continue;
+    auto document = nlohmann::json::parse(content_of(entry.path()));
+    if (entry.path().filename() == "run.json") {
+      for (const std::string& payload : all) document["warnings"].push_back(payload);
+    }
+    poison(document, all, next);
+    std::ofstream(entry.path()) << document.dump();
+  }
+  EXPECT_GT(next, 400U);
+  ASSERT_TRUE(write_report(folder_));
+  const auto frame = folder_ / "attacked.html";
+  std::ofstream(frame) << R"(<!DOCTYPE html><meta charset="utf-8"><body><iframe id="page" src="report.html" )"
+                       << R"(style="width:1280px;height:1000px"></iframe><script>
+const frame = document.getElementById('page');
+let called = 0;
+window.pwned = () => { ++called; };
+frame.onload = () => {
+  frame.contentWindow.pwned = window.pwned;
+  // A pointer over every figure, whose legend then names what lies under it.
+  for (const plot of frame.contentDocument.querySelectorAll('.plot canvas')) {
+    const place = plot.getBoundingClientRect();
+    for (const kind of ['mousemove', 'mouseover'])
+      plot.dispatchEvent(new frame.contentWindow.MouseEvent(kind, {bubbles: true, clientX: place.x + place.width / 2,
+                                                                   clientY: place.y + place.height / 2}));
+  }
+  setTimeout(() => {
+    const page = frame.contentDocument;
+    const foreign = [...page.querySelectorAll('*')].filter((element) =>
+        /^(img|iframe|object|embed|base|link|form|input|video|audio|math|template|a)$/i.test(element.tagName) && !(element.tagName === 'INPUT' && element.closest('.plot')) ||
+        [...element.attributes].some((attribute) => /^on|^srcdoc$/i.test(attribute.name)));
+    const words = page.body.textContent;
+    const shown = Array.from({length: 200}, (_, i) => i).filter((i) => words.includes('pwned(' + i + ')')).length;
+    document.body.dataset.measured = [called, foreign.length, page.querySelectorAll('script').length, shown,
+                                      page.body.dataset.figuresDrawn].join(' ');
+  }, 500);
+};
+</script>)";
+  const auto console = folder_ / "console_attacked.txt";
+  const std::string page = output_of(command("--virtual-time-budget=20000 --dump-dom", frame, console));
+  std::smatch found;
+  ASSERT_TRUE(
+      std::regex_search(page, found, std::regex("data-measured=\"(\\d+) (\\d+) (\\d+) (\\d+) (\\d+)\"")));
+  EXPECT_EQ(found[1], "0") << "scripts that ran";
+  EXPECT_EQ(found[2], "0") << "elements that no page of ours has";
+  EXPECT_EQ(found[3], "3") << "scripts in the page: the figures, the library and our own";
+  EXPECT_GT(std::stoi(found[4]), 150) << "payloads that are read as text";
+  EXPECT_GT(std::stoi(found[5]), 20) << "figures drawn all the same";
+  const std::string said = content_of(console);
+  EXPECT_EQ(said.find("Content Security Policy"), std::string::npos) << said;
+  EXPECT_EQ(said.find("CONSOLE"), std::string::npos) << said;
+}
+
+TEST_F(Browser, AScriptThatGotIntoThePageIsNotRun) {
+  auto page = content_of(folder_ / "report.html");
+  const auto at = page.find("<main>");
+  ASSERT_NE(at, std::string::npos);
+  page.insert(at,
+              "<script>document.documentElement.lang = 'pwned'</script>"
+              "<img src=x onerror=\"document.documentElement.lang = 'pwned'\">");
+  std::ofstream(folder_ / "forged.html") << page;
+  const auto console = folder_ / "console_forged.txt";
+  const std::string dom =
+      output_of(command("--virtual-time-budget=20000 --dump-dom", folder_ / "forged.html", console));
+  EXPECT_NE(dom.find("<html lang=\"en\""), std::string::npos);
+  EXPECT_NE(content_of(console).find("Content Security Policy"), std::string::npos)
+      << "the browser says that it refused";
 }
 
 TEST_F(Browser, PrintsAsPdf) {

@@ -59,7 +59,8 @@ TEST(GnuplotText, IsOneStringOfGnuplotWhateverIsInIt) {
 }
 
 TEST_F(HostileRun, FiguresStartNoProgram) {
-  if (!std::filesystem::exists(kDrawingProgram)) GTEST_SKIP() << "needs " << kDrawingProgram << " (gnuplot-nox)";
+  if (!std::filesystem::exists(kDrawingProgram))
+    GTEST_SKIP() << "needs " << kDrawingProgram << " (gnuplot-nox)";
   const std::string mark = (scratch_ / "started").string();
   const std::string touch = "touch " + mark;
   std::filesystem::create_directories(run_ / "figures");
@@ -119,6 +120,31 @@ TEST_F(HostileRun, ADocumentNestedWithoutEndIsRefusedBeforeItTakesTheStack) {
   EXPECT_THAT(page.error().what, HasSubstr("models.json"));
   std::ofstream(run_ / "models.json") << R"({"models":[],"words":")" << std::string(kDeep, '[') << "\"}";
   EXPECT_TRUE(write_report(run_)) << "brackets inside a text are none";
+}
+
+TEST_F(HostileRun, ALinkInTheFolderLeadsNoWriteOut) {
+  if (!std::filesystem::exists(kDrawingProgram))
+    GTEST_SKIP() << "needs " << kDrawingProgram << " (gnuplot-nox)";
+  const auto victim = scratch_ / "victim";
+  std::ofstream(victim) << "precious";
+  std::filesystem::create_directories(run_ / "figures");
+  for (const char* name : {"report.html", "report.html.unfinished", "figures/drive.gp", "figures/drive.svg",
+                           "figures/drive.pdf", "figures/figure4_mtx1.svg"})
+    std::filesystem::create_symlink(victim, run_ / name);
+  ASSERT_TRUE(write_report(run_));
+  ASSERT_TRUE(write_figures(run_));
+  EXPECT_EQ(test::content_of(victim), "precious");
+  EXPECT_FALSE(std::filesystem::is_symlink(run_ / "figures" / "drive.svg"));
+  for (const auto& entry : std::filesystem::directory_iterator(run_ / "figures"))
+    EXPECT_FALSE(entry.is_directory()) << "left behind: " << entry.path();
+
+  std::filesystem::remove_all(run_ / "figures");
+  std::filesystem::create_directories(scratch_ / "elsewhere");
+  std::filesystem::create_symlink(scratch_ / "elsewhere", run_ / "figures");
+  const auto files = write_figures(run_);
+  ASSERT_FALSE(files);
+  EXPECT_THAT(files.error().what, HasSubstr("is a link"));
+  EXPECT_TRUE(std::filesystem::is_empty(scratch_ / "elsewhere"));
 }
 
 }  // namespace

@@ -90,6 +90,35 @@ rotation_vector_b_s_deg = [0.0, 0.0, 90.0]
   EXPECT_NEAR(C[8], 1.0, 1e-15);
 }
 
+TEST(Configuration, AKeyThatWouldTakeTheStackIsRefused) {
+  constexpr int kWords = 400'000;
+  const auto repeated = [](const std::string& word) {
+    std::string key;
+    for (int i = 0; i < kWords; ++i) key += word;
+    return key;
+  };
+  const std::vector<std::string> documents{repeated("a.") + "a = 1\n",
+                                           "[" + repeated("a.") + "a]\n",
+                                           "[[" + repeated("\"a\" . ") + "a]]\n",
+                                           "x = {" + repeated("'a'.") + "a = 1}\n",
+                                           "x = [{" + repeated("a.\t") + "a = 1}]\n",
+                                           "x = \"\"\"\n\"\" # \"\"\"\n" + repeated("a.") + "a = 1\n",
+                                           "x = '\\'\n" + repeated("a.") + "a = 1\n"};
+  for (const std::string& document : documents)
+    EXPECT_THAT(refused(document + std::string(kMinimal)), HasSubstr("a key has more than 64 words"));
+  const std::string words = "x = \"" + repeated("a.") + "\" # " + repeated("a.") + "\n";
+  EXPECT_THAT(refused(words + std::string(kMinimal)), testing::Not(HasSubstr("a key has"))) << "no key";
+}
+
+TEST(Configuration, ATextIsALineWithoutControlCharacters) {
+  EXPECT_THAT(refused("[run]\nname = \"a\\u001b[2J\"\n" + std::string(kMinimal)),
+              HasSubstr("run.name must be one line"));
+  EXPECT_THAT(refused("[run]\nname = \"a\\nREADY=1\"\n" + std::string(kMinimal)),
+              HasSubstr("run.name must be one line"));
+  EXPECT_THAT(refused("[run]\nname = \"" + std::string(5'000, 'x') + "\"\n" + std::string(kMinimal)),
+              HasSubstr("at most 4096 bytes"));
+}
+
 TEST(Configuration, AnUnknownKeyIsRefusedWithLineAndNearestKey) {
   const auto text = refused(std::string(kMinimal) + "rate_herz = 100\n");
   EXPECT_THAT(text, HasSubstr("x.toml:10"));

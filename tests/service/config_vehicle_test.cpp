@@ -111,6 +111,18 @@ TEST_F(VehicleConfiguration, KeepsTheDbcFileSoThatACaptureIsWhole) {
   EXPECT_NE(load(whole_)->sha256, configuration->sha256);
 }
 
+TEST_F(VehicleConfiguration, ThatOfACaptureReadsNoFileOfThisPc) {
+  ASSERT_TRUE(load(whole_));
+  std::string text = whole_;
+  const std::string dbc = (folder_ / "car.dbc").string();
+  ASSERT_TRUE(std::filesystem::exists(dbc));
+  text.replace(text.find("car.dbc"), std::string("car.dbc").size(), dbc);
+  const auto of_capture = parse_configuration(text, "car (kept in the capture)");
+  ASSERT_FALSE(of_capture) << "the file's text would stand in run.json and in the report";
+  EXPECT_THAT(of_capture.error().text(), HasSubstr("is not attached to this configuration"));
+  EXPECT_TRUE(load(text)) << "a person's own configuration may name any file";
+}
+
 TEST_F(VehicleConfiguration, MistakesAreToldWithFileLineAndRemedy) {
   EXPECT_THAT(refused(whole_, "\"REAR.RL\"", "\"REAR.RX\""),
               HasSubstr("car.dbc: no signal 'REAR.RX'; did you mean 'REAR.RL'?"));

@@ -47,7 +47,7 @@ ErrorRow row_on_rails(std::int64_t k, std::mt19937& random) {
 
 DynamicsRegressions of_rails(double moving_s, double length_s) {
   std::vector<RowSpool> rows;
-  rows.push_back(RowSpool::create(test::scratch_folder()).value());
+  rows.push_back(RowSpool::create(*OutputFolder::open(test::scratch_folder())).value());
   std::mt19937 random(2);
   for (std::int64_t k = 0; static_cast<double>(k) < length_s * kStudyRate_hz; ++k)
     rows[0].add(row_on_rails(k, random));

@@ -152,5 +152,16 @@ TEST(NoiseStudy, AnImuThatMissesHalfOfTheRunIsSaid) {
               HasSubstr("has no sample"));
 }
 
+TEST(NoiseSeries, ACounterThatJumpsAndJumpsTakesNoMemoryThatTheRecordingDoesNotHave) {
+  NoiseSeries series;
+  ErrorRow row{};
+  for (int i = 0; i < 100; ++i) {
+    series.add(row, std::nullopt);
+    row.counter += 1'000'000'000;
+  }
+  EXPECT_LE(series.size(), 360'000U + 3 * 100U);
+  EXPECT_EQ(series.missing() + 100, series.size());
+}
+
 }  // namespace
 }  // namespace imuscope

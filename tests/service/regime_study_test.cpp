@@ -1,5 +1,6 @@
 #include "service/regime_study.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -79,6 +80,16 @@ TEST(RegimeStudy, LabelsOfAPersonComeFromTheFileOrFromTheRecordedMessages) {
   ASSERT_TRUE(of_events);
   ASSERT_EQ(of_events->chosen.stretches().size(), 1u);
   EXPECT_NEAR(of_events->chosen.total_s(0), 50.0, 0.21) << "until the end of the run";
+
+  std::vector<MarkedMoment> many;
+  for (int i = 0; i < 70; ++i) many.push_back({drive_time(0.5 * i), fmt::format("regime {}", i)});
+  many.push_back({drive_time(40.0), "regime 0"});
+  const auto first_ones = find_regimes(options, watch, {}, many, drive_time(0.0));
+  ASSERT_TRUE(first_ones) << "whoever sends many names ends no study";
+  EXPECT_EQ(first_ones->chosen.names().size(), 64U);
+  EXPECT_EQ(first_ones->chosen.names().back(), "63");
+  EXPECT_NEAR(first_ones->chosen.total_s(0), 0.5 + 20.0, 0.21);
+  EXPECT_THAT(first_ones->remarks, ElementsAre(HasSubstr("what the last 6 names hold for")));
 
   const auto none = find_regimes(options, watch, {}, {{drive_time(30.0), "a bump"}}, drive_time(0.0));
   ASSERT_FALSE(none);

@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 #include <memory>
 
+#include "base/json_text.h"
 #include "combination_table.h"
 #include "commands.h"
+#include "print.h"
 #include "service/combination.h"
 
 namespace imuscope::cli {
@@ -28,7 +30,7 @@ Result<void> combine_runs(const CombineCommand& options) {
   const auto combined = combine_drives(drives, method);
   if (!combined) return tl::unexpected<Error>(combined.error());
   if (options.json) {
-    fmt::print("{}\n", combination_json(*combined).dump(2));
+    say("{}\n", json_text(combination_json(*combined)));
   } else {
     print_combination(*combined);
   }

@@ -5,9 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/json_text.h"
 #include "commands.h"
 #include "fit_file.h"
 #include "noise/compare.h"
+#include "print.h"
 
 namespace imuscope::cli {
 namespace {
@@ -31,20 +33,20 @@ Result<noise::FitResult> read_fit(const std::filesystem::path& file) {
 std::string cell(const std::optional<double>& value) { return value ? fmt::format("{:.6g}", *value) : "-"; }
 
 void print_table(const noise::Comparison& comparison) {
-  fmt::print("{:<7} {:<10} {:>14} {:>14} {:>10} {:>10}  {}\n", "process", "parameter", "first", "second",
-             "ratio", "p-value", "unit");
+  say("{:<7} {:<10} {:>14} {:>14} {:>10} {:>10}  {}\n", "process", "parameter", "first", "second", "ratio",
+      "p-value", "unit");
   for (const auto& p : comparison.parameters) {
-    fmt::print("{:<7} {:<10} {:>14} {:>14} {:>10} {:>10}  {}\n", p.process, p.name, cell(p.first),
-               cell(p.second), p.ratio ? fmt::format("{:.4g}", *p.ratio) : "-",
-               p.p_value ? fmt::format("{:.3g}", *p.p_value) : "-", p.unit);
+    say("{:<7} {:<10} {:>14} {:>14} {:>10} {:>10}  {}\n", p.process, p.name, cell(p.first), cell(p.second),
+        p.ratio ? fmt::format("{:.4g}", *p.ratio) : "-", p.p_value ? fmt::format("{:.3g}", *p.p_value) : "-",
+        p.unit);
   }
   if (comparison.test) {
     const auto& t = *comparison.test;
     constexpr double kLevel = 0.05;
-    fmt::print("\nall together: {:.4g} on {} dof, p = {:.3g}: {}\n", t.statistic, t.dof, t.p_value,
-               t.p_value < kLevel ? "the models differ" : "no difference shown");
+    say("\nall together: {:.4g} on {} dof, p = {:.3g}: {}\n", t.statistic, t.dof, t.p_value,
+        t.p_value < kLevel ? "the models differ" : "no difference shown");
   }
-  for (const auto& warning : comparison.warnings) fmt::print("! {}\n", warning);
+  for (const auto& warning : comparison.warnings) say("! {}\n", warning);
 }
 
 nlohmann::json to_json(const std::optional<double>& value) {
@@ -68,7 +70,7 @@ void print_json(const noise::Comparison& comparison) {
                     {"dof", comparison.test->dof},
                     {"p_value", comparison.test->p_value}};
   }
-  fmt::print("{}\n", json.dump(2));
+  say("{}\n", json_text(json));
 }
 
 }  // namespace

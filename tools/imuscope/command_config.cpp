@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "commands.h"
+#include "print.h"
 #include "service/config.h"
 #include "service/config_reference.h"
 
@@ -16,8 +17,7 @@ namespace {
 std::string code(const std::string& text) { return fmt::format("`{}`", text); }
 
 void print_reference() {
-  fmt::print(
-      "# Configuration\n\n"
+  say("# Configuration\n\n"
       "This page is what `imuscope config` prints. Angles are in degrees and times in milliseconds where the "
       "key says "
       "so. A key that does not exist is refused with the nearest one that does. "
@@ -31,24 +31,24 @@ void print_reference() {
     const auto dot = key.name.rfind('.');
     if (key.name.substr(0, dot) != table) {
       table = key.name.substr(0, dot);
-      fmt::print("\n## `{}`\n\n| key | what it is | values | without it |\n|---|---|---|---|\n",
-                 table == "device" ? "[[device]]" : fmt::format("[{}]", table));
+      say("\n## `{}`\n\n| key | what it is | values | without it |\n|---|---|---|---|\n",
+          table == "device" ? "[[device]]" : fmt::format("[{}]", table));
     }
     std::vector<std::string> presets;
     for (const auto& preset : key.presets) presets.push_back(code(preset));
     if (key.required) presets = {"must be given"};
-    fmt::print("| `{}` | {} | {} | {} |\n", key.name.substr(dot + 1), key.about, key.values,
-               fmt::join(presets, ", "));
+    say("| `{}` | {} | {} | {} |\n", key.name.substr(dot + 1), key.about, key.values,
+        fmt::join(presets, ", "));
   }
 }
 
 Result<void> check(const std::filesystem::path& file) {
   const auto configuration = load_configuration(file);
   if (!configuration) return tl::unexpected<Error>(configuration.error());
-  fmt::print("{}: good, {} devices\n", file.string(), configuration->devices.size());
+  say("{}: good, {} devices\n", file.string(), configuration->devices.size());
   for (const auto& device : configuration->devices) {
-    fmt::print("  {:<12} {:<10} {:<14} {:g} Hz\n", device.name, name_of(device.role),
-               name_of(device.protocol), device.rate_hz);
+    say("  {:<12} {:<10} {:<14} {:g} Hz\n", device.name, name_of(device.role), name_of(device.protocol),
+        device.rate_hz);
   }
   return {};
 }

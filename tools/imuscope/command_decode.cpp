@@ -12,10 +12,12 @@
 #include <optional>
 #include <vector>
 
+#include "base/json_text.h"
 #include "commands.h"
 #include "decode/candump.h"
 #include "decode/stream_protocols.h"
 #include "drivers/dbc/parser.h"
+#include "print.h"
 #include "progress.h"
 
 namespace imuscope::cli {
@@ -118,14 +120,14 @@ void print(const StreamProtocol& protocol, const DecodedMessage& message, bool j
     nlohmann::ordered_json line = {
         {"offset", message.offset}, {"protocol", protocol.name}, {"message", message.message}};
     line.update(message.fields);
-    fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    say("{}\n", json_text(line, kJsonOneLine));
     return;
   }
-  fmt::print("{:>10}  {}  {:<18}", message.offset, protocol.name, message.message);
+  say("{:>10}  {}  {:<18}", message.offset, protocol.name, message.message);
   for (const auto& [key, value] : message.fields.items()) {
-    fmt::print("  {}={}", key, value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    say("  {}={}", key, json_text(value, kJsonOneLine));
   }
-  fmt::print("\n");
+  say("\n");
 }
 
 /// Prints the messages of a recording in stream order: those of its protocol, and between them those of
@@ -230,9 +232,9 @@ Result<void> decode(const DecodeCommand& options) {
   const auto totals = decode_stream(options, *file);
   if (!totals) return tl::unexpected<Error>(totals.error());
   if (options.json) {
-    fmt::print("{{\"messages\": {}, \"bytes_skipped\": {}}}\n", totals->messages, totals->bytes_skipped);
+    say("{{\"messages\": {}, \"bytes_skipped\": {}}}\n", totals->messages, totals->bytes_skipped);
   } else {
-    fmt::print("{} messages, {} bytes skipped\n", totals->messages, totals->bytes_skipped);
+    say("{} messages, {} bytes skipped\n", totals->messages, totals->bytes_skipped);
   }
   return {};
 }

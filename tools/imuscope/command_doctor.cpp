@@ -4,8 +4,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "commands.h"
 #include "doctor/examination.h"
+#include "print.h"
 
 namespace imuscope::cli {
 
@@ -25,8 +27,8 @@ const char* word_of(Verdict verdict) { return kVerdicts[static_cast<std::size_t>
 
 void print_table(const std::vector<doctor::Finding>& findings) {
   for (const auto& finding : findings) {
-    fmt::print("{:<8} {:<16} {}\n", word_of(finding.verdict), finding.check, finding.what);
-    if (!finding.fix.empty()) fmt::print("{:<8} {:<16}   fix: {}\n", "", "", finding.fix);
+    say("{:<8} {:<16} {}\n", word_of(finding.verdict), finding.check, finding.what);
+    if (!finding.fix.empty()) say("{:<8} {:<16}   fix: {}\n", "", "", finding.fix);
   }
 }
 
@@ -38,7 +40,7 @@ void print_json(const std::vector<doctor::Finding>& findings) {
                     {"what", finding.what},
                     {"fix", finding.fix}});
   }
-  fmt::print("{}\n", list.dump(2));
+  say("{}\n", json_text(list));
 }
 
 Result<void> run(const DoctorCommand& options) {

@@ -3,7 +3,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
 #include "commands.h"
+#include "print.h"
 #include "progress.h"
 #include "report/report.h"
 #include "service/evaluate.h"
@@ -22,8 +24,7 @@ void print_row(const nlohmann::json& row) {
   const double low = number("nees_low");
   const double high = number("nees_high");
   const auto mark = [&](double nees) { return nees > high ? '+' : nees < low ? '-' : ' '; };
-  fmt::print(
-      "  {:<12} {:>4.0f} {:>5} {:>10.2f} {:>8.2f} {:>6.2f} {:>9.2f}{} {:>9.2f}{} {:>9.2f}{} {:>6.2f} "
+  say("  {:<12} {:>4.0f} {:>5} {:>10.2f} {:>8.2f} {:>6.2f} {:>9.2f}{} {:>9.2f}{} {:>9.2f}{} {:>6.2f} "
       "{:>5.2f} {:>9.2f}\n",
       row.at("model").get<std::string>(), number("duration_s"),
       fmt::format("{}/{}", row.at("n_independent").get<int>(), row.at("n").get<int>()),
@@ -38,18 +39,17 @@ void print_table(const nlohmann::json& document) {
   for (const auto& row : document.at("evaluations")) {
     if (row.at("name") != name) {
       name = row.at("name").get<std::string>();
-      fmt::print("\n{}: coasting on this sensor alone, against the reference\n", name);
-      fmt::print("  {:<12} {:>4} {:>5} {:>10} {:>8} {:>6} {:>10} {:>10} {:>10} {:>12} {:>9}\n", "model", "s",
-                 "n", "horiz. rms", "sd, m", "ratio", "NEES pos.", "vel.", "att.", "95 % of it", "surprise");
+      say("\n{}: coasting on this sensor alone, against the reference\n", name);
+      say("  {:<12} {:>4} {:>5} {:>10} {:>8} {:>6} {:>10} {:>10} {:>10} {:>12} {:>9}\n", "model", "s", "n",
+          "horiz. rms", "sd, m", "ratio", "NEES pos.", "vel.", "att.", "95 % of it", "surprise");
     }
     print_row(row);
   }
   for (const auto& absent : document.at("absent")) {
-    fmt::print("\n{}, {}: {}\n", absent.at("name").get<std::string>(), absent.at("model").get<std::string>(),
-               absent.at("why").get<std::string>());
+    say("\n{}, {}: {}\n", absent.at("name").get<std::string>(), absent.at("model").get<std::string>(),
+        absent.at("why").get<std::string>());
   }
-  fmt::print(
-      "\nn: outages that do not overlap / all. sd: predicted. NEES per degree of freedom: 1 where the model "
+  say("\nn: outages that do not overlap / all. sd: predicted. NEES per degree of freedom: 1 where the model "
       "is "
       "right,\n+ above, - below where 95 % of right models lie. surprise: mean -log density of the position "
       "error; the smallest predicts best.\n");
@@ -65,7 +65,7 @@ Result<void> evaluate(const EvaluateCommand& options) {
   if (!document) return tl::unexpected<Error>(document.error());
   if (auto written = write_report(run.run_dir); !written) return written;
   if (options.json) {
-    fmt::print("{}\n", document->dump(2));
+    say("{}\n", json_text(*document));
   } else {
     print_table(*document);
   }

@@ -9,6 +9,7 @@
 #include "commands.h"
 #include "fit_file.h"
 #include "noise/export.h"
+#include "print.h"
 
 namespace imuscope::cli {
 namespace {
@@ -59,7 +60,7 @@ Result<void> run_export(const ExportCommand& options) {
   }
   const auto text = noise::export_models(axes, *format, options.conservative);
   if (!text) return tl::unexpected(text.error());
-  fmt::print("{}", *text);
+  say("{}", *text);
   return {};
 }
 

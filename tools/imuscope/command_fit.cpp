@@ -5,9 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/json_text.h"
 #include "commands.h"
 #include "fit_output.h"
 #include "noise/conservative.h"
+#include "print.h"
 #include "signal_options.h"
 
 namespace imuscope::cli {
@@ -37,7 +39,7 @@ void report(const Task& task, const noise::FitResult& fit, const nlohmann::json&
     auto json = fit_json(fit, task.unit);
     json.update(extra);
     if (bound) json["conservative"] = conservative_json(*bound, task.unit);
-    fmt::print("{}\n", json.dump(2));
+    say("{}\n", json_text(json));
     return;
   }
   print_fit(fit, task.unit);

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "commands.h"
+#include "print.h"
 #include "progress.h"
 #include "service/import.h"
 
@@ -33,8 +34,7 @@ for (const auto& remark : imported->remarks) spdlog::info("{}", remark);
 if (imported->drafted)
   spdlog::warn("the configuration was drafted from the files; give your own with --config, or with replay");
 for (const auto& device : imported->devices)
-  fmt::print("{:<12} {:>10} bytes in {} reads; times: {}\n", device.name, device.bytes, device.reads,
-             device.times);
+  say("{:<12} {:>10} bytes in {} reads; times: {}\n", device.name, device.bytes, device.reads, device.times);
 return {};
 }
 

@@ -1,13 +1,15 @@
 #include <fmt/format.h>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "base/json_text.h"
+#include "base/output_folder.h"
 #include "commands.h"
 #include "drivers/transport/can_interface.h"
 #include "drivers/transport/port_problems.h"
+#include "print.h"
 #include "service/draft.h"
 #include "service/probe.h"
 
@@ -33,19 +35,19 @@ nlohmann::ordered_json json_of(const ProbedPort& port) {
 void print(const std::vector<ProbedPort>& ports, const std::vector<CanInterface>& interfaces) {
   std::size_t width = 4;
   for (const auto& port : ports) width = std::max(width, port.port.size());
-  fmt::print("{:<{}}  {:>7}  {:<14}  {:<9}  {}\n", "port", width, "baud", "protocol", "device", "rate");
+  say("{:<{}}  {:>7}  {:<14}  {:<9}  {}\n", "port", width, "baud", "protocol", "device", "rate");
   for (const auto& port : ports) {
     if (!port.protocol) {
-      fmt::print("{:<{}}  {:>7}  {}\n", port.port, width, "-", port.problem);
+      say("{:<{}}  {:>7}  {}\n", port.port, width, "-", port.problem);
       continue;
     }
-    fmt::print("{:<{}}  {:>7}  {:<14}  {:<9}  {}\n", port.port, width, port.baud, name_of(*port.protocol),
-               port.device_id.empty() ? "-" : port.device_id,
-               port.rate_hz ? fmt::format("{:.1f} Hz", *port.rate_hz) : "silent");
+    say("{:<{}}  {:>7}  {:<14}  {:<9}  {}\n", port.port, width, port.baud, name_of(*port.protocol),
+        port.device_id.empty() ? "-" : port.device_id,
+        port.rate_hz ? fmt::format("{:.1f} Hz", *port.rate_hz) : "silent");
   }
   for (const auto& interface : interfaces)
-    fmt::print("{:<{}}  {:>7}  CAN interface, {}\n", interface.name, width, interface.bit_rate,
-               interface.is_up ? "up" : "down");
+    say("{:<{}}  {:>7}  CAN interface, {}\n", interface.name, width, interface.bit_rate,
+        interface.is_up ? "up" : "down");
 }
 
 Result<void> write_draft(const std::string& file, const std::vector<ProbedPort>& ports) {
@@ -63,12 +65,11 @@ Result<void> write_draft(const std::string& file, const std::vector<ProbedPort>&
   }
   const auto draft = draft_configuration(std::filesystem::path(file).stem().string(), devices);
   if (!draft) return tl::unexpected<Error>(draft.error());
-  std::ofstream out(file);
-  out << *draft;
-  out.close();
-  if (!out)
-    return work_error(fmt::format("{} cannot be written", file), "check the folder and its permissions");
-  fmt::print(stderr, "imuscope: drafted {}; look through it, then: imuscope run {}\n", file, file);
+  const auto folder = OutputFolder::open(std::filesystem::path(file).parent_path());
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  if (auto written = folder->write_whole(std::filesystem::path(file).filename().string(), *draft); !written)
+    return written;
+  say_aside("imuscope: drafted {}; look through it, then: imuscope run {}\n", file, file);
   return {};
 }
 
@@ -89,7 +90,7 @@ Result<void> probe(const ProbeCommand& options) {
     for (const auto& interface : interfaces)
       out["can"].push_back(
           {{"interface", interface.name}, {"up", interface.is_up}, {"bit_rate", interface.bit_rate}});
-    fmt::print("{}\n", out.dump(1));
+    say("{}\n", json_text(out, 1));
   } else {
     print(ports, interfaces);
   }

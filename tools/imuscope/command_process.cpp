@@ -2,9 +2,11 @@
 #include <spdlog/spdlog.h>
 #include <memory>
 
+#include "base/json_text.h"
 #include "base/text.h"
 #include "combination_table.h"
 #include "commands.h"
+#include "print.h"
 #include "progress.h"
 #include "report/report.h"
 #include "service/recording.h"
@@ -35,7 +37,11 @@ Result<OpenedRecording> open(const ProcessCommand& options, const std::vector<st
       open_recording(inputs, config, [&](const std::string& what, double share) { bar.show(what, share); });
   bar.clear();
   if (opened) {
-    for (const auto& remark : opened->remarks) spdlog::info("{}", remark);
+    const auto& damage = opened->recording.damage;
+    for (const auto& remark : opened->remarks) {
+      const bool is_damage = std::find(damage.begin(), damage.end(), remark) != damage.end();
+      spdlog::log(is_damage ? spdlog::level::warn : spdlog::level::info, "{}", remark);
+    }
   }
   return opened;
 }
@@ -70,13 +76,13 @@ Result<void> process_drives(const ProcessCommand& options,
     const auto folder = drive_folder(options.out, i);
     if (auto written = write_report(folder); !written) return written;
     if (options.json) continue;
-    fmt::print("\n--- drive {}\n", i + 1);
+    say("\n--- drive {}\n", i + 1);
     if (auto printed = print_study(folder, false); !printed) return printed;
   }
   if (options.json) {
-    fmt::print("{}\n", combination_json(*combined).dump(2));
+    say("{}\n", json_text(combination_json(*combined)));
   } else {
-    fmt::print("\n--- all drives\n");
+    say("\n--- all drives\n");
     print_combination(*combined);
   }
   return {};

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "commands.h"
+#include "print.h"
 #include "report/paper_figures.h"
 #include "report/report.h"
 
@@ -18,11 +19,11 @@ void add_report(CLI::App& app, Work& chosen) {
                     "draw the figures as SVG and PDF for papers, too (RUN_DIR/figures)");
   on_chosen(*command, chosen, [run_dir, figures]() -> Result<void> {
     if (auto written = write_report(*run_dir); !written) return written;
-    fmt::print("{}\n", (*run_dir / "report.html").string());
+    say("{}\n", (*run_dir / "report.html").string());
     if (!*figures) return {};
     const auto drawn = write_figures(*run_dir);
     if (!drawn) return tl::unexpected<Error>(drawn.error());
-    for (const auto& file : *drawn) fmt::print("{}\n", file.string());
+    for (const auto& file : *drawn) say("{}\n", file.string());
     return {};
   });
 }

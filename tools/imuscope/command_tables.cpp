@@ -7,8 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/json_text.h"
 #include "base/units.h"
 #include "commands.h"
+#include "print.h"
 #include "report/json_file.h"
 
 namespace imuscope::cli {
@@ -123,9 +125,9 @@ const json* find_regression(const json& regressions, const json& like, const cha
 }
 
 void print_table1(const TablesCommand& options, const json& regressions) {
-  fmt::print("Table I: linear regression of the errors on fifteen measures of the dynamics\n");
-  fmt::print("{:<8} {:<8} {:>8} {:>9} {:>11} {:>9}   {:>11} {:>9}   {:>11} {:>9}\n", "", "", "n", "R2 (OLS)",
-             "F (OLS)", "p (OLS)", "F (GLS)", "p (GLS)", "F projected", "p");
+  say("Table I: linear regression of the errors on fifteen measures of the dynamics\n");
+  say("{:<8} {:<8} {:>8} {:>9} {:>11} {:>9}   {:>11} {:>9}   {:>11} {:>9}\n", "", "", "n", "R2 (OLS)",
+      "F (OLS)", "p (OLS)", "F (GLS)", "p (GLS)", "F projected", "p");
   for (const auto& ols : regressions) {
     if (ols.at("method") != "ols" || ols.at("projected").get<bool>() || !wanted(options, ols)) continue;
     const auto cells = [](const json* r) {
@@ -133,50 +135,50 @@ void print_table1(const TablesCommand& options, const json& regressions) {
                  ? fmt::format("{:>11} {:>9}", "-", "-")
                  : fmt::format("{:>11.4g} {:>9}", r->at("f").get<double>(), p_text(number(*r, "p_value")));
     };
-    fmt::print("{:<8} {:<8} {:>8} {:>7.2f} % {}   {}   {}\n", ols.at("name").get<std::string>(),
-               ols.at("axis").get<std::string>(), ols.at("n").get<std::int64_t>(),
-               100.0 * ols.at("r2").get<double>(), cells(&ols),
-               cells(find_regression(regressions, ols, "gls", false)),
-               cells(find_regression(regressions, ols, "gls", true)));
+    say("{:<8} {:<8} {:>8} {:>7.2f} % {}   {}   {}\n", ols.at("name").get<std::string>(),
+        ols.at("axis").get<std::string>(), ols.at("n").get<std::int64_t>(),
+        100.0 * ols.at("r2").get<double>(), cells(&ols),
+        cells(find_regression(regressions, ols, "gls", false)),
+        cells(find_regression(regressions, ols, "gls", true)));
   }
 }
 
 void print_table2(const TablesCommand& options, const json& comparisons, const Truth& truth) {
-  fmt::print("\nTable II: noise models per regime (95 % intervals; p corrected after Holm over the S-IMU)\n");
+  say("\nTable II: noise models per regime (95 % intervals; p corrected after Holm over the S-IMU)\n");
   std::map<std::string, Held> held;
   for (const auto& c : comparisons) {
     if (!wanted(options, c)) continue;
     const auto first = c.at("first").get<std::string>();
     const auto second = c.at("second").get<std::string>();
-    fmt::print("\n{} {}\n{:<4} {:<7} {:<10} | {:>9} {:>9} {:<22} | {:>9} {:>9} {:<22} | {:>8}  {}\n",
-               c.at("name").get<std::string>(), c.at("axis").get<std::string>(), "", "", "", "truth", first,
-               "", "truth", second, "", "p", "");
+    say("\n{} {}\n{:<4} {:<7} {:<10} | {:>9} {:>9} {:<22} | {:>9} {:>9} {:<22} | {:>8}  {}\n",
+        c.at("name").get<std::string>(), c.at("axis").get<std::string>(), "", "", "", "truth", first, "",
+        "truth", second, "", "p", "");
     for (const auto& p : c.at("parameters")) {
       const auto [factor, unit] = shown(p.at("unit"));
       const auto true_first = truth_of(truth, c, "first", p);
       const auto true_second = truth_of(truth, c, "second", p);
-      fmt::print("{:<4} {:<7} {:<10} | {:>9} {:>9} {:<22} | {:>9} {:>9} {:<22} | {:>8}  {}\n",
-                 p.at("process").get<std::string>(), p.at("name").get<std::string>(), unit,
-                 value_text(true_first, factor), value_text(number(p, "first"), factor),
-                 interval_text(p, "first", factor), value_text(true_second, factor),
-                 value_text(number(p, "second"), factor), interval_text(p, "second", factor),
-                 p_text(number(p, "p_holm")), p.at("verdict").get<std::string>());
+      say("{:<4} {:<7} {:<10} | {:>9} {:>9} {:<22} | {:>9} {:>9} {:<22} | {:>8}  {}\n",
+          p.at("process").get<std::string>(), p.at("name").get<std::string>(), unit,
+          value_text(true_first, factor), value_text(number(p, "first"), factor),
+          interval_text(p, "first", factor), value_text(true_second, factor),
+          value_text(number(p, "second"), factor), interval_text(p, "second", factor),
+          p_text(number(p, "p_holm")), p.at("verdict").get<std::string>());
       account(p, "first", true_first, held[first]);
       account(p, "second", true_second, held[second]);
     }
     const json& joint = c.at("joint");
     if (!joint.is_null()) {
-      fmt::print("jointly: chi2({}) = {:.4g}, p: {} (corrected: {})\n", joint.at("dof").get<int>(),
-                 joint.at("statistic").get<double>(), p_text(number(joint, "p_value")),
-                 p_text(number(joint, "p_holm")));
+      say("jointly: chi2({}) = {:.4g}, p: {} (corrected: {})\n", joint.at("dof").get<int>(),
+          joint.at("statistic").get<double>(), p_text(number(joint, "p_value")),
+          p_text(number(joint, "p_holm")));
     }
-    for (const auto& remark : c.at("remarks")) fmt::print("{}\n", remark.get<std::string>());
+    for (const auto& remark : c.at("remarks")) say("{}\n", remark.get<std::string>());
   }
-  fmt::print("\n");
+  say("\n");
   for (const auto& [regime, h] : held) {
     if (h.of == 0) continue;
-    fmt::print("{}: {} of {} parameters have an interval; {} of those hold the truth\n", regime, h.given,
-               h.of, h.held);
+    say("{}: {} of {} parameters have an interval; {} of those hold the truth\n", regime, h.given, h.of,
+        h.held);
   }
 }
 
@@ -205,7 +207,7 @@ Result<void> tables(const TablesCommand& options) {
         }
       }
     }
-    fmt::print("{}\n", all.dump(2));
+    say("{}\n", json_text(all));
     return {};
   }
   print_table1(options, regression->at("regressions"));
@@ -213,10 +215,10 @@ Result<void> tables(const TablesCommand& options) {
   const auto regimes = read(options.run / "regimes.json", remedy);
   if (!regimes) return tl::unexpected<Error>(regimes.error());
   for (const auto& regime : regimes->at("regimes")) {
-    fmt::print("{}: {:.1f} s, longest stretch {:.1f} s\n", regime.at("name").get<std::string>(),
-               regime.at("total_s").get<double>(), regime.at("longest_s").get<double>());
+    say("{}: {:.1f} s, longest stretch {:.1f} s\n", regime.at("name").get<std::string>(),
+        regime.at("total_s").get<double>(), regime.at("longest_s").get<double>());
   }
-  for (const auto& remark : regimes->at("remarks")) fmt::print("Note: {}\n", remark.get<std::string>());
+  for (const auto& remark : regimes->at("remarks")) say("Note: {}\n", remark.get<std::string>());
   return {};
 }
 

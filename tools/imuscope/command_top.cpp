@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "commands.h"
+#include "print.h"
 #include "publish/lcm_listener.h"
 #include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
@@ -103,9 +104,9 @@ class Top {
           "PC its ttl must be 1");
     }
     if (as_json) {
-      fmt::print("{}\n", top::json_of(heard_));
+      say("{}\n", top::json_of(heard_));
     } else {
-      for (const auto& line : top::lines_of(heard_)) fmt::print("{}\n", line);
+      for (const auto& line : top::lines_of(heard_)) say("{}\n", line);
     }
     return {};
   }

@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/json_text.h"
 #include "commands.h"
 #include "noise/json.h"
+#include "print.h"
 #include "signal_options.h"
 
 namespace imuscope::cli {
@@ -14,19 +16,19 @@ namespace {
 
 void print_table(const noise::WaveletVariance& wv, double rate_hz, const std::string& unit) {
   const bool robust = wv.efficiency < 1.0;
-  if (!unit.empty()) fmt::print("wv in ({0})^2, allan_dev in {0}\n", unit);
+  if (!unit.empty()) say("wv in ({0})^2, allan_dev in {0}\n", unit);
   if (wv.n_valid < wv.n_samples) {
-    fmt::print("{} of {} samples used, in {} runs\n", wv.n_valid, wv.n_samples, wv.segments.size());
+    say("{} of {} samples used, in {} runs\n", wv.n_valid, wv.n_samples, wv.segments.size());
   }
-  fmt::print("{:>5} {:>12} {:>12} {:>13} {:>13} {:>13} {:>13} {:>12}{}\n", "level", "tau_s", "allan_tau_s",
-             "wv", "ci_low", "ci_high", "allan_dev", "coefficients", robust ? "   rejected" : "");
+  say("{:>5} {:>12} {:>12} {:>13} {:>13} {:>13} {:>13} {:>12}{}\n", "level", "tau_s", "allan_tau_s", "wv",
+      "ci_low", "ci_high", "allan_dev", "coefficients", robust ? "   rejected" : "");
   for (const noise::WvLevel& level : wv.levels) {
     const double tau_s = level.tau_samples / rate_hz;
-    fmt::print("{:>5} {:>12.6g} {:>12.6g} {:>13.6g} {:>13.6g} {:>13.6g} {:>13.6g} {:>12}", level.level, tau_s,
-               0.5 * tau_s, level.value, level.ci_low, level.ci_high, std::sqrt(2.0 * level.value),
-               level.n_coefficients);
-    if (robust) fmt::print(" {:>9.3f}%", 100.0 * level.rejected_share);
-    fmt::print("\n");
+    say("{:>5} {:>12.6g} {:>12.6g} {:>13.6g} {:>13.6g} {:>13.6g} {:>13.6g} {:>12}", level.level, tau_s,
+        0.5 * tau_s, level.value, level.ci_low, level.ci_high, std::sqrt(2.0 * level.value),
+        level.n_coefficients);
+    if (robust) say(" {:>9.3f}%", 100.0 * level.rejected_share);
+    say("\n");
   }
 }
 
@@ -44,7 +46,7 @@ void add_wv(CLI::App& app, Work& chosen) {
     if (options->json) {
       auto json = noise::wv_to_json(wv, options->rate_hz);
       json["unit"] = options->unit;
-      fmt::print("{}\n", json.dump(2));
+      say("{}\n", json_text(json));
     } else {
       print_table(wv, options->rate_hz, options->unit);
     }

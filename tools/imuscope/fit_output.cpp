@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "noise/json.h"
+#include "print.h"
 
 namespace imuscope::cli {
 namespace {
@@ -22,31 +23,31 @@ std::string p_value(const std::optional<noise::JTest>& test) {
 }
 
 void print_parameters(const noise::FitResult& fit) {
-  fmt::print("{:<7} {:<10} {:>14} {:>14}  {:<30} {}\n", "process", "parameter", "value", "sd",
-             "95 % interval", "unit");
+  say("{:<7} {:<10} {:>14} {:>14}  {:<30} {}\n", "process", "parameter", "value", "sd", "95 % interval",
+      "unit");
   for (const auto& p : fit.parameters) {
-    fmt::print("{:<7} {:<10} {:>14.7g} {:>14}  {:<30} {}\n", p.process, p.name, p.value,
-               p.sd ? fmt::format("{:.4g}", *p.sd) : "-", interval(p.ci_low, p.ci_high), p.unit);
+    say("{:<7} {:<10} {:>14.7g} {:>14}  {:<30} {}\n", p.process, p.name, p.value,
+        p.sd ? fmt::format("{:.4g}", *p.sd) : "-", interval(p.ci_low, p.ci_high), p.unit);
   }
 }
 
 void print_quantities(const noise::FitResult& fit, noise::SignalUnit unit) {
-  fmt::print("\n{:<7} {:<26} {:>14}  {:<30} {}\n", "process", "for filter and data sheet", "value",
-             "95 % interval", "unit");
+  say("\n{:<7} {:<26} {:>14}  {:<30} {}\n", "process", "for filter and data sheet", "value", "95 % interval",
+      "unit");
   for (const auto& q : noise::filter_quantities(fit, unit)) {
-    fmt::print("{:<7} {:<26} {:>14.7g}  {:<30} {}\n", q.process, q.name, q.value,
-               interval(q.ci_low, q.ci_high), q.unit);
+    say("{:<7} {:<26} {:>14.7g}  {:<30} {}\n", q.process, q.name, q.value, interval(q.ci_low, q.ci_high),
+        q.unit);
   }
 }
 
 void print_levels(const noise::FitResult& fit) {
-  fmt::print("\n{:>5} {:>12} {:>13} {:>13}  {}\n", "level", "tau_s", "wv", "fitted",
-             "95 % interval under the model");
+  say("\n{:>5} {:>12} {:>13} {:>13}  {}\n", "level", "tau_s", "wv", "fitted",
+      "95 % interval under the model");
   for (const auto& level : fit.wv) {
     const bool known = level.model_ci_high > 0.0;
-    fmt::print("{:>5} {:>12.6g} {:>13.6g} {:>13.6g}  {}\n", level.observed.level,
-               level.observed.tau_samples / fit.rate_hz, level.observed.value, level.fitted,
-               known ? fmt::format("[{:.6g}, {:.6g}]", level.model_ci_low, level.model_ci_high) : "-");
+    say("{:>5} {:>12.6g} {:>13.6g} {:>13.6g}  {}\n", level.observed.level,
+        level.observed.tau_samples / fit.rate_hz, level.observed.value, level.fitted,
+        known ? fmt::format("[{:.6g}, {:.6g}]", level.model_ci_low, level.model_ci_high) : "-");
   }
 }
 
@@ -58,68 +59,65 @@ nlohmann::json test_json(const std::optional<noise::JTest>& test) {
 }  // namespace
 
 void print_fit(const noise::FitResult& fit, noise::SignalUnit unit) {
-  fmt::print("model {}   n {}   rate {:g} Hz   weights {}{}\n\n", fit.spec.name(), fit.n, fit.rate_hz,
-             fit.weighting == noise::Weighting::kCi ? "ci" : "optimal",
-             fit.efficiency < 1.0 ? fmt::format("   robust, efficiency {:g}", fit.efficiency) : "");
+  say("model {}   n {}   rate {:g} Hz   weights {}{}\n\n", fit.spec.name(), fit.n, fit.rate_hz,
+      fit.weighting == noise::Weighting::kCi ? "ci" : "optimal",
+      fit.efficiency < 1.0 ? fmt::format("   robust, efficiency {:g}", fit.efficiency) : "");
   print_parameters(fit);
   print_quantities(fit, unit);
   print_levels(fit);
-  fmt::print("\nobjective {:.8g}", fit.objective);
+  say("\nobjective {:.8g}", fit.objective);
   if (fit.j_test) {
-    fmt::print("   J-test {:.4g} on {} dof, p = {:.3g}", fit.j_test->statistic, fit.j_test->dof,
-               fit.j_test->p_value);
+    say("   J-test {:.4g} on {} dof, p = {:.3g}", fit.j_test->statistic, fit.j_test->dof,
+        fit.j_test->p_value);
   }
-  fmt::print("\n{}\n", fit.identifiable ? "identifiable" : "not identifiable");
-  for (const auto& warning : fit.warnings) fmt::print("! {}\n", warning);
+  say("\n{}\n", fit.identifiable ? "identifiable" : "not identifiable");
+  for (const auto& warning : fit.warnings) say("! {}\n", warning);
 }
 
 void print_conservative(const noise::FitResult& bound, noise::SignalUnit unit) {
-  fmt::print(
-      "\nover-bounding model, above the upper interval end of every level with enough coefficients\n\n");
+  say("\nover-bounding model, above the upper interval end of every level with enough coefficients\n\n");
   print_parameters(bound);
   print_quantities(bound, unit);
 }
 
 void print_ranking(const std::vector<noise::RankedModel>& ranked) {
-  fmt::print("{:<4} {:<20} {:>12} {:>12}  {}\n", "rank", "model", "criterion", "J p-value", "why");
+  say("{:<4} {:<20} {:>12} {:>12}  {}\n", "rank", "model", "criterion", "J p-value", "why");
   for (std::size_t i = 0; i < ranked.size(); ++i) {
     const auto& m = ranked[i];
-    fmt::print("{:<4} {:<20} {:>12.5g} {:>12}  {}\n", i + 1, m.fit.spec.name(), m.criterion,
-               p_value(m.fit.j_test), m.reason);
+    say("{:<4} {:<20} {:>12.5g} {:>12}  {}\n", i + 1, m.fit.spec.name(), m.criterion, p_value(m.fit.j_test),
+        m.reason);
   }
-  fmt::print("\n");
+  say("\n");
 }
 
 void print_ranking(const std::vector<noise::CrossValidated>& ranked) {
-  fmt::print("{:<4} {:<20} {:>12} {:>12}  {}\n", "rank", "model", "CV-WVIC", "J p-value", "why");
+  say("{:<4} {:<20} {:>12} {:>12}  {}\n", "rank", "model", "CV-WVIC", "J p-value", "why");
   for (std::size_t i = 0; i < ranked.size(); ++i) {
     const auto& m = ranked[i];
-    fmt::print("{:<4} {:<20} {:>12.5g} {:>12}  {}\n", i + 1, m.pooled.spec.name(), m.score,
-               p_value(m.pooled.j_test), m.reason);
+    say("{:<4} {:<20} {:>12.5g} {:>12}  {}\n", i + 1, m.pooled.spec.name(), m.score, p_value(m.pooled.j_test),
+        m.reason);
   }
-  fmt::print("\n");
+  say("\n");
 }
 
 void print_replicates(const noise::JointFit& joint) {
-  fmt::print("\n{:<7} {:<10} {:>14}", "process", "parameter", "together");
-  for (std::size_t k = 0; k < joint.separate.size(); ++k)
-    fmt::print(" {:>14}", fmt::format("replicate {}", k + 1));
-  fmt::print("\n");
+  say("\n{:<7} {:<10} {:>14}", "process", "parameter", "together");
+  for (std::size_t k = 0; k < joint.separate.size(); ++k) say(" {:>14}", fmt::format("replicate {}", k + 1));
+  say("\n");
   for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {
     const auto& pooled = joint.pooled.parameters[p];
-    fmt::print("{:<7} {:<10} {:>14.6g}", pooled.process, pooled.name, pooled.value);
-    for (const auto& fit : joint.separate) fmt::print(" {:>14.6g}", fit.parameters[p].value);
-    fmt::print("\n");
+    say("{:<7} {:<10} {:>14.6g}", pooled.process, pooled.name, pooled.value);
+    for (const auto& fit : joint.separate) say(" {:>14.6g}", fit.parameters[p].value);
+    say("\n");
   }
   if (!joint.homogeneity) {
-    fmt::print("\nno test of near-stationarity: no parameter is determined in every replicate\n");
+    say("\nno test of near-stationarity: no parameter is determined in every replicate\n");
     return;
   }
   const auto& test = *joint.homogeneity;
-  fmt::print("\nnear-stationarity: {:.4g} on {} dof, p = {:.3g}: {}\n", test.statistic, test.dof,
-             test.p_value,
-             test.p_value < kHomogeneous ? "the replicates differ by more than their uncertainty"
-                                         : "the replicates may be one process");
+  say("\nnear-stationarity: {:.4g} on {} dof, p = {:.3g}: {}\n", test.statistic, test.dof, test.p_value,
+      test.p_value < kHomogeneous ? "the replicates differ by more than their uncertainty"
+                                  : "the replicates may be one process");
 }
 
 nlohmann::json fit_json(const noise::FitResult& fit, noise::SignalUnit unit) {

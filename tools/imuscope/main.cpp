@@ -62,7 +62,7 @@ int run(int argc, char** argv) {
   const auto result = work();
   if (result) return 0;
   say(fmt::format("{}imuscope: {}\n", imuscope::cli::error_prefix(),
-                  imuscope::printable(result.error().text())));
+                  imuscope::one_line(result.error().text())));
   return result.error().kind == imuscope::ErrorKind::kUsage ? 2 : 1;
 }
 

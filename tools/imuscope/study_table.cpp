@@ -10,7 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "base/json_text.h"
 #include "base/units.h"
+#include "print.h"
 #include "report/json_file.h"
 
 namespace imuscope::cli {
@@ -81,38 +83,38 @@ void print_observability(const json& imu) {
   for (const auto& state : observability.at("states")) {
     if (!state.at("observable").get<bool>()) unseen.push_back(state.at("words"));
   }
-  if (!unseen.empty()) fmt::print("  not observable yet: {}\n", fmt::join(unseen, ", "));
-  fmt::print("  least is known of  {}\n", observability.at("weakest").at("words").get<std::string>());
+  if (!unseen.empty()) say("  not observable yet: {}\n", fmt::join(unseen, ", "));
+  say("  least is known of  {}\n", observability.at("weakest").at("words").get<std::string>());
   if (!observability.at("advice").is_null())
-    fmt::print("  what would help    {}\n", observability.at("advice").get<std::string>());
+    say("  what would help    {}\n", observability.at("advice").get<std::string>());
 }
 
 void print_truth(const json& imu, const json& truth) {
   const auto error = small_rotation_b(matrix(truth.at("C_b_s")), matrix(imu.at("C_b_s")));
-  fmt::print("    boresight error  {:9.1f} {:9.1f} {:9.1f}  mdeg  (found minus true)\n",
-             error[0] * kMdegPerRad, error[1] * kMdegPerRad, error[2] * kMdegPerRad);
+  say("    boresight error  {:9.1f} {:9.1f} {:9.1f}  mdeg  (found minus true)\n", error[0] * kMdegPerRad,
+      error[1] * kMdegPerRad, error[2] * kMdegPerRad);
   const auto& r = imu.at("r_bs_b_m");
   const auto& t = truth.at("r_bs_b_m");
-  fmt::print("    lever-arm error  {:9.2f} {:9.2f} {:9.2f}  mm    (found minus true)\n",
-             (r.at(0).get<double>() - t.at(0).get<double>()) * 1e3,
-             (r.at(1).get<double>() - t.at(1).get<double>()) * 1e3,
-             (r.at(2).get<double>() - t.at(2).get<double>()) * 1e3);
-  fmt::print("    time-offset error{:9.3f}                      ms    (found minus true, {:.3f} ms)\n",
-             (imu.at("t_d_s").get<double>() - truth.at("t_d_s").get<double>()) * 1e3,
-             truth.at("t_d_s").get<double>() * 1e3);
+  say("    lever-arm error  {:9.2f} {:9.2f} {:9.2f}  mm    (found minus true)\n",
+      (r.at(0).get<double>() - t.at(0).get<double>()) * 1e3,
+      (r.at(1).get<double>() - t.at(1).get<double>()) * 1e3,
+      (r.at(2).get<double>() - t.at(2).get<double>()) * 1e3);
+  say("    time-offset error{:9.3f}                      ms    (found minus true, {:.3f} ms)\n",
+      (imu.at("t_d_s").get<double>() - truth.at("t_d_s").get<double>()) * 1e3,
+      truth.at("t_d_s").get<double>() * 1e3);
 }
 
 void print_imu(const json& imu, const std::optional<json>& truth) {
   const std::string name = imu.at("name");
-  fmt::print("\n{}  ({})\n", name, imu.at("status").get<std::string>());
+  say("\n{}  ({})\n", name, imu.at("status").get<std::string>());
   const auto angles = euler_deg(matrix(imu.at("C_b_s")));
-  fmt::print("  C_b_s, zyx Euler x y z {:9.3f} {:9.3f} {:9.3f}  deg\n", angles[0], angles[1], angles[2]);
-  fmt::print("    sd               {}  mdeg\n", triple(imu, "boresight_sd_deg", "psi", 1e3, 1));
-  fmt::print("  lever arm b, x y z {}  mm\n", triple(imu, "r_bs_b_m", "r", 1e3, 2));
-  fmt::print("    sd               {}  mm\n", triple(imu, "r_bs_b_sd_m", "r", 1e3, 2));
+  say("  C_b_s, zyx Euler x y z {:9.3f} {:9.3f} {:9.3f}  deg\n", angles[0], angles[1], angles[2]);
+  say("    sd               {}  mdeg\n", triple(imu, "boresight_sd_deg", "psi", 1e3, 1));
+  say("  lever arm b, x y z {}  mm\n", triple(imu, "r_bs_b_m", "r", 1e3, 2));
+  say("    sd               {}  mm\n", triple(imu, "r_bs_b_sd_m", "r", 1e3, 2));
   if (is_observable(imu, "t_d")) {
-    fmt::print("  time offset        {:9.3f}  sd {:.3f}  ms\n", imu.at("t_d_s").get<double>() * 1e3,
-               imu.at("t_d_sd_s").get<double>() * 1e3);
+    say("  time offset        {:9.3f}  sd {:.3f}  ms\n", imu.at("t_d_s").get<double>() * 1e3,
+        imu.at("t_d_sd_s").get<double>() * 1e3);
   }
   print_observability(imu);
   if (!truth) return;
@@ -129,28 +131,27 @@ void print_model(const json& models) {
   const auto dynamic =
       std::find_if(all.begin(), all.end(), [](const json& m) { return m.at("regime") == "dynamic"; });
   const json& model = dynamic != all.end() ? *dynamic : all.front();
-  fmt::print("\nNoise model of {} {}, {} ({}{}):\n", model.at("name").get<std::string>(),
-             model.at("axis").get<std::string>(), model.at("regime").get<std::string>(),
-             model.at("model").get<std::string>(),
-             model.at("identifiable").get<bool>() ? "" : ", not identifiable");
+  say("\nNoise model of {} {}, {} ({}{}):\n", model.at("name").get<std::string>(),
+      model.at("axis").get<std::string>(), model.at("regime").get<std::string>(),
+      model.at("model").get<std::string>(), model.at("identifiable").get<bool>() ? "" : ", not identifiable");
   for (const auto& p : model.at("parameters")) {
-    fmt::print("  {:<4} {:<7} {:>11}  [{}, {}]  {}\n", p.at("process").get<std::string>(),
-               p.at("name").get<std::string>(), number(p.at("value")), number(p.at("ci_low")),
-               number(p.at("ci_high")), p.at("unit").get<std::string>());
+    say("  {:<4} {:<7} {:>11}  [{}, {}]  {}\n", p.at("process").get<std::string>(),
+        p.at("name").get<std::string>(), number(p.at("value")), number(p.at("ci_low")),
+        number(p.at("ci_high")), p.at("unit").get<std::string>());
   }
 }
 
 /// What was read of each device: a recording that ends early or holds foreign bytes shows here.
 void print_devices(const json& devices) {
-  fmt::print("\n");
+  say("\n");
   for (const auto& device : devices) {
     const auto count = [&](const char* key) { return device.at(key).get<std::int64_t>(); };
     if (count("bytes") == 0) continue;
-    fmt::print("{:<10} {} samples in {} bytes", device.at("name").get<std::string>(), count("samples"),
-               count("bytes"));
-    if (count("bytes_skipped") > 0) fmt::print(", {} of them in no valid message", count("bytes_skipped"));
-    if (count("samples_lost") > 0) fmt::print("; {} samples are missing", count("samples_lost"));
-    fmt::print("\n");
+    say("{:<10} {} samples in {} bytes", device.at("name").get<std::string>(), count("samples"),
+        count("bytes"));
+    if (count("bytes_skipped") > 0) say(", {} of them in no valid message", count("bytes_skipped"));
+    if (count("samples_lost") > 0) say("; {} samples are missing", count("samples_lost"));
+    say("\n");
   }
 }
 
@@ -158,10 +159,10 @@ void print_devices(const json& devices) {
 void print_warnings(const json& warnings) {
   constexpr std::size_t kPrintedMax = 8;
   const std::size_t printed = std::min(warnings.size(), kPrintedMax);
-  if (printed > 0) fmt::print("\n");
-  for (std::size_t i = 0; i < printed; ++i) fmt::print("Note: {}\n", warnings[i].get<std::string>());
+  if (printed > 0) say("\n");
+  for (std::size_t i = 0; i < printed; ++i) say("Note: {}\n", warnings[i].get<std::string>());
   if (printed < warnings.size())
-    fmt::print("Note: {} more, in run.json and the report\n", warnings.size() - printed);
+    say("Note: {} more, in run.json and the report\n", warnings.size() - printed);
 }
 
 Result<void> print_documents(const std::filesystem::path& run_folder, bool as_json) {
@@ -175,7 +176,7 @@ Result<void> print_documents(const std::filesystem::path& run_folder, bool as_js
   if (as_json) {
     json all{{"schema", "imuscope.summary/1"}, {"run", *run}, {"calibration", *calibration}};
     all["models"] = models.value_or(json(nullptr));
-    fmt::print("{}\n", all.dump(2));
+    say("{}\n", json_text(all));
     return {};
   }
   print_devices(run->at("devices"));
@@ -183,8 +184,8 @@ Result<void> print_documents(const std::filesystem::path& run_folder, bool as_js
   if (models) print_model(*models);
   print_warnings(run->at("warnings"));
   const auto report = run_folder / "report.html";
-  fmt::print("\nResults: {}\n", run_folder.string());
-  if (std::filesystem::exists(report)) fmt::print("Report:  {}\n", report.string());
+  say("\nResults: {}\n", run_folder.string());
+  if (std::filesystem::exists(report)) say("Report:  {}\n", report.string());
   return {};
 }
 

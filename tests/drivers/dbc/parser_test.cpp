@@ -229,5 +229,39 @@ TEST(DbcParser, NumbersThatAreNotWholeOrDoNotFitAreRefused) {
   EXPECT_NE(text.error().text().find("\"GEAR\""), std::string::npos) << text.error().text();
 }
 
+TEST(DbcParser, WhatAFileClaimsIsBounded) {
+  const auto refusal_of = [](const std::string& text) {
+    const auto database = parse(text, "large.dbc");
+    EXPECT_FALSE(database);
+    return database ? std::string() : database.error().what;
+  };
+  std::string messages;
+  for (int id = 0; id <= 16'384; ++id)
+    messages += "BO_ " + std::to_string(0x8000'0000U + static_cast<unsigned>(id)) + " M: 8 E\n";
+  EXPECT_NE(refusal_of(messages).find("more than 16384 messages"), std::string::npos);
+
+  std::string signals = "BO_ 1 M: 64 E\n";
+  for (int i = 0; i <= 131'072; ++i)
+    signals += " SG_ S" + std::to_string(i) + " : 0|8@1+ (1,0) [0|0] \"\" E\n";
+  EXPECT_NE(refusal_of(signals).find("more than 131072 signals"), std::string::npos);
+
+  // A table that each of many signals takes as its own.
+  std::string tables = "VAL_TABLE_ T ";
+  for (int i = 0; i < 20'000; ++i) tables += std::to_string(i) + " \"name\" ";
+  tables += ";\nBO_ 1 M: 64 E\n";
+  for (int i = 0; i < 60; ++i) tables += " SG_ S" + std::to_string(i) + " : 0|8@1+ (1,0) [0|0] \"\" E\n";
+  for (int i = 0; i < 60; ++i) tables += "VAL_ 1 S" + std::to_string(i) + " T;\n";
+  EXPECT_NE(refusal_of(tables).find("names more than 1048576 values"), std::string::npos);
+
+  std::string chain = "BO_ 1 M: 64 E\n";
+  for (int i = 0; i < 30; ++i) chain += " SG_ S" + std::to_string(i) + " : 0|8@1+ (1,0) [0|0] \"\" E\n";
+  for (int i = 1; i < 30; ++i)
+    chain += "SG_MUL_VAL_ 1 S" + std::to_string(i) + " S" + std::to_string(i - 1) + " 0-0;\n";
+  EXPECT_NE(refusal_of(chain).find("more than 16 multiplexers in a row"), std::string::npos);
+
+  EXPECT_LT(refusal_of("BO_ " + std::string(1'000'000, 'x')).size(), 200U)
+      << "what is shown of a file is short";
+}
+
 }  // namespace
 }  // namespace imuscope::dbc

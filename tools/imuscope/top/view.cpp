@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_text.h"
 #include "base/text.h"
 #include "base/units.h"
 
@@ -322,7 +323,7 @@ std::string json_of(const Heard& heard) {
                              {"high_water", r.high_water},
                              {"refused", r.refused}});
   }
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(json);
 }
 
 }  // namespace imuscope::top
