@@ -77,11 +77,12 @@ std::optional<CaptureBreak> CaptureFiles::joins(int number) const {
   if (t0 && t0 != t0_) return std::nullopt;
   // A header has the time of the run's beginning: what follows it tells how much is missing.
   if (t0 && !log->next(event)) event.utime = last_utime_;
-  const double seconds = static_cast<double>(event.utime - last_utime_) * kSecondsPerMicrosecond;
+  const double seconds =
+      (static_cast<double>(event.utime) - static_cast<double>(last_utime_)) * kSecondsPerMicrosecond;
   // Where the header is among what is damaged, the records say whether they follow.
-  const bool follows = log->bytes_skipped() > 0 && seconds > -kDisorderMax_s && seconds < kBreakMax_s;
-  if (!t0 && !follows) return std::nullopt;
-  return CaptureBreak{number_ + 1, number - number_ - 1, number, seconds};
+  const bool is_damaged = log->bytes_skipped() > 0;
+  if (!t0 && !(is_damaged && seconds > -kDisorderMax_s && seconds < kBreakMax_s)) return std::nullopt;
+  return CaptureBreak{number_ + 1, number - number_ - 1, number, is_damaged, seconds};
 }
 
 /// Goes on to the next file of the same run, if there is one.
@@ -96,10 +97,7 @@ bool CaptureFiles::open_following() {
     bytes_cut_off_ += log_.bytes_cut_off();
     log_ = std::move(*log);
     number_ = number;
-    LogEvent header;
-    auto again = EventLogReader::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
-    const bool is_whole = again && again->next(header) && again->bytes_skipped() == 0;
-    if (found->n_missing > 0 || !is_whole) breaks_.push_back(*found);
+    if (found->n_missing > 0 || found->beginning_is_damaged) breaks_.push_back(*found);
     report_reads();
     return true;
   }

@@ -20,10 +20,11 @@ namespace imuscope {
 
 /// A place between two files of a capture where something is missing.
 struct CaptureBreak {
-  int first_missing = 0;  ///< number of the first file that is not there or cannot be read
-  int n_missing = 0;      ///< files in a row; 0: the file behind is there and its beginning is damaged
-  int behind = 0;         ///< number of the file with which it goes on
-  double seconds = 0.0;   ///< between the last record before and the first behind, by the recorder's clock
+  int first_missing = 0;              ///< number of the first file that is not there or cannot be read
+  int n_missing = 0;                  ///< files in a row
+  int behind = 0;                     ///< number of the file with which it goes on
+  bool beginning_is_damaged = false;  ///< of that file
+  double seconds = 0.0;  ///< between the last record before and the first behind, by the recorder's clock
 };
 
 /// Iterates over the events of a capture through all its files, given the first. A file belongs to the

@@ -82,8 +82,11 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
     } else if (const auto* marked = std::get_if<event_t>(&*record)) {
       summary.other_messages += 1;
       const RecordClock clock{summary.run.t0, summary.run.t0_wall};
-      if (summary.has_run && is_stamp_us(event.utime))
-        summary.events.push_back({clock.host_time(event.utime), one_line(marked->text)});
+      // Of the wall clock, which began in 1970: so no difference is beyond its type.
+      if (summary.has_run && event.utime >= 0 && is_stamp_us(event.utime)) {
+        const HostTime heard = clock.host_time(event.utime);
+        if (is_stamp_ns(to_ns(heard))) summary.events.push_back({heard, one_line(marked->text)});
+      }
     } else {
       summary.exceptions.push_back(std::move(std::get<StoredException>(*record)));
     }

@@ -25,7 +25,8 @@ std::int64_t fingerprint_of(const std::vector<std::uint8_t>& message) {
 }
 
 std::optional<CaptureRecord> to_record(const run_t& message) {
-  if (!is_stamp_ns(message.t0_ns) || !is_stamp_us(message.t0_utime)) return std::nullopt;
+  if (!is_stamp_ns(message.t0_ns) || message.t0_utime < 0 || !is_stamp_us(message.t0_utime))
+    return std::nullopt;
   RunHeader header;
   header.name = message.name;
   header.version = message.version;

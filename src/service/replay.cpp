@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 
+#include "base/units.h"
 #include "rt/host_clock.h"
 #include "rt/periodic.h"
 #include "service/device_factory.h"
@@ -328,7 +329,6 @@ std::vector<std::string> warnings_of(const Recording& recording, const ReplayRes
   std::vector<std::string> warnings = recording.damage;
   const SteppedPauses& pauses = result.pauses;
   if (pauses.n == 0) return warnings;
-  constexpr double kSecondsPerHour = 3600.0;
   warnings.push_back(fmt::format(
       "{} times no device said anything for more than {} minutes, {:.2f} h in all and {:.2f} h at most; "
       "these pauses were stepped over",

@@ -71,27 +71,36 @@ double tolerance(const Table& expected, std::size_t c, const std::vector<double>
 
 class Golden : public testing::Test {
  protected:
-  /// How many events an event log holds whose channel begins so, those of one time counted once: a message is
-  /// repeated while nothing comes, a row is not. Layout: LCM's log format, big-endian, 28 bytes before the
-  /// channel; in a message the time of validity follows the 8 bytes of its fingerprint.
-  static int events(const std::filesystem::path& log, const std::string& channel_begin) {
+  /// The data of the events of a log whose channel begins so. Layout: LCM's log format, big-endian, 28 bytes
+  /// before the channel.
+  static std::vector<std::string> data_of(const std::filesystem::path& log,
+                                          const std::string& channel_begin) {
     constexpr std::size_t kHeader = 28;
     constexpr std::size_t kChannelLength = 20;
-    constexpr std::size_t kFingerprint = 8;
-    constexpr std::size_t kTime = 8;
     const std::string bytes = read_text(log);
     const auto number = [&](std::size_t at) {
       std::size_t value = 0;
       for (std::size_t i = 0; i < 4; ++i) value = value << 8U | static_cast<unsigned char>(bytes[at + i]);
       return value;
     };
-    std::set<std::string> times;
+    std::vector<std::string> found;
     for (std::size_t at = 0; at + kHeader <= bytes.size();) {
       const std::size_t channel = number(at + kChannelLength);
+      const std::size_t data = number(at + kChannelLength + 4);
       if (bytes.compare(at + kHeader, channel_begin.size(), channel_begin) == 0)
-        times.insert(bytes.substr(at + kHeader + channel + kFingerprint, kTime));
-      at += kHeader + channel + number(at + kChannelLength + 4);
+        found.push_back(bytes.substr(at + kHeader + channel, data));
+      at += kHeader + channel + data;
     }
+    return found;
+  }
+  static int events(const std::filesystem::path& log, const std::string& channel_begin) {
+    return static_cast<int>(data_of(log, channel_begin).size());
+  }
+  /// The times of validity among them: a message is repeated while nothing comes, a row is not. The time
+  /// follows the eight bytes of the fingerprint.
+  static int moments(const std::filesystem::path& log, const std::string& channel_begin) {
+    std::set<std::string> times;
+    for (const auto& message : data_of(log, channel_begin)) times.insert(message.substr(8, 8));
     return static_cast<int>(times.size());
   }
   static int raw_events(const std::filesystem::path& log) { return events(log, "IMUSCOPE_RAW_"); }
@@ -169,8 +178,8 @@ TEST_F(Golden, PublishesWhatItReplaysAndGivesTheSame) {
     const auto& text = texts.at(file);
     return static_cast<int>(std::count(text.begin(), text.end(), '\n')) - 1;
   };
-  EXPECT_EQ(events(bus, "IMUSCOPE_NAVIGATION"), rows("navigation.csv"));
-  EXPECT_EQ(events(bus, "IMUSCOPE_CALIBRATION_MTX1"), rows("calibration_mtx1.csv"));
+  EXPECT_EQ(moments(bus, "IMUSCOPE_NAVIGATION"), rows("navigation.csv"));
+  EXPECT_EQ(moments(bus, "IMUSCOPE_CALIBRATION_MTX1"), rows("calibration_mtx1.csv"));
   EXPECT_EQ(events(bus, "IMUSCOPE_ERROR_MTX1"), rows("errors_mtx1.csv"));
   EXPECT_GE(events(bus, "IMUSCOPE_STATUS"), 15) << "one for each of the 18 s";
   EXPECT_EQ(run_program("imuscope",
