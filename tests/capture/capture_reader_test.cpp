@@ -550,8 +550,6 @@ TEST(CaptureReader, GoesOnBehindTheDamagedBeginningOfAFileAndTellsIt) {
 
 TEST(CaptureReader, LeavesFilesOfAnotherRunAloneWhereverTheyLie) {
   const auto first = five_files();
-  const auto other = test::scratch_folder() / "other";
-  std::filesystem::create_directories(other);
   RunHeader run = example_run();
   run.t0 += std::chrono::hours(1);
   for (const int file : {1, 3}) {
