@@ -150,7 +150,7 @@ TEST(NewestModels, AreThoseOfTheLastRefitOfEverySensorInTheFile) {
   const auto last = fed(book, counter, 10, 1.0, random);
   newest.take(last);
   const auto folder = test::scratch_folder();
-  ASSERT_TRUE(newest.write(folder));
+  ASSERT_TRUE(newest.write(*OutputFolder::open(folder)));
   std::ifstream file(folder / "models.json");
   const auto models = nlohmann::json::parse(file).at("models");
   ASSERT_EQ(models.size(), kAxisCount);
