@@ -29,7 +29,9 @@ constexpr double kRateAllowance = 200e-6;
 constexpr double kSettled_s = 10.0;
 constexpr int kEarlyToRestart = 3;
 constexpr Duration kWrongDeviceTime = std::chrono::seconds{1};
-// Every observation later than the line by this much for this long: the device's clock jumped.
+// Every observation later than the line by this much for this long, in device time and in host time, and no
+// less late as time goes on: the device's clock jumped. What waited while the host was away comes in a burst,
+// in no host time to speak of, or is caught up with: ever less late. Nothing is learned from it meanwhile.
 constexpr double kLate_s = 0.050;
 constexpr double kLateToRestart_s = 10.0;
 
@@ -59,18 +61,24 @@ inline void ClockMap::move_line(const Line& line, double x_s) noexcept {
   line_ = line;
 }
 
-inline bool ClockMap::jumped(double x_s, double residual_s) noexcept {
-  const double unseen_s = x_s - seconds(last_device_ns_ - device_origin_ns_);
-  const bool early = x_s > kSettled_s && residual_s < -(kEarlyAllowance_s + kRateAllowance * unseen_s);
+inline bool ClockMap::jumped(const Point& point, double residual_s) noexcept {
+  const double host_s = point.x_s + point.y_s;
+  const double unseen_s = point.x_s - seconds(last_device_ns_ - device_origin_ns_);
+  const bool settled = std::min(point.x_s, host_s) > kSettled_s;
+  const bool early = settled && residual_s < -(kEarlyAllowance_s + kRateAllowance * unseen_s);
   early_in_a_row_ = early ? early_in_a_row_ + 1 : 0;
   if (early_in_a_row_ >= kEarlyToRestart) return true;
   if (residual_s < kLate_s) {
     late_ = false;
     return false;
   }
-  if (!late_) late_since_s_ = x_s;
+  if (!late_ || residual_s < late_by_s_ - kLate_s) {
+    late_since_s_ = point.x_s;
+    late_since_host_s_ = host_s;
+    late_by_s_ = residual_s;
+  }
   late_ = true;
-  return x_s - late_since_s_ > kLateToRestart_s;
+  return std::min(point.x_s - late_since_s_, host_s - late_since_host_s_) > kLateToRestart_s;
 }
 
 inline void ClockMap::take(const Point& point) noexcept {
@@ -119,12 +127,12 @@ HostTime ClockMap::observe(std::int64_t device_time_ns, HostTime first_byte) noe
 
   const std::int64_t since_origin_ns = device_time_ns - device_origin_ns_;
   Point point{seconds(since_origin_ns), seconds((first_byte - host_origin_).count() - since_origin_ns)};
-  if (jumped(point.x_s, point.y_s - line_.at(point.x_s))) {
+  if (jumped(point, point.y_s - line_.at(point.x_s))) {
     restart();
     begin_segment(device_time_ns, first_byte);
     point = {0.0, 0.0};
   }
-  if (early_in_a_row_ == 0) take(point);
+  if (early_in_a_row_ == 0 && !late_) take(point);
   return emit(device_time_ns, point.x_s, first_byte);
 }
 

@@ -45,8 +45,9 @@ class ClockMap {
   /// every observation before whenever device_time_ns is (equal where device_time_ns is equal).
   ///
   /// A device time that is less than the one before begins a new segment, as restart() does. So does one that
-  /// arrives earlier than the line allows, or keeps arriving later than it by seconds: the device's clock
-  /// jumped.
+  /// arrives earlier than the line allows, or keeps arriving equally late for seconds of the device's and of
+  /// the host's time: the device's clock jumped. A host that was away, for however long, leaves the line
+  /// alone.
   ///
   /// @param device_time_ns  the device's time of the sample, unwrapped by the driver, any origin; |.| < 2^62
   /// @param first_byte      host time of the first byte of the sample's frame (upper bound: the read's
@@ -85,7 +86,7 @@ class ClockMap {
   static constexpr std::size_t kBins = 256;
 
   void begin_segment(std::int64_t device_time_ns, HostTime first_byte) noexcept;
-  [[nodiscard]] bool jumped(double x_s, double residual_s) noexcept;
+  [[nodiscard]] bool jumped(const Point& point, double residual_s) noexcept;
   void take(const Point& point) noexcept;
   void close_bin() noexcept;
   void refit() noexcept;
@@ -118,7 +119,9 @@ class ClockMap {
 
   // Suspicion that the device's clock jumped.
   int early_in_a_row_ = 0;
-  double late_since_s_ = 0.0;
+  double late_since_s_ = 0.0;       ///< device time
+  double late_since_host_s_ = 0.0;  ///< host time since the segment's first observation
+  double late_by_s_ = 0.0;
   bool late_ = false;
 
   // The last mapped observation.

@@ -226,6 +226,67 @@ TEST(ClockMap, StallsAndBurstsMoveItByNothing) {
   EXPECT_LT(mapped.scatter_s(60.0), 2e-6);
 }
 
+/// Every five minutes the host is away for so long; then what waited comes at once, or catches up at
+/// `drain` times the rate at which it was made.
+struct Stall {
+  double away_s;
+  double drain;
+};
+class ClockMapStall : public testing::TestWithParam<Stall> {};
+
+TEST_P(ClockMapStall, OfAnyLengthThatLosesNothingLeavesTheClockAlone) {
+  const auto [away_s, drain] = GetParam();
+  const auto stalled = [&](std::size_t k) {
+    const double begun_s = std::fmod(static_cast<double>(k) * kPeriod_s, 300.0) - 30.0;
+    if (begun_s < 0.0) return 0.0;
+    // Sample k leaves the queue when the host is back and all before it have gone.
+    return std::max(0.0, away_s + begun_s / drain - begun_s);
+  };
+  ClockMap map;
+  const Mapped mapped = with_delays(120000, 20e-6, stalled, map);
+  EXPECT_EQ(map.restarts(), 0U);
+  EXPECT_LT(mapped.scatter_s(60.0), 2e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Lengths, ClockMapStall,
+                         testing::Values(Stall{5.0, 1e6}, Stall{11.0, 1e6}, Stall{15.0, 1e6},
+                                         Stall{60.0, 1e6}, Stall{120.0, 1e6}, Stall{15.0, 3.0},
+                                         Stall{60.0, 3.0}, Stall{60.0, 1.3}),
+                         [](const auto& stall) {
+                           return "Away" + std::to_string(static_cast<int>(stall.param.away_s)) + "sDrain" +
+                                  std::to_string(static_cast<int>(10.0 * std::min(stall.param.drain, 99.9)));
+                         });
+
+TEST(ClockMap, ABacklogBeforeTheFirstReadIsNoJump) {
+  // A receiver at 10 Hz had been sending for 30 s when its line was opened.
+  constexpr double kFix_s = 0.1;
+  ClockMap map;
+  double error_s = 0.0;
+  for (int k = 0; k < 1500; ++k) {
+    const double truth_s = k * kFix_s;
+    error_s = to_seconds(map.observe(from_seconds(truth_s).count(), host_at(std::max(30.0, truth_s))) -
+                         host_at(truth_s));
+  }
+  EXPECT_EQ(map.restarts(), 0U);
+  EXPECT_NEAR(error_s, 0.0, 1e-4);
+}
+
+TEST(ClockMap, ADeviceThatStoodStillDuringAStallIsStillFound) {
+  // The host is away for 15 s; the device's clock lost two of them.
+  ClockMap map;
+  double error_s = 0.0;
+  for (int k = 0; k < 9000; ++k) {
+    const double truth_s = k * kPeriod_s;
+    const bool in_stall = truth_s > 30.0 && truth_s < 45.0;
+    const double device_s = truth_s - (truth_s > 40.0 ? 2.0 : 0.0);
+    const HostTime arrival = host_at(in_stall ? 45.0 : truth_s);
+    if (truth_s > 40.0 && truth_s <= 42.0) continue;
+    error_s = to_seconds(map.observe(from_seconds(device_s).count(), arrival) - host_at(truth_s));
+  }
+  EXPECT_EQ(map.restarts(), 1U);
+  EXPECT_NEAR(error_s, 0.0, 1e-4);
+}
+
 TEST(ClockMap, FollowsACrystalThatWarmsUp) {
   // 10 ppm in all, with a time constant of 200 s.
   std::mt19937_64 random(6);
