@@ -132,6 +132,10 @@ void Recorder::drain_messages() {
   for (const LogEvent& message : messages) writer_->append(message.channel, message.utime, message.data);
 }
 
+void Recorder::record_heard(std::string_view channel, HostTime heard, std::span<const std::uint8_t> message) {
+  record_message(channel, clock_.utime(heard), message);
+}
+
 void Recorder::record_message(std::string_view channel, std::int64_t utime,
                               std::span<const std::uint8_t> message) {
   const std::lock_guard lock(messages_mutex_);

@@ -187,7 +187,8 @@ void LivePublisher::set_recorder(Recorder& recorder) {
 }
 
 void LivePublisher::on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes) {
-  if (!event_gate_.take(bytes.size(), host_now())) return;
+  const HostTime heard = host_now();
+  if (!event_gate_.take(bytes.size(), heard)) return;
   const auto event = decode_message<event_t>(bytes);
   if (!event) {
     spdlog::warn("a message on {} is no event_t of this version; it was recorded as it came", channel);
@@ -196,7 +197,7 @@ void LivePublisher::on_person_event(const std::string& channel, std::span<const 
     spdlog::info("event: {} (from {})", event->text, event->source);
   }
   // By the time at which it was heard: the sender's clock may be another PC's.
-  if (recorder_ != nullptr) recorder_->record_message(channel, to_utime(wall_clock_now()), bytes);
+  if (recorder_ != nullptr) recorder_->record_heard(channel, heard, bytes);
 }
 
 void LivePublisher::reconfigure(const Tunables& tunables) {

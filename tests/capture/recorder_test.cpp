@@ -8,12 +8,14 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <imuscope/event_t.hpp>
 #include <lcm/lcm-cpp.hpp>
 #include <map>
 #include <memory>
 #include <thread>
 
 #include "capture/capture_reader.h"
+#include "publish/message_codec.h"
 #include "rt/host_clock.h"
 #include "tests/support/shared_data.h"
 
@@ -183,6 +185,27 @@ TEST(Recorder, AFullRingCostsRecordsAndTheCaptureSaysWhere) {
   ASSERT_EQ(summary->losses.size(), 1U);
   EXPECT_EQ(summary->losses[0].records, 10);
   EXPECT_EQ(summary->losses[0].after, now + milliseconds(kRawRingCapacity - 1));
+}
+
+TEST(Recorder, WhatIsHeardKeepsItsInstantThoughTheWallClockSteps) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  const auto ring = std::make_unique<RawRing>();
+  Recorder::Options options = options_for(path);
+  // Since the run began the wall clock was put back by an hour: at t0 it showed that much more.
+  options.run.t0_wall += std::chrono::hours(1);
+  const HostTime heard = options.run.t0 + milliseconds(9000);
+  auto recorder = Recorder::start(options, {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value());
+  event_t event;
+  event.utime = 1;
+  event.source = "test";
+  event.text = "regime gravel";
+  (*recorder)->record_heard("IMUSCOPE_EVENT", heard, encode_message(event));
+  ASSERT_TRUE((*recorder)->stop().has_value());
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value());
+  ASSERT_EQ(summary->events.size(), 1U);
+  EXPECT_LE(std::abs(to_seconds(summary->events[0].time - heard)), 1e-6);
 }
 
 TEST(Recorder, KeepsPublishedMessagesBesideTheBytesAndReplayPassesOverThem) {
