@@ -293,11 +293,13 @@ void read_can(TableReader in, CanLineOptions& can) {
   in.refuse_unknown_keys();
 }
 
-void read_line(TableReader in, LineOptions& line) {
+void read_line(TableReader in, Configuration& configuration) {
+  LineOptions& line = configuration.line;
   constexpr std::array kModels = {ReadModel::kUsbFrames, ReadModel::kFtdi, ReadModel::kMessages};
   line.reads = kModels[in.choice("reads", {"usb_frames", "ftdi", "messages"}, 0)];
   in.number("read_jitter_us", line.jitter_mean_s, kMicro, 0.0, 1e5);
-  in.number("host_skew_ppm", line.host_skew_ppm, 1.0, -1e4, 1e4);
+  configuration.has_pc_rate = in.has("host_skew_ppm");
+  in.number("host_skew_ppm", line.clock.rate_ppm, 1.0, -1e4, 1e4);
   in.refuse_unknown_keys();
 }
 
@@ -340,7 +342,7 @@ void read_simulation(TableReader in, Configuration& configuration) {
   read_gnss(in.table("gnss"), configuration.gnss);
   read_wheels(in.table("wheels"), configuration.wheels);
   read_can(in.table("can"), configuration.can);
-  read_line(in.table("line"), configuration.line);
+  read_line(in.table("line"), configuration);
   read_studies(in, common, configuration);
   in.refuse_unknown_keys();
 }

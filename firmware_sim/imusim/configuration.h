@@ -14,7 +14,8 @@
 /// [simulation.gnss]: position_sd_m, velocity_sd_mps (north, east, down), latency_ms
 /// [simulation.wheels]: scale_error_percent, slow_sd_mps, white_sd_mps, step_kmph, dead_band_mps, latency_ms
 /// [simulation.can]: bit_rate, bus_load_percent (by others), stamp_jitter_us
-/// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm
+/// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm (of the PC's
+///   clock; 0 in the ideal world, drawn in the harsh one)
 /// [[simulation.imu]], one for each S-IMU, found by `name`: model ("mtx", "mti"), rotation_vector_b_s_deg,
 ///   lever_arm_b_m, can_output ("increments", "high_rate", "high_rate_swapped": 061 is the rate of turn),
 ///   latency_ms, clock_skew_ppm, first_counter, accel_white_mps2, gyro_bias_sd_deg_per_s,
@@ -130,6 +131,7 @@ struct Configuration {
   WheelSimulation wheels;
   CanLineOptions can;
   LineOptions line;                      ///< all but the baud rate
+  bool has_pc_rate = false;              ///< line.clock has a rate that is given, not drawn
   std::vector<StudySimulation> studies;  ///< one for each device with role study, in its order
   std::vector<Fault> faults;             ///< of a fault script
   std::string fault_text;                ///< the script as read; empty where there is none

@@ -187,8 +187,10 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
   if (auto checked = check_faults(world); !checked) return tl::unexpected(checked.error());
   if (options.folder) {
     if (auto made = make_folder(*options.folder); !made) return tl::unexpected(made.error());
-    for (const auto& write : {write_truth_json, write_truth_csv})
-      if (auto written = write(world, *options.folder); !written) return tl::unexpected(written.error());
+    if (auto written = write_truth_json(world, *options.folder); !written)
+      return tl::unexpected(written.error());
+    if (auto written = write_truth_csv(world, *options.folder); !written)
+      return tl::unexpected(written.error());
   }
   auto ports = open_ports(world, options);
   if (!ports) return tl::unexpected(ports.error());

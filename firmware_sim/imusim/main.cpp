@@ -40,6 +40,7 @@ struct Common {
   std::optional<std::string> faults;
   std::optional<WorldKind> world;
   std::optional<int> reference;
+  std::optional<double> pc_ppm;
 
   void add_to(CLI::App& command) {
     command.add_option("CONFIG", config, "configuration with a [simulation] table, such as config/demo.toml")
@@ -57,6 +58,8 @@ struct Common {
                     "noise of the reference, from 1 (0.0015 deg/sqrt(h)) to 5 (4.8), instead of the "
                     "configuration's")
         ->check(CLI::Range(1, kReferenceClasses));
+    command.add_option("--pc-ppm", pc_ppm, "rate of the PC's clock, instead of the configuration's or drawn")
+        ->check(CLI::Range(-1000.0, 1000.0));
     command.add_option("--faults", faults,
                        "fault script: what goes wrong, and when; config/faults.toml explains it");
   }
@@ -66,6 +69,10 @@ struct Common {
     if (configuration && seed) configuration->scenario.seed = *seed;
     if (configuration && world) configuration->world = *world;
     if (configuration && reference) configuration->reference.noise = reference_class(*reference);
+    if (configuration && pc_ppm) {
+      configuration->line.clock.rate_ppm = *pc_ppm;
+      configuration->has_pc_rate = true;
+    }
     if (configuration && faults) {
       if (auto loaded = load_faults(*faults, *configuration); !loaded) return tl::unexpected(loaded.error());
     }
@@ -148,6 +155,8 @@ int run(int argc, char** argv) {
   record->add_option("--out", record_command.folder, "folder to write to")->required();
   record->add_flag("--errors", record_command.options.true_errors,
                    "also write every S-IMU's true errors: errors_truth_NAME.csv");
+  record->add_option("--truth-hz", record_command.options.truth_rows_hz, "rows of truth.csv a second")
+      ->check(CLI::Range(1.0, 1000.0));
   record->callback([&] { work = [&] { return record_command.run(); }; });
 
   LiveCommand live_command;

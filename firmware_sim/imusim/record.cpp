@@ -109,7 +109,8 @@ Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::fi
   return recorded;
 }
 
-/// The host's wall clock agrees with the scenario's: a log of candump is stamped with UTC.
+/// The host's wall clock agrees with the scenario's at its beginning and then runs as the PC's clocks do: a
+/// log of candump is stamped with it.
 std::string candump_line(const CanFrame& frame, const std::string& interface, Utc stamp) {
   const auto us = std::chrono::round<std::chrono::microseconds>(stamp.time_since_epoch()).count();
   constexpr std::int64_t kUsPerSecond = 1'000'000;
@@ -126,8 +127,9 @@ Outcome<Recorded> record_can_device(World& world, WorldDevice& device, const std
   Recorded recorded{device.played.name, 0, 0};
   const std::string interface = device.played.can_interface.empty() ? "can0" : device.played.can_interface;
   const auto on_frame = [&](const CanFrame& frame, double t_s) {
+    const double wall_s = world.pc_clock().seconds_at(t_s);
     const std::string line = candump_line(
-        frame, interface, utc_without_leap_second(gps_after(world.configuration().utc_begin, t_s)));
+        frame, interface, utc_without_leap_second(gps_after(world.configuration().utc_begin, wall_s)));
     log.write(line);
     recorded.bytes += line.size();
     ++recorded.reads;
@@ -200,8 +202,10 @@ Outcome<std::vector<Recorded>> record(const Configuration& configuration, const 
     if (auto written = write_file(options.folder / "faults.toml", configuration.fault_text); !written)
       return tl::unexpected(written.error());
   }
-  for (const auto& write : {write_truth_json, write_truth_csv})
-    if (auto written = write(world, options.folder); !written) return tl::unexpected(written.error());
+  if (auto written = write_truth_json(world, options.folder); !written)
+    return tl::unexpected(written.error());
+  if (auto written = write_truth_csv(world, options.folder, options.truth_rows_hz); !written)
+    return tl::unexpected(written.error());
   if (auto copied = copy_dbc(configuration, options.folder); !copied) return tl::unexpected(copied.error());
 
   std::vector<std::unique_ptr<OutputFile>> error_files;

@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "firmware_sim/imusim/failure.h"
+#include "firmware_sim/imusim/truth_files.h"
 #include "firmware_sim/imusim/world.h"
 
 namespace imusim {
@@ -17,6 +18,7 @@ struct RecordOptions {
   bool true_errors = false;  ///< also errors_truth_NAME.csv of each S-IMU
   /// Told the share of the work that is done, 0 to 1, from the calling thread; may be empty.
   std::function<void(double)> on_progress;
+  double truth_rows_hz = kTruthRows_hz;
 };
 
 /// What was written.

@@ -145,6 +145,14 @@ Outcome<void> write_truth_json(const World& world, const std::filesystem::path& 
   truth["t0_utc"] =
       utc_text(utc_without_leap_second(gps_after(configuration.utc_begin, world.first_reference_sample_s())));
   truth["world"] = configuration.world == WorldKind::kIdeal ? "ideal" : "harsh";
+  const PcClock& clock = world.pc_clock();
+  truth["pc_clock"] = {{"rate_ppm", clock.rate_ppm},
+                       {"warm_up_ppm", clock.warm_up_ppm},
+                       {"counted_s", clock.seconds_at(configuration.scenario.duration_s)},
+                       {"slews", json::array()}};
+  for (const PcClock::Slew& slew : clock.slews)
+    truth["pc_clock"]["slews"].push_back(
+        {{"begin_s", slew.begin_s}, {"end_s", slew.end_s}, {"ppm", slew.ppm}});
   truth["reference"] = {{"name", world.reference().name}};
   add_sensor(world.reference().errors, truth["reference"]);
   truth["imus"] = json::array();
@@ -152,8 +160,7 @@ Outcome<void> write_truth_json(const World& world, const std::filesystem::path& 
   return write_file(folder / "truth.json", truth.dump(1) + "\n");
 }
 
-Outcome<void> write_truth_csv(const World& world, const std::filesystem::path& folder) {
-  constexpr double kRowsPerSecond = 10.0;
+Outcome<void> write_truth_csv(const World& world, const std::filesystem::path& folder, double rows_hz) {
   fmt::memory_buffer text;
   const auto out = std::back_inserter(text);
   fmt::format_to(out,
@@ -161,7 +168,7 @@ Outcome<void> write_truth_csv(const World& world, const std::filesystem::path& f
                  "regime\n");
   const double begin_s = world.first_reference_sample_s();
   for (int row = 0;; ++row) {
-    const double time_s = row / kRowsPerSecond;
+    const double time_s = row / rows_hz;
     if (begin_s + time_s > world.motion().duration_s()) break;
     const MotionState state = world.motion().state_at(begin_s + time_s);
     fmt::format_to(out, "{},{:.12f},{:.12f},{:.6f},{:.7f},{:.7f},{:.7f},{:.9f},{:.9f},{:.9f},{}\n", time_s,

@@ -14,8 +14,11 @@ namespace imusim {
 /// Writes truth.json: per S-IMU mounting, biases, scales, latencies, sample times and noise parameters.
 Outcome<void> write_truth_json(const World& world, const std::filesystem::path& folder);
 
-/// Writes truth.csv, ten rows a second from the R-IMU's first sample to the end of the scenario.
-Outcome<void> write_truth_csv(const World& world, const std::filesystem::path& folder);
+/// Rows of truth.csv where nothing else is asked for: as many as imuscope's navigation.csv has.
+inline constexpr double kTruthRows_hz = 10.0;
+/// Writes truth.csv from the R-IMU's first sample to the end of the scenario.
+Outcome<void> write_truth_csv(const World& world, const std::filesystem::path& folder,
+                              double rows_hz = kTruthRows_hz);
 
 /// The header and a row of errors_truth_NAME.csv: the columns of imuscope's errors_NAME.csv.
 std::string error_header();

@@ -136,6 +136,12 @@ class NavigationSolution {
 
 World::World(const Configuration& configuration, Beginning beginning, double begin_s)
     : configuration_(configuration), motion_(motion_of(configuration)) {
+  if (configuration_.world == WorldKind::kHarsh) {
+    const double given_ppm = configuration_.line.clock.rate_ppm;
+    configuration_.line.clock =
+        PcClock::drawn(Random(configuration_.scenario.seed, "pc clock"), configuration_.scenario.duration_s);
+    if (configuration_.has_pc_rate) configuration_.line.clock.rate_ppm = given_ppm;
+  }
   std::size_t next_study = 0;
   for (const PlayedDevice& played : configuration_.devices) {
     switch (played.role) {

@@ -87,6 +87,9 @@ class World {
   /// Instant of the R-IMU's first sample at or after the beginning: what time_s counts from.
   [[nodiscard]] double first_reference_sample_s() const { return first_reference_sample_s_; }
 
+  /// The clock of the PC that reads the devices.
+  [[nodiscard]] const PcClock& pc_clock() const { return configuration_.line.clock; }
+
   /// The line of a device to the host.
   [[nodiscard]] SerialLine line_of(const PlayedDevice& played) const;
 

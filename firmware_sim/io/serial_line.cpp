@@ -99,7 +99,7 @@ void SerialLine::deliver_until(double t_s, const OnRead& on_read) {
     flushed_at_s_ = next.at_s;
     const double delivered_s = options_.reads == ReadModel::kFtdi ? next_usb_frame(next.at_s) : next.at_s;
     const double jitter_s = -options_.jitter_mean_s * std::log(1.0 - random_.uniform());
-    const double host_s = (delivered_s + jitter_s) * (1.0 + options_.host_skew_ppm * 1e-6);
+    const double host_s = options_.clock.seconds_at(delivered_s + jitter_s);
     last_arrival_ns_ = std::max(
         last_arrival_ns_, options_.host_begin_ns + static_cast<std::int64_t>(std::llround(host_s * 1e9)));
     on_read(read_, last_arrival_ns_);

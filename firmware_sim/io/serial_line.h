@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "firmware_sim/devices/device.h"
+#include "firmware_sim/io/pc_clock.h"
 #include "firmware_sim/random/random.h"
 
 namespace imusim {
@@ -40,11 +41,10 @@ struct Unplugged {
 struct LineOptions {
   ReadModel reads = ReadModel::kUsbFrames;
   int baud = 115200;
-  double jitter_mean_s = 30e-6;  ///< mean delay of a read, exponentially distributed: the host's scheduler
-  double usb_phase_s = 0.0;      ///< time of a USB frame
-  // The host's clock at the scenario's time 0, and how fast it is.
-  std::int64_t host_begin_ns = 0;
-  double host_skew_ppm = 0.0;
+  double jitter_mean_s = 30e-6;    ///< mean delay of a read, exponentially distributed: the host's scheduler
+  double usb_phase_s = 0.0;        ///< time of a USB frame
+  std::int64_t host_begin_ns = 0;  ///< the host's clock at the scenario's time 0
+  PcClock clock;
   std::vector<HeldReads> holds;
   std::vector<Unplugged> unplugged;
 };

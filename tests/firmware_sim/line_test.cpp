@@ -4,9 +4,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
 
+#include "firmware_sim/io/pc_clock.h"
 #include "firmware_sim/io/serial_line.h"
 #include "firmware_sim/io/tcp_server.h"
 
@@ -116,13 +118,44 @@ TEST(SerialLine, TheHostsClockHasItsOwnOriginAndRate) {
   options.reads = ReadModel::kMessages;
   options.jitter_mean_s = 0.0;
   options.host_begin_ns = 5'000'000'000;
-  options.host_skew_ppm = 100.0;
+  options.clock.rate_ppm = 100.0;
   SerialLine line(options, Random(1, "line"));
   line.send({100.0, Bytes{1}});
   std::int64_t arrival = 0;
   line.deliver_until(200.0,
                      [&](std::span<const std::uint8_t>, std::int64_t arrival_ns) { arrival = arrival_ns; });
   EXPECT_NEAR(static_cast<double>(arrival), 5e9 + (100.0 + 10.0 / 115200) * 1e9 * (1.0 + 100e-6), 2.0);
+}
+
+TEST(PcClock, CountsTheIntegralOfItsRate) {
+  const PcClock clock = PcClock::drawn(Random(7, "pc clock"), 900.0);
+  EXPECT_LE(std::abs(clock.rate_ppm), 50.0);
+  EXPECT_GT(clock.slews.size(), 13U);
+  double counted_s = clock.seconds_at(0.0);
+  EXPECT_EQ(counted_s, 0.0);
+  constexpr double kStep_s = 1e-3;
+  double fastest_ppm = 0.0;
+  for (int k = 0; k < 900'000; ++k) {
+    const double t_s = (k + 0.5) * kStep_s;
+    counted_s += kStep_s * (1.0 + 1e-6 * clock.ppm_at(t_s));
+    fastest_ppm = std::max(fastest_ppm, std::abs(clock.ppm_at(t_s)));
+  }
+  // A step may hold the end of a slew: 500 ppm of 1 ms, thirty times.
+  EXPECT_NEAR(clock.seconds_at(900.0), counted_s, 30 * 500e-6 * kStep_s);
+  EXPECT_GT(fastest_ppm, 440.0);  // the 5 ms
+}
+
+TEST(PcClock, StandsWhileThePcSleepsAndRunsWarm) {
+  PcClock clock;
+  clock.suspends.push_back({100.0, 130.0});
+  EXPECT_EQ(clock.seconds_at(99.0), 99.0);
+  EXPECT_EQ(clock.seconds_at(115.0), 100.0);
+  EXPECT_EQ(clock.seconds_at(200.0), 170.0);
+  PcClock warm;
+  warm.warm_up_ppm = 2.0;
+  warm.warm_up_s = 600.0;
+  EXPECT_NEAR(warm.ppm_at(600.0), 2.0 * (1.0 - std::exp(-1.0)), 1e-12);
+  EXPECT_NEAR(warm.seconds_at(600.0) - 600.0, 2e-6 * 600.0 * std::exp(-1.0), 1e-12);
 }
 
 /// A program that connects to a server of this PC.

@@ -18,6 +18,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,7 @@
 #include "service/recording.h"
 #include "service/replay.h"
 #include "tools/benchmarks/own_folder.h"
+#include "tools/studies/navigation_score.h"
 #include "tools/studies/study_score.h"
 
 namespace {
@@ -43,14 +45,26 @@ const Vector3d kGoalR_mm(0.65, 0.55, 0.45);
 constexpr double kThroughBytes = 1.2;
 constexpr double kGoalTimeOffset_us = 200.0;
 
-/// Keeps the last snapshot.
+/// Keeps the last snapshot, and holds the navigation against the truth.
 class Last final : public imuscope::CoreSink {
  public:
+  explicit Last(const study_score::NavigationTruth& truth) : truth_(truth) {}
   void on_error(const imuscope::ErrorRecord&) noexcept override {}
   void on_event(const imuscope::EstimatorEvent&) noexcept override {}
-  void on_snapshot(const imuscope::Snapshot& snapshot) noexcept override { last = snapshot; }
+  void on_snapshot(const imuscope::Snapshot& snapshot) noexcept override {
+    last = snapshot;
+    if (snapshot.tick >= kSettled_ticks && snapshot.tick % kEvery_ticks == 0)
+      navigation.add(snapshot.navigation, truth_);
+  }
   void on_late_sample(const imuscope::LateSample&) noexcept override {}
   imuscope::Snapshot last{};
+  study_score::NavigationScore navigation;
+
+ private:
+  // From two minutes on, every ten seconds.
+  static constexpr std::int64_t kSettled_ticks = 12'000;
+  static constexpr std::int64_t kEvery_ticks = 1'000;
+  const study_score::NavigationTruth& truth_;
 };
 
 struct Options {
@@ -62,6 +76,7 @@ struct Options {
   std::string folder;
   std::string world = "harsh";
   int reference_class = 1;
+  std::optional<double> pc_ppm;
 
   /// Whether errors are held against what the filter reaches where it models all there is.
   [[nodiscard]] bool has_accuracy_goals() const { return world == "ideal" && reference_class == 1; }
@@ -84,6 +99,7 @@ struct Totals {
   Vector3d r2 = Vector3d::Zero();
   Vector3d r_var = Vector3d::Zero();
   study_score::StudyScore score;
+  study_score::NavigationScore navigation;
   double t_d_var = 0.0;
   std::vector<double> processor_s;  ///< from the files' bytes to the calibration, per drive
   std::map<std::string, Device> devices;
@@ -147,10 +163,12 @@ void tell_noise_of(int reference_class, imuscope::ReferenceConfig& reference) {
 imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& totals) {
   const bench::OwnFolder own(options.folder);
   const auto& recording = own.path();
+  const std::string pc_clock = options.pc_ppm ? fmt::format("--pc-ppm {}", *options.pc_ppm) : "";
   const std::string command = fmt::format(
-      "'{}' record '{}' --minutes {} --seed {} --world {} --reference-class {} --out '{}' >/dev/null",
+      "'{}' record '{}' --minutes {} --seed {} --world {} --reference-class {} --truth-hz 100 {} --out '{}' "
+      ">/dev/null",
       options.simulator, options.config, options.minutes, seed, options.world, options.reference_class,
-      recording.string());
+      pc_clock, recording.string());
   if (std::system(command.c_str()) != 0) return imuscope::work_error("this failed: " + command);
   const auto config = recording / "config.toml";
   const auto configuration = imuscope::load_configuration(config);
@@ -160,14 +178,17 @@ imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& t
     const auto file = recording / (device.name + ".bin");
     if (std::filesystem::exists(file)) inputs.push_back(fmt::format("{}={}", device.name, file.string()));
   }
+  const auto known = study_score::NavigationTruth::read(recording);
+  if (!known) return tl::unexpected<imuscope::Error>(known.error());
   const double begin_s = processor_time_s();
   const auto opened = imuscope::open_recording(inputs, config);
   if (!opened) return tl::unexpected<imuscope::Error>(opened.error());
-  Last sink;
+  Last sink(*known);
   imuscope::EstimatorConfig estimator = imuscope::estimator_config(opened->configuration);
   tell_noise_of(options.reference_class, estimator.reference);
   const auto replayed = imuscope::replay(opened->configuration, estimator, opened->recording, sink);
   if (!replayed) return tl::unexpected<imuscope::Error>(replayed.error());
+  totals.navigation.add(sink.navigation);
   totals.processor_s.push_back(processor_time_s() - begin_s);
   std::ifstream in(recording / "truth.json");
   const json truth = json::parse(in);
@@ -241,7 +262,7 @@ bool print(const Options& options, const Totals& t) {
   const double nees_sd = std::sqrt(12.0 / t.n);
   fmt::print("  NEES (6) mean {:.2f}, 95 % band of the mean {:.2f} to {:.2f}\n", t.score.nees6(),
              6.0 - 1.96 * nees_sd, 6.0 + 1.96 * nees_sd);
-  fmt::print("{}", t.score.table());
+  fmt::print("{}{}", t.score.table(), t.navigation.table());
   for (const auto& [name, device] : t.devices) print(name, device);
   std::vector<double> times = t.processor_s;
   std::sort(times.begin(), times.end());
@@ -275,6 +296,7 @@ int main(int argc, char** argv) {
                  "harsh: sensors with all that data sheets allow and the filter is not told; ideal: bias, "
                  "scale and noise alone")
       ->check(CLI::IsMember({"ideal", "harsh"}));
+  app.add_option("--pc-ppm", options.pc_ppm, "rate of the PC's clock; 0 in the ideal world, else drawn");
   app.add_option("--reference-class", options.reference_class,
                  "noise of the reference, which the filter is told: 1 (0.0015 deg/sqrt(h)) to 5 (4.8)")
       ->check(CLI::Range(1, imusim::kReferenceClasses));

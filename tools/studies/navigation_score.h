@@ -1,0 +1,56 @@
+#pragma once
+
+/// How far the navigation of a run is off beside what was claimed for it, at instants that UTC names on both
+/// sides.
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "calibration/estimator.h"
+#include "tools/studies/study_score.h"
+
+namespace study_score {
+
+/// The rows of a simulator's truth.csv, found by UTC.
+class NavigationTruth {
+ public:
+  /// @param folder  of a recording: truth.json says what UTC the rows begin at
+  static imuscope::Result<NavigationTruth> read(const std::filesystem::path& folder);
+
+  struct Row {
+    double latitude_rad;
+    double longitude_rad;
+    double height_m;
+    imuscope::Vector3 v_n_mps;
+    imuscope::Vector3 rpy_rad;
+  };
+  /// The row within half a millisecond of an instant; null where there is none.
+  [[nodiscard]] const Row* at(imuscope::UtcTime utc) const;
+
+ private:
+  imuscope::UtcTime begin_{};
+  double rows_hz_ = 0.0;
+  std::vector<Row> rows_;
+};
+
+/// Heading, level, velocity and position, from a minute after the navigation's beginning on. Errors of one
+/// drive hang together over minutes: a mean over drives is what tells.
+class NavigationScore {
+ public:
+  void add(const imuscope::NavigationOutput& out, const NavigationTruth& truth);
+  void add(const NavigationScore& other);
+  [[nodiscard]] std::string table() const;
+  [[nodiscard]] const StateScore& heading() const { return heading_; }
+
+ private:
+  StateScore heading_;
+  StateScore level_;
+  StateScore velocity_;
+  StateScore position_;
+};
+
+}  // namespace study_score
