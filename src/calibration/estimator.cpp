@@ -117,6 +117,7 @@ class Estimator::Impl final : public EpochSink {
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept { return navigation_.output(); }
   [[nodiscard]] const OdometryOutput& odometry() const noexcept { return odometry_.output(); }
+  [[nodiscard]] const TimeScale& time_scale() const noexcept { return navigation_.time_scale(); }
   [[nodiscard]] std::size_t study_count() const noexcept { return studies_.size(); }
   [[nodiscard]] const StudyOutput& study(std::size_t i) const noexcept { return studies_[i].output(); }
   [[nodiscard]] std::span<const StudyEpoch> epochs() const noexcept { return epochs_; }
@@ -241,6 +242,7 @@ void Estimator::advance(HostTime cut) noexcept { impl_->advance(cut); }
 void Estimator::set_noise(std::size_t study, const StudyNoise& noise) noexcept {
   impl_->set_noise(study, noise);
 }
+const TimeScale& Estimator::time_scale() const noexcept { return impl_->time_scale(); }
 const NavigationOutput& Estimator::navigation() const noexcept { return impl_->navigation(); }
 const OdometryOutput& Estimator::odometry() const noexcept { return impl_->odometry(); }
 std::size_t Estimator::study_count() const noexcept { return impl_->study_count(); }

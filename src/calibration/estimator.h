@@ -15,6 +15,7 @@
 #include "base/time.h"
 #include "calibration/estimator_config.h"
 #include "sample/sample.h"
+#include "sample/utc_scale.h"
 
 namespace imuscope {
 
@@ -267,6 +268,8 @@ class Estimator {
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept;
   [[nodiscard]] const OdometryOutput& odometry() const noexcept;
+  /// UTC against the host's clock, as the devices tell it; what rates are integrated over.
+  [[nodiscard]] const TimeScale& time_scale() const noexcept;
   [[nodiscard]] std::size_t study_count() const noexcept;
   [[nodiscard]] const StudyOutput& study(std::size_t index) const noexcept;
   /// S samples processed by the last advance(), per S-IMU in the order of time. Valid until the next

@@ -18,6 +18,8 @@ using Eigen::Vector3d;
 
 /// Longest interval that is bridged by interpolating the rates; beyond it the navigation starts anew.
 constexpr double kBridgedGap_s = 1.0;
+/// An interval of UTC is never further from the host's than this share of it.
+constexpr double kIntervalShare = 0.5;
 /// Steps in which a gap is bridged; the transition is a second-order expansion.
 constexpr double kStep_s = 0.05;
 /// What a road vehicle's rate and force may do unseen during a gap, as white noise, rad/s and m/s^2 per
@@ -107,10 +109,22 @@ const NavigationFilter::PastEpoch& NavigationFilter::past(std::size_t back) cons
   return past_[(past_head_ + kPastEpochs - 1 - back) % kPastEpochs];
 }
 
+/// N-56: the interval in seconds of UTC, wherever a device tells them; else in the host's own.
+double NavigationFilter::interval_to(const Sample& sample) noexcept {
+  const double host_s = to_seconds(sample.time - last_time_);
+  const bool was_known = utc_scale_.is_known();
+  if (sample.has_utc) utc_scale_.observe(UtcSource::kReference, sample.time, sample.utc);
+  const double before_s = last_seconds_;
+  last_seconds_ = utc_scale_.seconds_at(sample.time);
+  if (!was_known) return host_s;
+  return std::clamp(last_seconds_ - before_s, (1.0 - kIntervalShare) * host_s,
+                    (1.0 + kIntervalShare) * host_s);
+}
+
 void NavigationFilter::add_reference(const Sample& sample) noexcept {
   const InertialRates measured = rates_of(sample.imu);
+  const double dt_s = interval_to(sample);
   if (has_last_) {
-    const double dt_s = to_seconds(sample.time - last_time_);
     if (navigating() && dt_s > kBridgedGap_s) stop(sample.time, dt_s);
     if (navigating()) {
       carry_over_interval(measured, (sample.imu.flags & kIsIncrement) != 0, dt_s);
@@ -201,7 +215,7 @@ void NavigationFilter::remember(const Sample& sample, const InertialRates& measu
 
 void NavigationFilter::try_start(const Sample& sample) noexcept {
   if (navigation_.initial_rpy_rad) return;  // waits for the first position, in add_gnss()
-  aligner_.add_imu(sample.time, last_);
+  aligner_.add_imu(sample.time, last_, 1.0 + utc_scale_.scale().rate);
   if (const InitialNavigation* found = aligner_.result()) {
     start(found->state, found->sd, method_of(found->method), sample.time);
     remember(sample, last_);
@@ -255,6 +269,7 @@ void NavigationFilter::add_attitude(const Sample& sample) noexcept {
 
 void NavigationFilter::add_gnss(const Sample& sample) noexcept {
   ++counters_.gnss_samples;
+  if (sample.has_utc) utc_scale_.observe(UtcSource::kGnss, sample.time, sample.utc);
   if (!is_finite(sample.gnss)) {
     ++counters_.gnss_not_finite;
     return;

@@ -15,6 +15,7 @@
 #include "navigation/gnss_gate.h"
 #include "navigation/gnss_measurement.h"
 #include "navigation/initial_alignment.h"
+#include "sample/utc_scale.h"
 
 namespace imuscope {
 
@@ -42,6 +43,8 @@ class NavigationFilter {
   /// Writes the newest state and its sd into output().
   void update_output() noexcept;
   [[nodiscard]] const NavigationOutput& output() const noexcept { return output_; }
+  /// The seconds that rates are integrated over.
+  [[nodiscard]] const TimeScale& time_scale() const noexcept { return utc_scale_.scale(); }
 
  private:
   /// State at one R epoch, and the transition that led to it from the epoch before.
@@ -57,6 +60,7 @@ class NavigationFilter {
     double accel_bias_decay;
   };
 
+  [[nodiscard]] double interval_to(const Sample& sample) noexcept;
   void carry_over_interval(const InertialRates& measured, bool is_mean, double dt_s) noexcept;
   void predict(const InertialRates& rates, double dt_s, double extra_rate_noise) noexcept;
   void predict_biases_only(double dt_s) noexcept;
@@ -96,6 +100,8 @@ class NavigationFilter {
 
   bool has_last_ = false;
   HostTime last_time_{};
+  UtcScale utc_scale_;
+  double last_seconds_ = 0.0;  ///< of utc_scale_ at last_time_
   UtcTime last_utc_{};
   bool last_has_utc_ = false;
   std::optional<Duration> gnss_lag_;  ///< of the last solution that was not near a UTC midnight

@@ -103,12 +103,13 @@ void InitialAligner::restart() noexcept {
   *this = InitialAligner(options);
 }
 
-void InitialAligner::add_imu(HostTime time, const InertialRates& measured) noexcept {
+void InitialAligner::add_imu(HostTime time, const InertialRates& measured,
+                             double true_per_host_second) noexcept {
   if (!measured.omega_ib_b_radps.allFinite() || !measured.f_b_mps2.allFinite()) return;
   if (has_imu_ && time <= imu_time_) return;
   if (has_imu_ && to_seconds(time - imu_time_) > kGap_s) restart();
   if (has_imu_) {
-    const double dt_s = to_seconds(time - imu_time_);
+    const double dt_s = true_per_host_second * to_seconds(time - imu_time_);
     integrate(measured, dt_s);
     block_sum_.omega_ib_b_radps += measured.omega_ib_b_radps;
     block_sum_.f_b_mps2 += measured.f_b_mps2;

@@ -76,7 +76,8 @@ class InitialAligner {
 
   /// Adds one R-IMU sample, not compensated, times strictly rising (others are ignored). After a gap of more
   /// than 0.5 s the alignment starts afresh.
-  void add_imu(HostTime time, const InertialRates& measured) noexcept;
+  /// @param true_per_host_second  length of a host second, near 1: rates are integrated over true ones
+  void add_imu(HostTime time, const InertialRates& measured, double true_per_host_second = 1.0) noexcept;
 
   /// Adds one GNSS position of the antenna. At most 0.5 s older than the newest IMU sample.
   /// @param sd_m  NED

@@ -30,7 +30,7 @@ void Broadcast::on_snapshot(const Snapshot& snapshot) {
     anchored_by_device_ = true;
   }
   if (!bus_) return;
-  if (snapshot.navigation.status == NavigationStatus::kNavigating) {
+  if (snapshot.has_new_navigation) {
     bus_->publish(navigation_message(snapshot, anchor_), "NAVIGATION");
     if (bridge_) {
       if (!bridge_origin_) bridge_origin_ = snapshot;

@@ -98,7 +98,11 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   snapshot_.tick = index;
   snapshot_.cut = cut;
   snapshot_.n_studies = estimator_.study_count();
-  snapshot_.navigation = estimator_.navigation();
+  snapshot_.time_scale = estimator_.time_scale();
+  const NavigationOutput& navigation = estimator_.navigation();
+  snapshot_.has_new_navigation =
+      navigation.status == NavigationStatus::kNavigating && navigation.time != snapshot_.navigation.time;
+  snapshot_.navigation = navigation;
   snapshot_.odometry = estimator_.odometry();
   for (std::size_t i = 0; i < snapshot_.n_studies; ++i) snapshot_.studies[i] = estimator_.study(i);
   snapshot_.counters = estimator_.counters();

@@ -40,6 +40,10 @@ struct Snapshot {
   bool has_utc;
   UtcTime first_reference_utc;
   std::size_t n_studies;
+  TimeScale time_scale;  ///< UTC against the host's clock
+  /// `navigation` is one of now: the reference went on since the snapshot before. What is stale is neither
+  /// written nor sent.
+  bool has_new_navigation;
   NavigationOutput navigation;
   OdometryOutput odometry;
   ImuData reference;  ///< newest sample of the R-IMU as measured; zero before the first

@@ -93,6 +93,28 @@ nlohmann::json gnss_json(const EstimatorCounters& counters) {
           {"contradicts_motion", contradicts_motion(counters)}};
 }
 
+/// Whose seconds the run's rates were integrated over. "host": nothing told UTC.
+nlohmann::json time_scale_json(const Snapshot* last) {
+  const TimeScale scale = last != nullptr ? last->time_scale : TimeScale{};
+  const char* sources[] = {"host", "reference", "gnss"};
+  nlohmann::json json{{"seconds_of", sources[static_cast<std::size_t>(scale.source)]},
+                      {"sd_rate_ppm", 1e6 * scale.sd_rate}};
+  if (scale.source == UtcSource::kNone) return json;
+  json["host_clock_ppm"] = -1e6 * scale.rate;
+  json["sd_utc_s"] = scale.sd_utc_s;
+  json["steps"] = scale.steps;
+  return json;
+}
+
+/// Navigation alone integrates; a mounting does not depend on the length of a second.
+void warn_of_host_seconds(const Snapshot& last, std::vector<std::string>& warnings) {
+  if (last.time_scale.source != UtcSource::kNone) return;
+  if (last.navigation.status != NavigationStatus::kNavigating) return;
+  warnings.push_back(
+      "no device tells UTC: rates were integrated over seconds of the arrivals' clock, which may be wrong by "
+      "50 ppm, and headings turn by as much of every turn");
+}
+
 }  // namespace
 
 std::vector<std::string> warnings_of(const Configuration& configuration, const Snapshot& last) {
@@ -106,6 +128,7 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
         configuration.devices[*gnss].name, counters.gnss_positions_rejected,
         counters.gnss_used + counters.gnss_rejected));
   }
+  warn_of_host_seconds(last, warnings);
   const auto indices = configuration.study_indices();
   for (std::size_t i = 0; i < last.n_studies; ++i) {
     if (last.studies[i].status >= StudyStatus::kConverging) continue;
@@ -132,6 +155,7 @@ nlohmann::json run_json(const RunRecord& run) {
   json["t0_utc"] = run.last != nullptr && run.last->has_utc
                        ? nlohmann::json(utc_text(run.last->first_reference_utc))
                        : nlohmann::json(nullptr);
+  json["time_scale"] = time_scale_json(run.last);
   if (run.static_s && run.dynamic_s)
     json["regimes"] = {{"static_s", *run.static_s}, {"dynamic_s", *run.dynamic_s}};
   json["devices"] = nlohmann::json::array();

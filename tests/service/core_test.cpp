@@ -107,6 +107,38 @@ TEST(Core, ARefitsModelIsTakenOverAtTheNextTickAndAReplayTakesItThere) {
   EXPECT_DOUBLE_EQ(replayed.noises[0].model.noise.gyro[0].white_sd[1], 0.123);
 }
 
+TEST(Core, ANavigationWhoseReferenceIsGoneIsNotNew) {
+  EstimatorConfig config = one_study();
+  config.gnss.enabled = true;
+  config.gnss.device = 2;
+  config.navigation.initial_rpy_rad = Vector3{};
+  Core core(config, 3);
+  Notes notes;
+  for (std::int64_t tick = 1; tick <= 100; ++tick) {
+    const double now_ms = 10.0 * static_cast<double>(tick);
+    if (tick <= 60) {
+      const auto sequence = static_cast<std::uint64_t>(tick);
+      ASSERT_TRUE(core.ring(0).try_push(imu_sample(0, sequence, now_ms - 2.0)));
+      Sample fix{};
+      fix.kind = SampleKind::kGnss;
+      fix.device = 2;
+      fix.sequence = sequence;
+      fix.arrival = at_ms(now_ms - 1.0);
+      fix.time = at_ms(now_ms - 3.0);
+      fix.gnss.latitude_rad = 0.8;
+      fix.gnss.sd_position_m = {0.01, 0.01, 0.02};
+      fix.gnss.solution = GnssSolution::kFixed;
+      fix.gnss.flags = kPositionValid | kHasPositionSd;
+      ASSERT_TRUE(core.ring(2).try_push(fix));
+    }
+    core.tick(tick, at_ms(now_ms), notes);
+  }
+  ASSERT_EQ(notes.snapshots.size(), 10U);
+  ASSERT_EQ(notes.snapshots.back().navigation.status, NavigationStatus::kNavigating);
+  for (const Snapshot& snapshot : notes.snapshots)
+    EXPECT_EQ(snapshot.has_new_navigation, snapshot.tick > 0 && snapshot.tick <= 60) << snapshot.tick;
+}
+
 TEST(Core, TheOriginOfTimesIsTheFirstReferenceEpoch) {
   Core core(one_study(), 2);
   Notes notes;

@@ -1,0 +1,67 @@
+#pragma once
+
+/// Seconds of UTC on the host's time scale. A PC's quartz is wrong by tens of ppm, and a rate that is
+/// integrated over its seconds turns too far or too little by as much. Whatever tells UTC tells the length of
+/// a second: the scale follows those tags smoothly, so that an interval between two instants is one of true
+/// seconds and no tick of a device shows in it.
+///
+/// Kalman filter of two states, UTC minus host time and its rate: both wander, the first as a clock map's
+/// line does that settles, the second as a quartz does that warms up. The tags' errors are taken as white.
+///
+/// Deterministic: a function of the observations alone.
+
+#include <cstdint>
+
+#include "base/time.h"
+
+namespace imuscope {
+
+/// Who told UTC.
+enum class UtcSource : std::uint8_t { kNone, kReference, kGnss };
+
+/// The scale at one instant, for those who show or record it.
+struct TimeScale {
+  UtcSource source = UtcSource::kNone;  ///< kNone: seconds are the host's own, within sd_rate
+  HostTime time{};                      ///< of the newest observation
+  UtcTime utc{};                        ///< at `time`
+  double sd_utc_s = 0.0;                ///< of the tags' mean against the line through them
+  double rate = 0.0;                    ///< UTC seconds per host second, minus 1
+  double sd_rate = 50e-6;
+  std::uint32_t steps = 0;  ///< times that the tags stepped by more than the scale can follow
+};
+
+/// Core: no allocation, noexcept. Not thread-safe; trivially copyable.
+class UtcScale {
+ public:
+  /// A time of validity on both scales. Of several devices, the R-IMU is believed as long as it tells UTC; a
+  /// receiver's tags count where it has not for some seconds. Times need not rise; an observation that is
+  /// older than the last one is left out.
+  void observe(UtcSource source, HostTime time, UtcTime utc) noexcept;
+
+  /// True seconds since an instant that never moves: differences are intervals. Tags that step (a leap
+  /// second, a receiver that found the time) leave it alone.
+  [[nodiscard]] double seconds_at(HostTime time) const noexcept;
+
+  [[nodiscard]] bool is_known() const noexcept { return scale_.source != UtcSource::kNone; }
+  [[nodiscard]] const TimeScale& scale() const noexcept { return scale_; }
+
+ private:
+  [[nodiscard]] double offset_at(HostTime time) const noexcept;
+  void begin(UtcSource source, HostTime time, UtcTime utc) noexcept;
+  void predict(double step_s) noexcept;
+  void publish(UtcSource source) noexcept;
+
+  TimeScale scale_;
+  HostTime origin_{};     ///< of seconds_at()
+  UtcTime utc_origin_{};  ///< what origin_ is in UTC where offset_s_ is zero; moves with steps
+  HostTime last_{};
+  HostTime last_reference_{};
+  double offset_s_ = 0.0;  ///< UTC minus host time, since the origins
+  double rate_ = 0.0;
+  double p_offset_ = 0.0;  ///< covariance
+  double p_rate_ = 0.0;
+  double p_both_ = 0.0;
+  int astray_in_a_row_ = 0;
+};
+
+}  // namespace imuscope
