@@ -200,6 +200,7 @@ TEST(Recorder, WhatIsHeardKeepsItsInstantThoughTheWallClockSteps) {
   event.utime = 1;
   event.source = "test";
   event.text = "regime gravel";
+  RawTap(*ring).record(0, Direction::kRead, Bytes{9}, host_now());
   (*recorder)->record_heard("IMUSCOPE_EVENT", heard, encode_message(event));
   ASSERT_TRUE((*recorder)->stop().has_value());
   const auto summary = summarise_capture(path);

@@ -111,6 +111,7 @@ TEST(Core, ANavigationWhoseReferenceIsGoneIsNotNew) {
   EstimatorConfig config = one_study();
   config.gnss.enabled = true;
   config.gnss.device = 2;
+  config.navigation.enabled = true;
   config.navigation.initial_rpy_rad = Vector3{};
   Core core(config, 3);
   Notes notes;
