@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/contracts.h"
+#include "base/limits.h"
 
 namespace imuscope {
 
@@ -72,7 +73,8 @@ bool all_finite(const Vector3& v) noexcept {
 
 }  // namespace
 
-ReferenceWindow::ReferenceWindow(const ReferenceWindowOptions& options) noexcept : options_(options) {
+ReferenceWindow::ReferenceWindow(const ReferenceWindowOptions& options)
+    : options_(options), ring_(reference_past_capacity(1.0 / options.period_s)) {
   IMUSCOPE_EXPECTS(options.points == 5 || options.points == 7 || options.points == 9 || options.points == 11);
   IMUSCOPE_EXPECTS(options.period_s > 0.0);
 }
@@ -96,13 +98,13 @@ bool ReferenceWindow::push(const Sample& sample) noexcept {
   if (has_acceleration)
     std::copy_n(imu.angular_acceleration_radps2.data(), 3, entry.values.data() + kAngularAcceleration);
   ring_[head_] = entry;
-  head_ = (head_ + 1) % kCapacity;
-  size_ = std::min(size_ + 1, kCapacity);
+  head_ = (head_ + 1) % ring_.size();
+  size_ = std::min(size_ + 1, ring_.size());
   return true;
 }
 
 const ReferenceWindow::Entry& ReferenceWindow::at(std::size_t index) const noexcept {
-  return ring_[(head_ + kCapacity - size_ + index) % kCapacity];
+  return ring_[(head_ + ring_.size() - size_ + index) % ring_.size()];
 }
 
 std::size_t ReferenceWindow::nearest(HostTime time) const noexcept {

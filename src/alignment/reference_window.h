@@ -14,6 +14,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "base/time.h"
 #include "sample/sample.h"
@@ -49,9 +50,8 @@ struct ReferenceWindowOptions {
 
 class ReferenceWindow {
  public:
-  static constexpr std::size_t kCapacity = 256;
-
-  explicit ReferenceWindow(const ReferenceWindowOptions& options) noexcept;
+  /// Allocates room for kReferencePast_s at the nominal rate (base/limits.h).
+  explicit ReferenceWindow(const ReferenceWindowOptions& options);
 
   /// Adds an R-IMU sample. Rates flagged kIsIncrement are means over the interval before the stamp; they are
   /// placed half a period earlier, and the averaging's loss of amplitude is undone from the fit.
@@ -77,7 +77,7 @@ class ReferenceWindow {
   [[nodiscard]] std::size_t nearest(HostTime time) const noexcept;
 
   ReferenceWindowOptions options_;
-  std::array<Entry, kCapacity> ring_;
+  std::vector<Entry> ring_;
   std::size_t head_ = 0;  ///< where the next sample goes
   std::size_t size_ = 0;
 };

@@ -17,8 +17,6 @@
 namespace imuscope {
 namespace {
 
-/// S samples that one tick can show: 0.5 s of six sensors at 400 Hz, so that a stall is caught up in one go.
-constexpr std::size_t kEpochsPerTick = 1200;
 /// At standstill f_z of forward-right-down axes is about -9.8; above this it points elsewhere.
 constexpr double kGravityWrong_mps2 = -8.0;
 /// And its magnitude, whatever the axes, is gravity's to this.
@@ -138,7 +136,7 @@ class Estimator::Impl final : public EpochSink {
     const double dt_s = has_reference_ ? to_seconds(sample.time - last_reference_) : 0.0;
     if (dt_s > 1.5 / config_.reference.rate_hz) {
       ++counters_.reference_gaps;
-      log_.add(EstimatorEventKind::kReferenceGap, sample.device, sample.time, dt_s);
+      log_.add(event::ReferenceGap{dt_s}, sample.device, sample.time);
     }
     has_reference_ = true;
     last_reference_ = sample.time;
@@ -155,7 +153,7 @@ class Estimator::Impl final : public EpochSink {
     next_history_ = last_reference_ + history_->interval();
     std::array<bool, kMaxStudies> calibrating{};
     for (std::size_t i = 0; i < studies_.size(); ++i)
-      calibrating[i] = studies_[i].output().status >= StudyStatus::kConverging;
+      calibrating[i] = has_estimate(studies_[i].output().status);
     history_->on_history(
         {last_reference_, navigation_.navigating(), calibrating, core_, core_.accumulated()});
     core_.restart_accumulation();
@@ -168,10 +166,9 @@ class Estimator::Impl final : public EpochSink {
     if (is_gravity && regime_.mean_f_mps2().z() < kGravityWrong_mps2) return;
     gravity_told_ = true;
     if (is_gravity) {
-      log_.add(EstimatorEventKind::kReferenceGravityWrong, sample.device, sample.time,
-               regime_.mean_f_mps2().z());
+      log_.add(event::ReferenceGravityWrong{regime_.mean_f_mps2().z()}, sample.device, sample.time);
     } else {
-      log_.add(EstimatorEventKind::kGravityMagnitudeWrong, sample.device, sample.time, magnitude);
+      log_.add(event::GravityMagnitudeWrong{magnitude}, sample.device, sample.time);
     }
   }
 
@@ -184,8 +181,7 @@ class Estimator::Impl final : public EpochSink {
             !studies_[j].fits_prior_of(studies_[i].config()))
           continue;
         swap_told_[i] = swap_told_[j] = true;
-        log_.add(EstimatorEventKind::kStudiesSwapped, studies_[j].config().device, now,
-                 static_cast<double>(studies_[i].config().device));
+        log_.add(event::StudiesSwapped{studies_[i].config().device}, studies_[j].config().device, now);
       }
     }
   }
@@ -203,8 +199,7 @@ class Estimator::Impl final : public EpochSink {
     }
     if (repaired == 0) return;
     counters_.covariance_repairs += repaired;
-    log_.add(EstimatorEventKind::kCovarianceRepaired, config_.reference.device, time,
-             static_cast<double>(state));
+    log_.add(event::CovarianceRepaired{state}, config_.reference.device, time);
   }
 
   EstimatorConfig config_;

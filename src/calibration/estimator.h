@@ -12,8 +12,10 @@
 #include <memory>
 #include <span>
 
+#include "base/calibration_levels.h"
 #include "base/time.h"
 #include "calibration/estimator_config.h"
+#include "calibration/events.h"
 #include "sample/sample.h"
 #include "sample/utc_scale.h"
 
@@ -24,15 +26,6 @@ enum class NavigationStatus : std::uint8_t {
   kInitialising,  ///< waiting for R-IMU samples, attitude or a first position
   kAligning,      ///< levelled; heading still to be found
   kNavigating,
-};
-
-/// How the navigation's attitude was started.
-enum class InitialisationMethod : std::uint8_t {
-  kNone,
-  kConfigured,
-  kReferenceAttitude,
-  kGyrocompass,
-  kInMotion
 };
 
 /// State at the newest R epoch. Everything but `status` is meaningful only while kNavigating.
@@ -78,13 +71,6 @@ struct OdometryOutput {
   Vector3 nis{};  ///< mean over the last seconds: speed, sideways, upwards
 };
 
-enum class StudyStatus : std::uint8_t {
-  kWaiting,     ///< no sample yet, or none since a long gap
-  kCoarse,      ///< gathering motion for the coarse time offset and mounting
-  kConverging,  ///< filter running, not yet at its goals
-  kCalibrated,  ///< sd of every boresight and lever-arm component at or below its goal
-};
-
 /// Directions of the 6-dim (psi, r) space, for naming the weakest one.
 enum class StudyDirection : std::uint8_t { kPsiX, kPsiY, kPsiZ, kRX, kRY, kRZ };
 
@@ -107,7 +93,7 @@ struct StudyCounters {
 
 /// The estimate of one S-IMU at the newest processed S sample.
 struct StudyOutput {
-  StudyStatus status = StudyStatus::kWaiting;
+  CalibrationStatus status = CalibrationStatus::kWaiting;
   Regime regime = Regime::kStatic;
   HostTime time;  ///< of validity of that sample
   Matrix3 C_b_s{1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -173,44 +159,6 @@ struct StudyEpoch {
   std::array<bool, 3> used_gyro{};
   std::array<bool, 3> used_accel{};
   bool calibrating = false;  ///< filter is running: C_b_s and r_bs_b_m are estimates, not placeholders
-};
-
-/// Things that a person should hear about, in the order in which they happened.
-enum class EstimatorEventKind : std::uint8_t {
-  kNavigationStarted,      ///< value: InitialisationMethod
-  kNavigationStopped,      ///< value: gap in s, after which the state could not be carried on
-  kReferenceGap,           ///< value: length in s
-  kReferenceGravityWrong,  ///< at standstill f_z of b is not -g: axes or sign convention; value: f_z
-  kCoarseAlignmentDone,    ///< value: residual of the vectors, rad
-  kCoarseAlignmentPoor,  ///< enough motion but no consistent rotation; value: correlation of the rates, to 1
-  kMountingChanged,      ///< innovations say that the S-IMU sits differently; starts again; value: mean NIS
-  kStudyReturned,        ///< after a gap; its biases are uncertain again; value: gap in s
-  kGnssRejected,  ///< start of a streak of rejected solutions; value: NIS, infinite for a place that is none
-  kGnssReacquired,    ///< end of a streak; value: its length in s
-  kOdometryLost,      ///< no speed for a while; the last one is not held; value: its age in s
-  kOdometryReturned,  ///< value: silence in s
-  kOdometryRejected,  ///< wheels contradict the navigation (slip, wrong unit or scale); value: excess in m/s
-  kOdometryAccepted,  ///< end of a streak of rejected speeds; value: its length in s
-  kCovarianceRepaired,     ///< a state's variance was no longer positive; value: state index (state_name.h)
-  kGravityMagnitudeWrong,  ///< at standstill a device feels another force than gravity: its unit; value: |f|
-  kBoresightPriorWrong,    ///< the mounting found contradicts the configured one; value: angle, rad
-  kLeverArmPriorWrong,     ///< the lever arm found contradicts the configured one; value: distance, m
-  kStudiesSwapped,    ///< two S-IMUs sit where the configuration has the other; value: the other's device
-  kGyroBiasChanged,   ///< since before a silence; value: by how much, rad/s
-  kAccelBiasChanged,  ///< since before a silence; value: by how much, m/s^2
-  kGnssInconsistent,  ///< positions disagree with the motion more than their sd say; value: share of them
-  /// An S-IMU's samples keep contradicting the reference whatever the mounting: axes, signs, unit or range.
-  /// Nothing of it is called observable until they have fitted for minutes; value: share of them.
-  kStudyInconsistent,
-};
-
-/// One such event, at a time on the host's scale: the device it is about, and the value that its kind
-/// explains.
-struct EstimatorEvent {
-  EstimatorEventKind kind = EstimatorEventKind::kNavigationStarted;
-  DeviceIndex device = 0;
-  HostTime time;
-  double value = 0.0;
 };
 
 /// Counts since the start that belong to no single S-IMU.

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/limits.h"
 #include "base/units.h"
 #include "calibration/covariance_loops.h"
 #include "sample/regime.h"
@@ -22,9 +23,6 @@ using Matrix3 = std::array<double, 9>;
 
 /// What a body at rest feels, anywhere on Earth to 0.05 m/s^2.
 inline constexpr double kNominalGravity_mps2 = 9.81;
-
-/// Most S-IMUs that one estimator can hold.
-inline constexpr std::size_t kMaxStudies = 6;
 
 /// Parts of the state of one S-IMU. Each can be left out; its quantity then stays at its prior value.
 enum StudyBlock : std::uint32_t {
@@ -189,11 +187,6 @@ struct StudyConfig {
   Vector3 prior_gyro_scale_sd{0.003, 0.003, 0.003};
   Vector3 prior_accel_scale{0.0, 0.0, 0.0};
   Vector3 prior_accel_scale_sd{0.003, 0.003, 0.003};
-
-  /// Accuracy that the live display compares with.
-  double goal_boresight_sd_rad = 0.01 * kRadPerDeg;
-  double goal_r_bs_b_sd_m = 1e-3;
-  double goal_t_d_sd_s = 1e-4;
 };
 
 struct EstimatorConfig {
@@ -206,7 +199,7 @@ struct EstimatorConfig {
   /// Probability with which a good measurement of one axis passes the gate.
   double gate_probability = 0.99999;
   /// An S sample waits this long (on the arrival time scale) for its reference, then counts as late.
-  Duration late_after = std::chrono::milliseconds{100};
+  Duration late_after = from_seconds(kReferenceWait_s);
   /// Instructions that the covariance is worked out with. Absent: the widest that the processor has.
   std::optional<InstructionSet> instruction_set;
 };

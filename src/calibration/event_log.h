@@ -8,20 +8,21 @@
 #include <span>
 #include <utility>
 
-#include "calibration/estimator.h"
+#include "base/limits.h"
+#include "calibration/events.h"
 
 namespace imuscope {
 
 class EventLog {
  public:
-  static constexpr std::size_t kCapacity = 64;
+  static constexpr std::size_t kCapacity = kEventsPerTick;
 
-  void add(EstimatorEventKind kind, DeviceIndex device, HostTime time, double value) noexcept {
+  void add(const EventPayload& what, DeviceIndex device, HostTime time) noexcept {
     if (size_ == kCapacity) {
       ++lost_;
       return;
     }
-    events_[size_++] = {kind, device, time, value};
+    events_[size_++] = {what, device, time};
   }
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept { return {events_.data(), size_}; }
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }

@@ -1,5 +1,7 @@
 #include "calibration/navigation_filter.h"
 
+#include "base/limits.h"
+
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -97,16 +99,16 @@ NavigationFilter::NavigationFilter(const EstimatorConfig& config, FilterCore& co
       log_(log),
       counters_(counters),
       aligner_(alignment_options(config)),
-      past_(kPastEpochs) {
+      past_(reference_past_capacity(config.reference.rate_hz)) {
   const bool offered = navigation_.enabled && gnss_.enabled;
   output_.status = offered ? NavigationStatus::kInitialising : NavigationStatus::kNotOffered;
 }
 
 NavigationFilter::PastEpoch& NavigationFilter::past(std::size_t back) noexcept {
-  return past_[(past_head_ + kPastEpochs - 1 - back) % kPastEpochs];
+  return past_[(past_head_ + past_.size() - 1 - back) % past_.size()];
 }
 const NavigationFilter::PastEpoch& NavigationFilter::past(std::size_t back) const noexcept {
-  return past_[(past_head_ + kPastEpochs - 1 - back) % kPastEpochs];
+  return past_[(past_head_ + past_.size() - 1 - back) % past_.size()];
 }
 
 /// N-56: the interval in seconds of UTC, wherever a device tells them; else in the host's own.
@@ -209,8 +211,8 @@ void NavigationFilter::remember(const Sample& sample, const InertialRates& measu
   next.has_utc = sample.has_utc;
   next.state = core_.navigation();
   next.measured = measured;
-  past_head_ = (past_head_ + 1) % kPastEpochs;
-  past_size_ = std::min(past_size_ + 1, kPastEpochs);
+  past_head_ = (past_head_ + 1) % past_.size();
+  past_size_ = std::min(past_size_ + 1, past_.size());
 }
 
 void NavigationFilter::try_start(const Sample& sample) noexcept {
@@ -242,7 +244,7 @@ void NavigationFilter::start(const NavigationState& state, const NavigationError
   past_size_ = 0;
   output_.status = NavigationStatus::kNavigating;
   output_.method = method;
-  log_.add(EstimatorEventKind::kNavigationStarted, reference_.device, time, static_cast<double>(method));
+  log_.add(event::NavigationStarted{method}, reference_.device, time);
 }
 
 void NavigationFilter::stop(HostTime time, double gap_s) noexcept {
@@ -253,7 +255,7 @@ void NavigationFilter::stop(HostTime time, double gap_s) noexcept {
   past_size_ = 0;
   for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) core_.reset_state(i, 0.0);
   core_.take_injected();
-  log_.add(EstimatorEventKind::kNavigationStopped, reference_.device, time, gap_s);
+  log_.add(event::NavigationStopped{gap_s}, reference_.device, time);
 }
 
 void NavigationFilter::add_attitude(const Sample& sample) noexcept {
@@ -423,7 +425,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     ++counters_.gnss_used;
     if (streak_) {
       streak_ = false;
-      log_.add(EstimatorEventKind::kGnssReacquired, gnss_.device, time, to_seconds(time - streak_start_));
+      log_.add(event::GnssReacquired{to_seconds(time - streak_start_)}, gnss_.device, time);
     }
   } else if (claims_position || has_velocity) {
     ++counters_.gnss_rejected;
@@ -433,7 +435,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
       double nis = std::numeric_limits<double>::infinity();
       if (has_position || has_velocity)
         nis = has_position ? position_gate_.last_nis() : velocity_gate_.last_nis();
-      log_.add(EstimatorEventKind::kGnssRejected, gnss_.device, time, nis);
+      log_.add(event::GnssRejected{nis}, gnss_.device, time);
     }
   }
   return true;
@@ -475,7 +477,7 @@ void NavigationFilter::watch_consistency(HostTime time) noexcept {
   if (inconsistent_told_ || watched_s_ < kConsistencyMean_s) return;
   if (improbable_share_ < kImprobableShareMax) return;
   inconsistent_told_ = true;
-  log_.add(EstimatorEventKind::kGnssInconsistent, gnss_.device, time, improbable_share_);
+  log_.add(event::GnssInconsistent{improbable_share_}, gnss_.device, time);
 }
 
 void NavigationFilter::widen_for_reacquisition(const Vector3d& innovation) noexcept {

@@ -79,7 +79,6 @@ class NavigationFilter {
   [[nodiscard]] PastEpoch& past(std::size_t back) noexcept;  ///< 0 = newest
   [[nodiscard]] const PastEpoch& past(std::size_t back) const noexcept;
 
-  static constexpr std::size_t kPastEpochs = 256;
   static constexpr std::size_t kPendingGnss = 8;
 
   ReferenceConfig reference_;

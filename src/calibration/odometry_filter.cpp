@@ -83,8 +83,7 @@ bool OdometryFilter::add(const Sample& sample) noexcept {
   }
   if (lost_) {
     lost_ = false;
-    log_.add(EstimatorEventKind::kOdometryReturned, config_.device, sample.time,
-             to_seconds(sample.time - last_time_));
+    log_.add(event::OdometryReturned{to_seconds(sample.time - last_time_)}, config_.device, sample.time);
   }
   const bool stands = std::abs(sample.odometry.speed_mps) <= kStanding_mps;
   const bool continues = has_last_ && wheels_stand_;
@@ -132,7 +131,7 @@ void OdometryFilter::watch_silence(HostTime time) noexcept {
   output_.standing = false;
   output_.resting = false;
   output_.lost = true;
-  log_.add(EstimatorEventKind::kOdometryLost, config_.device, time, silence_s);
+  log_.add(event::OdometryLost{silence_s}, config_.device, time);
 }
 
 void OdometryFilter::apply(const Sample& sample, Regime regime) noexcept {
@@ -253,14 +252,14 @@ void OdometryFilter::note_speed(bool accepted, double excess_mps, HostTime time)
     if (rejected_in_a_row_++ == 0) streak_start_ = time;
     if (rejected_in_a_row_ == kRejectedTold) {
       streak_ = true;
-      log_.add(EstimatorEventKind::kOdometryRejected, config_.device, time, excess_mps);
+      log_.add(event::OdometryRejected{excess_mps}, config_.device, time);
     }
     return;
   }
   rejected_in_a_row_ = 0;
   if (!streak_) return;
   streak_ = false;
-  log_.add(EstimatorEventKind::kOdometryAccepted, config_.device, time, to_seconds(time - streak_start_));
+  log_.add(event::OdometryAccepted{to_seconds(time - streak_start_)}, config_.device, time);
 }
 
 void OdometryFilter::update_output() noexcept {

@@ -92,7 +92,7 @@ StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
       force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
       increment_centre_(from_seconds(0.5 / config_.rate_hz)),
       has_biases_((config_.blocks & kBiasStudyBlocks) == kBiasStudyBlocks),
-      queue_(kQueue),
+      queue_(kWaitingSamples),
       gyro_floor_(config_.noise.gyro),
       accel_floor_(config_.noise.accel) {
   precompute_noise();
@@ -129,13 +129,13 @@ void StudyFilter::add(const Sample& sample) noexcept {
     ++counters.not_increasing;
     return;
   }
-  if (queue_size_ == kQueue) {
+  if (queue_size_ == kWaitingSamples) {
     ++counters.refused_full;
     return;
   }
   has_last_added_ = true;
   last_added_ = sample.time;
-  queue_[(queue_head_ + queue_size_++) % kQueue] = sample;
+  queue_[(queue_head_ + queue_size_++) % kWaitingSamples] = sample;
 }
 
 void StudyFilter::add_reference(HostTime time, double rate_radps) noexcept {
@@ -149,8 +149,8 @@ bool StudyFilter::gives_up(const Sample& sample, HostTime cut) const noexcept {
 }
 
 void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
-  if (!calibrating_ && output_.status == StudyStatus::kWaiting && queue_size_ > 0) {
-    output_.status = StudyStatus::kCoarse;
+  if (!calibrating_ && output_.status == CalibrationStatus::kWaiting && queue_size_ > 0) {
+    output_.status = CalibrationStatus::kCoarse;
     const bool knows_mounting = config_.prior_C_b_s && prior_in_force_;
     if (knows_mounting && config_.prior_t_d_s) {
       begin(context, queue_[queue_head_].time, to_eigen(*config_.prior_C_b_s), Matrix3d::Zero(),
@@ -185,7 +185,7 @@ void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
         process_sample(context, sample, valid, b);
         break;
     }
-    queue_head_ = (queue_head_ + 1) % kQueue;
+    queue_head_ = (queue_head_ + 1) % kWaitingSamples;
     --queue_size_;
   }
 }
@@ -293,10 +293,10 @@ void StudyFilter::try_coarse_alignment(StudyContext& context, HostTime now) noex
   const MountingResult result = coarse_mounting_.solve(mounting);
   if (result == MountingResult::kOk) {
     begin(context, now, mounting.C_b_s, mounting.covariance_rad2, coarse_t_d_s_, coarse_t_d_sd_s_);
-    context.log.add(EstimatorEventKind::kCoarseAlignmentDone, config_.device, now,
-                    std::sqrt(mounting.covariance_rad2.trace()));
+    context.log.add(event::CoarseAlignmentDone{std::sqrt(mounting.covariance_rad2.trace())}, config_.device,
+                    now);
   } else if (result == MountingResult::kInconsistent) {
-    context.log.add(EstimatorEventKind::kCoarseAlignmentPoor, config_.device, now, mounting.rate_correlation);
+    context.log.add(event::CoarseAlignmentPoor{mounting.rate_correlation}, config_.device, now);
     coarse_mounting_.clear();
     // Should a mounting be found after all, it has to prove itself first.
     misfit_share_ = std::max(misfit_share_, kMisfitShare);
@@ -332,7 +332,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   prior_sd_t_d_ = t_d_sd_s;
   output_.nis_gyro.fill(1.0);
   output_.nis_accel.fill(1.0);
-  output_.status = StudyStatus::kConverging;
+  output_.status = CalibrationStatus::kConverging;
   gated_ = {};
   gated_share_ = 0.0;
   proof_s_ = 0.0;
@@ -501,11 +501,11 @@ void StudyFilter::watch_gravity(StudyContext& context, const Sample& sample, dou
   if (resting_s_ < kRestForGravity_s) return;
   if (std::abs(resting_f_.norm() - kNominalGravity_mps2) < kStudyGravityTolerance_mps2) return;
   gravity_told_ = true;
-  context.log.add(EstimatorEventKind::kGravityMagnitudeWrong, config_.device, sample.time, resting_f_.norm());
+  context.log.add(event::GravityMagnitudeWrong{resting_f_.norm()}, config_.device, sample.time);
 }
 
 void StudyFilter::note_return(StudyContext& context, HostTime now, double silence_s) noexcept {
-  context.log.add(EstimatorEventKind::kStudyReturned, config_.device, now, silence_s);
+  context.log.add(event::StudyReturned{silence_s}, config_.device, now);
   before_silence_ = BiasesThen{now + kBiasSettles, output_.gyro_bias_radps, output_.sd_gyro_bias_radps,
                                output_.accel_bias_mps2, output_.sd_accel_bias_mps2};
 }
@@ -515,15 +515,16 @@ void StudyFilter::watch_return(StudyContext& context, HostTime now) noexcept {
   const BiasesThen then = *before_silence_;
   before_silence_.reset();
   if (!has_biases_) return;
-  const auto tell = [&](EstimatorEventKind kind, const Vector3& value, const Vector3& sd,
-                        const Vector3& before, const Vector3& sd_before) {
-    if (largest_contradiction(value, sd, before, sd_before) > kContradictionSds)
-      context.log.add(kind, config_.device, now, distance(value, before));
-  };
-  tell(EstimatorEventKind::kGyroBiasChanged, output_.gyro_bias_radps, output_.sd_gyro_bias_radps,
-       then.gyro_radps, then.sd_gyro_radps);
-  tell(EstimatorEventKind::kAccelBiasChanged, output_.accel_bias_mps2, output_.sd_accel_bias_mps2,
-       then.accel_mps2, then.sd_accel_mps2);
+  if (largest_contradiction(output_.gyro_bias_radps, output_.sd_gyro_bias_radps, then.gyro_radps,
+                            then.sd_gyro_radps) > kContradictionSds) {
+    context.log.add(event::GyroBiasChanged{distance(output_.gyro_bias_radps, then.gyro_radps)},
+                    config_.device, now);
+  }
+  if (largest_contradiction(output_.accel_bias_mps2, output_.sd_accel_bias_mps2, then.accel_mps2,
+                            then.sd_accel_mps2) > kContradictionSds) {
+    context.log.add(event::AccelBiasChanged{distance(output_.accel_bias_mps2, then.accel_mps2)},
+                    config_.device, now);
+  }
 }
 
 void StudyFilter::watch_priors(EventLog& log) noexcept {
@@ -532,8 +533,8 @@ void StudyFilter::watch_priors(EventLog& log) noexcept {
   if (!lever_arm_told_ && largest_contradiction(output_.r_bs_b_m, output_.sd_r_bs_b_m, prior.prior_r_bs_b_m,
                                                 prior.prior_r_bs_b_sd_m) > kContradictionSds) {
     lever_arm_told_ = true;
-    log.add(EstimatorEventKind::kLeverArmPriorWrong, config_.device, output_.time,
-            distance(output_.r_bs_b_m, prior.prior_r_bs_b_m));
+    log.add(event::LeverArmPriorWrong{distance(output_.r_bs_b_m, prior.prior_r_bs_b_m)}, config_.device,
+            output_.time);
   }
   const bool comparable = to_eigen(output_.sd_psi_rad).maxCoeff() < kComparableBoresightSd_rad;
   if (boresight_told_ || !prior.prior_C_b_s || !comparable) return;
@@ -542,7 +543,7 @@ void StudyFilter::watch_priors(EventLog& log) noexcept {
       kContradictionSds)
     return;
   boresight_told_ = true;
-  log.add(EstimatorEventKind::kBoresightPriorWrong, config_.device, output_.time, off.norm());
+  log.add(event::BoresightPriorWrong{off.norm()}, config_.device, output_.time);
 }
 
 bool StudyFilter::fits_prior_of(const StudyConfig& other) const noexcept {
@@ -563,7 +564,7 @@ void StudyFilter::watch_fit(StudyContext& context, bool gated, HostTime now, dou
   misfits_ = misfits_ || misfit_share_ >= kMisfitShare;
   if (misfit_told_ || misfit_share_ < kMisfitToldShare) return;
   misfit_told_ = true;
-  context.log.add(EstimatorEventKind::kStudyInconsistent, config_.device, now, misfit_share_);
+  context.log.add(event::StudyInconsistent{misfit_share_}, config_.device, now);
 }
 
 void StudyFilter::watch_mounting(StudyContext& context, HostTime now, double dt_s) noexcept {
@@ -575,7 +576,7 @@ void StudyFilter::watch_mounting(StudyContext& context, HostTime now, double dt_
   if (gated_share_ < kMountingChangedShare) return;
   double worst = 0.0;
   for (std::size_t i = 0; i < 3; ++i) worst = std::max({worst, output_.nis_gyro[i], output_.nis_accel[i]});
-  context.log.add(EstimatorEventKind::kMountingChanged, config_.device, now, worst);
+  context.log.add(event::MountingChanged{worst}, config_.device, now);
   ++output_.counters.resets;
   reset_to_prior(context.core, index_, config_);
   calibrating_ = false;
@@ -583,7 +584,7 @@ void StudyFilter::watch_mounting(StudyContext& context, HostTime now, double dt_
   offset_known_ = false;
   coarse_t_d_s_ = 0.0;
   coarse_mounting_.clear();
-  output_.status = StudyStatus::kCoarse;
+  output_.status = CalibrationStatus::kCoarse;
   next_attempt_ = now + kCoarseEvery;
 }
 
@@ -643,12 +644,11 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   output_.sd_t_d_s = core.sd(layout.t_d);
 
   const bool fits = !misfits_ && proof_s_ >= kProof_s;
-  bool calibrated = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
+  const bool estimates_mounting = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
   for (std::size_t i = 0; i < 6; ++i) {
     const std::size_t block = i < 3 ? layout.psi : layout.r;
     const double sd = i < 3 ? output_.sd_psi_rad[i] : output_.sd_r_bs_b_m[i - 3];
-    const double goal = i < 3 ? config_.goal_boresight_sd_rad : config_.goal_r_bs_b_sd_m;
-    calibrated = calibrated && fits && sd <= goal;
+    const double goal = i < 3 ? kGoalBoresightSd_rad : kGoalLeverArmSd_m;
     output_.observable[i] = fits && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal);
     for (std::size_t j = 0; j < 6; ++j) {
       const std::size_t other = j < 3 ? layout.psi : layout.r;
@@ -658,8 +658,10 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   }
   output_.t_d_observable =
       layout.t_d != StudyLayout::kAbsent && fits &&
-      (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= config_.goal_t_d_sd_s);
-  output_.status = calibrated ? StudyStatus::kCalibrated : StudyStatus::kConverging;
+      (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= kGoalTimeOffsetSd_s);
+  output_.status = estimates_mounting && fits && meets_goal(output_.sd_psi_rad, output_.sd_r_bs_b_m)
+                       ? CalibrationStatus::kCalibrated
+                       : CalibrationStatus::kConverging;
   if (output_.time >= next_direction_) {
     next_direction_ = output_.time + kDirectionEvery;
     update_weakest_direction(core);

@@ -83,8 +83,6 @@ class StudyFilter {
   [[nodiscard]] ReferenceNoise reference_noise(const ReferenceKinematics& b) const noexcept;
   void precompute_noise() noexcept;
 
-  static constexpr std::size_t kQueue = 2048;
-
   std::size_t index_;
   StudyConfig config_;
   Duration late_after_;

@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "base/contracts.h"
+#include "base/limits.h"
 #include "base/time.h"
 #include "rt/spsc_ring.h"
 #include "sample/sample.h"
@@ -20,7 +21,6 @@ namespace imuscope {
 enum class Direction : std::uint8_t { kRead, kWrite };
 
 inline constexpr std::size_t kRawChunkBytes = 1024;
-inline constexpr std::size_t kMaxDevices = 32;
 
 /// A read from, or a write to, a device, or a part of one that is larger than a chunk.
 struct RawChunk {
@@ -34,9 +34,7 @@ struct RawChunk {
 };
 static_assert(std::is_trivially_copyable_v<RawChunk>);
 
-/// From one I/O thread to the recorder. Five devices make about 500 reads a second: 2048 chunks outlast a
-/// disk that stands still for 4 s, in 2.1 MB.
-inline constexpr std::size_t kRawRingCapacity = 2048;
+/// From one I/O thread to the recorder; 2.1 MB.
 using RawRing = SpscRing<RawChunk, kRawRingCapacity>;
 
 /// The I/O thread's end: cuts reads into chunks and pushes them. A full ring costs the record, never time;

@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/limits.h"
 #include "base/time.h"
 #include "capture/raw_chunk.h"
 #include "rt/spsc_ring.h"
@@ -55,7 +56,6 @@ struct RunException {
 };
 static_assert(std::is_trivially_copyable_v<RunException>);
 
-inline constexpr std::size_t kExceptionRingCapacity = 1024;
 using ExceptionRing = SpscRing<RunException, kExceptionRingCapacity>;
 
 }  // namespace imuscope

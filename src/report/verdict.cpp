@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/calibration_levels.h"
 #include "base/units.h"
 #include "report/json_fields.h"
 #include "report/mounting.h"
@@ -64,25 +65,31 @@ std::vector<std::string> words_of(const std::vector<std::string>& directions) {
   return words;
 }
 
-struct Goal {
+/// One kind of sd beside what makes a mounting usable (base/calibration_levels.h).
+struct Usability {
   const char* what;
   std::optional<double> sd;
-  double goal;
+  double usable;
   const char* unit;
 };
 
-std::array<Goal, 3> goals_of(const StudyFiles& study) {
+constexpr double kUsableBoresightSd_deg = kUsableBoresightSd_rad * kDegPerRad;
+constexpr double kUsableLeverArmSd_mm = kUsableLeverArmSd_m * kMmPerM;
+constexpr double kUsableTimeOffsetSd_ms = kUsableTimeOffsetSd_s * kMsPerS;
+
+std::array<Usability, 3> usability_of(const StudyFiles& study) {
   const Accuracy accuracy = accuracy_of(study);
-  return {Goal{"boresight", accuracy.boresight_deg, kUsableBoresightSd_deg, "deg"},
-          Goal{"lever arm", accuracy.lever_arm_mm, kUsableLeverArmSd_mm, "mm"},
-          Goal{"time offset", accuracy.time_offset_ms, kUsableTimeOffsetSd_ms, "ms"}};
+  return {Usability{"boresight", accuracy.boresight_deg, kUsableBoresightSd_deg, "deg"},
+          Usability{"lever arm", accuracy.lever_arm_mm, kUsableLeverArmSd_mm, "mm"},
+          Usability{"time offset", accuracy.time_offset_ms, kUsableTimeOffsetSd_ms, "ms"}};
 }
 
-bool is_calibrated(const StudyFiles& study) {
-  const auto goals = goals_of(study);
-  return not_observed(study).empty() && std::all_of(goals.begin(), goals.end(), [](const Goal& goal) {
-           return goal.sd && *goal.sd <= goal.goal;
-         });
+bool is_usable(const StudyFiles& study) {
+  const Accuracy accuracy = accuracy_of(study);
+  return not_observed(study).empty() && accuracy.boresight_deg && accuracy.lever_arm_mm &&
+         accuracy.time_offset_ms &&
+         imuscope::is_usable(*accuracy.boresight_deg * kRadPerDeg, *accuracy.lever_arm_mm / kMmPerM,
+                             *accuracy.time_offset_ms / kMsPerS);
 }
 
 /// Largest error against truth.json in units of its sd; empty where either is not known.
@@ -109,13 +116,13 @@ std::optional<double> worst_error_sd(const StudyFiles& study) {
 
 std::string accuracy_sentence(const StudyFiles& study) {
   std::vector<std::string> parts;
-  for (const Goal& goal : goals_of(study)) {
-    if (!goal.sd) {
-      parts.push_back(fmt::format("{} unknown", goal.what));
+  for (const Usability& part : usability_of(study)) {
+    if (!part.sd) {
+      parts.push_back(fmt::format("{} unknown", part.what));
     } else {
-      parts.push_back(
-          fmt::format("{} {:.2g} {}{}", goal.what, *goal.sd, goal.unit,
-                      *goal.sd <= goal.goal ? "" : fmt::format(" (wanted: {:g} {})", goal.goal, goal.unit)));
+      parts.push_back(fmt::format(
+          "{} {:.2g} {}{}", part.what, *part.sd, part.unit,
+          *part.sd <= part.usable ? "" : fmt::format(" (wanted: {:g} {})", part.usable, part.unit)));
     }
   }
   std::string sentence = fmt::format("{}: largest sd of {}.", study.name, fmt::join(parts, ", "));
@@ -181,8 +188,8 @@ void manoeuvres(const RunFiles& run, std::vector<std::string>& steps) {
     const auto misses = [&](std::string_view name) {
       return std::find(missing.begin(), missing.end(), name) != missing.end();
     };
-    const auto goals = goals_of(study);
-    const auto short_of = [&](std::size_t i) { return goals[i].sd && *goals[i].sd > goals[i].goal; };
+    const auto parts = usability_of(study);
+    const auto short_of = [&](std::size_t i) { return parts[i].sd && *parts[i].sd > parts[i].usable; };
     turns = turns || misses("psi_x") || misses("psi_y") || misses("r_x") || misses("r_y") || misses("t_d") ||
             short_of(0) || short_of(1) || short_of(2);
     brakes = brakes || misses("psi_z") || short_of(0);
@@ -278,7 +285,7 @@ Verdict calibration_verdict(const RunFiles& run) {
   }
   std::vector<std::string> usable;
   for (const StudyFiles& study : run.studies) {
-    if (is_calibrated(study)) usable.push_back(study.name);
+    if (is_usable(study)) usable.push_back(study.name);
     verdict.reasons.push_back(accuracy_sentence(study));
   }
   if (usable.size() == run.studies.size()) {
@@ -393,8 +400,7 @@ Html summary_section(const RunFiles& run, const std::vector<Fit>& fits) {
   section += paragraph(
       fmt::format(
           "Usable means: an sd of at most {:g} deg for the boresight, {:g} mm for the lever arm and {:g} ms "
-          "for "
-          "the time offset, so that what is left disturbs the error signals less than an automotive MEMS "
+          "for the time offset, so that what is left disturbs the error signals less than an automotive MEMS "
           "sensor's own noise in a roundabout.",
           kUsableBoresightSd_deg, kUsableLeverArmSd_mm, kUsableTimeOffsetSd_ms),
       "note");

@@ -20,12 +20,6 @@ struct Verdict {
   std::vector<std::string> reasons;
 };
 
-/// A mounting is usable when what is left uncertain disturbs the error process less than the noise of the
-/// S-IMUs that are studied with it. With an automotive MEMS unit (white noise of 0.5 deg/s and 0.02 m/s² per
-/// sample at 100 Hz) in a roundabout (0.5 rad/s, 1 rad/s²), these leave 0.05 deg/s and 0.01 m/s².
-inline constexpr double kUsableBoresightSd_deg = 0.1;
-inline constexpr double kUsableLeverArmSd_mm = 10.0;
-inline constexpr double kUsableTimeOffsetSd_ms = 1.0;
 /// Level of the tests.
 inline constexpr double kTestLevel = 0.05;
 

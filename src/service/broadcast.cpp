@@ -40,8 +40,7 @@ void Broadcast::on_snapshot(const Snapshot& snapshot) {
   }
   if (snapshot.odometry.has_speed) bus_->publish(odometry_message(snapshot, anchor_), "ODOMETRY");
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
-    const auto state = snapshot.studies[i].status;
-    if (state != StudyStatus::kConverging && state != StudyStatus::kCalibrated) continue;
+    if (!has_estimate(snapshot.studies[i].status)) continue;
     const std::string& name = configuration_.devices[study_devices_[i]].name;
     bus_->publish(calibration_message(snapshot, i, name, anchor_), "CALIBRATION", name);
   }

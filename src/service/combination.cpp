@@ -54,11 +54,6 @@ std::string take_estimate(const json& imu, MountingEstimate& estimate) {
   return {};
 }
 
-bool is_calibrated(const json& imu) {
-  const std::string status = imu.value("status", std::string());
-  return status == "converging" || status == "calibrated";
-}
-
 /// Two drives that read a file in common.
 bool share_inputs(const DriveMountings& a, const DriveMountings& b) {
   return std::any_of(a.inputs.begin(), a.inputs.end(), [&b](const std::string& input) {
@@ -145,8 +140,8 @@ Result<DriveMountings> mountings_of(const std::filesystem::path& run) {
     if (!imu.is_object() || !imu.contains("name") || !imu["name"].is_string())
       return work_error(fmt::format("{}: an entry of \"imus\" has no name", file.string()));
     const std::string name = imu["name"];
-    if (!is_calibrated(imu)) {
-      out.uncalibrated.push_back(name);
+    if (!has_estimate(imu.value("status", std::string()))) {
+      out.without_estimate.push_back(name);
       continue;
     }
     DriveMountings::Study study{name, {}};
@@ -174,7 +169,7 @@ Result<Combination> combine_drives(const std::vector<DriveMountings>& drives,
   Combination out;
   for (const auto& drive : drives) {
     out.runs.push_back(drive.run);
-    for (const auto& name : drive.uncalibrated)
+    for (const auto& name : drive.without_estimate)
       out.remarks.push_back(fmt::format("{} was not calibrated in {}", name, drive.run.string()));
   }
   out.method = method.value_or(CombineMethod::kInverseVariance);

@@ -22,8 +22,8 @@ struct DriveMountings {
     std::string name;
     MountingEstimate estimate;
   };
-  std::vector<Study> studies;             ///< those that were calibrated
-  std::vector<std::string> uncalibrated;  ///< names of the others
+  std::vector<Study> studies;                 ///< those that have an estimate
+  std::vector<std::string> without_estimate;  ///< names of the others
 };
 
 /// Reads calibration.json and run.json of a run folder. Fails where it holds no finished run, or one that is

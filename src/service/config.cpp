@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.h"
 #include "base/text.h"
 #include "service/config_devices.h"
 #include "service/config_vehicle.h"

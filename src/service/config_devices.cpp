@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "base/limits.h"
 #include "base/text.h"
 #include "base/units.h"
 #include "service/config_vehicle.h"
@@ -450,11 +451,11 @@ void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
     return std::count_if(devices.begin(), devices.end(),
                          [&](const DeviceConfig& device) { return device.role == role; });
   };
-  constexpr int kMaxStudies = 6;
   if (count(DeviceRole::kReference) != 1) {
     root.fail("device", fmt::format("lists {} devices with role reference", count(DeviceRole::kReference)),
               "exactly one IMU is the reference");
-  } else if (count(DeviceRole::kStudy) < 1 || count(DeviceRole::kStudy) > kMaxStudies) {
+  } else if (count(DeviceRole::kStudy) < 1 ||
+             static_cast<std::size_t>(count(DeviceRole::kStudy)) > kMaxStudies) {
     root.fail("device", fmt::format("lists {} devices with role study", count(DeviceRole::kStudy)),
               fmt::format("1 to {} IMUs can be under study", kMaxStudies));
   } else if (count(DeviceRole::kGnss) > 1) {

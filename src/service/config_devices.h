@@ -12,9 +12,6 @@ class TomlReader;
 struct AttachedFiles;
 struct TomlProblem;
 
-/// Fastest samples that a device may be configured to send.
-inline constexpr double kMaxRate_hz = 2000.0;
-
 /// Reads the list, and checks what its devices are to each other: names, roles, shared lines.
 /// @param files    text of files that devices name, read or attached
 /// @param devices  in the order of the file

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/limits.h"
 #include "calibration/estimator.h"
 #include "error_process/error_row.h"
 #include "rt/latest_value.h"
@@ -21,15 +22,14 @@ namespace imuscope {
 /// Ticks per second of the core.
 inline constexpr double kTickRate_hz = 100.0;
 inline constexpr Duration kTickPeriod{10'000'000};
-/// Every tenth tick leaves a snapshot: 10 Hz.
-inline constexpr std::int64_t kTicksPerSnapshot = 10;
+inline constexpr auto kTicksPerSnapshot = static_cast<std::int64_t>(kTickRate_hz / kSnapshotRate_hz);
 
 /// After the newest arrival the core runs on for this many ticks, live and in replay: what waits for a
 /// reference that does not come is given up by then.
 inline constexpr std::int64_t kTailTicks = 20;
 
-/// From one device to the core: ten seconds at 100 Hz, far beyond any stall of the core.
-using SampleRing = SpscRing<Sample, 1024>;
+/// From one device to the core.
+using SampleRing = SpscRing<Sample, kSampleRingCapacity>;
 
 /// The estimates at one tick.
 struct Snapshot {

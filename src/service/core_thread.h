@@ -6,6 +6,7 @@
 #include <memory>
 #include <thread>
 
+#include "base/limits.h"
 #include "capture/records.h"
 #include "rt/heartbeat.h"
 #include "rt/host_clock.h"
@@ -16,13 +17,13 @@
 
 namespace imuscope {
 
-/// Rings from the core to the publisher. Sized for a publisher that stands still for seconds.
+/// Rings from the core to the publisher; how long it may stand still: base/limits.h.
 struct CoreRings {
-  SpscRing<ErrorRecord, 4096> errors;  ///< six S-IMUs at 100 Hz: 6 s
-  SpscRing<EstimatorEvent, 256> events;
-  SpscRing<Snapshot, 64> snapshots;   ///< 10 Hz: 6 s
-  SpscRing<AppliedNoise, 16> noises;  ///< a few a minute
-  ExceptionRing exceptions;           ///< to the recorder
+  SpscRing<ErrorRecord, kErrorRingCapacity> errors;
+  SpscRing<EstimatorEvent, kEventRingCapacity> events;
+  SpscRing<Snapshot, kSnapshotRingCapacity> snapshots;
+  SpscRing<AppliedNoise, kAppliedNoiseRingCapacity> noises;
+  ExceptionRing exceptions;  ///< to the recorder
 };
 
 /// Pushes into the rings; what they refuse is counted by them.

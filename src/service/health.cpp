@@ -66,10 +66,8 @@ Health judge(const status_t& status) {
                                      [&](const auto& d) { return d.role == kStudy && !failed(d); });
   if (!any_study && !devices.empty()) return {"failed", "no IMU under study can be set up"};
 
-  const bool calibrating = std::any_of(status.studies.begin(), status.studies.end(), [](const auto& study) {
-    return study.state == name_of(StudyStatus::kConverging) ||
-           study.state == name_of(StudyStatus::kCalibrated);
-  });
+  const bool calibrating = std::any_of(status.studies.begin(), status.studies.end(),
+                                       [](const auto& study) { return has_estimate(study.state); });
   if (const auto silent = find([](const auto& d) { return !streams(d); }); silent != devices.end()) {
     return {calibrating || failed(*silent) ? "degraded" : "starting", device_reason(*silent)};
   }
@@ -79,37 +77,21 @@ Health judge(const status_t& status) {
   return {"running", "all devices stream"};
 }
 
-const char* name_of(StudyStatus status) {
-  switch (status) {
-    case StudyStatus::kWaiting:
-      return "waiting for samples";
-    case StudyStatus::kCoarse:
-      return "looking for its mounting";
-    case StudyStatus::kConverging:
-      return "converging";
-    case StudyStatus::kCalibrated:
-      break;
-  }
-  return "calibrated";
-}
-
-study_status_t study_status(const std::string& name, const StudyOutput& study, const StudyConfig& config) {
+study_status_t study_status(const std::string& name, const StudyOutput& study) {
   const auto largest = [](const Vector3& sd) { return *std::max_element(sd.begin(), sd.end()); };
   study_status_t status{};
   status.name = name;
-  status.state = name_of(study.status);
+  status.state = words_of(study.status);
   status.regime = regime_name(study.regime);
-  status.goal_psi_deg = config.goal_boresight_sd_rad * kDegPerRad;
-  status.goal_r_m = config.goal_r_bs_b_sd_m;
-  status.goal_t_d_ms = config.goal_t_d_sd_s * kMsPerS;
+  status.goal_psi_deg = kGoalBoresightSd_rad * kDegPerRad;
+  status.goal_r_m = kGoalLeverArmSd_m;
+  status.goal_t_d_ms = kGoalTimeOffsetSd_s * kMsPerS;
   status.samples = as_count(study.counters.samples);
   status.used = as_count(study.counters.used);
   status.late = as_count(study.counters.late);
   for (std::size_t i = 0; i < 3; ++i)
     status.gated += as_count(study.counters.gated_gyro[i] + study.counters.gated_accel[i]);
-  const bool has_estimate =
-      study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
-  if (!has_estimate) {
+  if (!has_estimate(study.status)) {
     for (double* unknown : {&status.sd_psi_deg, &status.sd_r_m, &status.sd_t_d_ms, &status.weakest_relative})
       *unknown = kUnknown;
     status.manoeuvre = kManoeuvreForMounting;

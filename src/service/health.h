@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "calibration/estimator_config.h"
 #include "rt/periodic.h"
 #include "service/config.h"
 #include "service/core.h"
@@ -25,15 +24,11 @@ struct Health {
 /// than they could be, or are being lost), aligning, running.
 [[nodiscard]] Health judge(const status_t& status);
 
-/// Calibration of one S-IMU in a word.
-[[nodiscard]] const char* name_of(StudyStatus status);
-
 /// What is known of a run before anything happens: its names, and its devices with nothing but theirs.
 [[nodiscard]] status_t status_of(const Configuration& configuration, const std::string& version);
 
 /// Calibration of one S-IMU beside its goals.
-[[nodiscard]] study_status_t study_status(const std::string& name, const StudyOutput& study,
-                                          const StudyConfig& config);
+[[nodiscard]] study_status_t study_status(const std::string& name, const StudyOutput& study);
 
 /// Ticks and lateness of a thread with deadlines.
 /// @param before_deadline  from the instant that its work is of to its deadline

@@ -86,7 +86,7 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       lines_(configuration.devices.size()),
       can_watches_(configuration.devices.size()),
       line_problems_(configuration.devices.size()),
-      study_states_(study_devices_.size(), StudyStatus::kWaiting),
+      study_states_(study_devices_.size(), CalibrationStatus::kWaiting),
       observability_(study_devices_.size()),
       started_(host_now()),
       last_status_(started_) {
@@ -344,7 +344,7 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& name = configuration_.devices[study_devices_[i]].name;
     const auto state = snapshot.studies[i].status;
-    if (state != study_states_[i]) spdlog::info("{}: {}", name, name_of(state));
+    if (state != study_states_[i]) spdlog::info("{}: {}", name, words_of(state));
     study_states_[i] = state;
     for (const auto& sentence : observability_[i].update(snapshot.studies[i]))
       spdlog::info("{}: {}", name, sentence);
@@ -466,8 +466,7 @@ status_t LivePublisher::status(HostTime now) {
   for (std::size_t i = 0; i < lines_.size(); ++i) fill_device(i, status.devices[i]);
   for (std::size_t i = 0; i < study_devices_.size(); ++i) {
     status.studies.push_back(study_status(configuration_.devices[study_devices_[i]].name,
-                                          last_ ? last_->studies[i] : StudyOutput{},
-                                          estimator_config_.studies[i]));
+                                          last_ ? last_->studies[i] : StudyOutput{}));
   }
   add_threads(status, now);
   add_rings(status);

@@ -119,7 +119,7 @@ class LivePublisher {
   std::vector<std::optional<CanWatch>> can_watches_;  ///< one a device
   std::mutex line_problems_mutex_;
   std::vector<std::string> line_problems_;
-  std::vector<StudyStatus> study_states_;
+  std::vector<CalibrationStatus> study_states_;
   std::vector<ObservabilityWatch> observability_;
   std::int64_t refits_ = 0;
   NewestModels models_;

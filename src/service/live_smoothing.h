@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/limits.h"
 #include "base/output_folder.h"
 #include "calibration/fixed_lag.h"
 #include "rt/spsc_ring.h"
@@ -31,8 +32,7 @@ struct HistoryRecord {
 /// construction.
 class LiveHistory final : public HistorySink {
  public:
-  /// 3 s of the history.
-  using Ring = SpscRing<HistoryRecord, 16>;
+  using Ring = SpscRing<HistoryRecord, kHistoryRingCapacity>;
 
   LiveHistory() : ring_(std::make_unique<Ring>()), scratch_(std::make_unique<HistoryRecord>()) {}
   void on_history(const HistoryEpoch& epoch) noexcept override;

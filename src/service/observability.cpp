@@ -106,8 +106,6 @@ std::string value_text(const StateObservability& state) {
 }  // namespace
 
 Observability observability_of(const StudyOutput& study) {
-  // The goals are the estimator's own; no configuration changes them.
-  const StudyConfig goals;
   Observability out;
   for (std::size_t i = 0; i < kObservedStates; ++i) {
     StateObservability& state = out.states[i];
@@ -116,17 +114,17 @@ Observability observability_of(const StudyOutput& study) {
     if (i < 3) {
       state.unit = "deg";
       state.sd = study.sd_psi_rad[i] * kDegPerRad;
-      state.goal = goals.goal_boresight_sd_rad * kDegPerRad;
+      state.goal = kGoalBoresightSd_rad * kDegPerRad;
       state.observable = study.observable[i];
     } else if (i < kTimeOffsetState) {
       state.unit = "m";
       state.sd = study.sd_r_bs_b_m[i - 3];
-      state.goal = goals.goal_r_bs_b_sd_m;
+      state.goal = kGoalLeverArmSd_m;
       state.observable = study.observable[i];
     } else {
       state.unit = "s";
       state.sd = study.sd_t_d_s;
-      state.goal = goals.goal_t_d_sd_s;
+      state.goal = kGoalTimeOffsetSd_s;
       state.observable = study.t_d_observable;
     }
   }
@@ -160,7 +158,7 @@ nlohmann::json observability_json(const Observability& observability) {
 
 std::vector<std::string> ObservabilityWatch::update(const StudyOutput& study) {
   std::vector<std::string> sentences;
-  if (study.status < StudyStatus::kConverging) {
+  if (!has_estimate(study.status)) {
     started_ = false;
     observable_.fill(false);
     return sentences;

@@ -38,7 +38,7 @@ struct Observability {
   std::string advice;                ///< the manoeuvre that would help most; empty when every goal is reached
 };
 
-/// Precondition: the S-IMU is converging or calibrated.
+/// Precondition: the S-IMU has an estimate (base/calibration_levels.h).
 Observability observability_of(const StudyOutput& study);
 
 /// calibration.json's "observability".

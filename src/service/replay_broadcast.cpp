@@ -6,7 +6,6 @@
 
 #include "publish/message_values.h"
 #include "rt/host_clock.h"
-#include "service/estimator_setup.h"
 #include "service/health.h"
 
 namespace imuscope {
@@ -22,7 +21,6 @@ ReplayBroadcast::ReplayBroadcast(const Configuration& configuration, const Recor
     : configuration_(configuration),
       recording_(recording),
       version_(std::move(version)),
-      estimator_(estimator_config(configuration)),
       broadcast_(configuration, {host_now(), wall_clock_now()}) {}
 
 Result<void> ReplayBroadcast::open(const std::string& url) {
@@ -57,8 +55,7 @@ status_t ReplayBroadcast::status(const Snapshot& snapshot) const {
   }
   const auto studies = configuration_.study_indices();
   for (std::size_t i = 0; i < studies.size(); ++i) {
-    status.studies.push_back(
-        study_status(configuration_.devices[studies[i]].name, snapshot.studies[i], estimator_.studies[i]));
+    status.studies.push_back(study_status(configuration_.devices[studies[i]].name, snapshot.studies[i]));
   }
   return status;
 }

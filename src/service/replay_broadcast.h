@@ -29,7 +29,6 @@ class ReplayBroadcast {
   const Configuration& configuration_;
   const Recording& recording_;
   std::string version_;
-  EstimatorConfig estimator_;
   Broadcast broadcast_;
   std::int64_t refits_ = 0;
 };

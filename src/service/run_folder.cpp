@@ -213,11 +213,9 @@ nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& st
     observable[kDirectionNames[i]] = study.observable[i];
   observable["t_d"] = study.t_d_observable;
   imu["observable"] = observable;
-  imu["observability"] = study.status >= StudyStatus::kConverging
-                             ? observability_json(observability_of(study))
-                             : nlohmann::json(nullptr);
-  constexpr std::array kStatusNames{"waiting", "coarse", "converging", "calibrated"};
-  imu["status"] = kStatusNames[static_cast<std::size_t>(study.status)];
+  imu["observability"] =
+      has_estimate(study.status) ? observability_json(observability_of(study)) : nlohmann::json(nullptr);
+  imu["status"] = key_of(study.status);
   imu["method"] = "filter end value";
   imu["samples"] = {{"received", study.counters.samples},
                     {"used", study.counters.used},
@@ -296,8 +294,7 @@ void RunFolder::on_snapshot(const Snapshot& snapshot) noexcept {
   if (snapshot.odometry.has_speed && is_new(snapshot.odometry.time, odometry_time_)) add_odometry();
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& study = snapshot.studies[i];
-    if ((study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated) &&
-        is_new(study.time, calibration_times_[i]))
+    if (has_estimate(study.status) && is_new(study.time, calibration_times_[i]))
       calibrations_[i].append(calibration_csv_row(study, studies_[i], seconds_since_start(study.time)));
   }
 }

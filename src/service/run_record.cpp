@@ -131,7 +131,7 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
   warn_of_host_seconds(last, warnings);
   const auto indices = configuration.study_indices();
   for (std::size_t i = 0; i < last.n_studies; ++i) {
-    if (last.studies[i].status >= StudyStatus::kConverging) continue;
+    if (has_estimate(last.studies[i].status)) continue;
     warnings.push_back(
         fmt::format("{}: no mounting was found; it needs about a minute of driving with turns, or a "
                     "[device.prior] in the configuration",

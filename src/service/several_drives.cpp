@@ -36,8 +36,8 @@ Result<DriveMountings> calibrate(const OpenedRecording& drive, const std::filesy
   for (std::size_t i = 0; i < indices.size(); ++i) {
     const StudyOutput& study = sink.last().studies[i];
     const auto& name = configuration.devices[indices[i]].name;
-    if (study.status < StudyStatus::kConverging) {
-      out.uncalibrated.push_back(name);
+    if (!has_estimate(study.status)) {
+      out.without_estimate.push_back(name);
     } else {
       out.studies.push_back({name, {study.C_b_s, study.r_bs_b_m, study.covariance_psi_r}});
     }

@@ -40,7 +40,7 @@ EstimatorConfig relinearised(EstimatorConfig config, const std::vector<StudyOutp
                              const FormerMountings& former) {
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
     const StudyOutput& at_start = former[i].empty() ? finals[i] : former[i].front().estimate;
-    if (at_start.status < StudyStatus::kConverging) continue;
+    if (!has_estimate(at_start.status)) continue;
     StudyConfig& study = config.studies[i];
     study.prior_C_b_s = at_start.C_b_s;
     study.prior_r_bs_b_m = at_start.r_bs_b_m;
@@ -192,7 +192,7 @@ Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, co
       if (const FormerMounting* then = in_force(former[i], epoch->time)) {
         shown = smoothed_output(then->estimate, *epoch, i, track.layout(i));
       } else {
-        if (last.studies[i].status < StudyStatus::kConverging) continue;
+        if (!has_estimate(last.studies[i].status)) continue;
         shown = with_smoothed_biases(last.studies[i], *epoch, i, track.layout(i));
       }
       files[i].append(calibration_csv_row(shown, infos[i], time_s));

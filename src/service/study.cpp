@@ -69,7 +69,7 @@ class CalibrationPass final : public CoreSink {
   void on_error(const ErrorRecord&) noexcept override {}
   void on_event(const EstimatorEvent& event) noexcept override {
     folder_.on_event(event);
-    if (event.kind != EstimatorEventKind::kMountingChanged || !folder_.last_snapshot()) return;
+    if (!is<event::MountingChanged>(event) || !folder_.last_snapshot()) return;
     const auto found = std::find(studies_.begin(), studies_.end(), event.device);
     const auto i = static_cast<std::size_t>(found - studies_.begin());
     if (i < former_.size()) former_[i].push_back({event.time, folder_.last_snapshot()->studies[i]});
@@ -122,15 +122,11 @@ Result<std::vector<RowSpool>> make_spools(std::size_t n, const OutputFolder& fol
   return spools;
 }
 
-bool calibrated(const StudyOutput& study) {
-  return study.status == StudyStatus::kConverging || study.status == StudyStatus::kCalibrated;
-}
-
 /// The estimator of the last pass: every mounting that was found is known.
 EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& finals) {
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
     const auto& final = finals[i];
-    if (!calibrated(final)) continue;
+    if (!has_estimate(final.status)) continue;
     config.studies[i] = with_mounting(
         config.studies[i], {final.C_b_s, final.r_bs_b_m, final.t_d_s, final.gyro_scale, final.accel_scale});
   }
@@ -202,7 +198,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const auto infos = study_file_infos(configuration, recording);
   const FormerMountings& former = first.former_mountings();
   warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
-  if (std::none_of(finals.begin(), finals.end(), calibrated)) {
+  if (std::none_of(finals.begin(), finals.end(),
+                   [](const StudyOutput& final) { return has_estimate(final.status); })) {
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
   }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "base/limits.h"
 #include "tests/alignment/analytic_motion.h"
 
 namespace imuscope {
@@ -191,6 +192,20 @@ TEST(ReferenceWindow, SaysWhenToWaitAndWhenItIsTooLate) {
   EXPECT_EQ(window.evaluate(window.newest_time() + Duration{2}, out), ReferenceResult::kTooNew);
   EXPECT_EQ(window.evaluate(at(1.0), out), ReferenceResult::kTooOld);  // 256 samples are kept
   EXPECT_EQ(ReferenceWindow({5, kPeriod_s}).evaluate(at(1.0), out), ReferenceResult::kTooNew);
+}
+
+TEST(ReferenceWindow, ReachesBackTheSameTimeAtTheHighestRate) {
+  constexpr double kFast_s = 1.0 / kMaxRate_hz;
+  ReferenceWindow window({5, kFast_s});
+  for (int k = 0; k < 8000; ++k) {
+    Sample sample{};
+    sample.kind = SampleKind::kImu;
+    sample.time = at(k * kFast_s);
+    ASSERT_TRUE(window.push(sample));
+  }
+  ReferenceKinematics out;
+  const double newest_s = 8000 * kFast_s;
+  EXPECT_EQ(window.evaluate(at(newest_s - kReferencePast_s), out), ReferenceResult::kOk);
 }
 
 TEST(ReferenceWindow, DoesNotInterpolateOverAGap) {

@@ -37,10 +37,14 @@ SimulatedStudy tilted() { return {exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.2
 /// What a spoiler makes of a sample at a time of the drive; false: it is lost on the way.
 using Spoiler = std::function<bool(Sample&, double)>;
 
+/// One of every kind that came.
 struct Told {
-  std::set<EstimatorEventKind> kinds;
-  double last_value = 0.0;
-  [[nodiscard]] bool has(EstimatorEventKind kind) const { return kinds.contains(kind); }
+  std::vector<EstimatorEvent> events;
+  template <typename Kind>
+  [[nodiscard]] bool has() const {
+    return std::any_of(events.begin(), events.end(), is<Kind>);
+  }
+  void take(std::span<const EstimatorEvent> more) { events.insert(events.end(), more.begin(), more.end()); }
 };
 
 Told told_by(SimulatedDrive& drive, Estimator& estimator, const Spoiler& spoil = {}, double until_s = 1e9) {
@@ -52,10 +56,7 @@ Told told_by(SimulatedDrive& drive, Estimator& estimator, const Spoiler& spoil =
       if (!spoil || spoil(sample, t_s)) estimator.add(sample);
     }
     estimator.advance(samples.back().arrival);
-    for (const EstimatorEvent& event : estimator.events()) {
-      told.kinds.insert(event.kind);
-      told.last_value = event.value;
-    }
+    told.take(estimator.events());
   }
   return told;
 }
@@ -85,9 +86,9 @@ TEST(BadInput, TwoSwappedStudiesAreToldByName) {
     }
     Estimator estimator(config);
     const Told told = told_by(drive, estimator);
-    EXPECT_EQ(told.has(EstimatorEventKind::kStudiesSwapped), swapped);
-    EXPECT_EQ(told.has(EstimatorEventKind::kBoresightPriorWrong), swapped);
-    EXPECT_EQ(told.has(EstimatorEventKind::kLeverArmPriorWrong), swapped);
+    EXPECT_EQ(told.has<event::StudiesSwapped>(), swapped);
+    EXPECT_EQ(told.has<event::BoresightPriorWrong>(), swapped);
+    EXPECT_EQ(told.has<event::LeverArmPriorWrong>(), swapped);
     for (std::size_t i = 0; i < 2; ++i)
       EXPECT_LT(test::mounting_error_rad(estimator.study(i), truth[i].C_b_s).norm(), 0.5 * kRadPerDeg);
   }
@@ -114,8 +115,8 @@ TEST(BadInput, APositionThatIsNowhereIsRefusedFromTheFirstOnAndCounted) {
     ASSERT_GT(spoilt, 2 * nowhere.size());
     EXPECT_EQ(estimator.counters().gnss_positions_rejected, spoilt);
     EXPECT_EQ(estimator.counters().gnss_rejected, spoilt);
-    EXPECT_TRUE(told.has(EstimatorEventKind::kGnssRejected));
-    EXPECT_TRUE(told.has(EstimatorEventKind::kGnssReacquired));
+    EXPECT_TRUE(told.has<event::GnssRejected>());
+    EXPECT_TRUE(told.has<event::GnssReacquired>());
     EXPECT_LT(horizontal_error_m(estimator.navigation(), drive.motion().state_at(drive.time_s() - 0.01)),
               0.2);
     EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
@@ -136,10 +137,10 @@ TEST_P(SilentStudy, ThatReturnsIsToldAndItsBiasesAreComparedWithThoseBefore) {
     }
     return t_s < 160.0 || t_s > 170.0;
   });
-  EXPECT_TRUE(told.has(EstimatorEventKind::kStudyReturned));
-  EXPECT_EQ(told.has(EstimatorEventKind::kGyroBiasChanged), changed);
-  EXPECT_EQ(told.has(EstimatorEventKind::kAccelBiasChanged), changed);
-  EXPECT_FALSE(told.has(EstimatorEventKind::kMountingChanged));
+  EXPECT_TRUE(told.has<event::StudyReturned>());
+  EXPECT_EQ(told.has<event::GyroBiasChanged>(), changed);
+  EXPECT_EQ(told.has<event::AccelBiasChanged>(), changed);
+  EXPECT_FALSE(told.has<event::MountingChanged>());
   EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
 }
 INSTANTIATE_TEST_SUITE_P(WithOtherBiasesOrTheSame, SilentStudy, testing::Bool());
@@ -148,15 +149,15 @@ TEST(BadInput, AStudyThatReturnsTurnedIsFoundAnew) {
   SimulatedDrive drive(360.0, {tilted()}, 43);
   Estimator estimator(drive.config());
   told_by(drive, estimator, {}, 160.0);
-  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  ASSERT_GE(estimator.study(0).status, CalibrationStatus::kConverging);
   const Matrix3d turned = exp_so3(Vector3d(0.2, -0.3, 0.8)) * tilted().C_b_s;
   drive.remount(0, turned);
   const Told told = told_by(drive, estimator, [](Sample& sample, double t_s) {
     return sample.device != SimulatedDrive::kFirstStudy || t_s > 170.0;
   });
-  EXPECT_TRUE(told.has(EstimatorEventKind::kStudyReturned));
-  EXPECT_TRUE(told.has(EstimatorEventKind::kMountingChanged));
-  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  EXPECT_TRUE(told.has<event::StudyReturned>());
+  EXPECT_TRUE(told.has<event::MountingChanged>());
+  ASSERT_GE(estimator.study(0).status, CalibrationStatus::kConverging);
   EXPECT_LT(test::mounting_error_rad(estimator.study(0), turned).norm(), 0.5 * kRadPerDeg);
 }
 
@@ -168,7 +169,7 @@ TEST_P(AntennaLeverArm, IsToldWhenItIsWrongAndLeavesTheCalibrationAlone) {
   config.gnss.antenna_lever_arm_b_m = {GetParam(), 0.5 * GetParam(), 0.0};
   Estimator estimator(config);
   const Told told = told_by(drive, estimator);
-  EXPECT_EQ(told.has(EstimatorEventKind::kGnssInconsistent), GetParam() != 0.0);
+  EXPECT_EQ(told.has<event::GnssInconsistent>(), GetParam() != 0.0);
   EXPECT_LT(worst_in_sd(estimator.study(0), tilted()), 4.0);
   const imusim::MotionState truth = drive.motion().state_at(drive.time_s() - 0.01);
   EXPECT_LT(horizontal_error_m(estimator.navigation(), truth), 2.0 * std::hypot(GetParam(), 0.1));
@@ -215,7 +216,7 @@ TEST(BadInput, ForcesInAnotherUnitAreToldAtStandstill) {
           return true;
         },
         30.0);
-    EXPECT_TRUE(told.has(EstimatorEventKind::kGravityMagnitudeWrong)) << "device " << device;
+    EXPECT_TRUE(told.has<event::GravityMagnitudeWrong>()) << "device " << device;
   }
 }
 
@@ -230,7 +231,7 @@ class Mirrored : public testing::TestWithParam<WrongSigns> {};
 TEST_P(Mirrored, StudyIsToldAndNoneOfItsNumbersIsEverCalledUsable) {
   SimulatedDrive drive(400.0, {tilted()}, 47);
   Estimator estimator(drive.config());
-  std::set<EstimatorEventKind> told;
+  Told told;
   while (!drive.done()) {
     std::vector<Sample> samples = drive.next();
     for (Sample& sample : samples) {
@@ -243,14 +244,13 @@ TEST_P(Mirrored, StudyIsToldAndNoneOfItsNumbersIsEverCalledUsable) {
       estimator.add(sample);
     }
     estimator.advance(samples.back().arrival);
-    for (const EstimatorEvent& event : estimator.events()) told.insert(event.kind);
+    told.take(estimator.events());
     const StudyOutput& out = estimator.study(0);
-    ASSERT_NE(out.status, StudyStatus::kCalibrated) << "at " << drive.time_s() << " s";
+    ASSERT_NE(out.status, CalibrationStatus::kCalibrated) << "at " << drive.time_s() << " s";
     ASSERT_FALSE(out.t_d_observable) << "at " << drive.time_s() << " s";
     for (const bool observable : out.observable) ASSERT_FALSE(observable) << "at " << drive.time_s() << " s";
   }
-  EXPECT_TRUE(told.contains(EstimatorEventKind::kCoarseAlignmentPoor) ||
-              told.contains(EstimatorEventKind::kStudyInconsistent));
+  EXPECT_TRUE(told.has<event::CoarseAlignmentPoor>() || told.has<event::StudyInconsistent>());
 }
 INSTANTIATE_TEST_SUITE_P(WrongSigns, Mirrored,
                          testing::Values(WrongSigns{"XOfBoth", {-1, 1, 1}, {-1, 1, 1}},
@@ -265,7 +265,7 @@ TEST(BadInput, AStudyThatFitsIsCalledUsable) {
   SimulatedDrive drive(300.0, {tilted()}, 47);
   Estimator estimator(drive.config());
   const Told told = told_by(drive, estimator);
-  EXPECT_FALSE(told.has(EstimatorEventKind::kStudyInconsistent));
+  EXPECT_FALSE(told.has<event::StudyInconsistent>());
   for (const bool observable : estimator.study(0).observable) EXPECT_TRUE(observable);
 }
 
@@ -275,12 +275,12 @@ TEST(BadInput, ATurnedMountIsNoticedWhereSamplesAreAveraged) {
   config.studies[0].average_samples = 10;
   Estimator estimator(config);
   told_by(drive, estimator, {}, 160.0);
-  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  ASSERT_GE(estimator.study(0).status, CalibrationStatus::kConverging);
   const Matrix3d turned = exp_so3(Vector3d(0.2, -0.3, 0.8)) * tilted().C_b_s;
   drive.remount(0, turned);
   const Told told = told_by(drive, estimator);
-  EXPECT_TRUE(told.has(EstimatorEventKind::kMountingChanged));
-  ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+  EXPECT_TRUE(told.has<event::MountingChanged>());
+  ASSERT_GE(estimator.study(0).status, CalibrationStatus::kConverging);
   EXPECT_LT(test::mounting_error_rad(estimator.study(0), turned).norm(), 0.5 * kRadPerDeg);
 }
 
@@ -329,7 +329,7 @@ TEST(BadInput, TimeRunningBackwardsAndNanForAWholeSecondChangeNothingButCounters
       sample.time -= std::chrono::seconds{30};
     return true;
   });
-  EXPECT_TRUE(told.has(EstimatorEventKind::kReferenceGap));
+  EXPECT_TRUE(told.has<event::ReferenceGap>());
   EXPECT_GT(estimator.counters().reference_not_finite, 90U);
   EXPECT_GT(estimator.counters().reference_not_increasing, 90U);
   EXPECT_GT(estimator.study(0).counters.not_finite, 90U);
@@ -494,7 +494,7 @@ TEST(BadInput, SolutionsThatSayNothingAreCountedAndLeaveTheNavigationAlone) {
 TEST(BadInput, VelocitiesAloneHoldTheNavigationAndAWrongOneIsTold) {
   SimulatedDrive drive(130.0, {}, 54);
   Estimator estimator(drive.config());
-  std::set<EstimatorEventKind> told;
+  Told told;
   double worst_mps = 0.0;
   std::uint64_t positions_rejected = 0;
   while (!drive.done()) {
@@ -512,11 +512,11 @@ TEST(BadInput, VelocitiesAloneHoldTheNavigationAndAWrongOneIsTold) {
     }
     estimator.advance(samples.back().arrival);
     for (const EstimatorEvent& event : estimator.events()) {
-      if (event.kind == EstimatorEventKind::kGnssRejected) {
-        EXPECT_GT(event.value, 100.0) << "NIS of the velocity";
+      if (const auto* rejected = std::get_if<event::GnssRejected>(&event.what)) {
+        EXPECT_GT(rejected->nis, 100.0) << "NIS of the velocity";
       }
-      told.insert(event.kind);
     }
+    told.take(estimator.events());
     if (t_s < 71.0) continue;
     positions_rejected = estimator.counters().gnss_positions_rejected;
     for (Eigen::Index i = 0; i < 3; ++i) {
@@ -524,8 +524,8 @@ TEST(BadInput, VelocitiesAloneHoldTheNavigationAndAWrongOneIsTold) {
                                                truth.v_n_mps(i)));
     }
   }
-  EXPECT_TRUE(told.contains(EstimatorEventKind::kGnssRejected));
-  EXPECT_TRUE(told.contains(EstimatorEventKind::kGnssReacquired));
+  EXPECT_TRUE(told.has<event::GnssRejected>());
+  EXPECT_TRUE(told.has<event::GnssReacquired>());
   EXPECT_EQ(estimator.counters().gnss_rejected, 4U);
   EXPECT_EQ(positions_rejected, 0U);
   EXPECT_LT(worst_mps, 0.1);
@@ -610,13 +610,14 @@ TEST(EventLog, CountsWhatItHasNoRoomForAndIsEmptyOnceTaken) {
   EventLog log;
   EventLog shown;
   for (std::size_t i = 0; i < EventLog::kCapacity + 3; ++i)
-    log.add(EstimatorEventKind::kReferenceGap, 0, HostTime{}, static_cast<double>(i));
+    log.add(event::ReferenceGap{static_cast<double>(i)}, 0, HostTime{});
   EXPECT_EQ(log.lost(), 3U);
   shown.take(log);
   ASSERT_EQ(shown.events().size(), EventLog::kCapacity);
-  EXPECT_EQ(shown.events().back().value, static_cast<double>(EventLog::kCapacity - 1));
+  EXPECT_EQ(std::get<event::ReferenceGap>(shown.events().back().what).length_s,
+            static_cast<double>(EventLog::kCapacity - 1));
   EXPECT_TRUE(log.events().empty());
-  log.add(EstimatorEventKind::kReferenceGap, 0, HostTime{}, 0.0);
+  log.add(event::ReferenceGap{0.0}, 0, HostTime{});
   EXPECT_EQ(log.lost(), 3U);
 }
 

@@ -155,7 +155,7 @@ TEST_P(CarDrive, FindsTheKnownMountingLeverArmAndTimeOffsetWithoutPrior) {
   const Vector3d r_bs_b_m = flu_to_frd * Vector3d(0.002, 0.038, 0.154);
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(out.C_b_s.data());
   const Vector3d psi_deg = kDegPerRad * log_so3(C.transpose() * C_b_s);
-  ASSERT_GE(out.status, StudyStatus::kConverging);
+  ASSERT_GE(out.status, CalibrationStatus::kConverging);
   // Three published sd and the known values' spread over many drives, turned from the study's axes (its x
   // lies along the reference's y) to b; millimetres as given, offsets to the millisecond.
   const Vector3d spread_deg(0.18, 0.05, 0.08);

@@ -28,9 +28,9 @@ bool leave(double /*t_s*/, Sample& /*sample*/) { return true; }
 
 struct Told {
   std::vector<EstimatorEvent> events;
-  [[nodiscard]] long count(EstimatorEventKind kind) const {
-    return std::count_if(events.begin(), events.end(),
-                         [kind](const EstimatorEvent& event) { return event.kind == kind; });
+  template <typename Kind>
+  [[nodiscard]] long count() const {
+    return std::count_if(events.begin(), events.end(), is<Kind>);
   }
 };
 
@@ -132,9 +132,8 @@ TEST(Odometry, SpinningWheelsAreRejectedAndToldOnce) {
     return true;
   });
   EXPECT_GT(estimator.counters().odometry_speed_rejected, 200U);
-  EXPECT_GE(told.count(EstimatorEventKind::kOdometryRejected), 1);
-  EXPECT_EQ(told.count(EstimatorEventKind::kOdometryRejected),
-            told.count(EstimatorEventKind::kOdometryAccepted));
+  EXPECT_GE(told.count<event::OdometryRejected>(), 1);
+  EXPECT_EQ(told.count<event::OdometryRejected>(), told.count<event::OdometryAccepted>());
   EXPECT_LT(horizontal_error_m(drive, estimator), 0.05);
   EXPECT_NEAR(estimator.odometry().scale, 0.012, 5.0 * estimator.odometry().sd_scale);
 }
@@ -166,13 +165,13 @@ TEST(Odometry, SilenceIsToldAndTheLastSpeedIsNotHeld) {
   run(drive, estimator, 100.0);
   const auto silent = [](double /*t_s*/, Sample& sample) { return sample.kind != SampleKind::kOdometry; };
   Told told = run(drive, estimator, 110.0, silent);
-  ASSERT_EQ(told.count(EstimatorEventKind::kOdometryLost), 1);
+  ASSERT_EQ(told.count<event::OdometryLost>(), 1);
   const std::uint64_t used = estimator.counters().odometry_slip_used;
   told = run(drive, estimator, 111.0, silent);
   EXPECT_EQ(estimator.counters().odometry_slip_used, used);
-  EXPECT_EQ(told.count(EstimatorEventKind::kOdometryLost), 0);
+  EXPECT_EQ(told.count<event::OdometryLost>(), 0);
   told = run(drive, estimator, 112.0);
-  EXPECT_EQ(told.count(EstimatorEventKind::kOdometryReturned), 1);
+  EXPECT_EQ(told.count<event::OdometryReturned>(), 1);
   EXPECT_GT(estimator.counters().odometry_slip_used, used);
 }
 

@@ -48,7 +48,7 @@ TEST(States, AMountThatCreepsIsFollowedWhereCreepIsAllowedAndLostWhereItIsNot) {
       for (const Sample& sample : samples) estimator.add(sample);
       estimator.advance(samples.back().arrival);
     }
-    ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+    ASSERT_GE(estimator.study(0).status, CalibrationStatus::kConverging);
     error_rad[allowed ? 0 : 1] = test::mounting_error_rad(estimator.study(0), C).norm();
     if (allowed) {
       EXPECT_LT(worst_boresight_in_sd(estimator.study(0), C), 4.0);
@@ -71,7 +71,7 @@ TEST(States, ThePapersSixTakeBiasesForBoresightWithoutKnowingIt) {
       for (const Sample& sample : samples) estimator.add(sample);
       estimator.advance(samples.back().arrival);
     }
-    ASSERT_GE(estimator.study(0).status, StudyStatus::kConverging);
+    ASSERT_GE(estimator.study(0).status, CalibrationStatus::kConverging);
     const double worst = worst_boresight_in_sd(estimator.study(0), kMounting);
     if (paper) {
       EXPECT_GT(worst, 20.0);

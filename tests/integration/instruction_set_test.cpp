@@ -46,7 +46,7 @@ TEST(InstructionSets, AgreeOnTheGoldenDriveToAMillionthOfTheSd) {
 
   const auto baseline = snapshots_with(InstructionSet::kBaseline, *opened);
   ASSERT_GT(baseline.size(), 100U);
-  ASSERT_GE(baseline.back().studies[0].status, StudyStatus::kConverging);
+  ASSERT_GE(baseline.back().studies[0].status, CalibrationStatus::kConverging);
   std::size_t compared = 0;
   for (const InstructionSet set : {InstructionSet::kAvx2, InstructionSet::kAvx512}) {
     if (covariance_loops(set) == nullptr) continue;

@@ -63,7 +63,7 @@ TEST(Numerics, UnoptimisedAndOptimisedBuildsAgreeOnTheGoldenDriveToAMillionthOfT
 
   const auto deployed = run(estimator_run_release, config, samples);
   ASSERT_GT(deployed.size(), 100U);
-  ASSERT_GE(deployed.back().studies.at(0).status, StudyStatus::kConverging);
+  ASSERT_GE(deployed.back().studies.at(0).status, CalibrationStatus::kConverging);
   for (const auto& [name, build] : {std::pair{"O0", &estimator_run_O0}, std::pair{"O3", &estimator_run_O3}}) {
     const auto other = run(build, config, samples);
     ASSERT_EQ(other.size(), deployed.size()) << name;

@@ -164,9 +164,9 @@ TEST(Beat, QuantilesAreUnknownWithoutAValue) {
   EXPECT_TRUE(std::isnan(thread.done_p999_us));
 }
 
-TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection) {
+TEST(CalibrationStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection) {
   StudyOutput study;
-  study.status = StudyStatus::kConverging;
+  study.status = CalibrationStatus::kConverging;
   study.sd_psi_rad = {0.1, 0.3, 0.2};
   study.sd_r_bs_b_m = {0.6, 0.4, 0.5};
   study.sd_t_d_s = 0.7;
@@ -176,27 +176,26 @@ TEST(StudyStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection
   study.weakest_relative_sd = 0.9;
   study.counters.gated_gyro = {1, 2, 3};
   study.counters.gated_accel = {4, 5, 6};
-  StudyConfig config;
-  const auto status = study_status("mtx1", study, config);
+  const auto status = study_status("mtx1", study);
   EXPECT_DOUBLE_EQ(status.sd_psi_deg, 0.3 * kDegPerRad);
   EXPECT_DOUBLE_EQ(status.sd_r_m, 0.6);
   EXPECT_DOUBLE_EQ(status.sd_t_d_ms, 700.0);
-  EXPECT_DOUBLE_EQ(status.goal_psi_deg, config.goal_boresight_sd_rad * kDegPerRad);
-  EXPECT_DOUBLE_EQ(status.goal_r_m, config.goal_r_bs_b_sd_m);
-  EXPECT_DOUBLE_EQ(status.goal_t_d_ms, config.goal_t_d_sd_s * 1e3);
+  EXPECT_DOUBLE_EQ(status.goal_psi_deg, kGoalBoresightSd_rad * kDegPerRad);
+  EXPECT_DOUBLE_EQ(status.goal_r_m, kGoalLeverArmSd_m);
+  EXPECT_DOUBLE_EQ(status.goal_t_d_ms, kGoalTimeOffsetSd_s * 1e3);
   EXPECT_EQ(status.weakest, "boresight about down");
   EXPECT_DOUBLE_EQ(status.weakest_relative, 0.9);
   EXPECT_THAT(status.manoeuvre, HasSubstr("brake"));
   EXPECT_EQ(status.gated, 21);
   EXPECT_EQ(status.manoeuvre, observability_of(study).advice) << "said in one way everywhere";
-  study.status = StudyStatus::kCalibrated;
+  study.status = CalibrationStatus::kCalibrated;
   study.observable.fill(true);
-  study.sd_psi_rad.fill(0.5 * config.goal_boresight_sd_rad);
-  study.sd_r_bs_b_m.fill(0.5 * config.goal_r_bs_b_sd_m);
-  study.sd_t_d_s = 0.5 * config.goal_t_d_sd_s;
-  EXPECT_EQ(study_status("mtx1", study, config).manoeuvre, "") << "nothing is missing any more";
-  study.status = StudyStatus::kCoarse;
-  const auto coarse = study_status("mtx1", study, config);
+  study.sd_psi_rad.fill(0.5 * kGoalBoresightSd_rad);
+  study.sd_r_bs_b_m.fill(0.5 * kGoalLeverArmSd_m);
+  study.sd_t_d_s = 0.5 * kGoalTimeOffsetSd_s;
+  EXPECT_EQ(study_status("mtx1", study).manoeuvre, "") << "nothing is missing any more";
+  study.status = CalibrationStatus::kCoarse;
+  const auto coarse = study_status("mtx1", study);
   EXPECT_TRUE(std::isnan(coarse.sd_psi_deg)) << "what is not estimated has no sd";
   EXPECT_THAT(coarse.manoeuvre, HasSubstr("turn both ways"));
 }

@@ -15,7 +15,7 @@ using testing::IsEmpty;
 /// Everything at its goal.
 StudyOutput calibrated() {
   StudyOutput study;
-  study.status = StudyStatus::kCalibrated;
+  study.status = CalibrationStatus::kCalibrated;
   study.sd_psi_rad.fill(0.005 * kRadPerDeg);
   study.sd_r_bs_b_m.fill(5e-4);
   study.sd_t_d_s = 3e-5;
@@ -40,7 +40,7 @@ TEST(Observability, WithEveryGoalReachedGivesNumbersAndNoAdvice) {
 
 TEST(Observability, AtStandstillSaysThatTheAngleAboutGravityIsNotObservableAndWhatWouldShowIt) {
   StudyOutput study = calibrated();
-  study.status = StudyStatus::kConverging;
+  study.status = CalibrationStatus::kConverging;
   study.sd_psi_rad[2] = 2.0 * kRadPerDeg;
   study.observable[2] = false;
   study.weakest_direction = {0.02, -0.01, 0.999, 0, 0, 0};
@@ -84,9 +84,9 @@ TEST(Observability, AdvisesForWhatIsFurthestFromItsGoal) {
 TEST(ObservabilityWatch, SpeaksWhenSomethingChangesAndOnceAMinuteWhileSomethingIsMissing) {
   ObservabilityWatch watch;
   StudyOutput study = calibrated();
-  study.status = StudyStatus::kCoarse;
+  study.status = CalibrationStatus::kCoarse;
   EXPECT_THAT(watch.update(study), IsEmpty());
-  study.status = StudyStatus::kConverging;
+  study.status = CalibrationStatus::kConverging;
   study.observable[2] = false;
   study.sd_psi_rad[2] = 2.0 * kRadPerDeg;
   study.weakest_direction = {0, 0, 1, 0, 0, 0};

@@ -120,7 +120,7 @@ TEST(Telemetry, OdometryArrivesInPercentAndDegreesWithEveryFieldInItsPlace) {
 Snapshot calibrated_snapshot() {
   Snapshot s = snapshot();
   StudyOutput& study = s.studies[1];
-  study.status = StudyStatus::kConverging;
+  study.status = CalibrationStatus::kConverging;
   study.time = kThen;
   study.C_b_s = {0, 1, 0, -1, 0, 0, 0, 0, 1};
   double next = 0.0;
@@ -185,10 +185,9 @@ TEST(Telemetry, AStateThatIsNotObservableYetHasNoNumberButItsSd) {
               ElementsAre(1, 1, 0, 1, 1, 1, 0));
   EXPECT_DOUBLE_EQ(m.psi_x_deg, 1 * kDegreesPerRadian);
   EXPECT_DOUBLE_EQ(m.sd_psi_z_deg, 103 * kDegreesPerRadian);
-  const StudyConfig goals;
-  EXPECT_DOUBLE_EQ(m.goal_sd_psi_deg, goals.goal_boresight_sd_rad * kDegreesPerRadian);
-  EXPECT_DOUBLE_EQ(m.goal_sd_r_m, goals.goal_r_bs_b_sd_m);
-  EXPECT_DOUBLE_EQ(m.goal_sd_t_d_ms, goals.goal_t_d_sd_s * 1e3);
+  EXPECT_DOUBLE_EQ(m.goal_sd_psi_deg, kGoalBoresightSd_rad * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.goal_sd_r_m, kGoalLeverArmSd_m);
+  EXPECT_DOUBLE_EQ(m.goal_sd_t_d_ms, kGoalTimeOffsetSd_s * 1e3);
   EXPECT_EQ(m.weakest_direction, "boresight about down");
   EXPECT_DOUBLE_EQ(m.weakest_relative_sd, 0.25);
   EXPECT_THAT(m.advice, testing::HasSubstr("quickly"));

@@ -25,7 +25,7 @@ inline double share_of_sd(const Vector3& a, const Vector3& b, const Vector3& sd)
 /// Infinite where they are not in the same state; 0 where neither has an estimate yet.
 inline double difference(const StudyOutput& a, const StudyOutput& b) {
   if (a.status != b.status) return HUGE_VAL;
-  if (a.status < StudyStatus::kConverging) return 0.0;
+  if (!has_estimate(a.status)) return 0.0;
   return std::max({share_of_sd(a.psi_rad, b.psi_rad, b.sd_psi_rad),
                    share_of_sd(a.r_bs_b_m, b.r_bs_b_m, b.sd_r_bs_b_m),
                    share_of_sd(a.gyro_bias_radps, b.gyro_bias_radps, b.sd_gyro_bias_radps),

@@ -188,7 +188,7 @@ class WeightedErrors {
   void add(const imuscope::Estimator& estimator) {
     for (std::size_t i = 0; i < kStudies; ++i) {
       const imuscope::StudyOutput& out = estimator.study(i);
-      if (out.status < imuscope::StudyStatus::kConverging) continue;
+      if (!has_estimate(out.status)) continue;
       const Vector3d error = psi_error(out, i);
       for (std::size_t a = 0; a < 3; ++a)
         means_[i][a].add(error(static_cast<Eigen::Index>(a)), out.sd_psi_rad[a]);
@@ -206,7 +206,7 @@ void account(const Scenario& scenario, const imuscope::Estimator& estimator, con
              const WeightedErrors& weighted, const imusim::MotionState& end, Totals& totals) {
   for (std::size_t i = 0; i < kStudies; ++i) {
     const imuscope::StudyOutput& out = estimator.study(i);
-    if (out.status < imuscope::StudyStatus::kConverging) {
+    if (!has_estimate(out.status)) {
       ++totals.not_started;
       continue;
     }

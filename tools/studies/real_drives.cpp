@@ -87,8 +87,7 @@ class Last final : public imuscope::CoreSink {
   void on_snapshot(const imuscope::Snapshot& snapshot) noexcept override {
     last = snapshot;
     const imuscope::StudyOutput& study = snapshot.studies[0];
-    if (study.status < imuscope::StudyStatus::kConverging || study.regime != imuscope::Regime::kDynamic)
-      return;
+    if (!has_estimate(study.status) || study.regime != imuscope::Regime::kDynamic) return;
     nis[0] += imuscope::to_eigen(study.nis_gyro);
     nis[1] += imuscope::to_eigen(study.nis_accel);
     n += 1.0;
@@ -238,10 +237,10 @@ int main(int argc, char** argv) {
       fmt::print(stderr, "{}: {}\n", known.name, found.error().text());
       return 1;
     }
-    if (found->study.status < imuscope::StudyStatus::kConverging) {
-      fmt::print(stderr, "{}: no mounting was found\n", known.name);
-      return 1;
-    }
+    if (!has_estimate(found->study.status)) {
+        fmt::print(stderr, "{}: no mounting was found\n", known.name);
+        return 1;
+      }
     const Comparison comparison = compare(known, *found);
     if (json) {
       rows.push_back(to_json(known, *found, comparison));

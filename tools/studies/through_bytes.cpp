@@ -121,7 +121,7 @@ study_score::StudyTruth truth_of(const json& imu) {
 }
 
 void account(const imuscope::StudyOutput& out, double clock_shift_s, const json& truth, Totals& totals) {
-  if (out.status < imuscope::StudyStatus::kConverging) {
+  if (!has_estimate(out.status)) {
     ++totals.not_started;
     return;
   }

@@ -1,0 +1,78 @@
+#pragma once
+
+/// What may be said of the calibration of one S-IMU. Three sentences, each with its numbers, for the filter,
+/// the files, the messages, the report and the combination of drives alike:
+///
+/// - it has an estimate: the filter runs, and every value comes with an sd that means something;
+/// - it meets the goal: boresight and lever arm are known to the accuracy that the calibration is made for;
+/// - it is usable: what is left uncertain disturbs an error process less than the sensor's own noise does.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "base/units.h"
+
+namespace imuscope {
+
+/// How far the calibration of one S-IMU has come.
+enum class CalibrationStatus : std::uint8_t {
+  kWaiting,     ///< no sample yet, or none since a long gap
+  kCoarse,      ///< gathering motion for the coarse time offset and mounting
+  kConverging,  ///< has an estimate, which does not meet the goal yet
+  kCalibrated,  ///< meets the goal
+};
+
+/// As calibration.json has it.
+[[nodiscard]] constexpr std::string_view key_of(CalibrationStatus status) noexcept {
+  constexpr std::array<std::string_view, 4> kKeys{"waiting", "coarse", "converging", "calibrated"};
+  return kKeys[static_cast<std::size_t>(status)];
+}
+
+/// As STATUS and people have it.
+[[nodiscard]] constexpr std::string_view words_of(CalibrationStatus status) noexcept {
+  constexpr std::array<std::string_view, 4> kWords{"waiting for samples", "looking for its mounting",
+                                                   "converging", "calibrated"};
+  return kWords[static_cast<std::size_t>(status)];
+}
+
+[[nodiscard]] constexpr bool has_estimate(CalibrationStatus status) noexcept {
+  return status >= CalibrationStatus::kConverging;
+}
+/// The same of a status that was read, by key or words.
+[[nodiscard]] constexpr bool has_estimate(std::string_view status) noexcept {
+  return status == key_of(CalibrationStatus::kConverging) || status == key_of(CalibrationStatus::kCalibrated);
+}
+
+/// Each axis of the mounting, and the time offset, which has a goal of its own.
+inline constexpr double kGoalBoresightSd_rad = 0.01 * kRadPerDeg;
+inline constexpr double kGoalLeverArmSd_m = 1e-3;
+inline constexpr double kGoalTimeOffsetSd_s = 1e-4;
+
+/// A mounting ten times as uncertain as its goal is still usable. With an automotive MEMS unit (white noise
+/// of 0.5 deg/s and 0.02 m/s^2 per sample at 100 Hz) in a roundabout (0.5 rad/s, 1 rad/s^2), it leaves 0.05
+/// deg/s and 0.01 m/s^2.
+inline constexpr double kUsableFactor = 10.0;
+inline constexpr double kUsableBoresightSd_rad = kUsableFactor * kGoalBoresightSd_rad;
+inline constexpr double kUsableLeverArmSd_m = kUsableFactor * kGoalLeverArmSd_m;
+inline constexpr double kUsableTimeOffsetSd_s = kUsableFactor * kGoalTimeOffsetSd_s;
+
+/// Per axis; an sd that is NaN meets nothing.
+[[nodiscard]] constexpr bool meets_goal(const std::array<double, 3>& boresight_sd_rad,
+                                        const std::array<double, 3>& lever_arm_sd_m) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!(boresight_sd_rad[i] <= kGoalBoresightSd_rad) || !(lever_arm_sd_m[i] <= kGoalLeverArmSd_m))
+      return false;
+  }
+  return true;
+}
+
+/// Of the largest axis of each.
+[[nodiscard]] constexpr bool is_usable(double boresight_sd_rad, double lever_arm_sd_m,
+                                       double time_offset_sd_s) noexcept {
+  return boresight_sd_rad <= kUsableBoresightSd_rad && lever_arm_sd_m <= kUsableLeverArmSd_m &&
+         time_offset_sd_s <= kUsableTimeOffsetSd_s;
+}
+
+}  // namespace imuscope

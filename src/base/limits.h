@@ -1,0 +1,75 @@
+#pragma once
+
+/// How much there may be of everything, and for how long one part may stand still before another loses
+/// something. Capacities follow from rates and stalls; what depends on each other is bound together here.
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+
+namespace imuscope {
+
+/// Most S-IMUs that one run can hold, and beside them the R-IMU, a GNSS receiver and an odometry device.
+inline constexpr std::size_t kMaxStudies = 6;
+inline constexpr std::size_t kMaxDevices = kMaxStudies + 3;
+/// Fastest samples that a device may be configured to send.
+inline constexpr double kMaxRate_hz = 2000.0;
+/// What most IMUs send; stalls may last longer then.
+inline constexpr double kCommonRate_hz = 100.0;
+
+/// Places of a ring that takes `rate_hz` elements a second while its consumer stands still.
+[[nodiscard]] constexpr std::size_t ring_capacity(double rate_hz, double stall_s) noexcept {
+  const double elements = rate_hz * stall_s;
+  const auto whole = static_cast<std::size_t>(elements);
+  return std::bit_ceil(static_cast<double>(whole) < elements ? whole + 1 : whole);
+}
+
+/// The estimator's thread may stand still for this long at the highest rates, ten seconds at the common one.
+inline constexpr double kCoreStall_s = 0.5;
+/// Samples of one device on their way to the core.
+inline constexpr std::size_t kSampleRingCapacity = ring_capacity(kMaxRate_hz, kCoreStall_s);
+static_assert(kSampleRingCapacity >= ring_capacity(kCommonRate_hz, 10.0));
+/// S samples that one tick can show: what came while the core stood still is caught up in one go.
+inline constexpr std::size_t kEpochsPerTick =
+    kMaxStudies * static_cast<std::size_t>(kMaxRate_hz * kCoreStall_s);
+
+/// An S sample waits at most this long for the reference at its instant.
+inline constexpr double kReferenceWait_s = 0.1;
+/// S samples of one sensor that wait for the reference; a core that stood still finds all of them at once.
+inline constexpr std::size_t kWaitingSamples = ring_capacity(kMaxRate_hz, 1.0);
+static_assert(kWaitingSamples >= ring_capacity(kMaxRate_hz, kCoreStall_s + kReferenceWait_s));
+
+/// Past of the reference that a late S sample or GNSS solution is held against: places at its rate.
+inline constexpr double kReferencePast_s = 2.5;
+inline constexpr std::size_t kReferencePastMin = 256;
+[[nodiscard]] constexpr std::size_t reference_past_capacity(double rate_hz) noexcept {
+  return std::max(kReferencePastMin, ring_capacity(rate_hz, kReferencePast_s));
+}
+static_assert(kReferencePast_s >= kCoreStall_s + kReferenceWait_s);
+
+/// The publisher writes files, whose disk may stand still: for this long at the common rate.
+inline constexpr double kPublisherStall_s = 6.0;
+/// Rows of the error process on their way to the publisher: of a stall, and all of a tick that catches up.
+inline constexpr std::size_t kErrorRingCapacity =
+    std::max(ring_capacity(static_cast<double>(kMaxStudies) * kCommonRate_hz, kPublisherStall_s),
+             std::bit_ceil(kEpochsPerTick));
+inline constexpr double kSnapshotRate_hz = 10.0;
+inline constexpr std::size_t kSnapshotRingCapacity = ring_capacity(kSnapshotRate_hz, kPublisherStall_s);
+/// Events and new noise models come one by one: a few a minute, and what a tick may tell at most.
+inline constexpr std::size_t kEventsPerTick = 64;
+inline constexpr std::size_t kEventRingCapacity = 4 * kEventsPerTick;
+inline constexpr std::size_t kAppliedNoiseRingCapacity = 16;
+static_assert(kAppliedNoiseRingCapacity >= 2 * kMaxStudies);
+/// History of the filter on its way to the live smoother.
+inline constexpr double kHistoryRate_hz = 5.0;
+inline constexpr std::size_t kHistoryRingCapacity = ring_capacity(kHistoryRate_hz, 3.0);
+
+/// Serial lines are read once a tick. The recorder's disk may stand still for two seconds with every device
+/// that there can be, for four with five of them.
+inline constexpr double kReadRate_hz = 100.0;
+inline constexpr std::size_t kRawRingCapacity =
+    ring_capacity(static_cast<double>(kMaxDevices) * kReadRate_hz, 2.0);
+/// What breaks the rule of the ticks: every sample of a stall at the highest rate of one device.
+inline constexpr std::size_t kExceptionRingCapacity = ring_capacity(kMaxRate_hz, kCoreStall_s);
+
+}  // namespace imuscope

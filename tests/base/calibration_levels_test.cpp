@@ -1,0 +1,49 @@
+#include "base/calibration_levels.h"
+
+#include <gtest/gtest.h>
+#include <limits>
+
+namespace imuscope {
+namespace {
+
+constexpr std::array kGoalBoresight{kGoalBoresightSd_rad, kGoalBoresightSd_rad, kGoalBoresightSd_rad};
+constexpr std::array kGoalLeverArm{kGoalLeverArmSd_m, kGoalLeverArmSd_m, kGoalLeverArmSd_m};
+constexpr double kJustAbove = 1.0 + 1e-12;
+
+TEST(CalibrationLevels, AnEstimateIsThereFromConvergingOnByEnumKeyAndWords) {
+  EXPECT_FALSE(has_estimate(CalibrationStatus::kWaiting));
+  EXPECT_FALSE(has_estimate(CalibrationStatus::kCoarse));
+  EXPECT_TRUE(has_estimate(CalibrationStatus::kConverging));
+  EXPECT_TRUE(has_estimate(CalibrationStatus::kCalibrated));
+  for (const auto status : {CalibrationStatus::kWaiting, CalibrationStatus::kCoarse,
+                            CalibrationStatus::kConverging, CalibrationStatus::kCalibrated}) {
+    EXPECT_EQ(has_estimate(key_of(status)), has_estimate(status));
+    EXPECT_EQ(has_estimate(words_of(status)), has_estimate(status));
+  }
+  EXPECT_FALSE(has_estimate(""));
+}
+
+TEST(CalibrationLevels, EveryAxisHasToMeetTheGoal) {
+  EXPECT_TRUE(meets_goal(kGoalBoresight, kGoalLeverArm));
+  for (std::size_t i = 0; i < 3; ++i) {
+    auto boresight = kGoalBoresight;
+    boresight[i] *= kJustAbove;
+    EXPECT_FALSE(meets_goal(boresight, kGoalLeverArm)) << i;
+    auto lever_arm = kGoalLeverArm;
+    lever_arm[i] *= kJustAbove;
+    EXPECT_FALSE(meets_goal(kGoalBoresight, lever_arm)) << i;
+    lever_arm[i] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(meets_goal(kGoalBoresight, lever_arm)) << i;
+  }
+}
+
+TEST(CalibrationLevels, UsableIsATenthOfADegreeACentimetreAndAMillisecond) {
+  constexpr double kTenthOfDegree_rad = 0.1 * kRadPerDeg;
+  EXPECT_TRUE(is_usable(0.999 * kTenthOfDegree_rad, 0.999e-2, 0.999e-3));
+  EXPECT_FALSE(is_usable(1.001 * kTenthOfDegree_rad, 0.999e-2, 0.999e-3));
+  EXPECT_FALSE(is_usable(0.999 * kTenthOfDegree_rad, 1.001e-2, 0.999e-3));
+  EXPECT_FALSE(is_usable(0.999 * kTenthOfDegree_rad, 0.999e-2, 1.001e-3));
+}
+
+}  // namespace
+}  // namespace imuscope

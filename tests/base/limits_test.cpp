@@ -1,0 +1,22 @@
+#include "base/limits.h"
+
+#include <gtest/gtest.h>
+
+namespace imuscope {
+namespace {
+
+TEST(Limits, ARingHasRoomForAllThatComesInAStallAndIsAPowerOfTwo) {
+  EXPECT_EQ(ring_capacity(100.0, 10.0), 1024U);
+  EXPECT_EQ(ring_capacity(128.0, 1.0), 128U) << "what fits exactly is not doubled";
+  EXPECT_EQ(ring_capacity(128.5, 1.0), 256U) << "a part of an element needs a place";
+}
+
+TEST(Limits, ThePastOfTheReferenceLastsAsLongAtEveryRate) {
+  EXPECT_EQ(reference_past_capacity(100.0), 256U);
+  EXPECT_EQ(reference_past_capacity(10.0), 256U);
+  for (const double rate_hz : {200.0, 400.0, kMaxRate_hz})
+    EXPECT_GE(static_cast<double>(reference_past_capacity(rate_hz)), rate_hz * kReferencePast_s);
+}
+
+}  // namespace
+}  // namespace imuscope
