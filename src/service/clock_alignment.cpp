@@ -32,7 +32,7 @@ RateSeries rate_series(const std::vector<Sample>& samples) {
 }
 
 bool shares_the_reference_clock(const DeviceConfig& device) {
-  const bool csv = device.protocol == Protocol::kCsvImu || device.protocol == Protocol::kCsvGnss;
+  const bool csv = traits_of(device.protocol).is_text;
   return csv ? device.csv.common_clock : device.gnss.common_clock;
 }
 

@@ -15,28 +15,14 @@
 #include "regimes/motion_regimes.h"
 #include "sample/sample.h"
 #include "service/config_vehicle.h"
+#include "service/protocols.h"
 
 namespace imuscope {
 
 struct AskedKey;
 
-enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss, kOdometry };
-enum class Protocol : std::uint8_t {
-  kXsensMt,
-  kIxblueStdbin,
-  kGreis,
-  kNmea,
-  kUbx,
-  kRtklibPos,
-  kCsvImu,
-  kCsvGnss,
-  kXsensCan,
-  kCanOdometry
-};
-
-/// Name of a role or protocol as the configuration writes it.
+/// Name of a role as the configuration writes it.
 std::string_view name_of(DeviceRole role);
-std::string_view name_of(Protocol protocol);
 
 /// How the bytes come in. `port` is empty for a device that only exists as a file given on the command line.
 struct SerialConfig {

@@ -18,11 +18,22 @@ namespace {
 
 constexpr std::array kRoleNames{std::string_view("reference"), std::string_view("study"),
                                 std::string_view("gnss"), std::string_view("odometry")};
-constexpr std::array kProtocolNames{std::string_view("xsens_mt"),  std::string_view("ixblue_stdbin"),
-                                    std::string_view("greis"),     std::string_view("nmea"),
-                                    std::string_view("ubx"),       std::string_view("rtklib_pos"),
-                                    std::string_view("csv_imu"),   std::string_view("csv_gnss"),
-                                    std::string_view("xsens_can"), std::string_view("can_odometry")};
+std::vector<std::string_view> protocol_names() {
+  std::vector<std::string_view> names;
+  for (const ProtocolTraits& traits : kProtocols) names.push_back(traits.name);
+  return names;
+}
+
+/// Those that a device of a role can have, for people.
+std::string protocols_of(DeviceRole role) {
+  std::vector<std::string_view> names;
+  for (const ProtocolTraits& traits : kProtocols) {
+    if (fits(traits.protocol, role)) names.push_back(traits.name);
+  }
+  const std::string_view last = names.back();
+  names.pop_back();
+  return names.empty() ? std::string(last) : fmt::format("{} or {}", fmt::join(names, ", "), last);
+}
 
 constexpr int kMaxAveraged = 50;
 constexpr double kMaxBaud = 4'000'000.0;
@@ -31,18 +42,6 @@ template <std::size_t N>
 std::vector<std::string_view> words(const std::array<std::string_view, N>& names) {
   return {names.begin(), names.end()};
 }
-
-/// A GNSS receiver speaks it. An XSens device with a receiver inside can be that, or an IMU.
-bool is_gnss(Protocol protocol) {
-  return protocol == Protocol::kGreis || protocol == Protocol::kNmea || protocol == Protocol::kUbx ||
-         protocol == Protocol::kRtklibPos || protocol == Protocol::kCsvGnss;
-}
-bool fits(Protocol protocol, DeviceRole role) {
-  if (protocol == Protocol::kXsensMt) return role != DeviceRole::kOdometry;
-  return is_gnss(protocol) == (role == DeviceRole::kGnss) &&
-         (protocol == Protocol::kCanOdometry) == (role == DeviceRole::kOdometry);
-}
-bool is_csv(Protocol protocol) { return protocol == Protocol::kCsvImu || protocol == Protocol::kCsvGnss; }
 
 /// White noise can be given per sample or as a density; not both.
 void read_white(TomlReader& in, std::optional<double>& sd, std::string_view per_sample_key,
@@ -328,11 +327,6 @@ void read_rtklib(TomlReader& in, GnssOptions& gnss) {
   in.vector("base_lat_lon_height", *gnss.base_lat_lon_height, 1.0);
 }
 
-double default_rate_hz(Protocol protocol) {
-  if (is_gnss(protocol)) return 10.0;
-  return protocol == Protocol::kCanOdometry ? 50.0 : 100.0;
-}
-
 DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   DeviceConfig device;
   in.require("name", "every [[device]] needs a name of its own");
@@ -340,15 +334,14 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   if (in.has("name")) check_name(in, device.name);
   in.require("role", fmt::format("valid: {}", fmt::join(kRoleNames, ", ")));
   device.role = static_cast<DeviceRole>(in.choice("role", words(kRoleNames), 0));
-  in.require("protocol", fmt::format("valid: {}", fmt::join(kProtocolNames, ", ")));
-  device.protocol = static_cast<Protocol>(in.choice("protocol", words(kProtocolNames), 0));
+  in.require("protocol", fmt::format("valid: {}", fmt::join(protocol_names(), ", ")));
+  device.protocol = static_cast<Protocol>(in.choice("protocol", protocol_names(), 0));
   if (!fits(device.protocol, device.role)) {
     in.fail("protocol",
             fmt::format("{} does not fit role {}", name_of(device.protocol), name_of(device.role)),
-            "a gnss device speaks greis, nmea, ubx, rtklib_pos, xsens_mt or csv_gnss, an odometry device "
-            "can_odometry, an IMU any other protocol");
+            fmt::format("a {} device speaks {}", name_of(device.role), protocols_of(device.role)));
   }
-  device.rate_hz = default_rate_hz(device.protocol);
+  device.rate_hz = traits_of(device.protocol).rate_hz;
   in.number("rate_hz", device.rate_hz, 1.0, 0.1, kMaxRate_hz);
   // The StdBin telegram is in forward-port-up axes, b is forward-right-down.
   if (device.protocol == Protocol::kIxblueStdbin) device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
@@ -362,7 +355,7 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
     device.data_sheet = default_data_sheet(device.protocol);
     read_data_sheet(in.table("data_sheet"), device.data_sheet);
   }
-  if (is_csv(device.protocol)) read_csv(in.table("csv"), device.csv);
+  if (traits_of(device.protocol).is_text) read_csv(in.table("csv"), device.csv);
   if (device.role == DeviceRole::kGnss) {
     device.gnss.position_sd_m = {0.02, 0.02, 0.04};
     device.gnss.velocity_sd_mps = {0.05, 0.05, 0.10};
@@ -425,7 +418,6 @@ void share_lines(TomlReader& root, std::vector<DeviceConfig>& devices) {
 }  // namespace
 
 std::string_view name_of(DeviceRole role) { return kRoleNames[static_cast<std::size_t>(role)]; }
-std::string_view name_of(Protocol protocol) { return kProtocolNames[static_cast<std::size_t>(protocol)]; }
 
 void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
                   std::vector<DeviceConfig>& devices) {

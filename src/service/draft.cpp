@@ -16,7 +16,9 @@ std::ptrdiff_t reference_of(const std::vector<FoundDevice>& devices) {
     return found == devices.end() ? -1 : found - devices.begin();
   };
   const auto stdbin = first([](const FoundDevice& d) { return d.protocol == Protocol::kIxblueStdbin; });
-  return stdbin >= 0 ? stdbin : first([](const FoundDevice& d) { return !is_receiver(d.protocol); });
+  return stdbin >= 0
+             ? stdbin
+             : first([](const FoundDevice& d) { return traits_of(d.protocol).purpose == SampleKind::kImu; });
 }
 
 /// A rate as a person would set it: measured ones are off by what the short look adds.
@@ -57,7 +59,7 @@ Result<std::string> draft_configuration(const std::string& run_name,
   int receivers = 0;
   for (std::size_t i = 0; i < devices.size(); ++i) {
     const FoundDevice& device = devices[i];
-    const bool is_gnss = is_receiver(device.protocol);
+    const bool is_gnss = traits_of(device.protocol).purpose == SampleKind::kGnss;
     const bool is_reference = static_cast<std::ptrdiff_t>(i) == reference;
     const DeviceRole role = is_gnss        ? DeviceRole::kGnss
                             : is_reference ? DeviceRole::kReference

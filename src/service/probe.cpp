@@ -182,7 +182,9 @@ ProbedPort probe_port(const std::string& path) {
     }
   }
   std::vector<std::string_view> names;
-  for (const StreamProtocol& stream : stream_protocols()) names.push_back(name_of(stream.protocol));
+  for (const ProtocolTraits& protocol : kProtocols) {
+    if (protocol.is_stream) names.push_back(protocol.name);
+  }
   result.problem =
       most_bytes >= kSpeaks
           ? fmt::format(

@@ -1,7 +1,6 @@
 #include "service/protocol_finder.h"
 
 #include <algorithm>
-#include <array>
 #include <tuple>
 #include <vector>
 
@@ -38,7 +37,7 @@ class Counter final : public SampleSink {
   std::vector<double> steps_;
 };
 
-FoundStream decode_as(const StreamProtocol& as, std::span<const std::uint8_t> bytes) {
+FoundStream decode_as(const ProtocolTraits& as, std::span<const std::uint8_t> bytes) {
   DeviceConfig device;
   device.protocol = as.protocol;
   device.rate_hz = 100.0;
@@ -55,27 +54,11 @@ FoundStream decode_as(const StreamProtocol& as, std::span<const std::uint8_t> by
 
 }  // namespace
 
-std::span<const StreamProtocol> stream_protocols() {
-  static constexpr std::array<StreamProtocol, 6> kProtocols{{{Protocol::kXsensMt, SampleKind::kImu},
-                                                             {Protocol::kIxblueStdbin, SampleKind::kImu},
-                                                             {Protocol::kNmea, SampleKind::kGnss},
-                                                             {Protocol::kUbx, SampleKind::kGnss},
-                                                             {Protocol::kGreis, SampleKind::kGnss},
-                                                             {Protocol::kRtklibPos, SampleKind::kGnss}}};
-  return kProtocols;
-}
-
-bool is_receiver(Protocol protocol) {
-  const auto all = stream_protocols();
-  return std::any_of(all.begin(), all.end(), [&](const StreamProtocol& stream) {
-    return stream.protocol == protocol && stream.purpose == SampleKind::kGnss;
-  });
-}
-
 std::optional<FoundStream> find_protocol(std::span<const std::uint8_t> bytes) {
   std::optional<FoundStream> best;
   const auto rank = [](const FoundStream& found) { return std::tuple(found.samples > 0, found.share); };
-  for (const StreamProtocol& protocol : stream_protocols()) {
+  for (const ProtocolTraits& protocol : kProtocols) {
+    if (!protocol.is_stream) continue;
     const FoundStream found = decode_as(protocol, bytes);
     if (found.messages < kMessagesToBelieve || found.share < kShareToBelieve) continue;
     if (!best || rank(found) > rank(*best)) best = found;

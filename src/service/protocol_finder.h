@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "service/config.h"
 
@@ -20,18 +19,6 @@ struct FoundStream {
   /// Samples per second by the device's own times; nothing where it only counts, as an XSens MT does.
   std::optional<double> rate_hz;
 };
-
-/// A protocol of devices on a line, and what its devices are there for.
-struct StreamProtocol {
-  Protocol protocol{};
-  SampleKind purpose{};  ///< kImu or kGnss
-};
-
-/// In the order in which they are tried.
-[[nodiscard]] std::span<const StreamProtocol> stream_protocols();
-
-/// Whether devices of a stream protocol are GNSS receivers; the others are IMUs.
-[[nodiscard]] bool is_receiver(Protocol protocol);
 
 /// The protocol of a stream: the one with samples whose messages cover the most bytes; nothing where no
 /// protocol finds kMessagesToBelieve messages.

@@ -1,0 +1,82 @@
+#pragma once
+
+/// Every protocol that a device can speak, and what follows from it. A new one is a line here, its reader in
+/// device_factory.cpp, and its driver.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "sample/sample.h"
+
+namespace imuscope {
+
+enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss, kOdometry };
+
+enum class Protocol : std::uint8_t {
+  kXsensMt,
+  kIxblueStdbin,
+  kGreis,
+  kNmea,
+  kUbx,
+  kRtklibPos,
+  kCsvImu,
+  kCsvGnss,
+  kXsensCan,
+  kCanOdometry
+};
+
+/// What the rest of the service has to know of a protocol.
+struct ProtocolTraits {
+  Protocol protocol;
+  std::string_view name;  ///< as the configuration writes it
+  SampleKind purpose;     ///< what its devices are there for: kImu, kGnss or kOdometry
+  double rate_hz;         ///< where the configuration gives none
+  bool is_stream;         ///< its bytes can be told from any others: probe and import look for it
+  bool is_text = false;   ///< rows with named columns, read from files alone
+};
+
+inline constexpr std::array<ProtocolTraits, 10> kProtocols{
+    {{Protocol::kXsensMt, "xsens_mt", SampleKind::kImu, 100.0, true},
+     {Protocol::kIxblueStdbin, "ixblue_stdbin", SampleKind::kImu, 100.0, true},
+     {Protocol::kGreis, "greis", SampleKind::kGnss, 10.0, true},
+     {Protocol::kNmea, "nmea", SampleKind::kGnss, 10.0, true},
+     {Protocol::kUbx, "ubx", SampleKind::kGnss, 10.0, true},
+     {Protocol::kRtklibPos, "rtklib_pos", SampleKind::kGnss, 10.0, true},
+     {Protocol::kCsvImu, "csv_imu", SampleKind::kImu, 100.0, false, true},
+     {Protocol::kCsvGnss, "csv_gnss", SampleKind::kGnss, 10.0, false, true},
+     {Protocol::kXsensCan, "xsens_can", SampleKind::kImu, 100.0, false},
+     {Protocol::kCanOdometry, "can_odometry", SampleKind::kOdometry, 50.0, false}}};
+
+[[nodiscard]] constexpr const ProtocolTraits& traits_of(Protocol protocol) noexcept {
+  return kProtocols[static_cast<std::size_t>(protocol)];
+}
+static_assert(
+    [] {
+      for (std::size_t i = 0; i < kProtocols.size(); ++i) {
+        if (kProtocols[i].protocol != static_cast<Protocol>(i)) return false;
+      }
+      return true;
+    }(),
+    "the table is in the order of the enumeration");
+
+[[nodiscard]] constexpr std::string_view name_of(Protocol protocol) noexcept {
+  return traits_of(protocol).name;
+}
+
+/// Whether a device of this protocol can have a role. An XSens device with a receiver inside can be that, or
+/// an IMU.
+[[nodiscard]] constexpr bool fits(Protocol protocol, DeviceRole role) noexcept {
+  if (protocol == Protocol::kXsensMt) return role != DeviceRole::kOdometry;
+  switch (traits_of(protocol).purpose) {
+    case SampleKind::kGnss:
+      return role == DeviceRole::kGnss;
+    case SampleKind::kOdometry:
+      return role == DeviceRole::kOdometry;
+    default:
+      return role == DeviceRole::kReference || role == DeviceRole::kStudy;
+  }
+}
+
+}  // namespace imuscope
