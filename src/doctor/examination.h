@@ -6,8 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "configuration/config.h"
 #include "doctor/finding.h"
-#include "service/config.h"
 
 namespace imuscope::doctor {
 

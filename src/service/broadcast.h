@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "configuration/config.h"
 #include "publish/lcm_publisher.h"
-#include "service/config.h"
 #include "service/refit.h"
 #include "service/telemetry.h"
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "base/result.h"
+#include "configuration/config.h"
 #include "sample/clock_map.h"
 #include "service/byte_source.h"
-#include "service/config.h"
 
 namespace imuscope {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/result.h"
+#include "configuration/config.h"
 #include "sample/clock_map.h"
-#include "service/config.h"
 
 namespace imuscope {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "calibration/estimator.h"
-#include "service/config.h"
+#include "configuration/config.h"
 
 namespace imuscope {
 

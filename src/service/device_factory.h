@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "base/result.h"
+#include "configuration/config.h"
 #include "drivers/device/device.h"
 #include "sample/clock_map.h"
-#include "service/config.h"
 
 namespace imuscope {
 

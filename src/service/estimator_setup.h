@@ -3,7 +3,7 @@
 /// From the configuration to the estimator's own terms.
 
 #include "calibration/estimator_config.h"
-#include "service/config.h"
+#include "configuration/config.h"
 
 namespace imuscope {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "configuration/config.h"
 #include "rt/periodic.h"
-#include "service/config.h"
 #include "service/core.h"
 
 namespace imuscope {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/result.h"
+#include "configuration/config.h"
 #include "drivers/device/can_frame.h"
 #include "drivers/transport/transport.h"
-#include "service/config.h"
 
 namespace imuscope {
 

@@ -12,7 +12,7 @@
 #include <string>
 
 #include "base/result.h"
-#include "service/config.h"
+#include "configuration/config.h"
 
 namespace imuscope {
 

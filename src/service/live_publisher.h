@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "capture/recorder.h"
+#include "configuration/config.h"
 #include "publish/lcm_listener.h"
 #include "publish/message_values.h"
 #include "service/broadcast.h"
 #include "service/can_watch.h"
-#include "service/config.h"
 #include "service/core_thread.h"
 #include "service/event_gate.h"
 #include "service/health.h"

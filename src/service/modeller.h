@@ -14,13 +14,13 @@
 #include <vector>
 
 #include "base/output_folder.h"
+#include "configuration/config.h"
 #include "noise/fit.h"
 #include "noise/streaming_wv.h"
 #include "rt/heartbeat.h"
 #include "rt/host_clock.h"
 #include "rt/spsc_ring.h"
 #include "rt/thread_setup.h"
-#include "service/config.h"
 #include "service/core.h"
 #include "service/motion_book.h"
 #include "service/noise_series.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "service/config.h"
+#include "configuration/config.h"
 
 namespace imuscope {
 

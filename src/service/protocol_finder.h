@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "service/config.h"
+#include "configuration/config.h"
 
 namespace imuscope {
 

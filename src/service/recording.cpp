@@ -11,11 +11,11 @@
 #include "base/text.h"
 #include "capture/capture_reader.h"
 #include "capture/raw_dump.h"
+#include "configuration/toml_reader.h"
 #include "drivers/transport/candump.h"
 #include "service/candump_source.h"
 #include "service/device_factory.h"
 #include "service/noise_feedback.h"
-#include "service/toml_reader.h"
 
 namespace imuscope {
 

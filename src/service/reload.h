@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/result.h"
+#include "configuration/config.h"
 #include "noise/model.h"
-#include "service/config.h"
 
 namespace imuscope {
 

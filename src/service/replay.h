@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "base/result.h"
+#include "configuration/config.h"
 #include "drivers/device/device.h"
 #include "regimes/labels.h"
 #include "service/byte_source.h"
 #include "service/clock_alignment.h"
-#include "service/config.h"
 #include "service/core.h"
 #include "service/number_ranges.h"
 #include "service/run_folder.h"

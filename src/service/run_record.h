@@ -11,8 +11,8 @@
 
 #include "base/output_folder.h"
 #include "base/result.h"
+#include "configuration/config.h"
 #include "drivers/device/device.h"
-#include "service/config.h"
 #include "service/core.h"
 
 namespace imuscope {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "service/config.h"
+#include "configuration/config.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -7,11 +7,11 @@
 #include <fstream>
 #include <set>
 
+#include "configuration/config.h"
 #include "drivers/nmea/decoder.h"
 #include "drivers/rtklib_pos/decoder.h"
 #include "drivers/ubx/decoder.h"
 #include "service/baud_search.h"
-#include "service/config.h"
 #include "service/device_factory.h"
 #include "service/line_factory.h"
 #include "service/recording.h"

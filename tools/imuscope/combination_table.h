@@ -2,7 +2,7 @@
 
 /// The mounting of several drives as a table for people.
 
-#include "service/combination.h"
+#include "study/combination.h"
 
 namespace imuscope::cli {
 

@@ -5,7 +5,7 @@
 #include "combination_table.h"
 #include "commands.h"
 #include "print.h"
-#include "service/combination.h"
+#include "study/combination.h"
 
 namespace imuscope::cli {
 namespace {

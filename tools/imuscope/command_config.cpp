@@ -5,9 +5,9 @@
 #include <memory>
 
 #include "commands.h"
+#include "configuration/config.h"
+#include "configuration/config_reference.h"
 #include "print.h"
-#include "service/config.h"
-#include "service/config_reference.h"
 
 namespace imuscope::cli {
 

@@ -8,7 +8,7 @@
 #include "print.h"
 #include "progress.h"
 #include "report/report.h"
-#include "service/evaluate.h"
+#include "study/evaluate.h"
 
 namespace imuscope::cli {
 

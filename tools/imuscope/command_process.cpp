@@ -11,8 +11,8 @@
 #include "report/report.h"
 #include "service/recording.h"
 #include "service/replay_run.h"
-#include "service/several_drives.h"
-#include "service/study.h"
+#include "study/several_drives.h"
+#include "study/study.h"
 #include "study_table.h"
 
 namespace imuscope::cli {

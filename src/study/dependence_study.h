@@ -1,0 +1,32 @@
+#pragma once
+
+/// How the noise parameters of every S-IMU and axis follow the dynamics: dependence.json.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "configuration/config.h"
+#include "regimes/motion_levels.h"
+#include "regimes/regime_track.h"
+#include "service/noise_series.h"
+#include "study/noise_study.h"
+#include "study/temperature_track.h"
+
+namespace imuscope {
+
+struct DependenceStudy {
+  nlohmann::json document;
+  std::vector<std::string> remarks;
+};
+
+/// Over windows that lie wholly inside the dynamic part, against rms rate, rms vibration, mean speed and the
+/// sensor's own temperature. Holm's correction holds over all slopes of one S-IMU.
+/// @param temperatures  one a S-IMU, in the order of `series`
+/// @param models        where the search begins: the dynamic model of the axis, or that of the whole run
+DependenceStudy study_dependence(const Configuration& configuration, const std::vector<NoiseSeries>& series,
+                                 const std::vector<TemperatureTrack>& temperatures,
+                                 const MotionLevels& levels, const RegimeTrack& motion,
+                                 const NoiseStudy& models, HostTime origin);
+
+}  // namespace imuscope

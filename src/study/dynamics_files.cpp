@@ -1,0 +1,145 @@
+#include "study/dynamics_files.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+
+#include "base/text.h"
+#include "dynamics/covariates.h"
+#include "dynamics/json.h"
+#include "regimes/motion_regimes.h"
+#include "service/noise_series.h"
+#include "service/run_folder.h"
+
+namespace imuscope {
+namespace {
+
+std::string scatter_header() {
+  std::string header = "time_s";
+  for (std::size_t i = 0; i < kCovariates; ++i) header += fmt::format(",{}", covariate_name(i));
+  return header +
+         ",e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,e_accel_z_mps2\n";
+}
+
+void append_value(std::string& line, bool known, double value) {
+  line += ',';
+  if (known) line += fmt::format("{:.9g}", value);
+}
+
+std::string scatter_row(const ErrorRow& row, double time_s) {
+  std::string line = fmt::format("{:.4f}", time_s);
+  for (const double value : covariates(row)) append_value(line, true, value);
+  for (const double value : row.e_gyro_radps) append_value(line, row.gyro_valid, value);
+  for (const double value : row.e_accel_mps2) append_value(line, row.accel_valid, value);
+  return line + '\n';
+}
+
+std::size_t count_rows(RowSpool& rows) {
+  rows.rewind();
+  std::size_t n = 0;
+  for (ErrorRow row{}; rows.next(row);) ++n;
+  return n;
+}
+
+/// The rows of one regime.
+class RowsOfRegime final : public ErrorRowSource {
+ public:
+  /// Everything must outlive the rows.
+  RowsOfRegime(ErrorRowSource& rows, const RegimeTrack& track, std::size_t regime)
+      : rows_(rows), track_(track), regime_(regime) {}
+  void rewind() override { rows_.rewind(); }
+  bool next(ErrorRow& row) override {
+    while (rows_.next(row)) {
+      if (track_.at(row.time) == regime_) return true;
+    }
+    return false;
+  }
+
+ private:
+  ErrorRowSource& rows_;
+  const RegimeTrack& track_;
+  std::size_t regime_;
+};
+
+/// Covariates that have no coefficient beside one another, told once for an S-IMU: before projection alone,
+/// as what the projection takes out is no finding.
+void say_left_out(const std::string& name, const std::array<AxisDynamics, kErrorAxes>& axes,
+                  std::vector<std::string>& remarks) {
+  std::vector<std::string> told;
+  for (const auto& axis : axes) {
+    if (!axis.ols) continue;
+    for (const auto& [covariate, why] : axis.ols->left_out) {
+      auto sentence = fmt::format("{}: {} {}; it has no coefficient", name, covariate_name(covariate),
+                                  why == LeftOut::kConstant ? "does not vary in the dynamic part"
+                                                            : "is a combination of the covariates before it");
+      if (std::find(told.begin(), told.end(), sentence) == told.end()) told.push_back(std::move(sentence));
+    }
+  }
+  remarks.insert(remarks.end(), told.begin(), told.end());
+}
+
+void say_what_is_missing(const std::string& name, const std::array<AxisDynamics, kErrorAxes>& axes,
+                         std::vector<std::string>& remarks) {
+  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
+    if (!axes[axis].ols) {
+      remarks.push_back(fmt::format("{} {}: no regression on the dynamics: too few rows of the dynamic part",
+                                    name, axis_name(axis)));
+    } else if (!axes[axis].residual_noise) {
+      remarks.push_back(fmt::format("{} {}: the regression has no generalised form: {}", name,
+                                    axis_name(axis), axes[axis].no_gls_because));
+    }
+  }
+  say_left_out(name, axes, remarks);
+}
+
+}  // namespace
+
+DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
+                                   const RegimeTrack& motion, const noise::ModelSpec& residual_model) {
+  DynamicsRegressions out;
+  const auto indices = configuration.study_indices();
+  const auto dynamic = motion.index_of(kDynamicName);
+  if (!dynamic || motion.total_s(*dynamic) <= 0.0) {
+    out.remarks.emplace_back("no regression on the dynamics: there is no dynamic part");
+    return out;
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto& device = configuration.devices[indices[i]];
+    if (!rows[i].whole()) {
+      out.remarks.push_back(
+          fmt::format("{}: no regression on the dynamics: its rows could not be kept on the "
+                      "disk of the run folder; check its free space",
+                      device.name));
+      continue;
+    }
+    RowsOfRegime moving(rows[i], motion, *dynamic);
+    const auto axes = study_dynamics(moving, {device.rate_hz, residual_model});
+    say_what_is_missing(device.name, axes, out.remarks);
+    nlohmann::json of_device = nlohmann::json::array();
+    append_regressions(device.name, axes, of_device);
+    for (auto& regression : of_device) {
+      regression["regime"] = kDynamicName;
+      out.regressions.push_back(std::move(regression));
+    }
+  }
+  return out;
+}
+
+Result<void> write_scatter(const Configuration& configuration, std::vector<RowSpool>& rows,
+                           HostTime first_reference_time, const OutputFolder& folder) {
+  const auto indices = configuration.study_indices();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::size_t step = count_rows(rows[i]) / kScatterRows + 1;
+    CsvFile file;
+    const auto name = device_file_name("scatter", configuration.devices[indices[i]].name, ".csv");
+    if (auto opened = file.open(folder, name, scatter_header()); !opened) return opened;
+    rows[i].rewind();
+    std::size_t k = 0;
+    for (ErrorRow row{}; rows[i].next(row); ++k) {
+      if (k % step == 0) file.append(scatter_row(row, to_seconds(row.time - first_reference_time)));
+    }
+    if (auto closed = file.close(); !closed) return closed;
+  }
+  return {};
+}
+
+}  // namespace imuscope

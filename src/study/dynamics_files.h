@@ -1,0 +1,36 @@
+#pragma once
+
+/// regression.json and scatter_NAME.csv: how the errors of a run depend on the dynamics.
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/output_folder.h"
+#include "base/result.h"
+#include "configuration/config.h"
+#include "noise/model.h"
+#include "regimes/regime_track.h"
+#include "study/row_spool.h"
+
+namespace imuscope {
+
+/// The entries of regression.json, and sentences about what could not be studied.
+struct DynamicsRegressions {
+  nlohmann::json regressions = nlohmann::json::array();
+  std::vector<std::string> remarks;
+};
+
+/// For every S-IMU, over the dynamic part of the run: at rest there are no dynamics, and the noise is
+/// another.
+DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
+                                   const RegimeTrack& motion, const noise::ModelSpec& residual_model);
+
+/// Writes scatter_NAME.csv for every S-IMU: time_s, the fifteen covariates and the six errors of at most
+/// kScatterRows rows, evenly spaced over the drive, at rest and in motion alike.
+inline constexpr std::size_t kScatterRows = 3000;
+Result<void> write_scatter(const Configuration& configuration, std::vector<RowSpool>& rows,
+                           HostTime first_reference_time, const OutputFolder& folder);
+
+}  // namespace imuscope

@@ -1,0 +1,307 @@
+#include "study/noise_study.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+
+#include "noise/compare.h"
+#include "noise/holm.h"
+#include "noise/lines.h"
+#include "noise/wavelet_variance.h"
+#include "service/models_file.h"
+
+namespace imuscope {
+
+namespace {
+
+constexpr const char* kWholeRun = "all";
+
+nlohmann::json or_null(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
+
+/// What one S-IMU's series are fitted with, and where the results go.
+struct Job {
+  const DeviceConfig& device;
+  const std::vector<double>& values;  ///< of the axis, vibration lines taken out
+  const noise::ModelSpec& spec;
+  NoiseStudy& study;
+};
+
+double seconds_of_level(std::size_t level, double rate_hz) {
+  return static_cast<double>(std::uint64_t{1} << level) / rate_hz;
+}
+
+/// Says which levels the stretches of a regime are too short for, where the whole run has them.
+void say_left_out(const Job& job, std::size_t axis, const std::string& regime,
+                  const noise::WaveletVariance& wv, std::size_t levels_of_whole) {
+  if (regime == kWholeRun || wv.levels.size() >= levels_of_whole) return;
+  std::size_t longest = 0;
+  for (const auto& segment : wv.segments) longest = std::max(longest, segment.end - segment.begin);
+  const double tau_s = seconds_of_level(wv.levels.size(), job.device.rate_hz);
+  const std::string sentence = fmt::format(
+      "{} {}, {}: scales above {:.4g} s are left out, as its longest stretch lasts {:.4g} s", job.device.name,
+      axis_name(axis), regime, tau_s, static_cast<double>(longest) / job.device.rate_hz);
+  job.study.left_out.push_back({{"name", job.device.name},
+                                {"axis", axis_name(axis)},
+                                {"regime", regime},
+                                {"above_level", wv.levels.size()},
+                                {"above_tau_s", tau_s},
+                                {"sentence", sentence}});
+}
+
+/// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
+std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::uint8_t>& mask,
+                     const std::string& regime, const std::vector<noise::Line>& lines,
+                     std::size_t levels_of_whole) {
+  // A regime that the run does not have is said once, not for every axis.
+  if (std::none_of(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; })) return 0;
+  const auto remark = [&](const std::string& what) {
+    job.study.remarks.push_back(fmt::format("{} {}, {}: {}", job.device.name, axis_name(axis), regime, what));
+  };
+  noise::WvOptions options;
+  options.mask = mask;
+  const auto wv = noise::haar_wavelet_variance(job.values, options);
+  if (!wv) {
+    remark("no wavelet variance: " + wv.error().what);
+    return 0;
+  }
+  say_left_out(job, axis, regime, *wv, levels_of_whole);
+  noise::FitOptions fit_options;
+  fit_options.signal_unit = axis_unit(axis);
+  auto fit = noise::fit(*wv, job.spec, job.device.rate_hz, fit_options);
+  if (!fit) {
+    remark(fmt::format("no noise model: {}{}", fit.error().what,
+                       wv->levels.size() < levels_of_whole ? "; its stretches are too short" : ""));
+    return wv->levels.size();
+  }
+  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), lines});
+  return wv->levels.size();
+}
+
+/// Finds the lines of one regime, says them and takes them out of `values`.
+std::vector<noise::Line> take_out_lines(const DeviceConfig& device, std::size_t axis,
+                                        const std::string& regime, const std::vector<std::uint8_t>& mask,
+                                        std::vector<double>& values, NoiseStudy& study) {
+  noise::LineOptions options;
+  options.rate_hz = device.rate_hz;
+  auto lines = noise::find_lines(values, mask, options);
+  for (const auto& line : lines) {
+    study.lines.push_back({{"name", device.name},
+                           {"axis", axis_name(axis)},
+                           {"regime", regime},
+                           {"frequency_hz", line.frequency_hz},
+                           {"frequency_sd_hz", line.frequency_sd_hz},
+                           {"amplitude", line.amplitude},
+                           {"amplitude_sd", line.amplitude_sd},
+                           {"amplitude_unit", axis_unit(axis)},
+                           {"share_of_variance", line.share_of_variance},
+                           {"p_value", line.p_value}});
+    study.remarks.push_back(fmt::format(
+        "{} {}, {}: a vibration line at {:.4g} Hz, amplitude {:.3g} {} ({:.2g} % of the "
+        "variance); it is a sinusoid of the model, beside the noise that is fitted to what it leaves",
+        device.name, axis_name(axis), regime, line.frequency_hz, line.amplitude, axis_unit(axis),
+        100.0 * line.share_of_variance));
+  }
+  noise::remove_lines(values, mask, lines, options);
+  return lines;
+}
+
+/// @param levels  of the wavelet variance
+nlohmann::json sinusoid_json(const noise::Line& line, std::size_t number, double rate_hz, std::size_t axis,
+                             std::size_t levels) {
+  constexpr double kNormal95 = 1.959963984540054;
+  const auto parameter = [](const char* name, const std::string& unit, double value, double sd) {
+    return nlohmann::json{{"name", name},
+                          {"unit", unit},
+                          {"value", value},
+                          {"sd", sd},
+                          {"ci_low", std::max(0.0, value - kNormal95 * sd)},
+                          {"ci_high", value + kNormal95 * sd}};
+  };
+  nlohmann::json wv = nlohmann::json::array();
+  for (std::size_t level = 1; level <= levels; ++level)
+    wv.push_back(noise::line_wv(line, rate_hz, static_cast<int>(level)));
+  return {{"process", fmt::format("SIN{}", number)},
+          {"parameters",
+           {parameter("alpha", axis_unit(axis), line.amplitude, line.amplitude_sd),
+            parameter("frequency", "Hz", line.frequency_hz, line.frequency_sd_hz)}},
+          {"wv", std::move(wv)}};
+}
+
+/// Three axes that leave out the same levels make one sentence.
+void summarise_left_out(NoiseStudy& study) {
+  for (const auto& entry : study.left_out) {
+    const std::string of_imu =
+        fmt::format("{}, {}: its stretches are too short for scales above {:.4g} s, which are left out",
+                    entry.at("name").get<std::string>(), entry.at("regime").get<std::string>(),
+                    entry.at("above_tau_s").get<double>());
+    if (std::find(study.remarks.begin(), study.remarks.end(), of_imu) == study.remarks.end())
+      study.remarks.push_back(of_imu);
+  }
+}
+
+const StudyModel* find(const NoiseStudy& study, const std::string& name, std::size_t axis,
+                       const std::string& regime) {
+  const auto found = std::find_if(study.models.begin(), study.models.end(), [&](const StudyModel& m) {
+    return m.name == name && m.axis == axis && m.regime == regime;
+  });
+  return found == study.models.end() ? nullptr : &*found;
+}
+
+/// One axis in two regimes.
+struct AxisComparison {
+  const StudyModel* first;
+  const StudyModel* second;
+  noise::Comparison comparison;
+};
+
+const noise::ParameterEstimate* parameter_of(const noise::FitResult& fit,
+                                             const noise::ComparedParameter& like) {
+  for (const auto& p : fit.parameters) {
+    if (p.process == like.process && p.name == like.name) return &p;
+  }
+  return nullptr;
+}
+
+nlohmann::json parameter_json(const AxisComparison& of, const noise::ComparedParameter& p,
+                              const std::optional<double>& p_holm) {
+  nlohmann::json document{{"process", p.process},
+                          {"name", p.name},
+                          {"unit", p.unit},
+                          {"first", or_null(p.first)},
+                          {"second", or_null(p.second)},
+                          {"ratio", or_null(p.ratio)},
+                          {"ratio_ci_low", or_null(p.ratio_ci_low)},
+                          {"ratio_ci_high", or_null(p.ratio_ci_high)},
+                          {"p_value", or_null(p.p_value)},
+                          {"p_holm", or_null(p_holm)}};
+  const auto add_interval = [&](const char* key, const noise::FitResult& fit) {
+    const auto* estimate = parameter_of(fit, p);
+    document[std::string(key) + "_ci_low"] = estimate != nullptr ? or_null(estimate->ci_low) : nullptr;
+    document[std::string(key) + "_ci_high"] = estimate != nullptr ? or_null(estimate->ci_high) : nullptr;
+  };
+  add_interval("first", of.first->fit);
+  add_interval("second", of.second->fit);
+  document["verdict"] = !p_holm                          ? "not determined"
+                        : *p_holm < noise::kSignificance ? "differs"
+                                                         : "no difference shown";
+  return document;
+}
+
+/// The comparisons of one S-IMU, corrected together.
+void append_comparisons(const std::vector<AxisComparison>& all, nlohmann::json& out) {
+  std::vector<std::optional<double>> parameter_p;
+  std::vector<std::optional<double>> joint_p;
+  for (const auto& one : all) {
+    for (const auto& p : one.comparison.parameters) parameter_p.push_back(p.p_value);
+    joint_p.push_back(one.comparison.test ? std::optional(one.comparison.test->p_value) : std::nullopt);
+  }
+  const auto parameter_holm = noise::holm_adjusted(parameter_p);
+  const auto joint_holm = noise::holm_adjusted(joint_p);
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const auto& one = all[i];
+    nlohmann::json entry{{"name", one.first->name},
+                         {"axis", axis_name(one.first->axis)},
+                         {"first", one.first->regime},
+                         {"second", one.second->regime},
+                         {"parameters", nlohmann::json::array()},
+                         {"joint", nullptr},
+                         {"remarks", one.comparison.warnings}};
+    for (const auto& p : one.comparison.parameters)
+      entry["parameters"].push_back(parameter_json(one, p, parameter_holm[at++]));
+    if (one.comparison.test) {
+      entry["joint"] = {{"statistic", one.comparison.test->statistic},
+                        {"dof", one.comparison.test->dof},
+                        {"p_value", one.comparison.test->p_value},
+                        {"p_holm", or_null(joint_holm[i])}};
+    }
+    out.push_back(std::move(entry));
+  }
+}
+
+}  // namespace
+
+std::string coverage_remark(const std::string& name, const NoiseSeries& series, double rate_hz, double run_s,
+                            HostTime origin) {
+  if (series.size() == 0)
+    return fmt::format("{}: has no sample in this run's error process; nothing is said of it", name);
+  const double has_s = static_cast<double>(series.size() - series.missing()) / rate_hz;
+  if (has_s >= kWholeRunShare * run_s) return {};
+  return fmt::format(
+      "{}: has samples for {:.0f} s of the run's {:.0f} s, between {:.0f} s and {:.0f} s; its models and "
+      "regressions "
+      "are of that part alone",
+      name, has_s, run_s, to_seconds(series.time(0) - origin),
+      to_seconds(series.time(series.size() - 1) - origin));
+}
+
+NoiseStudy study_noise(const Configuration& configuration, const std::vector<NoiseSeries>& series,
+                       const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
+                       const std::function<void(double)>& progress) {
+  NoiseStudy study;
+  const auto indices = configuration.study_indices();
+  const double total = static_cast<double>(series.size() * kAxisCount);
+  double done = 0.0;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    if (series[i].size() == 0) continue;
+    const auto& device = configuration.devices[indices[i]];
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      std::vector<double> values = series[i].values(axis);
+      std::vector<std::vector<noise::Line>> lines;
+      for (std::size_t regime = 0; regime < regimes.size(); ++regime)
+        lines.push_back(
+            take_out_lines(device, axis, regimes[regime], series[i].mask(axis, regime), values, study));
+      const Job job{device, values, spec, study};
+      const std::size_t levels = fit_axis(job, axis, series[i].mask(axis), kWholeRun, {}, 0);
+      for (std::size_t regime = 0; regime < regimes.size(); ++regime)
+        fit_axis(job, axis, series[i].mask(axis, regime), regimes[regime], lines[regime], levels);
+      if (progress) progress((done += 1.0) / total);
+    }
+  }
+  summarise_left_out(study);
+  return study;
+}
+
+nlohmann::json models_json(const NoiseStudy& study) {
+  nlohmann::json models = nlohmann::json::array();
+  for (const auto& m : study.models) {
+    nlohmann::json model = model_json(m.fit, m.name, m.axis, m.regime);
+    if (!m.lines.empty()) {
+      model["sinusoids"] = nlohmann::json::array();
+      for (std::size_t i = 0; i < m.lines.size(); ++i)
+        model["sinusoids"].push_back(
+            sinusoid_json(m.lines[i], i + 1, m.fit.rate_hz, m.axis, m.fit.wv.size()));
+    }
+    models.push_back(std::move(model));
+  }
+  return models;
+}
+
+nlohmann::json comparison_json(const NoiseStudy& study, const std::vector<std::string>& regimes) {
+  nlohmann::json document{{"schema", "imuscope.comparison/1"},
+                          {"correction", "Holm"},
+                          {"level", noise::kSignificance},
+                          {"comparisons", nlohmann::json::array()}};
+  std::vector<std::string> names;
+  for (const auto& m : study.models) {
+    if (std::find(names.begin(), names.end(), m.name) == names.end()) names.push_back(m.name);
+  }
+  for (const auto& name : names) {
+    std::vector<AxisComparison> all;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      for (std::size_t a = 0; a < regimes.size(); ++a) {
+        for (std::size_t b = a + 1; b < regimes.size(); ++b) {
+          const auto* first = find(study, name, axis, regimes[a]);
+          const auto* second = find(study, name, axis, regimes[b]);
+          if (first == nullptr || second == nullptr) continue;
+          all.push_back({first, second, noise::compare(first->fit, second->fit)});
+        }
+      }
+    }
+    append_comparisons(all, document["comparisons"]);
+  }
+  return document;
+}
+
+}  // namespace imuscope

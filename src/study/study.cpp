@@ -1,0 +1,285 @@
+#include "study/study.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+
+#include "error_process/row_low_pass.h"
+#include "service/estimator_setup.h"
+#include "service/models_file.h"
+#include "service/noise_series.h"
+#include "service/run_folder.h"
+#include "service/run_record.h"
+#include "study/dependence_study.h"
+#include "study/dynamics_files.h"
+#include "study/noise_study.h"
+#include "study/regime_study.h"
+#include "study/smoothing.h"
+
+namespace imuscope {
+
+namespace {
+
+/// Rows of the last pass: mounting frozen at its final value, the reference compensated with its smoothed
+/// biases, the whole drive covered.
+class ErrorCollector final : public CoreSink {
+ public:
+  /// @param former    mountings that the rows leave out; must outlive the collector, as must what follows
+  /// @param rows      one spool a S-IMU
+  /// @param low_pass  one a S-IMU, or none
+  ErrorCollector(const FormerMountings& former, const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows,
+                 std::vector<RowLowPass> low_pass)
+      : former_(former),
+        biases_(biases),
+        rows_(rows),
+        low_pass_(std::move(low_pass)),
+        temperatures_(rows.size()) {}
+
+  void on_epoch(const StudyEpoch& epoch, HostTime) noexcept override {
+    const ReferenceBias bias = biases_.at(epoch.time + from_seconds(epoch.t_d_s));
+    watch_.add(epoch, bias);
+    if ((epoch.sample.flags & kHasTemperature) != 0)
+      temperatures_[epoch.study].add(epoch.time, epoch.sample.temperature_degC);
+    if (!is_final_mounting(former_[epoch.study], epoch.time)) return;
+    ErrorRow row = error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, bias);
+    if (!low_pass_.empty()) low_pass_[epoch.study].apply(row);
+    rows_[epoch.study].add(row);
+  }
+  void on_error(const ErrorRecord&) noexcept override {}
+  void on_event(const EstimatorEvent&) noexcept override {}
+  void on_snapshot(const Snapshot& snapshot) noexcept override { watch_.add(snapshot); }
+  void on_late_sample(const LateSample&) noexcept override {}
+
+  [[nodiscard]] const MotionWatch& watch() const { return watch_; }
+  [[nodiscard]] const std::vector<TemperatureTrack>& temperatures() const { return temperatures_; }
+
+ private:
+  const FormerMountings& former_;
+  const ReferenceBiasTrack& biases_;
+  std::vector<RowSpool>& rows_;
+  std::vector<RowLowPass> low_pass_;
+  MotionWatch watch_;
+  std::vector<TemperatureTrack> temperatures_;
+};
+
+/// First pass: everything but errors goes to the folder.
+class CalibrationPass final : public CoreSink {
+ public:
+  CalibrationPass(RunFolder& folder, const Configuration& configuration)
+      : folder_(folder), studies_(configuration.study_indices()), former_(studies_.size()) {}
+  void on_error(const ErrorRecord&) noexcept override {}
+  void on_event(const EstimatorEvent& event) noexcept override {
+    folder_.on_event(event);
+    if (!is<event::MountingChanged>(event) || !folder_.last_snapshot()) return;
+    const auto found = std::find(studies_.begin(), studies_.end(), event.device);
+    const auto i = static_cast<std::size_t>(found - studies_.begin());
+    if (i < former_.size()) former_[i].push_back({event.time, folder_.last_snapshot()->studies[i]});
+  }
+  void on_snapshot(const Snapshot& snapshot) noexcept override { folder_.on_snapshot(snapshot); }
+  void on_late_sample(const LateSample& late) noexcept override { folder_.on_late_sample(late); }
+
+  [[nodiscard]] const FormerMountings& former_mountings() const { return former_; }
+
+ private:
+  RunFolder& folder_;
+  std::vector<std::size_t> studies_;
+  FormerMountings former_;
+};
+
+/// The common low-pass of every S-IMU; none where none is configured.
+std::vector<RowLowPass> low_passes(const Configuration& configuration) {
+  std::vector<RowLowPass> filters;
+  if (configuration.error_process.low_pass_hz <= 0.0) return filters;
+  for (const auto index : configuration.study_indices())
+    filters.emplace_back(configuration.devices[index].rate_hz, configuration.error_process.low_pass_hz);
+  return filters;
+}
+
+/// errors_NAME.csv under the names of the regimes, with the scale error; and without it the series for the
+/// noise models and the rows for everything that follows.
+/// @param of        its row is set here
+/// @param studied   takes the rows without the scale error
+NoiseSeries write_errors(ErrorRecord of, const RunRegimes& regimes, const ScaleError& scale, RowSpool& rows,
+                         RunFolder& folder, RowSpool& studied) {
+  NoiseSeries series;
+  rows.rewind();
+  while (rows.next(of.row)) {
+    const auto regime = regimes.chosen.at(of.row.time);
+    folder.write_error(of, regime ? std::string_view(regimes.chosen.names()[*regime]) : std::string_view());
+    const ErrorRow row = without_scale_error(of.row, scale);
+    series.add(row, regime);
+    studied.add(row);
+  }
+  return series;
+}
+
+Result<std::vector<RowSpool>> make_spools(std::size_t n, const OutputFolder& folder) {
+  std::vector<RowSpool> spools;
+  for (std::size_t i = 0; i < n; ++i) {
+    auto spool = RowSpool::create(folder);
+    if (!spool) return tl::unexpected<Error>(spool.error());
+    spools.push_back(std::move(*spool));
+  }
+  return spools;
+}
+
+/// The estimator of the last pass: every mounting that was found is known.
+EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& finals) {
+  for (std::size_t i = 0; i < config.studies.size(); ++i) {
+    const auto& final = finals[i];
+    if (!has_estimate(final.status)) continue;
+    config.studies[i] = with_mounting(
+        config.studies[i], {final.C_b_s, final.r_bs_b_m, final.t_d_s, final.gyro_scale, final.accel_scale});
+  }
+  return config;
+}
+
+std::vector<StudyOutput> final_studies(const Snapshot& last) {
+  return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
+}
+
+/// The drive's own mountings, replaced by those that several drives settled.
+std::vector<StudyOutput> with_settled(std::vector<StudyOutput> finals,
+                                      const std::vector<StudyFileInfo>& infos,
+                                      const std::map<std::string, MountingEstimate>& settled) {
+  for (std::size_t i = 0; i < finals.size(); ++i) {
+    const auto found = settled.find(infos[i].name);
+    if (found == settled.end()) continue;
+    finals[i].C_b_s = found->second.C_b_s;
+    finals[i].r_bs_b_m = found->second.r_bs_b_m;
+  }
+  return finals;
+}
+
+void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMountings& former,
+                       HostTime first_reference_time, std::vector<std::string>& warnings) {
+  for (std::size_t i = 0; i < former.size(); ++i) {
+    if (former[i].empty()) continue;
+    warnings.push_back(fmt::format(
+        "{}: found to sit differently {:.1f} s into the run; calibration.json, its errors and its "
+        "noise models are of the mounting after that",
+        infos[i].name, to_seconds(former[i].back().until - first_reference_time)));
+  }
+}
+
+tl::unexpected<Error> nothing_was_run(const ReplayResult& result) {
+  return work_error(
+      fmt::format(
+          "the estimator never came to a result: {} ticks were run, and a result comes with every {}th",
+          result.ticks, kTicksPerSnapshot),
+      "a recording whose own record says that every tick was skipped, or that ends at once, is damaged or "
+      "forged");
+}
+
+}  // namespace
+
+Result<void> run_study(const Configuration& configuration, const Recording& recording,
+                       const StudyRunOptions& options) {
+  const auto spec = noise::parse_model(configuration.noise.model);
+  if (!spec) return tl::unexpected<Error>(spec.error());
+  auto folder = RunFolder::create(options.out, study_file_infos(configuration, recording), true);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  const auto estimator = estimator_config(configuration);
+
+  CalibrationPass first(**folder, configuration);
+  ReplayOptions replay_options;
+  if (options.progress)
+    replay_options.progress = [&](double share) { options.progress("calibration", share); };
+  const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
+  if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
+  if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
+  const Snapshot last = *(*folder)->last_snapshot();
+  const auto finals = final_studies(last);
+
+  RunRecord run{
+      configuration,         options.version, recording.inputs,    calibrated_run->devices,
+      calibrated_run->ticks, &last,           (*folder)->events(), warnings_of(recording, *calibrated_run)};
+  const auto of_run = warnings_of(configuration, last);
+  run.warnings.insert(run.warnings.end(), of_run.begin(), of_run.end());
+  const auto infos = study_file_infos(configuration, recording);
+  const FormerMountings& former = first.former_mountings();
+  warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
+  if (std::none_of(finals.begin(), finals.end(),
+                   [](const StudyOutput& final) { return has_estimate(final.status); })) {
+    return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
+  }
+
+  const RecordStorage storage{Smoother::kMemory_bytes, options.out};
+  const auto track =
+      smooth_drive(configuration, estimator, recording, finals, former, storage, [&](double share) {
+        if (options.progress) options.progress("smoothing", share);
+      });
+  if (!track) return tl::unexpected<Error>(track.error());
+  if (auto written = write_smoothed(*track, last, former, infos, (*folder)->folder()); !written)
+    return written;
+  const auto means = weighted_means(*track, finals, former);
+  if (!means) return tl::unexpected<Error>(means.error());
+  const auto biases = ReferenceBiasTrack::of(*track);
+  if (!biases) return tl::unexpected<Error>(biases.error());
+
+  const auto settled = with_settled(finals, infos, options.mountings);
+  auto rows = make_spools(finals.size(), (*folder)->folder());
+  if (!rows) return tl::unexpected<Error>(rows.error());
+  ErrorCollector collector(former, *biases, *rows, low_passes(configuration));
+  if (options.progress)
+    replay_options.progress = [&](double share) { options.progress("error process", share); };
+  const auto second = replay(configuration, frozen(estimator, settled), recording, collector, replay_options);
+  if (!second) return tl::unexpected<Error>(second.error());
+
+  const HostTime origin = last.first_reference_time;
+  auto regimes =
+      find_regimes(configuration.regimes, collector.watch(), options.labels, recording.moments, origin);
+  if (!regimes) return tl::unexpected<Error>(regimes.error());
+  auto studied = make_spools(finals.size(), (*folder)->folder());
+  if (!studied) return tl::unexpected<Error>(studied.error());
+  std::vector<NoiseSeries> series;
+  for (std::size_t i = 0; i < finals.size(); ++i) {
+    const ScaleError scale = configuration.noise.remove_scale_error
+                                 ? ScaleError{settled[i].gyro_scale, settled[i].accel_scale}
+                                 : ScaleError{};
+    series.push_back(write_errors({i, origin, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]));
+  }
+
+  const double run_s = regimes->motion.total_s(0) + regimes->motion.total_s(1);
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const auto& device = configuration.devices[configuration.study_indices()[i]];
+    const auto remark = coverage_remark(device.name, series[i], device.rate_hz, run_s, origin);
+    if (!remark.empty()) regimes->remarks.push_back(remark);
+  }
+
+  const auto& names = regimes->chosen.names();
+  const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
+    if (options.progress) options.progress("noise models", share);
+  });
+  const auto dependence = study_dependence(configuration, series, collector.temperatures(),
+                                           collector.watch().levels(), regimes->motion, noise_study, origin);
+  const auto regressions = regressions_of(configuration, *studied, regimes->motion, *spec);
+  auto regime_document = regimes_json(*regimes, origin);
+  regime_document["left_out"] = noise_study.left_out;
+  for (const std::vector<std::string>& remarks :
+       {regimes->remarks, noise_study.remarks, dependence.remarks, regressions.remarks})
+    run.warnings.insert(run.warnings.end(), remarks.begin(), remarks.end());
+  run.static_s = regimes->motion.total_s(0);
+  run.dynamic_s = regimes->motion.total_s(1);
+  if (auto written = write_scatter(configuration, *studied, origin, (*folder)->folder()); !written)
+    return written;
+
+  if (auto written = (*folder)->write_calibration(*means); !written) return written;
+  if (auto closed = (*folder)->close(); !closed) return closed;
+  if (auto written = write_models((*folder)->folder(), models_json(noise_study)); !written) return written;
+  const std::pair<const char*, nlohmann::json> documents[] = {
+      {"regimes.json", std::move(regime_document)},
+      {"comparison.json", comparison_json(noise_study, names)},
+      {"dependence.json", dependence.document},
+      {"vibration.json", {{"schema", "imuscope.vibration/1"}, {"lines", noise_study.lines}}},
+      {"regression.json",
+       {{"schema", "imuscope.regression/1"},
+        {"regressions", regressions.regressions},
+        {"remarks", regressions.remarks}}}};
+  for (const auto& [file, document] : documents) {
+    if (auto written = write_json((*folder)->folder(), file, document); !written) return written;
+  }
+  run.error_process_mounting = options.mountings.empty() ? "of this drive" : "of all drives combined";
+  return write_run_record((*folder)->folder(), run);
+}
+
+}  // namespace imuscope

@@ -1,0 +1,195 @@
+#include "configuration/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <fstream>
+
+#include "base/units.h"
+#include "service/estimator_setup.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kMinimal = R"(
+[[device]]
+name = "r"
+role = "reference"
+protocol = "ixblue_stdbin"
+[[device]]
+name = "s"
+role = "study"
+protocol = "xsens_mt"
+)";
+
+Configuration parsed(const std::string& text) {
+  auto result = parse_configuration(text, "x.toml");
+  EXPECT_TRUE(result) << (result ? "" : result.error().text());
+  return result.value_or(Configuration{});
+}
+
+std::string refused(const std::string& text) {
+  auto result = parse_configuration(text, "x.toml");
+  EXPECT_FALSE(result) << "accepted:\n" << text;
+  if (result) return {};
+  EXPECT_EQ(result.error().kind, ErrorKind::kUsage);
+  return result.error().text();
+}
+
+TEST(Configuration, EveryCommittedConfigurationIsAccepted) {
+  int read = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(test::source_path("config"))) {
+    if (entry.path().extension() != ".toml") continue;
+    // A script of faults for the simulator, no configuration.
+    if (entry.path().filename() == "faults.toml") continue;
+    const auto result = load_configuration(entry.path());
+    EXPECT_TRUE(result) << (result ? "" : result.error().text());
+    ++read;
+  }
+  EXPECT_GE(read, 2);
+}
+
+TEST(Configuration, ADeviceWithoutAxesOfAStdbinUnitIsTurnedToForwardRightDown) {
+  const auto configuration = parsed(kMinimal);
+  EXPECT_EQ(configuration.devices[0].axes, (std::array<double, 9>{1, 0, 0, 0, -1, 0, 0, 0, -1}));
+  EXPECT_EQ(configuration.devices[1].axes, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
+}
+
+TEST(Configuration, UserUnitsBecomeSiOnLoading) {
+  const auto configuration = parsed(std::string(kMinimal) + R"(
+rate_hz = 50
+[device.noise]
+gyro_white_sd_degps = 0.5
+accel_white_ug_per_sqrt_hz = 100.0
+gyro_bias_sd_deg_per_h = 3600.0
+[device.prior]
+time_offset_ms = -4.0
+)");
+  const auto& study = configuration.devices[1];
+  EXPECT_DOUBLE_EQ(*study.noise.gyro_white_sd_radps, 0.5 * kPi / 180.0);
+  EXPECT_DOUBLE_EQ(*study.noise.accel_white_sd_mps2, 100e-6 * 9.80665 * std::sqrt(50.0));
+  EXPECT_DOUBLE_EQ(*study.noise.gyro_bias_sd_radps, kPi / 180.0);
+  EXPECT_DOUBLE_EQ(*study.prior.time_offset_s, -0.004);
+  const auto estimator = estimator_config(configuration);
+  EXPECT_DOUBLE_EQ(estimator.studies.at(0).noise.gyro[1].white_sd[2], 0.5 * kPi / 180.0);
+  EXPECT_FALSE(estimator.navigation.enabled) << "there is no GNSS device";
+}
+
+TEST(Configuration, APriorRotationVectorBecomesTheRotationItNames) {
+  const auto configuration = parsed(std::string(kMinimal) + R"(
+[device.prior]
+rotation_vector_b_s_deg = [0.0, 0.0, 90.0]
+)");
+  const auto C = *configuration.devices[1].prior.C_b_s;
+  // A quarter turn about z takes x to y.
+  EXPECT_NEAR(C[0], 0.0, 1e-15);
+  EXPECT_NEAR(C[3], 1.0, 1e-15);
+  EXPECT_NEAR(C[1], -1.0, 1e-15);
+  EXPECT_NEAR(C[8], 1.0, 1e-15);
+}
+
+TEST(Configuration, AKeyThatWouldTakeTheStackIsRefused) {
+  constexpr int kWords = 400'000;
+  const auto repeated = [](const std::string& word) {
+    std::string key;
+    for (int i = 0; i < kWords; ++i) key += word;
+    return key;
+  };
+  const std::vector<std::string> documents{repeated("a.") + "a = 1\n",
+                                           "[" + repeated("a.") + "a]\n",
+                                           "[[" + repeated("\"a\" . ") + "a]]\n",
+                                           "x = {" + repeated("'a'.") + "a = 1}\n",
+                                           "x = [{" + repeated("a.\t") + "a = 1}]\n",
+                                           "x = \"\"\"\n\"\" # \"\"\"\n" + repeated("a.") + "a = 1\n",
+                                           "x = '\\'\n" + repeated("a.") + "a = 1\n"};
+  for (const std::string& document : documents)
+    EXPECT_THAT(refused(document + std::string(kMinimal)), HasSubstr("a key has more than 64 words"));
+  const std::string words = "x = \"" + repeated("a.") + "\" # " + repeated("a.") + "\n";
+  EXPECT_THAT(refused(words + std::string(kMinimal)), testing::Not(HasSubstr("a key has"))) << "no key";
+}
+
+TEST(Configuration, ATextIsALineWithoutControlCharacters) {
+  EXPECT_THAT(refused("[run]\nname = \"a\\u001b[2J\"\n" + std::string(kMinimal)),
+              HasSubstr("run.name must be one line"));
+  EXPECT_THAT(refused("[run]\nname = \"a\\nREADY=1\"\n" + std::string(kMinimal)),
+              HasSubstr("run.name must be one line"));
+  EXPECT_THAT(refused("[run]\nname = \"" + std::string(5'000, 'x') + "\"\n" + std::string(kMinimal)),
+              HasSubstr("at most 4096 bytes"));
+}
+
+TEST(Configuration, AnUnknownKeyIsRefusedWithLineAndNearestKey) {
+  const auto text = refused(std::string(kMinimal) + "rate_herz = 100\n");
+  EXPECT_THAT(text, HasSubstr("x.toml:10"));
+  EXPECT_THAT(text, HasSubstr("rate_herz"));
+  EXPECT_THAT(text, HasSubstr("did you mean 'rate_hz'"));
+}
+
+TEST(Configuration, AnUnknownWordListsTheValidOnes) {
+  const auto text = refused("[[device]]\nname = \"r\"\nrole = \"referense\"\nprotocol = \"greis\"\n");
+  EXPECT_THAT(text, HasSubstr("x.toml:3"));
+  EXPECT_THAT(text, HasSubstr("reference, study, gnss"));
+}
+
+TEST(Configuration, AnImpossibleValueNamesItsRange) {
+  EXPECT_THAT(refused(std::string(kMinimal) + "rate_hz = -1\n"),
+              HasSubstr("rate_hz must be a number from 0.1"));
+}
+
+TEST(Configuration, CoresOfTheThreadsAreAList) {
+  const auto configuration =
+      parsed(std::string("[threads]\nio_cores = [1]\nestimator_cores = [0, 1]\n") + kMinimal);
+  EXPECT_EQ(configuration.threads.io_cores, std::vector<int>{1});
+  EXPECT_EQ(configuration.threads.estimator_cores, (std::vector<int>{0, 1}));
+  EXPECT_TRUE(parsed(kMinimal).threads.io_cores.empty()) << "any core unless some are named";
+  EXPECT_THAT(refused(std::string("[threads]\nio_cores = [-1]\n") + kMinimal),
+              HasSubstr("threads.io_cores names a core -1"));
+  EXPECT_THAT(refused(std::string("[threads]\nio_cores = [0.5]\n") + kMinimal),
+              HasSubstr("names a core 0.5"));
+}
+
+TEST(Configuration, AxesThatAreNoRotationAreRefused) {
+  EXPECT_THAT(refused(std::string(kMinimal) + "axes = \"+x +y -z\"\n"), HasSubstr("is not a rotation"));
+  EXPECT_THAT(refused(std::string(kMinimal) + "axes = \"forward\"\n"), HasSubstr("signed axes"));
+}
+
+TEST(Configuration, TwoReferencesAreRefused) {
+  const std::string twice =
+      std::string(kMinimal) + "[[device]]\nname = \"r2\"\nrole = \"reference\"\nprotocol = \"csv_imu\"\n";
+  EXPECT_THAT(refused(twice), HasSubstr("2 devices with role reference"));
+}
+
+TEST(Configuration, TheSameNameTwiceIsRefused) {
+  const std::string twice =
+      std::string(kMinimal) + "[[device]]\nname = \"s\"\nrole = \"study\"\nprotocol = \"csv_imu\"\n";
+  EXPECT_THAT(refused(twice), HasSubstr("'s' is used twice"));
+}
+
+TEST(Configuration, ANameThatCouldLeaveTheOutputFolderIsRefused) {
+  EXPECT_THAT(refused("[[device]]\nname = \"../s\"\nrole = \"study\"\nprotocol = \"csv_imu\"\n"),
+              HasSubstr("letters, digits"));
+}
+
+TEST(Configuration, BrokenTomlNamesTheLine) {
+  EXPECT_THAT(refused("[run]\nname = \n"), HasSubstr("x.toml:2"));
+}
+
+TEST(Configuration, AMissingOrEmptyFileAndAFolderAreToldApart) {
+  const auto folder = test::scratch_folder();
+  EXPECT_THAT(load_configuration(folder / "absent.toml").error().text(), HasSubstr("does not exist"));
+  EXPECT_THAT(load_configuration(folder).error().text(), HasSubstr("is a folder"));
+  std::ofstream(folder / "empty.toml").close();
+  EXPECT_THAT(load_configuration(folder / "empty.toml").error().text(), HasSubstr("is empty"));
+}
+
+TEST(Configuration, TheHashIsThatOfTheText) {
+  // Expected by coreutils: sha256sum of the text below.
+  const std::string text =
+      "[[device]]\nname = \"r\"\nrole = \"reference\"\nprotocol = \"csv_imu\"\n"
+      "[[device]]\nname = \"s\"\nrole = \"study\"\nprotocol = \"csv_imu\"\n";
+  EXPECT_EQ(parsed(text).sha256, "2bdf62cebb4b14b378b86ad7aeda9525d8823bb185756ec989c2bce285d0b960");
+}
+
+}  // namespace
+}  // namespace imuscope
