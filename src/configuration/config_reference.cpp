@@ -75,6 +75,10 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "`full`: boresight, lever arm, biases, time offset and scales of every S-IMU. `paper`: the six states "
      "of the "
      "published method, for comparison."},
+    {"estimator.mounting",
+     "What `process` publishes of a mounting. `filter`: the filter's end value. `batch`: an estimate of "
+     "the whole drive that needs neither `[device.noise]` nor `average_samples`, for a reference that is a "
+     "MEMS itself and for sensors with crooked axes; its sd are still too small where a drive shows little."},
     {"estimator.navigation",
      "Navigation of the R-IMU with GNSS. Without it (or without a receiver) the mounting is calibrated all "
      "the "

@@ -307,11 +307,18 @@ void RunFolder::add_odometry() {
   odometry_.append(odometry_csv_row(last_->odometry, seconds_since_start(last_->odometry.time)));
 }
 
-Result<void> RunFolder::write_calibration(const std::vector<nlohmann::json>& weighted_means) {
+Result<void> RunFolder::write_calibration() {
+  std::vector<CalibrationEntry> entries;
+  for (std::size_t i = 0; last_ && i < last_->n_studies; ++i)
+    entries.push_back({last_->studies[i], {{"weighted_mean", nullptr}}});
+  return write_calibration(entries);
+}
+
+Result<void> RunFolder::write_calibration(const std::vector<CalibrationEntry>& entries) {
   nlohmann::json imus = nlohmann::json::array();
-  for (std::size_t i = 0; last_ && i < last_->n_studies; ++i) {
-    imus.push_back(calibration_json(studies_[i], last_->studies[i], sample_times_[i]));
-    imus.back()["weighted_mean"] = i < weighted_means.size() ? weighted_means[i] : nlohmann::json(nullptr);
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    imus.push_back(calibration_json(studies_[i], entries[i].study, sample_times_[i]));
+    imus.back().update(entries[i].more);
   }
   return write_json(folder_, "calibration.json", {{"schema", "imuscope.calibration/1"}, {"imus", imus}});
 }

@@ -64,6 +64,12 @@ struct StudyFileInfo {
 };
 
 /// Writes the series of a run as the core produces them. Errors of the disk are kept and told by close().
+/// What calibration.json says of one S-IMU: the estimate, and keys that are added to it or replace its own.
+struct CalibrationEntry {
+  StudyOutput study;
+  nlohmann::json more = nlohmann::json::object();
+};
+
 class RunFolder final : public CoreSink {
  public:
   /// Creates the folder if needed. Existing files of an earlier run in it are replaced.
@@ -83,9 +89,9 @@ class RunFolder final : public CoreSink {
   [[nodiscard]] const std::vector<LateSample>& late_samples() const { return late_; }
   [[nodiscard]] const std::vector<EstimatorEvent>& events() const { return events_; }
 
-  /// Writes calibration.json from the last snapshot.
-  /// @param weighted_means  per S-IMU, of a study; empty otherwise
-  [[nodiscard]] Result<void> write_calibration(const std::vector<nlohmann::json>& weighted_means = {});
+  /// Writes calibration.json from the last snapshot, or from what a study made of it.
+  [[nodiscard]] Result<void> write_calibration();
+  [[nodiscard]] Result<void> write_calibration(const std::vector<CalibrationEntry>& entries);
   /// Closes the CSV files; the first failed write, if any, is the error.
   [[nodiscard]] Result<void> close();
 

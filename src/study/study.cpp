@@ -9,6 +9,7 @@
 #include "service/noise_series.h"
 #include "service/run_folder.h"
 #include "service/run_record.h"
+#include "study/batch_study.h"
 #include "study/dependence_study.h"
 #include "study/dynamics_files.h"
 #include "study/noise_study.h"
@@ -150,6 +151,69 @@ std::vector<StudyOutput> with_settled(std::vector<StudyOutput> finals,
   return finals;
 }
 
+/// Former mountings that the batch confirms: a filter that is told too little noise finds changes where there
+/// are none.
+FormerMountings confirmed(FormerMountings former, const std::vector<BatchOutcome>& outcomes) {
+  for (std::size_t i = 0; i < former.size(); ++i) {
+    if (outcomes[i].mounting && !outcomes[i].remounted) former[i].clear();
+  }
+  return former;
+}
+
+/// The batch's values where it found any. Where it found the data to be wrong, nothing of them is believed.
+std::vector<StudyOutput> with_batch(std::vector<StudyOutput> studies,
+                                    const std::vector<BatchOutcome>& outcomes) {
+  for (std::size_t i = 0; i < studies.size(); ++i) {
+    if (outcomes[i].mounting) {
+      take_over(*outcomes[i].mounting, studies[i]);
+    } else if (!outcomes[i].why_not.what.empty() && outcomes[i].why_not.kind == ErrorKind::kUsage) {
+      studies[i].status = CalibrationStatus::kWaiting;
+    }
+  }
+  return studies;
+}
+
+/// What the batch has to say, refusals first.
+std::vector<std::string> remarks_of_batch(const std::vector<StudyFileInfo>& infos,
+                                          const std::vector<StudyOutput>& of_filter,
+                                          const std::vector<BatchOutcome>& outcomes) {
+  std::vector<std::string> refusals;
+  std::vector<std::string> remarks;
+  for (std::size_t i = 0; i < outcomes.size(); ++i) {
+    const auto& outcome = outcomes[i];
+    if (outcome.mounting) {
+      if (auto remark = batch_remark(infos[i].name, *outcome.mounting); !remark.empty())
+        remarks.push_back(std::move(remark));
+    } else if (has_estimate(of_filter[i].status) && outcome.why_not.kind == ErrorKind::kWork) {
+      remarks.push_back(fmt::format("{}: its mounting is the filter's, as the batch estimate found none: {}",
+                                    infos[i].name, outcome.why_not.text()));
+    } else {
+      refusals.push_back(fmt::format("{}: no mounting was found: {}", infos[i].name, outcome.why_not.text()));
+    }
+  }
+  refusals.insert(refusals.end(), remarks.begin(), remarks.end());
+  return refusals;
+}
+
+/// What calibration.json says of each S-IMU beside the published values.
+std::vector<CalibrationEntry> calibration_entries(const std::vector<StudyOutput>& finals,
+                                                  const std::vector<StudyOutput>& of_filter,
+                                                  const std::vector<BatchOutcome>& outcomes,
+                                                  const std::vector<StudyFileInfo>& infos,
+                                                  const std::vector<nlohmann::json>& weighted_means) {
+  std::vector<CalibrationEntry> entries;
+  for (std::size_t i = 0; i < finals.size(); ++i) {
+    CalibrationEntry entry{finals[i], {{"weighted_mean", weighted_means[i]}}};
+    if (outcomes[i].mounting) {
+      entry.more["method"] = "batch estimate";
+      entry.more["batch"] = batch_json(*outcomes[i].mounting);
+      entry.more["filter"] = filter_json(of_filter[i], infos[i].clock_shift_s);
+    }
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
 void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMountings& former,
                        HostTime first_reference_time, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < former.size(); ++i) {
@@ -184,19 +248,29 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   ReplayOptions replay_options;
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
+  BatchRecords records(configuration);
+  if (configuration.estimator.batch_mounting)
+    replay_options.on_sample = [&records](const Sample& sample) { records.add(sample); };
   const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
   if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
+  replay_options.on_sample = nullptr;
   if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
-  const Snapshot last = *(*folder)->last_snapshot();
-  const auto finals = final_studies(last);
-
-  RunRecord run{
-      configuration,         options.version, recording.inputs,    calibrated_run->devices,
-      calibrated_run->ticks, &last,           (*folder)->events(), warnings_of(recording, *calibrated_run)};
-  const auto of_run = warnings_of(configuration, last);
-  run.warnings.insert(run.warnings.end(), of_run.begin(), of_run.end());
+  Snapshot last = *(*folder)->last_snapshot();
   const auto infos = study_file_infos(configuration, recording);
-  const FormerMountings& former = first.former_mountings();
+  const auto of_filter = final_studies(last);
+  const bool by_batch = configuration.estimator.batch_mounting;
+  if (by_batch && options.progress) options.progress("batch estimate", 0.0);
+  std::vector<BatchOutcome> outcomes(of_filter.size());
+  if (by_batch) outcomes = estimate_mountings(configuration, records, first.former_mountings());
+  const auto finals = by_batch ? with_batch(of_filter, outcomes) : of_filter;
+  std::copy(finals.begin(), finals.end(), last.studies.begin());
+
+  RunRecord run{configuration,         options.version, recording.inputs,    calibrated_run->devices,
+                calibrated_run->ticks, &last,           (*folder)->events(), {}};
+  if (by_batch) run.warnings = remarks_of_batch(infos, of_filter, outcomes);
+  for (const auto& warnings : {warnings_of(recording, *calibrated_run), warnings_of(configuration, last)})
+    run.warnings.insert(run.warnings.end(), warnings.begin(), warnings.end());
+  const FormerMountings former = confirmed(first.former_mountings(), outcomes);
   warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
   if (std::none_of(finals.begin(), finals.end(),
                    [](const StudyOutput& final) { return has_estimate(final.status); })) {
@@ -263,7 +337,10 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   if (auto written = write_scatter(configuration, *studied, origin, (*folder)->folder()); !written)
     return written;
 
-  if (auto written = (*folder)->write_calibration(*means); !written) return written;
+  if (auto written =
+          (*folder)->write_calibration(calibration_entries(finals, of_filter, outcomes, infos, *means));
+      !written)
+    return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
   if (auto written = write_models((*folder)->folder(), models_json(noise_study)); !written) return written;
   const std::pair<const char*, nlohmann::json> documents[] = {

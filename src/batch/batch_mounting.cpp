@@ -1,0 +1,293 @@
+#include "batch/batch_mounting.h"
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "batch/checks.h"
+#include "batch/grid.h"
+#include "batch/normal_equations.h"
+#include "batch/prior_scales.h"
+#include "navigation/so3.h"
+
+namespace imuscope::batch {
+
+namespace {
+
+using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
+
+/// Above this neither filter of the sensors nor body is to be trusted, and vibration rules.
+constexpr double kTop_hz = 8.0;
+/// Share of the residual noise that is taken to be the reference's: nothing in a pair of records tells it.
+constexpr double kReferenceShare = 0.5;
+/// A band's first sd of deviation, before it is learned.
+constexpr double kFirstDeviation = 0.01;
+constexpr double kLeastDeviation = 1e-5;
+/// Bands to either side that a band's sd of deviation is learned with: nine elements alone tell it too badly,
+/// and a band that came out quiet by chance would rule all others.
+constexpr Eigen::Index kNeighbours = 2;
+constexpr int kMostIterations = 25;
+/// Rounds before noise and scales have come near enough for the finer corrections.
+constexpr int kRoughIterations = 2;
+/// A step of less than this share of the sd changes nothing that is published.
+constexpr double kSettledShare = 0.1;
+/// Share of the information that the noise in the derivatives may be.
+constexpr double kMostNoise = 0.9;
+/// Windows overlap by half, so that neighbours share information: so many of them are one that stands alone.
+constexpr double kWindowsPerIndependent = 1.5;
+/// Windows whose scores are taken to be correlated, beyond the overlap: drifts outlast a window.
+constexpr Eigen::Index kLags = 2;
+/// Weight, in windows, of the covariance that the noise gives against that of the scatter over time.
+constexpr double kNoiseWeight = 20.0;
+
+Eigen::MatrixXd reference_series(const Grid& grid, const Eigen::RowVectorXd& mean) {
+  Eigen::MatrixXd series(grid.motion.rows(), kReferenceColumns);
+  series.leftCols<6>() = grid.motion.rowwise() - mean;
+  series.middleCols<3>(kOmegaDot) = grid.omega_dot;
+  const auto x = grid.motion.col(0).array();
+  const auto y = grid.motion.col(1).array();
+  const auto z = grid.motion.col(2).array();
+  series.col(kProducts) = x * x;
+  series.col(kProducts + 1) = y * y;
+  series.col(kProducts + 2) = z * z;
+  series.col(kProducts + 3) = x * y;
+  series.col(kProducts + 4) = x * z;
+  series.col(kProducts + 5) = y * z;
+  return series;
+}
+
+Eigen::RowVectorXd mean_of(const Grid& grid) {
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(6);
+  double n = 0.0;
+  for (Eigen::Index i = 0; i < grid.motion.rows(); ++i) {
+    if (grid.valid[static_cast<std::size_t>(i)] == 0) continue;
+    sum += grid.motion.row(i);
+    n += 1.0;
+  }
+  return n > 0.0 ? Eigen::RowVectorXd(sum / n) : sum;
+}
+
+/// The estimate of one pair of records.
+class Batch {
+ public:
+  Batch(const ImuRecord& reference, const ImuRecord& study, const BatchOptions& options)
+      : reference_(reference),
+        study_(study),
+        reference_axis_sd_rad_(options.sensor.reference_axis_sd_rad),
+        scales_(options.sensor) {}
+
+  Result<BatchMounting> run(const Start& start) {
+    if (auto set = set_up(start); !set) return tl::unexpected<Error>(set.error());
+    BatchMounting result;
+    result.rate_correlation = start.rate_correlation;
+    for (int i = 0; i < kMostIterations && !result.settled; ++i) {
+      result.iterations = i + 1;
+      result.settled = step(i);
+    }
+    finish(result);
+    return result;
+  }
+
+ private:
+  Result<void> set_up(const Start& start) {
+    instants_ = common_instants(reference_, study_, start.time_offset_s, kGridRate_hz);
+    middle_s_ = 0.5 * (instants_.front() + instants_.back());
+    const Grid grid = make_grid(reference_, instants_, true);
+    estimate_.sensor.C_b_s = start.C_b_s;
+    estimate_.sensor.x[kTimeOffset] = start.time_offset_s;
+    Grid study = study_grid();
+    std::vector<char> valid = grid.valid;
+    for (std::size_t i = 0; i < valid.size(); ++i)
+      valid[i] = static_cast<char>(valid[i] != 0 && study.valid[i] != 0);
+    problem_.plan = plan_windows(valid, kGridRate_hz, kTop_hz);
+    if (problem_.plan.starts.empty())
+      return work_error("no stretch of it is free of gaps for five seconds",
+                        "look at its counter and its line");
+    problem_.bands = Bands(problem_.plan.n_frequencies);
+    problem_.constant = window_spectrum(problem_.plan);
+    reference_mean_ = mean_of(grid);
+    study_mean_ = mean_of(study);
+    problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
+    const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
+    problem_.from_middle_s.resize(n);
+    for (Eigen::Index w = 0; w < n; ++w) {
+      const Eigen::Index middle =
+          problem_.plan.starts[static_cast<std::size_t>(w)] + problem_.plan.length / 2;
+      problem_.from_middle_s[w] = instants_[static_cast<std::size_t>(middle)] - middle_s_;
+    }
+    estimate_.deviation.assign(static_cast<std::size_t>(problem_.bands.size()), DeviationVector::Zero());
+    estimate_.deviation_sd.setConstant(problem_.bands.size(), 2, kFirstDeviation);
+    return {};
+  }
+
+  /// The S-IMU at the instants of the grid, by the clock as it is known now.
+  [[nodiscard]] Grid study_grid() const {
+    std::vector<double> own(instants_.size());
+    for (std::size_t i = 0; i < own.size(); ++i)
+      own[i] = instants_[i] - estimate_.sensor.time_offset_s(instants_[i] - middle_s_);
+    return make_grid(study_, own, false);
+  }
+
+  [[nodiscard]] Spectra study_spectra() const {
+    const Grid grid = study_grid();
+    return {problem_.plan, Eigen::MatrixXd(grid.motion.rowwise() - study_mean_)};
+  }
+
+  /// One Gauss-Newton step and one round of learning. True where nothing moves any more.
+  bool step(int round) {
+    const bool rough = round < kRoughIterations;
+    const Spectra study = study_spectra();
+    const Residuals residual = residuals(problem_, study, estimate_);
+    noise_ = NoiseBands(problem_.bands, static_cast<Eigen::Index>(problem_.plan.starts.size()),
+                        problem_.plan.n_frequencies, residual);
+    equations_ = normal_equations(problem_, study, residual, estimate_, noise_, kReferenceShare, !rough);
+    const ParameterVector precision = scales_.precision();
+    Covariance information = equations_.information;
+    information.diagonal() += precision;
+    const ParameterVector gradient = equations_.gradient - precision.cwiseProduct(estimate_.sensor.x);
+    const Eigen::LLT<Covariance> factor(information);
+    const ParameterVector correction = factor.solve(gradient);
+    covariance_ = factor.solve(Covariance::Identity());
+    estimate_.sensor.add(correction);
+    for (std::size_t band = 1; band < estimate_.deviation.size(); ++band) {
+      const auto& own = equations_.bands[band];
+      estimate_.deviation[band] += own.own - own.coupling.transpose() * correction;
+    }
+    if (!rough) learn();
+    const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
+    return !rough && share.head<kGyroBias>().maxCoeff() < kSettledShare;
+  }
+
+  void learn() {
+    const Eigen::Index n = problem_.bands.size();
+    Eigen::MatrixX2d square = Eigen::MatrixX2d::Zero(n, 2);
+    for (Eigen::Index band = 1; band < n; ++band) {
+      const auto i = static_cast<std::size_t>(band);
+      const DeviationVector all = estimate_.deviation[i].cwiseAbs2() + equations_.bands[i].variance;
+      square.row(band) << all.head<9>().mean(), all.tail<9>().mean();
+    }
+    for (Eigen::Index band = 1; band < n; ++band) {  // B-15
+      const Eigen::Index first = std::max<Eigen::Index>(1, band - kNeighbours);
+      const Eigen::Index count = std::min(n - 1, band + kNeighbours) - first + 1;
+      estimate_.deviation_sd.row(band) =
+          square.middleRows(first, count).colwise().mean().cwiseSqrt().cwiseMax(kLeastDeviation);
+    }
+    scales_.learn(estimate_.sensor.x, covariance_);
+  }
+
+  /// B-13: information without what the reference's noise only seems to add. Where that is nearly all of it,
+  /// the difference of the two is no number to rely on: at most kMostNoise of it goes.
+  [[nodiscard]] Covariance honest_covariance() const {
+    Covariance information = equations_.information;
+    information.diagonal() += scales_.precision();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Covariance> shares(equations_.of_noise, information);
+    // With V' information V = I: information - noise = V^-T (I - shares) V^-1.
+    const ParameterVector left =
+        (ParameterVector::Ones() - shares.eigenvalues()).cwiseMax(1.0 - kMostNoise).cwiseInverse();
+    return shares.eigenvectors() * left.asDiagonal() * shares.eigenvectors().transpose();
+  }
+
+  /// B-19: covariance by the scatter of the windows' scores over time.
+  [[nodiscard]] Covariance scatter_covariance(const Covariance& covariance) const {
+    const auto& scores = equations_.window_scores;
+    Covariance sum = scores.transpose() * scores;
+    for (Eigen::Index lag = 1; lag <= std::min(kLags, scores.rows() - 1); ++lag) {
+      const Eigen::Index n = scores.rows() - lag;
+      const Covariance cross = scores.bottomRows(n).transpose() * scores.topRows(n);
+      const double taper = 1.0 - static_cast<double>(lag) / static_cast<double>(kLags + 1);
+      sum += taper * (cross + cross.transpose());
+    }
+    sum.diagonal() += scales_.precision();
+    return covariance * sum * covariance;
+  }
+
+  void finish(BatchMounting& result) {
+    const Covariance by_noise = honest_covariance();
+    const Covariance by_scatter = scatter_covariance(by_noise);
+    const auto windows = static_cast<double>(problem_.plan.starts.size());
+    const double independent = windows / kWindowsPerIndependent;
+    // B-20: correlations as the noise gives them, sd between both.
+    ParameterVector growth;
+    for (Eigen::Index i = 0; i < kParameters; ++i) {
+      const double ratio = std::max(0.0, by_scatter(i, i) / by_noise(i, i));
+      growth[i] = std::sqrt((kNoiseWeight + independent * ratio) / (kNoiseWeight + independent));
+      if (i < kTimeOffset) result.inconsistency = std::max(result.inconsistency, std::sqrt(ratio));
+    }
+    result.covariance = growth.asDiagonal() * by_noise * growth.asDiagonal();
+    result.degrees_of_freedom = kNoiseWeight + independent;
+    result.sensor = estimate_.sensor;
+    add_mean_motion(result);
+    result.covariance.diagonal().head<3>().array() +=
+        reference_axis_sd_rad_ * reference_axis_sd_rad_;  // B-21
+    result.middle_s = middle_s_;
+    result.windows = problem_.plan.starts.size();
+    const double half_s = 0.5 * static_cast<double>(problem_.plan.length) / kGridRate_hz;
+    result.used_s = half_s * (windows + 1.0);
+    result.one_chip = scales_.one_chip();
+    for (Eigen::Index band = 0; band < problem_.bands.size(); ++band) result.bands.push_back(report(band));
+  }
+
+  /// Biases were those of records without their means. That of the gyros stays what they show at the drive's
+  /// mean force; in that of the accelerometers the uncertain axes are multiplied by gravity.
+  void add_mean_motion(BatchMounting& result) const {
+    SensorState& sensor = result.sensor;
+    const Eigen::Vector3d omega = reference_mean_.head<3>().transpose();
+    const Eigen::Vector3d f = reference_mean_.tail<3>().transpose();
+    sensor.x.segment<3>(kGyroBias) += study_mean_.head<3>().transpose() - sensor.C_b_gyro() * omega;
+    sensor.x.segment<3>(kAccelBias) += study_mean_.tail<3>().transpose() - sensor.C_b_accel() * f;
+    Covariance to_bias = Covariance::Identity();
+    const Eigen::Vector3d f_a = sensor.C_s_accel() * sensor.C_b_s * f;
+    to_bias.block<3, 3>(kAccelBias, kPsi) = -sensor.C_b_accel() * skew(f);
+    to_bias.block<3, 3>(kAccelBias, kAlpha) = -sensor.accel_shape() * skew(f_a);
+    for (Eigen::Index j = 0; j < 6; ++j)
+      to_bias.block<3, 1>(kAccelBias, kAccelShape + j) = -shape_derivative(j) * f_a;
+    result.covariance = to_bias * result.covariance * to_bias.transpose();
+  }
+
+  [[nodiscard]] BandReport report(Eigen::Index band) const {
+    BandReport out;
+    out.from_hz = problem_.plan.frequency_hz(problem_.bands.first(band));
+    out.to_hz = problem_.plan.frequency_hz(problem_.bands.end(band));
+    // Power a frequency of a record scaled to keep sums of squares: density = 2 P / rate.
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      out.gyro_density[i] = std::sqrt(2.0 * noise_.power(band, i) / kGridRate_hz);
+      out.accel_density[i] = std::sqrt(2.0 * noise_.power(band, 3 + i) / kGridRate_hz);
+    }
+    if (band > 0) {
+      out.gyro_deviation_sd = estimate_.deviation_sd(band, 0);
+      out.accel_deviation_sd = estimate_.deviation_sd(band, 1);
+    }
+    return out;
+  }
+
+  const ImuRecord& reference_;
+  const ImuRecord& study_;
+  double reference_axis_sd_rad_;
+  PriorScales scales_;
+  std::vector<double> instants_;
+  double middle_s_ = 0.0;
+  Problem problem_;
+  Eigen::RowVectorXd reference_mean_;
+  Eigen::RowVectorXd study_mean_;
+  Estimate estimate_;
+  NoiseBands noise_;
+  NormalEquations equations_;
+  Covariance covariance_;
+};
+
+}  // namespace
+
+double BatchMounting::sd(Parameter first, Eigen::Index component) const {
+  return std::sqrt(covariance(first + component, first + component));
+}
+
+Result<BatchMounting> estimate_mounting(const ImuRecord& reference, const ImuRecord& study,
+                                        const BatchOptions& options) {
+  const auto start = find_start(reference, study, options.search_s);
+  if (!start) return tl::unexpected<Error>(start.error());
+  return Batch(reference, study, options).run(*start);
+}
+
+}  // namespace imuscope::batch

@@ -1,0 +1,61 @@
+#pragma once
+
+/// Mounting, clock and imperfections of one S-IMU from a whole drive at once, with the true motion unknown:
+/// both IMUs measure it, so that noise of the reference is no error in the variables. The noise is learned
+/// from the residuals. No filter, no GNSS, no noise figure, no tuning. EQUATIONS.md.
+///
+/// Soft world: allocates. Deterministic: the same records give the same bits. Reentrant.
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "base/result.h"
+#include "batch/imu_record.h"
+#include "batch/sensor_model.h"
+
+namespace imuscope::batch {
+
+struct BatchOptions {
+  SensorClass sensor;
+  double search_s = 3.0;  ///< time offsets from -search_s to +search_s are tried
+};
+
+/// One band of frequency: noise that is left, and how far the pair is from a rigid body there.
+struct BandReport {
+  double from_hz = 0.0;
+  double to_hz = 0.0;
+  Eigen::Vector3d gyro_density;    ///< of the residuals, rad/s/sqrt(Hz), one-sided, per axis of s
+  Eigen::Vector3d accel_density;   ///< m/s^2/sqrt(Hz)
+  double gyro_deviation_sd = 0.0;  ///< of the transfer from R to S, relative; 0.01 is half a degree
+  double accel_deviation_sd = 0.0;
+};
+
+/// The result. (psi, r) of `covariance` as everywhere: psi in b, C = C^ Exp(-psi).
+struct BatchMounting {
+  SensorState sensor;  ///< biases are those of the middle of the record
+  Eigen::Matrix<double, kParameters, kParameters>
+      covariance;  ///< of SensorState's parameters, published form
+  double rate_correlation = 0.0;
+  double middle_s = 0.0;  ///< instant that t_d belongs to, on the records' scale
+  double used_s = 0.0;    ///< time inside windows
+  std::size_t windows = 0;
+  double degrees_of_freedom = 0.0;  ///< of the sd, for Student's t
+  /// Largest sd of a component of (psi, r) by its scatter over time, by the sd that the noise alone would
+  /// give.
+  double inconsistency = 1.0;
+  bool one_chip = false;  ///< the accelerometers were found to be in one place
+  int iterations = 0;
+  bool settled = false;
+  std::vector<BandReport> bands;
+
+  [[nodiscard]] double sd(Parameter first, Eigen::Index component = 0) const;
+};
+
+/// @param reference  R-IMU, axes b
+/// @param study      S-IMU, axes s
+/// Errors: those of find_start(); a record without one window free of gaps.
+[[nodiscard]] Result<BatchMounting> estimate_mounting(const ImuRecord& reference, const ImuRecord& study,
+                                                      const BatchOptions& options = {});
+
+}  // namespace imuscope::batch

@@ -1,0 +1,50 @@
+#pragma once
+
+/// What is left when the motion is explained: its power by band of frequency, axis and window, learned from
+/// the residuals themselves, so that nobody has to know a noise figure (B-10, B-11).
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "batch/spectra.h"
+
+namespace imuscope::batch {
+
+/// Bands of a plan's frequencies: single frequencies at first, then a quarter wider each.
+class Bands {
+ public:
+  Bands() = default;
+  explicit Bands(Eigen::Index n_frequencies);
+
+  [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(edges_.size()) - 1; }
+  [[nodiscard]] Eigen::Index first(Eigen::Index band) const { return edges_[static_cast<std::size_t>(band)]; }
+  [[nodiscard]] Eigen::Index end(Eigen::Index band) const {
+    return edges_[static_cast<std::size_t>(band) + 1];
+  }
+  [[nodiscard]] Eigen::Index width(Eigen::Index band) const { return end(band) - first(band); }
+
+ private:
+  std::vector<Eigen::Index> edges_{0};
+};
+
+/// Residual power: of the whole record by band, and of each window about it.
+class NoiseBands {
+ public:
+  NoiseBands() = default;
+  /// @param residuals  rows as in Spectra: window by window, a frequency a row; six columns, gyro then accel
+  NoiseBands(const Bands& bands, Eigen::Index n_windows, Eigen::Index n_frequencies,
+             const Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 6, Eigen::RowMajor>& residuals);
+
+  /// Power of axis 0 to 5 in a band over the record; rad^2/s^2, m^2/s^4 a frequency.
+  [[nodiscard]] double power(Eigen::Index band, Eigen::Index axis) const { return power_(band, axis); }
+  /// Of one window, drawn towards the record's: a window with more of it counts less.
+  [[nodiscard]] double window_power(Eigen::Index window, Eigen::Index band, Eigen::Index axis) const {
+    return window_power_(window * power_.rows() + band, axis);
+  }
+
+ private:
+  Eigen::Matrix<double, Eigen::Dynamic, 6> power_;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> window_power_;
+};
+
+}  // namespace imuscope::batch

@@ -1,0 +1,72 @@
+#pragma once
+
+/// One step of the batch estimate: residuals with the true motion unknown, their derivatives, and the normal
+/// equations, whitened by the noise that was learned. B-6 to B-15 in EQUATIONS.md.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "batch/noise_bands.h"
+#include "batch/sensor_model.h"
+#include "batch/spectra.h"
+
+namespace imuscope::batch {
+
+/// Deviations of a band from a rigid body: two 3 x 3 matrices, gyro and accelerometer, row-major.
+inline constexpr Eigen::Index kDeviations = 18;
+using DeviationVector = Eigen::Matrix<double, kDeviations, 1>;
+using Residuals = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 6, Eigen::RowMajor>;
+
+/// Columns of the reference's spectra.
+enum ReferenceColumn : Eigen::Index {
+  kOmega = 0,
+  kForce = 3,
+  kOmegaDot = 6,
+  kProducts = 9,  ///< omega_i omega_j: xx, yy, zz, xy, xz, yz
+  kReferenceColumns = 15,
+};
+
+/// Everything one step is made from. Spectra of the reference less its means; of the S-IMU likewise.
+struct Problem {
+  WindowPlan plan;
+  Bands bands;
+  Spectra reference;              ///< kReferenceColumns
+  Eigen::VectorXcd constant;      ///< window_spectrum()
+  Eigen::VectorXd from_middle_s;  ///< of each window's middle, from the record's
+};
+
+/// The estimate of everything: sensor, and each band's deviation with the sd that such deviations have there.
+struct Estimate {
+  SensorState sensor;
+  std::vector<DeviationVector> deviation;  ///< by band
+  Eigen::MatrixX2d deviation_sd;           ///< by band: gyro, accelerometer
+};
+
+/// Residuals of all windows and frequencies (B-7, B-8).
+[[nodiscard]] Residuals residuals(const Problem& problem, const Spectra& study, const Estimate& estimate);
+
+/// Normal equations of the sensor's parameters; the bands' deviations are eliminated (B-14).
+struct NormalEquations {
+  Eigen::Matrix<double, kParameters, kParameters> information;
+  /// What the reference's noise in the derivatives adds to `information` without being any (B-13).
+  Eigen::Matrix<double, kParameters, kParameters> of_noise;
+  ParameterVector gradient;
+  Eigen::Matrix<double, Eigen::Dynamic, kParameters> window_scores;  ///< a row a window
+  /// By band, for a correction d of the parameters: deviation <- deviation + own - coupling' d.
+  struct Elimination {
+    DeviationVector own = DeviationVector::Zero();
+    Eigen::Matrix<double, kParameters, kDeviations> coupling =
+        Eigen::Matrix<double, kParameters, kDeviations>::Zero();
+    DeviationVector variance = DeviationVector::Zero();  ///< of the deviation, the parameters known
+  };
+  std::vector<Elimination> bands;
+};
+
+/// @param reference_share  share of the residual noise that is the reference's
+/// @param corrected        whether the motion in the derivatives is the estimated one (B-12)
+[[nodiscard]] NormalEquations normal_equations(const Problem& problem, const Spectra& study,
+                                               const Residuals& residual, const Estimate& estimate,
+                                               const NoiseBands& noise, double reference_share,
+                                               bool corrected);
+
+}  // namespace imuscope::batch

@@ -1,0 +1,90 @@
+#include "batch/sensor_model.h"
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "navigation/so3.h"
+
+namespace imuscope::batch {
+
+namespace {
+
+using Row33 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// Row and column of each of the six parameters of a lower triangle.
+constexpr std::array<std::array<Eigen::Index, 2>, 6> kTriangle{
+    {{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 0}, {2, 1}}};
+
+Eigen::Matrix3d shape(const ParameterVector& x, Eigen::Index first) {
+  Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
+  for (Eigen::Index j = 0; j < 6; ++j)
+    m(kTriangle[static_cast<std::size_t>(j)][0], kTriangle[static_cast<std::size_t>(j)][1]) += x[first + j];
+  return m;
+}
+
+}  // namespace
+
+Eigen::Matrix3d shape_derivative(Eigen::Index j) {
+  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+  m(kTriangle[static_cast<std::size_t>(j)][0], kTriangle[static_cast<std::size_t>(j)][1]) = 1.0;
+  return m;
+}
+
+Eigen::Vector3d place_basis(Eigen::Index axis, Eigen::Index j) {
+  // Two patterns over the three accelerometers that sum to zero, for each direction.
+  constexpr std::array<std::array<double, 3>, 2> kPatterns{
+      {{0.7071067811865476, -0.7071067811865476, 0.0},
+       {0.408248290463863, 0.408248290463863, -0.816496580927726}}};
+  return kPatterns[static_cast<std::size_t>(j / 3)][static_cast<std::size_t>(axis)] *
+         Eigen::Vector3d::Unit(j % 3);
+}
+
+Eigen::Matrix3d SensorState::gyro_shape() const { return shape(x, kGyroShape); }
+Eigen::Matrix3d SensorState::accel_shape() const { return shape(x, kAccelShape); }
+Eigen::Matrix3d SensorState::C_s_accel() const { return exp_so3(-x.segment<3>(kAlpha)); }
+Eigen::Matrix3d SensorState::C_b_accel() const { return accel_shape() * C_s_accel() * C_b_s; }
+Eigen::Matrix3d SensorState::g_sensitivity() const {
+  return Row33(Eigen::Map<const Row33>(x.data() + kGSensitivity));
+}
+Eigen::Matrix3d SensorState::flexure() const { return Row33(Eigen::Map<const Row33>(x.data() + kFlexure)); }
+
+Eigen::Vector3d SensorState::place_s_m(Eigen::Index axis) const {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();
+  for (Eigen::Index j = 0; j < 6; ++j) place += x[kPlaces + j] * place_basis(axis, j);
+  return place;
+}
+
+void SensorState::add(const ParameterVector& correction) {
+  C_b_s = C_b_s * exp_so3(-correction.segment<3>(kPsi));
+  // A product of many rotations drifts from one.
+  C_b_s = Eigen::Quaterniond(C_b_s).normalized().toRotationMatrix();
+  // alpha is turned as a rotation, too, so that large ones stay exact.
+  const Eigen::Matrix3d turned = exp_so3(-correction.segment<3>(kAlpha)) * C_s_accel();
+  x += correction;
+  x.segment<3>(kPsi).setZero();
+  x.segment<3>(kAlpha) = -log_so3(turned);
+}
+
+ParameterVector prior_sd(const SensorClass& sensor) {
+  ParameterVector sd;
+  sd.segment<3>(kPsi).setConstant(std::numeric_limits<double>::infinity());
+  sd.segment<3>(kLeverArm).setConstant(sensor.lever_arm_sd_m);
+  sd[kTimeOffset] = std::numeric_limits<double>::infinity();
+  sd[kClockRate] = sensor.clock_rate_sd;
+  sd.segment<3>(kGyroBias).setConstant(sensor.gyro_bias_sd_radps);
+  sd.segment<3>(kAccelBias).setConstant(sensor.accel_bias_sd_mps2);
+  sd.segment<3>(kGyroShape).setConstant(sensor.gyro_scale_sd);
+  sd.segment<3>(kGyroShape + 3).setConstant(sensor.axis_sd_rad);
+  sd.segment<3>(kAlpha).setConstant(sensor.triad_sd_rad);
+  sd.segment<3>(kAccelShape).setConstant(sensor.accel_scale_sd);
+  sd.segment<3>(kAccelShape + 3).setConstant(sensor.axis_sd_rad);
+  sd[kAccelDelay] = sensor.accel_delay_sd_s;
+  sd.segment<6>(kPlaces).setConstant(sensor.place_sd_m);
+  sd.segment<9>(kGSensitivity).setConstant(sensor.g_sensitivity_sd);
+  sd.segment<9>(kFlexure).setConstant(sensor.flexure_sd);
+  return sd;
+}
+
+}  // namespace imuscope::batch

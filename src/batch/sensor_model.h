@@ -1,0 +1,91 @@
+#pragma once
+
+/// One S-IMU as the batch estimate knows it: mounting, clock, and what data sheets allow its axes, places and
+/// delays to be. B-4 to B-9 in EQUATIONS.md.
+///
+/// The gyro triad's frame: its x axis is that of the x gyro, and the y gyro lies in its x-y plane, so that
+/// the gyro matrix is lower triangular, as kalibr has it. C_b_s takes b to this frame.
+
+#include <Eigen/Core>
+
+namespace imuscope::batch {
+
+/// Where each quantity stands in the vector of parameters.
+enum Parameter : Eigen::Index {
+  kPsi = 0,            ///< 3: boresight, rotation vector in b, C = C^ Exp(-psi)
+  kLeverArm = 3,       ///< 3: r_bs_b, to the middle of the three accelerometers, m
+  kTimeOffset = 6,     ///< z_S(t) shows the motion at t + t_d; at the middle of the record, s
+  kClockRate = 7,      ///< growth of t_d, s/s
+  kGyroBias = 8,       ///< 3
+  kAccelBias = 11,     ///< 3
+  kGyroShape = 14,     ///< 6: scale x, y, z; yx, zx, zy of the lower triangle
+  kAlpha = 20,         ///< 3: accelerometer triad against the gyro triad, rotation vector in s
+  kAccelShape = 23,    ///< 6: as kGyroShape
+  kAccelDelay = 29,    ///< of the accelerometers against the gyros, on top of t_d, s
+  kPlaces = 30,        ///< 6: where the three accelerometers are, about their middle, m
+  kGSensitivity = 36,  ///< 9: row-major, rad/s per m/s^2
+  kFlexure = 45,       ///< 9: row-major; what the body between the IMUs gives way to, at kFlexure_hz
+  kParameters = 54,
+};
+
+/// Flexure grows with the square of the frequency below the body's resonances; this is where it is stated.
+inline constexpr double kFlexure_hz = 5.0;
+
+using ParameterVector = Eigen::Matrix<double, kParameters, 1>;
+
+/// What is believed of a sensor before the drive: sd of each kind of imperfection, all of zero mean. The
+/// defaults are what data sheets of industrial MEMS allow (MTx: alignment 0.1 deg, scale below 1 %); where a
+/// drive shows more, more is taken (B-16).
+struct SensorClass {
+  double lever_arm_sd_m = 1.0;
+  double clock_rate_sd = 20e-6;  ///< two quartzes
+  double gyro_bias_sd_radps = 0.05;
+  double accel_bias_sd_mps2 = 0.5;
+  double gyro_scale_sd = 0.01;
+  double accel_scale_sd = 0.01;
+  double axis_sd_rad = 1.75e-3;   ///< non-orthogonality, 0.1 deg
+  double triad_sd_rad = 1.75e-3;  ///< gyro against accelerometer triad, 0.1 deg
+  double accel_delay_sd_s = 1e-3;
+  double place_sd_m = 0.012;           ///< three chips; 2 cm apart
+  double one_chip_place_sd_m = 0.001;  ///< all three on one chip
+  double g_sensitivity_sd = 8.9e-5;    ///< 0.05 deg/s per g
+  double flexure_sd = 0.003;
+  /// What the reference's own axes may be off by, per element: no drive shows it, as only the two together
+  /// are seen, so that it stays in the sd of the boresight (B-21). 300 ppm, shared by both sides of the
+  /// diagonal.
+  double reference_axis_sd_rad = 2e-4;
+};
+
+/// The estimate as it stands.
+struct SensorState {
+  Eigen::Matrix3d C_b_s = Eigen::Matrix3d::Identity();
+  ParameterVector x = ParameterVector::Zero();  ///< with psi always zero: C_b_s holds it
+
+  [[nodiscard]] Eigen::Matrix3d gyro_shape() const;  ///< I + lower triangle
+  [[nodiscard]] Eigen::Matrix3d accel_shape() const;
+  [[nodiscard]] Eigen::Matrix3d C_b_gyro() const { return gyro_shape() * C_b_s; }  ///< B-4
+  [[nodiscard]] Eigen::Matrix3d C_b_accel() const;                                 ///< B-5
+  [[nodiscard]] Eigen::Matrix3d C_s_accel() const;  ///< Exp(-alpha): rotation of the accelerometer triad
+  [[nodiscard]] Eigen::Vector3d lever_arm_b_m() const { return x.segment<3>(kLeverArm); }
+  /// Place of one accelerometer about the middle of the three, in s, m.
+  [[nodiscard]] Eigen::Vector3d place_s_m(Eigen::Index axis) const;
+  [[nodiscard]] Eigen::Matrix3d g_sensitivity() const;
+  [[nodiscard]] Eigen::Matrix3d flexure() const;
+  [[nodiscard]] double time_offset_s(double seconds_from_middle) const {
+    return x[kTimeOffset] + x[kClockRate] * seconds_from_middle;
+  }
+  /// Adds a correction; psi turns C_b_s.
+  void add(const ParameterVector& correction);
+};
+
+/// Derivative of a triad's lower-triangular matrix in its parameter j, 0 to 5.
+[[nodiscard]] Eigen::Matrix3d shape_derivative(Eigen::Index j);
+
+/// Column j of kPlaces: place of accelerometer `axis`, in s. The six columns are orthonormal, and each leaves
+/// the middle of the three where it is.
+[[nodiscard]] Eigen::Vector3d place_basis(Eigen::Index axis, Eigen::Index j);
+
+/// sd of each parameter before the drive; infinite for psi and t_d, which the start gives.
+[[nodiscard]] ParameterVector prior_sd(const SensorClass& sensor);
+
+}  // namespace imuscope::batch
