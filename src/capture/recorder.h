@@ -69,8 +69,8 @@ class Recorder {
   /// Adds a published message, so that the capture shows the run in lcm-logplayer and lcm-spy, too. A replay
   /// passes over it. Any thread of the soft world. A message that finds too many waiting is counted as lost.
   void record_message(std::string_view channel, std::int64_t utime, std::span<const std::uint8_t> message);
-  /// The same for a message of somebody else's that was heard at `heard`: stamped as the capture's reader maps
-  /// times back, whatever the PC's wall clock was set to meanwhile.
+  /// The same for a message of somebody else's that was heard at `heard`: stamped as the capture's reader
+  /// maps times back, whatever the PC's wall clock was set to meanwhile.
   void record_heard(std::string_view channel, HostTime heard, std::span<const std::uint8_t> message);
 
   /// Records what is still in the rings, completes the file, ends the thread. Call after the producers ended.

@@ -238,9 +238,9 @@ int main(int argc, char** argv) {
       return 1;
     }
     if (!has_estimate(found->study.status)) {
-        fmt::print(stderr, "{}: no mounting was found\n", known.name);
-        return 1;
-      }
+      fmt::print(stderr, "{}: no mounting was found\n", known.name);
+      return 1;
+    }
     const Comparison comparison = compare(known, *found);
     if (json) {
       rows.push_back(to_json(known, *found, comparison));
