@@ -578,11 +578,19 @@ TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
   test::run(drive, estimator, 70.0);
   ASSERT_EQ(estimator.counters().epochs_lost, 0U);
   const std::uint64_t used_before = estimator.study(0).counters.used;
-  // Within what is held of the reference, but more samples than one tick can show.
+  // Within what is held of the reference, but more samples than one tick can show: S-IMUs of 500 Hz.
   std::vector<Sample> samples;
   while (drive.time_s() < 72.4) {
     samples = drive.next();
-    for (const Sample& sample : samples) estimator.add(sample);
+    for (const Sample& sample : samples) {
+      estimator.add(sample);
+      if (sample.kind != SampleKind::kImu || sample.device == config.reference.device) continue;
+      for (int i = 1; i < 5; ++i) {
+        Sample between = sample;
+        between.time += i * std::chrono::milliseconds(2);
+        estimator.add(between);
+      }
+    }
   }
   estimator.advance(samples.back().arrival);
   std::uint64_t used = 0;
