@@ -7,6 +7,7 @@
 #include <fstream>
 #include <future>
 #include <limits>
+#include <map>
 
 #include "firmware_sim/devices/can_encoder.h"
 #include "firmware_sim/imusim/capture_file.h"
@@ -172,6 +173,18 @@ std::string configuration_copy(const Configuration& configuration) {
       configuration.text);
 }
 
+/// What the configuration names, as the service keeps it in a capture: nothing beside a capture is read.
+std::string attached_files(const Configuration& configuration) {
+  std::map<std::string, std::string> files;
+  for (const PlayedDevice& device : configuration.devices) {
+    if (device.protocol == Protocol::kCanOdometry && !device.dbc.empty()) files[device.dbc] = wheel_dbc();
+  }
+  if (files.empty()) return {};
+  std::string table = "\n[attached]\n";
+  for (const auto& [name, text] : files) table += fmt::format("\"{}\" = '''\n{}'''\n", name, text);
+  return table;
+}
+
 CaptureHeader capture_header(const Configuration& configuration) {
   CaptureHeader header;
   header.run_name = configuration.run_name;
@@ -179,7 +192,7 @@ CaptureHeader capture_header(const Configuration& configuration) {
   header.utc_begin = configuration.utc_begin;
   header.host_begin_ns = kHostBegin_ns;
   header.channel_prefix = configuration.channel_prefix;
-  header.configuration = configuration_copy(configuration);
+  header.configuration = configuration_copy(configuration) + attached_files(configuration);
   for (const PlayedDevice& device : configuration.devices) {
     if (!device.shares_line()) header.devices.push_back(device.name);
   }

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::size_t kReadBytes = std::size_t{256} << 10U;
 constexpr std::size_t kSniffBytes = 64;
+constexpr std::size_t kMovesPerByte = 4;
 
 // Offsets of the fields of a record header.
 constexpr std::size_t kNumberAt = 4;
@@ -122,12 +123,14 @@ Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path, B
 bool EventLogReader::ensure(std::size_t n) {
   if (buffer_.size() - begin_ >= n) return true;
   if (!file_) return false;
-  // Moving what is left costs as much as it is long: it pays where as much was consumed, and every byte is
-  // moved once for each that was read.
-  if (begin_ >= buffer_.size() - begin_) {
+  // Moving what is left costs as much as it is long: where a quarter of it was consumed, every byte is moved
+  // four times at most, and little is held that is of no use any more.
+  if (kMovesPerByte * begin_ >= buffer_.size() - begin_) {
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(begin_));
     begin_ = 0;
   }
+  // A long record at its length, not at the next power of two; memory that is never filled costs nothing.
+  if (n > buffer_.size() - begin_ + kReadBytes) buffer_.reserve(begin_ + n + kReadBytes);
   // By blocks: a record may claim a length that the file does not have.
   while (buffer_.size() - begin_ < n && file_) {
     const std::size_t have = buffer_.size();
