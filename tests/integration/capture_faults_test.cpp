@@ -131,7 +131,7 @@ TEST_F(CaptureFaults, ASlowAFullAndAnAbsentDiskAreToldAndSurvivedAndAKillLosesLe
                 folder_ / "replay.log"),
             0)
       << read_text(folder_ / "replay.log");
-  EXPECT_THAT(read_text(folder_ / "replay.log"), HasSubstr("the replay is not exact from there on"));
+  EXPECT_THAT(read_text(folder_ / "replay.log"), HasSubstr("the replay is not exact from the first on"));
 }
 
 }  // namespace
