@@ -242,7 +242,7 @@ class BandSummer {
       mean_weight += scale.cwiseProduct(scale);
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
         const Eigen::Index i = k - problem_.bands.first(band);
-        fill(t, weights[static_cast<std::size_t>(i)], scale, w, k, rows.middleRows<12>(12 * i));
+        fill(t, weights[static_cast<std::size_t>(i)], scale, w, k, rows, 12 * i);
       }
       const auto J = rows.leftCols<kColumns>();
       sums.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
@@ -264,7 +264,7 @@ class BandSummer {
   }
 
   void fill(const Transfer& t, const Weight& weight, const Eigen::Matrix<double, 6, 1>& scale, Eigen::Index w,
-            Eigen::Index k, Eigen::Ref<Rows> rows) {
+            Eigen::Index k, Rows& rows, Eigen::Index first_row) {
     const double f_hz = problem_.plan.frequency_hz(k);
     Vector6c e = residual_.row(w * problem_.plan.n_frequencies + k).transpose();
     e = weight.factor.matrixL().solve((scale.asDiagonal() * e).eval());
@@ -277,7 +277,7 @@ class BandSummer {
     jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], f_hz, problem_.from_middle_s[w], J_);
     for (Eigen::Index i = 0; i < 6; ++i) J_.row(i) *= scale[i];
     weight.factor.matrixL().solveInPlace(J_);
-    put_rows(J_, e, f_hz, rows);
+    put_rows(J_, e, f_hz, rows.middleRows<12>(first_row));
   }
 
   /// B-13: derivatives that the motion's own uncertainty alone would have, all windows in one.
