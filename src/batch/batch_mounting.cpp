@@ -20,7 +20,7 @@ using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
 
 /// Above this neither filter of the sensors nor body is to be trusted, and vibration rules.
 constexpr double kTop_hz = 8.0;
-/// Share of the residual noise that is taken to be the reference's: nothing in a pair of records tells it.
+/// Largest share of the residual noise that is taken to be the reference's.
 constexpr double kReferenceShare = 0.5;
 /// A band's first sd of deviation, before it is learned.
 constexpr double kFirstDeviation = 0.01;
@@ -69,6 +69,26 @@ Eigen::RowVectorXd mean_of(const Grid& grid) {
   return n > 0.0 ? Eigen::RowVectorXd(sum / n) : sum;
 }
 
+/// B-10: power by band in the window in which the reference shows least.
+Eigen::MatrixX2d quietest_power(const Problem& problem) {
+  const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
+  Eigen::MatrixX2d least(problem.bands.size(), 2);
+  for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
+    const double values = 3.0 * static_cast<double>(problem.bands.width(band));
+    for (Eigen::Index w = 0; w < n_windows; ++w) {
+      double gyro = 0.0;
+      double accel = 0.0;
+      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k) {
+        gyro += problem.reference.row(w, k).segment<3>(kOmega).squaredNorm() / values;
+        accel += problem.reference.row(w, k).segment<3>(kForce).squaredNorm() / values;
+      }
+      least(band, 0) = w == 0 ? gyro : std::min(least(band, 0), gyro);
+      least(band, 1) = w == 0 ? accel : std::min(least(band, 1), accel);
+    }
+  }
+  return least;
+}
+
 /// The estimate of one pair of records.
 class Batch {
  public:
@@ -110,6 +130,7 @@ class Batch {
     reference_mean_ = mean_of(grid);
     study_mean_ = mean_of(study);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
+    problem_.quietest_power = quietest_power(problem_);
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
     problem_.from_middle_s.resize(n);
     for (Eigen::Index w = 0; w < n; ++w) {

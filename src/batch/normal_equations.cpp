@@ -162,12 +162,14 @@ struct Weight {
   Eigen::Matrix<double, 6, 1> power;
 };
 
-Weight weight_at(const Transfer& t, const NoiseBands& noise, Eigen::Index band, double frequency_hz,
-                 double share) {
+Weight weight_at(const Transfer& t, const NoiseBands& noise, const Problem& problem, Eigen::Index band,
+                 double frequency_hz, double share) {
   Weight weight;
   for (Eigen::Index i = 0; i < 6; ++i) weight.power[i] = noise.power(band, i);
-  weight.reference_power.head<3>().setConstant(share * weight.power.head<3>().mean());
-  weight.reference_power.tail<3>().setConstant(share * weight.power.tail<3>().mean());
+  weight.reference_power.head<3>().setConstant(
+      std::min(share * weight.power.head<3>().mean(), problem.quietest_power(band, 0)));
+  weight.reference_power.tail<3>().setConstant(
+      std::min(share * weight.power.tail<3>().mean(), problem.quietest_power(band, 1)));
   weight.of_reference.setZero();
   weight.of_reference.topLeftCorner<3, 3>() = t.gyro.cast<complex<double>>();
   weight.of_reference.bottomRightCorner<3, 3>() = t.accel.cast<complex<double>>();
@@ -232,7 +234,7 @@ class BandSummer {
     const auto n_windows = static_cast<Eigen::Index>(problem_.plan.starts.size());
     std::vector<Weight> weights;
     for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
-      weights.push_back(weight_at(t, noise_, band, problem_.plan.frequency_hz(k), share_));
+      weights.push_back(weight_at(t, noise_, problem_, band, problem_.plan.frequency_hz(k), share_));
     BandSums sums;
     sums.scores.resize(n_windows, kColumns);
     Rows rows(12 * problem_.bands.width(band), kColumns + 1);

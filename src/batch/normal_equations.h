@@ -33,6 +33,8 @@ struct Problem {
   Spectra reference;              ///< kReferenceColumns
   Eigen::VectorXcd constant;      ///< window_spectrum()
   Eigen::VectorXd from_middle_s;  ///< of each window's middle, from the record's
+  /// By band: what the reference shows in its quietest window, gyro and accelerometer. Its noise is no more.
+  Eigen::MatrixX2d quietest_power;
 };
 
 /// The estimate of everything: sensor, and each band's deviation with the sd that such deviations have there.

@@ -28,6 +28,7 @@ struct Drawn {
     problem.bands = Bands(problem.plan.n_frequencies);
     problem.constant = window_spectrum(problem.plan);
     problem.from_middle_s = Eigen::Vector2d(-2.0, 3.0);
+    problem.quietest_power.setConstant(problem.bands.size(), 2, 1e9);
     const auto draw = [&](Eigen::Index columns, double size) {
       Eigen::MatrixXd series(384, columns);
       for (Eigen::Index i = 0; i < series.size(); ++i) series.data()[i] = size * normal(random);
