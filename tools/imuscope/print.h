@@ -9,7 +9,8 @@
 
 namespace imuscope::cli {
 
-/// The text without what a terminal would act upon (base/text.h, printable()), but for the ends of its lines and tabs.
+/// The text without what a terminal would act upon (base/text.h, printable()), but for the ends of its lines
+/// and tabs.
 [[nodiscard]] std::string for_terminal(std::string_view text);
 
 /// Writes for_terminal() to standard output; nothing else in these commands writes there.
