@@ -25,6 +25,10 @@ constexpr double kReferenceShare = 0.5;
 /// A band's first sd of deviation, before it is learned.
 constexpr double kFirstDeviation = 0.01;
 constexpr double kLeastDeviation = 1e-5;
+/// Rounds of learning the deviations' sizes in each step.
+constexpr int kLearningRounds = 10;
+/// Deviations that a drive must tell at least, for their size to be learned from it.
+constexpr double kLeastTold = 1e-3;
 /// Bands to either side that a band's sd of deviation is learned with: nine elements alone tell it too badly,
 /// and a band that came out quiet by chance would rule all others.
 constexpr Eigen::Index kNeighbours = 2;
@@ -38,7 +42,7 @@ constexpr double kMostNoise = 0.9;
 /// Windows overlap by half, so that neighbours share information: so many of them are one that stands alone.
 constexpr double kWindowsPerIndependent = 1.5;
 /// Windows whose scores are taken to be correlated, beyond the overlap: drifts outlast a window.
-constexpr Eigen::Index kLags = 2;
+constexpr Eigen::Index kLags = 4;
 /// Weight, in windows, of the covariance that the noise gives against that of the scatter over time.
 constexpr double kNoiseWeight = 20.0;
 
@@ -69,34 +73,43 @@ Eigen::RowVectorXd mean_of(const Grid& grid) {
   return n > 0.0 ? Eigen::RowVectorXd(sum / n) : sum;
 }
 
-/// B-10: power by band in the window in which the reference shows least.
-Eigen::MatrixX2d quietest_power(const Problem& problem) {
+/// What the smallest of `count` chi-squared numbers of `dof` degrees of freedom is to be expected to have of
+/// their mean (Wilson and Hilferty's cube).
+double least_share(double dof, double count) {
+  constexpr double kLeastShare = 0.02;
+  const double spread = 2.0 / (9.0 * dof);
+  return std::max(kLeastShare, std::pow(1.0 - spread - std::sqrt(2.0 * std::log(count) * spread), 3));
+}
+
+/// B-10: power by band in the window in which the reference shows least, which is less than its noise's mean.
+void set_reference_power(Problem& problem) {
   const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
-  Eigen::MatrixX2d least(problem.bands.size(), 2);
+  Eigen::MatrixX2d& least = problem.quietest_power;
+  least.resize(problem.bands.size(), 2);
+  problem.mean_gyro_power.setZero(problem.bands.size());
   for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
     const double values = 3.0 * static_cast<double>(problem.bands.width(band));
     for (Eigen::Index w = 0; w < n_windows; ++w) {
       double gyro = 0.0;
       double accel = 0.0;
       for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k) {
-        gyro += problem.reference.row(w, k).segment<3>(kOmega).squaredNorm() / values;
-        accel += problem.reference.row(w, k).segment<3>(kForce).squaredNorm() / values;
+        gyro += kWindowsPerInstant * problem.reference.row(w, k).segment<3>(kOmega).squaredNorm() / values;
+        accel += kWindowsPerInstant * problem.reference.row(w, k).segment<3>(kForce).squaredNorm() / values;
       }
+      problem.mean_gyro_power[band] += gyro / static_cast<double>(n_windows);
       least(band, 0) = w == 0 ? gyro : std::min(least(band, 0), gyro);
       least(band, 1) = w == 0 ? accel : std::min(least(band, 1), accel);
     }
+    const double dof = 2.0 * values - (problem.bands.first(band) == 0 ? 3.0 : 0.0);
+    least.row(band) /= least_share(dof, static_cast<double>(n_windows));
   }
-  return least;
 }
 
 /// The estimate of one pair of records.
 class Batch {
  public:
   Batch(const ImuRecord& reference, const ImuRecord& study, const BatchOptions& options)
-      : reference_(reference),
-        study_(study),
-        reference_axis_sd_rad_(options.sensor.reference_axis_sd_rad),
-        scales_(options.sensor) {}
+      : reference_(reference), study_(study), class_(options.sensor), scales_(options.sensor) {}
 
   Result<BatchMounting> run(const Start& start) {
     if (auto set = set_up(start); !set) return tl::unexpected<Error>(set.error());
@@ -130,7 +143,7 @@ class Batch {
     reference_mean_ = mean_of(grid);
     study_mean_ = mean_of(study);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
-    problem_.quietest_power = quietest_power(problem_);
+    set_reference_power(problem_);
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
     problem_.from_middle_s.resize(n);
     for (Eigen::Index w = 0; w < n; ++w) {
@@ -140,6 +153,7 @@ class Batch {
     }
     estimate_.deviation.assign(static_cast<std::size_t>(problem_.bands.size()), DeviationVector::Zero());
     estimate_.deviation_sd.setConstant(problem_.bands.size(), 2, kFirstDeviation);
+    taken_.setZero(problem_.bands.size(), 2);
     return {};
   }
 
@@ -162,40 +176,68 @@ class Batch {
     const Spectra study = study_spectra();
     const Residuals residual = residuals(problem_, study, estimate_);
     noise_ = NoiseBands(problem_.bands, static_cast<Eigen::Index>(problem_.plan.starts.size()),
-                        problem_.plan.n_frequencies, residual);
-    equations_ = normal_equations(problem_, study, residual, estimate_, noise_, kReferenceShare, !rough);
+                        problem_.plan.n_frequencies, residual, taken_);
+    const auto sums = band_sums(problem_, study, residual, estimate_, noise_, kReferenceShare, !rough);
+    ParameterVector correction;
+    std::vector<DeviationVector> deviation;
+    for (int inner = 0; inner < (rough ? 1 : kLearningRounds); ++inner) {
+      correction = solve(sums, deviation);
+      if (!rough) learn(deviation);
+    }
+    estimate_.sensor.add(correction);
+    estimate_.deviation = std::move(deviation);
+    for (std::size_t band = 0; band < sums.size(); ++band)
+      taken_.row(static_cast<Eigen::Index>(band)) =
+          numbers_taken(sums[band], equations_.bands[band], covariance_).transpose();
+    if (!rough) scales_.learn(estimate_.sensor.x, covariance_);
+    const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
+    return !rough && share.head<kGyroBias>().maxCoeff() < kSettledShare;
+  }
+
+  /// The correction of the parameters and the deviations that go with it, with the sizes as they are known.
+  ParameterVector solve(const std::vector<BandSums>& sums, std::vector<DeviationVector>& deviation) {
+    equations_ = normal_equations(sums, estimate_);
     const ParameterVector precision = scales_.precision();
     Covariance information = equations_.information;
     information.diagonal() += precision;
     const ParameterVector gradient = equations_.gradient - precision.cwiseProduct(estimate_.sensor.x);
     const Eigen::LLT<Covariance> factor(information);
-    const ParameterVector correction = factor.solve(gradient);
     covariance_ = factor.solve(Covariance::Identity());
-    estimate_.sensor.add(correction);
-    for (std::size_t band = 1; band < estimate_.deviation.size(); ++band) {
+    const ParameterVector correction = factor.solve(gradient);
+    deviation = estimate_.deviation;
+    for (std::size_t band = 1; band < deviation.size(); ++band) {
       const auto& own = equations_.bands[band];
-      estimate_.deviation[band] += own.own - own.coupling.transpose() * correction;
+      deviation[band] += own.own - own.coupling.transpose() * correction;
     }
-    if (!rough) learn();
-    const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
-    return !rough && share.head<kGyroBias>().maxCoeff() < kSettledShare;
+    return correction;
   }
 
-  void learn() {
+  /// B-15: what a band's deviations add up to, over how many of them the drive tells.
+  void learn(const std::vector<DeviationVector>& deviation) {
     const Eigen::Index n = problem_.bands.size();
     Eigen::MatrixX2d square = Eigen::MatrixX2d::Zero(n, 2);
+    Eigen::MatrixX2d told = Eigen::MatrixX2d::Zero(n, 2);
     for (Eigen::Index band = 1; band < n; ++band) {
-      const auto i = static_cast<std::size_t>(band);
-      const DeviationVector all = estimate_.deviation[i].cwiseAbs2() + equations_.bands[i].variance;
-      square.row(band) << all.head<9>().mean(), all.tail<9>().mean();
+      const auto& own = equations_.bands[static_cast<std::size_t>(band)];
+      const DeviationVector variance =
+          own.covariance.diagonal() + (own.coupling.transpose() * covariance_ * own.coupling).diagonal();
+      const DeviationVector& d = deviation[static_cast<std::size_t>(band)];
+      for (Eigen::Index triad = 0; triad < 2; ++triad) {
+        const double prior = std::pow(estimate_.deviation_sd(band, triad), 2);
+        square(band, triad) = d.segment<9>(9 * triad).squaredNorm();
+        told(band, triad) = (1.0 - variance.segment<9>(9 * triad).array() / prior).max(0.0).sum();
+      }
     }
-    for (Eigen::Index band = 1; band < n; ++band) {  // B-15
+    for (Eigen::Index band = 1; band < n; ++band) {
       const Eigen::Index first = std::max<Eigen::Index>(1, band - kNeighbours);
       const Eigen::Index count = std::min(n - 1, band + kNeighbours) - first + 1;
-      estimate_.deviation_sd.row(band) =
-          square.middleRows(first, count).colwise().mean().cwiseSqrt().cwiseMax(kLeastDeviation);
+      for (Eigen::Index triad = 0; triad < 2; ++triad) {
+        const double of_all = told.col(triad).segment(first, count).sum();
+        const double sum = square.col(triad).segment(first, count).sum();
+        estimate_.deviation_sd(band, triad) =
+            std::max(kLeastDeviation, std::sqrt(sum / std::max(of_all, kLeastTold)));
+      }
     }
-    scales_.learn(estimate_.sensor.x, covariance_);
   }
 
   /// B-13: information without what the reference's noise only seems to add. Where that is nearly all of it,
@@ -232,7 +274,8 @@ class Batch {
     // B-20: correlations as the noise gives them, sd between both.
     ParameterVector growth;
     for (Eigen::Index i = 0; i < kParameters; ++i) {
-      const double ratio = std::max(0.0, by_scatter(i, i) / by_noise(i, i));
+      // Below one is what the fit itself takes from the windows that tell most: no reason to claim more.
+      const double ratio = std::max(1.0, by_scatter(i, i) / by_noise(i, i));
       growth[i] = std::sqrt((kNoiseWeight + independent * ratio) / (kNoiseWeight + independent));
       if (i < kTimeOffset) result.inconsistency = std::max(result.inconsistency, std::sqrt(ratio));
     }
@@ -240,8 +283,7 @@ class Batch {
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = estimate_.sensor;
     add_mean_motion(result);
-    result.covariance.diagonal().head<3>().array() +=
-        reference_axis_sd_rad_ * reference_axis_sd_rad_;  // B-21
+    result.covariance += of_reference_axes(class_, result.sensor);  // B-21
     result.middle_s = middle_s_;
     result.windows = problem_.plan.starts.size();
     const double half_s = 0.5 * static_cast<double>(problem_.plan.length) / kGridRate_hz;
@@ -285,7 +327,7 @@ class Batch {
 
   const ImuRecord& reference_;
   const ImuRecord& study_;
-  double reference_axis_sd_rad_;
+  SensorClass class_;
   PriorScales scales_;
   std::vector<double> instants_;
   double middle_s_ = 0.0;
@@ -293,6 +335,7 @@ class Batch {
   Eigen::RowVectorXd reference_mean_;
   Eigen::RowVectorXd study_mean_;
   Estimate estimate_;
+  Eigen::MatrixX2d taken_;  ///< B-11b, of the step before
   NoiseBands noise_;
   NormalEquations equations_;
   Covariance covariance_;

@@ -10,6 +10,10 @@
 
 namespace imuscope::batch {
 
+/// Windows that each instant is in: they overlap by half, and their squares add to one (B-3), so that the
+/// mean square of a transform is half of the power.
+inline constexpr double kWindowsPerInstant = 2.0;
+
 /// Bands of a plan's frequencies: single frequencies at first, then a quarter wider each.
 class Bands {
  public:
@@ -32,10 +36,13 @@ class NoiseBands {
  public:
   NoiseBands() = default;
   /// @param residuals  rows as in Spectra: window by window, a frequency a row; six columns, gyro then accel
+  /// @param taken      by band, how many numbers of gyros and accelerometers the parameters take (B-11b)
   NoiseBands(const Bands& bands, Eigen::Index n_windows, Eigen::Index n_frequencies,
-             const Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 6, Eigen::RowMajor>& residuals);
+             const Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 6, Eigen::RowMajor>& residuals,
+             const Eigen::MatrixX2d& taken);
 
-  /// Power of axis 0 to 5 in a band over the record; rad^2/s^2, m^2/s^4 a frequency.
+  /// Power of axis 0 to 5 in a band over the record: variance of white noise of that density; rad^2/s^2,
+  /// m^2/s^4.
   [[nodiscard]] double power(Eigen::Index band, Eigen::Index axis) const { return power_(band, axis); }
   /// Of one window, drawn towards the record's: a window with more of it counts less.
   [[nodiscard]] double window_power(Eigen::Index window, Eigen::Index band, Eigen::Index axis) const {

@@ -16,11 +16,17 @@ using Vector3c = Eigen::Vector3cd;
 using Matrix3c = Eigen::Matrix3cd;
 using Vector6c = Eigen::Matrix<complex<double>, 6, 1>;
 using Matrix6c = Eigen::Matrix<complex<double>, 6, 6>;
-constexpr Eigen::Index kColumns = kParameters + kDeviations;
+constexpr Eigen::Index kColumns = BandSums::kColumns;
 using Jacobian = Eigen::Matrix<complex<double>, 6, kColumns>;
 
 /// Weight that the reference's noise may have in the covariance of a residual, for it to stay one.
 constexpr double kLargestShare = 0.9;
+/// Share of what the reference's gyros show that may be their noise, for their derivative to be a motion.
+constexpr double kNoisyMotion = 0.2;
+/// Factor of a variance that leaves no weight.
+constexpr double kTellsNothing = 1e6;
+/// Share of the accelerometers' residual noise that is theirs at least, whatever the gyros' may make of it.
+constexpr double kLeastLeftToAccels = 0.05;
 
 /// The body's motion in one window at one frequency.
 struct Motion {
@@ -60,6 +66,7 @@ struct Transfer {
   Eigen::Vector3d arm_b_m;
   std::array<Eigen::Vector3d, 3> place_b_m;
   Eigen::Vector3d gyro_bias, accel_bias;
+  Eigen::Vector3d fade;
   double delay_s;
 
   Transfer(const SensorState& sensor, const DeviationVector& deviation)
@@ -72,6 +79,7 @@ struct Transfer {
         arm_b_m(sensor.lever_arm_b_m()),
         gyro_bias(sensor.x.segment<3>(kGyroBias)),
         accel_bias(sensor.x.segment<3>(kAccelBias)),
+        fade(sensor.x.segment<3>(kAccelFade)),
         delay_s(sensor.x[kAccelDelay]) {
     for (Eigen::Index i = 0; i < 3; ++i) {
       place_b_m[static_cast<std::size_t>(i)] = C.transpose() * sensor.place_s_m(i);
@@ -110,7 +118,9 @@ Vector6c predicted(const Transfer& t, const Motion& motion, const Vector3c& stud
                    double frequency_hz) {
   Vector6c y;
   y.head<3>() = gyros(t, motion, frequency_hz) + t.g_sensitivity * study_f + constant * t.gyro_bias;
-  y.tail<3>() = accelerometers(t, motion) * (1.0 + derivative(frequency_hz) * t.delay_s) +
+  const Vector3c felt = accelerometers(t, motion);
+  y.tail<3>() = felt * (1.0 + derivative(frequency_hz) * t.delay_s) +
+                flexure_gain(frequency_hz) * t.fade.cast<complex<double>>().cwiseProduct(felt) +
                 t.accel_deviation * (t.C * motion.force_at(t.arm_b_m)) + constant * t.accel_bias;
   return y;
 }
@@ -128,7 +138,8 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
   J.block<3, 3>(3, kPsi) = t.accel * skew_c(force);
   J.block<3, 3>(3, kLeverArm) = t.accel * motion.arm;
   J.block<3, 1>(0, kTimeOffset) = derivative(frequency_hz) * gyros(t, motion, frequency_hz);
-  J.block<3, 1>(3, kTimeOffset) = derivative(frequency_hz) * accelerometers(t, motion);
+  const Vector3c felt = accelerometers(t, motion);
+  J.block<3, 1>(3, kTimeOffset) = derivative(frequency_hz) * felt;
   J.col(kClockRate) = from_middle_s * J.col(kTimeOffset);
   J.block<3, 1>(3, kAccelDelay) = J.block<3, 1>(3, kTimeOffset);
   J.block<3, 3>(3, kAlpha) = accel_shape * skew_c(force_a);
@@ -146,6 +157,7 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
   for (Eigen::Index i = 0; i < 3; ++i) {
     J(i, kGyroBias + i) = constant;
     J(3 + i, kAccelBias + i) = constant;
+    J(3 + i, kAccelFade + i) = flex * felt[i];
     J.block<1, 3>(i, kGSensitivity + 3 * i) = study_f.transpose();
     J.block<1, 3>(i, kFlexure + 3 * i) = flex * omega_s.transpose();
     J.block<1, 3>(i, kParameters + 3 * i) = omega_s.transpose();
@@ -166,10 +178,14 @@ Weight weight_at(const Transfer& t, const NoiseBands& noise, const Problem& prob
                  double frequency_hz, double share) {
   Weight weight;
   for (Eigen::Index i = 0; i < 6; ++i) weight.power[i] = noise.power(band, i);
-  weight.reference_power.head<3>().setConstant(
-      std::min(share * weight.power.head<3>().mean(), problem.quietest_power(band, 0)));
-  weight.reference_power.tail<3>().setConstant(
-      std::min(share * weight.power.tail<3>().mean(), problem.quietest_power(band, 1)));
+  const double of_gyros = std::min(share * weight.power.head<3>().mean(), problem.quietest_power(band, 0));
+  // What its gyros' noise makes of accelerations at the lever arm is not its accelerometers'.
+  const double omega = std::abs(derivative(frequency_hz));
+  const double at_arm = omega * omega * (t.accel * skew(t.arm_b_m)).squaredNorm() / 3.0 * of_gyros;
+  const double accel_power = weight.power.tail<3>().mean();
+  const double left = std::max(accel_power - at_arm, kLeastLeftToAccels * accel_power);
+  weight.reference_power.head<3>().setConstant(of_gyros);
+  weight.reference_power.tail<3>().setConstant(std::min(share * left, problem.quietest_power(band, 1)));
   weight.of_reference.setZero();
   weight.of_reference.topLeftCorner<3, 3>() = t.gyro.cast<complex<double>>();
   weight.of_reference.bottomRightCorner<3, 3>() = t.accel.cast<complex<double>>();
@@ -183,6 +199,8 @@ Weight weight_at(const Transfer& t, const NoiseBands& noise, const Problem& prob
     scale[i] = std::min(1.0, std::sqrt(kLargestShare * weight.power[i] / covariance(i, i).real()));
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   for (Eigen::Index i = 0; i < 6; ++i) covariance(i, i) = weight.power[i];
+  if (of_gyros > kNoisyMotion * problem.mean_gyro_power[band])
+    covariance.diagonal().tail<3>() *= kTellsNothing;
   weight.gain = gain * scale.cwiseProduct(scale).asDiagonal();
   weight.factor.compute(covariance);
   return weight;
@@ -210,13 +228,6 @@ void put_rows(const Jacobian& J, const Vector6c& e, double frequency_hz, Eigen::
   rows.col(kColumns).tail<6>() = weight * e.imag();
 }
 
-/// Sums of one band over all windows.
-struct BandSums {
-  Eigen::Matrix<double, kColumns, kColumns> information = Eigen::Matrix<double, kColumns, kColumns>::Zero();
-  Eigen::Matrix<double, kColumns, kColumns> of_noise = Eigen::Matrix<double, kColumns, kColumns>::Zero();
-  Eigen::Matrix<double, Eigen::Dynamic, kColumns> scores;
-};
-
 class BandSummer {
  public:
   BandSummer(const Problem& problem, const Spectra& study, const Residuals& residual,
@@ -238,6 +249,7 @@ class BandSummer {
     BandSums sums;
     sums.scores.resize(n_windows, kColumns);
     Rows rows(12 * problem_.bands.width(band), kColumns + 1);
+    Rows of_gyros(6 * problem_.bands.width(band), kColumns + 1);
     Eigen::Matrix<double, 6, 1> mean_weight = Eigen::Matrix<double, 6, 1>::Zero();
     for (Eigen::Index w = 0; w < n_windows; ++w) {
       const Eigen::Matrix<double, 6, 1> scale = window_scale(w, band, weights.front());
@@ -248,9 +260,13 @@ class BandSummer {
       }
       const auto J = rows.leftCols<kColumns>();
       sums.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
+      for (Eigen::Index i = 0; i < 2 * problem_.bands.width(band); ++i)
+        of_gyros.middleRows<3>(3 * i) = rows.middleRows<3>(6 * i);
+      sums.of_gyros.selfadjointView<Eigen::Lower>().rankUpdate(of_gyros.leftCols<kColumns>().transpose());
       sums.scores.row(w) = (J.transpose() * rows.col(kColumns)).transpose();
     }
     sums.information = sums.information.selfadjointView<Eigen::Lower>();
+    sums.of_gyros = sums.of_gyros.selfadjointView<Eigen::Lower>();
     if (corrected_) add_noise(t, weights, band, mean_weight.cwiseSqrt(), sums);
     return sums;
   }
@@ -292,6 +308,8 @@ class BandSummer {
       const Matrix6c W_inverse = weight.factor.solve(Matrix6c::Identity());
       Matrix6c motion_covariance = -weight.gain * W_inverse * weight.gain.adjoint();
       for (Eigen::Index i = 0; i < 6; ++i) motion_covariance(i, i) += weight.reference_power[i];
+      motion_covariance /=
+          kWindowsPerInstant;  // the transforms' mean square is that much smaller than the power
       const Eigen::LLT<Matrix6c> root(motion_covariance);
       if (root.info() != Eigen::Success) continue;
       const Matrix6c L = root.matrixL();
@@ -331,7 +349,7 @@ void eliminate(const BandSums& sums, const DeviationVector& deviation, double gy
       own.llt().solve(Eigen::Matrix<double, kDeviations, kDeviations>::Identity());
   const auto cross = sums.information.topRightCorner<kParameters, kDeviations>();
   elimination.coupling = cross * covariance;
-  elimination.variance = covariance.diagonal();
+  elimination.covariance = covariance;
   const DeviationVector gradient =
       sums.scores.rightCols<kDeviations>().colwise().sum().transpose() - precision.cwiseProduct(deviation);
   elimination.own = covariance * gradient;
@@ -369,27 +387,44 @@ Residuals residuals(const Problem& problem, const Spectra& study, const Estimate
   return all;
 }
 
-NormalEquations normal_equations(const Problem& problem, const Spectra& study, const Residuals& residual,
-                                 const Estimate& estimate, const NoiseBands& noise, double reference_share,
-                                 bool corrected) {
+std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study, const Residuals& residual,
+                                const Estimate& estimate, const NoiseBands& noise, double reference_share,
+                                bool corrected) {
+  BandSummer summer(problem, study, residual, estimate, noise, reference_share, corrected);
+  std::vector<BandSums> sums;
+  for (Eigen::Index band = 0; band < problem.bands.size(); ++band) sums.push_back(summer.sum(band));
+  return sums;
+}
+
+Eigen::Vector2d numbers_taken(const BandSums& sums, const NormalEquations::Elimination& elimination,
+                              const Eigen::Matrix<double, kParameters, kParameters>& covariance) {
+  Eigen::Matrix<double, kColumns, kColumns> joint;
+  joint.topLeftCorner<kParameters, kParameters>() = covariance;
+  joint.topRightCorner<kParameters, kDeviations>() = -covariance * elimination.coupling;
+  joint.bottomLeftCorner<kDeviations, kParameters>() =
+      joint.topRightCorner<kParameters, kDeviations>().transpose();
+  joint.bottomRightCorner<kDeviations, kDeviations>() =
+      elimination.covariance + elimination.coupling.transpose() * covariance * elimination.coupling;
+  const double gyros = sums.of_gyros.cwiseProduct(joint).sum();
+  return {gyros, sums.information.cwiseProduct(joint).sum() - gyros};
+}
+
+NormalEquations normal_equations(const std::vector<BandSums>& sums, const Estimate& estimate) {
   NormalEquations equations;
   equations.information.setZero();
   equations.of_noise.setZero();
   equations.gradient.setZero();
-  equations.window_scores.setZero(static_cast<Eigen::Index>(problem.plan.starts.size()), kParameters);
-  equations.bands.resize(static_cast<std::size_t>(problem.bands.size()));
-  BandSummer summer(problem, study, residual, estimate, noise, reference_share, corrected);
-  for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
-    const BandSums sums = summer.sum(band);
-    if (band == 0) {  // at zero frequency a deviation is a bias
-      equations.information += sums.information.topLeftCorner<kParameters, kParameters>();
-      equations.of_noise += sums.of_noise.topLeftCorner<kParameters, kParameters>();
-      equations.gradient += sums.scores.leftCols<kParameters>().colwise().sum().transpose();
-      equations.window_scores += sums.scores.leftCols<kParameters>();
-      continue;
-    }
-    eliminate(sums, estimate.deviation[static_cast<std::size_t>(band)], estimate.deviation_sd(band, 0),
-              estimate.deviation_sd(band, 1), equations, equations.bands[static_cast<std::size_t>(band)]);
+  equations.window_scores.setZero(sums.front().scores.rows(), kParameters);
+  equations.bands.resize(sums.size());
+  // At zero frequency a deviation is a bias.
+  equations.information += sums.front().information.topLeftCorner<kParameters, kParameters>();
+  equations.of_noise += sums.front().of_noise.topLeftCorner<kParameters, kParameters>();
+  equations.gradient += sums.front().scores.leftCols<kParameters>().colwise().sum().transpose();
+  equations.window_scores += sums.front().scores.leftCols<kParameters>();
+  for (std::size_t band = 1; band < sums.size(); ++band) {
+    const auto i = static_cast<Eigen::Index>(band);
+    eliminate(sums[band], estimate.deviation[band], estimate.deviation_sd(i, 0), estimate.deviation_sd(i, 1),
+              equations, equations.bands[band]);
   }
   return equations;
 }

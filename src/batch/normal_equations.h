@@ -35,6 +35,9 @@ struct Problem {
   Eigen::VectorXd from_middle_s;  ///< of each window's middle, from the record's
   /// By band: what the reference shows in its quietest window, gyro and accelerometer. Its noise is no more.
   Eigen::MatrixX2d quietest_power;
+  /// By band: what the reference's gyros show in the mean. Where most of it is their noise, accelerations at
+  /// the lever arm are not known, and forces tell nothing.
+  Eigen::VectorXd mean_gyro_power;
 };
 
 /// The estimate of everything: sensor, and each band's deviation with the sd that such deviations have there.
@@ -46,6 +49,23 @@ struct Estimate {
 
 /// Residuals of all windows and frequencies (B-7, B-8).
 [[nodiscard]] Residuals residuals(const Problem& problem, const Spectra& study, const Estimate& estimate);
+
+/// Sums of one band over all windows, of the sensor's parameters and then the band's deviation.
+struct BandSums {
+  static constexpr Eigen::Index kColumns = kParameters + kDeviations;
+  Eigen::Matrix<double, kColumns, kColumns> information = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+  Eigen::Matrix<double, kColumns, kColumns> of_gyros =
+      Eigen::Matrix<double, kColumns, kColumns>::Zero();  ///< their share
+  Eigen::Matrix<double, kColumns, kColumns> of_noise = Eigen::Matrix<double, kColumns, kColumns>::Zero();
+  Eigen::Matrix<double, Eigen::Dynamic, kColumns> scores;  ///< a row a window
+};
+
+/// @param reference_share  share of the residual noise that is the reference's
+/// @param corrected        whether the motion in the derivatives is the estimated one (B-12)
+[[nodiscard]] std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study,
+                                              const Residuals& residual, const Estimate& estimate,
+                                              const NoiseBands& noise, double reference_share,
+                                              bool corrected);
 
 /// Normal equations of the sensor's parameters; the bands' deviations are eliminated (B-14).
 struct NormalEquations {
@@ -59,16 +79,19 @@ struct NormalEquations {
     DeviationVector own = DeviationVector::Zero();
     Eigen::Matrix<double, kParameters, kDeviations> coupling =
         Eigen::Matrix<double, kParameters, kDeviations>::Zero();
-    DeviationVector variance = DeviationVector::Zero();  ///< of the deviation, the parameters known
+    /// Of the deviation, the parameters known.
+    Eigen::Matrix<double, kDeviations, kDeviations> covariance =
+        Eigen::Matrix<double, kDeviations, kDeviations>::Zero();
   };
   std::vector<Elimination> bands;
 };
 
-/// @param reference_share  share of the residual noise that is the reference's
-/// @param corrected        whether the motion in the derivatives is the estimated one (B-12)
-[[nodiscard]] NormalEquations normal_equations(const Problem& problem, const Spectra& study,
-                                               const Residuals& residual, const Estimate& estimate,
-                                               const NoiseBands& noise, double reference_share,
-                                               bool corrected);
+[[nodiscard]] NormalEquations normal_equations(const std::vector<BandSums>& sums, const Estimate& estimate);
+
+/// B-11b: how many of a band's numbers the parameters and its deviation take, gyros' and accelerometers'.
+/// @param covariance  of the parameters
+[[nodiscard]] Eigen::Vector2d numbers_taken(
+    const BandSums& sums, const NormalEquations::Elimination& elimination,
+    const Eigen::Matrix<double, kParameters, kParameters>& covariance);
 
 }  // namespace imuscope::batch

@@ -67,6 +67,53 @@ void SensorState::add(const ParameterVector& correction) {
   x.segment<3>(kAlpha) = -log_so3(turned);
 }
 
+namespace {
+
+/// How axes and scales of a triad in s move where the reference's triad is off by E (in s): (I - E) is split
+/// into a rotation and a lower triangle.
+struct AxisShift {
+  Eigen::Vector3d rotation;
+  Eigen::Matrix<double, 6, 1> shape;
+
+  explicit AxisShift(const Eigen::Matrix3d& E) : rotation(-E(1, 2), E(0, 2), -E(0, 1)) {
+    for (Eigen::Index j = 0; j < 6; ++j) {
+      const auto row = kTriangle[static_cast<std::size_t>(j)][0];
+      const auto column = kTriangle[static_cast<std::size_t>(j)][1];
+      shape[j] = row == column ? -E(row, row) : -E(row, column) - E(column, row);
+    }
+  }
+};
+
+}  // namespace
+
+Eigen::Matrix<double, kParameters, kParameters> of_reference_axes(const SensorClass& sensor,
+                                                                  const SensorState& state) {
+  Eigen::Matrix<double, kParameters, kParameters> covariance =
+      Eigen::Matrix<double, kParameters, kParameters>::Zero();
+  const Eigen::Matrix3d& C = state.C_b_s;
+  const auto add = [&](const Eigen::Matrix3d& of_gyros_b, const Eigen::Matrix3d& of_accels_b) {
+    const AxisShift gyro(C * of_gyros_b * C.transpose());
+    const AxisShift accel(C * of_accels_b * C.transpose());
+    ParameterVector shift = ParameterVector::Zero();
+    shift.segment<3>(kPsi) = C.transpose() * gyro.rotation;
+    shift.segment<6>(kGyroShape) = gyro.shape;
+    shift.segment<3>(kAlpha) = accel.rotation - gyro.rotation;
+    shift.segment<6>(kAccelShape) = accel.shape;
+    covariance += shift * shift.transpose();
+  };
+  const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      Eigen::Matrix3d E = none;
+      E(i, j) = i == j ? sensor.reference_scale_sd : sensor.reference_axis_sd_rad;
+      add(E, none);
+      add(none, E);
+    }
+    add(none, skew(sensor.reference_triad_sd_rad * Eigen::Vector3d::Unit(i)));
+  }
+  return covariance;
+}
+
 ParameterVector prior_sd(const SensorClass& sensor) {
   ParameterVector sd;
   sd.segment<3>(kPsi).setConstant(std::numeric_limits<double>::infinity());
@@ -84,6 +131,7 @@ ParameterVector prior_sd(const SensorClass& sensor) {
   sd.segment<6>(kPlaces).setConstant(sensor.place_sd_m);
   sd.segment<9>(kGSensitivity).setConstant(sensor.g_sensitivity_sd);
   sd.segment<9>(kFlexure).setConstant(sensor.flexure_sd);
+  sd.segment<3>(kAccelFade).setConstant(sensor.accel_fade_sd);
   return sd;
 }
 

@@ -25,10 +25,13 @@ enum Parameter : Eigen::Index {
   kPlaces = 30,        ///< 6: where the three accelerometers are, about their middle, m
   kGSensitivity = 36,  ///< 9: row-major, rad/s per m/s^2
   kFlexure = 45,       ///< 9: row-major; what the body between the IMUs gives way to, at kFlexure_hz
-  kParameters = 54,
+  kAccelFade =
+      54,  ///< 3: what each accelerometer shows more of forces at kFlexure_hz; its low-pass, its mount
+  kParameters = 57,
 };
 
-/// Flexure grows with the square of the frequency below the body's resonances; this is where it is stated.
+/// Flexure and fading grow with the square of the frequency below the body's resonances; this is where it is
+/// stated.
 inline constexpr double kFlexure_hz = 5.0;
 
 using ParameterVector = Eigen::Matrix<double, kParameters, 1>;
@@ -46,14 +49,17 @@ struct SensorClass {
   double axis_sd_rad = 1.75e-3;   ///< non-orthogonality, 0.1 deg
   double triad_sd_rad = 1.75e-3;  ///< gyro against accelerometer triad, 0.1 deg
   double accel_delay_sd_s = 1e-3;
-  double place_sd_m = 0.012;           ///< three chips; 2 cm apart
+  double place_sd_m = 0.02;            ///< three chips, each in each axis
   double one_chip_place_sd_m = 0.001;  ///< all three on one chip
   double g_sensitivity_sd = 8.9e-5;    ///< 0.05 deg/s per g
   double flexure_sd = 0.003;
-  /// What the reference's own axes may be off by, per element: no drive shows it, as only the two together
-  /// are seen, so that it stays in the sd of the boresight (B-21). 300 ppm, shared by both sides of the
-  /// diagonal.
+  double accel_fade_sd = 0.01;  ///< a low-pass of 35 Hz
+  /// What the reference's own axes may be off by: scale; each element off the diagonal; its accelerometer
+  /// triad against its gyro triad. No drive shows it, as only the two together are seen, so that it stays in
+  /// the sd of everything that is a direction or a scale (B-21).
+  double reference_scale_sd = 3e-4;
   double reference_axis_sd_rad = 2e-4;
+  double reference_triad_sd_rad = 3e-4;
 };
 
 /// The estimate as it stands.
@@ -84,6 +90,10 @@ struct SensorState {
 /// Column j of kPlaces: place of accelerometer `axis`, in s. The six columns are orthonormal, and each leaves
 /// the middle of the three where it is.
 [[nodiscard]] Eigen::Vector3d place_basis(Eigen::Index axis, Eigen::Index j);
+
+/// Covariance of the parameters from what the reference's own axes are off by (B-21).
+[[nodiscard]] Eigen::Matrix<double, kParameters, kParameters> of_reference_axes(const SensorClass& sensor,
+                                                                                const SensorState& state);
 
 /// sd of each parameter before the drive; infinite for psi and t_d, which the start gives.
 [[nodiscard]] ParameterVector prior_sd(const SensorClass& sensor);

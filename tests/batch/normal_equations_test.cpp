@@ -29,6 +29,7 @@ struct Drawn {
     problem.constant = window_spectrum(problem.plan);
     problem.from_middle_s = Eigen::Vector2d(-2.0, 3.0);
     problem.quietest_power.setConstant(problem.bands.size(), 2, 1e9);
+    problem.mean_gyro_power.setConstant(problem.bands.size(), 1e9);
     const auto draw = [&](Eigen::Index columns, double size) {
       Eigen::MatrixXd series(384, columns);
       for (Eigen::Index i = 0; i < series.size(); ++i) series.data()[i] = size * normal(random);
@@ -43,7 +44,15 @@ struct Drawn {
   }
 
   [[nodiscard]] NoiseBands noise() const {
-    return {problem.bands, 2, problem.plan.n_frequencies, residuals(problem, study, estimate)};
+    return {problem.bands, 2, problem.plan.n_frequencies, residuals(problem, study, estimate),
+            Eigen::MatrixX2d::Zero(problem.bands.size(), 2)};
+  }
+
+  [[nodiscard]] NormalEquations equations(const NoiseBands& noise, double reference_share,
+                                          bool corrected) const {
+    return normal_equations(band_sums(problem, study, residuals(problem, study, estimate), estimate, noise,
+                                      reference_share, corrected),
+                            estimate);
   }
 
   /// Weighted sum of squares; the noise stays what it was.
@@ -66,9 +75,7 @@ TEST(NormalEquations, GradientIsThatOfTheSumOfSquares) {
   Drawn drawn;
   const NoiseBands noise = drawn.noise();
   // Hardly any noise is the reference's: the weights then do not depend on the parameters.
-  const auto equations =
-      normal_equations(drawn.problem, drawn.study, residuals(drawn.problem, drawn.study, drawn.estimate),
-                       drawn.estimate, noise, 1e-12, false);
+  const auto equations = drawn.equations(noise, 1e-12, false);
   for (Eigen::Index i = 0; i < kParameters; ++i) {
     if (i == kTimeOffset || i == kClockRate) continue;
     constexpr double kStep = 1e-6;
@@ -84,13 +91,63 @@ TEST(NormalEquations, GradientIsThatOfTheSumOfSquares) {
   }
 }
 
+/// Windows overlap, and neighbouring frequencies of a window are correlated; all of it has to come out as if
+/// every instant had been counted once.
+TEST(NormalEquations, ScoresOfWhiteNoiseVaryAsTheInformationSays) {
+  constexpr Eigen::Index kInstants = 6'000;
+  constexpr double kRate_hz = 50.0;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  const auto white = [&](Eigen::Index columns) {
+    return Eigen::MatrixXd::NullaryExpr(kInstants, columns, [&] { return normal(random); }).eval();
+  };
+  // A vehicle's motion is slow.
+  const auto slow = [&](Eigen::Index columns) {
+    Eigen::MatrixXd series = white(columns);
+    for (Eigen::Index i = 1; i < kInstants; ++i) series.row(i) += 0.99 * series.row(i - 1);
+    return series;
+  };
+  Problem problem;
+  problem.plan = plan_windows(std::vector<char>(kInstants, 1), kRate_hz, 8.0);
+  problem.bands = Bands(problem.plan.n_frequencies);
+  problem.constant = window_spectrum(problem.plan);
+  problem.reference = Spectra(problem.plan, slow(kReferenceColumns));
+  const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
+  problem.from_middle_s.setLinSpaced(n_windows, -1.0, 1.0);
+  problem.quietest_power.setConstant(problem.bands.size(), 2, 1e-12);
+  problem.mean_gyro_power.setOnes(problem.bands.size());
+  Estimate estimate;
+  estimate.deviation.assign(static_cast<std::size_t>(problem.bands.size()), DeviationVector::Zero());
+  estimate.deviation_sd.setConstant(problem.bands.size(), 2, 1e-9);
+  const Eigen::MatrixX2d none = Eigen::MatrixX2d::Zero(problem.bands.size(), 2);
+  ParameterVector sum = ParameterVector::Zero();
+  constexpr int kDraws = 30;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    // What the S-IMU shows only enters through its g-sensitivity.
+    const Spectra study(problem.plan, slow(6));
+    Residuals noise(n_windows * problem.plan.n_frequencies, 6);
+    const Spectra drawn(problem.plan, white(6));
+    for (Eigen::Index w = 0; w < n_windows; ++w)
+      for (Eigen::Index k = 0; k < problem.plan.n_frequencies; ++k)
+        noise.row(w * problem.plan.n_frequencies + k) = drawn.row(w, k);
+    const NoiseBands bands(problem.bands, n_windows, problem.plan.n_frequencies, noise, none);
+    const auto equations =
+        normal_equations(band_sums(problem, study, noise, estimate, bands, 1e-12, false), estimate);
+    sum += equations.gradient.cwiseAbs2().cwiseQuotient(equations.information.diagonal());
+  }
+  const ParameterVector ratio = sum / kDraws;
+  // The ends of the record lie in one window instead of two and count half, so that a little less than one is
+  // right: twelve windows have two ends.
+  EXPECT_LT(ratio.mean(), 1.05);
+  EXPECT_GT(ratio.mean(), 0.7);
+}
+
 TEST(NormalEquations, ABandThatMayDeviateFreelyTellsNothingOfTheAxes) {
   Drawn drawn;
   const NoiseBands noise = drawn.noise();
-  const Residuals e = residuals(drawn.problem, drawn.study, drawn.estimate);
-  const auto rigid = normal_equations(drawn.problem, drawn.study, e, drawn.estimate, noise, 0.5, false);
+  const auto rigid = drawn.equations(noise, 0.5, false);
   drawn.estimate.deviation_sd.setConstant(1e3);
-  const auto loose = normal_equations(drawn.problem, drawn.study, e, drawn.estimate, noise, 0.5, false);
+  const auto loose = drawn.equations(noise, 0.5, false);
   // What is left is what zero frequency says.
   for (const Eigen::Index i : {Eigen::Index{kPsi}, Eigen::Index{kGyroShape}, Eigen::Index{kAlpha}})
     EXPECT_LT(loose.information(i, i), 0.5 * rigid.information(i, i)) << i;
@@ -99,11 +156,10 @@ TEST(NormalEquations, ABandThatMayDeviateFreelyTellsNothingOfTheAxes) {
 TEST(NormalEquations, NoiseOfTheReferenceIsNoInformation) {
   Drawn drawn;
   const NoiseBands noise = drawn.noise();
-  const Residuals e = residuals(drawn.problem, drawn.study, drawn.estimate);
-  const auto equations = normal_equations(drawn.problem, drawn.study, e, drawn.estimate, noise, 0.5, true);
+  const auto equations = drawn.equations(noise, 0.5, true);
   EXPECT_GT(equations.of_noise(kLeverArm, kLeverArm), 0.0);
   EXPECT_LT(equations.of_noise(kLeverArm, kLeverArm), equations.information(kLeverArm, kLeverArm));
-  const auto without = normal_equations(drawn.problem, drawn.study, e, drawn.estimate, noise, 1e-12, true);
+  const auto without = drawn.equations(noise, 1e-12, true);
   EXPECT_LT(without.of_noise(kLeverArm, kLeverArm), 1e-9 * without.information(kLeverArm, kLeverArm));
 }
 
