@@ -87,6 +87,11 @@ double on_interval_scale(const ParameterEstimate& p) {
   return p.name == "omega" || p.name == "alpha" ? 2.0 * log : log;
 }
 
+double from_interval_scale(const ParameterEstimate& p, double place) {
+  if (p.name == "theta" || p.name == "phi") return std::tanh(place);
+  return std::exp(p.name == "omega" || p.name == "alpha" ? 0.5 * place : place);
+}
+
 Comparison compare(const FitResult& first, const FitResult& second) {
   Comparison out;
   std::vector<Pair> testable;

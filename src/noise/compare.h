@@ -41,6 +41,8 @@ struct Comparison {
 
 /// A parameter on the scale of its interval and of FitResult::covariance.
 double on_interval_scale(const ParameterEstimate& parameter);
+/// As printed, what has the given place on that scale.
+double from_interval_scale(const ParameterEstimate& parameter, double place);
 
 /// The fits are of different stretches or sensors (independent). Parameters are matched by process and name.
 Comparison compare(const FitResult& first, const FitResult& second);

@@ -74,4 +74,13 @@ FitResult over_bounding(const FitResult& fit) {
   return out;
 }
 
+double largest_increase(const FitResult& fit, const FitResult& bound) {
+  double largest = 1.0;
+  for (std::size_t i = 0; i < fit.model.components.size(); ++i) {
+    const double own = fit.model.components[i].amplitude;
+    if (own > 0.0) largest = std::max(largest, bound.model.components[i].amplitude / own);
+  }
+  return largest;
+}
+
 }  // namespace imuscope::noise

@@ -11,4 +11,11 @@ namespace imuscope::noise {
 /// coefficients (wavelet_variance.h). Terms of amplitude zero stay out. The parameters carry no intervals.
 FitResult over_bounding(const FitResult& fit);
 
+/// An over-bounding model with an amplitude (a variance) larger than the fit's by more than this tells of a
+/// model that misses the data, not of noise.
+inline constexpr double kMostIncrease = 20.0;
+
+/// The largest ratio of an amplitude of over_bounding(fit) to the fit's own; 1 where nothing had to grow.
+double largest_increase(const FitResult& fit, const FitResult& bound);
+
 }  // namespace imuscope::noise

@@ -9,8 +9,14 @@
 /// - kf-gins: kf-gins.yaml `imunoise`, white noise and Gauss-Markov bias of each axis, one correlation time
 /// - state-space: JSON, the whole model of each axis as F, Q, H, R
 ///
-/// A form that holds fewer terms than the model gets the best model of that form for the same wavelet
-/// variance; the file says so in its comments.
+/// Every number comes from the fitted model (felt_noise.h), none from a fit of a smaller one. A form that
+/// holds fewer terms gets its own terms in their place: white noise with the density of all that is white at
+/// a second, and a slow term that grows like the model's over the band in which that tool works, 1 s to 100 s
+/// for kalibr and px4, 1 s to 1000 s for the others. What the data only bound is written as that bound. The
+/// file says all of that in its comments, and from which stretch of which regime it comes.
+///
+/// With `conservative` the upper ends of the intervals take the places of the values: of a triad's axes the
+/// highest.
 
 #include <cstdint>
 #include <string>
@@ -33,11 +39,22 @@ struct AxisFit {
   std::string axis;  ///< as it is named in the file: "gyro_x", "accel_z"
   SignalUnit unit = SignalUnit::kNone;
   FitResult fit;
+  std::string source{};  ///< what the fit was made from, for people: "regime static, 812 s in 9 stretches"
 };
 
-/// @param conservative  the over-bounding model of each axis (see conservative.h) in place of the fit
-/// Errors: an axis without a unit (kUsage), no axes (kUsage), a fit whose wavelet variance is too short for
-/// the form (kWork).
-Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat format, bool conservative);
+struct ExportOptions {
+  bool conservative = false;  ///< upper ends in place of the values
+  bool force = false;         ///< write what would be refused, with the reason in the file
+};
+
+/// A conservative amplitude that exceeds the fitted one by more than this is refused: the record is too short
+/// for the term.
+inline constexpr double kConservativeMost = 2.0;
+
+/// Errors: an axis without a unit (kUsage), no axes (kUsage), axes of different rates (kUsage). And kWork,
+/// unless forced: a model that misses a level of the tool's band by more than it states (missed_level()), a
+/// term that the data do not even bound, a conservative amplitude beyond kConservativeMost.
+Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat format,
+                                  const ExportOptions& options = {});
 
 }  // namespace imuscope::noise

@@ -1,38 +1,20 @@
 #pragma once
 
-/// Models cut down to what a filter's configuration can hold, in SI units.
+/// The terms of a fit that a filter is made of.
 
-#include <string>
 #include <vector>
 
-#include "base/result.h"
 #include "noise/fit.h"
-#include "noise/quantities.h"
 
 namespace imuscope::noise {
-
-inline constexpr double kFastSamples = 10.0;
-
-/// A fit to be cut down and the unit of its signal; `fit` is the caller's and never null.
-struct FormSource {
-  SignalUnit unit = SignalUnit::kNone;
-  const FitResult* fit = nullptr;
-};
-
-/// A fit of the form's terms in SI units, and how it came about.
-struct FormFit {
-  FitResult fit;
-  std::string origin;  ///< one line
-};
-
-/// One source whose terms the form has all: the fit itself. Otherwise the form is fitted to the source's
-/// wavelet variance, or to the mean one of several sources (axes of one triad). Errors: those of fit();
-/// sources of different rates (kUsage).
-Result<FormFit> fit_of_form(const std::vector<FormSource>& sources, const ModelSpec& form);
 
 /// A process of at most this time constant acts like white noise on a filter that integrates for longer, a
 /// slower one like a bias.
 inline constexpr double kFastTau_s = 1.0;
+
+/// Variance of the white noise that has the component's density at frequency zero, in sample terms (N-28);
+/// zero for what has none there (quantization, sinusoids) or no end (random walk, ramp).
+double low_frequency_variance(const Component& component) noexcept;
 
 /// What filters are made of, in the fit's own units and continuous time. A term that the model does not have
 /// is zero; quantization, ramps and sinusoids have nothing that a filter could take.
@@ -52,15 +34,14 @@ struct FilterTerms {
   std::vector<GaussMarkov> gauss_markov{};  ///< in order of falling rate; those of no variance, too
 
   [[nodiscard]] double white_density() const { return white_variance / rate_hz; }  ///< unit^2/Hz
-  /// Of a sampled Gauss-Markov process at low frequencies, unit^2/Hz: variance * period * (1 + phi) /
-  /// (1 - phi).
+  /// Of a sampled Gauss-Markov process at low frequencies (N-28), unit^2/Hz.
   [[nodiscard]] double low_frequency_density(const GaussMarkov& process) const;
   /// The slowest process that has a variance; zeros without one.
   [[nodiscard]] GaussMarkov bias() const;
 };
 
-/// The only way from a fit to a filter: for what is exported, given back to the estimator and judged in
-/// outages.
+/// Term by term, for what is given back to the estimator and judged in outages; felt_noise.h makes a tool's
+/// few numbers of them.
 FilterTerms filter_terms(const FitResult& fit);
 
 }  // namespace imuscope::noise

@@ -23,9 +23,17 @@ enum class Weighting : std::uint8_t {
 
 struct FitResult;
 
+/// How the intervals of the parameters are made.
+enum class Intervals : std::uint8_t {
+  kQuick,     ///< from the estimate's own covariance; none for a process of less than 20 correlation times
+  kInverted,  ///< by inversion of a test where that covariance is not small (inverted_intervals.h); optimal
+              ///< weights
+};
+
 /// How a model is fitted: weights, levels, and the confidence of what is said of it.
 struct FitOptions {
   Weighting weighting = Weighting::kOptimal;
+  Intervals intervals = Intervals::kQuick;
   int levels = 0;  ///< use only the first so many levels; 0: all
   double confidence = 0.95;
   std::string signal_unit{};              ///< as printed with the parameters: "rad/s", "m/s^2", "deg/s"
@@ -48,10 +56,11 @@ struct ParameterEstimate {
   std::string name;     ///< "sigma2", "beta", ...
   std::string unit;
   double value = 0.0;
-  std::optional<double> sd;      ///< absent where the parameter is not identifiable
-  std::optional<double> ci_low;  ///< interval on the logarithmic scale (amplitudes, rates)
-  std::optional<double> ci_high;
-  std::optional<double> log_sd;  ///< sd on the scale the interval was made on
+  std::optional<double> sd;  ///< absent where the parameter is not identifiable
+  std::optional<double>
+      ci_low;  ///< interval on the logarithmic scale (amplitudes, rates); an end that the data
+  std::optional<double> ci_high;  ///< do not tell is absent: with ci_high alone it is known to be below that
+  std::optional<double> log_sd;   ///< sd on the scale the interval was made on
 };
 
 /// Test that the model explains the wavelet variance, on the levels with enough coefficients
@@ -65,12 +74,14 @@ struct JTest {
 /// A fitted model and all that is said of it, the observed wavelet variance included: a value that refers to
 /// nothing else.
 struct FitResult {
-  std::uint64_t n = 0;  ///< samples used
+  std::uint64_t n = 0;        ///< samples used
+  std::size_t stretches = 0;  ///< runs of neighbouring samples that they make; 0 where not known
   double rate_hz = 0.0;
   ModelSpec spec;
   Weighting weighting = Weighting::kOptimal;
   double confidence = 0.95;  ///< of the intervals
-  double efficiency = 1.0;   ///< of the wavelet variance's estimator; 1 = classical
+  Intervals intervals = Intervals::kQuick;
+  double efficiency = 1.0;  ///< of the wavelet variance's estimator; 1 = classical
   std::vector<FittedLevel> wv;
   std::vector<ParameterEstimate> parameters;
   Model model;  ///< the estimate in sample terms

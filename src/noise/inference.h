@@ -43,9 +43,16 @@ ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const 
 
 /// Test of the model on the levels with enough coefficients (wavelet_variance.h). The part of the residual
 /// that the parameters could still follow is projected out, so the test holds for every weighting of the fit.
+/// @param by_these_weights  the model is the best by the weights v^-1 of all levels: no more of the residual
+/// than
+///                          the other levels explain can be followed, and what is beyond that counts
 std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& residual,
                             const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
-                            const std::vector<bool>& present);
+                            const std::vector<bool>& present, bool by_these_weights);
+
+/// value - expected with the skewness of a wavelet variance of few degrees of freedom taken out: the
+/// difference of cube roots (Wilson and Hilferty 1931), scaled so that it keeps the variance.
+double near_gaussian_residual(double value, double expected, double variance);
 
 /// Fills parameters (values and intervals), covariance, identifiable, simpler_model and warnings of `result`,
 /// whose model, spec and rate are set.

@@ -75,6 +75,8 @@ int level_of(const json& row) {
 FitResult read_fit(const json& j) {
   FitResult fit;
   fit.n = j.at("n").get<std::uint64_t>();
+  if (const auto at = j.find("fitted_to"); at != j.end() && at->value("stretches", json()).is_number())
+    fit.stretches = at->at("stretches").get<std::size_t>();
   fit.rate_hz = j.at("rate_hz").get<double>();
   if (!(fit.rate_hz > 0.0) || !std::isfinite(fit.rate_hz)) throw std::invalid_argument("rate_hz is no rate");
   const auto spec = parse_model(j.at("model").get<std::string>());
@@ -82,6 +84,9 @@ FitResult read_fit(const json& j) {
   fit.spec = *spec;
   fit.weighting = j.at("weights").get<std::string>() == "ci" ? Weighting::kCi : Weighting::kOptimal;
   fit.efficiency = j.value("efficiency", 1.0);
+  fit.intervals = j.value("intervals", "quick") == "inverted" ? Intervals::kInverted : Intervals::kQuick;
+  fit.confidence = j.value("confidence", fit.confidence);
+  if (!(fit.confidence > 0.0 && fit.confidence < 1.0)) throw std::invalid_argument("confidence is no share");
   for (const json& row : j.at("wv")) {
     FittedLevel level;
     level.observed.level = level_of(row);
@@ -141,8 +146,13 @@ json wv_to_json(const WaveletVariance& wv, double rate_hz) {
 json fit_to_json(const FitResult& fit) {
   json out{{"n", fit.n},
            {"rate_hz", fit.rate_hz},
+           {"fitted_to",
+            {{"seconds", number(static_cast<double>(fit.n) / fit.rate_hz)},
+             {"stretches", fit.stretches > 0 ? json(fit.stretches) : json(nullptr)}}},
            {"model", fit.spec.name()},
            {"weights", fit.weighting == Weighting::kCi ? "ci" : "optimal"},
+           {"intervals", fit.intervals == Intervals::kQuick ? "quick" : "inverted"},
+           {"confidence", fit.confidence},
            {"wv", json::array()},
            {"parameters", json::array()},
            {"covariance", json::array()},
@@ -180,6 +190,22 @@ json fit_to_json(const FitResult& fit) {
   return out;
 }
 
+std::string fitted_to_words(const json& entry) {
+  if (!entry.is_object() || !entry.contains("fitted_to") || !entry.at("fitted_to").is_object()) return {};
+  const json& from = entry.at("fitted_to");
+  const auto seconds = optional_number(from, "seconds");
+  if (!seconds) return {};
+  std::string words = fmt::format("{:.6g} s", *seconds);
+  const std::string regime = entry.value("regime", std::string());
+  if (!regime.empty()) words += fmt::format(" of regime {}", regime);
+  if (const auto stretches = optional_number(from, "stretches"))
+    words += fmt::format(" in {:.0f} stretch{}", *stretches, *stretches == 1.0 ? "" : "es");
+  const auto begin = optional_number(from, "begin_s");
+  const auto end = optional_number(from, "end_s");
+  if (begin && end) words += fmt::format(", between {:.1f} s and {:.1f} s of the run", *begin, *end);
+  return words;
+}
+
 json quantities_to_json(const std::vector<Quantity>& quantities) {
   json out = json::array();
   for (const Quantity& q : quantities) {
@@ -188,7 +214,8 @@ json quantities_to_json(const std::vector<Quantity>& quantities) {
                    {"unit", q.unit},
                    {"value", number(q.value)},
                    {"ci_low", number(q.ci_low)},
-                   {"ci_high", number(q.ci_high)}});
+                   {"ci_high", number(q.ci_high)},
+                   {"known", knowledge_name(q.knowledge)}});
   }
   return out;
 }

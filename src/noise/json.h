@@ -4,6 +4,7 @@
 /// models.json. What is not known is null.
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 #include <vector>
 
 #include "base/result.h"
@@ -16,14 +17,19 @@ namespace imuscope::noise {
 /// a robust one has "efficiency" and "rejected_share" too.
 nlohmann::json wv_to_json(const WaveletVariance& wv, double rate_hz);
 
-/// {"n", "rate_hz", "model", "weights", "wv": [.. and "fitted", "model_ci_low", "model_ci_high"],
+/// {"n", "rate_hz", "fitted_to": {"seconds", "stretches"}, "model", "weights", "intervals": "quick" or
+/// "inverted", "confidence", "wv": [.. and "fitted", "model_ci_low", "model_ci_high"],
 ///  "parameters": [{"process", "name", "unit", "value", "sd", "ci_low", "ci_high"}], "covariance" (row-major,
 ///  of the logarithms), "objective", "model_error", "j_test", "criterion", "identifiable", "simpler_model",
 ///  "warnings"}.
 nlohmann::json fit_to_json(const FitResult& fit);
 
-/// [{"process", "name", "unit", "value", "ci_low", "ci_high"}].
+/// [{"process", "name", "unit", "value", "ci_low", "ci_high", "known": "fitted", "bound" or "unknown"}].
 nlohmann::json quantities_to_json(const std::vector<Quantity>& quantities);
+
+/// What an entry was fitted to, for people: "812 s of regime static in 9 stretches, between 3.0 s and 1805.2
+/// s of the run". Empty where the entry does not say.
+std::string fitted_to_words(const nlohmann::json& entry);
 
 /// Reads what fit_to_json() wrote. Errors (kWork): the field that is missing or of the wrong type.
 Result<FitResult> fit_from_json(const nlohmann::json& json);

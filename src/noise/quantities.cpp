@@ -33,6 +33,7 @@ class Builder {
 
   std::vector<Quantity> build() {
     for (const ParameterEstimate& p : fit_.parameters) add_parameter(p);
+    add_white_noise_of_all();
     add_bias_instability();
     return std::move(out_);
   }
@@ -45,8 +46,25 @@ class Builder {
     if (p.ci_low && p.ci_high) {
       q.ci_low = std::min(map(*p.ci_low), map(*p.ci_high));
       q.ci_high = std::max(map(*p.ci_low), map(*p.ci_high));
+    } else if (const Felt most = amplitude_of(p); most.knowledge == Knowledge::kBound) {
+      const bool is_root = p.name == "omega" || p.name == "alpha";
+      q.value = map(is_root ? std::sqrt(most.value) : most.value);
+      q.ci_high = q.value;
+      q.knowledge = Knowledge::kBound;
+    } else {
+      q.knowledge = Knowledge::kUnknown;
     }
     out_.push_back(std::move(q));
+  }
+
+  /// What the data tell of a parameter that is an amplitude of its own.
+  [[nodiscard]] Felt amplitude_of(const ParameterEstimate& p) const {
+    const auto places = parameter_places(fit_.model);
+    const auto at = static_cast<std::size_t>(&p - fit_.parameters.data());
+    if (at >= places.size() || places[at].shape >= 0) return {};
+    // The amplitude of a Gauss-Markov process means nothing without its rate.
+    const Component& c = fit_.model.components[places[at].component];
+    return c.kind == ProcessKind::kGaussMarkov ? Felt{} : felt_amplitude(fit_, places[at].component);
   }
 
   void add_parameter(const ParameterEstimate& p) {
@@ -54,13 +72,6 @@ class Builder {
     if (p.process == "WN") {
       add(p, "density", fmt::format("({})^2/Hz", u_), 1.0 / f, 1.0);
       add(p, "density root", fmt::format("{}/sqrt(Hz)", u_), 1.0 / std::sqrt(f), 0.5);
-      if (unit_ == SignalUnit::kNone) return;
-      const double sheet = sheet_factor(unit_) * kSqrtSecondsPerHour / std::sqrt(f);
-      if (is_gyro(unit_)) {
-        add(p, "angle random walk", "deg/sqrt(h)", sheet, 0.5);
-      } else {
-        add(p, "velocity random walk", "m/s/sqrt(h)", sheet, 0.5);
-      }
     } else if (p.process == "RW") {
       add(p, "driving density", fmt::format("({})^2 Hz", u_), f, 1.0);
       if (unit_ == SignalUnit::kNone) return;
@@ -90,6 +101,7 @@ class Builder {
     if (at > 0) gradient[at - 1] = 1.0;
     Quantity q{p.process, "driving density", fmt::format("({})^2 Hz", u_), 2.0 * beta_ * p.value, {}, {}};
     set_interval(q, gradient);
+    if (!q.ci_low) q.knowledge = Knowledge::kUnknown;
     out_.push_back(std::move(q));
   }
 
@@ -111,6 +123,23 @@ class Builder {
     q.ci_high = q.value * std::exp(half_width);
   }
 
+  void add_white_noise_of_all() {
+    if (unit_ == SignalUnit::kNone || fit_.model.components.empty()) return;
+    const Felt white = felt_white_density(fit_, {});
+    const double sheet = sheet_factor(unit_) * kSqrtSecondsPerHour;
+    const bool gyro = is_gyro(unit_);
+    Quantity q{"model",
+               gyro ? "angle random walk" : "velocity random walk",
+               gyro ? "deg/sqrt(h)" : "m/s/sqrt(h)",
+               sheet * std::sqrt(white.value),
+               {},
+               {},
+               white.knowledge};
+    if (white.knowledge == Knowledge::kFitted) q.ci_low = sheet * std::sqrt(white.lower);
+    if (white.knowledge != Knowledge::kUnknown) q.ci_high = sheet * std::sqrt(white.upper);
+    out_.push_back(std::move(q));
+  }
+
   void add_bias_instability() {
     if (unit_ == SignalUnit::kNone || fit_.wv.empty()) return;
     const auto smallest =
@@ -125,6 +154,12 @@ class Builder {
     if (places.size() == fit_.parameters.size() && smallest->fitted > 0.0) {
       const Eigen::MatrixXd slope = wv_jacobian(fit_.model, {smallest->observed.level}, places);
       set_interval(q, slope.row(0).transpose() / (2.0 * smallest->fitted));
+    }
+    // Beyond the last level it may fall further.
+    if (smallest + 1 == fit_.wv.end()) {
+      q.knowledge = Knowledge::kBound;
+      q.value = q.ci_high.value_or(q.value);
+      q.ci_low.reset();
     }
     out_.push_back(std::move(q));
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "noise/felt_noise.h"
 #include "noise/fit.h"
 
 namespace imuscope::noise {
@@ -26,19 +27,24 @@ struct Quantity {
   std::string process;  ///< "WN", "GM1", ...; "model" for what the sum of the processes has
   std::string name;     ///< "density", "correlation time", "driving density", "angle random walk", ...
   std::string unit;
-  double value = 0.0;
+  double value = 0.0;            ///< of a bound the bound
   std::optional<double> ci_low;  ///< on the logarithm; absent where a parameter it is made of has none
   std::optional<double> ci_high;
+  Knowledge knowledge = Knowledge::kFitted;
 };
 
 /// At sampling rate f, signal unit u:
-/// - WN: density sigma2 / f (u^2/Hz); its root is the angle or velocity random walk
-///   (deg/sqrt(h), m/s/sqrt(h))
+/// - WN: density sigma2 / f (u^2/Hz)
 /// - RW: driving density gamma2 f (u^2 Hz); its root is the rate random walk
 /// - GM: correlation time 1 / beta (s), driving density 2 beta sigma2, sd sqrt(sigma2)
 /// - QN: quantization sqrt(q2) / f (u s)
 /// - DR: ramp omega f (u/s)
-/// - model: bias instability = smallest Allan deviation of the model over the fitted levels / 0.664
+/// - model: angle or velocity random walk (deg/sqrt(h), m/s/sqrt(h)), the root of the density of all that is
+///   white at a second (felt_noise.h); bias instability = smallest Allan deviation of the model over the
+///   fitted levels / 0.664, a bound where the smallest is the last
+///
+/// An amplitude without an interval is given as the most that the data allow, where they bound it; a
+/// correlation time without one is not known.
 ///
 /// Data-sheet names appear with a known unit only.
 std::vector<Quantity> filter_quantities(const FitResult& fit, SignalUnit unit);

@@ -9,6 +9,7 @@
 #include "base/contracts.h"
 #include "noise/chi_squared.h"
 #include "noise/compare.h"
+#include "noise/homogeneity.h"
 #include "noise/inference.h"
 #include "noise/wv_covariance.h"
 
@@ -17,13 +18,6 @@ namespace {
 
 /// Level of the J-test from which a model counts as explaining its samples.
 constexpr double kExplained = 0.01;
-
-/// value - expected with the skewness of a wavelet variance of few degrees of freedom taken out: the
-/// difference of cube roots (Wilson and Hilferty 1931), scaled so that it keeps the variance.
-double near_gaussian_residual(double value, double expected, double variance) {
-  const double dof = 2.0 * expected * expected / variance;
-  return 3.0 * expected * (std::cbrt(value / expected) - 1.0 + 2.0 / (9.0 * dof));
-}
 
 /// Covariance of the model's curve at `levels` from that of its parameters.
 Eigen::MatrixXd curve_covariance(const FitResult& fit, const std::vector<int>& levels) {
@@ -38,49 +32,31 @@ Eigen::MatrixXd curve_covariance(const FitResult& fit, const std::vector<int>& l
   return jacobian * known * jacobian.transpose();
 }
 
-/// Parameters that every fit determines.
-std::vector<Eigen::Index> common_parameters(const std::vector<FitResult>& fits) {
-  std::vector<Eigen::Index> common;
-  for (std::size_t p = 0; p < fits.front().parameters.size(); ++p) {
-    const bool all = std::all_of(fits.begin(), fits.end(),
-                                 [&](const FitResult& f) { return f.parameters[p].sd.has_value(); });
-    if (all) common.push_back(static_cast<Eigen::Index>(p));
-  }
-  return common;
-}
-
-std::optional<JTest> homogeneity_of(const std::vector<FitResult>& fits) {
-  const auto common = common_parameters(fits);
-  if (common.empty()) return std::nullopt;
-  const auto n = static_cast<Eigen::Index>(common.size());
-  const auto size = static_cast<Eigen::Index>(fits.front().parameters.size());
-  std::vector<Eigen::VectorXd> values;
-  std::vector<Eigen::MatrixXd> weights;
-  Eigen::MatrixXd total = Eigen::MatrixXd::Zero(n, n);
-  Eigen::VectorXd weighted = Eigen::VectorXd::Zero(n);
-  for (const FitResult& fit : fits) {
-    Eigen::VectorXd value(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      value[i] =
-          on_interval_scale(fit.parameters[static_cast<std::size_t>(common[static_cast<std::size_t>(i)])]);
+/// Every parameter's mean and spread over the replicates, about the pooled value; the pooled intervals become
+/// those of the mean of all such replicates.
+void set_spreads(JointFit& joint, const std::vector<UnitEstimate>& units) {
+  FitResult& pooled = joint.pooled;
+  for (std::size_t p = 0; p < pooled.parameters.size(); ++p) {
+    ParameterEstimate& parameter = pooled.parameters[p];
+    joint.spreads.emplace_back();
+    if (!parameter.log_sd || !(parameter.value > 0.0)) continue;
+    const auto i = static_cast<Eigen::Index>(p);
+    std::vector<double> steps;
+    std::vector<double> variances;
+    for (const UnitEstimate& unit : units) {
+      steps.push_back(unit.step[i]);
+      variances.push_back(unit.covariance(i, i));
     }
-    const Eigen::Map<const Eigen::MatrixXd> all(fit.covariance.data(), size, size);
-    const Eigen::MatrixXd covariance = all(common, common);
-    const Eigen::MatrixXd weight = covariance.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-    total += weight;
-    weighted += weight * value;
-    values.push_back(value);
-    weights.push_back(weight);
+    auto effects = random_effects(steps, variances, pooled.confidence);
+    if (!effects) continue;
+    const double at = on_interval_scale(parameter);
+    effects->mean += at;
+    effects->ci_low += at;
+    effects->ci_high += at;
+    parameter.ci_low = from_interval_scale(parameter, effects->ci_low);
+    parameter.ci_high = from_interval_scale(parameter, effects->ci_high);
+    joint.spreads.back() = *effects;
   }
-  const Eigen::VectorXd mean = total.ldlt().solve(weighted);
-  JTest test;
-  test.dof = static_cast<int>(fits.size() - 1) * static_cast<int>(n);
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    const Eigen::VectorXd d = values[k] - mean;
-    test.statistic += d.dot(weights[k] * d);
-  }
-  test.p_value = chi_squared_p_value(test.statistic, test.dof);
-  return test;
 }
 
 }  // namespace
@@ -130,7 +106,9 @@ Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const 
     }
     joint.separate.push_back(std::move(*separate));
   }
-  joint.homogeneity = homogeneity_of(joint.separate);
+  const Homogeneity homogeneity = test_homogeneity(replicates, joint.pooled.model);
+  joint.homogeneity = homogeneity.test;
+  set_spreads(joint, homogeneity.units);
   return joint;
 }
 

@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "noise/fit.h"
+#include "noise/random_effects.h"
 
 namespace imuscope::noise {
 
@@ -20,9 +21,12 @@ WaveletVariance pool(std::span<const WaveletVariance> replicates);
 struct JointFit {
   FitResult pooled;
   std::vector<FitResult> separate;  ///< one a replicate
-  /// Test that all replicates have the pooled parameters (near-stationarity), over the parameters that every
-  /// fit determines: sum_k (theta_k - mean)' S_k^-1 (theta_k - mean). Absent where there are none.
+  /// Test that all replicates have the pooled parameters (near-stationarity), homogeneity.h.
   std::optional<JTest> homogeneity;
+  /// Of every parameter on the scale of its interval: mean over the replicates, and how much they differ
+  /// beyond their errors. The pooled parameters' intervals are those of the mean and contain the spread.
+  /// Absent where the pooled fit does not determine the parameter.
+  std::vector<std::optional<RandomEffects>> spreads;
 };
 
 /// Errors: those of fit(), and fewer than two replicates (kUsage).

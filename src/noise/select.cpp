@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 
+#include "noise/nested_fit.h"
 #include "noise/replicates.h"
 #include "noise/wv_covariance.h"
 
@@ -36,7 +37,10 @@ std::vector<ModelSpec> sub_models(const ModelSpec& full) {
   return models;
 }
 
+bool is_rejected(const FitResult& fit) { return fit.j_test && fit.j_test->p_value < kRejectedOutright; }
+
 bool before(const RankedModel& a, const RankedModel& b) {
+  if (is_rejected(a.fit) != is_rejected(b.fit)) return is_rejected(b.fit);
   if (a.fit.identifiable != b.fit.identifiable) return a.fit.identifiable;
   return a.criterion < b.criterion;
 }
@@ -48,6 +52,7 @@ void apply_parsimony(std::vector<RankedModel>& ranked) {
   for (std::size_t i = 1; i < ranked.size(); ++i) {
     const bool close = ranked[i].criterion - ranked.front().criterion < kEquivalent;
     if (ranked[i].fit.identifiable && ranked.front().fit.identifiable && close &&
+        is_rejected(ranked[i].fit) == is_rejected(ranked.front().fit) &&
         ranked[i].fit.spec.parameter_count() < ranked[best].fit.spec.parameter_count()) {
       best = i;
     }
@@ -55,7 +60,9 @@ void apply_parsimony(std::vector<RankedModel>& ranked) {
   for (std::size_t i = 1; i < ranked.size(); ++i) {
     const RankedModel& first = ranked.front();
     ranked[i].reason =
-        !ranked[i].fit.identifiable
+        is_rejected(ranked[i].fit) && !is_rejected(first.fit)
+            ? fmt::format("rejected: J-test p = {:.2g}", ranked[i].fit.j_test->p_value)
+        : !ranked[i].fit.identifiable
             ? ranked[i].fit.warnings.empty() ? "not identifiable" : ranked[i].fit.warnings.front()
             : fmt::format("criterion larger by {:.3g}", ranked[i].criterion - first.criterion);
   }
@@ -154,8 +161,9 @@ void order_by_parsimony(std::vector<CrossValidated>& ranked) {
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options) {
   std::vector<RankedModel> ranked;
+  NestedFit models(wv, fitted_levels(wv, options));
   for (const ModelSpec& spec : sub_models(full)) {
-    auto fitted = fit(wv, spec, rate_hz, options);
+    auto fitted = fit(wv, spec, rate_hz, options, models);
     if (!fitted) return tl::unexpected(fitted.error());
     RankedModel model;
     model.criterion = fitted->criterion;

@@ -367,34 +367,6 @@ std::optional<ProcessKind> removable_kind(const ModelSpec& spec, bool on_grid) {
   return std::nullopt;
 }
 
-/// The smaller model with one more of `kind`: at the slowest rate, and where the amplitudes alone gain most
-/// from it.
-std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& smaller, ProcessKind kind) {
-  constexpr int kRates = 40;
-  constexpr std::size_t kKept = 3;
-  const CoordinateRange range = coordinate_range(kind, 0, problem.levels.back());
-  const RowVector target = problem.whitener * problem.y;
-  struct Candidate {
-    double objective;
-    Model model;
-  };
-  std::vector<Candidate> candidates;
-  for (int i = 0; i <= kRates; ++i) {
-    Model model = smaller;
-    model.components.push_back(
-        {kind, 0.0, {shape_of_coordinate(kind, 0, range.low + (range.high - range.low) * i / kRates), 0.0}});
-    order_components(model);
-    std::vector<Shape> shapes;
-    for (const Component& c : model.components) shapes.push_back(c.shape);
-    candidates.push_back({evaluate(problem, target, shapes).objective, std::move(model)});
-  }
-  std::vector<Model> kept{candidates.front().model};
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.objective < b.objective; });
-  for (std::size_t i = 0; i < kKept; ++i) kept.push_back(candidates[i].model);
-  return kept;
-}
-
 }  // namespace
 
 double coordinate_of_shape(ProcessKind kind, int /*i*/, double shape) noexcept {
@@ -429,6 +401,38 @@ CoordinateRange coordinate_range(ProcessKind kind, int i, int highest_level) noe
     default:
       return {std::log(kSlowestShare / longest), std::log(kFastestRate)};
   }
+}
+
+std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& smaller, ProcessKind kind) {
+  constexpr int kRates = 40;
+  constexpr std::size_t kKept = 3;
+  if (shape_count(kind) != 1) {
+    Model model = smaller;
+    model.components.push_back({kind, 0.0, {}});
+    order_components(model);
+    return {model};
+  }
+  const CoordinateRange range = coordinate_range(kind, 0, problem.levels.back());
+  const RowVector target = problem.whitener * problem.y;
+  struct Candidate {
+    double objective;
+    Model model;
+  };
+  std::vector<Candidate> candidates;
+  for (int i = 0; i <= kRates; ++i) {
+    Model model = smaller;
+    model.components.push_back(
+        {kind, 0.0, {shape_of_coordinate(kind, 0, range.low + (range.high - range.low) * i / kRates), 0.0}});
+    order_components(model);
+    std::vector<Shape> shapes;
+    for (const Component& c : model.components) shapes.push_back(c.shape);
+    candidates.push_back({evaluate(problem, target, shapes).objective, std::move(model)});
+  }
+  std::vector<Model> kept{candidates.front().model};
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.objective < b.objective; });
+  for (std::size_t i = 0; i < kKept; ++i) kept.push_back(candidates[i].model);
+  return kept;
 }
 
 SeparableSolution find_global_minimum(const SeparableProblem& problem) {

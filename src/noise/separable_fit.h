@@ -41,6 +41,10 @@ struct SeparableSolution {
 
 SeparableSolution find_global_minimum(const SeparableProblem& problem);
 
+/// Starts for polish(): the smaller model with one more term of `kind`, at the slowest rate and at those
+/// where the amplitudes alone gain most from it; one start for kinds without a rate.
+std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& smaller, ProcessKind kind);
+
 /// The local minimum that the shapes of `start` lead to.
 SeparableSolution polish(const SeparableProblem& problem, const Model& start);
 

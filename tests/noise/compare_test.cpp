@@ -161,6 +161,9 @@ TEST(Quantities, AreTheOnesThatADataSheetGivesForTheSameSensor) {
   fit.parameters.push_back({"GM1", "beta", "", 0.01, {}, {}, {}, {}});
   fit.parameters.push_back({"GM1", "sigma2", "", 4e-6, {}, {}, {}, {}});
   fit.parameters.push_back({"RW", "gamma2", "", 1e-10, {}, {}, {}, {}});
+  fit.model = {{{ProcessKind::kWhiteNoise, n_degps * n_degps * 100.0, {}},
+                {ProcessKind::kGaussMarkov, 4e-6, {1e-4, 0.0}},
+                {ProcessKind::kRandomWalk, 1e-10, {}}}};
   const auto list = filter_quantities(fit, SignalUnit::kDegps);
   EXPECT_NEAR(quantity(list, "angle random walk"), 0.5, 1e-12);
   EXPECT_NEAR(quantity(list, "correlation time"), 100.0, 1e-9);
@@ -169,6 +172,34 @@ TEST(Quantities, AreTheOnesThatADataSheetGivesForTheSameSensor) {
   for (const auto& q : list) {
     if (q.process == "GM1" && q.name == "driving density") {
       EXPECT_NEAR(q.value, 8e-8, 1e-20);
+    }
+  }
+}
+
+TEST(Quantities, SayWhatARecordDoesNotTellOrOnlyBounds) {
+  // A walk where there is none, and a Gauss-Markov process of four records' length.
+  std::mt19937_64 random(31);
+  std::normal_distribution<double> normal;
+  std::vector<double> x(1U << 14U);
+  const double phi = std::exp(-1.0 / static_cast<double>(4 * x.size()));
+  double slow = normal(random);
+  for (double& v : x) {
+    v = slow + normal(random);
+    slow = phi * slow + std::sqrt(1.0 - phi * phi) * normal(random);
+  }
+  const auto fitted = fit(haar_wavelet_variance(x).value(), parse_model("WN+GM+RW").value(), 100.0).value();
+  const auto list = filter_quantities(fitted, SignalUnit::kDegps);
+  for (const auto& q : list) {
+    if (q.name == "correlation time") {
+      EXPECT_EQ(q.knowledge, Knowledge::kUnknown);
+    }
+    if (q.name == "angle random walk") {
+      EXPECT_EQ(q.knowledge, Knowledge::kFitted);
+      EXPECT_NEAR(q.value, 6.0, 0.15);  // 1 deg/s a sample of 10 ms: 0.1 deg/s/sqrt(Hz)
+    }
+    if (q.name == "rate random walk" && fitted.model.components[2].amplitude <= 0.0) {
+      EXPECT_EQ(q.knowledge, Knowledge::kBound);
+      EXPECT_GT(q.value, 0.0);
     }
   }
 }

@@ -124,7 +124,7 @@ TEST_P(ExportRoundTrip, ARefitOfWhatTheFileMeansHasTheExportedModelInsideItsInte
   for (int trip = 0; trip < kTrips; ++trip) {
     const FitResult first = fitted(signal(p.white, p.bias, p.rate_per_sample, random), p.model);
     ASSERT_TRUE(first.identifiable);
-    const auto text = export_models({{"x", p.unit, first}}, p.format, false).value();
+    const auto text = export_models({{"x", p.unit, first}}, p.format).value();
     const Meaning m = p.meaning(text);
     const double a = m.correlation_time_s > 0.0 ? 1.0 / (m.correlation_time_s * kRateHz) : 0.0;
     const FitResult again = fitted(
@@ -235,8 +235,7 @@ TEST(ExportStateSpace, EveryProcessComesBackFromASimulationOfItsMatrices) {
     fit.rate_hz = kRateHz;
     fit.spec = parse_model(c.name).value();
     fit.model = c.model;
-    const auto text =
-        export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace, false).value();
+    const auto text = export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace).value();
     const auto json = nlohmann::json::parse(text);
     const auto wv = haar_wavelet_variance(simulated(json.at("axes").at(0), kSamples, random)).value();
     const auto distance = distance_from_model(wv, fit);
@@ -258,7 +257,7 @@ TEST(ExportStateSpace, RefitsOfTheSimulatedMatricesHoldTheExportedParametersInTh
                   {ProcessKind::kGaussMarkov, 0.3, {0.002, 0}}}};
     const std::vector<double> truth{1.0, 10.0, 0.5, 0.2, 0.3};
     const auto json = nlohmann::json::parse(
-        export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace, false).value());
+        export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace).value());
     const auto again = fitted(simulated(json.at("axes").at(0), 1U << 16U, random), "WN+2*GM", 100.0);
     for (std::size_t i = 0; i < truth.size(); ++i) {
       const auto& p = again.parameters[i];
@@ -274,8 +273,7 @@ TEST(ExportStateSpace, TheContinuousFormSampledIsTheDiscreteOne) {
   fit.spec = parse_model("GM+RW").value();
   fit.model = {{{ProcessKind::kGaussMarkov, 0.5, {0.02, 0}}, {ProcessKind::kRandomWalk, 1e-5, {}}}};
   const auto axis =
-      nlohmann::json::parse(
-          export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace, false).value())
+      nlohmann::json::parse(export_models({{"x", SignalUnit::kNone, fit}}, ExportFormat::kStateSpace).value())
           .at("axes")
           .at(0);
   const auto a = matrix_of(axis.at("continuous").at("A"));
@@ -286,14 +284,102 @@ TEST(ExportStateSpace, TheContinuousFormSampledIsTheDiscreteOne) {
   EXPECT_NEAR(matrix_of(axis.at("Q"))(1, 1), qc(1, 1) / 50.0, 1e-18);
 }
 
-TEST(Export, AFormThatHoldsLessIsFittedAnewAndSaysSo) {
+TEST(Export, AFormThatHoldsLessGetsATermThatGrowsAlikeAndSaysSo) {
   std::mt19937_64 random(3);
-  const auto first = fitted(signal(1.0, 0.5, 0.01, random), "WN+GM");
-  const auto text =
-      export_models({{"gyro_x", SignalUnit::kRadps, first}}, ExportFormat::kKalibr, false).value();
-  EXPECT_THAT(text, HasSubstr("WN+RW fitted to the wavelet variance in place of WN+GM"));
+  const auto first = fitted(signal(1.0, 0.5, 0.001, random), "WN+GM");
+  const auto text = export_models({{"gyro_x", SignalUnit::kRadps, first}}, ExportFormat::kKalibr).value();
+  EXPECT_THAT(text, HasSubstr("in place of GM1 a random walk that grows alike over 1 s to 100 s"));
   EXPECT_THAT(text, HasSubstr("accelerometer: not given"));
   EXPECT_THAT(text, testing::Not(HasSubstr("accelerometer_noise_density")));
+  // White noise is the fit's own; the walk's growth over T the process' in the mean over ln T (trapezium,
+  // fine).
+  const double beta = first.parameters[1].value;
+  const double variance = first.parameters[2].value;
+  double sum = 0.0;
+  constexpr int kPoints = 20'000;
+  for (int i = 0; i < kPoints; ++i) {
+    const double t = std::pow(100.0, (i + 0.5) / kPoints);
+    sum += std::log(2.0 * variance * (1.0 - std::exp(-beta * t)) / t) / kPoints;
+  }
+  const Meaning m = meaning_of_kalibr(text);
+  EXPECT_NEAR(m.white_density * kRateHz / first.parameters[0].value, 1.0, 1e-6);
+  EXPECT_NEAR(m.walk_density / std::exp(sum), 1.0, 0.01);
+}
+
+/// Truths of a gyroscope at 100 Hz: white noise, a bias of a minute, a walk.
+TEST(Export, WhiteNoiseBesideSlowTermsIsTheModelsOwn) {
+  constexpr double kWhite = 0.05 * 0.05;
+  std::mt19937_64 random(21);
+  for (const double factor : {0.83, 1.0, 1.17}) {
+    std::vector<double> x;
+    for (int block = 0; block < 16; ++block) {
+      const auto more = signal(factor * factor * kWhite, 0.0, 0.0, random);
+      x.insert(x.end(), more.begin(), more.end());
+    }
+    std::normal_distribution<double> normal;
+    double bias = 0.004 * normal(random);
+    const double phi = std::exp(-1.0 / 6000.0);
+    for (double& v : x) {
+      v += bias;
+      bias = phi * bias + 0.004 * std::sqrt(1.0 - phi * phi) * normal(random);
+    }
+    const auto fit = fitted(x, "WN+GM+RW", 100.0);
+    for (const bool conservative : {false, true}) {
+      const auto text = export_models({{"gyro_x", SignalUnit::kDegps, fit}}, ExportFormat::kKalibr,
+                                      {.conservative = conservative, .force = true});
+      const double density = numbers_of(text.value()).at("gyroscope_noise_density") / kRadPerDegree;
+      EXPECT_NEAR(density / (factor * 0.05 / 10.0), 1.0, 0.02);
+    }
+  }
+}
+
+TEST(Export, WhatTheRecordOnlyBoundsIsWrittenAsThatBoundAndMarked) {
+  std::mt19937_64 random(13);
+  int below = 0;
+  int bounds = 0;
+  constexpr double kWalk = 1e-9;  // of a step; too weak for such a record in most series
+  for (int trip = 0; trip < 40; ++trip) {
+    const auto fit = fitted(signal(1.0, kWalk, 0.0, random), "WN+RW");
+    const auto text =
+        export_models({{"x", SignalUnit::kRadps, fit}}, ExportFormat::kKalibr, {.force = true}).value();
+    if (text.find("an upper bound") == std::string::npos) continue;
+    ++bounds;
+    const double walk = numbers_of(text).at("gyroscope_random_walk");
+    EXPECT_GT(walk, 0.0);
+    below += walk * walk < kWalk * kRateHz ? 1 : 0;
+  }
+  EXPECT_GE(bounds, 10);
+  EXPECT_LE(below, 5);  // 5 % promised; more than 5 of 40 has a chance of 1.4 %
+}
+
+TEST(Export, AModelThatMissesItsBandIsRefusedUnlessForced) {
+  std::mt19937_64 random(14);
+  auto fit = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");
+  const std::vector<AxisFit> good{{"gyro_x", SignalUnit::kRadps, fit}};
+  ASSERT_TRUE(export_models(good, ExportFormat::kPx4));
+  // tau of level 9 is 2.56 s: within the band; level 2 is not.
+  auto outside = good;
+  outside[0].fit.wv[1].fitted *= 5.0;
+  EXPECT_TRUE(export_models(outside, ExportFormat::kPx4));
+  auto wrong = good;
+  wrong[0].fit.wv[8].fitted *= 5.0;
+  const auto refused = export_models(wrong, ExportFormat::kPx4);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::kWork);
+  EXPECT_THAT(refused.error().text(), HasSubstr("tau = 2.56 s"));
+  EXPECT_THAT(refused.error().text(), HasSubstr("--force"));
+  EXPECT_THAT(export_models(wrong, ExportFormat::kPx4, {.force = true}).value(),
+              HasSubstr("FORCED although gyro_x"));
+}
+
+TEST(Export, AConservativeAmplitudeOfMoreThanTwiceTheFittedIsRefused) {
+  std::mt19937_64 random(15);
+  auto fit = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");
+  for (FittedLevel& level : fit.wv) level.observed.n_coefficients = 1 + level.observed.n_coefficients / 200;
+  const auto refused =
+      export_models({{"gyro_x", SignalUnit::kRadps, fit}}, ExportFormat::kKalibr, {.conservative = true});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), HasSubstr("the conservative random walk is"));
 }
 
 TEST(Export, ASensorsOwnLowPassBecomesWhiteNoiseAndNotAFiltersBias) {
@@ -305,9 +391,7 @@ TEST(Export, ASensorsOwnLowPassBecomesWhiteNoiseAndNotAFiltersBias) {
   const auto slow = signal(0.0, 0.02, 0.01, random);
   for (std::size_t i = 0; i < x.size(); ++i) x[i] += slow[i];
   const auto first = fitted(x, "WN+2*GM");
-  const auto text =
-      export_models({{"gyro_x", SignalUnit::kDegps, first}}, ExportFormat::kKfGins, false).value();
-  EXPECT_THAT(text, HasSubstr("from tau = "));
+  const auto text = export_models({{"gyro_x", SignalUnit::kDegps, first}}, ExportFormat::kKfGins).value();
   const Meaning m = meaning_of_kf_gins(text);
   const double phi = std::exp(-kFast);
   const double si = kRadPerDegree * kRadPerDegree;
@@ -322,7 +406,7 @@ TEST(Export, ThreeAxesOfATriadBecomeTheMeanOfTheirVariances) {
   for (const double white : {0.5, 1.0, 1.5}) {
     axes.push_back({"gyro", SignalUnit::kRadps, fitted(signal(white, 1e-4, 0.0, random), "WN+RW")});
   }
-  const auto n = numbers_of(export_models(axes, ExportFormat::kKalibr, false).value());
+  const auto n = numbers_of(export_models(axes, ExportFormat::kKalibr).value());
   EXPECT_NEAR(std::pow(n.at("gyroscope_noise_density"), 2) * kRateHz, 1.0, 0.03);
 }
 
@@ -330,8 +414,9 @@ TEST(Export, ConservativeParametersAreLargerThanTheFit) {
   std::mt19937_64 random(5);
   const auto first = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");
   for (const auto format : {ExportFormat::kKalibr, ExportFormat::kPx4}) {
-    const auto plain = numbers_of(export_models({{"x", SignalUnit::kRadps, first}}, format, false).value());
-    const auto bound = numbers_of(export_models({{"x", SignalUnit::kRadps, first}}, format, true).value());
+    const auto plain = numbers_of(export_models({{"x", SignalUnit::kRadps, first}}, format).value());
+    const auto bound =
+        numbers_of(export_models({{"x", SignalUnit::kRadps, first}}, format, {.conservative = true}).value());
     for (const char* key :
          {"gyroscope_noise_density", "gyroscope_random_walk", "EKF2_GYR_NOISE", "EKF2_GYR_B_NOISE"}) {
       if (!plain.contains(key)) continue;
@@ -343,7 +428,7 @@ TEST(Export, ConservativeParametersAreLargerThanTheFit) {
 TEST(Export, WithoutAUnitOnlyTheMatricesCanBeWritten) {
   std::mt19937_64 random(6);
   const auto first = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");
-  const auto refused = export_models({{"x", SignalUnit::kNone, first}}, ExportFormat::kRos, false);
+  const auto refused = export_models({{"x", SignalUnit::kNone, first}}, ExportFormat::kRos);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::kUsage);
   EXPECT_THAT(refused.error().text(), HasSubstr("--unit"));

@@ -1,8 +1,10 @@
 #include "noise/fit.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -10,6 +12,7 @@
 #include <set>
 
 #include "made_series.h"
+#include "noise/wv_covariance.h"
 #include "oracle_files.h"
 #include "tests/support/shared_data.h"
 
@@ -182,6 +185,111 @@ TEST(Fit, AModelThatCannotFollowTheDataPassesTheMiddleOfThemAndSaysByHowMuch) {
   EXPECT_NEAR(again.model_error / result.model_error, 1.0, 0.2);
   const auto right = fit(wv, parse_model("QN+WN").value(), 100.0).value();
   EXPECT_EQ(right.model_error, 0.0);
+}
+
+TEST(Fit, WhatIsPrintedBelongsToThePrintedModel) {
+  // Two slow processes and quantization, of which the models hold one or none.
+  const Model truth{{{ProcessKind::kQuantization, 0.1, {}},
+                     {ProcessKind::kGaussMarkov, 1e-2, {0.05, 0}},
+                     {ProcessKind::kRandomWalk, 1e-6, {}}}};
+  const auto wv = exact_wv(truth, 200000, 17);
+  for (const char* name : {"WN+GM", "QN+WN", "WN+RW", "2*GM"}) {
+    const auto result = fit(wv, parse_model(name).value(), 100.0).value();
+    ASSERT_TRUE(result.j_test && result.j_test->p_value < 0.001) << name;
+    // The covariance of the model as printed, made anew.
+    const Eigen::MatrixXd v = wv_covariance(result.model, wv, wv.levels.size());
+    Eigen::MatrixXd with_error = v;
+    Eigen::VectorXd residual(v.rows());
+    int parameters = 0;
+    for (const Component& c : result.model.components)
+      parameters += c.amplitude > 0.0 ? 1 + shape_count(c.kind) : 0;
+    for (Eigen::Index i = 0; i < v.rows(); ++i) {
+      const FittedLevel& level = result.wv[static_cast<std::size_t>(i)];
+      const double y = level.observed.value;
+      const double m = level.fitted;
+      residual[i] = y - m;
+      with_error(i, i) += result.model_error * result.model_error * 2.0 * y * m * m / (y + m);
+      // The interval's ends are those of a chi-square with this level's own degrees of freedom: at least one.
+      EXPECT_LT(level.model_ci_high, 1100.0 * y) << name;
+      EXPECT_GT(level.model_ci_low, 0.0);
+    }
+    const double objective = residual.dot(Eigen::VectorXd(with_error.ldlt().solve(residual)));
+    EXPECT_NEAR(objective / static_cast<double>(17 - parameters), 1.0, 1e-3) << name;
+    // The test knows no model error: no smaller than what the levels say one by one.
+    double alone = 0.0;
+    for (Eigen::Index i = 0; i < v.rows(); ++i) alone = std::max(alone, residual[i] * residual[i] / v(i, i));
+    EXPECT_GT(result.j_test->statistic, 0.2 * alone) << name;
+  }
+}
+
+TEST(Fit, AModelNeverHasMoreErrorThanAPartOfItself) {
+  const Model truth{{{ProcessKind::kQuantization, 0.1, {}},
+                     {ProcessKind::kGaussMarkov, 1e-2, {0.05, 0}},
+                     {ProcessKind::kRandomWalk, 1e-6, {}}}};
+  const auto wv = exact_wv(truth, 200000, 17);
+  for (const auto& [whole, part] : {std::pair{"WN+GM", "WN"}, std::pair{"WN+GM", "GM"},
+                                    std::pair{"WN+GM+DR", "WN+GM"}, std::pair{"WN+RW+DR", "WN+RW"}}) {
+    const auto large = fit(wv, parse_model(whole).value(), 100.0).value();
+    const auto small = fit(wv, parse_model(part).value(), 100.0).value();
+    EXPECT_LE(large.model_error, small.model_error * (1.0 + 1e-6)) << whole << " and " << part;
+  }
+}
+
+TEST(Fit, WhichLevelsAreMissedByHowMuchIsSaidAndTrueOfEveryLevel) {
+  const Model truth{{{ProcessKind::kWhiteNoise, 1.0, {}}}};
+  auto wv = exact_wv(truth, 1U << 20U, 18);
+  wv.levels[7].value *= 3.0;
+  const auto result = fit(wv, parse_model("WN").value(), 100.0).value();
+  ASSERT_FALSE(result.warnings.empty());
+  const double ratio = result.wv[7].observed.value / result.wv[7].fitted;
+  EXPECT_THAT(result.warnings.back(),
+              HasSubstr(fmt::format("{:.3g} times too low at level 8 (2.56 s)", ratio)));
+  EXPECT_GT(ratio, 2.0);
+}
+
+TEST(InvertedIntervals, HoldTheTruthOfASlowProcessInEverySeriesThatIsCounted) {
+  // Twelve correlation times: the estimate's own covariance is too small where chance makes the process
+  // small.
+  constexpr std::size_t kN = 4096;
+  constexpr double kRate = 12.0 / kN;
+  constexpr unsigned kSeries = 40;
+  FitOptions options;
+  options.intervals = Intervals::kInverted;
+  int held = 0;
+  for (unsigned s = 0; s < kSeries; ++s) {
+    std::vector<double> x = white(kN, 300 + s);
+    const auto drive = white(kN + 1, 900 + s);
+    double state = drive[kN];
+    for (std::size_t i = 0; i < kN; ++i) {
+      x[i] += state;
+      state = std::exp(-kRate) * state + std::sqrt(-std::expm1(-2.0 * kRate)) * drive[i];
+    }
+    const auto result =
+        fit(haar_wavelet_variance(x).value(), parse_model("WN+GM").value(), 1.0, options).value();
+    const auto& beta = result.parameters[1];
+    held += (!beta.ci_low || *beta.ci_low <= kRate) && (!beta.ci_high || kRate <= *beta.ci_high) ? 1 : 0;
+  }
+  EXPECT_GE(held, 33) << "38 expected; fewer than 33 has a chance of 3e-3";
+}
+
+TEST(InvertedIntervals, ATermAtZeroIsKnownToBeBelowABoundThatTheQuickOnesDoNotGive) {
+  auto wv = haar_wavelet_variance(white(4096, 12)).value();
+  for (auto& level : wv.levels) level.value = 1.0 / level.tau_samples * std::pow(0.97, level.level);
+  set_intervals(wv.levels, 1.0, 0.95);
+  FitOptions options;
+  EXPECT_FALSE(fit(wv, parse_model("WN+RW").value(), 100.0)->parameters[1].ci_high);
+  options.intervals = Intervals::kInverted;
+  const auto result = fit(wv, parse_model("WN+RW").value(), 100.0, options).value();
+  const auto& walk = result.parameters[1];
+  EXPECT_EQ(walk.value, 0.0);
+  EXPECT_FALSE(walk.ci_low);
+  ASSERT_TRUE(walk.ci_high);
+  // At the bound the walk shows: as much as the white noise somewhere between the levels of 64 and 4096
+  // samples.
+  EXPECT_GT(*walk.ci_high, 12.0 / (4096.0 * 4096.0) / 10.0);
+  EXPECT_LT(*walk.ci_high, 12.0 / (64.0 * 64.0));
+  options.confidence = 0.99;
+  EXPECT_GT(*fit(wv, parse_model("WN+RW").value(), 100.0, options)->parameters[1].ci_high, *walk.ci_high);
 }
 
 TEST(Fit, AModelWithoutNoiseOfItsOwnHasIntervalsAllTheSame) {

@@ -58,6 +58,46 @@ TEST(Replicates, EqualReplicatesPassAndOneWithMoreNoiseFailsTheTestOfHomogeneity
   EXPECT_LT(*same.pooled.parameters[0].sd, *same.separate[0].parameters[0].sd);
 }
 
+TEST(Replicates, OneTruthIsCalledManyAsRarelyAsTheTestPromises) {
+  const auto spec = parse_model("WN+GM").value();
+  int differ = 0;
+  constexpr unsigned kRuns = 60;
+  for (unsigned i = 0; i < kRuns; ++i) {
+    std::vector<WaveletVariance> records;
+    for (unsigned k = 0; k < 4; ++k)
+      records.push_back(haar_wavelet_variance(series(2048, 1.0, 7000 + 4 * i + k)).value());
+    differ += fit_jointly(records, spec, 100.0)->homogeneity->p_value < 0.05 ? 1 : 0;
+  }
+  EXPECT_LE(differ, 9) << "3 expected; more than 9 has a chance of 1e-3";
+}
+
+TEST(Replicates, PooledIntervalsContainWhatReplicatesDifferBy) {
+  const auto spec = parse_model("WN+GM").value();
+  const auto same = fit_jointly(replicates({1, 1, 1, 1}, 10), spec, 100.0).value();
+  const auto different = fit_jointly(replicates({0.8, 1, 1.2, 1}, 10), spec, 100.0).value();
+  ASSERT_TRUE(different.spreads[0] && same.spreads[0]);
+  // Sd of log sigma2 about 0.33: squares of 0.8 to 1.2.
+  EXPECT_NEAR(different.spreads[0]->spread, 0.33, 0.05);
+  EXPECT_LT(same.spreads[0]->spread, 0.05);
+  EXPECT_LE(same.spreads[0]->spread_low, same.spreads[0]->spread);
+  EXPECT_LT(std::exp(2.0 * std::log(0.8)), *different.pooled.parameters[0].ci_high);
+  EXPECT_GT(*different.pooled.parameters[0].ci_high / *different.pooled.parameters[0].ci_low, 2.0);
+}
+
+TEST(RandomEffects, OfEqualErrorsIsStudentsIntervalAndTheSampleVariance) {
+  const std::vector<double> values{1.0, 2.0, 4.0, 5.0};
+  const std::vector<double> variances(4, 0.5);
+  const auto effects = random_effects(values, variances, 0.95).value();
+  const double s2 = 10.0 / 3.0;
+  EXPECT_NEAR(effects.mean, 3.0, 1e-9);
+  EXPECT_NEAR(effects.spread * effects.spread, s2 - 0.5, 1e-9);
+  constexpr double kStudent3 = 3.182446;  // 97.5 % with three degrees of freedom
+  EXPECT_NEAR(effects.ci_high, 3.0 + kStudent3 * std::sqrt(s2 / 4.0), 1e-5);
+  EXPECT_LT(effects.spread_low, effects.spread);
+  EXPECT_GT(effects.spread_high, effects.spread);
+  EXPECT_FALSE(random_effects(std::vector{1.0}, std::vector{1.0}, 0.95));
+}
+
 TEST(Replicates, OneReplicateIsRefused) {
   EXPECT_FALSE(fit_jointly(replicates({1}, 1), parse_model("WN").value(), 100.0));
 }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -37,6 +38,16 @@ TEST(RankModels, ATermThatEarnsNothingIsLeftOutWithTheReasonInWords) {
   ASSERT_EQ(ranked.size(), 3U);
   EXPECT_EQ(ranked.front().fit.spec.name(), "WN");
   for (const auto& model : ranked) EXPECT_FALSE(model.reason.empty()) << model.fit.spec.name();
+}
+
+TEST(RankModels, ARejectedModelStandsBehindEveryOneThatIsNot) {
+  const auto ranked =
+      rank_models(record(40'000, 0.7, 3), parse_model("QN+WN+2*GM+RW").value(), 100.0).value();
+  ASSERT_EQ(ranked.size(), 23U);
+  const auto rejected = [](const RankedModel& m) { return m.fit.j_test && m.fit.j_test->p_value < 0.001; };
+  EXPECT_FALSE(rejected(ranked.front()));
+  EXPECT_TRUE(std::is_partitioned(ranked.begin(), ranked.end(), [&](const auto& m) { return !rejected(m); }));
+  EXPECT_THAT(ranked.back().reason, HasSubstr("rejected: J-test p = "));
 }
 
 TEST(CrossValidation, ARightModelMissesAReplicateByOneVarianceALevel) {

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <string>
@@ -210,6 +213,79 @@ TEST_F(NoiseCommands, ARegimeAndACounterMakeGapsInTheSignal) {
   EXPECT_EQ(json.at("wv").at(2).at("n_coefficients"), 1);
 }
 
+/// Rows at 10 Hz of which the second half comes 1,000 s later; `stamp` writes a time since the first row.
+std::string with_a_gap(const char* header, const std::function<std::string(double)>& stamp) {
+  std::string text = std::string(header) + "\n";
+  for (int i = 0; i < 64; ++i) {
+    const double time_s = 0.1 * i + (i < 32 ? 0.0 : 1000.0);
+    text += stamp(time_s) + "," + std::to_string((i * 37) % 11) + "\n";
+  }
+  return text;
+}
+
+TEST_F(NoiseCommands, TimesOfEveryKindMakeGapsAndTellTheRate) {
+  const auto plain = [](double t) { return fmt::format("{:.3f}", t + 12.0); };
+  const auto iso = [](double t) {
+    const double of_day = t + 86'000.0;  // across midnight
+    const int day = of_day < 86'400.0 ? 1 : 2;
+    const double s = of_day - 86'400.0 * (day - 1);
+    return fmt::format("2026-03-{:02d}T{:02d}:{:02d}:{:06.3f}+01:00", day, static_cast<int>(s) / 3600,
+                       static_cast<int>(s) / 60 % 60, std::fmod(s, 60.0));
+  };
+  const auto gps = [](double t) {
+    const double tow = t + 604'700.0;  // across the end of a week
+    return fmt::format("{},{:.3f}", tow < 604'800.0 ? 2400 : 2401, std::fmod(tow, 604'800.0));
+  };
+  const struct {
+    const char* header;
+    std::function<std::string(double)> stamp;
+    const char* options;
+  } cases[] = {{"time_s,x", plain, ""},
+               {"when,x", plain, "--time when"},
+               {"utc,x", iso, "--rate 10"},
+               {"gps_week,tow,x", gps, ""},
+               {"a,b,x", gps, "--time a,b"}};
+  for (const auto& c : cases) {
+    const auto file = write("t.csv", with_a_gap(c.header, c.stamp));
+    const auto result = run("wv " + file + " -c x --json " + c.options);
+    ASSERT_EQ(result.exit_code, 0) << c.header << result.err;
+    const auto json = nlohmann::json::parse(result.out);
+    EXPECT_NEAR(json.at("rate_hz").get<double>(), 10.0, 1e-9) << c.header;
+    EXPECT_EQ(json.at("n"), 64);
+    EXPECT_EQ(json.at("wv").at(0).at("n_coefficients"), 62) << c.header;
+  }
+  const auto glued =
+      run("wv " + write("t.csv", with_a_gap("time_s,x", plain)) + " -c x -r 10 --time none --json");
+  EXPECT_EQ(nlohmann::json::parse(glued.out).at("wv").at(0).at("n_coefficients"), 63);
+}
+
+TEST_F(NoiseCommands, ARateThatContradictsTheTimesIsRefusedWithTheOneThatFits) {
+  const auto file = write("t.csv", with_a_gap("time_s,x", [](double t) { return fmt::format("{:.3f}", t); }));
+  for (const char* command : {"wv ", "fit -m WN "}) {
+    const auto refused = run(command + file + " -c x --rate 100");
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("--rate 10 fits"));
+    EXPECT_EQ(run(command + file + " -c x --rate 10.01").exit_code, 0);
+  }
+}
+
+TEST_F(NoiseCommands, StampsOfArrivalInBurstsMakeNoGapsAndALostSampleOfEvenOnesDoes) {
+  std::string bursts = "time_s,x\n";
+  std::string lost = bursts;
+  for (int i = 0; i < 400; ++i) {
+    // Eight rows arrive together, after the last of them.
+    bursts += fmt::format("{:.4f},{}\n", 0.01 * (8 * (i / 8) + 8), (i * 37) % 11);
+    if (i % 100 != 50) lost += fmt::format("{:.4f},{}\n", 0.01 * i + 0.001 * ((i * 7) % 3), (i * 37) % 11);
+  }
+  const auto together = run("wv " + write("b.csv", bursts) + " -c x --rate 100 --json");
+  ASSERT_EQ(together.exit_code, 0) << together.err;
+  EXPECT_EQ(nlohmann::json::parse(together.out).at("wv").at(0).at("n_coefficients"), 399);
+  const auto holes = run("wv " + write("l.csv", lost) + " -c x --json");
+  ASSERT_EQ(holes.exit_code, 0) << holes.err;
+  EXPECT_EQ(nlohmann::json::parse(holes.out).at("n"), 396);
+  EXPECT_EQ(nlohmann::json::parse(holes.out).at("wv").at(0).at("n_coefficients"), 399 - 2 * 4);
+}
+
 TEST_F(NoiseCommands, NotANumberCountsAsAGapOnRequest) {
   const auto file = write("gap.csv", "1\n2\nnan\n3\n5\n4\n");
   const auto refused = run("wv " + file + " -r 1");
@@ -294,6 +370,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"WhereWithoutEquals", "a.csv", "a,b\n1,2\n", "wv {} -r 1 -c a --where b", 2, "COLUMN=VALUE"},
         BadInput{"FallingCounter", "d.csv", "a,b\n1,2\n2,1\n", "wv {} -r 1 -c a --counter b", 1,
                  "line 3: the counter goes from 2 to 1"},
+        BadInput{"TimeGoesBack", "tb.csv", "time_s,a\n1,2\n2,3\n1.5,1\n3,1\n", "wv {} -c a", 1, "row 3"},
+        BadInput{"NoTime", "nt.csv", "time_s,a\n1,2\nlater,3\n", "wv {} -c a", 1, "'later' is no time"},
+        BadInput{"MissingTime", "mt.csv", "b,a\n1,2\n2,3\n", "wv {} -c a --time tme", 2, "no column 'tme'"},
         BadInput{"ColumnOfARawFile", "b.f64", "12345678", "wv {} -r 1 -c 1", 2, "no columns"},
         BadInput{"HalfANumber", "9.f64", "123456789", "wv {} -r 1", 1, "9 bytes"},
         BadInput{"ExportToNobody", "j1.json", "{}", "export {} --to matlab", 2, "kalibr, ros, px4"},

@@ -20,7 +20,7 @@ struct ExportCommand {
   std::string name;
   std::string regime;
   std::string unit;
-  bool conservative = false;
+  noise::ExportOptions how;
 };
 
 /// Keeps the fits whose `member` is `wanted`; without a wish there must be one choice only.
@@ -56,9 +56,9 @@ Result<void> run_export(const ExportCommand& options) {
   if (auto kept = keep(fits, &StoredFit::regime, options.regime, "--regime"); !kept) return kept;
   std::vector<noise::AxisFit> axes;
   for (StoredFit& fit : fits) {
-    axes.push_back({fit.axis, options.unit.empty() ? fit.unit : *unit, std::move(fit.fit)});
+    axes.push_back({fit.axis, options.unit.empty() ? fit.unit : *unit, std::move(fit.fit), fit.source});
   }
-  const auto text = noise::export_models(axes, *format, options.conservative);
+  const auto text = noise::export_models(axes, *format, options.how);
   if (!text) return tl::unexpected(text.error());
   say("{}", *text);
   return {};
@@ -78,9 +78,10 @@ void add_export(CLI::App& app, Work& chosen) {
   command->add_option("--regime", options->regime, "all, static or dynamic, where the file holds several");
   command->add_option("--unit,-u", options->unit,
                       "Unit of the signal, where the file does not say: rad/s, deg/s, m/s^2 or g");
-  command->add_flag(
-      "--conservative", options->conservative,
-      "Over-bounding amplitudes: the model above the upper interval ends, not through the middle");
+  command->add_flag("--conservative", options->how.conservative,
+                    "Upper ends of the intervals, for a filter that must not be optimistic");
+  command->add_flag("--force", options->how.force,
+                    "Write even what does not hold: the file then says why it should not be used");
   on_chosen(*command, chosen, [options] { return run_export(*options); });
 }
 

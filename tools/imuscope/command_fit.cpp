@@ -19,6 +19,8 @@ struct FitCommand {
   SignalOptions signal;
   std::string model;
   noise::Weighting weighting = noise::Weighting::kOptimal;
+  double confidence = 0.95;
+  bool quick_intervals = false;
   bool select = false;
   bool conservative = false;
 };
@@ -29,16 +31,28 @@ struct Task {
   noise::SignalUnit unit;
   noise::FitOptions fit_options;
   std::vector<noise::WaveletVariance> wvs;
+  double rate_hz;
 };
 
 /// The fit that the command is about, after the ranking that led to it and what else belongs to it.
-void report(const Task& task, const noise::FitResult& fit, const nlohmann::json& extra) {
+void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra) {
   std::optional<noise::FitResult> bound;
-  if (task.options.conservative) bound = noise::over_bounding(fit);
+  if (task.options.conservative) {
+    bound = noise::over_bounding(fit);
+    if (const double increase = noise::largest_increase(fit, *bound); increase > noise::kMostIncrease) {
+      bound.reset();
+      fit.warnings.push_back(
+          fmt::format("no over-bounding model: an amplitude would have to be {:.3g} times the fitted one, as "
+                      "the model misses "
+                      "levels by factors; give it the terms that they show",
+                      increase));
+    }
+  }
   if (task.options.signal.json) {
     auto json = fit_json(fit, task.unit);
     json.update(extra);
-    if (bound) json["conservative"] = conservative_json(*bound, task.unit);
+    if (task.options.conservative)
+      json["conservative"] = bound ? conservative_json(*bound, task.unit) : nlohmann::json(nullptr);
     say("{}\n", json_text(json));
     return;
   }
@@ -48,25 +62,33 @@ void report(const Task& task, const noise::FitResult& fit, const nlohmann::json&
 
 Result<void> fit_one(const Task& task, const noise::ModelSpec& spec) {
   const auto& wv = task.wvs.front();
-  const double rate_hz = task.options.signal.rate_hz;
+  const double rate_hz = task.rate_hz;
   if (!task.options.select) {
     const auto fit = noise::fit(wv, spec, rate_hz, task.fit_options);
     if (!fit) return tl::unexpected(fit.error());
     report(task, *fit, nlohmann::json::object());
     return {};
   }
-  const auto ranked = noise::rank_models(wv, spec, rate_hz, task.fit_options);
+  noise::FitOptions quick = task.fit_options;
+  quick.intervals = noise::Intervals::kQuick;
+  const auto ranked = noise::rank_models(wv, spec, rate_hz, quick);
   if (!ranked) return tl::unexpected(ranked.error());
   if (!task.options.signal.json) print_ranking(*ranked);
-  report(task, ranked->front().fit, {{"ranking", ranking_json(*ranked)}});
+  noise::FitOptions again = task.fit_options;
+  again.warm_start = &ranked->front().fit;
+  const auto best = noise::fit(wv, ranked->front().fit.spec, rate_hz, again);
+  if (!best) return tl::unexpected(best.error());
+  report(task, *best, {{"ranking", ranking_json(*ranked)}});
   return {};
 }
 
 Result<void> fit_replicates(const Task& task, noise::ModelSpec spec) {
-  const double rate_hz = task.options.signal.rate_hz;
+  const double rate_hz = task.rate_hz;
   auto extra = nlohmann::json::object();
   if (task.options.select) {
-    const auto ranked = noise::cross_validate(task.wvs, spec, rate_hz, task.fit_options);
+    noise::FitOptions quick = task.fit_options;
+    quick.intervals = noise::Intervals::kQuick;
+    const auto ranked = noise::cross_validate(task.wvs, spec, rate_hz, quick);
     if (!ranked) return tl::unexpected(ranked.error());
     if (!task.options.signal.json) print_ranking(*ranked);
     extra["ranking"] = ranking_json(*ranked);
@@ -83,10 +105,12 @@ Result<void> fit_replicates(const Task& task, noise::ModelSpec spec) {
 Result<void> run_fit(const FitCommand& options) {
   const auto spec = noise::parse_model(options.model);
   if (!spec) return tl::unexpected(spec.error());
-  auto wvs = wavelet_variances_of(options.signal);
-  if (!wvs) return tl::unexpected(wvs.error());
-  Task task{options, noise::parse_unit(options.signal.unit).value(), {}, std::move(*wvs)};
+  auto read = wavelet_variances_of(options.signal);
+  if (!read) return tl::unexpected(read.error());
+  Task task{options, noise::parse_unit(options.signal.unit).value(), {}, std::move(read->wvs), read->rate_hz};
   task.fit_options.weighting = options.weighting;
+  task.fit_options.confidence = options.confidence;
+  if (!options.quick_intervals) task.fit_options.intervals = noise::Intervals::kInverted;
   task.fit_options.signal_unit = options.signal.unit;
   return task.wvs.size() == 1 ? fit_one(task, *spec) : fit_replicates(task, *spec);
 }
@@ -107,6 +131,14 @@ void add_fit(CLI::App& app, Work& chosen) {
       ->add_option("--weights,-w", options->weighting,
                    "optimal: inverse covariance under the model; ci: 1/(interval width)^2 (default: optimal)")
       ->transform(CLI::CheckedTransformer(weightings, CLI::ignore_case));
+  command
+      ->add_option("--confidence", options->confidence,
+                   "Of every interval, as a share: 0.99 for 99 % (default: 0.95)")
+      ->check(CLI::Range(0.51, 0.9999));
+  command->add_flag(
+      "--quick-intervals", options->quick_intervals,
+      "Intervals from the estimate's own covariance, none for slow processes, as the live refits have "
+      "them");
   command->add_flag("--select", options->select,
                     "Rank the sub-models and report the best; of three or more files by cross-validation");
   command->add_flag(

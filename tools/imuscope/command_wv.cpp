@@ -42,13 +42,13 @@ void add_wv(CLI::App& app, Work& chosen) {
   on_chosen(*command, chosen, [options]() -> Result<void> {
     const auto wvs = wavelet_variances_of(*options);
     if (!wvs) return tl::unexpected(wvs.error());
-    const auto& wv = wvs->front();
+    const auto& wv = wvs->wvs.front();
     if (options->json) {
-      auto json = noise::wv_to_json(wv, options->rate_hz);
+      auto json = noise::wv_to_json(wv, wvs->rate_hz);
       json["unit"] = options->unit;
       say("{}\n", json_text(json));
     } else {
-      print_table(wv, options->rate_hz, options->unit);
+      print_table(wv, wvs->rate_hz, options->unit);
     }
     return {};
   });

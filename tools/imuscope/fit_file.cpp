@@ -21,8 +21,12 @@ Result<StoredFit> stored_fit(const nlohmann::json& entry, const std::filesystem:
   if (!fit) return tl::unexpected(fit.error());
   const auto unit = noise::parse_unit(text_of(entry, "unit", ""));
   if (!unit) return tl::unexpected(unit.error());
-  return StoredFit{text_of(entry, "name", ""), text_of(entry, "axis", file.stem().string()),
-                   text_of(entry, "regime", ""), *unit, std::move(*fit)};
+  return StoredFit{text_of(entry, "name", ""),
+                   text_of(entry, "axis", file.stem().string()),
+                   text_of(entry, "regime", ""),
+                   *unit,
+                   std::move(*fit),
+                   noise::fitted_to_words(entry)};
 }
 
 }  // namespace

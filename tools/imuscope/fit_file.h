@@ -18,6 +18,7 @@ struct StoredFit {
   std::string regime;  ///< empty in the output of fit
   noise::SignalUnit unit = noise::SignalUnit::kNone;
   noise::FitResult fit;
+  std::string source;  ///< noise::fitted_to_words()
 };
 
 /// Errors (kWork): a file that cannot be read, is not JSON or holds no fit; each with the file's name.

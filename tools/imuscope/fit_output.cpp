@@ -15,7 +15,13 @@ namespace {
 constexpr double kHomogeneous = 0.05;
 
 std::string interval(const std::optional<double>& low, const std::optional<double>& high) {
-  return low && high ? fmt::format("[{:.6g}, {:.6g}]", *low, *high) : "-";
+  if (low && high) return fmt::format("[{:.6g}, {:.6g}]", *low, *high);
+  if (high) return fmt::format("below {:.6g}", *high);
+  return low ? fmt::format("above {:.6g}", *low) : "-";
+}
+
+std::string interval_heading(const noise::FitResult& fit) {
+  return fmt::format("{:g} % interval", 100.0 * fit.confidence);
 }
 
 std::string p_value(const std::optional<noise::JTest>& test) {
@@ -23,7 +29,7 @@ std::string p_value(const std::optional<noise::JTest>& test) {
 }
 
 void print_parameters(const noise::FitResult& fit) {
-  say("{:<7} {:<10} {:>14} {:>14}  {:<30} {}\n", "process", "parameter", "value", "sd", "95 % interval",
+  say("{:<7} {:<10} {:>14} {:>14}  {:<30} {}\n", "process", "parameter", "value", "sd", interval_heading(fit),
       "unit");
   for (const auto& p : fit.parameters) {
     say("{:<7} {:<10} {:>14.7g} {:>14}  {:<30} {}\n", p.process, p.name, p.value,
@@ -32,11 +38,15 @@ void print_parameters(const noise::FitResult& fit) {
 }
 
 void print_quantities(const noise::FitResult& fit, noise::SignalUnit unit) {
-  say("\n{:<7} {:<26} {:>14}  {:<30} {}\n", "process", "for filter and data sheet", "value", "95 % interval",
-      "unit");
+  say("\n{:<7} {:<26} {:>14}  {:<30} {}\n", "process", "for filter and data sheet", "value",
+      interval_heading(fit), "unit");
   for (const auto& q : noise::filter_quantities(fit, unit)) {
-    say("{:<7} {:<26} {:>14.7g}  {:<30} {}\n", q.process, q.name, q.value, interval(q.ci_low, q.ci_high),
-        q.unit);
+    const std::string range = q.knowledge == noise::Knowledge::kBound     ? "at most"
+                              : q.knowledge == noise::Knowledge::kUnknown ? "not known from this record"
+                                                                          : interval(q.ci_low, q.ci_high);
+    const std::string value =
+        q.knowledge == noise::Knowledge::kUnknown ? "-" : fmt::format("{:.7g}", q.value);
+    say("{:<7} {:<26} {:>14}  {:<30} {}\n", q.process, q.name, value, range, q.unit);
   }
 }
 
@@ -110,14 +120,23 @@ void print_replicates(const noise::JointFit& joint) {
     for (const auto& fit : joint.separate) say(" {:>14.6g}", fit.parameters[p].value);
     say("\n");
   }
+  say("\n{:<7} {:<10} {:>16}  {}\n", "process", "parameter", "spread, sd of log",
+      interval_heading(joint.pooled));
+  for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {
+    const auto& parameter = joint.pooled.parameters[p];
+    if (const auto& spread = joint.spreads[p])
+      say("{:<7} {:<10} {:>16.4g}  [{:.4g}, {:.4g}]\n", parameter.process, parameter.name, spread->spread,
+          spread->spread_low, spread->spread_high);
+  }
   if (!joint.homogeneity) {
-    say("\nno test of near-stationarity: no parameter is determined in every replicate\n");
+    say("\nno test of near-stationarity: no parameter is in use\n");
     return;
   }
   const auto& test = *joint.homogeneity;
   say("\nnear-stationarity: {:.4g} on {} dof, p = {:.3g}: {}\n", test.statistic, test.dof, test.p_value,
-      test.p_value < kHomogeneous ? "the replicates differ by more than their uncertainty"
-                                  : "the replicates may be one process");
+      test.p_value < kHomogeneous
+          ? "the replicates differ by more than their uncertainty; the intervals contain that"
+          : "the replicates may be one process");
 }
 
 nlohmann::json fit_json(const noise::FitResult& fit, noise::SignalUnit unit) {
@@ -162,6 +181,17 @@ nlohmann::json ranking_json(const std::vector<noise::CrossValidated>& ranked) {
 nlohmann::json replicates_json(const noise::JointFit& joint, noise::SignalUnit unit) {
   nlohmann::json json{{"replicates", nlohmann::json::array()}, {"homogeneity", test_json(joint.homogeneity)}};
   for (const auto& fit : joint.separate) json["replicates"].push_back(fit_json(fit, unit));
+  json["spread"] = nlohmann::json::array();
+  for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {
+    const auto& parameter = joint.pooled.parameters[p];
+    nlohmann::json row{{"process", parameter.process}, {"name", parameter.name}, {"log_sd", nullptr}};
+    if (const auto& spread = joint.spreads[p]) {
+      row["log_sd"] = spread->spread;
+      row["ci_low"] = spread->spread_low;
+      row["ci_high"] = spread->spread_high;
+    }
+    json["spread"].push_back(std::move(row));
+  }
   return json;
 }
 

@@ -17,6 +17,7 @@
 #include <system_error>
 
 #include "base/line_reader.h"
+#include "time_column.h"
 
 namespace imuscope::cli {
 namespace {
@@ -123,6 +124,10 @@ class CsvReader {
       if (auto taken = take(content); !taken) return tl::unexpected(taken.error());
     }
     if (signal_.values.empty()) return work_error(fmt::format("{} holds no numbers", file_));
+    signal_.rate_hz = choice_.rate_hz;
+    if (!stamps_s_.empty()) {
+      if (auto placed = place_by_time(); !placed) return tl::unexpected(placed.error());
+    }
     return std::move(signal_);
   }
 
@@ -138,7 +143,7 @@ class CsvReader {
     separator_ = separator_of(line);
     split(line, separator_, cells_);
     const bool has_header =
-        std::any_of(cells_.begin(), cells_.end(), [](auto cell) { return !to_number(cell); });
+        std::any_of(cells_.begin(), cells_.end(), [](auto cell) { return !parse_stamp(cell); });
     std::vector<std::string> names;
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       std::string_view name = cells_[i];
@@ -170,6 +175,89 @@ class CsvReader {
       if (!column) return tl::unexpected(column.error());
       counter_index_ = *column;
     }
+    return find_time(names, has_header);
+  }
+
+  Result<void> find_time(const std::vector<std::string>& names, bool has_header) {
+    if (choice_.time == "none") return {};
+    if (choice_.time.empty()) {
+      if (has_header) find_time_by_name(names);
+      return {};
+    }
+    const std::size_t comma = choice_.time.find(',');
+    const auto last = find_column(
+        names, has_header, comma == std::string::npos ? choice_.time : choice_.time.substr(comma + 1), file_);
+    if (!last) return tl::unexpected(last.error());
+    time_index_ = *last;
+    if (comma == std::string::npos) return {};
+    const auto week = find_column(names, has_header, choice_.time.substr(0, comma), file_);
+    if (!week) return tl::unexpected(week.error());
+    week_index_ = *week;
+    return {};
+  }
+
+  /// What is read as the signal is no time.
+  void find_time_by_name(const std::vector<std::string>& names) {
+    const auto at = [&](bool (*is)(std::string_view)) -> std::optional<std::size_t> {
+      for (std::size_t i = 0; i < names.size(); ++i) {
+        if (i != index_ && is(names[i])) return i;
+      }
+      return std::nullopt;
+    };
+    time_index_ = at(is_time_name);
+    const auto week = at(is_week_name);
+    const auto seconds = at(is_week_seconds_name);
+    if (time_index_ || !week || !seconds) return;
+    week_index_ = week;
+    time_index_ = seconds;
+  }
+
+  Result<void> take_stamp() {
+    const auto text = cell(*time_index_);
+    if (!text) return tl::unexpected(text.error());
+    const auto stamp = parse_stamp(*text);
+    if (!stamp) {
+      return work_error(fmt::format("{}, line {}, column {}: '{}' is no time", file_, line_number_,
+                                    *time_index_ + 1, *text),
+                        "times are seconds, ISO 8601 as in 2026-11-23T07:38:36.5Z, or GPS week and seconds");
+    }
+    double weeks = 0.0;
+    if (week_index_) {
+      const auto week = number(*week_index_);
+      if (!week) return tl::unexpected(week.error());
+      weeks = *week;
+    }
+    constexpr double kWeek_s = 604'800.0;
+    stamps_s_.push_back(weeks * kWeek_s + *stamp);
+    return {};
+  }
+
+  /// Puts the samples in between that the times say are missing.
+  Result<void> place_by_time() {
+    auto rows = rows_of_stamps(stamps_s_, counts_, choice_.rate_hz);
+    if (!rows) {
+      Error error = rows.error();
+      error.what = fmt::format("{}: {}", file_, error.what);
+      return tl::unexpected(error);
+    }
+    signal_.rate_hz = rows->rate_hz;
+    std::int64_t missing = 0;
+    for (const std::int64_t n : rows->missing_before) missing = std::min(missing + n, kHolesMax + 1);
+    if (missing == 0) return {};
+    if (missing > kHolesMax) {
+      return work_error(fmt::format("{}: the times leave out more than {} samples", file_, kHolesMax),
+                        "cut the file where the long gaps are");
+    }
+    Signal placed;
+    placed.rate_hz = rows->rate_hz;
+    for (std::size_t i = 0; i < signal_.values.size(); ++i) {
+      const auto hole = static_cast<std::size_t>(rows->missing_before[i]);
+      placed.values.insert(placed.values.end(), hole, 0.0);
+      placed.mask.insert(placed.mask.end(), hole, 0);
+      placed.values.push_back(signal_.values[i]);
+      placed.mask.push_back(signal_.mask.empty() ? 1 : signal_.mask[i]);
+    }
+    signal_ = std::move(placed);
     return {};
   }
 
@@ -192,6 +280,9 @@ class CsvReader {
     if (!value) return tl::unexpected(value.error());
     if (counter_index_) {
       if (auto padded = pad_hole(); !padded) return padded;
+    }
+    if (time_index_) {
+      if (auto taken = take_stamp(); !taken) return taken;
     }
     bool valid = true;
     if (where_index_) {
@@ -221,6 +312,7 @@ class CsvReader {
     }
     for (std::int64_t i = 0; i < hole; ++i) add(0.0, false);
     next_counter_ = counter + 1;
+    counts_.push_back(counter);
     return {};
   }
 
@@ -239,6 +331,10 @@ class CsvReader {
   std::optional<std::size_t> counter_index_;
   std::optional<std::int64_t> next_counter_;
   std::int64_t padded_ = 0;
+  std::vector<std::int64_t> counts_;  ///< of the rows, with a counter
+  std::optional<std::size_t> time_index_;
+  std::optional<std::size_t> week_index_;
+  std::vector<double> stamps_s_;  ///< of the rows
   std::size_t line_number_ = 0;
   char separator_ = ',';
   bool started_ = false;
@@ -246,14 +342,15 @@ class CsvReader {
 
 Result<Signal> read_raw(std::istream& in, std::uintmax_t size, const std::string& file,
                         const SignalChoice& choice) {
-  if (!choice.column.empty() || !choice.where.empty() || !choice.counter.empty()) {
+  if (!choice.column.empty() || !choice.where.empty() || !choice.counter.empty() || !choice.time.empty()) {
     return usage_error(fmt::format("{} is raw float64 and has no columns", file),
-                       "leave out --column, --where and --counter");
+                       "leave out --column, --where, --counter and --time");
   }
   if (size % sizeof(double) != 0) {
     return work_error(fmt::format("{} has {} bytes, which is no whole number of float64 values", file, size));
   }
   Signal signal;
+  signal.rate_hz = choice.rate_hz;
   signal.values.resize(size / sizeof(double));
   if (!in.read(reinterpret_cast<char*>(signal.values.data()), static_cast<std::streamsize>(size))) {
     return work_error(fmt::format("{} could not be read to its end", file));

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,17 +16,23 @@ struct SignalChoice {
   std::string column;   ///< a header name, or a number from 1; may be empty where there is one column only
   std::string where;    ///< "COLUMN=VALUE": rows whose cell is something else count as gaps; may be empty
   std::string counter;  ///< column that counts the samples: numbers left out are gaps; may be empty
+  /// Column of time stamps, or WEEK,SECONDS of GPS: times left out are gaps. Empty: a column whose name says
+  /// that it holds times, where there is one; "none": no times.
+  std::string time{};
+  std::optional<double> rate_hz{};  ///< samples per second, to be held against the times
 };
 
 struct Signal {
   std::vector<double> values;
   std::vector<std::uint8_t> mask;  ///< 1 = a value; empty: all are
+  std::optional<double> rate_hz;   ///< as asked for, or as the times have it; absent where neither tells
 };
 
 /// CSV: separated by comma, semicolon, tab or blanks; `#` starts a comment; a first line that is not all
 /// numbers is the header. "nan" is a value (the caller decides). Errors (kWork): a missing or empty file, a
-/// folder, text where a number belongs (line and column told), a counter that does not rise. kUsage: a column
-/// that does not exist (columns listed, nearest name suggested), a choice of columns in a raw file.
+/// folder, text where a number belongs (line and column told), a counter that does not rise, times that go
+/// back. kUsage: a column that does not exist (columns listed, nearest name suggested), a choice of columns
+/// in a raw file, a rate that contradicts the times (with the one that fits).
 Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice& choice);
 
 }  // namespace imuscope::cli

@@ -7,16 +7,14 @@
 namespace imuscope::cli {
 namespace {
 
-Result<noise::WaveletVariance> wavelet_variance_of(const std::filesystem::path& file,
+Result<noise::WaveletVariance> wavelet_variance_of(const std::filesystem::path& file, const Signal& signal,
                                                    const SignalOptions& options) {
-  const auto signal = read_signal(file, options.choice);
-  if (!signal) return tl::unexpected(signal.error());
   noise::WvOptions wv_options;
   wv_options.levels = options.levels;
-  wv_options.mask = signal->mask;
+  wv_options.mask = signal.mask;
   wv_options.nan_is_gap = options.nan_is_gap;
   if (options.robust) wv_options.robust = noise::RobustOptions{options.efficiency, std::nullopt};
-  auto wv = noise::haar_wavelet_variance(signal->values, wv_options);
+  auto wv = noise::haar_wavelet_variance(signal.values, wv_options);
   if (!wv) {
     Error error = wv.error();
     error.what = fmt::format("{}: {}", file.string(), error.what);
@@ -40,7 +38,12 @@ void add_signal_options(CLI::App& command, SignalOptions& options, bool several)
                      "COLUMN=VALUE of a CSV: rows with another value count as gaps, as in regime=static");
   command.add_option("--counter", options.choice.counter,
                      "Column of a CSV that counts the samples: numbers left out count as gaps");
-  command.add_option("--rate,-r", options.rate_hz, "Samples per second")->required();
+  command.add_option(
+      "--time", options.choice.time,
+      "Column of a CSV with time stamps: seconds, ISO 8601, or WEEK,SECONDS of GPS; times left "
+      "out count as gaps. A column named time_s or the like is taken by itself; none: no times");
+  command.add_option("--rate,-r", options.choice.rate_hz,
+                     "Samples per second (default: what the time stamps say, where there are any)");
   command.add_option("--unit,-u", options.unit, "Unit of the signal: rad/s, deg/s, m/s^2 or g");
   command.add_option("--levels,-l", options.levels, "Number of levels (default: all that the length allows)");
   command.add_flag("--robust", options.robust, "Resist outliers (Tukey biweight)");
@@ -52,17 +55,31 @@ void add_signal_options(CLI::App& command, SignalOptions& options, bool several)
   command.add_flag("--json", options.json, "Print JSON");
 }
 
-Result<std::vector<noise::WaveletVariance>> wavelet_variances_of(const SignalOptions& options) {
-  if (!(options.rate_hz > 0.0) || !std::isfinite(options.rate_hz)) {
-    return usage_error(fmt::format("--rate {} is impossible", options.rate_hz),
-                       "give the samples per second");
+Result<ReadSignals> wavelet_variances_of(const SignalOptions& options) {
+  const auto& asked_hz = options.choice.rate_hz;
+  if (asked_hz && (!(*asked_hz > 0.0) || !std::isfinite(*asked_hz))) {
+    return usage_error(fmt::format("--rate {} is impossible", *asked_hz), "give the samples per second");
   }
   if (const auto unit = noise::parse_unit(options.unit); !unit) return tl::unexpected(unit.error());
-  std::vector<noise::WaveletVariance> out;
+  ReadSignals out;
   for (const auto& file : options.files) {
-    auto wv = wavelet_variance_of(file, options);
+    const auto signal = read_signal(file, options.choice);
+    if (!signal) return tl::unexpected(signal.error());
+    if (!signal->rate_hz) {
+      return usage_error(fmt::format("{} has no time stamps that would tell its rate", file.string()),
+                         "give the samples per second, --rate");
+    }
+    constexpr double kSameRate = 0.005;
+    if (!out.wvs.empty() && std::abs(*signal->rate_hz / out.rate_hz - 1.0) > kSameRate) {
+      return usage_error(
+          fmt::format("{} has {:g} samples per second and {} has {:g}", options.files.front().string(),
+                      out.rate_hz, file.string(), *signal->rate_hz),
+          "replicates have one rate");
+    }
+    if (out.wvs.empty()) out.rate_hz = *signal->rate_hz;
+    auto wv = wavelet_variance_of(file, *signal, options);
     if (!wv) return tl::unexpected(wv.error());
-    out.push_back(std::move(*wv));
+    out.wvs.push_back(std::move(*wv));
   }
   return out;
 }

@@ -18,7 +18,6 @@ struct SignalOptions {
   std::vector<std::filesystem::path> files;  ///< one, or several of one sensor
   SignalChoice choice;
   std::string unit;
-  double rate_hz = 0.0;
   int levels = 0;
   bool robust = false;
   double efficiency = 0.6;
@@ -26,13 +25,18 @@ struct SignalOptions {
   bool json = false;
 };
 
-/// Registers FILE, --column, --where, --counter, --rate, --unit, --levels, --robust, --efficiency,
-/// --nan-is-gap and
-/// --json. `several`: FILE may be given more than once.
+/// Registers FILE, --column, --where, --counter, --time, --rate, --unit, --levels, --robust, --efficiency,
+/// --nan-is-gap and --json. `several`: FILE may be given more than once.
 void add_signal_options(CLI::App& command, SignalOptions& options, bool several);
 
+/// What the files hold; of several all at one rate.
+struct ReadSignals {
+  std::vector<noise::WaveletVariance> wvs;
+  double rate_hz = 0.0;
+};
+
 /// Reads the files and makes their wavelet variances. Errors: those of the reader and of the wavelet
-/// variance, and an impossible rate or unit (kUsage).
-Result<std::vector<noise::WaveletVariance>> wavelet_variances_of(const SignalOptions& options);
+/// variance, and an impossible rate or unit, none at all, or files of different ones (kUsage).
+Result<ReadSignals> wavelet_variances_of(const SignalOptions& options);
 
 }  // namespace imuscope::cli

@@ -23,6 +23,7 @@
 #include "noise/fit.h"
 #include "noise/inference.h"
 #include "noise/wv_covariance.h"
+#include "simulated_noise.h"
 
 namespace {
 
@@ -63,43 +64,6 @@ std::vector<Truth> truths() {
            {{{ProcessKind::kQuantization, 1.0, {}},
              {ProcessKind::kWhiteNoise, 0.09, {}},
              {ProcessKind::kRandomWalk, 1e-5, {}}}}}};
-}
-
-void add_component(const Component& c, std::mt19937_64& random, std::vector<double>& x) {
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform;
-  const double sd = std::sqrt(c.amplitude);
-  double state = 0.0;
-  switch (c.kind) {
-    case ProcessKind::kWhiteNoise:
-      for (double& v : x) v += sd * normal(random);
-      break;
-    case ProcessKind::kRandomWalk:
-      for (double& v : x) v += state += sd * normal(random);
-      break;
-    case ProcessKind::kGaussMarkov: {
-      const double phi = std::exp(-c.shape[0]);
-      const double drive = sd * std::sqrt(-std::expm1(-2.0 * c.shape[0]));
-      state = sd * normal(random);
-      for (double& v : x) {
-        v += state;
-        state = phi * state + drive * normal(random);
-      }
-      break;
-    }
-    case ProcessKind::kQuantization: {
-      const double scale = std::sqrt(12.0) * sd;
-      state = uniform(random);
-      for (double& v : x) {
-        const double next = uniform(random);
-        v += scale * (next - state);
-        state = next;
-      }
-      break;
-    }
-    default:
-      std::abort();
-  }
 }
 
 struct Tally {
@@ -204,13 +168,11 @@ bool study(const Truth& truth, int log2_n, const Settings& settings) {
   for (std::size_t i = 0; i < places.size(); ++i) tallies[i] = {true_value(truth, places[i]), sd[i], 0, 0};
   const auto spec = noise::parse_model(truth.spec).value();
   std::mt19937_64 random(20240u + static_cast<unsigned>(log2_n));
-  std::vector<double> x(n);
   JTests j_tests;
   int warned = 0;
   std::vector<std::string> names(places.size());
   for (int s = 0; s < settings.series; ++s) {
-    std::fill(x.begin(), x.end(), 0.0);
-    for (const Component& c : truth.model.components) add_component(c, random, x);
+    const auto x = imuscope::simulated_noise(truth.model, n, random);
     const FitResult fit = noise::fit(noise::haar_wavelet_variance(x, options).value(), spec, kRateHz).value();
     if (fit.j_test) {
       ++j_tests.n;

@@ -1,0 +1,278 @@
+#include "noise/inverted_intervals.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <limits>
+
+#include "noise/chi_squared.h"
+#include "noise/compare.h"
+#include "noise/fixed_point.h"
+#include "noise/inference.h"
+
+namespace imuscope::noise {
+namespace {
+
+/// Below this log-sd the estimate's own covariance is as good: estimates are near enough to Gaussian.
+constexpr double kQuickBelowLogSd = 0.05;
+/// An end further than this from the estimate, on the scale of the interval, is none.
+constexpr double kFurthest = 12.0;
+
+/// One model's parameters as a vector on the scales of their intervals, and the levels that they are fitted
+/// to.
+class Inversion {
+ public:
+  Inversion(const FitResult& fit, const WaveletVariance& wv, std::size_t rows)
+      : wv_(wv), base_(fit.model), places_(parameter_places(fit.model)), model_error_(fit.model_error) {
+    y_.resize(static_cast<Eigen::Index>(rows));
+    for (std::size_t i = 0; i < rows; ++i) {
+      levels_.push_back(fit.wv[i].observed.level);
+      y_[static_cast<Eigen::Index>(i)] = fit.wv[i].observed.value;
+    }
+    estimate_.resize(static_cast<Eigen::Index>(places_.size()));
+    for (std::size_t p = 0; p < places_.size(); ++p) estimate_[static_cast<Eigen::Index>(p)] = coordinate(p);
+  }
+
+  [[nodiscard]] double estimate(std::size_t p) const { return estimate_[static_cast<Eigen::Index>(p)]; }
+  [[nodiscard]] const ParameterPlace& place(std::size_t p) const { return places_[p]; }
+  [[nodiscard]] const Component& component(std::size_t p) const {
+    return base_.components[places_[p].component];
+  }
+
+  /// Range of a parameter's coordinate.
+  [[nodiscard]] CoordinateRange range(std::size_t p) const {
+    if (places_[p].shape < 0) return {estimate(p) - kFurthest, estimate(p) + kFurthest};
+    return coordinate_range(component(p).kind, places_[p].shape, levels_.back());
+  }
+
+  /// A term of amplitude zero is given one that no level shows yet.
+  void make_present(std::size_t p) {
+    Component& c = base_.components[places_[p].component];
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < levels_.size(); ++i) {
+      const double unit = unit_wv(c.kind, c.shape, levels_[i]).value;
+      least = std::min(least, y_[static_cast<Eigen::Index>(i)] / unit);
+    }
+    constexpr double kInvisible = 1e-2;
+    c.amplitude = kInvisible * least;
+    estimate_[static_cast<Eigen::Index>(p)] = coordinate(p);
+  }
+
+  /// Test that parameter p is `value`, ~ chi2 with one degree of freedom. `others` is where the search for
+  /// the other parameters starts and becomes where it ends.
+  double statistic(std::size_t p, double value, Eigen::VectorXd& others) const {
+    constexpr int kWeightRounds = 2;
+    others[static_cast<Eigen::Index>(p)] = value;
+    Problem problem;
+    for (int round = 0; round < kWeightRounds; ++round) {
+      problem = problem_at(others);
+      if (problem.whitener.size() == 0) return 0.0;
+      minimise(problem, others, p);
+    }
+    Eigen::VectorXd free = others;
+    const double fixed = cost(problem, others);
+    const double from_here = minimise(problem, free, kNone);
+    Eigen::VectorXd other_start = estimate_;
+    return std::max(0.0, fixed - std::min(from_here, minimise(problem, other_start, kNone)));
+  }
+
+  [[nodiscard]] const Eigen::VectorXd& start() const { return estimate_; }
+
+ private:
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  struct Problem {
+    Eigen::MatrixXd whitener;
+    Eigen::VectorXd y;  ///< the levels, their skewness taken out as the weights' model has it
+  };
+
+  [[nodiscard]] double coordinate(std::size_t p) const {
+    const Component& c = component(p);
+    const int s = places_[p].shape;
+    if (s >= 0) return coordinate_of_shape(c.kind, s, c.shape[static_cast<std::size_t>(s)]);
+    return c.amplitude > 0.0 ? std::log(c.amplitude) : 0.0;
+  }
+
+  [[nodiscard]] Model model_at(const Eigen::VectorXd& u) const {
+    Model model = base_;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      Component& c = model.components[places_[p].component];
+      if (c.amplitude <= 0.0) continue;
+      const double v = u[static_cast<Eigen::Index>(p)];
+      const int s = places_[p].shape;
+      if (s < 0) {
+        c.amplitude = std::exp(v);
+      } else {
+        c.shape[static_cast<std::size_t>(s)] = shape_of_coordinate(c.kind, s, v);
+      }
+    }
+    return model;
+  }
+
+  [[nodiscard]] Eigen::VectorXd curve(const Model& model) const {
+    Eigen::VectorXd m(y_.size());
+    for (Eigen::Index i = 0; i < m.size(); ++i) m[i] = model_wv(model, levels_[static_cast<std::size_t>(i)]);
+    return m;
+  }
+
+  /// Weights of the model at u. The levels' residuals are brought to a Gaussian's by cube roots (N-18).
+  [[nodiscard]] Problem problem_at(const Eigen::VectorXd& u) const {
+    const Model model = model_at(u);
+    const Eigen::VectorXd m = curve(model);
+    Eigen::MatrixXd v = sampling_covariance(model, wv_, levels_.size());
+    Problem problem;
+    problem.y.resize(m.size());
+    for (Eigen::Index i = 0; i < m.size(); ++i)
+      problem.y[i] = m[i] + near_gaussian_residual(y_[i], m[i], v(i, i));
+    for (Eigen::Index i = 0; i < m.size(); ++i)
+      v(i, i) += model_error_ * model_error_ * 2.0 * y_[i] * m[i] * m[i] / (y_[i] + m[i]);
+    problem.whitener = whitener_of(v);
+    return problem;
+  }
+
+  [[nodiscard]] double cost(const Problem& problem, const Eigen::VectorXd& u) const {
+    return (problem.whitener * (problem.y - curve(model_at(u)))).squaredNorm();
+  }
+
+  /// Levenberg-Marquardt over the parameters in use but `fixed`; returns the least cost.
+  double minimise(const Problem& problem, Eigen::VectorXd& u, std::size_t fixed) const {
+    constexpr int kMaxSteps = 40;
+    constexpr double kStop = 1e-4;  // beside a chi-square of 3.8
+    std::vector<Eigen::Index> free;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (p != fixed && component(p).amplitude > 0.0) free.push_back(static_cast<Eigen::Index>(p));
+    }
+    double now = cost(problem, u);
+    double damping = 1e-3;
+    for (int step = 0; step < kMaxSteps && !free.empty() && damping < 1e8; ++step) {
+      const Model model = model_at(u);
+      const Eigen::MatrixXd d = problem.whitener * wv_jacobian(model, levels_, places_)(Eigen::all, free);
+      const Eigen::VectorXd gradient = d.transpose() * (problem.whitener * (problem.y - curve(model)));
+      Eigen::MatrixXd normal = d.transpose() * d;
+      const Eigen::VectorXd diagonal = normal.diagonal();
+      bool improved = false;
+      while (!improved && damping < 1e8) {
+        normal.diagonal() = diagonal * (1.0 + damping) + Eigen::VectorXd::Constant(diagonal.size(), 1e-12);
+        const Eigen::VectorXd move = normal.ldlt().solve(gradient).cwiseMax(-2.0).cwiseMin(2.0);
+        Eigen::VectorXd next = u;
+        for (std::size_t i = 0; i < free.size(); ++i) {
+          const auto p = static_cast<std::size_t>(free[i]);
+          const CoordinateRange r = range(p);
+          next[free[i]] = std::clamp(u[free[i]] + move[static_cast<Eigen::Index>(i)],
+                                     r.low - (places_[p].shape < 0 ? kFurthest : 0.0),
+                                     r.high + (places_[p].shape < 0 ? kFurthest : 0.0));
+        }
+        const double trial = cost(problem, next);
+        if (trial < now) {
+          improved = true;
+          const double gain = now - trial;
+          u = next;
+          now = trial;
+          damping = std::max(1e-9, damping * 0.1);
+          if (gain < kStop) return now;
+        } else {
+          damping *= 10.0;
+        }
+      }
+    }
+    return now;
+  }
+
+  const WaveletVariance& wv_;
+  Model base_;
+  std::vector<ParameterPlace> places_;
+  double model_error_;
+  std::vector<int> levels_;
+  Eigen::VectorXd y_;
+  Eigen::VectorXd estimate_;
+};
+
+/// Where the test of parameter p first reaches `critical` in the direction `sign`; nothing where it does not.
+std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p, double sign, double step,
+                                      double critical) {
+  constexpr int kMaxSteps = 14;
+  constexpr int kMaxRefinements = 6;
+  constexpr double kNear = 0.02;  // of the root of the critical value
+  const CoordinateRange range = inversion.range(p);
+  const double root_critical = std::sqrt(critical);
+  Eigen::VectorXd others = inversion.start();
+  double inside = inversion.estimate(p);
+  double inside_root = 0.0;
+  double outside = inside;
+  double outside_root = 0.0;
+  for (int i = 0; outside_root < root_critical; ++i) {
+    if (i == kMaxSteps) return std::nullopt;
+    if (i > 0) {
+      inside = outside;
+      inside_root = outside_root;
+    }
+    const double limit = sign > 0.0 ? range.high : range.low;
+    if (inside == limit) return std::nullopt;
+    outside = sign > 0.0 ? std::min(limit, inside + step) : std::max(limit, inside - step);
+    outside_root = std::sqrt(inversion.statistic(p, outside, others));
+    step *= 1.5;
+  }
+  for (int i = 0; i < kMaxRefinements && std::abs(outside_root - root_critical) > kNear * root_critical;
+       ++i) {
+    const double share = std::clamp((root_critical - inside_root) / (outside_root - inside_root), 0.1, 0.95);
+    const double middle = inside + share * (outside - inside);
+    const double root = std::sqrt(inversion.statistic(p, middle, others));
+    if (root >= root_critical) {
+      outside = middle;
+      outside_root = root;
+    } else {
+      inside = middle;
+      inside_root = root;
+      if (root_critical - root <= kNear * root_critical) return middle;
+    }
+  }
+  return outside;
+}
+
+void bound_from_above(ParameterEstimate& p, Inversion inversion, std::size_t place, double critical) {
+  inversion.make_present(place);
+  const auto end = end_of_interval(inversion, place, 1.0, 2.0, critical);
+  if (end) p.ci_high = from_interval_scale(p, *end);
+}
+
+void invert(ParameterEstimate& p, const Inversion& inversion, std::size_t place, double two_sided,
+            double one_sided) {
+  constexpr double kShortestStep = 0.2;
+  constexpr double kLongestStep = 1.5;
+  const double step = std::clamp(2.0 * p.log_sd.value_or(1.0), kShortestStep, kLongestStep);
+  const double at = inversion.estimate(place);
+  const auto low = end_of_interval(inversion, place, -1.0, step, two_sided);
+  const auto high = end_of_interval(inversion, place, 1.0, step, two_sided);
+  const auto at_place = [&, centre = on_interval_scale(p)](double end) {
+    return from_interval_scale(p, centre + end - at);
+  };
+  p.ci_low.reset();
+  p.ci_high.reset();
+  if (low && high) {
+    p.ci_low = at_place(*low);
+    p.ci_high = at_place(*high);
+  } else if (const auto only = low    ? end_of_interval(inversion, place, -1.0, step, one_sided)
+                               : high ? end_of_interval(inversion, place, 1.0, step, one_sided)
+                                      : std::nullopt) {
+    (low ? p.ci_low : p.ci_high) = at_place(*only);
+  }
+}
+
+}  // namespace
+
+void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels) {
+  const double two_sided = chi_squared_quantile(1.0, result.confidence);
+  // The square of the Gaussian's one-sided quantile.
+  const double one_sided = chi_squared_quantile(1.0, 2.0 * result.confidence - 1.0);
+  const Inversion inversion(result, wv, levels);
+  for (std::size_t i = 0; i < result.parameters.size(); ++i) {
+    ParameterEstimate& p = result.parameters[i];
+    if (inversion.component(i).amplitude > 0.0) {
+      if (!p.log_sd || *p.log_sd > kQuickBelowLogSd) invert(p, inversion, i, two_sided, one_sided);
+    } else if (shape_count(inversion.component(i).kind) == 0) {
+      bound_from_above(p, inversion, i, one_sided);
+    }
+  }
+}
+
+}  // namespace imuscope::noise

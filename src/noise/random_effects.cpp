@@ -1,0 +1,79 @@
+#include "noise/random_effects.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+
+#include "base/contracts.h"
+#include "noise/chi_squared.h"
+
+namespace imuscope::noise {
+namespace {
+
+/// Units weighted by one value of the variance between them.
+struct Weighted {
+  double mean = 0.0;
+  double weight = 0.0;  ///< sum over the units
+  double q = 0.0;       ///< weighted sum of squares about the mean
+};
+
+Weighted weighted_by(std::span<const double> values, std::span<const double> variances, double between) {
+  Weighted out;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const double weight = 1.0 / (variances[k] + between);
+    out.weight += weight;
+    out.mean += weight * values[k];
+  }
+  out.mean /= out.weight;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const double d = values[k] - out.mean;
+    out.q += d * d / (variances[k] + between);
+  }
+  return out;
+}
+
+/// The variance between units at which the weighted sum of squares is `q`; it falls with that variance.
+double between_at(std::span<const double> values, std::span<const double> variances, double q) {
+  if (weighted_by(values, variances, 0.0).q <= q) return 0.0;
+  double low = 0.0;
+  double high = *std::max_element(variances.begin(), variances.end());
+  constexpr int kDoublings = 200;
+  for (int i = 0; i < kDoublings && weighted_by(values, variances, high).q > q; ++i) {
+    low = high;
+    high *= 2.0;
+  }
+  constexpr int kHalvings = 60;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (weighted_by(values, variances, middle).q > q ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+}  // namespace
+
+std::optional<RandomEffects> random_effects(std::span<const double> values, std::span<const double> variances,
+                                            double confidence) {
+  IMUSCOPE_EXPECTS(values.size() == variances.size());
+  if (values.size() < 2) return std::nullopt;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (!(variances[k] > 0.0) || !std::isfinite(variances[k]) || !std::isfinite(values[k]))
+      return std::nullopt;
+  }
+  const auto dof = static_cast<double>(values.size() - 1);
+  const double tail = 0.5 * (1.0 - confidence);
+  const double between = between_at(values, variances, dof);
+  const Weighted at = weighted_by(values, variances, between);
+  RandomEffects out;
+  out.mean = at.mean;
+  out.sd = std::sqrt(at.q / dof / at.weight);
+  const double half = boost::math::quantile(boost::math::students_t(dof), 1.0 - tail) * out.sd;
+  out.ci_low = out.mean - half;
+  out.ci_high = out.mean + half;
+  out.spread = std::sqrt(between);
+  out.spread_low = std::sqrt(between_at(values, variances, chi_squared_quantile(dof, 1.0 - tail)));
+  out.spread_high = std::sqrt(between_at(values, variances, chi_squared_quantile(dof, tail)));
+  return out;
+}
+
+}  // namespace imuscope::noise

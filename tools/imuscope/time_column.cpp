@@ -1,0 +1,215 @@
+#include "time_column.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <deque>
+
+namespace imuscope::cli {
+namespace {
+
+/// Quartz and rounded stamps stay within; the next wrong rate that people type is further away.
+constexpr double kRateTolerance = 0.005;
+/// A row that comes later than so many periods has a hole before it, or is the first of a late burst.
+constexpr double kHole = 1.5;
+/// Rows by which a burst may delay its first one.
+constexpr std::size_t kBurst = 32;
+
+bool is_one_of(std::string_view name, std::span<const std::string_view> names) {
+  std::string lower(name);
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(names.begin(), names.end(), lower) != names.end();
+}
+
+/// Reads `digits` digits at the front of `text` and drops them.
+std::optional<int> take_number(std::string_view& text, std::size_t digits) {
+  if (text.size() < digits) return std::nullopt;
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + digits, value);
+  if (error != std::errc() || end != text.data() + digits || text.front() == '-') return std::nullopt;
+  text.remove_prefix(digits);
+  return value;
+}
+
+bool take_char(std::string_view& text, std::string_view wanted) {
+  if (text.empty() || wanted.find(text.front()) == std::string_view::npos) return false;
+  text.remove_prefix(1);
+  return true;
+}
+
+/// Seconds that a zone such as "+01:00", "-0530" or "Z" is ahead of UTC.
+std::optional<double> zone_offset_s(std::string_view text) {
+  if (text.empty() || text == "Z" || text == "z") return 0.0;
+  const double sign = text.front() == '-' ? -1.0 : 1.0;
+  if (!take_char(text, "+-")) return std::nullopt;
+  const auto hours = take_number(text, 2);
+  if (!hours) return std::nullopt;
+  take_char(text, ":");
+  const auto minutes = text.empty() ? std::optional(0) : take_number(text, 2);
+  if (!minutes || !text.empty()) return std::nullopt;
+  return sign * (3600.0 * *hours + 60.0 * *minutes);
+}
+
+std::optional<double> iso_8601(std::string_view text) {
+  const auto year = take_number(text, 4);
+  if (!year || !take_char(text, "-")) return std::nullopt;
+  const auto month = take_number(text, 2);
+  if (!month || !take_char(text, "-")) return std::nullopt;
+  const auto day = take_number(text, 2);
+  if (!day || !take_char(text, "Tt ")) return std::nullopt;
+  const auto hour = take_number(text, 2);
+  if (!hour || !take_char(text, ":")) return std::nullopt;
+  const auto minute = take_number(text, 2);
+  if (!minute || !take_char(text, ":")) return std::nullopt;
+  const std::size_t end_of_seconds = std::min(text.find_first_not_of("0123456789."), text.size());
+  double second = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + end_of_seconds, second);
+  if (error != std::errc() || end != text.data() + end_of_seconds) return std::nullopt;
+  const auto zone = zone_offset_s(text.substr(end_of_seconds));
+  const std::chrono::year_month_day date{std::chrono::year{*year},
+                                         std::chrono::month{static_cast<unsigned>(*month)},
+                                         std::chrono::day{static_cast<unsigned>(*day)}};
+  constexpr double kLeapSecondEnd = 61.0;
+  if (!zone || !date.ok() || *hour > 23 || *minute > 59 || second >= kLeapSecondEnd) return std::nullopt;
+  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+  return 86'400.0 * static_cast<double>(days) + 3600.0 * *hour + 60.0 * *minute + second - *zone;
+}
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Time from a row to the next, per sample where a counter tells how many it is.
+std::vector<double> steps_of(std::span<const double> stamps_s, std::span<const std::int64_t> counts) {
+  std::vector<double> steps(stamps_s.size() - 1);
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const double samples = counts.empty() ? 1.0 : static_cast<double>(counts[i + 1] - counts[i]);
+    steps[i] = (stamps_s[i + 1] - stamps_s[i]) / std::max(1.0, samples);
+  }
+  return steps;
+}
+
+/// Rows that arrive in bursts: many steps are longer than the middle one, where lost samples make few so.
+bool are_bursts(const std::vector<double>& steps, double median) {
+  constexpr double kMostLost = 0.08;
+  constexpr double kLeastEven = 0.7;
+  const auto n = static_cast<double>(steps.size());
+  const auto longer =
+      std::count_if(steps.begin(), steps.end(), [&](double step) { return step > kHole * median; });
+  const auto shorter =
+      std::count_if(steps.begin(), steps.end(), [&](double step) { return step < (2.0 - kHole) * median; });
+  return median <= 0.0 || static_cast<double>(longer) > kMostLost * n ||
+         static_cast<double>(longer + shorter) > (1.0 - kLeastEven) * n;
+}
+
+/// The period: the mean of the steps that are one, or over bursts of rows the median of what each makes.
+double period_of(std::span<const double> stamps_s, const std::vector<double>& steps) {
+  const double median = median_of(steps);
+  if (are_bursts(steps, median)) {
+    std::vector<double> bursts;
+    for (std::size_t i = 0; i + kBurst < stamps_s.size(); i += kBurst)
+      bursts.push_back((stamps_s[i + kBurst] - stamps_s[i]) / static_cast<double>(kBurst));
+    return bursts.empty() ? median : median_of(bursts);
+  }
+  double sum = 0.0;
+  std::size_t n = 0;
+  for (const double step : steps) {
+    if (step > kHole * median) continue;
+    sum += step;
+    ++n;
+  }
+  return sum / static_cast<double>(n);
+}
+
+/// Samples missing before every row: by how many periods it and the rows behind it are late.
+std::vector<std::int64_t> holes_of(std::span<const double> stamps_s, double period_s) {
+  std::vector<std::int64_t> missing(stamps_s.size(), 0);
+  const auto lateness = [&](std::size_t i) {
+    return stamps_s[i] - stamps_s[0] - static_cast<double>(i) * period_s;
+  };
+  std::deque<std::size_t> smallest;  // rows ahead, by rising lateness: the front is the least of the window
+  std::size_t next = 0;
+  double before = 0.0;
+  for (std::size_t i = 0; i < stamps_s.size(); ++i) {
+    for (; next < stamps_s.size() && next < i + kBurst; ++next) {
+      while (!smallest.empty() && lateness(smallest.back()) >= lateness(next)) smallest.pop_back();
+      smallest.push_back(next);
+    }
+    while (smallest.front() < i) smallest.pop_front();
+    const double now = lateness(smallest.front());
+    if (i > 0 && now - before > (kHole - 1.0) * period_s)
+      missing[i] = std::llround((now - before) / period_s);
+    before = now;
+  }
+  return missing;
+}
+
+}  // namespace
+
+std::optional<double> parse_stamp(std::string_view text) {
+  if (text.size() > 1 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
+  return iso_8601(text);
+}
+
+bool is_time_name(std::string_view name) {
+  constexpr std::array<std::string_view, 10> kNames{"time_s",   "time",      "timestamp", "time_utc",
+                                                    "utc",      "t_s",       "utc_time",  "timestamp_s",
+                                                    "datetime", "time_utc_s"};
+  return is_one_of(name, kNames);
+}
+
+bool is_week_name(std::string_view name) {
+  constexpr std::array<std::string_view, 3> kNames{"gps_week", "gpsweek", "week"};
+  return is_one_of(name, kNames);
+}
+
+bool is_week_seconds_name(std::string_view name) {
+  constexpr std::array<std::string_view, 8> kNames{
+      "gps_tow", "tow", "tow_s", "gps_seconds", "gpssec", "gps_seconds_of_week", "sow", "gps_tow_s"};
+  return is_one_of(name, kNames);
+}
+
+Result<StampedRows> rows_of_stamps(std::span<const double> stamps_s, std::span<const std::int64_t> counts,
+                                   std::optional<double> rate_hz) {
+  constexpr std::size_t kFewest = 3;
+  if (stamps_s.size() < kFewest) {
+    return work_error(fmt::format("{} time stamps tell no rate", stamps_s.size()),
+                      "leave the times out (--time none)");
+  }
+  for (std::size_t i = 1; i < stamps_s.size(); ++i) {
+    if (stamps_s[i] >= stamps_s[i - 1]) continue;
+    return work_error(fmt::format("the time goes back, from {:.6f} to {:.6f}, at row {}", stamps_s[i - 1],
+                                  stamps_s[i], i + 1),
+                      "sort the rows, or leave the times out (--time none)");
+  }
+  const auto steps = steps_of(stamps_s, counts);
+  const double period_s = period_of(stamps_s, steps);
+  if (!(period_s > 0.0)) {
+    return work_error("the time stamps do not move on", "leave the times out (--time none)");
+  }
+  // Enough digits for any clock, and none of the stamps' own rounding.
+  const double fits_hz = std::stod(fmt::format("{:.6g}", 1.0 / period_s));
+  if (rate_hz && std::abs(*rate_hz * period_s - 1.0) > kRateTolerance) {
+    return usage_error(fmt::format("--rate {:g} contradicts the time stamps, whose rows are {:.6g} s apart",
+                                   *rate_hz, period_s),
+                       fmt::format("--rate {:g} fits", fits_hz));
+  }
+  StampedRows rows;
+  rows.rate_hz = rate_hz.value_or(fits_hz);
+  rows.missing_before =
+      counts.empty() ? holes_of(stamps_s, period_s) : std::vector<std::int64_t>(stamps_s.size(), 0);
+  return rows;
+}
+
+}  // namespace imuscope::cli

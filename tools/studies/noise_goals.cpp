@@ -1,0 +1,309 @@
+/// What is asked of models that are fitted to simulated series of known truth, cell by cell: that a selection
+/// finds the truth and no winner is rejected, that intervals hold the truth in every series (an end that a
+/// fit does not give is open), that the test of replicates rejects as often as it says, and that pooled
+/// intervals contain what replicates differ by.
+///
+/// Series are numbered; `--results FILE` keeps what was counted, some series a line, and a later call goes on
+/// where the file ends. A band is missed where the count lies beyond it by more than 3.3 of its binomial sd.
+/// Exits 1 then.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "noise/inference.h"
+#include "noise/replicates.h"
+#include "noise/select.h"
+#include "simulated_noise.h"
+
+namespace {
+
+namespace noise = imuscope::noise;
+using noise::Component;
+using noise::ProcessKind;
+
+constexpr double kRate_hz = 100.0;
+
+/// Of how many series something was so.
+struct Count {
+  int hits = 0;
+  int of = 0;
+};
+using Counts = std::map<std::string, Count>;
+
+/// Per cent that a count of this name has to lie in.
+struct Band {
+  std::string name;
+  double low;
+  double high;
+};
+
+struct Cell {
+  std::string name;
+  std::vector<Band> bands;
+  std::function<void(std::mt19937_64&, Counts&)> series;
+};
+
+void count(Counts& counts, const std::string& name, bool hit) {
+  Count& c = counts[name];
+  c.hits += hit ? 1 : 0;
+  ++c.of;
+}
+
+Component white(double sigma2) { return {ProcessKind::kWhiteNoise, sigma2, {}}; }
+Component walk(double gamma2) { return {ProcessKind::kRandomWalk, gamma2, {}}; }
+Component quantization(double q2) { return {ProcessKind::kQuantization, q2, {}}; }
+Component markov(double beta, double sigma2) {
+  return {ProcessKind::kGaussMarkov, sigma2, {beta / kRate_hz, 0.0}};
+}
+
+noise::ModelSpec spec_of(const noise::Model& model) {
+  noise::ModelSpec spec;
+  for (const Component& c : model.components) spec.processes.push_back(c.kind);
+  return spec;
+}
+
+/// Components in the order of a fit.
+std::vector<noise::Model> truths() {
+  return {{{white(1.0)}},
+          {{quantization(1.0), white(0.09)}},
+          {{white(1.0), markov(1.0, 0.5)}},
+          {{white(1.0), walk(1e-4)}},
+          {{white(1.0), markov(10.5, 0.53), markov(0.3, 0.1)}},
+          {{white(1.0), markov(10.5, 0.53), walk(1e-5)}},
+          {{quantization(1.0), white(0.09), markov(1.0, 0.05)}},
+          {{quantization(1.0), white(0.09), walk(1e-5)}},
+          {{white(1.0), markov(22.0, 0.6), markov(2.0, 0.2), markov(0.2, 0.1)}}};
+}
+
+double true_value(const noise::Model& model, const noise::ParameterPlace& place) {
+  const Component& c = model.components[place.component];
+  return place.shape < 0 ? c.amplitude : c.shape[static_cast<std::size_t>(place.shape)] * kRate_hz;
+}
+
+bool holds(const noise::ParameterEstimate& p, double truth) {
+  return (!p.ci_low || *p.ci_low <= truth) && (!p.ci_high || truth <= *p.ci_high);
+}
+
+Cell interval_cell(const std::string& name, const noise::Model& truth, std::size_t n) {
+  return {name, {{"", 91.0, 98.0}}, [truth, n](std::mt19937_64& random, Counts& counts) {
+            noise::FitOptions options;
+            options.intervals = noise::Intervals::kInverted;
+            const auto wv = noise::haar_wavelet_variance(imuscope::simulated_noise(truth, n, random)).value();
+            const auto fit = noise::fit(wv, spec_of(truth), kRate_hz, options).value();
+            const auto places = noise::parameter_places(truth);
+            for (std::size_t i = 0; i < places.size(); ++i) {
+              const auto& p = fit.parameters[i];
+              count(counts, p.process + "." + p.name, holds(p, true_value(truth, places[i])));
+            }
+          }};
+}
+
+std::vector<Cell> interval_cells(const std::vector<int>& lengths) {
+  std::vector<Cell> cells;
+  for (const int log2_n : lengths) {
+    for (const auto& truth : truths()) {
+      cells.push_back(interval_cell(fmt::format("intervals/{}/2^{}", spec_of(truth).name(), log2_n), truth,
+                                    std::size_t{1} << static_cast<unsigned>(log2_n)));
+    }
+  }
+  return cells;
+}
+
+/// A slow process of which the record lasts a few correlation times.
+std::vector<Cell> slow_cells() {
+  std::vector<Cell> cells;
+  constexpr std::size_t kN = 1U << 16U;
+  for (const double times : {10.0, 15.0, 22.0, 30.0, 50.0, 100.0}) {
+    const double beta = times * kRate_hz / static_cast<double>(kN);
+    cells.push_back(
+        interval_cell(fmt::format("slow/WN+GM/{:g}", times), {{white(1.0), markov(beta, 0.5)}}, kN));
+  }
+  return cells;
+}
+
+std::vector<Cell> selection_cells() {
+  // The shares of right winners that are asked for, of these truths in this order.
+  const std::vector<std::pair<noise::Model, double>> asked{
+      {{{white(1.0), walk(1e-4)}}, 93.0},
+      {{{white(1.0), markov(10.5, 0.53), markov(0.3, 0.1)}}, 92.0},
+      {{{white(1.0)}}, 87.0},
+      {{{white(1.0), markov(1.0, 0.5)}}, 87.0},
+      {{{white(1.0), markov(10.5, 0.53), walk(1e-5)}}, 78.0}};
+  std::vector<Cell> cells;
+  for (const auto& [truth, right] : asked) {
+    const std::string name = spec_of(truth).name();
+    cells.push_back({"selection/" + name,
+                     {{"right", right, 100.0}, {"rejected", 0.0, 0.5}},
+                     [truth, name](std::mt19937_64& random, Counts& counts) {
+                       constexpr std::size_t kN = 1U << 16U;
+                       const auto wv =
+                           noise::haar_wavelet_variance(imuscope::simulated_noise(truth, kN, random)).value();
+                       const auto full = noise::parse_model("QN+WN+2*GM+RW").value();
+                       const auto ranked = noise::rank_models(wv, full, kRate_hz).value();
+                       const noise::FitResult& best = ranked.front().fit;
+                       count(counts, "right", best.spec.name() == name);
+                       count(counts, "rejected", best.j_test && best.j_test->p_value < 0.001);
+                     }});
+  }
+  return cells;
+}
+
+/// Each replicate's white noise differs by `spread` (sd of the logarithm), all else by as much where it is
+/// large.
+noise::Model varied(const noise::Model& truth, double spread, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  noise::Model model = truth;
+  for (Component& c : model.components) c.amplitude *= std::exp(spread * normal(random));
+  return model;
+}
+
+std::vector<Cell> replicate_cells() {
+  std::vector<Cell> cells;
+  const auto all = truths();
+  for (const std::size_t which : {2U, 4U, 8U, 5U}) {
+    for (const double spread : {0.0, 0.05, 0.2}) {
+      const noise::Model truth = all[which];
+      std::vector<Band> bands{{"", 91.0, 98.0}};
+      if (spread == 0.0) bands.insert(bands.begin(), {"differ", 3.0, 8.0});
+      if (spread > 0.0) bands.insert(bands.begin(), {"differ", 0.0, 100.0});
+      cells.push_back(
+          {fmt::format("replicates/{}/{:g}", spec_of(truth).name(), spread), bands,
+           [truth, spread](std::mt19937_64& random, Counts& counts) {
+             constexpr std::size_t kN = 1U << 15U;
+             constexpr int kReplicates = 4;
+             std::vector<noise::WaveletVariance> wvs;
+             for (int k = 0; k < kReplicates; ++k) {
+               const auto model = varied(truth, spread, random);
+               wvs.push_back(
+                   noise::haar_wavelet_variance(imuscope::simulated_noise(model, kN, random)).value());
+             }
+             const auto joint = noise::fit_jointly(wvs, spec_of(truth), kRate_hz).value();
+             count(counts, "differ", joint.homogeneity && joint.homogeneity->p_value < 0.05);
+             const auto places = noise::parameter_places(truth);
+             for (std::size_t i = 0; i < places.size(); ++i) {
+               const auto& p = joint.pooled.parameters[i];
+               count(counts, p.process + "." + p.name, holds(p, true_value(truth, places[i])));
+             }
+           }});
+    }
+  }
+  return cells;
+}
+
+/// What earlier calls counted, and the file to go on in.
+class Results {
+ public:
+  explicit Results(const std::string& file) : file_(file) {
+    std::ifstream in(file);
+    for (std::string line; std::getline(in, line);) {
+      std::istringstream words(line);
+      std::string cell;
+      int first = 0;
+      int end = 0;
+      if (!(words >> cell >> first >> end) || first != done_[cell]) continue;
+      Counts read;
+      std::string name;
+      for (Count c; words >> name >> c.hits >> c.of;) read[name] = c;
+      add(cell, end, read);
+    }
+  }
+
+  [[nodiscard]] int done(const std::string& cell) const { return done_.contains(cell) ? done_.at(cell) : 0; }
+  [[nodiscard]] const Counts& counts(const std::string& cell) { return counts_[cell]; }
+
+  void keep(const std::string& cell, int end, const Counts& counts) {
+    if (!file_.empty()) {
+      std::string line = fmt::format("{} {} {}", cell, done(cell), end);
+      for (const auto& [name, c] : counts) line += fmt::format(" {} {} {}", name, c.hits, c.of);
+      std::ofstream(file_, std::ios::app) << line << '\n';
+    }
+    add(cell, end, counts);
+  }
+
+ private:
+  void add(const std::string& cell, int end, const Counts& counts) {
+    for (const auto& [name, c] : counts) {
+      counts_[cell][name].hits += c.hits;
+      counts_[cell][name].of += c.of;
+    }
+    done_[cell] = end;
+  }
+
+  std::string file_;
+  std::map<std::string, int> done_;
+  std::map<std::string, Counts> counts_;
+};
+
+void run(const Cell& cell, int series, Results& results) {
+  constexpr int kSeriesALine = 20;
+  while (results.done(cell.name) < series) {
+    const int first = results.done(cell.name);
+    const int end = std::min(series, first + kSeriesALine);
+    Counts counts;
+    for (int s = first; s < end; ++s) {
+      std::mt19937_64 random(20240U + static_cast<unsigned>(s));
+      cell.series(random, counts);
+    }
+    results.keep(cell.name, end, counts);
+  }
+}
+
+bool judge(const Cell& cell, const Counts& counts) {
+  constexpr double kSd = 3.3;
+  bool good = true;
+  fmt::print("{}\n", cell.name);
+  for (const auto& [name, c] : counts) {
+    const Band* band = nullptr;
+    for (const Band& b : cell.bands) {
+      if (band == nullptr && (b.name == name || b.name.empty())) band = &b;
+    }
+    const double share = 100.0 * c.hits / c.of;
+    const auto sd_at = [&](double percent) { return std::sqrt(percent * (100.0 - percent) / c.of); };
+    const bool holds_here = band == nullptr || (share >= band->low - kSd * sd_at(band->low) &&
+                                                share <= band->high + kSd * sd_at(band->high));
+    good = good && holds_here;
+    fmt::print("  {:<12} {:>6} of {:>6}  {:>6.2f} % (sd {:.2f})  {}\n", name, c.hits, c.of, share,
+               sd_at(share),
+               band == nullptr
+                   ? ""
+                   : fmt::format("{:g} to {:g}: {}", band->low, band->high, holds_here ? "ok" : "MISSED"));
+  }
+  (void)std::fflush(stdout);
+  return good;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Goals of the noise models on simulated series"};
+  int series = 1000;
+  std::string results_file;
+  std::string only;
+  std::vector<int> lengths{14, 16, 18};
+  app.add_option("--series", series, "a cell")->check(CLI::Range(1, 1'000'000));
+  app.add_option("--lengths", lengths, "logarithms to base 2, of the intervals")->check(CLI::Range(10, 22));
+  app.add_option("--results", results_file, "keep counts here, and go on from there")->type_name("FILE");
+  app.add_option("--only", only, "cells whose name begins so: intervals, slow, selection, replicates")
+      ->type_name("TEXT");
+  CLI11_PARSE(app, argc, argv);
+  std::vector<Cell> cells = selection_cells();
+  for (auto&& more : {interval_cells(lengths), slow_cells(), replicate_cells()})
+    cells.insert(cells.end(), more.begin(), more.end());
+  Results results(results_file);
+  bool good = true;
+  for (const Cell& cell : cells) {
+    if (!cell.name.starts_with(only)) continue;
+    run(cell, series, results);
+    good = judge(cell, results.counts(cell.name)) && good;
+  }
+  fmt::print("\n{}\n", good ? "every goal is met" : "NOT every goal is met");
+  return good ? 0 : 1;
+}
