@@ -38,8 +38,9 @@ std::filesystem::path capture_file(const std::filesystem::path& first, int n) {
   return path;
 }
 
-Result<CaptureFiles> CaptureFiles::open(const std::filesystem::path& first) {
-  auto log = EventLogReader::open(first);
+Result<CaptureFiles> CaptureFiles::open(const std::filesystem::path& first,
+                                        EventLogReader::Beginning beginning) {
+  auto log = SealedLog::open(first, beginning);
   if (!log) return tl::unexpected(log.error());
   return CaptureFiles(first, std::move(*log));
 }
@@ -63,14 +64,40 @@ bool CaptureFiles::next(LogEvent& event) {
   while (!log_.next(event)) {
     if (!open_following()) return false;
   }
-  if (std::exchange(at_beginning_, false)) t0_ = t0_of(event);
+  if (std::exchange(at_beginning_, false)) {
+    t0_ = t0_of(event);
+    if (!t0_ && log_.health().is_sealed) t0_ = t0_of_others();
+  }
   last_utime_ = event.utime;
   return true;
 }
 
+std::vector<CapturedFile> CaptureFiles::files() const {
+  auto files = finished_;
+  files.push_back({number_, log_.health()});
+  return files;
+}
+
+/// Of a capture of our own whose first header is damaged: what the next file there says.
+std::optional<HostTime> CaptureFiles::t0_of_others() const {
+  for (int number = 1; number <= kMissingMax; ++number) {
+    const auto path = capture_file(first_, number);
+    std::error_code ignored;
+    if (!std::filesystem::exists(path, ignored)) continue;
+    auto log = EventLogReader::open(path);
+    LogEvent event;
+    if (log && log->next(event)) return t0_of(event);
+  }
+  return std::nullopt;
+}
+
 /// Whether file `number` goes on with this capture, and what is missing before it.
 std::optional<CaptureBreak> CaptureFiles::joins(int number) const {
-  auto log = EventLogReader::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
+  const auto path = capture_file(first_, number);
+  // Most of those that are asked for are not there: no error has to be made for them.
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) return std::nullopt;
+  auto log = SealedLog::open(path, EventLogReader::Beginning::kMayBeDamaged);
   LogEvent event;
   if (!log || !log->next(event)) return std::nullopt;
   const auto t0 = t0_of(event);
@@ -80,9 +107,10 @@ std::optional<CaptureBreak> CaptureFiles::joins(int number) const {
   const double seconds =
       (static_cast<double>(event.utime) - static_cast<double>(last_utime_)) * kSecondsPerMicrosecond;
   // Where the header is among what is damaged, the records say whether they follow.
-  const bool is_damaged = log->bytes_skipped() > 0;
+  const LogHealth health = log->health();
+  const bool is_damaged = health.bytes_skipped + health.records_damaged > 0;
   if (!t0 && !(is_damaged && seconds > -kDisorderMax_s && seconds < kBreakMax_s)) return std::nullopt;
-  return CaptureBreak{number_ + 1, number - number_ - 1, number, is_damaged, seconds};
+  return CaptureBreak{number_ + 1, number - number_ - 1, number, !t0, seconds};
 }
 
 /// Goes on to the next file of the same run, if there is one.
@@ -91,10 +119,9 @@ bool CaptureFiles::open_following() {
   for (int number = number_ + 1; number <= number_ + 1 + kMissingMax; ++number) {
     const auto found = joins(number);
     if (!found) continue;
-    auto log = EventLogReader::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
+    auto log = SealedLog::open(capture_file(first_, number), EventLogReader::Beginning::kMayBeDamaged);
     if (!log) return false;
-    bytes_skipped_ += log_.bytes_skipped();
-    bytes_cut_off_ += log_.bytes_cut_off();
+    finished_.push_back({number_, log_.health()});
     log_ = std::move(*log);
     number_ = number;
     if (found->n_missing > 0 || found->beginning_is_damaged) breaks_.push_back(*found);

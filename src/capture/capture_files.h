@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/result.h"
-#include "capture/event_log_reader.h"
 #include "capture/records.h"
+#include "capture/sealed_log.h"
 
 namespace imuscope {
 
@@ -27,13 +27,23 @@ struct CaptureBreak {
   double seconds = 0.0;  ///< between the last record before and the first behind, by the recorder's clock
 };
 
+/// One file of a capture that was read to its end.
+struct CapturedFile {
+  int number = 0;
+  LogHealth health;
+};
+
 /// Iterates over the events of a capture through all its files, given the first. A file belongs to the
 /// capture if it begins with a run header of the same t0; what lies beside it from another run is left alone.
 /// Files that are missing or unreadable in between are passed over, and so is the damaged beginning of one
-/// whose records follow in time: breaks() tells of them. Thread: one, of the soft world.
+/// whose records follow in time: breaks() tells of them. Records that a seal says are damaged are passed
+/// over, too: files() tells of them. Thread: one, of the soft world.
 class CaptureFiles {
  public:
-  static Result<CaptureFiles> open(const std::filesystem::path& first);
+  /// @param beginning  of the first file
+  static Result<CaptureFiles> open(
+      const std::filesystem::path& first,
+      EventLogReader::Beginning beginning = EventLogReader::Beginning::kIsARecord);
 
   /// Is told how much of the present file has been read, 0 to 1.
   void on_read(const std::function<void(double share)>& listener);
@@ -41,29 +51,29 @@ class CaptureFiles {
   /// Fetches the next event. Returns false at the end of the last file.
   [[nodiscard]] bool next(LogEvent& event);
 
-  /// Sums over the files; see EventLogReader.
-  [[nodiscard]] std::uint64_t bytes_skipped() const noexcept { return bytes_skipped_ + log_.bytes_skipped(); }
-  [[nodiscard]] std::uint64_t bytes_cut_off() const noexcept { return bytes_cut_off_ + log_.bytes_cut_off(); }
+  /// Those that were begun so far.
+  [[nodiscard]] std::vector<CapturedFile> files() const;
+  /// Of the present one.
+  [[nodiscard]] int number() const noexcept { return number_; }
   /// So far.
   [[nodiscard]] const std::vector<CaptureBreak>& breaks() const noexcept { return breaks_; }
 
  private:
-  CaptureFiles(std::filesystem::path first, EventLogReader log)
-      : first_(std::move(first)), log_(std::move(log)) {}
+  CaptureFiles(std::filesystem::path first, SealedLog log) : first_(std::move(first)), log_(std::move(log)) {}
   bool open_following();
   [[nodiscard]] std::optional<CaptureBreak> joins(int number) const;
+  [[nodiscard]] std::optional<HostTime> t0_of_others() const;
   void report_reads();
 
   std::filesystem::path first_;
   std::function<void(double)> on_read_;
   int number_ = 0;
-  EventLogReader log_;
+  SealedLog log_;
   bool at_beginning_ = true;
   std::optional<HostTime> t0_;
   std::int64_t last_utime_ = 0;
   std::vector<CaptureBreak> breaks_;
-  std::uint64_t bytes_skipped_ = 0;
-  std::uint64_t bytes_cut_off_ = 0;
+  std::vector<CapturedFile> finished_;
 };
 
 }  // namespace imuscope

@@ -28,7 +28,8 @@ class LossFinder {
     Seen& seen = place->second;
     if (is_first) seen.last_arrival = piece.read.arrival;
     if (piece.sequence > seen.next_sequence) {
-      losses.push_back({piece.read.device, seen.last_arrival, piece.sequence - seen.next_sequence});
+      losses.push_back(
+          {piece.read.device, seen.last_arrival, piece.read.arrival, piece.sequence - seen.next_sequence});
     }
     seen.next_sequence = piece.sequence + 1;
     seen.last_arrival = piece.read.arrival;
@@ -55,9 +56,23 @@ void count_piece(const RawPiece& piece, CaptureSummary& summary) {
 
 }  // namespace
 
+LogHealth health_of(const std::vector<CapturedFile>& files) {
+  LogHealth sum;
+  for (const auto& [number, health] : files) {
+    sum.bytes_skipped += health.bytes_skipped;
+    sum.bytes_cut_off += health.bytes_cut_off;
+    sum.records_damaged += health.records_damaged;
+    sum.records_missing += health.records_missing;
+    sum.records_unsealed += health.records_unsealed;
+    sum.is_sealed = sum.is_sealed || health.is_sealed;
+  }
+  return sum;
+}
+
 Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
-                                         const std::function<void(double share)>& progress) {
-  auto log = CaptureFiles::open(path);
+                                         const std::function<void(double share)>& progress,
+                                         EventLogReader::Beginning beginning) {
+  auto log = CaptureFiles::open(path, beginning);
   if (!log) return tl::unexpected(log.error());
   log->on_read(progress);
   CaptureSummary summary;
@@ -92,8 +107,7 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
     }
   }
   summary.breaks = log->breaks();
-  summary.bytes_skipped = log->bytes_skipped();
-  summary.bytes_cut_off = log->bytes_cut_off();
+  summary.files = log->files();
   if (summary.devices.empty()) {
     return work_error(path.string() + " is an LCM event log without device bytes (" +
                           std::to_string(summary.other_messages) + " other messages)",

@@ -24,6 +24,7 @@ namespace imuscope {
 struct CaptureLoss {
   std::string device;
   HostTime after{};          ///< arrival of the last record before the gap
+  HostTime until{};          ///< of the first record behind it
   std::int64_t records = 0;  ///< missing
 };
 
@@ -53,16 +54,20 @@ struct CaptureSummary {
   std::vector<CaptureLoss> losses;
   std::vector<CaptureBreak> breaks;  ///< files that are missing or whose beginning is damaged
   std::uint64_t other_messages = 0;  ///< messages of other types, such as published ones
-  std::uint64_t bytes_skipped = 0;   ///< damage in the midst of the file
-  std::uint64_t bytes_cut_off = 0;   ///< unfinished record at the end: the recorder was killed
+  std::vector<CapturedFile> files;   ///< in order
 };
 
 /// @param path     of the first file of the capture; those that follow are found beside it
 /// @param progress is told the share of the present file that has been read; may be empty
+/// @param beginning of the first file
 /// @return an error that says what the file is where it is not a capture, and of kind kWork for an event log
 ///         that holds no device bytes
 [[nodiscard]] Result<CaptureSummary> summarise_capture(
-    const std::filesystem::path& path, const std::function<void(double share)>& progress = {});
+    const std::filesystem::path& path, const std::function<void(double share)>& progress = {},
+    EventLogReader::Beginning beginning = EventLogReader::Beginning::kIsARecord);
+
+/// Sums over the files; the index is of none.
+[[nodiscard]] LogHealth health_of(const std::vector<CapturedFile>& files);
 
 /// Iterates over reads and writes ordered by arrival, equal arrivals by the order of the configuration, then
 /// in the order in which they happened. Thread: one, of the soft world.

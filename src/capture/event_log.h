@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace imuscope {
@@ -25,5 +26,9 @@ struct LogEvent {
   std::string channel;
   std::vector<std::uint8_t> data;
 };
+
+/// Appends what a record has before its data.
+void append_record_head(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t utime,
+                        std::string_view channel, std::size_t data_bytes);
 
 }  // namespace imuscope

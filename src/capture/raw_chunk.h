@@ -7,13 +7,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <type_traits>
 
 #include "base/contracts.h"
 #include "base/limits.h"
 #include "base/time.h"
-#include "rt/spsc_ring.h"
+#include "rt/byte_ring.h"
 #include "sample/sample.h"
 
 namespace imuscope {
@@ -22,20 +23,62 @@ enum class Direction : std::uint8_t { kRead, kWrite };
 
 inline constexpr std::size_t kRawChunkBytes = 1024;
 
-/// A read from, or a write to, a device, or a part of one that is larger than a chunk.
-struct RawChunk {
+/// What is said of a read from, or a write to, a device, or of a part of one that is longer than
+/// kRawChunkBytes.
+struct RawChunkInfo {
   std::int64_t sequence;  ///< counts the chunks of the device, from 0, refused ones included
   HostTime arrival;       ///< of the read or write
   DeviceIndex device;
   Direction direction;
   bool continues;  ///< the next chunk of this device holds more of the same read or write
-  std::uint16_t n_bytes;
-  std::array<std::uint8_t, kRawChunkBytes> bytes;
 };
-static_assert(std::is_trivially_copyable_v<RawChunk>);
+static_assert(std::is_trivially_copyable_v<RawChunkInfo>);
 
-/// From one I/O thread to the recorder; 2.1 MB.
-using RawRing = SpscRing<RawChunk, kRawRingCapacity>;
+/// A chunk: what is said of it, and its bytes, which are somebody else's.
+struct RawChunk {
+  RawChunkInfo info;
+  std::span<const std::uint8_t> bytes;
+};
+
+/// The recorder's disk may stand still for so long before a read is lost.
+inline constexpr double kRecordStall_s = 60.0;
+inline constexpr std::size_t kRawRingBytesMin = std::size_t{1} << 20U;
+/// Bounds the memory that is locked; only rates that no serial line carries get there.
+inline constexpr std::size_t kRawRingBytesMax = std::size_t{64} << 20U;
+/// Beside its bytes a chunk has what is said of it, its length, and up to a length of padding.
+inline constexpr std::size_t kRawChunkExtraBytes = sizeof(RawChunkInfo) + 2 * sizeof(std::uint64_t);
+
+/// Bytes of a ring that takes so much while the disk stands still for kRecordStall_s.
+[[nodiscard]] constexpr std::size_t raw_ring_capacity(double bytes_per_s, double reads_per_s) noexcept {
+  const double rate = bytes_per_s + static_cast<double>(kRawChunkExtraBytes) * reads_per_s;
+  return std::clamp(ring_capacity(rate, kRecordStall_s), kRawRingBytesMin, kRawRingBytesMax);
+}
+
+/// From one I/O thread to the recorder. Threads, waits and losses: see ByteRing.
+class RawRing {
+ public:
+  explicit RawRing(std::size_t capacity_bytes = kRawRingBytesMin) : ring_(capacity_bytes) {}
+
+  [[nodiscard]] bool try_push(const RawChunk& chunk) noexcept {
+    std::array<std::uint8_t, sizeof(RawChunkInfo)> head{};
+    std::memcpy(head.data(), &chunk.info, sizeof chunk.info);
+    return ring_.try_push(head, chunk.bytes);
+  }
+  /// The oldest chunk; its bytes lie in the ring until pop().
+  [[nodiscard]] std::optional<RawChunk> front() noexcept {
+    const auto record = ring_.front();
+    if (record.empty()) return std::nullopt;
+    RawChunk chunk{{}, record.subspan(sizeof(RawChunkInfo))};
+    std::memcpy(&chunk.info, record.data(), sizeof chunk.info);
+    return chunk;
+  }
+  void pop() noexcept { ring_.pop(); }
+  [[nodiscard]] std::size_t capacity() const noexcept { return ring_.capacity(); }
+  [[nodiscard]] RingCounters counters() const noexcept { return ring_.counters(); }
+
+ private:
+  ByteRing ring_;
+};
 
 /// The I/O thread's end: cuts reads into chunks and pushes them. A full ring costs the record, never time;
 /// the gap in the sequence tells the capture's reader what is missing. Thread: the I/O thread of the ring
@@ -49,22 +92,15 @@ class RawTap {
               HostTime arrival) noexcept {
     IMUSCOPE_EXPECTS(device < kMaxDevices);
     while (!bytes.empty()) {
-      const std::size_t n = std::min(bytes.size(), kRawChunkBytes);
-      chunk_.sequence = sequences_[device]++;
-      chunk_.arrival = arrival;
-      chunk_.device = device;
-      chunk_.direction = direction;
-      chunk_.continues = n < bytes.size();
-      chunk_.n_bytes = static_cast<std::uint16_t>(n);
-      std::memcpy(chunk_.bytes.data(), bytes.data(), n);
-      (void)ring_->try_push(chunk_);  // the ring counts what it refuses
-      bytes = bytes.subspan(n);
+      const auto piece = bytes.first(std::min(bytes.size(), kRawChunkBytes));
+      bytes = bytes.subspan(piece.size());
+      // The ring counts what it refuses.
+      (void)ring_->try_push({{sequences_[device]++, arrival, device, direction, !bytes.empty()}, piece});
     }
   }
 
  private:
   RawRing* ring_;
-  RawChunk chunk_{};
   std::array<std::int64_t, kMaxDevices> sequences_{};
 };
 

@@ -120,14 +120,14 @@ std::vector<std::uint8_t> encode(const RunHeader& header, std::int64_t file) {
 
 std::vector<std::uint8_t> encode(const RawChunk& chunk, const std::string& device, const RecordClock& clock) {
   raw_t message;
-  message.utime = clock.utime(chunk.arrival);
-  message.sequence = chunk.sequence;
+  message.utime = clock.utime(chunk.info.arrival);
+  message.sequence = chunk.info.sequence;
   message.device = device;
-  message.direction = chunk.direction == Direction::kWrite ? raw_t::WRITE : raw_t::READ;
-  message.arrival_ns = to_ns(chunk.arrival);
-  message.continues = chunk.continues ? 1 : 0;
-  message.n_bytes = chunk.n_bytes;
-  message.bytes.assign(chunk.bytes.begin(), chunk.bytes.begin() + chunk.n_bytes);
+  message.direction = chunk.info.direction == Direction::kWrite ? raw_t::WRITE : raw_t::READ;
+  message.arrival_ns = to_ns(chunk.info.arrival);
+  message.continues = chunk.info.continues ? 1 : 0;
+  message.n_bytes = static_cast<std::int32_t>(chunk.bytes.size());
+  message.bytes.assign(chunk.bytes.begin(), chunk.bytes.end());
   return encode_message(message);
 }
 

@@ -15,7 +15,7 @@
 
 namespace imuscope {
 
-/// A chunk as it is stored: RawChunk with the device's name and as many bytes as there are.
+/// A chunk as it is stored: RawChunk with the device's name.
 struct RawPiece {
   RawRead read;
   std::int64_t sequence = 0;

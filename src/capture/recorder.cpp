@@ -1,5 +1,6 @@
 #include "capture/recorder.h"
 
+#include <algorithm>
 #include <chrono>
 #include <system_error>
 #include <utility>
@@ -12,11 +13,12 @@
 namespace imuscope {
 namespace {
 
-// The rings hold seconds; a kill loses at most what came since the last flush, which must stay below 1 s.
+// A kill loses at most what came since the last flush, a cut of the power what came since the last sync.
 constexpr Duration kDrainInterval = std::chrono::milliseconds(100);
 constexpr Duration kFlushInterval = std::chrono::milliseconds(250);
 constexpr std::size_t kFlushBytes = std::size_t{1} << 20U;
-constexpr std::size_t kMaxWaitingMessageBytes = std::size_t{4} << 20U;
+/// What is published in kRecordStall_s: snapshots ten times a second, rows of errors by the hundred.
+constexpr std::size_t kMaxWaitingMessageBytes = std::size_t{16} << 20U;
 
 }  // namespace
 
@@ -70,14 +72,20 @@ RecorderStatus Recorder::status() const {
 void Recorder::run() {
   (void)setup_this_thread({kRecorderThreadName, Scheduling::kNormal, 0, {}});  // a name is never refused
   HostTime flush_due = host_now() + kFlushInterval;
+  HostTime sync_due = host_now() + options_.sync_interval;
   while (!stop_.load()) {
-    heartbeat_.beat(host_now());
+    const HostTime now = host_now();
+    heartbeat_.beat(now);
     drain();
-    if (host_now() >= flush_due || writer_->pending_bytes() > kFlushBytes) {
+    if (now >= flush_due || now >= sync_due) {
       flush();
-      flush_due = host_now() + kFlushInterval;
+      flush_due = now + kFlushInterval;
     }
-    std::this_thread::sleep_for(kDrainInterval);
+    if (now >= sync_due) {
+      sync();
+      sync_due = now + options_.sync_interval;
+    }
+    std::this_thread::sleep_for(std::min(kDrainInterval, sync_due - host_now()));
   }
 }
 
@@ -92,18 +100,19 @@ void Recorder::drain() {
 /// Records the chunk that arrived first among the heads of the rings, so that the file is nearly in order.
 bool Recorder::drain_oldest_chunk() {
   RawRing* oldest_ring = nullptr;
-  const RawChunk* oldest = nullptr;
+  std::optional<RawChunk> oldest;
   for (RawRing* ring : raw_rings_) {
-    const RawChunk* chunk = ring->front();
-    if (chunk != nullptr && (oldest == nullptr || chunk->arrival < oldest->arrival)) {
+    const auto chunk = ring->front();
+    if (chunk && (!oldest || chunk->info.arrival < oldest->info.arrival)) {
       oldest_ring = ring;
       oldest = chunk;
     }
   }
-  if (oldest == nullptr) return false;
-  IMUSCOPE_EXPECTS(oldest->device < raw_channels_.size());
-  const std::vector<std::uint8_t> message = encode(*oldest, options_.run.devices[oldest->device], clock_);
-  writer_->append(raw_channels_[oldest->device], clock_.utime(oldest->arrival), message);
+  if (!oldest) return false;
+  const DeviceIndex device = oldest->info.device;
+  IMUSCOPE_EXPECTS(device < raw_channels_.size());
+  const std::vector<std::uint8_t> message = encode(*oldest, options_.run.devices[device], clock_);
+  writer_->append(raw_channels_[device], clock_.utime(oldest->info.arrival), message);
   oldest_ring->pop();
   return true;
 }
@@ -149,7 +158,7 @@ void Recorder::record_message(std::string_view channel, std::int64_t utime,
 
 /// Creates a file of the capture and writes the run header, so that each can be understood by itself.
 Result<std::unique_ptr<CaptureWriter>> Recorder::begin_file(const Options& options, int number) {
-  auto created = CaptureWriter::create(capture_file(options.path, number));
+  auto created = CaptureWriter::create(capture_file(options.path, number), options.channel_prefix, number);
   if (!created) return tl::unexpected(created.error());
   auto writer = std::make_unique<CaptureWriter>(std::move(*created));
   const RecordClock clock{options.run.t0, options.run.t0_wall};
@@ -161,6 +170,14 @@ Result<std::unique_ptr<CaptureWriter>> Recorder::begin_file(const Options& optio
     return tl::unexpected(flushed.error());
   }
   return writer;
+}
+
+void Recorder::sync() {
+  // What a disk did not keep it may not be told of again: the problem stays.
+  if (auto synced = writer_->sync(); !synced) {
+    finished_.problem = synced.error();
+    update_status(synced);
+  }
 }
 
 void Recorder::flush() {

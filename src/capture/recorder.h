@@ -57,6 +57,9 @@ class Recorder {
     /// never.
     std::uint64_t max_file_bytes = std::uint64_t{2} << 30U;
     Duration max_file_age = std::chrono::hours(1);
+    /// What was recorded is on the disk after this time: a cut of the power costs no more than what came in
+    /// it and while the disk wrote.
+    Duration sync_interval = std::chrono::milliseconds(500);
   };
 
   /// Creates the capture, writes the run header and starts the thread.
@@ -90,6 +93,7 @@ class Recorder {
   void drain_messages();
   static Result<std::unique_ptr<CaptureWriter>> begin_file(const Options& options, int number);
   void flush();
+  void sync();
   void rotate_if_due();
   void update_status(const Result<void>& flushed);
 

@@ -45,14 +45,8 @@ class Capture {
   void header() { writer_.append("IMUSCOPE_RUN", 1, encode(run_, 0)); }
   void chunk(DeviceIndex device, std::int64_t sequence, std::int64_t arrival_ms, const Bytes& bytes,
              bool continues = false, Direction direction = Direction::kRead) {
-    RawChunk chunk{};
-    chunk.sequence = sequence;
-    chunk.arrival = kT0 + std::chrono::milliseconds(arrival_ms);
-    chunk.device = device;
-    chunk.direction = direction;
-    chunk.continues = continues;
-    chunk.n_bytes = static_cast<std::uint16_t>(bytes.size());
-    std::copy(bytes.begin(), bytes.end(), chunk.bytes.begin());
+    const RawChunk chunk{
+        {sequence, kT0 + std::chrono::milliseconds(arrival_ms), device, direction, continues}, bytes};
     writer_.append("IMUSCOPE_RAW_X", 1, encode(chunk, run_.devices.at(device), {run_.t0, run_.t0_wall}));
   }
   /// A read whose arrival is what no clock says.
@@ -248,10 +242,10 @@ TEST(CaptureReader, JoinsReadsThatWereSplit) {
     Bytes bytes(size);
     for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random());
     tap.record(0, Direction::kRead, bytes, kT0 + std::chrono::milliseconds(at));
-    while (const RawChunk* chunk = ring->front()) {
-      EXPECT_LE(chunk->n_bytes, kRawChunkBytes);
-      capture.chunk(0, chunk->sequence, at,
-                    Bytes(chunk->bytes.begin(), chunk->bytes.begin() + chunk->n_bytes), chunk->continues);
+    while (const auto chunk = ring->front()) {
+      EXPECT_LE(chunk->bytes.size(), kRawChunkBytes);
+      capture.chunk(0, chunk->info.sequence, at, Bytes(chunk->bytes.begin(), chunk->bytes.end()),
+                    chunk->info.continues);
       ring->pop();
     }
     written.push_back(bytes);
@@ -500,12 +494,12 @@ std::filesystem::path five_files() {
     auto writer = std::move(*CaptureWriter::create(capture_file(first, file)));
     writer.append("IMUSCOPE_RUN", clock.utime(run.t0), encode(run, file));
     for (int i = 0; i < 10; ++i) {
-      RawChunk chunk{};
-      chunk.sequence = 10 * file + i;
-      chunk.arrival = kT0 + std::chrono::seconds(chunk.sequence);
-      chunk.n_bytes = 1;
-      chunk.bytes[0] = static_cast<std::uint8_t>(chunk.sequence);
-      writer.append("IMUSCOPE_RAW_X", clock.utime(chunk.arrival), encode(chunk, "airins", clock));
+      const std::int64_t sequence = 10 * file + i;
+      const HostTime arrival = kT0 + std::chrono::seconds(sequence);
+      const Bytes bytes{static_cast<std::uint8_t>(sequence)};
+      writer.append(
+          "IMUSCOPE_RAW_X", clock.utime(arrival),
+          encode(RawChunk{{sequence, arrival, 0, Direction::kRead, false}, bytes}, "airins", clock));
     }
     EXPECT_TRUE(writer.close().has_value());
   }
@@ -545,7 +539,7 @@ TEST(CaptureReader, GoesOnBehindTheDamagedBeginningOfAFileAndTellsIt) {
   EXPECT_EQ(summary->breaks[0].n_missing, 0);
   EXPECT_EQ(summary->breaks[0].behind, 1);
   EXPECT_NEAR(summary->breaks[0].seconds, 1.0, 1e-6);
-  EXPECT_GT(summary->bytes_skipped, 0U);
+  EXPECT_GT(health_of(summary->files).bytes_skipped, 0U);
 }
 
 TEST(CaptureReader, LeavesFilesOfAnotherRunAloneWhereverTheyLie) {

@@ -6,7 +6,10 @@
 #include <sys/types.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <ctime>
+#include <utility>
 
 namespace imuscope::test {
 namespace {
@@ -28,7 +31,36 @@ bool refuses(Call call) noexcept {
   return true;
 }
 
+std::atomic<std::uint64_t> bytes_synced{0};
+thread_local std::uint64_t bytes_unsynced = 0;
+
+std::atomic<bool> disk_stands_still{false};
+std::atomic<int> calls_waiting{0};
+thread_local bool stalls_the_disk = false;
+
+void wait_for_the_disk() noexcept {
+  if (stalls_the_disk || !disk_stands_still.load()) return;
+  calls_waiting += 1;
+  const timespec pause{0, 1'000'000};
+  while (disk_stands_still.load()) (void)nanosleep(&pause, nullptr);
+  calls_waiting -= 1;
+}
+
 }  // namespace
+
+std::uint64_t synced_bytes() noexcept { return bytes_synced.load(); }
+
+StalledDisk::StalledDisk() noexcept {
+  stalls_the_disk = true;
+  disk_stands_still.store(true);
+}
+
+StalledDisk::~StalledDisk() {
+  disk_stands_still.store(false);
+  stalls_the_disk = false;
+}
+
+int StalledDisk::waiting() const noexcept { return calls_waiting.load(); }
 
 RefusedCalls::RefusedCalls(Call call, int error, int times) noexcept : call_(call) {
   refusal_of(call) = {error, times};
@@ -51,7 +83,10 @@ ssize_t read(int fd, void* bytes, std::size_t n) {
 
 ssize_t write(int fd, const void* bytes, std::size_t n) {
   if (imuscope::test::refuses(imuscope::test::Call::kWrite)) return -1;
-  return syscall(SYS_write, fd, bytes, n);
+  imuscope::test::wait_for_the_disk();
+  const ssize_t written = syscall(SYS_write, fd, bytes, n);
+  if (written > 0) imuscope::test::bytes_unsynced += static_cast<std::uint64_t>(written);
+  return written;
 }
 
 ssize_t pwrite(int fd, const void* bytes, std::size_t n, off_t offset) {
@@ -82,6 +117,8 @@ int epoll_pwait2(int epoll, epoll_event* events, int n, const timespec* timeout,
 
 int fdatasync(int fd) {
   if (imuscope::test::refuses(imuscope::test::Call::kFdatasync)) return -1;
+  imuscope::test::wait_for_the_disk();
+  imuscope::test::bytes_synced += std::exchange(imuscope::test::bytes_unsynced, 0);
   return static_cast<int>(syscall(SYS_fdatasync, fd));
 }
 }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 namespace imuscope::test {
 
@@ -24,6 +25,22 @@ class RefusedCalls {
 
  private:
   Call call_;
+};
+
+/// Bytes that this program has written and then waited for until the disk had them.
+[[nodiscard]] std::uint64_t synced_bytes() noexcept;
+
+/// While it lives, no other thread's write to a file nor its wait for the disk returns, as behind a disk that
+/// stands still. One at a time.
+class StalledDisk {
+ public:
+  StalledDisk() noexcept;
+  ~StalledDisk();
+  StalledDisk(const StalledDisk&) = delete;
+  StalledDisk& operator=(const StalledDisk&) = delete;
+
+  /// Calls that have not returned.
+  [[nodiscard]] int waiting() const noexcept;
 };
 
 }  // namespace imuscope::test

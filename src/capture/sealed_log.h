@@ -1,0 +1,64 @@
+#pragma once
+
+/// Reads an event log and believes its seals: what they say is damaged is passed over and counted.
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <utility>
+
+#include "base/result.h"
+#include "capture/event_log_reader.h"
+#include "capture/seal.h"
+
+namespace imuscope {
+
+/// What is known of one file once it was read to its end.
+struct LogHealth {
+  std::uint64_t bytes_skipped = 0;     ///< see EventLogReader
+  std::uint64_t bytes_cut_off = 0;     ///< likewise
+  std::uint64_t records_damaged = 0;   ///< do not agree with their checksums; passed over
+  std::uint64_t records_missing = 0;   ///< that a seal names and the file does not hold
+  std::uint64_t records_unsealed = 0;  ///< taken as they are: no seal says anything of them
+  bool is_sealed = false;              ///< false for a log without any seal, such as one of an older version
+  /// With which the file ends; a file without one was cut off.
+  std::optional<capture_index_t> index;
+};
+
+/// Iterates over the records of a log in file order, without the seals and the index. Records are held until
+/// their seal, which follows within the writer's flush; in a log without seals they are given at once.
+/// Thread: one, of the soft world.
+class SealedLog {
+ public:
+  static Result<SealedLog> open(const std::filesystem::path& path,
+                                EventLogReader::Beginning beginning = EventLogReader::Beginning::kIsARecord);
+
+  /// See EventLogReader.
+  void on_read(std::function<void(std::uint64_t bytes)> listener) { log_.on_read(std::move(listener)); }
+
+  /// Fetches the next record. Returns false at the end of the file.
+  [[nodiscard]] bool next(LogEvent& event);
+
+  /// So far.
+  [[nodiscard]] LogHealth health() const;
+
+ private:
+  explicit SealedLog(EventLogReader log) : log_(std::move(log)) {}
+  void take(LogEvent&& event);
+  void hold(LogEvent&& event);
+  void check(const capture_seal_t& seal);
+  void release_all();
+
+  EventLogReader log_;
+  std::optional<LogEvent> index_;  ///< that was read last
+  std::deque<LogEvent> held_;
+  std::size_t released_ = 0;          ///< of those held, from the front
+  std::size_t waiting_bytes_ = 0;     ///< of those held and not released
+  std::uint64_t given_unsealed_ = 0;  ///< since the last seal
+  LogHealth health_;
+};
+
+}  // namespace imuscope
