@@ -6,8 +6,8 @@
 
 #include "drivers/device/calendar.h"
 #include "drivers/device/feed.h"
-#include "drivers/device/gps_time.h"
 #include "drivers/device/wgs84.h"
+#include "sample/gps_time.h"
 
 namespace imuscope::greis {
 namespace {

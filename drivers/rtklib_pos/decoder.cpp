@@ -5,8 +5,8 @@
 
 #include "base/units.h"
 #include "drivers/device/feed.h"
-#include "drivers/device/gps_time.h"
 #include "drivers/device/wgs84.h"
+#include "sample/gps_time.h"
 
 namespace imuscope::rtklib_pos {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "drivers/device/calendar.h"
 #include "drivers/device/decimal.h"
-#include "drivers/device/gps_time.h"
+#include "sample/gps_time.h"
 
 namespace imuscope::rtklib_pos {
 namespace {

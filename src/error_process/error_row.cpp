@@ -36,6 +36,7 @@ ErrorRow error_row(const StudyEpoch& epoch, const Mounting& mounting, const Refe
   const std::uint32_t flags = epoch.sample.flags;
   ErrorRow row{};
   row.time = epoch.time;
+  row.utc = epoch.utc;
   row.counter = epoch.sample.counter;
   row.regime = epoch.regime;
   row.gyro_valid = (flags & kGyroValid) != 0 && (flags & kGyroClip) == 0;

@@ -19,6 +19,7 @@ namespace imuscope {
 /// One row of the error process, in s axes.
 struct ErrorRow {
   HostTime time;         ///< of validity of the S sample
+  UtcStamp utc;          ///< of the motion that it shows: later by the time offset
   std::int64_t counter;  ///< of the device, unwrapped
   Regime regime;
   bool gyro_valid;  ///< the sample held rates and no axis was at the end of its range

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <set>
@@ -14,12 +15,15 @@ namespace imuscope {
 namespace {
 
 constexpr std::string_view kHeader = "begin_s,end_s,regime";
+constexpr std::string_view kUtcHeader = "begin_utc,end_utc,regime";
 /// What spreadsheets write at the beginning of a file in UTF-8.
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::string_view kEvent = "regime ";
 constexpr std::string_view kEnd = "end";
 /// Some thirty years: no run is as long, and every time of the host can be counted from there.
 constexpr double kRunMax_s = 1e9;
+/// Nanoseconds since 1970 end in 2262.
+constexpr double kUtcMax_s = 9e9;
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\n";
@@ -48,30 +52,72 @@ std::optional<double> number(std::string_view text) {
   return value;
 }
 
-std::optional<Label> parse_line(std::string_view line) {
+/// Two or four digits and what ends them.
+bool take_digits(std::string_view& text, std::size_t n, char end, int& value) {
+  if (text.size() <= n || text[n] != end) return false;
+  const auto [stopped, code] = std::from_chars(text.data(), text.data() + n, value);
+  if (code != std::errc{} || stopped != text.data() + n) return false;
+  text.remove_prefix(n + 1);
+  return true;
+}
+
+/// Seconds since 1970-01-01 of a text such as 2026-03-14T09:30:00.25Z.
+std::optional<double> utc_date(std::string_view text) {
+  int year = 0;
+  int month = 0;
+  int day = 0;
+  int hour = 0;
+  int minute = 0;
+  if (!take_digits(text, 4, '-', year) || !take_digits(text, 2, '-', month) ||
+      !take_digits(text, 2, 'T', day) || !take_digits(text, 2, ':', hour) ||
+      !take_digits(text, 2, ':', minute) || !text.ends_with('Z'))
+    return std::nullopt;
+  const auto second = number(text.substr(0, text.size() - 1));
+  const std::chrono::year_month_day date{std::chrono::year{year},
+                                         std::chrono::month{static_cast<unsigned>(month)},
+                                         std::chrono::day{static_cast<unsigned>(day)}};
+  // Second 60 is a leap second's, and the first of the next minute here.
+  if (!second || !date.ok() || hour > 23 || minute > 59 || *second < 0.0 || *second >= 61.0)
+    return std::nullopt;
+  const auto days = std::chrono::sys_days(date).time_since_epoch();
+  return std::chrono::duration<double>(days + std::chrono::hours(hour) + std::chrono::minutes(minute))
+             .count() +
+         *second;
+}
+
+std::optional<double> utc_number(std::string_view text) {
+  const auto date = utc_date(text);
+  return date ? date : number(text);
+}
+
+std::optional<Label> parse_line(std::string_view line, bool in_utc) {
   const auto first = line.find(',');
   if (first == std::string_view::npos) return std::nullopt;
   const auto second = line.find(',', first + 1);
   if (second == std::string_view::npos) return std::nullopt;
-  const auto begin = number(trimmed(line.substr(0, first)));
-  const auto end = number(trimmed(line.substr(first + 1, second - first - 1)));
+  const auto time = [&](std::string_view text) { return in_utc ? utc_number(text) : number(text); };
+  const auto begin = time(trimmed(line.substr(0, first)));
+  const auto end = time(trimmed(line.substr(first + 1, second - first - 1)));
   const auto name = trimmed(line.substr(second + 1));
-  const auto is_of_a_run = [](double time_s) { return std::abs(time_s) <= kRunMax_s; };
+  const auto is_of_a_run = [&](double time_s) {
+    return std::abs(time_s) <= (in_utc ? kUtcMax_s : kRunMax_s);
+  };
   if (!begin || !end || !is_of_a_run(*begin) || !is_of_a_run(*end)) return std::nullopt;
   if (*end <= *begin || !is_regime_name(name)) return std::nullopt;
-  return Label{*begin, *end, std::string(name)};
+  return Label{*begin, *end, std::string(name), in_utc};
 }
 
 }  // namespace
 
 Result<std::vector<Label>> parse_labels(std::string_view text, const std::string& file) {
   const std::string remedy = fmt::format(
-      "a file of labels begins with the line {}, then one stretch a line, "
+      "a file of labels begins with the line {} or {}, then one stretch a line, "
       "such as 12.0,340.5,motorway",
-      kHeader);
+      kHeader, kUtcHeader);
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::vector<Label> labels;
   bool has_header = false;
+  bool in_utc = false;
   int line_number = 0;
   while (!text.empty()) {
     const auto end = text.find('\n');
@@ -80,14 +126,15 @@ Result<std::vector<Label>> parse_labels(std::string_view text, const std::string
     ++line_number;
     if (line.empty() || line.front() == '#') continue;
     if (!has_header) {
-      if (line != kHeader)
+      in_utc = line == kUtcHeader;
+      if (line != kHeader && !in_utc)
         return usage_error(
             fmt::format("{}:{}: '{}' is not the header {}", file, line_number, one_line(line), kHeader),
             remedy);
       has_header = true;
       continue;
     }
-    const auto label = parse_line(line);
+    const auto label = parse_line(line, in_utc);
     if (!label)
       return usage_error(
           fmt::format("{}:{}: '{}' is no stretch of a regime", file, line_number, one_line(line)), remedy);
@@ -116,9 +163,27 @@ std::vector<Label> labels_of_moments(const std::vector<MarkedMoment>& moments, H
     if (open) labels.back().end_s = time_s;
     const auto name = as_cell(text.substr(kEvent.size()));
     open = !name.empty() && name != kEnd;
-    if (open) labels.push_back({time_s, time_s, name});
+    if (open) labels.push_back({time_s, time_s, name, false});
   }
   if (open) labels.back().end_s = std::max(labels.back().begin_s, to_seconds(end - origin));
+  return labels;
+}
+
+Result<std::vector<Label>> labels_of_run(std::vector<Label> labels, HostTime origin,
+                                         const std::function<std::optional<HostTime>(UtcTime)>& time_of) {
+  const auto in_run = [&](double utc_s) {
+    const auto time = time_of(UtcTime{from_seconds(utc_s)});
+    return time ? std::optional(to_seconds(*time - origin)) : std::nullopt;
+  };
+  for (auto& label : labels) {
+    if (!label.in_utc) continue;
+    const auto begin = in_run(label.begin_s);
+    const auto end = in_run(label.end_s);
+    if (!begin || !end)
+      return usage_error("the labels are in UTC, which nothing in this recording tells",
+                         fmt::format("give them by time_s, under the header {}", kHeader));
+    label = {*begin, *end, label.name, false};
+  }
   return labels;
 }
 

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <type_traits>
+
+#include "sample/gps_time.h"
 
 namespace imuscope {
 namespace {
@@ -23,6 +26,18 @@ constexpr double kAstray_s = 0.01;
 constexpr int kAstrayToStep = 3;
 // The R-IMU is believed alone for so long after its last tag.
 constexpr Duration kReferenceHolds = std::chrono::seconds{5};
+// A receiver sends its solution some 20 to 200 ms after the epoch; how much, it does not say.
+constexpr double kReceiverDelaySd_s = 0.1;
+// A step of the tags by one second, this near to a midnight of UTC, is a leap second.
+constexpr double kLeapTolerance_s = 0.02;
+constexpr Duration kAroundMidnight = std::chrono::seconds{10};
+
+bool is_leap_second(double step_s, UtcTime utc) noexcept {
+  const Duration since_midnight = utc - std::chrono::floor<std::chrono::days>(utc);
+  const bool near_midnight =
+      since_midnight < kAroundMidnight || since_midnight > std::chrono::hours{24} - kAroundMidnight;
+  return near_midnight && std::abs(std::abs(step_s) - 1.0) < kLeapTolerance_s;
+}
 
 }  // namespace
 
@@ -38,9 +53,19 @@ double UtcScale::seconds_at(HostTime time) const noexcept {
 void UtcScale::begin(UtcSource source, HostTime time, UtcTime utc) noexcept {
   origin_ = last_ = time;
   utc_origin_ = utc;
+  scale_.gps_minus_utc_s = gps_minus_utc_s(utc);
   p_offset_ = kTagSd_s * kTagSd_s;
   p_rate_ = kRateSd * kRateSd;
   publish(source);
+}
+
+void UtcScale::set_pc_clock(HostTime time, UtcTime utc) noexcept {
+  if (is_known()) return;
+  scale_.source = UtcSource::kPcClock;
+  scale_.time = time;
+  scale_.utc = utc;
+  scale_.sd_utc_s = std::numeric_limits<double>::quiet_NaN();
+  scale_.gps_minus_utc_s = gps_minus_utc_s(utc);
 }
 
 void UtcScale::predict(double step_s) noexcept {
@@ -65,6 +90,11 @@ void UtcScale::observe(UtcSource source, HostTime time, UtcTime utc) noexcept {
   if (std::abs(innovation_s) > kAstray_s + 5.0 * std::sqrt(p_offset_)) {
     if (++astray_in_a_row_ >= kAstrayToStep) {
       utc_origin_ += from_seconds(innovation_s);
+      if (is_leap_second(innovation_s, utc)) {
+        scale_.gps_minus_utc_s += innovation_s < 0.0 ? 1 : -1;
+      } else {
+        scale_.gps_minus_utc_s = gps_minus_utc_s(utc);
+      }
       ++scale_.steps;
       astray_in_a_row_ = 0;
     }
@@ -86,7 +116,7 @@ void UtcScale::publish(UtcSource source) noexcept {
   scale_.source = source;
   scale_.time = last_;
   scale_.utc = utc_origin_ + (last_ - origin_) + from_seconds(offset_s_);
-  scale_.sd_utc_s = std::sqrt(p_offset_);
+  scale_.sd_utc_s = std::hypot(std::sqrt(p_offset_), source == UtcSource::kGnss ? kReceiverDelaySd_s : 0.0);
   scale_.rate = rate_;
   scale_.sd_rate = std::sqrt(p_rate_);
 }

@@ -16,18 +16,32 @@
 
 namespace imuscope {
 
-/// Who told UTC.
-enum class UtcSource : std::uint8_t { kNone, kReference, kGnss };
+/// Who told UTC. The PC's clock says what time it was at the start, but not how long a second is.
+enum class UtcSource : std::uint8_t { kNone, kReference, kGnss, kPcClock };
+
+/// An instant of the run in UTC.
+struct UtcStamp {
+  UtcTime utc{};
+  std::int32_t gps_minus_utc_s = 0;  ///< leap seconds: what follows one is a second of GPS time later
+  bool is_known = false;             ///< otherwise nobody has told UTC
+};
 
 /// The scale at one instant, for those who show or record it.
 struct TimeScale {
-  UtcSource source = UtcSource::kNone;  ///< kNone: seconds are the host's own, within sd_rate
+  UtcSource source = UtcSource::kNone;  ///< kNone, kPcClock: seconds are the host's own, within sd_rate
   HostTime time{};                      ///< of the newest observation
   UtcTime utc{};                        ///< at `time`
-  double sd_utc_s = 0.0;                ///< of the tags' mean against the line through them
-  double rate = 0.0;                    ///< UTC seconds per host second, minus 1
+  double sd_utc_s = 0.0;  ///< of utc; a receiver's delay in it, which nobody tells. NaN: not known
+  double rate = 0.0;      ///< UTC seconds per host second, minus 1
   double sd_rate = 50e-6;
-  std::uint32_t steps = 0;  ///< times that the tags stepped by more than the scale can follow
+  std::uint32_t steps = 0;           ///< times that the tags stepped by more than the scale can follow
+  std::int32_t gps_minus_utc_s = 0;  ///< leap seconds
+
+  /// Any instant near `time` on the line through the tags.
+  [[nodiscard]] UtcStamp at(HostTime instant) const noexcept {
+    const Duration step = instant - time;
+    return {utc + step + from_seconds(rate * to_seconds(step)), gps_minus_utc_s, source != UtcSource::kNone};
+  }
 };
 
 /// Core: no allocation, noexcept. Not thread-safe; trivially copyable.
@@ -38,11 +52,17 @@ class UtcScale {
   /// older than the last one is left out.
   void observe(UtcSource source, HostTime time, UtcTime utc) noexcept;
 
+  /// What the PC's clock showed: for those who want to know what time it is, until a device tells.
+  void set_pc_clock(HostTime time, UtcTime utc) noexcept;
+
   /// True seconds since an instant that never moves: differences are intervals. Tags that step (a leap
   /// second, a receiver that found the time) leave it alone.
   [[nodiscard]] double seconds_at(HostTime time) const noexcept;
 
-  [[nodiscard]] bool is_known() const noexcept { return scale_.source != UtcSource::kNone; }
+  /// Whether a device has told UTC, and with it the length of a second.
+  [[nodiscard]] bool is_known() const noexcept {
+    return scale_.source == UtcSource::kReference || scale_.source == UtcSource::kGnss;
+  }
   [[nodiscard]] const TimeScale& scale() const noexcept { return scale_; }
 
  private:

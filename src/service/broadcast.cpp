@@ -6,8 +6,10 @@
 
 namespace imuscope {
 
-Broadcast::Broadcast(const Configuration& configuration, const UtcAnchor& anchor)
-    : configuration_(configuration), study_devices_(configuration.study_indices()), anchor_(anchor) {}
+Broadcast::Broadcast(const Configuration& configuration)
+    : configuration_(configuration), study_devices_(configuration.study_indices()) {
+  for (const auto index : study_devices_) errors_.emplace_back(configuration.devices[index].name);
+}
 
 void Broadcast::open(LcmPublisher bus, bool bridge) {
   bus_.emplace(std::move(bus));
@@ -18,39 +20,48 @@ void Broadcast::set_tap(LcmPublisher::Tap tap) {
   if (bus_) bus_->set_tap(std::move(tap));
 }
 
+void Broadcast::send(std::optional<error_t> rows) {
+  if (!rows) return;
+  const std::string name = rows->name;
+  bus_->publish(std::move(*rows), "ERROR", name);
+}
+
 void Broadcast::on_error(const ErrorRecord& record) {
+  if (bus_) send(errors_[record.study].add(record));
+}
+
+void Broadcast::finish() {
   if (!bus_) return;
-  const std::string& name = configuration_.devices[study_devices_[record.study]].name;
-  bus_->publish(error_message(record, name, anchor_), "ERROR", name);
+  for (auto& rows : errors_) send(rows.take());
 }
 
 void Broadcast::on_snapshot(const Snapshot& snapshot) {
-  if (snapshot.has_utc && !anchored_by_device_) {
-    anchor_ = {snapshot.first_reference_time, snapshot.first_reference_utc};
-    anchored_by_device_ = true;
-  }
+  scale_ = snapshot.time_scale;
   if (!bus_) return;
+  if (snapshot.has_reference) {
+    for (auto& rows : errors_) send(rows.take_old(to_seconds(snapshot.cut - snapshot.first_reference_time)));
+  }
   if (snapshot.has_new_navigation) {
-    bus_->publish(navigation_message(snapshot, anchor_), "NAVIGATION");
+    bus_->publish(navigation_message(snapshot), "NAVIGATION");
     if (bridge_) {
       if (!bridge_origin_) bridge_origin_ = snapshot;
-      bus_->publish(pose_message(snapshot, *bridge_origin_, anchor_), "POSE");
-      bus_->publish(ins_message(snapshot, *bridge_origin_, anchor_), "INS");
+      bus_->publish(pose_message(snapshot, *bridge_origin_), "POSE");
+      bus_->publish(ins_message(snapshot, *bridge_origin_), "INS");
     }
   }
-  if (snapshot.odometry.has_speed) bus_->publish(odometry_message(snapshot, anchor_), "ODOMETRY");
+  if (snapshot.odometry.has_speed) bus_->publish(odometry_message(snapshot), "ODOMETRY");
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
-    if (!has_estimate(snapshot.studies[i].status)) continue;
+    if (!snapshot.has_new_study[i]) continue;
     const std::string& name = configuration_.devices[study_devices_[i]].name;
-    bus_->publish(calibration_message(snapshot, i, name, anchor_), "CALIBRATION", name);
+    bus_->publish(calibration_message(snapshot, i, name), "CALIBRATION", name);
   }
 }
 
 void Broadcast::on_refit(const Refit& refit) {
   if (!bus_) return;
-  bus_->publish(wavelet_variance_message(refit, anchor_), "WV", refit.name);
-  bus_->publish(noise_model_message(refit, anchor_), "NOISE_MODEL", refit.name);
-  bus_->publish(dynamics_message(refit, anchor_), "DYNAMICS", refit.name);
+  bus_->publish(wavelet_variance_message(refit), "WV", refit.name);
+  bus_->publish(noise_model_message(refit), "NOISE_MODEL", refit.name);
+  bus_->publish(dynamics_message(refit), "DYNAMICS", refit.name);
 }
 
 void Broadcast::on_status(status_t status) {

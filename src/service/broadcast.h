@@ -15,10 +15,10 @@
 namespace imuscope {
 
 /// Thread: one. Without a bus it says nothing and still knows the run's UTC.
+/// What is said depends on what the core put out alone, so that a replay says the same.
 class Broadcast {
  public:
-  /// @param anchor  UTC as long as no device has told it
-  Broadcast(const Configuration& configuration, const UtcAnchor& anchor);
+  explicit Broadcast(const Configuration& configuration);
 
   /// @param bridge  pose_t and ins_t, too
   void open(LcmPublisher bus, bool bridge);
@@ -32,16 +32,22 @@ class Broadcast {
   /// Counts its arrays, too.
   void on_status(status_t status);
 
-  [[nodiscard]] const UtcAnchor& anchor() const { return anchor_; }
+  /// Says what is left of the error rows, at the end of the run.
+  void finish();
+
+  /// By the newest snapshot's time scale.
+  [[nodiscard]] UtcStamp utc_at(HostTime time) const { return scale_.at(time); }
 
  private:
+  void send(std::optional<error_t> rows);
+
   const Configuration& configuration_;
   std::vector<std::size_t> study_devices_;
   std::optional<LcmPublisher> bus_;
   bool bridge_ = false;
   std::optional<Snapshot> bridge_origin_;
-  UtcAnchor anchor_;
-  bool anchored_by_device_ = false;
+  std::vector<ErrorBatch> errors_;  ///< per study
+  TimeScale scale_;
 };
 
 }  // namespace imuscope

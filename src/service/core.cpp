@@ -62,10 +62,17 @@ void Core::note_first_reference(const Sample& sample) noexcept {
     snapshot_.has_reference = true;
     snapshot_.first_reference_time = sample.time;
   }
-  if (!snapshot_.has_utc && sample.has_utc) {
-    snapshot_.has_utc = true;
-    snapshot_.first_reference_utc = sample.utc - (sample.time - snapshot_.first_reference_time);
-  }
+}
+
+/// From the first who tells it; a device is believed over the PC's clock.
+void Core::note_first_utc() noexcept {
+  const TimeScale& scale = estimator_.time_scale();
+  const bool is_better = first_utc_from_ == UtcSource::kNone ||
+                         (first_utc_from_ == UtcSource::kPcClock && scale.source != UtcSource::kPcClock);
+  if (!snapshot_.has_reference || scale.source == UtcSource::kNone || !is_better) return;
+  first_utc_from_ = scale.source;
+  snapshot_.has_utc = true;
+  snapshot_.first_reference_utc = scale.at(snapshot_.first_reference_time).utc;
 }
 
 /// Before anything of the tick is computed, so that a replay needs the tick's number alone.
@@ -90,11 +97,20 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   previous_cut_ = cut;
   estimator_.advance(cut);
 
+  note_first_utc();
   for (const auto& event : estimator_.events()) sink.on_event(event);
+  snapshot_.ages = data_ages(estimator_.navigation(), snapshot_.has_reference, cut);
   for (const auto& epoch : estimator_.epochs()) {
-    if (epoch.calibrating) sink.on_epoch(epoch, snapshot_.first_reference_time);
+    if (!epoch.calibrating) continue;
+    sink.on_epoch(epoch, {snapshot_.first_reference_time, snapshot_.ages,
+                          validity_of(estimator_.study(epoch.study), snapshot_.ages)});
   }
   if (index % kTicksPerSnapshot != 0) return;
+  take_snapshot(index, cut);
+  sink.on_snapshot(snapshot_);
+}
+
+void Core::take_snapshot(std::int64_t index, HostTime cut) noexcept {
   snapshot_.tick = index;
   snapshot_.cut = cut;
   snapshot_.n_studies = estimator_.study_count();
@@ -103,10 +119,15 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   snapshot_.has_new_navigation =
       navigation.status == NavigationStatus::kNavigating && navigation.time != snapshot_.navigation.time;
   snapshot_.navigation = navigation;
-  snapshot_.odometry = estimator_.odometry();
-  for (std::size_t i = 0; i < snapshot_.n_studies; ++i) snapshot_.studies[i] = estimator_.study(i);
+  const OdometryOutput& odometry = estimator_.odometry();
+  snapshot_.has_new_odometry = odometry.has_speed && odometry.time != snapshot_.odometry.time;
+  snapshot_.odometry = odometry;
+  for (std::size_t i = 0; i < snapshot_.n_studies; ++i) {
+    const StudyOutput& study = estimator_.study(i);
+    snapshot_.has_new_study[i] = has_estimate(study.status) && study.time != snapshot_.studies[i].time;
+    snapshot_.studies[i] = study;
+  }
   snapshot_.counters = estimator_.counters();
-  sink.on_snapshot(snapshot_);
 }
 
 }  // namespace imuscope

@@ -16,6 +16,7 @@
 #include "rt/latest_value.h"
 #include "rt/spsc_ring.h"
 #include "sample/sample.h"
+#include "service/validity.h"
 
 namespace imuscope {
 
@@ -41,9 +42,12 @@ struct Snapshot {
   UtcTime first_reference_utc;
   std::size_t n_studies;
   TimeScale time_scale;  ///< UTC against the host's clock
-  /// `navigation` is one of now: the reference went on since the snapshot before. What is stale is neither
-  /// written nor sent.
+  DataAges ages;
+  /// There is one, of a later instant than that of the snapshot before. What is not new is neither written
+  /// nor sent.
   bool has_new_navigation;
+  bool has_new_odometry;
+  std::array<bool, kMaxStudies> has_new_study;
   NavigationOutput navigation;
   OdometryOutput odometry;
   ImuData reference;  ///< newest sample of the R-IMU as measured; zero before the first
@@ -52,11 +56,20 @@ struct Snapshot {
 };
 static_assert(std::is_trivially_copyable_v<Snapshot>);
 
+/// What all results of a tick have in common.
+struct TickFacts {
+  HostTime first_reference_time;  ///< origin of time_s
+  DataAges ages;
+  Validity validity;  ///< of what is made with the S-IMU's calibration
+};
+
 /// One row of the error process on its way out of the core.
 struct ErrorRecord {
   std::size_t study;
   HostTime first_reference_time;  ///< origin of time_s
   ErrorRow row;
+  DataAges ages{};
+  Validity validity = Validity::kUsable;  ///< of the calibration that it was made with
 };
 static_assert(std::is_trivially_copyable_v<ErrorRecord>);
 
@@ -96,8 +109,8 @@ class CoreSink {
   virtual ~CoreSink() = default;
   /// One S sample of a calibrated S-IMU. Unless overridden, its row goes to on_error(), made with the
   /// estimate as it stands.
-  virtual void on_epoch(const StudyEpoch& epoch, HostTime first_reference_time) noexcept {
-    on_error({epoch.study, first_reference_time, live_error_row(epoch)});
+  virtual void on_epoch(const StudyEpoch& epoch, const TickFacts& facts) noexcept {
+    on_error({epoch.study, facts.first_reference_time, live_error_row(epoch), facts.ages, facts.validity});
   }
   virtual void on_error(const ErrorRecord& record) noexcept = 0;
   virtual void on_event(const EstimatorEvent& event) noexcept = 0;
@@ -121,6 +134,9 @@ class Core {
   /// world.
   void offer_noise(std::size_t study, const NewNoise& model) noexcept { noises_[study]->write(model); }
 
+  /// What the PC's clock showed (Estimator). Call before the first tick.
+  void set_pc_clock(HostTime time, UtcTime utc) noexcept { estimator_.set_pc_clock(time, utc); }
+
   /// Consumes every sample that had arrived by `cut`, advances the estimator and reports to `sink`.
   /// Ticks increase; a skipped tick is simply not called.
   void tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
@@ -132,6 +148,8 @@ class Core {
   void consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
   void take_over_noises(std::int64_t index, CoreSink& sink) noexcept;
   void note_first_reference(const Sample& sample) noexcept;
+  void note_first_utc() noexcept;
+  void take_snapshot(std::int64_t index, HostTime cut) noexcept;
 
   Estimator estimator_;
   DeviceIndex reference_;
@@ -141,6 +159,7 @@ class Core {
   std::size_t next_applied_ = 0;
   std::vector<std::unique_ptr<LatestValue<NewNoise>>> noises_;  ///< per study
   HostTime previous_cut_{HostTime::min()};
+  UtcSource first_utc_from_ = UtcSource::kNone;
   Snapshot snapshot_{};
 };
 

@@ -125,6 +125,18 @@ status_t status_of(const Configuration& configuration, const std::string& versio
   return status;
 }
 
+std::string_view name_of(UtcSource source) noexcept {
+  constexpr std::array<std::string_view, 4> kNames{"none", "reference", "gnss", "pc"};
+  return kNames[static_cast<std::size_t>(source)];
+}
+
+void set_time_scale(const TimeScale& scale, status_t& status) {
+  const bool told_by_device = scale.source == UtcSource::kReference || scale.source == UtcSource::kGnss;
+  status.utc_source = name_of(scale.source);
+  status.utc_sd_s = scale.source == UtcSource::kNone ? kUnknown : scale.sd_utc_s;
+  status.host_clock_ppm = told_by_device ? -scale.rate * 1e6 : kUnknown;
+}
+
 void count_elements(status_t& status) {
   status.n_devices = element_count(status.devices);
   status.n_studies = element_count(status.studies);

@@ -27,6 +27,11 @@ struct Health {
 /// What is known of a run before anything happens: its names, and its devices with nothing but theirs.
 [[nodiscard]] status_t status_of(const Configuration& configuration, const std::string& version);
 
+/// As STATUS and run.json have it: "none", "reference", "gnss", "pc".
+[[nodiscard]] std::string_view name_of(UtcSource source) noexcept;
+
+/// Who tells UTC and how well.
+void set_time_scale(const TimeScale& scale, status_t& status);
 /// Calibration of one S-IMU beside its goals.
 [[nodiscard]] study_status_t study_status(const std::string& name, const StudyOutput& study);
 

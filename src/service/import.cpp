@@ -262,20 +262,14 @@ class Merger {
     const Configuration& configuration = opened_.configuration;
     const std::string channel = channel_name(configuration.lcm.channel_prefix, "RAW", device.counts.name);
     std::span<const std::uint8_t> rest(device.head->bytes);
-    RawChunk chunk{};
-    chunk.arrival = device.head->arrival;
-    chunk.device = device.index;
-    chunk.direction = Direction::kRead;
     ++device.counts.reads;
     device.counts.bytes += rest.size();
     while (!rest.empty()) {
       const auto piece = rest.first(std::min(rest.size(), kRawChunkBytes));
       rest = rest.subspan(piece.size());
-      chunk.sequence = device.sequence++;
-      chunk.continues = !rest.empty();
-      chunk.n_bytes = static_cast<std::uint16_t>(piece.size());
-      std::copy(piece.begin(), piece.end(), chunk.bytes.begin());
-      writer.append(channel, clock_.utime(chunk.arrival), encode(chunk, device.counts.name, clock_));
+      const RawChunk chunk{
+          {device.sequence++, device.head->arrival, device.index, Direction::kRead, !rest.empty()}, piece};
+      writer.append(channel, clock_.utime(chunk.info.arrival), encode(chunk, device.counts.name, clock_));
     }
   }
 

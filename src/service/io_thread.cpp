@@ -230,8 +230,8 @@ class IoThread::Line final : public SampleSink {
 };
 
 IoThread::IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders,
-                   const std::vector<std::size_t>& line_owners)
-    : raw_ring_(std::make_unique<RawRing>()),
+                   const std::vector<std::size_t>& line_owners, std::size_t raw_ring_bytes)
+    : raw_ring_(std::make_unique<RawRing>(raw_ring_bytes)),
       exceptions_(std::make_unique<ExceptionRing>()),
       tap_(*raw_ring_) {
   for (std::size_t i = 0; i < decoders.size(); ++i) {

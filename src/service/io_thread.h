@@ -63,8 +63,9 @@ class IoThread {
  public:
   /// @param decoders     one a device
   /// @param line_owners  per device, the one on whose line its bytes come: itself, or another one's
+  /// @param raw_ring_bytes  of the ring to the recorder (line_rate.h)
   IoThread(Core& core, std::vector<std::unique_ptr<DeviceDecoder>> decoders,
-           const std::vector<std::size_t>& line_owners);
+           const std::vector<std::size_t>& line_owners, std::size_t raw_ring_bytes);
   ~IoThread();
   IoThread(const IoThread&) = delete;
   IoThread& operator=(const IoThread&) = delete;

@@ -19,6 +19,7 @@
 #include "service/io_thread.h"
 #include "service/line_factory.h"
 #include "service/line_opener.h"
+#include "service/line_rate.h"
 #include "service/live_publisher.h"
 #include "service/live_smoothing.h"
 #include "service/new_folder.h"
@@ -167,7 +168,8 @@ RunHeader run_header(const Configuration& configuration, const LiveOptions& opti
   header.processor = processor_model();
   header.t0 = t0;
   header.period = kTickPeriod;
-  header.t0_wall = wall_clock_now() + (t0 - host_now());
+  // As the capture keeps it, so that a replay knows the same.
+  header.t0_wall = std::chrono::floor<std::chrono::microseconds>(wall_clock_now() + (t0 - host_now()));
   header.configuration = configuration.text;
   header.configuration_hash = configuration.sha256;
   for (const auto& device : configuration.devices) header.devices.push_back(device.name);
@@ -258,17 +260,20 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
   }
   std::vector<std::size_t> line_owners;
   for (const auto& device : configuration.devices) line_owners.push_back(device.line_owner);
-  IoThread io(core, std::move(decoders), line_owners);
+  IoThread io(core, std::move(decoders), line_owners, raw_ring_bytes(configuration.devices));
   const HostTime t0{((host_now() + kStartDelay).time_since_epoch() / kTickPeriod) * kTickPeriod};
+  const RunHeader header = run_header(configuration, options, t0);
+  core.set_pc_clock(t0, header.t0_wall);
   CoreThread estimator(core, t0);
 
   auto publisher = LivePublisher::create(configuration, *spec, options, io, estimator);
   if (!publisher) return tl::unexpected<Error>(publisher.error());
   if (auto opened = (*publisher)->smooth(history, estimator_settings); !opened) return opened;
   (*publisher)->watch_can(ids);
-  auto recorder = Recorder::start(
-      {options.out / "capture.lcm", configuration.lcm.channel_prefix, run_header(configuration, options, t0)},
-      {&io.raw_ring()}, {&io.exceptions(), &estimator.rings().exceptions});
+  Recorder::Options recording{options.out / "capture.lcm", configuration.lcm.channel_prefix, header};
+  recording.sync_interval = from_seconds(configuration.record.sync_s);
+  auto recorder = Recorder::start(std::move(recording), {&io.raw_ring()},
+                                  {&io.exceptions(), &estimator.rings().exceptions});
   if (!recorder) return tl::unexpected<Error>(recorder.error());
   (*publisher)->set_recorder(**recorder);
 

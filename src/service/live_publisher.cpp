@@ -66,7 +66,7 @@ ring_status_t ring_status(const char* name, std::size_t capacity, const RingCoun
 
 template <typename Ring>
 ring_status_t ring_status(const char* name, const Ring& ring) {
-  return ring_status(name, Ring::capacity(), ring.counters());
+  return ring_status(name, ring.capacity(), ring.counters());
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       study_devices_(configuration.study_indices()),
       estimator_config_(estimator_config(configuration)),
       tunables_{configuration.lcm, configuration.noise, spec},
-      broadcast_(configuration, {host_now(), wall_clock_now()}),
+      broadcast_(configuration),
       modeller_(configuration, std::move(spec)),
       watches_(configuration.devices.size()),
       lines_(configuration.devices.size()),
@@ -313,7 +313,7 @@ void LivePublisher::drain() {
     on_snapshot(*snapshot);
     rings.snapshots.pop();
   }
-  if (smoothing_ && last_) smoothing_->drain(*last_);
+  if (smoothing_ && last_) smoothing_->drain(*last_, folder_->utc());
   AppliedNoise applied;
   while (rings.noises.try_pop(applied)) on_noise_applied(applied);
   for (const auto& refit : modeller_.take()) on_refit(refit);
@@ -354,7 +354,7 @@ void LivePublisher::on_snapshot(const Snapshot& snapshot) {
 void LivePublisher::on_refit(const Refit& refit) {
   ++refits_;
   refit_duration_s_ = refit.duration_s;
-  refit_utc_ = broadcast_.anchor().at(host_now());
+  refit_utc_ = utc_at(host_now());
   models_.take(refit);
   // At each refit, not only at the end: a run that is killed leaves its newest models.
   if (auto written = models_.write(folder_->folder()); !written) spdlog::error("{}", written.error().text());
@@ -444,10 +444,17 @@ void LivePublisher::add_rings(status_t& status) {
   status.rings.push_back(ring_status("modeller", Modeller::row_capacity(), modeller_.rows()));
 }
 
+/// By the PC's clock until there is a first result.
+UtcTime LivePublisher::utc_at(HostTime time) const {
+  const UtcStamp stamp = broadcast_.utc_at(time);
+  return stamp.is_known ? stamp.utc : wall_clock_now() + (time - host_now());
+}
+
 status_t LivePublisher::status(HostTime now) {
   constexpr double kBytesPerMb = 1e6;
   status_t status = status_of(configuration_, options_.version);
-  status.utime = to_utime(broadcast_.anchor().at(now));
+  status.utime = to_utime(utc_at(now));
+  set_time_scale(last_ ? last_->time_scale : TimeScale{}, status);
   status.uptime_s = to_seconds(now - started_);
   status.tick = estimator_.last_tick();
   status.refits = refits_;
@@ -471,6 +478,7 @@ status_t LivePublisher::status(HostTime now) {
   add_threads(status, now);
   add_rings(status);
   for (auto& sentence : standing_threads(pulses(), now)) status.problems.push_back(std::move(sentence));
+  if (const auto problem = folder_->problem()) status.problems.push_back(problem->text());
   if (!bus_problem_.empty()) status.problems.push_back(bus_problem_);
   const std::lock_guard lock(shared_mutex_);
   status.problems.insert(status.problems.end(), refusals_.begin(), refusals_.end());
@@ -488,16 +496,21 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
   drain();
   modeller_.stop();
   drain();
+  broadcast_.finish();
   watch_devices(host_now());
   publish_status(host_now());
-  if (auto written = folder_->write_calibration(); !written) return written;
-  if (auto closed = folder_->close(); !closed) return closed;
-  if (smoothing_) {
-    if (auto closed = smoothing_->close(); !closed) return closed;
-  }
+  // Whatever the disk refuses of one file, the others are written, and run.json says what is not whole.
+  std::vector<Error> refused;
+  const auto note = [&refused](const Result<void>& written) {
+    if (!written) refused.push_back(written.error());
+  };
+  note(folder_->write_calibration());
+  note(folder_->close());
+  if (smoothing_) note(smoothing_->close());
 
   RunRecord run{configuration_, options_.version,          {"live"},         {},
                 last_tick + 1,  last_ ? &*last_ : nullptr, folder_->events()};
+  run.utc = &folder_->utc();
   for (const auto& line : lines_) {
     DeviceRecord device;
     device.counters = line.counters;
@@ -506,7 +519,10 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
     device.problem = line.problem.data();
     run.devices.push_back(std::move(device));
   }
-  return write_run_record(folder_->folder(), run);
+  for (const auto& error : refused) run.warnings.push_back(error.text());
+  note(write_run_record(folder_->folder(), run));
+  if (refused.empty()) return {};
+  return tl::unexpected<Error>(refused.front());
 }
 
 }  // namespace imuscope

@@ -80,6 +80,7 @@ class LivePublisher {
   void watch_devices(HostTime now);
   void publish_status(HostTime now);
   [[nodiscard]] std::string problem_of(std::size_t device, HostTime now);
+  [[nodiscard]] UtcTime utc_at(HostTime time) const;
   [[nodiscard]] status_t status(HostTime now);
   void fill_device(std::size_t index, device_status_t& device) const;
   void add_threads(status_t& status, HostTime now);

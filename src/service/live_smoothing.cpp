@@ -38,7 +38,7 @@ Result<void> LiveSmoothing::open(const OutputFolder& folder, std::vector<StudyFi
   return opened;
 }
 
-void LiveSmoothing::drain(const Snapshot& last) {
+void LiveSmoothing::drain(const Snapshot& last, const UtcTrack& utc) {
   while (const HistoryRecord* record = history_.ring().front()) {
     // Across a hole there is no transition: what the window holds is given up.
     if (!record->continues) smoother_.reset();
@@ -49,23 +49,24 @@ void LiveSmoothing::drain(const Snapshot& last) {
       smoother_.emplace(layouts_, states);
     }
     smoother_->add({record->values.data(), record->size},
-                   [&](const SmoothedEpoch& epoch) { write(epoch, last); });
+                   [&](const SmoothedEpoch& epoch) { write(epoch, last, utc); });
     history_.ring().pop();
   }
 }
 
-void LiveSmoothing::write(const SmoothedEpoch& epoch, const Snapshot& last) {
+void LiveSmoothing::write(const SmoothedEpoch& epoch, const Snapshot& last, const UtcTrack& utc) {
   if (!last.has_reference) return;
   const double time_s = to_seconds(epoch.time - last.first_reference_time);
   if (epoch.navigating) {
     NavigationOutput shown;
     write_state(epoch.navigation, {epoch.sd.data(), kNavigationStates}, epoch.P_phi, shown);
-    navigation_.append(navigation_csv_row(shown, time_s));
+    navigation_.append(navigation_csv_row(shown, {time_s, utc.at(epoch.time)}));
   }
   for (std::size_t i = 0; i < studies_.size(); ++i) {
     if (!epoch.calibrating[i]) continue;
+    const StudyOutput shown = smoothed_output(last.studies[i], epoch, i, layouts_[i]);
     studies_[i].append(
-        calibration_csv_row(smoothed_output(last.studies[i], epoch, i, layouts_[i]), infos_[i], time_s));
+        calibration_csv_row(shown, infos_[i], {time_s, utc.at(epoch.time + from_seconds(shown.t_d_s))}));
   }
 }
 

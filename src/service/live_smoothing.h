@@ -52,11 +52,12 @@ class LiveSmoothing {
 
   [[nodiscard]] Result<void> open(const OutputFolder& folder, std::vector<StudyFileInfo> infos);
   /// Empties the ring. @param last  newest snapshot, for what smoothing does not change
-  void drain(const Snapshot& last);
+  /// @param utc   of the run so far
+  void drain(const Snapshot& last, const UtcTrack& utc);
   [[nodiscard]] Result<void> close();
 
  private:
-  void write(const SmoothedEpoch& epoch, const Snapshot& last);
+  void write(const SmoothedEpoch& epoch, const Snapshot& last, const UtcTrack& utc);
 
   LiveHistory& history_;
   std::vector<StudyLayout> layouts_;

@@ -83,6 +83,7 @@ void ModelBook::add(const ErrorRecord& record) {
   study.motion.add(record.row);
   ++study.samples;
   study.last_time = record.row.time;
+  study.last_utc = record.row.utc;
   study.first_reference_time = record.first_reference_time;
   ++study.samples_since_refit;
 }
@@ -120,6 +121,7 @@ Refit ModelBook::fit(std::size_t index) {
   refit.study = index;
   refit.name = study.name;
   refit.time = study.last_time;
+  refit.utc = study.last_utc;
   refit.first_reference_time = study.first_reference_time;
   refit.motion = study.motion.message();
   refit.samples = study.samples;

@@ -81,6 +81,7 @@ class ModelBook {
     std::int64_t next_counter = 0;
     Regime regime = Regime::kStatic;
     HostTime last_time{};
+    UtcStamp last_utc{};
     HostTime first_reference_time{};
   };
 

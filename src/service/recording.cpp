@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <algorithm>
-#include <limits>
-#include <map>
 #include <utility>
 
 #include "base/nearest_word.h"
@@ -14,6 +12,7 @@
 #include "configuration/toml_reader.h"
 #include "drivers/transport/candump.h"
 #include "service/candump_source.h"
+#include "service/capture_damage.h"
 #include "service/device_factory.h"
 #include "service/noise_feedback.h"
 
@@ -22,6 +21,8 @@ namespace imuscope {
 namespace {
 
 constexpr std::uint64_t kReadsPerProgress = 1024;
+/// 2000-01-01: a clock that shows less was never set.
+constexpr UtcTime kNoClock = utc_time_from_ns(946'684'800'000'000'000);
 
 class SampleCollector final : public SampleSink {
  public:
@@ -316,51 +317,6 @@ RecordedSchedule schedule_of(const CaptureSummary& summary, const Configuration&
   return schedule;
 }
 
-/// What is missing of a capture or damaged, in sentences.
-std::vector<std::string> damage_of(const CaptureSummary& summary, const std::string& input) {
-  std::vector<std::string> damage;
-  for (const auto& gap : summary.breaks) {
-    const std::string behind = capture_file(input, gap.behind).filename().string();
-    if (gap.n_missing > 0) {
-      damage.push_back(
-          fmt::format("{}: {} file{} from {} on {} missing or unreadable; {:.1f} s of the recording are lost "
-                      "and it goes on with {}",
-                      input, gap.n_missing, gap.n_missing == 1 ? "" : "s",
-                      capture_file(input, gap.first_missing).filename().string(),
-                      gap.n_missing == 1 ? "is" : "are", gap.seconds, behind));
-    } else {
-      damage.push_back(
-          fmt::format("{}: the beginning of {} is damaged; {:.1f} s of the recording are lost there", input,
-                      behind, gap.seconds));
-    }
-  }
-  // One remark a device, however many holes a capture has or claims.
-  struct Lost {
-    std::int64_t records = 0;
-    std::int64_t places = 0;
-  };
-  std::map<std::string, Lost> lost;
-  for (const auto& loss : summary.losses) {
-    Lost& of_device = lost[loss.device];
-    of_device.records += std::min(loss.records, std::numeric_limits<std::int64_t>::max() - of_device.records);
-    ++of_device.places;
-  }
-  for (const auto& [device, of_device] : lost) {
-    damage.push_back(fmt::format(
-        "{}: the recorder lost {} records in {} place{}; the replay is not exact from the first on",
-        one_line(device), of_device.records, of_device.places, of_device.places == 1 ? "" : "s"));
-  }
-  if (summary.bytes_cut_off > 0) {
-    damage.push_back(fmt::format("{}: its last record is cut off ({} bytes); everything before it is used",
-                                 input, summary.bytes_cut_off));
-  }
-  if (summary.bytes_skipped > 0) {
-    damage.push_back(
-        fmt::format("{}: {} bytes are damaged and were passed over", input, summary.bytes_skipped));
-  }
-  return damage;
-}
-
 Result<OpenedRecording> open_capture(const std::string& input,
                                      const std::optional<std::filesystem::path>& file,
                                      const OpeningProgress& progress) {
@@ -404,6 +360,9 @@ Result<OpenedRecording> open_capture(const std::string& input,
   recording.open = [input, names, bytes](DeviceIndex index) {
     return open_captured_device(input, names[index], bytes[index]);
   };
+  // A log of reads that were imported may know nothing of UTC.
+  if (summary->has_run && summary->run.t0_wall > kNoClock)
+    recording.pc_clock = {summary->run.t0, summary->run.t0_wall};
   // Exceptions name devices by their index in the recorded configuration: they hold for that one alone.
   if (!summary->has_run) {
     opened.remarks.push_back(fmt::format(

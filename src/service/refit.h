@@ -12,6 +12,7 @@
 #include "noise/fit.h"
 #include "noise/wavelet_variance.h"
 #include "sample/regime.h"
+#include "sample/utc_scale.h"
 
 namespace imuscope {
 
@@ -31,6 +32,7 @@ struct Refit {
   std::size_t study = 0;
   std::string name;  ///< of the S-IMU
   HostTime time{};   ///< of the last sample used
+  UtcStamp utc{};    ///< of the same
   HostTime first_reference_time{};
   std::vector<AxisRefit> axes;
   dynamics_t motion{};       ///< its name, utime and time_s are left to the publisher

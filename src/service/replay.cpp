@@ -129,6 +129,7 @@ class Replayer {
     if (!t0)
       return work_error("the recording holds no data that a decoder understands",
                         "check protocols and files");
+    if (recording_.pc_clock) core_.set_pc_clock(recording_.pc_clock->time, recording_.pc_clock->utc);
     ReplayResult result;
     result.t0 = *t0;
     if (auto ran = run_ticks(*t0, result.ticks); !ran) return tl::unexpected<Error>(ran.error());

@@ -49,8 +49,14 @@ struct Recording {
   std::vector<bool> present;                 ///< per device of the configuration
   std::vector<DeviceClock> clocks;           ///< per device
   std::optional<RecordedSchedule> schedule;  ///< of a capture of a live run
-  std::vector<MarkedMoment> moments;         ///< that a person marked while it was recorded
-  std::vector<std::string> damage;  ///< what is missing of it or damaged, with what it costs, in sentences
+  /// What the PC's clock showed, and when, where the recording says it.
+  struct PcClock {
+    HostTime time{};
+    UtcTime utc{};
+  };
+  std::optional<PcClock> pc_clock{};
+  std::vector<MarkedMoment> moments;  ///< that a person marked while it was recorded
+  std::vector<std::string> damage;    ///< what is missing of it or damaged, with what it costs, in sentences
 };
 
 /// Names and clock shifts of the S-IMUs, in the order of the configuration.

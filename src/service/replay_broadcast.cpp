@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "publish/message_values.h"
-#include "rt/host_clock.h"
 #include "service/health.h"
 
 namespace imuscope {
@@ -21,7 +20,7 @@ ReplayBroadcast::ReplayBroadcast(const Configuration& configuration, const Recor
     : configuration_(configuration),
       recording_(recording),
       version_(std::move(version)),
-      broadcast_(configuration, {host_now(), wall_clock_now()}) {}
+      broadcast_(configuration) {}
 
 Result<void> ReplayBroadcast::open(const std::string& url) {
   auto bus = LcmPublisher::open(url, configuration_.lcm.channel_prefix);
@@ -43,7 +42,8 @@ void ReplayBroadcast::on_snapshot(const Snapshot& snapshot) {
 /// What only a running service has (lines, threads, rings, a capture being written) is left out.
 status_t ReplayBroadcast::status(const Snapshot& snapshot) const {
   status_t status = status_of(configuration_, version_);
-  status.utime = to_utime(broadcast_.anchor().at(snapshot.cut));
+  status.utime = utime_of(snapshot.time_scale.at(snapshot.cut));
+  set_time_scale(snapshot.time_scale, status);
   status.state = "running";
   status.reason = fmt::format("a replay of {}", fmt::join(recording_.inputs, ", "));
   status.uptime_s = static_cast<double>(snapshot.tick) / kTickRate_hz;

@@ -20,6 +20,8 @@ class ReplayBroadcast {
 
   void on_error(const ErrorRecord& record) { broadcast_.on_error(record); }
   void on_refit(const Refit& refit);
+  /// After the last of all.
+  void finish() { broadcast_.finish(); }
   /// Publishes STATUS, too, once for every second of the recording.
   void on_snapshot(const Snapshot& snapshot);
 

@@ -70,6 +70,7 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   ReplaySink sink(**folder, configuration, *spec, broadcast);
   const auto result = replay(configuration, estimator_config(configuration), recording, sink, replay_options);
   if (!result) return tl::unexpected<Error>(result.error());
+  broadcast.finish();
   if (auto written = sink.models().write((*folder)->folder()); !written) return written;
   if (auto written = (*folder)->write_calibration(); !written) return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
@@ -79,9 +80,10 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
     const auto of_run = warnings_of(configuration, *last);
     warnings.insert(warnings.end(), of_run.begin(), of_run.end());
   }
-  return write_run_record((*folder)->folder(),
-                          {configuration, options.version, recording.inputs, result->devices, result->ticks,
-                           last ? &*last : nullptr, (*folder)->events(), std::move(warnings)});
+  RunRecord run{configuration, options.version,         recording.inputs,    result->devices,
+                result->ticks, last ? &*last : nullptr, (*folder)->events(), std::move(warnings)};
+  run.utc = &(*folder)->utc();
+  return write_run_record((*folder)->folder(), run);
 }
 
 }  // namespace imuscope

@@ -9,6 +9,7 @@
 #include "base/json_text.h"
 #include "base/text.h"
 #include "base/units.h"
+#include "sample/gps_time.h"
 #include "service/observability.h"
 
 namespace imuscope {
@@ -79,14 +80,33 @@ void SampleTimeLine::add(std::int64_t counter, double time_s) {
 double SampleTimeLine::period_s() const { return sum_ct_ / sum_cc_; }
 double SampleTimeLine::t0_s() const { return mean_t_ - period_s() * mean_c_; }
 
+void append_time(const RowTime& time, fmt::memory_buffer& row) {
+  fmt::format_to(fmt::appender(row), FMT_COMPILE("{},"), time.time_s);
+  if (!time.utc.is_known) return;
+  constexpr std::int64_t kUsPerS = 1'000'000;
+  const std::int64_t us =
+      std::chrono::round<std::chrono::microseconds>(time.utc.utc).time_since_epoch().count();
+  fmt::format_to(fmt::appender(row), FMT_COMPILE("{}.{:06}"), us / kUsPerS, us % kUsPerS);
+}
+
 std::string navigation_csv_header() {
-  return "time_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_deg,"
+  return std::string(kTimeColumns) +
+         ",gps_week,gps_tow_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_"
+         "deg,"
          "sd_n_m,sd_e_m,sd_d_m,sd_v_n_mps,sd_v_e_mps,sd_v_d_mps,sd_roll_deg,sd_pitch_deg,sd_heading_deg\n";
 }
 
-std::string navigation_csv_row(const NavigationOutput& nav, double time_s) {
+std::string navigation_csv_row(const NavigationOutput& nav, const RowTime& time) {
   fmt::memory_buffer row;
-  fmt::format_to(fmt::appender(row), FMT_COMPILE("{},{},{},{}"), time_s, nav.latitude_rad * kDegPerRad,
+  append_time(time, row);
+  if (time.utc.is_known) {
+    const GpsTime gps =
+        gps_time(std::chrono::round<std::chrono::microseconds>(time.utc.utc), time.utc.gps_minus_utc_s);
+    fmt::format_to(fmt::appender(row), FMT_COMPILE(",{},{:.6f}"), gps.week, gps.tow_s);
+  } else {
+    row.append(std::string_view(",,"));
+  }
+  fmt::format_to(fmt::appender(row), FMT_COMPILE(",{},{},{}"), nav.latitude_rad * kDegPerRad,
                  nav.longitude_rad * kDegPerRad, nav.height_m);
   append(row, nav.v_n_mps, 1.0);
   append(row, nav.rpy_rad, kDegPerRad);
@@ -98,15 +118,17 @@ std::string navigation_csv_row(const NavigationOutput& nav, double time_s) {
 }
 
 std::string odometry_csv_header() {
-  return "time_s,speed_mps,standing,zero_velocity,lost,scale_percent,mount_y_deg,mount_z_deg,"
+  return std::string(kTimeColumns) +
+         ",speed_mps,standing,zero_velocity,lost,scale_percent,mount_y_deg,mount_z_deg,"
          "axle_x_m,axle_y_m,axle_z_m,sd_scale_percent,sd_mount_y_deg,sd_mount_z_deg,"
          "sd_axle_x_m,sd_axle_y_m,sd_axle_z_m\n";
 }
 
-std::string odometry_csv_row(const OdometryOutput& odometry, double time_s) {
+std::string odometry_csv_row(const OdometryOutput& odometry, const RowTime& time) {
   constexpr double kPercent = 100.0;
   fmt::memory_buffer row;
-  fmt::format_to(fmt::appender(row), FMT_COMPILE("{},{},{:d},{:d},{:d},{},{},{}"), time_s, odometry.speed_mps,
+  append_time(time, row);
+  fmt::format_to(fmt::appender(row), FMT_COMPILE(",{},{:d},{:d},{:d},{},{},{}"), odometry.speed_mps,
                  odometry.standing, odometry.resting, odometry.lost, kPercent * odometry.scale,
                  odometry.mount_rad[1] * kDegPerRad, odometry.mount_rad[2] * kDegPerRad);
   append(row, odometry.r_bv_b_m, 1.0);
@@ -119,7 +141,7 @@ std::string odometry_csv_row(const OdometryOutput& odometry, double time_s) {
 
 std::string calibration_csv_header() {
   const auto names = calibration_columns();
-  std::string header = "time_s";
+  std::string header(kTimeColumns);
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (i == kPsiColumns) header += ",q_w,q_x,q_y,q_z";
     header += "," + names[i];
@@ -128,10 +150,10 @@ std::string calibration_csv_header() {
   return header + "\n";
 }
 
-std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, double time_s) {
+std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, const RowTime& time) {
   const auto q = quaternion_of(study.C_b_s);
   fmt::memory_buffer row;
-  fmt::format_to(fmt::appender(row), FMT_COMPILE("{}"), time_s);
+  append_time(time, row);
   append(row, study.psi_rad, kDegPerRad);
   fmt::format_to(fmt::appender(row), FMT_COMPILE(",{},{},{},{}"), q.w(), q.x(), q.y(), q.z());
   append(row, study.r_bs_b_m, 1.0);
@@ -152,13 +174,15 @@ std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& i
 }
 
 std::string error_csv_header() {
-  return "time_s,counter,e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,"
+  return std::string(kTimeColumns) +
+         ",counter,e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,"
          "e_accel_z_mps2,regime\n";
 }
 
 std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view regime) {
   fmt::memory_buffer text;
-  fmt::format_to(fmt::appender(text), FMT_COMPILE("{},{}"), time_s, row.counter);
+  append_time({time_s, row.utc}, text);
+  fmt::format_to(fmt::appender(text), FMT_COMPILE(",{}"), row.counter);
   // An invalid triad is an empty field: nothing is invented.
   for (std::size_t i = 0; i < 3; ++i) {
     text.push_back(',');
@@ -238,7 +262,6 @@ Result<std::unique_ptr<RunFolder>> RunFolder::create(const std::filesystem::path
   run->calibrations_.resize(n);
   run->errors_.resize(n);
   run->sample_times_.resize(n);
-  run->calibration_times_.resize(n, HostTime::min());
   if (auto opened = run->navigation_.open(run->folder_, "navigation.csv", navigation_csv_header()); !opened) {
     return tl::unexpected<Error>(opened.error());
   }
@@ -271,40 +294,30 @@ void RunFolder::on_event(const EstimatorEvent& event) noexcept { events_.push_ba
 
 void RunFolder::on_late_sample(const LateSample& late) noexcept { late_.push_back(late); }
 
-double RunFolder::seconds_since_start(HostTime time) const {
-  return to_seconds(time - last_->first_reference_time);
+RowTime RunFolder::row_time(HostTime time, double shift_s) const {
+  return {to_seconds(time - last_->first_reference_time), last_->time_scale.at(time + from_seconds(shift_s))};
 }
-
-namespace {
-
-/// Whether `time` is not that of the row written last, which it becomes.
-bool is_new(HostTime time, HostTime& written) { return std::exchange(written, time) != time; }
-
-}  // namespace
 
 void RunFolder::on_snapshot(const Snapshot& snapshot) noexcept {
   last_ = snapshot;
+  utc_.add(snapshot.time_scale);
   if (!snapshot.has_reference) return;
   // A row is of a time: while nothing comes, none is repeated.
-  if (snapshot.navigation.status == NavigationStatus::kNavigating &&
-      is_new(snapshot.navigation.time, navigation_time_)) {
-    navigation_.append(
-        navigation_csv_row(snapshot.navigation, seconds_since_start(snapshot.navigation.time)));
-  }
-  if (snapshot.odometry.has_speed && is_new(snapshot.odometry.time, odometry_time_)) add_odometry();
+  if (snapshot.has_new_navigation)
+    navigation_.append(navigation_csv_row(snapshot.navigation, row_time(snapshot.navigation.time)));
+  if (snapshot.has_new_odometry) add_odometry();
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
     const auto& study = snapshot.studies[i];
-    if (has_estimate(study.status) && is_new(study.time, calibration_times_[i]))
-      calibrations_[i].append(calibration_csv_row(study, studies_[i], seconds_since_start(study.time)));
+    if (snapshot.has_new_study[i])
+      calibrations_[i].append(calibration_csv_row(study, studies_[i], row_time(study.time, study.t_d_s)));
   }
 }
 
 /// The file is made with the first speed: a run without odometry has none.
 void RunFolder::add_odometry() {
-  if (odometry_opened_ && !odometry_.is_open())
-    odometry_opened_ = odometry_.open(folder_, kOdometryFile, odometry_csv_header());
+  if (!odometry_.is_open()) odometry_opened_ = odometry_.open(folder_, kOdometryFile, odometry_csv_header());
   if (!odometry_opened_) return;
-  odometry_.append(odometry_csv_row(last_->odometry, seconds_since_start(last_->odometry.time)));
+  odometry_.append(odometry_csv_row(last_->odometry, row_time(last_->odometry.time)));
 }
 
 Result<void> RunFolder::write_calibration() {
@@ -321,6 +334,19 @@ Result<void> RunFolder::write_calibration(const std::vector<CalibrationEntry>& e
     imus.back().update(entries[i].more);
   }
   return write_json(folder_, "calibration.json", {{"schema", "imuscope.calibration/1"}, {"imus", imus}});
+}
+
+std::optional<Error> RunFolder::problem() const {
+  if (!odometry_opened_) return odometry_opened_.error();
+  for (const auto* file : {&navigation_, &odometry_}) {
+    if (auto problem = file->problem()) return problem;
+  }
+  for (const auto* files : {&calibrations_, &errors_}) {
+    for (const auto& file : *files) {
+      if (auto problem = file.problem()) return problem;
+    }
+  }
+  return std::nullopt;
 }
 
 Result<void> RunFolder::close() {

@@ -4,6 +4,7 @@
 /// errors_NAME.csv while it goes, calibration.json and run.json at its end. Columns and keys are promised to
 /// users; see docs in README.md, "Files of a run". Soft world: one thread, allocates, writes files.
 
+#include <fmt/format.h>
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include "base/output_folder.h"
 #include "base/result.h"
 #include "service/core.h"
+#include "service/utc_track.h"
 
 namespace imuscope {
 
@@ -26,10 +28,17 @@ class CsvFile {
   /// Appends text that ends in a newline.
   void append(std::string_view rows) { out_.write(rows); }
   [[nodiscard]] Result<void> close() { return out_.close(); }
+  [[nodiscard]] std::optional<Error> problem() const { return out_.problem(); }
   [[nodiscard]] bool is_open() const { return out_.is_open(); }
 
  private:
   OutputFile out_;
+};
+
+/// When a row is valid, in the columns time_s and utc_s.
+struct RowTime {
+  double time_s = 0.0;  ///< since the run's first R-IMU epoch, by the host's clock
+  UtcStamp utc;         ///< utc_s: seconds since 1970-01-01, six decimals; empty where nobody told UTC
 };
 
 /// Writes `document`, indented, numbers with the digits that give the same double back.
@@ -88,16 +97,20 @@ class RunFolder final : public CoreSink {
   [[nodiscard]] const std::optional<Snapshot>& last_snapshot() const { return last_; }
   [[nodiscard]] const std::vector<LateSample>& late_samples() const { return late_; }
   [[nodiscard]] const std::vector<EstimatorEvent>& events() const { return events_; }
+  [[nodiscard]] const UtcTrack& utc() const { return utc_; }
 
   /// Writes calibration.json from the last snapshot, or from what a study made of it.
   [[nodiscard]] Result<void> write_calibration();
   [[nodiscard]] Result<void> write_calibration(const std::vector<CalibrationEntry>& entries);
+  /// What is wrong with the disk now, of the first of the files that has lost a line to it.
+  [[nodiscard]] std::optional<Error> problem() const;
   /// Closes the CSV files; the first failed write, if any, is the error.
   [[nodiscard]] Result<void> close();
 
  private:
   explicit RunFolder(OutputFolder folder) : folder_(std::move(folder)) {}
-  [[nodiscard]] double seconds_since_start(HostTime time) const;
+  /// @param shift_s  from the host's time to the motion's: the time offset of an S-IMU
+  [[nodiscard]] RowTime row_time(HostTime time, double shift_s = 0.0) const;
   void add_odometry();
 
   OutputFolder folder_;
@@ -107,25 +120,25 @@ class RunFolder final : public CoreSink {
   Result<void> odometry_opened_;
   std::vector<CsvFile> calibrations_;
   std::vector<CsvFile> errors_;
-  /// Of the rows written last.
-  HostTime navigation_time_ = HostTime::min();
-  HostTime odometry_time_ = HostTime::min();
-  std::vector<HostTime> calibration_times_;
   std::vector<SampleTimeLine> sample_times_;
   std::vector<EstimatorEvent> events_;
   std::vector<LateSample> late_;
   std::optional<Snapshot> last_;
+  UtcTrack utc_;
 };
 
+/// The two columns that every file begins with, and the same of a row.
+inline constexpr std::string_view kTimeColumns = "time_s,utc_s";
+void append_time(const RowTime& time, fmt::memory_buffer& row);
 /// Header and rows of navigation.csv.
 std::string navigation_csv_header();
-std::string navigation_csv_row(const NavigationOutput& navigation, double time_s);
+std::string navigation_csv_row(const NavigationOutput& navigation, const RowTime& time);
 /// Header and rows of odometry.csv.
 std::string odometry_csv_header();
-std::string odometry_csv_row(const OdometryOutput& odometry, double time_s);
+std::string odometry_csv_row(const OdometryOutput& odometry, const RowTime& time);
 /// Header and rows of calibration_NAME.csv.
 std::string calibration_csv_header();
-std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, double time_s);
+std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, const RowTime& time);
 /// Row of errors_NAME.csv.
 /// @param regime  its last column; empty where none holds
 std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view regime);

@@ -6,6 +6,7 @@
 
 #include "base/units.h"
 #include "service/describe.h"
+#include "service/health.h"
 #include "service/run_folder.h"
 
 namespace imuscope {
@@ -13,12 +14,14 @@ namespace imuscope {
 namespace {
 
 std::string utc_text(UtcTime utc) {
-  const auto since_epoch = std::chrono::floor<std::chrono::seconds>(utc);
+  const auto whole = std::chrono::round<std::chrono::microseconds>(utc);
+  const auto since_epoch = std::chrono::floor<std::chrono::seconds>(whole);
   const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(since_epoch));
   const std::chrono::hh_mm_ss time(since_epoch - std::chrono::floor<std::chrono::days>(since_epoch));
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}Z", static_cast<int>(date.year()),
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", static_cast<int>(date.year()),
                      static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
-                     time.hours().count(), time.minutes().count(), time.seconds().count());
+                     time.hours().count(), time.minutes().count(), time.seconds().count(),
+                     (whole - since_epoch).count());
 }
 
 nlohmann::json device_json(const RunRecord& run, std::size_t i) {
@@ -93,22 +96,30 @@ nlohmann::json gnss_json(const EstimatorCounters& counters) {
           {"contradicts_motion", contradicts_motion(counters)}};
 }
 
-/// Whose seconds the run's rates were integrated over. "host": nothing told UTC.
+bool is_told_by_device(const TimeScale& scale) {
+  return scale.source == UtcSource::kReference || scale.source == UtcSource::kGnss;
+}
+
+/// Whose seconds the run's rates were integrated over ("host": no device told UTC), and where the UTC of its
+/// rows comes from.
 nlohmann::json time_scale_json(const Snapshot* last) {
   const TimeScale scale = last != nullptr ? last->time_scale : TimeScale{};
-  const char* sources[] = {"host", "reference", "gnss"};
-  nlohmann::json json{{"seconds_of", sources[static_cast<std::size_t>(scale.source)]},
-                      {"sd_rate_ppm", 1e6 * scale.sd_rate}};
-  if (scale.source == UtcSource::kNone) return json;
+  const bool told = is_told_by_device(scale);
+  nlohmann::json json{{"seconds_of", told ? name_of(scale.source) : "host"},
+                      {"sd_rate_ppm", 1e6 * scale.sd_rate},
+                      {"utc_from", name_of(scale.source)},
+                      {"sd_utc_s", nullptr}};
+  if (!told) return json;
   json["host_clock_ppm"] = -1e6 * scale.rate;
   json["sd_utc_s"] = scale.sd_utc_s;
+  json["gps_minus_utc_s"] = scale.gps_minus_utc_s;
   json["steps"] = scale.steps;
   return json;
 }
 
 /// Navigation alone integrates; a mounting does not depend on the length of a second.
 void warn_of_host_seconds(const Snapshot& last, std::vector<std::string>& warnings) {
-  if (last.time_scale.source != UtcSource::kNone) return;
+  if (is_told_by_device(last.time_scale)) return;
   if (last.navigation.status != NavigationStatus::kNavigating) return;
   warnings.push_back(
       "no device tells UTC: rates were integrated over seconds of the arrivals' clock, which may be wrong by "
@@ -165,8 +176,10 @@ nlohmann::json run_json(const RunRecord& run) {
   if (run.last != nullptr && run.last->odometry.enabled) json["odometry"] = odometry_json(*run.last);
   json["events"] = nlohmann::json::array();
   for (const auto& event : run.events) {
+    const UtcStamp utc = run.utc != nullptr ? run.utc->at(event.time) : UtcStamp{};
     json["events"].push_back(
         {{"time_s", run.last != nullptr ? to_seconds(event.time - run.last->first_reference_time) : 0.0},
+         {"utc", utc.is_known ? nlohmann::json(utc_text(utc.utc)) : nlohmann::json(nullptr)},
          {"text", describe(run.configuration, event)}});
   }
   if (!run.error_process_mounting.empty()) json["error_process_mounting"] = run.error_process_mounting;

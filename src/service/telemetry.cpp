@@ -3,12 +3,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "base/units.h"
 #include "calibration/eigen_types.h"
 #include "navigation/gravity.h"
 #include "navigation/wgs84.h"
 #include "publish/message_values.h"
+#include "sample/gps_time.h"
 #include "service/noise_series.h"
 #include "service/observability.h"
 
@@ -34,8 +36,8 @@ struct Fields {
 
 /// What every message of a refit begins with.
 template <typename Message>
-Message stamped(Message message, const Refit& refit, const UtcAnchor& anchor) {
-  message.utime = to_utime(anchor.at(refit.time));
+Message stamped(Message message, const Refit& refit) {
+  message.utime = utime_of(refit.utc);
   message.name = refit.name;
   message.time_s = to_seconds(refit.time - refit.first_reference_time);
   return message;
@@ -176,16 +178,45 @@ struct BridgeFrames {
 
 void copy(const Eigen::Vector3d& from, double (&to)[3]) { std::copy(from.begin(), from.end(), to); }
 
-UtcTime utc_of(const NavigationOutput& navigation, const UtcAnchor& anchor) {
-  return navigation.has_utc ? navigation.utc : anchor.at(navigation.time);
+template <typename Message>
+void set_freshness(const DataAges& ages, Validity validity, Message& message) {
+  message.validity = static_cast<std::int8_t>(validity);
+  message.reference_age_s = ages.reference_s;
+  message.gnss_age_s = ages.gnss_s;
 }
+
+error_row_t error_row_message(const ErrorRecord& record) {
+  constexpr Vector3 kUnknownVector{kUnknown, kUnknown, kUnknown};
+  const ErrorRow& row = record.row;
+  error_row_t m{};
+  m.utime = utime_of(row.utc);
+  m.time_s = to_seconds(row.time - record.first_reference_time);
+  m.counter = row.counter;
+  Fields{m.e_gyro_x_radps, m.e_gyro_y_radps, m.e_gyro_z_radps}.set(row.gyro_valid ? row.e_gyro_radps
+                                                                                  : kUnknownVector);
+  Fields{m.e_accel_x_mps2, m.e_accel_y_mps2, m.e_accel_z_mps2}.set(row.accel_valid ? row.e_accel_mps2
+                                                                                   : kUnknownVector);
+  return m;
+}
+
+constexpr double kBatch_s = 0.1;
+/// Rows wait for their reference a tenth of a second, and a stalled core or line brings them later still.
+constexpr double kBatchWaits_s = 1.0;
+
+std::int64_t tenth_of(double time_s) { return static_cast<std::int64_t>(std::floor(time_s / kBatch_s)); }
 
 }  // namespace
 
-navigation_t navigation_message(const Snapshot& snapshot, const UtcAnchor& anchor) {
+std::int64_t utime_of(const UtcStamp& stamp) { return stamp.is_known ? to_utime(stamp.utc) : 0; }
+
+navigation_t navigation_message(const Snapshot& snapshot) {
   const NavigationOutput& navigation = snapshot.navigation;
+  const UtcStamp utc = snapshot.time_scale.at(navigation.time);
+  const GpsTime gps = gps_time(utc.utc, utc.gps_minus_utc_s);
   navigation_t m{};
-  m.utime = to_utime(utc_of(navigation, anchor));
+  m.utime = utime_of(utc);
+  m.gps_week = utc.is_known ? gps.week : 0;
+  m.gps_tow_s = utc.is_known ? gps.tow_s : kUnknown;
   m.time_s = to_seconds(navigation.time - snapshot.first_reference_time);
   m.lat_deg = navigation.latitude_rad * kDegPerRad;
   m.lon_deg = navigation.longitude_rad * kDegPerRad;
@@ -195,14 +226,15 @@ navigation_t navigation_message(const Snapshot& snapshot, const UtcAnchor& ancho
   Fields{m.sd_n_m, m.sd_e_m, m.sd_d_m}.set(navigation.sd_position_m);
   Fields{m.sd_v_n_mps, m.sd_v_e_mps, m.sd_v_d_mps}.set(navigation.sd_velocity_mps);
   Fields{m.sd_roll_deg, m.sd_pitch_deg, m.sd_heading_deg}.set(navigation.sd_rpy_rad, kDegPerRad);
+  set_freshness(snapshot.ages, validity_of(navigation, snapshot.ages), m);
   return m;
 }
 
-odometry_t odometry_message(const Snapshot& snapshot, const UtcAnchor& anchor) {
+odometry_t odometry_message(const Snapshot& snapshot) {
   const OdometryOutput& odometry = snapshot.odometry;
   const EstimatorCounters& counters = snapshot.counters;
   odometry_t m{};
-  m.utime = to_utime(anchor.at(odometry.time));
+  m.utime = utime_of(snapshot.time_scale.at(odometry.time));
   m.time_s = to_seconds(odometry.time - snapshot.first_reference_time);
   m.speed_mps = odometry.speed_mps;
   m.standing = static_cast<std::int8_t>(odometry.standing);
@@ -226,44 +258,64 @@ odometry_t odometry_message(const Snapshot& snapshot, const UtcAnchor& anchor) {
   return m;
 }
 
-calibration_t calibration_message(const Snapshot& snapshot, std::size_t study, const std::string& name,
-                                  const UtcAnchor& anchor) {
+calibration_t calibration_message(const Snapshot& snapshot, std::size_t study, const std::string& name) {
   const StudyOutput& estimate = snapshot.studies[study];
   calibration_t m{};
-  m.utime = to_utime(anchor.at(estimate.time));
+  m.utime = utime_of(snapshot.time_scale.at(estimate.time + from_seconds(estimate.t_d_s)));
   m.name = name;
   m.time_s = to_seconds(estimate.time - snapshot.first_reference_time);
   set_values(estimate, m);
   set_sds(estimate, m);
   set_observability(estimate, m);
+  set_freshness(snapshot.ages, validity_of(estimate, snapshot.ages), m);
   return m;
 }
 
-error_t error_message(const ErrorRecord& record, const std::string& name, const UtcAnchor& anchor) {
-  constexpr Vector3 kUnknownVector{kUnknown, kUnknown, kUnknown};
-  const ErrorRow& row = record.row;
-  error_t m{};
-  m.utime = to_utime(anchor.at(row.time));
-  m.name = name;
-  m.time_s = to_seconds(row.time - record.first_reference_time);
-  m.counter = row.counter;
-  Fields{m.e_gyro_x_radps, m.e_gyro_y_radps, m.e_gyro_z_radps}.set(row.gyro_valid ? row.e_gyro_radps
-                                                                                  : kUnknownVector);
-  Fields{m.e_accel_x_mps2, m.e_accel_y_mps2, m.e_accel_z_mps2}.set(row.accel_valid ? row.e_accel_mps2
-                                                                                   : kUnknownVector);
-  m.regime = regime_name(row.regime);
-  return m;
+std::optional<error_t> ErrorBatch::add(const ErrorRecord& record) {
+  const double time_s = to_seconds(record.row.time - record.first_reference_time);
+  const auto validity = static_cast<std::int8_t>(record.validity);
+  const auto regime = regime_name(record.row.regime);
+  std::optional<error_t> whole;
+  if (pending_ && (tenth_of(time_s) != tenth_ || pending_->validity != validity ||
+                   pending_->regime != regime || pending_->rows.size() == kRowsMax))
+    whole = take();
+  if (!pending_) {
+    pending_.emplace();
+    pending_->name = name_;
+    pending_->regime = regime;
+    set_freshness(record.ages, record.validity, *pending_);
+    tenth_ = tenth_of(time_s);
+  }
+  pending_->rows.push_back(error_row_message(record));
+  // fmax() passes over NaN: an age that one row knows counts.
+  pending_->reference_age_s = std::fmax(pending_->reference_age_s, record.ages.reference_s);
+  pending_->gnss_age_s = std::fmax(pending_->gnss_age_s, record.ages.gnss_s);
+  return whole;
 }
 
-wavelet_variance_t wavelet_variance_message(const Refit& refit, const UtcAnchor& anchor) {
-  auto m = stamped(wavelet_variance_t{}, refit, anchor);
+std::optional<error_t> ErrorBatch::take() {
+  if (!pending_) return std::nullopt;
+  error_t whole = std::move(*pending_);
+  pending_.reset();
+  whole.utime = whole.rows.front().utime;
+  whole.n_rows = element_count(whole.rows);
+  return whole;
+}
+
+std::optional<error_t> ErrorBatch::take_old(double time_s) {
+  if (!pending_ || time_s < kBatch_s * static_cast<double>(tenth_ + 1) + kBatchWaits_s) return std::nullopt;
+  return take();
+}
+
+wavelet_variance_t wavelet_variance_message(const Refit& refit) {
+  auto m = stamped(wavelet_variance_t{}, refit);
   for (const AxisRefit& axis : refit.axes) m.axes.push_back(axis_message(axis));
   m.n_axes = element_count(m.axes);
   return m;
 }
 
-noise_model_t noise_model_message(const Refit& refit, const UtcAnchor& anchor) {
-  auto m = stamped(noise_model_t{}, refit, anchor);
+noise_model_t noise_model_message(const Refit& refit) {
+  auto m = stamped(noise_model_t{}, refit);
   for (const AxisRefit& axis : refit.axes) {
     if (axis.fit) m.models.push_back(model_message(axis));
   }
@@ -271,11 +323,9 @@ noise_model_t noise_model_message(const Refit& refit, const UtcAnchor& anchor) {
   return m;
 }
 
-dynamics_t dynamics_message(const Refit& refit, const UtcAnchor& anchor) {
-  return stamped(refit.motion, refit, anchor);
-}
+dynamics_t dynamics_message(const Refit& refit) { return stamped(refit.motion, refit); }
 
-pose_t pose_message(const Snapshot& snapshot, const Snapshot& origin, const UtcAnchor& anchor) {
+pose_t pose_message(const Snapshot& snapshot, const Snapshot& origin) {
   const NavigationOutput& navigation = snapshot.navigation;
   const BridgeFrames frames(navigation);
   const Eigen::Matrix3d C_n_b = frames.C_b_n.transpose();
@@ -285,7 +335,7 @@ pose_t pose_message(const Snapshot& snapshot, const Snapshot& origin, const UtcA
   const Eigen::Vector3d omega_ie_n = earth_rate_n(navigation.latitude_rad);
   const Eigen::Vector3d g_n(0.0, 0.0, normal_gravity(navigation.latitude_rad, navigation.height_m).g_mps2);
   pose_t m{};
-  m.utime = to_utime(utc_of(navigation, anchor));
+  m.utime = utime_of(snapshot.time_scale.at(navigation.time));
   copy(frames.position_U_m(navigation, origin.navigation), m.pos);
   copy(frames.C_b_F * C_n_b * to_eigen(navigation.v_n_mps), m.vel);
   const auto q = frames.q_F_U();
@@ -295,11 +345,11 @@ pose_t pose_message(const Snapshot& snapshot, const Snapshot& origin, const UtcA
   return m;
 }
 
-ins_t ins_message(const Snapshot& snapshot, const Snapshot& origin, const UtcAnchor& anchor) {
+ins_t ins_message(const Snapshot& snapshot, const Snapshot& origin) {
   const NavigationOutput& navigation = snapshot.navigation;
   const BridgeFrames frames(navigation);
   ins_t m{};
-  m.utime = to_utime(utc_of(navigation, anchor));
+  m.utime = utime_of(snapshot.time_scale.at(navigation.time));
   m.device_time = snapshot.reference.counter;
   copy(frames.C_b_F * to_eigen(snapshot.reference.omega_radps), m.gyro);
   copy(frames.C_b_F * to_eigen(snapshot.reference.f_mps2), m.accel);

@@ -12,39 +12,54 @@
 #include <imuscope/odometry_t.hpp>
 #include <imuscope/pose_t.hpp>
 #include <imuscope/wavelet_variance_t.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "service/core.h"
 #include "service/refit.h"
 
 namespace imuscope {
 
-/// Where UTC is on the host's time scale: from the R-IMU's tags, or from the PC's clock as long as there are
-/// none.
-struct UtcAnchor {
-  HostTime host{};
-  UtcTime utc{};
-  [[nodiscard]] UtcTime at(HostTime time) const { return utc + (time - host); }
-};
+/// utime of a message; 0 where nobody told UTC.
+[[nodiscard]] std::int64_t utime_of(const UtcStamp& stamp);
 
-[[nodiscard]] navigation_t navigation_message(const Snapshot& snapshot, const UtcAnchor& anchor);
-[[nodiscard]] odometry_t odometry_message(const Snapshot& snapshot, const UtcAnchor& anchor);
+[[nodiscard]] navigation_t navigation_message(const Snapshot& snapshot);
+[[nodiscard]] odometry_t odometry_message(const Snapshot& snapshot);
 /// Where the motion has shown nothing of a state, its value is NaN.
 /// @param study  index of the S-IMU that is called `name`
 [[nodiscard]] calibration_t calibration_message(const Snapshot& snapshot, std::size_t study,
-                                                const std::string& name, const UtcAnchor& anchor);
-/// @param name  of the S-IMU
-[[nodiscard]] error_t error_message(const ErrorRecord& record, const std::string& name,
-                                    const UtcAnchor& anchor);
+                                                const std::string& name);
 
-[[nodiscard]] wavelet_variance_t wavelet_variance_message(const Refit& refit, const UtcAnchor& anchor);
-[[nodiscard]] noise_model_t noise_model_message(const Refit& refit, const UtcAnchor& anchor);
-[[nodiscard]] dynamics_t dynamics_message(const Refit& refit, const UtcAnchor& anchor);
+/// Gathers the error rows of one S-IMU into messages: what a message holds depends on the rows alone, so that
+/// live run and replay send the same.
+class ErrorBatch {
+ public:
+  static constexpr std::size_t kRowsMax = 500;
+
+  /// @param name  of the S-IMU
+  explicit ErrorBatch(std::string name) : name_(std::move(name)) {}
+  /// Takes a row. The message of the rows before it, where it does not belong to them any more.
+  [[nodiscard]] std::optional<error_t> add(const ErrorRecord& record);
+  /// The message of what is there, if anything.
+  [[nodiscard]] std::optional<error_t> take();
+  /// The same once every row of its tenth of a second must have come.
+  [[nodiscard]] std::optional<error_t> take_old(double time_s);
+
+ private:
+  std::string name_;
+  std::optional<error_t> pending_;
+  std::int64_t tenth_ = 0;  ///< of a second, of the rows
+};
+
+[[nodiscard]] wavelet_variance_t wavelet_variance_message(const Refit& refit);
+[[nodiscard]] noise_model_t noise_model_message(const Refit& refit);
+[[nodiscard]] dynamics_t dynamics_message(const Refit& refit);
 
 /// The navigation solution for those who listen to the widespread pose_t and ins_t, in their frames: body
 /// forward-left-up, local east-north-up from `origin` on.
 /// @param origin  the first snapshot with a navigation solution
-[[nodiscard]] pose_t pose_message(const Snapshot& snapshot, const Snapshot& origin, const UtcAnchor& anchor);
-[[nodiscard]] ins_t ins_message(const Snapshot& snapshot, const Snapshot& origin, const UtcAnchor& anchor);
+[[nodiscard]] pose_t pose_message(const Snapshot& snapshot, const Snapshot& origin);
+[[nodiscard]] ins_t ins_message(const Snapshot& snapshot, const Snapshot& origin);
 
 }  // namespace imuscope

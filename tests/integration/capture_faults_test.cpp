@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -12,10 +14,13 @@
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
 #include <regex>
+#include <sstream>
+#include <string_view>
 
 #include "capture/capture_reader.h"
 #include "programs.h"
 #include "rt/host_clock.h"
+#include "tests/support/child_process.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::test {
@@ -120,7 +125,7 @@ TEST_F(CaptureFaults, ASlowAFullAndAnAbsentDiskAreToldAndSurvivedAndAKillLosesLe
   vehicle.wait();
   const auto summary = summarise_capture(folder_ / "run" / "capture.lcm");
   ASSERT_TRUE(summary.has_value()) << summary.error().text();
-  EXPECT_EQ(summary->bytes_skipped, 0U) << "a lost record must not damage its neighbours";
+  EXPECT_EQ(health_of(summary->files).bytes_skipped, 0U) << "a lost record must not damage its neighbours";
   EXPECT_FALSE(summary->losses.empty()) << "the capture must show what is missing";
   HostTime newest = HostTime::min();
   for (const auto& [name, device] : summary->devices) newest = std::max(newest, device.last);
@@ -132,6 +137,71 @@ TEST_F(CaptureFaults, ASlowAFullAndAnAbsentDiskAreToldAndSurvivedAndAKillLosesLe
             0)
       << read_text(folder_ / "replay.log");
   EXPECT_THAT(read_text(folder_ / "replay.log"), HasSubstr("the replay is not exact from the first on"));
+}
+
+/// The demo's vehicle, its S-IMUs roughly known, so that every file has rows from the first seconds on.
+std::string known_mountings(std::string text) {
+  const std::array<std::pair<const char*, const char*>, 3> turns{
+      {{"mtx1", "0.0, 0.0, 0.0"}, {"mtx2", "0.0, 0.0, 91.0"}, {"mtx3", "179.0, 0.0, 0.0"}}};
+  for (const auto& [name, turn] : turns) {
+    const std::string role = std::string("name = \"") + name + "\"\nrole = \"study\"";
+    text.replace(text.find(role), role.size(),
+                 role + "\nprior = { rotation_vector_b_s_deg = [" + turn +
+                     "], boresight_sd_deg = 3.0, lever_arm_sd_m = 0.5, time_offset_ms = 0.0, "
+                     "time_offset_sd_ms = 10.0 }");
+  }
+  return text;
+}
+
+/// Whether every line has as many fields as the first.
+bool is_whole_table(const std::string& csv) {
+  const auto fields = [](std::string_view line) { return std::count(line.begin(), line.end(), ','); };
+  std::istringstream lines(csv);
+  std::string line;
+  std::getline(lines, line);
+  const auto expected = fields(line);
+  while (std::getline(lines, line)) {
+    if (fields(line) != expected) return false;
+  }
+  return csv.ends_with('\n');
+}
+
+TEST_F(CaptureFaults, AFullDiskThatHasRoomAgainCostsLinesThatAreToldAndTheRunEndsWithItsFiles) {
+  const auto disk = folder_ / "disk";
+  std::filesystem::create_directory(disk);
+  if (!mount_disk(disk, "24m")) GTEST_SKIP() << "mounting needs root";
+  const auto text = known_mountings(read_text(folder_ / "car.toml"));
+  std::ofstream(folder_ / "car.toml") << text;
+  BackgroundProgram vehicle("imusim",
+                            {"live", (folder_ / "car.toml").string(), "--skip-static", "--seconds", "120"},
+                            folder_ / "imusim.log");
+  BackgroundProgram service("imuscope",
+                            {"run", (folder_ / "car.toml").string(), "--out", (disk / "run").string()},
+                            folder_ / "imuscope.log");
+  const auto rows = [&] { return std::filesystem::file_size(disk / "run" / "errors_mtx1.csv"); };
+  constexpr std::uintmax_t kSomeRows = 50'000;
+  (void)wait_for("rows of errors",
+                 [&](const status_t& s) { return s.state == "running" && rows() > kSomeRows; });
+
+  std::ofstream(disk / "other").write(std::string(24 << 20, 'x').data(), 24 << 20);
+  const auto full =
+      wait_for("lines told as lost", [](const status_t& s) { return tells(s, "lines are lost"); });
+  EXPECT_EQ(full.state, "degraded");
+  EXPECT_TRUE(tells(full, "records were lost"));
+  std::filesystem::remove(disk / "other");
+  (void)wait_for("the disk back", [](const status_t& s) { return s.problems.empty(); });
+  const auto before = rows();
+  (void)wait_for("more rows", [&](const status_t&) { return rows() > before + kSomeRows; });
+
+  service.interrupt();
+  EXPECT_EQ(service.wait(), 1) << "a run whose files are not whole says so";
+  vehicle.interrupt();
+  vehicle.wait();
+  const auto run = read_json(disk / "run" / "run.json");
+  EXPECT_THAT(run.at("warnings").dump(), HasSubstr("lines were lost"));
+  EXPECT_TRUE(std::filesystem::exists(disk / "run" / "calibration.json"));
+  for (const char* name : {"navigation.csv", "errors_mtx1.csv", "calibration_mtx1.csv"})
+    EXPECT_TRUE(is_whole_table(read_text(disk / "run" / name))) << name;
 }
 
 }  // namespace

@@ -162,13 +162,15 @@ std::vector<Row> heights_of(const std::filesystem::path& run) {
   std::vector<Row> rows;
   std::string line;
   std::getline(in, line);
-  EXPECT_EQ(line.rfind("time_s,lat_deg,lon_deg,height_m,", 0), 0U) << line;
+  EXPECT_EQ(line.rfind("time_s,utc_s,gps_week,gps_tow_s,lat_deg,lon_deg,height_m,", 0), 0U) << line;
   while (std::getline(in, line)) {
     Row row{};
     double skipped = 0.0;
     char comma = 0;
     std::istringstream cells(line);
-    cells >> row.time_s >> comma >> skipped >> comma >> skipped >> comma >> row.height_m;
+    cells >> row.time_s;
+    for (int i = 0; i < 5; ++i) cells >> comma >> skipped;
+    cells >> comma >> row.height_m;
     rows.push_back(row);
   }
   return rows;

@@ -35,7 +35,7 @@ struct Listener {
   std::vector<status_t> statuses;
   std::vector<navigation_t> navigations;
   std::map<std::string, std::vector<calibration_t>> calibrations;
-  std::map<std::string, std::vector<error_t>> errors;
+  std::map<std::string, std::vector<error_row_t>> errors;
   std::vector<noise_model_t> models;
   std::map<std::string, std::vector<dynamics_t>> dynamics;
 
@@ -47,7 +47,8 @@ struct Listener {
     calibrations[m->name].push_back(*m);
   }
   void on_error(const lcm::ReceiveBuffer*, const std::string&, const error_t* m) {
-    errors[m->name].push_back(*m);
+    auto& rows = errors[m->name];
+    rows.insert(rows.end(), m->rows.begin(), m->rows.end());
   }
   void on_model(const lcm::ReceiveBuffer*, const std::string&, const noise_model_t* m) {
     models.push_back(*m);
@@ -83,8 +84,9 @@ std::vector<std::int64_t> counters_of(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line;
   std::getline(in, line);
-  EXPECT_EQ(line.rfind("time_s,counter,", 0), 0U) << line;
-  while (std::getline(in, line)) counters.push_back(std::stoll(line.substr(line.find(',') + 1)));
+  EXPECT_EQ(line.rfind("time_s,utc_s,counter,", 0), 0U) << line;
+  while (std::getline(in, line))
+    counters.push_back(std::stoll(line.substr(line.find(',', line.find(',') + 1) + 1)));
   return counters;
 }
 

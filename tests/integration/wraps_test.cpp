@@ -99,6 +99,29 @@ TEST_P(Wraps, NothingIsLostAndNavigationNoticesNothing) {
     ASSERT_NEAR(time_s[i] - time_s[i - 1], kPeriod_s, kClockMap_s) << time_s[i];
   }
 
+  // UTC has the leap second, GPS time goes on through it, the week's begin with it.
+  const auto row_s = column(folder / "run" / "navigation.csv", "time_s");
+  const auto utc_s = column(folder / "run" / "navigation.csv", "utc_s");
+  const auto week = column(folder / "run" / "navigation.csv", "gps_week");
+  const auto tow_s = column(folder / "run" / "navigation.csv", "gps_tow_s");
+  constexpr double kWeek_s = 7.0 * 86400.0;
+  constexpr double kNewYear_utc_s = 1'483'228'800.0;
+  constexpr double kNewYear_gps_s = 1930.0 * kWeek_s + 18.0;  // 2017-01-01 is the first day of week 1930
+  ASSERT_LT(utc_s.front(), kNewYear_utc_s - 30.0);
+  ASSERT_GT(utc_s.back(), kNewYear_utc_s + 60.0);
+  int before = 0;
+  for (std::size_t i = 0; i < utc_s.size(); ++i) {
+    const double gps_s = week[i] * kWeek_s + tow_s[i];
+    EXPECT_NEAR(gps_s - (week[0] * kWeek_s + tow_s[0]), row_s[i] - row_s[0], 0.02) << row_s[i];
+    // While the second is inserted, and until the tags say so, nobody can tell one from the other.
+    if (row_s[i] > kLeap_s - 0.1 && row_s[i] < kLeap_s + 1.2) continue;
+    const bool is_new_year = row_s[i] > kLeap_s;
+    EXPECT_NEAR(gps_s - kNewYear_gps_s, utc_s[i] - kNewYear_utc_s - (is_new_year ? 0.0 : 1.0), 2e-6)
+        << row_s[i];
+    before += is_new_year ? 0 : 1;
+  }
+  EXPECT_GT(before, 100);
+
   // Every fix is used: the position stays as well known as before, and as right as its sd says.
   const auto at_s = column(folder / "run" / "navigation.csv", "time_s");
   const auto sd_m = column(folder / "run" / "navigation.csv", "sd_n_m");

@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
     calibration.psi_x_deg = std::cos(phase);
     bus->publish(calibration, "CALIBRATION", "mtx1");
     auto error = test::example_error();
-    error.e_gyro_x_radps = 0.02 * std::sin(3.0 * phase);
+    error.rows.front().e_gyro_x_radps = 0.02 * std::sin(3.0 * phase);
     bus->publish(error, "ERROR", "mtx1");
     bus->publish(test::example_status(), "STATUS");
     bus->publish(test::example_wavelet_variance(), "WV", "mtx1");

@@ -43,6 +43,11 @@ inline navigation_t example_navigation() {
   m.lat_deg = 46.5;
   m.lon_deg = 8.6;
   m.height_m = 432.1;
+  m.gps_week = 2290;
+  m.gps_tow_s = 166'418.25;
+  m.validity = navigation_t::COASTING;
+  m.reference_age_s = 0.012;
+  m.gnss_age_s = 7.5;
   return m;
 }
 
@@ -68,10 +73,14 @@ inline error_t example_error(const std::string& name = "mtx1") {
   error_t m{};
   m.utime = kExampleUtime;
   m.name = name;
-  m.time_s = 7.75;
-  m.counter = 70'001;
-  m.e_gyro_x_radps = 1e-3;
   m.regime = "dynamic";
+  error_row_t row{};
+  row.utime = kExampleUtime;
+  row.time_s = 7.75;
+  row.counter = 70'001;
+  row.e_gyro_x_radps = 1e-3;
+  m.rows = {row};
+  m.n_rows = element_count(m.rows);
   return m;
 }
 
@@ -229,6 +238,9 @@ inline status_t example_status() {
   m.capture_path = "run/capture.lcm";
   m.capture_bytes = 123;
   m.capture_lost = 4;
+  m.utc_source = "reference";
+  m.utc_sd_s = 3e-5;
+  m.host_clock_ppm = 17.0;
   m.last_event = "roundabout";
   m.devices = {example_device_status(), example_device_status()};
   m.n_devices = element_count(m.devices);

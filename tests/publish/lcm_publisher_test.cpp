@@ -93,7 +93,8 @@ TEST(LcmPublisher, TheTapGetsWhatIsSent) {
   publisher->publish(test::example_error(), "ERROR", "mtx1");
   EXPECT_EQ(channel, "IMUSCOPE_ERROR_MTX1");
   EXPECT_EQ(utime, 1'700'000'000'123'456);
-  EXPECT_EQ(message.counter, 70'001);
+  ASSERT_EQ(message.rows.size(), 1U);
+  EXPECT_EQ(message.rows[0].counter, 70'001);
 }
 
 TEST(LcmPublisher, WithoutABusTheTapGetsAllAndSequencesGoOnWithOne) {
@@ -183,7 +184,8 @@ int publish_over_multicast() {
   while (received.count < 10 && receiver.handleTimeout(kTimeoutMs) > 0) {
   }
   if (received.count != 10) return 4;
-  return received.last.sequence == 9 && received.last.counter == 70'001 && received.last.regime == "dynamic"
+  return received.last.sequence == 9 && received.last.rows.at(0).counter == 70'001 &&
+                 received.last.regime == "dynamic"
              ? 0
              : 5;
 }

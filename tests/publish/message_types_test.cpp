@@ -21,7 +21,7 @@ std::vector<std::string> fields_of(const std::string& type) {
   std::ifstream file(test::source_path("src/publish/lcm/" + type + ".lcm"));
   EXPECT_TRUE(file.is_open()) << type;
   std::vector<std::string> fields;
-  const std::regex declaration(R"(^\s+(?:double|string|int64_t|boolean)\s+(\w+)\s*;.*)");
+  const std::regex declaration(R"(^\s+(?:double|string|int64_t|int32_t|int8_t|boolean)\s+(\w+)\s*;.*)");
   for (std::string line; std::getline(file, line);) {
     std::smatch match;
     if (std::regex_match(line, match, declaration)) fields.push_back(match[1]);
@@ -37,21 +37,25 @@ std::vector<std::string> words(const std::string& text) {
 TEST(MessageTypes, FieldsAreThoseOfTheFilesOfARun) {
   EXPECT_EQ(
       fields_of("navigation_t"),
-      words("utime sequence time_s lat_deg lon_deg height_m v_n_mps v_e_mps v_d_mps roll_deg pitch_deg "
+      words("utime sequence time_s gps_week gps_tow_s lat_deg lon_deg height_m v_n_mps v_e_mps v_d_mps "
+            "roll_deg pitch_deg "
             "heading_deg sd_n_m sd_e_m sd_d_m sd_v_n_mps sd_v_e_mps sd_v_d_mps sd_roll_deg sd_pitch_deg "
-            "sd_heading_deg"));
+            "sd_heading_deg validity reference_age_s gnss_age_s"));
   EXPECT_EQ(fields_of("error_t"),
-            words("utime sequence name time_s counter e_gyro_x_radps e_gyro_y_radps e_gyro_z_radps "
-                  "e_accel_x_mps2 e_accel_y_mps2 e_accel_z_mps2 regime"));
+            words("utime sequence name regime validity reference_age_s gnss_age_s n_rows"));
+  EXPECT_EQ(fields_of("error_row_t"),
+            words("utime time_s counter e_gyro_x_radps e_gyro_y_radps e_gyro_z_radps "
+                  "e_accel_x_mps2 e_accel_y_mps2 e_accel_z_mps2"));
   EXPECT_EQ(
       fields_of("calibration_t"),
-      words("utime sequence name time_s psi_x_deg psi_y_deg psi_z_deg q_w q_x q_y q_z r_x_m r_y_m r_z_m "
-            "t_d_ms bg_x_radps bg_y_radps bg_z_radps ba_x_mps2 ba_y_mps2 ba_z_mps2 sg_x sg_y sg_z sa_x "
-            "sa_y sa_z sd_psi_x_deg sd_psi_y_deg sd_psi_z_deg sd_r_x_m sd_r_y_m sd_r_z_m sd_t_d_ms "
-            "sd_bg_x_radps sd_bg_y_radps sd_bg_z_radps sd_ba_x_mps2 sd_ba_y_mps2 sd_ba_z_mps2 sd_sg_x "
-            "sd_sg_y sd_sg_z sd_sa_x sd_sa_y sd_sa_z psi_x_observable psi_y_observable psi_z_observable "
-            "r_x_observable r_y_observable r_z_observable t_d_observable goal_sd_psi_deg goal_sd_r_m "
-            "goal_sd_t_d_ms weakest_direction weakest_relative_sd advice"));
+      words(
+          "utime sequence name time_s psi_x_deg psi_y_deg psi_z_deg q_w q_x q_y q_z r_x_m r_y_m r_z_m "
+          "t_d_ms bg_x_radps bg_y_radps bg_z_radps ba_x_mps2 ba_y_mps2 ba_z_mps2 sg_x sg_y sg_z sa_x "
+          "sa_y sa_z sd_psi_x_deg sd_psi_y_deg sd_psi_z_deg sd_r_x_m sd_r_y_m sd_r_z_m sd_t_d_ms "
+          "sd_bg_x_radps sd_bg_y_radps sd_bg_z_radps sd_ba_x_mps2 sd_ba_y_mps2 sd_ba_z_mps2 sd_sg_x "
+          "sd_sg_y sd_sg_z sd_sa_x sd_sa_y sd_sa_z psi_x_observable psi_y_observable psi_z_observable "
+          "r_x_observable r_y_observable r_z_observable t_d_observable goal_sd_psi_deg goal_sd_r_m "
+          "goal_sd_t_d_ms weakest_direction weakest_relative_sd advice validity reference_age_s gnss_age_s"));
 }
 
 TEST(MessageValues, UtimeIsWholeMicrosecondsRoundedDown) {

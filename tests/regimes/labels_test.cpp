@@ -43,6 +43,33 @@ TEST(Labels, WhatIsWrongInAFileIsToldWithItsLine) {
               HasSubstr("l.csv:3: begins at 4 s, before the stretch above it ends (5 s)"));
 }
 
+TEST(Labels, UtcIsADateOrSecondsAndBecomesSecondsOfTheRun) {
+  const auto labels = parse_labels(
+      "begin_utc,end_utc,regime\n2026-03-14T09:30:00.25Z,2026-03-14T09:30:10Z,motorway\n"
+      "1773480620.5,1773480630,gravel\n",
+      "l.csv");
+  ASSERT_TRUE(labels) << labels.error().text();
+  ASSERT_EQ(labels->size(), 2U);
+  EXPECT_DOUBLE_EQ((*labels)[0].begin_s, 1773480600.25);
+  EXPECT_DOUBLE_EQ((*labels)[0].end_s, 1773480610.0);
+  const auto time_of = [](UtcTime utc) {
+    return std::optional(at(105.0) + (utc - utc_time_from_ns(1'773'480'600'000'000'000)));
+  };
+  const auto of_run = labels_of_run(*labels, at(100.0), time_of);
+  ASSERT_TRUE(of_run);
+  EXPECT_NEAR((*of_run)[0].begin_s, 5.25, 1e-6);
+  EXPECT_NEAR((*of_run)[1].end_s, 35.0, 1e-6);
+  EXPECT_FALSE((*of_run)[0].in_utc);
+  EXPECT_FALSE(labels_of_run(*labels, at(100.0), [](UtcTime) { return std::optional<HostTime>(); }));
+  for (const char* wrong :
+       {"2026-03-14T09:30:00", "2026-13-14T09:30:00Z", "2026-03-14 09:30:00Z", "2026-03-14T24:30:00Z",
+        "2026-02-30T09:30:00Z", "2026-03-14T09:30:xxZ", "-26-03-14T09:30:00Z"}) {
+    EXPECT_FALSE(
+        parse_labels(std::string("begin_utc,end_utc,regime\n") + wrong + ",1773480630,gravel\n", "l.csv"))
+        << wrong;
+  }
+}
+
 TEST(Labels, MessagesOpenAndCloseRegimesAndOthersArePassedOver) {
   const std::vector<MarkedMoment> moments{{at(30.0), "regime gravel"},
                                           {at(10.0), "regime motorway"},

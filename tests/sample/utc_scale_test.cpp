@@ -94,6 +94,39 @@ TEST(UtcScale, AStepOfTheTagsIsNoIntervalAndIsCounted) {
   EXPECT_NEAR(to_seconds(scale.scale().utc - utc_at(58.99)), 0.0, 1e-4);
 }
 
+TEST(UtcScale, GpsTimeGoesOnThroughALeapSecondAndNotThroughACorrection) {
+  const auto seen = [](UtcTime begin, double step_s) {
+    UtcScale scale;
+    for (int k = 0; k < 6000; ++k) {
+      const double t_s = k * kEpoch_s;
+      const double tag_s = k < 3000 ? t_s : t_s + step_s;
+      scale.observe(UtcSource::kReference, host_at(t_s, 10.0), begin + from_seconds(tag_s));
+    }
+    return scale.scale().gps_minus_utc_s;
+  };
+  // 23:59:30 on a day whose leap second no table of today has, and on the last day that had one.
+  EXPECT_EQ(seen(utc_time_from_ns(1'798'761'570'000'000'000), -1.0), 19);
+  EXPECT_EQ(seen(utc_time_from_ns(1'798'761'570'000'000'000), 1.0), 17);
+  EXPECT_EQ(seen(utc_time_from_ns(1'483'228'770'000'000'000), -1.0), 18);
+  EXPECT_EQ(seen(kBegin, -1.0), 18) << "in the forenoon a receiver has corrected itself";
+  EXPECT_EQ(seen(kBegin, 7200.0), 18);
+}
+
+TEST(UtcScale, ThePcsClockTellsWhatTimeItIsUntilADeviceDoes) {
+  UtcScale scale;
+  EXPECT_FALSE(scale.scale().at(host_at(0.0, 0.0)).is_known);
+  scale.set_pc_clock(host_at(0.0, 0.0), kBegin);
+  EXPECT_FALSE(scale.is_known()) << "its seconds are the host's own";
+  EXPECT_EQ(scale.scale().source, UtcSource::kPcClock);
+  EXPECT_TRUE(std::isnan(scale.scale().sd_utc_s));
+  EXPECT_EQ(to_ns(scale.scale().at(host_at(5.0, 0.0)).utc), to_ns(utc_at(5.0)));
+  EXPECT_EQ(scale.seconds_at(host_at(5.0, 0.0)) - scale.seconds_at(host_at(3.0, 0.0)), 2.0);
+  scale.observe(UtcSource::kGnss, host_at(6.0, 0.0), utc_at(7.0));
+  EXPECT_EQ(scale.scale().source, UtcSource::kGnss);
+  EXPECT_EQ(to_ns(scale.scale().at(host_at(6.0, 0.0)).utc), to_ns(utc_at(7.0)));
+  EXPECT_GE(scale.scale().sd_utc_s, 0.1) << "how long a receiver took, it does not say";
+}
+
 TEST(UtcScale, AReceiverCountsWhereTheReferenceTellsNothing) {
   UtcScale scale;
   EXPECT_FALSE(scale.is_known());

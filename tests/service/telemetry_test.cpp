@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <cmath>
+#include <limits>
 
+#include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
 #include "publish/message_values.h"
 
@@ -17,7 +19,17 @@ constexpr UtcTime kUtc = utc_time_from_ns(1'700'000'000'123'456'789);
 constexpr std::int64_t kUtime = 1'700'000'000'123'456;
 constexpr HostTime kFirst = host_time_from_ns(5'000'000'000);
 constexpr HostTime kThen = host_time_from_ns(17'500'000'000);  // 12.5 s later
-constexpr UtcAnchor kAnchor{kThen, kUtc};
+/// 2023-11-14, 18 leap seconds after the GPS epoch.
+constexpr std::int32_t kLeap_s = 18;
+
+TimeScale scale() {
+  TimeScale s;
+  s.source = UtcSource::kReference;
+  s.time = kThen;
+  s.utc = kUtc;
+  s.gps_minus_utc_s = kLeap_s;
+  return s;
+}
 
 /// What a receiver on the other side of the wire gets.
 template <typename Message>
@@ -31,6 +43,7 @@ Snapshot snapshot() {
   Snapshot s{};
   s.first_reference_time = kFirst;
   s.n_studies = 2;
+  s.time_scale = scale();
   return s;
 }
 
@@ -45,7 +58,7 @@ TEST(Telemetry, NavigationArrivesInDegreesWithEveryFieldInItsPlace) {
   s.navigation.sd_position_m = {0.01, 0.02, 0.03};
   s.navigation.sd_velocity_mps = {0.04, 0.05, 0.06};
   s.navigation.sd_rpy_rad = {0.07, 0.08, 0.09};
-  const auto m = over_the_wire(navigation_message(s, kAnchor));
+  const auto m = over_the_wire(navigation_message(s));
   EXPECT_EQ(m.utime, kUtime);
   EXPECT_EQ(m.time_s, 12.5);
   EXPECT_DOUBLE_EQ(m.lat_deg, 0.8 * kDegreesPerRadian);
@@ -62,13 +75,61 @@ TEST(Telemetry, NavigationArrivesInDegreesWithEveryFieldInItsPlace) {
   EXPECT_DOUBLE_EQ(m.sd_heading_deg, 0.09 * kDegreesPerRadian);
 }
 
-TEST(Telemetry, NavigationHasTheUtcOfItsOwnTagWhereThereIsOne) {
+TEST(Telemetry, NavigationHasTheUtcOfTheScaleAndTheGpsTimeThatBelongsToIt) {
+  Snapshot s = snapshot();
+  s.time_scale.rate = -50e-6;  // the host's clock is fast: 3 s of it are 150 us less of UTC
+  s.navigation.time = kThen + std::chrono::seconds(3);
+  const auto m = navigation_message(s);
+  EXPECT_EQ(m.utime, kUtime + 3'000'000 - 150);
+  EXPECT_EQ(pose_message(s, s).utime, m.utime);
+  // 1 700 000 003 s + 18 s - 315 964 800 s (1980-01-06) = 2288 weeks + 252 821 s, by hand.
+  EXPECT_EQ(m.gps_week, 2288);
+  EXPECT_NEAR(m.gps_tow_s, 252'821.123'306'789, 1e-6);
+  s.time_scale = {};
+  const auto unknown = navigation_message(s);
+  EXPECT_EQ(unknown.utime, 0);
+  EXPECT_TRUE(std::isnan(unknown.gps_tow_s));
+}
+
+TEST(Telemetry, MessagesSayHowOldTheirDataAreAndWhetherTheyMayBeUsed) {
   Snapshot s = snapshot();
   s.navigation.time = kThen;
-  s.navigation.utc = kUtc + std::chrono::seconds(3);
-  s.navigation.has_utc = true;
-  EXPECT_EQ(navigation_message(s, kAnchor).utime, kUtime + 3'000'000);
-  EXPECT_EQ(pose_message(s, s, kAnchor).utime, kUtime + 3'000'000);
+  s.navigation.has_gnss = true;
+  s.navigation.gnss_time = kThen - std::chrono::seconds(1);
+  const auto at = [&](double after_s) {
+    s.ages = data_ages(s.navigation, true, kThen + from_seconds(after_s));
+    return over_the_wire(navigation_message(s));
+  };
+  EXPECT_EQ(at(0.02).validity, navigation_t::USABLE);
+  EXPECT_DOUBLE_EQ(at(0.02).reference_age_s, 0.02);
+  EXPECT_DOUBLE_EQ(at(0.02).gnss_age_s, 1.02);
+  EXPECT_EQ(at(0.6).validity, navigation_t::STALE);
+  s.navigation.gnss_contradicts = true;
+  EXPECT_EQ(at(0.02).validity, navigation_t::CONTRADICTED);
+  EXPECT_EQ(at(0.6).validity, navigation_t::STALE);
+  s.navigation.gnss_contradicts = false;
+  s.navigation.gnss_time = kThen - std::chrono::seconds(6);
+  EXPECT_EQ(at(0.02).validity, navigation_t::COASTING);
+  s.navigation.has_gnss = false;
+  EXPECT_EQ(at(0.02).validity, navigation_t::COASTING);
+  EXPECT_TRUE(std::isnan(at(0.02).gnss_age_s));
+  s.ages = data_ages(s.navigation, false, kThen);
+  EXPECT_EQ(navigation_message(s).validity, navigation_t::STALE);
+
+  StudyOutput& study = s.studies[1];
+  study.status = CalibrationStatus::kConverging;
+  study.sd_psi_rad = {kUsableBoresightSd_rad, 0, 0};
+  study.sd_r_bs_b_m = {0, kUsableLeverArmSd_m, 0};
+  study.sd_t_d_s = kUsableTimeOffsetSd_s;
+  s.ages = data_ages(s.navigation, true, kThen + from_seconds(0.02));
+  const auto of_study = [&] { return over_the_wire(calibration_message(s, 1, "mtx2")).validity; };
+  EXPECT_EQ(of_study(), calibration_t::USABLE);
+  study.sd_r_bs_b_m[1] *= 1.01;
+  EXPECT_EQ(of_study(), calibration_t::CONVERGING);
+  study.contradicts = true;
+  EXPECT_EQ(of_study(), calibration_t::CONTRADICTED);
+  s.ages.reference_s = 0.6;
+  EXPECT_EQ(of_study(), calibration_t::STALE);
 }
 
 TEST(Telemetry, OdometryArrivesInPercentAndDegreesWithEveryFieldInItsPlace) {
@@ -90,7 +151,7 @@ TEST(Telemetry, OdometryArrivesInPercentAndDegreesWithEveryFieldInItsPlace) {
   s.counters.odometry_slip_rejected = 24;
   s.counters.zero_velocity_used = 25;
   s.counters.zero_velocity_rejected = 26;
-  const auto m = over_the_wire(odometry_message(s, kAnchor));
+  const auto m = over_the_wire(odometry_message(s));
   EXPECT_EQ(m.utime, kUtime);
   EXPECT_EQ(m.time_s, 12.5);
   EXPECT_EQ(m.speed_mps, 12.25);
@@ -110,7 +171,7 @@ TEST(Telemetry, OdometryArrivesInPercentAndDegreesWithEveryFieldInItsPlace) {
               ElementsAre(21, 22, 23, 24, 25, 26));
   s.odometry.lost = true;
   s.odometry.resting = false;
-  const auto lost = odometry_message(s, kAnchor);
+  const auto lost = odometry_message(s);
   EXPECT_THAT((std::array<bool, 3>{lost.standing != 0, lost.zero_velocity != 0, lost.lost != 0}),
               ElementsAre(true, false, true));
 }
@@ -143,8 +204,8 @@ Snapshot calibrated_snapshot() {
 }
 
 TEST(Telemetry, CalibrationArrivesWithEveryStateAndSdInItsPlace) {
-  const auto m = over_the_wire(calibration_message(calibrated_snapshot(), 1, "mtx1", kAnchor));
-  EXPECT_EQ(m.utime, kUtime);
+  const auto m = over_the_wire(calibration_message(calibrated_snapshot(), 1, "mtx1"));
+  EXPECT_EQ(m.utime, kUtime + 19'000'000) << "of the motion that the sample shows";
   EXPECT_EQ(m.name, "mtx1");
   EXPECT_EQ(m.time_s, 12.5);
   const double root = std::sqrt(0.5);
@@ -170,14 +231,14 @@ TEST(Telemetry, CalibrationArrivesWithEveryStateAndSdInItsPlace) {
 TEST(Telemetry, AQuaternionHasNoNegativeScalar) {
   Snapshot s = snapshot();
   s.studies[0].C_b_s = {-1, 0, 0, 0, -1, 0, 0, 0, 1};  // half a turn about z
-  EXPECT_GE(calibration_message(s, 0, "s", kAnchor).q_w, 0.0);
+  EXPECT_GE(calibration_message(s, 0, "s").q_w, 0.0);
 }
 
 TEST(Telemetry, AStateThatIsNotObservableYetHasNoNumberButItsSd) {
   Snapshot s = calibrated_snapshot();
   s.studies[1].observable = {true, true, false, true, true, true};
   s.studies[1].t_d_observable = false;
-  const auto m = over_the_wire(calibration_message(s, 1, "mtx1", kAnchor));
+  const auto m = over_the_wire(calibration_message(s, 1, "mtx1"));
   EXPECT_TRUE(std::isnan(m.psi_z_deg));
   EXPECT_TRUE(std::isnan(m.t_d_ms));
   EXPECT_THAT((std::array{m.psi_x_observable, m.psi_y_observable, m.psi_z_observable, m.r_x_observable,
@@ -193,30 +254,79 @@ TEST(Telemetry, AStateThatIsNotObservableYetHasNoNumberButItsSd) {
   EXPECT_THAT(m.advice, testing::HasSubstr("quickly"));
 }
 
-TEST(Telemetry, AnErrorRowArrivesWithItsRegimeInWordsAndNoNumberWhereItHasNone) {
+ErrorRecord error_record(double time_s) {
   ErrorRecord record{};
   record.first_reference_time = kFirst;
-  record.row.time = kThen;
+  record.row.time = kFirst + from_seconds(time_s);
+  record.row.utc = scale().at(record.row.time);
   record.row.counter = 70'001;
   record.row.regime = Regime::kDynamic;
   record.row.e_gyro_radps = {1e-3, 2e-3, 3e-3};
   record.row.e_accel_mps2 = {0.1, 0.2, 0.3};
   record.row.gyro_valid = record.row.accel_valid = true;
-  const auto m = over_the_wire(error_message(record, "mtx2", kAnchor));
-  EXPECT_EQ(m.utime, kUtime);
-  EXPECT_EQ(m.time_s, 12.5);
-  EXPECT_EQ(m.name, "mtx2");
-  EXPECT_EQ(m.counter, 70'001);
-  EXPECT_EQ(m.regime, "dynamic");
-  EXPECT_THAT((std::array{m.e_gyro_x_radps, m.e_gyro_y_radps, m.e_gyro_z_radps}),
-              ElementsAre(1e-3, 2e-3, 3e-3));
-  EXPECT_THAT((std::array{m.e_accel_x_mps2, m.e_accel_y_mps2, m.e_accel_z_mps2}), ElementsAre(0.1, 0.2, 0.3));
+  record.ages = {0.02, 0.3};
+  return record;
+}
+
+TEST(Telemetry, ErrorRowsArriveWithTheirRegimeInWordsAndNoNumberWhereTheyHaveNone) {
+  ErrorBatch batch("mtx2");
+  EXPECT_FALSE(batch.take());
+  ErrorRecord record = error_record(12.5);
+  EXPECT_FALSE(batch.add(record));
   record.row.gyro_valid = false;
-  const auto without_rates = error_message(record, "mtx2", kAnchor);
-  EXPECT_TRUE(std::isnan(without_rates.e_gyro_y_radps));
-  EXPECT_EQ(without_rates.e_accel_y_mps2, 0.2);
+  record.ages = {0.03, std::numeric_limits<double>::quiet_NaN()};
+  EXPECT_FALSE(batch.add(record));
   record.row.accel_valid = false;
-  EXPECT_TRUE(std::isnan(error_message(record, "mtx2", kAnchor).e_accel_z_mps2));
+  EXPECT_FALSE(batch.add(record));
+  const auto m = over_the_wire(batch.take().value());
+  EXPECT_FALSE(batch.take());
+  EXPECT_EQ(m.utime, kUtime);
+  EXPECT_EQ(m.name, "mtx2");
+  EXPECT_EQ(m.regime, "dynamic");
+  EXPECT_EQ(m.validity, error_t::USABLE);
+  EXPECT_EQ(m.reference_age_s, 0.03);
+  EXPECT_EQ(m.gnss_age_s, 0.3);
+  ASSERT_EQ(m.n_rows, 3);
+  const error_row_t& row = m.rows[0];
+  EXPECT_EQ(row.utime, kUtime);
+  EXPECT_EQ(row.time_s, 12.5);
+  EXPECT_EQ(row.counter, 70'001);
+  EXPECT_THAT((std::array{row.e_gyro_x_radps, row.e_gyro_y_radps, row.e_gyro_z_radps}),
+              ElementsAre(1e-3, 2e-3, 3e-3));
+  EXPECT_THAT((std::array{row.e_accel_x_mps2, row.e_accel_y_mps2, row.e_accel_z_mps2}),
+              ElementsAre(0.1, 0.2, 0.3));
+  EXPECT_TRUE(std::isnan(m.rows[1].e_gyro_y_radps));
+  EXPECT_EQ(m.rows[1].e_accel_y_mps2, 0.2);
+  EXPECT_TRUE(std::isnan(m.rows[2].e_accel_z_mps2));
+}
+
+TEST(Telemetry, AMessageOfErrorRowsEndsWithItsTenthOfASecondItsRegimeAndItsValidity) {
+  ErrorBatch batch("mtx2");
+  std::vector<std::size_t> sizes;
+  const auto add = [&](const ErrorRecord& record) {
+    if (const auto m = batch.add(record)) sizes.push_back(m->rows.size());
+  };
+  for (int i = 0; i < 25; ++i) add(error_record(0.004 + 0.01 * i));  // 100 Hz: 10, 10 and 5
+  EXPECT_THAT(sizes, ElementsAre(10, 10));
+  ErrorRecord other = error_record(0.254);
+  other.row.regime = Regime::kStatic;
+  add(other);
+  other.validity = Validity::kConverging;
+  add(other);
+  EXPECT_THAT(sizes, ElementsAre(10, 10, 5, 1));
+  EXPECT_FALSE(batch.take_old(1.2)) << "a row of the same tenth may come yet";
+  EXPECT_EQ(batch.take_old(1.5).value().rows.size(), 1U);
+  // A tenth of a second at 2 kHz is one datagram, and what a stalled core hands out at once are several.
+  sizes.clear();
+  for (std::size_t i = 0; i <= 2 * ErrorBatch::kRowsMax; ++i) add(error_record(7.05));
+  EXPECT_THAT(sizes, ElementsAre(ErrorBatch::kRowsMax, ErrorBatch::kRowsMax));
+  const auto encoded = encode_message([&] {
+    error_t m;
+    m.rows.resize(ErrorBatch::kRowsMax);
+    m.n_rows = element_count(m.rows);
+    return m;
+  }());
+  EXPECT_LT(encoded.size(), kMaxMessageBytes);
 }
 
 /// Two axes: the second has a fit.
@@ -224,6 +334,7 @@ Refit refit() {
   Refit refit;
   refit.name = "mtx1";
   refit.time = kThen;
+  refit.utc = scale().at(kThen);
   refit.first_reference_time = kFirst;
   AxisRefit without;
   without.axis = 0;
@@ -255,7 +366,7 @@ Refit refit() {
 }
 
 TEST(Telemetry, WaveletVariancesKeepTheirLevels) {
-  const auto m = over_the_wire(wavelet_variance_message(refit(), kAnchor));
+  const auto m = over_the_wire(wavelet_variance_message(refit()));
   EXPECT_EQ(m.utime, kUtime);
   EXPECT_EQ(m.name, "mtx1");
   EXPECT_EQ(m.time_s, 12.5);
@@ -274,7 +385,7 @@ TEST(Telemetry, WaveletVariancesKeepTheirLevels) {
 }
 
 TEST(Telemetry, NoiseModelsKeepTheirParametersAndWhatIsUnknown) {
-  const auto m = over_the_wire(noise_model_message(refit(), kAnchor));
+  const auto m = over_the_wire(noise_model_message(refit()));
   ASSERT_EQ(m.models.size(), 1U) << "an axis without a fit has no model";
   const axis_noise_model_t& model = m.models[0];
   EXPECT_EQ(model.axis + model.regime + model.unit, "accel_zdynamicm/s^2");
@@ -310,7 +421,7 @@ TEST(Telemetry, TheFirstModelHasNothingToBeComparedWith) {
   first.axes[1].fit->j_test.reset();
   first.axes[1].fit->identifiable = false;
   first.axes[1].fit->weighting = noise::Weighting::kCi;
-  const auto message = noise_model_message(first, kAnchor);
+  const auto message = noise_model_message(first);
   const axis_noise_model_t& model = message.models[0];
   for (const double unknown : {model.change_statistic, model.change_dof, model.change_p_value,
                                model.j_statistic, model.j_dof, model.j_p_value})
@@ -329,7 +440,7 @@ TEST(Telemetry, DynamicsAreStampedLikeTheModels) {
   with_motion.motion.n_dynamic = 7;
   with_motion.motion.axes = {axis};
   with_motion.motion.n_axes = 1;
-  const auto m = over_the_wire(dynamics_message(with_motion, kAnchor));
+  const auto m = over_the_wire(dynamics_message(with_motion));
   EXPECT_EQ(m.utime, kUtime);
   EXPECT_EQ(m.name, "mtx1");
   EXPECT_EQ(m.time_s, 12.5);
@@ -352,7 +463,7 @@ TEST(Bridge, IsForwardLeftUpInEastNorthUp) {
   s.reference.counter = 13;
   s.reference.omega_radps = {0.1, 0.2, 1.3};
   s.reference.f_mps2 = {1.5, 0.6, -9.1};
-  const auto pose = over_the_wire(pose_message(s, origin, kAnchor));
+  const auto pose = over_the_wire(pose_message(s, origin));
   EXPECT_EQ(pose.utime, kUtime);
   EXPECT_NEAR(pose.pos[2], 20.0, 1e-3);
   EXPECT_THAT(pose.vel, ElementsAre(testing::DoubleNear(15.0, 1e-12), testing::DoubleNear(0.0, 1e-12),
@@ -363,7 +474,7 @@ TEST(Bridge, IsForwardLeftUpInEastNorthUp) {
   EXPECT_NEAR(pose.rotation_rate[2], -1.0, 1e-4);
   EXPECT_NEAR(pose.accel[0], 1.0, 1e-9);
   EXPECT_NEAR(pose.accel[2], 9.8 - 9.78, 0.01) << "gravity is taken out";
-  const auto ins = over_the_wire(ins_message(s, origin, kAnchor));
+  const auto ins = over_the_wire(ins_message(s, origin));
   EXPECT_EQ(ins.utime, kUtime);
   EXPECT_EQ(ins.device_time, 13);
   EXPECT_THAT(ins.gyro, ElementsAre(0.1, -0.2, -1.3)) << "as measured";
