@@ -4,6 +4,7 @@
 #include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
@@ -72,13 +73,26 @@ OutputFile::~OutputFile() { flush(); }
 
 void OutputFile::flush() {
   if (!file_.is_open() || collected_.empty()) return;
-  const int error = write_all(file_.get(), collected_);
-  if (error_ == 0) error_ = error;
+  present_error_ = write_all(file_.get(), collected_);
+  if (present_error_ == 0) {
+    whole_ += collected_.size();
+  } else {
+    const auto whole = static_cast<off_t>(whole_);
+    if (::ftruncate(file_.get(), whole) == 0) (void)::lseek(file_.get(), whole, SEEK_SET);
+    lines_lost_ += static_cast<std::size_t>(std::count(collected_.begin(), collected_.end(), '\n'));
+    if (error_ == 0) error_ = present_error_;
+  }
   collected_.clear();
 }
 
-void OutputFile::write(std::string_view bytes) {
-  collected_ += bytes;
+std::optional<Error> OutputFile::problem() const {
+  if (present_error_ == 0) return std::nullopt;
+  return Error{ErrorKind::kWork, path_.string() + ": lines are lost: " + std::strerror(present_error_),
+               "free space on that disk; the file goes on by itself then"};
+}
+
+void OutputFile::write(std::string_view lines) {
+  collected_ += lines;
   if (collected_.size() >= kBlockBytes) flush();
 }
 
@@ -88,7 +102,8 @@ Result<void> OutputFile::close() {
   const int closed = ::close(file_.release()) == 0 ? 0 : errno;
   if (error_ == 0) error_ = closed;
   if (error_ == 0) return {};
-  return work_error(path_.string() + " could not be written to its end: " + std::strerror(error_),
+  return work_error(path_.string() + " is not whole: " + std::to_string(lines_lost_) +
+                        " lines were lost: " + std::strerror(error_),
                     "check the disk's free space");
 }
 

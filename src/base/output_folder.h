@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -29,12 +30,16 @@ class Descriptor {
   int fd_ = -1;
 };
 
-/// A file that is being written. Bytes are collected and written in blocks; what the disk refused is told by
-/// close(). Thread: one, of the soft world.
+/// A file of lines that is being written. Whole lines are collected and written in blocks. A block that the
+/// disk refuses is lost as a whole, so that no line is torn, and the file goes on where there is room again.
+/// Thread: one, of the soft world.
 class OutputFile {
  public:
-  void write(std::string_view bytes);
-  /// Writes what was collected.
+  /// @param lines  whole ones
+  void write(std::string_view lines);
+  /// What is wrong with the disk now, if anything.
+  [[nodiscard]] std::optional<Error> problem() const;
+  /// Writes what was collected. An error where any line was lost.
   [[nodiscard]] Result<void> close();
   [[nodiscard]] bool is_open() const noexcept { return file_.is_open(); }
 
@@ -52,7 +57,10 @@ class OutputFile {
   Descriptor file_;
   std::filesystem::path path_;  ///< for messages
   std::string collected_;
-  int error_ = 0;  ///< errno of the first refused write
+  std::size_t whole_ = 0;  ///< bytes of the file
+  std::size_t lines_lost_ = 0;
+  int error_ = 0;          ///< errno of the first refused write
+  int present_error_ = 0;  ///< of the last one
 };
 
 /// A folder that was opened once: a name in it is a name there, whatever becomes of the path that led to it.

@@ -111,7 +111,10 @@ class Estimator::Impl final : public EpochSink {
       return;
     }
     epochs_.push_back(epoch);
+    epochs_.back().utc = time_scale().at(epoch.time + from_seconds(epoch.t_d_s));
   }
+
+  void set_pc_clock(HostTime time, UtcTime utc) noexcept { navigation_.set_pc_clock(time, utc); }
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept { return navigation_.output(); }
   [[nodiscard]] const OdometryOutput& odometry() const noexcept { return odometry_.output(); }
@@ -237,6 +240,7 @@ void Estimator::advance(HostTime cut) noexcept { impl_->advance(cut); }
 void Estimator::set_noise(std::size_t study, const StudyNoise& noise) noexcept {
   impl_->set_noise(study, noise);
 }
+void Estimator::set_pc_clock(HostTime time, UtcTime utc) noexcept { impl_->set_pc_clock(time, utc); }
 const TimeScale& Estimator::time_scale() const noexcept { return impl_->time_scale(); }
 const NavigationOutput& Estimator::navigation() const noexcept { return impl_->navigation(); }
 const OdometryOutput& Estimator::odometry() const noexcept { return impl_->odometry(); }

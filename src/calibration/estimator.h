@@ -50,6 +50,9 @@ struct NavigationOutput {
   Vector3 sd_accel_bias_mps2{};
   Vector3 nis_position{};  ///< last GNSS position, per axis north, east, down
   Vector3 nis_velocity{};
+  bool has_gnss = false;          ///< a solution went through an update since the navigation began
+  HostTime gnss_time{};           ///< of validity of the newest such solution
+  bool gnss_contradicts = false;  ///< of the last minute, more than chance would refuse
 };
 
 /// What the wheels say and what has been learned of them. Nothing but `enabled` is meaningful without an
@@ -128,6 +131,7 @@ struct StudyOutput {
   /// while the samples contradict the reference (kStudyInconsistent). Otherwise: not observable yet.
   std::array<bool, 6> observable{};
   bool t_d_observable = false;
+  bool contradicts = false;  ///< its samples do not fit the reference, whatever the mounting
   StudyCounters counters;
 };
 
@@ -136,6 +140,7 @@ struct StudyEpoch {
   std::size_t study = 0;
   HostTime time;       ///< of validity of the S sample
   double t_d_s = 0.0;  ///< reference below is taken at time + t_d_s
+  UtcStamp utc;        ///< of the motion that the sample shows: at time + t_d_s
   ImuData sample;      ///< as received
   /// Reference compensated with the R biases named below, in b.
   Vector3 omega_ib_b_radps{};
@@ -207,6 +212,9 @@ class Estimator {
   /// One tick: processes every S sample whose reference is complete, and gives up those that waited too long.
   /// Cuts do not decrease.
   void advance(HostTime cut) noexcept;
+
+  /// What the PC's clock showed; its UTC counts until a device tells. Call before the first sample.
+  void set_pc_clock(HostTime time, UtcTime utc) noexcept;
 
   /// Replaces the stochastic model of one S-IMU, at a tick boundary, no white noise below noise_floor_share
   /// of the configured. Where the bias process became larger, the bias variance grows by the difference (at

@@ -243,6 +243,7 @@ void NavigationFilter::start(const NavigationState& state, const NavigationError
   core_.take_injected();
   past_size_ = 0;
   output_.status = NavigationStatus::kNavigating;
+  output_.has_gnss = false;
   output_.method = method;
   log_.add(event::NavigationStarted{method}, reference_.device, time);
 }
@@ -271,7 +272,8 @@ void NavigationFilter::add_attitude(const Sample& sample) noexcept {
 
 void NavigationFilter::add_gnss(const Sample& sample) noexcept {
   ++counters_.gnss_samples;
-  if (sample.has_utc) utc_scale_.observe(UtcSource::kGnss, sample.time, sample.utc);
+  if (sample.has_utc)
+    utc_scale_.observe(UtcSource::kGnss, sample.time - from_seconds(gnss_.latency_s), sample.utc);
   if (!is_finite(sample.gnss)) {
     ++counters_.gnss_not_finite;
     return;
@@ -423,6 +425,8 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
   }
   if (used) {
     ++counters_.gnss_used;
+    output_.has_gnss = true;
+    output_.gnss_time = time;
     if (streak_) {
       streak_ = false;
       log_.add(event::GnssReacquired{to_seconds(time - streak_start_)}, gnss_.device, time);
@@ -493,6 +497,7 @@ void NavigationFilter::update_output() noexcept {
   output_.time = last_time_;
   output_.utc = last_utc_;
   output_.has_utc = last_has_utc_;
+  output_.gnss_contradicts = watched_s_ >= kConsistencyMean_s && improbable_share_ >= kImprobableShareMax;
   if (!navigating()) return;
   std::array<double, kNavigationStates> sd{};
   for (std::size_t i = 0; i < sd.size(); ++i) sd[i] = core_.sd(i);

@@ -43,6 +43,7 @@ class NavigationFilter {
   /// Writes the newest state and its sd into output().
   void update_output() noexcept;
   [[nodiscard]] const NavigationOutput& output() const noexcept { return output_; }
+  void set_pc_clock(HostTime time, UtcTime utc) noexcept { utc_scale_.set_pc_clock(time, utc); }
   /// The seconds that rates are integrated over.
   [[nodiscard]] const TimeScale& time_scale() const noexcept { return utc_scale_.scale(); }
 

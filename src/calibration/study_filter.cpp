@@ -616,6 +616,7 @@ void StudyFilter::set_noise(FilterCore& core, const StudyNoise& noise) noexcept 
 }
 
 void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept {
+  output_.contradicts = misfits_;
   if (!calibrating_) return;
   const StudyState& state = core.study(index_);
   const StudyLayout& layout = core.layout(index_);

@@ -154,6 +154,9 @@ Result<Configuration> parse(const std::string& text, const std::filesystem::path
   lcm.finish();
   auto record = root.table("record");
   record.text("folder", configuration.record.folder);
+  constexpr double kShortestSync_s = 0.1;
+  constexpr double kLongestSync_s = 3600.0;
+  record.number("sync_s", configuration.record.sync_s, 1.0, kShortestSync_s, kLongestSync_s);
   record.finish();
   read_threads(root.table("threads"), configuration.threads);
   root.ignore("simulation");  // belongs to imusim, which checks it

@@ -200,7 +200,8 @@ struct LcmOptions {
 
 /// [record]: where live runs go.
 struct RecordOptions {
-  std::string folder;  ///< where live runs are recorded; relative to the working folder
+  std::string folder;   ///< where live runs are recorded; relative to the working folder
+  double sync_s = 0.5;  ///< a cut of the power costs what came in this time and while it was written
 };
 
 /// Processor cores that the core's threads keep to; empty: any.

@@ -119,6 +119,9 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"record.folder",
      "Where live runs are recorded, relative to the working folder; each makes a folder `NAME-TIME` there. "
      "Without it: `runs`. `--out` comes first."},
+    {"record.sync_s",
+     "Live: what was recorded is on the disk after so many seconds, and safe from the ignition key then. A "
+     "cut of the power costs this and the time that the disk takes to write it."},
     {"threads.io_cores", "Live: processor cores that the I/O thread keeps to; empty: any."},
     {"threads.estimator_cores", "Live: processor cores that the estimator's thread keeps to; empty: any."},
     {"device.name", "Becomes part of file names: letters, digits, `_`, `-`."},

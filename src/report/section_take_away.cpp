@@ -28,7 +28,8 @@ std::vector<noise::AxisFit> axis_fits(const RunFiles& run, const std::string& im
     if (text_at(entry, "name") != imu || text_at(entry, "regime") != regime) continue;
     auto fit = noise::fit_from_json(entry);
     const auto unit = noise::parse_unit(text_at(entry, "unit"));
-    if (fit && unit) fits.push_back({text_at(entry, "axis"), *unit, std::move(*fit)});
+    if (fit && unit)
+      fits.push_back({text_at(entry, "axis"), *unit, std::move(*fit), noise::fitted_to_words(entry)});
   }
   return fits;
 }
@@ -43,6 +44,12 @@ std::string with_roots(const std::string& unit) {
 
 /// What data sheets name, axis by axis.
 Html quantity_table(const std::vector<noise::AxisFit>& fits) {
+  constexpr const char* kNotKnown = "not known from this record";
+  const auto shown = [&](const noise::Quantity& quantity, double factor, int digits) {
+    if (quantity.knowledge == noise::Knowledge::kUnknown) return text(kNotKnown);
+    const Html value = number(factor * quantity.value, digits);
+    return quantity.knowledge == noise::Knowledge::kBound ? text("at most ") + value : value;
+  };
   constexpr const char* kWanted[] = {"angle random walk", "velocity random walk", "bias instability"};
   Table table({text("axis"), text("random walk"), text("unit"), text("bias instability"), text("unit"),
                text("slowest process: sd"), text("its correlation time, s")});
@@ -55,7 +62,7 @@ Html quantity_table(const std::vector<noise::AxisFit>& fits) {
     for (const noise::Quantity& quantity : quantities) {
       for (std::size_t i = 0; i < std::size(kWanted); ++i) {
         if (quantity.name != kWanted[i]) continue;
-        value[i] = number(quantity.value, 3);
+        value[i] = shown(quantity, 1.0, 3);
         unit[i] = with_roots(quantity.unit);
       }
       if (quantity.process.rfind("GM", 0) != 0)
@@ -63,9 +70,10 @@ Html quantity_table(const std::vector<noise::AxisFit>& fits) {
       if (quantity.name == "sd") {
         std::string sd_unit = quantity.unit;
         const double factor = shown_unit(sd_unit);
-        slow_sd = number(factor * quantity.value, 3) + text(" " + sd_unit);
+        slow_sd = shown(quantity, factor, 3);
+        if (quantity.knowledge == noise::Knowledge::kFitted) slow_sd += text(" " + sd_unit);
       }
-      if (quantity.name == "correlation time") slow_time = number(quantity.value, 2);
+      if (quantity.name == "correlation time") slow_time = shown(quantity, 1.0, 2);
     }
     const std::size_t walk = noise::is_gyro(axis.unit) ? 0 : 1;
     table.add_row({text(axis_words(axis.axis)), value[walk], text(unit[walk]), value[2], text(unit[2]),
@@ -77,7 +85,7 @@ Html quantity_table(const std::vector<noise::AxisFit>& fits) {
 Html exports(const std::vector<noise::AxisFit>& fits) {
   Html all;
   for (const auto& [format, name] : kFormats) {
-    const auto exported = noise::export_models(fits, format, false);
+    const auto exported = noise::export_models(fits, format);
     const Html content =
         exported ? element("pre", text(*exported)) : paragraph(exported.error().text(), "note");
     all += element("details", element("summary", text(name)) + content);
@@ -94,9 +102,8 @@ Html take_away_section(const RunFiles& run, const std::vector<Fit>& all_fits) {
   }
   section += paragraph(
       "In the terms of data sheets, and as the configuration of other tools. `imuscope export models.json` "
-      "writes the same as files, the whole model as state space, and with --conservative models that lie "
-      "above "
-      "what the data allow.");
+      "writes the same as files, the whole model as state space, and with --conservative the upper ends of "
+      "the intervals. What does not hold is not written, with the reason in its place.");
   for (const StudyFiles& study : run.studies) {
     for (const std::string& regime : particular_regimes(regimes_of(all_fits))) {
       const auto fits = axis_fits(run, study.name, regime);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
 
 #include "base/text.h"
 #include "dynamics/covariates.h"
@@ -14,7 +15,7 @@ namespace imuscope {
 namespace {
 
 std::string scatter_header() {
-  std::string header = "time_s";
+  std::string header(kTimeColumns);
   for (std::size_t i = 0; i < kCovariates; ++i) header += fmt::format(",{}", covariate_name(i));
   return header +
          ",e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,e_accel_z_mps2\n";
@@ -26,7 +27,10 @@ void append_value(std::string& line, bool known, double value) {
 }
 
 std::string scatter_row(const ErrorRow& row, double time_s) {
-  std::string line = fmt::format("{:.4f}", time_s);
+  constexpr double kRounded = 1e4;
+  fmt::memory_buffer time;
+  append_time({std::round(time_s * kRounded) / kRounded, row.utc}, time);
+  std::string line = fmt::to_string(time);
   for (const double value : covariates(row)) append_value(line, true, value);
   for (const double value : row.e_gyro_radps) append_value(line, row.gyro_valid, value);
   for (const double value : row.e_accel_mps2) append_value(line, row.accel_valid, value);

@@ -27,8 +27,8 @@ struct DynamicsRegressions {
 DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
                                    const RegimeTrack& motion, const noise::ModelSpec& residual_model);
 
-/// Writes scatter_NAME.csv for every S-IMU: time_s, the fifteen covariates and the six errors of at most
-/// kScatterRows rows, evenly spaced over the drive, at rest and in motion alike.
+/// Writes scatter_NAME.csv for every S-IMU: time_s, utc_s, the fifteen covariates and the six errors of at
+/// most kScatterRows rows, evenly spaced over the drive, at rest and in motion alike.
 inline constexpr std::size_t kScatterRows = 3000;
 Result<void> write_scatter(const Configuration& configuration, std::vector<RowSpool>& rows,
                            HostTime first_reference_time, const OutputFolder& folder);

@@ -129,9 +129,9 @@ class Gatherer final : public CoreSink {
 
   explicit Gatherer(std::size_t n_studies) : makers(n_studies) {}
 
-  void on_epoch(const StudyEpoch& epoch, HostTime first_reference) noexcept override {
-    first_reference_time = first_reference;
-    if (makers[epoch.study]) makers[epoch.study]->add(epoch, first_reference);
+  void on_epoch(const StudyEpoch& epoch, const TickFacts& facts) noexcept override {
+    first_reference_time = facts.first_reference_time;
+    if (makers[epoch.study]) makers[epoch.study]->add(epoch, first_reference_time);
   }
   void on_error(const ErrorRecord&) noexcept override {}
   void on_event(const EstimatorEvent&) noexcept override {}

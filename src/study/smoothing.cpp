@@ -165,8 +165,9 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
   return smoother.smooth();
 }
 
-Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const FormerMountings& former,
-                            const std::vector<StudyFileInfo>& infos, const OutputFolder& folder) {
+Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const UtcTrack& utc,
+                            const FormerMountings& former, const std::vector<StudyFileInfo>& infos,
+                            const OutputFolder& folder) {
   CsvFile navigation;
   if (auto opened = navigation.open(folder, "smoothed_navigation.csv", navigation_csv_header()); !opened)
     return opened;
@@ -184,7 +185,7 @@ Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, co
       NavigationOutput shown;
       const auto sd = static_cast<std::size_t>(kNavigationErrorSize);
       write_state(epoch->navigation, {epoch->sd.data(), sd}, epoch->P_phi, shown);
-      navigation.append(navigation_csv_row(shown, time_s));
+      navigation.append(navigation_csv_row(shown, {time_s, utc.at(epoch->time)}));
     }
     for (std::size_t i = 0; i < files.size(); ++i) {
       if (!epoch->calibrating[i]) continue;
@@ -195,7 +196,8 @@ Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, co
         if (!has_estimate(last.studies[i].status)) continue;
         shown = with_smoothed_biases(last.studies[i], *epoch, i, track.layout(i));
       }
-      files[i].append(calibration_csv_row(shown, infos[i], time_s));
+      files[i].append(
+          calibration_csv_row(shown, infos[i], {time_s, utc.at(epoch->time + from_seconds(shown.t_d_s))}));
     }
   }
   auto result = navigation.close();

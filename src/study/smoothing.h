@@ -53,8 +53,10 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
 /// Writes smoothed_navigation.csv (columns of navigation.csv; where there was navigation) and, per S-IMU,
 /// smoothed_NAME.csv (columns of calibration_NAME.csv): biases smoothed, the constants of the mounting at
 /// their end values, with the end value's sd; while a former mounting was in force, its own.
-Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const FormerMountings& former,
-                            const std::vector<StudyFileInfo>& infos, const OutputFolder& folder);
+/// @param utc  of the run
+Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const UtcTrack& utc,
+                            const FormerMountings& former, const std::vector<StudyFileInfo>& infos,
+                            const OutputFolder& folder);
 
 /// The paper's final value of each S-IMU: mean over the drive of the smoothed values, weighted by their
 /// inverse variances, of the final mounting; calibration.json's "weighted_mean". Null for an S-IMU that was

@@ -35,7 +35,7 @@ class ErrorCollector final : public CoreSink {
         low_pass_(std::move(low_pass)),
         temperatures_(rows.size()) {}
 
-  void on_epoch(const StudyEpoch& epoch, HostTime) noexcept override {
+  void on_epoch(const StudyEpoch& epoch, const TickFacts&) noexcept override {
     const ReferenceBias bias = biases_.at(epoch.time + from_seconds(epoch.t_d_s));
     watch_.add(epoch, bias);
     if ((epoch.sample.flags & kHasTemperature) != 0)
@@ -267,6 +267,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
 
   RunRecord run{configuration,         options.version, recording.inputs,    calibrated_run->devices,
                 calibrated_run->ticks, &last,           (*folder)->events(), {}};
+  run.utc = &(*folder)->utc();
   if (by_batch) run.warnings = remarks_of_batch(infos, of_filter, outcomes);
   for (const auto& warnings : {warnings_of(recording, *calibrated_run), warnings_of(configuration, last)})
     run.warnings.insert(run.warnings.end(), warnings.begin(), warnings.end());
@@ -283,7 +284,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
         if (options.progress) options.progress("smoothing", share);
       });
   if (!track) return tl::unexpected<Error>(track.error());
-  if (auto written = write_smoothed(*track, last, former, infos, (*folder)->folder()); !written)
+  if (auto written = write_smoothed(*track, last, (*folder)->utc(), former, infos, (*folder)->folder());
+      !written)
     return written;
   const auto means = weighted_means(*track, finals, former);
   if (!means) return tl::unexpected<Error>(means.error());
@@ -300,8 +302,10 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   if (!second) return tl::unexpected<Error>(second.error());
 
   const HostTime origin = last.first_reference_time;
-  auto regimes =
-      find_regimes(configuration.regimes, collector.watch(), options.labels, recording.moments, origin);
+  const UtcTrack& utc = (*folder)->utc();
+  const auto labels = labels_of_run(options.labels, origin, [&](UtcTime time) { return utc.time_of(time); });
+  if (!labels) return tl::unexpected<Error>(labels.error());
+  auto regimes = find_regimes(configuration.regimes, collector.watch(), *labels, recording.moments, origin);
   if (!regimes) return tl::unexpected<Error>(regimes.error());
   auto studied = make_spools(finals.size(), (*folder)->folder());
   if (!studied) return tl::unexpected<Error>(studied.error());
@@ -310,7 +314,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     const ScaleError scale = configuration.noise.remove_scale_error
                                  ? ScaleError{settled[i].gyro_scale, settled[i].accel_scale}
                                  : ScaleError{};
-    series.push_back(write_errors({i, origin, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]));
+    series.push_back(
+        write_errors({i, origin, {}, {}, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]));
   }
 
   const double run_s = regimes->motion.total_s(0) + regimes->motion.total_s(1);

@@ -90,6 +90,37 @@ TEST_F(OutputFolderTest, StaysTheSameFolderWhenItsPathBecomesAnother) {
   EXPECT_EQ(content_of(scratch_ / "moved" / "run.json"), "{}");
 }
 
+/// The disk is full and has room again: no line is torn, what is lost is counted, and the file goes on.
+TEST_F(OutputFolderTest, AFileGoesOnWhereThereIsRoomAgain) {
+  const auto folder = opened();
+  auto rows = folder.begin("rows.csv");
+  ASSERT_TRUE(rows);
+  const std::string line = std::string(99, 'x') + "\n";
+  const auto write_lines = [&](int n) {
+    for (int i = 0; i < n; ++i) rows->write(line);
+  };
+  write_lines(100);
+  EXPECT_FALSE(rows->problem());
+  {
+    // In the midst of a block, and of a line.
+    const test::FileSizeLimit full(12'345);
+    write_lines(100);
+    ASSERT_TRUE(rows->problem());
+    EXPECT_THAT(rows->problem()->text(), testing::AllOf(HasSubstr("rows.csv"), HasSubstr("lines are lost")));
+    EXPECT_THAT(rows->problem()->remedy, HasSubstr("goes on by itself"));
+  }
+  write_lines(200);
+  EXPECT_FALSE(rows->problem()) << "the disk has room";
+  const auto closed = rows->close();
+  ASSERT_FALSE(closed);
+  const std::string content = content_of(out_ / "rows.csv");
+  ASSERT_EQ(content.size() % line.size(), 0U) << "a line is torn";
+  const std::size_t kept = content.size() / line.size();
+  EXPECT_GT(kept, 200U);
+  for (std::size_t i = 0; i < kept; ++i) ASSERT_EQ(content.substr(i * line.size(), line.size()), line);
+  EXPECT_THAT(closed.error().what, HasSubstr(std::to_string(400 - kept) + " lines were lost"));
+}
+
 TEST_F(OutputFolderTest, AFileThatCannotBeWrittenIsToldAndWhatStoodThereStays) {
   const auto folder = opened();
   ASSERT_TRUE(folder.write_whole("run.json", "before"));
@@ -105,7 +136,7 @@ TEST_F(OutputFolderTest, AFileThatCannotBeWrittenIsToldAndWhatStoodThereStays) {
     rows->write(large);
     const auto closed = rows->close();
     ASSERT_FALSE(closed);
-    EXPECT_THAT(closed.error().what, HasSubstr("rows.csv could not be written to its end"));
+    EXPECT_THAT(closed.error().what, HasSubstr("rows.csv is not whole"));
   }
   EXPECT_EQ(content_of(out_ / "run.json"), "before");
   EXPECT_EQ(names(), (std::vector<std::string>{"rows.csv", "run.json"}));

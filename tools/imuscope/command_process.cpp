@@ -140,7 +140,9 @@ void add_process(CLI::App& app, Work& chosen) {
   auto options = std::make_shared<ProcessCommand>();
   add_inputs(*command, *options);
   command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
-  command->add_option("--labels", options->labels, "regimes that a person named: CSV begin_s,end_s,regime")
+  command
+      ->add_option("--labels", options->labels,
+                   "regimes that a person named: CSV begin_s,end_s,regime or begin_utc,end_utc,regime")
       ->type_name("FILE");
   command->add_flag("--json", options->json, "print the summary as JSON");
   on_chosen(*command, chosen, [options] { return process(*options); });

@@ -57,6 +57,9 @@ void add_tables(CLI::App& app, Work& chosen);
 /// `imuscope import --out CAPTURE NAME=FILE...`
 void add_import(CLI::App& app, Work& chosen);
 
+/// `imuscope capture check|repair FILE`
+void add_capture(CLI::App& app, Work& chosen);
+
 /// `imuscope probe`
 void add_probe(CLI::App& app, Work& chosen);
 

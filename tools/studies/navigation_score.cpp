@@ -72,10 +72,18 @@ const NavigationTruth::Row* NavigationTruth::at(imuscope::UtcTime utc) const {
   return &rows_[static_cast<std::size_t>(nearest)];
 }
 
-void NavigationScore::add(const imuscope::NavigationOutput& out, const NavigationTruth& truth) {
+imuscope::UtcTime NavigationTruth::instant_of(const Row& row) const {
+  return begin_ + imuscope::from_seconds(static_cast<double>(&row - rows_.data()) / rows_hz_);
+}
+
+void NavigationScore::add(const imuscope::NavigationOutput& out, const imuscope::TimeScale& scale,
+                          const NavigationTruth& truth) {
   if (out.status != imuscope::NavigationStatus::kNavigating || !out.has_utc) return;
   const NavigationTruth::Row* row = truth.at(out.utc);
   if (row == nullptr) return;
+  const double utc_error_s = imuscope::to_seconds(scale.at(out.time).utc - truth.instant_of(*row));
+  utc_.add(utc_error_s, scale.sd_utc_s);
+  utc_errors_s_.push_back(std::abs(utc_error_s));
   const imuscope::EulerAngles angles{row->rpy_rad[0], row->rpy_rad[1], row->rpy_rad[2]};
   // True = Exp(phi) estimated, phi about north, east, down; its sd are published as those of roll, pitch and
   // heading, which are the same about a level vehicle's axes.
@@ -96,6 +104,8 @@ void NavigationScore::add(const NavigationScore& other) {
   level_.add(other.level_);
   velocity_.add(other.velocity_);
   position_.add(other.position_);
+  utc_.add(other.utc_);
+  utc_errors_s_.insert(utc_errors_s_.end(), other.utc_errors_s_.begin(), other.utc_errors_s_.end());
 }
 
 std::string NavigationScore::table() const {
@@ -111,6 +121,14 @@ std::string NavigationScore::table() const {
   line("roll, pitch", "mdeg", kMdeg, level_);
   line("velocity", "mm/s", 1e3, velocity_);
   line("position", "mm", 1e3, position_);
+  line("UTC of a row", "us", 1e6, utc_);
+  if (!utc_errors_s_.empty()) {
+    std::vector<double> errors = utc_errors_s_;
+    const auto place = static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(errors.size()));
+    std::nth_element(errors.begin(), errors.begin() + place, errors.end());
+    text += fmt::format("   UTC of 95 % of the rows within {:.1f} us\n",
+                        1e6 * errors[static_cast<std::size_t>(place)]);
+  }
   return text;
 }
 

@@ -30,6 +30,8 @@ class NavigationTruth {
   };
   /// The row within half a millisecond of an instant; null where there is none.
   [[nodiscard]] const Row* at(imuscope::UtcTime utc) const;
+  /// The instant of that row.
+  [[nodiscard]] imuscope::UtcTime instant_of(const Row& row) const;
 
  private:
   imuscope::UtcTime begin_{};
@@ -37,11 +39,13 @@ class NavigationTruth {
   std::vector<Row> rows_;
 };
 
-/// Heading, level, velocity and position, from a minute after the navigation's beginning on. Errors of one
-/// drive hang together over minutes: a mean over drives is what tells.
+/// Heading, level, velocity and position, and the UTC of a row, from a minute after the navigation's
+/// beginning on. Errors of one drive hang together over minutes: a mean over drives is what tells.
 class NavigationScore {
  public:
-  void add(const imuscope::NavigationOutput& out, const NavigationTruth& truth);
+  /// @param scale  by which the files tell the row's UTC
+  void add(const imuscope::NavigationOutput& out, const imuscope::TimeScale& scale,
+           const NavigationTruth& truth);
   void add(const NavigationScore& other);
   [[nodiscard]] std::string table() const;
   [[nodiscard]] const StateScore& heading() const { return heading_; }
@@ -51,6 +55,8 @@ class NavigationScore {
   StateScore level_;
   StateScore velocity_;
   StateScore position_;
+  StateScore utc_;
+  std::vector<double> utc_errors_s_;
 };
 
 }  // namespace study_score

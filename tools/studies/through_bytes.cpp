@@ -54,7 +54,7 @@ class Last final : public imuscope::CoreSink {
   void on_snapshot(const imuscope::Snapshot& snapshot) noexcept override {
     last = snapshot;
     if (snapshot.tick >= kSettled_ticks && snapshot.tick % kEvery_ticks == 0)
-      navigation.add(snapshot.navigation, truth_);
+      navigation.add(snapshot.navigation, snapshot.time_scale, truth_);
   }
   void on_late_sample(const imuscope::LateSample&) noexcept override {}
   imuscope::Snapshot last{};

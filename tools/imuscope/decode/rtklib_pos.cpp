@@ -4,8 +4,8 @@
 #include <chrono>
 #include <string_view>
 
-#include "drivers/device/gps_time.h"
 #include "drivers/rtklib_pos/messages.h"
+#include "sample/gps_time.h"
 #include "stream_protocols.h"
 #include "whole_stream.h"
 
