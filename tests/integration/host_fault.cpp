@@ -1,7 +1,7 @@
 /// Preloaded into the unmodified `imuscope`, this library is a host in trouble. The first letter of the file
 /// named by HOST_FAULT_CONTROL says which: "e" the estimator's thread gets no processor, "p" the publisher's
-/// messages are not taken, "r" the recorder's disk does not answer, "t" the wall clock is an hour ahead.
-/// Threads are held for as long as the file says so.
+/// messages are not taken, "r" the recorder's disk does not answer, "f" it is full, "t" the wall clock is an hour
+/// ahead. Threads are held for as long as the file says so.
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <sys/types.h>
 #include <unistd.h>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
@@ -53,7 +54,13 @@ extern "C" ssize_t sendmsg(int fd, const msghdr* message, int flags) {
 
 extern "C" ssize_t write(int fd, const void* buffer, size_t size) {
   static auto* const put = real<ssize_t(int, const void*, size_t)>("write");
-  if (this_thread_is("imuscope-rec")) hold_while('r');
+  if (this_thread_is("imuscope-rec")) {
+    hold_while('r');
+    if (mode() == 'f') {
+      errno = ENOSPC;
+      return -1;
+    }
+  }
   return put(fd, buffer, size);
 }
 

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <algorithm>
 
 #include <array>
 #include <cmath>
@@ -37,16 +38,19 @@ std::map<std::int64_t, Row> read_errors(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line;
   std::getline(in, line);
+  const auto names = cells_of(line);
+  const auto counter = static_cast<std::size_t>(std::ranges::find(names, "counter") - names.begin());
   while (std::getline(in, line)) {
     const auto cells = cells_of(line);
-    if (cells.size() < 2 + kAxes) continue;
+    if (cells.size() <= counter + kAxes) continue;
     Row row{};
     bool whole = true;
     for (std::size_t i = 0; i < kAxes; ++i) {
-      whole = whole && !cells[2 + i].empty();
-      if (whole) row[i] = std::stod(cells[2 + i]);
+      const std::string& cell = cells[counter + 1 + i];
+      whole = whole && !cell.empty();
+      if (whole) row[i] = std::stod(cell);
     }
-    if (whole) rows[std::stoll(cells[1])] = row;
+    if (whole) rows[std::stoll(cells[counter])] = row;
   }
   return rows;
 }
