@@ -38,8 +38,8 @@ Imperfections study_imperfections(WorldKind world);
 /// The R-IMU: 300 ppm of scale and misalignment, a quarter of the vehicle's vibration.
 Imperfections reference_imperfections(WorldKind world);
 
-/// Adds what is drawn to a sensor's errors. The gyro triad's departure from orthogonality is symmetric, so
-/// that its axes s are the orthogonal frame closest to it (polar decomposition), which C_b_s belongs to; the
+/// Adds what is drawn to a sensor's errors. The gyro triad's departure from orthogonality is symmetric: its
+/// axes lean about the nominal ones (for the frame that its mounting is told in, see triad_frame()); the
 /// accelerometers' places are centred, so that r_bs_b is their mean. The same numbers are drawn in every
 /// case: an imperfection that is zero changes no other.
 void draw_imperfections(const Imperfections& imperfections, Random& random, ImuErrors& errors);

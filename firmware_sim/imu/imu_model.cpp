@@ -59,6 +59,14 @@ Eigen::Matrix3d triad_matrix(const TriadErrors& errors) {
   return matrix * errors.C_s_triad;
 }
 
+Eigen::Matrix3d triad_frame(const Eigen::Matrix3d& triad) {
+  Eigen::Matrix3d frame;
+  frame.row(0) = triad.row(0).normalized();
+  frame.row(1) = (triad.row(1) - triad.row(1).dot(frame.row(0)) * frame.row(0)).normalized();
+  frame.row(2) = frame.row(0).cross(frame.row(1));
+  return frame;
+}
+
 double slow_delay_s(const TriadErrors& errors) {
   return errors.delay_s + 1.0 / (2.0 * std::numbers::pi * errors.low_pass_hz);
 }

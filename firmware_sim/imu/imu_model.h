@@ -43,6 +43,10 @@ struct TriadErrors {
 /// Matrix of a triad: what it makes of a constant rate or force in s.
 Eigen::Matrix3d triad_matrix(const TriadErrors& errors);
 
+/// The orthogonal frame that belongs to a triad, whose axes are the rows: x along its x axis, y in the plane
+/// of its x and y axes. It is what an estimate of a crooked triad's mounting is an estimate of.
+Eigen::Matrix3d triad_frame(const Eigen::Matrix3d& triad);
+
 /// How far a triad's readings are behind a slow motion: its delay and that of its low-pass.
 double slow_delay_s(const TriadErrors& errors);
 

@@ -87,11 +87,16 @@ void add_sensor(const ImuErrors& errors, json& imu) {
 }
 
 json study_json(const World& world, const StudyTruth& study) {
-  const Eigen::Quaterniond q(study.mounting.C_b_s);
+  // s is the frame of the gyro triad, as calibration.json has it; the sensor's own errors are told about its
+  // nominal axes.
+  const Eigen::Matrix3d gyros = triad_matrix(study.errors.gyro) * study.mounting.C_b_s;
+  const Eigen::Matrix3d accels = triad_matrix(study.errors.accel) * study.mounting.C_b_s;
+  const Eigen::Matrix3d C_b_s = triad_frame(gyros);
+  const Eigen::Quaterniond q(C_b_s);
   const double sign = q.w() < 0.0 ? -1.0 : 1.0;
   json imu;
   imu["name"] = study.name;
-  imu["C_b_s"] = rows_of(study.mounting.C_b_s);
+  imu["C_b_s"] = rows_of(C_b_s);
   imu["q_b_s"] = {sign * q.w(), sign * q.x(), sign * q.y(), sign * q.z()};
   imu["r_bs_b_m"] = numbers_of(study.mounting.r_bs_b_m);
   imu["t_d_s"] = true_time_offset_s(world, study);
@@ -102,6 +107,9 @@ json study_json(const World& world, const StudyTruth& study) {
                         {"t0_s", study.first_sample_s - world.first_reference_sample_s()},
                         {"period_s", study.period_s}};
   add_sensor(study.errors, imu);
+  imu["gyro_matrix"] = rows_of(gyros * C_b_s.transpose());
+  imu["accel_matrix"] = rows_of(accels * C_b_s.transpose());
+  imu["C_s_accel"] = rows_of(triad_frame(accels) * C_b_s.transpose());
   return imu;
 }
 

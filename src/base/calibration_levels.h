@@ -21,7 +21,7 @@ enum class CalibrationStatus : std::uint8_t {
   kWaiting,     ///< no sample yet, or none since a long gap
   kCoarse,      ///< gathering motion for the coarse time offset and mounting
   kConverging,  ///< has an estimate, which does not meet the goal yet
-  kCalibrated,  ///< meets the goal
+  kCalibrated,  ///< meets the goal; of the estimate of a whole drive, which tells all that there is: usable
 };
 
 /// As calibration.json has it.

@@ -203,7 +203,7 @@ class Batch {
     const ParameterVector gradient = equations_.gradient - precision.cwiseProduct(estimate_.sensor.x);
     const Eigen::LLT<Covariance> factor(information);
     covariance_ = factor.solve(Covariance::Identity());
-    const ParameterVector correction = factor.solve(gradient);
+    ParameterVector correction = factor.solve(gradient);
     deviation = estimate_.deviation;
     for (std::size_t band = 1; band < deviation.size(); ++band) {
       const auto& own = equations_.bands[band];
@@ -266,6 +266,28 @@ class Batch {
     return covariance * sum * covariance;
   }
 
+  /// B-23: what the priors of all that lasts from drive to drive leave in (psi, r). Biases and clocks are
+  /// another drive's no more.
+  [[nodiscard]] Eigen::Matrix<double, 6, kParameters> of_lasting_priors(const Covariance& covariance) const {
+    ParameterVector root = scales_.precision().cwiseSqrt();
+    root.segment<kGyroShape - kClockRate>(kClockRate).setZero();
+    return covariance.topRows<6>() * root.asDiagonal();
+  }
+
+  /// B-22: what would go if the sensor's imperfections were known is theirs.
+  [[nodiscard]] static LimitShares limit_shares(const Covariance& own, const Covariance& of_reference) {
+    constexpr Eigen::Index kImperfections = kParameters - kGyroShape;
+    const Eigen::Matrix<double, 6, kImperfections> cross = own.topRightCorner<6, kImperfections>();
+    const Eigen::Matrix<double, 6, 6> of_sensor =
+        cross * own.bottomRightCorner<kImperfections, kImperfections>().ldlt().solve(cross.transpose());
+    const Eigen::Array<double, 6, 1> all =
+        own.diagonal().head<6>().array() + of_reference.diagonal().head<6>().array();
+    LimitShares shares;
+    shares.sensor = of_sensor.diagonal().array() / all;
+    shares.reference = of_reference.diagonal().head<6>().array() / all;
+    return shares;
+  }
+
   void finish(BatchMounting& result) {
     const Covariance by_noise = honest_covariance();
     const Covariance by_scatter = scatter_covariance(by_noise);
@@ -279,11 +301,17 @@ class Batch {
       growth[i] = std::sqrt((kNoiseWeight + independent * ratio) / (kNoiseWeight + independent));
       if (i < kTimeOffset) result.inconsistency = std::max(result.inconsistency, std::sqrt(ratio));
     }
-    result.covariance = growth.asDiagonal() * by_noise * growth.asDiagonal();
+    const AxesFrame published = in_axes_frame(estimate_.sensor);
+    const Covariance with_scatter = published.derivative * growth.asDiagonal() * by_noise;
+    result.covariance = with_scatter * growth.asDiagonal() * published.derivative.transpose();
     result.degrees_of_freedom = kNoiseWeight + independent;
-    result.sensor = estimate_.sensor;
+    result.sensor = published.sensor;
     add_mean_motion(result);
-    result.covariance += of_reference_axes(class_, result.sensor);  // B-21
+    const auto of_reference_errors = of_reference_axes(class_, result.sensor);
+    const Covariance of_reference = of_reference_errors * of_reference_errors.transpose();
+    result.limits = limit_shares(result.covariance, of_reference);
+    result.shared << of_lasting_priors(with_scatter), of_reference_errors.topRows<6>();
+    result.covariance += of_reference;  // B-21
     result.middle_s = middle_s_;
     result.windows = problem_.plan.starts.size();
     const double half_s = 0.5 * static_cast<double>(problem_.plan.length) / kGridRate_hz;
@@ -305,7 +333,7 @@ class Batch {
     to_bias.block<3, 3>(kAccelBias, kPsi) = -sensor.C_b_accel() * skew(f);
     to_bias.block<3, 3>(kAccelBias, kAlpha) = -sensor.accel_shape() * skew(f_a);
     for (Eigen::Index j = 0; j < 6; ++j)
-      to_bias.block<3, 1>(kAccelBias, kAccelShape + j) = -shape_derivative(j) * f_a;
+      to_bias.block<3, 1>(kAccelBias, kAccelShape + j) = -shape_derivative(j, sensor.above) * f_a;
     result.covariance = to_bias * result.covariance * to_bias.transpose();
   }
 

@@ -31,6 +31,16 @@ struct BandReport {
   double accel_deviation_sd = 0.0;
 };
 
+/// What the variance of psi and r, each axis, consists of, as shares that add up to one.
+struct LimitShares {
+  Eigen::Matrix<double, 6, 1> sensor = Eigen::Matrix<double, 6, 1>::Zero();     ///< its imperfections
+  Eigen::Matrix<double, 6, 1> reference = Eigen::Matrix<double, 6, 1>::Zero();  ///< its axes and scales
+  /// Noise, and motion that did not show more.
+  [[nodiscard]] Eigen::Matrix<double, 6, 1> drive() const {
+    return Eigen::Matrix<double, 6, 1>::Ones() - sensor - reference;
+  }
+};
+
 /// The result. (psi, r) of `covariance` as everywhere: psi in b, C = C^ Exp(-psi).
 struct BatchMounting {
   SensorState sensor;  ///< biases are those of the middle of the record
@@ -44,6 +54,12 @@ struct BatchMounting {
   /// Largest sd of a component of (psi, r) by its scatter over time, by the sd that the noise alone would
   /// give.
   double inconsistency = 1.0;
+  LimitShares limits;
+  /// What of the errors of (psi, r) every drive of this sensor on this reference has in common, F of the
+  /// covariance F F' (B-23): places, axes and delays as they were believed to be before the drive, and the
+  /// reference's own axes.
+  Eigen::Matrix<double, 6, kParameters + kReferenceErrors> shared =
+      Eigen::Matrix<double, 6, kParameters + kReferenceErrors>::Zero();
   bool one_chip = false;  ///< the accelerometers were found to be in one place
   int iterations = 0;
   bool settled = false;

@@ -162,9 +162,9 @@ Result<Start> find_start(const ImuRecord& reference, const ImuRecord& study, dou
   start.time_offset_s = offset->offset_s;
   const auto instants = common_instants(reference, study, start.time_offset_s, kGridRate_hz);
   if (static_cast<double>(instants.size()) < kShortestRecord_s * kGridRate_hz) {
-    return tl::unexpected(wrong(fmt::format("it shares {:.0f} s with the reference",
-                                            static_cast<double>(instants.size()) / kGridRate_hz),
-                                fmt::format("at least {:.0f} s of driving are needed", kShortestRecord_s)));
+    return tl::unexpected(unknown(fmt::format("it shares {:.0f} s with the reference",
+                                              static_cast<double>(instants.size()) / kGridRate_hz),
+                                  fmt::format("at least {:.0f} s of driving are needed", kShortestRecord_s)));
   }
   std::vector<double> own = instants;
   for (double& time : own) time -= start.time_offset_s;

@@ -144,7 +144,7 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
   J.block<3, 1>(3, kAccelDelay) = J.block<3, 1>(3, kTimeOffset);
   J.block<3, 3>(3, kAlpha) = accel_shape * skew_c(force_a);
   for (Eigen::Index j = 0; j < 6; ++j) {
-    const Eigen::Matrix3d d = shape_derivative(j);
+    const Eigen::Matrix3d d = shape_derivative(j, sensor.above);
     J.block<3, 1>(0, kGyroShape + j) = d * omega_s;
     J.block<3, 1>(3, kAccelShape + j) = d * force_a;
     for (Eigen::Index i = 0; i < 3; ++i) {

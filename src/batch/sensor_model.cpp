@@ -17,18 +17,47 @@ using Row33 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 constexpr std::array<std::array<Eigen::Index, 2>, 6> kTriangle{
     {{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 0}, {2, 1}}};
 
-Eigen::Matrix3d shape(const ParameterVector& x, Eigen::Index first) {
+Eigen::Matrix3d shape(const ParameterVector& x, Eigen::Index first, double above) {
   Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
-  for (Eigen::Index j = 0; j < 6; ++j)
-    m(kTriangle[static_cast<std::size_t>(j)][0], kTriangle[static_cast<std::size_t>(j)][1]) += x[first + j];
+  for (Eigen::Index j = 0; j < 6; ++j) m += x[first + j] * shape_derivative(j, above);
   return m;
+}
+
+/// The frame with x along a triad's x axis and y in the plane of its x and y axes, which are its rows.
+Eigen::Matrix3d axes_frame(const Eigen::Matrix3d& triad) {
+  Eigen::Matrix3d frame;
+  frame.row(0) = triad.row(0).normalized();
+  frame.row(1) = (triad.row(1) - triad.row(1).dot(frame.row(0)) * frame.row(0)).normalized();
+  frame.row(2) = frame.row(0).cross(frame.row(1));
+  return frame;
+}
+
+Eigen::Matrix<double, 6, 1> triangle_of(const Eigen::Matrix3d& triangular) {
+  Eigen::Matrix<double, 6, 1> shape;
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    const auto& [row, column] = kTriangle[static_cast<std::size_t>(j)];
+    shape[j] = triangular(row, column) - (row == column ? 1.0 : 0.0);
+  }
+  return shape;
+}
+
+/// Derivative of the rotation vector, in s, from a triad's symmetric frame to that of its axes in its three
+/// departures yx, zx, zy.
+Eigen::Matrix3d turn_derivative() {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+  turn(0, 2) = 0.5;
+  turn(1, 1) = -0.5;
+  turn(2, 0) = 0.5;
+  return turn;
 }
 
 }  // namespace
 
-Eigen::Matrix3d shape_derivative(Eigen::Index j) {
+Eigen::Matrix3d shape_derivative(Eigen::Index j, double above) {
+  const auto& [row, column] = kTriangle[static_cast<std::size_t>(j)];
   Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
-  m(kTriangle[static_cast<std::size_t>(j)][0], kTriangle[static_cast<std::size_t>(j)][1]) = 1.0;
+  m(row, column) = row == column ? 1.0 : 1.0 - above;
+  if (row != column) m(column, row) = above;
   return m;
 }
 
@@ -41,8 +70,8 @@ Eigen::Vector3d place_basis(Eigen::Index axis, Eigen::Index j) {
          Eigen::Vector3d::Unit(j % 3);
 }
 
-Eigen::Matrix3d SensorState::gyro_shape() const { return shape(x, kGyroShape); }
-Eigen::Matrix3d SensorState::accel_shape() const { return shape(x, kAccelShape); }
+Eigen::Matrix3d SensorState::gyro_shape() const { return shape(x, kGyroShape, above); }
+Eigen::Matrix3d SensorState::accel_shape() const { return shape(x, kAccelShape, above); }
 Eigen::Matrix3d SensorState::C_s_accel() const { return exp_so3(-x.segment<3>(kAlpha)); }
 Eigen::Matrix3d SensorState::C_b_accel() const { return accel_shape() * C_s_accel() * C_b_s; }
 Eigen::Matrix3d SensorState::g_sensitivity() const {
@@ -67,6 +96,25 @@ void SensorState::add(const ParameterVector& correction) {
   x.segment<3>(kAlpha) = -log_so3(turned);
 }
 
+AxesFrame in_axes_frame(const SensorState& symmetric) {
+  AxesFrame out{symmetric, {}};
+  const Eigen::Matrix3d gyros = symmetric.C_b_gyro();
+  const Eigen::Matrix3d accels = symmetric.C_b_accel();
+  SensorState& sensor = out.sensor;
+  sensor.above = 0.0;
+  sensor.C_b_s = axes_frame(gyros);
+  const Eigen::Matrix3d C_b_accel_axes = axes_frame(accels);
+  sensor.x.segment<6>(kGyroShape) = triangle_of(gyros * sensor.C_b_s.transpose());
+  sensor.x.segment<3>(kAlpha) = -log_so3(C_b_accel_axes * sensor.C_b_s.transpose());
+  sensor.x.segment<6>(kAccelShape) = triangle_of(accels * C_b_accel_axes.transpose());
+  out.derivative.setIdentity();
+  const Eigen::Matrix3d turn = turn_derivative();
+  out.derivative.block<3, 3>(kPsi, kGyroShape + 3) = symmetric.C_b_s.transpose() * turn;
+  out.derivative.block<3, 3>(kAlpha, kGyroShape + 3) = -turn;
+  out.derivative.block<3, 3>(kAlpha, kAccelShape + 3) = turn;
+  return out;
+}
+
 namespace {
 
 /// How axes and scales of a triad in s move where the reference's triad is off by E (in s): (I - E) is split
@@ -86,20 +134,20 @@ struct AxisShift {
 
 }  // namespace
 
-Eigen::Matrix<double, kParameters, kParameters> of_reference_axes(const SensorClass& sensor,
-                                                                  const SensorState& state) {
-  Eigen::Matrix<double, kParameters, kParameters> covariance =
-      Eigen::Matrix<double, kParameters, kParameters>::Zero();
+Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const SensorClass& sensor,
+                                                                       const SensorState& state) {
+  Eigen::Matrix<double, kParameters, kReferenceErrors> factor;
+  factor.setZero();
+  Eigen::Index next = 0;
   const Eigen::Matrix3d& C = state.C_b_s;
   const auto add = [&](const Eigen::Matrix3d& of_gyros_b, const Eigen::Matrix3d& of_accels_b) {
     const AxisShift gyro(C * of_gyros_b * C.transpose());
     const AxisShift accel(C * of_accels_b * C.transpose());
-    ParameterVector shift = ParameterVector::Zero();
-    shift.segment<3>(kPsi) = C.transpose() * gyro.rotation;
-    shift.segment<6>(kGyroShape) = gyro.shape;
-    shift.segment<3>(kAlpha) = accel.rotation - gyro.rotation;
-    shift.segment<6>(kAccelShape) = accel.shape;
-    covariance += shift * shift.transpose();
+    factor.col(next).segment<3>(kPsi) = C.transpose() * gyro.rotation;
+    factor.col(next).segment<6>(kGyroShape) = gyro.shape;
+    factor.col(next).segment<3>(kAlpha) = accel.rotation - gyro.rotation;
+    factor.col(next).segment<6>(kAccelShape) = accel.shape;
+    ++next;
   };
   const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -111,7 +159,7 @@ Eigen::Matrix<double, kParameters, kParameters> of_reference_axes(const SensorCl
     }
     add(none, skew(sensor.reference_triad_sd_rad * Eigen::Vector3d::Unit(i)));
   }
-  return covariance;
+  return factor;
 }
 
 ParameterVector prior_sd(const SensorClass& sensor) {

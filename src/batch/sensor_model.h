@@ -3,8 +3,10 @@
 /// One S-IMU as the batch estimate knows it: mounting, clock, and what data sheets allow its axes, places and
 /// delays to be. B-4 to B-9 in EQUATIONS.md.
 ///
-/// The gyro triad's frame: its x axis is that of the x gyro, and the y gyro lies in its x-y plane, so that
-/// the gyro matrix is lower triangular, as kalibr has it. C_b_s takes b to this frame.
+/// While it is estimated, a crooked triad's frame leans to none of its axes: its matrix is symmetric, and
+/// what is believed of it does not depend on the order of its axes. What is published is the gyro triad's
+/// frame: x along the x gyro, the y gyro in the x-y plane, so that the gyro matrix is lower triangular, as
+/// kalibr has it (in_axes_frame()). C_b_s takes b to this frame.
 
 #include <Eigen/Core>
 
@@ -18,7 +20,7 @@ enum Parameter : Eigen::Index {
   kClockRate = 7,      ///< growth of t_d, s/s
   kGyroBias = 8,       ///< 3
   kAccelBias = 11,     ///< 3
-  kGyroShape = 14,     ///< 6: scale x, y, z; yx, zx, zy of the lower triangle
+  kGyroShape = 14,     ///< 6: scale x, y, z; departure of y from x, z from x, z from y from a right angle
   kAlpha = 20,         ///< 3: accelerometer triad against the gyro triad, rotation vector in s
   kAccelShape = 23,    ///< 6: as kGyroShape
   kAccelDelay = 29,    ///< of the accelerometers against the gyros, on top of t_d, s
@@ -66,8 +68,11 @@ struct SensorClass {
 struct SensorState {
   Eigen::Matrix3d C_b_s = Eigen::Matrix3d::Identity();
   ParameterVector x = ParameterVector::Zero();  ///< with psi always zero: C_b_s holds it
+  /// Share of each departure from a right angle that stands above the diagonal of a triad's matrix: half
+  /// while it is estimated, none in what is published.
+  double above = 0.5;
 
-  [[nodiscard]] Eigen::Matrix3d gyro_shape() const;  ///< I + lower triangle
+  [[nodiscard]] Eigen::Matrix3d gyro_shape() const;
   [[nodiscard]] Eigen::Matrix3d accel_shape() const;
   [[nodiscard]] Eigen::Matrix3d C_b_gyro() const { return gyro_shape() * C_b_s; }  ///< B-4
   [[nodiscard]] Eigen::Matrix3d C_b_accel() const;                                 ///< B-5
@@ -84,16 +89,29 @@ struct SensorState {
   void add(const ParameterVector& correction);
 };
 
-/// Derivative of a triad's lower-triangular matrix in its parameter j, 0 to 5.
-[[nodiscard]] Eigen::Matrix3d shape_derivative(Eigen::Index j);
+/// Derivative of a triad's matrix in its parameter j, 0 to 5.
+/// @param above  as in SensorState
+[[nodiscard]] Eigen::Matrix3d shape_derivative(Eigen::Index j, double above);
+
+/// The same sensor with triangular matrices, exactly, and the derivative of its parameters in those of the
+/// symmetric one, to first order in the departures (B-24).
+struct AxesFrame {
+  SensorState sensor;
+  Eigen::Matrix<double, kParameters, kParameters> derivative;
+};
+[[nodiscard]] AxesFrame in_axes_frame(const SensorState& symmetric);
 
 /// Column j of kPlaces: place of accelerometer `axis`, in s. The six columns are orthonormal, and each leaves
 /// the middle of the three where it is.
 [[nodiscard]] Eigen::Vector3d place_basis(Eigen::Index axis, Eigen::Index j);
 
-/// Covariance of the parameters from what the reference's own axes are off by (B-21).
-[[nodiscard]] Eigen::Matrix<double, kParameters, kParameters> of_reference_axes(const SensorClass& sensor,
-                                                                                const SensorState& state);
+/// Scale and axes of both triads of the reference, and the rotation between them.
+inline constexpr Eigen::Index kReferenceErrors = 21;
+
+/// What each error of the reference's own axes, off by its sd, makes of the published parameters (B-21): F,
+/// of which F F' is the covariance.
+[[nodiscard]] Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(
+    const SensorClass& sensor, const SensorState& state);
 
 /// sd of each parameter before the drive; infinite for psi and t_d, which the start gives.
 [[nodiscard]] ParameterVector prior_sd(const SensorClass& sensor);

@@ -1,6 +1,7 @@
 #include "calibration/combine.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <string>
@@ -18,9 +19,13 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 constexpr int kWeightSteps = 2000;
 constexpr double kWeightTolerance = 1e-10;
 
+using RowFactor = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>;
+
 struct Information {
   Vector6 x;  ///< (psi, r) about the first drive's mounting
+  Matrix6 covariance;
   Matrix6 information;
+  RowFactor shared;  ///< E-20; no column where nothing is shared
 };
 
 /// Sum of w I and its weighted mean.
@@ -35,6 +40,40 @@ Vector6 weighted_mean(const std::vector<Information>& all, const std::vector<dou
   covariance = sum.ldlt().solve(Matrix6::Identity());
   return covariance * right;
 }
+
+/// Drives whose errors have something in common, and their best mean. E-20.
+struct SharingDrives {
+  Eigen::VectorXd x;           ///< (psi, r) one after the other
+  Eigen::MatrixXd covariance;  ///< of x
+  Eigen::MatrixXd weights;     ///< 6 rows: mean = weights x
+  Vector6 mean;
+  Matrix6 P;  ///< of the mean
+
+  explicit SharingDrives(const std::vector<const Information*>& drives)
+      : x(6 * static_cast<Eigen::Index>(drives.size())), covariance(x.size(), x.size()) {
+    for (std::size_t i = 0; i < drives.size(); ++i) {
+      const auto row = 6 * static_cast<Eigen::Index>(i);
+      x.segment<6>(row) = drives[i]->x;
+      for (std::size_t j = 0; j < drives.size(); ++j) {
+        covariance.block<6, 6>(row, 6 * static_cast<Eigen::Index>(j)) =
+            i == j ? drives[i]->covariance : Matrix6(drives[i]->shared * drives[j]->shared.transpose());
+      }
+    }
+    Eigen::MatrixXd ones(x.size(), 6);
+    for (Eigen::Index row = 0; row < x.size(); row += 6) ones.block<6, 6>(row, 0).setIdentity();
+    const Eigen::MatrixXd whitened = covariance.ldlt().solve(ones);
+    P = (ones.transpose() * whitened).ldlt().solve(Matrix6::Identity());
+    weights = P * whitened.transpose();
+    mean = weights * x;
+  }
+
+  /// E-21.
+  [[nodiscard]] double chi2() const {
+    Eigen::VectorXd apart = x;
+    for (Eigen::Index row = 0; row < x.size(); row += 6) apart.segment<6>(row) -= mean;
+    return apart.dot(covariance.ldlt().solve(apart));
+  }
+};
 
 /// Weights that minimise log det P of the intersection: w_i <- w_i tr(P I_i) / 6, which keeps the sum at one
 /// and never increases det P (Titterington 1976). E-22.
@@ -58,22 +97,34 @@ double upper_tail(double chi2, double dof) {
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(dof), chi2));
 }
 
-/// Drive i against the inverse-variance mean of all others: their errors are independent, so that the
-/// difference has the sum of the covariances. E-24.
+/// Drive i against the least-squares mean of all others. E-24.
 DriveDeviation deviation_of(const std::vector<Information>& all, std::size_t i) {
   DriveDeviation out;
   if (all.size() < 2) return out;
-  std::vector<double> others(all.size(), 1.0);
-  others[i] = 0.0;
-  Matrix6 P;
-  const Vector6 mean = weighted_mean(all, others, P);
-  P += all[i].information.ldlt().solve(Matrix6::Identity());
-  const Vector6 difference = all[i].x - mean;
+  std::vector<const Information*> others;
+  for (std::size_t j = 0; j < all.size(); ++j)
+    if (j != i) others.push_back(&all[j]);
+  const SharingDrives mean(others);
+  Matrix6 between = Matrix6::Zero();  // drive i and the mean of the others
+  for (std::size_t j = 0; j < others.size(); ++j) {
+    between += all[i].shared * others[j]->shared.transpose() *
+               mean.weights.middleCols<6>(6 * static_cast<Eigen::Index>(j)).transpose();
+  }
+  const Matrix6 P = all[i].covariance + mean.P - between - between.transpose();
+  const Vector6 difference = all[i].x - mean.mean;
   Eigen::Map<Vector6>(out.deviation.data()) = difference;
-  Eigen::Map<Vector6>(out.deviation_sd.data()) = P.diagonal().cwiseSqrt();
+  Eigen::Map<Vector6>(out.deviation_sd.data()) = P.diagonal().cwiseMax(0.0).cwiseSqrt();
   out.chi2 = difference.dot(P.ldlt().solve(difference));
   out.p_value = upper_tail(out.chi2, 6.0);
   return out;
+}
+
+/// Whether what the drives share is told of each of them in the same terms.
+bool share_errors(std::span<const MountingEstimate> estimates) {
+  const std::size_t n = estimates.front().shared_psi_r.size();
+  return n > 0 && n % 6 == 0 && std::all_of(estimates.begin(), estimates.end(), [n](const auto& estimate) {
+           return estimate.shared_psi_r.size() == n;
+         });
 }
 
 }  // namespace
@@ -81,6 +132,7 @@ DriveDeviation deviation_of(const std::vector<Information>& all, std::size_t i) 
 Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, CombineMethod method) {
   if (estimates.empty()) return usage_error("there is no mounting to combine", "name at least one run");
   const Eigen::Matrix3d C_first = to_eigen(estimates.front().C_b_s);
+  const bool sharing = share_errors(estimates);
   std::vector<Information> all;
   for (std::size_t i = 0; i < estimates.size(); ++i) {
     const Eigen::Map<const Matrix6> P(estimates[i].covariance_psi_r.data());
@@ -92,20 +144,29 @@ Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, Co
     Information one;
     one.x.head<3>() = -log_so3(C_first.transpose() * to_eigen(estimates[i].C_b_s));
     one.x.tail<3>() = to_eigen(estimates[i].r_bs_b_m);
+    one.covariance = P;
     one.information = factor.solve(Matrix6::Identity());
+    one.shared.resize(6, 0);
+    if (sharing) {
+      const auto& shared = estimates[i].shared_psi_r;
+      one.shared =
+          Eigen::Map<const RowFactor>(shared.data(), 6, static_cast<Eigen::Index>(shared.size() / 6));
+    }
     all.push_back(one);
   }
 
   CombinedMounting out;
-  const std::vector<double> ones(all.size(), 1.0);
-  Matrix6 P;
-  Vector6 x = weighted_mean(all, ones, P);
-  for (const Information& one : all) out.homogeneity_chi2 += (one.x - x).dot(one.information * (one.x - x));
+  std::vector<const Information*> drives;
+  for (const Information& one : all) drives.push_back(&one);
+  const SharingDrives together(drives);
+  Vector6 x = together.mean;
+  Matrix6 P = together.P;
+  out.homogeneity_chi2 = together.chi2();
   out.homogeneity_dof = 6 * (all.size() - 1);
   if (out.homogeneity_dof > 0)
     out.homogeneity_p_value = upper_tail(out.homogeneity_chi2, static_cast<double>(out.homogeneity_dof));
   for (std::size_t i = 0; i < all.size(); ++i) out.drives.push_back(deviation_of(all, i));
-  out.weights = ones;
+  out.weights.assign(all.size(), 1.0);
   if (method == CombineMethod::kCovarianceIntersection) {
     out.weights = intersection_weights(all);
     x = weighted_mean(all, out.weights, P);

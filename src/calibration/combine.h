@@ -1,7 +1,7 @@
 #pragma once
 
 /// Several estimates of one mounting made into one, and the question whether they are of one mounting at all.
-/// Soft world: allocates. EQUATIONS.md E-20 to E-23.
+/// Soft world: allocates. EQUATIONS.md E-20 to E-24.
 
 #include <array>
 #include <cstddef>
@@ -19,17 +19,21 @@ struct MountingEstimate {
   Vector3 r_bs_b_m{};
   /// Of (psi, r), row-major, rad and m; psi in b, C = C^ Exp(-psi). Positive definite.
   std::array<double, 36> covariance_psi_r{};
+  /// What of it every drive of this sensor shares: F, row-major, 6 rows; F_i F_j' is the covariance between
+  /// the errors of drives i and j. Empty: nothing. Mountings are combined as sharing where all have as many
+  /// columns.
+  std::vector<double> shared_psi_r{};
 };
 
 enum class CombineMethod {
-  kInverseVariance,         ///< the drives' errors are independent
+  kInverseVariance,         ///< the drives' errors are independent but for what they are known to share
   kCovarianceIntersection,  ///< they may share errors (one turn-on, one capture cut in two); never
                             ///< over-confident
 };
 
 /// How far one drive lies from the others.
 struct DriveDeviation {
-  /// (psi, r) of the drive minus the inverse-variance mean of the others, rad and m; by the sd of the
+  /// (psi, r) of the drive minus the least-squares mean of the others, rad and m; by the sd of the
   /// difference.
   std::array<double, 6> deviation{};
   std::array<double, 6> deviation_sd{};
@@ -42,8 +46,8 @@ struct CombinedMounting {
   MountingEstimate estimate;
   std::vector<DriveDeviation> drives;  ///< in the order given; of a single drive all zero
   std::vector<double> weights;         ///< per drive; covariance intersection only, else 1 each
-  /// Sum of squared deviations from the inverse-variance mean, each by its own covariance. Chi-square with
-  /// 6 (n - 1) degrees of freedom where all drives saw one mounting and their errors are independent.
+  /// Sum of squared deviations from the least-squares mean, by the covariance of all drives. Chi-square with
+  /// 6 (n - 1) degrees of freedom where all drives saw one mounting.
   double homogeneity_chi2 = 0.0;
   std::size_t homogeneity_dof = 0;
   double homogeneity_p_value = 1.0;

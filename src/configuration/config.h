@@ -159,7 +159,7 @@ struct DeviceConfig {
 /// [estimator]: which states the filter has.
 struct EstimatorOptions {
   bool paper_states = false;      ///< the paper's six states per S-IMU
-  bool batch_mounting = false;    ///< a study publishes the batch estimate's mounting, not the filter's
+  bool batch_mounting = true;     ///< a study publishes the batch estimate's mounting, not the filter's
   bool navigation = true;         ///< R-IMU/GNSS navigation; needs a gnss device
   int differentiator_points = 5;  ///< of the reference: 5, 7, 9 or 11
 };

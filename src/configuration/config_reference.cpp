@@ -76,9 +76,12 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "of the "
      "published method, for comparison."},
     {"estimator.mounting",
-     "What `process` publishes of a mounting. `filter`: the filter's end value. `batch`: an estimate of "
-     "the whole drive that needs neither `[device.noise]` nor `average_samples`, for a reference that is a "
-     "MEMS itself and for sensors with crooked axes; its sd are still too small where a drive shows little."},
+     "What `process` publishes of a mounting. `batch`: an estimate of the whole drive in which nobody knows "
+     "the true motion; it learns the noise, so that it needs neither `[device.noise]` nor `average_samples`, "
+     "and its sd hold what crooked axes and the reference's own errors leave open. `filter`: the filter's "
+     "end "
+     "value, which is sharper where a sensor is exactly as the filter takes it to be, and too sure of itself "
+     "where it is not; with `states = \"paper\"` the default."},
     {"estimator.navigation",
      "Navigation of the R-IMU with GNSS. Without it (or without a receiver) the mounting is calibrated all "
      "the "

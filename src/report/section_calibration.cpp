@@ -201,6 +201,8 @@ Html observability_table(const StudyFiles& study) {
   }
   std::string words =
       fmt::format("Least is known of the {}.", text_at(field(observability, "weakest"), "words"));
+  if (const std::string limits = text_at(observability, "limited_by"); !limits.empty())
+    words += fmt::format(" Limited: {}.", limits);
   if (const std::string advice = text_at(observability, "advice"); !advice.empty())
     words += fmt::format(" What would help: {}.", advice);
   return table.html() + paragraph(words);

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <future>
 
+#include "base/calibration_levels.h"
 #include "base/units.h"
 #include "navigation/so3.h"
+#include "service/observability.h"
 
 namespace imuscope {
 
@@ -17,8 +19,14 @@ namespace {
 constexpr double kLongest_s = 3600.0;
 /// Beyond the filter's own coarse search, in case it ended at its border.
 constexpr double kSearchMargin_s = 1.0;
+/// The reference is kept so much longer than the S-IMU is used: the offsets that are searched, with room.
+constexpr double kMargin_s = 60.0;
 /// Chi-square of six degrees of freedom that chance exceeds once in a million times.
 constexpr double kContradictionChi2 = 38.3;
+/// Where noise and motion have less than this share of the variance, no manoeuvre is worth its fuel.
+constexpr double kMotionHelps = 0.5;
+/// A lever arm counts as shown once its sd is below this share of what was assumed before the drive.
+constexpr double kShownShare = 0.5;
 /// Scatter over time this much above what the noise explains is worth a sentence.
 constexpr double kInconsistencyTold = 2.0;
 /// A band that differs from a rigid body by this (half a degree) is worth a sentence.
@@ -38,24 +46,36 @@ Vector3 sd_of(const batch::BatchMounting& mounting, batch::Parameter first) {
   return {mounting.sd(first, 0), mounting.sd(first, 1), mounting.sd(first, 2)};
 }
 
-/// The part of a record between two instants.
-batch::ImuRecord part_of(const batch::ImuRecord& all, double from_s, double to_s) {
-  batch::ImuRecord part;
+/// Adds the part of a record between two instants.
+void add_part(const batch::ImuRecord& all, double from_s, double to_s, batch::ImuRecord& part) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all.time_s[i] < from_s) continue;
     if (all.time_s[i] > to_s) break;
     part.add(all.time_s[i], all.omega_radps[i], all.f_mps2[i]);
   }
-  return part;
 }
 
-Result<batch::BatchMounting> estimate_part(const batch::ImuRecord& reference, const batch::ImuRecord& study,
-                                           double from_s, double to_s) {
-  batch::BatchOptions options;
-  options.search_s = StudyConfig{}.coarse_search_s + kSearchMargin_s;
-  return batch::estimate_mounting(part_of(reference, from_s - options.search_s, to_s + options.search_s),
-                                  part_of(study, from_s, to_s), options);
+void forget_before(double time_s, batch::ImuRecord& record) {
+  const auto kept = std::ranges::lower_bound(record.time_s, time_s) - record.time_s.begin();
+  record.time_s.erase(record.time_s.begin(), record.time_s.begin() + kept);
+  record.omega_radps.erase(record.omega_radps.begin(), record.omega_radps.begin() + kept);
+  record.f_mps2.erase(record.f_mps2.begin(), record.f_mps2.begin() + kept);
 }
+
+/// The two IMUs of one estimate.
+struct Pair {
+  const BatchRecords& records;
+  std::size_t reference;
+  std::size_t study;
+
+  [[nodiscard]] Result<batch::BatchMounting> estimate(double from_s, double to_s) const {
+    batch::BatchOptions options;
+    options.search_s = StudyConfig{}.coarse_search_s + kSearchMargin_s;
+    return batch::estimate_mounting(
+        records.part(reference, from_s - options.search_s, to_s + options.search_s),
+        records.part(study, from_s, to_s), options);
+  }
+};
 
 /// Whether two estimates cannot be of one mounting.
 bool contradict(const batch::BatchMounting& a, const batch::BatchMounting& b) {
@@ -67,14 +87,14 @@ bool contradict(const batch::BatchMounting& a, const batch::BatchMounting& b) {
   return difference.dot(covariance.ldlt().solve(difference)) > kContradictionChi2;
 }
 
-BatchOutcome estimate_one(const batch::ImuRecord& reference, const batch::ImuRecord& study,
-                          std::optional<double> moved_s) {
+BatchOutcome estimate_one(const Pair& pair, std::optional<double> moved_s) {
   BatchOutcome outcome;
-  const double first_s = study.size() > 0 ? study.time_s.front() : 0.0;
-  auto found = estimate_part(reference, study, first_s, first_s + kLongest_s);
+  const double first_s = pair.records.first_s(pair.study);
+  auto found = pair.estimate(first_s, first_s + kLongest_s);
   if (moved_s) {
-    const auto before = estimate_part(reference, study, first_s, *moved_s);
-    auto after = estimate_part(reference, study, *moved_s, *moved_s + kLongest_s);
+    const double after_s = std::max(*moved_s, pair.records.kept_to_end_from_s(pair.study));
+    const auto before = pair.estimate(first_s, std::min(*moved_s, first_s + kLongest_s));
+    auto after = pair.estimate(after_s, after_s + kLongest_s);
     outcome.remounted = before && after && contradict(*before, *after);
     if (outcome.remounted) found = std::move(after);
   }
@@ -84,6 +104,35 @@ BatchOutcome estimate_one(const batch::ImuRecord& reference, const batch::ImuRec
     outcome.why_not = found.error();
   }
   return outcome;
+}
+
+/// Sets the direction of (psi, r) of which the drive shows least: nothing was assumed of the rotation, and of
+/// the lever arm its prior.
+void set_weakest(const batch::BatchMounting& mounting, StudyOutput& study) {
+  Eigen::Matrix<double, 6, 1> assumed = Eigen::Matrix<double, 6, 1>::Ones();
+  assumed.tail<3>().setConstant(batch::SensorClass{}.lever_arm_sd_m);
+  const Eigen::Matrix<double, 6, 1> scale = assumed.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> solver(
+      scale.asDiagonal() * mounting.covariance.topLeftCorner<6, 6>() * scale.asDiagonal());
+  const Eigen::Matrix<double, 6, 1> weakest = solver.eigenvectors().col(5);
+  Eigen::Index largest = 0;
+  weakest.cwiseAbs().maxCoeff(&largest);
+  Eigen::Map<Eigen::Matrix<double, 6, 1>>(study.weakest_direction.data()) = weakest;
+  study.weakest_component = static_cast<StudyDirection>(largest);
+  study.weakest_relative_sd = std::sqrt(std::max(0.0, solver.eigenvalues()[5]));
+}
+
+/// "the boresight by the sensor's own axes, scales and delays (94 % of its variance)".
+std::string limit_words(const char* what, double sensor, double reference, double drive) {
+  const double largest = std::max({sensor, reference, drive});
+  const char* by = largest == sensor      ? "the sensor's own axes, scales and delays"
+                   : largest == reference ? "the reference's own axes and scales"
+                                          : "noise, and motion that did not show more";
+  return fmt::format("{} by {} ({:.0f} % of its variance)", what, by, 100.0 * largest);
+}
+
+nlohmann::json shares_json(const Eigen::Matrix<double, 6, 1>& shares) {
+  return std::vector<double>(shares.data(), shares.data() + shares.size());
 }
 
 std::vector<double> degrees(const Eigen::Vector3d& v) {
@@ -113,29 +162,55 @@ void BatchRecords::add(const Sample& sample) {
     has_origin_ = true;
     origin_ = sample.time;
   }
-  auto& record = records_[sample.device];
+  Kept& record = records_[sample.device];
   double time_s = to_seconds(sample.time - origin_);
   if ((sample.imu.flags & kIsIncrement) != 0) time_s -= half_period_s_[sample.device];
-  if (record.size() > 0 && time_s <= record.time_s.back()) return;
+  if (record.first.size() > 0 && time_s <= record.last_s) return;
   const Eigen::Vector3f omega =
       Eigen::Map<const Eigen::Vector3d>(sample.imu.omega_radps.data()).cast<float>();
   const Eigen::Vector3f f = Eigen::Map<const Eigen::Vector3d>(sample.imu.f_mps2.data()).cast<float>();
   if (!omega.allFinite() || !f.allFinite()) return;
-  record.add(time_s, omega, f);
+  record.last_s = time_s;
+  if (record.first.size() == 0 || time_s <= record.first.time_s.front() + kLongest_s + kMargin_s) {
+    record.first.add(time_s, omega, f);
+    return;
+  }
+  record.last.add(time_s, omega, f);
+  // Seldom, as it moves an hour of samples.
+  const double longest_s = kLongest_s + 2.0 * kMargin_s;
+  if (time_s - record.last.time_s.front() > 2.0 * longest_s) forget_before(time_s - longest_s, record.last);
+}
+
+batch::ImuRecord BatchRecords::part(std::size_t device, double from_s, double to_s) const {
+  batch::ImuRecord part;
+  add_part(records_[device].first, from_s, to_s, part);
+  add_part(records_[device].last, from_s, to_s, part);
+  return part;
+}
+
+double BatchRecords::first_s(std::size_t device) const {
+  const auto& first = records_[device].first;
+  return first.size() > 0 ? first.time_s.front() : 0.0;
+}
+
+double BatchRecords::kept_to_end_from_s(std::size_t device) const {
+  const Kept& kept = records_[device];
+  if (kept.last.size() == 0) return first_s(device);
+  const double gap_s = kept.last.time_s.front() - kept.first.time_s.back();
+  return gap_s > kMargin_s ? kept.last.time_s.front() : first_s(device);
 }
 
 std::vector<BatchOutcome> estimate_mountings(const Configuration& configuration, const BatchRecords& records,
                                              const FormerMountings& former) {
   const auto studies = configuration.study_indices();
-  const auto& reference = records.of(configuration.reference_index());
+  const std::size_t reference = configuration.reference_index();
   std::vector<std::future<BatchOutcome>> running;
   for (std::size_t i = 0; i < studies.size(); ++i) {
     std::optional<double> moved_s;
     if (!former[i].empty()) moved_s = to_seconds(former[i].back().until - records.origin());
-    const auto& study = records.of(studies[i]);
-    running.push_back(std::async(std::launch::async, [&reference, &study, moved_s] {
-      return estimate_one(reference, study, moved_s);
-    }));
+    const Pair pair{records, reference, studies[i]};
+    running.push_back(
+        std::async(std::launch::async, [pair, moved_s] { return estimate_one(pair, moved_s); }));
   }
   std::vector<BatchOutcome> outcomes;
   for (auto& one : running) outcomes.push_back(one.get());
@@ -168,9 +243,55 @@ void take_over(const batch::BatchMounting& mounting, StudyOutput& study) {
   study.sd_accel_t_d_s = mounting.sd(batch::kAccelDelay);
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(study.covariance_psi_r.data()) =
       mounting.covariance.topLeftCorner<6, 6>();
-  study.status = CalibrationStatus::kCalibrated;
+  // Rotation and offset have no prior to fall back to; a lever arm that the drive does not show stays at it.
   study.observable.fill(true);
+  const double shown_m = kShownShare * batch::SensorClass{}.lever_arm_sd_m;
+  for (std::size_t i = 0; i < 3; ++i) study.observable[3 + i] = study.sd_r_bs_b_m[i] < shown_m;
   study.t_d_observable = true;
+  set_weakest(mounting, study);
+  const bool usable = is_usable(*std::ranges::max_element(study.sd_psi_rad),
+                                *std::ranges::max_element(study.sd_r_bs_b_m), study.sd_t_d_s);
+  study.status = usable ? CalibrationStatus::kCalibrated : CalibrationStatus::kConverging;
+}
+
+std::vector<StudyOutput> with_batch(std::vector<StudyOutput> studies,
+                                    const std::vector<BatchOutcome>& outcomes) {
+  for (std::size_t i = 0; i < studies.size(); ++i) {
+    if (outcomes[i].mounting) {
+      take_over(*outcomes[i].mounting, studies[i]);
+    } else if (!outcomes[i].why_not.what.empty() && outcomes[i].why_not.kind == ErrorKind::kUsage) {
+      studies[i].status = CalibrationStatus::kWaiting;
+    }
+  }
+  return studies;
+}
+
+MountingEstimate estimate_of(const batch::BatchMounting& mounting) {
+  MountingEstimate estimate{
+      matrix_of(mounting.sensor.C_b_s), vector_of(mounting.sensor.lever_arm_b_m()), {}, {}};
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(estimate.covariance_psi_r.data()) =
+      mounting.covariance.topLeftCorner<6, 6>();
+  for (Eigen::Index i = 0; i < mounting.shared.rows(); ++i)
+    for (Eigen::Index j = 0; j < mounting.shared.cols(); ++j)
+      estimate.shared_psi_r.push_back(mounting.shared(i, j));
+  return estimate;
+}
+
+nlohmann::json batch_observability_json(const StudyOutput& study, const batch::BatchMounting& mounting) {
+  auto json = observability_json(observability_of(study, kUsableFactor));
+  const auto& limits = mounting.limits;
+  const Eigen::Matrix<double, 6, 1> drive = limits.drive();
+  json["limited_by"] = fmt::format("{}; {}",
+                                   limit_words("boresight", limits.sensor.head<3>().mean(),
+                                               limits.reference.head<3>().mean(), drive.head<3>().mean()),
+                                   limit_words("lever arm", limits.sensor.tail<3>().mean(),
+                                               limits.reference.tail<3>().mean(), drive.tail<3>().mean()));
+  Eigen::Index weakest = 0;
+  (void)Eigen::Map<const Eigen::Matrix<double, 6, 1>>(study.weakest_direction.data())
+      .cwiseAbs()
+      .maxCoeff(&weakest);
+  if (drive[weakest] < kMotionHelps) json["advice"] = nullptr;
+  return json;
 }
 
 nlohmann::json batch_json(const batch::BatchMounting& mounting) {
@@ -192,6 +313,9 @@ nlohmann::json batch_json(const batch::BatchMounting& mounting) {
       {"C_gyro_accel", matrix_of(sensor.C_s_accel())},
       {"g_sensitivity_radps_per_mps2", matrix_of(sensor.g_sensitivity())},
       {"flexure_at_5_hz", matrix_of(sensor.flexure())},
+      {"share_of_sensor_psi_r", shares_json(mounting.limits.sensor)},
+      {"share_of_reference_psi_r", shares_json(mounting.limits.reference)},
+      {"shared_psi_r", estimate_of(mounting).shared_psi_r},
       {"accelerometers_in_one_place", mounting.one_chip},
       {"clock_rate", sensor.x[batch::kClockRate]},
       {"clock_rate_sd", mounting.sd(batch::kClockRate)}};

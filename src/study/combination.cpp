@@ -44,11 +44,25 @@ bool take_numbers(const json& object, const char* key, std::array<double, N>& ou
   return true;
 }
 
+/// Six rows of numbers, one after the other.
+bool take_columns(const json& array, std::vector<double>& out) {
+  constexpr std::size_t kMaxNumbers = 6 * 1000;
+  if (!array.is_array() || array.size() % 6 != 0 || array.size() > kMaxNumbers) return false;
+  for (const json& element : array) {
+    if (!element.is_number() || !std::isfinite(element.get<double>())) return false;
+    out.push_back(element.get<double>());
+  }
+  return true;
+}
+
 /// Name of the field that is missing or malformed; empty when all is well.
 std::string take_estimate(const json& imu, MountingEstimate& estimate) {
   if (!take_numbers(imu, "C_b_s", estimate.C_b_s)) return "C_b_s";
   if (!take_numbers(imu, "r_bs_b_m", estimate.r_bs_b_m)) return "r_bs_b_m";
   if (!take_numbers(imu, "covariance_psi_r", estimate.covariance_psi_r)) return "covariance_psi_r";
+  if (imu.contains("batch") && imu["batch"].is_object() && imu["batch"].contains("shared_psi_r")) {
+    if (!take_columns(imu["batch"]["shared_psi_r"], estimate.shared_psi_r)) return "batch.shared_psi_r";
+  }
   const Eigen::Matrix3d C = to_eigen(estimate.C_b_s);
   constexpr double kOrthonormal = 1e-6;
   if (!(C * C.transpose()).isIdentity(kOrthonormal) || C.determinant() < 0.0) return "C_b_s (no rotation)";

@@ -1,45 +1,68 @@
 #include "study/several_drives.h"
 
 #include <fmt/format.h>
+#include <algorithm>
 #include <map>
 
+#include "calibration/events.h"
 #include "service/estimator_setup.h"
+#include "study/batch_study.h"
 
 namespace imuscope {
 
 namespace {
 
-/// Keeps the last snapshot.
+/// Keeps the last snapshot, and where an S-IMU was found to sit differently.
 class LastSnapshot final : public CoreSink {
  public:
+  explicit LastSnapshot(const Configuration& configuration)
+      : studies_(configuration.study_indices()), former_(studies_.size()) {}
   void on_error(const ErrorRecord&) noexcept override {}
-  void on_event(const EstimatorEvent&) noexcept override {}
+  void on_event(const EstimatorEvent& event) noexcept override {
+    if (!is<event::MountingChanged>(event)) return;
+    const auto found = std::find(studies_.begin(), studies_.end(), event.device);
+    const auto i = static_cast<std::size_t>(found - studies_.begin());
+    if (i < former_.size()) former_[i].push_back({event.time, last_.studies[i]});
+  }
   void on_snapshot(const Snapshot& snapshot) noexcept override { last_ = snapshot; }
   void on_late_sample(const LateSample&) noexcept override {}
-  [[nodiscard]] const Snapshot& last() const { return last_; }
+  [[nodiscard]] std::vector<StudyOutput> studies() const {
+    return {last_.studies.begin(), last_.studies.begin() + static_cast<std::ptrdiff_t>(studies_.size())};
+  }
+  [[nodiscard]] const FormerMountings& former_mountings() const { return former_; }
 
  private:
+  std::vector<std::size_t> studies_;
+  FormerMountings former_;
   Snapshot last_{};
 };
 
 Result<DriveMountings> calibrate(const OpenedRecording& drive, const std::filesystem::path& folder,
-                                 const ReplayOptions& options) {
-  LastSnapshot sink;
+                                 ReplayOptions options) {
   const auto& configuration = drive.configuration;
+  LastSnapshot sink(configuration);
+  const bool by_batch = configuration.estimator.batch_mounting;
+  BatchRecords records(configuration);
+  if (by_batch) options.on_sample = [&records](const Sample& sample) { records.add(sample); };
   const auto replayed =
       replay(configuration, estimator_config(configuration), drive.recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());
+  const auto indices = configuration.study_indices();
+  std::vector<BatchOutcome> outcomes(indices.size());
+  if (by_batch) outcomes = estimate_mountings(configuration, records, sink.former_mountings());
+  const auto studies = with_batch(sink.studies(), outcomes);
   DriveMountings out;
   out.run = folder;
   out.inputs = drive.recording.inputs;
-  const auto indices = configuration.study_indices();
   for (std::size_t i = 0; i < indices.size(); ++i) {
-    const StudyOutput& study = sink.last().studies[i];
+    const StudyOutput& study = studies[i];
     const auto& name = configuration.devices[indices[i]].name;
-    if (!has_estimate(study.status)) {
+    if (outcomes[i].mounting) {
+      out.studies.push_back({name, estimate_of(*outcomes[i].mounting)});
+    } else if (!has_estimate(study.status)) {
       out.without_estimate.push_back(name);
     } else {
-      out.studies.push_back({name, {study.C_b_s, study.r_bs_b_m, study.covariance_psi_r}});
+      out.studies.push_back({name, {study.C_b_s, study.r_bs_b_m, study.covariance_psi_r, {}}});
     }
   }
   return out;

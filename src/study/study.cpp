@@ -160,19 +160,6 @@ FormerMountings confirmed(FormerMountings former, const std::vector<BatchOutcome
   return former;
 }
 
-/// The batch's values where it found any. Where it found the data to be wrong, nothing of them is believed.
-std::vector<StudyOutput> with_batch(std::vector<StudyOutput> studies,
-                                    const std::vector<BatchOutcome>& outcomes) {
-  for (std::size_t i = 0; i < studies.size(); ++i) {
-    if (outcomes[i].mounting) {
-      take_over(*outcomes[i].mounting, studies[i]);
-    } else if (!outcomes[i].why_not.what.empty() && outcomes[i].why_not.kind == ErrorKind::kUsage) {
-      studies[i].status = CalibrationStatus::kWaiting;
-    }
-  }
-  return studies;
-}
-
 /// What the batch has to say, refusals first.
 std::vector<std::string> remarks_of_batch(const std::vector<StudyFileInfo>& infos,
                                           const std::vector<StudyOutput>& of_filter,
@@ -207,6 +194,7 @@ std::vector<CalibrationEntry> calibration_entries(const std::vector<StudyOutput>
     if (outcomes[i].mounting) {
       entry.more["method"] = "batch estimate";
       entry.more["batch"] = batch_json(*outcomes[i].mounting);
+      entry.more["observability"] = batch_observability_json(finals[i], *outcomes[i].mounting);
       entry.more["filter"] = filter_json(of_filter[i], infos[i].clock_shift_s);
     }
     entries.push_back(std::move(entry));

@@ -163,4 +163,29 @@ TEST(NormalEquations, NoiseOfTheReferenceIsNoInformation) {
   EXPECT_LT(without.of_noise(kLeverArm, kLeverArm), 1e-9 * without.information(kLeverArm, kLeverArm));
 }
 
+/// B-24: the published frame describes the same sensor, and its derivative is that of the parameters.
+TEST(AxesFrame, IsTheSameSensorWithTriangularMatrices) {
+  const SensorState symmetric = Drawn().estimate.sensor;
+  const SensorState axes = in_axes_frame(symmetric).sensor;
+  EXPECT_LT((axes.C_b_gyro() - symmetric.C_b_gyro()).norm(), 1e-14);
+  EXPECT_LT((axes.C_b_accel() - symmetric.C_b_accel()).norm(), 1e-14);
+  for (const auto& matrix : {axes.gyro_shape(), axes.accel_shape()})
+    for (const auto& [row, column] : {std::pair(0, 1), std::pair(0, 2), std::pair(1, 2)})
+      EXPECT_EQ(matrix(row, column), 0.0);
+
+  const auto derivative = in_axes_frame(symmetric).derivative;
+  constexpr double kStep = 1e-5;
+  for (Eigen::Index i = kGyroShape; i < kAccelDelay; ++i) {
+    SensorState moved = symmetric;
+    ParameterVector step = ParameterVector::Zero();
+    step[i] = kStep;
+    moved.add(step);
+    const SensorState there = in_axes_frame(moved).sensor;
+    ParameterVector change = (there.x - axes.x) / kStep;
+    change.segment<3>(kPsi) = -imuscope::log_so3(axes.C_b_s.transpose() * there.C_b_s) / kStep;
+    // Departures are of the size kSmall, and products of two of them are left out.
+    EXPECT_LT((change - derivative.col(i)).cwiseAbs().maxCoeff(), 10.0 * kSmall) << i;
+  }
+}
+
 }  // namespace

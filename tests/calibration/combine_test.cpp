@@ -75,6 +75,44 @@ TEST(Combine, IndependentDrivesGiveAConsistentMeanAndAnUnsuspiciousHomogeneity) 
   EXPECT_NEAR(suspicious, 0.05 * kCampaigns, 4.0 * std::sqrt(0.05 * 0.95 * kCampaigns));
 }
 
+/// What lasts from drive to drive (a sensor's crooked axes) must not average out, nor make drives differ.
+TEST(Combine, WhatDrivesShareStaysAndTheTestOfHomogeneityKnowsIt) {
+  std::mt19937_64 random(33);
+  std::normal_distribution<double> normal;
+  constexpr int kCampaigns = 400;
+  constexpr int kColumns = 4;
+  constexpr double kShared = 3e-4;
+  Eigen::Matrix<double, 6, kColumns, Eigen::RowMajor> pattern;
+  for (Eigen::Index i = 0; i < pattern.size(); ++i) pattern.data()[i] = kShared * normal(random);
+  double nees = 0.0;
+  double mean_chi2 = 0.0;
+  int suspicious = 0;
+  for (int c = 0; c < kCampaigns; ++c) {
+    Eigen::Matrix<double, kColumns, 1> lasting;
+    for (auto& value : lasting) value = normal(random);
+    std::vector<MountingEstimate> drives;
+    for (const double scale : {1.0, 2.0, 0.7, 1.5}) {
+      const Matrix6 own = covariance_with_sd(1e-4 * scale, 5e-4 * scale);
+      // A drive that tells less leaves more of what was believed before.
+      const Eigen::Matrix<double, 6, kColumns, Eigen::RowMajor> shared = (0.8 + 0.2 * scale) * pattern;
+      const Matrix6 P = own + shared * shared.transpose();
+      drives.push_back(estimate_of(draw(random, own) + shared * lasting, P));
+      drives.back().shared_psi_r.assign(shared.data(), shared.data() + shared.size());
+    }
+    const auto combined = combine(drives, CombineMethod::kInverseVariance);
+    ASSERT_TRUE(combined.has_value());
+    const Eigen::Map<const Matrix6> P(combined->estimate.covariance_psi_r.data());
+    const Vector6 error = error_of(combined->estimate);
+    nees += error.dot(P.ldlt().solve(error));
+    mean_chi2 += combined->homogeneity_chi2;
+    suspicious += combined->homogeneity_p_value < 0.05 ? 1 : 0;
+    for (const auto& drive : combined->drives) suspicious += drive.p_value < 1e-5 ? 100 : 0;
+  }
+  EXPECT_NEAR(nees / kCampaigns, 6.0, 4.0 * std::sqrt(12.0 / kCampaigns));
+  EXPECT_NEAR(mean_chi2 / kCampaigns, 18.0, 4.0 * std::sqrt(36.0 / kCampaigns));
+  EXPECT_NEAR(suspicious, 0.05 * kCampaigns, 4.0 * std::sqrt(0.05 * 0.95 * kCampaigns));
+}
+
 TEST(Combine, IntersectionOfTwiceTheSameDriveLearnsNothing) {
   const Matrix6 P = covariance_with_sd(1e-4, 5e-4);
   std::mt19937_64 random(32);

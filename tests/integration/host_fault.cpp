@@ -1,7 +1,7 @@
 /// Preloaded into the unmodified `imuscope`, this library is a host in trouble. The first letter of the file
 /// named by HOST_FAULT_CONTROL says which: "e" the estimator's thread gets no processor, "p" the publisher's
-/// messages are not taken, "r" the recorder's disk does not answer, "f" it is full, "t" the wall clock is an hour
-/// ahead. Threads are held for as long as the file says so.
+/// messages are not taken, "r" the recorder's disk does not answer, "f" it is full, "t" the wall clock is an
+/// hour ahead. Threads are held for as long as the file says so.
 
 #include <dlfcn.h>
 #include <fcntl.h>

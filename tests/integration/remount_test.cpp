@@ -67,7 +67,8 @@ std::vector<SmoothedRow> smoothed_rows(const std::filesystem::path& file) {
   while (std::getline(in, line)) {
     std::vector<double> values;
     std::istringstream cells(line);
-    for (std::string cell; std::getline(cells, cell, ',');) values.push_back(std::strtod(cell.c_str(), nullptr));  // empty: no UTC
+    for (std::string cell; std::getline(cells, cell, ',');)
+      values.push_back(std::strtod(cell.c_str(), nullptr));  // empty: no UTC
     const Eigen::Quaterniond q(values.at(q_w), values.at(q_w + 1), values.at(q_w + 2), values.at(q_w + 3));
     rows.push_back({values.front(), q.toRotationMatrix()});
   }

@@ -472,9 +472,9 @@ class StatusTruth : public testing::Test {
   /// Records are counted on their channel: what is missing in the capture is what was lost of them.
   void check_capture_lost() const {
     std::map<std::string, std::int64_t> next;
-    std::int64_t missing = 0;       // reads of devices
+    std::int64_t missing = 0;  // reads of devices
     std::int64_t next_number = 0;
-    std::int64_t left_out = 0;      // records of any kind, seals included
+    std::int64_t left_out = 0;  // records of any kind, seals included
     auto log = EventLogReader::open(folder_ / "live" / "capture.lcm");
     ASSERT_TRUE(log.has_value());
     LogEvent event;

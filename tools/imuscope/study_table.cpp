@@ -85,6 +85,8 @@ void print_observability(const json& imu) {
   }
   if (!unseen.empty()) say("  not observable yet: {}\n", fmt::join(unseen, ", "));
   say("  least is known of  {}\n", observability.at("weakest").at("words").get<std::string>());
+  if (observability.contains("limited_by"))
+    say("  limited            {}\n", observability.at("limited_by").get<std::string>());
   if (!observability.at("advice").is_null())
     say("  what would help    {}\n", observability.at("advice").get<std::string>());
 }

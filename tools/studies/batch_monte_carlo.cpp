@@ -70,18 +70,9 @@ struct Totals {
   }
 };
 
-/// C of A = L C with L lower triangular, its diagonal positive.
-Matrix3d frame_of(const Matrix3d& gyro) {
-  Matrix3d C;
-  C.row(0) = gyro.row(0).normalized();
-  C.row(1) = (gyro.row(1) - gyro.row(1).dot(C.row(0)) * C.row(0)).normalized();
-  C.row(2) = C.row(0).cross(C.row(1));
-  return C;
-}
-
 /// Scale and lower triangle of a triad's matrix in the frame that goes with it.
 Vector6 shape_of(const Matrix3d& triad) {
-  const Matrix3d L = triad * frame_of(triad).transpose();
+  const Matrix3d L = triad * imusim::triad_frame(triad).transpose();
   Vector6 shape;
   shape << L(0, 0) - 1.0, L(1, 1) - 1.0, L(2, 2) - 1.0, L(1, 0), L(2, 0), L(2, 1);
   return shape;
@@ -99,11 +90,11 @@ TrueSensor true_sensor(const study_drive::Draw& draw, std::size_t study) {
   const Matrix3d gyro = imusim::triad_matrix(errors.gyro) * study_drive::mounting_of(study);
   const Matrix3d accel = imusim::triad_matrix(errors.accel) * study_drive::mounting_of(study);
   TrueSensor truth;
-  truth.C_b_s = frame_of(gyro);
+  truth.C_b_s = imusim::triad_frame(gyro);
   truth.x.segment<3>(batch::kLeverArm) = study_drive::lever_arm_of(study);
   truth.x[batch::kTimeOffset] = known.t_d_s;
   truth.x.segment<6>(batch::kGyroShape) = shape_of(gyro);
-  truth.x.segment<3>(batch::kAlpha) = -log_so3(frame_of(accel) * truth.C_b_s.transpose());
+  truth.x.segment<3>(batch::kAlpha) = -log_so3(imusim::triad_frame(accel) * truth.C_b_s.transpose());
   truth.x.segment<6>(batch::kAccelShape) = shape_of(accel);
   truth.x[batch::kAccelDelay] = known.accel_t_d_s;
   for (Eigen::Index j = 0; j < 6; ++j)

@@ -138,10 +138,11 @@ std::vector<Cell> selection_cells() {
       {{{white(1.0), markov(1.0, 0.5)}}, 87.0},
       {{{white(1.0), markov(10.5, 0.53), walk(1e-5)}}, 78.0}};
   std::vector<Cell> cells;
-  for (const auto& [truth, right] : asked) {
+  for (const auto& one : asked) {
+    const noise::Model& truth = one.first;
     const std::string name = spec_of(truth).name();
     cells.push_back({"selection/" + name,
-                     {{"right", right, 100.0}, {"rejected", 0.0, 0.5}},
+                     {{"right", one.second, 100.0}, {"rejected", 0.0, 0.5}},
                      [truth, name](std::mt19937_64& random, Counts& counts) {
                        constexpr std::size_t kN = 1U << 16U;
                        const auto wv =
@@ -170,7 +171,7 @@ std::vector<Cell> replicate_cells() {
   const auto all = truths();
   for (const std::size_t which : {2U, 4U, 8U, 5U}) {
     for (const double spread : {0.0, 0.05, 0.2}) {
-      const noise::Model truth = all[which];
+      const noise::Model& truth = all[which];
       std::vector<Band> bands{{"", 91.0, 98.0}};
       if (spread == 0.0) bands.insert(bands.begin(), {"differ", 3.0, 8.0});
       if (spread > 0.0) bands.insert(bands.begin(), {"differ", 0.0, 100.0});
@@ -260,13 +261,14 @@ bool judge(const Cell& cell, const Counts& counts) {
   constexpr double kSd = 3.3;
   bool good = true;
   fmt::print("{}\n", cell.name);
-  for (const auto& [name, c] : counts) {
+  for (const auto& count : counts) {
+    const auto& [name, c] = count;
     const Band* band = nullptr;
     for (const Band& b : cell.bands) {
       if (band == nullptr && (b.name == name || b.name.empty())) band = &b;
     }
     const double share = 100.0 * c.hits / c.of;
-    const auto sd_at = [&](double percent) { return std::sqrt(percent * (100.0 - percent) / c.of); };
+    const auto sd_at = [of = c.of](double percent) { return std::sqrt(percent * (100.0 - percent) / of); };
     const bool holds_here = band == nullptr || (share >= band->low - kSd * sd_at(band->low) &&
                                                 share <= band->high + kSd * sd_at(band->high));
     good = good && holds_here;
