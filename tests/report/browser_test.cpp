@@ -50,6 +50,18 @@ struct Measured {
   std::string console;
 };
 
+/// What the page said on the console; not what the browser says of a machine that is busy with other things.
+std::string console_of(const std::filesystem::path& log) {
+  std::string said;
+  std::istringstream lines(content_of(log));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find("CONSOLE") == std::string::npos) continue;
+    if (line.find("Slow network is detected") != std::string::npos) continue;
+    said += line + "\n";
+  }
+  return said;
+}
+
 class Browser : public testing::Test {
  protected:
   void SetUp() override {
@@ -107,10 +119,7 @@ frame.onload = () => setTimeout(() => {
       out.blank = std::stoi(found[4]);
       out.figures = std::stoi(found[5]);
     }
-    std::istringstream lines(content_of(console));
-    for (std::string line; std::getline(lines, line);) {
-      if (line.find("CONSOLE") != std::string::npos) out.console += line + "\n";
-    }
+    out.console = console_of(console);
     return out;
   }
 
@@ -265,9 +274,8 @@ frame.onload = () => {
   EXPECT_EQ(found[3], "3") << "scripts in the page: the figures, the library and our own";
   EXPECT_GT(std::stoi(found[4]), 150) << "payloads that are read as text";
   EXPECT_GT(std::stoi(found[5]), 20) << "figures drawn all the same";
-  const std::string said = content_of(console);
-  EXPECT_EQ(said.find("Content Security Policy"), std::string::npos) << said;
-  EXPECT_EQ(said.find("CONSOLE"), std::string::npos) << said;
+  EXPECT_EQ(content_of(console).find("Content Security Policy"), std::string::npos) << content_of(console);
+  EXPECT_EQ(console_of(console), "");
 }
 
 TEST_F(Browser, AScriptThatGotIntoThePageIsNotRun) {
