@@ -93,6 +93,16 @@ void record(const std::filesystem::path& folder, const char* minutes) {
       << read_text(folder.string() + ".log");
 }
 
+/// The mounting of the filter, which takes each sensor to have straight axes.
+void take_the_mounting_of_the_filter(const std::filesystem::path& recording) {
+  const auto file = recording / "config.toml";
+  std::string text = read_text(file);
+  const std::string section = "[estimator]\n";
+  const auto at = text.find(section);
+  ASSERT_NE(at, std::string::npos) << text;
+  std::ofstream(file) << text.insert(at + section.size(), "mounting = \"filter\"\n");
+}
+
 /// Keeps the first half of a device's bytes and of its reads.
 void cut_in_half(const std::filesystem::path& recording, const std::string& device) {
   const auto file = recording / (device + ".bin");
@@ -126,6 +136,9 @@ TEST(StudyOfADrive, TheErrorProcessIsTheTrueErrorToAHundredthOfTheNoise) {
   const auto scratch = scratch_folder();
   const auto folder = scratch / "drive";
   record(folder, "6");
+  // These sensors' axes are straight, which the batch does not take for granted: what it leaves open of them
+  // is in its sd, and not what is looked at here.
+  take_the_mounting_of_the_filter(folder);
   const auto out = scratch / "run";
   ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
   const auto truth = read_json(folder / "truth.json");
