@@ -19,6 +19,7 @@
 #include "base/contracts.h"
 #include "drivers/transport/can_interface.h"
 #include "drivers/transport/kernel_stamp.h"
+#include "drivers/transport/receive_buffer.h"
 
 namespace imuscope {
 namespace {
@@ -64,28 +65,14 @@ bool set_can_option(int fd, int level, int option, const T& value) noexcept {
   return setsockopt(fd, level, option, &value, sizeof value) == 0;
 }
 
-/// @return what the kernel granted; it counts its own overhead, so that it grants twice what is asked for
-int grow_receive_buffer(int fd, int wanted_bytes) noexcept {
-  if (!set_can_option(fd, SOL_SOCKET, SO_RCVBUFFORCE, wanted_bytes)) {
-    (void)set_can_option(fd, SOL_SOCKET, SO_RCVBUF, wanted_bytes);
-  }
-  int granted = 0;
-  socklen_t size = sizeof granted;
-  getsockopt(fd, SOL_SOCKET, SO_RCVBUF, &granted, &size);
-  return granted / 2;
-}
-
 std::string description_of(const CanInterface& interface, const CanSettings& settings, int buffer_bytes) {
   std::string text = fmt::format("{} ({}", settings.interface, interface.takes_fd ? "CAN FD" : "CAN");
   if (interface.bit_rate > 0) text += fmt::format(", {} bit/s", interface.bit_rate);
   if (interface.listen_only) text += ", listen-only";
   text += fmt::format(", {} identifiers", settings.ids.size());
   if (!interface.is_up) text += ", down";
-  if (buffer_bytes < settings.receive_buffer_bytes) {
-    text +=
-        fmt::format(", room for {} kB of {} wanted: sudo sysctl net.core.rmem_max={}", buffer_bytes / 1024,
-                    settings.receive_buffer_bytes / 1024, settings.receive_buffer_bytes);
-  }
+  if (const auto shortage = buffer_shortage(buffer_bytes, settings.receive_buffer_bytes); !shortage.empty())
+    text += ", " + shortage;
   return text + ")";
 }
 

@@ -15,6 +15,8 @@
 #include <cstring>
 #include <utility>
 
+#include "drivers/transport/receive_buffer.h"
+
 namespace imuscope {
 namespace {
 
@@ -23,8 +25,9 @@ constexpr int kConnectWithin_ms = 1000;
 constexpr int kKeepAliveIdle_s = 5;
 constexpr int kKeepAliveInterval_s = 2;
 constexpr int kKeepAliveCount = 3;
-// Seconds of the fastest StdBin output.
-constexpr int kReceiveBuffer = 1 << 20;
+// Of datagrams: each takes about a kilobyte of kernel memory, so that this is two minutes of a hundred a
+// second. Memory is taken by what waits alone.
+constexpr int kReceiveBuffer = 1 << 24;
 
 /// Closes what is not handed on.
 class Socket {
@@ -140,10 +143,11 @@ bool join_group(int fd, const addrinfo& address) {
   return setsockopt(fd, is_v6 ? IPPROTO_IPV6 : IPPROTO_IP, MCAST_JOIN_GROUP, &group, sizeof group) == 0;
 }
 
-Result<int> open_udp(const NetSettings& settings, const addrinfo& address) {
+/// @param[out] shortage  of memory for datagrams that wait
+Result<int> open_udp(const NetSettings& settings, const addrinfo& address, std::string& shortage) {
   Socket socket(::socket(address.ai_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (socket.fd() < 0) return work_error(fmt::format("{}: {}", name_of(settings), std::strerror(errno)));
-  set_option(socket.fd(), SOL_SOCKET, SO_RCVBUF, kReceiveBuffer);
+  shortage = buffer_shortage(grow_receive_buffer(socket.fd(), kReceiveBuffer), kReceiveBuffer);
   const bool multicast = is_multicast(address);
   // Several listeners may share a group; a port of our own is ours alone.
   if (multicast) set_option(socket.fd(), SOL_SOCKET, SO_REUSEADDR, 1);
@@ -171,9 +175,10 @@ Result<std::unique_ptr<NetStream>> NetStream::open(const NetSettings& settings) 
   }
   const auto addresses = resolve(settings);
   if (!addresses) return tl::unexpected<Error>(addresses.error());
-  const auto fd = tcp ? open_tcp(settings, addresses->get()) : open_udp(settings, **addresses);
+  std::string shortage;
+  const auto fd = tcp ? open_tcp(settings, addresses->get()) : open_udp(settings, **addresses, shortage);
   if (!fd) return tl::unexpected<Error>(fd.error());
-  return std::unique_ptr<NetStream>(new NetStream(*fd, settings));
+  return std::unique_ptr<NetStream>(new NetStream(*fd, settings, std::move(shortage)));
 }
 
 NetStream::~NetStream() { ::close(fd_); }
@@ -224,6 +229,8 @@ LineHealth NetStream::health() noexcept {
   return health;
 }
 
-std::string NetStream::describe() const { return name_of(settings_); }
+std::string NetStream::describe() const {
+  return shortage_.empty() ? name_of(settings_) : name_of(settings_) + " (" + shortage_ + ")";
+}
 
 }  // namespace imuscope

@@ -42,10 +42,12 @@ class NetStream final : public Transport {
   [[nodiscard]] std::string describe() const override;
 
  private:
-  NetStream(int fd, NetSettings settings) : fd_(fd), settings_(std::move(settings)) {}
+  NetStream(int fd, NetSettings settings, std::string shortage)
+      : fd_(fd), settings_(std::move(settings)), shortage_(std::move(shortage)) {}
 
   int fd_;
   NetSettings settings_;
+  std::string shortage_;  ///< of memory for datagrams that wait
   std::uint64_t datagrams_cut_ = 0;
 };
 

@@ -24,19 +24,41 @@ inline constexpr double kCommonRate_hz = 100.0;
   return std::bit_ceil(static_cast<double>(whole) < elements ? whole + 1 : whole);
 }
 
-/// The estimator's thread may stand still for this long at the highest rates, ten seconds at the common one.
-inline constexpr double kCoreStall_s = 0.5;
+/// The whole service, or one of its core threads, may stand still for this long without a sample being lost
+/// here; what the kernel has no room for meanwhile is lost there.
+inline constexpr double kLongestStall_s = 120.0;
+/// That long up to this rate of samples; above it as long as the largest ring lasts.
+inline constexpr double kLongestStallRate_hz = 500.0;
+/// A reference sends its attitude as a sample of its own.
+inline constexpr double kSamplesPerMessage = 2.0;
 /// Samples of one device on their way to the core.
-inline constexpr std::size_t kSampleRingCapacity = ring_capacity(kMaxRate_hz, kCoreStall_s);
-static_assert(kSampleRingCapacity >= ring_capacity(kCommonRate_hz, 10.0));
-/// S samples that one tick can show: what came while the core stood still is caught up in one go.
+inline constexpr std::size_t kSampleRingMin = 1024;
+inline constexpr std::size_t kSampleRingMax = ring_capacity(kLongestStallRate_hz, kLongestStall_s);
+[[nodiscard]] constexpr std::size_t sample_ring_capacity(double rate_hz) noexcept {
+  return std::clamp(ring_capacity(kSamplesPerMessage * rate_hz, kLongestStall_s), kSampleRingMin,
+                    kSampleRingMax);
+}
+static_assert(sample_ring_capacity(kCommonRate_hz) >=
+              static_cast<std::size_t>(kSamplesPerMessage * kCommonRate_hz * kLongestStall_s));
+static_assert(kSampleRingMax >= ring_capacity(kMaxRate_hz, 30.0), "half a minute at the highest rate");
+
+/// A core that finds the reference this far behind the cut catches up in steps.
+inline constexpr double kBehind_s = 1.0;
+/// Of time of validity that one tick of a core that catches up takes: ten times as much as passes meanwhile.
+inline constexpr double kCatchUpStep_s = 0.1;
+/// So close to the cut it is up to date.
+inline constexpr double kCaughtUp_s = 0.3;
+/// Time of validity that one tick can meet at most.
+inline constexpr double kCoreStall_s = kBehind_s;
+static_assert(kCaughtUp_s + kCatchUpStep_s <= kCoreStall_s);
+/// S samples that one tick can show.
 inline constexpr std::size_t kEpochsPerTick =
     kMaxStudies * static_cast<std::size_t>(kMaxRate_hz * kCoreStall_s);
 
 /// An S sample waits at most this long for the reference at its instant.
 inline constexpr double kReferenceWait_s = 0.1;
-/// S samples of one sensor that wait for the reference; a core that stood still finds all of them at once.
-inline constexpr std::size_t kWaitingSamples = ring_capacity(kMaxRate_hz, 1.0);
+/// S samples of one sensor that wait for the reference; a core that stood still finds many of them at once.
+inline constexpr std::size_t kWaitingSamples = ring_capacity(kMaxRate_hz, 2.0);
 static_assert(kWaitingSamples >= ring_capacity(kMaxRate_hz, kCoreStall_s + kReferenceWait_s));
 
 /// Past of the reference that a late S sample or GNSS solution is held against: places at its rate.
@@ -46,6 +68,8 @@ inline constexpr std::size_t kReferencePastMin = 256;
   return std::max(kReferencePastMin, ring_capacity(rate_hz, kReferencePast_s));
 }
 static_assert(kReferencePast_s >= kCoreStall_s + kReferenceWait_s);
+static_assert(kBehind_s > kCatchUpStep_s + kReferenceWait_s,
+              "the reference runs ahead by as long as S samples wait");
 
 /// The publisher writes files, whose disk may stand still: for this long at the common rate.
 inline constexpr double kPublisherStall_s = 6.0;

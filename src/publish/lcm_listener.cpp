@@ -5,14 +5,17 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <utility>
 #include <vector>
 
 #include "publish/lcm_datagram.h"
 #include "publish/lcm_socket_filter.h"
+#include "publish/receive_age.h"
 
 namespace imuscope {
 
@@ -35,6 +38,7 @@ Result<void> join(int socket, const UdpmBus& bus, Reach reach) {
   if (auto deaf = attach_lcm_filter(socket, {}, reach); !deaf) return deaf;
   const int yes = 1;
   const int no = 0;
+  (void)set(socket, SOL_SOCKET, SO_TIMESTAMPNS, yes);  // without it messages are as old as their reading
   if (!set(socket, SOL_SOCKET, SO_REUSEADDR, yes)) return refused("to share the bus with others");
   // Without this a socket hears what any program of this PC has joined, on any interface.
   if (!set(socket, IPPROTO_IP, IP_MULTICAST_ALL, no)) return refused("to hear one interface alone");
@@ -50,6 +54,18 @@ Result<void> join(int socket, const UdpmBus& bus, Reach reach) {
   if (!set(socket, IPPROTO_IP, IP_ADD_MEMBERSHIP, membership)) return refused("to join the multicast group");
   return {};
 }
+
+std::chrono::nanoseconds since_epoch(const timespec& time) noexcept {
+  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
+
+std::chrono::nanoseconds now_by(clockid_t clock) noexcept {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return since_epoch(now);
+}
+
+ReceiveAge::Clocks read_clocks() noexcept { return {now_by(CLOCK_MONOTONIC), now_by(CLOCK_REALTIME)}; }
 
 }  // namespace
 
@@ -68,8 +84,31 @@ struct LcmListener::Impl {
     }
   }
 
+  /// Bytes of the next datagram; below zero where none waits. Sets its age.
+  ssize_t receive() noexcept {
+    iovec vector{buffer.data(), buffer.size()};
+    alignas(cmsghdr) std::array<std::uint8_t, CMSG_SPACE(sizeof(timespec))> control{};
+    msghdr header{};
+    header.msg_iov = &vector;
+    header.msg_iovlen = 1;
+    header.msg_control = control.data();
+    header.msg_controllen = control.size();
+    const ReceiveAge::Clocks before = read_clocks();
+    const ssize_t n = recvmsg(socket, &header, 0);
+    if (n < 0) receive_age.nothing_waited(before);
+    age = {};
+    const cmsghdr* const told = n >= 0 ? CMSG_FIRSTHDR(&header) : nullptr;
+    if (told == nullptr || told->cmsg_level != SOL_SOCKET || told->cmsg_type != SO_TIMESTAMPNS) return n;
+    timespec received{};
+    std::memcpy(&received, CMSG_DATA(told), sizeof received);
+    age = receive_age.of(since_epoch(received), read_clocks());
+    return n;
+  }
+
   int socket;
   Reach reach;
+  ReceiveAge receive_age{read_clocks()};
+  std::chrono::nanoseconds age{};
   std::string prefix;
   std::vector<ChannelPattern> patterns;
   std::vector<Handler> handlers;  // one a pattern
@@ -111,16 +150,18 @@ Result<void> LcmListener::subscribe(std::string_view kind, Handler handler) {
 
 int LcmListener::wait(std::chrono::milliseconds timeout) {
   pollfd input{impl_->socket, POLLIN, 0};
-  if (poll(&input, 1, static_cast<int>(timeout.count())) <= 0) return 0;
+  (void)poll(&input, 1, static_cast<int>(timeout.count()));  // whatever it says, the reading tells
   const auto end = std::chrono::steady_clock::now() + kLongestAtOnce;
   int handled = 0;
   while (handled < kMostAtOnce && std::chrono::steady_clock::now() < end) {
-    const auto n = recv(impl_->socket, impl_->buffer.data(), impl_->buffer.size(), 0);
+    const auto n = impl_->receive();
     if (n < 0) break;
     impl_->handle({impl_->buffer.data(), static_cast<std::size_t>(n)});
     ++handled;
   }
   return handled;
 }
+
+std::chrono::nanoseconds LcmListener::age() const noexcept { return impl_->age; }
 
 }  // namespace imuscope

@@ -51,6 +51,11 @@ class LcmListener {
   /// were handled.
   int wait(std::chrono::milliseconds timeout);
 
+  /// Of the message that a handler is called for: how long it had waited to be read since the kernel received
+  /// it. 0 where the kernel does not tell. Right as well where the wall clock, by which it does, was stepped
+  /// (receive_age.h).
+  [[nodiscard]] std::chrono::nanoseconds age() const noexcept;
+
  private:
   struct Impl;
   explicit LcmListener(std::unique_ptr<Impl> impl) noexcept;

@@ -64,6 +64,10 @@ void Broadcast::on_refit(const Refit& refit) {
   bus_->publish(dynamics_message(refit), "DYNAMICS", refit.name);
 }
 
+void Broadcast::on_pc_clock(const PcClockLog::News& news, UtcTime utc) {
+  if (bus_) bus_->publish(pc_clock_message(news, utc), "PC_CLOCK");
+}
+
 void Broadcast::on_status(status_t status) {
   if (!bus_) return;
   count_elements(status);

@@ -29,6 +29,7 @@ class Broadcast {
   void on_error(const ErrorRecord& record);
   void on_snapshot(const Snapshot& snapshot);
   void on_refit(const Refit& refit);
+  void on_pc_clock(const PcClockLog::News& news, UtcTime utc);
   /// Counts its arrays, too.
   void on_status(status_t status);
 

@@ -7,12 +7,30 @@
 
 namespace imuscope {
 
+namespace {
+
+std::size_t ring_capacity_of(const EstimatorConfig& config, std::size_t device) noexcept {
+  if (device == config.reference.device) return sample_ring_capacity(config.reference.rate_hz);
+  for (const StudyConfig& study : config.studies) {
+    if (study.device == device) return sample_ring_capacity(study.rate_hz);
+  }
+  return sample_ring_capacity(kCommonRate_hz);  // GNSS and wheels send no faster
+}
+
+constexpr Duration duration(double value_s) noexcept {
+  return Duration{static_cast<std::int64_t>(value_s * 1e9)};
+}
+
+}  // namespace
+
 Core::Core(const EstimatorConfig& config, std::size_t n_devices, CoreSchedule schedule, HistorySink* history)
     : estimator_(config, history),
       reference_(config.reference.device),
       late_samples_(n_devices),
       applied_noises_(std::move(schedule.applied_noises)) {
-  for (std::size_t i = 0; i < n_devices; ++i) rings_.push_back(std::make_unique<SampleRing>());
+  for (std::size_t i = 0; i < n_devices; ++i) {
+    rings_.push_back(std::make_unique<SampleRing>(ring_capacity_of(config, i)));
+  }
   for (std::size_t i = 0; i < config.studies.size(); ++i)
     noises_.push_back(std::make_unique<LatestValue<NewNoise>>());
   std::sort(schedule.late_samples.begin(), schedule.late_samples.end(),
@@ -32,6 +50,33 @@ bool Core::held_back(const Sample& sample, std::int64_t index) const noexcept {
   return found != late.end() && found->sequence == sample.sequence && found->tick > index;
 }
 
+/// By the samples' stamps and the cut alone, so that a replay decides the same.
+void Core::look_for_backlog(std::int64_t index, HostTime cut) noexcept {
+  previous_horizon_ = horizon_;
+  if (catches_up()) {
+    horizon_ += duration(kCatchUpStep_s);
+    if (horizon_ < cut - duration(kCaughtUp_s)) return;
+    horizon_ = HostTime::max();
+  }
+  const Sample* const oldest = rings_[reference_]->front();
+  const bool is_there = oldest != nullptr && oldest->arrival <= cut && !held_back(*oldest, index);
+  if (is_there && oldest->time < cut - duration(kBehind_s)) {
+    horizon_ = oldest->time + duration(kCatchUpStep_s);
+  }
+}
+
+/// The reference runs ahead by as long as an S sample waits for it.
+bool Core::is_within(const Sample& sample, HostTime horizon) const noexcept {
+  if (horizon == HostTime::max()) return true;
+  return sample.time <= (sample.device == reference_ ? horizon + duration(kReferenceWait_s) : horizon);
+}
+
+/// An earlier tick would have consumed it, had it been in its ring.
+bool Core::was_late(const Sample& sample) const noexcept {
+  if (sample.arrival <= last_open_cut_) return true;
+  return sample.arrival <= previous_cut_ && is_within(sample, previous_horizon_);
+}
+
 void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   for (;;) {
     // Oldest arrival first; equal stamps in configuration order, then in sequence (the ring's own order).
@@ -39,16 +84,17 @@ void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
     const Sample* oldest = nullptr;
     for (const auto& ring : rings_) {
       const Sample* sample = ring->front();
-      if (sample == nullptr || sample->arrival > cut || held_back(*sample, index)) continue;
+      if (sample == nullptr || sample->arrival > cut || held_back(*sample, index) ||
+          !is_within(*sample, horizon_))
+        continue;
       if (oldest == nullptr || sample->arrival < oldest->arrival) {
         oldest = sample;
         next = ring.get();
       }
     }
     if (next == nullptr) return;
-    if (oldest->arrival <= previous_cut_) {
-      sink.on_late_sample({oldest->device, oldest->sequence, index});
-    }
+    if (was_late(*oldest)) sink.on_late_sample({oldest->device, oldest->sequence, index});
+    newest_arrival_ = std::max(newest_arrival_, oldest->arrival);
     note_first_reference(*oldest);
     estimator_.add(*oldest);
     next->pop();
@@ -93,9 +139,13 @@ void Core::take_over_noises(std::int64_t index, CoreSink& sink) noexcept {
 void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   IMUSCOPE_EXPECTS(cut > previous_cut_);
   take_over_noises(index, sink);
+  look_for_backlog(index, cut);
+  // What was heard by the tick before: a tick may fall between the reads of two lines.
+  if (!catches_up()) listened_until_ = std::max(listened_until_, std::min(cut, newest_arrival_));
   consume(index, cut, sink);
   previous_cut_ = cut;
-  estimator_.advance(cut);
+  if (!catches_up()) last_open_cut_ = cut;
+  estimator_.advance(listened_until_);
 
   note_first_utc();
   for (const auto& event : estimator_.events()) sink.on_event(event);

@@ -25,12 +25,11 @@ inline constexpr double kTickRate_hz = 100.0;
 inline constexpr Duration kTickPeriod{10'000'000};
 inline constexpr auto kTicksPerSnapshot = static_cast<std::int64_t>(kTickRate_hz / kSnapshotRate_hz);
 
-/// After the newest arrival the core runs on for this many ticks, live and in replay: what waits for a
-/// reference that does not come is given up by then.
+/// After the newest arrival the core runs on for this many ticks, live and in replay.
 inline constexpr std::int64_t kTailTicks = 20;
 
 /// From one device to the core.
-using SampleRing = SpscRing<Sample, kSampleRingCapacity>;
+using SampleRing = SpscRing<Sample, std::dynamic_extent>;
 
 /// The estimates at one tick.
 struct Snapshot {
@@ -121,6 +120,13 @@ class CoreSink {
 
 /// Consumer of the sample rings and owner of the estimator. Thread: one, save for the rings' producer side.
 /// Allocates: in the constructor alone.
+///
+/// After a stall of the host (the process was stopped, a thread had no processor, a line recovered) the rings
+/// hold samples of many seconds. They are good: their times of validity come from the devices' own counts. A
+/// core that finds the reference's oldest sample kBehind_s behind its cut catches up: each tick takes
+/// kCatchUpStep_s of time of validity from every ring, and a little more of the reference's, so that S
+/// samples meet the reference in the order in which both were measured. Meanwhile nothing is given up as
+/// late. Nor is it while no device is heard at all: lateness is counted in time in which the host listened.
 class Core {
  public:
   /// @param schedule  of the run that is replayed, empty otherwise
@@ -142,8 +148,13 @@ class Core {
   void tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
 
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
+  /// Samples of a stall are being caught up with.
+  [[nodiscard]] bool catches_up() const noexcept { return horizon_ != HostTime::max(); }
 
  private:
+  void look_for_backlog(std::int64_t index, HostTime cut) noexcept;
+  [[nodiscard]] bool is_within(const Sample& sample, HostTime horizon) const noexcept;
+  [[nodiscard]] bool was_late(const Sample& sample) const noexcept;
   [[nodiscard]] bool held_back(const Sample& sample, std::int64_t index) const noexcept;
   void consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
   void take_over_noises(std::int64_t index, CoreSink& sink) noexcept;
@@ -159,6 +170,11 @@ class Core {
   std::size_t next_applied_ = 0;
   std::vector<std::unique_ptr<LatestValue<NewNoise>>> noises_;  ///< per study
   HostTime previous_cut_{HostTime::min()};
+  HostTime horizon_{HostTime::max()};  ///< what is of a later time of validity waits
+  HostTime previous_horizon_{HostTime::max()};
+  HostTime last_open_cut_{HostTime::min()};   ///< of the last tick without a horizon
+  HostTime newest_arrival_{HostTime::min()};  ///< of what was consumed
+  HostTime listened_until_{HostTime::min()};  ///< what the estimator counts lateness by
   UtcSource first_utc_from_ = UtcSource::kNone;
   Snapshot snapshot_{};
 };

@@ -187,7 +187,8 @@ void LivePublisher::set_recorder(Recorder& recorder) {
 }
 
 void LivePublisher::on_person_event(const std::string& channel, std::span<const std::uint8_t> bytes) {
-  const HostTime heard = host_now();
+  // It may have waited for this thread's turn.
+  const HostTime heard = host_now() - ear_->age();
   if (!event_gate_.take(bytes.size(), heard)) return;
   const auto event = decode_message<event_t>(bytes);
   if (!event) {
@@ -288,6 +289,7 @@ void LivePublisher::loop() {
           "longer ones; find who sends them",
           refused, tunables_.lcm.channel_prefix);
     }
+    watch_pc_clock(now);
     if (now - bus_looked_ >= kBusPeriod) {
       watch_bus();
       bus_looked_ = now;
@@ -488,6 +490,17 @@ status_t LivePublisher::status(HostTime now) {
   return status;
 }
 
+void LivePublisher::watch_pc_clock(HostTime now) {
+  const auto news = pc_clock_.look(now);
+  if (!news) return;
+  if (news->step) {
+    spdlog::warn(
+        "this PC's wall clock was stepped by {:+.6f} s; times and labels of this run go on as they were",
+        news->step->size_s);
+  }
+  broadcast_.on_pc_clock(*news, utc_at(news->state.reading.host));
+}
+
 void LivePublisher::publish_status(HostTime now) { broadcast_.on_status(status(now)); }
 
 Result<void> LivePublisher::finish(std::int64_t last_tick) {
@@ -511,6 +524,7 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
   RunRecord run{configuration_, options_.version,          {"live"},         {},
                 last_tick + 1,  last_ ? &*last_ : nullptr, folder_->events()};
   run.utc = &folder_->utc();
+  run.pc_clock = &pc_clock_.record();
   for (const auto& line : lines_) {
     DeviceRecord device;
     device.counters = line.counters;

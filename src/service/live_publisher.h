@@ -78,6 +78,7 @@ class LivePublisher {
   void on_snapshot(const Snapshot& snapshot);
   void on_refit(const Refit& refit);
   void watch_devices(HostTime now);
+  void watch_pc_clock(HostTime now);
   void publish_status(HostTime now);
   [[nodiscard]] std::string problem_of(std::size_t device, HostTime now);
   [[nodiscard]] UtcTime utc_at(HostTime time) const;
@@ -120,6 +121,7 @@ class LivePublisher {
   std::vector<std::optional<CanWatch>> can_watches_;  ///< one a device
   std::mutex line_problems_mutex_;
   std::vector<std::string> line_problems_;
+  PcClockLog pc_clock_;
   std::vector<CalibrationStatus> study_states_;
   std::vector<ObservabilityWatch> observability_;
   std::int64_t refits_ = 0;

@@ -104,7 +104,8 @@ class ModelBook {
 class Modeller {
   using RowBlock = std::vector<ErrorRecord>;
   static constexpr std::size_t kRowsPerBlock = 64;
-  using BlockRing = SpscRing<RowBlock*, 4096>;
+  static constexpr std::size_t kBlocks = 4096;
+  using BlockRing = SpscRing<RowBlock*, kBlocks>;
 
  public:
   Modeller(const Configuration& configuration, noise::ModelSpec spec);
@@ -124,7 +125,7 @@ class Modeller {
   /// Refits since the last call.
   [[nodiscard]] std::vector<Refit> take();
   /// What waits for the thread and what was refused, in rows. Thread: that of add().
-  static constexpr std::size_t row_capacity() { return BlockRing::capacity() * kRowsPerBlock; }
+  static constexpr std::size_t row_capacity() { return kBlocks * kRowsPerBlock; }
   [[nodiscard]] RingCounters rows() const;
   [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
 

@@ -28,7 +28,7 @@ class RingSink final : public SampleSink {
   }
   [[nodiscard]] HostTime newest_arrival() const { return newest_arrival_; }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
-  [[nodiscard]] bool half_full() const { return ring_->counters().level > SampleRing::capacity() / 2; }
+  [[nodiscard]] bool half_full() const { return ring_->counters().level > ring_->capacity() / 2; }
 
  private:
   SampleRing* ring_;
@@ -193,7 +193,7 @@ class Replayer {
               std::max(last_needed_tick_, (feed->sink().newest_arrival() - t0) / kTickPeriod + kTailTicks);
         }
       }
-      if (is_busy(cut)) last_busy_tick_ = index;
+      if (core_.catches_up() || is_busy(cut)) last_busy_tick_ = index;
       if (index > last_busy_tick_ + kTailTicks) {
         const std::int64_t stepped = pause(index, cut);
         if (stepped < 0) break;

@@ -117,6 +117,37 @@ nlohmann::json time_scale_json(const Snapshot* last) {
   return json;
 }
 
+nlohmann::json kernel_clock_json(const PcClockRecord::State& state) {
+  nlohmann::json json{{"wall", utc_text(state.reading.wall)}, {"kernel", nullptr}};
+  if (!state.kernel) return json;
+  const KernelClockState& kernel = *state.kernel;
+  json["kernel"] = {{"is_synchronised", kernel.is_synchronised},
+                    {"status", kernel.status},
+                    {"offset_s", kernel.offset_s},
+                    {"frequency_ppm", kernel.frequency_ppm},
+                    {"max_error_s", kernel.max_error_s},
+                    {"estimated_error_s", kernel.estimated_error_s},
+                    {"tai_minus_utc_s", kernel.tai_minus_utc_s}};
+  return json;
+}
+
+/// The wall clock of the PC that recorded: who sets it, how well, and where it was stepped.
+nlohmann::json pc_clock_json(const PcClockRecord& clock, const Snapshot* last) {
+  nlohmann::json json{{"first", nullptr}, {"last", nullptr}, {"steps", nlohmann::json::array()}};
+  if (clock.first) json["first"] = kernel_clock_json(*clock.first);
+  if (clock.last) json["last"] = kernel_clock_json(*clock.last);
+  const auto time_s = [&](HostTime time) {
+    return last != nullptr ? to_seconds(time - last->first_reference_time) : 0.0;
+  };
+  for (const WallClockStep& step : clock.steps) {
+    json["steps"].push_back({{"after_time_s", time_s(step.after)},
+                             {"before_time_s", time_s(step.before)},
+                             {"size_s", step.size_s}});
+  }
+  json["steps_left_out"] = clock.steps_left_out;
+  return json;
+}
+
 /// Navigation alone integrates; a mounting does not depend on the length of a second.
 void warn_of_host_seconds(const Snapshot& last, std::vector<std::string>& warnings) {
   if (is_told_by_device(last.time_scale)) return;
@@ -167,6 +198,7 @@ nlohmann::json run_json(const RunRecord& run) {
                        ? nlohmann::json(utc_text(run.last->first_reference_utc))
                        : nlohmann::json(nullptr);
   json["time_scale"] = time_scale_json(run.last);
+  if (run.pc_clock != nullptr) json["pc_clock"] = pc_clock_json(*run.pc_clock, run.last);
   if (run.static_s && run.dynamic_s)
     json["regimes"] = {{"static_s", *run.static_s}, {"dynamic_s", *run.dynamic_s}};
   json["devices"] = nlohmann::json::array();

@@ -14,6 +14,7 @@
 #include "configuration/config.h"
 #include "drivers/device/device.h"
 #include "service/core.h"
+#include "service/pc_clock.h"
 #include "service/utc_track.h"
 
 namespace imuscope {
@@ -39,8 +40,9 @@ struct RunRecord {
   std::vector<std::string> warnings{};
   std::optional<double> static_s{};  ///< of a study, which tells rest from motion
   std::optional<double> dynamic_s{};
-  const UtcTrack* utc = nullptr;         ///< of the run, for its events
-  std::string error_process_mounting{};  ///< of a study: whose mounting the error process was made with
+  const UtcTrack* utc = nullptr;            ///< of the run, for its events
+  const PcClockRecord* pc_clock = nullptr;  ///< of a live run
+  std::string error_process_mounting{};     ///< of a study: whose mounting the error process was made with
 };
 
 /// run.json's content.

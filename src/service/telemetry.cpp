@@ -258,6 +258,26 @@ odometry_t odometry_message(const Snapshot& snapshot) {
   return m;
 }
 
+pc_clock_t pc_clock_message(const PcClockLog::News& news, UtcTime utc) {
+  const auto& [reading, kernel] = news.state;
+  pc_clock_t m{};
+  m.utime = to_utime(utc);
+  m.host_ns = to_ns(reading.host);
+  m.wall_ns = reading.wall.time_since_epoch().count();
+  m.step_s = news.step ? news.step->size_s : 0.0;
+  m.is_known = static_cast<std::int8_t>(kernel.has_value());
+  m.offset_s = m.frequency_ppm = m.max_error_s = m.estimated_error_s = kUnknown;
+  if (!kernel) return m;
+  m.is_synchronised = static_cast<std::int8_t>(kernel->is_synchronised);
+  m.status = kernel->status;
+  m.offset_s = kernel->offset_s;
+  m.frequency_ppm = kernel->frequency_ppm;
+  m.max_error_s = kernel->max_error_s;
+  m.estimated_error_s = kernel->estimated_error_s;
+  m.tai_minus_utc_s = kernel->tai_minus_utc_s;
+  return m;
+}
+
 calibration_t calibration_message(const Snapshot& snapshot, std::size_t study, const std::string& name) {
   const StudyOutput& estimate = snapshot.studies[study];
   calibration_t m{};

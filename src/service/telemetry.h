@@ -10,6 +10,7 @@
 #include <imuscope/navigation_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <imuscope/odometry_t.hpp>
+#include <imuscope/pc_clock_t.hpp>
 #include <imuscope/pose_t.hpp>
 #include <imuscope/wavelet_variance_t.hpp>
 #include <optional>
@@ -17,6 +18,7 @@
 #include <utility>
 
 #include "service/core.h"
+#include "service/pc_clock.h"
 #include "service/refit.h"
 
 namespace imuscope {
@@ -26,6 +28,8 @@ namespace imuscope {
 
 [[nodiscard]] navigation_t navigation_message(const Snapshot& snapshot);
 [[nodiscard]] odometry_t odometry_message(const Snapshot& snapshot);
+/// @param utc  of the reading, as the run has it
+[[nodiscard]] pc_clock_t pc_clock_message(const PcClockLog::News& news, UtcTime utc);
 /// Where the motion has shown nothing of a state, its value is NaN.
 /// @param study  index of the S-IMU that is called `name`
 [[nodiscard]] calibration_t calibration_message(const Snapshot& snapshot, std::size_t study,

@@ -11,6 +11,17 @@ TEST(Limits, ARingHasRoomForAllThatComesInAStallAndIsAPowerOfTwo) {
   EXPECT_EQ(ring_capacity(128.5, 1.0), 256U) << "a part of an element needs a place";
 }
 
+TEST(Limits, TheRingOfADeviceHoldsTheLongestStallAtItsRate) {
+  for (const double rate_hz : {10.0, 100.0, 400.0}) {
+    const double came = kSamplesPerMessage * rate_hz * kLongestStall_s;
+    EXPECT_GE(static_cast<double>(sample_ring_capacity(rate_hz)),
+              std::min(came, static_cast<double>(kSampleRingMax)));
+  }
+  EXPECT_GE(static_cast<double>(sample_ring_capacity(kLongestStallRate_hz)),
+            kLongestStallRate_hz * kLongestStall_s);
+  EXPECT_EQ(sample_ring_capacity(kMaxRate_hz), kSampleRingMax) << "memory is locked: it has an end";
+}
+
 TEST(Limits, ThePastOfTheReferenceLastsAsLongAtEveryRate) {
   EXPECT_EQ(reference_past_capacity(100.0), 256U);
   EXPECT_EQ(reference_past_capacity(10.0), 256U);

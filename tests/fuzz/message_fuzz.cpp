@@ -10,6 +10,7 @@
 #include <imuscope/navigation_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <imuscope/odometry_t.hpp>
+#include <imuscope/pc_clock_t.hpp>
 #include <imuscope/raw_t.hpp>
 #include <imuscope/run_t.hpp>
 #include <imuscope/status_t.hpp>
@@ -49,6 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::decode_as<navigation_t>(bytes);
   fuzz::decode_as<noise_model_t>(bytes);
   fuzz::decode_as<odometry_t>(bytes);
+  fuzz::decode_as<pc_clock_t>(bytes);
   fuzz::decode_as<raw_t>(bytes);
   fuzz::decode_as<run_t>(bytes);
   fuzz::decode_as<status_t>(bytes);

@@ -1,15 +1,20 @@
 /// Preloaded into the unmodified `imuscope`, this library is a host in trouble. The first letter of the file
-/// named by HOST_FAULT_CONTROL says which: "e" the estimator's thread gets no processor, "p" the publisher's
-/// messages are not taken, "r" the recorder's disk does not answer, "f" it is full, "t" the wall clock is an
-/// hour ahead. Threads are held for as long as the file says so.
+/// named by HOST_FAULT_CONTROL says which: "e" the estimator's thread gets no processor, "i" the I/O thread,
+/// "p" the publisher's messages are not taken, "r" the recorder's disk does not answer, "f" it is full, "t"
+/// the wall clock is an hour ahead, "b" an hour behind, "s" a second behind, "w" slewed by 500 ppm. Threads
+/// are held for as long as the file says so. The kernel's stamps of received messages go by the same wall
+/// clock.
 
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <pthread.h>
+#include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/types.h>
 #include <unistd.h>
+#include <atomic>
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
@@ -46,6 +51,15 @@ extern "C" int clock_nanosleep(clockid_t clock, int flags, const timespec* until
   return result;
 }
 
+extern "C" int epoll_pwait2(int fd, epoll_event* events, int size, const timespec* timeout,
+                            const sigset_t* signals) {
+  static auto* const wait =
+      real<int(int, epoll_event*, int, const timespec*, const sigset_t*)>("epoll_pwait2");
+  const int result = wait(fd, events, size, timeout, signals);
+  if (this_thread_is("imuscope-io")) hold_while('i');
+  return result;
+}
+
 extern "C" ssize_t sendmsg(int fd, const msghdr* message, int flags) {
   static auto* const send = real<ssize_t(int, const msghdr*, int)>("sendmsg");
   if (this_thread_is("imuscope-pub")) hold_while('p');
@@ -64,10 +78,60 @@ extern "C" ssize_t write(int fd, const void* buffer, size_t size) {
   return put(fd, buffer, size);
 }
 
+namespace {
+
+constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+
+std::int64_t ns_of(const timespec& time) { return time.tv_sec * kNsPerSecond + time.tv_nsec; }
+
+timespec moved(const timespec& time, std::int64_t by_ns) {
+  const std::int64_t ns = ns_of(time) + by_ns;
+  return {ns / kNsPerSecond, ns % kNsPerSecond};
+}
+
+/// Of the wall clock against the true one, by now.
+std::int64_t wall_error_ns() {
+  constexpr std::int64_t kHour_s = 3600;
+  constexpr std::int64_t kSlewDivisor = 2000;  // 500 ppm
+  static std::atomic<std::int64_t> slew_began{0};
+  timespec now{};
+  switch (mode()) {
+    case 't':
+      return kHour_s * kNsPerSecond;
+    case 'b':
+      return -kHour_s * kNsPerSecond;
+    case 's':
+      return -kNsPerSecond;
+    case 'w': {
+      real<int(clockid_t, timespec*)>("clock_gettime")(CLOCK_MONOTONIC, &now);
+      std::int64_t none = 0;
+      slew_began.compare_exchange_strong(none, ns_of(now));
+      return (ns_of(now) - slew_began.load()) / kSlewDivisor;
+    }
+    default:
+      return 0;
+  }
+}
+
+}  // namespace
+
+extern "C" ssize_t recvmsg(int fd, msghdr* message, int flags) {
+  static auto* const receive = real<ssize_t(int, msghdr*, int)>("recvmsg");
+  const ssize_t n = receive(fd, message, flags);
+  for (cmsghdr* told = n >= 0 ? CMSG_FIRSTHDR(message) : nullptr; told != nullptr;
+       told = CMSG_NXTHDR(message, told)) {
+    if (told->cmsg_level != SOL_SOCKET || told->cmsg_type != SO_TIMESTAMPNS) continue;
+    timespec stamp{};
+    memcpy(&stamp, CMSG_DATA(told), sizeof stamp);
+    stamp = moved(stamp, wall_error_ns());
+    memcpy(CMSG_DATA(told), &stamp, sizeof stamp);
+  }
+  return n;
+}
+
 extern "C" int clock_gettime(clockid_t clock, timespec* time) {
   static auto* const get = real<int(clockid_t, timespec*)>("clock_gettime");
   const int result = get(clock, time);
-  constexpr time_t kStep_s = 3600;
-  if (clock == CLOCK_REALTIME && result == 0 && mode() == 't') time->tv_sec += kStep_s;
+  if (clock == CLOCK_REALTIME && result == 0) *time = moved(*time, wall_error_ns());
   return result;
 }

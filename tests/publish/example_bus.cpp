@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
     navigation.heading_deg = phase;
     bus->publish(navigation, "NAVIGATION");
     bus->publish(test::example_odometry(), "ODOMETRY");
+    bus->publish(test::example_pc_clock(), "PC_CLOCK");
     auto calibration = test::example_calibration();
     calibration.psi_x_deg = std::cos(phase);
     bus->publish(calibration, "CALIBRATION", "mtx1");

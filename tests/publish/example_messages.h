@@ -10,6 +10,7 @@
 #include <imuscope/navigation_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <imuscope/odometry_t.hpp>
+#include <imuscope/pc_clock_t.hpp>
 #include <imuscope/pose_t.hpp>
 #include <imuscope/status_t.hpp>
 #include <imuscope/wavelet_variance_t.hpp>
@@ -66,6 +67,19 @@ inline odometry_t example_odometry() {
   m.non_holonomic_rejected = 24;
   m.zero_velocity_used = 25;
   m.zero_velocity_rejected = 26;
+  return m;
+}
+
+inline pc_clock_t example_pc_clock() {
+  pc_clock_t m{};
+  m.utime = kExampleUtime;
+  m.host_ns = 123'456'789;
+  m.wall_ns = kExampleUtime * 1000;
+  m.step_s = -1.0;
+  m.is_known = 1;
+  m.is_synchronised = 1;
+  m.frequency_ppm = -12.5;
+  m.max_error_s = 0.02;
   return m;
 }
 

@@ -1,6 +1,7 @@
 #include "service/core.h"
 
 #include <gtest/gtest.h>
+#include <optional>
 
 #include "service/estimator_setup.h"
 
@@ -138,6 +139,120 @@ TEST(Core, ANavigationWhoseReferenceIsGoneIsNotNew) {
   ASSERT_EQ(notes.snapshots.back().navigation.status, NavigationStatus::kNavigating);
   for (const Snapshot& snapshot : notes.snapshots)
     EXPECT_EQ(snapshot.has_new_navigation, snapshot.tick > 0 && snapshot.tick <= 60) << snapshot.tick;
+}
+
+// ------------------------------------------------------------------------------------ a host that stood
+// still
+
+constexpr double kPeriod_ms = 10.0;
+
+/// Both IMUs at 100 Hz from `first` to `last` (sample numbers), read at `arrival_ms` or as they come.
+void fill(Core& core, DeviceIndex device, int first, int last, std::optional<double> arrival_ms) {
+  for (int k = first; k < last; ++k) {
+    Sample sample = imu_sample(device, static_cast<std::uint64_t>(k), kPeriod_ms * k + 2.0);
+    if (arrival_ms) sample.arrival = at_ms(*arrival_ms);
+    ASSERT_TRUE(core.ring(device).try_push(sample)) << k;
+  }
+}
+
+/// Runs the ticks from `first` on, `n` of them.
+void run_ticks(Core& core, std::int64_t first, std::int64_t n, Notes& notes) {
+  for (std::int64_t tick = first; tick < first + n; ++tick)
+    core.tick(tick, at_ms(kPeriod_ms * static_cast<double>(tick)), notes);
+}
+
+const StudyCounters& counters_of(const Core& core) { return core.estimator().study(0).counters; }
+
+/// Samples that went neither to the reference's instant nor to a loss.
+std::uint64_t given_up(const Core& core) {
+  const StudyCounters& counters = counters_of(core);
+  return counters.late + counters.no_reference + counters.refused_full;
+}
+
+constexpr int kStart = 100;
+/// The reference's window has to be filled at the start.
+constexpr std::uint64_t kOfStart = 3;
+
+class CoreAfterAStall : public testing::TestWithParam<double> {};
+
+TEST_P(CoreAfterAStall, UsesEverySampleThatWasReadLate) {
+  const int samples = static_cast<int>(GetParam() * 1e3 / kPeriod_ms);
+  const int end = kStart + samples;
+  // The S-IMU's line is read first, and a tick falls between: whatever the order of the reads.
+  for (const bool between : {false, true}) {
+    Core core(one_study(), 2);
+    Notes notes;
+    fill(core, 0, 0, kStart, std::nullopt);
+    fill(core, 1, 0, kStart, std::nullopt);
+    run_ticks(core, 0, kStart, notes);
+    const double back_ms = kPeriod_ms * end + 3.0;
+    const int catch_up = samples / 8 + 50;
+    fill(core, 1, kStart, end, back_ms);
+    fill(core, 1, end, end + catch_up, std::nullopt);  // and from then on as ever
+    if (between) run_ticks(core, end + 1, 1, notes);
+    fill(core, 0, kStart, end + 1, between ? back_ms + kPeriod_ms : back_ms);
+    fill(core, 0, end + 1, end + catch_up, std::nullopt);
+    run_ticks(core, end + 2, catch_up, notes);
+    EXPECT_FALSE(core.catches_up());
+    EXPECT_LE(given_up(core), kOfStart) << between;
+    EXPECT_GE(counters_of(core).samples, static_cast<std::uint64_t>(end + catch_up - 10));
+    EXPECT_EQ(core.estimator().counters().reference_gaps, 0U);
+    EXPECT_TRUE(notes.late.empty());
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Seconds, CoreAfterAStall, testing::Values(0.5, 1.5, 5.0, 11.0, 15.0, 60.0, 118.0));
+
+TEST(Core, SamplesWaitWhileNobodyIsHeardAndAreGivenUpWhereTheReferenceAloneIsSilent) {
+  for (const bool is_heard : {false, true}) {
+    Core core(one_study(), 2);
+    Notes notes;
+    fill(core, 0, 0, kStart, std::nullopt);
+    fill(core, 1, 0, kStart, std::nullopt);
+    constexpr int kSilent = 500;
+    if (is_heard) fill(core, 1, kStart, kStart + kSilent, std::nullopt);
+    run_ticks(core, 0, kStart + kSilent, notes);
+    if (is_heard) {
+      EXPECT_GT(counters_of(core).late, static_cast<std::uint64_t>(kSilent - 20));
+    } else {
+      EXPECT_EQ(counters_of(core).late, 0U);
+    }
+  }
+}
+
+TEST(Core, AReplayCatchesUpAtTheSameTicks) {
+  constexpr int kEnd = kStart + 1500;
+  constexpr int kTicks = 400;
+  const auto run = [&](Core& core, Notes& notes, bool as_recorded) {
+    fill(core, 0, 0, kStart, std::nullopt);
+    fill(core, 1, 0, kStart, std::nullopt);
+    run_ticks(core, 0, kStart, notes);
+    // Read just before a cut, and pushed after its tick: live, that tick did not see them.
+    const double back_ms = kPeriod_ms * (kEnd + 1) - 0.01;
+    const auto push = [&] {
+      fill(core, 1, kStart, kEnd, back_ms);
+      fill(core, 0, kStart, kEnd, back_ms);
+    };
+    if (as_recorded) push();
+    run_ticks(core, kEnd + 1, 1, notes);
+    if (!as_recorded) push();
+    run_ticks(core, kEnd + 2, kTicks, notes);
+  };
+  Notes live;
+  Core first(one_study(), 2);
+  run(first, live, false);
+  EXPECT_GT(live.late.size(), 0U);
+  Notes replayed;
+  Core second(one_study(), 2, {live.late, {}});
+  run(second, replayed, true);
+  ASSERT_EQ(live.snapshots.size(), replayed.snapshots.size());
+  for (std::size_t i = 0; i < live.snapshots.size(); ++i) {
+    EXPECT_EQ(live.snapshots[i].counters.reference_samples, replayed.snapshots[i].counters.reference_samples)
+        << i;
+    EXPECT_EQ(live.snapshots[i].studies[0].counters.samples,
+              replayed.snapshots[i].studies[0].counters.samples)
+        << i;
+    EXPECT_EQ(live.snapshots[i].studies[0].time, replayed.snapshots[i].studies[0].time) << i;
+  }
 }
 
 TEST(Core, TheOriginOfTimesIsTheFirstReferenceEpoch) {

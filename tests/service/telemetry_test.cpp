@@ -203,6 +203,30 @@ Snapshot calibrated_snapshot() {
   return s;
 }
 
+TEST(Telemetry, TheStateOfThePcClockArrivesAndWhatTheKernelDoesNotTellIsNoNumber) {
+  PcClockLog::News news;
+  news.state.reading = {kThen, utc_time_from_ns(1'700'000'000'000'000'123), Duration{1}};
+  news.step = WallClockStep{kThen - Duration{5}, kThen, -3600.0};
+  const UtcTime utc = utc_time_from_ns(kUtime * 1000);
+  auto m = over_the_wire(pc_clock_message(news, utc));
+  EXPECT_EQ(m.utime, kUtime);
+  EXPECT_EQ(m.host_ns, to_ns(kThen));
+  EXPECT_EQ(m.wall_ns, 1'700'000'000'000'000'123);
+  EXPECT_EQ(m.step_s, -3600.0);
+  EXPECT_EQ(m.is_known, 0);
+  EXPECT_TRUE(std::isnan(m.max_error_s));
+  news.step.reset();
+  news.state.kernel = KernelClockState{8193, true, 1e-4, -12.5, 0.02, 1e-3, 37};
+  m = over_the_wire(pc_clock_message(news, utc));
+  EXPECT_EQ(m.step_s, 0.0);
+  EXPECT_EQ(m.is_known, 1);
+  EXPECT_EQ(m.is_synchronised, 1);
+  EXPECT_EQ(m.status, 8193);
+  EXPECT_EQ((std::array<double, 4>{m.offset_s, m.frequency_ppm, m.max_error_s, m.estimated_error_s}),
+            (std::array<double, 4>{1e-4, -12.5, 0.02, 1e-3}));
+  EXPECT_EQ(m.tai_minus_utc_s, 37);
+}
+
 TEST(Telemetry, CalibrationArrivesWithEveryStateAndSdInItsPlace) {
   const auto m = over_the_wire(calibration_message(calibrated_snapshot(), 1, "mtx1"));
   EXPECT_EQ(m.utime, kUtime + 19'000'000) << "of the motion that the sample shows";

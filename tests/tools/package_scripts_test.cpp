@@ -55,6 +55,17 @@ TEST(PackageScripts, AnUpgradeCutsNoRecording) {
             std::string::npos);
 }
 
+TEST(PackageScripts, TheUnitLetsTheStateOfTheClockBeReadAndNobodySetIt) {
+  std::ifstream unit(test::source_path("config/imuscope.service"));
+  std::set<std::string> lines;
+  for (std::string line; std::getline(unit, line);) lines.insert(line);
+  EXPECT_TRUE(lines.contains("SystemCallFilter=@system-service adjtimex clock_adjtime clock_adjtime64"))
+      << "the set of systemd leaves out the calls that read it";
+  EXPECT_FALSE(lines.contains("ProtectClock=yes")) << "it refuses these calls whatever the filter allows";
+  EXPECT_TRUE(lines.contains("CapabilityBoundingSet=")) << "CAP_SYS_TIME would set the clock";
+  EXPECT_TRUE(lines.contains("NoNewPrivileges=yes"));
+}
+
 TEST(PackageScripts, TheUnitAllowsPortsThatArePluggedInLater) {
   std::ifstream unit(test::source_path("config/imuscope.service"));
   std::set<std::string> allowed;
