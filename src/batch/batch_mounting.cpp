@@ -32,6 +32,10 @@ constexpr double kLeastTold = 1e-3;
 /// Bands to either side that a band's sd of deviation is learned with: nine elements alone tell it too badly,
 /// and a band that came out quiet by chance would rule all others.
 constexpr Eigen::Index kNeighbours = 2;
+/// A delay does not change by this, half a sample of 100 Hz; a clock that jumps does.
+constexpr double kJumpMin_s = 0.005;
+/// Two quartzes differ by less than so many sd.
+constexpr double kQuartzSds = 5.0;
 constexpr int kMostIterations = 25;
 /// Rounds before noise and scales have come near enough for the finer corrections.
 constexpr int kRoughIterations = 2;
@@ -41,8 +45,6 @@ constexpr double kSettledShare = 0.1;
 constexpr double kMostNoise = 0.9;
 /// Windows overlap by half, so that neighbours share information: so many of them are one that stands alone.
 constexpr double kWindowsPerIndependent = 1.5;
-/// Windows whose scores are taken to be correlated, beyond the overlap: drifts outlast a window.
-constexpr Eigen::Index kLags = 4;
 /// Weight, in windows, of the covariance that the noise gives against that of the scatter over time.
 constexpr double kNoiseWeight = 20.0;
 
@@ -120,6 +122,7 @@ class Batch {
       result.settled = step(i);
     }
     finish(result);
+    if (auto ok = one_clock(result); !ok) return tl::unexpected(ok.error());
     return result;
   }
 
@@ -194,6 +197,26 @@ class Batch {
     return !rough && share.head<kGyroBias>().maxCoeff() < kSettledShare;
   }
 
+  /// A clock that jumps makes a lever arm of its own: no sd is wide enough for that. Much of a jump is taken
+  /// for a clock rate.
+  [[nodiscard]] Result<void> one_clock(const BatchMounting& result) const {
+    constexpr const char* kRemedy = "cut the recording there, or look at its line and its time column";
+    // t_d falls where the clock jumps forward.
+    const double jump_s = -result.change.difference[kTimeOffset];
+    const double rate = -result.sensor.x[kClockRate];
+    if (result.change.is_told() && std::abs(jump_s) > kJumpMin_s) {
+      return usage_error(fmt::format("its clock jumps by {:.3f} s or more after {:.0f} s of the recording",
+                                     jump_s, result.change_s - instants_.front()),
+                         kRemedy);
+    }
+    if (std::abs(rate) < kQuartzSds * class_.clock_rate_sd) return {};
+    return usage_error(
+        fmt::format("against the reference's its clock gains {:.0f} millionths, which no quartz "
+                    "does: it jumps, about {:.0f} s into the recording",
+                    1e6 * rate, result.change_s - instants_.front()),
+        kRemedy);
+  }
+
   /// The correction of the parameters and the deviations that go with it, with the sizes as they are known.
   ParameterVector solve(const std::vector<BandSums>& sums, std::vector<DeviationVector>& deviation) {
     equations_ = normal_equations(sums, estimate_);
@@ -254,14 +277,7 @@ class Batch {
 
   /// B-19: covariance by the scatter of the windows' scores over time.
   [[nodiscard]] Covariance scatter_covariance(const Covariance& covariance) const {
-    const auto& scores = equations_.window_scores;
-    Covariance sum = scores.transpose() * scores;
-    for (Eigen::Index lag = 1; lag <= std::min(kLags, scores.rows() - 1); ++lag) {
-      const Eigen::Index n = scores.rows() - lag;
-      const Covariance cross = scores.bottomRows(n).transpose() * scores.topRows(n);
-      const double taper = 1.0 - static_cast<double>(lag) / static_cast<double>(kLags + 1);
-      sum += taper * (cross + cross.transpose());
-    }
+    Covariance sum = variance_of_sum(equations_.window_scores, kLags);
     sum.diagonal() += scales_.precision();
     return covariance * sum * covariance;
   }
@@ -306,6 +322,7 @@ class Batch {
     result.covariance = with_scatter * growth.asDiagonal() * published.derivative.transpose();
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = published.sensor;
+    add_change(by_noise, result);
     add_mean_motion(result);
     const auto of_reference_errors = of_reference_axes(class_, result.sensor);
     const Covariance of_reference = of_reference_errors * of_reference_errors.transpose();
@@ -318,6 +335,16 @@ class Batch {
     result.used_s = half_s * (windows + 1.0);
     result.one_chip = scales_.one_chip();
     for (Eigen::Index band = 0; band < problem_.bands.size(); ++band) result.bands.push_back(report(band));
+  }
+
+  /// B-25: where parts of the drive disagree, the sd reach to both.
+  void add_change(const Covariance& by_noise, BatchMounting& result) const {
+    const WindowInfluences influences = equations_.window_scores * by_noise.leftCols<kWatched>();
+    result.change = largest_change(influences, by_noise.diagonal().head<kWatched>());
+    result.change_s = middle_s_ + problem_.from_middle_s[result.change.window];
+    if (!result.change.is_told()) return;
+    const WatchedVector& reach = result.change.reach;
+    result.covariance.topLeftCorner<kWatched, kWatched>() += reach * reach.transpose();
   }
 
   /// Biases were those of records without their means. That of the gyros stays what they show at the drive's

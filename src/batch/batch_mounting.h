@@ -13,6 +13,7 @@
 #include "base/result.h"
 #include "batch/imu_record.h"
 #include "batch/sensor_model.h"
+#include "batch/stability.h"
 
 namespace imuscope::batch {
 
@@ -55,6 +56,9 @@ struct BatchMounting {
   /// give.
   double inconsistency = 1.0;
   LimitShares limits;
+  /// Whether the drive's parts agree. Where they do not, the sd reach to the mountings of both.
+  Change change;
+  double change_s = 0.0;  ///< its instant, on the records' scale
   /// What of the errors of (psi, r) every drive of this sensor on this reference has in common, F of the
   /// covariance F F' (B-23): places, axes and delays as they were believed to be before the drive, and the
   /// reference's own axes.

@@ -148,6 +148,19 @@ nlohmann::json band_json(const batch::BandReport& band) {
           {"accel_deviation_sd", band.accel_deviation_sd}};
 }
 
+/// Whether the drive's parts agree (B-25).
+nlohmann::json parts_json(const batch::BatchMounting& mounting) {
+  const auto& change = mounting.change;
+  const Eigen::Vector3d psi = change.difference.head<3>();
+  const Eigen::Vector3d r = change.difference.segment<3>(batch::kLeverArm);
+  return {{"agree", !change.is_told()},
+          {"statistic", change.statistic},
+          {"later_from_s", mounting.change_s},
+          {"later_less_earlier_deg", degrees(psi)},
+          {"later_less_earlier_m", vector_of(r)},
+          {"later_less_earlier_t_d_s", change.difference[batch::kTimeOffset]}};
+}
+
 }  // namespace
 
 BatchRecords::BatchRecords(const Configuration& configuration) : records_(configuration.devices.size()) {
@@ -259,8 +272,11 @@ std::vector<StudyOutput> with_batch(std::vector<StudyOutput> studies,
   for (std::size_t i = 0; i < studies.size(); ++i) {
     if (outcomes[i].mounting) {
       take_over(*outcomes[i].mounting, studies[i]);
-    } else if (!outcomes[i].why_not.what.empty() && outcomes[i].why_not.kind == ErrorKind::kUsage) {
-      studies[i].status = CalibrationStatus::kWaiting;
+    } else if (!outcomes[i].why_not.what.empty()) {
+      // Where the whole drive did not tell, the filter, which takes a sensor to be perfect, cannot be sure.
+      const auto most = outcomes[i].why_not.kind == ErrorKind::kUsage ? CalibrationStatus::kWaiting
+                                                                      : CalibrationStatus::kConverging;
+      studies[i].status = std::min(studies[i].status, most);
     }
   }
   return studies;
@@ -304,6 +320,7 @@ nlohmann::json batch_json(const batch::BatchMounting& mounting) {
       {"rate_correlation", mounting.rate_correlation},
       {"degrees_of_freedom", mounting.degrees_of_freedom},
       {"inconsistency", mounting.inconsistency},
+      {"parts", parts_json(mounting)},
       {"gyro_matrix", matrix_of(sensor.gyro_shape())},
       {"gyro_axes_sd_deg", degrees({mounting.sd(batch::kGyroShape, 3), mounting.sd(batch::kGyroShape, 4),
                                     mounting.sd(batch::kGyroShape, 5)})},
@@ -341,6 +358,14 @@ nlohmann::json filter_json(const StudyOutput& study, double clock_shift_s) {
 }
 
 std::string batch_remark(const std::string& name, const batch::BatchMounting& mounting) {
+  if (mounting.change.is_told()) {
+    return fmt::format(
+        "{}: before and after {:.0f} s its mounting differs by {:.2g} deg and {:.0f} mm: it has moved, or "
+        "the "
+        "two IMUs do not sit on one rigid body; the sd reach to both, and each part by itself tells more",
+        name, mounting.change_s, mounting.change.difference.head<3>().norm() * kDegPerRad,
+        mounting.change.difference.segment<3>(batch::kLeverArm).norm() * kMmPerM);
+  }
   if (mounting.inconsistency > kInconsistencyTold) {
     return fmt::format(
         "{}: parts of the drive disagree by {:.1f} times what the noise explains; the sd allows for it, but "

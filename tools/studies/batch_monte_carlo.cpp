@@ -1,12 +1,9 @@
 /// How well the batch estimate does what it claims: Monte-Carlo of a drive with three S-IMUs in a world that
 /// it is not told of. Prints errors beside the published sd, NEES of (psi, r) and coverage, with the goals.
-///
-/// A gyro triad whose axes are not at right angles has several frames that could be called its own. The truth
-/// is turned to the one that the estimate publishes: x along the x gyro, y in the plane of the x and y gyros.
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <array>
 #include <atomic>
 #include <thread>
@@ -14,23 +11,19 @@
 
 #include "base/units.h"
 #include "batch/batch_mounting.h"
-#include "navigation/so3.h"
+#include "tools/studies/batch_pairs.h"
 #include "tools/studies/study_drive.h"
 
 namespace {
 
 using namespace imuscope;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 struct Options {
   std::size_t seeds = 20;
   std::size_t threads = 1;
   std::uint64_t first = 1;
   double duration_s = 900.0;
-  int reference_class = 1;
-  imusim::WorldKind world = imusim::WorldKind::kHarsh;
+  batch_pairs::PairOptions pair;
 };
 
 /// Parameters whose intervals are pooled.
@@ -70,53 +63,13 @@ struct Totals {
   }
 };
 
-/// Scale and lower triangle of a triad's matrix in the frame that goes with it.
-Vector6 shape_of(const Matrix3d& triad) {
-  const Matrix3d L = triad * imusim::triad_frame(triad).transpose();
-  Vector6 shape;
-  shape << L(0, 0) - 1.0, L(1, 1) - 1.0, L(2, 2) - 1.0, L(1, 0), L(2, 0), L(2, 1);
-  return shape;
-}
-
-/// What the estimate should be; psi stays zero, biases and flexure are left out.
-struct TrueSensor {
-  Matrix3d C_b_s;
-  batch::ParameterVector x = batch::ParameterVector::Zero();
-};
-
-TrueSensor true_sensor(const study_drive::Draw& draw, std::size_t study) {
-  const imusim::ImuErrors& errors = draw.studies[study];
-  const auto known = study_drive::truth_of(draw, study);
-  const Matrix3d gyro = imusim::triad_matrix(errors.gyro) * study_drive::mounting_of(study);
-  const Matrix3d accel = imusim::triad_matrix(errors.accel) * study_drive::mounting_of(study);
-  TrueSensor truth;
-  truth.C_b_s = imusim::triad_frame(gyro);
-  truth.x.segment<3>(batch::kLeverArm) = study_drive::lever_arm_of(study);
-  truth.x[batch::kTimeOffset] = known.t_d_s;
-  truth.x.segment<6>(batch::kGyroShape) = shape_of(gyro);
-  truth.x.segment<3>(batch::kAlpha) = -log_so3(imusim::triad_frame(accel) * truth.C_b_s.transpose());
-  truth.x.segment<6>(batch::kAccelShape) = shape_of(accel);
-  truth.x[batch::kAccelDelay] = known.accel_t_d_s;
-  for (Eigen::Index j = 0; j < 6; ++j)
-    for (Eigen::Index axis = 0; axis < 3; ++axis)
-      truth.x[batch::kPlaces + j] += batch::place_basis(axis, j).dot(errors.accel_places_s_m.col(axis));
-  for (Eigen::Index j = 0; j < 9; ++j)
-    truth.x[batch::kGSensitivity + j] = errors.gyro.g_sensitivity(j / 3, j % 3);
-  return truth;
-}
-
-void account(const batch::BatchMounting& found, const study_drive::Draw& draw, std::size_t study,
-             Totals& totals) {
-  const TrueSensor truth = true_sensor(draw, study);
-  batch::ParameterVector error = truth.x - found.sensor.x;
-  error.segment<3>(batch::kPsi) = -log_so3(found.sensor.C_b_s.transpose() * truth.C_b_s);
+void account(const batch::BatchMounting& found, const batch_pairs::TrueSensor& truth, Totals& totals) {
+  const batch::ParameterVector error = batch_pairs::error_of(found, truth);
   const batch::ParameterVector variance = found.covariance.diagonal();
-  const Vector6 mounting = error.head<6>();
-  const Eigen::Matrix<double, 6, 6> P = found.covariance.topLeftCorner<6, 6>();
   ++totals.n;
   totals.chips += found.one_chip ? 1 : 0;
   totals.unsettled += found.settled ? 0 : 1;
-  totals.nees += mounting.dot(P.ldlt().solve(mounting));
+  totals.nees += batch_pairs::nees6(found, error);
   totals.error2 += error.cwiseAbs2();
   totals.variance += variance;
   totals.z2 += error.cwiseAbs2().cwiseQuotient(variance);
@@ -124,33 +77,13 @@ void account(const batch::BatchMounting& found, const study_drive::Draw& draw, s
   totals.inside += (error.cwiseAbs2().cwiseQuotient(variance).array() < k95 * k95).cast<double>().matrix();
 }
 
-batch::ImuRecord& record_of(std::vector<batch::ImuRecord>& records, const Sample& sample) {
-  return records[sample.device - study_drive::kReferenceDevice];
-}
-
 Totals run(const study_drive::Truth& truth, const Options& options, std::uint64_t seed) {
-  imusim::Random random(seed, "study");
-  study_drive::DrawOptions drawn;
-  drawn.world = options.world;
-  drawn.reference_class = options.reference_class;
-  drawn.mtx.gyro_noise = imusim::GyroNoiseChoice::kAllDynamic;
-  const auto draw = study_drive::draw(drawn, random, seed);
-  study_drive::Instruments instruments(truth, draw, seed);
-  std::vector<batch::ImuRecord> records(1 + study_drive::kStudies);
-  for (std::size_t k = 0; k < truth.ticks(); ++k) {
-    for (const Sample& sample : instruments.next()) {
-      if (sample.kind != SampleKind::kImu) continue;
-      const auto vector = [](const Vector3& v) { return Vector3d(v[0], v[1], v[2]).cast<float>().eval(); };
-      record_of(records, sample)
-          .add(to_seconds(sample.time.time_since_epoch()), vector(sample.imu.omega_radps),
-               vector(sample.imu.f_mps2));
-    }
-  }
+  const auto run = batch_pairs::run(truth, options.pair, seed);
   Totals totals;
   for (std::size_t i = 0; i < study_drive::kStudies; ++i) {
-    const auto found = batch::estimate_mounting(records[0], records[1 + i]);
+    const auto found = batch::estimate_mounting(run.reference, run.studies[i]);
     if (found) {
-      account(*found, draw, i, totals);
+      account(*found, batch_pairs::true_sensor(run.draw, i), totals);
     } else {
       ++totals.failed;
     }
@@ -160,7 +93,7 @@ Totals run(const study_drive::Truth& truth, const Options& options, std::uint64_
 
 /// Every seed on its own; summed in their order, so that the number of threads changes nothing.
 Totals run_all(const Options& options) {
-  const study_drive::Truth truth(imusim::Scenario{}, options.duration_s, options.world);
+  const study_drive::Truth truth(imusim::Scenario{}, options.duration_s, options.pair.world);
   std::vector<Totals> each(options.seeds);
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
@@ -186,8 +119,8 @@ bool print(const Totals& t, const Options& options) {
   fmt::print(
       "reference class {}, {} world, {} S-IMUs, {} without a mounting, {} not settled, {} taken for one "
       "chip\n",
-      options.reference_class, options.world == imusim::WorldKind::kHarsh ? "harsh" : "ideal", t.n, t.failed,
-      t.unsettled, t.chips);
+      options.pair.reference_class, options.pair.world == imusim::WorldKind::kHarsh ? "harsh" : "ideal", t.n,
+      t.failed, t.unsettled, t.chips);
   fmt::print("  psi  rms {:.1f} / {:.1f} / {:.1f} mdeg, sd {:.1f} / {:.1f} / {:.1f}\n", rms[0] * kMdeg,
              rms[1] * kMdeg, rms[2] * kMdeg, sd[0] * kMdeg, sd[1] * kMdeg, sd[2] * kMdeg);
   fmt::print("  r    rms {:.2f} / {:.2f} / {:.2f} mm, sd {:.2f} / {:.2f} / {:.2f}\n", rms[3] * kMmPerM,
@@ -221,9 +154,9 @@ int main(int argc, char** argv) {
   app.add_option("--first", options.first, "first seed");
   app.add_option("--threads", options.threads, "runs at a time");
   app.add_option("--duration", options.duration_s, "length of the drive, s");
-  app.add_option("--reference-class", options.reference_class, "1 (navigation grade) to 5");
+  app.add_option("--reference-class", options.pair.reference_class, "1 (navigation grade) to 5");
   app.add_option("--world", world, "ideal or harsh")->check(CLI::IsMember({"ideal", "harsh"}));
   CLI11_PARSE(app, argc, argv);
-  options.world = world == "harsh" ? imusim::WorldKind::kHarsh : imusim::WorldKind::kIdeal;
+  options.pair.world = world == "harsh" ? imusim::WorldKind::kHarsh : imusim::WorldKind::kIdeal;
   return print(run_all(options), options) ? 0 : 1;
 }
