@@ -49,6 +49,12 @@ class DeviceDecoder {
 
   [[nodiscard]] virtual const DecoderCounters& counters() const noexcept = 0;
 
+  /// Time of one byte on the wire from now on: the line was opened at a rate. What is stamped by its first
+  /// byte is dated back by it. Without effect where bytes do not come over a serial line.
+  virtual void set_per_byte(Duration per_byte) noexcept { (void)per_byte; }
+  /// Zero where there is none.
+  [[nodiscard]] virtual Duration per_byte() const noexcept { return Duration::zero(); }
+
   /// Of a device on a CAN bus: the frames that it needs, so that the kernel lets through only those. Empty
   /// for every other device. Not for the real-time thread.
   [[nodiscard]] virtual std::vector<CanId> ids() const { return {}; }

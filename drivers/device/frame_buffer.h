@@ -15,13 +15,14 @@
 
 namespace imuscope {
 
-/// Start bit, eight data bits, stop bit.
-inline constexpr double kBitsPerByteOnTheWire = 10.0;
+/// Start bit and eight data bits.
+inline constexpr double kBitsBeforeStop = 9.0;
 
 /// Time of one byte on a serial line; zero where `baud` is zero (the stream does not come over a serial
 /// line).
-inline Duration byte_time(double baud) {
-  return baud > 0.0 ? from_seconds(kBitsPerByteOnTheWire / baud) : Duration::zero();
+/// @param stop_bits  1 or 2
+inline Duration byte_time(double baud, int stop_bits = 1) {
+  return baud > 0.0 ? from_seconds((kBitsBeforeStop + stop_bits) / baud) : Duration::zero();
 }
 
 /// @tparam Capacity  at least the longest frame; twice that keeps copying low
@@ -77,6 +78,8 @@ class FrameBuffer {
   [[nodiscard]] std::uint64_t position() const noexcept { return position_; }
 
   [[nodiscard]] Duration per_byte() const noexcept { return per_byte_; }
+  /// The line runs at another rate from now on.
+  void set_per_byte(Duration per_byte) noexcept { per_byte_ = per_byte; }
 
  private:
   /// Reads whose bytes may be pending at the same time. Where there are more, the newest ones are taken for

@@ -42,6 +42,10 @@ class ScanLoop {
  public:
   explicit ScanLoop(Duration per_byte) noexcept : buffer_(per_byte) {}
 
+  /// Time of one byte on the wire, see byte_time(); of a line that may change its rate.
+  [[nodiscard]] Duration per_byte() const noexcept { return buffer_.per_byte(); }
+  void set_per_byte(Duration per_byte) noexcept { buffer_.set_per_byte(per_byte); }
+
   /// See FrameBuffer::append().
   std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
     return buffer_.append(bytes, arrival);

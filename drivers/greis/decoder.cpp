@@ -70,7 +70,7 @@ bool all_finite(const Vector3& v) noexcept {
 }  // namespace
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
-    : config_(config), scanner_(byte_time(config.baud)), clock_(config.clock) {}
+    : config_(config), scanner_(config.per_byte), clock_(config.clock) {}
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
@@ -207,7 +207,7 @@ void Decoder::end_epoch(bool complete, std::uint64_t end_offset, HostTime arriva
   sample.kind = SampleKind::kGnss;
   sample.device = config_.device;
   const HostTime epoch_time = clock_.observe(time_ms_ * kNsPerMs + offset_ns, epoch_.first_byte);
-  const auto wire_time = byte_time(config_.baud) * static_cast<std::int64_t>(end_offset - epoch_.offset);
+  const auto wire_time = scanner_.per_byte() * static_cast<std::int64_t>(end_offset - epoch_.offset);
   sample.arrival = clock_.is_fixed() ? epoch_time + wire_time : arrival;
   sample.time = epoch_time - Duration(delay_ms * kNsPerMs);
   if (since_1970_minus_time_ms_) {

@@ -28,8 +28,8 @@ struct DecoderConfig {
   DeviceIndex device = 0;
   /// Time between epochs, to tell missing ones; zero: not looked for.
   Duration period = std::chrono::milliseconds(100);
-  /// Of the serial line; 0 over a network.
-  double baud = 0.0;
+  /// Time of one byte on the serial line, see byte_time(); zero over a network.
+  Duration per_byte{};
   ClockMapConfig clock{};
 };
 
@@ -45,6 +45,8 @@ class Decoder final : public DeviceDecoder {
   [[nodiscard]] std::uint64_t epochs() const noexcept { return epochs_; }
   [[nodiscard]] std::uint64_t epochs_damaged() const noexcept { return epochs_damaged_; }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
+  void set_per_byte(Duration per_byte) noexcept override { scanner_.set_per_byte(per_byte); }
+  [[nodiscard]] Duration per_byte() const noexcept override { return scanner_.per_byte(); }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 

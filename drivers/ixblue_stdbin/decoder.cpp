@@ -55,7 +55,7 @@ std::string_view describe(RawBlocks state) noexcept {
 }
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
-    : config_(config), scanner_(byte_time(config.baud)), clock_(config.clock) {}
+    : config_(config), scanner_(config.per_byte), clock_(config.clock) {}
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
@@ -103,7 +103,7 @@ void Decoder::on_telegram(const Frame& frame, HostTime arrival, SampleSink& sink
   Sample sample{};
   sample.device = config_.device;
   sample.time = clock_.observe(ticks_ * kTickNs, frame.first_byte);
-  const auto wire_time = byte_time(config_.baud) * static_cast<std::int64_t>(frame.bytes.size());
+  const auto wire_time = scanner_.per_byte() * static_cast<std::int64_t>(frame.bytes.size());
   sample.arrival = clock_.is_fixed() ? sample.time + wire_time : arrival;
   sample.has_utc = has_utc_ && utc_at_ticks_ == ticks_;
   if (sample.has_utc) sample.utc = utc_time_from_ns(utc_ticks_ * kTickNs);

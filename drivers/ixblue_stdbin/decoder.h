@@ -31,8 +31,8 @@ struct DecoderConfig {
   DeviceIndex device = 0;
   /// Row-major rotation that takes the unit's XV axes (forward, port, up) to b (forward, right, down).
   std::array<double, 9> axes{1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0};
-  /// Of the serial line; 0 over a network.
-  double baud = 0.0;
+  /// Time of one byte on the serial line, see byte_time(); zero over a network.
+  Duration per_byte{};
   ClockMapConfig clock{};
 };
 
@@ -67,6 +67,8 @@ class Decoder final : public DeviceDecoder {
     return user_status_.has_value() && (*user_status_ & kUserAlignment) != 0;
   }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
+  void set_per_byte(Duration per_byte) noexcept override { scanner_.set_per_byte(per_byte); }
+  [[nodiscard]] Duration per_byte() const noexcept override { return scanner_.per_byte(); }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 

@@ -33,7 +33,7 @@ GnssSolution solution_of(int quality) noexcept {
 }  // namespace
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
-    : config_(config), scanner_(byte_time(config.baud), config.checksum_required), clock_(config.clock) {}
+    : config_(config), scanner_(config.per_byte, config.checksum_required), clock_(config.clock) {}
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
@@ -136,7 +136,7 @@ void Decoder::publish(HostTime arrival, SampleSink& sink) noexcept {
   sample.kind = SampleKind::kGnss;
   sample.device = config_.device;
   sample.time = clock_.observe(time_ns_, epoch_.first_byte);
-  const auto wire_time = byte_time(config_.baud) * static_cast<std::int64_t>(epoch_.bytes);
+  const auto wire_time = scanner_.per_byte() * static_cast<std::int64_t>(epoch_.bytes);
   sample.arrival = clock_.is_fixed() ? sample.time + wire_time : arrival;
   if (since_1970_minus_time_ns_) {
     sample.has_utc = true;

@@ -29,8 +29,8 @@ struct DecoderConfig {
   DeviceIndex device = 0;
   /// Time between epochs, to tell missing ones; zero: not looked for.
   Duration period{};
-  /// Of the serial line; 0 over a network.
-  double baud = 0.0;
+  /// Time of one byte on the serial line, see byte_time(); zero over a network.
+  Duration per_byte{};
   /// For receivers that give no geoid separation, m.
   std::optional<double> geoid_separation_m;
   /// Of the horizontal velocity, which NMEA gives without one.
@@ -49,6 +49,8 @@ class Decoder final : public DeviceDecoder {
   void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
+  void set_per_byte(Duration per_byte) noexcept override { scanner_.set_per_byte(per_byte); }
+  [[nodiscard]] Duration per_byte() const noexcept override { return scanner_.per_byte(); }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
   [[nodiscard]] std::string_view remark() const noexcept override;

@@ -69,7 +69,7 @@ Vector3 ned_variance(const Vector3& variance, const Vector3& xy_yz_zx,
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
     : config_(config),
-      scanner_(byte_time(config.baud)),
+      scanner_(config.per_byte),
       clock_(config.clock),
       format_(config.format),
       base_(config.base) {}

@@ -26,8 +26,8 @@ struct DecoderConfig {
   /// What lines hold until a header says so: a client that connects late gets none.
   Format format{};
   std::optional<ReferencePosition> base;
-  /// Of the serial line; 0 over a network.
-  double baud = 0.0;
+  /// Time of one byte on the serial line, see byte_time(); zero over a network.
+  Duration per_byte{};
   ClockMapConfig clock{};
 };
 
@@ -38,6 +38,8 @@ class Decoder final : public DeviceDecoder {
   void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
+  void set_per_byte(Duration per_byte) noexcept override { scanner_.set_per_byte(per_byte); }
+  [[nodiscard]] Duration per_byte() const noexcept override { return scanner_.per_byte(); }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 

@@ -15,6 +15,7 @@
 #include <cstring>
 #include <utility>
 
+#include "drivers/device/frame_buffer.h"
 #include "drivers/transport/port_problems.h"
 
 namespace imuscope {
@@ -74,6 +75,16 @@ bool ask_for_low_latency(int fd) {
   return ioctl(fd, TIOCSSERIAL, &serial) == 0;
 }
 
+/// Low latency is this timer at its shortest, whatever it was set to before.
+constexpr Duration kShortestTimer = std::chrono::milliseconds(1);
+
+Duration held_for(const std::string& path, bool low_latency) {
+  const auto timer_ms = latency_timer_ms(path);
+  if (!timer_ms) return Duration::zero();
+  const Duration timer = std::chrono::milliseconds(*timer_ms);
+  return low_latency ? std::min(timer, kShortestTimer) : timer;
+}
+
 std::int64_t overruns(const std::optional<LineErrors>& errors) {
   return errors ? std::int64_t{errors->overrun} + errors->buffer_overrun : 0;
 }
@@ -102,6 +113,7 @@ Result<SerialPort> SerialPort::open(const SerialSettings& settings) {
   port.baud_ = *baud;
   ioctl(fd, TIOCEXCL);
   port.low_latency_ = ask_for_low_latency(fd);
+  port.timing_ = {byte_time(*baud, settings.stop_bits), held_for(settings.path, port.low_latency_)};
   ioctl(fd, TCFLSH, TCIOFLUSH);
   port.overruns_at_open_ = overruns(port.line_errors());
   return port;
@@ -112,6 +124,7 @@ SerialPort::SerialPort(SerialPort&& other) noexcept
       path_(std::move(other.path_)),
       fd_(std::exchange(other.fd_, -1)),
       baud_(other.baud_),
+      timing_(other.timing_),
       low_latency_(other.low_latency_),
       overruns_at_open_(other.overruns_at_open_) {}
 
@@ -121,6 +134,7 @@ SerialPort& SerialPort::operator=(SerialPort&& other) noexcept {
   path_ = std::move(other.path_);
   fd_ = std::exchange(other.fd_, -1);
   baud_ = other.baud_;
+  timing_ = other.timing_;
   low_latency_ = other.low_latency_;
   overruns_at_open_ = other.overruns_at_open_;
   return *this;
@@ -140,10 +154,9 @@ LineHealth SerialPort::health() noexcept {
 }
 
 std::string SerialPort::describe() const {
-  const auto held_ms = low_latency_ ? std::nullopt : latency_timer_ms(path_);
-  if (!held_ms || *held_ms <= 1) return fmt::format("{} at {:.0f} baud", path_, baud_);
+  if (timing_.held <= kShortestTimer) return fmt::format("{} at {:.0f} baud", path_, baud_);
   return fmt::format("{} at {:.0f} baud (its adapter holds bytes for up to {} ms; {})", path_, baud_,
-                     *held_ms, kLatencyRule);
+                     timing_.held / std::chrono::milliseconds(1), kLatencyRule);
 }
 
 IoResult SerialPort::read(std::span<std::uint8_t> buffer) noexcept {

@@ -53,6 +53,8 @@ class SerialPort final : public Transport {
   /// Dropped: overruns of the UART and of the kernel's buffer since the port was opened, where the driver
   /// counts them.
   [[nodiscard]] LineHealth health() noexcept override;
+  /// By the rate that the driver gives, and the latency timer of the adapter as it was when it was opened.
+  [[nodiscard]] LineTiming timing() const noexcept override { return timing_; }
   [[nodiscard]] std::string describe() const override;
 
   /// As the driver gives it, within 2 % of what was asked for.
@@ -70,6 +72,7 @@ class SerialPort final : public Transport {
   std::string path_;
   int fd_ = -1;
   double baud_ = 0.0;
+  LineTiming timing_;
   bool low_latency_ = false;
   std::int64_t overruns_at_open_ = 0;
 };

@@ -9,6 +9,8 @@
 #include <span>
 #include <string>
 
+#include "base/time.h"
+
 namespace imuscope {
 
 enum class IoStatus : std::uint8_t {
@@ -22,6 +24,12 @@ struct IoResult {
   IoStatus status = IoStatus::kNothing;
   std::size_t n = 0;
   bool more = false;  ///< of a read: the buffer was too small for all that waits
+};
+
+/// What a line does to the times of bytes, as it was opened.
+struct LineTiming {
+  Duration per_byte{};  ///< on the wire, at the rate in force; zero where the line has no rate of its own
+  Duration held{};      ///< an adapter may keep bytes for so long before it hands them on; zero: none known
 };
 
 /// What a line says about itself besides its bytes.
@@ -45,6 +53,9 @@ class Transport {
 
   /// Core: no allocation.
   [[nodiscard]] virtual LineHealth health() noexcept { return {}; }
+
+  /// Core: no allocation.
+  [[nodiscard]] virtual LineTiming timing() const noexcept { return {}; }
 
   /// Which line this is and how it is set, for a log: "/dev/ttyUSB0 at 115200 baud".
   [[nodiscard]] virtual std::string describe() const = 0;

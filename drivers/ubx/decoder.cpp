@@ -5,7 +5,7 @@
 namespace imuscope::ubx {
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
-    : config_(config), scanner_(byte_time(config.baud)), clock_(config.clock) {}
+    : config_(config), scanner_(config.per_byte), clock_(config.clock) {}
 
 void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
@@ -43,7 +43,7 @@ void Decoder::on_pvt(const Frame& frame, HostTime arrival, SampleSink& sink) noe
   sample.kind = SampleKind::kGnss;
   sample.device = config_.device;
   sample.time = clock_.observe(time_.time_ns(), frame.first_byte);
-  const auto wire_time = byte_time(config_.baud) * static_cast<std::int64_t>(frame.bytes.size());
+  const auto wire_time = scanner_.per_byte() * static_cast<std::int64_t>(frame.bytes.size());
   sample.arrival = clock_.is_fixed() ? sample.time + wire_time : arrival;
   if (const auto utc = utc_of(pvt)) {
     sample.has_utc = true;

@@ -43,8 +43,7 @@ MtDecoder::MtDecoder(const MtDecoderConfig& config)
     : wants_imu_(config.wants_imu),
       wants_attitude_(config.wants_attitude),
       wants_gnss_(config.wants_gnss),
-      per_byte_(byte_time(config.baud)),
-      scanner_(per_byte_),
+      scanner_(config.per_byte),
       clock_(config.clock),
       gnss_clock_(config.clock),
       count_period_s_(1.0 / config.rate_hz),
@@ -451,7 +450,7 @@ void MtDecoder::restart_clock() noexcept {
 }
 
 HostTime MtDecoder::arrival_of(const Frame& frame, HostTime time, HostTime arrival) const noexcept {
-  return clock_.is_fixed() ? time + per_byte_ * static_cast<std::int64_t>(frame.size) : arrival;
+  return clock_.is_fixed() ? time + scanner_.per_byte() * static_cast<std::int64_t>(frame.size) : arrival;
 }
 
 void MtDecoder::put(Sample& sample, Block& block, SampleSink& sink) noexcept {

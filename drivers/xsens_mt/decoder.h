@@ -56,7 +56,7 @@ struct MtDecoderConfig {
   bool wants_gnss = false;
   DataLayout layout = kDefaultLayout;  ///< expected; a Configuration message overrules it
   double rate_hz = 100.0;  ///< expected; Configuration (MTData) or OutputConfiguration (MTData2) overrules it
-  double baud = 115200.0;  ///< of the line; 0 where there is none
+  Duration per_byte = byte_time(115200.0);  ///< time of one byte on the line; zero where there is none
   Matrix3 axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< rotates the sensor's components
   ClockMapConfig clock;
 };
@@ -76,6 +76,8 @@ class MtDecoder final : public DeviceDecoder {
   /// Code of the last Error message, if one came.
   [[nodiscard]] std::optional<std::uint8_t> last_error() const noexcept { return last_error_; }
   [[nodiscard]] const ClockMap& clock() const noexcept { return clock_; }
+  void set_per_byte(Duration per_byte) noexcept override { scanner_.set_per_byte(per_byte); }
+  [[nodiscard]] Duration per_byte() const noexcept override { return scanner_.per_byte(); }
   [[nodiscard]] double clock_drift_ppm() const noexcept override { return clock_.drift_ppm(); }
   [[nodiscard]] double clock_sd_s() const noexcept override { return clock_.scatter_s(); }
 
@@ -131,7 +133,6 @@ class MtDecoder final : public DeviceDecoder {
   bool wants_imu_;
   bool wants_attitude_;
   bool wants_gnss_;
-  Duration per_byte_;
   Scanner scanner_;
   ClockMap clock_;
   DecoderCounters counters_;

@@ -48,6 +48,10 @@ class Scanner {
   /// @param per_byte  time of one byte on the wire, see byte_time()
   explicit Scanner(Duration per_byte = Duration::zero()) noexcept : buffer_(per_byte) {}
 
+  /// Time of one byte on the wire, see DeviceDecoder::set_per_byte().
+  [[nodiscard]] Duration per_byte() const noexcept { return buffer_.per_byte(); }
+  void set_per_byte(Duration per_byte) noexcept { buffer_.set_per_byte(per_byte); }
+
   /// Takes as many bytes as fit; see FrameBuffer::append(). Drain next() after every call.
   std::size_t append(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
     return buffer_.append(bytes, arrival);

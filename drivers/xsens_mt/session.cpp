@@ -75,7 +75,8 @@ MtSession::MtSession(const MtSessionConfig& config) : config_(config) {
   const std::size_t data_bytes =
       config.bus_devices == 0 ? wanted_length_ : sizeof(std::uint16_t) + config.bus_devices * wanted_length_;
   const std::size_t header = data_bytes < kExtendedLength ? kHeaderSize : kExtendedHeaderSize;
-  const double frame_bits = kBitsPerByteOnTheWire * static_cast<double>(header + data_bytes + kChecksumSize);
+  const double frame_bits =
+      (kBitsBeforeStop + config.stop_bits) * static_cast<double>(header + data_bytes + kChecksumSize);
   if (std::abs(period / period_ - 1.0) > kPeriodTolerance) {
     step_ = Step::kFailed;
     say("an MT device cannot send %.6g times a second; the nearest it can is %.6g: set rate_hz",

@@ -44,6 +44,7 @@ struct MtSessionConfig {
   DataLayout layout = kDefaultLayout;  ///< legacy data of every device on the line
   double rate_hz = 100.0;              ///< messages per second; 115200 / rate must be whole to 0.1 %
   double baud = 115200.0;              ///< to tell beforehand whether the data fits the line
+  int stop_bits = 1;
   std::optional<SyncIn> sync_in;
   bool searching_baud = false;             ///< the rate is a guess: give up sooner
   std::optional<std::uint32_t> device_id;  ///< that it must have; asked before its data is taken

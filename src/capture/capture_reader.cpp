@@ -44,6 +44,7 @@ class LossFinder {
 };
 
 void count_piece(const RawPiece& piece, CaptureSummary& summary) {
+  if (piece.read.direction == Direction::kLine) return;  // nothing was read or written
   const auto [place, is_first] = summary.devices.try_emplace(piece.read.device);
   CapturedDevice& device = place->second;
   if (is_first) device.first = piece.read.arrival;

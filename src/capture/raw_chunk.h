@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -19,7 +20,36 @@
 
 namespace imuscope {
 
-enum class Direction : std::uint8_t { kRead, kWrite };
+enum class Direction : std::uint8_t {
+  kRead,
+  kWrite,
+  kLine,  ///< nothing went either way: the line runs at another rate (line_rate_bytes())
+};
+
+/// What a chunk of Direction::kLine holds: the time of one byte on the wire, ns, lowest byte first.
+using LineRateBytes = std::array<std::uint8_t, sizeof(std::int64_t)>;
+
+[[nodiscard]] constexpr LineRateBytes line_rate_bytes(Duration per_byte) noexcept {
+  LineRateBytes bytes{};
+  auto rest = static_cast<std::uint64_t>(per_byte.count());
+  for (std::uint8_t& byte : bytes) {
+    byte = static_cast<std::uint8_t>(rest & 0xFFU);
+    rest >>= 8U;
+  }
+  return bytes;
+}
+
+/// The slowest line, of 50 baud, needs less than this for a byte.
+inline constexpr Duration kLongestPerByte = std::chrono::seconds(1);
+
+/// Nothing where the bytes of a recording are no such time.
+[[nodiscard]] constexpr std::optional<Duration> line_rate_of(std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() != sizeof(std::int64_t)) return std::nullopt;
+  std::uint64_t ns = 0;
+  for (std::size_t i = bytes.size(); i-- > 0;) ns = ns << 8U | bytes[i];
+  if (ns == 0 || ns > static_cast<std::uint64_t>(kLongestPerByte.count())) return std::nullopt;
+  return Duration(static_cast<std::int64_t>(ns));
+}
 
 inline constexpr std::size_t kRawChunkBytes = 1024;
 

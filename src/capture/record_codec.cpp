@@ -41,11 +41,34 @@ std::optional<CaptureRecord> to_record(const run_t& message) {
   return header;
 }
 
+Direction direction_of(std::int8_t direction) {
+  switch (direction) {
+    case raw_t::WRITE:
+      return Direction::kWrite;
+    case raw_t::LINE:
+      return Direction::kLine;
+    default:
+      return Direction::kRead;
+  }
+}
+
+std::int8_t code_of(Direction direction) {
+  switch (direction) {
+    case Direction::kRead:
+      return raw_t::READ;
+    case Direction::kWrite:
+      return raw_t::WRITE;
+    case Direction::kLine:
+      return raw_t::LINE;
+  }
+  return raw_t::READ;
+}
+
 std::optional<CaptureRecord> to_record(const raw_t& message) {
   if (!is_stamp_ns(message.arrival_ns) || !is_count(message.sequence)) return std::nullopt;
   RawPiece piece;
   piece.read.device = message.device;
-  piece.read.direction = message.direction == raw_t::WRITE ? Direction::kWrite : Direction::kRead;
+  piece.read.direction = direction_of(message.direction);
   piece.read.arrival = host_time_from_ns(message.arrival_ns);
   piece.read.bytes = message.bytes;
   piece.sequence = message.sequence;
@@ -123,7 +146,7 @@ std::vector<std::uint8_t> encode(const RawChunk& chunk, const std::string& devic
   message.utime = clock.utime(chunk.info.arrival);
   message.sequence = chunk.info.sequence;
   message.device = device;
-  message.direction = chunk.info.direction == Direction::kWrite ? raw_t::WRITE : raw_t::READ;
+  message.direction = code_of(chunk.info.direction);
   message.arrival_ns = to_ns(chunk.info.arrival);
   message.continues = chunk.info.continues ? 1 : 0;
   message.n_bytes = static_cast<std::int32_t>(chunk.bytes.size());

@@ -31,7 +31,7 @@ struct RunHeader {
   std::vector<std::string> devices;  ///< names, in configuration order: DeviceIndex counts here
 };
 
-/// One read or write, whole again.
+/// One read or write, whole again; or the rate at which the line runs from then on.
 struct RawRead {
   std::string device;
   Direction direction = Direction::kRead;

@@ -83,6 +83,35 @@ Html events_of(const RunFiles& run) {
   return element("h3", text("Events")) + element("div", table.html(), "words");
 }
 
+Html scaled(std::optional<double> value, double by, int decimals) {
+  return text(value ? fmt::format("{:.{}f}", *value * by, decimals) : std::string(kUnknown));
+}
+
+/// Of a live run: what lies between an instant that a device measured and its time in the run.
+Html time_budget(const nlohmann::json& devices) {
+  constexpr double kMs = 1e3;
+  constexpr double kUs = 1e6;
+  Table table({text("device"), text("on the wire, ms"), text("adapter up to, ms"), text("until read, ms"),
+               text("jitter, us"), text("constant delay t_d, ms"), text("its sd, ms")});
+  for (const auto& device : devices) {
+    const auto& budget = field(device, "time_budget");
+    if (budget.is_null()) continue;
+    table.add_row(
+        {text(text_at(device, "name")), scaled(number_at(budget, "wire_s"), kMs, 3),
+         scaled(number_at(budget, "adapter_s"), kMs, 0), scaled(number_at(budget, "latency_s"), kMs, 2),
+         scaled(number_at(budget, "clock_sd_s"), kUs, 0), scaled(number_at(budget, "t_d_s"), kMs, 3),
+         scaled(number_at(budget, "sd_t_d_s"), kMs, 3)});
+  }
+  if (table.empty()) return {};
+  return element("h3", text("Time")) + table.html() +
+         paragraph(
+             "Stamps are dated back by the time on the wire, and late reads have no influence. The constant "
+             "delay "
+             "that is left, of device, adapter and line, is estimated for an S-IMU against the reference and "
+             "taken "
+             "out; of that its sd remains. That of any other device nobody measures.");
+}
+
 }  // namespace
 
 Html health_section(const RunFiles& run) {
@@ -105,7 +134,8 @@ Html health_section(const RunFiles& run) {
     }
   }
   if (!problems.empty()) problems = element("ul", problems);
-  return section + (table.empty() ? paragraph("run.json names no device.") : table.html() + problems);
+  if (table.empty()) return section + paragraph("run.json names no device.");
+  return section + table.html() + problems + time_budget(devices);
 }
 
 Html making_section(const RunFiles& run) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <utility>
 #include <vector>
 
 #include "capture/capture_reader.h"
@@ -62,10 +63,16 @@ class CaptureSource final : public ByteSource {
     for (;;) {
       auto read = reader_.next();
       if (!read) return std::optional<RecordedRead>{};
-      if (read->device != device_ || read->direction != Direction::kRead) continue;
+      if (read->device != device_) continue;
+      if (read->direction == Direction::kLine) {
+        const auto told = line_rate_of(read->bytes);
+        if (told) per_byte_ = told;
+      }
+      if (read->direction != Direction::kRead) continue;
       current_ = std::move(*read);
       read_ += current_.bytes.size();
-      return std::optional<RecordedRead>{RecordedRead{current_.arrival, current_.bytes}};
+      return std::optional<RecordedRead>{
+          RecordedRead{current_.arrival, current_.bytes, std::exchange(per_byte_, std::nullopt)}};
     }
   }
   [[nodiscard]] std::uint64_t bytes_read() const override { return read_; }
@@ -76,6 +83,7 @@ class CaptureSource final : public ByteSource {
   std::string device_;
   std::uint64_t total_;
   std::uint64_t read_ = 0;
+  std::optional<Duration> per_byte_;  ///< told, and no read since
   RawRead current_;
 };
 

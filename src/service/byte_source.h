@@ -17,6 +17,7 @@ namespace imuscope {
 struct RecordedRead {
   std::optional<HostTime> arrival;  ///< absent in recordings without arrival stamps
   std::span<const std::uint8_t> bytes;
+  std::optional<Duration> per_byte{};  ///< on the wire from here on, where the line's rate is another one
 };
 
 class ByteSource {

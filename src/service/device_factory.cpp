@@ -7,6 +7,7 @@
 #include "drivers/can_odometry/decoder.h"
 #include "drivers/csv/decoder.h"
 #include "drivers/csv/validate.h"
+#include "drivers/device/frame_buffer.h"
 #include "drivers/greis/decoder.h"
 #include "drivers/greis/session.h"
 #include "drivers/ixblue_stdbin/decoder.h"
@@ -25,16 +26,17 @@ namespace imuscope {
 
 namespace {
 
-/// Baud rate with which a byte's time on the wire is computed: that of the configured line, also for a
-/// recording that was made from it.
-double baud_of(const DeviceConfig& device) { return device.serial ? device.serial->baud : 0.0; }
+/// Of the configured line, also for a recording that was made from it, until the line itself says otherwise.
+Duration per_byte_of(const DeviceConfig& device) {
+  return device.serial ? byte_time(device.serial->baud, device.serial->stop_bits) : Duration::zero();
+}
 
 std::unique_ptr<DeviceDecoder> make_xsens(const DeviceConfig& device, DeviceIndex index,
                                           const ClockMapConfig& clock) {
   xsens::MtDecoderConfig config;
   config.device = index;
   config.rate_hz = device.rate_hz;
-  config.baud = baud_of(device);
+  config.per_byte = per_byte_of(device);
   config.axes = device.axes;
   config.clock = clock;
   config.wants_imu = device.role != DeviceRole::kGnss;
@@ -50,13 +52,13 @@ std::unique_ptr<DeviceDecoder> make_xsens(const DeviceConfig& device, DeviceInde
 std::unique_ptr<DeviceDecoder> make_stdbin(const DeviceConfig& device, DeviceIndex index,
                                            const ClockMapConfig& clock) {
   return std::make_unique<ixblue_stdbin::Decoder>(
-      ixblue_stdbin::DecoderConfig{index, device.axes, baud_of(device), clock});
+      ixblue_stdbin::DecoderConfig{index, device.axes, per_byte_of(device), clock});
 }
 
 std::unique_ptr<DeviceDecoder> make_greis(const DeviceConfig& device, DeviceIndex index,
                                           const ClockMapConfig& clock) {
   return std::make_unique<greis::Decoder>(
-      greis::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), baud_of(device), clock});
+      greis::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), per_byte_of(device), clock});
 }
 
 std::unique_ptr<DeviceDecoder> make_can_odometry(const DeviceConfig& device, DeviceIndex index) {
@@ -88,7 +90,7 @@ std::unique_ptr<DeviceDecoder> make_nmea(const DeviceConfig& device, DeviceIndex
   nmea::DecoderConfig config;
   config.device = index;
   config.period = from_seconds(1.0 / device.rate_hz);
-  config.baud = baud_of(device);
+  config.per_byte = per_byte_of(device);
   config.geoid_separation_m = device.gnss.geoid_separation_m;
   config.clock = clock;
   return std::make_unique<nmea::Decoder>(config);
@@ -97,7 +99,7 @@ std::unique_ptr<DeviceDecoder> make_nmea(const DeviceConfig& device, DeviceIndex
 std::unique_ptr<DeviceDecoder> make_ubx(const DeviceConfig& device, DeviceIndex index,
                                         const ClockMapConfig& clock) {
   return std::make_unique<ubx::Decoder>(
-      ubx::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), baud_of(device), clock});
+      ubx::DecoderConfig{index, from_seconds(1.0 / device.rate_hz), per_byte_of(device), clock});
 }
 
 std::unique_ptr<DeviceDecoder> make_rtklib_pos(const DeviceConfig& device, DeviceIndex index,
@@ -106,7 +108,7 @@ std::unique_ptr<DeviceDecoder> make_rtklib_pos(const DeviceConfig& device, Devic
   config.device = index;
   config.period = from_seconds(1.0 / device.rate_hz);
   if (const auto& base = device.gnss.base_lat_lon_height) config.base = {(*base)[0], (*base)[1], (*base)[2]};
-  config.baud = baud_of(device);
+  config.per_byte = per_byte_of(device);
   config.clock = clock;
   return std::make_unique<rtklib_pos::Decoder>(config);
 }
@@ -175,7 +177,8 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device, bool sea
       xsens::MtSessionConfig config;
       config.output = xsens::MtSessionConfig::Output::kAsDevice;
       config.rate_hz = device.rate_hz;
-      config.baud = baud_of(device);
+      config.baud = device.serial ? device.serial->baud : 0.0;
+      config.stop_bits = device.serial ? device.serial->stop_bits : 1;
       config.searching_baud = searching_baud;
       config.device_id = device.xsens.device_id;
       config.bus_devices = static_cast<std::size_t>(device.xsens.bus_size);

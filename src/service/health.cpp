@@ -107,6 +107,17 @@ study_status_t study_status(const std::string& name, const StudyOutput& study) {
   return status;
 }
 
+void set_time_budget(const TimeBudget& budget, device_status_t& device) {
+  constexpr double kUsPerS = 1e6;
+  device.latency_ms = budget.latency_s * kMsPerS;
+  device.clock_drift_ppm = budget.clock_drift_ppm;
+  device.clock_sd_us = budget.clock_sd_s * kUsPerS;
+  device.wire_ms = budget.wire_s * kMsPerS;
+  device.adapter_ms = budget.adapter_s * kMsPerS;
+  device.t_d_ms = budget.t_d_s * kMsPerS;
+  device.sd_t_d_ms = budget.sd_t_d_s * kMsPerS;
+}
+
 status_t status_of(const Configuration& configuration, const std::string& version) {
   status_t status{};
   status.run = configuration.run_name;
@@ -119,7 +130,7 @@ status_t status_of(const Configuration& configuration, const std::string& versio
     entry.name = device.name;
     entry.role = name_of(device.role);
     entry.protocol = name_of(device.protocol);
-    entry.latency_ms = entry.clock_drift_ppm = entry.clock_sd_us = kUnknown;
+    set_time_budget({}, entry);
     status.devices.push_back(std::move(entry));
   }
   return status;

@@ -10,6 +10,7 @@
 #include "configuration/config.h"
 #include "rt/periodic.h"
 #include "service/core.h"
+#include "service/time_budget.h"
 
 namespace imuscope {
 
@@ -32,6 +33,8 @@ struct Health {
 
 /// Who tells UTC and how well.
 void set_time_scale(const TimeScale& scale, status_t& status);
+/// Where a device's times come from.
+void set_time_budget(const TimeBudget& budget, device_status_t& device);
 /// Calibration of one S-IMU beside its goals.
 [[nodiscard]] study_status_t study_status(const std::string& name, const StudyOutput& study);
 

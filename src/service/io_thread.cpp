@@ -72,10 +72,11 @@ class IoThread::Line final : public SampleSink {
   }
 
   /// I/O thread's side.
-  void adopt(int epoll) noexcept {
+  void adopt(RawTap& tap, int epoll) noexcept {
     if (connection_ != nullptr || offered_.load(std::memory_order_relaxed) == nullptr) return;
     connection_ = offered_.exchange(nullptr, std::memory_order_acq_rel);
     adopted_ = host_now();
+    set_timing(tap, connection_->line->timing());
     listen(epoll, EPOLL_CTL_ADD, adopted_);
     dropped_before_ = status_.frames_dropped;
   }
@@ -171,6 +172,7 @@ class IoThread::Line final : public SampleSink {
   /// The line is another device's, and so is what is known of it.
   void show_line_of(const LineStatus& owner) noexcept {
     status_.line = owner.line;
+    status_.timing = owner.timing;
     status_.session = owner.session;
     status_.problem = owner.problem;
     status_.last_arrival = owner.last_arrival;
@@ -181,6 +183,15 @@ class IoThread::Line final : public SampleSink {
 
  private:
   static constexpr int kReadsPerWake = 4;
+
+  /// A rate that the decoder was not made with is recorded, so that a replay decodes alike.
+  void set_timing(RawTap& tap, const LineTiming& timing) noexcept {
+    status_.timing = timing;
+    if (timing.per_byte == decoder_->per_byte()) return;
+    tap.record(index_, Direction::kLine, line_rate_bytes(timing.per_byte), adopted_);
+    decoder_->set_per_byte(timing.per_byte);
+    for (Line* sharer : sharers_) sharer->decoder_->set_per_byte(timing.per_byte);
+  }
 
   void listen(int epoll, int operation, HostTime now) noexcept {
     since_.reset();
@@ -309,7 +320,7 @@ void IoThread::loop() {
     for (const auto& line : lines_) line->on_wake(tap_, epoll, now);
     if (!beaten) continue;
     for (const auto& line : lines_) {
-      line->adopt(epoll);
+      line->adopt(tap_, epoll);
       line->on_beat(tap_, epoll, now);
       line->say(tap_, epoll, now);
       line->publish(now);

@@ -4,6 +4,7 @@
 
 #include "base/limits.h"
 #include "capture/raw_chunk.h"
+#include "drivers/device/frame_buffer.h"
 #include "service/line_factory.h"
 
 namespace imuscope {
@@ -15,8 +16,6 @@ namespace {
 constexpr double kImuSampleBytes = 256.0;
 constexpr double kGnssEpochBytes = 1024.0;
 constexpr double kOdometrySampleBytes = 128.0;
-/// On the wire a byte has a start bit and eight of its own, and then its stop bits.
-constexpr double kBitsBeforeStop = 9.0;
 
 /// A serial line is read at every beat, and now and then while a frame is on its way; any other whenever
 /// something has come: on a CAN bus a sample comes in as many frames.

@@ -409,17 +409,16 @@ void LivePublisher::fill_device(std::size_t index, device_status_t& device) cons
   device.samples_lost = as_count(line.counters.samples_lost);
   device.samples_refused = as_count(line.refused);
   device.clock_resets = as_count(line.counters.clock_resets);
-  if (line.counters.samples > 0) {
-    constexpr double kUsPerS = 1e6;
-    device.latency_ms = line.latency_s * kMsPerS;
-    device.clock_sd_us = line.clock_sd_s * kUsPerS;
-    device.clock_drift_ppm = line.clock_drift_ppm;
-  }
+  const StudyOutput* const study = study_of(index);
+  if (study != nullptr) device.samples_late = as_count(study->counters.late);
+  set_time_budget(time_budget(line, study), device);
+}
+
+/// The newest estimate of an S-IMU; null for other devices and before the first.
+const StudyOutput* LivePublisher::study_of(std::size_t index) const {
   const auto study = std::find(study_devices_.begin(), study_devices_.end(), index);
-  if (last_ && study != study_devices_.end()) {
-    device.samples_late =
-        as_count(last_->studies[static_cast<std::size_t>(study - study_devices_.begin())].counters.late);
-  }
+  if (!last_ || study == study_devices_.end()) return nullptr;
+  return &last_->studies[static_cast<std::size_t>(study - study_devices_.begin())];
 }
 
 /// The beats of the threads that have one, by the threads' names.
@@ -525,8 +524,10 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
                 last_tick + 1,  last_ ? &*last_ : nullptr, folder_->events()};
   run.utc = &folder_->utc();
   run.pc_clock = &pc_clock_.record();
-  for (const auto& line : lines_) {
+  for (std::size_t i = 0; i < lines_.size(); ++i) {
+    const LineStatus& line = lines_[i];
     DeviceRecord device;
+    device.time_budget = time_budget(line, study_of(i));
     device.counters = line.counters;
     device.refused = line.refused;
     device.frames_dropped = line.frames_dropped;

@@ -44,6 +44,7 @@ Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex i
     auto read = source.next();
     if (!read) return tl::unexpected<Error>(read.error());
     if (!*read) break;
+    if ((*read)->per_byte) decoder->set_per_byte(*(*read)->per_byte);
     decoder->push((*read)->bytes, (*read)->arrival.value_or(HostTime{}), collector);
     if (progress && reads % kReadsPerProgress == 0 && source.bytes_total() > 0) {
       progress("clock of " + device.name,

@@ -97,6 +97,7 @@ class Feed {
 
   Result<void> push_pending() {
     last_arrival_ = pending_->arrival.value_or(HostTime{});
+    if (pending_->per_byte) decoder_->set_per_byte(*pending_->per_byte);
     decoder_->push(pending_->bytes, last_arrival_, sink_);
     if (auto fetched = fetch(); !fetched) return fetched;
     if (!pending_) decoder_->finish(last_arrival_, sink_);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "base/units.h"
 #include "service/describe.h"
@@ -22,6 +23,21 @@ std::string utc_text(UtcTime utc) {
                      static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
                      time.hours().count(), time.minutes().count(), time.seconds().count(),
                      (whole - since_epoch).count());
+}
+
+/// A number, or null where it is unknown.
+nlohmann::json known(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
+nlohmann::json time_budget_json(const TimeBudget& budget) {
+  return {{"wire_s", budget.wire_s},
+          {"adapter_s", budget.adapter_s},
+          {"latency_s", known(budget.latency_s)},
+          {"clock_sd_s", known(budget.clock_sd_s)},
+          {"clock_drift_ppm", known(budget.clock_drift_ppm)},
+          {"t_d_s", known(budget.t_d_s)},
+          {"sd_t_d_s", known(budget.sd_t_d_s)}};
 }
 
 nlohmann::json device_json(const RunRecord& run, std::size_t i) {
@@ -53,6 +69,7 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
       is_study
           ? nlohmann::json(run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters.late)
           : nlohmann::json(nullptr);
+  if (record.time_budget) entry["time_budget"] = time_budget_json(*record.time_budget);
   return entry;
 }
 

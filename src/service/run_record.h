@@ -15,6 +15,7 @@
 #include "drivers/device/device.h"
 #include "service/core.h"
 #include "service/pc_clock.h"
+#include "service/time_budget.h"
 #include "service/utc_track.h"
 
 namespace imuscope {
@@ -22,11 +23,12 @@ namespace imuscope {
 /// What became of one device's bytes.
 struct DeviceRecord {
   DecoderCounters counters;
-  std::uint64_t refused = 0;             ///< samples that found their ring full
-  std::uint64_t frames_dropped = 0;      ///< of a live run: lost by this PC before they could be read
-  std::string problem;                   ///< in one sentence with the remedy; empty when all is well
-  std::string clock = "arrival stamps";  ///< how its times were mapped
-  double clock_shift_s = 0.0;            ///< what was added to its own time at mid-record
+  std::uint64_t refused = 0;                ///< samples that found their ring full
+  std::uint64_t frames_dropped = 0;         ///< of a live run: lost by this PC before they could be read
+  std::string problem;                      ///< in one sentence with the remedy; empty when all is well
+  std::string clock = "arrival stamps";     ///< how its times were mapped
+  double clock_shift_s = 0.0;               ///< what was added to its own time at mid-record
+  std::optional<TimeBudget> time_budget{};  ///< of a live run
 };
 
 struct RunRecord {

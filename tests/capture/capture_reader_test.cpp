@@ -116,6 +116,35 @@ TEST(CaptureReader, GivesBackTheRunHeaderAndEveryReadWithItsBoundaries) {
   EXPECT_EQ(reads[2].bytes, (Bytes{4}));
 }
 
+TEST(CaptureReader, TellsTheRateOfALineAndCountsItForNoRead) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  const auto told = line_rate_bytes(std::chrono::nanoseconds(10'851));
+  capture.chunk(0, 0, 1, Bytes(told.begin(), told.end()), false, Direction::kLine);
+  capture.chunk(0, 1, 2, {4});
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value()) << summary.error().text();
+  EXPECT_TRUE(summary->losses.empty());
+  EXPECT_EQ(summary->devices.at("airins").reads, 1U);
+  EXPECT_EQ(summary->devices.at("airins").writes, 0U);
+  EXPECT_EQ(summary->devices.at("airins").bytes_read, 1U);
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  const auto reads = read_all(*reader);
+  ASSERT_EQ(reads.size(), 2U);
+  EXPECT_EQ(reads[0].direction, Direction::kLine);
+  EXPECT_EQ(line_rate_of(reads[0].bytes), std::chrono::nanoseconds(10'851));
+  EXPECT_EQ(reads[1].direction, Direction::kRead);
+}
+
+TEST(CaptureReader, ARateThatNoLineHasIsNone) {
+  for (const Duration per_byte : {Duration::zero(), -Duration(1), Duration(std::chrono::seconds(2))})
+    EXPECT_EQ(line_rate_of(line_rate_bytes(per_byte)), std::nullopt) << per_byte.count();
+  EXPECT_EQ(line_rate_of(Bytes{1, 2, 3}), std::nullopt);
+}
+
 TEST(CaptureReader, TakesRecordsWithImpossibleTimesAndCountsForDamage) {
   const auto path = test::scratch_folder() / "capture.lcm";
   Capture capture(path);

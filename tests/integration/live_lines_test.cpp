@@ -195,6 +195,9 @@ TEST_F(LiveLines, EveryKindOfLineAndFaultInOneRun) {
   // The MTi's speed was found by trying, and told.
   EXPECT_NE(log.find("mti: no answer at"), std::string::npos);
   EXPECT_NE(log.find("/mti at 921600 baud is open"), std::string::npos);
+  // And its stamps are dated back by that speed, not by the configured one: some 60 bytes a message.
+  EXPECT_NEAR(at_end("mti").wire_ms, 1e3 * 60.0 * 10.0 / 921600.0, 0.3);
+  EXPECT_EQ(at_end("airins").wire_ms, 0.0) << "datagrams come whole";
 
   // One line carries three devices, and the service says so of each: IMU samples at 100 Hz.
   for (const char* name : {"mtx1", "mtx2", "mtx3"}) {

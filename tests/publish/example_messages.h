@@ -208,6 +208,10 @@ inline device_status_t example_device_status() {
   m.latency_ms = 4.2;
   m.clock_drift_ppm = -11.5;
   m.clock_sd_us = 25.0;
+  m.wire_ms = 3.7;
+  m.adapter_ms = 1.0;
+  m.t_d_ms = -4.8;
+  m.sd_t_d_ms = 0.02;
   return m;
 }
 

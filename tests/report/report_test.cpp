@@ -211,6 +211,21 @@ TEST(Report, WheelsOfADriveWithOdometryAreDrawnAndSummedUp) {
   EXPECT_EQ(found, 2);
 }
 
+TEST(Report, ALiveRunHasABudgetOfTimeForEachDevice) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  EXPECT_FALSE(holds(page_of(folder), "adapter up to")) << "a recording has no line";
+  auto run = nlohmann::json::parse(std::ifstream(folder / "run.json"));
+  run["devices"][1]["time_budget"] = {{"wire_s", 0.003733},  {"adapter_s", 0.016},    {"latency_s", 0.0098},
+                                      {"clock_sd_s", 21e-6}, {"clock_drift_ppm", 11}, {"t_d_s", -0.0048},
+                                      {"sd_t_d_s", nullptr}};
+  std::ofstream(folder / "run.json") << run;
+  const std::string page = page_of(folder);
+  for (const char* cell : {"3.733", "16", "9.80", "21", "-4.800", "–"})
+    EXPECT_TRUE(holds(page, std::string("<td>") + cell + "</td>")) << cell;
+  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+}
+
 TEST(Report, AGapInTheErrorsIsAGapInTheFigure) {
   test::SyntheticRun options;
   options.gap_begin_s = 20.0;

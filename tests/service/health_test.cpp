@@ -251,6 +251,7 @@ TEST(Status, KnowsItsDevicesAndNothingElseBeforeTheRun) {
   EXPECT_TRUE(std::isnan(status.devices[1].latency_ms));
   EXPECT_TRUE(std::isnan(status.devices[1].clock_drift_ppm));
   EXPECT_TRUE(std::isnan(status.devices[1].clock_sd_us));
+  EXPECT_TRUE(std::isnan(status.devices[1].sd_t_d_ms));
   EXPECT_TRUE(std::isnan(status.refit_duration_s));
   EXPECT_EQ(status.refit_utime, 0);
 }

@@ -305,7 +305,7 @@ TEST(StdBinDecoder, TheRecordedV3UnitIsFoundToSendZeroRatesWhileAligning) {
 
 TEST(StdBinDecoder, TheFirstByteOfABurstIsDatedBackByItsTimeOnTheWire) {
   DecoderConfig config;
-  config.baud = 100'000.0;  // 100 us a byte
+  config.per_byte = 100us;
   Rig rig(config);
   const Bytes first = telegram(1, 1000).build();
   const HostTime arrival = host_time_from_ns(1'000'000'000);
@@ -314,6 +314,20 @@ TEST(StdBinDecoder, TheFirstByteOfABurstIsDatedBackByItsTimeOnTheWire) {
   ASSERT_EQ(imu.size(), 1U);
   EXPECT_EQ(imu[0].arrival, arrival);
   EXPECT_EQ(arrival - imu[0].time, Duration(100us) * static_cast<std::int64_t>(first.size()));
+}
+
+TEST(StdBinDecoder, DatesBackByTheRateThatItsLineWasOpenedAt) {
+  DecoderConfig config;
+  config.per_byte = 100us;
+  Rig rig(config);
+  rig.decoder.set_per_byte(30us);
+  EXPECT_EQ(rig.decoder.per_byte(), Duration(30us));
+  const Bytes first = telegram(1, 1000).build();
+  const HostTime arrival = host_time_from_ns(1'000'000'000);
+  rig.decoder.push(first, arrival, rig.sink);
+  const auto imu = rig.sink.of_kind(SampleKind::kImu);
+  ASSERT_EQ(imu.size(), 1U);
+  EXPECT_EQ(arrival - imu[0].time, Duration(30us) * static_cast<std::int64_t>(first.size()));
 }
 
 TEST(StdBinSession, StreamsWithTheFirstGoodTelegram) {

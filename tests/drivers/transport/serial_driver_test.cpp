@@ -103,6 +103,7 @@ TEST_F(SerialDriver, ABaudRateThatIsMissedByMoreThanAUartEnduresIsRefusedWithWha
   const auto port = SerialPort::open(settings_);
   ASSERT_TRUE(port) << port.error().text();
   EXPECT_EQ(port->baud(), 907'776.0);
+  EXPECT_EQ(port->timing().per_byte, from_seconds(10.0 / 907'776.0)) << "not the rate that was asked for";
   EXPECT_THAT(port->describe(), HasSubstr("at 907776 baud"));
 }
 

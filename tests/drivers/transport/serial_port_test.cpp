@@ -100,6 +100,17 @@ TEST_F(SerialPortTest, TakesAnyBaudRateAndTellsTheRealOne) {
   EXPECT_TRUE(SerialPort::open(settings_));
 }
 
+TEST_F(SerialPortTest, TellsHowLongAByteTakesWithItsStopBits) {
+  settings_.baud = 100'000;  // 10 us a bit
+  for (const int stop_bits : {1, 2}) {
+    settings_.stop_bits = stop_bits;
+    const auto port = SerialPort::open(settings_);
+    ASSERT_TRUE(port) << port.error().text();
+    EXPECT_EQ(port->timing().per_byte, std::chrono::microseconds(10) * (9 + stop_bits));
+    EXPECT_EQ(port->timing().held, Duration::zero()) << "a pseudo-terminal has no adapter";
+  }
+}
+
 TEST_F(SerialPortTest, ASecondProgramIsTurnedAwayAndToldWhoHoldsThePort) {
   auto port = SerialPort::open(settings_);
   ASSERT_TRUE(port);

@@ -206,7 +206,11 @@ nlohmann::json device_json(const device_status_t& d) {
           {"clock_resets", d.clock_resets},
           {"latency_ms", known(d.latency_ms)},
           {"clock_sd_us", known(d.clock_sd_us)},
-          {"clock_drift_ppm", known(d.clock_drift_ppm)}};
+          {"clock_drift_ppm", known(d.clock_drift_ppm)},
+          {"wire_ms", known(d.wire_ms)},
+          {"adapter_ms", known(d.adapter_ms)},
+          {"t_d_ms", known(d.t_d_ms)},
+          {"sd_t_d_ms", known(d.sd_t_d_ms)}};
 }
 
 nlohmann::json study_json(const study_status_t& s) {

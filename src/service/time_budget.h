@@ -1,0 +1,32 @@
+#pragma once
+
+/// What lies between an instant that a device measured and its time in a run: what is known of it, what is
+/// estimated, and what nobody knows.
+
+#include <limits>
+
+#include "calibration/estimator.h"
+#include "service/io_thread.h"
+
+namespace imuscope {
+
+/// Of one device of a live run. NaN: unknown.
+struct TimeBudget {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  double wire_s = 0.0;  ///< of the bytes of a sample, mean, on a serial line at the rate in force; stamps are
+                        ///< dated back by it; 0 on other lines
+  double adapter_s = 0.0;             ///< an adapter may hold bytes for up to so long; 0 where none is known
+  double latency_s = kUnknown;        ///< from the time of validity to the read, mean over the last second
+  double clock_sd_s = kUnknown;       ///< scatter about the line from the device's clock to the host's
+  double clock_drift_ppm = kUnknown;  ///< of that line: the device's clock is fast where positive
+  /// Of an S-IMU: its constant delay against the reference, whatever it is made of, which is estimated and
+  /// taken out. That of any other device nobody measures.
+  double t_d_s = kUnknown;
+  double sd_t_d_s = kUnknown;  ///< what remains unknown of it
+};
+
+/// @param study  the newest estimate of an S-IMU; null for other devices and before the first
+[[nodiscard]] TimeBudget time_budget(const LineStatus& line, const StudyOutput* study) noexcept;
+
+}  // namespace imuscope
