@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "batch/checks.h"
 #include "batch/grid.h"
@@ -22,6 +23,8 @@ using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
 constexpr double kTop_hz = 8.0;
 /// Largest share of the residual noise that is taken to be the reference's.
 constexpr double kReferenceShare = 0.5;
+/// Above this an inertial sensor's noise is white, or less with frequency; below, its bias wanders.
+constexpr double kWhiteFrom_hz = 0.5;
 /// A band's first sd of deviation, before it is learned.
 constexpr double kFirstDeviation = 0.01;
 constexpr double kLeastDeviation = 1e-5;
@@ -41,6 +44,8 @@ constexpr int kMostIterations = 25;
 constexpr int kRoughIterations = 2;
 /// A step of less than this share of the sd changes nothing that is published.
 constexpr double kSettledShare = 0.1;
+/// After the last step one of more than this is no approach to anything.
+constexpr double kLostShare = 1.0;
 /// Share of the information that the noise in the derivatives may be.
 constexpr double kMostNoise = 0.9;
 /// Windows overlap by half, so that neighbours share information: so many of them are one that stands alone.
@@ -83,6 +88,21 @@ double least_share(double dof, double count) {
   return std::max(kLeastShare, std::pow(1.0 - spread - std::sqrt(2.0 * std::log(count) * spread), 3));
 }
 
+/// B-10a: above kWhiteFrom_hz noise does not grow with frequency, and motion does fall with it: what a band
+/// shows in its quietest window is no more noise than the bands above it show, by what the low-pass leaves of
+/// each.
+void bound_by_bands_above(Problem& problem) {
+  Eigen::RowVector2d white = Eigen::RowVector2d::Constant(std::numeric_limits<double>::infinity());
+  for (Eigen::Index band = problem.bands.size() - 1; band >= 0; --band) {
+    const double middle_hz =
+        0.5 * problem.plan.frequency_hz(problem.bands.first(band) + problem.bands.end(band) - 1);
+    if (middle_hz < kWhiteFrom_hz) return;
+    const double left = std::pow(low_pass_gain(middle_hz), 2);
+    white = white.cwiseMin(problem.quietest_power.row(band) / left);
+    problem.quietest_power.row(band) = white * left;
+  }
+}
+
 /// B-10: power by band in the window in which the reference shows least, which is less than its noise's mean.
 void set_reference_power(Problem& problem) {
   const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
@@ -105,6 +125,7 @@ void set_reference_power(Problem& problem) {
     const double dof = 2.0 * values - (problem.bands.first(band) == 0 ? 3.0 : 0.0);
     least.row(band) /= least_share(dof, static_cast<double>(n_windows));
   }
+  bound_by_bands_above(problem);
 }
 
 /// The estimate of one pair of records.
@@ -120,6 +141,11 @@ class Batch {
     for (int i = 0; i < kMostIterations && !result.settled; ++i) {
       result.iterations = i + 1;
       result.settled = step(i);
+    }
+    if (last_share_ > kLostShare) {
+      return work_error(
+          "its estimate runs away",
+          "the drive tells too little: more turns, braking and accelerating, and a minute of rest");
     }
     finish(result);
     if (auto ok = one_clock(result); !ok) return tl::unexpected(ok.error());
@@ -193,8 +219,21 @@ class Batch {
       taken_.row(static_cast<Eigen::Index>(band)) =
           numbers_taken(sums[band], equations_.bands[band], covariance_).transpose();
     if (!rough) scales_.learn(estimate_.sensor.x, covariance_);
+    if (std::getenv("DBGI")) {
+      const auto sd0 = covariance_.diagonal().cwiseSqrt();
+      fmt::print("it {} r {:.4f} {:.4f} {:.4f} corr/sd", round, estimate_.sensor.x[3], estimate_.sensor.x[4],
+                 estimate_.sensor.x[5]);
+      for (int i = 0; i < 8; ++i) fmt::print(" {:.2f}", correction[i] / sd0[i]);
+      fmt::print(" dev");
+      for (int b = 1; b < 6; ++b)
+        fmt::print(" {:.1e}/{:.1e}", estimate_.deviation_sd(b, 0), estimate_.deviation_sd(b, 1));
+      fmt::print(" pl {:.1e} T", scales_.precision()[kPlaces]);
+      for (int b = 0; b < 6; ++b) fmt::print(" {:.2e},{:.2e}", noise_.power(b, 0), noise_.power(b, 3));
+      fmt::print("\n");
+    }
     const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
-    return !rough && share.head<kGyroBias>().maxCoeff() < kSettledShare;
+    last_share_ = share.head<kGyroBias>().maxCoeff();
+    return !rough && last_share_ < kSettledShare;
   }
 
   /// A clock that jumps makes a lever arm of its own: no sd is wide enough for that. Much of a jump is taken
@@ -394,6 +433,7 @@ class Batch {
   NoiseBands noise_;
   NormalEquations equations_;
   Covariance covariance_;
+  double last_share_ = 0.0;  ///< the newest step's largest, of its sd
 };
 
 }  // namespace

@@ -114,15 +114,25 @@ struct StudyInconsistent {
   double share;  ///< of its samples
 };
 
+/// An S-IMU and the reference differ by more than their configured noise, in the mean over a minute of
+/// motion. Nothing of it is called calibrated or observable while that lasts.
+struct NoiseTooSmall {
+  bool gyro;        ///< or accelerometer
+  double factor;    ///< sd of the innovations over the predicted one, of the worst axis
+  double white_sd;  ///< of a sample, with which they would agree; rad/s, m/s^2
+};
+
 }  // namespace event
 
-using EventPayload = std::variant<
-    event::NavigationStarted, event::NavigationStopped, event::ReferenceGap, event::ReferenceGravityWrong,
-    event::GravityMagnitudeWrong, event::CoarseAlignmentDone, event::CoarseAlignmentPoor,
-    event::MountingChanged, event::StudyReturned, event::GnssRejected, event::GnssReacquired,
-    event::GnssInconsistent, event::OdometryLost, event::OdometryReturned, event::OdometryRejected,
-    event::OdometryAccepted, event::CovarianceRepaired, event::BoresightPriorWrong, event::LeverArmPriorWrong,
-    event::StudiesSwapped, event::GyroBiasChanged, event::AccelBiasChanged, event::StudyInconsistent>;
+using EventPayload =
+    std::variant<event::NavigationStarted, event::NavigationStopped, event::ReferenceGap,
+                 event::ReferenceGravityWrong, event::GravityMagnitudeWrong, event::CoarseAlignmentDone,
+                 event::CoarseAlignmentPoor, event::MountingChanged, event::StudyReturned,
+                 event::GnssRejected, event::GnssReacquired, event::GnssInconsistent, event::OdometryLost,
+                 event::OdometryReturned, event::OdometryRejected, event::OdometryAccepted,
+                 event::CovarianceRepaired, event::BoresightPriorWrong, event::LeverArmPriorWrong,
+                 event::StudiesSwapped, event::GyroBiasChanged, event::AccelBiasChanged,
+                 event::StudyInconsistent, event::NoiseTooSmall>;
 
 /// What happened, to which device, at which time on the host's scale.
 struct EstimatorEvent {

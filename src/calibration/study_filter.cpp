@@ -25,6 +25,12 @@ constexpr double kReturnAfter_s = 5.0;
 constexpr double kBlockGap_s = 0.1;
 /// NIS is averaged over this time.
 constexpr double kNisMean_s = 10.0;
+/// Over so much motion innovations are held against their predicted variance. White ones have it to 2 % then;
+/// with twice the variance every sd is too small by 1.4, and nothing of it is called calibrated or observable
+/// until they fit again.
+constexpr double kNoiseMean_s = 60.0;
+constexpr double kNoiseTooSmall = 2.0;
+constexpr double kNoiseFits = 1.5;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
 constexpr double kMountingChangedShare = 0.8;
 constexpr double kMountingWatch_s = 3.0;
@@ -336,6 +342,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   gated_ = {};
   gated_share_ = 0.0;
   proof_s_ = 0.0;
+  contradiction_ = {};
   blocks_ = {};
   t_d_column_power_ = {};
   next_direction_ = now;
@@ -459,9 +466,35 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     gated = gated || !use[i];
     if (!use[i]) ++(gyro ? counters.gated_gyro : counters.gated_accel)[i];
     nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
+    // At rest there is less noise, and a sample that was gated is no noise.
+    if (context.regime == Regime::kStatic || !use[i]) continue;
+    Contradiction& noise = contradiction_[static_cast<std::size_t>(triad)];
+    noise.seen[i] += n;
+    const double long_share = n / std::min(noise.seen[i], kNoiseMean_s * config_.rate_hz);
+    noise.nis[i] += long_share * (y(k) * y(k) / plain(k) - noise.nis[i]);
+    noise.excess[i] += long_share * (n * (y(k) * y(k) - plain(k)) - noise.excess[i]);
   }
+  watch_noise(context, triad, epoch.time);
   core.update(y, use);
   block.n = 0;
+}
+
+void StudyFilter::watch_noise(StudyContext& context, Triad triad, HostTime now) noexcept {
+  Contradiction& noise = contradiction_[static_cast<std::size_t>(triad)];
+  const auto worst = static_cast<std::size_t>(std::ranges::max_element(noise.nis) - noise.nis.begin());
+  if (noise.nis[worst] < kNoiseFits) noise.is_too_small = noise.is_told = false;
+  noise.is_too_small = noise.is_too_small || noise.nis[worst] >= kNoiseTooSmall;
+  // By then what was not known at first has left the mean.
+  const bool settled = noise.seen[worst] >= kNoiseMean_s * config_.rate_hz;
+  if (noise.is_told || !noise.is_too_small || !settled) return;
+  noise.is_told = true;
+  const bool gyro = triad == Triad::kGyro;
+  const auto& configured =
+      (gyro ? config_.noise.gyro : config_.noise.accel)[static_cast<std::size_t>(context.regime)];
+  const double white = configured.white_sd[worst];
+  context.log.add(
+      event::NoiseTooSmall{gyro, std::sqrt(noise.nis[worst]), std::sqrt(white * white + noise.excess[worst])},
+      config_.device, now);
 }
 
 void StudyFilter::attenuate_time_offset(Triad triad, double noise, const FilterCore& core,
@@ -644,7 +677,8 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   output_.sd_accel_t_d_s = core.sd(layout.accel_t_d);
   output_.sd_t_d_s = core.sd(layout.t_d);
 
-  const bool fits = !misfits_ && proof_s_ >= kProof_s;
+  const bool noise_fits = !contradiction_[0].is_too_small && !contradiction_[1].is_too_small;
+  const bool fits = !misfits_ && noise_fits && proof_s_ >= kProof_s;
   const bool estimates_mounting = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
   for (std::size_t i = 0; i < 6; ++i) {
     const std::size_t block = i < 3 ? layout.psi : layout.r;

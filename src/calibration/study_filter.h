@@ -78,6 +78,8 @@ class StudyFilter {
   void watch_return(StudyContext& context, HostTime now) noexcept;
   void watch_priors(EventLog& log) noexcept;
   void watch_mounting(StudyContext& context, HostTime now, double dt_s) noexcept;
+  /// Tells of a configured noise that is too small.
+  void watch_noise(StudyContext& context, Triad triad, HostTime now) noexcept;
   void watch_fit(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
   void update_weakest_direction(const FilterCore& core) noexcept;
   [[nodiscard]] ReferenceNoise reference_noise(const ReferenceKinematics& b) const noexcept;
@@ -154,6 +156,15 @@ class StudyFilter {
   bool boresight_told_ = false;
   bool lever_arm_told_ = false;
 
+  /// What the innovations of a triad say of its configured noise, over a minute of motion.
+  struct Contradiction {
+    Vector3 nis{1.0, 1.0, 1.0};
+    Vector3 seen{};    ///< samples
+    Vector3 excess{};  ///< of a sample's variance over the predicted one, SI
+    bool is_too_small = false;
+    bool is_told = false;
+  };
+  std::array<Contradiction, 2> contradiction_{};
   std::array<bool, 2> gated_{};  ///< an axis of this triad, in the newest update
   double gated_share_ = 0.0;     ///< over seconds: the mounting changed
   double misfit_share_ = 0.0;    ///< over half a minute of motion: the device is not what is configured

@@ -142,6 +142,15 @@ struct EventSentence {
         "signs and units in the configuration, and that it is bolted to the reference's vehicle",
         name, 100.0 * e.share);
   }
+  std::string operator()(const event::NoiseTooSmall& e) const {
+    const std::string line = e.gyro ? fmt::format("gyro_white_sd_degps = {:.2g}", e.white_sd * kDegPerRad)
+                                    : fmt::format("accel_white_sd_mps2 = {:.2g}", e.white_sd);
+    return fmt::format(
+        "{}: its {} differ from the reference's by {:.1f} times the configured noise, so that its sd are too "
+        "small; "
+        "[device.noise] {} would fit",
+        name, e.gyro ? "rates" : "forces", e.factor, line);
+  }
 };
 
 }  // namespace

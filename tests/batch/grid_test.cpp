@@ -77,4 +77,21 @@ TEST(Grid, HasNothingToSayBeyondTheRecord) {
   EXPECT_EQ(grid.valid, (std::vector<char>{0, 0, 1, 0, 0}));
 }
 
+TEST(Grid, LowPassLeavesOfASineWhatItsGainSays) {
+  for (const double f_hz : {0.5, 3.0, 8.0, 12.0}) {
+    imuscope::batch::ImuRecord record;
+    for (int i = 0; i < 1000; ++i) {
+      const double t = i / 200.0;
+      record.add(t, {static_cast<float>(std::sin(kTwoPi * f_hz * t)), 0.0F, 0.0F}, {0.0F, 0.0F, -9.81F});
+    }
+    std::vector<double> instants;
+    for (int i = 0; i < 200; ++i) instants.push_back(1.0 + i / 67.0);
+    const auto grid = imuscope::batch::make_grid(record, instants, false);
+    for (std::size_t i = 0; i < instants.size(); ++i) {
+      EXPECT_NEAR(grid.motion(static_cast<Eigen::Index>(i), 0),
+                  imuscope::batch::low_pass_gain(f_hz) * std::sin(kTwoPi * f_hz * instants[i]), 1e-3);
+    }
+  }
+}
+
 }  // namespace

@@ -44,6 +44,11 @@ struct Told {
   [[nodiscard]] bool has() const {
     return std::any_of(events.begin(), events.end(), is<Kind>);
   }
+  /// Precondition: has<Kind>()
+  template <typename Kind>
+  [[nodiscard]] const Kind& first() const {
+    return std::get<Kind>(std::find_if(events.begin(), events.end(), is<Kind>)->what);
+  }
   void take(std::span<const EstimatorEvent> more) { events.insert(events.end(), more.begin(), more.end()); }
 };
 
@@ -266,7 +271,33 @@ TEST(BadInput, AStudyThatFitsIsCalledUsable) {
   Estimator estimator(drive.config());
   const Told told = told_by(drive, estimator);
   EXPECT_FALSE(told.has<event::StudyInconsistent>());
+  EXPECT_FALSE(told.has<event::NoiseTooSmall>());
   for (const bool observable : estimator.study(0).observable) EXPECT_TRUE(observable);
+}
+
+/// Told a third of the noise that there is, the filter is sure of itself for no reason.
+TEST(BadInput, ANoiseThatIsConfiguredTooSmallIsToldWithTheOneThatFitsAndNothingIsCalledCalibrated) {
+  for (const bool gyro : {true, false}) {
+    SCOPED_TRACE(gyro ? "gyro" : "accel");
+    SimulatedDrive drive(400.0, {tilted()}, 47);
+    EstimatorConfig config = drive.config();
+    StudyNoise& noise = config.studies[0].noise;
+    const double simulated = (gyro ? noise.gyro : noise.accel)[1].white_sd[0];
+    for (TriadNoise& regime : gyro ? noise.gyro : noise.accel)
+      for (std::size_t i = 0; i < 3; ++i) {
+        regime.white_sd[i] /= 3.0;
+        regime.fast_sd[i] /= 3.0;
+      }
+    Estimator estimator(config);
+    const Told told = told_by(drive, estimator);
+    ASSERT_TRUE(told.has<event::NoiseTooSmall>());
+    const auto& e = told.first<event::NoiseTooSmall>();
+    EXPECT_EQ(e.gyro, gyro);
+    EXPECT_NEAR(e.factor, 3.0, 0.9);
+    EXPECT_NEAR(e.white_sd, simulated, 0.3 * simulated);
+    EXPECT_EQ(estimator.study(0).status, CalibrationStatus::kConverging);
+    for (const bool observable : estimator.study(0).observable) EXPECT_FALSE(observable);
+  }
 }
 
 TEST(BadInput, ATurnedMountIsNoticedWhereSamplesAreAveraged) {

@@ -31,6 +31,7 @@ struct Options {
   double duration_s = 600.0;
   int reference_class = 1;
   std::string only;
+  bool each = false;
 };
 
 /// The records that the estimate is given.
@@ -214,8 +215,21 @@ struct Totals {
 /// 0.999 quantile of chi-squared with six degrees of freedom: one right mounting in a thousand is beyond.
 constexpr double kSurelyWrong = 22.46;
 
+/// One mounting, its error beside its sd.
+void print_each(const std::string& name, const batch::BatchMounting& found,
+                const batch::ParameterVector& error, double nees) {
+  fmt::print("{}: NEES6 {:.1f}, change {:.1f}, inconsistency {:.2f}, {}{}\n", name, nees,
+             found.change.statistic, found.inconsistency, found.settled ? "settled" : "not settled",
+             found.one_chip ? ", one chip" : "");
+  const auto sd = [&](Eigen::Index i) { return std::sqrt(found.covariance(i, i)); };
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    fmt::print("    psi {:8.1f} ({:.1f}) mdeg, r {:8.1f} ({:.1f}) mm\n", 1e3 * kDegPerRad * error[i],
+               1e3 * kDegPerRad * sd(i), kMmPerM * error[3 + i], kMmPerM * sd(3 + i));
+  }
+}
+
 void account(const Result<batch::BatchMounting>& found, const batch_pairs::TrueSensor& truth,
-             Totals& totals) {
+             const std::string& each, Totals& totals) {
   if (!found) {
     ++totals.refused;
     totals.sentence = found.error().text();
@@ -223,6 +237,7 @@ void account(const Result<batch::BatchMounting>& found, const batch_pairs::TrueS
   }
   const auto error = batch_pairs::error_of(*found, truth);
   const double nees = batch_pairs::nees6(*found, error);
+  if (!each.empty()) print_each(each, *found, error, nees);
   ++totals.found;
   totals.sure_and_wrong += nees > kSurelyWrong ? 1 : 0;
   totals.worst_nees = std::max(totals.worst_nees, nees);
@@ -245,6 +260,7 @@ std::vector<Totals> run(const study_drive::Truth& truth, const std::vector<Case>
       std::rotate(other.f_mps2.begin(), other.f_mps2.begin() + 3000, other.f_mps2.end());
       cases[c].make(pair, other);
       account(batch::estimate_mounting(pair.reference, pair.study), batch_pairs::true_sensor(run.draw, i),
+              options.each ? fmt::format("{}, seed {}, S-IMU {}", cases[c].name, seed, i + 1) : std::string{},
               totals[c]);
     }
   }
@@ -295,6 +311,7 @@ int main(int argc, char** argv) {
   app.add_option("--duration", options.duration_s, "length of the drive, s");
   app.add_option("--reference-class", options.reference_class, "1 (navigation grade) to 5");
   app.add_option("--only", options.only, "cases whose name holds this text");
+  app.add_flag("--each", options.each, "prints every mounting that is found");
   CLI11_PARSE(app, argc, argv);
   std::vector<Case> chosen;
   for (Case& one : cases())
