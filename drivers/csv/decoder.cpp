@@ -23,10 +23,20 @@ bool any_named(const std::array<std::string, 3>& columns) {
   return std::any_of(columns.begin(), columns.end(), [](const std::string& name) { return !name.empty(); });
 }
 
+bool is_turned(const std::string& column) { return column.size() > 1 && column.front() == '-'; }
+
+std::string without_sign(const std::string& column) { return is_turned(column) ? column.substr(1) : column; }
+
+Vector3 units_of(const std::array<std::string, 3>& columns, double unit) {
+  Vector3 units{};
+  for (std::size_t i = 0; i < units.size(); ++i) units[i] = is_turned(columns[i]) ? -unit : unit;
+  return units;
+}
+
 std::vector<Column> columns_of(const ImuConfig& config) {
   std::vector<Column> columns{{config.time_column}};
-  for (const std::string& name : config.gyro_columns) columns.push_back({name});
-  for (const std::string& name : config.accel_columns) columns.push_back({name});
+  for (const std::string& name : config.gyro_columns) columns.push_back({without_sign(name)});
+  for (const std::string& name : config.accel_columns) columns.push_back({without_sign(name)});
   if (!config.counter_column.empty()) columns.push_back({config.counter_column});
   return columns;
 }
@@ -68,10 +78,10 @@ bool all_positive(const Vector3& v) noexcept {
   return all_finite(v) && v[0] > 0.0 && v[1] > 0.0 && v[2] > 0.0;
 }
 
-Vector3 rotate(const std::array<double, 9>& axes, const Vector3& v, double unit) noexcept {
+Vector3 rotate(const std::array<double, 9>& axes, const Vector3& v, const Vector3& units) noexcept {
   Vector3 rotated{};
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) rotated[i] += axes[3 * i + j] * (v[j] * unit);
+    for (std::size_t j = 0; j < 3; ++j) rotated[i] += axes[3 * i + j] * (v[j] * units[j]);
   }
   return rotated;
 }
@@ -91,12 +101,13 @@ std::uint64_t RowPeriod::missing(Duration step) noexcept {
   return periods > kGapPeriods ? static_cast<std::uint64_t>(std::llround(periods)) - 1 : 0;
 }
 
-RowDecoder::RowDecoder(std::vector<Column> columns, double time_unit_s, Duration period,
+RowDecoder::RowDecoder(std::vector<Column> columns, double time_unit_s, double time_offset_s, Duration period,
                        const ClockMapConfig& clock, DeviceIndex device)
     : reader_(std::move(columns)),
       clock_(clock),
       period_(period),
       time_unit_s_(time_unit_s),
+      time_offset_s_(time_offset_s),
       device_(device) {}
 
 void RowDecoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
@@ -129,7 +140,7 @@ void RowDecoder::drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept
 
 bool RowDecoder::take_row(HostTime arrival, SampleSink& sink) noexcept {
   const auto values = reader_.values();
-  const double time_s = values[0] * time_unit_s_;
+  const double time_s = values[0] * time_unit_s_ + time_offset_s_;
   if (!(std::abs(time_s) < kTimeMax_s)) {
     report(RowError::Kind::kOutOfRange, 0, values[0]);
     return false;
@@ -161,10 +172,13 @@ void RowDecoder::report(RowError::Kind kind, std::size_t column, double value) n
 }
 
 ImuDecoder::ImuDecoder(const ImuConfig& config)
-    : RowDecoder(columns_of(config), config.time_unit_s, config.period, config.clock, config.device),
+    : RowDecoder(columns_of(config), config.time_unit_s, config.time_offset_s, config.period, config.clock,
+                 config.device),
       axes_(config.axes),
-      gyro_unit_radps_(config.gyro_unit == AngularRateUnit::kDegps ? kRadPerDeg : 1.0),
-      accel_unit_mps2_(config.accel_unit == AccelerationUnit::kG ? kMps2PerG : 1.0),
+      gyro_units_radps_(
+          units_of(config.gyro_columns, config.gyro_unit == AngularRateUnit::kDegps ? kRadPerDeg : 1.0)),
+      accel_units_mps2_(
+          units_of(config.accel_columns, config.accel_unit == AccelerationUnit::kG ? kMps2PerG : 1.0)),
       has_counter_(!config.counter_column.empty()) {}
 
 bool ImuDecoder::fill(std::span<const double> values, std::uint64_t missing_before, Sample& sample) noexcept {
@@ -180,8 +194,8 @@ bool ImuDecoder::fill(std::span<const double> values, std::uint64_t missing_befo
     counters_.samples_lost += missing_before;
     if (missing_before > 0) imu.flags |= kGapBefore;
   }
-  imu.omega_radps = rotate(axes_, three(values, kGyroAt), gyro_unit_radps_);
-  imu.f_mps2 = rotate(axes_, three(values, kAccelAt), accel_unit_mps2_);
+  imu.omega_radps = rotate(axes_, three(values, kGyroAt), gyro_units_radps_);
+  imu.f_mps2 = rotate(axes_, three(values, kAccelAt), accel_units_mps2_);
   return true;
 }
 
@@ -217,7 +231,8 @@ bool ImuDecoder::take_counter(double value, ImuData& imu) noexcept {
 }
 
 GnssDecoder::GnssDecoder(const GnssConfig& config)
-    : RowDecoder(columns_of(config), config.time_unit_s, config.period, config.clock, config.device),
+    : RowDecoder(columns_of(config), config.time_unit_s, config.time_offset_s, config.period, config.clock,
+                 config.device),
       solution_code_(config.solution_code),
       solution_without_column_(config.solution_without_column) {
   std::size_t at = 4;

@@ -26,7 +26,9 @@ enum class AccelerationUnit : std::uint8_t { kMps2, kG };
 struct ImuConfig {
   DeviceIndex device = 0;
   std::string time_column = "t_s";
-  double time_unit_s = 1.0;  ///< seconds per unit of the time column
+  double time_unit_s = 1.0;    ///< seconds per unit of the time column
+  double time_offset_s = 0.0;  ///< to be added to the times
+  /// A minus before a name turns its sign, of gyros and accelerometers alike.
   std::array<std::string, 3> gyro_columns{"gyro_x_radps", "gyro_y_radps", "gyro_z_radps"};
   AngularRateUnit gyro_unit = AngularRateUnit::kRadps;
   std::array<std::string, 3> accel_columns{"accel_x_mps2", "accel_y_mps2", "accel_z_mps2"};
@@ -53,6 +55,7 @@ struct GnssConfig {
   DeviceIndex device = 0;
   std::string time_column = "t_s";
   double time_unit_s = 1.0;
+  double time_offset_s = 0.0;
   std::string latitude_column = "lat_deg";
   std::string longitude_column = "lon_deg";
   std::string height_column = "height_m";          ///< above the WGS-84 ellipsoid
@@ -96,8 +99,8 @@ class RowDecoder : public DeviceDecoder {
 
  protected:
   /// Column 0 is the time.
-  RowDecoder(std::vector<Column> columns, double time_unit_s, Duration period, const ClockMapConfig& clock,
-             DeviceIndex device);
+  RowDecoder(std::vector<Column> columns, double time_unit_s, double time_offset_s, Duration period,
+             const ClockMapConfig& clock, DeviceIndex device);
 
   /// Fills the sample of a row; false where the row cannot be used (and report() has said why).
   virtual bool fill(std::span<const double> values, std::uint64_t missing_before,
@@ -114,6 +117,7 @@ class RowDecoder : public DeviceDecoder {
   ClockMap clock_;
   RowPeriod period_;
   double time_unit_s_;
+  double time_offset_s_;
   DeviceIndex device_;
   std::uint64_t sequence_ = 0;
   std::optional<std::int64_t> last_time_ns_;
@@ -129,8 +133,8 @@ class ImuDecoder final : public RowDecoder {
   [[nodiscard]] bool take_counter(double value, ImuData& imu) noexcept;
 
   std::array<double, 9> axes_;
-  double gyro_unit_radps_;
-  double accel_unit_mps2_;
+  Vector3 gyro_units_radps_;  ///< by column, with its sign
+  Vector3 accel_units_mps2_;
   bool has_counter_;
   std::int64_t row_ = 0;
   std::optional<std::int64_t> last_counter_;  ///< unwrapped

@@ -75,4 +75,26 @@ inline constexpr double kUsableTimeOffsetSd_s = kUsableFactor * kGoalTimeOffsetS
          time_offset_sd_s <= kUsableTimeOffsetSd_s;
 }
 
+/// What a person may do with a mounting, on the one scale of console and report.
+enum class Usability : std::uint8_t {
+  kUsable,
+  kWithLimits,  ///< some of its numbers are less certain than is wanted
+  kNotUsable,   ///< there is none, or a protractor tells as much
+};
+
+/// A protractor and a spirit level are good to a degree.
+inline constexpr double kProtractorSd_rad = 1.0 * kRadPerDeg;
+
+/// Of the largest axis of each; an sd that is NaN is not known.
+[[nodiscard]] constexpr Usability usability_of(double boresight_sd_rad, double lever_arm_sd_m,
+                                               double time_offset_sd_s) noexcept {
+  if (is_usable(boresight_sd_rad, lever_arm_sd_m, time_offset_sd_s)) return Usability::kUsable;
+  return boresight_sd_rad <= kProtractorSd_rad ? Usability::kWithLimits : Usability::kNotUsable;
+}
+
+[[nodiscard]] constexpr std::string_view words_of(Usability usability) noexcept {
+  constexpr std::array<std::string_view, 3> kWords{"usable", "usable with limits", "not usable"};
+  return kWords[static_cast<std::size_t>(usability)];
+}
+
 }  // namespace imuscope

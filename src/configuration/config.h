@@ -107,6 +107,8 @@ struct MountingPriorConfig {
 /// Columns of a CSV device. See drivers/csv.
 struct CsvConfig {
   std::string time_column = "t_s";
+  double time_unit_s = 1.0;    ///< seconds that one unit of the time column is
+  double time_offset_s = 0.0;  ///< to be added to the times of the file
   std::array<std::string, 3> gyro_columns{"gyro_x_radps", "gyro_y_radps", "gyro_z_radps"};
   std::array<std::string, 3> accel_columns{"accel_x_mps2", "accel_y_mps2", "accel_z_mps2"};
   bool gyro_in_degps = false;

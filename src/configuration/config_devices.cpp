@@ -141,6 +141,8 @@ void read_prior(TomlReader in, MountingPriorConfig& prior) {
 
 void read_csv(TomlReader in, CsvConfig& csv) {
   in.text("time_column", csv.time_column);
+  in.number("time_unit_s", csv.time_unit_s, 1.0, 1e-12, 1e6);
+  in.number("time_offset_s", csv.time_offset_s, 1.0, -1e9, 1e9);
   in.texts("gyro_columns", csv.gyro_columns);
   in.texts("accel_columns", csv.accel_columns);
   csv.gyro_in_degps = in.choice("gyro_unit", {"rad/s", "deg/s"}, 0) == 1;

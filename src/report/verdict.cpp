@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/calibration_levels.h"
 #include "base/units.h"
@@ -84,12 +85,15 @@ std::array<Usability, 3> usability_of(const StudyFiles& study) {
           Usability{"time offset", accuracy.time_offset_ms, kUsableTimeOffsetSd_ms, "ms"}};
 }
 
-bool is_usable(const StudyFiles& study) {
+imuscope::Usability usability(const StudyFiles& study) {
+  constexpr double kUnknownSd = std::numeric_limits<double>::quiet_NaN();
   const Accuracy accuracy = accuracy_of(study);
-  return not_observed(study).empty() && accuracy.boresight_deg && accuracy.lever_arm_mm &&
-         accuracy.time_offset_ms &&
-         imuscope::is_usable(*accuracy.boresight_deg * kRadPerDeg, *accuracy.lever_arm_mm / kMmPerM,
-                             *accuracy.time_offset_ms / kMsPerS);
+  const auto by_sd = imuscope::usability_of(accuracy.boresight_deg.value_or(kUnknownSd) * kRadPerDeg,
+                                            accuracy.lever_arm_mm.value_or(kUnknownSd) / kMmPerM,
+                                            accuracy.time_offset_ms.value_or(kUnknownSd) / kMsPerS);
+  if (by_sd == imuscope::Usability::kUsable && !not_observed(study).empty())
+    return imuscope::Usability::kWithLimits;
+  return by_sd;
 }
 
 /// Largest error against truth.json in units of its sd; empty where either is not known.
@@ -125,7 +129,8 @@ std::string accuracy_sentence(const StudyFiles& study) {
           *part.sd <= part.usable ? "" : fmt::format(" (wanted: {:g} {})", part.usable, part.unit)));
     }
   }
-  std::string sentence = fmt::format("{}: largest sd of {}.", study.name, fmt::join(parts, ", "));
+  std::string sentence = fmt::format("{}: {}; largest sd of {}.", study.name,
+                                     imuscope::words_of(usability(study)), fmt::join(parts, ", "));
   const auto missing = words_of(not_observed(study));
   if (!missing.empty())
     sentence += fmt::format(" Not observable in this drive: {}.", fmt::join(missing, ", "));
@@ -275,6 +280,43 @@ Html verdict_block(const std::string& question, const Verdict& verdict) {
       css_class_of(verdict.answer));
 }
 
+/// The sentences of what the look at the data found, of one degree of harm.
+std::vector<std::string> findings_of(const RunFiles& run, std::string_view harm) {
+  std::vector<std::string> sentences;
+  for (const auto& finding : field(run.run, "findings")) {
+    if (text_at(finding, "harm") == harm) sentences.push_back(text_at(finding, "text"));
+  }
+  return sentences;
+}
+
+/// Nothing is usable that was made of data or a configuration that are wrong.
+void judge_by_findings(const RunFiles& run, Verdict& verdict) {
+  const auto wrong = findings_of(run, "wrong");
+  if (!wrong.empty()) {
+    verdict.answer = Answer::kNo;
+    verdict.headline = "Not usable: something is wrong with the data or the configuration, as said above.";
+  } else if (verdict.answer == Answer::kYes && !findings_of(run, "limits").empty()) {
+    verdict.answer = Answer::kPartly;
+    verdict.headline = "Usable with limits: what the data lack is said above.";
+  }
+}
+
+/// What is wrong with the data, before anything that was made of them; nothing where nothing harms.
+Html findings_block(const RunFiles& run) {
+  const auto wrong = findings_of(run, "wrong");
+  const auto limits = findings_of(run, "limits");
+  Html block;
+  if (!wrong.empty()) {
+    block += element("div",
+                     element("h3", text("What is wrong with the data or the configuration")) + list_of(wrong),
+                     css_class_of(Answer::kNo));
+  }
+  if (!limits.empty())
+    block += element("div", element("h3", text("What limits the results")) + list_of(limits),
+                     css_class_of(Answer::kPartly));
+  return block;
+}
+
 }  // namespace
 
 Verdict calibration_verdict(const RunFiles& run) {
@@ -283,35 +325,44 @@ Verdict calibration_verdict(const RunFiles& run) {
     verdict.headline = "Cannot be said: the run has no S-IMU.";
     return verdict;
   }
-  std::vector<std::string> usable;
+  std::size_t usable = 0;
+  std::size_t not_usable = 0;
   for (const StudyFiles& study : run.studies) {
-    if (is_usable(study)) usable.push_back(study.name);
+    const imuscope::Usability of_study = usability(study);
+    if (of_study == imuscope::Usability::kUsable) ++usable;
+    if (of_study == imuscope::Usability::kNotUsable) ++not_usable;
     verdict.reasons.push_back(accuracy_sentence(study));
   }
-  if (usable.size() == run.studies.size()) {
+  const std::size_t n = run.studies.size();
+  if (usable == n) {
     verdict.answer = Answer::kYes;
-    verdict.headline = usable.size() == 1 ? "Yes." : fmt::format("Yes, for all {} S-IMUs.", usable.size());
-  } else if (usable.empty()) {
+    verdict.headline = n == 1 ? "Usable." : fmt::format("Usable, all {} S-IMUs.", n);
+  } else if (not_usable == n) {
     verdict.answer = Answer::kNo;
-    verdict.headline = "Not yet: the uncertainties below are above what the error process needs.";
+    verdict.headline = "Not usable: its directions are known no better than a protractor tells them.";
   } else {
     verdict.answer = Answer::kPartly;
-    verdict.headline = fmt::format("For {}, not for the others.", fmt::join(usable, ", "));
+    verdict.headline =
+        n == 1 ? "Usable with limits: what is less certain than wanted stands below."
+               : fmt::format("Usable with limits: {} of {} S-IMUs are usable, {} with limits, {} not.",
+                             usable, n, n - usable - not_usable, not_usable);
   }
   const bool overconfident = std::any_of(run.studies.begin(), run.studies.end(), [](const StudyFiles& study) {
     return worst_error_sd(study).value_or(0.0) > kSdMax;
   });
   if (overconfident && verdict.answer == Answer::kYes) {
     verdict.answer = Answer::kPartly;
-    verdict.headline = "Precise, but not as accurate as it says: an error exceeds its sd.";
+    verdict.headline =
+        "Usable with limits: precise, but not as accurate as it says, as an error exceeds its sd.";
   }
   if (field(field(run.run, "gnss"), "contradicts_motion") == nlohmann::json(true)) {
-    if (verdict.answer == Answer::kYes) verdict.answer = Answer::kPartly;
-    verdict.headline = "Not to be trusted: the receiver's positions contradict the motion.";
+    verdict.answer = Answer::kNo;
+    verdict.headline = "Not usable: the receiver's positions contradict the motion.";
     verdict.reasons.push_back(
         "The warnings of the run say what to check: whose clock the receiver's times are of, its antenna's "
         "lever arm, its sd.");
   }
+  judge_by_findings(run, verdict);
   return verdict;
 }
 
@@ -389,6 +440,7 @@ std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>&
 
 Html summary_section(const RunFiles& run, const std::vector<Fit>& fits) {
   Html section = element("h2", text("In short"));
+  section += findings_block(run);
   section += verdict_block("Is the calibration usable?", calibration_verdict(run));
   section += verdict_block("Is the noise model adequate?", model_verdict(fits));
   if (!run.comparison.is_null())

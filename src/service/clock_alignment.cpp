@@ -31,11 +31,6 @@ RateSeries rate_series(const std::vector<Sample>& samples) {
   return series;
 }
 
-bool shares_the_reference_clock(const DeviceConfig& device) {
-  const bool csv = traits_of(device.protocol).is_text;
-  return csv ? device.csv.common_clock : device.gnss.common_clock;
-}
-
 /// Clocks that only count begin anywhere: where their times as they stand show no match, the recordings are
 /// taken to have begun together.
 Result<TimeOffset> find_offset(const RateSeries& reference, const RateSeries& study,
@@ -78,6 +73,11 @@ Result<DeviceClock> align_by_rate(const std::string& name, const RateSeries& ref
 }
 
 }  // namespace
+
+bool shares_the_reference_clock(const DeviceConfig& device) {
+  const bool csv = traits_of(device.protocol).is_text;
+  return csv ? device.csv.common_clock : device.gnss.common_clock;
+}
 
 std::optional<Duration> utc_minus_time(const std::vector<Sample>& samples) {
   std::vector<std::int64_t> differences;

@@ -23,6 +23,9 @@ struct DeviceClock {
   std::string how = "arrival stamps";  ///< for the log and run.json
 };
 
+/// Whether the configuration says that the times of a recording without stamps are the reference's.
+[[nodiscard]] bool shares_the_reference_clock(const DeviceConfig& device);
+
 /// All samples of one device, its times taken as they stand in the recording.
 using ReadSamples = std::function<Result<std::vector<Sample>>(DeviceIndex)>;
 

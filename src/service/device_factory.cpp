@@ -117,6 +117,8 @@ csv::ImuConfig csv_imu(const DeviceConfig& device, DeviceIndex index, const Cloc
   csv::ImuConfig config;
   config.device = index;
   config.time_column = device.csv.time_column;
+  config.time_unit_s = device.csv.time_unit_s;
+  config.time_offset_s = device.csv.time_offset_s;
   config.gyro_columns = device.csv.gyro_columns;
   config.gyro_unit = device.csv.gyro_in_degps ? csv::AngularRateUnit::kDegps : csv::AngularRateUnit::kRadps;
   config.accel_columns = device.csv.accel_columns;
@@ -132,6 +134,8 @@ csv::GnssConfig csv_gnss(const DeviceConfig& device, DeviceIndex index, const Cl
   csv::GnssConfig config;
   config.device = index;
   config.time_column = device.csv.time_column;
+  config.time_unit_s = device.csv.time_unit_s;
+  config.time_offset_s = device.csv.time_offset_s;
   config.latitude_column = device.csv.latitude_column;
   config.longitude_column = device.csv.longitude_column;
   config.height_column = device.csv.height_column;

@@ -15,6 +15,7 @@
 #include "service/capture_damage.h"
 #include "service/device_factory.h"
 #include "service/noise_feedback.h"
+#include "service/recorded_look.h"
 
 namespace imuscope {
 
@@ -216,8 +217,23 @@ class LogAlignment {
   std::optional<Duration> utc_of_run_;
 };
 
+/// Dumps as they are, before their clocks are brought together.
+std::vector<check::Finding> look_at_dumps(const Configuration& configuration, Recording recording,
+                                          const std::vector<bool>& unstamped) {
+  std::vector<bool> has_own_clock(unstamped.size());
+  recording.clocks.resize(unstamped.size());
+  for (std::size_t i = 0; i < unstamped.size(); ++i) {
+    if (!unstamped[i]) continue;
+    recording.clocks[i].map = ClockMapConfig::fixed(HostTime{}, 1.0);
+    has_own_clock[i] =
+        i != configuration.reference_index() && !shares_the_reference_clock(configuration.devices[i]);
+  }
+  return look_at_recording(configuration, recording, has_own_clock);
+}
+
 Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, Configuration configuration,
-                                       const OpeningProgress& progress) {
+                                       const OpeningProgress& progress,
+                                       std::vector<check::Finding>* findings) {
   auto files = assign_files(inputs, configuration);
   if (!files) return tl::unexpected<Error>(files.error());
   const std::size_t n = configuration.devices.size();
@@ -264,6 +280,8 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
     return tl::unexpected<Error>(stamps.error());
   }
   recording.open = [files = *files](DeviceIndex index) { return open_raw_dump(files[index]); };
+  const bool has_log = std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.has_value(); });
+  if (findings != nullptr && !has_log) *findings = look_at_dumps(configuration, recording, unstamped);
   auto clocks = align_clocks(configuration, unstamped, [&](DeviceIndex index) -> Result<std::vector<Sample>> {
     auto source = recording.open(index);
     if (!source) return tl::unexpected<Error>(source.error());
@@ -275,6 +293,8 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   if (auto aligned = LogAlignment(configuration, inputs, *files, logs, progress, opened).run(); !aligned) {
     return tl::unexpected<Error>(aligned.error());
   }
+  if (findings != nullptr && has_log)
+    *findings = look_at_recording(configuration, recording, std::vector<bool>(n));
   for (std::size_t i = 0; i < n; ++i) {
     if (!recording.present[i] || !unstamped[i]) continue;
     opened.remarks.push_back(fmt::format("{}: times from {}, {:+.3f} s", configuration.devices[i].name,
@@ -320,7 +340,7 @@ RecordedSchedule schedule_of(const CaptureSummary& summary, const Configuration&
 
 Result<OpenedRecording> open_capture(const std::string& input,
                                      const std::optional<std::filesystem::path>& file,
-                                     const OpeningProgress& progress) {
+                                     const OpeningProgress& progress, std::vector<check::Finding>* findings) {
   const auto of_file = [&progress](double share) { progress("looking through", share); };
   const auto summary = progress ? summarise_capture(input, of_file) : summarise_capture(input);
   if (!summary) return tl::unexpected<Error>(summary.error());
@@ -377,6 +397,7 @@ Result<OpenedRecording> open_capture(const std::string& input,
   for (const auto& event : summary->events) recording.moments.push_back({event.time, event.text});
   recording.damage = damage_of(*summary, input);
   opened.remarks.insert(opened.remarks.end(), recording.damage.begin(), recording.damage.end());
+  if (findings != nullptr) *findings = look_at_recording(*configuration, recording, std::vector<bool>(n));
   opened.configuration = std::move(*configuration);
   return opened;
 }
@@ -385,19 +406,20 @@ Result<OpenedRecording> open_capture(const std::string& input,
 
 Result<OpenedRecording> open_dumps(const std::vector<std::string>& inputs, Configuration configuration,
                                    const OpeningProgress& progress) {
-  return open_raw_dumps(inputs, std::move(configuration), progress);
+  return open_raw_dumps(inputs, std::move(configuration), progress, nullptr);
 }
 
 Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
                                        const std::optional<std::filesystem::path>& configuration,
-                                       const OpeningProgress& progress) {
+                                       const OpeningProgress& progress,
+                                       std::vector<check::Finding>* findings) {
   const auto is_dump = [](const std::string& input) { return input.find('=') != std::string::npos; };
   const auto n_dumps = std::count_if(inputs.begin(), inputs.end(), is_dump);
   if (n_dumps == 0) {
     if (inputs.size() != 1) {
       return usage_error("more than one capture is given", "give one capture, or raw dumps as NAME=FILE");
     }
-    return open_capture(inputs.front(), configuration, progress);
+    return open_capture(inputs.front(), configuration, progress, findings);
   }
   if (static_cast<std::size_t>(n_dumps) != inputs.size()) {
     return usage_error("captures and raw dumps (NAME=FILE) are mixed", "give one capture, or raw dumps only");
@@ -407,7 +429,7 @@ Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
   }
   auto loaded = load_configuration(*configuration);
   if (!loaded) return tl::unexpected<Error>(loaded.error());
-  return open_raw_dumps(inputs, std::move(*loaded), progress);
+  return open_raw_dumps(inputs, std::move(*loaded), progress, findings);
 }
 
 }  // namespace imuscope

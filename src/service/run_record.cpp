@@ -73,6 +73,26 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
   return entry;
 }
 
+nlohmann::json findings_json(const std::vector<check::Finding>& findings) {
+  auto json = nlohmann::json::array();
+  for (const check::Finding& finding : findings) {
+    auto mends = nlohmann::json::array();
+    for (const check::ConfigLine& line : finding.mends)
+      mends.push_back({{"device", line.device}, {"key", line.key}, {"value", line.value}});
+    json.push_back({{"harm", check::key_of(finding.harm)},
+                    {"check", finding.check},
+                    {"device", finding.device},
+                    {"what", finding.what},
+                    {"value", finding.value},
+                    {"expected", finding.expected},
+                    {"unit", finding.unit},
+                    {"remedy", finding.remedy},
+                    {"mends", std::move(mends)},
+                    {"text", check::sentence(finding)}});
+  }
+  return json;
+}
+
 /// What was learned of the wheels, and what became of their speeds.
 nlohmann::json odometry_json(const Snapshot& last) {
   const OdometryOutput& out = last.odometry;
@@ -210,6 +230,7 @@ nlohmann::json run_json(const RunRecord& run) {
                       {"inputs", run.inputs},
                       {"ticks", run.ticks},
                       {"duration_s", static_cast<double>(run.ticks) / kTickRate_hz},
+                      {"findings", findings_json(run.findings)},
                       {"warnings", run.warnings}};
   json["t0_utc"] = run.last != nullptr && run.last->has_utc
                        ? nlohmann::json(utc_text(run.last->first_reference_utc))

@@ -11,6 +11,7 @@
 
 #include "base/output_folder.h"
 #include "base/result.h"
+#include "check/finding.h"
 #include "configuration/config.h"
 #include "drivers/device/device.h"
 #include "service/core.h"
@@ -40,7 +41,8 @@ struct RunRecord {
   const Snapshot* last = nullptr;     ///< absent where there was no tick
   std::vector<EstimatorEvent> events{};
   std::vector<std::string> warnings{};
-  std::optional<double> static_s{};  ///< of a study, which tells rest from motion
+  std::vector<check::Finding> findings{};  ///< of the look at the data before
+  std::optional<double> static_s{};        ///< of a study, which tells rest from motion
   std::optional<double> dynamic_s{};
   const UtcTrack* utc = nullptr;            ///< of the run, for its events
   const PcClockRecord* pc_clock = nullptr;  ///< of a live run

@@ -128,6 +128,7 @@ Result<Combination> run_studies(const std::vector<OpenedRecording>& drives, cons
     of_drive.out = drive_folder(options.out, i);
     of_drive.progress = progress_of(i);
     of_drive.mountings = settled;
+    of_drive.findings = drives[i].findings;
     if (auto done = run_study(drives[i].configuration, drives[i].recording, of_drive); !done)
       return tl::unexpected<Error>(done.error());
   }

@@ -256,6 +256,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   RunRecord run{configuration,         options.version, recording.inputs,    calibrated_run->devices,
                 calibrated_run->ticks, &last,           (*folder)->events(), {}};
   run.utc = &(*folder)->utc();
+  run.findings = options.findings;
   if (by_batch) run.warnings = remarks_of_batch(infos, of_filter, outcomes);
   for (const auto& warnings : {warnings_of(recording, *calibrated_run), warnings_of(configuration, last)})
     run.warnings.insert(run.warnings.end(), warnings.begin(), warnings.end());

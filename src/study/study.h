@@ -27,6 +27,8 @@ struct StudyRunOptions {
   std::map<std::string, MountingEstimate> mountings;
   /// Regimes that a person named in a file; empty: as the configuration says.
   std::vector<Label> labels;
+  /// Of the look at the data before, for run.json.
+  std::vector<check::Finding> findings;
 };
 
 /// Runs the whole study of `recording` into options.out. Errors: what replay() refuses; a folder that cannot

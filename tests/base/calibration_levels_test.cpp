@@ -45,5 +45,17 @@ TEST(CalibrationLevels, UsableIsATenthOfADegreeACentimetreAndAMillisecond) {
   EXPECT_FALSE(is_usable(0.999 * kTenthOfDegree_rad, 0.999e-2, 1.001e-3));
 }
 
+TEST(CalibrationLevels, OneScaleSaysWhatAPersonMayDoWithAMounting) {
+  constexpr double kDeg = kPi / 180.0;
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(usability_of(0.09 * kDeg, 0.009, 0.9e-3), Usability::kUsable);
+  EXPECT_EQ(usability_of(0.2 * kDeg, 0.009, 0.9e-3), Usability::kWithLimits);
+  EXPECT_EQ(usability_of(0.09 * kDeg, 0.5, 0.9e-3), Usability::kWithLimits);
+  EXPECT_EQ(usability_of(0.09 * kDeg, 0.009, kUnknown), Usability::kWithLimits);
+  EXPECT_EQ(usability_of(1.1 * kDeg, 0.009, 0.9e-3), Usability::kNotUsable);
+  EXPECT_EQ(usability_of(kUnknown, kUnknown, kUnknown), Usability::kNotUsable);
+  EXPECT_EQ(words_of(Usability::kWithLimits), "usable with limits");
+}
+
 }  // namespace
 }  // namespace imuscope

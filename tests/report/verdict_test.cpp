@@ -24,14 +24,23 @@ TEST(Verdict, AnAccurateMountingIsUsable) {
   EXPECT_EQ(calibration_verdict(run_with({})).answer, Answer::kYes);
 }
 
-TEST(Verdict, ABoresightSdAboveTheLimitIsNotUsableAndSaysSo) {
+TEST(Verdict, ABoresightSdAboveTheLimitIsALimitAndSaysSo) {
   test::SyntheticRun options;
   options.boresight_sd_deg = 0.3;
   const auto run = run_with(options);
   const Verdict verdict = calibration_verdict(run);
-  EXPECT_EQ(verdict.answer, Answer::kNo);
-  EXPECT_THAT(verdict.reasons, Contains(AllOf(HasSubstr("mtx1"), HasSubstr("0.3 deg (wanted: 0.1 deg)"))));
+  EXPECT_EQ(verdict.answer, Answer::kPartly);
+  EXPECT_THAT(verdict.reasons,
+              Contains(AllOf(HasSubstr("mtx1: usable with limits"), HasSubstr("0.3 deg (wanted: 0.1 deg)"))));
   EXPECT_THAT(next_steps(run, {}), Contains(HasSubstr("figures of eight")));
+}
+
+TEST(Verdict, ABoresightThatAProtractorTellsAsWellIsNotUsable) {
+  test::SyntheticRun options;
+  options.boresight_sd_deg = 1.3;
+  const auto run = run_with(options);
+  EXPECT_EQ(calibration_verdict(run).answer, Answer::kNo);
+  EXPECT_THAT(calibration_verdict(run).headline, HasSubstr("Not usable"));
 }
 
 TEST(Verdict, WhatIsNotObservableIsNamedWithTheManoeuvreThatShowsIt) {
@@ -39,7 +48,7 @@ TEST(Verdict, WhatIsNotObservableIsNamedWithTheManoeuvreThatShowsIt) {
   options.psi_z_observable = false;
   const auto run = run_with(options);
   const Verdict verdict = calibration_verdict(run);
-  EXPECT_EQ(verdict.answer, Answer::kNo);
+  EXPECT_EQ(verdict.answer, Answer::kPartly);
   EXPECT_THAT(verdict.reasons, Contains(HasSubstr("Not observable in this drive: boresight about z")));
   EXPECT_THAT(next_steps(run, {}), Contains(HasSubstr("Brake and start firmly")));
 }
@@ -63,8 +72,26 @@ TEST(Verdict, AReceiverThatContradictsTheMotionMakesNothingUsable) {
   EXPECT_EQ(calibration_verdict(run).answer, Answer::kYes);
   run.run["gnss"] = {{"contradicts_motion", true}};
   const Verdict verdict = calibration_verdict(run);
-  EXPECT_EQ(verdict.answer, Answer::kPartly);
+  EXPECT_EQ(verdict.answer, Answer::kNo);
   EXPECT_THAT(verdict.headline, HasSubstr("contradict the motion"));
+}
+
+TEST(Verdict, WhatTheLookAtTheDataFoundStandsFirstAndJudgesTheRest) {
+  auto run = run_with({});
+  EXPECT_THAT(calibration_verdict(run).headline, HasSubstr("Usable"));
+  run.run["findings"] = nlohmann::json::array({{{"harm", "note"}, {"text", "a: never rests"}}});
+  EXPECT_EQ(calibration_verdict(run).answer, Answer::kYes);
+  run.run["findings"].push_back({{"harm", "limits"}, {"text", "a: gyro x is cut off"}});
+  EXPECT_EQ(calibration_verdict(run).answer, Answer::kPartly);
+  EXPECT_THAT(calibration_verdict(run).headline, HasSubstr("Usable with limits"));
+  run.run["findings"].push_back({{"harm", "wrong"}, {"text", "b: <in> g"}});
+  EXPECT_EQ(calibration_verdict(run).answer, Answer::kNo);
+  EXPECT_THAT(calibration_verdict(run).headline, HasSubstr("Not usable"));
+  const std::string page = summary_section(run, {}).str();
+  const auto wrong = page.find("b: &lt;in&gt; g");
+  EXPECT_LT(wrong, page.find("a: gyro x is cut off"));
+  EXPECT_LT(page.find("a: gyro x is cut off"), page.find("Is the calibration usable?"));
+  EXPECT_EQ(page.find("a: never rests"), std::string::npos);
 }
 
 TEST(Verdict, ModelsThatTheDataDoNotContradictAreAdequate) {

@@ -7,6 +7,7 @@
 #include "commands.h"
 #include "configuration/config.h"
 #include "configuration/config_reference.h"
+#include "findings.h"
 #include "print.h"
 
 namespace imuscope::cli {
@@ -53,17 +54,59 @@ Result<void> check(const std::filesystem::path& file) {
   return {};
 }
 
+/// The configuration held against a recording.
+Result<void> check_with_data(const std::filesystem::path& file, const std::vector<std::string>& data,
+                             const std::filesystem::path& fix) {
+  std::vector<check::Finding> findings;
+  const auto opened = open_recording(data, file, {}, &findings);
+  print_findings(findings);
+  for (const check::Finding& finding : findings) {
+    if (finding.harm == check::Harm::kNote) say("NOTE   {}\n", check::sentence(finding));
+  }
+  if (!fix.empty()) {
+    const auto configuration = load_configuration(file);
+    if (!configuration) return tl::unexpected<Error>(configuration.error());
+    if (auto written = write_fixed(*configuration, findings, fix); !written) return written;
+  }
+  if (!opened) return tl::unexpected<Error>(explained(opened.error(), findings));
+  if (harm_in_short(findings).empty()) {
+    say("{}: nothing in the data speaks against it\n", file.string());
+    return {};
+  }
+  return work_error("the data and the configuration do not fit", "the findings above say what to correct");
+}
+
+struct ConfigCommand {
+  std::filesystem::path file;
+  std::vector<std::string> data;
+  std::filesystem::path fix;
+};
+
 }  // namespace
 
 void add_config(CLI::App& app, Work& chosen) {
   auto* command =
       app.add_subcommand("config", "Check a configuration, or print what can stand in one (Markdown)");
-  auto file = std::make_shared<std::filesystem::path>();
-  command->add_option("CONFIG", *file,
+  auto options = std::make_shared<ConfigCommand>();
+  command->add_option("CONFIG", options->file,
                       "Configuration to check; without it, the reference of all keys is printed");
-  on_chosen(*command, chosen, [file]() -> Result<void> {
-    if (!file->empty()) return check(*file);
-    print_reference();
+  auto* data = command
+                   ->add_option("--data", options->data,
+                                "a recording to hold it against: a capture, or raw dumps as NAME=FILE")
+                   ->type_name("INPUT");
+  command
+      ->add_option("--fix", options->fix,
+                   "write a copy of it with the lines corrected that the data show to be wrong")
+      ->type_name("FILE")
+      ->needs(data);
+  on_chosen(*command, chosen, [options]() -> Result<void> {
+    if (!options->data.empty() && options->file.empty())
+      return usage_error("--data needs the configuration that the data are held against",
+                         "give CONFIG before it");
+    if (auto checked = options->file.empty() ? Result<void>{} : check(options->file); !checked)
+      return checked;
+    if (!options->data.empty()) return check_with_data(options->file, options->data, options->fix);
+    if (options->file.empty()) print_reference();
     return {};
   });
 }

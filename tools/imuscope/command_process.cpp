@@ -6,6 +6,7 @@
 #include "base/text.h"
 #include "combination_table.h"
 #include "commands.h"
+#include "findings.h"
 #include "print.h"
 #include "progress.h"
 #include "report/report.h"
@@ -24,24 +25,30 @@ struct ProcessCommand {
   std::string config;
   std::string out;
   std::string labels;
+  std::string fix;
   bool realtime = false;
   std::string lcm;
   bool json = false;
 };
 
-Result<OpenedRecording> open(const ProcessCommand& options, const std::vector<std::string>& inputs) {
+/// @param look  at the data before anything is estimated from them, and say what is wrong
+Result<OpenedRecording> open(const ProcessCommand& options, const std::vector<std::string>& inputs,
+                             bool look) {
   std::optional<std::filesystem::path> config;
   if (!options.config.empty()) config = options.config;
   ProgressBar bar;
-  auto opened =
-      open_recording(inputs, config, [&](const std::string& what, double share) { bar.show(what, share); });
+  std::vector<check::Finding> findings;
+  auto opened = open_recording(
+      inputs, config, [&](const std::string& what, double share) { bar.show(what, share); },
+      look ? &findings : nullptr);
   bar.clear();
-  if (opened) {
-    const auto& damage = opened->recording.damage;
-    for (const auto& remark : opened->remarks) {
-      const bool is_damage = std::find(damage.begin(), damage.end(), remark) != damage.end();
-      spdlog::log(is_damage ? spdlog::level::warn : spdlog::level::info, "{}", remark);
-    }
+  if (!options.json) print_findings(findings);
+  if (!opened) return tl::unexpected<Error>(explained(opened.error(), findings));
+  opened->findings = std::move(findings);
+  const auto& damage = opened->recording.damage;
+  for (const auto& remark : opened->remarks) {
+    const bool is_damage = std::find(damage.begin(), damage.end(), remark) != damage.end();
+    spdlog::log(is_damage ? spdlog::level::warn : spdlog::level::info, "{}", remark);
   }
   return opened;
 }
@@ -59,7 +66,7 @@ Result<void> process_drives(const ProcessCommand& options,
                             const std::vector<std::vector<std::string>>& inputs) {
   std::vector<OpenedRecording> drives;
   for (const auto& of_drive : inputs) {
-    auto opened = open(options, of_drive);
+    auto opened = open(options, of_drive, true);
     if (!opened) return tl::unexpected<Error>(opened.error());
     drives.push_back(std::move(*opened));
   }
@@ -99,26 +106,34 @@ Result<void> process(const ProcessCommand& options) {
   const auto drives = drives_of(options.inputs);
   if (drives.size() > 1 && !options.labels.empty())
     return usage_error("labels are of one drive", "process the drives one by one");
+  if (drives.size() > 1 && !options.fix.empty())
+    return usage_error("--fix is of one drive", "process the drives one by one");
   if (drives.size() > 1) return process_drives(options, drives);
   const auto labels = read_labels(options.labels);
   if (!labels) return tl::unexpected<Error>(labels.error());
-  const auto opened = open(options, options.inputs);
+  const auto opened = open(options, options.inputs, true);
   if (!opened) return tl::unexpected<Error>(opened.error());
+  if (!options.fix.empty()) {
+    if (auto written = write_fixed(opened->configuration, opened->findings, options.fix); !written)
+      return written;
+  }
   {
     ProgressBar bar;
-    const StudyRunOptions run{options.out,
-                              IMUSCOPE_VERSION,
-                              [&](const std::string& step, double share) { bar.show(step, share); },
-                              {},
-                              *labels};
-    if (auto done = run_study(opened->configuration, opened->recording, run); !done) return done;
+    const StudyRunOptions run{
+        options.out, IMUSCOPE_VERSION, [&](const std::string& step, double share) { bar.show(step, share); },
+        {},          *labels,          opened->findings};
+    if (auto done = run_study(opened->configuration, opened->recording, run); !done)
+      return tl::unexpected<Error>(explained(done.error(), opened->findings));
   }
   if (auto written = write_report(options.out); !written) return written;
-  return print_study(options.out, options.json);
+  if (auto printed = print_study(options.out, options.json); !printed) return printed;
+  const std::string harm = harm_in_short(opened->findings);
+  if (!options.json && !harm.empty()) say("\n{}\n", harm);
+  return {};
 }
 
 Result<void> replay_command(const ProcessCommand& options) {
-  const auto opened = open(options, options.inputs);
+  const auto opened = open(options, options.inputs, false);
   if (!opened) return tl::unexpected<Error>(opened.error());
   {
     ProgressBar bar;
@@ -143,6 +158,11 @@ void add_process(CLI::App& app, Work& chosen) {
   command
       ->add_option("--labels", options->labels,
                    "regimes that a person named: CSV begin_s,end_s,regime or begin_utc,end_utc,regime")
+      ->type_name("FILE");
+  command
+      ->add_option(
+          "--fix", options->fix,
+          "write a copy of the configuration with the lines corrected that the data show to be wrong")
       ->type_name("FILE");
   command->add_flag("--json", options->json, "print the summary as JSON");
   on_chosen(*command, chosen, [options] { return process(*options); });

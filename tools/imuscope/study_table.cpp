@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "base/calibration_levels.h"
 #include "base/json_text.h"
 #include "base/units.h"
 #include "print.h"
@@ -106,9 +107,34 @@ void print_truth(const json& imu, const json& truth) {
       truth.at("t_d_s").get<double>() * 1e3);
 }
 
+double largest(const json& imu, const char* key) {
+  double most = 0.0;
+  for (const auto& value : imu.at(key)) most = std::max(most, value.get<double>());
+  return most;
+}
+
+/// "usable with limits: boresight 0.25 deg (0.1 wanted)".
+std::string usability_words(const json& imu) {
+  if (!has_estimate(imu.at("status").get<std::string>())) return "not usable: no mounting was found";
+  const double boresight_rad = largest(imu, "boresight_sd_deg") * kRadPerDeg;
+  const double lever_arm_m = largest(imu, "r_bs_b_sd_m");
+  const double time_offset_s = imu.at("t_d_sd_s").get<double>();
+  const Usability usability = usability_of(boresight_rad, lever_arm_m, time_offset_s);
+  std::vector<std::string> limits;
+  const auto limit = [&](const char* what, double sd, double wanted, double unit, const char* name) {
+    if (!(sd <= wanted))
+      limits.push_back(fmt::format("{} sd {:.2g} {} ({:g} wanted)", what, sd * unit, name, wanted * unit));
+  };
+  limit("boresight", boresight_rad, kUsableBoresightSd_rad, kDegPerRad, "deg");
+  limit("lever arm", lever_arm_m, kUsableLeverArmSd_m, kMmPerM, "mm");
+  limit("time offset", time_offset_s, kUsableTimeOffsetSd_s, kMsPerS, "ms");
+  if (limits.empty()) return std::string(words_of(usability));
+  return fmt::format("{}: {}", words_of(usability), fmt::join(limits, ", "));
+}
+
 void print_imu(const json& imu, const std::optional<json>& truth) {
   const std::string name = imu.at("name");
-  say("\n{}  ({})\n", name, imu.at("status").get<std::string>());
+  say("\n{}  ({})\n", name, usability_words(imu));
   const auto angles = euler_deg(matrix(imu.at("C_b_s")));
   say("  C_b_s, zyx Euler x y z {:9.3f} {:9.3f} {:9.3f}  deg\n", angles[0], angles[1], angles[2]);
   say("    sd               {}  mdeg\n", triple(imu, "boresight_sd_deg", "psi", 1e3, 1));

@@ -29,6 +29,26 @@ std::vector<Sample> decode_imu(std::string_view rows, const ImuConfig& config = 
   return decode(decoder, std::string(kHeader) + std::string(rows));
 }
 
+TEST(CsvImu, AMinusBeforeAColumnTurnsItsSignBeforeTheAxes) {
+  ImuConfig config;
+  config.gyro_columns = {"gyro_y_radps", "-gyro_x_radps", "gyro_z_radps"};
+  config.accel_columns = {"accel_x_mps2", "accel_y_mps2", "-accel_z_mps2"};
+  config.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+  const auto samples = decode_imu("1.25,0.1,0.2,0.3,1,2,9.8\n", config);
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].imu.omega_radps, (Vector3{0.2, 0.1, -0.3}));
+  EXPECT_EQ(samples[0].imu.f_mps2, (Vector3{1.0, -2.0, 9.8}));
+}
+
+TEST(CsvImu, TimesHaveAUnitAndAnOffsetOfTheirOwn) {
+  ImuConfig config;
+  config.time_unit_s = 1e-3;
+  config.time_offset_s = -18.0;
+  const auto samples = decode_imu("20250,0,0,0,0,0,9.8\n", config);
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(to_ns(samples[0].time), 2'250'000'000);
+}
+
 TEST(CsvImu, ARowBecomesASampleAtItsTime) {
   ImuConfig config;
   config.device = 2;

@@ -1,0 +1,107 @@
+#include "check/check.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+
+#include "check/bins.h"
+#include "check/checks.h"
+
+namespace imuscope::check {
+
+namespace {
+
+bool found(const std::vector<Finding>& findings, const std::string& device, const std::string& check) {
+  return std::any_of(findings.begin(), findings.end(), [&](const Finding& finding) {
+    return finding.device == device && finding.check == check;
+  });
+}
+
+}  // namespace
+
+std::string sentence(const Finding& finding) {
+  std::string evidence;
+  if (!finding.unit.empty()) {
+    evidence = fmt::format(" ({:.4g} {}", finding.value, finding.unit);
+    if (finding.expected != 0.0) evidence += fmt::format(", expected {:.4g}", finding.expected);
+    evidence += ")";
+  }
+  return fmt::format("{}: {}{}; {}", finding.device, finding.what, evidence, finding.remedy);
+}
+
+std::vector<Finding> look_at(Drive& drive) {
+  const Configuration& configuration = drive.configuration();
+  std::vector<Finding> findings;
+  for (std::size_t i = 0; i < configuration.devices.size(); ++i) {
+    check_stamps(drive, i, findings);
+    if (drive.imu(i).size() == 0) continue;
+    if (!found(findings, configuration.devices[i].name, "repeated samples"))
+      check_signals(drive, i, findings);
+    check_gravity_norm(drive, i, findings);
+  }
+  ReferenceAxes reference = reference_down(drive);
+  if (const auto gnss = configuration.gnss_index()) {
+    check_positions(drive, *gnss, findings);
+    reference = check_motion(drive, *gnss, findings);
+  }
+  std::vector<std::pair<std::size_t, PairAxes>> pairs;
+  for (const std::size_t study : configuration.study_indices()) {
+    if (drive.imu(study).size() > 0) pairs.emplace_back(study, check_pair(drive, study, findings));
+  }
+  check_axes(drive, reference, pairs, findings);
+  check_drive(drive, reference, findings);
+  std::stable_sort(findings.begin(), findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.harm < b.harm; });
+  return findings;
+}
+
+void check_drive(const Drive& drive, const ReferenceAxes& reference, std::vector<Finding>& findings) {
+  // A quarter turn each way shows a scale error of the yaw gyro from its bias.
+  constexpr double kTurnMin_rad = 1.5;
+  constexpr double kRestMin_s = 10.0;
+  constexpr double kRestRate_radps = 0.01;
+  constexpr double kRestForce_mps2 = 0.2;
+  constexpr int kMeanBins = 11;
+  const std::size_t device = drive.configuration().reference_index();
+  const ImuBins bins = bins_of(drive.imu(device), kMeanBins);
+  double left_rad = 0.0;
+  double right_rad = 0.0;
+  double rest_s = 0.0;
+  double longest_s = 0.0;
+  Eigen::Vector3d before_f = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < bins.valid.size(); ++i) {
+    if (!bins.valid[i]) continue;
+    const double turned_rad = bins.omega_radps[i].dot(reference.down) * kBin_s;
+    (turned_rad > 0.0 ? right_rad : left_rad) += std::abs(turned_rad);
+    const bool rests = bins.omega_radps[i].norm() < kRestRate_radps &&
+                       (rest_s == 0.0 || (bins.f_mps2[i] - before_f).norm() < kRestForce_mps2);
+    if (rests && rest_s == 0.0) before_f = bins.f_mps2[i];
+    rest_s = rests ? rest_s + kBin_s : 0.0;
+    longest_s = std::max(longest_s, rest_s);
+  }
+  const std::string& name = drive.configuration().devices[device].name;
+  const double turn_rad = std::min(left_rad, right_rad);
+  if (!bins.valid.empty() && turn_rad < kTurnMin_rad) {
+    findings.push_back({Harm::kNote,
+                        "turns",
+                        name,
+                        "the drive has no turns both ways",
+                        turn_rad,
+                        kTurnMin_rad,
+                        "rad to one side",
+                        "drive turns to the left and to the right",
+                        {}});
+  }
+  if (!bins.valid.empty() && longest_s < kRestMin_s) {
+    findings.push_back({Harm::kNote,
+                        "rest",
+                        name,
+                        "the vehicle never rests",
+                        longest_s,
+                        kRestMin_s,
+                        "s",
+                        "stand for a minute at the beginning, where the noise at rest is wanted",
+                        {}});
+  }
+}
+
+}  // namespace imuscope::check

@@ -1,0 +1,18 @@
+#pragma once
+
+/// The look at the data before anything is estimated from them. Thresholds come from physics, data sheets and
+/// statistics and stand with their source beside each check; healthy drives have no finding that harms.
+/// Thread: one, of the soft world; allocates.
+
+#include <vector>
+
+#include "check/finding.h"
+#include "check/tracks.h"
+
+namespace imuscope::check {
+
+/// What is wrong, the greatest harm first. Corrects in `drive` what it has found, so that one mistake does
+/// not hide another.
+[[nodiscard]] std::vector<Finding> look_at(Drive& drive);
+
+}  // namespace imuscope::check

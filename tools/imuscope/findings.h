@@ -1,0 +1,30 @@
+#pragma once
+
+/// What the look at the data found, for the person who started the command.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "check/finding.h"
+#include "service/recording.h"
+
+namespace imuscope::cli {
+
+/// Those that harm, the greatest harm first; nothing where there are none.
+void print_findings(const std::vector<check::Finding>& findings);
+
+/// The one sentence of them that ends a command; empty where none harms.
+[[nodiscard]] std::string harm_in_short(const std::vector<check::Finding>& findings);
+
+/// A failure that a finding explains is told with it.
+[[nodiscard]] Error explained(Error error, const std::vector<check::Finding>& findings);
+
+/// Writes a copy of the configuration with the lines that the findings ask for; a file that is there stays.
+/// Errors: nothing to correct, a file that is there or cannot be written, a line that cannot be put in.
+[[nodiscard]] Result<void> write_fixed(const Configuration& configuration,
+                                       const std::vector<check::Finding>& findings,
+                                       const std::filesystem::path& out);
+
+}  // namespace imuscope::cli
