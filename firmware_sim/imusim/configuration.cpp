@@ -100,7 +100,9 @@ PlayedDevice read_device(TableReader& in) {
   if (device.protocol == Protocol::kXsensCan && device.role == Role::kReference)
     in.fail("protocol", "is played for an S-IMU only");
   device.rate_hz = default_rate_hz(device.role);
-  in.number("rate_hz", device.rate_hz, 1.0, 1.0, 512.0);
+  // An MT's period has at least 225 ticks of 1/115200 s; a telegram of the StdBin protocol has no such limit.
+  const double fastest_hz = device.protocol == Protocol::kIxblueStdbin ? 2000.0 : 512.0;
+  in.number("rate_hz", device.rate_hz, 1.0, 1.0, fastest_hz);
   if (device.protocol == Protocol::kIxblueStdbin)
     device.C_device_frame = Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
   read_axes(in, device.C_device_frame);
