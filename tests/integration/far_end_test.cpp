@@ -146,7 +146,7 @@ TEST(FarEnd, SeveralMtxBehindAnXbusAreSetUpEachByItself) {
       0.0);
   xsens::MtDecoderConfig config;
   config.bus = {xsens::BusDevice{0}, xsens::BusDevice{1}, xsens::BusDevice{2}};
-  config.baud = options.baud;
+  config.per_byte = byte_time(options.baud);
   xsens::MtDecoder decoder(config);
   xsens::MtSessionConfig session_config;
   session_config.bus_devices = options.bus_devices.size();
