@@ -4,6 +4,20 @@ include_guard(GLOBAL)
 install(TARGETS imuscope imusim RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(PROGRAMS tools/spy DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME imuscope-spy)
 install(FILES config/imuscope.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+# What the program itself says of its commands, where each shell looks for it.
+set(completions ${CMAKE_BINARY_DIR}/completions)
+foreach(shell bash zsh fish)
+  add_custom_command(OUTPUT ${completions}/${shell}
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${completions}
+    COMMAND imuscope completion ${shell} > ${completions}/${shell}
+    DEPENDS imuscope VERBATIM)
+  list(APPEND completion_files ${completions}/${shell})
+endforeach()
+add_custom_target(completions ALL DEPENDS ${completion_files})
+install(FILES ${completions}/bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME imuscope)
+install(FILES ${completions}/zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions RENAME _imuscope)
+install(FILES ${completions}/fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d
+        RENAME imuscope.fish)
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
         FILES_MATCHING PATTERN *.toml PATTERN *.dbc PATTERN vehicle.toml EXCLUDE)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs

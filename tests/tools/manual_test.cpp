@@ -50,6 +50,50 @@ TEST(ManualPage, NamesEveryCommandAndNoOther) {
   EXPECT_EQ(commands_of_the_manual(), commands);
 }
 
+TEST(Help, OfACommandIsWhatTheCommandItselfPrints) {
+  const auto folder = scratch_folder();
+  ASSERT_EQ(run_program("imuscope", {"help", "process"}, folder / "help.txt"), 0);
+  ASSERT_EQ(run_program("imuscope", {"process", "--help"}, folder / "option.txt"), 0);
+  EXPECT_EQ(read_text(folder / "help.txt"), read_text(folder / "option.txt"));
+  ASSERT_EQ(run_program("imuscope", {"help"}, folder / "all.txt"), 0);
+  EXPECT_THAT(read_text(folder / "all.txt"), HasSubstr("Subcommands:"));
+}
+
+/// What bash offers for a line, its last word being completed.
+std::string completed(const std::filesystem::path& script, const std::string& words, int word) {
+  const auto log = script.parent_path() / "completed.txt";
+  const std::string command = "bash -c 'source " + script.string() + "; COMP_WORDS=(" + words +
+                              "); COMP_CWORD=" + std::to_string(word) +
+                              "; _imuscope; echo \"${COMPREPLY[@]}\"' >" + log.string();
+  EXPECT_EQ(std::system(command.c_str()), 0);
+  return read_text(log);
+}
+
+TEST(Completion, OfBashKnowsEveryCommandItsOptionsAndFiles) {
+  const auto commands = commands_of_the_program();
+  const auto folder = scratch_folder();
+  const auto script = folder / "imuscope.bash";
+  ASSERT_EQ(run_program("imuscope", {"completion", "bash"}, script), 0);
+  for (const std::string& command : commands)
+    EXPECT_EQ(completed(script, "imuscope " + command, 1).find(command), 0U) << command;
+  EXPECT_EQ(completed(script, "imuscope proc", 1), "process\n");
+  EXPECT_EQ(completed(script, "imuscope process --fi", 2), "--fix\n");
+  EXPECT_EQ(completed(script, "imuscope process mtx1=" + (folder / "imuscope.b").string(), 2),
+            script.string() + "\n");
+}
+
+TEST(Completion, OfTheOtherShellsNamesEveryCommand) {
+  const auto commands = commands_of_the_program();
+  const auto folder = scratch_folder();
+  for (const char* shell : {"zsh", "fish"}) {
+    ASSERT_EQ(run_program("imuscope", {"completion", shell}, folder / shell), 0);
+    const std::string text = read_text(folder / shell);
+    for (const std::string& command : commands) EXPECT_THAT(text, HasSubstr(command)) << shell;
+    if (std::system(("command -v " + std::string(shell) + " >/dev/null").c_str()) != 0) continue;
+    EXPECT_EQ(std::system((std::string(shell) + " -n " + (folder / shell).string()).c_str()), 0) << shell;
+  }
+}
+
 TEST(ManualPage, IsMarkedUpWithoutAMistake) {
   if (std::system("command -v mandoc >/dev/null") != 0)
     GTEST_SKIP() << "mandoc is missing: apt-get install mandoc";

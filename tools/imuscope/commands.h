@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <string>
 
 #include "base/result.h"
 
@@ -74,5 +75,14 @@ void add_config(CLI::App& app, Work& chosen);
 
 /// `imuscope top`
 void add_top(CLI::App& app, Work& chosen);
+
+/// `imuscope completion bash|zsh|fish`
+void add_completion(CLI::App& app, Work& chosen);
+
+/// `imuscope help [COMMAND]`
+void add_help(CLI::App& app, Work& chosen);
+
+/// What is said of a word that is no command, with the nearest one that is.
+[[nodiscard]] std::string no_such_command(const CLI::App& app, const std::string& word);
 
 }  // namespace imuscope::cli

@@ -18,7 +18,7 @@ std::string usage_sentence(const CLI::App* app, const CLI::Error& error) {
   if (!chosen.empty()) {
     command += " " + chosen.front()->get_name();
   } else if (!app->remaining().empty()) {
-    what = "there is no command '" + app->remaining().front() + "'";
+    what = imuscope::cli::no_such_command(*app, app->remaining().front());
   }
   return fmt::format("imuscope: {}; see {} --help\n", what, command);
 }
@@ -27,7 +27,7 @@ std::string usage_sentence(const CLI::App* app, const CLI::Error& error) {
 void say(const std::string& sentence) { (void)std::fputs(sentence.c_str(), stderr); }
 
 int run(int argc, char** argv) {
-  CLI::App app{"imuscope: shows, live on a moving vehicle, how wrong a low-cost IMU is, and why"};
+  CLI::App app{"imuscope: shows, live on a moving vehicle, how wrong a low-cost IMU is, and why", "imuscope"};
   app.require_subcommand(1);
   app.failure_message(usage_sentence);
   app.set_version_flag("--version", IMUSCOPE_VERSION);
@@ -50,6 +50,8 @@ int run(int argc, char** argv) {
   imuscope::cli::add_top(app, work);
   imuscope::cli::add_doctor(app, work);
   imuscope::cli::add_config(app, work);
+  imuscope::cli::add_completion(app, work);
+  imuscope::cli::add_help(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
