@@ -106,7 +106,8 @@ class Manual {
         option ? std::vector<std::string>{"--help"} : std::vector<std::string>{command.words[1], "--help"};
     std::string text = run_program(name, ask, log) == 0 ? read_text(log) : std::string();
     // Of a command that it does not know the program explains itself instead.
-    if (!option && text.find("/" + key + " ") == std::string::npos) text.clear();
+    const std::string usage = text.substr(std::min(text.size(), text.find("Usage: ")));
+    if (!option && usage.substr(0, usage.find('\n')).find(key + " ") == std::string::npos) text.clear();
     return texts_[key] = text;
   }
 
