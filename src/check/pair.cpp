@@ -97,8 +97,7 @@ Result<TimeOffset> bring_together(const Norms& reference, ImuTrack& track, doubl
   TimeOffset all;
   const double origin_s = track.time_s.front();
   for (int round = 0; round < kClockRounds; ++round) {
-    const auto found =
-        find_offset(reference, norms_of(track, factor), round == 0 ? scale : TimeScale::kShared);
+    auto found = find_offset(reference, norms_of(track, factor), round == 0 ? scale : TimeScale::kShared);
     if (!found && round == 0) return found;
     if (!found) break;
     for (double& time : track.time_s)

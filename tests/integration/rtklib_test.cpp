@@ -192,11 +192,11 @@ TEST(Rtklib, AFixedSolutionThatStr2strSendsOverTcpDrivesTheFilter) {
   const auto run = folder / "run";
   const std::string imu = shared_path("data/rtk_drive/imu.csv").string();
   ASSERT_EQ(run_program("imuscope",
-                        {"process", "reference=" + imu, "again=" + imu, "gnss=" + received.string(),
+                        {"replay", "reference=" + imu, "again=" + imu, "gnss=" + received.string(),
                          "--config", source_path("config/rtklib_drive.toml").string(), "--out", run.string()},
-                        folder / "process.log"),
+                        folder / "replay.log"),
             0)
-      << read_text(folder / "process.log");
+      << read_text(folder / "replay.log");
 
   // The solution of an IMU of this class follows the fixed positions to decimetres where they come every 0.25
   // s.
