@@ -3,12 +3,12 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <utility>
 
 #include "base/contracts.h"
+#include "base/output_folder.h"
 
 namespace imuscope {
 namespace {
@@ -16,6 +16,7 @@ namespace {
 /// Memory is taken in pieces of about this size, so that growing never copies what is there.
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20U;
 constexpr int kNoFile = -1;
+constexpr const char* kRemedy = "make room there, or choose another --out folder";
 
 }  // namespace
 
@@ -49,14 +50,15 @@ Error RecordStore::file_error(const char* what) const {
   return {ErrorKind::kWork,
           std::string("the smoother's history cannot be ") + what + " in " + storage_.folder.string() + ": " +
               std::strerror(errno),
-          "make room there, or choose another --out folder"};
+          kRemedy};
 }
 
 Result<void> RecordStore::open_file() {
-  std::string name = (storage_.folder / "history.XXXXXX").string();
-  file_ = mkstemp(name.data());
-  if (file_ == kNoFile) return tl::unexpected<Error>(file_error("kept"));
-  unlink(name.c_str());
+  auto file = OutputFolder::open(storage_.folder).and_then([](const OutputFolder& folder) {
+    return folder.scratch_file();
+  });
+  if (!file) return work_error("the smoother's history cannot be kept: " + file.error().what, kRemedy);
+  file_ = file->release();
   return {};
 }
 
