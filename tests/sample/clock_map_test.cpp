@@ -235,12 +235,12 @@ struct Stall {
 class ClockMapStall : public testing::TestWithParam<Stall> {};
 
 TEST_P(ClockMapStall, OfAnyLengthThatLosesNothingLeavesTheClockAlone) {
-  const auto [away_s, drain] = GetParam();
+  const Stall stall = GetParam();
   const auto stalled = [&](std::size_t k) {
     const double begun_s = std::fmod(static_cast<double>(k) * kPeriod_s, 300.0) - 30.0;
     if (begun_s < 0.0) return 0.0;
     // Sample k leaves the queue when the host is back and all before it have gone.
-    return std::max(0.0, away_s + begun_s / drain - begun_s);
+    return std::max(0.0, stall.away_s + begun_s / stall.drain - begun_s);
   };
   ClockMap map;
   const Mapped mapped = with_delays(120000, 20e-6, stalled, map);
