@@ -28,6 +28,8 @@ constexpr double kCruiseLow_s = 20.0;
 constexpr double kCruiseHigh_s = 55.0;
 constexpr double kStopLow_s = 4.0;
 constexpr double kStopHigh_s = 10.0;
+// The Gaussian's feet are slower than this, and shake nothing.
+constexpr double kFootOfStop_mps = 0.01;
 constexpr double kSpeedSmoothing_s = 0.4;  // standard deviation of the Gaussian
 constexpr double kSpeedRipple = 0.04;
 constexpr double kSpeedRippleScale_s = 1.5;
@@ -226,8 +228,8 @@ std::vector<MovingSpan> moving_spans(const std::vector<double>& speed) {
   bool moving = false;
   for (std::size_t i = 0; i < speed.size(); ++i) {
     const double t_s = static_cast<double>(i) * kFineStep_s;
-    if (speed[i] > 0.0 && !moving) spans.push_back({t_s, t_s});
-    moving = speed[i] > 0.0;
+    if (speed[i] > kFootOfStop_mps && !moving) spans.push_back({t_s, t_s});
+    moving = speed[i] > kFootOfStop_mps;
     if (moving) spans.back().end_s = t_s;
   }
   return spans;

@@ -32,7 +32,7 @@ struct Scenario {
 /// Standstill at the beginning of a drive.
 double initial_standstill_s(const Scenario& scenario);
 
-/// Times between which the vehicle moves without standing still for long.
+/// Times between which the vehicle moves without standing still.
 struct MovingSpan {
   double begin_s;
   double end_s;

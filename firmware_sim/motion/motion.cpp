@@ -7,24 +7,10 @@
 namespace imusim {
 namespace {
 
-constexpr double kStaticStandstill_s = 30.0;
-
 bool inside(const std::vector<MovingSpan>& spans, double t_s) {
   const auto after = std::upper_bound(spans.begin(), spans.end(), t_s,
                                       [](double t, const MovingSpan& span) { return t < span.begin_s; });
   return after != spans.begin() && t_s <= std::prev(after)->end_s;
-}
-
-/// Spans joined over the stops that are too short to count as static.
-std::vector<MovingSpan> joined(const std::vector<MovingSpan>& spans) {
-  std::vector<MovingSpan> result;
-  for (const MovingSpan& span : spans) {
-    if (!result.empty() && span.begin_s - result.back().end_s < kStaticStandstill_s)
-      result.back().end_s = span.end_s;
-    else
-      result.push_back(span);
-  }
-  return result;
 }
 
 /// Velocity in n and its derivative, of a point that moves over the ellipsoid.
@@ -87,8 +73,7 @@ Motion::Motion(const Scenario& scenario, const DriveNodes& nodes)
       roll_(nodes.step_s, nodes.roll_rad),
       pitch_(nodes.step_s, nodes.pitch_rad),
       heading_(nodes.step_s, nodes.heading_rad),
-      moving_(nodes.moving),
-      dynamic_(joined(nodes.moving)) {
+      moving_(nodes.moving) {
   if (!scenario_.engine_runs) return;
   engine_.emplace([this](double t_s) { return undisturbed_at(t_s).v_n_mps.norm(); }, scenario_.duration_s,
                   scenario_.seed);
@@ -152,10 +137,8 @@ MotionState Motion::undisturbed_at(double t_s) const {
 }
 
 Regime Motion::regime_at(double t_s) const {
-  return inside(dynamic_, t_s) ? Regime::kDynamic : Regime::kStatic;
+  return inside(moving_, t_s) ? Regime::kDynamic : Regime::kStatic;
 }
-
-bool Motion::moving_at(double t_s) const { return inside(moving_, t_s); }
 
 Eigen::Matrix3d C_b_n_from_euler(double roll_rad, double pitch_rad, double heading_rad) {
   return (Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()) *

@@ -46,12 +46,8 @@ class Motion {
   /// Valid for any time; before 0 and after duration_s() the vehicle stands.
   [[nodiscard]] MotionState state_at(double t_s) const;
 
-  /// Whether the vehicle moves or has only just stopped and will move on: dynamic. A standstill of 30 s or
-  /// more is static.
+  /// Static wherever the vehicle stands, at a light as well as at the end.
   [[nodiscard]] Regime regime_at(double t_s) const;
-
-  /// Whether the speed is not zero.
-  [[nodiscard]] bool moving_at(double t_s) const;
 
   [[nodiscard]] double duration_s() const { return scenario_.duration_s; }
   [[nodiscard]] const Scenario& scenario() const { return scenario_; }
@@ -72,7 +68,6 @@ class Motion {
   QuinticSpline pitch_;
   QuinticSpline heading_;
   std::vector<MovingSpan> moving_;
-  std::vector<MovingSpan> dynamic_;
   std::optional<Engine> engine_;
   std::optional<Vibration> vibration_;  ///< of the body, at b's origin
 };

@@ -49,6 +49,7 @@ void read_regimes(TomlReader in, RegimeOptions& options) {
   both("motion_force_mps2", limits.motion_force_spread_mps2, limits.rest_force_spread_mps2, 1.0, 1e3);
   both("motion_vibration_mps2", limits.motion_vibration_mps2, limits.rest_vibration_mps2, 1.0, 1e3);
   in.number("shortest_static_s", limits.shortest_static_s, 1.0, 0.0, 1e5);
+  in.number("guard_s", limits.guard_s, 1.0, 0.0, 10.0);
   options.intensity = static_cast<Intensity>(in.choice("intensity", {"rate", "vibration", "speed"}, 0));
   constexpr int kMaxBins = 10;
   in.integer("bins", options.bins, 2, kMaxBins);

@@ -6,13 +6,20 @@ namespace imuscope {
 
 namespace {
 
-constexpr std::int64_t kCell_ns = 200'000'000;
+constexpr std::int64_t kCell_ns = 100'000'000;
 constexpr auto kCellsMax = static_cast<std::int64_t>(MotionLevels::kLongestRun_s / MotionLevels::kCell_s);
 static_assert(static_cast<double>(kCell_ns) * 1e-9 == MotionLevels::kCell_s);
 
 std::int64_t number_of(HostTime time) {
   const std::int64_t ns = to_ns(time);
   return ns >= 0 ? ns / kCell_ns : (ns + 1) / kCell_ns - 1;
+}
+
+/// Takes value number n into the mean; returns what it adds to the squares of the deviations from it.
+double squares_after(double value, double n, double& mean) {
+  const double before = value - mean;
+  mean += before / n;
+  return before * (value - mean);
 }
 
 }  // namespace
@@ -40,10 +47,8 @@ void MotionLevels::add(HostTime time, const Vector3& omega_ib_b_radps, const Vec
   const auto n = static_cast<double>(sums.n);
   for (std::size_t i = 0; i < 3; ++i) {
     sums.omega_squares += omega_ib_b_radps[i] * omega_ib_b_radps[i];
-    sums.mean_omega[i] += (omega_ib_b_radps[i] - sums.mean_omega[i]) / n;
-    const double before = f_b_mps2[i] - sums.mean_f[i];
-    sums.mean_f[i] += before / n;
-    sums.f_deviation_squares += before * (f_b_mps2[i] - sums.mean_f[i]);
+    sums.omega_deviation_squares += squares_after(omega_ib_b_radps[i], n, sums.mean_omega[i]);
+    sums.f_deviation_squares += squares_after(f_b_mps2[i], n, sums.mean_f[i]);
   }
 }
 
@@ -69,8 +74,10 @@ std::vector<MotionCell> MotionLevels::cells() const {
     cell.omega_radps = sums.mean_omega;
     cell.f_mps2 = sums.mean_f;
     if (sums.n > 0) cell.rate_rms_radps = std::sqrt(sums.omega_squares / static_cast<double>(sums.n));
-    if (sums.n > 1)
+    if (sums.n > 1) {
       cell.vibration_mps2 = std::sqrt(sums.f_deviation_squares / static_cast<double>(sums.n - 1));
+      cell.rate_scatter_radps = std::sqrt(sums.omega_deviation_squares / static_cast<double>(sums.n - 1));
+    }
     age = sums.speed_mps ? 0 : age + 1;
     if (sums.speed_mps) {
       cell.speed_mps = sums.speed_mps;

@@ -1,6 +1,6 @@
 #pragma once
 
-/// How much the vehicle moves, in cells of a fifth of a second: rate, force, vibration and speed, as the
+/// How much the vehicle moves, in cells of a tenth of a second: rate, force, vibration and speed, as the
 /// reference and the navigation show them. What static and dynamic, and bins of intensity, are found from.
 
 #include <cstdint>
@@ -19,6 +19,7 @@ struct MotionCell {
   Vector3 f_mps2{};                 ///< mean
   double vibration_mps2 = 0.0;      ///< rms of the force about its mean in the cell, all axes together
   double rate_rms_radps = 0.0;      ///< of the magnitude
+  double rate_scatter_radps = 0.0;  ///< rms of the rate about its mean in the cell, all axes together
   std::optional<double> speed_mps;  ///< magnitude; held until the next one, for at most kSpeedHeld_s
   double speed_sd_mps = 0.0;
 };
@@ -26,7 +27,7 @@ struct MotionCell {
 /// Collects samples, in any order. Thread: one. Allocates with the length of the run, kLongestRun_s at most.
 class MotionLevels {
  public:
-  static constexpr double kCell_s = 0.2;
+  static constexpr double kCell_s = 0.1;
   static constexpr double kSpeedHeld_s = 1.0;
   /// Between the first cell and the last; samples beyond it, which no drive has and a forged time may, are
   /// left out.
@@ -47,6 +48,7 @@ class MotionLevels {
     Vector3 mean_omega{};
     Vector3 mean_f{};
     double omega_squares = 0.0;
+    double omega_deviation_squares = 0.0;
     double f_deviation_squares = 0.0;
     std::optional<double> speed_mps;
     double speed_sd_mps = 0.0;
