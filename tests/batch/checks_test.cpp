@@ -99,7 +99,8 @@ TEST(FindStart, TellsForcesInGAndForcesWithoutGravity) {
   expect_wrong(changed(kSame, kSame / 9.80665F), "they are in g");
   Pair pair = pair_of();
   for (auto& f : pair.reference.f_mps2) f /= 9.80665F;
-  expect_wrong(pair, "the reference's forces are 1.0");
+  expect_wrong(pair, "the reference's forces are");
+  expect_wrong(pair, "they are in g");
   pair = pair_of();
   for (auto& f : pair.study.f_mps2) f.z() += 9.81F;
   expect_wrong(pair, "forces without gravity");

@@ -33,7 +33,9 @@ TEST(LcmDatagram, NothingIsReadFromWhatIsNoWholeShortMessage) {
   for (std::size_t n = 0; n < datagram.size(); ++n) EXPECT_FALSE(read_datagram(datagram.substr(0, n))) << n;
   EXPECT_FALSE(read_datagram(test::lc02(std::string(kMaxChannelBytes + 1, 'c'), "x")));
   EXPECT_FALSE(read_datagram(test::lc02("c", std::string(kMaxDatagramBytes, 'x'))));
-  EXPECT_FALSE(read_datagram(test::lc03({10, 0, 0, 1}, std::string("c\0123456789", 12))));
+  EXPECT_FALSE(read_datagram(test::lc03({10, 0, 0, 1}, std::string("c\0"
+                                                                   "12345678910",
+                                                                   13))));
 }
 
 }  // namespace
