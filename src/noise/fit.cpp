@@ -13,6 +13,15 @@
 namespace imuscope::noise {
 namespace {
 
+/// Runs of samples; what is apart by less than a second, as single lost samples leave it, counts as one.
+std::size_t stretches_of(const std::vector<Segment>& segments, double rate_hz) {
+  constexpr double kApart_s = 1.0;
+  std::size_t n = segments.empty() ? 0 : 1;
+  for (std::size_t i = 1; i < segments.size(); ++i)
+    n += static_cast<double>(segments[i].begin - segments[i - 1].end) >= kApart_s * rate_hz ? 1 : 0;
+  return n;
+}
+
 /// Level of the J-test at which the model is said not to explain the data.
 constexpr double kRejected = 0.01;
 
@@ -191,7 +200,7 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
   if (auto checked = check(wv, spec, rate_hz, levels); !checked) return tl::unexpected(checked.error());
   FitResult result;
   result.n = wv.n_valid;
-  result.stretches = wv.segments.size();
+  result.stretches = stretches_of(wv.segments, rate_hz);
   result.rate_hz = rate_hz;
   result.spec = spec;
   result.weighting = options.weighting;

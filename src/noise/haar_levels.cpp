@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 
 // Other processors than x86 have their widest registers anyhow. What chooses between clones runs before
 // ThreadSanitizer has set itself up, and would end the program.
@@ -158,6 +159,51 @@ int highest_level(std::size_t length) noexcept {
   return length < 2 ? 0 : static_cast<int>(std::bit_width(length)) - 1;
 }
 
+double missing_excess(std::size_t n, std::size_t older, std::size_t newer) noexcept {
+  if (older == n && newer == n) return 0.0;
+  return 0.25 *
+         (1.0 / static_cast<double>(older) + 1.0 / static_cast<double>(newer) - 2.0 / static_cast<double>(n));
+}
+
+void HoleLengths::add(std::uint64_t missing) noexcept {
+  if (missing == 0) return;
+  const std::size_t scale = std::min(kScales - 1, static_cast<std::size_t>(std::bit_width(missing)) - 1);
+  samples_[scale] += static_cast<double>(missing);
+  holes_[scale] += 1.0;
+}
+
+void HoleLengths::merge(const HoleLengths& other) noexcept {
+  for (std::size_t i = 0; i < kScales; ++i) {
+    samples_[i] += other.samples_[i];
+    holes_[i] += other.holes_[i];
+  }
+}
+
+double HoleLengths::variance_within(std::span<const double> below) const noexcept {
+  const double n = std::ldexp(1.0, static_cast<int>(below.size()));
+  // m times the sum of the levels above scale log2(m), straight in log2(m) between two of them; the last
+  // factor is that of drawing without putting back.
+  const auto of_length = [&](double m) {
+    const double at = std::log2(m);
+    const auto whole = static_cast<std::size_t>(at);
+    double beyond = 0.0;
+    for (std::size_t k = below.size(); k-- > whole + 1;) beyond += below[k];
+    const double here = whole < below.size() ? below[whole] : 0.0;
+    return m * (beyond + (1.0 - (at - static_cast<double>(whole))) * here) / (1.0 - m / n);
+  };
+  double sum = 0.0;
+  double weight = 0.0;
+  for (std::size_t i = 0; i < kScales; ++i) {
+    if (holes_[i] == 0.0) continue;
+    const double m = samples_[i] / holes_[i];
+    if (m > n / 8.0) break;
+    sum += samples_[i] * of_length(m);
+    weight += samples_[i];
+  }
+  // Where only longer holes are, a half reaches into one of them by up to an eighth.
+  return weight > 0.0 ? sum / weight : of_length(std::max(1.0, n / 16.0));
+}
+
 void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vector<double>& work) {
   const int levels = std::min(static_cast<int>(sums.size()), highest_level(run.size()));
   if (levels < 1) return;
@@ -177,22 +223,65 @@ void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vec
   take_levels(work, kLowLevels + 1, levels, sums_left, sums_left, add);
 }
 
-HaarLevels::HaarLevels(std::span<const double> run) {
-  if (!run.empty()) subtract_first(run, blocks_);
+HaarLevels::HaarLevels(std::span<const double> x, std::span<const Segment> runs)
+    : begin_(runs.front().begin) {
+  const std::size_t begin = begin_;
+  const std::size_t length = runs.back().end - begin;
+  if (runs.size() == 1) {
+    subtract_first(x.subspan(begin, length), blocks_);
+    return;
+  }
+  blocks_.resize(length, 0.0);
+  before_.resize(length + 1, 0);
+  for (const Segment& run : runs) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      blocks_[i - begin] = x[i] - x[begin];
+      before_[i - begin + 1] = 1;
+    }
+  }
+  std::partial_sum(before_.begin(), before_.end(), before_.begin());
 }
 
-bool HaarLevels::append_next(std::vector<double>& coefficients) {
+void HaarLevels::append_whole(std::size_t n, std::vector<double>& coefficients) {
+  const std::size_t count = blocks_.size() - n;
+  const double scale = 0.5 / static_cast<double>(n);
+  const std::size_t had = coefficients.size();
+  coefficients.resize(had + count);
+  stretch(coefficients, had, count) = (stretch(blocks_, n, count) - stretch(blocks_, 0, count)) * scale;
+  stretch(blocks_, 0, count) += stretch(blocks_, n, count);
+}
+
+void HaarLevels::append_of_valid(std::size_t n, std::vector<double>& coefficients, double& excess,
+                                 std::vector<Segment>& places) {
+  const std::size_t count = blocks_.size() - n;
+  const std::size_t least = least_valid(n);
+  for (std::size_t s = 0; s < count; ++s) {
+    const std::size_t older = before_[s + n] - before_[s];
+    const std::size_t newer = before_[s + 2 * n] - before_[s + n];
+    if (older >= least && newer >= least) {
+      coefficients.push_back(
+          0.5 * (blocks_[s + n] / static_cast<double>(newer) - blocks_[s] / static_cast<double>(older)));
+      excess += missing_excess(n, older, newer);
+      const std::size_t newest = begin_ + s + 2 * n - 1;
+      if (places.empty() || places.back().end != newest) places.push_back({newest, newest});
+      ++places.back().end;
+    }
+    blocks_[s] += blocks_[s + n];
+  }
+}
+
+bool HaarLevels::append_next(std::vector<double>& coefficients, double& excess,
+                             std::vector<Segment>& places) {
   const std::size_t n = std::size_t{1} << static_cast<unsigned>(level_);
   if (blocks_.size() < n + 1) return false;
-  const std::size_t count = blocks_.size() - n;
-  const double scale = std::ldexp(1.0, -(level_ + 1));
-  const std::size_t before = coefficients.size();
-  coefficients.resize(before + count);
-  stretch(coefficients, before, count) = (stretch(blocks_, n, count) - stretch(blocks_, 0, count)) * scale;
-  stretch(blocks_, 0, count) += stretch(blocks_, n, count);
-  blocks_.resize(count);
+  const std::size_t had = coefficients.size();
+  if (before_.empty())
+    append_whole(n, coefficients);
+  else
+    append_of_valid(n, coefficients, excess, places);
+  blocks_.resize(blocks_.size() - n);
   ++level_;
-  return true;
+  return coefficients.size() > had;
 }
 
 }  // namespace imuscope::noise

@@ -1,16 +1,50 @@
 #pragma once
 
-/// The Haar coefficients of one run of samples, level by level, from dyadic block sums.
+/// The Haar coefficients of a signal, level by level, from dyadic block sums: of one run of samples, or of
+/// many with missing samples between them.
 ///
 /// Block sums (never prefix sums) keep the rounding error relative to the run's own variation: the first
 /// sample is subtracted before anything is added, so a large constant offset costs nothing.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 namespace imuscope::noise {
+
+/// A run of valid samples, [begin, end).
+struct Segment {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+/// Samples that half a support of n samples needs: an eighth of them may be missing. More than that, and what
+/// the half stands for is another stretch of time; less would lose the slow levels to a few lost samples.
+/// Below n = 8 none may be missing.
+constexpr std::size_t least_valid(std::size_t n) noexcept { return n - n / 8; }
+
+/// (1/c_o + 1/c_n - 2/n) / 4: what missing samples add to the expected square of a coefficient, in units of
+/// the variance within its halves (N-33).
+/// @param n  samples of half the support, of which `older` and `newer` are there
+double missing_excess(std::size_t n, std::size_t older, std::size_t newer) noexcept;
+
+/// How long the holes of a record are, by powers of two.
+class HoleLengths {
+ public:
+  void add(std::uint64_t missing) noexcept;
+  void merge(const HoleLengths& other) noexcept;
+  /// Variance of the mean of a hole's samples within half a support, times their number; mean over the
+  /// samples of the holes that the half bears (N-33).
+  /// @param below  wavelet variances of the levels below the support's: n = 2^below.size()
+  [[nodiscard]] double variance_within(std::span<const double> below) const noexcept;
+
+ private:
+  static constexpr std::size_t kScales = 40;
+  std::array<double, kScales> samples_{};
+  std::array<double, kScales> holes_{};
+};
 
 /// Sum of squared coefficients and their count at one level.
 struct LevelSum {
@@ -25,15 +59,26 @@ int highest_level(std::size_t length) noexcept;
 /// `work` is scratch; it grows to the run's length.
 void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vector<double>& work);
 
-/// Walks the levels of one run and hands out the coefficients themselves.
+/// Walks the levels of one run, or of several with missing samples between them, and hands out the
+/// coefficients themselves: half the difference of the means of the samples that are there.
 class HaarLevels {
  public:
-  explicit HaarLevels(std::span<const double> run);
-  /// Computes the next level into `coefficients` (appended). False when the run is too short for it.
-  bool append_next(std::vector<double>& coefficients);
+  /// Precondition: at least one run, in order, without overlap.
+  HaarLevels(std::span<const double> x, std::span<const Segment> runs);
+  /// Computes the next level into `coefficients` (appended). False when there is none at it.
+  /// @param excess  the sum of missing_excess() over them is added
+  /// @param places  of several runs: the stretches of the coefficients' newest samples are appended
+  bool append_next(std::vector<double>& coefficients, double& excess, std::vector<Segment>& places);
 
  private:
-  std::vector<double> blocks_;  ///< sums of 2^level_ neighbouring samples, by the oldest one's index
+  void append_whole(std::size_t n, std::vector<double>& coefficients);
+  void append_of_valid(std::size_t n, std::vector<double>& coefficients, double& excess,
+                       std::vector<Segment>& places);
+
+  std::size_t begin_;
+  std::vector<double> blocks_;  ///< sums of 2^level_ neighbouring samples, missing ones as zero
+  std::vector<std::uint32_t>
+      before_;  ///< number of valid samples before each and before the end; of one run empty
   int level_ = 0;
 };
 

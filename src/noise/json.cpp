@@ -17,12 +17,14 @@ json number(double value) { return std::isfinite(value) ? json(value) : json(nul
 json number(const std::optional<double>& value) { return value ? number(*value) : json(nullptr); }
 
 json level_to_json(const WvLevel& level, double rate_hz) {
-  return {{"level", level.level},
-          {"tau_s", level.tau_samples / rate_hz},
-          {"value", number(level.value)},
-          {"ci_low", number(level.ci_low)},
-          {"ci_high", number(level.ci_high)},
-          {"n_coefficients", level.n_coefficients}};
+  json row{{"level", level.level},
+           {"tau_s", level.tau_samples / rate_hz},
+           {"value", number(level.value)},
+           {"ci_low", number(level.ci_low)},
+           {"ci_high", number(level.ci_high)},
+           {"n_coefficients", level.n_coefficients}};
+  if (level.inflation != 1.0) row["inflation"] = level.inflation;
+  return row;
 }
 
 double number_or_nan(const json& j) {
@@ -95,6 +97,7 @@ FitResult read_fit(const json& j) {
     level.observed.ci_low = number_or_nan(row.at("ci_low"));
     level.observed.ci_high = number_or_nan(row.at("ci_high"));
     level.observed.n_coefficients = row.at("n_coefficients").get<std::uint64_t>();
+    level.observed.inflation = optional_number(row, "inflation").value_or(1.0);
     level.fitted = number_or_nan(row.at("fitted"));
     level.model_ci_low = optional_number(row, "model_ci_low").value_or(0.0);
     level.model_ci_high = optional_number(row, "model_ci_high").value_or(0.0);

@@ -59,31 +59,48 @@ void set_spreads(JointFit& joint, const std::vector<UnitEstimate>& units) {
   }
 }
 
+/// Where a replicate has the coefficients of a level, `at` samples on.
+void append_places(const WaveletVariance& wv, const WvLevel& level, std::size_t at,
+                   std::vector<Segment>& out) {
+  for (const Segment& s : level.places) out.push_back({s.begin + at, s.end + at});
+  if (!level.places.empty()) return;
+  const auto support = static_cast<std::size_t>(level.tau_samples);
+  for (const Segment& s : wv.segments) {
+    if (s.end - s.begin >= support) out.push_back({s.begin + at + support - 1, s.end + at});
+  }
+}
+
 }  // namespace
 
 WaveletVariance pool(std::span<const WaveletVariance> replicates) {
   IMUSCOPE_EXPECTS(!replicates.empty());
   WaveletVariance out;
   out.efficiency = replicates.front().efficiency;
+  std::size_t at = 0;
   for (const WaveletVariance& wv : replicates) {
     IMUSCOPE_EXPECTS(!wv.segments.empty() && wv.efficiency == out.efficiency);
-    for (const Segment& s : wv.segments)
-      out.segments.push_back({s.begin + out.n_samples, s.end + out.n_samples});
-    out.n_samples += wv.n_samples + 1;  // one sample of gap
+    for (const Segment& s : wv.segments) out.segments.push_back({s.begin + at, s.end + at});
+    out.n_samples += wv.n_samples;
     out.n_valid += wv.n_valid;
     for (std::size_t i = 0; i < wv.levels.size(); ++i) {
       const WvLevel& from = wv.levels[i];
-      if (i == out.levels.size()) {
+      const bool is_first = i == out.levels.size();
+      if (is_first) {
         out.levels.push_back(from);
-        continue;
+        out.levels.back().places.clear();
       }
       WvLevel& to = out.levels[i];
+      append_places(wv, from, at, to.places);
+      if (is_first) continue;
       const auto count = static_cast<double>(to.n_coefficients);
       const auto more = static_cast<double>(from.n_coefficients);
+      const double squares = count * to.value * to.inflation + more * from.value * from.inflation;
       to.value = (count * to.value + more * from.value) / (count + more);
       to.rejected_share = (count * to.rejected_share + more * from.rejected_share) / (count + more);
+      if (to.value > 0.0) to.inflation = squares / ((count + more) * to.value);
       to.n_coefficients += from.n_coefficients;
     }
+    at += 2 * wv.n_samples;  // further apart than any support bears
   }
   constexpr double kConfidence = 0.95;
   set_intervals(out.levels, out.efficiency, kConfidence);

@@ -16,11 +16,13 @@ constexpr std::uint64_t kSettleEvery = 1024;
 
 void WvSums::merge(const WvSums& other) {
   n_samples += other.n_samples;
+  holes.merge(other.holes);
   if (levels.size() < other.levels.size()) levels.resize(other.levels.size());
   for (std::size_t i = 0; i < other.levels.size(); ++i) {
     levels[i].squares += other.levels[i].squares;
     levels[i].weight += other.levels[i].weight;
     levels[i].weight_squares += other.levels[i].weight_squares;
+    levels[i].excess += other.levels[i].excess;
   }
 }
 
@@ -28,6 +30,7 @@ WaveletVariance WvSums::wavelet_variance(double confidence) const {
   WaveletVariance wv;
   wv.n_samples = n_samples;
   wv.n_valid = n_samples;
+  std::vector<double> excess;
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const Level& sums = levels[i];
     if (!(sums.weight > 0.0)) break;
@@ -38,7 +41,9 @@ WaveletVariance WvSums::wavelet_variance(double confidence) const {
     level.n_coefficients = static_cast<std::uint64_t>(
         std::llround(std::max(1.0, sums.weight * sums.weight / sums.weight_squares)));
     wv.levels.push_back(level);
+    excess.push_back(sums.excess / sums.weight);
   }
+  take_out_missing(wv.levels, excess, holes);
   set_intervals(wv.levels, 1.0, confidence);
   return wv;
 }
@@ -57,13 +62,15 @@ StreamingWv::StreamingWv(const StreamingOptions& options)
     length *= 2;
   }
   rings_.assign(offset, 0.0);
+  valid_.assign(offset + 1, 0);
 }
 
 void StreamingWv::reset() noexcept {
   for (Level& level : levels_) {
-    level.squares = level.recent = level.weight = level.weight_squares = 0.0;
+    level.squares = level.recent = level.weight = level.weight_squares = level.excess = 0.0;
   }
-  run_ = 0;
+  holes_ = {};
+  run_ = missing_ = 0;
   count_ = 0;
 }
 
@@ -74,59 +81,107 @@ void StreamingWv::settle() noexcept {
   }
 }
 
+void StreamingWv::miss(std::uint64_t samples) noexcept {
+  if (run_ > 0) missing_ += samples;
+}
+
 void StreamingWv::push(double x) noexcept {
   if (!std::isfinite(x)) {
-    gap();
+    miss(1);
     return;
   }
-  if (run_ == 0) reference_ = x;
+  if (run_ == 0) {
+    reference_ = x;
+    valid_[0] = 0;
+    whole_ = 0;
+  }
+  // Beyond the longest support nothing is left of what was before.
+  const auto longest = static_cast<std::uint64_t>(valid_.size());
+  if (missing_ > 0) whole_ = 0;
+  for (std::uint64_t k = std::min(missing_, longest); k > 0; --k) advance(0.0, 0);
+  holes_.add(missing_);
+  missing_ = 0;
+  ++whole_;
+  advance(x - reference_, 1);
+  if (++count_ % kSettleEvery == 0) settle();
+}
+
+/// Valid samples before `position`.
+std::uint32_t StreamingWv::valid_until(std::uint64_t position) const noexcept {
+  return valid_[position & (valid_.size() - 1)];
+}
+
+/// One position on. A missing sample adds nothing to the sums and nothing to the counts.
+void StreamingWv::advance(double x, std::uint32_t valid) noexcept {
   const std::uint64_t position = run_++;
-  double block = x - reference_;  // sum of the n newest samples, n = 1
+  // The slot that this takes is the one of a whole longest support ago, whose count is still needed.
+  const std::uint32_t oldest = valid_until(run_);
+  const std::uint32_t now = valid_until(position) + valid;
+  valid_[run_ & (valid_.size() - 1)] = now;
+  double block = x;  // sum of the n newest samples, n = 1
   for (Level& level : levels_) {
     double& slot = rings_[level.offset + (position & level.mask)];
     const double before = slot;  // sum of the n samples before those
     slot = block;
+    const std::uint64_t n = static_cast<std::uint64_t>(level.mask) + 1;
     // The ring of the next level takes only complete sums.
-    if (run_ < 2 * (static_cast<std::uint64_t>(level.mask) + 1)) break;
-    const double difference = block - before;
-    add(level, difference * difference);
+    if (run_ < 2 * n) break;
+    if (whole_ >= 2 * n) {
+      const double difference = block - before;
+      add(level, difference * difference, 0.0);
+    } else {
+      const std::uint32_t middle = valid_until(run_ - n);
+      const std::uint32_t newer = now - middle;
+      const std::uint32_t older = middle - (2 * n == valid_.size() ? oldest : valid_until(run_ - 2 * n));
+      if (newer >= least_valid(n) && older >= least_valid(n)) {
+        const auto whole = static_cast<double>(n);
+        const double difference = whole * (block / newer - before / older);
+        add(level, difference * difference, missing_excess(n, older, newer));
+      }
+    }
     block += before;
   }
-  if (++count_ % kSettleEvery == 0) settle();
 }
 
-void StreamingWv::add(Level& level, double square) const noexcept {
+void StreamingWv::add(Level& level, double square, double excess) const noexcept {
   if (keep_ < 1.0) {
     level.recent *= keep_;
     level.squares *= keep_;
     level.weight *= keep_;
     level.weight_squares *= keep_ * keep_;
+    level.excess *= keep_;
   }
   level.recent += square;
   level.weight += 1.0;
   level.weight_squares += 1.0;
+  level.excess += excess;
 }
 
 void StreamingWv::take(WvSums& out) noexcept {
   IMUSCOPE_EXPECTS(out.levels.size() == levels_.size());
   out.n_samples = count_;
+  out.holes = holes_;
   double scale = 1.0;
   for (std::size_t i = 0; i < levels_.size(); ++i) {
     Level& level = levels_[i];
     scale *= 0.25;  // 1 / (2n)^2
-    out.levels[i] = {(level.squares + level.recent) * scale, level.weight, level.weight_squares};
-    level.squares = level.recent = level.weight = level.weight_squares = 0.0;
+    out.levels[i] = {(level.squares + level.recent) * scale, level.weight, level.weight_squares,
+                     level.excess};
+    level.squares = level.recent = level.weight = level.weight_squares = level.excess = 0.0;
   }
+  holes_ = {};
   count_ = 0;
 }
 
 WvSums StreamingWv::sums() const {
   WvSums out;
   out.n_samples = count_;
+  out.holes = holes_;
   double scale = 1.0;
   for (const Level& level : levels_) {
     scale *= 0.25;  // 1 / (2n)^2
-    out.levels.push_back({(level.squares + level.recent) * scale, level.weight, level.weight_squares});
+    out.levels.push_back(
+        {(level.squares + level.recent) * scale, level.weight, level.weight_squares, level.excess});
   }
   return out;
 }

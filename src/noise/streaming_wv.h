@@ -1,7 +1,8 @@
 #pragma once
 
 /// Haar wavelet variance of a signal as it arrives: O(levels) a sample, no allocation after construction,
-/// equal to the batch result over the same samples, with gaps. Memory: 2^levels doubles (16 levels: 512 KiB).
+/// equal to the batch result over the same samples, with those that are missing. Memory: 2^levels doubles and
+/// as many counts (16 levels: 768 KiB).
 
 #include <cstdint>
 #include <vector>
@@ -27,9 +28,11 @@ struct WvSums {
     double squares = 0.0;         ///< sum of w W^2
     double weight = 0.0;          ///< sum of w
     double weight_squares = 0.0;  ///< sum of w^2
+    double excess = 0.0;          ///< sum of w missing_excess()
   };
   std::uint64_t n_samples = 0;
   std::vector<Level> levels;
+  HoleLengths holes;
 
   /// Adds the coefficients of another stretch. What would span the join is in neither, as at a gap.
   void merge(const WvSums& other);
@@ -41,10 +44,12 @@ class StreamingWv {
  public:
   explicit StreamingWv(const StreamingOptions& options = {});
 
-  /// Next sample. A value that is not finite counts as a gap. Allocates: never. Not thread-safe.
+  /// Next sample. A value that is not finite counts as missing. Allocates: never. Not thread-safe.
   void push(double x) noexcept;
-  /// Samples are missing, or the regime changed: no coefficient spans this place.
-  void gap() noexcept { run_ = 0; }
+  /// So many samples are missing here, lost or of another regime. They count when the next one comes.
+  void miss(std::uint64_t samples) noexcept;
+  /// What comes has nothing to do with what was: no coefficient spans this place.
+  void gap() noexcept { run_ = missing_ = 0; }
   /// Forgets everything, keeps the options.
   void reset() noexcept;
 
@@ -60,20 +65,28 @@ class StreamingWv {
     double recent = 0.0;   ///< part since the last settling, so that long sums keep their digits
     double weight = 0.0;
     double weight_squares = 0.0;
+    double excess = 0.0;
     std::size_t offset = 0;  ///< of this level's ring in rings_
     std::size_t mask = 0;    ///< ring length - 1
   };
 
-  void add(Level& level, double square) const noexcept;
+  void advance(double x, std::uint32_t valid) noexcept;
+  [[nodiscard]] std::uint32_t valid_until(std::uint64_t position) const noexcept;
+  void add(Level& level, double square, double excess) const noexcept;
   void settle() noexcept;
 
   StreamingOptions options_;
   double keep_ = 1.0;
   std::vector<Level> levels_;
   std::vector<double> rings_;  ///< for each level the sums of n = 2^(level-1) samples, the last n of them
+  /// Valid samples since the last gap, modulo 2^32, at each of the last 2^levels positions.
+  std::vector<std::uint32_t> valid_;
+  HoleLengths holes_;
   double reference_ = 0.0;
-  std::uint64_t run_ = 0;    ///< samples since the last gap
-  std::uint64_t count_ = 0;  ///< samples taken
+  std::uint64_t run_ = 0;      ///< positions since the last gap
+  std::uint64_t missing_ = 0;  ///< positions that wait for the next sample
+  std::uint64_t whole_ = 0;    ///< positions since the last missing sample
+  std::uint64_t count_ = 0;    ///< samples taken
 };
 
 /// The wavelet variance of the last `blocks` blocks of `block_length` samples: a sliding window that moves by
@@ -85,6 +98,7 @@ class WindowedWv {
 
   /// Allocates: never. True when this sample completed a block.
   bool push(double x) noexcept;
+  void miss(std::uint64_t samples) noexcept { stream_.miss(samples); }
   void gap() noexcept { stream_.gap(); }
 
   /// Over the complete blocks of the window.

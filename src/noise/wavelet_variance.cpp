@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "noise/chi_squared.h"
@@ -48,46 +49,99 @@ Result<void> check(std::span<const double> x, const WvOptions& options) {
   return {};
 }
 
-std::vector<WvLevel> classical_levels(std::span<const double> x, const std::vector<Segment>& segments,
-                                      int levels) {
-  std::vector<LevelSum> sums(static_cast<std::size_t>(levels));
+WvLevel level_of(int j, double value, std::uint64_t count) {
+  WvLevel level;
+  level.level = j;
+  level.tau_samples = std::ldexp(1.0, j);
+  level.value = value;
+  level.n_coefficients = count;
+  return level;
+}
+
+/// Of one run, block by block in cache.
+std::vector<WvLevel> whole_levels(std::span<const double> run, int levels) {
+  std::vector<LevelSum> sums(static_cast<std::size_t>(std::min(levels, highest_level(run.size()))));
   std::vector<double> work;
-  for (const Segment& s : segments) add_squares(x.subspan(s.begin, s.end - s.begin), sums, work);
+  add_squares(run, sums, work);
   std::vector<WvLevel> result;
-  for (int j = 1; j <= levels; ++j) {
-    const LevelSum& sum = sums[static_cast<std::size_t>(j - 1)];
-    WvLevel level;
-    level.level = j;
-    level.tau_samples = std::ldexp(1.0, j);
-    level.n_coefficients = sum.count;
-    level.value = sum.sum_of_squares / static_cast<double>(sum.count);
-    result.push_back(level);
+  for (const LevelSum& sum : sums) {
+    result.push_back(level_of(static_cast<int>(result.size()) + 1,
+                              sum.sum_of_squares / static_cast<double>(sum.count), sum.count));
   }
   return result;
 }
 
-std::vector<WvLevel> robust_levels(std::span<const double> x, const std::vector<Segment>& segments,
-                                   int levels, double c) {
-  std::vector<HaarLevels> runs;
-  for (const Segment& s : segments) runs.emplace_back(x.subspan(s.begin, s.end - s.begin));
-  std::vector<WvLevel> result;
-  std::vector<double> coefficients;
-  for (int j = 1; j <= levels; ++j) {
-    coefficients.clear();
-    for (HaarLevels& run : runs) run.append_next(coefficients);
-    const RobustScale scale = biweight_scale(coefficients, c);
-    WvLevel level;
-    level.level = j;
-    level.tau_samples = std::ldexp(1.0, j);
-    level.n_coefficients = coefficients.size();
-    level.value = scale.s2;
-    level.rejected_share = scale.rejected_share;
-    result.push_back(level);
+double mean_square(const std::vector<double>& values) {
+  const Eigen::Map<const Eigen::ArrayXd> all(values.data(), static_cast<Eigen::Index>(values.size()));
+  return all.square().sum() / static_cast<double>(values.size());
+}
+
+WvLevel with_scale(int j, const std::vector<double>& coefficients, const std::optional<double>& c) {
+  if (!c) return level_of(j, mean_square(coefficients), coefficients.size());
+  const RobustScale scale = biweight_scale(coefficients, *c);
+  WvLevel level = level_of(j, scale.s2, coefficients.size());
+  level.rejected_share = scale.rejected_share;
+  return level;
+}
+
+/// Joins stretches over the shortest holes, until there are kMostPlaces of them.
+std::vector<Segment> joined(const std::vector<Segment>& places) {
+  if (places.size() <= kMostPlaces) return places;
+  std::vector<std::size_t> holes;
+  for (std::size_t i = 1; i < places.size(); ++i) holes.push_back(places[i].begin - places[i - 1].end);
+  const auto last_kept = holes.begin() + static_cast<std::ptrdiff_t>(kMostPlaces - 1);
+  std::nth_element(holes.begin(), last_kept, holes.end(), std::greater<>());
+  const std::size_t longest = *last_kept;
+  std::vector<Segment> out{places.front()};
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    if (places[i].begin - out.back().end > longest)
+      out.push_back(places[i]);
+    else
+      out.back().end = places[i].end;
   }
+  return out;
+}
+
+/// Level by level, as far as there are coefficients.
+/// @param c  the biweight's constant; absent: classical
+std::vector<WvLevel> levels_by_coefficients(std::span<const double> x, const std::vector<Segment>& segments,
+                                            int levels, const std::optional<double>& c) {
+  HaarLevels haar(x, segments);
+  std::vector<WvLevel> result;
+  std::vector<double> excess;
+  std::vector<double> coefficients;
+  std::vector<Segment> places;
+  double sum = 0.0;
+  for (int j = 1; j <= levels && haar.append_next(coefficients, sum, places); ++j) {
+    result.push_back(with_scale(j, coefficients, c));
+    result.back().places = joined(places);
+    places.clear();
+    excess.push_back(sum / static_cast<double>(coefficients.size()));
+    coefficients.clear();
+    sum = 0.0;
+  }
+  HoleLengths holes;
+  for (std::size_t i = 1; i < segments.size(); ++i) holes.add(segments[i].begin - segments[i - 1].end);
+  take_out_missing(result, excess, holes);
   return result;
 }
 
 }  // namespace
+
+void take_out_missing(std::vector<WvLevel>& levels, std::span<const double> excess,
+                      const HoleLengths& holes) {
+  // Where missing samples make nearly all of a level (of quantization alone), its own part is not told better
+  // than this.
+  constexpr double kLeastShare = 1.0 / 16.0;
+  std::vector<double> below;
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    const double raw = levels[i].value;
+    if (excess[i] > 0.0)
+      levels[i].value = std::max(raw - excess[i] * holes.variance_within(below), kLeastShare * raw);
+    levels[i].inflation = levels[i].value > 0.0 ? raw / levels[i].value : 1.0;
+    below.push_back(levels[i].value);
+  }
+}
 
 bool has_enough_coefficients(const WvLevel& level, double efficiency) noexcept {
   constexpr double kEnough = 3.0;
@@ -137,25 +191,27 @@ Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const W
     wv.n_valid += s.end - s.begin;
     longest = std::max(longest, s.end - s.begin);
   }
-  const int possible = highest_level(longest);
-  if (possible < 1) {
+  if (longest < 2) {
     return work_error(
         fmt::format("the longest run of valid samples has {} of the signal's {}", longest, x.size()),
         "a wavelet variance needs at least 2 in a row");
   }
-  if (options.levels > possible) {
-    return work_error(
-        fmt::format("{} levels need {} valid samples in a row, and the longest run has {}", options.levels,
-                    std::uint64_t{1} << static_cast<unsigned>(options.levels), longest),
-        fmt::format("ask for at most {} levels", possible));
-  }
-  const int levels = options.levels > 0 ? options.levels : std::min(possible, kMaxLevel);
+  const int wanted = options.levels > 0 ? options.levels : kMaxLevel;
   if (options.robust) {
     const double c = options.robust->tuning_constant.value_or(biweight_constant(options.robust->efficiency));
     wv.efficiency = options.robust->efficiency;
-    wv.levels = robust_levels(x, wv.segments, levels, c);
+    wv.levels = levels_by_coefficients(x, wv.segments, wanted, c);
+  } else if (wv.segments.size() > 1) {
+    wv.levels = levels_by_coefficients(x, wv.segments, wanted, std::nullopt);
   } else {
-    wv.levels = classical_levels(x, wv.segments, levels);
+    wv.levels = whole_levels(x.subspan(wv.segments.front().begin, longest), wanted);
+  }
+  if (const auto possible = static_cast<int>(wv.levels.size()); options.levels > possible) {
+    return work_error(
+        fmt::format("{} levels need {} samples with few missing, and the longest run of valid "
+                    "samples has {}",
+                    options.levels, std::uint64_t{1} << static_cast<unsigned>(options.levels), longest),
+        fmt::format("ask for at most {} levels", possible));
   }
   set_intervals(wv.levels, wv.efficiency, options.confidence);
   return wv;

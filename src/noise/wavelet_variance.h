@@ -3,8 +3,9 @@
 /// Haar wavelet variance (maximal overlap) of a signal, whole or through a mask.
 ///
 /// W_{j,t} = (mean of the n newest samples - mean of the n before) / 2, n = 2^(j-1); wv_j = mean of W_{j,t}^2
-/// over all t whose 2^j samples are valid (no mean subtraction). It is half the Allan variance at cluster
-/// size n.
+/// over all t (no mean subtraction). It is half the Allan variance at cluster size n. Of missing samples each
+/// half bears up to an eighth of its own (haar_levels.h): the means are of those that are there, and what
+/// their absence adds to the squares is taken out, so that single lost samples cost information and no scale.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,14 +14,13 @@
 #include <vector>
 
 #include "base/result.h"
+#include "noise/haar_levels.h"
 
 namespace imuscope::noise {
 
-/// A run of valid samples, [begin, end).
-struct Segment {
-  std::size_t begin = 0;
-  std::size_t end = 0;
-};
+/// Stretches of coefficients that are told apart: beyond them, what is missing in between is missing at
+/// random.
+inline constexpr std::size_t kMostPlaces = 64;
 
 /// Wavelet variance at one level, with its confidence interval.
 struct WvLevel {
@@ -31,6 +31,11 @@ struct WvLevel {
   double ci_high = 0.0;
   std::uint64_t n_coefficients = 0;  ///< M_j
   double rejected_share = 0.0;       ///< robust only: share of coefficients with weight zero
+  /// Mean square of the coefficients over `value`, which is less by what missing samples add; 1 without any.
+  double inflation = 1.0;
+  /// Stretches of the newest samples of its coefficients, joined over the shortest holes where there are more
+  /// than kMostPlaces; empty: those of the runs of samples (of one run, and where that is not known).
+  std::vector<Segment> places{};
 };
 
 /// Efficiency times M_j >= 3 * 2^j: near enough to Gaussian for tests and bounds. `efficiency` is that of the
@@ -55,9 +60,10 @@ struct RobustOptions {
 
 /// Which samples are used, how many levels, and by which estimator: the classical one unless `robust` is set.
 struct WvOptions {
-  int levels = 0;  ///< 0: as many as the longest run of valid samples allows, floor(log2)
+  int levels = 0;  ///< 0: as many as have a coefficient
   std::optional<RobustOptions> robust;
-  /// One entry a sample, non-zero = valid (a regime, no gap before inside). Empty: all valid.
+  /// One entry a sample, non-zero = valid; zero is a missing sample or one of another regime. Empty: all
+  /// valid.
   std::span<const std::uint8_t> mask;
   bool nan_is_gap =
       false;  ///< otherwise a NaN or infinity in a valid sample is an error that names its place
@@ -66,11 +72,15 @@ struct WvOptions {
 
 /// Errors (kWork): fewer than 2 samples in every run; a value that is not finite; a mask of another length;
 /// more levels asked for than the data allow. A constant signal is not an error: its levels are all zero.
-/// Memory beyond the input: one copy of the longest run (two when robust). Thread-safe.
+/// Memory beyond the input: one copy of the signal (two when robust or with missing samples). Thread-safe.
 Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const WvOptions& options = {});
 
 /// Runs of non-zero mask entries that do not hold a non-finite value.
 std::vector<Segment> valid_segments(std::span<const double> x, std::span<const std::uint8_t> mask);
+
+/// Takes out of each level what missing samples add to its squares (N-33).
+/// @param excess  mean over the level's coefficients of missing_excess()
+void take_out_missing(std::vector<WvLevel>& levels, std::span<const double> excess, const HoleLengths& holes);
 
 /// The interval [eta wv / chi2_{1-alpha/2}(eta), eta wv / chi2_{alpha/2}(eta)], eta = max(M_j / 2^j, 1).
 /// `efficiency` below 1 widens it by 1/sqrt(efficiency) around the value.

@@ -336,35 +336,47 @@ class CrossCovariance {
   bool tail_ = false;
 };
 
-/// Number of coefficient pairs (t of level j, t + h of level k) as a function of the lag.
+/// Where a level has coefficients: stretches of their newest samples, and the share of these that it keeps.
+struct LevelPlaces {
+  std::vector<Segment> places;  ///< empty: one stretch, that ends at the newest sample
+  double kept = 1.0;
+  double width = 0.0;        ///< 2^j
+  bool bears_holes = false;  ///< single missing samples; where not, what it loses depends on the overlap
+};
+
+LevelPlaces places_of(const WaveletVariance& wv, const WvLevel& level) {
+  LevelPlaces out;
+  out.width = level.tau_samples;
+  const auto n = static_cast<std::size_t>(0.5 * level.tau_samples);
+  out.bears_holes = least_valid(n) < n;
+  out.places = level.places;
+  if (out.places.empty() && wv.segments.size() > 1) {
+    for (const Segment& s : wv.segments) {
+      if (s.end - s.begin >= 2 * n) out.places.push_back({s.begin + 2 * n - 1, s.end});
+    }
+  }
+  double positions = 0.0;
+  for (const Segment& s : out.places) positions += static_cast<double>(s.end - s.begin);
+  if (positions > 0.0) out.kept = std::min(1.0, static_cast<double>(level.n_coefficients) / positions);
+  return out;
+}
+
+/// N_jk(h) of N-8: pairs of coefficients at a lag. In runs joined over missing samples a share of the
+/// positions is kept (N-34).
 class PairCounts {
  public:
-  PairCounts(const WaveletVariance& wv, const WvLevel& j, const WvLevel& k)
-      : segments_(wv.segments),
+  PairCounts(const WvLevel& j, const WvLevel& k, const LevelPlaces& at_j, const LevelPlaces& at_k)
+      : j_(at_j),
+        k_(at_k),
         m_j_(static_cast<double>(j.n_coefficients)),
-        m_k_(static_cast<double>(k.n_coefficients)),
-        width_j_(j.tau_samples),
-        width_k_(k.tau_samples) {}
+        m_k_(static_cast<double>(k.n_coefficients)) {}
 
   [[nodiscard]] double operator()(double h) const {
-    if (segments_.size() < 2) {
+    if (j_.places.empty() || k_.places.empty()) {
       // Both runs end at the newest sample.
       return std::max(0.0, std::min(0.0, -h) - std::max(-m_j_, -m_k_ - h));
     }
-    double sum = 0.0;
-    std::size_t first = 0;
-    for (const Segment& s : segments_) {
-      const double begin = static_cast<double>(s.begin) + width_j_ - 1.0 + h;
-      const double end = static_cast<double>(s.end) + h;
-      if (begin >= end) continue;
-      while (first < segments_.size() && static_cast<double>(segments_[first].end) <= begin) ++first;
-      for (std::size_t i = first; i < segments_.size(); ++i) {
-        const double from = static_cast<double>(segments_[i].begin) + width_k_ - 1.0;
-        if (from >= end) break;
-        sum += std::max(0.0, std::min(end, static_cast<double>(segments_[i].end)) - std::max(begin, from));
-      }
-    }
-    return sum;
+    return kept_together(h) * positions(h);
   }
 
   /// Lags beyond these have no pairs.
@@ -372,16 +384,44 @@ class PairCounts {
   [[nodiscard]] double highest() const { return extent(); }
 
  private:
-  [[nodiscard]] double extent() const {
-    if (segments_.size() < 2) return std::max(m_j_, m_k_);
-    return static_cast<double>(segments_.back().end - segments_.front().begin);
+  [[nodiscard]] double positions(double h) const {
+    double sum = 0.0;
+    std::size_t first = 0;
+    for (const Segment& s : j_.places) {
+      const double begin = static_cast<double>(s.begin) + h;
+      const double end = static_cast<double>(s.end) + h;
+      while (first < k_.places.size() && static_cast<double>(k_.places[first].end) <= begin) ++first;
+      for (std::size_t i = first; i < k_.places.size(); ++i) {
+        const auto from = static_cast<double>(k_.places[i].begin);
+        if (from >= end) break;
+        sum += std::max(0.0, std::min(end, static_cast<double>(k_.places[i].end)) - std::max(begin, from));
+      }
+    }
+    return sum;
   }
 
-  const std::vector<Segment>& segments_;
+  /// Chance that both coefficients of a pair are kept. What overlaps is kept or lost together, where no
+  /// missing sample is borne; of one level always.
+  [[nodiscard]] double kept_together(double h) const {
+    const double both = j_.kept * k_.kept;
+    if (both == 1.0) return 1.0;
+    if (j_.width != k_.width && (j_.bears_holes || k_.bears_holes)) return both;
+    // The supports end at 0 and at h.
+    const double overlap = std::max(0.0, std::min(0.0, h) - std::max(-j_.width, h - k_.width));
+    const double most = std::max(j_.kept, k_.kept);
+    return both * std::pow(most, -overlap / std::min(j_.width, k_.width));
+  }
+
+  [[nodiscard]] double extent() const {
+    if (j_.places.empty() || k_.places.empty()) return std::max(m_j_, m_k_);
+    return static_cast<double>(std::max(j_.places.back().end, k_.places.back().end) -
+                               std::min(j_.places.front().begin, k_.places.front().begin));
+  }
+
+  const LevelPlaces& j_;
+  const LevelPlaces& k_;
   double m_j_;
   double m_k_;
-  double width_j_;
-  double width_k_;
 };
 
 /// Sum of f over the integers of [low, high]. Between its break points f is smooth, the more so the further
@@ -510,7 +550,7 @@ double spectrum_at(const Parts& parts, double b) {
 /// Quantization is a difference of uniform numbers, whose fourth cumulant narrows the wavelet variance's
 /// spread by kappa q2^2 sum_i A_j(i) A_k(i) / (M_j M_k), A_j(i) the summed squared weights of number i at
 /// level j.
-double uniform_correction(double q2, const WaveletVariance& wv, const WvLevel& j, const WvLevel& k) {
+double uniform_correction(double q2, const std::vector<Segment>& runs, const WvLevel& j, const WvLevel& k) {
   constexpr double kExcessKurtosis = -1.2;
   const double n_j = 0.5 * j.tau_samples;
   const double n_k = 0.5 * k.tau_samples;
@@ -531,19 +571,20 @@ double uniform_correction(double q2, const WaveletVariance& wv, const WvLevel& j
     return sum;
   };
   double sum = 0.0;
-  for (const Segment& s : wv.segments) sum += overlap_of_run(static_cast<double>(s.end - s.begin));
+  for (const Segment& s : runs) sum += overlap_of_run(static_cast<double>(s.end - s.begin));
   const auto count_j = static_cast<double>(j.n_coefficients);
   const auto count_k = static_cast<double>(k.n_coefficients);
-  if (wv.segments.empty()) sum = overlap_of_run(std::min(count_j + 2.0 * n_j, count_k + 2.0 * n_k) - 1.0);
+  if (runs.empty()) sum = overlap_of_run(std::min(count_j + 2.0 * n_j, count_k + 2.0 * n_k) - 1.0);
   const double scale = 1.0 / (16.0 * n_j * n_j * n_k * n_k);
   return kExcessKurtosis * q2 * q2 * scale * sum / (count_j * count_k);
 }
 
-double covariance_of_pair(const Parts& parts, const WaveletVariance& wv, const WvLevel& j, const WvLevel& k,
+double covariance_of_pair(const Parts& parts, const WvLevel& j, const WvLevel& k, const LevelPlaces& at_j,
+                          const LevelPlaces& at_k, const std::vector<Segment>& runs,
                           const std::vector<double>& robust_terms) {
   const double n_j = 0.5 * j.tau_samples;
   const double n_k = 0.5 * k.tau_samples;
-  const PairCounts pairs(wv, j, k);
+  const PairCounts pairs(j, k, at_j, at_k);
   const double means = 4.0 * (0.5 * parts.ramp * n_j) * (0.5 * parts.ramp * n_k);
   const double centre = n_k - n_j;
   RobustTerms robust;
@@ -575,13 +616,33 @@ double covariance_of_pair(const Parts& parts, const WaveletVariance& wv, const W
   const double count_j = static_cast<double>(j.n_coefficients);
   const double count_k = static_cast<double>(k.n_coefficients);
   double result = sum.between(breaks, 0.0, high) / (count_j * count_k);
-  if (parts.uniform > 0.0) result += uniform_correction(parts.uniform, wv, j, k);
+  if (parts.uniform > 0.0) result += uniform_correction(parts.uniform, runs, j, k);
   for (const Component& s : parts.sinusoids) {
     const double b = s.shape[0];
     result += 2.0 * s.amplitude * gain_at(b, n_j) * gain_at(b, n_k) * spectrum_at(parts, b) /
               std::max(count_j, count_k);
   }
   return result;
+}
+
+/// @param robust_terms  of N-11; empty: classical
+Eigen::MatrixXd covariance(const Model& model, const WaveletVariance& wv, std::size_t levels,
+                           const std::vector<double>& robust_terms) {
+  const Parts parts = parts_of(model);
+  const auto size = static_cast<Eigen::Index>(levels);
+  Eigen::MatrixXd v(size, size);
+  std::vector<LevelPlaces> places;
+  for (std::size_t j = 0; j < levels; ++j) places.push_back(places_of(wv, wv.levels[j]));
+  for (std::size_t j = 0; j < levels; ++j) {
+    for (std::size_t k = 0; k <= j; ++k) {
+      const double value = wv.levels[j].inflation * wv.levels[k].inflation *
+                           covariance_of_pair(parts, wv.levels[j], wv.levels[k], places[j], places[k],
+                                              wv.segments, robust_terms);
+      v(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) = value;
+      v(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = value;
+    }
+  }
+  return v;
 }
 
 }  // namespace
@@ -592,19 +653,14 @@ double coefficient_covariance(const Model& model, int level_j, int level_k, doub
 }
 
 Eigen::MatrixXd wv_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels) {
-  const Parts parts = parts_of(model);
-  const auto size = static_cast<Eigen::Index>(levels);
-  std::vector<double> robust_terms;
-  if (wv.efficiency < 1.0) robust_terms = biweight_correlation_terms(wv.efficiency);
-  Eigen::MatrixXd v(size, size);
-  for (std::size_t j = 0; j < levels; ++j) {
-    for (std::size_t k = 0; k <= j; ++k) {
-      const double value = covariance_of_pair(parts, wv, wv.levels[j], wv.levels[k], robust_terms);
-      v(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) = value;
-      v(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = value;
-    }
-  }
-  return v;
+  return covariance(model, wv, levels,
+                    wv.efficiency < 1.0 ? biweight_correlation_terms(wv.efficiency) : std::vector<double>{});
+}
+
+Eigen::MatrixXd robust_loss(const Model& model, const WaveletVariance& robust, std::size_t levels) {
+  auto terms = biweight_correlation_terms(robust.efficiency);
+  terms.front() = 0.0;  // that of the classical one
+  return covariance(model, robust, levels, terms);
 }
 
 }  // namespace imuscope::noise

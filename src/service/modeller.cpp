@@ -64,17 +64,23 @@ void ModelBook::set_options(noise::ModelSpec spec, double refit_interval_s) {
 }
 
 void ModelBook::push(Study& study, const ErrorRow& row) {
-  const bool joined = study.started && row.counter == study.next_counter && row.regime == study.regime;
-  const auto regime = static_cast<std::size_t>(row.regime);
+  const bool joined = study.started && row.counter > study.next_counter - 1;
+  const auto lost = static_cast<std::uint64_t>(joined ? row.counter - study.next_counter : 0);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    auto& stream = study.tracks[axis][regime].recent;
     const bool valid = axis < 3 ? row.gyro_valid : row.accel_valid;
-    if (!joined || !valid) stream.gap();
-    if (valid) stream.push(axis < 3 ? row.e_gyro_radps[axis] : row.e_accel_mps2[axis - 3]);
+    for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {
+      auto& stream = study.tracks[axis][static_cast<std::size_t>(regime)].recent;
+      if (study.started && !joined) stream.gap();
+      stream.miss(lost);
+      // To the one regime, a sample of the other is missing.
+      if (valid && row.regime == regime)
+        stream.push(axis < 3 ? row.e_gyro_radps[axis] : row.e_accel_mps2[axis - 3]);
+      else
+        stream.miss(1);
+    }
   }
   study.started = true;
   study.next_counter = row.counter + 1;
-  study.regime = row.regime;
 }
 
 void ModelBook::add(const ErrorRecord& record) {

@@ -79,7 +79,6 @@ class ModelBook {
     MotionBook motion;
     bool started = false;
     std::int64_t next_counter = 0;
-    Regime regime = Regime::kStatic;
     HostTime last_time{};
     UtcStamp last_utc{};
     HostTime first_reference_time{};

@@ -70,20 +70,26 @@ struct Run {
   HostTime origin;
 };
 
-/// Windows without a gap inside one stretch of the regime.
+/// Windows inside one stretch of the regime, in which an eighth of the samples may be missing.
 std::vector<Window> windows_of(const NoiseSeries& series, const TemperatureTrack& temperature,
                                std::size_t axis, std::size_t length, const Run& run) {
   std::vector<Window> windows;
   const auto mask = series.mask(axis);
   const auto& values = series.values(axis);
   std::size_t begin = 0;
+  std::size_t missing = 0;
   for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (mask[i] == 0 || run.motion.at(series.time(i)) != run.regime) {
+    const bool outside = run.motion.at(series.time(i)) != run.regime;
+    missing += mask[i] == 0 ? 1 : 0;
+    if (outside || (mask[i] == 0 && begin == i) || missing > length - noise::least_valid(length)) {
       begin = i + 1;
+      missing = 0;
       continue;
     }
     if (i + 1 - begin < length) continue;
-    auto wv = noise::haar_wavelet_variance({values.data() + begin, length});
+    noise::WvOptions options;
+    options.mask = {mask.data() + begin, length};
+    auto wv = noise::haar_wavelet_variance({values.data() + begin, length}, options);
     if (wv) {
       const HostTime first = series.time(begin);
       const HostTime last = series.time(i);
@@ -93,6 +99,7 @@ std::vector<Window> windows_of(const NoiseSeries& series, const TemperatureTrack
           {std::move(*wv), to_seconds(first - run.origin) + 0.5 * to_seconds(last - first), drivers});
     }
     begin = i + 1;
+    missing = 0;
   }
   return windows;
 }

@@ -6,6 +6,7 @@
 #include "noise/compare.h"
 #include "noise/holm.h"
 #include "noise/lines.h"
+#include "noise/tails.h"
 #include "noise/wavelet_variance.h"
 #include "service/models_file.h"
 
@@ -74,6 +75,12 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
                        wv->levels.size() < levels_of_whole ? "; its stretches are too short" : ""));
     return wv->levels.size();
   }
+  // The whole run is a mixture of its regimes: nobody expects one Gaussian process of it.
+  const auto spikes =
+      regime == kWholeRun
+          ? std::nullopt
+          : noise::spike_warning(noise::test_tails(job.values, options, fit->model), job.device.rate_hz);
+  if (spikes) fit->warnings.insert(fit->warnings.begin(), *spikes);
   job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), lines});
   return wv->levels.size();
 }

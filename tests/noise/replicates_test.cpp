@@ -28,23 +28,32 @@ std::vector<WaveletVariance> replicates(const std::vector<double>& sds, unsigned
   return out;
 }
 
-TEST(Replicates, PooledEqualsOneRecordWithGaps) {
+TEST(Replicates, PooledIsTheMeanOverTheCoefficientsOfAll) {
   auto x = series(3000, 1.0, 1);
-  std::vector<std::uint8_t> mask(x.size(), 1);
-  mask[1000] = 0;
-  mask[2100] = 0;
-  WvOptions options;
-  options.mask = mask;
-  const auto whole = haar_wavelet_variance(x, options).value();
   const std::span<const double> all(x);
-  const auto pooled = pool(std::vector{haar_wavelet_variance(all.subspan(0, 1000)).value(),
-                                       haar_wavelet_variance(all.subspan(1001, 1099)).value(),
-                                       haar_wavelet_variance(all.subspan(2101)).value()});
-  ASSERT_EQ(pooled.levels.size(), whole.levels.size());
-  for (std::size_t i = 0; i < whole.levels.size(); ++i) {
-    EXPECT_NEAR(pooled.levels[i].value / whole.levels[i].value, 1.0, 1e-12);
-    EXPECT_EQ(pooled.levels[i].n_coefficients, whole.levels[i].n_coefficients);
+  const std::vector parts{haar_wavelet_variance(all.subspan(0, 1000)).value(),
+                          haar_wavelet_variance(all.subspan(1001, 1099)).value(),
+                          haar_wavelet_variance(all.subspan(2101)).value()};
+  const auto pooled = pool(parts);
+  ASSERT_EQ(pooled.levels.size(), parts[1].levels.size());
+  for (std::size_t i = 0; i < pooled.levels.size(); ++i) {
+    double sum = 0.0;
+    std::uint64_t count = 0;
+    for (const auto& part : parts) {
+      if (i >= part.levels.size()) continue;
+      count += part.levels[i].n_coefficients;
+      sum += part.levels[i].value * static_cast<double>(part.levels[i].n_coefficients);
+    }
+    EXPECT_EQ(pooled.levels[i].n_coefficients, count);
+    EXPECT_NEAR(pooled.levels[i].value / (sum / static_cast<double>(count)), 1.0, 1e-12);
+    EXPECT_NEAR(pooled.levels[i].inflation, 1.0, 1e-12);
   }
+  // Nothing spans the joins: three runs stay three in the covariance as well.
+  EXPECT_EQ(pooled.levels[8].places.size(), 3u);
+  EXPECT_EQ(pooled.levels[9].places.size(), 1u) << "only the second lasts 1024 samples";
+  ASSERT_EQ(pooled.segments.size(), 3u);
+  for (std::size_t k = 1; k < 3; ++k)
+    EXPECT_GT(pooled.segments[k].begin - pooled.segments[k - 1].end, 1024u / 8u);
 }
 
 TEST(Replicates, EqualReplicatesPassAndOneWithMoreNoiseFailsTheTestOfHomogeneity) {

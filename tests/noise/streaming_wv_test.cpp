@@ -6,6 +6,8 @@
 #include <limits>
 #include <random>
 
+#include "noise/replicates.h"
+
 namespace imuscope::noise {
 namespace {
 
@@ -36,41 +38,53 @@ TEST(StreamingWv, EqualsTheBatchResultOverALongSeries) {
   expect_equal(stream.wavelet_variance(), haar_wavelet_variance(x, options).value());
 }
 
-TEST(StreamingWv, EqualsTheMaskedBatchResultAcrossGapsNotANumberAndRegimeChanges) {
-  auto x = walk_and_noise(5000, 2);
+TEST(StreamingWv, EqualsTheMaskedBatchResultOverMissingSamplesNotANumberAndOtherRegimes) {
+  auto x = walk_and_noise(20000, 2);
   std::vector<std::uint8_t> mask(x.size(), 1);
-  StreamingWv stream({10, 0.0, 0.95});
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (i == 700 || i == 701 || i == 4100) {
-      mask[i] = 0;
-      stream.push(std::numeric_limits<double>::quiet_NaN());
-    } else if (i >= 2000 && i < 2300) {
-      mask[i] = 0;
-      stream.gap();
-    } else {
-      stream.push(x[i]);
-    }
+  std::mt19937_64 random(7);
+  for (std::size_t i = 1; i + 1 < x.size(); ++i) {
+    const bool other_regime = (i >= 2000 && i < 2300) || (i >= 9000 && i < 14000);
+    if (other_regime || random() % 50 == 0) mask[i] = 0;
   }
+  StreamingWv stream({11, 0.0, 0.95});
+  stream.miss(5);  // before the first sample nothing is missing
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (mask[i] != 0)
+      stream.push(x[i]);
+    else if (i % 2 == 0)
+      stream.push(std::numeric_limits<double>::quiet_NaN());
+    else
+      stream.miss(1);
+  }
+  stream.miss(100);  // behind the last one neither
   WvOptions options;
-  options.levels = 10;
+  options.levels = 11;
   options.mask = mask;
-  expect_equal(stream.wavelet_variance(), haar_wavelet_variance(x, options).value());
+  const auto batch = haar_wavelet_variance(x, options).value();
+  expect_equal(stream.wavelet_variance(), batch);
+  for (std::size_t i = 0; i < batch.levels.size(); ++i)
+    EXPECT_NEAR(stream.wavelet_variance().levels[i].inflation, batch.levels[i].inflation, 1e-10);
+  EXPECT_GT(batch.levels[5].inflation, 1.01);
 }
 
-TEST(StreamingWv, MergedSumsOfTwoStretchesEqualABatchWithAGapBetweenThem) {
+TEST(StreamingWv, MergedSumsOfTwoStretchesEqualTheirBatchesPooled) {
   const auto x = walk_and_noise(3000, 3);
   StreamingWv first({9, 0.0, 0.95});
-  StreamingWv second({9, 0.0, 0.95});
   for (std::size_t i = 0; i < 1234; ++i) first.push(x[i]);
-  for (std::size_t i = 1235; i < x.size(); ++i) second.push(x[i]);
-  std::vector<std::uint8_t> mask(x.size(), 1);
-  mask[1234] = 0;
+  first.gap();
+  for (std::size_t i = 1234; i < x.size(); ++i) first.push(x[i]);
+  StreamingWv second({9, 0.0, 0.95});
+  for (std::size_t i = 100; i < 2000; ++i) second.push(x[i]);
   WvOptions options;
   options.levels = 9;
-  options.mask = mask;
+  const std::span<const double> all(x);
+  const auto batch = [&](std::size_t begin, std::size_t end) {
+    return haar_wavelet_variance(all.subspan(begin, end - begin), options).value();
+  };
   WvSums sums = first.sums();
   sums.merge(second.sums());
-  expect_equal(sums.wavelet_variance(), haar_wavelet_variance(x, options).value());
+  expect_equal(sums.wavelet_variance(),
+               pool(std::vector{batch(0, 1234), batch(1234, 3000), batch(100, 2000)}));
 }
 
 TEST(StreamingWv, HasOnlyTheLevelsThatTheSamplesSoFarAllow) {

@@ -221,7 +221,35 @@ TEST(WaveletVariance, AnOffsetThatTheInputCarriesExactlyChangesNothing) {
   }
 }
 
-TEST(WaveletVariance, AMaskKeepsOnlyCoefficientsWhoseWholeSupportIsValid) {
+/// By N-1 and N-33, coefficient by coefficient: squares, count and mean excess of a level.
+struct ByDefinition {
+  double squares = 0.0;
+  double excess = 0.0;
+  std::uint64_t count = 0;
+};
+ByDefinition by_definition(const std::vector<double>& x, const std::vector<std::uint8_t>& mask,
+                           std::size_t n) {
+  ByDefinition out;
+  for (std::size_t t = 0; t + 2 * n <= x.size(); ++t) {
+    double sums[2] = {0.0, 0.0};
+    double there[2] = {0.0, 0.0};
+    for (std::size_t i = 0; i < 2 * n; ++i) {
+      if (mask[t + i] == 0) continue;
+      sums[i / n] += x[t + i];
+      there[i / n] += 1.0;
+    }
+    const auto all = static_cast<double>(n);
+    const double least = all - std::floor(all / 8.0);
+    if (there[0] < least || there[1] < least) continue;
+    const double w = 0.5 * (sums[1] / there[1] - sums[0] / there[0]);
+    out.squares += w * w;
+    out.excess += 0.25 * (1.0 / there[0] + 1.0 / there[1] - 2.0 / all);
+    ++out.count;
+  }
+  return out;
+}
+
+TEST(WaveletVariance, HalfASupportBearsAnEighthOfMissingSamplesAndWhatTheyAddIsTakenOut) {
   const auto x = white(700, 5);
   std::vector<std::uint8_t> mask(x.size(), 1);
   mask[300] = 0;
@@ -229,22 +257,26 @@ TEST(WaveletVariance, AMaskKeepsOnlyCoefficientsWhoseWholeSupportIsValid) {
   WvOptions options;
   options.mask = mask;
   const auto wv = haar_wavelet_variance(x, options).value();
-  ASSERT_EQ(wv.levels.size(), 8U);  // the longest run has 300
+  ASSERT_EQ(wv.levels.size(), 9U) << "of 700 samples, of which a half of 256 lacks 20 at most";
+  std::vector<double> below;
   for (const auto& level : wv.levels) {
-    const auto width = static_cast<std::size_t>(level.tau_samples);
-    double sum = 0;
-    std::uint64_t count = 0;
-    for (std::size_t t = width; t <= x.size(); ++t) {
-      if (std::count(mask.begin() + static_cast<long>(t - width), mask.begin() + static_cast<long>(t), 0) !=
-          0)
-        continue;
-      double w = 0;
-      for (std::size_t i = 0; i < width; ++i) w += (i < width / 2 ? 1.0 : -1.0) * x[t - 1 - i];
-      sum += w * w / (level.tau_samples * level.tau_samples);
-      ++count;
-    }
-    EXPECT_EQ(level.n_coefficients, count) << "level " << level.level;
-    EXPECT_LT(relative(level.value, sum / static_cast<double>(count)), 1e-12) << "level " << level.level;
+    const auto expected = by_definition(x, mask, static_cast<std::size_t>(level.tau_samples) / 2);
+    const double raw = expected.squares / static_cast<double>(expected.count);
+    // A hole of one sample, and from n = 256 on one of twenty as well, each for as many samples as it has.
+    const double n = 0.5 * level.tau_samples;
+    const auto above = [&](double m) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < below.size(); ++k)
+        sum += below[k] * std::clamp(static_cast<double>(k) + 1.0 - std::log2(m), 0.0, 1.0);
+      return m * sum / (1.0 - m / n);
+    };
+    const double within = n >= 160.0 ? (above(1.0) + 20.0 * above(20.0)) / 21.0 : above(1.0);
+    const double value =
+        raw - (n > 1.0 ? expected.excess / static_cast<double>(expected.count) * within : 0.0);
+    below.push_back(value);
+    EXPECT_EQ(level.n_coefficients, expected.count) << "level " << level.level;
+    EXPECT_LT(relative(level.value, value), 1e-12) << "level " << level.level;
+    EXPECT_LT(relative(level.inflation, raw / value), 1e-12) << "level " << level.level;
   }
 }
 

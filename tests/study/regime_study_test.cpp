@@ -54,7 +54,7 @@ TEST(RegimeStudy, AMissingPartIsSaid) {
   const auto always = find_regimes({}, run_with(0.3, 0.0, 60.0, true), {}, {}, drive_time(0.0));
   ASSERT_TRUE(always);
   EXPECT_THAT(always->remarks,
-              ElementsAre(HasSubstr("there is no static part: the vehicle never stood for 10 s")));
+              ElementsAre(HasSubstr("there is no static part: the vehicle never stood for 1 s")));
   const auto never = find_regimes({}, run_with(0.3, 0.0, 0.0, true), {}, {}, drive_time(0.0));
   ASSERT_TRUE(never);
   EXPECT_THAT(never->remarks,

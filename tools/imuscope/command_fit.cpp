@@ -31,11 +31,13 @@ struct Task {
   noise::SignalUnit unit;
   noise::FitOptions fit_options;
   std::vector<noise::WaveletVariance> wvs;
+  std::vector<std::string> warnings;  ///< of the signals
   double rate_hz;
 };
 
 /// The fit that the command is about, after the ranking that led to it and what else belongs to it.
 void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra) {
+  fit.warnings.insert(fit.warnings.begin(), task.warnings.begin(), task.warnings.end());
   std::optional<noise::FitResult> bound;
   if (task.options.conservative) {
     bound = noise::over_bounding(fit);
@@ -107,7 +109,12 @@ Result<void> run_fit(const FitCommand& options) {
   if (!spec) return tl::unexpected(spec.error());
   auto read = wavelet_variances_of(options.signal);
   if (!read) return tl::unexpected(read.error());
-  Task task{options, noise::parse_unit(options.signal.unit).value(), {}, std::move(read->wvs), read->rate_hz};
+  Task task{options,
+            noise::parse_unit(options.signal.unit).value(),
+            {},
+            std::move(read->wvs),
+            std::move(read->warnings),
+            read->rate_hz};
   task.fit_options.weighting = options.weighting;
   task.fit_options.confidence = options.confidence;
   if (!options.quick_intervals) task.fit_options.intervals = noise::Intervals::kInverted;

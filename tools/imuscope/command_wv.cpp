@@ -46,9 +46,11 @@ void add_wv(CLI::App& app, Work& chosen) {
     if (options->json) {
       auto json = noise::wv_to_json(wv, wvs->rate_hz);
       json["unit"] = options->unit;
+      json["warnings"] = wvs->warnings;
       say("{}\n", json_text(json));
     } else {
       print_table(wv, wvs->rate_hz, options->unit);
+      for (const auto& warning : wvs->warnings) say("warning: {}\n", warning);
     }
     return {};
   });

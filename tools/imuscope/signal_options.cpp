@@ -4,6 +4,9 @@
 
 #include <cmath>
 
+#include "noise/fit.h"
+#include "noise/tails.h"
+
 namespace imuscope::cli {
 namespace {
 
@@ -23,6 +26,18 @@ Result<noise::WaveletVariance> wavelet_variance_of(const std::filesystem::path& 
     return tl::unexpected(error);
   }
   return wv;
+}
+
+/// A sentence where a signal holds spikes that its wavelet variance does not resist.
+std::optional<std::string> spikes_in(const Signal& signal, const noise::WaveletVariance& wv, double rate_hz,
+                                     const SignalOptions& options) {
+  if (options.robust) return std::nullopt;
+  const auto model = noise::fit(wv, noise::parse_model("QN+WN+2*GM").value(), rate_hz);
+  if (!model) return std::nullopt;
+  noise::WvOptions wv_options;
+  wv_options.mask = signal.mask;
+  wv_options.nan_is_gap = options.nan_is_gap;
+  return noise::spike_warning(noise::test_tails(signal.values, wv_options, model->model), rate_hz);
 }
 
 }  // namespace
@@ -79,6 +94,10 @@ Result<ReadSignals> wavelet_variances_of(const SignalOptions& options) {
     if (out.wvs.empty()) out.rate_hz = *signal->rate_hz;
     auto wv = wavelet_variance_of(file, *signal, options);
     if (!wv) return tl::unexpected(wv.error());
+    if (const auto spikes = spikes_in(*signal, *wv, out.rate_hz, options)) {
+      out.warnings.push_back(options.files.size() > 1 ? fmt::format("{}: {}", file.string(), *spikes)
+                                                      : *spikes);
+    }
     out.wvs.push_back(std::move(*wv));
   }
   return out;

@@ -32,6 +32,7 @@ void add_signal_options(CLI::App& command, SignalOptions& options, bool several)
 /// What the files hold; of several all at one rate.
 struct ReadSignals {
   std::vector<noise::WaveletVariance> wvs;
+  std::vector<std::string> warnings;  ///< sentences for people: spikes
   double rate_hz = 0.0;
 };
 

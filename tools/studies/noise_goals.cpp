@@ -70,6 +70,37 @@ noise::ModelSpec spec_of(const noise::Model& model) {
   return spec;
 }
 
+using Mask = std::vector<std::uint8_t>;
+using Loss = std::function<Mask(std::size_t, std::mt19937_64&)>;
+
+Mask nothing_lost(std::size_t, std::mt19937_64&) { return {}; }
+
+/// Each sample is lost by itself.
+Loss drop_outs(double percent) {
+  return [percent](std::size_t n, std::mt19937_64& random) {
+    Mask mask(n, 1);
+    std::bernoulli_distribution lost(0.01 * percent);
+    for (auto& m : mask) m = lost(random) ? 0 : 1;
+    return mask;
+  };
+}
+
+/// Gaps of 1 to 60 s, one in five minutes.
+Mask gaps(std::size_t n, std::mt19937_64& random) {
+  Mask mask(n, 1);
+  constexpr double kApart_s = 300.0;
+  std::exponential_distribution<double> apart(1.0 / kApart_s);
+  std::uniform_real_distribution<double> length(1.0, 60.0);
+  for (double at_s = apart(random); at_s * kRate_hz < static_cast<double>(n); at_s += apart(random)) {
+    const double end_s = at_s + length(random);
+    for (auto i = static_cast<std::size_t>(at_s * kRate_hz);
+         i < std::min(n, static_cast<std::size_t>(end_s * kRate_hz)); ++i)
+      mask[i] = 0;
+    at_s = end_s;
+  }
+  return mask;
+}
+
 /// Components in the order of a fit.
 std::vector<noise::Model> truths() {
   return {{{white(1.0)}},
@@ -92,11 +123,16 @@ bool holds(const noise::ParameterEstimate& p, double truth) {
   return (!p.ci_low || *p.ci_low <= truth) && (!p.ci_high || truth <= *p.ci_high);
 }
 
-Cell interval_cell(const std::string& name, const noise::Model& truth, std::size_t n) {
-  return {name, {{"", 91.0, 98.0}}, [truth, n](std::mt19937_64& random, Counts& counts) {
+Cell interval_cell(const std::string& name, const noise::Model& truth, std::size_t n,
+                   const Loss& loss = nothing_lost) {
+  return {name, {{"", 91.0, 98.0}}, [truth, n, loss](std::mt19937_64& random, Counts& counts) {
             noise::FitOptions options;
             options.intervals = noise::Intervals::kInverted;
-            const auto wv = noise::haar_wavelet_variance(imuscope::simulated_noise(truth, n, random)).value();
+            const auto x = imuscope::simulated_noise(truth, n, random);
+            const Mask mask = loss(n, random);
+            noise::WvOptions of_valid;
+            of_valid.mask = mask;
+            const auto wv = noise::haar_wavelet_variance(x, of_valid).value();
             const auto fit = noise::fit(wv, spec_of(truth), kRate_hz, options).value();
             const auto places = noise::parameter_places(truth);
             for (std::size_t i = 0; i < places.size(); ++i) {
@@ -126,6 +162,42 @@ std::vector<Cell> slow_cells() {
     cells.push_back(
         interval_cell(fmt::format("slow/WN+GM/{:g}", times), {{white(1.0), markov(beta, 0.5)}}, kN));
   }
+  return cells;
+}
+
+/// Records with missing samples.
+std::vector<Cell> missing_cells() {
+  constexpr std::size_t kN = 1U << 16U;
+  const auto all = truths();
+  const std::vector<std::pair<std::string, Loss>> losses{{"0.05%", drop_outs(0.05)},
+                                                         {"0.2%", drop_outs(0.2)},
+                                                         {"1%", drop_outs(1.0)},
+                                                         {"5%", drop_outs(5.0)},
+                                                         {"gaps", gaps}};
+  std::vector<Cell> cells;
+  for (const std::size_t which : {0U, 1U, 2U, 3U}) {
+    for (const auto& [name, loss] : losses)
+      cells.push_back(interval_cell(fmt::format("missing/{}/{}", spec_of(all[which]).name(), name),
+                                    all[which], kN, loss));
+  }
+  // What 1 % of drop-outs may cost: a level, and a fifth of a random walk's sd.
+  const noise::Model truth = all[3];
+  cells.push_back({"missing/cost",
+                   {{"levels", 100.0, 100.0}, {"sd", 99.0, 100.0}},
+                   [truth](std::mt19937_64& random, Counts& counts) {
+                     const auto x = imuscope::simulated_noise(truth, kN, random);
+                     const Mask mask = drop_outs(1.0)(kN, random);
+                     noise::WvOptions of_valid;
+                     of_valid.mask = mask;
+                     const auto whole = noise::haar_wavelet_variance(x).value();
+                     const auto part = noise::haar_wavelet_variance(x, of_valid).value();
+                     count(counts, "levels", part.levels.size() + 1 >= whole.levels.size());
+                     const auto fit_whole = noise::fit(whole, spec_of(truth), kRate_hz).value();
+                     const auto fit_part = noise::fit(part, spec_of(truth), kRate_hz).value();
+                     const auto& sd_whole = fit_whole.parameters.back().sd;
+                     const auto& sd_part = fit_part.parameters.back().sd;
+                     count(counts, "sd", sd_whole && sd_part && *sd_part <= 1.2 * *sd_whole);
+                   }});
   return cells;
 }
 
@@ -293,11 +365,12 @@ int main(int argc, char** argv) {
   app.add_option("--series", series, "a cell")->check(CLI::Range(1, 1'000'000));
   app.add_option("--lengths", lengths, "logarithms to base 2, of the intervals")->check(CLI::Range(10, 22));
   app.add_option("--results", results_file, "keep counts here, and go on from there")->type_name("FILE");
-  app.add_option("--only", only, "cells whose name begins so: intervals, slow, selection, replicates")
+  app.add_option("--only", only,
+                 "cells whose name begins so: intervals, slow, missing, selection, replicates")
       ->type_name("TEXT");
   CLI11_PARSE(app, argc, argv);
   std::vector<Cell> cells = selection_cells();
-  for (auto&& more : {interval_cells(lengths), slow_cells(), replicate_cells()})
+  for (auto&& more : {interval_cells(lengths), slow_cells(), missing_cells(), replicate_cells()})
     cells.insert(cells.end(), more.begin(), more.end());
   Results results(results_file);
   bool good = true;
