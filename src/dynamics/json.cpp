@@ -1,9 +1,15 @@
 #include "dynamics/json.h"
 
+#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "dynamics/covariates.h"
 #include "dynamics/physical_meaning.h"
+#include "noise/holm.h"
 
 namespace imuscope {
 namespace {
@@ -51,7 +57,37 @@ nlohmann::json regression_json(const std::string& name, std::size_t axis, const 
   return json;
 }
 
+/// Sets p_holm of what shares one question.
+void correct_family(const std::vector<nlohmann::json*>& family) {
+  std::vector<std::optional<double>> p;
+  for (const nlohmann::json* entry : family) {
+    const auto& value = entry->at("p_value");
+    p.push_back(value.is_number() ? std::optional(value.get<double>()) : std::nullopt);
+  }
+  const auto adjusted = noise::holm_adjusted(p);  // N-22
+  for (std::size_t i = 0; i < family.size(); ++i)
+    (*family[i])["p_holm"] = adjusted[i] ? nlohmann::json(*adjusted[i]) : nlohmann::json(nullptr);
+}
+
 }  // namespace
+
+void correct_for_number(nlohmann::json& regressions) {
+  struct Family {
+    std::vector<nlohmann::json*> regressions;
+    std::vector<nlohmann::json*> coefficients;
+  };
+  std::map<std::pair<std::string, bool>, Family> families;
+  for (nlohmann::json& regression : regressions) {
+    auto& family =
+        families[{regression.at("method").get<std::string>(), regression.at("projected").get<bool>()}];
+    family.regressions.push_back(&regression);
+    for (nlohmann::json& c : regression.at("coefficients")) family.coefficients.push_back(&c);
+  }
+  for (const auto& [method, family] : families) {
+    correct_family(family.regressions);
+    correct_family(family.coefficients);
+  }
+}
 
 void append_regressions(const std::string& name, const std::array<AxisDynamics, kErrorAxes>& axes,
                         nlohmann::json& regressions) {

@@ -18,4 +18,8 @@ namespace imuscope {
 void append_regressions(const std::string& name, const std::array<AxisDynamics, kErrorAxes>& axes,
                         nlohmann::json& regressions);
 
+/// Gives every coefficient and every regression "p_holm": p corrected for how many coefficients (regressions)
+/// of the same method there are over all axes and S-IMUs (N-22). Null where there is no p.
+void correct_for_number(nlohmann::json& regressions);
+
 }  // namespace imuscope

@@ -1,5 +1,6 @@
 #include "noise/wv_covariance.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -379,6 +380,29 @@ class PairCounts {
     return kept_together(h) * positions(h);
   }
 
+  /// Lags within `reach` of `centre` at which the number of pairs changes its slope. None where they are many: then
+  /// each of them matters little.
+  [[nodiscard]] std::vector<double> kinks(double centre, double reach) const {
+    constexpr std::size_t kMostKinks = 64;
+    std::vector<double> out;
+    auto first = k_.places.begin();
+    for (const Segment& run : j_.places) {
+      const double low = static_cast<double>(run.begin) + centre - reach;
+      const double high = static_cast<double>(run.end) + centre + reach;
+      while (first != k_.places.end() && static_cast<double>(first->end) < low) ++first;
+      for (auto other = first; other != k_.places.end() && static_cast<double>(other->begin) <= high; ++other) {
+        for (const std::size_t to : {other->begin, other->end}) {
+          for (const std::size_t from : {run.begin, run.end}) {
+            const double lag = static_cast<double>(to) - static_cast<double>(from);
+            if (std::abs(lag - centre) <= reach) out.push_back(lag);
+          }
+        }
+        if (out.size() > kMostKinks) return {};
+      }
+    }
+    return out;
+  }
+
   /// Lags beyond these have no pairs.
   [[nodiscard]] double lowest() const { return -extent(); }
   [[nodiscard]] double highest() const { return extent(); }
@@ -610,6 +634,9 @@ double covariance_of_pair(const Parts& parts, const WvLevel& j, const WvLevel& k
   }
   const double furthest_pair = std::max(pairs.highest() - centre, centre - pairs.lowest());
   const double high = std::min(furthest_pair, breaks.back() + std::ceil(reach));
+  for (const double lag : pairs.kinks(centre, high)) breaks.push_back(std::abs(lag - centre));
+  std::sort(breaks.begin(), breaks.end());
+  breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
   constexpr int kExactNear = 5;
   constexpr int kExactNearAlternating = 64;
   LagSum sum(term, alternating ? kExactNearAlternating : kExactNear);
@@ -623,6 +650,23 @@ double covariance_of_pair(const Parts& parts, const WvLevel& j, const WvLevel& k
               std::max(count_j, count_k);
   }
   return result;
+}
+
+/// Counts of pairs that are told by shares and by few break points may leave a matrix that is no covariance. Those
+/// of whole records have no correlation eigenvalue below this.
+constexpr double kLeastEigenvalue = 0.003;
+
+/// The nearest matrix of the same variances whose correlations have no smaller eigenvalue.
+Eigen::MatrixXd bounded_below(const Eigen::MatrixXd& v) {
+  const Eigen::VectorXd sd = v.diagonal().cwiseSqrt();
+  const Eigen::MatrixXd correlation = sd.cwiseInverse().asDiagonal() * v * sd.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of_correlation(correlation);
+  if (!(of_correlation.eigenvalues().minCoeff() < kLeastEigenvalue)) return v;
+  const Eigen::MatrixXd& axes = of_correlation.eigenvectors();
+  const Eigen::MatrixXd lifted =
+      axes * of_correlation.eigenvalues().cwiseMax(kLeastEigenvalue).asDiagonal() * axes.transpose();
+  const Eigen::VectorXd scale = sd.cwiseQuotient(lifted.diagonal().cwiseSqrt());
+  return scale.asDiagonal() * lifted * scale.asDiagonal();
 }
 
 /// @param robust_terms  of N-11; empty: classical
@@ -642,7 +686,9 @@ Eigen::MatrixXd covariance(const Model& model, const WaveletVariance& wv, std::s
       v(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = value;
     }
   }
-  return v;
+  const bool is_exact = std::all_of(places.begin(), places.end(), [](const auto& p) { return p.places.empty(); });
+  if (getenv("EIG")) { const Eigen::VectorXd sd = v.diagonal().cwiseSqrt(); const Eigen::MatrixXd c = sd.cwiseInverse().asDiagonal() * v * sd.cwiseInverse().asDiagonal(); printf("EIG %d %g\n", int(is_exact), c.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff()); }
+  return is_exact ? v : bounded_below(v);
 }
 
 }  // namespace

@@ -11,8 +11,8 @@ namespace {
 
 using nlohmann::json;
 
-/// Coefficients that are shown: those that one axis' fifteen tests at 5 % would not give by chance.
-constexpr double kShownP = 0.05 / 15.0;
+/// Coefficients that are shown, their p corrected for the number of all.
+constexpr double kShownP = 0.05;
 constexpr std::size_t kShownMax = 4;
 
 /// What Figure 3 draws: an error axis, its own covariates.
@@ -57,7 +57,7 @@ Html effects(const json& regression) {
   if (!coefficients.is_array()) return text(kUnknown);
   std::vector<const json*> shown;
   for (const json& c : coefficients) {
-    if (const auto p = number_at(c, "p_value"); p && *p < kShownP) shown.push_back(&c);
+    if (const auto p = number_at(c, "p_holm"); p && *p < kShownP) shown.push_back(&c);
   }
   std::sort(shown.begin(), shown.end(), [](const json* a, const json* b) {
     const auto strength = [](const json& c) {

@@ -125,6 +125,7 @@ DynamicsRegressions regressions_of(const Configuration& configuration, std::vect
       out.regressions.push_back(std::move(regression));
     }
   }
+  correct_for_number(out.regressions);
   return out;
 }
 
