@@ -2,11 +2,11 @@
 
 /// Haar wavelet variances and covariances of the columns of a regression, scale by scale: where in the
 /// spectrum the columns have what they tell by. Coarse scales only, from means of blocks of samples: at the
-/// finer ones a few columns are nothing beside the number of samples (D-7, D-8 in EQUATIONS.md).
+/// finer ones a few columns are nothing beside the number of samples (D-7, D-8 in EQUATIONS.md). Missing rows
+/// cost what missing samples cost the wavelet variance of the errors (noise/haar_levels.h).
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -30,7 +30,7 @@ class ColumnWavelets {
   /// A row that is missing.
   void skip();
 
-  /// Scales that have at least one coefficient without a missing row.
+  /// Scales that have at least one coefficient.
   [[nodiscard]] std::vector<ColumnLevel> levels() const;
 
  private:
@@ -40,9 +40,9 @@ class ColumnWavelets {
   std::size_t columns_;
   Eigen::VectorXd sum_;
   std::size_t in_block_ = 0;
-  bool whole_ = true;
-  std::vector<double> means_;  ///< block by block
-  std::vector<std::uint8_t> valid_;
+  std::size_t missing_in_block_ = 0;
+  std::vector<double> sums_;  ///< block by block
+  std::vector<std::size_t> missing_;
 };
 
 }  // namespace imuscope

@@ -159,10 +159,15 @@ int highest_level(std::size_t length) noexcept {
   return length < 2 ? 0 : static_cast<int>(std::bit_width(length)) - 1;
 }
 
-double missing_excess(std::size_t n, std::size_t older, std::size_t newer) noexcept {
-  if (older == n && newer == n) return 0.0;
-  return 0.25 *
-         (1.0 / static_cast<double>(older) + 1.0 / static_cast<double>(newer) - 2.0 / static_cast<double>(n));
+MissingExcess missing_excess(std::size_t n, std::size_t older, std::size_t newer) noexcept {
+  MissingExcess out;
+  for (const std::size_t there : {older, newer}) {
+    if (there == n) continue;
+    const auto missing = static_cast<double>(n - there);
+    const double own = 0.25 * missing / (static_cast<double>(there) * static_cast<double>(there));
+    out += {own, own * missing / static_cast<double>(n)};
+  }
+  return out;
 }
 
 void HoleLengths::add(std::uint64_t missing) noexcept {
@@ -179,7 +184,7 @@ void HoleLengths::merge(const HoleLengths& other) noexcept {
   }
 }
 
-double HoleLengths::variance_within(std::span<const double> below) const noexcept {
+double HoleLengths::variance_of(const MissingExcess& excess, std::span<const double> below) const noexcept {
   const double n = std::ldexp(1.0, static_cast<int>(below.size()));
   // m times the sum of the levels above scale log2(m), straight in log2(m) between two of them; the last
   // factor is that of drawing without putting back.
@@ -201,7 +206,8 @@ double HoleLengths::variance_within(std::span<const double> below) const noexcep
     weight += samples_[i];
   }
   // Where only longer holes are, a half reaches into one of them by up to an eighth.
-  return weight > 0.0 ? sum / weight : of_length(std::max(1.0, n / 16.0));
+  const double within = weight > 0.0 ? sum / weight : of_length(std::max(1.0, n / 16.0));
+  return excess.own * within - excess.common * of_length(std::max(1.0, n / 8.0));
 }
 
 void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vector<double>& work) {
@@ -251,7 +257,7 @@ void HaarLevels::append_whole(std::size_t n, std::vector<double>& coefficients) 
   stretch(blocks_, 0, count) += stretch(blocks_, n, count);
 }
 
-void HaarLevels::append_of_valid(std::size_t n, std::vector<double>& coefficients, double& excess,
+void HaarLevels::append_of_valid(std::size_t n, std::vector<double>& coefficients, MissingExcess& excess,
                                  std::vector<Segment>& places) {
   const std::size_t count = blocks_.size() - n;
   const std::size_t least = least_valid(n);
@@ -270,7 +276,7 @@ void HaarLevels::append_of_valid(std::size_t n, std::vector<double>& coefficient
   }
 }
 
-bool HaarLevels::append_next(std::vector<double>& coefficients, double& excess,
+bool HaarLevels::append_next(std::vector<double>& coefficients, MissingExcess& excess,
                              std::vector<Segment>& places) {
   const std::size_t n = std::size_t{1} << static_cast<unsigned>(level_);
   if (blocks_.size() < n + 1) return false;

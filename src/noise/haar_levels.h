@@ -25,20 +25,35 @@ struct Segment {
 /// Below n = 8 none may be missing.
 constexpr std::size_t least_valid(std::size_t n) noexcept { return n - n / 8; }
 
-/// (1/c_o + 1/c_n - 2/n) / 4: what missing samples add to the expected square of a coefficient, in units of
-/// the variance within its halves (N-33).
+/// What missing samples add to the expected square of a coefficient, in units of variances within its halves
+/// (N-33): each hole its own, less what all of a half have in common.
+struct MissingExcess {
+  double own = 0.0;
+  double common = 0.0;
+
+  MissingExcess& operator+=(const MissingExcess& more) noexcept {
+    own += more.own;
+    common += more.common;
+    return *this;
+  }
+  MissingExcess& operator*=(double factor) noexcept {
+    own *= factor;
+    common *= factor;
+    return *this;
+  }
+};
+
 /// @param n  samples of half the support, of which `older` and `newer` are there
-double missing_excess(std::size_t n, std::size_t older, std::size_t newer) noexcept;
+MissingExcess missing_excess(std::size_t n, std::size_t older, std::size_t newer) noexcept;
 
 /// How long the holes of a record are, by powers of two.
 class HoleLengths {
  public:
   void add(std::uint64_t missing) noexcept;
   void merge(const HoleLengths& other) noexcept;
-  /// Variance of the mean of a hole's samples within half a support, times their number; mean over the
-  /// samples of the holes that the half bears (N-33).
+  /// What the holes add to a square, by N-33.
   /// @param below  wavelet variances of the levels below the support's: n = 2^below.size()
-  [[nodiscard]] double variance_within(std::span<const double> below) const noexcept;
+  [[nodiscard]] double variance_of(const MissingExcess& excess, std::span<const double> below) const noexcept;
 
  private:
   static constexpr std::size_t kScales = 40;
@@ -68,11 +83,11 @@ class HaarLevels {
   /// Computes the next level into `coefficients` (appended). False when there is none at it.
   /// @param excess  the sum of missing_excess() over them is added
   /// @param places  of several runs: the stretches of the coefficients' newest samples are appended
-  bool append_next(std::vector<double>& coefficients, double& excess, std::vector<Segment>& places);
+  bool append_next(std::vector<double>& coefficients, MissingExcess& excess, std::vector<Segment>& places);
 
  private:
   void append_whole(std::size_t n, std::vector<double>& coefficients);
-  void append_of_valid(std::size_t n, std::vector<double>& coefficients, double& excess,
+  void append_of_valid(std::size_t n, std::vector<double>& coefficients, MissingExcess& excess,
                        std::vector<Segment>& places);
 
   std::size_t begin_;

@@ -30,7 +30,7 @@ WaveletVariance WvSums::wavelet_variance(double confidence) const {
   WaveletVariance wv;
   wv.n_samples = n_samples;
   wv.n_valid = n_samples;
-  std::vector<double> excess;
+  std::vector<MissingExcess> excess;
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const Level& sums = levels[i];
     if (!(sums.weight > 0.0)) break;
@@ -41,7 +41,8 @@ WaveletVariance WvSums::wavelet_variance(double confidence) const {
     level.n_coefficients = static_cast<std::uint64_t>(
         std::llround(std::max(1.0, sums.weight * sums.weight / sums.weight_squares)));
     wv.levels.push_back(level);
-    excess.push_back(sums.excess / sums.weight);
+    excess.push_back(sums.excess);
+    excess.back() *= 1.0 / sums.weight;
   }
   take_out_missing(wv.levels, excess, holes);
   set_intervals(wv.levels, 1.0, confidence);
@@ -67,7 +68,8 @@ StreamingWv::StreamingWv(const StreamingOptions& options)
 
 void StreamingWv::reset() noexcept {
   for (Level& level : levels_) {
-    level.squares = level.recent = level.weight = level.weight_squares = level.excess = 0.0;
+    level.squares = level.recent = level.weight = level.weight_squares = 0.0;
+    level.excess = {};
   }
   holes_ = {};
   run_ = missing_ = 0;
@@ -128,7 +130,7 @@ void StreamingWv::advance(double x, std::uint32_t valid) noexcept {
     if (run_ < 2 * n) break;
     if (whole_ >= 2 * n) {
       const double difference = block - before;
-      add(level, difference * difference, 0.0);
+      add(level, difference * difference, {});
     } else {
       const std::uint32_t middle = valid_until(run_ - n);
       const std::uint32_t newer = now - middle;
@@ -143,7 +145,7 @@ void StreamingWv::advance(double x, std::uint32_t valid) noexcept {
   }
 }
 
-void StreamingWv::add(Level& level, double square, double excess) const noexcept {
+void StreamingWv::add(Level& level, double square, const MissingExcess& excess) const noexcept {
   if (keep_ < 1.0) {
     level.recent *= keep_;
     level.squares *= keep_;
@@ -167,7 +169,8 @@ void StreamingWv::take(WvSums& out) noexcept {
     scale *= 0.25;  // 1 / (2n)^2
     out.levels[i] = {(level.squares + level.recent) * scale, level.weight, level.weight_squares,
                      level.excess};
-    level.squares = level.recent = level.weight = level.weight_squares = level.excess = 0.0;
+    level.squares = level.recent = level.weight = level.weight_squares = 0.0;
+    level.excess = {};
   }
   holes_ = {};
   count_ = 0;

@@ -28,7 +28,7 @@ struct WvSums {
     double squares = 0.0;         ///< sum of w W^2
     double weight = 0.0;          ///< sum of w
     double weight_squares = 0.0;  ///< sum of w^2
-    double excess = 0.0;          ///< sum of w missing_excess()
+    MissingExcess excess{};       ///< sum of w missing_excess()
   };
   std::uint64_t n_samples = 0;
   std::vector<Level> levels;
@@ -65,14 +65,14 @@ class StreamingWv {
     double recent = 0.0;   ///< part since the last settling, so that long sums keep their digits
     double weight = 0.0;
     double weight_squares = 0.0;
-    double excess = 0.0;
+    MissingExcess excess{};
     std::size_t offset = 0;  ///< of this level's ring in rings_
     std::size_t mask = 0;    ///< ring length - 1
   };
 
   void advance(double x, std::uint32_t valid) noexcept;
   [[nodiscard]] std::uint32_t valid_until(std::uint64_t position) const noexcept;
-  void add(Level& level, double square, double excess) const noexcept;
+  void add(Level& level, double square, const MissingExcess& excess) const noexcept;
   void settle() noexcept;
 
   StreamingOptions options_;

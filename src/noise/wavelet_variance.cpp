@@ -108,17 +108,18 @@ std::vector<WvLevel> levels_by_coefficients(std::span<const double> x, const std
                                             int levels, const std::optional<double>& c) {
   HaarLevels haar(x, segments);
   std::vector<WvLevel> result;
-  std::vector<double> excess;
+  std::vector<MissingExcess> excess;
   std::vector<double> coefficients;
   std::vector<Segment> places;
-  double sum = 0.0;
+  MissingExcess sum;
   for (int j = 1; j <= levels && haar.append_next(coefficients, sum, places); ++j) {
     result.push_back(with_scale(j, coefficients, c));
     result.back().places = joined(places);
     places.clear();
-    excess.push_back(sum / static_cast<double>(coefficients.size()));
+    excess.push_back(sum);
+    excess.back() *= 1.0 / static_cast<double>(coefficients.size());
     coefficients.clear();
-    sum = 0.0;
+    sum = {};
   }
   HoleLengths holes;
   for (std::size_t i = 1; i < segments.size(); ++i) holes.add(segments[i].begin - segments[i - 1].end);
@@ -128,7 +129,7 @@ std::vector<WvLevel> levels_by_coefficients(std::span<const double> x, const std
 
 }  // namespace
 
-void take_out_missing(std::vector<WvLevel>& levels, std::span<const double> excess,
+void take_out_missing(std::vector<WvLevel>& levels, std::span<const MissingExcess> excess,
                       const HoleLengths& holes) {
   // Where missing samples make nearly all of a level (of quantization alone), its own part is not told better
   // than this.
@@ -136,8 +137,8 @@ void take_out_missing(std::vector<WvLevel>& levels, std::span<const double> exce
   std::vector<double> below;
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const double raw = levels[i].value;
-    if (excess[i] > 0.0)
-      levels[i].value = std::max(raw - excess[i] * holes.variance_within(below), kLeastShare * raw);
+    if (excess[i].own > 0.0)
+      levels[i].value = std::max(raw - holes.variance_of(excess[i], below), kLeastShare * raw);
     levels[i].inflation = levels[i].value > 0.0 ? raw / levels[i].value : 1.0;
     below.push_back(levels[i].value);
   }

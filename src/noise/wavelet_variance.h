@@ -80,7 +80,8 @@ std::vector<Segment> valid_segments(std::span<const double> x, std::span<const s
 
 /// Takes out of each level what missing samples add to its squares (N-33).
 /// @param excess  mean over the level's coefficients of missing_excess()
-void take_out_missing(std::vector<WvLevel>& levels, std::span<const double> excess, const HoleLengths& holes);
+void take_out_missing(std::vector<WvLevel>& levels, std::span<const MissingExcess> excess,
+                      const HoleLengths& holes);
 
 /// The interval [eta wv / chi2_{1-alpha/2}(eta), eta wv / chi2_{alpha/2}(eta)], eta = max(M_j / 2^j, 1).
 /// `efficiency` below 1 widens it by 1/sqrt(efficiency) around the value.

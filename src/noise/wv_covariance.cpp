@@ -380,8 +380,8 @@ class PairCounts {
     return kept_together(h) * positions(h);
   }
 
-  /// Lags within `reach` of `centre` at which the number of pairs changes its slope. None where they are many: then
-  /// each of them matters little.
+  /// Lags within `reach` of `centre` at which the number of pairs changes its slope. None where they are
+  /// many: then each of them matters little.
   [[nodiscard]] std::vector<double> kinks(double centre, double reach) const {
     constexpr std::size_t kMostKinks = 64;
     std::vector<double> out;
@@ -390,7 +390,8 @@ class PairCounts {
       const double low = static_cast<double>(run.begin) + centre - reach;
       const double high = static_cast<double>(run.end) + centre + reach;
       while (first != k_.places.end() && static_cast<double>(first->end) < low) ++first;
-      for (auto other = first; other != k_.places.end() && static_cast<double>(other->begin) <= high; ++other) {
+      for (auto other = first; other != k_.places.end() && static_cast<double>(other->begin) <= high;
+           ++other) {
         for (const std::size_t to : {other->begin, other->end}) {
           for (const std::size_t from : {run.begin, run.end}) {
             const double lag = static_cast<double>(to) - static_cast<double>(from);
@@ -603,17 +604,29 @@ double uniform_correction(double q2, const std::vector<Segment>& runs, const WvL
   return kExcessKurtosis * q2 * q2 * scale * sum / (count_j * count_k);
 }
 
-double covariance_of_pair(const Parts& parts, const WvLevel& j, const WvLevel& k, const LevelPlaces& at_j,
+/// N-34: what missing samples add to two levels behaves as white noise.
+Parts with_missing(const Parts& parts, const WvLevel& j, const WvLevel& k) {
+  const auto white_of = [](const WvLevel& level) {
+    return (level.inflation - 1.0) * level.value * level.tau_samples;
+  };
+  Parts out = parts;
+  if (j.inflation > 1.0 && k.inflation > 1.0) out.white += std::sqrt(white_of(j) * white_of(k));
+  return out;
+}
+
+double covariance_of_pair(const Parts& whole, const WvLevel& j, const WvLevel& k, const LevelPlaces& at_j,
                           const LevelPlaces& at_k, const std::vector<Segment>& runs,
                           const std::vector<double>& robust_terms) {
   const double n_j = 0.5 * j.tau_samples;
   const double n_k = 0.5 * k.tau_samples;
+  const Parts parts = with_missing(whole, j, k);
   const PairCounts pairs(j, k, at_j, at_k);
   const double means = 4.0 * (0.5 * parts.ramp * n_j) * (0.5 * parts.ramp * n_k);
   const double centre = n_k - n_j;
   RobustTerms robust;
   if (!robust_terms.empty()) {
-    robust = {CrossCovariance(parts, n_j, n_j)(0.0), CrossCovariance(parts, n_k, n_k)(0.0), robust_terms};
+    robust = {CrossCovariance(with_missing(whole, j, j), n_j, n_j)(0.0),
+              CrossCovariance(with_missing(whole, k, k), n_k, n_k)(0.0), robust_terms};
   }
   PairTerm term(CrossCovariance(parts, n_j, n_k), pairs, centre, means, robust);
   std::vector<double> breaks;  // distances from the centre
@@ -652,9 +665,9 @@ double covariance_of_pair(const Parts& parts, const WvLevel& j, const WvLevel& k
   return result;
 }
 
-/// Counts of pairs that are told by shares and by few break points may leave a matrix that is no covariance. Those
-/// of whole records have no correlation eigenvalue below this.
-constexpr double kLeastEigenvalue = 0.003;
+/// Counts of pairs that are told by shares and by few break points may leave a matrix that is no covariance.
+/// Those of whole records have no correlation eigenvalue below twice this.
+constexpr double kLeastEigenvalue = 0.01;
 
 /// The nearest matrix of the same variances whose correlations have no smaller eigenvalue.
 Eigen::MatrixXd bounded_below(const Eigen::MatrixXd& v) {
@@ -679,15 +692,14 @@ Eigen::MatrixXd covariance(const Model& model, const WaveletVariance& wv, std::s
   for (std::size_t j = 0; j < levels; ++j) places.push_back(places_of(wv, wv.levels[j]));
   for (std::size_t j = 0; j < levels; ++j) {
     for (std::size_t k = 0; k <= j; ++k) {
-      const double value = wv.levels[j].inflation * wv.levels[k].inflation *
-                           covariance_of_pair(parts, wv.levels[j], wv.levels[k], places[j], places[k],
+      const double value = covariance_of_pair(parts, wv.levels[j], wv.levels[k], places[j], places[k],
                                               wv.segments, robust_terms);
       v(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(k)) = value;
       v(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) = value;
     }
   }
-  const bool is_exact = std::all_of(places.begin(), places.end(), [](const auto& p) { return p.places.empty(); });
-  if (getenv("EIG")) { const Eigen::VectorXd sd = v.diagonal().cwiseSqrt(); const Eigen::MatrixXd c = sd.cwiseInverse().asDiagonal() * v * sd.cwiseInverse().asDiagonal(); printf("EIG %d %g\n", int(is_exact), c.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff()); }
+  const bool is_exact =
+      std::all_of(places.begin(), places.end(), [](const auto& p) { return p.places.empty(); });
   return is_exact ? v : bounded_below(v);
 }
 

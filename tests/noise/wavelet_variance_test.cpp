@@ -224,7 +224,8 @@ TEST(WaveletVariance, AnOffsetThatTheInputCarriesExactlyChangesNothing) {
 /// By N-1 and N-33, coefficient by coefficient: squares, count and mean excess of a level.
 struct ByDefinition {
   double squares = 0.0;
-  double excess = 0.0;
+  double own = 0.0;
+  double common = 0.0;
   std::uint64_t count = 0;
 };
 ByDefinition by_definition(const std::vector<double>& x, const std::vector<std::uint8_t>& mask,
@@ -243,7 +244,10 @@ ByDefinition by_definition(const std::vector<double>& x, const std::vector<std::
     if (there[0] < least || there[1] < least) continue;
     const double w = 0.5 * (sums[1] / there[1] - sums[0] / there[0]);
     out.squares += w * w;
-    out.excess += 0.25 * (1.0 / there[0] + 1.0 / there[1] - 2.0 / all);
+    for (const double c : there) {
+      out.own += 0.25 * (all - c) / (c * c);
+      out.common += 0.25 * (all - c) * (all - c) / (c * c * all);
+    }
     ++out.count;
   }
   return out;
@@ -271,8 +275,10 @@ TEST(WaveletVariance, HalfASupportBearsAnEighthOfMissingSamplesAndWhatTheyAddIsT
       return m * sum / (1.0 - m / n);
     };
     const double within = n >= 160.0 ? (above(1.0) + 20.0 * above(20.0)) / 21.0 : above(1.0);
-    const double value =
-        raw - (n > 1.0 ? expected.excess / static_cast<double>(expected.count) * within : 0.0);
+    const auto count = static_cast<double>(expected.count);
+    const double value = expected.own > 0.0 ? raw - expected.own / count * within +
+                                                  expected.common / count * above(std::max(1.0, n / 8.0))
+                                            : raw;
     below.push_back(value);
     EXPECT_EQ(level.n_coefficients, expected.count) << "level " << level.level;
     EXPECT_LT(relative(level.value, value), 1e-12) << "level " << level.level;
