@@ -118,34 +118,48 @@ void StreamingWv::advance(double x, std::uint32_t valid) noexcept {
   const std::uint64_t position = run_++;
   // The slot that this takes is the one of a whole longest support ago, whose count is still needed.
   const std::uint32_t oldest = valid_until(run_);
-  const std::uint32_t now = valid_until(position) + valid;
-  valid_[run_ & (valid_.size() - 1)] = now;
+  valid_[run_ & (valid_.size() - 1)] = valid_until(position) + valid;
+  const bool is_whole = whole_ == run_ || whole_ >= valid_.size();
+  // Two loops: the one that nearly all samples take calls nothing.
+  if (is_whole)
+    for_each_level(position, x, [this](Level& level, double newer, double older) {
+      add(level, (newer - older) * (newer - older));
+    });
+  else
+    for_each_level(position, x, [this, oldest](Level& level, double newer, double older) {
+      add_of_valid(level, newer, older, oldest);
+    });
+}
+
+/// Hands out, level by level, the sums of the n newest samples and of the n before them.
+template <typename Take>
+void StreamingWv::for_each_level(std::uint64_t position, double x, const Take& take) noexcept {
   double block = x;  // sum of the n newest samples, n = 1
   for (Level& level : levels_) {
     double& slot = rings_[level.offset + (position & level.mask)];
     const double before = slot;  // sum of the n samples before those
     slot = block;
-    const std::uint64_t n = static_cast<std::uint64_t>(level.mask) + 1;
     // The ring of the next level takes only complete sums.
-    if (run_ < 2 * n) break;
-    if (whole_ >= 2 * n) {
-      const double difference = block - before;
-      add(level, difference * difference, {});
-    } else {
-      const std::uint32_t middle = valid_until(run_ - n);
-      const std::uint32_t newer = now - middle;
-      const std::uint32_t older = middle - (2 * n == valid_.size() ? oldest : valid_until(run_ - 2 * n));
-      if (newer >= least_valid(n) && older >= least_valid(n)) {
-        const auto whole = static_cast<double>(n);
-        const double difference = whole * (block / newer - before / older);
-        add(level, difference * difference, missing_excess(n, older, newer));
-      }
-    }
+    if (position + 1 < 2 * (static_cast<std::uint64_t>(level.mask) + 1)) break;
+    take(level, block, before);
     block += before;
   }
 }
 
-void StreamingWv::add(Level& level, double square, const MissingExcess& excess) const noexcept {
+/// @param oldest  valid samples up to a longest support ago
+void StreamingWv::add_of_valid(Level& level, double newer, double older,
+                               std::uint32_t oldest) const noexcept {
+  const std::uint64_t n = static_cast<std::uint64_t>(level.mask) + 1;
+  const std::uint32_t middle = valid_until(run_ - n);
+  const std::uint32_t there_newer = valid_until(run_) - middle;
+  const std::uint32_t there_older = middle - (2 * n == valid_.size() ? oldest : valid_until(run_ - 2 * n));
+  if (there_newer < least_valid(n) || there_older < least_valid(n)) return;
+  const double difference = static_cast<double>(n) * (newer / there_newer - older / there_older);
+  add(level, difference * difference);
+  level.excess += missing_excess(n, there_older, there_newer);
+}
+
+void StreamingWv::add(Level& level, double square) const noexcept {
   if (keep_ < 1.0) {
     level.recent *= keep_;
     level.squares *= keep_;
@@ -156,7 +170,6 @@ void StreamingWv::add(Level& level, double square, const MissingExcess& excess) 
   level.recent += square;
   level.weight += 1.0;
   level.weight_squares += 1.0;
-  level.excess += excess;
 }
 
 void StreamingWv::take(WvSums& out) noexcept {

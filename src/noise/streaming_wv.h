@@ -72,7 +72,10 @@ class StreamingWv {
 
   void advance(double x, std::uint32_t valid) noexcept;
   [[nodiscard]] std::uint32_t valid_until(std::uint64_t position) const noexcept;
-  void add(Level& level, double square, const MissingExcess& excess) const noexcept;
+  template <typename Take>
+  void for_each_level(std::uint64_t position, double x, const Take& take) noexcept;
+  void add_of_valid(Level& level, double newer, double older, std::uint32_t oldest) const noexcept;
+  void add(Level& level, double square) const noexcept;
   void settle() noexcept;
 
   StreamingOptions options_;
