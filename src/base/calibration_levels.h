@@ -24,9 +24,9 @@ enum class CalibrationStatus : std::uint8_t {
   kCalibrated,  ///< meets the goal; of the estimate of a whole drive, which tells all that there is: usable
 };
 
-/// As calibration.json has it.
+/// As calibration.json has it, also when the drive is over: then nothing converges any more.
 [[nodiscard]] constexpr std::string_view key_of(CalibrationStatus status) noexcept {
-  constexpr std::array<std::string_view, 4> kKeys{"waiting", "coarse", "converging", "calibrated"};
+  constexpr std::array<std::string_view, 4> kKeys{"waiting", "coarse", "estimated", "calibrated"};
   return kKeys[static_cast<std::size_t>(status)];
 }
 
@@ -40,9 +40,10 @@ enum class CalibrationStatus : std::uint8_t {
 [[nodiscard]] constexpr bool has_estimate(CalibrationStatus status) noexcept {
   return status >= CalibrationStatus::kConverging;
 }
-/// The same of a status that was read, by key or words.
+/// The same of a status that was read, by key or words; files of before had the words.
 [[nodiscard]] constexpr bool has_estimate(std::string_view status) noexcept {
-  return status == key_of(CalibrationStatus::kConverging) || status == key_of(CalibrationStatus::kCalibrated);
+  return status == key_of(CalibrationStatus::kConverging) ||
+         status == words_of(CalibrationStatus::kConverging) || status == key_of(CalibrationStatus::kCalibrated);
 }
 
 /// Each axis of the mounting, and the time offset, which has a goal of its own.

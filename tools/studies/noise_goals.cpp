@@ -21,6 +21,7 @@
 #include "noise/inference.h"
 #include "noise/replicates.h"
 #include "noise/select.h"
+#include "noise/tails.h"
 #include "simulated_noise.h"
 
 namespace {
@@ -201,6 +202,32 @@ std::vector<Cell> missing_cells() {
   return cells;
 }
 
+/// Records that are clean, and with 0.1 % of spikes of 15 sd: which are called spiky.
+std::vector<Cell> spike_cells() {
+  std::vector<Cell> cells;
+  const auto all = truths();
+  for (const std::size_t which : {0U, 2U, 3U, 4U, 5U}) {
+    for (const double percent : {0.0, 0.1}) {
+      const noise::Model truth = all[which];
+      cells.push_back({fmt::format("spikes/{}/{:g}%", spec_of(truth).name(), percent),
+                       {percent > 0.0 ? Band{"called", 95.0, 100.0} : Band{"called", 0.0, 7.0}},
+                       [truth, percent](std::mt19937_64& random, Counts& counts) {
+                         constexpr std::size_t kN = 1U << 16U;
+                         constexpr double kSpike = 15.0;
+                         auto x = imuscope::simulated_noise(truth, kN, random);
+                         std::bernoulli_distribution spike(0.01 * percent);
+                         std::bernoulli_distribution up(0.5);
+                         for (double& v : x) v += spike(random) ? (up(random) ? kSpike : -kSpike) : 0.0;
+                         const auto wv = noise::haar_wavelet_variance(x).value();
+                         const auto fit = noise::fit(wv, spec_of(truth), kRate_hz).value();
+                         const auto test = noise::test_tails(x, {}, fit.model);
+                         count(counts, "called", noise::spike_warning(test, kRate_hz).has_value());
+                       }});
+    }
+  }
+  return cells;
+}
+
 std::vector<Cell> selection_cells() {
   // The shares of right winners that are asked for, of these truths in this order.
   const std::vector<std::pair<noise::Model, double>> asked{
@@ -366,11 +393,12 @@ int main(int argc, char** argv) {
   app.add_option("--lengths", lengths, "logarithms to base 2, of the intervals")->check(CLI::Range(10, 22));
   app.add_option("--results", results_file, "keep counts here, and go on from there")->type_name("FILE");
   app.add_option("--only", only,
-                 "cells whose name begins so: intervals, slow, missing, selection, replicates")
+                 "cells whose name begins so: intervals, slow, missing, spikes, selection, replicates")
       ->type_name("TEXT");
   CLI11_PARSE(app, argc, argv);
   std::vector<Cell> cells = selection_cells();
-  for (auto&& more : {interval_cells(lengths), slow_cells(), missing_cells(), replicate_cells()})
+  for (auto&& more :
+       {interval_cells(lengths), slow_cells(), missing_cells(), spike_cells(), replicate_cells()})
     cells.insert(cells.end(), more.begin(), more.end());
   Results results(results_file);
   bool good = true;
