@@ -43,7 +43,8 @@ enum class CalibrationStatus : std::uint8_t {
 /// The same of a status that was read, by key or words; files of before had the words.
 [[nodiscard]] constexpr bool has_estimate(std::string_view status) noexcept {
   return status == key_of(CalibrationStatus::kConverging) ||
-         status == words_of(CalibrationStatus::kConverging) || status == key_of(CalibrationStatus::kCalibrated);
+         status == words_of(CalibrationStatus::kConverging) ||
+         status == key_of(CalibrationStatus::kCalibrated);
 }
 
 /// Each axis of the mounting, and the time offset, which has a goal of its own.
