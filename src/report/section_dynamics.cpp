@@ -11,8 +11,10 @@ namespace {
 
 using nlohmann::json;
 
-/// Coefficients that are shown, their p corrected for the number of all.
+/// Coefficients that are shown: p corrected for the number of all; where a run does not have that, for the
+/// fifteen of an axis.
 constexpr double kShownP = 0.05;
+constexpr double kOfAnAxis = 15.0;
 constexpr std::size_t kShownMax = 4;
 
 /// What Figure 3 draws: an error axis, its own covariates.
@@ -57,7 +59,8 @@ Html effects(const json& regression) {
   if (!coefficients.is_array()) return text(kUnknown);
   std::vector<const json*> shown;
   for (const json& c : coefficients) {
-    if (const auto p = number_at(c, "p_holm"); p && *p < kShownP) shown.push_back(&c);
+    const double p_of_axis = kOfAnAxis * number_at(c, "p_value").value_or(1.0);
+    if (number_at(c, "p_holm").value_or(p_of_axis) < kShownP) shown.push_back(&c);
   }
   std::sort(shown.begin(), shown.end(), [](const json* a, const json* b) {
     const auto strength = [](const json& c) {

@@ -182,7 +182,7 @@ std::vector<Cell> missing_cells() {
                                     all[which], kN, loss));
   }
   // What 1 % of drop-outs may cost: a level, and a fifth of a random walk's sd.
-  const noise::Model truth = all[3];
+  const noise::Model& truth = all[3];
   cells.push_back({"missing/cost",
                    {{"levels", 100.0, 100.0}, {"sd", 99.0, 100.0}},
                    [truth](std::mt19937_64& random, Counts& counts) {
@@ -208,7 +208,7 @@ std::vector<Cell> spike_cells() {
   const auto all = truths();
   for (const std::size_t which : {0U, 2U, 3U, 4U, 5U}) {
     for (const double percent : {0.0, 0.1}) {
-      const noise::Model truth = all[which];
+      const noise::Model& truth = all[which];
       cells.push_back({fmt::format("spikes/{}/{:g}%", spec_of(truth).name(), percent),
                        {percent > 0.0 ? Band{"called", 95.0, 100.0} : Band{"called", 0.0, 7.0}},
                        [truth, percent](std::mt19937_64& random, Counts& counts) {
