@@ -1,5 +1,6 @@
 #include "regimes/motion_levels.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace imuscope {
@@ -57,6 +58,14 @@ void MotionLevels::add_speed(HostTime time, double speed_mps, double sd_mps) {
   if (cell == nullptr) return;
   cell->speed_mps = std::abs(speed_mps);
   cell->speed_sd_mps = sd_mps;
+}
+
+void MotionLevels::forget_before(HostTime time) {
+  if (!first_) return;
+  const std::int64_t n = std::clamp<std::int64_t>(number_of(time) - *first_, 0,
+                                                  static_cast<std::int64_t>(sums_.size()));
+  sums_.erase(sums_.begin(), sums_.begin() + n);
+  *first_ += n;
 }
 
 HostTime MotionLevels::begin_of(std::size_t index) const {

@@ -37,6 +37,9 @@ class MotionLevels {
   void add(HostTime time, const Vector3& omega_ib_b_radps, const Vector3& f_b_mps2);
   void add_speed(HostTime time, double speed_mps, double sd_mps);
 
+  /// Gives up the cells that end before `time`, and their memory.
+  void forget_before(HostTime time);
+
   /// Cells of the whole run, without a hole; empty before the first sample.
   [[nodiscard]] std::vector<MotionCell> cells() const;
   /// Beginning of cell `index`.

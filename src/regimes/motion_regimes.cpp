@@ -80,6 +80,11 @@ std::vector<Block> blocks_of(const std::vector<MotionCell>& cells, const MotionL
 
 RegimeTrack static_and_dynamic(const MotionLevels& levels, const MotionLimits& limits) {
   const auto cells = levels.cells();
+  return static_and_dynamic(levels, cells, limits, cell_noise(cells));
+}
+
+RegimeTrack static_and_dynamic(const MotionLevels& levels, const std::vector<MotionCell>& cells,
+                               const MotionLimits& limits, const CellNoise& noise) {
   std::vector<std::optional<std::size_t>> regimes(cells.size(), kDynamic);
   const std::size_t guard = cells_in(limits.guard_s);
   const std::size_t shortest = cells_in(limits.shortest_static_s);
@@ -87,7 +92,7 @@ RegimeTrack static_and_dynamic(const MotionLevels& levels, const MotionLimits& l
     std::fill(regimes.begin() + static_cast<std::ptrdiff_t>(first),
               regimes.begin() + static_cast<std::ptrdiff_t>(std::max(first, last)), regime);
   };
-  for (const auto& stop : find_standstills(cells, limits)) {
+  for (const auto& stop : find_standstills(cells, limits, noise)) {
     const bool begins = stop.first > 0;
     const bool ends = stop.last < cells.size();
     fill(begins ? stop.first - std::min(guard, stop.first) : 0, std::min(cells.size(), stop.last + guard),

@@ -8,6 +8,7 @@
 /// what no noise model describes.
 
 #include <string>
+#include <vector>
 
 #include "regimes/motion_levels.h"
 #include "regimes/regime_track.h"
@@ -21,6 +22,10 @@ inline constexpr const char* kDynamicName = "dynamic";
 /// "static" (index 0) and "dynamic" (index 1). A cell of which nothing is known goes on with the regime
 /// before it. No regime holds in the guards and in stops shorter than the shortest that is wanted.
 RegimeTrack static_and_dynamic(const MotionLevels& levels, const MotionLimits& limits);
+/// The same of a part of a run.
+/// @param noise  of the reference, as the whole run shows it
+RegimeTrack static_and_dynamic(const MotionLevels& levels, const std::vector<MotionCell>& cells,
+                               const MotionLimits& limits, const CellNoise& noise);
 
 /// What the intensity of motion is measured by.
 enum class Intensity : std::uint8_t { kRate, kVibration, kSpeed };

@@ -33,30 +33,12 @@ constexpr double kNoiseInCell = 2.33;
 constexpr double kEdgeShare = 1.0 / 3.0;
 constexpr double kEdgeSpeedSds = 2.5;
 
-struct Noise {
-  double omega_radps = 0.0;  ///< rms over the axes of a cell's mean, all axes together
-  double f_mps2 = 0.0;
-};
-
 double lower_tenth(std::vector<double> values) {
   if (values.empty()) return 0.0;
   const auto at =
       values.begin() + static_cast<std::ptrdiff_t>(kQuietShare * static_cast<double>(values.size()));
   std::nth_element(values.begin(), at, values.end());
   return *at;
-}
-
-/// What the reference's white noise leaves in the means of cells.
-Noise noise_of(const std::vector<MotionCell>& cells) {
-  std::vector<double> omega;
-  std::vector<double> f;
-  for (const auto& cell : cells) {
-    if (cell.n < 2) continue;
-    const double root_n = std::sqrt(static_cast<double>(cell.n));
-    omega.push_back(cell.rate_scatter_radps / root_n);
-    f.push_back(cell.vibration_mps2 / root_n);
-  }
-  return {lower_tenth(std::move(omega)), lower_tenth(std::move(f))};
 }
 
 double distance(const Vector3& a, const Vector3& b) {
@@ -99,8 +81,8 @@ double spread_at(const std::vector<MotionCell>& cells, Vector3 MotionCell::*what
 
 class Judge {
  public:
-  Judge(const std::vector<MotionCell>& cells, const MotionLimits& limits)
-      : cells_(cells), limits_(limits), noise_(noise_of(cells)) {}
+  Judge(const std::vector<MotionCell>& cells, const MotionLimits& limits, const CellNoise& noise)
+      : cells_(cells), limits_(limits), noise_(noise) {}
 
   /// Still in all measures together: their squares, each against its limit for rest, sum to less than one.
   [[nodiscard]] bool rests(std::size_t i) const {
@@ -153,7 +135,7 @@ class Judge {
 
   const std::vector<MotionCell>& cells_;
   const MotionLimits& limits_;
-  Noise noise_;
+  const CellNoise& noise_;
 };
 
 /// From the first cell at rest on, until the last cell at rest before motion.
@@ -207,8 +189,21 @@ Standstill with_edges(const std::vector<MotionCell>& cells, const Judge& judge, 
 
 }  // namespace
 
-std::vector<Standstill> find_standstills(const std::vector<MotionCell>& cells, const MotionLimits& limits) {
-  const Judge judge(cells, limits);
+CellNoise cell_noise(const std::vector<MotionCell>& cells) {
+  std::vector<double> omega;
+  std::vector<double> f;
+  for (const auto& cell : cells) {
+    if (cell.n < 2) continue;
+    const double root_n = std::sqrt(static_cast<double>(cell.n));
+    omega.push_back(cell.rate_scatter_radps / root_n);
+    f.push_back(cell.vibration_mps2 / root_n);
+  }
+  return {lower_tenth(std::move(omega)), lower_tenth(std::move(f))};
+}
+
+std::vector<Standstill> find_standstills(const std::vector<MotionCell>& cells, const MotionLimits& limits,
+                                         const CellNoise& noise) {
+  const Judge judge(cells, limits, noise);
   std::vector<Standstill> stops;
   const auto found = with_hysteresis(cells, judge);
   for (std::size_t k = 0; k < found.size(); ++k) {

@@ -40,6 +40,13 @@ struct MotionLimits {
   double guard_s = 0.3;            ///< on both sides of a change; belongs to neither
 };
 
+/// What the reference's white noise leaves in the means of cells: rms, all axes together.
+struct CellNoise {
+  double omega_radps = 0.0;
+  double f_mps2 = 0.0;
+};
+CellNoise cell_noise(const std::vector<MotionCell>& cells);
+
 /// Cells [first, last).
 struct Standstill {
   std::size_t first;
@@ -48,6 +55,8 @@ struct Standstill {
 
 /// In order, without overlap. Inside a run none is shorter than 0.8 s: a shorter one is a moment in which a
 /// moving vehicle happens to be still. A cell without samples goes on with what was before it.
-std::vector<Standstill> find_standstills(const std::vector<MotionCell>& cells, const MotionLimits& limits);
+/// @param noise  of the reference, as the quietest cells of the run show it
+std::vector<Standstill> find_standstills(const std::vector<MotionCell>& cells, const MotionLimits& limits,
+                                         const CellNoise& noise);
 
 }  // namespace imuscope

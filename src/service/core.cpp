@@ -150,10 +150,11 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   note_first_utc();
   for (const auto& event : estimator_.events()) sink.on_event(event);
   snapshot_.ages = data_ages(estimator_.navigation(), snapshot_.has_reference, cut);
+  const auto speed = vehicle_speed(estimator_.navigation(), estimator_.odometry(), estimator_.counters());
   for (const auto& epoch : estimator_.epochs()) {
     if (!epoch.calibrating) continue;
     sink.on_epoch(epoch, {snapshot_.first_reference_time, snapshot_.ages,
-                          validity_of(estimator_.study(epoch.study), snapshot_.ages)});
+                          validity_of(estimator_.study(epoch.study), snapshot_.ages), speed});
   }
   if (index % kTicksPerSnapshot != 0) return;
   take_snapshot(index, cut);

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "rt/spsc_ring.h"
 #include "sample/sample.h"
 #include "service/validity.h"
+#include "service/vehicle_speed.h"
 
 namespace imuscope {
 
@@ -60,6 +62,7 @@ struct TickFacts {
   HostTime first_reference_time;  ///< origin of time_s
   DataAges ages;
   Validity validity;  ///< of what is made with the S-IMU's calibration
+  std::optional<VehicleSpeed> speed;
 };
 
 /// One row of the error process on its way out of the core.
@@ -69,6 +72,7 @@ struct ErrorRecord {
   ErrorRow row;
   DataAges ages{};
   Validity validity = Validity::kUsable;  ///< of the calibration that it was made with
+  std::optional<VehicleSpeed> speed{};
 };
 static_assert(std::is_trivially_copyable_v<ErrorRecord>);
 
@@ -109,7 +113,7 @@ class CoreSink {
   /// One S sample of a calibrated S-IMU. Unless overridden, its row goes to on_error(), made with the
   /// estimate as it stands.
   virtual void on_epoch(const StudyEpoch& epoch, const TickFacts& facts) noexcept {
-    on_error({epoch.study, facts.first_reference_time, live_error_row(epoch), facts.ages, facts.validity});
+    on_error({epoch.study, facts.first_reference_time, live_error_row(epoch), facts.ages, facts.validity, facts.speed});
   }
   virtual void on_error(const ErrorRecord& record) noexcept = 0;
   virtual void on_event(const EstimatorEvent& event) noexcept = 0;

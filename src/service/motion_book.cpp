@@ -40,9 +40,9 @@ axis_dynamics_t MotionSums::message() const {
 
 MotionBook::MotionBook() : regressions_(kAxisCount, RegressionSums(1, kCovariates)) {}
 
-void MotionBook::add(const ErrorRow& row) {
-  const std::int64_t before = rows_[static_cast<std::size_t>(row.regime)]++;
-  if (row.regime == Regime::kDynamic && before % kRegressionStep == 0) add_to_regression(row);
+void MotionBook::add(const ErrorRow& row, Regime regime) {
+  const std::int64_t before = rows_[static_cast<std::size_t>(regime)]++;
+  if (regime == Regime::kDynamic && before % kRegressionStep == 0) add_to_regression(row);
   for (std::size_t i = 0; i < 3; ++i) {
     if (row.gyro_valid) axes_[i].add(row.predicted_omega_s_radps[i], row.e_gyro_radps[i]);
     if (row.accel_valid) axes_[3 + i].add(row.predicted_f_s_mps2[i], row.e_accel_mps2[i]);

@@ -36,8 +36,9 @@ class MotionSums {
 class MotionBook {
  public:
   MotionBook();
+  /// @param regime  that holds at the row, whatever the row says
   /// Thread: modeller. Allocates: never.
-  void add(const ErrorRow& row);
+  void add(const ErrorRow& row, Regime regime);
   /// name, utime, sequence and time_s are left to the caller.
   [[nodiscard]] dynamics_t message() const;
 

@@ -4,6 +4,7 @@
 
 #include "base/text.h"
 #include "service/estimator_setup.h"
+#include "service/live_models.h"
 #include "service/modeller.h"
 #include "service/replay_broadcast.h"
 #include "service/run_folder.h"
@@ -18,16 +19,18 @@ class ReplaySink final : public CoreSink {
  public:
   ReplaySink(RunFolder& folder, const Configuration& configuration, noise::ModelSpec spec,
              ReplayBroadcast& broadcast)
-      : folder_(folder), book_(configuration, std::move(spec)), broadcast_(broadcast) {}
+      : folder_(folder),
+        live_models_(configuration, std::move(spec),
+                     [this](const Refit& refit) {
+                       models_.take(refit);
+                       broadcast_.on_refit(refit);
+                     }),
+        broadcast_(broadcast) {}
 
   void on_error(const ErrorRecord& record) noexcept override {
     folder_.on_error(record);
     broadcast_.on_error(record);
-    book_.add(record);
-    while (const auto refit = book_.refit()) {
-      models_.take(*refit);
-      broadcast_.on_refit(*refit);
-    }
+    live_models_.add(record);
   }
   void on_event(const EstimatorEvent& event) noexcept override { folder_.on_event(event); }
   void on_snapshot(const Snapshot& snapshot) noexcept override {
@@ -36,11 +39,13 @@ class ReplaySink final : public CoreSink {
   }
   void on_late_sample(const LateSample& late) noexcept override { folder_.on_late_sample(late); }
 
+  /// The recording ends.
+  void finish() { live_models_.finish(); }
   [[nodiscard]] const NewestModels& models() const { return models_; }
 
  private:
   RunFolder& folder_;
-  ModelBook book_;
+  LiveModels live_models_;
   ReplayBroadcast& broadcast_;
   NewestModels models_;
 };
@@ -70,6 +75,7 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   ReplaySink sink(**folder, configuration, *spec, broadcast);
   const auto result = replay(configuration, estimator_config(configuration), recording, sink, replay_options);
   if (!result) return tl::unexpected<Error>(result.error());
+  sink.finish();
   broadcast.finish();
   if (auto written = sink.models().write((*folder)->folder()); !written) return written;
   if (auto written = (*folder)->write_calibration(); !written) return written;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "service/noise_series.h"
+#include "service/vehicle_speed.h"
 
 namespace imuscope {
 
@@ -14,8 +15,6 @@ constexpr std::size_t kStatic = 0;
 constexpr std::size_t kDynamic = 1;
 
 constexpr const char* kByNames[] = {"motion", "intensity", "labels"};
-
-double norm(const Vector3& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 /// What is said where the run has no static or no dynamic part.
 std::vector<std::string> missing_parts(const RegimeTrack& motion, const MotionLimits& limits,
@@ -54,14 +53,10 @@ void MotionWatch::add(const StudyEpoch& epoch, const ReferenceBias& bias) {
 }
 
 void MotionWatch::add(const Snapshot& snapshot) {
-  const auto& navigation = snapshot.navigation;
-  if (navigation.status == NavigationStatus::kNavigating) {
-    levels_.add_speed(navigation.time, norm(navigation.v_n_mps), norm(navigation.sd_velocity_mps));
-    has_speed_ = true;
-  } else if (snapshot.odometry.enabled && snapshot.counters.odometry_samples > 0) {
-    levels_.add_speed(snapshot.odometry.time, snapshot.odometry.speed_mps, 0.0);
-    has_speed_ = true;
-  }
+  const auto speed = vehicle_speed(snapshot.navigation, snapshot.odometry, snapshot.counters);
+  if (!speed) return;
+  levels_.add_speed(speed->time, speed->speed_mps, speed->sd_mps);
+  has_speed_ = true;
 }
 
 Result<RunRegimes> find_regimes(const RegimeOptions& options, const MotionWatch& watch,

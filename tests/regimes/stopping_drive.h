@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -32,8 +33,19 @@ struct Stop {
   double end_s;
 };
 
-/// What was driven: levels as a reference of 100 Hz shows them, and where the speed was zero.
+/// What a reference of 100 Hz shows at one instant; the speed where it is told.
+struct DrivenSample {
+  HostTime time;
+  Vector3 omega_radps;
+  Vector3 f_mps2;
+  std::optional<double> speed_mps;
+};
+
+inline constexpr double kDrivenSpeedSd_mps = 0.03;
+
+/// What was driven: samples, their levels, and where the speed was zero.
 struct Driven {
+  std::vector<DrivenSample> samples;
   MotionLevels levels;
   std::vector<Stop> stops;
 };
@@ -119,10 +131,14 @@ inline Driven driven(const StoppingDrive& drive) {
     const Eigen::Vector3d omega = Eigen::Vector3d(0.0, pitch_radps, yaw_radps) + road_omega +
                                   engine * std::cos(phase_rad) * omega_line + gyro_sd * vector();
     const HostTime time = HostTime{} + from_seconds(1000.0 + t_s);
-    out.levels.add(time, {omega.x(), omega.y(), omega.z()}, {f.x(), f.y(), f.z()});
-    if (!drive.has_speed || k % 10 != 0) continue;
-    speed_error_mps += 0.2 * (0.06 * normal(random) - speed_error_mps);
-    out.levels.add_speed(time, v + speed_error_mps, 0.03);
+    out.samples.push_back({time, {omega.x(), omega.y(), omega.z()}, {f.x(), f.y(), f.z()}, {}});
+    DrivenSample& sample = out.samples.back();
+    if (drive.has_speed && k % 10 == 0) {
+      speed_error_mps += 0.2 * (0.06 * normal(random) - speed_error_mps);
+      sample.speed_mps = v + speed_error_mps;
+    }
+    out.levels.add(time, sample.omega_radps, sample.f_mps2);
+    if (sample.speed_mps) out.levels.add_speed(time, *sample.speed_mps, kDrivenSpeedSd_mps);
   }
   return out;
 }

@@ -1,3 +1,5 @@
+#include "service/live_models.h"
+#include "service/model_book.h"
 #include "service/modeller.h"
 
 #include <gtest/gtest.h>
@@ -53,7 +55,7 @@ TEST(ModelBook, RefitsByCountAndAgreesWithTheBatchOverTheSameGapsAndRegimes) {
     // A hole of seven samples, and three regimes in turn.
     counter += i == 300 ? 8 : 1;
     const auto row = row_of(counter, i < 400 || i >= 800 ? Regime::kStatic : Regime::kDynamic, random);
-    book.add({0, HostTime{}, row});
+    book.add({0, HostTime{}, row}, row.regime);
     batch.add(row);
   }
   refit = book.refit();
@@ -83,7 +85,7 @@ Refit fed(ModelBook& book, std::int64_t& counter, int seconds, double sd, std::m
     for (auto* triad : {&row.e_gyro_radps, &row.e_accel_mps2}) {
       for (double& e : *triad) e *= sd;
     }
-    book.add({0, HostTime{}, row});
+    book.add({0, HostTime{}, row}, row.regime);
   }
   auto refit = book.refit();
   EXPECT_TRUE(refit);
@@ -125,7 +127,7 @@ TEST(ModelBook, AWarmRefitEndsWhereASearchOverAllRatesDoes) {
     auto row = row_of(i, Regime::kStatic, random);
     state = 0.98 * state + 0.2 * normal(random);
     row.e_gyro_radps[0] += state;
-    book.add({0, HostTime{}, row});
+    book.add({0, HostTime{}, row}, row.regime);
     batch.add(row);
     if (auto refit = book.refit()) last = std::move(refit);
   }
@@ -186,6 +188,51 @@ TEST(Modeller, CountsEachRowThatFoundNoRoom) {
   EXPECT_EQ(modeller.rows().refused, kTooMany);
   EXPECT_EQ(modeller.rows().pushed, Modeller::row_capacity());
   EXPECT_EQ(modeller.rows().level, Modeller::row_capacity());
+}
+
+/// Twelve stops of five seconds in a drive, whose errors are three times as large in motion: each regime's
+/// white noise is its own and no mixture. What the row says of its regime, late as it is told live, counts
+/// for nothing.
+TEST(LiveModels, GiveEachRowToTheRegimeThatHeldThere) {
+  std::mt19937 random(29);
+  std::normal_distribution<double> normal;
+  Refit last;
+  int refits = 0;
+  LiveModels models(two_devices(), *noise::parse_model("WN"), [&](Refit refit) {
+    last = std::move(refit);
+    ++refits;
+  });
+  constexpr int kRate_hz = 100;
+  constexpr int kRounds = 12;
+  constexpr int kRound_s = 25;
+  constexpr int kStop_s = 5;
+  for (int k = 0; k < kRate_hz * kRounds * kRound_s; ++k) {
+    const bool stands = (k / kRate_hz) % kRound_s < kStop_s;
+    auto row = row_of(k, Regime::kDynamic, random);
+    row.time = HostTime{} + from_seconds(10.0 + 0.01 * k);
+    for (auto* triad : {&row.e_gyro_radps, &row.e_accel_mps2}) {
+      for (double& e : *triad) e *= stands ? 1.0 : 3.0;
+    }
+    row.predicted_f_s_mps2 = {stands ? 0.0 : 0.5 * normal(random), 0.0, -9.81};
+    row.predicted_omega_s_radps = {0.0, 0.0, stands ? 0.0 : 0.05 * normal(random)};
+    ErrorRecord record{0, HostTime{}, row};
+    if (k % 10 == 0) record.speed = VehicleSpeed{row.time, stands ? 0.0 : 8.0, 0.02};
+    models.add(record);
+  }
+  const int before = refits;
+  models.finish();
+  EXPECT_EQ(before, kRounds * kRound_s / 10 - 1) << "the last seconds waited for what came after them";
+  EXPECT_EQ(refits, kRounds * kRound_s / 10);
+  EXPECT_NEAR(static_cast<double>(last.motion.n_static) / kRate_hz, kRounds * (kStop_s - 0.6), 3.0);
+  EXPECT_NEAR(static_cast<double>(last.motion.n_dynamic) / kRate_hz, kRounds * (kRound_s - kStop_s - 0.6), 3.0);
+  ASSERT_EQ(last.axes.size(), 2 * kAxisCount);
+  for (const AxisRefit& axis : last.axes) {
+    ASSERT_TRUE(axis.fit);
+    const double truth = axis.regime == Regime::kStatic ? 1.0 : 9.0;
+    const auto& wn = axis.fit->parameters.front();
+    EXPECT_NEAR(wn.value, truth, 4.0 * *wn.sd) << axis.axis;
+    EXPECT_LT(*wn.sd, 0.05 * truth);
+  }
 }
 
 }  // namespace

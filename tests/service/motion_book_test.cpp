@@ -69,10 +69,10 @@ TEST(MotionBook, CountsRegimesAndLeavesOutAxesWithoutAValue) {
   row.accel_valid = false;
   row.predicted_omega_s_radps = {1.0, 2.0, -3.0};
   row.regime = Regime::kDynamic;
-  book.add(row);
+  book.add(row, row.regime);
   row.regime = Regime::kStatic;
-  book.add(row);
-  book.add(row);
+  book.add(row, row.regime);
+  book.add(row, row.regime);
   const auto message = book.message();
   EXPECT_EQ(message.n_static, 2);
   EXPECT_EQ(message.n_dynamic, 1);
@@ -101,7 +101,7 @@ TEST(MotionBook, RegressesEveryAxisOnTheFifteenCovariatesInMotion) {
       for (double& component : *v) component = normal(random);
     }
     row.e_gyro_radps[0] = 0.2 * row.f_dot_s_mps3[1] + normal(random);
-    book.add(row);
+    book.add(row, row.regime);
     if (row.regime == Regime::kStatic || n++ % 5 != 0) continue;
     std::array<double, 1 + kCovariates + 1> columns{1.0};
     const auto x = covariates(row);
