@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
 #include "noise/chi_squared.h"
+#include "noise/homogeneity.h"
 #include "noise/inference.h"
 
 namespace imuscope::noise {
@@ -41,33 +42,44 @@ bool is_too_short_for_the_other(const FitResult& first, const FitResult& second,
   return is_short(first, rate_of(second)) || is_short(second, rate_of(first));
 }
 
-struct Pair {
-  std::size_t first;
-  std::size_t second;
-};
-
-std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b,
-                                         const std::vector<Pair>& pairs) {
-  if (pairs.empty()) return std::nullopt;
-  const auto n = static_cast<Eigen::Index>(pairs.size());
-  Eigen::VectorXd difference(n);
-  Eigen::MatrixXd covariance(n, n);
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    difference[static_cast<Eigen::Index>(i)] =
-        on_interval_scale(b.parameters[pairs[i].second]) - on_interval_scale(a.parameters[pairs[i].first]);
-    for (std::size_t k = 0; k < pairs.size(); ++k) {
-      covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-          covariance_of(a, pairs[i].first, pairs[k].first) +
-          covariance_of(b, pairs[i].second, pairs[k].second);
-    }
+/// Both wavelet variances as one, level by level.
+WaveletVariance together(const FitResult& a, const FitResult& b) {
+  WaveletVariance out = observed_wv(a.wv.size() >= b.wv.size() ? a : b);
+  const WaveletVariance less = observed_wv(a.wv.size() >= b.wv.size() ? b : a);
+  out.n_samples += less.n_samples;
+  out.n_valid += less.n_valid;
+  for (std::size_t i = 0; i < less.levels.size(); ++i) {
+    WvLevel& to = out.levels[i];
+    const WvLevel& from = less.levels[i];
+    const auto count = static_cast<double>(to.n_coefficients);
+    const auto more = static_cast<double>(from.n_coefficients);
+    to.value = (count * to.value + more * from.value) / (count + more);
+    to.n_coefficients += from.n_coefficients;
+    to.places.clear();
   }
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(covariance);
-  if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return std::nullopt;
-  DifferenceTest test;
-  test.dof = static_cast<int>(n);
-  test.statistic = difference.dot(ldlt.solve(difference));
-  test.p_value = chi_squared_p_value(test.statistic, test.dof);
-  return test;
+  return out;
+}
+
+bool are_of_one_kind(const FitResult& a, const FitResult& b) {
+  const auto unit_of = [](const FitResult& fit) {
+    return fit.parameters.empty() ? std::string() : fit.parameters.front().unit;
+  };
+  return a.rate_hz == b.rate_hz && a.efficiency == b.efficiency && !a.wv.empty() && !b.wv.empty() &&
+         (unit_of(a) == unit_of(b) || a.parameters.front().name != b.parameters.front().name);
+}
+
+/// Whether both records come from one model, that of more terms: a test of the levels, whose size does not
+/// hang on how far from Gaussian the estimates are.
+std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b) {
+  if (!are_of_one_kind(a, b)) return std::nullopt;
+  const ModelSpec& spec = b.spec.parameter_count() > a.spec.parameter_count() ? b.spec : a.spec;
+  const auto common = fit(together(a, b), spec, a.rate_hz);
+  if (!common) return std::nullopt;
+  const std::array records{observed_wv(a), observed_wv(b)};
+  const std::array errors{a.model_error, b.model_error};
+  const auto test = test_homogeneity(records, common->model, errors).test;
+  if (!test) return std::nullopt;
+  return DifferenceTest{test->statistic, test->dof, test->p_value};
 }
 
 /// @param sd  of the difference on the scale of the intervals
@@ -94,7 +106,7 @@ double from_interval_scale(const ParameterEstimate& p, double place) {
 
 Comparison compare(const FitResult& first, const FitResult& second) {
   Comparison out;
-  std::vector<Pair> testable;
+  bool has_common = false;
   const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + first.confidence));
   for (std::size_t i = 0; i < first.parameters.size(); ++i) {
     const ParameterEstimate& p = first.parameters[i];
@@ -121,7 +133,7 @@ Comparison compare(const FitResult& first, const FitResult& second) {
         const double d = on_interval_scale(q) - on_interval_scale(p);
         row.p_value = chi_squared_p_value(d * d / variance, 1);
         set_ratio_interval(row, std::sqrt(variance), z);
-        testable.push_back({i, *k});
+        has_common = true;
       }
     }
     out.parameters.push_back(row);
@@ -145,7 +157,7 @@ Comparison compare(const FitResult& first, const FitResult& second) {
         fmt::format("the rates differ ({} and {} Hz): WN, RW, QN and DR parameters are per sample",
                     first.rate_hz, second.rate_hz));
   }
-  out.test = joint_test(first, second, testable);
+  if (has_common) out.test = joint_test(first, second);
   return out;
 }
 

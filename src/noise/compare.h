@@ -25,7 +25,8 @@ struct ComparedParameter {
   std::optional<double> p_value;
 };
 
-/// Joint test over the parameters that both fits determine: (a-b)' (Sa+Sb)^-1 (a-b).
+/// Score test that both records come from one model, over all its parameters (homogeneity.h). Differences
+/// below what the models miss of the levels do not count.
 struct DifferenceTest {
   double statistic = 0.0;
   int dof = 0;
@@ -35,7 +36,8 @@ struct DifferenceTest {
 /// Parameters of both fits in one table, and the test over all of them.
 struct Comparison {
   std::vector<ComparedParameter> parameters;
-  std::optional<DifferenceTest> test;  ///< absent where no parameter is determined in both
+  /// Absent where no parameter is determined in both, and where units, rates or estimators differ.
+  std::optional<DifferenceTest> test;
   std::vector<std::string> warnings;
 };
 

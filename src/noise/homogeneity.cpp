@@ -20,7 +20,8 @@ constexpr double kSingular = 1e-9;
 /// One record under the common model.
 class Unit {
  public:
-  Unit(const WaveletVariance& wv, const Model& common, const std::vector<Eigen::Index>& in_use)
+  Unit(const WaveletVariance& wv, const Model& common, const std::vector<Eigen::Index>& in_use,
+       double model_error)
       : v_(sampling_covariance(common, wv, wv.levels.size())) {
     std::vector<int> levels;
     expected_.resize(v_.rows());
@@ -30,6 +31,7 @@ class Unit {
       expected_[static_cast<Eigen::Index>(i)] = model_wv(common, wv.levels[i].level);
       observed[static_cast<Eigen::Index>(i)] = wv.levels[i].value;
     }
+    v_.diagonal() += model_error * model_error * expected_.cwiseAbs2();
     const Eigen::MatrixXd whitener = whitener_of(v_);
     const Eigen::MatrixXd all = wv_jacobian(common, levels, parameter_places(common));
     const Eigen::MatrixXd slope = whitener * all(Eigen::all, in_use);
@@ -98,7 +100,8 @@ double statistic_of(const std::vector<Unit>& units, const std::vector<Eigen::Vec
 
 }  // namespace
 
-Homogeneity test_homogeneity(std::span<const WaveletVariance> records, const Model& common) {
+Homogeneity test_homogeneity(std::span<const WaveletVariance> records, const Model& common,
+                             std::span<const double> model_errors) {
   Homogeneity out;
   const auto places = parameter_places(common);
   std::vector<Eigen::Index> in_use;
@@ -111,8 +114,9 @@ Homogeneity test_homogeneity(std::span<const WaveletVariance> records, const Mod
   std::vector<Eigen::VectorXd> scores;
   const auto size = static_cast<Eigen::Index>(in_use.size());
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(size, size);
-  for (const WaveletVariance& record : records) {
-    const Unit& unit = units.emplace_back(record, common, in_use);
+  for (std::size_t k = 0; k < records.size(); ++k) {
+    const Unit& unit =
+        units.emplace_back(records[k], common, in_use, model_errors.empty() ? 0.0 : model_errors[k]);
     scores.push_back(unit.score());
     information += unit.information();
   }

@@ -27,6 +27,9 @@ struct Homogeneity {
 };
 
 /// Deterministic: the same records, the same p-value.
-Homogeneity test_homogeneity(std::span<const WaveletVariance> records, const Model& common);
+/// @param model_errors  share by which a model of that kind misses the levels of each record
+///                      (FitResult::model_error): no difference is made of it. Empty: none.
+Homogeneity test_homogeneity(std::span<const WaveletVariance> records, const Model& common,
+                             std::span<const double> model_errors = {});
 
 }  // namespace imuscope::noise

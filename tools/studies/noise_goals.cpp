@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "noise/compare.h"
 #include "noise/inference.h"
 #include "noise/replicates.h"
 #include "noise/select.h"
@@ -298,6 +299,29 @@ std::vector<Cell> replicate_cells() {
   return cells;
 }
 
+/// Two records of one sensor, side by side: how often the joint test says that they differ.
+std::vector<Cell> comparison_cells() {
+  std::vector<Cell> cells;
+  const auto all = truths();
+  for (const std::size_t which : {0U, 2U, 3U, 4U, 5U, 8U}) {
+    const noise::Model& truth = all[which];
+    cells.push_back({fmt::format("comparison/{}", spec_of(truth).name()),
+                     {{"differ", 3.0, 8.0}},
+                     [truth](std::mt19937_64& random, Counts& counts) {
+                       // The shorter one is what a drive's stops leave.
+                       const auto fit_of = [&](std::size_t n) {
+                         const auto wv =
+                             noise::haar_wavelet_variance(imuscope::simulated_noise(truth, n, random)).value();
+                         return noise::fit(wv, spec_of(truth), kRate_hz).value();
+                       };
+                       const auto first = fit_of(1U << 15U);
+                       const auto compared = noise::compare(first, fit_of(1U << 16U));
+                       if (compared.test) count(counts, "differ", compared.test->p_value < 0.05);
+                     }});
+  }
+  return cells;
+}
+
 /// What earlier calls counted, and the file to go on in.
 class Results {
  public:
@@ -393,12 +417,13 @@ int main(int argc, char** argv) {
   app.add_option("--lengths", lengths, "logarithms to base 2, of the intervals")->check(CLI::Range(10, 22));
   app.add_option("--results", results_file, "keep counts here, and go on from there")->type_name("FILE");
   app.add_option("--only", only,
-                 "cells whose name begins so: intervals, slow, missing, spikes, selection, replicates")
+                 "cells whose name begins so: intervals, slow, missing, spikes, selection, replicates, comparison")
       ->type_name("TEXT");
   CLI11_PARSE(app, argc, argv);
   std::vector<Cell> cells = selection_cells();
   for (auto&& more :
-       {interval_cells(lengths), slow_cells(), missing_cells(), spike_cells(), replicate_cells()})
+       {interval_cells(lengths), slow_cells(), missing_cells(), spike_cells(), replicate_cells(),
+                       comparison_cells()})
     cells.insert(cells.end(), more.begin(), more.end());
   Results results(results_file);
   bool good = true;
