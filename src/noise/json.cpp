@@ -193,6 +193,31 @@ json fit_to_json(const FitResult& fit) {
   return out;
 }
 
+nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const std::string& unit, double rate_hz,
+                                 std::size_t levels) {
+  constexpr double kNormal95 = 1.959963984540054;
+  const auto parameter = [](const char* name, const std::string& of_unit, double value, double sd) {
+    return nlohmann::json{{"name", name},
+                          {"unit", of_unit},
+                          {"value", value},
+                          {"sd", sd},
+                          {"ci_low", std::max(0.0, value - kNormal95 * sd)},
+                          {"ci_high", value + kNormal95 * sd}};
+  };
+  nlohmann::json out = nlohmann::json::array();
+  for (const Line& line : lines) {
+    nlohmann::json wv = nlohmann::json::array();
+    for (std::size_t level = 1; level <= levels; ++level)
+      wv.push_back(line_wv(line, rate_hz, static_cast<int>(level)));
+    out.push_back({{"process", fmt::format("SIN{}", out.size() + 1)},
+                   {"parameters",
+                    {parameter("alpha", unit, line.amplitude, line.amplitude_sd),
+                     parameter("frequency", "Hz", line.frequency_hz, line.frequency_sd_hz)}},
+                   {"wv", std::move(wv)}});
+  }
+  return out;
+}
+
 std::string fitted_to_words(const json& entry) {
   if (!entry.is_object() || !entry.contains("fitted_to") || !entry.at("fitted_to").is_object()) return {};
   const json& from = entry.at("fitted_to");

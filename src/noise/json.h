@@ -9,6 +9,7 @@
 
 #include "base/result.h"
 #include "noise/fit.h"
+#include "noise/lines.h"
 #include "noise/quantities.h"
 
 namespace imuscope::noise {
@@ -26,6 +27,11 @@ nlohmann::json fit_to_json(const FitResult& fit);
 
 /// [{"process", "name", "unit", "value", "ci_low", "ci_high", "known": "fitted", "bound" or "unknown"}].
 nlohmann::json quantities_to_json(const std::vector<Quantity>& quantities);
+
+/// [{"process": "SIN1", "parameters": [alpha, frequency: {"name", "unit", "value", "sd", "ci_low",
+/// "ci_high"}], "wv": what it adds to each level}].
+nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const std::string& unit, double rate_hz,
+                                 std::size_t levels);
 
 /// What an entry was fitted to, for people: "812 s of regime static in 9 stretches, between 3.0 s and 1805.2
 /// s of the run". Empty where the entry does not say.

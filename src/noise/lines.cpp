@@ -1,12 +1,18 @@
 #include "noise/lines.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <complex>
+#include <functional>
+#include <map>
 #include <numbers>
+#include <numeric>
+#include <optional>
 #include <unsupported/Eigen/FFT>
 
 #include "noise/process.h"
@@ -19,6 +25,14 @@ namespace {
 constexpr std::size_t kLobe = 2;
 /// The noise beside a bin: so many bins to either side, outside of the lobe.
 constexpr std::size_t kFloorBins = 40;
+/// The first bin with a floor on both sides. Nearer to zero the noise of sensors rises within its floor.
+constexpr std::size_t kFirstBin = kLobe + kFloorBins + 1;
+/// From one length of segments to the next.
+constexpr std::size_t kLonger = 4;
+/// Fewer of a longer segment than these are one look at slow noise, not a spectrum.
+constexpr std::size_t kFewestSegments = 3;
+/// Of a segment's samples so many may be missing.
+constexpr double kMostMissing = 0.125;
 /// Degrees of freedom a segment, Hann windows that overlap by half (Welch 1967; 36 K^2 / (19 K - 1)).
 double degrees_of_freedom(double segments) { return 36.0 * segments * segments / (19.0 * segments - 1.0); }
 
@@ -31,28 +45,76 @@ std::vector<double> hann(std::size_t n) {
   return window;
 }
 
+/// Samples that are there, and how many of them before each place.
+class Present {
+ public:
+  Present(std::span<const double> x, std::span<const std::uint8_t> mask)
+      : runs_(valid_segments(x, mask)), before_(x.size() + 1, 0) {
+    for (const Segment& run : runs_) {
+      for (std::size_t i = run.begin; i < run.end; ++i) before_[i + 1] = 1;
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) before_[i + 1] += before_[i];
+  }
+
+  [[nodiscard]] const std::vector<Segment>& runs() const { return runs_; }
+  [[nodiscard]] bool at(std::size_t i) const { return before_[i + 1] > before_[i]; }
+  [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
+    return before_[end] - before_[begin];
+  }
+
+  /// Where segments of `length` begin, half overlapping, in which enough samples are there.
+  [[nodiscard]] std::vector<std::size_t> segments(std::size_t length) const {
+    std::vector<std::size_t> begins;
+    const auto least = static_cast<std::size_t>((1.0 - kMostMissing) * static_cast<double>(length));
+    std::size_t begin = 0;
+    for (const Segment& run : runs_) {
+      // From the beginning of a run on, as long as there is enough; else from the next run.
+      for (begin = std::max(begin, run.begin); begin < run.end && begin + length < before_.size() &&
+                                               count(begin, begin + length) >= least;
+           begin += length / 2)
+        begins.push_back(begin);
+    }
+    return begins;
+  }
+
+ private:
+  std::vector<Segment> runs_;
+  std::vector<std::size_t> before_;
+};
+
 /// Mean periodogram of overlapping segments.
 struct Spectrum {
+  std::size_t length = 0;     ///< samples a segment
   std::vector<double> power;  ///< mean |X_k|^2 of the windowed segments
   std::size_t segments = 0;
 };
 
-Spectrum spectrum_of(std::span<const double> x, const std::vector<Segment>& runs, std::size_t length) {
+/// A missing sample counts as the segment's mean; what the window loses by that is made up for, so that a
+/// line keeps its amplitude.
+Spectrum spectrum_of(std::span<const double> x, const Present& present, std::size_t length) {
   const auto window = hann(length);
+  const double whole = std::accumulate(window.begin(), window.end(), 0.0);
   Spectrum out;
+  out.length = length;
   out.power.assign(length / 2 + 1, 0.0);
   Eigen::FFT<double> fft;
   std::vector<double> piece(length);
   std::vector<std::complex<double>> transform;
-  for (const auto& run : runs) {
-    for (std::size_t begin = run.begin; begin + length <= run.end; begin += length / 2) {
-      double mean = 0.0;
-      for (std::size_t i = 0; i < length; ++i) mean += x[begin + i] / static_cast<double>(length);
-      for (std::size_t i = 0; i < length; ++i) piece[i] = window[i] * (x[begin + i] - mean);
-      fft.fwd(transform, piece);
-      for (std::size_t k = 0; k < out.power.size(); ++k) out.power[k] += std::norm(transform[k]);
-      ++out.segments;
+  for (const std::size_t begin : present.segments(length)) {
+    double mean = 0.0;
+    double there = 0.0;
+    const auto n = static_cast<double>(present.count(begin, begin + length));
+    for (std::size_t i = 0; i < length; ++i) {
+      if (!present.at(begin + i)) continue;
+      mean += x[begin + i] / n;
+      there += window[i];
     }
+    const double gain = whole / there;
+    for (std::size_t i = 0; i < length; ++i)
+      piece[i] = present.at(begin + i) ? gain * window[i] * (x[begin + i] - mean) : 0.0;
+    fft.fwd(transform, piece);
+    for (std::size_t k = 0; k < out.power.size(); ++k) out.power[k] += std::norm(transform[k]);
+    ++out.segments;
   }
   for (double& p : out.power) p /= static_cast<double>(std::max<std::size_t>(out.segments, 1));
   return out;
@@ -102,11 +164,11 @@ double offset_of(double left, double peak, double right) {
 }
 
 /// A sinusoid's power in the bins of the lobe: sum over them of |X|^2 is A^2/4 sum(w)^2 (1 + 2/4) for Hann.
-double amplitude_of(const Spectrum& spectrum, std::size_t k, double floor, std::size_t length) {
+double amplitude_of(const Spectrum& spectrum, std::size_t k, double floor) {
   double power = 0.0;
   for (std::size_t i = k - kLobe; i <= std::min(k + kLobe, spectrum.power.size() - 1); ++i)
     power += spectrum.power[i] - floor;
-  const double sum_of_window_squared = 0.25 * static_cast<double>(length) * static_cast<double>(length);
+  const double sum_of_window_squared = 0.25 * static_cast<double>(spectrum.length) * static_cast<double>(spectrum.length);
   constexpr double kLobePower = 1.5;
   return std::sqrt(std::max(0.0, 4.0 * power / (kLobePower * sum_of_window_squared)));
 }
@@ -127,8 +189,8 @@ double variance_of(std::span<const double> x, const std::vector<Segment>& runs) 
 }
 
 /// Variance a sample of white noise with this floor: E|X|^2 = sigma^2 sum(w^2), sum(w^2) = 3/8 n.
-double noise_variance_of(double floor, const LineOptions& options) {
-  return floor / (0.375 * static_cast<double>(options.segment));
+double noise_variance_of(double floor, const Spectrum& spectrum) {
+  return floor / (0.375 * static_cast<double>(spectrum.length));
 }
 
 /// Half of the overlapping segments are new.
@@ -137,67 +199,167 @@ double independent_segments(const Spectrum& spectrum) {
 }
 
 /// Cramer and Rao's bound for one segment, averaged over them (independent phases).
-double frequency_sd_hz(double amplitude, double floor, const Spectrum& spectrum, const LineOptions& options) {
-  const auto length = static_cast<double>(options.segment);
+double frequency_sd_hz(double amplitude, double floor, const Spectrum& spectrum, double rate_hz) {
+  const auto length = static_cast<double>(spectrum.length);
   const double var_omega =
-      24.0 * noise_variance_of(floor, options) / (amplitude * amplitude * length * length * length);
-  return std::sqrt(var_omega / independent_segments(spectrum)) * options.rate_hz / (2.0 * std::numbers::pi);
+      24.0 * noise_variance_of(floor, spectrum) / (amplitude * amplitude * length * length * length);
+  return std::sqrt(var_omega / independent_segments(spectrum)) * rate_hz / (2.0 * std::numbers::pi);
 }
 
 /// The same bound, 2 sigma^2 / n, times what the window gives away (its equivalent noise bandwidth, 3/2
 /// bins).
-double amplitude_sd_of(double floor, const Spectrum& spectrum, const LineOptions& options) {
+double amplitude_sd_of(double floor, const Spectrum& spectrum) {
   constexpr double kBandwidth = 1.5;
-  return std::sqrt(2.0 * kBandwidth * noise_variance_of(floor, options) /
-                   static_cast<double>(options.segment) / independent_segments(spectrum));
+  return std::sqrt(2.0 * kBandwidth * noise_variance_of(floor, spectrum) /
+                   static_cast<double>(spectrum.length) / independent_segments(spectrum));
 }
 
-std::vector<Segment> runs_of(std::span<const double> x, std::span<const std::uint8_t> mask,
-                             std::size_t shortest) {
-  auto runs = valid_segments(x, mask);
-  std::erase_if(runs, [&](const Segment& run) { return run.end - run.begin < shortest; });
-  return runs;
+/// Bins [first, last] of one spectrum in which lines are looked for.
+struct Band {
+  Spectrum spectrum;
+  std::size_t first;
+  std::size_t last;
+};
+
+/// From the highest frequencies down.
+std::vector<Band> bands_of(std::span<const double> x, const Present& present, const LineOptions& options) {
+  std::vector<Band> bands;
+  for (std::size_t length = options.segment; length <= x.size(); length *= kLonger) {
+    const bool is_first = bands.empty();
+    if (!is_first && present.segments(length).size() < kFewestSegments) break;
+    Spectrum spectrum = spectrum_of(x, present, length);
+    if (spectrum.segments == 0) break;
+    const double bin_hz = options.rate_hz / static_cast<double>(length);
+    const auto lowest = static_cast<std::size_t>(std::ceil(options.lowest_hz / bin_hz));
+    const std::size_t last = is_first ? spectrum.power.size() - 1 - kLobe : kLonger * kFirstBin - 1;
+    const std::size_t first = std::max(lowest, kFirstBin);
+    if (first <= last) bands.push_back({std::move(spectrum), first, last});
+    if (lowest >= kFirstBin) break;
+  }
+  return bands;
+}
+
+/// Lines of one band.
+class Search {
+ public:
+  /// @param bins   of all bands: each is a chance for noise
+  /// @param total  variance of the signal
+  Search(const Band& band, const LineOptions& options, double bins, double total)
+      : band_(band),
+        options_(options),
+        bins_(bins),
+        total_(total),
+        dof_(degrees_of_freedom(static_cast<double>(band.spectrum.segments))),
+        // The floor is itself a median of some bins: its spread widens the threshold (variance of a median,
+        // pi/2 times that of a mean of as many).
+        floor_spread_(1.0 + 3.0 * std::sqrt(0.5 * std::numbers::pi * 2.0 /
+                                            (dof_ * static_cast<double>(2 * kFloorBins)))),
+        threshold_(floor_spread_ *
+                   boost::math::quantile(boost::math::complement(boost::math::chi_squared(dof_),
+                                                                 options.false_alarm / bins)) /
+                   dof_) {}
+
+  [[nodiscard]] std::vector<Line> lines() const {
+    std::vector<Line> out;
+    for (std::size_t k = band_.first; k <= band_.last; ++k) {
+      if (auto line = at(k)) out.push_back(*line);
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] std::optional<Line> at(std::size_t k) const {
+    const Spectrum& spectrum = band_.spectrum;
+    const double power = spectrum.power[k];
+    if (power < spectrum.power[k - 1] || power <= spectrum.power[k + 1]) return std::nullopt;
+    const double floor = floor_at(spectrum, k, dof_);
+    if (!(floor > 0.0) || power < threshold_ * floor) return std::nullopt;
+    if (power < threshold_ * power_beside(spectrum, k)) return std::nullopt;
+    Line line;
+    line.segment = spectrum.length;
+    const double offset = offset_of(spectrum.power[k - 1] - floor, power, spectrum.power[k + 1] - floor);
+    line.frequency_hz =
+        (static_cast<double>(k) + offset) * options_.rate_hz / static_cast<double>(spectrum.length);
+    line.amplitude = amplitude_of(spectrum, k, floor);
+    if (!(line.amplitude > 0.0)) return std::nullopt;
+    line.frequency_sd_hz = frequency_sd_hz(line.amplitude, floor, spectrum, options_.rate_hz);
+    line.amplitude_sd = amplitude_sd_of(floor, spectrum);
+    line.share_of_variance = total_ > 0.0 ? 0.5 * line.amplitude * line.amplitude / total_ : 0.0;
+    line.p_value =
+        std::min(1.0, bins_ * boost::math::cdf(boost::math::complement(
+                                  boost::math::chi_squared(dof_), dof_ * power / (floor * floor_spread_))));
+    return line;
+  }
+
+  const Band& band_;
+  const LineOptions& options_;
+  double bins_;
+  double total_;
+  double dof_;
+  double floor_spread_;
+  double threshold_;
+};
+
+/// A line at the border of two bands is one.
+bool is_known(const std::vector<Line>& lines, const Line& line, double rate_hz) {
+  return std::any_of(lines.begin(), lines.end(), [&](const Line& other) {
+    const auto shorter = static_cast<double>(std::min(line.segment, other.segment));
+    return std::abs(line.frequency_hz - other.frequency_hz) < static_cast<double>(kLobe) * rate_hz / shorter;
+  });
+}
+
+/// Takes the lines out of [begin, end), by those of its samples that are there.
+void remove_from(std::span<double> x, const Present& present, std::size_t begin, std::size_t end,
+                 std::span<const Line> lines, double rate_hz) {
+  const auto columns = static_cast<Eigen::Index>(2 * lines.size());
+  Eigen::MatrixXd waves(static_cast<Eigen::Index>(present.count(begin, end)), columns);
+  Eigen::VectorXd piece(waves.rows());
+  Eigen::Index row = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    if (!present.at(i)) continue;
+    piece[row] = x[i];
+    for (std::size_t l = 0; l < lines.size(); ++l) {
+      const double phase =
+          2.0 * std::numbers::pi * lines[l].frequency_hz / rate_hz * static_cast<double>(i - begin);
+      waves(row, static_cast<Eigen::Index>(2 * l)) = std::cos(phase);
+      waves(row, static_cast<Eigen::Index>(2 * l + 1)) = std::sin(phase);
+    }
+    ++row;
+  }
+  const Eigen::VectorXd right = waves.transpose() * (piece.array() - piece.mean()).matrix();
+  piece -= waves * (waves.transpose() * waves).eval().ldlt().solve(right);
+  row = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    if (present.at(i)) x[i] = piece[row++];
+  }
+}
+
+/// Runs joined over holes shorter than `hole`.
+std::vector<Segment> joined(const std::vector<Segment>& runs, std::size_t hole) {
+  std::vector<Segment> out;
+  for (const Segment& run : runs) {
+    if (!out.empty() && run.begin - out.back().end < hole)
+      out.back().end = run.end;
+    else
+      out.push_back(run);
+  }
+  return out;
 }
 
 }  // namespace
 
 std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
                              const LineOptions& options) {
-  const auto runs = runs_of(x, mask, options.segment);
-  if (runs.empty()) return {};
-  const Spectrum spectrum = spectrum_of(x, runs, options.segment);
-  const double dof = degrees_of_freedom(static_cast<double>(spectrum.segments));
-  const boost::math::chi_squared chi(dof);
-  const std::size_t last = spectrum.power.size() - 1 - kLobe;
-  const std::size_t first = std::max(options.first_bin, kLobe + kFloorBins + 1);
-  const auto bins = static_cast<double>(last - first + 1);
-  // The floor is itself a median of some bins: its spread widens the threshold (variance of a median, pi/2
-  // times that of a mean of as many).
-  const double floor_spread =
-      1.0 + 3.0 * std::sqrt(0.5 * std::numbers::pi * 2.0 / (dof * static_cast<double>(2 * kFloorBins)));
-  const double threshold =
-      floor_spread * boost::math::quantile(boost::math::complement(chi, options.false_alarm / bins)) / dof;
-  const double total = variance_of(x, runs);
-
+  const Present present(x, mask);
+  const std::vector<Band> bands = bands_of(x, present, options);
+  double bins = 0.0;
+  for (const Band& band : bands) bins += static_cast<double>(band.last - band.first + 1);
+  const double total = bands.empty() ? 0.0 : variance_of(x, present.runs());
   std::vector<Line> lines;
-  for (std::size_t k = first; k <= last; ++k) {
-    const double power = spectrum.power[k];
-    if (power < spectrum.power[k - 1] || power <= spectrum.power[k + 1]) continue;
-    const double floor = floor_at(spectrum, k, dof);
-    if (!(floor > 0.0) || power < threshold * floor) continue;
-    if (power < threshold * power_beside(spectrum, k)) continue;
-    Line line;
-    const double offset = offset_of(spectrum.power[k - 1] - floor, power, spectrum.power[k + 1] - floor);
-    line.frequency_hz =
-        (static_cast<double>(k) + offset) * options.rate_hz / static_cast<double>(options.segment);
-    line.amplitude = amplitude_of(spectrum, k, floor, options.segment);
-    if (!(line.amplitude > 0.0)) continue;
-    line.frequency_sd_hz = frequency_sd_hz(line.amplitude, floor, spectrum, options);
-    line.amplitude_sd = amplitude_sd_of(floor, spectrum, options);
-    line.share_of_variance = total > 0.0 ? 0.5 * line.amplitude * line.amplitude / total : 0.0;
-    line.p_value = std::min(
-        1.0, bins * boost::math::cdf(boost::math::complement(chi, dof * power / (floor * floor_spread))));
-    lines.push_back(line);
+  for (const Band& band : bands) {
+    for (const Line& line : Search(band, options, bins, total).lines()) {
+      if (!is_known(lines, line, options.rate_hz)) lines.push_back(line);
+    }
   }
   std::sort(lines.begin(), lines.end(),
             [](const Line& a, const Line& b) { return a.amplitude > b.amplitude; });
@@ -211,30 +373,28 @@ double line_wv(const Line& line, double rate_hz, int level) {
   return line.amplitude * line.amplitude * unit_wv(ProcessKind::kSinusoid, shape, level).value;
 }
 
+std::string in_words(const Line& line, std::string_view unit) {
+  return fmt::format("a line at {:.4g} Hz, amplitude {:.3g} {} ({:.2g} % of the variance)", line.frequency_hz,
+                     line.amplitude, unit, 100.0 * line.share_of_variance);
+}
+
 void remove_lines(std::span<double> x, std::span<const std::uint8_t> mask, const std::vector<Line>& lines,
-                  const LineOptions& options) {
+                  double rate_hz) {
   if (lines.empty()) return;
-  // Shorter pieces would lose too much of their noise to the sinusoids.
-  const std::size_t shortest = options.segment / 4;
-  const auto columns = static_cast<Eigen::Index>(2 * lines.size());
-  for (const auto& run : runs_of(x, mask, shortest)) {
-    for (std::size_t begin = run.begin; begin < run.end;) {
-      const std::size_t left = run.end - begin;
-      const std::size_t length = left < options.segment + shortest ? left : options.segment;
-      const auto rows = static_cast<Eigen::Index>(length);
-      Eigen::MatrixXd waves(rows, columns);
-      for (std::size_t l = 0; l < lines.size(); ++l) {
-        const double omega = 2.0 * std::numbers::pi * lines[l].frequency_hz / options.rate_hz;
-        for (Eigen::Index i = 0; i < rows; ++i) {
-          waves(i, static_cast<Eigen::Index>(2 * l)) = std::cos(omega * static_cast<double>(i));
-          waves(i, static_cast<Eigen::Index>(2 * l + 1)) = std::sin(omega * static_cast<double>(i));
-        }
+  const Present present(x, mask);
+  std::map<std::size_t, std::vector<Line>, std::greater<>> by_segment;
+  for (const Line& line : lines) by_segment[line.segment].push_back(line);
+  for (const auto& [segment, alike] : by_segment) {
+    // Shorter pieces would lose too much of their noise to the sinusoids.
+    const std::size_t shortest = segment / 4;
+    for (const Segment& stretch : joined(present.runs(), shortest)) {
+      for (std::size_t begin = stretch.begin; begin < stretch.end;) {
+        const std::size_t left = stretch.end - begin;
+        const std::size_t length = left < segment + shortest ? left : segment;
+        if (present.count(begin, begin + length) >= shortest)
+          remove_from(x, present, begin, begin + length, alike, rate_hz);
+        begin += length;
       }
-      Eigen::Map<Eigen::VectorXd> piece(x.data() + begin, rows);
-      const double mean = piece.mean();
-      const Eigen::VectorXd right = waves.transpose() * (piece.array() - mean).matrix();
-      piece -= waves * (waves.transpose() * waves).eval().ldlt().solve(right);
-      begin += length;
     }
   }
 }

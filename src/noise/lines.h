@@ -5,6 +5,8 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace imuscope::noise {
@@ -17,6 +19,7 @@ struct Line {
   double amplitude_sd = 0.0;     ///< from noise alone
   double share_of_variance = 0.0;
   double p_value = 1.0;  ///< of noise alone reaching this anywhere in the spectrum
+  std::size_t segment = 0;  ///< samples a segment of the spectrum in which it was found
 };
 
 /// Sampling rate of the signal, and what counts as a line in it.
@@ -24,24 +27,28 @@ struct LineOptions {
   double rate_hz = 100.0;
   /// Chance of any false line in one signal.
   double false_alarm = 1e-3;
-  /// Samples a segment of the spectrum, a power of two: lines closer than 4 rate / segment are one.
+  /// Samples of the shortest segments of the spectrum, a power of two: lines closer than 4 rate / segment are
+  /// one. Below its 43rd bin, segments of four times the length take over, and so on down to `lowest_hz`.
   std::size_t segment = 4096;
-  /// Below this bin the noise of sensors rises: slow processes, not lines. Never below 43.
-  std::size_t first_bin = 43;
-  std::size_t most_lines = 6;
+  double lowest_hz = 0.05;
+  std::size_t most_lines = 16;
 };
 
-/// Strongest first. Only runs of valid samples as long as a segment are looked at; without any, none are
-/// found. A peak wider than the window's main lobe is a band, not a line, and is passed over.
+/// Strongest first. A segment of the spectrum may miss an eighth of its samples; a signal that has none of the
+/// shortest has no lines, and longer ones are looked at where there are kFewestSegments. A peak wider than the
+/// window's main lobe is a band, not a line, and is passed over.
 std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
                              const LineOptions& options);
 
 /// What a line contributes to the wavelet variance of a level, as a sinusoid of random phase (N-5).
 double line_wv(const Line& line, double rate_hz, int level);
 
-/// Takes the lines out in place: in blocks of `segment` samples of every valid run, sine and cosine of each
-/// by least squares, so that amplitude and phase may wander from block to block.
+/// "a line at 0.565 Hz, amplitude 0.0021 m/s^2 (2.1 % of the variance)".
+std::string in_words(const Line& line, std::string_view unit);
+
+/// Takes the lines out in place: in blocks of each line's segment, sine and cosine by least squares of the
+/// samples that are there, so that amplitude and phase may wander from block to block.
 void remove_lines(std::span<double> x, std::span<const std::uint8_t> mask, const std::vector<Line>& lines,
-                  const LineOptions& options);
+                  double rate_hz);
 
 }  // namespace imuscope::noise

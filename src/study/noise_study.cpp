@@ -5,6 +5,7 @@
 
 #include "noise/compare.h"
 #include "noise/holm.h"
+#include "noise/json.h"
 #include "noise/lines.h"
 #include "noise/tails.h"
 #include "noise/wavelet_variance.h"
@@ -104,35 +105,11 @@ std::vector<noise::Line> take_out_lines(const DeviceConfig& device, std::size_t 
                            {"share_of_variance", line.share_of_variance},
                            {"p_value", line.p_value}});
     study.remarks.push_back(fmt::format(
-        "{} {}, {}: a vibration line at {:.4g} Hz, amplitude {:.3g} {} ({:.2g} % of the "
-        "variance); it is a sinusoid of the model, beside the noise that is fitted to what it leaves",
-        device.name, axis_name(axis), regime, line.frequency_hz, line.amplitude, axis_unit(axis),
-        100.0 * line.share_of_variance));
+        "{} {}, {}: {}; it is a sinusoid of the model, beside the noise that is fitted to what it leaves",
+        device.name, axis_name(axis), regime, noise::in_words(line, axis_unit(axis))));
   }
-  noise::remove_lines(values, mask, lines, options);
+  noise::remove_lines(values, mask, lines, device.rate_hz);
   return lines;
-}
-
-/// @param levels  of the wavelet variance
-nlohmann::json sinusoid_json(const noise::Line& line, std::size_t number, double rate_hz, std::size_t axis,
-                             std::size_t levels) {
-  constexpr double kNormal95 = 1.959963984540054;
-  const auto parameter = [](const char* name, const std::string& unit, double value, double sd) {
-    return nlohmann::json{{"name", name},
-                          {"unit", unit},
-                          {"value", value},
-                          {"sd", sd},
-                          {"ci_low", std::max(0.0, value - kNormal95 * sd)},
-                          {"ci_high", value + kNormal95 * sd}};
-  };
-  nlohmann::json wv = nlohmann::json::array();
-  for (std::size_t level = 1; level <= levels; ++level)
-    wv.push_back(noise::line_wv(line, rate_hz, static_cast<int>(level)));
-  return {{"process", fmt::format("SIN{}", number)},
-          {"parameters",
-           {parameter("alpha", axis_unit(axis), line.amplitude, line.amplitude_sd),
-            parameter("frequency", "Hz", line.frequency_hz, line.frequency_sd_hz)}},
-          {"wv", std::move(wv)}};
 }
 
 /// Three axes that leave out the same levels make one sentence.
@@ -274,12 +251,9 @@ nlohmann::json models_json(const NoiseStudy& study) {
   nlohmann::json models = nlohmann::json::array();
   for (const auto& m : study.models) {
     nlohmann::json model = model_json(m.fit, m.name, m.axis, m.regime);
-    if (!m.lines.empty()) {
-      model["sinusoids"] = nlohmann::json::array();
-      for (std::size_t i = 0; i < m.lines.size(); ++i)
-        model["sinusoids"].push_back(
-            sinusoid_json(m.lines[i], i + 1, m.fit.rate_hz, m.axis, m.fit.wv.size()));
-    }
+    if (!m.lines.empty())
+      model["sinusoids"] =
+          noise::sinusoids_to_json(m.lines, axis_unit(m.axis), m.fit.rate_hz, m.fit.wv.size());
     models.push_back(std::move(model));
   }
   return models;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
 
 #include "noise/wavelet_variance.h"
 
@@ -97,6 +98,93 @@ TEST(Lines, NoiseAloneRarelyHasOne) {
   EXPECT_LT(found, 11);
 }
 
+struct SlowNoise {
+  const char* name;
+  double markov_sd;
+  double time_constant_s;
+  double walk_sd;  ///< of a step
+};
+
+class SlowSpectrum : public testing::TestWithParam<SlowNoise> {
+ protected:
+  static std::vector<double> draw(std::size_t n, unsigned seed) {
+    const SlowNoise& noise = GetParam();
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    const double phi = std::exp(-1.0 / (noise.time_constant_s * kLineRate_hz));
+    std::vector<double> x(n);
+    double markov = noise.markov_sd * normal(random);
+    double walk = 0.0;
+    for (double& value : x) {
+      markov = phi * markov + noise.markov_sd * std::sqrt(1.0 - phi * phi) * normal(random);
+      value = normal(random) + markov + (walk += noise.walk_sd * normal(random));
+    }
+    return x;
+  }
+};
+
+TEST_P(SlowSpectrum, RarelyHasALineDownToATwentiethOfAHertz) {
+  int found = 0;
+  constexpr int kSeries = 40;
+  for (unsigned seed = 1; seed <= kSeries; ++seed) {
+    const auto x = draw(300'000, seed);
+    LineOptions options;
+    options.rate_hz = kLineRate_hz;
+    options.false_alarm = 0.02;
+    found += find_lines(x, all_valid(x.size()), options).empty() ? 0 : 1;
+  }
+  // One expected at most; five or more have a chance of 1e-3.
+  EXPECT_LT(found, 5);
+}
+
+TEST_P(SlowSpectrum, HidesNoLineThatStandsOutOfIt) {
+  for (const double frequency_hz : {0.062, 0.13, 0.27, 0.565, 1.69}) {
+    auto x = draw(600'000, 77);
+    std::mt19937_64 random(5);
+    std::vector<std::uint8_t> mask(x.size());
+    for (auto& there : mask) there = std::uniform_real_distribution(0.0, 1.0)(random) < 0.99 ? 1 : 0;
+    add_line(x, frequency_hz, 0.8);
+    const auto lines = find_lines(x, mask, {});
+    ASSERT_EQ(lines.size(), 1U) << frequency_hz;
+    EXPECT_NEAR(lines[0].frequency_hz, frequency_hz,
+                0.2 * kLineRate_hz / static_cast<double>(lines[0].segment));
+    EXPECT_NEAR(lines[0].amplitude, 0.8, 0.08) << frequency_hz;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Noises, SlowSpectrum,
+                         testing::Values(SlowNoise{"Markov1s", 0.7, 1.0, 0.0},
+                                         SlowNoise{"Markov10s", 0.5, 10.0, 0.0},
+                                         SlowNoise{"Walk", 0.0, 1.0, 0.005},
+                                         SlowNoise{"All", 0.5, 3.0, 0.002}),
+                         [](const auto& noise) { return std::string(noise.param.name); });
+
+// Single samples are lost on a serial line, and a drive's stretches have holes.
+TEST(Lines, OfARecordWithMissingSamplesAreFoundAndTakenOut) {
+  const auto clean = noise_of(400'000, 11);
+  auto x = clean;
+  add_line(x, 0.4, 0.5);
+  add_line(x, 21.3, 1.0);
+  std::mt19937_64 random(12);
+  std::vector<std::uint8_t> mask(x.size());
+  for (auto& there : mask) there = std::uniform_real_distribution(0.0, 1.0)(random) < 0.95 ? 1 : 0;
+  std::fill(mask.begin() + 50'000, mask.begin() + 56'000, std::uint8_t{0});
+  auto lines = find_lines(x, mask, {});
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_NEAR(lines[0].frequency_hz, 21.3, 0.003);
+  EXPECT_NEAR(lines[0].amplitude, 1.0, 0.03);
+  EXPECT_NEAR(lines[1].frequency_hz, 0.4, 2e-4);
+  EXPECT_NEAR(lines[1].amplitude, 0.5, 0.05);
+  remove_lines(x, mask, lines, kLineRate_hz);
+  WvOptions options;
+  options.mask = mask;
+  const auto after = haar_wavelet_variance(x, options).value();
+  const auto truth = haar_wavelet_variance(clean, options).value();
+  for (std::size_t j = 0; j < 11; ++j)
+    EXPECT_NEAR(after.levels[j].value, truth.levels[j].value, 0.03 * truth.levels[j].value)
+        << "level " << j + 1;
+}
+
 TEST(Lines, ABroadPeakIsNoLine) {
   // A resonance of 20 Hz, 1 Hz wide: an AR(2) process.
   std::mt19937 random(7);
@@ -122,7 +210,7 @@ TEST(Lines, TakenOutTheyLeaveTheWaveletVarianceOfTheNoise) {
   const auto lines = find_lines(x, all_valid(x.size()), {});
   ASSERT_EQ(lines.size(), 1u);
   const auto before = haar_wavelet_variance(x).value();
-  remove_lines(x, all_valid(x.size()), lines, {});
+  remove_lines(x, all_valid(x.size()), lines, kLineRate_hz);
   const auto after = haar_wavelet_variance(x).value();
   const auto truth = haar_wavelet_variance(clean).value();
   EXPECT_GT(before.levels[1].value, 1.3 * truth.levels[1].value) << "the line shows";

@@ -9,6 +9,7 @@
 #include "commands.h"
 #include "fit_output.h"
 #include "noise/conservative.h"
+#include "noise/json.h"
 #include "print.h"
 #include "signal_options.h"
 
@@ -23,6 +24,7 @@ struct FitCommand {
   bool quick_intervals = false;
   bool select = false;
   bool conservative = false;
+  bool keep_lines = false;
 };
 
 /// What one call of the command works on.
@@ -31,7 +33,8 @@ struct Task {
   noise::SignalUnit unit;
   noise::FitOptions fit_options;
   std::vector<noise::WaveletVariance> wvs;
-  std::vector<std::string> warnings;  ///< of the signals
+  std::vector<std::vector<noise::Line>> lines;  ///< that were taken out of each
+  std::vector<std::string> warnings;            ///< of the signals
   double rate_hz;
 };
 
@@ -53,6 +56,9 @@ void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra)
   if (task.options.signal.json) {
     auto json = fit_json(fit, task.unit);
     json.update(extra);
+    if (task.wvs.size() == 1 && !task.lines.front().empty())
+      json["sinusoids"] = noise::sinusoids_to_json(task.lines.front(), task.options.signal.unit, fit.rate_hz,
+                                                   fit.wv.size());
     if (task.options.conservative)
       json["conservative"] = bound ? conservative_json(*bound, task.unit) : nlohmann::json(nullptr);
     say("{}\n", json_text(json));
@@ -107,12 +113,15 @@ Result<void> fit_replicates(const Task& task, noise::ModelSpec spec) {
 Result<void> run_fit(const FitCommand& options) {
   const auto spec = noise::parse_model(options.model);
   if (!spec) return tl::unexpected(spec.error());
-  auto read = wavelet_variances_of(options.signal);
+  // A model that has sinusoids finds them itself.
+  const bool keeps = options.keep_lines || spec->count(noise::ProcessKind::kSinusoid) > 0;
+  auto read = wavelet_variances_of(options.signal, keeps ? Lines::kStay : Lines::kTakenOut);
   if (!read) return tl::unexpected(read.error());
   Task task{options,
             noise::parse_unit(options.signal.unit).value(),
             {},
             std::move(read->wvs),
+            keeps ? std::vector<std::vector<noise::Line>>(read->lines.size()) : std::move(read->lines),
             std::move(read->warnings),
             read->rate_hz};
   task.fit_options.weighting = options.weighting;
@@ -146,6 +155,9 @@ void add_fit(CLI::App& app, Work& chosen) {
       "--quick-intervals", options->quick_intervals,
       "Intervals from the estimate's own covariance, none for slow processes, as the live refits have "
       "them");
+  command->add_flag("--keep-lines", options->keep_lines,
+                    "Leave sinusoids (an engine, a fan) in the signal instead of taking them out before the "
+                    "fit");
   command->add_flag("--select", options->select,
                     "Rank the sub-models and report the best; of three or more files by cross-validation");
   command->add_flag(

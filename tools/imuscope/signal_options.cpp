@@ -28,6 +28,27 @@ Result<noise::WaveletVariance> wavelet_variance_of(const std::filesystem::path& 
   return wv;
 }
 
+/// The sinusoids of a signal, after they were taken out of it where that is asked for.
+std::vector<noise::Line> lines_of(Signal& signal, double rate_hz, Lines lines) {
+  std::vector<std::uint8_t> mask = signal.mask;
+  if (mask.empty()) mask.assign(signal.values.size(), 1);
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (!std::isfinite(signal.values[i])) mask[i] = 0;
+  }
+  noise::LineOptions line_options;
+  line_options.rate_hz = rate_hz;
+  auto found = noise::find_lines(signal.values, mask, line_options);
+  if (lines == Lines::kTakenOut) noise::remove_lines(signal.values, mask, found, rate_hz);
+  return found;
+}
+
+std::string line_warning(const noise::Line& line, const std::string& unit, Lines lines) {
+  return noise::in_words(line, unit) + (lines == Lines::kTakenOut
+                                            ? ": taken out before the fit (--keep-lines leaves it in)"
+                                            : ": it raises the levels around half its period; `fit` takes it "
+                                              "out");
+}
+
 /// A sentence where a signal holds spikes that its wavelet variance does not resist.
 std::optional<std::string> spikes_in(const Signal& signal, const noise::WaveletVariance& wv, double rate_hz,
                                      const SignalOptions& options) {
@@ -70,7 +91,7 @@ void add_signal_options(CLI::App& command, SignalOptions& options, bool several)
   command.add_flag("--json", options.json, "Print JSON");
 }
 
-Result<ReadSignals> wavelet_variances_of(const SignalOptions& options) {
+Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, Lines lines) {
   const auto& asked_hz = options.choice.rate_hz;
   if (asked_hz && (!(*asked_hz > 0.0) || !std::isfinite(*asked_hz))) {
     return usage_error(fmt::format("--rate {} is impossible", *asked_hz), "give the samples per second");
@@ -78,7 +99,7 @@ Result<ReadSignals> wavelet_variances_of(const SignalOptions& options) {
   if (const auto unit = noise::parse_unit(options.unit); !unit) return tl::unexpected(unit.error());
   ReadSignals out;
   for (const auto& file : options.files) {
-    const auto signal = read_signal(file, options.choice);
+    auto signal = read_signal(file, options.choice);
     if (!signal) return tl::unexpected(signal.error());
     if (!signal->rate_hz) {
       return usage_error(fmt::format("{} has no time stamps that would tell its rate", file.string()),
@@ -92,12 +113,17 @@ Result<ReadSignals> wavelet_variances_of(const SignalOptions& options) {
           "replicates have one rate");
     }
     if (out.wvs.empty()) out.rate_hz = *signal->rate_hz;
+    const auto warn = [&](const std::string& what) {
+      out.warnings.push_back(options.files.size() > 1 ? fmt::format("{}: {}", file.string(), what) : what);
+    };
+    // First, as it refuses what is no signal.
     auto wv = wavelet_variance_of(file, *signal, options);
     if (!wv) return tl::unexpected(wv.error());
-    if (const auto spikes = spikes_in(*signal, *wv, out.rate_hz, options)) {
-      out.warnings.push_back(options.files.size() > 1 ? fmt::format("{}: {}", file.string(), *spikes)
-                                                      : *spikes);
-    }
+    out.lines.push_back(lines_of(*signal, out.rate_hz, lines));
+    for (const auto& line : out.lines.back()) warn(line_warning(line, options.unit, lines));
+    if (lines == Lines::kTakenOut && !out.lines.back().empty()) wv = wavelet_variance_of(file, *signal, options);
+    if (!wv) return tl::unexpected(wv.error());
+    if (const auto spikes = spikes_in(*signal, *wv, out.rate_hz, options)) warn(*spikes);
     out.wvs.push_back(std::move(*wv));
   }
   return out;
