@@ -5,6 +5,9 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
 
 #include "noise/chi_squared.h"
 #include "noise/compare.h"
@@ -16,6 +19,8 @@ namespace {
 
 /// Below this log-sd the estimate's own covariance is as good: estimates are near enough to Gaussian.
 constexpr double kQuickBelowLogSd = 0.05;
+/// A process known no better than this may have rivals elsewhere.
+constexpr double kLooseLogSd = 0.25;
 /// An end further than this from the estimate, on the scale of the interval, is none.
 constexpr double kFurthest = 12.0;
 
@@ -47,15 +52,14 @@ class Inversion {
   }
 
   /// A term of amplitude zero is given one that no level shows yet.
-  void make_present(std::size_t p) {
+  void make_present(std::size_t p, double share = kInvisible) {
     Component& c = base_.components[places_[p].component];
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < levels_.size(); ++i) {
       const double unit = unit_wv(c.kind, c.shape, levels_[i]).value;
       least = std::min(least, y_[static_cast<Eigen::Index>(i)] / unit);
     }
-    constexpr double kInvisible = 1e-2;
-    c.amplitude = kInvisible * least;
+    c.amplitude = share * least;
     estimate_[static_cast<Eigen::Index>(p)] = coordinate(p);
   }
 
@@ -73,13 +77,108 @@ class Inversion {
     Eigen::VectorXd free = others;
     const double fixed = cost(problem, others);
     const double from_here = minimise(problem, free, kNone);
-    Eigen::VectorXd other_start = estimate_;
+    Eigen::VectorXd other_start = best_.size() > 0 ? best_ : estimate_;
     return std::max(0.0, fixed - std::min(from_here, minimise(problem, other_start, kNone)));
   }
 
   [[nodiscard]] const Eigen::VectorXd& start() const { return estimate_; }
 
+  /// Whether a Gauss-Markov process of the model is known so badly that another place of it may do as well.
+  [[nodiscard]] bool has_loose_markov(const FitResult& fit) const {
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (component(p).kind != ProcessKind::kGaussMarkov) continue;
+      const auto& log_sd = fit.parameters[p].log_sd;
+      if (component(p).amplitude <= 0.0 || !log_sd || *log_sd > kLooseLogSd) return true;
+    }
+    return false;
+  }
+
+  /// The same problem about other sets of parameters that the data reject no more than the estimate: one
+  /// process stands elsewhere, and the others, in order of their rates again, have taken over its part.
+  [[nodiscard]] std::vector<Inversion> rivals(double critical) const {
+    constexpr int kPlaces = 7;
+    std::vector<Inversion> found;
+    const Problem problem = problem_at(estimate_);
+    if (problem.whitener.size() == 0) return found;
+    const double best = cost(problem, estimate_);
+    Inversion all_present = *this;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (places_[p].shape < 0 && component(p).amplitude <= 0.0) all_present.make_present(p);
+    }
+    all_present.best_ = all_present.estimate_;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (component(p).kind != ProcessKind::kGaussMarkov || places_[p].shape < 0) continue;
+      const CoordinateRange r = range(p);
+      for (int k = 0; k < kPlaces; ++k) {
+        Inversion other = all_present;
+        other.move_markov(places_[p].component, r.low + (k + 0.5) / kPlaces * (r.high - r.low));
+        if (other.minimise(problem, other.estimate_, kNone) - best > critical) continue;
+        other.sort_markov();
+        if (std::none_of(found.begin(), found.end(), [&](const Inversion& f) { return f.is_near(other); }) &&
+            !all_present.is_near(other))
+          found.push_back(std::move(other));
+      }
+    }
+    return found;
+  }
+
  private:
+  /// A process of that coordinate of its rate, with an amplitude that levels show a little.
+  void move_markov(std::size_t component, double rate_coordinate) {
+    Component& c = base_.components[component];
+    c.shape[0] = shape_of_coordinate(c.kind, 0, rate_coordinate);
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (places_[p].component != component) continue;
+      if (places_[p].shape < 0)
+        make_present(p, kVisible);
+      else
+        estimate_[static_cast<Eigen::Index>(p)] = rate_coordinate;
+    }
+  }
+
+  /// Places of amplitude and rate of each Gauss-Markov process.
+  [[nodiscard]] std::vector<std::pair<Eigen::Index, Eigen::Index>> markov_places() const {
+    std::vector<std::pair<Eigen::Index, Eigen::Index>> out;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (component(p).kind != ProcessKind::kGaussMarkov || places_[p].shape < 0) continue;
+      for (std::size_t q = 0; q < places_.size(); ++q) {
+        if (places_[q].component == places_[p].component && places_[q].shape < 0)
+          out.emplace_back(static_cast<Eigen::Index>(q), static_cast<Eigen::Index>(p));
+      }
+    }
+    return out;
+  }
+
+  /// In the order of the estimate: of falling rate.
+  void sort_markov() {
+    const auto places = markov_places();
+    std::vector<std::pair<double, double>> values;  // rate, amplitude
+    for (const auto& [amplitude, rate] : places) values.emplace_back(beta_at(rate), estimate_[amplitude]);
+    std::vector<std::size_t> order(values.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return values[a].first > values[b].first; });
+    const Eigen::VectorXd before = estimate_;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      estimate_[places[i].first] = before[places[order[i]].first];
+      estimate_[places[i].second] = before[places[order[i]].second];
+    }
+  }
+
+  [[nodiscard]] double beta_at(Eigen::Index rate) const {
+    return shape_of_coordinate(ProcessKind::kGaussMarkov, 0, estimate_[rate]);
+  }
+
+  /// All rates within half an octave or so.
+  [[nodiscard]] bool is_near(const Inversion& other) const {
+    constexpr double kNear = 0.4;  // of the logarithm
+    return std::ranges::all_of(markov_places(), [&](const auto& place) {
+      return std::abs(estimate_[place.second] - other.estimate_[place.second]) < kNear;
+    });
+  }
+
+  static constexpr double kInvisible = 1e-2;  ///< share of the lowest level that a new term has
+  static constexpr double kVisible = 0.3;
   static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   struct Problem {
     Eigen::MatrixXd whitener;
@@ -185,6 +284,7 @@ class Inversion {
   std::vector<int> levels_;
   Eigen::VectorXd y_;
   Eigen::VectorXd estimate_;
+  Eigen::VectorXd best_;  ///< where the estimate is another
 };
 
 /// Where the test of parameter p first reaches `critical` in the direction `sign`; nothing where it does not.
@@ -229,20 +329,37 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
   return outside;
 }
 
-void bound_from_above(ParameterEstimate& p, Inversion inversion, std::size_t place, double critical) {
-  inversion.make_present(place);
-  const auto end = end_of_interval(inversion, place, 1.0, 2.0, critical);
+/// The estimate and its rivals.
+using Candidates = std::vector<Inversion>;
+
+/// The furthest end of all candidates in one direction; absent where one of them has none.
+std::optional<double> furthest_end(const Candidates& candidates, std::size_t place, double sign, double step,
+                                   double critical) {
+  std::optional<double> furthest;
+  for (const Inversion& candidate : candidates) {
+    const auto end = end_of_interval(candidate, place, sign, step, critical);
+    if (!end) return std::nullopt;
+    if (!furthest || sign * *end > sign * *furthest) furthest = end;
+  }
+  return furthest;
+}
+
+void bound_from_above(ParameterEstimate& p, Candidates candidates, std::size_t place, double critical) {
+  for (Inversion& candidate : candidates) {
+    if (candidate.component(place).amplitude <= 0.0) candidate.make_present(place);
+  }
+  const auto end = furthest_end(candidates, place, 1.0, 2.0, critical);
   if (end) p.ci_high = from_interval_scale(p, *end);
 }
 
-void invert(ParameterEstimate& p, const Inversion& inversion, std::size_t place, double two_sided,
+void invert(ParameterEstimate& p, const Candidates& candidates, std::size_t place, double two_sided,
             double one_sided) {
   constexpr double kShortestStep = 0.2;
   constexpr double kLongestStep = 1.5;
   const double step = std::clamp(2.0 * p.log_sd.value_or(1.0), kShortestStep, kLongestStep);
-  const double at = inversion.estimate(place);
-  const auto low = end_of_interval(inversion, place, -1.0, step, two_sided);
-  const auto high = end_of_interval(inversion, place, 1.0, step, two_sided);
+  const double at = candidates.front().estimate(place);
+  const auto low = furthest_end(candidates, place, -1.0, step, two_sided);
+  const auto high = furthest_end(candidates, place, 1.0, step, two_sided);
   const auto at_place = [&, centre = on_interval_scale(p)](double end) {
     return from_interval_scale(p, centre + end - at);
   };
@@ -251,8 +368,8 @@ void invert(ParameterEstimate& p, const Inversion& inversion, std::size_t place,
   if (low && high) {
     p.ci_low = at_place(*low);
     p.ci_high = at_place(*high);
-  } else if (const auto only = low    ? end_of_interval(inversion, place, -1.0, step, one_sided)
-                               : high ? end_of_interval(inversion, place, 1.0, step, one_sided)
+  } else if (const auto only = low    ? furthest_end(candidates, place, -1.0, step, one_sided)
+                               : high ? furthest_end(candidates, place, 1.0, step, one_sided)
                                       : std::nullopt) {
     (low ? p.ci_low : p.ci_high) = at_place(*only);
   }
@@ -264,13 +381,17 @@ void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t 
   const double two_sided = chi_squared_quantile(1.0, result.confidence);
   // The square of the Gaussian's one-sided quantile.
   const double one_sided = chi_squared_quantile(1.0, 2.0 * result.confidence - 1.0);
-  const Inversion inversion(result, wv, levels);
+  Candidates candidates{Inversion(result, wv, levels)};
+  const Inversion inversion = candidates.front();
+  if (inversion.has_loose_markov(result)) {
+    for (Inversion& rival : inversion.rivals(two_sided)) candidates.push_back(std::move(rival));
+  }
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterEstimate& p = result.parameters[i];
     if (inversion.component(i).amplitude > 0.0) {
-      if (!p.log_sd || *p.log_sd > kQuickBelowLogSd) invert(p, inversion, i, two_sided, one_sided);
+      if (!p.log_sd || *p.log_sd > kQuickBelowLogSd) invert(p, candidates, i, two_sided, one_sided);
     } else if (shape_count(inversion.component(i).kind) == 0) {
-      bound_from_above(p, inversion, i, one_sided);
+      bound_from_above(p, candidates, i, one_sided);
     }
   }
 }
