@@ -10,7 +10,10 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <vector>
 
+#include "base/contracts.h"
 #include "noise/inference.h"
 #include "noise/separable_fit.h"
 #include "noise/wv_covariance.h"
@@ -44,34 +47,36 @@ struct Problem {
   std::vector<int> levels;
   std::vector<ParameterPlace> places;
   std::vector<VectorXd> wv;  ///< one a window
-  VectorXd x;                ///< driver minus its mean, in its own standard deviations
-  double x_scale = 1.0;
+  MatrixXd x;                ///< a row a window: drivers minus their means, in their own standard deviations
+  VectorXd x_scale;
   MatrixXd correlation_inverse;  ///< of the levels' errors under the start model
   VectorXd relative_sd;          ///< of the levels under the start model
   VectorXd weight;               ///< of each window, 0 to 1
 };
 
-/// What is searched for: for every place a level and, where it has one, a slope.
+/// What is searched for: for every place a level and, where it has them, slopes, one a driver. In this order
+/// they make up a vector.
 struct Unknowns {
   std::vector<bool> level;
-  std::vector<bool> slope;
+  std::vector<std::vector<bool>> slope;
   [[nodiscard]] Index count() const {
-    return static_cast<Index>(std::count(level.begin(), level.end(), true) +
-                              std::count(slope.begin(), slope.end(), true));
+    auto n = std::count(level.begin(), level.end(), true);
+    for (const auto& of_place : slope) n += std::count(of_place.begin(), of_place.end(), true);
+    return static_cast<Index>(n);
   }
 };
 
 struct Values {
   VectorXd level;  ///< interval scale of each place
-  VectorXd slope;
+  MatrixXd slope;  ///< a row a place, a column a driver
 };
 
 Model model_at(const Model& start, const std::vector<ParameterPlace>& places, const Values& values,
-               double x) {
+               const Eigen::RowVectorXd& x) {
   Model model = start;
   for (std::size_t p = 0; p < places.size(); ++p) {
     const auto k = static_cast<Index>(p);
-    const double u = values.level(k) + values.slope(k) * x;
+    const double u = values.level(k) + values.slope.row(k).dot(x);
     Component& c = model.components[places[p].component];
     if (places[p].shape < 0) {
       c.amplitude = std::exp(u);
@@ -83,9 +88,9 @@ Model model_at(const Model& start, const std::vector<ParameterPlace>& places, co
   return model;
 }
 
-Values start_values(const Model& model, const std::vector<ParameterPlace>& places) {
+Values start_values(const Model& model, const std::vector<ParameterPlace>& places, Index drivers) {
   Values values{VectorXd::Zero(static_cast<Index>(places.size())),
-                VectorXd::Zero(static_cast<Index>(places.size()))};
+                MatrixXd::Zero(static_cast<Index>(places.size()), drivers)};
   for (std::size_t p = 0; p < places.size(); ++p) {
     const Component& c = model.components[places[p].component];
     values.level(static_cast<Index>(p)) =
@@ -111,7 +116,7 @@ Scores scores_at(const Problem& problem, const Model& start, const Values& value
   const auto rows = static_cast<Index>(problem.levels.size());
   MatrixXd design(rows, n);
   for (std::size_t w = 0; w < problem.wv.size(); ++w) {
-    const double x = problem.x(static_cast<Index>(w));
+    const Eigen::RowVectorXd x = problem.x.row(static_cast<Index>(w));
     const Model model = model_at(start, problem.places, values, x);
     const MatrixXd jacobian = wv_jacobian(model, problem.levels, problem.places);
     VectorXd expected(rows);
@@ -123,7 +128,9 @@ Scores scores_at(const Problem& problem, const Model& start, const Values& value
     for (std::size_t p = 0; p < problem.places.size(); ++p) {
       const VectorXd of_place = unit.cwiseProduct(jacobian.col(static_cast<Index>(p)));
       if (unknowns.level[p]) design.col(column++) = of_place;
-      if (unknowns.slope[p]) design.col(column++) = x * of_place;
+      for (std::size_t k = 0; k < unknowns.slope[p].size(); ++k) {
+        if (unknowns.slope[p][k]) design.col(column++) = x(static_cast<Index>(k)) * of_place;
+      }
     }
     const VectorXd residual = unit.cwiseProduct(problem.wv[w] - expected);
     const double distance2 = residual.dot(problem.correlation_inverse * residual);
@@ -144,7 +151,10 @@ Scores scores_at(const Problem& problem, const Model& start, const Values& value
 
 MatrixXd inverse_of(const MatrixXd& information) {
   const VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  // Of two drivers that are one, neither is determined: a variance that is huge, and a number.
+  constexpr double kRidge = 1e-10;
+  MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  scaled.diagonal().array() += kRidge;
   return scale.asDiagonal() *
          MatrixXd(scaled.ldlt().solve(MatrixXd::Identity(scaled.rows(), scaled.cols()))) * scale.asDiagonal();
 }
@@ -184,23 +194,29 @@ void leave_out_undetermined(const Problem& problem, const Model& start, const Va
     const MatrixXd covariance = inverse_of(scores_at(problem, start, values, unknowns).information);
     double worst = kUndeterminedSd * kUndeterminedSd;
     std::size_t worst_place = problem.places.size();
-    bool is_slope = false;
+    std::optional<std::size_t> worst_driver;  // absent: it is the level
     Index column = 0;
-    const auto look = [&](std::size_t place, bool slope) {
+    const auto look = [&](std::size_t place, std::optional<std::size_t> driver) {
       const double variance = covariance(column, column);
       ++column;
       if (variance >= 0.0 && variance <= worst) return;
       worst = variance >= 0.0 ? variance : std::numeric_limits<double>::infinity();
       worst_place = place;
-      is_slope = slope;
+      worst_driver = driver;
     };
     for (std::size_t p = 0; p < problem.places.size(); ++p) {
-      if (unknowns.level[p]) look(p, false);
-      if (unknowns.slope[p]) look(p, true);
+      if (unknowns.level[p]) look(p, std::nullopt);
+      for (std::size_t k = 0; k < unknowns.slope[p].size(); ++k) {
+        if (unknowns.slope[p][k]) look(p, k);
+      }
     }
     if (worst_place == problem.places.size()) return;
-    unknowns.slope[worst_place] = false;
-    if (!is_slope) unknowns.level[worst_place] = false;
+    if (worst_driver) {
+      unknowns.slope[worst_place][*worst_driver] = false;
+      continue;
+    }
+    unknowns.level[worst_place] = false;
+    unknowns.slope[worst_place].assign(unknowns.slope[worst_place].size(), false);
   }
 }
 
@@ -208,7 +224,9 @@ void add_to(const Unknowns& unknowns, const VectorXd& move, Values& values) {
   Index column = 0;
   for (std::size_t p = 0; p < unknowns.level.size(); ++p) {
     if (unknowns.level[p]) values.level(static_cast<Index>(p)) += move(column++);
-    if (unknowns.slope[p]) values.slope(static_cast<Index>(p)) += move(column++);
+    for (std::size_t k = 0; k < unknowns.slope[p].size(); ++k) {
+      if (unknowns.slope[p][k]) values.slope(static_cast<Index>(p), static_cast<Index>(k)) += move(column++);
+    }
   }
 }
 
@@ -259,9 +277,40 @@ bool search_and_weight(Problem& problem, const Model& start, const Unknowns& unk
   return true;
 }
 
+/// The drivers of all windows about their means, in their standard deviations.
+Result<void> set_drivers(std::span<const DrivenWindow> windows, Problem& problem) {
+  const auto n = static_cast<Index>(windows.size());
+  const auto drivers = static_cast<Index>(windows.front().drivers.size());
+  problem.x.resize(n, drivers);
+  problem.x_scale.resize(drivers);
+  for (Index w = 0; w < n; ++w) {
+    const auto& of_window = windows[static_cast<std::size_t>(w)].drivers;
+    IMUSCOPE_EXPECTS(static_cast<Index>(of_window.size()) == drivers);
+    for (Index k = 0; k < drivers; ++k) {
+      problem.x(w, k) = of_window[static_cast<std::size_t>(k)];
+      if (!std::isfinite(problem.x(w, k)))
+        return work_error(fmt::format("the driver of window {} is no number", w + 1),
+                          "leave windows without a driver out");
+    }
+  }
+  for (Index k = 0; k < drivers; ++k) {
+    const double mean = problem.x.col(k).mean();
+    problem.x.col(k).array() -= mean;
+    const double variance = problem.x.col(k).squaredNorm() / static_cast<double>(n);
+    constexpr double kConstant = 1e-9;
+    if (!(variance > kConstant * kConstant * (mean * mean + variance)))
+      return work_error("the driver does not vary", "a dependence shows only where what it is on changes");
+    problem.x_scale(k) = std::sqrt(variance);
+    problem.x.col(k) /= problem.x_scale(k);
+  }
+  return {};
+}
+
 Result<Problem> problem_of(std::span<const DrivenWindow> windows, const Model& model) {
-  if (windows.size() < kFewestWindows) {
-    return work_error(fmt::format("there are {} windows and {} are needed", windows.size(), kFewestWindows),
+  const std::size_t needed =
+      kFewestWindows * (windows.empty() ? 1 : std::max<std::size_t>(1, windows.front().drivers.size()));
+  if (windows.size() < needed) {
+    return work_error(fmt::format("there are {} windows and {} are needed", windows.size(), needed),
                       "use shorter windows or a longer drive");
   }
   Problem problem;
@@ -271,28 +320,13 @@ Result<Problem> problem_of(std::span<const DrivenWindow> windows, const Model& m
   }
   if (problem.levels.empty()) return work_error("the windows are too short", "use longer windows");
   const auto rows = static_cast<Index>(problem.levels.size());
-  const auto n = static_cast<double>(windows.size());
-  const auto unknown = std::find_if(windows.begin(), windows.end(),
-                                    [](const DrivenWindow& w) { return !std::isfinite(w.driver); });
-  if (unknown != windows.end())
-    return work_error(fmt::format("the driver of window {} is no number", unknown - windows.begin() + 1),
-                      "leave windows without a driver out");
-  double mean = 0.0;
-  for (const auto& w : windows) mean += w.driver / n;
-  double variance = 0.0;
-  for (const auto& w : windows) variance += (w.driver - mean) * (w.driver - mean) / n;
-  constexpr double kConstant = 1e-9;
-  if (!(variance > kConstant * kConstant * (mean * mean + variance)))
-    return work_error("the driver does not vary", "a dependence shows only where what it is on changes");
-  problem.x_scale = std::sqrt(variance);
-  problem.x.resize(static_cast<Index>(windows.size()));
-  for (std::size_t w = 0; w < windows.size(); ++w) {
-    problem.x(static_cast<Index>(w)) = (windows[w].driver - mean) / problem.x_scale;
+  if (auto set = set_drivers(windows, problem); !set) return tl::unexpected<Error>(set.error());
+  for (const DrivenWindow& window : windows) {
     VectorXd wv(rows);
-    for (Index r = 0; r < rows; ++r) wv(r) = windows[w].wv.levels.at(static_cast<std::size_t>(r)).value;
+    for (Index r = 0; r < rows; ++r) wv(r) = window.wv.levels.at(static_cast<std::size_t>(r)).value;
     problem.wv.push_back(std::move(wv));
   }
-  problem.weight = VectorXd::Ones(problem.x.size());
+  problem.weight = VectorXd::Ones(problem.x.rows());
   problem.places = parameter_places(model);
   const MatrixXd v = wv_covariance(model, first, problem.levels.size());
   problem.relative_sd.resize(rows);
@@ -340,8 +374,10 @@ Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const F
   auto problem = problem_of(windows, model);
   if (!problem) return tl::unexpected<Error>(problem.error());
   const std::size_t places = problem->places.size();
-  Unknowns unknowns{std::vector<bool>(places, true), std::vector<bool>(places, true)};
-  Values values = start_values(model, problem->places);
+  const auto drivers = static_cast<std::size_t>(problem->x.cols());
+  Unknowns unknowns{std::vector<bool>(places, true),
+                    std::vector<std::vector<bool>>(places, std::vector<bool>(drivers, true))};
+  Values values = start_values(model, problem->places, problem->x.cols());
   const Values begin = values;
   problem->weight =
       weights_of(scores_at(*problem, model, values, unknowns).distance2, problem->levels.size());
@@ -355,8 +391,13 @@ Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const F
   Dependence out;
   out.n_windows = windows.size();
   out.n_far = static_cast<std::size_t>((problem->weight.array() < kFarWeight).count());
-  for (const auto& w : windows) out.mean_driver += w.driver / static_cast<double>(windows.size());
-  out.at_mean_driver = model_at(model, problem->places, values, 0.0);
+  for (std::size_t k = 0; k < drivers; ++k) {
+    double sum = 0.0;
+    for (const auto& w : windows) sum += w.drivers[k];
+    out.mean_drivers.push_back(sum / static_cast<double>(windows.size()));
+  }
+  out.at_mean_driver =
+      model_at(model, problem->places, values, Eigen::RowVectorXd::Zero(problem->x.cols()));
   const auto names = names_of(start);
   const Index n = unknowns.count();
   const auto free = static_cast<double>(windows.size()) - static_cast<double>(n);
@@ -365,27 +406,31 @@ Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const F
   const double quantile = boost::math::quantile(t, 0.5 * (1.0 + options.confidence));
   Index column = 0;
   for (std::size_t p = 0; p < places; ++p) {
-    const auto k = static_cast<Index>(p);
+    const auto row = static_cast<Index>(p);
     if (unknowns.level[p]) ++column;
-    if (!unknowns.slope[p]) {
-      out.undetermined.push_back({names[p]->process, names[p]->name,
-                                  unknowns.level[p]
-                                      ? "its change with the driver is not determined by this run"
-                                      : "windows of this length do not determine it"});
-      continue;
+    for (std::size_t k = 0; k < drivers; ++k) {
+      if (!unknowns.slope[p][k]) {
+        out.undetermined.push_back({k, names[p]->process, names[p]->name,
+                                    unknowns.level[p]
+                                        ? "its change with the driver is not determined by this run"
+                                        : "windows of this length do not determine it"});
+        continue;
+      }
+      const auto of_driver = static_cast<Index>(k);
+      ParameterSlope slope;
+      slope.driver = k;
+      slope.process = names[p]->process;
+      slope.name = names[p]->name;
+      slope.unit = names[p]->unit;
+      slope.at_mean_driver = printed(*names[p], begin.level(row), values.level(row));
+      slope.slope = values.slope(row, of_driver) / problem->x_scale(of_driver);
+      slope.sd = std::sqrt(covariance(column, column)) / problem->x_scale(of_driver);
+      ++column;
+      slope.ci_low = slope.slope - quantile * slope.sd;
+      slope.ci_high = slope.slope + quantile * slope.sd;
+      slope.p_value = 2.0 * boost::math::cdf(boost::math::complement(t, std::abs(slope.slope) / slope.sd));
+      out.slopes.push_back(slope);
     }
-    ParameterSlope slope;
-    slope.process = names[p]->process;
-    slope.name = names[p]->name;
-    slope.unit = names[p]->unit;
-    slope.at_mean_driver = printed(*names[p], begin.level(k), values.level(k));
-    slope.slope = values.slope(k) / problem->x_scale;
-    slope.sd = std::sqrt(covariance(column, column)) / problem->x_scale;
-    ++column;
-    slope.ci_low = slope.slope - quantile * slope.sd;
-    slope.ci_high = slope.slope + quantile * slope.sd;
-    slope.p_value = 2.0 * boost::math::cdf(boost::math::complement(t, std::abs(slope.slope) / slope.sd));
-    out.slopes.push_back(slope);
   }
   return out;
 }

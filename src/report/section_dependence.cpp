@@ -26,9 +26,20 @@ Html list_of_remarks(const json& document) {
 /// "+12 % a unit" from a slope of the logarithm.
 double percent_of(double slope) { return 100.0 * std::expm1(slope); }
 
+/// A slope with its interval.
+Html change_words(const json& entry, const std::string& driver_unit) {
+  const auto slope = number_at(entry, "slope");
+  if (!slope) return text(kUnknown);
+  const auto low = number_at(entry, "ci_low");
+  const auto high = number_at(entry, "ci_high");
+  return with_interval(percent_of(*slope), low ? std::optional(percent_of(*low)) : low,
+                       high ? std::optional(percent_of(*high)) : high) +
+         text(" % per " + driver_unit);
+}
+
 Html dependence_table(const RunFiles& run, const std::string& imu) {
   Table table({text("parameter"), text("driver"), text("at its mean"), text("change a unit of the driver"),
-               text("p, corrected")});
+               text("p, corrected"), text("beside the other drivers"), text("p, corrected")});
   std::string axis;
   for (const json& entry : field(run.dependence, "dependences")) {
     if (text_at(entry, "name") != imu) continue;
@@ -39,17 +50,13 @@ Html dependence_table(const RunFiles& run, const std::string& imu) {
     std::string unit = text_at(entry, "unit");
     const double factor = shown_unit(unit);
     const auto at_mean = number_at(entry, "at_mean_driver");
-    const auto slope = number_at(entry, "slope");
-    const auto low = number_at(entry, "ci_low");
-    const auto high = number_at(entry, "ci_high");
-    const Html change = slope ? with_interval(percent_of(*slope), low ? std::optional(percent_of(*low)) : low,
-                                              high ? std::optional(percent_of(*high)) : high) +
-                                    text(" % per " + text_at(entry, "driver_unit"))
-                              : text(kUnknown);
+    const json& beside = field(entry, "beside_others");
     table.add_row({text(text_at(entry, "process") + " " + text_at(entry, "parameter")),
                    text(text_at(entry, "driver")),
-                   at_mean ? number(factor * *at_mean, 4) + text(" " + unit) : text(kUnknown), change,
-                   p_words(number_at(entry, "p_holm"))});
+                   at_mean ? number(factor * *at_mean, 4) + text(" " + unit) : text(kUnknown),
+                   change_words(entry, text_at(entry, "driver_unit")), p_words(number_at(entry, "p_holm")),
+                   change_words(beside, text_at(entry, "driver_unit")),
+                   p_words(number_at(beside, "p_holm"))});
   }
   return table.empty() ? paragraph("No dependence could be fitted for this sensor.") : table.html();
 }

@@ -131,6 +131,7 @@ noise::FitResult with_white_noise(noise::FitResult fit) {
   return fit;
 }
 
+/// Of one parameter on one driver: by itself, and beside the other drivers of the run.
 struct Slope {
   std::size_t axis;
   std::size_t driver;
@@ -138,23 +139,44 @@ struct Slope {
   std::size_t n_far;
   double mean_driver;
   noise::ParameterSlope slope;
+  std::optional<noise::ParameterSlope> beside_others{};
 };
 
 double percent(double slope) { return 100.0 * std::expm1(slope); }
 
-std::string sentence_of(const std::string& name, const Slope& s, double p_holm) {
+/// What the other drivers leave of a dependence.
+std::string beside_others_words(const Slope& s, const std::optional<double>& p_holm) {
+  if (!s.beside_others || !p_holm) return "";
+  const auto& beside = *s.beside_others;
+  if (*p_holm >= noise::kSignificance)
+    return fmt::format("; beside the other drivers nothing is left of it (p = {:.2g})", *p_holm);
+  return fmt::format("; beside the other drivers {:+.3g} % [{:+.3g}, {:+.3g}] (p = {:.2g})",
+                     percent(beside.slope), percent(beside.ci_low), percent(beside.ci_high), *p_holm);
+}
+
+std::string sentence_of(const std::string& name, const Slope& s, double p_holm,
+                        const std::optional<double>& p_holm_beside) {
   const char* unit = kDriverUnits[s.driver];
   if (p_holm >= noise::kSignificance) {
     return fmt::format("{} {}: {} {} shows no dependence on the {} (p = {:.2g}, corrected)", name,
                        axis_name(s.axis), s.slope.process, s.slope.name, kDriverNames[s.driver], p_holm);
   }
   return fmt::format(
-      "{} {}: {} {} changes by {:+.3g} % per {} of {} [{:+.3g}, {:+.3g}], p = {:.2g} (corrected)", name,
+      "{} {}: {} {} changes by {:+.3g} % per {} of {} [{:+.3g}, {:+.3g}], p = {:.2g} (corrected){}", name,
       axis_name(s.axis), s.slope.process, s.slope.name, percent(s.slope.slope), unit, kDriverNames[s.driver],
-      percent(s.slope.ci_low), percent(s.slope.ci_high), p_holm);
+      percent(s.slope.ci_low), percent(s.slope.ci_high), p_holm, beside_others_words(s, p_holm_beside));
 }
 
-nlohmann::json slope_json(const std::string& name, const Slope& s, double p_holm) {
+nlohmann::json beside_others_json(const Slope& s, const std::optional<double>& p_holm) {
+  if (!s.beside_others) return nullptr;
+  const auto& beside = *s.beside_others;
+  return {{"slope", beside.slope},     {"slope_sd", beside.sd},     {"ci_low", beside.ci_low},
+          {"ci_high", beside.ci_high}, {"p_value", beside.p_value}, {"p_holm", p_holm.value_or(1.0)},
+          {"percent_per_unit", percent(beside.slope)}};
+}
+
+nlohmann::json slope_json(const std::string& name, const Slope& s, double p_holm,
+                          const std::optional<double>& p_holm_beside) {
   return {{"name", name},
           {"axis", axis_name(s.axis)},
           {"driver", kDriverNames[s.driver]},
@@ -173,7 +195,8 @@ nlohmann::json slope_json(const std::string& name, const Slope& s, double p_holm
           {"p_value", s.slope.p_value},
           {"p_holm", p_holm},
           {"percent_per_unit", percent(s.slope.slope)},
-          {"sentence", sentence_of(name, s, p_holm)}};
+          {"beside_others", beside_others_json(s, p_holm_beside)},
+          {"sentence", sentence_of(name, s, p_holm, p_holm_beside)}};
 }
 
 /// One S-IMU on its way.
@@ -182,11 +205,10 @@ class ImuStudy {
   ImuStudy(std::string name, DependenceStudy& out) : name_(std::move(name)), out_(out) {}
 
   void axis(std::size_t axis, const std::vector<Window>& windows, const noise::FitResult& start) {
+    std::vector<std::size_t> of_use;
+    const std::size_t first_slope = slopes_.size();
     for (std::size_t driver = 0; driver < kDrivers; ++driver) {
-      std::vector<noise::DrivenWindow> driven;
-      for (const auto& w : windows) {
-        if (w.drivers[driver]) driven.push_back({w.wv, *w.drivers[driver]});
-      }
+      const auto driven = driven_windows(windows, {driver});
       if (driven.empty() && driver == kSpeed) continue;  // said with the regimes
       if (driver == kTemperature && (windows.empty() || !warms_up(driven))) continue;
       const auto found = noise::fit_dependence(driven, start);
@@ -196,7 +218,7 @@ class ImuStudy {
         continue;
       }
       for (const auto& slope : found->slopes)
-        slopes_.push_back({axis, driver, found->n_windows, found->n_far, found->mean_driver, slope});
+        slopes_.push_back({axis, driver, found->n_windows, found->n_far, found->mean_drivers.front(), slope});
       for (const auto& u : found->undetermined) {
         out_.document["not_determined"].push_back({{"name", name_},
                                                    {"axis", axis_name(axis)},
@@ -205,16 +227,23 @@ class ImuStudy {
                                                    {"parameter", u.name},
                                                    {"why", u.why}});
       }
+      of_use.push_back(driver);
     }
+    if (of_use.size() > 1) together(windows, of_use, start, first_slope);
     points(axis, windows, start);
   }
 
   void finish() {
     std::vector<std::optional<double>> p;
     for (const auto& s : slopes_) p.emplace_back(s.slope.p_value);
+    std::vector<std::optional<double>> p_beside;
+    for (const auto& s : slopes_)
+      p_beside.push_back(s.beside_others ? std::optional(s.beside_others->p_value) : std::nullopt);
     const auto holm = noise::holm_adjusted(p);
+    const auto holm_beside = noise::holm_adjusted(p_beside);
     for (std::size_t i = 0; i < slopes_.size(); ++i)
-      out_.document["dependences"].push_back(slope_json(name_, slopes_[i], holm[i].value_or(1.0)));
+      out_.document["dependences"].push_back(
+          slope_json(name_, slopes_[i], holm[i].value_or(1.0), holm_beside[i]));
     say_what_lies_far();
   }
 
@@ -224,6 +253,36 @@ class ImuStudy {
   }
 
  private:
+  /// The windows in which all of these drivers are known.
+  static std::vector<noise::DrivenWindow> driven_windows(const std::vector<Window>& windows,
+                                                         const std::vector<std::size_t>& drivers) {
+    std::vector<noise::DrivenWindow> driven;
+    for (const auto& w : windows) {
+      noise::DrivenWindow window{w.wv, {}};
+      for (const std::size_t driver : drivers) {
+        if (w.drivers[driver]) window.drivers.push_back(*w.drivers[driver]);
+      }
+      if (window.drivers.size() == drivers.size()) driven.push_back(std::move(window));
+    }
+    return driven;
+  }
+
+  /// All drivers at once: which of them it is on, where they go together. Without enough windows nothing is
+  /// said of it.
+  void together(const std::vector<Window>& windows, const std::vector<std::size_t>& drivers,
+                const noise::FitResult& start, std::size_t first_slope) {
+    const auto found = noise::fit_dependence(driven_windows(windows, drivers), start);
+    if (!found) return;
+    for (const noise::ParameterSlope& beside : found->slopes) {
+      for (std::size_t i = first_slope; i < slopes_.size(); ++i) {
+        Slope& s = slopes_[i];
+        if (s.driver == drivers[beside.driver] && s.slope.process == beside.process &&
+            s.slope.name == beside.name)
+          s.beside_others = beside;
+      }
+    }
+  }
+
   /// Whether its temperature changed enough to be held against; says why where it did not.
   bool warms_up(const std::vector<noise::DrivenWindow>& windows) {
     if (windows.empty()) {
@@ -232,8 +291,8 @@ class ImuStudy {
       return false;
     }
     const auto [coldest, warmest] = std::minmax_element(
-        windows.begin(), windows.end(), [](const auto& a, const auto& b) { return a.driver < b.driver; });
-    const double change_degC = warmest->driver - coldest->driver;
+        windows.begin(), windows.end(), [](const auto& a, const auto& b) { return a.drivers[0] < b.drivers[0]; });
+    const double change_degC = warmest->drivers[0] - coldest->drivers[0];
     if (change_degC >= kLeastWarming_degC) return true;
     say(
         fmt::format("{}: its temperature changed by {:.1f} degC over the drive, too little to hold its noise "

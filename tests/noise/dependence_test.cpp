@@ -38,7 +38,7 @@ Example example_of(const std::vector<std::vector<double>>& signals, const char* 
   for (std::size_t w = 0; w < signals.size(); ++w) {
     all.insert(all.end(), signals[w].begin(), signals[w].end());
     out.windows.push_back({haar_wavelet_variance(signals[w]).value(),
-                           2.0 * static_cast<double>(w) / static_cast<double>(signals.size() - 1)});
+                           {2.0 * static_cast<double>(w) / static_cast<double>(signals.size() - 1)}});
   }
   out.start = fit(haar_wavelet_variance(all).value(), parse_model(model).value(), kRate_hz).value();
   return out;
@@ -56,7 +56,7 @@ TEST(Dependence, OfWhiteNoiseHasTheSlopeAndTheSdOfItsRegression) {
   EXPECT_NEAR(slope.slope, 0.5, 3.5 * slope.sd);
   // log of a sample variance of n values has sd sqrt(2/n); x is uniform on [0, 2].
   double squares = 0.0;
-  for (const auto& w : example.windows) squares += (w.driver - 1.0) * (w.driver - 1.0);
+  for (const auto& w : example.windows) squares += (w.drivers[0] - 1.0) * (w.drivers[0] - 1.0);
   const double expected_sd = std::sqrt(2.0 / static_cast<double>(kWindow) / squares);
   EXPECT_NEAR(slope.sd, expected_sd, 0.35 * expected_sd);
   EXPECT_NEAR(slope.at_mean_driver, std::exp(0.5), 0.02);
@@ -85,7 +85,7 @@ TEST(Dependence, WindowsThatDoNotVaryAndTooFewOfThemAreRefused) {
   const auto refused = fit_dependence(few, example.start);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text(), ::testing::HasSubstr("there are 5 windows and 12 are needed"));
-  for (auto& window : example.windows) window.driver = 4.0;
+  for (auto& window : example.windows) window.drivers[0] = 4.0;
   const auto constant = fit_dependence(example.windows, example.start);
   ASSERT_FALSE(constant);
   EXPECT_THAT(constant.error().text(), ::testing::HasSubstr("does not vary"));
@@ -106,7 +106,7 @@ TEST(Dependence, ADriverThatIsNoNumberSomewhereIsRefused) {
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     auto windows = example.windows;
-    windows[7].driver = bad;
+    windows[7].drivers = {bad};
     const auto refused = fit_dependence(windows, example.start);
     ASSERT_FALSE(refused) << bad;
     EXPECT_THAT(refused.error().text(), ::testing::HasSubstr("driver of window 8 is no number"));
@@ -190,6 +190,76 @@ TEST(WhiteNoiseOfAWindow, IsAbsentWhereNothingSaysWhatItIs) {
   EXPECT_FALSE(white_noise_of(WaveletVariance{}, white, 0.95)) << "a window without a level";
   EXPECT_FALSE(white_noise_of(window, none, 0.95)) << "a model without white noise";
   EXPECT_FALSE(white_noise_of(window, loud, 0.95)) << "a model that explains more than is there";
+}
+
+/// Two drivers that go together, as speed and vibration do; the noise follows the second alone.
+struct Correlated {
+  std::vector<DrivenWindow> windows;
+  FitResult start;
+};
+
+Correlated correlated(std::size_t n, double slope, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Correlated out;
+  std::vector<double> all;
+  for (std::size_t w = 0; w < n; ++w) {
+    const double common = normal(random);
+    const std::vector<double> drivers{10.0 + 3.0 * (common + 0.5 * normal(random)),
+                                      common + 0.5 * normal(random)};
+    std::vector<double> values(kWindow);
+    for (double& value : values) value = std::exp(0.5 * slope * drivers[1]) * normal(random);
+    all.insert(all.end(), values.begin(), values.end());
+    out.windows.push_back({haar_wavelet_variance(values).value(), drivers});
+  }
+  out.start = fit(haar_wavelet_variance(all).value(), parse_model("WN").value(), kRate_hz).value();
+  return out;
+}
+
+TEST(Dependence, OnSeveralDriversIsGivenToTheOneThatItIsOn) {
+  const auto example = correlated(60, 0.3, 3);
+  std::vector<DrivenWindow> first_alone = example.windows;
+  for (auto& window : first_alone) window.drivers.resize(1);
+  const auto alone = fit_dependence(first_alone, example.start);
+  ASSERT_TRUE(alone) << alone.error().text();
+  EXPECT_LT(alone->slopes[0].p_value, 1e-6) << "by itself it seems to be on the first";
+  const auto both = fit_dependence(example.windows, example.start);
+  ASSERT_TRUE(both) << both.error().text();
+  ASSERT_EQ(both->slopes.size(), 2U);
+  EXPECT_EQ(both->slopes[0].driver, 0U);
+  EXPECT_EQ(both->slopes[1].driver, 1U);
+  EXPECT_NEAR(both->slopes[1].slope, 0.3, 3.5 * both->slopes[1].sd);
+  EXPECT_LT(both->slopes[1].p_value, 1e-6);
+  EXPECT_NEAR(both->slopes[0].slope, 0.0, 3.5 * both->slopes[0].sd);
+  ASSERT_EQ(both->mean_drivers.size(), 2U);
+  EXPECT_NEAR(both->mean_drivers[0], 10.0, 1.5);
+}
+
+// Of no dependence on the first driver, beside a strong one on the second.
+TEST(Dependence, OnSeveralDriversRejectsAsRarelyAsItSays) {
+  int rejected = 0;
+  int held = 0;
+  constexpr int kSeries = 200;
+  for (unsigned seed = 1; seed <= kSeries; ++seed) {
+    const auto example = correlated(40, 0.3, 100 + seed);
+    const auto found = fit_dependence(example.windows, example.start);
+    ASSERT_TRUE(found) << found.error().text();
+    ASSERT_EQ(found->slopes.size(), 2U);
+    rejected += found->slopes[0].p_value < 0.05 ? 1 : 0;
+    held += found->slopes[1].ci_low <= 0.3 && 0.3 <= found->slopes[1].ci_high ? 1 : 0;
+  }
+  // 10 and 190 expected; each limit has a chance of 2e-4.
+  EXPECT_LE(rejected, 22);
+  EXPECT_GE(held, 178);
+}
+
+TEST(Dependence, OnTwoDriversThatAreOneTellsOfNeither) {
+  auto example = correlated(40, 0.3, 5);
+  for (auto& window : example.windows) window.drivers[0] = 2.0 * window.drivers[1] + 1.0;
+  const auto found = fit_dependence(example.windows, example.start);
+  ASSERT_TRUE(found) << found.error().text();
+  EXPECT_LE(found->slopes.size(), 1U);
+  EXPECT_GE(found->undetermined.size(), 1U);
 }
 
 }  // namespace

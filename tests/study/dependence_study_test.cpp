@@ -80,6 +80,10 @@ TEST(DependenceStudy, WhatFollowsTheTemperatureIsFoundOnTheAxesThatDoAlone) {
     const double truth = follows ? kSlope : 0.0;
     EXPECT_NEAR(entry.at("slope").get<double>(), truth, 4.0 * entry.at("slope_sd").get<double>());
     EXPECT_EQ(entry.at("p_holm").get<double>() < 1e-3, follows) << entry.at("axis");
+    const auto& beside = entry.at("beside_others");
+    ASSERT_TRUE(beside.is_object()) << "rate, vibration and temperature are known throughout";
+    EXPECT_NEAR(beside.at("slope").get<double>(), truth, 4.0 * beside.at("slope_sd").get<double>());
+    EXPECT_EQ(beside.at("p_holm").get<double>() < 1e-3, follows) << entry.at("axis");
   }
   EXPECT_EQ(of_temperature, 6);
 }

@@ -109,7 +109,7 @@ imuscope::Result<noise::Dependence> dependence_of(const std::vector<double>& x,
   std::vector<noise::DrivenWindow> windows;
   for (std::size_t w = 0; w < rates.size(); ++w) {
     const std::span<const double> piece(x.data() + w * per_window, per_window);
-    windows.push_back({noise::haar_wavelet_variance(piece).value(), rates[w]});
+    windows.push_back({noise::haar_wavelet_variance(piece).value(), {rates[w]}});
   }
   return noise::fit_dependence(windows, *start);
 }
