@@ -32,33 +32,6 @@ Eigen::MatrixXd curve_covariance(const FitResult& fit, const std::vector<int>& l
   return jacobian * known * jacobian.transpose();
 }
 
-/// Every parameter's mean and spread over the replicates, about the pooled value; the pooled intervals become
-/// those of the mean of all such replicates.
-void set_spreads(JointFit& joint, const std::vector<UnitEstimate>& units) {
-  FitResult& pooled = joint.pooled;
-  for (std::size_t p = 0; p < pooled.parameters.size(); ++p) {
-    ParameterEstimate& parameter = pooled.parameters[p];
-    joint.spreads.emplace_back();
-    if (!parameter.log_sd || !(parameter.value > 0.0)) continue;
-    const auto i = static_cast<Eigen::Index>(p);
-    std::vector<double> steps;
-    std::vector<double> variances;
-    for (const UnitEstimate& unit : units) {
-      steps.push_back(unit.step[i]);
-      variances.push_back(unit.covariance(i, i));
-    }
-    auto effects = random_effects(steps, variances, pooled.confidence);
-    if (!effects) continue;
-    const double at = on_interval_scale(parameter);
-    effects->mean += at;
-    effects->ci_low += at;
-    effects->ci_high += at;
-    parameter.ci_low = from_interval_scale(parameter, effects->ci_low);
-    parameter.ci_high = from_interval_scale(parameter, effects->ci_high);
-    joint.spreads.back() = *effects;
-  }
-}
-
 /// Where a replicate has the coefficients of a level, `at` samples on.
 void append_places(const WaveletVariance& wv, const WvLevel& level, std::size_t at,
                    std::vector<Segment>& out) {
@@ -107,6 +80,42 @@ WaveletVariance pool(std::span<const WaveletVariance> replicates) {
   return out;
 }
 
+Spread spread_of(const FitResult& pooled, std::span<const WaveletVariance> replicates) {
+  const Homogeneity homogeneity = test_homogeneity(replicates, pooled.model);
+  Spread out;
+  out.homogeneity = homogeneity.test;
+  for (std::size_t p = 0; p < pooled.parameters.size(); ++p) {
+    const ParameterEstimate& parameter = pooled.parameters[p];
+    out.of_parameters.emplace_back();
+    if (!parameter.log_sd || !(parameter.value > 0.0)) continue;
+    const auto i = static_cast<Eigen::Index>(p);
+    std::vector<double> steps;
+    std::vector<double> variances;
+    for (const UnitEstimate& unit : homogeneity.units) {
+      steps.push_back(unit.step[i]);
+      variances.push_back(unit.covariance(i, i));
+    }
+    auto effects = random_effects(steps, variances, pooled.confidence);
+    if (!effects) continue;
+    const double at = on_interval_scale(parameter);
+    effects->mean += at;
+    effects->ci_low += at;
+    effects->ci_high += at;
+    out.of_parameters.back() = *effects;
+  }
+  return out;
+}
+
+void contain_spread(FitResult& pooled, const Spread& spread) {
+  for (std::size_t p = 0; p < pooled.parameters.size(); ++p) {
+    const auto& effects = spread.of_parameters[p];
+    if (!effects) continue;
+    ParameterEstimate& parameter = pooled.parameters[p];
+    parameter.ci_low = from_interval_scale(parameter, effects->ci_low);
+    parameter.ci_high = from_interval_scale(parameter, effects->ci_high);
+  }
+}
+
 Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const ModelSpec& spec,
                              double rate_hz, const FitOptions& options) {
   if (replicates.size() < 2) return usage_error("a joint fit needs at least two replicates");
@@ -123,9 +132,8 @@ Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const 
     }
     joint.separate.push_back(std::move(*separate));
   }
-  const Homogeneity homogeneity = test_homogeneity(replicates, joint.pooled.model);
-  joint.homogeneity = homogeneity.test;
-  set_spreads(joint, homogeneity.units);
+  joint.spread = spread_of(joint.pooled, replicates);
+  contain_spread(joint.pooled, joint.spread);
   return joint;
 }
 

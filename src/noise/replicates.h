@@ -17,16 +17,26 @@ namespace imuscope::noise {
 /// Precondition: not empty, all with segments, one efficiency.
 WaveletVariance pool(std::span<const WaveletVariance> replicates);
 
+/// What replicates of one model differ by.
+struct Spread {
+  /// Test that all replicates have the pooled parameters (near-stationarity), homogeneity.h.
+  std::optional<JTest> homogeneity;
+  /// Of every parameter on the scale of its interval: mean over the replicates, and how much they differ
+  /// beyond their errors. Absent where the pooled fit does not determine the parameter.
+  std::vector<std::optional<RandomEffects>> of_parameters;
+};
+
+/// @param pooled  fitted to all replicates together
+Spread spread_of(const FitResult& pooled, std::span<const WaveletVariance> replicates);
+
+/// The pooled intervals become those of the mean of all such replicates, and contain their spread.
+void contain_spread(FitResult& pooled, const Spread& spread);
+
 /// One model fitted to all replicates, and to each alone.
 struct JointFit {
   FitResult pooled;
   std::vector<FitResult> separate;  ///< one a replicate
-  /// Test that all replicates have the pooled parameters (near-stationarity), homogeneity.h.
-  std::optional<JTest> homogeneity;
-  /// Of every parameter on the scale of its interval: mean over the replicates, and how much they differ
-  /// beyond their errors. The pooled parameters' intervals are those of the mean and contain the spread.
-  /// Absent where the pooled fit does not determine the parameter.
-  std::vector<std::optional<RandomEffects>> spreads;
+  Spread spread;                    ///< the pooled intervals contain it
 };
 
 /// Errors: those of fit(), and fewer than two replicates (kUsage).

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <cmath>
 
 #include "noise/compare.h"
 #include "noise/holm.h"
 #include "noise/json.h"
 #include "noise/lines.h"
+#include "noise/replicates.h"
 #include "noise/tails.h"
 #include "noise/wavelet_variance.h"
 #include "service/models_file.h"
@@ -51,6 +53,55 @@ void say_left_out(const Job& job, std::size_t axis, const std::string& regime,
                                 {"sentence", sentence}});
 }
 
+/// Parts of a regime, one after the other and with about as many samples each: enough to see whether they
+/// differ, and long enough to tell the white noise.
+constexpr std::size_t kParts = 8;
+constexpr std::size_t kFewestParts = 3;
+constexpr double kPart_s = 15.0;
+/// Chance of parts that are alike being said to differ.
+constexpr double kPartsDifferBelow = 0.01;
+
+std::vector<noise::WaveletVariance> parts_of(const Job& job, const std::vector<std::uint8_t>& mask) {
+  const auto n = static_cast<std::size_t>(std::count(mask.begin(), mask.end(), std::uint8_t{1}));
+  const auto parts = std::min(
+      kParts, static_cast<std::size_t>(static_cast<double>(n) / (kPart_s * job.device.rate_hz)));
+  std::vector<noise::WaveletVariance> out;
+  if (parts < kFewestParts) return out;
+  std::size_t begin = 0;
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    seen += mask[i] != 0 ? 1 : 0;
+    if (seen * parts < (out.size() + 1) * n) continue;
+    noise::WvOptions options;
+    options.mask = {mask.data() + begin, i + 1 - begin};
+    auto wv = noise::haar_wavelet_variance({job.values.data() + begin, i + 1 - begin}, options);
+    if (!wv) return {};
+    out.push_back(std::move(*wv));
+    if (out.size() == parts) break;
+    begin = i + 1;
+  }
+  return out;
+}
+
+/// Where the parts of a regime differ, its intervals contain that, and it is said by how much.
+void look_at_parts(const Job& job, const std::vector<std::uint8_t>& mask, noise::FitResult& fit) {
+  const auto parts = parts_of(job, mask);
+  if (parts.empty()) return;
+  const noise::Spread spread = noise::spread_of(fit, parts);
+  if (!spread.homogeneity || spread.homogeneity->p_value >= kPartsDifferBelow) return;
+  noise::contain_spread(fit, spread);
+  std::string by;
+  for (std::size_t p = 0; p < fit.parameters.size(); ++p) {
+    const auto& effects = spread.of_parameters[p];
+    if (!effects || !(effects->spread_low > 0.0)) continue;
+    by += fmt::format("{}{} {} by {:.2g} %", by.empty() ? ": " : ", ", fit.parameters[p].process,
+                      fit.parameters[p].name, 100.0 * std::expm1(effects->spread));
+  }
+  fit.warnings.push_back(fmt::format(
+      "its {} parts differ (p = {:.2g}){}; intervals are of the mean of such parts and contain that",
+      parts.size(), spread.homogeneity->p_value, by));
+}
+
 /// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
 std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::uint8_t>& mask,
                      const std::string& regime, const std::vector<noise::Line>& lines,
@@ -81,6 +132,7 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
       regime == kWholeRun
           ? std::nullopt
           : noise::spike_warning(noise::test_tails(job.values, options, fit->model), job.device.rate_hz);
+  if (regime != kWholeRun) look_at_parts(job, mask, *fit);
   if (spikes) fit->warnings.insert(fit->warnings.begin(), *spikes);
   job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), lines});
   return wv->levels.size();

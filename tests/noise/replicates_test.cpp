@@ -59,11 +59,11 @@ TEST(Replicates, PooledIsTheMeanOverTheCoefficientsOfAll) {
 TEST(Replicates, EqualReplicatesPassAndOneWithMoreNoiseFailsTheTestOfHomogeneity) {
   const auto spec = parse_model("WN+GM").value();
   const auto same = fit_jointly(replicates({1, 1, 1, 1}, 10), spec, 100.0).value();
-  ASSERT_TRUE(same.homogeneity.has_value());
-  EXPECT_EQ(same.homogeneity->dof, 9);
-  EXPECT_GT(same.homogeneity->p_value, 0.001);
+  ASSERT_TRUE(same.spread.homogeneity.has_value());
+  EXPECT_EQ(same.spread.homogeneity->dof, 9);
+  EXPECT_GT(same.spread.homogeneity->p_value, 0.001);
   const auto different = fit_jointly(replicates({1, 1, 1.3, 1}, 20), spec, 100.0).value();
-  EXPECT_LT(different.homogeneity->p_value, 1e-6);
+  EXPECT_LT(different.spread.homogeneity->p_value, 1e-6);
   EXPECT_LT(*same.pooled.parameters[0].sd, *same.separate[0].parameters[0].sd);
 }
 
@@ -75,7 +75,7 @@ TEST(Replicates, OneTruthIsCalledManyAsRarelyAsTheTestPromises) {
     std::vector<WaveletVariance> records;
     for (unsigned k = 0; k < 4; ++k)
       records.push_back(haar_wavelet_variance(series(2048, 1.0, 7000 + 4 * i + k)).value());
-    differ += fit_jointly(records, spec, 100.0)->homogeneity->p_value < 0.05 ? 1 : 0;
+    differ += fit_jointly(records, spec, 100.0)->spread.homogeneity->p_value < 0.05 ? 1 : 0;
   }
   EXPECT_LE(differ, 9) << "3 expected; more than 9 has a chance of 1e-3";
 }
@@ -84,11 +84,11 @@ TEST(Replicates, PooledIntervalsContainWhatReplicatesDifferBy) {
   const auto spec = parse_model("WN+GM").value();
   const auto same = fit_jointly(replicates({1, 1, 1, 1}, 10), spec, 100.0).value();
   const auto different = fit_jointly(replicates({0.8, 1, 1.2, 1}, 10), spec, 100.0).value();
-  ASSERT_TRUE(different.spreads[0] && same.spreads[0]);
+  ASSERT_TRUE(different.spread.of_parameters[0] && same.spread.of_parameters[0]);
   // Sd of log sigma2 about 0.33: squares of 0.8 to 1.2.
-  EXPECT_NEAR(different.spreads[0]->spread, 0.33, 0.05);
-  EXPECT_LT(same.spreads[0]->spread, 0.05);
-  EXPECT_LE(same.spreads[0]->spread_low, same.spreads[0]->spread);
+  EXPECT_NEAR(different.spread.of_parameters[0]->spread, 0.33, 0.05);
+  EXPECT_LT(same.spread.of_parameters[0]->spread, 0.05);
+  EXPECT_LE(same.spread.of_parameters[0]->spread_low, same.spread.of_parameters[0]->spread);
   EXPECT_LT(std::exp(2.0 * std::log(0.8)), *different.pooled.parameters[0].ci_high);
   EXPECT_GT(*different.pooled.parameters[0].ci_high / *different.pooled.parameters[0].ci_low, 2.0);
 }

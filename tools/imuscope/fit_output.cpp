@@ -124,15 +124,15 @@ void print_replicates(const noise::JointFit& joint) {
       interval_heading(joint.pooled));
   for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {
     const auto& parameter = joint.pooled.parameters[p];
-    if (const auto& spread = joint.spreads[p])
+    if (const auto& spread = joint.spread.of_parameters[p])
       say("{:<7} {:<10} {:>16.4g}  [{:.4g}, {:.4g}]\n", parameter.process, parameter.name, spread->spread,
           spread->spread_low, spread->spread_high);
   }
-  if (!joint.homogeneity) {
+  if (!joint.spread.homogeneity) {
     say("\nno test of near-stationarity: no parameter is in use\n");
     return;
   }
-  const auto& test = *joint.homogeneity;
+  const auto& test = *joint.spread.homogeneity;
   say("\nnear-stationarity: {:.4g} on {} dof, p = {:.3g}: {}\n", test.statistic, test.dof, test.p_value,
       test.p_value < kHomogeneous
           ? "the replicates differ by more than their uncertainty; the intervals contain that"
@@ -179,13 +179,13 @@ nlohmann::json ranking_json(const std::vector<noise::CrossValidated>& ranked) {
 }
 
 nlohmann::json replicates_json(const noise::JointFit& joint, noise::SignalUnit unit) {
-  nlohmann::json json{{"replicates", nlohmann::json::array()}, {"homogeneity", test_json(joint.homogeneity)}};
+  nlohmann::json json{{"replicates", nlohmann::json::array()}, {"homogeneity", test_json(joint.spread.homogeneity)}};
   for (const auto& fit : joint.separate) json["replicates"].push_back(fit_json(fit, unit));
   json["spread"] = nlohmann::json::array();
   for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {
     const auto& parameter = joint.pooled.parameters[p];
     nlohmann::json row{{"process", parameter.process}, {"name", parameter.name}, {"log_sd", nullptr}};
-    if (const auto& spread = joint.spreads[p]) {
+    if (const auto& spread = joint.spread.of_parameters[p]) {
       row["log_sd"] = spread->spread;
       row["ci_low"] = spread->spread_low;
       row["ci_high"] = spread->spread_high;

@@ -287,7 +287,7 @@ std::vector<Cell> replicate_cells() {
                    noise::haar_wavelet_variance(imuscope::simulated_noise(model, kN, random)).value());
              }
              const auto joint = noise::fit_jointly(wvs, spec_of(truth), kRate_hz).value();
-             count(counts, "differ", joint.homogeneity && joint.homogeneity->p_value < 0.05);
+             count(counts, "differ", joint.spread.homogeneity && joint.spread.homogeneity->p_value < 0.05);
              const auto places = noise::parameter_places(truth);
              for (std::size_t i = 0; i < places.size(); ++i) {
                const auto& p = joint.pooled.parameters[i];
