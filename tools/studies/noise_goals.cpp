@@ -11,13 +11,11 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <fstream>
 #include <functional>
-#include <map>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "goal_counts.h"
 #include "noise/compare.h"
 #include "noise/inference.h"
 #include "noise/replicates.h"
@@ -30,34 +28,17 @@ namespace {
 namespace noise = imuscope::noise;
 using noise::Component;
 using noise::ProcessKind;
+using imuscope::Band;
+using imuscope::count;
+using imuscope::Counts;
 
 constexpr double kRate_hz = 100.0;
-
-/// Of how many series something was so.
-struct Count {
-  int hits = 0;
-  int of = 0;
-};
-using Counts = std::map<std::string, Count>;
-
-/// Per cent that a count of this name has to lie in.
-struct Band {
-  std::string name;
-  double low;
-  double high;
-};
 
 struct Cell {
   std::string name;
   std::vector<Band> bands;
   std::function<void(std::mt19937_64&, Counts&)> series;
 };
-
-void count(Counts& counts, const std::string& name, bool hit) {
-  Count& c = counts[name];
-  c.hits += hit ? 1 : 0;
-  ++c.of;
-}
 
 Component white(double sigma2) { return {ProcessKind::kWhiteNoise, sigma2, {}}; }
 Component walk(double gamma2) { return {ProcessKind::kRandomWalk, gamma2, {}}; }
@@ -322,51 +303,7 @@ std::vector<Cell> comparison_cells() {
   return cells;
 }
 
-/// What earlier calls counted, and the file to go on in.
-class Results {
- public:
-  explicit Results(const std::string& file) : file_(file) {
-    std::ifstream in(file);
-    for (std::string line; std::getline(in, line);) {
-      std::istringstream words(line);
-      std::string cell;
-      int first = 0;
-      int end = 0;
-      if (!(words >> cell >> first >> end) || first != done_[cell]) continue;
-      Counts read;
-      std::string name;
-      for (Count c; words >> name >> c.hits >> c.of;) read[name] = c;
-      add(cell, end, read);
-    }
-  }
-
-  [[nodiscard]] int done(const std::string& cell) const { return done_.contains(cell) ? done_.at(cell) : 0; }
-  [[nodiscard]] const Counts& counts(const std::string& cell) { return counts_[cell]; }
-
-  void keep(const std::string& cell, int end, const Counts& counts) {
-    if (!file_.empty()) {
-      std::string line = fmt::format("{} {} {}", cell, done(cell), end);
-      for (const auto& [name, c] : counts) line += fmt::format(" {} {} {}", name, c.hits, c.of);
-      std::ofstream(file_, std::ios::app) << line << '\n';
-    }
-    add(cell, end, counts);
-  }
-
- private:
-  void add(const std::string& cell, int end, const Counts& counts) {
-    for (const auto& [name, c] : counts) {
-      counts_[cell][name].hits += c.hits;
-      counts_[cell][name].of += c.of;
-    }
-    done_[cell] = end;
-  }
-
-  std::string file_;
-  std::map<std::string, int> done_;
-  std::map<std::string, Counts> counts_;
-};
-
-void run(const Cell& cell, int series, Results& results) {
+void run(const Cell& cell, int series, imuscope::Results& results) {
   constexpr int kSeriesALine = 20;
   while (results.done(cell.name) < series) {
     const int first = results.done(cell.name);
@@ -378,31 +315,6 @@ void run(const Cell& cell, int series, Results& results) {
     }
     results.keep(cell.name, end, counts);
   }
-}
-
-bool judge(const Cell& cell, const Counts& counts) {
-  constexpr double kSd = 3.3;
-  bool good = true;
-  fmt::print("{}\n", cell.name);
-  for (const auto& count : counts) {
-    const auto& [name, c] = count;
-    const Band* band = nullptr;
-    for (const Band& b : cell.bands) {
-      if (band == nullptr && (b.name == name || b.name.empty())) band = &b;
-    }
-    const double share = 100.0 * c.hits / c.of;
-    const auto sd_at = [of = c.of](double percent) { return std::sqrt(percent * (100.0 - percent) / of); };
-    const bool holds_here = band == nullptr || (share >= band->low - kSd * sd_at(band->low) &&
-                                                share <= band->high + kSd * sd_at(band->high));
-    good = good && holds_here;
-    fmt::print("  {:<12} {:>6} of {:>6}  {:>6.2f} % (sd {:.2f})  {}\n", name, c.hits, c.of, share,
-               sd_at(share),
-               band == nullptr
-                   ? ""
-                   : fmt::format("{:g} to {:g}: {}", band->low, band->high, holds_here ? "ok" : "MISSED"));
-  }
-  (void)std::fflush(stdout);
-  return good;
 }
 
 }  // namespace
@@ -425,12 +337,12 @@ int main(int argc, char** argv) {
        {interval_cells(lengths), slow_cells(), missing_cells(), spike_cells(), replicate_cells(),
                        comparison_cells()})
     cells.insert(cells.end(), more.begin(), more.end());
-  Results results(results_file);
+  imuscope::Results results(results_file);
   bool good = true;
   for (const Cell& cell : cells) {
     if (!cell.name.starts_with(only)) continue;
     run(cell, series, results);
-    good = judge(cell, results.counts(cell.name)) && good;
+    good = imuscope::judge(cell.name, cell.bands, results.counts(cell.name)) && good;
   }
   fmt::print("\n{}\n", good ? "every goal is met" : "NOT every goal is met");
   return good ? 0 : 1;
