@@ -107,8 +107,16 @@ double deviance_of(const SeparableProblem& problem, const Model& model, const Ei
   const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * v * scale.asDiagonal());
   if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
   const Eigen::MatrixXd factor = llt.matrixL();
-  return llt.matrixL().solve(scale.cwiseProduct(residual_of(problem, model))).squaredNorm() +
-         2.0 * factor.diagonal().array().log().sum();
+  // N-16
+  const Eigen::VectorXd expected = problem.y - residual_of(problem, model);
+  Eigen::VectorXd residual(problem.y.size());
+  double jacobian = 0.0;
+  for (Eigen::Index i = 0; i < residual.size(); ++i) {
+    if (!(expected[i] > 0.0)) return std::numeric_limits<double>::infinity();
+    residual[i] = scale[i] * near_gaussian_residual(problem.y[i], expected[i], v(i, i));
+    jacobian -= 4.0 / 3.0 * std::log(scale[i] * expected[i]);
+  }
+  return llt.matrixL().solve(residual).squaredNorm() + 2.0 * factor.diagonal().array().log().sum() + jacobian;
 }
 
 std::vector<bool> present_parameters(const Model& model) {

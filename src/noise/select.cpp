@@ -15,8 +15,8 @@
 namespace imuscope::noise {
 namespace {
 
-/// Criteria closer than this are equal: exp(-1) in likelihood.
-constexpr double kEquivalent = 2.0;
+/// Criteria closer than this are equal: exp(-2) in likelihood.
+constexpr double kEquivalent = 4.0;
 
 std::vector<ModelSpec> sub_models(const ModelSpec& full) {
   std::map<ProcessKind, int> counts;
