@@ -396,8 +396,7 @@ Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const F
     for (const auto& w : windows) sum += w.drivers[k];
     out.mean_drivers.push_back(sum / static_cast<double>(windows.size()));
   }
-  out.at_mean_driver =
-      model_at(model, problem->places, values, Eigen::RowVectorXd::Zero(problem->x.cols()));
+  out.at_mean_driver = model_at(model, problem->places, values, Eigen::RowVectorXd::Zero(problem->x.cols()));
   const auto names = names_of(start);
   const Index n = unknowns.count();
   const auto free = static_cast<double>(windows.size()) - static_cast<double>(n);

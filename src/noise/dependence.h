@@ -38,7 +38,7 @@ struct DependenceOptions {
 struct ParameterSlope {
   std::size_t driver = 0;  ///< index in DrivenWindow::drivers
   std::string process;     ///< as in FitResult: "WN", "GM1", ...
-  std::string name;     ///< "sigma2", "beta", ...
+  std::string name;        ///< "sigma2", "beta", ...
   std::string unit;
   double at_mean_driver = 0.0;  ///< value where the drivers have their means
   double slope = 0.0;           ///< of the logarithm, per unit of the driver
@@ -70,8 +70,8 @@ inline constexpr std::size_t kFewestWindows = 12;
 
 /// @param windows  all of one length, so that one covariance serves them, and with the same drivers
 /// @param start    a fit of the same signal: which processes, and where the search begins
-/// Errors (kWork): fewer than kFewestWindows windows a driver; a driver that is no number or does not vary; no level
-/// with enough coefficients; a search that does not settle.
+/// Errors (kWork): fewer than kFewestWindows windows a driver; a driver that is no number or does not vary;
+/// no level with enough coefficients; a search that does not settle.
 Result<Dependence> fit_dependence(std::span<const DrivenWindow> windows, const FitResult& start,
                                   const DependenceOptions& options = {});
 

@@ -69,8 +69,8 @@ class Present {
     std::size_t begin = 0;
     for (const Segment& run : runs_) {
       // From the beginning of a run on, as long as there is enough; else from the next run.
-      for (begin = std::max(begin, run.begin); begin < run.end && begin + length < before_.size() &&
-                                               count(begin, begin + length) >= least;
+      for (begin = std::max(begin, run.begin);
+           begin < run.end && begin + length < before_.size() && count(begin, begin + length) >= least;
            begin += length / 2)
         begins.push_back(begin);
     }
@@ -168,7 +168,8 @@ double amplitude_of(const Spectrum& spectrum, std::size_t k, double floor) {
   double power = 0.0;
   for (std::size_t i = k - kLobe; i <= std::min(k + kLobe, spectrum.power.size() - 1); ++i)
     power += spectrum.power[i] - floor;
-  const double sum_of_window_squared = 0.25 * static_cast<double>(spectrum.length) * static_cast<double>(spectrum.length);
+  const double sum_of_window_squared =
+      0.25 * static_cast<double>(spectrum.length) * static_cast<double>(spectrum.length);
   constexpr double kLobePower = 1.5;
   return std::sqrt(std::max(0.0, 4.0 * power / (kLobePower * sum_of_window_squared)));
 }
@@ -255,8 +256,8 @@ class Search {
         floor_spread_(1.0 + 3.0 * std::sqrt(0.5 * std::numbers::pi * 2.0 /
                                             (dof_ * static_cast<double>(2 * kFloorBins)))),
         threshold_(floor_spread_ *
-                   boost::math::quantile(boost::math::complement(boost::math::chi_squared(dof_),
-                                                                 options.false_alarm / bins)) /
+                   boost::math::quantile(
+                       boost::math::complement(boost::math::chi_squared(dof_), options.false_alarm / bins)) /
                    dof_) {}
 
   [[nodiscard]] std::vector<Line> lines() const {

@@ -18,7 +18,7 @@ struct Line {
   double amplitude = 0.0;        ///< of the sinusoid, signal unit, rms over the segments times sqrt(2)
   double amplitude_sd = 0.0;     ///< from noise alone
   double share_of_variance = 0.0;
-  double p_value = 1.0;  ///< of noise alone reaching this anywhere in the spectrum
+  double p_value = 1.0;     ///< of noise alone reaching this anywhere in the spectrum
   std::size_t segment = 0;  ///< samples a segment of the spectrum in which it was found
 };
 
@@ -34,9 +34,9 @@ struct LineOptions {
   std::size_t most_lines = 16;
 };
 
-/// Strongest first. A segment of the spectrum may miss an eighth of its samples; a signal that has none of the
-/// shortest has no lines, and longer ones are looked at where there are kFewestSegments. A peak wider than the
-/// window's main lobe is a band, not a line, and is passed over.
+/// Strongest first. A segment of the spectrum may miss an eighth of its samples; a signal that has none of
+/// the shortest has no lines, and longer ones are looked at where there are kFewestSegments. A peak wider
+/// than the window's main lobe is a band, not a line, and is passed over.
 std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
                              const LineOptions& options);
 

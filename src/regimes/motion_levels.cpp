@@ -62,8 +62,8 @@ void MotionLevels::add_speed(HostTime time, double speed_mps, double sd_mps) {
 
 void MotionLevels::forget_before(HostTime time) {
   if (!first_) return;
-  const std::int64_t n = std::clamp<std::int64_t>(number_of(time) - *first_, 0,
-                                                  static_cast<std::int64_t>(sums_.size()));
+  const std::int64_t n =
+      std::clamp<std::int64_t>(number_of(time) - *first_, 0, static_cast<std::int64_t>(sums_.size()));
   sums_.erase(sums_.begin(), sums_.begin() + n);
   *first_ += n;
 }

@@ -23,7 +23,8 @@ void RecentRegimes::add(HostTime time, const Vector3& omega_ib_b_radps, const Ve
 }
 
 void RecentRegimes::add_speed(HostTime time, double speed_mps, double sd_mps) {
-  if (newest_ && std::abs(to_seconds(time - *newest_)) < kWindow_s) levels_.add_speed(time, speed_mps, sd_mps);
+  if (newest_ && std::abs(to_seconds(time - *newest_)) < kWindow_s)
+    levels_.add_speed(time, speed_mps, sd_mps);
 }
 
 void RecentRegimes::settle() {
@@ -34,12 +35,12 @@ void RecentRegimes::decide(double look_ahead_s) {
   levels_.forget_before(*newest_ - from_seconds(kWindow_s));
   const auto cells = levels_.cells();
   const CellNoise now = cell_noise(cells);
-  noise_ = noise_ ? CellNoise{std::min(noise_->omega_radps, now.omega_radps),
-                                   std::min(noise_->f_mps2, now.f_mps2)}
-                  : now;
+  noise_ =
+      noise_ ? CellNoise{std::min(noise_->omega_radps, now.omega_radps), std::min(noise_->f_mps2, now.f_mps2)}
+             : now;
   track_ = static_and_dynamic(levels_, cells, limits_, *noise_);
-  settled_until_ = look_ahead_s > 0.0 ? *newest_ - from_seconds(look_ahead_s)
-                                      : *newest_ + std::chrono::nanoseconds(1);
+  settled_until_ =
+      look_ahead_s > 0.0 ? *newest_ - from_seconds(look_ahead_s) : *newest_ + std::chrono::nanoseconds(1);
 }
 
 }  // namespace imuscope

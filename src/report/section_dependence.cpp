@@ -51,12 +51,11 @@ Html dependence_table(const RunFiles& run, const std::string& imu) {
     const double factor = shown_unit(unit);
     const auto at_mean = number_at(entry, "at_mean_driver");
     const json& beside = field(entry, "beside_others");
-    table.add_row({text(text_at(entry, "process") + " " + text_at(entry, "parameter")),
-                   text(text_at(entry, "driver")),
-                   at_mean ? number(factor * *at_mean, 4) + text(" " + unit) : text(kUnknown),
-                   change_words(entry, text_at(entry, "driver_unit")), p_words(number_at(entry, "p_holm")),
-                   change_words(beside, text_at(entry, "driver_unit")),
-                   p_words(number_at(beside, "p_holm"))});
+    table.add_row(
+        {text(text_at(entry, "process") + " " + text_at(entry, "parameter")), text(text_at(entry, "driver")),
+         at_mean ? number(factor * *at_mean, 4) + text(" " + unit) : text(kUnknown),
+         change_words(entry, text_at(entry, "driver_unit")), p_words(number_at(entry, "p_holm")),
+         change_words(beside, text_at(entry, "driver_unit")), p_words(number_at(beside, "p_holm"))});
   }
   return table.empty() ? paragraph("No dependence could be fitted for this sensor.") : table.html();
 }

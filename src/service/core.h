@@ -113,7 +113,8 @@ class CoreSink {
   /// One S sample of a calibrated S-IMU. Unless overridden, its row goes to on_error(), made with the
   /// estimate as it stands.
   virtual void on_epoch(const StudyEpoch& epoch, const TickFacts& facts) noexcept {
-    on_error({epoch.study, facts.first_reference_time, live_error_row(epoch), facts.ages, facts.validity, facts.speed});
+    on_error({epoch.study, facts.first_reference_time, live_error_row(epoch), facts.ages, facts.validity,
+              facts.speed});
   }
   virtual void on_error(const ErrorRecord& record) noexcept = 0;
   virtual void on_event(const EstimatorEvent& event) noexcept = 0;

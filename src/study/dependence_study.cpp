@@ -170,8 +170,12 @@ std::string sentence_of(const std::string& name, const Slope& s, double p_holm,
 nlohmann::json beside_others_json(const Slope& s, const std::optional<double>& p_holm) {
   if (!s.beside_others) return nullptr;
   const auto& beside = *s.beside_others;
-  return {{"slope", beside.slope},     {"slope_sd", beside.sd},     {"ci_low", beside.ci_low},
-          {"ci_high", beside.ci_high}, {"p_value", beside.p_value}, {"p_holm", p_holm.value_or(1.0)},
+  return {{"slope", beside.slope},
+          {"slope_sd", beside.sd},
+          {"ci_low", beside.ci_low},
+          {"ci_high", beside.ci_high},
+          {"p_value", beside.p_value},
+          {"p_holm", p_holm.value_or(1.0)},
           {"percent_per_unit", percent(beside.slope)}};
 }
 
@@ -290,8 +294,9 @@ class ImuStudy {
                       name_));
       return false;
     }
-    const auto [coldest, warmest] = std::minmax_element(
-        windows.begin(), windows.end(), [](const auto& a, const auto& b) { return a.drivers[0] < b.drivers[0]; });
+    const auto [coldest, warmest] =
+        std::minmax_element(windows.begin(), windows.end(),
+                            [](const auto& a, const auto& b) { return a.drivers[0] < b.drivers[0]; });
     const double change_degC = warmest->drivers[0] - coldest->drivers[0];
     if (change_degC >= kLeastWarming_degC) return true;
     say(

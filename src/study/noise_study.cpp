@@ -63,8 +63,8 @@ constexpr double kPartsDifferBelow = 0.01;
 
 std::vector<noise::WaveletVariance> parts_of(const Job& job, const std::vector<std::uint8_t>& mask) {
   const auto n = static_cast<std::size_t>(std::count(mask.begin(), mask.end(), std::uint8_t{1}));
-  const auto parts = std::min(
-      kParts, static_cast<std::size_t>(static_cast<double>(n) / (kPart_s * job.device.rate_hz)));
+  const auto parts =
+      std::min(kParts, static_cast<std::size_t>(static_cast<double>(n) / (kPart_s * job.device.rate_hz)));
   std::vector<noise::WaveletVariance> out;
   if (parts < kFewestParts) return out;
   std::size_t begin = 0;

@@ -100,10 +100,12 @@ TEST_P(Stops, OfOneToTenSecondsAreFoundAndRestAndMotionAreNamedRight) {
     drive.accel_density_mps2 = GetParam().accel_mps2_sqrt_hz;
     const auto driven = test::driven(drive);
     const auto track = static_and_dynamic(driven.levels, {});
-    add(driven, [&](HostTime time) { return track.at(time); }, afterwards);
+    add(
+        driven, [&](HostTime time) { return track.at(time); }, afterwards);
     const auto settled = settled_regimes(driven);
     ASSERT_EQ(settled.size(), driven.samples.size());
-    add(driven, [&](HostTime time) { return std::prev(settled.upper_bound(time))->second; }, meanwhile);
+    add(
+        driven, [&](HostTime time) { return std::prev(settled.upper_bound(time))->second; }, meanwhile);
   }
   const auto share = [](int part, int whole) { return 100.0 * part / whole; };
   for (const Score& score : {afterwards, meanwhile}) {

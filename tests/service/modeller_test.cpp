@@ -1,6 +1,6 @@
+#include "service/modeller.h"
 #include "service/live_models.h"
 #include "service/model_book.h"
-#include "service/modeller.h"
 
 #include <gtest/gtest.h>
 
@@ -224,7 +224,8 @@ TEST(LiveModels, GiveEachRowToTheRegimeThatHeldThere) {
   EXPECT_EQ(before, kRounds * kRound_s / 10 - 1) << "the last seconds waited for what came after them";
   EXPECT_EQ(refits, kRounds * kRound_s / 10);
   EXPECT_NEAR(static_cast<double>(last.motion.n_static) / kRate_hz, kRounds * (kStop_s - 0.6), 3.0);
-  EXPECT_NEAR(static_cast<double>(last.motion.n_dynamic) / kRate_hz, kRounds * (kRound_s - kStop_s - 0.6), 3.0);
+  EXPECT_NEAR(static_cast<double>(last.motion.n_dynamic) / kRate_hz, kRounds * (kRound_s - kStop_s - 0.6),
+              3.0);
   ASSERT_EQ(last.axes.size(), 2 * kAxisCount);
   for (const AxisRefit& axis : last.axes) {
     ASSERT_TRUE(axis.fit);

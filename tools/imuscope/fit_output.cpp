@@ -179,7 +179,8 @@ nlohmann::json ranking_json(const std::vector<noise::CrossValidated>& ranked) {
 }
 
 nlohmann::json replicates_json(const noise::JointFit& joint, noise::SignalUnit unit) {
-  nlohmann::json json{{"replicates", nlohmann::json::array()}, {"homogeneity", test_json(joint.spread.homogeneity)}};
+  nlohmann::json json{{"replicates", nlohmann::json::array()},
+                      {"homogeneity", test_json(joint.spread.homogeneity)}};
   for (const auto& fit : joint.separate) json["replicates"].push_back(fit_json(fit, unit));
   json["spread"] = nlohmann::json::array();
   for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {

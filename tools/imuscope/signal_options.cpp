@@ -121,7 +121,8 @@ Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, Lines lin
     if (!wv) return tl::unexpected(wv.error());
     out.lines.push_back(lines_of(*signal, out.rate_hz, lines));
     for (const auto& line : out.lines.back()) warn(line_warning(line, options.unit, lines));
-    if (lines == Lines::kTakenOut && !out.lines.back().empty()) wv = wavelet_variance_of(file, *signal, options);
+    if (lines == Lines::kTakenOut && !out.lines.back().empty())
+      wv = wavelet_variance_of(file, *signal, options);
     if (!wv) return tl::unexpected(wv.error());
     if (const auto spikes = spikes_in(*signal, *wv, out.rate_hz, options)) warn(*spikes);
     out.wvs.push_back(std::move(*wv));

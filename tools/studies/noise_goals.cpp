@@ -26,11 +26,11 @@
 namespace {
 
 namespace noise = imuscope::noise;
-using noise::Component;
-using noise::ProcessKind;
 using imuscope::Band;
 using imuscope::count;
 using imuscope::Counts;
+using noise::Component;
+using noise::ProcessKind;
 
 constexpr double kRate_hz = 100.0;
 
@@ -286,19 +286,20 @@ std::vector<Cell> comparison_cells() {
   const auto all = truths();
   for (const std::size_t which : {0U, 2U, 3U, 4U, 5U, 8U}) {
     const noise::Model& truth = all[which];
-    cells.push_back({fmt::format("comparison/{}", spec_of(truth).name()),
-                     {{"differ", 3.0, 8.0}},
-                     [truth](std::mt19937_64& random, Counts& counts) {
-                       // The shorter one is what a drive's stops leave.
-                       const auto fit_of = [&](std::size_t n) {
-                         const auto wv =
-                             noise::haar_wavelet_variance(imuscope::simulated_noise(truth, n, random)).value();
-                         return noise::fit(wv, spec_of(truth), kRate_hz).value();
-                       };
-                       const auto first = fit_of(1U << 15U);
-                       const auto compared = noise::compare(first, fit_of(1U << 16U));
-                       if (compared.test) count(counts, "differ", compared.test->p_value < 0.05);
-                     }});
+    cells.push_back(
+        {fmt::format("comparison/{}", spec_of(truth).name()),
+         {{"differ", 3.0, 8.0}},
+         [truth](std::mt19937_64& random, Counts& counts) {
+           // The shorter one is what a drive's stops leave.
+           const auto fit_of = [&](std::size_t n) {
+             const auto wv =
+                 noise::haar_wavelet_variance(imuscope::simulated_noise(truth, n, random)).value();
+             return noise::fit(wv, spec_of(truth), kRate_hz).value();
+           };
+           const auto first = fit_of(1U << 15U);
+           const auto compared = noise::compare(first, fit_of(1U << 16U));
+           if (compared.test) count(counts, "differ", compared.test->p_value < 0.05);
+         }});
   }
   return cells;
 }
@@ -328,14 +329,14 @@ int main(int argc, char** argv) {
   app.add_option("--series", series, "a cell")->check(CLI::Range(1, 1'000'000));
   app.add_option("--lengths", lengths, "logarithms to base 2, of the intervals")->check(CLI::Range(10, 22));
   app.add_option("--results", results_file, "keep counts here, and go on from there")->type_name("FILE");
-  app.add_option("--only", only,
-                 "cells whose name begins so: intervals, slow, missing, spikes, selection, replicates, comparison")
+  app.add_option(
+         "--only", only,
+         "cells whose name begins so: intervals, slow, missing, spikes, selection, replicates, comparison")
       ->type_name("TEXT");
   CLI11_PARSE(app, argc, argv);
   std::vector<Cell> cells = selection_cells();
-  for (auto&& more :
-       {interval_cells(lengths), slow_cells(), missing_cells(), spike_cells(), replicate_cells(),
-                       comparison_cells()})
+  for (auto&& more : {interval_cells(lengths), slow_cells(), missing_cells(), spike_cells(),
+                      replicate_cells(), comparison_cells()})
     cells.insert(cells.end(), more.begin(), more.end());
   imuscope::Results results(results_file);
   bool good = true;

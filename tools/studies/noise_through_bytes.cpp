@@ -17,8 +17,8 @@
 #include <optional>
 #include <string>
 
-#include "tools/benchmarks/own_folder.h"
 #include "goal_counts.h"
+#include "tools/benchmarks/own_folder.h"
 
 namespace {
 
@@ -37,7 +37,8 @@ struct Options {
 };
 
 void call(const std::string& command) {
-  if (std::system((command + " >/dev/null").c_str()) != 0) throw std::runtime_error("this failed: " + command);
+  if (std::system((command + " >/dev/null").c_str()) != 0)
+    throw std::runtime_error("this failed: " + command);
 }
 
 json read(const fs::path& file) {
@@ -75,9 +76,9 @@ void add(const json& models, const json& truth, Counts& counts) {
                                          model.at("axis").get<std::string>().substr(0, 4));
     const bool told = !low.is_null() && !high.is_null();
     imuscope::count(counts, name + ".told", told);
-    imuscope::count(counts, name,
-                    (low.is_null() || low.get<double>() <= *value) &&
-                        (high.is_null() || *value <= high.get<double>()));
+    imuscope::count(
+        counts, name,
+        (low.is_null() || low.get<double>() <= *value) && (high.is_null() || *value <= high.get<double>()));
     if (!told) continue;
     imuscope::count(counts, model.at("regime").get<std::string>() + ".of_told",
                     low.get<double>() <= *value && *value <= high.get<double>());
@@ -119,8 +120,8 @@ int main(int argc, char** argv) {
       const int number = results.done(cell);
       results.keep(cell, number + 1, drive(options, number));
     }
-    const std::vector<imuscope::Band> bands{{"static.gyro", 91.0, 99.5},   {"static.acce", 91.0, 99.5},
-                                            {"dynamic.gyro", 91.0, 99.5},  {"dynamic.acce", 91.0, 99.5},
+    const std::vector<imuscope::Band> bands{{"static.gyro", 91.0, 99.5},    {"static.acce", 91.0, 99.5},
+                                            {"dynamic.gyro", 91.0, 99.5},   {"dynamic.acce", 91.0, 99.5},
                                             {"static.of_told", 93.0, 97.0}, {"dynamic.of_told", 93.0, 97.0}};
     return imuscope::judge(cell, bands, results.counts(cell)) ? 0 : 1;
   } catch (const std::exception& error) {
