@@ -9,6 +9,7 @@
 
 #include "noise/chi_squared.h"
 #include "noise/homogeneity.h"
+#include "noise/parameter_scale.h"
 #include "noise/inference.h"
 
 namespace imuscope::noise {
@@ -84,25 +85,18 @@ std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b)
 
 /// @param sd  of the difference on the scale of the intervals
 void set_ratio_interval(ComparedParameter& row, double sd, double z) {
-  if (!row.ratio || row.name == "theta" || row.name == "phi") return;
-  const double log_sd = row.name == "omega" || row.name == "alpha" ? 0.5 * sd : sd;
+  const ParameterScale scale = parameter_scale_of(row.name);
+  if (!row.ratio || !is_logarithmic(scale)) return;
+  const double log_sd = scale == ParameterScale::kLogSquare ? 0.5 * sd : sd;
   row.ratio_ci_low = *row.ratio * std::exp(-z * log_sd);
   row.ratio_ci_high = *row.ratio * std::exp(z * log_sd);
 }
 
 }  // namespace
 
-/// The covariance of omega and alpha is that of their squares.
-double on_interval_scale(const ParameterEstimate& p) {
-  if (p.name == "theta" || p.name == "phi") return std::atanh(p.value);
-  const double log = std::log(p.value);
-  return p.name == "omega" || p.name == "alpha" ? 2.0 * log : log;
-}
+double on_interval_scale(const ParameterEstimate& p) { return to_scale(parameter_scale_of(p.name), p.value); }
 
-double from_interval_scale(const ParameterEstimate& p, double place) {
-  if (p.name == "theta" || p.name == "phi") return std::tanh(place);
-  return std::exp(p.name == "omega" || p.name == "alpha" ? 0.5 * place : place);
-}
+double from_interval_scale(const ParameterEstimate& p, double place) { return from_scale(parameter_scale_of(p.name), place); }
 
 Comparison compare(const FitResult& first, const FitResult& second) {
   Comparison out;

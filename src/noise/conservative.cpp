@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "noise/inference.h"
+#include "noise/parameter_scale.h"
 
 namespace imuscope::noise {
 namespace {
@@ -63,8 +64,7 @@ FitResult over_bounding(const FitResult& fit) {
     parameter.sd = parameter.ci_low = parameter.ci_high = parameter.log_sd = std::nullopt;
     if (places[p].shape >= 0) continue;
     const double f = factor[static_cast<Eigen::Index>(places[p].component)];
-    const bool is_root = parameter.name == "omega" || parameter.name == "alpha";
-    parameter.value *= is_root ? std::sqrt(f) : f;
+    parameter.value *= parameter_scale_of(parameter.name) == ParameterScale::kLogSquare ? std::sqrt(f) : f;
   }
   for (std::size_t i = 0; i < out.model.components.size(); ++i) {
     out.model.components[i].amplitude *= factor[static_cast<Eigen::Index>(i)];

@@ -15,6 +15,7 @@
 
 #include "base/contracts.h"
 #include "noise/inference.h"
+#include "noise/parameter_scale.h"
 #include "noise/separable_fit.h"
 #include "noise/wv_covariance.h"
 
@@ -362,8 +363,8 @@ std::vector<const ParameterEstimate*> names_of(const FitResult& start) {
 /// Value of a place as it is printed, from the value in the start fit and the change on its scale.
 double printed(const ParameterEstimate& like, double start_scale, double now_scale) {
   const double change = now_scale - start_scale;
-  if (like.name == "theta" || like.name == "phi") return std::tanh(std::atanh(like.value) + change);
-  return like.value * std::exp(like.name == "omega" || like.name == "alpha" ? 0.5 * change : change);
+  const ParameterScale scale = parameter_scale_of(like.name);
+  return from_scale(scale, to_scale(scale, like.value) + change);
 }
 
 }  // namespace

@@ -17,8 +17,12 @@
 namespace imuscope::noise {
 namespace {
 
-constexpr std::array<std::pair<ExportFormat, std::string_view>, 5> kFormats{
+constexpr std::array<std::pair<ExportFormat, std::string_view>, 9> kFormats{
     {{ExportFormat::kKalibr, "kalibr"},
+     {ExportFormat::kOpenVins, "openvins"},
+     {ExportFormat::kVinsFusion, "vins-fusion"},
+     {ExportFormat::kLioSam, "lio-sam"},
+     {ExportFormat::kGtsam, "gtsam"},
      {ExportFormat::kRos, "ros"},
      {ExportFormat::kPx4, "px4"},
      {ExportFormat::kKfGins, "kf-gins"},
@@ -29,7 +33,16 @@ constexpr std::array<std::pair<ExportFormat, std::string_view>, 5> kFormats{
 constexpr FilterBand kWalkBand{kFastTau_s, 100.0};
 constexpr FilterBand kBiasBand{kFastTau_s, 1000.0};
 
-bool has_walk(ExportFormat format) { return format == ExportFormat::kKalibr || format == ExportFormat::kPx4; }
+bool has_walk(ExportFormat format) {
+  switch (format) {
+    case ExportFormat::kRos:
+    case ExportFormat::kKfGins:
+    case ExportFormat::kStateSpace:
+      return false;
+    default:
+      return true;
+  }
+}
 FilterBand band_of(ExportFormat format) { return has_walk(format) ? kWalkBand : kBiasBand; }
 
 /// A variance or density as it is written: SI.
@@ -226,6 +239,89 @@ std::string kalibr(Writer& writer) {
          fmt::format("rostopic: /imu0\nupdate_rate: {}\n", writer.axes().front().fit.rate_hz);
 }
 
+/// OpenVINS propagates with the densities as kalibr writes them (Qc = sigma^2 / dt), in a file of its own shape.
+std::string openvins(Writer& writer) {
+  const Triad accel = walk_triad(writer, false);
+  const Triad gyro = walk_triad(writer, true);
+  std::string text = writer.header("OpenVINS (kalibr_imu_chain.yaml)") + "imu0:\n";
+  std::string keys = kalibr_keys("accelerometer", "m/s^2", accel) + kalibr_keys("gyroscope", "rad/s", gyro);
+  for (std::size_t at = 0; at < keys.size(); at = keys.find('\n', at) + 1) {
+    keys.insert(at, "  ");
+    at += 2;
+  }
+  return text + keys + fmt::format("  update_rate: {}\n", writer.axes().front().fit.rate_hz);
+}
+
+/// A tool that has one number for each of these, under names of its own.
+struct FourNames {
+  const char* accel_white;
+  const char* accel_walk;
+  const char* gyro_white;
+  const char* gyro_walk;
+};
+
+/// @param white_factor, walk_factor  of the densities' roots
+std::string four_keys(const FourNames& names, const Triad& accel, const Triad& gyro, double white_factor, double walk_factor) {
+  std::string text;
+  const auto add = [&](const char* name, const Written& density, double factor) {
+    text += fmt::format("{}: {:.9e}{}\n", name, factor * root(density),
+                        density.knowledge == Knowledge::kFitted ? "" : "  # " + mark(density).substr(2));
+  };
+  if (accel.given) {
+    add(names.accel_white, accel.white, white_factor);
+    add(names.accel_walk, accel.slow, walk_factor);
+  }
+  if (gyro.given) {
+    add(names.gyro_white, gyro.white, white_factor);
+    add(names.gyro_walk, gyro.slow, walk_factor);
+  }
+  return text;
+}
+
+/// VINS-Mono and VINS-Fusion take the noise of a sample: a step adds (dt/2)^2 of each of its two samples to a velocity, which
+/// is half of what one sample of density / dt adds, and (dt w)^2 to a bias (integration_base.h, midPointIntegration).
+std::string vins_fusion(Writer& writer) {
+  const double rate_hz = writer.axes().front().fit.rate_hz;
+  const Triad accel = walk_triad(writer, false);
+  const Triad gyro = walk_triad(writer, true);
+  return writer.header("VINS-Fusion (config.yaml)") +
+         fmt::format("# of a sample at {:g} Hz: acc_n, gyr_n = sqrt(2 density rate), acc_w, gyr_w = sqrt(walk density rate)\n",
+                     rate_hz) +
+         four_keys({"acc_n", "acc_w", "gyr_n", "gyr_w"}, accel, gyro, std::sqrt(2.0 * rate_hz), std::sqrt(rate_hz));
+}
+
+/// LIO-SAM hands the squares to GTSAM's PreintegrationParams, densities in continuous time, and drives the biases by
+/// sqrt(dt) imu...BiasN between key frames.
+std::string lio_sam(Writer& writer) {
+  const Triad accel = walk_triad(writer, false);
+  const Triad gyro = walk_triad(writer, true);
+  return writer.header("LIO-SAM (params.yaml)") + "# roots of densities in continuous time\n" +
+         four_keys({"imuAccNoise", "imuAccBiasN", "imuGyrNoise", "imuGyrBiasN"}, accel, gyro, 1.0, 1.0);
+}
+
+std::string gtsam(Writer& writer) {
+  const Triad accel = walk_triad(writer, false);
+  const Triad gyro = walk_triad(writer, true);
+  std::string text = writer.header("GTSAM (C++)");
+  for (std::size_t at = 0; at < text.size(); at = text.find('\n', at) + 1) text.replace(at, 1, "//");
+  text +=
+      "// densities in continuous time; integrationCovariance is an error of the integration, not of the sensor\n"
+      "auto params = gtsam::PreintegrationCombinedParams::MakeSharedU();\n";
+  const auto add = [&](const char* setter, const Written& density) {
+    text += fmt::format("params->{}({:.9e} * gtsam::I_3x3);{}\n", setter, density.value,
+                        density.knowledge == Knowledge::kFitted ? "" : "  // " + mark(density).substr(2));
+  };
+  if (accel.given) {
+    add("setAccelerometerCovariance", accel.white);
+    add("setBiasAccCovariance", accel.slow);
+  }
+  if (gyro.given) {
+    add("setGyroscopeCovariance", gyro.white);
+    add("setBiasOmegaCovariance", gyro.slow);
+  }
+  return text;
+}
+
 /// PX4 EKF2 adds sq(NOISE) * dt^2 to a delta angle and sq(B_NOISE * dt) to a bias at each of its updates.
 std::string px4(Writer& writer) {
   constexpr double kFilterUpdate_s = 0.01;  // EKF2_PREDICT_US, default
@@ -332,14 +428,13 @@ nlohmann::json rows_of(const Eigen::MatrixXd& m) {
 /// that is asked for. Terms of amplitude zero stay out of the matrices; `terms` has their bounds.
 Model written_model(Writer& writer, const AxisFit& axis, nlohmann::json& terms) {
   Model model = axis.fit.model;
-  int gm = 0;
+  const std::vector<std::string> names = component_names(model);
   for (std::size_t i = 0; i < model.components.size(); ++i) {
     Component& c = model.components[i];
-    const std::string number = c.kind == ProcessKind::kGaussMarkov ? std::to_string(++gm) : "";
     const Felt felt = felt_amplitude(axis.fit, i);
     const bool is_bound = felt.knowledge == Knowledge::kBound;
     terms.push_back(
-        {{"process", std::string(short_name(c.kind)) + number},
+        {{"process", names[i]},
          {"known", knowledge_name(felt.knowledge)},
          {"variance_upper", is_bound || felt.upper > felt.value ? nlohmann::json(felt.upper) : nullptr}});
     if (c.amplitude <= 0.0) continue;
@@ -408,7 +503,7 @@ Result<ExportFormat> parse_export_format(std::string_view text) {
     if (name == text) return format;
   }
   return usage_error(fmt::format("there is no format '{}'", text),
-                     "formats are kalibr, ros, px4, kf-gins and state-space");
+                     "formats are kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins and state-space");
 }
 
 Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat format,
@@ -421,6 +516,14 @@ Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat
   switch (format) {
     case ExportFormat::kKalibr:
       return writer.finished(kalibr(writer));
+    case ExportFormat::kOpenVins:
+      return writer.finished(openvins(writer));
+    case ExportFormat::kVinsFusion:
+      return writer.finished(vins_fusion(writer));
+    case ExportFormat::kLioSam:
+      return writer.finished(lio_sam(writer));
+    case ExportFormat::kGtsam:
+      return writer.finished(gtsam(writer));
     case ExportFormat::kRos:
       return writer.finished(ros(writer));
     case ExportFormat::kPx4:

@@ -3,6 +3,8 @@
 /// Fitted models as another tool's configuration, in that tool's units and for that tool's equations.
 ///
 /// - kalibr: imu.yaml, white noise and random walk of each triad
+/// - openvins: kalibr_imu_chain.yaml; vins-fusion: acc_n, gyr_n, acc_w, gyr_w, of a sample; lio-sam: params.yaml; gtsam: a
+///   piece of C++ that fills PreintegrationCombinedParams; each white noise and random walk of each triad
 /// - ros: ROS 2 parameters, covariances as in sensor_msgs/Imu; white noise and one Gauss-Markov bias a triad,
 ///   as IMU simulation plugins take them
 /// - px4: EKF2 parameters, white noise and bias random walk of each triad
@@ -12,7 +14,7 @@
 /// Every number comes from the fitted model (felt_noise.h), none from a fit of a smaller one. A form that
 /// holds fewer terms gets its own terms in their place: white noise with the density of all that is white at
 /// a second, and a slow term that grows like the model's over the band in which that tool works, 1 s to 100 s
-/// for kalibr and px4, 1 s to 1000 s for the others. What the data only bound is written as that bound. The
+/// for those with a random walk, 1 s to 1000 s for ros, kf-gins and state-space. What the data only bound is written as that bound. The
 /// file says all of that in its comments, and from which stretch of which regime it comes.
 ///
 /// With `conservative` the upper ends of the intervals take the places of the values: of a triad's axes the
@@ -29,9 +31,19 @@
 
 namespace imuscope::noise {
 
-enum class ExportFormat : std::uint8_t { kKalibr, kRos, kPx4, kKfGins, kStateSpace };
+enum class ExportFormat : std::uint8_t {
+  kKalibr,
+  kOpenVins,
+  kVinsFusion,
+  kLioSam,
+  kGtsam,
+  kRos,
+  kPx4,
+  kKfGins,
+  kStateSpace,
+};
 
-/// "kalibr", "ros", "px4", "kf-gins", "state-space". Errors: kUsage, with the formats that exist.
+/// "kalibr", "openvins", "vins-fusion", "lio-sam", "gtsam", "ros", "px4", "kf-gins", "state-space". Errors: kUsage, with the formats that exist.
 Result<ExportFormat> parse_export_format(std::string_view text);
 
 /// The fit of one axis to be written.

@@ -13,6 +13,8 @@
 #include "noise/chi_squared.h"
 #include "noise/filter_form.h"
 #include "noise/inference.h"
+#include "noise/parameter_scale.h"
+#include "noise/power_law.h"
 #include "noise/separable_fit.h"
 #include "noise/wv_covariance.h"
 
@@ -37,6 +39,8 @@ bool is_slow(const Component& c, double rate_hz, double fast_s) {
   switch (c.kind) {
     case ProcessKind::kRandomWalk:
     case ProcessKind::kRamp:
+    case ProcessKind::kFlicker:
+    case ProcessKind::kPowerLaw:
       return true;
     case ProcessKind::kGaussMarkov:
       return c.shape[0] * rate_hz * fast_s < 1.0;
@@ -47,7 +51,7 @@ bool is_slow(const Component& c, double rate_hz, double fast_s) {
 
 double white_of(const Model& model, double rate_hz, double fast_s) {
   double sum = 0.0;
-  for (const Component& c : model.components) {
+  for (const Component& c : without_power_laws(model).components) {
     if (!is_slow(c, rate_hz, fast_s)) sum += low_frequency_variance(c) / rate_hz;
   }
   return sum;
@@ -68,7 +72,8 @@ double growth_of(const Component& c, double rate_hz, double time_s) {
   }
 }
 
-double slow_growth(const Model& model, double rate_hz, double fast_s, double time_s) {
+double slow_growth(const Model& any, double rate_hz, double fast_s, double time_s) {
+  const Model model = without_power_laws(any);
   double sum = 0.0;
   for (const Component& c : model.components) {
     if (is_slow(c, rate_hz, fast_s)) sum += growth_of(c, rate_hz, time_s);
@@ -256,7 +261,7 @@ Felt felt(const FitResult& fit, const OfModel& f, const std::function<double()>&
 /// The model without (or with only) what is slow.
 Model part_of(const Model& model, double rate_hz, double fast_s, bool slow) {
   Model part;
-  for (const Component& c : model.components) {
+  for (const Component& c : without_power_laws(model).components) {
     if (is_slow(c, rate_hz, fast_s) == slow) part.components.push_back(c);
   }
   return part;
@@ -269,7 +274,7 @@ Felt white_density(const FitResult& fit, double fast_s) {
       [&] {
         // What is white but no white noise (quantization) has its own curve, and stays beside it.
         Model rest;
-        for (const Component& c : fit.model.components) {
+        for (const Component& c : without_power_laws(fit.model).components) {
           if (is_slow(c, f, fast_s) || low_frequency_variance(c) <= 0.0) rest.components.push_back(c);
         }
         return most_of(
@@ -324,7 +329,7 @@ std::optional<FeltBias> own_process(const FitResult& fit, double fast_s, const F
     const Component& c = fit.model.components[i];
     if (!is_slow(c, f, fast_s) || c.amplitude <= 0.0) continue;
     const auto share = [&](double time_s) {
-      return growth_of(c, f, time_s) / slow_growth(fit.model, f, fast_s, time_s);
+      return slow_growth(Model{{c}}, f, fast_s, time_s) / slow_growth(fit.model, f, fast_s, time_s);
     };
     const bool is_told = has_interval(parameter_of(fit, i, -1));
     if (std::max(share(band.from_s), share(band.to_s)) < (is_told ? kNegligibleShare : kNegligibleUntold))
@@ -402,7 +407,7 @@ Felt felt_amplitude(const FitResult& fit, std::size_t component) {
   const Component& c = fit.model.components[component];
   const ParameterEstimate* p = parameter_of(fit, component, -1);
   if (has_interval(p)) {
-    const bool is_root = p->name == "omega" || p->name == "alpha";
+    const bool is_root = parameter_scale_of(p->name) == ParameterScale::kLogSquare;
     const auto squared = [&](double v) { return is_root ? v * v : v; };
     return {c.amplitude, squared(*p->ci_high), squared(*p->ci_low), Knowledge::kFitted};
   }
@@ -415,12 +420,11 @@ Felt felt_amplitude(const FitResult& fit, std::size_t component) {
 
 std::string slow_terms(const FitResult& fit, const FilterBand& band) {
   std::string names;
-  int gm = 0;
-  for (const Component& c : fit.model.components) {
-    const bool is_gm = c.kind == ProcessKind::kGaussMarkov;
-    gm += is_gm ? 1 : 0;
+  const std::vector<std::string> of_components = component_names(fit.model);
+  for (std::size_t i = 0; i < of_components.size(); ++i) {
+    const Component& c = fit.model.components[i];
     if (c.amplitude <= 0.0 || !is_slow(c, fit.rate_hz, band.from_s)) continue;
-    names += (names.empty() ? "" : "+") + std::string(short_name(c.kind)) + (is_gm ? std::to_string(gm) : "");
+    names += (names.empty() ? "" : "+") + of_components[i];
   }
   return names;
 }

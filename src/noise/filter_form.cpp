@@ -1,8 +1,11 @@
 #include "noise/filter_form.h"
 
+#include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "noise/inference.h"
+#include "noise/power_law.h"
 
 namespace imuscope::noise {
 double low_frequency_variance(const Component& component) noexcept {
@@ -16,6 +19,11 @@ double low_frequency_variance(const Component& component) noexcept {
       return component.amplitude * std::pow(1.0 + shape[0], 2);
     case ProcessKind::kArma11:
       return component.amplitude * std::pow((1.0 + shape[1]) / (1.0 - shape[0]), 2);
+    case ProcessKind::kResonance: {  // Re[(1 - i a/b) (1 + z) / (1 - z)], N-37
+      const std::complex<double> z = std::exp(std::complex<double>(-shape[0], shape[1]));
+      const std::complex<double> weight(1.0, -shape[0] / shape[1]);
+      return component.amplitude * (weight * (1.0 + z) / (1.0 - z)).real();
+    }
     default:
       return 0.0;
   }
@@ -33,6 +41,23 @@ FilterTerms::GaussMarkov FilterTerms::bias() const {
   }
   return slowest;
 }
+
+namespace {
+
+/// The terms of the sum that a power law is to a filter. What of it is white counts as short memory.
+void add_power_law(FilterTerms& terms, const Component& power_law, bool is_determined) {
+  for (const Component& c : power_law_sum(power_law)) {
+    if (c.kind == ProcessKind::kWhiteNoise) {
+      terms.short_memory_density += c.amplitude / terms.rate_hz;
+    } else if (c.kind == ProcessKind::kRandomWalk) {
+      terms.walk_density += c.amplitude * terms.rate_hz;
+    } else {
+      terms.gauss_markov.push_back({c.amplitude, c.shape[0] * terms.rate_hz, is_determined});
+    }
+  }
+}
+
+}  // namespace
 
 FilterTerms filter_terms(const FitResult& fit) {
   FilterTerms terms;
@@ -61,6 +86,11 @@ FilterTerms filter_terms(const FitResult& fit) {
       case ProcessKind::kGaussMarkov:
         terms.gauss_markov.push_back({c.amplitude, c.shape[0] * fit.rate_hz, is_determined(i)});
         break;
+      case ProcessKind::kFlicker:
+      case ProcessKind::kPowerLaw:
+        add_power_law(terms, c, is_determined(i));
+        break;
+      case ProcessKind::kResonance:
       case ProcessKind::kMa1:
       case ProcessKind::kArma11:
         terms.short_memory_density += low_frequency_variance(c) / fit.rate_hz;
@@ -71,6 +101,8 @@ FilterTerms filter_terms(const FitResult& fit) {
         break;
     }
   }
+  std::stable_sort(terms.gauss_markov.begin(), terms.gauss_markov.end(),
+                   [](const auto& a, const auto& b) { return a.rate_per_s > b.rate_per_s; });
   return terms;
 }
 

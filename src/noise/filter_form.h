@@ -17,7 +17,7 @@ inline constexpr double kFastTau_s = 1.0;
 double low_frequency_variance(const Component& component) noexcept;
 
 /// What filters are made of, in the fit's own units and continuous time. A term that the model does not have
-/// is zero; quantization, ramps and sinusoids have nothing that a filter could take.
+/// is zero; quantization, ramps and sinusoids have nothing that a filter could take. A power law is the sum of power_law.h.
 struct FilterTerms {
   struct GaussMarkov {
     double variance = 0.0;
@@ -29,7 +29,7 @@ struct FilterTerms {
   double rate_hz = 0.0;                     ///< of the samples
   double white_variance = 0.0;              ///< of a sample's white noise
   bool white_is_determined = false;         ///< it is positive, and the data tell it
-  double short_memory_density = 0.0;        ///< MA1 and ARMA11 at low frequencies, unit^2/Hz
+  double short_memory_density = 0.0;        ///< MA1, ARMA11, RES at low frequencies, unit^2/Hz
   double walk_density = 0.0;                ///< unit^2 Hz, of the random walk
   std::vector<GaussMarkov> gauss_markov{};  ///< in order of falling rate; those of no variance, too
 

@@ -12,6 +12,7 @@
 #include <numbers>
 
 #include "noise/chi_squared.h"
+#include "noise/parameter_scale.h"
 #include "noise/separable_fit.h"
 
 namespace imuscope::noise {
@@ -24,20 +25,6 @@ constexpr double kUndeterminedLogSd = 1.5;
 constexpr double kSameRate = 1.05;
 /// phi below 0.01: white to within a percent.
 constexpr double kWhiteRate = 4.6;
-
-/// "GM2": the name of a component, numbered where its kind may be repeated.
-std::vector<std::string> component_names(const Model& model) {
-  std::vector<std::string> names;
-  int gm = 0;
-  int sin = 0;
-  for (const Component& c : model.components) {
-    std::string name(short_name(c.kind));
-    if (c.kind == ProcessKind::kGaussMarkov) name += std::to_string(++gm);
-    if (c.kind == ProcessKind::kSinusoid) name += std::to_string(++sin);
-    names.push_back(name);
-  }
-  return names;
-}
 
 std::string simpler_name(const ModelSpec& spec, const std::vector<ProcessKind>& without,
                          std::optional<ProcessKind> with = std::nullopt) {
@@ -56,53 +43,55 @@ struct Presentation {
   std::string name;
   std::string unit;
   double value;
-  double slope;          ///< d(value)/d(interval scale)
-  bool logarithmic;      ///< interval on the log of the value
-  double scale_per_log;  ///< d(log value)/d(interval scale)
+  double slope;  ///< d(value)/d(interval scale)
 };
 
 std::string squared(const std::string& unit) { return unit.empty() ? "" : fmt::format("({})^2", unit); }
 
 Presentation present(const Component& c, int shape, double rate_hz, const std::string& unit) {
   if (shape < 0) {
-    if (c.kind == ProcessKind::kRamp || c.kind == ProcessKind::kSinusoid) {
-      const double root = std::sqrt(c.amplitude);
-      const bool ramp = c.kind == ProcessKind::kRamp;
-      const std::string text = ramp && !unit.empty() ? unit + "/sample" : unit;
-      return {ramp ? "omega" : "alpha", text, root, 0.5 * root, true, 0.5};
+    const double root = std::sqrt(c.amplitude);
+    switch (c.kind) {
+      case ProcessKind::kRamp:
+        return {"omega", unit.empty() ? unit : unit + "/sample", root, 0.5 * root};
+      case ProcessKind::kSinusoid:
+        return {"alpha", unit, root, 0.5 * root};
+      case ProcessKind::kFlicker:
+        return {"B", unit, root, 0.5 * root};
+      case ProcessKind::kQuantization:
+        return {"q2", squared(unit), c.amplitude, c.amplitude};
+      case ProcessKind::kRandomWalk:
+        return {"gamma2", squared(unit), c.amplitude, c.amplitude};
+      default:
+        return {"sigma2", squared(unit), c.amplitude, c.amplitude};
     }
-    const char* name = c.kind == ProcessKind::kQuantization ? "q2"
-                       : c.kind == ProcessKind::kRandomWalk ? "gamma2"
-                                                            : "sigma2";
-    return {name, squared(unit), c.amplitude, c.amplitude, true, 1.0};
   }
   const double s = c.shape[static_cast<std::size_t>(shape)];
+  const double frequency_hz = s * rate_hz / (2.0 * std::numbers::pi);
   switch (c.kind) {
     case ProcessKind::kGaussMarkov:
-      return {"beta", "1/s", s * rate_hz, s * rate_hz, true, 1.0};
-    case ProcessKind::kSinusoid: {
-      const double frequency = s * rate_hz / (2.0 * std::numbers::pi);
-      return {"frequency", "Hz", frequency, frequency, true, 1.0};
-    }
+      return {"beta", "1/s", s * rate_hz, s * rate_hz};
+    case ProcessKind::kSinusoid:
+      return {"frequency", "Hz", frequency_hz, frequency_hz};
+    case ProcessKind::kResonance:
+      if (shape == 0) return {"damping", "1/s", s * rate_hz, s * rate_hz};
+      return {"frequency", "Hz", frequency_hz, frequency_hz};
+    case ProcessKind::kPowerLaw:
+      return {"exponent", "1", s, 1.0 - (s - 1.0) * (s - 1.0)};
     case ProcessKind::kArma11:
-      return {shape == 0 ? "phi" : "theta", "1", s, 1.0 - s * s, false, 0.0};
+      return {shape == 0 ? "phi" : "theta", "1", s, 1.0 - s * s};
     default:
-      return {"theta", "1", s, 1.0 - s * s, false, 0.0};
+      return {"theta", "1", s, 1.0 - s * s};
   }
 }
 
 void set_interval(ParameterEstimate& p, const Presentation& shown, double sd, double z) {
+  const ParameterScale scale = parameter_scale_of(shown.name);
   p.sd = std::abs(shown.slope) * sd;
-  if (shown.logarithmic) {
-    p.log_sd = sd * shown.scale_per_log;
-    p.ci_low = shown.value * std::exp(-z * *p.log_sd);
-    p.ci_high = shown.value * std::exp(z * *p.log_sd);
-  } else {
-    p.log_sd = sd;
-    const double centre = std::atanh(shown.value);
-    p.ci_low = std::tanh(centre - z * sd);
-    p.ci_high = std::tanh(centre + z * sd);
-  }
+  p.log_sd = scale == ParameterScale::kLogSquare ? 0.5 * sd : sd;
+  const double centre = to_scale(scale, shown.value);
+  p.ci_low = from_scale(scale, centre - z * sd);
+  p.ci_high = from_scale(scale, centre + z * sd);
 }
 
 class Verdict {

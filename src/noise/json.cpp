@@ -8,6 +8,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "noise/parameter_scale.h"
+
 namespace imuscope::noise {
 namespace {
 
@@ -41,13 +43,17 @@ std::optional<double> optional_number(const json& object, const char* key) {
 void set_parameter(Component& c, const ParameterEstimate& p, double rate_hz) {
   if (p.name == "beta") {
     c.shape[0] = p.value / rate_hz;
+  } else if (p.name == "damping") {
+    c.shape[0] = p.value / rate_hz;
   } else if (p.name == "frequency") {
-    c.shape[0] = 2.0 * std::numbers::pi * p.value / rate_hz;
+    c.shape[c.kind == ProcessKind::kResonance ? 1 : 0] = 2.0 * std::numbers::pi * p.value / rate_hz;
+  } else if (p.name == "exponent") {
+    c.shape[0] = p.value;
   } else if (p.name == "phi") {
     c.shape[0] = p.value;
   } else if (p.name == "theta") {
     c.shape[c.kind == ProcessKind::kArma11 ? 1 : 0] = p.value;
-  } else if (p.name == "omega" || p.name == "alpha") {
+  } else if (parameter_scale_of(p.name) == ParameterScale::kLogSquare) {
     c.amplitude = p.value * p.value;
   } else {
     c.amplitude = p.value;

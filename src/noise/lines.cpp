@@ -7,15 +7,13 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
-#include <complex>
 #include <functional>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <optional>
-#include <unsupported/Eigen/FFT>
 
 #include "noise/process.h"
+#include "noise/spectrum.h"
 #include "noise/wavelet_variance.h"
 
 namespace imuscope::noise {
@@ -31,95 +29,6 @@ constexpr std::size_t kFirstBin = kLobe + kFloorBins + 1;
 constexpr std::size_t kLonger = 4;
 /// Fewer of a longer segment than these are one look at slow noise, not a spectrum.
 constexpr std::size_t kFewestSegments = 3;
-/// Of a segment's samples so many may be missing.
-constexpr double kMostMissing = 0.125;
-/// Degrees of freedom a segment, Hann windows that overlap by half (Welch 1967; 36 K^2 / (19 K - 1)).
-double degrees_of_freedom(double segments) { return 36.0 * segments * segments / (19.0 * segments - 1.0); }
-
-std::vector<double> hann(std::size_t n) {
-  std::vector<double> window(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const double phase = 2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
-    window[i] = 0.5 - 0.5 * std::cos(phase);
-  }
-  return window;
-}
-
-/// Samples that are there, and how many of them before each place.
-class Present {
- public:
-  Present(std::span<const double> x, std::span<const std::uint8_t> mask)
-      : runs_(valid_segments(x, mask)), before_(x.size() + 1, 0) {
-    for (const Segment& run : runs_) {
-      for (std::size_t i = run.begin; i < run.end; ++i) before_[i + 1] = 1;
-    }
-    for (std::size_t i = 0; i < x.size(); ++i) before_[i + 1] += before_[i];
-  }
-
-  [[nodiscard]] const std::vector<Segment>& runs() const { return runs_; }
-  [[nodiscard]] bool at(std::size_t i) const { return before_[i + 1] > before_[i]; }
-  [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
-    return before_[end] - before_[begin];
-  }
-
-  /// Where segments of `length` begin, half overlapping, in which enough samples are there.
-  [[nodiscard]] std::vector<std::size_t> segments(std::size_t length) const {
-    std::vector<std::size_t> begins;
-    const auto least = static_cast<std::size_t>((1.0 - kMostMissing) * static_cast<double>(length));
-    std::size_t begin = 0;
-    for (const Segment& run : runs_) {
-      // From the beginning of a run on, as long as there is enough; else from the next run.
-      for (begin = std::max(begin, run.begin);
-           begin < run.end && begin + length < before_.size() && count(begin, begin + length) >= least;
-           begin += length / 2)
-        begins.push_back(begin);
-    }
-    return begins;
-  }
-
- private:
-  std::vector<Segment> runs_;
-  std::vector<std::size_t> before_;
-};
-
-/// Mean periodogram of overlapping segments.
-struct Spectrum {
-  std::size_t length = 0;     ///< samples a segment
-  std::vector<double> power;  ///< mean |X_k|^2 of the windowed segments
-  std::size_t segments = 0;
-};
-
-/// A missing sample counts as the segment's mean; what the window loses by that is made up for, so that a
-/// line keeps its amplitude.
-Spectrum spectrum_of(std::span<const double> x, const Present& present, std::size_t length) {
-  const auto window = hann(length);
-  const double whole = std::accumulate(window.begin(), window.end(), 0.0);
-  Spectrum out;
-  out.length = length;
-  out.power.assign(length / 2 + 1, 0.0);
-  Eigen::FFT<double> fft;
-  std::vector<double> piece(length);
-  std::vector<std::complex<double>> transform;
-  for (const std::size_t begin : present.segments(length)) {
-    double mean = 0.0;
-    double there = 0.0;
-    const auto n = static_cast<double>(present.count(begin, begin + length));
-    for (std::size_t i = 0; i < length; ++i) {
-      if (!present.at(begin + i)) continue;
-      mean += x[begin + i] / n;
-      there += window[i];
-    }
-    const double gain = whole / there;
-    for (std::size_t i = 0; i < length; ++i)
-      piece[i] = present.at(begin + i) ? gain * window[i] * (x[begin + i] - mean) : 0.0;
-    fft.fwd(transform, piece);
-    for (std::size_t k = 0; k < out.power.size(); ++k) out.power[k] += std::norm(transform[k]);
-    ++out.segments;
-  }
-  for (double& p : out.power) p /= static_cast<double>(std::max<std::size_t>(out.segments, 1));
-  return out;
-}
-
 /// Median of bins [first, last), as a mean.
 double median_power(const Spectrum& spectrum, std::size_t first, std::size_t last, double dof) {
   std::vector<double> bins(spectrum.power.begin() + static_cast<std::ptrdiff_t>(first),

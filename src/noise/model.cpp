@@ -10,13 +10,14 @@ namespace imuscope::noise {
 namespace {
 
 constexpr std::array kKinds{ProcessKind::kQuantization, ProcessKind::kWhiteNoise, ProcessKind::kMa1,
-                            ProcessKind::kArma11,       ProcessKind::kSinusoid,   ProcessKind::kGaussMarkov,
+                            ProcessKind::kArma11,       ProcessKind::kSinusoid,   ProcessKind::kResonance,
+                            ProcessKind::kGaussMarkov,  ProcessKind::kFlicker,    ProcessKind::kPowerLaw,
                             ProcessKind::kRandomWalk,   ProcessKind::kRamp};
 constexpr const char* kTermsThatExist =
-    "terms are QN, WN, MA1, ARMA11, SIN, GM, RW, DR, joined by +, such as WN+2*GM";
+    "terms are QN, WN, MA1, ARMA11, SIN, RES, GM, FN, PL, RW, DR, joined by +, such as WN+2*GM";
 
 bool repeatable(ProcessKind kind) {
-  return kind == ProcessKind::kGaussMarkov || kind == ProcessKind::kSinusoid;
+  return kind == ProcessKind::kGaussMarkov || kind == ProcessKind::kSinusoid || kind == ProcessKind::kResonance;
 }
 
 std::string without_spaces_upper(std::string_view text) {
@@ -99,6 +100,17 @@ Result<ModelSpec> parse_model(std::string_view text) {
   }
   std::sort(spec.processes.begin(), spec.processes.end());
   return spec;
+}
+
+std::vector<std::string> component_names(const Model& model) {
+  std::array<int, kKinds.size()> seen{};
+  std::vector<std::string> names;
+  for (const Component& c : model.components) {
+    std::string name(short_name(c.kind));
+    if (repeatable(c.kind)) name += std::to_string(++seen[static_cast<std::size_t>(c.kind)]);
+    names.push_back(std::move(name));
+  }
+  return names;
 }
 
 double model_wv(const Model& model, int level) noexcept {

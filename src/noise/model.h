@@ -11,7 +11,7 @@
 
 namespace imuscope::noise {
 
-/// The processes of a model, in the order QN, WN, MA1, ARMA11, SIN..., GM..., RW, DR.
+/// The processes of a model, in the order QN, WN, MA1, ARMA11, SIN..., RES..., GM..., FN, PL, RW, DR.
 struct ModelSpec {
   std::vector<ProcessKind> processes;
 
@@ -21,8 +21,8 @@ struct ModelSpec {
   friend bool operator==(const ModelSpec&, const ModelSpec&) = default;
 };
 
-/// Reads "WN+2*GM", "WN + GM + GM", "QN+WN+RW". At most one each of WN, QN, RW, DR, MA1, ARMA11; up to
-/// kMaxRepeated GM and SIN. Errors (kUsage): an unknown or repeated term, named, with the terms that exist.
+/// Reads "WN+2*GM", "WN + GM + GM", "QN+WN+RW". At most one each of WN, QN, RW, DR, MA1, ARMA11, FN,
+/// PL; up to kMaxRepeated GM, SIN and RES. Errors (kUsage): an unknown or repeated term, named, with the terms that exist.
 Result<ModelSpec> parse_model(std::string_view text);
 
 inline constexpr int kMaxRepeated = 8;
@@ -38,6 +38,9 @@ struct Component {
 struct Model {
   std::vector<Component> components;
 };
+
+/// "GM2", "WN": name of each component, numbered where its kind may be repeated.
+std::vector<std::string> component_names(const Model& model);
 
 /// Wavelet variance of the model at `level`.
 double model_wv(const Model& model, int level) noexcept;

@@ -1,7 +1,12 @@
 #include "noise/process.h"
 
+#include <algorithm>
+#include <array>
+#include <boost/math/special_functions/digamma.hpp>
 #include <cmath>
+#include <complex>
 #include <cstdint>
+#include <numbers>
 
 #include "base/contracts.h"
 
@@ -127,6 +132,73 @@ CurvePoint sinusoid(double b, double n) noexcept {
   return {value, {derivative, 0.0}};
 }
 
+using Complex = std::complex<double>;
+
+/// N-6 for a complex rate s, z = exp(-s): the curve and its derivative by s. Of small n |s| the numerator is summed as
+/// the series of series_numerator(), which holds for complex s as well.
+struct ComplexCurve {
+  Complex value;
+  Complex slope;
+};
+
+ComplexCurve complex_exponential_wv(Complex s, double n) {
+  Complex numerator;
+  Complex d_numerator;
+  const Complex z = std::exp(-s);
+  if (n * std::abs(s) < kSeriesBelow) {
+    constexpr double kRelativeStop = 1e-18;
+    constexpr int kMaxTerms = 80;
+    Complex p_next = 1.0, p_double = 1.0, p_one = 1.0, p_two = 1.0;
+    double sign = 1.0;
+    for (int k = 1; k < kMaxTerms; ++k) {
+      const auto order = static_cast<double>(k);
+      p_next *= (1.0 + n) * s / order;
+      p_double *= (1.0 + 2.0 * n) * s / order;
+      p_one *= s / order;
+      p_two *= 2.0 * s / order;
+      sign = -sign;
+      if (k < 3) continue;
+      const Complex term = sign * (4.0 * p_next - p_double - 3.0 * p_one - n * p_two);
+      numerator += term;
+      d_numerator += term * order / s;
+      if (std::abs(term) * order < kRelativeStop * std::abs(numerator)) break;
+    }
+  } else {
+    const Complex z_n = std::exp(-n * s);
+    numerator = n * (1.0 - z * z) - z * (1.0 - z_n) * (3.0 - z_n);
+    d_numerator = 2.0 * n * z * z + z * (1.0 - z_n) * (3.0 - z_n) - z * n * z_n * (4.0 - 2.0 * z_n);
+  }
+  const Complex one_less = 1.0 - z;
+  const Complex denominator = 2.0 * n * n * one_less * one_less;
+  const Complex value = numerator / denominator;
+  return {value, d_numerator / denominator - value * 2.0 * z / one_less};
+}
+
+/// ln of Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) over m^(2x), by Stirling's series in 1/m^2; m >= kStirlingFrom.
+constexpr double kStirlingFrom = 40.0;
+
+double log_gamma_ratio_rest(double x, double m) {
+  // - sum over odd k >= 3 of 2 B_k(1/2 + x) / (k (k-1) m^(k-1)), as Bernoulli polynomials at 1/2 + x are odd in x there
+  // (DLMF 5.11.8).
+  const double x2 = x * x;
+  const double b3 = x * (x2 - 0.25);
+  const double b5 = x * (x2 * x2 - 5.0 / 6.0 * x2 + 7.0 / 48.0);
+  const double b7 = x * (x2 * x2 * x2 - 1.75 * x2 * x2 + 49.0 / 48.0 * x2 - 31.0 / 192.0);
+  const double r = 1.0 / (m * m);
+  return -r * (b3 / 3.0 + r * (b5 / 10.0 + r * b7 / 21.0));
+}
+
+/// ln[Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) / (m^2 - 1/4)], which is zero at x = 1, in terms that all vanish there; x =
+/// 1 + off, m a whole number >= 0. Small m is led up to large by Gamma(u + 1) = u Gamma(u).
+double power_law_exponent(double off, double m) {
+  double sum = 0.0;
+  for (; m < kStirlingFrom; m += 1.0) {
+    const double u = m + 0.5;
+    sum += std::log1p(-off / (u - 1.0)) - std::log1p(off / (u + 1.0));
+  }
+  return sum + 2.0 * off * std::log(m) + log_gamma_ratio_rest(1.0 + off, m) - log_gamma_ratio_rest(1.0, m);
+}
+
 }  // namespace
 
 std::string_view short_name(ProcessKind kind) noexcept {
@@ -141,8 +213,14 @@ std::string_view short_name(ProcessKind kind) noexcept {
       return "ARMA11";
     case ProcessKind::kSinusoid:
       return "SIN";
+    case ProcessKind::kResonance:
+      return "RES";
     case ProcessKind::kGaussMarkov:
       return "GM";
+    case ProcessKind::kFlicker:
+      return "FN";
+    case ProcessKind::kPowerLaw:
+      return "PL";
     case ProcessKind::kRandomWalk:
       return "RW";
     case ProcessKind::kRamp:
@@ -154,10 +232,12 @@ std::string_view short_name(ProcessKind kind) noexcept {
 int shape_count(ProcessKind kind) noexcept {
   switch (kind) {
     case ProcessKind::kArma11:
+    case ProcessKind::kResonance:
       return 2;
     case ProcessKind::kMa1:
     case ProcessKind::kSinusoid:
     case ProcessKind::kGaussMarkov:
+    case ProcessKind::kPowerLaw:
       return 1;
     default:
       return 0;
@@ -173,6 +253,10 @@ bool is_in_range(ProcessKind kind, const Shape& shape) noexcept {
       return std::abs(shape[0]) <= 1.0;
     case ProcessKind::kArma11:
       return std::abs(shape[0]) < 1.0 && std::abs(shape[1]) <= 1.0;
+    case ProcessKind::kResonance:
+      return shape[0] > 0.0 && std::isfinite(shape[0]) && shape[1] > 0.0 && shape[1] <= std::numbers::pi;
+    case ProcessKind::kPowerLaw:
+      return shape[0] > 0.0 && shape[0] < 2.0;
     default:
       return true;
   }
@@ -187,6 +271,58 @@ CurvePoint gauss_markov_wv(double a, int level) noexcept {
   const double denominator = 2.0 * n * n * v * v;
   const double value = numerator.value / denominator;
   return {value, {numerator.derivative[0] / denominator - value * 2.0 * phi / v, 0.0}};
+}
+
+CurvePoint resonance_wv(double a, double b, int level) noexcept {
+  IMUSCOPE_EXPECTS(a > 0.0 && b > 0.0 && level >= 1 && level <= kMaxLevel);
+  const Complex weight(1.0, -a / b);
+  const auto [value, slope] = complex_exponential_wv(Complex(a, -b), half_support(level));
+  CurvePoint out;
+  out.value = (weight * value).real();
+  out.derivative[0] = (weight * slope - Complex(0.0, 1.0 / b) * value).real();
+  out.derivative[1] = (weight * slope * Complex(0.0, -1.0) + Complex(0.0, a / (b * b)) * value).real();
+  return out;
+}
+
+double power_law_sum_covariance(double alpha, double m) noexcept {
+  // Gamma(m + D) / Gamma(m + 1 - D) / (2 cos(pi D) Gamma(2D)), D = 1 + alpha / 2 = 3/2 + off. At alpha = 1 the cosine is
+  // zero and the ratio a square of m, which is taken out beforehand.
+  const double off = 0.5 * (alpha - 1.0);  // D - 3/2
+  const double gamma = std::tgamma(2.0 + alpha);
+  const double square = m * m - 0.25;
+  if (off == 0.0) {
+    const double sum = boost::math::digamma(m + 1.5) + boost::math::digamma(m - 0.5);
+    return square * sum / (2.0 * std::numbers::pi * gamma);
+  }
+  const double cosine = 2.0 * std::sin(std::numbers::pi * off);  // 2 cos(pi D)
+  return square * std::expm1(power_law_exponent(off, m)) / (cosine * gamma);
+}
+
+namespace {
+
+double power_law_value(double alpha, double n) {
+  const double sum = 6.0 * power_law_sum_covariance(alpha, 0.0) - 8.0 * power_law_sum_covariance(alpha, n) +
+                     2.0 * power_law_sum_covariance(alpha, 2.0 * n);
+  return sum / (4.0 * n * n);
+}
+
+double flicker_wv(int level) {
+  static const std::array<double, kMaxLevel> kCurve = [] {
+    std::array<double, kMaxLevel> curve{};
+    for (int j = 1; j <= kMaxLevel; ++j) curve[static_cast<std::size_t>(j - 1)] = power_law_value(1.0, half_support(j));
+    return curve;
+  }();
+  return kCurve[static_cast<std::size_t>(level - 1)];
+}
+
+}  // namespace
+
+CurvePoint power_law_wv(double alpha, int level) noexcept {
+  IMUSCOPE_EXPECTS(alpha > 0.0 && alpha < 2.0 && level >= 1 && level <= kMaxLevel);
+  const double n = half_support(level);
+  constexpr double kStep = 1e-4;  // a central difference: exact to 1e-8 of the curve
+  const double step = std::min({kStep, 0.5 * alpha, 0.5 * (2.0 - alpha)});
+  return {power_law_value(alpha, n), {(power_law_value(alpha + step, n) - power_law_value(alpha - step, n)) / (2.0 * step), 0.0}};
 }
 
 CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
@@ -204,6 +340,12 @@ CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
       return {tau * tau / 16.0, {}};
     case ProcessKind::kGaussMarkov:
       return gauss_markov_wv(shape[0], level);
+    case ProcessKind::kResonance:
+      return resonance_wv(shape[0], shape[1], level);
+    case ProcessKind::kFlicker:
+      return {flicker_wv(level), {}};
+    case ProcessKind::kPowerLaw:
+      return power_law_wv(shape[0], level);
     case ProcessKind::kMa1:
       return moving_average(shape[0], tau);
     case ProcessKind::kSinusoid:

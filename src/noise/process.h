@@ -16,6 +16,11 @@
 /// - ARMA11: amplitude innovation variance, shape phi, theta in (-1, 1); curve see process.cpp
 /// - SIN: amplitude alpha^2 (random phase), shape b in radians per sample;
 ///   curve sin^4(n b/2) / (2 n^2 sin^2(b/2))
+/// - RES: resonance, x'' + 2 a x' + (a^2 + b^2) x = white noise, sampled; amplitude variance of x, shape a
+///   (damping) and b (ringing) in radians per sample; curve see resonance_wv()
+/// - FN: flicker noise, two-sided spectrum B^2 / |2 sin(pi f)| over the frequency f in cycles per sample:
+///   amplitude B^2, B the bias instability of IEEE 952; curve see power_law_wv()
+/// - PL: power law, spectrum s2 |2 sin(pi f)|^-alpha; amplitude s2, shape alpha in (0, 2); FN has alpha 1
 ///
 /// QN with q2 is sqrt(12 q2) times the difference of uniform(0, 1) numbers: variance 2 q2.
 
@@ -31,7 +36,10 @@ enum class ProcessKind : std::uint8_t {
   kMa1,
   kArma11,
   kSinusoid,
+  kResonance,
   kGaussMarkov,
+  kFlicker,
+  kPowerLaw,
   kRandomWalk,
   kRamp,
 };
@@ -47,7 +55,7 @@ struct CurvePoint {
   Shape derivative{};
 };
 
-/// "WN", "QN", "RW", "DR", "GM", "MA1", "ARMA11", "SIN".
+/// "WN", "QN", "RW", "DR", "GM", "MA1", "ARMA11", "SIN", "RES", "FN", "PL".
 std::string_view short_name(ProcessKind kind) noexcept;
 
 /// Number of shape values of a kind: 0, 1 or 2.
@@ -64,5 +72,16 @@ CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept;
 /// evaluated without cancellation for every a (relative error a few 1e-16; the naive form is negative at
 /// 1e-6).
 CurvePoint gauss_markov_wv(double a, int level) noexcept;
+
+/// Wavelet variance of a resonance of variance 1, autocovariance Re[(1 - i a/b) z^k] with z = exp(-a + i b): the
+/// formula of the Gauss-Markov process for the complex z (N-37), and its derivatives by a and b.
+CurvePoint resonance_wv(double a, double b, int level) noexcept;
+
+/// Generalized covariance of the summed power-law noise at lag m >= 0, up to constants and squares of m, which
+/// fall out of every wavelet covariance (N-38).
+double power_law_sum_covariance(double alpha, double m) noexcept;
+
+/// Wavelet variance of power-law noise of amplitude 1, and d/dalpha.
+CurvePoint power_law_wv(double alpha, int level) noexcept;
 
 }  // namespace imuscope::noise

@@ -9,6 +9,7 @@
 
 #include "base/units.h"
 #include "noise/inference.h"
+#include "noise/parameter_scale.h"
 
 namespace imuscope::noise {
 namespace {
@@ -47,8 +48,7 @@ class Builder {
       q.ci_low = std::min(map(*p.ci_low), map(*p.ci_high));
       q.ci_high = std::max(map(*p.ci_low), map(*p.ci_high));
     } else if (const Felt most = amplitude_of(p); most.knowledge == Knowledge::kBound) {
-      const bool is_root = p.name == "omega" || p.name == "alpha";
-      q.value = map(is_root ? std::sqrt(most.value) : most.value);
+      q.value = map(parameter_scale_of(p.name) == ParameterScale::kLogSquare ? std::sqrt(most.value) : most.value);
       q.ci_high = q.value;
       q.knowledge = Knowledge::kBound;
     } else {

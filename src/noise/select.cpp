@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <set>
 
 #include "noise/nested_fit.h"
 #include "noise/replicates.h"
@@ -73,6 +75,93 @@ void apply_parsimony(std::vector<RankedModel>& ranked) {
                 ranked.begin() + static_cast<std::ptrdiff_t>(best) + 1);
   }
 }
+
+/// Grows and prunes one model.
+class Grower {
+ public:
+  Grower(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz, const FitOptions& options)
+      : terms_(terms), rate_hz_(rate_hz), options_(options), wv_(wv), models_(wv, fitted_levels(wv, options)) {
+    options_.intervals = Intervals::kQuick;
+  }
+
+  Result<FitResult> run() {
+    for (const ProcessKind kind : terms_) consider(ModelSpec{{kind}}, 0.0);
+    if (!best_) return tl::unexpected(why_none_);
+    while (add_one()) {
+    }
+    while (drop_one()) {
+    }
+    return *best_;
+  }
+
+ private:
+  static constexpr int kMostAlike = 3;
+
+  /// Takes the model where it is better than the best by `margin`.
+  /// @param added  the kind that it has more than the best; fast or steep ones that get no amplitude are not tried again
+  bool consider(ModelSpec spec, double margin, std::optional<ProcessKind> added = std::nullopt) {
+    std::sort(spec.processes.begin(), spec.processes.end());
+    auto fitted = fit(wv_, spec, rate_hz_, options_, models_);
+    if (!fitted) {
+      why_none_ = fitted.error();
+      return false;
+    }
+    if (added && is_fast_or_steep(*added) && std::any_of(fitted->model.components.begin(), fitted->model.components.end(),
+                             [&](const Component& c) { return c.kind == *added && c.amplitude <= 0.0; }))
+      unsupported_.insert(*added);
+    const bool is_better = !best_ || (is_rejected(*fitted) != is_rejected(*best_)
+                                          ? is_rejected(*best_)
+                                          : fitted->criterion < best_->criterion - margin);
+    if (is_better) best_ = std::move(*fitted);
+    return is_better;
+  }
+
+  /// White noise, quantization and a ramp stand at the ends of the scales: what is added later leaves even less to them.
+  static bool is_fast_or_steep(ProcessKind kind) {
+    return kind == ProcessKind::kWhiteNoise || kind == ProcessKind::kQuantization || kind == ProcessKind::kRamp;
+  }
+
+  bool add_one() {
+    const ModelSpec base = best_->spec;
+    // A model that cannot be right may grow by small steps.
+    const double margin = is_rejected(*best_) ? 0.0 : kEquivalent;
+    bool grown = false;
+    for (const ProcessKind kind : terms_) {
+      const int most = kind == ProcessKind::kGaussMarkov ? kMostAlike : 1;
+      if (base.count(kind) >= most || unsupported_.contains(kind)) continue;
+      ModelSpec more = base;
+      more.processes.push_back(kind);
+      grown = consider(std::move(more), grown ? 0.0 : margin, kind) || grown;
+    }
+    return grown;
+  }
+
+  bool drop_one() {
+    const ModelSpec base = best_->spec;
+    if (base.processes.size() < 2) return false;
+    for (std::size_t i = 0; i < base.processes.size(); ++i) {
+      ModelSpec less = base;
+      less.processes.erase(less.processes.begin() + static_cast<std::ptrdiff_t>(i));
+      const bool already_rejected = is_rejected(*best_);
+      const double before = best_->criterion;
+      const FitResult kept = *best_;
+      if (consider(std::move(less), -kEquivalent) && is_rejected(*best_) == already_rejected &&
+          best_->criterion < before + kEquivalent)
+        return true;
+      best_ = kept;
+    }
+    return false;
+  }
+
+  std::span<const ProcessKind> terms_;
+  double rate_hz_;
+  FitOptions options_;
+  const WaveletVariance& wv_;
+  NestedFit models_;
+  std::set<ProcessKind> unsupported_;
+  std::optional<FitResult> best_;
+  Error why_none_;
+};
 
 /// One replicate and the pool of the others.
 class LeftOut {
@@ -173,6 +262,15 @@ Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const Mo
   std::stable_sort(ranked.begin(), ranked.end(), before);
   apply_parsimony(ranked);
   return ranked;
+}
+
+Result<FitResult> grow_model(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
+                             const FitOptions& options) {
+  auto grown = Grower(wv, terms, rate_hz, options).run();
+  if (!grown || options.intervals == Intervals::kQuick) return grown;
+  FitOptions again = options;
+  again.warm_start = &*grown;
+  return fit(wv, grown->spec, rate_hz, again);
 }
 
 Result<std::vector<CrossValidated>> cross_validate(std::span<const WaveletVariance> replicates,

@@ -25,6 +25,14 @@ struct RankedModel {
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options = {});
 
+/// Term by term: from the best single process on, each round adds the one of `terms` that gains most, while the criterion
+/// falls by more than two models' as good as each other may differ (or the data reject what there is); in the end, terms
+/// without which it is as good go again. A few dozen fits where rank_models() makes all sub-models.
+/// @param terms  what may be added, a GM up to three times, the others once; not empty
+/// @return the winner, with `options.intervals`. Errors: those of fit() where not even one process fits.
+Result<FitResult> grow_model(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
+                             const FitOptions& options = {});
+
 /// A sub-model, and how well it predicts replicates that it has not seen.
 struct CrossValidated {
   FitResult pooled;  ///< of all replicates together

@@ -357,38 +357,70 @@ SeparableSolution best_of_grid(const SeparableProblem& problem, const std::vecto
   return solution_of(problem, coordinates, best_u, best);
 }
 
+/// Shapes that lie between one below and one above this, whose coordinate is the inverse hyperbolic tangent.
+std::optional<double> middle_of_bounded(ProcessKind kind) {
+  if (kind == ProcessKind::kMa1 || kind == ProcessKind::kArma11) return 0.0;
+  if (kind == ProcessKind::kPowerLaw) return 1.0;
+  return std::nullopt;
+}
+
 /// The kind of which a smaller model has one less: the last repeated one, or, where the grid cannot hold the
 /// model, the last that can be repeated.
 std::optional<ProcessKind> removable_kind(const ModelSpec& spec, bool on_grid) {
   const int kept = on_grid ? 1 : 0;
-  for (const ProcessKind kind : {ProcessKind::kGaussMarkov, ProcessKind::kSinusoid}) {
+  for (const ProcessKind kind : {ProcessKind::kResonance, ProcessKind::kGaussMarkov, ProcessKind::kSinusoid}) {
     if (spec.count(kind) > kept) return kind;
   }
   return std::nullopt;
 }
 
+/// Shapes of a further term from which the search for its own begins, the slowest first. ARMA11 begins as white noise.
+std::vector<Shape> tried_shapes(ProcessKind kind, int highest_level) {
+  constexpr int kRates = 40;
+  constexpr int kDampings = 5;
+  if (shape_count(kind) == 0 || kind == ProcessKind::kArma11) return {Shape{}};
+  const auto place = [&](int i, int k, int n) {
+    const CoordinateRange range = coordinate_range(kind, i, highest_level);
+    return shape_of_coordinate(kind, i, range.low + (range.high - range.low) * k / n);
+  };
+  std::vector<Shape> shapes;
+  for (int k = 0; k <= kRates; ++k) {
+    if (kind != ProcessKind::kResonance) {
+      shapes.push_back({place(0, k, kRates), 0.0});
+      continue;
+    }
+    for (int d = 0; d <= kDampings; ++d) shapes.push_back({place(0, d, kDampings), place(1, k, kRates)});
+  }
+  return shapes;
+}
+
 }  // namespace
 
 double coordinate_of_shape(ProcessKind kind, int /*i*/, double shape) noexcept {
-  const bool bounded = kind == ProcessKind::kMa1 || kind == ProcessKind::kArma11;
-  return bounded ? std::atanh(shape) : std::log(shape);
+  const auto middle = middle_of_bounded(kind);
+  return middle ? std::atanh(shape - *middle) : std::log(shape);
 }
 
 double shape_of_coordinate(ProcessKind kind, int /*i*/, double coordinate) noexcept {
-  const bool bounded = kind == ProcessKind::kMa1 || kind == ProcessKind::kArma11;
-  return bounded ? std::tanh(coordinate) : std::exp(coordinate);
+  const auto middle = middle_of_bounded(kind);
+  return middle ? *middle + std::tanh(coordinate) : std::exp(coordinate);
 }
 
 double shape_slope(ProcessKind kind, int i, double coordinate) noexcept {
   const double shape = shape_of_coordinate(kind, i, coordinate);
-  const bool bounded = kind == ProcessKind::kMa1 || kind == ProcessKind::kArma11;
-  return bounded ? 1.0 - shape * shape : shape;
+  const auto middle = middle_of_bounded(kind);
+  return middle ? 1.0 - (shape - *middle) * (shape - *middle) : shape;
 }
 
 CoordinateRange coordinate_range(ProcessKind kind, int i, int highest_level) noexcept {
   constexpr double kMaBound = 3.8;        // theta = 0.999
   constexpr double kArmaPhiBound = 5.3;   // phi = 0.99995
   constexpr double kFastestRate = 20.0;   // phi = 2e-9: white
+  constexpr double kPowerLawBound = 1.5;  // exponents of 0.095 to 1.905
+  // Of a resonance, radians a sample: below, it is a line; above, it has no peak; slower ones are drift.
+  constexpr double kNarrowest = 0.02;
+  constexpr double kWidest = 1.5;
+  constexpr double kSlowestRinging = 0.05;
   constexpr double kSlowestShare = 0.01;  // of a over the longest tau: a random walk to within half a percent
   const double longest = std::ldexp(1.0, highest_level);
   switch (kind) {
@@ -398,32 +430,34 @@ CoordinateRange coordinate_range(ProcessKind kind, int i, int highest_level) noe
       return i == 0 ? CoordinateRange{-1.5, kArmaPhiBound} : CoordinateRange{-kMaBound, kMaBound};
     case ProcessKind::kSinusoid:
       return {std::log(std::numbers::pi / longest), std::log(0.999 * std::numbers::pi)};
+    case ProcessKind::kResonance:
+      return i == 0 ? CoordinateRange{std::log(kNarrowest), std::log(kWidest)}
+                    : CoordinateRange{std::log(kSlowestRinging), std::log(0.999 * std::numbers::pi)};
+    case ProcessKind::kPowerLaw:
+      return {-kPowerLawBound, kPowerLawBound};
     default:
       return {std::log(kSlowestShare / longest), std::log(kFastestRate)};
   }
 }
 
 std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& smaller, ProcessKind kind) {
-  constexpr int kRates = 40;
   constexpr std::size_t kKept = 3;
-  if (shape_count(kind) != 1) {
+  const auto with = [&](const Shape& shape) {
     Model model = smaller;
-    model.components.push_back({kind, 0.0, {}});
+    model.components.push_back({kind, 0.0, shape});
     order_components(model);
-    return {model};
-  }
-  const CoordinateRange range = coordinate_range(kind, 0, problem.levels.back());
+    return model;
+  };
+  const std::vector<Shape> tried = tried_shapes(kind, problem.levels.back());
+  if (tried.size() == 1) return {with(tried.front())};
   const RowVector target = problem.whitener * problem.y;
   struct Candidate {
     double objective;
     Model model;
   };
   std::vector<Candidate> candidates;
-  for (int i = 0; i <= kRates; ++i) {
-    Model model = smaller;
-    model.components.push_back(
-        {kind, 0.0, {shape_of_coordinate(kind, 0, range.low + (range.high - range.low) * i / kRates), 0.0}});
-    order_components(model);
+  for (const Shape& shape : tried) {
+    Model model = with(shape);
     std::vector<Shape> shapes;
     for (const Component& c : model.components) shapes.push_back(c.shape);
     candidates.push_back({evaluate(problem, target, shapes).objective, std::move(model)});
@@ -437,7 +471,9 @@ std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& s
 
 SeparableSolution find_global_minimum(const SeparableProblem& problem) {
   const auto coordinates = coordinates_of(problem);
-  const bool on_grid = coordinates.size() < kGridPoints.size();
+  // A resonance of two shapes makes the grid long and is sharply placed: it grows from the model without it.
+  const bool on_grid =
+      coordinates.size() < kGridPoints.size() && problem.spec.count(ProcessKind::kResonance) == 0;
   SeparableSolution found;
   found.objective = kInfinity;
   if (on_grid) found = best_of_grid(problem, coordinates);

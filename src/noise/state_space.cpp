@@ -2,6 +2,9 @@
 
 #include <cmath>
 
+#include "base/contracts.h"
+#include "noise/power_law.h"
+
 namespace imuscope::noise {
 namespace {
 
@@ -52,6 +55,21 @@ Block sinusoid_block(double alpha2, double b) {
   return block;
 }
 
+/// x and x', N-37.
+Block resonance_block(double variance, double a, double b) {
+  Block block;
+  const double decay = std::exp(-a);
+  const double c = std::cos(b);
+  const double s = std::sin(b) / b;
+  const double stiffness = a * a + b * b;
+  block.F = decay * (Matrix2d() << c + a * s, s, -stiffness * s, c - a * s).finished();
+  block.P0 = variance * Vector2d(1.0, stiffness).asDiagonal().toDenseMatrix();
+  block.Q = block.P0 - block.F * block.P0 * block.F.transpose();
+  block.H = Eigen::RowVector2d(1.0, 0.0);
+  block.diffuse = {false, false};
+  return block;
+}
+
 Block first_order(double transition, double driving, double start, bool diffuse) {
   Block block;
   block.F = MatrixXd::Constant(1, 1, transition);
@@ -87,6 +105,12 @@ Block block_of(const Component& c) {
       return arma(c.amplitude, c.shape[0], c.shape[1]);
     case ProcessKind::kSinusoid:
       return sinusoid_block(c.amplitude, c.shape[0]);
+    case ProcessKind::kResonance:
+      return resonance_block(c.amplitude, c.shape[0], c.shape[1]);
+    case ProcessKind::kFlicker:
+    case ProcessKind::kPowerLaw:
+      IMUSCOPE_EXPECTS(false);  // written as its sum before
+      return {};
     case ProcessKind::kGaussMarkov:
       return first_order(std::exp(-c.shape[0]), -c.amplitude * std::expm1(-2.0 * c.shape[0]), c.amplitude,
                          false);
@@ -100,7 +124,8 @@ Block block_of(const Component& c) {
 
 }  // namespace
 
-StateSpace state_space(const Model& model) {
+StateSpace state_space(const Model& any) {
+  const Model model = without_power_laws(any);
   std::vector<Block> blocks;
   Eigen::Index size = 0;
   for (const Component& component : model.components) {

@@ -10,6 +10,8 @@
 ///   MA1     x = (e_k, e_{k-1}), y = e_k + theta e_{k-1}
 ///   ARMA11  x = (y_k, theta e_k)
 ///   SIN     x = (alpha sin, alpha cos) of a uniform phase: turns by b radians a sample, no noise
+///   RES     x = (x, x' a sample), F = exp of ((0, 1), (-(a^2 + b^2), -2 a)), P0 = sigma2 diag(1, a^2 + b^2)
+///   FN, PL  the sum of power_law.h, one state a Gauss-Markov process
 ///   GM      F = e^-a, Q = sigma2 (1 - e^-2a), P0 = sigma2
 ///   RW      F = 1, Q = gamma2; its start is unknown (diffuse)
 ///   DR      x = (ramp, slope), variance of the slope omega^2; its start is unknown (diffuse)

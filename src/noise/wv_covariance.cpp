@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <utility>
 
+#include "noise/power_law.h"
 #include "noise/robust_scale.h"
 
 namespace imuscope::noise {
@@ -24,7 +26,25 @@ struct Exponential {
   double gain = 0.0;    ///< phi / (1 - phi)^2
   double linear = 0.0;  ///< (1 + phi) / (2 (1 - phi))
   double rest = 0.0;    ///< a gain - linear, without cancellation
+  bool is_approximate = false;  ///< one of those that stand for a power law
 };
+
+using Complex = std::complex<double>;
+
+/// A resonance: the real part of an exponential whose rate and variance are complex (N-37).
+struct Oscillation {
+  Complex rate;      ///< a - i b
+  Complex variance;  ///< sigma2 (1 - i a/b)
+  Complex gain;      ///< of Exponential
+  double linear = 0.0;  ///< Re(variance linear)
+};
+
+Oscillation oscillation_of(const Component& c) {
+  const Complex rate(c.shape[0], -c.shape[1]);
+  const Complex variance = c.amplitude * Complex(1.0, -c.shape[0] / c.shape[1]);
+  const Complex sh = std::sinh(0.5 * rate);
+  return {rate, variance, 0.25 / (sh * sh), (variance * 0.5 / std::tanh(0.5 * rate)).real()};
+}
 
 /// The model sorted by what its summed signal's generalized covariance G(m) looks like.
 struct Parts {
@@ -34,6 +54,7 @@ struct Parts {
   double uniform = 0.0;       ///< of that, what is made of uniform numbers
   double ramp = 0.0;          ///< omega per sample
   std::vector<Exponential> exponentials;
+  std::vector<Oscillation> oscillations;
   std::vector<Component> sinusoids;
 };
 
@@ -104,6 +125,19 @@ Parts parts_of(const Model& model) {
       case ProcessKind::kSinusoid:
         parts.sinusoids.push_back(c);
         break;
+      case ProcessKind::kResonance:
+        parts.oscillations.push_back(oscillation_of(c));
+        break;
+      case ProcessKind::kFlicker:
+      case ProcessKind::kPowerLaw:
+        for (const Component& term : power_law_sum(c)) {
+          if (term.kind == ProcessKind::kWhiteNoise) parts.white += term.amplitude;
+          if (term.kind == ProcessKind::kRandomWalk) parts.walk += term.amplitude;
+          if (term.kind != ProcessKind::kGaussMarkov) continue;
+          parts.exponentials.push_back(exponential_of_rate(term.shape[0], term.amplitude));
+          parts.exponentials.back().is_approximate = true;
+        }
+        break;
     }
   }
   return parts;
@@ -154,7 +188,14 @@ class CrossCovariance {
         n_j_(n_j),
         n_k_(n_k),
         scale_(1.0 / (4.0 * n_j * n_k)),
-        terms_(parts.exponentials.size()) {
+        terms_(parts.exponentials.size()),
+        waves_(parts.oscillations.size()) {
+    for (std::size_t i = 0; i < waves_.size(); ++i) {
+      const Oscillation& o = parts.oscillations[i];
+      const Complex pj = 1.0 - std::exp(-o.rate * n_j_);
+      const Complex pk = 1.0 - std::exp(-o.rate * n_k_);
+      waves_[i].tail = -o.variance * o.gain * pj * pj * pk * pk;
+    }
     for (std::size_t i = 0; i < terms_.size(); ++i) {
       const Exponential& e = parts.exponentials[i];
       const double pj = e.a > 0.0 ? -std::expm1(-e.a * n_j_) : 1.0 - std::pow(e.phi, n_j_);
@@ -181,6 +222,7 @@ class CrossCovariance {
     end_ = q;
     cubic_ = {};
     for (Term& t : terms_) t.left = t.right = t.ahead = t.behind = 0.0;
+    for (Wave& w : waves_) w.left = w.right = 0.0;
     for (std::size_t i = 0; i < shift_.size(); ++i) {
       const double at = p + shift_[i];  // argument of G at p
       const double sign = at >= 0.0 ? 1.0 : -1.0;
@@ -209,6 +251,10 @@ class CrossCovariance {
         sum += e.variance * nonlinear_part(e, t.form, h);
       }
     }
+    for (std::size_t i = 0; i < waves_.size(); ++i) {
+      const Complex rate = parts_.oscillations[i].rate;
+      sum -= (waves_[i].left * decayed(rate * d) + waves_[i].right * decayed(rate * (end_ - h))).real();
+    }
     return sum * scale_;
   }
 
@@ -221,6 +267,7 @@ class CrossCovariance {
       const double m = std::abs(h + shift_[i]);
       double g = m * (parts_.walk * (m * m - 1.0) / 12.0 - 0.5 * parts_.white);
       for (std::size_t k = 0; k < terms_.size(); ++k) g += m * linear_coefficient(k);
+      for (const Oscillation& o : parts_.oscillations) g -= m * o.linear + (o.variance * o.gain * decayed(o.rate * m)).real();
       if (m == 0.0) g += parts_.quantization;
       sum += weight_[i] * g;
     }
@@ -241,11 +288,16 @@ class CrossCovariance {
     double behind = 0.0;  ///< of the tail of exp(a (h - p)), remainder
   };
 
+  struct Wave {
+    Complex tail;
+    Complex left;
+    Complex right;
+  };
+
+  static constexpr double kNothing = 60.0;
   /// exp(-z); nothing where it is lost beside the cubic.
-  static double decayed(double z) {
-    constexpr double kNothing = 60.0;
-    return z < kNothing ? std::exp(-z) : 0.0;
-  }
+  static double decayed(double z) { return z < kNothing ? std::exp(-z) : 0.0; }
+  static Complex decayed(Complex z) { return z.real() < kNothing ? std::exp(-z) : 0.0; }
 
   /// Adds the remainder of process k about p: with R(z) = exp(-z) - 1 + z - z^2/2,
   ///   R(z + x) = R(z) + R'(z) x + R''(z) x^2/2 + exp(-z) T(-x),  T(x) = exp(x) - 1 - x - x^2/2.
@@ -275,6 +327,7 @@ class CrossCovariance {
   void add_polynomial(double at, double weight) {
     double linear = -0.5 * parts_.white - parts_.walk / 12.0;
     for (std::size_t k = 0; k < terms_.size(); ++k) linear += linear_coefficient(k);
+    for (const Oscillation& o : parts_.oscillations) linear -= o.linear;
     const double third = parts_.walk / 12.0;
     cubic_[0] += weight * at * (linear + third * at * at);
     cubic_[1] += weight * (linear + 3.0 * third * at * at);
@@ -292,6 +345,14 @@ class CrossCovariance {
         terms_[k].right += weight * e.variance * e.gain * decayed(-e.a * at_q);
       }
     }
+    for (std::size_t k = 0; k < waves_.size(); ++k) {
+      const Oscillation& o = parts_.oscillations[k];
+      if (at_p >= 0.0) {
+        waves_[k].left += weight * o.variance * o.gain * decayed(o.rate * at_p);
+      } else {
+        waves_[k].right += weight * o.variance * o.gain * decayed(-o.rate * at_q);
+      }
+    }
   }
 
   /// Where the two supports do not overlap only the exponentials remain, and only as a product.
@@ -301,6 +362,8 @@ class CrossCovariance {
       const Exponential& e = parts_.exponentials[k];
       sum += terms_[k].tail * (e.a > 0.0 ? std::exp(-e.a * distance) : std::pow(e.phi, std::round(distance)));
     }
+    for (std::size_t k = 0; k < waves_.size(); ++k)
+      sum += (waves_[k].tail * std::exp(-parts_.oscillations[k].rate * distance)).real();
     return sum;
   }
 
@@ -329,6 +392,7 @@ class CrossCovariance {
   double n_k_;
   double scale_;
   std::vector<Term> terms_;
+  std::vector<Wave> waves_;
   std::array<double, 9> shift_{};
   std::array<double, 9> weight_{};
   std::array<double, 4> cubic_{};
@@ -456,7 +520,7 @@ class PairCounts {
 template <typename F>
 class LagSum {
  public:
-  LagSum(F& f, int exact_near) : f_(f), exact_(exact_near) {}
+  LagSum(F& f, double exact_near) : f_(f), exact_(exact_near) {}
 
   double between(const std::vector<double>& breaks, double low, double high) {
     constexpr double kFar = std::numeric_limits<double>::infinity();
@@ -569,6 +633,10 @@ double spectrum_at(const Parts& parts, double b) {
   for (const Exponential& e : parts.exponentials) {
     sum += e.variance * (1.0 - e.phi * e.phi) / ((1.0 - e.phi) * (1.0 - e.phi) + e.phi * s2);
   }
+  for (const Oscillation& o : parts.oscillations) {
+    const Complex z = std::exp(-o.rate);
+    sum += (o.variance * (1.0 - z * z) / ((1.0 - z) * (1.0 - z) + z * s2)).real();
+  }
   return sum;
 }
 
@@ -614,12 +682,37 @@ Parts with_missing(const Parts& parts, const WvLevel& j, const WvLevel& k) {
   return out;
 }
 
+/// What acts like a simpler process on both levels becomes that, where the model is approximate or the difference small: of
+/// the processes that stand for a power law, those that are a random walk to both levels, or white noise to both,
+/// become just that: to within what the sum itself deviates by.
+Parts folded(Parts parts, double n_j, double n_k) {
+  constexpr double kWalk = 0.02;  // of a n: 2 sigma2 (1 - e^{-a n}) is a walk's growth to a hundredth
+  constexpr double kWhite = 50.0;
+  std::erase_if(parts.exponentials, [&](const Exponential& e) {
+    if (!e.is_approximate) return false;
+    const bool is_walk = e.a * std::max(n_j, n_k) < kWalk;
+    const bool is_white = e.a * std::min(n_j, n_k) > kWhite;
+    if (is_walk) parts.walk += 2.0 * e.a * e.variance;
+    if (is_white) parts.white += 2.0 * e.linear * e.variance;
+    return is_walk || is_white;
+  });
+  // A resonance that rings many times within both supports is white noise to them but for a few lags.
+  constexpr double kRung = 60.0;   // radians
+  constexpr double kFaded = 8.0;  // time constants
+  std::erase_if(parts.oscillations, [&](const Oscillation& o) {
+    if (std::abs(o.rate) * std::min(n_j, n_k) < kRung || o.rate.real() * std::min(n_j, n_k) < kFaded) return false;
+    parts.white += 2.0 * o.linear;
+    return true;
+  });
+  return parts;
+}
+
 double covariance_of_pair(const Parts& whole, const WvLevel& j, const WvLevel& k, const LevelPlaces& at_j,
                           const LevelPlaces& at_k, const std::vector<Segment>& runs,
                           const std::vector<double>& robust_terms) {
   const double n_j = 0.5 * j.tau_samples;
   const double n_k = 0.5 * k.tau_samples;
-  const Parts parts = with_missing(whole, j, k);
+  const Parts parts = folded(with_missing(whole, j, k), n_j, n_k);
   const PairCounts pairs(j, k, at_j, at_k);
   const double means = 4.0 * (0.5 * parts.ramp * n_j) * (0.5 * parts.ramp * n_k);
   const double centre = n_k - n_j;
@@ -638,21 +731,26 @@ double covariance_of_pair(const Parts& whole, const WvLevel& j, const WvLevel& k
   // Beyond the overlap of the supports only exponentials reach, and none further than this many time
   // constants.
   constexpr double kTimeConstants = 18.0;
+  constexpr double kRinging = 4.0;  // time constants after which a product of two is below 1e-3
+  constexpr double kExactNearAlternating = 64.0;
   double reach = 0.0;
-  bool alternating = false;
+  double exact_near = 5.0;
+  for (const Oscillation& o : parts.oscillations) {
+    // While it rings no block of lags is smooth.
+    reach = std::max(reach, kTimeConstants / o.rate.real());
+    exact_near = std::max(exact_near, kRinging / o.rate.real());
+  }
   for (const Exponential& e : parts.exponentials) {
     const double a = e.a > 0.0 ? e.a : -std::log(std::abs(e.phi));
     reach = std::max(reach, kTimeConstants / a);
-    alternating = alternating || e.a < 0.0;
+    if (e.a < 0.0) exact_near = std::max(exact_near, kExactNearAlternating);
   }
   const double furthest_pair = std::max(pairs.highest() - centre, centre - pairs.lowest());
   const double high = std::min(furthest_pair, breaks.back() + std::ceil(reach));
   for (const double lag : pairs.kinks(centre, high)) breaks.push_back(std::abs(lag - centre));
   std::sort(breaks.begin(), breaks.end());
   breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
-  constexpr int kExactNear = 5;
-  constexpr int kExactNearAlternating = 64;
-  LagSum sum(term, alternating ? kExactNearAlternating : kExactNear);
+  LagSum sum(term, exact_near);
   const double count_j = static_cast<double>(j.n_coefficients);
   const double count_k = static_cast<double>(k.n_coefficients);
   double result = sum.between(breaks, 0.0, high) / (count_j * count_k);

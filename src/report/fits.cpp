@@ -50,13 +50,11 @@ std::optional<double> scaled(std::optional<double> value, double factor) {
 /// @param factor  of the signal's unit
 std::vector<FitComponent> components_of(const noise::FitResult& result, double factor) {
   std::vector<FitComponent> components;
-  int n_gauss_markov = 0;
-  int n_sinusoid = 0;
-  for (const noise::Component& component : result.model.components) {
+  const std::vector<std::string> names = noise::component_names(result.model);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const noise::Component& component = result.model.components[i];
     FitComponent out;
-    out.name = std::string(noise::short_name(component.kind));
-    if (component.kind == noise::ProcessKind::kGaussMarkov) out.name += std::to_string(++n_gauss_markov);
-    if (component.kind == noise::ProcessKind::kSinusoid) out.name += std::to_string(++n_sinusoid);
+    out.name = names[i];
     if (!(component.amplitude > 0.0)) continue;
     for (const noise::FittedLevel& level : result.wv) {
       out.values.push_back(factor * factor * component.amplitude *

@@ -1,12 +1,9 @@
 #include "report/paper_figures.h"
 
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <optional>
 
 #include "base/output_folder.h"
@@ -14,25 +11,13 @@
 #include "base/units.h"
 #include "report/figures.h"
 #include "report/fits.h"
-#include "report/gnuplot.h"
+#include "report/picture.h"
 #include "report/run_files.h"
-
-extern char** environ;
+#include "report/wavelet_plots.h"
 
 namespace imuscope {
 namespace report {
 namespace {
-
-/// Told apart by the colour-blind (Okabe and Ito).
-constexpr GnuplotWord kColours[] = {"#d1600a", "#0b9a6e", "#3a86d8"};
-
-/// A script under construction: panels of one picture.
-struct Picture {
-  std::string name;  ///< of its files: written in this program, or with the name of a device in it
-  int rows = 1;
-  int columns = 1;
-  GnuplotScript body;
-};
 
 /// Mean, smallest and largest of a signal over time; a blank line where there is a gap.
 GnuplotScript block_of(const GnuplotScript& name, const BinnedSignals& signals, std::size_t signal) {
@@ -92,7 +77,7 @@ Picture drive_picture(const RunFiles& run) {
       "set size ratio -1\nset xlabel 'east, m'\nset ylabel 'north, m'\nset cblabel 'speed, m/s'\n"
       "plot $way using 1:2:3 with lines linecolor palette linewidth 2 notitle\nset size noratio\n"
       "set autoscale xfix\nset xlabel 'time, s'\nset ylabel 'speed, m/s'\n");
-  picture.body += band_plot(speed, kColours[2]);
+  picture.body += band_plot(speed, kPictureColours[2]);
   return picture;
 }
 
@@ -116,7 +101,7 @@ Picture estimate_picture(const StudyFiles& study) {
     }
     picture.body.add("set ylabel '{} {}, {}'\n", angle ? kAngle : kLength, kAxisNames[i % kTriad],
                      angle ? GnuplotWord("deg") : GnuplotWord("mm"));
-    picture.body += band_plot(block, kColours[i % kTriad]);
+    picture.body += band_plot(block, kPictureColours[i % kTriad]);
   }
   return picture;
 }
@@ -129,7 +114,7 @@ Picture error_picture(const StudyFiles& study) {
     picture.body += block_of(block, *study.errors, i);
     picture.body.add("set ylabel {}\n",
                      GnuplotText(fmt::format("{}, {}", axis_words(kAxes[i]), i < kTriad ? "deg/s" : "m/s²")));
-    picture.body += band_plot(block, kColours[i % kTriad]);
+    picture.body += band_plot(block, kPictureColours[i % kTriad]);
   }
   return picture;
 }
@@ -160,59 +145,10 @@ Picture scatter_picture(const StudyFiles& study) {
     picture.body.add(
         "EOD\nset xlabel '{}'\nset ylabel {}\nplot $points{} using 1:2 with points pointtype 7 "
         "pointsize 0.15 linecolor rgb '{}' notitle\n",
-        panel.words, label, n, kColours[panel.error % kTriad]);
+        panel.words, label, n, kPictureColours[panel.error % kTriad]);
     ++n;
   }
   return picture;
-}
-
-/// Observed, interval, total and every component of one fit.
-GnuplotScript wavelet_block(const GnuplotScript& name, const Fit& fit) {
-  auto block = GnuplotScript::of("${} << EOD\n", name);
-  for (std::size_t i = 0; i < fit.levels.size(); ++i) {
-    const FitLevel& level = fit.levels[i];
-    block.add("{} {} {} {} {}", GnuplotNumber{level.tau_s}, GnuplotNumber{or_nan(level.value)},
-              GnuplotNumber{or_nan(level.ci_low)}, GnuplotNumber{or_nan(level.ci_high)},
-              GnuplotNumber{or_nan(level.fitted)});
-    for (const FitComponent& component : fit.components) {
-      if (component.values.size() == fit.levels.size()) block.add(" {}", GnuplotNumber{component.values[i]});
-    }
-    block.add("\n");
-  }
-  return block.add("EOD\n");
-}
-
-GnuplotScript wavelet_plots(const GnuplotScript& block, const Fit& fit, const GnuplotWord& colour) {
-  constexpr std::size_t kFirstComponent = 6;
-  auto plots = GnuplotScript::of(
-      "${0} using 1:2:3:4 with yerrorbars pointtype 7 pointsize 0.4 linecolor rgb '{1}' title {2} "
-      "noenhanced, "
-      "${0} using 1:5 with lines linewidth 1.5 linecolor rgb '{1}' notitle",
-      block, colour, GnuplotText(fit.regime.empty() ? "all" : fit.regime));
-  for (std::size_t i = 0; i < fit.components.size(); ++i) {
-    if (fit.components[i].values.size() != fit.levels.size()) continue;
-    plots.add(", ${} using 1:{} with lines dashtype 2 linewidth 0.8 linecolor rgb '{}' notitle", block,
-              kFirstComponent + i, colour);
-  }
-  return plots;
-}
-
-/// Between half the smallest and twice the largest of what was observed and fitted: a component may leave it.
-GnuplotScript wavelet_range(const std::vector<const Fit*>& fits) {
-  double low = std::numeric_limits<double>::infinity();
-  double high = 0.0;
-  for (const Fit* fit : fits) {
-    for (const FitLevel& level : fit->levels) {
-      for (const auto& value : {level.value, level.fitted}) {
-        if (!value || !(*value > 0.0)) continue;
-        low = std::min(low, *value);
-        high = std::max(high, *value);
-      }
-    }
-  }
-  return high > 0.0
-             ? GnuplotScript::of("set yrange [{}:{}]\n", GnuplotNumber{0.5 * low}, GnuplotNumber{2.0 * high})
-             : GnuplotScript::of("set yrange [*:*]\n");
 }
 
 /// The fits of one axis that a panel shows: those of regimes, or that of everything together.
@@ -244,7 +180,7 @@ std::optional<Picture> wavelet_picture(const std::vector<Fit>& fits, const std::
       const auto block = GnuplotScript::of("axis{}_{}", axis, i);
       picture.body += wavelet_block(block, *shown[i]);
       if (!plots.empty()) plots.add(", ");
-      plots += wavelet_plots(block, *shown[i], kColours[(i + 2) % kTriad]);
+      plots += wavelet_plots(block, *shown[i], kPictureColours[(i + 2) % kTriad]);
     }
     picture.body += wavelet_range(shown);
     const GnuplotText label(fmt::format("{}, ({})²", axis_words(kAxes[axis]), shown.front()->unit));
@@ -264,70 +200,6 @@ std::vector<Picture> pictures_of(const RunFiles& run) {
     if (auto wavelet = wavelet_picture(fits, study.name)) pictures.push_back(std::move(*wavelet));
   }
   return pictures;
-}
-
-/// Draws the panels once for each format. Run in its own folder, so that no path stands in it.
-GnuplotScript script_of(const Picture& picture) {
-  constexpr double kPanelWidth_in = 3.0;
-  constexpr double kPanelHeight_in = 2.2;
-  constexpr double kPixelsPerInch = 96.0;
-  const double width = picture.columns == 1 ? 2.0 * kPanelWidth_in : kPanelWidth_in * picture.columns;
-  const double height =
-      picture.columns == 1 ? 2.0 * kPanelHeight_in * picture.rows : kPanelHeight_in * picture.rows;
-  auto script = GnuplotScript::of("# imuscope: gnuplot draws this file as SVG and PDF.\nset encoding utf8\n");
-  const std::pair<GnuplotScript, std::string> kOutputs[] = {
-      {GnuplotScript::of("svg size {:.0f},{:.0f} dynamic background 'white' font 'sans,11'",
-                         width * kPixelsPerInch, height * kPixelsPerInch),
-       ".svg"},
-      {GnuplotScript::of("pdfcairo size {:g}in,{:g}in font 'sans,8'", width, height), ".pdf"}};
-  for (const auto& [terminal, suffix] : kOutputs) {
-    script.add(
-        "reset\nset terminal {}\nset output {}\nset grid linecolor rgb '#dddddd'\n"
-        "set border 3\nset tics nomirror\nset multiplot layout {},{}\n{}unset multiplot\n"
-        "set output\n",
-        terminal, GnuplotText(picture.name + suffix), picture.rows, picture.columns, picture.body);
-  }
-  return script;
-}
-
-/// Runs gnuplot on a script in `folder`.
-Result<void> draw(const OutputFolder& folder, const std::string& script, const std::string& shown) {
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addfchdir_np(&actions, folder.descriptor());
-  std::string program = "gnuplot";
-  std::string file = script;
-  // Its own settings alone: what lies in a folder from elsewhere is no start-up file.
-  std::string defaults = "-d";
-  char* arguments[] = {program.data(), defaults.data(), file.data(), nullptr};
-  pid_t child = 0;
-  const int failed = posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments, environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0) {
-    return work_error("gnuplot could not be started",
-                      "install it (apt-get install gnuplot-nox), or draw " + shown + " elsewhere");
-  }
-  int status = 0;
-  if (waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    return work_error("gnuplot refused " + shown, "its own message is above");
-  return {};
-}
-
-/// Draws in a folder made for it, since gnuplot follows links, and takes over what came of it.
-Result<void> draw_into(const OutputFolder& figures, const Picture& picture) {
-  const std::string script = picture.name + ".gp";
-  const auto scratch = figures.scratch_folder();
-  if (!scratch) return tl::unexpected<Error>(scratch.error());
-  Result<void> done = scratch->write_whole(script, script_of(picture).str());
-  if (done) done = draw(*scratch, script, (figures.path() / script).string());
-  for (const char* suffix : {".gp", ".svg", ".pdf"}) {
-    const std::string name = picture.name + suffix;
-    auto taken = figures.take(*scratch, name);
-    if (done && !taken) done = std::move(taken);
-    scratch->remove(name);
-  }
-  figures.remove(scratch->path().filename().string());
-  return done;
 }
 
 }  // namespace

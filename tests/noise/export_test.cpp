@@ -75,6 +75,38 @@ Meaning meaning_of_kalibr(const std::string& text) {
   return {std::pow(n.at("gyroscope_noise_density"), 2), std::pow(n.at("gyroscope_random_walk"), 2), 0.0, 0.0};
 }
 
+/// OpenVINS: Qc = sigma^2 / dt of a rate, sigma_b^2 dt of a bias, as kalibr.
+Meaning meaning_of_openvins(const std::string& text) {
+  EXPECT_NE(text.find("imu0:\n  gyroscope_noise_density: "), std::string::npos);
+  return meaning_of_kalibr(text);
+}
+
+/// VINS-Fusion, a step of dt with two samples: velocity gets (dt/2)^2 (n^2 + n^2), a bias (dt w)^2.
+Meaning meaning_of_vins_fusion(const std::string& text) {
+  auto n = numbers_of(text);
+  const double dt = 1.0 / kRateHz;
+  const double per_step = 2.0 * std::pow(0.5 * dt * n.at("acc_n"), 2);
+  return {per_step / dt, std::pow(dt * n.at("acc_w"), 2) / dt, 0.0, 0.0};
+}
+
+/// LIO-SAM: a covariance of noise^2 in continuous time, a bias that goes by sqrt(dt) n between key frames.
+Meaning meaning_of_lio_sam(const std::string& text) {
+  auto n = numbers_of(text);
+  constexpr double kBetweenFrames_s = 0.4;
+  return {std::pow(n.at("imuGyrNoise"), 2),
+          std::pow(std::sqrt(kBetweenFrames_s) * n.at("imuGyrBiasN"), 2) / kBetweenFrames_s, 0.0, 0.0};
+}
+
+/// GTSAM: covariances in continuous time.
+Meaning meaning_of_gtsam(const std::string& text) {
+  const auto argument = [&](const std::string& setter) {
+    const auto at = text.find(setter + "(");
+    EXPECT_NE(at, std::string::npos) << setter;
+    return std::stod(text.substr(at + setter.size() + 1));
+  };
+  return {argument("setGyroscopeCovariance"), argument("setBiasOmegaCovariance"), 0.0, 0.0};
+}
+
 /// Of an EKF2 update of 10 ms: rate noise NOISE in each, a step of B_NOISE * dt of the bias in each.
 Meaning meaning_of_px4(const std::string& text) {
   constexpr double kUpdate_s = 0.01;
@@ -146,6 +178,14 @@ TEST_P(ExportRoundTrip, ARefitOfWhatTheFileMeansHasTheExportedModelInsideItsInte
 INSTANTIATE_TEST_SUITE_P(Each, ExportRoundTrip,
                          testing::Values(RoundTrip{ExportFormat::kKalibr, SignalUnit::kDegps, kRadPerDegree,
                                                    "WN+RW", 0.04, 4e-6, 0.0, meaning_of_kalibr},
+                                         RoundTrip{ExportFormat::kOpenVins, SignalUnit::kRadps, 1.0, "WN+RW", 1e-5,
+                                                   1e-9, 0.0, meaning_of_openvins},
+                                         RoundTrip{ExportFormat::kVinsFusion, SignalUnit::kMps2, 1.0, "WN+RW", 1e-4,
+                                                   1e-8, 0.0, meaning_of_vins_fusion},
+                                         RoundTrip{ExportFormat::kLioSam, SignalUnit::kDegps, kRadPerDegree, "WN+RW",
+                                                   0.04, 4e-6, 0.0, meaning_of_lio_sam},
+                                         RoundTrip{ExportFormat::kGtsam, SignalUnit::kRadps, 1.0, "WN+RW", 1e-5,
+                                                   1e-9, 0.0, meaning_of_gtsam},
                                          RoundTrip{ExportFormat::kPx4, SignalUnit::kG, 9.80665, "WN+RW", 1e-6,
                                                    1e-10, 0.0, meaning_of_px4},
                                          RoundTrip{ExportFormat::kRos, SignalUnit::kRadps, 1.0, "WN+GM", 1e-5,
@@ -156,6 +196,14 @@ INSTANTIATE_TEST_SUITE_P(Each, ExportRoundTrip,
                            switch (test.param.format) {
                              case ExportFormat::kKalibr:
                                return "Kalibr";
+                             case ExportFormat::kOpenVins:
+                               return "OpenVins";
+                             case ExportFormat::kVinsFusion:
+                               return "VinsFusion";
+                             case ExportFormat::kLioSam:
+                               return "LioSam";
+                             case ExportFormat::kGtsam:
+                               return "Gtsam";
                              case ExportFormat::kPx4:
                                return "Px4";
                              case ExportFormat::kRos:

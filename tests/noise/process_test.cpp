@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "made_series.h"
+#include "noise/model.h"
+#include "noise/power_law.h"
 #include "oracle_files.h"
 #include "tests/support/shared_data.h"
 
@@ -93,6 +95,72 @@ TEST(Process, StationaryCurvesFollowFromTheirAutocovariances) {
   }
 }
 
+TEST(Process, AResonanceHasTheCurveOfItsAutocovariance) {
+  constexpr std::size_t kLongest = 1024;
+  for (const auto& [a, b] : {std::pair{0.05, 1.2}, {0.3, 0.4}, {1e-3, 0.02}, {1.5, 3.0}, {0.01, 0.003}}) {
+    std::vector<double> g(kLongest + 1);
+    for (std::size_t i = 0; i < g.size(); ++i) {
+      const auto k = static_cast<double>(i);
+      g[i] = std::exp(-a * k) * (std::cos(b * k) + a / b * std::sin(b * k));
+    }
+    for (int level = 1; level <= 10; ++level) {
+      const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
+      const double expected = from_autocovariance(g, n);
+      EXPECT_NEAR(resonance_wv(a, b, level).value, expected, 1e-9 * expected + 1e-13) << a << ' ' << b << ' ' << level;
+    }
+  }
+}
+
+/// Integral of |transfer function|^2 |2 sin(pi f)|^-alpha over -1/2 < f < 1/2 by the trapezoidal rule in u, f = u^3 / 2,
+/// which has no singularity left.
+double power_law_by_spectrum(double alpha, double n) {
+  constexpr int kSteps = 400'000;
+  double sum = 0.0;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double u = static_cast<double>(i) / kSteps;
+    const double f = 0.5 * u * u * u;
+    const double s = std::sin(M_PI * f);
+    const double sn = std::sin(M_PI * f * n);
+    const double gain = sn * sn * sn * sn / (n * n * s * s);
+    sum += (i == kSteps ? 0.5 : 1.0) * gain * std::pow(2.0 * s, -alpha) * 1.5 * u * u / kSteps;
+  }
+  return 2.0 * sum;
+}
+
+TEST(Process, PowerLawsHaveTheWaveletVarianceOfTheirSpectrum) {
+  for (const double alpha : {0.2, 0.7, 0.999999, 1.0, 1.0001, 1.4, 1.8}) {
+    for (const int level : {1, 2, 5, 8, 12}) {
+      const double expected = power_law_by_spectrum(alpha, std::ldexp(1.0, level - 1));
+      EXPECT_LT(relative(power_law_wv(alpha, level).value, expected), 2e-6) << alpha << " level " << level;
+    }
+  }
+}
+
+TEST(Process, PowerLawsEndInWhiteNoiseAndInARandomWalk) {
+  for (int level = 1; level <= 24; ++level) {
+    EXPECT_LT(relative(power_law_wv(1e-9, level).value, unit_wv(ProcessKind::kWhiteNoise, {}, level).value), 1e-6);
+    EXPECT_LT(relative(power_law_wv(2.0 - 1e-9, level).value, unit_wv(ProcessKind::kRandomWalk, {}, level).value), 1e-6);
+  }
+}
+
+// IEEE Std 952-2020, annex C: the Allan variance of flicker noise is 2 ln 2 / pi B^2, and twice the wavelet variance.
+TEST(Process, FlickerNoiseIsFlatAtTheBiasInstability) {
+  for (int level = 12; level <= 28; ++level) {
+    EXPECT_LT(relative(2.0 * unit_wv(ProcessKind::kFlicker, {}, level).value, 2.0 * std::log(2.0) / M_PI), 1e-6) << level;
+  }
+}
+
+TEST(Process, ASumOfGaussMarkovProcessesFollowsAPowerLaw) {
+  for (const double alpha : {0.3, 0.6, 1.0, 1.3, 1.7}) {
+    const Component law{ProcessKind::kPowerLaw, 2.0, {alpha, 0.0}};
+    const Model sum{power_law_sum(law)};
+    for (int level = 1; level <= 24; ++level) {
+      EXPECT_LT(relative(model_wv(sum, level), 2.0 * power_law_wv(alpha, level).value), kPowerLawSumError)
+          << alpha << " level " << level;
+    }
+  }
+}
+
 TEST(Process, DerivativesMatchCentralDifferences) {
   struct Case {
     ProcessKind kind;
@@ -101,7 +169,10 @@ TEST(Process, DerivativesMatchCentralDifferences) {
   const std::vector<Case> cases{{ProcessKind::kMa1, {0.4, 0}},        {ProcessKind::kMa1, {-0.8, 0}},
                                 {ProcessKind::kSinusoid, {0.37, 0}},  {ProcessKind::kSinusoid, {0.011, 0}},
                                 {ProcessKind::kArma11, {0.3, 0.2}},   {ProcessKind::kArma11, {-0.6, 0.7}},
-                                {ProcessKind::kArma11, {0.95, -0.5}}, {ProcessKind::kGaussMarkov, {0.02, 0}}};
+                                {ProcessKind::kArma11, {0.95, -0.5}}, {ProcessKind::kGaussMarkov, {0.02, 0}},
+                                {ProcessKind::kResonance, {0.1, 0.9}}, {ProcessKind::kResonance, {0.02, 0.01}},
+                                {ProcessKind::kPowerLaw, {0.6, 0}},   {ProcessKind::kPowerLaw, {1.0, 0}},
+                                {ProcessKind::kPowerLaw, {1.5, 0}}};
   for (const Case& c : cases) {
     for (const int level : {1, 3, 7, 11}) {
       for (int i = 0; i < shape_count(c.kind); ++i) {

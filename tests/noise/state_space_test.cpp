@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "noise/power_law.h"
 #include "noise/wavelet_variance.h"
 
 namespace imuscope::noise {
@@ -44,6 +45,7 @@ TEST(StateSpace, EveryProcessHasTheWaveletVarianceOfItsCurve) {
       of(ProcessKind::kArma11, 0.5, {0.8, -0.3}),
       of(ProcessKind::kSinusoid, 2.0, {0.37, 0.0}),
       of(ProcessKind::kGaussMarkov, 1.5, {0.02, 0.0}),
+      of(ProcessKind::kResonance, 0.8, {0.05, 0.9}),
       of(ProcessKind::kRandomWalk, 0.01),
       of(ProcessKind::kRamp, 1e-4),
   };
@@ -53,6 +55,17 @@ TEST(StateSpace, EveryProcessHasTheWaveletVarianceOfItsCurve) {
       const double expected = model_wv(model, level);
       EXPECT_NEAR(wv_of_form(form, level), expected, 1e-9 * expected)
           << short_name(model.components.front().kind) << " level " << level;
+    }
+  }
+}
+
+// Flicker and power laws are approximated: power_law.h says how well.
+TEST(StateSpace, APowerLawIsTheSumThatStandsForIt) {
+  for (const Model& model : {of(ProcessKind::kFlicker, 1.3), of(ProcessKind::kPowerLaw, 0.2, {0.6, 0.0})}) {
+    const StateSpace form = state_space(model);
+    for (const int level : {1, 2, 3, 5, 7}) {
+      const double expected = model_wv(model, level);
+      EXPECT_NEAR(wv_of_form(form, level), expected, kPowerLawSumError * expected) << level;
     }
   }
 }

@@ -93,6 +93,15 @@ TEST(WvCovariance, CoefficientCovariancesOfEveryProcessFollowFromTheirAutocovari
       [](long h) { return h == 0   ? 1.1 * 1.36
                           : h == 1 ? -1.1 * 0.6
                                    : 0.0; }, "MA1");
+  for (const auto& [a, b] : {std::pair{0.3, 1.1}, {0.02, 0.2}}) {
+    check(
+        model_of({{ProcessKind::kResonance, 1.2, {a, b}}}),
+        [a = a, b = b](long h) {
+          const auto m = static_cast<double>(h);
+          return 1.2 * std::exp(-a * m) * (std::cos(b * m) + a / b * std::sin(b * m));
+        },
+        "RES a = " + std::to_string(a));
+  }
   for (const double phi : {-0.7, 0.8}) {
     check(
         model_of({{ProcessKind::kArma11, 1.0, {phi, 0.4}}}),
@@ -163,6 +172,7 @@ TEST(WvCovariance, TheSumByBlocksAgreesWithTheSumOverEveryLag) {
       {"WN+2GM", model_of({{ProcessKind::kWhiteNoise, 1.0, {}},
                            {ProcessKind::kGaussMarkov, 0.5, {0.1, 0}},
                            {ProcessKind::kGaussMarkov, 0.8, {0.004, 0}}})},
+      {"WN+RES", model_of({{ProcessKind::kWhiteNoise, 0.1, {}}, {ProcessKind::kResonance, 1.0, {0.08, 1.2}}})},
       {"ARMA11", model_of({{ProcessKind::kArma11, 1.0, {-0.8, 0.3}}})}};
   for (const auto& segments :
        {std::vector<Segment>{{0, 1500}}, std::vector<Segment>{{0, 600}, {650, 900}, {1000, 1500}}}) {

@@ -28,6 +28,9 @@ void add_wv(CLI::App& app, Work& chosen);
 /// `imuscope fit FILE --rate HZ --model 'WN+2*GM'`
 void add_fit(CLI::App& app, Work& chosen);
 
+/// `imuscope characterize FILE...`
+void add_characterize(CLI::App& app, Work& chosen);
+
 /// `imuscope compare A.json B.json`
 void add_compare(CLI::App& app, Work& chosen);
 

@@ -29,6 +29,23 @@ Result<StoredFit> stored_fit(const nlohmann::json& entry, const std::filesystem:
                    noise::fitted_to_words(entry)};
 }
 
+/// The axes of a certificate as entries of a run's models.
+nlohmann::json entries_of_certificate(const nlohmann::json& certificate) {
+  auto entries = nlohmann::json::array();
+  const auto axes = certificate.find("axes");
+  if (axes == certificate.end() || !axes->is_array()) return entries;
+  for (const auto& axis : *axes) {
+    if (!axis.is_object() || !axis.contains("fit")) continue;
+    auto entry = axis.at("fit");
+    if (!entry.is_object()) continue;
+    entry["axis"] = text_of(axis, "name", "");
+    entry["unit"] = text_of(axis, "unit", "");
+    entry["name"] = text_of(certificate, "sensor", "");
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
 }  // namespace
 
 Result<std::vector<StoredFit>> read_fits(const std::filesystem::path& file) {
@@ -39,8 +56,11 @@ Result<std::vector<StoredFit>> read_fits(const std::filesystem::path& file) {
   }
   const auto json = report::read_json_file(file);
   if (json.is_discarded()) return work_error(fmt::format("{} is not JSON", file.string()));
+  const bool is_certificate = json.is_object() && json.value("schema", "").starts_with("imuscope.certificate/");
   const bool is_run = json.is_object() && json.contains("models") && json.at("models").is_array();
-  const auto entries = is_run ? json.at("models") : nlohmann::json::array({json});
+  const auto entries = is_certificate ? entries_of_certificate(json)
+                       : is_run       ? json.at("models")
+                                      : nlohmann::json::array({json});
   std::vector<StoredFit> fits;
   for (const auto& entry : entries) {
     auto fit = stored_fit(entry, file);

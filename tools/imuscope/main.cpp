@@ -34,6 +34,7 @@ int run(int argc, char** argv) {
   imuscope::cli::Work work;
   imuscope::cli::add_wv(app, work);
   imuscope::cli::add_fit(app, work);
+  imuscope::cli::add_characterize(app, work);
   imuscope::cli::add_compare(app, work);
   imuscope::cli::add_export(app, work);
   imuscope::cli::add_run(app, work);

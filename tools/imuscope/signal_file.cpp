@@ -51,6 +51,10 @@ void split(std::string_view line, char separator, std::vector<std::string_view>&
   }
 }
 
+std::string_view unquoted(std::string_view cell) {
+  return cell.size() > 1 && cell.front() == '"' && cell.back() == '"' ? cell.substr(1, cell.size() - 2) : cell;
+}
+
 std::optional<double> to_number(std::string_view cell) {
   if (!cell.empty() && cell.front() == '+') cell.remove_prefix(1);
   double value = 0.0;
@@ -145,12 +149,8 @@ class CsvReader {
     const bool has_header =
         std::any_of(cells_.begin(), cells_.end(), [](auto cell) { return !parse_stamp(cell); });
     std::vector<std::string> names;
-    for (std::size_t i = 0; i < cells_.size(); ++i) {
-      std::string_view name = cells_[i];
-      if (name.size() > 1 && name.front() == '"' && name.back() == '"')
-        name = name.substr(1, name.size() - 2);
-      names.push_back(has_header ? std::string(name) : std::to_string(i + 1));
-    }
+    for (std::size_t i = 0; i < cells_.size(); ++i)
+      names.push_back(has_header ? std::string(unquoted(cells_[i])) : std::to_string(i + 1));
     if (auto found = find_columns(names, has_header); !found) return found;
     return has_header ? Result<void>{} : add_row();
   }
@@ -359,6 +359,16 @@ Result<Signal> read_raw(std::istream& in, std::uintmax_t size, const std::string
 }
 
 }  // namespace
+
+std::vector<std::string> cells_of(std::string_view line) {
+  const std::string_view content = trimmed(line.substr(0, line.find('#')));
+  std::vector<std::string> out;
+  if (content.empty()) return out;
+  std::vector<std::string_view> cells;
+  split(content, separator_of(content), cells);
+  for (const auto cell : cells) out.emplace_back(unquoted(cell));
+  return out;
+}
 
 Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice& choice) {
   const std::string name = file.string();

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/result.h"
@@ -27,6 +28,9 @@ struct Signal {
   std::vector<std::uint8_t> mask;  ///< 1 = a value; empty: all are
   std::optional<double> rate_hz;   ///< as asked for, or as the times have it; absent where neither tells
 };
+
+/// The cells of a line of a CSV file, quotes taken off; empty for an empty line or a comment.
+std::vector<std::string> cells_of(std::string_view line);
 
 /// CSV: separated by comma, semicolon, tab or blanks; `#` starts a comment; a first line that is not all
 /// numbers is the header. "nan" is a value (the caller decides). Errors (kWork): a missing or empty file, a

@@ -1,13 +1,56 @@
 #include "simulated_noise.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <cmath>
+#include <complex>
 #include <cstdlib>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+#include <unsupported/Eigen/MatrixFunctions>
 
 namespace imuscope {
 namespace {
 
 using noise::Component;
 using noise::ProcessKind;
+
+/// The sampled oscillator x'' + 2 a x' + (a^2 + b^2) x = w from its exact transition.
+void add_resonance(const Component& c, std::mt19937_64& random, std::vector<double>& x) {
+  std::normal_distribution<double> normal;
+  const double a = c.shape[0];
+  const double b = c.shape[1];
+  Eigen::Matrix2d generator;
+  generator << 0.0, 1.0, -(a * a + b * b), -2.0 * a;
+  const Eigen::Matrix2d F = generator.exp();
+  const Eigen::Matrix2d P = c.amplitude * Eigen::Vector2d(1.0, a * a + b * b).asDiagonal().toDenseMatrix();
+  const Eigen::Matrix2d drive = Eigen::Matrix2d(P - F * P * F.transpose()).llt().matrixL();
+  Eigen::Vector2d state = Eigen::Matrix2d(P.llt().matrixL()) * Eigen::Vector2d(normal(random), normal(random));
+  for (double& v : x) {
+    v += state[0];
+    state = F * state + drive * Eigen::Vector2d(normal(random), normal(random));
+  }
+}
+
+/// Gaussian noise of spectrum sd^2 |2 sin(pi f)|^-alpha. Of what repeats after two lengths one is used.
+void add_power_law(double alpha, double sd, std::mt19937_64& random, std::vector<double>& x) {
+  std::normal_distribution<double> normal;
+  std::size_t n = 2;
+  while (n < 2 * x.size()) n *= 2;
+  std::vector<std::complex<double>> spectrum(n);
+  for (std::size_t k = 1; k < n / 2; ++k) {
+    const double f = static_cast<double>(k) / static_cast<double>(n);
+    const double scale = sd * std::pow(2.0 * std::sin(std::numbers::pi * f), -0.5 * alpha) *
+                         std::sqrt(0.5 * static_cast<double>(n));
+    spectrum[k] = scale * std::complex<double>(normal(random), normal(random));
+    spectrum[n - k] = std::conj(spectrum[k]);
+  }
+  spectrum[n / 2] = sd * std::pow(2.0, -0.5 * alpha) * std::sqrt(static_cast<double>(n)) * normal(random);
+  Eigen::FFT<double> fft;
+  std::vector<std::complex<double>> made;
+  fft.inv(made, spectrum);
+  for (std::size_t i = 0; i < x.size(); ++i) x[i] += made[i].real();
+}
 
 void add_component(const Component& c, std::mt19937_64& random, std::vector<double>& x) {
   std::normal_distribution<double> normal;
@@ -41,6 +84,20 @@ void add_component(const Component& c, std::mt19937_64& random, std::vector<doub
       }
       break;
     }
+    case ProcessKind::kRamp: {
+      const double slope = uniform(random) < 0.5 ? -sd : sd;
+      for (std::size_t i = 0; i < x.size(); ++i) x[i] += slope * static_cast<double>(i);
+      break;
+    }
+    case ProcessKind::kResonance:
+      add_resonance(c, random, x);
+      break;
+    case ProcessKind::kFlicker:
+      add_power_law(1.0, sd, random, x);
+      break;
+    case ProcessKind::kPowerLaw:
+      add_power_law(c.shape[0], sd, random, x);
+      break;
     default:
       std::abort();
   }

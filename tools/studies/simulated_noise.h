@@ -10,8 +10,9 @@
 
 namespace imuscope {
 
-/// WN, QN, RW and GM of the model summed; GM from its stationary distribution, RW from zero.
-/// Precondition: no other processes.
+/// The model's processes summed: GM and RES from their stationary distribution, RW and DR from zero, the slope of DR of
+/// random sign. FN and PL are made in the frequency domain from their spectrum, over twice the length.
+/// Precondition: no MA1, ARMA11 or SIN.
 std::vector<double> simulated_noise(const noise::Model& model, std::size_t n, std::mt19937_64& random);
 
 }  // namespace imuscope

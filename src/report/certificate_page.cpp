@@ -1,0 +1,230 @@
+#include "report/certificate_page.h"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "base/output_folder.h"
+#include "base/text.h"
+#include "base/units.h"
+#include "report/assets.h"
+#include "report/certificate_figures.h"
+#include "report/html.h"
+#include "report/json_fields.h"
+#include "report/json_file.h"
+#include "report/people.h"
+
+namespace imuscope {
+namespace report {
+namespace {
+
+using nlohmann::json;
+
+std::string base64(const std::string& bytes) {
+  std::string out(4 * ((bytes.size() + 2) / 3) + 1, '\0');
+  const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()),
+                                     reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
+  out.resize(static_cast<std::size_t>(length));
+  return out;
+}
+
+/// A picture as part of the page.
+Html image(const std::filesystem::path& svg, const std::string& words) {
+  std::ifstream in(svg, std::ios::binary);
+  std::ostringstream content;
+  content << in.rdbuf();
+  return Html::markup(fmt::format("<img class=\"drawn\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">", text(words).str(),
+                                  base64(content.str())));
+}
+
+Html figure(const std::filesystem::path& svg, const std::string& words) {
+  return element("figure", image(svg, words) + element("figcaption", text(words)));
+}
+
+/// "0.302 [0.299, 0.305]", "below 1.2", "–".
+Html term_cell(const json& term) {
+  const std::string known = text_at(term, "known");
+  const auto value = number_at(term, "value");
+  if (known == "unknown" || !value) return text(kUnknown);
+  if (known == "bound") return text("below ") + number(*value, 2);
+  return with_interval(*value, number_at(term, "ci_low"), number_at(term, "ci_high"));
+}
+
+/// The first axis' terms name the rows; gyroscopes and accelerometers have tables of their own.
+Html terms_table(const json& certificate, bool gyro) {
+  std::vector<const json*> axes;
+  for (const auto& axis : field(certificate, "axes")) {
+    if (is_gyro_axis(axis) == gyro) axes.push_back(&axis);
+  }
+  if (axes.empty()) return {};
+  std::vector<Html> headings{text(gyro ? "gyroscope" : "accelerometer")};
+  for (const json* axis : axes) headings.push_back(text(text_at(*axis, "name")));
+  headings.push_back(text("unit"));
+  Table table(std::move(headings));
+  const json& first = field(*axes.front(), "terms");
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    std::vector<Html> row{text(text_at(first[i], "name") + " (" + text_at(first[i], "symbol") + ")")};
+    for (const json* axis : axes) {
+      const json& terms = field(*axis, "terms");
+      row.push_back(i < terms.size() ? term_cell(terms[i]) : text(kUnknown));
+    }
+    row.push_back(text(text_at(first[i], "unit")));
+    table.add_row(std::move(row));
+  }
+  return table.html();
+}
+
+Html list_of(const std::vector<std::string>& sentences, std::string_view css_class) {
+  if (sentences.empty()) return {};
+  Html items;
+  for (const auto& sentence : sentences) items += element("li", text(sentence));
+  return element("ul", items, css_class);
+}
+
+/// Sentences of all axes; one that several axes share stands once, with their names.
+std::vector<std::string> grouped(const json& certificate, const char* key) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> groups;
+  for (const auto& axis : field(certificate, "axes")) {
+    for (const auto& sentence : field(axis, key)) {
+      if (!sentence.is_string()) continue;
+      const auto words = sentence.get<std::string>();
+      const auto known = std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == words; });
+      if (known == groups.end())
+        groups.push_back({words, {text_at(axis, "name")}});
+      else
+        known->second.push_back(text_at(axis, "name"));
+    }
+  }
+  std::vector<std::string> out;
+  for (const auto& [words, axes] : groups) out.push_back(fmt::format("{}: {}", fmt::join(axes, ", "), words));
+  return out;
+}
+
+Html heading_of(const json& certificate) {
+  std::string words = duration_words(number_at(certificate, "duration_s").value_or(0.0)) +
+                      fmt::format(" at {:.6g} Hz", number_at(certificate, "rate_hz").value_or(0.0));
+  const std::string selection = text_at(certificate, "selection");
+  if (!selection.empty()) words += ", " + selection;
+  std::string files;
+  for (const auto& file : field(certificate, "files")) {
+    if (file.is_string()) files += (files.empty() ? "" : ", ") + file.get<std::string>();
+  }
+  return element("header", element("h1", text(text_at(certificate, "sensor"))) +
+                               paragraph("IMU noise certificate: " + words) + paragraph("From " + files, "quiet"));
+}
+
+Html summary(const json& certificate, const CertificateFigures& figures) {
+  Html out;
+  const auto warnings = grouped(certificate, "warnings");
+  out += list_of(warnings, "answer no");
+  out += terms_table(certificate, true) + terms_table(certificate, false);
+  out += paragraph(fmt::format("Intervals hold the true value in {:.0f} % of records. \"Below\" is the most that this record "
+                               "allows. Symbols as in IEEE Std 952 and 1293.",
+                               100.0 * number_at(certificate, "confidence").value_or(0.0)),
+                   "quiet");
+  for (const auto& [file, words] : figures.overview) out += figure(file, words);
+  const auto limits = grouped(certificate, "limits");
+  if (!limits.empty()) out += element("h2", text("What limits the numbers")) + list_of(limits, "limits");
+  return out;
+}
+
+Html found_in_spectrum(const json& axis) {
+  std::vector<std::string> sentences;
+  for (const char* key : {"lines", "resonances"}) {
+    for (const auto& found : field(axis, key)) sentences.push_back(text_at(found, "words"));
+  }
+  if (const auto end = number_at(axis, "low_pass_hz")) {
+    sentences.push_back(fmt::format("the density falls to half of its plateau at {:.3g} Hz: the end of the bandwidth", *end));
+  }
+  if (sentences.empty()) return {};
+  for (auto& sentence : sentences) sentence.front() = static_cast<char>(std::toupper(sentence.front()));
+  return list_of(sentences, "plain");
+}
+
+Html temperature_words(const json& axis) {
+  const json& t = field(axis, "temperature");
+  if (!t.is_object()) return {};
+  const std::string unit = text_at(axis, "unit");
+  std::string words = fmt::format("Between {:.1f} and {:.1f} °C the bias changes by {:.3g} ± {:.2g} {} per °C (p = {:.2g}).",
+                                  number_at(t, "lowest_c").value_or(0.0), number_at(t, "highest_c").value_or(0.0),
+                                  number_at(t, "bias_per_c").value_or(0.0), number_at(t, "bias_per_c_sd").value_or(0.0), unit,
+                                  number_at(t, "bias_p_value").value_or(1.0));
+  if (const auto noise = number_at(t, "noise_variance_per_c")) {
+    words += fmt::format(" The variance of the fast noise changes by {:.2g} ± {:.1g} % per °C.", 100.0 * *noise,
+                         100.0 * number_at(t, "noise_variance_per_c_sd").value_or(0.0));
+  }
+  return paragraph(words);
+}
+
+Html axis_section(const json& axis, const std::filesystem::path& drawn) {
+  Html out = element("h2", text(axis_words(text_at(axis, "name"))));
+  const json& fit = field(axis, "fit");
+  std::string words = fmt::format("{} samples", number_at(axis, "n_samples").value_or(0.0));
+  if (const double missing = number_at(axis, "n_missing").value_or(0.0); missing > 0.0)
+    words += fmt::format(", {} missing", missing);
+  words += fmt::format("; mean {:.6g}, sd {:.4g} {}", number_at(axis, "mean").value_or(0.0), number_at(axis, "sd").value_or(0.0),
+                       text_at(axis, "unit"));
+  if (const auto step = number_at(axis, "resolution")) words += fmt::format(", resolution {:.4g}", *step);
+  words += ". Model " + text_at(fit, "model");
+  if (const double error = number_at(fit, "model_error").value_or(0.0); error > 0.0)
+    words += fmt::format(", which follows every scale within about {:.2g} %", 100.0 * error);
+  out += paragraph(words + ".");
+  out += figure(drawn, "Allan deviation, wavelet variance with the model and its processes, and power spectral density.");
+  out += found_in_spectrum(axis) + temperature_words(axis);
+  Table table({text("process"), text("parameter"), text("value"), text("unit")});
+  for (const auto& p : field(fit, "parameters")) {
+    const auto value = number_at(p, "value");
+    table.add_row({text(text_at(p, "process")), text(text_at(p, "name")),
+                   value ? with_interval(*value, number_at(p, "ci_low"), number_at(p, "ci_high")) : text(kUnknown),
+                   text(text_at(p, "unit"))});
+  }
+  if (!table.empty()) out += table.html();
+  return out;
+}
+
+std::string page_of(const json& certificate, const CertificateFigures& figures) {
+  Html body = heading_of(certificate) + element("section", summary(certificate, figures));
+  std::size_t i = 0;
+  for (const auto& axis : field(certificate, "axes")) {
+    if (i < figures.of_axes.size()) body += element("section", axis_section(axis, figures.of_axes[i]));
+    ++i;
+  }
+  body += paragraph(fmt::format("Made by imuscope {} at {}.", text_at(certificate, "version"), text_at(certificate, "made_utc")),
+                    "quiet");
+  std::string page =
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; form-action 'none'; "
+      "style-src 'unsafe-inline'; img-src data:\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>";
+  page += text(text_at(certificate, "sensor")).str();
+  page += "</title>\n<style>\n";
+  page += page_style();
+  page += "</style>\n</head>\n<body>\n<main>\n" + body.str() + "\n</main>\n</body>\n</html>\n";
+  return page;
+}
+
+}  // namespace
+}  // namespace report
+
+Result<std::vector<std::filesystem::path>> write_certificate_page(const std::filesystem::path& folder,
+                                                                  const nlohmann::json& certificate) {
+  using Files = std::vector<std::filesystem::path>;
+  return report::with_documents_of(folder, [&]() -> Result<Files> {
+    const auto out = OutputFolder::open(folder);
+    if (!out) return tl::unexpected<Error>(out.error());
+    const auto figures = report::draw_certificate(*out, certificate);
+    if (!figures) return tl::unexpected<Error>(figures.error());
+    if (auto written = out->write_whole("certificate.html", report::page_of(certificate, *figures)); !written)
+      return tl::unexpected<Error>(written.error());
+    Files files{folder / "certificate.html"};
+    files.insert(files.end(), figures->of_axes.begin(), figures->of_axes.end());
+    return files;
+  });
+}
+
+}  // namespace imuscope
