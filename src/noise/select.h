@@ -21,7 +21,7 @@ struct RankedModel {
 };
 
 /// Sub-models of `full` with at least one term, best first. Identifiable models come before the others; of
-/// two whose criteria differ by less than 2 the one with fewer parameters comes first.
+/// two whose criteria differ by less than 4 the one with fewer parameters comes first.
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options = {});
 
