@@ -307,7 +307,7 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
   constexpr int kMaxSteps = 14;
   constexpr int kMaxRefinements = 10;
   constexpr double kStraight = 3.0;  // critical roots up to which the root is taken for a straight line
-  constexpr double kNear = 0.02;  // of the root of the critical value
+  constexpr double kNear = 0.02;     // of the root of the critical value
   const CoordinateRange range = inversion.range(p);
   const double root_critical = std::sqrt(critical);
   Eigen::VectorXd others = inversion.start();
