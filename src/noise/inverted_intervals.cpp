@@ -310,7 +310,10 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
   constexpr double kNear = 0.02;     // of the root of the critical value
   const CoordinateRange range = inversion.range(p);
   const double root_critical = std::sqrt(critical);
-  Eigen::VectorXd others = inversion.start();
+  // A search for the other parameters begins where they were at the last value inside: from beyond the end,
+  // where they may have run off, it would not find back.
+  Eigen::VectorXd others_inside = inversion.start();
+  Eigen::VectorXd others;
   double inside = inversion.estimate(p);
   double inside_root = 0.0;
   double outside = inside;
@@ -320,7 +323,9 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
     if (i > 0) {
       inside = outside;
       inside_root = outside_root;
+      others_inside = others;
     }
+    others = others_inside;
     const double limit = sign > 0.0 ? range.high : range.low;
     if (inside == limit) return std::nullopt;
     outside = sign > 0.0 ? std::min(limit, inside + step) : std::max(limit, inside - step);
@@ -332,6 +337,7 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
     const double beyond = std::min(outside_root, kStraight * root_critical);
     const double share = std::clamp((root_critical - inside_root) / (beyond - inside_root), 0.1, 0.95);
     const double middle = inside + share * (outside - inside);
+    others = others_inside;
     const double root = std::sqrt(inversion.statistic(p, middle, others));
     if (root >= root_critical) {
       outside = middle;
@@ -339,6 +345,7 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
     } else {
       inside = middle;
       inside_root = root;
+      others_inside = others;
       if (root_critical - root <= kNear * root_critical) return middle;
     }
   }

@@ -298,18 +298,21 @@ TEST(InvertedIntervals, ATermAtZeroThatARivalHoldsIsBoundedFromAbove) {
   FitOptions options;
   options.intervals = Intervals::kInverted;
   int at_zero = 0;
-  for (unsigned seed = 1; seed <= 12; ++seed) {
+  int below_truth = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
     const auto wv = haar_wavelet_variance(white(20'000, seed)).value();
     const auto result = fit(wv, parse_model("QN+WN+2*GM").value(), 100.0, options).value();
     for (const auto& p : result.parameters) {
       if (p.name == "beta" || p.process.starts_with("GM") || p.value > 0.0) continue;
       ++at_zero;
       ASSERT_TRUE(p.ci_high) << p.process << ", series " << seed;
-      EXPECT_GT(*p.ci_high, p.process == "WN" ? 1.0 : 0.0) << seed;
-      EXPECT_LT(*p.ci_high, 1.5) << seed;
+      below_truth += p.process == "WN" && *p.ci_high < 1.0 ? 1 : 0;
+      EXPECT_GT(*p.ci_high, 0.0) << seed;
+      EXPECT_LT(*p.ci_high, 1.1) << seed;
     }
   }
-  EXPECT_GE(at_zero, 6);
+  EXPECT_LE(below_truth, 2) << "a bound of 95 %";
+  EXPECT_GE(at_zero, 4);
 }
 
 TEST(Fit, AModelWithoutNoiseOfItsOwnHasIntervalsAllTheSame) {
