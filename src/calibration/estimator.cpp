@@ -60,6 +60,9 @@ class Estimator::Impl final : public EpochSink {
         if (odometry_.add(sample)) regime_.add_wheel_speed(sample.odometry.speed_mps);
         return;
       }
+    } else if (sample.kind == SampleKind::kPulse) {
+      navigation_.add_pulse(sample);
+      return;
     } else if (sample.kind == SampleKind::kGnss) {
       if (config_.gnss.enabled && sample.device == config_.gnss.device) {
         navigation_.add_gnss(sample);

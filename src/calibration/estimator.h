@@ -83,6 +83,7 @@ struct StudyCounters {
   std::uint64_t used = 0;                     ///< went through a measurement update
   std::uint64_t late = 0;                     ///< reference did not come within late_after
   std::uint64_t no_reference = 0;             ///< inside a gap of the R-IMU, or before its start
+  std::uint64_t waiting = 0;                  ///< now, for the reference
   std::uint64_t refused_full = 0;             ///< waiting queue was full
   std::uint64_t not_increasing = 0;           ///< time of validity at or before the previous sample's
   std::uint64_t not_finite = 0;               ///< NaN or infinity in the sample

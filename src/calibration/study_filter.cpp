@@ -98,7 +98,7 @@ StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
       force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
       increment_centre_(from_seconds(0.5 / config_.rate_hz)),
       has_biases_((config_.blocks & kBiasStudyBlocks) == kBiasStudyBlocks),
-      queue_(kWaitingSamples),
+      queue_(waiting_samples_capacity(config_.rate_hz)),
       gyro_floor_(config_.noise.gyro),
       accel_floor_(config_.noise.accel) {
   precompute_noise();
@@ -135,13 +135,13 @@ void StudyFilter::add(const Sample& sample) noexcept {
     ++counters.not_increasing;
     return;
   }
-  if (queue_size_ == kWaitingSamples) {
+  if (queue_size_ == queue_.size()) {
     ++counters.refused_full;
     return;
   }
   has_last_added_ = true;
   last_added_ = sample.time;
-  queue_[(queue_head_ + queue_size_++) % kWaitingSamples] = sample;
+  queue_[(queue_head_ + queue_size_++) % queue_.size()] = sample;
 }
 
 void StudyFilter::add_reference(HostTime time, double rate_radps) noexcept {
@@ -149,12 +149,19 @@ void StudyFilter::add_reference(HostTime time, double rate_radps) noexcept {
 }
 
 bool StudyFilter::gives_up(const Sample& sample, HostTime cut) const noexcept {
+  // A reference whose line stands still has its samples later: nothing is lost for it.
+  if (calibrating_) return false;
   // A sensor that runs ahead (t_d > 0) is expected to wait for t_d.
   const Duration ahead = std::max(Duration{0}, from_seconds(output_.t_d_s));
   return cut > std::max(sample.arrival, sample.time + ahead) + late_after_;
 }
 
 void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
+  work_off(context, cut);
+  output_.counters.waiting = queue_size_;
+}
+
+void StudyFilter::work_off(StudyContext& context, HostTime cut) noexcept {
   if (!calibrating_ && output_.status == CalibrationStatus::kWaiting && queue_size_ > 0) {
     output_.status = CalibrationStatus::kCoarse;
     const bool knows_mounting = config_.prior_C_b_s && prior_in_force_;
@@ -191,12 +198,17 @@ void StudyFilter::process(StudyContext& context, HostTime cut) noexcept {
         process_sample(context, sample, valid, b);
         break;
     }
-    queue_head_ = (queue_head_ + 1) % kWaitingSamples;
+    queue_head_ = (queue_head_ + 1) % queue_.size();
     --queue_size_;
   }
 }
 
 ReferenceResult StudyFilter::look(const StudyContext& context, HostTime time, Seen& seen) const noexcept {
+  // A coarse offset that is wrong by seconds has to be found out.
+  constexpr Duration kCoarsePast = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * kReferencePast_s));
+  if (!calibrating_ && context.window.newest_sample() > HostTime::min() &&
+      time < context.window.newest_sample() - kCoarsePast)
+    return ReferenceResult::kTooOld;
   const ReferenceResult result = context.window.evaluate(time, seen.gyro);
   seen.accel = seen.gyro;
   const bool apart = calibrating_ && context.core.layout(index_).accel_t_d != StudyLayout::kAbsent;

@@ -39,7 +39,8 @@ class StudyFilter {
   void add(const Sample& sample) noexcept;
   /// The reference's rate, for the coarse time offset.
   void add_reference(HostTime time, double rate_radps) noexcept;
-  /// Processes what has its reference, gives up what waited too long.
+  /// Processes what has its reference. What has none waits for it, and is given up after a while as long as the
+  /// mounting is not known.
   void process(StudyContext& context, HostTime cut) noexcept;
 
   void set_noise(FilterCore& core, const StudyNoise& noise) noexcept;
@@ -54,6 +55,7 @@ class StudyFilter {
  private:
   enum class Triad : std::uint8_t { kGyro, kAccel };
 
+  void work_off(StudyContext& context, HostTime cut) noexcept;
   [[nodiscard]] bool gives_up(const Sample& sample, HostTime cut) const noexcept;
   /// The reference as the two triads see it.
   struct Seen {

@@ -38,6 +38,12 @@ struct CanConfig {
   bool log_has_common_clock = false;
 };
 
+/// A PPS device of the kernel.
+struct PpsConfig {
+  std::string port;         ///< its path
+  bool clear_edge = false;  ///< the second begins at the clear edge, not at the assert edge
+};
+
 /// The same over a network: a TCP server that we connect to, or UDP datagrams that are sent to us.
 struct NetConfig {
   bool udp = false;
@@ -145,6 +151,7 @@ struct DeviceConfig {
   std::optional<SerialConfig> serial;
   std::optional<CanConfig> can;
   std::optional<NetConfig> net;
+  std::optional<PpsConfig> pps;
   /// The device whose line also carries this one's bytes: itself, or another one behind the same Xbus Master.
   std::size_t line_owner = 0;
   XsensConfig xsens;

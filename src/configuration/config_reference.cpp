@@ -27,7 +27,7 @@ protocol = "xsens_mt"
 transport = { kind = "serial", port = "/dev/ttyUSB0" }
 sync_in = { mode = 0 }
 )";
-constexpr std::array<std::string_view, 5> kDevices{R"(
+constexpr std::array<std::string_view, 6> kDevices{R"(
 [[device]]
 name = "dot"
 role = "study"
@@ -57,6 +57,13 @@ name = "gnss"
 role = "gnss"
 protocol = "rtklib_pos"
 base_lat_lon_height = [46.0, 7.0, 500.0]
+)",
+                                                   R"(
+[[device]]
+name = "pps"
+role = "time"
+protocol = "pps"
+transport = { kind = "pps", port = "/dev/pps0" }
 )",
                                                    R"(
 [[device]]
@@ -132,12 +139,11 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"threads.estimator_cores", "Live: processor cores that the estimator's thread keeps to; empty: any."},
     {"device.name", "Becomes part of file names: letters, digits, `_`, `-`."},
     {"device.role",
-     "`reference`: the better IMU, exactly one. `study`: an IMU under study, one to six. `gnss`, `odometry`: "
-     "at most "
-     "one each."},
+     "`reference`: the better IMU, exactly one. `study`: an IMU under study, one to six. `gnss`, `odometry`, "
+     "`time`: at most one each."},
     {"device.protocol",
      "What the device speaks. A `gnss` device: greis, nmea, ubx, rtklib_pos, csv_gnss, or xsens_mt where it "
-     "has a receiver inside. An `odometry` device: can_odometry. An IMU: any other."},
+     "has a receiver inside. An `odometry` device: can_odometry. A `time` device: pps. An IMU: any other."},
     {"device.rate_hz",
      "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, 50 of wheel "
      "speeds."},
@@ -148,7 +154,9 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.transport.kind",
      "How the bytes come in. Only a device that is never run live, but given as a file, needs no transport."},
     {"device.transport.port",
-     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number."},
+     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number. pps: the path, such as "
+     "`/dev/pps0`."},
+    {"device.transport.edge", "pps: the edge of the pulse at which the second begins, as `ppstest` names them."},
     {"device.transport.baud", "serial: bits per second; any rate that the hardware can make."},
     {"device.transport.stop_bits", "serial: stop bits."},
     {"device.transport.host",

@@ -109,6 +109,11 @@ study_status_t study_status(const std::string& name, const StudyOutput& study) {
 
 void set_time_budget(const TimeBudget& budget, device_status_t& device) {
   constexpr double kUsPerS = 1e6;
+  device.stamped_by = name_of(budget.stamped_by);
+  device.stamp_lead_us = budget.stamp_lead_s * kUsPerS;
+  device.stamp_lead_sd_us = budget.stamp_lead_sd_s * kUsPerS;
+  device.delay_ms = budget.delay_s * kMsPerS;
+  device.sd_delay_ms = budget.sd_delay_s * kMsPerS;
   device.latency_ms = budget.latency_s * kMsPerS;
   device.clock_drift_ppm = budget.clock_drift_ppm;
   device.clock_sd_us = budget.clock_sd_s * kUsPerS;
@@ -137,15 +142,17 @@ status_t status_of(const Configuration& configuration, const std::string& versio
 }
 
 std::string_view name_of(UtcSource source) noexcept {
-  constexpr std::array<std::string_view, 4> kNames{"none", "reference", "gnss", "pc"};
+  constexpr std::array<std::string_view, 5> kNames{"none", "reference", "gnss", "pc", "pps"};
   return kNames[static_cast<std::size_t>(source)];
 }
 
 void set_time_scale(const TimeScale& scale, status_t& status) {
-  const bool told_by_device = scale.source == UtcSource::kReference || scale.source == UtcSource::kGnss;
+  const bool told_by_device = is_told_by_device(scale.source);
   status.utc_source = name_of(scale.source);
   status.utc_sd_s = scale.source == UtcSource::kNone ? kUnknown : scale.sd_utc_s;
   status.host_clock_ppm = told_by_device ? -scale.rate * 1e6 : kUnknown;
+  status.pulses = as_count(scale.pulses.used);
+  status.host_utc_sd_us = scale.pulses.is_known ? scale.pulses.sd_utc_s * 1e6 : kUnknown;
 }
 
 void count_elements(status_t& status) {

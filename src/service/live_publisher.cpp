@@ -86,6 +86,7 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       lines_(configuration.devices.size()),
       can_watches_(configuration.devices.size()),
       line_problems_(configuration.devices.size()),
+      clock_keepers_([folder = options.out] { return ask_clock_keepers(folder); }),
       study_states_(study_devices_.size(), CalibrationStatus::kWaiting),
       observability_(study_devices_.size()),
       started_(host_now()),
@@ -411,7 +412,9 @@ void LivePublisher::fill_device(std::size_t index, device_status_t& device) cons
   device.clock_resets = as_count(line.counters.clock_resets);
   const StudyOutput* const study = study_of(index);
   if (study != nullptr) device.samples_late = as_count(study->counters.late);
-  set_time_budget(time_budget(line, study), device);
+  set_time_budget(
+      time_budget(line, study, configuration_.devices[index].role, last_ ? last_->time_scale.pulses : PulseState{}),
+      device);
 }
 
 /// The newest estimate of an S-IMU; null for other devices and before the first.
@@ -490,8 +493,19 @@ status_t LivePublisher::status(HostTime now) {
 }
 
 void LivePublisher::watch_pc_clock(HostTime now) {
+  if (auto keepers = clock_keepers_.take()) {
+    const auto news = pc_clock_.take(std::move(*keepers));
+    broadcast_.on_pc_clock(news, utc_at(news.state.reading.host));
+  }
   const auto news = pc_clock_.look(now);
   if (!news) return;
+  clock_keepers_.begin();
+  if (news->suspend) {
+    spdlog::warn(
+        "this PC was suspended for {:.1f} s: what the devices sent meanwhile is lost, and their clocks begin anew; "
+        "keep it awake while it records (systemd-inhibit)",
+        news->suspend->length_s);
+  }
   if (news->step) {
     spdlog::warn(
         "this PC's wall clock was stepped by {:+.6f} s; times and labels of this run go on as they were",
@@ -527,7 +541,8 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
   for (std::size_t i = 0; i < lines_.size(); ++i) {
     const LineStatus& line = lines_[i];
     DeviceRecord device;
-    device.time_budget = time_budget(line, study_of(i));
+    device.time_budget = time_budget(line, study_of(i), configuration_.devices[i].role,
+                                     last_ ? last_->time_scale.pulses : PulseState{});
     device.counters = line.counters;
     device.refused = line.refused;
     device.frames_dropped = line.frames_dropped;

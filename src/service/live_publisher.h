@@ -123,6 +123,7 @@ class LivePublisher {
   std::mutex line_problems_mutex_;
   std::vector<std::string> line_problems_;
   PcClockLog pc_clock_;
+  ClockKeeperInquiry clock_keepers_;
   std::vector<CalibrationStatus> study_states_;
   std::vector<ObservabilityWatch> observability_;
   std::int64_t refits_ = 0;

@@ -258,13 +258,34 @@ odometry_t odometry_message(const Snapshot& snapshot) {
   return m;
 }
 
+namespace {
+
+clock_keeper_t keeper_message(const ClockKeeper& keeper) {
+  clock_keeper_t m{};
+  m.name = keeper.name;
+  m.source = keeper.source;
+  m.stratum = keeper.stratum;
+  m.is_synchronised = static_cast<std::int8_t>(keeper.is_synchronised);
+  m.offset_s = keeper.offset_s;
+  m.sd_s = keeper.sd_s;
+  m.max_error_s = keeper.max_error_s;
+  m.frequency_ppm = keeper.frequency_ppm;
+  return m;
+}
+
+}  // namespace
+
 pc_clock_t pc_clock_message(const PcClockLog::News& news, UtcTime utc) {
-  const auto& [reading, kernel] = news.state;
+  const PcClockReading& reading = news.state.reading;
+  const auto& kernel = news.state.kernel;
   pc_clock_t m{};
   m.utime = to_utime(utc);
   m.host_ns = to_ns(reading.host);
   m.wall_ns = reading.wall.time_since_epoch().count();
   m.step_s = news.step ? news.step->size_s : 0.0;
+  m.suspended_s = news.suspend ? news.suspend->length_s : 0.0;
+  for (const ClockKeeper& keeper : news.state.keepers) m.keepers.push_back(keeper_message(keeper));
+  m.n_keepers = element_count(m.keepers);
   m.is_known = static_cast<std::int8_t>(kernel.has_value());
   m.offset_s = m.frequency_ppm = m.max_error_s = m.estimated_error_s = kUnknown;
   if (!kernel) return m;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/limits.h"
 #include "base/units.h"
 #include "calibration/estimator.h"
 #include "calibration/event_log.h"
@@ -628,7 +629,7 @@ TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
   for (std::size_t i = 0; i < truth.size(); ++i) used += estimator.study(i).counters.used - used_before;
   EXPECT_GT(estimator.counters().epochs_lost, 0U);
   EXPECT_EQ(estimator.epochs().size() + estimator.counters().epochs_lost, used);
-  // Much later still, the oldest samples have no reference any more and the newest no place in the queue.
+  // Much later still: the reference is kept for as long, and none is given up.
   const StudyCounters before = estimator.study(0).counters;
   std::uint64_t added = 0;
   while (drive.time_s() < 116.0) {
@@ -638,11 +639,34 @@ TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
   }
   estimator.advance(samples.back().arrival);
   const StudyCounters& after = estimator.study(0).counters;
-  EXPECT_GT(after.refused_full, 0U);
-  EXPECT_GT(after.no_reference, before.no_reference);
+  EXPECT_EQ(after.refused_full, 0U);
+  EXPECT_EQ(after.no_reference, before.no_reference);
   EXPECT_EQ(after.samples - before.samples, added);
+  EXPECT_LE(after.waiting, 10U);
   test::run(drive, estimator);
   for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_LT(worst_in_sd(estimator.study(i), truth[i]), 4.0);
+}
+
+TEST(BadInput, MoreSamplesThanMayWaitForAReferenceAreCounted) {
+  const std::vector<SimulatedStudy> truth(1, tilted());
+  SimulatedDrive drive(120.0, truth, 55);
+  EstimatorConfig config = drive.config();
+  config.studies[0].rate_hz = 20.0;  // it sends five times as much
+  Estimator estimator(config);
+  std::uint64_t added = 0;
+  std::vector<Sample> samples;
+  while (drive.time_s() < 116.0) {
+    samples = drive.next();
+    for (const Sample& sample : samples) {
+      if (sample.device != config.studies[0].device) continue;
+      estimator.add(sample);
+      ++added;
+    }
+  }
+  estimator.advance(samples.back().arrival);
+  const StudyCounters& counters = estimator.study(0).counters;
+  EXPECT_EQ(counters.samples, added);
+  EXPECT_EQ(counters.refused_full, added - waiting_samples_capacity(20.0));
 }
 
 TEST(EventLog, CountsWhatItHasNoRoomForAndIsEmptyOnceTaken) {

@@ -25,6 +25,7 @@
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <linux/pps.h>
 #include <sys/syscall.h>
 #include <time.h>
 #include <ucontext.h>
@@ -111,8 +112,9 @@ constexpr int kAllowedBoth[] = {SYS_clock_gettime, SYS_rt_sigreturn, SYS_restart
 constexpr int kAllowedEstimator[] = {SYS_clock_nanosleep};
 constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait2, SYS_epoll_ctl, SYS_read,
                               SYS_write,      SYS_recvmsg,      SYS_recvmmsg,  SYS_fcntl};
-/// Health of a line: the driver's error counts and an interface's flags, copied from the kernel's memory.
-constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS};
+/// Health of a line: the driver's error counts and an interface's flags, and the newest pulse of a PPS device without
+/// waiting for one, all copied from the kernel's memory.
+constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS, static_cast<unsigned>(PPS_FETCH)};
 
 void install_filter(bool is_io) {
   sock_filter program[64];

@@ -75,6 +75,8 @@ TEST(PackageScripts, TheUnitAllowsPortsThatArePluggedInLater) {
   }
   for (const char* ports : {"char-188 rw", "char-166 rw", "char-4 rw", "char-204 rw", "char-207 rw"})
     EXPECT_TRUE(allowed.contains(ports)) << ports;
+  for (const char* clocks : {"char-pps rw", "char-ptp r"})
+    EXPECT_TRUE(allowed.contains(clocks)) << "pulses of UTC, clocks of network cards: " << clocks;
   for (const char* loaded_later : {"char-ttyUSB rw", "char-ttyACM rw"})
     EXPECT_FALSE(allowed.contains(loaded_later)) << "unknown to the kernel until the first is plugged in";
 }

@@ -207,10 +207,15 @@ nlohmann::json device_json(const device_status_t& d) {
           {"latency_ms", known(d.latency_ms)},
           {"clock_sd_us", known(d.clock_sd_us)},
           {"clock_drift_ppm", known(d.clock_drift_ppm)},
+          {"stamped_by", d.stamped_by},
+          {"stamp_lead_us", known(d.stamp_lead_us)},
+          {"stamp_lead_sd_us", known(d.stamp_lead_sd_us)},
           {"wire_ms", known(d.wire_ms)},
           {"adapter_ms", known(d.adapter_ms)},
           {"t_d_ms", known(d.t_d_ms)},
-          {"sd_t_d_ms", known(d.sd_t_d_ms)}};
+          {"sd_t_d_ms", known(d.sd_t_d_ms)},
+          {"delay_ms", known(d.delay_ms)},
+          {"sd_delay_ms", known(d.sd_delay_ms)}};
 }
 
 nlohmann::json study_json(const study_status_t& s) {
