@@ -40,15 +40,16 @@ std::size_t write_pulse_record(const UtcPulse& pulse, std::span<std::uint8_t> ou
 }
 
 std::optional<UtcPulse> read_pulse_record(std::span<const std::uint8_t> bytes) noexcept {
-  if (bytes.size() < kPulseRecordBytes || !std::equal(kPulseMark.begin(), kPulseMark.end(), bytes.begin())) return std::nullopt;
+  if (bytes.size() < kPulseRecordBytes || !std::equal(kPulseMark.begin(), kPulseMark.end(), bytes.begin()))
+    return std::nullopt;
   const std::uint8_t edge = bytes[kPulseEdgeAt];
   if ((edge != 'a' && edge != 'c') || read_le<std::uint32_t>(bytes, kZeroAt) != 0) return std::nullopt;
   const auto time_ns = read_le<std::int64_t>(bytes, kPulseTimeAt);
   const auto wall_ns = read_le<std::int64_t>(bytes, kPulseWallAt);
   if (!is_instant(time_ns) || !is_instant(wall_ns)) return std::nullopt;
-  return UtcPulse{edge == 'a' ? PulseEdge::kAssert : PulseEdge::kClear, read_le<std::uint32_t>(bytes, kPulseSequenceAt),
-               host_time_from_ns(time_ns), utc_time_from_ns(wall_ns),
-               Duration{read_le<std::uint32_t>(bytes, kPulseApartAt)}};
+  return UtcPulse{edge == 'a' ? PulseEdge::kAssert : PulseEdge::kClear,
+                  read_le<std::uint32_t>(bytes, kPulseSequenceAt), host_time_from_ns(time_ns),
+                  utc_time_from_ns(wall_ns), Duration{read_le<std::uint32_t>(bytes, kPulseApartAt)}};
 }
 
 }  // namespace imuscope

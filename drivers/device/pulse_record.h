@@ -1,7 +1,8 @@
 #pragma once
 
-/// One pulse that marks a second of UTC (PPS, RFC 2783), and its form as bytes: the form in which pulses travel from a
-/// PPS device of the kernel to the decoder and into the capture, so that it is a device like any other.
+/// One pulse that marks a second of UTC (PPS, RFC 2783), and its form as bytes: the form in which pulses
+/// travel from a PPS device of the kernel to the decoder and into the capture, so that it is a device like
+/// any other.
 ///
 /// A record, least significant byte first:
 ///

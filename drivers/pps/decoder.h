@@ -1,7 +1,7 @@
 #pragma once
 
-/// Pulses of a PPS device of the kernel to kPulse samples. There is no wire: the bytes are pulse_record.h's, which the
-/// transport makes of what the kernel says.
+/// Pulses of a PPS device of the kernel to kPulse samples. There is no wire: the bytes are pulse_record.h's,
+/// which the transport makes of what the kernel says.
 
 #include "drivers/device/device.h"
 #include "drivers/device/pulse_record.h"

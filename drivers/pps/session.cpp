@@ -17,7 +17,8 @@ bool Session::hear(std::span<const std::uint8_t> bytes, HostTime) noexcept {
 }
 
 std::string_view Session::nothing_comes() const noexcept {
-  return "no pulse comes; check that the receiver has a fix and its pulse is switched on, the wire, and the other "
+  return "no pulse comes; check that the receiver has a fix and its pulse is switched on, the wire, and the "
+         "other "
          "edge (sudo ppstest DEVICE shows both)";
 }
 

@@ -111,8 +111,7 @@ Result<void> CanSocket::set_up(const CanSettings& settings) {
   address.can_ifindex = static_cast<int>(if_nametoindex(settings.interface.c_str()));
   const bool good = setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), filter_bytes) == 0 &&
                     set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, kAllErrors) &&
-                    set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, kOn) &&
-                    ask_for_stamps(fd_) &&
+                    set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, kOn) && ask_for_stamps(fd_) &&
                     set_can_option(fd_, SOL_SOCKET, SO_RXQ_OVFL, kOn) &&
                     bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   if (!good) {

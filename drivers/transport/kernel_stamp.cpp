@@ -105,9 +105,7 @@ HostTime KernelStampMap::map(const KernelStamps& stamps) noexcept {
     ++hardware_stamps_;
     time = std::min(hardware_.observe(stamps.hardware_ns, time), read_);
   }
-  by_ = by_card                    ? StampedBy::kInterface
-        : stamps.software_ns != 0 ? StampedBy::kKernel
-                                   : StampedBy::kRead;
+  by_ = by_card ? StampedBy::kInterface : stamps.software_ns != 0 ? StampedBy::kKernel : StampedBy::kRead;
   last_ = std::max(last_, time);
   const double lead_s = to_seconds(read_ - last_);
   leads_ = std::min(leads_ + 1, kLeadFrames);

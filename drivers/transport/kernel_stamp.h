@@ -40,7 +40,8 @@ bool ask_for_stamps(int fd) noexcept;
 struct BothClocks {
   HostTime host{};
   UtcTime wall{};
-  Duration apart{};  ///< from the reading of `host` before that of `wall` to the one after, `host` in the middle
+  Duration
+      apart{};  ///< from the reading of `host` before that of `wall` to the one after, `host` in the middle
 };
 /// The best of a few tries. Core: no allocation.
 [[nodiscard]] BothClocks read_both_clocks() noexcept;
@@ -64,8 +65,8 @@ class KernelStampMap {
   /// Steps of the wall clock.
   [[nodiscard]] std::uint64_t clock_steps() const noexcept { return clock_steps_; }
 
-  /// By whom the newest frames were stamped, and how long they waited for their read, which is what a stamp of
-  /// the read would be late by. Means over some hundred frames.
+  /// By whom the newest frames were stamped, and how long they waited for their read, which is what a stamp
+  /// of the read would be late by. Means over some hundred frames.
   [[nodiscard]] StampQuality quality() const noexcept {
     return {by_, lead_mean_s_, std::sqrt(std::max(lead_variance_s2_, 0.0))};
   }
@@ -74,7 +75,8 @@ class KernelStampMap {
   [[nodiscard]] HostTime software_time(std::int64_t software_ns) const noexcept;
 
   bool has_offset_ = false;
-  HostTime trusted_from_{HostTime::min()};  ///< what came before was stamped by a wall clock that was stepped since
+  HostTime trusted_from_{
+      HostTime::min()};  ///< what came before was stamped by a wall clock that was stepped since
   Duration wall_minus_host_{};
   HostTime read_{};
   HostTime last_{HostTime::min()};

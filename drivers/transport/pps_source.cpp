@@ -58,7 +58,8 @@ std::string devices_there() {
   }
   std::sort(names.begin(), names.end());
   if (names.empty())
-    return "this PC has none; load pps-gpio, or attach a serial port whose DCD pin the pulse is on: sudo ldattach pps "
+    return "this PC has none; load pps-gpio, or attach a serial port whose DCD pin the pulse is on: sudo "
+           "ldattach pps "
            "/dev/ttyS0";
   return fmt::format("there are: {}", fmt::join(names, ", "));
 }
@@ -68,12 +69,15 @@ Error no_device(const std::string& path, int error) {
   if (error == ENOENT || error == ENODEV || error == ENXIO) return {ErrorKind::kWork, what, devices_there()};
   if (error == EACCES || error == EPERM) {
     return {ErrorKind::kWork, what,
-            "join the group of the device (the package's udev rule gives it to dialout): sudo usermod -aG dialout $USER"};
+            "join the group of the device (the package's udev rule gives it to dialout): sudo usermod -aG "
+            "dialout $USER"};
   }
   return {ErrorKind::kWork, what, "check the device"};
 }
 
-std::string_view edge_name(PulseEdge edge) noexcept { return edge == PulseEdge::kAssert ? "assert" : "clear"; }
+std::string_view edge_name(PulseEdge edge) noexcept {
+  return edge == PulseEdge::kAssert ? "assert" : "clear";
+}
 
 }  // namespace
 
@@ -105,11 +109,13 @@ Result<void> PpsSource::choose_edge() {
   const int wanted = settings_.edge == PulseEdge::kAssert ? PPS_CAPTUREASSERT : PPS_CAPTURECLEAR;
   int modes = 0;
   if (const int error = device_->capabilities(modes); error != 0) {
-    return work_error(fmt::format("{} is no PPS device: {}", settings_.path, std::strerror(error)), devices_there());
+    return work_error(fmt::format("{} is no PPS device: {}", settings_.path, std::strerror(error)),
+                      devices_there());
   }
   if ((modes & wanted) == 0) {
-    return usage_error(fmt::format("{} does not see the {} edge", settings_.path, edge_name(settings_.edge)),
-                       fmt::format("set edge = \"{}\"", settings_.edge == PulseEdge::kAssert ? "clear" : "assert"));
+    return usage_error(
+        fmt::format("{} does not see the {} edge", settings_.path, edge_name(settings_.edge)),
+        fmt::format("set edge = \"{}\"", settings_.edge == PulseEdge::kAssert ? "clear" : "assert"));
   }
   pps_kparams params{};
   if (const int error = device_->parameters(params); error != 0)
@@ -117,10 +123,9 @@ Result<void> PpsSource::choose_edge() {
   if ((params.mode & wanted) != 0) return {};
   params.mode |= wanted;
   if (const int error = device_->set_parameters(params); error != 0) {
-    return work_error(
-        fmt::format("{} does not capture the {} edge, and cannot be told to: {}", settings_.path,
-                    edge_name(settings_.edge), std::strerror(error)),
-        fmt::format("take the other edge, or once, as root: ppstest {}", settings_.path));
+    return work_error(fmt::format("{} does not capture the {} edge, and cannot be told to: {}",
+                                  settings_.path, edge_name(settings_.edge), std::strerror(error)),
+                      fmt::format("take the other edge, or once, as root: ppstest {}", settings_.path));
   }
   return {};
 }
@@ -131,12 +136,14 @@ IoResult PpsSource::read(std::span<std::uint8_t> buffer) noexcept {
   (void)!::read(timer_, &expirations, sizeof expirations);
   pps_kinfo newest{};
   const int error = device_->fetch(newest);
-  if (error != 0) return {error == EINTR || error == ETIMEDOUT || error == EAGAIN ? IoStatus::kNothing : IoStatus::kGone};
+  if (error != 0)
+    return {error == EINTR || error == ETIMEDOUT || error == EAGAIN ? IoStatus::kNothing : IoStatus::kGone};
   const BothClocks now = read_both_clocks();
   const Duration wall_minus_host = now.wall.time_since_epoch() - now.host.time_since_epoch();
   if (has_clocks_) {
     const Duration before = clocks_.wall.time_since_epoch() - clocks_.host.time_since_epoch();
-    if (std::chrono::abs(wall_minus_host - before) > kWallStepMin + now.apart + clocks_.apart) trusted_from_ = now.host;
+    if (std::chrono::abs(wall_minus_host - before) > kWallStepMin + now.apart + clocks_.apart)
+      trusted_from_ = now.host;
   }
   has_clocks_ = true;
   clocks_ = now;

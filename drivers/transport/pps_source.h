@@ -1,8 +1,8 @@
 #pragma once
 
-/// Pulses of a PPS device of the kernel (RFC 2783; /dev/pps0 of pps-gpio, pps-ldisc or a card): each as a pulse_record.h,
-/// on the host's time scale. The kernel stamps a pulse in its interrupt, so that it does not matter when it is asked;
-/// it is asked ten times a second.
+/// Pulses of a PPS device of the kernel (RFC 2783; /dev/pps0 of pps-gpio, pps-ldisc or a card): each as a
+/// pulse_record.h, on the host's time scale. The kernel stamps a pulse in its interrupt, so that it does not
+/// matter when it is asked; it is asked ten times a second.
 
 #include <linux/pps.h>
 
@@ -39,7 +39,8 @@ class PpsSource final : public Transport {
   /// Errors name the remedy: a missing device lists those there are. Not for the real-time thread.
   static Result<std::unique_ptr<PpsSource>> open(const PpsSettings& settings);
   /// The same with the kernel's part already there, for tests.
-  static Result<std::unique_ptr<PpsSource>> with(const PpsSettings& settings, std::unique_ptr<PpsDevice> device);
+  static Result<std::unique_ptr<PpsSource>> with(const PpsSettings& settings,
+                                                 std::unique_ptr<PpsDevice> device);
 
   PpsSource(const PpsSource&) = delete;
   PpsSource& operator=(const PpsSource&) = delete;
@@ -65,8 +66,9 @@ class PpsSource final : public Transport {
   bool has_last_ = false;
   std::uint32_t last_sequence_ = 0;
   bool has_clocks_ = false;
-  BothClocks clocks_;                      ///< as they were last
-  HostTime trusted_from_{HostTime::min()};  ///< what came before was stamped by a wall clock that was stepped since
+  BothClocks clocks_;  ///< as they were last
+  HostTime trusted_from_{
+      HostTime::min()};  ///< what came before was stamped by a wall clock that was stepped since
 };
 
 }  // namespace imuscope

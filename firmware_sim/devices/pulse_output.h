@@ -1,7 +1,7 @@
 #pragma once
 
-/// A receiver's pulse output: one pulse at the beginning of each second of UTC, while it has a fix. An emission of it is
-/// one pulse, which has no bytes. There is nothing to be left out.
+/// A receiver's pulse output: one pulse at the beginning of each second of UTC, while it has a fix. An
+/// emission of it is one pulse, which has no bytes. There is nothing to be left out.
 
 #include "firmware_sim/devices/device.h"
 #include "firmware_sim/devices/sample_grid.h"

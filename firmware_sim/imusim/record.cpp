@@ -71,8 +71,8 @@ Outcome<void> clear_folder(const std::filesystem::path& folder, const Configurat
 
 /// Runs one device through the whole scenario and writes what the host reads.
 template <typename Line>
-Outcome<Recorded> record_over(Line line, World& world, WorldDevice& device, const std::filesystem::path& folder,
-                              std::atomic<double>& done_s) {
+Outcome<Recorded> record_over(Line line, World& world, WorldDevice& device,
+                              const std::filesystem::path& folder, std::atomic<double>& done_s) {
   OutputFile bytes_file(folder / (device.played.name + ".bin"));
   OutputFile arrivals(folder / (device.played.name + ".arrivals.csv"));
   arrivals.write("byte_offset,n_bytes,arrival_ns\n");

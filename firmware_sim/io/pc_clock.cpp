@@ -47,9 +47,8 @@ double PcClock::seconds_at(double t_s) const {
 }
 
 bool PcClock::is_asleep_at(double t_s) const {
-  return std::any_of(suspends.begin(), suspends.end(), [t_s](const Suspend& suspend) {
-    return t_s >= suspend.begin_s && t_s < suspend.end_s;
-  });
+  return std::any_of(suspends.begin(), suspends.end(),
+                     [t_s](const Suspend& suspend) { return t_s >= suspend.begin_s && t_s < suspend.end_s; });
 }
 
 double PcClock::ppm_at(double t_s) const {

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Where the newest pulse lies for whoever plays the kernel's part towards the program under test: a file that holds
-/// its record (pulse_line.h) and nothing else.
+/// Where the newest pulse lies for whoever plays the kernel's part towards the program under test: a file
+/// that holds its record (pulse_line.h) and nothing else.
 
 #include <string>
 #include <tl/expected.hpp>

@@ -1,9 +1,9 @@
 #pragma once
 
-/// A pulse on its way into the PC: its edge raises an interrupt, in which the kernel reads its clocks, and who asks the
-/// kernel ten times a second is told of the newest one. What is handed out is the form in which imuscope records pulses,
-/// 32 bytes, least significant byte first: "PPSa", the count (u32), CLOCK_MONOTONIC (i64, ns), CLOCK_REALTIME (i64, ns),
-/// how far apart the two were read (u32, ns), 0 (u32).
+/// A pulse on its way into the PC: its edge raises an interrupt, in which the kernel reads its clocks, and
+/// who asks the kernel ten times a second is told of the newest one. What is handed out is the form in which
+/// imuscope records pulses, 32 bytes, least significant byte first: "PPSa", the count (u32), CLOCK_MONOTONIC
+/// (i64, ns), CLOCK_REALTIME (i64, ns), how far apart the two were read (u32, ns), 0 (u32).
 
 #include <cstdint>
 #include <deque>
@@ -20,7 +20,7 @@ namespace imusim {
 struct PulseLineOptions {
   std::int64_t host_begin_ns = 0;  ///< CLOCK_MONOTONIC at the scenario's time 0
   PcClock clock;
-  Utc wall_begin{};               ///< CLOCK_REALTIME then
+  Utc wall_begin{};                ///< CLOCK_REALTIME then
   double interrupt_mean_s = 2e-6;  ///< until the kernel has read its clock, exponentially distributed
   double late_share = 0.01;        ///< of pulses whose interrupt has to wait
   double late_mean_s = 100e-6;     ///< for so long, likewise

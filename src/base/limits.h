@@ -68,8 +68,8 @@ static_assert(kWaitingSamplesMin >= ring_capacity(kMaxRate_hz, kCoreStall_s + kR
 [[nodiscard]] constexpr std::size_t reference_window_capacity(double rate_hz) noexcept {
   return waiting_samples_capacity(rate_hz);
 }
-/// Past of the reference that an S-IMU whose mounting is not known yet, or a GNSS solution, is held against: places at
-/// its rate.
+/// Past of the reference that an S-IMU whose mounting is not known yet, or a GNSS solution, is held against:
+/// places at its rate.
 inline constexpr double kReferencePast_s = 2.5;
 inline constexpr std::size_t kReferencePastMin = 256;
 [[nodiscard]] constexpr std::size_t reference_past_capacity(double rate_hz) noexcept {

@@ -59,7 +59,8 @@ InitialAlignmentOptions alignment_options(const EstimatorConfig& config) noexcep
   return options;
 }
 
-/// The reference's own count may be further on than the host's clock by so much: else the host's clock stood still.
+/// The reference's own count may be further on than the host's clock by so much: else the host's clock stood
+/// still.
 constexpr double kSleptMin_s = 0.5;
 /// A receiver's message comes within this after its epoch.
 constexpr Duration kPulsesAgree = std::chrono::milliseconds{500};

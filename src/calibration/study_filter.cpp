@@ -205,7 +205,8 @@ void StudyFilter::work_off(StudyContext& context, HostTime cut) noexcept {
 
 ReferenceResult StudyFilter::look(const StudyContext& context, HostTime time, Seen& seen) const noexcept {
   // A coarse offset that is wrong by seconds has to be found out.
-  constexpr Duration kCoarsePast = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * kReferencePast_s));
+  constexpr Duration kCoarsePast =
+      std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * kReferencePast_s));
   if (!calibrating_ && context.window.newest_sample() > HostTime::min() &&
       time < context.window.newest_sample() - kCoarsePast)
     return ReferenceResult::kTooOld;

@@ -39,8 +39,8 @@ class StudyFilter {
   void add(const Sample& sample) noexcept;
   /// The reference's rate, for the coarse time offset.
   void add_reference(HostTime time, double rate_radps) noexcept;
-  /// Processes what has its reference. What has none waits for it, and is given up after a while as long as the
-  /// mounting is not known.
+  /// Processes what has its reference. What has none waits for it, and is given up after a while as long as
+  /// the mounting is not known.
   void process(StudyContext& context, HostTime cut) noexcept;
 
   void set_noise(FilterCore& core, const StudyNoise& noise) noexcept;

@@ -24,8 +24,8 @@ enum class Direction : std::uint8_t {
   kRead,
   kWrite,
   kLine,  ///< nothing went either way: the line runs at another rate (line_rate_bytes())
-  /// A read whose last byte had come earlier, as the kernel or the card say: the first kReceivedBytes bytes are
-  /// that instant (received_bytes()), those that were read follow.
+  /// A read whose last byte had come earlier, as the kernel or the card say: the first kReceivedBytes bytes
+  /// are that instant (received_bytes()), those that were read follow.
   kStampedRead,
 };
 
@@ -145,7 +145,8 @@ class RawTap {
       bytes = bytes.subspan(piece.size());
       // The ring counts what it refuses.
       (void)ring_->try_push({{sequences_[device]++, arrival, device, direction, !bytes.empty()}, piece});
-      if (direction == Direction::kStampedRead) direction = Direction::kRead;  // the stamp went with the first
+      if (direction == Direction::kStampedRead)
+        direction = Direction::kRead;  // the stamp went with the first
     }
   }
 

@@ -146,7 +146,7 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "has a receiver inside. An `odometry` device: can_odometry. A `time` device: pps. An IMU: any other."},
     {"device.rate_hz",
      "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, 50 of wheel "
-     "speeds."},
+     "speeds, 1 of pulses."},
     {"device.axes",
      "Rotates the device's components to its frame; the reference's and the vehicle's is forward-right-down. "
      "Three signed axes, or the rows of a rotation matrix. Without it an ixblue_stdbin telegram, which is "
@@ -154,9 +154,11 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.transport.kind",
      "How the bytes come in. Only a device that is never run live, but given as a file, needs no transport."},
     {"device.transport.port",
-     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number. pps: the path, such as "
+     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number. pps: the path, "
+     "such as "
      "`/dev/pps0`."},
-    {"device.transport.edge", "pps: the edge of the pulse at which the second begins, as `ppstest` names them."},
+    {"device.transport.edge",
+     "pps: the edge of the pulse at which the second begins, as `ppstest` names them."},
     {"device.transport.baud", "serial: bits per second; any rate that the hardware can make."},
     {"device.transport.stop_bits", "serial: stop bits."},
     {"device.transport.host",

@@ -9,14 +9,14 @@ namespace {
 
 static_assert(std::is_trivially_copyable_v<PulseClock>);
 
-// Of an interrupt on a PC: some microseconds where nothing holds it up. What is learned is no better than the first
-// and no worse than the last.
+// Of an interrupt on a PC: some microseconds where nothing holds it up. What is learned is no better than the
+// first and no worse than the last.
 constexpr double kJitterFirst_s = 5e-6;
 constexpr double kJitterMin_s = 1e-6;
 constexpr double kJitterMax_s = 1e-3;
 constexpr double kJitterPulses = 60.0;
-// Quartzes of PCs: within 50 ppm, NTP's corrections beside, a rate that wanders by 1e-8 in a second, and a phase that
-// does by 1e-8 s.
+// Quartzes of PCs: within 50 ppm, NTP's corrections beside, a rate that wanders by 1e-8 in a second, and a
+// phase that does by 1e-8 s.
 constexpr double kSlewedRateSd = 500e-6;
 constexpr double kPulseRateWalk_per_sqrt_s = 1e-8;
 constexpr double kPhaseWalk_s_per_sqrt_s = 1e-8;
@@ -39,7 +39,8 @@ void PulseClock::begin(HostTime time, UtcTime second) noexcept {
 
 double PulseClock::variance_after(double step_s) const noexcept {
   // The rate's walk of the interval moves the phase as well, by a third of its cube.
-  return p_offset_ + 2.0 * step_s * p_both_ + square(step_s) * p_rate_ + square(kPhaseWalk_s_per_sqrt_s) * step_s +
+  return p_offset_ + 2.0 * step_s * p_both_ + square(step_s) * p_rate_ +
+         square(kPhaseWalk_s_per_sqrt_s) * step_s +
          square(kPulseRateWalk_per_sqrt_s) * step_s * square(step_s) / 3.0;
 }
 
@@ -59,7 +60,9 @@ bool PulseClock::observe(HostTime time, UtcTime second) noexcept {
   double p_both = p_both_ + step_s * p_rate_ + 0.5 * square(kPulseRateWalk_per_sqrt_s) * square(step_s);
   double p_rate = p_rate_ + square(kPulseRateWalk_per_sqrt_s) * step_s;
   if (square(innovation_s) > square(kAstraySigmas) * (p_offset + jitter_variance_s2_)) {
-    const bool goes_on = astray_s_ * innovation_s > 0.0;
+    // No interrupt comes before its pulse: one that seems to is the clock's own doing, as is a second one in
+    // a row.
+    const bool goes_on = innovation_s > 0.0 || astray_s_ * innovation_s > 0.0;
     astray_s_ = innovation_s;
     if (!goes_on) {
       ++left_out_;
@@ -93,7 +96,8 @@ UtcTime PulseClock::at(HostTime time) const noexcept {
 }
 
 double PulseClock::sd_s(Duration after) const noexcept {
-  // Interrupts are late and never early: in the mean by about as much as they scatter, which no average takes out.
+  // Interrupts are late and never early: in the mean by about as much as they scatter, which no average takes
+  // out.
   return std::sqrt(variance_after(std::abs(to_seconds(after))) + jitter_variance_s2_);
 }
 

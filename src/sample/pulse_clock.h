@@ -1,12 +1,12 @@
 #pragma once
 
-/// The host's clock against UTC by pulses that mark its seconds (PPS): to microseconds, where messages tell to a
-/// hundred milliseconds. Which second a pulse marks somebody else says.
+/// The host's clock against UTC by pulses that mark its seconds (PPS): to microseconds, where messages tell
+/// to a hundred milliseconds. Which second a pulse marks somebody else says.
 ///
-/// Kalman filter of two states, UTC minus host time and its rate. A pulse is stamped late where an interrupt had to
-/// wait: one that lies off by itself is left out, two in a row are the clock's own (NTP slews CLOCK_MONOTONIC, by up
-/// to 500 ppm from one moment to the next). The pulses' jitter is learned from what they scatter. Stamps are late and
-/// never early; how late in the mean nobody tells, and the sd has as much as the jitter for it.
+/// Kalman filter of two states, UTC minus host time and its rate. A pulse is stamped late where an interrupt
+/// had to wait: one that lies off by itself is left out, two in a row are the clock's own (NTP slews
+/// CLOCK_MONOTONIC, by up to 500 ppm from one moment to the next). The pulses' jitter is learned from what
+/// they scatter.
 ///
 /// Deterministic: a function of the observations alone.
 

@@ -32,14 +32,14 @@ constexpr double kReceiverDelaySd_s = 0.1;
 constexpr double kLeapTolerance_s = 0.02;
 constexpr Duration kAroundMidnight = std::chrono::seconds{10};
 
-// A pulse is believed to mark the second of whoever tells UTC by messages, which come up to so much later than the
-// instants that they tell.
+// A pulse is believed to mark the second of whoever tells UTC by messages, which come up to so much later
+// than the instants that they tell.
 constexpr double kMessageDelayMax_s = 0.9;
 // Pulses that are further off the line through those before are no pulses of the same seconds.
 constexpr double kPulseAstray_s = 0.1;
 constexpr int kMiscountedToShift = 3;
-// The pulses are believed alone for so long after the last of them, and then as long as their line is better known than
-// messages would tell: a quartz that warms up goes astray by a millisecond in minutes.
+// The pulses are believed alone for so long after the last of them, and then as long as their line is better
+// known than messages would tell: a quartz that warms up goes astray by a millisecond in minutes.
 constexpr Duration kPulsesHold = std::chrono::minutes{10};
 // The stream of an R-IMU that does not tell UTC: filters and processor of the unit, its line, an adapter.
 constexpr double kStreamDelaySd_s = 0.005;
@@ -107,8 +107,8 @@ void UtcScale::observe(UtcSource source, HostTime time, UtcTime utc) noexcept {
   if (pulses_.is_known()) measure_delay(source, time, utc);
   const bool is_spare = source == UtcSource::kGnss && scale_.source == UtcSource::kReference &&
                         time - last_reference_ < kReferenceHolds;
-  const bool pulses_hold =
-      source == UtcSource::kGnss && scale_.source == UtcSource::kPulses && time - pulses_.last() < kPulsesHold;
+  const bool pulses_hold = source == UtcSource::kGnss && scale_.source == UtcSource::kPulses &&
+                           time - pulses_.last() < kPulsesHold;
   if (is_spare || pulses_hold || time <= last_) return;
   // What the pulses have measured of the receiver's delay holds on without them.
   if (source == UtcSource::kGnss && !std::isnan(scale_.pulses.gnss_delay.mean_s))
@@ -188,7 +188,8 @@ void UtcScale::observe_pulse(HostTime time, UtcTime wall) noexcept {
   told.sd_rate = pulses_.sd_rate();
   told.jitter_s = pulses_.jitter_s();
   ++told.used;
-  const bool reference_tells = scale_.source == UtcSource::kReference && time - last_reference_ < kReferenceHolds;
+  const bool reference_tells =
+      scale_.source == UtcSource::kReference && time - last_reference_ < kReferenceHolds;
   if (!reference_tells) follow_pulses(time);
 }
 
@@ -225,7 +226,8 @@ void UtcScale::measure_delay(UtcSource source, HostTime time, UtcTime utc) noexc
   }
   miscounted_in_a_row_ = 0;
   scale_.pulses.counted_by_pc_clock = false;
-  average(delay_s, source == UtcSource::kReference ? scale_.pulses.reference_delay : scale_.pulses.gnss_delay);
+  average(delay_s,
+          source == UtcSource::kReference ? scale_.pulses.reference_delay : scale_.pulses.gnss_delay);
 }
 
 /// A leap second has passed, or the PC's clock had counted wrongly.
@@ -243,8 +245,8 @@ void UtcScale::count_seconds_anew(HostTime time, Duration by, UtcTime utc) noexc
   publish(UtcSource::kPulses);
 }
 
-/// What nobody tells of the delays that stand in the scale: of the receiver's messages, and of the R-IMU's stream where
-/// its own tags do not take it out.
+/// What nobody tells of the delays that stand in the scale: of the receiver's messages, and of the R-IMU's
+/// stream where its own tags do not take it out.
 double UtcScale::delay_sd_s(UtcSource source) const noexcept {
   if (source == UtcSource::kReference) return 0.0;
   const auto known = [](const StreamDelay& delay, double otherwise_s) {

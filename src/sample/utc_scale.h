@@ -8,11 +8,12 @@
 /// Kalman filter of two states, UTC minus host time and its rate: both wander, the first as a clock map's
 /// line does that settles, the second as a quartz does that warms up. The tags' errors are taken as white.
 ///
-/// Pulses that mark seconds (PPS) tell the host's clock far better than any message does; the tags of a receiver, or the
-/// PC's wall clock where nothing else tells UTC, say which second is meant. Samples of the R-IMU have their times from a
-/// clock map, which leaves the constant delay of their stream in them. The R-IMU's own tags know of it, as they say
-/// which sample is of which instant; pulses do not. So where the R-IMU tells UTC the scale follows it, and the pulses
-/// measure the delays of the streams; where it does not, the scale follows the pulses.
+/// Pulses that mark seconds (PPS) tell the host's clock far better than any message does; the tags of a
+/// receiver, or the PC's wall clock where nothing else tells UTC, say which second is meant. Samples of the
+/// R-IMU have their times from a clock map, which leaves the constant delay of their stream in them. The
+/// R-IMU's own tags know of it, as they say which sample is of which instant; pulses do not. So where the
+/// R-IMU tells UTC the scale follows it, and the pulses measure the delays of the streams; where it does not,
+/// the scale follows the pulses.
 ///
 /// Deterministic: a function of the observations alone.
 

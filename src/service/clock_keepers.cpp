@@ -107,8 +107,8 @@ std::optional<ClockKeeper> ask_ptp(const std::filesystem::path& socket_folder) {
     if (::access(server, W_OK) != 0) continue;
     for (const char* path : {"/usr/sbin/pmc", "/usr/bin/pmc"}) {
       if (!is_program(path)) continue;
-      const auto text = output_of({path, "-u", "-b", "0", "-i", socket, "-s", server, "GET CURRENT_DATA_SET",
-                                   "GET PARENT_DATA_SET"});
+      const auto text = output_of(
+          {path, "-u", "-b", "0", "-i", socket, "-s", server, "GET CURRENT_DATA_SET", "GET PARENT_DATA_SET"});
       std::error_code ignored;
       std::filesystem::remove(socket, ignored);
       return text ? read_ptp_management(*text) : std::nullopt;
@@ -135,12 +135,14 @@ std::optional<ClockKeeper> read_card_clock(const std::string& path) {
   for (unsigned i = 0; i < std::min(readings.n_samples, kCardReadings); ++i) {
     const auto& [before, card, after] = readings.ts[i];
     // Whole seconds apart: a double holds the nanoseconds of a difference, not of a date.
-    const double apart_s = static_cast<double>(after.sec - before.sec) +
-                           kNanosecond_s * (static_cast<double>(after.nsec) - static_cast<double>(before.nsec));
+    const double apart_s =
+        static_cast<double>(after.sec - before.sec) +
+        kNanosecond_s * (static_cast<double>(after.nsec) - static_cast<double>(before.nsec));
     if (apart_s < 0.0 || apart_s >= closest_s) continue;
     closest_s = apart_s;
     const ptp_clock_time since_before{card.sec - before.sec, card.nsec, 0};
-    difference_s = seconds_of(since_before) - kNanosecond_s * static_cast<double>(before.nsec) - apart_s / 2.0;
+    difference_s =
+        seconds_of(since_before) - kNanosecond_s * static_cast<double>(before.nsec) - apart_s / 2.0;
   }
   if (!std::isfinite(closest_s)) return std::nullopt;
   return card_clock(path, difference_s, closest_s);
@@ -149,11 +151,19 @@ std::optional<ClockKeeper> read_card_clock(const std::string& path) {
 }  // namespace
 
 std::optional<ClockKeeper> read_chrony_tracking(std::string_view text) {
-  // chronyc(1), -c; client.c of chrony 4: reference id, name, stratum, reference time, offset (slow: positive), last
-  // offset, rms offset, frequency (slow: positive), residual frequency, skew, root delay, root dispersion, update
-  // interval, leap status.
+  // chronyc(1), -c; client.c of chrony 4: reference id, name, stratum, reference time, offset (slow:
+  // positive), last offset, rms offset, frequency (slow: positive), residual frequency, skew, root delay,
+  // root dispersion, update interval, leap status.
   constexpr std::size_t kFields = 14;
-  enum : std::size_t { kSource = 1, kStratum, kOffset = 4, kRmsOffset = 6, kFrequency, kRootDelay = 10, kRootDispersion };
+  enum : std::size_t {
+    kSource = 1,
+    kStratum,
+    kOffset = 4,
+    kRmsOffset = 6,
+    kFrequency,
+    kRootDelay = 10,
+    kRootDispersion
+  };
   const auto line = text.substr(0, text.find_first_of("\r\n"));
   const auto fields = fields_of(line, ',');
   if (fields.size() < kFields) return std::nullopt;
@@ -191,7 +201,7 @@ std::optional<ClockKeeper> read_ptp_management(std::string_view text) {
   keeper.stratum = static_cast<int>(std::clamp(*steps_value, 0.0, 255.0));
   keeper.is_synchronised = keeper.stratum > 0;
   keeper.offset_s = kNanosecond_s * *offset_ns;
-  // The way to the master is measured there and back: what the two differ by is at most all of it.
+  // The way to the source is measured there and back: what the two differ by is at most all of it.
   keeper.max_error_s = kNanosecond_s * (std::abs(*offset_ns) + std::abs(*path_ns));
   return keeper;
 }
@@ -214,7 +224,8 @@ std::optional<std::string> output_of(const std::vector<std::string>& arguments) 
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  // What it complains of goes nowhere: it cannot be written there.
+  posix_spawn_file_actions_adddup2(&actions, STDIN_FILENO, STDERR_FILENO);
   std::vector<char*> words;
   for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
   words.push_back(nullptr);

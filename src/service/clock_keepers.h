@@ -1,8 +1,8 @@
 #pragma once
 
-/// Who keeps the PC's clock, and how well it says it does: chrony and ptp4l, asked through their own programs, and the
-/// clocks of network cards (PTP), read against the wall clock. Soft world: starts programs, each for two seconds at
-/// most, in a thread of its own.
+/// Who keeps the PC's clock, and how well it says it does: chrony and ptp4l, asked through their own
+/// programs, and the clocks of network cards (PTP), read against the wall clock. Soft world: starts programs,
+/// each for two seconds at most, in a thread of its own.
 
 #include <atomic>
 #include <cstdint>
@@ -25,7 +25,8 @@ struct ClockKeeper {
   std::string source;  ///< whom it follows
   int stratum = -1;    ///< of ptp4l: steps to the grandmaster; -1: none
   bool is_synchronised = false;
-  double offset_s = kUnsaid;  ///< of the wall clock against its source; of ptp4l of the card's clock; ahead: positive
+  double offset_s =
+      kUnsaid;  ///< of the wall clock against its source; of ptp4l of the card's clock; ahead: positive
   double sd_s = kUnsaid;
   double max_error_s = kUnsaid;
   double frequency_ppm = kUnsaid;

@@ -71,7 +71,8 @@ HostTime Core::common_horizon(std::int64_t index, HostTime cut) const noexcept {
 
 HostTime Core::reach_of(std::size_t device, std::int64_t index, HostTime cut) noexcept {
   // The reference runs ahead by as long as an S sample waits for it.
-  if (horizon_ != HostTime::max()) return device == reference_ ? horizon_ + duration(kReferenceWait_s) : horizon_;
+  if (horizon_ != HostTime::max())
+    return device == reference_ ? horizon_ + duration(kReferenceWait_s) : horizon_;
   if (device == reference_ || !has_front(device, index, cut)) return HostTime::max();
   const Sample& oldest = *rings_[device]->front();
   if (is_study_[device]) {
@@ -138,10 +139,9 @@ void Core::note_first_reference(const Sample& sample) noexcept {
 /// From the first who tells it; a device is believed over the PC's clock.
 void Core::note_first_utc() noexcept {
   const TimeScale& scale = estimator_.time_scale();
-  const bool is_better =
-      first_utc_from_ == UtcSource::kNone ||
-      (first_utc_from_ == UtcSource::kPcClock && scale.source != UtcSource::kPcClock) ||
-      (first_utc_from_ == UtcSource::kGnss && scale.source == UtcSource::kPulses);
+  const bool is_better = first_utc_from_ == UtcSource::kNone ||
+                         (first_utc_from_ == UtcSource::kPcClock && scale.source != UtcSource::kPcClock) ||
+                         (first_utc_from_ == UtcSource::kGnss && scale.source == UtcSource::kPulses);
   if (!snapshot_.has_reference || scale.source == UtcSource::kNone || !is_better) return;
   first_utc_from_ = scale.source;
   snapshot_.has_utc = true;

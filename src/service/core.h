@@ -133,8 +133,9 @@ class CoreSink {
 /// samples meet the reference in the order in which both were measured. Meanwhile nothing is given up as
 /// late. Nor is it while no device is heard at all: lateness is counted in time in which the host listened.
 ///
-/// The line of one device may stand still alone. Samples of an S-IMU that come long after they were measured are taken
-/// in such steps, too; while the reference is silent, S samples wait in the estimator and GNSS solutions in their ring.
+/// The line of one device may stand still alone. Samples of an S-IMU that come long after they were measured
+/// are taken in such steps, too; while the reference is silent, S samples wait in the estimator and GNSS
+/// solutions in their ring.
 class Core {
  public:
   /// @param schedule  of the run that is replayed, empty otherwise
@@ -189,7 +190,7 @@ class Core {
   HostTime horizon_{HostTime::max()};  ///< of all devices: what is of a later time of validity waits
   std::vector<Reach> reaches_;         ///< one a device
   std::vector<bool> is_study_;
-  bool steps_study_ = false;                  ///< an S-IMU is caught up with by itself
+  bool steps_study_ = false;  ///< an S-IMU is caught up with by itself
   HostTime newest_reference_{HostTime::min()};
   HostTime newest_arrival_{HostTime::min()};  ///< of what was consumed
   HostTime listened_until_{HostTime::min()};  ///< what the estimator counts lateness by

@@ -32,8 +32,8 @@ Result<std::unique_ptr<Transport>> open_line(const DeviceConfig& device, const s
     return std::unique_ptr<Transport>(std::move(*stream));
   }
   if (device.pps) {
-    auto source = PpsSource::open(
-        {device.pps->port, device.pps->clear_edge ? PulseEdge::kClear : PulseEdge::kAssert});
+    auto source =
+        PpsSource::open({device.pps->port, device.pps->clear_edge ? PulseEdge::kClear : PulseEdge::kAssert});
     if (!source) return tl::unexpected<Error>(std::move(source.error()));
     return std::unique_ptr<Transport>(std::move(*source));
   }

@@ -412,9 +412,9 @@ void LivePublisher::fill_device(std::size_t index, device_status_t& device) cons
   device.clock_resets = as_count(line.counters.clock_resets);
   const StudyOutput* const study = study_of(index);
   if (study != nullptr) device.samples_late = as_count(study->counters.late);
-  set_time_budget(
-      time_budget(line, study, configuration_.devices[index].role, last_ ? last_->time_scale.pulses : PulseState{}),
-      device);
+  set_time_budget(time_budget(line, study, configuration_.devices[index].role,
+                              last_ ? last_->time_scale.pulses : PulseState{}),
+                  device);
 }
 
 /// The newest estimate of an S-IMU; null for other devices and before the first.
@@ -502,7 +502,8 @@ void LivePublisher::watch_pc_clock(HostTime now) {
   clock_keepers_.begin();
   if (news->suspend) {
     spdlog::warn(
-        "this PC was suspended for {:.1f} s: what the devices sent meanwhile is lost, and their clocks begin anew; "
+        "this PC was suspended for {:.1f} s: what the devices sent meanwhile is lost, and their clocks begin "
+        "anew; "
         "keep it awake while it records (systemd-inhibit)",
         news->suspend->length_s);
   }

@@ -2,7 +2,8 @@
 
 /// The PC's own clock: what the kernel knows of it, and steps of the wall clock, which nothing of the core
 /// looks at and which everything that a person compares with the run is stamped by. And whether the PC slept:
-/// CLOCK_MONOTONIC, by which everything is stamped, stands still meanwhile, and the devices go on. Soft world.
+/// CLOCK_MONOTONIC, by which everything is stamped, stands still meanwhile, and the devices go on. Soft
+/// world.
 
 #include <cstdint>
 #include <functional>
@@ -52,9 +53,8 @@ struct PcClockReading {
 };
 [[nodiscard]] PcClockReading read_pc_clocks() noexcept;
 
-/// Finds steps by the difference of the two clocks. What NTP slews, at most 500 ppm, is no step, nor is the time for
-/// which the PC slept.
-/// Thread: one. Deterministic: a function of the readings.
+/// Finds steps by the difference of the two clocks. What NTP slews, at most 500 ppm, is no step, nor is the
+/// time for which the PC slept. Thread: one. Deterministic: a function of the readings.
 class WallClockWatch {
  public:
   /// A step since the reading before, where there is one.
@@ -99,7 +99,8 @@ class PcClockLog {
     std::optional<WallClockStep> step;
     std::optional<PcSuspend> suspend{};
   };
-  /// Call at every turn of the thread: says something at the start, once a minute, and after a step or a sleep.
+  /// Call at every turn of the thread: says something at the start, once a minute, and after a step or a
+  /// sleep.
   [[nodiscard]] std::optional<News> look(HostTime now);
 
   /// What those who keep the clock answered; a state to be published, with that.

@@ -72,7 +72,8 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
   const bool is_study = found != studies.end() && run.last != nullptr;
   entry["late"] = nullptr;
   if (is_study) {
-    const StudyCounters& study = run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters;
+    const StudyCounters& study =
+        run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters;
     entry["late"] = study.late + study.refused_full;
     entry["waiting"] = study.waiting;
   }

@@ -17,7 +17,8 @@ struct TimeBudget {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
   StampedBy stamped_by = StampedBy::kRead;  ///< who says when bytes arrived
-  double stamp_lead_s = kUnknown;     ///< mean, by which those stamps are before the reads; NaN where the read stamps
+  double stamp_lead_s =
+      kUnknown;  ///< mean, by which those stamps are before the reads; NaN where the read stamps
   double stamp_lead_sd_s = kUnknown;  ///< of single ones: jitter that does not reach the clock's line
   double wire_s = 0.0;  ///< of the bytes of a sample, mean, on a serial line at the rate in force; stamps are
                         ///< dated back by it; 0 on other lines
@@ -29,8 +30,9 @@ struct TimeBudget {
   /// taken out. That of any other device nobody measures.
   double t_d_s = kUnknown;
   double sd_t_d_s = kUnknown;  ///< what remains unknown of it
-  /// From an instant that the device measured to the time that its clock map gives it, where pulses of UTC and the
-  /// tags of the device (of an S-IMU: those of the reference) tell it. Of a receiver beyond the configured latency.
+  /// From an instant that the device measured to the time that its clock map gives it, where pulses of UTC
+  /// and the tags of the device (of an S-IMU: those of the reference) tell it. Of a receiver beyond the
+  /// configured latency.
   double delay_s = kUnknown;
   double sd_delay_s = kUnknown;
 };

@@ -10,8 +10,8 @@ constexpr Duration kEvery = std::chrono::seconds{1};
 /// Between two tags UTC steps where it is further off the line than this.
 constexpr Duration kStep = std::chrono::milliseconds{10};
 
-/// The line of the better one holds before it began, too: messages of a receiver tell UTC late by a delay that nobody
-/// tells, and the PC's clock by anything.
+/// The line of the better one holds before it began, too: messages of a receiver tell UTC late by a delay
+/// that nobody tells, and the PC's clock by anything.
 bool is_worse(UtcSource before, UtcSource now) {
   if (before == UtcSource::kPcClock) return now != UtcSource::kPcClock;
   return before == UtcSource::kGnss && now == UtcSource::kPulses;

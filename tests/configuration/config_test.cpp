@@ -57,6 +57,37 @@ TEST(Configuration, ADeviceWithoutAxesOfAStdbinUnitIsTurnedToForwardRightDown) {
   EXPECT_EQ(configuration.devices[1].axes, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
 }
 
+TEST(Configuration, PulsesOfUtcAreADeviceOfTheirOwn) {
+  const std::string pps = R"(
+[[device]]
+name = "pps"
+role = "time"
+protocol = "pps"
+transport = { kind = "pps", port = "/dev/pps0", edge = "clear" }
+)";
+  const auto configuration = parsed(kMinimal + pps);
+  ASSERT_EQ(configuration.devices.size(), 3U);
+  const DeviceConfig& device = configuration.devices[2];
+  EXPECT_EQ(device.role, DeviceRole::kTime);
+  ASSERT_TRUE(device.pps);
+  EXPECT_EQ(device.pps->port, "/dev/pps0");
+  EXPECT_TRUE(device.pps->clear_edge);
+  EXPECT_EQ(device.rate_hz, 1.0);
+  EXPECT_THAT(refused(kMinimal + pps + pps), HasSubstr("pps"));
+  auto other = pps;
+  other.replace(other.find("\"pps\"\nrole"), 5, "\"two\"");
+  EXPECT_THAT(refused(kMinimal + pps + other), HasSubstr("more than one time device"));
+  EXPECT_THAT(
+      refused(std::string(kMinimal) + "[[device]]\nname = \"p\"\nrole = \"time\"\nprotocol = \"pps\"\n"
+                                      "transport = { kind = \"tcp\", host = \"h\", port = 1 }\n"),
+      HasSubstr("does not carry pps"));
+  EXPECT_THAT(refused(std::string(kMinimal) + "transport = { kind = \"pps\", port = \"/dev/pps0\" }\n"),
+              HasSubstr("does not carry xsens_mt"));
+  EXPECT_THAT(
+      refused(std::string(kMinimal) + "[[device]]\nname = \"p\"\nrole = \"gnss\"\nprotocol = \"pps\"\n"),
+      HasSubstr("does not fit role gnss"));
+}
+
 TEST(Configuration, UserUnitsBecomeSiOnLoading) {
   const auto configuration = parsed(std::string(kMinimal) + R"(
 rate_hz = 50

@@ -13,6 +13,7 @@
 #include <fcntl.h>
 #include <linux/audit.h>
 #include <linux/filter.h>
+#include <linux/pps.h>
 #include <linux/seccomp.h>
 #include <pthread.h>
 #include <semaphore.h>
@@ -25,7 +26,6 @@
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <linux/pps.h>
 #include <sys/syscall.h>
 #include <time.h>
 #include <ucontext.h>
@@ -112,8 +112,8 @@ constexpr int kAllowedBoth[] = {SYS_clock_gettime, SYS_rt_sigreturn, SYS_restart
 constexpr int kAllowedEstimator[] = {SYS_clock_nanosleep};
 constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait2, SYS_epoll_ctl, SYS_read,
                               SYS_write,      SYS_recvmsg,      SYS_recvmmsg,  SYS_fcntl};
-/// Health of a line: the driver's error counts and an interface's flags, and the newest pulse of a PPS device without
-/// waiting for one, all copied from the kernel's memory.
+/// Health of a line: the driver's error counts and an interface's flags, and the newest pulse of a PPS device
+/// without waiting for one, all copied from the kernel's memory.
 constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS, static_cast<unsigned>(PPS_FETCH)};
 
 void install_filter(bool is_io) {

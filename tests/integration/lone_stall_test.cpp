@@ -1,8 +1,11 @@
-/// The line of one device stands still alone, for up to a minute, in replay: nothing of it is lost, late or measured
-/// against another instant, no clock begins anew, whichever device it is. On CAN as on a serial line.
+/// The line of one device stands still alone, for up to a minute, in replay: nothing of it is lost, late or
+/// measured against another instant, no clock begins anew, whichever device it is. On CAN as on a serial
+/// line.
 
 #include <gtest/gtest.h>
+#include <algorithm>
 #include <fstream>
+#include <ostream>
 #include <string>
 
 #include "programs.h"
@@ -48,9 +51,9 @@ TEST_P(LoneStall, LosesNothing) {
     EXPECT_EQ(device.at("clock_resets"), 0) << device.at("name");
     EXPECT_EQ(device.at("refused"), 0) << device.at("name");
     if (device.at("role") != "study") continue;
-    std::printf("%-6s stalled %2d s: %-5s late %s, waiting at the end %s\n", GetParam().device, GetParam().length_s,
-                device.at("name").get<std::string>().c_str(), device.at("late").dump().c_str(),
-                device.at("waiting").dump().c_str());
+    std::printf("%-6s stalled %2d s: %-5s late %s, waiting at the end %s\n", GetParam().device,
+                GetParam().length_s, device.at("name").get<std::string>().c_str(),
+                device.at("late").dump().c_str(), device.at("waiting").dump().c_str());
     EXPECT_EQ(device.at("late"), 0) << device.at("name");
     // A row for every sample from the first row to the end of the drive.
     const auto name = "errors_" + device.at("name").get<std::string>() + ".csv";

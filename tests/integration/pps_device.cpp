@@ -1,6 +1,7 @@
-/// Preloaded into the unmodified `imuscope`, this library is the PPS part of a kernel: the file that PPS_DEVICE names
-/// answers the ioctls of a PPS device. What lies in it is the newest pulse, as `imusim live` writes it
-/// (firmware_sim/io/pulse_line.h); it is stamped by the wall clock as the program sees that, as a kernel would.
+/// Preloaded into the unmodified `imuscope`, this library is the PPS part of a kernel: the file that
+/// PPS_DEVICE names answers the ioctls of a PPS device. What lies in it is the newest pulse, as `imusim live`
+/// writes it (firmware_sim/io/pulse_line.h); it is stamped by the wall clock as the program sees that, as a
+/// kernel would.
 
 #include <dlfcn.h>
 #include <fcntl.h>

@@ -1,6 +1,6 @@
-/// What tells time, live: datagrams and connections stamped by the kernel, and a PPS device (played at its ioctls, as
-/// this kernel may have none) that tells the PC's clock to microseconds while somebody sets the wall clock. The capture
-/// replays to the same rows.
+/// What tells time, live: datagrams and connections stamped by the kernel, and a PPS device (played at its
+/// ioctls, as this kernel may have none) that tells the PC's clock to microseconds while somebody sets the
+/// wall clock. The capture replays to the same rows.
 
 #include <gtest/gtest.h>
 #include <chrono>
@@ -69,9 +69,11 @@ TEST(TimeDevices, PulsesAndKernelStampsTellTheTimeOfARunAndReplayAlike) {
   std::ofstream(folder / "car.toml") << vehicle(pulses);
   const auto set_clock = [&](char mode) { std::ofstream(folder / "control") << mode; };
   set_clock('-');
-  BackgroundProgram car("imusim", {"live", (folder / "car.toml").string(), "--skip-static"}, folder / "imusim.log");
+  BackgroundProgram car("imusim", {"live", (folder / "car.toml").string(), "--skip-static"},
+                        folder / "imusim.log");
   std::this_thread::sleep_for(seconds(1));
-  const std::string preloaded = program_path("libhost_fault.so").string() + ":" + program_path("libpps_device.so").string();
+  const std::string preloaded =
+      program_path("libhost_fault.so").string() + ":" + program_path("libpps_device.so").string();
   ::setenv("LD_PRELOAD", preloaded.c_str(), 1);
   ::setenv("HOST_FAULT_CONTROL", (folder / "control").c_str(), 1);
   ::setenv("PPS_DEVICE", pulses.c_str(), 1);
@@ -110,9 +112,10 @@ TEST(TimeDevices, PulsesAndKernelStampsTellTheTimeOfARunAndReplayAlike) {
   }
   EXPECT_NEAR(device(run, "airins").at("time_budget").at("delay_s").get<double>(), 3.5e-3, 3e-3);
 
-  ASSERT_EQ(run_program("imuscope",
-                        {"replay", (folder / "live" / "capture.lcm").string(), "--out", (folder / "again").string()},
-                        folder / "replay.log"),
+  ASSERT_EQ(run_program(
+                "imuscope",
+                {"replay", (folder / "live" / "capture.lcm").string(), "--out", (folder / "again").string()},
+                folder / "replay.log"),
             0)
       << read_text(folder / "replay.log");
   const auto again = read_json(folder / "again" / "run.json");

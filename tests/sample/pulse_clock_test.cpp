@@ -1,4 +1,5 @@
-/// Pulses of UTC seconds against a PC whose clock has a life of its own: written here, not by the filter's model.
+/// Pulses of UTC seconds against a PC whose clock has a life of its own: written here, not by the filter's
+/// model.
 
 #include "sample/pulse_clock.h"
 
@@ -56,7 +57,8 @@ struct Score {
   }
 };
 
-Score run(const Pc& pc, int n_pulses, const std::function<bool(int)>& is_missing = [](int) { return false; }) {
+Score run(
+    const Pc& pc, int n_pulses, const std::function<bool(int)>& is_missing = [](int) { return false; }) {
   PulseClock clock;
   Interrupts interrupts;
   Score score;
@@ -127,8 +129,8 @@ struct Trip {
   bool has_pulses = true;
   UtcTime wall_begin = kFirstPulse;
 
-  /// In the order in which a run hears of it: 100 samples of the reference a second, ten solutions, a pulse that is
-  /// asked for some hundredths of a second later.
+  /// In the order in which a run hears of it: 100 samples of the reference a second, ten solutions, a pulse
+  /// that is asked for some hundredths of a second later.
   void live(int from_s, int to_s) {
     for (int k = 100 * from_s; k < 100 * to_s; ++k) {
       const double now_s = 0.01 * k;
@@ -137,7 +139,8 @@ struct Trip {
         return now_s > after_s && std::abs(phase - std::round(phase)) * every_s < 0.005;
       };
       if (has_reference_tags)
-        scale.observe(UtcSource::kReference, pc.at(now_s), utc_of_second(now_s - reference_delay_s + tags_off_s));
+        scale.observe(UtcSource::kReference, pc.at(now_s),
+                      utc_of_second(now_s - reference_delay_s + tags_off_s));
       if (has_gnss && is_due(0.1, gnss_delay_s)) {
         const double epoch_s = 0.1 * std::round((now_s - gnss_delay_s) / 0.1);
         scale.observe(UtcSource::kGnss, pc.at(epoch_s + gnss_delay_s), utc_of_second(epoch_s + tags_off_s));
@@ -148,7 +151,9 @@ struct Trip {
       }
     }
   }
-  [[nodiscard]] double error_s(double t_s) const { return to_seconds(scale.scale().at(pc.at(t_s)).utc - utc_of_second(t_s)); }
+  [[nodiscard]] double error_s(double t_s) const {
+    return to_seconds(scale.scale().at(pc.at(t_s)).utc - utc_of_second(t_s));
+  }
 };
 
 TEST(UtcScaleByPulses, TakesTheSecondFromMessagesAndItsBeginningFromPulses) {

@@ -13,7 +13,8 @@ namespace {
 
 TEST(ClockKeepers, ChronysLineIsRead) {
   const auto keeper = read_chrony_tracking(
-      "A29FC87B,162.159.200.123,4,1763961600.123456789,-0.000012345,0.000001234,0.000023456,-12.345,0.001,0.052,"
+      "A29FC87B,162.159.200.123,4,1763961600.123456789,-0.000012345,0.000001234,0.000023456,-12.345,0.001,0."
+      "052,"
       "0.012345678,0.000987654,64.2,Normal\n");
   ASSERT_TRUE(keeper);
   EXPECT_EQ(keeper->name, "chrony");
@@ -24,7 +25,8 @@ TEST(ClockKeepers, ChronysLineIsRead) {
   EXPECT_DOUBLE_EQ(keeper->sd_s, 23.456e-6);
   EXPECT_NEAR(keeper->max_error_s, 12.345e-6 + 0.000987654 + 0.5 * 0.012345678, 1e-12);
   EXPECT_DOUBLE_EQ(keeper->frequency_ppm, -12.345);
-  const auto alone = read_chrony_tracking("7F7F0101,,0,0.0,0.0,0.0,0.0,0.0,0.0,0.0,1.0,1.0,0.0,Not synchronised\n");
+  const auto alone =
+      read_chrony_tracking("7F7F0101,,0,0.0,0.0,0.0,0.0,0.0,0.0,0.0,1.0,1.0,0.0,Not synchronised\n");
   ASSERT_TRUE(alone);
   EXPECT_FALSE(alone->is_synchronised);
 }

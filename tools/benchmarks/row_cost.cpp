@@ -1,6 +1,6 @@
-/// What a sample of an S-IMU costs behind the estimator: in the modeller (wavelet variance and refits) and in the
-/// publisher (a line of its file, a row of its message, the message), at the rates that sensors have and for one and six
-/// of them. The ratio is that to one S-IMU at 100 Hz in the same run.
+/// What a sample of an S-IMU costs behind the estimator: in the modeller (wavelet variance and refits) and in
+/// the publisher (a line of its file, a row of its message, the message), at the rates that sensors have and
+/// for one and six of them. The ratio is that to one S-IMU at 100 Hz in the same run.
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -27,11 +27,13 @@ using namespace imuscope;
 constexpr double kRefitEvery_s = 60.0;
 
 Configuration vehicle(int studies, double rate_hz) {
-  std::string text = "[run]\nname = \"cost\"\n[[device]]\nname = \"reference\"\nrole = \"reference\"\nprotocol = "
-                     "\"ixblue_stdbin\"\n";
+  std::string text =
+      "[run]\nname = \"cost\"\n[[device]]\nname = \"reference\"\nrole = \"reference\"\nprotocol = "
+      "\"ixblue_stdbin\"\n";
   for (int i = 0; i < studies; ++i) {
-    text += fmt::format("[[device]]\nname = \"imu{}\"\nrole = \"study\"\nprotocol = \"ixblue_stdbin\"\nrate_hz = {:.1f}\n",
-                        i, rate_hz);
+    text += fmt::format(
+        "[[device]]\nname = \"imu{}\"\nrole = \"study\"\nprotocol = \"ixblue_stdbin\"\nrate_hz = {:.1f}\n", i,
+        rate_hz);
   }
   auto read = parse_configuration(text, "cost.toml");
   if (!read) throw std::runtime_error(read.error().text());
@@ -57,12 +59,13 @@ class Rows {
         ErrorRecord record{};
         record.study = static_cast<std::size_t>(i);
         record.row.time = HostTime{from_seconds(1000.0 + static_cast<double>(k) / rate_hz_)};
-        record.row.utc = {UtcTime{std::chrono::seconds(1'773'480'600)} + record.row.time.time_since_epoch(), 18, true};
+        record.row.utc = {UtcTime{std::chrono::seconds(1'773'480'600)} + record.row.time.time_since_epoch(),
+                          18, true};
         record.row.counter = k;
         record.row.regime = Regime::kDynamic;
         record.row.gyro_valid = record.row.accel_valid = true;
-        for (auto* vector : {&record.row.e_gyro_radps, &record.row.e_accel_mps2, &record.row.predicted_omega_s_radps,
-                             &record.row.predicted_f_s_mps2}) {
+        for (auto* vector : {&record.row.e_gyro_radps, &record.row.e_accel_mps2,
+                             &record.row.predicted_omega_s_radps, &record.row.predicted_f_s_mps2}) {
           for (double& component : *vector) component = noise_[next_++ % noise_.size()];
         }
         record.row.predicted_f_s_mps2[2] -= 9.81;
@@ -104,7 +107,8 @@ double publisher_ns(int studies, double rate_hz, double seconds, const std::file
   const Configuration configuration = vehicle(studies, rate_hz);
   const bench::OwnFolder own(scratch);
   std::vector<StudyFileInfo> infos;
-  for (const auto index : configuration.study_indices()) infos.push_back({configuration.devices[index].name, 0.0});
+  for (const auto index : configuration.study_indices())
+    infos.push_back({configuration.devices[index].name, 0.0});
   auto folder = RunFolder::create(own.path() / "run", infos, true);
   if (!folder) throw std::runtime_error(folder.error().text());
   Broadcast broadcast(configuration);
@@ -149,8 +153,8 @@ int main(int argc, char** argv) {
           if (one_at_100_hz == 0.0) one_at_100_hz = ns;
           bench::Row row;
           row.group = "rows";
-          row.what = fmt::format("a sample in the {}, {} S-IMU{} at {:.0f} Hz", part, studies, studies > 1 ? "s" : "",
-                                 rate_hz);
+          row.what = fmt::format("a sample in the {}, {} S-IMU{} at {:.0f} Hz", part, studies,
+                                 studies > 1 ? "s" : "", rate_hz);
           row.ratio = ns / one_at_100_hz;
           row.against = "x one S-IMU at 100 Hz";
           row.value = ns;

@@ -1,5 +1,5 @@
-/// Pulses as records: bytes laid down here by the description in pulse_record.h, and a decoder that believes none that
-/// cannot be.
+/// Pulses as records: bytes laid down here by the description in pulse_record.h, and a decoder that believes
+/// none that cannot be.
 
 #include <gtest/gtest.h>
 
@@ -18,12 +18,14 @@ using std::chrono::seconds;
 using test::Bytes;
 
 // "PPSa", count 258, 1000.000000123 s, 2026-03-14T09:30:00 UTC, 60 ns apart.
-const Bytes kRecord{'P',  'P',  'S',  'a',  0x02, 0x01, 0,    0,    0x7B, 0x10, 0xA5, 0xD4, 0xE8, 0x00, 0x00, 0x00,
-                    0x00, 0xF0, 0x0B, 0x9B, 0x35, 0xAB, 0x9C, 0x18, 60,   0,    0,    0,    0,    0,    0,    0};
+const Bytes kRecord{'P',  'P',  'S',  'a',  0x02, 0x01, 0,    0,    0x7B, 0x10, 0xA5,
+                    0xD4, 0xE8, 0x00, 0x00, 0x00, 0x00, 0xF0, 0x0B, 0x9B, 0x35, 0xAB,
+                    0x9C, 0x18, 60,   0,    0,    0,    0,    0,    0,    0};
 
 Bytes record(std::uint32_t sequence, HostTime time, Duration apart = Duration{60}) {
   Bytes bytes(kPulseRecordBytes);
-  write_pulse_record({PulseEdge::kAssert, sequence, time, utc_time_from_ns(1'773'480'600'000'000'000), apart}, bytes);
+  write_pulse_record({PulseEdge::kAssert, sequence, time, utc_time_from_ns(1'773'480'600'000'000'000), apart},
+                     bytes);
   return bytes;
 }
 
@@ -71,9 +73,10 @@ TEST(PpsDecoder, BelievesNoPulseThatCannotBe) {
   Decoder decoder({0});
   test::CollectingSink sink;
   const HostTime now = host_time_from_ns(1'000'000'000'000);
-  decoder.push(record(1, now + milliseconds(1)), now, sink);               // after its read
-  decoder.push(record(2, now - seconds(60)), now, sink);                   // of long ago
-  decoder.push(record(3, now - milliseconds(50), milliseconds(1)), now, sink);  // the clocks were not read together
+  decoder.push(record(1, now + milliseconds(1)), now, sink);  // after its read
+  decoder.push(record(2, now - seconds(60)), now, sink);      // of long ago
+  decoder.push(record(3, now - milliseconds(50), milliseconds(1)), now,
+               sink);  // the clocks were not read together
   EXPECT_TRUE(sink.samples.empty());
   EXPECT_EQ(decoder.counters().bad_contents, 3U);
   decoder.push(record(4, now - milliseconds(50)), now, sink);

@@ -451,7 +451,8 @@ TEST(NetStream, SaysWhenTheKernelReceivedTheLastByteOfAReadOverTcp) {
   const IoResult result = read_soon(**stream, buffer);
   ASSERT_EQ(result.n, 6U);
   ASSERT_TRUE(result.received);
-  EXPECT_GE(*result.received, between - std::chrono::milliseconds(1)) << "of the second piece, not of the first";
+  EXPECT_GE(*result.received, between - std::chrono::milliseconds(1))
+      << "of the second piece, not of the first";
   EXPECT_LT(*result.received, read - std::chrono::milliseconds(20));
   EXPECT_GT(read, before);
 }
