@@ -200,10 +200,24 @@ struct LcmOptions {
   bool bridge = false;  ///< publishes pose_t and ins_t, too
 };
 
-/// [record]: where live runs go.
+/// [record]: where live runs go, and how long they stay.
 struct RecordOptions {
   std::string folder;   ///< where live runs are recorded; relative to the working folder
   double sync_s = 0.5;  ///< a cut of the power costs what came in this time and while it was written
+  /// A capture goes on in another file when one is as large or as old.
+  double file_bytes = 2e9;
+  double file_s = 3600.0;
+  /// Runs that are over and not marked kept are removed, oldest first: those that ended longer ago, as many as
+  /// are more than this together, and until so much of the disk is free. Absent: never.
+  std::optional<double> remove_older_than_s;
+  std::optional<double> remove_beyond_bytes;
+  std::optional<double> remove_below_free_bytes;
+};
+
+/// [metrics]: numbers of a running service for a monitoring system. Without a port there are none.
+struct MetricsOptions {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 0;
 };
 
 /// Processor cores that the core's threads keep to; empty: any.
@@ -226,6 +240,7 @@ struct Configuration {
   ErrorProcessOptions error_process;
   LcmOptions lcm;
   RecordOptions record;
+  MetricsOptions metrics;
   ThreadOptions threads;
 
   [[nodiscard]] const DeviceConfig* find(std::string_view name) const;
