@@ -124,7 +124,7 @@ Result<std::unique_ptr<MetricsServer>> MetricsServer::open(const std::string& ad
       flags, port, nullptr, nullptr, &Impl::on_request, impl.get(), MHD_OPTION_SOCK_ADDR, &parsed->storage,
       MHD_OPTION_CONNECTION_LIMIT, kClientsMax, MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s,
       MHD_OPTION_CONNECTION_MEMORY_LIMIT, kMemoryPerClient, MHD_OPTION_THREAD_STACK_SIZE, kStackBytes,
-      MHD_OPTION_LISTENING_ADDRESS_REUSE, 1U, MHD_OPTION_END);
+      MHD_OPTION_END);
   if (impl->daemon == nullptr)
     return work_error(fmt::format("metrics cannot be offered at {} port {} ({})", address, port,
                                   std::generic_category().message(errno)),

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
-#include <thread>
 
 #include "capture/recorder.h"
 #include "doors/journal.h"
@@ -17,6 +16,7 @@
 #include "service/baud_search.h"
 #include "service/controlling_terminal.h"
 #include "service/core_thread.h"
+#include "service/device_events.h"
 #include "service/device_factory.h"
 #include "service/estimator_setup.h"
 #include "service/io_thread.h"
@@ -63,6 +63,14 @@ class Supervisor {
   void step(HostTime now) {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       if (configuration_.devices[i].line_owner == i) step_line(static_cast<DeviceIndex>(i), now);
+    }
+  }
+
+  /// A device has come: lines that are missing are tried without a pause, and again soon where it is not ready yet.
+  void try_at_once() {
+    for (auto& line : lines_) {
+      line.next_try = HostTime{};
+      line.pause = kReopenFirst;
     }
   }
 
@@ -333,6 +341,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
   systemd.ready(fmt::format("recording into {}", options.out.string()));
 
   Supervisor supervisor(configuration, ids, io, **publisher);
+  DeviceEvents devices;
   const auto pulses = (*publisher)->pulses();
   const ControllingTerminal terminal;
   StandingThreads standing;
@@ -361,7 +370,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
     }
     standing.look(pulses, now);
     if (all_alive(pulses, now)) systemd.alive(now);
-    std::this_thread::sleep_for(kSupervisorPeriod);
+    if (devices.wait(kSupervisorPeriod)) supervisor.try_at_once();
   }
   systemd.stopping();
 

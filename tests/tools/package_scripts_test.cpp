@@ -66,6 +66,15 @@ TEST(PackageScripts, TheUnitLetsTheStateOfTheClockBeReadAndNobodySetIt) {
   EXPECT_TRUE(lines.contains("NoNewPrivileges=yes"));
 }
 
+TEST(PackageScripts, TheUnitKeepsItsSocketToItselfAndOutlivesAShortageOfMemory) {
+  std::ifstream unit(test::source_path("config/imuscope.service"));
+  std::set<std::string> lines;
+  for (std::string line; std::getline(unit, line);) lines.insert(line);
+  EXPECT_TRUE(lines.contains("RuntimeDirectory=imuscope"));
+  EXPECT_TRUE(lines.contains("RuntimeDirectoryMode=0700"));
+  EXPECT_TRUE(lines.contains("OOMScoreAdjust=-500"));
+}
+
 TEST(PackageScripts, TheUnitAllowsPortsThatArePluggedInLater) {
   std::ifstream unit(test::source_path("config/imuscope.service"));
   std::set<std::string> allowed;

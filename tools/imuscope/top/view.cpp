@@ -63,8 +63,8 @@ void add_alarms(const status_t& status, std::vector<std::string>& lines) {
   for (const auto& a : status.alarms) {
     const std::string often = a.times > 1 ? fmt::format(", {} times", a.times) : "";
     const auto since = status.utime > 0 && a.since_utime > 0
-                           ? fmt::format(", began {} ago", clock_of(to_seconds(std::chrono::microseconds(
-                                                               std::max<std::int64_t>(0, status.utime - a.since_utime)))))
+                           ? fmt::format(", began {} ago", clock_of(std::chrono::duration<double>(std::chrono::microseconds(
+                                                               std::max<std::int64_t>(0, status.utime - a.since_utime))).count()))
                            : "";
     if (a.active != 0) {
       lines.push_back(fmt::format("!! {} (for {}{})", a.what, clock_of(a.lasted_s), often));
