@@ -13,30 +13,30 @@ using std::chrono::seconds;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr HostTime kBegin{std::chrono::hours(1)};
-const UtcTime kUtc = utc_time_from_ns(1'700'000'000'000'000'000);
+constexpr HostTime kAlarmsBegin{std::chrono::hours(1)};
+const UtcTime kAlarmsUtc = utc_time_from_ns(1'700'000'000'000'000'000);
 
 Condition disk_full() { return {alarm_kind::kDisk, "capture", "no space left", "free space"}; }
 
 TEST(Alarms, SayWhenTheyBeganHowOftenAndHowLong) {
   AlarmBook book;
-  EXPECT_THAT(book.look({}, kUtc, kBegin).began, IsEmpty());
+  EXPECT_THAT(book.look({}, kAlarmsUtc, kAlarmsBegin).began, IsEmpty());
   const std::vector<Condition> full{disk_full()};
-  EXPECT_THAT(book.look(full, kUtc, kBegin).began, SizeIs(1));
-  EXPECT_THAT(book.look(full, kUtc + seconds(5), kBegin + seconds(5)).began, IsEmpty()) << "it is the same one";
+  EXPECT_THAT(book.look(full, kAlarmsUtc, kAlarmsBegin).began, SizeIs(1));
+  EXPECT_THAT(book.look(full, kAlarmsUtc + seconds(5), kAlarmsBegin + seconds(5)).began, IsEmpty()) << "it is the same one";
   ASSERT_THAT(book.list(), SizeIs(1));
   EXPECT_EQ(book.list()[0].active, 1);
-  EXPECT_EQ(book.list()[0].since_utime, to_utime(kUtc));
+  EXPECT_EQ(book.list()[0].since_utime, to_utime(kAlarmsUtc));
   EXPECT_DOUBLE_EQ(book.list()[0].lasted_s, 5.0);
-  const auto news = book.look({}, kUtc + seconds(7), kBegin + seconds(7));
+  const auto news = book.look({}, kAlarmsUtc + seconds(7), kAlarmsBegin + seconds(7));
   ASSERT_THAT(news.ended, SizeIs(1));
   EXPECT_DOUBLE_EQ(news.ended[0].lasted_s, 7.0);
   EXPECT_EQ(book.list()[0].active, 0);
-  (void)book.look({}, kUtc + seconds(60), kBegin + seconds(60));
+  (void)book.look({}, kAlarmsUtc + seconds(60), kAlarmsBegin + seconds(60));
   EXPECT_DOUBLE_EQ(book.list()[0].lasted_s, 7.0) << "what is over lasts no longer";
-  EXPECT_THAT(book.look(full, kUtc + seconds(90), kBegin + seconds(90)).began, SizeIs(1));
+  EXPECT_THAT(book.look(full, kAlarmsUtc + seconds(90), kAlarmsBegin + seconds(90)).began, SizeIs(1));
   EXPECT_EQ(book.list()[0].times, 2);
-  EXPECT_EQ(book.list()[0].since_utime, to_utime(kUtc + seconds(90)));
+  EXPECT_EQ(book.list()[0].since_utime, to_utime(kAlarmsUtc + seconds(90)));
 }
 
 TEST(Alarms, ActiveOnesComeFirstAndTheirNumberIsBounded) {
@@ -44,21 +44,21 @@ TEST(Alarms, ActiveOnesComeFirstAndTheirNumberIsBounded) {
   std::vector<Condition> many;
   for (std::size_t i = 0; i < 2 * AlarmBook::kMost; ++i)
     many.push_back({alarm_kind::kPrivilege, std::to_string(i), "refused", ""});
-  (void)book.look(many, kUtc, kBegin);
+  (void)book.look(many, kAlarmsUtc, kAlarmsBegin);
   EXPECT_THAT(book.list(), SizeIs(AlarmBook::kMost));
   const std::vector<Condition> one{many[7]};
-  (void)book.look(one, kUtc, kBegin + seconds(1));
+  (void)book.look(one, kAlarmsUtc, kAlarmsBegin + seconds(1));
   EXPECT_EQ(book.list()[0].subject, "7");
   EXPECT_EQ(book.list()[1].active, 0);
 }
 
 TEST(Alarms, ACountIsOneWhileItGrowsAndForAWhile) {
   GrowingCounts counts;
-  EXPECT_FALSE(counts.grows("lost", 0, kBegin));
-  EXPECT_TRUE(counts.grows("lost", 3, kBegin + seconds(1)));
-  EXPECT_TRUE(counts.grows("lost", 3, kBegin + seconds(5)));
-  EXPECT_FALSE(counts.grows("lost", 3, kBegin + seconds(1) + GrowingCounts::kStillGrowing));
-  EXPECT_TRUE(counts.grows("lost", 4, kBegin + seconds(60)));
+  EXPECT_FALSE(counts.grows("lost", 0, kAlarmsBegin));
+  EXPECT_TRUE(counts.grows("lost", 3, kAlarmsBegin + seconds(1)));
+  EXPECT_TRUE(counts.grows("lost", 3, kAlarmsBegin + seconds(5)));
+  EXPECT_FALSE(counts.grows("lost", 3, kAlarmsBegin + seconds(1) + GrowingCounts::kStillGrowing));
+  EXPECT_TRUE(counts.grows("lost", 4, kAlarmsBegin + seconds(60)));
 }
 
 TEST(Alarms, DevicesThatDoNotStreamAndQueuesThatLoseAreConditions) {
@@ -74,7 +74,7 @@ TEST(Alarms, DevicesThatDoNotStreamAndQueuesThatLoseAreConditions) {
   status.rings.resize(1);
   status.rings[0].name = "errors";
   GrowingCounts counts;
-  const auto conditions = conditions_of(status, counts, kBegin);
+  const auto conditions = conditions_of(status, counts, kAlarmsBegin);
   ASSERT_THAT(conditions, SizeIs(4));
   EXPECT_EQ(conditions[0].what, "mtx2: connecting");
   EXPECT_NE(conditions[0].remedy, "") << "there is always something to do";
