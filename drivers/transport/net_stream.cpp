@@ -10,6 +10,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -183,6 +184,16 @@ Result<std::unique_ptr<NetStream>> NetStream::open(const NetSettings& settings) 
 
 NetStream::~NetStream() { ::close(fd_); }
 
+namespace {
+
+bool is_of_the_network(int error) noexcept {
+  constexpr std::array kPassing{ECONNREFUSED, EHOSTUNREACH, EHOSTDOWN, ENETUNREACH, ENETDOWN,
+                                ETIMEDOUT, ENOBUFS, ENOMEM};
+  return std::find(kPassing.begin(), kPassing.end(), error) != kPassing.end();
+}
+
+}  // namespace
+
 IoResult NetStream::read(std::span<std::uint8_t> buffer) noexcept {
   const bool tcp = settings_.kind == NetSettings::Kind::kTcp;
   // An empty datagram says nothing, and whoever sends them without end must not keep the reader here: what is
@@ -203,7 +214,8 @@ IoResult NetStream::read(std::span<std::uint8_t> buffer) noexcept {
     }
     if (errno == EINTR) continue;
     if (errno == EAGAIN || errno == EWOULDBLOCK) return {IoStatus::kNothing, 0};
-    return {tcp ? IoStatus::kGone : IoStatus::kNothing, 0};
+    // What a network says of the far end is said once and passes. Any other error would stay, and come at every turn.
+    return {tcp || !is_of_the_network(errno) ? IoStatus::kGone : IoStatus::kNothing, 0};
   }
   return {IoStatus::kNothing, 0};
 }

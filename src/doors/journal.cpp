@@ -50,6 +50,9 @@ int priority_of(spdlog::level::level_enum level) {
   }
 }
 
+/// libsystemd drops without a word what nobody hears.
+bool journal_listens() { return access("/run/systemd/journal/socket", W_OK) == 0; }
+
 /// One entry of the journal.
 class Entry {
  public:
@@ -78,7 +81,14 @@ class Entry {
 class JournalSink final : public spdlog::sinks::base_sink<std::mutex> {
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
-    Entry(priority_of(message.level), {message.payload.data(), message.payload.size()}).send();
+    const int priority = priority_of(message.level);
+    const std::string_view text{message.payload.data(), message.payload.size()};
+    if (journal_listens()) {
+      Entry(priority, text).send();
+    } else {
+      // As sd-daemon(3) has it: whoever reads standard error in the journal's place.
+      fmt::print(stderr, "<{}>{}\n", priority, printable(text));
+    }
   }
   void flush_() override {}
 };
@@ -102,7 +112,7 @@ void set_journal_run(const std::string& name, std::vector<std::string> devices) 
 }
 
 void tell_alarm(const alarm_t& alarm) {
-  if (!logs_to_journal()) return;
+  if (!logs_to_journal() || !journal_listens()) return;
   const bool began = alarm.active != 0;
   Entry entry(began ? LOG_WARNING : LOG_INFO,
               began ? fmt::format("alarm: {}", alarm.what)

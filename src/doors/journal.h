@@ -1,7 +1,7 @@
 #pragma once
 
 /// Systemd's journal with fields of its own: what is logged can be found by run, device and alarm
-/// (`journalctl IMUSCOPE_DEVICE=mtx1`). docs/guide.md lists the fields.
+/// (`journalctl IMUSCOPE_DEVICE=mtx1`). docs/vehicle.md lists the fields.
 
 #include <imuscope/alarm_t.hpp>
 #include <memory>
@@ -17,7 +17,7 @@ namespace imuscope {
 /// Standard error is connected to the journal: systemd tells by JOURNAL_STREAM which file that is.
 [[nodiscard]] bool logs_to_journal();
 
-/// Where the log goes then. A line that begins with the name of a device and a colon has IMUSCOPE_DEVICE.
+/// Where the log goes then; standard error with the priority before each line where no journal listens. A line that begins with the name of a device and a colon has IMUSCOPE_DEVICE.
 [[nodiscard]] std::shared_ptr<spdlog::sinks::sink> journal_sink();
 
 /// Of the run whose log it is. Any thread of the soft world; nothing where the log does not go to the journal.

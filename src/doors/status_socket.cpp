@@ -14,6 +14,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -21,6 +22,7 @@
 
 #include "base/output_folder.h"
 #include "publish/message_codec.h"
+#include "rt/host_clock.h"
 #include "rt/thread_setup.h"
 
 namespace imuscope {
@@ -30,6 +32,7 @@ namespace {
 constexpr std::string_view kSuffix = ".status";
 /// A status of eight devices has some ten kilobytes.
 constexpr std::size_t kStatusMax = std::size_t{1} << 20U;
+constexpr std::size_t kAgeBytes = 8;
 constexpr timeval kPatience{2, 0};
 constexpr mode_t kOwnerAlone = 0700;
 constexpr mode_t kOwnerReadsAndWrites = 0600;
@@ -102,6 +105,13 @@ void remove_left_behind(const std::filesystem::path& directory) {
   }
 }
 
+std::vector<std::uint8_t> big_endian(Duration age) {
+  std::vector<std::uint8_t> bytes;
+  for (int shift = 56; shift >= 0; shift -= 8)
+    bytes.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(age.count()) >> static_cast<unsigned>(shift)));
+  return bytes;
+}
+
 bool may_ask(int client) {
   ucred peer{};
   socklen_t size = sizeof peer;
@@ -144,7 +154,10 @@ struct StatusSocket::Impl {
     }
     const auto posted = board.newest();
     if (!posted || !may_ask(client.get())) return;
-    const auto message = encode_message(posted->status);
+    // Its age first: what made it may stand still.
+    std::vector<std::uint8_t> message = big_endian(host_now() - posted->at);
+    const auto status = encode_message(posted->status);
+    message.insert(message.end(), status.begin(), status.end());
     setsockopt(client.get(), SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
     std::size_t sent = 0;
     while (sent < message.size()) {
@@ -214,7 +227,7 @@ Result<std::vector<std::filesystem::path>> find_status_sockets() {
                     "user and root alone");
 }
 
-Result<status_t> ask_status(const std::filesystem::path& socket) {
+Result<AskedStatus> ask_status(const std::filesystem::path& socket) {
   const auto address = address_of(socket);
   if (!address) return tl::unexpected<Error>(address.error());
   const Descriptor line(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
@@ -233,14 +246,16 @@ Result<status_t> ask_status(const std::filesystem::path& socket) {
   if (n < 0)
     return work_error(fmt::format("{} does not answer ({})", socket.string(), reason()),
                       "is that run standing still? See its log");
-  if (message.empty())
+  if (message.size() < kAgeBytes)
     return work_error(fmt::format("{} has no status yet, or none for this user", socket.string()),
                       "ask again in a second, or as root");
-  auto status = decode_message<status_t>(message);
+  std::uint64_t age_ns = 0;
+  for (std::size_t i = 0; i < kAgeBytes; ++i) age_ns = age_ns << 8U | message[i];
+  auto status = decode_message<status_t>(std::span(message).subspan(kAgeBytes));
   if (!status)
     return work_error(fmt::format("the run at {} is of another version", socket.string()),
                       "use the imuscope that it was started with, or start it anew");
-  return std::move(*status);
+  return AskedStatus{std::move(*status), to_seconds(Duration{static_cast<std::int64_t>(age_ns)})};
 }
 
 }  // namespace imuscope

@@ -1,7 +1,7 @@
 #pragma once
 
 /// The door of `imuscope status`: a Unix socket in the runtime directory of the service. Whoever connects gets the
-/// newest STATUS as LCM encodes it, and the end. It takes no byte from anybody; of users it answers its own and root.
+/// age of the newest STATUS (int64, ns, big-endian), that STATUS as LCM encodes it, and the end. It takes no byte from anybody; of users it answers its own and root.
 ///
 /// Runtime directory: what systemd names (RUNTIME_DIRECTORY), else `imuscope` in XDG_RUNTIME_DIR, else, for root,
 /// /run/imuscope. Each run has a socket of its own there, PID.status.
@@ -40,8 +40,13 @@ class StatusSocket {
 /// @return kWork with what stands in the way where there is none
 [[nodiscard]] Result<std::vector<std::filesystem::path>> find_status_sockets();
 
+struct AskedStatus {
+  status_t status;
+  double age_s = 0.0;  ///< more than a second or two: the thread that makes it stands still
+};
+
 /// Asks one run. Waits at most two seconds for it.
 /// @return kWork where nobody answers (a run that was killed leaves its socket) or the run is of another version
-[[nodiscard]] Result<status_t> ask_status(const std::filesystem::path& socket);
+[[nodiscard]] Result<AskedStatus> ask_status(const std::filesystem::path& socket);
 
 }  // namespace imuscope

@@ -149,6 +149,28 @@ TEST(Configuration, CoresOfTheThreadsAreAList) {
               HasSubstr("names a core 0.5"));
 }
 
+TEST(Configuration, NothingIsRemovedAndNothingListenedToUnlessItIsAskedFor) {
+  const auto usual = parsed(kMinimal);
+  EXPECT_FALSE(usual.record.remove_older_than_s || usual.record.remove_beyond_bytes ||
+               usual.record.remove_below_free_bytes);
+  EXPECT_EQ(usual.metrics.port, 0);
+  EXPECT_EQ(usual.metrics.address, "127.0.0.1");
+  const auto asked = parsed(std::string("[record]\nremove_older_than_days = 30\nremove_beyond_gb = 100\n"
+                                        "remove_below_free_gb = 5\nfile_gb = 0.5\nfile_hours = 2\n"
+                                        "[metrics]\nport = 9847\naddress = \"::1\"\n") +
+                            kMinimal);
+  EXPECT_DOUBLE_EQ(asked.record.remove_older_than_s.value_or(0.0), 30.0 * 86400.0);
+  EXPECT_DOUBLE_EQ(asked.record.remove_beyond_bytes.value_or(0.0), 1e11);
+  EXPECT_DOUBLE_EQ(asked.record.remove_below_free_bytes.value_or(0.0), 5e9);
+  EXPECT_DOUBLE_EQ(asked.record.file_bytes, 5e8);
+  EXPECT_DOUBLE_EQ(asked.record.file_s, 7200.0);
+  EXPECT_EQ(asked.metrics.port, 9847);
+  EXPECT_THAT(refused(std::string("[metrics]\nport = 9847\naddress = \"vehicle\"\n") + kMinimal),
+              HasSubstr("'vehicle' is no address"));
+  EXPECT_THAT(refused(std::string("[record]\nremove_older_than_days = 0\n") + kMinimal),
+              HasSubstr("remove_older_than_days"));
+}
+
 TEST(Configuration, AxesThatAreNoRotationAreRefused) {
   EXPECT_THAT(refused(std::string(kMinimal) + "axes = \"+x +y -z\"\n"), HasSubstr("is not a rotation"));
   EXPECT_THAT(refused(std::string(kMinimal) + "axes = \"forward\"\n"), HasSubstr("signed axes"));

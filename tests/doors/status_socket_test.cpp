@@ -65,9 +65,15 @@ TEST_F(StatusDoor, GivesTheNewestStatusToItsOwnUser) {
   for (int i = 0; i < 100; ++i) {
     const auto status = ask_status((*door)->path());
     ASSERT_TRUE(status) << status.error().text();
-    EXPECT_EQ(status->run, "demo");
-    EXPECT_EQ(status->alarms.size(), 1U);
+    EXPECT_EQ(status->status.run, "demo");
+    EXPECT_EQ(status->status.alarms.size(), 1U);
+    EXPECT_GE(status->age_s, 0.0);
+    EXPECT_LT(status->age_s, 60.0);
   }
+  board_.put(test::example_status(), host_now() - std::chrono::minutes(5));
+  const auto old = ask_status((*door)->path());
+  ASSERT_TRUE(old);
+  EXPECT_GE(old->age_s, 300.0);
   const auto found = find_status_sockets();
   ASSERT_TRUE(found);
   EXPECT_THAT(*found, testing::Contains((*door)->path()));

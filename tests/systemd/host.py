@@ -10,7 +10,7 @@ import time
 
 # What the scenarios may ask for, in the words of QEMU's monitor.
 DEEDS = {
-    "plug": "device_add usb-serial,chardev=line,id=adapter,bus=usb.0",
+    "plug": "device_add usb-serial,chardev=line,id=adapter,bus=usb.0,always-plugged=on",
     "unplug": "device_del adapter",
 }
 

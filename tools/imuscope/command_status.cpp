@@ -33,7 +33,8 @@ Result<void> run(const StatusCommand& options) {
       continue;
     }
     top::Heard heard;
-    heard.status = std::move(*status);
+    heard.status = std::move(status->status);
+    heard.status_age_s = status->age_s;
     if (options.json) {
       say("{}\n", top::json_of(heard));
     } else {

@@ -285,6 +285,11 @@ TEST(NetStream, ASignalIsNoEndAndAnErrorIsOneOfAConnectionAlone) {
   }
   sender.say_to(port, "still here");
   EXPECT_EQ(hear(**udp).text, "still here");
+  // What would come at every turn for ever must not keep the reader turning.
+  for (const int error : {ENOSYS, EBADF, ENOTCONN}) {
+    const test::RefusedCalls refused(test::Call::kRecv, error, 1);
+    EXPECT_EQ((*udp)->read(buffer).status, IoStatus::kGone) << std::strerror(error);
+  }
 }
 
 TEST(NetStream, AServerThatDoesNotAnswerWithinASecondIsToldWithWhatMayBeTheReason) {

@@ -334,6 +334,7 @@ std::string json_of(const Heard& heard) {
                       {"configuration_hash", s.configuration_hash},
                       {"state", s.state},
                       {"reason", s.reason},
+                      {"status_age_s", heard.status_age_s},
                       {"uptime_s", s.uptime_s},
                       {"tick", s.tick},
                       {"refits", s.refits},
