@@ -187,8 +187,8 @@ NetStream::~NetStream() { ::close(fd_); }
 namespace {
 
 bool is_of_the_network(int error) noexcept {
-  constexpr std::array kPassing{ECONNREFUSED, EHOSTUNREACH, EHOSTDOWN, ENETUNREACH, ENETDOWN,
-                                ETIMEDOUT, ENOBUFS, ENOMEM};
+  constexpr std::array kPassing{ECONNREFUSED, EHOSTUNREACH, EHOSTDOWN, ENETUNREACH,
+                                ENETDOWN,     ETIMEDOUT,    ENOBUFS,   ENOMEM};
   return std::find(kPassing.begin(), kPassing.end(), error) != kPassing.end();
 }
 
@@ -214,7 +214,8 @@ IoResult NetStream::read(std::span<std::uint8_t> buffer) noexcept {
     }
     if (errno == EINTR) continue;
     if (errno == EAGAIN || errno == EWOULDBLOCK) return {IoStatus::kNothing, 0};
-    // What a network says of the far end is said once and passes. Any other error would stay, and come at every turn.
+    // What a network says of the far end is said once and passes. Any other error would stay, and come at
+    // every turn.
     return {tcp || !is_of_the_network(errno) ? IoStatus::kGone : IoStatus::kNothing, 0};
   }
   return {IoStatus::kNothing, 0};

@@ -131,14 +131,16 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"record.file_gb", "A capture goes on in another file when one has this size."},
     {"record.file_hours", "The same when one is as old."},
     {"record.remove_older_than_days",
-     "Live: runs in the folder that ended longer ago are removed. Never one that `imuscope keep` marked, one that "
+     "Live: runs in the folder that ended longer ago are removed. Never one that `imuscope keep` marked, one "
+     "that "
      "is being recorded, or a folder that no live run made. Without it: none."},
     {"record.remove_beyond_gb",
      "Live: the oldest runs are removed while all together are larger. Without it: none."},
     {"record.remove_below_free_gb",
      "Live: the oldest runs are removed while less of the disk is free. Without it: none."},
     {"metrics.port",
-     "Live: numbers of the service for Prometheus, at `http://ADDRESS:PORT/metrics` (docs/metrics.md). 0: none."},
+     "Live: numbers of the service for Prometheus, at `http://ADDRESS:PORT/metrics` (docs/metrics.md). 0: "
+     "none."},
     {"metrics.address",
      "Where they are offered: an address of this PC in numbers. Beyond a loopback address everybody on that "
      "network may read them."},

@@ -178,10 +178,11 @@ Finding check_wall_clock(UtcTime now) {
   // Nobody has built this program before.
   constexpr UtcTime kEarliest{std::chrono::sys_days{std::chrono::year{2026} / 1 / 1}};
   if (now >= kEarliest) return {"wall clock", Verdict::kGood, "the PC knows the date", {}};
-  return {"wall clock", Verdict::kWarning,
-          "the PC begins in the past: folders of runs get wrong dates, and none is removed by its age",
-          "timedatectl set-ntp true, or a battery for its clock; the rows of a run have UTC all the same where a "
-          "device tells it"};
+  return {
+      "wall clock", Verdict::kWarning,
+      "the PC begins in the past: folders of runs get wrong dates, and none is removed by its age",
+      "timedatectl set-ntp true, or a battery for its clock; the rows of a run have UTC all the same where a "
+      "device tells it"};
 }
 
 std::vector<Finding> check_metrics(const MetricsOptions& options) {
@@ -191,7 +192,8 @@ std::vector<Finding> check_metrics(const MetricsOptions& options) {
   if (!opened) return {refused("metrics", opened.error())};
   const bool is_loopback = options.address.starts_with("127.") || options.address == "::1";
   if (is_loopback)
-    return {{"metrics", Verdict::kGood, fmt::format("{} port {} is free", options.address, options.port), {}}};
+    return {
+        {"metrics", Verdict::kGood, fmt::format("{} port {} is free", options.address, options.port), {}}};
   return {{"metrics", Verdict::kWarning,
            fmt::format("{} port {} is free; everybody on that network may read names, rates and alarms",
                        options.address, options.port),

@@ -67,7 +67,9 @@ class Entry {
     if (std::find(known.devices.begin(), known.devices.end(), device) != known.devices.end())
       add("IMUSCOPE_DEVICE", device);
   }
-  void add(std::string_view name, std::string_view value) { fields_.push_back(fmt::format("{}={}", name, value)); }
+  void add(std::string_view name, std::string_view value) {
+    fields_.push_back(fmt::format("{}={}", name, value));
+  }
   void send() const {
     std::vector<iovec> parts;
     for (const auto& field : fields_) parts.push_back({const_cast<char*>(field.data()), field.size()});

@@ -17,14 +17,16 @@ namespace imuscope {
 /// Standard error is connected to the journal: systemd tells by JOURNAL_STREAM which file that is.
 [[nodiscard]] bool logs_to_journal();
 
-/// Where the log goes then; standard error with the priority before each line where no journal listens. A line that begins with the name of a device and a colon has IMUSCOPE_DEVICE.
+/// Where the log goes then; standard error with the priority before each line where no journal listens. A
+/// line that begins with the name of a device and a colon has IMUSCOPE_DEVICE.
 [[nodiscard]] std::shared_ptr<spdlog::sinks::sink> journal_sink();
 
-/// Of the run whose log it is. Any thread of the soft world; nothing where the log does not go to the journal.
+/// Of the run whose log it is. Any thread of the soft world; nothing where the log does not go to the
+/// journal.
 void set_journal_run(const std::string& run, std::vector<std::string> devices);
 
-/// One entry when an alarm begins and one when it is over, beside what the log says in words. Nothing where the log
-/// does not go to the journal.
+/// One entry when an alarm begins and one when it is over, beside what the log says in words. Nothing where
+/// the log does not go to the journal.
 void tell_alarm(const alarm_t& alarm);
 
 }  // namespace imuscope

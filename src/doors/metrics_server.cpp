@@ -120,11 +120,11 @@ Result<std::unique_ptr<MetricsServer>> MetricsServer::open(const std::string& ad
   unsigned flags = MHD_USE_POLL_INTERNAL_THREAD;
   if (parsed->is_ipv6) flags |= MHD_USE_IPv6;
   errno = 0;
-  impl->daemon = MHD_start_daemon(
-      flags, port, nullptr, nullptr, &Impl::on_request, impl.get(), MHD_OPTION_SOCK_ADDR, &parsed->storage,
-      MHD_OPTION_CONNECTION_LIMIT, kClientsMax, MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s,
-      MHD_OPTION_CONNECTION_MEMORY_LIMIT, kMemoryPerClient, MHD_OPTION_THREAD_STACK_SIZE, kStackBytes,
-      MHD_OPTION_END);
+  impl->daemon =
+      MHD_start_daemon(flags, port, nullptr, nullptr, &Impl::on_request, impl.get(), MHD_OPTION_SOCK_ADDR,
+                       &parsed->storage, MHD_OPTION_CONNECTION_LIMIT, kClientsMax,
+                       MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+                       kMemoryPerClient, MHD_OPTION_THREAD_STACK_SIZE, kStackBytes, MHD_OPTION_END);
   if (impl->daemon == nullptr)
     return work_error(fmt::format("metrics cannot be offered at {} port {} ({})", address, port,
                                   std::generic_category().message(errno)),

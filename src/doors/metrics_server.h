@@ -1,7 +1,8 @@
 #pragma once
 
-/// The door of a monitoring system: GET /metrics over HTTP, where the configuration asks for it ([metrics]). It reads
-/// the newest status and nothing else; however many ask, the service does no more for them than it would for eight.
+/// The door of a monitoring system: GET /metrics over HTTP, where the configuration asks for it ([metrics]).
+/// It reads the newest status and nothing else; however many ask, the service does no more for them than it
+/// would for eight.
 
 #include <cstdint>
 #include <memory>
@@ -18,7 +19,8 @@ class MetricsServer {
   static constexpr unsigned kPatience_s = 5;  ///< with a client that neither asks nor takes its answer
 
   /// Listens, and answers from a thread of its own.
-  /// @param address  numeric, IPv4 or IPv6. On a loopback address requests whose Host is another name are refused:
+  /// @param address  numeric, IPv4 or IPv6. On a loopback address requests whose Host is another name are
+  /// refused:
   ///                 a page in a browser may have its name lead here.
   /// @return kUsage for what is no address, kWork where it cannot be listened to
   static Result<std::unique_ptr<MetricsServer>> open(const std::string& address, std::uint16_t port,

@@ -11,7 +11,7 @@ namespace imuscope {
 /// One family of metrics, as docs/metrics.md lists it.
 struct MetricFamily {
   const char* name;
-  const char* type;  ///< gauge, counter
+  const char* type;    ///< gauge, counter
   const char* labels;  ///< with commas between them
   const char* help;
 };

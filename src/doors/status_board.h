@@ -11,7 +11,8 @@
 
 namespace imuscope {
 
-/// Threads: any of the soft world. Nobody waits for a reader: what was read stays whole, whatever is put up after.
+/// Threads: any of the soft world. Nobody waits for a reader: what was read stays whole, whatever is put up
+/// after.
 class StatusBoard {
  public:
   struct Posted {

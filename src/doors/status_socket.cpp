@@ -61,7 +61,8 @@ Result<sockaddr_un> address_of(const std::filesystem::path& path) {
   address.sun_family = AF_UNIX;
   const std::string text = path.string();
   if (text.size() >= sizeof address.sun_path)
-    return work_error(fmt::format("{} is too long for a socket", text), "set XDG_RUNTIME_DIR to a shorter path");
+    return work_error(fmt::format("{} is too long for a socket", text),
+                      "set XDG_RUNTIME_DIR to a shorter path");
   std::memcpy(address.sun_path, text.c_str(), text.size() + 1);
   return address;
 }
@@ -108,7 +109,8 @@ void remove_left_behind(const std::filesystem::path& directory) {
 std::vector<std::uint8_t> big_endian(Duration age) {
   std::vector<std::uint8_t> bytes;
   for (int shift = 56; shift >= 0; shift -= 8)
-    bytes.push_back(static_cast<std::uint8_t>(static_cast<std::uint64_t>(age.count()) >> static_cast<unsigned>(shift)));
+    bytes.push_back(
+        static_cast<std::uint8_t>(static_cast<std::uint64_t>(age.count()) >> static_cast<unsigned>(shift)));
   return bytes;
 }
 
@@ -145,7 +147,8 @@ struct StatusSocket::Impl {
     }
   }
 
-  /// One after the other: an answer fits into what the kernel keeps for a socket, so that nobody is waited for.
+  /// One after the other: an answer fits into what the kernel keeps for a socket, so that nobody is waited
+  /// for.
   void answer(const Descriptor& client) const {
     if (!client.is_open()) {
       // Out of descriptors, say: not again at once.
@@ -190,7 +193,8 @@ Result<std::unique_ptr<StatusSocket>> StatusSocket::open(const StatusBoard& boar
   if (!address) return tl::unexpected<Error>(address.error());
   Descriptor listener(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   constexpr int kWaiting = 8;
-  // The mode of the socket becomes that of its name, less the umask: there is no moment at which others could connect.
+  // The mode of the socket becomes that of its name, less the umask: there is no moment at which others could
+  // connect.
   if (!listener.is_open() || fchmod(listener.get(), kOwnerReadsAndWrites) != 0 ||
       bind(listener.get(), reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0 ||
       listen(listener.get(), kWaiting) != 0)
@@ -204,7 +208,8 @@ Result<std::unique_ptr<StatusSocket>> StatusSocket::open(const StatusBoard& boar
 
 Result<std::vector<std::filesystem::path>> find_status_sockets() {
   std::vector<std::filesystem::path> directories{"/run/imuscope"};
-  if (const auto own = own_directory(); !own.empty() && own != directories.front()) directories.push_back(own);
+  if (const auto own = own_directory(); !own.empty() && own != directories.front())
+    directories.push_back(own);
   std::vector<std::filesystem::path> found;
   std::string closed;
   for (const auto& directory : directories) {
@@ -222,9 +227,10 @@ Result<std::vector<std::filesystem::path>> find_status_sockets() {
   if (!closed.empty())
     return work_error(fmt::format("this user may not look into {}", closed),
                       "ask as root: sudo imuscope status");
-  return work_error("no run was found on this PC",
-                    "start one: systemctl start imuscope, or imuscope run; a run of another user answers that "
-                    "user and root alone");
+  return work_error(
+      "no run was found on this PC",
+      "start one: systemctl start imuscope, or imuscope run; a run of another user answers that "
+      "user and root alone");
 }
 
 Result<AskedStatus> ask_status(const std::filesystem::path& socket) {

@@ -1,10 +1,11 @@
 #pragma once
 
-/// The door of `imuscope status`: a Unix socket in the runtime directory of the service. Whoever connects gets the
-/// age of the newest STATUS (int64, ns, big-endian), that STATUS as LCM encodes it, and the end. It takes no byte from anybody; of users it answers its own and root.
+/// The door of `imuscope status`: a Unix socket in the runtime directory of the service. Whoever connects
+/// gets the age of the newest STATUS (int64, ns, big-endian), that STATUS as LCM encodes it, and the end. It
+/// takes no byte from anybody; of users it answers its own and root.
 ///
-/// Runtime directory: what systemd names (RUNTIME_DIRECTORY), else `imuscope` in XDG_RUNTIME_DIR, else, for root,
-/// /run/imuscope. Each run has a socket of its own there, PID.status.
+/// Runtime directory: what systemd names (RUNTIME_DIRECTORY), else `imuscope` in XDG_RUNTIME_DIR, else, for
+/// root, /run/imuscope. Each run has a socket of its own there, PID.status.
 
 #include <filesystem>
 #include <imuscope/status_t.hpp>
@@ -46,7 +47,8 @@ struct AskedStatus {
 };
 
 /// Asks one run. Waits at most two seconds for it.
-/// @return kWork where nobody answers (a run that was killed leaves its socket) or the run is of another version
+/// @return kWork where nobody answers (a run that was killed leaves its socket) or the run is of another
+/// version
 [[nodiscard]] Result<AskedStatus> ask_status(const std::filesystem::path& socket);
 
 }  // namespace imuscope

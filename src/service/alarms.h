@@ -22,14 +22,14 @@ struct Condition {
 };
 
 namespace alarm_kind {
-inline constexpr const char* kDevice = "device";            ///< it does not stream
-inline constexpr const char* kDeviceLoss = "device_loss";   ///< this PC loses what it sends
-inline constexpr const char* kCaptureLoss = "capture_loss"; ///< records are missing in the capture
-inline constexpr const char* kRing = "ring";                ///< a full ring refuses elements
-inline constexpr const char* kThread = "thread";            ///< it stands still
+inline constexpr const char* kDevice = "device";             ///< it does not stream
+inline constexpr const char* kDeviceLoss = "device_loss";    ///< this PC loses what it sends
+inline constexpr const char* kCaptureLoss = "capture_loss";  ///< records are missing in the capture
+inline constexpr const char* kRing = "ring";                 ///< a full ring refuses elements
+inline constexpr const char* kThread = "thread";             ///< it stands still
 inline constexpr const char* kDisk = "disk";
 inline constexpr const char* kBus = "bus";
-inline constexpr const char* kPrivilege = "privilege";      ///< the system refused a right at the start
+inline constexpr const char* kPrivilege = "privilege";  ///< the system refused a right at the start
 }  // namespace alarm_kind
 
 /// "what; what to do" as Error::text() joins them, taken apart again.

@@ -12,8 +12,8 @@ namespace imuscope {
 /// Thread: one.
 class DeviceEvents {
  public:
-  /// Listens to udev, whose announcements come when names and rights are set; where no udev runs, to the kernel.
-  /// Where neither can be listened to, nothing is ever announced.
+  /// Listens to udev, whose announcements come when names and rights are set; where no udev runs, to the
+  /// kernel. Where neither can be listened to, nothing is ever announced.
   DeviceEvents();
   ~DeviceEvents();
   DeviceEvents(const DeviceEvents&) = delete;

@@ -94,11 +94,12 @@ std::vector<Condition> conditions_of(const status_t& status, GrowingCounts& coun
     Condition condition = condition_of(alarm_kind::kDevice, device.name, device.problem);
     condition.what = fmt::format("{}: {}{}{}", device.name, device.state, condition.what.empty() ? "" : ": ",
                                  condition.what);
-    if (device.problem.empty()) condition.remedy = "check its power, its cable and its line in the configuration";
+    if (device.problem.empty())
+      condition.remedy = "check its power, its cable and its line in the configuration";
     conditions.push_back(std::move(condition));
   }
-  const auto add_loss = [&](const char* kind, const std::string& subject, std::int64_t count, std::string what,
-                            const char* remedy) {
+  const auto add_loss = [&](const char* kind, const std::string& subject, std::int64_t count,
+                            std::string what, const char* remedy) {
     if (counts.grows(fmt::format("{} {}", kind, subject), count, now))
       conditions.push_back({kind, subject, std::move(what), remedy});
   };

@@ -28,7 +28,8 @@ struct Health {
 
 /// What is wrong with devices and queues by the status alone.
 /// @param counts  of the looks before
-[[nodiscard]] std::vector<Condition> conditions_of(const status_t& status, GrowingCounts& counts, HostTime now);
+[[nodiscard]] std::vector<Condition> conditions_of(const status_t& status, GrowingCounts& counts,
+                                                   HostTime now);
 
 /// What is known of a run before anything happens: its names, and its devices with nothing but theirs.
 [[nodiscard]] status_t status_of(const Configuration& configuration, const std::string& version);

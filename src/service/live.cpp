@@ -66,7 +66,8 @@ class Supervisor {
     }
   }
 
-  /// A device has come: lines that are missing are tried without a pause, and again soon where it is not ready yet.
+  /// A device has come: lines that are missing are tried without a pause, and again soon where it is not
+  /// ready yet.
   void try_at_once() {
     for (auto& line : lines_) {
       line.next_try = HostTime{};
@@ -234,7 +235,8 @@ void reload(const Configuration& configuration, LivePublisher& publisher) {
     spdlog::warn("reload: [{}] has changed, too; that takes effect at the next start", name);
 }
 
-/// Through which this PC may ask how the run is. A door that cannot be opened is told, and is no reason not to record.
+/// Through which this PC may ask how the run is. A door that cannot be opened is told, and is no reason not
+/// to record.
 struct Doors {
   Doors(const MetricsOptions& metrics, const StatusBoard& board) {
     if (auto opened = StatusSocket::open(board)) {

@@ -31,16 +31,17 @@ constexpr double kBytesPerGb = 1e9;
 constexpr double kSPerDay = 86400.0;
 constexpr const char* kCaptureName = "capture.lcm";
 
-/// Name of a file as a live run writes it. A file that was being written at a cut of the power has a dot before it.
+/// Name of a file as a live run writes it. A file that was being written at a cut of the power has a dot
+/// before it.
 bool is_file_of_a_run(std::string_view name) {
-  constexpr std::array<std::string_view, 5> kWhole{"navigation.csv", "odometry.csv", "calibration.json", "models.json",
-                                                   "run.json"};
+  constexpr std::array<std::string_view, 5> kWhole{"navigation.csv", "odometry.csv", "calibration.json",
+                                                   "models.json", "run.json"};
   constexpr std::array<std::string_view, 3> kOfAnImu{"calibration_", "errors_", "smoothed_"};
   if (std::find(kWhole.begin(), kWhole.end(), name) != kWhole.end()) return true;
   const bool is_capture = name == kCaptureName || (name.starts_with("capture_") && name.ends_with(".lcm"));
-  return is_capture || (name.ends_with(".csv") && std::any_of(kOfAnImu.begin(), kOfAnImu.end(), [&](auto stem) {
-                          return name.starts_with(stem);
-                        }));
+  return is_capture ||
+         (name.ends_with(".csv") &&
+          std::any_of(kOfAnImu.begin(), kOfAnImu.end(), [&](auto stem) { return name.starts_with(stem); }));
 }
 
 Descriptor open_folder(const std::filesystem::path& folder) {
@@ -91,7 +92,8 @@ std::optional<Content> removable_content(const Descriptor& run) {
     has_capture = has_capture || name == kCaptureName;
     constexpr std::uint64_t kBlock = 512;  // of st_blocks, whatever the file system's
     content.bytes += static_cast<std::uint64_t>(file.st_blocks) * kBlock;
-    const UtcTime written{std::chrono::seconds(file.st_mtim.tv_sec) + std::chrono::nanoseconds(file.st_mtim.tv_nsec)};
+    const UtcTime written{std::chrono::seconds(file.st_mtim.tv_sec) +
+                          std::chrono::nanoseconds(file.st_mtim.tv_nsec)};
     content.newest = std::max(content.newest, written);
     content.files.push_back(std::move(name));
   }
@@ -114,7 +116,8 @@ std::uint64_t bytes_of(const Descriptor& folder) {
 Result<void> remove_run(const Descriptor& parent, const std::string& name) {
   const Descriptor run = open_run(parent, name);
   const auto refused = [&] {
-    return work_error(fmt::format("the run {} cannot be removed ({})", name, std::generic_category().message(errno)));
+    return work_error(
+        fmt::format("the run {} cannot be removed ({})", name, std::generic_category().message(errno)));
   };
   if (!run.is_open()) return refused();
   if (!lock(run, LOCK_EX)) return work_error(fmt::format("the run {} is being recorded", name));
@@ -169,8 +172,8 @@ std::vector<RemovableRun> removable_runs(const std::filesystem::path& folder) {
   return runs;
 }
 
-std::vector<Removal> runs_to_remove(const std::vector<RemovableRun>& runs, const RecordOptions& limits, UtcTime now,
-                                    std::uint64_t all_bytes, std::uint64_t free_bytes) {
+std::vector<Removal> runs_to_remove(const std::vector<RemovableRun>& runs, const RecordOptions& limits,
+                                    UtcTime now, std::uint64_t all_bytes, std::uint64_t free_bytes) {
   std::vector<Removal> removals;
   const bool clock_is_set =
       std::all_of(runs.begin(), runs.end(), [&](const RemovableRun& run) { return run.ended <= now; });

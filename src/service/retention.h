@@ -2,10 +2,10 @@
 
 /// Which runs of a folder may go when it grows, and their removal. Soft world.
 ///
-/// A folder is a run that may go only where all of this holds: it lies in the folder of [record] itself and is no link;
-/// nothing is in it but regular files that a live run writes, a capture with the header of a run among them; nobody marked
-/// it (kKeptMark); nobody records into it (RunLock). Whatever else lies there is passed over: a folder into which
-/// somebody put something of his own is his.
+/// A folder is a run that may go only where all of this holds: it lies in the folder of [record] itself and
+/// is no link; nothing is in it but regular files that a live run writes, a capture with the header of a run
+/// among them; nobody marked it (kKeptMark); nobody records into it (RunLock). Whatever else lies there is
+/// passed over: a folder into which somebody put something of his own is his.
 
 #include <condition_variable>
 #include <filesystem>
@@ -30,8 +30,8 @@ inline constexpr const char* kRetentionThreadName = "imuscope-retain";
 /// Marks a run, or takes the mark away. kUsage where the folder is no run.
 [[nodiscard]] Result<void> set_kept(const std::filesystem::path& run, bool kept);
 
-/// Says that a run is being recorded, as long as it lives, also to other processes. Where the file system has no locks
-/// it says nothing.
+/// Says that a run is being recorded, as long as it lives, also to other processes. Where the file system has
+/// no locks it says nothing.
 class RunLock {
  public:
   explicit RunLock(const std::filesystem::path& run);
@@ -57,16 +57,19 @@ struct Removal {
 
 /// What has to go by the limits. Pure function.
 /// @param runs        the oldest first
-/// @param now         by the PC's clock. Where it is before the end of a run the clock was not set, and no age is believed
+/// @param now         by the PC's clock. Where it is before the end of a run the clock was not set, and no
+/// age is believed
 /// @param all_bytes   of all runs, those that may not go as well
 /// @param free_bytes  of the disk
-[[nodiscard]] std::vector<Removal> runs_to_remove(const std::vector<RemovableRun>& runs, const RecordOptions& limits,
-                                                  UtcTime now, std::uint64_t all_bytes, std::uint64_t free_bytes);
+[[nodiscard]] std::vector<Removal> runs_to_remove(const std::vector<RemovableRun>& runs,
+                                                  const RecordOptions& limits, UtcTime now,
+                                                  std::uint64_t all_bytes, std::uint64_t free_bytes);
 
 /// Removes them; tells each in the log. Looks once more whether it may.
 void apply_retention(const std::filesystem::path& folder, const RecordOptions& limits);
 
-/// Does that at the start and each minute, at idle priority, until it is destroyed. Without limits it does nothing.
+/// Does that at the start and each minute, at idle priority, until it is destroyed. Without limits it does
+/// nothing.
 class Retention {
  public:
   Retention(std::filesystem::path folder, const RecordOptions& limits);

@@ -111,8 +111,9 @@ constexpr int kAllowedBoth[] = {SYS_clock_gettime, SYS_rt_sigreturn, SYS_restart
                                 SYS_madvise,       SYS_munmap,       SYS_rt_sigprocmask};
 constexpr int kAllowedEstimator[] = {SYS_clock_nanosleep};
 /// getsockopt: what the kernel counted of a datagram socket, copied without a lock.
-constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait2, SYS_epoll_ctl, SYS_read,  SYS_write,     SYS_recvmsg,
-                              SYS_recvmmsg,   SYS_recvfrom,     SYS_sendto,    SYS_fcntl, SYS_getsockopt};
+constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait2, SYS_epoll_ctl, SYS_read,
+                              SYS_write,      SYS_recvmsg,      SYS_recvmmsg,  SYS_recvfrom,
+                              SYS_sendto,     SYS_fcntl,        SYS_getsockopt};
 /// Health of a line: the driver's error counts and an interface's flags, copied from the kernel's memory.
 constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS};
 

@@ -11,8 +11,8 @@
 #include <cstring>
 #include <fstream>
 
-#include "doors/metrics_server.h"
 #include "doctor/examination.h"
+#include "doors/metrics_server.h"
 #include "service/line_factory.h"
 #include "tests/support/child_process.h"
 #include "tests/support/refused_calls.h"

@@ -52,8 +52,9 @@ TEST(MetricsText, PrometheusTakesItWithoutARemark) {
 }
 
 TEST(MetricsText, PrometheusRefusesWhatIsWrong) {
-  const int verdict = check_by_prometheus("# TYPE imuscope_ticks_total counter\nimuscope_ticks_total 1\n" 
-                                          "imuscope_ticks_total 2\n");
+  const int verdict = check_by_prometheus(
+      "# TYPE imuscope_ticks_total counter\nimuscope_ticks_total 1\n"
+      "imuscope_ticks_total 2\n");
   if (verdict == kSkipped) GTEST_SKIP() << "promtool is missing: apt-get install prometheus";
   EXPECT_NE(verdict, 0) << "the judge of the other test judges";
 }
@@ -75,11 +76,13 @@ TEST(MetricsText, NamesOfOthersAreTextAndStandOnce) {
 TEST(MetricsText, SaysWhatTheStatusSaysInBaseUnits) {
   const auto text = metrics_text(test::example_status(), 0.25);
   for (const char* line :
-       {"imuscope_state{state=\"degraded\"} 1", "imuscope_state{state=\"running\"} 0", "imuscope_ticks_total 6151",
-        "imuscope_capture_lost_records_total 4", "imuscope_device_rate_hertz{device=\"mtx1\"} 99.9",
+       {"imuscope_state{state=\"degraded\"} 1", "imuscope_state{state=\"running\"} 0",
+        "imuscope_ticks_total 6151", "imuscope_capture_lost_records_total 4",
+        "imuscope_device_rate_hertz{device=\"mtx1\"} 99.9",
         "imuscope_device_lost_samples_total{device=\"mtx1\"} ", "imuscope_thread_heartbeat_age_seconds",
-        "imuscope_alarm_active{kind=\"bus\",subject=\"LCM\"} 1", "imuscope_alarm_begins_total{kind=\"bus\",subject=\"LCM\"} 22",
-        "imuscope_status_age_seconds 0.25", "imuscope_ring_high_water{ring=\"samples\"} 18"})
+        "imuscope_alarm_active{kind=\"bus\",subject=\"LCM\"} 1",
+        "imuscope_alarm_begins_total{kind=\"bus\",subject=\"LCM\"} 22", "imuscope_status_age_seconds 0.25",
+        "imuscope_ring_high_water{ring=\"samples\"} 18"})
     EXPECT_THAT(text, HasSubstr(line));
   EXPECT_THAT(text, HasSubstr("imuscope_device_latency_seconds{device=\"mtx1\"} 0.0042"));
 }
@@ -93,8 +96,8 @@ TEST(MetricsText, ThePageOfTheDocumentsHasEveryFamilyAndNoOther) {
   for (std::size_t at = 0; (at = text.find("| `imuscope_", at)) != std::string::npos; ++at) ++rows;
   EXPECT_EQ(rows, metric_families().size());
   for (const auto& family : metric_families()) {
-    EXPECT_THAT(text, HasSubstr(fmt::format("| `{}` | {} | {} | {} |", family.name, family.type, family.labels,
-                                            family.help)));
+    EXPECT_THAT(text, HasSubstr(fmt::format("| `{}` | {} | {} | {} |", family.name, family.type,
+                                            family.labels, family.help)));
   }
 }
 
@@ -152,7 +155,8 @@ TEST_F(MetricsDoor, GivesTheNewestStatusAndNothingElse) {
   EXPECT_THAT(page, HasSubstr("text/plain; version=0.0.4"));
   EXPECT_THAT(page, HasSubstr("imuscope_ticks_total 6151\n"));
   EXPECT_THAT(get("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"), StartsWith("HTTP/1.1 404"));
-  EXPECT_THAT(get("GET /metrics/../etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n"), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(get("GET /metrics/../etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+              StartsWith("HTTP/1.1 404"));
   EXPECT_THAT(get("DELETE /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n"), StartsWith("HTTP/1.1 405"));
 }
 
@@ -164,7 +168,8 @@ TEST_F(MetricsDoor, APageOfABrowserWhoseNameLeadsHereIsRefused) {
 TEST_F(MetricsDoor, WhoeverHoldsItOpenHoldsItForItsTimeAlone) {
   board_.put(test::example_status(), host_now());
   std::vector<std::unique_ptr<Client>> holders;
-  for (unsigned i = 0; i < 4 * MetricsServer::kClientsMax; ++i) holders.push_back(std::make_unique<Client>(port_));
+  for (unsigned i = 0; i < 4 * MetricsServer::kClientsMax; ++i)
+    holders.push_back(std::make_unique<Client>(port_));
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(6 * MetricsServer::kPatience_s);
   bool answered = false;
   while (!answered && std::chrono::steady_clock::now() < end) {

@@ -94,7 +94,8 @@ TEST_F(StatusDoor, NobodyElseMayOpenIt) {
   std::filesystem::permissions(folder_, std::filesystem::perms::all);
   std::filesystem::permissions(folder_ / "imuscope", std::filesystem::perms::all);
   std::filesystem::permissions((*door)->path(), std::filesystem::perms::all);
-  EXPECT_FALSE(holds_for_nobody([&] { return ask_status((*door)->path()).has_value(); })) << "a stranger was answered";
+  EXPECT_FALSE(holds_for_nobody([&] { return ask_status((*door)->path()).has_value(); }))
+      << "a stranger was answered";
 }
 
 TEST_F(StatusDoor, AFolderInWhichOthersMayWriteIsRefused) {
@@ -145,7 +146,8 @@ TEST_F(StatusDoor, WhoeverTakesNoByteHoldsNobodyAndWhatAKilledRunLeftIsRemoved) 
   unsetenv("RUNTIME_DIRECTORY");
   ASSERT_TRUE(second) << second.error().text();
   EXPECT_FALSE(std::filesystem::exists(left));
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "imuscope" / "1.status")) << "a run that answers keeps its own";
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "imuscope" / "1.status"))
+      << "a run that answers keeps its own";
 }
 
 TEST_F(StatusDoor, WithoutARunItSaysWhatToDo) {

@@ -186,7 +186,8 @@ TEST_F(LiveLines, EveryKindOfLineAndFaultInOneRun) {
   const std::string log = read_text(folder_ / "imuscope.log");
   SCOPED_TRACE(log);
   if (!guard_report_.empty()) {
-    // TCP and UDP lines under the rule of the core, too: no allocation, no lock, no call but those that it may make.
+    // TCP and UDP lines under the rule of the core, too: no allocation, no lock, no call but those that it
+    // may make.
     const auto report = read_guard_report(guard_report_);
     for (const char* thread : {"imuscope-io", "imuscope-est"}) {
       ASSERT_TRUE(report.contains(thread)) << read_text(guard_report_);

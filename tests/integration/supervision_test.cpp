@@ -191,7 +191,8 @@ TEST_F(Supervision, StatusTellsAStandingThreadItsAgeAndTheAlarm) {
   run(kSilentVehicle);
   const auto status = [&] {
     // Before its first second it has none.
-    if (run_program("imuscope", {"status", "--json"}, folder_ / "status.json") != 0) return nlohmann::json::object();
+    if (run_program("imuscope", {"status", "--json"}, folder_ / "status.json") != 0)
+      return nlohmann::json::object();
     return nlohmann::json::parse(read_text(folder_ / "status.json"));
   };
   // The devices are silent: an alarm each, with what to do.
@@ -205,7 +206,8 @@ TEST_F(Supervision, StatusTellsAStandingThreadItsAgeAndTheAlarm) {
         return alarm["kind"] == "thread" && alarm["subject"] == "imuscope-rec" && alarm["active"];
       });
       const bool aged = std::any_of(now["threads"].begin(), now["threads"].end(), [](const auto& thread) {
-        return thread["name"] == "imuscope-rec" && thread["heartbeat_age_s"].is_number() && thread["heartbeat_age_s"] > 3.0;
+        return thread["name"] == "imuscope-rec" && thread["heartbeat_age_s"].is_number() &&
+               thread["heartbeat_age_s"] > 3.0;
       });
       return told && aged;
     })) << read_text(folder_ / "status.json");
@@ -218,7 +220,8 @@ TEST_F(Supervision, StatusTellsAStandingThreadItsAgeAndTheAlarm) {
   })) << "it is over, and stays in the list";
   {
     const FrozenThread frozen(service_->id(), "imuscope-pub");
-    EXPECT_TRUE(soon([&] { return status()["status_age_s"] > 3.0; })) << "what makes the status stands still itself";
+    EXPECT_TRUE(soon([&] { return status()["status_age_s"] > 3.0; }))
+        << "what makes the status stands still itself";
   }
   service_->interrupt();
   EXPECT_EQ(service_->wait(), kFailedWork) << log();
@@ -248,8 +251,9 @@ TEST_F(Supervision, TheJournalGetsFieldsOfRunDeviceAndAlarm) {
   std::vector<std::string> entries;
   const auto has = [&](std::initializer_list<std::string> fields) {
     return std::any_of(entries.begin(), entries.end(), [&](const std::string& entry) {
-      return std::all_of(fields.begin(), fields.end(),
-                         [&](const std::string& field) { return entry.find(field + "\n") != std::string::npos; });
+      return std::all_of(fields.begin(), fields.end(), [&](const std::string& field) {
+        return entry.find(field + "\n") != std::string::npos;
+      });
     });
   };
   EXPECT_TRUE(soon([&] {
@@ -257,7 +261,8 @@ TEST_F(Supervision, TheJournalGetsFieldsOfRunDeviceAndAlarm) {
     for (ssize_t n = 0; (n = recv(journal, text.data(), text.size(), 0)) > 0;)
       entries.emplace_back(text.data(), static_cast<std::size_t>(n));
     return has({"IMUSCOPE_RUN=silent", "IMUSCOPE_DEVICE=mtx1", "PRIORITY=6"}) &&
-           has({"IMUSCOPE_ALARM=device", "IMUSCOPE_SUBJECT=mtx1", "IMUSCOPE_ACTIVE=1", "IMUSCOPE_TIMES=1", "PRIORITY=4"});
+           has({"IMUSCOPE_ALARM=device", "IMUSCOPE_SUBJECT=mtx1", "IMUSCOPE_ACTIVE=1", "IMUSCOPE_TIMES=1",
+                "PRIORITY=4"});
   }));
   service_->interrupt();
   EXPECT_EQ(service_->wait(), kFailedWork) << log();

@@ -23,7 +23,8 @@ TEST(Alarms, SayWhenTheyBeganHowOftenAndHowLong) {
   EXPECT_THAT(book.look({}, kAlarmsUtc, kAlarmsBegin).began, IsEmpty());
   const std::vector<Condition> full{disk_full()};
   EXPECT_THAT(book.look(full, kAlarmsUtc, kAlarmsBegin).began, SizeIs(1));
-  EXPECT_THAT(book.look(full, kAlarmsUtc + seconds(5), kAlarmsBegin + seconds(5)).began, IsEmpty()) << "it is the same one";
+  EXPECT_THAT(book.look(full, kAlarmsUtc + seconds(5), kAlarmsBegin + seconds(5)).began, IsEmpty())
+      << "it is the same one";
   ASSERT_THAT(book.list(), SizeIs(1));
   EXPECT_EQ(book.list()[0].active, 1);
   EXPECT_EQ(book.list()[0].since_utime, to_utime(kAlarmsUtc));

@@ -29,10 +29,12 @@ void announce(const std::string& action, const std::string& subsystem) {
   address.nl_family = AF_NETLINK;
   address.nl_groups = kKernelGroup;
   std::string message;
-  for (const auto& part : {action + "@/devices/platform/imu", "ACTION=" + action, std::string("DEVPATH=/devices/platform/imu"),
-                           "SUBSYSTEM=" + subsystem, std::string("SEQNUM=1")})
+  for (const auto& part :
+       {action + "@/devices/platform/imu", "ACTION=" + action, std::string("DEVPATH=/devices/platform/imu"),
+        "SUBSYSTEM=" + subsystem, std::string("SEQNUM=1")})
     message += part + '\0';
-  (void)sendto(line, message.data(), message.size(), 0, reinterpret_cast<const sockaddr*>(&address), sizeof address);
+  (void)sendto(line, message.data(), message.size(), 0, reinterpret_cast<const sockaddr*>(&address),
+               sizeof address);
   close(line);
 }
 
@@ -44,7 +46,8 @@ TEST(DeviceEvents, WithoutAnEventItWaitsItsTime) {
 }
 
 TEST(DeviceEvents, WhatComesWakesItAtOnceAndWhatGoesDoesNot) {
-  if (std::filesystem::exists("/run/udev/control")) GTEST_SKIP() << "this PC's udev announces nothing in a private network";
+  if (std::filesystem::exists("/run/udev/control"))
+    GTEST_SKIP() << "this PC's udev announces nothing in a private network";
   if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network needs root";
   DeviceEvents events;
   std::thread plug([] {
@@ -60,8 +63,8 @@ TEST(DeviceEvents, WhatComesWakesItAtOnceAndWhatGoesDoesNot) {
   EXPECT_FALSE(came);
 }
 
-// A message of a user's program has a sender, and the kernel's have none: libudev drops it, as it must. What stands
-// here is that forged announcements move nothing; real ones are seen by tools/systemd_vm.
+// A message of a user's program has a sender, and the kernel's have none: libudev drops it, as it must. What
+// stands here is that forged announcements move nothing; real ones are seen by tools/systemd_vm.
 TEST(DeviceEvents, WhatNoKernelAndNoUdevSaidIsNotBelieved) {
   if (unshare(CLONE_NEWNET) != 0) GTEST_SKIP() << "a private network needs root";
   DeviceEvents events;

@@ -38,7 +38,8 @@ class RetentionTest : public testing::Test {
     auto recorder = Recorder::start({run / "capture.lcm", "IMUSCOPE", header}, {}, {});
     EXPECT_TRUE(recorder);
     EXPECT_TRUE((*recorder)->stop());
-    for (const char* file : {"navigation.csv", "errors_mtx1.csv", "calibration.json", "run.json", "capture_001.lcm"})
+    for (const char* file :
+         {"navigation.csv", "errors_mtx1.csv", "calibration.json", "run.json", "capture_001.lcm"})
       std::ofstream(run / file) << "text\n";
     for (const auto& entry : std::filesystem::directory_iterator(run))
       std::filesystem::last_write_time(entry.path(), std::filesystem::file_time_type::clock::now() - age);

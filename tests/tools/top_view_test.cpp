@@ -47,11 +47,26 @@ TEST(TopView, WhatANetworkSendsMovesNoCursorAndIsStillJson) {
 
 TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndAlarms) {
   const auto text = page(example());
-  for (const char* part :
-       {"run 'demo'  degraded: mtx2 is silent", "run/capture.lcm", "lost 4", "last event: roundabout",
-        "streaming", "99.9", "4.20", "25", "-11.5", "converging", "0.5730/0.0573", "20.00/2", "3.000/0.3",
-        "weakest psi_z (50 % of its prior left); still missing: brake", "fifo 80", "13 us", "18 us", "1024",
-        "!! no route (for 0:00:21, 22 times)", "   run ip route add"}) {
+  for (const char* part : {"run 'demo'  degraded: mtx2 is silent",
+                           "run/capture.lcm",
+                           "lost 4",
+                           "last event: roundabout",
+                           "streaming",
+                           "99.9",
+                           "4.20",
+                           "25",
+                           "-11.5",
+                           "converging",
+                           "0.5730/0.0573",
+                           "20.00/2",
+                           "3.000/0.3",
+                           "weakest psi_z (50 % of its prior left); still missing: brake",
+                           "fifo 80",
+                           "13 us",
+                           "18 us",
+                           "1024",
+                           "!! no route (for 0:00:21, 22 times)",
+                           "   run ip route add"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
 }

@@ -49,7 +49,8 @@ Result<void> run(const StatusCommand& options) {
 }  // namespace
 
 void add_status(CLI::App& app, Work& chosen) {
-  auto* command = app.add_subcommand("status", "How the runs on this PC are, asked of themselves, without LCM");
+  auto* command =
+      app.add_subcommand("status", "How the runs on this PC are, asked of themselves, without LCM");
   auto options = std::make_shared<StatusCommand>();
   command->add_option("--socket", options->socket, "of the run to ask (default: all that this user may ask)")
       ->type_name("PATH");

@@ -6,7 +6,8 @@
 
 namespace imuscope::cli {
 
-/// The log goes to standard error, "17:03:21.250 warning mtx1: ...", or to the journal where that is the journal.
+/// The log goes to standard error, "17:03:21.250 warning mtx1: ...", or to the journal where that is the
+/// journal.
 void set_up_log();
 
 /// What a line of an error begins with besides its text.

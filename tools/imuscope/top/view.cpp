@@ -62,10 +62,14 @@ void add_alarms(const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back("ALARMS");
   for (const auto& a : status.alarms) {
     const std::string often = a.times > 1 ? fmt::format(", {} times", a.times) : "";
-    const auto since = status.utime > 0 && a.since_utime > 0
-                           ? fmt::format(", began {} ago", clock_of(std::chrono::duration<double>(std::chrono::microseconds(
-                                                               std::max<std::int64_t>(0, status.utime - a.since_utime))).count()))
-                           : "";
+    const auto since =
+        status.utime > 0 && a.since_utime > 0
+            ? fmt::format(
+                  ", began {} ago",
+                  clock_of(std::chrono::duration<double>(std::chrono::microseconds(std::max<std::int64_t>(
+                                                             0, status.utime - a.since_utime)))
+                               .count()))
+            : "";
     if (a.active != 0) {
       lines.push_back(fmt::format("!! {} (for {}{})", a.what, clock_of(a.lasted_s), often));
       if (!a.remedy.empty()) lines.push_back("   " + a.remedy);
@@ -77,15 +81,15 @@ void add_alarms(const status_t& status, std::vector<std::string>& lines) {
 
 void add_devices(const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back();
-  lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", "DEVICE",
-                              "role", "state", "rate/Hz", "age/s", "lost", "late", "bad", "refused", "dropped",
-                              "latency/ms", "clock/us", "drift/ppm"));
+  lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}",
+                              "DEVICE", "role", "state", "rate/Hz", "age/s", "lost", "late", "bad", "refused",
+                              "dropped", "latency/ms", "clock/us", "drift/ppm"));
   for (const auto& d : status.devices) {
-    lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", d.name,
-                                d.role, d.state, number(d.rate_hz, 1), number(d.data_age_s, 1), d.samples_lost,
-                                d.samples_late,
-                                d.bad_checksums, d.samples_refused, d.frames_dropped, number(d.latency_ms, 2),
-                                number(d.clock_sd_us, 0), number(d.clock_drift_ppm, 1)));
+    lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}",
+                                d.name, d.role, d.state, number(d.rate_hz, 1), number(d.data_age_s, 1),
+                                d.samples_lost, d.samples_late, d.bad_checksums, d.samples_refused,
+                                d.frames_dropped, number(d.latency_ms, 2), number(d.clock_sd_us, 0),
+                                number(d.clock_drift_ppm, 1)));
     if (!d.problem.empty()) lines.push_back("  " + d.problem);
   }
 }
@@ -180,15 +184,15 @@ std::string ms_or_us(double us) {
 
 void add_threads(const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back();
-  lines.push_back(fmt::format("{:<16}{:<9}{:>6}{:>8}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", "THREAD",
-                              "sched", "cpu/%", "alive/s", "ticks", "overruns", "skipped", "late p50", "p99", "p99.9",
-                              "max", "done p50", "p99"));
+  lines.push_back(fmt::format("{:<16}{:<9}{:>6}{:>8}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
+                              "THREAD", "sched", "cpu/%", "alive/s", "ticks", "overruns", "skipped",
+                              "late p50", "p99", "p99.9", "max", "done p50", "p99"));
   for (const auto& t : status.threads) {
-    lines.push_back(fmt::format("{:<16}{:<9}{:>6}{:>8}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", t.name,
-                                t.scheduling, number(t.cpu_percent, 2), number(t.heartbeat_age_s, 1), t.ticks, t.overruns, t.skipped,
-                                ms_or_us(t.lateness_p50_us), ms_or_us(t.lateness_p99_us),
-                                ms_or_us(t.lateness_p999_us), ms_or_us(t.lateness_max_us),
-                                ms_or_us(t.done_p50_us), ms_or_us(t.done_p99_us)));
+    lines.push_back(fmt::format(
+        "{:<16}{:<9}{:>6}{:>8}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", t.name, t.scheduling,
+        number(t.cpu_percent, 2), number(t.heartbeat_age_s, 1), t.ticks, t.overruns, t.skipped,
+        ms_or_us(t.lateness_p50_us), ms_or_us(t.lateness_p99_us), ms_or_us(t.lateness_p999_us),
+        ms_or_us(t.lateness_max_us), ms_or_us(t.done_p50_us), ms_or_us(t.done_p99_us)));
   }
   for (const auto& t : status.threads) {
     if (t.lateness_octaves.empty()) continue;
@@ -280,8 +284,8 @@ nlohmann::json ring_json(const ring_status_t& r) {
 }
 
 nlohmann::json alarm_json(const alarm_t& a) {
-  return {{"kind", a.kind},          {"subject", a.subject}, {"what", a.what},
-          {"remedy", a.remedy},      {"active", a.active != 0}, {"since_utime", a.since_utime},
+  return {{"kind", a.kind},         {"subject", a.subject},    {"what", a.what},
+          {"remedy", a.remedy},     {"active", a.active != 0}, {"since_utime", a.since_utime},
           {"lasted_s", a.lasted_s}, {"times", a.times}};
 }
 
