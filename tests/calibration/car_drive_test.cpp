@@ -104,8 +104,6 @@ EstimatorConfig car_config() {
   StudyConfig study;
   study.device = kStudy;
   study.rate_hz = 120.0;
-  // A MEMS reference and a running engine: 0.1 s of samples in one update keep their noise out of H.
-  study.average_samples = 12;
   for (TriadNoise& gyro : study.noise.gyro) {
     gyro = TriadNoise{};
     gyro.white_sd.fill(0.006);
