@@ -68,8 +68,8 @@ inline constexpr double kUsableTimeOffsetSd_s = kUsableGoal.time_offset_sd_s;
 struct SensorQuality {
   double gyro_white_radps_per_sqrt_hz = 0.0;
   double accel_white_mps2_per_sqrt_hz = 0.0;
-  double axes_sd_rad = 0.0;   ///< lean of each axis; 0 where axes are taken to be straight
-  double places_sd_m = 0.0;   ///< of the accelerometers about their middle; 0 where they are at one place
+  double axes_sd_rad = 0.0;  ///< lean of each axis; 0 where axes are taken to be straight
+  double places_sd_m = 0.0;  ///< of the accelerometers about their middle; 0 where they are at one place
 };
 
 /// A manoeuvre takes so long, and has so much rate, angular acceleration and acceleration of a metre's lever.

@@ -10,11 +10,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// E-18: how long the error of a solution stays much the same. Ambiguities of a float solution settle over half
-/// a minute. The autocorrelation of recorded single positions bends at about one minute and then falls slowly
-/// (D. L. Wilson's twenty-day records, "Correlation of errors"), as reflections change within a minute, and what
-/// orbits, clocks and the atmosphere leave within many (differenced phases: 5 to 20 min, Howind et al. 1999).
-/// Corrections take most of the slow part away.
+/// E-18: how long the error of a solution stays much the same. Ambiguities of a float solution settle over
+/// half a minute. The autocorrelation of recorded single positions bends at about one minute and then falls
+/// slowly (D. L. Wilson's twenty-day records, "Correlation of errors"), as reflections change within a
+/// minute, and what orbits, clocks and the atmosphere leave within many (differenced phases: 5 to 20 min,
+/// Howind et al. 1999). Corrections take most of the slow part away.
 constexpr double kFloatCorrelation_s = 30.0;
 constexpr double kDifferentialCorrelation_s = 60.0;
 constexpr double kSingleCorrelation_s = 120.0;

@@ -220,10 +220,6 @@ void NavigationFilter::try_start(const Sample& sample) noexcept {
   aligner_.add_imu(sample.time, last_, 1.0 + utc_scale_.scale().rate);
   if (const InitialNavigation* found = aligner_.result()) {
     start(found->state, found->sd, method_of(found->method), sample.time);
-    if (found->method != AlignmentMethod::kReferenceAttitude) {
-      tie_tilt_to_accel_bias(found->C_b_n_at_rest);
-      take_gyro_bias(found->state.gyro_bias_b_radps, found->sd.segment<3>(kGyroBiasError));
-    }
     remember(sample, last_);
     return;
   }
@@ -250,66 +246,6 @@ void NavigationFilter::start(const NavigationState& state, const NavigationError
   output_.has_gnss = false;
   output_.method = method;
   log_.add(event::NavigationStarted{method}, reference_.device, time);
-}
-
-/// N-49: a level that was found at rest hides the accelerometers' bias behind a tilt.
-void NavigationFilter::tie_tilt_to_accel_bias(const Matrix3d& C_b_n_at_rest) noexcept {
-  constexpr double kShort_s = 0.01;
-  NavigationState at_rest = core_.navigation();
-  at_rest.C_b_n = C_b_n_at_rest;
-  at_rest.v_n_mps.setZero();
-  const Vector3d up_b = C_b_n_at_rest.transpose() * Vector3d(0.0, 0.0, -kNominalGravity_mps2);
-  const NavigationTransition step = transition(at_rest, {Vector3d::Zero(), up_b}, noise_, kShort_s);
-  // The tilt with which a bias accelerates nothing: the level's own condition, in the error model's signs.
-  const auto horizontal = step.kinematic_rows.middleRows<2>(kVelocityError);
-  const Eigen::Matrix2d by_tilt = horizontal.middleCols<2>(kAttitudeError);
-  const Eigen::Matrix<double, 2, 3> tilt_by_bias =
-      -by_tilt.inverse() * horizontal.middleCols<3>(kAccelBiasError);
-  CovarianceKernel& P = core_.covariance();
-  const auto carried = [&](Eigen::Index row, std::size_t state) {
-    double sum = 0.0;
-    for (std::size_t j = 0; j < 3; ++j)
-      sum += tilt_by_bias(row, static_cast<Eigen::Index>(j)) * P(kAccelBiasError + j, state);
-    return sum;
-  };
-  Eigen::Matrix2d of_bias = Eigen::Matrix2d::Zero();
-  for (Eigen::Index row = 0; row < 2; ++row) {
-    for (Eigen::Index other = 0; other < 2; ++other) {
-      for (std::size_t j = 0; j < 3; ++j)
-        of_bias(row, other) +=
-            carried(row, kAccelBiasError + j) * tilt_by_bias(other, static_cast<Eigen::Index>(j));
-    }
-  }
-  // A tilt better known than the bias allows was found by more than these accelerometers.
-  for (std::size_t i = 0; i < 2; ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    if (of_bias(row, row) > P(kAttitudeError + i, kAttitudeError + i)) return;
-  }
-  P.set(kAttitudeError, kAttitudeError + 1, of_bias(0, 1));
-  for (std::size_t i = 0; i < 2; ++i) {
-    for (std::size_t state = kGyroBiasError; state < P.dimension(); ++state)
-      P.set(kAttitudeError + i, state, carried(static_cast<Eigen::Index>(i), state));
-  }
-}
-
-/// N-47: what the rest said of the gyro bias, as a measurement of it.
-void NavigationFilter::take_gyro_bias(const Vector3d& bias_b_radps, const Vector3d& sd_radps) noexcept {
-  SparseMeasurement H;
-  MeasurementBlock& block = H.append(kGyroBiasError, 3);
-  Matrix3d R = Matrix3d::Zero();
-  Vector3d measured;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    block.h[i][i] = 1.0;
-    // The aligner has weighed it against the prior, which is in the filter already: that is taken out again.
-    const double prior = reference_.gyro_bias.sd * reference_.gyro_bias.sd;
-    const double posterior = sd_radps(k) * sd_radps(k);
-    if (!(posterior < prior)) return;
-    R(k, k) = prior * posterior / (prior - posterior);
-    measured(k) = bias_b_radps(k) * R(k, k) / posterior;
-  }
-  core_.covariance().project(H, to_array(R));
-  core_.update(measured - core_.reference_gyro_bias_radps(), {true, true, true});
 }
 
 void NavigationFilter::stop(HostTime time, double gap_s) noexcept {

@@ -69,8 +69,6 @@ class NavigationFilter {
   void try_start(const Sample& sample) noexcept;
   void start(const NavigationState& state, const NavigationErrorVector& sd, InitialisationMethod method,
              HostTime time) noexcept;
-  void tie_tilt_to_accel_bias(const Eigen::Matrix3d& C_b_n_at_rest) noexcept;
-  void take_gyro_bias(const Eigen::Vector3d& bias_b_radps, const Eigen::Vector3d& sd_radps) noexcept;
   void stop(HostTime time, double gap_s) noexcept;
   bool apply_gnss(const Sample& sample) noexcept;
   [[nodiscard]] HostTime host_time_of(const Sample& gnss) const noexcept;

@@ -23,8 +23,8 @@ constexpr double kBlockGap_s = 0.1;
 /// Nothing is called calibrated or observable where more than a third of the sd comes from it.
 constexpr double kNoiseKnown = 0.1;
 constexpr double kAttenuationMax = 0.3;
-/// Noise of the angular acceleration in neighbouring windows has the correlation -1/2: what changes from one to
-/// the next, as the columns of the time offset do, sees up to twice the variance.
+/// Noise of the angular acceleration in neighbouring windows has the correlation -1/2: what changes from one
+/// to the next, as the columns of the time offset do, sees up to twice the variance.
 constexpr double kSlopeCorrelation = 2.0;
 /// A window that began in the middle, as after a gap, is none.
 constexpr double kWholeWindow = 0.9;
@@ -36,6 +36,8 @@ constexpr double kNisMean_s = 10.0;
 constexpr double kNoiseMean_s = 60.0;
 constexpr double kNoiseTooSmall = 2.0;
 constexpr double kNoiseFits = 1.5;
+/// Where the state's own share of an innovation's variance is below this, what is too much of it is noise.
+constexpr double kNoiseRules = 0.2;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
 constexpr double kMountingChangedShare = 0.8;
 constexpr double kMountingWatch_s = 3.0;
@@ -545,7 +547,10 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     seen.seen[i] += n;
     const double long_share = n / std::min(seen.seen[i], kNoiseMean_s * config_.rate_hz);
     seen.nis[i] += long_share * (y(k) * y(k) / plain(k) - seen.nis[i]);
-    seen.excess[i] += long_share * (n * (y(k) * y(k) - plain(k)) - seen.excess[i]);
+    // Of one sample; while the state is uncertain, innovations tell of it and not of the noise.
+    const double excess_of_sample = n / window_white_share(length) * (y(k) * y(k) - plain(k));
+    if (windows.known(k) < kNoiseRules * plain(k))
+      seen.excess[i] += long_share * (excess_of_sample - seen.excess[i]);
   }
   watch_noise(context, triad, epoch.time);
   core.update(y, use);
@@ -727,7 +732,8 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
     for (std::size_t i = 0; i < 3; ++i) {
       output_.sd_gyro_scale[i] = std::hypot(output_.sd_gyro_scale[i], reference_scale_sd_);
       output_.sd_accel_scale[i] = std::hypot(output_.sd_accel_scale[i], reference_scale_sd_);
-      output_.sd_accel_boresight_rad[i] = std::hypot(output_.sd_accel_boresight_rad[i], reference_triad_sd_rad_);
+      output_.sd_accel_boresight_rad[i] =
+          std::hypot(output_.sd_accel_boresight_rad[i], reference_triad_sd_rad_);
     }
   }
   judge(core);
@@ -806,8 +812,7 @@ void StudyFilter::judge(const FilterCore& core) noexcept {
     const double goal_sd = i < 3 ? goal.boresight_sd_rad : goal.lever_arm_sd_m;
     const bool blurred = i >= 3 && lever_arm_attenuated_[i - 3];
     attenuated = attenuated || blurred;
-    output_.observable[i] =
-        fits && !blurred && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal_sd);
+    output_.observable[i] = fits && !blurred && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal_sd);
   }
   output_.t_d_observable =
       layout.t_d != StudyLayout::kAbsent && fits &&

@@ -15,7 +15,7 @@ namespace imuscope {
 /// sd of noise in the mean of a window, for white noise of sd 1 on every R sample.
 struct NoiseGains {
   double value = 1.0;
-  double slope_per_s = 0.0;      ///< of the first derivative
+  double slope_per_s = 0.0;       ///< of the first derivative
   double curvature_per_s2 = 0.0;  ///< of the second
 };
 

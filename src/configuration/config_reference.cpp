@@ -78,7 +78,8 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "have. `paper`: the six states of the published method, for comparison."},
     {"estimator.mounting",
      "What `process` publishes of a mounting. `batch`: an estimate of the whole drive in which nobody knows "
-     "the true motion; it learns the noise, so that it needs no `[device.noise]`, and its sd hold what crooked "
+     "the true motion; it learns the noise, so that it needs no `[device.noise]`, and its sd hold what "
+     "crooked "
      "axes and the reference's own errors leave open. `filter`: the filter's end value, which is as good as "
      "the configured noise; with `states = \"paper\"` the default."},
     {"estimator.navigation",

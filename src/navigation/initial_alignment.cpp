@@ -341,7 +341,6 @@ void InitialAligner::update_stage() noexcept {
   result_.time = imu_time_;
   result_.method = method_;
   result_.state.C_b_n = C_a_n() * C_b_a_;
-  result_.C_b_n_at_rest = C_a_n() * C_b_a_at_rest_;
   result_.state.accel_bias_b_mps2.setZero();
   result_.sd.segment<3>(kAttitudeError) = Vector3d(tilt_sd_rad_, tilt_sd_rad_, heading_sd_rad_);
   result_.sd.segment<3>(kGyroBiasError).setConstant(noise.gyro_bias.sd);

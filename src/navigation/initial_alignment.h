@@ -56,8 +56,6 @@ struct InitialNavigation {
   NavigationState state;
   HostTime time{};                                           ///< of the newest IMU sample handed in
   NavigationErrorVector sd = NavigationErrorVector::Zero();  ///< of the error states, in their order
-  /// Attitude at the rest that gave the level; the present one where the IMU told its attitude itself.
-  Eigen::Matrix3d C_b_n_at_rest = Eigen::Matrix3d::Identity();
   AlignmentMethod method = AlignmentMethod::kReferenceAttitude;
 };
 

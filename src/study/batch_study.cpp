@@ -252,8 +252,8 @@ void take_over(const batch::BatchMounting& mounting, StudyOutput& study) {
   study.sd_accel_scale = sd_of(mounting, batch::kAccelShape);
   // In b, as the boresight.
   const Eigen::Matrix3d C_s_b = sensor.C_b_s.transpose();
-  const Eigen::Matrix3d alpha = C_s_b * mounting.covariance.block<3, 3>(batch::kAlpha, batch::kAlpha) *
-                                C_s_b.transpose();
+  const Eigen::Matrix3d alpha =
+      C_s_b * mounting.covariance.block<3, 3>(batch::kAlpha, batch::kAlpha) * C_s_b.transpose();
   study.accel_boresight_rad = vector_of(C_s_b * sensor.x.segment<3>(batch::kAlpha));
   study.sd_accel_boresight_rad = vector_of(alpha.diagonal().cwiseSqrt());
   study.accel_t_d_s = sensor.x[batch::kAccelDelay];

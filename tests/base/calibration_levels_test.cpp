@@ -40,7 +40,8 @@ TEST(CalibrationLevels, EveryAxisHasToMeetTheGoal) {
 
 TEST(CalibrationLevels, GoalsFollowFromTheSensorsNoiseAndFromItsAxes) {
   constexpr double kDeg = kPi / 180.0;
-  // A quarter of what 0.04 deg/s per sqrt(Hz) leaves in a mean of 4 s is 0.005 deg/s: of 0.1 rad/s and rad/s^2.
+  // A quarter of what 0.04 deg/s per sqrt(Hz) leaves in a mean of 4 s is 0.005 deg/s: of 0.1 rad/s and
+  // rad/s^2.
   SensorQuality mems{0.04 * kDeg, 2e-3, 0.0, 0.0};
   EXPECT_NEAR(goal_of(mems).boresight_sd_rad, 0.05 * kDeg, 1e-12);
   EXPECT_NEAR(goal_of(mems).lever_arm_sd_m, 0.25e-3 / 0.2, 1e-12);

@@ -97,8 +97,8 @@ using Variances6 = Eigen::Matrix<double, 6, 1>;
 
 /// Posterior Cramer-Rao bound of (psi, r): variances that the same states and priors have where the motion is
 /// as it was, the noise is known and everything is linear and Gaussian. A Kalman filter tells just these; its
-/// covariance hangs on the motion and hardly on the draw, so that one run does. Where the reference is as noisy
-/// as the sensors (class 5), the filter's windows lose a little, and the bound is an upper one.
+/// covariance hangs on the motion and hardly on the draw, so that one run does. Where the reference is as
+/// noisy as the sensors (class 5), the filter's windows lose a little, and the bound is an upper one.
 Variances6 bound_of(const study_drive::Truth& truth, const Options& options) {
   const int reference_class = options.pair.reference_class;
   EstimatorConfig config = study_drive::configuration(truth.motion(), reference_class);

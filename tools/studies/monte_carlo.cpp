@@ -230,8 +230,8 @@ void account(const Scenario& scenario, const imuscope::Estimator& estimator, con
     const Vector3d about_gravity = end.f_b_mps2.normalized();
     const double sd = std::sqrt(about_gravity.dot(P.topLeftCorner<3, 3>() * about_gravity));
     totals.about_gravity_min = std::min(totals.about_gravity_min, sd / kBoresightSd_rad);
-    totals.lever_arm_min = std::min(
-        totals.lever_arm_min, std::sqrt(P.diagonal().tail<3>().minCoeff()) / kLeverArmSd_m);
+    totals.lever_arm_min =
+        std::min(totals.lever_arm_min, std::sqrt(P.diagonal().tail<3>().minCoeff()) / kLeverArmSd_m);
     totals.weakest += out.weakest_relative_sd;
     const double t_d_error = truth.t_d_s - out.t_d_s;
     totals.t_d2 += t_d_error * t_d_error;
@@ -392,8 +392,9 @@ void print(const Scenario& scenario, const Totals& t, const Options& options, Ju
     fmt::print(
         "   every kind of state within its 95 % interval in 93 to 97 % of all cases, NEES as above: {}\n",
         judge(t.score.honest()));
-  fmt::print("   least sd of the lever arm {:.2f} %, about gravity {:.2f} % of its prior, weakest direction {:.4f}",
-             1e2 * t.lever_arm_min, 1e2 * t.about_gravity_min, t.weakest / t.n);
+  fmt::print(
+      "   least sd of the lever arm {:.2f} %, about gravity {:.2f} % of its prior, weakest direction {:.4f}",
+      1e2 * t.lever_arm_min, 1e2 * t.about_gravity_min, t.weakest / t.n);
   if (scenario.name == 'S')
     fmt::print(", goal 99 %: {}", judge(t.lever_arm_min >= 0.99 && t.about_gravity_min >= 0.99));
   fmt::print(
