@@ -110,9 +110,9 @@ RowDecoder::RowDecoder(std::vector<Column> columns, double time_unit_s, double t
       time_offset_s_(time_offset_s),
       device_(device) {}
 
-void RowDecoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
+void RowDecoder::push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  feed(reader_, bytes, arrival, [&] { drain(arrival, sink, false); });
+  feed(reader_, bytes, arrival.received, [&] { drain(arrival.read, sink, false); });
 }
 
 void RowDecoder::finish(HostTime arrival, SampleSink& sink) noexcept { drain(arrival, sink, true); }

@@ -87,7 +87,7 @@ class RowPeriod {
 /// What both devices share: lines to rows, time, counts.
 class RowDecoder : public DeviceDecoder {
  public:
-  void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept final;
+  void push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept final;
   void finish(HostTime arrival, SampleSink& sink) noexcept final;
   [[nodiscard]] const DecoderCounters& counters() const noexcept final { return counters_; }
   [[nodiscard]] double clock_drift_ppm() const noexcept final { return clock_.drift_ppm(); }

@@ -48,6 +48,12 @@ template <typename T>
   return detail::read_ordered<T>(bytes.data() + offset, std::endian::little);
 }
 
+/// Writes an integer, least significant byte first, `offset` bytes into `out`, which has room for it.
+template <typename T>
+void write_le(T value, std::span<std::uint8_t> out, std::size_t offset = 0) noexcept {
+  for (std::size_t i = 0; i < sizeof(T); ++i) out[offset + i] = static_cast<std::uint8_t>(value >> (8 * i));
+}
+
 /// Sum of the bytes modulo 2^32, eight at a time.
 [[nodiscard]] inline std::uint32_t sum_of_bytes(std::span<const std::uint8_t> bytes) noexcept {
   // Bytes are added in lanes of 16 bits, each of which holds 128 sums of two bytes.

@@ -10,7 +10,7 @@ namespace imuscope {
 
 class CanDecoder : public DeviceDecoder {
  public:
-  void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept final;
+  void push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept final;
   [[nodiscard]] const DecoderCounters& counters() const noexcept final { return counters_; }
 
  protected:

@@ -25,11 +25,6 @@ constexpr std::size_t kRawDlcAt = 6;
 constexpr std::size_t kReservedAt = 7;
 constexpr std::size_t kStampAt = 8;
 
-template <typename T>
-void write_le(T value, std::span<std::uint8_t> out, std::size_t offset) noexcept {
-  for (std::size_t i = 0; i < sizeof(T); ++i) out[offset + i] = static_cast<std::uint8_t>(value >> (8 * i));
-}
-
 bool is_record(const CanFrame& frame, std::uint8_t flags, std::uint8_t reserved) noexcept {
   const std::uint32_t id_max = frame.is_extended || frame.is_error ? kCanExtendedIdMax : kCanStandardIdMax;
   return frame.id <= id_max && (flags & ~kKnownFlags) == 0 && reserved == 0 &&

@@ -30,6 +30,18 @@ struct DecoderCounters {
   std::uint64_t clock_resets = 0;  ///< the device's count was not continuable: a new segment began
 };
 
+/// The instants of one read. A plain instant stands for both.
+struct Arrival {
+  HostTime read{};  ///< it was made: which tick consumes what it brought follows from this
+  /// Its last byte had come, as the kernel or the interface say where they do; never after `read`. Clocks are
+  /// learned by this.
+  HostTime received{};
+
+  constexpr Arrival() noexcept = default;
+  constexpr Arrival(HostTime at) noexcept : read(at), received(at) {}
+  constexpr Arrival(HostTime read_at, HostTime received_at) noexcept : read(read_at), received(received_at) {}
+};
+
 /// Turns the byte stream of one device into samples. Core: no allocation, no exception after construction.
 class DeviceDecoder {
  public:
@@ -37,8 +49,8 @@ class DeviceDecoder {
 
   /// Decodes one read. Frames may span reads; samples come out in stream order.
   /// @param bytes    what the read returned
-  /// @param arrival  host time of the read
-  virtual void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept = 0;
+  /// @param arrival  host times of the read
+  virtual void push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept = 0;
 
   /// The stream has ended (end of a recording, never needed live): decodes what waited for more bytes, such
   /// as a last line without its end, or a frame behind a false start that announced more than came.

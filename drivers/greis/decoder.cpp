@@ -72,9 +72,9 @@ bool all_finite(const Vector3& v) noexcept {
 Decoder::Decoder(const DecoderConfig& config) noexcept
     : config_(config), scanner_(config.per_byte), clock_(config.clock) {}
 
-void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
+void Decoder::push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  feed(scanner_, bytes, arrival, [&] { drain(arrival, sink, false); });
+  feed(scanner_, bytes, arrival.received, [&] { drain(arrival.read, sink, false); });
 }
 
 void Decoder::finish(HostTime arrival, SampleSink& sink) noexcept {

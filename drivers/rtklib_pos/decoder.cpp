@@ -74,9 +74,9 @@ Decoder::Decoder(const DecoderConfig& config) noexcept
       format_(config.format),
       base_(config.base) {}
 
-void Decoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
+void Decoder::push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  feed(scanner_, bytes, arrival, [&] { drain(arrival, sink, false); });
+  feed(scanner_, bytes, arrival.received, [&] { drain(arrival.read, sink, false); });
 }
 
 std::string_view Decoder::remark() const noexcept {

@@ -4,8 +4,6 @@
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
-#include <linux/errqueue.h>
-#include <linux/net_tstamp.h>
 #include <net/if.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
@@ -14,7 +12,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
 
 #include "base/contracts.h"
 #include "drivers/transport/can_interface.h"
@@ -26,20 +23,6 @@ namespace {
 
 /// A full bus brings eight frames a millisecond: one call takes what comes while a thread wakes up.
 constexpr std::size_t kFramesPerCall = 64;
-
-constexpr std::size_t kControlBytes =
-    CMSG_SPACE(sizeof(scm_timestamping)) + CMSG_SPACE(sizeof(std::uint32_t));
-
-std::int64_t to_ns(const timespec& time) noexcept {
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-  return std::int64_t{time.tv_sec} * kNsPerSecond + time.tv_nsec;
-}
-
-std::int64_t clock_ns(clockid_t clock) noexcept {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return to_ns(now);
-}
 
 Error no_socket(int error) {
   if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT) {
@@ -83,7 +66,7 @@ struct CanSocket::Batch {
   std::array<iovec, kFramesPerCall> vectors{};
   std::array<canfd_frame, kFramesPerCall> frames{};
   struct alignas(cmsghdr) Control {
-    std::array<std::uint8_t, kControlBytes> bytes;
+    std::array<std::uint8_t, kStampControlBytes> bytes;
   };
   std::array<Control, kFramesPerCall> controls{};
   KernelStampMap stamps;
@@ -123,15 +106,12 @@ Result<void> CanSocket::set_up(const CanSettings& settings) {
   const auto filter_bytes = static_cast<socklen_t>(filters.size() * sizeof(can_filter));
   constexpr can_err_mask_t kAllErrors = CAN_ERR_MASK;
   constexpr int kOn = 1;
-  constexpr int kStamps = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE |
-                          SOF_TIMESTAMPING_RX_HARDWARE | SOF_TIMESTAMPING_RAW_HARDWARE;
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = static_cast<int>(if_nametoindex(settings.interface.c_str()));
   const bool good = setsockopt(fd_, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), filter_bytes) == 0 &&
                     set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, kAllErrors) &&
-                    set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, kOn) &&
-                    set_can_option(fd_, SOL_SOCKET, SO_TIMESTAMPING, kStamps) &&
+                    set_can_option(fd_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, kOn) && ask_for_stamps(fd_) &&
                     set_can_option(fd_, SOL_SOCKET, SO_RXQ_OVFL, kOn) &&
                     bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   if (!good) {
@@ -148,15 +128,14 @@ IoResult CanSocket::read(std::span<std::uint8_t> buffer) noexcept {
   IMUSCOPE_EXPECTS(buffer.size() >= kCanRecordMaxBytes);
   const std::size_t room = std::min(buffer.size() / kCanRecordMaxBytes, kFramesPerCall);
   // The kernel writes the lengths that it used.
-  for (std::size_t i = 0; i < room; ++i) batch_->headers[i].msg_hdr.msg_controllen = kControlBytes;
+  for (std::size_t i = 0; i < room; ++i) batch_->headers[i].msg_hdr.msg_controllen = kStampControlBytes;
   int count = 0;
   do {
     count = recvmmsg(fd_, batch_->headers.data(), static_cast<unsigned>(room), MSG_DONTWAIT, nullptr);
   } while (count < 0 && errno == EINTR);
   if (count < 0) return failed_read(errno);
   is_up_ = true;
-  batch_->stamps.begin_read(utc_time_from_ns(clock_ns(CLOCK_REALTIME)),
-                            host_time_from_ns(clock_ns(CLOCK_MONOTONIC)));
+  batch_->stamps.begin_read(read_both_clocks());
   std::size_t n = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) n += take(i, buffer.subspan(n));
   return {n > 0 ? IoStatus::kDone : IoStatus::kNothing, n, static_cast<std::size_t>(count) == room};
@@ -169,20 +148,14 @@ IoResult CanSocket::failed_read(int error) noexcept {
 
 std::size_t CanSocket::take(std::size_t message, std::span<std::uint8_t> buffer) noexcept {
   msghdr& header = batch_->headers[message].msg_hdr;
-  KernelStamps stamps;
+  const KernelStamps stamps = stamps_of(header);
   for (const cmsghdr* control = CMSG_FIRSTHDR(&header); control != nullptr;
        control = CMSG_NXTHDR(&header, const_cast<cmsghdr*>(control))) {
-    if (control->cmsg_level != SOL_SOCKET) continue;
-    if (control->cmsg_type == SO_TIMESTAMPING) {
-      scm_timestamping times{};
-      std::memcpy(&times, CMSG_DATA(control), sizeof times);
-      stamps = {to_ns(times.ts[0]), to_ns(times.ts[2])};
-    } else if (control->cmsg_type == SO_RXQ_OVFL) {
-      std::uint32_t total = 0;
-      std::memcpy(&total, CMSG_DATA(control), sizeof total);
-      frames_dropped_ += total - dropped_count_;  // modulo 2^32, as the count wraps
-      dropped_count_ = total;
-    }
+    if (control->cmsg_level != SOL_SOCKET || control->cmsg_type != SO_RXQ_OVFL) continue;
+    std::uint32_t total = 0;
+    std::memcpy(&total, CMSG_DATA(control), sizeof total);
+    frames_dropped_ += total - dropped_count_;  // modulo 2^32, as the count wraps
+    dropped_count_ = total;
   }
   const canfd_frame& received = batch_->frames[message];
   const std::size_t n_bytes = batch_->headers[message].msg_len;
@@ -219,7 +192,7 @@ bool CanSocket::interface_is_up() const noexcept {
 LineHealth CanSocket::health() noexcept {
   // Going down is heard from read(); coming up is not heard before the first frame.
   if (!is_up_) is_up_ = interface_is_up();
-  return {is_up_, frames_dropped_};
+  return {is_up_, frames_dropped_, batch_->stamps.quality()};
 }
 
 std::uint64_t CanSocket::hardware_stamps() const noexcept { return batch_->stamps.hardware_stamps(); }

@@ -10,6 +10,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -109,6 +110,7 @@ Result<int> open_tcp(const NetSettings& settings, const addrinfo* addresses) {
     error = socket.fd() < 0 ? errno : connect_within(socket.fd(), *address);
     if (error != 0) continue;
     set_option(socket.fd(), IPPROTO_TCP, TCP_NODELAY, 1);
+    (void)ask_for_stamps(socket.fd());
     set_option(socket.fd(), SOL_SOCKET, SO_KEEPALIVE, 1);
     set_option(socket.fd(), IPPROTO_TCP, TCP_KEEPIDLE, kKeepAliveIdle_s);
     set_option(socket.fd(), IPPROTO_TCP, TCP_KEEPINTVL, kKeepAliveInterval_s);
@@ -148,6 +150,7 @@ Result<int> open_udp(const NetSettings& settings, const addrinfo& address, std::
   Socket socket(::socket(address.ai_family, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
   if (socket.fd() < 0) return work_error(fmt::format("{}: {}", name_of(settings), std::strerror(errno)));
   shortage = buffer_shortage(grow_receive_buffer(socket.fd(), kReceiveBuffer), kReceiveBuffer);
+  (void)ask_for_stamps(socket.fd());
   const bool multicast = is_multicast(address);
   // Several listeners may share a group; a port of our own is ours alone.
   if (multicast) set_option(socket.fd(), SOL_SOCKET, SO_REUSEADDR, 1);
@@ -183,19 +186,37 @@ Result<std::unique_ptr<NetStream>> NetStream::open(const NetSettings& settings) 
 
 NetStream::~NetStream() { ::close(fd_); }
 
+namespace {
+
+bool is_of_the_network(int error) noexcept {
+  constexpr std::array kPassing{ECONNREFUSED, EHOSTUNREACH, EHOSTDOWN, ENETUNREACH,
+                                ENETDOWN,     ETIMEDOUT,    ENOBUFS,   ENOMEM};
+  return std::find(kPassing.begin(), kPassing.end(), error) != kPassing.end();
+}
+
+}  // namespace
+
 IoResult NetStream::read(std::span<std::uint8_t> buffer) noexcept {
   const bool tcp = settings_.kind == NetSettings::Kind::kTcp;
   // An empty datagram says nothing, and whoever sends them without end must not keep the reader here: what is
   // left waits for the next call.
   constexpr int kAttempts = 16;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    iovec room{buffer.data(), buffer.size()};
+    alignas(cmsghdr) std::array<std::uint8_t, kStampControlBytes> control;
+    msghdr message{};
+    message.msg_iov = &room;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
     // With MSG_TRUNC a datagram's whole length comes back, also of what did not fit.
-    const ssize_t n = recv(fd_, buffer.data(), buffer.size(), tcp ? 0 : MSG_TRUNC);
+    const ssize_t n = recvmsg(fd_, &message, tcp ? 0 : MSG_TRUNC);
     if (n > 0) {
       const auto size = static_cast<std::size_t>(n);
-      if (tcp) return {IoStatus::kDone, size, size == buffer.size()};
+      const HostTime at = received(message);
+      if (tcp) return {IoStatus::kDone, size, size == buffer.size(), at};
       if (size > buffer.size()) ++datagrams_cut_;
-      return {IoStatus::kDone, std::min(size, buffer.size()), true};
+      return {IoStatus::kDone, std::min(size, buffer.size()), true, at};
     }
     if (n == 0) {
       if (tcp) return {IoStatus::kGone, 0};
@@ -203,9 +224,17 @@ IoResult NetStream::read(std::span<std::uint8_t> buffer) noexcept {
     }
     if (errno == EINTR) continue;
     if (errno == EAGAIN || errno == EWOULDBLOCK) return {IoStatus::kNothing, 0};
-    return {tcp ? IoStatus::kGone : IoStatus::kNothing, 0};
+    // What a network says of the far end is said once and passes. Any other error would stay, and come at
+    // every turn.
+    return {tcp || !is_of_the_network(errno) ? IoStatus::kGone : IoStatus::kNothing, 0};
   }
   return {IoStatus::kNothing, 0};
+}
+
+/// Of a read of TCP: when its last byte had come, as the kernel keeps the newest stamp of what it joins.
+HostTime NetStream::received(const msghdr& message) noexcept {
+  stamps_.begin_read(read_both_clocks());
+  return stamps_.map(stamps_of(message));
 }
 
 IoResult NetStream::write(std::span<const std::uint8_t> bytes) noexcept {
@@ -221,6 +250,7 @@ IoResult NetStream::write(std::span<const std::uint8_t> bytes) noexcept {
 
 LineHealth NetStream::health() noexcept {
   LineHealth health;
+  health.stamps = stamps_.quality();
   if (settings_.kind == NetSettings::Kind::kTcp) return health;
   std::array<std::uint32_t, SK_MEMINFO_VARS> counts{};
   socklen_t size = sizeof counts;

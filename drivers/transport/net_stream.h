@@ -9,6 +9,7 @@
 #include <string>
 
 #include "base/result.h"
+#include "drivers/transport/kernel_stamp.h"
 #include "drivers/transport/transport.h"
 
 namespace imuscope {
@@ -32,7 +33,7 @@ class NetStream final : public Transport {
   NetStream& operator=(const NetStream&) = delete;
   ~NetStream() override;
 
-  /// One datagram at most per call.
+  /// One datagram at most per call. Says when the kernel, or the card, received the last of the bytes.
   [[nodiscard]] IoResult read(std::span<std::uint8_t> buffer) noexcept override;
   /// What is said to a UDP device goes nowhere: such devices only send.
   [[nodiscard]] IoResult write(std::span<const std::uint8_t> bytes) noexcept override;
@@ -44,11 +45,13 @@ class NetStream final : public Transport {
  private:
   NetStream(int fd, NetSettings settings, std::string shortage)
       : fd_(fd), settings_(std::move(settings)), shortage_(std::move(shortage)) {}
+  [[nodiscard]] HostTime received(const msghdr& message) noexcept;
 
   int fd_;
   NetSettings settings_;
   std::string shortage_;  ///< of memory for datagrams that wait
   std::uint64_t datagrams_cut_ = 0;
+  KernelStampMap stamps_;
 };
 
 }  // namespace imuscope

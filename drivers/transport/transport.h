@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -24,6 +25,22 @@ struct IoResult {
   IoStatus status = IoStatus::kNothing;
   std::size_t n = 0;
   bool more = false;  ///< of a read: the buffer was too small for all that waits
+  /// Of a read: when the kernel, or the card, received its last byte, where that is known.
+  std::optional<HostTime> received{};
+};
+
+/// Who says when something arrived, the better the further down.
+enum class StampedBy : std::uint8_t {
+  kRead,       ///< nobody: the read itself
+  kKernel,     ///< the kernel, as its driver handed the bytes over
+  kInterface,  ///< the interface, by a clock of its own
+};
+
+/// How well the arrivals of a line are stamped.
+struct StampQuality {
+  StampedBy by = StampedBy::kRead;
+  double lead_s = 0.0;     ///< mean, by which the stamps are before the reads
+  double lead_sd_s = 0.0;  ///< of single ones: jitter that stamps of the reads would have
 };
 
 /// What a line does to the times of bytes, as it was opened.
@@ -37,6 +54,7 @@ struct LineHealth {
   bool is_up =
       true;  ///< false while the line is there and cannot carry anything, as a CAN interface that is down
   std::uint64_t frames_dropped = 0;  ///< arrived, and lost by this PC before they could be read
+  StampQuality stamps{};
 };
 
 class Transport {

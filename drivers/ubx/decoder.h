@@ -26,7 +26,7 @@ class Decoder final : public DeviceDecoder {
  public:
   explicit Decoder(const DecoderConfig& config) noexcept;
 
-  void push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept override;
+  void push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept override;
   void finish(HostTime arrival, SampleSink& sink) noexcept override;
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
   void set_per_byte(Duration per_byte) noexcept override { scanner_.set_per_byte(per_byte); }

@@ -73,9 +73,9 @@ MtDecoder::MtDecoder(const MtDecoderConfig& config)
   message_length_ = n_blocks_ * blocks_[0].length + (xbus_ ? sizeof(std::uint16_t) : 0);
 }
 
-void MtDecoder::push(std::span<const std::uint8_t> bytes, HostTime arrival, SampleSink& sink) noexcept {
+void MtDecoder::push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
-  feed(scanner_, bytes, arrival, [&] { drain(arrival, sink, false); });
+  feed(scanner_, bytes, arrival.received, [&] { drain(arrival.read, sink, false); });
 }
 
 void MtDecoder::finish(HostTime arrival, SampleSink& sink) noexcept { drain(arrival, sink, true); }

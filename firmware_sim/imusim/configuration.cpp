@@ -56,6 +56,8 @@ double default_rate_hz(Role role) {
       return 10.0;
     case Role::kOdometry:
       return 50.0;
+    case Role::kTime:
+      return 1.0;
     case Role::kReference:
     case Role::kStudy:
       break;
@@ -71,6 +73,8 @@ bool fits(Protocol protocol, Role role) {
       return role == Role::kReference || role == Role::kStudy;
     case Protocol::kCanOdometry:
       return role == Role::kOdometry;
+    case Protocol::kPps:
+      return role == Role::kTime;
     case Protocol::kGreis:
     case Protocol::kNmea:
     case Protocol::kUbx:
@@ -88,15 +92,16 @@ PlayedDevice read_device(TableReader& in) {
     return std::isalnum(letter) != 0 || letter == '_' || letter == '-';
   });
   if (!plain) in.fail("name", "must consist of letters, digits, '_' and '-': it becomes a file name");
-  device.role = static_cast<Role>(in.choice("role", {"reference", "study", "gnss", "odometry"}, 1));
+  device.role = static_cast<Role>(in.choice("role", {"reference", "study", "gnss", "odometry", "time"}, 1));
   device.protocol = static_cast<Protocol>(in.choice(
       "protocol",
-      {"xsens_mt", "ixblue_stdbin", "greis", "nmea", "ubx", "rtklib_pos", "xsens_can", "can_odometry"}, 0));
+      {"xsens_mt", "ixblue_stdbin", "greis", "nmea", "ubx", "rtklib_pos", "xsens_can", "can_odometry", "pps"},
+      0));
   if (!fits(device.protocol, device.role))
     in.fail(
         "protocol",
-        "does not fit the role: xsens_mt, ixblue_stdbin and xsens_can are IMUs, can_odometry odometry, the "
-        "others gnss");
+        "does not fit the role: xsens_mt, ixblue_stdbin and xsens_can are IMUs, can_odometry odometry, pps "
+        "time, the others gnss");
   if (device.protocol == Protocol::kXsensCan && device.role == Role::kReference)
     in.fail("protocol", "is played for an S-IMU only");
   device.rate_hz = default_rate_hz(device.role);
@@ -108,7 +113,7 @@ PlayedDevice read_device(TableReader& in) {
   read_axes(in, device.C_device_frame);
   in.vector("antenna_lever_arm_b_m", device.antenna_b_m, 1.0);
   TableReader transport = in.table("transport");
-  const std::size_t kind = transport.choice("kind", {"serial", "tcp", "udp", "can"}, 0);
+  const std::size_t kind = transport.choice("kind", {"serial", "tcp", "udp", "can", "pps"}, 0);
   if (kind == 1 || kind == 2) {
     std::int64_t port = 0;
     transport.whole("port", port, 1, std::numeric_limits<std::uint16_t>::max());
@@ -122,6 +127,7 @@ PlayedDevice read_device(TableReader& in) {
   transport.number("baud", baud, 1.0, 4800.0, 4e6);
   device.baud = static_cast<int>(baud);
   transport.text("interface", device.can_interface);
+  (void)transport.choice("edge", {"assert"}, 0);
   in.table("odometry").text("dbc", device.dbc);
   std::int64_t bus_id = 0;
   in.whole("bus_id", bus_id, 1, kBusIdMax);
@@ -302,6 +308,11 @@ void read_line(TableReader in, Configuration& configuration) {
   in.number("read_jitter_us", line.jitter_mean_s, kMicro, 0.0, 1e5);
   configuration.has_pc_rate = in.has("host_skew_ppm");
   in.number("host_skew_ppm", line.clock.rate_ppm, 1.0, -1e4, 1e4);
+  double suspend_at_s = 0.0;
+  double suspend_for_s = 0.0;
+  in.number("suspend_at_s", suspend_at_s, 1.0, 0.0, 86400.0);
+  in.number("suspend_for_s", suspend_for_s, 1.0, 0.0, 86400.0);
+  if (suspend_for_s > 0.0) line.clock.suspends.push_back({suspend_at_s, suspend_at_s + suspend_for_s});
   in.refuse_unknown_keys();
 }
 

@@ -15,7 +15,8 @@
 /// [simulation.wheels]: scale_error_percent, slow_sd_mps, white_sd_mps, step_kmph, dead_band_mps, latency_ms
 /// [simulation.can]: bit_rate, bus_load_percent (by others), stamp_jitter_us
 /// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm (of the PC's
-///   clock; 0 in the ideal world, drawn in the harsh one)
+///   clock; 0 in the ideal world, drawn in the harsh one), suspend_at_s, suspend_for_s (the PC sleeps: its
+///   monotonic clock stands still, and what the devices send is lost)
 /// [[simulation.imu]], one for each S-IMU, found by `name`: model ("mtx", "mti"), rotation_vector_b_s_deg,
 ///   lever_arm_b_m, can_output ("increments", "high_rate", "high_rate_swapped": 061 is the rate of turn),
 ///   latency_ms, clock_skew_ppm, first_counter, accel_white_mps2, gyro_bias_sd_deg_per_s,
@@ -48,8 +49,18 @@
 
 namespace imusim {
 
-enum class Role { kReference, kStudy, kGnss, kOdometry };
-enum class Protocol { kXsensMt, kIxblueStdbin, kGreis, kNmea, kUbx, kRtklibPos, kXsensCan, kCanOdometry };
+enum class Role { kReference, kStudy, kGnss, kOdometry, kTime };
+enum class Protocol {
+  kXsensMt,
+  kIxblueStdbin,
+  kGreis,
+  kNmea,
+  kUbx,
+  kRtklibPos,
+  kXsensCan,
+  kCanOdometry,
+  kPps
+};
 /// Which XSens device plays a S-IMU: an MTx with legacy MTData, or an MTi with MTData2.
 enum class XsensModel { kMtx, kMti };
 
@@ -71,6 +82,8 @@ struct PlayedDevice {
   Eigen::Vector3d antenna_b_m = Eigen::Vector3d::Zero();
 
   [[nodiscard]] bool is_on_network() const { return tcp_port != 0 || udp_port != 0; }
+  /// It is no bytes that it gives but pulses: `port` is where the newest lies, live.
+  [[nodiscard]] bool gives_pulses() const { return protocol == Protocol::kPps; }
   /// Its data come over the line of another device.
   [[nodiscard]] bool shares_line() const { return bus_id > 0 && line_owner != name; }
 };

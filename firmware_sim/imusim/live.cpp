@@ -11,6 +11,8 @@
 #include "firmware_sim/imusim/truth_files.h"
 #include "firmware_sim/io/can_port.h"
 #include "firmware_sim/io/pseudo_terminal.h"
+#include "firmware_sim/io/pulse_file.h"
+#include "firmware_sim/io/pulse_line.h"
 #include "firmware_sim/io/tcp_server.h"
 #include "firmware_sim/io/udp_sender.h"
 #include "firmware_sim/random/random.h"
@@ -131,6 +133,43 @@ struct CanEnd {
   std::vector<Emission> emissions{};
 };
 
+/// A receiver's pulses, and where the newest of them lies.
+struct PulseEnd {
+  WorldDevice* device;
+  PulseLine line;
+  PulseFile file;
+  LiveCounts counts;
+
+  void run_until(double t_s) {
+    emissions.clear();
+    device->device->run_until(t_s, emissions);
+    for (const Emission& emission : emissions) line.send(emission);
+    line.deliver_until(t_s, [this](std::span<const std::uint8_t> bytes, std::int64_t /*arrival_ns*/) {
+      const std::size_t dropped = file.write(bytes);
+      counts.dropped_bytes += dropped;
+      counts.sent_bytes += bytes.size() - dropped;
+    });
+  }
+
+  std::vector<Emission> emissions{};
+};
+
+/// @param host_begin_ns  CLOCK_MONOTONIC at the scenario's time 0
+Outcome<std::vector<PulseEnd>> open_pulse_ends(World& world, const LiveOptions& options,
+                                               std::int64_t host_begin_ns) {
+  std::vector<PulseEnd> ends;
+  for (WorldDevice& device : world.devices()) {
+    const PlayedDevice& played = device.played;
+    if (!played.gives_pulses()) continue;
+    auto file = PulseFile::open(played.port);
+    if (!file) return failed_work(fmt::format("device '{}': {}", played.name, file.error()));
+    if (options.on_line) options.on_line(fmt::format("{:<10} {}", played.name, played.port));
+    ends.push_back(
+        {&device, world.live_pulse_line_of(played, host_begin_ns), std::move(*file), {played.name, 0, 0, 0}});
+  }
+  return ends;
+}
+
 Outcome<std::vector<CanEnd>> open_can_ends(World& world, const LiveOptions& options) {
   std::vector<CanEnd> ends;
   for (WorldDevice& device : world.devices()) {
@@ -160,7 +199,7 @@ Outcome<std::vector<Port>> open_ports(World& world, const LiveOptions& options) 
   ports.reserve(world.devices().size());
   for (WorldDevice& device : world.devices()) {
     const PlayedDevice& played = device.played;
-    if (Configuration::is_on_can(played)) continue;
+    if (Configuration::is_on_can(played) || played.gives_pulses()) continue;
     if (played.port.empty() && !played.is_on_network())
       return wrong_usage(fmt::format(
           "{}: device '{}' has no port to play on; give transport = {{ kind = \"serial\", port = \"...\" }}",
@@ -201,12 +240,16 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
       std::min(configuration.scenario.duration_s,
                options.start_s + options.seconds.value_or(configuration.scenario.duration_s));
   const std::int64_t begin_ns = monotonic_ns();
+  auto pulse_ends = open_pulse_ends(
+      world, options, begin_ns - std::llround(options.start_s * static_cast<double>(kNsPerSecond)));
+  if (!pulse_ends) return tl::unexpected(pulse_ends.error());
   for (std::int64_t tick_ns = begin_ns; !stop.load(); tick_ns += kLiveTick_ns) {
     sleep_until(tick_ns);
     const double t_s = options.start_s + static_cast<double>(monotonic_ns() - begin_ns) / kNsPerSecond;
     if (t_s > end_s) break;
     for (Port& port : *ports) port.run_until(t_s);
     for (CanEnd& end : *can_ends) end.run_until(t_s);
+    for (PulseEnd& end : *pulse_ends) end.run_until(t_s);
   }
   if (options.folder && !configuration.faults.empty()) {
     if (auto logged = write_fault_log(configuration, *options.folder); !logged)
@@ -215,6 +258,7 @@ Outcome<std::vector<LiveCounts>> play(const Configuration& configuration, const 
   std::vector<LiveCounts> counts;
   for (const Port& port : *ports) counts.push_back(port.counts);
   for (const CanEnd& end : *can_ends) counts.push_back(end.counts);
+  for (const PulseEnd& end : *pulse_ends) counts.push_back(end.counts);
   return counts;
 }
 

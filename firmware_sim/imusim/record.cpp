@@ -70,8 +70,9 @@ Outcome<void> clear_folder(const std::filesystem::path& folder, const Configurat
 }
 
 /// Runs one device through the whole scenario and writes what the host reads.
-Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::filesystem::path& folder,
-                                std::atomic<double>& done_s) {
+template <typename Line>
+Outcome<Recorded> record_over(Line line, World& world, WorldDevice& device,
+                              const std::filesystem::path& folder, std::atomic<double>& done_s) {
   OutputFile bytes_file(folder / (device.played.name + ".bin"));
   OutputFile arrivals(folder / (device.played.name + ".arrivals.csv"));
   arrivals.write("byte_offset,n_bytes,arrival_ns\n");
@@ -91,7 +92,6 @@ Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::fi
     ++recorded.reads;
   };
 
-  SerialLine line = world.line_of(device.played);
   const double duration_s = world.motion().duration_s();
   constexpr double kStep_s = 1.0;
   const auto steps = static_cast<int>(std::ceil(duration_s / kStep_s));
@@ -108,6 +108,13 @@ Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::fi
   if (auto closed = bytes_file.close(); !closed) return tl::unexpected(closed.error());
   if (auto closed = arrivals.close(); !closed) return tl::unexpected(closed.error());
   return recorded;
+}
+
+Outcome<Recorded> record_device(World& world, WorldDevice& device, const std::filesystem::path& folder,
+                                std::atomic<double>& done_s) {
+  if (device.played.gives_pulses())
+    return record_over(world.pulse_line_of(device.played), world, device, folder, done_s);
+  return record_over(world.line_of(device.played), world, device, folder, done_s);
 }
 
 /// The host's wall clock agrees with the scenario's at its beginning and then runs as the PC's clocks do: a

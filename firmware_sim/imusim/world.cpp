@@ -11,6 +11,7 @@
 #include "firmware_sim/devices/can_encoder.h"
 #include "firmware_sim/devices/gnss_talker.h"
 #include "firmware_sim/devices/greis_receiver.h"
+#include "firmware_sim/devices/pulse_output.h"
 #include "firmware_sim/devices/stdbin_unit.h"
 #include "firmware_sim/devices/xsens_mti.h"
 #include "firmware_sim/devices/xsens_mtx.h"
@@ -138,9 +139,11 @@ World::World(const Configuration& configuration, Beginning beginning, double beg
     : configuration_(configuration), motion_(motion_of(configuration)) {
   if (configuration_.world == WorldKind::kHarsh) {
     const double given_ppm = configuration_.line.clock.rate_ppm;
+    const auto suspends = configuration_.line.clock.suspends;
     configuration_.line.clock =
         PcClock::drawn(Random(configuration_.scenario.seed, "pc clock"), configuration_.scenario.duration_s);
     if (configuration_.has_pc_rate) configuration_.line.clock.rate_ppm = given_ppm;
+    configuration_.line.clock.suspends = suspends;
   }
   std::size_t next_study = 0;
   for (const PlayedDevice& played : configuration_.devices) {
@@ -156,6 +159,9 @@ World::World(const Configuration& configuration, Beginning beginning, double beg
         break;
       case Role::kOdometry:
         add_wheels(played, begin_s);
+        break;
+      case Role::kTime:
+        add_pulses(played, begin_s);
         break;
     }
   }
@@ -453,6 +459,27 @@ void World::add_wheels(const PlayedDevice& played, double begin_s) {
   add(played, std::move(node));
 }
 
+void World::add_pulses(const PlayedDevice& played, double begin_s) {
+  auto output = std::make_unique<PulseOutput>(PulseOutput::Options{configuration_.utc_begin});
+  output->skip_to(begin_s);
+  add(played, std::move(output));
+}
+
+PulseLine World::pulse_line_of(const PlayedDevice& played) const {
+  PulseLineOptions options;
+  options.host_begin_ns = kHostBegin_ns;
+  options.clock = configuration_.line.clock;
+  options.wall_begin = configuration_.utc_begin;
+  return {options, Random(configuration_.scenario.seed, played.name + "/line")};
+}
+
+PulseLine World::live_pulse_line_of(const PlayedDevice& played, std::int64_t host_begin_ns) const {
+  PulseLineOptions options;
+  options.host_begin_ns = host_begin_ns;
+  options.wall_begin = configuration_.utc_begin;
+  return {options, Random(configuration_.scenario.seed, played.name + "/line")};
+}
+
 CanLine World::can_line_of(const PlayedDevice& played) const {
   return {configuration_.can, Random(configuration_.scenario.seed, played.name + "/line")};
 }
@@ -465,6 +492,8 @@ SerialLine World::line_of(const PlayedDevice& played) const {
   // All devices hang on one host controller: its frames are common.
   options.usb_phase_s = Random(configuration_.scenario.seed, "usb").uniform(0.0, 1e-3);
   add_line_faults(configuration_.faults_of(played.name), options);
+  for (const PcClock::Suspend& suspend : options.clock.suspends)
+    options.unplugged.push_back({suspend.begin_s, suspend.end_s});
   return {options, Random(configuration_.scenario.seed, played.name + "/line")};
 }
 

@@ -14,6 +14,7 @@
 #include "firmware_sim/imu/imu_model.h"
 #include "firmware_sim/imusim/configuration.h"
 #include "firmware_sim/io/can_line.h"
+#include "firmware_sim/io/pulse_line.h"
 #include "firmware_sim/io/serial_line.h"
 #include "firmware_sim/motion/motion.h"
 
@@ -96,6 +97,10 @@ class World {
   /// The way of a device on a CAN bus to the host.
   [[nodiscard]] CanLine can_line_of(const PlayedDevice& played) const;
 
+  /// The way of a pulse into the PC: of a recording, or live, where the PC is a real one.
+  [[nodiscard]] PulseLine pulse_line_of(const PlayedDevice& played) const;
+  [[nodiscard]] PulseLine live_pulse_line_of(const PlayedDevice& played, std::int64_t host_begin_ns) const;
+
   /// Has every sample of an S-IMU shown as it is made, in the thread that runs the device.
   void observe(const std::string& name, OnTrueSample on_sample);
 
@@ -105,6 +110,7 @@ class World {
                  double begin_s);
   void add_reference(const PlayedDevice& played, Beginning beginning, double begin_s);
   void add_gnss(const PlayedDevice& played, double begin_s);
+  void add_pulses(const PlayedDevice& played, double begin_s);
   void add_wheels(const PlayedDevice& played, double begin_s);
   void join_bus(const PlayedDevice& played, XbusSampler sampler, const StudyTruth& clock);
   void add_buses(Beginning beginning, double begin_s);

@@ -46,6 +46,11 @@ double PcClock::seconds_at(double t_s) const {
   return counted_s;
 }
 
+bool PcClock::is_asleep_at(double t_s) const {
+  return std::any_of(suspends.begin(), suspends.end(),
+                     [t_s](const Suspend& suspend) { return t_s >= suspend.begin_s && t_s < suspend.end_s; });
+}
+
 double PcClock::ppm_at(double t_s) const {
   double ppm = rate_ppm;
   if (t_s > 0.0) ppm -= warm_up_ppm * std::expm1(-t_s / warm_up_s);

@@ -38,6 +38,7 @@ class PcClock {
 
   /// What the clock has counted at t_s since the scenario's time 0, s. Rises with t_s, or stands still.
   [[nodiscard]] double seconds_at(double t_s) const;
+  [[nodiscard]] bool is_asleep_at(double t_s) const;
   /// Its rate at t_s against true time, ppm; slews included.
   [[nodiscard]] double ppm_at(double t_s) const;
 };

@@ -74,7 +74,7 @@ bool all_finite(const Vector3& v) noexcept {
 }  // namespace
 
 ReferenceWindow::ReferenceWindow(const ReferenceWindowOptions& options)
-    : options_(options), ring_(reference_past_capacity(1.0 / options.period_s)) {
+    : options_(options), ring_(reference_window_capacity(1.0 / options.period_s)) {
   IMUSCOPE_EXPECTS(options.points == 5 || options.points == 7 || options.points == 9 || options.points == 11);
   IMUSCOPE_EXPECTS(options.period_s > 0.0);
 }

@@ -50,7 +50,7 @@ struct ReferenceWindowOptions {
 
 class ReferenceWindow {
  public:
-  /// Allocates room for kReferencePast_s at the nominal rate (base/limits.h).
+  /// Allocates reference_window_capacity() of the nominal rate (base/limits.h).
   explicit ReferenceWindow(const ReferenceWindowOptions& options);
 
   /// Adds an R-IMU sample. Rates flagged kIsIncrement are means over the interval before the stamp; they are
@@ -63,6 +63,10 @@ class ReferenceWindow {
 
   /// The newest instant that evaluate() can answer now: half the window's width behind the newest sample.
   [[nodiscard]] HostTime newest_time() const noexcept;
+  /// Of the newest sample; HostTime::min() before the first.
+  [[nodiscard]] HostTime newest_sample() const noexcept {
+    return size_ > 0 ? at(size_ - 1).time : HostTime::min();
+  }
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
 

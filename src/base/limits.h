@@ -57,11 +57,19 @@ inline constexpr std::size_t kEpochsPerTick =
 
 /// An S sample waits at most this long for the reference at its instant.
 inline constexpr double kReferenceWait_s = 0.1;
-/// S samples of one sensor that wait for the reference; a core that stood still finds many of them at once.
-inline constexpr std::size_t kWaitingSamples = ring_capacity(kMaxRate_hz, 2.0);
-static_assert(kWaitingSamples >= ring_capacity(kMaxRate_hz, kCoreStall_s + kReferenceWait_s));
+/// S samples of one sensor that wait for the reference: as long as its line may stand still alone.
+inline constexpr std::size_t kWaitingSamplesMin = ring_capacity(kMaxRate_hz, 2.0);
+static_assert(kWaitingSamplesMin >= ring_capacity(kMaxRate_hz, kCoreStall_s + kReferenceWait_s));
+[[nodiscard]] constexpr std::size_t waiting_samples_capacity(double rate_hz) noexcept {
+  return std::clamp(ring_capacity(rate_hz, kLongestStall_s), kWaitingSamplesMin, kSampleRingMax);
+}
 
-/// Past of the reference that a late S sample or GNSS solution is held against: places at its rate.
+/// Samples of the reference that are kept for an S-IMU whose line stood still alone.
+[[nodiscard]] constexpr std::size_t reference_window_capacity(double rate_hz) noexcept {
+  return waiting_samples_capacity(rate_hz);
+}
+/// Past of the reference that an S-IMU whose mounting is not known yet, or a GNSS solution, is held against:
+/// places at its rate.
 inline constexpr double kReferencePast_s = 2.5;
 inline constexpr std::size_t kReferencePastMin = 256;
 [[nodiscard]] constexpr std::size_t reference_past_capacity(double rate_hz) noexcept {

@@ -32,7 +32,7 @@ void check(const EstimatorConfig& config) {
   for (const StudyConfig& study : config.studies) {
     IMUSCOPE_EXPECTS(study.rate_hz > 0.0);
     IMUSCOPE_EXPECTS(study.blocks != 0);
-    IMUSCOPE_EXPECTS(study.average_samples >= 1 && study.average_samples <= 50);
+    IMUSCOPE_EXPECTS(study.average_samples >= 0 && study.average_samples <= 50);
   }
 }
 
@@ -60,6 +60,9 @@ class Estimator::Impl final : public EpochSink {
         if (odometry_.add(sample)) regime_.add_wheel_speed(sample.odometry.speed_mps);
         return;
       }
+    } else if (sample.kind == SampleKind::kPulse) {
+      navigation_.add_pulse(sample);
+      return;
     } else if (sample.kind == SampleKind::kGnss) {
       if (config_.gnss.enabled && sample.device == config_.gnss.device) {
         navigation_.add_gnss(sample);

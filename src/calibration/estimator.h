@@ -83,6 +83,7 @@ struct StudyCounters {
   std::uint64_t used = 0;                     ///< went through a measurement update
   std::uint64_t late = 0;                     ///< reference did not come within late_after
   std::uint64_t no_reference = 0;             ///< inside a gap of the R-IMU, or before its start
+  std::uint64_t waiting = 0;                  ///< now, for the reference
   std::uint64_t refused_full = 0;             ///< waiting queue was full
   std::uint64_t not_increasing = 0;           ///< time of validity at or before the previous sample's
   std::uint64_t not_finite = 0;               ///< NaN or infinity in the sample
@@ -97,8 +98,10 @@ struct StudyCounters {
 /// The estimate of one S-IMU at the newest processed S sample.
 struct StudyOutput {
   CalibrationStatus status = CalibrationStatus::kWaiting;
+  MountingGoal goal = kFinestGoal;  ///< what `kCalibrated` asks for
   Regime regime = Regime::kStatic;
   HostTime time;  ///< of validity of that sample
+  /// To the gyro triad's frame: x along the x gyro, y in the plane of the x and y gyros.
   Matrix3 C_b_s{1, 0, 0, 0, 1, 0, 0, 0, 1};
   Matrix3 C_prior{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< configured, or the coarse alignment
   Vector3 psi_rad{};                           ///< -Log(C_prior^T C_b_s), in b

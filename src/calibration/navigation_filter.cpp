@@ -59,6 +59,12 @@ InitialAlignmentOptions alignment_options(const EstimatorConfig& config) noexcep
   return options;
 }
 
+/// The reference's own count may be further on than the host's clock by so much: else the host's clock stood
+/// still.
+constexpr double kSleptMin_s = 0.5;
+/// A receiver's message comes within this after its epoch.
+constexpr Duration kPulsesAgree = std::chrono::milliseconds{500};
+
 InertialRates rates_of(const ImuData& imu) noexcept {
   return {to_eigen(imu.omega_radps), to_eigen(imu.f_mps2)};
 }
@@ -114,10 +120,15 @@ const NavigationFilter::PastEpoch& NavigationFilter::past(std::size_t back) cons
 /// N-56: the interval in seconds of UTC, wherever a device tells them; else in the host's own.
 double NavigationFilter::interval_to(const Sample& sample) noexcept {
   const double host_s = to_seconds(sample.time - last_time_);
+  // A PC that slept: its clock stood still, and the device has counted on.
+  const double counted_s = static_cast<double>(sample.imu.counter - last_counter_) / reference_.rate_hz;
+  const bool slept = has_last_ && (sample.imu.flags & kGapBefore) != 0 && counted_s > host_s + kSleptMin_s;
+  last_counter_ = sample.imu.counter;
   const bool was_known = utc_scale_.is_known();
   if (sample.has_utc) utc_scale_.observe(UtcSource::kReference, sample.time, sample.utc);
   const double before_s = last_seconds_;
   last_seconds_ = utc_scale_.seconds_at(sample.time);
+  if (slept) return counted_s;
   if (!was_known) return host_s;
   return std::clamp(last_seconds_ - before_s, (1.0 - kIntervalShare) * host_s,
                     (1.0 + kIntervalShare) * host_s);
@@ -288,8 +299,18 @@ void NavigationFilter::add_gnss(const Sample& sample) noexcept {
   pending_[pending_size_++] = sample;
 }
 
+void NavigationFilter::add_pulse(const Sample& sample) noexcept {
+  utc_scale_.observe_pulse(sample.time, utc_time_from_ns(sample.pulse.wall_ns));
+}
+
 HostTime NavigationFilter::host_time_of(const Sample& gnss) const noexcept {
-  if (!gnss.has_utc || !last_has_utc_) return gnss.time - from_seconds(gnss_.latency_s);
+  const HostTime by_its_clock = gnss.time - from_seconds(gnss_.latency_s);
+  if (gnss.has_utc && !last_has_utc_ && time_scale().source == UtcSource::kPulses) {
+    // Pulses tell the host's time of any UTC. A leap second that they have not counted yet shows as one.
+    const HostTime by_pulses = time_scale().host_time(gnss.utc);
+    return std::chrono::abs(by_its_clock - by_pulses) < kPulsesAgree ? by_pulses : by_its_clock;
+  }
+  if (!gnss.has_utc || !last_has_utc_) return by_its_clock;
   // The tag of the nearest R epoch carries the solution to host time, so that clock maps cannot part them.
   const PastEpoch* nearest = nullptr;
   for (std::size_t back = 0; back < past_size_; ++back) {

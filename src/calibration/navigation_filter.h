@@ -28,6 +28,7 @@ class NavigationFilter {
   void add_reference(const Sample& sample) noexcept;
   void add_attitude(const Sample& sample) noexcept;
   void add_gnss(const Sample& sample) noexcept;
+  void add_pulse(const Sample& sample) noexcept;
 
   /// A past epoch seen from the present.
   struct Delayed {
@@ -102,6 +103,7 @@ class NavigationFilter {
   HostTime last_time_{};
   UtcScale utc_scale_;
   double last_seconds_ = 0.0;  ///< of utc_scale_ at last_time_
+  std::int64_t last_counter_ = 0;
   UtcTime last_utc_{};
   bool last_has_utc_ = false;
   std::optional<Duration> gnss_lag_;  ///< of the last solution that was not near a UTC midnight

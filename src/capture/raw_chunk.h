@@ -24,19 +24,39 @@ enum class Direction : std::uint8_t {
   kRead,
   kWrite,
   kLine,  ///< nothing went either way: the line runs at another rate (line_rate_bytes())
+  /// A read whose last byte had come earlier, as the kernel or the card say: the first kReceivedBytes bytes
+  /// are that instant (received_bytes()), those that were read follow.
+  kStampedRead,
 };
 
-/// What a chunk of Direction::kLine holds: the time of one byte on the wire, ns, lowest byte first.
-using LineRateBytes = std::array<std::uint8_t, sizeof(std::int64_t)>;
+/// Nanoseconds in a chunk, lowest byte first.
+using NanosecondBytes = std::array<std::uint8_t, sizeof(std::int64_t)>;
 
-[[nodiscard]] constexpr LineRateBytes line_rate_bytes(Duration per_byte) noexcept {
-  LineRateBytes bytes{};
-  auto rest = static_cast<std::uint64_t>(per_byte.count());
+[[nodiscard]] constexpr NanosecondBytes nanosecond_bytes(std::int64_t ns) noexcept {
+  NanosecondBytes bytes{};
+  auto rest = static_cast<std::uint64_t>(ns);
   for (std::uint8_t& byte : bytes) {
     byte = static_cast<std::uint8_t>(rest & 0xFFU);
     rest >>= 8U;
   }
   return bytes;
+}
+[[nodiscard]] constexpr std::int64_t nanoseconds_of(
+    std::span<const std::uint8_t, sizeof(std::int64_t)> bytes) noexcept {
+  std::uint64_t ns = 0;
+  for (std::size_t i = bytes.size(); i-- > 0;) ns = ns << 8U | bytes[i];
+  return static_cast<std::int64_t>(ns);
+}
+
+inline constexpr std::size_t kReceivedBytes = sizeof(std::int64_t);
+/// What a chunk of Direction::kStampedRead begins with: CLOCK_MONOTONIC, ns.
+[[nodiscard]] constexpr NanosecondBytes received_bytes(HostTime received) noexcept {
+  return nanosecond_bytes(to_ns(received));
+}
+
+/// What a chunk of Direction::kLine holds: the time of one byte on the wire, ns.
+[[nodiscard]] constexpr NanosecondBytes line_rate_bytes(Duration per_byte) noexcept {
+  return nanosecond_bytes(per_byte.count());
 }
 
 /// The slowest line, of 50 baud, needs less than this for a byte.
@@ -45,10 +65,9 @@ inline constexpr Duration kLongestPerByte = std::chrono::seconds(1);
 /// Nothing where the bytes of a recording are no such time.
 [[nodiscard]] constexpr std::optional<Duration> line_rate_of(std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != sizeof(std::int64_t)) return std::nullopt;
-  std::uint64_t ns = 0;
-  for (std::size_t i = bytes.size(); i-- > 0;) ns = ns << 8U | bytes[i];
-  if (ns == 0 || ns > static_cast<std::uint64_t>(kLongestPerByte.count())) return std::nullopt;
-  return Duration(static_cast<std::int64_t>(ns));
+  const std::int64_t ns = nanoseconds_of(bytes.first<sizeof(std::int64_t)>());
+  if (ns <= 0 || ns > kLongestPerByte.count()) return std::nullopt;
+  return Duration(ns);
 }
 
 inline constexpr std::size_t kRawChunkBytes = 1024;
@@ -126,6 +145,8 @@ class RawTap {
       bytes = bytes.subspan(piece.size());
       // The ring counts what it refuses.
       (void)ring_->try_push({{sequences_[device]++, arrival, device, direction, !bytes.empty()}, piece});
+      if (direction == Direction::kStampedRead)
+        direction = Direction::kRead;  // the stamp went with the first
     }
   }
 

@@ -4,6 +4,7 @@
 #include <imuscope/exception_t.hpp>
 #include <imuscope/raw_t.hpp>
 #include <imuscope/run_t.hpp>
+#include <span>
 
 #include "capture/stamp_range.h"
 #include "publish/message_codec.h"
@@ -60,6 +61,8 @@ std::int8_t code_of(Direction direction) {
       return raw_t::WRITE;
     case Direction::kLine:
       return raw_t::LINE;
+    case Direction::kStampedRead:
+      return raw_t::STAMPED_READ;
   }
   return raw_t::READ;
 }
@@ -73,6 +76,14 @@ std::optional<CaptureRecord> to_record(const raw_t& message) {
   piece.read.bytes = message.bytes;
   piece.sequence = message.sequence;
   piece.continues = message.continues != 0;
+  if (message.direction == raw_t::STAMPED_READ) {
+    if (piece.read.bytes.size() < kReceivedBytes) return std::nullopt;
+    const std::int64_t received_ns =
+        nanoseconds_of(std::span<const std::uint8_t>(piece.read.bytes).first<kReceivedBytes>());
+    if (!is_stamp_ns(received_ns)) return std::nullopt;
+    piece.read.received = std::min(host_time_from_ns(received_ns), piece.read.arrival);
+    piece.read.bytes.erase(piece.read.bytes.begin(), piece.read.bytes.begin() + kReceivedBytes);
+  }
   return piece;
 }
 

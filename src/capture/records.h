@@ -3,6 +3,7 @@
 /// What a capture holds, as plain values.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -37,6 +38,7 @@ struct RawRead {
   Direction direction = Direction::kRead;
   HostTime arrival{};
   std::vector<std::uint8_t> bytes;
+  std::optional<HostTime> received{};  ///< its last byte had come, where the kernel or the card said so
 };
 
 /// What breaks the rule "tick k consumes what arrived at or before its cut" in a live run.

@@ -46,7 +46,7 @@ void add_moments(AxisCertificate& out, std::span<const double> x, std::span<cons
   out.sd = out.n_samples > 1 ? std::sqrt(squares / static_cast<double>(out.n_samples - 1)) : 0.0;
 }
 
-Result<FitResult> model_of(const noise::WaveletVariance& wv, const AxisRecord& record, bool has_resonance,
+Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisRecord& record, bool has_resonance,
                            const AxisOptions& options) {
   noise::FitOptions fit_options;
   fit_options.confidence = options.confidence;
@@ -55,7 +55,9 @@ Result<FitResult> model_of(const noise::WaveletVariance& wv, const AxisRecord& r
   if (!options.model.empty()) {
     const auto spec = noise::parse_model(options.model);
     if (!spec) return tl::unexpected(spec.error());
-    return noise::fit(wv, *spec, record.rate_hz, fit_options);
+    auto fit = noise::fit(wv, *spec, record.rate_hz, fit_options);
+    if (!fit) return tl::unexpected(fit.error());
+    return noise::GrownModel{std::move(*fit), {}};
   }
   return select_model(wv, record.rate_hz, has_resonance, fit_options);
 }
@@ -82,8 +84,8 @@ std::optional<HalvesTest> halves_of(std::span<const double> x, std::span<const s
     const auto& a = first->levels[i];
     const auto& b = second->levels[i];
     if (!has_enough_coefficients(a, 1.0) || !has_enough_coefficients(b, 1.0)) break;
-    const double distance =
-        std::abs(std::log(b.value / a.value)) * std::sqrt(static_cast<double>(a.n_coefficients) / a.tau_samples);
+    const double distance = std::abs(std::log(b.value / a.value)) *
+                            std::sqrt(static_cast<double>(a.n_coefficients) / a.tau_samples);
     if (distance <= largest) continue;
     largest = distance;
     out.level = a.level;
@@ -98,21 +100,24 @@ void add_limits(AxisCertificate& out) {
                                    [](const auto& t) { return t.term == Term::kBiasInstability; });
   if (bias.knowledge == noise::Knowledge::kBound) {
     constexpr double kLonger = 4.0;
-    out.limits.push_back(fmt::format(
-        "bias instability: the Allan deviation still falls at {:.3g} s, the longest averaging time of this record of {:.2g} h; "
-        "a record of {:.2g} h shows {:.3g} s",
-        out.allan.back().tau_s, seconds / kSecondsPerHour, kLonger * seconds / kSecondsPerHour,
-        kLonger * out.allan.back().tau_s));
+    out.limits.push_back(
+        fmt::format("bias instability: the Allan deviation still falls at {:.3g} s, the longest averaging "
+                    "time of this record of {:.2g} h; "
+                    "a record of {:.2g} h shows {:.3g} s",
+                    out.allan.back().tau_s, seconds / kSecondsPerHour, kLonger * seconds / kSecondsPerHour,
+                    kLonger * out.allan.back().tau_s));
   }
   constexpr double kWide = 0.3;  // of the value, half an interval
   for (const TermValue& term : out.terms) {
-    if (term.knowledge != noise::Knowledge::kFitted || !term.ci_low || !term.ci_high || !(term.value > 0.0)) continue;
+    if (term.knowledge != noise::Knowledge::kFitted || !term.ci_low || !term.ci_high || !(term.value > 0.0))
+      continue;
     const double half = 0.5 * (*term.ci_high - *term.ci_low) / term.value;
     if (half <= kWide) continue;
     constexpr double kWanted = 0.1;
-    out.limits.push_back(fmt::format(
-        "{}: known within {:.0f} %; within 10 % takes a record of about {:.2g} h", name_of(term.term, is_gyro(out.unit)),
-        100.0 * half, seconds * (half / kWanted) * (half / kWanted) / kSecondsPerHour));
+    out.limits.push_back(
+        fmt::format("{}: known within {:.0f} %; within 10 % takes a record of about {:.2g} h",
+                    name_of(term.term, is_gyro(out.unit)), 100.0 * half,
+                    seconds * (half / kWanted) * (half / kWanted) / kSecondsPerHour));
   }
 }
 
@@ -130,9 +135,10 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
   out.unit = record.unit;
   add_moments(out, record.values, mask);
   if (out.n_samples < kFewestSamples) {
-    return tl::unexpected(
-        named(record, {ErrorKind::kWork, fmt::format("{} valid samples are too few", out.n_samples),
-                       fmt::format("a record needs {} at least, and some minutes to be worth reading", kFewestSamples)}));
+    return tl::unexpected(named(
+        record,
+        {ErrorKind::kWork, fmt::format("{} valid samples are too few", out.n_samples),
+         fmt::format("a record needs {} at least, and some minutes to be worth reading", kFewestSamples)}));
   }
   if (!(out.sd > 0.0)) {
     return tl::unexpected(named(record, {ErrorKind::kWork, fmt::format("all values are {:.6g}", out.mean),
@@ -154,19 +160,22 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
   wv_options.confidence = options.confidence;
   const auto wv = noise::haar_wavelet_variance(x, wv_options);
   if (!wv) return tl::unexpected(named(record, wv.error()));
-  auto fit = model_of(*wv, record, !out.resonances.empty(), options);
-  if (!fit) return tl::unexpected(named(record, fit.error()));
-  out.fit = std::move(*fit);
+  auto grown = model_of(*wv, record, !out.resonances.empty(), options);
+  if (!grown) return tl::unexpected(named(record, grown.error()));
+  out.fit = std::move(grown->best);
+  for (const FitResult& rival : grown->rivals) out.rivals.push_back(rival.spec.name());
 
   out.allan = noise::allan_deviation(x, *wv, record.rate_hz);
   noise::set_allan_intervals(out.allan, &out.fit, options.confidence);
   // The spectrum shows the lines, too.
-  out.density = noise::density_of(record.values, noise::Present(record.values, mask), record.rate_hz, options.confidence);
-  out.terms = data_sheet_terms(out.fit, out.allan, record.unit);
+  out.density = noise::density_of(record.values, noise::Present(record.values, mask), record.rate_hz,
+                                  options.confidence);
+  out.terms = data_sheet_terms(out.fit, grown->rivals, out.allan, record.unit);
   out.halves = halves_of(x, mask, out.fit);
   if (out.halves && out.halves->p_value < kDiffer) {
     out.warnings.push_back(fmt::format(
-        "the halves of the record differ (p = {:.2g}): at averaging times around {:.3g} s the second has {:.2f} times the "
+        "the halves of the record differ (p = {:.2g}): at averaging times around {:.3g} s the second has "
+        "{:.2f} times the "
         "variance of the first; the numbers are a mean of both",
         out.halves->p_value, std::ldexp(0.5, out.halves->level) / record.rate_hz, out.halves->ratio));
   }
@@ -177,7 +186,8 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
   return out;
 }
 
-std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records, const AxisOptions& options) {
+std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
+                                                       const AxisOptions& options) {
   std::vector<Result<AxisCertificate>> out(records.size(), work_error("not looked at"));
   std::vector<std::size_t> index(records.size());
   std::iota(index.begin(), index.end(), std::size_t{0});

@@ -1,6 +1,7 @@
 #pragma once
 
-/// All that one axis' record at rest tells: curves, model, data-sheet terms, lines, resonances, and what limits them.
+/// All that one axis' record at rest tells: curves, model, data-sheet terms, lines, resonances, and what
+/// limits them.
 
 #include <array>
 #include <cstdint>
@@ -50,6 +51,7 @@ struct AxisCertificate {
   std::vector<noise::Resonance> resonances;
   std::optional<double> low_pass_hz;
   noise::FitResult fit;
+  std::vector<std::string> rivals;  ///< models that the record takes for as good
   std::vector<noise::AllanPoint> allan;
   std::vector<noise::DensityPoint> density;
   std::vector<TermValue> terms;
@@ -65,14 +67,15 @@ struct AxisOptions {
   std::string model;  ///< as for parse_model(); empty: selected among those of candidate_models()
 };
 
-/// Errors (kWork), each naming the axis: fewer than kFewestSamples valid samples, a constant signal. kUsage: a model that
-/// does not exist.
+/// Errors (kWork), each naming the axis: fewer than kFewestSamples valid samples, a constant signal. kUsage:
+/// a model that does not exist.
 Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOptions& options);
 
 /// Below this nothing that would be worth a page can be said.
 inline constexpr std::uint64_t kFewestSamples = 200;
 
 /// Axes side by side on all cores; the result does not depend on their number. One entry a record, in order.
-std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records, const AxisOptions& options);
+std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
+                                                       const AxisOptions& options);
 
 }  // namespace imuscope::certificate

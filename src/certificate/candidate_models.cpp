@@ -6,11 +6,12 @@
 
 namespace imuscope::certificate {
 
-Result<noise::FitResult> select_model(const noise::WaveletVariance& wv, double rate_hz, bool has_resonance,
+Result<noise::GrownModel> select_model(const noise::WaveletVariance& wv, double rate_hz, bool has_resonance,
                                       const noise::FitOptions& options) {
   using noise::ProcessKind;
-  std::vector<ProcessKind> terms{ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov, ProcessKind::kRandomWalk,
-                                 ProcessKind::kQuantization, ProcessKind::kFlicker, ProcessKind::kRamp};
+  std::vector<ProcessKind> terms{ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov,
+                                 ProcessKind::kRandomWalk, ProcessKind::kQuantization,
+                                 ProcessKind::kFlicker,    ProcessKind::kRamp};
   if (has_resonance) terms.push_back(ProcessKind::kResonance);
   return noise::grow_model(wv, terms, rate_hz, options);
 }

@@ -69,7 +69,8 @@ TermValue as_root(Term term, noise::SignalUnit unit, const noise::Felt& felt, do
 /// The model's own amplitude of a kind, or the most that the levels allow of one.
 noise::Felt amplitude_of(const FitResult& fit, ProcessKind kind) {
   const auto& components = fit.model.components;
-  const auto at = std::find_if(components.begin(), components.end(), [&](const auto& c) { return c.kind == kind; });
+  const auto at =
+      std::find_if(components.begin(), components.end(), [&](const auto& c) { return c.kind == kind; });
   if (at != components.end()) return felt_amplitude(fit, static_cast<std::size_t>(at - components.begin()));
   FitResult with = fit;
   with.model.components.push_back({kind, 0.0, {}});
@@ -91,8 +92,8 @@ Lowest lowest_of(const noise::Model& model, std::span<const noise::AllanPoint> a
   return lowest;
 }
 
-/// Whether the record shows that the curve rises behind its lowest point: some later interval lies above the lowest
-/// point's.
+/// Whether the record shows that the curve rises behind its lowest point: some later interval lies above the
+/// lowest point's.
 bool rises_after(std::span<const noise::AllanPoint> allan, std::size_t lowest) {
   return std::any_of(allan.begin() + static_cast<std::ptrdiff_t>(lowest), allan.end(),
                      [&](const auto& point) { return point.ci_low > allan[lowest].deviation; });
@@ -118,7 +119,8 @@ std::optional<double> log_sd_at(const FitResult& fit, double n) {
   return 0.5 * std::sqrt(variance) / value;
 }
 
-TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoint> allan, noise::SignalUnit unit) {
+TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoint> allan,
+                           noise::SignalUnit unit) {
   const SheetUnit sheet = sheet_unit(Term::kBiasInstability, unit);
   TermValue out;
   out.term = Term::kBiasInstability;
@@ -133,7 +135,8 @@ TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoi
     out.value = shown(place.ci_high);
     out.ci_high = out.value;
     out.note = fmt::format(
-        "not reached within this record: the Allan deviation still falls at {:.3g} s, the longest averaging time",
+        "not reached within this record: the Allan deviation still falls at {:.3g} s, the longest averaging "
+        "time",
         allan.back().tau_s);
     return out;
   }
@@ -148,6 +151,25 @@ TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoi
   return out;
 }
 
+std::vector<TermValue> terms_of(const FitResult& fit, std::span<const noise::AllanPoint> allan, noise::SignalUnit unit) {
+  const double f = fit.rate_hz;
+  std::vector<TermValue> terms;
+  terms.push_back(as_root(Term::kRandomWalk, unit, felt_white_density(fit, {}), 1.0));
+  terms.push_back(bias_instability(fit, allan, unit));
+  terms.push_back(as_root(Term::kRateRandomWalk, unit, amplitude_of(fit, ProcessKind::kRandomWalk), f));
+  terms.push_back(as_root(Term::kRamp, unit, amplitude_of(fit, ProcessKind::kRamp), f * f));
+  terms.push_back(
+      as_root(Term::kQuantization, unit, amplitude_of(fit, ProcessKind::kQuantization), 1.0 / (f * f)));
+  return terms;
+}
+
+/// The interval reaches over the rival's, where both give a value.
+void reach_over(TermValue& term, const TermValue& rival) {
+  if (term.knowledge != Knowledge::kFitted || rival.knowledge != Knowledge::kFitted) return;
+  if (term.ci_low && rival.ci_low) term.ci_low = std::min(*term.ci_low, *rival.ci_low);
+  if (term.ci_high && rival.ci_high) term.ci_high = std::max(*term.ci_high, *rival.ci_high);
+}
+
 }  // namespace
 
 const char* symbol_of(Term term) noexcept {
@@ -158,20 +180,19 @@ const char* symbol_of(Term term) noexcept {
 const char* name_of(Term term, bool gyro) noexcept {
   constexpr const char* kGyro[] = {"angle random walk", "bias instability", "rate random walk", "rate ramp",
                                    "angle quantization"};
-  constexpr const char* kAccelerometer[] = {"velocity random walk", "bias instability", "acceleration random walk",
-                                            "acceleration ramp", "velocity quantization"};
+  constexpr const char* kAccelerometer[] = {"velocity random walk", "bias instability",
+                                            "acceleration random walk", "acceleration ramp",
+                                            "velocity quantization"};
   return (gyro ? kGyro : kAccelerometer)[static_cast<std::size_t>(term)];
 }
 
-std::vector<TermValue> data_sheet_terms(const FitResult& fit, std::span<const noise::AllanPoint> allan,
-                                        noise::SignalUnit unit) {
-  const double f = fit.rate_hz;
-  std::vector<TermValue> terms;
-  terms.push_back(as_root(Term::kRandomWalk, unit, felt_white_density(fit, {}), 1.0));
-  terms.push_back(bias_instability(fit, allan, unit));
-  terms.push_back(as_root(Term::kRateRandomWalk, unit, amplitude_of(fit, ProcessKind::kRandomWalk), f));
-  terms.push_back(as_root(Term::kRamp, unit, amplitude_of(fit, ProcessKind::kRamp), f * f));
-  terms.push_back(as_root(Term::kQuantization, unit, amplitude_of(fit, ProcessKind::kQuantization), 1.0 / (f * f)));
+std::vector<TermValue> data_sheet_terms(const FitResult& fit, std::span<const FitResult> rivals,
+                                        std::span<const noise::AllanPoint> allan, noise::SignalUnit unit) {
+  std::vector<TermValue> terms = terms_of(fit, allan, unit);
+  for (const FitResult& rival : rivals) {
+    const std::vector<TermValue> others = terms_of(rival, allan, unit);
+    for (std::size_t i = 0; i < terms.size(); ++i) reach_over(terms[i], others[i]);
+  }
   for (TermValue& term : terms) {
     if (term.term != Term::kBiasInstability && term.knowledge == Knowledge::kBound)
       term.note = "below this: the record does not show it";

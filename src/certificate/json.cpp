@@ -104,6 +104,7 @@ json axis_json(const AxisCertificate& axis) {
            {"resonances", resonances_json(axis)},
            {"low_pass_hz", number(axis.low_pass_hz)},
            {"fit", fit_to_json(axis.fit)},
+           {"models_as_good", axis.rivals},
            {"allan", allan_json(axis)},
            {"density", density_json(axis)},
            {"temperature", temperature_json(axis.temperature)},
@@ -113,19 +114,16 @@ json axis_json(const AxisCertificate& axis) {
                                      {"level", axis.halves->level},
                                      {"ratio", number(axis.halves->ratio)}}
                               : json(nullptr);
-  out["spikes"] = axis.tails ? json{{"p_value", axis.tails->p_value}, {"excess", number(axis.tails->excess)}} : json(nullptr);
+  out["spikes"] = axis.tails ? json{{"p_value", axis.tails->p_value}, {"excess", number(axis.tails->excess)}}
+                             : json(nullptr);
   return out;
 }
 
 }  // namespace
 
 json to_json(const Origin& origin, const std::vector<AxisCertificate>& axes) {
-  json out{{"schema", "imuscope.certificate/1"},
-           {"sensor", origin.sensor},
-           {"files", origin.files},
-           {"selection", origin.selection},
-           {"made_utc", origin.made_utc},
-           {"version", origin.version}};
+  json out{{"schema", "imuscope.certificate/1"}, {"sensor", origin.sensor},     {"files", origin.files},
+           {"selection", origin.selection},      {"made_utc", origin.made_utc}, {"version", origin.version}};
   double rate_hz = 0.0;
   double duration_s = 0.0;
   double confidence = 0.0;

@@ -103,7 +103,8 @@ std::optional<std::string> motion_in(const AxisRecord& record, std::span<const s
   const auto share = static_cast<double>(n) / static_cast<double>(std::max<std::size_t>(1, blocks.sd.size()));
   if (n < 2 || share < kFew) return std::nullopt;
   return fmt::format(
-      "the sensor was not at rest: {:.3g} % of the record is shaken or turned, first at {:.0f} s; cut the record to its "
+      "the sensor was not at rest: {:.3g} % of the record is shaken or turned, first at {:.0f} s; cut the "
+      "record to its "
       "rest, or the numbers are those of the motion",
       100.0 * share, static_cast<double>(first) * blocks.seconds);
 }
@@ -146,29 +147,31 @@ std::vector<std::string> record_warnings(const AxisRecord& record, std::span<con
   const double step = so_far.resolution.value_or(0.0);
   // Of a coarse grid many samples share a value; of a clipped signal the last one more than any inside.
   const auto clipped = [&](std::size_t at, double end) {
-    return static_cast<double>(at) > kClipped * n && at > 10 && std::abs(end - so_far.mean) > 2.0 * so_far.sd &&
-           std::abs(end - so_far.mean) > 5.0 * step;
+    return static_cast<double>(at) > kClipped * n && at > 10 &&
+           std::abs(end - so_far.mean) > 2.0 * so_far.sd && std::abs(end - so_far.mean) > 5.0 * step;
   };
   if (clipped(e.at_high, e.high) || clipped(e.at_low, e.low)) {
     const bool high = clipped(e.at_high, e.high);
-    warnings.push_back(fmt::format("{} samples are exactly {:.6g}: the end of the sensor's range; what lies beyond is lost",
-                                   high ? e.at_high : e.at_low, high ? e.high : e.low));
+    warnings.push_back(
+        fmt::format("{} samples are exactly {:.6g}: the end of the sensor's range; what lies beyond is lost",
+                    high ? e.at_high : e.at_low, high ? e.high : e.low));
   }
   // Runs that noise of this spread and resolution would not make.
   const double in_a_row = step > 0.0 ? std::max(10.0, 40.0 * std::max(1.0, step / so_far.sd)) : 5.0;
   if (static_cast<double>(e.longest_run) > std::max(in_a_row, record.rate_hz)) {
-    warnings.push_back(fmt::format("the value stands still for {:.3g} s at {:.0f} s: the sensor or the log was stuck",
-                                   static_cast<double>(e.longest_run) / record.rate_hz,
-                                   static_cast<double>(e.run_at) / record.rate_hz));
+    warnings.push_back(fmt::format(
+        "the value stands still for {:.3g} s at {:.0f} s: the sensor or the log was stuck",
+        static_cast<double>(e.longest_run) / record.rate_hz, static_cast<double>(e.run_at) / record.rate_hz));
   }
   constexpr double kManyMissing = 0.05;
   const double missing = static_cast<double>(so_far.n_missing) / static_cast<double>(record.values.size());
   if (missing > kManyMissing)
     warnings.push_back(fmt::format("{:.2g} % of the samples are missing", 100.0 * missing));
   if (step > so_far.sd) {
-    warnings.push_back(fmt::format("the resolution, {:.3g}, is coarser than the noise: what the table says of fast noise is "
-                                   "the quantization's",
-                                   step));
+    warnings.push_back(
+        fmt::format("the resolution, {:.3g}, is coarser than the noise: what the table says of fast noise is "
+                    "the quantization's",
+                    step));
   }
   return warnings;
 }

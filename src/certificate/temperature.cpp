@@ -23,7 +23,8 @@ struct Range {
   std::size_t n = 0;
 };
 
-bool is_there(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const double> t, std::size_t i) {
+bool is_there(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const double> t,
+              std::size_t i) {
   return (mask.empty() || mask[i] != 0) && std::isfinite(x[i]) && std::isfinite(t[i]);
 }
 
@@ -38,7 +39,8 @@ Range range_of(std::span<const double> x, std::span<const std::uint8_t> mask, st
   return range;
 }
 
-/// Weighted line through (x, y) with the sd of its slope from the scatter; absent with fewer than three places.
+/// Weighted line through (x, y) with the sd of its slope from the scatter; absent with fewer than three
+/// places.
 struct Slope {
   double value = 0.0;
   double sd = 0.0;
@@ -70,7 +72,7 @@ std::optional<Slope> slope_of(const std::vector<double>& x, const std::vector<do
   return slope;
 }
 
-/// Bias by generalised least squares: both columns go through the noise's own whitening filter (C-2).
+/// Bias by generalised least squares: both columns go through the noise's own whitening filter (T-2).
 void add_bias(Temperature& out, std::span<const double> x, std::span<const std::uint8_t> mask,
               std::span<const double> t, const noise::Model& model) {
   constexpr std::size_t kColumns = 3;  // signal, constant, temperature
@@ -128,7 +130,8 @@ void add_noise(Temperature& out, std::span<const double> x, std::span<const std:
 }  // namespace
 
 std::optional<Temperature> temperature_of(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                          std::span<const double> temperature_c, const noise::FitResult& fit) {
+                                          std::span<const double> temperature_c,
+                                          const noise::FitResult& fit) {
   if (temperature_c.size() != x.size()) return std::nullopt;
   const Range range = range_of(x, mask, temperature_c);
   if (range.n == 0 || range.highest - range.lowest < kLeastRange_c) return std::nullopt;

@@ -17,7 +17,8 @@ struct Temperature {
   double bias_per_c = 0.0;     ///< signal unit per degree, about the mean temperature
   double bias_per_c_sd = 0.0;  ///< under the fitted noise (generalised least squares)
   double bias_p_value = 1.0;
-  /// Relative change of the variance of fast noise per degree; absent where the record is too short for windows.
+  /// Relative change of the variance of fast noise per degree; absent where the record is too short for
+  /// windows.
   std::optional<double> noise_per_c;
   double noise_per_c_sd = 0.0;
 };

@@ -99,7 +99,8 @@ double tolerance_factor(std::size_t n, double share, double confidence) {
   return boost::math::quantile(t, confidence) / std::sqrt(count);
 }
 
-std::vector<Population> population_of(std::span<const std::vector<AxisCertificate>> records, double confidence) {
+std::vector<Population> population_of(std::span<const std::vector<AxisCertificate>> records,
+                                      double confidence) {
   // In the order in which the first record names them.
   std::vector<std::pair<std::string, Term>> rows;
   std::map<std::pair<std::string, Term>, std::vector<const TermValue*>> values;

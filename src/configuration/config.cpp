@@ -1,8 +1,11 @@
 #include "configuration/config.h"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
+#include <netinet/in.h>
 #include <openssl/evp.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/limits.h"
@@ -17,9 +20,10 @@ namespace imuscope {
 namespace {
 
 void read_estimator(TomlReader in, EstimatorOptions& options) {
-  options.paper_states = in.choice("states", {"full", "paper"}, 0) == 1;
+  options.states = static_cast<FilterStates>(in.choice("states", {"full", "rigid", "paper"}, 0));
   // Six states beside the published method's: the filter's, unless the batch is asked for.
-  options.batch_mounting = in.choice("mounting", {"batch", "filter"}, options.paper_states ? 1 : 0) == 0;
+  options.batch_mounting =
+      in.choice("mounting", {"batch", "filter"}, options.states == FilterStates::kPaper ? 1 : 0) == 0;
   in.boolean("navigation", options.navigation);
   in.integer("differentiator_points", options.differentiator_points, 5, 11);
   if (options.differentiator_points % 2 == 0) in.fail("differentiator_points", "must be 5, 7, 9 or 11");
@@ -83,6 +87,45 @@ void read_cores(TomlReader& in, std::string_view key, std::vector<int>& cores) {
 void read_threads(TomlReader in, ThreadOptions& options) {
   read_cores(in, "io_cores", options.io_cores);
   read_cores(in, "estimator_cores", options.estimator_cores);
+  in.finish();
+}
+
+void read_record(TomlReader in, RecordOptions& options) {
+  constexpr double kShortestSync_s = 0.1;
+  constexpr double kLongest_s = 3600.0;
+  constexpr double kSPerHour = 3600.0;
+  constexpr double kSPerDay = 86400.0;
+  constexpr double kBytesPerGb = 1e9;
+  constexpr double kSmallest_gb = 1e-3;
+  constexpr double kLargest_gb = 1e6;
+  constexpr double kShortest_days = 0.01;
+  constexpr double kLongest_days = 36500.0;
+  constexpr double kShortest_hours = 0.01;
+  constexpr double kLongest_hours = 1000.0;
+  in.text("folder", options.folder);
+  in.number("sync_s", options.sync_s, 1.0, kShortestSync_s, kLongest_s);
+  in.number("file_gb", options.file_bytes, kBytesPerGb, kSmallest_gb, kLargest_gb);
+  in.number("file_hours", options.file_s, kSPerHour, kShortest_hours, kLongest_hours);
+  in.number("remove_older_than_days", options.remove_older_than_s, kSPerDay, kShortest_days, kLongest_days);
+  in.number("remove_beyond_gb", options.remove_beyond_bytes, kBytesPerGb, kSmallest_gb, kLargest_gb);
+  in.number("remove_below_free_gb", options.remove_below_free_bytes, kBytesPerGb, kSmallest_gb, kLargest_gb);
+  in.finish();
+}
+
+void read_metrics(TomlReader in, MetricsOptions& options) {
+  constexpr int kHighestPort = 65535;
+  int port = options.port;
+  in.integer("port", port, 0, kHighestPort);
+  options.port = static_cast<std::uint16_t>(port);
+  in.text("address", options.address);
+  const bool is_address = [&] {
+    std::array<unsigned char, sizeof(in6_addr)> bytes{};
+    return inet_pton(AF_INET, options.address.c_str(), bytes.data()) == 1 ||
+           inet_pton(AF_INET6, options.address.c_str(), bytes.data()) == 1;
+  }();
+  if (!is_address)
+    in.fail("address", fmt::format("'{}' is no address", options.address),
+            "give 127.0.0.1, ::1 or an address of this PC in numbers; 0.0.0.0 is all of them");
   in.finish();
 }
 
@@ -154,12 +197,8 @@ Result<Configuration> parse(const std::string& text, const std::filesystem::path
   lcm.text("channel_prefix", configuration.lcm.channel_prefix);
   lcm.boolean("bridge", configuration.lcm.bridge);
   lcm.finish();
-  auto record = root.table("record");
-  record.text("folder", configuration.record.folder);
-  constexpr double kShortestSync_s = 0.1;
-  constexpr double kLongestSync_s = 3600.0;
-  record.number("sync_s", configuration.record.sync_s, 1.0, kShortestSync_s, kLongestSync_s);
-  record.finish();
+  read_record(root.table("record"), configuration.record);
+  read_metrics(root.table("metrics"), configuration.metrics);
   read_threads(root.table("threads"), configuration.threads);
   root.ignore("simulation");  // belongs to imusim, which checks it
   auto attached = root.table("attached");

@@ -38,6 +38,12 @@ struct CanConfig {
   bool log_has_common_clock = false;
 };
 
+/// A PPS device of the kernel.
+struct PpsConfig {
+  std::string port;         ///< its path
+  bool clear_edge = false;  ///< the second begins at the clear edge, not at the assert edge
+};
+
 /// The same over a network: a TCP server that we connect to, or UDP datagrams that are sent to us.
 struct NetConfig {
   bool udp = false;
@@ -145,22 +151,30 @@ struct DeviceConfig {
   std::optional<SerialConfig> serial;
   std::optional<CanConfig> can;
   std::optional<NetConfig> net;
+  std::optional<PpsConfig> pps;
   /// The device whose line also carries this one's bytes: itself, or another one behind the same Xbus Master.
   std::size_t line_owner = 0;
   XsensConfig xsens;
   ImuNoiseConfig noise;        ///< reference and study
   MountingPriorConfig prior;   ///< study
   DataSheetConfig data_sheet;  ///< study
-  int average_samples = 1;     ///< study: samples taken into one measurement update, see StudyConfig
+  int average_samples = 0;     ///< study: samples from one update to the next, see StudyConfig
   CsvConfig csv;               ///< csv_imu, csv_gnss
   GnssOptions gnss;            ///< gnss
   OdometryOptions odometry;    ///< odometry
   xsens_can::ItemIds xsens_can_ids = xsens_can::default_ids();  ///< xsens_can
 };
 
+/// States of an S-IMU in the filter.
+enum class FilterStates : std::uint8_t {
+  kFull,   ///< with all that data sheets allow its axes, places and delays to be
+  kRigid,  ///< boresight, lever arm, biases, time offset, scales: axes are straight
+  kPaper,  ///< the paper's six
+};
+
 /// [estimator]: which states the filter has.
 struct EstimatorOptions {
-  bool paper_states = false;      ///< the paper's six states per S-IMU
+  FilterStates states = FilterStates::kFull;
   bool batch_mounting = true;     ///< a study publishes the batch estimate's mounting, not the filter's
   bool navigation = true;         ///< R-IMU/GNSS navigation; needs a gnss device
   int differentiator_points = 5;  ///< of the reference: 5, 7, 9 or 11
@@ -200,10 +214,24 @@ struct LcmOptions {
   bool bridge = false;  ///< publishes pose_t and ins_t, too
 };
 
-/// [record]: where live runs go.
+/// [record]: where live runs go, and how long they stay.
 struct RecordOptions {
   std::string folder;   ///< where live runs are recorded; relative to the working folder
   double sync_s = 0.5;  ///< a cut of the power costs what came in this time and while it was written
+  /// A capture goes on in another file when one is as large or as old.
+  double file_bytes = 2e9;
+  double file_s = 3600.0;
+  /// Runs that are over and not marked kept are removed, oldest first: those that ended longer ago, as many
+  /// as are more than this together, and until so much of the disk is free. Absent: never.
+  std::optional<double> remove_older_than_s;
+  std::optional<double> remove_beyond_bytes;
+  std::optional<double> remove_below_free_bytes;
+};
+
+/// [metrics]: numbers of a running service for a monitoring system. Without a port there are none.
+struct MetricsOptions {
+  std::string address = "127.0.0.1";
+  std::uint16_t port = 0;
 };
 
 /// Processor cores that the core's threads keep to; empty: any.
@@ -226,6 +254,7 @@ struct Configuration {
   ErrorProcessOptions error_process;
   LcmOptions lcm;
   RecordOptions record;
+  MetricsOptions metrics;
   ThreadOptions threads;
 
   [[nodiscard]] const DeviceConfig* find(std::string_view name) const;

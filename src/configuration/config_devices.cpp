@@ -17,7 +17,8 @@ namespace imuscope {
 namespace {
 
 constexpr std::array kRoleNames{std::string_view("reference"), std::string_view("study"),
-                                std::string_view("gnss"), std::string_view("odometry")};
+                                std::string_view("gnss"), std::string_view("odometry"),
+                                std::string_view("time")};
 std::vector<std::string_view> protocol_names() {
   std::vector<std::string_view> names;
   for (const ProtocolTraits& traits : kProtocols) names.push_back(traits.name);
@@ -222,7 +223,8 @@ void read_axes(TomlReader& in, std::array<double, 9>& axes) {
 }
 
 constexpr std::array kTransportKinds{std::string_view("serial"), std::string_view("tcp"),
-                                     std::string_view("udp"), std::string_view("can")};
+                                     std::string_view("udp"), std::string_view("can"),
+                                     std::string_view("pps")};
 
 void read_serial(TomlReader& in, DeviceConfig& device) {
   SerialConfig config;
@@ -241,6 +243,14 @@ void read_can(TomlReader& in, DeviceConfig& device) {
   in.require("interface", "give the CAN interface, such as can0");
   config.log_has_common_clock = in.choice("log_clock", {"utc", "common"}, 0) == 1;
   device.can = config;
+}
+
+void read_pps(TomlReader& in, DeviceConfig& device) {
+  PpsConfig config;
+  in.text("port", config.port);
+  in.require("port", "give the device's path, such as /dev/pps0");
+  config.clear_edge = in.choice("edge", {"assert", "clear"}, 0) == 1;
+  device.pps = config;
 }
 
 void read_net(TomlReader& in, bool udp, DeviceConfig& device) {
@@ -268,9 +278,16 @@ void read_transport(TomlReader in, DeviceConfig& device) {
     case 2:
       read_net(in, true, device);
       break;
-    default:
+    case 3:
       read_can(in, device);
       break;
+    default:
+      read_pps(in, device);
+      break;
+  }
+  if (device.pps.has_value() != (device.protocol == Protocol::kPps)) {
+    in.fail("kind", fmt::format("does not carry {}", name_of(device.protocol)),
+            "kind = \"pps\" is for protocol pps, which has no other");
   }
   in.finish();
 }
@@ -353,7 +370,7 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   read_noise(in.table("noise"), device.rate_hz, device.noise);
   read_prior(in.table("prior"), device.prior);
   if (device.role == DeviceRole::kStudy) {
-    in.integer("average_samples", device.average_samples, 1, kMaxAveraged);
+    in.integer("average_samples", device.average_samples, 0, kMaxAveraged);
     device.data_sheet = default_data_sheet(device.protocol);
     read_data_sheet(in.table("data_sheet"), device.data_sheet);
   }
@@ -456,6 +473,8 @@ void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
     root.fail("device", "lists more than one gnss device", "keep the better one");
   } else if (count(DeviceRole::kOdometry) > 1) {
     root.fail("device", "lists more than one odometry device", "put all speed_signals into one");
+  } else if (count(DeviceRole::kTime) > 1) {
+    root.fail("device", "lists more than one time device", "keep the better one");
   }
 }
 

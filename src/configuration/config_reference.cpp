@@ -27,7 +27,7 @@ protocol = "xsens_mt"
 transport = { kind = "serial", port = "/dev/ttyUSB0" }
 sync_in = { mode = 0 }
 )";
-constexpr std::array<std::string_view, 5> kDevices{R"(
+constexpr std::array<std::string_view, 6> kDevices{R"(
 [[device]]
 name = "dot"
 role = "study"
@@ -60,6 +60,13 @@ base_lat_lon_height = [46.0, 7.0, 500.0]
 )",
                                                    R"(
 [[device]]
+name = "pps"
+role = "time"
+protocol = "pps"
+transport = { kind = "pps", port = "/dev/pps0" }
+)",
+                                                   R"(
+[[device]]
 name = "wheels"
 role = "odometry"
 protocol = "can_odometry"
@@ -72,24 +79,23 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "What the run is called in its files. Without it: the name of the configuration's file, which is "
      "`reference` on this page."},
     {"estimator.states",
-     "`full`: boresight, lever arm, biases, time offset and scales of every S-IMU. `paper`: the six states "
-     "of the "
-     "published method, for comparison."},
+     "`full`: boresight, lever arm, biases, time offset and scales of every S-IMU, and what data sheets "
+     "allow it besides: crooked axes, accelerometers that are turned, late and apart, gyros that feel "
+     "forces. `rigid`: without these, for sensors that are known to have none; sd are too small where they "
+     "have. `paper`: the six states of the published method, for comparison."},
     {"estimator.mounting",
      "What `process` publishes of a mounting. `batch`: an estimate of the whole drive in which nobody knows "
-     "the true motion; it learns the noise, so that it needs neither `[device.noise]` nor `average_samples`, "
-     "and its sd hold what crooked axes and the reference's own errors leave open. `filter`: the filter's "
-     "end "
-     "value, which is sharper where a sensor is exactly as the filter takes it to be, and too sure of itself "
-     "where it is not; with `states = \"paper\"` the default."},
+     "the true motion; it learns the noise, so that it needs no `[device.noise]`, and its sd hold what "
+     "crooked "
+     "axes and the reference's own errors leave open. `filter`: the filter's end value, which is as good as "
+     "the configured noise; with `states = \"paper\"` the default."},
     {"estimator.navigation",
      "Navigation of the R-IMU with GNSS. Without it (or without a receiver) the mounting is calibrated all "
      "the "
      "same, from the two IMUs alone."},
     {"estimator.differentiator_points",
-     "Samples of the reference from which its angular acceleration is found: 5, 7, 9 or 11. More suit a "
-     "noisy "
-     "reference on a smooth vehicle."},
+     "Samples of the reference from which its angular acceleration is found: 5, 7, 9 or 11. What an update "
+     "averages decides more, so that this may stay as it is."},
     {"noise.model",
      "Noise model that is fitted to every axis and regime: a sum of WN, QN, RW, DR, GM, such as `WN+2*GM`."},
     {"noise.refit_interval_s", "Live: from one refit to the next, seconds."},
@@ -128,19 +134,34 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"record.sync_s",
      "Live: what was recorded is on the disk after so many seconds, and safe from the ignition key then. A "
      "cut of the power costs this and the time that the disk takes to write it."},
+    {"record.file_gb", "A capture goes on in another file when one has this size."},
+    {"record.file_hours", "The same when one is as old."},
+    {"record.remove_older_than_days",
+     "Live: runs in the folder that ended longer ago are removed. Never one that `imuscope keep` marked, one "
+     "that "
+     "is being recorded, or a folder that no live run made. Without it: none."},
+    {"record.remove_beyond_gb",
+     "Live: the oldest runs are removed while all together are larger. Without it: none."},
+    {"record.remove_below_free_gb",
+     "Live: the oldest runs are removed while less of the disk is free. Without it: none."},
+    {"metrics.port",
+     "Live: numbers of the service for Prometheus, at `http://ADDRESS:PORT/metrics` (docs/metrics.md). 0: "
+     "none."},
+    {"metrics.address",
+     "Where they are offered: an address of this PC in numbers. Beyond a loopback address everybody on that "
+     "network may read them."},
     {"threads.io_cores", "Live: processor cores that the I/O thread keeps to; empty: any."},
     {"threads.estimator_cores", "Live: processor cores that the estimator's thread keeps to; empty: any."},
     {"device.name", "Becomes part of file names: letters, digits, `_`, `-`."},
     {"device.role",
-     "`reference`: the better IMU, exactly one. `study`: an IMU under study, one to six. `gnss`, `odometry`: "
-     "at most "
-     "one each."},
+     "`reference`: the better IMU, exactly one. `study`: an IMU under study, one to six. `gnss`, `odometry`, "
+     "`time`: at most one each."},
     {"device.protocol",
      "What the device speaks. A `gnss` device: greis, nmea, ubx, rtklib_pos, csv_gnss, or xsens_mt where it "
-     "has a receiver inside. An `odometry` device: can_odometry. An IMU: any other."},
+     "has a receiver inside. An `odometry` device: can_odometry. A `time` device: pps. An IMU: any other."},
     {"device.rate_hz",
      "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, 50 of wheel "
-     "speeds."},
+     "speeds, 1 of pulses."},
     {"device.axes",
      "Rotates the device's components to its frame; the reference's and the vehicle's is forward-right-down. "
      "Three signed axes, or the rows of a rotation matrix. Without it an ixblue_stdbin telegram, which is "
@@ -148,7 +169,11 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.transport.kind",
      "How the bytes come in. Only a device that is never run live, but given as a file, needs no transport."},
     {"device.transport.port",
-     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number."},
+     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number. pps: the path, "
+     "such as "
+     "`/dev/pps0`."},
+    {"device.transport.edge",
+     "pps: the edge of the pulse at which the second begins, as `ppstest` names them."},
     {"device.transport.baud", "serial: bits per second; any rate that the hardware can make."},
     {"device.transport.stop_bits", "serial: stop bits."},
     {"device.transport.host",
@@ -168,9 +193,9 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.sync_in.offset_33_9ns",
      "xsens_mt: from the pulse to the action, in the device's ticks of 33.9 ns."},
     {"device.average_samples",
-     "study: samples that go into one update. Above 1 where the reference is itself a MEMS: its noise would "
-     "pull the "
-     "boresight."},
+     "study: samples from one update of the filter to the next; an update takes a weighted mean over twice "
+     "as many. 0: chosen by the filter from the reference's noise and the motion, which is what fits; "
+     "results do not hang on it."},
     {"device.noise.gyro_white_sd_degps", "IMUs: white noise of a sample's angular rate, 1 sigma."},
     {"device.noise.gyro_white_deg_per_sqrt_h",
      "IMUs: the same as a density (angular random walk); give one of the two."},

@@ -12,7 +12,7 @@
 
 namespace imuscope {
 
-enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss, kOdometry };
+enum class DeviceRole : std::uint8_t { kReference, kStudy, kGnss, kOdometry, kTime };
 
 enum class Protocol : std::uint8_t {
   kXsensMt,
@@ -24,20 +24,21 @@ enum class Protocol : std::uint8_t {
   kCsvImu,
   kCsvGnss,
   kXsensCan,
-  kCanOdometry
+  kCanOdometry,
+  kPps
 };
 
 /// What the rest of the service has to know of a protocol.
 struct ProtocolTraits {
   Protocol protocol;
   std::string_view name;  ///< as the configuration writes it
-  SampleKind purpose;     ///< what its devices are there for: kImu, kGnss or kOdometry
+  SampleKind purpose;     ///< what its devices are there for: kImu, kGnss, kOdometry or kPulse
   double rate_hz;         ///< where the configuration gives none
   bool is_stream;         ///< its bytes can be told from any others: probe and import look for it
   bool is_text = false;   ///< rows with named columns, read from files alone
 };
 
-inline constexpr std::array<ProtocolTraits, 10> kProtocols{
+inline constexpr std::array<ProtocolTraits, 11> kProtocols{
     {{Protocol::kXsensMt, "xsens_mt", SampleKind::kImu, 100.0, true},
      {Protocol::kIxblueStdbin, "ixblue_stdbin", SampleKind::kImu, 100.0, true},
      {Protocol::kGreis, "greis", SampleKind::kGnss, 10.0, true},
@@ -47,7 +48,8 @@ inline constexpr std::array<ProtocolTraits, 10> kProtocols{
      {Protocol::kCsvImu, "csv_imu", SampleKind::kImu, 100.0, false, true},
      {Protocol::kCsvGnss, "csv_gnss", SampleKind::kGnss, 10.0, false, true},
      {Protocol::kXsensCan, "xsens_can", SampleKind::kImu, 100.0, false},
-     {Protocol::kCanOdometry, "can_odometry", SampleKind::kOdometry, 50.0, false}}};
+     {Protocol::kCanOdometry, "can_odometry", SampleKind::kOdometry, 50.0, false},
+     {Protocol::kPps, "pps", SampleKind::kPulse, 1.0, false}}};
 
 [[nodiscard]] constexpr const ProtocolTraits& traits_of(Protocol protocol) noexcept {
   return kProtocols[static_cast<std::size_t>(protocol)];
@@ -68,12 +70,14 @@ static_assert(
 /// Whether a device of this protocol can have a role. An XSens device with a receiver inside can be that, or
 /// an IMU.
 [[nodiscard]] constexpr bool fits(Protocol protocol, DeviceRole role) noexcept {
-  if (protocol == Protocol::kXsensMt) return role != DeviceRole::kOdometry;
+  if (protocol == Protocol::kXsensMt) return role != DeviceRole::kOdometry && role != DeviceRole::kTime;
   switch (traits_of(protocol).purpose) {
     case SampleKind::kGnss:
       return role == DeviceRole::kGnss;
     case SampleKind::kOdometry:
       return role == DeviceRole::kOdometry;
+    case SampleKind::kPulse:
+      return role == DeviceRole::kTime;
     default:
       return role == DeviceRole::kReference || role == DeviceRole::kStudy;
   }

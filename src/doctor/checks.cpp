@@ -9,6 +9,7 @@
 #include <unistd.h>
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <fstream>
 #include <optional>
@@ -16,6 +17,7 @@
 #include <thread>
 
 #include "base/output_folder.h"
+#include "doors/metrics_server.h"
 #include "publish/lcm_url.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
@@ -151,6 +153,51 @@ Finding check_lcm(const std::string& url) {
   const auto checked = check_lcm_bus(url);
   if (checked) return {"LCM", Verdict::kGood, fmt::format("{} can be reached", url), {}};
   return refused("LCM", checked.error());
+}
+
+Finding check_udev(const fs::path& root) {
+  std::error_code ignored;
+  if (fs::exists(root / "run/udev/control", ignored))
+    return {"udev", Verdict::kGood, "a device that is plugged in is opened at once", {}};
+  return {"udev", Verdict::kWarning,
+          "udev does not run: ports get neither their names nor their rights when a device is plugged in",
+          "apt-get install udev; in a container, run the service on the host"};
+}
+
+std::vector<Finding> check_unit(const fs::path& root) {
+  std::error_code ignored;
+  if (!fs::exists(root / "lib/systemd/system/imuscope.service", ignored)) return {};
+  const auto wanted = root / "etc/systemd/system/multi-user.target.wants/imuscope.service";
+  if (fs::is_symlink(fs::symlink_status(wanted, ignored)))
+    return {{"start", Verdict::kGood, "the service starts with the PC", {}}};
+  return {{"start", Verdict::kWarning, "the service is installed and does not start with the PC",
+           "systemctl enable imuscope, where it shall record every drive (docs/vehicle.md)"}};
+}
+
+Finding check_wall_clock(UtcTime now) {
+  // Nobody has built this program before.
+  constexpr UtcTime kEarliest{std::chrono::sys_days{std::chrono::year{2026} / 1 / 1}};
+  if (now >= kEarliest) return {"wall clock", Verdict::kGood, "the PC knows the date", {}};
+  return {
+      "wall clock", Verdict::kWarning,
+      "the PC begins in the past: folders of runs get wrong dates, and none is removed by its age",
+      "timedatectl set-ntp true, or a battery for its clock; the rows of a run have UTC all the same where a "
+      "device tells it"};
+}
+
+std::vector<Finding> check_metrics(const MetricsOptions& options) {
+  if (options.port == 0) return {};
+  const StatusBoard nothing;
+  const auto opened = MetricsServer::open(options.address, options.port, nothing);
+  if (!opened) return {refused("metrics", opened.error())};
+  const bool is_loopback = options.address.starts_with("127.") || options.address == "::1";
+  if (is_loopback)
+    return {
+        {"metrics", Verdict::kGood, fmt::format("{} port {} is free", options.address, options.port), {}}};
+  return {{"metrics", Verdict::kWarning,
+           fmt::format("{} port {} is free; everybody on that network may read names, rates and alarms",
+                       options.address, options.port),
+           "leave out address in [metrics] where only this PC shall read them"}};
 }
 
 Finding check_line(const std::string& device, const Result<void>& opened) {

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "base/result.h"
+#include "base/time.h"
+#include "configuration/config.h"
 #include "doctor/finding.h"
 
 namespace imuscope::doctor {
@@ -33,6 +35,20 @@ namespace imuscope::doctor {
 
 /// The way to the multicast group.
 [[nodiscard]] Finding check_lcm(const std::string& url);
+
+/// udev announces devices that are plugged in later.
+[[nodiscard]] Finding check_udev(const std::filesystem::path& root);
+
+/// A service that is installed starts with the PC, and with the ignition.
+/// @return nothing where the package is not installed
+[[nodiscard]] std::vector<Finding> check_unit(const std::filesystem::path& root);
+
+/// The PC's own clock names folders and decides which runs are old.
+[[nodiscard]] Finding check_wall_clock(UtcTime now);
+
+/// [metrics]: is the port free, and who may read?
+/// @return nothing where the configuration asks for none
+[[nodiscard]] std::vector<Finding> check_metrics(const MetricsOptions& options);
 
 /// One configured line: does it open? It is opened and closed again.
 [[nodiscard]] Finding check_line(const std::string& device, const Result<void>& opened);

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "doctor/checks.h"
+#include "rt/host_clock.h"
 #include "service/device_factory.h"
 #include "service/line_factory.h"
 
@@ -41,7 +42,11 @@ std::vector<Finding> examine(const Examination& examination) {
                                 check_clock_source(examination.root),
                                 check_governor(examination.root),
                                 check_lcm(configuration ? configuration->lcm.url : LcmOptions{}.url),
-                                check_receive_buffer(examination.root)};
+                                check_receive_buffer(examination.root),
+                                check_udev(examination.root),
+                                check_wall_clock(wall_clock_now())};
+  append(findings, check_unit(examination.root));
+  if (configuration) append(findings, check_metrics(configuration->metrics));
   std::vector<std::string> ports;
   std::vector<std::string> interfaces;
   if (configuration) {

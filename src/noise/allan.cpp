@@ -118,8 +118,8 @@ std::vector<AllanPoint> allan_deviation(std::span<const double> x, const Wavelet
       point.tau_s = static_cast<double>(n) / rate_hz;
       const double square = sums.mean_square(n, point.n_differences);
       const double exact_share = std::log2(static_cast<double>(n) / static_cast<double>(octave));
-      const double inflation =
-          std::exp(between(std::log(wv.levels[i].inflation), std::log(wv.levels[i + 1].inflation), exact_share));
+      const double inflation = std::exp(
+          between(std::log(wv.levels[i].inflation), std::log(wv.levels[i + 1].inflation), exact_share));
       point.deviation = std::sqrt(0.5 * square / inflation);
       if (point.n_differences > 0) points.push_back(point);
     }
@@ -156,8 +156,8 @@ void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, 
 }
 
 double model_allan_deviation(const Model& model, double n) {
-  // Every curve of process.h holds for any number of samples; between powers of two the logarithm of the variance is
-  // taken as a parabola through the three nearest levels.
+  // Every curve of process.h holds for any number of samples; between powers of two the logarithm of the
+  // variance is taken as a parabola through the three nearest levels.
   const double place = std::clamp(std::log2(n), 0.0, static_cast<double>(kMaxLevel - 1));
   const int middle = std::clamp(static_cast<int>(std::lround(place)), 1, kMaxLevel - 2);
   const double d = place - middle;

@@ -10,27 +10,28 @@
 
 namespace imuscope::noise {
 
-/// AVAR(n) = half the mean square of the difference of neighbouring means of n samples, over all places (IEEE Std 952,
-/// annex C): twice the wavelet variance at n = 2^(level-1) (N-40).
+/// AVAR(n) = half the mean square of the difference of neighbouring means of n samples, over all places (IEEE
+/// Std 952, annex C): twice the wavelet variance at n = 2^(level-1) (N-40).
 struct AllanPoint {
   std::uint64_t n = 0;  ///< samples a mean
   double tau_s = 0.0;
-  double deviation = 0.0;       ///< signal unit
+  double deviation = 0.0;  ///< signal unit
   std::uint64_t n_differences = 0;
   double degrees_of_freedom = 0.0;  ///< equivalent, of the variance; set by set_allan_intervals()
   double ci_low = 0.0;
   double ci_high = 0.0;
 };
 
-/// Averaging times of powers of two samples are those of `wv`; between them lie `points_per_octave - 1` more, up to the
-/// longest level with enough coefficients (wavelet_variance.h) or, without one, the longest at all. Missing samples are
-/// borne as in haar_wavelet_variance(), and what they add is taken out by the neighbouring levels' inflation.
+/// Averaging times of powers of two samples are those of `wv`; between them lie `points_per_octave - 1` more,
+/// up to the longest level with enough coefficients (wavelet_variance.h) or, without one, the longest at all.
+/// Missing samples are borne as in haar_wavelet_variance(), and what they add is taken out by the
+/// neighbouring levels' inflation.
 /// @param wv  of the same signal and mask, classical
 std::vector<AllanPoint> allan_deviation(std::span<const double> x, const WaveletVariance& wv, double rate_hz,
                                         int points_per_octave = 4);
 
-/// Chi-square intervals. Their degrees of freedom are those of the wavelet variance under the fitted model (N-8),
-/// between levels on a logarithmic scale; without a fit max(N / 2n, 1).
+/// Chi-square intervals. Their degrees of freedom are those of the wavelet variance under the fitted model
+/// (N-8), between levels on a logarithmic scale; without a fit max(N / 2n, 1).
 void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, double confidence);
 
 /// Allan deviation of the model for means of n samples; n need not be a power of two.

@@ -9,8 +9,8 @@
 
 #include "noise/chi_squared.h"
 #include "noise/homogeneity.h"
-#include "noise/parameter_scale.h"
 #include "noise/inference.h"
+#include "noise/parameter_scale.h"
 
 namespace imuscope::noise {
 namespace {
@@ -61,18 +61,10 @@ WaveletVariance together(const FitResult& a, const FitResult& b) {
   return out;
 }
 
-bool are_of_one_kind(const FitResult& a, const FitResult& b) {
-  const auto unit_of = [](const FitResult& fit) {
-    return fit.parameters.empty() ? std::string() : fit.parameters.front().unit;
-  };
-  return a.rate_hz == b.rate_hz && a.efficiency == b.efficiency && !a.wv.empty() && !b.wv.empty() &&
-         (unit_of(a) == unit_of(b) || a.parameters.front().name != b.parameters.front().name);
-}
-
 /// Whether both records come from one model, that of more terms: a test of the levels, whose size does not
-/// hang on how far from Gaussian the estimates are.
+/// hang on how far from Gaussian the estimates are. Both are in one unit.
 std::optional<DifferenceTest> joint_test(const FitResult& a, const FitResult& b) {
-  if (!are_of_one_kind(a, b)) return std::nullopt;
+  if (a.rate_hz != b.rate_hz || a.efficiency != b.efficiency) return std::nullopt;
   const ModelSpec& spec = b.spec.parameter_count() > a.spec.parameter_count() ? b.spec : a.spec;
   const auto common = fit(together(a, b), spec, a.rate_hz);
   if (!common) return std::nullopt;
@@ -96,11 +88,14 @@ void set_ratio_interval(ComparedParameter& row, double sd, double z) {
 
 double on_interval_scale(const ParameterEstimate& p) { return to_scale(parameter_scale_of(p.name), p.value); }
 
-double from_interval_scale(const ParameterEstimate& p, double place) { return from_scale(parameter_scale_of(p.name), place); }
+double from_interval_scale(const ParameterEstimate& p, double place) {
+  return from_scale(parameter_scale_of(p.name), place);
+}
 
 Comparison compare(const FitResult& first, const FitResult& second) {
   Comparison out;
   bool has_common = false;
+  bool in_one_unit = true;
   const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + first.confidence));
   for (std::size_t i = 0; i < first.parameters.size(); ++i) {
     const ParameterEstimate& p = first.parameters[i];
@@ -114,6 +109,7 @@ Comparison compare(const FitResult& first, const FitResult& second) {
       row.second = q.value;
       if (p.value != 0.0) row.ratio = q.value / p.value;
       if (p.unit != q.unit) {
+        in_one_unit = false;
         out.warnings.push_back(
             fmt::format("{} {} is in '{}' and in '{}': not compared", p.process, p.name, p.unit, q.unit));
       } else if (is_too_short_for_the_other(first, second, p.process)) {
@@ -151,7 +147,7 @@ Comparison compare(const FitResult& first, const FitResult& second) {
         fmt::format("the rates differ ({} and {} Hz): WN, RW, QN and DR parameters are per sample",
                     first.rate_hz, second.rate_hz));
   }
-  if (has_common) out.test = joint_test(first, second);
+  if (has_common && in_one_unit) out.test = joint_test(first, second);
   return out;
 }
 

@@ -239,7 +239,8 @@ std::string kalibr(Writer& writer) {
          fmt::format("rostopic: /imu0\nupdate_rate: {}\n", writer.axes().front().fit.rate_hz);
 }
 
-/// OpenVINS propagates with the densities as kalibr writes them (Qc = sigma^2 / dt), in a file of its own shape.
+/// OpenVINS propagates with the densities as kalibr writes them (Qc = sigma^2 / dt), in a file of its own
+/// shape.
 std::string openvins(Writer& writer) {
   const Triad accel = walk_triad(writer, false);
   const Triad gyro = walk_triad(writer, true);
@@ -261,7 +262,8 @@ struct FourNames {
 };
 
 /// @param white_factor, walk_factor  of the densities' roots
-std::string four_keys(const FourNames& names, const Triad& accel, const Triad& gyro, double white_factor, double walk_factor) {
+std::string four_keys(const FourNames& names, const Triad& accel, const Triad& gyro, double white_factor,
+                      double walk_factor) {
   std::string text;
   const auto add = [&](const char* name, const Written& density, double factor) {
     text += fmt::format("{}: {:.9e}{}\n", name, factor * root(density),
@@ -278,20 +280,24 @@ std::string four_keys(const FourNames& names, const Triad& accel, const Triad& g
   return text;
 }
 
-/// VINS-Mono and VINS-Fusion take the noise of a sample: a step adds (dt/2)^2 of each of its two samples to a velocity, which
-/// is half of what one sample of density / dt adds, and (dt w)^2 to a bias (integration_base.h, midPointIntegration).
+/// VINS-Mono and VINS-Fusion take the noise of a sample: a step adds (dt/2)^2 of each of its two samples to a
+/// velocity, which is half of what one sample of density / dt adds, and (dt w)^2 to a bias
+/// (integration_base.h, midPointIntegration).
 std::string vins_fusion(Writer& writer) {
   const double rate_hz = writer.axes().front().fit.rate_hz;
   const Triad accel = walk_triad(writer, false);
   const Triad gyro = walk_triad(writer, true);
   return writer.header("VINS-Fusion (config.yaml)") +
-         fmt::format("# of a sample at {:g} Hz: acc_n, gyr_n = sqrt(2 density rate), acc_w, gyr_w = sqrt(walk density rate)\n",
-                     rate_hz) +
-         four_keys({"acc_n", "acc_w", "gyr_n", "gyr_w"}, accel, gyro, std::sqrt(2.0 * rate_hz), std::sqrt(rate_hz));
+         fmt::format(
+             "# of a sample at {:g} Hz: acc_n, gyr_n = sqrt(2 density rate), acc_w, gyr_w = sqrt(walk "
+             "density rate)\n",
+             rate_hz) +
+         four_keys({"acc_n", "acc_w", "gyr_n", "gyr_w"}, accel, gyro, std::sqrt(2.0 * rate_hz),
+                   std::sqrt(rate_hz));
 }
 
-/// LIO-SAM hands the squares to GTSAM's PreintegrationParams, densities in continuous time, and drives the biases by
-/// sqrt(dt) imu...BiasN between key frames.
+/// LIO-SAM hands the squares to GTSAM's PreintegrationParams, densities in continuous time, and drives the
+/// biases by sqrt(dt) imu...BiasN between key frames.
 std::string lio_sam(Writer& writer) {
   const Triad accel = walk_triad(writer, false);
   const Triad gyro = walk_triad(writer, true);
@@ -305,7 +311,8 @@ std::string gtsam(Writer& writer) {
   std::string text = writer.header("GTSAM (C++)");
   for (std::size_t at = 0; at < text.size(); at = text.find('\n', at) + 1) text.replace(at, 1, "//");
   text +=
-      "// densities in continuous time; integrationCovariance is an error of the integration, not of the sensor\n"
+      "// densities in continuous time; integrationCovariance is an error of the integration, not of the "
+      "sensor\n"
       "auto params = gtsam::PreintegrationCombinedParams::MakeSharedU();\n";
   const auto add = [&](const char* setter, const Written& density) {
     text += fmt::format("params->{}({:.9e} * gtsam::I_3x3);{}\n", setter, density.value,
@@ -502,8 +509,9 @@ Result<ExportFormat> parse_export_format(std::string_view text) {
   for (const auto& [format, name] : kFormats) {
     if (name == text) return format;
   }
-  return usage_error(fmt::format("there is no format '{}'", text),
-                     "formats are kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins and state-space");
+  return usage_error(
+      fmt::format("there is no format '{}'", text),
+      "formats are kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins and state-space");
 }
 
 Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat format,

@@ -3,7 +3,8 @@
 /// Fitted models as another tool's configuration, in that tool's units and for that tool's equations.
 ///
 /// - kalibr: imu.yaml, white noise and random walk of each triad
-/// - openvins: kalibr_imu_chain.yaml; vins-fusion: acc_n, gyr_n, acc_w, gyr_w, of a sample; lio-sam: params.yaml; gtsam: a
+/// - openvins: kalibr_imu_chain.yaml; vins-fusion: acc_n, gyr_n, acc_w, gyr_w, of a sample; lio-sam:
+/// params.yaml; gtsam: a
 ///   piece of C++ that fills PreintegrationCombinedParams; each white noise and random walk of each triad
 /// - ros: ROS 2 parameters, covariances as in sensor_msgs/Imu; white noise and one Gauss-Markov bias a triad,
 ///   as IMU simulation plugins take them
@@ -14,8 +15,9 @@
 /// Every number comes from the fitted model (felt_noise.h), none from a fit of a smaller one. A form that
 /// holds fewer terms gets its own terms in their place: white noise with the density of all that is white at
 /// a second, and a slow term that grows like the model's over the band in which that tool works, 1 s to 100 s
-/// for those with a random walk, 1 s to 1000 s for ros, kf-gins and state-space. What the data only bound is written as that bound. The
-/// file says all of that in its comments, and from which stretch of which regime it comes.
+/// for those with a random walk, 1 s to 1000 s for ros, kf-gins and state-space. What the data only bound is
+/// written as that bound. The file says all of that in its comments, and from which stretch of which regime
+/// it comes.
 ///
 /// With `conservative` the upper ends of the intervals take the places of the values: of a triad's axes the
 /// highest.
@@ -43,7 +45,8 @@ enum class ExportFormat : std::uint8_t {
   kStateSpace,
 };
 
-/// "kalibr", "openvins", "vins-fusion", "lio-sam", "gtsam", "ros", "px4", "kf-gins", "state-space". Errors: kUsage, with the formats that exist.
+/// "kalibr", "openvins", "vins-fusion", "lio-sam", "gtsam", "ros", "px4", "kf-gins", "state-space". Errors:
+/// kUsage, with the formats that exist.
 Result<ExportFormat> parse_export_format(std::string_view text);
 
 /// The fit of one axis to be written.

@@ -49,6 +49,7 @@ bool is_slow(const Component& c, double rate_hz, double fast_s) {
   }
 }
 
+/// N-28.
 double white_of(const Model& model, double rate_hz, double fast_s) {
   double sum = 0.0;
   for (const Component& c : without_power_laws(model).components) {
@@ -170,8 +171,11 @@ class Uncertainty {
   /// Sd of ln(f(model)); infinite where the data do not tell.
   [[nodiscard]] double log_sd(const OfModel& f) const {
     if (!known_) return kInfinity;
-    const Eigen::VectorXd along = eigen_.eigenvectors().transpose() * gradient(f);
+    const Eigen::VectorXd slope = gradient(f);
+    const Eigen::VectorXd along = eigen_.eigenvectors().transpose() * slope;
     double variance = 0.0;
+    for (std::size_t i = 0; i < present_.size() && present_[i] < fit_.parameters.size(); ++i)
+      variance += std::pow(slope[static_cast<Eigen::Index>(i)] * fit_.parameters[present_[i]].spread_sd, 2);
     for (Eigen::Index i = 0; i < along.size(); ++i) {
       constexpr double kNothing = 1e-9;
       if (std::abs(along[i]) < kNothing) continue;
@@ -223,14 +227,14 @@ class Uncertainty {
 };
 
 /// N-32: the most of a term with this unit curve that every level allows beside the rest of the model.
-/// Infinite without a level.
+/// Infinite without a level. What the rest of a rejected model takes of a level is not known.
 double most_of(const FitResult& fit, const std::function<double(int)>& unit, const Model& rest) {
   double most = kInfinity;
   const double tail = (1.0 - fit.confidence) / static_cast<double>(std::max<std::size_t>(1, fit.wv.size()));
   for (const FittedLevel& level : fit.wv) {
     const double dof = freedom_of(level.observed, fit.efficiency);
     const double upper = level.observed.value * dof / chi_squared_quantile(dof, tail);
-    const double room = upper - model_wv(rest, level.observed.level);
+    const double room = upper - (fit.model_error > 0.0 ? 0.0 : model_wv(rest, level.observed.level));
     if (room > 0.0) most = std::min(most, room / unit(level.observed.level));
   }
   return most;
@@ -267,7 +271,7 @@ Model part_of(const Model& model, double rate_hz, double fast_s, bool slow) {
   return part;
 }
 
-Felt white_density(const FitResult& fit, double fast_s) {
+Felt told_white_density(const FitResult& fit, double fast_s) {
   const double f = fit.rate_hz;
   return felt(
       fit, [&](const Model& m) { return white_of(m, f, fast_s); },
@@ -368,8 +372,12 @@ const char* knowledge_name(Knowledge knowledge) noexcept {
   return kNames[static_cast<std::size_t>(knowledge)];
 }
 
+double white_density(const Model& model, double rate_hz, const FilterBand& band) {
+  return white_of(model, rate_hz, band.from_s);
+}
+
 Felt felt_white_density(const FitResult& fit, const FilterBand& band) {
-  return white_density(fit, band.from_s);
+  return told_white_density(fit, band.from_s);
 }
 
 Felt felt_walk_density(const FitResult& fit, const FilterBand& band) {
@@ -379,7 +387,7 @@ Felt felt_walk_density(const FitResult& fit, const FilterBand& band) {
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band) {
   const double fast_s = fast_beside_bias_s(fit, band);
   FeltWithBias out;
-  out.white_density = white_density(fit, fast_s);
+  out.white_density = told_white_density(fit, fast_s);
   if (const auto own = own_process(fit, fast_s, band)) {
     out.bias = *own;
     return out;
@@ -430,6 +438,8 @@ std::string slow_terms(const FitResult& fit, const FilterBand& band) {
 }
 
 std::string missed_level(const FitResult& fit, const FilterBand& band) {
+  if (fit.model_error >= kMostModelError)
+    return fmt::format("the model misses every level by {:.3g} % or so", 100.0 * fit.model_error);
   constexpr double kIntervals = 2.0;  // so that one level of many is not missed by chance
   std::string worst;
   double worst_excess = 0.0;

@@ -51,7 +51,10 @@ struct FeltBias {
   bool as_fitted = false;              ///< the model's own process, not one in its place
 };
 
-/// Density of what is white in the band, unit^2/Hz.
+/// Density of what of a model is white in the band, unit^2/Hz: N-28.
+double white_density(const Model& model, double rate_hz, const FilterBand& band);
+
+/// The same as the fit tells it.
 Felt felt_white_density(const FitResult& fit, const FilterBand& band);
 
 /// Density that drives a random walk in the place of the slow terms, unit^2 Hz.
@@ -73,8 +76,12 @@ Felt felt_amplitude(const FitResult& fit, std::size_t component);
 /// Names of the slow terms that the fit has ("GM2+RW"); empty without any.
 std::string slow_terms(const FitResult& fit, const FilterBand& band);
 
+/// A model that states to miss every level by as much as this tells no filter how strong its noise is.
+inline constexpr double kMostModelError = 1.0;
+
 /// A level of the band that the model misses by more than it states: by more than twice the level's own
-/// interval and the model error that the fit reports. Empty where there is none; else a clause for people.
+/// interval and the model error that the fit reports; or that error, where it is kMostModelError and more.
+/// Empty where there is none; else a clause for people.
 std::string missed_level(const FitResult& fit, const FilterBand& band);
 
 }  // namespace imuscope::noise

@@ -17,7 +17,8 @@ inline constexpr double kFastTau_s = 1.0;
 double low_frequency_variance(const Component& component) noexcept;
 
 /// What filters are made of, in the fit's own units and continuous time. A term that the model does not have
-/// is zero; quantization, ramps and sinusoids have nothing that a filter could take. A power law is the sum of power_law.h.
+/// is zero; quantization, ramps and sinusoids have nothing that a filter could take. A power law is the sum
+/// of power_law.h.
 struct FilterTerms {
   struct GaussMarkov {
     double variance = 0.0;

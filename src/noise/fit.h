@@ -61,6 +61,9 @@ struct ParameterEstimate {
       ci_low;  ///< interval on the logarithmic scale (amplitudes, rates); an end that the data
   std::optional<double> ci_high;  ///< do not tell is absent: with ci_high alone it is known to be below that
   std::optional<double> log_sd;   ///< sd on the scale the interval was made on
+  /// What sd and interval hold of the spread between parts or replicates (replicates.h), as an sd on the
+  /// scale of `covariance`.
+  double spread_sd = 0.0;
 };
 
 /// Test that the model explains the wavelet variance, on the levels with enough coefficients

@@ -21,8 +21,11 @@ namespace {
 constexpr double kQuickBelowLogSd = 0.05;
 /// A process known no better than this may have rivals elsewhere.
 constexpr double kLooseLogSd = 0.25;
-/// An end further than this from the estimate, on the scale of the interval, is none.
-constexpr double kFurthest = 12.0;
+/// Logarithms: a term so much smaller than every level, or so much larger than one, can change no more.
+constexpr double kFarBelow = 9.0;
+constexpr double kFarAbove = 3.0;
+/// How far beyond that the search for the other parameters may go.
+constexpr double kBeyond = 12.0;
 
 /// One model's parameters as a vector on the scales of their intervals, and the levels that they are fitted
 /// to.
@@ -45,10 +48,19 @@ class Inversion {
     return base_.components[places_[p].component];
   }
 
-  /// Range of a parameter's coordinate.
+  /// Range of a parameter's coordinate: of an amplitude from where no level shows the term to where it is
+  /// more than any level. An end that is not reached there is none.
   [[nodiscard]] CoordinateRange range(std::size_t p) const {
-    if (places_[p].shape < 0) return {estimate(p) - kFurthest, estimate(p) + kFurthest};
-    return coordinate_range(component(p).kind, places_[p].shape, levels_.back());
+    const Component& c = component(p);
+    if (places_[p].shape >= 0) return coordinate_range(c.kind, places_[p].shape, levels_.back());
+    CoordinateRange out{estimate(p), estimate(p)};
+    for (std::size_t i = 0; i < levels_.size(); ++i) {
+      const double at_level =
+          std::log(y_[static_cast<Eigen::Index>(i)] / unit_wv(c.kind, c.shape, levels_[i]).value);
+      out.low = std::min(out.low, at_level - kFarBelow);
+      out.high = std::max(out.high, at_level + kFarAbove);
+    }
+    return out;
   }
 
   /// A term of amplitude zero is given one that no level shows yet.
@@ -238,8 +250,13 @@ class Inversion {
     constexpr int kMaxSteps = 40;
     constexpr double kStop = 1e-4;  // beside a chi-square of 3.8
     std::vector<Eigen::Index> free;
+    std::vector<CoordinateRange> ranges;
     for (std::size_t p = 0; p < places_.size(); ++p) {
-      if (p != fixed && component(p).amplitude > 0.0) free.push_back(static_cast<Eigen::Index>(p));
+      if (p == fixed || component(p).amplitude <= 0.0) continue;
+      const double beyond = places_[p].shape < 0 ? kBeyond : 0.0;
+      const CoordinateRange r = range(p);
+      free.push_back(static_cast<Eigen::Index>(p));
+      ranges.push_back({r.low - beyond, r.high + beyond});
     }
     double now = cost(problem, u);
     double damping = 1e-3;
@@ -255,11 +272,8 @@ class Inversion {
         const Eigen::VectorXd move = normal.ldlt().solve(gradient).cwiseMax(-2.0).cwiseMin(2.0);
         Eigen::VectorXd next = u;
         for (std::size_t i = 0; i < free.size(); ++i) {
-          const auto p = static_cast<std::size_t>(free[i]);
-          const CoordinateRange r = range(p);
-          next[free[i]] = std::clamp(u[free[i]] + move[static_cast<Eigen::Index>(i)],
-                                     r.low - (places_[p].shape < 0 ? kFurthest : 0.0),
-                                     r.high + (places_[p].shape < 0 ? kFurthest : 0.0));
+          next[free[i]] =
+              std::clamp(u[free[i]] + move[static_cast<Eigen::Index>(i)], ranges[i].low, ranges[i].high);
         }
         const double trial = cost(problem, next);
         if (trial < now) {
@@ -291,11 +305,15 @@ class Inversion {
 std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p, double sign, double step,
                                       double critical) {
   constexpr int kMaxSteps = 14;
-  constexpr int kMaxRefinements = 6;
-  constexpr double kNear = 0.02;  // of the root of the critical value
+  constexpr int kMaxRefinements = 10;
+  constexpr double kStraight = 3.0;  // critical roots up to which the root is taken for a straight line
+  constexpr double kNear = 0.02;     // of the root of the critical value
   const CoordinateRange range = inversion.range(p);
   const double root_critical = std::sqrt(critical);
-  Eigen::VectorXd others = inversion.start();
+  // A search for the other parameters begins where they were at the last value inside: from beyond the end,
+  // where they may have run off, it would not find back.
+  Eigen::VectorXd others_inside = inversion.start();
+  Eigen::VectorXd others;
   double inside = inversion.estimate(p);
   double inside_root = 0.0;
   double outside = inside;
@@ -305,7 +323,9 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
     if (i > 0) {
       inside = outside;
       inside_root = outside_root;
+      others_inside = others;
     }
+    others = others_inside;
     const double limit = sign > 0.0 ? range.high : range.low;
     if (inside == limit) return std::nullopt;
     outside = sign > 0.0 ? std::min(limit, inside + step) : std::max(limit, inside - step);
@@ -314,8 +334,10 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
   }
   for (int i = 0; i < kMaxRefinements && std::abs(outside_root - root_critical) > kNear * root_critical;
        ++i) {
-    const double share = std::clamp((root_critical - inside_root) / (outside_root - inside_root), 0.1, 0.95);
+    const double beyond = std::min(outside_root, kStraight * root_critical);
+    const double share = std::clamp((root_critical - inside_root) / (beyond - inside_root), 0.1, 0.95);
     const double middle = inside + share * (outside - inside);
+    others = others_inside;
     const double root = std::sqrt(inversion.statistic(p, middle, others));
     if (root >= root_critical) {
       outside = middle;
@@ -323,6 +345,7 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
     } else {
       inside = middle;
       inside_root = root;
+      others_inside = others;
       if (root_critical - root <= kNear * root_critical) return middle;
     }
   }
@@ -337,6 +360,11 @@ std::optional<double> furthest_end(const Candidates& candidates, std::size_t pla
                                    double critical) {
   std::optional<double> furthest;
   for (const Inversion& candidate : candidates) {
+    if (furthest && sign * (*furthest - candidate.estimate(place)) > 0.0) {
+      // One that the test rejects there ends before.
+      Eigen::VectorXd others = candidate.start();
+      if (candidate.statistic(place, *furthest, others) >= critical) continue;
+    }
     const auto end = end_of_interval(candidate, place, sign, step, critical);
     if (!end) return std::nullopt;
     if (!furthest || sign * *end > sign * *furthest) furthest = end;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -37,6 +39,30 @@ std::optional<double> optional_number(const json& object, const char* key) {
   const auto at = object.find(key);
   if (at == object.end() || at->is_null()) return std::nullopt;
   return at->get<double>();
+}
+
+/// A number of a document that anybody may have written.
+std::optional<double> number_if_any(const json& object, const char* key) {
+  const auto at = object.find(key);
+  if (at == object.end() || !at->is_number()) return std::nullopt;
+  return at->get<double>();
+}
+
+/// ", without lines at 21.3, 0.4 Hz"; empty where none were taken out.
+std::string lines_in_words(const json& entry) {
+  std::string words;
+  const auto sinusoids = entry.find("sinusoids");
+  if (sinusoids == entry.end() || !sinusoids->is_array()) return words;
+  for (const json& line : *sinusoids) {
+    const auto parameters = line.is_object() ? line.find("parameters") : line.end();
+    if (parameters == line.end() || !parameters->is_array()) continue;
+    for (const json& p : *parameters) {
+      if (!p.is_object() || p.value("name", json()) != "frequency") continue;
+      if (const auto frequency_hz = number_if_any(p, "value"))
+        words += fmt::format("{} {:.4g}", words.empty() ? ", without lines at" : ",", *frequency_hz);
+    }
+  }
+  return words.empty() ? words : words + " Hz";
 }
 
 /// The component's value that a printed parameter stands for, back in sample terms.
@@ -118,6 +144,7 @@ FitResult read_fit(const json& j) {
     p.sd = optional_number(row, "sd");
     p.ci_low = optional_number(row, "ci_low");
     p.ci_high = optional_number(row, "ci_high");
+    p.spread_sd = optional_number(row, "spread_sd").value_or(0.0);
     fit.parameters.push_back(p);
   }
   fit.model = model_from_parameters(fit);
@@ -189,6 +216,7 @@ json fit_to_json(const FitResult& fit) {
                                  {"sd", number(p.sd)},
                                  {"ci_low", number(p.ci_low)},
                                  {"ci_high", number(p.ci_high)}});
+    if (p.spread_sd > 0.0) out["parameters"].back()["spread_sd"] = number(p.spread_sd);
   }
   for (const double v : fit.covariance) out["covariance"].push_back(number(v));
   if (fit.j_test) {
@@ -199,22 +227,21 @@ json fit_to_json(const FitResult& fit) {
   return out;
 }
 
-nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const std::string& unit, double rate_hz,
-                                 std::size_t levels) {
-  constexpr double kNormal95 = 1.959963984540054;
-  const auto parameter = [](const char* name, const std::string& of_unit, double value, double sd) {
+nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const FitResult& fit,
+                                 const std::string& unit) {
+  const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + fit.confidence));
+  const auto parameter = [z](const char* name, const std::string& of_unit, double value, double sd) {
     return nlohmann::json{{"name", name},
                           {"unit", of_unit},
                           {"value", value},
                           {"sd", sd},
-                          {"ci_low", std::max(0.0, value - kNormal95 * sd)},
-                          {"ci_high", value + kNormal95 * sd}};
+                          {"ci_low", std::max(0.0, value - z * sd)},
+                          {"ci_high", value + z * sd}};
   };
   nlohmann::json out = nlohmann::json::array();
   for (const Line& line : lines) {
     nlohmann::json wv = nlohmann::json::array();
-    for (std::size_t level = 1; level <= levels; ++level)
-      wv.push_back(line_wv(line, rate_hz, static_cast<int>(level)));
+    for (const FittedLevel& level : fit.wv) wv.push_back(line_wv(line, fit.rate_hz, level.observed.level));
     out.push_back({{"process", fmt::format("SIN{}", out.size() + 1)},
                    {"parameters",
                     {parameter("alpha", unit, line.amplitude, line.amplitude_sd),
@@ -227,17 +254,17 @@ nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const std::stri
 std::string fitted_to_words(const json& entry) {
   if (!entry.is_object() || !entry.contains("fitted_to") || !entry.at("fitted_to").is_object()) return {};
   const json& from = entry.at("fitted_to");
-  const auto seconds = optional_number(from, "seconds");
+  const auto seconds = number_if_any(from, "seconds");
   if (!seconds) return {};
   std::string words = fmt::format("{:.6g} s", *seconds);
-  const std::string regime = entry.value("regime", std::string());
-  if (!regime.empty()) words += fmt::format(" of regime {}", regime);
-  if (const auto stretches = optional_number(from, "stretches"))
+  const json regime = entry.value("regime", json());
+  if (regime.is_string() && regime != "") words += fmt::format(" of regime {}", regime.get<std::string>());
+  if (const auto stretches = number_if_any(from, "stretches"))
     words += fmt::format(" in {:.0f} stretch{}", *stretches, *stretches == 1.0 ? "" : "es");
-  const auto begin = optional_number(from, "begin_s");
-  const auto end = optional_number(from, "end_s");
+  const auto begin = number_if_any(from, "begin_s");
+  const auto end = number_if_any(from, "end_s");
   if (begin && end) words += fmt::format(", between {:.1f} s and {:.1f} s of the run", *begin, *end);
-  return words;
+  return words + lines_in_words(entry);
 }
 
 json quantities_to_json(const std::vector<Quantity>& quantities) {

@@ -20,9 +20,9 @@ nlohmann::json wv_to_json(const WaveletVariance& wv, double rate_hz);
 
 /// {"n", "rate_hz", "fitted_to": {"seconds", "stretches"}, "model", "weights", "intervals": "quick" or
 /// "inverted", "confidence", "wv": [.. and "fitted", "model_ci_low", "model_ci_high"],
-///  "parameters": [{"process", "name", "unit", "value", "sd", "ci_low", "ci_high"}], "covariance" (row-major,
-///  of the logarithms), "objective", "model_error", "j_test", "criterion", "identifiable", "simpler_model",
-///  "warnings"}.
+///  "parameters": [{"process", "name", "unit", "value", "sd", "ci_low", "ci_high", and "spread_sd" where
+///  parts of the record differ}], "covariance" (row-major, of the logarithms), "objective", "model_error",
+///  "j_test", "criterion", "identifiable", "simpler_model", "warnings"}.
 nlohmann::json fit_to_json(const FitResult& fit);
 
 /// [{"process", "name", "unit", "value", "ci_low", "ci_high", "known": "fitted", "bound" or "unknown"}].
@@ -30,11 +30,13 @@ nlohmann::json quantities_to_json(const std::vector<Quantity>& quantities);
 
 /// [{"process": "SIN1", "parameters": [alpha, frequency: {"name", "unit", "value", "sd", "ci_low",
 /// "ci_high"}], "wv": what it adds to each level}].
-nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const std::string& unit, double rate_hz,
-                                 std::size_t levels);
+/// @param fit   of what the lines left: rate, levels, confidence
+/// @param unit  of the signal
+nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const FitResult& fit,
+                                 const std::string& unit);
 
 /// What an entry was fitted to, for people: "812 s of regime static in 9 stretches, between 3.0 s and 1805.2
-/// s of the run". Empty where the entry does not say.
+/// s of the run, without lines at 21.3 Hz". Empty where the entry does not say.
 std::string fitted_to_words(const nlohmann::json& entry);
 
 /// Reads what fit_to_json() wrote. Errors (kWork): the field that is missing or of the wrong type.

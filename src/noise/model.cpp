@@ -17,7 +17,8 @@ constexpr const char* kTermsThatExist =
     "terms are QN, WN, MA1, ARMA11, SIN, RES, GM, FN, PL, RW, DR, joined by +, such as WN+2*GM";
 
 bool repeatable(ProcessKind kind) {
-  return kind == ProcessKind::kGaussMarkov || kind == ProcessKind::kSinusoid || kind == ProcessKind::kResonance;
+  return kind == ProcessKind::kGaussMarkov || kind == ProcessKind::kSinusoid ||
+         kind == ProcessKind::kResonance;
 }
 
 std::string without_spaces_upper(std::string_view text) {

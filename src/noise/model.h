@@ -22,7 +22,8 @@ struct ModelSpec {
 };
 
 /// Reads "WN+2*GM", "WN + GM + GM", "QN+WN+RW". At most one each of WN, QN, RW, DR, MA1, ARMA11, FN,
-/// PL; up to kMaxRepeated GM, SIN and RES. Errors (kUsage): an unknown or repeated term, named, with the terms that exist.
+/// PL; up to kMaxRepeated GM, SIN and RES. Errors (kUsage): an unknown or repeated term, named, with the
+/// terms that exist.
 Result<ModelSpec> parse_model(std::string_view text);
 
 inline constexpr int kMaxRepeated = 8;

@@ -54,8 +54,8 @@ class NestedFit {
 /// `problem` without weights.
 SeparableProblem unweighted_problem(const WaveletVariance& wv, const ModelSpec& spec, std::size_t levels);
 
-/// Twice the negative Gaussian log-likelihood of the wavelet variance under the model, in units of the
-/// observed values.
+/// Twice the negative log-likelihood of the wavelet variance under the model, in units of the observed
+/// values; the levels are cubes of Gaussian numbers (N-16).
 double deviance_of(const SeparableProblem& problem, const Model& model, const Eigen::MatrixXd& v);
 
 /// J-test of a model whose sampling covariance is `v`; see j_test().

@@ -9,10 +9,10 @@
 namespace imuscope::noise {
 
 enum class ParameterScale : std::uint8_t {
-  kLog,       ///< variances and rates
-  kLogSquare, ///< printed as the root of an amplitude: omega, alpha, B
-  kAtanh,     ///< in (-1, 1): theta, phi
-  kAboutOne,  ///< in (0, 2): exponent
+  kLog,        ///< variances and rates
+  kLogSquare,  ///< printed as the root of an amplitude: omega, alpha, B
+  kAtanh,      ///< in (-1, 1): theta, phi
+  kAboutOne,   ///< in (0, 2): exponent
 };
 
 inline ParameterScale parameter_scale_of(std::string_view name) noexcept {
@@ -26,7 +26,8 @@ inline bool is_logarithmic(ParameterScale scale) noexcept {
   return scale == ParameterScale::kLog || scale == ParameterScale::kLogSquare;
 }
 
-/// The place of a printed value on its scale, which is that of the covariance (of roots the square's logarithm).
+/// The place of a printed value on its scale, which is that of the covariance (of roots the square's
+/// logarithm).
 inline double to_scale(ParameterScale scale, double value) noexcept {
   switch (scale) {
     case ParameterScale::kAtanh:

@@ -14,7 +14,8 @@ constexpr int kRates = 10;        // the slowest: 2 / 8^9 a sample, 2^26 samples
 std::vector<Component> unit_sum(const Component& power_law) {
   std::vector<Component> terms{{ProcessKind::kWhiteNoise, 0.0, {}}};
   double rate = kFastest;
-  for (int i = 0; i < kRates; ++i, rate /= kFactor) terms.push_back({ProcessKind::kGaussMarkov, 0.0, {rate, 0.0}});
+  for (int i = 0; i < kRates; ++i, rate /= kFactor)
+    terms.push_back({ProcessKind::kGaussMarkov, 0.0, {rate, 0.0}});
   terms.push_back({ProcessKind::kRandomWalk, 0.0, {}});
   // Relative deviations: every level counts alike.
   Design columns(kLevels, static_cast<Eigen::Index>(terms.size()));
@@ -22,8 +23,8 @@ std::vector<Component> unit_sum(const Component& power_law) {
   for (Eigen::Index c = 0; c < columns.cols(); ++c) {
     const Component& term = terms[static_cast<std::size_t>(c)];
     for (int level = 1; level <= kLevels; ++level) {
-      columns(level - 1, c) = unit_wv(term.kind, term.shape, level).value /
-                              unit_wv(power_law.kind, power_law.shape, level).value;
+      columns(level - 1, c) =
+          unit_wv(term.kind, term.shape, level).value / unit_wv(power_law.kind, power_law.shape, level).value;
     }
     length[c] = columns.col(c).norm();
     columns.col(c) /= length[c];

@@ -134,8 +134,8 @@ CurvePoint sinusoid(double b, double n) noexcept {
 
 using Complex = std::complex<double>;
 
-/// N-6 for a complex rate s, z = exp(-s): the curve and its derivative by s. Of small n |s| the numerator is summed as
-/// the series of series_numerator(), which holds for complex s as well.
+/// N-6 for a complex rate s, z = exp(-s): the curve and its derivative by s. Of small n |s| the numerator is
+/// summed as the series of series_numerator(), which holds for complex s as well.
 struct ComplexCurve {
   Complex value;
   Complex slope;
@@ -174,12 +174,13 @@ ComplexCurve complex_exponential_wv(Complex s, double n) {
   return {value, d_numerator / denominator - value * 2.0 * z / one_less};
 }
 
-/// ln of Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) over m^(2x), by Stirling's series in 1/m^2; m >= kStirlingFrom.
+/// ln of Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) over m^(2x), by Stirling's series in 1/m^2; m >=
+/// kStirlingFrom.
 constexpr double kStirlingFrom = 40.0;
 
 double log_gamma_ratio_rest(double x, double m) {
-  // - sum over odd k >= 3 of 2 B_k(1/2 + x) / (k (k-1) m^(k-1)), as Bernoulli polynomials at 1/2 + x are odd in x there
-  // (DLMF 5.11.8).
+  // - sum over odd k >= 3 of 2 B_k(1/2 + x) / (k (k-1) m^(k-1)), as Bernoulli polynomials at 1/2 + x are odd
+  // in x there (DLMF 5.11.8).
   const double x2 = x * x;
   const double b3 = x * (x2 - 0.25);
   const double b5 = x * (x2 * x2 - 5.0 / 6.0 * x2 + 7.0 / 48.0);
@@ -188,8 +189,8 @@ double log_gamma_ratio_rest(double x, double m) {
   return -r * (b3 / 3.0 + r * (b5 / 10.0 + r * b7 / 21.0));
 }
 
-/// ln[Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) / (m^2 - 1/4)], which is zero at x = 1, in terms that all vanish there; x =
-/// 1 + off, m a whole number >= 0. Small m is led up to large by Gamma(u + 1) = u Gamma(u).
+/// ln[Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) / (m^2 - 1/4)], which is zero at x = 1, in terms that all
+/// vanish there; x = 1 + off, m a whole number >= 0. Small m is led up to large by Gamma(u + 1) = u Gamma(u).
 double power_law_exponent(double off, double m) {
   double sum = 0.0;
   for (; m < kStirlingFrom; m += 1.0) {
@@ -285,8 +286,8 @@ CurvePoint resonance_wv(double a, double b, int level) noexcept {
 }
 
 double power_law_sum_covariance(double alpha, double m) noexcept {
-  // Gamma(m + D) / Gamma(m + 1 - D) / (2 cos(pi D) Gamma(2D)), D = 1 + alpha / 2 = 3/2 + off. At alpha = 1 the cosine is
-  // zero and the ratio a square of m, which is taken out beforehand.
+  // Gamma(m + D) / Gamma(m + 1 - D) / (2 cos(pi D) Gamma(2D)), D = 1 + alpha / 2 = 3/2 + off. At alpha = 1
+  // the cosine is zero and the ratio a square of m, which is taken out beforehand.
   const double off = 0.5 * (alpha - 1.0);  // D - 3/2
   const double gamma = std::tgamma(2.0 + alpha);
   const double square = m * m - 0.25;
@@ -309,7 +310,8 @@ double power_law_value(double alpha, double n) {
 double flicker_wv(int level) {
   static const std::array<double, kMaxLevel> kCurve = [] {
     std::array<double, kMaxLevel> curve{};
-    for (int j = 1; j <= kMaxLevel; ++j) curve[static_cast<std::size_t>(j - 1)] = power_law_value(1.0, half_support(j));
+    for (int j = 1; j <= kMaxLevel; ++j)
+      curve[static_cast<std::size_t>(j - 1)] = power_law_value(1.0, half_support(j));
     return curve;
   }();
   return kCurve[static_cast<std::size_t>(level - 1)];
@@ -322,7 +324,8 @@ CurvePoint power_law_wv(double alpha, int level) noexcept {
   const double n = half_support(level);
   constexpr double kStep = 1e-4;  // a central difference: exact to 1e-8 of the curve
   const double step = std::min({kStep, 0.5 * alpha, 0.5 * (2.0 - alpha)});
-  return {power_law_value(alpha, n), {(power_law_value(alpha + step, n) - power_law_value(alpha - step, n)) / (2.0 * step), 0.0}};
+  return {power_law_value(alpha, n),
+          {(power_law_value(alpha + step, n) - power_law_value(alpha - step, n)) / (2.0 * step), 0.0}};
 }
 
 CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {

@@ -28,7 +28,9 @@ double sheet_factor(SignalUnit unit) { return si_factor(unit) * (is_gyro(unit) ?
 
 class Builder {
  public:
-  Builder(const FitResult& fit, SignalUnit unit) : fit_(fit), unit_(unit), u_(unit_name(unit)) {
+  /// @param over_bounding  amplitudes are bounds as they stand
+  Builder(const FitResult& fit, SignalUnit unit, bool over_bounding)
+      : fit_(fit), unit_(unit), over_bounding_(over_bounding), u_(unit_name(unit)) {
     if (u_.empty()) u_ = "unit";
   }
 
@@ -44,17 +46,25 @@ class Builder {
   void add(const ParameterEstimate& p, std::string name, std::string unit, double factor, double power) {
     const auto map = [&](double v) { return factor * std::pow(v, power); };
     Quantity q{p.process, std::move(name), std::move(unit), map(p.value), std::nullopt, std::nullopt};
-    if (p.ci_low && p.ci_high) {
+    if (over_bounding_) {
+      if (p.name != "beta") make_bound(q);
+    } else if (p.ci_low && p.ci_high) {
       q.ci_low = std::min(map(*p.ci_low), map(*p.ci_high));
       q.ci_high = std::max(map(*p.ci_low), map(*p.ci_high));
     } else if (const Felt most = amplitude_of(p); most.knowledge == Knowledge::kBound) {
-      q.value = map(parameter_scale_of(p.name) == ParameterScale::kLogSquare ? std::sqrt(most.value) : most.value);
-      q.ci_high = q.value;
-      q.knowledge = Knowledge::kBound;
+      q.value =
+          map(parameter_scale_of(p.name) == ParameterScale::kLogSquare ? std::sqrt(most.value) : most.value);
+      make_bound(q);
     } else {
       q.knowledge = Knowledge::kUnknown;
     }
     out_.push_back(std::move(q));
+  }
+
+  static void make_bound(Quantity& q) {
+    q.ci_low.reset();
+    q.ci_high = q.value;
+    q.knowledge = Knowledge::kBound;
   }
 
   /// What the data tell of a parameter that is an amplitude of its own.
@@ -101,7 +111,10 @@ class Builder {
     if (at > 0) gradient[at - 1] = 1.0;
     Quantity q{p.process, "driving density", fmt::format("({})^2 Hz", u_), 2.0 * beta_ * p.value, {}, {}};
     set_interval(q, gradient);
-    if (!q.ci_low) q.knowledge = Knowledge::kUnknown;
+    if (over_bounding_)
+      make_bound(q);
+    else if (!q.ci_low)
+      q.knowledge = Knowledge::kUnknown;
     out_.push_back(std::move(q));
   }
 
@@ -125,7 +138,9 @@ class Builder {
 
   void add_white_noise_of_all() {
     if (unit_ == SignalUnit::kNone || fit_.model.components.empty()) return;
-    const Felt white = felt_white_density(fit_, {});
+    const double over_bounding = white_density(fit_.model, fit_.rate_hz, {});
+    const Felt white = over_bounding_ ? Felt{over_bounding, over_bounding, 0.0, Knowledge::kBound}
+                                      : felt_white_density(fit_, {});
     const double sheet = sheet_factor(unit_) * kSqrtSecondsPerHour;
     const bool gyro = is_gyro(unit_);
     Quantity q{"model",
@@ -156,16 +171,16 @@ class Builder {
       set_interval(q, slope.row(0).transpose() / (2.0 * smallest->fitted));
     }
     // Beyond the last level it may fall further.
-    if (smallest + 1 == fit_.wv.end()) {
-      q.knowledge = Knowledge::kBound;
+    if (over_bounding_ || smallest + 1 == fit_.wv.end()) {
       q.value = q.ci_high.value_or(q.value);
-      q.ci_low.reset();
+      make_bound(q);
     }
     out_.push_back(std::move(q));
   }
 
   const FitResult& fit_;
   SignalUnit unit_;
+  bool over_bounding_;
   std::string u_;
   double beta_ = 0.0;
   std::vector<Quantity> out_;
@@ -195,7 +210,11 @@ std::string_view unit_name(SignalUnit unit) noexcept {
 }
 
 std::vector<Quantity> filter_quantities(const FitResult& fit, SignalUnit unit) {
-  return Builder(fit, unit).build();
+  return Builder(fit, unit, false).build();
+}
+
+std::vector<Quantity> over_bounding_quantities(const FitResult& bound, SignalUnit unit) {
+  return Builder(bound, unit, true).build();
 }
 
 }  // namespace imuscope::noise

@@ -49,4 +49,8 @@ struct Quantity {
 /// Data-sheet names appear with a known unit only.
 std::vector<Quantity> filter_quantities(const FitResult& fit, SignalUnit unit);
 
+/// The same of over_bounding() (conservative.h): what its larger amplitudes make, each a bound; correlation
+/// times as fitted.
+std::vector<Quantity> over_bounding_quantities(const FitResult& bound, SignalUnit unit);
+
 }  // namespace imuscope::noise

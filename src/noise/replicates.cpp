@@ -106,6 +106,26 @@ Spread spread_of(const FitResult& pooled, std::span<const WaveletVariance> repli
   return out;
 }
 
+namespace {
+
+/// Gives parameter p this sd on the scale of its interval where its own is smaller.
+void widen(FitResult& fit, std::size_t p, double sd) {
+  ParameterEstimate& parameter = fit.parameters[p];
+  const std::size_t size = fit.parameters.size();
+  if (fit.covariance.size() != size * size) return;
+  const double own = std::sqrt(fit.covariance[p * size + p]);
+  if (!(sd > own)) return;
+  parameter.spread_sd = std::sqrt(sd * sd - own * own);
+  if (parameter.sd) *parameter.sd *= sd / own;
+  if (parameter.log_sd) *parameter.log_sd *= sd / own;
+  for (std::size_t k = 0; k < size; ++k) {
+    fit.covariance[p * size + k] *= sd / own;
+    fit.covariance[k * size + p] *= sd / own;
+  }
+}
+
+}  // namespace
+
 void contain_spread(FitResult& pooled, const Spread& spread) {
   for (std::size_t p = 0; p < pooled.parameters.size(); ++p) {
     const auto& effects = spread.of_parameters[p];
@@ -113,6 +133,7 @@ void contain_spread(FitResult& pooled, const Spread& spread) {
     ParameterEstimate& parameter = pooled.parameters[p];
     parameter.ci_low = from_interval_scale(parameter, effects->ci_low);
     parameter.ci_high = from_interval_scale(parameter, effects->ci_high);
+    widen(pooled, p, effects->sd);
   }
 }
 

@@ -29,7 +29,8 @@ struct Spread {
 /// @param pooled  fitted to all replicates together
 Spread spread_of(const FitResult& pooled, std::span<const WaveletVariance> replicates);
 
-/// The pooled intervals become those of the mean of all such replicates, and contain their spread.
+/// The pooled intervals become those of the mean of all such replicates and contain their spread. So do sd
+/// and covariance, which comparisons and exports are made with.
 void contain_spread(FitResult& pooled, const Spread& spread);
 
 /// One model fitted to all replicates, and to each alone.

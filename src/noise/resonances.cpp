@@ -70,8 +70,8 @@ double half_height(const std::vector<double>& y, std::size_t peak, double floor_
 
 }  // namespace
 
-std::vector<Resonance> find_resonances(std::span<const double> x, std::span<const std::uint8_t> mask, double rate_hz,
-                                       double false_alarm) {
+std::vector<Resonance> find_resonances(std::span<const double> x, std::span<const std::uint8_t> mask,
+                                       double rate_hz, double false_alarm) {
   const Present present(x, mask);
   if (x.size() < kSegment) return {};
   const Spectrum spectrum = spectrum_of(x, present, kSegment);
@@ -91,8 +91,8 @@ std::vector<Resonance> find_resonances(std::span<const double> x, std::span<cons
     const double height = y[k] - floor_log;
     // Peak and feet are the extremes of some thirty places each.
     const double z = height / (std::sqrt(2.0) * s.sd);
-    const double p = std::min(1.0, static_cast<double>(y.size() * y.size()) *
-                                       boost::math::cdf(boost::math::complement(normal, z)));
+    const double p = std::min(
+        1.0, static_cast<double>(y.size() * y.size()) * boost::math::cdf(boost::math::complement(normal, z)));
     if (p > false_alarm || height < std::log(kLeastHeight)) continue;
     Resonance r;
     r.frequency_hz = static_cast<double>(k + kFirstBin) * bin_hz;
@@ -101,7 +101,8 @@ std::vector<Resonance> find_resonances(std::span<const double> x, std::span<cons
     r.p_value = p;
     double power = 0.0;
     for (std::size_t i = left; i <= right; ++i) {
-      const double share = right > left ? static_cast<double>(i - left) / static_cast<double>(right - left) : 0.0;
+      const double share =
+          right > left ? static_cast<double>(i - left) / static_cast<double>(right - left) : 0.0;
       const double below = std::exp(y[left] + share * (y[right] - y[left]));
       power += std::max(0.0, std::exp(y[i]) - below) * bin_hz;
     }
@@ -112,14 +113,16 @@ std::vector<Resonance> find_resonances(std::span<const double> x, std::span<cons
   return found;
 }
 
-std::optional<double> low_pass_hz(std::span<const double> x, std::span<const std::uint8_t> mask, double rate_hz) {
+std::optional<double> low_pass_hz(std::span<const double> x, std::span<const std::uint8_t> mask,
+                                  double rate_hz) {
   const Present present(x, mask);
   if (x.size() < kSegment) return std::nullopt;
   const Spectrum spectrum = spectrum_of(x, present, kSegment);
   constexpr std::size_t kFewest = 20;
   if (spectrum.segments < kFewest) return std::nullopt;
   const std::vector<double> y = smoothed(spectrum, rate_hz).log_density;
-  // The plateau: the median of the second to sixth tenth, which neither slow noise nor the end of the band reaches.
+  // The plateau: the median of the second to sixth tenth, which neither slow noise nor the end of the band
+  // reaches.
   std::vector<double> middle(y.begin() + static_cast<std::ptrdiff_t>(y.size() / 10),
                              y.begin() + static_cast<std::ptrdiff_t>(y.size() * 6 / 10));
   const auto at = middle.begin() + static_cast<std::ptrdiff_t>(middle.size() / 2);
@@ -134,8 +137,8 @@ std::optional<double> low_pass_hz(std::span<const double> x, std::span<const std
 }
 
 std::string in_words(const Resonance& r, std::string_view unit) {
-  return fmt::format("a resonance at {:.3g} Hz, {:.2g} Hz wide, {:.2g} {} rms, {:.2g} times the floor", r.frequency_hz,
-                     r.width_hz, r.rms, unit, r.height);
+  return fmt::format("a resonance at {:.3g} Hz, {:.2g} Hz wide, {:.2g} {} rms, {:.2g} times the floor",
+                     r.frequency_hz, r.width_hz, r.rms, unit, r.height);
 }
 
 }  // namespace imuscope::noise

@@ -79,26 +79,54 @@ void apply_parsimony(std::vector<RankedModel>& ranked) {
 /// Grows and prunes one model.
 class Grower {
  public:
-  Grower(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz, const FitOptions& options)
-      : terms_(terms), rate_hz_(rate_hz), options_(options), wv_(wv), models_(wv, fitted_levels(wv, options)) {
+  Grower(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
+         const FitOptions& options)
+      : terms_(terms),
+        rate_hz_(rate_hz),
+        options_(options),
+        wv_(wv),
+        models_(wv, fitted_levels(wv, options)) {
     options_.intervals = Intervals::kQuick;
   }
 
-  Result<FitResult> run() {
+  Result<GrownModel> run() {
     for (const ProcessKind kind : terms_) consider(ModelSpec{{kind}}, 0.0);
     if (!best_) return tl::unexpected(why_none_);
+    // White noise and one more are what most sensors show, and no step of one term may lead there.
+    for (const ProcessKind kind : terms_) {
+      if (kind != ProcessKind::kWhiteNoise)
+        consider(ModelSpec{{ProcessKind::kWhiteNoise, kind}}, kEquivalent);
+    }
     while (add_one()) {
     }
-    while (drop_one()) {
-    }
-    return *best_;
+    do {
+      while (drop_one()) {
+      }
+    } while (exchange_one());
+    return GrownModel{*best_, rivals()};
   }
 
  private:
   static constexpr int kMostAlike = 3;
+  static constexpr std::size_t kMostRivals = 4;
+
+  /// Models that were tried and are as good as the best.
+  [[nodiscard]] std::vector<FitResult> rivals() const {
+    std::vector<FitResult> out;
+    for (const auto& [name, fitted] : tried_) {
+      if (name != best_->spec.name() && is_rejected(fitted) == is_rejected(*best_) && fitted.criterion < best_->criterion + kEquivalent)
+        out.push_back(fitted);
+    }
+    std::stable_sort(out.begin(), out.end(),
+                     [](const FitResult& a, const FitResult& b) { return a.criterion < b.criterion; });
+    if (out.size() > kMostRivals) out.resize(kMostRivals);
+    return out;
+  }
+
 
   /// Takes the model where it is better than the best by `margin`.
-  /// @param added  the kind that it has more than the best; fast or steep ones that get no amplitude are not tried again
+  /// @param added  the kind that it has more than the best; fast or steep ones that get no amplitude are not
+  /// tried again
   bool consider(ModelSpec spec, double margin, std::optional<ProcessKind> added = std::nullopt) {
     std::sort(spec.processes.begin(), spec.processes.end());
     auto fitted = fit(wv_, spec, rate_hz_, options_, models_);
@@ -106,9 +134,11 @@ class Grower {
       why_none_ = fitted.error();
       return false;
     }
-    if (added && is_fast_or_steep(*added) && std::any_of(fitted->model.components.begin(), fitted->model.components.end(),
-                             [&](const Component& c) { return c.kind == *added && c.amplitude <= 0.0; }))
+    if (added && is_fast_or_steep(*added) &&
+        std::any_of(fitted->model.components.begin(), fitted->model.components.end(),
+                    [&](const Component& c) { return c.kind == *added && c.amplitude <= 0.0; }))
       unsupported_.insert(*added);
+    tried_[fitted->spec.name()] = *fitted;
     const bool is_better = !best_ || (is_rejected(*fitted) != is_rejected(*best_)
                                           ? is_rejected(*best_)
                                           : fitted->criterion < best_->criterion - margin);
@@ -116,9 +146,11 @@ class Grower {
     return is_better;
   }
 
-  /// White noise, quantization and a ramp stand at the ends of the scales: what is added later leaves even less to them.
+  /// White noise, quantization and a ramp stand at the ends of the scales: what is added later leaves even
+  /// less to them.
   static bool is_fast_or_steep(ProcessKind kind) {
-    return kind == ProcessKind::kWhiteNoise || kind == ProcessKind::kQuantization || kind == ProcessKind::kRamp;
+    return kind == ProcessKind::kWhiteNoise || kind == ProcessKind::kQuantization ||
+           kind == ProcessKind::kRamp;
   }
 
   bool add_one() {
@@ -153,12 +185,30 @@ class Grower {
     return false;
   }
 
+  /// Another process in the place of one, where the model is likelier by it with no more parameters.
+  bool exchange_one() {
+    const ModelSpec base = best_->spec;
+    for (std::size_t i = 0; i < base.processes.size(); ++i) {
+      for (const ProcessKind kind : terms_) {
+        const bool alike =
+            kind == base.processes[i] || (kind != ProcessKind::kGaussMarkov && base.count(kind) > 0);
+        if (alike || base.count(kind) >= kMostAlike) continue;
+        ModelSpec other = base;
+        other.processes[i] = kind;
+        const double margin = other.parameter_count() > base.parameter_count() ? kEquivalent : 0.0;
+        if (consider(std::move(other), margin)) return true;
+      }
+    }
+    return false;
+  }
+
   std::span<const ProcessKind> terms_;
   double rate_hz_;
   FitOptions options_;
   const WaveletVariance& wv_;
   NestedFit models_;
   std::set<ProcessKind> unsupported_;
+  std::map<std::string, FitResult> tried_;
   std::optional<FitResult> best_;
   Error why_none_;
 };
@@ -264,13 +314,16 @@ Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const Mo
   return ranked;
 }
 
-Result<FitResult> grow_model(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
-                             const FitOptions& options) {
+Result<GrownModel> grow_model(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
+                              const FitOptions& options) {
   auto grown = Grower(wv, terms, rate_hz, options).run();
   if (!grown || options.intervals == Intervals::kQuick) return grown;
   FitOptions again = options;
-  again.warm_start = &*grown;
-  return fit(wv, grown->spec, rate_hz, again);
+  again.warm_start = &grown->best;
+  auto best = fit(wv, grown->best.spec, rate_hz, again);
+  if (!best) return tl::unexpected(best.error());
+  grown->best = std::move(*best);
+  return grown;
 }
 
 Result<std::vector<CrossValidated>> cross_validate(std::span<const WaveletVariance> replicates,

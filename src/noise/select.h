@@ -21,17 +21,25 @@ struct RankedModel {
 };
 
 /// Sub-models of `full` with at least one term, best first. Identifiable models come before the others; of
-/// two whose criteria differ by less than 2 the one with fewer parameters comes first.
+/// two whose criteria differ by less than 4 the one with fewer parameters comes first.
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options = {});
 
-/// Term by term: from the best single process on, each round adds the one of `terms` that gains most, while the criterion
-/// falls by more than two models' as good as each other may differ (or the data reject what there is); in the end, terms
-/// without which it is as good go again. A few dozen fits where rank_models() makes all sub-models.
+/// A model and those that the record takes for as good: what is said of the sensor has to hold for them, too.
+struct GrownModel {
+  FitResult best;
+  std::vector<FitResult> rivals;  ///< with quick intervals, the likeliest first, at most four
+};
+
+/// Term by term: from the best single process, or white noise and one more, on, each round adds the one of
+/// `terms` that gains most, while the criterion falls by more than two models' as good as each other may
+/// differ (or the data reject what there is); in the end terms without which it is as good go again, and
+/// others take the places of those that explain less. A few dozen fits where rank_models() makes all
+/// sub-models.
 /// @param terms  what may be added, a GM up to three times, the others once; not empty
 /// @return the winner, with `options.intervals`. Errors: those of fit() where not even one process fits.
-Result<FitResult> grow_model(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
-                             const FitOptions& options = {});
+Result<GrownModel> grow_model(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
+                              const FitOptions& options = {});
 
 /// A sub-model, and how well it predicts replicates that it has not seen.
 struct CrossValidated {

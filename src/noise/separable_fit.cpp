@@ -368,13 +368,15 @@ std::optional<double> middle_of_bounded(ProcessKind kind) {
 /// model, the last that can be repeated.
 std::optional<ProcessKind> removable_kind(const ModelSpec& spec, bool on_grid) {
   const int kept = on_grid ? 1 : 0;
-  for (const ProcessKind kind : {ProcessKind::kResonance, ProcessKind::kGaussMarkov, ProcessKind::kSinusoid}) {
+  for (const ProcessKind kind :
+       {ProcessKind::kResonance, ProcessKind::kGaussMarkov, ProcessKind::kSinusoid}) {
     if (spec.count(kind) > kept) return kind;
   }
   return std::nullopt;
 }
 
-/// Shapes of a further term from which the search for its own begins, the slowest first. ARMA11 begins as white noise.
+/// Shapes of a further term from which the search for its own begins, the slowest first. ARMA11 begins as
+/// white noise.
 std::vector<Shape> tried_shapes(ProcessKind kind, int highest_level) {
   constexpr int kRates = 40;
   constexpr int kDampings = 5;

@@ -12,8 +12,8 @@
 
 namespace imuscope::noise {
 
-/// Interval of a search coordinate: log of a GM's a, of a SIN's b, of both of a RES, atanh of theta and phi and of a PL's
-/// exponent less one.
+/// Interval of a search coordinate: log of a GM's a, of a SIN's b, of both of a RES, atanh of theta and phi
+/// and of a PL's exponent less one.
 struct CoordinateRange {
   double low = 0.0;
   double high = 0.0;

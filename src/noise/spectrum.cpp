@@ -91,7 +91,8 @@ double density_at(const Spectrum& spectrum, std::size_t bin, double rate_hz) {
 
 std::vector<DensityPoint> density_of(std::span<const double> x, const Present& present, double rate_hz,
                                      double confidence, int points_per_octave, std::size_t shortest) {
-  // From this bin on a segment's spectrum is not bent by what leaks from below; longer segments take over there.
+  // From this bin on a segment's spectrum is not bent by what leaks from below; longer segments take over
+  // there.
   constexpr std::size_t kFirstBin = 8;
   constexpr std::size_t kLonger = 4;
   const double tail = 0.5 * (1.0 - confidence);
@@ -105,7 +106,8 @@ std::vector<DensityPoint> density_of(std::span<const double> x, const Present& p
     const double dof_of_bin = degrees_of_freedom(static_cast<double>(spectrum.segments));
     std::size_t high = last;
     while (high >= first) {
-      auto low = static_cast<std::size_t>(std::floor(static_cast<double>(high) * std::exp2(-1.0 / points_per_octave)));
+      auto low = static_cast<std::size_t>(
+          std::floor(static_cast<double>(high) * std::exp2(-1.0 / points_per_octave)));
       low = std::max(low + 1, first);
       low = std::min(low, high);
       double sum = 0.0;
@@ -115,8 +117,7 @@ std::vector<DensityPoint> density_of(std::span<const double> x, const Present& p
       constexpr double kIndependent = 1.5;
       const double dof = dof_of_bin * std::max(1.0, bins / kIndependent);
       DensityPoint point;
-      point.frequency_hz =
-          0.5 * static_cast<double>(low + high) * rate_hz / static_cast<double>(length);
+      point.frequency_hz = 0.5 * static_cast<double>(low + high) * rate_hz / static_cast<double>(length);
       point.density = sum / bins;
       point.ci_low = point.density * dof / chi_squared_quantile(dof, 1.0 - tail);
       point.ci_high = point.density * dof / chi_squared_quantile(dof, tail);

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Welch's mean periodogram of a signal with missing samples: what lines and resonances are looked for in, and what is
-/// drawn beside a wavelet variance (N-23).
+/// Welch's mean periodogram of a signal with missing samples: what lines and resonances are looked for in,
+/// and what is drawn beside a wavelet variance (N-23).
 
 #include <cstdint>
 #include <span>
@@ -18,7 +18,9 @@ class Present {
 
   [[nodiscard]] const std::vector<Segment>& runs() const { return runs_; }
   [[nodiscard]] bool at(std::size_t i) const { return before_[i + 1] > before_[i]; }
-  [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const { return before_[end] - before_[begin]; }
+  [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
+    return before_[end] - before_[begin];
+  }
 
   /// Where segments of `length` begin, half overlapping, of which at most an eighth is missing.
   [[nodiscard]] std::vector<std::size_t> segments(std::size_t length) const;
@@ -35,8 +37,8 @@ struct Spectrum {
   std::size_t segments = 0;
 };
 
-/// A missing sample counts as the segment's mean; what the window loses by that is made up for, so that a line keeps its
-/// amplitude.
+/// A missing sample counts as the segment's mean; what the window loses by that is made up for, so that a
+/// line keeps its amplitude.
 Spectrum spectrum_of(std::span<const double> x, const Present& present, std::size_t length);
 
 /// Degrees of freedom of a bin: Hann windows that overlap by half (Welch 1967), 36 K^2 / (19 K - 1).
@@ -50,8 +52,8 @@ struct DensityPoint {
   double ci_high = 0.0;
 };
 
-/// Density over the whole range that the record tells, equally dense on a logarithmic scale: short segments for what is
-/// fast, longer ones below. Empty for a signal without a segment of `shortest` samples.
+/// Density over the whole range that the record tells, equally dense on a logarithmic scale: short segments
+/// for what is fast, longer ones below. Empty for a signal without a segment of `shortest` samples.
 std::vector<DensityPoint> density_of(std::span<const double> x, const Present& present, double rate_hz,
                                      double confidence = 0.95, int points_per_octave = 8,
                                      std::size_t shortest = 256);

@@ -109,11 +109,14 @@ std::optional<TailTest> test_tails(std::span<const double> x, const WvOptions& o
 std::optional<std::string> spike_warning(const std::optional<TailTest>& test, double rate_hz) {
   // Fewer large values than a Gaussian signal has are no spikes.
   if (!test || test->p_value >= kSpikesBelow || test->excess <= 0.0) return std::nullopt;
+  constexpr double kFactorsFrom = 5.0;
+  const std::string by_how_much = test->excess < kFactorsFrom
+                                      ? fmt::format("lies {:.3g} % above", 100.0 * test->excess)
+                                      : fmt::format("is {:.3g} times", 1.0 + test->excess);
   return fmt::format(
-      "spikes, or noise that changes: at {:.3g} s the wavelet variance lies {:.2g} % above a robust one "
-      "(chance "
-      "{:.2g}), so that the model and its intervals hold them; `fit --robust` gives the noise without them",
-      std::ldexp(1.0, test->level) / rate_hz, 100.0 * test->excess, test->p_value);
+      "spikes, or noise that changes: at {:.3g} s the wavelet variance {} a robust one (chance {:.2g}), so "
+      "that the model and its intervals hold them; `fit --robust` gives the noise without them",
+      std::ldexp(1.0, test->level) / rate_hz, by_how_much, test->p_value);
 }
 
 }  // namespace imuscope::noise

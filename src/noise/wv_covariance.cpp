@@ -22,10 +22,10 @@ constexpr std::array<double, 3> kDifference{1.0, -2.0, 1.0};
 struct Exponential {
   double a = 0.0;
   double variance = 0.0;
-  double phi = 0.0;     ///< used for negative phi, where a has no meaning
-  double gain = 0.0;    ///< phi / (1 - phi)^2
-  double linear = 0.0;  ///< (1 + phi) / (2 (1 - phi))
-  double rest = 0.0;    ///< a gain - linear, without cancellation
+  double phi = 0.0;             ///< used for negative phi, where a has no meaning
+  double gain = 0.0;            ///< phi / (1 - phi)^2
+  double linear = 0.0;          ///< (1 + phi) / (2 (1 - phi))
+  double rest = 0.0;            ///< a gain - linear, without cancellation
   bool is_approximate = false;  ///< one of those that stand for a power law
 };
 
@@ -33,9 +33,9 @@ using Complex = std::complex<double>;
 
 /// A resonance: the real part of an exponential whose rate and variance are complex (N-37).
 struct Oscillation {
-  Complex rate;      ///< a - i b
-  Complex variance;  ///< sigma2 (1 - i a/b)
-  Complex gain;      ///< of Exponential
+  Complex rate;         ///< a - i b
+  Complex variance;     ///< sigma2 (1 - i a/b)
+  Complex gain;         ///< of Exponential
   double linear = 0.0;  ///< Re(variance linear)
 };
 
@@ -267,7 +267,8 @@ class CrossCovariance {
       const double m = std::abs(h + shift_[i]);
       double g = m * (parts_.walk * (m * m - 1.0) / 12.0 - 0.5 * parts_.white);
       for (std::size_t k = 0; k < terms_.size(); ++k) g += m * linear_coefficient(k);
-      for (const Oscillation& o : parts_.oscillations) g -= m * o.linear + (o.variance * o.gain * decayed(o.rate * m)).real();
+      for (const Oscillation& o : parts_.oscillations)
+        g -= m * o.linear + (o.variance * o.gain * decayed(o.rate * m)).real();
       if (m == 0.0) g += parts_.quantization;
       sum += weight_[i] * g;
     }
@@ -682,9 +683,9 @@ Parts with_missing(const Parts& parts, const WvLevel& j, const WvLevel& k) {
   return out;
 }
 
-/// What acts like a simpler process on both levels becomes that, where the model is approximate or the difference small: of
-/// the processes that stand for a power law, those that are a random walk to both levels, or white noise to both,
-/// become just that: to within what the sum itself deviates by.
+/// What acts like a simpler process on both levels becomes that, where the model is approximate or the
+/// difference small: of the processes that stand for a power law, those that are a random walk to both
+/// levels, or white noise to both, become just that: to within what the sum itself deviates by.
 Parts folded(Parts parts, double n_j, double n_k) {
   constexpr double kWalk = 0.02;  // of a n: 2 sigma2 (1 - e^{-a n}) is a walk's growth to a hundredth
   constexpr double kWhite = 50.0;
@@ -697,10 +698,11 @@ Parts folded(Parts parts, double n_j, double n_k) {
     return is_walk || is_white;
   });
   // A resonance that rings many times within both supports is white noise to them but for a few lags.
-  constexpr double kRung = 60.0;   // radians
+  constexpr double kRung = 60.0;  // radians
   constexpr double kFaded = 8.0;  // time constants
   std::erase_if(parts.oscillations, [&](const Oscillation& o) {
-    if (std::abs(o.rate) * std::min(n_j, n_k) < kRung || o.rate.real() * std::min(n_j, n_k) < kFaded) return false;
+    if (std::abs(o.rate) * std::min(n_j, n_k) < kRung || o.rate.real() * std::min(n_j, n_k) < kFaded)
+      return false;
     parts.white += 2.0 * o.linear;
     return true;
   });

@@ -38,8 +38,8 @@ double shown_axis_unit(const json& axis, std::string& unit) {
 GnuplotScript allan_block(const GnuplotScript& name, const json& axis, double factor) {
   auto block = GnuplotScript::of("${} << EOD\n", name);
   for (const auto& p : field(axis, "allan")) {
-    block.add("{} {} {} {} {}\n", shown(p, "tau_s"), shown(p, "deviation", factor), shown(p, "ci_low", factor),
-              shown(p, "ci_high", factor), shown(p, "model", factor));
+    block.add("{} {} {} {} {}\n", shown(p, "tau_s"), shown(p, "deviation", factor),
+              shown(p, "ci_low", factor), shown(p, "ci_high", factor), shown(p, "model", factor));
   }
   return block.add("EOD\n");
 }
@@ -48,8 +48,8 @@ GnuplotScript density_block(const GnuplotScript& name, const json& axis, double 
   auto block = GnuplotScript::of("${} << EOD\n", name);
   for (const auto& p : field(axis, "density")) {
     const double square = factor * factor;
-    block.add("{} {} {} {}\n", shown(p, "frequency_hz"), shown(p, "density", square), shown(p, "ci_low", square),
-              shown(p, "ci_high", square));
+    block.add("{} {} {} {}\n", shown(p, "frequency_hz"), shown(p, "density", square),
+              shown(p, "ci_low", square), shown(p, "ci_high", square));
   }
   return block.add("EOD\n");
 }
@@ -57,7 +57,9 @@ GnuplotScript density_block(const GnuplotScript& name, const json& axis, double 
 /// Allan deviations of the gyroscopes or of the accelerometers in one picture.
 Picture overview_picture(const json& certificate, bool gyro) {
   Picture picture{gyro ? "allan_gyroscopes" : "allan_accelerometers", 1, 1, {}};
-  picture.body.add("set logscale xy\nset format '10^{{%L}}'\nset key top right samplen 2\nset xlabel 'averaging time τ, s'\n");
+  picture.body.add(
+      "set logscale xy\nset format '10^{{%L}}'\nset key top right samplen 2\nset xlabel 'averaging time τ, "
+      "s'\n");
   GnuplotScript plots;
   std::size_t n = 0;
   std::string unit;
@@ -69,8 +71,10 @@ Picture overview_picture(const json& certificate, bool gyro) {
     const GnuplotWord& colour = kPictureColours[n % std::size(kPictureColours)];
     if (!plots.empty()) plots.add(", ");
     plots.add(
-        "${0} using 1:3:4 with filledcurves fillcolor rgb '{1}' fillstyle transparent solid 0.25 noborder notitle, ${0} using "
-        "1:2 with linespoints pointtype 7 pointsize 0.3 linecolor rgb '{1}' title {2} noenhanced, ${0} using 1:5 with lines "
+        "${0} using 1:3:4 with filledcurves fillcolor rgb '{1}' fillstyle transparent solid 0.25 noborder "
+        "notitle, ${0} using "
+        "1:2 with linespoints pointtype 7 pointsize 0.3 linecolor rgb '{1}' title {2} noenhanced, ${0} using "
+        "1:5 with lines "
         "dashtype 2 linecolor rgb '{1}' notitle",
         block, colour, GnuplotText(axis_words(text_at(axis, "name"))));
     ++n;
@@ -88,8 +92,10 @@ Picture axis_picture(const json& axis, std::size_t place) {
   const auto allan = GnuplotScript::of("allan");
   picture.body += allan_block(allan, axis, factor);
   picture.body.add(
-      "set xlabel 'averaging time τ, s'\nset ylabel {}\nplot $allan using 1:3:4 with filledcurves fillcolor rgb '{}' fillstyle "
-      "transparent solid 0.3 noborder notitle, $allan using 1:2 with points pointtype 7 pointsize 0.3 linecolor rgb '{}' title "
+      "set xlabel 'averaging time τ, s'\nset ylabel {}\nplot $allan using 1:3:4 with filledcurves fillcolor "
+      "rgb '{}' fillstyle "
+      "transparent solid 0.3 noborder notitle, $allan using 1:2 with points pointtype 7 pointsize 0.3 "
+      "linecolor rgb '{}' title "
       "'Allan deviation', $allan using 1:5 with lines linecolor rgb '#000000' title 'model'\n",
       GnuplotText(unit), kPictureColours[2], kPictureColours[2]);
   json entry = field(axis, "fit");
@@ -104,13 +110,16 @@ Picture axis_picture(const json& axis, std::size_t place) {
     picture.body += wavelet_block(block, fits.front());
     picture.body += wavelet_range({&fits.front()});
     picture.body.add("set xlabel 'scale τ, s'\nset ylabel {} noenhanced\nplot {}\nset yrange [*:*]\n",
-                     GnuplotText("(" + fits.front().unit + ")²"), wavelet_plots(block, fits.front(), kPictureColours[2]));
+                     GnuplotText("(" + fits.front().unit + ")²"),
+                     wavelet_plots(block, fits.front(), kPictureColours[2]));
   }
   const auto density = GnuplotScript::of("density");
   picture.body += density_block(density, axis, factor);
   picture.body.add(
-      "set xlabel 'frequency, Hz'\nset ylabel {}\nplot $density using 1:3:4 with filledcurves fillcolor rgb '{}' fillstyle "
-      "transparent solid 0.3 noborder notitle, $density using 1:2 with lines linecolor rgb '{}' title 'spectral density'\n",
+      "set xlabel 'frequency, Hz'\nset ylabel {}\nplot $density using 1:3:4 with filledcurves fillcolor rgb "
+      "'{}' fillstyle "
+      "transparent solid 0.3 noborder notitle, $density using 1:2 with lines linecolor rgb '{}' title "
+      "'spectral density'\n",
       GnuplotText("(" + unit + ")²/Hz"), kPictureColours[0], kPictureColours[0]);
   return picture;
 }
@@ -129,11 +138,13 @@ Result<CertificateFigures> draw_certificate(const OutputFolder& folder, const js
   std::vector<Picture> pictures;
   for (const bool gyro : {true, false}) {
     const json& axes = field(certificate, "axes");
-    if (std::none_of(axes.begin(), axes.end(), [&](const auto& axis) { return is_gyro_axis(axis) == gyro; })) continue;
+    if (std::none_of(axes.begin(), axes.end(), [&](const auto& axis) { return is_gyro_axis(axis) == gyro; }))
+      continue;
     pictures.push_back(overview_picture(certificate, gyro));
-    out.overview.emplace_back(drawn->path() / (pictures.back().name + ".svg"),
-                              fmt::format("Allan deviation of the {}: measured, with its interval, and of the model (dashed).",
-                                          gyro ? "gyroscopes" : "accelerometers"));
+    out.overview.emplace_back(
+        drawn->path() / (pictures.back().name + ".svg"),
+        fmt::format("Allan deviation of the {}: measured, with its interval, and of the model (dashed).",
+                    gyro ? "gyroscopes" : "accelerometers"));
   }
   for (const auto& axis : field(certificate, "axes")) {
     pictures.push_back(axis_picture(axis, out.of_axes.size()));

@@ -27,8 +27,9 @@ using nlohmann::json;
 
 std::string base64(const std::string& bytes) {
   std::string out(4 * ((bytes.size() + 2) / 3) + 1, '\0');
-  const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()),
-                                     reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
+  const int length =
+      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()),
+                      reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
   out.resize(static_cast<std::size_t>(length));
   return out;
 }
@@ -38,8 +39,8 @@ Html image(const std::filesystem::path& svg, const std::string& words) {
   std::ifstream in(svg, std::ios::binary);
   std::ostringstream content;
   content << in.rdbuf();
-  return Html::markup(fmt::format("<img class=\"drawn\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">", text(words).str(),
-                                  base64(content.str())));
+  return Html::markup(fmt::format("<img class=\"drawn\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">",
+                                  text(words).str(), base64(content.str())));
 }
 
 Html figure(const std::filesystem::path& svg, const std::string& words) {
@@ -86,6 +87,35 @@ Html list_of(const std::vector<std::string>& sentences, std::string_view css_cla
   return element("ul", items, css_class);
 }
 
+/// Records beside each other: the population's mean, what they differ by, the bound for a new unit.
+Html units_section(const json& certificate) {
+  const json& units = field(certificate, "units");
+  if (!units.is_array() || units.empty()) return {};
+  Table table({text("axis"), text("term"), text("records"), text("mean of all"), text("differ by, %"),
+               text("95 % are below"), text("unit"), text("stands out")});
+  for (const auto& row : units) {
+    std::size_t n = 0;
+    std::string outliers;
+    const json& values = field(row, "values");
+    const json& p = field(row, "p_holm");
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      n += values[i].is_number() ? 1 : 0;
+      constexpr double kSignificant = 0.05;
+      if (i < p.size() && p[i].is_number() && p[i].get<double>() < kSignificant)
+        outliers += (outliers.empty() ? "" : ", ") + std::to_string(i + 1);
+    }
+    const auto ci = numbers_at<2>(row, "mean_ci");
+    const auto mean = number_at(row, "mean");
+    const auto spread = number_at(row, "spread_log");
+    table.add_row({text(text_at(row, "axis")), text(text_at(row, "symbol")), text(std::to_string(n)),
+                   mean && ci ? with_interval(*mean, (*ci)[0], (*ci)[1]) : text(kUnknown),
+                   spread ? number(100.0 * *spread, 2) : text(kUnknown),
+                   number(number_at(row, "tolerance_upper_95_95"), 3), text(text_at(row, "unit")),
+                   text(outliers.empty() ? kUnknown : "record " + outliers)});
+  }
+  return element("h2", text("All records")) + table.html();
+}
+
 /// Sentences of all axes; one that several axes share stands once, with their names.
 std::vector<std::string> grouped(const json& certificate, const char* key) {
   std::vector<std::pair<std::string, std::vector<std::string>>> groups;
@@ -93,7 +123,8 @@ std::vector<std::string> grouped(const json& certificate, const char* key) {
     for (const auto& sentence : field(axis, key)) {
       if (!sentence.is_string()) continue;
       const auto words = sentence.get<std::string>();
-      const auto known = std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == words; });
+      const auto known =
+          std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == words; });
       if (known == groups.end())
         groups.push_back({words, {text_at(axis, "name")}});
       else
@@ -115,19 +146,25 @@ Html heading_of(const json& certificate) {
     if (file.is_string()) files += (files.empty() ? "" : ", ") + file.get<std::string>();
   }
   return element("header", element("h1", text(text_at(certificate, "sensor"))) +
-                               paragraph("IMU noise certificate: " + words) + paragraph("From " + files, "quiet"));
+                               paragraph("IMU noise certificate: " + words) +
+                               paragraph("From " + files, "quiet"));
 }
 
 Html summary(const json& certificate, const CertificateFigures& figures) {
   Html out;
   const auto warnings = grouped(certificate, "warnings");
-  out += list_of(warnings, "answer no");
+  out += list_of(warnings, "answer partly");
   out += terms_table(certificate, true) + terms_table(certificate, false);
-  out += paragraph(fmt::format("Intervals hold the true value in {:.0f} % of records. \"Below\" is the most that this record "
-                               "allows. Symbols as in IEEE Std 952 and 1293.",
-                               100.0 * number_at(certificate, "confidence").value_or(0.0)),
-                   "quiet");
-  for (const auto& [file, words] : figures.overview) out += figure(file, words);
+  out += paragraph(
+      fmt::format(
+          "Intervals hold the true value in {:.0f} % of records. \"Below\" is the most that this record "
+          "allows. Symbols as in IEEE Std 952 and 1293.",
+          100.0 * number_at(certificate, "confidence").value_or(0.0)),
+      "quiet");
+  Html overview;
+  for (const auto& [file, words] : figures.overview) overview += figure(file, words);
+  out += element("div", overview, "panels wide");
+  out += units_section(certificate);
   const auto limits = grouped(certificate, "limits");
   if (!limits.empty()) out += element("h2", text("What limits the numbers")) + list_of(limits, "limits");
   return out;
@@ -139,7 +176,8 @@ Html found_in_spectrum(const json& axis) {
     for (const auto& found : field(axis, key)) sentences.push_back(text_at(found, "words"));
   }
   if (const auto end = number_at(axis, "low_pass_hz")) {
-    sentences.push_back(fmt::format("the density falls to half of its plateau at {:.3g} Hz: the end of the bandwidth", *end));
+    sentences.push_back(
+        fmt::format("the density falls to half of its plateau at {:.3g} Hz: the end of the bandwidth", *end));
   }
   if (sentences.empty()) return {};
   for (auto& sentence : sentences) sentence.front() = static_cast<char>(std::toupper(sentence.front()));
@@ -150,13 +188,14 @@ Html temperature_words(const json& axis) {
   const json& t = field(axis, "temperature");
   if (!t.is_object()) return {};
   const std::string unit = text_at(axis, "unit");
-  std::string words = fmt::format("Between {:.1f} and {:.1f} °C the bias changes by {:.3g} ± {:.2g} {} per °C (p = {:.2g}).",
-                                  number_at(t, "lowest_c").value_or(0.0), number_at(t, "highest_c").value_or(0.0),
-                                  number_at(t, "bias_per_c").value_or(0.0), number_at(t, "bias_per_c_sd").value_or(0.0), unit,
-                                  number_at(t, "bias_p_value").value_or(1.0));
+  std::string words =
+      fmt::format("Between {:.1f} and {:.1f} °C the bias changes by {:.3g} ± {:.2g} {} per °C (p = {:.2g}).",
+                  number_at(t, "lowest_c").value_or(0.0), number_at(t, "highest_c").value_or(0.0),
+                  number_at(t, "bias_per_c").value_or(0.0), number_at(t, "bias_per_c_sd").value_or(0.0), unit,
+                  number_at(t, "bias_p_value").value_or(1.0));
   if (const auto noise = number_at(t, "noise_variance_per_c")) {
-    words += fmt::format(" The variance of the fast noise changes by {:.2g} ± {:.1g} % per °C.", 100.0 * *noise,
-                         100.0 * number_at(t, "noise_variance_per_c_sd").value_or(0.0));
+    words += fmt::format(" The variance of the fast noise changes by {:.2g} ± {:.1g} % per °C.",
+                         100.0 * *noise, 100.0 * number_at(t, "noise_variance_per_c_sd").value_or(0.0));
   }
   return paragraph(words);
 }
@@ -167,21 +206,24 @@ Html axis_section(const json& axis, const std::filesystem::path& drawn) {
   std::string words = fmt::format("{} samples", number_at(axis, "n_samples").value_or(0.0));
   if (const double missing = number_at(axis, "n_missing").value_or(0.0); missing > 0.0)
     words += fmt::format(", {} missing", missing);
-  words += fmt::format("; mean {:.6g}, sd {:.4g} {}", number_at(axis, "mean").value_or(0.0), number_at(axis, "sd").value_or(0.0),
-                       text_at(axis, "unit"));
+  words += fmt::format("; mean {:.6g}, sd {:.4g} {}", number_at(axis, "mean").value_or(0.0),
+                       number_at(axis, "sd").value_or(0.0), text_at(axis, "unit"));
   if (const auto step = number_at(axis, "resolution")) words += fmt::format(", resolution {:.4g}", *step);
   words += ". Model " + text_at(fit, "model");
   if (const double error = number_at(fit, "model_error").value_or(0.0); error > 0.0)
     words += fmt::format(", which follows every scale within about {:.2g} %", 100.0 * error);
   out += paragraph(words + ".");
-  out += figure(drawn, "Allan deviation, wavelet variance with the model and its processes, and power spectral density.");
+  out += figure(
+      drawn,
+      "Allan deviation, wavelet variance with the model and its processes, and power spectral density.");
   out += found_in_spectrum(axis) + temperature_words(axis);
   Table table({text("process"), text("parameter"), text("value"), text("unit")});
   for (const auto& p : field(fit, "parameters")) {
     const auto value = number_at(p, "value");
-    table.add_row({text(text_at(p, "process")), text(text_at(p, "name")),
-                   value ? with_interval(*value, number_at(p, "ci_low"), number_at(p, "ci_high")) : text(kUnknown),
-                   text(text_at(p, "unit"))});
+    table.add_row(
+        {text(text_at(p, "process")), text(text_at(p, "name")),
+         value ? with_interval(*value, number_at(p, "ci_low"), number_at(p, "ci_high")) : text(kUnknown),
+         text(text_at(p, "unit"))});
   }
   if (!table.empty()) out += table.html();
   return out;
@@ -194,13 +236,16 @@ std::string page_of(const json& certificate, const CertificateFigures& figures) 
     if (i < figures.of_axes.size()) body += element("section", axis_section(axis, figures.of_axes[i]));
     ++i;
   }
-  body += paragraph(fmt::format("Made by imuscope {} at {}.", text_at(certificate, "version"), text_at(certificate, "made_utc")),
+  body += paragraph(fmt::format("Made by imuscope {} at {}.", text_at(certificate, "version"),
+                                text_at(certificate, "made_utc")),
                     "quiet");
   std::string page =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; form-action 'none'; "
-      "style-src 'unsafe-inline'; img-src data:\">\n<meta name=\"color-scheme\" content=\"light dark\">\n<title>";
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
+      "form-action 'none'; "
+      "style-src 'unsafe-inline'; img-src data:\">\n<meta name=\"color-scheme\" content=\"light "
+      "dark\">\n<title>";
   page += text(text_at(certificate, "sensor")).str();
   page += "</title>\n<style>\n";
   page += page_style();

@@ -22,8 +22,8 @@ struct Picture {
   GnuplotScript body;
 };
 
-/// Writes NAME.gp, NAME.svg and NAME.pdf into `folder`. Drawn in a folder made for it, since gnuplot follows links.
-/// Errors (kWork): gnuplot is not there, or refuses the script.
+/// Writes NAME.gp, NAME.svg and NAME.pdf into `folder`. Drawn in a folder made for it, since gnuplot follows
+/// links. Errors (kWork): gnuplot is not there, or refuses the script.
 Result<void> draw_into(const OutputFolder& folder, const Picture& picture);
 
 }  // namespace imuscope::report

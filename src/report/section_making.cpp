@@ -91,16 +91,21 @@ Html scaled(std::optional<double> value, double by, int decimals) {
 Html time_budget(const nlohmann::json& devices) {
   constexpr double kMs = 1e3;
   constexpr double kUs = 1e6;
-  Table table({text("device"), text("on the wire, ms"), text("adapter up to, ms"), text("until read, ms"),
-               text("jitter, us"), text("constant delay t_d, ms"), text("its sd, ms")});
+  Table table({text("device"), text("stamped by"), text("before the read, us"), text("jitter of reads, us"),
+               text("on the wire, ms"), text("adapter up to, ms"), text("until read, ms"), text("jitter, us"),
+               text("constant delay t_d, ms"), text("its sd, ms"), text("delay by pulses, ms"),
+               text("its sd, ms")});
   for (const auto& device : devices) {
     const auto& budget = field(device, "time_budget");
     if (budget.is_null()) continue;
     table.add_row(
-        {text(text_at(device, "name")), scaled(number_at(budget, "wire_s"), kMs, 3),
+        {text(text_at(device, "name")), text(text_at(budget, "stamped_by")),
+         scaled(number_at(budget, "stamp_lead_s"), kUs, 0),
+         scaled(number_at(budget, "stamp_lead_sd_s"), kUs, 0), scaled(number_at(budget, "wire_s"), kMs, 3),
          scaled(number_at(budget, "adapter_s"), kMs, 0), scaled(number_at(budget, "latency_s"), kMs, 2),
          scaled(number_at(budget, "clock_sd_s"), kUs, 0), scaled(number_at(budget, "t_d_s"), kMs, 3),
-         scaled(number_at(budget, "sd_t_d_s"), kMs, 3)});
+         scaled(number_at(budget, "sd_t_d_s"), kMs, 3), scaled(number_at(budget, "delay_s"), kMs, 3),
+         scaled(number_at(budget, "sd_delay_s"), kMs, 3)});
   }
   if (table.empty()) return {};
   return element("h3", text("Time")) + table.html() +
@@ -109,7 +114,11 @@ Html time_budget(const nlohmann::json& devices) {
              "delay "
              "that is left, of device, adapter and line, is estimated for an S-IMU against the reference and "
              "taken "
-             "out; of that its sd remains. That of any other device nobody measures.");
+             "out; of that its sd remains. That of any other device nobody measures, unless pulses of UTC "
+             "(PPS) "
+             "come into the PC and the device tags its data with UTC. Where kernel or card stamp what "
+             "arrives, the "
+             "jitter of reads does not reach the times.");
 }
 
 }  // namespace

@@ -15,7 +15,8 @@ GnuplotScript wavelet_block(const GnuplotScript& name, const Fit& fit);
 /// What follows `plot` for that block: points with intervals, the model, its components dashed.
 GnuplotScript wavelet_plots(const GnuplotScript& block, const Fit& fit, const GnuplotWord& colour);
 
-/// `set yrange` between half the smallest and twice the largest of what was observed and fitted: a component may leave it.
+/// `set yrange` between half the smallest and twice the largest of what was observed and fitted: a component
+/// may leave it.
 GnuplotScript wavelet_range(const std::vector<const Fit*>& fits);
 
 }  // namespace imuscope::report

@@ -19,7 +19,7 @@ using DeviceIndex = std::uint8_t;
 
 using Vector3 = std::array<double, 3>;
 
-enum class SampleKind : std::uint8_t { kImu, kGnss, kAttitude, kOdometry };
+enum class SampleKind : std::uint8_t { kImu, kGnss, kAttitude, kOdometry, kPulse };
 
 /// Bits of ImuData::flags.
 enum ImuFlag : std::uint32_t {
@@ -104,6 +104,11 @@ struct OdometryData {
   std::uint32_t flags;  ///< OdometryFlag bits
 };
 
+/// A pulse that marks a whole second of UTC; Sample.time is when the kernel stamped it.
+struct PulseData {
+  std::int64_t wall_ns;  ///< CLOCK_REALTIME of the same instant
+};
+
 struct Sample {
   SampleKind kind;
   DeviceIndex device;
@@ -117,6 +122,7 @@ struct Sample {
     GnssData gnss;
     AttitudeData attitude;
     OdometryData odometry;
+    PulseData pulse;
   };
 };
 

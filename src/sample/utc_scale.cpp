@@ -32,6 +32,30 @@ constexpr double kReceiverDelaySd_s = 0.1;
 constexpr double kLeapTolerance_s = 0.02;
 constexpr Duration kAroundMidnight = std::chrono::seconds{10};
 
+// A pulse is believed to mark the second of whoever tells UTC by messages, which come up to so much later
+// than the instants that they tell.
+constexpr double kMessageDelayMax_s = 0.9;
+// Pulses that are further off the line through those before are no pulses of the same seconds.
+constexpr double kPulseAstray_s = 0.1;
+constexpr int kMiscountedToShift = 3;
+// The pulses are believed alone for so long after the last of them, and then as long as their line is better
+// known than messages would tell: a quartz that warms up goes astray by a millisecond in minutes.
+constexpr Duration kPulsesHold = std::chrono::minutes{10};
+// The stream of an R-IMU that does not tell UTC: filters and processor of the unit, its line, an adapter.
+constexpr double kStreamDelaySd_s = 0.005;
+// Delays are means over so many tags.
+constexpr double kDelayTags = 500.0;
+
+void average(double value_s, StreamDelay& delay) noexcept {
+  if (std::isnan(delay.mean_s)) {
+    delay = {value_s, 0.0};
+    return;
+  }
+  const double step_s = value_s - delay.mean_s;
+  delay.mean_s += step_s / kDelayTags;
+  delay.sd_s = std::sqrt(delay.sd_s * delay.sd_s + (step_s * step_s - delay.sd_s * delay.sd_s) / kDelayTags);
+}
+
 bool is_leap_second(double step_s, UtcTime utc) noexcept {
   const Duration since_midnight = utc - std::chrono::floor<std::chrono::days>(utc);
   const bool near_midnight =
@@ -80,9 +104,19 @@ void UtcScale::predict(double step_s) noexcept {
 void UtcScale::observe(UtcSource source, HostTime time, UtcTime utc) noexcept {
   if (source == UtcSource::kReference) last_reference_ = time;
   if (!is_known()) return begin(source, time, utc);
+  if (pulses_.is_known()) measure_delay(source, time, utc);
   const bool is_spare = source == UtcSource::kGnss && scale_.source == UtcSource::kReference &&
                         time - last_reference_ < kReferenceHolds;
-  if (is_spare || time <= last_) return;
+  const bool pulses_hold = source == UtcSource::kGnss && scale_.source == UtcSource::kPulses &&
+                           time - pulses_.last() < kPulsesHold;
+  if (is_spare || pulses_hold || time <= last_) return;
+  // What the pulses have measured of the receiver's delay holds on without them.
+  if (source == UtcSource::kGnss && !std::isnan(scale_.pulses.gnss_delay.mean_s))
+    utc += from_seconds(scale_.pulses.gnss_delay.mean_s - reference_delay_s());
+  if (scale_.source == UtcSource::kPulses) {
+    // Another one tells from here on: what lies between the two is no step of its tags.
+    utc_origin_ += from_seconds(to_seconds((utc - utc_origin_) - (time - origin_)) - offset_at(time));
+  }
   const double told_s = to_seconds((utc - utc_origin_) - (time - origin_));
   predict(to_seconds(time - last_));
   last_ = time;
@@ -112,11 +146,122 @@ void UtcScale::observe(UtcSource source, HostTime time, UtcTime utc) noexcept {
   publish(source);
 }
 
+/// The R-IMU's samples are of so much earlier than the host's clock shows with them.
+double UtcScale::reference_delay_s() const noexcept {
+  const double mean_s = scale_.pulses.reference_delay.mean_s;
+  return std::isnan(mean_s) ? 0.0 : mean_s;
+}
+
+/// Which second a pulse marks.
+UtcTime UtcScale::second_of(HostTime time, UtcTime wall) noexcept {
+  using std::chrono::seconds;
+  if (pulses_.has_begun()) return std::chrono::round<seconds>(pulses_.at(time));
+  scale_.pulses.counted_by_pc_clock = !is_known();
+  if (!is_known()) return std::chrono::round<seconds>(wall);
+  return std::chrono::floor<seconds>(scale_.at(time).utc + from_seconds(kMessageDelayMax_s));
+}
+
+void UtcScale::observe_pulse(HostTime time, UtcTime wall) noexcept {
+  const UtcTime second = second_of(time, wall);
+  if (pulses_.has_begun() && std::abs(to_seconds(pulses_.at(time) - second)) > kPulseAstray_s) {
+    // The other edge, or pulses of something else: what was learned is of no use once they go on.
+    ++scale_.pulses.left_out;
+    if (++pulses_astray_in_a_row_ >= kMiscountedToShift) {
+      pulses_astray_in_a_row_ = 0;
+      pulses_.forget();
+      scale_.pulses.is_known = false;
+    }
+    return;
+  }
+  pulses_astray_in_a_row_ = 0;
+  if (!pulses_.observe(time, second)) {
+    ++scale_.pulses.left_out;
+    return;
+  }
+  if (!pulses_.is_known()) return;
+  PulseState& told = scale_.pulses;
+  told.is_known = true;
+  told.time = time;
+  told.utc = pulses_.at(time);
+  told.sd_utc_s = pulses_.sd_s();
+  told.rate = pulses_.rate();
+  told.sd_rate = pulses_.sd_rate();
+  told.jitter_s = pulses_.jitter_s();
+  ++told.used;
+  const bool reference_tells =
+      scale_.source == UtcSource::kReference && time - last_reference_ < kReferenceHolds;
+  if (!reference_tells) follow_pulses(time);
+}
+
+void UtcScale::follow_pulses(HostTime time) noexcept {
+  if (!is_known()) begin(UtcSource::kPulses, time, pulses_.at(time) - from_seconds(reference_delay_s()));
+  // Whoever asks the kernel hears of a pulse up to a tenth of a second later.
+  const HostTime now = std::max(time, last_);
+  const double before_s = offset_at(now);
+  const double told_s = to_seconds((pulses_.at(now) - utc_origin_) - (now - origin_)) - reference_delay_s();
+  if (scale_.source != UtcSource::kPulses) {
+    // Messages told it so far, by their delay too late: intervals do not change with who tells UTC.
+    utc_origin_ += from_seconds(told_s - before_s);
+    offset_s_ = before_s;
+  } else {
+    offset_s_ = told_s;
+  }
+  last_ = now;
+  rate_ = pulses_.rate();
+  p_offset_ = pulses_.sd_s(now - time) * pulses_.sd_s(now - time);
+  p_rate_ = pulses_.sd_rate() * pulses_.sd_rate();
+  p_both_ = 0.0;
+  astray_in_a_row_ = 0;
+  publish(UtcSource::kPulses);
+}
+
+/// What a tag says against the pulses: the delay of its stream, or that the seconds are miscounted.
+void UtcScale::measure_delay(UtcSource source, HostTime time, UtcTime utc) noexcept {
+  const double delay_s = to_seconds(pulses_.at(time) - utc);
+  // A message tells an instant that has passed, by less than a second.
+  const double whole_s = std::ceil(delay_s - kMessageDelayMax_s);
+  if (whole_s != 0.0) {
+    if (++miscounted_in_a_row_ >= kMiscountedToShift) count_seconds_anew(time, from_seconds(-whole_s), utc);
+    return;
+  }
+  miscounted_in_a_row_ = 0;
+  scale_.pulses.counted_by_pc_clock = false;
+  average(delay_s,
+          source == UtcSource::kReference ? scale_.pulses.reference_delay : scale_.pulses.gnss_delay);
+}
+
+/// A leap second has passed, or the PC's clock had counted wrongly.
+void UtcScale::count_seconds_anew(HostTime time, Duration by, UtcTime utc) noexcept {
+  miscounted_in_a_row_ = 0;
+  pulses_.shift(by);
+  scale_.pulses.utc += by;
+  if (scale_.source != UtcSource::kPulses) return;
+  utc_origin_ += by;
+  scale_.gps_minus_utc_s = is_leap_second(to_seconds(by), utc)
+                               ? scale_.gps_minus_utc_s + (by < Duration::zero() ? 1 : -1)
+                               : gps_minus_utc_s(utc);
+  ++scale_.steps;
+  last_ = std::max(last_, time);
+  publish(UtcSource::kPulses);
+}
+
+/// What nobody tells of the delays that stand in the scale: of the receiver's messages, and of the R-IMU's
+/// stream where its own tags do not take it out.
+double UtcScale::delay_sd_s(UtcSource source) const noexcept {
+  if (source == UtcSource::kReference) return 0.0;
+  const auto known = [](const StreamDelay& delay, double otherwise_s) {
+    return std::isnan(delay.mean_s) ? otherwise_s : delay.sd_s;
+  };
+  const double reference_s = known(scale_.pulses.reference_delay, kStreamDelaySd_s);
+  if (source == UtcSource::kPulses) return reference_s;
+  return std::hypot(reference_s, known(scale_.pulses.gnss_delay, kReceiverDelaySd_s));
+}
+
 void UtcScale::publish(UtcSource source) noexcept {
   scale_.source = source;
   scale_.time = last_;
   scale_.utc = utc_origin_ + (last_ - origin_) + from_seconds(offset_s_);
-  scale_.sd_utc_s = std::hypot(std::sqrt(p_offset_), source == UtcSource::kGnss ? kReceiverDelaySd_s : 0.0);
+  scale_.sd_utc_s = std::hypot(std::sqrt(p_offset_), delay_sd_s(source));
   scale_.rate = rate_;
   scale_.sd_rate = std::sqrt(p_rate_);
 }

@@ -8,22 +8,58 @@
 /// Kalman filter of two states, UTC minus host time and its rate: both wander, the first as a clock map's
 /// line does that settles, the second as a quartz does that warms up. The tags' errors are taken as white.
 ///
+/// Pulses that mark seconds (PPS) tell the host's clock far better than any message does; the tags of a
+/// receiver, or the PC's wall clock where nothing else tells UTC, say which second is meant. Samples of the
+/// R-IMU have their times from a clock map, which leaves the constant delay of their stream in them. The
+/// R-IMU's own tags know of it, as they say which sample is of which instant; pulses do not. So where the
+/// R-IMU tells UTC the scale follows it, and the pulses measure the delays of the streams; where it does not,
+/// the scale follows the pulses.
+///
 /// Deterministic: a function of the observations alone.
 
 #include <cstdint>
+#include <limits>
 
 #include "base/time.h"
+#include "sample/pulse_clock.h"
 
 namespace imuscope {
 
 /// Who told UTC. The PC's clock says what time it was at the start, but not how long a second is.
-enum class UtcSource : std::uint8_t { kNone, kReference, kGnss, kPcClock };
+enum class UtcSource : std::uint8_t { kNone, kReference, kGnss, kPcClock, kPulses };
+
+/// Whether a device has told UTC, and with it the length of a second.
+[[nodiscard]] constexpr bool is_told_by_device(UtcSource source) noexcept {
+  return source == UtcSource::kReference || source == UtcSource::kGnss || source == UtcSource::kPulses;
+}
 
 /// An instant of the run in UTC.
 struct UtcStamp {
   UtcTime utc{};
   std::int32_t gps_minus_utc_s = 0;  ///< leap seconds: what follows one is a second of GPS time later
   bool is_known = false;             ///< otherwise nobody has told UTC
+};
+
+/// A constant delay, from an instant to the time that a stream gives it on the host's clock.
+struct StreamDelay {
+  double mean_s = std::numeric_limits<double>::quiet_NaN();  ///< NaN: not measured
+  double sd_s = std::numeric_limits<double>::quiet_NaN();    ///< of what is measured at a time
+};
+
+/// The host's clock by pulses, for those who show or record it.
+struct PulseState {
+  bool is_known = false;
+  bool counted_by_pc_clock = false;  ///< no device told which second a pulse marks
+  HostTime time{};                   ///< of the newest pulse
+  UtcTime utc{};                     ///< at `time`
+  double sd_utc_s = 0.0;
+  double rate = 0.0;  ///< UTC seconds per host second, minus 1
+  double sd_rate = 0.0;
+  double jitter_s = 0.0;  ///< of a pulse, 1 sigma
+  std::uint64_t used = 0;
+  std::uint64_t left_out = 0;
+  StreamDelay reference_delay{};  ///< of the R-IMU's samples
+  StreamDelay gnss_delay{};       ///< of the receiver's solutions
 };
 
 /// The scale at one instant, for those who show or record it.
@@ -36,11 +72,17 @@ struct TimeScale {
   double sd_rate = 50e-6;
   std::uint32_t steps = 0;           ///< times that the tags stepped by more than the scale can follow
   std::int32_t gps_minus_utc_s = 0;  ///< leap seconds
+  PulseState pulses{};
 
   /// Any instant near `time` on the line through the tags.
   [[nodiscard]] UtcStamp at(HostTime instant) const noexcept {
     const Duration step = instant - time;
     return {utc + step + from_seconds(rate * to_seconds(step)), gps_minus_utc_s, source != UtcSource::kNone};
+  }
+  /// The instant of a UTC near `utc`.
+  [[nodiscard]] HostTime host_time(UtcTime instant) const noexcept {
+    const Duration step = instant - utc;
+    return time + step - from_seconds(rate / (1.0 + rate) * to_seconds(step));
   }
 };
 
@@ -52,6 +94,10 @@ class UtcScale {
   /// older than the last one is left out.
   void observe(UtcSource source, HostTime time, UtcTime utc) noexcept;
 
+  /// A pulse that marks a second of UTC.
+  /// @param wall  what the PC's wall clock showed
+  void observe_pulse(HostTime time, UtcTime wall) noexcept;
+
   /// What the PC's clock showed: for those who want to know what time it is, until a device tells.
   void set_pc_clock(HostTime time, UtcTime utc) noexcept;
 
@@ -60,9 +106,7 @@ class UtcScale {
   [[nodiscard]] double seconds_at(HostTime time) const noexcept;
 
   /// Whether a device has told UTC, and with it the length of a second.
-  [[nodiscard]] bool is_known() const noexcept {
-    return scale_.source == UtcSource::kReference || scale_.source == UtcSource::kGnss;
-  }
+  [[nodiscard]] bool is_known() const noexcept { return is_told_by_device(scale_.source); }
   [[nodiscard]] const TimeScale& scale() const noexcept { return scale_; }
 
  private:
@@ -70,6 +114,12 @@ class UtcScale {
   void begin(UtcSource source, HostTime time, UtcTime utc) noexcept;
   void predict(double step_s) noexcept;
   void publish(UtcSource source) noexcept;
+  [[nodiscard]] UtcTime second_of(HostTime time, UtcTime wall) noexcept;
+  void measure_delay(UtcSource source, HostTime time, UtcTime utc) noexcept;
+  void count_seconds_anew(HostTime time, Duration by, UtcTime utc) noexcept;
+  void follow_pulses(HostTime time) noexcept;
+  [[nodiscard]] double reference_delay_s() const noexcept;
+  [[nodiscard]] double delay_sd_s(UtcSource source) const noexcept;
 
   TimeScale scale_;
   HostTime origin_{};     ///< of seconds_at()
@@ -82,6 +132,9 @@ class UtcScale {
   double p_rate_ = 0.0;
   double p_both_ = 0.0;
   int astray_in_a_row_ = 0;
+  PulseClock pulses_;
+  int pulses_astray_in_a_row_ = 0;
+  int miscounted_in_a_row_ = 0;
 };
 
 }  // namespace imuscope

@@ -71,8 +71,8 @@ class CaptureSource final : public ByteSource {
       if (read->direction != Direction::kRead) continue;
       current_ = std::move(*read);
       read_ += current_.bytes.size();
-      return std::optional<RecordedRead>{
-          RecordedRead{current_.arrival, current_.bytes, std::exchange(per_byte_, std::nullopt)}};
+      return std::optional<RecordedRead>{RecordedRead{
+          current_.arrival, current_.bytes, std::exchange(per_byte_, std::nullopt), current_.received}};
     }
   }
   [[nodiscard]] std::uint64_t bytes_read() const override { return read_; }

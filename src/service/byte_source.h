@@ -18,6 +18,7 @@ struct RecordedRead {
   std::optional<HostTime> arrival;  ///< absent in recordings without arrival stamps
   std::span<const std::uint8_t> bytes;
   std::optional<Duration> per_byte{};  ///< on the wire from here on, where the line's rate is another one
+  std::optional<HostTime> received{};  ///< its last byte had come, where the kernel or the card said so
 };
 
 class ByteSource {

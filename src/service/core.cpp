@@ -30,7 +30,10 @@ Core::Core(const EstimatorConfig& config, std::size_t n_devices, CoreSchedule sc
       applied_noises_(std::move(schedule.applied_noises)) {
   for (std::size_t i = 0; i < n_devices; ++i) {
     rings_.push_back(std::make_unique<SampleRing>(ring_capacity_of(config, i)));
+    is_study_.push_back(std::any_of(config.studies.begin(), config.studies.end(),
+                                    [i](const StudyConfig& study) { return study.device == i; }));
   }
+  reaches_.resize(n_devices);
   for (std::size_t i = 0; i < config.studies.size(); ++i)
     noises_.push_back(std::make_unique<LatestValue<NewNoise>>());
   std::sort(schedule.late_samples.begin(), schedule.late_samples.end(),
@@ -50,31 +53,53 @@ bool Core::held_back(const Sample& sample, std::int64_t index) const noexcept {
   return found != late.end() && found->sequence == sample.sequence && found->tick > index;
 }
 
-/// By the samples' stamps and the cut alone, so that a replay decides the same.
-void Core::look_for_backlog(std::int64_t index, HostTime cut) noexcept {
-  previous_horizon_ = horizon_;
-  if (catches_up()) {
-    horizon_ += duration(kCatchUpStep_s);
-    if (horizon_ < cut - duration(kCaughtUp_s)) return;
-    horizon_ = HostTime::max();
-  }
-  const Sample* const oldest = rings_[reference_]->front();
-  const bool is_there = oldest != nullptr && oldest->arrival <= cut && !held_back(*oldest, index);
-  if (is_there && oldest->time < cut - duration(kBehind_s)) {
-    horizon_ = oldest->time + duration(kCatchUpStep_s);
-  }
+bool Core::has_front(std::size_t device, std::int64_t index, HostTime cut) const noexcept {
+  const Sample* const oldest = rings_[device]->front();
+  return oldest != nullptr && oldest->arrival <= cut && !held_back(*oldest, index);
 }
 
-/// The reference runs ahead by as long as an S sample waits for it.
-bool Core::is_within(const Sample& sample, HostTime horizon) const noexcept {
-  if (horizon == HostTime::max()) return true;
-  return sample.time <= (sample.device == reference_ ? horizon + duration(kReferenceWait_s) : horizon);
+/// By the samples' stamps and the cut alone, so that a replay decides the same.
+HostTime Core::common_horizon(std::int64_t index, HostTime cut) const noexcept {
+  if (horizon_ != HostTime::max()) {
+    const HostTime next = horizon_ + duration(kCatchUpStep_s);
+    if (next < cut - duration(kCaughtUp_s)) return next;
+  }
+  if (!has_front(reference_, index, cut)) return HostTime::max();
+  const HostTime oldest = rings_[reference_]->front()->time;
+  return oldest < cut - duration(kBehind_s) ? oldest + duration(kCatchUpStep_s) : HostTime::max();
+}
+
+HostTime Core::reach_of(std::size_t device, std::int64_t index, HostTime cut) noexcept {
+  // The reference runs ahead by as long as an S sample waits for it.
+  if (horizon_ != HostTime::max())
+    return device == reference_ ? horizon_ + duration(kReferenceWait_s) : horizon_;
+  if (device == reference_ || !has_front(device, index, cut)) return HostTime::max();
+  const Sample& oldest = *rings_[device]->front();
+  if (is_study_[device]) {
+    if (oldest.time >= cut - duration(kBehind_s)) return HostTime::max();
+    steps_study_ = true;
+    return oldest.time + duration(kCatchUpStep_s);
+  }
+  // A solution has no state to be applied to before the reference has come that far, if it comes at all.
+  const bool waits = oldest.kind == SampleKind::kGnss && newest_reference_ > HostTime::min() &&
+                     cut - newest_reference_ < duration(kLongestStall_s);
+  return waits ? newest_reference_ + duration(kBehind_s) : HostTime::max();
+}
+
+void Core::look_for_backlog(std::int64_t index, HostTime cut) noexcept {
+  horizon_ = common_horizon(index, cut);
+  steps_study_ = false;
+  for (std::size_t i = 0; i < reaches_.size(); ++i) {
+    reaches_[i].before = reaches_[i].now;
+    reaches_[i].now = reach_of(i, index, cut);
+  }
 }
 
 /// An earlier tick would have consumed it, had it been in its ring.
 bool Core::was_late(const Sample& sample) const noexcept {
-  if (sample.arrival <= last_open_cut_) return true;
-  return sample.arrival <= previous_cut_ && is_within(sample, previous_horizon_);
+  const Reach& reach = reaches_[sample.device];
+  if (sample.arrival <= reach.last_open_cut) return true;
+  return sample.arrival <= previous_cut_ && sample.time <= reach.before;
 }
 
 void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
@@ -85,7 +110,7 @@ void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
     for (const auto& ring : rings_) {
       const Sample* sample = ring->front();
       if (sample == nullptr || sample->arrival > cut || held_back(*sample, index) ||
-          !is_within(*sample, horizon_))
+          sample->time > reaches_[sample->device].now)
         continue;
       if (oldest == nullptr || sample->arrival < oldest->arrival) {
         oldest = sample;
@@ -103,6 +128,7 @@ void Core::consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
 
 void Core::note_first_reference(const Sample& sample) noexcept {
   if (sample.device != reference_ || sample.kind != SampleKind::kImu) return;
+  newest_reference_ = std::max(newest_reference_, sample.time);
   snapshot_.reference = sample.imu;
   if (!snapshot_.has_reference) {
     snapshot_.has_reference = true;
@@ -114,7 +140,8 @@ void Core::note_first_reference(const Sample& sample) noexcept {
 void Core::note_first_utc() noexcept {
   const TimeScale& scale = estimator_.time_scale();
   const bool is_better = first_utc_from_ == UtcSource::kNone ||
-                         (first_utc_from_ == UtcSource::kPcClock && scale.source != UtcSource::kPcClock);
+                         (first_utc_from_ == UtcSource::kPcClock && scale.source != UtcSource::kPcClock) ||
+                         (first_utc_from_ == UtcSource::kGnss && scale.source == UtcSource::kPulses);
   if (!snapshot_.has_reference || scale.source == UtcSource::kNone || !is_better) return;
   first_utc_from_ = scale.source;
   snapshot_.has_utc = true;
@@ -141,10 +168,13 @@ void Core::tick(std::int64_t index, HostTime cut, CoreSink& sink) noexcept {
   take_over_noises(index, sink);
   look_for_backlog(index, cut);
   // What was heard by the tick before: a tick may fall between the reads of two lines.
-  if (!catches_up()) listened_until_ = std::max(listened_until_, std::min(cut, newest_arrival_));
+  const bool all_is_open = horizon_ == HostTime::max();
+  if (all_is_open) listened_until_ = std::max(listened_until_, std::min(cut, newest_arrival_));
   consume(index, cut, sink);
   previous_cut_ = cut;
-  if (!catches_up()) last_open_cut_ = cut;
+  for (Reach& reach : reaches_) {
+    if (reach.now == HostTime::max()) reach.last_open_cut = cut;
+  }
   estimator_.advance(listened_until_);
 
   note_first_utc();

@@ -132,6 +132,10 @@ class CoreSink {
 /// kCatchUpStep_s of time of validity from every ring, and a little more of the reference's, so that S
 /// samples meet the reference in the order in which both were measured. Meanwhile nothing is given up as
 /// late. Nor is it while no device is heard at all: lateness is counted in time in which the host listened.
+///
+/// The line of one device may stand still alone. Samples of an S-IMU that come long after they were measured
+/// are taken in such steps, too; while the reference is silent, S samples wait in the estimator and GNSS
+/// solutions in their ring.
 class Core {
  public:
   /// @param schedule  of the run that is replayed, empty otherwise
@@ -154,11 +158,19 @@ class Core {
 
   [[nodiscard]] const Estimator& estimator() const noexcept { return estimator_; }
   /// Samples of a stall are being caught up with.
-  [[nodiscard]] bool catches_up() const noexcept { return horizon_ != HostTime::max(); }
+  [[nodiscard]] bool catches_up() const noexcept { return horizon_ != HostTime::max() || steps_study_; }
 
  private:
+  /// How far a tick takes the samples of a device, in time of validity.
+  struct Reach {
+    HostTime now{HostTime::max()};
+    HostTime before{HostTime::max()};         ///< of the tick before
+    HostTime last_open_cut{HostTime::min()};  ///< of the last tick that took all there was
+  };
   void look_for_backlog(std::int64_t index, HostTime cut) noexcept;
-  [[nodiscard]] bool is_within(const Sample& sample, HostTime horizon) const noexcept;
+  [[nodiscard]] HostTime common_horizon(std::int64_t index, HostTime cut) const noexcept;
+  [[nodiscard]] HostTime reach_of(std::size_t device, std::int64_t index, HostTime cut) noexcept;
+  [[nodiscard]] bool has_front(std::size_t device, std::int64_t index, HostTime cut) const noexcept;
   [[nodiscard]] bool was_late(const Sample& sample) const noexcept;
   [[nodiscard]] bool held_back(const Sample& sample, std::int64_t index) const noexcept;
   void consume(std::int64_t index, HostTime cut, CoreSink& sink) noexcept;
@@ -175,9 +187,11 @@ class Core {
   std::size_t next_applied_ = 0;
   std::vector<std::unique_ptr<LatestValue<NewNoise>>> noises_;  ///< per study
   HostTime previous_cut_{HostTime::min()};
-  HostTime horizon_{HostTime::max()};  ///< what is of a later time of validity waits
-  HostTime previous_horizon_{HostTime::max()};
-  HostTime last_open_cut_{HostTime::min()};   ///< of the last tick without a horizon
+  HostTime horizon_{HostTime::max()};  ///< of all devices: what is of a later time of validity waits
+  std::vector<Reach> reaches_;         ///< one a device
+  std::vector<bool> is_study_;
+  bool steps_study_ = false;  ///< an S-IMU is caught up with by itself
+  HostTime newest_reference_{HostTime::min()};
   HostTime newest_arrival_{HostTime::min()};  ///< of what was consumed
   HostTime listened_until_{HostTime::min()};  ///< what the estimator counts lateness by
   UtcSource first_utc_from_ = UtcSource::kNone;

@@ -37,7 +37,9 @@ PeriodicStatistics CoreThread::statistics() {
 void CoreThread::loop() {
   RingCoreSink sink(*rings_);
   PeriodicLoop beat(t0_ + kGuard, kTickPeriod);
-  while (last_tick_.load(std::memory_order_relaxed) < end_after_.load(std::memory_order_acquire)) {
+  // What came at last of a stall is caught up with, whenever the end was asked for.
+  while (last_tick_.load(std::memory_order_relaxed) < end_after_.load(std::memory_order_acquire) ||
+         (core_.catches_up() && end_after_.load(std::memory_order_relaxed) >= 0)) {
     const Tick tick = beat.wait();
     if (tick.skipped > 0) {
       (void)rings_->exceptions.try_push({ExceptionKind::kSkippedTicks, 0, -1, tick.index, tick.skipped});

@@ -14,6 +14,8 @@
 #include "drivers/ixblue_stdbin/session.h"
 #include "drivers/nmea/decoder.h"
 #include "drivers/nmea/session.h"
+#include "drivers/pps/decoder.h"
+#include "drivers/pps/session.h"
 #include "drivers/rtklib_pos/decoder.h"
 #include "drivers/rtklib_pos/session.h"
 #include "drivers/ubx/decoder.h"
@@ -171,6 +173,8 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
       return make_xsens_can(device, index, clock);
     case Protocol::kCanOdometry:
       return make_can_odometry(device, index);
+    case Protocol::kPps:
+      return std::make_unique<pps::Decoder>(pps::DecoderConfig{index});
   }
   return nullptr;
 }
@@ -202,6 +206,8 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device, bool sea
     case Protocol::kXsensCan:
     case Protocol::kCanOdometry:
       return std::make_unique<CanSession>();
+    case Protocol::kPps:
+      return std::make_unique<pps::Session>();
     case Protocol::kCsvImu:
     case Protocol::kCsvGnss:
       break;

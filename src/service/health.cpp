@@ -11,6 +11,7 @@
 
 #include "base/units.h"
 #include "publish/message_values.h"
+#include "service/alarms.h"
 #include "service/observability.h"
 
 namespace imuscope {
@@ -51,6 +52,15 @@ std::string loss_reason(const status_t& status) {
   return {};
 }
 
+/// The first active alarm that is of no device; empty when there is none.
+std::string first_trouble(const status_t& status) {
+  for (const auto& alarm : status.alarms) {
+    if (alarm.active != 0 && alarm.kind != alarm_kind::kDevice)
+      return Error{ErrorKind::kWork, alarm.what, alarm.remedy}.text();
+  }
+  return {};
+}
+
 }  // namespace
 
 Health judge(const status_t& status) {
@@ -72,9 +82,42 @@ Health judge(const status_t& status) {
     return {calibrating || failed(*silent) ? "degraded" : "starting", device_reason(*silent)};
   }
   if (auto loss = loss_reason(status); !loss.empty()) return {"degraded", std::move(loss)};
-  if (!status.problems.empty()) return {"degraded", status.problems.front()};
+  if (const std::string trouble = first_trouble(status); !trouble.empty()) return {"degraded", trouble};
   if (!calibrating) return {"aligning", "waiting for motion that shows how the S-IMUs sit"};
   return {"running", "all devices stream"};
+}
+
+std::vector<Condition> conditions_of(const status_t& status, GrowingCounts& counts, HostTime now) {
+  std::vector<Condition> conditions;
+  for (const auto& device : status.devices) {
+    if (streams(device)) continue;
+    Condition condition = condition_of(alarm_kind::kDevice, device.name, device.problem);
+    condition.what = fmt::format("{}: {}{}{}", device.name, device.state, condition.what.empty() ? "" : ": ",
+                                 condition.what);
+    if (device.problem.empty())
+      condition.remedy = "check its power, its cable and its line in the configuration";
+    conditions.push_back(std::move(condition));
+  }
+  const auto add_loss = [&](const char* kind, const std::string& subject, std::int64_t count,
+                            std::string what, const char* remedy) {
+    if (counts.grows(fmt::format("{} {}", kind, subject), count, now))
+      conditions.push_back({kind, subject, std::move(what), remedy});
+  };
+  for (const auto& device : status.devices) {
+    add_loss(alarm_kind::kDeviceLoss, device.name, device.frames_dropped + device.samples_refused,
+             fmt::format("{} frames and {} samples of {} were lost by this PC", device.frames_dropped,
+                         device.samples_refused, device.name),
+             "find what else keeps this PC busy, and let the service run in real time (imuscope doctor)");
+  }
+  add_loss(alarm_kind::kCaptureLoss, "", status.capture_lost,
+           fmt::format("{} records could not be kept in the capture", status.capture_lost),
+           "make room on the disk, or record to a faster one");
+  for (const auto& ring : status.rings) {
+    add_loss(alarm_kind::kRing, ring.name, ring.refused,
+             fmt::format("the ring '{}' refused {} elements", ring.name, ring.refused),
+             "find what else keeps this PC or its disk busy");
+  }
+  return conditions;
 }
 
 study_status_t study_status(const std::string& name, const StudyOutput& study) {
@@ -83,9 +126,9 @@ study_status_t study_status(const std::string& name, const StudyOutput& study) {
   status.name = name;
   status.state = words_of(study.status);
   status.regime = regime_name(study.regime);
-  status.goal_psi_deg = kGoalBoresightSd_rad * kDegPerRad;
-  status.goal_r_m = kGoalLeverArmSd_m;
-  status.goal_t_d_ms = kGoalTimeOffsetSd_s * kMsPerS;
+  status.goal_psi_deg = study.goal.boresight_sd_rad * kDegPerRad;
+  status.goal_r_m = study.goal.lever_arm_sd_m;
+  status.goal_t_d_ms = study.goal.time_offset_sd_s * kMsPerS;
   status.samples = as_count(study.counters.samples);
   status.used = as_count(study.counters.used);
   status.late = as_count(study.counters.late);
@@ -109,6 +152,11 @@ study_status_t study_status(const std::string& name, const StudyOutput& study) {
 
 void set_time_budget(const TimeBudget& budget, device_status_t& device) {
   constexpr double kUsPerS = 1e6;
+  device.stamped_by = name_of(budget.stamped_by);
+  device.stamp_lead_us = budget.stamp_lead_s * kUsPerS;
+  device.stamp_lead_sd_us = budget.stamp_lead_sd_s * kUsPerS;
+  device.delay_ms = budget.delay_s * kMsPerS;
+  device.sd_delay_ms = budget.sd_delay_s * kMsPerS;
   device.latency_ms = budget.latency_s * kMsPerS;
   device.clock_drift_ppm = budget.clock_drift_ppm;
   device.clock_sd_us = budget.clock_sd_s * kUsPerS;
@@ -130,6 +178,7 @@ status_t status_of(const Configuration& configuration, const std::string& versio
     entry.name = device.name;
     entry.role = name_of(device.role);
     entry.protocol = name_of(device.protocol);
+    entry.data_age_s = kUnknown;
     set_time_budget({}, entry);
     status.devices.push_back(std::move(entry));
   }
@@ -137,15 +186,17 @@ status_t status_of(const Configuration& configuration, const std::string& versio
 }
 
 std::string_view name_of(UtcSource source) noexcept {
-  constexpr std::array<std::string_view, 4> kNames{"none", "reference", "gnss", "pc"};
+  constexpr std::array<std::string_view, 5> kNames{"none", "reference", "gnss", "pc", "pps"};
   return kNames[static_cast<std::size_t>(source)];
 }
 
 void set_time_scale(const TimeScale& scale, status_t& status) {
-  const bool told_by_device = scale.source == UtcSource::kReference || scale.source == UtcSource::kGnss;
+  const bool told_by_device = is_told_by_device(scale.source);
   status.utc_source = name_of(scale.source);
   status.utc_sd_s = scale.source == UtcSource::kNone ? kUnknown : scale.sd_utc_s;
   status.host_clock_ppm = told_by_device ? -scale.rate * 1e6 : kUnknown;
+  status.pulses = as_count(scale.pulses.used);
+  status.host_utc_sd_us = scale.pulses.is_known ? scale.pulses.sd_utc_s * 1e6 : kUnknown;
 }
 
 void count_elements(status_t& status) {
@@ -154,7 +205,7 @@ void count_elements(status_t& status) {
   for (thread_status_t& thread : status.threads) thread.n_octaves = element_count(thread.lateness_octaves);
   status.n_threads = element_count(status.threads);
   status.n_rings = element_count(status.rings);
-  status.n_problems = element_count(status.problems);
+  status.n_alarms = element_count(status.alarms);
 }
 
 namespace {
@@ -220,6 +271,7 @@ std::vector<thread_status_t> ThreadWatch::look(HostTime now) {
     set_beat({}, Duration::zero(), thread);
     thread.lateness_octaves.clear();
     thread.cpu_percent = kUnknown;
+    thread.heartbeat_age_s = kUnknown;
     std::ifstream(entry.path() / "comm") >> thread.name;
     std::int64_t ran_ns = 0;
     std::ifstream(entry.path() / "schedstat") >> ran_ns;

@@ -9,6 +9,7 @@
 
 #include "configuration/config.h"
 #include "rt/periodic.h"
+#include "service/alarms.h"
 #include "service/core.h"
 #include "service/time_budget.h"
 
@@ -20,10 +21,15 @@ struct Health {
   std::string reason;
 };
 
-/// Judges a status whose devices, studies, threads, rings, problems and capture are filled in. The worst
+/// Judges a status whose devices, studies, threads, rings, alarms and capture are filled in. The worst
 /// thing wins: failed (nothing can come of this run as it stands), then starting, degraded (results are less
 /// than they could be, or are being lost), aligning, running.
 [[nodiscard]] Health judge(const status_t& status);
+
+/// What is wrong with devices and queues by the status alone.
+/// @param counts  of the looks before
+[[nodiscard]] std::vector<Condition> conditions_of(const status_t& status, GrowingCounts& counts,
+                                                   HostTime now);
 
 /// What is known of a run before anything happens: its names, and its devices with nothing but theirs.
 [[nodiscard]] status_t status_of(const Configuration& configuration, const std::string& version);

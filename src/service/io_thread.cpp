@@ -109,25 +109,38 @@ class IoThread::Line final : public SampleSink {
 
   void read(RawTap& tap, int epoll) noexcept {
     for (int i = 0; i < kReadsPerWake && connection_ != nullptr; ++i) {
-      const auto result = connection_->line->read(buffer_);
+      const auto result = connection_->line->read(std::span(buffer_).subspan(kReceivedBytes));
       if (result.status == IoStatus::kGone) give_back(epoll);
       if (result.status != IoStatus::kDone) return;
-      const HostTime arrival = host_now();
-      const std::span<const std::uint8_t> bytes(buffer_.data(), result.n);
-      tap.record(index_, Direction::kRead, bytes, arrival);
+      const HostTime now = host_now();
+      const Arrival arrival{now, std::min(result.received.value_or(now), now)};
+      const auto bytes = record(tap, result.n, arrival);
       decode(bytes, arrival);
       for (Line* sharer : sharers_) sharer->decode(bytes, arrival);
-      connection_->session->on_bytes(bytes, arrival);
-      status_.last_arrival = arrival;
+      connection_->session->on_bytes(bytes, now);
+      status_.last_arrival = now;
       ++status_.reads;
       if (!result.more) return;
     }
   }
 
+  /// The bytes of a read, which lie behind room for its stamp.
+  std::span<const std::uint8_t> record(RawTap& tap, std::size_t n, const Arrival& arrival) noexcept {
+    const std::span<const std::uint8_t> all(buffer_.data(), kReceivedBytes + n);
+    if (arrival.received == arrival.read) {
+      tap.record(index_, Direction::kRead, all.subspan(kReceivedBytes), arrival.read);
+    } else {
+      const auto stamp = received_bytes(arrival.received);
+      std::copy(stamp.begin(), stamp.end(), buffer_.begin());
+      tap.record(index_, Direction::kStampedRead, all, arrival.read);
+    }
+    return all.subspan(kReceivedBytes);
+  }
+
   /// A device behind the same head, whose bytes come on this line.
   void share_with(Line& other) { sharers_.push_back(&other); }
 
-  void decode(std::span<const std::uint8_t> bytes, HostTime arrival) noexcept {
+  void decode(std::span<const std::uint8_t> bytes, const Arrival& arrival) noexcept {
     decoder_->push(bytes, arrival, *this);
   }
 
@@ -158,6 +171,7 @@ class IoThread::Line final : public SampleSink {
       const auto health = connection_->line->health();
       status_.line = health.is_up ? LineState::kOpen : LineState::kDown;
       status_.frames_dropped = dropped_before_ + health.frames_dropped;
+      status_.stamps = health.stamps;
       status_.session = connection_->session->state();
       auto problem = connection_->session->problem();
       if (problem.empty()) problem = decoder_->remark();
@@ -173,6 +187,7 @@ class IoThread::Line final : public SampleSink {
   void show_line_of(const LineStatus& owner) noexcept {
     status_.line = owner.line;
     status_.timing = owner.timing;
+    status_.stamps = owner.stamps;
     status_.session = owner.session;
     status_.problem = owner.problem;
     status_.last_arrival = owner.last_arrival;
@@ -231,7 +246,7 @@ class IoThread::Line final : public SampleSink {
   HostTime listens_since_{};
   std::optional<HostTime> since_;  ///< in the midst of a frame, rests since then
   int beats_ = 0;                  ///< of rest that are left
-  std::array<std::uint8_t, kReadBytes> buffer_{};
+  std::array<std::uint8_t, kReceivedBytes + kReadBytes> buffer_{};  ///< a read, behind room for its stamp
   LineStatus status_;
   std::uint64_t dropped_before_ = 0;  ///< on the connections before this one
   LatencyWindow latency_;

@@ -55,6 +55,7 @@ struct LineStatus {
   double clock_drift_ppm = 0.0;  ///< of the device's clock, fast where positive; NaN where unknown
   double clock_sd_s = 0.0;       ///< how well their relation is known; NaN where it is not
   LineTiming timing{};           ///< of the line as it was opened last
+  StampQuality stamps{};         ///< of the line, lately
   HostTime last_arrival{};
   std::array<char, 200> problem{};  ///< of the session; NUL-terminated
 };

@@ -4,12 +4,14 @@
 
 #include "drivers/transport/can_socket.h"
 #include "drivers/transport/net_stream.h"
+#include "drivers/transport/pps_source.h"
 #include "drivers/transport/serial_port.h"
 
 namespace imuscope {
 
 bool has_line(const DeviceConfig& device) {
-  return device.serial.has_value() || device.net.has_value() || device.can.has_value();
+  return device.serial.has_value() || device.net.has_value() || device.can.has_value() ||
+         device.pps.has_value();
 }
 
 Result<std::unique_ptr<Transport>> open_line(const DeviceConfig& device, const std::vector<CanId>& ids) {
@@ -28,6 +30,12 @@ Result<std::unique_ptr<Transport>> open_line(const DeviceConfig& device, const s
     auto stream = NetStream::open({kind, device.net->host, device.net->port});
     if (!stream) return tl::unexpected<Error>(std::move(stream.error()));
     return std::unique_ptr<Transport>(std::move(*stream));
+  }
+  if (device.pps) {
+    auto source =
+        PpsSource::open({device.pps->port, device.pps->clear_edge ? PulseEdge::kClear : PulseEdge::kAssert});
+    if (!source) return tl::unexpected<Error>(std::move(source.error()));
+    return std::unique_ptr<Transport>(std::move(*source));
   }
   return usage_error(fmt::format("device '{}' has no line", device.name), "give it a transport");
 }

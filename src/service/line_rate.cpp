@@ -5,6 +5,7 @@
 #include "base/limits.h"
 #include "capture/raw_chunk.h"
 #include "drivers/device/frame_buffer.h"
+#include "drivers/device/pulse_record.h"
 #include "service/line_factory.h"
 
 namespace imuscope {
@@ -28,6 +29,8 @@ double sample_bytes(DeviceRole role) {
       return kGnssEpochBytes;
     case DeviceRole::kOdometry:
       return kOdometrySampleBytes;
+    case DeviceRole::kTime:
+      return kPulseRecordBytes;
     default:
       return kImuSampleBytes;
   }

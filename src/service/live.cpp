@@ -5,15 +5,18 @@
 #include <algorithm>
 #include <chrono>
 #include <fstream>
-#include <thread>
 
 #include "capture/recorder.h"
+#include "doors/journal.h"
+#include "doors/metrics_server.h"
+#include "doors/status_socket.h"
 #include "noise/model.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
 #include "service/baud_search.h"
 #include "service/controlling_terminal.h"
 #include "service/core_thread.h"
+#include "service/device_events.h"
 #include "service/device_factory.h"
 #include "service/estimator_setup.h"
 #include "service/io_thread.h"
@@ -25,6 +28,7 @@
 #include "service/new_folder.h"
 #include "service/pulse.h"
 #include "service/reload.h"
+#include "service/retention.h"
 #include "service/systemd_notify.h"
 
 namespace imuscope {
@@ -59,6 +63,15 @@ class Supervisor {
   void step(HostTime now) {
     for (std::size_t i = 0; i < lines_.size(); ++i) {
       if (configuration_.devices[i].line_owner == i) step_line(static_cast<DeviceIndex>(i), now);
+    }
+  }
+
+  /// A device has come: lines that are missing are tried without a pause, and again soon where it is not
+  /// ready yet.
+  void try_at_once() {
+    for (auto& line : lines_) {
+      line.next_try = HostTime{};
+      line.pause = kReopenFirst;
     }
   }
 
@@ -160,6 +173,12 @@ std::string processor_model() {
   return "unknown";
 }
 
+std::vector<std::string> device_names(const Configuration& configuration) {
+  std::vector<std::string> names;
+  for (const auto& device : configuration.devices) names.push_back(device.name);
+  return names;
+}
+
 RunHeader run_header(const Configuration& configuration, const LiveOptions& options, HostTime t0) {
   RunHeader header;
   header.name = configuration.run_name;
@@ -172,7 +191,7 @@ RunHeader run_header(const Configuration& configuration, const LiveOptions& opti
   header.t0_wall = std::chrono::floor<std::chrono::microseconds>(wall_clock_now() + (t0 - host_now()));
   header.configuration = configuration.text;
   header.configuration_hash = configuration.sha256;
-  for (const auto& device : configuration.devices) header.devices.push_back(device.name);
+  header.devices = device_names(configuration);
   return header;
 }
 
@@ -184,12 +203,12 @@ void log_refusals(const std::vector<Error>& refusals) {
 class StandingThreads {
  public:
   void look(std::span<const Pulse> pulses, HostTime now) {
-    const auto sentences = standing_threads(pulses, now);
-    if (sentences.size() > told_) {
-      for (const auto& sentence : sentences) spdlog::warn("{}", sentence);
+    const auto standing = standing_threads(pulses, now);
+    if (standing.size() > told_) {
+      for (const auto& thread : standing) spdlog::warn("{}", thread.what);
     }
-    if (sentences.empty() && told_ > 0) spdlog::info("all threads move again");
-    told_ = sentences.size();
+    if (standing.empty() && told_ > 0) spdlog::info("all threads move again");
+    told_ = standing.size();
   }
 
  private:
@@ -215,6 +234,28 @@ void reload(const Configuration& configuration, LivePublisher& publisher) {
   for (const auto& name : read->at_next_start)
     spdlog::warn("reload: [{}] has changed, too; that takes effect at the next start", name);
 }
+
+/// Through which this PC may ask how the run is. A door that cannot be opened is told, and is no reason not
+/// to record.
+struct Doors {
+  Doors(const MetricsOptions& metrics, const StatusBoard& board) {
+    if (auto opened = StatusSocket::open(board)) {
+      status = std::move(*opened);
+    } else {
+      spdlog::info("`imuscope status` cannot ask this run: {}", opened.error().text());
+    }
+    if (metrics.port == 0) return;
+    if (auto opened = MetricsServer::open(metrics.address, metrics.port, board)) {
+      numbers = std::move(*opened);
+      spdlog::info("metrics are offered at {} port {}", metrics.address, metrics.port);
+    } else {
+      spdlog::error("{}", opened.error().text());
+    }
+  }
+
+  std::unique_ptr<StatusSocket> status;
+  std::unique_ptr<MetricsServer> numbers;
+};
 
 /// A recording is never written over, nor the files beside it.
 Result<void> check_folder(const std::filesystem::path& out) {
@@ -249,6 +290,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
   if (auto checked = check_folder(options.out); !checked) return checked;
   if (auto sized = set_thread_stack_size(kThreadStackBytes); !sized) spdlog::warn("{}", sized.error().text());
 
+  set_journal_run(configuration.run_name, device_names(configuration));
   LiveHistory history;
   const EstimatorConfig estimator_settings = estimator_config(configuration);
   Core core(estimator_settings, configuration.devices.size(), {}, &history);
@@ -272,6 +314,8 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
   (*publisher)->watch_can(ids);
   Recorder::Options recording{options.out / "capture.lcm", configuration.lcm.channel_prefix, header};
   recording.sync_interval = from_seconds(configuration.record.sync_s);
+  recording.max_file_bytes = static_cast<std::uint64_t>(configuration.record.file_bytes);
+  recording.max_file_age = from_seconds(configuration.record.file_s);
   auto recorder = Recorder::start(std::move(recording), {&io.raw_ring()},
                                   {&io.exceptions(), &estimator.rings().exceptions});
   if (!recorder) return tl::unexpected<Error>(recorder.error());
@@ -289,11 +333,17 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
   (*publisher)->start();
   log_refusals(refusals);
   (*publisher)->set_refusals(refusals);
+  const RunLock lock(options.out);
+  // Of a run whose folder somebody named, the folder of [record] is none of its business.
+  std::optional<Retention> retention;
+  if (wanted.out.empty()) retention.emplace(options.parent, configuration.record);
+  const Doors doors(configuration.metrics, (*publisher)->board());
   spdlog::info("running '{}' into {}; Ctrl-C ends it", configuration.run_name, options.out.string());
   SystemdNotify systemd;
   systemd.ready(fmt::format("recording into {}", options.out.string()));
 
   Supervisor supervisor(configuration, ids, io, **publisher);
+  DeviceEvents devices;
   const auto pulses = (*publisher)->pulses();
   const ControllingTerminal terminal;
   StandingThreads standing;
@@ -322,7 +372,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
     }
     standing.look(pulses, now);
     if (all_alive(pulses, now)) systemd.alive(now);
-    std::this_thread::sleep_for(kSupervisorPeriod);
+    if (devices.wait(kSupervisorPeriod)) supervisor.try_at_once();
   }
   systemd.stopping();
 

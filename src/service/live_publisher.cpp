@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/units.h"
+#include "doors/journal.h"
 #include "publish/message_codec.h"
 #include "rt/host_clock.h"
 #include "service/describe.h"
@@ -86,6 +87,7 @@ LivePublisher::LivePublisher(const Configuration& configuration, noise::ModelSpe
       lines_(configuration.devices.size()),
       can_watches_(configuration.devices.size()),
       line_problems_(configuration.devices.size()),
+      clock_keepers_([folder = options.out] { return ask_clock_keepers(folder); }),
       study_states_(study_devices_.size(), CalibrationStatus::kWaiting),
       observability_(study_devices_.size()),
       started_(host_now()),
@@ -237,7 +239,7 @@ std::vector<Pulse> LivePublisher::pulses() const {
 
 void LivePublisher::set_refusals(const std::vector<Error>& refusals) {
   const std::lock_guard lock(shared_mutex_);
-  for (const auto& refusal : refusals) refusals_.push_back(refusal.text());
+  refusals_ = refusals;
 }
 
 void LivePublisher::watch_can(const std::vector<std::vector<CanId>>& ids) {
@@ -395,8 +397,9 @@ void LivePublisher::watch_devices(HostTime now) {
   }
 }
 
-void LivePublisher::fill_device(std::size_t index, device_status_t& device) const {
+void LivePublisher::fill_device(std::size_t index, device_status_t& device, HostTime now) const {
   const auto& line = lines_[index];
+  if (line.last_arrival > HostTime{}) device.data_age_s = std::max(0.0, to_seconds(now - line.last_arrival));
   device.state = state_name(line);
   device.problem = watches_[index].problem;
   device.rate_hz = watches_[index].rate_hz;
@@ -411,7 +414,9 @@ void LivePublisher::fill_device(std::size_t index, device_status_t& device) cons
   device.clock_resets = as_count(line.counters.clock_resets);
   const StudyOutput* const study = study_of(index);
   if (study != nullptr) device.samples_late = as_count(study->counters.late);
-  set_time_budget(time_budget(line, study), device);
+  set_time_budget(time_budget(line, study, configuration_.devices[index].role,
+                              last_ ? last_->time_scale.pulses : PulseState{}),
+                  device);
 }
 
 /// The newest estimate of an S-IMU; null for other devices and before the first.
@@ -432,6 +437,12 @@ void LivePublisher::add_threads(status_t& status, HostTime now) {
   add_beat(kEstimatorThreadName, estimator_.statistics(), CoreThread::kGuard);
   add_beat(kIoThreadName, io_.statistics(), Duration::zero());
   add_beat(kPublisherThreadName, beat_, Duration::zero());
+  for (const auto& pulse : pulses()) {
+    const auto found = std::find_if(status.threads.begin(), status.threads.end(),
+                                    [&](const auto& thread) { return thread.name == pulse.thread; });
+    if (found != status.threads.end())
+      found->heartbeat_age_s = std::max(0.0, to_seconds(now - pulse.heartbeat->last()));
+  }
 }
 
 void LivePublisher::add_rings(status_t& status) {
@@ -469,29 +480,58 @@ status_t LivePublisher::status(HostTime now) {
     status.capture_bytes = as_count(recorded.bytes);
     status.capture_lost =
         as_count(recorded.records_lost + recorded.messages_lost + io_.raw_ring().counters().refused);
-    if (recorded.problem) status.problems.push_back(recorded.problem->text());
   }
-  for (std::size_t i = 0; i < lines_.size(); ++i) fill_device(i, status.devices[i]);
+  for (std::size_t i = 0; i < lines_.size(); ++i) fill_device(i, status.devices[i], now);
   for (std::size_t i = 0; i < study_devices_.size(); ++i) {
     status.studies.push_back(study_status(configuration_.devices[study_devices_[i]].name,
                                           last_ ? last_->studies[i] : StudyOutput{}));
   }
   add_threads(status, now);
   add_rings(status);
-  for (auto& sentence : standing_threads(pulses(), now)) status.problems.push_back(std::move(sentence));
-  if (const auto problem = folder_->problem()) status.problems.push_back(problem->text());
-  if (!bus_problem_.empty()) status.problems.push_back(bus_problem_);
+  add_alarms(status, now);
   const std::lock_guard lock(shared_mutex_);
-  status.problems.insert(status.problems.end(), refusals_.begin(), refusals_.end());
   health_ = judge(status);
   status.state = health_.state;
   status.reason = health_.reason;
   return status;
 }
 
+void LivePublisher::add_alarms(status_t& status, HostTime now) {
+  std::vector<Condition> holding = standing_threads(pulses(), now);
+  const auto add = [&holding](Condition condition) { holding.push_back(std::move(condition)); };
+  const auto add_disk = [&add](const char* subject, const std::optional<Error>& problem) {
+    if (problem) add({alarm_kind::kDisk, subject, problem->what, problem->remedy});
+  };
+  if (recorder_ != nullptr) add_disk("capture", recorder_->status().problem);
+  add_disk("results", folder_->problem());
+  if (!bus_problem_.empty()) add(condition_of(alarm_kind::kBus, "LCM", bus_problem_));
+  {
+    const std::lock_guard lock(shared_mutex_);
+    for (const auto& refusal : refusals_)
+      add({alarm_kind::kPrivilege, refusal.what, refusal.what, refusal.remedy});
+  }
+  for (auto& condition : conditions_of(status, growing_, now)) add(std::move(condition));
+  const auto news = alarms_.look(holding, utc_at(now), now);
+  for (const auto& alarm : news.began) tell_alarm(alarm);
+  for (const auto& alarm : news.ended) tell_alarm(alarm);
+  status.alarms = alarms_.list();
+}
+
 void LivePublisher::watch_pc_clock(HostTime now) {
+  if (auto keepers = clock_keepers_.take()) {
+    const auto news = pc_clock_.take(std::move(*keepers));
+    broadcast_.on_pc_clock(news, utc_at(news.state.reading.host));
+  }
   const auto news = pc_clock_.look(now);
   if (!news) return;
+  clock_keepers_.begin();
+  if (news->suspend) {
+    spdlog::warn(
+        "this PC was suspended for {:.1f} s: what the devices sent meanwhile is lost, and their clocks begin "
+        "anew; "
+        "keep it awake while it records (systemd-inhibit)",
+        news->suspend->length_s);
+  }
   if (news->step) {
     spdlog::warn(
         "this PC's wall clock was stepped by {:+.6f} s; times and labels of this run go on as they were",
@@ -500,7 +540,12 @@ void LivePublisher::watch_pc_clock(HostTime now) {
   broadcast_.on_pc_clock(*news, utc_at(news->state.reading.host));
 }
 
-void LivePublisher::publish_status(HostTime now) { broadcast_.on_status(status(now)); }
+void LivePublisher::publish_status(HostTime now) {
+  status_t newest = status(now);
+  count_elements(newest);
+  board_.put(newest, now);
+  broadcast_.on_status(std::move(newest));
+}
 
 Result<void> LivePublisher::finish(std::int64_t last_tick) {
   running_.store(false, std::memory_order_release);
@@ -527,7 +572,8 @@ Result<void> LivePublisher::finish(std::int64_t last_tick) {
   for (std::size_t i = 0; i < lines_.size(); ++i) {
     const LineStatus& line = lines_[i];
     DeviceRecord device;
-    device.time_budget = time_budget(line, study_of(i));
+    device.time_budget = time_budget(line, study_of(i), configuration_.devices[i].role,
+                                     last_ ? last_->time_scale.pulses : PulseState{});
     device.counters = line.counters;
     device.refused = line.refused;
     device.frames_dropped = line.frames_dropped;

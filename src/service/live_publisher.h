@@ -12,8 +12,10 @@
 
 #include "capture/recorder.h"
 #include "configuration/config.h"
+#include "doors/status_board.h"
 #include "publish/lcm_listener.h"
 #include "publish/message_values.h"
+#include "service/alarms.h"
 #include "service/broadcast.h"
 #include "service/can_watch.h"
 #include "service/core_thread.h"
@@ -57,6 +59,8 @@ class LivePublisher {
   void reconfigure(const Tunables& tunables);
   /// Of every thread of the run but the caller's. Call after set_recorder().
   [[nodiscard]] std::vector<Pulse> pulses() const;
+  /// The newest status, for the doors. Lives as long as the publisher.
+  [[nodiscard]] const StatusBoard& board() const noexcept { return board_; }
   /// The last overall state and its reason, for the log and systemd. Any thread.
   [[nodiscard]] Health health() const;
   /// Publishes and writes what is left, closes the files. Call after the core's thread has ended.
@@ -84,9 +88,10 @@ class LivePublisher {
   [[nodiscard]] std::string problem_of(std::size_t device, HostTime now);
   [[nodiscard]] UtcTime utc_at(HostTime time) const;
   [[nodiscard]] status_t status(HostTime now);
-  void fill_device(std::size_t index, device_status_t& device) const;
+  void fill_device(std::size_t index, device_status_t& device, HostTime now) const;
   void add_threads(status_t& status, HostTime now);
   void add_rings(status_t& status);
+  void add_alarms(status_t& status, HostTime now);
 
   const Configuration& configuration_;
   LiveOptions options_;
@@ -123,6 +128,7 @@ class LivePublisher {
   std::mutex line_problems_mutex_;
   std::vector<std::string> line_problems_;
   PcClockLog pc_clock_;
+  ClockKeeperInquiry clock_keepers_;
   std::vector<CalibrationStatus> study_states_;
   std::vector<ObservabilityWatch> observability_;
   std::int64_t refits_ = 0;
@@ -131,10 +137,13 @@ class LivePublisher {
   std::optional<UtcTime> refit_utc_;
   ThreadWatch threads_;
   PeriodicStatistics beat_;
+  GrowingCounts growing_;
+  AlarmBook alarms_;
+  StatusBoard board_;
   HostTime started_;
   HostTime last_status_{};
   mutable std::mutex shared_mutex_;  ///< what other threads of the soft world ask for or hand in
-  std::vector<std::string> refusals_;
+  std::vector<Error> refusals_;
   std::optional<Tunables> new_tunables_;
   Health health_{"starting", "the threads start"};
   Heartbeat heartbeat_{host_now()};

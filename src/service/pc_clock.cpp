@@ -3,6 +3,7 @@
 #include <sys/timex.h>
 
 #include <cmath>
+#include <ctime>
 
 #include "rt/host_clock.h"
 
@@ -17,6 +18,14 @@ constexpr Duration kApartGood = std::chrono::microseconds(20);
 constexpr Duration kStepMin = std::chrono::milliseconds(1);
 /// NTP slews the wall clock by at most 500 ppm (adjtimex(2)); chrony and adjtime() by as much as a tenth.
 constexpr double kSlewMax = 500e-6;
+/// Nobody suspends a PC for less; two readings of clocks are closer.
+constexpr Duration kSuspendMin = std::chrono::milliseconds(50);
+
+Duration boot_time() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return std::chrono::seconds(now.tv_sec) + Duration(now.tv_nsec);
+}
 
 }  // namespace
 
@@ -44,8 +53,9 @@ PcClockReading read_pc_clocks() noexcept {
   for (int i = 0; i < kReadings && best.apart > kApartGood; ++i) {
     const HostTime before = host_now();
     const UtcTime wall = wall_clock_now();
-    const Duration apart = host_now() - before;
-    if (apart < best.apart) best = {before + apart / 2, wall, apart};
+    const HostTime after = host_now();
+    const Duration apart = after - before;
+    if (apart < best.apart) best = {before + apart / 2, wall, apart, boot_time() - after.time_since_epoch()};
   }
   return best;
 }
@@ -53,9 +63,17 @@ PcClockReading read_pc_clocks() noexcept {
 std::optional<WallClockStep> WallClockWatch::look(const PcClockReading& reading) noexcept {
   const std::optional<PcClockReading> before = last_;
   last_ = reading;
+  suspend_.reset();
   if (!before) return std::nullopt;
   const Duration passed = reading.host - before->host;
-  const Duration change = (reading.wall - before->wall) - passed;
+  Duration change = (reading.wall - before->wall) - passed;
+  const Duration slept = reading.asleep - before->asleep;
+  if (slept > kSuspendMin) {
+    suspend_ = PcSuspend{before->host, reading.host, to_seconds(slept)};
+    // The wall clock is set from the hardware's, which counts less finely.
+    change -= slept;
+    if (std::chrono::abs(change) < std::chrono::seconds(1)) return std::nullopt;
+  }
   const double unsure_s =
       to_seconds(kStepMin + before->apart + reading.apart) + kSlewMax * to_seconds(passed);
   if (std::abs(to_seconds(change)) <= unsure_s) return std::nullopt;
@@ -75,11 +93,21 @@ std::optional<PcClockLog::News> PcClockLog::look(HostTime now) {
       ++record_.steps_left_out;
     }
   }
-  if (!is_first && !step && now - told_ < kStatePeriod) return std::nullopt;
+  const auto& suspend = watch_.suspend();
+  if (suspend && record_.suspends.size() < kStepsMax) record_.suspends.push_back(*suspend);
+  if (!is_first && !step && !suspend && now - told_ < kStatePeriod) return std::nullopt;
   told_ = now;
-  record_.last = {reading, ask_()};
+  record_.last = {reading, ask_(), record_.last ? record_.last->keepers : std::vector<ClockKeeper>{}};
   if (is_first) record_.first = record_.last;
-  return News{*record_.last, step};
+  return News{*record_.last, step, suspend};
+}
+
+PcClockLog::News PcClockLog::take(std::vector<ClockKeeper> keepers) {
+  const PcClockReading reading = read_();
+  if (!record_.first) record_.first = PcClockRecord::State{reading, ask_()};
+  if (record_.first->keepers.empty()) record_.first->keepers = keepers;
+  record_.last = {reading, ask_(), std::move(keepers)};
+  return {*record_.last, std::nullopt, std::nullopt};
 }
 
 }  // namespace imuscope

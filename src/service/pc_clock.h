@@ -1,7 +1,9 @@
 #pragma once
 
 /// The PC's own clock: what the kernel knows of it, and steps of the wall clock, which nothing of the core
-/// looks at and which everything that a person compares with the run is stamped by. Soft world.
+/// looks at and which everything that a person compares with the run is stamped by. And whether the PC slept:
+/// CLOCK_MONOTONIC, by which everything is stamped, stands still meanwhile, and the devices go on. Soft
+/// world.
 
 #include <cstdint>
 #include <functional>
@@ -9,6 +11,7 @@
 #include <vector>
 
 #include "base/time.h"
+#include "service/clock_keepers.h"
 
 namespace imuscope {
 
@@ -34,23 +37,34 @@ struct WallClockStep {
   double size_s = 0.0;  ///< forward where positive
 };
 
-/// One reading of both clocks.
+/// The PC was suspended: for so long the wall clock and the devices went on, and the host's clock did not.
+struct PcSuspend {
+  HostTime after{};   ///< it was awake
+  HostTime before{};  ///< it was awake again
+  double length_s = 0.0;
+};
+
+/// One reading of all clocks.
 struct PcClockReading {
   HostTime host{};
   UtcTime wall{};
-  Duration apart{};  ///< at most, between the readings of the two clocks
+  Duration apart{};   ///< at most, between the readings of the two clocks
+  Duration asleep{};  ///< since the PC was switched on: CLOCK_BOOTTIME less CLOCK_MONOTONIC
 };
 [[nodiscard]] PcClockReading read_pc_clocks() noexcept;
 
-/// Finds steps by the difference of the two clocks. What NTP slews, at most 500 ppm, is no step.
-/// Thread: one. Deterministic: a function of the readings.
+/// Finds steps by the difference of the two clocks. What NTP slews, at most 500 ppm, is no step, nor is the
+/// time for which the PC slept. Thread: one. Deterministic: a function of the readings.
 class WallClockWatch {
  public:
   /// A step since the reading before, where there is one.
   [[nodiscard]] std::optional<WallClockStep> look(const PcClockReading& reading) noexcept;
+  /// The sleep that the last look() found, where there was one.
+  [[nodiscard]] const std::optional<PcSuspend>& suspend() const noexcept { return suspend_; }
 
  private:
   std::optional<PcClockReading> last_;
+  std::optional<PcSuspend> suspend_;
 };
 
 /// Everything that a run notes of the PC's clock.
@@ -58,11 +72,13 @@ struct PcClockRecord {
   struct State {
     PcClockReading reading;
     std::optional<KernelClockState> kernel;
+    std::vector<ClockKeeper> keepers{};  ///< as they answered last, a minute ago at most
   };
   std::optional<State> first;
   std::optional<State> last;
   std::vector<WallClockStep> steps;
   std::uint64_t steps_left_out = 0;  ///< a clock that is stepped for ever fills no file
+  std::vector<PcSuspend> suspends;   ///< not more than steps either
 };
 
 /// Looks at the clock as often as a run has to. Thread: one, of the soft world.
@@ -81,9 +97,14 @@ class PcClockLog {
   struct News {
     PcClockRecord::State state;
     std::optional<WallClockStep> step;
+    std::optional<PcSuspend> suspend{};
   };
-  /// Call at every turn of the thread: says something at the start, once a minute, and after a step.
+  /// Call at every turn of the thread: says something at the start, once a minute, and after a step or a
+  /// sleep.
   [[nodiscard]] std::optional<News> look(HostTime now);
+
+  /// What those who keep the clock answered; a state to be published, with that.
+  [[nodiscard]] News take(std::vector<ClockKeeper> keepers);
 
   [[nodiscard]] const PcClockRecord& record() const noexcept { return record_; }
 

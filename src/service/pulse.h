@@ -3,10 +3,10 @@
 /// Are all threads of a run alive? For STATUS, the log and systemd's watchdog.
 
 #include <span>
-#include <string>
 #include <vector>
 
 #include "rt/heartbeat.h"
+#include "service/alarms.h"
 
 namespace imuscope {
 
@@ -29,8 +29,8 @@ inline constexpr Duration kWriterGivenUp = std::chrono::seconds(60);
 inline constexpr Duration kModellerTold = std::chrono::minutes(5);
 inline constexpr Duration kModellerGivenUp = std::chrono::minutes(15);
 
-/// A sentence for each thread that stands still for longer than may be passed over.
-[[nodiscard]] std::vector<std::string> standing_threads(std::span<const Pulse> pulses, HostTime now);
+/// Each thread that stands still for longer than may be passed over.
+[[nodiscard]] std::vector<Condition> standing_threads(std::span<const Pulse> pulses, HostTime now);
 
 /// Whether every thread has moved within the time that it is given: what systemd is to be told.
 [[nodiscard]] bool all_alive(std::span<const Pulse> pulses, HostTime now);

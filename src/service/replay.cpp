@@ -98,7 +98,7 @@ class Feed {
   Result<void> push_pending() {
     last_arrival_ = pending_->arrival.value_or(HostTime{});
     if (pending_->per_byte) decoder_->set_per_byte(*pending_->per_byte);
-    decoder_->push(pending_->bytes, last_arrival_, sink_);
+    decoder_->push(pending_->bytes, {last_arrival_, pending_->received.value_or(last_arrival_)}, sink_);
     if (auto fetched = fetch(); !fetched) return fetched;
     if (!pending_) decoder_->finish(last_arrival_, sink_);
     return {};
@@ -176,7 +176,7 @@ class Replayer {
   [[nodiscard]] bool finished(std::int64_t index) const {
     return std::all_of(feeds_.begin(), feeds_.end(),
                        [](const auto& feed) { return !feed || feed->at_end(); }) &&
-           index > last_needed_tick_;
+           index > last_needed_tick_ && !core_.catches_up();
   }
 
   Result<void> run_ticks(HostTime t0, std::int64_t& ticks) {

@@ -31,7 +31,12 @@ nlohmann::json known(double value) {
 }
 
 nlohmann::json time_budget_json(const TimeBudget& budget) {
-  return {{"wire_s", budget.wire_s},
+  return {{"stamped_by", name_of(budget.stamped_by)},
+          {"stamp_lead_s", known(budget.stamp_lead_s)},
+          {"stamp_lead_sd_s", known(budget.stamp_lead_sd_s)},
+          {"delay_s", known(budget.delay_s)},
+          {"sd_delay_s", known(budget.sd_delay_s)},
+          {"wire_s", budget.wire_s},
           {"adapter_s", budget.adapter_s},
           {"latency_s", known(budget.latency_s)},
           {"clock_sd_s", known(budget.clock_sd_s)},
@@ -65,10 +70,13 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
   const auto studies = run.configuration.study_indices();
   const auto found = std::find(studies.begin(), studies.end(), i);
   const bool is_study = found != studies.end() && run.last != nullptr;
-  entry["late"] =
-      is_study
-          ? nlohmann::json(run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters.late)
-          : nlohmann::json(nullptr);
+  entry["late"] = nullptr;
+  if (is_study) {
+    const StudyCounters& study =
+        run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters;
+    entry["late"] = study.late + study.refused_full;
+    entry["waiting"] = study.waiting;
+  }
   if (record.time_budget) entry["time_budget"] = time_budget_json(*record.time_budget);
   return entry;
 }
@@ -133,19 +141,34 @@ nlohmann::json gnss_json(const EstimatorCounters& counters) {
           {"contradicts_motion", contradicts_motion(counters)}};
 }
 
-bool is_told_by_device(const TimeScale& scale) {
-  return scale.source == UtcSource::kReference || scale.source == UtcSource::kGnss;
+nlohmann::json delay_json(const StreamDelay& delay) {
+  return {{"mean_s", known(delay.mean_s)}, {"sd_s", known(delay.sd_s)}};
+}
+
+/// The host's clock by pulses; null where none came.
+nlohmann::json pulses_json(const PulseState& pulses) {
+  if (!pulses.is_known) return nullptr;
+  return {{"used", pulses.used},
+          {"left_out", pulses.left_out},
+          {"seconds_counted_by", pulses.counted_by_pc_clock ? "pc" : "device"},
+          {"sd_utc_s", pulses.sd_utc_s},
+          {"jitter_s", pulses.jitter_s},
+          {"host_clock_ppm", -1e6 * pulses.rate},
+          {"sd_rate_ppm", 1e6 * pulses.sd_rate},
+          {"reference_delay", delay_json(pulses.reference_delay)},
+          {"gnss_delay", delay_json(pulses.gnss_delay)}};
 }
 
 /// Whose seconds the run's rates were integrated over ("host": no device told UTC), and where the UTC of its
 /// rows comes from.
 nlohmann::json time_scale_json(const Snapshot* last) {
   const TimeScale scale = last != nullptr ? last->time_scale : TimeScale{};
-  const bool told = is_told_by_device(scale);
+  const bool told = is_told_by_device(scale.source);
   nlohmann::json json{{"seconds_of", told ? name_of(scale.source) : "host"},
                       {"sd_rate_ppm", 1e6 * scale.sd_rate},
                       {"utc_from", name_of(scale.source)},
-                      {"sd_utc_s", nullptr}};
+                      {"sd_utc_s", nullptr},
+                      {"pulses", pulses_json(scale.pulses)}};
   if (!told) return json;
   json["host_clock_ppm"] = -1e6 * scale.rate;
   json["sd_utc_s"] = scale.sd_utc_s;
@@ -154,8 +177,21 @@ nlohmann::json time_scale_json(const Snapshot* last) {
   return json;
 }
 
+nlohmann::json keeper_json(const ClockKeeper& keeper) {
+  return {{"name", keeper.name},
+          {"source", keeper.source},
+          {"stratum", keeper.stratum < 0 ? nlohmann::json(nullptr) : nlohmann::json(keeper.stratum)},
+          {"is_synchronised", keeper.is_synchronised},
+          {"offset_s", known(keeper.offset_s)},
+          {"sd_s", known(keeper.sd_s)},
+          {"max_error_s", known(keeper.max_error_s)},
+          {"frequency_ppm", known(keeper.frequency_ppm)}};
+}
+
 nlohmann::json kernel_clock_json(const PcClockRecord::State& state) {
-  nlohmann::json json{{"wall", utc_text(state.reading.wall)}, {"kernel", nullptr}};
+  nlohmann::json json{
+      {"wall", utc_text(state.reading.wall)}, {"kernel", nullptr}, {"keepers", nlohmann::json::array()}};
+  for (const ClockKeeper& keeper : state.keepers) json["keepers"].push_back(keeper_json(keeper));
   if (!state.kernel) return json;
   const KernelClockState& kernel = *state.kernel;
   json["kernel"] = {{"is_synchronised", kernel.is_synchronised},
@@ -182,12 +218,18 @@ nlohmann::json pc_clock_json(const PcClockRecord& clock, const Snapshot* last) {
                              {"size_s", step.size_s}});
   }
   json["steps_left_out"] = clock.steps_left_out;
+  json["suspends"] = nlohmann::json::array();
+  for (const PcSuspend& suspend : clock.suspends) {
+    json["suspends"].push_back({{"after_time_s", time_s(suspend.after)},
+                                {"before_time_s", time_s(suspend.before)},
+                                {"length_s", suspend.length_s}});
+  }
   return json;
 }
 
 /// Navigation alone integrates; a mounting does not depend on the length of a second.
 void warn_of_host_seconds(const Snapshot& last, std::vector<std::string>& warnings) {
-  if (is_told_by_device(last.time_scale)) return;
+  if (is_told_by_device(last.time_scale.source)) return;
   if (last.navigation.status != NavigationStatus::kNavigating) return;
   warnings.push_back(
       "no device tells UTC: rates were integrated over seconds of the arrivals' clock, which may be wrong by "

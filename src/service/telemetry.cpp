@@ -148,9 +148,9 @@ void set_observability(const StudyOutput& study, calibration_t& m) {
     *shown[i] = static_cast<std::int8_t>(observable);
     if (!observable) *values[i] = kUnknown;
   }
-  m.goal_sd_psi_deg = kGoalBoresightSd_rad * kDegPerRad;
-  m.goal_sd_r_m = kGoalLeverArmSd_m;
-  m.goal_sd_t_d_ms = kGoalTimeOffsetSd_s * kMsPerS;
+  m.goal_sd_psi_deg = study.goal.boresight_sd_rad * kDegPerRad;
+  m.goal_sd_r_m = study.goal.lever_arm_sd_m;
+  m.goal_sd_t_d_ms = study.goal.time_offset_sd_s * kMsPerS;
   m.weakest_direction = observability.weakest;
   m.weakest_relative_sd = observability.weakest_relative_sd;
   m.advice = observability.advice;
@@ -258,13 +258,34 @@ odometry_t odometry_message(const Snapshot& snapshot) {
   return m;
 }
 
+namespace {
+
+clock_keeper_t keeper_message(const ClockKeeper& keeper) {
+  clock_keeper_t m{};
+  m.name = keeper.name;
+  m.source = keeper.source;
+  m.stratum = keeper.stratum;
+  m.is_synchronised = static_cast<std::int8_t>(keeper.is_synchronised);
+  m.offset_s = keeper.offset_s;
+  m.sd_s = keeper.sd_s;
+  m.max_error_s = keeper.max_error_s;
+  m.frequency_ppm = keeper.frequency_ppm;
+  return m;
+}
+
+}  // namespace
+
 pc_clock_t pc_clock_message(const PcClockLog::News& news, UtcTime utc) {
-  const auto& [reading, kernel] = news.state;
+  const PcClockReading& reading = news.state.reading;
+  const auto& kernel = news.state.kernel;
   pc_clock_t m{};
   m.utime = to_utime(utc);
   m.host_ns = to_ns(reading.host);
   m.wall_ns = reading.wall.time_since_epoch().count();
   m.step_s = news.step ? news.step->size_s : 0.0;
+  m.suspended_s = news.suspend ? news.suspend->length_s : 0.0;
+  for (const ClockKeeper& keeper : news.state.keepers) m.keepers.push_back(keeper_message(keeper));
+  m.n_keepers = element_count(m.keepers);
   m.is_known = static_cast<std::int8_t>(kernel.has_value());
   m.offset_s = m.frequency_ppm = m.max_error_s = m.estimated_error_s = kUnknown;
   if (!kernel) return m;

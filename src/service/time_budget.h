@@ -4,8 +4,10 @@
 /// estimated, and what nobody knows.
 
 #include <limits>
+#include <string_view>
 
 #include "calibration/estimator.h"
+#include "configuration/config.h"
 #include "service/io_thread.h"
 
 namespace imuscope {
@@ -14,6 +16,10 @@ namespace imuscope {
 struct TimeBudget {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
+  StampedBy stamped_by = StampedBy::kRead;  ///< who says when bytes arrived
+  double stamp_lead_s =
+      kUnknown;  ///< mean, by which those stamps are before the reads; NaN where the read stamps
+  double stamp_lead_sd_s = kUnknown;  ///< of single ones: jitter that does not reach the clock's line
   double wire_s = 0.0;  ///< of the bytes of a sample, mean, on a serial line at the rate in force; stamps are
                         ///< dated back by it; 0 on other lines
   double adapter_s = 0.0;             ///< an adapter may hold bytes for up to so long; 0 where none is known
@@ -24,9 +30,18 @@ struct TimeBudget {
   /// taken out. That of any other device nobody measures.
   double t_d_s = kUnknown;
   double sd_t_d_s = kUnknown;  ///< what remains unknown of it
+  /// From an instant that the device measured to the time that its clock map gives it, where pulses of UTC
+  /// and the tags of the device (of an S-IMU: those of the reference) tell it. Of a receiver beyond the
+  /// configured latency.
+  double delay_s = kUnknown;
+  double sd_delay_s = kUnknown;
 };
 
-/// @param study  the newest estimate of an S-IMU; null for other devices and before the first
-[[nodiscard]] TimeBudget time_budget(const LineStatus& line, const StudyOutput* study) noexcept;
+/// @param study   the newest estimate of an S-IMU; null for other devices and before the first
+/// @param pulses  what they tell of the run's clock
+[[nodiscard]] TimeBudget time_budget(const LineStatus& line, const StudyOutput* study,
+                                     DeviceRole role = DeviceRole::kStudy,
+                                     const PulseState& pulses = {}) noexcept;
+[[nodiscard]] std::string_view name_of(StampedBy by) noexcept;
 
 }  // namespace imuscope

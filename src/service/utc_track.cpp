@@ -10,12 +10,18 @@ constexpr Duration kEvery = std::chrono::seconds{1};
 /// Between two tags UTC steps where it is further off the line than this.
 constexpr Duration kStep = std::chrono::milliseconds{10};
 
+/// The line of the better one holds before it began, too: messages of a receiver tell UTC late by a delay
+/// that nobody tells, and the PC's clock by anything.
+bool is_worse(UtcSource before, UtcSource now) {
+  if (before == UtcSource::kPcClock) return now != UtcSource::kPcClock;
+  return before == UtcSource::kGnss && now == UtcSource::kPulses;
+}
+
 }  // namespace
 
 void UtcTrack::add(const TimeScale& scale) {
   if (scale.source == UtcSource::kNone) return;
-  if (!scales_.empty() && scales_.back().source == UtcSource::kPcClock && scale.source != UtcSource::kPcClock)
-    scales_.clear();
+  if (!scales_.empty() && is_worse(scales_.back().source, scale.source)) scales_.clear();
   if (scales_.size() < 2 || scales_.back().time - scales_[scales_.size() - 2].time >= kEvery) {
     if (scales_.empty() || scale.time > scales_.back().time) scales_.push_back(scale);
   } else {

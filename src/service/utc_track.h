@@ -14,7 +14,7 @@ namespace imuscope {
 class UtcTrack {
  public:
   /// Takes the scale as it stands; times of its tags do not decrease. What a device tells replaces what the
-  /// PC's clock said before.
+  /// PC's clock said before, and what pulses do what a receiver's messages said.
   void add(const TimeScale& scale);
 
   /// An instant of the run; before the first tag and after the last along the line that goes through it.

@@ -83,23 +83,25 @@ std::vector<noise::WaveletVariance> parts_of(const Job& job, const std::vector<s
   return out;
 }
 
-/// Where the parts of a regime differ, its intervals contain that, and it is said by how much.
-void look_at_parts(const Job& job, const std::vector<std::uint8_t>& mask, noise::FitResult& fit) {
+/// Where the parts of a regime differ, its intervals contain that, and it is said by how much. Returns
+/// whether they do.
+bool look_at_parts(const Job& job, const std::vector<std::uint8_t>& mask, noise::FitResult& fit) {
   const auto parts = parts_of(job, mask);
-  if (parts.empty()) return;
+  if (parts.empty()) return false;
   const noise::Spread spread = noise::spread_of(fit, parts);
-  if (!spread.homogeneity || spread.homogeneity->p_value >= kPartsDifferBelow) return;
+  if (!spread.homogeneity || spread.homogeneity->p_value >= kPartsDifferBelow) return false;
   noise::contain_spread(fit, spread);
   std::string by;
   for (std::size_t p = 0; p < fit.parameters.size(); ++p) {
     const auto& effects = spread.of_parameters[p];
     if (!effects || !(effects->spread_low > 0.0)) continue;
-    by += fmt::format("{}{} {} by {:.2g} %", by.empty() ? ": " : ", ", fit.parameters[p].process,
+    by += fmt::format("{}{} {} by {:.3g} %", by.empty() ? ": " : ", ", fit.parameters[p].process,
                       fit.parameters[p].name, 100.0 * std::expm1(effects->spread));
   }
   fit.warnings.push_back(fmt::format(
       "its {} parts differ (p = {:.2g}){}; intervals are of the mean of such parts and contain that",
       parts.size(), spread.homogeneity->p_value, by));
+  return true;
 }
 
 /// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
@@ -132,9 +134,9 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
       regime == kWholeRun
           ? std::nullopt
           : noise::spike_warning(noise::test_tails(job.values, options, fit->model), job.device.rate_hz);
-  if (regime != kWholeRun) look_at_parts(job, mask, *fit);
+  const bool parts_differ = regime != kWholeRun && look_at_parts(job, mask, *fit);
   if (spikes) fit->warnings.insert(fit->warnings.begin(), *spikes);
-  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), lines});
+  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), lines, parts_differ});
   return wv->levels.size();
 }
 
@@ -190,6 +192,17 @@ struct AxisComparison {
   const StudyModel* second;
   noise::Comparison comparison;
 };
+
+/// The joint test takes each record for one process.
+noise::Comparison compared(const StudyModel& first, const StudyModel& second) {
+  noise::Comparison out = noise::compare(first.fit, second.fit);
+  if (!first.parts_differ && !second.parts_differ) return out;
+  out.test.reset();
+  out.warnings.push_back(
+      fmt::format("the parts of {} differ among themselves: no test of all parameters together",
+                  first.parts_differ ? first.regime : second.regime));
+  return out;
+}
 
 const noise::ParameterEstimate* parameter_of(const noise::FitResult& fit,
                                              const noise::ComparedParameter& like) {
@@ -303,9 +316,7 @@ nlohmann::json models_json(const NoiseStudy& study) {
   nlohmann::json models = nlohmann::json::array();
   for (const auto& m : study.models) {
     nlohmann::json model = model_json(m.fit, m.name, m.axis, m.regime);
-    if (!m.lines.empty())
-      model["sinusoids"] =
-          noise::sinusoids_to_json(m.lines, axis_unit(m.axis), m.fit.rate_hz, m.fit.wv.size());
+    if (!m.lines.empty()) model["sinusoids"] = noise::sinusoids_to_json(m.lines, m.fit, axis_unit(m.axis));
     models.push_back(std::move(model));
   }
   return models;
@@ -328,7 +339,7 @@ nlohmann::json comparison_json(const NoiseStudy& study, const std::vector<std::s
           const auto* first = find(study, name, axis, regimes[a]);
           const auto* second = find(study, name, axis, regimes[b]);
           if (first == nullptr || second == nullptr) continue;
-          all.push_back({first, second, noise::compare(first->fit, second->fit)});
+          all.push_back({first, second, compared(*first, *second)});
         }
       }
     }

@@ -23,6 +23,7 @@ struct StudyModel {
   std::string regime;                ///< "all", or a regime's name
   noise::FitResult fit;              ///< of what the sinusoids leave
   std::vector<noise::Line> lines{};  ///< sinusoids that belong to the model beside the fit
+  bool parts_differ = false;         ///< by more than chance; intervals and warnings of the fit hold that
 };
 
 struct NoiseStudy {

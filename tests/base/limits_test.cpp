@@ -22,6 +22,12 @@ TEST(Limits, TheRingOfADeviceHoldsTheLongestStallAtItsRate) {
   EXPECT_EQ(sample_ring_capacity(kMaxRate_hz), kSampleRingMax) << "memory is locked: it has an end";
 }
 
+TEST(Limits, ALineMayStandStillAlone) {
+  EXPECT_GE(static_cast<double>(waiting_samples_capacity(100.0)), 100.0 * kLongestStall_s);
+  EXPECT_GE(static_cast<double>(reference_window_capacity(100.0)), 100.0 * kLongestStall_s);
+  EXPECT_GE(static_cast<double>(waiting_samples_capacity(kMaxRate_hz)), kMaxRate_hz * 30.0);
+}
+
 TEST(Limits, ThePastOfTheReferenceLastsAsLongAtEveryRate) {
   EXPECT_EQ(reference_past_capacity(100.0), 256U);
   EXPECT_EQ(reference_past_capacity(10.0), 256U);

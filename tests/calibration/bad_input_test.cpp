@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/limits.h"
 #include "base/units.h"
 #include "calibration/estimator.h"
 #include "calibration/event_log.h"
@@ -595,6 +596,9 @@ TEST(GnssTrust, FloatsThatFollowEachOtherQuicklySayLittleThatIsNew) {
   // 60 s hold as much as one independent value each 30 s on either side.
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 0.6), 10.0);
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 1000.0), 1.0);
+  // Code solutions stay wrong by the same amount for longer.
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kDifferential, 1.2), 10.0);
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kSingle, 2.4), 10.0);
 }
 
 TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
@@ -627,9 +631,22 @@ TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
   std::uint64_t used = 0;
   for (std::size_t i = 0; i < truth.size(); ++i) used += estimator.study(i).counters.used - used_before;
   EXPECT_GT(estimator.counters().epochs_lost, 0U);
+  // Copies of a sample are no measurements of their own: how good the estimate is, the next test asks.
   EXPECT_EQ(estimator.epochs().size() + estimator.counters().epochs_lost, used);
-  // Much later still, the oldest samples have no reference any more and the newest no place in the queue.
+}
+
+TEST(BadInput, ATickThatComesMuchLaterGivesUpNothing) {
+  const std::vector<SimulatedStudy> truth(kMaxStudies, tilted());
+  SimulatedDrive drive(120.0, truth, 55);
+  EstimatorConfig config = drive.config();
+  for (StudyConfig& study : config.studies) {
+    study.prior_C_b_s = row_major(tilted().C_b_s);
+    study.prior_t_d_s = tilted().t_d_s;
+  }
+  Estimator estimator(config);
+  test::run(drive, estimator, 72.4);
   const StudyCounters before = estimator.study(0).counters;
+  std::vector<Sample> samples;
   std::uint64_t added = 0;
   while (drive.time_s() < 116.0) {
     samples = drive.next();
@@ -638,11 +655,34 @@ TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
   }
   estimator.advance(samples.back().arrival);
   const StudyCounters& after = estimator.study(0).counters;
-  EXPECT_GT(after.refused_full, 0U);
-  EXPECT_GT(after.no_reference, before.no_reference);
+  EXPECT_EQ(after.refused_full, 0U);
+  EXPECT_EQ(after.no_reference, before.no_reference);
   EXPECT_EQ(after.samples - before.samples, added);
+  EXPECT_LE(after.waiting, 10U);
   test::run(drive, estimator);
   for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_LT(worst_in_sd(estimator.study(i), truth[i]), 4.0);
+}
+
+TEST(BadInput, MoreSamplesThanMayWaitForAReferenceAreCounted) {
+  const std::vector<SimulatedStudy> truth(1, tilted());
+  SimulatedDrive drive(120.0, truth, 55);
+  EstimatorConfig config = drive.config();
+  config.studies[0].rate_hz = 20.0;  // it sends five times as much
+  Estimator estimator(config);
+  std::uint64_t added = 0;
+  std::vector<Sample> samples;
+  while (drive.time_s() < 116.0) {
+    samples = drive.next();
+    for (const Sample& sample : samples) {
+      if (sample.device != config.studies[0].device) continue;
+      estimator.add(sample);
+      ++added;
+    }
+  }
+  estimator.advance(samples.back().arrival);
+  const StudyCounters& counters = estimator.study(0).counters;
+  EXPECT_EQ(counters.samples, added);
+  EXPECT_EQ(counters.refused_full, added - waiting_samples_capacity(20.0));
 }
 
 TEST(EventLog, CountsWhatItHasNoRoomForAndIsEmptyOnceTaken) {

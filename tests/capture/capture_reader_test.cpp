@@ -139,6 +139,55 @@ TEST(CaptureReader, TellsTheRateOfALineAndCountsItForNoRead) {
   EXPECT_EQ(reads[1].direction, Direction::kRead);
 }
 
+TEST(CaptureReader, AReadThatTheKernelStampedKeepsBothInstants) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  Capture capture(path);
+  capture.header();
+  const HostTime received = kT0 + std::chrono::microseconds(4'321);
+  const auto stamp = received_bytes(received);
+  Bytes bytes(stamp.begin(), stamp.end());
+  bytes.insert(bytes.end(), {7, 8});
+  // A read of more than one piece has its stamp in the first.
+  capture.chunk(0, 0, 5, bytes, true, Direction::kStampedRead);
+  capture.chunk(0, 1, 5, {9});
+  capture.chunk(0, 2, 6, {1});
+  capture.chunk(0, 3, 7, {1, 2, 3}, false, Direction::kStampedRead);  // too short to hold one
+  capture.done();
+  const auto summary = summarise_capture(path);
+  ASSERT_TRUE(summary.has_value()) << summary.error().text();
+  EXPECT_EQ(summary->devices.at("airins").reads, 2U);
+  EXPECT_EQ(summary->devices.at("airins").bytes_read, 4U);
+  auto reader = CaptureReader::open(path);
+  ASSERT_TRUE(reader.has_value());
+  const auto reads = read_all(*reader);
+  ASSERT_EQ(reads.size(), 2U);
+  EXPECT_EQ(reads[0].direction, Direction::kRead);
+  EXPECT_EQ(reads[0].arrival, kT0 + std::chrono::milliseconds(5));
+  EXPECT_EQ(reads[0].received, received);
+  EXPECT_EQ(reads[0].bytes, (Bytes{7, 8, 9}));
+  EXPECT_FALSE(reads[1].received);
+}
+
+TEST(RawTap, PutsTheStampOfALongReadBeforeItsFirstPiece) {
+  auto ring = std::make_unique<RawRing>();
+  RawTap tap(*ring);
+  const HostTime received = kT0 + std::chrono::microseconds(1);
+  const auto stamp = received_bytes(received);
+  Bytes bytes(stamp.begin(), stamp.end());
+  for (int i = 0; i < 2500; ++i) bytes.push_back(static_cast<std::uint8_t>(i));
+  tap.record(0, Direction::kStampedRead, bytes, kT0 + std::chrono::milliseconds(1));
+  Bytes together;
+  int pieces = 0;
+  while (const auto chunk = ring->front()) {
+    EXPECT_EQ(chunk->info.direction, pieces == 0 ? Direction::kStampedRead : Direction::kRead);
+    together.insert(together.end(), chunk->bytes.begin(), chunk->bytes.end());
+    ++pieces;
+    ring->pop();
+  }
+  EXPECT_EQ(pieces, 3);
+  EXPECT_EQ(together, bytes);
+}
+
 TEST(CaptureReader, ARateThatNoLineHasIsNone) {
   for (const Duration per_byte : {Duration::zero(), -Duration(1), Duration(std::chrono::seconds(2))})
     EXPECT_EQ(line_rate_of(line_rate_bytes(per_byte)), std::nullopt) << per_byte.count();

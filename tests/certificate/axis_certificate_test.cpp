@@ -33,7 +33,8 @@ TEST(AxisCertificate, WhiteNoiseIsAnAngleRandomWalkAndLeavesTheOthersBounded) {
     EXPECT_GT(term_of(*axis, term).value, 0.0) << symbol_of(term);
   }
   EXPECT_THAT(axis->warnings, testing::IsEmpty());
-  EXPECT_THAT(axis->limits, testing::Contains(HasSubstr("bias instability: the Allan deviation still falls")));
+  EXPECT_THAT(axis->limits,
+              testing::Contains(HasSubstr("bias instability: the Allan deviation still falls")));
 }
 
 TEST(AxisCertificate, ARandomWalkIsFoundWithTheMinimumThatItMakes) {
@@ -128,7 +129,8 @@ TEST(AxisCertificate, RecordsThatTellNothingAreRefusedInASentence) {
   AxisRecord stuck = made_gyro(1000, 8);
   std::fill(stuck.values.begin(), stuck.values.end(), 1.25);
   EXPECT_THAT(characterize_axis(stuck, {}).error().text(), HasSubstr("gyro_x: all values are 1.25"));
-  EXPECT_THAT(characterize_axis(made_gyro(10, 8), {}).error().text(), HasSubstr("10 valid samples are too few"));
+  EXPECT_THAT(characterize_axis(made_gyro(10, 8), {}).error().text(),
+              HasSubstr("10 valid samples are too few"));
   AxisOptions options;
   options.model = "WN+XX";
   EXPECT_THAT(characterize_axis(made_gyro(1000, 8), options).error().text(), HasSubstr("unknown term 'XX'"));

@@ -20,12 +20,14 @@ std::vector<std::string> warnings_of(const AxisRecord& record) {
 }
 
 TEST(RecordChecks, AHealthyRecordHasNoWarning) {
-  for (unsigned seed = 20; seed < 24; ++seed) EXPECT_THAT(warnings_of(made_gyro(30'000, seed)), testing::IsEmpty());
+  for (unsigned seed = 20; seed < 24; ++seed)
+    EXPECT_THAT(warnings_of(made_gyro(30'000, seed)), testing::IsEmpty());
 }
 
 TEST(RecordChecks, MotionIsTold) {
   AxisRecord record = made_gyro(60'000, 1);
-  for (std::size_t i = 20'000; i < 24'000; ++i) record.values[i] += 20.0 * std::sin(0.05 * static_cast<double>(i));
+  for (std::size_t i = 20'000; i < 24'000; ++i)
+    record.values[i] += 20.0 * std::sin(0.05 * static_cast<double>(i));
   EXPECT_THAT(warnings_of(record), Contains(HasSubstr("the sensor was not at rest")));
 }
 

@@ -16,7 +16,8 @@ std::vector<AxisCertificate> with_walk(double value, double log_sd) {
   axis.name = "gyro_x";
   axis.unit = noise::SignalUnit::kDegps;
   const double factor = std::exp(1.959964 * log_sd);
-  axis.terms.push_back({Term::kRandomWalk, "deg/sqrt(h)", value, value / factor, value * factor, noise::Knowledge::kFitted, ""});
+  axis.terms.push_back({Term::kRandomWalk, "deg/sqrt(h)", value, value / factor, value * factor,
+                        noise::Knowledge::kFitted, ""});
   return {axis};
 }
 

@@ -34,12 +34,12 @@ TEST(ConfigReference, PresetsAreThoseThatHold) {
   const auto find = [&](const std::string& name) {
     return *std::find_if(keys.begin(), keys.end(), [&](const auto& key) { return key.name == name; });
   };
-  EXPECT_THAT(find("device.rate_hz").presets, testing::UnorderedElementsAre("100", "10", "50"));
+  EXPECT_THAT(find("device.rate_hz").presets, testing::UnorderedElementsAre("100", "10", "50", "1"));
   EXPECT_THAT(find("device.axes").presets, testing::UnorderedElementsAre("\"+x -y -z\"", "\"+x +y +z\""));
   EXPECT_THAT(find("noise.model").presets, testing::ElementsAre("\"WN+2*GM\""));
   EXPECT_TRUE(find("device.role").required);
   EXPECT_FALSE(find("device.rate_hz").required);
-  EXPECT_EQ(find("device.transport.kind").values, "\"serial\", \"tcp\", \"udp\", \"can\"");
+  EXPECT_EQ(find("device.transport.kind").values, "\"serial\", \"tcp\", \"udp\", \"can\", \"pps\"");
 }
 
 // A branch of a reader that no configuration of the reference leads into would leave its keys out.

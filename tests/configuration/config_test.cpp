@@ -57,6 +57,37 @@ TEST(Configuration, ADeviceWithoutAxesOfAStdbinUnitIsTurnedToForwardRightDown) {
   EXPECT_EQ(configuration.devices[1].axes, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
 }
 
+TEST(Configuration, PulsesOfUtcAreADeviceOfTheirOwn) {
+  const std::string pps = R"(
+[[device]]
+name = "pps"
+role = "time"
+protocol = "pps"
+transport = { kind = "pps", port = "/dev/pps0", edge = "clear" }
+)";
+  const auto configuration = parsed(kMinimal + pps);
+  ASSERT_EQ(configuration.devices.size(), 3U);
+  const DeviceConfig& device = configuration.devices[2];
+  EXPECT_EQ(device.role, DeviceRole::kTime);
+  ASSERT_TRUE(device.pps);
+  EXPECT_EQ(device.pps->port, "/dev/pps0");
+  EXPECT_TRUE(device.pps->clear_edge);
+  EXPECT_EQ(device.rate_hz, 1.0);
+  EXPECT_THAT(refused(kMinimal + pps + pps), HasSubstr("pps"));
+  auto other = pps;
+  other.replace(other.find("\"pps\"\nrole"), 5, "\"two\"");
+  EXPECT_THAT(refused(kMinimal + pps + other), HasSubstr("more than one time device"));
+  EXPECT_THAT(
+      refused(std::string(kMinimal) + "[[device]]\nname = \"p\"\nrole = \"time\"\nprotocol = \"pps\"\n"
+                                      "transport = { kind = \"tcp\", host = \"h\", port = 1 }\n"),
+      HasSubstr("does not carry pps"));
+  EXPECT_THAT(refused(std::string(kMinimal) + "transport = { kind = \"pps\", port = \"/dev/pps0\" }\n"),
+              HasSubstr("does not carry xsens_mt"));
+  EXPECT_THAT(
+      refused(std::string(kMinimal) + "[[device]]\nname = \"p\"\nrole = \"gnss\"\nprotocol = \"pps\"\n"),
+      HasSubstr("does not fit role gnss"));
+}
+
 TEST(Configuration, UserUnitsBecomeSiOnLoading) {
   const auto configuration = parsed(std::string(kMinimal) + R"(
 rate_hz = 50
@@ -147,6 +178,28 @@ TEST(Configuration, CoresOfTheThreadsAreAList) {
               HasSubstr("threads.io_cores names a core -1"));
   EXPECT_THAT(refused(std::string("[threads]\nio_cores = [0.5]\n") + kMinimal),
               HasSubstr("names a core 0.5"));
+}
+
+TEST(Configuration, NothingIsRemovedAndNothingListenedToUnlessItIsAskedFor) {
+  const auto usual = parsed(kMinimal);
+  EXPECT_FALSE(usual.record.remove_older_than_s || usual.record.remove_beyond_bytes ||
+               usual.record.remove_below_free_bytes);
+  EXPECT_EQ(usual.metrics.port, 0);
+  EXPECT_EQ(usual.metrics.address, "127.0.0.1");
+  const auto asked = parsed(std::string("[record]\nremove_older_than_days = 30\nremove_beyond_gb = 100\n"
+                                        "remove_below_free_gb = 5\nfile_gb = 0.5\nfile_hours = 2\n"
+                                        "[metrics]\nport = 9847\naddress = \"::1\"\n") +
+                            kMinimal);
+  EXPECT_DOUBLE_EQ(asked.record.remove_older_than_s.value_or(0.0), 30.0 * 86400.0);
+  EXPECT_DOUBLE_EQ(asked.record.remove_beyond_bytes.value_or(0.0), 1e11);
+  EXPECT_DOUBLE_EQ(asked.record.remove_below_free_bytes.value_or(0.0), 5e9);
+  EXPECT_DOUBLE_EQ(asked.record.file_bytes, 5e8);
+  EXPECT_DOUBLE_EQ(asked.record.file_s, 7200.0);
+  EXPECT_EQ(asked.metrics.port, 9847);
+  EXPECT_THAT(refused(std::string("[metrics]\nport = 9847\naddress = \"vehicle\"\n") + kMinimal),
+              HasSubstr("'vehicle' is no address"));
+  EXPECT_THAT(refused(std::string("[record]\nremove_older_than_days = 0\n") + kMinimal),
+              HasSubstr("remove_older_than_days"));
 }
 
 TEST(Configuration, AxesThatAreNoRotationAreRefused) {

@@ -13,6 +13,7 @@
 #include <fcntl.h>
 #include <linux/audit.h>
 #include <linux/filter.h>
+#include <linux/pps.h>
 #include <linux/seccomp.h>
 #include <pthread.h>
 #include <semaphore.h>
@@ -25,6 +26,7 @@
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <time.h>
 #include <ucontext.h>
@@ -109,10 +111,13 @@ constexpr int kAllowedBoth[] = {SYS_clock_gettime, SYS_rt_sigreturn, SYS_restart
                                 SYS_getrusage,     SYS_exit,         SYS_exit_group,
                                 SYS_madvise,       SYS_munmap,       SYS_rt_sigprocmask};
 constexpr int kAllowedEstimator[] = {SYS_clock_nanosleep};
+/// getsockopt: what the kernel counted of a datagram socket, copied without a lock.
 constexpr int kAllowedIo[] = {SYS_epoll_wait, SYS_epoll_pwait2, SYS_epoll_ctl, SYS_read,
-                              SYS_write,      SYS_recvmsg,      SYS_recvmmsg,  SYS_fcntl};
-/// Health of a line: the driver's error counts and an interface's flags, copied from the kernel's memory.
-constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS};
+                              SYS_write,      SYS_recvmsg,      SYS_recvmmsg,  SYS_recvfrom,
+                              SYS_sendto,     SYS_fcntl,        SYS_getsockopt};
+/// Health of a line: the driver's error counts and an interface's flags, and the newest pulse of a PPS device
+/// without waiting for one, all copied from the kernel's memory.
+constexpr unsigned kAllowedIoctls[] = {TIOCGICOUNT, SIOCGIFFLAGS, static_cast<unsigned>(PPS_FETCH)};
 
 void install_filter(bool is_io) {
   sock_filter program[64];
@@ -311,6 +316,16 @@ ssize_t read(int fd, void* buffer, size_t size) {
   static auto* const real = next<ssize_t(int, void*, size_t)>("read");
   check_descriptor(fd);
   return real(fd, buffer, size);
+}
+ssize_t recv(int fd, void* buffer, size_t size, int flags) {
+  static auto* const real = next<ssize_t(int, void*, size_t, int)>("recv");
+  if ((flags & MSG_DONTWAIT) == 0) check_descriptor(fd);
+  return real(fd, buffer, size, flags);
+}
+ssize_t send(int fd, const void* buffer, size_t size, int flags) {
+  static auto* const real = next<ssize_t(int, const void*, size_t, int)>("send");
+  if ((flags & MSG_DONTWAIT) == 0) check_descriptor(fd);
+  return real(fd, buffer, size, flags);
 }
 ssize_t write(int fd, const void* buffer, size_t size) {
   static auto* const real = next<ssize_t(int, const void*, size_t)>("write");

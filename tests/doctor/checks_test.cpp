@@ -12,6 +12,7 @@
 #include <fstream>
 
 #include "doctor/examination.h"
+#include "doors/metrics_server.h"
 #include "service/line_factory.h"
 #include "tests/support/child_process.h"
 #include "tests/support/refused_calls.h"
@@ -260,10 +261,51 @@ TEST_F(FakePc, APortIsFoundByItsStableNameAlsoWhereItIsUnplugged) {
   EXPECT_THAT(check_ftdi_latency(root_, {(root_ / "gone").string()}), IsEmpty());
 }
 
+TEST_F(FakePc, WithoutUdevADeviceThatComesBackIsNotAnnounced) {
+  EXPECT_EQ(check_udev(root_).verdict, Verdict::kWarning);
+  write("run/udev/control", "");
+  EXPECT_EQ(check_udev(root_).verdict, Verdict::kGood);
+}
+
+TEST_F(FakePc, AnInstalledServiceThatDoesNotStartWithTheIgnitionIsTold) {
+  EXPECT_THAT(check_unit(root_), IsEmpty()) << "no package, no service";
+  write("lib/systemd/system/imuscope.service", "[Unit]");
+  ASSERT_THAT(check_unit(root_), SizeIs(1));
+  EXPECT_EQ(check_unit(root_)[0].verdict, Verdict::kWarning);
+  EXPECT_THAT(check_unit(root_)[0].fix, HasSubstr("systemctl enable imuscope"));
+  fs::create_directories(root_ / "etc/systemd/system/multi-user.target.wants");
+  // As systemctl makes it: it leads to a place of that PC.
+  fs::create_symlink("/lib/systemd/system/imuscope.service",
+                     root_ / "etc/systemd/system/multi-user.target.wants/imuscope.service");
+  EXPECT_EQ(check_unit(root_)[0].verdict, Verdict::kGood);
+}
+
+TEST(DoctorClock, APcThatBeginsInThePastIsTold) {
+  EXPECT_EQ(check_wall_clock(utc_time_from_ns(1'000'000'000)).verdict, Verdict::kWarning);
+  EXPECT_THAT(check_wall_clock(utc_time_from_ns(1'000'000'000)).fix, HasSubstr("set-ntp"));
+  EXPECT_EQ(check_wall_clock(utc_time_from_ns(1'800'000'000'000'000'000)).verdict, Verdict::kGood);
+}
+
+TEST(DoctorMetrics, APortThatIsTakenIsBadAndOneForAllIsAWarning) {
+  EXPECT_THAT(check_metrics({}), IsEmpty());
+  MetricsOptions options;
+  options.port = 29849;
+  ASSERT_THAT(check_metrics(options), SizeIs(1));
+  EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kGood);
+  const StatusBoard board;
+  const auto other = MetricsServer::open("127.0.0.1", options.port, board);
+  ASSERT_TRUE(other);
+  EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kBad);
+  options.port = 29850;
+  options.address = "0.0.0.0";
+  EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kWarning);
+  EXPECT_THAT(check_metrics(options)[0].what, HasSubstr("everybody on that network"));
+}
+
 TEST(DoctorExamination, WithoutAConfigurationLooksAtThePcAlone) {
   std::vector<std::string> checks;
   for (const auto& finding : examine({})) checks.push_back(finding.check);
-  for (const char* check : {"real time", "memory lock", "cores", "LCM", "disk"})
+  for (const char* check : {"real time", "memory lock", "cores", "LCM", "disk", "udev", "wall clock"})
     EXPECT_THAT(checks, testing::Contains(check));
   for (const auto& check : checks) EXPECT_THAT(check, testing::Not(HasSubstr("line of")));
 }

@@ -120,9 +120,12 @@ extern "C" ssize_t recvmsg(int fd, msghdr* message, int flags) {
   const ssize_t n = receive(fd, message, flags);
   for (cmsghdr* told = n >= 0 ? CMSG_FIRSTHDR(message) : nullptr; told != nullptr;
        told = CMSG_NXTHDR(message, told)) {
-    if (told->cmsg_level != SOL_SOCKET || told->cmsg_type != SO_TIMESTAMPNS) continue;
+    // That of SO_TIMESTAMPING begins with the kernel's, too.
+    const bool is_stamp = told->cmsg_type == SO_TIMESTAMPNS || told->cmsg_type == SO_TIMESTAMPING;
+    if (told->cmsg_level != SOL_SOCKET || !is_stamp) continue;
     timespec stamp{};
     memcpy(&stamp, CMSG_DATA(told), sizeof stamp);
+    if (ns_of(stamp) == 0) continue;
     stamp = moved(stamp, wall_error_ns());
     memcpy(CMSG_DATA(told), &stamp, sizeof stamp);
   }

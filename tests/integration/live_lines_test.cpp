@@ -149,6 +149,11 @@ class LiveLines : public testing::Test {
   }
 
   std::filesystem::path folder_ = scratch_folder();
+#ifdef IMUSCOPE_HAS_CORE_GUARD
+  const std::filesystem::path guard_report_ = folder_ / "guard.txt";
+#else
+  const std::filesystem::path guard_report_;
+#endif
   Listener listener_;
 };
 
@@ -177,9 +182,19 @@ std::vector<Row> heights_of(const std::filesystem::path& run) {
 }
 
 TEST_F(LiveLines, EveryKindOfLineAndFaultInOneRun) {
-  ASSERT_NO_FATAL_FAILURE(run_beside(folder_, "vehicle.toml", kRun, listener_));
+  ASSERT_NO_FATAL_FAILURE(run_beside(folder_, "vehicle.toml", kRun, listener_, guard_report_));
   const std::string log = read_text(folder_ / "imuscope.log");
   SCOPED_TRACE(log);
+  if (!guard_report_.empty()) {
+    // TCP and UDP lines under the rule of the core, too: no allocation, no lock, no call but those that it
+    // may make.
+    const auto report = read_guard_report(guard_report_);
+    for (const char* thread : {"imuscope-io", "imuscope-est"}) {
+      ASSERT_TRUE(report.contains(thread)) << read_text(guard_report_);
+      for (const auto& [what, count] : offences_of(report.at(thread)))
+        EXPECT_EQ(count, 0) << thread << ": " << what << "\n" << read_text(guard_report_);
+    }
+  }
   ASSERT_GT(listener_.heard.size(), 25U);
 
   for (const char* name : {"airins", "mtx1", "mtx2", "mtx3", "gnss", "ins2", "mti"}) {

@@ -11,10 +11,12 @@
 #include <imuscope/status_t.hpp>
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "guard_report.h"
 #include "programs.h"
 
 namespace imuscope::test {
@@ -76,8 +78,10 @@ struct Listener {
 
 /// Runs the service with `folder`/live.toml into `folder`/live for a while, beside a driving vehicle of
 /// `folder`/`vehicle` with the faults of `folder`/faults.toml, and keeps what the service says of itself.
+/// @param guard_report  of the core guard around the service; empty: none
 inline void run_beside(const std::filesystem::path& folder, const std::string& vehicle,
-                       std::chrono::seconds length, Listener& listener) {
+                       std::chrono::seconds length, Listener& listener,
+                       const std::filesystem::path& guard_report = {}) {
   lcm::LCM bus("udpm://239.255.76.67:7667?ttl=0");
   ASSERT_TRUE(bus.good());
   bus.subscribe("IMUSCOPE_STATUS", &Listener::on_status, &listener);
@@ -85,9 +89,12 @@ inline void run_beside(const std::filesystem::path& folder, const std::string& v
       "imusim",
       {"live", (folder / vehicle).string(), "--skip-static", "--faults", (folder / "faults.toml").string()},
       folder / "imusim.log");
+  std::optional<ScopedGuard> guard;
+  if (!guard_report.empty()) guard.emplace(guard_report);
   BackgroundProgram service("imuscope",
                             {"run", (folder / "live.toml").string(), "--out", (folder / "live").string()},
                             folder / "imuscope.log");
+  guard.reset();
   // The drive begins when the lines are open, which a sanitized simulator takes seconds for; statuses of
   // before wait.
   constexpr std::chrono::seconds kOpens{30};

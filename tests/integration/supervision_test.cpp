@@ -11,18 +11,26 @@
 #include <sys/mount.h>
 #include <sys/ptrace.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <utmp.h>
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "programs.h"
 #include "systemd.h"
@@ -174,6 +182,92 @@ TEST_F(Supervision, ABusThatComesLaterIsTakenAndWhatWasSaidBeforeIsRecorded) {
   EXPECT_TRUE(hears("the route is back")) << log();
   service_->interrupt();
   EXPECT_EQ(service_->wait(), kFailedWork) << log();
+}
+
+TEST_F(Supervision, StatusTellsAStandingThreadItsAgeAndTheAlarm) {
+  const auto runtime = std::filesystem::path("/tmp") / ("imuscope-run-" + std::to_string(getpid()));
+  std::filesystem::create_directory(runtime);
+  setenv("XDG_RUNTIME_DIR", runtime.c_str(), 1);
+  run(kSilentVehicle);
+  const auto status = [&] {
+    // Before its first second it has none.
+    if (run_program("imuscope", {"status", "--json"}, folder_ / "status.json") != 0)
+      return nlohmann::json::object();
+    return nlohmann::json::parse(read_text(folder_ / "status.json"));
+  };
+  // The devices are silent: an alarm each, with what to do.
+  ASSERT_TRUE(soon([&] { return status().value("/alarms/1/active"_json_pointer, false); }));
+  EXPECT_FALSE(status()["alarms"][0]["remedy"].get<std::string>().empty());
+  {
+    const FrozenThread frozen(service_->id(), "imuscope-rec");
+    EXPECT_TRUE(soon([&] {
+      const auto now = status();
+      const bool told = std::any_of(now["alarms"].begin(), now["alarms"].end(), [](const auto& alarm) {
+        return alarm["kind"] == "thread" && alarm["subject"] == "imuscope-rec" && alarm["active"];
+      });
+      const bool aged = std::any_of(now["threads"].begin(), now["threads"].end(), [](const auto& thread) {
+        return thread["name"] == "imuscope-rec" && thread["heartbeat_age_s"].is_number() &&
+               thread["heartbeat_age_s"] > 3.0;
+      });
+      return told && aged;
+    })) << read_text(folder_ / "status.json");
+  }
+  EXPECT_TRUE(soon([&] {
+    const auto now = status();
+    return std::any_of(now["alarms"].begin(), now["alarms"].end(), [](const auto& alarm) {
+      return alarm["kind"] == "thread" && !alarm["active"] && alarm["times"] == 1;
+    });
+  })) << "it is over, and stays in the list";
+  {
+    const FrozenThread frozen(service_->id(), "imuscope-pub");
+    EXPECT_TRUE(soon([&] { return status()["status_age_s"] > 3.0; }))
+        << "what makes the status stands still itself";
+  }
+  service_->interrupt();
+  EXPECT_EQ(service_->wait(), kFailedWork) << log();
+  EXPECT_TRUE(std::filesystem::is_empty(runtime / "imuscope"));
+  std::filesystem::remove_all(runtime);
+  unsetenv("XDG_RUNTIME_DIR");
+}
+
+TEST_F(Supervision, TheJournalGetsFieldsOfRunDeviceAndAlarm) {
+  // The journal's own socket, in this test's mount namespace.
+  std::filesystem::create_directories("/run/systemd/journal");
+  ASSERT_EQ(mount("tmpfs", "/run/systemd/journal", "tmpfs", 0, nullptr), 0);
+  const int journal = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strcpy(address.sun_path, "/run/systemd/journal/socket");
+  ASSERT_EQ(bind(journal, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  std::ofstream(folder_ / "log.txt") << "";
+  struct stat file {};
+  ASSERT_EQ(stat((folder_ / "log.txt").c_str(), &file), 0);
+  setenv("JOURNAL_STREAM", (std::to_string(file.st_dev) + ":" + std::to_string(file.st_ino)).c_str(), 1);
+  std::ofstream(folder_ / "car.toml") << kSilentVehicle;
+  service_.emplace(
+      "imuscope",
+      std::vector<std::string>{"run", (folder_ / "car.toml").string(), "--out", (folder_ / "run").string()},
+      folder_ / "log.txt");
+  std::vector<std::string> entries;
+  const auto has = [&](std::initializer_list<std::string> fields) {
+    return std::any_of(entries.begin(), entries.end(), [&](const std::string& entry) {
+      return std::all_of(fields.begin(), fields.end(), [&](const std::string& field) {
+        return entry.find(field + "\n") != std::string::npos;
+      });
+    });
+  };
+  EXPECT_TRUE(soon([&] {
+    std::array<char, 8192> text{};
+    for (ssize_t n = 0; (n = recv(journal, text.data(), text.size(), 0)) > 0;)
+      entries.emplace_back(text.data(), static_cast<std::size_t>(n));
+    return has({"IMUSCOPE_RUN=silent", "IMUSCOPE_DEVICE=mtx1", "PRIORITY=6"}) &&
+           has({"IMUSCOPE_ALARM=device", "IMUSCOPE_SUBJECT=mtx1", "IMUSCOPE_ACTIVE=1", "IMUSCOPE_TIMES=1",
+                "PRIORITY=4"});
+  }));
+  service_->interrupt();
+  EXPECT_EQ(service_->wait(), kFailedWork) << log();
+  unsetenv("JOURNAL_STREAM");
+  close(journal);
 }
 
 /// Holds the port of a name server and never answers.

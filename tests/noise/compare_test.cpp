@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "noise/conservative.h"
 #include "noise/json.h"
 #include "noise/quantities.h"
 #include "noise/select.h"
@@ -224,6 +226,39 @@ TEST(Quantities, SayWhatARecordDoesNotTellOrOnlyBounds) {
       EXPECT_GT(q.value, 0.0);
     }
   }
+}
+
+TEST(Quantities, OfAnOverBoundingModelAreWhatItsAmplitudesMake) {
+  const auto fitted = fit_of(white_and_walk(20'000, 1.0, 0.02, 4), "WN+RW");
+  const auto bound = over_bounding(fitted);
+  const auto before = filter_quantities(fitted, SignalUnit::kDegps);
+  const auto list = over_bounding_quantities(bound, SignalUnit::kDegps);
+  ASSERT_EQ(list.size(), before.size());
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    EXPECT_EQ(list[i].knowledge, Knowledge::kBound) << list[i].name;
+    EXPECT_GT(list[i].value, before[i].value) << list[i].name;
+    EXPECT_EQ(list[i].ci_high, list[i].value) << list[i].name;
+  }
+  EXPECT_NEAR(list[0].value, bound.model.components[0].amplitude / 100.0, 1e-12);
+  const auto white =
+      std::find_if(list.begin(), list.end(), [](const Quantity& q) { return q.name == "angle random walk"; });
+  ASSERT_NE(white, list.end());
+  EXPECT_NEAR(white->value, 60.0 * std::sqrt(list[0].value), 1e-9) << "the same white noise in another unit";
+}
+
+TEST(NoiseJson, SaysInWordsWhatAnEntryWasFittedTo) {
+  auto entry = nlohmann::json::parse(R"({"regime": "static",
+      "fitted_to": {"seconds": 812, "stretches": 9},
+      "sinusoids": [{"parameters": [{"name": "alpha", "value": 1}, {"name": "frequency", "value": 21.3}]},
+                    {"parameters": [{"name": "frequency", "value": 0.565}]}]})");
+  EXPECT_EQ(fitted_to_words(entry), "812 s of regime static in 9 stretches, without lines at 21.3, 0.565 Hz");
+  // Anybody may have written the file.
+  entry["sinusoids"] = {1, {{"parameters", 2}}, {{"parameters", {3, {{"name", 4}}}}}};
+  entry["regime"] = 5;
+  entry["fitted_to"]["stretches"] = "many";
+  EXPECT_EQ(fitted_to_words(entry), "812 s");
+  entry["fitted_to"]["seconds"] = "x";
+  EXPECT_EQ(fitted_to_words(entry), "");
 }
 
 TEST(RankModels, PrefersTheTrueModelOverLargerAndSmallerOnes) {

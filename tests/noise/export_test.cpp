@@ -12,6 +12,7 @@
 #include <random>
 #include <sstream>
 
+#include "noise/felt_noise.h"
 #include "noise/replicates.h"
 
 namespace imuscope::noise {
@@ -178,14 +179,14 @@ TEST_P(ExportRoundTrip, ARefitOfWhatTheFileMeansHasTheExportedModelInsideItsInte
 INSTANTIATE_TEST_SUITE_P(Each, ExportRoundTrip,
                          testing::Values(RoundTrip{ExportFormat::kKalibr, SignalUnit::kDegps, kRadPerDegree,
                                                    "WN+RW", 0.04, 4e-6, 0.0, meaning_of_kalibr},
-                                         RoundTrip{ExportFormat::kOpenVins, SignalUnit::kRadps, 1.0, "WN+RW", 1e-5,
-                                                   1e-9, 0.0, meaning_of_openvins},
-                                         RoundTrip{ExportFormat::kVinsFusion, SignalUnit::kMps2, 1.0, "WN+RW", 1e-4,
-                                                   1e-8, 0.0, meaning_of_vins_fusion},
-                                         RoundTrip{ExportFormat::kLioSam, SignalUnit::kDegps, kRadPerDegree, "WN+RW",
-                                                   0.04, 4e-6, 0.0, meaning_of_lio_sam},
-                                         RoundTrip{ExportFormat::kGtsam, SignalUnit::kRadps, 1.0, "WN+RW", 1e-5,
-                                                   1e-9, 0.0, meaning_of_gtsam},
+                                         RoundTrip{ExportFormat::kOpenVins, SignalUnit::kRadps, 1.0, "WN+RW",
+                                                   1e-5, 1e-9, 0.0, meaning_of_openvins},
+                                         RoundTrip{ExportFormat::kVinsFusion, SignalUnit::kMps2, 1.0, "WN+RW",
+                                                   1e-4, 1e-8, 0.0, meaning_of_vins_fusion},
+                                         RoundTrip{ExportFormat::kLioSam, SignalUnit::kDegps, kRadPerDegree,
+                                                   "WN+RW", 0.04, 4e-6, 0.0, meaning_of_lio_sam},
+                                         RoundTrip{ExportFormat::kGtsam, SignalUnit::kRadps, 1.0, "WN+RW",
+                                                   1e-5, 1e-9, 0.0, meaning_of_gtsam},
                                          RoundTrip{ExportFormat::kPx4, SignalUnit::kG, 9.80665, "WN+RW", 1e-6,
                                                    1e-10, 0.0, meaning_of_px4},
                                          RoundTrip{ExportFormat::kRos, SignalUnit::kRadps, 1.0, "WN+GM", 1e-5,
@@ -418,6 +419,36 @@ TEST(Export, AModelThatMissesItsBandIsRefusedUnlessForced) {
   EXPECT_THAT(refused.error().text(), HasSubstr("--force"));
   EXPECT_THAT(export_models(wrong, ExportFormat::kPx4, {.force = true}).value(),
               HasSubstr("FORCED although gyro_x"));
+}
+
+// A slow sinusoid is none of the model's terms. It leaves next to nothing at the level of its period, where a
+// wrong process in its place would leave no room for white noise.
+TEST(Export, ABoundLiesAboveTheTruthWhereTheModelIsRejectedToo) {
+  constexpr std::size_t kN = 1U << 17U;
+  constexpr double kPeriods = 3.95;
+  std::mt19937_64 random(16);
+  std::normal_distribution<double> normal;
+  for (int trip = 0; trip < 6; ++trip) {
+    std::vector<double> x(kN);
+    for (std::size_t i = 0; i < kN; ++i)
+      x[i] = normal(random) + std::sin(2.0 * std::numbers::pi * kPeriods * static_cast<double>(i) / kN);
+    const auto fit = fitted(x, "WN+GM");
+    EXPECT_GT(fit.model_error, 0.0);
+    const Felt white = felt_white_density(fit, {});
+    EXPECT_EQ(white.knowledge, Knowledge::kBound);
+    EXPECT_GE(white.upper, 1.0 / kRateHz);
+  }
+}
+
+TEST(Export, AModelThatStatesAnErrorOfTheLevelsOwnSizeIsRefused) {
+  std::mt19937_64 random(17);
+  auto fit = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");
+  fit.model_error = 0.9;
+  EXPECT_TRUE(export_models({{"gyro_x", SignalUnit::kRadps, fit}}, ExportFormat::kKalibr));
+  fit.model_error = 1.2;
+  const auto refused = export_models({{"gyro_x", SignalUnit::kRadps, fit}}, ExportFormat::kKalibr);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text(), HasSubstr("misses every level by 120 %"));
 }
 
 TEST(Export, AConservativeAmplitudeOfMoreThanTwiceTheFittedIsRefused) {

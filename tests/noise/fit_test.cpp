@@ -292,6 +292,29 @@ TEST(InvertedIntervals, ATermAtZeroIsKnownToBeBelowABoundThatTheQuickOnesDoNotGi
   EXPECT_GT(*fit(wv, parse_model("WN+RW").value(), 100.0, options)->parameters[1].ci_high, *walk.ci_high);
 }
 
+// Of white noise and a fast Gauss-Markov process one can take the other's place: where one of them is zero,
+// the other sets of processes that the data allow bound it all the same.
+TEST(InvertedIntervals, ATermAtZeroThatARivalHoldsIsBoundedFromAbove) {
+  FitOptions options;
+  options.intervals = Intervals::kInverted;
+  int at_zero = 0;
+  int below_truth = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    const auto wv = haar_wavelet_variance(white(20'000, seed)).value();
+    const auto result = fit(wv, parse_model("QN+WN+2*GM").value(), 100.0, options).value();
+    for (const auto& p : result.parameters) {
+      if (p.name == "beta" || p.process.starts_with("GM") || p.value > 0.0) continue;
+      ++at_zero;
+      ASSERT_TRUE(p.ci_high) << p.process << ", series " << seed;
+      below_truth += p.process == "WN" && *p.ci_high < 1.0 ? 1 : 0;
+      EXPECT_GT(*p.ci_high, 0.0) << seed;
+      EXPECT_LT(*p.ci_high, 1.1) << seed;
+    }
+  }
+  EXPECT_LE(below_truth, 2) << "a bound of 95 %";
+  EXPECT_GE(at_zero, 4);
+}
+
 TEST(Fit, AModelWithoutNoiseOfItsOwnHasIntervalsAllTheSame) {
   // A pure ramp: its wavelet variance has no sampling error, and so endless degrees of freedom.
   const Model truth{{{ProcessKind::kRamp, 1e-6, {}}}};

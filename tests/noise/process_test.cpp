@@ -106,13 +106,14 @@ TEST(Process, AResonanceHasTheCurveOfItsAutocovariance) {
     for (int level = 1; level <= 10; ++level) {
       const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
       const double expected = from_autocovariance(g, n);
-      EXPECT_NEAR(resonance_wv(a, b, level).value, expected, 1e-9 * expected + 1e-13) << a << ' ' << b << ' ' << level;
+      EXPECT_NEAR(resonance_wv(a, b, level).value, expected, 1e-9 * expected + 1e-13)
+          << a << ' ' << b << ' ' << level;
     }
   }
 }
 
-/// Integral of |transfer function|^2 |2 sin(pi f)|^-alpha over -1/2 < f < 1/2 by the trapezoidal rule in u, f = u^3 / 2,
-/// which has no singularity left.
+/// Integral of |transfer function|^2 |2 sin(pi f)|^-alpha over -1/2 < f < 1/2 by the trapezoidal rule in u, f
+/// = u^3 / 2, which has no singularity left.
 double power_law_by_spectrum(double alpha, double n) {
   constexpr int kSteps = 400'000;
   double sum = 0.0;
@@ -138,15 +139,21 @@ TEST(Process, PowerLawsHaveTheWaveletVarianceOfTheirSpectrum) {
 
 TEST(Process, PowerLawsEndInWhiteNoiseAndInARandomWalk) {
   for (int level = 1; level <= 24; ++level) {
-    EXPECT_LT(relative(power_law_wv(1e-9, level).value, unit_wv(ProcessKind::kWhiteNoise, {}, level).value), 1e-6);
-    EXPECT_LT(relative(power_law_wv(2.0 - 1e-9, level).value, unit_wv(ProcessKind::kRandomWalk, {}, level).value), 1e-6);
+    EXPECT_LT(relative(power_law_wv(1e-9, level).value, unit_wv(ProcessKind::kWhiteNoise, {}, level).value),
+              1e-6);
+    EXPECT_LT(
+        relative(power_law_wv(2.0 - 1e-9, level).value, unit_wv(ProcessKind::kRandomWalk, {}, level).value),
+        1e-6);
   }
 }
 
-// IEEE Std 952-2020, annex C: the Allan variance of flicker noise is 2 ln 2 / pi B^2, and twice the wavelet variance.
+// IEEE Std 952-2020, annex C: the Allan variance of flicker noise is 2 ln 2 / pi B^2, and twice the wavelet
+// variance.
 TEST(Process, FlickerNoiseIsFlatAtTheBiasInstability) {
   for (int level = 12; level <= 28; ++level) {
-    EXPECT_LT(relative(2.0 * unit_wv(ProcessKind::kFlicker, {}, level).value, 2.0 * std::log(2.0) / M_PI), 1e-6) << level;
+    EXPECT_LT(relative(2.0 * unit_wv(ProcessKind::kFlicker, {}, level).value, 2.0 * std::log(2.0) / M_PI),
+              1e-6)
+        << level;
   }
 }
 
@@ -166,13 +173,14 @@ TEST(Process, DerivativesMatchCentralDifferences) {
     ProcessKind kind;
     Shape shape;
   };
-  const std::vector<Case> cases{{ProcessKind::kMa1, {0.4, 0}},        {ProcessKind::kMa1, {-0.8, 0}},
-                                {ProcessKind::kSinusoid, {0.37, 0}},  {ProcessKind::kSinusoid, {0.011, 0}},
-                                {ProcessKind::kArma11, {0.3, 0.2}},   {ProcessKind::kArma11, {-0.6, 0.7}},
-                                {ProcessKind::kArma11, {0.95, -0.5}}, {ProcessKind::kGaussMarkov, {0.02, 0}},
-                                {ProcessKind::kResonance, {0.1, 0.9}}, {ProcessKind::kResonance, {0.02, 0.01}},
-                                {ProcessKind::kPowerLaw, {0.6, 0}},   {ProcessKind::kPowerLaw, {1.0, 0}},
-                                {ProcessKind::kPowerLaw, {1.5, 0}}};
+  const std::vector<Case> cases{
+      {ProcessKind::kMa1, {0.4, 0}},         {ProcessKind::kMa1, {-0.8, 0}},
+      {ProcessKind::kSinusoid, {0.37, 0}},   {ProcessKind::kSinusoid, {0.011, 0}},
+      {ProcessKind::kArma11, {0.3, 0.2}},    {ProcessKind::kArma11, {-0.6, 0.7}},
+      {ProcessKind::kArma11, {0.95, -0.5}},  {ProcessKind::kGaussMarkov, {0.02, 0}},
+      {ProcessKind::kResonance, {0.1, 0.9}}, {ProcessKind::kResonance, {0.02, 0.01}},
+      {ProcessKind::kPowerLaw, {0.6, 0}},    {ProcessKind::kPowerLaw, {1.0, 0}},
+      {ProcessKind::kPowerLaw, {1.5, 0}}};
   for (const Case& c : cases) {
     for (const int level : {1, 3, 7, 11}) {
       for (int i = 0; i < shape_count(c.kind); ++i) {

@@ -172,7 +172,8 @@ TEST(WvCovariance, TheSumByBlocksAgreesWithTheSumOverEveryLag) {
       {"WN+2GM", model_of({{ProcessKind::kWhiteNoise, 1.0, {}},
                            {ProcessKind::kGaussMarkov, 0.5, {0.1, 0}},
                            {ProcessKind::kGaussMarkov, 0.8, {0.004, 0}}})},
-      {"WN+RES", model_of({{ProcessKind::kWhiteNoise, 0.1, {}}, {ProcessKind::kResonance, 1.0, {0.08, 1.2}}})},
+      {"WN+RES",
+       model_of({{ProcessKind::kWhiteNoise, 0.1, {}}, {ProcessKind::kResonance, 1.0, {0.08, 1.2}}})},
       {"ARMA11", model_of({{ProcessKind::kArma11, 1.0, {-0.8, 0.3}}})}};
   for (const auto& segments :
        {std::vector<Segment>{{0, 1500}}, std::vector<Segment>{{0, 600}, {650, 900}, {1000, 1500}}}) {

@@ -223,6 +223,7 @@ inline status_t example_status() {
   thread.overruns = 11;
   thread.skipped = 12;
   thread.cpu_percent = 0.4;
+  thread.heartbeat_age_s = 0.02;
   thread.lateness_p50_us = 13.0;
   thread.lateness_p99_us = 14.0;
   thread.lateness_p999_us = 15.0;
@@ -268,8 +269,17 @@ inline status_t example_status() {
   m.n_threads = element_count(m.threads);
   m.rings = {ring};
   m.n_rings = element_count(m.rings);
-  m.problems = {"no route; run ip route add"};
-  m.n_problems = element_count(m.problems);
+  alarm_t alarm{};
+  alarm.kind = "bus";
+  alarm.subject = "LCM";
+  alarm.what = "no route";
+  alarm.remedy = "run ip route add";
+  alarm.active = 1;
+  alarm.since_utime = kExampleUtime;
+  alarm.lasted_s = 21.0;
+  alarm.times = 22;
+  m.alarms = {alarm};
+  m.n_alarms = element_count(m.alarms);
   return m;
 }
 

@@ -202,6 +202,51 @@ TEST_P(CoreAfterAStall, UsesEverySampleThatWasReadLate) {
 }
 INSTANTIATE_TEST_SUITE_P(Seconds, CoreAfterAStall, testing::Values(0.5, 1.5, 5.0, 11.0, 15.0, 60.0, 118.0));
 
+/// A study with a mounting that is known: its samples are rows from the first on.
+EstimatorConfig calibrating_study() {
+  EstimatorConfig config = one_study();
+  config.studies[0].prior_C_b_s = std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  config.studies[0].prior_t_d_s = 0.0;
+  config.studies[0].prior_t_d_sd_s = 0.001;
+  return config;
+}
+
+TEST_P(CoreAfterAStall, OfTheLineOfAnImuAloneUsesEverySample) {
+  const int samples = static_cast<int>(GetParam() * 1e3 / kPeriod_ms);
+  const int end = kStart + samples;
+  const int catch_up = samples / 8 + 50;
+  Core core(calibrating_study(), 2);
+  Notes notes;
+  fill(core, 0, 0, end + catch_up, std::nullopt);
+  fill(core, 1, 0, kStart, std::nullopt);
+  fill(core, 1, kStart, end, kPeriod_ms * end + 3.0);
+  fill(core, 1, end, end + catch_up, std::nullopt);
+  run_ticks(core, 0, end + catch_up, notes);
+  EXPECT_FALSE(core.catches_up());
+  EXPECT_LE(given_up(core), kOfStart);
+  EXPECT_GE(counters_of(core).samples, static_cast<std::uint64_t>(end + catch_up - 10));
+  EXPECT_TRUE(notes.late.empty());
+}
+
+TEST_P(CoreAfterAStall, OfTheReferencesLineAloneUsesEverySample) {
+  const int samples = static_cast<int>(GetParam() * 1e3 / kPeriod_ms);
+  const int end = kStart + samples;
+  const int catch_up = samples / 8 + 50;
+  Core core(calibrating_study(), 2);
+  Notes notes;
+  fill(core, 1, 0, end + catch_up, std::nullopt);
+  fill(core, 0, 0, kStart, std::nullopt);
+  fill(core, 0, kStart, end, kPeriod_ms * end + 3.0);
+  fill(core, 0, end, end + catch_up, std::nullopt);
+  run_ticks(core, 0, end + catch_up, notes);
+  EXPECT_FALSE(core.catches_up());
+  EXPECT_LE(given_up(core), kOfStart);
+  EXPECT_LE(counters_of(core).waiting, 10U);
+  EXPECT_GE(counters_of(core).samples, static_cast<std::uint64_t>(end + catch_up - 10));
+  EXPECT_EQ(core.estimator().counters().reference_gaps, 0U);
+  EXPECT_TRUE(notes.late.empty());
+}
+
 TEST(Core, SamplesWaitWhileNobodyIsHeardAndAreGivenUpWhereTheReferenceAloneIsSilent) {
   for (const bool is_heard : {false, true}) {
     Core core(one_study(), 2);

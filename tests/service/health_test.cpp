@@ -36,6 +36,15 @@ device_status_t device(const std::string& name, const std::string& role, const s
   return d;
 }
 
+alarm_t alarm(const char* kind, const char* what, const char* remedy) {
+  alarm_t a{};
+  a.kind = kind;
+  a.what = what;
+  a.remedy = remedy;
+  a.active = 1;
+  return a;
+}
+
 status_t healthy() {
   status_t report{};
   report.devices = {device("airins", "reference", "streaming"), device("mtx1", "study", "streaming"),
@@ -92,9 +101,11 @@ TEST(Health, DegradedWhenAnythingIsLostOrRefused) {
   report.devices[2].samples_refused = 2;
   EXPECT_THAT(judge(report).reason, HasSubstr("2 samples of mtx2"));
   report = healthy();
-  report.problems = {"memory is not locked; ..."};
+  report.alarms = {alarm("privilege", "memory is not locked", "...")};
   EXPECT_EQ(judge(report).state, "degraded");
   EXPECT_EQ(judge(report).reason, "memory is not locked; ...");
+  report.alarms[0].active = 0;
+  EXPECT_EQ(judge(report).state, "running") << "it is over";
 }
 
 TEST(Health, SaysOneReasonForEachState) {
@@ -103,7 +114,7 @@ TEST(Health, SaysOneReasonForEachState) {
   EXPECT_EQ(judge(report).reason, "all devices stream");
   for (auto& study : report.studies) study.state = "waiting for samples";
   EXPECT_EQ(judge(report).reason, "waiting for motion that shows how the S-IMUs sit");
-  report.problems = {"no route; run ip route add"};
+  report.alarms = {alarm("bus", "no route", "run ip route add")};
   EXPECT_EQ(judge(report).state, "degraded") << "even before there is a mounting";
   EXPECT_EQ(judge(report).reason, "no route; run ip route add");
   report.devices[2].frames_dropped = 5;
@@ -180,9 +191,9 @@ TEST(CalibrationStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDir
   EXPECT_DOUBLE_EQ(status.sd_psi_deg, 0.3 * kDegPerRad);
   EXPECT_DOUBLE_EQ(status.sd_r_m, 0.6);
   EXPECT_DOUBLE_EQ(status.sd_t_d_ms, 700.0);
-  EXPECT_DOUBLE_EQ(status.goal_psi_deg, kGoalBoresightSd_rad * kDegPerRad);
-  EXPECT_DOUBLE_EQ(status.goal_r_m, kGoalLeverArmSd_m);
-  EXPECT_DOUBLE_EQ(status.goal_t_d_ms, kGoalTimeOffsetSd_s * 1e3);
+  EXPECT_DOUBLE_EQ(status.goal_psi_deg, kFinestGoal.boresight_sd_rad * kDegPerRad);
+  EXPECT_DOUBLE_EQ(status.goal_r_m, kFinestGoal.lever_arm_sd_m);
+  EXPECT_DOUBLE_EQ(status.goal_t_d_ms, kFinestGoal.time_offset_sd_s * 1e3);
   EXPECT_EQ(status.weakest, "boresight about down");
   EXPECT_DOUBLE_EQ(status.weakest_relative, 0.9);
   EXPECT_THAT(status.manoeuvre, HasSubstr("brake"));
@@ -190,9 +201,9 @@ TEST(CalibrationStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDir
   EXPECT_EQ(status.manoeuvre, observability_of(study).advice) << "said in one way everywhere";
   study.status = CalibrationStatus::kCalibrated;
   study.observable.fill(true);
-  study.sd_psi_rad.fill(0.5 * kGoalBoresightSd_rad);
-  study.sd_r_bs_b_m.fill(0.5 * kGoalLeverArmSd_m);
-  study.sd_t_d_s = 0.5 * kGoalTimeOffsetSd_s;
+  study.sd_psi_rad.fill(0.5 * kFinestGoal.boresight_sd_rad);
+  study.sd_r_bs_b_m.fill(0.5 * kFinestGoal.lever_arm_sd_m);
+  study.sd_t_d_s = 0.5 * kFinestGoal.time_offset_sd_s;
   EXPECT_EQ(study_status("mtx1", study).manoeuvre, "") << "nothing is missing any more";
   study.status = CalibrationStatus::kCoarse;
   const auto coarse = study_status("mtx1", study);
@@ -249,6 +260,7 @@ TEST(Status, KnowsItsDevicesAndNothingElseBeforeTheRun) {
   ASSERT_EQ(status.devices.size(), 2U);
   EXPECT_EQ(status.devices[1].name, "mtx1");
   EXPECT_TRUE(std::isnan(status.devices[1].latency_ms));
+  EXPECT_TRUE(std::isnan(status.devices[1].data_age_s));
   EXPECT_TRUE(std::isnan(status.devices[1].clock_drift_ppm));
   EXPECT_TRUE(std::isnan(status.devices[1].clock_sd_us));
   EXPECT_TRUE(std::isnan(status.devices[1].sd_t_d_ms));
@@ -260,12 +272,12 @@ TEST(Status, CountsEveryArraySoThatAListenerGetsAllOfIt) {
   status_t status = healthy();
   status.threads.resize(3);
   status.threads[1].lateness_octaves = {4, 5, 6, 7};
-  status.problems = {"one", "two", "three", "four", "five"};
+  status.alarms.resize(5);
   count_elements(status);
   const auto heard = decode_message<status_t>(encode_message(status));
   ASSERT_TRUE(heard);
   EXPECT_THAT((std::array{heard->devices.size(), heard->studies.size(), heard->threads.size(),
-                          heard->rings.size(), heard->problems.size()}),
+                          heard->rings.size(), heard->alarms.size()}),
               ElementsAre(3, 2, 3, 1, 5));
   EXPECT_THAT(heard->threads[1].lateness_octaves, ElementsAre(4, 5, 6, 7));
 }

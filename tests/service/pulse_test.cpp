@@ -9,6 +9,7 @@ namespace {
 
 using std::chrono::seconds;
 using testing::ElementsAre;
+using testing::Field;
 using testing::IsEmpty;
 
 constexpr HostTime kBegin{std::chrono::hours(1)};
@@ -34,7 +35,7 @@ TEST_F(PulseTest, WhatMovesIsAlive) {
 TEST_F(PulseTest, AStandingCoreThreadIsToldAndGivenUpSoon) {
   recorder_.beat(kBegin + seconds(10));
   EXPECT_THAT(standing_threads(pulses_, kBegin + seconds(10)),
-              ElementsAre("the thread io has stood still for 10 s"));
+              ElementsAre(Field(&Condition::what, "the thread io has stood still for 10 s")));
   EXPECT_FALSE(all_alive(pulses_, kBegin + seconds(10)));
   io_.beat(kBegin + seconds(10));
   EXPECT_TRUE(all_alive(pulses_, kBegin + seconds(10))) << "it came back";
@@ -43,7 +44,7 @@ TEST_F(PulseTest, AStandingCoreThreadIsToldAndGivenUpSoon) {
 TEST_F(PulseTest, ARecorderThatWaitsForTheDiskIsToldAndGivenItsTime) {
   io_.beat(kBegin + seconds(14));
   EXPECT_THAT(standing_threads(pulses_, kBegin + seconds(14)),
-              ElementsAre("the thread rec has stood still for 14 s"));
+              ElementsAre(Field(&Condition::what, "the thread rec has stood still for 14 s")));
   EXPECT_TRUE(all_alive(pulses_, kBegin + seconds(14)));
   io_.beat(kBegin + seconds(61));
   EXPECT_FALSE(all_alive(pulses_, kBegin + seconds(61)));

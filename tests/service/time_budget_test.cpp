@@ -51,5 +51,35 @@ TEST(TimeBudget, IsOpenBeforeTheFirstSample) {
   EXPECT_TRUE(std::isnan(budget.clock_sd_s));
 }
 
+TEST(TimeBudget, TellsWhoStampsAndWhatThatSaves) {
+  EXPECT_EQ(name_of(time_budget(heard(), nullptr).stamped_by), "read");
+  EXPECT_TRUE(std::isnan(time_budget(heard(), nullptr).stamp_lead_s));
+  LineStatus line = heard();
+  line.stamps = {StampedBy::kInterface, 120e-6, 40e-6};
+  const TimeBudget budget = time_budget(line, nullptr);
+  EXPECT_EQ(name_of(budget.stamped_by), "interface");
+  EXPECT_EQ(budget.stamp_lead_s, 120e-6);
+  EXPECT_EQ(budget.stamp_lead_sd_s, 40e-6);
+}
+
+TEST(TimeBudget, HasTheConstantDelayOfEachDeviceThatPulsesMeasure) {
+  PulseState pulses;
+  StudyOutput study;
+  study.status = CalibrationStatus::kCalibrated;
+  study.t_d_s = -3e-3;
+  study.sd_t_d_s = 30e-6;
+  EXPECT_TRUE(std::isnan(time_budget(heard(), &study, DeviceRole::kStudy, pulses).delay_s));
+  pulses.is_known = true;
+  pulses.reference_delay = {4e-3, 40e-6};
+  pulses.gnss_delay = {60e-3, 1e-3};
+  EXPECT_EQ(time_budget(heard(), nullptr, DeviceRole::kReference, pulses).delay_s, 4e-3);
+  EXPECT_EQ(time_budget(heard(), nullptr, DeviceRole::kGnss, pulses).delay_s, 60e-3);
+  // It runs 3 ms behind the reference, which is 4 ms late.
+  const TimeBudget budget = time_budget(heard(), &study, DeviceRole::kStudy, pulses);
+  EXPECT_DOUBLE_EQ(budget.delay_s, 7e-3);
+  EXPECT_DOUBLE_EQ(budget.sd_delay_s, 50e-6);
+  EXPECT_TRUE(std::isnan(time_budget(heard(), nullptr, DeviceRole::kTime, pulses).delay_s));
+}
+
 }  // namespace
 }  // namespace imuscope

@@ -71,5 +71,17 @@ TEST(UtcTrack, WhatADeviceTellsReplacesThePcsClock) {
   EXPECT_NEAR(utc_at(track, 1.0), 1.0, 1e-9);
 }
 
+TEST(UtcTrack, WhatPulsesTellHoldsBeforeThemInPlaceOfAReceiversMessages) {
+  UtcTrack track;
+  for (int i = 0; i < 5; ++i) track.add(track_scale(i, i - 0.1, UtcSource::kGnss));
+  for (int i = 5; i < 10; ++i) track.add(track_scale(i, i, UtcSource::kPulses));
+  EXPECT_NEAR(utc_at(track, 2.0), 2.0, 1e-9);
+  EXPECT_NEAR(utc_at(track, 8.0), 8.0, 1e-9);
+  // What the R-IMU's tags say of its own samples stays.
+  track.add(track_scale(10.0, 10.0 - 0.004));
+  track.add(track_scale(11.0, 11.0 - 0.004));
+  EXPECT_NEAR(utc_at(track, 8.0), 8.0, 1e-9);
+}
+
 }  // namespace
 }  // namespace imuscope

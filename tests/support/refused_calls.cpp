@@ -99,9 +99,9 @@ ssize_t pread(int fd, void* bytes, std::size_t n, off_t offset) {
   return syscall(SYS_pread64, fd, bytes, n, offset);
 }
 
-ssize_t recv(int fd, void* bytes, std::size_t n, int flags) {
+ssize_t recvmsg(int fd, msghdr* message, int flags) {
   if (imuscope::test::refuses(imuscope::test::Call::kRecv)) return -1;
-  return syscall(SYS_recvfrom, fd, bytes, n, flags, nullptr, nullptr);
+  return syscall(SYS_recvmsg, fd, message, flags);
 }
 
 ssize_t send(int fd, const void* bytes, std::size_t n, int flags) {

@@ -66,6 +66,15 @@ TEST(PackageScripts, TheUnitLetsTheStateOfTheClockBeReadAndNobodySetIt) {
   EXPECT_TRUE(lines.contains("NoNewPrivileges=yes"));
 }
 
+TEST(PackageScripts, TheUnitKeepsItsSocketToItselfAndOutlivesAShortageOfMemory) {
+  std::ifstream unit(test::source_path("config/imuscope.service"));
+  std::set<std::string> lines;
+  for (std::string line; std::getline(unit, line);) lines.insert(line);
+  EXPECT_TRUE(lines.contains("RuntimeDirectory=imuscope"));
+  EXPECT_TRUE(lines.contains("RuntimeDirectoryMode=0700"));
+  EXPECT_TRUE(lines.contains("OOMScoreAdjust=-500"));
+}
+
 TEST(PackageScripts, TheUnitAllowsPortsThatArePluggedInLater) {
   std::ifstream unit(test::source_path("config/imuscope.service"));
   std::set<std::string> allowed;
@@ -75,6 +84,8 @@ TEST(PackageScripts, TheUnitAllowsPortsThatArePluggedInLater) {
   }
   for (const char* ports : {"char-188 rw", "char-166 rw", "char-4 rw", "char-204 rw", "char-207 rw"})
     EXPECT_TRUE(allowed.contains(ports)) << ports;
+  for (const char* clocks : {"char-pps rw", "char-ptp r"})
+    EXPECT_TRUE(allowed.contains(clocks)) << "pulses of UTC, clocks of network cards: " << clocks;
   for (const char* loaded_later : {"char-ttyUSB rw", "char-ttyACM rw"})
     EXPECT_FALSE(allowed.contains(loaded_later)) << "unknown to the kernel until the first is plugged in";
 }

@@ -32,7 +32,7 @@ std::string page(const Heard& heard) {
 TEST(TopView, WhatANetworkSendsMovesNoCursorAndIsStillJson) {
   Heard heard = example();
   heard.status->state = "\x1b[2Jrunning";
-  heard.status->last_event = "first\nproblem: forged";
+  heard.status->last_event = "first\n!! forged";
   heard.status->devices[0].name = "\xff\xfe";
   const auto lines = lines_of(heard);
   for (const auto& line : lines) {
@@ -42,16 +42,31 @@ TEST(TopView, WhatANetworkSendsMovesNoCursorAndIsStillJson) {
   }
   EXPECT_THAT(lines, Contains(HasSubstr("?[2Jrunning")));
   const auto json = nlohmann::json::parse(json_of(heard));
-  EXPECT_EQ(json["last_event"], "first\nproblem: forged") << "JSON has escapes of its own";
+  EXPECT_EQ(json["last_event"], "first\n!! forged") << "JSON has escapes of its own";
 }
 
-TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndProblems) {
+TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndAlarms) {
   const auto text = page(example());
-  for (const char* part :
-       {"run 'demo'  degraded: mtx2 is silent", "run/capture.lcm", "lost 4", "last event: roundabout",
-        "streaming", "99.9", "4.20", "25", "-11.5", "converging", "0.5730/0.0573", "20.00/2", "3.000/0.3",
-        "weakest psi_z (50 % of its prior left); still missing: brake", "fifo 80", "13 us", "18 us", "1024",
-        "problem: no route; run ip route add"}) {
+  for (const char* part : {"run 'demo'  degraded: mtx2 is silent",
+                           "run/capture.lcm",
+                           "lost 4",
+                           "last event: roundabout",
+                           "streaming",
+                           "99.9",
+                           "4.20",
+                           "25",
+                           "-11.5",
+                           "converging",
+                           "0.5730/0.0573",
+                           "20.00/2",
+                           "3.000/0.3",
+                           "weakest psi_z (50 % of its prior left); still missing: brake",
+                           "fifo 80",
+                           "13 us",
+                           "18 us",
+                           "1024",
+                           "!! no route (for 0:00:21, 22 times)",
+                           "   run ip route add"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
 }
@@ -74,6 +89,21 @@ TEST(TopView, FramesThatThisPcLostAreShown) {
   heard.status->devices[0].frames_dropped = 4711;
   EXPECT_THAT(page(heard), HasSubstr("4711"));
   EXPECT_EQ(nlohmann::json::parse(json_of(heard)).at("devices").at(0).at("frames_dropped"), 4711);
+}
+
+TEST(TopView, AlarmsThatAreOverSayHowLongTheyLasted) {
+  auto heard = example();
+  heard.status->alarms[0].active = 0;
+  heard.status->utime = heard.status->alarms[0].since_utime + 61'000'000;
+  EXPECT_THAT(page(heard), HasSubstr("over: no route (lasted 0:00:21, began 0:01:01 ago, 22 times)"));
+  const auto json = nlohmann::json::parse(json_of(heard)).at("alarms").at(0);
+  EXPECT_EQ(json.at("kind"), "bus");
+  EXPECT_EQ(json.at("active"), false);
+  EXPECT_EQ(json.at("remedy"), "run ip route add");
+}
+
+TEST(TopView, EveryRingStandsInTheJsonOnce) {
+  EXPECT_EQ(nlohmann::json::parse(json_of(example())).at("rings").size(), 1U);
 }
 
 TEST(TopView, SaysWhatToDoBeforeAnythingIsHeard) {

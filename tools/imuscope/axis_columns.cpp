@@ -40,9 +40,10 @@ Tokens tokens_of(std::string_view name) {
   return tokens;
 }
 
-constexpr std::array<std::string_view, 8> kGyroWords{"gyro", "gyr", "gyroscope", "angular", "omega", "rate", "angrate", "gyros"};
-constexpr std::array<std::string_view, 8> kAccelWords{"accel",          "acc",  "accelerometer", "acceleration",
-                                                      "accelerometers", "linear", "specific",    "force"};
+constexpr std::array<std::string_view, 8> kGyroWords{"gyro",  "gyr",  "gyroscope", "angular",
+                                                     "omega", "rate", "angrate",   "gyros"};
+constexpr std::array<std::string_view, 8> kAccelWords{
+    "accel", "acc", "accelerometer", "acceleration", "accelerometers", "linear", "specific", "force"};
 
 template <std::size_t N>
 bool is_one_of(std::string_view word, const std::array<std::string_view, N>& words) {
@@ -55,9 +56,12 @@ bool is_axis_letter(std::string_view word) { return word == "x" || word == "y" |
 char fused_axis(std::string_view word, std::optional<bool>& gyro) {
   if (word.size() < 2 || !is_axis_letter(word.substr(word.size() - 1))) return 0;
   const std::string_view stem = word.substr(0, word.size() - 1);
-  if (is_one_of(stem, kGyroWords) || stem == "w" || stem == "g") gyro = true;
-  else if (is_one_of(stem, kAccelWords) || stem == "a" || stem == "f") gyro = false;
-  else return 0;
+  if (is_one_of(stem, kGyroWords) || stem == "w" || stem == "g")
+    gyro = true;
+  else if (is_one_of(stem, kAccelWords) || stem == "a" || stem == "f")
+    gyro = false;
+  else
+    return 0;
   return word.back();
 }
 
@@ -73,7 +77,8 @@ Unit unit_of(const Tokens& tokens, std::size_t behind, bool gyro) {
   using noise::SignalUnit;
   if (gyro) {
     if (rest == "radps" || rest == "rads" || rest == "radpersec") return {SignalUnit::kRadps, 1.0};
-    if (rest == "degps" || rest == "degs" || rest == "dps" || rest == "degpersec") return {SignalUnit::kDegps, 1.0};
+    if (rest == "degps" || rest == "degs" || rest == "dps" || rest == "degpersec")
+      return {SignalUnit::kDegps, 1.0};
     return {};
   }
   if (rest == "mps2" || rest == "ms2" || rest == "mss" || rest == "mpss") return {SignalUnit::kMps2, 1.0};
@@ -106,13 +111,14 @@ std::optional<AxisColumn> axis_of_name(std::string_view name) {
   }
   if (!gyro || axis == 0) return std::nullopt;
   const Unit unit = unit_of(tokens, behind, *gyro);
-  return AxisColumn{fmt::format("{}_{}", *gyro ? "gyro" : "accel", axis), std::string(name), unit.unit, unit.factor};
+  return AxisColumn{fmt::format("{}_{}", *gyro ? "gyro" : "accel", axis), std::string(name), unit.unit,
+                    unit.factor};
 }
 
 bool is_temperature_name(std::string_view name) {
   const Tokens tokens = tokens_of(name);
-  return !tokens.empty() && (tokens.front() == "temp" || tokens.front() == "temperature" || tokens.back() == "temp" ||
-                             tokens.back() == "temperature");
+  return !tokens.empty() && (tokens.front() == "temp" || tokens.front() == "temperature" ||
+                             tokens.back() == "temp" || tokens.back() == "temperature");
 }
 
 Result<std::vector<std::string>> header_of(const std::filesystem::path& file) {
@@ -124,7 +130,8 @@ Result<std::vector<std::string>> header_of(const std::filesystem::path& file) {
   while (read_line(in, line, kLongest)) {
     const auto names = cells_of(line);
     if (names.empty()) continue;
-    const bool has_names = std::any_of(names.begin(), names.end(), [](const auto& cell) { return !parse_stamp(cell); });
+    const bool has_names =
+        std::any_of(names.begin(), names.end(), [](const auto& cell) { return !parse_stamp(cell); });
     return has_names ? names : std::vector<std::string>{};
   }
   return work_error(fmt::format("{} is empty", file.string()));

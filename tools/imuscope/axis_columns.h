@@ -14,14 +14,14 @@
 namespace imuscope::cli {
 
 struct AxisColumn {
-  std::string axis;    ///< "gyro_x", "accel_z"
-  std::string column;  ///< its name in the file; of a raw file empty
+  std::string axis;                                   ///< "gyro_x", "accel_z"
+  std::string column;                                 ///< its name in the file; of a raw file empty
   noise::SignalUnit unit = noise::SignalUnit::kNone;  ///< kNone: the name does not say
   double factor = 1.0;                                ///< to that unit, of thousandths of g
 };
 
-/// Axis and unit of a name such as "gyro_x_radps", "AngularVelocity.X (deg/s)", "imu.linear_acceleration.z", "acc_y [mg]",
-/// "wx", "az". Absent where it names neither a rate nor a force, or no axis.
+/// Axis and unit of a name such as "gyro_x_radps", "AngularVelocity.X (deg/s)", "imu.linear_acceleration.z",
+/// "acc_y [mg]", "wx", "az". Absent where it names neither a rate nor a force, or no axis.
 std::optional<AxisColumn> axis_of_name(std::string_view name);
 
 /// "temp", "temperature_c", "Temp (degC)".

@@ -46,7 +46,8 @@ Result<void> parse_axes(CharacterizeCommand& options) {
   for (const std::string& text : options.axes) {
     const std::size_t equals = text.find('=');
     const std::string axis = text.substr(0, equals);
-    constexpr std::array<std::string_view, 6> kNames{"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+    constexpr std::array<std::string_view, 6> kNames{"gyro_x",  "gyro_y",  "gyro_z",
+                                                     "accel_x", "accel_y", "accel_z"};
     if (equals == std::string::npos || std::find(kNames.begin(), kNames.end(), axis) == kNames.end()) {
       return usage_error(fmt::format("--axis {} is not understood", text),
                          "write AXIS=COLUMN, AXIS one of gyro_x, gyro_y, gyro_z, accel_x, accel_y, accel_z");
@@ -61,8 +62,9 @@ Result<void> may_write(const CharacterizeCommand& options) {
   if (options.no_page || options.force || !std::filesystem::exists(options.out / kPage)) return {};
   const auto ours = report::read_json_file(options.out / kDocument);
   if (ours.is_object() && ours.value("schema", "").starts_with("imuscope.certificate/")) return {};
-  return usage_error(fmt::format("{} is there and was not written by this command", (options.out / kPage).string()),
-                     "name another folder with --out, or write over it with --force");
+  return usage_error(
+      fmt::format("{} is there and was not written by this command", (options.out / kPage).string()),
+      "name another folder with --out, or write over it with --force");
 }
 
 std::string shown_term(const certificate::TermValue& term) {
@@ -74,36 +76,40 @@ std::string shown_term(const certificate::TermValue& term) {
 
 void print_axis(const certificate::AxisCertificate& axis) {
   say("{}: {}", axis.name, axis.fit.spec.name());
-  if (axis.fit.model_error > 0.0) say(", which follows every scale within about {:.2g} %", 100.0 * axis.fit.model_error);
+  if (axis.fit.model_error > 0.0)
+    say(", which follows every scale within about {:.2g} %", 100.0 * axis.fit.model_error);
   say("\n");
   for (const auto& term : axis.terms) {
-    say("  {} {:<24} {:<28} {:<16} {}\n", symbol_of(term.term), name_of(term.term, is_gyro(axis.unit)), shown_term(term),
-        term.unit, term.knowledge == noise::Knowledge::kFitted ? term.note : "");
+    say("  {} {:<24} {:<28} {:<16} {}\n", symbol_of(term.term), name_of(term.term, is_gyro(axis.unit)),
+        shown_term(term), term.unit, term.knowledge == noise::Knowledge::kFitted ? term.note : "");
   }
   for (const auto& line : axis.lines) say("  {}\n", in_words(line, unit_name(axis.unit)));
   for (const auto& r : axis.resonances) say("  {}\n", in_words(r, unit_name(axis.unit)));
   if (axis.low_pass_hz) say("  bandwidth ends at {:.3g} Hz\n", *axis.low_pass_hz);
   if (axis.temperature) {
     say("  bias {:.3g} +- {:.2g} {} per degC, {:.1f} to {:.1f} degC\n", axis.temperature->bias_per_c,
-        axis.temperature->bias_per_c_sd, unit_name(axis.unit), axis.temperature->lowest_c, axis.temperature->highest_c);
+        axis.temperature->bias_per_c_sd, unit_name(axis.unit), axis.temperature->lowest_c,
+        axis.temperature->highest_c);
   }
 }
 
-void print_population(const std::vector<certificate::Population>& populations, const std::vector<SensorRecord>& records) {
+void print_population(const std::vector<certificate::Population>& populations,
+                      const std::vector<SensorRecord>& records) {
   if (populations.empty()) return;
   say("\nAll {} records\n", records.size());
   for (const auto& p : populations) {
     const bool gyro = p.axis.starts_with("gyro");
     say("  {} {}: ", p.axis, name_of(p.term, gyro));
     if (p.effects) {
-      say("{:.4g} [{:.4g}, {:.4g}] {}, records differ by {:.2g} %", std::exp(p.effects->mean), std::exp(p.effects->ci_low),
-          std::exp(p.effects->ci_high), p.unit, 100.0 * p.effects->spread);
+      say("{:.4g} [{:.4g}, {:.4g}] {}, records differ by {:.2g} %", std::exp(p.effects->mean),
+          std::exp(p.effects->ci_low), std::exp(p.effects->ci_high), p.unit, 100.0 * p.effects->spread);
     }
     if (p.tolerance_upper) say("; 95 % are below {:.4g} (95 % confidence)", *p.tolerance_upper);
     say("\n");
     for (std::size_t i = 0; i < p.p_values.size(); ++i) {
       if (p.p_values[i] && *p.p_values[i] < noise::kSignificance)
-        say("    {} stands out: {:.4g} {} (p = {:.2g}, corrected)\n", records[i].name, *p.values[i], p.unit, *p.p_values[i]);
+        say("    {} stands out: {:.4g} {} (p = {:.2g}, corrected)\n", records[i].name, *p.values[i], p.unit,
+            *p.p_values[i]);
     }
   }
 }
@@ -158,7 +164,8 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     auto axes = characterize(record, options.how);
     if (!axes) return tl::unexpected(axes.error());
     const std::string name = options.sensor.empty() || records->size() > 1 ? record.name : options.sensor;
-    documents.push_back(certificate::to_json({name, record.files, record.selection, now_utc(), IMUSCOPE_VERSION}, *axes));
+    documents.push_back(
+        certificate::to_json({name, record.files, record.selection, now_utc(), IMUSCOPE_VERSION}, *axes));
     all.push_back(std::move(*axes));
   }
   const auto populations = certificate::population_of(all, options.how.confidence);
@@ -197,29 +204,37 @@ Result<void> run_characterize(CharacterizeCommand& options) {
 
 void add_characterize(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
-      "characterize", "The noise of a sensor at rest as a page: data-sheet terms with intervals, Allan deviation, model");
+      "characterize",
+      "The noise of a sensor at rest as a page: data-sheet terms with intervals, Allan deviation, model");
   auto options = std::make_shared<CharacterizeCommand>();
   command
       ->add_option("FILE", options->files,
-                   "A log at rest: CSV in any columns; raw float64 named after its axis (gyro_x_degps.f64), one file an axis; "
+                   "A log at rest: CSV in any columns; raw float64 named after its axis (gyro_x_degps.f64), "
+                   "one file an axis; "
                    "or the folder of a study. Several logs: several units of one sensor, or several days")
       ->required();
-  command->add_option("--rate,-r", options->choice.signal.rate_hz, "Samples per second (default: by the time stamps)");
-  command->add_option("--time", options->choice.signal.time,
-                      "Column with time stamps: seconds, ISO 8601, or WEEK,SECONDS of GPS (default: by its name; none: no "
-                      "times)");
+  command->add_option("--rate,-r", options->choice.signal.rate_hz,
+                      "Samples per second (default: by the time stamps)");
+  command->add_option(
+      "--time", options->choice.signal.time,
+      "Column with time stamps: seconds, ISO 8601, or WEEK,SECONDS of GPS (default: by its name; none: no "
+      "times)");
   command->add_option("--counter", options->choice.signal.counter, "Column that counts the samples");
-  command->add_option("--where", options->choice.signal.where, "COLUMN=VALUE: rows with another value count as gaps");
-  command->add_option("--axis", options->axes, "AXIS=COLUMN, as gyro_x=wx, where names do not tell; once an axis");
+  command->add_option("--where", options->choice.signal.where,
+                      "COLUMN=VALUE: rows with another value count as gaps");
+  command->add_option("--axis", options->axes,
+                      "AXIS=COLUMN, as gyro_x=wx, where names do not tell; once an axis");
   command->add_option("--gyro-unit", options->choice.gyro_unit, "rad/s or deg/s, where names do not tell");
   command->add_option("--accel-unit", options->choice.accel_unit,
                       "m/s^2 or g, where neither names nor the size of gravity tell");
   command->add_option("--temperature", options->choice.temperature,
                       "Column with the sensor's temperature, degC (default: by its name; none: none)");
   command->add_option("--name,-n", options->choice.imu, "The IMU, where the folder of a study holds several");
-  command->add_option("--regime", options->choice.regime, "Of the folder of a study: a regime, or all")->capture_default_str();
+  command->add_option("--regime", options->choice.regime, "Of the folder of a study: a regime, or all")
+      ->capture_default_str();
   command->add_option("--sensor", options->sensor, "Name of the sensor on the page (default: the file's)");
-  command->add_option("--model,-m", options->how.model, "Noise model of every axis, as for `fit` (default: selected)");
+  command->add_option("--model,-m", options->how.model,
+                      "Noise model of every axis, as for `fit` (default: selected)");
   command->add_option("--confidence", options->how.confidence, "Of every interval, as a share")
       ->check(CLI::Range(0.51, 0.9999))
       ->capture_default_str();

@@ -71,10 +71,14 @@ void add_export(CLI::App& app, Work& chosen) {
   auto options = std::make_shared<ExportCommand>();
   command
       ->add_option("MODEL", options->files,
-                   "What `imuscope fit --json` printed (one file an axis), a run's models.json, or the certificate.json of "
+                   "What `imuscope fit --json` printed (one file an axis), a run's models.json, or the "
+                   "certificate.json of "
                    "`imuscope characterize`")
       ->required();
-  command->add_option("--to,-t", options->format, "kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins or state-space")->required();
+  command
+      ->add_option("--to,-t", options->format,
+                   "kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins or state-space")
+      ->required();
   command->add_option("--name,-n", options->name, "The S-IMU to export, where the file holds several");
   command->add_option("--regime", options->regime, "all, static or dynamic, where the file holds several");
   command->add_option("--unit,-u", options->unit,

@@ -57,8 +57,7 @@ void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra)
     auto json = fit_json(fit, task.unit);
     json.update(extra);
     if (task.wvs.size() == 1 && !task.lines.front().empty())
-      json["sinusoids"] =
-          noise::sinusoids_to_json(task.lines.front(), task.options.signal.unit, fit.rate_hz, fit.wv.size());
+      json["sinusoids"] = noise::sinusoids_to_json(task.lines.front(), fit, task.options.signal.unit);
     if (task.options.conservative)
       json["conservative"] = bound ? conservative_json(*bound, task.unit) : nlohmann::json(nullptr);
     say("{}\n", json_text(json));

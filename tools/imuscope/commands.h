@@ -79,6 +79,12 @@ void add_config(CLI::App& app, Work& chosen);
 /// `imuscope top`
 void add_top(CLI::App& app, Work& chosen);
 
+/// `imuscope status`
+void add_status(CLI::App& app, Work& chosen);
+
+/// `imuscope keep RUN_DIR`
+void add_keep(CLI::App& app, Work& chosen);
+
 /// `imuscope completion bash|zsh|fish`
 void add_completion(CLI::App& app, Work& chosen);
 

@@ -56,7 +56,8 @@ Result<std::vector<StoredFit>> read_fits(const std::filesystem::path& file) {
   }
   const auto json = report::read_json_file(file);
   if (json.is_discarded()) return work_error(fmt::format("{} is not JSON", file.string()));
-  const bool is_certificate = json.is_object() && json.value("schema", "").starts_with("imuscope.certificate/");
+  const bool is_certificate =
+      json.is_object() && json.value("schema", "").starts_with("imuscope.certificate/");
   const bool is_run = json.is_object() && json.contains("models") && json.at("models").is_array();
   const auto entries = is_certificate ? entries_of_certificate(json)
                        : is_run       ? json.at("models")

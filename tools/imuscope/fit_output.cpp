@@ -37,10 +37,10 @@ void print_parameters(const noise::FitResult& fit) {
   }
 }
 
-void print_quantities(const noise::FitResult& fit, noise::SignalUnit unit) {
+void print_quantities(const noise::FitResult& fit, const std::vector<noise::Quantity>& quantities) {
   say("\n{:<7} {:<26} {:>14}  {:<30} {}\n", "process", "for filter and data sheet", "value",
       interval_heading(fit), "unit");
-  for (const auto& q : noise::filter_quantities(fit, unit)) {
+  for (const auto& q : quantities) {
     const std::string range = q.knowledge == noise::Knowledge::kBound     ? "at most"
                               : q.knowledge == noise::Knowledge::kUnknown ? "not known from this record"
                                                                           : interval(q.ci_low, q.ci_high);
@@ -51,8 +51,8 @@ void print_quantities(const noise::FitResult& fit, noise::SignalUnit unit) {
 }
 
 void print_levels(const noise::FitResult& fit) {
-  say("\n{:>5} {:>12} {:>13} {:>13}  {}\n", "level", "tau_s", "wv", "fitted",
-      "95 % interval under the model");
+  say("\n{:>5} {:>12} {:>13} {:>13}  {} under the model\n", "level", "tau_s", "wv", "fitted",
+      interval_heading(fit));
   for (const auto& level : fit.wv) {
     const bool known = level.model_ci_high > 0.0;
     say("{:>5} {:>12.6g} {:>13.6g} {:>13.6g}  {}\n", level.observed.level,
@@ -73,7 +73,7 @@ void print_fit(const noise::FitResult& fit, noise::SignalUnit unit) {
       fit.weighting == noise::Weighting::kCi ? "ci" : "optimal",
       fit.efficiency < 1.0 ? fmt::format("   robust, efficiency {:g}", fit.efficiency) : "");
   print_parameters(fit);
-  print_quantities(fit, unit);
+  print_quantities(fit, noise::filter_quantities(fit, unit));
   print_levels(fit);
   say("\nobjective {:.8g}", fit.objective);
   if (fit.j_test) {
@@ -87,7 +87,7 @@ void print_fit(const noise::FitResult& fit, noise::SignalUnit unit) {
 void print_conservative(const noise::FitResult& bound, noise::SignalUnit unit) {
   say("\nover-bounding model, above the upper interval end of every level with enough coefficients\n\n");
   print_parameters(bound);
-  print_quantities(bound, unit);
+  print_quantities(bound, noise::over_bounding_quantities(bound, unit));
 }
 
 void print_ranking(const std::vector<noise::RankedModel>& ranked) {
@@ -148,7 +148,7 @@ nlohmann::json fit_json(const noise::FitResult& fit, noise::SignalUnit unit) {
 
 nlohmann::json conservative_json(const noise::FitResult& bound, noise::SignalUnit unit) {
   return {{"parameters", noise::fit_to_json(bound).at("parameters")},
-          {"quantities", noise::quantities_to_json(noise::filter_quantities(bound, unit))}};
+          {"quantities", noise::quantities_to_json(noise::over_bounding_quantities(bound, unit))}};
 }
 
 nlohmann::json ranking_json(const std::vector<noise::RankedModel>& ranked) {

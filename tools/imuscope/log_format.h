@@ -6,11 +6,7 @@
 
 namespace imuscope::cli {
 
-/// Standard error is connected to the journal, which stamps lines itself and takes their priority from a
-/// leading <N>: systemd tells by JOURNAL_STREAM which file that is.
-[[nodiscard]] bool logs_to_journal();
-
-/// The log goes to standard error: "17:03:21.250 warning mtx1: ..." for people, "<4>mtx1: ..." for the
+/// The log goes to standard error, "17:03:21.250 warning mtx1: ...", or to the journal where that is the
 /// journal.
 void set_up_log();
 

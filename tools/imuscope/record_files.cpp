@@ -21,7 +21,8 @@ struct AxisSource {
   AxisColumn column;
 };
 
-constexpr std::array<const char*, 6> kAxisOrder{"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+constexpr std::array<const char*, 6> kAxisOrder{"gyro_x",  "gyro_y",  "gyro_z",
+                                                "accel_x", "accel_y", "accel_z"};
 
 bool is_gyro_name(const std::string& axis) { return axis.starts_with("gyro"); }
 
@@ -64,10 +65,12 @@ Result<void> units_by_gravity(SensorRecord& sensor, const std::string& file) {
   if (n == 3 && near(1.0)) unit = noise::SignalUnit::kG;
   if (n == 3 && near(kThousand)) unit = noise::SignalUnit::kG, factor = 1.0 / kThousand;
   if (unit == noise::SignalUnit::kNone) {
-    return usage_error(fmt::format("{} does not say the unit of its accelerometers, and {:.4g} is no size of gravity in m/s^2, "
-                                   "g or mg",
-                                   file, size),
-                       "give --accel-unit m/s^2 or g");
+    return usage_error(
+        fmt::format(
+            "{} does not say the unit of its accelerometers, and {:.4g} is no size of gravity in m/s^2, "
+            "g or mg",
+            file, size),
+        "give --accel-unit m/s^2 or g");
   }
   for (auto& axis : sensor.axes) {
     if (is_gyro_name(axis.name)) continue;
@@ -83,15 +86,16 @@ Result<noise::SignalUnit> given_unit(const AxisColumn& column, const RecordChoic
   const auto unit = noise::parse_unit(text);
   if (!unit) return tl::unexpected(unit.error());
   if (is_gyro(*unit) != is_gyro_name(column.axis)) {
-    return usage_error(fmt::format("{} is no unit of {}", text, is_gyro_name(column.axis) ? "an angular rate" : "a force"),
-                       "give rad/s or deg/s for gyroscopes, m/s^2 or g for accelerometers");
+    return usage_error(
+        fmt::format("{} is no unit of {}", text, is_gyro_name(column.axis) ? "an angular rate" : "a force"),
+        "give rad/s or deg/s for gyroscopes, m/s^2 or g for accelerometers");
   }
   return *unit;
 }
 
 /// Reads all axes side by side.
-Result<void> read_axes(SensorRecord& sensor, const std::vector<AxisSource>& sources, const std::string& temperature,
-                       const RecordChoice& choice) {
+Result<void> read_axes(SensorRecord& sensor, const std::vector<AxisSource>& sources,
+                       const std::string& temperature, const RecordChoice& choice) {
   struct Job {
     AxisSource source;
     Result<Signal> signal = work_error("not read");
@@ -112,7 +116,8 @@ Result<void> read_axes(SensorRecord& sensor, const std::vector<AxisSource>& sour
       return usage_error(fmt::format("{} has no time stamps that would tell its rate", file),
                          "give the samples per second, --rate");
     if (!(*signal->rate_hz > 0.0) || !std::isfinite(*signal->rate_hz))
-      return usage_error(fmt::format("--rate {} is impossible", *signal->rate_hz), "give the samples per second");
+      return usage_error(fmt::format("--rate {} is impossible", *signal->rate_hz),
+                         "give the samples per second");
     const auto unit = given_unit(sources[i].column, choice);
     if (!unit) return tl::unexpected(unit.error());
     if (*unit == noise::SignalUnit::kNone && is_gyro_name(sources[i].column.axis))
@@ -160,9 +165,10 @@ Result<SensorRecord> read_csv(const std::filesystem::path& file, const RecordCho
   }
   if (sources.empty()) {
     return usage_error(fmt::format("{} has no column whose name tells an axis", file.string()),
-                       names->empty() ? std::string("it has no header: give --axis gyro_x=COLUMN and so on, by number")
-                                      : fmt::format("its columns are {}; give --axis gyro_x=COLUMN and so on",
-                                                    fmt::join(*names, ", ")));
+                       names->empty()
+                           ? std::string("it has no header: give --axis gyro_x=COLUMN and so on, by number")
+                           : fmt::format("its columns are {}; give --axis gyro_x=COLUMN and so on",
+                                         fmt::join(*names, ", ")));
   }
   in_order(sources);
   SensorRecord sensor{file.stem().string(), {file.filename().string()}, {}, {}};
@@ -170,15 +176,18 @@ Result<SensorRecord> read_csv(const std::filesystem::path& file, const RecordCho
   return sensor;
 }
 
-Result<SensorRecord> read_raw_files(const std::vector<std::filesystem::path>& files, const RecordChoice& choice) {
+Result<SensorRecord> read_raw_files(const std::vector<std::filesystem::path>& files,
+                                    const RecordChoice& choice) {
   std::vector<AxisSource> sources;
   SensorRecord sensor;
   for (const auto& file : files) {
     auto axis = axis_of_name(file.stem().string());
-    if (!axis && files.size() == 1 && choice.axes.size() == 1) axis = AxisColumn{choice.axes.begin()->first, ""};
+    if (!axis && files.size() == 1 && choice.axes.size() == 1)
+      axis = AxisColumn{choice.axes.begin()->first, ""};
     if (!axis) {
-      return usage_error(fmt::format("the name of {} tells no axis", file.string()),
-                         "name raw files after their axes, as gyro_x_degps.f64, or give --axis gyro_x= for a single one");
+      return usage_error(
+          fmt::format("the name of {} tells no axis", file.string()),
+          "name raw files after their axes, as gyro_x_degps.f64, or give --axis gyro_x= for a single one");
     }
     axis->column.clear();
     sources.push_back({file, *axis});
@@ -197,10 +206,13 @@ Result<SensorRecord> read_run(const std::filesystem::path& folder, const RecordC
   constexpr std::string_view kBegin = "errors_";
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string stem = entry.path().stem().string();
-    if (entry.path().extension() == ".csv" && stem.starts_with(kBegin)) imus.push_back(stem.substr(kBegin.size()));
+    if (entry.path().extension() == ".csv" && stem.starts_with(kBegin))
+      imus.push_back(stem.substr(kBegin.size()));
   }
   std::sort(imus.begin(), imus.end());
-  if (imus.empty()) return work_error(fmt::format("{} holds no errors_NAME.csv", folder.string()), "give the folder of a study");
+  if (imus.empty())
+    return work_error(fmt::format("{} holds no errors_NAME.csv", folder.string()),
+                      "give the folder of a study");
   std::string imu = choice.imu;
   if (imu.empty() && imus.size() == 1) imu = imus.front();
   if (std::find(imus.begin(), imus.end(), imu) == imus.end()) {
@@ -221,7 +233,8 @@ Result<SensorRecord> read_run(const std::filesystem::path& folder, const RecordC
 
 }  // namespace
 
-Result<std::vector<SensorRecord>> read_records(const std::vector<std::filesystem::path>& files, const RecordChoice& choice) {
+Result<std::vector<SensorRecord>> read_records(const std::vector<std::filesystem::path>& files,
+                                               const RecordChoice& choice) {
   std::vector<SensorRecord> records;
   std::vector<std::filesystem::path> raw;
   for (const auto& file : files) {

@@ -52,7 +52,8 @@ void split(std::string_view line, char separator, std::vector<std::string_view>&
 }
 
 std::string_view unquoted(std::string_view cell) {
-  return cell.size() > 1 && cell.front() == '"' && cell.back() == '"' ? cell.substr(1, cell.size() - 2) : cell;
+  return cell.size() > 1 && cell.front() == '"' && cell.back() == '"' ? cell.substr(1, cell.size() - 2)
+                                                                      : cell;
 }
 
 std::optional<double> to_number(std::string_view cell) {

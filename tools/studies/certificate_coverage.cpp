@@ -1,5 +1,5 @@
-/// How often the intervals of a certificate's terms hold what the simulated sensor has: N, B, K, R and Q of sums of the
-/// processes that real sensors show, most of which the selection has to find.
+/// How often the intervals of a certificate's terms hold what the simulated sensor has: N, B, K, R and Q of
+/// sums of the processes that real sensors show, most of which the selection has to find.
 
 #include <fmt/format.h>
 
@@ -80,7 +80,8 @@ double true_value(const Model& model, Term term) {
       return imuscope::kSecondsPerHour * lowest / 0.664;
     }
     case Term::kRateRandomWalk:
-      return imuscope::kSecondsPerHour * root_hour * std::sqrt(amplitude(ProcessKind::kRandomWalk) * kRate_hz);
+      return imuscope::kSecondsPerHour * root_hour *
+             std::sqrt(amplitude(ProcessKind::kRandomWalk) * kRate_hz);
     case Term::kRamp:
       return std::pow(imuscope::kSecondsPerHour, 2) * std::sqrt(amplitude(ProcessKind::kRamp)) * kRate_hz;
     case Term::kQuantization:
@@ -98,15 +99,26 @@ void count_terms(imuscope::Counts& counts, const Cell& cell, const AxisCertifica
     if (term.knowledge == imuscope::noise::Knowledge::kFitted)
       count(counts, fmt::format("{}_value_holds", symbol_of(term.term)), holds);
   }
-  const bool has_resonance = std::any_of(cell.model.components.begin(), cell.model.components.end(),
-                                         [](const Component& c) { return c.kind == ProcessKind::kResonance; });
+  const bool has_resonance =
+      std::any_of(cell.model.components.begin(), cell.model.components.end(),
+                  [](const Component& c) { return c.kind == ProcessKind::kResonance; });
   if (!has_resonance) {
     count(counts, "no_resonance_named", certificate.resonances.empty());
     return;
   }
   constexpr double kTrue_hz = 1.25 * kRate_hz / (2.0 * std::numbers::pi);
-  const bool named = !certificate.resonances.empty() && std::abs(certificate.resonances.front().frequency_hz - kTrue_hz) < 1.0;
+  const bool named = !certificate.resonances.empty() &&
+                     std::abs(certificate.resonances.front().frequency_hz - kTrue_hz) < 1.0;
   count(counts, "resonance_named", named);
+}
+
+void print(const AxisCertificate& certificate, const Model& truth) {
+  fmt::print("{}", certificate.fit.spec.name());
+  for (const auto& term : certificate.terms) {
+    fmt::print("  {} {:.4g} [{:.4g}, {:.4g}] true {:.4g}", symbol_of(term.term), term.value,
+               term.ci_low.value_or(0.0), term.ci_high.value_or(0.0), true_value(truth, term.term));
+  }
+  fmt::print("\n");
 }
 
 imuscope::certificate::AxisRecord record_of(const Cell& cell, unsigned seed) {
@@ -129,6 +141,8 @@ int main(int argc, char** argv) {
   app.add_option("--series", series, "Series a cell")->capture_default_str();
   app.add_option("--results", results_file, "Keeps what was counted, and goes on from there");
   app.add_option("--only", only, "One cell");
+  bool show = false;
+  app.add_flag("--show", show, "Prints the model and the terms of every series");
   CLI11_PARSE(app, argc, argv);
   imuscope::Results results(results_file);
   bool all_met = true;
@@ -140,6 +154,7 @@ int main(int argc, char** argv) {
       const auto record = record_of(cell, kFirstSeed + static_cast<unsigned>(run));
       if (const auto certificate = characterize_axis(record, {})) {
         count_terms(counts, cell, *certificate);
+        if (show) print(*certificate, cell.model);
         count(counts, "record_called_wrong", !certificate->warnings.empty());
       }
       results.keep(cell.name, run + 1, counts);

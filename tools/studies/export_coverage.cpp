@@ -15,6 +15,7 @@
 #include "noise/felt_noise.h"
 #include "noise/fit.h"
 #include "noise/wavelet_variance.h"
+#include "simulated_noise.h"
 
 namespace {
 
@@ -40,40 +41,6 @@ std::vector<Truth> truths() {
           {"WN+2*GM", {{white, markov(0.5, 0.05), markov(0.02, 10.0)}}},
           {"WN+GM+RW", {{white, markov(0.01, 5.0), walk(1e-8)}}},
           {"QN+WN+RW", {{{ProcessKind::kQuantization, 1.0, {}}, white, walk(1e-6)}}}};
-}
-
-std::vector<double> series(const Model& model, std::size_t n, std::mt19937_64& random) {
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform;
-  std::vector<double> x(n, 0.0);
-  for (const Component& c : model.components) {
-    const double sd = std::sqrt(c.amplitude);
-    const double phi = std::exp(-c.shape[0]);
-    double state = c.kind == ProcessKind::kGaussMarkov ? sd * normal(random) : 0.0;
-    double before = uniform(random);
-    for (double& v : x) {
-      switch (c.kind) {
-        case ProcessKind::kWhiteNoise:
-          v += sd * normal(random);
-          break;
-        case ProcessKind::kQuantization: {
-          const double now = uniform(random);
-          v += std::sqrt(12.0) * sd * (now - before);
-          before = now;
-          break;
-        }
-        case ProcessKind::kGaussMarkov:
-          v += state;
-          state = phi * state + sd * std::sqrt(1.0 - phi * phi) * normal(random);
-          break;
-        default:
-          v += state;
-          state += sd * normal(random);
-          break;
-      }
-    }
-  }
-  return x;
 }
 
 double slowest_variance(const Model& model) {
@@ -151,8 +118,9 @@ int main(int argc, char** argv) {
     int refused = 0;
     std::mt19937_64 random(1);
     for (int run = 0; run < runs; ++run) {
-      const auto wv =
-          haar_wavelet_variance(series(truth.model, std::size_t{1} << log2_samples, random)).value();
+      const auto wv = haar_wavelet_variance(
+                          imuscope::simulated_noise(truth.model, std::size_t{1} << log2_samples, random))
+                          .value();
       const auto fitted = fit(wv, true_fit.spec, kRateHz).value();
       white.add(felt_white_density(fitted, walk_band), true_white);
       walk.add(felt_walk_density(fitted, walk_band), true_walk);

@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/result.h"
@@ -49,6 +50,12 @@ class NavigationScore {
   void add(const NavigationScore& other);
   [[nodiscard]] std::string table() const;
   [[nodiscard]] const StateScore& heading() const { return heading_; }
+  /// By name: heading, level, velocity, position.
+  [[nodiscard]] std::vector<std::pair<const char*, const StateScore*>> scores() const {
+    return {{"heading", &heading_}, {"level", &level_}, {"velocity", &velocity_}, {"position", &position_}};
+  }
+  /// Of every row, without sign.
+  [[nodiscard]] const std::vector<double>& utc_errors_s() const { return utc_errors_s_; }
 
  private:
   StateScore heading_;

@@ -25,7 +25,8 @@ void add_resonance(const Component& c, std::mt19937_64& random, std::vector<doub
   const Eigen::Matrix2d F = generator.exp();
   const Eigen::Matrix2d P = c.amplitude * Eigen::Vector2d(1.0, a * a + b * b).asDiagonal().toDenseMatrix();
   const Eigen::Matrix2d drive = Eigen::Matrix2d(P - F * P * F.transpose()).llt().matrixL();
-  Eigen::Vector2d state = Eigen::Matrix2d(P.llt().matrixL()) * Eigen::Vector2d(normal(random), normal(random));
+  Eigen::Vector2d state =
+      Eigen::Matrix2d(P.llt().matrixL()) * Eigen::Vector2d(normal(random), normal(random));
   for (double& v : x) {
     v += state[0];
     state = F * state + drive * Eigen::Vector2d(normal(random), normal(random));

@@ -10,11 +10,13 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include "tests/support/child_process.h"
@@ -285,6 +287,11 @@ TEST(NetStream, ASignalIsNoEndAndAnErrorIsOneOfAConnectionAlone) {
   }
   sender.say_to(port, "still here");
   EXPECT_EQ(hear(**udp).text, "still here");
+  // What would come at every turn for ever must not keep the reader turning.
+  for (const int error : {ENOSYS, EBADF, ENOTCONN}) {
+    const test::RefusedCalls refused(test::Call::kRecv, error, 1);
+    EXPECT_EQ((*udp)->read(buffer).status, IoStatus::kGone) << std::strerror(error);
+  }
 }
 
 TEST(NetStream, AServerThatDoesNotAnswerWithinASecondIsToldWithWhatMayBeTheReason) {
@@ -390,6 +397,69 @@ TEST(NetStream, AGroupThatNoInterfaceLeadsToSaysSo) {
   });
   if (outcome == test::kNotPermitted) GTEST_SKIP() << "a private network namespace needs root";
   EXPECT_EQ(outcome, 0);
+}
+
+/// Reads until something came.
+IoResult read_soon(NetStream& stream, std::span<std::uint8_t> buffer) {
+  pollfd waiting{stream.fd(), POLLIN, 0};
+  EXPECT_EQ(poll(&waiting, 1, 2000), 1);
+  return stream.read(buffer);
+}
+
+HostTime now() { return HostTime{std::chrono::steady_clock::now().time_since_epoch()}; }
+
+TEST(NetStream, SaysWhenTheKernelReceivedADatagramThatWaited) {
+  FarEnd sender(SOCK_DGRAM);
+  const std::uint16_t port = FarEnd(SOCK_DGRAM).port();
+  auto stream = NetStream::open({NetKind::kUdp, "", port});
+  ASSERT_TRUE(stream) << stream.error().text();
+  std::array<std::uint8_t, 100> buffer{};
+  // The kernel begins to stamp a moment after it was asked to.
+  for (int i = 0; i < 20; ++i) {
+    sender.say_to(port, "first");
+    (void)read_soon(**stream, buffer);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  for (int i = 0; i < 5; ++i) {
+    const HostTime before = now();
+    sender.say_to(port, "late");
+    const HostTime after = now();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    const IoResult result = read_soon(**stream, buffer);
+    ASSERT_EQ(result.status, IoStatus::kDone);
+    ASSERT_TRUE(result.received);
+    EXPECT_GE(*result.received, before - std::chrono::milliseconds(1));
+    EXPECT_LE(*result.received, after + std::chrono::milliseconds(20)) << "long before it was read";
+  }
+  EXPECT_EQ((*stream)->health().stamps.by, StampedBy::kKernel);
+  EXPECT_GT((*stream)->health().stamps.lead_s, 1e-3);
+}
+
+TEST(NetStream, SaysWhenTheKernelReceivedTheLastByteOfAReadOverTcp) {
+  FarEnd server(SOCK_STREAM);
+  auto stream = NetStream::open({NetKind::kTcp, "127.0.0.1", server.port()});
+  ASSERT_TRUE(stream) << stream.error().text();
+  server.accept_one();
+  std::array<std::uint8_t, 100> buffer{};
+  for (int i = 0; i < 20; ++i) {
+    server.say("first");
+    (void)read_soon(**stream, buffer);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  const HostTime before = now();
+  server.say("one");
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  const HostTime between = now();
+  server.say("two");
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const HostTime read = now();
+  const IoResult result = read_soon(**stream, buffer);
+  ASSERT_EQ(result.n, 6U);
+  ASSERT_TRUE(result.received);
+  EXPECT_GE(*result.received, between - std::chrono::milliseconds(1))
+      << "of the second piece, not of the first";
+  EXPECT_LT(*result.received, read - std::chrono::milliseconds(20));
+  EXPECT_GT(read, before);
 }
 
 }  // namespace

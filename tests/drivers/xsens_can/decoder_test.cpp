@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "drivers/dbc/parser.h"
 #include "tests/drivers/support/streams.h"
@@ -45,7 +46,7 @@ struct Unit {
     now += 200us;
     std::array<std::uint8_t, kCanRecordMaxBytes> record{};
     const std::size_t size = write_can_record(can, record);
-    decoder.push(std::span(record).first(size), can.stamp + 1ms, sink);
+    decoder.push(std::span(record).first(size), read_at.value_or(can.stamp + 1ms), sink);
   }
 
   void opening() {
@@ -89,6 +90,7 @@ struct Unit {
   std::int64_t ticks_per_100us = 1;
   std::int64_t period = 0;
   Duration now = 1s;
+  std::optional<HostTime> read_at{};  ///< where the host stands still
 };
 
 TEST(XsensCanMessages, TheFixedPointNumbersOfTheVectorsDecode) {
@@ -123,6 +125,26 @@ TEST(XsensCanMessages, TheFixedPointNumbersOfTheVectorsDecode) {
     }
   }
   EXPECT_EQ(checked, 8);
+}
+
+TEST(XsensCan, AHostThatStandsStillChangesNoTimeAndLosesNoSample) {
+  for (const int stall_s : {5, 11, 15, 60}) {
+    Unit unit;
+    constexpr int kBefore = 3000;
+    unit.groups(kBefore, [&] { unit.rates(); });
+    unit.read_at = HostTime{unit.now} + std::chrono::seconds(stall_s);
+    const int held = stall_s * 100;
+    unit.groups(held, [&] { unit.rates(); });
+    unit.read_at.reset();
+    unit.groups(1000, [&] { unit.rates(); });
+    const auto& samples = unit.samples();
+    ASSERT_GE(samples.size(), static_cast<std::size_t>(kBefore + held + 998)) << stall_s;
+    for (std::size_t i = kBefore; i < samples.size(); ++i)
+      ASSERT_NEAR(to_seconds(samples[i].time - samples[i - 1].time), 0.01, 1e-5)
+          << stall_s << " s, sample " << i;
+    EXPECT_EQ(unit.decoder.counters().clock_resets, 0U) << stall_s;
+    EXPECT_EQ(unit.decoder.counters().samples_lost, 0U) << stall_s;
+  }
 }
 
 TEST(XsensCan, AGroupIsClosedByTheNextOneThatOpens) {

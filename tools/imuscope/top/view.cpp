@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -54,16 +55,41 @@ void add_head(const Heard& heard, const status_t& status, std::vector<std::strin
   if (!status.last_event.empty()) lines.push_back("last event: " + status.last_event);
 }
 
+/// What is wrong now, with what to do; then what was, shortly.
+void add_alarms(const status_t& status, std::vector<std::string>& lines) {
+  if (status.alarms.empty()) return;
+  lines.emplace_back();
+  lines.emplace_back("ALARMS");
+  for (const auto& a : status.alarms) {
+    const std::string often = a.times > 1 ? fmt::format(", {} times", a.times) : "";
+    const auto since =
+        status.utime > 0 && a.since_utime > 0
+            ? fmt::format(
+                  ", began {} ago",
+                  clock_of(std::chrono::duration<double>(std::chrono::microseconds(std::max<std::int64_t>(
+                                                             0, status.utime - a.since_utime)))
+                               .count()))
+            : "";
+    if (a.active != 0) {
+      lines.push_back(fmt::format("!! {} (for {}{})", a.what, clock_of(a.lasted_s), often));
+      if (!a.remedy.empty()) lines.push_back("   " + a.remedy);
+    } else {
+      lines.push_back(fmt::format("   over: {} (lasted {}{}{})", a.what, clock_of(a.lasted_s), since, often));
+    }
+  }
+}
+
 void add_devices(const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back();
-  lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", "DEVICE",
-                              "role", "state", "rate/Hz", "lost", "late", "bad", "refused", "dropped",
-                              "latency/ms", "clock/us", "drift/ppm"));
+  lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}",
+                              "DEVICE", "role", "state", "rate/Hz", "age/s", "lost", "late", "bad", "refused",
+                              "dropped", "latency/ms", "clock/us", "drift/ppm"));
   for (const auto& d : status.devices) {
-    lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}", d.name,
-                                d.role, d.state, number(d.rate_hz, 1), d.samples_lost, d.samples_late,
-                                d.bad_checksums, d.samples_refused, d.frames_dropped, number(d.latency_ms, 2),
-                                number(d.clock_sd_us, 0), number(d.clock_drift_ppm, 1)));
+    lines.push_back(fmt::format("{:<12}{:<11}{:<13}{:>7}{:>7}{:>8}{:>6}{:>6}{:>9}{:>9}{:>12}{:>11}{:>11}",
+                                d.name, d.role, d.state, number(d.rate_hz, 1), number(d.data_age_s, 1),
+                                d.samples_lost, d.samples_late, d.bad_checksums, d.samples_refused,
+                                d.frames_dropped, number(d.latency_ms, 2), number(d.clock_sd_us, 0),
+                                number(d.clock_drift_ppm, 1)));
     if (!d.problem.empty()) lines.push_back("  " + d.problem);
   }
 }
@@ -158,15 +184,15 @@ std::string ms_or_us(double us) {
 
 void add_threads(const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back();
-  lines.push_back(fmt::format("{:<16}{:<9}{:>6}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", "THREAD",
-                              "sched", "cpu/%", "ticks", "overruns", "skipped", "late p50", "p99", "p99.9",
-                              "max", "done p50", "p99"));
+  lines.push_back(fmt::format("{:<16}{:<9}{:>6}{:>8}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
+                              "THREAD", "sched", "cpu/%", "alive/s", "ticks", "overruns", "skipped",
+                              "late p50", "p99", "p99.9", "max", "done p50", "p99"));
   for (const auto& t : status.threads) {
-    lines.push_back(fmt::format("{:<16}{:<9}{:>6}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", t.name,
-                                t.scheduling, number(t.cpu_percent, 2), t.ticks, t.overruns, t.skipped,
-                                ms_or_us(t.lateness_p50_us), ms_or_us(t.lateness_p99_us),
-                                ms_or_us(t.lateness_p999_us), ms_or_us(t.lateness_max_us),
-                                ms_or_us(t.done_p50_us), ms_or_us(t.done_p99_us)));
+    lines.push_back(fmt::format(
+        "{:<16}{:<9}{:>6}{:>8}{:>9}{:>9}{:>8}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", t.name, t.scheduling,
+        number(t.cpu_percent, 2), number(t.heartbeat_age_s, 1), t.ticks, t.overruns, t.skipped,
+        ms_or_us(t.lateness_p50_us), ms_or_us(t.lateness_p99_us), ms_or_us(t.lateness_p999_us),
+        ms_or_us(t.lateness_max_us), ms_or_us(t.done_p50_us), ms_or_us(t.done_p99_us)));
   }
   for (const auto& t : status.threads) {
     if (t.lateness_octaves.empty()) continue;
@@ -193,6 +219,7 @@ nlohmann::json device_json(const device_status_t& d) {
           {"protocol", d.protocol},
           {"state", d.state},
           {"problem", d.problem},
+          {"data_age_s", known(d.data_age_s)},
           {"rate_hz", known(d.rate_hz)},
           {"bytes", d.bytes},
           {"bytes_skipped", d.bytes_skipped},
@@ -207,10 +234,15 @@ nlohmann::json device_json(const device_status_t& d) {
           {"latency_ms", known(d.latency_ms)},
           {"clock_sd_us", known(d.clock_sd_us)},
           {"clock_drift_ppm", known(d.clock_drift_ppm)},
+          {"stamped_by", d.stamped_by},
+          {"stamp_lead_us", known(d.stamp_lead_us)},
+          {"stamp_lead_sd_us", known(d.stamp_lead_sd_us)},
           {"wire_ms", known(d.wire_ms)},
           {"adapter_ms", known(d.adapter_ms)},
           {"t_d_ms", known(d.t_d_ms)},
-          {"sd_t_d_ms", known(d.sd_t_d_ms)}};
+          {"sd_t_d_ms", known(d.sd_t_d_ms)},
+          {"delay_ms", known(d.delay_ms)},
+          {"sd_delay_ms", known(d.sd_delay_ms)}};
 }
 
 nlohmann::json study_json(const study_status_t& s) {
@@ -232,6 +264,7 @@ nlohmann::json thread_json(const thread_status_t& t) {
   return {{"name", t.name},
           {"scheduling", t.scheduling},
           {"cpu_percent", known(t.cpu_percent)},
+          {"heartbeat_age_s", known(t.heartbeat_age_s)},
           {"ticks", t.ticks},
           {"overruns", t.overruns},
           {"skipped", t.skipped},
@@ -253,6 +286,12 @@ nlohmann::json ring_json(const ring_status_t& r) {
           {"level", r.level},
           {"high_water", r.high_water},
           {"refused", r.refused}};
+}
+
+nlohmann::json alarm_json(const alarm_t& a) {
+  return {{"kind", a.kind},         {"subject", a.subject},    {"what", a.what},
+          {"remedy", a.remedy},     {"active", a.active != 0}, {"since_utime", a.since_utime},
+          {"lasted_s", a.lasted_s}, {"times", a.times}};
 }
 
 }  // namespace
@@ -280,14 +319,13 @@ std::vector<std::string> lines_of(const Heard& heard) {
   } else {
     const status_t& status = *heard.status;
     add_head(heard, status, lines);
+    add_alarms(status, lines);
     add_devices(status, lines);
     add_studies(heard, status, lines);
     add_odometry(heard, lines);
     add_threads(status, lines);
     add_rings(status, lines);
     add_models(heard, lines);
-    if (!status.problems.empty()) lines.emplace_back();
-    for (const auto& problem : status.problems) lines.push_back("problem: " + problem);
   }
   if (!heard.note.empty()) {
     lines.emplace_back();
@@ -305,6 +343,7 @@ std::string json_of(const Heard& heard) {
                       {"configuration_hash", s.configuration_hash},
                       {"state", s.state},
                       {"reason", s.reason},
+                      {"status_age_s", heard.status_age_s},
                       {"uptime_s", s.uptime_s},
                       {"tick", s.tick},
                       {"refits", s.refits},
@@ -314,19 +353,17 @@ std::string json_of(const Heard& heard) {
                       {"capture_bytes", s.capture_bytes},
                       {"capture_lost", s.capture_lost},
                       {"last_event", s.last_event},
-                      {"problems", s.problems}};
+                      {"devices", nlohmann::json::array()},
+                      {"studies", nlohmann::json::array()},
+                      {"threads", nlohmann::json::array()},
+                      {"rings", nlohmann::json::array()},
+                      {"alarms", nlohmann::json::array()}};
   if (heard.odometry) json["odometry"] = odometry_json(*heard.odometry);
   for (const auto& device : s.devices) json["devices"].push_back(device_json(device));
   for (const auto& study : s.studies) json["studies"].push_back(study_json(study));
   for (const auto& thread : s.threads) json["threads"].push_back(thread_json(thread));
   for (const auto& ring : s.rings) json["rings"].push_back(ring_json(ring));
-  for (const auto& r : s.rings) {
-    json["rings"].push_back({{"name", r.name},
-                             {"capacity", r.capacity},
-                             {"level", r.level},
-                             {"high_water", r.high_water},
-                             {"refused", r.refused}});
-  }
+  for (const auto& alarm : s.alarms) json["alarms"].push_back(alarm_json(alarm));
   return json_text(json);
 }
 

@@ -1,0 +1,45 @@
+#pragma once
+
+/// One pulse that marks a second of UTC (PPS, RFC 2783), and its form as bytes: the form in which pulses
+/// travel from a PPS device of the kernel to the decoder and into the capture, so that it is a device like
+/// any other.
+///
+/// A record, least significant byte first:
+///
+///     offset 0  u8[4]  "PPS", then "a" for the assert edge or "c" for the clear edge
+///            4  u32    the kernel's count of such edges
+///            8  i64    when it came, CLOCK_MONOTONIC, ns
+///           16  i64    the same by CLOCK_REALTIME, ns, which is how the kernel stamps it
+///           24  u32    the two clocks were read within so many ns, so that the one is known from the other
+///           28  u32    0
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "base/time.h"
+
+namespace imuscope {
+
+inline constexpr std::size_t kPulseRecordBytes = 32;
+
+enum class PulseEdge : std::uint8_t { kAssert, kClear };
+
+struct UtcPulse {
+  PulseEdge edge = PulseEdge::kAssert;
+  std::uint32_t sequence = 0;
+  HostTime time{};
+  UtcTime wall{};  ///< by the PC's wall clock
+  Duration apart{};
+};
+
+/// @param out  of at least kPulseRecordBytes
+/// @return bytes written
+/// Core: no allocation.
+std::size_t write_pulse_record(const UtcPulse& pulse, std::span<std::uint8_t> out) noexcept;
+
+/// The record at the beginning of `bytes`; nothing where there is none. Core: no allocation.
+[[nodiscard]] std::optional<UtcPulse> read_pulse_record(std::span<const std::uint8_t> bytes) noexcept;
+
+}  // namespace imuscope

@@ -1,0 +1,159 @@
+/// `imuscope characterize` as a user meets it.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "programs.h"
+#include "tests/support/shared_data.h"
+
+namespace imuscope::test {
+namespace {
+
+using testing::HasSubstr;
+
+struct Columns {
+  std::string header;
+  double gyro_factor = 1.0;   ///< of rad/s
+  double accel_factor = 1.0;  ///< of m/s^2
+};
+
+class Characterize : public testing::Test {
+ protected:
+  /// A log of a sensor at rest, 100 Hz, a minute and a half.
+  std::string log(const std::string& name, const Columns& columns, unsigned seed = 1) const {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    std::ofstream out(folder_ / name);
+    out << columns.header << '\n';
+    for (int i = 0; i < 9000; ++i) {
+      out << fmt::format("{:.2f}", 0.01 * i);
+      for (int k = 0; k < 3; ++k) out << fmt::format(",{:.7g}", columns.gyro_factor * 3e-3 * normal(random));
+      for (int k = 0; k < 3; ++k)
+        out << fmt::format(",{:.7g}", columns.accel_factor * ((k == 2 ? 9.81 : 0.0) + 0.02 * normal(random)));
+      out << '\n';
+    }
+    return (folder_ / name).string();
+  }
+  int run(const std::vector<std::string>& arguments) const {
+    std::vector<std::string> all{"characterize"};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return run_program("imuscope", all, folder_ / "log.txt");
+  }
+  std::string output() const { return read_text(folder_ / "log.txt"); }
+
+  std::filesystem::path folder_ = scratch_folder();
+};
+
+// 3e-3 rad/s a sample at 100 Hz: 3e-4 rad/s/sqrt(Hz), 1.031 deg/sqrt(h); 0.02 m/s^2: 0.12 m/s/sqrt(h).
+void expect_the_truth(const nlohmann::json& certificate) {
+  ASSERT_EQ(certificate.at("axes").size(), 6U);
+  for (const auto& axis : certificate.at("axes")) {
+    const auto& n = axis.at("terms").at(0);
+    EXPECT_EQ(n.at("symbol"), "N");
+    const bool gyro = axis.at("name").get<std::string>().starts_with("gyro");
+    EXPECT_NEAR(n.at("value").get<double>(), gyro ? 1.031 : 0.12, gyro ? 0.04 : 0.005) << axis.at("name");
+  }
+}
+
+TEST_F(Characterize, ReadsAnyonesColumnsAndUnits) {
+  const double deg = 180.0 / M_PI;
+  const std::vector<Columns> all{
+      {"time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"},
+      {"time,wx [deg/s],wy [deg/s],wz [deg/s],ax [g],ay [g],az [g]", deg, 1.0 / 9.80665},
+      {"t_s,AngularVelocity.X (dps),AngularVelocity.Y (dps),AngularVelocity.Z (dps),LinearAcceleration.X,"
+       "LinearAcceleration.Y,LinearAcceleration.Z",
+       deg, 1.0 / 9.80665},
+      {"timestamp,imu.gyr_x.rad_s,imu.gyr_y.rad_s,imu.gyr_z.rad_s,acc_x_mg,acc_y_mg,acc_z_mg", 1.0,
+       1000.0 / 9.80665}};
+  for (const Columns& columns : all) {
+    ASSERT_EQ(run({log("static.csv", columns), "--no-page", "--json"}), 0) << columns.header << output();
+    expect_the_truth(nlohmann::json::parse(output()));
+  }
+}
+
+TEST_F(Characterize, WritesAPageWithFiguresThatExportReads) {
+  const Columns columns{
+      "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"};
+  const auto out = folder_ / "page";
+  ASSERT_EQ(run({log("static.csv", columns), "--out", out.string(), "--sensor", "Unit <7>"}), 0) << output();
+  const std::string page = read_text(out / "certificate.html");
+  EXPECT_THAT(page, HasSubstr("Unit &lt;7&gt;"));
+  EXPECT_THAT(page, HasSubstr("angle random walk (N)"));
+  EXPECT_THAT(page, HasSubstr("data:image/svg+xml;base64,"));
+  EXPECT_THAT(page, testing::Not(HasSubstr("<script")));
+  for (const char* file : {"axis1.svg", "axis6.pdf", "allan_gyroscopes.gp"})
+    EXPECT_TRUE(std::filesystem::exists(out / "figures" / file)) << file;
+  ASSERT_EQ(
+      run_program("imuscope", {"export", (out / "certificate.json").string(), "--to", "kalibr", "--force"},
+                  folder_ / "kalibr.yaml"),
+      0);
+  EXPECT_THAT(read_text(folder_ / "kalibr.yaml"), HasSubstr("gyroscope_noise_density: 3.0"));
+  // Once more is no surprise, but a page of somebody's own stays.
+  EXPECT_EQ(run({log("static.csv", columns), "--out", out.string()}), 0) << output();
+  std::filesystem::remove(out / "certificate.json");
+  EXPECT_EQ(run({log("static.csv", columns), "--out", out.string()}), 2);
+  EXPECT_THAT(output(), HasSubstr("was not written by this command"));
+}
+
+TEST_F(Characterize, UnitsStandBesideEachOther) {
+  const Columns columns{
+      "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"};
+  const Columns loud{columns.header, 2.0, 1.0};
+  std::vector<std::string> arguments{"--no-page"};
+  for (unsigned seed = 1; seed <= 5; ++seed)
+    arguments.push_back(log(fmt::format("unit{}.csv", seed), columns, seed));
+  arguments.push_back(log("unit6.csv", loud, 6));
+  ASSERT_EQ(run(arguments), 0) << output();
+  EXPECT_THAT(output(), HasSubstr("All 6 records"));
+  EXPECT_THAT(output(), HasSubstr("unit6 stands out: 2.0"));
+  EXPECT_THAT(output(), HasSubstr("95 % are below"));
+}
+
+TEST_F(Characterize, BadInputGetsASentence) {
+  const Columns good{"time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"};
+  const auto refuses = [&](const std::vector<std::string>& arguments, int code, const std::string& words) {
+    std::vector<std::string> all = arguments;
+    all.emplace_back("--no-page");
+    EXPECT_EQ(run(all), code) << output();
+    EXPECT_THAT(output(), HasSubstr(words));
+  };
+  refuses({(folder_ / "none.csv").string()}, 1, "does not exist");
+  refuses({log("a.csv", {"time_s,a1,a2,a3,a4,a5,a6"})}, 2, "no column whose name tells an axis");
+  refuses({log("b.csv", {"time_s,wx,wy,wz,ax,ay,az"})}, 2, "give --gyro-unit rad/s or deg/s");
+  refuses({log("c.csv", {"time_s,wx_radps,wy_radps,wz_radps,ax,ay,az", 1.0, 3.0})}, 2, "no size of gravity");
+  refuses({log("d.csv", good), "--rate", "200"}, 2, "100");
+  refuses({log("e.csv", good), "--axis", "roll=wx"}, 2, "--axis roll=wx is not understood");
+  refuses({log("f.csv", good), "--axis", "gyro_x=nothing"}, 2, "has no column 'nothing'");
+  std::ofstream(folder_ / "short.csv") << "time_s,gyro_x_radps\n0,0.1\n0.01,0.2\n0.02,0.3\n0.03,0.1\n";
+  refuses({(folder_ / "short.csv").string()}, 1, "4 valid samples are too few");
+  std::ofstream(folder_ / "text.csv") << "time_s,gyro_x_radps\n0,zero\n";
+  refuses({(folder_ / "text.csv").string()}, 1, "'zero' is not a number");
+  std::ofstream(folder_ / "sound.f64") << "12345678";
+  refuses({(folder_ / "sound.f64").string(), "--rate", "100"}, 2, "tells no axis");
+}
+
+// A real sensor: the resonance of its z gyroscope near 20 Hz, and a random walk that is no white noise's.
+TEST_F(Characterize, ARealGyroscopeHasItsResonanceNamed) {
+  IMUSCOPE_NEEDS_SHARED("data/adis16405_static/gyro_z_degps.f64");
+  const auto file = shared_path("data/adis16405_static/gyro_z_degps.f64");
+  ASSERT_EQ(run({file.string(), "--rate", "100", "--no-page", "--json"}), 0) << output();
+  const auto axis = nlohmann::json::parse(output()).at("axes").at(0);
+  ASSERT_FALSE(axis.at("resonances").empty());
+  EXPECT_NEAR(axis.at("resonances").at(0).at("frequency_hz").get<double>(), 20.0, 0.5);
+  const double n = axis.at("terms").at(0).at("value").get<double>();
+  for (const auto& point : axis.at("allan")) {
+    const double tau_s = point.at("tau_s").get<double>();
+    if (tau_s < 1.0 || tau_s > 4.0) continue;
+    EXPECT_NEAR(60.0 * point.at("deviation").get<double>() * std::sqrt(tau_s), n, 0.05 * n) << tau_s;
+  }
+}
+
+}  // namespace
+}  // namespace imuscope::test
