@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "alignment/accelerometer_places.h"
 #include "navigation/so3.h"
 
 namespace imuscope::batch {
