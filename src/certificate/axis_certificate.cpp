@@ -46,8 +46,8 @@ void add_moments(AxisCertificate& out, std::span<const double> x, std::span<cons
   out.sd = out.n_samples > 1 ? std::sqrt(squares / static_cast<double>(out.n_samples - 1)) : 0.0;
 }
 
-Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisRecord& record, bool has_resonance,
-                           const AxisOptions& options) {
+Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisRecord& record,
+                                   bool has_resonance, const AxisOptions& options) {
   noise::FitOptions fit_options;
   fit_options.confidence = options.confidence;
   fit_options.signal_unit = noise::unit_name(record.unit);

@@ -7,7 +7,7 @@
 namespace imuscope::certificate {
 
 Result<noise::GrownModel> select_model(const noise::WaveletVariance& wv, double rate_hz, bool has_resonance,
-                                      const noise::FitOptions& options) {
+                                       const noise::FitOptions& options) {
   using noise::ProcessKind;
   std::vector<ProcessKind> terms{ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov,
                                  ProcessKind::kRandomWalk, ProcessKind::kQuantization,

@@ -10,6 +10,6 @@ namespace imuscope::certificate {
 /// noise, random walk and ramp; with a resonance where the spectrum shows one. `options.intervals` apply to
 /// the winner.
 Result<noise::GrownModel> select_model(const noise::WaveletVariance& wv, double rate_hz, bool has_resonance,
-                                      const noise::FitOptions& options);
+                                       const noise::FitOptions& options);
 
 }  // namespace imuscope::certificate

@@ -151,7 +151,8 @@ TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoi
   return out;
 }
 
-std::vector<TermValue> terms_of(const FitResult& fit, std::span<const noise::AllanPoint> allan, noise::SignalUnit unit) {
+std::vector<TermValue> terms_of(const FitResult& fit, std::span<const noise::AllanPoint> allan,
+                                noise::SignalUnit unit) {
   const double f = fit.rate_hz;
   std::vector<TermValue> terms;
   terms.push_back(as_root(Term::kRandomWalk, unit, felt_white_density(fit, {}), 1.0));

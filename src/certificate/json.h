@@ -23,9 +23,9 @@ struct Origin {
 /// "duration_s",
 ///  "confidence", "axes": [{"name", "unit", "n_samples", "n_missing", "mean", "sd", "resolution", "terms":
 ///  [{"symbol", "name", "unit", "value", "ci_low", "ci_high", "known", "note"}], "lines", "resonances",
-///  "low_pass_hz", "models_as_good", "fit" (as noise::fit_to_json()), "allan": [{"tau_s", "deviation", "ci_low", "ci_high",
-///  "model"}], "density": [{"frequency_hz", "density", "ci_low", "ci_high"}], "halves", "spikes",
-///  "temperature", "warnings", "limits"}]}. What is not known is null.
+///  "low_pass_hz", "models_as_good", "fit" (as noise::fit_to_json()), "allan": [{"tau_s", "deviation",
+///  "ci_low", "ci_high", "model"}], "density": [{"frequency_hz", "density", "ci_low", "ci_high"}], "halves",
+///  "spikes", "temperature", "warnings", "limits"}]}. What is not known is null.
 nlohmann::json to_json(const Origin& origin, const std::vector<AxisCertificate>& axes);
 
 }  // namespace imuscope::certificate

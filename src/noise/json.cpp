@@ -67,15 +67,11 @@ std::string lines_in_words(const json& entry) {
 
 /// The component's value that a printed parameter stands for, back in sample terms.
 void set_parameter(Component& c, const ParameterEstimate& p, double rate_hz) {
-  if (p.name == "beta") {
-    c.shape[0] = p.value / rate_hz;
-  } else if (p.name == "damping") {
+  if (p.name == "beta" || p.name == "damping") {
     c.shape[0] = p.value / rate_hz;
   } else if (p.name == "frequency") {
     c.shape[c.kind == ProcessKind::kResonance ? 1 : 0] = 2.0 * std::numbers::pi * p.value / rate_hz;
-  } else if (p.name == "exponent") {
-    c.shape[0] = p.value;
-  } else if (p.name == "phi") {
+  } else if (p.name == "exponent" || p.name == "phi") {
     c.shape[0] = p.value;
   } else if (p.name == "theta") {
     c.shape[c.kind == ProcessKind::kArma11 ? 1 : 0] = p.value;

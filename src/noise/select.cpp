@@ -114,7 +114,8 @@ class Grower {
   [[nodiscard]] std::vector<FitResult> rivals() const {
     std::vector<FitResult> out;
     for (const auto& [name, fitted] : tried_) {
-      if (name != best_->spec.name() && is_rejected(fitted) == is_rejected(*best_) && fitted.criterion < best_->criterion + kEquivalent)
+      if (name != best_->spec.name() && is_rejected(fitted) == is_rejected(*best_) &&
+          fitted.criterion < best_->criterion + kEquivalent)
         out.push_back(fitted);
     }
     std::stable_sort(out.begin(), out.end(),
@@ -122,7 +123,6 @@ class Grower {
     if (out.size() > kMostRivals) out.resize(kMostRivals);
     return out;
   }
-
 
   /// Takes the model where it is better than the best by `margin`.
   /// @param added  the kind that it has more than the best; fast or steep ones that get no amplitude are not

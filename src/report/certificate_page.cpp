@@ -1,7 +1,6 @@
 #include "report/certificate_page.h"
 
 #include <fmt/format.h>
-#include <openssl/evp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -25,26 +24,11 @@ namespace {
 
 using nlohmann::json;
 
-std::string base64(const std::string& bytes) {
-  std::string out(4 * ((bytes.size() + 2) / 3) + 1, '\0');
-  const int length =
-      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(out.data()),
-                      reinterpret_cast<const unsigned char*>(bytes.data()), static_cast<int>(bytes.size()));
-  out.resize(static_cast<std::size_t>(length));
-  return out;
-}
-
-/// A picture as part of the page.
-Html image(const std::filesystem::path& svg, const std::string& words) {
+Html figure(const std::filesystem::path& svg, const std::string& words) {
   std::ifstream in(svg, std::ios::binary);
   std::ostringstream content;
   content << in.rdbuf();
-  return Html::markup(fmt::format("<img class=\"drawn\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">",
-                                  text(words).str(), base64(content.str())));
-}
-
-Html figure(const std::filesystem::path& svg, const std::string& words) {
-  return element("figure", image(svg, words) + element("figcaption", text(words)));
+  return element("figure", svg_image(content.str(), words) + element("figcaption", text(words)));
 }
 
 /// "0.302 [0.299, 0.305]", "below 1.2", "–".

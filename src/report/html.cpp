@@ -1,6 +1,7 @@
 #include "report/html.h"
 
 #include <fmt/format.h>
+#include <openssl/evp.h>
 
 namespace imuscope::report {
 
@@ -69,6 +70,17 @@ Html Table::html() const {
   }
   const Html table = element("table", element("thead", element("tr", head)) + element("tbody", body));
   return element("div", table, "scroll");
+}
+
+Html svg_image(const std::string& svg, std::string_view words) {
+  // Four characters for three bytes, and the zero that the encoder writes behind them.
+  std::string base64(4 * ((svg.size() + 2) / 3) + 1, '\0');
+  const int length =
+      EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()),
+                      reinterpret_cast<const unsigned char*>(svg.data()), static_cast<int>(svg.size()));
+  base64.resize(static_cast<std::size_t>(length));
+  return Html::markup(fmt::format("<img class=\"drawn\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">",
+                                  text(words).str(), base64));
 }
 
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class) {

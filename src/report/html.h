@@ -56,6 +56,10 @@ class Table {
   std::vector<std::vector<Html>> rows_;
 };
 
+/// A picture as part of the page: nothing in an SVG file becomes markup of it.
+/// @param words  what it shows, for those who do not see it
+Html svg_image(const std::string& svg, std::string_view words);
+
 /// A place where page.js draws the figure `id`, with what it shows in words below it.
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class = {});
 

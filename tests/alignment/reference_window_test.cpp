@@ -190,7 +190,8 @@ TEST(ReferenceWindow, SaysWhenToWaitAndWhenItIsTooLate) {
   EXPECT_EQ(window.evaluate(at(9.98), out), ReferenceResult::kOk);
   EXPECT_EQ(window.evaluate(window.newest_time(), out), ReferenceResult::kOk);
   EXPECT_EQ(window.evaluate(window.newest_time() + Duration{2}, out), ReferenceResult::kTooNew);
-  EXPECT_EQ(window.evaluate(at(1.0), out), ReferenceResult::kTooOld);  // 256 samples are kept
+  EXPECT_EQ(window.evaluate(at(1.0), out), ReferenceResult::kOk);  // two minutes are kept
+  EXPECT_EQ(window.evaluate(at(-0.1), out), ReferenceResult::kTooOld);
   EXPECT_EQ(ReferenceWindow({5, kPeriod_s}).evaluate(at(1.0), out), ReferenceResult::kTooNew);
 }
 

@@ -375,7 +375,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"MissingTime", "mt.csv", "b,a\n1,2\n2,3\n", "wv {} -c a --time tme", 2, "no column 'tme'"},
         BadInput{"ColumnOfARawFile", "b.f64", "12345678", "wv {} -r 1 -c 1", 2, "no columns"},
         BadInput{"HalfANumber", "9.f64", "123456789", "wv {} -r 1", 1, "9 bytes"},
-        BadInput{"ExportToNobody", "j1.json", "{}", "export {} --to matlab", 2, "kalibr, ros, px4"},
+        BadInput{"ExportToNobody", "j1.json", "{}", "export {} --to matlab", 2, "kalibr, openvins, "},
         BadInput{"ExportOfNoFit", "j2.json", "{}", "export {} --to kalibr", 1, "not a fit"},
         BadInput{"ExportOfNoJson", "j3.json", "WN", "export {} --to kalibr", 1, "is not JSON"},
         BadInput{"Constant", "k.csv", "2\n2\n2\n2\n", "fit {} -r 1 -m WN", 1, "constant"},
