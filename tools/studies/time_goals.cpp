@@ -222,7 +222,7 @@ json psi_of(const imuscope::Snapshot& last, const std::vector<imusim::StudyTruth
 }
 
 /// One drive: recorded, read back, held against the truth.
-json drive(imusim::Configuration configuration, const std::filesystem::path& parent) {
+json drive(const imusim::Configuration& configuration, const std::filesystem::path& parent) {
   const bench::OwnFolder own(parent);
   imusim::RecordOptions options;
   options.folder = own.path() / "drive";
@@ -344,7 +344,7 @@ bool quartz(const Options& options) {
       imusim::Configuration configuration = scenario(kVehicle, options, seed);
       configuration.line.clock = imusim::PcClock();
       configuration.line.clock.rate_ppm = ppm;
-      all.push_back(drive(std::move(configuration), options.folder));
+      all.push_back(drive(configuration, options.folder));
     }
     return all;
   });
@@ -424,7 +424,7 @@ bool pps(const Options& options, bool by_ntp) {
   const auto results = drives.results([&](std::uint64_t seed) {
     imusim::Configuration configuration = scenario(text, options, seed);
     if (!by_ntp) configuration.line.clock.slews.clear();
-    return drive(std::move(configuration), options.folder);
+    return drive(configuration, options.folder);
   });
   fmt::print("the PC's clock by pulses{}: {} drives of {} min\n",
              by_ntp ? ", while NTP slews it by 100 to 500 ppm" : "", results.size(), options.minutes);
@@ -446,7 +446,7 @@ bool gnss(const Options& options) {
     imusim::Configuration configuration = scenario(kWithoutUtc, options, seed);
     // From the epoch to the first bit: what receivers take.
     configuration.gnss.latency_s = imusim::Random(seed, "receiver").uniform(0.02, 0.2);
-    return drive(std::move(configuration), options.folder);
+    return drive(configuration, options.folder);
   });
   fmt::print("UTC from a receiver's messages alone: {} drives of {} min\n", results.size(), options.minutes);
   const Mean inside = mean_of(column(results, [](const json& r) { return r["rows_inside"].get<double>(); }));
