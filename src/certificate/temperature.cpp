@@ -39,7 +39,7 @@ Range range_of(std::span<const double> x, std::span<const std::uint8_t> mask, st
   return range;
 }
 
-/// Weighted line through (x, y) with the sd of its slope from the scatter; absent with fewer than three
+/// Least-squares line through (x, y) with the sd of its slope from the scatter; absent with fewer than three
 /// places.
 struct Slope {
   double value = 0.0;

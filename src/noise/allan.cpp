@@ -156,8 +156,8 @@ void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, 
 }
 
 double model_allan_deviation(const Model& model, double n) {
-  // Every curve of process.h holds for any number of samples; between powers of two the logarithm of the
-  // variance is taken as a parabola through the three nearest levels.
+  // The curves of process.h are of whole levels; between them the logarithm of the variance is a parabola
+  // through the three nearest, which follows a slope that bends slowly.
   const double place = std::clamp(std::log2(n), 0.0, static_cast<double>(kMaxLevel - 1));
   const int middle = std::clamp(static_cast<int>(std::lround(place)), 1, kMaxLevel - 2);
   const double d = place - middle;
