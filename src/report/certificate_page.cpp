@@ -139,12 +139,11 @@ Html summary(const json& certificate, const CertificateFigures& figures) {
   const auto warnings = grouped(certificate, "warnings");
   out += list_of(warnings, "answer partly");
   out += terms_table(certificate, true) + terms_table(certificate, false);
-  out += paragraph(
-      fmt::format(
-          "Intervals hold the true value in {:.0f} % of records. \"Below\" is the most that this record "
-          "allows. Symbols as in IEEE Std 952 and 1293.",
-          100.0 * number_at(certificate, "confidence").value_or(0.0)),
-      "quiet");
+  out += paragraph(fmt::format("Intervals at {:.0f} % confidence, if the model or one as good is right. "
+                               "\"Below\" is the most that this record "
+                               "allows. Symbols as in IEEE Std 952 and 1293.",
+                               100.0 * number_at(certificate, "confidence").value_or(0.0)),
+                   "quiet");
   Html overview;
   for (const auto& [file, words] : figures.overview) overview += figure(file, words);
   out += element("div", overview, "panels wide");
