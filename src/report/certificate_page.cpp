@@ -13,6 +13,7 @@
 #include "base/units.h"
 #include "report/assets.h"
 #include "report/certificate_figures.h"
+#include "report/grouped.h"
 #include "report/html.h"
 #include "report/json_fields.h"
 #include "report/json_file.h"
@@ -64,13 +65,6 @@ Html terms_table(const json& certificate, bool gyro) {
   return table.html();
 }
 
-Html list_of(const std::vector<std::string>& sentences, std::string_view css_class) {
-  if (sentences.empty()) return {};
-  Html items;
-  for (const auto& sentence : sentences) items += element("li", text(sentence));
-  return element("ul", items, css_class);
-}
-
 /// Records beside each other: the population's mean, what they differ by, the bound for a new unit.
 Html units_section(const json& certificate) {
   const json& units = field(certificate, "units");
@@ -101,23 +95,14 @@ Html units_section(const json& certificate) {
 }
 
 /// Sentences of all axes; one that several axes share stands once, with their names.
-std::vector<std::string> grouped(const json& certificate, const char* key) {
-  std::vector<std::pair<std::string, std::vector<std::string>>> groups;
+std::vector<std::string> grouped_at(const json& certificate, const char* key) {
+  std::vector<Named> sentences;
   for (const auto& axis : field(certificate, "axes")) {
     for (const auto& sentence : field(axis, key)) {
-      if (!sentence.is_string()) continue;
-      const auto words = sentence.get<std::string>();
-      const auto known =
-          std::find_if(groups.begin(), groups.end(), [&](const auto& g) { return g.first == words; });
-      if (known == groups.end())
-        groups.push_back({words, {text_at(axis, "name")}});
-      else
-        known->second.push_back(text_at(axis, "name"));
+      if (sentence.is_string()) sentences.push_back({text_at(axis, "name"), sentence.get<std::string>()});
     }
   }
-  std::vector<std::string> out;
-  for (const auto& [words, axes] : groups) out.push_back(fmt::format("{}: {}", fmt::join(axes, ", "), words));
-  return out;
+  return grouped(sentences);
 }
 
 Html heading_of(const json& certificate) {
@@ -136,7 +121,7 @@ Html heading_of(const json& certificate) {
 
 Html summary(const json& certificate, const CertificateFigures& figures) {
   Html out;
-  const auto warnings = grouped(certificate, "warnings");
+  const auto warnings = grouped_at(certificate, "warnings");
   out += list_of(warnings, "answer partly");
   out += terms_table(certificate, true) + terms_table(certificate, false);
   out += paragraph(fmt::format("Intervals at {:.0f} % confidence, if the model or one as good is right. "
@@ -148,7 +133,7 @@ Html summary(const json& certificate, const CertificateFigures& figures) {
   for (const auto& [file, words] : figures.overview) overview += figure(file, words);
   out += element("div", overview, "panels wide");
   out += units_section(certificate);
-  const auto limits = grouped(certificate, "limits");
+  const auto limits = grouped_at(certificate, "limits");
   if (!limits.empty()) out += element("h2", text("What limits the numbers")) + list_of(limits, "limits");
   return out;
 }

@@ -13,6 +13,7 @@ namespace {
 /// Significant digits that are more than a figure can show, also when zoomed.
 constexpr int kDigitsOfSignal = 4;
 constexpr int kDigitsOfEstimate = 7;
+constexpr int kDigitsOfSd = 3;
 
 std::string quoted(const std::string& any) { return json_text(any, kJsonOneLine); }
 
@@ -47,12 +48,9 @@ std::string head_of(const Figure& figure, const char* kind) {
   return head + "]";
 }
 
+/// Middle of the first stretch and the step to the next.
 std::string times_of(const BinnedSignals& signals) {
-  // A stretch's middle is a multiple of half the first width: two decimals of a second hold it.
-  std::string array = "[";
-  for (std::size_t i = 0; i < signals.size(); ++i)
-    array += fmt::format("{}{:.2f}", i > 0 ? "," : "", signals.time_s(i));
-  return array + "]";
+  return signals.size() == 0 ? "[0,1]" : fmt::format("[{:.3f},{:.6g}]", signals.time_s(0), signals.width_s());
 }
 
 std::string components_of(const Fit& fit) {
@@ -108,15 +106,12 @@ Html FigureSheet::range_figure(const Figure& figure, const BinnedSignals& signal
 
 Html FigureSheet::estimate_figure(const Figure& figure, const BinnedSignals& signals, std::size_t signal,
                                   std::size_t sd_signal, double unit, int colour, const Html& caption) {
-  const auto values = [&](double factor) {
-    return array_of(signals.size(), kDigitsOfEstimate, [&](std::size_t i) {
-      const double sd = signals.bin(sd_signal, i).last;
-      return unit * (signals.bin(signal, i).last + (factor == 0.0 ? 0.0 : factor * sd));
-    });
+  const auto values = [&](std::size_t of, int digits) {
+    return array_of(signals.size(), digits, [&](std::size_t i) { return unit * signals.bin(of, i).last; });
   };
-  add(head_of(figure, "time") + fmt::format(",\"colour\":{},\"times\":{},\"mid\":{},\"low\":{},\"high\":{}",
-                                            colour, times_of(signals), values(0.0), values(-1.0),
-                                            values(1.0)));
+  add(head_of(figure, "time") + fmt::format(",\"colour\":{},\"times\":{},\"mid\":{},\"sd\":{}", colour,
+                                            times_of(signals), values(signal, kDigitsOfEstimate),
+                                            values(sd_signal, kDigitsOfSd)));
   return figure_place(figure.id, caption);
 }
 
@@ -131,23 +126,20 @@ Html FigureSheet::wavelet_figure(const std::string& id, const std::vector<const 
   return figure_place(id, caption);
 }
 
+std::size_t FigureSheet::add_column(const std::vector<double>& values) {
+  if (!columns_.empty()) columns_ += ",\n";
+  columns_ += array_of(values.size(), kDigitsOfSignal, [&](std::size_t i) { return values[i]; });
+  return n_columns_++;
+}
+
 Html FigureSheet::scatter_figure(const std::string& id, const std::string& x_label,
-                                 const std::string& y_label, const std::vector<double>& x,
-                                 const std::vector<double>& y, int colour, const Html& caption) {
-  // The plotting library wants its abscissas in order.
-  std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    if (std::isfinite(x[i]) && std::isfinite(y[i])) order.push_back(i);
-  }
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return x[a] < x[b]; });
+                                 const std::string& y_label, std::size_t x_column, std::size_t y_column,
+                                 int colour, const Html& caption) {
   Figure figure;
   figure.id = id;
   figure.y_label = y_label;
-  const auto values = [&](const std::vector<double>& of) {
-    return array_of(order.size(), kDigitsOfSignal, [&](std::size_t i) { return of[order[i]]; });
-  };
   add(head_of(figure, "scatter") + fmt::format(",\"colour\":{},\"x_label\":{},\"x\":{},\"y\":{}", colour,
-                                               quoted(x_label), values(x), values(y)));
+                                               quoted(x_label), x_column, y_column));
   return figure_place(id, caption);
 }
 

@@ -36,19 +36,24 @@ class FigureSheet {
                        std::size_t sd_signal, double unit, int colour, const Html& caption);
   /// Wavelet variances of the fits with their intervals, and the fitted lines; both axes logarithmic.
   Html wavelet_figure(const std::string& id, const std::vector<const Fit*>& fits, const Html& caption);
-  /// One point for each pair of values that are both known.
+  /// A column of numbers that several figures may show; returns its place in the sheet.
+  std::size_t add_column(const std::vector<double>& values);
+  /// One point for each pair of values of two columns that are both known.
   Html scatter_figure(const std::string& id, const std::string& x_label, const std::string& y_label,
-                      const std::vector<double>& x, const std::vector<double>& y, int colour,
-                      const Html& caption);
+                      std::size_t x_column, std::size_t y_column, int colour, const Html& caption);
   /// The way driven, in metres, coloured by speed.
   Html map_figure(const std::string& id, const BinnedSignals& navigation, const Html& caption);
 
-  /// The sheet as a JSON array.
-  [[nodiscard]] std::string json() const { return "[" + figures_ + "]"; }
+  /// The sheet: {"columns": [[...], ...], "figures": [{...}, ...]}.
+  [[nodiscard]] std::string json() const {
+    return "{\"columns\":[" + columns_ + "],\"figures\":[" + figures_ + "]}";
+  }
 
  private:
   void add(const std::string& figure);
   std::string figures_;
+  std::string columns_;
+  std::size_t n_columns_ = 0;
 };
 
 /// Height window that shows signal +- 2 sd after the first fifth of the time, when an estimate has settled.

@@ -41,6 +41,23 @@ Html paragraph(std::string_view any, std::string_view css_class) {
   return element("p", text(any), css_class);
 }
 
+Html list_of(const std::vector<std::string>& sentences, std::string_view css_class) {
+  if (sentences.empty()) return {};
+  Html items;
+  for (const std::string& sentence : sentences) items += element("li", text(sentence));
+  return element("ul", items, css_class);
+}
+
+Html heading(std::string_view id, std::string_view words) {
+  return Html::markup(fmt::format("<h2 id=\"{}\">{}</h2>", id, text(words).str()));
+}
+
+Html fold(std::string_view summary, const Html& content, bool open) {
+  if (content.empty()) return {};
+  return Html::markup(fmt::format("<details class=\"fold\"{}><summary>{}</summary>{}</details>",
+                                  open ? " open" : "", text(summary).str(), content.str()));
+}
+
 std::string json_for_script(const std::string& json) {
   std::string safe;
   safe.reserve(json.size());
@@ -54,9 +71,34 @@ std::string json_for_script(const std::string& json) {
   return safe;
 }
 
+namespace {
+
+/// The words of a heading, for the narrow page: without its markup.
+std::string plain_words(const Html& html) {
+  std::string words;
+  bool inside = false;
+  for (const char c : html.str()) {
+    if (c == '<') inside = true;
+    if (!inside) words += c;
+    if (c == '>') inside = false;
+  }
+  return words;
+}
+
+/// Tables of so many columns fit the screen of a phone, and that of a tablet.
+constexpr std::size_t kColumnsOfAPhone = 4;
+constexpr std::size_t kColumnsOfATablet = 6;
+
+}  // namespace
+
 Html Table::html() const {
   Html head;
-  for (const Html& heading : headings_) head += element("th", heading);
+  std::vector<std::string> labels;
+  for (const Html& heading : headings_) {
+    head += element("th", heading);
+    labels.push_back(plain_words(heading));
+  }
+  const bool wide = headings_.size() > kColumnsOfAPhone;
   Html body;
   for (const auto& row : rows_) {
     if (row.size() == 1) {
@@ -64,11 +106,18 @@ Html Table::html() const {
                                        headings_.size(), row.front().str()));
       continue;
     }
-    Html cells;
-    for (std::size_t i = 0; i < row.size(); ++i) cells += element(i == 0 ? "th" : "td", row[i]);
+    Html cells = element("th", row.front());
+    for (std::size_t i = 1; i < row.size(); ++i) {
+      cells += wide && i < labels.size() && !labels[i].empty()
+                   ? Html::markup(fmt::format("<td data-label=\"{}\">{}</td>", labels[i], row[i].str()))
+                   : element("td", row[i]);
+    }
     body += element("tr", cells);
   }
-  const Html table = element("table", element("thead", element("tr", head)) + element("tbody", body));
+  const Html table = element("table", element("thead", element("tr", head)) + element("tbody", body),
+                             headings_.size() > kColumnsOfATablet ? "wide"
+                             : wide                               ? "middle"
+                                                                  : std::string_view{});
   return element("div", table, "scroll");
 }
 

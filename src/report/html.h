@@ -37,10 +37,22 @@ Html element(std::string_view tag, const Html& content, std::string_view css_cla
 /// A paragraph of plain text.
 Html paragraph(std::string_view any, std::string_view css_class = {});
 
+/// Items of a list; nothing where there are none.
+Html list_of(const std::vector<std::string>& sentences, std::string_view css_class = {});
+
+/// The heading of a section; the page's contents lead to `id`, which is written in this program.
+Html heading(std::string_view id, std::string_view words);
+
+/// What a reader opens who wants all of it; `summary` says what is inside. On paper it stands in the
+/// appendix. Nothing where `content` is empty.
+/// @param open  from the beginning, where it differs from what is normal; it then stays in its place on paper
+Html fold(std::string_view summary, const Html& content, bool open = false);
+
 /// A JSON document as the content of a `<script>` element: no text in it can end the element.
 std::string json_for_script(const std::string& json);
 
-/// A table with a heading row. The first cell of a row is its heading.
+/// A table with a heading row. The first cell of a row is its heading. Where the page is too narrow for it,
+/// every row becomes a list of its cells, each behind its heading.
 class Table {
  public:
   explicit Table(std::vector<Html> headings) : headings_(std::move(headings)) {}
@@ -48,7 +60,6 @@ class Table {
   /// A row that names the group of rows below it.
   void add_group(Html name) { rows_.push_back({std::move(name)}); }
   [[nodiscard]] bool empty() const { return rows_.empty(); }
-  /// The table, inside an element that scrolls sideways where the page is narrow.
   [[nodiscard]] Html html() const;
 
  private:

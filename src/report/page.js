@@ -19,6 +19,7 @@
   };
 
   const graphs = [];
+  let wholeRange = false;
   const groups = new Map();
 
   // A finger scrolls the page; two fingers zoom. The library alone would take both.
@@ -81,15 +82,24 @@
     };
   }
 
+  // Times of a figure's values: the first, and the step to the next.
+  const timesOf = (figure, n) => Array.from({length: n}, (_, i) => +(figure.times[0] + i * figure.times[1]).toFixed(2));
+
+  // A value with the ends of its band: smallest and largest, or one sd to either side.
+  function band(figure, i) {
+    const mid = figure.mid[i];
+    if (mid === null) return [null, null, null];
+    if (figure.sd) return [mid - (figure.sd[i] || 0), mid, mid + (figure.sd[i] || 0)];
+    return [figure.low[i] === null ? mid : figure.low[i], mid, figure.high[i] === null ? mid : figure.high[i]];
+  }
+
   function drawTime(figure, place, legendPlace) {
-    const rows = figure.times.map((time, i) => [time, figure.mid[i] === null
-        ? [null, null, null] : [figure.low[i] === null ? figure.mid[i] : figure.low[i], figure.mid[i],
-                                figure.high[i] === null ? figure.mid[i] : figure.high[i]]]);
+    const rows = timesOf(figure, figure.mid.length).map((time, i) => [time, band(figure, i)]);
     const colour = COLOURS[figure.colour % COLOURS.length];
     const options = common(figure, legendPlace);
     options.labels = ['time', 'value'];
     options.colors = [colour];
-    options.valueRange = figure.window || null;
+    options.valueRange = wholeRange ? null : figure.window || null;
     options.axes.y.axisLabelFormatter = shown;
     options.axes.x.axisLabelFormatter = (value) => value + ' s';
     options.zoomCallback = figure.group ? zoomTogether(figure.group) : null;
@@ -214,7 +224,11 @@
     options.axes.x.axisLabelFormatter = shown;
     options.axes.y.axisLabelFormatter = shown;
     options.legendFormatter = () => '';
-    graphs.push({graph: new Dygraph(place, figure.x.map((x, i) => [x, figure.y[i]]), options), figure});
+    // The library wants its abscissas in order.
+    const y = sheet.columns[figure.y];
+    const points = sheet.columns[figure.x].map((x, i) => [x, y[i]]).filter((point) => point[0] !== null && point[1] !== null)
+        .sort((a, b) => a[0] - b[0]);
+    graphs.push({graph: new Dygraph(place, points, options), figure});
   }
 
   // Metres that make a scale bar of about `wanted` metres.
@@ -224,7 +238,8 @@
   }
 
   function drawMap(figure, place, legendPlace) {
-    const points = figure.times.map((time, i) => ({time, n: figure.north[i], e: figure.east[i], v: figure.speed[i]}))
+    const points = timesOf(figure, figure.north.length)
+        .map((time, i) => ({time, n: figure.north[i], e: figure.east[i], v: figure.speed[i]}))
         .filter((point) => point.n !== null && point.e !== null);
     if (points.length === 0) return;
     const range = (values) => [Math.min(...values), Math.max(...values)];
@@ -233,7 +248,7 @@
     const [, fastest] = range(points.map((point) => point.v || 0));
     const width = Math.max(320, place.clientWidth);
     const margin = 36;
-    const flattest = 0.52;  // of height to width: the map shall fit a screen
+    const flattest = 0.36;  // of height to width: the map shall leave room on a screen
     const scale = (width - 2 * margin) / Math.max(east - west, (north - south) / flattest, 1);
     const foot = 30;  // a strip of its own for scale bar and north, so that the way never runs under them
     const field = Math.max((north - south) * scale, 140) + 2 * margin;
@@ -243,7 +258,17 @@
     const level = (v) => Math.min(SPEED_COLOURS.length - 1, Math.floor((v || 0) / (fastest || 1) * SPEED_COLOURS.length));
 
     // One path for each run of points of the same speed class; a gap in time breaks the way.
-    const step = figure.times.length > 1 ? figure.times[1] - figure.times[0] : 1;
+    const step = figure.times[1];
+    const at = (i) => [x(points[i].e), y(points[i].n)];
+    const isNext = (i, j) => points[i] && points[j] && points[j].time - points[i].time <= 1.5 * step;
+    // From one point to the next as a curve that leaves each in the direction of its neighbours (Catmull-Rom).
+    const curve = (i) => {
+      const [from, to] = [at(i - 1), at(i)];
+      const before = isNext(i - 2, i - 1) ? at(i - 2) : from;
+      const after = isNext(i, i + 1) ? at(i + 1) : to;
+      const control = (p, a, b, sign) => [0, 1].map((k) => (p[k] + sign * (b[k] - a[k]) / 6).toFixed(1)).join(' ');
+      return 'C' + control(from, before, to, 1) + ' ' + control(to, from, after, -1) + ' ' + to.map((c) => c.toFixed(1)).join(' ');
+    };
     const paths = [];
     for (let i = 1; i < points.length; ++i) {
       const from = points[i - 1];
@@ -251,7 +276,7 @@
       if (to.time - from.time > 1.5 * step) continue;
       const colour = SPEED_COLOURS[level(to.v)];
       const last = paths[paths.length - 1];
-      const segment = 'L' + x(to.e).toFixed(1) + ' ' + y(to.n).toFixed(1);
+      const segment = curve(i);
       if (last && last.colour === colour && last.end === i - 1) {
         last.d += segment;
         last.end = i;
@@ -310,18 +335,91 @@
     svg.addEventListener('dblclick', () => { box = [0, 0, width, height]; show(); });
   }
 
+  const sheet = JSON.parse(document.getElementById('figures').textContent);
   const draw = {time: drawTime, wavelet: drawWavelet, map: drawMap, scatter: drawScatter};
   const places = new Map();
   document.querySelectorAll('.plot').forEach((place) => places.set(place.dataset.figure, place));
-  for (const figure of JSON.parse(document.getElementById('figures').textContent)) {
-    const place = places.get(figure.id);
-    if (place) draw[figure.kind](figure, place, place.parentElement.querySelector('.legend'));
+  const waiting = new Map(sheet.figures.filter((figure) => places.has(figure.id)).map((figure) => [figure.id, figure]));
+  const isShown = (place) => place.clientWidth > 0;
+
+  function drawOne(id) {
+    const figure = waiting.get(id);
+    const place = places.get(id);
+    if (!figure || !isShown(place)) return;
+    waiting.delete(id);
+    draw[figure.kind](figure, place, place.parentElement.querySelector('.legend'));
+    document.body.dataset.figuresDrawn = String(graphs.length);
   }
+  function drawInside(element) {
+    element.querySelectorAll('.plot').forEach((place) => drawOne(place.dataset.figure));
+  }
+
+  // One figure after the other, so that the page can be read and scrolled meanwhile; those in a fold when it is opened.
+  const order = [...places.keys()];
+  function drawNext() {
+    const id = order.shift();
+    if (id === undefined) {
+      document.body.dataset.ready = 'yes';
+      return;
+    }
+    drawOne(id);
+    setTimeout(drawNext, 0);
+  }
+  document.body.dataset.figuresDrawn = '0';
+  setTimeout(drawNext, 0);
+  document.querySelectorAll('details').forEach((fold) => fold.addEventListener('toggle', () => { if (fold.open) drawInside(fold); }));
+
+  // On paper, what is folded stands in an appendix behind all else, and returns to its place afterwards.
+  const moved = [];
+  window.addEventListener('beforeprint', () => {
+    drawInside(document.body);
+    const folds = [...document.querySelectorAll('main > section details.fold:not([open])')]
+        .filter((fold) => !fold.parentElement.closest('details.fold:not([open])'));
+    if (folds.length === 0) return;
+    const appendix = document.createElement('section');
+    appendix.id = 'appendix';
+    const title = document.createElement('h2');
+    title.textContent = 'Appendix';
+    appendix.append(title);
+    for (const fold of folds) {
+      const mark = document.createElement('span');
+      const words = document.createElement('h3');
+      const section = fold.closest('section').querySelector('h2');
+      words.textContent = (section ? section.textContent + ': ' : '') + fold.querySelector('summary').textContent;
+      fold.before(mark);
+      appendix.append(words, fold);
+      fold.open = true;
+      moved.push({fold, mark});
+    }
+    document.querySelector('main').append(appendix);
+    drawInside(appendix);
+  });
+  window.addEventListener('afterprint', () => {
+    for (const {fold, mark} of moved.splice(0)) {
+      fold.open = false;
+      mark.replaceWith(fold);
+    }
+    const appendix = document.getElementById('appendix');
+    if (appendix) appendix.remove();
+  });
+
+  // The contents show where one is.
+  const links = new Map([...document.querySelectorAll('nav.contents a')].map((link) => [link.hash.slice(1), link]));
+  const seen = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting) continue;
+      links.forEach((link) => link.removeAttribute('aria-current'));
+      const link = links.get(entry.target.id);
+      if (link) link.setAttribute('aria-current', 'true');
+    }
+  }, {rootMargin: '-15% 0px -75% 0px'});
+  document.querySelectorAll('h2[id]').forEach((heading) => seen.observe(heading));
 
   const button = document.getElementById('whole-range');
   if (button) {
     button.addEventListener('click', () => {
-      const whole = button.getAttribute('aria-pressed') !== 'true';
+      wholeRange = !wholeRange;
+      const whole = wholeRange;
       button.setAttribute('aria-pressed', String(whole));
       button.textContent = whole ? 'show the settled estimates' : 'show the whole range';
       for (const {graph, figure} of graphs) {
@@ -333,5 +431,4 @@
   window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
     for (const {graph} of graphs) graph.updateOptions({gridLineColor: variable('--line'), axisLineColor: variable('--line')});
   });
-  document.body.dataset.figuresDrawn = String(graphs.length);
 })();

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 #include <array>
+#include <filesystem>
+#include <utility>
 
 #include "base/output_folder.h"
 #include "report/assets.h"
@@ -20,11 +22,40 @@ namespace report {
 namespace {
 
 Html page_heading(const RunFiles& run) {
+  const std::string vehicle = text_at(run.run, "name");
   std::string words = fmt::format("{} S-IMU{}", run.studies.size(), run.studies.size() == 1 ? "" : "s");
   if (const auto duration_s = number_at(run.run, "duration_s")) words += ", " + duration_words(*duration_s);
-  const std::string start = text_at(run.run, "t0_utc");
-  if (!start.empty()) words += ", from " + start;
-  return element("header", element("h1", text("imuscope report")) + paragraph(words));
+  // "2026-03-14T09:30:00.002000Z": to the second.
+  constexpr std::size_t kDate = 10;
+  constexpr std::size_t kToTheSecond = 19;
+  if (const std::string start = text_at(run.run, "t0_utc"); start.size() > kToTheSecond)
+    words += fmt::format(", from {} {} UTC", start.substr(0, kDate),
+                         start.substr(kDate + 1, kToTheSecond - kDate - 1));
+  const std::string folder = std::filesystem::absolute(run.folder).lexically_normal().filename().string();
+  return element("header",
+                 element("h1", text(vehicle.empty() ? "imuscope report" : vehicle)) +
+                     paragraph("imuscope report: " + words + (folder.empty() ? "" : ", folder " + folder)));
+}
+
+/// The sections that the contents lead to, in the order of the page.
+constexpr std::pair<const char*, const char*> kContents[] = {
+    {"in-short", "In short"},  {"drive", "Drive"},
+    {"mounting", "Mounting"},  {"figure-1", "Figure 1"},
+    {"errors", "Figure 2"},    {"motion", "Figure 3"},
+    {"table-1", "Table I"},    {"noise", "Figure 4"},
+    {"table-2", "Table II"},   {"dependence", "Noise and motion"},
+    {"outages", "Outages"},    {"health", "Devices"},
+    {"warnings", "Warnings"},  {"making", "Making"},
+    {"take-away", "Take away"}};
+
+/// They follow the reader down the page.
+Html contents_of(const Html& body) {
+  Html links;
+  for (const auto& [id, words] : kContents) {
+    if (body.str().find(fmt::format("<h2 id=\"{}\"", id)) == std::string::npos) continue;
+    links += Html::markup(fmt::format("<a href=\"#{}\">{}</a>", id, words));
+  }
+  return Html::markup("<nav class=\"contents\" aria-label=\"contents\">") + links + Html::markup("</nav>");
 }
 
 /// The template with each {{name}} replaced once, in one pass: what is put in is not searched again.
@@ -59,18 +90,18 @@ std::string hash_of(std::string_view script) {
 std::string make_page(const RunFiles& run) {
   const auto fits = read_fits(run.models);
   FigureSheet figures;
-  Html body = page_heading(run);
-  body += element("section", summary_section(run, fits));
-  body += element("section", drive_section(run, figures));
-  body += element("section", calibration_section(run, figures));
-  body += element("section", errors_section(run, figures));
-  body += element("section", dynamics_section(run, figures));
-  body += element("section", models_section(run, fits, figures));
-  body += element("section", dependence_section(run, figures));
-  body += element("section", outages_section(run));
-  body += element("section", health_section(run));
-  body += element("section", making_section(run));
-  body += element("section", take_away_section(run, fits));
+  Html sections = element("section", summary_section(run, fits));
+  sections += element("section", drive_section(run, figures));
+  sections += element("section", calibration_section(run, figures));
+  sections += element("section", errors_section(run, figures));
+  sections += element("section", dynamics_section(run, figures));
+  sections += element("section", models_section(run, fits, figures));
+  sections += element("section", dependence_section(run, figures));
+  sections += element("section", outages_section(run));
+  sections += element("section", health_section(run));
+  sections += element("section", making_section(run));
+  sections += element("section", take_away_section(run, fits));
+  const Html body = page_heading(run) + contents_of(sections) + sections;
   const std::string data = json_for_script(figures.json());
   const std::string hashes = hash_of(plotting_script()) + " " + hash_of(page_script());
   return filled(page_template(), {{"script_hashes", hashes},

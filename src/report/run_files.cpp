@@ -17,7 +17,7 @@ namespace {
 using nlohmann::json;
 
 /// Stretches a figure is made of: more than a wide screen has pixels across one is not seen.
-constexpr std::size_t kBinsMax = 1600;
+constexpr std::size_t kBinsMax = 700;
 constexpr std::size_t kMapBinsMax = 2000;
 /// Shorter than any stretch of interest, longer than a sample period at 20 Hz or faster.
 constexpr double kFirstBin_s = 0.05;
@@ -241,6 +241,12 @@ Result<void> read_studies(RunFiles& run, const json& calibration) {
 }
 
 }  // namespace
+
+std::vector<std::string> names_of(const RunFiles& run) {
+  std::vector<std::string> names;
+  for (const StudyFiles& study : run.studies) names.push_back(study.name);
+  return names;
+}
 
 Result<RunFiles> read_run_files(const std::filesystem::path& folder) {
   if (!std::filesystem::is_directory(folder)) {

@@ -82,6 +82,9 @@ struct RunFiles {
   std::vector<std::string> absent;        ///< names of files that a run may have and this one has not
 };
 
+/// Of all S-IMUs.
+std::vector<std::string> names_of(const RunFiles& run);
+
 /// Errors as write_report().
 Result<RunFiles> read_run_files(const std::filesystem::path& folder);
 

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <algorithm>
 #include <cmath>
 
 #include "base/units.h"
@@ -179,7 +180,20 @@ double small_unit(std::string& unit) {
   return 1.0;
 }
 
-/// sd against goal of every state, what is known least, what would help.
+/// What is known least and what would help.
+Html limits_words(const StudyFiles& study) {
+  const auto& observability = field(study.calibration, "observability");
+  if (!observability.is_object()) return {};
+  std::string words =
+      fmt::format("Least is known of the {}.", text_at(field(observability, "weakest"), "words"));
+  if (const std::string limits = text_at(observability, "limited_by"); !limits.empty())
+    words += fmt::format(" Limited: {}.", limits);
+  if (const std::string advice = text_at(observability, "advice"); !advice.empty())
+    words += fmt::format(" What would help: {}.", advice);
+  return paragraph(words);
+}
+
+/// sd against goal of every state.
 Html observability_table(const StudyFiles& study) {
   const auto& observability = field(study.calibration, "observability");
   if (!observability.is_object()) return {};
@@ -199,13 +213,87 @@ Html observability_table(const StudyFiles& study) {
                         : seen  ? "goal not reached"
                                 : "")});
   }
-  std::string words =
-      fmt::format("Least is known of the {}.", text_at(field(observability, "weakest"), "words"));
-  if (const std::string limits = text_at(observability, "limited_by"); !limits.empty())
-    words += fmt::format(" Limited: {}.", limits);
-  if (const std::string advice = text_at(observability, "advice"); !advice.empty())
-    words += fmt::format(" What would help: {}.", advice);
-  return table.html() + paragraph(words);
+  return table.html();
+}
+
+/// An estimate, and below it how far it is from the truth where that is known.
+Html found_cell(std::optional<double> value, std::optional<double> sd, std::optional<double> truth,
+                double unit, bool observable) {
+  if (!observable) return text(kNotObservable);
+  if (!value) return text(kUnknown);
+  const auto in_unit = [&](std::optional<double> any) { return any ? std::optional(unit * *any) : any; };
+  Html cell = with_sd(unit * *value, in_unit(sd));
+  if (truth) cell += element("span", text("off by " + in_sd(unit * (*value - *truth), in_unit(sd))), "aside");
+  return cell;
+}
+
+/// The three of one quantity of one S-IMU.
+std::array<Html, 3> found_cells(const std::optional<Three>& values, const std::optional<Three>& sd,
+                                const std::optional<Three>& truth, double unit,
+                                const std::array<bool, 3>& observable) {
+  std::array<Html, 3> cells;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const auto at = [&](const std::optional<Three>& three) {
+      return three ? std::optional((*three)[i]) : std::nullopt;
+    };
+    cells[i] = found_cell(at(values), at(sd), at(truth), unit, observable[i]);
+  }
+  return cells;
+}
+
+/// Boresight from the square mounting, lever arm and time offset of one S-IMU, in the order of kMountingRows.
+std::vector<Html> mounting_cells(const StudyFiles& study) {
+  std::vector<Html> cells;
+  const auto add = [&](const std::array<Html, 3>& three) {
+    cells.insert(cells.end(), three.begin(), three.end());
+  };
+  const auto C_b_s = numbers_at<9>(study.calibration, "C_b_s");
+  const auto true_C = numbers_at<9>(study.truth, "C_b_s");
+  std::optional<Three> psi_deg;
+  std::optional<Three> true_psi_deg;
+  if (C_b_s) {
+    const Rotation square = nearest_square_mounting(*C_b_s);
+    psi_deg = boresight_deg(square, *C_b_s);
+    if (true_C) {
+      // The error is the small rotation between both, whatever the square mounting is.
+      const Angles error_deg = boresight_deg(*true_C, *C_b_s);
+      true_psi_deg = Three{};
+      for (std::size_t i = 0; i < error_deg.size(); ++i) (*true_psi_deg)[i] = (*psi_deg)[i] - error_deg[i];
+    }
+  }
+  add(found_cells(psi_deg, numbers_at<3>(study.calibration, "boresight_sd_deg"), true_psi_deg, 1.0,
+                  observable_axes(study.calibration, "psi")));
+  add(found_cells(numbers_at<3>(study.calibration, "r_bs_b_m"),
+                  numbers_at<3>(study.calibration, "r_bs_b_sd_m"), numbers_at<3>(study.truth, "r_bs_b_m"),
+                  kMmPerM, observable_axes(study.calibration, "r")));
+  cells.push_back(found_cell(number_at(study.calibration, "t_d_s"), number_at(study.calibration, "t_d_sd_s"),
+                             number_at(study.truth, "t_d_s"), kMsPerS,
+                             is_observable(study.calibration, "t_d")));
+  return cells;
+}
+
+/// All S-IMUs beside each other.
+Html mounting_table(const RunFiles& run) {
+  constexpr const char* kMountingRows[] = {"boresight ψ about forward, deg",
+                                           "about right, deg",
+                                           "about down, deg",
+                                           "lever arm r forward, mm",
+                                           "right, mm",
+                                           "down, mm",
+                                           "time offset t_d, ms"};
+  std::vector<Html> headings{text("± one sd")};
+  std::vector<std::vector<Html>> columns;
+  for (const StudyFiles& study : run.studies) {
+    headings.push_back(text(study.name));
+    columns.push_back(mounting_cells(study));
+  }
+  Table table(std::move(headings));
+  for (std::size_t row = 0; row < std::size(kMountingRows); ++row) {
+    std::vector<Html> cells{text(kMountingRows[row])};
+    for (const auto& column : columns) cells.push_back(column[row]);
+    table.add_row(std::move(cells));
+  }
+  return columns.empty() ? Html{} : table.html();
 }
 
 Html estimate_panels(const StudyFiles& study, FigureSheet& figures) {
@@ -245,23 +333,32 @@ Html estimate_panels(const StudyFiles& study, FigureSheet& figures) {
   return element("div", panels, "panels");
 }
 
+/// Whether the mounting is not as it should be: then all that is known of it is open from the beginning.
+bool is_notable(const StudyFiles& study) {
+  const auto& states = field(field(study.calibration, "observability"), "states");
+  return std::any_of(states.begin(), states.end(),
+                     [](const auto& state) { return field(state, "observable") != nlohmann::json(true); });
+}
+
 }  // namespace
 
 Html calibration_section(const RunFiles& run, FigureSheet& figures) {
-  Html section = element("h2", text("The mounting of each S-IMU"));
+  Html section = heading("mounting", "The mounting of each S-IMU");
   section += paragraph(
       "b is the frame of the reference IMU (x forward, y right, z down), s that of the sensor under study. "
       "The "
-      "boresight ψ is a rotation vector in b; the lever arm r leads from b to s, in b. A positive time "
-      "offset is added to "
-      "the sensor's time stamps.");
+      "boresight ψ is what is left beside the nearest square mounting, a rotation vector in b; the lever arm "
+      "r leads "
+      "from b to s, in b. A positive time offset is added to the sensor's time stamps.");
+  section += mounting_table(run);
   if (!run.has_truth)
     section += paragraph("No truth.json in this run: nothing to compare the estimates with.", "note");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + mounting_words(study) + study_table(study) +
-               observability_table(study);
+    section += element("h3", text(study.name)) + mounting_words(study) + limits_words(study) +
+               fold(fmt::format("All that is estimated of {}, and what the drive has shown", study.name),
+                    study_table(study) + observability_table(study), is_notable(study));
   }
-  section += element("h2", text("Figure 1: boresight and lever arm over time"));
+  section += heading("figure-1", "Figure 1: boresight and lever arm over time");
   section += element("p", text("Line: the estimate at that time; band: ± one sd") +
                               text(run.has_truth ? "; dashed: the truth" : "") +
                               text("; darker ground: at rest. Heights are chosen to show the settled "
@@ -269,9 +366,8 @@ Html calibration_section(const RunFiles& run, FigureSheet& figures) {
                                    "click to return. ") +
                               Html::markup("<button type=\"button\" id=\"whole-range\" "
                                            "aria-pressed=\"false\">show the whole range</button>"));
-  for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + estimate_panels(study, figures);
-  }
+  for (const StudyFiles& study : run.studies)
+    section += fold(study.name, estimate_panels(study, figures), &study == &run.studies.front());
   return section;
 }
 

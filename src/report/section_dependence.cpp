@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/grouped.h"
 #include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
@@ -15,12 +16,12 @@ using nlohmann::json;
 constexpr std::size_t kFiguresMax = 6;
 constexpr double kLevel = 0.05;
 
-Html list_of_remarks(const json& document) {
-  Html items;
+Html list_of_remarks(const RunFiles& run, const json& document) {
+  std::vector<std::string> remarks;
   for (const json& remark : field(document, "remarks")) {
-    if (remark.is_string()) items += element("li", text(remark.get<std::string>()));
+    if (remark.is_string()) remarks.push_back(remark.get<std::string>());
   }
-  return items.empty() ? Html{} : element("ul", items, "note");
+  return list_of(grouped_by_name(remarks, names_of(run)), "note");
 }
 
 /// "+12 % a unit" from a slope of the logarithm.
@@ -37,12 +38,18 @@ Html change_words(const json& entry, const std::string& driver_unit) {
          text(" % per " + driver_unit);
 }
 
-Html dependence_table(const RunFiles& run, const std::string& imu) {
+bool is_clear(const json& entry) {
+  const auto p = number_at(entry, "p_holm");
+  return p && *p < kLevel;
+}
+
+/// @param clear_only  those that are clear of chance after correction
+Html dependence_table(const RunFiles& run, const std::string& imu, bool clear_only) {
   Table table({text("parameter"), text("driver"), text("at its mean"), text("change a unit of the driver"),
                text("p, corrected"), text("beside the other drivers"), text("p, corrected")});
   std::string axis;
   for (const json& entry : field(run.dependence, "dependences")) {
-    if (text_at(entry, "name") != imu) continue;
+    if (text_at(entry, "name") != imu || (clear_only && !is_clear(entry))) continue;
     if (text_at(entry, "axis") != axis) {
       axis = text_at(entry, "axis");
       table.add_group(text(axis_words(axis)));
@@ -53,11 +60,11 @@ Html dependence_table(const RunFiles& run, const std::string& imu) {
     const json& beside = field(entry, "beside_others");
     table.add_row(
         {text(text_at(entry, "process") + " " + text_at(entry, "parameter")), text(text_at(entry, "driver")),
-         at_mean ? number(factor * *at_mean, 4) + text(" " + unit) : text(kUnknown),
+         at_mean ? number(factor * *at_mean, 3) + text(" " + unit) : text(kUnknown),
          change_words(entry, text_at(entry, "driver_unit")), p_words(number_at(entry, "p_holm")),
          change_words(beside, text_at(entry, "driver_unit")), p_words(number_at(beside, "p_holm"))});
   }
-  return table.empty() ? paragraph("No dependence could be fitted for this sensor.") : table.html();
+  return table.empty() ? Html{} : table.html();
 }
 
 /// The variance of the white noise, window by window, against a driver that it follows.
@@ -80,15 +87,15 @@ Html dependence_figure(const RunFiles& run, const json& entry, FigureSheet& figu
   if (x.empty()) return {};
   const std::string driver_words = driver + ", " + text_at(entry, "driver_unit");
   return figures.scatter_figure(
-      fmt::format("dependence-{}-{}-{}", axis, driver, imu), driver_words, unit, x, y, 2,
+      fmt::format("dependence-{}-{}-{}", axis, driver, imu), driver_words, unit, figures.add_column(x),
+      figures.add_column(y), 2,
       text(fmt::format("{}: variance of the white noise, {}, against {}", axis_words(axis), unit, driver)));
 }
 
 Html dependence_panels(const RunFiles& run, const std::string& imu, FigureSheet& figures) {
   std::vector<const json*> clear;
   for (const json& entry : field(run.dependence, "dependences")) {
-    const auto p = number_at(entry, "p_holm");
-    if (text_at(entry, "name") == imu && text_at(entry, "process") == "WN" && p && *p < kLevel)
+    if (text_at(entry, "name") == imu && text_at(entry, "process") == "WN" && is_clear(entry))
       clear.push_back(&entry);
   }
   std::stable_sort(clear.begin(), clear.end(), [](const json* a, const json* b) {
@@ -100,17 +107,16 @@ Html dependence_panels(const RunFiles& run, const std::string& imu, FigureSheet&
   return panels.empty() ? Html{} : element("div", panels, "panels");
 }
 
+/// What could not be told, each reason once with what it is of.
 Html not_determined(const RunFiles& run, const std::string& imu) {
-  Html items;
+  std::vector<Named> reasons;
   for (const json& entry : field(run.dependence, "not_determined")) {
     if (text_at(entry, "name") != imu) continue;
-    items += element(
-        "li", text(fmt::format("{} {} against {}: {}", axis_words(text_at(entry, "axis")),
-                               text_at(entry, "process"), text_at(entry, "driver"), text_at(entry, "why"))));
+    reasons.push_back({fmt::format("{} {} against {}", axis_words(text_at(entry, "axis")),
+                                   text_at(entry, "process"), text_at(entry, "driver")),
+                       text_at(entry, "why")});
   }
-  return items.empty()
-             ? Html{}
-             : element("details", element("summary", text("Not determined")) + element("ul", items, "note"));
+  return fold("Not determined", list_of(grouped(reasons), "note"));
 }
 
 std::optional<double> scaled_sd(const json& line, double factor) {
@@ -137,13 +143,13 @@ Html vibration_lines(const RunFiles& run) {
   }
   return element("h3", text("Vibration lines")) +
          (table.empty() ? paragraph("No line stands out of the noise.") : table.html()) +
-         list_of_remarks(run.vibration);
+         list_of_remarks(run, run.vibration);
 }
 
 }  // namespace
 
 Html dependence_section(const RunFiles& run, FigureSheet& figures) {
-  Html section = element("h2", text("How the noise depends on the motion"));
+  Html section = heading("dependence", "How the noise depends on the motion");
   if (run.dependence.is_null()) {
     return section +
            paragraph(
@@ -157,10 +163,14 @@ Html dependence_section(const RunFiles& run, FigureSheet& figures) {
       "its window, with 95 % intervals. p: chance of such a slope without a dependence, corrected for the "
       "number of tests (Holm).",
       window_s ? fmt::format(" of {:g} s", *window_s) : ""));
-  section += list_of_remarks(run.dependence);
+  section += list_of_remarks(run, run.dependence);
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + dependence_table(run, study.name) +
-               dependence_panels(run, study.name, figures) + not_determined(run, study.name);
+    const Html clear = dependence_table(run, study.name, true);
+    section += element("h3", text(study.name));
+    section += clear.empty() ? paragraph("No parameter follows the motion clear of chance.") : clear;
+    section += dependence_panels(run, study.name, figures) +
+               fold("All that was tried", dependence_table(run, study.name, false)) +
+               not_determined(run, study.name);
   }
   return section + vibration_lines(run);
 }

@@ -67,7 +67,7 @@ Html odometry_part(const RunFiles& run, FigureSheet& figures) {
 }  // namespace
 
 Html drive_section(const RunFiles& run, FigureSheet& figures) {
-  Html section = element("h2", text("The drive"));
+  Html section = heading("drive", "The drive");
   if (!run.navigation) {
     return section +
            paragraph(
@@ -97,8 +97,8 @@ Html drive_section(const RunFiles& run, FigureSheet& figures) {
   Figure height = speed;
   height.id = "height";
   height.y_label = "m";
-  section += figures.estimate_figure(height, navigation, kHeight_m, kSdDown_m, 1.0, kColour,
-                                     text("Height above the ellipsoid, with its sd"));
+  section += fold("Height", figures.estimate_figure(height, navigation, kHeight_m, kSdDown_m, 1.0, kColour,
+                                                    text("Height above the ellipsoid, with its sd")));
   if (run.odometry) section += odometry_part(run, figures);
   return section;
 }

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <cmath>
 
@@ -53,15 +54,20 @@ const json& find_regression(const json& regressions, const std::string& imu, con
   return kNone;
 }
 
-/// The strongest coefficients in words, strongest first.
-Html effects(const json& regression) {
-  const json& coefficients = field(regression, "coefficients");
-  if (!coefficients.is_array()) return text(kUnknown);
+/// Coefficients that are clear of chance.
+std::vector<const json*> shown_coefficients(const json& regression) {
   std::vector<const json*> shown;
-  for (const json& c : coefficients) {
+  for (const json& c : field(regression, "coefficients")) {
     const double p_of_axis = kOfAnAxis * number_at(c, "p_value").value_or(1.0);
     if (number_at(c, "p_holm").value_or(p_of_axis) < kShownP) shown.push_back(&c);
   }
+  return shown;
+}
+
+/// The strongest coefficients in words, strongest first.
+Html effects(const json& regression) {
+  if (!field(regression, "coefficients").is_array()) return text(kUnknown);
+  std::vector<const json*> shown = shown_coefficients(regression);
   std::sort(shown.begin(), shown.end(), [](const json* a, const json* b) {
     const auto strength = [](const json& c) {
       return std::abs(number_at(c, "value").value_or(0.0)) / number_at(c, "sd").value_or(1.0);
@@ -94,12 +100,28 @@ Html regression_table(const json& regressions, const std::string& imu) {
                        : table.html();
 }
 
+/// Points of a figure this small that can be told apart.
+constexpr std::size_t kPointsShown = 1000;
+
+/// Every so-manieth value of a long column.
+std::vector<double> thinned(const std::vector<double>& values) {
+  const std::size_t step = std::max<std::size_t>(1, (values.size() + kPointsShown - 1) / kPointsShown);
+  std::vector<double> kept;
+  for (std::size_t i = 0; i < values.size(); i += step) kept.push_back(values[i]);
+  return kept;
+}
+
 Html scatter_panels(const StudyFiles& study, FigureSheet& figures) {
+  std::array<std::size_t, kScatterCovariates> x_columns{};
+  std::array<std::size_t, kScatterErrors> y_columns{};
+  for (std::size_t i = 0; i < x_columns.size(); ++i)
+    x_columns[i] = figures.add_column(thinned(study.scatter->covariates[i]));
+  for (std::size_t i = 0; i < y_columns.size(); ++i)
+    y_columns[i] = figures.add_column(thinned(study.scatter->errors[i]));
   Html panels;
   for (const Pair& pair : kPairs) {
-    const auto& x = study.scatter->covariates[pair.covariate];
-    const auto& y = study.scatter->errors[pair.error];
-    const double r = correlation(x, y);
+    const double r =
+        correlation(study.scatter->covariates[pair.covariate], study.scatter->errors[pair.error]);
     const DrivingQuantity& quantity = kQuantities[pair.covariate / 3];
     const char* unit = pair.error < 3 ? "deg/s" : "m/s²";
     const std::string caption =
@@ -107,16 +129,42 @@ Html scatter_panels(const StudyFiles& study, FigureSheet& figures) {
                     std::isfinite(r) ? fmt::format("; r = {:.3f}", r) : "");
     panels += figures.scatter_figure(fmt::format("scatter-{}-{}-{}", kAxes[pair.error],
                                                  kScatterCovariateColumns[pair.covariate], study.name),
-                                     fmt::format("{}, {}", quantity.name, quantity.unit), unit, x, y,
+                                     fmt::format("{}, {}", quantity.name, quantity.unit), unit,
+                                     x_columns[pair.covariate], y_columns[pair.error],
                                      static_cast<int>(pair.error % 3), text(caption));
   }
   return element("div", panels, "panels");
 }
 
+/// "gyroscope z against angular rate, r = 0.41": the strongest of the figure's pairs.
+std::string strongest_pair(const StudyFiles& study) {
+  std::string words;
+  double strongest = 0.0;
+  for (const Pair& pair : kPairs) {
+    const double r =
+        correlation(study.scatter->covariates[pair.covariate], study.scatter->errors[pair.error]);
+    if (!(std::abs(r) > strongest)) continue;
+    strongest = std::abs(r);
+    words = fmt::format("{} against {}, r = {:.2g}", axis_words(kAxes[pair.error]),
+                        kQuantities[pair.covariate / 3].name, r);
+  }
+  return words.empty() ? "" : "; strongest: " + words;
+}
+
+/// Axes on which something of the sensor's own stands out once the calibration's errors are taken out.
+std::vector<std::string> axes_that_depend(const json& regressions, const std::string& imu) {
+  std::vector<std::string> axes;
+  for (const char* axis : kAxes) {
+    const json& projected = find_regression(regressions, imu, axis, "gls", true);
+    if (!projected.is_null() && !shown_coefficients(projected).empty()) axes.push_back(axis_words(axis));
+  }
+  return axes;
+}
+
 }  // namespace
 
 Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
-  Html section = element("h2", text("Figure 3: errors against the motion"));
+  Html section = heading("motion", "Figure 3: errors against the motion");
   const bool any = std::any_of(run.studies.begin(), run.studies.end(),
                                [](const StudyFiles& study) { return study.scatter.has_value(); });
   if (any) {
@@ -126,11 +174,11 @@ Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
         "correlation of the points shown.");
   }
   for (const StudyFiles& study : run.studies) {
-    if (study.scatter) section += element("h3", text(study.name)) + scatter_panels(study, figures);
+    if (study.scatter) section += fold(study.name + strongest_pair(study), scatter_panels(study, figures));
   }
   if (!any) section += paragraph("No scatter_NAME.csv in this run: the figure is left out.");
 
-  section += element("h2", text("Table I: do the errors depend on the motion?"));
+  section += heading("table-1", "Table I: do the errors depend on the motion?");
   if (!run.regressions.is_array() || run.regressions.empty()) {
     return section +
            paragraph("No regression.json in this run: the dependence on the motion was not studied.");
@@ -149,7 +197,12 @@ Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
     if (remark.is_string()) section += paragraph(remark.get<std::string>(), "note");
   }
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) + regression_table(run.regressions, study.name);
+    const auto axes = axes_that_depend(run.regressions, study.name);
+    const std::string words = axes.empty()
+                                  ? study.name + ": nothing of the sensor's own stands out on any axis"
+                                  : fmt::format("{}: something of the sensor's own stands out on {}",
+                                                study.name, fmt::join(axes, ", "));
+    section += fold(words, regression_table(run.regressions, study.name), !axes.empty());
   }
   return section;
 }

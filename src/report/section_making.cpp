@@ -3,6 +3,7 @@
 #include <iterator>
 
 #include "base/json_text.h"
+#include "report/grouped.h"
 #include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
@@ -27,19 +28,21 @@ Html duration_cell(std::optional<double> seconds) {
   return text(seconds ? duration_words(*seconds) : std::string(kUnknown));
 }
 
+/// What several S-IMUs share stands once.
 Html warnings_of(const RunFiles& run) {
-  Html items;
+  std::vector<std::string> warnings;
   for (const auto& warning : field(run.run, "warnings")) {
-    if (warning.is_string()) items += element("li", text(warning.get<std::string>()));
+    if (warning.is_string()) warnings.push_back(warning.get<std::string>());
   }
-  return items.empty() ? paragraph("The run gave no warning.") : element("ul", items);
+  return warnings.empty() ? paragraph("The run gave no warning.")
+                          : list_of(grouped_by_name(warnings, names_of(run)));
 }
 
 Html absent_files(const RunFiles& run) {
   if (run.absent.empty()) return {};
   Html items;
   for (const std::string& file : run.absent) items += element("li", text(file));
-  return element("h3", text("Files that this run folder does not hold")) + element("ul", items);
+  return fold("Files that this run folder does not hold", element("ul", items));
 }
 
 /// A count of a device and what it is called.
@@ -48,7 +51,13 @@ struct Column {
   const char* heading;
 };
 
-/// The counts that at least one device has.
+/// Whether every device that has this count has none of it: then it need not be shown.
+bool is_zero_everywhere(const nlohmann::json& devices, const Column& column) {
+  return std::all_of(devices.begin(), devices.end(),
+                     [&](const auto& device) { return number_at(device, column.key).value_or(0.0) == 0.0; });
+}
+
+/// The counts that are not zero in all devices.
 std::vector<Column> columns_of(const nlohmann::json& devices) {
   constexpr Column kColumns[] = {{"rate_hz", "rate, Hz"},
                                  {"samples", "samples"},
@@ -62,13 +71,10 @@ std::vector<Column> columns_of(const nlohmann::json& devices) {
                                  {"gaps", "gaps"},
                                  {"clock_resets", "clock resets"},
                                  {"refused", "refused"},
-                                 {"late", "late"}};
+                                 {"late", "late"}};  // what is not among the headings is zero everywhere
   std::vector<Column> columns;
-  std::copy_if(
-      std::begin(kColumns), std::end(kColumns), std::back_inserter(columns), [&](const Column& column) {
-        return std::any_of(devices.begin(), devices.end(),
-                           [&](const auto& device) { return number_at(device, column.key).has_value(); });
-      });
+  std::copy_if(std::begin(kColumns), std::end(kColumns), std::back_inserter(columns),
+               [&](const Column& column) { return !is_zero_everywhere(devices, column); });
   return columns;
 }
 
@@ -80,7 +86,7 @@ Html events_of(const RunFiles& run) {
     table.add_row({text(time_s ? fmt::format("{:.1f}", *time_s) : kUnknown), text(text_at(event, "text"))});
   }
   if (table.empty()) return {};
-  return element("h3", text("Events")) + element("div", table.html(), "words");
+  return element("div", table.html(), "words");
 }
 
 Html scaled(std::optional<double> value, double by, int decimals) {
@@ -124,7 +130,7 @@ Html time_budget(const nlohmann::json& devices) {
 }  // namespace
 
 Html health_section(const RunFiles& run) {
-  Html section = element("h2", text("Health of the devices"));
+  Html section = heading("health", "Health of the devices");
   if (run.run.is_null()) return section + paragraph(kNoRunFile);
   const auto& devices = field(run.run, "devices");
   const auto columns = columns_of(devices);
@@ -144,14 +150,24 @@ Html health_section(const RunFiles& run) {
   }
   if (!problems.empty()) problems = element("ul", problems);
   if (table.empty()) return section + paragraph("run.json names no device.");
-  return section + table.html() + problems + time_budget(devices);
+  return section + table.html() +
+         paragraph(
+             "Of what is not listed (skipped bytes, wrong checksums, lost, refused and late samples, "
+             "restarts of "
+             "clocks) no device had any.",
+             "note") +
+         problems + time_budget(devices);
 }
 
 Html making_section(const RunFiles& run) {
-  Html section = element("h2", text("How this was made"));
+  Html section = heading("warnings", "Warnings and events");
   if (run.run.is_null()) {
     section += paragraph(kNoRunFile);
   } else {
+    section += warnings_of(run) + fold("Events", events_of(run));
+  }
+  section += heading("making", "How this was made");
+  if (!run.run.is_null()) {
     Table table({text("what"), text("value")});
     const auto& regimes = field(run.run, "regimes");
     table.add_row({text("imuscope"), or_unknown(text_at(run.run, "version"))});
@@ -164,12 +180,10 @@ Html making_section(const RunFiles& run) {
     table.add_row({text("duration"), duration_cell(number_at(run.run, "duration_s"))});
     table.add_row({text("at rest"), duration_cell(number_at(regimes, "static_s"))});
     table.add_row({text("in motion"), duration_cell(number_at(regimes, "dynamic_s"))});
-    section += element("div", table.html(), "words") + element("h3", text("Warnings")) + warnings_of(run) +
-               events_of(run);
-    if (const std::string words = text_at(run.run, "configuration_text"); !words.empty()) {
-      section += element("details", element("summary", text("The configuration, word by word")) +
-                                        element("pre", text(words)));
-    }
+    Html all = element("div", table.html(), "words");
+    if (const std::string words = text_at(run.run, "configuration_text"); !words.empty())
+      all += element("h3", text("The configuration, word by word")) + element("pre", text(words));
+    section += fold("Program, configuration, inputs", all);
   }
   return section + absent_files(run);
 }

@@ -2,9 +2,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/data_sheet_table.h"
+#include "report/grouped.h"
 #include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
+#include "report/verdict.h"
 
 namespace imuscope::report {
 namespace {
@@ -174,13 +177,11 @@ Html parameter_table(const RunFiles& run, const std::vector<Fit>& fits, const st
 
 /// Levels that a regime's stretches are too short for.
 Html left_out(const RunFiles& run, const std::string& imu) {
-  Html items;
+  std::vector<std::string> sentences;
   for (const auto& entry : field(run.regimes, "left_out")) {
-    if (text_at(entry, "name") == imu) items += element("li", text(text_at(entry, "sentence")));
+    if (text_at(entry, "name") == imu) sentences.push_back(text_at(entry, "sentence"));
   }
-  return items.empty()
-             ? Html{}
-             : element("details", element("summary", text("Levels left out")) + element("ul", items, "note"));
+  return list_of(sentences, "note");
 }
 
 /// How the drive was divided, and how much there is of each part.
@@ -201,19 +202,69 @@ Html regimes_table(const RunFiles& run) {
   return (table.empty() ? Html{} : table.html()) + (remarks.empty() ? Html{} : element("ul", remarks));
 }
 
+/// What the fits remark, each remark once with the axes that it is of.
 Html fit_warnings(const std::vector<Fit>& fits, const std::string& imu) {
-  Html items;
-  std::size_t n = 0;
+  std::vector<Named> remarks;
   for (const Fit& fit : fits) {
     if (fit.imu != imu) continue;
-    n += fit.warnings.size();
-    for (const std::string& warning : fit.warnings) {
-      items += element("li", text(axis_words(fit.axis) + " (" + fit.regime + "): " + warning));
+    for (const std::string& warning : fit.warnings)
+      remarks.push_back({fmt::format("{} ({})", axis_words(fit.axis), fit.regime), warning});
+  }
+  return list_of(grouped(remarks), "note");
+}
+
+/// Whether the tests of all parameters together say that the regimes' models of an axis differ.
+bool regimes_differ(const nlohmann::json& comparison) {
+  const auto p = number_at(field(comparison, "joint"), "p_holm");
+  return p && *p < kTestLevel;
+}
+
+/// The fits of an axis whose test rejects them after correction for all tests of the run.
+bool is_rejected(const Fit& fit, std::size_t n_tests) {
+  return fit.j_p_value && *fit.j_p_value * static_cast<double>(n_tests) < kTestLevel;
+}
+
+/// One line for each axis of all S-IMUs: the random walk in each regime, whether they differ, the model,
+/// whether it holds.
+Html overview_table(const RunFiles& run, const std::vector<Fit>& fits,
+                    const std::vector<std::string>& regimes) {
+  const bool tested = !field(run.comparison, "comparisons").empty();
+  std::vector<Html> headings{text("axis")};
+  for (const std::string& regime : regimes)
+    headings.push_back(text(fmt::format("random walk, {}", regime.empty() ? "all" : regime)));
+  if (tested) headings.push_back(text("rest and motion"));
+  headings.push_back(text("model"));
+  headings.push_back(text("against the data"));
+  Table table(std::move(headings));
+  for (const StudyFiles& study : run.studies) {
+    table.add_group(text(study.name));
+    std::vector<std::vector<noise::AxisFit>> walks;
+    for (const std::string& regime : regimes) walks.push_back(axis_fits(run, study.name, regime));
+    for (const char* axis : kAxes) {
+      std::vector<Html> row{text(axis_words(axis))};
+      std::string model;
+      bool rejected = false;
+      bool any = false;
+      for (std::size_t i = 0; i < regimes.size(); ++i) {
+        const Fit* fit = find_fit(fits, study.name, axis, regimes[i]);
+        row.push_back(random_walk_cell(walks[i], axis));
+        if (fit == nullptr) continue;
+        any = true;
+        if (model.find(fit->model) == std::string::npos) model += (model.empty() ? "" : "; ") + fit->model;
+        rejected = rejected || is_rejected(*fit, fits.size());
+      }
+      if (!any) continue;
+      if (tested) {
+        row.push_back(regimes_differ(find_comparison(run, study.name, axis))
+                          ? element("strong", text("differ"))
+                          : text("no difference shown"));
+      }
+      row.push_back(text(model));
+      row.push_back(rejected ? element("strong", text("contradicted"), "no") : text("not contradicted"));
+      table.add_row(std::move(row));
     }
   }
-  if (items.empty()) return {};
-  return element("details", element("summary", text(fmt::format("Remarks of the fits ({})", n))) +
-                                element("ul", items, "note"));
+  return table.html();
 }
 
 Html wavelet_panels(const std::vector<Fit>& fits, const std::string& imu,
@@ -236,7 +287,7 @@ Html wavelet_panels(const std::vector<Fit>& fits, const std::string& imu,
 }  // namespace
 
 Html errors_section(const RunFiles& run, FigureSheet& figures) {
-  Html section = element("h2", text("Figure 2: the error signals"));
+  Html section = heading("errors", "Figure 2: the error signals");
   section += paragraph(
       "Sample of the S-IMU minus the reference at the same instant, turned into the sensor's axes and moved "
       "to its "
@@ -245,45 +296,49 @@ Html errors_section(const RunFiles& run, FigureSheet& figures) {
       "sample in it; darker ground: at rest. Where there is a gap in the record there is a gap in the line.");
   section += rms_table(run);
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name));
-    section += study.errors
-                   ? error_panels(study, figures)
-                   : paragraph(fmt::format("No errors_{}.csv with samples in this run folder.", study.name));
+    section +=
+        fold(study.name,
+             study.errors
+                 ? error_panels(study, figures)
+                 : paragraph(fmt::format("No errors_{}.csv with samples in this run folder.", study.name)),
+             &study == &run.studies.front());
   }
   return section;
 }
 
 Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureSheet& figures) {
-  Html section = element("h2", text("Figure 4: wavelet variance and noise model"));
+  Html section = heading("noise", "Figure 4: wavelet variance and noise model");
   if (fits.empty()) {
     return section + paragraph("No noise model in this run (models.json is absent or empty).");
   }
-  const auto regimes = regimes_of(fits);
+  const auto regimes = particular_regimes(regimes_of(fits));
   section += paragraph(
       "Haar wavelet variance of the error signals at the scales τ, in s: points with their 95 % intervals; "
       "line: the variance that the fitted model implies; dashed: its processes one by one. Where the line "
       "leaves the intervals the model does not explain the signal.");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) +
-               wavelet_panels(fits, study.name, particular_regimes(regimes), figures);
+    section +=
+        fold(study.name, wavelet_panels(fits, study.name, regimes, figures), &study == &run.studies.front());
   }
-  section += element("h2", text("Table II: parameters of the noise models"));
-  section += paragraph(
-      "With 95 % intervals. WN: white noise; GM: first-order Gauss-Markov process (β its rate, τ = 1/β its "
-      "correlation "
-      "time, σ² its variance); RW: random walk; QN: quantisation noise.");
-  section += regimes_table(run);
+  section += heading("table-2", "Table II: the noise models");
+  section += regimes_table(run) + overview_table(run, fits, regimes);
   section += field(run.comparison, "comparisons").empty()
                  ? paragraph(
                        "No comparison.json with two regimes in this run: the models are shown side by "
                        "side without a test of difference.")
                  : paragraph(
-                       "Ratio: the second regime's parameter over the first's. The p values are corrected "
-                       "for the number of tests (Holm); “no difference shown” is not “equal”.");
+                       "Whether rest and motion differ is tested with all parameters of an axis together, "
+                       "corrected for "
+                       "the number of tests (Holm); “no difference shown” is not “equal”.");
   for (const StudyFiles& study : run.studies) {
-    section += element("h3", text(study.name)) +
-               parameter_table(run, fits, study.name, particular_regimes(regimes)) +
-               left_out(run, study.name) + fit_warnings(fits, study.name);
+    section += fold(
+        fmt::format("Every parameter of {}, with 95 % intervals", study.name),
+        paragraph(
+            "WN: white noise; GM: first-order Gauss-Markov process (β its rate, τ = 1/β its correlation "
+            "time, σ² its variance); RW: random walk; QN: quantisation noise. Ratio: the second regime's "
+            "parameter over the first's.") +
+            parameter_table(run, fits, study.name, regimes) + left_out(run, study.name) +
+            fit_warnings(fits, study.name));
   }
   return section;
 }

@@ -58,7 +58,7 @@ Html absent_models(const RunFiles& run, const std::string& imu) {
 }  // namespace
 
 Html outages_section(const RunFiles& run) {
-  Html section = element("h2", text("Does it matter? Coasting through GNSS outages"));
+  Html section = heading("outages", "Does it matter? Coasting through GNSS outages");
   if (run.evaluation.is_null()) {
     return section + paragraph(
                          "No evaluation.json in this run: `imuscope evaluate` on this folder puts the "

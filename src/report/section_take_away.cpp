@@ -5,6 +5,7 @@
 #include "noise/export.h"
 #include "noise/json.h"
 #include "noise/quantities.h"
+#include "report/data_sheet_table.h"
 #include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
@@ -19,20 +20,6 @@ constexpr std::pair<noise::ExportFormat, const char*> kFormats[] = {
     {noise::ExportFormat::kRos, "ros"},
     {noise::ExportFormat::kPx4, "px4"},
     {noise::ExportFormat::kKfGins, "kf-gins"}};
-
-/// The fits of one sensor in one regime that can be exported.
-std::vector<noise::AxisFit> axis_fits(const RunFiles& run, const std::string& imu,
-                                      const std::string& regime) {
-  std::vector<noise::AxisFit> fits;
-  for (const json& entry : run.models) {
-    if (text_at(entry, "name") != imu || text_at(entry, "regime") != regime) continue;
-    auto fit = noise::fit_from_json(entry);
-    const auto unit = noise::parse_unit(text_at(entry, "unit"));
-    if (fit && unit)
-      fits.push_back({text_at(entry, "axis"), *unit, std::move(*fit), noise::fitted_to_words(entry)});
-  }
-  return fits;
-}
 
 /// "deg/√h" for "deg/sqrt(h)".
 std::string with_roots(const std::string& unit) {
@@ -96,7 +83,7 @@ Html exports(const std::vector<noise::AxisFit>& fits) {
 }  // namespace
 
 Html take_away_section(const RunFiles& run, const std::vector<Fit>& all_fits) {
-  Html section = element("h2", text("Models to take away"));
+  Html section = heading("take-away", "Models to take away");
   if (!run.models.is_array() || run.models.empty()) {
     return section + paragraph("No noise model in this run: there is nothing to take away.");
   }
@@ -108,8 +95,8 @@ Html take_away_section(const RunFiles& run, const std::vector<Fit>& all_fits) {
     for (const std::string& regime : particular_regimes(regimes_of(all_fits))) {
       const auto fits = axis_fits(run, study.name, regime);
       if (fits.empty()) continue;
-      section += element("h3", text(study.name + ", " + (regime.empty() ? "all" : regime))) +
-                 quantity_table(fits) + exports(fits);
+      section +=
+          fold(study.name + ", " + (regime.empty() ? "all" : regime), quantity_table(fits) + exports(fits));
     }
   }
   return section;

@@ -1,6 +1,6 @@
 #pragma once
 
-/// The sections of the page below its summary, in their order. Each draws only what the run folder holds and
+/// The sections of the page, in their order. Each draws only what the run folder holds and
 /// says what it has not.
 
 #include "report/figures.h"
@@ -10,6 +10,9 @@
 
 namespace imuscope::report {
 
+/// Verdicts, the mounting as a drawing, the noise beside its data sheet, whether the predictions hold, what
+/// to do next.
+Html summary_section(const RunFiles& run, const std::vector<Fit>& fits);
 /// Map, speed and height.
 Html drive_section(const RunFiles& run, FigureSheet& figures);
 /// Mounting tables with sd and, where known, the truth; Figure 1.

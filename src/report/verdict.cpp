@@ -253,42 +253,6 @@ void model_steps(const RunFiles& run, const std::vector<Fit>& fits, std::vector<
   }
 }
 
-const char* css_class_of(Answer answer) {
-  switch (answer) {
-    case Answer::kYes:
-      return "answer yes";
-    case Answer::kPartly:
-      return "answer partly";
-    case Answer::kNo:
-      return "answer no";
-    case Answer::kOpen:
-      break;
-  }
-  return "answer unknown";
-}
-
-Html list_of(const std::vector<std::string>& sentences) {
-  Html items;
-  for (const std::string& sentence : sentences) items += element("li", text(sentence));
-  return element("ul", items);
-}
-
-Html verdict_block(const std::string& question, const Verdict& verdict) {
-  return element(
-      "div",
-      element("h3", text(question)) + paragraph(verdict.headline, "headline") + list_of(verdict.reasons),
-      css_class_of(verdict.answer));
-}
-
-/// The sentences of what the look at the data found, of one degree of harm.
-std::vector<std::string> findings_of(const RunFiles& run, std::string_view harm) {
-  std::vector<std::string> sentences;
-  for (const auto& finding : field(run.run, "findings")) {
-    if (text_at(finding, "harm") == harm) sentences.push_back(text_at(finding, "text"));
-  }
-  return sentences;
-}
-
 /// Nothing is usable that was made of data or a configuration that are wrong.
 void judge_by_findings(const RunFiles& run, Verdict& verdict) {
   const auto wrong = findings_of(run, "wrong");
@@ -301,23 +265,15 @@ void judge_by_findings(const RunFiles& run, Verdict& verdict) {
   }
 }
 
-/// What is wrong with the data, before anything that was made of them; nothing where nothing harms.
-Html findings_block(const RunFiles& run) {
-  const auto wrong = findings_of(run, "wrong");
-  const auto limits = findings_of(run, "limits");
-  Html block;
-  if (!wrong.empty()) {
-    block += element("div",
-                     element("h3", text("What is wrong with the data or the configuration")) + list_of(wrong),
-                     css_class_of(Answer::kNo));
-  }
-  if (!limits.empty())
-    block += element("div", element("h3", text("What limits the results")) + list_of(limits),
-                     css_class_of(Answer::kPartly));
-  return block;
-}
-
 }  // namespace
+
+std::vector<std::string> findings_of(const RunFiles& run, std::string_view harm) {
+  std::vector<std::string> sentences;
+  for (const auto& finding : field(run.run, "findings")) {
+    if (text_at(finding, "harm") == harm) sentences.push_back(text_at(finding, "text"));
+  }
+  return sentences;
+}
 
 Verdict calibration_verdict(const RunFiles& run) {
   Verdict verdict;
@@ -383,9 +339,8 @@ Verdict model_verdict(const std::vector<Fit>& all_fits) {
     verdict.headline = fmt::format("Cannot be said: none of the {} models could be tested.", fits.size());
   } else if (rejected.empty()) {
     verdict.answer = vague.empty() ? Answer::kYes : Answer::kPartly;
-    verdict.headline = vague.empty()
-                           ? "Yes: the data contradict none of the models."
-                           : "The data contradict none of the models, but not every parameter can be told.";
+    verdict.headline = vague.empty() ? "Yes: not contradicted by the data."
+                                     : "Not contradicted, but not every parameter can be told.";
   } else {
     verdict.answer = rejected.size() == tested.size() ? Answer::kNo : Answer::kPartly;
     verdict.headline =
@@ -427,7 +382,7 @@ std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>&
     model_steps(run, fits, steps);
   }
   if (const std::size_t n = field(run.run, "warnings").size(); n > 0) {
-    steps.push_back(fmt::format("Read the warnings of the run ({}) under “How this was made”.", n));
+    steps.push_back(fmt::format("Read the warnings of the run ({}) under “Warnings”.", n));
   }
   if (steps.empty()) {
     steps.emplace_back(
@@ -436,27 +391,6 @@ std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>&
         "run, ready for a filter.");
   }
   return steps;
-}
-
-Html summary_section(const RunFiles& run, const std::vector<Fit>& fits) {
-  Html section = element("h2", text("In short"));
-  section += findings_block(run);
-  section += verdict_block("Is the calibration usable?", calibration_verdict(run));
-  section += verdict_block("Is the noise model adequate?", model_verdict(fits));
-  if (!run.comparison.is_null())
-    section += verdict_block("Do rest and motion differ?", difference_verdict(run));
-  if (!run.evaluation.is_null())
-    section += verdict_block("Does it matter which model a filter holds?", outage_verdict(run));
-  section +=
-      element("div", element("h3", text("What to do next")) + list_of(next_steps(run, fits)), "answer next");
-  section += paragraph(
-      fmt::format(
-          "Usable means: an sd of at most {:g} deg for the boresight, {:g} mm for the lever arm and {:g} ms "
-          "for the time offset, so that what is left disturbs the error signals less than an automotive MEMS "
-          "sensor's own noise in a roundabout.",
-          kUsableBoresightSd_deg, kUsableLeverArmSd_mm, kUsableTimeOffsetSd_ms),
-      "note");
-  return section;
 }
 
 }  // namespace imuscope::report

@@ -3,10 +3,10 @@
 /// What the numbers mean, in words: the head of the report.
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "report/fits.h"
-#include "report/html.h"
 #include "report/run_files.h"
 
 namespace imuscope::report {
@@ -36,7 +36,7 @@ Verdict outage_verdict(const RunFiles& run);
 /// What to do next; never empty.
 std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>& fits);
 
-/// All of them as the first section of the page.
-Html summary_section(const RunFiles& run, const std::vector<Fit>& fits);
+/// What the look at the data found, of one degree of harm: "wrong", "limits".
+std::vector<std::string> findings_of(const RunFiles& run, std::string_view harm);
 
 }  // namespace imuscope::report

@@ -27,6 +27,14 @@ bool is_known(const FitParameter& parameter) {
   return parameter.value && parameter.ci_low && parameter.ci_high && *parameter.ci_low > 0.0;
 }
 
+/// How far a value may be off, from half the interval of its logarithm.
+std::string width_words(double half_width) {
+  // A percentage says less than a factor where up and down are no longer alike.
+  constexpr double kFactorFrom = 0.4;
+  return half_width < kFactorFrom ? fmt::format("± {:.2g} %", 100.0 * half_width)
+                                  : fmt::format("within a factor of {:.2g}", std::exp(half_width));
+}
+
 /// White noise of one kind of sensor in one regime, over all S-IMUs and axes, as the sd of a sample.
 struct WhiteNoise {
   std::size_t n = 0;
@@ -53,10 +61,10 @@ struct WhiteNoise {
     if (known == 0) return fmt::format("{}: of none of {} axes", sensors, n);
     std::vector<double> sorted = half_widths;
     std::sort(sorted.begin(), sorted.end());
-    std::string width = fmt::format("± {:.2g} %", 100.0 * sorted[sorted.size() / 2]);
+    std::string width = width_words(sorted[sorted.size() / 2]);
     constexpr double kUneven = 2.0;
     if (sorted.back() > kUneven * sorted[sorted.size() / 2])
-      width += fmt::format(" in the middle, ± {:.2g} % at worst", 100.0 * sorted.back());
+      width += fmt::format(" in the middle, {} at worst", width_words(sorted.back()));
     const std::string range = fmt::format("{:.3g}", lowest) == fmt::format("{:.3g}", highest)
                                   ? fmt::format("{:.3g}", lowest)
                                   : fmt::format("{:.3g} to {:.3g}", lowest, highest);

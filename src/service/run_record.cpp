@@ -45,6 +45,19 @@ nlohmann::json time_budget_json(const TimeBudget& budget) {
           {"sd_t_d_s", known(budget.sd_t_d_s)}};
 }
 
+/// What the maker says of an S-IMU, as the configuration has it; null where it says nothing.
+nlohmann::json data_sheet_json(const DataSheetConfig& sheet) {
+  nlohmann::json json = nlohmann::json::object();
+  const auto say = [&](const char* key, const std::optional<double>& value, double unit) {
+    if (value) json[key] = *value / unit;
+  };
+  say("gyro_density_degps_per_sqrt_hz", sheet.gyro_density_radps_per_sqrt_hz, kRadPerDeg);
+  say("gyro_bias_stability_deg_per_h", sheet.gyro_bias_stability_radps, kRadPerDeg / kSecondsPerHour);
+  say("accel_density_ug_per_sqrt_hz", sheet.accel_density_mps2_per_sqrt_hz, kMps2PerMicroG);
+  say("accel_bias_stability_ug", sheet.accel_bias_stability_mps2, kMps2PerMicroG);
+  return json.empty() ? nlohmann::json(nullptr) : json;
+}
+
 nlohmann::json device_json(const RunRecord& run, std::size_t i) {
   const auto& device = run.configuration.devices[i];
   const DeviceRecord& record = run.devices[i];
@@ -77,6 +90,7 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
     entry["late"] = study.late + study.refused_full;
     entry["waiting"] = study.waiting;
   }
+  if (device.role == DeviceRole::kStudy) entry["data_sheet"] = data_sheet_json(device.data_sheet);
   if (record.time_budget) entry["time_budget"] = time_budget_json(*record.time_budget);
   return entry;
 }

@@ -27,6 +27,7 @@ using test::content_of;
 
 constexpr const char* kBrowser = "/usr/bin/chromium";
 constexpr const char* kGnuplot = "/usr/bin/gnuplot";
+constexpr const char* kPdfToText = "/usr/bin/pdftotext";
 
 /// What `command` writes to its standard output.
 std::string output_of(const std::string& command) {
@@ -47,6 +48,7 @@ struct Measured {
   int places = 0;   ///< for figures
   int blank = 0;    ///< of them without ink
   int figures = 0;  ///< drawn, by the page's own count
+  int folded = 0;   ///< height before all folds were opened
   std::string console;
 };
 
@@ -84,13 +86,17 @@ class Browser : public testing::Test {
 const frame = document.getElementById('page');
 frame.onload = () => setTimeout(() => {
   const page = frame.contentDocument;
+  const folded = page.documentElement.scrollHeight;
+  page.querySelectorAll('details').forEach((fold) => { fold.open = true; });
+  setTimeout(() => {
   const hasInk = (canvas) => canvas.width > 0 && canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data
       .some((value, i) => i % 4 === 3 && value > 0);
   const places = [...page.querySelectorAll('.plot')];
   const blank = places.filter((place) => !place.querySelector('svg') &&
                                          ![...place.querySelectorAll('canvas')].some(hasInk)).length;
   document.body.dataset.measured = [page.documentElement.scrollWidth, page.documentElement.scrollHeight,
-                                    places.length, blank, page.body.dataset.figuresDrawn].join(' ');
+                                    places.length, blank, page.body.dataset.figuresDrawn, folded].join(' ');
+  }, 1000);
 }, 500);
 </script>)";
     return file;
@@ -111,13 +117,14 @@ frame.onload = () => setTimeout(() => {
         output_of(command("--virtual-time-budget=20000 --dump-dom", frame_of(width, 1000), console));
     Measured out;
     std::smatch found;
-    const std::regex pattern("data-measured=\"(\\d+) (\\d+) (\\d+) (\\d+) (\\d+)\"");
+    const std::regex pattern("data-measured=\"(\\d+) (\\d+) (\\d+) (\\d+) (\\d+) (\\d+)\"");
     if (std::regex_search(page, found, pattern)) {
       out.width = std::stoi(found[1]);
       out.height = std::stoi(found[2]);
       out.places = std::stoi(found[3]);
       out.blank = std::stoi(found[4]);
       out.figures = std::stoi(found[5]);
+      out.folded = std::stoi(found[6]);
     }
     out.console = console_of(console);
     return out;
@@ -135,6 +142,9 @@ TEST_F(Browser, AtDesktopAndPhoneWidthNothingSticksOutEveryFigureHasInkAndTheCon
     EXPECT_EQ(page.figures, 70) << width;
     EXPECT_EQ(page.places, 71) << width;
     EXPECT_EQ(page.blank, 0) << width;
+    if (width == 1280) {
+      EXPECT_LT(page.folded, 12'000) << "what is normal is folded away";
+    }
     EXPECT_EQ(page.console, "") << width;
     // A picture of all of it stays to be looked at.
     const auto picture = folder_ / ("page_" + std::to_string(width) + ".png");
@@ -255,7 +265,8 @@ frame.onload = () => {
   setTimeout(() => {
     const page = frame.contentDocument;
     const foreign = [...page.querySelectorAll('*')].filter((element) =>
-        /^(img|iframe|object|embed|base|link|form|input|video|audio|math|template|a)$/i.test(element.tagName) && !(element.tagName === 'INPUT' && element.closest('.plot')) ||
+        /^(img|iframe|object|embed|base|link|form|input|video|audio|math|template|a)$/i.test(element.tagName) && !(element.tagName === 'INPUT' && element.closest('.plot')) &&
+            !element.matches('nav.contents > a[href^="#"]') ||
         [...element.attributes].some((attribute) => /^on|^srcdoc$/i.test(attribute.name)));
     const words = page.body.textContent;
     const shown = Array.from({length: 200}, (_, i) => i).filter((i) => words.includes('pwned(' + i + ')')).length;
@@ -303,6 +314,20 @@ TEST_F(Browser, PrintsAsPdf) {
   const std::string content = content_of(pdf);
   EXPECT_EQ(content.rfind("%PDF", 0), 0U);
   EXPECT_GT(content.size(), 100'000U);
+  // What is open on the screen is on eight pages at most, and behind them what is folded.
+  if (!std::filesystem::exists(kPdfToText))
+    GTEST_SKIP() << "needs " << kPdfToText << " (Debian package poppler-utils)";
+  int before_appendix = 0;
+  int pages = 0;
+  bool found = false;
+  std::istringstream text(output_of(std::string(kPdfToText) + " '" + pdf.string() + "' -"));
+  for (std::string page; std::getline(text, page, '\f'); ++pages) {
+    found = found || page.find("Appendix\n") != std::string::npos;
+    if (!found) ++before_appendix;
+  }
+  EXPECT_TRUE(found);
+  EXPECT_LE(before_appendix, 8);
+  EXPECT_GT(pages, before_appendix + 2) << "the appendix has all that is folded";
 }
 
 TEST(PaperFigures, AreDrawnAsSvgAndPdfAndWhatIsMissingIsLeftOut) {

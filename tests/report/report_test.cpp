@@ -63,11 +63,11 @@ std::string markup_of(const std::string& page) {
 
 /// Names of elements left open or closed out of order; empty for well-formed markup.
 std::string nesting_fault(const std::string& markup) {
-  static const std::regex kTag("<(/?)([a-z][a-z0-9]*)([^<>]*)>");
+  static const std::regex kTag("<(/?)([a-z][a-z0-9]*)([^<>]*?)(/?)>");
   std::vector<std::string> open;
   for (std::sregex_iterator tag(markup.begin(), markup.end(), kTag), end; tag != end; ++tag) {
     const std::string name = (*tag)[2];
-    if (name == "meta" || name == "br") continue;
+    if (name == "meta" || name == "br" || (*tag)[4] == "/") continue;
     if ((*tag)[1] == "/") {
       if (open.empty() || open.back() != name)
         return "</" + name + "> does not close " + (open.empty() ? "anything" : open.back());
@@ -82,7 +82,14 @@ std::string nesting_fault(const std::string& markup) {
 nlohmann::json figures_of(const std::string& page) {
   const std::string mark = "id=\"figures\">";
   const std::size_t begin = page.find(mark) + mark.size();
-  return nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin), nullptr, false);
+  const auto sheet =
+      nlohmann::json::parse(page.substr(begin, page.find("</script>", begin) - begin), nullptr, false);
+  return sheet.is_discarded() ? sheet : sheet.at("figures");
+}
+
+/// Time of value `i` of a figure.
+double time_of(const nlohmann::json& figure, std::size_t i) {
+  return figure["times"][0].get<double>() + static_cast<double>(i) * figure["times"][1].get<double>();
 }
 
 TEST(Report, PageIsWellFormedAndHoldsEverySImu) {
@@ -120,7 +127,9 @@ TEST(Report, EveryFigureThatThePageNamesIsInTheSheetOnce) {
 TEST(Report, ThePageLoadsNothing) {
   const std::string page = page_of(test::SyntheticRun{});
   const std::string markup = markup_of(page);
-  EXPECT_FALSE(std::regex_search(markup, std::regex("\\s(src|href|action|data|poster|srcset)\\s*=")));
+  EXPECT_FALSE(std::regex_search(markup, std::regex("\\s(src|action|data|poster|srcset)\\s*=")));
+  EXPECT_FALSE(std::regex_search(markup, std::regex("\\shref\\s*=\\s*\"[^#]")))
+      << "links lead within the page only";
   EXPECT_FALSE(holds(markup, "<link"));
   EXPECT_FALSE(holds(markup, "http:"));
   EXPECT_FALSE(holds(markup, "https:"));
@@ -159,11 +168,11 @@ TEST(Report, ClosingScriptTagsInJsonCannotEndTheScript) {
   EXPECT_EQ(report::json_for_script("{\"a\":\"</script>\"}"), "{\"a\":\"\\u003c/script>\"}");
 }
 
-TEST(Report, FifteenMinutesOfThreeSensorsStayBelowThreeMegabytes) {
+TEST(Report, FifteenMinutesOfThreeSensorsStayBelowOneAndAHalfMegabytes) {
   test::SyntheticRun options;
   options.duration_s = 900.0;
   options.names = {"mtx1", "mtx2", "mtx3"};
-  EXPECT_LT(page_of(options).size(), 3'000'000U);
+  EXPECT_LT(page_of(options).size(), 1'500'000U);
 }
 
 TEST(Report, ErrorFigureShowsTheExtremesOfTheSamples) {
@@ -188,7 +197,7 @@ TEST(Report, ErrorFigureShowsTheExtremesOfTheSamples) {
 TEST(Report, WheelsOfADriveWithOdometryAreDrawnAndSummedUp) {
   const auto folder = test::scratch_folder();
   test::write_synthetic_run(folder, {});
-  EXPECT_FALSE(holds(page_of(folder), "Odometry")) << "without odometry nothing is said of it";
+  EXPECT_FALSE(holds(page_of(folder), "<h3>Odometry")) << "without odometry nothing is said of it";
   // 60 s at 10 Hz: 20 s standing, the last 15 of them used; the scale goes from 0 to 1.2 %.
   std::ofstream out(folder / "odometry.csv");
   out << "time_s,speed_mps,standing,zero_velocity,scale_percent,sd_scale_percent\n";
@@ -206,7 +215,7 @@ TEST(Report, WheelsOfADriveWithOdometryAreDrawnAndSummedUp) {
   for (const auto& figure : figures_of(page)) {
     if (figure["id"] != "wheel_speed" && figure["id"] != "wheel_scale") continue;
     ++found;
-    EXPECT_GT(figure["times"].size(), 100U);
+    EXPECT_GT(figure["mid"].size(), 100U);
   }
   EXPECT_EQ(found, 2);
 }
@@ -222,7 +231,7 @@ TEST(Report, ALiveRunHasABudgetOfTimeForEachDevice) {
   std::ofstream(folder / "run.json") << run;
   const std::string page = page_of(folder);
   for (const char* cell : {"3.733", "16", "9.80", "21", "-4.800", "–"})
-    EXPECT_TRUE(holds(page, std::string("<td>") + cell + "</td>")) << cell;
+    EXPECT_TRUE(holds(page, std::string("\">") + cell + "</td>")) << cell;
   EXPECT_EQ(nesting_fault(markup_of(page)), "");
 }
 
@@ -232,8 +241,8 @@ TEST(Report, AGapInTheErrorsIsAGapInTheFigure) {
   options.gap_end_s = 40.0;
   for (const auto& figure : figures_of(page_of(options))) {
     if (figure["id"] != "error-gyro_x-mtx1") continue;
-    for (std::size_t i = 0; i < figure["times"].size(); ++i) {
-      const double time_s = figure["times"][i];
+    for (std::size_t i = 0; i < figure["mid"].size(); ++i) {
+      const double time_s = time_of(figure, i);
       if (time_s > 21.0 && time_s < 39.0) {
         EXPECT_TRUE(figure["mid"][i].is_null()) << time_s;
       }
@@ -249,7 +258,7 @@ TEST(Report, AGapInTheErrorsIsAGapInTheFigure) {
 TEST(Report, GyroscopeModelsAreShownInDegrees) {
   // The made-up static WN sigma2 is 0.5055 (deg/s)^2, written in (rad/s)^2.
   const std::string page = page_of(test::SyntheticRun{});
-  EXPECT_TRUE(holds(page, "<td>(deg/s)²</td><td>0.5055 "));
+  EXPECT_TRUE(std::regex_search(page, std::regex("<td[^>]*>\\(deg/s\\)²</td><td[^>]*>0.5055 ")));
   // Other tools' configurations are in their own units.
   EXPECT_FALSE(holds(std::regex_replace(page, std::regex("<pre>[^<]*</pre>"), ""), "(rad/s)"));
 }

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include "report/sections.h"
+
 #include "tests/report/synthetic_run.h"
 #include "tests/support/shared_data.h"
 
