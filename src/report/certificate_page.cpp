@@ -11,7 +11,6 @@
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "base/units.h"
-#include "report/assets.h"
 #include "report/certificate_figures.h"
 #include "report/grouped.h"
 #include "report/html.h"
@@ -207,18 +206,7 @@ std::string page_of(const json& certificate, const CertificateFigures& figures) 
   body += paragraph(fmt::format("Made by imuscope {} at {}.", text_at(certificate, "version"),
                                 text_at(certificate, "made_utc")),
                     "quiet");
-  std::string page =
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
-      "form-action 'none'; "
-      "style-src 'unsafe-inline'; img-src data:\">\n<meta name=\"color-scheme\" content=\"light "
-      "dark\">\n<title>";
-  page += text(text_at(certificate, "sensor")).str();
-  page += "</title>\n<style>\n";
-  page += page_style();
-  page += "</style>\n</head>\n<body>\n<main>\n" + body.str() + "\n</main>\n</body>\n</html>\n";
-  return page;
+  return page_without_script(text_at(certificate, "sensor"), body);
 }
 
 }  // namespace

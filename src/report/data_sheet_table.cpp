@@ -85,12 +85,14 @@ Range range_of(const std::vector<noise::AxisFit>& fits, const Term& term) {
 }
 
 /// "within", "1.4 times": the worst axis over the sheet's number, in the regime that a sheet is about, rest.
+/// A bound tells only where it is below.
 Html comparison_cell(const Range& range, std::optional<double> sheet) {
-  if (!sheet || !(*sheet > 0.0) || range.n == 0 || range.bounds == range.n) return text(kUnknown);
+  if (!sheet || !(*sheet > 0.0) || range.n == 0) return text(kUnknown);
   // Sheets give typical values; a unit within a tenth of them is as typical as can be told.
   constexpr double kTypical = 1.1;
   const double ratio = range.highest / *sheet;
   if (ratio <= kTypical) return element("strong", text("within"), "yes");
+  if (range.bounds > 0) return text(kUnknown);
   return element("strong", text(fmt::format("{:.2g} times", ratio)), "partly");
 }
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
+#include "report/assets.h"
+
 namespace imuscope::report {
 
 Html text(std::string_view any) {
@@ -130,6 +132,17 @@ Html svg_image(const std::string& svg, std::string_view words) {
   base64.resize(static_cast<std::size_t>(length));
   return Html::markup(fmt::format("<img class=\"drawn\" alt=\"{}\" src=\"data:image/svg+xml;base64,{}\">",
                                   text(words).str(), base64));
+}
+
+std::string page_without_script(std::string_view title, const Html& body) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
+      "form-action 'none'; style-src 'unsafe-inline'; img-src data:\">\n"
+      "<meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n<style>\n{}</style>\n</head>\n"
+      "<body>\n<main>\n{}\n</main>\n</body>\n</html>\n",
+      text(title).str(), page_style(), body.str());
 }
 
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class) {

@@ -71,6 +71,9 @@ class Table {
 /// @param words  what it shows, for those who do not see it
 Html svg_image(const std::string& svg, std::string_view words);
 
+/// A whole page that runs no script and loads nothing, in the style of all pages.
+std::string page_without_script(std::string_view title, const Html& body);
+
 /// A place where page.js draws the figure `id`, with what it shows in words below it.
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class = {});
 

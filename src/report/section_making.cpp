@@ -129,34 +129,40 @@ Html time_budget(const nlohmann::json& devices) {
 
 }  // namespace
 
-Html health_section(const RunFiles& run) {
-  Html section = heading("health", "Health of the devices");
-  if (run.run.is_null()) return section + paragraph(kNoRunFile);
+Html device_table(const RunFiles& run) {
   const auto& devices = field(run.run, "devices");
   const auto columns = columns_of(devices);
   std::vector<Html> headings{text("device"), text("role"), text("protocol")};
   for (const Column& column : columns) headings.push_back(text(column.heading));
   Table table(std::move(headings));
-  Html problems;
   for (const auto& device : devices) {
     std::vector<Html> row{text(text_at(device, "name")), text(text_at(device, "role")),
                           text(text_at(device, "protocol"))};
     for (const Column& column : columns) row.push_back(count(number_at(device, column.key)));
     table.add_row(std::move(row));
-    for (const char* key : {"problem", "clock"}) {
-      const std::string words = text_at(device, key);
-      if (!words.empty()) problems += element("li", text(text_at(device, "name") + ": " + words));
-    }
   }
-  if (!problems.empty()) problems = element("ul", problems);
-  if (table.empty()) return section + paragraph("run.json names no device.");
-  return section + table.html() +
+  if (table.empty()) return paragraph("run.json names no device.");
+  return table.html() +
          paragraph(
              "Of what is not listed (skipped bytes, wrong checksums, lost, refused and late samples, "
-             "restarts of "
-             "clocks) no device had any.",
-             "note") +
-         problems + time_budget(devices);
+             "restarts of clocks) no device had any.",
+             "note");
+}
+
+Html health_section(const RunFiles& run) {
+  Html section = heading("health", "Health of the devices");
+  if (run.run.is_null()) return section + paragraph(kNoRunFile);
+  std::vector<std::string> remarks;
+  for (const auto& device : field(run.run, "devices")) {
+    for (const char* key : {"problem", "clock"}) {
+      const std::string words = text_at(device, key);
+      if (!words.empty()) remarks.push_back(text_at(device, "name") + ": " + words);
+    }
+  }
+  std::vector<std::string> names;
+  for (const auto& device : field(run.run, "devices")) names.push_back(text_at(device, "name"));
+  return section + device_table(run) + list_of(grouped_by_name(remarks, names)) +
+         time_budget(field(run.run, "devices"));
 }
 
 Html making_section(const RunFiles& run) {

@@ -16,38 +16,12 @@ namespace {
 
 using nlohmann::json;
 
-const char* css_class_of(Answer answer) {
-  switch (answer) {
-    case Answer::kYes:
-      return "yes";
-    case Answer::kPartly:
-      return "partly";
-    case Answer::kNo:
-      return "no";
-    case Answer::kOpen:
-      break;
-  }
-  return "unknown";
-}
-
 /// A question, its answer, and behind a click why.
 Html tile(const std::string& question, const Verdict& verdict) {
   Html why = verdict.reasons.empty() ? Html{} : fold("Why", list_of(verdict.reasons));
   return element("div",
                  element("h3", text(question)) + paragraph(verdict.headline, "headline") + std::move(why),
                  std::string("tile ") + css_class_of(verdict.answer));
-}
-
-Verdict data_verdict(const RunFiles& run) {
-  Verdict verdict;
-  const std::size_t wrong = findings_of(run, "wrong").size();
-  const std::size_t limits = findings_of(run, "limits").size();
-  verdict.answer = wrong > 0 ? Answer::kNo : limits > 0 ? Answer::kPartly : Answer::kYes;
-  verdict.headline = wrong > 0
-                         ? fmt::format("No: {} {} wrong.", wrong, wrong == 1 ? "thing is" : "things are")
-                     : limits > 0 ? fmt::format("Yes, with {} limit{}.", limits, limits == 1 ? "" : "s")
-                                  : "Yes: nothing wrong was found.";
-  return verdict;
 }
 
 /// What is wrong with the data, before anything that was made of them; nothing where nothing harms.

@@ -27,6 +27,8 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
 Html dependence_section(const RunFiles& run, FigureSheet& figures);
 /// What the models are worth in GNSS outages.
 Html outages_section(const RunFiles& run);
+/// What came from each device, and what went wrong with it.
+Html device_table(const RunFiles& run);
 /// Health of the devices.
 Html health_section(const RunFiles& run);
 /// Configuration, versions, inputs, warnings, absent files.

@@ -275,6 +275,32 @@ std::vector<std::string> findings_of(const RunFiles& run, std::string_view harm)
   return sentences;
 }
 
+const char* css_class_of(Answer answer) {
+  switch (answer) {
+    case Answer::kYes:
+      return "yes";
+    case Answer::kPartly:
+      return "partly";
+    case Answer::kNo:
+      return "no";
+    case Answer::kOpen:
+      break;
+  }
+  return "unknown";
+}
+
+Verdict data_verdict(const RunFiles& run) {
+  Verdict verdict;
+  const std::size_t wrong = findings_of(run, "wrong").size();
+  const std::size_t limits = findings_of(run, "limits").size();
+  verdict.answer = wrong > 0 ? Answer::kNo : limits > 0 ? Answer::kPartly : Answer::kYes;
+  verdict.headline = wrong > 0
+                         ? fmt::format("No: {} {} wrong.", wrong, wrong == 1 ? "thing is" : "things are")
+                     : limits > 0 ? fmt::format("Yes, with {} limit{}.", limits, limits == 1 ? "" : "s")
+                                  : "Yes: nothing wrong was found.";
+  return verdict;
+}
+
 Verdict calibration_verdict(const RunFiles& run) {
   Verdict verdict;
   if (run.studies.empty()) {

@@ -23,6 +23,11 @@ struct Verdict {
 /// Level of the tests.
 inline constexpr double kTestLevel = 0.05;
 
+/// The class that page.css colours it by: "yes", "partly", "no", "unknown".
+const char* css_class_of(Answer answer);
+
+/// Is something wrong with data or configuration, by what the look at the data found?
+Verdict data_verdict(const RunFiles& run);
 Verdict calibration_verdict(const RunFiles& run);
 Verdict model_verdict(const std::vector<Fit>& fits);
 /// Which parts of the models the data determine, and how well.

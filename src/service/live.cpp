@@ -275,18 +275,11 @@ Result<void> check_lines(const Configuration& configuration) {
   return {};
 }
 
-}  // namespace
-
-Result<void> run_live(const Configuration& configuration, const LiveOptions& wanted, LiveSignals& signals) {
-  if (auto checked = check_lines(configuration); !checked) return checked;
+/// @param retain  remove old runs beside options.out, where [record] says so
+Result<void> run_into(const Configuration& configuration, const LiveOptions& options, bool retain,
+                      LiveSignals& signals) {
   const auto spec = noise::parse_model(configuration.noise.model);
   if (!spec) return tl::unexpected<Error>(spec.error());
-  LiveOptions options = wanted;
-  if (options.out.empty()) {
-    auto made = make_new_folder(options.parent, configuration.run_name, std::chrono::system_clock::now());
-    if (!made) return tl::unexpected<Error>(made.error());
-    options.out = std::move(*made);
-  }
   if (auto checked = check_folder(options.out); !checked) return checked;
   if (auto sized = set_thread_stack_size(kThreadStackBytes); !sized) spdlog::warn("{}", sized.error().text());
 
@@ -336,7 +329,7 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
   const RunLock lock(options.out);
   // Of a run whose folder somebody named, the folder of [record] is none of its business.
   std::optional<Retention> retention;
-  if (wanted.out.empty()) retention.emplace(options.parent, configuration.record);
+  if (retain) retention.emplace(options.parent, configuration.record);
   const Doors doors(configuration.metrics, (*publisher)->board());
   spdlog::info("running '{}' into {}; Ctrl-C ends it", configuration.run_name, options.out.string());
   SystemdNotify systemd;
@@ -395,6 +388,22 @@ Result<void> run_live(const Configuration& configuration, const LiveOptions& wan
                (*recorder)->status().path.string(), static_cast<double>((*recorder)->status().bytes) * 1e-6,
                (*recorder)->status().path.string());
   return {};
+}
+
+}  // namespace
+
+Result<std::filesystem::path> run_live(const Configuration& configuration, const LiveOptions& wanted,
+                                       LiveSignals& signals) {
+  if (auto checked = check_lines(configuration); !checked) return tl::unexpected<Error>(checked.error());
+  LiveOptions options = wanted;
+  if (options.out.empty()) {
+    auto made = make_new_folder(options.parent, configuration.run_name, std::chrono::system_clock::now());
+    if (!made) return tl::unexpected<Error>(made.error());
+    options.out = std::move(*made);
+  }
+  if (auto done = run_into(configuration, options, wanted.out.empty(), signals); !done)
+    return tl::unexpected<Error>(done.error());
+  return options.out;
 }
 
 }  // namespace imuscope

@@ -40,9 +40,10 @@ struct LiveSignals {
 static_assert(std::atomic<bool>::is_always_lock_free);
 
 /// Runs until signals.stop becomes true, its terminal is closed, or for options.duration_s. Ends cleanly:
-/// what had arrived is estimated, recorded, published and written. Errors: a device of the configuration has
-/// no line, the run folder already holds a recording, the run's name cannot name a folder (kUsage); the run
-/// folder or the capture cannot be made, no device ever answered (kWork).
-Result<void> run_live(const Configuration& configuration, const LiveOptions& options, LiveSignals& signals);
+/// what had arrived is estimated, recorded, published and written. Returns the run folder. Errors: a device
+/// of the configuration has no line, the run folder already holds a recording, the run's name cannot name a
+/// folder (kUsage); the run folder or the capture cannot be made, no device ever answered (kWork).
+Result<std::filesystem::path> run_live(const Configuration& configuration, const LiveOptions& options,
+                                       LiveSignals& signals);
 
 }  // namespace imuscope

@@ -343,6 +343,7 @@ void LivePublisher::on_error(const ErrorRecord& record) {
 
 void LivePublisher::on_snapshot(const Snapshot& snapshot) {
   last_ = snapshot;
+  if (const auto line = minute_line_.look(snapshot)) spdlog::info("{}", *line);
   folder_->on_snapshot(snapshot);
   broadcast_.on_snapshot(snapshot);
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {

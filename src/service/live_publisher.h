@@ -24,6 +24,7 @@
 #include "service/io_thread.h"
 #include "service/live.h"
 #include "service/live_smoothing.h"
+#include "service/minute_line.h"
 #include "service/modeller.h"
 #include "service/noise_feedback.h"
 #include "service/observability.h"
@@ -115,6 +116,7 @@ class LivePublisher {
   std::vector<NoiseFeedback> feedback_;  ///< per study
   std::int64_t applied_ = 0;
   std::optional<Snapshot> last_;
+  MinuteLine minute_line_{configuration_};
 
   struct DeviceWatch {
     SessionState session = SessionState::kConnecting;

@@ -27,6 +27,8 @@ constexpr double kMentioned = 0.2;
 constexpr double kUnseen = 0.5;
 /// Advice that has not changed is repeated after this time.
 constexpr Duration kAdviceEvery = std::chrono::seconds{60};
+/// One that has changed not before this time.
+constexpr Duration kChangedAdviceAfter = std::chrono::seconds{10};
 
 /// What excites a state on a vehicle (each is confounded with something else without it).
 const char* manoeuvre_for(std::size_t state) {
@@ -165,17 +167,24 @@ std::vector<std::string> ObservabilityWatch::update(const StudyOutput& study) {
   }
   const Observability now = observability_of(study);
   std::vector<std::string> unseen;
+  std::vector<std::string> seen;
   for (std::size_t i = 0; i < kObservedStates; ++i) {
     const StateObservability& state = now.states[i];
     if (state.observable && !observable_[i])
-      sentences.push_back(fmt::format("{} is observable now ({})", state.words, value_text(state)));
+      seen.push_back(fmt::format("{} ({})", state.words, value_text(state)));
     observable_[i] = state.observable;
     if (!state.observable) unseen.push_back(state.words);
   }
-  const bool due = !started_ || (now.advice != advice_) || study.time >= next_advice_;
+  if (!seen.empty()) sentences.push_back(fmt::format("observable now: {}", fmt::join(seen, ", ")));
+  // A changed advice is told soon, but not each time that two manoeuvres are about as good.
+  const bool changed =
+      now.advice != advice_ && study.time >= next_advice_ - kAdviceEvery + kChangedAdviceAfter;
+  const bool due = !started_ || changed || study.time >= next_advice_;
   if (!unseen.empty() && due) {
-    sentences.push_back(fmt::format("{}: {}; least is known of the {}; {}", kNotObservable,
-                                    fmt::join(unseen, ", "), now.weakest, now.advice));
+    const std::string which =
+        unseen.size() == kObservedStates ? "all of it" : fmt::format("{}", fmt::join(unseen, ", "));
+    sentences.push_back(
+        fmt::format("{}: {}; least is known of the {}; {}", kNotObservable, which, now.weakest, now.advice));
     next_advice_ = study.time + kAdviceEvery;
     advice_ = now.advice;
   }

@@ -102,7 +102,7 @@ TEST(ObservabilityWatch, SpeaksWhenSomethingChangesAndOnceAMinuteWhileSomethingI
   study.sd_psi_rad[2] = 0.5 * kRadPerDeg;
   said = watch.update(study);
   ASSERT_EQ(said.size(), 1U);
-  EXPECT_THAT(said[0], HasSubstr("boresight about down is observable now"));
+  EXPECT_THAT(said[0], HasSubstr("observable now: boresight about down (sd"));
   EXPECT_THAT(watch.update(study), IsEmpty());
 }
 

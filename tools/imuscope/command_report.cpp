@@ -3,28 +3,67 @@
 #include <filesystem>
 #include <memory>
 
+#include "base/output_folder.h"
 #include "commands.h"
 #include "print.h"
+#include "report/comparison_page.h"
 #include "report/paper_figures.h"
 #include "report/report.h"
 
 namespace imuscope::cli {
 
+namespace {
+
+struct ReportCommand {
+  std::vector<std::filesystem::path> runs;
+  std::filesystem::path out = "comparison.html";
+  bool figures = false;
+  bool force = false;
+};
+
+/// Two runs as one page. What stands in its place already is somebody's.
+Result<void> compare_runs(const ReportCommand& options) {
+  if (std::filesystem::exists(options.out) && !options.force) {
+    return usage_error(fmt::format("{} exists", options.out.string()),
+                       "give another --out, or --force to write over it");
+  }
+  const auto page = comparison_page(options.runs[0], options.runs[1]);
+  if (!page) return tl::unexpected<Error>(page.error());
+  const auto parent = options.out.has_parent_path() ? options.out.parent_path() : std::filesystem::path(".");
+  const auto folder = OutputFolder::open(parent);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  if (auto written = folder->write_whole(options.out.filename().string(), *page); !written) return written;
+  say("{}\n", options.out.string());
+  return {};
+}
+
+Result<void> report_of_run(const ReportCommand& options) {
+  const auto& run_dir = options.runs.front();
+  if (auto written = write_report(run_dir); !written) return written;
+  say("{}\n", (run_dir / "report.html").string());
+  if (!options.figures) return {};
+  const auto drawn = write_figures(run_dir);
+  if (!drawn) return tl::unexpected<Error>(drawn.error());
+  for (const auto& file : *drawn) say("{}\n", file.string());
+  return {};
+}
+
+}  // namespace
+
 void add_report(CLI::App& app, Work& chosen) {
-  auto* command = app.add_subcommand("report", "Write report.html from the files of a run folder");
-  auto run_dir = std::make_shared<std::filesystem::path>();
-  command->add_option("RUN_DIR", *run_dir, "Folder that a run wrote with --out")->required();
-  auto figures = std::make_shared<bool>(false);
-  command->add_flag("--figures", *figures,
+  auto* command = app.add_subcommand(
+      "report", "Write report.html from the files of a run folder; of two, a page with both side by side");
+  auto options = std::make_shared<ReportCommand>();
+  command->add_option("RUN_DIR", options->runs, "folder that a run wrote with --out; two to compare them")
+      ->required()
+      ->expected(1, 2);
+  command->add_option("--out,-o", options->out, "page of the comparison (comparison.html)")
+      ->type_name("FILE");
+  command->add_flag("--figures", options->figures,
                     "draw the figures as SVG and PDF for papers, too (RUN_DIR/figures)");
-  on_chosen(*command, chosen, [run_dir, figures]() -> Result<void> {
-    if (auto written = write_report(*run_dir); !written) return written;
-    say("{}\n", (*run_dir / "report.html").string());
-    if (!*figures) return {};
-    const auto drawn = write_figures(*run_dir);
-    if (!drawn) return tl::unexpected<Error>(drawn.error());
-    for (const auto& file : *drawn) say("{}\n", file.string());
-    return {};
+  command->add_flag("--force", options->force, "write over a file that is there");
+  on_chosen(*command, chosen, [options]() -> Result<void> {
+    return options->runs.size() == 2 ? compare_runs(*options) : report_of_run(*options);
   });
 }
 

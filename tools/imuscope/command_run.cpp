@@ -3,6 +3,8 @@
 #include <memory>
 
 #include "commands.h"
+#include "print.h"
+#include "report/report.h"
 #include "service/live.h"
 
 namespace imuscope::cli {
@@ -23,6 +25,7 @@ struct RunCommand {
   std::string config;
   std::string out;
   double seconds = 0.0;
+  bool no_report = false;
 };
 
 Result<void> run(const RunCommand& options) {
@@ -39,7 +42,15 @@ Result<void> run(const RunCommand& options) {
   if (std::signal(SIGHUP, hang_up) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
   // Ctrl-C ends `tee` behind a pipe, too: what is lost then is the log's end and not the run's.
   std::signal(SIGPIPE, SIG_IGN);
-  return run_live(*configuration, live, signals);
+  const auto folder = run_live(*configuration, live, signals);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  if (options.no_report) {
+    say("Results: {}\nReport:  imuscope report {}\n", folder->string(), folder->string());
+    return {};
+  }
+  if (auto written = write_report(*folder); !written) return written;
+  say("Results: {}\nReport:  {}\n", folder->string(), (*folder / "report.html").string());
+  return {};
 }
 
 }  // namespace
@@ -55,6 +66,9 @@ void add_run(CLI::App& app, Work& chosen) {
       ->type_name("DIR");
   command->add_option("--seconds", options->seconds, "end by itself after this time")
       ->check(CLI::Range(kShortestRun_s, kLongestRun_s));
+  command->add_flag(
+      "--no-report", options->no_report,
+      "end without report.html, which takes a while after a long run; `imuscope report` makes it later");
   on_chosen(*command, chosen, [options] { return run(*options); });
 }
 

@@ -14,6 +14,7 @@
 #include "base/json_text.h"
 #include "base/units.h"
 #include "print.h"
+#include "report/grouped.h"
 #include "report/json_file.h"
 
 namespace imuscope::cli {
@@ -184,13 +185,14 @@ void print_devices(const json& devices) {
 }
 
 /// The first of them; a short record can have one for every axis and regime, all of them in the report.
-void print_warnings(const json& warnings) {
+void print_warnings(const json& warnings, const std::vector<std::string>& names) {
   constexpr std::size_t kPrintedMax = 8;
-  const std::size_t printed = std::min(warnings.size(), kPrintedMax);
+  const auto sentences = report::grouped_by_name(warnings.get<std::vector<std::string>>(), names);
+  const std::size_t printed = std::min(sentences.size(), kPrintedMax);
   if (printed > 0) say("\n");
-  for (std::size_t i = 0; i < printed; ++i) say("Note: {}\n", warnings[i].get<std::string>());
-  if (printed < warnings.size())
-    say("Note: {} more, in run.json and the report\n", warnings.size() - printed);
+  for (std::size_t i = 0; i < printed; ++i) say("Note: {}\n", sentences[i]);
+  if (printed < sentences.size())
+    say("Note: {} more, in run.json and the report\n", sentences.size() - printed);
 }
 
 Result<void> print_documents(const std::filesystem::path& run_folder, bool as_json) {
@@ -210,7 +212,9 @@ Result<void> print_documents(const std::filesystem::path& run_folder, bool as_js
   print_devices(run->at("devices"));
   for (const auto& imu : calibration->at("imus")) print_imu(imu, truth);
   if (models) print_model(*models);
-  print_warnings(run->at("warnings"));
+  std::vector<std::string> names;
+  for (const auto& imu : calibration->at("imus")) names.push_back(imu.at("name"));
+  print_warnings(run->at("warnings"), names);
   const auto report = run_folder / "report.html";
   say("\nResults: {}\n", run_folder.string());
   if (std::filesystem::exists(report)) say("Report:  {}\n", report.string());
