@@ -21,23 +21,13 @@ install(FILES ${completions}/fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vend
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
         FILES_MATCHING PATTERN *.toml PATTERN *.dbc PATTERN vehicle.toml EXCLUDE)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs
-        FILES_MATCHING PATTERN guide.md PATTERN configuration.md PATTERN security.md PATTERN pitfalls.md PATTERN vehicle.md PATTERN metrics.md)
+        FILES_MATCHING PATTERN *.md PATTERN *.png PATTERN examples/*.toml
+        PATTERN index.md EXCLUDE PATTERN developer.md EXCLUDE PATTERN api.md EXCLUDE)
 foreach(driver csv can_odometry rtklib_pos)
   install(FILES drivers/${driver}/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/drivers/${driver})
 endforeach()
 install(FILES CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
-# The README of the package begins with what it brings; files of a run and devices are told as in the source's own.
-file(READ README.md readme)
-string(FIND "${readme}" "## Files of a run\n" from)
-string(FIND "${readme}" "## More\n" to)
-if(from EQUAL -1 OR to LESS from)
-  message(FATAL_ERROR "README.md lacks 'Files of a run' or 'More', between which the package's README takes its end from")
-endif()
-math(EXPR length "${to} - ${from}")
-string(SUBSTRING "${readme}" ${from} ${length} README_FILES_AND_DEVICES)
-string(STRIP "${README_FILES_AND_DEVICES}" README_FILES_AND_DEVICES)
-set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS README.md)
 configure_file(${CMAKE_CURRENT_LIST_DIR}/debian/README.md.in ${CMAKE_BINARY_DIR}/package/README.md @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/package/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

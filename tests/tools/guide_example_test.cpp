@@ -1,4 +1,4 @@
-/// The worked example of docs/guide.md, run as it is written.
+/// The worked example of docs/noise.md, run as it is written.
 
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ class GuideExample : public testing::Test {
   /// The first block in this language behind the example's heading.
   std::string block(const std::string& language) const {
     const std::string begin = "```" + language + "\n";
-    const auto from = guide_.find(begin, guide_.find("### A worked example"));
+    const auto from = guide_.find(begin, guide_.find("## A worked example"));
     if (from == std::string::npos) return {};
     return guide_.substr(from + begin.size(), guide_.find("```", from + begin.size()) - from - begin.size());
   }
@@ -67,7 +67,7 @@ class GuideExample : public testing::Test {
   }
 
   std::filesystem::path folder_ = scratch_folder();
-  std::string guide_ = read_file(source_path("docs/guide.md"));
+  std::string guide_ = read_file(source_path("docs/noise.md"));
 };
 
 // The mean of 60,000 squares has an sd of 0.6 %, the fitted white noise one of 0.6 %, too.

@@ -2,10 +2,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
+
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "example_messages.h"
+#include "tools/imuscope/top/colours.h"
 #include "tools/imuscope/top/terminal.h"
 
 namespace imuscope::top {
@@ -137,6 +142,32 @@ TEST(TopTerminal, CutsAtCharactersNotAtBytes) {
   EXPECT_EQ(cut("\u2588\u2588\u2588", 2), "\u2588\u2588");
   EXPECT_EQ(cut("abc", 5), "abc");
   EXPECT_EQ(cut("abc", 0), "");
+}
+
+/// What a terminal shows of a coloured line.
+std::string without_colours(const std::string& line) {
+  return std::regex_replace(line, std::regex("\x1b\\[[0-9;]*m"), "");
+}
+
+TEST(TopColours, TheWordsStayAsTheyAreAndTheStateAloneIsColoured) {
+  for (const auto& line : lines_of(example())) EXPECT_EQ(without_colours(coloured(line)), line);
+  EXPECT_EQ(coloured("mtx1        study      streaming      99.9"),
+            "mtx1        study      \033[32mstreaming\033[0m      99.9");
+  EXPECT_EQ(coloured("mtx2  converging  running late"), "mtx2  \033[33mconverging\033[0m  running late");
+  EXPECT_EQ(coloured("not-running-yet"), "not-running-yet") << "a part of a word is none";
+  EXPECT_EQ(coloured("!! mtx2 is silent"), "\033[1;31m!! mtx2 is silent\033[0m");
+  EXPECT_EQ(coloured("DEVICE  role"), "\033[1mDEVICE  role\033[0m");
+}
+
+TEST(TopColours, AFileAndAPersonWhoSaysSoGetNone) {
+  // Standard output of a test is no terminal.
+  ASSERT_EQ(setenv("TERM", "xterm", 1), 0);
+  if (isatty(STDOUT_FILENO) == 0) {
+    EXPECT_FALSE(colours_wanted());
+  }
+  ASSERT_EQ(setenv("NO_COLOR", "1", 1), 0);
+  EXPECT_FALSE(colours_wanted());
+  unsetenv("NO_COLOR");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "findings.h"
 #include "print.h"
 #include "progress.h"
+#include "report/json_file.h"
 #include "report/report.h"
 #include "service/recording.h"
 #include "service/replay_run.h"
@@ -29,6 +30,7 @@ struct ProcessCommand {
   bool realtime = false;
   std::string lcm;
   bool json = false;
+  bool force = false;
 };
 
 /// @param look  at the data before anything is estimated from them, and say what is wrong
@@ -102,7 +104,20 @@ Result<std::vector<Label>> read_labels(const std::string& file) {
   return parse_labels(*text, file);
 }
 
+/// A report.html in a folder in which no run of ours ended is somebody else's.
+Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
+  std::error_code error;
+  if (!std::filesystem::exists(out / "report.html", error)) return {};
+  const auto run = report::read_json_file(out / "run.json");
+  if (run.is_object() && run.value("schema", "").starts_with("imuscope.run/")) return {};
+  return usage_error(fmt::format("{} exists, and no run of imuscope made it", (out / "report.html").string()),
+                     "give another --out, or --force to write over it");
+}
+
 Result<void> process(const ProcessCommand& options) {
+  if (!options.force) {
+    if (auto checked = check_nothing_is_lost(options.out); !checked) return checked;
+  }
   const auto drives = drives_of(options.inputs);
   if (drives.size() > 1 && !options.labels.empty())
     return usage_error("labels are of one drive", "process the drives one by one");
@@ -165,6 +180,7 @@ void add_process(CLI::App& app, Work& chosen) {
           "write a copy of the configuration with the lines corrected that the data show to be wrong")
       ->type_name("FILE");
   command->add_flag("--json", options->json, "print the summary as JSON");
+  command->add_flag("--force", options->force, "write over a report.html that no run of imuscope made");
   on_chosen(*command, chosen, [options] { return process(*options); });
 }
 

@@ -106,7 +106,7 @@ class Top {
     if (as_json) {
       say("{}\n", top::json_of(heard_));
     } else {
-      for (const auto& line : top::lines_of(heard_)) say("{}\n", line);
+      top::print(top::lines_of(heard_));
     }
     return {};
   }

@@ -6,6 +6,8 @@
 #include <unistd.h>
 #include <algorithm>
 
+#include "tools/imuscope/top/colours.h"
+
 namespace imuscope::top {
 
 namespace {
@@ -35,7 +37,14 @@ std::string cut(const std::string& text, std::size_t columns) {
   return text;
 }
 
-Terminal::Terminal() {
+void print(const std::vector<std::string>& lines) {
+  const bool colours = colours_wanted();
+  std::string page;
+  for (const std::string& line : lines) page += (colours ? coloured(line) : line) + "\n";
+  write_all(page);
+}
+
+Terminal::Terminal() : colours_(colours_wanted()) {
   tcgetattr(STDIN_FILENO, &before_);
   termios raw = before_;
   raw.c_lflag &= static_cast<tcflag_t>(~(ICANON | ECHO));
@@ -57,7 +66,9 @@ void Terminal::draw(const std::vector<std::string>& lines) {
   std::string page = kHome;
   for (std::size_t i = 0; i < rows; ++i) {
     const auto& line = i + 1 == rows ? lines.back() : lines[i];
-    page += cut(line, size.ws_col) + kEndOfLine;
+    // Cut first: a colour has no width.
+    const std::string shown = cut(line, size.ws_col);
+    page += (colours_ ? coloured(shown) : shown) + kEndOfLine;
   }
   write_all(page + kEndOfPage);
 }

@@ -25,8 +25,13 @@ class Terminal {
   [[nodiscard]] std::optional<char> key() const;
 
  private:
+  bool colours_;
   termios before_{};
 };
+
+/// Writes the lines once to standard output, in colours where they are wanted. Precondition: they are
+/// printable, as lines_of() makes them.
+void print(const std::vector<std::string>& lines);
 
 /// The first `columns` characters of UTF-8 text.
 [[nodiscard]] std::string cut(const std::string& text, std::size_t columns);
