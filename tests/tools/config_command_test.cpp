@@ -21,14 +21,23 @@ TEST(ConfigCommand, DocumentIsWhatItPrints) {
 
 TEST(ConfigCommand, EveryConfigurationOfTheProjectIsGood) {
   std::size_t count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(source_path("config"))) {
-    // A script of faults is for imusim alone.
-    if (entry.path().extension() != ".toml" || entry.path().stem() == "faults") continue;
-    const auto log = scratch_folder() / "log";
-    EXPECT_EQ(run_program("imuscope", {"config", entry.path().string()}, log), 0) << read_text(log);
-    ++count;
+  for (const char* where : {"config", "docs/examples"}) {
+    for (const auto& entry : std::filesystem::directory_iterator(source_path(where))) {
+      // A script of faults is for imusim alone.
+      if (entry.path().extension() != ".toml" || entry.path().stem() == "faults") continue;
+      const auto log = scratch_folder() / "log";
+      EXPECT_EQ(run_program("imuscope", {"config", entry.path().string()}, log), 0) << read_text(log);
+      ++count;
+    }
   }
   EXPECT_GT(count, 2U);
+}
+
+TEST(ConfigCommand, TheExampleOfTheCsvPageIsTheFileBesideIt) {
+  const std::string page = read_text(source_path("docs/csv.md"));
+  const auto begin = page.find("```toml\n") + std::string("```toml\n").size();
+  EXPECT_EQ(page.substr(begin, page.find("```", begin) - begin),
+            read_text(source_path("docs/examples/my_drive.toml")));
 }
 
 TEST(ConfigCommand, WrongKeyIsToldWithItsLine) {

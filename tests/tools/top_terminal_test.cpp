@@ -42,6 +42,7 @@ class TerminalProgram {
     process_ = fork();
     if (process_ == 0) {
       login_tty(far_end);
+      setenv("NO_COLOR", "1", 1);  // the words alone; top_view_tests have the colours
       const std::string program = test::program_path("imuscope").string();
       execl(program.c_str(), program.c_str(), "top", nullptr);
       _exit(127);
