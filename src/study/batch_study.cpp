@@ -1,10 +1,10 @@
 #include "study/batch_study.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <future>
 
 #include "base/calibration_levels.h"
 #include "base/units.h"
@@ -217,16 +217,12 @@ std::vector<BatchOutcome> estimate_mountings(const Configuration& configuration,
                                              const FormerMountings& former) {
   const auto studies = configuration.study_indices();
   const std::size_t reference = configuration.reference_index();
-  std::vector<std::future<BatchOutcome>> running;
-  for (std::size_t i = 0; i < studies.size(); ++i) {
+  std::vector<BatchOutcome> outcomes(studies.size());
+  tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) {
     std::optional<double> moved_s;
     if (!former[i].empty()) moved_s = to_seconds(former[i].back().until - records.origin());
-    const Pair pair{records, reference, studies[i]};
-    running.push_back(
-        std::async(std::launch::async, [pair, moved_s] { return estimate_one(pair, moved_s); }));
-  }
-  std::vector<BatchOutcome> outcomes;
-  for (auto& one : running) outcomes.push_back(one.get());
+    outcomes[i] = estimate_one({records, reference, studies[i]}, moved_s);
+  });
   return outcomes;
 }
 

@@ -1,8 +1,11 @@
 #include "study/dynamics_files.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "base/text.h"
 #include "dynamics/covariates.h"
@@ -95,6 +98,29 @@ void say_what_is_missing(const std::string& name, const std::array<AxisDynamics,
   say_left_out(name, axes, remarks);
 }
 
+DynamicsRegressions regressions_of_device(const DeviceConfig& device, RowSpool& rows,
+                                          const RegimeTrack& motion, std::size_t dynamic,
+                                          const noise::ModelSpec& residual_model) {
+  DynamicsRegressions out;
+  if (!rows.whole()) {
+    out.remarks.push_back(
+        fmt::format("{}: no regression on the dynamics: its rows could not be kept on the "
+                    "disk of the run folder; check its free space",
+                    device.name));
+    return out;
+  }
+  RowsOfRegime moving(rows, motion, dynamic);
+  const auto axes = study_dynamics(moving, {device.rate_hz, residual_model});
+  say_what_is_missing(device.name, axes, out.remarks);
+  nlohmann::json of_device = nlohmann::json::array();
+  append_regressions(device.name, axes, of_device);
+  for (auto& regression : of_device) {
+    regression["regime"] = kDynamicName;
+    out.regressions.push_back(std::move(regression));
+  }
+  return out;
+}
+
 }  // namespace
 
 DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
@@ -106,24 +132,14 @@ DynamicsRegressions regressions_of(const Configuration& configuration, std::vect
     out.remarks.emplace_back("no regression on the dynamics: there is no dynamic part");
     return out;
   }
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto& device = configuration.devices[indices[i]];
-    if (!rows[i].whole()) {
-      out.remarks.push_back(
-          fmt::format("{}: no regression on the dynamics: its rows could not be kept on the "
-                      "disk of the run folder; check its free space",
-                      device.name));
-      continue;
-    }
-    RowsOfRegime moving(rows[i], motion, *dynamic);
-    const auto axes = study_dynamics(moving, {device.rate_hz, residual_model});
-    say_what_is_missing(device.name, axes, out.remarks);
-    nlohmann::json of_device = nlohmann::json::array();
-    append_regressions(device.name, axes, of_device);
-    for (auto& regression : of_device) {
-      regression["regime"] = kDynamicName;
-      out.regressions.push_back(std::move(regression));
-    }
+  std::vector<DynamicsRegressions> parts(rows.size());
+  tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
+    parts[i] =
+        regressions_of_device(configuration.devices[indices[i]], rows[i], motion, *dynamic, residual_model);
+  });
+  for (DynamicsRegressions& part : parts) {
+    std::move(part.remarks.begin(), part.remarks.end(), std::back_inserter(out.remarks));
+    for (auto& regression : part.regressions) out.regressions.push_back(std::move(regression));
   }
   correct_for_number(out.regressions);
   return out;

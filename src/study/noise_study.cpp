@@ -1,8 +1,12 @@
 #include "study/noise_study.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <mutex>
 
 #include "noise/compare.h"
 #include "noise/holm.h"
@@ -269,6 +273,27 @@ void append_comparisons(const std::vector<AxisComparison>& all, nlohmann::json& 
   }
 }
 
+NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std::size_t axis,
+                      const std::vector<std::string>& regimes, const noise::ModelSpec& spec) {
+  NoiseStudy study;
+  std::vector<double> values = series.values(axis);
+  std::vector<std::vector<noise::Line>> lines;
+  for (std::size_t regime = 0; regime < regimes.size(); ++regime)
+    lines.push_back(take_out_lines(device, axis, regimes[regime], series.mask(axis, regime), values, study));
+  const Job job{device, values, spec, study};
+  const std::size_t levels = fit_axis(job, axis, series.mask(axis), kWholeRun, {}, 0);
+  for (std::size_t regime = 0; regime < regimes.size(); ++regime)
+    fit_axis(job, axis, series.mask(axis, regime), regimes[regime], lines[regime], levels);
+  return study;
+}
+
+void append_part(NoiseStudy part, NoiseStudy& study) {
+  std::move(part.models.begin(), part.models.end(), std::back_inserter(study.models));
+  std::move(part.remarks.begin(), part.remarks.end(), std::back_inserter(study.remarks));
+  for (auto& one : part.lines) study.lines.push_back(std::move(one));
+  for (auto& one : part.left_out) study.left_out.push_back(std::move(one));
+}
+
 }  // namespace
 
 std::string coverage_remark(const std::string& name, const NoiseSeries& series, double rate_hz, double run_s,
@@ -288,26 +313,23 @@ std::string coverage_remark(const std::string& name, const NoiseSeries& series, 
 NoiseStudy study_noise(const Configuration& configuration, const std::vector<NoiseSeries>& series,
                        const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
                        const std::function<void(double)>& progress) {
-  NoiseStudy study;
   const auto indices = configuration.study_indices();
-  const double total = static_cast<double>(series.size() * kAxisCount);
-  double done = 0.0;
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    if (series[i].size() == 0) continue;
-    const auto& device = configuration.devices[indices[i]];
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      std::vector<double> values = series[i].values(axis);
-      std::vector<std::vector<noise::Line>> lines;
-      for (std::size_t regime = 0; regime < regimes.size(); ++regime)
-        lines.push_back(
-            take_out_lines(device, axis, regimes[regime], series[i].mask(axis, regime), values, study));
-      const Job job{device, values, spec, study};
-      const std::size_t levels = fit_axis(job, axis, series[i].mask(axis), kWholeRun, {}, 0);
-      for (std::size_t regime = 0; regime < regimes.size(); ++regime)
-        fit_axis(job, axis, series[i].mask(axis, regime), regimes[regime], lines[regime], levels);
-      if (progress) progress((done += 1.0) / total);
-    }
-  }
+  const std::size_t total = series.size() * kAxisCount;
+  // Each axis of each S-IMU by itself, on any thread; what came of them stands in their order.
+  std::vector<NoiseStudy> parts(total);
+  std::mutex told;
+  std::size_t done = 0;
+  const auto study_one = [&](std::size_t job) {
+    const std::size_t i = job / kAxisCount;
+    if (series[i].size() == 0) return;
+    parts[job] = study_axis(configuration.devices[indices[i]], series[i], job % kAxisCount, regimes, spec);
+    if (!progress) return;
+    const std::lock_guard lock(told);
+    progress(static_cast<double>(++done) / static_cast<double>(total));
+  };
+  tbb::parallel_for(std::size_t{0}, total, study_one);
+  NoiseStudy study;
+  for (NoiseStudy& part : parts) append_part(std::move(part), study);
   summarise_left_out(study);
   return study;
 }

@@ -1,6 +1,8 @@
 #include "study/study.h"
 
 #include <fmt/format.h>
+#include <tbb/task_group.h>
+
 #include <algorithm>
 
 #include "error_process/row_low_pass.h"
@@ -315,12 +317,16 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   }
 
   const auto& names = regimes->chosen.names();
+  // The regressions need no noise model of the error process: both at once.
+  DynamicsRegressions regressions;
+  tbb::task_group beside;
+  beside.run([&] { regressions = regressions_of(configuration, *studied, regimes->motion, *spec); });
   const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
     if (options.progress) options.progress("noise models", share);
   });
   const auto dependence = study_dependence(configuration, series, collector.temperatures(),
                                            collector.watch().levels(), regimes->motion, noise_study, origin);
-  const auto regressions = regressions_of(configuration, *studied, regimes->motion, *spec);
+  beside.wait();
   auto regime_document = regimes_json(*regimes, origin);
   regime_document["left_out"] = noise_study.left_out;
   for (const std::vector<std::string>& remarks :

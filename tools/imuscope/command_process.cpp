@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <tbb/global_control.h>
+
 #include <memory>
+#include <optional>
 
 #include "base/json_text.h"
 #include "base/text.h"
@@ -21,6 +24,9 @@ namespace imuscope::cli {
 
 namespace {
 
+/// More do not make a study faster: three S-IMUs have 18 axes.
+constexpr int kThreadsMax = 256;
+
 struct ProcessCommand {
   std::vector<std::string> inputs;
   std::string config;
@@ -31,6 +37,7 @@ struct ProcessCommand {
   std::string lcm;
   bool json = false;
   bool force = false;
+  int threads = 0;  ///< 0: all cores
 };
 
 /// @param look  at the data before anything is estimated from them, and say what is wrong
@@ -115,6 +122,9 @@ Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
 }
 
 Result<void> process(const ProcessCommand& options) {
+  std::optional<tbb::global_control> limit;
+  if (options.threads > 0)
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
   if (!options.force) {
     if (auto checked = check_nothing_is_lost(options.out); !checked) return checked;
   }
@@ -180,6 +190,10 @@ void add_process(CLI::App& app, Work& chosen) {
           "write a copy of the configuration with the lines corrected that the data show to be wrong")
       ->type_name("FILE");
   command->add_flag("--json", options->json, "print the summary as JSON");
+  command
+      ->add_option("--threads", options->threads,
+                   "at most so many at once (default: as many as there are cores)")
+      ->check(CLI::Range(1, kThreadsMax));
   command->add_flag("--force", options->force, "write over a report.html that no run of imuscope made");
   on_chosen(*command, chosen, [options] { return process(*options); });
 }
