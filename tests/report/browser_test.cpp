@@ -14,7 +14,9 @@
 #include <set>
 #include <sstream>
 
+#include "base/output_folder.h"
 #include "report/paper_figures.h"
+#include "report/printed_page.h"
 #include "report/report.h"
 #include "tests/report/synthetic_run.h"
 #include "tests/support/file_content.h"
@@ -328,6 +330,20 @@ TEST_F(Browser, PrintsAsPdf) {
   EXPECT_TRUE(found);
   EXPECT_LE(before_appendix, 8);
   EXPECT_GT(pages, before_appendix + 2) << "the appendix has all that is folded";
+}
+
+TEST_F(Browser, TheCommandPrintsAPageAndSaysWhereThereIsNoBrowser) {
+  const auto folder = OutputFolder::open(folder_);
+  ASSERT_TRUE(folder);
+  const auto printed = print_page(*folder, "report.html");
+  ASSERT_TRUE(printed) << printed.error().text();
+  EXPECT_EQ(content_of(*printed).rfind("%PDF", 0), 0U);
+  const std::string path = std::getenv("PATH");
+  setenv("PATH", folder_.c_str(), 1);
+  const auto none = print_page(*folder, "report.html");
+  setenv("PATH", path.c_str(), 1);
+  ASSERT_FALSE(none);
+  EXPECT_NE(none.error().text().find("apt-get install chromium"), std::string::npos);
 }
 
 TEST(PaperFigures, AreDrawnAsSvgAndPdfAndWhatIsMissingIsLeftOut) {

@@ -18,6 +18,7 @@
 #include "record_files.h"
 #include "report/certificate_page.h"
 #include "report/json_file.h"
+#include "report/printed_page.h"
 
 namespace imuscope::cli {
 namespace {
@@ -33,6 +34,7 @@ struct CharacterizeCommand {
   std::string sensor;
   std::filesystem::path out = "certificate";
   bool no_page = false;
+  bool pdf = false;
   bool force = false;
   bool json = false;
 };
@@ -196,6 +198,10 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     const auto page = write_certificate_page(folder->path(), documents[i]);
     if (!page) return tl::unexpected<Error>(page.error());
     if (!options.json) say("{}\n", page->front().string());
+    if (!options.pdf) continue;
+    const auto printed = print_page(*folder, page->front().filename().string());
+    if (!printed) return tl::unexpected<Error>(printed.error());
+    if (!options.json) say("{}\n", printed->string());
   }
   return {};
 }
@@ -241,6 +247,7 @@ void add_characterize(CLI::App& app, Work& chosen) {
   command->add_option("--out,-o", options->out, "Folder for certificate.html, certificate.json and figures")
       ->capture_default_str();
   command->add_flag("--no-page", options->no_page, "Print alone");
+  command->add_flag("--pdf", options->pdf, "Print the page as certificate.pdf, too, by Chromium");
   command->add_flag("--force", options->force, "Write over a page that this command did not write");
   command->add_flag("--json", options->json, "Print JSON");
   on_chosen(*command, chosen, [options] { return run_characterize(*options); });

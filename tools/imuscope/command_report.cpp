@@ -8,6 +8,7 @@
 #include "print.h"
 #include "report/comparison_page.h"
 #include "report/paper_figures.h"
+#include "report/printed_page.h"
 #include "report/report.h"
 
 namespace imuscope::cli {
@@ -18,6 +19,7 @@ struct ReportCommand {
   std::vector<std::filesystem::path> runs;
   std::filesystem::path out = "comparison.html";
   bool figures = false;
+  bool pdf = false;
   bool force = false;
 };
 
@@ -41,6 +43,13 @@ Result<void> report_of_run(const ReportCommand& options) {
   const auto& run_dir = options.runs.front();
   if (auto written = write_report(run_dir); !written) return written;
   say("{}\n", (run_dir / "report.html").string());
+  if (options.pdf) {
+    const auto folder = OutputFolder::open(run_dir);
+    if (!folder) return tl::unexpected<Error>(folder.error());
+    const auto printed = print_page(*folder, "report.html");
+    if (!printed) return tl::unexpected<Error>(printed.error());
+    say("{}\n", printed->string());
+  }
   if (!options.figures) return {};
   const auto drawn = write_figures(run_dir);
   if (!drawn) return tl::unexpected<Error>(drawn.error());
@@ -61,6 +70,8 @@ void add_report(CLI::App& app, Work& chosen) {
       ->type_name("FILE");
   command->add_flag("--figures", options->figures,
                     "draw the figures as SVG and PDF for papers, too (RUN_DIR/figures)");
+  command->add_flag("--pdf", options->pdf,
+                    "print it as report.pdf, too, by Chromium: eight pages, and an appendix");
   command->add_flag("--force", options->force, "write over a file that is there");
   on_chosen(*command, chosen, [options]() -> Result<void> {
     return options->runs.size() == 2 ? compare_runs(*options) : report_of_run(*options);
