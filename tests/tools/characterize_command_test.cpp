@@ -4,11 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
+#include <sstream>
+#include <vector>
 
 #include "programs.h"
 #include "tests/support/shared_data.h"
@@ -100,6 +103,60 @@ TEST_F(Characterize, WritesAPageWithFiguresThatExportReads) {
   std::filesystem::remove(out / "certificate.json");
   EXPECT_EQ(run({log("static.csv", columns), "--out", out.string()}), 2);
   EXPECT_THAT(output(), HasSubstr("was not written by this command"));
+}
+
+TEST_F(Characterize, TablesForPapersSayWhatTheDocumentSays) {
+  const Columns columns{
+      "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"};
+  const std::string file = log("static.csv", columns);
+  const auto out = folder_ / "page";
+  ASSERT_EQ(run({file, "--out", out.string(), "--table", "csv"}), 0) << output();
+  const auto certificate = nlohmann::json::parse(read_text(out / "certificate.json"));
+  std::istringstream table(output());
+  std::string line;
+  std::getline(table, line);
+  EXPECT_EQ(line, "axis,term,value,ci_low,ci_high,bound,unit");
+  for (const auto& axis : certificate.at("axes")) {
+    for (const auto& term : axis.at("terms")) {
+      ASSERT_TRUE(std::getline(table, line));
+      std::string start =
+          axis.at("name").get<std::string>() + "," + term.at("symbol").get<std::string>() + ",";
+      if (term.at("known") != "unknown") start += fmt::format("{:.3g},", term.at("value").get<double>());
+      EXPECT_TRUE(line.starts_with(start)) << line << " against " << start;
+      EXPECT_THAT(line, HasSubstr(term.at("known") == "bound" ? ",1," : ",0,"));
+    }
+  }
+  EXPECT_FALSE(std::getline(table, line));
+  const std::string allan = read_text(out / "allan.csv");
+  std::size_t points = 1;
+  for (const auto& axis : certificate.at("axes")) points += axis.at("allan").size();
+  EXPECT_EQ(static_cast<std::size_t>(std::count(allan.begin(), allan.end(), '\n')), points);
+  ASSERT_EQ(run({file, "--no-page", "--table", "latex"}), 0) << output();
+  EXPECT_THAT(output(), HasSubstr("gyro\\_x & $N$ & 1.0"));
+  ASSERT_EQ(run({file, "--no-page", "--table", "markdown"}), 0) << output();
+  EXPECT_THAT(output(), HasSubstr("| accel_z | N | 0.1"));
+}
+
+TEST_F(Characterize, ATerminalShowsThePointsOfWvAndFit) {
+  const Columns columns{
+      "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"};
+  const std::string file = log("static.csv", columns);
+  ASSERT_EQ(run_program("imuscope", {"fit", file, "--column", "gyro_x_radps", "--model", "WN", "--plot"},
+                        folder_ / "log.txt"),
+            0)
+      << output();
+  // White noise falls by a decade a decade: the first point stands at the left and above, the last one at the
+  // right.
+  std::vector<std::size_t> columns_of_points;
+  std::istringstream lines(output());
+  for (std::string line; std::getline(lines, line);) {
+    const auto axis = line.find(" |");
+    if (axis == std::string::npos) continue;
+    for (auto at = line.find('o', axis); at != std::string::npos; at = line.find('o', at + 1))
+      columns_of_points.push_back(at);
+  }
+  EXPECT_GE(columns_of_points.size(), 8U) << output();
+  EXPECT_TRUE(std::is_sorted(columns_of_points.begin(), columns_of_points.end())) << output();
 }
 
 TEST_F(Characterize, UnitsStandBesideEachOther) {

@@ -12,6 +12,7 @@
 #include "base/output_folder.h"
 #include "certificate/json.h"
 #include "certificate/units.h"
+#include "certificate_table.h"
 #include "commands.h"
 #include "noise/holm.h"
 #include "print.h"
@@ -35,6 +36,7 @@ struct CharacterizeCommand {
   std::filesystem::path out = "certificate";
   bool no_page = false;
   bool pdf = false;
+  std::optional<TableFormat> table;
   bool force = false;
   bool json = false;
 };
@@ -173,7 +175,7 @@ Result<void> run_characterize(CharacterizeCommand& options) {
   const auto populations = certificate::population_of(all, options.how.confidence);
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (records->size() > 1) documents[i]["units"] = population_json(populations);
-    if (options.json) continue;
+    if (options.json || options.table) continue;
     if (records->size() > 1) say("{}{}\n", i > 0 ? "\n" : "", (*records)[i].name);
     for (const auto& axis : all[i]) {
       for (const auto& warning : axis.warnings) say("warning: {}: {}\n", axis.name, warning);
@@ -183,11 +185,14 @@ Result<void> run_characterize(CharacterizeCommand& options) {
       for (const auto& limit : axis.limits) say("  {}: {}\n", axis.name, limit);
     }
   }
-  if (options.json)
+  if (options.table) {
+    for (const auto& document : documents) say("{}", certificate_table(document, *options.table));
+  } else if (options.json)
     say("{}\n", json_text(documents.size() == 1 ? documents.front() : documents));
   else
     print_population(populations, *records);
   if (options.no_page) return {};
+  const bool quiet = options.json || options.table;
   const auto out = OutputFolder::open(options.out);
   if (!out) return tl::unexpected<Error>(out.error());
   for (std::size_t i = 0; i < documents.size(); ++i) {
@@ -195,13 +200,14 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     auto folder = documents.size() > 1 ? out->sub_folder(fmt::format("{}", i + 1)) : *out;
     if (!folder) return tl::unexpected<Error>(folder.error());
     if (auto written = folder->write_whole(kDocument, json_text(documents[i])); !written) return written;
+    if (auto written = folder->write_whole("allan.csv", allan_csv(documents[i])); !written) return written;
     const auto page = write_certificate_page(folder->path(), documents[i]);
     if (!page) return tl::unexpected<Error>(page.error());
-    if (!options.json) say("{}\n", page->front().string());
+    if (!quiet) say("{}\n", page->front().string());
     if (!options.pdf) continue;
     const auto printed = print_page(*folder, page->front().filename().string());
     if (!printed) return tl::unexpected<Error>(printed.error());
-    if (!options.json) say("{}\n", printed->string());
+    if (!quiet) say("{}\n", printed->string());
   }
   return {};
 }
@@ -247,6 +253,12 @@ void add_characterize(CLI::App& app, Work& chosen) {
   command->add_option("--out,-o", options->out, "Folder for certificate.html, certificate.json and figures")
       ->capture_default_str();
   command->add_flag("--no-page", options->no_page, "Print alone");
+  const std::map<std::string, TableFormat> formats{
+      {"latex", TableFormat::kLatex}, {"markdown", TableFormat::kMarkdown}, {"csv", TableFormat::kCsv}};
+  command
+      ->add_option("--table", options->table,
+                   "Print N, B, K, R and Q as a table for a paper: latex, markdown or csv")
+      ->transform(CLI::CheckedTransformer(formats, CLI::ignore_case));
   command->add_flag("--pdf", options->pdf, "Print the page as certificate.pdf, too, by Chromium");
   command->add_flag("--force", options->force, "Write over a page that this command did not write");
   command->add_flag("--json", options->json, "Print JSON");

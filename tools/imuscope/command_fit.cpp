@@ -8,6 +8,7 @@
 #include "base/json_text.h"
 #include "commands.h"
 #include "fit_output.h"
+#include "log_plot.h"
 #include "noise/conservative.h"
 #include "noise/json.h"
 #include "print.h"
@@ -25,6 +26,7 @@ struct FitCommand {
   bool select = false;
   bool conservative = false;
   bool keep_lines = false;
+  bool plot = false;
 };
 
 /// What one call of the command works on.
@@ -37,6 +39,20 @@ struct Task {
   std::vector<std::string> warnings;            ///< of the signals
   double rate_hz;
 };
+
+/// The wavelet variance as points with what the model allows it, and the model between them.
+void print_plot(const noise::FitResult& fit, const std::string& unit) {
+  std::vector<PlottedPoint> points;
+  for (const auto& level : fit.wv) {
+    points.push_back({level.observed.tau_samples / fit.rate_hz, level.observed.value, level.observed.ci_low,
+                      level.observed.ci_high, level.fitted});
+  }
+  say("\n");
+  for (const auto& line :
+       log_plot(points, "tau, s",
+                unit.empty() ? "wavelet variance" : fmt::format("wavelet variance, ({})^2", unit)))
+    say("{}\n", line);
+}
 
 /// The fit that the command is about, after the ranking that led to it and what else belongs to it.
 void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra) {
@@ -65,6 +81,7 @@ void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra)
   }
   print_fit(fit, task.unit);
   if (bound) print_conservative(*bound, task.unit);
+  if (task.options.plot) print_plot(fit, task.options.signal.unit);
 }
 
 Result<void> fit_one(const Task& task, const noise::ModelSpec& spec) {
@@ -157,6 +174,7 @@ void add_fit(CLI::App& app, Work& chosen) {
   command->add_flag("--keep-lines", options->keep_lines,
                     "Leave sinusoids (an engine, a fan) in the signal instead of taking them out before the "
                     "fit");
+  command->add_flag("--plot", options->plot, "Draw wavelet variance and model, too, in the terminal");
   command->add_flag("--select", options->select,
                     "Rank the sub-models and report the best; of three or more files by cross-validation");
   command->add_flag(

@@ -7,6 +7,7 @@
 
 #include "base/json_text.h"
 #include "commands.h"
+#include "log_plot.h"
 #include "noise/json.h"
 #include "print.h"
 #include "signal_options.h"
@@ -32,6 +33,17 @@ void print_table(const noise::WaveletVariance& wv, double rate_hz, const std::st
   }
 }
 
+void print_plot(const noise::WaveletVariance& wv, double rate_hz, const std::string& unit) {
+  std::vector<PlottedPoint> points;
+  for (const noise::WvLevel& level : wv.levels)
+    points.push_back({level.tau_samples / rate_hz, level.value, level.ci_low, level.ci_high, 0.0});
+  say("\n");
+  for (const auto& line :
+       log_plot(points, "tau, s",
+                unit.empty() ? "wavelet variance" : fmt::format("wavelet variance, ({})^2", unit)))
+    say("{}\n", line);
+}
+
 }  // namespace
 
 void add_wv(CLI::App& app, Work& chosen) {
@@ -39,7 +51,9 @@ void add_wv(CLI::App& app, Work& chosen) {
       app.add_subcommand("wv", "Wavelet variance of a signal (half the Allan variance at half of tau)");
   auto options = std::make_shared<SignalOptions>();
   add_signal_options(*command, *options, false);
-  on_chosen(*command, chosen, [options]() -> Result<void> {
+  auto plot = std::make_shared<bool>(false);
+  command->add_flag("--plot", *plot, "Draw it, too, in the terminal");
+  on_chosen(*command, chosen, [options, plot]() -> Result<void> {
     const auto wvs = wavelet_variances_of(*options, Lines::kStay);
     if (!wvs) return tl::unexpected(wvs.error());
     const auto& wv = wvs->wvs.front();
@@ -50,6 +64,7 @@ void add_wv(CLI::App& app, Work& chosen) {
       say("{}\n", json_text(json));
     } else {
       print_table(wv, wvs->rate_hz, options->unit);
+      if (*plot) print_plot(wv, wvs->rate_hz, options->unit);
       for (const auto& warning : wvs->warnings) say("warning: {}\n", warning);
     }
     return {};
