@@ -145,6 +145,19 @@ bool read_json(Bytes message, Odometry& odometry) {
   return in.good();
 }
 
+bool read_json(Bytes message, TwistStamped& twist) {
+  const json document = parse(message);
+  Members in(document);
+  twist.header = in.header(document);
+  const json& outer = in.member(document, "twist");
+  const bool has_covariance = outer.is_object() && outer.contains("twist");
+  const json& inner = has_covariance ? in.member(outer, "twist") : outer;
+  twist.linear_mps = in.vector(in.member(inner, "linear"));
+  twist.angular_radps = in.vector(in.member(inner, "angular"));
+  twist.covariance = has_covariance ? in.numbers<36>(outer, "covariance") : Covariance6{};
+  return in.good();
+}
+
 bool read_json(Bytes message, TimeReference& reference) {
   const json document = parse(message);
   Members in(document);

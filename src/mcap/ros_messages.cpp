@@ -68,6 +68,14 @@ void write(CdrWriter& out, const Odometry& odometry) {
   out.numbers(odometry.twist_covariance);
 }
 
+void write(CdrWriter& out, const TwistStamped& twist) {
+  out.begin();
+  write_header(out, twist.header);
+  out.numbers(twist.linear_mps);
+  out.numbers(twist.angular_radps);
+  out.numbers(twist.covariance);
+}
+
 void write(CdrWriter& out, const TimeReference& reference) {
   out.begin();
   write_header(out, reference.header);
@@ -139,6 +147,17 @@ bool read(Bytes message, Odometry& odometry) {
   odometry.angular_radps = in.numbers<3>();
   odometry.twist_covariance = in.numbers<36>();
   return in.good();
+}
+
+bool read(Bytes message, TwistStamped& twist) {
+  CdrReader in(message);
+  read_header(in, twist.header);
+  twist.linear_mps = in.numbers<3>();
+  twist.angular_radps = in.numbers<3>();
+  const bool is_twist = in.good();
+  twist.covariance = in.numbers<36>();
+  if (!in.good()) twist.covariance = {};
+  return is_twist;
 }
 
 bool read(Bytes message, TimeReference& reference) {

@@ -67,6 +67,14 @@ struct Odometry {
   Covariance6 twist_covariance{};
 };
 
+/// geometry_msgs/TwistWithCovarianceStamped; of a TwistStamped nothing is known of how good it is.
+struct TwistStamped {
+  RosHeader header;
+  Vector linear_mps{};
+  Vector angular_radps{};
+  Covariance6 covariance{};
+};
+
 /// sensor_msgs/TimeReference.
 struct TimeReference {
   RosHeader header;  ///< by the clock of the PC
@@ -94,6 +102,7 @@ struct Diagnostic {
 void write(CdrWriter& out, const Imu& imu);
 void write(CdrWriter& out, const NavSatFix& fix);
 void write(CdrWriter& out, const Odometry& odometry);
+void write(CdrWriter& out, const TwistStamped& twist);
 void write(CdrWriter& out, const TimeReference& reference);
 /// tf2_msgs/TFMessage.
 void write(CdrWriter& out, const std::vector<Transform>& transforms);
@@ -104,10 +113,13 @@ void write_diagnostics(CdrWriter& out, const RosHeader& header, const std::vecto
 [[nodiscard]] bool read(Bytes message, Imu& imu);
 [[nodiscard]] bool read(Bytes message, NavSatFix& fix);
 [[nodiscard]] bool read(Bytes message, Odometry& odometry);
+/// A TwistStamped, too.
+[[nodiscard]] bool read(Bytes message, TwistStamped& twist);
 [[nodiscard]] bool read(Bytes message, TimeReference& reference);
 [[nodiscard]] bool read_json(Bytes message, Imu& imu);
 [[nodiscard]] bool read_json(Bytes message, NavSatFix& fix);
 [[nodiscard]] bool read_json(Bytes message, Odometry& odometry);
+[[nodiscard]] bool read_json(Bytes message, TwistStamped& twist);
 [[nodiscard]] bool read_json(Bytes message, TimeReference& reference);
 
 /// A schema as MCAP's profile "ros2" has it.
@@ -116,7 +128,7 @@ struct RosSchema {
   std::string text;  ///< ros2msg, with the types that it uses
 };
 /// @param type  "sensor_msgs/Imu", "sensor_msgs/NavSatFix", "sensor_msgs/TimeReference", "nav_msgs/Odometry",
-///              "tf2_msgs/TFMessage", "diagnostic_msgs/DiagnosticArray"
+/// "geometry_msgs/TwistWithCovarianceStamped", "tf2_msgs/TFMessage", "diagnostic_msgs/DiagnosticArray"
 [[nodiscard]] RosSchema ros_schema(const std::string& type);
 
 }  // namespace imuscope::mcap
