@@ -100,7 +100,8 @@ Result<json> evaluate_documents(const EvaluationRunOptions& options) {
     if (!read) return read;
     dependence = std::move(*read);
   }
-  const auto opened = open_recording_of_run({options.run_dir, options.inputs, options.configuration}, *run, options.progress);
+  const auto opened =
+      open_recording_of_run({options.run_dir, options.inputs, options.configuration}, *run, options.progress);
   if (!opened) return tl::unexpected<Error>(opened.error());
   const auto drives = evaluation_drives(*opened, options.run_dir, *calibration, [&](double share) {
     if (options.progress) options.progress("reading the drive", share);

@@ -21,6 +21,7 @@
 #include "service/device_factory.h"
 #include "service/models_file.h"
 #include "service/noise_series.h"
+#include "study/mountings.h"
 
 namespace imuscope {
 namespace {
@@ -181,10 +182,10 @@ class RegimeNoise {
  public:
   RegimeNoise(const json& models, const json& regimes, const std::string& name) {
     for (const json& regime : report::field(regimes, "regimes")) {
-      const std::string regime_name = report::text_at(regime, "name");
+      const bag::WhiteVariance variance = variance_of(models, name, report::text_at(regime, "name"));
       for (const json& stretch : report::field(regime, "stretches")) {
         const auto begin = report::number_at(stretch, "begin_s");
-        if (begin) stretches_.push_back({*begin, variance_of(models, name, regime_name)});
+        if (begin) stretches_.push_back({*begin, variance});
       }
     }
     std::sort(stretches_.begin(), stretches_.end(),
@@ -380,6 +381,7 @@ class RunBagMaker {
     const json models = report::read_json_file(folder_ / "models.json");
     const json regimes = report::read_json_file(folder_ / "regimes.json");
     const json& fits = report::field(models, "models");
+    const auto found = found_calibrations(calibration);
     const auto infos = study_file_infos(opened_.configuration, opened_.recording);
     const auto indices = opened_.configuration.study_indices();
     for (std::size_t i = 0; i < infos.size(); ++i) {
@@ -393,35 +395,18 @@ class RunBagMaker {
                      BiasTrack(std::filesystem::exists(smoothed) ? smoothed : filtered),
                      RegimeNoise(fits, regimes, name),
                      RowStream<calibration_t>(filtered)};
-      take_calibration(report::named(report::field(calibration, "imus"), name), infos[i].clock_shift_s,
-                       study);
+      for (const FoundCalibration& of : found) {
+        if (of.mounting.name != name) continue;
+        study.has_mounting = true;
+        study.correction = of.correction;
+        study.correction.t_d_s -= infos[i].clock_shift_s;
+        mountings_.push_back(of.mounting);
+      }
       if (!study.has_mounting)
         bag_.remarks.push_back(
             fmt::format("{}: has no mounting, so its samples stand as they were sent alone", name));
       studies_.push_back(std::move(study));
     }
-  }
-
-  void take_calibration(const json& imu, double clock_shift_s, StudyBag& study) {
-    const auto C_b_s = report::numbers_at<9>(imu, "C_b_s");
-    const auto r_bs_b = report::numbers_at<3>(imu, "r_bs_b_m");
-    const auto t_d = report::number_at(imu, "t_d_s");
-    const std::string status = report::text_at(imu, "status");
-    if (!C_b_s || !r_bs_b || !t_d || status == "waiting" || status == "coarse") return;
-    study.has_mounting = true;
-    const Vector3 none{};
-    study.correction = {*C_b_s,
-                        report::numbers_at<3>(imu, "gyro_bias_radps").value_or(none),
-                        report::numbers_at<3>(imu, "accel_bias_mps2").value_or(none),
-                        report::numbers_at<3>(imu, "gyro_scale").value_or(none),
-                        report::numbers_at<3>(imu, "accel_scale").value_or(none),
-                        *t_d - clock_shift_s};
-    Vector3 sd_boresight = report::numbers_at<3>(imu, "boresight_sd_deg").value_or(none);
-    for (double& sd : sd_boresight) sd *= kRadPerDeg;
-    mountings_.push_back({study.name, *C_b_s, *r_bs_b, *t_d, sd_boresight,
-                          report::numbers_at<3>(imu, "r_bs_b_sd_m").value_or(none),
-                          report::number_at(imu, "t_d_sd_s").value_or(kNan), one_line(status),
-                          status == "calibrated"});
   }
 
   Result<void> open_streams() {
@@ -476,7 +461,9 @@ class RunBagMaker {
   }
 
   void add_sample(const Sample& sample, double time_s) {
-    const std::int64_t utc_ns = utc_.ns_at(sample.time - begin_);
+    // A receiver's solution is of the instant that it tags, whenever it came.
+    const bool is_tagged = sample.kind == SampleKind::kGnss && sample.has_utc && utc_.is_known();
+    const std::int64_t utc_ns = is_tagged ? to_ns(sample.utc) : utc_.ns_at(sample.time - begin_);
     writer_.add_sample(sample, utc_ns, variances_[sample.device]);
     if (sample.kind != SampleKind::kImu) return;
     for (StudyBag& study : studies_) {

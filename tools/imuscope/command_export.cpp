@@ -67,6 +67,9 @@ Result<void> export_models(const ExportCommand& options) {
 }
 
 Result<void> run_export(ExportCommand& options) {
+  const bool is_of_run = options.files.size() == 1 && has_mountings(options.files.front());
+  if (options.format != "mcap" && is_of_run)
+    return export_mounting(options.files.front(), options.name, options.format);
   if (options.format != "mcap") return export_models(options);
   if (options.files.size() != 1) return usage_error("more than one run is given", "export them one by one");
   options.of_run.run = options.files.front();
@@ -81,13 +84,15 @@ void add_export(CLI::App& app, Work& chosen) {
   auto options = std::make_shared<ExportCommand>();
   command
       ->add_option("MODEL", options->files,
-                   "What `imuscope fit --json` printed (one file an axis), a run's models.json, or the "
+                   "A run's folder; what `imuscope fit --json` printed (one file an axis), a run's "
+                   "models.json, or the "
                    "certificate.json of "
                    "`imuscope characterize`")
       ->required();
   command
       ->add_option("--to,-t", options->format,
-                   "Of a run: mcap, all of it in one file. Of noise models: kalibr, openvins, vins-fusion, "
+                   "Of a run: mcap, all of it in one file; urdf, tf, kalibr, openvins or json, a mounting. "
+                   "Of noise models: kalibr, openvins, vins-fusion, "
                    "lio-sam, gtsam, "
                    "ros, px4, kf-gins or state-space")
       ->required();

@@ -22,4 +22,12 @@ struct ExportRun {
 /// Writes the run as an MCAP file and says what it holds.
 Result<void> export_mcap(const ExportRun& options);
 
+/// Whether a path is what a mounting is read from: a run folder or a calibration.json.
+[[nodiscard]] bool has_mountings(const std::filesystem::path& path);
+/// Prints the mounting of one S-IMU.
+/// @param name    may be empty where there is one only
+/// @param format  urdf, tf, kalibr, openvins or json
+Result<void> export_mounting(const std::filesystem::path& path, const std::string& name,
+                             const std::string& format);
+
 }  // namespace imuscope::cli
