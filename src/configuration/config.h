@@ -232,6 +232,7 @@ struct RecordOptions {
   /// A capture goes on in another file when one is as large or as old.
   double file_bytes = 2e9;
   double file_s = 3600.0;
+  bool mcap = false;  ///< run.mcap beside the capture, for other people's tools
   /// Runs that are over and not marked kept are removed, oldest first: those that ended longer ago, as many
   /// as are more than this together, and until so much of the disk is free. Absent: never.
   std::optional<double> remove_older_than_s;

@@ -142,6 +142,10 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"record.folder",
      "Where live runs are recorded, relative to the working folder; each makes a folder `NAME-TIME` there. "
      "Without it: `runs`. `--out` comes first."},
+    {"record.mcap",
+     "Live: writes run.mcap into the run's folder, too, for Foxglove, PlotJuggler and rosbag2 "
+     "(docs/doors.md). The "
+     "capture stays the record of the run."},
     {"record.sync_s",
      "Live: what was recorded is on the disk after so many seconds, and safe from the ignition key then. A "
      "cut of the power costs this and the time that the disk takes to write it."},

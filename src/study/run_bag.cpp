@@ -18,6 +18,7 @@
 #include "report/csv_reader.h"
 #include "report/json_fields.h"
 #include "report/json_file.h"
+#include "service/bag_noise.h"
 #include "service/device_factory.h"
 #include "service/models_file.h"
 #include "service/noise_series.h"
@@ -219,16 +220,6 @@ class RegimeNoise {
   std::size_t next_ = 0;
 };
 
-/// What the configuration says of an IMU's white noise.
-bag::WhiteVariance configured(const ImuNoiseConfig& noise) {
-  bag::WhiteVariance variance;
-  const double gyro = noise.gyro_white_sd_radps.value_or(0.0);
-  const double accel = noise.accel_white_sd_mps2.value_or(0.0);
-  variance.gyro.fill(gyro * gyro);
-  variance.accel.fill(accel * accel);
-  return variance;
-}
-
 /// Rows of a CSV file as messages of a type whose fields have the columns' names.
 template <typename Message>
 class RowStream {
@@ -420,7 +411,7 @@ class RunBagMaker {
       streams_[i].emplace(std::move(*source),
                           make_decoder(devices[i], index, opened_.recording.clocks[i].map));
       variances_.resize(devices.size());
-      variances_[i] = configured(devices[i].noise);
+      variances_[i] = configured_variance(devices[i].noise);
     }
     // The run's times count from the reference's first sample.
     auto& reference = *streams_[opened_.configuration.reference_index()];
@@ -539,7 +530,9 @@ class RunBagMaker {
          {"evaluation.json", "application/json"},
          {"report.html", "text/html"}}};
     for (const auto& [name, type] : kFiles) {
-      if (!std::filesystem::exists(folder_ / name)) continue;
+      // A link may lead to a file that is none of the run's, and the bag goes to others.
+      const auto status = std::filesystem::symlink_status(folder_ / name);
+      if (!std::filesystem::is_regular_file(status)) continue;
       if (const auto text = read_text_file(folder_ / name, "file of a run", ""))
         writer_.attach(name, type, utc_ns, *text);
     }
