@@ -13,6 +13,7 @@
 #include "rt/thread_setup.h"
 #include "service/bag_noise.h"
 #include "service/device_factory.h"
+#include "service/estimator_setup.h"
 
 namespace imuscope {
 namespace {
@@ -33,6 +34,26 @@ std::vector<std::string> names_of(const Configuration& configuration) {
   std::vector<std::string> names;
   for (const auto& device : configuration.devices) names.push_back(device.name);
   return names;
+}
+
+/// What the filter takes the white noise of a sample to be: a fast process counts by its density at low
+/// frequencies.
+Vector3 assumed(const TriadNoise& noise, double rate_hz) {
+  Vector3 variance{};
+  for (std::size_t i = 0; i < variance.size(); ++i) {
+    variance[i] = noise.white_sd[i] * noise.white_sd[i] +
+                  2.0 * noise.fast_sd[i] * noise.fast_sd[i] * noise.fast_time_constant_s[i] * rate_hz;
+  }
+  return variance;
+}
+
+std::array<bag::WhiteVariance, kRegimeCount> assumed_variances(const StudyConfig& study) {
+  std::array<bag::WhiteVariance, kRegimeCount> variances;
+  for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
+    variances[regime] = {assumed(study.noise.gyro[regime], study.rate_hz),
+                         assumed(study.noise.accel[regime], study.rate_hz)};
+  }
+  return variances;
 }
 
 bag::Correction correction_of(const StudyOutput& study) {
@@ -62,8 +83,9 @@ LiveBag::LiveBag(const Configuration& configuration, OutputFile file, const std:
           {"ros2", "imuscope " + version}, [this](std::string_view bytes) { file_.write(bytes); },
           names_of(configuration)),
       begun_(host_now()),
-      variances_(study_devices_.size()),
       unfinished_(configuration.devices.size()) {
+  for (const auto& study : estimator_config(configuration).studies)
+    variances_.push_back(assumed_variances(study));
   for (std::size_t i = 0; i < configuration.devices.size(); ++i)
     decoders_.push_back(
         make_decoder(configuration.devices[i], static_cast<DeviceIndex>(i), ClockMapConfig{}));
@@ -208,8 +230,7 @@ void LiveBag::take(const Refit& refit) {
   for (const AxisRefit& axis : refit.axes) {
     if (!axis.fit) continue;
     auto& variance = variances_[refit.study][static_cast<std::size_t>(axis.regime)];
-    if (!variance) variance.emplace();
-    (axis.axis < kTriad ? variance->gyro : variance->accel)[axis.axis % kTriad] =
+    (axis.axis < kTriad ? variance.gyro : variance.accel)[axis.axis % kTriad] =
         noise::white_variance_of_sample(*axis.fit);
   }
 }
@@ -243,12 +264,6 @@ void LiveBag::take(const Read& read) {
   }
 }
 
-/// White noise of the regime in force; of the configuration until a refit tells it.
-bag::WhiteVariance LiveBag::variance_of(std::size_t study) const {
-  const auto& of_regime = variances_[study][static_cast<std::size_t>(last_->studies[study].regime)];
-  return of_regime ? *of_regime : configured_variance(configuration_.devices[study_devices_[study]].noise);
-}
-
 void LiveBag::write_samples(bool at_end) {
   auto& samples = decoded_.samples;
   const bool is_told = last_ && is_told_by_device(last_->time_scale.source);
@@ -265,7 +280,8 @@ void LiveBag::write_samples(bool at_end) {
     for (std::size_t i = 0; i < last_->n_studies; ++i) {
       const StudyOutput& study = last_->studies[i];
       if (study_devices_[i] == sample.device && has_estimate(study.status))
-        writer_.add_corrected(sample, utc_ns, correction_of(study), variance_of(i));
+        writer_.add_corrected(sample, utc_ns, correction_of(study),
+                              variances_[i][static_cast<std::size_t>(study.regime)]);
     }
   }
   samples.clear();

@@ -101,7 +101,6 @@ class LiveBag {
   [[nodiscard]] std::string topic_of(const std::string& channel, const std::string& type) const;
   void write_samples(bool at_end);
   void write_mountings();
-  [[nodiscard]] bag::WhiteVariance variance_of(std::size_t study) const;
 
   const Configuration& configuration_;
   std::vector<std::size_t> study_devices_;
@@ -113,8 +112,8 @@ class LiveBag {
   HostTime begun_;
   HostTime mountings_told_{};
   HostTime chunk_ended_{};
-  /// By study and regime, of the newest refit.
-  std::vector<std::array<std::optional<bag::WhiteVariance>, kRegimeCount>> variances_;
+  /// By study and regime: what the filter takes it to be, then what the newest refit says.
+  std::vector<std::array<bag::WhiteVariance, kRegimeCount>> variances_;
 
   mutable std::mutex mutex_;
   Waiting waiting_;

@@ -22,9 +22,7 @@ class Bag {
  public:
   Bag()
       : path_(std::filesystem::temp_directory_path() /
-              ("mcap_source_" + std::to_string(::getpid()) + "_" + std::to_string(count_++))) {
-    out_.open(path_, std::ios::binary);
-  }
+              ("mcap_source_" + std::to_string(::getpid()) + "_" + std::to_string(count_++))) {}
   Bag(const Bag&) = delete;
   Bag& operator=(const Bag&) = delete;
   ~Bag() { std::filesystem::remove(path_); }
@@ -40,7 +38,7 @@ class Bag {
   }
   std::filesystem::path finish() {
     writer_.finish();
-    out_.close();
+    std::ofstream(path_, std::ios::binary) << content_;
     return path_;
   }
 
@@ -52,8 +50,8 @@ class Bag {
   }
   static inline int count_ = 0;
   std::filesystem::path path_;
-  std::ofstream out_;
-  mcap::Writer writer_{{"ros2", "test"}, [this](std::string_view bytes) { out_ << bytes; }};
+  std::string content_;
+  mcap::Writer writer_{{"ros2", "test"}, [this](std::string_view bytes) { content_ += bytes; }};
   std::map<std::string, mcap::ChannelId> channels_;
 };
 
