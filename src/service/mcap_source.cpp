@@ -18,8 +18,8 @@
 namespace imuscope {
 namespace {
 
-/// What is taken of a file is kept up to this size: an hour of a device of 1 kHz.
-constexpr std::size_t kKeptMost = std::size_t{256} << 20U;
+/// What is taken of a file is kept up to this size: two and a half hours at 100 Hz.
+constexpr std::size_t kKeptMost = std::size_t{64} << 20U;
 constexpr std::size_t kPiece = 4096;
 constexpr std::uint64_t kMessagesPerProgress = 4096;
 constexpr std::int64_t kNsPerS = 1'000'000'000;

@@ -1,5 +1,6 @@
 #include "study/mountings.h"
 
+#include <cmath>
 #include <limits>
 
 #include "base/text.h"
@@ -18,7 +19,9 @@ std::vector<FoundCalibration> found_calibrations(const nlohmann::json& calibrati
     const auto t_d = report::number_at(imu, "t_d_s");
     const std::string status = report::text_at(imu, "status");
     // A file from elsewhere may call a sensor what no configuration lets it be called.
-    if (!is_device_name(name) || !C_b_s || !r_bs_b || !t_d || status == "waiting" || status == "coarse")
+    constexpr double kOffsetMost_s = 4e9;
+    if (!is_device_name(name) || !C_b_s || !r_bs_b || !t_d || !(std::abs(*t_d) < kOffsetMost_s) ||
+        status == "waiting" || status == "coarse")
       continue;
     Vector3 sd_boresight = report::numbers_at<3>(imu, "boresight_sd_deg").value_or(none);
     for (double& sd : sd_boresight) sd *= kRadPerDeg;

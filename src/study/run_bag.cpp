@@ -11,6 +11,7 @@
 
 #include "bag/bag_writer.h"
 #include "bag/message_json.h"
+#include "base/line_reader.h"
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "base/units.h"
@@ -31,6 +32,9 @@ using nlohmann::json;
 using report::CsvReader;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+/// Files of a run may come from elsewhere: what is no time of a run would not fit into nanoseconds either.
+constexpr double kTimeMost_s = 4e9;
+bool is_time(double time_s) { return std::abs(time_s) < kTimeMost_s; }
 constexpr std::size_t kChunkBytes = std::size_t{4} << 20U;
 
 std::int64_t utime_of(std::int64_t utc_ns) { return utc_ns / 1000; }
@@ -39,7 +43,8 @@ std::int64_t utime_of(std::int64_t utc_ns) { return utc_ns / 1000; }
 std::vector<std::string> header_of(const std::filesystem::path& file) {
   std::ifstream in(file);
   std::string line;
-  std::getline(in, line);
+  constexpr std::size_t kLongest = 65536;
+  if (!read_line(in, line, kLongest) || line.size() > kLongest) return {};
   std::vector<std::string> names;
   std::string_view rest = line;
   while (!rest.empty()) {
@@ -64,6 +69,8 @@ class RunUtc {
     const auto begin = parse_utc(report::text_at(run, "t0_utc"));
     if (!begin) return;
     const double ppm = report::number_at(report::field(run, "time_scale"), "host_clock_ppm").value_or(0.0);
+    constexpr double kPpmMost = 1e4;  // of a quartz
+    if (!(std::abs(ppm) < kPpmMost)) return;
     points_ = {{0.0, *begin}, {1e3, *begin + 1e3 - ppm * 1e-3}};
   }
 
@@ -90,8 +97,17 @@ class RunUtc {
     double utc_s;
   };
   void add(double time_s, double utc_s, double between_s) {
-    if (!std::isfinite(time_s) || !std::isfinite(utc_s) || std::abs(utc_s) > 4e9) return;
-    if (points_.empty() || time_s >= points_.back().time_s + between_s) points_.push_back({time_s, utc_s});
+    if (!is_time(time_s) || !is_time(utc_s)) return;
+    if (points_.empty()) {
+      points_.push_back({time_s, utc_s});
+      return;
+    }
+    // No quartz is as wrong: such a row is damaged.
+    constexpr double kRateMost = 0.01;
+    const double step_s = time_s - points_.back().time_s;
+    const double utc_step_s = utc_s - points_.back().utc_s;
+    if (step_s >= between_s && std::abs(utc_step_s / step_s - 1.0) < kRateMost)
+      points_.push_back({time_s, utc_s});
   }
   /// "2026-03-14T09:30:12.004913Z", as run.json has it.
   static std::optional<double> parse_utc(const std::string& text) {
@@ -104,7 +120,10 @@ class RunUtc {
                                            std::chrono::day(static_cast<unsigned>(day))};
     if (!date.ok()) return {};
     const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-    return static_cast<double>(days) * 86400.0 + hour * kSecondsPerHour + minute * 60.0 + second;
+    const double utc_s =
+        static_cast<double>(days) * 86400.0 + hour * kSecondsPerHour + minute * 60.0 + second;
+    if (!is_time(utc_s)) return {};
+    return utc_s;
   }
 
   std::vector<Point> points_;
@@ -240,7 +259,12 @@ class RowStream {
   [[nodiscard]] const Message* front() const { return row_ ? &*row_ : nullptr; }
   void pop() {
     row_.reset();
-    if (!rows_ || !rows_->next()) return;
+    // Rows without a time are passed over.
+    while (!row_ && rows_ && rows_->next()) take_row();
+  }
+
+ private:
+  void take_row() {
     row_.emplace();
     std::size_t column = 0;
     visit_fields(*row_, [&](const char* name, auto& value, const char* /*sentence*/) {
@@ -251,14 +275,15 @@ class RowStream {
         if constexpr (std::is_floating_point_v<Field>)
           value = number;
         else
-          value = std::isfinite(number) && std::abs(number) < 1e9 ? static_cast<Field>(number) : Field{};
+          value = std::abs(number) <= static_cast<double>(std::numeric_limits<Field>::max()) / 2.0
+                      ? static_cast<Field>(number)
+                      : Field{};
       }
     });
     row_->sequence = sequence_++;
-    if (!std::isfinite(row_->time_s)) pop();
+    if (!is_time(row_->time_s)) row_.reset();
   }
 
- private:
   std::vector<std::string> columns_;
   std::optional<CsvReader> rows_;
   std::optional<Message> row_;
@@ -307,7 +332,7 @@ class ErrorStream {
       row.e_accel_y_mps2 = rows_->number(6);
       row.e_accel_z_mps2 = rows_->number(7);
       const double utc_s = rows_->number(8);
-      row.utime = std::abs(utc_s) < 4e9 ? static_cast<std::int64_t>(std::llround(utc_s * 1e6)) : 0;
+      row.utime = is_time(utc_s) ? static_cast<std::int64_t>(std::llround(utc_s * 1e6)) : 0;
       message.rows.push_back(row);
       more_ = rows_->next();
     } while (more_ && std::floor(rows_->number(0) * 10.0) == tenth && rows_->cell(9) == message.regime &&
@@ -503,6 +528,7 @@ class RunBagMaker {
     for (const StudyBag& study : studies_) {
       ErrorStream errors(folder_ / device_file_name("errors", study.name, ".csv"), study.name);
       while (const auto message = errors.next()) {
+        if (!is_time(message->rows.front().time_s)) continue;
         const std::int64_t utc_ns = utc_.ns_at(from_seconds(message->rows.front().time_s));
         writer_.add_message("/imuscope/error/" + study.name, "error_t", bag::json_of(*message), utc_ns);
       }
