@@ -12,6 +12,7 @@
 
 namespace imuscope::ros_message {
 
+/// How the messages of one device are taken.
 struct DecoderConfig {
   DeviceIndex device = 0;
   /// Row-major rotation of the message's axes to the device's (b, or s).

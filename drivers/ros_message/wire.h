@@ -43,6 +43,7 @@ inline constexpr std::uint8_t kSolutionBits = 0x07;
 /// seconds of 1970, s, and these.
 inline constexpr std::size_t kValuesMost = 12;
 
+/// What a frame holds; values beyond those of its kind are zero.
 struct Content {
   Kind kind = Kind::kImu;
   std::uint8_t flags = 0;

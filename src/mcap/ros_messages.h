@@ -27,6 +27,7 @@ using Quaternion = std::array<double, 4>;
 /// The first number of a covariance that says that there is no such measurement (sensor_msgs/Imu).
 inline constexpr double kNotMeasured = -1.0;
 
+/// std_msgs/Header.
 struct RosHeader {
   std::int64_t stamp_ns = 0;
   std::string frame_id;

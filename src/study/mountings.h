@@ -10,6 +10,7 @@
 
 namespace imuscope {
 
+/// What a run found of one S-IMU.
 struct FoundCalibration {
   bag::Mounting mounting;      ///< t_d_s as the recording's own times need it
   bag::Correction correction;  ///< the same mounting with biases and scales

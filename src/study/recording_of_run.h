@@ -11,6 +11,7 @@
 
 namespace imuscope {
 
+/// Which run, and where its recording is now.
 struct RunSource {
   std::filesystem::path run_dir;
   std::vector<std::string> inputs;      ///< empty: those that run.json names; of a live run its own capture

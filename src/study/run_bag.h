@@ -14,6 +14,7 @@
 
 namespace imuscope {
 
+/// Which run goes into which file, and how it is packed.
 struct RunBagOptions {
   RunSource source;
   std::filesystem::path out;  ///< the file; replaces one of its name
