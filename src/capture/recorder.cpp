@@ -113,6 +113,7 @@ bool Recorder::drain_oldest_chunk() {
   IMUSCOPE_EXPECTS(device < raw_channels_.size());
   const std::vector<std::uint8_t> message = encode(*oldest, options_.run.devices[device], clock_);
   writer_->append(raw_channels_[device], clock_.utime(oldest->info.arrival), message);
+  if (options_.raw_tap) options_.raw_tap(*oldest);
   oldest_ring->pop();
   return true;
 }

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -60,6 +61,8 @@ class Recorder {
     /// What was recorded is on the disk after this time: a cut of the power costs no more than what came in
     /// it and while the disk wrote.
     Duration sync_interval = std::chrono::milliseconds(500);
+    /// Sees every chunk that is recorded, in the recorder's thread; must not wait. May be empty.
+    std::function<void(const RawChunk&)> raw_tap{};
   };
 
   /// Creates the capture, writes the run header and starts the thread.

@@ -102,6 +102,7 @@ void read_record(TomlReader in, RecordOptions& options) {
   constexpr double kShortest_hours = 0.01;
   constexpr double kLongest_hours = 1000.0;
   in.text("folder", options.folder);
+  in.boolean("mcap", options.mcap);
   in.number("sync_s", options.sync_s, 1.0, kShortestSync_s, kLongest_s);
   in.number("file_gb", options.file_bytes, kBytesPerGb, kSmallest_gb, kLargest_gb);
   in.number("file_hours", options.file_s, kSPerHour, kShortest_hours, kLongest_hours);

@@ -128,6 +128,23 @@ struct CsvConfig {
   bool common_clock = true;  ///< false: the file's times are of a clock of its own, brought to the reference
 };
 
+/// When a message of an MCAP file was valid.
+enum class McapTime : std::uint8_t {
+  kHeader,   ///< its header's stamp
+  kLog,      ///< when it was recorded
+  kPublish,  ///< when it was sent
+};
+
+/// Messages of an MCAP file as a device.
+struct McapConfig {
+  std::string topic;           ///< empty: the only one of a type that the role needs
+  std::string velocity_topic;  ///< gnss: a twist, east-north-up, at the times of the positions; empty: none
+  std::string frame_id;        ///< messages of another frame are passed over; empty: all are taken
+  McapTime time = McapTime::kHeader;
+  bool times_are_utc = false;
+  bool common_clock = true;  ///< false: times are of a clock of its own, brought to the reference
+};
+
 /// What a device of role gnss has beside the rest: the antenna's place in b, and how far its numbers are
 /// believed.
 struct GnssOptions {
@@ -160,6 +177,7 @@ struct DeviceConfig {
   DataSheetConfig data_sheet;  ///< study
   int average_samples = 1;     ///< study: samples taken into one measurement update, see StudyConfig
   CsvConfig csv;               ///< csv_imu, csv_gnss
+  McapConfig mcap;             ///< mcap
   GnssOptions gnss;            ///< gnss
   OdometryOptions odometry;    ///< odometry
   xsens_can::ItemIds xsens_can_ids = xsens_can::default_ids();  ///< xsens_can
@@ -214,6 +232,7 @@ struct RecordOptions {
   /// A capture goes on in another file when one is as large or as old.
   double file_bytes = 2e9;
   double file_s = 3600.0;
+  bool mcap = false;  ///< run.mcap beside the capture, for other people's tools
   /// Runs that are over and not marked kept are removed, oldest first: those that ended longer ago, as many
   /// as are more than this together, and until so much of the disk is free. Absent: never.
   std::optional<double> remove_older_than_s;

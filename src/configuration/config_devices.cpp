@@ -158,6 +158,32 @@ void read_csv(TomlReader in, CsvConfig& csv) {
   in.finish();
 }
 
+void read_mcap(TomlReader in, DeviceRole role, McapConfig& mcap) {
+  in.text("topic", mcap.topic);
+  if (role == DeviceRole::kGnss) in.text("velocity_topic", mcap.velocity_topic);
+  in.text("frame_id", mcap.frame_id);
+  mcap.time = static_cast<McapTime>(in.choice("time", {"header", "log", "publish"}, 0));
+  in.boolean("times_are_utc", mcap.times_are_utc);
+  mcap.common_clock = in.choice("clock", {"common", "own"}, 0) == 0;
+  in.finish();
+}
+
+/// Samples per second where the configuration gives none.
+double default_rate_hz(Protocol protocol, DeviceRole role) {
+  if (protocol != Protocol::kMcap) return traits_of(protocol).rate_hz;
+  // Those of the devices that have the role by their protocol.
+  switch (role) {
+    case DeviceRole::kGnss:
+      return traits_of(Protocol::kCsvGnss).rate_hz;
+    case DeviceRole::kOdometry:
+      return traits_of(Protocol::kCanOdometry).rate_hz;
+    case DeviceRole::kTime:
+      return traits_of(Protocol::kPps).rate_hz;
+    default:
+      return traits_of(protocol).rate_hz;
+  }
+}
+
 /// A permutation of axes as the configuration writes it.
 std::string axes_text(const std::array<double, 9>& axes) {
   std::string text = "\"";
@@ -285,6 +311,8 @@ void read_transport(TomlReader in, DeviceConfig& device) {
       read_pps(in, device);
       break;
   }
+  if (device.protocol == Protocol::kMcap)
+    in.fail("kind", "is given for mcap", "messages of an MCAP file are read from that file alone");
   if (device.pps.has_value() != (device.protocol == Protocol::kPps)) {
     in.fail("kind", fmt::format("does not carry {}", name_of(device.protocol)),
             "kind = \"pps\" is for protocol pps, which has no other");
@@ -360,7 +388,7 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
             fmt::format("{} does not fit role {}", name_of(device.protocol), name_of(device.role)),
             fmt::format("a {} device speaks {}", name_of(device.role), protocols_of(device.role)));
   }
-  device.rate_hz = traits_of(device.protocol).rate_hz;
+  device.rate_hz = default_rate_hz(device.protocol, device.role);
   in.number("rate_hz", device.rate_hz, 1.0, 0.1, kMaxRate_hz);
   // The StdBin telegram is in forward-port-up axes, b is forward-right-down.
   if (device.protocol == Protocol::kIxblueStdbin) device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
@@ -375,6 +403,7 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
     read_data_sheet(in.table("data_sheet"), device.data_sheet);
   }
   if (traits_of(device.protocol).is_text) read_csv(in.table("csv"), device.csv);
+  if (device.protocol == Protocol::kMcap) read_mcap(in.table("mcap"), device.role, device.mcap);
   if (device.role == DeviceRole::kGnss) {
     device.gnss.position_sd_m = {0.02, 0.02, 0.04};
     device.gnss.velocity_sd_mps = {0.05, 0.05, 0.10};
@@ -390,7 +419,10 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
       in.number("geoid_separation_m", device.gnss.geoid_separation_m, 1.0, -200.0, 200.0);
     if (device.protocol == Protocol::kRtklibPos) read_rtklib(in, device.gnss);
   }
-  if (device.role == DeviceRole::kOdometry) read_odometry(in.table("odometry"), files, device.odometry);
+  if (device.protocol == Protocol::kCanOdometry)
+    read_odometry(in.table("odometry"), files, device.odometry);
+  else if (device.role == DeviceRole::kOdometry)
+    read_odometry_filter(in.table("odometry"), device.odometry);
   if (device.protocol == Protocol::kXsensCan) read_xsens_can(in.table("xsens_can"), device.xsens_can_ids);
   in.finish();
   return device;

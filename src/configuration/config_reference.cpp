@@ -27,7 +27,7 @@ protocol = "xsens_mt"
 transport = { kind = "serial", port = "/dev/ttyUSB0" }
 sync_in = { mode = 0 }
 )";
-constexpr std::array<std::string_view, 6> kDevices{R"(
+constexpr std::array<std::string_view, 7> kDevices{R"(
 [[device]]
 name = "dot"
 role = "study"
@@ -36,6 +36,16 @@ protocol = "csv_imu"
 name = "gnss"
 role = "gnss"
 protocol = "csv_gnss"
+)",
+                                                   R"(
+[[device]]
+name = "bag"
+role = "study"
+protocol = "mcap"
+[[device]]
+name = "gnss"
+role = "gnss"
+protocol = "mcap"
 )",
                                                    R"(
 [[device]]
@@ -132,6 +142,10 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"record.folder",
      "Where live runs are recorded, relative to the working folder; each makes a folder `NAME-TIME` there. "
      "Without it: `runs`. `--out` comes first."},
+    {"record.mcap",
+     "Live: writes run.mcap into the run's folder, too, for Foxglove, PlotJuggler and rosbag2 "
+     "(docs/doors.md). The "
+     "capture stays the record of the run."},
     {"record.sync_s",
      "Live: what was recorded is on the disk after so many seconds, and safe from the ignition key then. A "
      "cut of the power costs this and the time that the disk takes to write it."},
@@ -159,7 +173,9 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "`time`: at most one each."},
     {"device.protocol",
      "What the device speaks. A `gnss` device: greis, nmea, ubx, rtklib_pos, csv_gnss, or xsens_mt where it "
-     "has a receiver inside. An `odometry` device: can_odometry. A `time` device: pps. An IMU: any other."},
+     "has a receiver inside. An `odometry` device: can_odometry. A `time` device: pps. An IMU: any other. "
+     "mcap, "
+     "for messages of ROS in an MCAP file, has every role."},
     {"device.rate_hz",
      "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, 50 of wheel "
      "speeds, 1 of pulses."},
@@ -259,6 +275,23 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.csv.position_sd_columns", "csv_gnss: north, east, down, metres."},
     {"device.csv.clock",
      "csv: `common`: times are of the reference's clock. `own`: of another, found by the motion."},
+    {"device.mcap.topic",
+     "mcap: the topic in the file. An IMU is sensor_msgs/Imu, a gnss device sensor_msgs/NavSatFix, an "
+     "odometry "
+     "device nav_msgs/Odometry, a time device sensor_msgs/TimeReference. Without it the only one of that "
+     "type."},
+    {"device.mcap.velocity_topic",
+     "mcap: the receiver's velocity, east-north-up, at the times of its positions: "
+     "geometry_msgs/TwistWithCovarianceStamped or TwistStamped. Without it there is none."},
+    {"device.mcap.frame_id",
+     "mcap: messages of another frame_id are passed over, where a topic holds several sensors. Bodies of ROS "
+     "are "
+     "forward-left-up: write axes = \"+x -y -z\" for those."},
+    {"device.mcap.time",
+     "mcap: when a message was valid: its header's stamp, or when it was recorded or sent."},
+    {"device.mcap.times_are_utc", "mcap: the times are UTC and not of a PC's clock that nobody set."},
+    {"device.mcap.clock",
+     "mcap: `common`: times are of the reference's clock. `own`: of another, found by UTC or the motion."},
     {"device.antenna_lever_arm_b_m", "gnss: from the R-IMU to the antenna, in b."},
     {"device.position_sd_m", "gnss: north, east, down; where the receiver gives none."},
     {"device.velocity_sd_mps", "gnss: north, east, down; where the receiver gives none."},

@@ -121,6 +121,11 @@ void read_odometry(TomlReader in, AttachedFiles& files, OdometryOptions& options
   options.database = std::make_shared<const dbc::Database>(std::move(*database));
 }
 
+void read_odometry_filter(TomlReader in, OdometryOptions& options) {
+  read_filter_keys(in, options);
+  in.finish();
+}
+
 void read_xsens_can(TomlReader in, xsens_can::ItemIds& ids) {
   TomlReader table = in.table("ids");
   for (std::size_t i = 0; i < xsens_can::kItemCount; ++i) {

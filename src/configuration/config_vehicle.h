@@ -51,6 +51,9 @@ struct AttachedFiles {
 /// Reads [device.odometry] and the DBC file that it names.
 void read_odometry(TomlReader in, AttachedFiles& files, OdometryOptions& options);
 
+/// Reads what [device.odometry] says to the filter alone, for speeds that do not come from a CAN bus.
+void read_odometry_filter(TomlReader in, OdometryOptions& options);
+
 /// Reads [device.xsens_can]: `ids`, where they are not the device's defaults.
 void read_xsens_can(TomlReader in, xsens_can::ItemIds& ids);
 

@@ -25,7 +25,8 @@ enum class Protocol : std::uint8_t {
   kCsvGnss,
   kXsensCan,
   kCanOdometry,
-  kPps
+  kPps,
+  kMcap
 };
 
 /// What the rest of the service has to know of a protocol.
@@ -38,7 +39,7 @@ struct ProtocolTraits {
   bool is_text = false;   ///< rows with named columns, read from files alone
 };
 
-inline constexpr std::array<ProtocolTraits, 11> kProtocols{
+inline constexpr std::array<ProtocolTraits, 12> kProtocols{
     {{Protocol::kXsensMt, "xsens_mt", SampleKind::kImu, 100.0, true},
      {Protocol::kIxblueStdbin, "ixblue_stdbin", SampleKind::kImu, 100.0, true},
      {Protocol::kGreis, "greis", SampleKind::kGnss, 10.0, true},
@@ -49,7 +50,8 @@ inline constexpr std::array<ProtocolTraits, 11> kProtocols{
      {Protocol::kCsvGnss, "csv_gnss", SampleKind::kGnss, 10.0, false, true},
      {Protocol::kXsensCan, "xsens_can", SampleKind::kImu, 100.0, false},
      {Protocol::kCanOdometry, "can_odometry", SampleKind::kOdometry, 50.0, false},
-     {Protocol::kPps, "pps", SampleKind::kPulse, 1.0, false}}};
+     {Protocol::kPps, "pps", SampleKind::kPulse, 1.0, false},
+     {Protocol::kMcap, "mcap", SampleKind::kImu, 100.0, false}}};
 
 [[nodiscard]] constexpr const ProtocolTraits& traits_of(Protocol protocol) noexcept {
   return kProtocols[static_cast<std::size_t>(protocol)];
@@ -68,8 +70,10 @@ static_assert(
 }
 
 /// Whether a device of this protocol can have a role. An XSens device with a receiver inside can be that, or
-/// an IMU.
+/// an IMU. The topics of an MCAP file hold
+/// whatever there is.
 [[nodiscard]] constexpr bool fits(Protocol protocol, DeviceRole role) noexcept {
+  if (protocol == Protocol::kMcap) return true;
   if (protocol == Protocol::kXsensMt) return role != DeviceRole::kOdometry && role != DeviceRole::kTime;
   switch (traits_of(protocol).purpose) {
     case SampleKind::kGnss:

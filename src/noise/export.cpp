@@ -544,4 +544,8 @@ Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat
   return writer.finished(state_space_json(writer));
 }
 
+double white_variance_of_sample(const FitResult& fit) {
+  return felt_with_bias(fit, kBiasBand).white_density.value * fit.rate_hz;
+}
+
 }  // namespace imuscope::noise

@@ -72,4 +72,8 @@ inline constexpr double kConservativeMost = 2.0;
 Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat format,
                                   const ExportOptions& options = {});
 
+/// Variance of white noise per sample, as the covariances of sensor_msgs/Imu have it: what kRos writes for
+/// one axis.
+double white_variance_of_sample(const FitResult& fit);
+
 }  // namespace imuscope::noise

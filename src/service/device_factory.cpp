@@ -16,6 +16,7 @@
 #include "drivers/nmea/session.h"
 #include "drivers/pps/decoder.h"
 #include "drivers/pps/session.h"
+#include "drivers/ros_message/decoder.h"
 #include "drivers/rtklib_pos/decoder.h"
 #include "drivers/rtklib_pos/session.h"
 #include "drivers/ubx/decoder.h"
@@ -115,6 +116,12 @@ std::unique_ptr<DeviceDecoder> make_rtklib_pos(const DeviceConfig& device, Devic
   return std::make_unique<rtklib_pos::Decoder>(config);
 }
 
+std::unique_ptr<DeviceDecoder> make_ros_message(const DeviceConfig& device, DeviceIndex index,
+                                                const ClockMapConfig& clock) {
+  return std::make_unique<ros_message::Decoder>(ros_message::DecoderConfig{
+      index, device.axes, from_seconds(1.0 / device.rate_hz), device.mcap.times_are_utc, clock});
+}
+
 csv::ImuConfig csv_imu(const DeviceConfig& device, DeviceIndex index, const ClockMapConfig& clock) {
   csv::ImuConfig config;
   config.device = index;
@@ -175,6 +182,8 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
       return make_can_odometry(device, index);
     case Protocol::kPps:
       return std::make_unique<pps::Decoder>(pps::DecoderConfig{index});
+    case Protocol::kMcap:
+      return make_ros_message(device, index, clock);
   }
   return nullptr;
 }
@@ -210,6 +219,7 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device, bool sea
       return std::make_unique<pps::Session>();
     case Protocol::kCsvImu:
     case Protocol::kCsvGnss:
+    case Protocol::kMcap:
       break;
   }
   return nullptr;

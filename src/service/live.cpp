@@ -305,10 +305,18 @@ Result<void> run_into(const Configuration& configuration, const LiveOptions& opt
   if (!publisher) return tl::unexpected<Error>(publisher.error());
   if (auto opened = (*publisher)->smooth(history, estimator_settings); !opened) return opened;
   (*publisher)->watch_can(ids);
+  std::unique_ptr<LiveBag> bag;
+  if (configuration.record.mcap) {
+    auto begun = LiveBag::start(configuration, (*publisher)->folder(), options.version);
+    if (!begun) return tl::unexpected<Error>(begun.error());
+    bag = std::move(*begun);
+    (*publisher)->set_bag(*bag);
+  }
   Recorder::Options recording{options.out / "capture.lcm", configuration.lcm.channel_prefix, header};
   recording.sync_interval = from_seconds(configuration.record.sync_s);
   recording.max_file_bytes = static_cast<std::uint64_t>(configuration.record.file_bytes);
   recording.max_file_age = from_seconds(configuration.record.file_s);
+  if (bag) recording.raw_tap = [&bag](const RawChunk& chunk) { bag->on_chunk(chunk); };
   auto recorder = Recorder::start(std::move(recording), {&io.raw_ring()},
                                   {&io.exceptions(), &estimator.rings().exceptions});
   if (!recorder) return tl::unexpected<Error>(recorder.error());
@@ -378,8 +386,10 @@ Result<void> run_into(const Configuration& configuration, const LiveOptions& opt
   estimator.finish(tail);
   auto written = (*publisher)->finish(estimator.last_tick());
   auto recorded = (*recorder)->stop();
+  auto bagged = bag ? bag->finish((*publisher)->folder()) : Result<void>{};
   if (!recorded) return recorded;
   if (!written) return written;
+  if (!bagged) return bagged;
   if (io.newest_arrival() == HostTime::min()) {
     return work_error("no device ever sent a sample",
                       "check power, cables and baud rates; the log above names each line");

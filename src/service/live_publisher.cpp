@@ -185,6 +185,7 @@ void LivePublisher::set_recorder(Recorder& recorder) {
   broadcast_.set_tap(
       [this](std::string_view channel, std::int64_t utime, std::span<const std::uint8_t> message) {
         recorder_->record_message(channel, utime, message);
+        if (bag_ != nullptr) bag_->on_message(channel, utime, message);
       });
 }
 
@@ -201,6 +202,7 @@ void LivePublisher::on_person_event(const std::string& channel, std::span<const 
   }
   // By the time at which it was heard: the sender's clock may be another PC's.
   if (recorder_ != nullptr) recorder_->record_heard(channel, heard, bytes);
+  if (bag_ != nullptr) bag_->on_message(channel, to_utime(utc_at(heard)), bytes);
 }
 
 void LivePublisher::reconfigure(const Tunables& tunables) {
@@ -234,6 +236,7 @@ std::vector<Pulse> LivePublisher::pulses() const {
   };
   if (recorder_ != nullptr)
     pulses.push_back({kRecorderThreadName, &recorder_->heartbeat(), kWriterTold, kWriterGivenUp});
+  if (bag_ != nullptr) pulses.push_back({kBagThreadName, &bag_->heartbeat(), kWriterTold, kWriterGivenUp});
   return pulses;
 }
 
@@ -344,6 +347,7 @@ void LivePublisher::on_error(const ErrorRecord& record) {
 void LivePublisher::on_snapshot(const Snapshot& snapshot) {
   last_ = snapshot;
   if (const auto line = minute_line_.look(snapshot)) spdlog::info("{}", *line);
+  if (bag_ != nullptr) bag_->on_snapshot(snapshot);
   folder_->on_snapshot(snapshot);
   broadcast_.on_snapshot(snapshot);
   for (std::size_t i = 0; i < snapshot.n_studies; ++i) {
@@ -361,6 +365,7 @@ void LivePublisher::on_refit(const Refit& refit) {
   refit_duration_s_ = refit.duration_s;
   refit_utc_ = utc_at(host_now());
   models_.take(refit);
+  if (bag_ != nullptr) bag_->on_refit(refit);
   // At each refit, not only at the end: a run that is killed leaves its newest models.
   if (auto written = models_.write(folder_->folder()); !written) spdlog::error("{}", written.error().text());
   if (tunables_.noise.apply_to_filter) {
@@ -505,6 +510,7 @@ void LivePublisher::add_alarms(status_t& status, HostTime now) {
   };
   if (recorder_ != nullptr) add_disk("capture", recorder_->status().problem);
   add_disk("results", folder_->problem());
+  if (bag_ != nullptr) add_disk(kBagFileName, bag_->problem());
   if (!bus_problem_.empty()) add(condition_of(alarm_kind::kBus, "LCM", bus_problem_));
   {
     const std::lock_guard lock(shared_mutex_);

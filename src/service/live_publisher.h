@@ -23,6 +23,7 @@
 #include "service/health.h"
 #include "service/io_thread.h"
 #include "service/live.h"
+#include "service/live_bag.h"
 #include "service/live_smoothing.h"
 #include "service/minute_line.h"
 #include "service/modeller.h"
@@ -49,6 +50,11 @@ class LivePublisher {
   [[nodiscard]] Result<void> smooth(LiveHistory& history, const EstimatorConfig& estimator);
   /// Everything that is published, heard and applied goes into the capture, too. Call before start().
   void set_recorder(Recorder& recorder);
+  /// Everything that is published, and the estimates, go into the run's MCAP file, too. Call before
+  /// set_recorder(); the file must outlive the thread.
+  void set_bag(LiveBag& bag) { bag_ = &bag; }
+  /// Of the run.
+  [[nodiscard]] const OutputFolder& folder() const { return folder_->folder(); }
   /// What the system refused at start; repeated in every status message.
   void set_refusals(const std::vector<Error>& refusals);
   /// What the decoders need of their CAN buses, per device; for those watched. Call before start().
@@ -99,6 +105,7 @@ class LivePublisher {
   IoThread& io_;
   CoreThread& estimator_;
   Recorder* recorder_ = nullptr;
+  LiveBag* bag_ = nullptr;
   std::vector<std::size_t> study_devices_;
   EstimatorConfig estimator_config_;
   Tunables tunables_;

@@ -14,6 +14,7 @@
 #include "service/candump_source.h"
 #include "service/capture_damage.h"
 #include "service/device_factory.h"
+#include "service/mcap_source.h"
 #include "service/noise_feedback.h"
 #include "service/recorded_look.h"
 
@@ -98,6 +99,17 @@ Result<void> check_roles(const Configuration& configuration, const std::vector<b
 /// Per device: what its log of candump holds, where it is given as one.
 using Logs = std::vector<std::optional<CandumpSurvey>>;
 
+/// Per device: what its MCAP file holds, where it is read from one.
+using Bags = std::vector<std::optional<McapSurvey>>;
+
+/// The bytes of a device that is in no log of candump.
+OpenSource open_plain(const Configuration& configuration, const std::vector<std::filesystem::path>& files,
+                      Bags bags) {
+  return [devices = configuration.devices, files, bags = std::move(bags)](DeviceIndex index) {
+    return bags[index] ? open_mcap(files[index], devices[index], *bags[index]) : open_raw_dump(files[index]);
+  };
+}
+
 /// Arrival stamps are times of the host, which nothing ties to a device's own.
 Result<void> check_stamps(const std::vector<std::filesystem::path>& files, const std::vector<bool>& present,
                           const std::vector<bool>& unstamped, const Logs& logs, std::size_t reference) {
@@ -145,9 +157,9 @@ class LogAlignment {
       if (!logs_[i] || i == reference_) continue;
       if (auto aligned = align(i); !aligned) return aligned;
     }
-    opened_.recording.open = [files = files_, logs = logs_, clocks = clocks_](DeviceIndex index) {
-      return logs[index] ? open_candump(files[index], logs[index]->interface, clocks[index])
-                         : open_raw_dump(files[index]);
+    opened_.recording.open = [files = files_, logs = logs_, clocks = clocks_,
+                              plain = opened_.recording.open](DeviceIndex index) {
+      return logs[index] ? open_candump(files[index], logs[index]->interface, clocks[index]) : plain(index);
     };
     return {};
   }
@@ -200,7 +212,7 @@ class LogAlignment {
   Result<std::vector<Sample>> decode(std::size_t i, const ClockMapConfig& log_clock) {
     const auto index = static_cast<DeviceIndex>(i);
     auto source =
-        logs_[i] ? open_candump(files_[i], logs_[i]->interface, log_clock) : open_raw_dump(files_[i]);
+        logs_[i] ? open_candump(files_[i], logs_[i]->interface, log_clock) : opened_.recording.open(index);
     if (!source) return tl::unexpected<Error>(source.error());
     return decode_all(configuration_.devices[i], index, inputs_, opened_.recording.clocks[i].map, **source,
                       progress_);
@@ -243,6 +255,7 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   recording.present.resize(n);
   std::vector<bool> unstamped(n);
   Logs logs(n);
+  Bags bags(n);
   for (std::size_t i = 0; i < n; ++i) {
     auto& file = (*files)[i];
     if (file.empty()) file = (*files)[configuration.devices[i].line_owner];
@@ -250,6 +263,14 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
     if (!recording.present[i]) {
       opened.remarks.push_back(
           fmt::format("{}: no file given; the run goes without it", configuration.devices[i].name));
+      continue;
+    }
+    if (configuration.devices[i].protocol == Protocol::kMcap) {
+      auto survey = survey_mcap(file, configuration.devices[i], progress);
+      if (!survey) return tl::unexpected<Error>(survey.error());
+      recording.damage.insert(recording.damage.end(), survey->losses.begin(), survey->losses.end());
+      bags[i] = std::move(*survey);
+      unstamped[i] = true;
       continue;
     }
     if (CandumpLog::looks_like_one((*files)[i])) {
@@ -279,7 +300,8 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
       !stamps) {
     return tl::unexpected<Error>(stamps.error());
   }
-  recording.open = [files = *files](DeviceIndex index) { return open_raw_dump(files[index]); };
+  opened.remarks.insert(opened.remarks.end(), recording.damage.begin(), recording.damage.end());
+  recording.open = open_plain(configuration, *files, std::move(bags));
   const bool has_log = std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.has_value(); });
   if (findings != nullptr && !has_log) *findings = look_at_dumps(configuration, recording, unstamped);
   auto clocks = align_clocks(configuration, unstamped, [&](DeviceIndex index) -> Result<std::vector<Sample>> {

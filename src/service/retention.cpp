@@ -21,6 +21,7 @@
 #include "capture/capture_files.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
+#include "service/live_bag.h"
 
 namespace imuscope {
 
@@ -34,8 +35,8 @@ constexpr const char* kCaptureName = "capture.lcm";
 /// Name of a file as a live run writes it. A file that was being written at a cut of the power has a dot
 /// before it.
 bool is_file_of_a_run(std::string_view name) {
-  constexpr std::array<std::string_view, 5> kWhole{"navigation.csv", "odometry.csv", "calibration.json",
-                                                   "models.json", "run.json"};
+  constexpr std::array<std::string_view, 6> kWhole{"navigation.csv", "odometry.csv", "calibration.json",
+                                                   kBagFileName,     "models.json",  "run.json"};
   constexpr std::array<std::string_view, 3> kOfAnImu{"calibration_", "errors_", "smoothed_"};
   if (std::find(kWhole.begin(), kWhole.end(), name) != kWhole.end()) return true;
   const bool is_capture = name == kCaptureName || (name.starts_with("capture_") && name.ends_with(".lcm"));

@@ -10,6 +10,7 @@
 #include "service/run_folder.h"
 #include "study/evaluation_drive.h"
 #include "study/evaluation_models.h"
+#include "study/recording_of_run.h"
 
 namespace imuscope {
 namespace {
@@ -25,20 +26,6 @@ Result<json> read_document(const std::filesystem::path& file) {
   auto document = report::read_json_file(file);
   if (document.is_discarded()) return work_error(file.string() + " is no JSON", "make the run again");
   return document;
-}
-
-Result<OpenedRecording> open_run(const EvaluationRunOptions& options, const json& run) {
-  const OpeningProgress& progress = options.progress;
-  std::vector<std::string> inputs = options.inputs;
-  if (inputs.empty()) inputs = run.value("inputs", std::vector<std::string>{});
-  if (!options.configuration.empty()) return open_recording(inputs, options.configuration, progress);
-  const bool dumps = !inputs.empty() && inputs.front().find('=') != std::string::npos;
-  if (!dumps) return open_recording(inputs, std::nullopt, progress);
-  const auto text = run.value("configuration_text", std::string{});
-  if (text.empty()) return usage_error("run.json holds no configuration", "give it with --config");
-  auto configuration = parse_configuration(text, run.value("configuration", std::string{"run.json"}));
-  if (!configuration) return tl::unexpected<Error>(configuration.error());
-  return open_dumps(inputs, std::move(*configuration), progress);
 }
 
 std::array<double, kImuAxes> turn_on_sd(const StudyConfig& study) {
@@ -113,7 +100,8 @@ Result<json> evaluate_documents(const EvaluationRunOptions& options) {
     if (!read) return read;
     dependence = std::move(*read);
   }
-  const auto opened = open_run(options, *run);
+  const auto opened =
+      open_recording_of_run({options.run_dir, options.inputs, options.configuration}, *run, options.progress);
   if (!opened) return tl::unexpected<Error>(opened.error());
   const auto drives = evaluation_drives(*opened, options.run_dir, *calibration, [&](double share) {
     if (options.progress) options.progress("reading the drive", share);

@@ -19,6 +19,8 @@
 #include <regex>
 #include <sstream>
 
+#include "mcap/reader.h"
+#include "mcap/ros_messages.h"
 #include "mounting_compare.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
@@ -94,7 +96,7 @@ std::vector<std::int64_t> counters_of(const std::filesystem::path& file) {
 std::filesystem::path configuration_in(const std::filesystem::path& folder) {
   std::string text = read_text(source_path("config/demo.toml"));
   text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder / "ports").string());
-  text += "\n[noise]\nrefit_interval_s = 15.0\n\n[regimes]\nby = \"labels\"\n";
+  text += "\n[noise]\nrefit_interval_s = 15.0\n\n[regimes]\nby = \"labels\"\n\n[record]\nmcap = true\n";
   auto file = folder / "live.toml";
   std::ofstream(file) << text;
   return file;
@@ -296,6 +298,60 @@ class LiveRun : public testing::Test {
     EXPECT_GT(rows[""], 100) << "before and after nothing was named";
   }
 
+  /// run.mcap holds every sample that the run decoded, what was published, and corrected samples that show
+  /// the reference's motion.
+  void check_bag(const std::filesystem::path& live) {
+    auto reader = mcap::Reader::open(live / "run.mcap");
+    ASSERT_TRUE(reader) << reader.error().text();
+    std::map<std::string, std::int64_t> counts;
+    std::map<std::int64_t, Vector3d> reference;
+    std::vector<std::pair<std::int64_t, Vector3d>> corrected;
+    while (const auto message = reader->next()) {
+      const std::string& topic = message->topic->name;
+      ++counts[topic];
+      mcap::Imu imu;
+      if (topic == "/imu/airins/raw" && mcap::read(message->data, imu)) {
+        const auto& w = imu.angular_velocity;
+        reference[imu.header.stamp_ns] = Vector3d(w[0], -w[1], -w[2]);
+      }
+      if (topic == "/imu/mtx1/corrected" && mcap::read(message->data, imu)) {
+        corrected.emplace_back(imu.header.stamp_ns, Vector3d(imu.angular_velocity.data()));
+        EXPECT_GT(imu.angular_velocity_covariance[0], 0.0);
+      }
+    }
+    EXPECT_TRUE(reader->losses().empty()) << reader->losses().front();
+    const auto run = read_json(live / "run.json");
+    for (const auto& device : run.at("devices")) {
+      const auto name = device.at("name").get<std::string>();
+      if (device.at("role") != "study") continue;
+      EXPECT_EQ(counts["/imu/" + name + "/raw"], device.at("samples").get<std::int64_t>()) << name;
+    }
+    EXPECT_GE(counts["/imuscope/status"], static_cast<std::int64_t>(heard_.statuses.size()));
+    EXPECT_GE(counts["/imuscope/navigation"], static_cast<std::int64_t>(heard_.navigations.size()));
+    EXPECT_EQ(counts["/imuscope/navigation"], counts["/navigation/odometry"]);
+    EXPECT_GE(counts["/imuscope/calibration/mtx1"],
+              static_cast<std::int64_t>(heard_.calibrations["mtx1"].size()));
+    EXPECT_GT(counts["/imuscope/noise_model/mtx1"], 0);
+    EXPECT_GT(counts["/tf_static"], 3);
+    EXPECT_GT(counts["/gnss/gnss/fix"], 400);
+    // In the last ten seconds the mounting is known: the mean difference is the noise's, whose sd is 0.65
+    // deg/s.
+    ASSERT_GT(corrected.size(), 1500U);
+    Vector3d sum = Vector3d::Zero();
+    Vector3d turns = Vector3d::Zero();
+    int n = 0;
+    for (auto it = corrected.end() - 1000; it != corrected.end(); ++it) {
+      const auto near = reference.lower_bound(it->first);
+      if (near == reference.end()) continue;
+      sum += it->second - near->second;
+      turns += near->second.cwiseAbs();
+      ++n;
+    }
+    ASSERT_GT(n, 900);
+    EXPECT_LT((sum / n).norm(), 0.3 / kDeg) << sum.transpose() / n;
+    EXPECT_GT(turns.norm() / n, 0.5 / kDeg) << "the vehicle moved";
+  }
+
   Listener heard_;
 };
 
@@ -347,6 +403,7 @@ TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
     check_errors(imu, folder / "live");
   }
   check_models();
+  check_bag(folder / "live");
   // The modeller runs when nothing else wants to: on a loaded machine the last S-IMU's turn may come too
   // late.
   ASSERT_FALSE(heard_.dynamics.empty());

@@ -54,7 +54,8 @@ TEST(Bench, EveryPromisedRowIsInTheOneTable) {
       {"ring_speed", {"--rounds", "1", "--elements", "1000"}},
       {"imuscope_epoch_cost", {"--repeats", "1", "--seconds", "2"}},
       {"noise_speed", {"--runs", "1", "--quick"}},
-      {"replay_speed", {"--minutes", "0.5", "--rounds", "1", "--scratch", (folder / "drives").string()}}};
+      {"replay_speed", {"--minutes", "0.5", "--rounds", "1", "--scratch", (folder / "drives").string()}},
+      {"mcap_speed", {"--minutes", "0.1", "--rounds", "1", "--scratch", folder.string()}}};
   std::vector<std::string> compose;
   for (const Program& program : programs) {
     const auto part = folder / (std::string(program.name) + ".json");
@@ -88,6 +89,7 @@ TEST(Bench, EveryPromisedRowIsInTheOneTable) {
   for (const char* what :
        {"raw bytes, no refits", "raw bytes, refits every minute", "capture", "whole study"})
     EXPECT_TRUE(has_row(table, "replay", what)) << what;
+  for (const char* what : {"out, ", "in, "}) EXPECT_TRUE(has_row(table, "mcap", what)) << what;
   for (const char* what : {"replay, with S-IMUs", "replay, with the drive's length", "streaming, with levels",
                            "epoch, with states"})
     EXPECT_TRUE(has_row(table, "growth", what)) << what;

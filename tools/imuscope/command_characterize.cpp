@@ -165,6 +165,7 @@ Result<void> run_characterize(CharacterizeCommand& options) {
   std::vector<std::vector<certificate::AxisCertificate>> all;
   auto documents = nlohmann::json::array();
   for (const SensorRecord& record : *records) {
+    for (const auto& warning : record.warnings) say_aside("warning: {}\n", warning);
     auto axes = characterize(record, options.how);
     if (!axes) return tl::unexpected(axes.error());
     const std::string name = options.sensor.empty() || records->size() > 1 ? record.name : options.sensor;
@@ -231,6 +232,8 @@ void add_characterize(CLI::App& app, Work& chosen) {
       "--time", options->choice.signal.time,
       "Column with time stamps: seconds, ISO 8601, or WEEK,SECONDS of GPS (default: by its name; none: no "
       "times)");
+  command->add_option("--topic", options->choice.signal.topic,
+                      "Topic of an MCAP file, where it holds several IMUs");
   command->add_option("--counter", options->choice.signal.counter, "Column that counts the samples");
   command->add_option("--where", options->choice.signal.where,
                       "COLUMN=VALUE: rows with another value count as gaps");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "export_run.h"
 #include "fit_file.h"
 #include "noise/export.h"
 #include "print.h"
@@ -21,6 +22,7 @@ struct ExportCommand {
   std::string regime;
   std::string unit;
   noise::ExportOptions how;
+  ExportRun of_run;
 };
 
 /// Keeps the fits whose `member` is `wanted`; without a wish there must be one choice only.
@@ -41,7 +43,7 @@ Result<void> keep(std::vector<StoredFit>& fits, std::string StoredFit::*member, 
   return {};
 }
 
-Result<void> run_export(const ExportCommand& options) {
+Result<void> export_models(const ExportCommand& options) {
   const auto format = noise::parse_export_format(options.format);
   if (!format) return tl::unexpected(format.error());
   const auto unit = noise::parse_unit(options.unit);
@@ -64,20 +66,35 @@ Result<void> run_export(const ExportCommand& options) {
   return {};
 }
 
+Result<void> run_export(ExportCommand& options) {
+  const bool is_of_run = options.files.size() == 1 && has_mountings(options.files.front());
+  if (options.format != "mcap" && is_of_run)
+    return export_mounting(options.files.front(), options.name, options.format);
+  if (options.format != "mcap") return export_models(options);
+  if (options.files.size() != 1) return usage_error("more than one run is given", "export them one by one");
+  options.of_run.run = options.files.front();
+  return export_mcap(options.of_run);
+}
+
 }  // namespace
 
 void add_export(CLI::App& app, Work& chosen) {
-  auto* command = app.add_subcommand("export", "Noise models as another tool's configuration");
+  auto* command = app.add_subcommand(
+      "export", "A run as a bag, noise models and mountings as another tool's configuration");
   auto options = std::make_shared<ExportCommand>();
   command
       ->add_option("MODEL", options->files,
-                   "What `imuscope fit --json` printed (one file an axis), a run's models.json, or the "
+                   "A run's folder; what `imuscope fit --json` printed (one file an axis), a run's "
+                   "models.json, or the "
                    "certificate.json of "
                    "`imuscope characterize`")
       ->required();
   command
       ->add_option("--to,-t", options->format,
-                   "kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins or state-space")
+                   "Of a run: mcap, all of it in one file; urdf, tf, kalibr, openvins or json, a mounting. "
+                   "Of noise models: kalibr, openvins, vins-fusion, "
+                   "lio-sam, gtsam, "
+                   "ros, px4, kf-gins or state-space")
       ->required();
   command->add_option("--name,-n", options->name, "The S-IMU to export, where the file holds several");
   command->add_option("--regime", options->regime, "all, static or dynamic, where the file holds several");
@@ -87,6 +104,16 @@ void add_export(CLI::App& app, Work& chosen) {
                     "Upper ends of the intervals, for a filter that must not be optimistic");
   command->add_flag("--force", options->how.force,
                     "Write even what does not hold: the file then says why it should not be used");
+  command->add_option("--out,-o", options->of_run.out,
+                      "mcap: the file; without it run.mcap in the run's folder");
+  options->of_run.compression = "zstd";
+  command->add_option("--compression", options->of_run.compression, "mcap: zstd, lz4 or none")
+      ->capture_default_str();
+  command->add_flag("--errors", options->of_run.with_errors, "mcap: the rows of the error process, too");
+  command->add_option(
+      "--recording", options->of_run.inputs,
+      "mcap: the capture or the raw dumps (NAME=FILE), where they are no longer where they were");
+  command->add_option("--config", options->of_run.config, "mcap: the configuration of that recording");
   on_chosen(*command, chosen, [options] { return run_export(*options); });
 }
 

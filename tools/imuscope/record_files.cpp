@@ -11,6 +11,7 @@
 
 #include "axis_columns.h"
 #include "base/units.h"
+#include "mcap_signal.h"
 
 namespace imuscope::cli {
 namespace {
@@ -200,6 +201,29 @@ Result<SensorRecord> read_raw_files(const std::vector<std::filesystem::path>& fi
   return sensor;
 }
 
+/// All axes of one topic.
+Result<SensorRecord> read_mcap(const std::filesystem::path& file, const RecordChoice& choice) {
+  auto read = read_mcap_axes(file, choice.signal.topic, choice.signal.rate_hz);
+  if (!read) return tl::unexpected(read.error());
+  SensorRecord sensor{file.stem().string(), {file.filename().string()}, {}, {}};
+  if (!choice.signal.topic.empty()) sensor.selection = "topic " + choice.signal.topic;
+  for (std::size_t i = 0; i < kMcapAxes.size(); ++i) {
+    Signal& signal = read->axes[i];
+    // A triad that the messages do not have is none of the record's.
+    if (std::none_of(signal.mask.begin(), signal.mask.end(), [](std::uint8_t there) { return there != 0; }))
+      continue;
+    certificate::AxisRecord axis;
+    axis.name = kMcapAxes[i];
+    axis.unit = is_gyro_name(axis.name) ? noise::SignalUnit::kRadps : noise::SignalUnit::kMps2;
+    axis.rate_hz = *signal.rate_hz;
+    axis.values = std::move(signal.values);
+    axis.mask = std::move(signal.mask);
+    sensor.axes.push_back(std::move(axis));
+  }
+  sensor.warnings = std::move(read->warnings);
+  return sensor;
+}
+
 /// The error process of one S-IMU in one regime.
 Result<SensorRecord> read_run(const std::filesystem::path& folder, const RecordChoice& choice) {
   std::vector<std::string> imus;
@@ -242,7 +266,9 @@ Result<std::vector<SensorRecord>> read_records(const std::vector<std::filesystem
       raw.push_back(file);
       continue;
     }
-    auto record = std::filesystem::is_directory(file) ? read_run(file, choice) : read_csv(file, choice);
+    auto record = std::filesystem::is_directory(file) ? read_run(file, choice)
+                  : is_mcap(file)                     ? read_mcap(file, choice)
+                                                      : read_csv(file, choice);
     if (!record) return tl::unexpected(record.error());
     records.push_back(std::move(*record));
   }

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Files of a sensor at rest as the records of its axes: CSV in anyone's columns and units, raw float64, a
-/// run folder.
+/// topic of an MCAP file, a run folder.
 
 #include <filesystem>
 #include <map>
@@ -31,6 +31,7 @@ struct SensorRecord {
   std::vector<std::string> files;  ///< names without folders
   std::string selection;           ///< "regime static"; empty: all
   std::vector<certificate::AxisRecord> axes;
+  std::vector<std::string> warnings{};  ///< what is missing of the file
 };
 
 /// Raw files (.f64) named after axes, as "gyro_x_degps.f64", make one sensor; every CSV file and every run

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "mcap_signal.h"
 #include "noise/fit.h"
 #include "noise/tails.h"
 
@@ -64,12 +65,14 @@ std::optional<std::string> spikes_in(const Signal& signal, const noise::WaveletV
 }  // namespace
 
 void add_signal_options(CLI::App& command, SignalOptions& options, bool several) {
-  const char* what =
-      several ? "Signal: CSV, or raw little-endian float64 (.f64); several are replicates of one sensor"
-              : "Signal: CSV, or raw little-endian float64 (.f64)";
+  const char* what = several ? "Signal: CSV, MCAP with messages of ROS, or raw little-endian float64 (.f64); "
+                               "several are replicates of one sensor"
+                             : "Signal: CSV, MCAP with messages of ROS, or raw little-endian float64 (.f64)";
   auto* file = command.add_option("FILE", options.files, what)->required();
   if (!several) file->expected(1);
-  command.add_option("--column,-c", options.choice.column, "Column of a CSV: its name, or its number from 1");
+  command.add_option("--column,-c", options.choice.column,
+                     "Column of a CSV: its name, or its number from 1; of an MCAP file gyro_x to accel_z");
+  command.add_option("--topic", options.choice.topic, "Topic of an MCAP file, where it holds several IMUs");
   command.add_option("--where", options.choice.where,
                      "COLUMN=VALUE of a CSV: rows with another value count as gaps, as in regime=static");
   command.add_option("--counter", options.choice.counter,
@@ -99,7 +102,7 @@ Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, Lines lin
   if (const auto unit = noise::parse_unit(options.unit); !unit) return tl::unexpected(unit.error());
   ReadSignals out;
   for (const auto& file : options.files) {
-    auto signal = read_signal(file, options.choice);
+    auto signal = read_any_signal(file, options.choice, out.warnings);
     if (!signal) return tl::unexpected(signal.error());
     if (!signal->rate_hz) {
       return usage_error(fmt::format("{} has no time stamps that would tell its rate", file.string()),

@@ -1,0 +1,80 @@
+#pragma once
+
+/// CDR as ROS 2 serialises its messages (XCDR1, plain): a head of four bytes that tells the byte order, then
+/// fields at multiples of their size, counted from behind the head.
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "mcap/records.h"
+
+namespace imuscope::mcap {
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
+
+/// Writes one message after the other into the same buffer; little-endian.
+class CdrWriter {
+ public:
+  void begin();
+  template <typename Number>
+  void number(Number value) {
+    align(sizeof value);
+    const std::size_t at = out_.size();
+    out_.resize(at + sizeof value);
+    std::memcpy(out_.data() + at, &value, sizeof value);
+  }
+  template <std::size_t N>
+  void numbers(const std::array<double, N>& values) {
+    align(sizeof(double));
+    const std::size_t at = out_.size();
+    out_.resize(at + sizeof values);
+    std::memcpy(out_.data() + at, values.data(), sizeof values);
+  }
+  void text(std::string_view text);
+  [[nodiscard]] Bytes bytes() const { return bytes_of(out_); }
+
+ private:
+  void align(std::size_t size);
+  std::string out_;
+};
+
+/// Takes fields one after the other; what is asked for beyond the end is zero, and good() says so.
+class CdrReader {
+ public:
+  explicit CdrReader(Bytes message) noexcept;
+  template <typename Number>
+  [[nodiscard]] Number number() noexcept {
+    align(sizeof(Number));
+    std::array<std::uint8_t, sizeof(Number)> bytes{};
+    if (body_.size() - at_ < sizeof(Number)) {
+      good_ = false;
+      at_ = body_.size();
+      return Number{};
+    }
+    for (std::size_t i = 0; i < sizeof(Number); ++i)
+      bytes[swap_ ? sizeof(Number) - 1 - i : i] = body_[at_ + i];
+    at_ += sizeof(Number);
+    return std::bit_cast<Number>(bytes);
+  }
+  template <std::size_t N>
+  [[nodiscard]] std::array<double, N> numbers() noexcept {
+    std::array<double, N> values{};
+    for (double& value : values) value = number<double>();
+    return values;
+  }
+  [[nodiscard]] std::string_view text() noexcept;
+  [[nodiscard]] bool good() const noexcept { return good_; }
+
+ private:
+  void align(std::size_t size) noexcept;
+  Bytes body_;
+  std::size_t at_ = 0;
+  bool swap_ = false;
+  bool good_ = true;
+};
+
+}  // namespace imuscope::mcap

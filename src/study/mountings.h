@@ -1,0 +1,22 @@
+#pragma once
+
+/// The mountings of a run, by its calibration.json.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "bag/bag_writer.h"
+
+namespace imuscope {
+
+/// What a run found of one S-IMU.
+struct FoundCalibration {
+  bag::Mounting mounting;      ///< t_d_s as the recording's own times need it
+  bag::Correction correction;  ///< the same mounting with biases and scales
+};
+
+/// Those S-IMUs that have an estimate.
+[[nodiscard]] std::vector<FoundCalibration> found_calibrations(const nlohmann::json& calibration);
+
+}  // namespace imuscope

@@ -1,0 +1,147 @@
+/// Mountings as others write them, read back and put through the equations of those who read them.
+
+#include "bag/mounting_text.h"
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <regex>
+
+namespace imuscope::bag {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Numbers of a text behind `key`.
+std::vector<double> numbers_behind(const std::string& text, const std::string& key, std::size_t n) {
+  const auto at = text.find(key);
+  EXPECT_NE(at, std::string::npos) << key << " is not in\n" << text;
+  static const std::regex kNumber("[-+]?[0-9]*\\.?[0-9]+(e[-+]?[0-9]+)?");
+  std::vector<double> numbers;
+  const std::string rest = text.substr(at + key.size());
+  for (auto found = std::sregex_iterator(rest.begin(), rest.end(), kNumber);
+       found != std::sregex_iterator() && numbers.size() < n; ++found)
+    numbers.push_back(std::stod(found->str()));
+  EXPECT_EQ(numbers.size(), n);
+  return numbers;
+}
+
+struct Case {
+  Matrix3d C_b_s;
+  Vector3d r_bs_b_m;
+  Mounting mounting;
+};
+
+std::vector<Case> cases() {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::vector<Case> all;
+  for (int i = 0; i < 40; ++i) {
+    Eigen::Quaterniond q(normal(random), normal(random), normal(random), normal(random));
+    q.normalize();
+    // The poles of roll, pitch and yaw, too: s points up or down.
+    if (i == 0) q = Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2.0, Vector3d::UnitY()));
+    if (i == 1)
+      q = Eigen::Quaterniond(Eigen::AngleAxisd(-M_PI / 2.0, Vector3d::UnitY()) *
+                             Eigen::AngleAxisd(0.7, Vector3d::UnitX()));
+    if (i == 2) q = Eigen::Quaterniond::Identity();
+    Case one{q.toRotationMatrix(), {normal(random), normal(random), normal(random)}, {}};
+    one.mounting.name = "mtx1";
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(one.mounting.C_b_s.data()) = one.C_b_s;
+    one.mounting.r_bs_b_m = {one.r_bs_b_m.x(), one.r_bs_b_m.y(), one.r_bs_b_m.z()};
+    one.mounting.t_d_s = -0.0123;
+    one.mounting.status = "calibrated";
+    all.push_back(one);
+  }
+  return all;
+}
+
+/// A point that the sensor sees, in its own axes, and where it is in base_link: forward-left-up, by our
+/// definition.
+Vector3d in_base_link(const Case& one, const Vector3d& p_s) {
+  const Vector3d p_b = one.C_b_s.transpose() * p_s + one.r_bs_b_m;
+  return {p_b.x(), -p_b.y(), -p_b.z()};
+}
+
+const Vector3d kPoint(0.3, -1.1, 2.2);
+
+TEST(MountingText, UrdfTurnsAboutFixedAxesRollFirst) {
+  for (const Case& one : cases()) {
+    const auto text = mounting_text(one.mounting, {}, "airins", MountingFormat::kUrdf);
+    const auto xyz = numbers_behind(text, "xyz=\"", 3);
+    const auto rpy = numbers_behind(text, "rpy=\"", 3);
+    const Matrix3d R =
+        (Eigen::AngleAxisd(rpy[2], Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy[1], Vector3d::UnitY()) *
+         Eigen::AngleAxisd(rpy[0], Vector3d::UnitX()))
+            .toRotationMatrix();
+    EXPECT_LT((R * kPoint + Vector3d(xyz[0], xyz[1], xyz[2]) - in_base_link(one, kPoint)).norm(), 1e-6)
+        << text;
+    EXPECT_NE(text.find("<parent link=\"base_link\"/>"), std::string::npos);
+    // A comment of XML ends at its first two hyphens.
+    const auto end = text.find("-->");
+    EXPECT_EQ(text.substr(4, end - 4).find("--"), std::string::npos) << text;
+  }
+}
+
+TEST(MountingText, TfTakesTheChildsCoordinatesToTheParents) {
+  for (const Case& one : cases()) {
+    const auto text = mounting_text(one.mounting, {}, "airins", MountingFormat::kTf);
+    const Vector3d at(numbers_behind(text, "--x ", 1)[0], numbers_behind(text, "--y ", 1)[0],
+                      numbers_behind(text, "--z ", 1)[0]);
+    const Eigen::Quaterniond q(numbers_behind(text, "--qw ", 1)[0], numbers_behind(text, "--qx ", 1)[0],
+                               numbers_behind(text, "--qy ", 1)[0], numbers_behind(text, "--qz ", 1)[0]);
+    EXPECT_LT((q * kPoint + at - in_base_link(one, kPoint)).norm(), 1e-6) << text;
+  }
+}
+
+/// kalibr: p_i = T_i_b p_b, and t = stamp + time_offset. OpenVINS reads the same T_i_b.
+TEST(MountingText, ImuChainsTakeTheBodysCoordinatesToTheSensors) {
+  for (const auto format : {MountingFormat::kKalibr, MountingFormat::kOpenVins}) {
+    for (const Case& one : cases()) {
+      const auto text = mounting_text(one.mounting, {}, "airins", format);
+      const auto T = numbers_behind(text, "T_i_b:", 16);
+      const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> T_i_b(T.data());
+      const Vector3d p_b = one.C_b_s.transpose() * kPoint + one.r_bs_b_m;
+      const Eigen::Vector4d p_i = T_i_b * p_b.homogeneous();
+      EXPECT_LT((p_i.head<3>() - kPoint).norm(), 1e-6) << text;
+      EXPECT_NEAR(p_i[3], 1.0, 0.0);
+      EXPECT_NEAR(numbers_behind(text, "time_offset:", 1)[0], -0.0123, 1e-9);
+    }
+  }
+}
+
+TEST(MountingText, OpenVinsScalesSayWhatHappensToTheTruth) {
+  Correction scale;
+  scale.gyro_scale = {0.01, -0.02, 0.03};
+  scale.accel_scale = {0.001, 0.002, -0.003};
+  const auto text = mounting_text(cases()[5].mounting, scale, "airins", MountingFormat::kOpenVins);
+  const auto Tw = numbers_behind(text, "Tw:", 9);
+  EXPECT_NEAR(Tw[0], 1.01, 1e-9);
+  EXPECT_NEAR(Tw[4], 0.98, 1e-9);
+  EXPECT_NEAR(numbers_behind(text, "Ta:", 9)[8], 0.997, 1e-9);
+}
+
+TEST(MountingText, JsonHoldsTheSameThreeTimes) {
+  for (const Case& one : cases()) {
+    const auto document =
+        nlohmann::json::parse(mounting_text(one.mounting, {}, "airins", MountingFormat::kJson));
+    const auto q = document.at("in_base_link").at("quaternion_xyzw").get<std::array<double, 4>>();
+    const auto at = document.at("in_base_link").at("xyz_m").get<std::array<double, 3>>();
+    const Vector3d there =
+        Eigen::Quaterniond(q[3], q[0], q[1], q[2]) * kPoint + Vector3d(at[0], at[1], at[2]);
+    EXPECT_LT((there - in_base_link(one, kPoint)).norm(), 1e-9);
+    EXPECT_EQ((document.at("C_b_s").get<std::array<double, 9>>()), one.mounting.C_b_s);
+  }
+}
+
+TEST(MountingText, AnUnknownFormatNamesThoseThatExist) {
+  const auto format = parse_mounting_format("sdf");
+  ASSERT_FALSE(format);
+  EXPECT_NE(format.error().text().find("urdf"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace imuscope::bag

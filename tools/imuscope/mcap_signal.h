@@ -1,0 +1,39 @@
+#pragma once
+
+/// Axes of an IMU in an MCAP file as signals: sensor_msgs/Imu of one topic, rad/s and m/s^2.
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "signal_file.h"
+
+namespace imuscope::cli {
+
+/// "gyro_x" ... "accel_z".
+inline constexpr std::array<const char*, 6> kMcapAxes{"gyro_x",  "gyro_y",  "gyro_z",
+                                                      "accel_x", "accel_y", "accel_z"};
+
+[[nodiscard]] bool is_mcap(const std::filesystem::path& file);
+
+/// What a file holds, sample by sample; times left out are gaps. In the order of kMcapAxes.
+struct McapAxes {
+  std::array<Signal, kMcapAxes.size()> axes;
+  std::vector<std::string> warnings;  ///< what is missing of the file
+};
+
+/// @param topic  may be empty where there is one IMU only
+/// Errors: those of the file and the topic (service/mcap_source.h), too few messages, times that go back, a
+/// rate that contradicts them.
+Result<McapAxes> read_mcap_axes(const std::filesystem::path& file, const std::string& topic,
+                                std::optional<double> rate_hz);
+
+/// A signal of any kind of file: `choice.column` is an axis of an MCAP file; see read_signal() for the
+/// others.
+/// @param warnings  receives what is missing of the file
+Result<Signal> read_any_signal(const std::filesystem::path& file, const SignalChoice& choice,
+                               std::vector<std::string>& warnings);
+
+}  // namespace imuscope::cli
