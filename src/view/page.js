@@ -206,8 +206,15 @@ function showHead() {
 
 function showAlarms() {
   const alarms = known.status ? known.status.alarms : [];
+  listAlarms(byId('alarms'), alarms.filter((a) => a.active));
+  const over = alarms.filter((a) => !a.active);
+  listAlarms(byId('over'), over);
+  byId('past').hidden = over.length + known.marks.length === 0;
+}
+
+function listAlarms(place, alarms) {
   const keys = alarms.map((a, i) => a.kind + '|' + a.subject + '|' + i);
-  const shown = children(byId('alarms'), keys, () => {
+  const shown = children(place, keys, () => {
     const e = element('div', 'alarm');
     e.append(element('div'), element('div', 'quiet'));
     return e;
@@ -225,7 +232,11 @@ function showDevices() {
   const tiles = children(byId('devices'), devices.map((d) => d.name), (name) => {
     const tile = element('div', 'tile'), head = element('div', 'head');
     head.append(element('h3', '', name), element('span', 'quiet'));
-    tile.append(head, element('div', 'big'));
+    const rate = element('div', 'head');
+    rate.append(element('div', 'big'), element('span'));
+    rate.children[0].dataset.field = 'rate';
+    rate.children[1].dataset.field = 'state';
+    tile.append(head, rate);
     return tile;
   });
   devices.forEach((d, i) => {
@@ -233,11 +244,9 @@ function showDevices() {
     const streams = d.state === 'streaming' || d.state === 'recorded';
     dress(tile, 'tile ' + (d.state === 'failed' ? 'no' : !streams ? 'partly' : d.problem ? 'partly' : 'yes'));
     say(tile.querySelector('.head span'), d.role + ' · ' + d.protocol);
-    const big = tile.querySelector('.big');
-    big.dataset.field = 'rate';
-    say(big, streams ? number(d.rate_hz, 1) + ' Hz' : d.state);
+    say(tile.children[1].children[0], streams ? number(d.rate_hz, 1) + ' Hz' : kUnknown);
+    say(tile.children[1].children[1], d.state);
     figures(tile, [
-      ['state', 'state', d.state],
       ['age', 'newest sample', d.data_age_s === null ? kUnknown : d.data_age_s.toFixed(1) + ' s ago'],
       ['latency', 'latency', number(d.latency_ms, 1) + ' ms'],
       ['samples', 'samples', String(d.samples)],
@@ -250,10 +259,18 @@ function showDevices() {
   });
 }
 
+// Of C_b_s, as configurations write a mounting.
+function rotationVector_deg(q) {
+  if (q.some((v) => v === null)) return [null, null, null];
+  const sign = q[0] < 0 ? -1 : 1, sine = Math.hypot(q[1], q[2], q[3]);
+  const angle = 2 * Math.atan2(sine, sign * q[0]), scale = sine > 0 ? sign * angle / sine : 2;
+  return [q[1], q[2], q[3]].map((v) => v * scale * 180 / Math.PI);
+}
+
 // Boresight, lever arm, time offset: each with its unit for people.
 const kGoals = [
   {key: 'psi', label: 'boresight', unit: 'mdeg', factor: 1000, sd: (c) => largest(c.sd_psi_deg), goal: (c) => c.goal_psi_deg,
-    value: (c) => three(c.psi_deg, 1, 3) + ' deg'},
+    value: (c) => three(rotationVector_deg(c.q), 1, 3) + ' deg'},
   {key: 'r', label: 'lever arm', unit: 'mm', factor: 1000, sd: (c) => largest(c.sd_r_m), goal: (c) => c.goal_r_m,
     value: (c) => three(c.r_m, 1000, 1) + ' mm'},
   {key: 't', label: 'time offset', unit: 'µs', factor: 1000, sd: (c) => c.sd_t_d_ms, goal: (c) => c.goal_t_d_ms,
@@ -285,10 +302,10 @@ function showCalibration() {
   });
   names.forEach((name, i) => {
     const tile = tiles[i], study = studies.get(name), imu = known.imus.get(name), c = imu ? imu.calibration : null;
-    const state = study ? study.state : c ? kValidities[c.validity] : '';
+    const state = study ? study.state : c ? kValidities[c.validity] ?? '' : '';
     const reached = c && kGoals.every((g) => g.sd(c) !== null && g.sd(c) <= g.goal(c));
     dress(tile, 'tile ' + (reached ? 'yes' : c && c.validity === 3 ? 'no' : 'partly'));
-    say(tile.querySelector('.head span'), state + (imu && imu.regime ? ' · ' + imu.regime : ''));
+    say(tile.querySelector('.head span'), [state, imu ? imu.regime : ''].filter(Boolean).join(' · '));
     kGoals.forEach((g, k) => {
       const row = tile.children[1 + k], sd = c ? g.sd(c) : null, target = c ? g.goal(c) : null;
       say(row.children[0].children[1], sd === null ? kUnknown : brief(sd * g.factor) + ' / ' + brief(target * g.factor) + ' ' + g.unit);
@@ -309,6 +326,7 @@ function showCalibration() {
 
 function showThreads() {
   const threads = known.status ? known.status.threads : [];
+  byId('deadlines').hidden = known.status !== null && threads.length === 0;
   const rows = children(byId('threads'), threads.map((t, i) => t.name + '|' + i), () => {
     const row = element('tr');
     for (let i = 0; i < 9; ++i) row.append(element('td'));
@@ -332,7 +350,7 @@ function showPosition() {
   if (!n) return;
   const speed = n.v_n_mps === null || n.v_e_mps === null ? null : Math.hypot(n.v_n_mps, n.v_e_mps);
   const validity = ['', '', 'without GNSS · ', 'GNSS contradicts the motion · ', 'stale · '][n.validity] ?? '';
-  say(byId('position'), validity + number(n.lat_deg, 6) + ' ' + number(n.lon_deg, 6) + ' ± ' + number(Math.max(n.sd_n_m, n.sd_e_m), 2) + ' m  ·  ' +
+  say(byId('position'), validity + number(n.lat_deg, 6) + ' ' + number(n.lon_deg, 6) + ' ± ' + brief(Math.max(n.sd_n_m, n.sd_e_m)) + ' m  ·  ' +
     number(speed === null ? null : speed * 3.6, 1) + ' km/h  ·  heading ' + number(n.heading_deg, 1) + '°' +
     (known.odometry ? '  ·  wheels ' + number(known.odometry.speed_mps, 2) + ' m/s' : ''));
 }
@@ -471,6 +489,7 @@ function drawTrack() {
   g.lineTo(14 + pixels, h - 14);
   g.stroke();
   g.textBaseline = 'bottom';
+  g.textAlign = 'left';
   g.fillText(length >= 1000 ? length / 1000 + ' km' : length + ' m', 14, h - 18);
   g.textAlign = 'right';
   g.fillText('N ↑', w - 12, h - 12);
@@ -553,7 +572,9 @@ function drawWavelet(canvas, variances, models) {
   g.beginPath();
   g.rect(left, top, right - left, bottom - top);
   g.clip();
-  const colourOf = (regime) => regime === 'static' ? colours.rest : colours.x;
+  const regimes = [...new Set(variances.map((v) => v.regime))];
+  const fixed = {static: colours.rest, dynamic: colours.x, all: colours.text};
+  const colourOf = (regime) => fixed[regime] ?? colours[['x', 'y', 'z', 'partly'][regimes.indexOf(regime) % 4]];
   for (const v of variances) {
     g.strokeStyle = g.fillStyle = colourOf(v.regime);
     g.lineWidth = 1.5;
@@ -578,14 +599,22 @@ function drawWavelet(canvas, variances, models) {
     g.stroke();
   }
   g.restore();
+  // Variances fall: the lower left is free.
+  g.textAlign = 'left';
+  g.textBaseline = 'bottom';
+  regimes.forEach((regime, i) => {
+    g.fillStyle = colourOf(regime);
+    g.fillText(regime, left + 6, bottom - 4 - 15 * (regimes.length - 1 - i));
+  });
 }
 
 function showWavelets(imu) {
+  say(byId('no-wavelets'), imu && imu.variances ? '' : 'none yet: the first fit comes with the first hundreds of samples');
   const variances = imu && imu.variances ? imu.variances : [], models = imu && imu.models ? imu.models : [];
   const axes = kAxes.filter((axis) => variances.some((v) => v.axis === axis));
   const tiles = children(byId('wavelets'), axes, (axis) => {
     const tile = element('div', 'tile'), head = element('div', 'head');
-    head.append(element('h3', '', axis), element('span', 'quiet'));
+    head.append(element('h3', '', axis.replace('_', '\u00a0')), element('span', 'quiet'));
     tile.append(head, element('canvas', 'loglog'), element('p', 'values'));
     return tile;
   });
@@ -593,10 +622,9 @@ function showWavelets(imu) {
     const v = variances.filter((one) => one.axis === axis), m = models.filter((one) => one.axis === axis);
     say(tiles[i].querySelector('.head span'), v.map((one) => one.regime + ' ' + one.n).join(' · ') + ' samples');
     say(tiles[i].querySelector('p'), m.map((one) => one.regime + ': ' + one.model + (one.identifiable ? '' : ' (not identifiable)') + ', ' +
-      one.parameters.filter((p) => p[1] === 'sigma2' && p[3] > 0).map((p) => p[0] + ' ' + brief(Math.sqrt(p[3]))).join(', ')).join('\n'));
+      one.parameters.filter((p) => p[1] === 'sigma2' && p[3] > 0).map((p) => p[0] + ' ' + brief(Math.sqrt(p[3]))).join(', ') + ' ' + (v[0] ? v[0].unit : '')).join('\n'));
     drawWavelet(tiles[i].querySelector('canvas'), v, m);
   });
-  if (axes.length === 0 && !byId('wavelets').hasChildNodes()) return;
 }
 
 function showChoice() {
@@ -612,7 +640,7 @@ function showChoice() {
 }
 
 // ---- the loop: at most ten pictures a second, none while nobody looks ----------------------------------------------
-let dirty = true, drawnAt = -Infinity, drawnWavelets = null;
+let dirty = true, drawnAt = -Infinity, drawnWavelets = [];
 function frame(now) {
   requestAnimationFrame(frame);
   if (now - drawnAt < (dirty ? 95 : 950)) return;
@@ -635,11 +663,12 @@ function draw() {
   const imu = known.imus.get(chosen);
   drawSignal(byId('gyro'), imu, 0, 180 / Math.PI, 'gyroscope', 'deg/s');
   drawSignal(byId('accel'), imu, 3, 1, 'accelerometer', 'm/s²');
-  say(byId('errors-note'), imu && imu.errors.length ? (kValidities[imu.validity] || 'coasting') + ' · ' + imu.regime +
+  say(byId('errors-note'), imu && imu.errors.length ? [kValidities[imu.validity], imu.regime].filter(Boolean).join(' · ') +
     (counts.missed ? ' · ' + counts.missed + ' rows were missed: this connection is slow' : '') : 'none yet');
-  const state = imu ? chosen + (imu.variances ? JSON.stringify(imu.variances[0] ?? '').length + '|' + imu.variances.reduce((n, v) => n + v.n, 0) : '') + innerWidth + document.documentElement.dataset.colours + colours.ground + !!imu.models : '';
-  if (state !== drawnWavelets) {
-    drawnWavelets = state;
+  // Six figures that change once in a while alone.
+  const shown = [imu, imu && imu.variances, imu && imu.models, innerWidth, colours.ground];
+  if (shown.some((what, i) => what !== drawnWavelets[i])) {
+    drawnWavelets = shown;
     showWavelets(imu);
   }
 }

@@ -2,9 +2,16 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace imuscope::view {
+
+namespace {
+
+constexpr double kToTheEnd = std::numeric_limits<double>::infinity();
+
+}  // namespace
 
 Result<std::unique_ptr<Player>> Player::open(std::unique_ptr<RecordedMessages> recording) {
   std::unique_ptr<Player> player(new Player(std::move(recording)));
@@ -80,7 +87,8 @@ std::string Player::turn(double passed_s) {
     if (backwards) at_end_ = !recording_->rewind();
     if (is_seek || speed_ > kRowsUpTo) picture_.tell_all_next();
   }
-  if (is_seek || plays) feed_until(clock_s_, is_seek);
+  // What bears the last time may not be the last message.
+  if (is_seek || plays) feed_until(clock_s_ < length_s_ ? clock_s_ : kToTheEnd, is_seek);
   const std::scoped_lock lock(mutex_);
   if (at_end_) is_playing_ = false;
   return picture_.part(extra());

@@ -41,6 +41,9 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr std::size_t kModelsMax = 2048;
 constexpr std::size_t kDevicesMax = 64;
 constexpr std::size_t kLevelsMax = 64;
+constexpr std::size_t kParametersMax = 64;
+/// Of what a table does not tell: none of the constants of the message.
+constexpr std::int8_t kNoValidity = -1;
 
 double or_unknown(const json& object, const char* key) { return number_at(object, key).value_or(kUnknown); }
 
@@ -52,6 +55,14 @@ std::int64_t count_at(const json& object, const char* key) {
 
 template <typename Message>
 using Column = std::pair<const char*, double Message::*>;
+
+/// Goes to the next row that has a time, which stands in the first column.
+double next_time_s(CsvReader& reader) {
+  while (reader.next()) {
+    if (std::isfinite(reader.number(0))) return reader.number(0);
+  }
+  return kNever;
+}
 
 /// Rows of one table as messages. `time_s()` is that of the row under way, kNever at the end.
 class Table {
@@ -82,7 +93,7 @@ class PlainTable final : public Table {
   }
 
  private:
-  void advance() { time_s_ = reader_.next() ? reader_.number(0) : kNever; }
+  void advance() { time_s_ = next_time_s(reader_); }
 
   CsvReader reader_;
   std::vector<Column<Message>> columns_;
@@ -107,16 +118,14 @@ std::vector<Column<calibration_t>> calibration_columns() {
           {"psi_x_deg", &C::psi_x_deg},
           {"psi_y_deg", &C::psi_y_deg},
           {"psi_z_deg", &C::psi_z_deg},
+          {"q_w", &C::q_w},
+          {"q_x", &C::q_x},
+          {"q_y", &C::q_y},
+          {"q_z", &C::q_z},
           {"r_x_m", &C::r_x_m},
           {"r_y_m", &C::r_y_m},
           {"r_z_m", &C::r_z_m},
           {"t_d_ms", &C::t_d_ms},
-          {"bg_x_radps", &C::bg_x_radps},
-          {"bg_y_radps", &C::bg_y_radps},
-          {"bg_z_radps", &C::bg_z_radps},
-          {"ba_x_mps2", &C::ba_x_mps2},
-          {"ba_y_mps2", &C::ba_y_mps2},
-          {"ba_z_mps2", &C::ba_z_mps2},
           {"sd_psi_x_deg", &C::sd_psi_x_deg},
           {"sd_psi_y_deg", &C::sd_psi_y_deg},
           {"sd_psi_z_deg", &C::sd_psi_z_deg},
@@ -138,6 +147,7 @@ class ErrorTable final : public Table {
  public:
   ErrorTable(CsvReader reader, const std::string& name) : reader_(std::move(reader)) {
     message_.name = name;
+    message_.validity = kNoValidity;
     advance();
   }
   static std::vector<std::string> columns() {
@@ -151,7 +161,7 @@ class ErrorTable final : public Table {
     message_.rows.clear();
     message_.regime = std::string(reader_.cell(kRegime));
     const double end_s = time_s_ + kMessage_s;
-    while (time_s_ < end_s && message_.rows.size() < kRowsMax && reader_.cell(kRegime) == message_.regime) {
+    do {  // one at least, whatever its time
       error_row_t row{};
       row.time_s = time_s_;
       row.e_gyro_x_radps = reader_.number(1);
@@ -162,7 +172,7 @@ class ErrorTable final : public Table {
       row.e_accel_z_mps2 = reader_.number(6);
       message_.rows.push_back(row);
       advance();
-    }
+    } while (time_s_ < end_s && message_.rows.size() < kRowsMax && reader_.cell(kRegime) == message_.regime);
     message_.n_rows = element_count(message_.rows);
     Bytes bytes = encode_message(message_);
     ++message_.sequence;
@@ -171,7 +181,7 @@ class ErrorTable final : public Table {
 
  private:
   static constexpr std::size_t kRowsMax = 500;
-  void advance() { time_s_ = reader_.next() ? reader_.number(0) : kNever; }
+  void advance() { time_s_ = next_time_s(reader_); }
 
   CsvReader reader_;
   imuscope::error_t message_{};
@@ -197,6 +207,20 @@ std::vector<Bytes> model_messages(const std::filesystem::path& folder) {
       model.model = text_at(one, "model");
       model.identifiable = field(one, "identifiable") == true ? 1 : 0;
       model.j_p_value = or_unknown(field(one, "j_test"), "p_value");
+      const json& parameters = field(one, "parameters");
+      if (parameters.is_array()) {
+        for (const json& each : parameters) {
+          if (model.parameters.size() >= kParametersMax) break;
+          noise_parameter_t parameter{};
+          parameter.process = text_at(each, "process");
+          parameter.name = text_at(each, "name");
+          parameter.unit = text_at(each, "unit");
+          parameter.value = or_unknown(each, "value");
+          parameter.sd = parameter.ci_low = parameter.ci_high = kUnknown;
+          model.parameters.push_back(std::move(parameter));
+        }
+      }
+      model.n_parameters = element_count(model.parameters);
       const json& levels = field(one, "wv");
       if (!levels.is_array()) continue;
       for (const json& level : levels) {
@@ -234,6 +258,7 @@ Bytes status_message(const json& run) {
   status.configuration_hash = text_at(run, "configuration_sha256");
   status.state = "recorded";
   status.reason = "the files of a run, not a service";
+  status.refit_duration_s = kUnknown;
   status.uptime_s = number_at(run, "duration_s").value_or(0.0);
   const json& devices = field(run, "devices");
   if (devices.is_array()) {
@@ -309,6 +334,7 @@ class RunFolderMessages final : public RecordedMessages {
     const auto columns = calibration_columns();
     calibration_t fixed{};
     fixed.name = name;
+    fixed.validity = kNoValidity;
     fixed.goal_sd_psi_deg = kGoalBoresightSd_rad / kRadPerDeg;
     fixed.goal_sd_r_m = kGoalLeverArmSd_m;
     fixed.goal_sd_t_d_ms = kGoalTimeOffsetSd_s * 1e3;

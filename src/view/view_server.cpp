@@ -129,8 +129,10 @@ class ViewServer::Impl::Page : public std::enable_shared_from_this<Page> {
   }
 
   void send(const Part& part) {
-    if (!is_open_ || is_behind_) return;  // it gets the whole picture, which holds this part
-    if (queue_.size() >= kQueueMax) {
+    if (!is_open_) return;
+    if (is_behind_) {  // it gets the whole picture, which holds this part
+      server_.count([](ViewCounters& c) { ++c.parts_left_out; });
+    } else if (queue_.size() >= kQueueMax) {
       server_.count([n = queue_.size()](ViewCounters& c) { c.parts_left_out += n; });
       queue_.clear();
       is_behind_ = true;
@@ -142,10 +144,10 @@ class ViewServer::Impl::Page : public std::enable_shared_from_this<Page> {
 
   void close() {
     is_open_ = false;
-    error_code ignored;
-    beast::get_lowest_layer(socket_).socket().close(ignored);
     server_.pages.erase(shared_from_this());
     server_.count([n = server_.pages.size()](ViewCounters& c) { c.pages = n; });
+    error_code ignored;
+    beast::get_lowest_layer(socket_).socket().close(ignored);
   }
 
  private:

@@ -2,6 +2,7 @@
 #include <array>
 #include <atomic>
 #include <csignal>
+#include <cstdio>
 #include <memory>
 #include <string>
 
@@ -51,6 +52,7 @@ Result<void> run(const ViewCommand& options) {
     const bool is_ipv6 = door.address.find(':') != std::string::npos;
     say("the page is at http://{}:{}/{}{}\n", is_ipv6 ? "[" + door.address + "]" : door.address, server.port(),
         door.token.empty() ? "" : "?token=", door.token);
+    std::fflush(stdout);  // whoever started it waits for this line
   };
   if (!options.recording.empty()) return view::show_recording(options.recording, door, opened, view_stopped);
   return view::show_live(options.source, door, opened, view_stopped);
