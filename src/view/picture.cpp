@@ -20,9 +20,6 @@ constexpr double kRadPerDeg = 3.14159265358979323846 / 180.0;
 // WGS-84 (NIMA TR8350.2): semi-major axis, first eccentricity squared.
 constexpr double kSemiMajor_m = 6'378'137.0;
 constexpr double kEccentricity2 = 6.69437999014e-3;
-/// A service that has been up for less than before by more than this is another run of it.
-constexpr double kRestart_s = 1.0;
-
 constexpr std::size_t kFingerprintBytes = 8;
 
 std::uint64_t fingerprint_of(std::span<const std::uint8_t> message) {
@@ -125,7 +122,8 @@ void Picture::advance(double time_s) {
 }
 
 void Picture::take(status_t&& status) {
-  if (status_ && status.uptime_s < status_->uptime_s - kRestart_s) begin_anew();
+  // Another run of the service counts its messages and its time from the beginning.
+  if (status_ && status.uptime_s < status_->uptime_s && status.sequence <= status_->sequence) begin_anew();
   status_ = std::move(status);
   new_status_ = true;
 }

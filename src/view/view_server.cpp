@@ -118,6 +118,7 @@ class ViewServer::Impl::Page : public std::enable_shared_from_this<Page> {
     socket_.set_option(patience);
     socket_.read_message_max(kPageMessageMax);
     socket_.text(true);
+    socket_.auto_fragment(false);  // a part is a frame
     socket_.async_accept(request, [self = shared_from_this()](error_code error) {
       if (error) return self->close();
       self->is_open_ = true;

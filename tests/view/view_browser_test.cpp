@@ -8,6 +8,7 @@
 #include <unistd.h>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -105,7 +106,7 @@ class View {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     const std::string text = read_text(log);
     std::smatch found;
-    EXPECT_TRUE(std::regex_search(text, found, std::regex("(http://127.0.0.1:(\\d+)/\\S*)\n"))) << text;
+    EXPECT_TRUE(std::regex_search(text, found, std::regex("(http://[0-9.]+:(\\d+)/\\S*)\n"))) << text;
     if (found.empty()) return;
     url_ = found[1];
     port_ = static_cast<std::uint16_t>(std::stoi(found[2]));
@@ -123,6 +124,49 @@ class View {
   std::optional<BackgroundProgram> program_;
   std::string url_;
   std::uint16_t port_ = 0;
+};
+
+/// A page of somebody else: its origin is another port.
+class ForeignPage {
+ public:
+  ForeignPage() : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&address), size), 0);
+    EXPECT_EQ(::listen(socket_, 8), 0);
+    EXPECT_EQ(::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size), 0);
+    port_ = ntohs(address.sin_port);
+    thread_ = std::thread([this] { serve(); });
+  }
+  ForeignPage(const ForeignPage&) = delete;
+  ForeignPage& operator=(const ForeignPage&) = delete;
+  ~ForeignPage() {
+    ::shutdown(socket_, SHUT_RDWR);  // accept() returns
+    thread_.join();
+    ::close(socket_);
+  }
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+
+ private:
+  void serve() const {
+    const std::string answer =
+        "HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nContent-Length: 22\r\nConnection: close\r\n\r\n"
+        "<title>foreign</title>";
+    for (int client = 0; (client = ::accept(socket_, nullptr, nullptr)) >= 0;) {
+      constexpr timeval kPatience{0, 300'000};  // browsers open connections that they do not use
+      ::setsockopt(client, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
+      std::array<char, 4096> request{};
+      (void)::recv(client, request.data(), request.size(), 0);
+      (void)::send(client, answer.data(), answer.size(), MSG_NOSIGNAL);
+      ::close(client);
+    }
+  }
+
+  int socket_;
+  std::uint16_t port_ = 0;
+  std::thread thread_;
 };
 
 class ViewPage : public testing::Test {
@@ -189,6 +233,9 @@ class LivePage : public ViewPage {
     EXPECT_NEAR(numbers_in(field("devices", "gnss", "rate")).at(0), 10.0, 2.0);
     for (const auto& [name, role] : roles)
       EXPECT_THAT(text_at("#devices [data-key=\"" + name + "\"] .head span"), HasSubstr(role));
+  }
+
+  void check_losses() const {
     // What the simulator cut off is what the page says was lost, of that device alone.
     const auto hit =
         read_json(folder_ / "truth" / "fault_log.json").at("faults").at(0).at("hit").get<double>();
@@ -267,10 +314,11 @@ class LivePage : public ViewPage {
       found = true;
       constexpr double kDeg2 = 180.0 / M_PI * 180.0 / M_PI;
       EXPECT_NEAR(2.0 * one.at("value").at(0).get<double>() * kDeg2, 0.654, 0.15 * 0.654);
-      for (const json& model : imu.at("m"))
-        if (model.at("axis") == "gyro_x" && model.at("regime") == "dynamic")
-          EXPECT_NEAR(model.at("fitted").at(0).get<double>(), one.at("value").at(0).get<double>(),
-                      0.15 * one.at("value").at(0).get<double>());
+      for (const json& model : imu.at("m")) {
+        if (model.at("axis") != "gyro_x" || model.at("regime") != "dynamic") continue;
+        const auto measured = one.at("value").at(0).get<double>();
+        EXPECT_NEAR(model.at("fitted").at(0).get<double>(), measured, 0.15 * measured);
+      }
     }
     EXPECT_TRUE(found);
     EXPECT_EQ(browser_->value_of("document.querySelectorAll('#wavelets canvas').length"), 6);
@@ -360,6 +408,7 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   EXPECT_TRUE(browser_->becomes_true("document.getElementById('state').textContent.startsWith('silent for')", 15.0));
   EXPECT_EQ(counts().at("rows"), rows_written(folder_ / "live")) << "every row that the service wrote was drawn";
   const json truth = read_json(folder_ / "truth" / "truth.json");
+  check_losses();
   check_calibration(truth);
   check_position(truth);
   check_wavelets();
@@ -445,7 +494,10 @@ TEST_F(ViewPage, WhatAStrangerSendsIsTextAndAPageOfAnotherOriginHearsNothing) {
     bus->publish(example_error(payload), "ERROR", "mtx1");
     auto variances = example_wavelet_variance();
     variances.name = payload;
-    for (auto& axis : variances.axes) axis.axis = "gyro_x", axis.regime = payload;
+    for (auto& axis : variances.axes) {
+      axis.axis = "gyro_x";
+      axis.regime = payload;
+    }
     bus->publish(variances, "WV", "mtx1");
     bus->publish(example_event(payload), "EVENT");
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -459,14 +511,52 @@ TEST_F(ViewPage, WhatAStrangerSendsIsTextAndAPageOfAnotherOriginHearsNothing) {
   // A script that got into the page does not run; a page of another origin gets no websocket.
   browser_->value_of("{const s = document.createElement('script'); s.textContent = 'pwned()'; document.body.append(s);}");
   EXPECT_EQ(browser_->value_of("window.called"), 0);
-  browser_->open("about:blank");
-  ASSERT_TRUE(browser_->becomes_true("location.href === 'about:blank' && document.readyState === 'complete'", 5.0));
-  browser_->value_of("window.heard = 0; window.closed = 0; window.socket = new WebSocket('ws://127.0.0.1:" +
+  const ForeignPage foreign;
+  browser_->open("http://127.0.0.1:" + std::to_string(foreign.port()) + "/");
+  ASSERT_TRUE(browser_->becomes_true("document.title === 'foreign'", 5.0));
+  browser_->value_of("window.heard = 0; window.ended = 0; window.socket = new WebSocket('ws://127.0.0.1:" +
                      std::to_string(view.port()) +
-                     "/live'); socket.onmessage = () => { ++window.heard; }; socket.onclose = () => { ++window.closed; }");
-  EXPECT_TRUE(browser_->becomes_true("window.closed === 1", 10.0));
+                     "/live'); socket.onmessage = () => { ++window.heard; }; socket.onclose = () => { ++window.ended; }");
+  EXPECT_TRUE(browser_->becomes_true("window.ended === 1", 10.0));
   EXPECT_EQ(browser_->value_of("window.heard"), 0);
+  EXPECT_EQ(browser_->value_of("window.socket.readyState"), 3) << "it was never open";
   view.end();
+}
+
+TEST(ViewCommand, BeyondThisPcThereIsAlwaysAToken) {
+  if (!enter_private_network()) GTEST_SKIP() << "a private network namespace needs root";
+  const auto folder = scratch_folder();
+  View open({"--address", "0.0.0.0", "--port", "0"}, folder / "open.log");
+  std::smatch found;
+  ASSERT_TRUE(std::regex_search(open.url(), found, std::regex("\\?token=([0-9a-f]{32})$"))) << open.url();
+  const std::string host = "127.0.0.1:" + std::to_string(open.port());
+  EXPECT_THAT(RawClient(open.port()).get("/", host), testing::StartsWith("HTTP/1.1 401"));
+  EXPECT_THAT(RawClient(open.port()).get("/?token=" + found[1].str(), host), testing::StartsWith("HTTP/1.1 200"));
+  View again({"--address", "0.0.0.0", "--port", "0"}, folder / "again.log");
+  EXPECT_THAT(again.url(), testing::Not(HasSubstr(found[1].str()))) << "it is another one each time";
+  View own({"--port", "0", "--token", "a-long-secret"}, folder / "own.log");
+  EXPECT_THAT(own.url(), testing::EndsWith("/?token=a-long-secret"));
+  EXPECT_THAT(RawClient(own.port()).get("/", "127.0.0.1"), testing::StartsWith("HTTP/1.1 401")) << "on loopback, too";
+  for (View* view : {&open, &again, &own}) view->end();
+}
+
+TEST(ViewCommand, WhatCannotBeShownIsToldWithWhatToDo) {
+  if (!enter_private_network()) GTEST_SKIP() << "a private network namespace needs root";
+  const auto folder = scratch_folder();
+  const auto log = folder / "view.log";
+  View taken({"--port", "0"}, folder / "taken.log");
+  const auto told = [&](const std::vector<std::string>& arguments, int code) {
+    std::vector<std::string> all{"view"};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    EXPECT_EQ(run_program("imuscope", all, log), code) << arguments.front();
+    return read_text(log);
+  };
+  EXPECT_THAT(told({"--port", std::to_string(taken.port())}, 1), HasSubstr("choose another --port"));
+  EXPECT_THAT(told({"--address", "tablet.local"}, 2), HasSubstr("0.0.0.0 is all of them"));
+  EXPECT_THAT(told({"--token", "short"}, 2), HasSubstr("8 to 128"));
+  EXPECT_THAT(told({"--port", "99999"}, 2), HasSubstr("--port"));
+  EXPECT_THAT(told({(folder / "absent").string()}, 2), HasSubstr("absent"));
+  taken.end();
 }
 
 }  // namespace
