@@ -21,7 +21,7 @@ install(FILES ${completions}/fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vend
 install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
         FILES_MATCHING PATTERN *.toml PATTERN *.dbc PATTERN vehicle.toml EXCLUDE)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs
-        FILES_MATCHING PATTERN guide.md PATTERN configuration.md PATTERN security.md PATTERN pitfalls.md PATTERN vehicle.md PATTERN metrics.md)
+        FILES_MATCHING PATTERN guide.md PATTERN configuration.md PATTERN security.md PATTERN pitfalls.md PATTERN vehicle.md PATTERN metrics.md PATTERN view.md)
 foreach(driver csv can_odometry rtklib_pos)
   install(FILES drivers/${driver}/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/drivers/${driver})
 endforeach()

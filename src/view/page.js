@@ -161,12 +161,14 @@ function figures(tile, list) {
   tile.cells ??= new Map();
   let dl = tile.querySelector('dl');
   if (!dl) tile.append(dl = element('dl', 'figures'));
-  for (const [field, label, text] of list) {
+  for (const [field, label, text, fine] of list) {
     let dd = tile.cells.get(field);
     if (!dd) {
       dd = element('dd');
       dd.dataset.field = field;
-      dl.append(element('dt', '', label), dd);
+      const dt = element('dt', fine ? 'fine' : '', label);
+      dd.className = dt.className;
+      dl.append(dt, dd);
       tile.cells.set(field, dd);
     }
     say(dd, text);
@@ -237,22 +239,25 @@ function showDevices() {
     rate.children[0].dataset.field = 'rate';
     rate.children[1].dataset.field = 'state';
     tile.append(head, rate);
+    // On a phone the fine figures wait for a tap.
+    tile.addEventListener('click', () => tile.classList.toggle('open'));
     return tile;
   });
   devices.forEach((d, i) => {
     const tile = tiles[i];
     const streams = d.state === 'streaming' || d.state === 'recorded';
-    dress(tile, 'tile ' + (d.state === 'failed' ? 'no' : !streams ? 'partly' : d.problem ? 'partly' : 'yes'));
+    dress(tile, 'tile ' + (tile.classList.contains('open') ? 'open ' : '') + (d.state === 'failed' ? 'no' : !streams ? 'partly' : d.problem ? 'partly' : 'yes'));
     say(tile.querySelector('.head span'), d.role + ' · ' + d.protocol);
     say(tile.children[1].children[0], streams ? number(d.rate_hz, 1) + ' Hz' : kUnknown);
     say(tile.children[1].children[1], d.state);
     figures(tile, [
-      ['age', 'newest sample', d.data_age_s === null ? kUnknown : d.data_age_s.toFixed(1) + ' s ago'],
-      ['latency', 'latency', number(d.latency_ms, 1) + ' ms'],
-      ['samples', 'samples', String(d.samples)],
+      ['age', 'newest', d.data_age_s === null ? kUnknown : d.data_age_s.toFixed(1) + ' s ago'],
+      ['latency', 'latency', d.latency_ms === null ? kUnknown : number(d.latency_ms, 1) + ' ms'],
       ['lost', 'lost', String(d.samples_lost)],
-      ['late', 'late · refused · dropped', d.samples_late + ' · ' + d.samples_refused + ' · ' + d.frames_dropped],
-      ['clock', 'clock', number(d.clock_drift_ppm, 1) + ' ppm ± ' + number(d.clock_sd_us, 0) + ' µs']]);
+      ['samples', 'samples', String(d.samples), true],
+      ['late', 'late', String(d.samples_late), true],
+      ['refused', 'refused here', String(d.samples_refused + d.frames_dropped), true],
+      ['clock', 'clock', d.clock_drift_ppm === null ? kUnknown : number(d.clock_drift_ppm, 1) + ' ppm ± ' + number(d.clock_sd_us, 0) + ' µs', true]]);
     let problem = tile.querySelector('p');
     if (d.problem && !problem) tile.append(problem = element('p'));
     if (problem) say(problem, d.problem);
