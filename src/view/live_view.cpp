@@ -47,8 +47,8 @@ class Live {
       const std::scoped_lock lock(mutex_);
       if (picture_.hear(bytes)) heard_at_ = host_now();
     };
-    for (const char* kind :
-         {"STATUS", "NAVIGATION", "ODOMETRY", "CALIBRATION_.*", "ERROR_.*", "WV_.*", "NOISE_MODEL_.*", "EVENT"}) {
+    for (const char* kind : {"STATUS", "NAVIGATION", "ODOMETRY", "CALIBRATION_.*", "ERROR_.*", "WV_.*",
+                             "NOISE_MODEL_.*", "EVENT"}) {
       if (auto heard = ear_.subscribe(kind, hear); !heard) return heard;
     }
     return {};

@@ -137,10 +137,9 @@ json to_json(const status_t& s) {
 
 json to_json(const calibration_t& c) {
   // Of the bits alone: psi, lever arm, time offset.
-  const json observable =
-      json::array({c.psi_x_observable != 0, c.psi_y_observable != 0, c.psi_z_observable != 0,
-                   c.r_x_observable != 0, c.r_y_observable != 0, c.r_z_observable != 0,
-                   c.t_d_observable != 0});
+  const json observable = json::array({c.psi_x_observable != 0, c.psi_y_observable != 0,
+                                       c.psi_z_observable != 0, c.r_x_observable != 0, c.r_y_observable != 0,
+                                       c.r_z_observable != 0, c.t_d_observable != 0});
   return {{"time_s", known(c.time_s)},
           {"q", brief({c.q_w, c.q_x, c.q_y, c.q_z})},
           {"psi_deg", brief({c.psi_x_deg, c.psi_y_deg, c.psi_z_deg})},
@@ -179,19 +178,17 @@ json to_json(const navigation_t& n) {
 }
 
 json to_json(const odometry_t& o) {
-  return {{"speed_mps", brief(o.speed_mps)},
-          {"standing", o.standing != 0},
-          {"zero_velocity", o.zero_velocity != 0},
-          {"lost", o.lost != 0},
-          {"scale_percent", brief(o.scale_percent)},
-          {"sd_scale_percent", brief(o.sd_scale_percent)}};
+  return {{"speed_mps", brief(o.speed_mps)},         {"standing", o.standing != 0},
+          {"zero_velocity", o.zero_velocity != 0},   {"lost", o.lost != 0},
+          {"scale_percent", brief(o.scale_percent)}, {"sd_scale_percent", brief(o.sd_scale_percent)}};
 }
 
 json to_json(const wavelet_variance_t& variances) {
   return list_of(variances.axes, [](const axis_wavelet_variance_t& axis) -> json {
-    return {{"axis", shown(axis.axis)},      {"regime", shown(axis.regime)},  {"unit", shown(axis.unit)},
-            {"n", axis.n},                   {"tau_s", brief(axis.tau_s)},    {"value", brief(axis.value)},
-            {"ci_low", brief(axis.ci_low)},  {"ci_high", brief(axis.ci_high)}};
+    return {{"axis", shown(axis.axis)},     {"regime", shown(axis.regime)},
+            {"unit", shown(axis.unit)},     {"n", axis.n},
+            {"tau_s", brief(axis.tau_s)},   {"value", brief(axis.value)},
+            {"ci_low", brief(axis.ci_low)}, {"ci_high", brief(axis.ci_high)}};
   });
 }
 
@@ -200,9 +197,9 @@ json to_json(const noise_model_t& models) {
     json parameters = json::array();
     for (const auto& p : model.parameters)
       parameters.push_back(json::array({shown(p.process), shown(p.name), shown(p.unit), brief(p.value)}));
-    return {{"axis", shown(model.axis)},        {"regime", shown(model.regime)},
-            {"model", shown(model.model)},      {"tau_s", brief(model.tau_s)},
-            {"fitted", brief(model.fitted)},    {"parameters", std::move(parameters)},
+    return {{"axis", shown(model.axis)},         {"regime", shown(model.regime)},
+            {"model", shown(model.model)},       {"tau_s", brief(model.tau_s)},
+            {"fitted", brief(model.fitted)},     {"parameters", std::move(parameters)},
             {"p_value", brief(model.j_p_value)}, {"identifiable", model.identifiable != 0}};
   });
 }

@@ -34,7 +34,7 @@ bool is(std::uint64_t fingerprint) {
 }
 
 std::array<double, 6> axes_of(const error_row_t& row) {
-  return {row.e_gyro_x_radps,  row.e_gyro_y_radps,  row.e_gyro_z_radps,
+  return {row.e_gyro_x_radps, row.e_gyro_y_radps, row.e_gyro_z_radps,
           row.e_accel_x_mps2, row.e_accel_y_mps2, row.e_accel_z_mps2};
 }
 
@@ -132,10 +132,10 @@ void Picture::take(calibration_t&& calibration) {
   Imu* const of = imu(calibration.name);
   if (of == nullptr) return;
   advance(calibration.time_s);
-  of->convergence.add(
-      {calibration.time_s,
-       largest(calibration.sd_psi_x_deg, calibration.sd_psi_y_deg, calibration.sd_psi_z_deg),
-       largest(calibration.sd_r_x_m, calibration.sd_r_y_m, calibration.sd_r_z_m), calibration.sd_t_d_ms});
+  of->convergence.add({calibration.time_s,
+                       largest(calibration.sd_psi_x_deg, calibration.sd_psi_y_deg, calibration.sd_psi_z_deg),
+                       largest(calibration.sd_r_x_m, calibration.sd_r_y_m, calibration.sd_r_z_m),
+                       calibration.sd_t_d_ms});
   of->calibration = std::move(calibration);
   of->new_calibration = true;
 }

@@ -3,8 +3,10 @@
 /// What the page shows: the newest messages of a service or of a recording, and as much of the past as a
 /// page needs that was opened late. Bounded, whatever comes.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <imuscope/calibration_t.hpp>
 #include <imuscope/error_t.hpp>
 #include <imuscope/navigation_t.hpp>
@@ -12,8 +14,6 @@
 #include <imuscope/odometry_t.hpp>
 #include <imuscope/status_t.hpp>
 #include <imuscope/wavelet_variance_t.hpp>
-#include <array>
-#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -29,10 +29,10 @@ namespace imuscope::view {
 /// Thread: one at a time. Deterministic: a function of the messages.
 class Picture {
  public:
-  static constexpr std::size_t kNamesMax = 16;      ///< S-IMUs; a run has six at most
-  static constexpr std::size_t kPastMax = 100;      ///< tenths of a second of errors that a late page gets
-  static constexpr std::size_t kRowsMax = 4096;     ///< of one S-IMU between two parts; the rest is counted
-  static constexpr std::size_t kMarksMax = 20;      ///< newest events
+  static constexpr std::size_t kNamesMax = 16;   ///< S-IMUs; a run has six at most
+  static constexpr std::size_t kPastMax = 100;   ///< tenths of a second of errors that a late page gets
+  static constexpr std::size_t kRowsMax = 4096;  ///< of one S-IMU between two parts; the rest is counted
+  static constexpr std::size_t kMarksMax = 20;   ///< newest events
   static constexpr std::size_t kTrackPointsMax = 800;
   static constexpr std::size_t kConvergencePointsMax = 120;
   static constexpr double kTrackStep_m = 0.5;
@@ -46,8 +46,8 @@ class Picture {
   /// The next part is the whole picture, and no row is lost by it.
   void tell_all_next() noexcept { all_next_ = news_ = true; }
 
-  /// What was heard since the last part, as one JSON object; all of it after begin_anew() or tell_all_next(). `extra` are members
-  /// of the object, each behind a comma.
+  /// What was heard since the last part, as one JSON object; all of it after begin_anew() or tell_all_next().
+  /// `extra` are members of the object, each behind a comma.
   [[nodiscard]] std::string part(std::string_view extra = {});
   /// All of it, for a page that knows nothing. The parts that follow go on from the last part().
   [[nodiscard]] std::string whole(std::string_view extra = {}) const;

@@ -23,8 +23,9 @@ Result<void> Player::read_through() {
   while (recording_->next(message_)) (void)picture_.hear(message_);
   length_s_ = picture_.time_s();
   if (!(length_s_ > 0.0)) {
-    return work_error("the recording holds nothing that a page shows: no navigation, no calibration, no error",
-                      "make a run of it first: imuscope process FILE --out DIR, and view that folder");
+    return work_error(
+        "the recording holds nothing that a page shows: no navigation, no calibration, no error",
+        "make a run of it first: imuscope process FILE --out DIR, and view that folder");
   }
   picture_.begin_anew();
   return recording_->rewind();
@@ -45,8 +46,8 @@ void Player::on_said(std::string_view text) {
 }
 
 std::string Player::extra() const {
-  return fmt::format(R"(,"play":{{"playing":{},"speed":{:g},"time_s":{:.3f},"length_s":{:.3f}}})", is_playing_,
-                     speed_, clock_s_, length_s_);
+  return fmt::format(R"(,"play":{{"playing":{},"speed":{:g},"time_s":{:.3f},"length_s":{:.3f}}})",
+                     is_playing_, speed_, clock_s_, length_s_);
 }
 
 std::string Player::whole() const {

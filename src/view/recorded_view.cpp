@@ -35,9 +35,8 @@ Result<void> show_recording(const std::filesystem::path& recording, const ViewDo
     std::this_thread::sleep_until(last + kTurnEvery);
     const auto now = steady_clock::now();
     // A PC that slept does not jump ahead.
-    const double passed_s = std::chrono::duration<double>(std::min<steady_clock::duration>(
-                                                              now - last, 10 * kTurnEvery))
-                                .count();
+    const double passed_s =
+        std::chrono::duration<double>(std::min<steady_clock::duration>(now - last, 10 * kTurnEvery)).count();
     last = now;
     std::string part = (*player)->turn(passed_s);
     if (!part.empty()) (*server)->send(std::move(part));

@@ -103,12 +103,18 @@ class PlainTable final : public Table {
 
 std::vector<Column<navigation_t>> navigation_columns() {
   using N = navigation_t;
-  return {{"time_s", &N::time_s},           {"lat_deg", &N::lat_deg},
-          {"lon_deg", &N::lon_deg},         {"height_m", &N::height_m},
-          {"v_n_mps", &N::v_n_mps},         {"v_e_mps", &N::v_e_mps},
-          {"v_d_mps", &N::v_d_mps},         {"roll_deg", &N::roll_deg},
-          {"pitch_deg", &N::pitch_deg},     {"heading_deg", &N::heading_deg},
-          {"sd_n_m", &N::sd_n_m},           {"sd_e_m", &N::sd_e_m},
+  return {{"time_s", &N::time_s},
+          {"lat_deg", &N::lat_deg},
+          {"lon_deg", &N::lon_deg},
+          {"height_m", &N::height_m},
+          {"v_n_mps", &N::v_n_mps},
+          {"v_e_mps", &N::v_e_mps},
+          {"v_d_mps", &N::v_d_mps},
+          {"roll_deg", &N::roll_deg},
+          {"pitch_deg", &N::pitch_deg},
+          {"heading_deg", &N::heading_deg},
+          {"sd_n_m", &N::sd_n_m},
+          {"sd_e_m", &N::sd_e_m},
           {"sd_heading_deg", &N::sd_heading_deg}};
 }
 
@@ -151,7 +157,7 @@ class ErrorTable final : public Table {
     advance();
   }
   static std::vector<std::string> columns() {
-    return {"time_s",         "e_gyro_x_radps",  "e_gyro_y_radps",  "e_gyro_z_radps",
+    return {"time_s",         "e_gyro_x_radps", "e_gyro_y_radps", "e_gyro_z_radps",
             "e_accel_x_mps2", "e_accel_y_mps2", "e_accel_z_mps2", "regime"};
   }
   [[nodiscard]] double time_s() const override { return time_s_; }
@@ -297,9 +303,9 @@ class RunFolderMessages final : public RecordedMessages {
       message = first_[at_++];
       return true;
     }
-    const auto earliest =
-        std::min_element(tables_.begin(), tables_.end(),
-                         [](const auto& a, const auto& b) { return a->time_s() < b->time_s(); });
+    const auto earliest = std::min_element(tables_.begin(), tables_.end(), [](const auto& a, const auto& b) {
+      return a->time_s() < b->time_s();
+    });
     if (earliest == tables_.end() || !((*earliest)->time_s() < kNever)) return false;
     message = (*earliest)->take();
     return true;

@@ -290,9 +290,8 @@ class ViewServer::Impl::Asking : public std::enable_shared_from_this<Asking> {
     if (request.method() == http::verb::head) {
       // The header says how long the page is and nothing follows it.
       auto serializer = std::make_shared<http::response_serializer<http::string_body>>(*response);
-      http::async_write_header(stream_, *serializer, [written, serializer](error_code error, std::size_t n) {
-        written(error, n);
-      });
+      http::async_write_header(stream_, *serializer,
+                               [written, serializer](error_code error, std::size_t n) { written(error, n); });
       return;
     }
     http::async_write(stream_, *response, written);

@@ -22,11 +22,11 @@ struct ViewDoor {
 
 /// What became of clients since the server was opened.
 struct ViewCounters {
-  std::size_t pages = 0;              ///< open now
+  std::size_t pages = 0;  ///< open now
   std::uint64_t pages_opened = 0;
   std::uint64_t requests_refused = 0;  ///< of a foreign origin, without the token, of what does not exist
   std::uint64_t clients_dropped = 0;   ///< too many, too slow to ask, or sent what no page sends
-  std::uint64_t parts_left_out = 0;    ///< of pages that were slower than the data; they got the newest instead
+  std::uint64_t parts_left_out = 0;  ///< of pages that were slower than the data; they got the newest instead
 };
 
 class ViewServer {
@@ -36,7 +36,7 @@ class ViewServer {
   static constexpr std::size_t kHeaderMax = 8 * 1024;
   static constexpr int kPatience_s = 5;  ///< with a client that does not ask, or does not take its answer
   static constexpr int kSilence_s = 30;  ///< a page that answers no ping for so long is gone
-  static constexpr std::size_t kQueueMax = 20;  ///< parts that wait for a page: two seconds
+  static constexpr std::size_t kQueueMax = 20;   ///< parts that wait for a page: two seconds
   static constexpr int kMessagesPerSecond = 20;  ///< of a page; one that sends more is dropped
 
   /// The whole picture for a page that has just come, or has missed something.

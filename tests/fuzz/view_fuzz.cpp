@@ -77,7 +77,8 @@ void ask(std::string_view text) {
   const view::HostNames network{{"car"}, false};
   require(!view::is_host_allowed(text, loopback) || view::is_host_allowed(text, network),
           "whoever may ask on this PC may ask from the network");
-  require(!view::is_own_origin(text, "127.0.0.1:8088") || text.size() == 21, "one origin alone is the page's own");
+  require(!view::is_own_origin(text, "127.0.0.1:8088") || text.size() == 21,
+          "one origin alone is the page's own");
   require(view::token_of(text).size() <= text.size(), "a token is a part of the target");
 }
 
@@ -93,7 +94,8 @@ constexpr std::array kFiles{
          R"("identifiable":true,"j_test":{"p_value":0.5},"wv":[{"tau_s":0.02,"value":1e-6,"ci_low":1e-7,)"
          R"("ci_high":1e-5,"fitted":1e-6}],"parameters":[{"process":"WN","name":"sigma2","value":1e-6}]}]})"},
     File{"navigation.csv",
-         "time_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_deg,sd_n_m,sd_e_m,"
+         "time_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_deg,sd_n_m,sd_e_"
+         "m,"
          "sd_heading_deg\n0.1,46,6,400,1,0,0,1,2,3,0.1,0.1,1\n1,46,6,400,1,0,0,1,2,3,0.1,0.1,1\n"},
     File{"calibration_m.csv",
          "time_s,psi_x_deg,psi_y_deg,psi_z_deg,q_w,q_x,q_y,q_z,r_x_m,r_y_m,r_z_m,t_d_ms,sd_psi_x_deg,"
@@ -137,9 +139,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const std::span<const std::uint8_t> rest(data + 1, size - 1);
   switch (data[0] % 3) {
-    case 0: imuscope::fuzz::hear({rest.begin(), rest.end()}); break;
-    case 1: imuscope::fuzz::ask({reinterpret_cast<const char*>(rest.data()), rest.size()}); break;
-    default: imuscope::fuzz::play(rest); break;
+    case 0:
+      imuscope::fuzz::hear({rest.begin(), rest.end()});
+      break;
+    case 1:
+      imuscope::fuzz::ask({reinterpret_cast<const char*>(rest.data()), rest.size()});
+      break;
+    default:
+      imuscope::fuzz::play(rest);
+      break;
   }
   return 0;
 }

@@ -62,8 +62,9 @@ Browser::Browser(const std::filesystem::path& folder) {
     const int to_log = ::open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
     ::dup2(to_log, 1);
     ::dup2(to_log, 2);
-    ::execl(kProgram, kProgram, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars",
-            "--disable-background-networking", "--remote-debugging-pipe", profile.c_str(), "about:blank", nullptr);
+    ::execl(kProgram, kProgram, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
+            "--hide-scrollbars", "--disable-background-networking", "--remote-debugging-pipe",
+            profile.c_str(), "about:blank", nullptr);
     ::_exit(127);
   }
   ::close(in[0]);
@@ -119,7 +120,8 @@ json Browser::call(const std::string& method, json parameters) {
 
 void Browser::take(const json& event) {
   const std::string method = event.value("method", "");
-  if (method == "Runtime.exceptionThrown" || method == "Runtime.consoleAPICalled" || method == "Log.entryAdded")
+  if (method == "Runtime.exceptionThrown" || method == "Runtime.consoleAPICalled" ||
+      method == "Log.entryAdded")
     said_.push_back(event.at("params").dump());
   if (method == "Network.dataReceived") bytes_ += event.at("params").value("dataLength", 0.0);
   if (method == "Network.webSocketFrameReceived")

@@ -188,8 +188,8 @@ TEST(RecordedMessages, OfARunFolderAreWhatItsFilesSay) {
   EXPECT_NEAR(calibration.at("sd_r_m").at(0), cell("sd_r_x_m"), 1e-5 * cell("sd_r_x_m"));
   const json models = json::parse(std::ifstream(folder / "models.json")).at("models");
   EXPECT_EQ(whole.at("imus").at("mtx1").at("variances").size(),
-            static_cast<std::size_t>(std::count_if(models.begin(), models.end(),
-                                                   [](const json& one) { return one.at("name") == "mtx1"; })));
+            static_cast<std::size_t>(std::count_if(
+                models.begin(), models.end(), [](const json& one) { return one.at("name") == "mtx1"; })));
   std::ifstream errors(folder / "errors_mtx1.csv");
   std::uint64_t rows = 0;
   for (std::string line; std::getline(errors, line);) ++rows;

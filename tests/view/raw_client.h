@@ -28,7 +28,9 @@ class RawClient {
     connected_ = ::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
   }
   RawClient(RawClient&& other) noexcept
-      : socket_(std::exchange(other.socket_, -1)), connected_(other.connected_), bytes_(std::move(other.bytes_)) {}
+      : socket_(std::exchange(other.socket_, -1)),
+        connected_(other.connected_),
+        bytes_(std::move(other.bytes_)) {}
   RawClient& operator=(RawClient&&) = delete;
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
@@ -37,7 +39,9 @@ class RawClient {
   }
 
   [[nodiscard]] bool connected() const { return connected_; }
-  void send(const std::string& bytes) const { (void)::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL); }
+  void send(const std::string& bytes) const {
+    (void)::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  }
 
   /// What comes until the server closes, or nothing comes for so long.
   std::string rest(std::chrono::milliseconds patience = std::chrono::seconds(8)) {
@@ -52,14 +56,15 @@ class RawClient {
     return closed_;
   }
 
-  [[nodiscard]] std::string get(const std::string& target, const std::string& host, const std::string& more = {},
-                                const std::string& method = "GET") {
+  [[nodiscard]] std::string get(const std::string& target, const std::string& host,
+                                const std::string& more = {}, const std::string& method = "GET") {
     send(method + " " + target + " HTTP/1.1\r\nHost: " + host + "\r\n" + more + "\r\n");
     return rest();
   }
 
   /// Asks for a websocket. The head of the answer.
-  std::string upgrade(const std::string& host, const std::string& target = "/live", const std::string& more = {}) {
+  std::string upgrade(const std::string& host, const std::string& target = "/live",
+                      const std::string& more = {}) {
     send("GET " + target + " HTTP/1.1\r\nHost: " + host +
          "\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
          "Sec-WebSocket-Version: 13\r\n" +

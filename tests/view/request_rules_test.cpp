@@ -12,10 +12,10 @@ TEST(RequestRules, OnLoopbackThisPcsOwnNamesAloneMayBeAskedFor) {
   for (const char* host : {"localhost", "LOCALHOST:8088", "127.0.0.1", "127.0.0.1:8088", "127.1.2.3:1",
                            "[::1]", "[::1]:8088", "car:8088", "Car.local"})
     EXPECT_TRUE(is_host_allowed(host, known)) << host;
-  for (const char* host :
-       {"", "attacker.example", "attacker.example:8088", "127.0.0.1.attacker.example", "localhost.attacker.example",
-        "192.168.1.5", "0.0.0.0", "[::2]:8088", "[::1", "::1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:123456",
-        "127.0.0.1@attacker.example", "localhost:80:80", "car.example"})
+  for (const char* host : {"", "attacker.example", "attacker.example:8088", "127.0.0.1.attacker.example",
+                           "localhost.attacker.example", "192.168.1.5", "0.0.0.0", "[::2]:8088", "[::1",
+                           "::1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:123456",
+                           "127.0.0.1@attacker.example", "localhost:80:80", "car.example"})
     EXPECT_FALSE(is_host_allowed(host, known)) << host;
   EXPECT_FALSE(is_host_allowed(std::string(100'000, 'a'), known));
 }
@@ -24,7 +24,8 @@ TEST(RequestRules, BeyondLoopbackAnyNumericAddressMayBeAskedForAndNoForeignName)
   const HostNames known{{"car"}, false};
   for (const char* host : {"192.168.1.5:8088", "10.0.0.1", "[fe80::1]:8088", "localhost", "car"})
     EXPECT_TRUE(is_host_allowed(host, known)) << host;
-  for (const char* host : {"attacker.example:8088", "192.168.1.5.attacker.example", "192.168.1", "[fe80::1%x]"})
+  for (const char* host :
+       {"attacker.example:8088", "192.168.1.5.attacker.example", "192.168.1", "[fe80::1%x]"})
     EXPECT_FALSE(is_host_allowed(host, known)) << host;
 }
 

@@ -64,7 +64,8 @@ std::string configuration(const std::filesystem::path& folder) {
   std::ostringstream truth;
   for (int i = 4; i <= kImus; ++i) {
     devices << "[[device]]\nname = \"" << name_of(i)
-            << "\"\nrole = \"study\"\nprotocol = \"xsens_mt\"\nrate_hz = 100.0\ntransport = { kind = \"serial\", port = "
+            << "\"\nrole = \"study\"\nprotocol = \"xsens_mt\"\nrate_hz = 100.0\ntransport = { kind = "
+               "\"serial\", port = "
             << folder / "ports" / name_of(i) << ", baud = 115200 }\n\n";
     truth << "[[simulation.imu]]\nname = \"" << name_of(i) << "\"\nrotation_vector_b_s_deg = [" << 10 * i
           << ".0, -5.0, 3.0]\nlever_arm_b_m = [0.1, 0." << i << ", -0.2]\nlatency_ms = 2.0\n";
@@ -182,11 +183,13 @@ class ViewPage : public testing::Test {
   }
 
   [[nodiscard]] std::string text_at(const std::string& selector) const {
-    const json text = browser_->value_of("(document.querySelector(" + json(selector).dump() + ") ?? {}).textContent");
+    const json text =
+        browser_->value_of("(document.querySelector(" + json(selector).dump() + ") ?? {}).textContent");
     return text.is_string() ? text.get<std::string>() : "";
   }
   /// Of a tile, by what it is of.
-  [[nodiscard]] std::string field(const std::string& section, const std::string& name, const std::string& which) const {
+  [[nodiscard]] std::string field(const std::string& section, const std::string& name,
+                                  const std::string& which) const {
     return text_at("#" + section + " [data-key=\"" + name + "\"] [data-field=\"" + which + "\"]");
   }
   [[nodiscard]] json counts() const { return browser_->value_of("imuscope.counts"); }
@@ -196,7 +199,8 @@ class ViewPage : public testing::Test {
       browser_->resize(width, 900);
       for (const bool night : {false, true}) {
         browser_->prefer_dark(night);
-        EXPECT_TRUE(browser_->becomes_true("document.documentElement.scrollWidth <= " + std::to_string(width), 3.0))
+        EXPECT_TRUE(
+            browser_->becomes_true("document.documentElement.scrollWidth <= " + std::to_string(width), 3.0))
             << "the page scrolls sideways at " << width;
         const auto picture =
             folder_ / (name + "_" + std::to_string(width) + (night ? "_night.png" : "_day.png"));
@@ -275,7 +279,8 @@ class LivePage : public ViewPage {
       for (int i = 0; i < 3; ++i)
         EXPECT_NEAR(arm_mm[static_cast<std::size_t>(i)], 1e3 * known_m[i], kSds * sd_mm.at(0) + 0.1) << name;
       // The pace of the pseudo-terminals adds up to some milliseconds of a loaded machine's scheduling.
-      EXPECT_NEAR(numbers_in(field("calibration", name, "t.value")).at(0), 1e3 * imu.at("t_d_s").get<double>(), 5.0)
+      EXPECT_NEAR(numbers_in(field("calibration", name, "t.value")).at(0),
+                  1e3 * imu.at("t_d_s").get<double>(), 5.0)
           << name;
     }
   }
@@ -288,7 +293,8 @@ class LivePage : public ViewPage {
     const std::string begin = truth.at("t0_utc");
     std::istringstream(begin) >> std::get_time(&utc, "%Y-%m-%dT%H:%M:%S");
     const double fraction = std::stod(std::regex_replace(begin, std::regex(".*(\\.[0-9]+)Z"), "0$1"));
-    const double t_s = shown.at("n").at("utime").get<double>() * 1e-6 - static_cast<double>(timegm(&utc)) - fraction;
+    const double t_s =
+        shown.at("n").at("utime").get<double>() * 1e-6 - static_cast<double>(timegm(&utc)) - fraction;
     std::ifstream table(folder_ / "truth" / "truth.csv");
     std::string line;
     std::getline(table, line);
@@ -349,9 +355,12 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   View view({"--port", "0"}, folder_ / "view.log");
   ASSERT_NE(view.port(), 0);
   browser_->open(view.url());
-  ASSERT_TRUE(browser_->becomes_true("document.getElementById('state')?.textContent === 'no service heard'", 10.0));
-  ASSERT_TRUE(browser_->becomes_true("performance.getEntriesByName('first-contentful-paint').length === 1", 10.0));
-  const json paint = browser_->value_of("performance.getEntriesByName('first-contentful-paint')[0].startTime");
+  ASSERT_TRUE(
+      browser_->becomes_true("document.getElementById('state')?.textContent === 'no service heard'", 10.0));
+  ASSERT_TRUE(
+      browser_->becomes_true("performance.getEntriesByName('first-contentful-paint').length === 1", 10.0));
+  const json paint =
+      browser_->value_of("performance.getEntriesByName('first-contentful-paint')[0].startTime");
   std::printf("first paint after %.0f ms\n", paint.get<double>());
   EXPECT_LE(paint.get<double>(), kFirstPaintMax_ms);
 
@@ -392,7 +401,8 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
     RawClient socket(view.port());
     (void)socket.upgrade(host);
     const auto picture = static_cast<double>(socket.next_text().value_or("").size());
-    std::printf("transferred until it shows all: %.0f kB of page, %.0f kB of picture\n", 1e-3 * page, 1e-3 * picture);
+    std::printf("transferred until it shows all: %.0f kB of page, %.0f kB of picture\n", 1e-3 * page,
+                1e-3 * picture);
     EXPECT_GT(picture, 10'000.0);
     EXPECT_LE(page + picture, kTransferMax);
   }
@@ -400,11 +410,13 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   EXPECT_EQ(text_at("#run"), "demo");
   const std::string state = text_at("#state");
   EXPECT_TRUE(state == "running" || state == "degraded") << state;
-  browser_->value_of("document.getElementById('mark-text').value = 'kerb on the <left>'; "
-                     "document.getElementById('mark').click()");
+  browser_->value_of(
+      "document.getElementById('mark-text').value = 'kerb on the <left>'; "
+      "document.getElementById('mark').click()");
   EXPECT_TRUE(browser_->becomes_true(
       "document.getElementById('marks').textContent.includes('kerb on the <left>')", 5.0));
-  EXPECT_THAT(read_text(folder_ / "imuscope.log"), HasSubstr("event: kerb on the <left> (from imuscope view on "));
+  EXPECT_THAT(read_text(folder_ / "imuscope.log"),
+              HasSubstr("event: kerb on the <left> (from imuscope view on "));
   check_devices();
   EXPECT_EQ(blank_figures(), 0);
   photograph_all("live");
@@ -414,8 +426,10 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   ASSERT_EQ(service->wait(), 0) << read_text(folder_ / "imuscope.log");
   simulator.interrupt();
   simulator.wait();
-  EXPECT_TRUE(browser_->becomes_true("document.getElementById('state').textContent.startsWith('silent for')", 15.0));
-  EXPECT_EQ(counts().at("rows"), rows_written(folder_ / "live")) << "every row that the service wrote was drawn";
+  EXPECT_TRUE(
+      browser_->becomes_true("document.getElementById('state').textContent.startsWith('silent for')", 15.0));
+  EXPECT_EQ(counts().at("rows"), rows_written(folder_ / "live"))
+      << "every row that the service wrote was drawn";
   const json truth = read_json(folder_ / "truth" / "truth.json");
   check_losses();
   check_calibration(truth);
@@ -425,7 +439,8 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   // The program of the page is started anew: the page finds it again.
   const std::string port = std::to_string(view.port());
   view.end();
-  EXPECT_TRUE(browser_->becomes_true("document.getElementById('state').textContent === 'page offline'", 10.0));
+  EXPECT_TRUE(
+      browser_->becomes_true("document.getElementById('state').textContent === 'page offline'", 10.0));
   View again({"--port", port}, folder_ / "again.log");
   EXPECT_TRUE(browser_->becomes_true("imuscope.counts.connections === 2", 15.0));
 
@@ -434,18 +449,18 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
                             folder_ / "imusim2.log");
   std::this_thread::sleep_for(seconds(1));
   {
-    BackgroundProgram second(
-        "imuscope", {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live2").string()},
-        folder_ / "imuscope2.log");
+    BackgroundProgram second("imuscope",
+                             {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live2").string()},
+                             folder_ / "imuscope2.log");
     EXPECT_TRUE(browser_->becomes_true("document.querySelectorAll('#devices .tile').length === 8", 15.0));
     second.interrupt();
     EXPECT_EQ(second.wait(), 0);
   }
   const json picture = browser_->value_of("imuscope.picture");
   {
-    BackgroundProgram third(
-        "imuscope", {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live3").string()},
-        folder_ / "imuscope3.log");
+    BackgroundProgram third("imuscope",
+                            {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live3").string()},
+                            folder_ / "imuscope3.log");
     EXPECT_TRUE(browser_->becomes_true("imuscope.picture > " + picture.dump(), 15.0));
     third.interrupt();
     EXPECT_EQ(third.wait(), 0);
@@ -455,7 +470,8 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   again.end();
   // A server that is gone is told by the browser itself; the page says nothing.
   for (const std::string& said : browser_->said())
-    EXPECT_THAT(said, testing::AnyOf(HasSubstr("ERR_CONNECTION_REFUSED"), HasSubstr("WebSocket connection"))) << said;
+    EXPECT_THAT(said, testing::AnyOf(HasSubstr("ERR_CONNECTION_REFUSED"), HasSubstr("WebSocket connection")))
+        << said;
 
   // The recording of the same run plays, and a slider leads to any time of it.
   View recorded({(folder_ / "live").string(), "--port", "0"}, folder_ / "recorded.log");
@@ -466,7 +482,8 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   const auto slide_to = [&](double time_s) {
     browser_->value_of("{const s = document.getElementById('slider'); s.value = " + std::to_string(time_s) +
                        "; s.dispatchEvent(new Event('input'));}");
-    return browser_->becomes_true("Math.abs(imuscope.known.time_s - " + std::to_string(time_s) + ") < 1.5", 10.0);
+    return browser_->becomes_true("Math.abs(imuscope.known.time_s - " + std::to_string(time_s) + ") < 1.5",
+                                  10.0);
   };
   EXPECT_TRUE(slide_to(0.5 * length_s));
   EXPECT_TRUE(slide_to(0.25 * length_s));
@@ -480,8 +497,12 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
 }
 
 TEST_F(ViewPage, WhatAStrangerSendsIsTextAndAPageOfAnotherOriginHearsNothing) {
-  const std::vector<std::string> payloads{"<img src=x onerror=pwned()>", "</script><script>pwned()</script>",
-                                          "<svg onload=pwned()>", "javascript:pwned()", "__proto__", "constructor",
+  const std::vector<std::string> payloads{"<img src=x onerror=pwned()>",
+                                          "</script><script>pwned()</script>",
+                                          "<svg onload=pwned()>",
+                                          "javascript:pwned()",
+                                          "__proto__",
+                                          "constructor",
                                           "\"><iframe srcdoc='<script>parent.pwned()</script>'>"};
   View view({"--port", "0"}, folder_ / "view.log");
   browser_->open(view.url());
@@ -511,21 +532,25 @@ TEST_F(ViewPage, WhatAStrangerSendsIsTextAndAPageOfAnotherOriginHearsNothing) {
     bus->publish(example_event(payload), "EVENT");
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
   }
-  EXPECT_TRUE(browser_->becomes_true("document.body.textContent.includes('onerror=pwned')", 5.0)) << "it is read as text";
+  EXPECT_TRUE(browser_->becomes_true("document.body.textContent.includes('onerror=pwned')", 5.0))
+      << "it is read as text";
   EXPECT_EQ(browser_->value_of("window.called"), 0);
-  EXPECT_EQ(browser_->value_of("document.querySelectorAll('img, iframe, svg, object, embed, form, a').length"), 0);
+  EXPECT_EQ(
+      browser_->value_of("document.querySelectorAll('img, iframe, svg, object, embed, form, a').length"), 0);
   EXPECT_EQ(browser_->value_of("document.querySelectorAll('script').length"), 1);
   EXPECT_THAT(browser_->said(), IsEmpty());
 
   // A script that got into the page does not run; a page of another origin gets no websocket.
-  browser_->value_of("{const s = document.createElement('script'); s.textContent = 'pwned()'; document.body.append(s);}");
+  browser_->value_of(
+      "{const s = document.createElement('script'); s.textContent = 'pwned()'; document.body.append(s);}");
   EXPECT_EQ(browser_->value_of("window.called"), 0);
   const ForeignPage foreign;
   browser_->open("http://127.0.0.1:" + std::to_string(foreign.port()) + "/");
   ASSERT_TRUE(browser_->becomes_true("document.title === 'foreign'", 5.0));
-  browser_->value_of("window.heard = 0; window.ended = 0; window.socket = new WebSocket('ws://127.0.0.1:" +
-                     std::to_string(view.port()) +
-                     "/live'); socket.onmessage = () => { ++window.heard; }; socket.onclose = () => { ++window.ended; }");
+  browser_->value_of(
+      "window.heard = 0; window.ended = 0; window.socket = new WebSocket('ws://127.0.0.1:" +
+      std::to_string(view.port()) +
+      "/live'); socket.onmessage = () => { ++window.heard; }; socket.onclose = () => { ++window.ended; }");
   EXPECT_TRUE(browser_->becomes_true("window.ended === 1", 10.0));
   EXPECT_EQ(browser_->value_of("window.heard"), 0);
   EXPECT_EQ(browser_->value_of("window.socket.readyState"), 3) << "it was never open";
@@ -540,12 +565,14 @@ TEST(ViewCommand, BeyondThisPcThereIsAlwaysAToken) {
   ASSERT_TRUE(std::regex_search(open.url(), found, std::regex("\\?token=([0-9a-f]{32})$"))) << open.url();
   const std::string host = "127.0.0.1:" + std::to_string(open.port());
   EXPECT_THAT(RawClient(open.port()).get("/", host), testing::StartsWith("HTTP/1.1 401"));
-  EXPECT_THAT(RawClient(open.port()).get("/?token=" + found[1].str(), host), testing::StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(RawClient(open.port()).get("/?token=" + found[1].str(), host),
+              testing::StartsWith("HTTP/1.1 200"));
   View again({"--address", "0.0.0.0", "--port", "0"}, folder / "again.log");
   EXPECT_THAT(again.url(), testing::Not(HasSubstr(found[1].str()))) << "it is another one each time";
   View own({"--port", "0", "--token", "a-long-secret"}, folder / "own.log");
   EXPECT_THAT(own.url(), testing::EndsWith("/?token=a-long-secret"));
-  EXPECT_THAT(RawClient(own.port()).get("/", "127.0.0.1"), testing::StartsWith("HTTP/1.1 401")) << "on loopback, too";
+  EXPECT_THAT(RawClient(own.port()).get("/", "127.0.0.1"), testing::StartsWith("HTTP/1.1 401"))
+      << "on loopback, too";
   for (View* view : {&open, &again, &own}) view->end();
 }
 

@@ -36,12 +36,12 @@ constexpr std::size_t kTransferMax = 300'000;
 class Door : public testing::Test {
  protected:
   void open(const std::string& token = {}, const std::string& address = "127.0.0.1") {
-    auto server = ViewServer::open({address, 0, token}, page_html(),
-                                   [this] { return "whole " + std::to_string(newest_.load()); },
-                                   [this](std::string_view text) {
-                                     const std::scoped_lock lock(mutex_);
-                                     said_.emplace_back(text);
-                                   });
+    auto server = ViewServer::open(
+        {address, 0, token}, page_html(), [this] { return "whole " + std::to_string(newest_.load()); },
+        [this](std::string_view text) {
+          const std::scoped_lock lock(mutex_);
+          said_.emplace_back(text);
+        });
     ASSERT_TRUE(server) << server.error().text();
     server_ = std::move(*server);
     host_ = "127.0.0.1:" + std::to_string(server_->port());
@@ -80,10 +80,11 @@ TEST_F(Door, GivesThePageWithHeadersThatLetNothingElseRun) {
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 200"));
   EXPECT_LT(answer.size(), kTransferMax / 3) << "the rest is for the picture";
   const std::string head = answer.substr(0, answer.find("\r\n\r\n"));
-  for (const char* line : {"X-Content-Type-Options: nosniff", "X-Frame-Options: DENY", "Referrer-Policy: no-referrer",
-                           "Cross-Origin-Opener-Policy: same-origin", "Cross-Origin-Resource-Policy: same-origin",
-                           "Cache-Control: no-store", "Connection: close", "default-src 'none'", "connect-src 'self'",
-                           "frame-ancestors 'none'", "base-uri 'none'", "form-action 'none'", "script-src 'sha256-"})
+  for (const char* line :
+       {"X-Content-Type-Options: nosniff", "X-Frame-Options: DENY", "Referrer-Policy: no-referrer",
+        "Cross-Origin-Opener-Policy: same-origin", "Cross-Origin-Resource-Policy: same-origin",
+        "Cache-Control: no-store", "Connection: close", "default-src 'none'", "connect-src 'self'",
+        "frame-ancestors 'none'", "base-uri 'none'", "form-action 'none'", "script-src 'sha256-"})
     EXPECT_THAT(head, HasSubstr(line));
   EXPECT_THAT(head, Not(HasSubstr("unsafe")));
   EXPECT_THAT(head, Not(HasSubstr("http:")));
@@ -108,7 +109,8 @@ TEST(ContentPolicy, NamesTheScriptByItsHash) {
 
 TEST_F(Door, HasOnePageAndNoFiles) {
   open();
-  for (const char* target : {"/index.html", "/../../etc/passwd", "/%2e%2e/etc/passwd", "//", "/live/", "http://x/"})
+  for (const char* target :
+       {"/index.html", "/../../etc/passwd", "/%2e%2e/etc/passwd", "//", "/live/", "http://x/"})
     EXPECT_THAT(client().get(target, host_), StartsWith("HTTP/1.1 404")) << target;
   EXPECT_THAT(client().get("/", host_, {}, "POST"), StartsWith("HTTP/1.1 405"));
   EXPECT_THAT(client().get("/", host_, {}, "DELETE"), StartsWith("HTTP/1.1 405"));
@@ -132,13 +134,15 @@ TEST_F(Door, APageOfAnotherOriginGetsNoWebsocket) {
     EXPECT_THAT(client().upgrade(host_, "/live", std::string("Origin: ") + origin + "\r\n"),
                 StartsWith("HTTP/1.1 403"))
         << origin;
-  EXPECT_THAT(client().upgrade(host_, "/live", "Origin: http://" + host_ + "\r\n"), StartsWith("HTTP/1.1 101"));
+  EXPECT_THAT(client().upgrade(host_, "/live", "Origin: http://" + host_ + "\r\n"),
+              StartsWith("HTTP/1.1 101"));
   EXPECT_GE(server_->counters().requests_refused, 4U);
 }
 
 TEST_F(Door, WithATokenNothingIsToldWithoutIt) {
   open("a-long-secret");
-  for (const char* target : {"/", "/live", "/?token=", "/?token=a-long-secre", "/?token=a-long-secret2", "/?x=a-long-secret"})
+  for (const char* target :
+       {"/", "/live", "/?token=", "/?token=a-long-secre", "/?token=a-long-secret2", "/?x=a-long-secret"})
     EXPECT_THAT(client().get(target, host_), StartsWith("HTTP/1.1 401")) << target;
   EXPECT_THAT(client().upgrade(host_), StartsWith("HTTP/1.1 401"));
   EXPECT_THAT(client().get("/?token=a-long-secret", host_), StartsWith("HTTP/1.1 200"));
@@ -147,7 +151,8 @@ TEST_F(Door, WithATokenNothingIsToldWithoutIt) {
 
 TEST_F(Door, WhatCannotBeOpenedIsTold) {
   const auto fails = [](const ViewDoor& door) {
-    return ViewServer::open(door, "page", [] { return std::string(); }, [](std::string_view) {});
+    return ViewServer::open(
+        door, "page", [] { return std::string(); }, [](std::string_view) {});
   };
   EXPECT_EQ(fails({"attacker.example", 0, {}}).error().kind, ErrorKind::kUsage);
   EXPECT_EQ(fails({"127.0.0.1", 0, "short"}).error().kind, ErrorKind::kUsage);
@@ -174,11 +179,15 @@ TEST_F(Door, MalformedRequestsAndFramesEndTheirOwnConnectionAlone) {
   open();
   RawClient watching = page();
   const std::vector<std::string> requests{
-      std::string(1, '\0'), std::string(10'000, 'A'), "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n",
+      std::string(1, '\0'),
+      std::string(10'000, 'A'),
+      "GET\r\n\r\n",
+      "GET / HTTP/9.9\r\n\r\n",
       "GET / HTTP/1.1\r\nHost: " + host_ + "\r\nContent-Length: 99999999999999999999\r\n\r\n",
       "GET / HTTP/1.1\r\nHost: " + host_ + "\r\nContent-Length: 100\r\n\r\n" + std::string(100, 'x'),
       "GET / HTTP/1.1\r\nHost: " + host_ + "\r\nTransfer-Encoding: chunked\r\n\r\nffffffffffffffff\r\n",
-      "GET / HTTP/1.1\r\nHost: " + host_ + "\r\nX: " + std::string(2 * ViewServer::kHeaderMax, 'y') + "\r\n\r\n",
+      "GET / HTTP/1.1\r\nHost: " + host_ + "\r\nX: " + std::string(2 * ViewServer::kHeaderMax, 'y') +
+          "\r\n\r\n",
       "\x16\x03\x01\x02\x01\x01\x01"};
   for (const std::string& request : requests) {
     RawClient one = client();
@@ -190,14 +199,14 @@ TEST_F(Door, MalformedRequestsAndFramesEndTheirOwnConnectionAlone) {
   const std::vector<std::string> frames{
       huge,
       RawClient::frame(std::string(kPageMessageMax + 1, 'x')),
-      std::string("\x81\x03xyz"),             // without a mask
-      RawClient::frame("x", 0x80),            // a continuation of nothing
-      RawClient::frame("x", 0xf1),            // reserved bits
-      RawClient::frame("x", 0x83),            // a reserved opcode
-      RawClient::frame("\xff\xfe"),           // no UTF-8
-      RawClient::frame("x", 0x82),            // binary
+      std::string("\x81\x03xyz"),                     // without a mask
+      RawClient::frame("x", 0x80),                    // a continuation of nothing
+      RawClient::frame("x", 0xf1),                    // reserved bits
+      RawClient::frame("x", 0x83),                    // a reserved opcode
+      RawClient::frame("\xff\xfe"),                   // no UTF-8
+      RawClient::frame("x", 0x82),                    // binary
       RawClient::frame(std::string(126, 'x'), 0x89),  // a ping that is too long
-      RawClient::frame("\x03", 0x88)};        // a close with half a code
+      RawClient::frame("\x03", 0x88)};                // a close with half a code
   for (std::size_t i = 0; i < frames.size(); ++i) {
     RawClient one = page();
     one.send(frames[i]);
@@ -206,7 +215,8 @@ TEST_F(Door, MalformedRequestsAndFramesEndTheirOwnConnectionAlone) {
   }
   EXPECT_TRUE(said().empty()) << "nothing of it was taken for a message";
   // The server has seen that the last of them closed, a moment after the test closed it.
-  for (int i = 0; i < 100 && server_->counters().pages > 1; ++i) std::this_thread::sleep_for(milliseconds(20));
+  for (int i = 0; i < 100 && server_->counters().pages > 1; ++i)
+    std::this_thread::sleep_for(milliseconds(20));
   EXPECT_EQ(server_->counters().pages, 1U);
 }
 
@@ -278,7 +288,8 @@ TEST_F(Door, WhoeverIsTooSlowGetsTheNewestAndCostsNobody) {
   constexpr int kParts = 400;  // 20 MB, of which no queue may hold more than kQueueMax
   for (int i = 0; i < kParts; ++i) {
     server_->send("part " + std::to_string(++newest_) + " " + long_text);
-    EXPECT_THAT(watching.next_text().value_or("").substr(0, 20), StartsWith("part " + std::to_string(newest_.load())));
+    EXPECT_THAT(watching.next_text().value_or("").substr(0, 20),
+                StartsWith("part " + std::to_string(newest_.load())));
   }
   EXPECT_GT(server_->counters().parts_left_out, static_cast<std::uint64_t>(kParts) / 2);
   // Now it reads: old parts first, then the whole of now.
@@ -289,7 +300,8 @@ TEST_F(Door, WhoeverIsTooSlowGetsTheNewestAndCostsNobody) {
     last = *text;
   }
   EXPECT_LT(got, (ViewServer::kQueueMax + 60) * long_text.size()) << "what the kernel held, and one queue";
-  EXPECT_TRUE(last.starts_with("whole") || last.starts_with("part " + std::to_string(kParts))) << last.substr(0, 20);
+  EXPECT_TRUE(last.starts_with("whole") || last.starts_with("part " + std::to_string(kParts)))
+      << last.substr(0, 20);
   expect_undisturbed(watching);
   EXPECT_EQ(slow.next_text().value_or("").substr(0, 4), "part") << "and goes on from there";
 }

@@ -50,8 +50,8 @@ Result<void> run(const ViewCommand& options) {
   std::signal(SIGTERM, stop_view);
   const auto opened = [&door](const view::ViewServer& server) {
     const bool is_ipv6 = door.address.find(':') != std::string::npos;
-    say("the page is at http://{}:{}/{}{}\n", is_ipv6 ? "[" + door.address + "]" : door.address, server.port(),
-        door.token.empty() ? "" : "?token=", door.token);
+    say("the page is at http://{}:{}/{}{}\n", is_ipv6 ? "[" + door.address + "]" : door.address,
+        server.port(), door.token.empty() ? "" : "?token=", door.token);
     std::fflush(stdout);  // whoever started it waits for this line
   };
   if (!options.recording.empty()) return view::show_recording(options.recording, door, opened, view_stopped);
