@@ -140,7 +140,7 @@ void Picture::take(calibration_t&& calibration) {
   of->new_calibration = true;
 }
 
-void Picture::take(navigation_t&& navigation) {
+void Picture::take(const navigation_t& navigation) {
   advance(navigation.time_s);
   if (std::abs(navigation.lat_deg) <= 90.0 && std::abs(navigation.lon_deg) <= 360.0) {
     if (!origin_) {
@@ -161,12 +161,12 @@ void Picture::take(navigation_t&& navigation) {
       last_track_ = here;
     }
   }
-  navigation_ = std::move(navigation);
+  navigation_ = navigation;
   new_navigation_ = true;
 }
 
-void Picture::take(odometry_t&& odometry) {
-  odometry_ = std::move(odometry);
+void Picture::take(const odometry_t& odometry) {
+  odometry_ = odometry;
   new_odometry_ = true;
 }
 

@@ -93,8 +93,8 @@ class Picture {
   [[nodiscard]] Imu* imu(const std::string& name);
   void take(status_t&& status);
   void take(calibration_t&& calibration);
-  void take(navigation_t&& navigation);
-  void take(odometry_t&& odometry);
+  void take(const navigation_t& navigation);
+  void take(const odometry_t& odometry);
   void take(imuscope::error_t&& errors);
   void take(wavelet_variance_t&& variances);
   void take(noise_model_t&& models);

@@ -462,11 +462,17 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
                             {"run", (folder_ / "live.toml").string(), "--out", (folder_ / "live3").string()},
                             folder_ / "imuscope3.log");
     EXPECT_TRUE(browser_->becomes_true("imuscope.picture > " + picture.dump(), 15.0));
+    EXPECT_TRUE(browser_->becomes_true(
+        "document.querySelector('#devices [data-key=mtx1] [data-field=state]')?.textContent === 'streaming'",
+        20.0));
+    // Without the vehicle there is something that wants a person, with the device's name.
+    vehicle.interrupt();
+    vehicle.wait();
+    EXPECT_TRUE(browser_->becomes_true(
+        "[...document.querySelectorAll('#alarms .now')].some((a) => a.textContent.includes('mtx1'))", 20.0));
     third.interrupt();
     EXPECT_EQ(third.wait(), 0);
   }
-  vehicle.interrupt();
-  vehicle.wait();
   again.end();
   // A server that is gone is told by the browser itself; the page says nothing.
   for (const std::string& said : browser_->said())
