@@ -256,7 +256,7 @@ function showDevices() {
       ['lost', 'lost', String(d.samples_lost)],
       ['samples', 'samples', String(d.samples), true],
       ['late', 'late', String(d.samples_late), true],
-      ['refused', 'refused here', String(d.samples_refused + d.frames_dropped), true],
+      ['refused', 'refused', String(d.samples_refused + d.frames_dropped), true],
       ['clock', 'clock', d.clock_drift_ppm === null ? kUnknown : number(d.clock_drift_ppm, 1) + ' ppm ± ' + number(d.clock_sd_us, 0) + ' µs', true]]);
     let problem = tile.querySelector('p');
     if (d.problem && !problem) tile.append(problem = element('p'));
