@@ -1,5 +1,8 @@
-# Writes the files named in ASSETS ("name=path|name=path...") as string constants of C++ to OUTPUT.
-set(text "#include \"report/assets.h\"\n\nnamespace imuscope::report {\n")
+# Writes the files named in ASSETS ("name=path|name=path...") as string constants of C++ to OUTPUT, of the room ROOM.
+if(NOT ROOM)
+  set(ROOM report)
+endif()
+set(text "#include \"${ROOM}/assets.h\"\n\nnamespace imuscope::${ROOM} {\n")
 string(REPLACE "|" ";" assets "${ASSETS}")
 foreach(asset ${assets})
   string(REGEX MATCH "^([^=]*)=(.*)$" matched "${asset}")
@@ -10,5 +13,5 @@ foreach(asset ${assets})
   string(REGEX REPLACE "(..)" "\\\\x\\1" escaped "${bytes}")
   string(APPEND text "std::string_view ${name}() { return {\"${escaped}\", ${size}}; }\n")
 endforeach()
-string(APPEND text "}  // namespace imuscope::report\n")
+string(APPEND text "}  // namespace imuscope::${ROOM}\n")
 file(WRITE ${OUTPUT} "${text}")

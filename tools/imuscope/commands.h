@@ -79,6 +79,9 @@ void add_config(CLI::App& app, Work& chosen);
 /// `imuscope top`
 void add_top(CLI::App& app, Work& chosen);
 
+/// `imuscope view [RECORDING]`
+void add_view(CLI::App& app, Work& chosen);
+
 /// `imuscope status`
 void add_status(CLI::App& app, Work& chosen);
 

@@ -49,6 +49,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_capture(app, work);
   imuscope::cli::add_probe(app, work);
   imuscope::cli::add_top(app, work);
+  imuscope::cli::add_view(app, work);
   imuscope::cli::add_status(app, work);
   imuscope::cli::add_keep(app, work);
   imuscope::cli::add_doctor(app, work);
