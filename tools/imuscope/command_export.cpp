@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "export_hdf5.h"
 #include "fit_file.h"
 #include "noise/export.h"
 #include "print.h"
@@ -20,6 +21,7 @@ struct ExportCommand {
   std::string name;
   std::string regime;
   std::string unit;
+  std::filesystem::path out;
   noise::ExportOptions how;
 };
 
@@ -41,7 +43,15 @@ Result<void> keep(std::vector<StoredFit>& fits, std::string StoredFit::*member, 
   return {};
 }
 
+/// A whole run in another form.
+Result<void> export_run(const ExportCommand& options) {
+  if (options.files.size() != 1) return usage_error("--to hdf5 is of one run", "give one run folder");
+  return export_hdf5(options.files.front(), options.out, options.how.force);
+}
+
 Result<void> run_export(const ExportCommand& options) {
+  if (options.format == "hdf5") return export_run(options);
+  if (!options.out.empty()) return usage_error("--out is of a whole run", "redirect what is printed: > FILE");
   const auto format = noise::parse_export_format(options.format);
   if (!format) return tl::unexpected(format.error());
   const auto unit = noise::parse_unit(options.unit);
@@ -67,26 +77,35 @@ Result<void> run_export(const ExportCommand& options) {
 }  // namespace
 
 void add_export(CLI::App& app, Work& chosen) {
-  auto* command = app.add_subcommand("export", "Noise models as another tool's configuration");
+  auto* command = app.add_subcommand(
+      "export", "Noise models as another tool's configuration; a run folder as one HDF5 file");
   auto options = std::make_shared<ExportCommand>();
   command
       ->add_option("MODEL", options->files,
                    "What `imuscope fit --json` printed (one file an axis), a run's models.json, or the "
                    "certificate.json of "
-                   "`imuscope characterize`")
+                   "`imuscope characterize`; with --to hdf5 a run folder")
       ->required();
   command
-      ->add_option("--to,-t", options->format,
-                   "kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins or state-space")
+      ->add_option(
+          "--to,-t", options->format,
+          "kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins or state-space; of a run "
+          "folder hdf5")
       ->required();
   command->add_option("--name,-n", options->name, "The S-IMU to export, where the file holds several");
   command->add_option("--regime", options->regime, "all, static or dynamic, where the file holds several");
   command->add_option("--unit,-u", options->unit,
                       "Unit of the signal, where the file does not say: rad/s, deg/s, m/s^2 or g");
+  command
+      ->add_option("--out,-o", options->out,
+                   "With --to hdf5: the file to write (default: run.h5 in the run folder)")
+      ->type_name("FILE");
   command->add_flag("--conservative", options->how.conservative,
                     "Upper ends of the intervals, for a filter that must not be optimistic");
-  command->add_flag("--force", options->how.force,
-                    "Write even what does not hold: the file then says why it should not be used");
+  command->add_flag(
+      "--force", options->how.force,
+      "Write even what does not hold: the file then says why it should not be used; with --to hdf5 "
+      "replace a file that is there");
   on_chosen(*command, chosen, [options] { return run_export(*options); });
 }
 

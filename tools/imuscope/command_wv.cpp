@@ -40,7 +40,7 @@ void add_wv(CLI::App& app, Work& chosen) {
   auto options = std::make_shared<SignalOptions>();
   add_signal_options(*command, *options, false);
   on_chosen(*command, chosen, [options]() -> Result<void> {
-    const auto wvs = wavelet_variances_of(*options, Lines::kStay);
+    const auto wvs = wavelet_variances_of(*options, noise::Lines::kStay);
     if (!wvs) return tl::unexpected(wvs.error());
     const auto& wv = wvs->wvs.front();
     if (options->json) {
