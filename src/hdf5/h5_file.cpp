@@ -26,12 +26,12 @@ Result<void> checked(herr_t status) {
   return {};
 }
 
-/// Strings of one length, UTF-8, filled up with zeros.
+/// Strings of one length, filled up with zeros. UTF-8, which the type does not say: Octave reads no string
+/// that does, and the others take the bytes as they are.
 Handle text_type(std::size_t length) {
   Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   (void)H5Tset_size(type.get(), std::max<std::size_t>(length, 1));
   (void)H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
-  (void)H5Tset_cset(type.get(), H5T_CSET_UTF8);
   return type;
 }
 
@@ -89,6 +89,8 @@ std::string link_name(std::string_view name) {
 }
 
 Result<Handle> create_file(const std::filesystem::path& file) {
+  // What a full disk refused, the library would try again when the program ends, and crash.
+  (void)H5dont_atexit();
   // Its own reports, of many lines on the terminal, say nothing to a person.
   (void)H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);

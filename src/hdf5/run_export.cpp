@@ -157,8 +157,9 @@ std::string joined(const std::set<std::string>& names) {
 
 Result<void> write_all(const Handle& file, const std::filesystem::path& folder, RunFileNames names,
                        std::string_view version) {
-  for (const auto& [key, value] :
-       {std::pair<const char*, std::string_view>{"format", "imuscope run"}, {"imuscope_version", version}}) {
+  for (const auto& [key, value] : {std::pair<const char*, std::string_view>{"format", "imuscope run"},
+                                   {"imuscope_version", version},
+                                   {"text_encoding", "UTF-8"}}) {
     if (auto set = set_attribute(file, key, value); !set) return set;
   }
   const auto tables_group = create_group(file, "tables");
@@ -187,8 +188,10 @@ Result<void> export_run(const std::filesystem::path& run_folder, const std::file
     return usage_error(fmt::format("{} is no name of a file", file.string()), "give the file to write");
   auto names = files_of(run_folder);
   if (!names) return tl::unexpected<Error>(names.error());
-  names->left_out.erase(name);
-  const auto folder = OutputFolder::open(file.has_parent_path() ? file.parent_path() : ".");
+  const auto parent = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  std::error_code elsewhere;
+  if (std::filesystem::equivalent(parent, run_folder, elsewhere)) names->left_out.erase(name);
+  const auto folder = OutputFolder::open(parent);
   if (!folder) return tl::unexpected<Error>(folder.error());
   const auto scratch = folder->scratch_folder();
   if (!scratch) return tl::unexpected<Error>(scratch.error());

@@ -10,7 +10,8 @@
 ///                        of flat objects groups of columns; null is NaN
 /// /documents/NAME        the JSON documents as they are
 ///
-/// What stays a file of its own (capture, report, figures) is named in the root's attribute `left_out`.
+/// Text is UTF-8. What stays a file of its own (capture, report, figures) is named in the root's attribute
+/// `left_out`.
 
 #include <filesystem>
 #include <string_view>

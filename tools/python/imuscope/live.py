@@ -16,6 +16,16 @@ _TYPES = {getattr(messages, name)._get_packed_fingerprint(): getattr(messages, n
           for name in dir(messages) if isinstance(getattr(messages, name), type)}
 
 
+class _Whole(io.BytesIO):
+    """Bytes of which a decoder gets as many as it asks for, or none: lcm-gen's takes what there is for the whole."""
+
+    def read(self, size: Optional[int] = -1, /) -> bytes:
+        data = super().read(size)
+        if size is None or size < 0 or len(data) != size:
+            raise EOFError
+        return data
+
+
 class Heard(NamedTuple):
     """A message of a channel."""
 
@@ -32,7 +42,7 @@ def decode(data: bytes) -> Optional[Any]:
     kind = _TYPES.get(data[:8])
     if kind is None:
         return None
-    stream = io.BytesIO(data)
+    stream = _Whole(data)
     try:
         message = kind.decode(stream)
     except Exception:  # of what damaged lengths can do to a decoder, no list would be whole

@@ -108,12 +108,14 @@ class Allan:
 
 def _chosen(x: ArrayLike, rate_hz: float, mask: Optional[ArrayLike], unit: str, levels: int, robust: bool,
             efficiency: float, nan_is_gap: bool, confidence: float) -> _imuscope.Signal:
+    if np.iscomplexobj(x):
+        raise Error("the signal is no series of real numbers; give an array of one dimension")
     try:
         values = np.ascontiguousarray(x, dtype=np.float64)
         used = None if mask is None else np.ascontiguousarray(mask, dtype=np.bool_)
     except (TypeError, ValueError) as why:
         raise Error(f"the signal is no series of numbers: {why}") from None
-    if np.iscomplexobj(x) or values.ndim != 1 or (used is not None and used.ndim != 1):
+    if values.ndim != 1 or (used is not None and used.ndim != 1):
         raise Error("the signal is no series of real numbers; give an array of one dimension")
     if not 0.5 < confidence < 1.0:
         raise Error(f"a confidence of {confidence} is no share; give 0.95 for 95 %")

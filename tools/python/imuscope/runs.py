@@ -116,7 +116,7 @@ class Run:
     @property
     def models(self) -> list[dict[str, Any]]:
         """Noise models per S-IMU, axis and regime: entries of models.json, each good for Fit.from_document()."""
-        return list(self.documents["models"])
+        return list(self.documents["models"]["models"])
 
 
 def read_run(folder: Union[str, os.PathLike[str]]) -> Run:
