@@ -76,12 +76,12 @@ set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_CONTROL_EXTRA
 
 if(TARGET _imuscope)
   list(APPEND CPACK_COMPONENTS_ALL python)
-  math(EXPR next_minor "${Python_VERSION_MINOR} + 1")
+  math(EXPR next_minor "${IMUSCOPE_PYTHON_MINOR} + 1")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-imuscope)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
   set(CPACK_DEBIAN_PYTHON_DESCRIPTION "imuscope for Python: noise models, runs, captures, studies and live data")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-      "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
+      "python3 (>= 3.${IMUSCOPE_PYTHON_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "imuscope, python3-matplotlib, jupyter-notebook")
 endif()
 if(TARGET imuscope_hdf5)

@@ -74,9 +74,7 @@ void append_time(const RowTime& time, fmt::memory_buffer& row) {
   fmt::format_to(fmt::appender(row), FMT_COMPILE("{}.{:06}"), us / kUsPerS, us % kUsPerS);
 }
 
-std::string navigation_csv_header() {
-  return tables::csv_header(tables::run_table("navigation"));
-}
+std::string navigation_csv_header() { return tables::csv_header(tables::run_table("navigation")); }
 
 std::string navigation_csv_row(const NavigationOutput& nav, const RowTime& time) {
   fmt::memory_buffer row;

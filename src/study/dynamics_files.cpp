@@ -130,7 +130,8 @@ Result<void> write_scatter(const Configuration& configuration, std::vector<RowSp
     const std::size_t step = count_rows(rows[i]) / kScatterRows + 1;
     CsvFile file;
     const auto name = device_file_name("scatter", configuration.devices[indices[i]].name, ".csv");
-    if (auto opened = file.open(folder, name, tables::csv_header(tables::run_table("scatter"))); !opened) return opened;
+    if (auto opened = file.open(folder, name, tables::csv_header(tables::run_table("scatter"))); !opened)
+      return opened;
     rows[i].rewind();
     std::size_t k = 0;
     for (ErrorRow row{}; rows[i].next(row); ++k) {

@@ -51,10 +51,12 @@ Column number(std::string name, std::string unit, std::string description) {
   return {std::move(name), std::move(unit), std::move(description), CellKind::kNumber};
 }
 
-void add_axes(std::vector<Column>& columns, const char* name, const char* unit, const char* description) {
+/// Columns PREFIXxSUFFIX, PREFIXySUFFIX, PREFIXzSUFFIX.
+void add_axes(std::vector<Column>& columns, std::string_view prefix, std::string_view suffix,
+              const char* unit, std::string_view description) {
   for (const char axis : kAxes) {
     columns.push_back(
-        number(fmt::format(fmt::runtime(name), axis), unit, fmt::format(fmt::runtime(description), axis)));
+        number(fmt::format("{}{}{}", prefix, axis, suffix), unit, fmt::format("{}, {}", description, axis)));
   }
 }
 
@@ -95,23 +97,23 @@ std::vector<Column> odometry_columns() {
   columns.push_back(number("scale_percent", "%", "the wheels show 1 + scale/100 times the speed"));
   columns.push_back(number("mount_y_deg", "deg", "rotation vector that takes b to the vehicle's axes, y"));
   columns.push_back(number("mount_z_deg", "deg", "rotation vector that takes b to the vehicle's axes, z"));
-  add_axes(columns, "axle_{}_m", "m", "lever arm from b's origin to the middle of the axle, in b, {}");
+  add_axes(columns, "axle_", "_m", "m", "lever arm from b's origin to the middle of the axle, in b");
   columns.push_back(number("sd_scale_percent", "%", "sd of scale_percent"));
   columns.push_back(number("sd_mount_y_deg", "deg", "sd of mount_y_deg"));
   columns.push_back(number("sd_mount_z_deg", "deg", "sd of mount_z_deg"));
-  add_axes(columns, "sd_axle_{}_m", "m", "sd of the axle's lever arm, {}");
+  add_axes(columns, "sd_axle_", "_m", "m", "sd of the axle's lever arm");
   return columns;
 }
 
 std::vector<Column> calibration_columns() {
   std::vector<Column> states;
-  add_axes(states, "psi_{}_deg", "deg", "boresight: rotation vector -Log(C_prior^T C_b_s), in b, {}");
-  add_axes(states, "r_{}_m", "m", "lever arm from b's origin to s's origin, in b, {}");
+  add_axes(states, "psi_", "_deg", "deg", "boresight: rotation vector -Log(C_prior^T C_b_s), in b");
+  add_axes(states, "r_", "_m", "m", "lever arm from b's origin to s's origin, in b");
   states.push_back(number("t_d_ms", "ms", "time offset: S at t shows the motion at t + t_d"));
-  add_axes(states, "bg_{}_radps", "rad/s", "gyroscope bias, in s, {}");
-  add_axes(states, "ba_{}_mps2", "m/s^2", "accelerometer bias, in s, {}");
-  add_axes(states, "sg_{}", "1", "gyroscope scale error, along s {}");
-  add_axes(states, "sa_{}", "1", "accelerometer scale error, along s {}");
+  add_axes(states, "bg_", "_radps", "rad/s", "gyroscope bias, in s");
+  add_axes(states, "ba_", "_mps2", "m/s^2", "accelerometer bias, in s");
+  add_axes(states, "sg_", "", "1", "gyroscope scale error, along s");
+  add_axes(states, "sa_", "", "1", "accelerometer scale error, along s");
   auto columns = time_columns();
   constexpr std::size_t kPsiColumns = 3;
   for (std::size_t i = 0; i < states.size(); ++i) {
@@ -124,15 +126,14 @@ std::vector<Column> calibration_columns() {
     columns.push_back(states[i]);
   }
   for (const Column& state : states)
-    columns.push_back(number("sd_" + state.name, state.unit, "sd of " + state.name));
+    columns.push_back(
+        number(fmt::format("sd_{}", state.name), state.unit, fmt::format("sd of {}", state.name)));
   return columns;
 }
 
 void add_errors(std::vector<Column>& columns) {
-  add_axes(columns, "e_gyro_{}_radps", "rad/s",
-           "error of the gyroscope, in s, {}; empty where it is not valid");
-  add_axes(columns, "e_accel_{}_mps2", "m/s^2",
-           "error of the accelerometer, in s, {}; empty where it is not valid");
+  add_axes(columns, "e_gyro_", "_radps", "rad/s", "error of the gyroscope, in s where it is valid");
+  add_axes(columns, "e_accel_", "_mps2", "m/s^2", "error of the accelerometer, in s where it is valid");
 }
 
 std::vector<Column> error_columns() {
@@ -146,11 +147,11 @@ std::vector<Column> error_columns() {
 
 std::vector<Column> scatter_columns() {
   auto columns = time_columns();
-  add_axes(columns, "omega_{}", "rad/s", "angular rate, in s, {}");
-  add_axes(columns, "omega_dot_{}", "rad/s^2", "angular acceleration, in s, {}");
-  add_axes(columns, "omega_ddot_{}", "rad/s^3", "angular jerk, in s, {}");
-  add_axes(columns, "f_{}", "m/s^2", "specific force, in s, {}");
-  add_axes(columns, "f_dot_{}", "m/s^3", "linear jerk, in s, {}");
+  add_axes(columns, "omega_", "", "rad/s", "angular rate, in s");
+  add_axes(columns, "omega_dot_", "", "rad/s^2", "angular acceleration, in s");
+  add_axes(columns, "omega_ddot_", "", "rad/s^3", "angular jerk, in s");
+  add_axes(columns, "f_", "", "m/s^2", "specific force, in s");
+  add_axes(columns, "f_dot_", "", "m/s^3", "linear jerk, in s");
   add_errors(columns);
   return columns;
 }

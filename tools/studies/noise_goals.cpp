@@ -222,18 +222,19 @@ std::vector<Cell> selection_cells() {
   for (const auto& one : asked) {
     const noise::Model& truth = one.first;
     const std::string name = spec_of(truth).name();
-    cells.push_back({"selection/" + name,
-                     {{"right", one.second, 100.0}, {"rejected", 0.0, 0.5}},
-                     [truth, name](std::mt19937_64& random, Counts& counts) {
-                       constexpr std::size_t kN = 1U << 16U;
-                       const auto wv =
-                           noise::haar_wavelet_variance(imuscope::noise::simulated_noise(truth, kN, random)).value();
-                       const auto full = noise::parse_model("QN+WN+2*GM+RW").value();
-                       const auto ranked = noise::rank_models(wv, full, kRate_hz).value();
-                       const noise::FitResult& best = ranked.front().fit;
-                       count(counts, "right", best.spec.name() == name);
-                       count(counts, "rejected", best.j_test && best.j_test->p_value < 0.001);
-                     }});
+    cells.push_back(
+        {"selection/" + name,
+         {{"right", one.second, 100.0}, {"rejected", 0.0, 0.5}},
+         [truth, name](std::mt19937_64& random, Counts& counts) {
+           constexpr std::size_t kN = 1U << 16U;
+           const auto wv =
+               noise::haar_wavelet_variance(imuscope::noise::simulated_noise(truth, kN, random)).value();
+           const auto full = noise::parse_model("QN+WN+2*GM+RW").value();
+           const auto ranked = noise::rank_models(wv, full, kRate_hz).value();
+           const noise::FitResult& best = ranked.front().fit;
+           count(counts, "right", best.spec.name() == name);
+           count(counts, "rejected", best.j_test && best.j_test->p_value < 0.001);
+         }});
   }
   return cells;
 }
