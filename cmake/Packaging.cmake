@@ -82,6 +82,8 @@ if(TARGET _imuscope)
   set(CPACK_DEBIAN_PYTHON_DESCRIPTION "imuscope for Python: noise models, runs, captures, studies and live data")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
       "python3 (>= 3.${IMUSCOPE_PYTHON_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA
+      ${CMAKE_CURRENT_LIST_DIR}/debian/python/postinst ${CMAKE_CURRENT_LIST_DIR}/debian/python/prerm)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "imuscope, python3-matplotlib, jupyter-notebook")
 endif()
 if(TARGET imuscope_hdf5)
