@@ -20,6 +20,7 @@ enum class CellKind : std::uint8_t {
   kText,  ///< one of a few words
 };
 
+/// One column: how it is called, in what it is measured, what it means.
 struct Column {
   std::string name;
   std::string unit;  ///< "m/s^2", "deg", ...; "1" without a dimension; empty for text

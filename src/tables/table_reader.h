@@ -29,6 +29,7 @@ struct Block {
   std::vector<std::vector<double>> columns;
 };
 
+/// Goes through a table once. Thread: one.
 class TableReader {
  public:
   /// Columns are known by their names, in whatever order; one that is not known has no unit and is read as a
