@@ -195,7 +195,7 @@ Result<void> export_run(const std::filesystem::path& run_folder, const std::file
   if (!folder) return tl::unexpected<Error>(folder.error());
   const auto scratch = folder->scratch_folder();
   if (!scratch) return tl::unexpected<Error>(scratch.error());
-  const auto done = [&]() -> Result<void> {
+  auto done = [&]() -> Result<void> {
     // The library opens a path: that of the descriptor leads to the new file and nowhere else.
     const Descriptor fresh = scratch->create_new(name);
     if (!fresh.is_open())
