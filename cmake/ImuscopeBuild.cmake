@@ -80,6 +80,8 @@ function(imuscope_library name)
   imuscope_layer(${name} ${folder})
   if(ARG_SOURCES)
     add_library(${name} STATIC ${ARG_SOURCES})
+    # Also part of shared objects: the Python module, the HDF5 export. Hidden, its code is that of a program all the same.
+    set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden)
     target_include_directories(${name} PUBLIC ${CMAKE_BINARY_DIR}/layers/${name})
     target_link_libraries(${name} PUBLIC ${ARG_PUBLIC} PRIVATE imuscope_flags ${ARG_PRIVATE})
   else()

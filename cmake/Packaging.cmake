@@ -36,7 +36,11 @@ install(FILES config/vehicle.toml DESTINATION /etc/imuscope)
 install(FILES config/imuscope.service DESTINATION /lib/systemd/system)
 install(FILES config/60-imuscope.rules DESTINATION /lib/udev/rules.d)
 
+# Three packages where the parts are built: what a vehicle needs, and beside it what only an office does.
 set(CPACK_GENERATOR DEB)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
+set(CPACK_COMPONENTS_ALL Unspecified)
 set(CPACK_PACKAGE_NAME imuscope)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
@@ -46,12 +50,36 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "liblcm-bin, iproute2")
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "chromium, default-jre, liblcm-java, libjchart2d-java, can-utils")
-set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_NAME imuscope)
+set(CPACK_DEBIAN_UNSPECIFIED_DESCRIPTION ${PROJECT_DESCRIPTION})
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_RECOMMENDS "liblcm-bin, iproute2")
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_SUGGESTS
+    "imuscope-hdf5, python3-imuscope, chromium, default-jre, liblcm-java, libjchart2d-java, can-utils")
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_CONTROL_EXTRA
     ${CMAKE_CURRENT_LIST_DIR}/debian/conffiles
     ${CMAKE_CURRENT_LIST_DIR}/debian/postinst
     ${CMAKE_CURRENT_LIST_DIR}/debian/prerm
     ${CMAKE_CURRENT_LIST_DIR}/debian/postrm)
-set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+
+if(TARGET _imuscope)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  math(EXPR next_minor "${IMUSCOPE_PYTHON_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-imuscope)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_DESCRIPTION "imuscope for Python: noise models, runs, captures, studies and live data")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "python3 (>= 3.${IMUSCOPE_PYTHON_MINOR}), python3 (<< 3.${next_minor}), python3-numpy")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA
+      ${CMAKE_CURRENT_LIST_DIR}/debian/python/postinst ${CMAKE_CURRENT_LIST_DIR}/debian/python/prerm)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "imuscope, python3-matplotlib, jupyter-notebook")
+endif()
+if(TARGET imuscope_hdf5)
+  list(APPEND CPACK_COMPONENTS_ALL hdf5)
+  set(CPACK_DEBIAN_HDF5_PACKAGE_NAME imuscope-hdf5)
+  set(CPACK_DEBIAN_HDF5_DESCRIPTION "imuscope's runs as HDF5 files, for MATLAB, h5py, Julia, R")
+  # The module is loaded by the program and by none of another version.
+  set(CPACK_DEBIAN_HDF5_PACKAGE_DEPENDS "imuscope (= ${PROJECT_VERSION})")
+endif()
 include(CPack)

@@ -1,6 +1,7 @@
 #include "noise/json.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
@@ -82,17 +83,72 @@ void set_parameter(Component& c, const ParameterEstimate& p, double rate_hz) {
   }
 }
 
-Model model_from_parameters(const FitResult& fit) {
+Model model_from_parameters(const ModelSpec& spec, const std::vector<ParameterEstimate>& parameters,
+                            double rate_hz) {
   Model model;
   std::size_t p = 0;
-  for (const ProcessKind kind : fit.spec.processes) {
+  for (const ProcessKind kind : spec.processes) {
     Component c{kind, 0.0, {}};
-    for (int i = 0; i <= shape_count(kind); ++i) set_parameter(c, fit.parameters.at(p++), fit.rate_hz);
+    for (int i = 0; i <= shape_count(kind); ++i) set_parameter(c, parameters.at(p++), rate_hz);
     if (!is_in_range(kind, c.shape))
       throw std::invalid_argument(fmt::format("a parameter of {} is out of its range", short_name(kind)));
     model.components.push_back(c);
   }
   return model;
+}
+
+/// Under which names the values of a process are printed: its shapes, then its amplitude.
+std::vector<std::string> value_names(ProcessKind kind) {
+  switch (kind) {
+    case ProcessKind::kQuantization:
+      return {"q2"};
+    case ProcessKind::kMa1:
+      return {"theta", "sigma2"};
+    case ProcessKind::kArma11:
+      return {"phi", "theta", "sigma2"};
+    case ProcessKind::kSinusoid:
+      return {"frequency", "alpha"};
+    case ProcessKind::kResonance:
+      return {"damping", "frequency", "sigma2"};
+    case ProcessKind::kGaussMarkov:
+      return {"beta", "sigma2"};
+    case ProcessKind::kFlicker:
+      return {"B"};
+    case ProcessKind::kPowerLaw:
+      return {"exponent", "sigma2"};
+    case ProcessKind::kRandomWalk:
+      return {"gamma2"};
+    case ProcessKind::kRamp:
+      return {"omega"};
+    case ProcessKind::kWhiteNoise:
+      break;
+  }
+  return {"sigma2"};
+}
+
+/// One process with its values; of those that are wrong the first.
+Result<Component> component_of(ProcessKind kind, const std::string& name, const ProcessValues& values,
+                               double rate_hz) {
+  const auto names = value_names(kind);
+  const std::string remedy = fmt::format("{} has {}", name, fmt::join(names, ", "));
+  for (const auto& [key, value] : values) {
+    if (std::find(names.begin(), names.end(), key) == names.end())
+      return usage_error(fmt::format("{} has no value {}", name, key), remedy);
+    if (!std::isfinite(value)) return usage_error(fmt::format("{} of {} is not finite", key, name), {});
+  }
+  Component c{kind, 0.0, {}};
+  for (const std::string& wanted : names) {
+    const auto at = values.find(wanted);
+    if (at == values.end()) return usage_error(fmt::format("{} of {} is missing", wanted, name), remedy);
+    ParameterEstimate parameter;
+    parameter.name = wanted;
+    parameter.value = at->second;
+    set_parameter(c, parameter, rate_hz);
+  }
+  if (!is_in_range(kind, c.shape) || c.amplitude < 0.0)
+    return usage_error(fmt::format("a value of {} is out of its range", name),
+                       "rates are positive, variances not negative, theta and phi between -1 and 1");
+  return c;
 }
 
 int level_of(const json& row) {
@@ -143,7 +199,7 @@ FitResult read_fit(const json& j) {
     p.spread_sd = optional_number(row, "spread_sd").value_or(0.0);
     fit.parameters.push_back(p);
   }
-  fit.model = model_from_parameters(fit);
+  fit.model = model_from_parameters(fit.spec, fit.parameters, fit.rate_hz);
   if (j.contains("covariance")) {
     for (const json& v : j.at("covariance")) fit.covariance.push_back(number_or_nan(v));
   }
@@ -223,6 +279,25 @@ json fit_to_json(const FitResult& fit) {
   return out;
 }
 
+json fit_to_json(const FitResult& fit, SignalUnit unit) {
+  json out = fit_to_json(fit);
+  out["unit"] = unit_name(unit);
+  out["quantities"] = quantities_to_json(filter_quantities(fit, unit));
+  return out;
+}
+
+json ranking_to_json(const std::vector<RankedModel>& ranked) {
+  json out = json::array();
+  for (const RankedModel& m : ranked) {
+    out.push_back({{"model", m.fit.spec.name()},
+                   {"criterion", m.criterion},
+                   {"identifiable", m.fit.identifiable},
+                   {"p_value", m.fit.j_test ? json(m.fit.j_test->p_value) : json()},
+                   {"reason", m.reason}});
+  }
+  return out;
+}
+
 nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const FitResult& fit,
                                  const std::string& unit) {
   const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + fit.confidence));
@@ -275,6 +350,28 @@ json quantities_to_json(const std::vector<Quantity>& quantities) {
                    {"known", knowledge_name(q.knowledge)}});
   }
   return out;
+}
+
+Result<Model> model_from_values(const ModelSpec& spec, double rate_hz,
+                                const std::map<std::string, ProcessValues>& values) {
+  if (!(rate_hz > 0.0) || !std::isfinite(rate_hz))
+    return usage_error(fmt::format("a rate of {} is impossible", rate_hz), "give the samples per second");
+  Model model;
+  for (const ProcessKind kind : spec.processes) model.components.push_back({kind, 0.0, {}});
+  const auto names = component_names(model);
+  for (const auto& [name, of_process] : values) {
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      return usage_error(fmt::format("the model has no {}", name),
+                         fmt::format("it has {}", fmt::join(names, ", ")));
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto at = values.find(names[i]);
+    if (at == values.end()) return usage_error(fmt::format("the values of {} are missing", names[i]), {});
+    auto component = component_of(spec.processes[i], names[i], at->second, rate_hz);
+    if (!component) return tl::unexpected<Error>(component.error());
+    model.components[i] = *component;
+  }
+  return model;
 }
 
 Result<FitResult> fit_from_json(const json& j) {

@@ -3,6 +3,7 @@
 /// Wavelet variances and fits as JSON: the fields of `wv --json`, `fit --json` and the entries of
 /// models.json. What is not known is null.
 
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "noise/fit.h"
 #include "noise/lines.h"
 #include "noise/quantities.h"
+#include "noise/select.h"
 
 namespace imuscope::noise {
 
@@ -25,6 +27,12 @@ nlohmann::json wv_to_json(const WaveletVariance& wv, double rate_hz);
 ///  "j_test", "criterion", "identifiable", "simpler_model", "warnings"}.
 nlohmann::json fit_to_json(const FitResult& fit);
 
+/// fit_to_json() and the fields "unit" and "quantities".
+nlohmann::json fit_to_json(const FitResult& fit, SignalUnit unit);
+
+/// [{"model", "criterion", "identifiable", "p_value", "reason"}], best first.
+nlohmann::json ranking_to_json(const std::vector<RankedModel>& ranked);
+
 /// [{"process", "name", "unit", "value", "ci_low", "ci_high", "known": "fitted", "bound" or "unknown"}].
 nlohmann::json quantities_to_json(const std::vector<Quantity>& quantities);
 
@@ -38,6 +46,16 @@ nlohmann::json sinusoids_to_json(const std::vector<Line>& lines, const FitResult
 /// What an entry was fitted to, for people: "812 s of regime static in 9 stretches, between 3.0 s and 1805.2
 /// s of the run, without lines at 21.3 Hz". Empty where the entry does not say.
 std::string fitted_to_words(const nlohmann::json& entry);
+
+/// Values of a process by the names under which they are printed: {"sigma2": 1e-6, "beta": 0.01}.
+using ProcessValues = std::map<std::string, double>;
+
+/// A model from the values of its processes, in the terms of ParameterEstimate.
+/// @param values  by the names of component_names(): "WN", "GM1", ...
+/// Errors (kUsage): a rate that is none; a process or value that is missing, unknown, or out of its range,
+/// named.
+Result<Model> model_from_values(const ModelSpec& spec, double rate_hz,
+                                const std::map<std::string, ProcessValues>& values);
 
 /// Reads what fit_to_json() wrote. Errors (kWork): the field that is missing or of the wrong type.
 Result<FitResult> fit_from_json(const nlohmann::json& json);

@@ -11,27 +11,12 @@
 #include "base/units.h"
 #include "sample/gps_time.h"
 #include "service/observability.h"
+#include "tables/columns.h"
 
 namespace imuscope {
 
 namespace {
 
-constexpr std::array kAxes{'x', 'y', 'z'};
-
-/// Columns of calibration_NAME.csv that carry an sd, in order.
-std::vector<std::string> calibration_columns() {
-  std::vector<std::string> names;
-  for (const char axis : kAxes) names.push_back(fmt::format("psi_{}_deg", axis));
-  for (const char axis : kAxes) names.push_back(fmt::format("r_{}_m", axis));
-  names.emplace_back("t_d_ms");
-  for (const char axis : kAxes) names.push_back(fmt::format("bg_{}_radps", axis));
-  for (const char axis : kAxes) names.push_back(fmt::format("ba_{}_mps2", axis));
-  for (const char axis : kAxes) names.push_back(fmt::format("sg_{}", axis));
-  for (const char axis : kAxes) names.push_back(fmt::format("sa_{}", axis));
-  return names;
-}
-
-constexpr std::size_t kPsiColumns = 3;
 constexpr const char* kOdometryFile = "odometry.csv";
 
 Eigen::Quaterniond quaternion_of(const Matrix3& C_b_s) {
@@ -89,12 +74,7 @@ void append_time(const RowTime& time, fmt::memory_buffer& row) {
   fmt::format_to(fmt::appender(row), FMT_COMPILE("{}.{:06}"), us / kUsPerS, us % kUsPerS);
 }
 
-std::string navigation_csv_header() {
-  return std::string(kTimeColumns) +
-         ",gps_week,gps_tow_s,lat_deg,lon_deg,height_m,v_n_mps,v_e_mps,v_d_mps,roll_deg,pitch_deg,heading_"
-         "deg,"
-         "sd_n_m,sd_e_m,sd_d_m,sd_v_n_mps,sd_v_e_mps,sd_v_d_mps,sd_roll_deg,sd_pitch_deg,sd_heading_deg\n";
-}
+std::string navigation_csv_header() { return tables::csv_header(tables::run_table("navigation")); }
 
 std::string navigation_csv_row(const NavigationOutput& nav, const RowTime& time) {
   fmt::memory_buffer row;
@@ -117,12 +97,7 @@ std::string navigation_csv_row(const NavigationOutput& nav, const RowTime& time)
   return fmt::to_string(row);
 }
 
-std::string odometry_csv_header() {
-  return std::string(kTimeColumns) +
-         ",speed_mps,standing,zero_velocity,lost,scale_percent,mount_y_deg,mount_z_deg,"
-         "axle_x_m,axle_y_m,axle_z_m,sd_scale_percent,sd_mount_y_deg,sd_mount_z_deg,"
-         "sd_axle_x_m,sd_axle_y_m,sd_axle_z_m\n";
-}
+std::string odometry_csv_header() { return tables::csv_header(tables::run_table("odometry")); }
 
 std::string odometry_csv_row(const OdometryOutput& odometry, const RowTime& time) {
   constexpr double kPercent = 100.0;
@@ -139,16 +114,7 @@ std::string odometry_csv_row(const OdometryOutput& odometry, const RowTime& time
   return fmt::to_string(row);
 }
 
-std::string calibration_csv_header() {
-  const auto names = calibration_columns();
-  std::string header(kTimeColumns);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    if (i == kPsiColumns) header += ",q_w,q_x,q_y,q_z";
-    header += "," + names[i];
-  }
-  for (const auto& name : names) header += ",sd_" + name;
-  return header + "\n";
-}
+std::string calibration_csv_header() { return tables::csv_header(tables::run_table("calibration")); }
 
 std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, const RowTime& time) {
   const auto q = quaternion_of(study.C_b_s);
@@ -173,11 +139,7 @@ std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& i
   return fmt::to_string(row);
 }
 
-std::string error_csv_header() {
-  return std::string(kTimeColumns) +
-         ",counter,e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,"
-         "e_accel_z_mps2,regime\n";
-}
+std::string error_csv_header() { return tables::csv_header(tables::run_table("errors")); }
 
 std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view regime) {
   fmt::memory_buffer text;

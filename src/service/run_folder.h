@@ -127,8 +127,7 @@ class RunFolder final : public CoreSink {
   UtcTrack utc_;
 };
 
-/// The two columns that every file begins with, and the same of a row.
-inline constexpr std::string_view kTimeColumns = "time_s,utc_s";
+/// The two columns that every row begins with: time_s, utc_s.
 void append_time(const RowTime& time, fmt::memory_buffer& row);
 /// Header and rows of navigation.csv.
 std::string navigation_csv_header();

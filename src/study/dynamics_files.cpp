@@ -13,16 +13,10 @@
 #include "regimes/motion_regimes.h"
 #include "service/noise_series.h"
 #include "service/run_folder.h"
+#include "tables/columns.h"
 
 namespace imuscope {
 namespace {
-
-std::string scatter_header() {
-  std::string header(kTimeColumns);
-  for (std::size_t i = 0; i < kCovariates; ++i) header += fmt::format(",{}", covariate_name(i));
-  return header +
-         ",e_gyro_x_radps,e_gyro_y_radps,e_gyro_z_radps,e_accel_x_mps2,e_accel_y_mps2,e_accel_z_mps2\n";
-}
 
 void append_value(std::string& line, bool known, double value) {
   line += ',';
@@ -152,7 +146,8 @@ Result<void> write_scatter(const Configuration& configuration, std::vector<RowSp
     const std::size_t step = count_rows(rows[i]) / kScatterRows + 1;
     CsvFile file;
     const auto name = device_file_name("scatter", configuration.devices[indices[i]].name, ".csv");
-    if (auto opened = file.open(folder, name, scatter_header()); !opened) return opened;
+    if (auto opened = file.open(folder, name, tables::csv_header(tables::run_table("scatter"))); !opened)
+      return opened;
     rows[i].rewind();
     std::size_t k = 0;
     for (ErrorRow row{}; rows[i].next(row); ++k) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "export_hdf5.h"
 #include "export_run.h"
 #include "fit_file.h"
 #include "noise/export.h"
@@ -66,21 +67,30 @@ Result<void> export_models(const ExportCommand& options) {
   return {};
 }
 
-Result<void> run_export(ExportCommand& options) {
-  const bool is_of_run = options.files.size() == 1 && has_mountings(options.files.front());
-  if (options.format != "mcap" && is_of_run)
-    return export_mounting(options.files.front(), options.name, options.format);
-  if (options.format != "mcap") return export_models(options);
+/// A whole run in one file.
+Result<void> export_run(ExportCommand& options) {
   if (options.files.size() != 1) return usage_error("more than one run is given", "export them one by one");
+  if (options.format == "hdf5")
+    return export_hdf5(options.files.front(), options.of_run.out, options.how.force);
   options.of_run.run = options.files.front();
   return export_mcap(options.of_run);
+}
+
+Result<void> run_export(ExportCommand& options) {
+  if (options.format == "mcap" || options.format == "hdf5") return export_run(options);
+  if (!options.of_run.out.empty())
+    return usage_error("--out is of a whole run", "redirect what is printed: > FILE");
+  const bool is_of_run = options.files.size() == 1 && has_mountings(options.files.front());
+  if (is_of_run) return export_mounting(options.files.front(), options.name, options.format);
+  return export_models(options);
 }
 
 }  // namespace
 
 void add_export(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand(
-      "export", "A run as a bag, noise models and mountings as another tool's configuration");
+      "export",
+      "A run as a bag or one HDF5 file, noise models and mountings as another tool's configuration");
   auto options = std::make_shared<ExportCommand>();
   command
       ->add_option("MODEL", options->files,
@@ -90,11 +100,12 @@ void add_export(CLI::App& app, Work& chosen) {
                    "`imuscope characterize`")
       ->required();
   command
-      ->add_option("--to,-t", options->format,
-                   "Of a run: mcap, all of it in one file; urdf, tf, kalibr, openvins or json, a mounting. "
-                   "Of noise models: kalibr, openvins, vins-fusion, "
-                   "lio-sam, gtsam, "
-                   "ros, px4, kf-gins or state-space")
+      ->add_option(
+          "--to,-t", options->format,
+          "Of a run: mcap or hdf5, all of it in one file; urdf, tf, kalibr, openvins or json, a mounting. "
+          "Of noise models: kalibr, openvins, vins-fusion, "
+          "lio-sam, gtsam, "
+          "ros, px4, kf-gins or state-space")
       ->required();
   command->add_option("--name,-n", options->name, "The S-IMU to export, where the file holds several");
   command->add_option("--regime", options->regime, "all, static or dynamic, where the file holds several");
@@ -102,10 +113,12 @@ void add_export(CLI::App& app, Work& chosen) {
                       "Unit of the signal, where the file does not say: rad/s, deg/s, m/s^2 or g");
   command->add_flag("--conservative", options->how.conservative,
                     "Upper ends of the intervals, for a filter that must not be optimistic");
-  command->add_flag("--force", options->how.force,
-                    "Write even what does not hold: the file then says why it should not be used");
+  command->add_flag(
+      "--force", options->how.force,
+      "Write even what does not hold: the file then says why it should not be used; of hdf5: write over a "
+      "file that is there");
   command->add_option("--out,-o", options->of_run.out,
-                      "mcap: the file; without it run.mcap in the run's folder");
+                      "mcap, hdf5: the file; without it run.mcap or run.h5 in the run's folder");
   options->of_run.compression = "zstd";
   command->add_option("--compression", options->of_run.compression, "mcap: zstd, lz4 or none")
       ->capture_default_str();

@@ -70,7 +70,7 @@ void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra)
     }
   }
   if (task.options.signal.json) {
-    auto json = fit_json(fit, task.unit);
+    auto json = noise::fit_to_json(fit, task.unit);
     json.update(extra);
     if (task.wvs.size() == 1 && !task.lines.front().empty())
       json["sinusoids"] = noise::sinusoids_to_json(task.lines.front(), fit, task.options.signal.unit);
@@ -102,7 +102,7 @@ Result<void> fit_one(const Task& task, const noise::ModelSpec& spec) {
   again.warm_start = &ranked->front().fit;
   const auto best = noise::fit(wv, ranked->front().fit.spec, rate_hz, again);
   if (!best) return tl::unexpected(best.error());
-  report(task, *best, {{"ranking", ranking_json(*ranked)}});
+  report(task, *best, {{"ranking", noise::ranking_to_json(*ranked)}});
   return {};
 }
 
@@ -131,7 +131,7 @@ Result<void> run_fit(const FitCommand& options) {
   if (!spec) return tl::unexpected(spec.error());
   // A model that has sinusoids finds them itself.
   const bool keeps = options.keep_lines || spec->count(noise::ProcessKind::kSinusoid) > 0;
-  auto read = wavelet_variances_of(options.signal, keeps ? Lines::kStay : Lines::kTakenOut);
+  auto read = wavelet_variances_of(options.signal, keeps ? noise::Lines::kStay : noise::Lines::kTakenOut);
   if (!read) return tl::unexpected(read.error());
   Task task{options,
             noise::parse_unit(options.signal.unit).value(),

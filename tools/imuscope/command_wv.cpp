@@ -54,7 +54,7 @@ void add_wv(CLI::App& app, Work& chosen) {
   auto plot = std::make_shared<bool>(false);
   command->add_flag("--plot", *plot, "Draw it, too, in the terminal");
   on_chosen(*command, chosen, [options, plot]() -> Result<void> {
-    const auto wvs = wavelet_variances_of(*options, Lines::kStay);
+    const auto wvs = wavelet_variances_of(*options, noise::Lines::kStay);
     if (!wvs) return tl::unexpected(wvs.error());
     const auto& wv = wvs->wvs.front();
     if (options->json) {

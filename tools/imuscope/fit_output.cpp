@@ -139,28 +139,9 @@ void print_replicates(const noise::JointFit& joint) {
           : "the replicates may be one process");
 }
 
-nlohmann::json fit_json(const noise::FitResult& fit, noise::SignalUnit unit) {
-  auto json = noise::fit_to_json(fit);
-  json["unit"] = noise::unit_name(unit);
-  json["quantities"] = noise::quantities_to_json(noise::filter_quantities(fit, unit));
-  return json;
-}
-
 nlohmann::json conservative_json(const noise::FitResult& bound, noise::SignalUnit unit) {
   return {{"parameters", noise::fit_to_json(bound).at("parameters")},
           {"quantities", noise::quantities_to_json(noise::over_bounding_quantities(bound, unit))}};
-}
-
-nlohmann::json ranking_json(const std::vector<noise::RankedModel>& ranked) {
-  auto json = nlohmann::json::array();
-  for (const auto& m : ranked) {
-    json.push_back({{"model", m.fit.spec.name()},
-                    {"criterion", m.criterion},
-                    {"identifiable", m.fit.identifiable},
-                    {"p_value", m.fit.j_test ? nlohmann::json(m.fit.j_test->p_value) : nlohmann::json()},
-                    {"reason", m.reason}});
-  }
-  return json;
 }
 
 nlohmann::json ranking_json(const std::vector<noise::CrossValidated>& ranked) {
@@ -181,7 +162,7 @@ nlohmann::json ranking_json(const std::vector<noise::CrossValidated>& ranked) {
 nlohmann::json replicates_json(const noise::JointFit& joint, noise::SignalUnit unit) {
   nlohmann::json json{{"replicates", nlohmann::json::array()},
                       {"homogeneity", test_json(joint.spread.homogeneity)}};
-  for (const auto& fit : joint.separate) json["replicates"].push_back(fit_json(fit, unit));
+  for (const auto& fit : joint.separate) json["replicates"].push_back(noise::fit_to_json(fit, unit));
   json["spread"] = nlohmann::json::array();
   for (std::size_t p = 0; p < joint.pooled.parameters.size(); ++p) {
     const auto& parameter = joint.pooled.parameters[p];

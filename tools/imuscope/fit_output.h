@@ -21,11 +21,8 @@ void print_ranking(const std::vector<noise::CrossValidated>& ranked);
 /// One column a replicate, and the test that they are one process.
 void print_replicates(const noise::JointFit& joint);
 
-/// fit_to_json() and the fields "unit" and "quantities".
-nlohmann::json fit_json(const noise::FitResult& fit, noise::SignalUnit unit);
 /// {"parameters", "quantities"}
 nlohmann::json conservative_json(const noise::FitResult& bound, noise::SignalUnit unit);
-nlohmann::json ranking_json(const std::vector<noise::RankedModel>& ranked);
 nlohmann::json ranking_json(const std::vector<noise::CrossValidated>& ranked);
 /// {"replicates": [fits], "homogeneity": test or null}
 nlohmann::json replicates_json(const noise::JointFit& joint, noise::SignalUnit unit);

@@ -5,61 +5,34 @@
 #include <cmath>
 
 #include "mcap_signal.h"
-#include "noise/fit.h"
-#include "noise/tails.h"
+#include "noise/quantities.h"
 
 namespace imuscope::cli {
 namespace {
 
-Result<noise::WaveletVariance> wavelet_variance_of(const std::filesystem::path& file, const Signal& signal,
-                                                   const SignalOptions& options) {
+Result<noise::SignalLook> look_at(const std::filesystem::path& file, const Signal& signal, double rate_hz,
+                                  const SignalOptions& options, noise::Lines lines) {
   noise::WvOptions wv_options;
   wv_options.levels = options.levels;
   wv_options.mask = signal.mask;
   wv_options.nan_is_gap = options.nan_is_gap;
   if (options.robust) wv_options.robust = noise::RobustOptions{options.efficiency, std::nullopt};
-  auto wv = noise::haar_wavelet_variance(signal.values, wv_options);
-  if (!wv) {
-    Error error = wv.error();
+  auto look = noise::look_at_signal(signal.values, wv_options, rate_hz, lines);
+  if (!look) {
+    Error error = look.error();
     error.what = fmt::format("{}: {}", file.string(), error.what);
     if (!options.nan_is_gap && error.remedy.find("gap") != std::string::npos)
       error.remedy += " (--nan-is-gap)";
     return tl::unexpected(error);
   }
-  return wv;
+  return look;
 }
 
-/// The sinusoids of a signal, after they were taken out of it where that is asked for.
-std::vector<noise::Line> lines_of(Signal& signal, double rate_hz, Lines lines) {
-  std::vector<std::uint8_t> mask = signal.mask;
-  if (mask.empty()) mask.assign(signal.values.size(), 1);
-  for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (!std::isfinite(signal.values[i])) mask[i] = 0;
-  }
-  noise::LineOptions line_options;
-  line_options.rate_hz = rate_hz;
-  auto found = noise::find_lines(signal.values, mask, line_options);
-  if (lines == Lines::kTakenOut) noise::remove_lines(signal.values, mask, found, rate_hz);
-  return found;
-}
-
-std::string line_warning(const noise::Line& line, const std::string& unit, Lines lines) {
-  return noise::in_words(line, unit) + (lines == Lines::kTakenOut
+std::string line_warning(const noise::Line& line, const std::string& unit, noise::Lines lines) {
+  return noise::in_words(line, unit) + (lines == noise::Lines::kTakenOut
                                             ? ": taken out before the fit (--keep-lines leaves it in)"
                                             : ": it raises the levels around half its period; `fit` takes it "
                                               "out");
-}
-
-/// A sentence where a signal holds spikes that its wavelet variance does not resist.
-std::optional<std::string> spikes_in(const Signal& signal, const noise::WaveletVariance& wv, double rate_hz,
-                                     const SignalOptions& options) {
-  if (options.robust) return std::nullopt;
-  const auto model = noise::fit(wv, noise::parse_model("QN+WN+2*GM").value(), rate_hz);
-  if (!model) return std::nullopt;
-  noise::WvOptions wv_options;
-  wv_options.mask = signal.mask;
-  wv_options.nan_is_gap = options.nan_is_gap;
-  return noise::spike_warning(noise::test_tails(signal.values, wv_options, model->model), rate_hz);
 }
 
 }  // namespace
@@ -94,7 +67,7 @@ void add_signal_options(CLI::App& command, SignalOptions& options, bool several)
   command.add_flag("--json", options.json, "Print JSON");
 }
 
-Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, Lines lines) {
+Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, noise::Lines lines) {
   const auto& asked_hz = options.choice.rate_hz;
   if (asked_hz && (!(*asked_hz > 0.0) || !std::isfinite(*asked_hz))) {
     return usage_error(fmt::format("--rate {} is impossible", *asked_hz), "give the samples per second");
@@ -119,16 +92,12 @@ Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, Lines lin
     const auto warn = [&](const std::string& what) {
       out.warnings.push_back(options.files.size() > 1 ? fmt::format("{}: {}", file.string(), what) : what);
     };
-    // First, as it refuses what is no signal.
-    auto wv = wavelet_variance_of(file, *signal, options);
-    if (!wv) return tl::unexpected(wv.error());
-    out.lines.push_back(lines_of(*signal, out.rate_hz, lines));
-    for (const auto& line : out.lines.back()) warn(line_warning(line, options.unit, lines));
-    if (lines == Lines::kTakenOut && !out.lines.back().empty())
-      wv = wavelet_variance_of(file, *signal, options);
-    if (!wv) return tl::unexpected(wv.error());
-    if (const auto spikes = spikes_in(*signal, *wv, out.rate_hz, options)) warn(*spikes);
-    out.wvs.push_back(std::move(*wv));
+    auto look = look_at(file, *signal, out.rate_hz, options, lines);
+    if (!look) return tl::unexpected(look.error());
+    for (const auto& line : look->lines) warn(line_warning(line, options.unit, lines));
+    if (look->spikes) warn(*look->spikes);
+    out.lines.push_back(std::move(look->lines));
+    out.wvs.push_back(std::move(look->wv));
   }
   return out;
 }

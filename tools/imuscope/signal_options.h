@@ -3,14 +3,13 @@
 /// The options that every command on a signal file has.
 
 #include <CLI/CLI.hpp>
-#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "base/result.h"
-#include "noise/lines.h"
 #include "noise/quantities.h"
+#include "noise/signal.h"
 #include "noise/wavelet_variance.h"
 #include "signal_file.h"
 
@@ -31,9 +30,6 @@ struct SignalOptions {
 /// --nan-is-gap and --json. `several`: FILE may be given more than once.
 void add_signal_options(CLI::App& command, SignalOptions& options, bool several);
 
-/// Whether sinusoids (an engine, a fan, a building) stay in the signal and are told of, or are taken out.
-enum class Lines : std::uint8_t { kStay, kTakenOut };
-
 /// What the files hold; of several all at one rate.
 struct ReadSignals {
   std::vector<noise::WaveletVariance> wvs;
@@ -44,6 +40,6 @@ struct ReadSignals {
 
 /// Reads the files and makes their wavelet variances. Errors: those of the reader and of the wavelet
 /// variance, and an impossible rate or unit, none at all, or files of different ones (kUsage).
-Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, Lines lines);
+Result<ReadSignals> wavelet_variances_of(const SignalOptions& options, noise::Lines lines);
 
 }  // namespace imuscope::cli

@@ -14,7 +14,7 @@
 #include "certificate/axis_certificate.h"
 #include "goal_counts.h"
 #include "noise/felt_noise.h"
-#include "simulated_noise.h"
+#include "noise/simulated_noise.h"
 
 namespace {
 
@@ -127,7 +127,7 @@ imuscope::certificate::AxisRecord record_of(const Cell& cell, unsigned seed) {
   record.name = "gyro_x";
   record.unit = imuscope::noise::SignalUnit::kDegps;
   record.rate_hz = kRate_hz;
-  record.values = imuscope::simulated_noise(cell.model, cell.samples, random);
+  record.values = imuscope::noise::simulated_noise(cell.model, cell.samples, random);
   return record;
 }
 

@@ -22,8 +22,8 @@
 
 #include "noise/fit.h"
 #include "noise/inference.h"
+#include "noise/simulated_noise.h"
 #include "noise/wv_covariance.h"
-#include "simulated_noise.h"
 
 namespace {
 
@@ -172,7 +172,7 @@ bool study(const Truth& truth, int log2_n, const Settings& settings) {
   int warned = 0;
   std::vector<std::string> names(places.size());
   for (int s = 0; s < settings.series; ++s) {
-    const auto x = imuscope::simulated_noise(truth.model, n, random);
+    const auto x = imuscope::noise::simulated_noise(truth.model, n, random);
     const FitResult fit = noise::fit(noise::haar_wavelet_variance(x, options).value(), spec, kRateHz).value();
     if (fit.j_test) {
       ++j_tests.n;

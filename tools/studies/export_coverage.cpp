@@ -14,8 +14,8 @@
 #include "noise/export.h"
 #include "noise/felt_noise.h"
 #include "noise/fit.h"
+#include "noise/simulated_noise.h"
 #include "noise/wavelet_variance.h"
-#include "simulated_noise.h"
 
 namespace {
 
@@ -118,8 +118,8 @@ int main(int argc, char** argv) {
     int refused = 0;
     std::mt19937_64 random(1);
     for (int run = 0; run < runs; ++run) {
-      const auto wv = haar_wavelet_variance(
-                          imuscope::simulated_noise(truth.model, std::size_t{1} << log2_samples, random))
+      const auto wv = haar_wavelet_variance(imuscope::noise::simulated_noise(
+                                                truth.model, std::size_t{1} << log2_samples, random))
                           .value();
       const auto fitted = fit(wv, true_fit.spec, kRateHz).value();
       white.add(felt_white_density(fitted, walk_band), true_white);

@@ -20,8 +20,8 @@
 #include "noise/inference.h"
 #include "noise/replicates.h"
 #include "noise/select.h"
+#include "noise/simulated_noise.h"
 #include "noise/tails.h"
-#include "simulated_noise.h"
 
 namespace {
 
@@ -111,7 +111,7 @@ Cell interval_cell(const std::string& name, const noise::Model& truth, std::size
   return {name, {{"", 91.0, 98.0}}, [truth, n, loss](std::mt19937_64& random, Counts& counts) {
             noise::FitOptions options;
             options.intervals = noise::Intervals::kInverted;
-            const auto x = imuscope::simulated_noise(truth, n, random);
+            const auto x = imuscope::noise::simulated_noise(truth, n, random);
             const Mask mask = loss(n, random);
             noise::WvOptions of_valid;
             of_valid.mask = mask;
@@ -168,7 +168,7 @@ std::vector<Cell> missing_cells() {
   cells.push_back({"missing/cost",
                    {{"levels", 100.0, 100.0}, {"sd", 99.0, 100.0}},
                    [truth](std::mt19937_64& random, Counts& counts) {
-                     const auto x = imuscope::simulated_noise(truth, kN, random);
+                     const auto x = imuscope::noise::simulated_noise(truth, kN, random);
                      const Mask mask = drop_outs(1.0)(kN, random);
                      noise::WvOptions of_valid;
                      of_valid.mask = mask;
@@ -196,7 +196,7 @@ std::vector<Cell> spike_cells() {
                        [truth, percent](std::mt19937_64& random, Counts& counts) {
                          constexpr std::size_t kN = 1U << 16U;
                          constexpr double kSpike = 15.0;
-                         auto x = imuscope::simulated_noise(truth, kN, random);
+                         auto x = imuscope::noise::simulated_noise(truth, kN, random);
                          std::bernoulli_distribution spike(0.01 * percent);
                          std::bernoulli_distribution up(0.5);
                          for (double& v : x) v += spike(random) ? (up(random) ? kSpike : -kSpike) : 0.0;
@@ -222,18 +222,19 @@ std::vector<Cell> selection_cells() {
   for (const auto& one : asked) {
     const noise::Model& truth = one.first;
     const std::string name = spec_of(truth).name();
-    cells.push_back({"selection/" + name,
-                     {{"right", one.second, 100.0}, {"rejected", 0.0, 0.5}},
-                     [truth, name](std::mt19937_64& random, Counts& counts) {
-                       constexpr std::size_t kN = 1U << 16U;
-                       const auto wv =
-                           noise::haar_wavelet_variance(imuscope::simulated_noise(truth, kN, random)).value();
-                       const auto full = noise::parse_model("QN+WN+2*GM+RW").value();
-                       const auto ranked = noise::rank_models(wv, full, kRate_hz).value();
-                       const noise::FitResult& best = ranked.front().fit;
-                       count(counts, "right", best.spec.name() == name);
-                       count(counts, "rejected", best.j_test && best.j_test->p_value < 0.001);
-                     }});
+    cells.push_back(
+        {"selection/" + name,
+         {{"right", one.second, 100.0}, {"rejected", 0.0, 0.5}},
+         [truth, name](std::mt19937_64& random, Counts& counts) {
+           constexpr std::size_t kN = 1U << 16U;
+           const auto wv =
+               noise::haar_wavelet_variance(imuscope::noise::simulated_noise(truth, kN, random)).value();
+           const auto full = noise::parse_model("QN+WN+2*GM+RW").value();
+           const auto ranked = noise::rank_models(wv, full, kRate_hz).value();
+           const noise::FitResult& best = ranked.front().fit;
+           count(counts, "right", best.spec.name() == name);
+           count(counts, "rejected", best.j_test && best.j_test->p_value < 0.001);
+         }});
   }
   return cells;
 }
@@ -265,7 +266,7 @@ std::vector<Cell> replicate_cells() {
              for (int k = 0; k < kReplicates; ++k) {
                const auto model = varied(truth, spread, random);
                wvs.push_back(
-                   noise::haar_wavelet_variance(imuscope::simulated_noise(model, kN, random)).value());
+                   noise::haar_wavelet_variance(imuscope::noise::simulated_noise(model, kN, random)).value());
              }
              const auto joint = noise::fit_jointly(wvs, spec_of(truth), kRate_hz).value();
              count(counts, "differ", joint.spread.homogeneity && joint.spread.homogeneity->p_value < 0.05);
@@ -293,7 +294,7 @@ std::vector<Cell> comparison_cells() {
            // The shorter one is what a drive's stops leave.
            const auto fit_of = [&](std::size_t n) {
              const auto wv =
-                 noise::haar_wavelet_variance(imuscope::simulated_noise(truth, n, random)).value();
+                 noise::haar_wavelet_variance(imuscope::noise::simulated_noise(truth, n, random)).value();
              return noise::fit(wv, spec_of(truth), kRate_hz).value();
            };
            const auto first = fit_of(1U << 15U);

@@ -1,22 +1,19 @@
-#include "simulated_noise.h"
+#include "noise/simulated_noise.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdlib>
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 #include <unsupported/Eigen/MatrixFunctions>
 
-namespace imuscope {
+namespace imuscope::noise {
 namespace {
 
-using noise::Component;
-using noise::ProcessKind;
-
 /// The sampled oscillator x'' + 2 a x' + (a^2 + b^2) x = w from its exact transition.
-void add_resonance(const Component& c, std::mt19937_64& random, std::vector<double>& x) {
+void add_resonance(const Component& c, std::mt19937_64& random, std::span<double> x) {
   std::normal_distribution<double> normal;
   const double a = c.shape[0];
   const double b = c.shape[1];
@@ -34,7 +31,7 @@ void add_resonance(const Component& c, std::mt19937_64& random, std::vector<doub
 }
 
 /// Gaussian noise of spectrum sd^2 |2 sin(pi f)|^-alpha. Of what repeats after two lengths one is used.
-void add_power_law(double alpha, double sd, std::mt19937_64& random, std::vector<double>& x) {
+void add_power_law(double alpha, double sd, std::mt19937_64& random, std::span<double> x) {
   std::normal_distribution<double> normal;
   std::size_t n = 2;
   while (n < 2 * x.size()) n *= 2;
@@ -53,7 +50,21 @@ void add_power_law(double alpha, double sd, std::mt19937_64& random, std::vector
   for (std::size_t i = 0; i < x.size(); ++i) x[i] += made[i].real();
 }
 
-void add_component(const Component& c, std::mt19937_64& random, std::vector<double>& x) {
+/// y_k = phi y_{k-1} + e_k + theta e_{k-1}, from its stationary distribution.
+void add_arma(double phi, double theta, double sd, std::mt19937_64& random, std::span<double> x) {
+  std::normal_distribution<double> normal;
+  double e = sd * normal(random);
+  // Of y what e does not tell: its variance is sd^2 (theta + phi)^2 / (1 - phi^2).
+  double y = e + sd * (theta + phi) / std::sqrt(1.0 - phi * phi) * normal(random);
+  for (double& v : x) {
+    v += y;
+    const double next = sd * normal(random);
+    y = phi * y + next + theta * e;
+    e = next;
+  }
+}
+
+void add_component(const Component& c, std::mt19937_64& random, std::span<double> x) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
   const double sd = std::sqrt(c.amplitude);
@@ -99,17 +110,32 @@ void add_component(const Component& c, std::mt19937_64& random, std::vector<doub
     case ProcessKind::kPowerLaw:
       add_power_law(c.shape[0], sd, random, x);
       break;
-    default:
-      std::abort();
+    case ProcessKind::kSinusoid: {
+      const double phase = 2.0 * std::numbers::pi * uniform(random);
+      for (std::size_t i = 0; i < x.size(); ++i)
+        x[i] += sd * std::sin(c.shape[0] * static_cast<double>(i) + phase);
+      break;
+    }
+    case ProcessKind::kMa1:
+      add_arma(0.0, c.shape[0], sd, random, x);
+      break;
+    case ProcessKind::kArma11:
+      add_arma(c.shape[0], c.shape[1], sd, random, x);
+      break;
   }
 }
 
 }  // namespace
 
-std::vector<double> simulated_noise(const noise::Model& model, std::size_t n, std::mt19937_64& random) {
-  std::vector<double> x(n, 0.0);
+void simulate_noise(const Model& model, std::mt19937_64& random, std::span<double> x) {
+  std::fill(x.begin(), x.end(), 0.0);
   for (const Component& c : model.components) add_component(c, random, x);
+}
+
+std::vector<double> simulated_noise(const Model& model, std::size_t n, std::mt19937_64& random) {
+  std::vector<double> x(n);
+  simulate_noise(model, random, x);
   return x;
 }
 
-}  // namespace imuscope
+}  // namespace imuscope::noise
