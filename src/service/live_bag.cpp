@@ -239,7 +239,7 @@ void LiveBag::take(const Refit& refit) {
 std::string LiveBag::topic_of(const std::string& channel, const std::string& type) const {
   constexpr std::size_t kEnding = 2;  // "_t"
   const std::string kind = type.substr(0, type.size() - kEnding);
-  const std::string topic = "/imuscope/" + kind;
+  std::string topic = "/imuscope/" + kind;
   std::string upper;
   for (const char c : kind) upper += static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   for (const auto& device : configuration_.devices) {

@@ -54,7 +54,7 @@ namespace {
 std::string reference_of(const std::filesystem::path& folder) {
   const auto run = report::read_json_file(folder / "run.json");
   for (const auto& device : report::field(run, "devices")) {
-    const std::string name = report::text_at(device, "name");
+    std::string name = report::text_at(device, "name");
     if (report::text_at(device, "role") == "reference" && is_device_name(name)) return name;
   }
   return "the reference IMU";
