@@ -596,6 +596,9 @@ TEST(GnssTrust, FloatsThatFollowEachOtherQuicklySayLittleThatIsNew) {
   // 60 s hold as much as one independent value each 30 s on either side.
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 0.6), 10.0);
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 1000.0), 1.0);
+  // Code solutions stay wrong by the same amount for longer.
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kDifferential, 1.2), 10.0);
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kSingle, 2.4), 10.0);
 }
 
 TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {

@@ -36,14 +36,19 @@ struct Size {
   const char* what;
   std::size_t studies;
   std::uint32_t blocks;
+  /// 1: an update for every sample, as the dense filter beside it. 0: as the filter chooses, C-15.
+  int average_samples = 1;
 };
 
-constexpr std::array<Size, 5> kSizes{{
+constexpr std::array<Size, 8> kSizes{{
     {"no S-IMU", 0, 0},
     {"3 x 6 (boresight, lever arm)", 3, imuscope::kPaperStudyBlocks},
     {"3 x 12 (and biases)", 3, imuscope::kPaperStudyBlocks | imuscope::kBiasStudyBlocks},
-    {"3 x 19 (all)", 3, imuscope::kFullStudyBlocks},
-    {"6 x 19 (all)", kMostStudies, imuscope::kFullStudyBlocks},
+    {"3 x 19 (rigid)", 3, imuscope::kFullStudyBlocks},
+    {"6 x 19 (rigid)", kMostStudies, imuscope::kFullStudyBlocks},
+    {"3 x 19 (rigid), windows", 3, imuscope::kFullStudyBlocks, 0},
+    {"3 x 44 (all), windows", 3, imuscope::kCompleteStudyBlocks, 0},
+    {"6 x 44 (all), windows", kMostStudies, imuscope::kCompleteStudyBlocks, 0},
 }};
 /// Where the published goal of 12 us an epoch, 30 us without AVX, belongs.
 constexpr std::size_t kGoalStates = 72;
@@ -78,6 +83,7 @@ imuscope::EstimatorConfig known_mounting(const imusim::Motion& motion, const Siz
     const std::size_t place = i % study_drive::kStudies;
     config.studies[i].device = device_of(i);
     config.studies[i].blocks = size.blocks;
+    config.studies[i].average_samples = size.average_samples;
     config.studies[i].prior_C_b_s = study_drive::to_array(study_drive::mounting_of(place));
     config.studies[i].prior_r_bs_b_m = study_drive::to_array(study_drive::lever_arm_of(place));
     config.studies[i].prior_t_d_s = study_drive::kTimeOffset_s;
@@ -251,6 +257,7 @@ int main(int argc, char** argv) {
       covariances.push_back(covariance_row(size, flavour.set, costs));
       best = costs.epoch_us;
     }
+    if (size.average_samples != 1) continue;
     states.push_back(static_cast<double>(dimension(size)));
     best_us.push_back(best);
   }
