@@ -79,6 +79,17 @@ double largest_contradiction(const Vector3& a, const Vector3& sd_a, const Vector
 
 double distance(const Vector3& a, const Vector3& b) { return (to_eigen(a) - to_eigen(b)).norm(); }
 
+/// 3 x 3 block of the covariance; zero where either state is absent.
+Matrix3d block_of(const CovarianceKernel& P, std::size_t row, std::size_t column) {
+  Matrix3d out = Matrix3d::Zero();
+  if (row == StudyLayout::kAbsent || column == StudyLayout::kAbsent) return out;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j)
+      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = P(row + i, column + j);
+  }
+  return out;
+}
+
 /// C-17: one process for a constant and a wandering part: the variance of both, and as fast at first as the
 /// wandering one.
 std::array<GaussMarkovConfig, 3> with_turn_on(const std::array<GaussMarkovConfig, 3>& slow,
@@ -444,6 +455,18 @@ Vector3d StudyFilter::sample_variance(Triad triad, const StudyState& state, cons
          slope * slope * (r_s.squaredNorm() - r_s.array().square());
 }
 
+LinearisationSpread StudyFilter::linearisation_spread(const FilterCore& core, Triad triad) const noexcept {
+  const StudyLayout& layout = core.layout(index_);
+  const CovarianceKernel& P = core.covariance();
+  LinearisationSpread spread;
+  spread.psi_rad2 = block_of(P, layout.psi, layout.psi);
+  spread.r_m2 = block_of(P, layout.r, layout.r);
+  if (layout.t_d != StudyLayout::kAbsent) spread.t_d_s2 = P(layout.t_d, layout.t_d);
+  if (triad == Triad::kAccel && layout.accel_t_d != StudyLayout::kAbsent)
+    spread.t_d_s2 += P(layout.accel_t_d, layout.accel_t_d) + 2.0 * P(layout.t_d, layout.accel_t_d);
+  return spread;
+}
+
 void StudyFilter::correct(StudyContext& context, Triad triad, const ReferenceKinematics& b, double t_d_s,
                           StudyEpoch& epoch) noexcept {
   const bool gyro = triad == Triad::kGyro;
@@ -511,6 +534,8 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
   if (gyro)
     motion_.add(block.b, core.reference_gyro_bias_radps(), core.reference_accel_bias_mps2(),
                 n / config_.rate_hz);
+  // The filter may have begun in the middle of a turn, of which the lever arm's share is not known then.
+  if (!motion_.can_tell()) return;
   const ReferenceMean believed = motion_.believed(block.b);
   const ReferenceMean expected = motion_.expected(block.b);
   const ReferenceBiasColumns columns =
@@ -527,7 +552,9 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
       variances_[static_cast<std::size_t>(context.regime)][static_cast<std::size_t>(triad)];
   const Vector3d y = block.measured - m.predicted;
   // Neighbouring windows share samples: R is what all updates together know of a constant, NIS that of one.
-  Matrix3d R = m.reference_covariance;
+  const LinearisationSpread spread = linearisation_spread(core, triad);
+  Matrix3d R = m.reference_covariance + (gyro ? second_order_rate(state, believed, spread)
+                                              : second_order_force(state, believed, spread));
   R.diagonal() += noise.inflated / n;
   const Vector3d excess = (noise.inflated - window_white_share(length) * noise.plain) / n;
   core.covariance().project(m.H, to_array(R));
@@ -761,15 +788,7 @@ void StudyFilter::publish_mounting(const FilterCore& core) noexcept {
   const StudyState& state = core.study(index_);
   const StudyLayout& layout = core.layout(index_);
   const CovarianceKernel& P = core.covariance();
-  const auto block = [&P](std::size_t row, std::size_t column) {
-    Matrix3d out = Matrix3d::Zero();
-    if (row == StudyLayout::kAbsent || column == StudyLayout::kAbsent) return out;
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j)
-        out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = P(row + i, column + j);
-    }
-    return out;
-  };
+  const auto block = [&P](std::size_t row, std::size_t column) { return block_of(P, row, column); };
   // C-22: from the frame that leans to no axis to the one along the x gyro.
   const Matrix3d sign = Vector3d(1.0, -1.0, 1.0).asDiagonal();
   const Matrix3d C_t = state.C_b_s.transpose();

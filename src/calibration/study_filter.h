@@ -76,6 +76,7 @@ class StudyFilter {
   void correct(StudyContext& context, Triad triad, const ReferenceKinematics& b, double t_d_s,
                StudyEpoch& epoch) noexcept;
   void update_from_block(StudyContext& context, Triad triad, StudyEpoch& epoch) noexcept;
+  [[nodiscard]] LinearisationSpread linearisation_spread(const FilterCore& core, Triad triad) const noexcept;
   /// Variance of one sample's innovation, as the newest update has it. In s.
   [[nodiscard]] Eigen::Vector3d sample_variance(Triad triad, const StudyState& state,
                                                 const ReferenceKinematics& b,

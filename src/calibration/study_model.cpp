@@ -53,6 +53,26 @@ Matrix3d lever_matrix(const ReferenceMean& b) noexcept {
   return b.omega_omega - b.omega_omega.trace() * Matrix3d::Identity() + skew(b.omega_dot_radps2);
 }
 
+/// C-11: derivative of C-2.
+Matrix3d lever_matrix_slope(const ReferenceMean& b) noexcept {
+  const Matrix3d W = skew(b.omega_radps);
+  const Matrix3d W_dot = skew(b.omega_dot_radps2);
+  return W_dot * W + W * W_dot + skew(b.omega_ddot_radps3);
+}
+
+/// Covariance of a x v, for independent a and v without mean, of the covariances A and V.
+Matrix3d cross_covariance(const Matrix3d& A, const Matrix3d& V) noexcept {
+  const Matrix3d AV = A * V;
+  return (A.trace() * V.trace() - AV.trace()) * Matrix3d::Identity() - A.trace() * V - V.trace() * A + AV +
+         AV.transpose();
+}
+
+/// C-23, in b: of psi x psi x v / 2 and of psi x (a part of v that moves as V).
+Matrix3d turned_covariance(const Matrix3d& psi_rad2, const Vector3d& v, const Matrix3d& V) noexcept {
+  const Matrix3d v_cross = skew(v);
+  return cross_covariance(psi_rad2, V + 0.5 * v_cross * psi_rad2 * v_cross.transpose());
+}
+
 /// What the places of the accelerometers add, before scale and axes. C-19.
 Vector3d by_places(const StudyState& state, const Matrix3d& turned_M) noexcept {
   Vector3d sum = Vector3d::Zero();
@@ -175,9 +195,8 @@ StudyMeasurement accel_measurement(const StudyState& state, const StudyLayout& l
   const Matrix3d C = state.C_b_s * state.accel_turn;
   const Matrix3d BC = B * C;
   const Matrix3d W = skew(for_H.omega_radps);
-  const Matrix3d W_dot = skew(for_H.omega_dot_radps2);
   const Matrix3d M = lever_matrix(for_H);
-  const Matrix3d M_dot = W_dot * W + W * W_dot + skew(for_H.omega_ddot_radps3);
+  const Matrix3d M_dot = lever_matrix_slope(for_H);
   const Vector3d& r = state.r_bs_b_m;
   const Vector3d f_at_s = for_H.f_mps2 + M * r;  // in b
   const Matrix3d CMC = C * M * state.C_b_s.transpose();
@@ -215,6 +234,24 @@ StudyMeasurement accel_measurement(const StudyState& state, const StudyLayout& l
       noise.omega_radps * noise.omega_radps * centripetal_slope * centripetal_slope.transpose();
   m.reference_covariance = BC * (force + euler + centripetal) * BC.transpose();
   return m;
+}
+
+Matrix3d second_order_rate(const StudyState& state, const ReferenceMean& b,
+                           const LinearisationSpread& spread) noexcept {
+  const Matrix3d by_time = spread.t_d_s2 * b.omega_dot_radps2 * b.omega_dot_radps2.transpose();
+  return state.C_b_s * turned_covariance(spread.psi_rad2, b.omega_radps, by_time) * state.C_b_s.transpose();
+}
+
+Matrix3d second_order_force(const StudyState& state, const ReferenceMean& b,
+                            const LinearisationSpread& spread) noexcept {
+  const Matrix3d M = lever_matrix(b);
+  const Matrix3d M_dot = lever_matrix_slope(b);
+  const Vector3d by_t = b.f_dot_mps3 + M_dot * state.r_bs_b_m;
+  const Matrix3d first_order = M * spread.r_m2 * M.transpose() + spread.t_d_s2 * by_t * by_t.transpose();
+  const Matrix3d in_b = turned_covariance(spread.psi_rad2, b.f_mps2 + M * state.r_bs_b_m, first_order) +
+                        spread.t_d_s2 * M_dot * spread.r_m2 * M_dot.transpose();
+  const Matrix3d C = state.C_b_s * state.accel_turn;
+  return C * in_b * C.transpose();
 }
 
 void inject(StudyState& state, const StudyLayout& layout, std::span<const double> error) noexcept {

@@ -112,6 +112,21 @@ struct ReferenceBiasColumns {
                                                  const ReferenceMean& b, const ReferenceMean& for_H,
                                                  const ReferenceNoise& noise) noexcept;
 
+/// How far the states that enter as products are from known: variances of psi, r and the time offset of the
+/// triad.
+struct LinearisationSpread {
+  Eigen::Matrix3d psi_rad2 = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d r_m2 = Eigen::Matrix3d::Zero();
+  double t_d_s2 = 0.0;
+};
+
+/// Covariance, in s, of what the derivatives above leave out to second order: psi by r, by t_d and by psi, r
+/// by t_d. It fades as the states become known. C-23.
+[[nodiscard]] Eigen::Matrix3d second_order_rate(const StudyState& state, const ReferenceMean& b,
+                                                const LinearisationSpread& spread) noexcept;
+[[nodiscard]] Eigen::Matrix3d second_order_force(const StudyState& state, const ReferenceMean& b,
+                                                 const LinearisationSpread& spread) noexcept;
+
 /// What the two triads should show; `b` as above.
 [[nodiscard]] Eigen::Vector3d predicted_rate(const StudyState& state, const ReferenceMean& b) noexcept;
 [[nodiscard]] Eigen::Vector3d predicted_force(const StudyState& state, const ReferenceMean& b) noexcept;

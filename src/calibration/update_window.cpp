@@ -107,6 +107,7 @@ void MotionShare::add(const ReferenceMean& b, const Vector3d& gyro_bias_radps,
                       const Vector3d& accel_bias_mps2, double spacing_s) noexcept {
   const Vector3d omega = b.omega_radps + gyro_bias_radps;
   const Vector3d f = b.f_mps2 + accel_bias_mps2;
+  ++windows_;
   mean_s_ += spacing_s;
   mean_f_mps2_ += spacing_s / std::min(mean_s_, kForceMean_s) * (f - mean_f_mps2_);
   mean_omega_radps_ += spacing_s / std::min(mean_s_, kRateMean_s) * (omega - mean_omega_radps_);

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 #include "alignment/reference_window.h"
 #include "calibration/study_model.h"
@@ -42,6 +43,8 @@ class MotionShare {
   ///           motion
   void add(const ReferenceMean& b, const Eigen::Vector3d& gyro_bias_radps,
            const Eigen::Vector3d& accel_bias_mps2, double spacing_s) noexcept;
+  /// Whether the newest window shows motion can be said: against the mean of those before.
+  [[nodiscard]] bool can_tell() const noexcept { return windows_ > 1; }
   /// The newest window shows motion at all.
   [[nodiscard]] bool moving() const noexcept { return moving_; }
   /// What the derivatives may take for motion: `b` with everything times its share; nothing where there is
@@ -67,6 +70,7 @@ class MotionShare {
   Eigen::Vector3d mean_omega_radps_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d mean_f_mps2_ = Eigen::Vector3d::Zero();
   double mean_s_ = 0.0;
+  std::uint64_t windows_ = 0;
   bool moving_ = false;
   double seen_s_ = 0.0;
   double motion_s_ = 0.0;

@@ -25,6 +25,8 @@ using imuscope::InstructionSet;
 
 /// A navigation epoch without S-IMU has no update of its own; the dense one is then the prediction.
 constexpr std::size_t kUpdatesOfStudy = 2;
+/// Of an S-IMU with every state, one triad shows so many.
+constexpr std::size_t kSeenStates = 30;
 constexpr std::size_t kMostStudies = 2 * study_drive::kStudies;
 
 struct Flavour {
@@ -148,7 +150,8 @@ double covariance_us(const Size& size, InstructionSet set, int repeats) {
   for (std::size_t u = 0; u < updates(size); ++u) {
     const bool gyro = u % 2 == 0;
     const std::size_t first = imuscope::kNavigationStates + u / 2 * own;
-    for (std::size_t column = first; column + 3 <= first + own; column += gyro ? 6 : 3)
+    const std::size_t step = gyro ? 6 : 3;
+    for (std::size_t column = first; column + 3 <= first + std::min(own, kSeenStates); column += step)
       H[u].append(column, 3).h = {{{0.5, 0.1, 0.2}, {0.3, 0.4, 0.1}, {0.2, 0.1, 0.6}}};
     H[u].append(9, 3).h = {{{0.5, 0.1, 0.2}, {0.3, 0.4, 0.1}, {0.2, 0.1, 0.6}}};
     if (!gyro) H[u].append(12, 3).h = {{{0.5, 0.1, 0.2}, {0.3, 0.4, 0.1}, {0.2, 0.1, 0.6}}};
