@@ -38,6 +38,10 @@ constexpr double kNoiseTooSmall = 2.0;
 constexpr double kNoiseFits = 1.5;
 /// Where the state's own share of an innovation's variance is below this, what is too much of it is noise.
 constexpr double kNoiseRules = 0.2;
+/// Innovations have more than their variance where their mean square exceeds 1 by so many of its own sd.
+constexpr double kSurplusSds = 3.0;
+/// No noise is ten times the configured one: then the device is not what is configured.
+constexpr double kSurplusMax = 100.0;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
 constexpr double kMountingChangedShare = 0.8;
 constexpr double kMountingWatch_s = 3.0;
@@ -120,6 +124,16 @@ SensorQuality quality_of(const StudyConfig& config) {
 }
 
 }  // namespace
+
+double StudyFilter::Surplus::factor(std::size_t axis) const noexcept {
+  if (updates[axis] == 0.0) return 1.0;
+  return std::clamp(nis[axis] / (1.0 + kSurplusSds * std::sqrt(2.0 / updates[axis])), 1.0, kSurplusMax);
+}
+
+void StudyFilter::Surplus::add(std::size_t axis, double nis_of_update, double updates_max) noexcept {
+  updates[axis] = std::min(updates[axis] + 1.0, updates_max);
+  nis[axis] += (nis_of_update - nis[axis]) / updates[axis];
+}
 
 StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
     : index_(index),
@@ -408,6 +422,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   gated_share_ = 0.0;
   proof_s_ = 0.0;
   contradiction_ = {};
+  surplus_ = {};
   windows_ = {};
   motion_.clear();
   set_window_noise();
@@ -556,11 +571,16 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
   Matrix3d R = m.reference_covariance + (gyro ? second_order_rate(state, believed, spread)
                                               : second_order_force(state, believed, spread));
   R.diagonal() += noise.inflated / n;
+  // C-24: where innovations have long been larger than the noise allows, the noise is what they say.
+  Surplus& surplus = surplus_[static_cast<std::size_t>(context.regime)][static_cast<std::size_t>(triad)];
+  const Vector3d factor(surplus.factor(0), surplus.factor(1), surplus.factor(2));
+  const Vector3d configured = R.diagonal();
+  R = factor.cwiseSqrt().asDiagonal() * R * factor.cwiseSqrt().asDiagonal();
   const Vector3d excess = (noise.inflated - window_white_share(length) * noise.plain) / n;
   core.covariance().project(m.H, to_array(R));
   const Matrix3d S = to_eigen(core.covariance().innovation_covariance());
-  const Vector3d plain = S.diagonal() - excess;
   windows.known = S.diagonal() - R.diagonal();
+  const Vector3d plain = windows.known + configured - excess;
   if (length == 1) (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(plain);
   if (!gyro && motion_.moving()) {
     noise_share_n_ += 1.0;
@@ -580,6 +600,9 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     use[i] = !has_biases_ || y(k) * y(k) <= gate_ * S(k, k);
     gated = gated || !use[i];
     if (!use[i]) ++(gyro ? counters.gated_gyro : counters.gated_accel)[i];
+    // What is beyond the gate counts as if at it: outliers tell little, a noise that is far off shows all the
+    // same.
+    surplus.add(i, std::min(y(k) * y(k), gate_ * S(k, k)) / plain(k), kNoiseMean_s * config_.rate_hz / n);
     nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
     // At rest there is less noise, and a sample that was gated is no noise.
     if (context.regime == Regime::kStatic || !use[i]) continue;
@@ -589,7 +612,7 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     seen.nis[i] += long_share * (y(k) * y(k) / plain(k) - seen.nis[i]);
     // Of one sample; while the state is uncertain, innovations tell of it and not of the noise.
     const double excess_of_sample = n / window_white_share(length) * (y(k) * y(k) - plain(k));
-    if (windows.known(k) < kNoiseRules * plain(k))
+    if (windows.known(k) < kNoiseRules * S(k, k))
       seen.excess[i] += long_share * (excess_of_sample - seen.excess[i]);
   }
   watch_noise(context, triad, epoch.time);

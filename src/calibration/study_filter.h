@@ -192,6 +192,15 @@ class StudyFilter {
     bool is_told = false;
   };
   std::array<Contradiction, 2> contradiction_{};
+  /// What the updates' innovations have been beyond what the configured noise explains, by regime and triad.
+  struct Surplus {
+    Vector3 nis{1.0, 1.0, 1.0};
+    Vector3 updates{};
+    /// Of the noise's variance; 1 where what was seen may be chance.
+    [[nodiscard]] double factor(std::size_t axis) const noexcept;
+    void add(std::size_t axis, double nis_of_update, double updates_max) noexcept;
+  };
+  std::array<std::array<Surplus, 2>, kRegimeCount> surplus_{};
   std::array<bool, 2> gated_{};  ///< an axis of this triad, in the newest update
   double gated_share_ = 0.0;     ///< over seconds: the mounting changed
   double misfit_share_ = 0.0;    ///< over half a minute of motion: the device is not what is configured

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <set>
 #include <utility>
 #include <vector>
@@ -599,6 +600,30 @@ TEST(GnssTrust, FloatsThatFollowEachOtherQuicklySayLittleThatIsNew) {
   // Code solutions stay wrong by the same amount for longer.
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kDifferential, 1.2), 10.0);
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kSingle, 2.4), 10.0);
+}
+
+/// A MEMS unit as the reference, of which nobody told the filter: a navigation-grade one would have a
+/// thousandth of its noise.
+TEST(BadInput, AReferenceThatIsNoisierThanConfiguredCostsNoMountingAndIsTold) {
+  SimulatedDrive drive(400.0, {tilted()}, 47);
+  Estimator estimator(drive.config());
+  std::mt19937_64 random(48);
+  std::normal_distribution<double> normal;
+  constexpr double kGyroNoise_radps = 0.01;
+  constexpr double kAccelNoise_mps2 = 0.02;
+  const Told told = told_by(drive, estimator, [&](Sample& sample, double /*t_s*/) {
+    if (sample.device != SimulatedDrive::kReference || sample.kind != SampleKind::kImu) return true;
+    for (double& w : sample.imu.omega_radps) w += kGyroNoise_radps * normal(random);
+    for (double& f : sample.imu.f_mps2) f += kAccelNoise_mps2 * normal(random);
+    return true;
+  });
+  const StudyOutput& out = estimator.study(0);
+  EXPECT_EQ(out.counters.resets, 0U);
+  EXPECT_TRUE(told.has<event::NoiseTooSmall>());
+  EXPECT_EQ(out.status, CalibrationStatus::kConverging) << "never calibrated on a noise that does not fit";
+  for (const bool observable : out.observable) EXPECT_FALSE(observable);
+  EXPECT_LT(test::mounting_error_rad(out, tilted().C_b_s).norm(), 0.5 * kRadPerDeg);
+  EXPECT_NEAR(out.t_d_s, tilted().t_d_s, 2e-3);
 }
 
 TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {

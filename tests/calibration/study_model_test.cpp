@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "navigation/so3.h"
@@ -268,6 +269,67 @@ TEST(StudyMeasurement, ReferenceNoiseEqualsThatOfSampledReferences) {
             tolerance * gyro.reference_covariance.norm());
   EXPECT_LT((accel_sum / kDraws - accel.reference_covariance).norm(),
             tolerance * accel.reference_covariance.norm());
+}
+
+/// Mean square of what the prediction does beyond its linear part, over drawn errors.
+struct SecondOrder {
+  Matrix3d rate = Matrix3d::Zero();
+  Matrix3d force = Matrix3d::Zero();
+};
+SecondOrder drawn_second_order(const Case& c, const LinearisationSpread& spread, std::mt19937_64& random) {
+  const StudyLayout layout = StudyLayout::make(kEveryBlock, kFirstStudyState);
+  const ReferenceKinematics b = c.motion.at(c.state.t_d_s);
+  const ReferenceKinematics a = c.motion.at(c.state.t_d_s + c.state.accel_t_d_s);
+  const MatrixXd H_gyro = dense(gyro_measurement(c.state, layout, kReferenceColumns, b, b, {}).H);
+  const MatrixXd H_accel = dense(accel_measurement(c.state, layout, kReferenceColumns, a, a, {}).H);
+  const VectorXd expected = predicted(c, {});
+  SecondOrder sum;
+  constexpr int kDraws = 20'000;
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < kDraws; ++i) {
+    std::array<double, kStates> error{};
+    const Vector3d psi = spread.psi_rad2.llt().matrixL() * random_vector(random, 1.0);
+    const Vector3d r = spread.r_m2.llt().matrixL() * random_vector(random, 1.0);
+    for (std::size_t k = 0; k < 3; ++k) {
+      error[layout.psi + k] = psi(static_cast<Eigen::Index>(k));
+      error[layout.r + k] = r(static_cast<Eigen::Index>(k));
+    }
+    error[layout.t_d] = std::sqrt(spread.t_d_s2) * normal(random);
+    const Eigen::Map<const VectorXd> e(error.data(), static_cast<Eigen::Index>(error.size()));
+    const VectorXd beyond = predicted(c, error) - expected;
+    const Vector3d rate = beyond.head<3>() - H_gyro * e;
+    const Vector3d force = beyond.tail<3>() - H_accel * e;
+    sum.rate += rate * rate.transpose() / kDraws;
+    sum.force += force * force.transpose() / kDraws;
+  }
+  return sum;
+}
+
+TEST(StudyMeasurement, WhatTheDerivativesLeaveOutIsCoveredByItsSecondOrder) {
+  std::mt19937_64 random(29);
+  for (int i = 0; i < 5; ++i) {
+    const Case c = random_case(random, random_vector(random, 1.5));
+    LinearisationSpread spread;
+    spread.psi_rad2 = Vector3d(4e-5, 4e-5, 1.6e-3).asDiagonal();
+    spread.r_m2 = Vector3d(0.25, 0.25, 0.01).asDiagonal();
+    spread.t_d_s2 = 1e-4;
+    const SecondOrder drawn = drawn_second_order(c, spread, random);
+    const Matrix3d rate = second_order_rate(c.state, c.motion.at(c.state.t_d_s), spread);
+    const Matrix3d force =
+        second_order_force(c.state, c.motion.at(c.state.t_d_s + c.state.accel_t_d_s), spread);
+    // Neither correlations of the products nor the square of the time offset are in it: right to a factor.
+    for (const auto& [claimed, seen] : {std::pair{rate, drawn.rate}, std::pair{force, drawn.force}}) {
+      EXPECT_GT(claimed.trace(), 0.6 * seen.trace()) << i;
+      EXPECT_LT(claimed.trace(), 2.0 * seen.trace()) << i;
+    }
+  }
+}
+
+TEST(StudyMeasurement, WhatIsKnownHasNoSecondOrder) {
+  std::mt19937_64 random(30);
+  const Case c = random_case(random, random_vector(random, 1.5));
+  EXPECT_EQ(second_order_rate(c.state, c.motion.at(0.0), {}), Matrix3d::Zero());
+  EXPECT_EQ(second_order_force(c.state, c.motion.at(0.0), {}), Matrix3d::Zero());
 }
 
 TEST(StudyLayout, LeavesOutWhatIsSwitchedOff) {

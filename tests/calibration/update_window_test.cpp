@@ -138,6 +138,21 @@ TEST(MotionShare, IsTheShareOfMotionOnEachAxis) {
   EXPECT_LT(share.x(), share.z()) << "an axis with less motion is believed less";
 }
 
+TEST(MotionShare, CannotTellATurnFromABiasByOneWindow) {
+  MotionShare share;
+  share.set_noise(1e-5, 1e-3, noise_gains(kReference, kRate_hz, 10));
+  EXPECT_FALSE(share.can_tell());
+  ReferenceMean turn;
+  turn.f_mps2 = Vector3d(0, 0, -9.8);
+  for (int i = 0; i < 2; ++i) {
+    turn.omega_radps = Vector3d(0, 0, 0.1 + 0.05 * i);
+    turn.omega_dot_radps2 = Vector3d(0, 0, 0.5);
+    share.add(turn, Vector3d::Zero(), Vector3d::Zero(), 0.1);
+    EXPECT_EQ(share.can_tell(), i == 1);
+  }
+  EXPECT_TRUE(share.moving());
+}
+
 TEST(MotionShare, AnEstimateOfABiasThatMovesIsNoMotion) {
   Windows windows;
   for (int i = 0; i < 1'000; ++i) {
