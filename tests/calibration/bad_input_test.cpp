@@ -609,8 +609,8 @@ TEST(BadInput, AReferenceThatIsNoisierThanConfiguredCostsNoMountingAndIsTold) {
   Estimator estimator(drive.config());
   std::mt19937_64 random(48);
   std::normal_distribution<double> normal;
-  constexpr double kGyroNoise_radps = 0.01;
-  constexpr double kAccelNoise_mps2 = 0.02;
+  constexpr double kGyroNoise_radps = 0.03;
+  constexpr double kAccelNoise_mps2 = 0.1;
   const Told told = told_by(drive, estimator, [&](Sample& sample, double /*t_s*/) {
     if (sample.device != SimulatedDrive::kReference || sample.kind != SampleKind::kImu) return true;
     for (double& w : sample.imu.omega_radps) w += kGyroNoise_radps * normal(random);

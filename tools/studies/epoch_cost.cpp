@@ -52,7 +52,7 @@ constexpr std::array<Size, 8> kSizes{{
     {"3 x 44 (all), windows", 3, imuscope::kCompleteStudyBlocks, 0},
     {"6 x 44 (all), windows", kMostStudies, imuscope::kCompleteStudyBlocks, 0},
 }};
-/// Where the published goal of 12 us an epoch, 30 us without AVX, belongs.
+/// Where the published goal of 12 us an epoch, 30 us without AVX, belongs: as the filter is shipped.
 constexpr std::size_t kGoalStates = 72;
 constexpr double kGoal_us = 12.0;
 constexpr double kGoalBaseline_us = 30.0;
@@ -205,7 +205,7 @@ bench::Row epoch_row(const Size& size, InstructionSet set, const Costs& costs) {
   row.value = costs.epoch_us;
   row.reference = costs.joseph_us;
   row.unit = "us";
-  if (dimension(size) == kGoalStates) {
+  if (dimension(size) == kGoalStates && size.average_samples == 0) {
     row.goal =
         bench::Goal{bench::Goal::Side::kAtMost,
                     set == InstructionSet::kBaseline ? kGoalBaseline_us : kGoal_us, bench::Goal::Of::kValue};
