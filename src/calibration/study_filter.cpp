@@ -23,6 +23,11 @@ constexpr double kBlockGap_s = 0.1;
 /// Nothing is called calibrated or observable where more than a third of the sd comes from it.
 constexpr double kNoiseKnown = 0.1;
 constexpr double kAttenuationMax = 0.3;
+/// What a low-pass of its own, of 40 Hz as data sheets have it, takes of the motion that a sensor is to show:
+/// f^2 / (2 f_c^2), and vehicles as wholes move at 1.25 Hz. It looks like a scale.
+constexpr double kLowPass_hz = 40.0;
+constexpr double kVehicle_hz = 1.25;
+constexpr double kLowPassShare = 0.5 * (kVehicle_hz / kLowPass_hz) * (kVehicle_hz / kLowPass_hz);
 /// Noise of the angular acceleration in neighbouring windows has the correlation -1/2: what changes from one
 /// to the next, as the columns of the time offset do, sees up to twice the variance.
 constexpr double kSlopeCorrelation = 2.0;
@@ -793,8 +798,8 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   // C-21: what nobody can tell from the motion.
   if (layout.accel_boresight != StudyLayout::kAbsent) {
     for (std::size_t i = 0; i < 3; ++i) {
-      output_.sd_gyro_scale[i] = std::hypot(output_.sd_gyro_scale[i], reference_scale_sd_);
-      output_.sd_accel_scale[i] = std::hypot(output_.sd_accel_scale[i], reference_scale_sd_);
+      output_.sd_gyro_scale[i] = std::hypot(output_.sd_gyro_scale[i], reference_scale_sd_, kLowPassShare);
+      output_.sd_accel_scale[i] = std::hypot(output_.sd_accel_scale[i], reference_scale_sd_, kLowPassShare);
       output_.sd_accel_boresight_rad[i] =
           std::hypot(output_.sd_accel_boresight_rad[i], reference_triad_sd_rad_);
     }
