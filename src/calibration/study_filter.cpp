@@ -609,16 +609,17 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     // same.
     surplus.add(i, std::min(y(k) * y(k), gate_ * S(k, k)) / plain(k), kNoiseMean_s * config_.rate_hz / n);
     nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
-    // At rest there is less noise, and a sample that was gated is no noise.
-    if (context.regime == Regime::kStatic || !use[i]) continue;
+    // At rest there is less noise, a sample that was gated is no noise, and while the state is uncertain
+    // innovations tell of it.
+    const bool tells =
+        context.regime != Regime::kStatic && use[i] && windows.known(k) < kNoiseRules * S(k, k);
+    if (!tells) continue;
     Contradiction& seen = contradiction_[static_cast<std::size_t>(triad)];
     seen.seen[i] += n;
     const double long_share = n / std::min(seen.seen[i], kNoiseMean_s * config_.rate_hz);
     seen.nis[i] += long_share * (y(k) * y(k) / plain(k) - seen.nis[i]);
-    // Of one sample; while the state is uncertain, innovations tell of it and not of the noise.
     const double excess_of_sample = n / window_white_share(length) * (y(k) * y(k) - plain(k));
-    if (windows.known(k) < kNoiseRules * S(k, k))
-      seen.excess[i] += long_share * (excess_of_sample - seen.excess[i]);
+    seen.excess[i] += long_share * (excess_of_sample - seen.excess[i]);
   }
   watch_noise(context, triad, epoch.time);
   core.update(y, use);
@@ -641,9 +642,9 @@ void StudyFilter::watch_noise(StudyContext& context, Triad triad, HostTime now) 
   const auto& configured =
       (gyro ? config_.noise.gyro : config_.noise.accel)[static_cast<std::size_t>(context.regime)];
   const double white = configured.white_sd[worst];
-  context.log.add(
-      event::NoiseTooSmall{gyro, std::sqrt(noise.nis[worst]), std::sqrt(white * white + noise.excess[worst])},
-      config_.device, now);
+  context.log.add(event::NoiseTooSmall{gyro, std::sqrt(noise.nis[worst]),
+                                       std::sqrt(white * white + std::max(0.0, noise.excess[worst]))},
+                  config_.device, now);
 }
 
 void StudyFilter::watch_gravity(StudyContext& context, const Sample& sample, double dt_s) noexcept {

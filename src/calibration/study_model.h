@@ -2,7 +2,7 @@
 
 /// The measurement model of one S-IMU: what it should show, given the reference, and how that changes with
 /// every state. Truth = estimate + error, except the boresight: C_b_s = C^_b_s Exp(-psi), psi in b.
-/// EQUATIONS.md C-1 to C-12, C-16, C-18 to C-20. Core: no allocation.
+/// EQUATIONS.md C-1 to C-12, C-16, C-18 to C-20, C-23. Core: no allocation.
 
 #include <Eigen/Core>
 #include <cstddef>

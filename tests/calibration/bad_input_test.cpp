@@ -626,6 +626,31 @@ TEST(BadInput, AReferenceThatIsNoisierThanConfiguredCostsNoMountingAndIsTold) {
   EXPECT_NEAR(out.t_d_s, tilted().t_d_s, 2e-3);
 }
 
+/// A reference as noisy as the S-IMU, and the filter is told: it finds the mounting, and says that the lever
+/// arm cannot be had.
+TEST(BadInput, OfALeverArmThatTheReferencesNoiseTakesPartOfNothingIsCalledObservable) {
+  SimulatedDrive drive(400.0, {tilted()}, 47);
+  EstimatorConfig config = drive.config();
+  constexpr double kGyroNoise_radps = 0.014;
+  config.reference.gyro_white_radps_per_sqrt_hz = kGyroNoise_radps / std::sqrt(config.reference.rate_hz);
+  Estimator estimator(config);
+  std::mt19937_64 random(48);
+  std::normal_distribution<double> normal;
+  const Told told = told_by(drive, estimator, [&](Sample& sample, double /*t_s*/) {
+    if (sample.device != SimulatedDrive::kReference || sample.kind != SampleKind::kImu) return true;
+    for (double& w : sample.imu.omega_radps) w += kGyroNoise_radps * normal(random);
+    return true;
+  });
+  const StudyOutput& out = estimator.study(0);
+  EXPECT_FALSE(told.has<event::NoiseTooSmall>());
+  EXPECT_LT(worst_in_sd(out, tilted()), 4.0);
+  EXPECT_NE(out.status, CalibrationStatus::kCalibrated);
+  // Known far better than before the drive, and yet: the share of noise is known to a tenth only.
+  EXPECT_LT(out.sd_r_bs_b_m[0], 0.5 * config.studies[0].prior_r_bs_b_sd_m[0]);
+  EXPECT_FALSE(out.observable[3]);
+  EXPECT_TRUE(out.observable[0]);
+}
+
 TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
   const std::vector<SimulatedStudy> truth(kMaxStudies, tilted());
   SimulatedDrive drive(120.0, truth, 55);
