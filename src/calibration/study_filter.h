@@ -10,6 +10,7 @@
 #include "alignment/coarse_mounting.h"
 #include "alignment/cross_correlation.h"
 #include "alignment/reference_window.h"
+#include "calibration/estimator.h"
 #include "calibration/event_log.h"
 #include "calibration/filter_core.h"
 #include "calibration/update_window.h"

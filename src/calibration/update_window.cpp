@@ -47,7 +47,8 @@ std::array<std::vector<double>, 3> derivative_weights_of(const ReferenceWindowOp
       window.push(sample);
     }
     ReferenceKinematics seen;
-    const HostTime middle = HostTime{} + from_seconds(static_cast<double>(points / 2) * reference.period_s);
+    const std::size_t half = points / 2;
+    const HostTime middle = HostTime{} + from_seconds(static_cast<double>(half) * reference.period_s);
     IMUSCOPE_EXPECTS(window.evaluate(middle, seen) == ReferenceResult::kOk);
     weights[0].push_back(seen.omega_radps.x());
     weights[1].push_back(seen.omega_dot_radps2.x());
