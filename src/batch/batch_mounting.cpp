@@ -302,16 +302,23 @@ class Batch {
     }
   }
 
-  /// B-13: information without what the reference's noise only seems to add. Where that is nearly all of it,
-  /// the difference of the two is no number to rely on: at most kMostNoise of it goes.
-  [[nodiscard]] Covariance honest_covariance() const {
+  /// B-13: what the noise makes of the estimate.
+  struct OfNoise {
+    Covariance per_slope;  ///< inverse of the information: what a score moves
+    Covariance covariance;
+  };
+  /// Information without what the reference's noise only seems to add. Where that is nearly all of it, the
+  /// difference of the two is no number to rely on: at most kMostNoise of it goes.
+  [[nodiscard]] OfNoise honest_covariance() const {
     Covariance information = equations_.information;
     information.diagonal() += scales_.precision();
     const Eigen::GeneralizedSelfAdjointEigenSolver<Covariance> shares(equations_.of_noise, information);
     // With V' information V = I: information - noise = V^-T (I - shares) V^-1.
     const ParameterVector left =
         (ParameterVector::Ones() - shares.eigenvalues()).cwiseMax(1.0 - kMostNoise).cwiseInverse();
-    return shares.eigenvectors() * left.asDiagonal() * shares.eigenvectors().transpose();
+    const Covariance& V = shares.eigenvectors();
+    // The noise in the derivatives is no information, yet the score has its variance.
+    return {V * left.asDiagonal() * V.transpose(), V * left.cwiseAbs2().asDiagonal() * V.transpose()};
   }
 
   /// B-19: covariance by the scatter of the windows' scores over time.
@@ -344,8 +351,9 @@ class Batch {
   }
 
   void finish(BatchMounting& result) {
-    const Covariance by_noise = honest_covariance();
-    const Covariance by_scatter = scatter_covariance(by_noise);
+    const OfNoise of_noise = honest_covariance();
+    const Covariance& by_noise = of_noise.covariance;
+    const Covariance by_scatter = scatter_covariance(of_noise.per_slope);
     const auto windows = static_cast<double>(problem_.plan.starts.size());
     const double independent = windows / kWindowsPerIndependent;
     // B-20: correlations as the noise gives them, sd between both.
@@ -357,16 +365,16 @@ class Batch {
       if (i < kTimeOffset) result.inconsistency = std::max(result.inconsistency, std::sqrt(ratio));
     }
     const AxesFrame published = in_axes_frame(estimate_.sensor);
-    const Covariance with_scatter = published.derivative * growth.asDiagonal() * by_noise;
-    result.covariance = with_scatter * growth.asDiagonal() * published.derivative.transpose();
+    const Covariance grown = published.derivative * growth.asDiagonal();
+    result.covariance = grown * by_noise * grown.transpose();
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = published.sensor;
-    add_change(by_noise, result);
+    add_change(of_noise, result);
     add_mean_motion(result);
     const auto of_reference_errors = of_reference_axes(class_, result.sensor);
     const Covariance of_reference = of_reference_errors * of_reference_errors.transpose();
     result.limits = limit_shares(result.covariance, of_reference);
-    result.shared << of_lasting_priors(with_scatter), of_reference_errors.topRows<6>();
+    result.shared << of_lasting_priors(grown * of_noise.per_slope), of_reference_errors.topRows<6>();
     result.covariance += of_reference;  // B-21
     result.middle_s = middle_s_;
     result.windows = problem_.plan.starts.size();
@@ -377,9 +385,9 @@ class Batch {
   }
 
   /// B-25: where parts of the drive disagree, the sd reach to both.
-  void add_change(const Covariance& by_noise, BatchMounting& result) const {
-    const WindowInfluences influences = equations_.window_scores * by_noise.leftCols<kWatched>();
-    result.change = largest_change(influences, by_noise.diagonal().head<kWatched>());
+  void add_change(const OfNoise& of_noise, BatchMounting& result) const {
+    const WindowInfluences influences = equations_.window_scores * of_noise.per_slope.leftCols<kWatched>();
+    result.change = largest_change(influences, of_noise.covariance.diagonal().head<kWatched>());
     result.change_s = middle_s_ + problem_.from_middle_s[result.change.window];
     if (!result.change.is_told()) return;
     const WatchedVector& reach = result.change.reach;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "alignment/accelerometer_places.h"
 #include "navigation/so3.h"
 
 namespace imuscope::batch {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "alignment/accelerometer_places.h"
 #include "navigation/so3.h"
 
 namespace imuscope::batch {
@@ -59,15 +60,6 @@ Eigen::Matrix3d shape_derivative(Eigen::Index j, double above) {
   m(row, column) = row == column ? 1.0 : 1.0 - above;
   if (row != column) m(column, row) = above;
   return m;
-}
-
-Eigen::Vector3d place_basis(Eigen::Index axis, Eigen::Index j) {
-  // Two patterns over the three accelerometers that sum to zero, for each direction.
-  constexpr std::array<std::array<double, 3>, 2> kPatterns{
-      {{0.7071067811865476, -0.7071067811865476, 0.0},
-       {0.408248290463863, 0.408248290463863, -0.816496580927726}}};
-  return kPatterns[static_cast<std::size_t>(j / 3)][static_cast<std::size_t>(axis)] *
-         Eigen::Vector3d::Unit(j % 3);
 }
 
 Eigen::Matrix3d SensorState::gyro_shape() const { return shape(x, kGyroShape, above); }

@@ -24,7 +24,7 @@ enum Parameter : Eigen::Index {
   kAlpha = 20,         ///< 3: accelerometer triad against the gyro triad, rotation vector in s
   kAccelShape = 23,    ///< 6: as kGyroShape
   kAccelDelay = 29,    ///< of the accelerometers against the gyros, on top of t_d, s
-  kPlaces = 30,        ///< 6: where the three accelerometers are, about their middle, m
+  kPlaces = 30,        ///< 6: where the three accelerometers are about their middle, by place_basis(), m
   kGSensitivity = 36,  ///< 9: row-major, rad/s per m/s^2
   kFlexure = 45,       ///< 9: row-major; what the body between the IMUs gives way to, at kFlexure_hz
   kAccelFade =
@@ -100,10 +100,6 @@ struct AxesFrame {
   Eigen::Matrix<double, kParameters, kParameters> derivative;
 };
 [[nodiscard]] AxesFrame in_axes_frame(const SensorState& symmetric);
-
-/// Column j of kPlaces: place of accelerometer `axis`, in s. The six columns are orthonormal, and each leaves
-/// the middle of the three where it is.
-[[nodiscard]] Eigen::Vector3d place_basis(Eigen::Index axis, Eigen::Index j);
 
 /// Scale and axes of both triads of the reference, and the rotation between them.
 inline constexpr Eigen::Index kReferenceErrors = 21;

@@ -98,8 +98,10 @@ struct StudyCounters {
 /// The estimate of one S-IMU at the newest processed S sample.
 struct StudyOutput {
   CalibrationStatus status = CalibrationStatus::kWaiting;
+  MountingGoal goal = kFinestGoal;  ///< what `kCalibrated` asks for
   Regime regime = Regime::kStatic;
   HostTime time;  ///< of validity of that sample
+  /// To the gyro triad's frame: x along the x gyro, y in the plane of the x and y gyros.
   Matrix3 C_b_s{1, 0, 0, 0, 1, 0, 0, 0, 1};
   Matrix3 C_prior{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< configured, or the coarse alignment
   Vector3 psi_rad{};                           ///< -Log(C_prior^T C_b_s), in b

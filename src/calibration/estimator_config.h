@@ -38,9 +38,19 @@ enum StudyBlock : std::uint32_t {
   /// Exp(-alpha).
   kAccelBoresightBlock = 1U << 7U,
   kAccelTimeOffsetBlock = 1U << 8U,
+  kGyroAxesBlock = 1U << 9U,       ///< lean of the gyros' axes towards each other
+  kAccelAxesBlock = 1U << 10U,     ///< likewise of the accelerometers'
+  kAccelPlacesBlock = 1U << 11U,   ///< where the accelerometers are about their middle
+  kGSensitivityBlock = 1U << 12U,  ///< rate that the gyros show per specific force
 };
-/// The 19 states that are the default.
+/// What data sheets allow a sensor to be beyond bias, scale and noise: 25 states.
+inline constexpr std::uint32_t kSensorStudyBlocks = kAccelBoresightBlock | kAccelTimeOffsetBlock |
+                                                    kGyroAxesBlock | kAccelAxesBlock | kAccelPlacesBlock |
+                                                    kGSensitivityBlock;
+/// The 19 states of a sensor that is exactly rigid, orthogonal and of one delay.
 inline constexpr std::uint32_t kFullStudyBlocks = 0x7FU;
+/// All 44: the default.
+inline constexpr std::uint32_t kCompleteStudyBlocks = kFullStudyBlocks | kSensorStudyBlocks;
 /// The paper's own 6 states: boresight and lever arm.
 inline constexpr std::uint32_t kPaperStudyBlocks = kBoresightBlock | kLeverArmBlock;
 /// Biases alone, with everything else known: the second pass of a study, whose history is smoothed.
@@ -64,6 +74,10 @@ struct ReferenceConfig {
   double accel_white_mps2_per_sqrt_hz = 10.0 * kMps2PerMicroG;       ///< velocity random walk
   GaussMarkovConfig gyro_bias{0.005 * kRadPerDeg / kSecondsPerHour, 3600.0};
   GaussMarkovConfig accel_bias{5e-4, 3600.0};
+  /// Its own scale, and its accelerometer triad against its gyro triad (rad): no motion shows them, so that
+  /// they stay in the sd of scales and of the S-IMU's accelerometer triad, where that is estimated.
+  double scale_sd = 3e-4;
+  double triad_sd_rad = 3e-4;
 };
 
 /// How far GNSS solutions are trusted, per solution kind (kSingle .. kFixed).
@@ -155,10 +169,9 @@ struct StudyConfig {
   /// A model that is handed in later is not believed where its white noise lies below this share of what is
   /// configured: the filter's own residuals must not talk it into over-confidence.
   double noise_floor_share = 0.5;
-  /// Samples whose innovations are averaged into one update, 1 to 50. 1 suits a quiet reference. Where the
-  /// reference's own noise or engine vibration exceeds the motion in single samples (a MEMS reference), 0.1 s
-  /// of samples keep that noise out of the measurement matrix. No sample is left out.
-  int average_samples = 1;
+  /// Samples from one measurement update to the next, 1 to 50; an update takes a weighted mean over twice as
+  /// many. 0: chosen from the reference's noise and the motion (C-15). No sample is left out.
+  int average_samples = 0;
 
   /// Mounting. Absent: found by the coarse alignment, to any rotation.
   std::optional<Matrix3> prior_C_b_s;
@@ -178,6 +191,11 @@ struct StudyConfig {
   /// sheet's alignment error is of the order of 0.1 deg.
   Vector3 prior_accel_boresight_sd_rad{0.1 * kRadPerDeg, 0.1 * kRadPerDeg, 0.1 * kRadPerDeg};
   double prior_accel_t_d_sd_s = 2e-3;
+
+  /// What data sheets of industrial MEMS allow (MTx: alignment 0.1 deg, 0.05 deg/s per g); all start at zero.
+  double prior_axes_sd_rad = 0.05 * kRadPerDeg;  ///< each of a pair leans by half of their departure
+  double prior_place_sd_m = 0.02;
+  double prior_g_sensitivity_sd = 0.05 * kRadPerDeg / kMps2PerG;  ///< rad/s per m/s^2
 
   Vector3 prior_gyro_bias_radps{0.0, 0.0, 0.0};
   Vector3 turn_on_gyro_sd_radps{0.3 * kRadPerDeg, 0.3 * kRadPerDeg, 0.3 * kRadPerDeg};

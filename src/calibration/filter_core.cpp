@@ -40,6 +40,14 @@ void for_each_prior(const StudyLayout& layout, const StudyConfig& config, Functi
   block(layout.accel_scale, config.prior_accel_scale_sd);
   block(layout.accel_boresight, config.prior_accel_boresight_sd_rad);
   if (layout.accel_t_d != StudyLayout::kAbsent) f(layout.accel_t_d, config.prior_accel_t_d_sd_s);
+  const auto alike = [&](std::size_t first, std::size_t count, double sd) {
+    if (first == StudyLayout::kAbsent) return;
+    for (std::size_t i = 0; i < count; ++i) f(first + i, sd);
+  };
+  alike(layout.gyro_axes, 3, config.prior_axes_sd_rad);
+  alike(layout.accel_axes, 3, config.prior_axes_sd_rad);
+  alike(layout.places, 6, config.prior_place_sd_m);
+  alike(layout.g_sensitivity, 9, config.prior_g_sensitivity_sd);
 }
 
 // Where a variance of the navigation is lost, these wide values stand in: m, m/s, rad.

@@ -10,7 +10,29 @@ namespace {
 
 using Eigen::Vector3d;
 
+/// E-18: how long the error of a solution stays much the same. Ambiguities of a float solution settle over
+/// half a minute. The autocorrelation of recorded single positions bends at about one minute and then falls
+/// slowly (D. L. Wilson's twenty-day records, "Correlation of errors"), as reflections change within a
+/// minute, and what orbits, clocks and the atmosphere leave within many (differenced phases: 5 to 20 min,
+/// Howind et al. 1999). Corrections take most of the slow part away.
 constexpr double kFloatCorrelation_s = 30.0;
+constexpr double kDifferentialCorrelation_s = 60.0;
+constexpr double kSingleCorrelation_s = 120.0;
+
+double correlation_s(GnssSolution solution) noexcept {
+  switch (solution) {
+    case GnssSolution::kFixed:
+      return 0.0;
+    case GnssSolution::kFloat:
+      return kFloatCorrelation_s;
+    case GnssSolution::kDifferential:
+      return kDifferentialCorrelation_s;
+    case GnssSolution::kSingle:
+    case GnssSolution::kNone:
+      break;
+  }
+  return kSingleCorrelation_s;
+}
 
 /// Receivers without sd: how much worse than a fixed solution.
 double sd_factor(GnssSolution solution) noexcept {
@@ -51,8 +73,8 @@ Vector3d trusted_velocity_sd(const GnssData& gnss, const GnssConfig& config) noe
 }
 
 double correlated_sd_factor(GnssSolution solution, double since_last_s) noexcept {
-  if (solution != GnssSolution::kFloat || since_last_s <= 0.0) return 1.0;
-  return std::sqrt(std::max(1.0, 2.0 * kFloatCorrelation_s / since_last_s));
+  if (since_last_s <= 0.0) return 1.0;
+  return std::sqrt(std::max(1.0, 2.0 * correlation_s(solution) / since_last_s));
 }
 
 }  // namespace imuscope

@@ -13,8 +13,8 @@ namespace imuscope {
 [[nodiscard]] Eigen::Vector3d trusted_position_sd(const GnssData& gnss, const GnssConfig& config) noexcept;
 [[nodiscard]] Eigen::Vector3d trusted_velocity_sd(const GnssData& gnss, const GnssConfig& config) noexcept;
 
-/// A float solution is wrong by much the same amount for half a minute (E-18). Its sd is widened so that all
-/// of that time's solutions together tell what one of them is worth.
+/// A position that is not fixed is wrong by much the same amount for half a minute and more (E-18). Its sd is
+/// widened so that all of that time's solutions together tell what one of them is worth.
 [[nodiscard]] double correlated_sd_factor(GnssSolution solution, double since_last_s) noexcept;
 
 }  // namespace imuscope

@@ -25,6 +25,14 @@ std::optional<std::string> study_state(const StudyLayout& layout, std::size_t in
   triple(layout.gyro_scale, "gyro_scale");
   triple(layout.accel_scale, "accel_scale");
   triple(layout.accel_boresight, "accel_boresight");
+  triple(layout.gyro_axes, "gyro_axes");
+  triple(layout.accel_axes, "accel_axes");
+  const auto numbered = [&](std::size_t first, std::size_t count, const char* name) {
+    if (first == StudyLayout::kAbsent || index < first || index >= first + count) return;
+    found = std::string(name) + "_" + std::to_string(index - first + 1);
+  };
+  numbered(layout.places, 6, "accel_places");
+  numbered(layout.g_sensitivity, 9, "g_sensitivity");
   if (index == layout.t_d) found = "t_d";
   if (index == layout.accel_t_d) found = "accel_t_d";
   return found;

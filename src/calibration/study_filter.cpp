@@ -15,14 +15,24 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// The power of the time offset's column is averaged over this time, and held against the reference's noise
-/// with a margin for the average's own scatter.
-constexpr double kColumnPowerMean_s = 1.0;
-constexpr double kColumnNoiseMargin = 1.3;
 /// A silence of this length makes the biases uncertain again: the sensor may have been off.
 constexpr double kReturnAfter_s = 5.0;
 /// Samples further apart are not averaged into one update.
 constexpr double kBlockGap_s = 0.1;
+/// The reference's noise is known to this share: what it takes of the lever arm is put right as far as that.
+/// Nothing is called calibrated or observable where more than a third of the sd comes from it.
+constexpr double kNoiseKnown = 0.1;
+constexpr double kAttenuationMax = 0.3;
+/// What a low-pass of its own, of 40 Hz as data sheets have it, takes of the motion that a sensor is to show:
+/// f^2 / (2 f_c^2), and vehicles as wholes move at 1.25 Hz. It looks like a scale.
+constexpr double kLowPass_hz = 40.0;
+constexpr double kVehicle_hz = 1.25;
+constexpr double kLowPassShare = 0.5 * (kVehicle_hz / kLowPass_hz) * (kVehicle_hz / kLowPass_hz);
+/// Noise of the angular acceleration in neighbouring windows has the correlation -1/2: what changes from one
+/// to the next, as the columns of the time offset do, sees up to twice the variance.
+constexpr double kSlopeCorrelation = 2.0;
+/// A window that began in the middle, as after a gap, is none.
+constexpr double kWholeWindow = 0.9;
 /// NIS is averaged over this time.
 constexpr double kNisMean_s = 10.0;
 /// Over so much motion innovations are held against their predicted variance. White ones have it to 2 % then;
@@ -31,6 +41,12 @@ constexpr double kNisMean_s = 10.0;
 constexpr double kNoiseMean_s = 60.0;
 constexpr double kNoiseTooSmall = 2.0;
 constexpr double kNoiseFits = 1.5;
+/// Where the state's own share of an innovation's variance is below this, what is too much of it is noise.
+constexpr double kNoiseRules = 0.2;
+/// Innovations have more than their variance where their mean square exceeds 1 by so many of its own sd.
+constexpr double kSurplusSds = 3.0;
+/// No noise is ten times the configured one: then the device is not what is configured.
+constexpr double kSurplusMax = 100.0;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
 constexpr double kMountingChangedShare = 0.8;
 constexpr double kMountingWatch_s = 3.0;
@@ -72,6 +88,17 @@ double largest_contradiction(const Vector3& a, const Vector3& sd_a, const Vector
 
 double distance(const Vector3& a, const Vector3& b) { return (to_eigen(a) - to_eigen(b)).norm(); }
 
+/// 3 x 3 block of the covariance; zero where either state is absent.
+Matrix3d block_of(const CovarianceKernel& P, std::size_t row, std::size_t column) {
+  Matrix3d out = Matrix3d::Zero();
+  if (row == StudyLayout::kAbsent || column == StudyLayout::kAbsent) return out;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j)
+      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = P(row + i, column + j);
+  }
+  return out;
+}
+
 /// C-17: one process for a constant and a wandering part: the variance of both, and as fast at first as the
 /// wandering one.
 std::array<GaussMarkovConfig, 3> with_turn_on(const std::array<GaussMarkovConfig, 3>& slow,
@@ -87,7 +114,31 @@ std::array<GaussMarkovConfig, 3> with_turn_on(const std::array<GaussMarkovConfig
   return whole;
 }
 
+/// What the sensor's class asks of its mounting: the noise of motion, its largest axis.
+SensorQuality quality_of(const StudyConfig& config) {
+  constexpr auto kMoving = static_cast<std::size_t>(Regime::kDynamic);
+  const double per_sqrt_hz = 1.0 / std::sqrt(config.rate_hz);
+  SensorQuality quality;
+  quality.gyro_white_radps_per_sqrt_hz =
+      *std::ranges::max_element(config.noise.gyro[kMoving].white_sd) * per_sqrt_hz;
+  quality.accel_white_mps2_per_sqrt_hz =
+      *std::ranges::max_element(config.noise.accel[kMoving].white_sd) * per_sqrt_hz;
+  if ((config.blocks & kGyroAxesBlock) != 0) quality.axes_sd_rad = config.prior_axes_sd_rad;
+  if ((config.blocks & kAccelPlacesBlock) != 0) quality.places_sd_m = config.prior_place_sd_m;
+  return quality;
+}
+
 }  // namespace
+
+double StudyFilter::Surplus::factor(std::size_t axis) const noexcept {
+  if (updates[axis] == 0.0) return 1.0;
+  return std::clamp(nis[axis] / (1.0 + kSurplusSds * std::sqrt(2.0 / updates[axis])), 1.0, kSurplusMax);
+}
+
+void StudyFilter::Surplus::add(std::size_t axis, double nis_of_update, double updates_max) noexcept {
+  updates[axis] = std::min(updates[axis] + 1.0, updates_max);
+  nis[axis] += (nis_of_update - nis[axis]) / updates[axis];
+}
 
 StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
     : index_(index),
@@ -96,12 +147,29 @@ StudyFilter::StudyFilter(const EstimatorConfig& config, std::size_t index)
       gate_(axis_gate(config.gate_probability)),
       rate_noise_radps_(config.reference.gyro_white_radps_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
       force_noise_mps2_(config.reference.accel_white_mps2_per_sqrt_hz * std::sqrt(config.reference.rate_hz)),
+      reference_scale_sd_(config.reference.scale_sd),
+      reference_triad_sd_rad_(config.reference.triad_sd_rad),
       increment_centre_(from_seconds(0.5 / config_.rate_hz)),
       has_biases_((config_.blocks & kBiasStudyBlocks) == kBiasStudyBlocks),
       queue_(waiting_samples_capacity(config_.rate_hz)),
+      window_({config.reference.differentiator_points, 1.0 / config.reference.rate_hz}, config_.rate_hz),
       gyro_floor_(config_.noise.gyro),
       accel_floor_(config_.noise.accel) {
+  // The paper's filter takes every sample by itself.
+  window_.fix(has_biases_ ? config_.average_samples : std::max(1, config_.average_samples));
+  set_window_noise();
   precompute_noise();
+}
+
+void StudyFilter::set_window_noise() noexcept {
+  motion_.set_noise(rate_noise_radps_, force_noise_mps2_, window_.now().gains);
+}
+
+void StudyFilter::restart_windows() noexcept {
+  for (Windows& windows : windows_) {
+    windows.blocks = {};
+    windows.position = 0;
+  }
 }
 
 void StudyFilter::precompute_noise() noexcept {
@@ -221,7 +289,7 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
                                  Seen seen) noexcept {
   FilterCore& core = context.core;
   const double dt_s = has_last_ ? to_seconds(valid - last_time_) : 0.0;
-  if (dt_s > kBlockGap_s) blocks_ = {};
+  if (dt_s > kBlockGap_s) restart_windows();
   if (has_last_ && dt_s > kReturnAfter_s && calibrating_) {
     for (std::size_t i = 0; i < 3; ++i) {
       const StudyLayout& layout = core.layout(index_);
@@ -241,6 +309,7 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
   watch_gravity(context, sample, dt_s);
   if (calibrating_) predict(core, dt_s);
 
+  const Seen as_measured = seen;
   for (ReferenceKinematics* b : {&seen.gyro, &seen.accel}) {
     b->omega_radps -= core.reference_gyro_bias_radps();
     b->f_mps2 -= core.reference_accel_bias_mps2();
@@ -265,8 +334,9 @@ void StudyFilter::process_sample(StudyContext& context, const Sample& sample, Ho
   epoch.regime = context.regime;
   epoch.calibrating = calibrating_;
   if (calibrating_) {
-    correct(context, Triad::kGyro, b, epoch);
-    correct(context, Triad::kAccel, seen.accel, epoch);
+    const double accel_t_d_s = epoch.t_d_s + now.accel_t_d_s;
+    correct(context, Triad::kGyro, as_measured.gyro, epoch.t_d_s, epoch);
+    correct(context, Triad::kAccel, as_measured.accel, accel_t_d_s, epoch);
     ++output_.counters.used;
     context.epochs.on_epoch(epoch);
     watch_return(context, valid);
@@ -349,6 +419,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
     prior_sd_psi_r_[i + 3] = core.sd(layout.r == StudyLayout::kAbsent ? layout.r : layout.r + i);
   }
   prior_sd_t_d_ = t_d_sd_s;
+  output_.goal = goal_of(quality_of(config_));
   output_.nis_gyro.fill(1.0);
   output_.nis_accel.fill(1.0);
   output_.status = CalibrationStatus::kConverging;
@@ -356,8 +427,11 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   gated_share_ = 0.0;
   proof_s_ = 0.0;
   contradiction_ = {};
-  blocks_ = {};
-  t_d_column_power_ = {};
+  surplus_ = {};
+  windows_ = {};
+  motion_.clear();
+  set_window_noise();
+  noise_share_ = noise_share_n_ = 0.0;
   next_direction_ = now;
   calibrating_ = true;
 }
@@ -389,81 +463,134 @@ void StudyFilter::predict(FilterCore& core, double dt_s) noexcept {
   }
 }
 
-ReferenceNoise StudyFilter::reference_noise(const ReferenceKinematics& b) const noexcept {
-  return {rate_noise_radps_ * b.value_noise_gain, rate_noise_radps_ * b.derivative_noise_gain_per_s,
-          force_noise_mps2_ * b.value_noise_gain};
+Vector3d StudyFilter::sample_variance(Triad triad, const StudyState& state, const ReferenceKinematics& b,
+                                      const Vector3d& plain) const noexcept {
+  const double value = b.value_noise_gain * b.value_noise_gain;
+  const Vector3d known = windows_[static_cast<std::size_t>(triad)].known + plain;
+  if (triad == Triad::kGyro) return known.array() + value * rate_noise_radps_ * rate_noise_radps_;
+  const double slope = rate_noise_radps_ * b.derivative_noise_gain_per_s;
+  // [r x][r x]' = |r|^2 I - r r'
+  const Vector3d r_s = state.C_b_s * (state.accel_turn * state.r_bs_b_m);
+  return known.array() + value * force_noise_mps2_ * force_noise_mps2_ +
+         slope * slope * (r_s.squaredNorm() - r_s.array().square());
 }
 
-void StudyFilter::correct(StudyContext& context, Triad triad, const ReferenceKinematics& b,
+LinearisationSpread StudyFilter::linearisation_spread(const FilterCore& core, Triad triad) const noexcept {
+  const StudyLayout& layout = core.layout(index_);
+  const CovarianceKernel& P = core.covariance();
+  LinearisationSpread spread;
+  spread.psi_rad2 = block_of(P, layout.psi, layout.psi);
+  spread.r_m2 = block_of(P, layout.r, layout.r);
+  if (layout.t_d != StudyLayout::kAbsent) spread.t_d_s2 = P(layout.t_d, layout.t_d);
+  if (triad == Triad::kAccel && layout.accel_t_d != StudyLayout::kAbsent)
+    spread.t_d_s2 += P(layout.accel_t_d, layout.accel_t_d) + 2.0 * P(layout.t_d, layout.accel_t_d);
+  return spread;
+}
+
+void StudyFilter::correct(StudyContext& context, Triad triad, const ReferenceKinematics& b, double t_d_s,
                           StudyEpoch& epoch) noexcept {
   const bool gyro = triad == Triad::kGyro;
   const std::uint32_t flags = epoch.sample.flags;
   if ((flags & (gyro ? kGyroValid : kAccelValid)) == 0) return;
   FilterCore& core = context.core;
-  const ReferenceBiasColumns columns =
-      has_biases_ ? ReferenceBiasColumns{kGyroBiasError, kAccelBiasError} : ReferenceBiasColumns{};
-  const ReferenceNoise own = reference_noise(b);
-  StudyMeasurement m = gyro ? gyro_measurement(core.study(index_), core.layout(index_), columns, b, own)
-                            : accel_measurement(core.study(index_), core.layout(index_), columns, b, own);
-  const double slope_noise = (gyro ? rate_noise_radps_ : force_noise_mps2_) * b.derivative_noise_gain_per_s;
-  attenuate_time_offset(triad, slope_noise, core, m.H);
-
+  const StudyState& state = core.study(index_);
+  const Vector3d measured = to_eigen(gyro ? epoch.sample.omega_radps : epoch.sample.f_mps2);
   const NoiseVariances& noise =
       variances_[static_cast<std::size_t>(context.regime)][static_cast<std::size_t>(triad)];
-  const Vector3d y = to_eigen(gyro ? epoch.sample.omega_radps : epoch.sample.f_mps2) - m.predicted;
+  ReferenceMean single(b);
+  single.compensate(core.reference_gyro_bias_radps(), core.reference_accel_bias_mps2());
+  Windows& windows = windows_[static_cast<std::size_t>(triad)];
+  if (!windows.is_known) {
+    windows.is_known = true;
+    const StudyMeasurement m = gyro ? gyro_measurement(state, core.layout(index_), {}, single, single, {})
+                                    : accel_measurement(state, core.layout(index_), {}, single, single, {});
+    core.covariance().project(m.H, {});
+    windows.known = to_eigen(core.covariance().innovation_covariance()).diagonal();
+  }
+  const Vector3d y = measured - (gyro ? predicted_rate(state, single) : predicted_force(state, single));
   (gyro ? epoch.innovation_gyro_radps : epoch.innovation_accel_mps2) = to_array(y);
+  (gyro ? epoch.variance_gyro : epoch.variance_accel) =
+      to_array(sample_variance(triad, state, b, noise.plain));
 
-  Block& block = blocks_[static_cast<std::size_t>(triad)];
-  if (block.n == 0) {
-    block.innovation.setZero();
-    block.R.setZero();
-    block.excess.setZero();
-    block.clipped = {};
-    block.H = m.H;
-  } else {
-    for (std::size_t k = 0; k < m.H.count; ++k) {
-      for (std::size_t i = 0; i < 3; ++i) {
-        for (std::size_t j = 0; j < m.H.blocks[k].width; ++j)
-          block.H.blocks[k].h[i][j] += m.H.blocks[k].h[i][j];
-      }
-    }
-  }
-  ++block.n;
-  block.innovation += y;
-  block.R += m.reference_covariance;
-  block.R.diagonal() += noise.inflated;
-  block.excess += noise.inflated - noise.plain;
+  const int n = window_.now().n;
+  const double rising = window_weight(n, windows.position);
   const auto first_clip = static_cast<std::uint32_t>(gyro ? kGyroClipX : kAccelClipX);
-  for (std::size_t i = 0; i < 3; ++i) {
-    if ((flags & (first_clip << i)) == 0) continue;
-    block.clipped[i] = true;
-    ++(gyro ? output_.counters.clipped_gyro : output_.counters.clipped_accel)[i];
+  for (std::size_t k = 0; k < 2; ++k) {
+    Block& block = windows.blocks[k];
+    const double weight = k == windows.falling ? 1.0 - rising : rising;
+    if (weight == 0.0) continue;
+    block.weight += weight;
+    block.b.add(weight, b);
+    block.measured += weight * measured;
+    block.t_d_s += weight * t_d_s;
+    for (std::size_t i = 0; i < 3; ++i)
+      block.clipped[i] = block.clipped[i] || (flags & (first_clip << i)) != 0;
   }
-  const Vector3d single = m.reference_covariance.diagonal() + noise.plain;
-  (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(single);
-  if (block.n >= config_.average_samples) update_from_block(context, triad, epoch);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if ((flags & (first_clip << i)) != 0)
+      ++(gyro ? output_.counters.clipped_gyro : output_.counters.clipped_accel)[i];
+  }
+  if (++windows.position < n) return;
+  windows.position = 0;
+  // The first one of all has no rising half.
+  if (windows.blocks[windows.falling].weight > kWholeWindow * n) update_from_block(context, triad, epoch);
+  windows.blocks[windows.falling] = Block{};
+  windows.falling = 1 - windows.falling;
 }
 
 void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpoch& epoch) noexcept {
   const bool gyro = triad == Triad::kGyro;
-  Block& block = blocks_[static_cast<std::size_t>(triad)];
-  const double n = block.n;
-  if (block.n > 1) {
-    for (std::size_t k = 0; k < block.H.count; ++k) {
-      for (auto& row : block.H.blocks[k].h) {
-        for (double& entry : row) entry /= n;
-      }
-    }
-  }
-  // The noise of n samples counts as white: n times less in their mean, and R is a sum over n already.
-  const Matrix3d R = block.R / (n * n);
-  const Vector3d y = block.innovation / n;
+  Windows& windows = windows_[static_cast<std::size_t>(triad)];
+  Block& block = windows.blocks[windows.falling];
+  const auto [length, gains] = window_.now();
+  const double n = length;
   FilterCore& core = context.core;
-  core.covariance().project(block.H, to_array(R));
+  const StudyState& state = core.study(index_);
+  block.b.scale(1.0 / block.weight);
+  block.measured /= block.weight;
+  const double t_d_s = state.t_d_s + (gyro ? 0.0 : state.accel_t_d_s);
+  block.b.move(t_d_s - block.t_d_s / block.weight);
+  block.b.compensate(core.reference_gyro_bias_radps(), core.reference_accel_bias_mps2());
+  if (gyro)
+    motion_.add(block.b, core.reference_gyro_bias_radps(), core.reference_accel_bias_mps2(),
+                n / config_.rate_hz);
+  // The filter may have begun in the middle of a turn, of which the lever arm's share is not known then.
+  if (!motion_.can_tell()) return;
+  const ReferenceMean believed = motion_.believed(block.b);
+  const ReferenceMean expected = motion_.expected(block.b);
+  const ReferenceBiasColumns columns =
+      has_biases_ ? ReferenceBiasColumns{kGyroBiasError, kAccelBiasError} : ReferenceBiasColumns{};
+  const double per_sqrt_n = 1.0 / std::sqrt(n);
+  const ReferenceNoise own{rate_noise_radps_ * per_sqrt_n,
+                           rate_noise_radps_ * gains.slope_per_s *
+                               std::sqrt(kSlopeCorrelation * motion_.rate_slope_share().maxCoeff()),
+                           force_noise_mps2_ * per_sqrt_n};
+  const StudyMeasurement m =
+      gyro ? gyro_measurement(state, core.layout(index_), columns, expected, believed, own)
+           : accel_measurement(state, core.layout(index_), columns, expected, believed, own);
+  const NoiseVariances& noise =
+      variances_[static_cast<std::size_t>(context.regime)][static_cast<std::size_t>(triad)];
+  const Vector3d y = block.measured - m.predicted;
+  // Neighbouring windows share samples: R is what all updates together know of a constant, NIS that of one.
+  const LinearisationSpread spread = linearisation_spread(core, triad);
+  Matrix3d R = m.reference_covariance + (gyro ? second_order_rate(state, believed, spread)
+                                              : second_order_force(state, believed, spread));
+  R.diagonal() += noise.inflated / n;
+  // C-24: where innovations have long been larger than the noise allows, the noise is what they say.
+  Surplus& surplus = surplus_[static_cast<std::size_t>(context.regime)][static_cast<std::size_t>(triad)];
+  const Vector3d factor(surplus.factor(0), surplus.factor(1), surplus.factor(2));
+  const Vector3d configured = R.diagonal();
+  R = factor.cwiseSqrt().asDiagonal() * R * factor.cwiseSqrt().asDiagonal();
+  const Vector3d excess = (noise.inflated - window_white_share(length) * noise.plain) / n;
+  core.covariance().project(m.H, to_array(R));
   const Matrix3d S = to_eigen(core.covariance().innovation_covariance());
-  const Vector3d plain = S.diagonal() - block.excess / (n * n);
-  // Of single samples, the variance is known exactly; of a mean's members it lacks H P H^T.
-  if (block.n == 1) (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(plain);
+  windows.known = S.diagonal() - R.diagonal();
+  const Vector3d plain = windows.known + configured - excess;
+  if (length == 1) (gyro ? epoch.variance_gyro : epoch.variance_accel) = to_array(plain);
+  if (!gyro && motion_.moving()) {
+    noise_share_n_ += 1.0;
+    noise_share_ += (motion_.noise_in_rate_slope() - noise_share_) / noise_share_n_;
+  }
 
   StudyCounters& counters = output_.counters;
   std::array<bool, 3>& use = gyro ? epoch.used_gyro : epoch.used_accel;
@@ -478,18 +605,28 @@ void StudyFilter::update_from_block(StudyContext& context, Triad triad, StudyEpo
     use[i] = !has_biases_ || y(k) * y(k) <= gate_ * S(k, k);
     gated = gated || !use[i];
     if (!use[i]) ++(gyro ? counters.gated_gyro : counters.gated_accel)[i];
+    // What is beyond the gate counts as if at it: outliers tell little, a noise that is far off shows all the
+    // same.
+    surplus.add(i, std::min(y(k) * y(k), gate_ * S(k, k)) / plain(k), kNoiseMean_s * config_.rate_hz / n);
     nis[i] += share * (y(k) * y(k) / plain(k) - nis[i]);
-    // At rest there is less noise, and a sample that was gated is no noise.
-    if (context.regime == Regime::kStatic || !use[i]) continue;
-    Contradiction& noise = contradiction_[static_cast<std::size_t>(triad)];
-    noise.seen[i] += n;
-    const double long_share = n / std::min(noise.seen[i], kNoiseMean_s * config_.rate_hz);
-    noise.nis[i] += long_share * (y(k) * y(k) / plain(k) - noise.nis[i]);
-    noise.excess[i] += long_share * (n * (y(k) * y(k) - plain(k)) - noise.excess[i]);
+    // At rest there is less noise, a sample that was gated is no noise, and while the state is uncertain
+    // innovations tell of it.
+    const bool tells =
+        context.regime != Regime::kStatic && use[i] && windows.known(k) < kNoiseRules * S(k, k);
+    if (!tells) continue;
+    Contradiction& seen = contradiction_[static_cast<std::size_t>(triad)];
+    seen.seen[i] += n;
+    const double long_share = n / std::min(seen.seen[i], kNoiseMean_s * config_.rate_hz);
+    seen.nis[i] += long_share * (y(k) * y(k) / plain(k) - seen.nis[i]);
+    const double excess_of_sample = n / window_white_share(length) * (y(k) * y(k) - plain(k));
+    seen.excess[i] += long_share * (excess_of_sample - seen.excess[i]);
   }
   watch_noise(context, triad, epoch.time);
   core.update(y, use);
-  block.n = 0;
+  if (!gyro && window_.choose(motion_)) {
+    restart_windows();
+    set_window_noise();
+  }
 }
 
 void StudyFilter::watch_noise(StudyContext& context, Triad triad, HostTime now) noexcept {
@@ -505,33 +642,9 @@ void StudyFilter::watch_noise(StudyContext& context, Triad triad, HostTime now) 
   const auto& configured =
       (gyro ? config_.noise.gyro : config_.noise.accel)[static_cast<std::size_t>(context.regime)];
   const double white = configured.white_sd[worst];
-  context.log.add(
-      event::NoiseTooSmall{gyro, std::sqrt(noise.nis[worst]), std::sqrt(white * white + noise.excess[worst])},
-      config_.device, now);
-}
-
-void StudyFilter::attenuate_time_offset(Triad triad, double noise, const FilterCore& core,
-                                        SparseMeasurement& H) noexcept {
-  // The columns of t_d and of the accelerometer's own offset hold the same derivative.
-  std::array<MeasurementBlock*, 2> blocks{};
-  std::size_t n = 0;
-  const StudyLayout& layout = core.layout(index_);
-  for (std::size_t k = 0; k < H.count; ++k) {
-    const std::size_t column = H.blocks[k].column;
-    if (column == layout.t_d || column == layout.accel_t_d) blocks[n++] = &H.blocks[k];
-  }
-  if (n == 0) return;
-  const MeasurementBlock* block = blocks.front();
-  double power = 0.0;
-  for (const auto& row : block->h) power += row[0] * row[0];
-  double& mean = t_d_column_power_[static_cast<std::size_t>(triad)];
-  mean += std::min(1.0, 1.0 / (kColumnPowerMean_s * config_.rate_hz)) * (power - mean);
-  // C-13: the column that the noise would be expected to leave out; at standstill nothing remains, so that
-  // the reference's noise is not taken for motion.
-  const double share = std::max(0.0, 1.0 - kColumnNoiseMargin * 3.0 * noise * noise / std::max(mean, 1e-300));
-  for (std::size_t k = 0; k < n; ++k) {
-    for (auto& row : blocks[k]->h) row[0] *= share;
-  }
+  context.log.add(event::NoiseTooSmall{gyro, std::sqrt(noise.nis[worst]),
+                                       std::sqrt(white * white + std::max(0.0, noise.excess[worst]))},
+                  config_.device, now);
 }
 
 void StudyFilter::watch_gravity(StudyContext& context, const Sample& sample, double dt_s) noexcept {
@@ -666,10 +779,7 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   if (!calibrating_) return;
   const StudyState& state = core.study(index_);
   const StudyLayout& layout = core.layout(index_);
-  const CovarianceKernel& P = core.covariance();
-  output_.C_b_s = to_array(state.C_b_s);
-  output_.psi_rad = to_array(Vector3d(-log_so3(to_eigen(output_.C_prior).transpose() * state.C_b_s)));
-  output_.r_bs_b_m = to_array(state.r_bs_b_m);
+  publish_mounting(core);
   output_.t_d_s = state.t_d_s;
   output_.gyro_bias_radps = to_array(state.gyro_bias_s_radps);
   output_.accel_bias_mps2 = to_array(state.accel_bias_s_mps2);
@@ -678,43 +788,100 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   const auto sd_of = [&](std::size_t first, Vector3& out) {
     for (std::size_t i = 0; i < 3; ++i) out[i] = first == StudyLayout::kAbsent ? 0.0 : core.sd(first + i);
   };
-  sd_of(layout.psi, output_.sd_psi_rad);
-  sd_of(layout.r, output_.sd_r_bs_b_m);
   sd_of(layout.gyro_bias, output_.sd_gyro_bias_radps);
   sd_of(layout.accel_bias, output_.sd_accel_bias_mps2);
   sd_of(layout.gyro_scale, output_.sd_gyro_scale);
   sd_of(layout.accel_scale, output_.sd_accel_scale);
-  output_.accel_boresight_rad = to_array(Vector3d(-log_so3(state.accel_turn)));
-  sd_of(layout.accel_boresight, output_.sd_accel_boresight_rad);
   output_.accel_t_d_s = state.accel_t_d_s;
   output_.sd_accel_t_d_s = core.sd(layout.accel_t_d);
   output_.sd_t_d_s = core.sd(layout.t_d);
 
-  const bool noise_fits = !contradiction_[0].is_too_small && !contradiction_[1].is_too_small;
-  const bool fits = !misfits_ && noise_fits && proof_s_ >= kProof_s;
-  const bool estimates_mounting = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
-  for (std::size_t i = 0; i < 6; ++i) {
-    const std::size_t block = i < 3 ? layout.psi : layout.r;
-    const double sd = i < 3 ? output_.sd_psi_rad[i] : output_.sd_r_bs_b_m[i - 3];
-    const double goal = i < 3 ? kGoalBoresightSd_rad : kGoalLeverArmSd_m;
-    output_.observable[i] = fits && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal);
-    for (std::size_t j = 0; j < 6; ++j) {
-      const std::size_t other = j < 3 ? layout.psi : layout.r;
-      const bool absent = block == StudyLayout::kAbsent || other == StudyLayout::kAbsent;
-      output_.covariance_psi_r[i * 6 + j] = absent ? 0.0 : P(block + i % 3, other + j % 3);
+  // C-21: what nobody can tell from the motion.
+  if (layout.accel_boresight != StudyLayout::kAbsent) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      output_.sd_gyro_scale[i] = std::hypot(output_.sd_gyro_scale[i], reference_scale_sd_, kLowPassShare);
+      output_.sd_accel_scale[i] = std::hypot(output_.sd_accel_scale[i], reference_scale_sd_, kLowPassShare);
+      output_.sd_accel_boresight_rad[i] =
+          std::hypot(output_.sd_accel_boresight_rad[i], reference_triad_sd_rad_);
     }
   }
-  output_.t_d_observable =
-      layout.t_d != StudyLayout::kAbsent && fits &&
-      (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= kGoalTimeOffsetSd_s);
-  output_.status = estimates_mounting && fits && meets_goal(output_.sd_psi_rad, output_.sd_r_bs_b_m)
-                       ? CalibrationStatus::kCalibrated
-                       : CalibrationStatus::kConverging;
+  judge(core);
   if (output_.time >= next_direction_) {
     next_direction_ = output_.time + kDirectionEvery;
     update_weakest_direction(core);
     watch_priors(log);
   }
+}
+
+void StudyFilter::publish_mounting(const FilterCore& core) noexcept {
+  const StudyState& state = core.study(index_);
+  const StudyLayout& layout = core.layout(index_);
+  const CovarianceKernel& P = core.covariance();
+  const auto block = [&P](std::size_t row, std::size_t column) { return block_of(P, row, column); };
+  // C-22: from the frame that leans to no axis to the one along the x gyro.
+  const Matrix3d sign = Vector3d(1.0, -1.0, 1.0).asDiagonal();
+  const Matrix3d C_t = state.C_b_s.transpose();
+  const Matrix3d by_axes = C_t * sign;
+  const Vector3d gyro_turn = sign * state.gyro_axes;
+  const Matrix3d C_published = exp_so3(-gyro_turn) * state.C_b_s;
+  output_.C_b_s = to_array(C_published);
+  output_.psi_rad = to_array(Vector3d(-log_so3(to_eigen(output_.C_prior).transpose() * C_published)));
+  output_.r_bs_b_m = to_array(state.r_bs_b_m);
+  const Matrix3d turned = by_axes * block(layout.gyro_axes, layout.psi);
+  Matrix3d psi = block(layout.psi, layout.psi) + turned + turned.transpose() +
+                 by_axes * block(layout.gyro_axes, layout.gyro_axes) * by_axes.transpose();
+  const Matrix3d psi_r = block(layout.psi, layout.r) + by_axes * block(layout.gyro_axes, layout.r);
+  Matrix3d r = block(layout.r, layout.r);
+  // C-13: the noise is known to a share, so the lever arm that it takes is, too.
+  const Vector3d attenuated = kNoiseKnown * noise_share_ * state.r_bs_b_m;
+  if (layout.r != StudyLayout::kAbsent) r += attenuated * attenuated.transpose();
+  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> covariance(output_.covariance_psi_r.data());
+  covariance << psi, psi_r, psi_r.transpose(), r;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    output_.sd_psi_rad[i] = std::sqrt(psi(k, k));
+    output_.sd_r_bs_b_m[i] = std::sqrt(r(k, k));
+    lever_arm_attenuated_[i] = std::abs(attenuated(k)) > kAttenuationMax * output_.sd_r_bs_b_m[i];
+  }
+
+  const Vector3d accel_turn = sign * state.accel_axes;
+  const Matrix3d C_accel = exp_so3(-accel_turn) * state.C_b_s * state.accel_turn;
+  output_.accel_boresight_rad = to_array(Vector3d(-log_so3(C_published.transpose() * C_accel)));
+  const Matrix3d alpha_g = block(layout.accel_boresight, layout.gyro_axes);
+  const Matrix3d alpha_a = block(layout.accel_boresight, layout.accel_axes);
+  const Matrix3d g_g = block(layout.gyro_axes, layout.gyro_axes);
+  const Matrix3d a_a = block(layout.accel_axes, layout.accel_axes);
+  const Matrix3d g_a = block(layout.gyro_axes, layout.accel_axes);
+  const Matrix3d mixed = (alpha_a - alpha_g) * by_axes.transpose();
+  const Matrix3d alpha = block(layout.accel_boresight, layout.accel_boresight) + mixed + mixed.transpose() +
+                         by_axes * (a_a + g_g - g_a - g_a.transpose()) * by_axes.transpose();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    output_.sd_accel_boresight_rad[i] =
+        layout.accel_boresight == StudyLayout::kAbsent ? 0.0 : std::sqrt(alpha(k, k));
+  }
+}
+
+void StudyFilter::judge(const FilterCore& core) noexcept {
+  const StudyLayout& layout = core.layout(index_);
+  const MountingGoal& goal = output_.goal;
+  const bool noise_fits = !contradiction_[0].is_too_small && !contradiction_[1].is_too_small;
+  const bool fits = !misfits_ && noise_fits && proof_s_ >= kProof_s;
+  bool attenuated = false;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double sd = i < 3 ? output_.sd_psi_rad[i] : output_.sd_r_bs_b_m[i - 3];
+    const double goal_sd = i < 3 ? goal.boresight_sd_rad : goal.lever_arm_sd_m;
+    const bool blurred = i >= 3 && lever_arm_attenuated_[i - 3];
+    attenuated = attenuated || blurred;
+    output_.observable[i] = fits && !blurred && (sd < kObservableShare * prior_sd_psi_r_[i] || sd <= goal_sd);
+  }
+  output_.t_d_observable =
+      layout.t_d != StudyLayout::kAbsent && fits &&
+      (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= goal.time_offset_sd_s);
+  const bool estimates_mounting = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
+  const bool meets = meets_goal(output_.sd_psi_rad, output_.sd_r_bs_b_m, goal);
+  output_.status = estimates_mounting && fits && meets && !attenuated ? CalibrationStatus::kCalibrated
+                                                                      : CalibrationStatus::kConverging;
 }
 
 void StudyFilter::update_weakest_direction(const FilterCore& core) noexcept {

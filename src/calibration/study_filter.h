@@ -10,8 +10,10 @@
 #include "alignment/coarse_mounting.h"
 #include "alignment/cross_correlation.h"
 #include "alignment/reference_window.h"
+#include "calibration/estimator.h"
 #include "calibration/event_log.h"
 #include "calibration/filter_core.h"
+#include "calibration/update_window.h"
 
 namespace imuscope {
 
@@ -71,10 +73,17 @@ class StudyFilter {
   void begin(StudyContext& context, HostTime now, const Eigen::Matrix3d& C_b_s,
              const Eigen::Matrix3d& mounting_covariance, double t_d_s, double t_d_sd_s) noexcept;
   void predict(FilterCore& core, double dt_s) noexcept;
-  void correct(StudyContext& context, Triad triad, const ReferenceKinematics& b, StudyEpoch& epoch) noexcept;
+  /// @param b      as the reference measured it, `t_d_s` after the sample
+  void correct(StudyContext& context, Triad triad, const ReferenceKinematics& b, double t_d_s,
+               StudyEpoch& epoch) noexcept;
   void update_from_block(StudyContext& context, Triad triad, StudyEpoch& epoch) noexcept;
-  void attenuate_time_offset(Triad triad, double noise, const FilterCore& core,
-                             SparseMeasurement& H) noexcept;
+  [[nodiscard]] LinearisationSpread linearisation_spread(const FilterCore& core, Triad triad) const noexcept;
+  /// Variance of one sample's innovation, as the newest update has it. In s.
+  [[nodiscard]] Eigen::Vector3d sample_variance(Triad triad, const StudyState& state,
+                                                const ReferenceKinematics& b,
+                                                const Eigen::Vector3d& plain) const noexcept;
+  void restart_windows() noexcept;
+  void set_window_noise() noexcept;
   void watch_gravity(StudyContext& context, const Sample& sample, double dt_s) noexcept;
   void note_return(StudyContext& context, HostTime now, double silence_s) noexcept;
   void watch_return(StudyContext& context, HostTime now) noexcept;
@@ -83,8 +92,11 @@ class StudyFilter {
   /// Tells of a configured noise that is too small.
   void watch_noise(StudyContext& context, Triad triad, HostTime now) noexcept;
   void watch_fit(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
+  /// Mounting and accelerometer triad in the frames of their axes. C-22.
+  void publish_mounting(const FilterCore& core) noexcept;
+  /// What may be said of what is published.
+  void judge(const FilterCore& core) noexcept;
   void update_weakest_direction(const FilterCore& core) noexcept;
-  [[nodiscard]] ReferenceNoise reference_noise(const ReferenceKinematics& b) const noexcept;
   void precompute_noise() noexcept;
 
   std::size_t index_;
@@ -93,6 +105,8 @@ class StudyFilter {
   double gate_;              ///< bound of y^2 / S of one axis
   double rate_noise_radps_;  ///< of one R sample
   double force_noise_mps2_;
+  double reference_scale_sd_;
+  double reference_triad_sd_rad_;
   Duration increment_centre_;  ///< half a sample period
   /// Without bias states (the paper's filter) S biases would pass for R biases and for outliers: the R biases
   /// are then left alone, as in the paper's eq. (5), and nothing is gated.
@@ -127,17 +141,29 @@ class StudyFilter {
   std::array<GaussMarkovConfig, 3> gyro_bias_;
   std::array<GaussMarkovConfig, 3> accel_bias_;
 
-  /// Sums over the samples of one update; C-15.
+  /// Weighted sums over the samples of one update; C-15. They are held against the state when they are
+  /// complete, so that nothing is lost where another update moves it meanwhile.
   struct Block {
-    int n = 0;
-    Eigen::Vector3d innovation = Eigen::Vector3d::Zero();
-    SparseMeasurement H;
-    Eigen::Matrix3d R = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d excess = Eigen::Vector3d::Zero();  ///< what inflation added to R's diagonal
+    double weight = 0.0;
+    ReferenceMean b;
+    Eigen::Vector3d measured = Eigen::Vector3d::Zero();
+    double t_d_s = 0.0;  ///< that the reference was looked up with
     std::array<bool, 3> clipped{};
   };
-  std::array<Block, 2> blocks_;
-  std::array<double, 2> t_d_column_power_{};  ///< recent mean of |column of t_d|^2, per triad
+  struct Windows {
+    std::array<Block, 2> blocks;  ///< one falls while the other rises
+    std::size_t falling = 0;
+    int position = 0;
+    Eigen::Vector3d known = Eigen::Vector3d::Zero();  ///< diagonal of H P H', of the newest update
+    bool is_known = false;
+  };
+  std::array<Windows, 2> windows_;
+  WindowChoice window_;
+  MotionShare motion_;
+  /// Mean share of noise in the angular acceleration of the updates that the lever arm was found from, and
+  /// how many they are.
+  double noise_share_ = 0.0;
+  double noise_share_n_ = 0.0;
 
   std::array<TriadNoise, kRegimeCount> gyro_floor_;  ///< as configured
   std::array<TriadNoise, kRegimeCount> accel_floor_;
@@ -167,12 +193,22 @@ class StudyFilter {
     bool is_told = false;
   };
   std::array<Contradiction, 2> contradiction_{};
+  /// What the updates' innovations have been beyond what the configured noise explains, by regime and triad.
+  struct Surplus {
+    Vector3 nis{1.0, 1.0, 1.0};
+    Vector3 updates{};
+    /// Of the noise's variance; 1 where what was seen may be chance.
+    [[nodiscard]] double factor(std::size_t axis) const noexcept;
+    void add(std::size_t axis, double nis_of_update, double updates_max) noexcept;
+  };
+  std::array<std::array<Surplus, 2>, kRegimeCount> surplus_{};
   std::array<bool, 2> gated_{};  ///< an axis of this triad, in the newest update
   double gated_share_ = 0.0;     ///< over seconds: the mounting changed
   double misfit_share_ = 0.0;    ///< over half a minute of motion: the device is not what is configured
   bool misfits_ = false;
   bool misfit_told_ = false;
   double proof_s_ = 0.0;  ///< motion that this mounting has been held against
+  std::array<bool, 3> lever_arm_attenuated_{};
   std::array<double, 6> prior_sd_psi_r_{};
   double prior_sd_t_d_ = 0.0;
   HostTime next_direction_{};

@@ -20,9 +20,10 @@ namespace imuscope {
 namespace {
 
 void read_estimator(TomlReader in, EstimatorOptions& options) {
-  options.paper_states = in.choice("states", {"full", "paper"}, 0) == 1;
+  options.states = static_cast<FilterStates>(in.choice("states", {"full", "rigid", "paper"}, 0));
   // Six states beside the published method's: the filter's, unless the batch is asked for.
-  options.batch_mounting = in.choice("mounting", {"batch", "filter"}, options.paper_states ? 1 : 0) == 0;
+  options.batch_mounting =
+      in.choice("mounting", {"batch", "filter"}, options.states == FilterStates::kPaper ? 1 : 0) == 0;
   in.boolean("navigation", options.navigation);
   in.integer("differentiator_points", options.differentiator_points, 5, 11);
   if (options.differentiator_points % 2 == 0) in.fail("differentiator_points", "must be 5, 7, 9 or 11");

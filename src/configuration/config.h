@@ -175,7 +175,7 @@ struct DeviceConfig {
   ImuNoiseConfig noise;        ///< reference and study
   MountingPriorConfig prior;   ///< study
   DataSheetConfig data_sheet;  ///< study
-  int average_samples = 1;     ///< study: samples taken into one measurement update, see StudyConfig
+  int average_samples = 0;     ///< study: samples from one update to the next, see StudyConfig
   CsvConfig csv;               ///< csv_imu, csv_gnss
   McapConfig mcap;             ///< mcap
   GnssOptions gnss;            ///< gnss
@@ -183,9 +183,16 @@ struct DeviceConfig {
   xsens_can::ItemIds xsens_can_ids = xsens_can::default_ids();  ///< xsens_can
 };
 
+/// States of an S-IMU in the filter.
+enum class FilterStates : std::uint8_t {
+  kFull,   ///< with all that data sheets allow its axes, places and delays to be
+  kRigid,  ///< boresight, lever arm, biases, time offset, scales: axes are straight
+  kPaper,  ///< the paper's six
+};
+
 /// [estimator]: which states the filter has.
 struct EstimatorOptions {
-  bool paper_states = false;      ///< the paper's six states per S-IMU
+  FilterStates states = FilterStates::kFull;
   bool batch_mounting = true;     ///< a study publishes the batch estimate's mounting, not the filter's
   bool navigation = true;         ///< R-IMU/GNSS navigation; needs a gnss device
   int differentiator_points = 5;  ///< of the reference: 5, 7, 9 or 11

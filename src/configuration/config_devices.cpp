@@ -398,7 +398,7 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
   read_noise(in.table("noise"), device.rate_hz, device.noise);
   read_prior(in.table("prior"), device.prior);
   if (device.role == DeviceRole::kStudy) {
-    in.integer("average_samples", device.average_samples, 1, kMaxAveraged);
+    in.integer("average_samples", device.average_samples, 0, kMaxAveraged);
     device.data_sheet = default_data_sheet(device.protocol);
     read_data_sheet(in.table("data_sheet"), device.data_sheet);
   }

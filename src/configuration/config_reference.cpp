@@ -89,24 +89,23 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "What the run is called in its files. Without it: the name of the configuration's file, which is "
      "`reference` on this page."},
     {"estimator.states",
-     "`full`: boresight, lever arm, biases, time offset and scales of every S-IMU. `paper`: the six states "
-     "of the "
-     "published method, for comparison."},
+     "`full`: boresight, lever arm, biases, time offset and scales of every S-IMU, and what data sheets "
+     "allow it besides: crooked axes, accelerometers that are turned, late and apart, gyros that feel "
+     "forces. `rigid`: without these, for sensors that are known to have none; sd are too small where they "
+     "have. `paper`: the six states of the published method, for comparison."},
     {"estimator.mounting",
      "What `process` publishes of a mounting. `batch`: an estimate of the whole drive in which nobody knows "
-     "the true motion; it learns the noise, so that it needs neither `[device.noise]` nor `average_samples`, "
-     "and its sd hold what crooked axes and the reference's own errors leave open. `filter`: the filter's "
-     "end "
-     "value, which is sharper where a sensor is exactly as the filter takes it to be, and too sure of itself "
-     "where it is not; with `states = \"paper\"` the default."},
+     "the true motion; it learns the noise, so that it needs no `[device.noise]`, and its sd hold what "
+     "crooked "
+     "axes and the reference's own errors leave open. `filter`: the filter's end value, which is as good as "
+     "the configured noise; with `states = \"paper\"` the default."},
     {"estimator.navigation",
      "Navigation of the R-IMU with GNSS. Without it (or without a receiver) the mounting is calibrated all "
      "the "
      "same, from the two IMUs alone."},
     {"estimator.differentiator_points",
-     "Samples of the reference from which its angular acceleration is found: 5, 7, 9 or 11. More suit a "
-     "noisy "
-     "reference on a smooth vehicle."},
+     "Samples of the reference from which its angular acceleration is found: 5, 7, 9 or 11. What an update "
+     "averages decides more, so that this may stay as it is."},
     {"noise.model",
      "Noise model that is fitted to every axis and regime: a sum of WN, QN, RW, DR, GM, such as `WN+2*GM`."},
     {"noise.refit_interval_s", "Live: from one refit to the next, seconds."},
@@ -210,9 +209,9 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.sync_in.offset_33_9ns",
      "xsens_mt: from the pulse to the action, in the device's ticks of 33.9 ns."},
     {"device.average_samples",
-     "study: samples that go into one update. Above 1 where the reference is itself a MEMS: its noise would "
-     "pull the "
-     "boresight."},
+     "study: samples from one update of the filter to the next; an update takes a weighted mean over twice "
+     "as many. 0: chosen by the filter from the reference's noise and the motion, which is what fits; "
+     "results do not hang on it."},
     {"device.noise.gyro_white_sd_degps", "IMUs: white noise of a sample's angular rate, 1 sigma."},
     {"device.noise.gyro_white_deg_per_sqrt_h",
      "IMUs: the same as a density (angular random walk); give one of the two."},

@@ -54,12 +54,24 @@ void set_bias(const std::optional<double>& sd, const std::optional<double>& tau_
   }
 }
 
-StudyConfig study_config(const DeviceConfig& device, std::size_t index, bool paper_states) {
+std::uint32_t blocks_of(FilterStates states) {
+  switch (states) {
+    case FilterStates::kRigid:
+      return kFullStudyBlocks;
+    case FilterStates::kPaper:
+      return kPaperStudyBlocks;
+    case FilterStates::kFull:
+      break;
+  }
+  return kCompleteStudyBlocks;
+}
+
+StudyConfig study_config(const DeviceConfig& device, std::size_t index, FilterStates states) {
   StudyConfig study;
   study.device = static_cast<DeviceIndex>(index);
   study.rate_hz = device.rate_hz;
   study.average_samples = device.average_samples;
-  if (paper_states) study.blocks = kPaperStudyBlocks;
+  study.blocks = blocks_of(states);
   const auto& noise = device.noise;
   set_triad(noise.gyro_white_sd_radps, noise.gyro_white_sd_static_radps, study.noise.gyro);
   set_triad(noise.accel_white_sd_mps2, noise.accel_white_sd_static_mps2, study.noise.accel);
@@ -130,7 +142,7 @@ EstimatorConfig estimator_config(const Configuration& configuration) {
   config.reference = reference_config(configuration);
   for (const auto index : configuration.study_indices()) {
     config.studies.push_back(
-        study_config(configuration.devices[index], index, configuration.estimator.paper_states));
+        study_config(configuration.devices[index], index, configuration.estimator.states));
   }
   if (const auto index = configuration.gnss_index()) {
     config.gnss = gnss_config(configuration.devices[*index], *index);

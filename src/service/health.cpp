@@ -126,9 +126,9 @@ study_status_t study_status(const std::string& name, const StudyOutput& study) {
   status.name = name;
   status.state = words_of(study.status);
   status.regime = regime_name(study.regime);
-  status.goal_psi_deg = kGoalBoresightSd_rad * kDegPerRad;
-  status.goal_r_m = kGoalLeverArmSd_m;
-  status.goal_t_d_ms = kGoalTimeOffsetSd_s * kMsPerS;
+  status.goal_psi_deg = study.goal.boresight_sd_rad * kDegPerRad;
+  status.goal_r_m = study.goal.lever_arm_sd_m;
+  status.goal_t_d_ms = study.goal.time_offset_sd_s * kMsPerS;
   status.samples = as_count(study.counters.samples);
   status.used = as_count(study.counters.used);
   status.late = as_count(study.counters.late);

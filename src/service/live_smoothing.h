@@ -22,7 +22,7 @@ namespace imuscope {
 /// One epoch of the history on its way out of the core.
 struct HistoryRecord {
   /// Enough for a filter with every state of six S-IMUs, and a few more.
-  static constexpr std::size_t kDoubles = 11'000;
+  static constexpr std::size_t kDoubles = 42'500;
   std::size_t size = 0;
   bool continues = true;  ///< false: the epoch before was refused by a full ring
   std::array<double, kDoubles> values;

@@ -107,7 +107,7 @@ std::string value_text(const StateObservability& state) {
 
 }  // namespace
 
-Observability observability_of(const StudyOutput& study, double goal_factor) {
+Observability observability_of(const StudyOutput& study) {
   Observability out;
   for (std::size_t i = 0; i < kObservedStates; ++i) {
     StateObservability& state = out.states[i];
@@ -116,17 +116,17 @@ Observability observability_of(const StudyOutput& study, double goal_factor) {
     if (i < 3) {
       state.unit = "deg";
       state.sd = study.sd_psi_rad[i] * kDegPerRad;
-      state.goal = goal_factor * kGoalBoresightSd_rad * kDegPerRad;
+      state.goal = study.goal.boresight_sd_rad * kDegPerRad;
       state.observable = study.observable[i];
     } else if (i < kTimeOffsetState) {
       state.unit = "m";
       state.sd = study.sd_r_bs_b_m[i - 3];
-      state.goal = goal_factor * kGoalLeverArmSd_m;
+      state.goal = study.goal.lever_arm_sd_m;
       state.observable = study.observable[i];
     } else {
       state.unit = "s";
       state.sd = study.sd_t_d_s;
-      state.goal = goal_factor * kGoalTimeOffsetSd_s;
+      state.goal = study.goal.time_offset_sd_s;
       state.observable = study.t_d_observable;
     }
   }

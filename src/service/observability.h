@@ -39,8 +39,7 @@ struct Observability {
 };
 
 /// Precondition: the S-IMU has an estimate (base/calibration_levels.h).
-/// @param goal_factor  kUsableFactor for the estimate of a whole drive, of which no more is to come
-Observability observability_of(const StudyOutput& study, double goal_factor = 1.0);
+Observability observability_of(const StudyOutput& study);
 
 /// calibration.json's "observability".
 nlohmann::json observability_json(const Observability& observability);

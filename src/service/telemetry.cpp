@@ -148,9 +148,9 @@ void set_observability(const StudyOutput& study, calibration_t& m) {
     *shown[i] = static_cast<std::int8_t>(observable);
     if (!observable) *values[i] = kUnknown;
   }
-  m.goal_sd_psi_deg = kGoalBoresightSd_rad * kDegPerRad;
-  m.goal_sd_r_m = kGoalLeverArmSd_m;
-  m.goal_sd_t_d_ms = kGoalTimeOffsetSd_s * kMsPerS;
+  m.goal_sd_psi_deg = study.goal.boresight_sd_rad * kDegPerRad;
+  m.goal_sd_r_m = study.goal.lever_arm_sd_m;
+  m.goal_sd_t_d_ms = study.goal.time_offset_sd_s * kMsPerS;
   m.weakest_direction = observability.weakest;
   m.weakest_relative_sd = observability.weakest_relative_sd;
   m.advice = observability.advice;

@@ -246,8 +246,12 @@ void take_over(const batch::BatchMounting& mounting, StudyOutput& study) {
   study.sd_gyro_scale = sd_of(mounting, batch::kGyroShape);
   study.accel_scale = vector_of(sensor.x.segment<3>(batch::kAccelShape));
   study.sd_accel_scale = sd_of(mounting, batch::kAccelShape);
-  study.accel_boresight_rad = vector_of(sensor.x.segment<3>(batch::kAlpha));
-  study.sd_accel_boresight_rad = sd_of(mounting, batch::kAlpha);
+  // In b, as the boresight.
+  const Eigen::Matrix3d C_s_b = sensor.C_b_s.transpose();
+  const Eigen::Matrix3d alpha =
+      C_s_b * mounting.covariance.block<3, 3>(batch::kAlpha, batch::kAlpha) * C_s_b.transpose();
+  study.accel_boresight_rad = vector_of(C_s_b * sensor.x.segment<3>(batch::kAlpha));
+  study.sd_accel_boresight_rad = vector_of(alpha.diagonal().cwiseSqrt());
   study.accel_t_d_s = sensor.x[batch::kAccelDelay];
   study.sd_accel_t_d_s = mounting.sd(batch::kAccelDelay);
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(study.covariance_psi_r.data()) =
@@ -258,6 +262,7 @@ void take_over(const batch::BatchMounting& mounting, StudyOutput& study) {
   for (std::size_t i = 0; i < 3; ++i) study.observable[3 + i] = study.sd_r_bs_b_m[i] < shown_m;
   study.t_d_observable = true;
   set_weakest(mounting, study);
+  study.goal = kUsableGoal;  // of a drive that is over no more is to come
   const bool usable = is_usable(*std::ranges::max_element(study.sd_psi_rad),
                                 *std::ranges::max_element(study.sd_r_bs_b_m), study.sd_t_d_s);
   study.status = usable ? CalibrationStatus::kCalibrated : CalibrationStatus::kConverging;
@@ -290,7 +295,7 @@ MountingEstimate estimate_of(const batch::BatchMounting& mounting) {
 }
 
 nlohmann::json batch_observability_json(const StudyOutput& study, const batch::BatchMounting& mounting) {
-  auto json = observability_json(observability_of(study, kUsableFactor));
+  auto json = observability_json(observability_of(study));
   const auto& limits = mounting.limits;
   const Eigen::Matrix<double, 6, 1> drive = limits.drive();
   json["limited_by"] = fmt::format("{}; {}",

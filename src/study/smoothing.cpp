@@ -42,6 +42,8 @@ EstimatorConfig relinearised(EstimatorConfig config, const std::vector<StudyOutp
     const StudyOutput& at_start = former[i].empty() ? finals[i] : former[i].front().estimate;
     if (!has_estimate(at_start.status)) continue;
     StudyConfig& study = config.studies[i];
+    // Linearised about the answer, what crooked axes add is below the noise of what is smoothed.
+    study.blocks &= ~kSensorStudyBlocks;
     study.prior_C_b_s = at_start.C_b_s;
     study.prior_r_bs_b_m = at_start.r_bs_b_m;
     study.prior_t_d_s = at_start.t_d_s;

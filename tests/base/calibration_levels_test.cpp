@@ -6,8 +6,9 @@
 namespace imuscope {
 namespace {
 
-constexpr std::array kGoalBoresight{kGoalBoresightSd_rad, kGoalBoresightSd_rad, kGoalBoresightSd_rad};
-constexpr std::array kGoalLeverArm{kGoalLeverArmSd_m, kGoalLeverArmSd_m, kGoalLeverArmSd_m};
+constexpr MountingGoal kGoal{1e-3, 2e-3, 1e-4};
+constexpr std::array kGoalBoresight{1e-3, 1e-3, 1e-3};
+constexpr std::array kGoalLeverArm{2e-3, 2e-3, 2e-3};
 constexpr double kJustAbove = 1.0 + 1e-12;
 
 TEST(CalibrationLevels, AnEstimateIsThereFromConvergingOnByEnumKeyAndWords) {
@@ -24,17 +25,33 @@ TEST(CalibrationLevels, AnEstimateIsThereFromConvergingOnByEnumKeyAndWords) {
 }
 
 TEST(CalibrationLevels, EveryAxisHasToMeetTheGoal) {
-  EXPECT_TRUE(meets_goal(kGoalBoresight, kGoalLeverArm));
+  EXPECT_TRUE(meets_goal(kGoalBoresight, kGoalLeverArm, kGoal));
   for (std::size_t i = 0; i < 3; ++i) {
     auto boresight = kGoalBoresight;
     boresight[i] *= kJustAbove;
-    EXPECT_FALSE(meets_goal(boresight, kGoalLeverArm)) << i;
+    EXPECT_FALSE(meets_goal(boresight, kGoalLeverArm, kGoal)) << i;
     auto lever_arm = kGoalLeverArm;
     lever_arm[i] *= kJustAbove;
-    EXPECT_FALSE(meets_goal(kGoalBoresight, lever_arm)) << i;
+    EXPECT_FALSE(meets_goal(kGoalBoresight, lever_arm, kGoal)) << i;
     lever_arm[i] = std::numeric_limits<double>::quiet_NaN();
-    EXPECT_FALSE(meets_goal(kGoalBoresight, lever_arm)) << i;
+    EXPECT_FALSE(meets_goal(kGoalBoresight, lever_arm, kGoal)) << i;
   }
+}
+
+TEST(CalibrationLevels, GoalsFollowFromTheSensorsNoiseAndFromItsAxes) {
+  constexpr double kDeg = kPi / 180.0;
+  // A quarter of what 0.04 deg/s per sqrt(Hz) leaves in a mean of 4 s is 0.005 deg/s: of 0.1 rad/s and
+  // rad/s^2.
+  SensorQuality mems{0.04 * kDeg, 2e-3, 0.0, 0.0};
+  EXPECT_NEAR(goal_of(mems).boresight_sd_rad, 0.05 * kDeg, 1e-12);
+  EXPECT_NEAR(goal_of(mems).lever_arm_sd_m, 0.25e-3 / 0.2, 1e-12);
+  EXPECT_NEAR(goal_of(mems).time_offset_sd_s, 0.05 * kDeg, 1e-12);
+  mems.axes_sd_rad = 0.07 * kDeg;
+  mems.places_sd_m = 5e-3;
+  EXPECT_NEAR(goal_of(mems).boresight_sd_rad, 0.07 * kDeg, 1e-12) << "no better than its axes are straight";
+  EXPECT_NEAR(goal_of(mems).lever_arm_sd_m, 5e-3, 1e-12);
+  EXPECT_EQ(goal_of(SensorQuality{}), kFinestGoal);
+  EXPECT_EQ(goal_of({1.0, 1.0, 1.0, 1.0}), kUsableGoal) << "never worse than what is usable";
 }
 
 TEST(CalibrationLevels, UsableIsATenthOfADegreeACentimetreAndAMillisecond) {

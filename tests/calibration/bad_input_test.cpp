@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <random>
 #include <set>
 #include <utility>
 #include <vector>
@@ -596,6 +597,58 @@ TEST(GnssTrust, FloatsThatFollowEachOtherQuicklySayLittleThatIsNew) {
   // 60 s hold as much as one independent value each 30 s on either side.
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 0.6), 10.0);
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kFloat, 1000.0), 1.0);
+  // Code solutions stay wrong by the same amount for longer.
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kDifferential, 1.2), 10.0);
+  EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kSingle, 2.4), 10.0);
+}
+
+/// A MEMS unit as the reference, of which nobody told the filter: a navigation-grade one would have a
+/// thousandth of its noise.
+TEST(BadInput, AReferenceThatIsNoisierThanConfiguredCostsNoMountingAndIsTold) {
+  SimulatedDrive drive(400.0, {tilted()}, 47);
+  Estimator estimator(drive.config());
+  std::mt19937_64 random(48);
+  std::normal_distribution<double> normal;
+  constexpr double kGyroNoise_radps = 0.03;
+  constexpr double kAccelNoise_mps2 = 0.1;
+  const Told told = told_by(drive, estimator, [&](Sample& sample, double /*t_s*/) {
+    if (sample.device != SimulatedDrive::kReference || sample.kind != SampleKind::kImu) return true;
+    for (double& w : sample.imu.omega_radps) w += kGyroNoise_radps * normal(random);
+    for (double& f : sample.imu.f_mps2) f += kAccelNoise_mps2 * normal(random);
+    return true;
+  });
+  const StudyOutput& out = estimator.study(0);
+  EXPECT_EQ(out.counters.resets, 0U);
+  EXPECT_TRUE(told.has<event::NoiseTooSmall>());
+  EXPECT_EQ(out.status, CalibrationStatus::kConverging) << "never calibrated on a noise that does not fit";
+  for (const bool observable : out.observable) EXPECT_FALSE(observable);
+  EXPECT_LT(test::mounting_error_rad(out, tilted().C_b_s).norm(), 0.5 * kRadPerDeg);
+  EXPECT_NEAR(out.t_d_s, tilted().t_d_s, 2e-3);
+}
+
+/// A reference as noisy as the S-IMU, and the filter is told: it finds the mounting, and says that the lever
+/// arm cannot be had.
+TEST(BadInput, OfALeverArmThatTheReferencesNoiseTakesPartOfNothingIsCalledObservable) {
+  SimulatedDrive drive(400.0, {tilted()}, 47);
+  EstimatorConfig config = drive.config();
+  constexpr double kGyroNoise_radps = 0.014;
+  config.reference.gyro_white_radps_per_sqrt_hz = kGyroNoise_radps / std::sqrt(config.reference.rate_hz);
+  Estimator estimator(config);
+  std::mt19937_64 random(48);
+  std::normal_distribution<double> normal;
+  const Told told = told_by(drive, estimator, [&](Sample& sample, double /*t_s*/) {
+    if (sample.device != SimulatedDrive::kReference || sample.kind != SampleKind::kImu) return true;
+    for (double& w : sample.imu.omega_radps) w += kGyroNoise_radps * normal(random);
+    return true;
+  });
+  const StudyOutput& out = estimator.study(0);
+  EXPECT_FALSE(told.has<event::NoiseTooSmall>());
+  EXPECT_LT(worst_in_sd(out, tilted()), 4.0);
+  EXPECT_NE(out.status, CalibrationStatus::kCalibrated);
+  // Known far better than before the drive, and yet: the share of noise is known to a tenth only.
+  EXPECT_LT(out.sd_r_bs_b_m[0], 0.5 * config.studies[0].prior_r_bs_b_sd_m[0]);
+  EXPECT_FALSE(out.observable[3]);
+  EXPECT_TRUE(out.observable[0]);
 }
 
 TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {

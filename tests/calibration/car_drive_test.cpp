@@ -92,10 +92,10 @@ std::vector<Sample> load_drive(const std::string& name) {
 EstimatorConfig car_config() {
   EstimatorConfig config;
   config.reference.device = kReference;
-  // The two gyros differ by 0.03 to 0.05 deg/s below 5 Hz, as stated with the recordings: means of 12 samples
-  // by 7e-4 rad/s at least. The accelerometers feel the engine, each in its own way.
-  config.reference.gyro_white_radps_per_sqrt_hz = 5e-4;
-  config.reference.accel_white_mps2_per_sqrt_hz = 0.03;
+  // A standing car's samples scatter by 0.65 deg/s and 0.13 m/s^2 on its running engine; means of a tenth of
+  // a second keep as much of it as of white noise of 0.2 deg/s and 0.05 m/s^2 a sample.
+  config.reference.gyro_white_radps_per_sqrt_hz = 0.2 * kRadPerDeg / 10.0;
+  config.reference.accel_white_mps2_per_sqrt_hz = 0.05 / 10.0;
   config.reference.gyro_bias = {0.05 * kRadPerDeg, 1000.0};
   config.reference.accel_bias = {0.02, 1000.0};
   config.gnss.enabled = true;
@@ -104,15 +104,13 @@ EstimatorConfig car_config() {
   StudyConfig study;
   study.device = kStudy;
   study.rate_hz = 120.0;
-  // A MEMS reference and a running engine: 0.1 s of samples in one update keep their noise out of H.
-  study.average_samples = 12;
   for (TriadNoise& gyro : study.noise.gyro) {
     gyro = TriadNoise{};
-    gyro.white_sd.fill(0.006);
+    gyro.white_sd.fill(0.2 * kRadPerDeg);
   }
   for (TriadNoise& accel : study.noise.accel) {
     accel = TriadNoise{};
-    accel.white_sd.fill(0.3);
+    accel.white_sd.fill(0.05);
   }
   study.noise.gyro_bias.fill({0.05 * kRadPerDeg, 300.0});
   study.noise.accel_bias.fill({0.02, 300.0});

@@ -439,7 +439,7 @@ TEST(Estimator, BadSamplesAreCountedAndLeaveTheStateAlone) {
   const StudyCounters& counters = estimator.study(0).counters;
   EXPECT_EQ(counters.not_finite, 1U);
   EXPECT_EQ(counters.not_increasing, 1U);
-  EXPECT_EQ(counters.gated_gyro[2], 1U);
+  EXPECT_EQ(counters.gated_gyro[2], 2U) << "the two windows that share the sample";
   EXPECT_EQ(counters.clipped_accel[1], 1U);
   EXPECT_EQ(estimator.counters().reference_not_finite, 1U);
   EXPECT_EQ(estimator.counters().reference_not_increasing, 1U);

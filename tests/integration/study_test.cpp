@@ -117,14 +117,14 @@ Rest true_rest_of(const std::filesystem::path& recording) {
   return rest;
 }
 
-/// The mounting of the filter, which takes each sensor to have straight axes.
-void take_the_mounting_of_the_filter(const std::filesystem::path& recording) {
+/// The mounting of a filter that takes each sensor to have straight axes.
+void take_the_mounting_of_the_rigid_filter(const std::filesystem::path& recording) {
   const auto file = recording / "config.toml";
   std::string text = read_text(file);
-  const std::string section = "[estimator]\n";
-  const auto at = text.find(section);
+  const std::string states = "states = \"full\"\n";
+  const auto at = text.find(states);
   ASSERT_NE(at, std::string::npos) << text;
-  std::ofstream(file) << text.insert(at + section.size(), "mounting = \"filter\"\n");
+  std::ofstream(file) << text.replace(at, states.size(), "states = \"rigid\"\nmounting = \"filter\"\n");
 }
 
 /// Keeps the first half of a device's bytes and of its reads.
@@ -160,9 +160,9 @@ TEST(StudyOfADrive, TheErrorProcessIsTheTrueErrorToAHundredthOfTheNoise) {
   const auto scratch = scratch_folder();
   const auto folder = scratch / "drive";
   record(folder, "6");
-  // These sensors' axes are straight, which the batch does not take for granted: what it leaves open of them
+  // These sensors' axes are straight, which is not taken for granted: what that leaves open of them
   // is in its sd, and not what is looked at here.
-  take_the_mounting_of_the_filter(folder);
+  take_the_mounting_of_the_rigid_filter(folder);
   const auto out = scratch / "run";
   ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
   const auto truth = read_json(folder / "truth.json");

@@ -191,9 +191,9 @@ TEST(CalibrationStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDir
   EXPECT_DOUBLE_EQ(status.sd_psi_deg, 0.3 * kDegPerRad);
   EXPECT_DOUBLE_EQ(status.sd_r_m, 0.6);
   EXPECT_DOUBLE_EQ(status.sd_t_d_ms, 700.0);
-  EXPECT_DOUBLE_EQ(status.goal_psi_deg, kGoalBoresightSd_rad * kDegPerRad);
-  EXPECT_DOUBLE_EQ(status.goal_r_m, kGoalLeverArmSd_m);
-  EXPECT_DOUBLE_EQ(status.goal_t_d_ms, kGoalTimeOffsetSd_s * 1e3);
+  EXPECT_DOUBLE_EQ(status.goal_psi_deg, kFinestGoal.boresight_sd_rad * kDegPerRad);
+  EXPECT_DOUBLE_EQ(status.goal_r_m, kFinestGoal.lever_arm_sd_m);
+  EXPECT_DOUBLE_EQ(status.goal_t_d_ms, kFinestGoal.time_offset_sd_s * 1e3);
   EXPECT_EQ(status.weakest, "boresight about down");
   EXPECT_DOUBLE_EQ(status.weakest_relative, 0.9);
   EXPECT_THAT(status.manoeuvre, HasSubstr("brake"));
@@ -201,9 +201,9 @@ TEST(CalibrationStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDir
   EXPECT_EQ(status.manoeuvre, observability_of(study).advice) << "said in one way everywhere";
   study.status = CalibrationStatus::kCalibrated;
   study.observable.fill(true);
-  study.sd_psi_rad.fill(0.5 * kGoalBoresightSd_rad);
-  study.sd_r_bs_b_m.fill(0.5 * kGoalLeverArmSd_m);
-  study.sd_t_d_s = 0.5 * kGoalTimeOffsetSd_s;
+  study.sd_psi_rad.fill(0.5 * kFinestGoal.boresight_sd_rad);
+  study.sd_r_bs_b_m.fill(0.5 * kFinestGoal.lever_arm_sd_m);
+  study.sd_t_d_s = 0.5 * kFinestGoal.time_offset_sd_s;
   EXPECT_EQ(study_status("mtx1", study).manoeuvre, "") << "nothing is missing any more";
   study.status = CalibrationStatus::kCoarse;
   const auto coarse = study_status("mtx1", study);

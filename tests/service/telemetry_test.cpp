@@ -270,9 +270,9 @@ TEST(Telemetry, AStateThatIsNotObservableYetHasNoNumberButItsSd) {
               ElementsAre(1, 1, 0, 1, 1, 1, 0));
   EXPECT_DOUBLE_EQ(m.psi_x_deg, 1 * kDegreesPerRadian);
   EXPECT_DOUBLE_EQ(m.sd_psi_z_deg, 103 * kDegreesPerRadian);
-  EXPECT_DOUBLE_EQ(m.goal_sd_psi_deg, kGoalBoresightSd_rad * kDegreesPerRadian);
-  EXPECT_DOUBLE_EQ(m.goal_sd_r_m, kGoalLeverArmSd_m);
-  EXPECT_DOUBLE_EQ(m.goal_sd_t_d_ms, kGoalTimeOffsetSd_s * 1e3);
+  EXPECT_DOUBLE_EQ(m.goal_sd_psi_deg, kFinestGoal.boresight_sd_rad * kDegreesPerRadian);
+  EXPECT_DOUBLE_EQ(m.goal_sd_r_m, kFinestGoal.lever_arm_sd_m);
+  EXPECT_DOUBLE_EQ(m.goal_sd_t_d_ms, kFinestGoal.time_offset_sd_s * 1e3);
   EXPECT_EQ(m.weakest_direction, "boresight about down");
   EXPECT_DOUBLE_EQ(m.weakest_relative_sd, 0.25);
   EXPECT_THAT(m.advice, testing::HasSubstr("quickly"));

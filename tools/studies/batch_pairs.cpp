@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "alignment/accelerometer_places.h"
 #include "navigation/so3.h"
 
 namespace batch_pairs {
@@ -62,17 +63,16 @@ TrueSensor true_sensor(const study_drive::Draw& draw, std::size_t study) {
   const Matrix3d gyro = imusim::triad_matrix(errors.gyro) * study_drive::mounting_of(study);
   const Matrix3d accel = imusim::triad_matrix(errors.accel) * study_drive::mounting_of(study);
   TrueSensor truth;
-  truth.C_b_s = imusim::triad_frame(gyro);
+  truth.C_b_s = known.C_b_s;
   truth.x.segment<3>(batch::kLeverArm) = study_drive::lever_arm_of(study);
   truth.x[batch::kTimeOffset] = known.t_d_s;
   truth.x.segment<6>(batch::kGyroShape) = shape_of(gyro);
-  truth.x.segment<3>(batch::kAlpha) =
-      -imuscope::log_so3(imusim::triad_frame(accel) * truth.C_b_s.transpose());
+  truth.x.segment<3>(batch::kAlpha) = -imuscope::log_so3(known.C_s_accel);
   truth.x.segment<6>(batch::kAccelShape) = shape_of(accel);
   truth.x[batch::kAccelDelay] = known.accel_t_d_s;
   for (Eigen::Index j = 0; j < 6; ++j)
     for (Eigen::Index axis = 0; axis < 3; ++axis)
-      truth.x[batch::kPlaces + j] += batch::place_basis(axis, j).dot(errors.accel_places_s_m.col(axis));
+      truth.x[batch::kPlaces + j] += imuscope::place_basis(axis, j).dot(errors.accel_places_s_m.col(axis));
   for (Eigen::Index j = 0; j < 9; ++j)
     truth.x[batch::kGSensitivity + j] = errors.gyro.g_sensitivity(j / 3, j % 3);
   return truth;

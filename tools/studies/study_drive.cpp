@@ -117,12 +117,14 @@ study_score::StudyTruth truth_of(const Draw& draw, std::size_t study) {
   const imusim::ImuErrors& errors = draw.studies[study];
   const double gyro_delay_s = imusim::slow_delay_s(errors.gyro);
   study_score::StudyTruth truth;
-  truth.C_b_s = mounting_of(study);
+  // A crooked triad's frame is that of its axes, as it is published.
+  const Matrix3d accel_frame = imusim::triad_frame(imusim::triad_matrix(errors.accel) * mounting_of(study));
+  truth.C_b_s = imusim::triad_frame(imusim::triad_matrix(errors.gyro) * mounting_of(study));
   truth.r_bs_b_m = lever_arm_of(study);
   truth.t_d_s = kTimeOffset_s - gyro_delay_s;
   truth.gyro_scale = errors.gyro.scale;
   truth.accel_scale = errors.accel.scale;
-  truth.C_s_accel = errors.accel.C_s_triad;
+  truth.C_s_accel = accel_frame * truth.C_b_s.transpose();
   truth.accel_t_d_s = gyro_delay_s - imusim::slow_delay_s(errors.accel);
   return truth;
 }

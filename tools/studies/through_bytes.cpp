@@ -185,6 +185,10 @@ imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& t
   if (!opened) return tl::unexpected<imuscope::Error>(opened.error());
   Last sink(*known);
   imuscope::EstimatorConfig estimator = imuscope::estimator_config(opened->configuration);
+  // What can be reached where axes are straight and known to be.
+  if (options.world == "ideal") {
+    for (imuscope::StudyConfig& study : estimator.studies) study.blocks = imuscope::kFullStudyBlocks;
+  }
   tell_noise_of(options.reference_class, estimator.reference);
   const auto replayed = imuscope::replay(opened->configuration, estimator, opened->recording, sink);
   if (!replayed) return tl::unexpected<imuscope::Error>(replayed.error());
