@@ -341,9 +341,10 @@ class RunFolderMessages final : public RecordedMessages {
     calibration_t fixed{};
     fixed.name = name;
     fixed.validity = kNoValidity;
-    fixed.goal_sd_psi_deg = kGoalBoresightSd_rad / kRadPerDeg;
-    fixed.goal_sd_r_m = kGoalLeverArmSd_m;
-    fixed.goal_sd_t_d_ms = kGoalTimeOffsetSd_s * 1e3;
+    // The tables do not say the sensor's own goal; of a drive that is over one asks whether it is usable.
+    fixed.goal_sd_psi_deg = kUsableGoal.boresight_sd_rad / kRadPerDeg;
+    fixed.goal_sd_r_m = kUsableGoal.lever_arm_sd_m;
+    fixed.goal_sd_t_d_ms = kUsableGoal.time_offset_sd_s * 1e3;
     fixed.weakest_relative_sd = kUnknown;
     fixed.psi_x_observable = fixed.psi_y_observable = fixed.psi_z_observable = 1;
     fixed.r_x_observable = fixed.r_y_observable = fixed.r_z_observable = fixed.t_d_observable = 1;
