@@ -102,15 +102,12 @@ Html agreement_chart(const std::vector<AgreementSeries>& series, const std::stri
   Html legend;
   for (std::size_t i = 0; i < series.size(); ++i) {
     svg += drawn(scale, series[i], i % kColours);
-    legend += Html::markup(fmt::format("<span class=\"key series-{}\">", i % kColours)) +
-              text(series[i].name) + Html::markup("</span> ");
+    legend += element("span", text(series[i].name), fmt::format("key series-{}", i % kColours)) + text(" ");
   }
   svg += fmt::format("<text class=\"quiet\" text-anchor=\"end\" x=\"{}\" y=\"{}\">{}</text>",
                      kWidth_px - kRight_px, kHeight_px - 6.0, text(x_words).str());
   return element("div", legend, "keys") +
-         Html::markup(fmt::format("<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\" "
-                                  "aria-label=\"measured error over predicted\">{}</svg>",
-                                  kWidth_px, kHeight_px, svg));
+         inline_svg("chart", kWidth_px, kHeight_px, "measured error over predicted", svg);
 }
 
 }  // namespace imuscope::report

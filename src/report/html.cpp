@@ -54,6 +54,17 @@ Html heading(std::string_view id, std::string_view words) {
   return Html::markup(fmt::format("<h2 id=\"{}\">{}</h2>", id, text(words).str()));
 }
 
+Html link_to_heading(std::string_view id, std::string_view words) {
+  return Html::markup(fmt::format("<a href=\"#{}\">{}</a>", id, text(words).str()));
+}
+
+Html inline_svg(std::string_view css_class, double width, double height, std::string_view words,
+                const std::string& inner) {
+  return Html::markup(
+      fmt::format("<svg class=\"{}\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{}</svg>",
+                  css_class, width, height, text(words).str(), inner));
+}
+
 Html fold(std::string_view summary, const Html& content, bool open) {
   if (content.empty()) return {};
   return Html::markup(fmt::format("<details class=\"fold\"{}><summary>{}</summary>{}</details>",

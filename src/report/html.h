@@ -43,6 +43,15 @@ Html list_of(const std::vector<std::string>& sentences, std::string_view css_cla
 /// The heading of a section; the page's contents lead to `id`, which is written in this program.
 Html heading(std::string_view id, std::string_view words);
 
+/// A link to the heading `id` of the same page.
+Html link_to_heading(std::string_view id, std::string_view words);
+
+/// A drawing of this program in the page itself, in the page's colours.
+/// @param words  what it shows, for those who do not see it
+/// @param inner  its elements, written in this program; what was read from a file is in them by text() alone
+Html inline_svg(std::string_view css_class, double width, double height, std::string_view words,
+                const std::string& inner);
+
 /// What a reader opens who wants all of it; `summary` says what is inside. On paper it stands in the
 /// appendix. Nothing where `content` is empty.
 /// @param open  from the beginning, where it differs from what is normal; it then stays in its place on paper

@@ -173,7 +173,7 @@ void keep_arrows_free(Names& names, const View& view, const DrawnImu& imu, Point
   }
 }
 
-std::string drawn(const View& view, const std::vector<DrawnImu>& imus, double metres_a_pixel) {
+Html drawn(const View& view, const std::vector<DrawnImu>& imus, double metres_a_pixel) {
   const Point middle{0.5 * kSide_px, 0.5 * kSide_px};
   constexpr double kHalf = 0.5 * kReference_px;
   const auto place_of = [&](const DrawnImu& imu) {
@@ -195,9 +195,8 @@ std::string drawn(const View& view, const std::vector<DrawnImu>& imus, double me
     svg += fmt::format("<circle class=\"imu\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\"/>", at.x, at.y);
     svg += names.place(at, imu.name);
   }
-  return fmt::format(
-      "<svg class=\"drawing\" viewBox=\"0 0 {0} {0}\" role=\"img\" aria-label=\"mounting {1}\">{2}</svg>",
-      kSide_px, view.words, svg + compass_of(view) + scale_bar(metres_a_pixel));
+  return inline_svg("drawing", kSide_px, kSide_px, std::string("mounting ") + view.words,
+                    svg + compass_of(view) + scale_bar(metres_a_pixel));
 }
 
 }  // namespace
@@ -207,8 +206,7 @@ Html mounting_drawing(const std::vector<DrawnImu>& imus) {
   const double metres_a_pixel = metres_per_pixel(imus);
   Html views;
   for (const View& view : kViews) {
-    views += element(
-        "figure", Html::markup(drawn(view, imus, metres_a_pixel)) + element("figcaption", text(view.words)));
+    views += element("figure", drawn(view, imus, metres_a_pixel) + element("figcaption", text(view.words)));
   }
   return element("div", views, "views");
 }

@@ -53,7 +53,7 @@ Html contents_of(const Html& body) {
   Html links;
   for (const auto& [id, words] : kContents) {
     if (body.str().find(fmt::format("<h2 id=\"{}\"", id)) == std::string::npos) continue;
-    links += Html::markup(fmt::format("<a href=\"#{}\">{}</a>", id, words));
+    links += link_to_heading(id, words);
   }
   return Html::markup("<nav class=\"contents\" aria-label=\"contents\">") + links + Html::markup("</nav>");
 }

@@ -18,9 +18,8 @@ using nlohmann::json;
 
 /// A question, its answer, and behind a click why.
 Html tile(const std::string& question, const Verdict& verdict) {
-  Html why = verdict.reasons.empty() ? Html{} : fold("Why", list_of(verdict.reasons));
-  return element("div",
-                 element("h3", text(question)) + paragraph(verdict.headline, "headline") + std::move(why),
+  const Html why = verdict.reasons.empty() ? Html{} : fold("Why", list_of(verdict.reasons));
+  return element("div", element("h3", text(question)) + paragraph(verdict.headline, "headline") + why,
                  std::string("tile ") + css_class_of(verdict.answer));
 }
 

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -16,6 +17,7 @@
 namespace imuscope::top {
 namespace {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
@@ -65,6 +67,7 @@ TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndAlarms) {
                            "0.5730/0.0573",
                            "20.00/2",
                            "3.000/0.3",
+                           "usable with limits",
                            "weakest psi_z (50 % of its prior left); still missing: brake",
                            "fifo 80",
                            "13 us",
@@ -74,6 +77,19 @@ TEST(TopView, ShowsStateDevicesCalibrationModelsRingsAndAlarms) {
                            "   run ip route add"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
+}
+
+TEST(TopView, SaysWhatAMountingIsGoodForOnTheScaleOfConsoleAndReport) {
+  auto heard = example();
+  auto& study = heard.status->studies[0];
+  study.sd_psi_deg = 0.09;
+  study.sd_r_m = 0.009;
+  study.sd_t_d_ms = 0.9;
+  EXPECT_THAT(page(heard), AllOf(HasSubstr("usable"), Not(HasSubstr("usable with limits"))));
+  study.sd_psi_deg = 1.1;
+  EXPECT_THAT(page(heard), HasSubstr("not usable"));
+  study.sd_psi_deg = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(page(heard), Not(HasSubstr("usable")));
 }
 
 TEST(TopView, OdometryShowsSpeedStateAndScaleWhereThereIsAny) {

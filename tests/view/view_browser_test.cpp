@@ -265,7 +265,7 @@ class LivePage : public ViewPage {
       const auto sd_mdeg = numbers_in(field("calibration", name, "psi.sd"));
       ASSERT_EQ(rotation.size(), 3U) << name;
       ASSERT_EQ(sd_mdeg.size(), 2U) << name;
-      EXPECT_EQ(sd_mdeg[1], 10.0) << "the goal";
+      EXPECT_EQ(sd_mdeg[1], 100.0) << "the goal of a sensor whose axes lean by 0.1 deg";
       const Eigen::Vector3d shown_deg(rotation[0], rotation[1], rotation[2]);
       const Eigen::Matrix3d shown =
           Eigen::AngleAxisd(shown_deg.norm() * M_PI / 180.0, shown_deg.normalized()).toRotationMatrix();

@@ -114,7 +114,9 @@ Result<std::vector<Label>> read_labels(const std::string& file) {
 /// A report.html in a folder in which no run of ours ended is somebody else's.
 Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
   std::error_code error;
-  if (!std::filesystem::exists(out / "report.html", error)) return {};
+  // A link is replaced, and what it leads to stays as it is.
+  if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(out / "report.html", error)))
+    return {};
   const auto run = report::read_json_file(out / "run.json");
   if (run.is_object() && run.value("schema", "").starts_with("imuscope.run/")) return {};
   return usage_error(fmt::format("{} exists, and no run of imuscope made it", (out / "report.html").string()),

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/calibration_levels.h"
 #include "base/json_text.h"
 #include "base/text.h"
 #include "base/units.h"
@@ -94,15 +95,23 @@ void add_devices(const status_t& status, std::vector<std::string>& lines) {
   }
 }
 
+/// What the mounting is good for as it is known now, on the scale of console and report; nothing where it is
+/// not known.
+std::string usability_text(const study_status_t& study) {
+  if (!std::isfinite(study.sd_psi_deg) || !std::isfinite(study.sd_r_m)) return {};
+  return std::string(
+      words_of(usability_of(study.sd_psi_deg * kRadPerDeg, study.sd_r_m, study.sd_t_d_ms / kMsPerS)));
+}
+
 void add_studies(const Heard& heard, const status_t& status, std::vector<std::string>& lines) {
   lines.emplace_back();
   lines.push_back(fmt::format("{:<12}{:<26}{:>17}{:>16}{:>16}   {}", "CALIBRATION", "state", "boresight/deg",
                               "lever arm/mm", "t_d/ms", "(sd/goal)"));
   for (const auto& s : status.studies) {
-    lines.push_back(fmt::format("{:<12}{:<26}{:>17}{:>16}{:>16}   {}", s.name, s.state,
-                                against_goal(s.sd_psi_deg, s.goal_psi_deg, 1.0, 4),
-                                against_goal(s.sd_r_m, s.goal_r_m, kMmPerM, 2),
-                                against_goal(s.sd_t_d_ms, s.goal_t_d_ms, 1.0, 3), s.regime));
+    lines.push_back(fmt::format(
+        "{:<12}{:<26}{:>17}{:>16}{:>16}   {:<10}{}", s.name, s.state,
+        against_goal(s.sd_psi_deg, s.goal_psi_deg, 1.0, 4), against_goal(s.sd_r_m, s.goal_r_m, kMmPerM, 2),
+        against_goal(s.sd_t_d_ms, s.goal_t_d_ms, 1.0, 3), s.regime, usability_text(s)));
     const auto found = heard.calibrations.find(s.name);
     if (found != heard.calibrations.end()) {
       const auto& c = found->second;
