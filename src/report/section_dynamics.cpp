@@ -103,7 +103,7 @@ Html regression_table(const json& regressions, const std::string& imu) {
 /// Points of a figure this small that can be told apart.
 constexpr std::size_t kPointsShown = 1000;
 
-/// Every so-manieth value of a long column.
+/// A long column, thinned evenly to what a figure can show.
 std::vector<double> thinned(const std::vector<double>& values) {
   const std::size_t step = std::max<std::size_t>(1, (values.size() + kPointsShown - 1) / kPointsShown);
   std::vector<double> kept;
