@@ -91,6 +91,30 @@ function(imuscope_library name)
   endif()
 endfunction()
 
+# imuscope_embed(VARIABLE ROOM function=file ...)
+# The files, of the current folder or with a whole path, as functions of C++ that return them, as the room's assets.h
+# declares them. VARIABLE gets the path of the source that is written.
+function(imuscope_embed variable room)
+  set(assets)
+  set(files)
+  foreach(asset ${ARGN})
+    string(REGEX MATCH "^([^=]*)=(.*)$" matched ${asset})
+    get_filename_component(file ${CMAKE_MATCH_2} ABSOLUTE)
+    list(APPEND assets "${CMAKE_MATCH_1}=${file}")
+    list(APPEND files ${file})
+  endforeach()
+  set(output ${CMAKE_CURRENT_BINARY_DIR}/${room}_assets.cpp)
+  set(script ${CMAKE_SOURCE_DIR}/cmake/embed_assets.cmake)
+  string(REPLACE ";" "|" assets "${assets}")
+  add_custom_command(
+    OUTPUT ${output}
+    COMMAND ${CMAKE_COMMAND} -D "ASSETS=${assets}" -D ROOM=${room} -D OUTPUT=${output} -P ${script}
+    DEPENDS ${files} ${script}
+    COMMENT "Embedding files of src/${room}"
+    VERBATIM)
+  set(${variable} ${output} PARENT_SCOPE)
+endfunction()
+
 # imuscope_program(NAME SOURCES a.cpp ... LIBS libs...)
 function(imuscope_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})

@@ -13,9 +13,9 @@
 #include "base/units.h"
 #include "report/certificate_figures.h"
 #include "report/grouped.h"
-#include "report/html.h"
 #include "report/json_fields.h"
 #include "report/json_file.h"
+#include "report/page_parts.h"
 #include "report/people.h"
 
 namespace imuscope {

@@ -7,7 +7,7 @@
 
 #include "noise/export.h"
 #include "report/fits.h"
-#include "report/html.h"
+#include "report/page_parts.h"
 #include "report/run_files.h"
 
 namespace imuscope::report {

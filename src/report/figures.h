@@ -9,7 +9,7 @@
 
 #include "report/binned_signals.h"
 #include "report/fits.h"
-#include "report/html.h"
+#include "report/page_parts.h"
 #include "report/run_files.h"
 
 namespace imuscope::report {

@@ -2,16 +2,18 @@
 (function () {
   'use strict';
 
-  // Legible on white and on black, and told apart by the colour-blind (after Okabe and Ito).
-  const COLOURS = ['#d1600a', '#0b9a6e', '#3a86d8', '#9a6fd0', '#c14b78'];
-  const SPEED_COLOURS = ['#8a63c9', '#3a86d8', '#0b9a6e', '#d99a00', '#d1600a'];
-  const REGIME_COLOURS = ['#3a86d8', '#d1600a', '#0b9a6e', '#9a6fd0', '#c14b78'];
   const WHISKER_STEP = 2.4;  // pixels
   const TRUTH_DASH = [6, 4];
   const COMPONENT_DASH = [4, 3];
 
   const escaped = (any) => String(any).replace(/[&<>"']/g, (c) => '&#' + c.charCodeAt(0) + ';');
   const variable = (name) => getComputedStyle(document.body).getPropertyValue(name).trim();
+
+  // Of the kit: the axes, and what else stands beside them.
+  const [X, Y, Z, FOURTH, FIFTH] = ['--x', '--y', '--z', '--series-3', '--series-4'].map(variable);
+  const COLOURS = [X, Y, Z, FOURTH, FIFTH];
+  const REGIME_COLOURS = [Z, X, Y, FOURTH, FIFTH];
+  const SPEED_COLOURS = [FOURTH, Z, Y, '#d99a00', X];  // from slow to fast
   const shown = (value) => {
     if (value === null || !isFinite(value)) return '–';
     return Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3) ? value.toExponential(2)
@@ -39,7 +41,7 @@
   // What lies under the curves: times at rest, and the truth where it is known.
   function underlay(figure) {
     return (canvas, area, graph) => {
-      canvas.fillStyle = variable('--rest');
+      canvas.fillStyle = variable('--still');
       for (const [begin, end] of figure.shaded) {
         const left = Math.max(graph.toDomXCoord(begin), area.x);
         const right = Math.min(graph.toDomXCoord(end), area.x + area.w);

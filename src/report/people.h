@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "report/html.h"
+#include "report/page_parts.h"
 
 namespace imuscope::report {
 

@@ -1,17 +1,17 @@
 #include "report/report.h"
 
 #include <fmt/format.h>
-#include <openssl/evp.h>
-#include <array>
 #include <filesystem>
 #include <utility>
 
 #include "base/output_folder.h"
+#include "page/assets.h"
+#include "page/template.h"
 #include "report/assets.h"
 #include "report/figures.h"
 #include "report/fits.h"
-#include "report/html.h"
 #include "report/json_fields.h"
+#include "report/page_parts.h"
 #include "report/people.h"
 #include "report/run_files.h"
 #include "report/sections.h"
@@ -58,35 +58,6 @@ Html contents_of(const Html& body) {
   return Html::markup("<nav class=\"contents\" aria-label=\"contents\">") + links + Html::markup("</nav>");
 }
 
-/// The template with each {{name}} replaced once, in one pass: what is put in is not searched again.
-std::string filled(std::string_view page_text,
-                   const std::vector<std::pair<std::string_view, std::string_view>>& values) {
-  std::string page;
-  while (!page_text.empty()) {
-    const std::size_t begin = page_text.find("{{");
-    page += page_text.substr(0, begin);
-    if (begin == std::string_view::npos) break;
-    const std::size_t end = page_text.find("}}", begin);
-    const std::string_view name = page_text.substr(begin + 2, end - begin - 2);
-    for (const auto& [key, value] : values) {
-      if (key == name) page += value;
-    }
-    page_text.remove_prefix(end + 2);
-  }
-  return page;
-}
-
-/// The script as a Content-Security-Policy names it: no other is run, whatever got into the page.
-std::string hash_of(std::string_view script) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned int size = 0;
-  EVP_Digest(script.data(), script.size(), digest.data(), &size, EVP_sha256(), nullptr);
-  std::array<unsigned char, 2 * EVP_MAX_MD_SIZE> base64{};
-  const int length = EVP_EncodeBlock(base64.data(), digest.data(), static_cast<int>(size));
-  return fmt::format("'sha256-{}'", std::string_view(reinterpret_cast<const char*>(base64.data()),
-                                                     static_cast<std::size_t>(length)));
-}
-
 std::string make_page(const RunFiles& run) {
   const auto fits = read_fits(run.models);
   FigureSheet figures;
@@ -103,15 +74,17 @@ std::string make_page(const RunFiles& run) {
   sections += element("section", take_away_section(run, fits));
   const Html body = page_heading(run) + contents_of(sections) + sections;
   const std::string data = json_for_script(figures.json());
-  const std::string hashes = hash_of(plotting_script()) + " " + hash_of(page_script());
-  return filled(page_template(), {{"script_hashes", hashes},
-                                  {"plotting_notice", plotting_notice()},
-                                  {"plotting_style", plotting_style()},
-                                  {"page_style", page_style()},
-                                  {"body", body.str()},
-                                  {"figures", data},
-                                  {"plotting_script", plotting_script()},
-                                  {"page_script", page_script()}});
+  const std::string hashes = page::hash_source(plotting_script()) + " " + page::hash_source(page_script());
+  return page::filled(page_template(), {{"script_hashes", hashes},
+                                        {"plotting_notice", plotting_notice()},
+                                        {"plotting_style", plotting_style()},
+                                        {"kit_style", page::kit_style()},
+                                        {"document_style", page::document_style()},
+                                        {"page_style", page_style()},
+                                        {"body", body.str()},
+                                        {"figures", data},
+                                        {"plotting_script", plotting_script()},
+                                        {"page_script", page_script()}});
 }
 
 }  // namespace

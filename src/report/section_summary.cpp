@@ -4,10 +4,9 @@
 
 #include "base/calibration_levels.h"
 #include "base/units.h"
-#include "report/agreement_chart.h"
 #include "report/data_sheet_table.h"
 #include "report/json_fields.h"
-#include "report/mounting_drawing.h"
+#include "report/page_parts.h"
 #include "report/sections.h"
 #include "report/verdict.h"
 

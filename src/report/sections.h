@@ -5,7 +5,7 @@
 
 #include "report/figures.h"
 #include "report/fits.h"
-#include "report/html.h"
+#include "report/page_parts.h"
 #include "report/run_files.h"
 
 namespace imuscope::report {

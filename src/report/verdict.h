@@ -23,7 +23,7 @@ struct Verdict {
 /// Level of the tests.
 inline constexpr double kTestLevel = 0.05;
 
-/// The class that page.css colours it by: "yes", "partly", "no", "unknown".
+/// The class that kit.css colours it by: "yes", "partly", "no", "unknown".
 const char* css_class_of(Answer answer);
 
 /// Is something wrong with data or configuration, by what the look at the data found?

@@ -1,26 +1,15 @@
 #include "view/page.h"
 
-#include <string_view>
-
+#include "page/assets.h"
+#include "page/template.h"
 #include "view/assets.h"
 
 namespace imuscope::view {
 
-namespace {
-
-void replace(std::string& text, std::string_view placeholder, std::string_view with) {
-  const std::size_t at = text.find(placeholder);
-  if (at != std::string::npos) text.replace(at, placeholder.size(), with);
-}
-
-}  // namespace
-
 std::string page_html() {
-  std::string page(page_template());
-  replace(page, "{{page_kit}}", page_kit());
-  replace(page, "{{page_style}}", page_style());
-  replace(page, "{{page_script}}", page_script());
-  return page;
+  return page::filled(
+      page_template(),
+      {{"kit_style", page::kit_style()}, {"page_style", page_style()}, {"page_script", page_script()}});
 }
 
 }  // namespace imuscope::view

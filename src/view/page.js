@@ -4,7 +4,7 @@ const byId = (id) => document.getElementById(id);
 const kWindow_s = 20, kTrackMax = 4000, kCurveMax = 600, kMarksMax = 20;
 
 // ---- what is known -------------------------------------------------------------------------------------------
-const fresh = () => ({status: null, navigation: null, odometry: null, track: [], imus: new Map(), marks: [], time_s: 0});
+const fresh = () => ({status: null, mounting: '', navigation: null, odometry: null, track: [], imus: new Map(), marks: [], time_s: 0});
 let known = fresh();
 let picture = -1, socket = null, heardAt = 0, silent_s = null, play = null, chosen = null;
 let expectedRows = null;
@@ -78,6 +78,7 @@ function take(message) {
   if (message.play) play = message.play;
   if (message.status) known.status = message.status;
   if (message.odometry) known.odometry = message.odometry;
+  if (message.mounting !== undefined) known.mounting = message.mounting;
   if (message.navigation) known.navigation = message.navigation;
   if (message.track) known.track = thin(known.track.concat(message.track), 2, kTrackMax);
   for (const [name, news] of Object.entries(message.imus ?? {})) {
@@ -329,6 +330,16 @@ function showCalibration() {
   });
 }
 
+// The drawing is markup of the program's own. Parsed apart: nothing in it runs.
+let drawnMounting = null;
+function showMounting() {
+  const drawing = known.mounting;
+  byId('mounting-section').hidden = drawing === '';
+  if (drawing === drawnMounting) return;
+  drawnMounting = drawing;
+  byId('mounting').replaceChildren(...new DOMParser().parseFromString(drawing, 'text/html').body.childNodes);
+}
+
 function showThreads() {
   const threads = known.status ? known.status.threads : [];
   byId('deadlines').hidden = known.status !== null && threads.length === 0;
@@ -377,7 +388,7 @@ function showPlayer() {
 let colours = {};
 const readColours = () => {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ['ground', 'text', 'quiet', 'line', 'panel', 'yes', 'partly', 'no', 'x', 'y', 'z', 'rest']) colours[name] = style.getPropertyValue('--' + name).trim();
+  for (const name of ['ground', 'text', 'quiet', 'line', 'panel', 'yes', 'partly', 'no', 'x', 'y', 'z', 'neutral']) colours[name] = style.getPropertyValue('--' + name).trim();
 };
 
 // A canvas as large as its place, cleared, in CSS pixels.
@@ -578,7 +589,7 @@ function drawWavelet(canvas, variances, models) {
   g.rect(left, top, right - left, bottom - top);
   g.clip();
   const regimes = [...new Set(variances.map((v) => v.regime))];
-  const fixed = {static: colours.rest, dynamic: colours.x, all: colours.text};
+  const fixed = {static: colours.neutral, dynamic: colours.x, all: colours.text};
   const colourOf = (regime) => fixed[regime] ?? colours[['x', 'y', 'z', 'partly'][regimes.indexOf(regime) % 4]];
   for (const v of variances) {
     g.strokeStyle = g.fillStyle = colourOf(v.regime);
@@ -660,6 +671,7 @@ function draw() {
   showAlarms();
   showDevices();
   showCalibration();
+  showMounting();
   showChoice();
   showThreads();
   showMarks();

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "page/mounting_drawing.h"
 #include "publish/message_codec.h"
 #include "view/message_json.h"
 
@@ -31,6 +32,19 @@ std::uint64_t fingerprint_of(std::span<const std::uint8_t> message) {
 template <typename Message>
 bool is(std::uint64_t fingerprint) {
   return static_cast<std::uint64_t>(Message::getHash()) == fingerprint;
+}
+
+/// C_b_s, row-major, of a Hamilton quaternion, scalar first (Sola 2017, eq. 115); nothing where it is none.
+std::optional<std::array<double, 9>> rotation_of(const calibration_t& c) {
+  constexpr double kRounding = 1e-3;  // of a message's norm
+  const double w = c.q_w;
+  const double x = c.q_x;
+  const double y = c.q_y;
+  const double z = c.q_z;
+  if (!(std::abs(w * w + x * x + y * y + z * z - 1.0) < kRounding)) return std::nullopt;
+  return std::array{1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+                    2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                    2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
 std::array<double, 6> axes_of(const error_row_t& row) {
@@ -222,6 +236,7 @@ void Picture::take_event(std::string_view text) {
 }
 
 std::string Picture::part(std::string_view extra) {
+  draw_mounting();
   std::string out;
   append_head(out, all_next_, extra);
   for (auto& [name, one] : imus_) {
@@ -230,7 +245,7 @@ std::string Picture::part(std::string_view extra) {
   }
   new_track_.clear();
   new_marks_ = 0;
-  new_status_ = new_navigation_ = new_odometry_ = news_ = all_next_ = false;
+  new_status_ = new_navigation_ = new_odometry_ = new_mounting_ = news_ = all_next_ = false;
   return out;
 }
 
@@ -255,10 +270,35 @@ void Picture::append_head(std::string& out, bool whole, std::string_view extra) 
   }
   append_navigation(out, whole);
   append_imus(out, whole);
+  append_mounting(out, whole);
   append_errors(out, whole);
   append_marks(out, whole);
   out += extra;
   out += '}';
+}
+
+/// The same from one message to the next once the mounting is known to the drawing's width of a line.
+void Picture::draw_mounting() {
+  if (std::none_of(imus_.begin(), imus_.end(), [](const auto& imu) { return imu.second.new_calibration; }))
+    return;
+  std::vector<page::DrawnImu> drawn;
+  for (const auto& [name, imu] : imus_) {
+    if (!imu.calibration) continue;
+    const auto C_b_s = rotation_of(*imu.calibration);
+    const std::array r_bs_b_m{imu.calibration->r_x_m, imu.calibration->r_y_m, imu.calibration->r_z_m};
+    const bool is_placed =
+        std::all_of(r_bs_b_m.begin(), r_bs_b_m.end(), [](double r) { return std::isfinite(r); });
+    if (C_b_s && is_placed) drawn.push_back({name, *C_b_s, r_bs_b_m});
+  }
+  std::string drawing = page::mounting_drawing(drawn).str();
+  new_mounting_ = new_mounting_ || drawing != mounting_;
+  mounting_ = std::move(drawing);
+}
+
+void Picture::append_mounting(std::string& out, bool whole) const {
+  if (!(whole ? !mounting_.empty() : new_mounting_)) return;
+  out += R"(,"mounting":)";
+  out += json_text(mounting_, kJsonOneLine);
 }
 
 void Picture::append_navigation(std::string& out, bool whole) const {

@@ -100,9 +100,11 @@ class Picture {
   void take(noise_model_t&& models);
   void take_event(std::string_view text);
   void advance(double time_s);
+  void draw_mounting();
   void append_head(std::string& out, bool whole, std::string_view extra) const;
   void append_navigation(std::string& out, bool whole) const;
   void append_imus(std::string& out, bool whole) const;
+  void append_mounting(std::string& out, bool whole) const;
   void append_errors(std::string& out, bool whole) const;
   void append_marks(std::string& out, bool whole) const;
 
@@ -116,6 +118,7 @@ class Picture {
   std::array<double, 2> last_track_{};
   std::deque<Mark> marks_;
   std::size_t new_marks_ = 0;
+  std::string mounting_;  ///< drawings of where the S-IMUs sit, as markup
   double time_s_ = 0.0;
   std::uint64_t number_ = 0;  ///< of the picture: a page that knows another one forgets it
   std::uint64_t rows_ = 0;
@@ -124,6 +127,7 @@ class Picture {
   bool new_status_ = false;
   bool new_navigation_ = false;
   bool new_odometry_ = false;
+  bool new_mounting_ = false;
   bool news_ = false;
   bool all_next_ = true;
 };

@@ -15,8 +15,8 @@
 #include <sstream>
 
 #include "base/output_folder.h"
+#include "page/printed_page.h"
 #include "report/paper_figures.h"
-#include "report/printed_page.h"
 #include "report/report.h"
 #include "tests/report/synthetic_run.h"
 #include "tests/support/file_content.h"
@@ -335,12 +335,12 @@ TEST_F(Browser, PrintsAsPdf) {
 TEST_F(Browser, TheCommandPrintsAPageAndSaysWhereThereIsNoBrowser) {
   const auto folder = OutputFolder::open(folder_);
   ASSERT_TRUE(folder);
-  const auto printed = print_page(*folder, "report.html");
+  const auto printed = page::print_page(*folder, "report.html");
   ASSERT_TRUE(printed) << printed.error().text();
   EXPECT_EQ(content_of(*printed).rfind("%PDF", 0), 0U);
   const std::string path = std::getenv("PATH");
   setenv("PATH", folder_.c_str(), 1);
-  const auto none = print_page(*folder, "report.html");
+  const auto none = page::print_page(*folder, "report.html");
   setenv("PATH", path.c_str(), 1);
   ASSERT_FALSE(none);
   EXPECT_NE(none.error().text().find("apt-get install chromium"), std::string::npos);

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "report/agreement_chart.h"
 #include "report/data_sheet_table.h"
 #include "report/grouped.h"
-#include "report/mounting_drawing.h"
+#include "report/mounting.h"
+#include "report/page_parts.h"
 #include "tests/report/synthetic_run.h"
 #include "tests/support/shared_data.h"
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "report/html.h"
+#include "report/page_parts.h"
 #include "tests/report/synthetic_run.h"
 #include "tests/support/file_content.h"
 #include "tests/support/shared_data.h"

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "example_messages.h"
@@ -133,6 +134,30 @@ TEST(Picture, TheTrackIsInMetresOfItsFirstPosition) {
   // One degree of latitude and of longitude at 46 degrees on WGS-84: 111.15 and 77.47 km (geodetic tables).
   EXPECT_NEAR(track.at(3), 111.15, 0.06);
   EXPECT_NEAR(track.at(4), 77.47, 0.06);
+}
+
+TEST(Picture, TheMountingIsDrawnOnceAndAgainOnlyWhereItChanged) {
+  Picture picture;
+  (void)picture.part();
+  auto calibration = test::example_calibration();
+  calibration.q_w = 1.0;
+  calibration.q_x = calibration.q_y = calibration.q_z = 0.0;
+  const auto drawing_after = [&] {
+    hear(picture, calibration);
+    const json part = json::parse(picture.part());
+    return part.contains("mounting") ? part.at("mounting").get<std::string>() : "none";
+  };
+  const std::string first = drawing_after();
+  EXPECT_NE(first.find("<svg"), std::string::npos);
+  EXPECT_NE(first.find(calibration.name), std::string::npos);
+  calibration.sd_r_x_m *= 0.9;
+  EXPECT_EQ(drawing_after(), "none");
+  calibration.r_x_m = 0.5 * calibration.r_x_m;
+  EXPECT_NE(drawing_after(), "none");
+  EXPECT_TRUE(json::parse(picture.whole()).contains("mounting"));
+  // A mounting that nobody knows is not drawn.
+  calibration.q_w = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(drawing_after(), "");
 }
 
 TEST(Picture, WhatNobodyKnowsIsNull) {

@@ -285,6 +285,36 @@ class LivePage : public ViewPage {
     }
   }
 
+  /// The drawing from above: page right is to the right, page down is backwards, in one scale.
+  void check_mounting(const json& truth) const {
+    const json circles = browser_->value_of(
+        "[...document.querySelectorAll('#mounting svg')[0].querySelectorAll('circle.imu')].map("
+        "(c) => [c.cx.baseVal.value, c.cy.baseVal.value])");
+    const json& imus = truth.at("imus");
+    ASSERT_EQ(circles.size(), imus.size());
+    constexpr double kMiddle_px = 110.0;
+    std::map<std::string, Eigen::Vector2d> known_m;  // in the order of the drawing, which is that of names
+    double farthest_m = 0.0;
+    double farthest_px = 0.0;
+    for (const auto& imu : imus) {
+      const Eigen::Vector3d r_bs_b_m = vector_of(imu.at("r_bs_b_m"));
+      known_m[imu.at("name")] = {r_bs_b_m.y(), -r_bs_b_m.x()};
+      farthest_m = std::max(farthest_m, r_bs_b_m.head<2>().norm());
+    }
+    for (const json& circle : circles) {
+      farthest_px = std::max(farthest_px, std::hypot(circle.at(0).get<double>() - kMiddle_px,
+                                                     circle.at(1).get<double>() - kMiddle_px));
+    }
+    constexpr double kWidthOfALine_px = 2.0;
+    std::size_t i = 0;
+    for (const auto& [name, place_m] : known_m) {
+      const Eigen::Vector2d place_px = farthest_px / farthest_m * place_m;
+      EXPECT_NEAR(circles.at(i).at(0).get<double>() - kMiddle_px, place_px.x(), kWidthOfALine_px) << name;
+      EXPECT_NEAR(circles.at(i).at(1).get<double>() - kMiddle_px, place_px.y(), kWidthOfALine_px) << name;
+      ++i;
+    }
+  }
+
   /// Where the page says that the vehicle is, against the simulator's table; both by the same UTC.
   void check_position(const json& truth) const {
     const json shown = browser_->value_of(
@@ -433,6 +463,7 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   const json truth = read_json(folder_ / "truth" / "truth.json");
   check_losses();
   check_calibration(truth);
+  check_mounting(truth);
   check_position(truth);
   check_wavelets();
 
@@ -498,6 +529,7 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
   EXPECT_TRUE(slide_to(length_s - 0.1));
   EXPECT_TRUE(browser_->becomes_true("document.getElementById('marks').textContent.includes('kerb')", 5.0));
   check_calibration(truth);
+  check_mounting(truth);
   photograph_all("recorded");
   recorded.end();
 }
@@ -526,6 +558,8 @@ TEST_F(ViewPage, WhatAStrangerSendsIsTextAndAPageOfAnotherOriginHearsNothing) {
     bus->publish(status, "STATUS");
     auto calibration = example_calibration();
     calibration.name = calibration.advice = payload;
+    calibration.q_w = 1.0;
+    calibration.q_x = calibration.q_y = calibration.q_z = 0.0;
     bus->publish(calibration, "CALIBRATION", "mtx1");
     bus->publish(example_error(payload), "ERROR", "mtx1");
     auto variances = example_wavelet_variance();
@@ -541,8 +575,11 @@ TEST_F(ViewPage, WhatAStrangerSendsIsTextAndAPageOfAnotherOriginHearsNothing) {
   EXPECT_TRUE(browser_->becomes_true("document.body.textContent.includes('onerror=pwned')", 5.0))
       << "it is read as text";
   EXPECT_EQ(browser_->value_of("window.called"), 0);
-  EXPECT_EQ(
-      browser_->value_of("document.querySelectorAll('img, iframe, svg, object, embed, form, a').length"), 0);
+  EXPECT_EQ(browser_->value_of("document.querySelectorAll('img, iframe, object, embed, form, a').length"), 0);
+  EXPECT_EQ(browser_->value_of("document.querySelectorAll('svg').length"), 3) << "the mounting's own";
+  EXPECT_TRUE(browser_->becomes_true(
+      "[...document.querySelectorAll('svg text.name')].some((name) => name.textContent.startsWith('<svg'))",
+      5.0));
   EXPECT_EQ(browser_->value_of("document.querySelectorAll('script').length"), 1);
   EXPECT_THAT(browser_->said(), IsEmpty());
 

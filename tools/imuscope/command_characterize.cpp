@@ -15,11 +15,11 @@
 #include "certificate_table.h"
 #include "commands.h"
 #include "noise/holm.h"
+#include "page/printed_page.h"
 #include "print.h"
 #include "record_files.h"
 #include "report/certificate_page.h"
 #include "report/json_file.h"
-#include "report/printed_page.h"
 
 namespace imuscope::cli {
 namespace {
@@ -202,11 +202,11 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     if (!folder) return tl::unexpected<Error>(folder.error());
     if (auto written = folder->write_whole(kDocument, json_text(documents[i])); !written) return written;
     if (auto written = folder->write_whole("allan.csv", allan_csv(documents[i])); !written) return written;
-    const auto page = write_certificate_page(folder->path(), documents[i]);
-    if (!page) return tl::unexpected<Error>(page.error());
-    if (!quiet) say("{}\n", page->front().string());
+    const auto files = write_certificate_page(folder->path(), documents[i]);
+    if (!files) return tl::unexpected<Error>(files.error());
+    if (!quiet) say("{}\n", files->front().string());
     if (!options.pdf) continue;
-    const auto printed = print_page(*folder, page->front().filename().string());
+    const auto printed = page::print_page(*folder, files->front().filename().string());
     if (!printed) return tl::unexpected<Error>(printed.error());
     if (!quiet) say("{}\n", printed->string());
   }

@@ -5,10 +5,10 @@
 
 #include "base/output_folder.h"
 #include "commands.h"
+#include "page/printed_page.h"
 #include "print.h"
 #include "report/comparison_page.h"
 #include "report/paper_figures.h"
-#include "report/printed_page.h"
 #include "report/report.h"
 
 namespace imuscope::cli {
@@ -29,12 +29,13 @@ Result<void> compare_runs(const ReportCommand& options) {
     return usage_error(fmt::format("{} exists", options.out.string()),
                        "give another --out, or --force to write over it");
   }
-  const auto page = comparison_page(options.runs[0], options.runs[1]);
-  if (!page) return tl::unexpected<Error>(page.error());
+  const auto comparison = comparison_page(options.runs[0], options.runs[1]);
+  if (!comparison) return tl::unexpected<Error>(comparison.error());
   const auto parent = options.out.has_parent_path() ? options.out.parent_path() : std::filesystem::path(".");
   const auto folder = OutputFolder::open(parent);
   if (!folder) return tl::unexpected<Error>(folder.error());
-  if (auto written = folder->write_whole(options.out.filename().string(), *page); !written) return written;
+  if (auto written = folder->write_whole(options.out.filename().string(), *comparison); !written)
+    return written;
   say("{}\n", options.out.string());
   return {};
 }
@@ -46,7 +47,7 @@ Result<void> report_of_run(const ReportCommand& options) {
   if (options.pdf) {
     const auto folder = OutputFolder::open(run_dir);
     if (!folder) return tl::unexpected<Error>(folder.error());
-    const auto printed = print_page(*folder, "report.html");
+    const auto printed = page::print_page(*folder, "report.html");
     if (!printed) return tl::unexpected<Error>(printed.error());
     say("{}\n", printed->string());
   }

@@ -1,4 +1,4 @@
-#include "report/printed_page.h"
+#include "page/printed_page.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -16,7 +16,7 @@
 
 extern char** environ;
 
-namespace imuscope {
+namespace imuscope::page {
 namespace {
 
 namespace fs = std::filesystem;
@@ -113,4 +113,4 @@ Result<fs::path> print_page(const OutputFolder& folder, const std::string& html_
   return folder.path() / name;
 }
 
-}  // namespace imuscope
+}  // namespace imuscope::page

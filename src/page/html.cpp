@@ -1,11 +1,11 @@
-#include "report/html.h"
+#include "page/html.h"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
-#include "report/assets.h"
+#include "page/assets.h"
 
-namespace imuscope::report {
+namespace imuscope::page {
 
 Html text(std::string_view any) {
   std::string escaped;
@@ -151,9 +151,10 @@ std::string page_without_script(std::string_view title, const Html& body) {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
       "form-action 'none'; style-src 'unsafe-inline'; img-src data:\">\n"
-      "<meta name=\"color-scheme\" content=\"light dark\">\n<title>{}</title>\n<style>\n{}</style>\n</head>\n"
+      "<meta name=\"color-scheme\" content=\"light "
+      "dark\">\n<title>{}</title>\n<style>\n{}{}</style>\n</head>\n"
       "<body>\n<main>\n{}\n</main>\n</body>\n</html>\n",
-      text(title).str(), page_style(), body.str());
+      text(title).str(), kit_style(), document_style(), body.str());
 }
 
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class) {
@@ -163,4 +164,4 @@ Html figure_place(std::string_view id, const Html& caption, std::string_view css
                   css_class, caption.str(), text(id).str()));
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope::page

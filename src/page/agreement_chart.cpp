@@ -1,11 +1,11 @@
-#include "report/agreement_chart.h"
+#include "page/agreement_chart.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace imuscope::report {
+namespace imuscope::page {
 namespace {
 
 constexpr double kWidth_px = 560.0;
@@ -17,7 +17,7 @@ constexpr double kFoot_px = 36.0;
 /// The ordinate reaches to a factor of this at least, and of this at most.
 constexpr double kFactorMin = 1.5;
 constexpr double kFactorMax = 10.0;
-/// Colours of the page (page.css, series-0 and on).
+/// Colours of the page (kit.css, series-0 and on).
 constexpr std::size_t kColours = 6;
 
 struct Scale {
@@ -110,4 +110,4 @@ Html agreement_chart(const std::vector<AgreementSeries>& series, const std::stri
          inline_svg("chart", kWidth_px, kHeight_px, "measured error over predicted", svg);
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope::page

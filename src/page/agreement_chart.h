@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "report/html.h"
+#include "page/html.h"
 
-namespace imuscope::report {
+namespace imuscope::page {
 
 /// One ratio of measured to predicted, with its 95 % interval where there is one.
 struct AgreementPoint {
@@ -29,4 +29,4 @@ struct AgreementSeries {
 /// @param x_words  what the abscissa is, with its unit
 Html agreement_chart(const std::vector<AgreementSeries>& series, const std::string& x_words);
 
-}  // namespace imuscope::report
+}  // namespace imuscope::page

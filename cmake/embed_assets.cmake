@@ -1,7 +1,4 @@
 # Writes the files named in ASSETS ("name=path|name=path...") as string constants of C++ to OUTPUT, of the room ROOM.
-if(NOT ROOM)
-  set(ROOM report)
-endif()
 set(text "#include \"${ROOM}/assets.h\"\n\nnamespace imuscope::${ROOM} {\n")
 string(REPLACE "|" ";" assets "${ASSETS}")
 foreach(asset ${assets})

@@ -7,18 +7,17 @@
 #include <string>
 #include <vector>
 
-#include "report/html.h"
-#include "report/mounting.h"
+#include "page/html.h"
 
-namespace imuscope::report {
+namespace imuscope::page {
 
 struct DrawnImu {
   std::string name;
-  Rotation C_b_s{};                  ///< rotates b to s: its rows are the axes of s in b
+  std::array<double, 9> C_b_s{};     ///< row-major; takes b to s: its rows are the axes of s in b
   std::array<double, 3> r_bs_b_m{};  ///< from the R-IMU to it
 };
 
 /// Three drawings; nothing where there is no S-IMU to draw.
 Html mounting_drawing(const std::vector<DrawnImu>& imus);
 
-}  // namespace imuscope::report
+}  // namespace imuscope::page

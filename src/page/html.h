@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace imuscope::report {
+namespace imuscope::page {
 
 class Html {
  public:
@@ -86,4 +86,4 @@ std::string page_without_script(std::string_view title, const Html& body);
 /// A place where page.js draws the figure `id`, with what it shows in words below it.
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class = {});
 
-}  // namespace imuscope::report
+}  // namespace imuscope::page

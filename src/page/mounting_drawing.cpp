@@ -1,4 +1,4 @@
-#include "report/mounting_drawing.h"
+#include "page/mounting_drawing.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "base/units.h"
 
-namespace imuscope::report {
+namespace imuscope::page {
 namespace {
 
 constexpr double kSide_px = 220.0;
@@ -133,7 +133,7 @@ class Names {
   std::string place(Point at, const std::string& name) {
     constexpr double kLetter_px = 6.2;
     constexpr double kHalfHeight_px = 6.0;
-    constexpr double kFoot_px = 4.0;  // from the middle of a line to its foot
+    constexpr double kBaseline_px = 4.0;  // from the middle of a line to its foot
     const Point half{0.5 * kLetter_px * static_cast<double>(std::max<std::size_t>(name.size(), 1)),
                      kHalfHeight_px};
     Box box{{at.x, at.y + 14.0}, half};
@@ -145,12 +145,12 @@ class Names {
         const Box tried{{at.x + shift.x, at.y + shift.y}, half};
         if (is_free(tried)) {
           taken_.push_back(tried);
-          return words_at({tried.middle.x, tried.middle.y + kFoot_px}, name, "middle", "name");
+          return words_at({tried.middle.x, tried.middle.y + kBaseline_px}, name, "middle", "name");
         }
       }
     }
     taken_.push_back(box);
-    return words_at({box.middle.x, box.middle.y + kFoot_px}, name, "middle", "name");
+    return words_at({box.middle.x, box.middle.y + kBaseline_px}, name, "middle", "name");
   }
 
  private:
@@ -211,4 +211,4 @@ Html mounting_drawing(const std::vector<DrawnImu>& imus) {
   return element("div", views, "views");
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope::page
