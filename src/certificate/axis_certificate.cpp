@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <execution>
+#include <mutex>
 #include <numeric>
 
 #include "base/units.h"
@@ -187,12 +188,18 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
 }
 
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
-                                                       const AxisOptions& options) {
+                                                       const AxisOptions& options, const AxisDone& told) {
   std::vector<Result<AxisCertificate>> out(records.size(), work_error("not looked at"));
   std::vector<std::size_t> index(records.size());
   std::iota(index.begin(), index.end(), std::size_t{0});
-  std::for_each(std::execution::par, index.begin(), index.end(),
-                [&](std::size_t i) { out[i] = characterize_axis(records[i], options); });
+  std::mutex telling;
+  std::size_t done = 0;
+  std::for_each(std::execution::par, index.begin(), index.end(), [&](std::size_t i) {
+    out[i] = characterize_axis(records[i], options);
+    if (!told) return;
+    const std::scoped_lock lock(telling);
+    told(++done);
+  });
   return out;
 }
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -74,8 +75,11 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
 /// Below this nothing that would be worth a page can be said.
 inline constexpr std::uint64_t kFewestSamples = 200;
 
+/// Told the number of axes that are done, by one thread at a time, whichever ended last.
+using AxisDone = std::function<void(std::size_t done)>;
+
 /// Axes side by side on all cores; the result does not depend on their number. One entry a record, in order.
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
-                                                       const AxisOptions& options);
+                                                       const AxisOptions& options, const AxisDone& told = {});
 
 }  // namespace imuscope::certificate

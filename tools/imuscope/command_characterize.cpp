@@ -17,6 +17,7 @@
 #include "noise/holm.h"
 #include "page/printed_page.h"
 #include "print.h"
+#include "progress.h"
 #include "record_files.h"
 #include "report/certificate_page.h"
 #include "report/json_file.h"
@@ -145,7 +146,13 @@ Result<std::vector<certificate::AxisCertificate>> characterize(const SensorRecor
                                                                const certificate::AxisOptions& how) {
   std::vector<certificate::AxisCertificate> axes;
   std::optional<Error> first;
-  for (auto& axis : characterize_axes(record.axes, how)) {
+  ProgressBar bar;
+  const auto n = static_cast<double>(record.axes.size());
+  bar.show(record.name, 0.0);
+  auto looked_at = characterize_axes(
+      record.axes, how, [&](std::size_t done) { bar.show(record.name, static_cast<double>(done) / n); });
+  bar.clear();
+  for (auto& axis : looked_at) {
     if (axis) {
       axes.push_back(std::move(*axis));
       continue;
@@ -160,7 +167,10 @@ Result<std::vector<certificate::AxisCertificate>> characterize(const SensorRecor
 Result<void> run_characterize(CharacterizeCommand& options) {
   if (auto parsed = parse_axes(options); !parsed) return parsed;
   if (auto may = may_write(options); !may) return may;
+  ProgressBar bar;
+  bar.show("reading");
   auto records = read_records(options.files, options.choice);
+  bar.clear();
   if (!records) return tl::unexpected(records.error());
   std::vector<std::vector<certificate::AxisCertificate>> all;
   auto documents = nlohmann::json::array();
@@ -206,7 +216,9 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     if (!files) return tl::unexpected<Error>(files.error());
     if (!quiet) say("{}\n", files->front().string());
     if (!options.pdf) continue;
+    bar.show("printing");
     const auto printed = page::print_page(*folder, files->front().filename().string());
+    bar.clear();
     if (!printed) return tl::unexpected<Error>(printed.error());
     if (!quiet) say("{}\n", printed->string());
   }

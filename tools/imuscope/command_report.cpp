@@ -7,6 +7,7 @@
 #include "commands.h"
 #include "page/printed_page.h"
 #include "print.h"
+#include "progress.h"
 #include "report/comparison_page.h"
 #include "report/paper_figures.h"
 #include "report/report.h"
@@ -47,12 +48,18 @@ Result<void> report_of_run(const ReportCommand& options) {
   if (options.pdf) {
     const auto folder = OutputFolder::open(run_dir);
     if (!folder) return tl::unexpected<Error>(folder.error());
+    ProgressBar bar;
+    bar.show("printing");
     const auto printed = page::print_page(*folder, "report.html");
+    bar.clear();
     if (!printed) return tl::unexpected<Error>(printed.error());
     say("{}\n", printed->string());
   }
   if (!options.figures) return {};
+  ProgressBar bar;
+  bar.show("drawing");
   const auto drawn = write_figures(run_dir);
+  bar.clear();
   if (!drawn) return tl::unexpected<Error>(drawn.error());
   for (const auto& file : *drawn) say("{}\n", file.string());
   return {};

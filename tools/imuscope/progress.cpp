@@ -40,4 +40,12 @@ void ProgressBar::show(const std::string& step, double share) {
   std::fflush(stderr);
 }
 
+void ProgressBar::show(const std::string& step) {
+  if (!is_terminal_) return;
+  shown_percent_ = 0;
+  shown_step_ = step;
+  fmt::print(stderr, "\r\x1b[K{} ...", step);
+  std::fflush(stderr);
+}
+
 }  // namespace imuscope::cli

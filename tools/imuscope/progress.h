@@ -18,6 +18,9 @@ class ProgressBar {
   /// @param share  0 to 1
   void show(const std::string& step, double share);
 
+  /// A step of some seconds of which nobody knows how far it is.
+  void show(const std::string& step);
+
   /// Takes it off the screen.
   void clear();
 
