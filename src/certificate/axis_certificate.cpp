@@ -95,18 +95,23 @@ std::optional<HalvesTest> halves_of(std::span<const double> x, std::span<const s
   return out;
 }
 
+/// A length that is known to two digits and is no power of ten to a reader: 120, not 1.2e+02.
+std::string rounded(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
+  return fmt::format("{:.10g}", std::round(value / unit) * unit);
+}
+
 void add_limits(AxisCertificate& out) {
   const double seconds = static_cast<double>(out.n_samples) / out.fit.rate_hz;
   const auto& bias = *std::find_if(out.terms.begin(), out.terms.end(),
                                    [](const auto& t) { return t.term == Term::kBiasInstability; });
   if (bias.knowledge == noise::Knowledge::kBound) {
     constexpr double kLonger = 4.0;
-    out.limits.push_back(
-        fmt::format("bias instability: the Allan deviation still falls at {:.3g} s, the longest averaging "
-                    "time of this record of {:.2g} h; "
-                    "a record of {:.2g} h shows {:.3g} s",
-                    out.allan.back().tau_s, seconds / kSecondsPerHour, kLonger * seconds / kSecondsPerHour,
-                    kLonger * out.allan.back().tau_s));
+    out.limits.push_back(fmt::format(
+        "bias instability: the Allan deviation still falls at {} s, the longest averaging time of "
+        "this record of {} h; a record of {} h shows {} s",
+        rounded(out.allan.back().tau_s), rounded(seconds / kSecondsPerHour),
+        rounded(kLonger * seconds / kSecondsPerHour), rounded(kLonger * out.allan.back().tau_s)));
   }
   constexpr double kWide = 0.3;  // of the value, half an interval
   for (const TermValue& term : out.terms) {
@@ -116,9 +121,9 @@ void add_limits(AxisCertificate& out) {
     if (half <= kWide) continue;
     constexpr double kWanted = 0.1;
     out.limits.push_back(
-        fmt::format("{}: known within {:.0f} %; within 10 % takes a record of about {:.2g} h",
+        fmt::format("{}: known within {:.0f} %; within 10 % takes a record of about {} h",
                     name_of(term.term, is_gyro(out.unit)), 100.0 * half,
-                    seconds * (half / kWanted) * (half / kWanted) / kSecondsPerHour));
+                    rounded(seconds * (half / kWanted) * (half / kWanted) / kSecondsPerHour)));
   }
 }
 
