@@ -31,6 +31,9 @@ void add_fit(CLI::App& app, Work& chosen);
 /// `imuscope characterize FILE...`
 void add_characterize(CLI::App& app, Work& chosen);
 
+/// `imuscope correlate RUN` or `LOG`
+void add_correlate(CLI::App& app, Work& chosen);
+
 /// `imuscope compare A.json B.json`
 void add_compare(CLI::App& app, Work& chosen);
 

@@ -35,6 +35,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_wv(app, work);
   imuscope::cli::add_fit(app, work);
   imuscope::cli::add_characterize(app, work);
+  imuscope::cli::add_correlate(app, work);
   imuscope::cli::add_compare(app, work);
   imuscope::cli::add_export(app, work);
   imuscope::cli::add_run(app, work);
