@@ -16,7 +16,7 @@ constexpr std::size_t kDevicesMax = 255;
 
 /// Memory that a read takes while it is held.
 std::size_t cost_of(const RawRead& read) {
-  constexpr std::size_t kPlace = 192;  // in the map, and with the allocator
+  constexpr std::size_t kPlace = 192;  // in the row, and with the allocator
   return kPlace + read.device.size() + read.bytes.size();
 }
 
@@ -125,25 +125,25 @@ Result<CaptureReader> CaptureReader::open(const std::filesystem::path& path, std
 
 std::optional<RawRead> CaptureReader::next() {
   while (!ended_ && held_bytes_ < kHeldMax &&
-         (held_.empty() || newest_ - held_.begin()->first.arrival < kReorderWindow)) {
+         (held_.empty() || newest_ - held_.front().key.arrival < kReorderWindow)) {
     ended_ = !read_one();
     if (ended_) close_assemblies();
   }
   if (held_.empty()) return std::nullopt;
-  auto oldest = held_.extract(held_.begin());
-  held_bytes_ -= cost_of(oldest.mapped());
-  if (oldest.key().arrival < given_) disordered_ += 1;
-  given_ = std::max(given_, oldest.key().arrival);
-  return std::move(oldest.mapped());
+  Held oldest = std::move(held_.front());
+  held_.pop_front();
+  held_bytes_ -= cost_of(oldest.read);
+  if (oldest.key.arrival < given_) disordered_ += 1;
+  given_ = std::max(given_, oldest.key.arrival);
+  return std::move(oldest.read);
 }
 
 /// Takes in one event. Returns false at the end of the file.
 bool CaptureReader::read_one() {
-  LogEvent event;
-  if (!log_.next(event)) return false;
-  const auto device = device_of_bytes(event.data);
+  if (!log_.next(event_)) return false;
+  const auto device = device_of_bytes(event_.data);
   if (!wanted_.empty() && !device.empty() && device != wanted_) return true;
-  auto record = decode_record(event.data);
+  auto record = decode_record(event_.data);
   if (!record) return true;
   if (const auto* run = std::get_if<RunHeader>(&*record)) {
     devices_ = run->devices;
@@ -180,7 +180,15 @@ void CaptureReader::add_whole(RawRead&& read) {
   const Key key{read.arrival, index_of(read.device), completed_++};
   newest_ = std::max(newest_, read.arrival);
   held_bytes_ += cost_of(read);
-  held_.emplace(key, std::move(read));
+  // Lines are read by turns, so that few have to be passed; damaged stamps may be of any time.
+  constexpr std::ptrdiff_t kNear = 64;
+  auto place = held_.end();
+  const auto least = held_.end() - std::min<std::ptrdiff_t>(kNear, held_.end() - held_.begin());
+  while (place != least && key < std::prev(place)->key) --place;
+  if (place == least)
+    place = std::lower_bound(held_.begin(), least, key,
+                             [](const Held& held, const Key& k) { return held.key < k; });
+  held_.insert(place, Held{key, std::move(read)});
 }
 
 /// Place of the device in the configuration; devices that the run header does not name follow in the order of

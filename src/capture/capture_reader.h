@@ -6,6 +6,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -118,7 +119,12 @@ class CaptureReader {
   std::string wanted_;  ///< device; empty: all
   std::vector<std::string> devices_;
   std::map<std::string, Assembly> assemblies_;
-  std::map<Key, RawRead> held_;
+  struct Held {
+    Key key;
+    RawRead read;
+  };
+  std::deque<Held> held_;  ///< rising; nearly all that comes belongs to its end
+  LogEvent event_;         ///< kept for its memory
   std::size_t held_bytes_ = 0;
   std::uint64_t completed_ = 0;
   HostTime newest_ = HostTime::min();

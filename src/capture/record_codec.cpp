@@ -5,6 +5,7 @@
 #include <imuscope/raw_t.hpp>
 #include <imuscope/run_t.hpp>
 #include <span>
+#include <utility>
 
 #include "capture/stamp_range.h"
 #include "publish/message_codec.h"
@@ -67,13 +68,13 @@ std::int8_t code_of(Direction direction) {
   return raw_t::READ;
 }
 
-std::optional<CaptureRecord> to_record(const raw_t& message) {
+std::optional<CaptureRecord> to_record(raw_t&& message) {
   if (!is_stamp_ns(message.arrival_ns) || !is_count(message.sequence)) return std::nullopt;
   RawPiece piece;
-  piece.read.device = message.device;
+  piece.read.device = std::move(message.device);
   piece.read.direction = direction_of(message.direction);
   piece.read.arrival = host_time_from_ns(message.arrival_ns);
-  piece.read.bytes = message.bytes;
+  piece.read.bytes = std::move(message.bytes);
   piece.sequence = message.sequence;
   piece.continues = message.continues != 0;
   if (message.direction == raw_t::STAMPED_READ) {
@@ -182,7 +183,7 @@ std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& mess
   if (message.size() < sizeof(std::int64_t)) return std::nullopt;
   const std::int64_t fingerprint = fingerprint_of(message);
   if (fingerprint == raw_t::getHash()) {
-    if (const auto raw = decode_message<raw_t>(message)) return to_record(*raw);
+    if (auto raw = decode_message<raw_t>(message)) return to_record(std::move(*raw));
   } else if (fingerprint == run_t::getHash()) {
     const auto run = decode_message<run_t>(message);
     if (run && run->format == kCaptureFormat) return to_record(*run);

@@ -1,7 +1,5 @@
 #include "capture/sealed_log.h"
 
-#include <vector>
-
 namespace imuscope {
 namespace {
 
@@ -28,8 +26,13 @@ Result<SealedLog> SealedLog::open(const std::filesystem::path& path, EventLogRea
 }
 
 bool SealedLog::next(LogEvent& event) {
+  constexpr std::size_t kSparesMost = 256;
   while (released_ == 0) {
     LogEvent read;
+    if (!spares_.empty()) {
+      read = std::move(spares_.back());
+      spares_.pop_back();
+    }
     if (log_.next(read)) {
       take(std::move(read));
       continue;
@@ -37,10 +40,25 @@ bool SealedLog::next(LogEvent& event) {
     if (held_.empty()) return false;
     release_all();
   }
+  if (spares_.size() < kSparesMost) spares_.push_back(std::move(event));
   event = std::move(held_.front());
   held_.pop_front();
   --released_;
   return true;
+}
+
+std::optional<std::uint64_t> SealedLog::place() const {
+  if (!held_.empty() || index_ || (health_.is_sealed && given_unsealed_ > 0)) return std::nullopt;
+  return log_.place();
+}
+
+void SealedLog::go_to(std::uint64_t place) {
+  held_.clear();
+  index_.reset();
+  released_ = 0;
+  waiting_bytes_ = 0;
+  given_unsealed_ = 0;
+  log_.go_to(place);
 }
 
 LogHealth SealedLog::health() const {

@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "base/result.h"
 #include "capture/event_log_reader.h"
@@ -36,6 +37,11 @@ class SealedLog {
   static Result<SealedLog> open(const std::filesystem::path& path,
                                 EventLogReader::Beginning beginning = EventLogReader::Beginning::kIsARecord);
 
+  /// Where the next record begins, if nothing is held between here and what was given: a place for go_to().
+  [[nodiscard]] std::optional<std::uint64_t> place() const;
+  /// Goes on from there. What is told of the file's health is of what was read.
+  void go_to(std::uint64_t place);
+
   /// See EventLogReader.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { log_.on_read(std::move(listener)); }
 
@@ -53,6 +59,7 @@ class SealedLog {
   void release_all();
 
   EventLogReader log_;
+  std::vector<LogEvent> spares_;   ///< memory of records that were given
   std::optional<LogEvent> index_;  ///< that was read last
   std::deque<LogEvent> held_;
   std::size_t released_ = 0;          ///< of those held, from the front

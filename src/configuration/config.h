@@ -128,19 +128,20 @@ struct CsvConfig {
   bool common_clock = true;  ///< false: the file's times are of a clock of its own, brought to the reference
 };
 
-/// When a message of an MCAP file was valid.
-enum class McapTime : std::uint8_t {
+/// When a message of a file of many topics was valid.
+enum class MessageTime : std::uint8_t {
   kHeader,   ///< its header's stamp
   kLog,      ///< when it was recorded
   kPublish,  ///< when it was sent
 };
 
-/// Messages of an MCAP file as a device.
-struct McapConfig {
+/// Messages of a topic as a device (is_message_log() in protocols.h).
+struct MessagesConfig {
   std::string topic;           ///< empty: the only one of a type that the role needs
-  std::string velocity_topic;  ///< gnss: a twist, east-north-up, at the times of the positions; empty: none
+  std::string velocity_topic;  ///< gnss: a twist, east-north-up, at the times of the positions; empty: none,
+                               ///< of a flight controller the one beside the topic
   std::string frame_id;        ///< messages of another frame are passed over; empty: all are taken
-  McapTime time = McapTime::kHeader;
+  MessageTime time = MessageTime::kHeader;
   bool times_are_utc = false;
   bool common_clock = true;  ///< false: times are of a clock of its own, brought to the reference
 };
@@ -177,7 +178,7 @@ struct DeviceConfig {
   DataSheetConfig data_sheet;  ///< study
   int average_samples = 0;     ///< study: samples from one update to the next, see StudyConfig
   CsvConfig csv;               ///< csv_imu, csv_gnss
-  McapConfig mcap;             ///< mcap
+  MessagesConfig messages;     ///< mcap, rosbag, ulog, dataflash
   GnssOptions gnss;            ///< gnss
   OdometryOptions odometry;    ///< odometry
   xsens_can::ItemIds xsens_can_ids = xsens_can::default_ids();  ///< xsens_can

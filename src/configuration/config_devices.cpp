@@ -158,19 +158,19 @@ void read_csv(TomlReader in, CsvConfig& csv) {
   in.finish();
 }
 
-void read_mcap(TomlReader in, DeviceRole role, McapConfig& mcap) {
-  in.text("topic", mcap.topic);
-  if (role == DeviceRole::kGnss) in.text("velocity_topic", mcap.velocity_topic);
-  in.text("frame_id", mcap.frame_id);
-  mcap.time = static_cast<McapTime>(in.choice("time", {"header", "log", "publish"}, 0));
-  in.boolean("times_are_utc", mcap.times_are_utc);
-  mcap.common_clock = in.choice("clock", {"common", "own"}, 0) == 0;
+void read_messages(TomlReader in, DeviceRole role, MessagesConfig& messages) {
+  in.text("topic", messages.topic);
+  if (role == DeviceRole::kGnss) in.text("velocity_topic", messages.velocity_topic);
+  in.text("frame_id", messages.frame_id);
+  messages.time = static_cast<MessageTime>(in.choice("time", {"header", "log", "publish"}, 0));
+  in.boolean("times_are_utc", messages.times_are_utc);
+  messages.common_clock = in.choice("clock", {"common", "own"}, 0) == 0;
   in.finish();
 }
 
 /// Samples per second where the configuration gives none.
 double default_rate_hz(Protocol protocol, DeviceRole role) {
-  if (protocol != Protocol::kMcap) return traits_of(protocol).rate_hz;
+  if (!is_message_log(protocol)) return traits_of(protocol).rate_hz;
   // Those of the devices that have the role by their protocol.
   switch (role) {
     case DeviceRole::kGnss:
@@ -311,8 +311,9 @@ void read_transport(TomlReader in, DeviceConfig& device) {
       read_pps(in, device);
       break;
   }
-  if (device.protocol == Protocol::kMcap)
-    in.fail("kind", "is given for mcap", "messages of an MCAP file are read from that file alone");
+  if (is_message_log(device.protocol))
+    in.fail("kind", fmt::format("is given for {}", name_of(device.protocol)),
+            "such messages are read from a file alone");
   if (device.pps.has_value() != (device.protocol == Protocol::kPps)) {
     in.fail("kind", fmt::format("does not carry {}", name_of(device.protocol)),
             "kind = \"pps\" is for protocol pps, which has no other");
@@ -403,7 +404,7 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
     read_data_sheet(in.table("data_sheet"), device.data_sheet);
   }
   if (traits_of(device.protocol).is_text) read_csv(in.table("csv"), device.csv);
-  if (device.protocol == Protocol::kMcap) read_mcap(in.table("mcap"), device.role, device.mcap);
+  if (is_message_log(device.protocol)) read_messages(in.table("messages"), device.role, device.messages);
   if (device.role == DeviceRole::kGnss) {
     device.gnss.position_sd_m = {0.02, 0.02, 0.04};
     device.gnss.velocity_sd_mps = {0.05, 0.05, 0.10};

@@ -173,8 +173,7 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.protocol",
      "What the device speaks. A `gnss` device: greis, nmea, ubx, rtklib_pos, csv_gnss, or xsens_mt where it "
      "has a receiver inside. An `odometry` device: can_odometry. A `time` device: pps. An IMU: any other. "
-     "mcap, "
-     "for messages of ROS in an MCAP file, has every role."},
+     "mcap, rosbag, ulog and dataflash, for messages in a file of many topics, have every role."},
     {"device.rate_hz",
      "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, 50 of wheel "
      "speeds, 1 of pulses."},
@@ -274,23 +273,22 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.csv.position_sd_columns", "csv_gnss: north, east, down, metres."},
     {"device.csv.clock",
      "csv: `common`: times are of the reference's clock. `own`: of another, found by the motion."},
-    {"device.mcap.topic",
-     "mcap: the topic in the file. An IMU is sensor_msgs/Imu, a gnss device sensor_msgs/NavSatFix, an "
-     "odometry "
-     "device nav_msgs/Odometry, a time device sensor_msgs/TimeReference. Without it the only one of that "
-     "type."},
-    {"device.mcap.velocity_topic",
-     "mcap: the receiver's velocity, east-north-up, at the times of its positions: "
-     "geometry_msgs/TwistWithCovarianceStamped or TwistStamped. Without it there is none."},
-    {"device.mcap.frame_id",
-     "mcap: messages of another frame_id are passed over, where a topic holds several sensors. Bodies of ROS "
-     "are "
-     "forward-left-up: write axes = \"+x -y -z\" for those."},
-    {"device.mcap.time",
-     "mcap: when a message was valid: its header's stamp, or when it was recorded or sent."},
-    {"device.mcap.times_are_utc", "mcap: the times are UTC and not of a PC's clock that nobody set."},
-    {"device.mcap.clock",
-     "mcap: `common`: times are of the reference's clock. `own`: of another, found by UTC or the motion."},
+    {"device.messages.topic",
+     "mcap, rosbag, ulog, dataflash: the topic in the file. An IMU is sensor_msgs/Imu, a gnss device "
+     "sensor_msgs/NavSatFix, an odometry device nav_msgs/Odometry, a time device sensor_msgs/TimeReference. "
+     "Without it the only one of that type."},
+    {"device.messages.velocity_topic",
+     "The receiver's velocity, east-north-up, at the times of its positions: "
+     "geometry_msgs/TwistWithCovarianceStamped or TwistStamped. Without it there is none; ulog and dataflash "
+     "take that beside the positions."},
+    {"device.messages.frame_id",
+     "Messages of another frame_id are passed over, where a topic holds several sensors. Bodies of ROS "
+     "are forward-left-up: write axes = \"+x -y -z\" for those."},
+    {"device.messages.time",
+     "When a message was valid: its header's stamp, or when it was recorded or sent."},
+    {"device.messages.times_are_utc", "The times are UTC and not of a clock that nobody set."},
+    {"device.messages.clock",
+     "`common`: times are of the reference's clock. `own`: of another, found by UTC or the motion."},
     {"device.antenna_lever_arm_b_m", "gnss: from the R-IMU to the antenna, in b."},
     {"device.position_sd_m", "gnss: north, east, down; where the receiver gives none."},
     {"device.velocity_sd_mps", "gnss: north, east, down; where the receiver gives none."},

@@ -26,7 +26,10 @@ enum class Protocol : std::uint8_t {
   kXsensCan,
   kCanOdometry,
   kPps,
-  kMcap
+  kMcap,
+  kRosbag,
+  kUlog,
+  kDataflash
 };
 
 /// What the rest of the service has to know of a protocol.
@@ -39,7 +42,7 @@ struct ProtocolTraits {
   bool is_text = false;   ///< rows with named columns, read from files alone
 };
 
-inline constexpr std::array<ProtocolTraits, 12> kProtocols{
+inline constexpr std::array<ProtocolTraits, 15> kProtocols{
     {{Protocol::kXsensMt, "xsens_mt", SampleKind::kImu, 100.0, true},
      {Protocol::kIxblueStdbin, "ixblue_stdbin", SampleKind::kImu, 100.0, true},
      {Protocol::kGreis, "greis", SampleKind::kGnss, 10.0, true},
@@ -51,7 +54,10 @@ inline constexpr std::array<ProtocolTraits, 12> kProtocols{
      {Protocol::kXsensCan, "xsens_can", SampleKind::kImu, 100.0, false},
      {Protocol::kCanOdometry, "can_odometry", SampleKind::kOdometry, 50.0, false},
      {Protocol::kPps, "pps", SampleKind::kPulse, 1.0, false},
-     {Protocol::kMcap, "mcap", SampleKind::kImu, 100.0, false}}};
+     {Protocol::kMcap, "mcap", SampleKind::kImu, 100.0, false},
+     {Protocol::kRosbag, "rosbag", SampleKind::kImu, 100.0, false},
+     {Protocol::kUlog, "ulog", SampleKind::kImu, 100.0, false},
+     {Protocol::kDataflash, "dataflash", SampleKind::kImu, 100.0, false}}};
 
 [[nodiscard]] constexpr const ProtocolTraits& traits_of(Protocol protocol) noexcept {
   return kProtocols[static_cast<std::size_t>(protocol)];
@@ -69,11 +75,17 @@ static_assert(
   return traits_of(protocol).name;
 }
 
+/// Whether a device is messages of topics in a file that holds many: MCAP, a bag of ROS 1, a log of a flight
+/// controller.
+[[nodiscard]] constexpr bool is_message_log(Protocol protocol) noexcept {
+  return protocol == Protocol::kMcap || protocol == Protocol::kRosbag || protocol == Protocol::kUlog ||
+         protocol == Protocol::kDataflash;
+}
+
 /// Whether a device of this protocol can have a role. An XSens device with a receiver inside can be that, or
-/// an IMU. The topics of an MCAP file hold
-/// whatever there is.
+/// an IMU. Topics hold whatever there is.
 [[nodiscard]] constexpr bool fits(Protocol protocol, DeviceRole role) noexcept {
-  if (protocol == Protocol::kMcap) return true;
+  if (is_message_log(protocol)) return true;
   if (protocol == Protocol::kXsensMt) return role != DeviceRole::kOdometry && role != DeviceRole::kTime;
   switch (traits_of(protocol).purpose) {
     case SampleKind::kGnss:

@@ -24,7 +24,11 @@ void CdrWriter::text(std::string_view text) {
   out_.push_back('\0');
 }
 
-CdrReader::CdrReader(Bytes message) noexcept {
+CdrReader::CdrReader(Bytes message, Wire wire) noexcept : wire_(wire) {
+  if (wire_ == Wire::kRos1) {
+    body_ = message;
+    return;
+  }
   // 0 and 1 are plain CDR; what else there is (parameter lists, XCDR2) no ROS message of these types is
   // written in.
   good_ = message.size() >= kHead && message[0] == 0 && message[1] <= kPlainLittleEndian;
@@ -34,7 +38,7 @@ CdrReader::CdrReader(Bytes message) noexcept {
 }
 
 void CdrReader::align(std::size_t size) noexcept {
-  const std::size_t over = at_ % size;
+  const std::size_t over = wire_ == Wire::kCdr ? at_ % size : 0;
   if (over > 0) at_ = std::min(body_.size(), at_ + size - over);
 }
 
@@ -47,7 +51,7 @@ std::string_view CdrReader::text() noexcept {
   }
   auto text = text_of(body_.subspan(at_, size));
   at_ += size;
-  if (text.ends_with('\0')) text.remove_suffix(1);
+  if (wire_ == Wire::kCdr && text.ends_with('\0')) text.remove_suffix(1);
   return text;
 }
 

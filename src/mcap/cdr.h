@@ -1,7 +1,7 @@
 #pragma once
 
 /// CDR as ROS 2 serialises its messages (XCDR1, plain): a head of four bytes that tells the byte order, then
-/// fields at multiples of their size, counted from behind the head.
+/// fields at multiples of their size, counted from behind the head. Read as ROS 1 writes them, too.
 
 #include <array>
 #include <bit>
@@ -42,10 +42,16 @@ class CdrWriter {
   std::string out_;
 };
 
+/// How the fields of a message of ROS lie in its bytes.
+enum class Wire : std::uint8_t {
+  kCdr,   ///< ROS 2
+  kRos1,  ///< one after the other, little-endian, no head, no zero behind texts
+};
+
 /// Takes fields one after the other; what is asked for beyond the end is zero, and good() says so.
 class CdrReader {
  public:
-  explicit CdrReader(Bytes message) noexcept;
+  explicit CdrReader(Bytes message, Wire wire = Wire::kCdr) noexcept;
   template <typename Number>
   [[nodiscard]] Number number() noexcept {
     align(sizeof(Number));
@@ -68,9 +74,11 @@ class CdrReader {
   }
   [[nodiscard]] std::string_view text() noexcept;
   [[nodiscard]] bool good() const noexcept { return good_; }
+  [[nodiscard]] Wire wire() const noexcept { return wire_; }
 
  private:
   void align(std::size_t size) noexcept;
+  Wire wire_;
   Bytes body_;
   std::size_t at_ = 0;
   bool swap_ = false;

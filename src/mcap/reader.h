@@ -17,39 +17,20 @@
 
 #include "base/result.h"
 #include "mcap/compression.h"
-#include "mcap/records.h"
+#include "mcap/message_reader.h"
 
 namespace imuscope::mcap {
 
-/// A topic, and how its messages are written.
-struct Topic {
-  std::string name;
-  std::string encoding;  ///< "cdr", "json"
-  std::string schema;    ///< "sensor_msgs/msg/Imu"
-  std::string schema_encoding;
-};
-
-/// One message; its bytes are valid until the next call of next().
-struct Message {
-  const Topic* topic = nullptr;
-  std::uint64_t log_time = 0;  ///< ns since 1970-01-01, or of another clock
-  std::uint64_t publish_time = 0;
-  Bytes data;
-};
-
-class Reader {
+class Reader final : public MessageReader {
  public:
   /// Errors (kWork): a file that cannot be read or is no MCAP file.
   static Result<Reader> open(const std::filesystem::path& file);
 
-  /// The next message; nothing at the end.
-  std::optional<Message> next();
-
-  /// What could not be read so far, in sentences; empty where nothing is missing.
-  [[nodiscard]] std::vector<std::string> losses() const;
+  std::optional<Message> next() override;
+  [[nodiscard]] std::vector<std::string> losses() const override;
   [[nodiscard]] const std::string& profile() const noexcept { return profile_; }
-  [[nodiscard]] std::uint64_t bytes_read() const noexcept { return position_; }
-  [[nodiscard]] std::uint64_t bytes_total() const noexcept { return size_; }
+  [[nodiscard]] std::uint64_t bytes_read() const noexcept override { return position_; }
+  [[nodiscard]] std::uint64_t bytes_total() const noexcept override { return size_; }
 
  private:
   struct Loss {

@@ -27,6 +27,8 @@ void write_header(CdrWriter& out, const RosHeader& header) {
 }
 
 void read_header(CdrReader& in, RosHeader& header) {
+  // ROS 1 counts its messages.
+  if (in.wire() == Wire::kRos1) (void)in.number<std::uint32_t>();
   header.stamp_ns = read_time(in);
   header.frame_id = in.text();
 }
@@ -111,8 +113,8 @@ void write_diagnostics(CdrWriter& out, const RosHeader& header, const std::vecto
   }
 }
 
-bool read(Bytes message, Imu& imu) {
-  CdrReader in(message);
+bool read(Bytes message, Imu& imu, Wire wire) {
+  CdrReader in(message, wire);
   read_header(in, imu.header);
   imu.orientation = in.numbers<4>();
   imu.orientation_covariance = in.numbers<9>();
@@ -123,8 +125,8 @@ bool read(Bytes message, Imu& imu) {
   return in.good();
 }
 
-bool read(Bytes message, NavSatFix& fix) {
-  CdrReader in(message);
+bool read(Bytes message, NavSatFix& fix, Wire wire) {
+  CdrReader in(message, wire);
   read_header(in, fix.header);
   fix.status = in.number<std::int8_t>();
   fix.service = in.number<std::uint16_t>();
@@ -136,8 +138,8 @@ bool read(Bytes message, NavSatFix& fix) {
   return in.good();
 }
 
-bool read(Bytes message, Odometry& odometry) {
-  CdrReader in(message);
+bool read(Bytes message, Odometry& odometry, Wire wire) {
+  CdrReader in(message, wire);
   read_header(in, odometry.header);
   odometry.child_frame_id = in.text();
   odometry.position_m = in.numbers<3>();
@@ -149,8 +151,8 @@ bool read(Bytes message, Odometry& odometry) {
   return in.good();
 }
 
-bool read(Bytes message, TwistStamped& twist) {
-  CdrReader in(message);
+bool read(Bytes message, TwistStamped& twist, Wire wire) {
+  CdrReader in(message, wire);
   read_header(in, twist.header);
   twist.linear_mps = in.numbers<3>();
   twist.angular_radps = in.numbers<3>();
@@ -160,8 +162,8 @@ bool read(Bytes message, TwistStamped& twist) {
   return is_twist;
 }
 
-bool read(Bytes message, TimeReference& reference) {
-  CdrReader in(message);
+bool read(Bytes message, TimeReference& reference, Wire wire) {
+  CdrReader in(message, wire);
   read_header(in, reference.header);
   reference.time_ref_ns = read_time(in);
   reference.source = in.text();

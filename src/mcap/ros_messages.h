@@ -1,7 +1,7 @@
 #pragma once
 
 /// The messages of ROS 2 that a run is made of and comes as: sensor_msgs, nav_msgs, tf2_msgs,
-/// diagnostic_msgs, with their ros2msg schemas, in CDR both ways and from JSON.
+/// diagnostic_msgs, with their ros2msg schemas, in CDR both ways, from the bytes of ROS 1 and from JSON.
 ///
 /// Frames are those of ROS (REP 103): positions and velocities east-north-up, bodies forward-left-up. Who
 /// fills them in turns forward-right-down and north-east-down into these.
@@ -111,12 +111,12 @@ void write(CdrWriter& out, const std::vector<Transform>& transforms);
 void write_diagnostics(CdrWriter& out, const RosHeader& header, const std::vector<Diagnostic>& diagnostics);
 
 /// False where the bytes are no such message.
-[[nodiscard]] bool read(Bytes message, Imu& imu);
-[[nodiscard]] bool read(Bytes message, NavSatFix& fix);
-[[nodiscard]] bool read(Bytes message, Odometry& odometry);
+[[nodiscard]] bool read(Bytes message, Imu& imu, Wire wire = Wire::kCdr);
+[[nodiscard]] bool read(Bytes message, NavSatFix& fix, Wire wire = Wire::kCdr);
+[[nodiscard]] bool read(Bytes message, Odometry& odometry, Wire wire = Wire::kCdr);
 /// A TwistStamped, too.
-[[nodiscard]] bool read(Bytes message, TwistStamped& twist);
-[[nodiscard]] bool read(Bytes message, TimeReference& reference);
+[[nodiscard]] bool read(Bytes message, TwistStamped& twist, Wire wire = Wire::kCdr);
+[[nodiscard]] bool read(Bytes message, TimeReference& reference, Wire wire = Wire::kCdr);
 [[nodiscard]] bool read_json(Bytes message, Imu& imu);
 [[nodiscard]] bool read_json(Bytes message, NavSatFix& fix);
 [[nodiscard]] bool read_json(Bytes message, Odometry& odometry);

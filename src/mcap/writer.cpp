@@ -97,43 +97,66 @@ void Writer::write(ChannelId id, std::uint64_t log_time, std::uint64_t publish_t
   begin_time_ = messages_ == 0 ? log_time : std::min(begin_time_, log_time);
   end_time_ = std::max(end_time_, log_time);
   ++messages_;
-  if (chunk_.size() >= options_.chunk_bytes) end_chunk();
+  if (chunk_.size() < options_.chunk_bytes) return;
+  hand_over();
+  if (!options_.packs_beside) write_out();
 }
 
 void Writer::end_chunk() {
+  hand_over();
+  write_out();
+}
+
+/// The chunk that was filled begins to be packed; the one before it goes into the file.
+void Writer::hand_over() {
   if (!chunk_has_message_) return;
-  ChunkEntry entry;
-  entry.begin_time = chunk_begin_;
-  entry.end_time = chunk_end_;
+  write_out();
+  has_full_ = true;
+  full_.entry = ChunkEntry{};
+  full_.entry.begin_time = chunk_begin_;
+  full_.entry.end_time = chunk_end_;
+  full_.entry.unpacked = chunk_.size();
+  full_.content.swap(chunk_);
+  chunk_.clear();
+  chunk_has_message_ = false;
+  full_.indexes.resize(channels_.size());
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    full_.indexes[i].swap(channels_[i].index);
+    channels_[i].index.clear();
+  }
+  full_.is_packed = std::async(options_.packs_beside ? std::launch::async : std::launch::deferred, [this] {
+    packer_.pack(full_.content, full_.packed);
+    full_.crc = crc32_of(bytes_of(full_.content));
+  });
+}
+
+void Writer::write_out() {
+  if (!std::exchange(has_full_, false)) return;
+  full_.is_packed.get();
+  ChunkEntry& entry = full_.entry;
   entry.offset = position_;
-  entry.unpacked = chunk_.size();
-  packer_.pack(chunk_, packed_);
-  entry.packed = packed_.size();
+  entry.packed = full_.packed.size();
   put(record(Opcode::kChunk, [&](RecordWriter& writer) {
     writer.number(entry.begin_time);
     writer.number(entry.end_time);
     writer.number(entry.unpacked);
-    writer.number(crc32_of(bytes_of(chunk_)));
+    writer.number(full_.crc);
     writer.text(name_of(options_.compression));
-    writer.number(static_cast<std::uint64_t>(packed_.size()));
-    writer.bytes(packed_);
+    writer.number(static_cast<std::uint64_t>(full_.packed.size()));
+    writer.bytes(full_.packed);
   }));
   entry.length = position_ - entry.offset;
-  for (std::size_t i = 0; i < channels_.size(); ++i) {
-    auto& index = channels_[i].index;
-    if (index.empty()) continue;
+  for (std::size_t i = 0; i < full_.indexes.size(); ++i) {
+    if (full_.indexes[i].empty()) continue;
     const auto id = static_cast<ChannelId>(i + 1);
     entry.index_offsets[id] = position_;
     put(record(Opcode::kMessageIndex, [&](RecordWriter& writer) {
       writer.number(id);
-      writer.text(index);
+      writer.text(full_.indexes[i]);
     }));
-    index.clear();
   }
   entry.index_length = position_ - entry.offset - entry.length;
   chunks_.push_back(std::move(entry));
-  chunk_.clear();
-  chunk_has_message_ = false;
 }
 
 void Writer::attach(const std::string& name, const std::string& media_type, std::uint64_t time,

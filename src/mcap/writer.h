@@ -3,10 +3,11 @@
 /// Writes an MCAP file: messages in packed chunks, indexes of messages, chunks, attachments and metadata,
 /// statistics, all CRCs. What was written before a cut of the power is read without the index.
 ///
-/// Soft world: allocates. Thread: one.
+/// Soft world: allocates. Thread: one, and one more for packing where that is asked for.
 
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <map>
 #include <set>
 #include <string>
@@ -27,6 +28,7 @@ struct WriterOptions {
   std::string library;  ///< the program
   Compression compression = Compression::kZstd;
   std::size_t chunk_bytes = std::size_t{1} << 20U;  ///< of a chunk before it is packed, about
+  bool packs_beside = false;  ///< a chunk is packed by a thread of its own while the next one is filled
 };
 
 class Writer {
@@ -72,7 +74,18 @@ class Writer {
     std::uint64_t packed = 0;
     std::uint64_t unpacked = 0;
   };
+  /// A chunk that is full, on its way into the file.
+  struct FullChunk {
+    ChunkEntry entry;
+    std::string content;
+    std::vector<std::string> indexes;  ///< by channel
+    std::string packed;
+    std::uint32_t crc = 0;
+    std::future<void> is_packed;
+  };
   void put(std::string_view bytes);
+  void hand_over();
+  void write_out();
   void define(Channel& channel);
   std::string summary(std::string& offsets) const;
 
@@ -94,7 +107,8 @@ class Writer {
   std::uint64_t messages_ = 0;
   std::uint64_t begin_time_ = 0;
   std::uint64_t end_time_ = 0;
-  std::string packed_;
+  FullChunk full_;
+  bool has_full_ = false;
 };
 
 }  // namespace imuscope::mcap

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cctype>
+#include <deque>
 #include <fstream>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -53,23 +55,76 @@ class RawDumpSource final : public ByteSource {
   std::span<const std::uint8_t> rest_;
 };
 
+/// The reads of several devices, taken from one pass over a capture and kept until they are asked for.
+class SharedReads {
+ public:
+  SharedReads(CaptureReader reader, const std::vector<std::string>& devices) : reader_(std::move(reader)) {
+    for (const auto& device : devices) lines_.push_back({device, {}, true});
+  }
+
+  /// The next of line `i`, whatever its direction; nothing at the end.
+  std::optional<RawRead> next(std::size_t i) {
+    auto& waiting = lines_[i].waiting;
+    while (waiting.empty() && !is_far_ahead()) {
+      auto read = reader_.next();
+      if (!read) return std::nullopt;
+      take(*read);
+    }
+    if (waiting.empty()) return std::nullopt;
+    RawRead read = std::move(waiting.front());
+    waiting.pop_front();
+    held_ -= read.bytes.size();
+    return read;
+  }
+  /// So much is kept for others that a line that has nothing waiting goes its own way.
+  [[nodiscard]] bool is_far_ahead() const { return held_ > kHeldMost; }
+  void leave(std::size_t i) {
+    lines_[i].is_wanted = false;
+    lines_[i].waiting = {};
+  }
+
+ private:
+  /// What five lines at their full rate bring in some minutes.
+  static constexpr std::size_t kHeldMost = std::size_t{32} << 20U;
+  struct Line {
+    std::string device;
+    std::deque<RawRead> waiting;
+    bool is_wanted;
+  };
+  void take(RawRead& read) {
+    Line* last = nullptr;
+    for (Line& line : lines_) {
+      if (!line.is_wanted || line.device != read.device) continue;
+      held_ += read.bytes.size();
+      if (last != nullptr) last->waiting.push_back(read);
+      last = &line;
+    }
+    if (last != nullptr) last->waiting.push_back(std::move(read));
+  }
+  CaptureReader reader_;
+  std::vector<Line> lines_;
+  std::size_t held_ = 0;
+};
+
 /// One device's reads out of a capture; what was written to devices is passed over.
 class CaptureSource final : public ByteSource {
  public:
-  CaptureSource(CaptureReader reader, std::string device, std::uint64_t total)
-      : reader_(std::move(reader)), device_(std::move(device)), total_(total) {}
+  /// @param take  the device's next, of any direction
+  CaptureSource(std::function<Result<std::optional<RawRead>>()> take, std::uint64_t total)
+      : take_(std::move(take)), total_(total) {}
 
   Result<std::optional<RecordedRead>> next() override {
     for (;;) {
-      auto read = reader_.next();
-      if (!read) return std::optional<RecordedRead>{};
-      if (read->device != device_) continue;
-      if (read->direction == Direction::kLine) {
-        const auto told = line_rate_of(read->bytes);
+      auto taken = take_();
+      if (!taken) return tl::unexpected<Error>(taken.error());
+      if (!*taken) return std::optional<RecordedRead>{};
+      RawRead& read = **taken;
+      if (read.direction == Direction::kLine) {
+        const auto told = line_rate_of(read.bytes);
         if (told) per_byte_ = told;
       }
-      if (read->direction != Direction::kRead) continue;
-      current_ = std::move(*read);
+      if (read.direction != Direction::kRead) continue;
+      current_ = std::move(read);
       read_ += current_.bytes.size();
       return std::optional<RecordedRead>{RecordedRead{
           current_.arrival, current_.bytes, std::exchange(per_byte_, std::nullopt), current_.received}};
@@ -79,12 +134,56 @@ class CaptureSource final : public ByteSource {
   [[nodiscard]] std::uint64_t bytes_total() const override { return total_; }
 
  private:
-  CaptureReader reader_;
-  std::string device_;
+  std::function<Result<std::optional<RawRead>>()> take_;
   std::uint64_t total_;
   std::uint64_t read_ = 0;
   std::optional<Duration> per_byte_;  ///< told, and no read since
   RawRead current_;
+};
+
+/// Takes the reads of one device from a reader of its own.
+class OwnReads {
+ public:
+  OwnReads(CaptureReader reader, std::string device)
+      : reader_(std::make_shared<CaptureReader>(std::move(reader))), device_(std::move(device)) {}
+  Result<std::optional<RawRead>> operator()() {
+    for (;;) {
+      auto read = reader_->next();
+      if (!read || read->device == device_) return read;
+    }
+  }
+
+ private:
+  std::shared_ptr<CaptureReader> reader_;
+  std::string device_;
+};
+
+/// Takes them from those that are shared, and by itself from where it went too far ahead.
+class SharedLine {
+ public:
+  SharedLine(std::shared_ptr<SharedReads> shared, std::size_t index, std::filesystem::path capture,
+             std::string device)
+      : shared_(std::move(shared)), index_(index), capture_(std::move(capture)), device_(std::move(device)) {}
+  Result<std::optional<RawRead>> operator()() {
+    if (own_) return (*own_)();
+    auto read = shared_->next(index_);
+    if (read) ++taken_;
+    if (read || !shared_->is_far_ahead()) return read;
+    shared_->leave(index_);
+    auto reader = CaptureReader::open(capture_, device_);
+    if (!reader) return tl::unexpected<Error>(reader.error());
+    own_.emplace(std::move(*reader), device_);
+    for (std::uint64_t i = 0; i < taken_; ++i) (void)(*own_)();
+    return (*own_)();
+  }
+
+ private:
+  std::shared_ptr<SharedReads> shared_;
+  std::size_t index_;
+  std::filesystem::path capture_;
+  std::string device_;
+  std::uint64_t taken_ = 0;
+  std::optional<OwnReads> own_;
 };
 
 /// Bytes of the header of a .mtb log; 0 for any other file.
@@ -122,7 +221,22 @@ Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::
                                                          const std::string& device, std::uint64_t bytes) {
   auto reader = CaptureReader::open(capture, device);
   if (!reader) return tl::unexpected<Error>(reader.error());
-  return std::make_unique<CaptureSource>(std::move(*reader), device, bytes);
+  return std::make_unique<CaptureSource>(OwnReads(std::move(*reader), device), bytes);
+}
+
+Result<std::vector<std::unique_ptr<ByteSource>>> open_captured_lines(const std::filesystem::path& capture,
+                                                                     const std::vector<CapturedLine>& lines) {
+  auto reader = CaptureReader::open(capture);
+  if (!reader) return tl::unexpected<Error>(reader.error());
+  std::vector<std::string> devices;
+  for (const auto& line : lines) devices.push_back(line.device);
+  const auto shared = std::make_shared<SharedReads>(std::move(*reader), devices);
+  std::vector<std::unique_ptr<ByteSource>> sources;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    sources.push_back(
+        std::make_unique<CaptureSource>(SharedLine(shared, i, capture, lines[i].device), lines[i].bytes));
+  }
+  return sources;
 }
 
 }  // namespace imuscope

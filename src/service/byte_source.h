@@ -7,6 +7,8 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "base/time.h"
@@ -39,5 +41,16 @@ Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& f
 /// @param bytes  of this device in the capture, as CaptureSummary says
 Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::path& capture,
                                                          const std::string& device, std::uint64_t bytes);
+
+/// A device whose reads are wanted, and their bytes, as CaptureSummary says.
+struct CapturedLine {
+  std::string device;
+  std::uint64_t bytes = 0;
+};
+
+/// The reads of several devices by one pass over the capture, for those who go through them side by side; a
+/// device may be named twice. One that is asked for far ahead of the others reads the capture by itself.
+Result<std::vector<std::unique_ptr<ByteSource>>> open_captured_lines(const std::filesystem::path& capture,
+                                                                     const std::vector<CapturedLine>& lines);
 
 }  // namespace imuscope

@@ -75,7 +75,7 @@ Result<DeviceClock> align_by_rate(const std::string& name, const RateSeries& ref
 }  // namespace
 
 bool shares_the_reference_clock(const DeviceConfig& device) {
-  if (device.protocol == Protocol::kMcap) return device.mcap.common_clock;
+  if (is_message_log(device.protocol)) return device.messages.common_clock;
   const bool csv = traits_of(device.protocol).is_text;
   return csv ? device.csv.common_clock : device.gnss.common_clock;
 }

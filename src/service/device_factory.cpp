@@ -119,7 +119,7 @@ std::unique_ptr<DeviceDecoder> make_rtklib_pos(const DeviceConfig& device, Devic
 std::unique_ptr<DeviceDecoder> make_ros_message(const DeviceConfig& device, DeviceIndex index,
                                                 const ClockMapConfig& clock) {
   return std::make_unique<ros_message::Decoder>(ros_message::DecoderConfig{
-      index, device.axes, from_seconds(1.0 / device.rate_hz), device.mcap.times_are_utc, clock});
+      index, device.axes, from_seconds(1.0 / device.rate_hz), device.messages.times_are_utc, clock});
 }
 
 csv::ImuConfig csv_imu(const DeviceConfig& device, DeviceIndex index, const ClockMapConfig& clock) {
@@ -183,6 +183,9 @@ std::unique_ptr<DeviceDecoder> make_decoder(const DeviceConfig& device, DeviceIn
     case Protocol::kPps:
       return std::make_unique<pps::Decoder>(pps::DecoderConfig{index});
     case Protocol::kMcap:
+    case Protocol::kRosbag:
+    case Protocol::kUlog:
+    case Protocol::kDataflash:
       return make_ros_message(device, index, clock);
   }
   return nullptr;
@@ -220,6 +223,9 @@ std::unique_ptr<DeviceSession> make_session(const DeviceConfig& device, bool sea
     case Protocol::kCsvImu:
     case Protocol::kCsvGnss:
     case Protocol::kMcap:
+    case Protocol::kRosbag:
+    case Protocol::kUlog:
+    case Protocol::kDataflash:
       break;
   }
   return nullptr;

@@ -9,6 +9,11 @@
 namespace imuscope {
 namespace {
 
+/// What a device is there for.
+SampleKind purpose_of(const FoundDevice& device) {
+  return device.purpose.value_or(traits_of(device.protocol).purpose);
+}
+
 /// Where the reference stands in the list; -1 without an IMU.
 std::ptrdiff_t reference_of(const std::vector<FoundDevice>& devices) {
   const auto first = [&](auto&& is) {
@@ -16,9 +21,7 @@ std::ptrdiff_t reference_of(const std::vector<FoundDevice>& devices) {
     return found == devices.end() ? -1 : found - devices.begin();
   };
   const auto stdbin = first([](const FoundDevice& d) { return d.protocol == Protocol::kIxblueStdbin; });
-  return stdbin >= 0
-             ? stdbin
-             : first([](const FoundDevice& d) { return traits_of(d.protocol).purpose == SampleKind::kImu; });
+  return stdbin >= 0 ? stdbin : first([](const FoundDevice& d) { return purpose_of(d) == SampleKind::kImu; });
 }
 
 /// A rate as a person would set it: measured ones are off by what the short look adds.
@@ -37,6 +40,9 @@ std::string table_of(const FoundDevice& device, const std::string& name, DeviceR
         "# From the reference's origin to the antenna, forward-right-down: measure it.\n"
         "antenna_lever_arm_b_m = [0.0, 0.0, 0.0]\n";
   }
+  if (device.is_flu && role != DeviceRole::kGnss && role != DeviceRole::kTime)
+    text += "axes = \"+x -y -z\"  # forward-left-up, as ROS has its bodies\n";
+  if (!device.topic.empty()) text += fmt::format("[device.messages]\ntopic = \"{}\"\n", device.topic);
   if (device.serial) {
     text += fmt::format("transport = {{ kind = \"serial\", port = \"{}\", baud = {}", device.serial->port,
                         device.serial->baud);
@@ -59,14 +65,17 @@ Result<std::string> draft_configuration(const std::string& run_name,
   int receivers = 0;
   for (std::size_t i = 0; i < devices.size(); ++i) {
     const FoundDevice& device = devices[i];
-    const bool is_gnss = traits_of(device.protocol).purpose == SampleKind::kGnss;
+    const bool is_gnss = purpose_of(device) == SampleKind::kGnss;
+    const bool is_time = purpose_of(device) == SampleKind::kPulse;
     const bool is_reference = static_cast<std::ptrdiff_t>(i) == reference;
     const DeviceRole role = is_gnss        ? DeviceRole::kGnss
+                            : is_time      ? DeviceRole::kTime
                             : is_reference ? DeviceRole::kReference
                                            : DeviceRole::kStudy;
     studies += role == DeviceRole::kStudy ? 1 : 0;
     receivers += is_gnss ? 1 : 0;
     const std::string by_role = is_gnss        ? "gnss"
+                                : is_time      ? "time"
                                 : is_reference ? std::string("reference")
                                                : fmt::format("study{}", studies);
     text += "\n" + table_of(device, device.name.empty() ? by_role : device.name, role);

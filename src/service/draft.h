@@ -18,6 +18,11 @@ struct FoundDevice {
   std::optional<double> rate_hz;       ///< of its samples; the protocol's default where absent
   std::optional<SerialConfig> serial;  ///< absent for a device that is only a file
   std::string remark;                  ///< for a comment above its table; may be empty
+  /// Of a topic in a file of many (is_message_log()): its name, what it holds, and whether its bodies are
+  /// forward-left-up.
+  std::string topic{};
+  std::optional<SampleKind> purpose{};
+  bool is_flu = false;
 };
 
 /// Roles: GNSS protocols are gnss; of the IMUs the first StdBin unit, else the first at all, is the

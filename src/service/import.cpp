@@ -11,6 +11,7 @@
 #include "service/core.h"
 #include "service/device_factory.h"
 #include "service/draft.h"
+#include "service/message_log.h"
 #include "service/protocol_finder.h"
 #include "service/recording.h"
 
@@ -131,10 +132,76 @@ Result<std::vector<std::uint8_t>> beginning_of(const std::string& file) {
   return bytes;
 }
 
-/// A configuration from the files alone.
-Result<std::string> draft_from_files(const std::vector<std::string>& inputs) {
+/// Whether a topic is a whole IMU that no better topic of the same log holds.
+bool is_best_imu(const FoundTopic& topic, const std::vector<FoundTopic>& topics) {
+  if (topic.type != "sensor_msgs/Imu") return false;
+  const auto has = [&](std::string_view begin) {
+    return std::any_of(topics.begin(), topics.end(),
+                       [&](const auto& t) { return t.name.starts_with(begin); });
+  };
+  // Of PX4 and ArduPilot: gyros and accelerometers apart, and what is made of others.
+  for (const std::string_view half : {"sensor_gyro/", "sensor_accel/", "ACC/", "GYR/", "ISB/"}) {
+    if (topic.name.starts_with(half)) return false;
+  }
+  if (topic.name.starts_with("sensor_combined/")) return !has("vehicle_imu/");
+  if (topic.name.starts_with("IMT/")) return !has("IMU/");
+  return true;
+}
+
+/// A device's name of a topic's: "vehicle_imu/0" is vehicle_imu_0.
+std::string device_name_of(const std::string& topic) {
+  constexpr std::size_t kLongest = 32;
+  std::string name;
+  for (const char c : topic) {
+    const bool is_plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+    if (is_plain || !name.empty()) name += is_plain ? c : '_';
+  }
+  return name.size() > kLongest ? name.substr(name.size() - kLongest) : name;
+}
+
+/// The devices that a file of many topics holds: all IMUs, the first receiver and the first that tells UTC.
+Result<std::vector<FoundDevice>> devices_of_log(const std::string& file, Protocol protocol) {
+  const auto topics = find_topics(file, protocol);
+  if (!topics) return tl::unexpected<Error>(topics.error());
   std::vector<FoundDevice> devices;
-  for (const std::string& input : inputs) {
+  const auto has = [&](SampleKind purpose) {
+    return std::any_of(devices.begin(), devices.end(),
+                       [&](const auto& device) { return device.purpose == purpose; });
+  };
+  for (const FoundTopic& topic : *topics) {
+    FoundDevice device;
+    if (is_best_imu(topic, *topics)) device.purpose = SampleKind::kImu;
+    if (topic.type == "sensor_msgs/NavSatFix" && !has(SampleKind::kGnss)) device.purpose = SampleKind::kGnss;
+    if (topic.type == "sensor_msgs/TimeReference" && !has(SampleKind::kPulse))
+      device.purpose = SampleKind::kPulse;
+    // Control characters and quotes have no place in a configuration.
+    const bool is_text = std::all_of(topic.name.begin(), topic.name.end(),
+                                     [](char c) { return c > ' ' && c != '"' && c != '\\' && c != '\x7F'; });
+    if (!device.purpose || !is_text) continue;
+    device.name = device_name_of(topic.name);
+    device.protocol = protocol;
+    if (topic.rate_hz > 0.0) device.rate_hz = topic.rate_hz;
+    device.topic = topic.name;
+    device.is_flu = protocol == Protocol::kMcap || protocol == Protocol::kRosbag;
+    device.remark = fmt::format("{} messages", topic.messages);
+    devices.push_back(std::move(device));
+  }
+  return devices;
+}
+
+/// A configuration from the files alone.
+/// @param inputs  a file of many topics becomes NAME=FILE of each of its devices
+Result<std::string> draft_from_files(std::vector<std::string>& inputs) {
+  std::vector<FoundDevice> devices;
+  for (const std::string& input : std::exchange(inputs, {})) {
+    if (const auto log = find_message_log(input)) {
+      const auto found = devices_of_log(input, *log);
+      if (!found) return tl::unexpected<Error>(found.error());
+      for (const auto& device : *found) inputs.push_back(device.name + "=" + input);
+      devices.insert(devices.end(), found->begin(), found->end());
+      continue;
+    }
+    inputs.push_back(input);
     const auto equals = input.find('=');
     if (equals == std::string::npos || equals == 0) {
       return usage_error(fmt::format("'{}' does not say whose recording it is", input),
@@ -163,11 +230,12 @@ Result<OpenedRecording> open_inputs(const ImportOptions& options) {
     if (options.progress) options.progress(share);
   };
   if (options.configuration) return open_recording(options.inputs, options.configuration, progress);
-  const auto draft = draft_from_files(options.inputs);
+  std::vector<std::string> inputs = options.inputs;
+  const auto draft = draft_from_files(inputs);
   if (!draft) return tl::unexpected<Error>(draft.error());
   auto configuration = parse_configuration(*draft, "the draft");
   if (!configuration) return tl::unexpected<Error>(configuration.error());
-  return open_dumps(options.inputs, std::move(*configuration), progress);
+  return open_dumps(inputs, std::move(*configuration), progress);
 }
 
 /// Writes the reads of all devices in the order of their arrival, equal ones in configuration order.

@@ -14,7 +14,7 @@
 #include "service/candump_source.h"
 #include "service/capture_damage.h"
 #include "service/device_factory.h"
-#include "service/mcap_source.h"
+#include "service/message_source.h"
 #include "service/noise_feedback.h"
 #include "service/recorded_look.h"
 
@@ -25,6 +25,20 @@ namespace {
 constexpr std::uint64_t kReadsPerProgress = 1024;
 /// 2000-01-01: a clock that shows less was never set.
 constexpr UtcTime kNoClock = utc_time_from_ns(946'684'800'000'000'000);
+
+using Sources = Result<std::vector<std::unique_ptr<ByteSource>>>;
+
+/// One after the other, of a recording in several files.
+Sources open_each(const OpenSource& open, const std::vector<bool>& present) {
+  std::vector<std::unique_ptr<ByteSource>> sources(present.size());
+  for (std::size_t i = 0; i < present.size(); ++i) {
+    if (!present[i]) continue;
+    auto source = open(static_cast<DeviceIndex>(i));
+    if (!source) return tl::unexpected<Error>(source.error());
+    sources[i] = std::move(*source);
+  }
+  return sources;
+}
 
 class SampleCollector final : public SampleSink {
  public:
@@ -99,14 +113,15 @@ Result<void> check_roles(const Configuration& configuration, const std::vector<b
 /// Per device: what its log of candump holds, where it is given as one.
 using Logs = std::vector<std::optional<CandumpSurvey>>;
 
-/// Per device: what its MCAP file holds, where it is read from one.
-using Bags = std::vector<std::optional<McapSurvey>>;
+/// Per device: what its file of many topics holds, where it is read from one.
+using Bags = std::vector<std::optional<MessageSurvey>>;
 
 /// The bytes of a device that is in no log of candump.
 OpenSource open_plain(const Configuration& configuration, const std::vector<std::filesystem::path>& files,
                       Bags bags) {
   return [devices = configuration.devices, files, bags = std::move(bags)](DeviceIndex index) {
-    return bags[index] ? open_mcap(files[index], devices[index], *bags[index]) : open_raw_dump(files[index]);
+    return bags[index] ? open_messages(files[index], devices[index], *bags[index])
+                       : open_raw_dump(files[index]);
   };
 }
 
@@ -265,8 +280,8 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
           fmt::format("{}: no file given; the run goes without it", configuration.devices[i].name));
       continue;
     }
-    if (configuration.devices[i].protocol == Protocol::kMcap) {
-      auto survey = survey_mcap(file, configuration.devices[i], progress);
+    if (is_message_log(configuration.devices[i].protocol)) {
+      auto survey = survey_messages(file, configuration.devices[i], progress);
       if (!survey) return tl::unexpected<Error>(survey.error());
       recording.damage.insert(recording.damage.end(), survey->losses.begin(), survey->losses.end());
       bags[i] = std::move(*survey);
@@ -322,6 +337,9 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
     opened.remarks.push_back(fmt::format("{}: times from {}, {:+.3f} s", configuration.devices[i].name,
                                          recording.clocks[i].how, recording.clocks[i].shift_s));
   }
+  recording.open_side_by_side = [open = recording.open, present = recording.present] {
+    return open_each(open, present);
+  };
   opened.configuration = std::move(configuration);
   return opened;
 }
@@ -402,6 +420,20 @@ Result<OpenedRecording> open_capture(const std::string& input,
   }
   recording.open = [input, names, bytes](DeviceIndex index) {
     return open_captured_device(input, names[index], bytes[index]);
+  };
+  recording.open_side_by_side = [input, names, bytes, present = recording.present]() -> Sources {
+    std::vector<CapturedLine> lines;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (present[i]) lines.push_back({names[i], bytes[i]});
+    }
+    auto opened_lines = open_captured_lines(input, lines);
+    if (!opened_lines) return tl::unexpected<Error>(opened_lines.error());
+    std::vector<std::unique_ptr<ByteSource>> sources(names.size());
+    auto next = opened_lines->begin();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (present[i]) sources[i] = std::move(*next++);
+    }
+    return sources;
   };
   // A log of reads that were imported may know nothing of UTC.
   if (summary->has_run && summary->run.t0_wall > kNoClock)

@@ -46,6 +46,9 @@ struct RecordedSchedule {
 struct Recording {
   std::vector<std::string> inputs;  ///< as given, for run.json
   OpenSource open;
+  /// The same of all devices, null for those that are not present, by one pass where the recording is one
+  /// file: for those who go through them side by side.
+  std::function<Result<std::vector<std::unique_ptr<ByteSource>>>()> open_side_by_side;
   std::vector<bool> present;                 ///< per device of the configuration
   std::vector<DeviceClock> clocks;           ///< per device
   std::optional<RecordedSchedule> schedule;  ///< of a capture of a live run

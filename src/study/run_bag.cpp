@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 #include <imuscope/message_fields.h>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <deque>
 #include <fstream>
 #include <limits>
 #include <map>
+#include <mutex>
+#include <thread>
 
 #include "bag/bag_writer.h"
 #include "bag/message_json.h"
@@ -163,6 +167,101 @@ class DeviceStream final : private SampleSink {
   std::unique_ptr<DeviceDecoder> decoder_;
   std::deque<Sample> samples_;
   bool at_end_ = false;
+};
+
+/// Samples of all devices in the order of their times, read and decoded by a thread of its own while those
+/// before them are written.
+class SortedSamples {
+ public:
+  /// @param streams  by device; none where a device is not present. They are the thread's until the end.
+  explicit SortedSamples(std::vector<std::optional<DeviceStream>>& streams)
+      : streams_(streams), thread_([this] { read(); }) {}
+  SortedSamples(const SortedSamples&) = delete;
+  SortedSamples& operator=(const SortedSamples&) = delete;
+  ~SortedSamples() {
+    {
+      const std::scoped_lock lock(mutex_);
+      is_wanted_ = false;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+
+  /// The next ones; empty at the end.
+  Result<std::vector<Sample>> next() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !waiting_.empty() || is_done_; });
+    if (waiting_.empty()) {
+      if (error_) return tl::unexpected<Error>(*error_);
+      return std::vector<Sample>{};
+    }
+    auto batch = std::move(waiting_.front());
+    waiting_.pop_front();
+    changed_.notify_all();
+    return batch;
+  }
+  /// Of the recording, read so far.
+  [[nodiscard]] double share() const noexcept { return share_.load(std::memory_order_relaxed); }
+
+ private:
+  static constexpr std::size_t kBatch = 4096;
+  static constexpr std::size_t kBatchesMost = 8;
+
+  void read() {
+    std::vector<Sample> batch;
+    auto done = read_sorted(batch);
+    const std::scoped_lock lock(mutex_);
+    if (!batch.empty()) waiting_.push_back(std::move(batch));
+    if (!done) error_ = done.error();
+    is_done_ = true;
+    changed_.notify_all();
+  }
+  Result<void> read_sorted(std::vector<Sample>& batch) {
+    for (;;) {
+      DeviceStream* oldest = nullptr;
+      const Sample* sample = nullptr;
+      for (auto& stream : streams_) {
+        if (!stream) continue;
+        const auto front = stream->front();
+        if (!front) return tl::unexpected<Error>(front.error());
+        if (*front == nullptr || (sample != nullptr && (*front)->time >= sample->time)) continue;
+        sample = *front;
+        oldest = &*stream;
+      }
+      if (sample == nullptr) return {};
+      batch.push_back(*sample);
+      oldest->pop();
+      if (batch.size() == kBatch && !hand_over(batch)) return {};
+    }
+  }
+  /// False where nobody wants more.
+  bool hand_over(std::vector<Sample>& batch) {
+    double read = 0.0;
+    double total = 0.0;
+    for (const auto& stream : streams_) {
+      if (!stream) continue;
+      read += static_cast<double>(stream->source().bytes_read());
+      total += static_cast<double>(stream->source().bytes_total());
+    }
+    share_.store(total > 0.0 ? read / total : 0.0, std::memory_order_relaxed);
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return waiting_.size() < kBatchesMost || !is_wanted_; });
+    waiting_.push_back(std::move(batch));
+    batch = {};
+    batch.reserve(kBatch);
+    changed_.notify_all();
+    return is_wanted_;
+  }
+
+  std::vector<std::optional<DeviceStream>>& streams_;
+  std::atomic<double> share_{0.0};
+  std::mutex mutex_;  ///< of what follows
+  std::condition_variable changed_;
+  std::deque<std::vector<Sample>> waiting_;
+  std::optional<Error> error_;
+  bool is_done_ = false;
+  bool is_wanted_ = true;
+  std::thread thread_;  ///< last: it uses all of the above
 };
 
 /// Biases of an S-IMU over time, from the smoothed drive where there is one; between its rows along a line.
@@ -359,7 +458,7 @@ class RunBagMaker {
         folder_(options.source.run_dir),
         utc_(folder_, run),
         writer_(
-            {"ros2", "imuscope " + options.version, options.compression, kChunkBytes},
+            {"ros2", "imuscope " + options.version, options.compression, kChunkBytes, true},
             [this, &out](std::string_view bytes) {
               out.write(bytes);
               bag_.bytes += bytes.size();
@@ -428,12 +527,12 @@ class RunBagMaker {
   Result<void> open_streams() {
     const auto& devices = opened_.configuration.devices;
     streams_.resize(devices.size());
+    auto sources = opened_.recording.open_side_by_side();
+    if (!sources) return tl::unexpected<Error>(sources.error());
     for (std::size_t i = 0; i < devices.size(); ++i) {
       if (!opened_.recording.present[i]) continue;
       const auto index = static_cast<DeviceIndex>(i);
-      auto source = opened_.recording.open(index);
-      if (!source) return tl::unexpected<Error>(source.error());
-      streams_[i].emplace(std::move(*source),
+      streams_[i].emplace(std::move((*sources)[i]),
                           make_decoder(devices[i], index, opened_.recording.clocks[i].map));
       variances_.resize(devices.size());
       variances_[i] = configured_variance(devices[i].noise);
@@ -454,26 +553,20 @@ class RunBagMaker {
 
   /// Samples of all devices in the order of their times, and between them the rows of the run.
   Result<void> merge() {
-    for (std::uint64_t n = 0;; ++n) {
-      DeviceStream* oldest = nullptr;
-      const Sample* sample = nullptr;
-      for (auto& stream : streams_) {
-        if (!stream) continue;
-        const auto front = stream->front();
-        if (!front) return tl::unexpected<Error>(front.error());
-        if (*front == nullptr || (sample != nullptr && (*front)->time >= sample->time)) continue;
-        sample = *front;
-        oldest = &*stream;
+    SortedSamples samples(streams_);
+    for (;;) {
+      const auto batch = samples.next();
+      if (!batch) return tl::unexpected<Error>(batch.error());
+      if (batch->empty()) break;
+      for (const Sample& sample : *batch) {
+        const double time_s = to_seconds(sample.time - begin_);
+        add_rows(time_s);
+        add_sample(sample, time_s);
       }
-      const double time_s =
-          sample != nullptr ? to_seconds(sample->time - begin_) : std::numeric_limits<double>::infinity();
-      add_rows(time_s);
-      if (sample == nullptr) return {};
-      add_sample(*sample, time_s);
-      oldest->pop();
-      constexpr std::uint64_t kPerProgress = 16384;
-      if (options_.progress && n % kPerProgress == 0) options_.progress(share());
+      if (options_.progress) options_.progress(samples.share());
     }
+    add_rows(std::numeric_limits<double>::infinity());
+    return {};
   }
 
   void add_sample(const Sample& sample, double time_s) {
@@ -562,17 +655,6 @@ class RunBagMaker {
       if (const auto text = read_text_file(folder_ / name, "file of a run", ""))
         writer_.attach(name, type, utc_ns, *text);
     }
-  }
-
-  [[nodiscard]] double share() const {
-    double read = 0.0;
-    double total = 0.0;
-    for (const auto& stream : streams_) {
-      if (!stream) continue;
-      read += static_cast<double>(stream->source().bytes_read());
-      total += static_cast<double>(stream->source().bytes_total());
-    }
-    return total > 0.0 ? read / total : 0.0;
   }
 
   const RunBagOptions& options_;

@@ -116,6 +116,13 @@ bool Picture::hear(std::span<const std::uint8_t> message) {
          try_as(static_cast<const noise_model_t*>(nullptr));
 }
 
+void Picture::become(const Picture& other) {
+  const std::uint64_t number = number_;
+  *this = other;
+  number_ = number + 1;
+  tell_all_next();
+}
+
 void Picture::begin_anew() {
   const std::uint64_t number = number_;
   *this = Picture();

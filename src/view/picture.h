@@ -43,6 +43,8 @@ class Picture {
   bool hear(std::span<const std::uint8_t> message);
   /// Forgets all but the number of the picture, which goes on.
   void begin_anew();
+  /// Becomes what another picture of the same recording was, under a number of its own.
+  void become(const Picture& other);
   /// The next part is the whole picture, and no row is lost by it.
   void tell_all_next() noexcept { all_next_ = news_ = true; }
 

@@ -10,6 +10,8 @@ namespace imuscope::view {
 namespace {
 
 constexpr double kToTheEnd = std::numeric_limits<double>::infinity();
+/// So many pictures of a recording are kept, of some hundred kB each.
+constexpr std::size_t kStopsMost = 120;
 
 }  // namespace
 
@@ -20,7 +22,14 @@ Result<std::unique_ptr<Player>> Player::open(std::unique_ptr<RecordedMessages> r
 }
 
 Result<void> Player::read_through() {
-  while (recording_->next(message_)) (void)picture_.hear(message_);
+  double newest_s = 0.0;
+  while (recording_->next(message_)) {
+    if (!picture_.hear(message_)) continue;
+    // Behind a service that began anew times come twice: a jump means the first.
+    if (picture_.time_s() < newest_s) stop_every_s_ = kToTheEnd;
+    newest_s = std::max(newest_s, picture_.time_s());
+    if (newest_s >= (stops_.empty() ? 0.0 : stops_.back().time_s) + stop_every_s_) add_stop();
+  }
   length_s_ = picture_.time_s();
   if (!(length_s_ > 0.0)) {
     return work_error(
@@ -29,6 +38,39 @@ Result<void> Player::read_through() {
   }
   picture_.begin_anew();
   return recording_->rewind();
+}
+
+void Player::add_stop() {
+  const auto place = recording_->place();
+  if (!place) return;
+  if (stops_.size() >= kStopsMost) {
+    std::size_t kept = 0;
+    for (std::size_t i = 1; i < stops_.size(); i += 2) std::swap(stops_[kept++], stops_[i]);
+    stops_.resize(kept);
+    stop_every_s_ *= 2.0;
+    if (picture_.time_s() < stops_.back().time_s + stop_every_s_) return;
+  }
+  (void)picture_.part();  // its rows need not be kept
+  stops_.push_back({picture_.time_s(), *place, picture_});
+}
+
+const Player::Stop* Player::stop_before(double time_s) const {
+  const auto behind = std::upper_bound(stops_.begin(), stops_.end(), time_s,
+                                       [](double t, const Stop& stop) { return t < stop.time_s; });
+  return behind == stops_.begin() ? nullptr : &*std::prev(behind);
+}
+
+/// To the last stop before a time, where that is nearer than to play on from here.
+void Player::go_near(double time_s) {
+  const bool is_behind = time_s < picture_.time_s();
+  const Stop* stop = stop_before(time_s);
+  if (stop != nullptr && (is_behind || stop->time_s > picture_.time_s())) {
+    picture_.become(stop->picture);
+    at_end_ = !recording_->go_to(stop->place);
+  } else if (is_behind) {
+    picture_.begin_anew();
+    at_end_ = !recording_->rewind();
+  }
 }
 
 void Player::on_said(std::string_view text) {
@@ -73,7 +115,6 @@ void Player::feed_until(double time_s, bool is_seek) {
 
 std::string Player::turn(double passed_s) {
   bool is_seek = false;
-  bool backwards = false;
   bool plays = false;
   {
     const std::scoped_lock lock(mutex_);
@@ -81,11 +122,9 @@ std::string Player::turn(double passed_s) {
     plays = is_playing_ && !at_end_;
     if (!is_seek && !plays && !was_asked_) return {};
     was_asked_ = false;
-    backwards = is_seek && *sought_s_ < picture_.time_s();
     if (is_seek) clock_s_ = *std::exchange(sought_s_, std::nullopt);
     if (!is_seek && plays) clock_s_ = std::min(length_s_, clock_s_ + speed_ * passed_s);
-    if (backwards) picture_.begin_anew();
-    if (backwards) at_end_ = !recording_->rewind();
+    if (is_seek) go_near(clock_s_);
     if (is_seek || speed_ > kRowsUpTo) picture_.tell_all_next();
   }
   // What bears the last time may not be the last message.

@@ -1,6 +1,7 @@
 #pragma once
 
-/// Plays a recording into a picture: at every time it is the picture that a page would have had live.
+/// Plays a recording into a picture: at every time it is the picture that a page would have had live. A jump
+/// costs at most what a sixtieth of a capture does.
 
 #include <cstdint>
 #include <memory>
@@ -41,12 +42,23 @@ class Player {
 
  private:
   explicit Player(std::unique_ptr<RecordedMessages> recording) : recording_(std::move(recording)) {}
+  /// The picture as it was somewhere in the recording: a jump begins at the last one before it.
+  struct Stop {
+    double time_s;
+    RecordedMessages::Place place;
+    Picture picture;
+  };
   Result<void> read_through();
+  void add_stop();
+  [[nodiscard]] const Stop* stop_before(double time_s) const;
+  void go_near(double time_s);
   void feed_until(double time_s, bool is_seek);
   [[nodiscard]] std::string extra() const;
 
   std::unique_ptr<RecordedMessages> recording_;
   std::vector<std::uint8_t> message_;
+  std::vector<Stop> stops_;  ///< rising; made by read_through()
+  double stop_every_s_ = 10.0;
   double length_s_ = 0.0;
   double clock_s_ = 0.0;  ///< to where it has been played
   bool at_end_ = false;

@@ -31,6 +31,12 @@ class CaptureMessages final : public RecordedMessages {
     return {};
   }
 
+  [[nodiscard]] std::optional<Place> place() const override {
+    const auto place = files_->place();
+    return place ? std::optional(Place{place->number, place->offset}) : std::nullopt;
+  }
+  Result<void> go_to(const Place& place) override { return files_->go_to({place.file, place.offset}); }
+
  private:
   std::filesystem::path file_;
   std::optional<CaptureFiles> files_;

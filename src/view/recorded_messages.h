@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/result.h"
@@ -23,6 +24,14 @@ class RecordedMessages {
   [[nodiscard]] virtual bool next(std::vector<std::uint8_t>& message) = 0;
   /// Goes back to the first one.
   [[nodiscard]] virtual Result<void> rewind() = 0;
+  /// Somewhere in the recording that is gone to without what stands before it.
+  struct Place {
+    int file = 0;
+    std::uint64_t offset = 0;
+  };
+  /// Before the next message; nothing where the recording cannot be entered here.
+  [[nodiscard]] virtual std::optional<Place> place() const { return std::nullopt; }
+  [[nodiscard]] virtual Result<void> go_to(const Place& /*place*/) { return rewind(); }
 };
 
 /// @param path  of a capture's first file, or of a run folder: its capture where it has one, else its files

@@ -113,15 +113,29 @@ TEST(MountingText, ImuChainsTakeTheBodysCoordinatesToTheSensors) {
   }
 }
 
-TEST(MountingText, OpenVinsScalesSayWhatHappensToTheTruth) {
+/// OpenVINS (VioManagerOptions.h, Propagator.cpp) reads Tw and Ta, inverts them, and takes D (reading - bias)
+/// for the truth, turned by the transposes of R_IMUtoGYRO and R_IMUtoACC; Tg is what forces do to the gyros.
+TEST(MountingText, OpenVinsFindsTheTruthBehindAReading) {
+  using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   Correction scale;
   scale.gyro_scale = {0.01, -0.02, 0.03};
   scale.accel_scale = {0.001, 0.002, -0.003};
   const auto text = mounting_text(cases()[5].mounting, scale, "airins", MountingFormat::kOpenVins);
-  const auto Tw = numbers_behind(text, "Tw:", 9);
-  EXPECT_NEAR(Tw[0], 1.01, 1e-9);
-  EXPECT_NEAR(Tw[4], 0.98, 1e-9);
-  EXPECT_NEAR(numbers_behind(text, "Ta:", 9)[8], 0.997, 1e-9);
+  const auto matrix = [&](const char* key) { return Matrix(numbers_behind(text, key, 9).data()); };
+  const Vector3d rate(0.3, -0.7, 1.1), force(0.5, -9.7, 2.0), gyro_bias(0.01, 0.02, -0.03),
+      accel_bias(0.1, -0.2, 0.3);
+  Vector3d gyro_reading = gyro_bias, accel_reading = accel_bias;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    gyro_reading[i] += (1.0 + scale.gyro_scale[static_cast<std::size_t>(i)]) * rate[i];
+    accel_reading[i] += (1.0 + scale.accel_scale[static_cast<std::size_t>(i)]) * force[i];
+  }
+  const Vector3d found_force =
+      matrix("R_IMUtoACC:").transpose() * (matrix("Ta:").inverse() * (accel_reading - accel_bias));
+  const Vector3d found_rate =
+      matrix("R_IMUtoGYRO:").transpose() *
+      (matrix("Tw:").inverse() * (gyro_reading - gyro_bias - matrix("Tg:") * found_force));
+  EXPECT_LT((found_force - force).norm(), 1e-7);
+  EXPECT_LT((found_rate - rate).norm(), 1e-8);
 }
 
 TEST(MountingText, JsonHoldsTheSameThreeTimes) {

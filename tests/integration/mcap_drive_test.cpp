@@ -22,7 +22,7 @@ constexpr const char* kConfiguration = R"(
 name = "airins"
 role = "reference"
 protocol = "mcap"
-[device.mcap]
+[device.messages]
 topic = "/imu/airins/raw"
 times_are_utc = true
 [device.noise]
@@ -34,7 +34,7 @@ accel_bias_sd_mps2 = 5e-4
 name = "mtx1"
 role = "study"
 protocol = "mcap"
-[device.mcap]
+[device.messages]
 topic = "/imu/mtx1/raw"
 times_are_utc = true
 [[device]]
@@ -42,7 +42,7 @@ name = "gnss"
 role = "gnss"
 protocol = "mcap"
 antenna_lever_arm_b_m = [-0.50, 0.20, -1.30]
-[device.mcap]
+[device.messages]
 topic = "/gnss/gnss/fix"
 velocity_topic = "/gnss/gnss/velocity"
 times_are_utc = true

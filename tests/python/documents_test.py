@@ -104,7 +104,9 @@ def test_the_listener_in_cpp(bus, expected, tmp_path):
     for program in ("g++", "lcm-gen"):
         if not shutil.which(program):
             pytest.skip(f"{program} is not installed")
-    (tmp_path / "listener.cpp").write_text(blocks("live_data.md", "cpp")[0])
+    program = blocks("live_data.md", "cpp")[0]
+    assert len(program.strip().splitlines()) <= 10
+    (tmp_path / "listener.cpp").write_text(program)
     *build, run = here(blocks("live_data.md", "sh")[0]).strip().splitlines()
     for command in build:
         subprocess.run(["bash", "-c", command], cwd=tmp_path, check=True, timeout=120)
@@ -114,7 +116,9 @@ def test_the_listener_in_cpp(bus, expected, tmp_path):
 def test_the_listener_in_java(bus, expected, tmp_path):
     if not shutil.which("javac") or not os.path.exists("/usr/share/java/lcm.jar"):
         pytest.skip("default-jdk-headless or liblcm-java is not installed")
-    (tmp_path / "Listener.java").write_text(blocks("live_data.md", "java")[0])
+    program = blocks("live_data.md", "java")[0]
+    assert len(program.strip().splitlines()) <= 10
+    (tmp_path / "Listener.java").write_text(program)
     command = here(blocks("live_data.md", "sh")[1]).split()
     check(lines_of(command, tmp_path, 30), expected)
 

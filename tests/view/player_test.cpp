@@ -23,12 +23,12 @@ using nlohmann::json;
 
 constexpr int kSeconds = 60;
 
-/// A capture of a service that published for a minute: S-IMU, navigation, status.
-std::filesystem::path write_capture() {
+/// A capture of a service that published for a while: S-IMU, navigation, status.
+std::filesystem::path write_capture(int seconds = kSeconds) {
   auto file = test::scratch_folder() / "capture.lcm";
   auto bus = LcmPublisher::open("file://" + file.string() + "?mode=w");
   EXPECT_TRUE(bus) << bus.error().text();
-  for (int tenth = 0; tenth < 10 * kSeconds; ++tenth) {
+  for (int tenth = 0; tenth < 10 * seconds; ++tenth) {
     const double t = 0.1 * tenth;
     auto navigation = test::example_navigation();
     navigation.time_s = t;
@@ -129,6 +129,48 @@ TEST(Player, ASeekGivesThePictureThatPlayingGives) {
   EXPECT_EQ(content_of(*seeking), content_of(*playing));
   EXPECT_EQ(told.at("marks").at(0).at("text"), "kerb");
   EXPECT_TRUE(seeking->turn(0.1).empty()) << "paused";
+}
+
+/// A recording that counts what is read of it, and may be one that nobody can enter but at its beginning.
+class Counted final : public RecordedMessages {
+ public:
+  Counted(std::unique_ptr<RecordedMessages> recording, bool has_places, std::size_t& read)
+      : recording_(std::move(recording)), has_places_(has_places), read_(read) {}
+  bool next(std::vector<std::uint8_t>& message) override {
+    ++read_;
+    return recording_->next(message);
+  }
+  Result<void> rewind() override { return recording_->rewind(); }
+  [[nodiscard]] std::optional<Place> place() const override {
+    return has_places_ ? recording_->place() : std::nullopt;
+  }
+  Result<void> go_to(const Place& place) override { return recording_->go_to(place); }
+
+ private:
+  std::unique_ptr<RecordedMessages> recording_;
+  bool has_places_;
+  std::size_t& read_;
+};
+
+TEST(Player, AJumpReadsLittleOfALongCaptureAndShowsWhatPlayingShows) {
+  constexpr int kLong_s = 600;
+  const auto file = write_capture(kLong_s);
+  std::size_t read = 0;
+  std::size_t read_by_playing = 0;
+  auto jumping = Player::open(std::make_unique<Counted>(std::move(*open_recording(file)), true, read));
+  auto playing =
+      Player::open(std::make_unique<Counted>(std::move(*open_recording(file)), false, read_by_playing));
+  ASSERT_TRUE(jumping && playing);
+  const std::size_t all = read;
+  for (const double to_s : {500.0, 590.0, 20.0, 300.0, 290.0}) {
+    read = 0;
+    for (auto* player : {&*jumping, &*playing}) {
+      (*player)->on_said(seek(to_s));
+      (void)(*player)->turn(0.0);
+    }
+    EXPECT_LT(read, all / 20) << "a jump to " << to_s << " s";
+    EXPECT_EQ(content_of(**jumping), content_of(**playing)) << to_s;
+  }
 }
 
 TEST(Player, OfSeveralSeeksTheLastOneHolds) {

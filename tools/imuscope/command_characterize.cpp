@@ -245,7 +245,7 @@ void add_characterize(CLI::App& app, Work& chosen) {
       "Column with time stamps: seconds, ISO 8601, or WEEK,SECONDS of GPS (default: by its name; none: no "
       "times)");
   command->add_option("--topic", options->choice.signal.topic,
-                      "Topic of an MCAP file, where it holds several IMUs");
+                      "Topic of an MCAP file, bag or flight log that holds several IMUs");
   command->add_option("--counter", options->choice.signal.counter, "Column that counts the samples");
   command->add_option("--where", options->choice.signal.where,
                       "COLUMN=VALUE: rows with another value count as gaps");

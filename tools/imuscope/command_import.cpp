@@ -44,9 +44,11 @@ void add_import(CLI::App& app, Work& chosen) {
   auto* command = app.add_subcommand("import", "Raw dumps and logs into one capture");
   auto options = std::make_shared<ImportCommand>();
   command
-      ->add_option("NAME=FILE", options->inputs,
-                   "recording of each device: raw bytes (with NAME.arrivals.csv beside it where the arrivals "
-                   "were kept), .mtb, .pos")
+      ->add_option(
+          "NAME=FILE", options->inputs,
+          "recording of each device: raw bytes (with NAME.arrivals.csv beside it where the arrivals "
+          "were kept), .mtb, .pos, or a file of many topics: MCAP, ROS bag, PX4 ULog, ArduPilot .bin. "
+          "Such a file alone, without NAME=, stands for all devices in it")
       ->required();
   command->add_option("--out,-o", options->out, "the capture to write")->required()->type_name("FILE.lcm");
   command->add_option("--config", options->config, "configuration (default: drafted from the files)")

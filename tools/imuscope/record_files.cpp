@@ -11,7 +11,7 @@
 
 #include "axis_columns.h"
 #include "base/units.h"
-#include "mcap_signal.h"
+#include "message_signal.h"
 
 namespace imuscope::cli {
 namespace {
@@ -202,18 +202,18 @@ Result<SensorRecord> read_raw_files(const std::vector<std::filesystem::path>& fi
 }
 
 /// All axes of one topic.
-Result<SensorRecord> read_mcap(const std::filesystem::path& file, const RecordChoice& choice) {
-  auto read = read_mcap_axes(file, choice.signal.topic, choice.signal.rate_hz);
+Result<SensorRecord> read_messages(const std::filesystem::path& file, const RecordChoice& choice) {
+  auto read = read_message_axes(file, choice.signal.topic, choice.signal.rate_hz);
   if (!read) return tl::unexpected(read.error());
   SensorRecord sensor{file.stem().string(), {file.filename().string()}, {}, {}};
   if (!choice.signal.topic.empty()) sensor.selection = "topic " + choice.signal.topic;
-  for (std::size_t i = 0; i < kMcapAxes.size(); ++i) {
+  for (std::size_t i = 0; i < kMessageAxes.size(); ++i) {
     Signal& signal = read->axes[i];
     // A triad that the messages do not have is none of the record's.
     if (std::none_of(signal.mask.begin(), signal.mask.end(), [](std::uint8_t there) { return there != 0; }))
       continue;
     certificate::AxisRecord axis;
-    axis.name = kMcapAxes[i];
+    axis.name = kMessageAxes[i];
     axis.unit = is_gyro_name(axis.name) ? noise::SignalUnit::kRadps : noise::SignalUnit::kMps2;
     axis.rate_hz = *signal.rate_hz;
     axis.values = std::move(signal.values);
@@ -267,7 +267,7 @@ Result<std::vector<SensorRecord>> read_records(const std::vector<std::filesystem
       continue;
     }
     auto record = std::filesystem::is_directory(file) ? read_run(file, choice)
-                  : is_mcap(file)                     ? read_mcap(file, choice)
+                  : is_message_log(file)              ? read_messages(file, choice)
                                                       : read_csv(file, choice);
     if (!record) return tl::unexpected(record.error());
     records.push_back(std::move(*record));

@@ -21,7 +21,7 @@ struct SignalChoice {
   /// that it holds times, where there is one; "none": no times.
   std::string time{};
   std::optional<double> rate_hz{};  ///< samples per second, to be held against the times
-  std::string topic{};              ///< of an MCAP file (mcap_signal.h), which has no columns
+  std::string topic{};              ///< of an MCAP file (message_signal.h), which has no columns
 };
 
 struct Signal {

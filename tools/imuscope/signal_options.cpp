@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "mcap_signal.h"
+#include "message_signal.h"
 #include "noise/quantities.h"
 
 namespace imuscope::cli {
@@ -38,14 +38,17 @@ std::string line_warning(const noise::Line& line, const std::string& unit, noise
 }  // namespace
 
 void add_signal_options(CLI::App& command, SignalOptions& options, bool several) {
-  const char* what = several ? "Signal: CSV, MCAP with messages of ROS, or raw little-endian float64 (.f64); "
+  const char* what = several ? "Signal: CSV, a file of topics (MCAP, ROS bag, PX4 ULog, ArduPilot .bin), or "
+                               "raw little-endian float64 (.f64); "
                                "several are replicates of one sensor"
-                             : "Signal: CSV, MCAP with messages of ROS, or raw little-endian float64 (.f64)";
+                             : "Signal: CSV, a file of topics (MCAP, ROS bag, PX4 ULog, ArduPilot .bin), or "
+                               "raw little-endian float64 (.f64)";
   auto* file = command.add_option("FILE", options.files, what)->required();
   if (!several) file->expected(1);
   command.add_option("--column,-c", options.choice.column,
-                     "Column of a CSV: its name, or its number from 1; of an MCAP file gyro_x to accel_z");
-  command.add_option("--topic", options.choice.topic, "Topic of an MCAP file, where it holds several IMUs");
+                     "Column of a CSV: its name, or its number from 1; of a topic gyro_x to accel_z");
+  command.add_option("--topic", options.choice.topic,
+                     "Topic of an MCAP file, bag or flight log that holds several IMUs");
   command.add_option("--where", options.choice.where,
                      "COLUMN=VALUE of a CSV: rows with another value count as gaps, as in regime=static");
   command.add_option("--counter", options.choice.counter,

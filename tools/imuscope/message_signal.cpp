@@ -1,4 +1,4 @@
-#include "mcap_signal.h"
+#include "message_signal.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,7 +8,8 @@
 #include <limits>
 
 #include "service/device_factory.h"
-#include "service/mcap_source.h"
+#include "service/message_log.h"
+#include "service/message_source.h"
 #include "time_column.h"
 
 namespace imuscope::cli {
@@ -28,19 +29,20 @@ Result<std::vector<Sample>> samples_of(const std::filesystem::path& file, const 
   DeviceConfig device;
   device.name = file.filename().string();
   device.role = DeviceRole::kReference;
-  device.protocol = Protocol::kMcap;
+  device.protocol = find_message_log(file).value_or(Protocol::kMcap);
   device.rate_hz = traits_of(device.protocol).rate_hz;
-  device.mcap.topic = topic;
-  const auto survey = survey_mcap(file, device);
+  device.messages.topic = topic;
+  const auto survey = survey_messages(file, device);
   if (!survey) {
     Error error = survey.error();
     // There is no configuration here.
-    if (const auto at = error.remedy.find("give topic in its [device.mcap]"); at != std::string::npos)
-      error.remedy.replace(at, std::string_view("give topic in its [device.mcap]").size(), "give --topic");
+    if (const auto at = error.remedy.find("give topic in its [device.messages]"); at != std::string::npos)
+      error.remedy.replace(at, std::string_view("give topic in its [device.messages]").size(),
+                           "give --topic");
     return tl::unexpected<Error>(error);
   }
   warnings.insert(warnings.end(), survey->losses.begin(), survey->losses.end());
-  auto source = open_mcap(file, device, *survey);
+  auto source = open_messages(file, device, *survey);
   if (!source) return tl::unexpected<Error>(source.error());
   const auto decoder = make_decoder(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0));
   Samples sink;
@@ -63,11 +65,14 @@ double value_of(const Sample& sample, std::size_t axis) {
 
 }  // namespace
 
-bool is_mcap(const std::filesystem::path& file) { return file.extension() == ".mcap"; }
+bool is_message_log(const std::filesystem::path& file) {
+  return file.extension() == ".mcap" || file.extension() == ".bag" || file.extension() == ".ulg" ||
+         find_message_log(file);
+}
 
-Result<McapAxes> read_mcap_axes(const std::filesystem::path& file, const std::string& topic,
-                                std::optional<double> rate_hz) {
-  McapAxes read;
+Result<MessageAxes> read_message_axes(const std::filesystem::path& file, const std::string& topic,
+                                      std::optional<double> rate_hz) {
+  MessageAxes read;
   const auto samples = samples_of(file, topic, read.warnings);
   if (!samples) return tl::unexpected<Error>(samples.error());
   std::vector<double> stamps_s;
@@ -103,22 +108,22 @@ Result<McapAxes> read_mcap_axes(const std::filesystem::path& file, const std::st
 
 Result<Signal> read_any_signal(const std::filesystem::path& file, const SignalChoice& choice,
                                std::vector<std::string>& warnings) {
-  if (!is_mcap(file)) return read_signal(file, choice);
+  if (!is_message_log(file)) return read_signal(file, choice);
   if (!choice.where.empty() || !choice.counter.empty() || !choice.time.empty()) {
     return usage_error(fmt::format("{} has no columns", file.string()),
                        "leave out --where, --counter and --time");
   }
-  const auto axis = std::find(kMcapAxes.begin(), kMcapAxes.end(), choice.column);
-  if (axis == kMcapAxes.end()) {
+  const auto axis = std::find(kMessageAxes.begin(), kMessageAxes.end(), choice.column);
+  if (axis == kMessageAxes.end()) {
     return usage_error(choice.column.empty()
                            ? fmt::format("{}: no axis is chosen", file.string())
                            : fmt::format("{} has no axis '{}'", file.string(), choice.column),
-                       fmt::format("give --column; there is {}", fmt::join(kMcapAxes, ", ")));
+                       fmt::format("give --column; there is {}", fmt::join(kMessageAxes, ", ")));
   }
-  auto read = read_mcap_axes(file, choice.topic, choice.rate_hz);
+  auto read = read_message_axes(file, choice.topic, choice.rate_hz);
   if (!read) return tl::unexpected<Error>(read.error());
   warnings.insert(warnings.end(), read->warnings.begin(), read->warnings.end());
-  return std::move(read->axes[static_cast<std::size_t>(axis - kMcapAxes.begin())]);
+  return std::move(read->axes[static_cast<std::size_t>(axis - kMessageAxes.begin())]);
 }
 
 }  // namespace imuscope::cli

@@ -13,22 +13,22 @@
 namespace imuscope::cli {
 
 /// "gyro_x" ... "accel_z".
-inline constexpr std::array<const char*, 6> kMcapAxes{"gyro_x",  "gyro_y",  "gyro_z",
-                                                      "accel_x", "accel_y", "accel_z"};
+inline constexpr std::array<const char*, 6> kMessageAxes{"gyro_x",  "gyro_y",  "gyro_z",
+                                                         "accel_x", "accel_y", "accel_z"};
 
-[[nodiscard]] bool is_mcap(const std::filesystem::path& file);
+[[nodiscard]] bool is_message_log(const std::filesystem::path& file);
 
-/// What a file holds, sample by sample; times left out are gaps. In the order of kMcapAxes.
-struct McapAxes {
-  std::array<Signal, kMcapAxes.size()> axes;
+/// What a file holds, sample by sample; times left out are gaps. In the order of kMessageAxes.
+struct MessageAxes {
+  std::array<Signal, kMessageAxes.size()> axes;
   std::vector<std::string> warnings;  ///< what is missing of the file
 };
 
 /// @param topic  may be empty where there is one IMU only
-/// Errors: those of the file and the topic (service/mcap_source.h), too few messages, times that go back, a
-/// rate that contradicts them.
-Result<McapAxes> read_mcap_axes(const std::filesystem::path& file, const std::string& topic,
-                                std::optional<double> rate_hz);
+/// Errors: those of the file and the topic (service/message_source.h), too few messages, times that go back,
+/// a rate that contradicts them.
+Result<MessageAxes> read_message_axes(const std::filesystem::path& file, const std::string& topic,
+                                      std::optional<double> rate_hz);
 
 /// A signal of any kind of file: `choice.column` is an axis of an MCAP file; see read_signal() for the
 /// others.

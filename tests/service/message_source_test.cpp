@@ -1,16 +1,19 @@
-/// What each role takes out of an MCAP file, as samples.
+/// What each role takes out of a file of many topics, as samples.
 
-#include "service/mcap_source.h"
+#include "service/message_source.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
 #include <cmath>
 #include <fstream>
+#include <map>
+#include <tuple>
 
 #include "base/units.h"
 #include "mcap/ros_messages.h"
 #include "mcap/writer.h"
 #include "service/device_factory.h"
+#include "tests/support/shared_data.h"
 
 namespace imuscope {
 namespace {
@@ -22,7 +25,7 @@ class Bag {
  public:
   Bag()
       : path_(std::filesystem::temp_directory_path() /
-              ("mcap_source_" + std::to_string(::getpid()) + "_" + std::to_string(count_++))) {}
+              ("message_source_" + std::to_string(::getpid()) + "_" + std::to_string(count_++))) {}
   Bag(const Bag&) = delete;
   Bag& operator=(const Bag&) = delete;
   ~Bag() { std::filesystem::remove(path_); }
@@ -61,7 +64,7 @@ DeviceConfig device_of(DeviceRole role, const std::string& topic = {}) {
   device.role = role;
   device.protocol = Protocol::kMcap;
   device.rate_hz = 10.0;
-  device.mcap.topic = topic;
+  device.messages.topic = topic;
   return device;
 }
 
@@ -72,12 +75,12 @@ class Samples final : public SampleSink {
 };
 
 std::vector<Sample> samples_of(const std::filesystem::path& file, const DeviceConfig& device) {
-  const auto survey = survey_mcap(file, device);
+  const auto survey = survey_messages(file, device);
   EXPECT_TRUE(survey) << survey.error().text();
   if (!survey) return {};
   Samples sink;
   const auto decoder = make_decoder(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0));
-  auto source = open_mcap(file, device, *survey);
+  auto source = open_messages(file, device, *survey);
   while (source) {
     const auto read = (*source)->next();
     if (!read || !*read) break;
@@ -96,12 +99,12 @@ mcap::Imu imu_at(std::int64_t stamp_ns, const std::string& frame, double x) {
   return imu;
 }
 
-TEST(McapSource, AnImuIsTurnedAndStampedAsConfigured) {
+TEST(MessageSource, AnImuIsTurnedAndStampedAsConfigured) {
   Bag bag;
   bag.add("/imu", "sensor_msgs/msg/Imu", imu_at(kTime_ns, "imu", 1.0), 77);
   auto device = device_of(DeviceRole::kStudy);
   device.axes = {1, 0, 0, 0, -1, 0, 0, 0, -1};
-  device.mcap.times_are_utc = true;
+  device.messages.times_are_utc = true;
   const auto path = bag.finish();
   auto samples = samples_of(path, device);
   ASSERT_EQ(samples.size(), 1U);
@@ -110,25 +113,25 @@ TEST(McapSource, AnImuIsTurnedAndStampedAsConfigured) {
   EXPECT_EQ(to_ns(samples[0].time), kTime_ns);
   EXPECT_TRUE(samples[0].has_utc);
   EXPECT_EQ(to_ns(samples[0].utc), kTime_ns);
-  device.mcap.time = McapTime::kLog;
+  device.messages.time = MessageTime::kLog;
   EXPECT_EQ(to_ns(samples_of(path, device)[0].time), 77);
-  device.mcap.time = McapTime::kPublish;
+  device.messages.time = MessageTime::kPublish;
   EXPECT_EQ(to_ns(samples_of(path, device)[0].time), 78);
 }
 
-TEST(McapSource, SensorsOfOneTopicAreToldApartByTheirFrames) {
+TEST(MessageSource, SensorsOfOneTopicAreToldApartByTheirFrames) {
   Bag bag;
   for (int i = 0; i < 4; ++i)
     bag.add("/imu", "sensor_msgs/msg/Imu", imu_at(kTime_ns + i, i % 2 == 0 ? "left" : "right", i));
   auto device = device_of(DeviceRole::kStudy);
-  device.mcap.frame_id = "right";
+  device.messages.frame_id = "right";
   const auto samples = samples_of(bag.finish(), device);
   ASSERT_EQ(samples.size(), 2U);
   EXPECT_EQ(samples[0].imu.omega_radps[0], 1.0);
   EXPECT_EQ(samples[1].imu.omega_radps[0], 3.0);
 }
 
-TEST(McapSource, WhatIsNotMeasuredIsNotValid) {
+TEST(MessageSource, WhatIsNotMeasuredIsNotValid) {
   Bag bag;
   auto imu = imu_at(kTime_ns, "", 1.0);
   imu.linear_acceleration_covariance[0] = -1.0;
@@ -136,7 +139,7 @@ TEST(McapSource, WhatIsNotMeasuredIsNotValid) {
   EXPECT_EQ(samples_of(bag.finish(), device_of(DeviceRole::kReference))[0].imu.flags, kGyroValid);
 }
 
-TEST(McapSource, GapsAndTimesThatGoBackAreTold) {
+TEST(MessageSource, GapsAndTimesThatGoBackAreTold) {
   Bag bag;
   for (const std::int64_t at : {0, 1, 5, 4, 6})
     bag.add("/imu", "sensor_msgs/msg/Imu", imu_at(kTime_ns + at * 100'000'000, "", 1.0));
@@ -147,7 +150,7 @@ TEST(McapSource, GapsAndTimesThatGoBackAreTold) {
 }
 
 /// The velocity may stand before or behind its position; one of another instant belongs to neither.
-TEST(McapSource, AVelocityMeetsThePositionOfItsInstant) {
+TEST(MessageSource, AVelocityMeetsThePositionOfItsInstant) {
   for (const bool before : {true, false}) {
     Bag bag;
     for (int i = 0; i < 4; ++i) {
@@ -168,7 +171,7 @@ TEST(McapSource, AVelocityMeetsThePositionOfItsInstant) {
       if (!before) bag.add("/velocity", "geometry_msgs/msg/TwistWithCovarianceStamped", twist);
     }
     auto device = device_of(DeviceRole::kGnss, "/fix");
-    device.mcap.velocity_topic = "/velocity";
+    device.messages.velocity_topic = "/velocity";
     const auto samples = samples_of(bag.finish(), device);
     ASSERT_EQ(samples.size(), 4U);
     for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -186,7 +189,7 @@ TEST(McapSource, AVelocityMeetsThePositionOfItsInstant) {
   }
 }
 
-TEST(McapSource, SolutionsSayHowGoodTheyAre) {
+TEST(MessageSource, SolutionsSayHowGoodTheyAre) {
   Bag bag;
   int i = 0;
   for (const auto& [status, sd] : {std::pair{-1, 0.0}, {0, 2.0}, {1, 0.8}, {2, 0.02}, {2, 0.4}, {2, 0.0}}) {
@@ -206,7 +209,7 @@ TEST(McapSource, SolutionsSayHowGoodTheyAre) {
                                                   GnssSolution::kFloat, GnssSolution::kFloat}));
 }
 
-TEST(McapSource, SpeedsAndPulses) {
+TEST(MessageSource, SpeedsAndPulses) {
   Bag bag;
   mcap::Odometry odometry;
   odometry.header.stamp_ns = kTime_ns;
@@ -225,7 +228,7 @@ TEST(McapSource, SpeedsAndPulses) {
   EXPECT_EQ(to_ns(pulses[0].time), kTime_ns + 2'000'000);
 }
 
-TEST(McapSource, JsonAndCdrAreTheSame) {
+TEST(MessageSource, JsonAndCdrAreTheSame) {
   Bag bag;
   bag.add_json("/imu", "sensor_msgs/Imu",
                R"({"header":{"stamp":{"sec":1700000000,"nanosec":250000000},"frame_id":"x"},)"
@@ -237,25 +240,142 @@ TEST(McapSource, JsonAndCdrAreTheSame) {
   ASSERT_EQ(samples.size(), 1U);
   EXPECT_EQ(to_ns(samples[0].time), kTime_ns);
   EXPECT_EQ(samples[0].imu.f_mps2, (Vector3{4, 5, 6}));
-  const auto survey = survey_mcap(path, device);
+  const auto survey = survey_messages(path, device);
   ASSERT_EQ(survey->losses.size(), 1U);
   EXPECT_NE(survey->losses[0].find("1 messages"), std::string::npos) << survey->losses[0];
 }
 
-TEST(McapSource, NamesOfAStrangerAreText) {
+/// The same numbers as tests/rosbag has them, through the device.
+TEST(MessageSource, ABagOfRos1IsADevice) {
+  for (const char* compression : {"none", "lz4", "bz2"}) {
+    const auto path = test::source_path(std::string("tests/vectors/bag_") + compression + ".bag");
+    auto imu = device_of(DeviceRole::kStudy, "/imu/data");
+    imu.protocol = Protocol::kRosbag;
+    imu.rate_hz = 100.0;
+    const auto samples = samples_of(path, imu);
+    ASSERT_EQ(samples.size(), 50U);
+    EXPECT_EQ(to_ns(samples[49].time), kTime_ns + 490'000'000);
+    EXPECT_EQ(samples[49].imu.f_mps2, (Vector3{0.1, 0.2 * 49, 9.81}));
+    auto gnss = device_of(DeviceRole::kGnss);
+    gnss.protocol = Protocol::kRosbag;
+    gnss.messages.velocity_topic = "/vel";
+    const auto fixes = samples_of(path, gnss);
+    ASSERT_EQ(fixes.size(), 5U);
+    EXPECT_EQ(fixes[1].gnss.solution, GnssSolution::kFixed);
+    EXPECT_EQ(fixes[1].gnss.v_n_mps, (Vector3{2, 1, -3}));
+    auto time = device_of(DeviceRole::kTime);
+    time.protocol = Protocol::kRosbag;
+    EXPECT_EQ(samples_of(path, time).size(), 1U);
+    auto wheels = device_of(DeviceRole::kOdometry);
+    wheels.protocol = Protocol::kRosbag;
+    EXPECT_EQ(samples_of(path, wheels).size(), 25U);
+  }
+}
+
+TEST(MessageSource, AFlightLogIsADeviceWithItsVelocities) {
+  for (const auto& [name, protocol, imu_topic, fix_topic] :
+       {std::tuple{"ulog/flight.ulg", Protocol::kUlog, "vehicle_imu/1", "sensor_gps/0"},
+        std::tuple{"dataflash/flight.bin", Protocol::kDataflash, "IMU/1", "GPS/0"}}) {
+    SCOPED_TRACE(name);
+    const auto path = test::source_path(std::string("tests/fuzz/seeds/") + name);
+    auto imu = device_of(DeviceRole::kStudy, imu_topic);
+    imu.protocol = protocol;
+    imu.rate_hz = 100.0;
+    const auto samples = samples_of(path, imu);
+    ASSERT_EQ(samples.size(), 40U);
+    EXPECT_NEAR(samples[39].imu.f_mps2[2], -9.80665, 1e-5);
+    for (const char* topic : {fix_topic, ""}) {
+      auto gnss = device_of(DeviceRole::kGnss, topic);
+      gnss.protocol = protocol;
+      gnss.rate_hz = 5.0;
+      const auto fixes = samples_of(path, gnss);
+      ASSERT_EQ(fixes.size(), 2U);
+      EXPECT_NE(fixes[1].gnss.flags & kVelocityValid, 0U);
+      EXPECT_EQ(fixes[1].gnss.solution, GnssSolution::kFixed);
+      EXPECT_NEAR(fixes[1].gnss.height_m, 450.02, 0.006);
+    }
+    auto time = device_of(DeviceRole::kTime);
+    time.protocol = protocol;
+    const auto pulses = samples_of(path, time);
+    ASSERT_EQ(pulses.size(), 2U);
+    EXPECT_EQ(pulses[0].pulse.wall_ns, 1'700'000'000'000'000'000);
+  }
+}
+
+TEST(MessageSource, AnotherKindOfFileIsNamed) {
+  auto device = device_of(DeviceRole::kStudy);
+  const auto wrong = survey_messages(test::source_path("tests/vectors/bag_lz4.bag"), device);
+  ASSERT_FALSE(wrong);
+  EXPECT_NE(wrong.error().what.find("is of rosbag, not of mcap"), std::string::npos) << wrong.error().what;
+  EXPECT_NE(wrong.error().remedy.find("protocol = \"rosbag\""), std::string::npos);
+}
+
+/// A folder of rosbag2: its files in the order of metadata.yaml, and in no other.
+class Rosbag2 : public testing::Test {
+ protected:
+  void SetUp() override { folder_ = test::scratch_folder(); }
+  void add_part(const std::string& name, int first) {
+    Bag bag;
+    for (int i = first; i < first + 3; ++i)
+      bag.add("/imu", "sensor_msgs/msg/Imu", imu_at(kTime_ns + i * 100'000'000, "imu", i));
+    std::filesystem::copy_file(bag.finish(), folder_ / name);
+  }
+  void describe(const std::string& files) {
+    std::ofstream(folder_ / "metadata.yaml")
+        << "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    "
+           "nanoseconds: 1\n"
+           "  relative_file_paths:\n"
+        << files << "  files:\n    - path: b_0.mcap\n      message_count: 3\n";
+  }
+  std::filesystem::path folder_;
+};
+
+TEST_F(Rosbag2, AFolderIsItsFilesInTheirOrder) {
+  add_part("b_0.mcap", 0);
+  add_part("b_1.mcap", 3);
+  add_part("stray.mcap", 9);
+  // Early versions wrote the folder's name before the file's; nothing leads out of the folder.
+  describe("    - b_0.mcap\n    - \"old_name/b_1.mcap\"\n");
+  const auto samples = samples_of(folder_, device_of(DeviceRole::kStudy));
+  ASSERT_EQ(samples.size(), 6U);
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    EXPECT_EQ(samples[i].imu.omega_radps[0], static_cast<double>(i));
+}
+
+TEST_F(Rosbag2, WhatCannotBeReadSaysWhatToDo) {
+  const auto error = [&] {
+    const auto survey = survey_messages(folder_, device_of(DeviceRole::kStudy));
+    return survey ? std::string("none") : survey.error().text();
+  };
+  EXPECT_NE(error().find("without metadata.yaml"), std::string::npos) << error();
+  describe("    - b_0.db3\n");
+  EXPECT_NE(error().find("mcap convert"), std::string::npos) << error();
+  describe("    - b_0.mcap.zstd\n");
+  EXPECT_NE(error().find("zstd -d"), std::string::npos) << error();
+  describe("    - ../../etc/passwd\n");
+  EXPECT_NE(error().find("no such file"), std::string::npos) << error();
+  describe("");
+  EXPECT_NE(error().find("names no file"), std::string::npos) << error();
+  std::ofstream(folder_ / "b.db3", std::ios::binary) << "SQLite format 3" << '\0' << "more";
+  const auto survey = survey_messages(folder_ / "b.db3", device_of(DeviceRole::kStudy));
+  ASSERT_FALSE(survey);
+  EXPECT_NE(survey.error().text().find("SQLite"), std::string::npos);
+}
+
+TEST(MessageSource, NamesOfAStrangerAreText) {
   Bag bag;
   bag.add("/a\x1b[2J\nb", "sensor_msgs/msg/Imu", imu_at(kTime_ns, "f\x1b]0;x\x07", 1.0));
   bag.add("/c", "sensor_msgs/msg/Imu", imu_at(kTime_ns, "g", 1.0));
   const auto path = bag.finish();
   auto device = device_of(DeviceRole::kStudy);
-  const auto choice = survey_mcap(path, device);
+  const auto choice = survey_messages(path, device);
   ASSERT_FALSE(choice);
-  device.mcap.topic = "/absent";
-  const auto absent = survey_mcap(path, device);
+  device.messages.topic = "/absent";
+  const auto absent = survey_messages(path, device);
   ASSERT_FALSE(absent);
-  device.mcap.topic = "/a\x1b[2J\nb";
-  device.mcap.frame_id = "none";
-  const auto frame = survey_mcap(path, device);
+  device.messages.topic = "/a\x1b[2J\nb";
+  device.messages.frame_id = "none";
+  const auto frame = survey_messages(path, device);
   ASSERT_FALSE(frame);
   for (const auto* error : {&choice.error(), &absent.error()}) {
     for (const char c : error->text()) EXPECT_TRUE(static_cast<unsigned char>(c) >= ' ') << error->text();

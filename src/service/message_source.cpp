@@ -1,4 +1,4 @@
-#include "service/mcap_source.h"
+#include "service/message_source.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,14 +6,15 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "base/nearest_word.h"
 #include "base/text.h"
 #include "base/units.h"
 #include "drivers/ros_message/wire.h"
-#include "mcap/reader.h"
 #include "mcap/ros_messages.h"
+#include "service/message_log.h"
 
 namespace imuscope {
 namespace {
@@ -45,19 +46,14 @@ std::string_view type_of(DeviceRole role) {
   }
 }
 
-/// "sensor_msgs/msg/Imu", "sensor_msgs.Imu" and "sensor_msgs/Imu" are the same.
-std::string plain_type(std::string_view schema) {
-  std::string type(schema);
-  std::replace(type.begin(), type.end(), '.', '/');
-  if (const auto at = type.find("/msg/"); at != std::string::npos) type.erase(at, 4);
-  return type;
+bool is_readable(const mcap::Topic& topic) {
+  return topic.encoding == "cdr" || topic.encoding == "ros1" || topic.encoding == "json";
 }
-
-bool is_readable(const mcap::Topic& topic) { return topic.encoding == "cdr" || topic.encoding == "json"; }
 
 template <typename Message>
 bool read_message(const mcap::Topic& topic, mcap::Bytes data, Message& message) {
-  return topic.encoding == "json" ? mcap::read_json(data, message) : mcap::read(data, message);
+  if (topic.encoding == "json") return mcap::read_json(data, message);
+  return mcap::read(data, message, topic.encoding == "ros1" ? mcap::Wire::kRos1 : mcap::Wire::kCdr);
 }
 
 /// Square roots of a covariance's diagonal, east-north-up to north, east, down; false where they are no sd.
@@ -91,17 +87,18 @@ struct Velocity {
 /// Takes the messages of one device out of a file, in their order in it.
 class Extractor {
  public:
-  Extractor(mcap::Reader reader, const DeviceConfig& device) : reader_(std::move(reader)), device_(device) {}
+  Extractor(std::unique_ptr<mcap::MessageReader> reader, const DeviceConfig& device)
+      : reader_(std::move(reader)), device_(device) {}
 
   /// The next content; nothing at the end.
   std::optional<ros_message::Content> next() {
-    while (const auto message = reader_.next()) {
+    while (const auto message = reader_->next()) {
       if (auto content = take(*message)) return content;
     }
     return std::exchange(waiting_, std::nullopt);
   }
 
-  [[nodiscard]] const mcap::Reader& reader() const { return reader_; }
+  [[nodiscard]] const mcap::MessageReader& reader() const { return *reader_; }
   /// Topics of the file and their types.
   [[nodiscard]] const std::map<std::string, std::string>& topics() const { return topics_; }
   [[nodiscard]] const std::set<std::string>& frames() const { return frames_; }
@@ -114,9 +111,9 @@ class Extractor {
     if (&topic != last_topic_) {
       last_topic_ = &topic;
       topics_.emplace(topic.name, plain_type(topic.schema));
-      is_velocity_ = !device_.mcap.velocity_topic.empty() && topic.name == device_.mcap.velocity_topic;
-      is_wanted_ = topic.name == device_.mcap.topic;
-      if (device_.mcap.topic.empty()) is_wanted_ = plain_type(topic.schema) == type_of(device_.role);
+      is_velocity_ = has_velocity() && is_velocity_topic(topic);
+      is_wanted_ = topic.name == device_.messages.topic;
+      if (device_.messages.topic.empty()) is_wanted_ = plain_type(topic.schema) == type_of(device_.role);
     }
     if (!is_wanted_ && !is_velocity_) return std::nullopt;
     if (!is_readable(topic)) {
@@ -136,17 +133,29 @@ class Extractor {
     }
   }
 
+  /// A flight controller's velocities stand beside its positions.
+  [[nodiscard]] bool has_velocity() const {
+    const bool is_beside = device_.protocol == Protocol::kUlog || device_.protocol == Protocol::kDataflash;
+    return device_.role == DeviceRole::kGnss && (is_beside || !device_.messages.velocity_topic.empty());
+  }
+  [[nodiscard]] bool is_velocity_topic(const mcap::Topic& topic) const {
+    const auto& [wanted, velocity] = std::tie(device_.messages.topic, device_.messages.velocity_topic);
+    if (!velocity.empty()) return topic.name == velocity;
+    constexpr std::string_view kBeside = "/velocity";
+    return topic.name.ends_with(kBeside) && (wanted.empty() || topic.name == wanted + std::string(kBeside));
+  }
+
   /// Whether a message is of the frame, and its time.
   bool is_ours(const mcap::RosHeader& header) {
     constexpr std::size_t kFramesMost = 32;
     if (frames_.size() < kFramesMost) frames_.insert(header.frame_id);
-    return device_.mcap.frame_id.empty() || header.frame_id == device_.mcap.frame_id;
+    return device_.messages.frame_id.empty() || header.frame_id == device_.messages.frame_id;
   }
   [[nodiscard]] std::int64_t time_of(const mcap::Message& message, const mcap::RosHeader& header) const {
-    switch (device_.mcap.time) {
-      case McapTime::kLog:
+    switch (device_.messages.time) {
+      case MessageTime::kLog:
         return static_cast<std::int64_t>(message.log_time);
-      case McapTime::kPublish:
+      case MessageTime::kPublish:
         return static_cast<std::int64_t>(message.publish_time);
       default:
         return header.stamp_ns;
@@ -190,7 +199,7 @@ class Extractor {
     if (solution == GnssSolution::kNone) {
       for (double& value : content.values) value = std::isfinite(value) ? value : 0.0;
     }
-    if (device_.mcap.velocity_topic.empty()) return content;
+    if (!has_velocity()) return content;
     join(content, velocity_);
     return std::exchange(waiting_, content);
   }
@@ -241,7 +250,7 @@ class Extractor {
     return content;
   }
 
-  mcap::Reader reader_;
+  std::unique_ptr<mcap::MessageReader> reader_;
   const DeviceConfig device_;
   const mcap::Topic* last_topic_ = nullptr;
   bool is_wanted_ = false;
@@ -319,15 +328,15 @@ std::string list_of_topics(const std::map<std::string, std::string>& topics) {
 Result<void> check_topics(const std::string& file, const DeviceConfig& device, const Extractor& found) {
   const std::string_view type = type_of(device.role);
   const auto& topics = found.topics();
-  if (device.mcap.topic.empty()) {
+  if (device.messages.topic.empty()) {
     const auto n =
         std::count_if(topics.begin(), topics.end(), [&](const auto& topic) { return topic.second == type; });
     if (n == 1) return {};
     return usage_error(
         fmt::format("{}: {} has {} topics of {}", device.name, file, n == 0 ? "no" : std::to_string(n), type),
-        fmt::format("give topic in its [device.mcap]; {}", list_of_topics(topics)));
+        fmt::format("give topic in its [device.messages]; {}", list_of_topics(topics)));
   }
-  for (const std::string& wanted : {device.mcap.topic, device.mcap.velocity_topic}) {
+  for (const std::string& wanted : {device.messages.topic, device.messages.velocity_topic}) {
     if (wanted.empty() || topics.contains(wanted)) continue;
     std::vector<std::string> names;
     for (const auto& topic : topics) names.push_back(topic.first);
@@ -336,19 +345,21 @@ Result<void> check_topics(const std::string& file, const DeviceConfig& device, c
         fmt::format("{}: {} has no topic {}", device.name, file, wanted),
         (near.empty() ? "" : fmt::format("did you mean {}? ", one_line(near, 200))) + list_of_topics(topics));
   }
-  const std::string& is = topics.at(device.mcap.topic);
+  const std::string& is = topics.at(device.messages.topic);
   // JSON may come with a schema of any name, or with none.
   if (is == type || found.unreadable() == 0) return {};
   return usage_error(
-      fmt::format("{}: topic {} of {} holds {}", device.name, device.mcap.topic, file, one_line(is, 200)),
+      fmt::format("{}: topic {} of {} holds {}", device.name, device.messages.topic, file, one_line(is, 200)),
       fmt::format("a {} device is {}", name_of(device.role), type));
 }
 
 Error no_message_error(const std::string& file, const DeviceConfig& device, const Extractor& found) {
-  const std::string topic = device.mcap.topic.empty() ? std::string(type_of(device.role)) : device.mcap.topic;
+  const std::string topic =
+      device.messages.topic.empty() ? std::string(type_of(device.role)) : device.messages.topic;
   if (found.unreadable() > 0) {
     return {ErrorKind::kWork,
-            fmt::format("{}: the messages of {} in {} are neither CDR nor JSON", device.name, topic, file),
+            fmt::format("{}: the messages of {} in {} are neither CDR nor ROS 1 nor JSON", device.name, topic,
+                        file),
             "convert the file to ROS 2 (rosbags-convert does)"};
   }
   if (!found.frames().empty()) {
@@ -356,7 +367,7 @@ Error no_message_error(const std::string& file, const DeviceConfig& device, cons
     for (const auto& frame : found.frames()) frames.push_back(one_line(frame, 64));
     return {ErrorKind::kUsage,
             fmt::format("{}: no message of {} in {} has frame_id '{}'", device.name, topic, file,
-                        device.mcap.frame_id),
+                        device.messages.frame_id),
             fmt::format("there is {}", fmt::join(frames, ", "))};
   }
   return {ErrorKind::kWork,
@@ -367,12 +378,13 @@ Error no_message_error(const std::string& file, const DeviceConfig& device, cons
 
 }  // namespace
 
-Result<McapSurvey> survey_mcap(const std::filesystem::path& file, const DeviceConfig& device,
-                               const std::function<void(const std::string& what, double share)>& progress) {
-  auto reader = mcap::Reader::open(file);
+Result<MessageSurvey> survey_messages(
+    const std::filesystem::path& file, const DeviceConfig& device,
+    const std::function<void(const std::string& what, double share)>& progress) {
+  auto reader = open_message_log(file, device.protocol);
   if (!reader) return tl::unexpected<Error>(reader.error());
   Extractor extractor(std::move(*reader), device);
-  McapSurvey survey;
+  MessageSurvey survey;
   std::vector<std::uint8_t> frames;
   bool keeps = true;
   while (const auto content = extractor.next()) {
@@ -406,10 +418,10 @@ Result<McapSurvey> survey_mcap(const std::filesystem::path& file, const DeviceCo
   return survey;
 }
 
-Result<std::unique_ptr<ByteSource>> open_mcap(const std::filesystem::path& file, const DeviceConfig& device,
-                                              const McapSurvey& survey) {
+Result<std::unique_ptr<ByteSource>> open_messages(const std::filesystem::path& file,
+                                                  const DeviceConfig& device, const MessageSurvey& survey) {
   if (survey.frames) return std::make_unique<KeptSource>(survey.frames);
-  auto reader = mcap::Reader::open(file);
+  auto reader = open_message_log(file, device.protocol);
   if (!reader) return tl::unexpected<Error>(reader.error());
   return std::make_unique<FileSource>(Extractor(std::move(*reader), device));
 }
