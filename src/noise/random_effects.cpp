@@ -6,6 +6,7 @@
 
 #include "base/contracts.h"
 #include "noise/chi_squared.h"
+#include "noise/spread_solver.h"
 
 namespace imuscope::noise {
 namespace {
@@ -32,22 +33,10 @@ Weighted weighted_by(std::span<const double> values, std::span<const double> var
   return out;
 }
 
-/// The variance between units at which the weighted sum of squares is `q`; it falls with that variance.
+/// The variance between units at which the weighted sum of squares is `q`.
 double between_at(std::span<const double> values, std::span<const double> variances, double q) {
-  if (weighted_by(values, variances, 0.0).q <= q) return 0.0;
-  double low = 0.0;
-  double high = *std::max_element(variances.begin(), variances.end());
-  constexpr int kDoublings = 200;
-  for (int i = 0; i < kDoublings && weighted_by(values, variances, high).q > q; ++i) {
-    low = high;
-    high *= 2.0;
-  }
-  constexpr int kHalvings = 60;
-  for (int i = 0; i < kHalvings; ++i) {
-    const double middle = 0.5 * (low + high);
-    (weighted_by(values, variances, middle).q > q ? low : high) = middle;
-  }
-  return 0.5 * (low + high);
+  return variance_at([&](double between) { return weighted_by(values, variances, between).q; }, q,
+                     *std::max_element(variances.begin(), variances.end()));
 }
 
 }  // namespace

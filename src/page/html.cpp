@@ -4,6 +4,7 @@
 #include <openssl/evp.h>
 
 #include "page/assets.h"
+#include "page/template.h"
 
 namespace imuscope::page {
 
@@ -155,6 +156,19 @@ std::string page_without_script(std::string_view title, const Html& body) {
       "dark\">\n<title>{}</title>\n<style>\n{}{}</style>\n</head>\n"
       "<body>\n<main>\n{}\n</main>\n</body>\n</html>\n",
       text(title).str(), kit_style(), document_style(), body.str());
+}
+
+std::string page_with_script(std::string_view title, const Html& body, std::string_view style,
+                             const std::string& data, std::string_view script) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
+      "form-action 'none'; "
+      "style-src 'unsafe-inline'; script-src {}\">\n<meta name=\"color-scheme\" content=\"light dark\">\n"
+      "<title>{}</title>\n<style>\n{}{}</style>\n</head>\n<body>\n<main>\n{}\n</main>\n"
+      "<script type=\"application/json\" id=\"data\">{}</script>\n<script>{}</script>\n</body>\n</html>\n",
+      hash_source(script), text(title).str(), kit_style(), style, body.str(), json_for_script(data), script);
 }
 
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class) {

@@ -83,6 +83,12 @@ Html svg_image(const std::string& svg, std::string_view words);
 /// A whole page that runs no script and loads nothing, in the style of all pages.
 std::string page_without_script(std::string_view title, const Html& body);
 
+/// A whole page that runs the script given and no other, and loads nothing.
+/// @param style  behind the kit's
+/// @param data   JSON that the script finds in the element `data`
+std::string page_with_script(std::string_view title, const Html& body, std::string_view style,
+                             const std::string& data, std::string_view script);
+
 /// A place where page.js draws the figure `id`, with what it shows in words below it.
 Html figure_place(std::string_view id, const Html& caption, std::string_view css_class = {});
 

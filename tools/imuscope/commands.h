@@ -28,6 +28,9 @@ void add_wv(CLI::App& app, Work& chosen);
 /// `imuscope fit FILE --rate HZ --model 'WN+2*GM'`
 void add_fit(CLI::App& app, Work& chosen);
 
+/// `imuscope fleet run FLEET.toml`
+void add_fleet(CLI::App& app, Work& chosen);
+
 /// `imuscope characterize FILE...`
 void add_characterize(CLI::App& app, Work& chosen);
 

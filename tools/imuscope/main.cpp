@@ -45,6 +45,7 @@ int run(int argc, char** argv) {
   imuscope::cli::add_evaluate(app, work);
   imuscope::cli::add_report(app, work);
   imuscope::cli::add_tables(app, work);
+  imuscope::cli::add_fleet(app, work);
   imuscope::cli::add_decode(app, work);
   imuscope::cli::add_import(app, work);
   imuscope::cli::add_capture(app, work);
