@@ -57,6 +57,27 @@ def test_samples_of_an_imu(capture, imuscope_program, drive):
         assert min(abs(number - value) for number in numbers) < 1e-5 * max(1.0, abs(value))
 
 
+@pytest.mark.parametrize("device", ["mtx1", "gnss", "airins"])
+def test_messages_of_a_protocol_are_those_of_the_program(capture, imuscope_program, drive, device):
+    dump = next(file for file in drive.glob(f"{device}.*") if not file.name.endswith(".csv"))
+    status, printed, said = imuscope_program("decode", dump, "--json")
+    assert status == 0, said
+    theirs = [json.loads(line) for line in printed.splitlines()]
+    ours = list(capture.protocol_messages(device))
+    assert len(ours) > 100
+    arrivals = [message.arrival_ns for message in ours]
+    assert arrivals == sorted(arrivals) and arrivals[0] >= capture.devices[device]["first_ns"]
+    named = [message for message in theirs if "message" in message]
+    assert [message.name for message in ours] == [message["message"] for message in named]
+    for message, same in list(zip(ours, named))[::97]:
+        assert message.fields.items() <= same.items() or message.fields == same.get("fields")
+
+
+def test_messages_of_a_device_that_is_not_there(capture):
+    with pytest.raises(imuscope.Error, match="no device mtx9"):
+        list(capture.protocol_messages("mtx9"))
+
+
 def flat(value):
     if isinstance(value, dict):
         value = list(value.values())

@@ -1,6 +1,7 @@
 """What a capture holds: what was run, the bytes of every device, their samples, the messages beside them."""
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import dataclass
 from typing import Any, Iterator, Mapping, NamedTuple, Optional, Union
@@ -22,6 +23,16 @@ class Read(NamedTuple):
     """On the PC's clock (CLOCK_MONOTONIC), ns."""
     is_read: bool
     data: bytes
+
+
+class ProtocolMessage(NamedTuple):
+    """One message that a device sent, in the words of its protocol's documents."""
+
+    arrival_ns: int
+    """Of the read in which it began, on the PC's clock, ns."""
+    name: str
+    """Such as "MTData2", "NAV-PVT" or "GGA"."""
+    fields: dict[str, Any]
 
 
 class Samples(Mapping[str, NDArray[Any]]):
@@ -84,6 +95,11 @@ class Capture:
         reads = _imuscope.CapturedReads(self.file, device)
         while batch := reads.next():
             yield from map(Read._make, batch)
+
+    def protocol_messages(self, device: str) -> Iterator[ProtocolMessage]:
+        """Every message of a device as it was sent, whether it became a sample or not; as `imuscope decode` has them."""
+        for arrival_ns, name, fields in _imuscope.protocol_messages(self.file, device):
+            yield ProtocolMessage(arrival_ns, name, json.loads(fields))
 
     def messages(self, channel: str = ".*") -> Iterator[Heard]:
         """The LCM messages of the capture, decoded, in the order of the file: the bytes of devices (raw_t), what was

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <limits>
 #include <optional>
 
@@ -5,6 +6,7 @@
 #include "conversions.h"
 #include "service/device_factory.h"
 #include "service/recording.h"
+#include "stream_protocols.h"
 
 namespace imuscope::python {
 namespace {
@@ -237,11 +239,60 @@ py::dict samples(const std::vector<std::string>& inputs, const std::optional<std
   return out;
 }
 
+/// [(arrival_ns, name, JSON of its fields)] of every message in what a device sent, as its protocol's
+/// documents call them. arrival_ns is that of the read in which the message began.
+py::list protocol_messages(const std::string& file, const std::string& device) {
+  struct Message {
+    std::int64_t arrival_ns;
+    std::string name;
+    std::string fields;
+  };
+  std::vector<Message> messages;
+  {
+    const py::gil_scoped_release unlocked;
+    const auto summary = take(summarise_capture(file));
+    const auto configuration = take(parse_configuration(summary.run.configuration, file));
+    const DeviceConfig& config = configuration.devices[device_named(configuration, device)];
+    const auto protocols = cli::stream_protocols();
+    const auto protocol = std::find_if(protocols.begin(), protocols.end(),
+                                       [&](const auto& one) { return one.name == name_of(config.protocol); });
+    if (protocol == protocols.end()) {
+      throw Failure({ErrorKind::kUsage,
+                     device + " speaks " + std::string(name_of(config.protocol)) +
+                         ", whose messages are not a stream of bytes",
+                     "take its samples"});
+    }
+    const std::string& carrier = configuration.devices[config.line_owner].name;
+    auto reader = take(CaptureReader::open(file, carrier));
+    std::vector<std::uint8_t> stream;
+    std::vector<std::pair<std::uint64_t, std::int64_t>> arrivals;
+    while (const auto read = reader.next()) {
+      if (read->direction != Direction::kRead || read->device != carrier) continue;
+      arrivals.emplace_back(stream.size(), to_ns(read->arrival));
+      stream.insert(stream.end(), read->bytes.begin(), read->bytes.end());
+    }
+    cli::Visitor visitor;
+    visitor.message = [&](const cli::DecodedMessage& message) {
+      const auto behind =
+          std::upper_bound(arrivals.begin(), arrivals.end(), message.offset,
+                           [](std::uint64_t offset, const auto& one) { return offset < one.first; });
+      messages.push_back({behind == arrivals.begin() ? 0 : std::prev(behind)->second, message.message,
+                          message.fields.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)});
+    };
+    protocol->decode(stream, visitor);
+  }
+  py::list out;
+  for (const Message& message : messages)
+    out.append(py::make_tuple(message.arrival_ns, message.name, message.fields));
+  return out;
+}
+
 }  // namespace
 
 void bind_captures(py::module_& module) {
   module.def("summarise", &summarise);
   module.def("samples", &samples);
+  module.def("protocol_messages", &protocol_messages);
   py::class_<CapturedMessages>(module, "CapturedMessages")
       .def(py::init<const std::string&>())
       .def("next", &CapturedMessages::next);
