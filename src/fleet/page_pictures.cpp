@@ -132,14 +132,30 @@ Scale scale_of(const std::vector<AxisValues>& axes, bool is_log, std::optional<d
   return scale;
 }
 
+/// Values that are marked: round ones, of logarithms to two digits.
+std::vector<double> marks_on(const Scale& scale) {
+  constexpr int kMarks = 5;
+  std::vector<double> marks;
+  if (scale.is_log) {
+    for (int i = 0; i < kMarks; ++i) {
+      const double value = std::exp(scale.low + (scale.high - scale.low) * (i + 0.5) / kMarks);
+      const double digit = round_below(value) / 20.0;
+      marks.push_back(std::round(value / digit) * digit);
+    }
+    return marks;
+  }
+  const double step = round_below((scale.high - scale.low) / (kMarks - 1));
+  for (double at = std::ceil(scale.low / step) * step; at <= scale.high; at += step) marks.push_back(at);
+  return marks;
+}
+
 std::string marks_of(const Scale& scale, double bottom) {
   std::string out;
-  constexpr int kMarks = 5;
-  for (int i = 0; i < kMarks; ++i) {
-    const double at = scale.low + (scale.high - scale.low) * (i + 0.5) / kMarks;
-    const double value = scale.is_log ? std::exp(at) : at;
+  for (const double value : marks_on(scale)) {
+    constexpr double kNothing = 1e-12;
+    const double shown = std::abs(value) < kNothing ? 0.0 : value;
     out += fmt::format(R"(<text class="quiet" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
-                       scale.x(value), bottom + 14.0, page::text(short_number(value)).str());
+                       scale.x(value), bottom + 14.0, page::text(short_number(shown)).str());
   }
   return out;
 }

@@ -79,7 +79,7 @@ void measure_calibration(const json& imu, Measurements& out) {
   if (t_d && t_d_sd) out.linear("time offset", "", "", "ms", kMilli * *t_d, kMilli * *t_d_sd);
 }
 
-/// What a data sheet has, and every parameter that the data determine.
+/// What a data sheet has becomes a measurement; parameters stand with their model.
 json measure_model(const json& entry, Measurements& out) {
   const std::string axis = text_at(entry, "axis");
   const std::string regime = text_at(entry, "regime");
@@ -100,8 +100,6 @@ json measure_model(const json& entry, Measurements& out) {
     const auto sd = number_at(p, "sd");
     const std::string process = text_at(p, "process");
     const std::string name = text_at(p, "name");
-    if (value && sd && *value > 0.0)
-      out.logarithm(process + " " + name, regime, axis, text_at(p, "unit"), *value, *sd / *value);
     parameters.push_back({process, name, text_at(p, "unit"), or_null(value), or_null(sd),
                           or_null(number_at(p, "ci_low")), or_null(number_at(p, "ci_high"))});
   }

@@ -20,8 +20,9 @@ inline constexpr const char* kStudySchema = "imuscope.fleet-study/1";
 ///  "r_bs_b_m", "r_bs_b_sd_m", "t_d_s", "t_d_sd_s", "measurements": [[quantity, regime, axis, unit, is_log,
 ///  value, sd]], "models": [{"axis", "regime", "model", "p_value", "identifiable", "simpler_model",
 ///  "seconds", "parameters": [[process, name, unit, value, sd, ci_low, ci_high]]}]}]}
-/// A measurement that is_log is the natural logarithm of its quantity. What is not known is null.
-/// Errors: kWork, a file of the run that is missing or holds something else.
+/// Measurements are what a data sheet and a calibration have; parameters of models are read as such, too
+/// (measurement_row.h). A measurement that is_log is the natural logarithm of its quantity. What is not known
+/// is null. Errors: kWork, a file of the run that is missing or holds something else.
 Result<nlohmann::json> summary_of_run(const std::filesystem::path& run);
 
 }  // namespace imuscope::fleet

@@ -114,12 +114,10 @@ Result<void> do_unit(const UnitTask& task, const std::string& program) {
       for (const json& one : field(field(result, "summary"), "imus")) {
         if (text_at(one, "device") != drive.device) continue;
         runs[{drive.mounting, drive.device}].push_back(study / "run");
-        for (const json& cells : field(one, "measurements")) {
-          const auto row = measurement_of(cells);
-          if (!row) return work_error((study / "result.json").string() + " holds no row of a measurement");
-          Values& all = values[{row->quantity, row->regime, row->axis, row->unit, row->is_log}];
-          all.values.push_back(row->value);
-          all.variances.push_back(row->sd * row->sd);
+        for (const auto& row : measurements_of(one)) {
+          Values& all = values[{row.quantity, row.regime, row.axis, row.unit, row.is_log}];
+          all.values.push_back(row.value);
+          all.variances.push_back(row.sd * row.sd);
         }
       }
     }

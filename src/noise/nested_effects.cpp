@@ -38,8 +38,9 @@ using Matrix = Eigen::MatrixXd;
 /// The drives' values at one variance between drives: what is left of them within the units, and the units'
 /// means.
 struct Within {
-  double q = 0.0;  ///< weighted sum of squares within the units, covariates taken out
-  Vector slopes;   ///< of the covariates
+  double q = 0.0;       ///< weighted sum of squares within the units, covariates taken out
+  double q_fall = 0.0;  ///< by a unit of the variance between drives
+  Vector slopes;        ///< of the covariates
   Matrix slope_covariance;
   Vector means;      ///< of the units, at the covariates' overall mean
   Vector variances;  ///< of these
@@ -108,6 +109,15 @@ class Drives {
     out.slope_covariance = p > 0 ? Matrix(gram.ldlt().solve(Matrix::Identity(p, p))) : Matrix(0, 0);
     out.slopes = p > 0 ? Vector(out.slope_covariance * moment) : Vector(0);
     out.q = std::max(0.0, squares - (p > 0 ? out.slopes.dot(moment) : 0.0));
+    // Means and slopes make the sum least, so that it follows the weights alone.
+    for (std::size_t j = 0; j < size(); ++j) {
+      const double w = 1.0 / (values_[j].variance + between_drives);
+      const auto u = static_cast<Eigen::Index>(values_[j].unit);
+      double y = values_[j].value - out.means(u);
+      for (Eigen::Index i = 0; i < p; ++i)
+        y -= out.slopes(i) * (covariate(j, static_cast<std::size_t>(i)) - x_means(u, i));
+      out.q_fall += w * w * y * y;
+    }
     if (p > 0) {
       out.means -= x_means * out.slopes;
       // What is not known of the slopes moves a unit by as much as it was measured elsewhere.
@@ -119,7 +129,13 @@ class Drives {
 
   /// The variance between drives at which the sum of squares is `q`.
   [[nodiscard]] double variance(double q) const {
-    return variance_at([&](double between) { return at(between).q; }, q, first_variance_);
+    const auto fast = variance_by_newton(
+        [&](double between) {
+          const Within within = at(between);
+          return SumOfSquares{within.q, within.q_fall};
+        },
+        q);
+    return fast ? *fast : variance_at([&](double between) { return at(between).q; }, q, first_variance_);
   }
 
  private:
