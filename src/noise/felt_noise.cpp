@@ -35,26 +35,39 @@ constexpr double kUndetermined = 1.5;
 constexpr double kNegligibleShare = 0.01;
 constexpr double kNegligibleUntold = 0.2;  ///< of one that the data do not tell
 
-bool is_slow(const Component& c, double rate_hz, double fast_s) {
+/// A Gauss-Markov process of at most 1/kEdge times the time at which noise is asked for is white to it, one
+/// of kEdge times that time is not.
+constexpr double kEdge = 2.0;
+
+/// Share of a process that is white at `fast_s` (N-28): it moves without a step as a time constant crosses
+/// it.
+double white_share(const Component& c, double rate_hz, double fast_s) {
   switch (c.kind) {
     case ProcessKind::kRandomWalk:
     case ProcessKind::kRamp:
     case ProcessKind::kFlicker:
     case ProcessKind::kPowerLaw:
-      return true;
-    case ProcessKind::kGaussMarkov:
-      return c.shape[0] * rate_hz * fast_s < 1.0;
+      return 0.0;
+    case ProcessKind::kGaussMarkov: {
+      const double in_edges = -std::log(c.shape[0] * rate_hz * fast_s) / std::log(kEdge);
+      const double x = std::clamp(0.5 * (1.0 + in_edges), 0.0, 1.0);
+      return 1.0 - x * x * (3.0 - 2.0 * x);
+    }
     default:
-      return false;
+      return 1.0;
   }
+}
+
+/// Less than half of it is white.
+bool is_slow(const Component& c, double rate_hz, double fast_s) {
+  return white_share(c, rate_hz, fast_s) < 0.5;
 }
 
 /// N-28.
 double white_of(const Model& model, double rate_hz, double fast_s) {
   double sum = 0.0;
-  for (const Component& c : without_power_laws(model).components) {
-    if (!is_slow(c, rate_hz, fast_s)) sum += low_frequency_variance(c) / rate_hz;
-  }
+  for (const Component& c : without_power_laws(model).components)
+    sum += white_share(c, rate_hz, fast_s) * low_frequency_variance(c) / rate_hz;
   return sum;
 }
 
@@ -76,9 +89,8 @@ double growth_of(const Component& c, double rate_hz, double time_s) {
 double slow_growth(const Model& any, double rate_hz, double fast_s, double time_s) {
   const Model model = without_power_laws(any);
   double sum = 0.0;
-  for (const Component& c : model.components) {
-    if (is_slow(c, rate_hz, fast_s)) sum += growth_of(c, rate_hz, time_s);
-  }
+  for (const Component& c : model.components)
+    sum += (1.0 - white_share(c, rate_hz, fast_s)) * growth_of(c, rate_hz, time_s);
   return sum;
 }
 
@@ -286,8 +298,57 @@ Felt told_white_density(const FitResult& fit, double fast_s) {
       });
 }
 
+/// A fit's own parameter of one component; nullptr where there is none of that name.
+const ParameterEstimate* parameter_of(const FitResult& fit, std::size_t component, int shape) {
+  const auto places = parameter_places(fit.model);
+  for (std::size_t p = 0; p < places.size() && p < fit.parameters.size(); ++p) {
+    if (places[p].component == component && places[p].shape == shape) return &fit.parameters[p];
+  }
+  return nullptr;
+}
+
+bool has_interval(const ParameterEstimate* p) {
+  return p != nullptr && p->ci_low && p->ci_high && std::isfinite(*p->ci_low) && std::isfinite(*p->ci_high) &&
+         *p->ci_low > 0.0;
+}
+
+/// An amplitude by its own interval: a value, or a bound where that has an upper end alone. A rejected
+/// model's bound trusts the rest of the model, and is none.
+std::optional<Felt> own_amplitude(const FitResult& fit, std::size_t component) {
+  const ParameterEstimate* p = parameter_of(fit, component, -1);
+  if (p == nullptr) return std::nullopt;
+  const bool is_root = parameter_scale_of(p->name) == ParameterScale::kLogSquare;
+  const auto squared = [&](double v) { return is_root ? v * v : v; };
+  if (has_interval(p))
+    return Felt{fit.model.components[component].amplitude, squared(*p->ci_high), squared(*p->ci_low),
+                Knowledge::kFitted};
+  if (p->ci_low || !p->ci_high || !std::isfinite(*p->ci_high) || fit.model_error > 0.0) return std::nullopt;
+  return Felt{squared(*p->ci_high), squared(*p->ci_high), 0.0, Knowledge::kBound};
+}
+
+/// Where a random walk is all that is slow, it is its own walk. A quick interval knows no more than the
+/// covariance.
+std::optional<Felt> own_walk(const FitResult& fit, double fast_s) {
+  if (fit.intervals != Intervals::kInverted) return std::nullopt;
+  std::optional<std::size_t> only;
+  for (std::size_t i = 0; i < fit.model.components.size(); ++i) {
+    const Component& c = fit.model.components[i];
+    const bool is_walk = c.kind == ProcessKind::kRandomWalk;
+    if (white_share(c, fit.rate_hz, fast_s) >= 1.0 || (!is_walk && c.amplitude <= 0.0)) continue;
+    if (only || !is_walk) return std::nullopt;
+    only = i;
+  }
+  if (!only) return std::nullopt;
+  auto own = own_amplitude(fit, *only);
+  if (own) {
+    for (double* v : {&own->value, &own->upper, &own->lower}) *v *= fit.rate_hz;
+  }
+  return own;
+}
+
 Felt walk_density(const FitResult& fit, double fast_s, const FilterBand& band) {
   const double f = fit.rate_hz;
+  if (const auto own = own_walk(fit, fast_s)) return *own;
   const auto value = [&](const Model& m) {
     return slow_growth(m, f, fast_s, band.to_s) > 0.0 ? walk_of(m, f, fast_s, band) : 0.0;
   };
@@ -303,26 +364,11 @@ double fast_beside_bias_s(const FitResult& fit, const FilterBand& band) {
   double slowest_s = 0.0;
   for (const Component& c : fit.model.components) {
     if (c.amplitude <= 0.0) continue;
-    if (is_slow(c, fit.rate_hz, band.from_s)) return band.from_s;
+    if (c.kind != ProcessKind::kGaussMarkov && is_slow(c, fit.rate_hz, band.from_s)) return band.from_s;
     if (c.kind == ProcessKind::kGaussMarkov && c.shape[0] * kBiasSamples <= 1.0)
       slowest_s = std::max(slowest_s, 1.0 / (c.shape[0] * fit.rate_hz));
   }
-  constexpr double kJustBelow = 0.999;
-  return slowest_s > 0.0 ? kJustBelow * slowest_s : band.from_s;
-}
-
-/// A fit's own parameter of one component; nullptr where there is none of that name.
-const ParameterEstimate* parameter_of(const FitResult& fit, std::size_t component, int shape) {
-  const auto places = parameter_places(fit.model);
-  for (std::size_t p = 0; p < places.size() && p < fit.parameters.size(); ++p) {
-    if (places[p].component == component && places[p].shape == shape) return &fit.parameters[p];
-  }
-  return nullptr;
-}
-
-bool has_interval(const ParameterEstimate* p) {
-  return p != nullptr && p->ci_low && p->ci_high && std::isfinite(*p->ci_low) && std::isfinite(*p->ci_high) &&
-         *p->ci_low > 0.0;
+  return slowest_s > 0.0 ? std::min(band.from_s, slowest_s / kEdge) : band.from_s;
 }
 
 /// The one Gauss-Markov process that makes the slow growth, told by the data; absent where there is none.
@@ -331,14 +377,14 @@ std::optional<FeltBias> own_process(const FitResult& fit, double fast_s, const F
   std::optional<std::size_t> only;
   for (std::size_t i = 0; i < fit.model.components.size(); ++i) {
     const Component& c = fit.model.components[i];
-    if (!is_slow(c, f, fast_s) || c.amplitude <= 0.0) continue;
+    if (white_share(c, f, fast_s) >= 1.0 || c.amplitude <= 0.0) continue;
     const auto share = [&](double time_s) {
       return slow_growth(Model{{c}}, f, fast_s, time_s) / slow_growth(fit.model, f, fast_s, time_s);
     };
     const bool is_told = has_interval(parameter_of(fit, i, -1));
     if (std::max(share(band.from_s), share(band.to_s)) < (is_told ? kNegligibleShare : kNegligibleUntold))
       continue;
-    if (only || c.kind != ProcessKind::kGaussMarkov) return std::nullopt;
+    if (only || c.kind != ProcessKind::kGaussMarkov || white_share(c, f, fast_s) > 0.0) return std::nullopt;
     only = i;
   }
   if (!only) return std::nullopt;
@@ -412,13 +458,8 @@ FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double
 }
 
 Felt felt_amplitude(const FitResult& fit, std::size_t component) {
+  if (const auto own = own_amplitude(fit, component)) return *own;
   const Component& c = fit.model.components[component];
-  const ParameterEstimate* p = parameter_of(fit, component, -1);
-  if (has_interval(p)) {
-    const bool is_root = parameter_scale_of(p->name) == ParameterScale::kLogSquare;
-    const auto squared = [&](double v) { return is_root ? v * v : v; };
-    return {c.amplitude, squared(*p->ci_high), squared(*p->ci_low), Knowledge::kFitted};
-  }
   Model rest = fit.model;
   rest.components.erase(rest.components.begin() + static_cast<std::ptrdiff_t>(component));
   return as_bound(c.amplitude,
@@ -431,7 +472,7 @@ std::string slow_terms(const FitResult& fit, const FilterBand& band) {
   const std::vector<std::string> of_components = component_names(fit.model);
   for (std::size_t i = 0; i < of_components.size(); ++i) {
     const Component& c = fit.model.components[i];
-    if (c.amplitude <= 0.0 || !is_slow(c, fit.rate_hz, band.from_s)) continue;
+    if (c.amplitude <= 0.0 || white_share(c, fit.rate_hz, band.from_s) >= 1.0) continue;
     names += (names.empty() ? "" : "+") + of_components[i];
   }
   return names;

@@ -4,10 +4,11 @@
 /// whether they are exported, printed as data-sheet rows or shown in a report (N-28 to N-32 in EQUATIONS.md).
 ///
 /// A filter works in a band of times, from the shortest over which it integrates to the longest over which it
-/// has to know how its biases grow. In that band a process is white (white noise, and a Gauss-Markov process
-/// or a moving average of a short memory with its density at frequency zero) or slow (the rest). Slow terms
-/// stand as they are where the filter's form has them; else they are replaced by the form's own term that
-/// grows alike over the band.
+/// has to know how its biases grow. In that band a process is white (white noise, and a moving average, a
+/// resonance or a Gauss-Markov process of a short memory with its density at frequency zero) or slow (the
+/// rest); a Gauss-Markov process of about the band's first time is so in part, so that the numbers do not
+/// jump where a fitted correlation time crosses it. Slow terms stand as they are where the filter's form has
+/// them; else they are replaced by the form's own term that grows alike over the band.
 
 #include <cstdint>
 #include <optional>
@@ -61,7 +62,8 @@ Felt felt_white_density(const FitResult& fit, const FilterBand& band);
 Felt felt_walk_density(const FitResult& fit, const FilterBand& band);
 
 /// For a form of white noise and one Gauss-Markov process: the density of the white noise, and the process.
-/// The slowest process is the bias even where it is faster than the band, as long as it lasts ten samples.
+/// The slowest process is the bias, and no part of it white, even where it is faster than the band, as long
+/// as it lasts ten samples.
 struct FeltWithBias {
   Felt white_density;
   FeltBias bias;

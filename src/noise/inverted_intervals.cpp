@@ -27,12 +27,46 @@ constexpr double kFarAbove = 3.0;
 /// How far beyond that the search for the other parameters may go.
 constexpr double kBeyond = 12.0;
 
+/// Sampling covariance of many models of one wavelet variance. What stretches and missing samples make of it
+/// depends little on the model: it is computed for one, as a factor of every entry beside that of a record
+/// whose coefficients lie in one run (N-41), which takes a small part of the time.
+class CovarianceOfModels {
+ public:
+  CovarianceOfModels(const Model& model, const WaveletVariance& wv, std::size_t rows)
+      : wv_(wv), in_one_run_(wv), rows_(rows) {
+    const bool has_stretches =
+        wv.segments.size() > 1 ||
+        std::any_of(wv.levels.begin(), wv.levels.end(), [](const WvLevel& l) { return !l.places.empty(); });
+    if (!has_stretches) return;
+    in_one_run_.segments.clear();
+    for (WvLevel& level : in_one_run_.levels) level.places.clear();
+    factor_ =
+        sampling_covariance(model, wv_, rows).cwiseQuotient(sampling_covariance(model, in_one_run_, rows));
+  }
+
+  [[nodiscard]] Eigen::MatrixXd of(const Model& model) const {
+    if (factor_.size() == 0 || !factor_.allFinite()) return sampling_covariance(model, wv_, rows_);
+    Eigen::MatrixXd v = factor_.cwiseProduct(sampling_covariance(model, in_one_run_, rows_));
+    // A product of entries need not be a covariance.
+    return v.llt().info() == Eigen::Success ? v : sampling_covariance(model, wv_, rows_);
+  }
+
+ private:
+  const WaveletVariance& wv_;
+  WaveletVariance in_one_run_;
+  std::size_t rows_;
+  Eigen::MatrixXd factor_;
+};
+
 /// One model's parameters as a vector on the scales of their intervals, and the levels that they are fitted
 /// to.
 class Inversion {
  public:
-  Inversion(const FitResult& fit, const WaveletVariance& wv, std::size_t rows)
-      : wv_(wv), base_(fit.model), places_(parameter_places(fit.model)), model_error_(fit.model_error) {
+  Inversion(const FitResult& fit, const CovarianceOfModels& covariances, std::size_t rows)
+      : covariances_(covariances),
+        base_(fit.model),
+        places_(parameter_places(fit.model)),
+        model_error_(fit.model_error) {
     y_.resize(static_cast<Eigen::Index>(rows));
     for (std::size_t i = 0; i < rows; ++i) {
       levels_.push_back(fit.wv[i].observed.level);
@@ -230,7 +264,7 @@ class Inversion {
   [[nodiscard]] Problem problem_at(const Eigen::VectorXd& u) const {
     const Model model = model_at(u);
     const Eigen::VectorXd m = curve(model);
-    Eigen::MatrixXd v = sampling_covariance(model, wv_, levels_.size());
+    Eigen::MatrixXd v = covariances_.of(model);
     Problem problem;
     problem.y.resize(m.size());
     for (Eigen::Index i = 0; i < m.size(); ++i)
@@ -291,7 +325,7 @@ class Inversion {
     return now;
   }
 
-  const WaveletVariance& wv_;
+  const CovarianceOfModels& covariances_;
   Model base_;
   std::vector<ParameterPlace> places_;
   double model_error_;
@@ -409,7 +443,8 @@ void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t 
   const double two_sided = chi_squared_quantile(1.0, result.confidence);
   // The square of the Gaussian's one-sided quantile.
   const double one_sided = chi_squared_quantile(1.0, 2.0 * result.confidence - 1.0);
-  Candidates candidates{Inversion(result, wv, levels)};
+  const CovarianceOfModels covariances(result.model, wv, levels);
+  Candidates candidates{Inversion(result, covariances, levels)};
   const Inversion inversion = candidates.front();
   if (inversion.has_loose_markov(result)) {
     for (Inversion& rival : inversion.rivals(two_sided)) candidates.push_back(std::move(rival));

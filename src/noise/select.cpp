@@ -102,26 +102,37 @@ class Grower {
     do {
       while (drop_one()) {
       }
-    } while (exchange_one());
+    } while (exchange_one() || split_flicker());
     return GrownModel{*best_, rivals()};
   }
 
  private:
   static constexpr int kMostAlike = 3;
-  static constexpr std::size_t kMostRivals = 4;
+  static constexpr std::size_t kMostRivals = 8;
 
-  /// Models that were tried and are as good as the best.
+  /// Models that were tried and are as good as the best, or as likely, and rejected for their parameters
+  /// alone. What contains the best is always as likely.
   [[nodiscard]] std::vector<FitResult> rivals() const {
     std::vector<FitResult> out;
     for (const auto& [name, fitted] : tried_) {
-      if (name != best_->spec.name() && is_rejected(fitted) == is_rejected(*best_) &&
-          fitted.criterion < best_->criterion + kEquivalent)
-        out.push_back(fitted);
+      if (name == best_->spec.name() || is_rejected(fitted) != is_rejected(*best_)) continue;
+      const bool is_as_likely = !contains(fitted.spec, best_->spec) && deviance(fitted) <= deviance(*best_);
+      if (is_as_likely || fitted.criterion < best_->criterion + kEquivalent) out.push_back(fitted);
     }
     std::stable_sort(out.begin(), out.end(),
                      [](const FitResult& a, const FitResult& b) { return a.criterion < b.criterion; });
     if (out.size() > kMostRivals) out.resize(kMostRivals);
     return out;
+  }
+
+  /// The criterion without what it takes for parameters (N-16).
+  static double deviance(const FitResult& fitted) {
+    return fitted.criterion - std::log(static_cast<double>(fitted.wv.size())) * fitted.spec.parameter_count();
+  }
+
+  static bool contains(const ModelSpec& whole, const ModelSpec& part) {
+    return std::ranges::all_of(part.processes,
+                               [&](ProcessKind kind) { return whole.count(kind) >= part.count(kind); });
   }
 
   /// Takes the model where it is better than the best by `margin`.
@@ -198,6 +209,24 @@ class Grower {
         const double margin = other.parameter_count() > base.parameter_count() ? kEquivalent : 0.0;
         if (consider(std::move(other), margin)) return true;
       }
+    }
+    return false;
+  }
+
+  /// Over a few octaves flicker noise is like a Gauss-Markov process and one that is slower; no step of one
+  /// term leads from one to the other.
+  bool split_flicker() {
+    const ModelSpec base = best_->spec;
+    const auto at = std::find(base.processes.begin(), base.processes.end(), ProcessKind::kFlicker);
+    if (at == base.processes.end() || base.count(ProcessKind::kGaussMarkov) >= kMostAlike) return false;
+    for (const ProcessKind slower : {ProcessKind::kRandomWalk, ProcessKind::kGaussMarkov}) {
+      ModelSpec other = base;
+      other.processes.erase(other.processes.begin() + (at - base.processes.begin()));
+      if (slower == ProcessKind::kRandomWalk && other.count(slower) > 0) continue;
+      other.processes.push_back(ProcessKind::kGaussMarkov);
+      other.processes.push_back(slower);
+      if (other.count(ProcessKind::kGaussMarkov) > kMostAlike) continue;
+      if (consider(std::move(other), kEquivalent)) return true;
     }
     return false;
   }

@@ -28,7 +28,7 @@ Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const Mo
 /// A model and those that the record takes for as good: what is said of the sensor has to hold for them, too.
 struct GrownModel {
   FitResult best;
-  std::vector<FitResult> rivals;  ///< with quick intervals, the likeliest first, at most four
+  std::vector<FitResult> rivals;  ///< with quick intervals, the best criterion first, at most eight
 };
 
 /// Term by term: from the best single process, or white noise and one more, on, each round adds the one of

@@ -440,6 +440,51 @@ TEST(Export, ABoundLiesAboveTheTruthWhereTheModelIsRejectedToo) {
   }
 }
 
+// N-28 and N-29: a time constant that crosses the band's first time moves what is white and what is slow
+// without a step, half a second is white, and two seconds are not.
+TEST(Export, WhatIsWhiteGoesOverIntoWhatIsSlowWithoutAStep) {
+  constexpr FilterBand kBand{1.0, 100.0};
+  FitResult fit;
+  fit.rate_hz = kRateHz;
+  fit.spec = parse_model("WN+GM").value();
+  const auto at = [&](double tau_s) {
+    fit.model.components = {{ProcessKind::kWhiteNoise, 1.0, {}},
+                            {ProcessKind::kGaussMarkov, 0.01, {1.0 / (tau_s * kRateHz), 0.0}}};
+    return std::pair{felt_white_density(fit, kBand).value * kRateHz, felt_walk_density(fit, kBand).value};
+  };
+  const auto whole = [](double tau_s) { return 0.01 / std::tanh(0.5 / (tau_s * kRateHz)); };
+  EXPECT_NEAR(at(0.4).first, 1.0 + whole(0.4), 1e-9);
+  EXPECT_EQ(at(0.4).second, 0.0);
+  EXPECT_NEAR(at(1.0).first, 1.0 + 0.5 * whole(1.0), 1e-9);
+  EXPECT_NEAR(at(2.1).first, 1.0, 1e-9);
+  EXPECT_GT(at(2.1).second, 0.0);
+  constexpr double kStep = 1.01;
+  for (double tau_s = 0.45; tau_s < 2.2; tau_s *= kStep) {
+    // The share falls by at most 3/2 of the step on the logarithm's scale of a factor of four.
+    EXPECT_NEAR(at(tau_s * kStep).first, at(tau_s).first, 0.03 * whole(tau_s)) << tau_s;
+  }
+}
+
+TEST(Export, ARandomWalkThatIsOnlyBoundedHasTheBoundOfItsFit) {
+  std::mt19937_64 random(18);
+  const auto x = signal(1.0, 0.0, 0.0, random);
+  FitOptions options;
+  options.intervals = Intervals::kInverted;
+  const auto fit =
+      imuscope::noise::fit(haar_wavelet_variance(x).value(), parse_model("WN+RW").value(), kRateHz, options)
+          .value();
+  const auto& walk = fit.parameters[1];
+  ASSERT_FALSE(walk.ci_low);
+  ASSERT_TRUE(walk.ci_high);
+  const Felt felt = felt_walk_density(fit, {1.0, 100.0});
+  EXPECT_EQ(felt.knowledge, Knowledge::kBound);
+  EXPECT_NEAR(felt.value, *walk.ci_high * kRateHz, 1e-9 * felt.value);
+  for (const Quantity& q : filter_quantities(fit, SignalUnit::kRadps)) {
+    if (q.process != "RW" || q.name != "driving density") continue;
+    EXPECT_NEAR(q.value, felt.value, 1e-9 * felt.value);
+  }
+}
+
 TEST(Export, AModelThatStatesAnErrorOfTheLevelsOwnSizeIsRefused) {
   std::mt19937_64 random(17);
   auto fit = fitted(signal(1.0, 1e-4, 0.0, random), "WN+RW");

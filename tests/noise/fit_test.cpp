@@ -272,6 +272,38 @@ TEST(InvertedIntervals, HoldTheTruthOfASlowProcessInEverySeriesThatIsCounted) {
   EXPECT_GE(held, 33) << "38 expected; fewer than 33 has a chance of 3e-3";
 }
 
+TEST(InvertedIntervals, OfARecordInStretchesHoldTheTruthAsOften) {
+  // A drive's stops: forty stretches of 10 to 100 samples' memory, whose covariance is a factor on that of
+  // one run.
+  constexpr std::size_t kN = 16'384;
+  constexpr double kRate = 0.02;
+  constexpr unsigned kSeries = 40;
+  FitOptions options;
+  options.intervals = Intervals::kInverted;
+  int held = 0;
+  int ends = 0;
+  for (unsigned s = 0; s < kSeries; ++s) {
+    std::vector<double> x = white(kN, 3000 + s);
+    const auto drive = white(kN + 1, 9000 + s);
+    std::vector<std::uint8_t> mask(kN, 1);
+    double state = drive[kN];
+    for (std::size_t i = 0; i < kN; ++i) {
+      x[i] += state;
+      state = std::exp(-kRate) * state + std::sqrt(-std::expm1(-2.0 * kRate)) * drive[i];
+      mask[i] = i % 400 < 300 ? 1 : 0;
+    }
+    WvOptions of_stretches;
+    of_stretches.mask = mask;
+    const auto wv = haar_wavelet_variance(x, of_stretches).value();
+    const auto result = fit(wv, parse_model("WN+GM").value(), 1.0, options).value();
+    const auto& beta = result.parameters[1];
+    held += (!beta.ci_low || *beta.ci_low <= kRate) && (!beta.ci_high || kRate <= *beta.ci_high) ? 1 : 0;
+    ends += (beta.ci_low ? 1 : 0) + (beta.ci_high ? 1 : 0);
+  }
+  EXPECT_GE(held, 33) << "38 expected; fewer than 33 has a chance of 3e-3";
+  EXPECT_GE(ends, 70) << "of 80: the record tells the rate";
+}
+
 TEST(InvertedIntervals, ATermAtZeroIsKnownToBeBelowABoundThatTheQuickOnesDoNotGive) {
   auto wv = haar_wavelet_variance(white(4096, 12)).value();
   for (auto& level : wv.levels) level.value = 1.0 / level.tau_samples * std::pow(0.97, level.level);

@@ -296,6 +296,25 @@ TEST_F(NoiseCommands, NotANumberCountsAsAGapOnRequest) {
   EXPECT_EQ(nlohmann::json::parse(taken.out).at("wv").at(0).at("n_coefficients"), 1 + 2);
 }
 
+TEST_F(NoiseCommands, AQuotedCellMayHoldSeparatorsAndACellMaySayThatItsValueIsMissing) {
+  std::string table = "name;utc;gyro_x\n";
+  for (int i = 0; i < 200; ++i) {
+    table += "\"a; # b\";\"2024-02-28T23:59:" + std::string(i < 100 ? "0" : "1") +
+             std::to_string(i / 10 % 10) + "." + std::to_string(i % 10) + "00Z\";" +
+             (i == 50    ? "n/a"
+              : i == 150 ? ""
+                         : std::to_string(i % 7)) +
+             "\n";
+  }
+  const auto file = write("quoted.csv", table);
+  EXPECT_THAT(run("wv " + file + " -c gyro_x").err, HasSubstr("--nan-is-gap"));
+  const auto taken = run("wv " + file + " -c gyro_x --nan-is-gap --json");
+  ASSERT_EQ(taken.exit_code, 0) << taken.err;
+  const auto json = nlohmann::json::parse(taken.out);
+  EXPECT_EQ(json.at("n"), 198);
+  EXPECT_NEAR(json.at("rate_hz").get<double>(), 10.0, 1e-9);
+}
+
 TEST_F(NoiseCommands, ShortAndConstantSignalsHaveTheVarianceThatThereIs) {
   const auto two = run("wv " + write("two.csv", "1\n3\n") + " -r 1 --json");
   ASSERT_EQ(two.exit_code, 0) << two.err;

@@ -4,12 +4,14 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <sstream>
@@ -32,18 +34,43 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
+/// The first of `wanted` that does not stand in double quotes.
+std::size_t find_unquoted(std::string_view line, char wanted) {
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (line[i] == '"') quoted = !quoted;
+    if (line[i] == wanted && !quoted) return i;
+  }
+  return std::string_view::npos;
+}
+
+std::string_view without_comment(std::string_view line) {
+  return trimmed(line.substr(0, find_unquoted(line, '#')));
+}
+
 /// ',' or ';' where the line has one, else tab, else blanks.
 char separator_of(std::string_view line) {
   for (const char c : {',', ';', '\t'}) {
-    if (line.find(c) != std::string_view::npos) return c;
+    if (find_unquoted(line, c) != std::string_view::npos) return c;
   }
   return ' ';
+}
+
+/// Where the cell at the front of the line ends. One that begins with a quote may hold separators.
+std::size_t end_of_cell(std::string_view line, char separator) {
+  const std::size_t start = line.find_first_not_of(' ');
+  if (start == std::string_view::npos || line[start] != '"') return line.find(separator);
+  const std::size_t end = find_unquoted(line, separator);
+  // A quote that nothing closes is a character like others.
+  return end == std::string_view::npos && std::count(line.begin(), line.end(), '"') % 2 != 0
+             ? line.find(separator)
+             : end;
 }
 
 void split(std::string_view line, char separator, std::vector<std::string_view>& cells) {
   cells.clear();
   while (true) {
-    const std::size_t at = line.find(separator);
+    const std::size_t at = end_of_cell(line, separator);
     const std::string_view cell = trimmed(line.substr(0, at));
     if (separator != ' ' || !cell.empty()) cells.push_back(cell);
     if (at == std::string_view::npos) return;
@@ -54,6 +81,12 @@ void split(std::string_view line, char separator, std::vector<std::string_view>&
 std::string_view unquoted(std::string_view cell) {
   return cell.size() > 1 && cell.front() == '"' && cell.back() == '"' ? cell.substr(1, cell.size() - 2)
                                                                       : cell;
+}
+
+/// How tables say that a value is missing.
+bool is_missing(std::string_view cell) {
+  constexpr std::array<std::string_view, 8> kMissing{"", "NA", "N/A", "n/a", "na", "null", "None", "-"};
+  return std::find(kMissing.begin(), kMissing.end(), cell) != kMissing.end();
 }
 
 std::optional<double> to_number(std::string_view cell) {
@@ -124,7 +157,7 @@ class CsvReader {
         return work_error(fmt::format("{}, line {}: longer than {} bytes", file_, line_number_, kLongestLine),
                           "a CSV file has one row a line");
       }
-      const std::string_view content = trimmed(std::string_view(line).substr(0, line.find('#')));
+      const std::string_view content = without_comment(line);
       if (content.empty()) continue;
       if (auto taken = take(content); !taken) return tl::unexpected(taken.error());
     }
@@ -148,7 +181,7 @@ class CsvReader {
     separator_ = separator_of(line);
     split(line, separator_, cells_);
     const bool has_header =
-        std::any_of(cells_.begin(), cells_.end(), [](auto cell) { return !parse_stamp(cell); });
+        std::any_of(cells_.begin(), cells_.end(), [](auto cell) { return !parse_stamp(unquoted(cell)); });
     std::vector<std::string> names;
     for (std::size_t i = 0; i < cells_.size(); ++i)
       names.push_back(has_header ? std::string(unquoted(cells_[i])) : std::to_string(i + 1));
@@ -263,7 +296,7 @@ class CsvReader {
   }
 
   Result<std::string_view> cell(std::size_t index) const {
-    if (index < cells_.size()) return cells_[index];
+    if (index < cells_.size()) return unquoted(cells_[index]);
     return work_error(fmt::format("{}, line {}: {} columns, and column {} is wanted", file_, line_number_,
                                   cells_.size(), index + 1));
   }
@@ -276,8 +309,15 @@ class CsvReader {
         fmt::format("{}, line {}, column {}: '{}' is not a number", file_, line_number_, index + 1, *text));
   }
 
+  /// NaN where the table says that it has none.
+  Result<double> signal_value() const {
+    const auto text = cell(index_);
+    if (text && is_missing(*text)) return std::numeric_limits<double>::quiet_NaN();
+    return number(index_);
+  }
+
   Result<void> add_row() {
-    const auto value = number(index_);
+    const auto value = signal_value();
     if (!value) return tl::unexpected(value.error());
     if (counter_index_) {
       if (auto padded = pad_hole(); !padded) return padded;
@@ -362,7 +402,7 @@ Result<Signal> read_raw(std::istream& in, std::uintmax_t size, const std::string
 }  // namespace
 
 std::vector<std::string> cells_of(std::string_view line) {
-  const std::string_view content = trimmed(line.substr(0, line.find('#')));
+  const std::string_view content = without_comment(line);
   std::vector<std::string> out;
   if (content.empty()) return out;
   std::vector<std::string_view> cells;

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "noise/fit.h"
+#include "noise/select.h"
 #include "noise/streaming_wv.h"
 #include "noise/wv_covariance.h"
 #include "tools/benchmarks/bench_report.h"
@@ -139,6 +140,11 @@ class Bench {
     add("refit from an earlier fit, WN+2*GM", median_ms(runs_, refit), first_ms, "x a first fit", refit, 5.0);
     const auto larger = [&] { (void)noise::fit(wv, three, kRate_hz).value(); };
     add("fit, WN+3*GM", median_ms(runs_, larger), first_ms, "x WN+2*GM", larger, 50.0);
+    const auto select = [&] {
+      (void)noise::rank_models(wv, noise::parse_model("QN+WN+2*GM+RW").value(), kRate_hz).value();
+    };
+    add("selection among 23 models", median_ms(std::min(runs_, 3), select), first_ms, "x WN+2*GM", select,
+        1000.0);
     // A drive's regime: a hundred stretches, of a few seconds to minutes.
     std::vector<std::uint8_t> mask(x.size(), 1);
     std::mt19937_64 random(2);
