@@ -63,39 +63,70 @@ std::string tf(const Mounting& m) {
       knowledge(m), place[0], place[1], place[2], q[0], q[1], q[2], q[3], kBaseLink, m.name);
 }
 
-/// Rows of the transform that takes coordinates in b to those in s.
-std::string rows_of_T_s_b(const Mounting& m) {
+Rotation product(const Rotation& a, const Rotation& b) {
+  Rotation out{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      out[3 * i + j] = 0.0;
+      for (std::size_t k = 0; k < 3; ++k) out[3 * i + j] += a[3 * i + k] * b[3 * k + j];
+    }
+  }
+  return out;
+}
+
+Rotation transposed(const Rotation& m) { return {m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]}; }
+
+/// Rows of the transform that takes coordinates in b to those in i: s, or the accelerometer triad's frame.
+std::string rows_of_T_i_b(const Mounting& m, const std::optional<Triads>& triads) {
+  const Rotation C_b_i = triads ? product(triads->C_s_accel, m.C_b_s) : m.C_b_s;
   std::string rows;
   for (std::size_t i = 0; i < 3; ++i) {
-    const double* C = &m.C_b_s[3 * i];
+    const double* C = &C_b_i[3 * i];
     const double t = -(C[0] * m.r_bs_b_m[0] + C[1] * m.r_bs_b_m[1] + C[2] * m.r_bs_b_m[2]);
     rows += fmt::format("    - [{:.12g}, {:.12g}, {:.12g}, {:.9g}]\n", C[0], C[1], C[2], t);
   }
   return rows + "    - [0.0, 0.0, 0.0, 1.0]\n";
 }
 
-std::string chain(const Mounting& m, const std::string& reference) {
+std::string chain(const Mounting& m, const std::optional<Triads>& triads, const std::string& reference) {
   return fmt::format(
       "# imuscope: {}\n# body: {}, forward-right-down\n{}:\n  T_i_b:\n{}  time_offset: {:.9g}\n",
-      knowledge(m), reference, m.name, rows_of_T_s_b(m), m.t_d_s);
+      knowledge(m), reference, m.name, rows_of_T_i_b(m, triads), m.t_d_s);
 }
 
-std::string diagonal(const char* key, const Vector3& v) {
-  return fmt::format("  {}:\n    - [{:.9g}, 0.0, 0.0]\n    - [0.0, {:.9g}, 0.0]\n    - [0.0, 0.0, {:.9g}]\n",
-                     key, 1.0 + v[0], 1.0 + v[1], 1.0 + v[2]);
+/// A matrix as three lists, `indent` deep.
+std::string matrix(const char* key, const std::array<double, 9>& m, int indent) {
+  const std::string space(static_cast<std::size_t>(indent), ' ');
+  std::string rows = fmt::format("{}{}:\n", space, key);
+  for (std::size_t i = 0; i < 3; ++i)
+    rows += fmt::format("{}  - [{:.12g}, {:.12g}, {:.12g}]\n", space, m[3 * i], m[3 * i + 1], m[3 * i + 2]);
+  return rows;
 }
 
-std::string openvins(const Mounting& m, const Correction& scale, const std::string& reference) {
-  constexpr Vector3 kNone{};
-  constexpr const char* kZeros = "    - [0.0, 0.0, 0.0]\n    - [0.0, 0.0, 0.0]\n    - [0.0, 0.0, 0.0]\n";
-  return "%YAML:1.0\n" + chain(m, reference) + "  model: \"kalibr\"\n" + diagonal("Tw", scale.gyro_scale) +
-         diagonal("R_IMUtoGYRO", kNone) + diagonal("Ta", scale.accel_scale) + diagonal("R_IMUtoACC", kNone) +
-         "  Tg:\n" + kZeros;
+Rotation diagonal(const Vector3& v) { return {1.0 + v[0], 0, 0, 0, 1.0 + v[1], 0, 0, 0, 1.0 + v[2]}; }
+
+std::string kalibr(const Mounting& m, const std::optional<Triads>& triads, const std::string& reference) {
+  if (!triads) return chain(m, triads, reference);
+  return chain(m, triads, reference) + "  model: scale-misalignment\n  accelerometers:\n" +
+         matrix("M", triads->accel_matrix, 4) + "  gyroscopes:\n" + matrix("M", triads->gyro_matrix, 4) +
+         matrix("A", triads->g_sensitivity, 4) + matrix("C_gyro_i", transposed(triads->C_s_accel), 4);
 }
 
-std::string all_of_it(const Mounting& m, const Correction& scale, const std::string& reference) {
+std::string openvins(const Mounting& m, const Correction& scale, const std::optional<Triads>& known,
+                     const std::string& reference) {
+  const Triads triads = known.value_or(
+      Triads{diagonal(scale.gyro_scale), diagonal(scale.accel_scale), {1, 0, 0, 0, 1, 0, 0, 0, 1}, {}});
+  const Rotation C_gyro_i = transposed(triads.C_s_accel);
+  return "%YAML:1.0\n" + chain(m, known, reference) + "  model: \"kalibr\"\n" +
+         matrix("Tw", triads.gyro_matrix, 2) + matrix("R_IMUtoGYRO", C_gyro_i, 2) +
+         matrix("Ta", triads.accel_matrix, 2) + matrix("R_IMUtoACC", diagonal({}), 2) +
+         matrix("Tg", product(triads.g_sensitivity, C_gyro_i), 2);
+}
+
+std::string all_of_it(const Mounting& m, const Correction& scale, const std::optional<Triads>& triads,
+                      const std::string& reference) {
   const auto q = sensor_in_base_link(m.C_b_s);
-  const nlohmann::json document{
+  nlohmann::json document{
       {"schema", "imuscope.mounting/1"},
       {"name", m.name},
       {"reference", reference},
@@ -111,6 +142,12 @@ std::string all_of_it(const Mounting& m, const Correction& scale, const std::str
       {"gyro_scale", scale.gyro_scale},
       {"accel_scale", scale.accel_scale},
       {"in_base_link", {{"xyz_m", flu(m.r_bs_b_m)}, {"quaternion_xyzw", q}, {"rpy_rad", fixed_rpy(q)}}}};
+  if (triads) {
+    document["gyro_matrix"] = triads->gyro_matrix;
+    document["accel_matrix"] = triads->accel_matrix;
+    document["C_s_accel"] = triads->C_s_accel;
+    document["g_sensitivity_radps_per_mps2"] = triads->g_sensitivity;
+  }
   return json_text(document) + "\n";
 }
 
@@ -124,7 +161,8 @@ Result<MountingFormat> parse_mounting_format(std::string_view text) {
                      "give urdf, tf, kalibr, openvins or json; noise models are in the run's models.json");
 }
 
-std::string mounting_text(const Mounting& mounting, const Correction& scale, const std::string& reference,
+std::string mounting_text(const Mounting& mounting, const Correction& scale,
+                          const std::optional<Triads>& triads, const std::string& reference,
                           MountingFormat format) {
   switch (format) {
     case MountingFormat::kUrdf:
@@ -132,11 +170,11 @@ std::string mounting_text(const Mounting& mounting, const Correction& scale, con
     case MountingFormat::kTf:
       return tf(mounting);
     case MountingFormat::kKalibr:
-      return chain(mounting, reference);
+      return kalibr(mounting, triads, reference);
     case MountingFormat::kOpenVins:
-      return openvins(mounting, scale, reference);
+      return openvins(mounting, scale, triads, reference);
     case MountingFormat::kJson:
-      return all_of_it(mounting, scale, reference);
+      return all_of_it(mounting, scale, triads, reference);
   }
   return {};
 }

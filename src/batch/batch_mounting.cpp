@@ -219,18 +219,6 @@ class Batch {
       taken_.row(static_cast<Eigen::Index>(band)) =
           numbers_taken(sums[band], equations_.bands[band], covariance_).transpose();
     if (!rough) scales_.learn(estimate_.sensor.x, covariance_);
-    if (std::getenv("DBGI")) {
-      const auto sd0 = covariance_.diagonal().cwiseSqrt();
-      fmt::print("it {} r {:.4f} {:.4f} {:.4f} corr/sd", round, estimate_.sensor.x[3], estimate_.sensor.x[4],
-                 estimate_.sensor.x[5]);
-      for (int i = 0; i < 8; ++i) fmt::print(" {:.2f}", correction[i] / sd0[i]);
-      fmt::print(" dev");
-      for (int b = 1; b < 6; ++b)
-        fmt::print(" {:.1e}/{:.1e}", estimate_.deviation_sd(b, 0), estimate_.deviation_sd(b, 1));
-      fmt::print(" pl {:.1e} T", scales_.precision()[kPlaces]);
-      for (int b = 0; b < 6; ++b) fmt::print(" {:.2e},{:.2e}", noise_.power(b, 0), noise_.power(b, 3));
-      fmt::print("\n");
-    }
     const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
     last_share_ = share.head<kGyroBias>().maxCoeff();
     return !rough && last_share_ < kSettledShare;

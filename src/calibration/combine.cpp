@@ -7,6 +7,7 @@
 #include <string>
 
 #include "base/contracts.h"
+#include "calibration/drive_scatter.h"
 #include "calibration/filter_core.h"
 #include "navigation/so3.h"
 
@@ -45,7 +46,6 @@ Vector6 weighted_mean(const std::vector<Information>& all, const std::vector<dou
 struct SharingDrives {
   Eigen::VectorXd x;           ///< (psi, r) one after the other
   Eigen::MatrixXd covariance;  ///< of x
-  Eigen::MatrixXd weights;     ///< 6 rows: mean = weights x
   Vector6 mean;
   Matrix6 P;  ///< of the mean
 
@@ -63,8 +63,7 @@ struct SharingDrives {
     for (Eigen::Index row = 0; row < x.size(); row += 6) ones.block<6, 6>(row, 0).setIdentity();
     const Eigen::MatrixXd whitened = covariance.ldlt().solve(ones);
     P = (ones.transpose() * whitened).ldlt().solve(Matrix6::Identity());
-    weights = P * whitened.transpose();
-    mean = weights * x;
+    mean = P * (whitened.transpose() * x);
   }
 
   /// E-21.
@@ -95,28 +94,6 @@ std::vector<double> intersection_weights(const std::vector<Information>& all) {
 
 double upper_tail(double chi2, double dof) {
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(dof), chi2));
-}
-
-/// Drive i against the least-squares mean of all others. E-24.
-DriveDeviation deviation_of(const std::vector<Information>& all, std::size_t i) {
-  DriveDeviation out;
-  if (all.size() < 2) return out;
-  std::vector<const Information*> others;
-  for (std::size_t j = 0; j < all.size(); ++j)
-    if (j != i) others.push_back(&all[j]);
-  const SharingDrives mean(others);
-  Matrix6 between = Matrix6::Zero();  // drive i and the mean of the others
-  for (std::size_t j = 0; j < others.size(); ++j) {
-    between += all[i].shared * others[j]->shared.transpose() *
-               mean.weights.middleCols<6>(6 * static_cast<Eigen::Index>(j)).transpose();
-  }
-  const Matrix6 P = all[i].covariance + mean.P - between - between.transpose();
-  const Vector6 difference = all[i].x - mean.mean;
-  Eigen::Map<Vector6>(out.deviation.data()) = difference;
-  Eigen::Map<Vector6>(out.deviation_sd.data()) = P.diagonal().cwiseMax(0.0).cwiseSqrt();
-  out.chi2 = difference.dot(P.ldlt().solve(difference));
-  out.p_value = upper_tail(out.chi2, 6.0);
-  return out;
 }
 
 /// Whether what the drives share is told of each of them in the same terms.
@@ -165,8 +142,22 @@ Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, Co
   out.homogeneity_dof = 6 * (all.size() - 1);
   if (out.homogeneity_dof > 0)
     out.homogeneity_p_value = upper_tail(out.homogeneity_chi2, static_cast<double>(out.homogeneity_dof));
-  for (std::size_t i = 0; i < all.size(); ++i) out.drives.push_back(deviation_of(all, i));
+  out.drives.resize(all.size());
   out.weights.assign(all.size(), 1.0);
+  if (all.size() > 1) {
+    const DriveScatter scatter = drive_scatter(together.x, together.covariance);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      Eigen::Map<Vector6>(out.drives[i].deviation.data()) = scatter.drives[i].deviation;
+      Eigen::Map<Vector6>(out.drives[i].deviation_sd.data()) = scatter.drives[i].sd;
+      out.drives[i].p_value = scatter.drives[i].p_value;
+    }
+    if (method == CombineMethod::kInverseVariance) {
+      x = scatter.mean;
+      P = scatter.covariance;
+      out.between_drives_psi_sd_rad = scatter.psi_sd_rad;
+      out.between_drives_r_sd_m = scatter.r_sd_m;
+    }
+  }
   if (method == CombineMethod::kCovarianceIntersection) {
     out.weights = intersection_weights(all);
     x = weighted_mean(all, out.weights, P);
@@ -175,6 +166,12 @@ Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, Co
   out.estimate.r_bs_b_m = to_array(Eigen::Vector3d(x.tail<3>()));
   Eigen::Map<Matrix6>(out.estimate.covariance_psi_r.data()) = 0.5 * (P + P.transpose());
   return out;
+}
+
+double CombinedMounting::one_mounting_p_value() const {
+  double least = 1.0;
+  for (const DriveDeviation& drive : drives) least = std::min(least, drive.p_value);
+  return std::min(1.0, least * static_cast<double>(drives.size()));
 }
 
 void WeightedMean::add(double value, double sd) noexcept {

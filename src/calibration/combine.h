@@ -1,7 +1,7 @@
 #pragma once
 
 /// Several estimates of one mounting made into one, and the question whether they are of one mounting at all.
-/// Soft world: allocates. EQUATIONS.md E-20 to E-24.
+/// Soft world: allocates. EQUATIONS.md E-20 to E-27.
 
 #include <array>
 #include <cstddef>
@@ -34,10 +34,10 @@ enum class CombineMethod {
 /// How far one drive lies from the others.
 struct DriveDeviation {
   /// (psi, r) of the drive minus the least-squares mean of the others, rad and m; by the sd of the
-  /// difference.
+  /// difference, with what mountings do between drives in it.
   std::array<double, 6> deviation{};
   std::array<double, 6> deviation_sd{};
-  double chi2 = 0.0;  ///< 6 degrees of freedom where this drive saw the others' mounting
+  /// Chance that a drive lies as far from the others as this one does, where all scatter alike (E-27).
   double p_value = 1.0;
 };
 
@@ -47,10 +47,18 @@ struct CombinedMounting {
   std::vector<DriveDeviation> drives;  ///< in the order given; of a single drive all zero
   std::vector<double> weights;         ///< per drive; covariance intersection only, else 1 each
   /// Sum of squared deviations from the least-squares mean, by the covariance of all drives. Chi-square with
-  /// 6 (n - 1) degrees of freedom where all drives saw one mounting.
+  /// 6 (n - 1) degrees of freedom where the mounting repeats exactly from drive to drive.
   double homogeneity_chi2 = 0.0;
   std::size_t homogeneity_dof = 0;
   double homogeneity_p_value = 1.0;
+  /// What the mounting does between drives beyond the drives' own sd, sd of each axis (E-25). Zero by
+  /// covariance intersection, which knows nothing of it.
+  double between_drives_psi_sd_rad = 0.0;
+  double between_drives_r_sd_m = 0.0;
+
+  /// Chance that a drive lies as far from the others as the farthest does (Bonferroni's bound): below a level
+  /// it was taken off or struck, and is no drive of this mounting.
+  [[nodiscard]] double one_mounting_p_value() const;
 };
 
 /// Fails where there is no estimate, or a covariance is not positive definite (the message names which, from

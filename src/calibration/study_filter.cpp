@@ -28,6 +28,10 @@ constexpr double kAttenuationMax = 0.3;
 constexpr double kLowPass_hz = 40.0;
 constexpr double kVehicle_hz = 1.25;
 constexpr double kLowPassShare = 0.5 * (kVehicle_hz / kLowPass_hz) * (kVehicle_hz / kLowPass_hz);
+/// Weight of the class, in imperfections seen, against what the drive shows; as the batch estimate has it.
+constexpr double kClassWeight = 3.0;
+/// Share of its prior's variance that must have been learned of an imperfection for it to be held against it.
+constexpr double kLearnedMin = 0.05;
 /// Noise of the angular acceleration in neighbouring windows has the correlation -1/2: what changes from one
 /// to the next, as the columns of the time offset do, sees up to twice the variance.
 constexpr double kSlopeCorrelation = 2.0;
@@ -813,6 +817,38 @@ void StudyFilter::update_output(const FilterCore& core, EventLog& log) noexcept 
   }
 }
 
+double StudyFilter::beyond_class(const FilterCore& core) const noexcept {
+  const StudyState& state = core.study(index_);
+  const StudyLayout& layout = core.layout(index_);
+  double factor2 = 1.0;
+  const auto look = [&](std::size_t first, std::size_t n, double sd, const auto& value) {
+    if (first == StudyLayout::kAbsent || sd <= 0.0) return;
+    double sum = 0.0;
+    double largest = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      // An estimate scatters by what has been learned of it: its prior's variance less its own.
+      const double learned = sd * sd - core.sd(first + i) * core.sd(first + i);
+      if (learned < kLearnedMin * sd * sd) continue;
+      const double share2 = value(i) * value(i) / learned;
+      sum += share2;
+      largest = std::max(largest, share2);
+    }
+    if (largest <= kContradictionSds * kContradictionSds) return;
+    factor2 = std::max(factor2, (kClassWeight + sum) / (kClassWeight + static_cast<double>(n)));
+  };
+  const Vector3d alpha = log_so3(state.accel_turn);
+  const auto index = [](std::size_t i) { return static_cast<Eigen::Index>(i); };
+  look(layout.gyro_axes, 3, config_.prior_axes_sd_rad,
+       [&](std::size_t i) { return state.gyro_axes(index(i)); });
+  look(layout.accel_axes, 3, config_.prior_axes_sd_rad,
+       [&](std::size_t i) { return state.accel_axes(index(i)); });
+  look(layout.accel_boresight, 3, config_.prior_accel_boresight_sd_rad[0],
+       [&](std::size_t i) { return alpha(index(i)); });
+  look(layout.g_sensitivity, 9, config_.prior_g_sensitivity_sd,
+       [&](std::size_t i) { return state.g_sensitivity(index(i / 3), index(i % 3)); });
+  return std::sqrt(factor2);
+}
+
 void StudyFilter::publish_mounting(const FilterCore& core) noexcept {
   const StudyState& state = core.study(index_);
   const StudyLayout& layout = core.layout(index_);
@@ -836,7 +872,11 @@ void StudyFilter::publish_mounting(const FilterCore& core) noexcept {
   const Vector3d attenuated = kNoiseKnown * noise_share_ * state.r_bs_b_m;
   if (layout.r != StudyLayout::kAbsent) r += attenuated * attenuated.transpose();
   Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> covariance(output_.covariance_psi_r.data());
-  covariance << psi, psi_r, psi_r.transpose(), r;
+  beyond_class_ = beyond_class(core);
+  psi *= beyond_class_ * beyond_class_;
+  r *= beyond_class_ * beyond_class_;
+  covariance << psi, beyond_class_ * beyond_class_ * psi_r, beyond_class_ * beyond_class_ * psi_r.transpose(),
+      r;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     output_.sd_psi_rad[i] = std::sqrt(psi(k, k));
@@ -880,8 +920,10 @@ void StudyFilter::judge(const FilterCore& core) noexcept {
       (output_.sd_t_d_s < kObservableShare * prior_sd_t_d_ || output_.sd_t_d_s <= goal.time_offset_sd_s);
   const bool estimates_mounting = layout.psi != StudyLayout::kAbsent || layout.r != StudyLayout::kAbsent;
   const bool meets = meets_goal(output_.sd_psi_rad, output_.sd_r_bs_b_m, goal);
-  output_.status = estimates_mounting && fits && meets && !attenuated ? CalibrationStatus::kCalibrated
-                                                                      : CalibrationStatus::kConverging;
+  const bool of_its_class = beyond_class_ <= 1.0;
+  output_.status = estimates_mounting && fits && meets && !attenuated && of_its_class
+                       ? CalibrationStatus::kCalibrated
+                       : CalibrationStatus::kConverging;
 }
 
 void StudyFilter::update_weakest_direction(const FilterCore& core) noexcept {

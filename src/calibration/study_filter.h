@@ -94,6 +94,8 @@ class StudyFilter {
   void watch_fit(StudyContext& context, bool gated, HostTime now, double dt_s) noexcept;
   /// Mounting and accelerometer triad in the frames of their axes. C-22.
   void publish_mounting(const FilterCore& core) noexcept;
+  /// By how much the sensor's imperfections exceed what its class allows. C-25.
+  [[nodiscard]] double beyond_class(const FilterCore& core) const noexcept;
   /// What may be said of what is published.
   void judge(const FilterCore& core) noexcept;
   void update_weakest_direction(const FilterCore& core) noexcept;
@@ -209,6 +211,7 @@ class StudyFilter {
   bool misfit_told_ = false;
   double proof_s_ = 0.0;  ///< motion that this mounting has been held against
   std::array<bool, 3> lever_arm_attenuated_{};
+  double beyond_class_ = 1.0;  ///< factor of every sd of the mounting
   std::array<double, 6> prior_sd_psi_r_{};
   double prior_sd_t_d_ = 0.0;
   HostTime next_direction_{};

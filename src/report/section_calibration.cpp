@@ -150,7 +150,28 @@ Html study_table(const StudyFiles& study) {
                kPpm);
   add_quantity(table, study, {text("accelerometer scale error, ppm"), "accel_scale", "accel_scale_sd", kPpm},
                "ppm", kPpm);
+  add_quantity(table, study,
+               {text("accelerometer triad turned against the gyroscopes', deg"), "accel_boresight_deg",
+                "accel_boresight_sd_deg", 1.0},
+               "mdeg", kMdegPerDeg);
   return table.html();
+}
+
+/// What each axis of a triad reads of the others' directions: the matrix less scale and right angles.
+Html axes_table(const StudyFiles& study) {
+  const auto& batch = field(study.calibration, "batch");
+  Table table(
+      {text("leaning axes, deg ± one sd"), text("y towards x"), text("z towards x"), text("z towards y")});
+  const auto add = [&](const char* name, const char* matrix_key, const char* sd_key) {
+    const auto m = numbers_at<9>(batch, matrix_key);
+    if (!m) return false;
+    const Three leaning{(*m)[3] * kDegPerRad, (*m)[6] * kDegPerRad, (*m)[7] * kDegPerRad};
+    table.add_row(row_of_three(text(name), leaning, numbers_at<3>(batch, sd_key), 1.0));
+    return true;
+  };
+  const bool gyro = add("gyroscopes", "gyro_matrix", "gyro_axes_sd_deg");
+  const bool accel = add("accelerometers", "accel_matrix", "accel_axes_sd_deg");
+  return gyro || accel ? table.html() : Html{};
 }
 
 Html mounting_words(const StudyFiles& study) {
@@ -356,7 +377,7 @@ Html calibration_section(const RunFiles& run, FigureSheet& figures) {
   for (const StudyFiles& study : run.studies) {
     section += element("h3", text(study.name)) + mounting_words(study) + limits_words(study) +
                fold(fmt::format("All that is estimated of {}, and what the drive has shown", study.name),
-                    study_table(study) + observability_table(study), is_notable(study));
+                    study_table(study) + axes_table(study) + observability_table(study), is_notable(study));
   }
   section += heading("figure-1", "Figure 1: boresight and lever arm over time");
   section += element("p", text("Line: the estimate at that time; band: ± one sd") +

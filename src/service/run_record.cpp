@@ -250,6 +250,23 @@ void warn_of_host_seconds(const Snapshot& last, std::vector<std::string>& warnin
       "50 ppm, and headings turn by as much of every turn");
 }
 
+/// GNSS was given, and there is no position: says what was missing.
+void warn_of_no_navigation(const Configuration& configuration, const Snapshot& last,
+                           std::vector<std::string>& warnings) {
+  const auto gnss = configuration.gnss_index();
+  const NavigationStatus status = last.navigation.status;
+  if (!gnss || status == NavigationStatus::kNotOffered || status == NavigationStatus::kNavigating) return;
+  const char* why =
+      status == NavigationStatus::kAligning
+          ? "the vehicle's heading was not found: it shows by the reference's own attitude, by a minute of "
+            "rest "
+            "with a reference that feels the Earth turn, or by braking and turning between good positions"
+          : "the vehicle never stood still for two seconds, by which it is levelled, or no position came";
+  warnings.push_back(
+      fmt::format("{}: the navigation did not start: {}; mountings do not need it, positions and speeds do",
+                  configuration.devices[*gnss].name, why));
+}
+
 }  // namespace
 
 std::vector<std::string> warnings_of(const Configuration& configuration, const Snapshot& last) {
@@ -264,6 +281,7 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
         counters.gnss_used + counters.gnss_rejected));
   }
   warn_of_host_seconds(last, warnings);
+  warn_of_no_navigation(configuration, last, warnings);
   const auto indices = configuration.study_indices();
   for (std::size_t i = 0; i < last.n_studies; ++i) {
     if (has_estimate(last.studies[i].status)) continue;

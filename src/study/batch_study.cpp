@@ -29,6 +29,8 @@ constexpr double kMotionHelps = 0.5;
 constexpr double kShownShare = 0.5;
 /// Scatter over time this much above what the noise explains is worth a sentence.
 constexpr double kInconsistencyTold = 2.0;
+/// Axes that lean by so many sd of their class are worth a sentence.
+constexpr double kBeyondClass = 5.0;
 /// A band that differs from a rigid body by this (half a degree) is worth a sentence.
 constexpr double kDeviationTold = 0.01;
 
@@ -372,6 +374,14 @@ std::string batch_remark(const std::string& name, const batch::BatchMounting& mo
         "{}: parts of the drive disagree by {:.1f} times what the noise explains; the sd allows for it, but "
         "look whether the sensor sits firmly",
         name, mounting.inconsistency);
+  }
+  const double leaning_rad = mounting.sensor.x.segment<3>(batch::kGyroShape + 3).cwiseAbs().maxCoeff();
+  if (leaning_rad > kBeyondClass * batch::SensorClass{}.axis_sd_rad) {
+    return fmt::format(
+        "{}: its gyroscopes' axes and the reference's differ from right angles by {:.2g} deg, more than data "
+        "sheets allow: which of the two are crooked no drive of theirs tells, and the boresight is about the "
+        "axes that the reference's gyroscopes have",
+        name, leaning_rad * kDegPerRad);
   }
   const auto loose =
       std::find_if(mounting.bands.begin(), mounting.bands.end(),

@@ -105,7 +105,6 @@ json drive_json(const Combination& combination, const CombinedStudy& study, std:
           {"boresight_from_others_sd_deg", psi_sd_deg},
           {"r_from_others_m", r_m},
           {"r_from_others_sd_m", r_sd_m},
-          {"chi2", drive.chi2},
           {"p_value", drive.p_value}};
 }
 
@@ -129,6 +128,10 @@ json study_json(const Combination& combination, const CombinedStudy& study) {
             {{"chi2", study.mounting.homogeneity_chi2},
              {"dof", study.mounting.homogeneity_dof},
              {"p_value", study.mounting.homogeneity_p_value}}},
+           {"between_drives",
+            {{"boresight_sd_deg", study.mounting.between_drives_psi_sd_rad * kDegPerRad},
+             {"r_sd_m", study.mounting.between_drives_r_sd_m}}},
+           {"one_mounting_p_value", study.mounting.one_mounting_p_value()},
            {"drives", json::array()}};
   for (std::size_t i = 0; i < study.drives.size(); ++i)
     out["drives"].push_back(drive_json(combination, study, i));

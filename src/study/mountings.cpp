@@ -9,6 +9,20 @@
 
 namespace imuscope {
 
+namespace {
+
+std::optional<bag::Triads> triads_of(const nlohmann::json& imu) {
+  const auto& batch = report::field(imu, "batch");
+  const auto gyro = report::numbers_at<9>(batch, "gyro_matrix");
+  const auto accel = report::numbers_at<9>(batch, "accel_matrix");
+  const auto turn = report::numbers_at<9>(batch, "C_gyro_accel");
+  const auto g_sensitivity = report::numbers_at<9>(batch, "g_sensitivity_radps_per_mps2");
+  if (!gyro || !accel || !turn || !g_sensitivity) return std::nullopt;
+  return bag::Triads{*gyro, *accel, *turn, *g_sensitivity};
+}
+
+}  // namespace
+
 std::vector<FoundCalibration> found_calibrations(const nlohmann::json& calibration) {
   std::vector<FoundCalibration> found;
   const Vector3 none{};
@@ -35,7 +49,8 @@ std::vector<FoundCalibration> found_calibrations(const nlohmann::json& calibrati
          {*C_b_s, report::numbers_at<3>(imu, "gyro_bias_radps").value_or(none),
           report::numbers_at<3>(imu, "accel_bias_mps2").value_or(none),
           report::numbers_at<3>(imu, "gyro_scale").value_or(none),
-          report::numbers_at<3>(imu, "accel_scale").value_or(none), *t_d}});
+          report::numbers_at<3>(imu, "accel_scale").value_or(none), *t_d},
+         triads_of(imu)});
   }
   return found;
 }

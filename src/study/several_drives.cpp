@@ -72,14 +72,14 @@ Result<DriveMountings> calibrate(const OpenedRecording& drive, const std::filesy
 std::map<std::string, MountingEstimate> settled_mountings(Combination& combination) {
   std::map<std::string, MountingEstimate> settled;
   for (const auto& study : combination.studies) {
-    if (study.mounting.homogeneity_p_value >= kOneMountingProbability) {
+    if (study.mounting.one_mounting_p_value() >= kOneMountingProbability) {
       settled[study.name] = study.mounting.estimate;
       continue;
     }
     combination.remarks.push_back(
         fmt::format("{}: the drives did not see one mounting (p = {:.2g}); each drive's error process is "
                     "made with its own",
-                    study.name, study.mounting.homogeneity_p_value));
+                    study.name, study.mounting.one_mounting_p_value()));
   }
   return settled;
 }

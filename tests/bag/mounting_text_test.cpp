@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 #include <regex>
 
@@ -70,7 +71,7 @@ const Vector3d kPoint(0.3, -1.1, 2.2);
 
 TEST(MountingText, UrdfTurnsAboutFixedAxesRollFirst) {
   for (const Case& one : cases()) {
-    const auto text = mounting_text(one.mounting, {}, "airins", MountingFormat::kUrdf);
+    const auto text = mounting_text(one.mounting, {}, std::nullopt, "airins", MountingFormat::kUrdf);
     const auto xyz = numbers_behind(text, "xyz=\"", 3);
     const auto rpy = numbers_behind(text, "rpy=\"", 3);
     const Matrix3d R =
@@ -88,7 +89,7 @@ TEST(MountingText, UrdfTurnsAboutFixedAxesRollFirst) {
 
 TEST(MountingText, TfTakesTheChildsCoordinatesToTheParents) {
   for (const Case& one : cases()) {
-    const auto text = mounting_text(one.mounting, {}, "airins", MountingFormat::kTf);
+    const auto text = mounting_text(one.mounting, {}, std::nullopt, "airins", MountingFormat::kTf);
     const Vector3d at(numbers_behind(text, "--x ", 1)[0], numbers_behind(text, "--y ", 1)[0],
                       numbers_behind(text, "--z ", 1)[0]);
     const Eigen::Quaterniond q(numbers_behind(text, "--qw ", 1)[0], numbers_behind(text, "--qx ", 1)[0],
@@ -101,7 +102,7 @@ TEST(MountingText, TfTakesTheChildsCoordinatesToTheParents) {
 TEST(MountingText, ImuChainsTakeTheBodysCoordinatesToTheSensors) {
   for (const auto format : {MountingFormat::kKalibr, MountingFormat::kOpenVins}) {
     for (const Case& one : cases()) {
-      const auto text = mounting_text(one.mounting, {}, "airins", format);
+      const auto text = mounting_text(one.mounting, {}, std::nullopt, "airins", format);
       const auto T = numbers_behind(text, "T_i_b:", 16);
       const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> T_i_b(T.data());
       const Vector3d p_b = one.C_b_s.transpose() * kPoint + one.r_bs_b_m;
@@ -120,7 +121,8 @@ TEST(MountingText, OpenVinsFindsTheTruthBehindAReading) {
   Correction scale;
   scale.gyro_scale = {0.01, -0.02, 0.03};
   scale.accel_scale = {0.001, 0.002, -0.003};
-  const auto text = mounting_text(cases()[5].mounting, scale, "airins", MountingFormat::kOpenVins);
+  const auto text =
+      mounting_text(cases()[5].mounting, scale, std::nullopt, "airins", MountingFormat::kOpenVins);
   const auto matrix = [&](const char* key) { return Matrix(numbers_behind(text, key, 9).data()); };
   const Vector3d rate(0.3, -0.7, 1.1), force(0.5, -9.7, 2.0), gyro_bias(0.01, 0.02, -0.03),
       accel_bias(0.1, -0.2, 0.3);
@@ -138,10 +140,71 @@ TEST(MountingText, OpenVinsFindsTheTruthBehindAReading) {
   EXPECT_LT((found_rate - rate).norm(), 1e-8);
 }
 
+using Matrix3Row = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+Matrix3d matrix_behind(const std::string& text, const std::string& key) {
+  const auto m = numbers_behind(text, key, 9);
+  return Eigen::Map<const Matrix3Row>(m.data());
+}
+
+/// What a sensor with crooked triads reads, by our definition and by the equations of kalibr
+/// (scale-misalignment) and OpenVINS, which undoes Tw, Ta, Tg and the rotations.
+TEST(MountingText, TriadsMakeTheSameReadingsByEveryonesEquations) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  for (const Case& one : cases()) {
+    const auto small = [&] { return 0.02 * normal(random); };
+    Matrix3d gyro = Matrix3d::Identity();
+    Matrix3d accel = Matrix3d::Identity();
+    Matrix3d K;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      for (Eigen::Index j = 0; j < 3; ++j) {
+        if (j <= i) gyro(i, j) += small(), accel(i, j) += small();
+        K(i, j) = 0.01 * small();
+      }
+    }
+    const Matrix3d C_s_accel =
+        Eigen::AngleAxisd(0.05, Vector3d(normal(random), normal(random), normal(random)).normalized())
+            .toRotationMatrix();
+    Triads triads;
+    Eigen::Map<Matrix3Row>(triads.gyro_matrix.data()) = gyro;
+    Eigen::Map<Matrix3Row>(triads.accel_matrix.data()) = accel;
+    Eigen::Map<Matrix3Row>(triads.C_s_accel.data()) = C_s_accel;
+    Eigen::Map<Matrix3Row>(triads.g_sensitivity.data()) = K;
+    const Vector3d w_b(0.3, -0.2, 0.9);
+    const Vector3d f_b(1.0, 2.0, -9.8);
+    const Vector3d w_read = gyro * one.C_b_s * w_b + K * one.C_b_s * f_b;
+    const Vector3d f_read = accel * C_s_accel * one.C_b_s * f_b;
+
+    const auto kalibr = mounting_text(one.mounting, {}, triads, "airins", MountingFormat::kKalibr);
+    const auto T = numbers_behind(kalibr, "T_i_b:", 16);
+    const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> T_i_b(T.data());
+    const Matrix3d C_b_i = T_i_b.topLeftCorner<3, 3>();
+    EXPECT_LT((C_b_i * one.r_bs_b_m + T_i_b.topRightCorner<3, 1>()).norm(), 1e-6) << "r is i's origin";
+    const auto of_gyros = kalibr.find("gyroscopes:");
+    ASSERT_NE(of_gyros, std::string::npos);
+    const Matrix3d M_accel = matrix_behind(kalibr.substr(0, of_gyros), "    M:");
+    const std::string gyroscopes = kalibr.substr(of_gyros);
+    const Matrix3d C_gyro_i = matrix_behind(gyroscopes, "C_gyro_i:");
+    const Vector3d w_kalibr = matrix_behind(gyroscopes, "    M:") * C_gyro_i * C_b_i * w_b +
+                              matrix_behind(gyroscopes, "    A:") * C_gyro_i * C_b_i * f_b;
+    EXPECT_LT((w_kalibr - w_read).norm(), 1e-9) << kalibr;
+    EXPECT_LT((M_accel * C_b_i * f_b - f_read).norm(), 1e-8) << kalibr;
+
+    const auto vins = mounting_text(one.mounting, {}, triads, "airins", MountingFormat::kOpenVins);
+    const Vector3d f_i =
+        matrix_behind(vins, "R_IMUtoACC:").transpose() * matrix_behind(vins, "Ta:").inverse() * f_read;
+    const Vector3d w_i = matrix_behind(vins, "R_IMUtoGYRO:").transpose() *
+                         (matrix_behind(vins, "Tw:").inverse() * (w_read - matrix_behind(vins, "Tg:") * f_i));
+    EXPECT_LT((f_i - C_b_i * f_b).norm(), 1e-8) << vins;
+    EXPECT_LT((w_i - C_b_i * w_b).norm(), 1e-8) << vins;
+  }
+}
+
 TEST(MountingText, JsonHoldsTheSameThreeTimes) {
   for (const Case& one : cases()) {
     const auto document =
-        nlohmann::json::parse(mounting_text(one.mounting, {}, "airins", MountingFormat::kJson));
+        nlohmann::json::parse(mounting_text(one.mounting, {}, std::nullopt, "airins", MountingFormat::kJson));
     const auto q = document.at("in_base_link").at("quaternion_xyzw").get<std::array<double, 4>>();
     const auto at = document.at("in_base_link").at("xyz_m").get<std::array<double, 3>>();
     const Vector3d there =

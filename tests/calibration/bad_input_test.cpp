@@ -130,6 +130,32 @@ TEST(BadInput, APositionThatIsNowhereIsRefusedFromTheFirstOnAndCounted) {
   }
 }
 
+/// C-25: axes that lean by thirty times what the class allows. The sd hang on that class.
+TEST(BadInput, ASensorFarMoreCrookedThanItsClassIsNotCalledCalibratedAndItsSdAreWider) {
+  Vector3 straight_sd_rad{};
+  for (const bool crooked : {false, true}) {
+    SimulatedDrive drive(400.0, {tilted()}, 48);
+    EstimatorConfig config = drive.config();
+    config.studies[0].blocks = kCompleteStudyBlocks;
+    Estimator estimator(config);
+    told_by(drive, estimator, [&](Sample& sample, double) {
+      // The z gyro leans towards x: along x and in the plane of x and y, the frame stays what it is.
+      if (crooked && sample.device == SimulatedDrive::kFirstStudy)
+        sample.imu.omega_radps[2] += 0.05 * sample.imu.omega_radps[0];
+      return true;
+    });
+    const StudyOutput& out = estimator.study(0);
+    if (!crooked) {
+      straight_sd_rad = out.sd_psi_rad;
+      continue;
+    }
+    EXPECT_NE(out.status, CalibrationStatus::kCalibrated);
+    EXPECT_TRUE(has_estimate(out.status));
+    EXPECT_GT(out.sd_psi_rad[1], 1.5 * straight_sd_rad[1]);
+    EXPECT_LT(worst_in_sd(out, tilted()), 4.0);
+  }
+}
+
 class SilentStudy : public testing::TestWithParam<bool> {};
 
 TEST_P(SilentStudy, ThatReturnsIsToldAndItsBiasesAreComparedWithThoseBefore) {
@@ -601,6 +627,69 @@ TEST(GnssTrust, FloatsThatFollowEachOtherQuicklySayLittleThatIsNew) {
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kDifferential, 1.2), 10.0);
   EXPECT_DOUBLE_EQ(correlated_sd_factor(GnssSolution::kSingle, 2.4), 10.0);
 }
+
+/// Positions whose error wanders, as reflections and the atmosphere have it: Gauss-Markov, drawn here.
+struct WanderingError {
+  GnssSolution solution;
+  double sd_m;
+  double tau_s;
+};
+
+class Wandering : public testing::TestWithParam<WanderingError> {};
+
+TEST_P(Wandering, PositionsAreNotBelievedToBeBetterThanTheyAre) {
+  const WanderingError& wandering = GetParam();
+  constexpr double kGnssPeriod_s = 0.2;
+  constexpr int kDrives = 6;
+  double z2 = 0.0;
+  double n = 0.0;
+  for (int drive_number = 0; drive_number < kDrives; ++drive_number) {
+    const auto seed = static_cast<std::uint64_t>(70 + drive_number);
+    SimulatedDrive drive(240.0, {tilted()}, seed);
+    EstimatorConfig config = drive.config();
+    config.studies.clear();
+    Estimator estimator(config);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    const double kept = std::exp(-kGnssPeriod_s / wandering.tau_s);
+    std::array<double, 3> error_m{};
+    for (double& error : error_m) error = wandering.sd_m * normal(random);
+    const auto wander = [&](Sample& sample, double) {
+      if (sample.kind == SampleKind::kImu && sample.device != SimulatedDrive::kReference) return false;
+      if (sample.device != SimulatedDrive::kGnss) return true;
+      for (double& error : error_m)
+        error = kept * error + std::sqrt(1.0 - kept * kept) * wandering.sd_m * normal(random);
+      sample.gnss.latitude_rad += error_m[0] / kEarthRadius_m;
+      sample.gnss.longitude_rad += error_m[1] / (kEarthRadius_m * std::cos(sample.gnss.latitude_rad));
+      sample.gnss.height_m += error_m[2];
+      sample.gnss.flags = kPositionValid | kHasPositionSd;
+      sample.gnss.sd_position_m = {wandering.sd_m, wandering.sd_m, wandering.sd_m};
+      sample.gnss.solution = wandering.solution;
+      return true;
+    };
+    for (const double until_s : {80.0, 160.0, 239.0}) {
+      told_by(drive, estimator, wander, until_s);
+      const NavigationOutput& out = estimator.navigation();
+      ASSERT_EQ(out.status, NavigationStatus::kNavigating);
+      const auto truth = drive.motion().state_at(drive.time_s() - 0.01).position;
+      const std::array<double, 2> apart_m{
+          kEarthRadius_m * (out.latitude_rad - truth.latitude_rad),
+          kEarthRadius_m * std::cos(truth.latitude_rad) * (out.longitude_rad - truth.longitude_rad)};
+      for (std::size_t i = 0; i < 2; ++i) {
+        z2 += std::pow(apart_m[i] / out.sd_position_m[i], 2);
+        n += 1.0;
+      }
+    }
+  }
+  // Of one drive the three looks are much alike: twelve values of a chi-squared, 3.3 sd.
+  EXPECT_LT(z2 / n, 1.0 + 3.3 * std::sqrt(2.0 / 12.0));
+  EXPECT_GT(z2 / n, 0.1);
+}
+
+INSTANTIATE_TEST_SUITE_P(GnssTrust, Wandering,
+                         testing::Values(WanderingError{GnssSolution::kSingle, 1.5, 60.0},
+                                         WanderingError{GnssSolution::kDifferential, 0.5, 60.0},
+                                         WanderingError{GnssSolution::kFloat, 0.3, 30.0}));
 
 /// A MEMS unit as the reference, of which nobody told the filter: a navigation-grade one would have a
 /// thousandth of its noise.

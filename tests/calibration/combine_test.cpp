@@ -69,8 +69,10 @@ TEST(Combine, IndependentDrivesGiveAConsistentMeanAndAnUnsuspiciousHomogeneity) 
     EXPECT_EQ(combined->homogeneity_dof, 12U);
     suspicious += combined->homogeneity_p_value < 0.05 ? 1 : 0;
   }
-  // Chi-square means and their sd; 4 sd.
-  EXPECT_NEAR(nees / kCampaigns, 6.0, 4.0 * std::sqrt(12.0 / kCampaigns));
+  // Chi-square means and their sd; 4 sd. That a mounting repeats exactly is not known: the sd are a little
+  // wider than where it is.
+  EXPECT_LT(nees / kCampaigns, 6.0 + 4.0 * std::sqrt(12.0 / kCampaigns));
+  EXPECT_GT(nees / kCampaigns, 4.0);
   EXPECT_NEAR(mean_chi2 / kCampaigns, 12.0, 4.0 * std::sqrt(24.0 / kCampaigns));
   EXPECT_NEAR(suspicious, 0.05 * kCampaigns, 4.0 * std::sqrt(0.05 * 0.95 * kCampaigns));
 }
@@ -150,6 +152,82 @@ TEST(Combine, AMovedMountShowsInTheTestOfHomogeneity) {
   const auto combined = combine(drives, CombineMethod::kInverseVariance);
   ASSERT_TRUE(combined.has_value());
   EXPECT_LT(combined->homogeneity_p_value, 1e-4);
+}
+
+/// Plates that are screwed on anew: each drive has a mounting of its own about the one that lasts.
+struct Campaign {
+  int drives;
+  double psi_sd_rad;
+  double r_sd_m;
+};
+
+void PrintTo(const Campaign& c, std::ostream* out) {
+  *out << c.drives << " drives, " << c.psi_sd_rad << " rad, " << c.r_sd_m << " m";
+}
+
+class Scatter : public testing::TestWithParam<Campaign> {};
+
+TEST_P(Scatter, BetweenDrivesIsLearnedTheMeanIsHonestAndNoDriveLikeTheOthersStandsOut) {
+  const Campaign& campaign = GetParam();
+  std::mt19937_64 random(34);
+  constexpr int kCampaigns = 100;
+  double nees = 0.0;
+  double square_psi = 0.0;
+  int stand_out = 0;
+  for (int c = 0; c < kCampaigns; ++c) {
+    std::vector<MountingEstimate> drives;
+    for (int i = 0; i < campaign.drives; ++i) {
+      const Matrix6 own = covariance_with_sd(1e-4, 1e-4);
+      Matrix6 between = Matrix6::Zero();
+      between.diagonal().head<3>().setConstant(campaign.psi_sd_rad * campaign.psi_sd_rad);
+      between.diagonal().tail<3>().setConstant(campaign.r_sd_m * campaign.r_sd_m);
+      drives.push_back(estimate_of(draw(random, own + between), own));
+    }
+    const auto combined = combine(drives, CombineMethod::kInverseVariance);
+    ASSERT_TRUE(combined.has_value());
+    const Eigen::Map<const Matrix6> P(combined->estimate.covariance_psi_r.data());
+    const Vector6 error = error_of(combined->estimate);
+    nees += error.dot(P.ldlt().solve(error)) / kCampaigns;
+    square_psi += std::pow(combined->between_drives_psi_sd_rad, 2) / kCampaigns;
+    stand_out += combined->one_mounting_p_value() < 0.05 ? 1 : 0;
+  }
+  // Chi-square with its sd, 4 sd. Of three drives the size of the scatter is known to a third at best.
+  EXPECT_NEAR(nees, 6.0, 1.5);
+  const double psi_sd = std::sqrt(square_psi);
+  if (campaign.psi_sd_rad > 0.0) {
+    EXPECT_GT(psi_sd, 0.7 * campaign.psi_sd_rad);
+    EXPECT_LT(psi_sd, 1.5 * campaign.psi_sd_rad);
+  } else {
+    EXPECT_LT(psi_sd, 5e-5);
+  }
+  EXPECT_LT(stand_out, 0.05 * kCampaigns + 4.0 * std::sqrt(0.05 * 0.95 * kCampaigns));
+}
+
+INSTANTIATE_TEST_SUITE_P(Combine, Scatter,
+                         testing::Values(Campaign{3, 0.0, 0.0}, Campaign{3, 1e-3, 5e-4},
+                                         Campaign{8, 1e-3, 5e-4}, Campaign{8, 0.0, 5e-4},
+                                         Campaign{5, 2e-4, 1e-4}));
+
+TEST(Combine, ASensorThatWasTakenOffStandsOutOfDrivesThatScatter) {
+  std::mt19937_64 random(35);
+  const Matrix6 own = covariance_with_sd(1e-4, 1e-4);
+  Matrix6 between = Matrix6::Zero();
+  between.diagonal().head<3>().setConstant(1e-6);
+  between.diagonal().tail<3>().setConstant(1e-7);
+  for (const int n : {2, 3, 6}) {
+    std::vector<MountingEstimate> drives;
+    for (int i = 0; i < n; ++i) drives.push_back(estimate_of(draw(random, own + between), own));
+    Vector6 moved = Vector6::Zero();
+    moved(2) = 2.0 / 57.3;
+    drives.back() = estimate_of(moved, own);
+    const auto combined = combine(drives, CombineMethod::kInverseVariance);
+    ASSERT_TRUE(combined.has_value());
+    EXPECT_LT(combined->one_mounting_p_value(), 1e-3) << n;
+    EXPECT_LT(combined->drives.back().p_value, 1e-3) << n;
+    if (n > 2) {
+      EXPECT_GT(combined->drives.front().p_value, 0.01) << n;
+    }
+  }
 }
 
 TEST(Combine, RefusesNothingAndNamesABrokenCovariance) {

@@ -78,7 +78,8 @@ class CombineCommand : public testing::Test {
 };
 
 TEST_F(CombineCommand, WeighsIndependentDrivesByInverseVarianceAndTestsWhetherTheyAgree) {
-  // Weights 1/1 and 1/4 of the squared sd: the closed form of two independent values.
+  // Weights 1/1 and 1/4 of the squared sd, the closed form of two independent values, if the mounting repeats
+  // exactly; the less it does, the more alike they count.
   const auto runs =
       run_with("a", 1e-3, 0.100, 1e-4, 1e-3, "a.lcm") + run_with("b", 1.1e-3, 0.105, 2e-4, 2e-3, "b.lcm");
   const auto outcome = combine(runs + "--json");
@@ -89,10 +90,16 @@ TEST_F(CombineCommand, WeighsIndependentDrivesByInverseVarianceAndTestsWhetherTh
   const auto& imu = document.at("imus").at(0);
   EXPECT_EQ(imu.at("name"), "mtx1");
   const double psi_z = std::asin(imu.at("C_b_s").at(1).get<double>());
-  EXPECT_NEAR(psi_z, (4.0 * 1e-3 + 1.1e-3) / 5.0, 1e-10);
-  EXPECT_NEAR(imu.at("r_bs_b_m").at(0).get<double>(), (4.0 * 0.100 + 0.105) / 5.0, 1e-12);
-  EXPECT_NEAR(imu.at("boresight_sd_deg").at(2).get<double>(), 1e-4 * std::sqrt(0.8) / kRadPerDeg, 1e-12);
-  EXPECT_NEAR(imu.at("r_bs_b_sd_m").at(0).get<double>(), 1e-3 * std::sqrt(0.8), 1e-12);
+  EXPECT_GT(psi_z, (4.0 * 1e-3 + 1.1e-3) / 5.0);
+  EXPECT_LT(psi_z, (1e-3 + 1.1e-3) / 2.0);
+  EXPECT_GT(imu.at("r_bs_b_m").at(0).get<double>(), (4.0 * 0.100 + 0.105) / 5.0);
+  EXPECT_LT(imu.at("r_bs_b_m").at(0).get<double>(), (0.100 + 0.105) / 2.0);
+  EXPECT_GT(imu.at("boresight_sd_deg").at(2).get<double>(), 1e-4 * std::sqrt(0.8) / kRadPerDeg);
+  EXPECT_LT(imu.at("boresight_sd_deg").at(2).get<double>(), 2e-4 / kRadPerDeg);
+  EXPECT_GT(imu.at("r_bs_b_sd_m").at(0).get<double>(), 1e-3 * std::sqrt(0.8));
+  EXPECT_LT(imu.at("r_bs_b_sd_m").at(0).get<double>(), 1.2e-3);
+  EXPECT_GT(imu.at("between_drives").at("r_sd_m").get<double>(), 0.0);
+  EXPECT_LT(imu.at("between_drives").at("r_sd_m").get<double>(), 1e-3);
   // Differences of 1e-4 rad and 5 mm with sd sqrt(5) of 1e-4 rad and 1 mm: chi2 = 1/5 + 25/5.
   EXPECT_NEAR(imu.at("homogeneity").at("chi2").get<double>(), 5.2, 1e-6);
   EXPECT_EQ(imu.at("homogeneity").at("dof"), 6);
@@ -100,14 +107,16 @@ TEST_F(CombineCommand, WeighsIndependentDrivesByInverseVarianceAndTestsWhetherTh
   EXPECT_NEAR(imu.at("homogeneity").at("p_value").get<double>(),
               std::exp(-2.6) * (1.0 + 2.6 + 0.5 * 2.6 * 2.6), 1e-6);
   EXPECT_NEAR(imu.at("drives").at(1).at("r_from_others_m").at(0).get<double>(), 0.005, 1e-12);
-  EXPECT_NEAR(imu.at("drives").at(1).at("r_from_others_sd_m").at(0).get<double>(), 1e-3 * std::sqrt(5.0),
-              1e-12);
+  // Half a millimetre of give in each of the two.
+  const double between_m = imu.at("drives").at(1).at("r_from_others_sd_m").at(0).get<double>();
+  EXPECT_GT(between_m, 1e-3 * std::sqrt(5.0));
+  EXPECT_LT(between_m, 1e-3 * std::sqrt(5.0 + 2.0 * 0.25 * 2.0));
 }
 
 TEST_F(CombineCommand, SaysInWordsThatDrivesDidNotSeeOneMountingAndWhichStandsOut) {
   const auto runs = run_with("a", 0.0, 0.1, 1e-4, 1e-3, "a.lcm") +
                     run_with("b", 0.0, 0.1, 1e-4, 1e-3, "b.lcm") +
-                    run_with("moved", 2e-3, 0.1, 1e-4, 1e-3, "c.lcm");
+                    run_with("moved", 2e-2, 0.1, 1e-4, 1e-3, "c.lcm");
   const auto outcome = combine(runs);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("differ by more than their sd allow"));

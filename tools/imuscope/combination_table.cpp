@@ -26,8 +26,8 @@ void print_drive(const Combination& combination, const CombinedStudy& study, std
       three(drive.deviation, 3, kMmPerM, 2));
   say("    sd of that         {}  mdeg   {}  mm\n", three(drive.deviation_sd, 0, kMdegPerRad, 1),
       three(drive.deviation_sd, 3, kMmPerM, 2));
-  say("    chi2 of 6 {:6.1f}   p {:.3g}   weight {:.3f}{}\n", drive.chi2, drive.p_value,
-      study.mounting.weights[i], drive.p_value < kSuspicious ? "   stands out" : "");
+  say("    p {:.3g}   weight {:.3f}{}\n", drive.p_value, study.mounting.weights[i],
+      drive.p_value < kSuspicious ? "   stands out" : "");
 }
 
 void print_combined_study(const Combination& combination, const CombinedStudy& study) {
@@ -44,10 +44,18 @@ void print_combined_study(const Combination& combination, const CombinedStudy& s
   say("    sd               {}  mdeg\n", three(sd, 0, kMdegPerRad, 1));
   say("  lever arm b, x y z {:9.2f} {:9.2f} {:9.2f}  mm\n", r[0] * kMmPerM, r[1] * kMmPerM, r[2] * kMmPerM);
   say("    sd               {}  mm\n", three(sd, 3, kMmPerM, 2));
-  say("  one mounting?  chi2 {:.1f} of {} degrees of freedom, p = {:.3g}: {}\n", mounting.homogeneity_chi2,
-      mounting.homogeneity_dof, mounting.homogeneity_p_value,
+  say("  repeats exactly?   chi2 {:.1f} of {} degrees of freedom, p = {:.3g}: {}\n",
+      mounting.homogeneity_chi2, mounting.homogeneity_dof, mounting.homogeneity_p_value,
       mounting.homogeneity_p_value < kSuspicious ? "the drives differ by more than their sd allow"
                                                  : "the drives agree within their sd");
+  if (combination.method == CombineMethod::kInverseVariance) {
+    say("  between drives     sd {:.1f} mdeg, {:.2f} mm an axis, beyond the drives' own\n",
+        mounting.between_drives_psi_sd_rad * kMdegPerRad, mounting.between_drives_r_sd_m * kMmPerM);
+  }
+  say("  one mounting?      p = {:.3g}: {}\n", mounting.one_mounting_p_value(),
+      mounting.one_mounting_p_value() < kSuspicious
+          ? "a drive lies farther from the others than a mounting gives way"
+          : "no drive stands out");
   for (std::size_t i = 0; i < study.drives.size(); ++i) print_drive(combination, study, i);
 }
 

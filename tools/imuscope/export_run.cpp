@@ -84,7 +84,7 @@ Result<void> export_mounting(const std::filesystem::path& path, const std::strin
     return usage_error(fmt::format("--name {} has no mounting", name),
                        fmt::format("there is {}", fmt::join(names, ", ")));
   const auto& chosen = found[static_cast<std::size_t>(wanted - names.begin())];
-  say("{}", bag::mounting_text(chosen.mounting, chosen.correction,
+  say("{}", bag::mounting_text(chosen.mounting, chosen.correction, chosen.triads,
                                reference_of(is_folder ? path : path.parent_path()), *how));
   return {};
 }
