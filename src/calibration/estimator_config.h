@@ -216,7 +216,7 @@ struct EstimatorConfig {
 
   /// Probability with which a good measurement of one axis passes the gate.
   double gate_probability = 0.99999;
-  /// An S sample waits this long (on the arrival time scale) for its reference, then counts as late.
+  /// E-2. An S sample waits this long (on the arrival time scale) for its reference, then counts as late.
   Duration late_after = from_seconds(kReferenceWait_s);
   /// Instructions that the covariance is worked out with. Absent: the widest that the processor has.
   std::optional<InstructionSet> instruction_set;

@@ -18,7 +18,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Longest interval that is bridged by interpolating the rates; beyond it the navigation starts anew.
+/// E-6. Longest interval that is bridged by interpolating the rates; beyond it the navigation starts anew.
 constexpr double kBridgedGap_s = 1.0;
 /// An interval of UTC is never further from the host's than this share of it.
 constexpr double kIntervalShare = 0.5;

@@ -158,6 +158,7 @@ void OdometryFilter::apply(const Sample& sample, Regime regime) noexcept {
 
 void OdometryFilter::predict(HostTime time) noexcept {
   if (has_predicted_ && time > predicted_to_) {
+    // E-33
     const double q = config_.scale_walk_per_sqrt_s * config_.scale_walk_per_sqrt_s;
     core_.predict_state(core_.odometry_states() + kWheelScaleError, 1.0,
                         q * to_seconds(time - predicted_to_));

@@ -85,6 +85,7 @@ class StudyFilter {
   void restart_windows() noexcept;
   void set_window_noise() noexcept;
   void watch_gravity(StudyContext& context, const Sample& sample, double dt_s) noexcept;
+  // E-8, E-9, E-19: what contradicts what was configured or known before.
   void note_return(StudyContext& context, HostTime now, double silence_s) noexcept;
   void watch_return(StudyContext& context, HostTime now) noexcept;
   void watch_priors(EventLog& log) noexcept;

@@ -32,9 +32,9 @@ const char* symbol_of(Term term) noexcept;
 /// "angle random walk" or "velocity random walk", "bias instability", "rate random walk", ...
 const char* name_of(Term term, bool gyro) noexcept;
 
-/// N: root of the density of all that is white to a filter that integrates for a second (N-28). B: lowest
+/// N: root of the density of all that is white to a filter that integrates for a second (G-28). B: lowest
 /// point of the Allan deviation over 0.664, where it is a minimum and not the end of the record (T-1). K, R,
-/// Q: of the model's own RW, DR and QN; without the term the most that the record allows (N-32).
+/// Q: of the model's own RW, DR and QN; without the term the most that the record allows (G-32).
 /// What a filter feels hangs little on the model, but more than its interval says: intervals of N and B reach
 /// over those of the rivals, and those of K, R and Q over the rivals that have the term (T-4).
 /// @param fit    fitted to the axis, quick or inverted intervals

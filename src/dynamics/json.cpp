@@ -64,7 +64,7 @@ void correct_family(const std::vector<nlohmann::json*>& family) {
     const auto& value = entry->at("p_value");
     p.push_back(value.is_number() ? std::optional(value.get<double>()) : std::nullopt);
   }
-  const auto adjusted = noise::holm_adjusted(p);  // N-22
+  const auto adjusted = noise::holm_adjusted(p);  // G-22
   for (std::size_t i = 0; i < family.size(); ++i)
     (*family[i])["p_holm"] = adjusted[i] ? nlohmann::json(*adjusted[i]) : nlohmann::json(nullptr);
 }

@@ -19,7 +19,7 @@ void append_regressions(const std::string& name, const std::array<AxisDynamics, 
                         nlohmann::json& regressions);
 
 /// Gives every coefficient and every regression "p_holm": p corrected for how many coefficients (regressions)
-/// of the same method there are over all axes and S-IMUs (N-22). Null where there is no p.
+/// of the same method there are over all axes and S-IMUs (G-22). Null where there is no p.
 void correct_for_number(nlohmann::json& regressions);
 
 }  // namespace imuscope

@@ -27,7 +27,7 @@ ErrorRow error_row(const StudyEpoch& epoch, const Mounting& mounting, const Refe
   const Vector3d f_b =
       vector(epoch.f_b_mps2) + vector(epoch.reference_accel_bias_mps2) - vector(bias.accel_mps2);
 
-  // E-1, E-2
+  // P-1, P-2
   const Vector3d omega_s = C_b_s * omega_ib_b;
   const Vector3d lever =
       vector(epoch.omega_dot_ib_b_radps2).cross(r_bs_b_m) + omega_ib_b.cross(omega_ib_b.cross(r_bs_b_m));

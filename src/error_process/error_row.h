@@ -7,7 +7,7 @@
 ///   e_a = z_a - C_b_s (f_b + omega' x r + omega x (omega x r))
 ///
 /// with the reference compensated for its own biases and taken at the S sample's time plus t_d. After Stebler
-/// et al. (2014), section II.A, eq. (1) and (2); equation numbers E-1 to E-3 in EQUATIONS.md.
+/// et al. (2014), section II.A, eq. (1) and (2); equation numbers P-1 to P-3 in EQUATIONS.md.
 
 #include <cstdint>
 
@@ -59,7 +59,7 @@ struct ScaleError {
   Vector3 accel{};
 };
 
-/// The row without the part that a scale error explains: e - s * prediction, per axis (E-3).
+/// The row without the part that a scale error explains: e - s * prediction, per axis (P-3).
 ErrorRow without_scale_error(const ErrorRow& row, const ScaleError& scale) noexcept;
 
 }  // namespace imuscope

@@ -23,7 +23,7 @@ constexpr std::array kVectors = {
 RowLowPass::RowLowPass(double rate_hz, double corner_hz) {
   IMUSCOPE_EXPECTS(corner_hz > 0.0 && corner_hz < 0.5 * rate_hz);
   static_assert(kSignals == 3 * kVectors.size());
-  // E-4: bilinear transform with the corner's frequency kept.
+  // P-4: bilinear transform with the corner's frequency kept.
   const double k = std::tan(std::numbers::pi * corner_hz / rate_hz);
   const double norm = 1.0 / (1.0 + std::numbers::sqrt2 * k + k * k);
   b0_ = k * k * norm;

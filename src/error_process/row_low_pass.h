@@ -2,7 +2,7 @@
 
 /// One low-pass for errors and prediction alike, so that two sensors whose bandwidths differ are compared
 /// where both see: the error is linear in sample and prediction, so filtering it filters both. The dynamics
-/// that the error is studied against pass the same filter. Equation numbers E-4 in EQUATIONS.md.
+/// that the error is studied against pass the same filter. Equation numbers P-4 in EQUATIONS.md.
 
 #include <array>
 #include <cstddef>

@@ -218,6 +218,7 @@ Consistency summary(const std::vector<const OutageResult*>& outages) {
     out.attitude_sd_rad += variance.segment<3>(kAttitudeError).sum();
     double log_det = 0.0;
     const double position = normalised_squared(e.head<3>(), P.topLeftCorner<3, 3>(), &log_det);
+    // V-5, V-6
     out.nees_position += position / kFreedom;
     out.nees_velocity +=
         normalised_squared(e.segment<3>(kVelocityError), P.block<3, 3>(kVelocityError, kVelocityError)) /

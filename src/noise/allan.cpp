@@ -78,7 +78,7 @@ AllanPoint of_level(const WvLevel& level, double rate_hz) {
   AllanPoint point;
   point.n = static_cast<std::uint64_t>(0.5 * level.tau_samples);
   point.tau_s = static_cast<double>(point.n) / rate_hz;
-  point.deviation = std::sqrt(2.0 * level.value);  // N-40
+  point.deviation = std::sqrt(2.0 * level.value);  // G-40
   point.n_differences = level.n_coefficients;
   return point;
 }

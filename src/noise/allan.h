@@ -11,7 +11,7 @@
 namespace imuscope::noise {
 
 /// AVAR(n) = half the mean square of the difference of neighbouring means of n samples, over all places (IEEE
-/// Std 952, annex C): twice the wavelet variance at n = 2^(level-1) (N-40).
+/// Std 952, annex C): twice the wavelet variance at n = 2^(level-1) (G-40).
 struct AllanPoint {
   std::uint64_t n = 0;  ///< samples a mean
   double tau_s = 0.0;
@@ -31,7 +31,7 @@ std::vector<AllanPoint> allan_deviation(std::span<const double> x, const Wavelet
                                         int points_per_octave = 4);
 
 /// Chi-square intervals. Their degrees of freedom are those of the wavelet variance under the fitted model
-/// (N-8), between levels on a logarithmic scale; without a fit max(N / 2n, 1).
+/// (G-8), between levels on a logarithmic scale; without a fit max(N / 2n, 1).
 void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, double confidence);
 
 /// Allan deviation of the model for means of n samples; n need not be a power of two.

@@ -29,7 +29,7 @@ Eigen::MatrixXd contributions(const FitResult& fit) {
   return g;
 }
 
-/// argmin |u - 1|^2 with g u >= 1, g >= 0, by ascent in the dual, one row at a time (Hildreth 1957).
+/// G-19: argmin |u - 1|^2 with g u >= 1, g >= 0, by ascent in the dual, one row at a time (Hildreth 1957).
 Eigen::VectorXd smallest_factors(const Eigen::MatrixXd& g) {
   constexpr int kMaxRounds = 10'000;
   constexpr double kReached = 1e-10;

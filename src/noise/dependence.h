@@ -4,7 +4,7 @@
 ///
 ///   log theta_p(w) = log theta_p + sum over drivers k of slope_pk (x_kw - mean x_k),
 ///
-/// for amplitudes and rates alike, fitted to the wavelet variances of all windows at once (N-24 in
+/// for amplitudes and rates alike, fitted to the wavelet variances of all windows at once (G-24 in
 /// EQUATIONS.md). With several drivers each slope is what follows that driver while the others stay. What
 /// windows of that length do not determine is held at the start model and said. A window
 /// that lies far from all others (a blow, a fault) makes no dependence of its own: it pulls no harder than

@@ -329,7 +329,8 @@ std::string gtsam(Writer& writer) {
   return text;
 }
 
-/// PX4 EKF2 adds sq(NOISE) * dt^2 to a delta angle and sq(B_NOISE * dt) to a bias at each of its updates.
+/// G-26. PX4 EKF2 adds sq(NOISE) * dt^2 to a delta angle and sq(B_NOISE * dt) to a bias at each of its
+/// updates.
 std::string px4(Writer& writer) {
   constexpr double kFilterUpdate_s = 0.01;  // EKF2_PREDICT_US, default
   constexpr int kRealType = 9;              // MAV_PARAM_TYPE_REAL32

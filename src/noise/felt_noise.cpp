@@ -39,7 +39,7 @@ constexpr double kNegligibleUntold = 0.2;  ///< of one that the data do not tell
 /// of kEdge times that time is not.
 constexpr double kEdge = 2.0;
 
-/// Share of a process that is white at `fast_s` (N-28): it moves without a step as a time constant crosses
+/// Share of a process that is white at `fast_s` (G-28): it moves without a step as a time constant crosses
 /// it.
 double white_share(const Component& c, double rate_hz, double fast_s) {
   switch (c.kind) {
@@ -63,7 +63,7 @@ bool is_slow(const Component& c, double rate_hz, double fast_s) {
   return white_share(c, rate_hz, fast_s) < 0.5;
 }
 
-/// N-28.
+/// G-28.
 double white_of(const Model& model, double rate_hz, double fast_s) {
   double sum = 0.0;
   for (const Component& c : without_power_laws(model).components)
@@ -71,7 +71,7 @@ double white_of(const Model& model, double rate_hz, double fast_s) {
   return sum;
 }
 
-/// N-29: variance of what a process grows by in `time_s`.
+/// G-29: variance of what a process grows by in `time_s`.
 double growth_of(const Component& c, double rate_hz, double time_s) {
   const double samples = time_s * rate_hz;
   switch (c.kind) {
@@ -112,12 +112,12 @@ double mean_log_growth(const Model& model, double rate_hz, double fast_s, const 
 
 double gauss_markov_growth(double tau_s, double time_s) { return -2.0 * std::expm1(-time_s / tau_s); }
 
-/// N-30.
+/// G-30.
 double walk_of(const Model& model, double rate_hz, double fast_s, const FilterBand& band) {
   return std::exp(mean_log_growth(model, rate_hz, fast_s, band, [](double t) { return t; }));
 }
 
-/// N-31.
+/// G-31.
 double bias_variance_of(const Model& model, double rate_hz, double fast_s, const FilterBand& band,
                         double tau_s) {
   return std::exp(
@@ -148,7 +148,7 @@ double best_tau(const Model& model, double rate_hz, double fast_s, const FilterB
   return best;
 }
 
-/// Degrees of freedom of a level's value (N-2), fewer where the estimator is less efficient.
+/// Degrees of freedom of a level's value (G-2), fewer where the estimator is less efficient.
 double freedom_of(const WvLevel& level, double efficiency) {
   return std::max(efficiency * static_cast<double>(level.n_coefficients) / level.tau_samples, 1.0);
 }
@@ -204,7 +204,7 @@ class Uncertainty {
       const double y = fit_.wv[i].observed.value;
       const double m = fit_.wv[i].fitted;
       const auto k = static_cast<Eigen::Index>(i);
-      if (y + m > 0.0) v(k, k) += fit_.model_error * fit_.model_error * 2.0 * y * m * m / (y + m);  // N-15
+      if (y + m > 0.0) v(k, k) += fit_.model_error * fit_.model_error * 2.0 * y * m * m / (y + m);  // G-15
     }
     return v;
   }
@@ -238,7 +238,7 @@ class Uncertainty {
   bool known_ = false;
 };
 
-/// N-32: the most of a term with this unit curve that every level allows beside the rest of the model.
+/// G-32: the most of a term with this unit curve that every level allows beside the rest of the model.
 /// Infinite without a level. What the rest of a rejected model takes of a level is not known.
 double most_of(const FitResult& fit, const std::function<double(int)>& unit, const Model& rest) {
   double most = kInfinity;

@@ -1,7 +1,7 @@
 #pragma once
 
 /// What a filter feels of a noise model: the one way from a fit to the numbers of a filter's configuration,
-/// whether they are exported, printed as data-sheet rows or shown in a report (N-28 to N-32 in EQUATIONS.md).
+/// whether they are exported, printed as data-sheet rows or shown in a report (G-28 to G-32 in EQUATIONS.md).
 ///
 /// A filter works in a band of times, from the shortest over which it integrates to the longest over which it
 /// has to know how its biases grow. In that band a process is white (white noise, and a moving average, a
@@ -52,7 +52,7 @@ struct FeltBias {
   bool as_fitted = false;              ///< the model's own process, not one in its place
 };
 
-/// Density of what of a model is white in the band, unit^2/Hz: N-28.
+/// Density of what of a model is white in the band, unit^2/Hz: G-28.
 double white_density(const Model& model, double rate_hz, const FilterBand& band);
 
 /// The same as the fit tells it.

@@ -19,7 +19,7 @@ double low_frequency_variance(const Component& component) noexcept {
       return component.amplitude * std::pow(1.0 + shape[0], 2);
     case ProcessKind::kArma11:
       return component.amplitude * std::pow((1.0 + shape[1]) / (1.0 - shape[0]), 2);
-    case ProcessKind::kResonance: {  // Re[(1 - i a/b) (1 + z) / (1 - z)], N-37
+    case ProcessKind::kResonance: {  // Re[(1 - i a/b) (1 + z) / (1 - z)], G-37
       const std::complex<double> z = std::exp(std::complex<double>(-shape[0], shape[1]));
       const std::complex<double> weight(1.0, -shape[0] / shape[1]);
       return component.amplitude * (weight * (1.0 + z) / (1.0 - z)).real();

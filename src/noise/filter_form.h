@@ -12,7 +12,7 @@ namespace imuscope::noise {
 /// slower one like a bias.
 inline constexpr double kFastTau_s = 1.0;
 
-/// Variance of the white noise that has the component's density at frequency zero, in sample terms (N-28);
+/// Variance of the white noise that has the component's density at frequency zero, in sample terms (G-28);
 /// zero for what has none there (quantization, sinusoids) or no end (random walk, ramp).
 double low_frequency_variance(const Component& component) noexcept;
 
@@ -35,7 +35,7 @@ struct FilterTerms {
   std::vector<GaussMarkov> gauss_markov{};  ///< in order of falling rate; those of no variance, too
 
   [[nodiscard]] double white_density() const { return white_variance / rate_hz; }  ///< unit^2/Hz
-  /// Of a sampled Gauss-Markov process at low frequencies (N-28), unit^2/Hz.
+  /// Of a sampled Gauss-Markov process at low frequencies (G-28), unit^2/Hz.
   [[nodiscard]] double low_frequency_density(const GaussMarkov& process) const;
   /// The slowest process that has a variance; zeros without one.
   [[nodiscard]] GaussMarkov bias() const;

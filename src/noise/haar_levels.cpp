@@ -38,7 +38,7 @@ double scale_of(int level) { return std::ldexp(1.0, -2 * level); }  // 1 / (2n)^
 using Lanes = double __attribute__((vector_size(32)));
 constexpr std::size_t kLanes = 4;
 
-/// Squares of one level over [from, to), without moving on to the next.
+/// G-1. Squares of one level over [from, to), without moving on to the next.
 double squares(const std::vector<double>& f, std::size_t n, std::size_t from, std::size_t to) {
   double sum = 0.0;
   for (std::size_t s = from; s < to; s += kStretch) {

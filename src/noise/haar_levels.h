@@ -26,7 +26,7 @@ struct Segment {
 constexpr std::size_t least_valid(std::size_t n) noexcept { return n - n / 8; }
 
 /// What missing samples add to the expected square of a coefficient, in units of variances within its halves
-/// (N-33): each hole its own, less what all of a half have in common.
+/// (G-33): each hole its own, less what all of a half have in common.
 struct MissingExcess {
   double own = 0.0;
   double common = 0.0;
@@ -51,7 +51,7 @@ class HoleLengths {
  public:
   void add(std::uint64_t missing) noexcept;
   void merge(const HoleLengths& other) noexcept;
-  /// What the holes add to a square, by N-33.
+  /// What the holes add to a square, by G-33.
   /// @param below  wavelet variances of the levels below the support's: n = 2^below.size()
   [[nodiscard]] double variance_of(const MissingExcess& excess, std::span<const double> below) const noexcept;
 

@@ -84,7 +84,7 @@ class Unit {
   Eigen::VectorXd root_variance_;
 };
 
-/// Sum over the units of what their scores have beyond the common step that all of them agree on.
+/// G-17. Sum over the units of what their scores have beyond the common step that all of them agree on.
 double statistic_of(const std::vector<Unit>& units, const std::vector<Eigen::VectorXd>& scores,
                     const Eigen::LDLT<Eigen::MatrixXd>& total) {
   Eigen::VectorXd sum = scores.front();

@@ -277,6 +277,7 @@ ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const 
   return out;
 }
 
+// G-14
 std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& residual,
                             const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
                             const std::vector<bool>& present, bool by_these_weights) {

@@ -31,9 +31,9 @@ std::vector<ParameterPlace> parameter_places(const Model& model);
 Eigen::MatrixXd wv_jacobian(const Model& model, const std::vector<int>& levels,
                             const std::vector<ParameterPlace>& places);
 
-/// Covariance of the parameters whose amplitude is not zero; NaN rows and columns for the others and for
-/// those the data do not determine. `v` is the covariance of the wavelet variance, `omega` the weights of the
-/// fit.
+/// G-13. Covariance of the parameters whose amplitude is not zero; NaN rows and columns for the others and
+/// for those the data do not determine. `v` is the covariance of the wavelet variance, `omega` the weights of
+/// the fit.
 struct ParameterCovariance {
   Eigen::MatrixXd covariance;
   std::vector<bool> determined;

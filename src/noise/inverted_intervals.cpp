@@ -29,7 +29,7 @@ constexpr double kBeyond = 12.0;
 
 /// Sampling covariance of many models of one wavelet variance. What stretches and missing samples make of it
 /// depends little on the model: it is computed for one, as a factor of every entry beside that of a record
-/// whose coefficients lie in one run (N-41), which takes a small part of the time.
+/// whose coefficients lie in one run (G-41), which takes a small part of the time.
 class CovarianceOfModels {
  public:
   CovarianceOfModels(const Model& model, const WaveletVariance& wv, std::size_t rows)
@@ -260,7 +260,7 @@ class Inversion {
     return m;
   }
 
-  /// Weights of the model at u. The levels' residuals are brought to a Gaussian's by cube roots (N-18).
+  /// Weights of the model at u. The levels' residuals are brought to a Gaussian's by cube roots (G-18).
   [[nodiscard]] Problem problem_at(const Eigen::VectorXd& u) const {
     const Model model = model_at(u);
     const Eigen::VectorXd m = curve(model);
@@ -335,7 +335,8 @@ class Inversion {
   Eigen::VectorXd best_;  ///< where the estimate is another
 };
 
-/// Where the test of parameter p first reaches `critical` in the direction `sign`; nothing where it does not.
+/// G-20. Where the test of parameter p first reaches `critical` in the direction `sign`; nothing where it
+/// does not.
 std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p, double sign, double step,
                                       double critical) {
   constexpr int kMaxSteps = 14;

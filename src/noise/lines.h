@@ -40,7 +40,7 @@ struct LineOptions {
 std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
                              const LineOptions& options);
 
-/// What a line contributes to the wavelet variance of a level, as a sinusoid of random phase (N-5).
+/// What a line contributes to the wavelet variance of a level, as a sinusoid of random phase (G-5).
 double line_wv(const Line& line, double rate_hz, int level);
 
 /// "a line at 0.565 Hz, amplitude 0.0021 m/s^2 (2.1 % of the variance)".

@@ -107,7 +107,7 @@ double deviance_of(const SeparableProblem& problem, const Model& model, const Ei
   const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * v * scale.asDiagonal());
   if (llt.info() != Eigen::Success) return std::numeric_limits<double>::infinity();
   const Eigen::MatrixXd factor = llt.matrixL();
-  // N-16
+  // G-16
   const Eigen::VectorXd expected = problem.y - residual_of(problem, model);
   Eigen::VectorXd residual(problem.y.size());
   double jacobian = 0.0;

@@ -55,7 +55,7 @@ class NestedFit {
 SeparableProblem unweighted_problem(const WaveletVariance& wv, const ModelSpec& spec, std::size_t levels);
 
 /// Twice the negative log-likelihood of the wavelet variance under the model, in units of the observed
-/// values; the levels are cubes of Gaussian numbers (N-16).
+/// values; the levels are cubes of Gaussian numbers (G-16).
 double deviance_of(const SeparableProblem& problem, const Model& model, const Eigen::MatrixXd& v);
 
 /// J-test of a model whose sampling covariance is `v`; see j_test().

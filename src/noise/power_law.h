@@ -12,7 +12,7 @@ namespace imuscope::noise {
 /// Whether the component is FN or PL.
 bool is_power_law(ProcessKind kind) noexcept;
 
-/// The sum (N-39): rates a factor of eight apart from half a sample to beyond 2^24 samples, amplitudes by
+/// The sum (G-39): rates a factor of eight apart from half a sample to beyond 2^24 samples, amplitudes by
 /// non-negative least squares of the relative deviations of the wavelet variance at levels 1 to 24. It
 /// follows the exact curve within kPowerLawSumError at each of them.
 std::vector<Component> power_law_sum(const Component& power_law);

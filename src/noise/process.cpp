@@ -103,8 +103,8 @@ CurvePoint arma_closed(double phi, double theta, double n) noexcept {
   return {value, {dnum_dphi / denominator - value * dlog_denominator, dnum_dtheta / denominator}};
 }
 
-/// The same curve as variance (g1/phi) of a Gauss-Markov process plus white noise of variance g0 - g1/phi,
-/// where g0, g1 are the autocovariances at lags 0 and 1.
+/// G-7: the same curve as variance (g1/phi) of a Gauss-Markov process plus white noise of variance g0 -
+/// g1/phi, where g0, g1 are the autocovariances at lags 0 and 1.
 CurvePoint arma_split(double phi, double theta, int level) noexcept {
   const double tau = std::ldexp(1.0, level);
   const CurvePoint gm = gauss_markov_wv(-std::log(phi), level);
@@ -134,7 +134,7 @@ CurvePoint sinusoid(double b, double n) noexcept {
 
 using Complex = std::complex<double>;
 
-/// N-6 for a complex rate s, z = exp(-s): the curve and its derivative by s. Of small n |s| the numerator is
+/// G-6 for a complex rate s, z = exp(-s): the curve and its derivative by s. Of small n |s| the numerator is
 /// summed as the series of series_numerator(), which holds for complex s as well.
 struct ComplexCurve {
   Complex value;

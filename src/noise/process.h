@@ -74,11 +74,11 @@ CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept;
 CurvePoint gauss_markov_wv(double a, int level) noexcept;
 
 /// Wavelet variance of a resonance of variance 1, autocovariance Re[(1 - i a/b) z^k] with z = exp(-a + i b):
-/// the formula of the Gauss-Markov process for the complex z (N-37), and its derivatives by a and b.
+/// the formula of the Gauss-Markov process for the complex z (G-37), and its derivatives by a and b.
 CurvePoint resonance_wv(double a, double b, int level) noexcept;
 
 /// Generalized covariance of the summed power-law noise at lag m >= 0, up to constants and squares of m,
-/// which fall out of every wavelet covariance (N-38).
+/// which fall out of every wavelet covariance (G-38).
 double power_law_sum_covariance(double alpha, double m) noexcept;
 
 /// Wavelet variance of power-law noise of amplitude 1, and d/dalpha.

@@ -77,6 +77,7 @@ class Builder {
     return c.kind == ProcessKind::kGaussMarkov ? Felt{} : felt_amplitude(fit_, places[at].component);
   }
 
+  // G-25
   void add_parameter(const ParameterEstimate& p) {
     const double f = fit_.rate_hz;
     if (p.process == "WN") {

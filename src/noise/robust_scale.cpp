@@ -159,8 +159,8 @@ double maximiser(std::span<const double> w, double centre, double c, double targ
   return std::exp(0.5 * (low + high));
 }
 
-/// The largest root; where the excess stays negative, as it may for few independent coefficients, the scale
-/// at which it comes closest: there the two roots have just met.
+/// G-3. The largest root; where the excess stays negative, as it may for few independent coefficients, the
+/// scale at which it comes closest: there the two roots have just met.
 double root(std::span<const double> w, double c, double target) {
   const std::vector<Bin> bins = histogram(w);
   double mean_square = 0.0;

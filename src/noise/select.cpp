@@ -125,7 +125,7 @@ class Grower {
     return out;
   }
 
-  /// The criterion without what it takes for parameters (N-16).
+  /// The criterion without what it takes for parameters (G-16).
   static double deviance(const FitResult& fitted) {
     return fitted.criterion - std::log(static_cast<double>(fitted.wv.size())) * fitted.spec.parameter_count();
   }

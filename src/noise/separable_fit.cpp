@@ -70,7 +70,7 @@ std::vector<Shape> shapes_at(const SeparableProblem& problem, const std::vector<
   return shapes;
 }
 
-/// The amplitudes and what remains at one point of the coordinates.
+/// G-12: the amplitudes and what remains at one point of the coordinates.
 struct Evaluation {
   Design columns;          ///< whitened, of length 1
   ColumnVector length;     ///< of the whitened columns before

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Welch's mean periodogram of a signal with missing samples: what lines and resonances are looked for in,
-/// and what is drawn beside a wavelet variance (N-23).
+/// and what is drawn beside a wavelet variance (G-23).
 
 #include <cstdint>
 #include <span>

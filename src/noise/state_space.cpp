@@ -55,7 +55,7 @@ Block sinusoid_block(double alpha2, double b) {
   return block;
 }
 
-/// x and x', N-37.
+/// x and x', G-37.
 Block resonance_block(double variance, double a, double b) {
   Block block;
   const double decay = std::exp(-a);

@@ -131,7 +131,7 @@ void StreamingWv::advance(double x, std::uint32_t valid) noexcept {
     });
 }
 
-/// Hands out, level by level, the sums of the n newest samples and of the n before them.
+/// G-4. Hands out, level by level, the sums of the n newest samples and of the n before them.
 template <typename Take>
 void StreamingWv::for_each_level(std::uint64_t position, double x, const Take& take) noexcept {
   double block = x;  // sum of the n newest samples, n = 1

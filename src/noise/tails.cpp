@@ -92,7 +92,7 @@ std::optional<TailTest> test_tails(std::span<const double> x, const WvOptions& o
     test.level = classical.levels[i].level;
     test.excess = d / robust->levels[i].value;
   }
-  // N-35
+  // G-35
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of_loss(all(used, used));
   const Eigen::VectorXd along = of_loss.eigenvectors().transpose() * difference;
   for (Eigen::Index k = 0; k < along.size(); ++k) {

@@ -2,7 +2,7 @@
 
 /// Heavy tails: are there more large values in a signal than in a Gaussian one? Spikes raise the classical
 /// wavelet variance and leave the robust one alone, so that their difference tells (Hausman 1978). Its
-/// covariance follows from the model, because of Gaussian signals the classical one is the better (N-35).
+/// covariance follows from the model, because of Gaussian signals the classical one is the better (G-35).
 
 #include <optional>
 #include <span>

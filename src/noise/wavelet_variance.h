@@ -78,7 +78,7 @@ Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const W
 /// Runs of non-zero mask entries that do not hold a non-finite value.
 std::vector<Segment> valid_segments(std::span<const double> x, std::span<const std::uint8_t> mask);
 
-/// Takes out of each level what missing samples add to its squares (N-33).
+/// Takes out of each level what missing samples add to its squares (G-33).
 /// @param excess  mean over the level's coefficients of missing_excess()
 void take_out_missing(std::vector<WvLevel>& levels, std::span<const MissingExcess> excess,
                       const HoleLengths& holes);

@@ -31,7 +31,7 @@ struct Exponential {
 
 using Complex = std::complex<double>;
 
-/// A resonance: the real part of an exponential whose rate and variance are complex (N-37).
+/// A resonance: the real part of an exponential whose rate and variance are complex (G-37).
 struct Oscillation {
   Complex rate;         ///< a - i b
   Complex variance;     ///< sigma2 (1 - i a/b)
@@ -174,7 +174,7 @@ ExponentialTail exponential_tail(double x) {
   return {even, odd};
 }
 
-/// Cross-covariance of the coefficients of two levels as a function of the lag.
+/// Cross-covariance of the coefficients of two levels as a function of the lag (G-9).
 ///
 /// Its break points are the lags b n_k - a n_j. Between two neighbouring ones the signs of all nine arguments
 /// of G are known, so that the sum collapses to a cubic and two exponentials a process; enter() prepares
@@ -427,8 +427,8 @@ LevelPlaces places_of(const WaveletVariance& wv, const WvLevel& level) {
   return out;
 }
 
-/// N_jk(h) of N-8: pairs of coefficients at a lag. In runs joined over missing samples a share of the
-/// positions is kept (N-34).
+/// N_jk(h) of G-8: pairs of coefficients at a lag. In runs joined over missing samples a share of the
+/// positions is kept (G-34).
 class PairCounts {
  public:
   PairCounts(const WvLevel& j, const WvLevel& k, const LevelPlaces& at_j, const LevelPlaces& at_k)
@@ -641,9 +641,9 @@ double spectrum_at(const Parts& parts, double b) {
   return sum;
 }
 
-/// Quantization is a difference of uniform numbers, whose fourth cumulant narrows the wavelet variance's
-/// spread by kappa q2^2 sum_i A_j(i) A_k(i) / (M_j M_k), A_j(i) the summed squared weights of number i at
-/// level j.
+/// G-10. Quantization is a difference of uniform numbers, whose fourth cumulant narrows the wavelet
+/// variance's spread by kappa q2^2 sum_i A_j(i) A_k(i) / (M_j M_k), A_j(i) the summed squared weights of
+/// number i at level j.
 double uniform_correction(double q2, const std::vector<Segment>& runs, const WvLevel& j, const WvLevel& k) {
   constexpr double kExcessKurtosis = -1.2;
   const double n_j = 0.5 * j.tau_samples;
@@ -673,7 +673,7 @@ double uniform_correction(double q2, const std::vector<Segment>& runs, const WvL
   return kExcessKurtosis * q2 * q2 * scale * sum / (count_j * count_k);
 }
 
-/// N-34: what missing samples add to two levels behaves as white noise.
+/// G-34: what missing samples add to two levels behaves as white noise.
 Parts with_missing(const Parts& parts, const WvLevel& j, const WvLevel& k) {
   const auto white_of = [](const WvLevel& level) {
     return (level.inflation - 1.0) * level.value * level.tau_samples;
@@ -782,7 +782,7 @@ Eigen::MatrixXd bounded_below(const Eigen::MatrixXd& v) {
   return scale.asDiagonal() * lifted * scale.asDiagonal();
 }
 
-/// @param robust_terms  of N-11; empty: classical
+/// @param robust_terms  of G-11; empty: classical
 Eigen::MatrixXd covariance(const Model& model, const WaveletVariance& wv, std::size_t levels,
                            const std::vector<double>& robust_terms) {
   const Parts parts = parts_of(model);

@@ -27,7 +27,7 @@ double coefficient_covariance(const Model& model, int level_j, int level_k, doub
 Eigen::MatrixXd wv_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels);
 
 /// Covariance of the differences of the classical and the robust wavelet variance of one Gaussian signal:
-/// what the robust one varies by more (N-35).
+/// what the robust one varies by more (G-35).
 /// @param robust  the robust one
 Eigen::MatrixXd robust_loss(const Model& model, const WaveletVariance& robust, std::size_t levels);
 

@@ -440,7 +440,7 @@ TEST(Export, ABoundLiesAboveTheTruthWhereTheModelIsRejectedToo) {
   }
 }
 
-// N-28 and N-29: a time constant that crosses the band's first time moves what is white and what is slow
+// G-28 and G-29: a time constant that crosses the band's first time moves what is white and what is slow
 // without a step, half a second is white, and two seconds are not.
 TEST(Export, WhatIsWhiteGoesOverIntoWhatIsSlowWithoutAStep) {
   constexpr FilterBand kBand{1.0, 100.0};

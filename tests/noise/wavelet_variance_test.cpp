@@ -221,7 +221,7 @@ TEST(WaveletVariance, AnOffsetThatTheInputCarriesExactlyChangesNothing) {
   }
 }
 
-/// By N-1 and N-33, coefficient by coefficient: squares, count and mean excess of a level.
+/// By G-1 and G-33, coefficient by coefficient: squares, count and mean excess of a level.
 struct ByDefinition {
   double squares = 0.0;
   double own = 0.0;
