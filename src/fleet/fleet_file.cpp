@@ -4,6 +4,7 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/text.h"
 #include "configuration/toml_depth.h"
@@ -100,8 +101,9 @@ void read_root(TomlReader& root, TomlProblem& problem, FleetFile& fleet) {
   auto certificate = root.table("certificate");
   certificate.number("factor", fleet.certificate_factor, 1.0, 1.0, kFactorMax);
   certificate.finish();
-  each_table(root, "mounting", problem, [&](TomlReader in) { read_mounting(in, fleet.mountings); });
-  each_table(root, "unit", problem, [&](TomlReader in) { read_unit(in, fleet.file, fleet); });
+  each_table(root, "mounting", problem,
+             [&](TomlReader in) { read_mounting(std::move(in), fleet.mountings); });
+  each_table(root, "unit", problem, [&](TomlReader in) { read_unit(std::move(in), fleet.file, fleet); });
   root.finish();
 }
 

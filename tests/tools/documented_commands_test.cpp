@@ -96,14 +96,19 @@ class Manual {
     const std::string& program = command.words[0];
     const bool script = program.starts_with("tools/");
     const std::string name = script ? program : std::filesystem::path(program).filename().string();
-    const std::string key = script ? name : name + " " + command.words[1];
+    // "capture" and "fleet" have commands of their own.
+    const bool nested =
+        !script && command.words.size() > 2 && (command.words[1] == "capture" || command.words[1] == "fleet");
+    const std::string key =
+        script ? name : name + " " + command.words[1] + (nested ? " " + command.words[2] : std::string());
     const auto known = texts_.find(key);
     if (known != texts_.end()) return known->second;
     if (script) return texts_[key] = read_text(source_path(name));
     const auto log = folder_ / "help.txt";
     const bool option = command.words[1].starts_with("-");
-    const std::vector<std::string> ask =
-        option ? std::vector<std::string>{"--help"} : std::vector<std::string>{command.words[1], "--help"};
+    std::vector<std::string> ask{"--help"};
+    if (nested) ask.insert(ask.begin(), command.words[2]);
+    if (!option) ask.insert(ask.begin(), command.words[1]);
     std::string text = run_program(name, ask, log) == 0 ? read_text(log) : std::string();
     // Of a command that it does not know the program explains itself instead.
     const std::string usage = text.substr(std::min(text.size(), text.find("Usage: ")));
@@ -135,7 +140,7 @@ TEST(DocumentedCommands, ExistWithEveryOptionTheyAreShownWith) {
                                << ", which does not exist";
     for (std::size_t i = 1; i < command.words.size(); ++i) {
       std::string option = command.words[i].substr(0, command.words[i].find('='));
-      if (!option.starts_with("-") || option == "-") continue;
+      if (!option.starts_with("-") || option == "-" || option == "--") continue;
       EXPECT_TRUE(names(text, option)) << command.where << " shows " << command.words[0] << " "
                                        << command.words[1] << " with " << option << ", which it has not";
     }
