@@ -151,9 +151,9 @@ void add_warnings(FitResult& result, const FixedPoint& point) {
                                  result.spec.name(), result.j_test->p_value);
   text += misses_in_words(result, point.sampling);
   if (result.model_error > 0.0) {
-    text +=
-        fmt::format("; weights and intervals of the parameters allow for an error of {:.3g} % (1 sd) of every level",
-                    100.0 * result.model_error);
+    text += fmt::format(
+        "; weights and intervals of the parameters allow for an error of {:.3g} % (1 sd) of every level",
+        100.0 * result.model_error);
   } else {
     text += "; the intervals hold for the best model of this kind only";
   }
