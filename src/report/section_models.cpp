@@ -316,15 +316,6 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
       "Haar wavelet variance of the error signals at the scales τ, in s: points with their 95 % intervals; "
       "line: the variance that the fitted model implies; dashed: its processes one by one. Where the line "
       "leaves the intervals the model does not explain the signal.");
-  const bool has_quick = std::any_of(run.models.begin(), run.models.end(), [](const nlohmann::json& entry) {
-    return entry.is_object() && entry.value("intervals", nlohmann::json()) == "quick";
-  });
-  if (has_quick) {
-    section += paragraph(
-        "These are the fits of the run itself, whose parameters have quick intervals: of a process that "
-        "lasts "
-        "less than twenty correlation times, none. A study of the capture has those, too.");
-  }
   for (const StudyFiles& study : run.studies) {
     section +=
         fold(study.name, wavelet_panels(fits, study.name, regimes, figures), &study == &run.studies.front());

@@ -127,7 +127,6 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
   say_left_out(job, axis, regime, *wv, levels_of_whole);
   noise::FitOptions fit_options;
   fit_options.signal_unit = axis_unit(axis);
-  fit_options.intervals = noise::Intervals::kInverted;
   auto fit = noise::fit(*wv, job.spec, job.device.rate_hz, fit_options);
   if (!fit) {
     remark(fmt::format("no noise model: {}{}", fit.error().what,
