@@ -308,8 +308,11 @@ Html distributions(Reader& in) {
   if (pictures.empty()) return {};
   return page::heading("distributions", "What the units are like") +
          page::paragraph(
-             "A dot is what the drives of a unit showed, their errors included; red ones stand out. The band "
-             "holds 95 % of all such units, at a confidence of 95 %, as they are without errors.",
+             "A dot is what the drives of a unit showed, their errors included; where units are many, a bar "
+             "says "
+             "how many lie there. Red ones stand out. The band holds 95 % of all such units, at a confidence "
+             "of "
+             "95 %, as they are without errors.",
              "quiet") +
          element("div", pictures, "pictures");
 }
