@@ -118,7 +118,7 @@ class LinearSystem {
     if (joint_.rows() == 0) joint_ = state_covariance_;
     SparseMeasurement H;
     MatrixXd row = MatrixXd::Zero(3, kStates);
-    for (const std::size_t column : {3, 6, 9, 15, 18}) {
+    for (const std::size_t column : {3UL, 6UL, 9UL, 15UL, 18UL}) {
       MeasurementBlock& block = H.append(column, column == 18 ? 1 : 3);
       for (std::size_t i = 0; i < 3; ++i) {
         for (std::size_t j = 0; j < block.width; ++j) {

@@ -1,7 +1,7 @@
 // A ULog by @foxglove/ulog: the numbers of its messages, and vehicle_imu/0 as a table of rates and forces.
 // Usage: node read_ulog.mjs FILE.ulg TABLE.csv
 import { ULog } from "@foxglove/ulog";
-import { FileReader } from "@foxglove/ulog/node";
+import { FileReader } from "@foxglove/ulog/node.js";
 import { writeFileSync } from "node:fs";
 
 const log = new ULog(new FileReader(process.argv[2]));
@@ -11,7 +11,7 @@ const counts = {};
 const rows = ["t_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"];
 for await (const message of log.readMessages()) {
   const name = names.get(message.msgId);
-  if (name === undefined) continue;
+  if (message.value === undefined || name === undefined) continue;  // no data: a subscription, a text
   counts[name] = (counts[name] ?? 0) + 1;
   if (name !== "vehicle_imu/0") continue;
   const { timestamp_sample: us, delta_angle: angle, delta_velocity: velocity, delta_angle_dt, delta_velocity_dt } = message.value;
