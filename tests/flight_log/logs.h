@@ -3,7 +3,6 @@
 /// Logs of flight controllers for tests, written from the descriptions of their formats.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "mcap/ros_messages.h"
+#include "tests/support/temporary_file.h"
 
 namespace imuscope::flight_log {
 
@@ -31,22 +31,7 @@ inline std::string padded(std::string text, std::size_t size) {
   return text;
 }
 
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::string& content)
-      : path_(std::filesystem::temp_directory_path() /
-              ("flight_log_test_" + std::to_string(::getpid()) + "_" + std::to_string(count_++))) {
-    std::ofstream(path_, std::ios::binary) << content;
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() { std::filesystem::remove(path_); }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  static inline int count_ = 0;
-  std::filesystem::path path_;
-};
+using test::TemporaryFile;
 
 /// What came of a log.
 struct Taken {

@@ -3,7 +3,6 @@
 /// MCAP files for tests.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -11,26 +10,11 @@
 
 #include "mcap/reader.h"
 #include "mcap/writer.h"
+#include "tests/support/temporary_file.h"
 
 namespace imuscope::mcap {
 
-/// A file of that content, gone at the end.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::string& content)
-      : path_(std::filesystem::temp_directory_path() /
-              ("mcap_test_" + std::to_string(::getpid()) + "_" + std::to_string(count_++))) {
-    std::ofstream(path_, std::ios::binary) << content;
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() { std::filesystem::remove(path_); }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  static inline int count_ = 0;
-  std::filesystem::path path_;
-};
+using test::TemporaryFile;
 
 /// What a message was, kept.
 struct Kept {

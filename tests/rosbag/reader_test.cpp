@@ -3,7 +3,6 @@
 #include "rosbag/reader.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -12,6 +11,7 @@
 
 #include "mcap/ros_messages.h"
 #include "tests/support/shared_data.h"
+#include "tests/support/temporary_file.h"
 
 namespace imuscope::rosbag {
 namespace {
@@ -24,22 +24,7 @@ std::string bag(const std::string& compression) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::string& content)
-      : path_(std::filesystem::temp_directory_path() /
-              ("rosbag_test_" + std::to_string(::getpid()) + "_" + std::to_string(count_++))) {
-    std::ofstream(path_, std::ios::binary) << content;
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() { std::filesystem::remove(path_); }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  static inline int count_ = 0;
-  std::filesystem::path path_;
-};
+using test::TemporaryFile;
 
 struct Kept {
   std::map<std::string, std::vector<std::string>> topics;
