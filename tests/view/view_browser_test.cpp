@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -43,7 +44,8 @@ constexpr double kTransferMax = 300'000.0;
 constexpr double kProcessorMax = 0.03;
 constexpr int kImus = 6;
 constexpr seconds kSettle{35};
-constexpr seconds kMeasured{60};
+/// With IMUSCOPE_LONG_PAGE a minute.
+const seconds kMeasured{std::getenv("IMUSCOPE_LONG_PAGE") == nullptr ? 25 : 60};
 /// Scenario time (kBegin_s is when the drive begins) of a stroke of bad luck within what is measured.
 constexpr const char* kFault = R"(
 [[fault]]
@@ -522,10 +524,17 @@ TEST_F(LivePage, ShowsWhatTheSimulatorKnowsAndOutlivesServiceAndProgram) {
     return browser_->becomes_true("Math.abs(imuscope.known.time_s - " + std::to_string(time_s) + ") < 1.5",
                                   10.0);
   };
+  const auto press_play = [&](const char* playing) {
+    browser_->value_of("document.getElementById('play').click()");
+    return browser_->becomes_true("imuscope.play.playing === " + std::string(playing), 10.0);
+  };
+  // It stands still, so that a page that is late sees the same.
+  EXPECT_TRUE(press_play("false"));
   EXPECT_TRUE(slide_to(0.5 * length_s));
   EXPECT_TRUE(slide_to(0.25 * length_s));
-  browser_->value_of("document.getElementById('play').click()");
-  EXPECT_TRUE(browser_->becomes_true("imuscope.play.playing === false", 5.0));
+  EXPECT_TRUE(press_play("true"));
+  EXPECT_TRUE(
+      browser_->becomes_true("imuscope.known.time_s > " + std::to_string(0.25 * length_s + 2.0), 10.0));
   EXPECT_TRUE(slide_to(length_s - 0.1));
   EXPECT_TRUE(browser_->becomes_true("document.getElementById('marks').textContent.includes('kerb')", 5.0));
   check_calibration(truth);
