@@ -20,40 +20,52 @@ std::size_t cost_of(const RawRead& read) {
   return kPlace + read.device.size() + read.bytes.size();
 }
 
-/// Follows the sequence numbers of each device through a capture.
-class LossFinder {
+/// Counts the records of each device, and what their sequence numbers show.
+class DeviceCounts {
  public:
-  void look(const RawPiece& piece, std::vector<CaptureLoss>& losses) {
-    const auto [place, is_first] = seen_.try_emplace(piece.read.device);
-    Seen& seen = place->second;
-    if (is_first) seen.last_arrival = piece.read.arrival;
-    if (piece.sequence > seen.next_sequence) {
-      losses.push_back(
-          {piece.read.device, seen.last_arrival, piece.read.arrival, piece.sequence - seen.next_sequence});
+  /// False for a device that is one too many.
+  bool add(const RawView& piece, std::vector<CaptureLoss>& losses) {
+    auto place = counts_.find(piece.device);
+    if (place == counts_.end()) {
+      if (counts_.size() >= kDevicesMax) return false;
+      place = counts_.emplace(piece.device, Count{}).first;
+      place->second.last_arrival = piece.arrival;
     }
-    seen.next_sequence = piece.sequence + 1;
-    seen.last_arrival = piece.read.arrival;
+    Count& count = place->second;
+    if (piece.sequence > count.next_sequence) {
+      losses.push_back(
+          {place->first, count.last_arrival, piece.arrival, piece.sequence - count.next_sequence});
+    }
+    count.next_sequence = piece.sequence + 1;
+    count.last_arrival = piece.arrival;
+    // Of a line nothing was read or written.
+    if (piece.direction != Direction::kLine) add(piece, count.device);
+    return true;
+  }
+  [[nodiscard]] std::map<std::string, CapturedDevice> devices() const {
+    std::map<std::string, CapturedDevice> devices;
+    for (const auto& [name, count] : counts_) {
+      if (count.device) devices.emplace(name, *count.device);
+    }
+    return devices;
   }
 
  private:
-  struct Seen {
+  struct Count {
     std::int64_t next_sequence = 0;
     HostTime last_arrival{};
+    std::optional<CapturedDevice> device{};
   };
-  std::map<std::string, Seen> seen_;
+  static void add(const RawView& piece, std::optional<CapturedDevice>& device) {
+    if (!device) device.emplace().first = piece.arrival;
+    device->last = piece.arrival;
+    const bool is_write = piece.direction == Direction::kWrite;
+    if (!is_write) device->bytes_read += piece.bytes.size();
+    if (piece.continues) return;  // counted with its last piece
+    (is_write ? device->writes : device->reads) += 1;
+  }
+  std::map<std::string, Count, std::less<>> counts_;
 };
-
-void count_piece(const RawPiece& piece, CaptureSummary& summary) {
-  if (piece.read.direction == Direction::kLine) return;  // nothing was read or written
-  const auto [place, is_first] = summary.devices.try_emplace(piece.read.device);
-  CapturedDevice& device = place->second;
-  if (is_first) device.first = piece.read.arrival;
-  device.last = piece.read.arrival;
-  const bool is_write = piece.read.direction == Direction::kWrite;
-  if (!is_write) device.bytes_read += piece.read.bytes.size();
-  if (piece.continues) return;  // counted with its last piece
-  (is_write ? device.writes : device.reads) += 1;
-}
 
 }  // namespace
 
@@ -77,22 +89,19 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
   if (!log) return tl::unexpected(log.error());
   log->on_read(progress);
   CaptureSummary summary;
-  LossFinder losses;
+  DeviceCounts counts;
   LogEvent event;
   while (log->next(event)) {
+    if (const auto piece = view_raw(event.data)) {
+      if (!counts.add(*piece, summary.losses)) summary.other_messages += 1;
+      continue;
+    }
     auto record = decode_record(event.data);
     if (!record) {
       summary.other_messages += 1;
     } else if (auto* run = std::get_if<RunHeader>(&*record)) {
       summary.run = std::move(*run);  // the same in every file
       summary.has_run = true;
-    } else if (auto* piece = std::get_if<RawPiece>(&*record)) {
-      if (summary.devices.size() >= kDevicesMax && !summary.devices.contains(piece->read.device)) {
-        summary.other_messages += 1;
-        continue;
-      }
-      losses.look(*piece, summary.losses);
-      count_piece(*piece, summary);
     } else if (auto* applied = std::get_if<applied_model_t>(&*record)) {
       summary.applied_models.push_back(std::move(*applied));
     } else if (const auto* marked = std::get_if<event_t>(&*record)) {
@@ -107,6 +116,7 @@ Result<CaptureSummary> summarise_capture(const std::filesystem::path& path,
       summary.exceptions.push_back(std::move(std::get<StoredException>(*record)));
     }
   }
+  summary.devices = counts.devices();
   summary.breaks = log->breaks();
   summary.files = log->files();
   if (summary.devices.empty()) {
@@ -141,28 +151,29 @@ std::optional<RawRead> CaptureReader::next() {
 /// Takes in one event. Returns false at the end of the file.
 bool CaptureReader::read_one() {
   if (!log_.next(event_)) return false;
-  const auto device = device_of_bytes(event_.data);
-  if (!wanted_.empty() && !device.empty() && device != wanted_) return true;
-  auto record = decode_record(event_.data);
-  if (!record) return true;
-  if (const auto* run = std::get_if<RunHeader>(&*record)) {
-    devices_ = run->devices;
-  } else if (auto* piece = std::get_if<RawPiece>(&*record)) {
-    add_piece(std::move(*piece));
+  if (const auto piece = view_raw(event_.data)) {
+    if (wanted_.empty() || piece->device == wanted_) add_piece(*piece);
+    return true;
   }
+  const auto record = decode_record(event_.data);
+  if (!record) return true;
+  if (const auto* run = std::get_if<RunHeader>(&*record)) devices_ = run->devices;
   return true;
 }
 
-void CaptureReader::add_piece(RawPiece&& piece) {
-  Assembly& assembly = assemblies_[piece.read.device];
+void CaptureReader::add_piece(const RawView& piece) {
+  auto place = assemblies_.find(piece.device);
+  if (place == assemblies_.end()) place = assemblies_.emplace(piece.device, Assembly{}).first;
+  Assembly& assembly = place->second;
   const bool follows = piece.sequence == assembly.next_sequence;
   assembly.next_sequence = piece.sequence + 1;
+  if (!assembly.open && !piece.continues) return add_whole(to_read(piece));
   if (assembly.open && follows) {
     auto& bytes = assembly.read.bytes;
-    bytes.insert(bytes.end(), piece.read.bytes.begin(), piece.read.bytes.end());
+    bytes.insert(bytes.end(), piece.bytes.begin(), piece.bytes.end());
   } else {
     if (assembly.open) add_whole(std::move(assembly.read));
-    assembly.read = std::move(piece.read);
+    assembly.read = to_read(piece);
   }
   // A read that never ends is damage: it is given as far as it goes.
   assembly.open = piece.continues && assembly.read.bytes.size() < kLongestRead;

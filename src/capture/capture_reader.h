@@ -110,7 +110,7 @@ class CaptureReader {
 
   CaptureReader(CaptureFiles log, std::string wanted) : log_(std::move(log)), wanted_(std::move(wanted)) {}
   bool read_one();
-  void add_piece(RawPiece&& piece);
+  void add_piece(const RawView& piece);
   void close_assemblies();
   void add_whole(RawRead&& read);
   std::size_t index_of(const std::string& device);
@@ -118,7 +118,7 @@ class CaptureReader {
   CaptureFiles log_;
   std::string wanted_;  ///< device; empty: all
   std::vector<std::string> devices_;
-  std::map<std::string, Assembly> assemblies_;
+  std::map<std::string, Assembly, std::less<>> assemblies_;
   struct Held {
     Key key;
     RawRead read;

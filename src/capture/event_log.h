@@ -4,6 +4,7 @@
 ///   uint32 0xEDA1DA01, int64 number, int64 utime, int32 channel length, int32 data length, channel, data,
 /// big-endian, one after another, without a file header. (LCM documentation, "LCM log file format".)
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -26,6 +27,11 @@ struct LogEvent {
   std::string channel;
   std::vector<std::uint8_t> data;
 };
+
+/// What a record begins with, up to its channel.
+using EventLogHeader = std::array<std::uint8_t, kEventLogHeaderBytes>;
+[[nodiscard]] EventLogHeader event_log_header(std::int64_t number, std::int64_t utime,
+                                              std::size_t channel_bytes, std::size_t data_bytes) noexcept;
 
 /// Appends what a record has before its data.
 void append_record_head(std::vector<std::uint8_t>& out, std::int64_t number, std::int64_t utime,

@@ -42,6 +42,8 @@ Lengths lengths_of(const std::uint8_t* header) {
           static_cast<std::size_t>(big_endian(header + kDataLengthAt, 4))};
 }
 
+bool is_sync(const std::uint8_t* bytes) { return big_endian(bytes, sizeof kEventLogSync) == kEventLogSync; }
+
 bool is_text(const std::vector<std::uint8_t>& bytes) {
   return std::all_of(bytes.begin(), bytes.end(),
                      [](std::uint8_t byte) { return std::isprint(byte) != 0 || std::isspace(byte) != 0; });
@@ -185,7 +187,21 @@ std::optional<std::size_t> EventLogReader::next_sure_record(std::size_t position
   return std::nullopt;
 }
 
+/// Whether a record lies in the buffer that another one follows: nearly always.
+bool EventLogReader::has_sure_record() const noexcept {
+  constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
+  const std::size_t available = buffer_.size() - begin_;
+  const std::uint8_t* at = buffer_.data() + begin_;
+  if (available < kEventLogHeaderBytes || !is_sync(at)) return false;
+  const Lengths lengths = lengths_of(at);
+  return lengths.plausible() && lengths.record() + kSyncBytes <= available && is_sync(at + lengths.record());
+}
+
 bool EventLogReader::next(LogEvent& event) {
+  if (has_sure_record()) {
+    take(event);
+    return true;
+  }
   while (ensure(1)) {
     std::size_t skip = 1;
     std::size_t length = 0;

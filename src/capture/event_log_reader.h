@@ -51,6 +51,7 @@ class EventLogReader {
   enum class Look : std::uint8_t { kRecord, kNoRecord, kCutOff };
 
   explicit EventLogReader(std::ifstream file) : file_(std::move(file)) {}
+  [[nodiscard]] bool has_sure_record() const noexcept;
   bool ensure(std::size_t n);
   Look look_at(std::size_t position, std::size_t& length);
   bool may_begin_record(std::size_t position);

@@ -20,10 +20,39 @@ constexpr std::int64_t kCountEnd = std::int64_t{1} << 62U;
 
 bool is_count(std::int64_t n) { return n >= 0 && n < kCountEnd; }
 
-std::int64_t fingerprint_of(const std::vector<std::uint8_t>& message) {
-  std::uint64_t fingerprint = 0;
-  for (std::size_t i = 0; i < sizeof fingerprint; ++i) fingerprint = fingerprint << 8U | message[i];
-  return static_cast<std::int64_t>(fingerprint);
+/// Takes numbers, high byte first, and bytes from a message until it has no more.
+class FieldReader {
+ public:
+  explicit FieldReader(std::span<const std::uint8_t> message) : rest_(message) {}
+  template <typename Integer>
+  Integer number() noexcept {
+    std::make_unsigned_t<Integer> value = 0;
+    if (!has(sizeof value)) return 0;
+    for (std::size_t i = 0; i < sizeof value; ++i)
+      value = static_cast<std::make_unsigned_t<Integer>>(std::uint64_t{value} << 8U | rest_[i]);
+    rest_ = rest_.subspan(sizeof value);
+    return static_cast<Integer>(value);
+  }
+  std::span<const std::uint8_t> bytes(std::int32_t n) noexcept {
+    if (n < 0 || !has(static_cast<std::size_t>(n))) {
+      is_good_ = false;
+      return {};
+    }
+    const auto taken = rest_.first(static_cast<std::size_t>(n));
+    rest_ = rest_.subspan(taken.size());
+    return taken;
+  }
+  /// Whether all was there, and nothing more.
+  [[nodiscard]] bool is_whole() const noexcept { return is_good_ && rest_.empty(); }
+
+ private:
+  bool has(std::size_t n) noexcept { return is_good_ = is_good_ && n <= rest_.size(); }
+  std::span<const std::uint8_t> rest_;
+  bool is_good_ = true;
+};
+
+std::int64_t fingerprint_of(std::span<const std::uint8_t> message) noexcept {
+  return FieldReader(message).number<std::int64_t>();
 }
 
 std::optional<CaptureRecord> to_record(const run_t& message) {
@@ -66,26 +95,6 @@ std::int8_t code_of(Direction direction) {
       return raw_t::STAMPED_READ;
   }
   return raw_t::READ;
-}
-
-std::optional<CaptureRecord> to_record(raw_t&& message) {
-  if (!is_stamp_ns(message.arrival_ns) || !is_count(message.sequence)) return std::nullopt;
-  RawPiece piece;
-  piece.read.device = std::move(message.device);
-  piece.read.direction = direction_of(message.direction);
-  piece.read.arrival = host_time_from_ns(message.arrival_ns);
-  piece.read.bytes = std::move(message.bytes);
-  piece.sequence = message.sequence;
-  piece.continues = message.continues != 0;
-  if (message.direction == raw_t::STAMPED_READ) {
-    if (piece.read.bytes.size() < kReceivedBytes) return std::nullopt;
-    const std::int64_t received_ns =
-        nanoseconds_of(std::span<const std::uint8_t>(piece.read.bytes).first<kReceivedBytes>());
-    if (!is_stamp_ns(received_ns)) return std::nullopt;
-    piece.read.received = std::min(host_time_from_ns(received_ns), piece.read.arrival);
-    piece.read.bytes.erase(piece.read.bytes.begin(), piece.read.bytes.begin() + kReceivedBytes);
-  }
-  return piece;
 }
 
 std::int8_t kind_of(ExceptionKind kind) {
@@ -183,7 +192,7 @@ std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& mess
   if (message.size() < sizeof(std::int64_t)) return std::nullopt;
   const std::int64_t fingerprint = fingerprint_of(message);
   if (fingerprint == raw_t::getHash()) {
-    if (auto raw = decode_message<raw_t>(message)) return to_record(std::move(*raw));
+    if (const auto raw = view_raw(message)) return RawPiece{to_read(*raw), raw->sequence, raw->continues};
   } else if (fingerprint == run_t::getHash()) {
     const auto run = decode_message<run_t>(message);
     if (run && run->format == kCaptureFormat) return to_record(*run);
@@ -198,15 +207,39 @@ std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& mess
   return std::nullopt;
 }
 
-std::string_view device_of_bytes(const std::vector<std::uint8_t>& message) {
-  // Fingerprint, utime and sequence stand before the name: its length with the zero at its end, its letters.
-  constexpr std::size_t kLengthAt = 3 * sizeof(std::int64_t);
-  constexpr std::size_t kNameAt = kLengthAt + sizeof(std::int32_t);
-  if (message.size() < kNameAt || fingerprint_of(message) != raw_t::getHash()) return {};
-  std::size_t length = 0;
-  for (std::size_t i = kLengthAt; i < kNameAt; ++i) length = length << 8U | message[i];
-  if (length == 0 || length > message.size() - kNameAt) return {};
-  return {reinterpret_cast<const char*>(message.data()) + kNameAt, length - 1};
+std::optional<RawView> view_raw(std::span<const std::uint8_t> message) noexcept {
+  static const std::int64_t kFingerprint = raw_t::getHash();
+  FieldReader fields(message);
+  if (fields.number<std::int64_t>() != kFingerprint) return std::nullopt;
+  RawView view;
+  (void)fields.number<std::int64_t>();  // utime
+  view.sequence = fields.number<std::int64_t>();
+  const auto device = fields.bytes(fields.number<std::int32_t>());  // and the zero at its end
+  const auto direction = fields.number<std::int8_t>();
+  const auto arrival_ns = fields.number<std::int64_t>();
+  view.continues = fields.number<std::int8_t>() != 0;
+  view.bytes = fields.bytes(fields.number<std::int32_t>());
+  if (!fields.is_whole() || device.empty()) return std::nullopt;
+  if (!is_stamp_ns(arrival_ns) || !is_count(view.sequence)) return std::nullopt;
+  view.device = {reinterpret_cast<const char*>(device.data()), device.size() - 1};
+  view.direction = direction_of(direction);
+  view.arrival = host_time_from_ns(arrival_ns);
+  if (direction == raw_t::STAMPED_READ) {
+    if (view.bytes.size() < kReceivedBytes) return std::nullopt;
+    const std::int64_t received_ns = nanoseconds_of(view.bytes.first<kReceivedBytes>());
+    if (!is_stamp_ns(received_ns)) return std::nullopt;
+    view.received = std::min(host_time_from_ns(received_ns), view.arrival);
+    view.bytes = view.bytes.subspan(kReceivedBytes);
+  }
+  return view;
+}
+
+RawRead to_read(const RawView& view) {
+  return {std::string(view.device),
+          view.direction,
+          view.arrival,
+          {view.bytes.begin(), view.bytes.end()},
+          view.received};
 }
 
 }  // namespace imuscope

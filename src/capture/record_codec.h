@@ -6,6 +6,7 @@
 #include <imuscope/applied_model_t.hpp>
 #include <imuscope/event_t.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -18,6 +19,17 @@ namespace imuscope {
 /// A chunk as it is stored: RawChunk with the device's name.
 struct RawPiece {
   RawRead read;
+  std::int64_t sequence = 0;
+  bool continues = false;
+};
+
+/// The same where it stands in its message, and valid as long as that.
+struct RawView {
+  std::string_view device;
+  Direction direction = Direction::kRead;
+  HostTime arrival{};
+  std::optional<HostTime> received{};  ///< see RawRead
+  std::span<const std::uint8_t> bytes;
   std::int64_t sequence = 0;
   bool continues = false;
 };
@@ -52,8 +64,8 @@ struct RecordClock {
 /// for a message of another type (a capture may hold published messages) and for one that is damaged.
 [[nodiscard]] std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& message);
 
-/// Name of the device whose bytes a message holds, without decoding it; empty for any other message. Valid as
-/// long as the message.
-[[nodiscard]] std::string_view device_of_bytes(const std::vector<std::uint8_t>& message);
+/// Bytes of a device, without a copy; nothing for any other message and for one that is damaged.
+[[nodiscard]] std::optional<RawView> view_raw(std::span<const std::uint8_t> message) noexcept;
+[[nodiscard]] RawRead to_read(const RawView& view);
 
 }  // namespace imuscope

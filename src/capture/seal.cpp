@@ -2,6 +2,8 @@
 
 #include <zlib.h>
 
+#include <bit>
+#include <cstring>
 #include <utility>
 
 #include "base/contracts.h"
@@ -24,20 +26,29 @@ std::vector<std::uint8_t> encode_checked(Message& message) {
   return encode_message(message);
 }
 
+/// The type of a message, or what stands in its place.
+std::uint64_t fingerprint_of(std::span<const std::uint8_t> message) noexcept {
+  std::uint64_t fingerprint = 0;
+  if (message.size() < sizeof fingerprint) return 0;
+  std::memcpy(&fingerprint, message.data(), sizeof fingerprint);
+  if constexpr (std::endian::native == std::endian::little) fingerprint = __builtin_bswap64(fingerprint);
+  return fingerprint;
+}
+
+template <typename Message>
+bool claims_to_be(std::span<const std::uint8_t> message) noexcept {
+  static const auto kFingerprint = static_cast<std::uint64_t>(Message::getHash());
+  return fingerprint_of(message) == kFingerprint;
+}
+
 template <typename Message>
 std::optional<Message> decode_checked(std::span<const std::uint8_t> bytes) {
+  // Most messages are neither, and a look is cheaper than to try.
+  if (!claims_to_be<Message>(bytes)) return std::nullopt;
   auto message = decode_message<Message>(bytes);
   if (!message) return std::nullopt;
   const auto checksum = static_cast<std::int32_t>(crc32_of(bytes.first(bytes.size() - kChecksumBytes)));
   return checksum == message->checksum ? std::move(message) : std::nullopt;
-}
-
-template <typename Message>
-bool claims_to_be(std::span<const std::uint8_t> message) {
-  std::uint64_t fingerprint = 0;
-  if (message.size() < sizeof fingerprint) return false;
-  for (std::size_t i = 0; i < sizeof fingerprint; ++i) fingerprint = fingerprint << 8U | message[i];
-  return fingerprint == static_cast<std::uint64_t>(Message::getHash());
 }
 
 /// A device's name comes behind the kind: a device called SEAL is none.
@@ -56,10 +67,9 @@ std::uint32_t crc32_of(std::span<const std::uint8_t> bytes, std::uint32_t before
 }
 
 std::uint32_t crc32_of(const LogEvent& event) {
-  std::vector<std::uint8_t> head;
-  head.reserve(kEventLogHeaderBytes + event.channel.size());
-  append_record_head(head, event.number, event.utime, event.channel, event.data.size());
-  return crc32_of(event.data, crc32_of(head));
+  const auto header = event_log_header(event.number, event.utime, event.channel.size(), event.data.size());
+  const std::span channel(reinterpret_cast<const std::uint8_t*>(event.channel.data()), event.channel.size());
+  return crc32_of(event.data, crc32_of(channel, crc32_of(header)));
 }
 
 void Sealer::add(std::int64_t number, std::int64_t utime, std::span<const std::uint8_t> record) {

@@ -26,7 +26,9 @@ Result<SealedLog> SealedLog::open(const std::filesystem::path& path, EventLogRea
 }
 
 bool SealedLog::next(LogEvent& event) {
-  constexpr std::size_t kSparesMost = 256;
+  // What lines bring between two seals; records as long as a configuration are not kept.
+  constexpr std::size_t kSparesMost = 4096;
+  constexpr std::size_t kSpareBytesMost = 2048;
   while (released_ == 0) {
     LogEvent read;
     if (!spares_.empty()) {
@@ -40,7 +42,8 @@ bool SealedLog::next(LogEvent& event) {
     if (held_.empty()) return false;
     release_all();
   }
-  if (spares_.size() < kSparesMost) spares_.push_back(std::move(event));
+  if (spares_.size() < kSparesMost && event.data.capacity() <= kSpareBytesMost)
+    spares_.push_back(std::move(event));
   event = std::move(held_.front());
   held_.pop_front();
   --released_;
@@ -104,28 +107,31 @@ void SealedLog::check(const capture_seal_t& seal) {
   const std::uint64_t given = std::exchange(given_unsealed_, 0);
   std::vector<bool> seen(seal.checksums.size());
   std::uint64_t found = given;
-  std::deque<LogEvent> kept;
-  while (held_.size() > released_) {
-    LogEvent event = std::move(held_.back());
-    held_.pop_back();
-    const auto place =
-        static_cast<std::uint64_t>(event.number) - static_cast<std::uint64_t>(seal.first_number);
+  std::vector<bool> is_kept(held_.size() - released_);
+  // From the last one: where a number stands twice, the seal is of the later.
+  for (std::size_t i = held_.size(); i-- > released_;) {
+    const LogEvent& event = held_[i];
     if (event.number < seal.first_number) {
       health_.records_unsealed += 1;
-      kept.push_front(std::move(event));
+      is_kept[i - released_] = true;
       continue;
     }
+    const auto place =
+        static_cast<std::uint64_t>(event.number) - static_cast<std::uint64_t>(seal.first_number);
     const bool is_named = place < seen.size() && !seen[place];
     if (is_named) seen[place] = true;
     found += is_named ? 1 : 0;
-    if (is_named && static_cast<std::int32_t>(crc32_of(event)) == seal.checksums[place]) {
-      kept.push_front(std::move(event));
-    } else {
-      health_.records_damaged += 1;
-    }
+    is_kept[i - released_] = is_named && static_cast<std::int32_t>(crc32_of(event)) == seal.checksums[place];
+    if (!is_kept[i - released_]) health_.records_damaged += 1;
   }
   if (found < seen.size()) health_.records_missing += seen.size() - found;
-  for (auto& event : kept) held_.push_back(std::move(event));
+  std::size_t end = released_;
+  for (std::size_t i = released_; i < held_.size(); ++i) {
+    if (!is_kept[i - released_]) continue;
+    if (i != end) held_[end] = std::move(held_[i]);
+    ++end;
+  }
+  held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(end), held_.end());
   released_ = held_.size();
   waiting_bytes_ = 0;
 }

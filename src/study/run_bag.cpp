@@ -8,6 +8,7 @@
 #include <condition_variable>
 #include <deque>
 #include <fstream>
+#include <future>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -338,6 +339,19 @@ class RegimeNoise {
   std::size_t next_ = 0;
 };
 
+/// By S-IMU. What a filter would feel of a model takes a while to find: it is done beside the first look at
+/// the recording.
+using RegimeNoises = std::map<std::string, RegimeNoise>;
+
+RegimeNoises regime_noises(const std::filesystem::path& folder, const std::vector<std::string>& names) {
+  const json models = report::read_json_file(folder / "models.json");
+  const json regimes = report::read_json_file(folder / "regimes.json");
+  RegimeNoises noises;
+  for (const std::string& name : names)
+    noises.emplace(name, RegimeNoise(report::field(models, "models"), regimes, name));
+  return noises;
+}
+
 /// Rows of a CSV file as messages of a type whose fields have the columns' names.
 template <typename Message>
 class RowStream {
@@ -396,7 +410,7 @@ struct StudyBag {
   bool has_mounting = false;
   bag::Correction correction;
   BiasTrack biases;
-  RegimeNoise noise;
+  std::optional<RegimeNoise> noise;  ///< where it has a mounting
   RowStream<calibration_t> calibrations;
 };
 
@@ -451,7 +465,7 @@ class ErrorStream {
 class RunBagMaker {
  public:
   RunBagMaker(const RunBagOptions& options, const OpenedRecording& opened, const json& run,
-              const json& calibration, OutputFile& out)
+              const std::vector<FoundCalibration>& found, RegimeNoises noises, OutputFile& out)
       : options_(options),
         opened_(opened),
         run_(run),
@@ -467,7 +481,7 @@ class RunBagMaker {
         navigation_(std::filesystem::exists(folder_ / "smoothed_navigation.csv")
                         ? folder_ / "smoothed_navigation.csv"
                         : folder_ / "navigation.csv") {
-    make_studies(calibration);
+    make_studies(found, noises);
   }
 
   Result<RunBag> run() {
@@ -492,11 +506,7 @@ class RunBagMaker {
     return names;
   }
 
-  void make_studies(const json& calibration) {
-    const json models = report::read_json_file(folder_ / "models.json");
-    const json regimes = report::read_json_file(folder_ / "regimes.json");
-    const json& fits = report::field(models, "models");
-    const auto found = found_calibrations(calibration);
+  void make_studies(const std::vector<FoundCalibration>& found, RegimeNoises& noises) {
     const auto infos = study_file_infos(opened_.configuration, opened_.recording);
     const auto indices = opened_.configuration.study_indices();
     for (std::size_t i = 0; i < infos.size(); ++i) {
@@ -508,11 +518,12 @@ class RunBagMaker {
                      false,
                      {},
                      BiasTrack(std::filesystem::exists(smoothed) ? smoothed : filtered),
-                     RegimeNoise(fits, regimes, name),
+                     {},
                      RowStream<calibration_t>(filtered)};
       for (const FoundCalibration& of : found) {
         if (of.mounting.name != name) continue;
         study.has_mounting = true;
+        study.noise = noises.at(name);
         study.correction = of.correction;
         study.correction.t_d_s -= infos[i].clock_shift_s;
         mountings_.push_back(of.mounting);
@@ -578,7 +589,7 @@ class RunBagMaker {
     for (StudyBag& study : studies_) {
       if (study.device != sample.device || !study.has_mounting) continue;
       study.biases.at(time_s, study.correction);
-      writer_.add_corrected(sample, utc_ns, study.correction, study.noise.at(time_s));
+      writer_.add_corrected(sample, utc_ns, study.correction, study.noise->at(time_s));
     }
   }
 
@@ -688,13 +699,17 @@ Result<RunBag> write_run_bag(const RunBagOptions& options) {
   const auto calibration = document(options.source.run_dir / "calibration.json");
   if (!calibration) return tl::unexpected<Error>(calibration.error());
   return report::with_documents_of(options.source.run_dir, [&]() -> Result<RunBag> {
+    const auto found = found_calibrations(*calibration);
+    std::vector<std::string> names;
+    for (const FoundCalibration& one : found) names.push_back(one.mounting.name);
+    auto noises = std::async(std::launch::async, regime_noises, options.source.run_dir, names);
     const auto opened = open_recording_of_run(options.source, *run);
     if (!opened) return tl::unexpected<Error>(opened.error());
     const auto folder = OutputFolder::open(options.out.parent_path());
     if (!folder) return tl::unexpected<Error>(folder.error());
     auto out = folder->begin(options.out.filename().string());
     if (!out) return tl::unexpected<Error>(out.error());
-    auto bag = RunBagMaker(options, *opened, *run, *calibration, *out).run();
+    auto bag = RunBagMaker(options, *opened, *run, found, noises.get(), *out).run();
     if (auto closed = out->close(); bag && !closed) return tl::unexpected<Error>(closed.error());
     if (bag) bag->remarks.insert(bag->remarks.begin(), opened->remarks.begin(), opened->remarks.end());
     return bag;
