@@ -78,6 +78,22 @@ TEST(ErrorRow, OfAPointOnATurningBodyIsTheErrorThatWasPutIn) {
   }
 }
 
+TEST(ErrorRow, BearsTheDerivativesInTheAxesOfTheSensor) {
+  StudyEpoch epoch{};
+  epoch.time = HostTime{} + Duration{1234};
+  epoch.regime = Regime::kDynamic;
+  epoch.omega_dot_ib_b_radps2 = {1.0, 2.0, 3.0};
+  epoch.omega_ddot_ib_b_radps3 = {4.0, 5.0, 6.0};
+  epoch.f_dot_b_mps3 = {7.0, 8.0, 9.0};
+  // A quarter turn about z takes y of b to x of s.
+  const auto row = error_row(epoch, {{0, 1, 0, -1, 0, 0, 0, 0, 1}, {}}, {});
+  EXPECT_EQ(row.omega_dot_s_radps2, (Vector3{2.0, -1.0, 3.0}));
+  EXPECT_EQ(row.omega_ddot_s_radps3, (Vector3{5.0, -4.0, 6.0}));
+  EXPECT_EQ(row.f_dot_s_mps3, (Vector3{8.0, -7.0, 9.0}));
+  EXPECT_EQ(row.time, epoch.time);
+  EXPECT_EQ(row.regime, epoch.regime);
+}
+
 TEST(ErrorRow, TakesTheReferenceBiasOfTheCallersChoice) {
   StudyEpoch epoch{};
   epoch.sample.flags = kGyroValid | kAccelValid;

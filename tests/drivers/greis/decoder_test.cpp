@@ -228,6 +228,26 @@ TEST(GreisDecoder, ADateThatCannotBeGivesNoUtc) {
   }
 }
 
+TEST(GreisDecoder, WhatTheLineDamagedIsCountedByItsKind) {
+  Rig rig;
+  const Bytes good = lines({rt(1000), pg(0.85, 0.04, 106.5, 0.5F, 4), et(1000)});
+  rig.decoder.push(good, {}, rig.sink);
+  const auto clean = rig.decoder.counters();
+  EXPECT_EQ(clean.frames, 3U);
+  EXPECT_EQ(clean.bytes_skipped + clean.bad_checksums + clean.bad_lengths, 0U);
+  // One bit of the position, then bytes that are no message.
+  Bytes damaged = lines({pg(0.85, 0.04, 106.5, 0.5F, 4)});
+  damaged[20] ^= 0x01U;
+  rig.decoder.push(damaged, {}, rig.sink);
+  EXPECT_EQ(rig.decoder.counters().bad_checksums, 1U);
+  rig.decoder.push(Bytes(40, std::uint8_t{0x81}), {}, rig.sink);
+  rig.decoder.push(good, {}, rig.sink);
+  // A false start waits for what it announced; at the end nothing more comes.
+  rig.decoder.finish({}, rig.sink);
+  EXPECT_GE(rig.decoder.counters().bytes_skipped, damaged.size() - 2 + 40U);
+  EXPECT_EQ(rig.decoder.counters().frames, 2 * clean.frames);
+}
+
 TEST(GreisDecoder, MissingEpochsAreCountedByTime) {
   Rig rig;
   for (const U32 tod : {1000U, 1100U, 1500U}) rig.push({rt(tod), pg(0.85, 0.04, 106.5, 0.5F, 4), et(tod)});

@@ -284,6 +284,47 @@ TEST(StdBinDecoder, AValueThatIsNotANumberGivesNoSample) {
   EXPECT_EQ(rig.decoder.counters().bad_contents, 1U);
 }
 
+TEST(StdBinDecoder, EachOfTheSixValuesMustBeANumberAndTheNextSampleHasAGapBefore) {
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    Rig rig;
+    std::vector<float> values{0.5F, 0.25F, 9.75F, 1.0F, 2.0F, 3.0F};
+    const auto push = [&](std::uint32_t count) {
+      rig.push(telegram(count, 100 * count)
+                   .nav(28, TelegramBuilder::floats({values[0], values[1], values[2]}))
+                   .extended(2, TelegramBuilder::floats({values[3], values[4], values[5]})));
+    };
+    values[axis] = INFINITY;
+    push(1);
+    EXPECT_TRUE(rig.sink.of_kind(SampleKind::kImu).empty()) << axis;
+    EXPECT_EQ(rig.decoder.counters().bad_contents, 1U) << axis;
+    values = {0.6F, 0.35F, 9.85F, 1.1F, 2.1F, 3.1F};
+    push(2);
+    values[0] += 0.1F;
+    values[3] += 0.1F;
+    push(3);
+    const auto imu = rig.sink.of_kind(SampleKind::kImu);
+    ASSERT_EQ(imu.size(), 2U) << axis;
+    EXPECT_NE(imu[0].imu.flags & kGapBefore, 0U) << axis;
+    EXPECT_EQ(imu[1].imu.flags & kGapBefore, 0U) << axis;
+  }
+}
+
+TEST(StdBinDecoder, UtcGoesOnThroughTelegramsWithoutADateBlock) {
+  Rig rig;
+  rig.push(telegram(1, 1000));
+  for (std::uint32_t i = 2; i <= 4; ++i) {
+    rig.push(TelegramBuilder(3, i, 900 + 100 * i)
+                 .nav(28, TelegramBuilder::floats({0.5F + 0.1F * static_cast<float>(i), 0.25F, 9.75F}))
+                 .extended(2, TelegramBuilder::floats({1.0F + 0.1F * static_cast<float>(i), 2.0F, 3.0F})));
+  }
+  const auto imu = rig.sink.of_kind(SampleKind::kImu);
+  ASSERT_EQ(imu.size(), 4U);
+  for (std::size_t i = 1; i < imu.size(); ++i) {
+    EXPECT_TRUE(imu[i].has_utc);
+    EXPECT_EQ(imu[i].utc - imu[i - 1].utc, Duration(10ms)) << i;
+  }
+}
+
 TEST(StdBinDecoder, TheRecordedV3UnitIsFoundToSendZeroRatesWhileAligning) {
   IMUSCOPE_NEEDS_SHARED("data/streams/ixblue_stdbin/v3.bin");
   Rig rig;

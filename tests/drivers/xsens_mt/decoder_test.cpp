@@ -288,6 +288,7 @@ TEST(MtDecoder, LostMessagesAreCountedByTheSampleTime) {
   }
   EXPECT_EQ(line.decoder.counters().samples_lost, 3U);
   EXPECT_NE(line.sink.samples[3].imu.flags & kGapBefore, 0U);
+  EXPECT_EQ(line.sink.samples[4].imu.flags & kGapBefore, 0U) << "before this one nothing is missing";
   EXPECT_EQ(line.sink.samples[4].imu.counter, 7);
 }
 
