@@ -228,6 +228,32 @@ TEST(GreisDecoder, ADateThatCannotBeGivesNoUtc) {
   }
 }
 
+TEST(GreisDecoder, APositionAndVelocityAlongTheAxesOfTheEarthAreThoseOfTheEllipsoid) {
+  constexpr double kLat_rad = 0.85, kLon_rad = 0.04, kHeight_m = 106.5;
+  // From the definition of geodetic coordinates, WGS-84.
+  constexpr double kA_m = 6378137.0, kF = 1.0 / 298.257223563, kE2 = kF * (2.0 - kF);
+  const double sin_lat = std::sin(kLat_rad), cos_lat = std::cos(kLat_rad);
+  const double sin_lon = std::sin(kLon_rad), cos_lon = std::cos(kLon_rad);
+  const double n_m = kA_m / std::sqrt(1.0 - kE2 * sin_lat * sin_lat);
+  const std::array<double, 3> xyz_m{(n_m + kHeight_m) * cos_lat * cos_lon,
+                                    (n_m + kHeight_m) * cos_lat * sin_lon,
+                                    (n_m * (1.0 - kE2) + kHeight_m) * sin_lat};
+  // Three metres a second north, two east, one down.
+  const std::array<double, 3> v_mps{-3.0 * sin_lat * cos_lon - 2.0 * sin_lon - 1.0 * cos_lat * cos_lon,
+                                    -3.0 * sin_lat * sin_lon + 2.0 * cos_lon - 1.0 * cos_lat * sin_lon,
+                                    3.0 * cos_lat - 1.0 * sin_lat};
+  Rig rig;
+  rig.push({rt(1000), po(xyz_m, 0.5F, 4), ve(v_mps, 0.1F, 4), et(1000)});
+  ASSERT_EQ(rig.sink.samples.size(), 1U);
+  const GnssData& gnss = rig.sink.samples[0].gnss;
+  EXPECT_NEAR(gnss.latitude_rad, kLat_rad, 1e-12);
+  EXPECT_NEAR(gnss.longitude_rad, kLon_rad, 1e-12);
+  EXPECT_NEAR(gnss.height_m, kHeight_m, 1e-5);
+  EXPECT_NEAR(gnss.v_n_mps[0], 3.0, 1e-6);
+  EXPECT_NEAR(gnss.v_n_mps[1], 2.0, 1e-6);
+  EXPECT_NEAR(gnss.v_n_mps[2], 1.0, 1e-6);
+}
+
 TEST(GreisDecoder, WhatTheLineDamagedIsCountedByItsKind) {
   Rig rig;
   const Bytes good = lines({rt(1000), pg(0.85, 0.04, 106.5, 0.5F, 4), et(1000)});
@@ -246,6 +272,9 @@ TEST(GreisDecoder, WhatTheLineDamagedIsCountedByItsKind) {
   rig.decoder.finish({}, rig.sink);
   EXPECT_GE(rig.decoder.counters().bytes_skipped, damaged.size() - 2 + 40U);
   EXPECT_EQ(rig.decoder.counters().frames, 2 * clean.frames);
+  Rig impossible;
+  impossible.decoder.push(bytes_of("PG000"), {}, impossible.sink);
+  EXPECT_EQ(impossible.decoder.counters().bad_lengths, 1U);
 }
 
 TEST(GreisDecoder, MissingEpochsAreCountedByTime) {

@@ -2,6 +2,7 @@
 
 /// Builds GREIS messages for tests, written from the protocol's layout and not from the decoder.
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <string_view>
@@ -63,6 +64,13 @@ inline Bytes pg(double lat_rad, double lon_rad, double alt_m, float sigma, U8 ty
 }
 inline Bytes vg(float north, float east, float up, float sigma, U8 type) {
   return greis_message("VG", Body().put(north).put(east).put(up).put(sigma).put(type));
+}
+inline Bytes po(const std::array<double, 3>& xyz_m, float sigma, U8 type) {
+  return greis_message("PO", Body().put(xyz_m[0]).put(xyz_m[1]).put(xyz_m[2]).put(sigma).put(type));
+}
+inline Bytes ve(const std::array<double, 3>& v_mps, float sigma, U8 type) {
+  const auto f = [&](std::size_t i) { return static_cast<float>(v_mps[i]); };
+  return greis_message("VE", Body().put(f(0)).put(f(1)).put(f(2)).put(sigma).put(type));
 }
 inline Bytes sg(float hpos, float vpos, float hvel, float vvel, U8 type) {
   return greis_message("SG", Body().put(hpos).put(vpos).put(hvel).put(vvel).put(type));
