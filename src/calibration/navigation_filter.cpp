@@ -283,8 +283,8 @@ void NavigationFilter::correlate_with_antenna() noexcept {
       P_ll(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = P(arm + i, arm + j);
   }
   const Matrix3d P_rl = -state.C_b_n * P_ll;
-  const Vector3d P_rT = state.v_n_mps * latency_variance;
-  const Matrix3d more = -P_rl * state.C_b_n.transpose() + P_rT * state.v_n_mps.transpose();
+  const Vector3d P_rt = state.v_n_mps * latency_variance;
+  const Matrix3d more = -P_rl * state.C_b_n.transpose() + P_rt * state.v_n_mps.transpose();
   for (std::size_t i = 0; i < 3; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     for (std::size_t j = 0; j < 3; ++j) {
@@ -293,7 +293,7 @@ void NavigationFilter::correlate_with_antenna() noexcept {
         P.set(kPositionError + i, kPositionError + j,
               P(kPositionError + i, kPositionError + j) + more(k, static_cast<Eigen::Index>(j)));
     }
-    P.set(kPositionError + i, latency, P_rT(k));
+    P.set(kPositionError + i, latency, P_rt(k));
     P.set(kVelocityError + i, kVelocityError + i,
           P(kVelocityError + i, kVelocityError + i) +
               kStartAcceleration_mps2 * kStartAcceleration_mps2 * latency_variance);
