@@ -281,6 +281,7 @@ void read_gnss(TableReader in, GnssSimulation& gnss) {
   in.vector("position_sd_m", gnss.position_sd_m, 1.0);
   in.vector("velocity_sd_mps", gnss.velocity_sd_mps, 1.0);
   in.number("latency_ms", gnss.latency_s, kMilli, 0.0, 1e4);
+  in.number("epoch_error_ms", gnss.epoch_error_s, kMilli, -100.0, 100.0);
   in.refuse_unknown_keys();
 }
 

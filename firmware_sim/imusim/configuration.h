@@ -11,7 +11,7 @@
 /// [simulation.reference]: class (1 to 5: imu/sensor_classes.h; the keys after it override it),
 /// gyro_white_deg_per_sqrt_h, accel_white_ug_per_sqrt_hz, gyro_bias_sd_deg_per_h,
 ///   accel_bias_sd_mps2, attitude_sd_deg (roll, pitch, heading), latency_ms, alignment_s
-/// [simulation.gnss]: position_sd_m, velocity_sd_mps (north, east, down), latency_ms
+/// [simulation.gnss]: position_sd_m, velocity_sd_mps (north, east, down), latency_ms, epoch_error_ms
 /// [simulation.wheels]: scale_error_percent, slow_sd_mps, white_sd_mps, step_kmph, dead_band_mps, latency_ms
 /// [simulation.can]: bit_rate, bus_load_percent (by others), stamp_jitter_us
 /// [simulation.line]: reads ("usb_frames", "ftdi", "messages"), read_jitter_us, host_skew_ppm (of the PC's
@@ -99,6 +99,7 @@ struct GnssSimulation {
   Eigen::Vector3d position_sd_m{0.01, 0.01, 0.02};
   Eigen::Vector3d velocity_sd_mps{0.02, 0.02, 0.03};
   double latency_s = 0.040;
+  double epoch_error_s = 0.0;  ///< a solution is of so much later than its epoch says
 };
 
 /// The four wheels of the vehicle, whose rear axle is under the R-IMU.

@@ -222,7 +222,6 @@ void World::add_reference(const PlayedDevice& played, Beginning beginning, doubl
   ImuErrors errors = draw_reference(configuration_.reference.noise, played.rate_hz, random);
   Random unseen(configuration_.scenario.seed, played.name + "/imperfections");
   draw_imperfections(reference_imperfections(configuration_.world), unseen, errors);
-  reference_ = {played.name, errors};
   StudyTruth clock;
   clock.name = played.name;
   clock.latency_s = configuration_.reference.latency_s;
@@ -233,6 +232,7 @@ void World::add_reference(const PlayedDevice& played, Beginning beginning, doubl
   // Anywhere within a period, on the 0.1 ms grid in which StdBin counts time.
   clock.first_sample_s = std::floor(random.uniform() * clock.period_s * 1e4) * 1e-4;
   const double periods = std::max(0.0, std::ceil((begin_s - clock.first_sample_s) / clock.period_s));
+  reference_ = {played.name, errors, clock.first_sample_s, clock.period_s};
   first_reference_sample_s_ = clock.first_sample_s + periods * clock.period_s;
   add_imu(played,
           std::make_shared<ImuModel>(*motion_, Mounting{}, errors, configuration_.scenario.seed, played.name),
@@ -388,7 +388,7 @@ void World::add_gnss(const PlayedDevice& played, double begin_s) {
   const std::shared_ptr<const Motion> motion = motion_;
   const auto faults = std::make_shared<const SensorFaults>(configuration_.faults_of(played.name));
   const auto solve = [=, antenna = played.antenna_b_m](double t_s) {
-    const MotionState state = motion->state_at(t_s);
+    const MotionState state = motion->state_at(t_s + gnss.epoch_error_s);
     const GeodeticPosition place =
         displaced(position_at(state, antenna), draw3(*random, 1.0).cwiseProduct(gnss.position_sd_m));
     const Eigen::Vector3d v =

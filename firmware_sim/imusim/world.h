@@ -51,6 +51,8 @@ struct StudyTruth {
 struct ReferenceTruth {
   std::string name;
   ImuErrors errors;
+  double first_sample_s = 0.0;  ///< instant of a sample
+  double period_s = 0.0;        ///< to the next one, its clock's skew included
 };
 
 /// A device, or all those behind one Xbus Master under the name of the first.

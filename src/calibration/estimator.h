@@ -50,8 +50,13 @@ struct NavigationOutput {
   Vector3 sd_accel_bias_mps2{};
   Vector3 nis_position{};  ///< last GNSS position, per axis north, east, down
   Vector3 nis_velocity{};
-  bool has_gnss = false;          ///< a solution went through an update since the navigation began
-  HostTime gnss_time{};           ///< of validity of the newest such solution
+  bool has_gnss = false;  ///< a solution went through an update since the navigation began
+  HostTime gnss_time{};   ///< of validity of the newest such solution
+  /// As found, from configured priors (navigation/antenna.h). Meaningful with has_gnss.
+  Vector3 antenna_lever_arm_b_m{};
+  Vector3 sd_antenna_lever_arm_m{};
+  double receiver_latency_s = 0.0;  ///< beyond what UTC tags or pulses take out, where there are such
+  double sd_receiver_latency_s = 0.0;
   bool gnss_contradicts = false;  ///< of the last minute, more than chance would refuse
 };
 

@@ -85,9 +85,12 @@ struct GnssConfig {
   bool enabled = false;
   DeviceIndex device = 0;
   Vector3 antenna_lever_arm_b_m{0.0, 0.0, 0.0};
+  Vector3 antenna_lever_arm_sd_m{0.02, 0.02, 0.02};  ///< by tape, and an antenna's phase centre
   bool use_velocity = true;
   /// Of the stamps against validity, where no UTC tag brings a solution to the R-IMU's time.
   double latency_s = 0.0;
+  /// Of the former. Receivers take some 20 to 200 ms to send their solution; how much, they do not say.
+  double latency_sd_s = 0.1;
   /// Used where the receiver gives no sd: north, east, down; scaled up for a solution worse than kFixed.
   Vector3 default_sd_position_m{0.02, 0.02, 0.04};
   Vector3 default_sd_velocity_mps{0.05, 0.05, 0.05};

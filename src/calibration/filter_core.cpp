@@ -10,6 +10,7 @@ std::size_t filter_dimension(const EstimatorConfig& config) {
   std::size_t dimension = kNavigationStates;
   for (const StudyConfig& study : config.studies) dimension += StudyLayout::make(study.blocks, 0).size;
   if (config.odometry.enabled) dimension += kOdometryErrorSize;
+  if (config.gnss.enabled) dimension += kAntennaErrorSize;
   return dimension;
 }
 
@@ -82,12 +83,21 @@ FilterCore::FilterCore(const EstimatorConfig& config)
                    [this](std::size_t state, double sd) { repair_variance_[state] = sd * sd; });
     reset_to_prior(*this, i, config.studies[i]);
   }
-  if (!config.odometry.enabled) return;
-  odometry_states_ = first;
-  odometry_.r_bv_b_m = to_eigen(config.odometry.prior_r_bv_b_m);
-  for (const double sd : odometry_prior(config.odometry)) {
+  const auto append = [&](double sd) {
     repair_variance_[first] = sd * sd;
     covariance_.reset_state(first++, sd * sd);
+  };
+  if (config.odometry.enabled) {
+    odometry_states_ = first;
+    odometry_.r_bv_b_m = to_eigen(config.odometry.prior_r_bv_b_m);
+    for (const double sd : odometry_prior(config.odometry)) append(sd);
+  }
+  if (config.gnss.enabled) {
+    antenna_states_ = first;
+    antenna_.r_ba_b_m = to_eigen(config.gnss.antenna_lever_arm_b_m);
+    for (const double sd : config.gnss.antenna_lever_arm_sd_m) append(sd);
+    antenna_.latency_s = config.gnss.latency_s;
+    append(config.gnss.latency_sd_s);
   }
 }
 
@@ -110,7 +120,16 @@ bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool
   std::fill(study_waits_.begin(), study_waits_.end(), 1);
   if (odometry_states_ != StudyLayout::kAbsent)
     inject(odometry_, Eigen::Map<const OdometryErrorVector>(correction.data() + odometry_states_));
+  if (antenna_states_ != StudyLayout::kAbsent)
+    inject(antenna_, Eigen::Map<const AntennaErrorVector>(correction.data() + antenna_states_));
   return true;
+}
+
+void FilterCore::reset_latency(double latency_s, double sd_s) noexcept {
+  IMUSCOPE_EXPECTS(antenna_states_ != StudyLayout::kAbsent);
+  antenna_.latency_s = latency_s;
+  repair_variance_[antenna_states_ + kReceiverLatencyError] = sd_s * sd_s;
+  reset_state(antenna_states_ + kReceiverLatencyError, sd_s * sd_s);
 }
 
 void FilterCore::settle() noexcept {

@@ -2,8 +2,8 @@
 
 /// The filter's state and covariance as one thing: every update corrects the navigation and every S-IMU.
 /// Order of the error state: 15 of the navigation (navigation/error_model.h), then the S-IMUs in order of
-/// configuration, then the odometry's 6 where there is one (navigation/odometry_measurement.h). Allocates:
-/// constructor only. Thread: one.
+/// configuration, then the odometry's 6 where there is one (navigation/odometry_measurement.h), then the
+/// antenna's 4 where there is GNSS (navigation/antenna.h). Allocates: constructor only. Thread: one.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -14,6 +14,7 @@
 #include "calibration/eigen_types.h"
 #include "calibration/estimator_config.h"
 #include "calibration/study_model.h"
+#include "navigation/antenna.h"
 #include "navigation/error_model.h"
 #include "navigation/navigation_state.h"
 #include "navigation/odometry_measurement.h"
@@ -61,6 +62,11 @@ class FilterCore {
   [[nodiscard]] const OdometryState& odometry() const noexcept { return odometry_; }
   /// First index of the odometry's states; StudyLayout::kAbsent where there are none.
   [[nodiscard]] std::size_t odometry_states() const noexcept { return odometry_states_; }
+  [[nodiscard]] const AntennaState& antenna() const noexcept { return antenna_; }
+  /// First index of the antenna's states; StudyLayout::kAbsent where there are none.
+  [[nodiscard]] std::size_t antenna_states() const noexcept { return antenna_states_; }
+  /// A receiver's latency of which nothing else is known yet.
+  void reset_latency(double latency_s, double sd_s) noexcept;
 
   /// Second half of an update (CovarianceKernel::project() is the first): corrects everything.
   /// @return false where nothing was changed
@@ -112,6 +118,8 @@ class FilterCore {
   std::vector<StudyLayout> layouts_;
   OdometryState odometry_;
   std::size_t odometry_states_ = StudyLayout::kAbsent;
+  AntennaState antenna_;
+  std::size_t antenna_states_ = StudyLayout::kAbsent;
   std::vector<double> repair_variance_;  ///< prior variance of every state
   bool keeps_history_ = false;
   Accumulated accumulated_;

@@ -9,6 +9,7 @@
 
 #include "calibration/gnss_trust.h"
 #include "calibration/navigation_output.h"
+#include "navigation/local_earth.h"
 #include "navigation/so3.h"
 #include "navigation/strapdown.h"
 
@@ -34,7 +35,15 @@ constexpr Duration kGnssAhead = std::chrono::milliseconds{1};
 constexpr Duration kAroundMidnight = std::chrono::minutes{1};
 /// Between a solution by its own clock map and by its UTC tag: what moves without a leap second.
 constexpr Duration kLagWanders = std::chrono::milliseconds{100};
-/// Stamps of R epochs are mapped; a solution at the same instant must not fall off the ring by rounding.
+/// N-37. By UTC tags: what two devices' ideas of an instant lie apart. By pulses: the delay of the R-IMU's
+/// stream. By stamps two clock maps' lines move: 1 ms or so in the first minute, little later.
+constexpr double kTaggedLatencySd_s = 1e-3;
+constexpr double kStreamDelaySd_s = 5e-3;
+constexpr double kLatencyWalk_s_per_sqrt_s = 1e-4;
+/// N-36: what a road vehicle accelerates by.
+constexpr double kStartAcceleration_mps2 = 2.0;
+/// Attitude of which rest tells all: wide against what it tells, narrow enough to be linear.
+constexpr double kRestAttitudeSd_rad = 0.1;
 constexpr double kConfiguredStartVelocitySd_mps = 0.05;
 /// One position in twenty has a NIS (3 degrees of freedom) above this where sd and lever arm are right. When
 /// a quarter of a minute's have, something is wrong with them.
@@ -231,6 +240,7 @@ void NavigationFilter::try_start(const Sample& sample) noexcept {
   aligner_.add_imu(sample.time, last_, 1.0 + utc_scale_.scale().rate);
   if (const InitialNavigation* found = aligner_.result()) {
     start(found->state, found->sd, method_of(found->method), sample.time);
+    if (found->rest.length_s > 0.0) take_rest(found->rest, output_.method);
     remember(sample, last_);
     return;
   }
@@ -251,12 +261,77 @@ void NavigationFilter::start(const NavigationState& state, const NavigationError
     const double value = sd(static_cast<Eigen::Index>(i));
     core_.reset_state(i, value * value);
   }
+  correlate_with_antenna();
   core_.take_injected();
   past_size_ = 0;
   output_.status = NavigationStatus::kNavigating;
   output_.has_gnss = false;
   output_.method = method;
   log_.add(event::NavigationStarted{method}, reference_.device, time);
+}
+
+/// N-36
+void NavigationFilter::correlate_with_antenna() noexcept {
+  CovarianceKernel& P = core_.covariance();
+  const NavigationState& state = core_.navigation();
+  const std::size_t arm = core_.antenna_states() + kAntennaLeverArmError;
+  const std::size_t latency = core_.antenna_states() + kReceiverLatencyError;
+  const double latency_variance = P(latency, latency);
+  Matrix3d P_ll;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j)
+      P_ll(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = P(arm + i, arm + j);
+  }
+  const Matrix3d P_rl = -state.C_b_n * P_ll;
+  const Vector3d P_rt = state.v_n_mps * latency_variance;
+  const Matrix3d more = -P_rl * state.C_b_n.transpose() + P_rt * state.v_n_mps.transpose();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    for (std::size_t j = 0; j < 3; ++j) {
+      P.set(kPositionError + i, arm + j, P_rl(k, static_cast<Eigen::Index>(j)));
+      if (j <= i)
+        P.set(kPositionError + i, kPositionError + j,
+              P(kPositionError + i, kPositionError + j) + more(k, static_cast<Eigen::Index>(j)));
+    }
+    P.set(kPositionError + i, latency, P_rt(k));
+    P.set(kVelocityError + i, kVelocityError + i,
+          P(kVelocityError + i, kVelocityError + i) +
+              kStartAcceleration_mps2 * kStartAcceleration_mps2 * latency_variance);
+  }
+}
+
+/// N-47, N-49: what rest showed, as measurements of attitude and biases together. Where the heading came from
+/// it as well, attitude is known from nothing else.
+void NavigationFilter::take_rest(const AlignmentRest& rest, InitialisationMethod method) noexcept {
+  const NavigationState& state = core_.navigation();
+  const Matrix3d C_b_n = rest.C_b_n;
+  const double age_s = rest.age_s + 0.5 * rest.length_s;
+  const auto variance = [&](double white, double other_sd, const GaussMarkovConfig& bias) {
+    const double wandered = -std::expm1(-2.0 * age_s / bias.time_constant_s);
+    return white * white / rest.length_s + other_sd * other_sd + wandered * bias.sd * bias.sd;
+  };
+  const auto take = [&](const Vector3d& shown_b, const Vector3d& true_n, std::size_t bias, double R,
+                        const std::array<bool, 3>& rows) {
+    NavigationMeasurementMatrix H = NavigationMeasurementMatrix::Zero();
+    H.middleCols<3>(kAttitudeError) = skew(true_n);
+    H.middleCols<3>(static_cast<Eigen::Index>(bias)) = C_b_n;
+    SparseMeasurement sparse;
+    append_columns(H, 0, sparse);
+    core_.covariance().project(sparse, to_array(Matrix3d(R * Matrix3d::Identity())));
+    core_.update(C_b_n * shown_b - true_n, rows);
+  };
+  if (method == InitialisationMethod::kGyrocompass) {
+    for (std::size_t i = 0; i < 3; ++i)
+      core_.reset_state(kAttitudeError + i, kRestAttitudeSd_rad * kRestAttitudeSd_rad);
+    const Vector3d force_n = -LocalEarth(state.position).gravity_n();
+    // Down tells of gravity and scale as much as of a bias.
+    take(rest.mean.f_b_mps2 - state.accel_bias_b_mps2, force_n, kAccelBiasError,
+         variance(noise_.accel_noise_mps2_per_sqrt_hz, 0.0, reference_.accel_bias), {true, true, false});
+  }
+  take(rest.mean.omega_ib_b_radps - state.gyro_bias_b_radps, earth_rate_n(state.position.latitude_rad),
+       kGyroBiasError, variance(noise_.gyro_noise_radps_per_sqrt_hz, rest.sway_radps, reference_.gyro_bias),
+       {true, true, true});
+  core_.take_injected();
 }
 
 void NavigationFilter::stop(HostTime time, double gap_s) noexcept {
@@ -303,14 +378,16 @@ void NavigationFilter::add_pulse(const Sample& sample) noexcept {
   utc_scale_.observe_pulse(sample.time, utc_time_from_ns(sample.pulse.wall_ns));
 }
 
-HostTime NavigationFilter::host_time_of(const Sample& gnss) const noexcept {
-  const HostTime by_its_clock = gnss.time - from_seconds(gnss_.latency_s);
+/// The solution's instant as far as it is told; its latency is not taken off.
+NavigationFilter::Met NavigationFilter::met(const Sample& gnss) const noexcept {
+  const Met by_stamp{gnss.time, Meeting::kStamps};
   if (gnss.has_utc && !last_has_utc_ && time_scale().source == UtcSource::kPulses) {
     // Pulses tell the host's time of any UTC. A leap second that they have not counted yet shows as one.
-    const HostTime by_pulses = time_scale().host_time(gnss.utc);
-    return std::chrono::abs(by_its_clock - by_pulses) < kPulsesAgree ? by_pulses : by_its_clock;
+    const HostTime by_pulses = utc_scale_.host_time_by_pulses(gnss.utc);
+    const bool agree = std::chrono::abs(gnss.time - from_seconds(gnss_.latency_s) - by_pulses) < kPulsesAgree;
+    return agree ? Met{by_pulses, Meeting::kPulses} : by_stamp;
   }
-  if (!gnss.has_utc || !last_has_utc_) return by_its_clock;
+  if (!gnss.has_utc || !last_has_utc_) return by_stamp;
   // The tag of the nearest R epoch carries the solution to host time, so that clock maps cannot part them.
   const PastEpoch* nearest = nullptr;
   for (std::size_t back = 0; back < past_size_; ++back) {
@@ -318,8 +395,33 @@ HostTime NavigationFilter::host_time_of(const Sample& gnss) const noexcept {
     nearest = &past(back);
     if (past(back).utc <= gnss.utc) break;
   }
-  if (nearest == nullptr) return last_time_ + (gnss.utc - last_utc_);
-  return nearest->time + (gnss.utc - nearest->utc);
+  if (nearest == nullptr) return {last_time_ + (gnss.utc - last_utc_), Meeting::kTags};
+  return {nearest->time + (gnss.utc - nearest->utc), Meeting::kTags};
+}
+
+/// N-37: the latency's state up to a solution's time.
+void NavigationFilter::carry_latency(Meeting by, HostTime time) noexcept {
+  const std::size_t latency = core_.antenna_states() + kReceiverLatencyError;
+  if (by != meeting_) {
+    meeting_ = by;
+    core_.reset_latency(by == Meeting::kStamps ? gnss_.latency_s : 0.0,
+                        by == Meeting::kTags     ? std::min(gnss_.latency_sd_s, kTaggedLatencySd_s)
+                        : by == Meeting::kPulses ? std::min(gnss_.latency_sd_s, kStreamDelaySd_s)
+                                                 : gnss_.latency_sd_s);
+  } else if (by == Meeting::kStamps && gnss_.latency_sd_s > 0.0 && time > latency_time_) {
+    const double wander_s = kLatencyWalk_s_per_sqrt_s * std::sqrt(to_seconds(time - latency_time_));
+    core_.predict_state(latency, 1.0, wander_s * wander_s);
+  }
+  latency_time_ = std::max(latency_time_, time);
+}
+
+/// UTC of the rows by what has been found.
+void NavigationFilter::tell_latency() noexcept {
+  const double sd_s = core_.sd(core_.antenna_states() + kReceiverLatencyError);
+  const double latency_s = core_.antenna().latency_s;
+  if (meeting_ == Meeting::kStamps)
+    utc_scale_.set_found_delay(UtcSource::kGnss, latency_s - gnss_.latency_s, sd_s);
+  if (meeting_ == Meeting::kPulses) utc_scale_.set_found_delay(UtcSource::kPulses, latency_s, sd_s);
 }
 
 /// In a leap second the tags of two devices may be a second apart: one repeats the last second of the day,
@@ -369,10 +471,11 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
   out.measured = epoch.measured;
   inject(out.state, learned);
   const double rest_s = to_seconds(time - epoch.time);
-  if (k > 0 && rest_s > 0.0) {
-    const PastEpoch& after = past(k - 1);
-    const double share = rest_s / to_seconds(after.time - epoch.time);
-    out.measured = mixed(epoch.measured, after.measured, share);
+  if (rest_s > 0.0) {
+    if (k > 0) {
+      const PastEpoch& after = past(k - 1);
+      out.measured = mixed(epoch.measured, after.measured, rest_s / to_seconds(after.time - epoch.time));
+    }
     propagate(out.state, increment_from_samples(compensated(epoch.measured, out.state),
                                                 compensated(out.measured, out.state), rest_s));
   }
@@ -389,14 +492,18 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
   const Vector3d sd_position = trusted_position_sd(gnss, gnss_);
   const Vector3d sd_velocity = trusted_velocity_sd(gnss, gnss_);
   if (!has_last_) return true;
-  const HostTime time = plausible_time(sample, host_time_of(sample));
+  const Met told = met(sample);
+  const HostTime stamped = plausible_time(sample, told.time);
+  carry_latency(told.by, stamped);
+  const double latency_s = core_.antenna().latency_s;
+  const Vector3d arm = core_.antenna().r_ba_b_m;
+  const HostTime time = stamped - from_seconds(latency_s);
   const double widened = correlated_sd_factor(gnss.solution, to_seconds(time - last_position_));
 
   if (!navigating()) {
     if (navigation_.initial_rpy_rad && has_position) {
       NavigationState state;
       const Vector3& rpy = *navigation_.initial_rpy_rad;
-      const Vector3d arm = to_eigen(gnss_.antenna_lever_arm_b_m);
       state.C_b_n = rotation_from_euler({rpy[0], rpy[1], rpy[2]});
       state.position = displaced(antenna, -(state.C_b_n * arm));
       NavigationErrorVector sd = NavigationErrorVector::Zero();
@@ -425,12 +532,11 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     case Lookup::kFound:
       break;
   }
-  const Vector3d arm = to_eigen(gnss_.antenna_lever_arm_b_m);
   bool used = false;
   if (has_position) {
     const GnssInnovation position = gnss_position_innovation(then.state, antenna, arm);
-    used =
-        apply(position_gate_, position, then.back, widened * sd_position, time, output_.nis_position) || used;
+    used = apply(position_gate_, position, antenna_in_position(then.state, then.measured, arm), then.back,
+                 widened * sd_position, time, output_.nis_position);
     if (!used) ++counters_.gnss_positions_rejected;
     watch_consistency(time);
     if (used)
@@ -440,10 +546,16 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     ++counters_.gnss_positions_rejected;
   }
   if (has_velocity) {
-    const GnssInnovation velocity =
-        gnss_velocity_innovation(then.state, to_eigen(gnss.v_n_mps), then.measured.omega_ib_b_radps, arm);
-    used = apply(velocity_gate_, velocity, then.back, sd_velocity, time, output_.nis_velocity) || used;
+    const Vector3d arm_now = core_.antenna().r_ba_b_m;
+    GnssInnovation velocity =
+        gnss_velocity_innovation(then.state, to_eigen(gnss.v_n_mps), then.measured.omega_ib_b_radps, arm_now);
+    const AntennaMatrix of_antenna = antenna_in_velocity(then.state, then.measured, arm_now);
+    // The state then is of the latency that was believed before the position told more of it.
+    velocity.innovation -= of_antenna.col(kReceiverLatencyError) * (core_.antenna().latency_s - latency_s);
+    used = apply(velocity_gate_, velocity, of_antenna, then.back, sd_velocity, time, output_.nis_velocity) ||
+           used;
   }
+  tell_latency();
   if (used) {
     ++counters_.gnss_used;
     output_.has_gnss = true;
@@ -466,18 +578,13 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
   return true;
 }
 
-bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured,
+bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured, const AntennaMatrix& of_antenna,
                              const NavigationErrorCovariance& back, const Vector3d& sd, HostTime time,
                              Vector3& nis) noexcept {
   const NavigationMeasurementMatrix H = measured.H * back;
   SparseMeasurement sparse;
-  for (std::size_t column = 0; column < kNavigationStates; column += 3) {
-    MeasurementBlock& block = sparse.append(column, 3);
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j)
-        block.h[i][j] = H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(column + j));
-    }
-  }
+  append_columns(H, 0, sparse);
+  append_columns(of_antenna, core_.antenna_states(), sparse);
   const Matrix3d R = sd.cwiseAbs2().asDiagonal();
   CovarianceKernel& P = core_.covariance();
   P.project(sparse, to_array(R));
@@ -529,6 +636,12 @@ void NavigationFilter::update_output() noexcept {
           core_.covariance()(kAttitudeError + i, kAttitudeError + j);
   }
   write_state(core_.navigation(), sd, P_phi, output_);
+  const std::size_t antenna = core_.antenna_states();
+  output_.antenna_lever_arm_b_m = to_array(core_.antenna().r_ba_b_m);
+  for (std::size_t i = 0; i < 3; ++i)
+    output_.sd_antenna_lever_arm_m[i] = core_.sd(antenna + kAntennaLeverArmError + i);
+  output_.receiver_latency_s = core_.antenna().latency_s;
+  output_.sd_receiver_latency_s = core_.sd(antenna + kReceiverLatencyError);
 }
 
 }  // namespace imuscope

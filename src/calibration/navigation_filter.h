@@ -72,10 +72,21 @@ class NavigationFilter {
              HostTime time) noexcept;
   void stop(HostTime time, double gap_s) noexcept;
   bool apply_gnss(const Sample& sample) noexcept;
-  [[nodiscard]] HostTime host_time_of(const Sample& gnss) const noexcept;
+  /// What brings a solution to the R-IMU's time, and so what its latency is of.
+  enum class Meeting : std::uint8_t { kNone, kTags, kPulses, kStamps };
+  struct Met {
+    HostTime time;
+    Meeting by;
+  };
+  [[nodiscard]] Met met(const Sample& gnss) const noexcept;
+  void carry_latency(Meeting by, HostTime time) noexcept;
+  void tell_latency() noexcept;
   [[nodiscard]] HostTime plausible_time(const Sample& gnss, HostTime time) noexcept;
-  bool apply(GnssGate& gate, const GnssInnovation& measured, const NavigationErrorCovariance& back,
-             const Eigen::Vector3d& sd, HostTime time, Vector3& nis) noexcept;
+  bool apply(GnssGate& gate, const GnssInnovation& measured, const AntennaMatrix& of_antenna,
+             const NavigationErrorCovariance& back, const Eigen::Vector3d& sd, HostTime time,
+             Vector3& nis) noexcept;
+  void correlate_with_antenna() noexcept;
+  void take_rest(const AlignmentRest& rest, InitialisationMethod method) noexcept;
   void watch_consistency(HostTime time) noexcept;
   void widen_for_reacquisition(const Eigen::Vector3d& innovation) noexcept;
   [[nodiscard]] PastEpoch& past(std::size_t back) noexcept;  ///< 0 = newest
@@ -106,6 +117,8 @@ class NavigationFilter {
   std::int64_t last_counter_ = 0;
   UtcTime last_utc_{};
   bool last_has_utc_ = false;
+  Meeting meeting_ = Meeting::kNone;
+  HostTime latency_time_{};           ///< up to which the latency has wandered
   std::optional<Duration> gnss_lag_;  ///< of the last solution that was not near a UTC midnight
   InertialRates last_;
 

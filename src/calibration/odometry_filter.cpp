@@ -31,27 +31,6 @@ constexpr int kRejectedTold = 25;
 /// Re-acquisition at standstill: velocity is uncertain by this much more than the contradiction.
 constexpr double kReacquireSd_mps = 0.1;
 
-void append_navigation(const NavigationMeasurementMatrix& H, SparseMeasurement& out) noexcept {
-  for (std::size_t column = 0; column < kNavigationStates; column += 3) {
-    MeasurementBlock& block = out.append(column, 3);
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j)
-        block.h[i][j] = H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(column + j));
-    }
-  }
-}
-
-void append_odometry(const Eigen::Matrix<double, 3, kOdometryErrorSize>& H, std::size_t first,
-                     SparseMeasurement& out) noexcept {
-  for (std::size_t column = 0; column < kOdometryErrorSize; column += 3) {
-    MeasurementBlock& block = out.append(first + column, 3);
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j)
-        block.h[i][j] = H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(column + j));
-    }
-  }
-}
-
 std::array<double, 9> diagonal(const Vector3d& variances) noexcept {
   return {variances(0), 0.0, 0.0, 0.0, variances(1), 0.0, 0.0, 0.0, variances(2)};
 }
@@ -186,8 +165,8 @@ void OdometryFilter::apply_motion(const Sample& sample, const NavigationFilter::
       noise_of({config_.speed_sd_mps, std::hypot(config_.sideways_sd_mps, slip_mps), config_.upwards_sd_mps});
 
   SparseMeasurement H;
-  append_navigation(predicted.H * then.back, H);
-  append_odometry(predicted.H_odometry, core_.odometry_states(), H);
+  append_columns(NavigationMeasurementMatrix(predicted.H * then.back), 0, H);
+  append_columns(predicted.H_odometry, core_.odometry_states(), H);
   CovarianceKernel& P = core_.covariance();
   P.project(H, diagonal(noise.inflated));
   const Vector3d S = to_eigen(P.innovation_covariance()).diagonal();
@@ -225,7 +204,7 @@ void OdometryFilter::apply_standstill(HostTime at, const NavigationFilter::Delay
   const ZeroVelocityInnovation zero = zero_velocity_innovation(then.state);
   const Noise noise = noise_of(Vector3d::Constant(config_.zero_velocity_sd_mps));
   SparseMeasurement H;
-  append_navigation(zero.H * then.back, H);
+  append_columns(NavigationMeasurementMatrix(zero.H * then.back), 0, H);
   CovarianceKernel& P = core_.covariance();
   P.project(H, diagonal(noise.inflated));
   Eigen::Matrix3d S = to_eigen(P.innovation_covariance());

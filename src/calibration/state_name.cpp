@@ -3,6 +3,8 @@
 #include <array>
 
 #include "calibration/study_model.h"
+#include "navigation/antenna.h"
+#include "navigation/odometry_measurement.h"
 
 namespace imuscope {
 namespace {
@@ -11,6 +13,13 @@ constexpr std::array kNavigationNames{"position_n",   "position_e",   "position_
                                       "velocity_e",   "velocity_d",   "attitude_n",  "attitude_e",
                                       "attitude_d",   "gyro_bias_x",  "gyro_bias_y", "gyro_bias_z",
                                       "accel_bias_x", "accel_bias_y", "accel_bias_z"};
+
+constexpr std::array kOdometryNames{"wheel_scale",      "mount_y",          "mount_z",
+                                    "axle_lever_arm_x", "axle_lever_arm_y", "axle_lever_arm_z"};
+constexpr std::array kAntennaNames{"antenna_lever_arm_x", "antenna_lever_arm_y", "antenna_lever_arm_z",
+                                   "receiver_latency"};
+static_assert(kOdometryNames.size() == kOdometryErrorSize);
+static_assert(kAntennaNames.size() == kAntennaErrorSize);
 
 std::optional<std::string> study_state(const StudyLayout& layout, std::size_t index) {
   std::optional<std::string> found;
@@ -48,6 +57,14 @@ StateName state_name(const EstimatorConfig& config, std::size_t index) {
     if (const auto name = study_state(layout, index)) return {i, *name};
     first += layout.size;
   }
+  const auto named = [&](bool is_there, const auto& names) -> std::optional<std::string> {
+    if (!is_there) return std::nullopt;
+    if (index < first + names.size()) return names[index - first];
+    first += names.size();
+    return std::nullopt;
+  };
+  if (const auto name = named(config.odometry.enabled, kOdometryNames)) return {std::nullopt, *name};
+  if (const auto name = named(config.gnss.enabled, kAntennaNames)) return {std::nullopt, *name};
   return {std::nullopt, "state " + std::to_string(index)};
 }
 

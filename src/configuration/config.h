@@ -149,12 +149,14 @@ struct MessagesConfig {
 /// What a device of role gnss has beside the rest: the antenna's place in b, and how far its numbers are
 /// believed.
 struct GnssOptions {
-  Vector3 antenna_lever_arm_b_m{};   ///< from the R-IMU to the antenna
-  Vector3 position_sd_m{};           ///< north, east, down; where the receiver gives none
-  Vector3 velocity_sd_mps{};         ///< likewise
-  double position_sd_floor_m = 0.0;  ///< of each axis: a receiver that claims less is not believed
+  Vector3 antenna_lever_arm_b_m{};       ///< from the R-IMU to the antenna
+  double antenna_lever_arm_sd_m = 0.02;  ///< of each axis
+  Vector3 position_sd_m{};               ///< north, east, down; where the receiver gives none
+  Vector3 velocity_sd_mps{};             ///< likewise
+  double position_sd_floor_m = 0.0;      ///< of each axis: a receiver that claims less is not believed
   double velocity_sd_floor_mps = 0.0;
   double latency_s = 0.0;  ///< of the stamps, where no UTC brings them to the reference's time
+  double latency_sd_s = 0.1;
   std::optional<double> geoid_separation_m;  ///< nmea: for receivers that send none
   bool common_clock = false;  ///< rtklib_pos: the lines' times are the reference's, where no stamps say more
   std::optional<Vector3> base_lat_lon_height;  ///< rtklib_pos: deg, deg, m; for east-north-up solutions

@@ -290,11 +290,18 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.messages.clock",
      "`common`: times are of the reference's clock. `own`: of another, found by UTC or the motion."},
     {"device.antenna_lever_arm_b_m", "gnss: from the R-IMU to the antenna, in b."},
+    {"device.antenna_lever_arm_sd_m",
+     "gnss: of each axis of the lever arm, 1 sigma. It is estimated with this prior. Measured by tape: "
+     "0.02."},
     {"device.position_sd_m", "gnss: north, east, down; where the receiver gives none."},
     {"device.velocity_sd_mps", "gnss: north, east, down; where the receiver gives none."},
     {"device.position_sd_floor_m", "gnss: a receiver that claims less is not believed."},
     {"device.velocity_sd_floor_mps", "gnss: a receiver that claims less is not believed."},
     {"device.latency_ms", "gnss: how old a solution is on arrival, where no UTC tells."},
+    {"device.latency_sd_ms",
+     "gnss: of `latency_ms`, 1 sigma. The latency is estimated with this prior. `csv_gnss`: 10. Where UTC "
+     "tags of "
+     "receiver and reference carry solutions, 1 or this, whichever is less."},
     {"device.geoid_separation_m", "nmea: geoid above the ellipsoid, for receivers that do not send it."},
     {"device.clock", "rtklib_pos: whether a file's times are UTC or of the reference's own clock."},
     {"device.base_lat_lon_height",

@@ -167,6 +167,7 @@ void InitialAligner::level_and_gyrocompass() noexcept {
   C_b_a_at_rest_ = C_b_a_;
   tilt_sd_rad_ = level.sd_n_rad.x();
   rest_rate_b_radps_ = rest_mean_.omega_ib_b_radps;
+  rest_force_b_mps2_ = rest_mean_.f_b_mps2;
   rest_used_s_ = rest_s_;
   levelled_s_ = 0.0;
   tilt_error_a_rad_.setZero();
@@ -337,32 +338,18 @@ void InitialAligner::update_stage() noexcept {
   }
   if (stage_ != AlignmentStage::kDone) return;
 
-  const NavigationProcessNoise& noise = options_.reference_noise;
   result_.time = imu_time_;
   result_.method = method_;
   result_.state.C_b_n = C_a_n() * C_b_a_;
-  result_.state.accel_bias_b_mps2.setZero();
   result_.sd.segment<3>(kAttitudeError) = Vector3d(tilt_sd_rad_, tilt_sd_rad_, heading_sd_rad_);
-  result_.sd.segment<3>(kGyroBiasError).setConstant(noise.gyro_bias.sd);
-  result_.sd.segment<3>(kAccelBiasError).setConstant(noise.accel_bias.sd);
-  result_.state.gyro_bias_b_radps.setZero();
+  result_.rest = {};
   if (method_ == AlignmentMethod::kReferenceAttitude) return;
 
-  // N-47: bias = rate at rest less the Earth's, weighed against its prior; then it wanders.
-  const Matrix3d C_n_b_at_rest = (C_a_n() * C_b_a_at_rest_).transpose();
-  const Vector3d shown = rest_rate_b_radps_ - C_n_b_at_rest * earth_rate_n(origin_.latitude_rad);
-  const double mean_variance =
-      square(noise.gyro_noise_radps_per_sqrt_hz) / rest_used_s_ + square(kSway_rad / rest_used_s_) +
-      square(std::min(heading_sd_rad_, 1.0) * kEarthRate_radps * std::cos(origin_.latitude_rad));
-  const double prior_variance = square(noise.gyro_bias.sd);
-  const double share = prior_variance / (prior_variance + mean_variance);
-  result_.state.gyro_bias_b_radps = share * shown;
-  const double wandered =
-      std::isinf(noise.gyro_bias.correlation_time_s) || noise.gyro_bias.correlation_time_s <= 0.0
-          ? 0.0
-          : -std::expm1(-2.0 * levelled_s_ / noise.gyro_bias.correlation_time_s);
-  result_.sd.segment<3>(kGyroBiasError)
-      .setConstant(std::sqrt(prior_variance * (wandered + (1.0 - wandered) * (1.0 - share))));
+  result_.rest = {{rest_rate_b_radps_, rest_force_b_mps2_},
+                  rest_used_s_,
+                  levelled_s_,
+                  C_a_n() * C_b_a_at_rest_,
+                  kSway_rad / rest_used_s_};
 }
 
 // N-48: over the last seconds, antenna position less what was felt is a straight line.

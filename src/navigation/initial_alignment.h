@@ -8,7 +8,7 @@
 /// 3. in motion, for a MEMS reference: level at rest, carry the attitude on with the gyros from an arbitrary
 ///    heading, and find that heading by least squares between the accelerations that the IMU felt and those
 ///    that GNSS positions show, over windows of several seconds. Needs no assumption on how the IMU is turned
-///    about the vertical and no GNSS velocity. EQUATIONS.md N-40 to N-47.
+///    about the vertical and no GNSS velocity. EQUATIONS.md N-40 to N-46, N-48.
 ///
 /// All need a GNSS position. Core: fixed memory (about 40 kB), no allocation, noexcept. Thread: owner only.
 
@@ -51,11 +51,23 @@ struct InitialAttitude {
                                           const Eigen::Vector3d& mean_f_b_mps2, double sd_omega_radps,
                                           double sd_f_mps2, double latitude_rad) noexcept;
 
+/// What the R-IMU showed at rest, for the filter to take as a measurement of tilt, heading and biases at
+/// once.
+struct AlignmentRest {
+  InertialRates mean;                                   ///< as measured
+  double length_s = 0.0;                                ///< 0: there was none
+  double age_s = 0.0;                                   ///< since its end
+  Eigen::Matrix3d C_b_n = Eigen::Matrix3d::Identity();  ///< then
+  double sway_radps = 0.0;  ///< sd of what a parked vehicle's swaying leaves of rate
+};
+
 /// Where the filter starts.
 struct InitialNavigation {
   NavigationState state;
-  HostTime time{};                                           ///< of the newest IMU sample handed in
-  NavigationErrorVector sd = NavigationErrorVector::Zero();  ///< of the error states, in their order
+  HostTime time{};  ///< of the newest IMU sample handed in
+  NavigationErrorVector sd =
+      NavigationErrorVector::Zero();  ///< of the kinematic error states, in their order
+  AlignmentRest rest;
   AlignmentMethod method = AlignmentMethod::kReferenceAttitude;
 };
 
@@ -145,6 +157,7 @@ class InitialAligner {
   double levelled_s_ = 0.0;                                      ///< time since the rest ended
   double rest_used_s_ = 0.0;                                     ///< length of that rest
   Eigen::Vector3d rest_rate_b_radps_ = Eigen::Vector3d::Zero();  ///< gyro bias and Earth rate together
+  Eigen::Vector3d rest_force_b_mps2_ = Eigen::Vector3d::Zero();
   double tilt_sd_rad_ = kPi;
   Eigen::Vector3d a_a_mps2_ = Eigen::Vector3d::Zero();             ///< C_b_a f + g
   Eigen::Vector3d felt_velocity_a_mps_ = Eigen::Vector3d::Zero();  ///< its integral

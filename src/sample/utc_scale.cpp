@@ -65,6 +65,21 @@ bool is_leap_second(double step_s, UtcTime utc) noexcept {
 
 }  // namespace
 
+void UtcScale::set_found_delay(UtcSource source, double delay_s, double sd_s) noexcept {
+  found_ = {source, delay_s, sd_s};
+  if (is_known()) publish(scale_.source);
+}
+
+HostTime UtcScale::host_time_by_pulses(UtcTime utc) const noexcept {
+  return scale_.host_time(is_found(UtcSource::kPulses) ? utc + from_seconds(found_.delay_s) : utc);
+}
+
+/// A receiver's delay that pulses have measured stands in the scale already.
+bool UtcScale::is_found(UtcSource source) const noexcept {
+  if (found_.source != source) return false;
+  return source == UtcSource::kPulses || std::isnan(scale_.pulses.gnss_delay.mean_s);
+}
+
 double UtcScale::offset_at(HostTime time) const noexcept {
   return offset_s_ + rate_ * to_seconds(time - last_);
 }
@@ -249,6 +264,7 @@ void UtcScale::count_seconds_anew(HostTime time, Duration by, UtcTime utc) noexc
 /// stream where its own tags do not take it out.
 double UtcScale::delay_sd_s(UtcSource source) const noexcept {
   if (source == UtcSource::kReference) return 0.0;
+  if (is_found(source)) return found_.sd_s;
   const auto known = [](const StreamDelay& delay, double otherwise_s) {
     return std::isnan(delay.mean_s) ? otherwise_s : delay.sd_s;
   };
@@ -261,6 +277,7 @@ void UtcScale::publish(UtcSource source) noexcept {
   scale_.source = source;
   scale_.time = last_;
   scale_.utc = utc_origin_ + (last_ - origin_) + from_seconds(offset_s_);
+  if (is_found(source)) scale_.utc += from_seconds(found_.delay_s);
   scale_.sd_utc_s = std::hypot(std::sqrt(p_offset_), delay_sd_s(source));
   scale_.rate = rate_;
   scale_.sd_rate = std::sqrt(p_rate_);

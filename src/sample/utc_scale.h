@@ -101,6 +101,13 @@ class UtcScale {
   /// What the PC's clock showed: for those who want to know what time it is, until a device tells.
   void set_pc_clock(HostTime time, UtcTime utc) noexcept;
 
+  /// What navigation has found that the tags of a source come later than the R-IMU's samples of the same
+  /// instant, beyond what stands in their times: taken out of the UTC that is told while that source tells.
+  void set_found_delay(UtcSource source, double delay_s, double sd_s) noexcept;
+
+  /// The instant that pulses give a UTC, whatever navigation has found. Precondition: the source is kPulses.
+  [[nodiscard]] HostTime host_time_by_pulses(UtcTime utc) const noexcept;
+
   /// True seconds since an instant that never moves: differences are intervals. Tags that step (a leap
   /// second, a receiver that found the time) leave it alone.
   [[nodiscard]] double seconds_at(HostTime time) const noexcept;
@@ -120,6 +127,7 @@ class UtcScale {
   void follow_pulses(HostTime time) noexcept;
   [[nodiscard]] double reference_delay_s() const noexcept;
   [[nodiscard]] double delay_sd_s(UtcSource source) const noexcept;
+  [[nodiscard]] bool is_found(UtcSource source) const noexcept;
 
   TimeScale scale_;
   HostTime origin_{};     ///< of seconds_at()
@@ -132,6 +140,12 @@ class UtcScale {
   double p_rate_ = 0.0;
   double p_both_ = 0.0;
   int astray_in_a_row_ = 0;
+  struct FoundDelay {
+    UtcSource source = UtcSource::kNone;
+    double delay_s = 0.0;
+    double sd_s = 0.0;
+  };
+  FoundDelay found_;
   PulseClock pulses_;
   int pulses_astray_in_a_row_ = 0;
   int miscounted_in_a_row_ = 0;

@@ -106,7 +106,9 @@ GnssConfig gnss_config(const DeviceConfig& device, std::size_t index) {
   gnss.enabled = true;
   gnss.device = static_cast<DeviceIndex>(index);
   gnss.antenna_lever_arm_b_m = device.gnss.antenna_lever_arm_b_m;
+  gnss.antenna_lever_arm_sd_m = all_axes(device.gnss.antenna_lever_arm_sd_m);
   gnss.latency_s = device.gnss.latency_s;
+  gnss.latency_sd_s = device.gnss.latency_sd_s;
   gnss.default_sd_position_m = device.gnss.position_sd_m;
   gnss.default_sd_velocity_mps = device.gnss.velocity_sd_mps;
   gnss.floor_sd_position_m = all_axes(device.gnss.position_sd_floor_m);

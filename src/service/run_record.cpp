@@ -14,6 +14,14 @@ namespace imuscope {
 
 namespace {
 
+/// Where the antenna was found to be, and how late the receiver's solutions are.
+nlohmann::json antenna_json(const NavigationOutput& found) {
+  return {{"lever_arm_b_m", found.antenna_lever_arm_b_m},
+          {"lever_arm_sd_m", found.sd_antenna_lever_arm_m},
+          {"latency_s", found.receiver_latency_s},
+          {"latency_sd_s", found.sd_receiver_latency_s}};
+}
+
 std::string utc_text(UtcTime utc) {
   const auto whole = std::chrono::round<std::chrono::microseconds>(utc);
   const auto since_epoch = std::chrono::floor<std::chrono::seconds>(whole);
@@ -90,6 +98,8 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
     entry["late"] = study.late + study.refused_full;
     entry["waiting"] = study.waiting;
   }
+  if (device.role == DeviceRole::kGnss && run.last != nullptr && run.last->navigation.has_gnss)
+    entry["antenna"] = antenna_json(run.last->navigation);
   if (device.role == DeviceRole::kStudy) entry["data_sheet"] = data_sheet_json(device.data_sheet);
   if (record.time_budget) entry["time_budget"] = time_budget_json(*record.time_budget);
   return entry;

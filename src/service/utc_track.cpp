@@ -10,18 +10,23 @@ constexpr Duration kEvery = std::chrono::seconds{1};
 /// Between two tags UTC steps where it is further off the line than this.
 constexpr Duration kStep = std::chrono::milliseconds{10};
 
+/// A receiver's delay counts as found where it is known so many times better than at first.
+constexpr double kFound = 10.0;
+
 /// The line of the better one holds before it began, too: messages of a receiver tell UTC late by a delay
-/// that nobody tells, and the PC's clock by anything.
-bool is_worse(UtcSource before, UtcSource now) {
-  if (before == UtcSource::kPcClock) return now != UtcSource::kPcClock;
-  return before == UtcSource::kGnss && now == UtcSource::kPulses;
+/// that nobody tells until motion shows it, and the PC's clock by anything.
+bool is_worse(const TimeScale& first, const TimeScale& before, const TimeScale& now) {
+  if (before.source == UtcSource::kPcClock) return now.source != UtcSource::kPcClock;
+  if (before.source != UtcSource::kGnss) return false;
+  if (now.source == UtcSource::kPulses) return true;
+  return now.source == UtcSource::kGnss && first.sd_utc_s > kFound * now.sd_utc_s;
 }
 
 }  // namespace
 
 void UtcTrack::add(const TimeScale& scale) {
   if (scale.source == UtcSource::kNone) return;
-  if (!scales_.empty() && is_worse(scales_.back().source, scale.source)) scales_.clear();
+  if (!scales_.empty() && is_worse(scales_.front(), scales_.back(), scale)) scales_.clear();
   if (scales_.size() < 2 || scales_.back().time - scales_[scales_.size() - 2].time >= kEvery) {
     if (scales_.empty() || scale.time > scales_.back().time) scales_.push_back(scale);
   } else {

@@ -65,6 +65,11 @@ TEST(StateName, FollowsTheOrderOfTheErrorState) {
   EXPECT_EQ(state_name(config, 21 + 12).study, 1U);
   EXPECT_EQ(state_name(config, 21 + 18).name, "accel_scale_z");
   EXPECT_EQ(state_name(config, 21 + 19).name, "state 40");
+  config.odometry.enabled = config.gnss.enabled = true;
+  EXPECT_EQ(state_name(config, 40).name, "wheel_scale");
+  EXPECT_EQ(state_name(config, 40 + 6).name, "antenna_lever_arm_x");
+  EXPECT_EQ(state_name(config, 40 + 9).name, "receiver_latency");
+  EXPECT_EQ(state_name(config, 40 + 10).name, "state 50");
 }
 
 }  // namespace

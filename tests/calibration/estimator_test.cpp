@@ -343,20 +343,23 @@ TEST(Estimator, RejectsGnssJumpsAndSaysSo) {
   SimulatedDrive drive(100.0, {}, 8);
   Estimator estimator(drive.config());
   bool told = false;
+  std::uint64_t jumped = 0;
   while (!drive.done()) {
     const double t_s = drive.time_s();
     std::vector<Sample> samples = drive.next();
     for (Sample& sample : samples) {
-      if (sample.kind == SampleKind::kGnss && t_s > 60.0 && t_s < 63.0)
+      if (sample.kind == SampleKind::kGnss && t_s > 60.0 && t_s < 63.0) {
         sample.gnss.latitude_rad += 20.0 / 6.37e6;
+        ++jumped;
+      }
       estimator.add(sample);
     }
     estimator.advance(samples.back().arrival);
     told = told || has_event<event::GnssRejected>(estimator);
   }
   EXPECT_TRUE(told);
-  EXPECT_EQ(estimator.counters().gnss_rejected, 15U);
-  EXPECT_EQ(estimator.counters().gnss_positions_rejected, 15U);
+  EXPECT_EQ(estimator.counters().gnss_rejected, jumped);
+  EXPECT_EQ(estimator.counters().gnss_positions_rejected, jumped);
   EXPECT_LT(horizontal_error_m(estimator.navigation(), drive.motion().state_at(drive.time_s() - 0.01)), 0.05);
 }
 

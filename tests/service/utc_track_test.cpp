@@ -50,6 +50,17 @@ TEST(UtcTrack, FindsAnyInstantOfALongRunThoughTheQuartzWanders) {
   }
 }
 
+TEST(UtcTrack, WhatAReceiverToldBeforeItsDelayWasFoundIsForgotten) {
+  UtcTrack track;
+  for (int k = 0; k <= 200; ++k) {
+    TimeScale s = track_scale(0.1 * k, 0.1 * k - (k < 100 ? 0.13 : 0.0), UtcSource::kGnss);
+    s.sd_utc_s = k < 100 ? 0.1 : 0.5e-3;
+    track.add(s);
+  }
+  EXPECT_NEAR(utc_at(track, 3.0), 3.0, 1e-9);
+  EXPECT_NEAR(utc_at(track, 15.0), 15.0, 1e-9);
+}
+
 TEST(UtcTrack, ALeapSecondIsAStepAndNoSlope) {
   UtcTrack track;
   for (int k = 0; k <= 200; ++k) {
