@@ -13,14 +13,13 @@
 #include "noise/compare.h"
 #include "noise/fixed_point.h"
 #include "noise/inference.h"
+#include "noise/loose_rates.h"
 
 namespace imuscope::noise {
 namespace {
 
 /// Below this log-sd the estimate's own covariance is as good: estimates are near enough to Gaussian.
 constexpr double kQuickBelowLogSd = 0.05;
-/// A process known no better than this may have rivals elsewhere.
-constexpr double kLooseLogSd = 0.25;
 /// Logarithms: a term so much smaller than every level, or so much larger than one, can change no more.
 constexpr double kFarBelow = 9.0;
 constexpr double kFarAbove = 3.0;
@@ -440,7 +439,8 @@ void invert(ParameterEstimate& p, const Candidates& candidates, std::size_t plac
 
 }  // namespace
 
-void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels) {
+void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels,
+                      const std::vector<bool>& leaning) {
   const double two_sided = chi_squared_quantile(1.0, result.confidence);
   // The square of the Gaussian's one-sided quantile.
   const double one_sided = chi_squared_quantile(1.0, 2.0 * result.confidence - 1.0);
@@ -453,7 +453,8 @@ void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t 
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterEstimate& p = result.parameters[i];
     if (inversion.component(i).amplitude > 0.0) {
-      if (!p.log_sd || *p.log_sd > kQuickBelowLogSd) invert(p, candidates, i, two_sided, one_sided);
+      if (!p.log_sd || *p.log_sd > kQuickBelowLogSd || leaning[i])
+        invert(p, candidates, i, two_sided, one_sided);
     } else if (shape_count(inversion.component(i).kind) == 0) {
       bound_from_above(p, candidates, i, one_sided);
     }
