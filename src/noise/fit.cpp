@@ -8,6 +8,7 @@
 #include "noise/chi_squared.h"
 #include "noise/inference.h"
 #include "noise/inverted_intervals.h"
+#include "noise/loose_rates.h"
 #include "noise/nested_fit.h"
 
 namespace imuscope::noise {
@@ -223,16 +224,16 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
     result.wv.push_back({level, model_wv(result.model, level.level), 0.0, 0.0});
   const Eigen::MatrixXd whitener = optimal ? whitener_of(point.v) : interval_whitener(wv, levels);
   const Eigen::MatrixXd jacobian = wv_jacobian(result.model, problem.levels, parameter_places(result.model));
-  report_parameters(result,
-                    parameter_covariance(jacobian, point.v, whitener.transpose() * whitener,
-                                         present_parameters(result.model)),
-                    options, problem.levels.back());
+  const ParameterCovariance covariance = parameter_covariance(
+      jacobian, point.v, whitener.transpose() * whitener, present_parameters(result.model));
+  report_parameters(result, covariance, options, problem.levels.back());
+  if (optimal && whitener.size() > 0) profile_loose_rates(result, covariance, whitener);
   set_model_intervals(result, point.sampling.diagonal(), options.confidence);
   result.criterion = deviance_of(problem, result.model, point.v) +
                      std::log(static_cast<double>(levels)) * spec.parameter_count();
   if (options.intervals == Intervals::kInverted && optimal) {
     result.intervals = Intervals::kInverted;
-    invert_intervals(result, wv, levels);
+    invert_intervals(result, wv, levels, leaning_on_loose_rates(result.model, covariance));
   }
   add_warnings(result, point);
   return result;

@@ -13,14 +13,13 @@
 #include "noise/compare.h"
 #include "noise/fixed_point.h"
 #include "noise/inference.h"
+#include "noise/loose_rates.h"
 
 namespace imuscope::noise {
 namespace {
 
 /// Below this log-sd the estimate's own covariance is as good: estimates are near enough to Gaussian.
 constexpr double kQuickBelowLogSd = 0.05;
-/// A process known no better than this may have rivals elsewhere.
-constexpr double kLooseLogSd = 0.25;
 /// Logarithms: a term so much smaller than every level, or so much larger than one, can change no more.
 constexpr double kFarBelow = 9.0;
 constexpr double kFarAbove = 3.0;
@@ -107,6 +106,22 @@ class Inversion {
     }
     c.amplitude = share * least;
     estimate_[static_cast<Eigen::Index>(p)] = coordinate(p);
+  }
+
+  /// The same with terms of amplitude zero as terms that no level shows yet: what the others may be is not
+  /// bounded by a zero. Nothing where there is none, or it has a shape that nothing tells.
+  [[nodiscard]] std::optional<Inversion> with_zeros_present() const {
+    Inversion out = *this;
+    bool has_zero = false;
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (places_[p].shape >= 0 || component(p).amplitude > 0.0 || shape_count(component(p).kind) > 0)
+        continue;
+      out.make_present(p);
+      has_zero = true;
+    }
+    if (!has_zero) return std::nullopt;
+    out.best_ = out.estimate_;
+    return out;
   }
 
   /// Test that parameter p is `value`, ~ chi2 with one degree of freedom. `others` is where the search for
@@ -440,20 +455,24 @@ void invert(ParameterEstimate& p, const Candidates& candidates, std::size_t plac
 
 }  // namespace
 
-void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels) {
+void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels,
+                      const std::vector<bool>& leaning) {
   const double two_sided = chi_squared_quantile(1.0, result.confidence);
   // The square of the Gaussian's one-sided quantile.
   const double one_sided = chi_squared_quantile(1.0, 2.0 * result.confidence - 1.0);
   const CovarianceOfModels covariances(result.model, wv, levels);
   Candidates candidates{Inversion(result, covariances, levels)};
   const Inversion inversion = candidates.front();
+  const std::optional<Inversion> with_zeros = inversion.with_zeros_present();
+  if (with_zeros) candidates.push_back(*with_zeros);
   if (inversion.has_loose_markov(result)) {
     for (Inversion& rival : inversion.rivals(two_sided)) candidates.push_back(std::move(rival));
   }
   for (std::size_t i = 0; i < result.parameters.size(); ++i) {
     ParameterEstimate& p = result.parameters[i];
     if (inversion.component(i).amplitude > 0.0) {
-      if (!p.log_sd || *p.log_sd > kQuickBelowLogSd) invert(p, candidates, i, two_sided, one_sided);
+      if (!p.log_sd || *p.log_sd > kQuickBelowLogSd || leaning[i] || with_zeros)
+        invert(p, candidates, i, two_sided, one_sided);
     } else if (shape_count(inversion.component(i).kind) == 0) {
       bound_from_above(p, candidates, i, one_sided);
     }

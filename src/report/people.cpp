@@ -64,6 +64,9 @@ Html with_sd(double value, std::optional<double> sd) {
 }
 
 Html with_interval(double value, std::optional<double> low, std::optional<double> high) {
+  if (low.has_value() != high.has_value() && std::isfinite(value) && std::isfinite(high ? *high : *low))
+    return number(value) + Html::markup(" <span class=\"interval\">") + text(high ? "below " : "above ") +
+           number(high ? *high : *low) + Html::markup("</span>");
   if (!low || !high || !usable(*high - *low) || !std::isfinite(value)) return number(value);
   const double magnitude = std::max(std::abs(value), std::abs(*high));
   const int exponent = common_exponent(magnitude);

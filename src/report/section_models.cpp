@@ -284,6 +284,21 @@ Html wavelet_panels(const std::vector<Fit>& fits, const std::string& imu,
                         : element("div", panels, "panels wide");
 }
 
+/// Every model that has an entry was fitted by the same rules.
+Html interval_words(const RunFiles& run) {
+  const bool has_quick = std::any_of(run.models.begin(), run.models.end(), [](const nlohmann::json& entry) {
+    return entry.is_object() && entry.value("intervals", nlohmann::json()) == "quick";
+  });
+  if (!has_quick) return {};
+  return paragraph(
+      "The intervals are the quick ones of a run: from the estimate's own covariance, without one for a "
+      "process that "
+      "lasts less than 20 correlation times, and with “below” where a fast process may hold any part of the "
+      "white "
+      "noise. “imuscope fit” of an errors file inverts a test instead, which holds for slow and weak "
+      "processes.");
+}
+
 }  // namespace
 
 Html errors_section(const RunFiles& run, FigureSheet& figures) {
@@ -337,8 +352,8 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
             "WN: white noise; GM: first-order Gauss-Markov process (β its rate, τ = 1/β its correlation "
             "time, σ² its variance); RW: random walk; QN: quantisation noise. Ratio: the second regime's "
             "parameter over the first's.") +
-            parameter_table(run, fits, study.name, regimes) + left_out(run, study.name) +
-            fit_warnings(fits, study.name));
+            interval_words(run) + parameter_table(run, fits, study.name, regimes) +
+            left_out(run, study.name) + fit_warnings(fits, study.name));
   }
   return section;
 }

@@ -84,6 +84,7 @@ axis_noise_model_t model_message(const AxisRefit& refit) {
   message.rate_hz = fit.rate_hz;
   message.model = fit.spec.name();
   message.weights = fit.weighting == noise::Weighting::kOptimal ? "optimal" : "ci";
+  message.intervals = fit.intervals == noise::Intervals::kQuick ? "quick" : "inverted";
   message.n_parameters = element_count(fit.parameters);
   for (const auto& parameter : fit.parameters) message.parameters.push_back(parameter_message(parameter));
   message.n_levels = element_count(fit.wv);

@@ -211,6 +211,7 @@ std::vector<Bytes> model_messages(const std::filesystem::path& folder) {
       variances.unit = model.unit = text_at(one, "unit");
       variances.n = model.n = count_at(one, "n");
       model.model = text_at(one, "model");
+      model.intervals = text_at(one, "intervals");
       model.identifiable = field(one, "identifiable") == true ? 1 : 0;
       model.j_p_value = or_unknown(field(one, "j_test"), "p_value");
       const json& parameters = field(one, "parameters");

@@ -135,6 +135,7 @@ inline noise_model_t example_noise_model() {
   model.rate_hz = 100.0;
   model.model = "WN";
   model.weights = "optimal";
+  model.intervals = "quick";
   model.parameters = {white};
   model.n_parameters = element_count(model.parameters);
   model.j_p_value = 0.72;

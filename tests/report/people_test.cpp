@@ -40,6 +40,14 @@ TEST(People, AVeryOneSidedIntervalKeepsItsLowerEndAboveZero) {
             "0.00490 <span class=\"interval\">[0.00084, 0.02860]</span>");
 }
 
+TEST(People, AnEndThatIsNotKnownLeavesABound) {
+  EXPECT_EQ(with_interval(0.0049, std::nullopt, 0.0286).str(),
+            "0.004900 <span class=\"interval\">below 0.02860</span>");
+  EXPECT_EQ(with_interval(0.0049, 0.0012, std::nullopt).str(),
+            "0.004900 <span class=\"interval\">above 0.001200</span>");
+  EXPECT_EQ(with_interval(0.0049, std::nullopt, std::nullopt).str(), "0.004900");
+}
+
 TEST(People, CountsHaveTheirThousandsApart) { EXPECT_EQ(count(1234567).str(), "1\u202f234\u202f567"); }
 
 TEST(People, DurationsAreWords) {

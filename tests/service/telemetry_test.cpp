@@ -417,6 +417,7 @@ TEST(Telemetry, NoiseModelsKeepTheirParametersAndWhatIsUnknown) {
   EXPECT_EQ(model.rate_hz, 100.0);
   EXPECT_EQ(model.model, "WN+GM");
   EXPECT_EQ(model.weights, "optimal");
+  EXPECT_EQ(model.intervals, "quick");
   ASSERT_EQ(model.parameters.size(), 2U);
   EXPECT_EQ(model.parameters[0].process + model.parameters[0].name + model.parameters[0].unit,
             "WNsigma2(m/s^2)^2");
@@ -445,6 +446,7 @@ TEST(Telemetry, TheFirstModelHasNothingToBeComparedWith) {
   first.axes[1].fit->j_test.reset();
   first.axes[1].fit->identifiable = false;
   first.axes[1].fit->weighting = noise::Weighting::kCi;
+  first.axes[1].fit->intervals = noise::Intervals::kInverted;
   const auto message = noise_model_message(first);
   const axis_noise_model_t& model = message.models[0];
   for (const double unknown : {model.change_statistic, model.change_dof, model.change_p_value,
@@ -453,6 +455,7 @@ TEST(Telemetry, TheFirstModelHasNothingToBeComparedWith) {
   EXPECT_EQ(model.changed, 0);
   EXPECT_EQ(model.identifiable, 0);
   EXPECT_EQ(model.weights, "ci");
+  EXPECT_EQ(model.intervals, "inverted");
 }
 
 TEST(Telemetry, DynamicsAreStampedLikeTheModels) {

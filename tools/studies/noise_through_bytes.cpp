@@ -74,14 +74,12 @@ void add(const json& models, const json& truth, Counts& counts) {
     const json& high = p->at("ci_high");
     const std::string name = fmt::format("{}.{}", model.at("regime").get<std::string>(),
                                          model.at("axis").get<std::string>().substr(0, 4));
-    const bool told = !low.is_null() && !high.is_null();
+    const bool told = !low.is_null() || !high.is_null();
+    const bool held =
+        (low.is_null() || low.get<double>() <= *value) && (high.is_null() || *value <= high.get<double>());
     imuscope::count(counts, name + ".told", told);
-    imuscope::count(
-        counts, name,
-        (low.is_null() || low.get<double>() <= *value) && (high.is_null() || *value <= high.get<double>()));
-    if (!told) continue;
-    imuscope::count(counts, model.at("regime").get<std::string>() + ".of_told",
-                    low.get<double>() <= *value && *value <= high.get<double>());
+    imuscope::count(counts, name, held);
+    if (told) imuscope::count(counts, model.at("regime").get<std::string>() + ".of_told", held);
   }
 }
 
