@@ -190,7 +190,7 @@ WaveletVariance observed_wv(const FitResult& fit) {
 
 Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double rate_hz,
                       const FitOptions& options) {
-  NestedFit models(wv, fitted_levels(wv, options));
+  NestedFit models(wv, fitted_levels(wv, options), options.covariances);
   return fit(wv, spec, rate_hz, options, models);
 }
 
@@ -232,7 +232,7 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
                      std::log(static_cast<double>(levels)) * spec.parameter_count();
   if (options.intervals == Intervals::kInverted && optimal) {
     result.intervals = Intervals::kInverted;
-    invert_intervals(result, wv, levels);
+    invert_intervals(result, wv, levels, options.covariances);
   }
   add_warnings(result, point);
   return result;

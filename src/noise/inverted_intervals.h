@@ -15,6 +15,7 @@ namespace imuscope::noise {
 /// is absent: "below", "above". A term of amplitude zero gets the
 /// upper end of its amplitude. Cost: tens of milliseconds a parameter.
 /// @param result  fitted to the first `levels` of `wv` with optimal weights
-void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels);
+void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels,
+                      CovarianceTables* tables);
 
 }  // namespace imuscope::noise
