@@ -384,13 +384,15 @@ Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& w
   const auto of_means = [&](const PairOfLevels& pair) {
     return 4.0 * (0.5 * parts.ramp * pair.n_j) * (0.5 * parts.ramp * pair.n_k);
   };
+  std::vector<double> white_at;  // of each resonance, the n from which it is
+  for (const Oscillation& o : parts.oscillations) white_at.push_back(white_from(o));
   // What is white on this pair alone: missing samples, resonances that are slow beside neither level.
   Eigen::VectorXd white(count);
   for (Eigen::Index p = 0; p < count; ++p) {
     const PairOfLevels& pair = pairs[static_cast<std::size_t>(p)];
     white[p] = white_of_missing(wv.levels[pair.j], wv.levels[pair.k]);
-    for (const Oscillation& o : parts.oscillations) {
-      if (pair.shorter() >= white_from(o)) white[p] += 2.0 * o.linear;
+    for (std::size_t o = 0; o < white_at.size(); ++o) {
+      if (pair.shorter() >= white_at[o]) white[p] += 2.0 * parts.oscillations[o].linear;
     }
     squares[p] += white[p] * with_white[p] + white[p] * white[p] * white_squares[p];
     if (parts.ramp != 0.0) squares[p] += of_means(pair) * (means[p] + white[p] * mean(kWhite)[p]);
@@ -404,13 +406,11 @@ Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& w
     for (std::size_t i = 0; i < nodes.pairs().size(); ++i) {
       const PairOfLevels& pair = nodes.pairs()[i];
       const auto p = static_cast<Eigen::Index>(nodes.numbers()[i]);
-      if (std::ranges::all_of(parts.oscillations,
-                              [&](const Oscillation& o) { return pair.shorter() >= white_from(o); }))
-        continue;
+      if (std::ranges::all_of(white_at, [&](double at) { return pair.shorter() >= at; })) continue;
       Eigen::VectorXd c = white[p] * of_white.segment(nodes.begin(i), nodes.size(i));
       for (const auto& [weight, values] : rest) c += weight * values->segment(nodes.begin(i), nodes.size(i));
-      for (const Oscillation& o : parts.oscillations) {
-        if (pair.shorter() < white_from(o)) nodes.add_oscillation(o, i, c);
+      for (std::size_t o = 0; o < white_at.size(); ++o) {
+        if (pair.shorter() < white_at[o]) nodes.add_oscillation(parts.oscillations[o], i, c);
       }
       const auto w = nodes.weights().segment(nodes.begin(i), nodes.size(i));
       squares[p] = 2.0 * w.cwiseProduct(c).dot(c) + of_means(pair) * w.dot(c);

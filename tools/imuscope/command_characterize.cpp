@@ -236,7 +236,8 @@ void add_characterize(CLI::App& app, Work& chosen) {
       ->add_option("FILE", options->files,
                    "A log at rest: CSV in any columns; raw float64 named after its axis (gyro_x_degps.f64), "
                    "one file an axis; "
-                   "or the folder of a study. Several logs: several units of one sensor, or several days")
+                   "a capture (each of its IMUs); or the folder of a study. Several logs: several units of "
+                   "one sensor, or several days")
       ->required();
   command->add_option("--rate,-r", options->choice.signal.rate_hz,
                       "Samples per second (default: by the time stamps)");
@@ -256,7 +257,8 @@ void add_characterize(CLI::App& app, Work& chosen) {
                       "m/s^2 or g, where neither names nor the size of gravity tell");
   command->add_option("--temperature", options->choice.temperature,
                       "Column with the sensor's temperature, degC (default: by its name; none: none)");
-  command->add_option("--name,-n", options->choice.imu, "The IMU, where the folder of a study holds several");
+  command->add_option("--name,-n", options->choice.imu,
+                      "The IMU, where a capture or the folder of a study holds several");
   command->add_option("--regime", options->choice.regime, "Of the folder of a study: a regime, or all")
       ->capture_default_str();
   command->add_option("--sensor", options->sensor, "Name of the sensor on the page (default: the file's)");
