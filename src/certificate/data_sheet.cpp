@@ -10,6 +10,7 @@
 #include <optional>
 #include <string_view>
 
+#include "base/json_text.h"
 #include "base/units.h"
 
 namespace imuscope::certificate {
@@ -66,7 +67,7 @@ std::string text_of(const json& value, const char* key) {
   const auto at = value.find(key);
   if (at == value.end()) return {};
   if (at->is_string()) return at->get<std::string>();
-  return at->is_number() ? at->dump() : std::string();
+  return at->is_number() ? json_text(*at) : std::string();
 }
 
 bool is_axes(const std::string& axes) {

@@ -220,7 +220,8 @@ TEST_F(Characterize, EachImuOfACaptureIsARecord) {
   EXPECT_EQ(run({capture, "--no-page", "--name", "nobody"}), 2);
   EXPECT_THAT(output(), HasSubstr("there is airins, mtx1"));
   std::ofstream(folder_ / "none.lcm") << "no capture";
-  EXPECT_EQ(run({(folder_ / "none.lcm").string(), "--no-page"}), 1);
+  EXPECT_NE(run({(folder_ / "none.lcm").string(), "--no-page"}), 0);
+  EXPECT_THAT(output(), HasSubstr("none.lcm"));
 }
 
 TEST_F(Characterize, BadInputGetsASentence) {
