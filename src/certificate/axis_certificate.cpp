@@ -12,6 +12,7 @@
 #include "base/units.h"
 #include "certificate/candidate_models.h"
 #include "certificate/record_checks.h"
+#include "noise/covariance_table.h"
 #include "noise/fixed_point.h"
 #include "noise/homogeneity.h"
 
@@ -48,11 +49,13 @@ void add_moments(AxisCertificate& out, std::span<const double> x, std::span<cons
 }
 
 Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisRecord& record,
-                                   bool has_resonance, const AxisOptions& options) {
+                                   bool has_resonance, const AxisOptions& options,
+                                   noise::CovarianceTables& covariances) {
   noise::FitOptions fit_options;
   fit_options.confidence = options.confidence;
   fit_options.signal_unit = noise::unit_name(record.unit);
   fit_options.intervals = Intervals::kInverted;
+  fit_options.covariances = &covariances;
   if (!options.model.empty()) {
     const auto spec = noise::parse_model(options.model);
     if (!spec) return tl::unexpected(spec.error());
@@ -132,9 +135,8 @@ Error named(const AxisRecord& record, Error error) {
   return error;
 }
 
-}  // namespace
-
-Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOptions& options) {
+Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions& options,
+                                     noise::CovarianceTables& covariances) {
   const std::vector<std::uint8_t> mask = mask_of(record);
   AxisCertificate out;
   out.name = record.name;
@@ -166,7 +168,7 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
   wv_options.confidence = options.confidence;
   const auto wv = noise::haar_wavelet_variance(x, wv_options);
   if (!wv) return tl::unexpected(named(record, wv.error()));
-  auto grown = model_of(*wv, record, !out.resonances.empty(), options);
+  auto grown = model_of(*wv, record, !out.resonances.empty(), options, covariances);
   if (!grown) return tl::unexpected(named(record, grown.error()));
   out.fit = std::move(grown->best);
   for (const FitResult& rival : grown->rivals) out.rivals.push_back(rival.spec.name());
@@ -192,15 +194,23 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
   return out;
 }
 
+}  // namespace
+
+Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOptions& options) {
+  noise::CovarianceTables covariances;
+  return characterize(record, options, covariances);
+}
+
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
                                                        const AxisOptions& options, const AxisDone& told) {
   std::vector<Result<AxisCertificate>> out(records.size(), work_error("not looked at"));
   std::vector<std::size_t> index(records.size());
   std::iota(index.begin(), index.end(), std::size_t{0});
+  noise::CovarianceTables covariances;
   std::mutex telling;
   std::size_t done = 0;
   std::for_each(std::execution::par, index.begin(), index.end(), [&](std::size_t i) {
-    out[i] = characterize_axis(records[i], options);
+    out[i] = characterize(records[i], options, covariances);
     if (!told) return;
     const std::scoped_lock lock(telling);
     told(++done);

@@ -191,7 +191,7 @@ WaveletVariance observed_wv(const FitResult& fit) {
 
 Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double rate_hz,
                       const FitOptions& options) {
-  NestedFit models(wv, fitted_levels(wv, options));
+  NestedFit models(wv, fitted_levels(wv, options), options.covariances);
   return fit(wv, spec, rate_hz, options, models);
 }
 
@@ -233,7 +233,8 @@ Result<FitResult> fit(const WaveletVariance& wv, const ModelSpec& spec, double r
                      std::log(static_cast<double>(levels)) * spec.parameter_count();
   if (options.intervals == Intervals::kInverted && optimal) {
     result.intervals = Intervals::kInverted;
-    invert_intervals(result, wv, levels, leaning_on_loose_rates(result.model, covariance));
+    invert_intervals(result, wv, levels, leaning_on_loose_rates(result.model, covariance),
+                     options.covariances);
   }
   add_warnings(result, point);
   return result;

@@ -16,6 +16,8 @@
 
 namespace imuscope::noise {
 
+class CovarianceTables;
+
 enum class Weighting : std::uint8_t {
   kOptimal,  ///< inverse of the wavelet variance's covariance under the model itself, iterated
   kCi,       ///< 1 / (interval width)^2, diagonal: what the reference packages use
@@ -36,7 +38,10 @@ struct FitOptions {
   Intervals intervals = Intervals::kQuick;
   int levels = 0;  ///< use only the first so many levels; 0: all
   double confidence = 0.95;
-  std::string signal_unit{};              ///< as printed with the parameters: "rad/s", "m/s^2", "deg/s"
+  std::string signal_unit{};  ///< as printed with the parameters: "rad/s", "m/s^2", "deg/s"
+  /// Covariances of many models are taken from tables here, which fits of records of one length share;
+  /// nothing: each is computed by itself.
+  CovarianceTables* covariances = nullptr;
   const FitResult* warm_start = nullptr;  ///< an earlier fit of the same model: polish from it, no grid
 };
 

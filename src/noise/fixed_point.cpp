@@ -91,7 +91,7 @@ double spare_levels(const WeightedProblem& problem, const Model& model) {
 
 /// What belongs to `point`'s model: its sampling covariance and its error, exactly there.
 void complete_with_model_error(const WeightedProblem& problem, FixedPoint& point) {
-  point.sampling = sampling_covariance(point.model, problem.wv, problem.levels());
+  point.sampling = sampling_covariance(point.model, problem.wv, problem.levels(), problem.table);
   const Eigen::VectorXd residual = residual_of(problem.problem, point.model);
   const Eigen::VectorXd scale2 = scale2_of(problem.problem.y, problem.problem.y - residual);
   const double dof = spare_levels(problem, point.model);
@@ -156,8 +156,9 @@ Eigen::VectorXd residual_of(const SeparableProblem& problem, const Model& model)
   return residual;
 }
 
-Eigen::MatrixXd sampling_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels) {
-  Eigen::MatrixXd v = wv_covariance(model, wv, levels);
+Eigen::MatrixXd sampling_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels,
+                                    const CovarianceTable* table) {
+  Eigen::MatrixXd v = table != nullptr ? table->of(model, wv) : wv_covariance(model, wv, levels);
   for (Eigen::Index i = 0; i < v.rows(); ++i) {
     const double value = model_wv(model, wv.levels[static_cast<std::size_t>(i)].level);
     v(i, i) += kRidge * (v(i, i) + kRidge * value * value);
@@ -168,7 +169,7 @@ Eigen::MatrixXd sampling_covariance(const Model& model, const WaveletVariance& w
 FixedPoint settle(WeightedProblem& problem, const Model& start, bool search) {
   FixedPoint point;
   point.model = start;
-  point.sampling = sampling_covariance(start, problem.wv, problem.levels());
+  point.sampling = sampling_covariance(start, problem.wv, problem.levels(), problem.table);
   point.settled = false;
   Eigen::MatrixXd weights = point.sampling;
   Eigen::VectorXd curve = curve_of_model(problem.problem, start);
@@ -188,7 +189,7 @@ FixedPoint settle(WeightedProblem& problem, const Model& start, bool search) {
     point.settled = moved <= kSettledShareOfSd;
     // Where the weights are the last model's own and it has not moved, they are this one's.
     if (point.settled && round <= kUndampedRounds) break;
-    point.sampling = sampling_covariance(point.model, problem.wv, problem.levels());
+    point.sampling = sampling_covariance(point.model, problem.wv, problem.levels(), problem.table);
     if (point.settled) break;
     weights += step_of_round(round) * (point.sampling - weights);
   }
@@ -213,7 +214,7 @@ FixedPoint settle_with_model_error(WeightedProblem& problem, const std::optional
   double share2 = share * share;
   Roaming roaming;
   for (int i = 0; i < kCovariances && !point.settled; ++i) {
-    point.sampling = sampling_covariance(point.model, problem.wv, problem.levels());
+    point.sampling = sampling_covariance(point.model, problem.wv, problem.levels(), problem.table);
     const Eigen::VectorXd before = curve_of_model(p, point.model);
     if (!follow_with_scaled_covariance(problem, point, share2, !start && i == 0)) break;
     const Eigen::VectorXd now = curve_of_model(p, point.model);

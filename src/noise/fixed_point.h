@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "noise/covariance_table.h"
 #include "noise/separable_fit.h"
 #include "noise/wavelet_variance.h"
 
@@ -27,6 +28,7 @@ struct FixedPoint {
 struct WeightedProblem {
   const WaveletVariance& wv;
   SeparableProblem problem;
+  const CovarianceTable* table = nullptr;  ///< of `wv`; nothing: wv_covariance()
 
   [[nodiscard]] std::size_t levels() const { return problem.levels.size(); }
 };
@@ -41,7 +43,9 @@ Eigen::VectorXd residual_of(const SeparableProblem& problem, const Model& model)
 Eigen::MatrixXd whitener_of(const Eigen::MatrixXd& v);
 
 /// wv_covariance() made positive definite.
-Eigen::MatrixXd sampling_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels);
+/// @param table  of `wv`, to take it from
+Eigen::MatrixXd sampling_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels,
+                                    const CovarianceTable* table = nullptr);
 
 /// Weights from the model's own covariance, iterated from `start` until a round moves no level by more than a
 /// small part of its sd. The first round searches all rates where `search` is set.

@@ -31,29 +31,37 @@ constexpr double kBeyond = 12.0;
 /// whose coefficients lie in one run (G-41), which takes a small part of the time.
 class CovarianceOfModels {
  public:
-  CovarianceOfModels(const Model& model, const WaveletVariance& wv, std::size_t rows)
+  CovarianceOfModels(const Model& model, const WaveletVariance& wv, std::size_t rows,
+                     CovarianceTables* tables)
       : wv_(wv), in_one_run_(wv), rows_(rows) {
     const bool has_stretches =
         wv.segments.size() > 1 ||
         std::any_of(wv.levels.begin(), wv.levels.end(), [](const WvLevel& l) { return !l.places.empty(); });
-    if (!has_stretches) return;
-    in_one_run_.segments.clear();
-    for (WvLevel& level : in_one_run_.levels) level.places.clear();
-    factor_ =
-        sampling_covariance(model, wv_, rows).cwiseQuotient(sampling_covariance(model, in_one_run_, rows));
+    if (has_stretches) {
+      in_one_run_.segments.clear();
+      for (WvLevel& level : in_one_run_.levels) level.places.clear();
+    }
+    if (tables != nullptr) table_ = tables->of(in_one_run_, rows);
+    if (has_stretches) factor_ = sampling_covariance(model, wv_, rows).cwiseQuotient(of_one_run(model));
   }
 
   [[nodiscard]] Eigen::MatrixXd of(const Model& model) const {
-    if (factor_.size() == 0 || !factor_.allFinite()) return sampling_covariance(model, wv_, rows_);
-    Eigen::MatrixXd v = factor_.cwiseProduct(sampling_covariance(model, in_one_run_, rows_));
+    if (factor_.size() == 0) return of_one_run(model);
+    if (!factor_.allFinite()) return sampling_covariance(model, wv_, rows_);
+    Eigen::MatrixXd v = factor_.cwiseProduct(of_one_run(model));
     // A product of entries need not be a covariance.
     return v.llt().info() == Eigen::Success ? v : sampling_covariance(model, wv_, rows_);
   }
 
  private:
+  [[nodiscard]] Eigen::MatrixXd of_one_run(const Model& model) const {
+    return sampling_covariance(model, in_one_run_, rows_, table_.get());
+  }
+
   const WaveletVariance& wv_;
   WaveletVariance in_one_run_;
   std::size_t rows_;
+  std::shared_ptr<const CovarianceTable> table_;
   Eigen::MatrixXd factor_;
 };
 
@@ -456,11 +464,11 @@ void invert(ParameterEstimate& p, const Candidates& candidates, std::size_t plac
 }  // namespace
 
 void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels,
-                      const std::vector<bool>& leaning) {
+                      const std::vector<bool>& leaning, CovarianceTables* tables) {
   const double two_sided = chi_squared_quantile(1.0, result.confidence);
   // The square of the Gaussian's one-sided quantile.
   const double one_sided = chi_squared_quantile(1.0, 2.0 * result.confidence - 1.0);
-  const CovarianceOfModels covariances(result.model, wv, levels);
+  const CovarianceOfModels covariances(result.model, wv, levels, tables);
   Candidates candidates{Inversion(result, covariances, levels)};
   const Inversion inversion = candidates.front();
   const std::optional<Inversion> with_zeros = inversion.with_zeros_present();

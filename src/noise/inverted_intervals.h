@@ -20,6 +20,6 @@ namespace imuscope::noise {
 /// @param result   fitted to the first `levels` of `wv` with optimal weights
 /// @param leaning  its parameters that lean on loose rates
 void invert_intervals(FitResult& result, const WaveletVariance& wv, std::size_t levels,
-                      const std::vector<bool>& leaning);
+                      const std::vector<bool>& leaning, CovarianceTables* tables);
 
 }  // namespace imuscope::noise

@@ -134,7 +134,7 @@ std::optional<JTest> j_test_of(const WaveletVariance& wv, const SeparableProblem
 }
 
 WeightedProblem NestedFit::problem_of(const ModelSpec& spec) const {
-  WeightedProblem problem{wv_, unweighted_problem(wv_, spec, levels_)};
+  WeightedProblem problem{wv_, unweighted_problem(wv_, spec, levels_), table_.get()};
   problem.problem.whitener = rough_whitener(wv_, levels_);
   return problem;
 }

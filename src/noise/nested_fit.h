@@ -4,6 +4,7 @@
 /// that a model never explains the data worse than a part of itself does.
 
 #include <map>
+#include <memory>
 #include <string>
 
 #include "noise/fit.h"
@@ -27,7 +28,9 @@ struct TestedPoint {
 class NestedFit {
  public:
   /// The first `levels` of `wv`, which must outlive this.
-  NestedFit(const WaveletVariance& wv, std::size_t levels) : wv_(wv), levels_(levels) {}
+  /// @param tables  to take covariances from; nothing: each is computed by itself
+  NestedFit(const WaveletVariance& wv, std::size_t levels, CovarianceTables* tables)
+      : wv_(wv), levels_(levels), table_(tables != nullptr ? tables->of(wv, levels) : nullptr) {}
 
   [[nodiscard]] std::size_t levels() const { return levels_; }
 
@@ -48,6 +51,7 @@ class NestedFit {
 
   const WaveletVariance& wv_;
   std::size_t levels_;
+  std::shared_ptr<const CovarianceTable> table_;
   std::map<std::string, TestedPoint> known_;
 };
 

@@ -148,6 +148,15 @@ ColumnVector nnls_from_gram(const Gram& gram, const ColumnVector& projected) {
   return lawson_hanson(GramSolver(gram, projected), projected.size());
 }
 
-ColumnVector nnls(const Design& a, const RowVector& y) { return lawson_hanson(QrSolver(a, y), a.cols()); }
+ColumnVector nnls(const Design& a, const RowVector& y) {
+  const QrSolver solver(a, y);
+  // Where all amplitudes of the unconstrained solution are plainly positive, it is the one.
+  constexpr double kPlainly = 1e-9;
+  Active all{};
+  std::fill_n(all.begin(), a.cols(), true);
+  ColumnVector z(a.cols());
+  if (a.cols() > 0 && solver.solve(all, z) && z.minCoeff() > kPlainly * z.maxCoeff()) return z;
+  return lawson_hanson(solver, a.cols());
+}
 
 }  // namespace imuscope::noise

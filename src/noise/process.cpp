@@ -145,7 +145,7 @@ ComplexCurve complex_exponential_wv(Complex s, double n) {
   Complex numerator;
   Complex d_numerator;
   const Complex z = std::exp(-s);
-  if (n * std::abs(s) < kSeriesBelow) {
+  if (n * n * std::norm(s) < kSeriesBelow * kSeriesBelow) {
     constexpr double kRelativeStop = 1e-18;
     constexpr int kMaxTerms = 80;
     Complex p_next = 1.0, p_double = 1.0, p_one = 1.0, p_two = 1.0;
@@ -164,14 +164,17 @@ ComplexCurve complex_exponential_wv(Complex s, double n) {
       if (std::abs(term) * order < kRelativeStop * std::abs(numerator)) break;
     }
   } else {
-    const Complex z_n = std::exp(-n * s);
+    // Below this the power is lost beside one.
+    constexpr double kNothing = 60.0;
+    const Complex z_n = n * s.real() < kNothing ? std::exp(-n * s) : 0.0;
     numerator = n * (1.0 - z * z) - z * (1.0 - z_n) * (3.0 - z_n);
     d_numerator = 2.0 * n * z * z + z * (1.0 - z_n) * (3.0 - z_n) - z * n * z_n * (4.0 - 2.0 * z_n);
   }
   const Complex one_less = 1.0 - z;
-  const Complex denominator = 2.0 * n * n * one_less * one_less;
-  const Complex value = numerator / denominator;
-  return {value, d_numerator / denominator - value * 2.0 * z / one_less};
+  const Complex inverse = std::conj(one_less) / std::norm(one_less);
+  const Complex scale = inverse * inverse / (2.0 * n * n);
+  const Complex value = numerator * scale;
+  return {value, d_numerator * scale - value * 2.0 * z * inverse};
 }
 
 /// ln of Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) over m^(2x), by Stirling's series in 1/m^2; m >=

@@ -85,7 +85,7 @@ class Grower {
         rate_hz_(rate_hz),
         options_(options),
         wv_(wv),
-        models_(wv, fitted_levels(wv, options)) {
+        models_(wv, fitted_levels(wv, options), options.covariances) {
     options_.intervals = Intervals::kQuick;
   }
 
@@ -329,7 +329,7 @@ void order_by_parsimony(std::vector<CrossValidated>& ranked) {
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options) {
   std::vector<RankedModel> ranked;
-  NestedFit models(wv, fitted_levels(wv, options));
+  NestedFit models(wv, fitted_levels(wv, options), options.covariances);
   for (const ModelSpec& spec : sub_models(full)) {
     auto fitted = fit(wv, spec, rate_hz, options, models);
     if (!fitted) return tl::unexpected(fitted.error());
@@ -345,7 +345,10 @@ Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const Mo
 
 Result<GrownModel> grow_model(const WaveletVariance& wv, std::span<const ProcessKind> terms, double rate_hz,
                               const FitOptions& options) {
-  auto grown = Grower(wv, terms, rate_hz, options).run();
+  CovarianceTables own;
+  FitOptions growing = options;
+  if (growing.covariances == nullptr) growing.covariances = &own;
+  auto grown = Grower(wv, terms, rate_hz, growing).run();
   if (!grown || options.intervals == Intervals::kQuick) return grown;
   FitOptions again = options;
   again.warm_start = &grown->best;

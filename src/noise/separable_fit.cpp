@@ -81,17 +81,32 @@ struct Evaluation {
       slope;  ///< of each process by its shape values, not whitened
 };
 
+/// Whitened columns of the processes that have no shape: one of no size where it has.
+std::vector<RowVector> fixed_columns(const SeparableProblem& problem) {
+  std::vector<RowVector> columns;
+  for (const ProcessKind kind : problem.spec.processes)
+    columns.push_back(shape_count(kind) == 0
+                          ? RowVector(problem.whitener * curve_of(problem, kind, Shape{}).value)
+                          : RowVector());
+  return columns;
+}
+
+/// @param fixed  those of fixed_columns()
 Evaluation evaluate(const SeparableProblem& problem, const RowVector& target,
-                    const std::vector<Shape>& shapes) {
+                    const std::vector<RowVector>& fixed, const std::vector<Shape>& shapes) {
   Evaluation e;
   const auto p = static_cast<Eigen::Index>(shapes.size());
   e.columns.resize(target.size(), p);
   e.length.resize(p);
   for (Eigen::Index i = 0; i < p; ++i) {
     const auto k = static_cast<std::size_t>(i);
-    const Curve curve = curve_of(problem, problem.spec.processes[k], shapes[k]);
-    e.slope[k] = curve.slope;
-    e.columns.col(i) = problem.whitener * curve.value;
+    if (fixed[k].size() > 0) {
+      e.columns.col(i) = fixed[k];
+    } else {
+      const Curve curve = curve_of(problem, problem.spec.processes[k], shapes[k]);
+      e.slope[k] = curve.slope;
+      e.columns.col(i) = problem.whitener * curve.value;
+    }
     e.length[i] = e.columns.col(i).norm();
     e.columns.col(i) /= e.length[i];
   }
@@ -105,7 +120,10 @@ Evaluation evaluate(const SeparableProblem& problem, const RowVector& target,
 class Polisher {
  public:
   Polisher(const SeparableProblem& problem, const std::vector<Coordinate>& coordinates)
-      : problem_(problem), coordinates_(coordinates), target_(problem.whitener * problem.y) {}
+      : problem_(problem),
+        coordinates_(coordinates),
+        target_(problem.whitener * problem.y),
+        fixed_(fixed_columns(problem)) {}
 
   Evaluation run(ColumnVector& u) const {
     constexpr int kMaxSteps = 200;
@@ -121,7 +139,10 @@ class Polisher {
       while (damping < 1e12) {
         Gram damped = normal;
         for (Eigen::Index i = 0; i < u.size(); ++i) damped(i, i) += damping * normal(i, i) + 1e-300;
-        ColumnVector next = u + ColumnVector(damped.ldlt().solve(gradient)).cwiseMax(-2.0).cwiseMin(2.0);
+        const ColumnVector move = ColumnVector(damped.ldlt().solve(gradient)).cwiseMax(-2.0).cwiseMin(2.0);
+        // Twice what the step can gain at most.
+        if (gradient.dot(move) <= kRelativeStop * now.objective) break;
+        ColumnVector next = u + move;
         clamp(next);
         const Evaluation trial = at(next);
         if (trial.objective < now.objective) {
@@ -141,7 +162,7 @@ class Polisher {
 
  private:
   [[nodiscard]] Evaluation at(const ColumnVector& u) const {
-    return evaluate(problem_, target_, shapes_at(problem_, coordinates_, u));
+    return evaluate(problem_, target_, fixed_, shapes_at(problem_, coordinates_, u));
   }
 
   void clamp(ColumnVector& u) const {
@@ -181,6 +202,7 @@ class Polisher {
   const SeparableProblem& problem_;
   const std::vector<Coordinate>& coordinates_;
   RowVector target_;
+  std::vector<RowVector> fixed_;
 };
 
 /// The objective over the whole grid of coordinates.
@@ -458,11 +480,12 @@ std::vector<Model> with_one_more(const SeparableProblem& problem, const Model& s
     Model model;
   };
   std::vector<Candidate> candidates;
+  const std::vector<RowVector> fixed = fixed_columns(problem);
   for (const Shape& shape : tried) {
     Model model = with(shape);
     std::vector<Shape> shapes;
     for (const Component& c : model.components) shapes.push_back(c.shape);
-    candidates.push_back({evaluate(problem, target, shapes).objective, std::move(model)});
+    candidates.push_back({evaluate(problem, target, fixed, shapes).objective, std::move(model)});
   }
   std::vector<Model> kept{candidates.front().model};
   std::stable_sort(candidates.begin(), candidates.end(),

@@ -54,6 +54,32 @@ GnuplotScript density_block(const GnuplotScript& name, const json& axis, double 
   return block.add("EOD\n");
 }
 
+/// What a data sheet states of the triad as its Allan deviation would be: N falling, B level (T-1).
+GnuplotScript stated_plots(const json& certificate, bool gyro) {
+  GnuplotScript plots;
+  constexpr double kRootHour = 60.0;
+  constexpr double kFlickerAllanDeviation = 0.664;  // IEEE Std 952
+  bool walk = false;
+  bool bias = false;
+  for (const auto& row : field(field(certificate, "comparison"), "rows")) {
+    if (text_at(row, "axis").starts_with("gyro") != gyro) continue;
+    const std::string symbol = text_at(row, "symbol");
+    const double stated = number_at(row, "stated").value_or(std::nan(""));
+    if (symbol == "N" && !walk) {
+      plots.add(", {}/sqrt(x) with lines linewidth 2 linecolor rgb '#808080' title 'data sheet, N'",
+                GnuplotNumber{stated / kRootHour});
+      walk = true;
+    }
+    if (symbol == "B" && !bias) {
+      const double level = stated * (gyro ? 1.0 / kSecondsPerHour : kMps2PerMicroG) * kFlickerAllanDeviation;
+      plots.add(", {}+0*x with lines linewidth 2 dashtype 3 linecolor rgb '#808080' title 'data sheet, B'",
+                GnuplotNumber{level});
+      bias = true;
+    }
+  }
+  return plots;
+}
+
 /// Allan deviations of the gyroscopes or of the accelerometers in one picture.
 Picture overview_picture(const json& certificate, bool gyro) {
   Picture picture{gyro ? "allan_gyroscopes" : "allan_accelerometers", 1, 1, {}};
@@ -80,6 +106,7 @@ Picture overview_picture(const json& certificate, bool gyro) {
     ++n;
   }
   if (plots.empty()) return picture;
+  plots += stated_plots(certificate, gyro);
   picture.body.add("set ylabel {}\nplot {}\n", GnuplotText("Allan deviation, " + unit), plots);
   return picture;
 }

@@ -93,6 +93,24 @@ Html units_section(const json& certificate) {
   return element("h2", text("All records")) + table.html();
 }
 
+/// What the maker states beside what the record shows.
+Html data_sheet_section(const json& certificate) {
+  const json& comparison = field(certificate, "comparison");
+  if (!comparison.is_object()) return {};
+  Table table({text("axis"), text("term"), text("record"), text("data sheet"), text("unit"),
+               text("record is"), text("where it is stated")});
+  for (const auto& row : field(comparison, "rows")) {
+    table.add_row(
+        {text(text_at(row, "axis")), text(text_at(row, "symbol")), term_cell(row),
+         number(number_at(row, "stated"), 3) + text(text_at(row, "kind") == "maximum" ? " at most" : ""),
+         text(text_at(row, "unit")), text(text_at(row, "verdict")),
+         text(fmt::format("{}, {}, page {}", text_at(row, "document"), text_at(row, "revision"),
+                          text_at(row, "page")))});
+  }
+  const Html heading = element("h2", text("Beside the data sheet of " + text_at(comparison, "part")));
+  return heading + (table.empty() ? paragraph("It states nothing of these axes.") : table.html());
+}
+
 /// Sentences of all axes; one that several axes share stands once, with their names.
 std::vector<std::string> grouped_at(const json& certificate, const char* key) {
   std::vector<Named> sentences;
@@ -131,6 +149,7 @@ Html summary(const json& certificate, const CertificateFigures& figures) {
   Html overview;
   for (const auto& [file, words] : figures.overview) overview += figure(file, words);
   out += element("div", overview, "panels wide");
+  out += data_sheet_section(certificate);
   out += units_section(certificate);
   const auto limits = grouped_at(certificate, "limits");
   if (!limits.empty()) out += element("h2", text("What limits the numbers")) + list_of(limits, "limits");

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -171,6 +172,56 @@ TEST_F(Characterize, UnitsStandBesideEachOther) {
   EXPECT_THAT(output(), HasSubstr("All 6 records"));
   EXPECT_THAT(output(), HasSubstr("unit6 stands out: 2.0"));
   EXPECT_THAT(output(), HasSubstr("95 % are below"));
+}
+
+TEST_F(Characterize, StandsBesideADataSheet) {
+  const Columns columns{
+      "time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"};
+  const std::string file = log("static.csv", columns);
+  const auto sheet = (folder_ / "sheets.json").string();
+  // The truth is 1.031 deg/sqrt(h) and 0.12 m/s/sqrt(h): half of the first, twice the second are stated.
+  std::ofstream(sheet) << R"json({"schema": "imuscope.data_sheets/1", "parts": [{"part": "A-1", "values": [
+    {"axes": "gyro", "term": "N", "value": 0.5, "unit": "deg/sqrt(h)", "kind": "maximum",
+     "document": "DS <9>", "revision": "C", "page": "7"},
+    {"axes": "accel", "term": "N", "value": 0.24, "unit": "m/s/sqrt(h)",
+     "document": "DS <9>", "revision": "C", "page": "8"}]}]})json";
+  const auto out = folder_ / "page";
+  ASSERT_EQ(run({file, "--out", out.string(), "--data-sheet", sheet}), 0) << output();
+  EXPECT_THAT(output(), HasSubstr("stated 0.5 deg/sqrt(h) (maximum): worse; DS <9>, C, page 7"));
+  const auto certificate = nlohmann::json::parse(read_text(out / "certificate.json"));
+  ASSERT_EQ(certificate.at("comparison").at("rows").size(), 6U);
+  for (const auto& row : certificate.at("comparison").at("rows")) {
+    const bool gyro = row.at("axis").get<std::string>().starts_with("gyro");
+    EXPECT_EQ(row.at("verdict"), gyro ? "worse" : "better") << row;
+  }
+  EXPECT_THAT(read_text(out / "certificate.html"), HasSubstr("DS &lt;9&gt;, C, page 8"));
+  EXPECT_THAT(read_text(out / "figures" / "allan_gyroscopes.gp"), HasSubstr("data sheet, N"));
+  EXPECT_EQ(run({file, "--no-page", "--part", "A-1"}), 2);
+  EXPECT_EQ(run({file, "--no-page", "--data-sheet", sheet, "--part", "B-2"}), 2);
+  EXPECT_THAT(output(), HasSubstr("holds no part B-2"));
+  EXPECT_EQ(run({file, "--no-page", "--data-sheet", (folder_ / "none.json").string()}), 1);
+}
+
+TEST_F(Characterize, EachImuOfACaptureIsARecord) {
+  const auto capture = (folder_ / "golden.lcm").string();
+  const std::string unpack =
+      "gzip -dc '" + source_path("tests/golden/capture.lcm.gz").string() + "' > '" + capture + "'";
+  ASSERT_EQ(std::system(unpack.c_str()), 0);
+  ASSERT_EQ(run({capture, "--no-page", "--json", "--name", "mtx1"}), 0) << output();
+  const std::string text = output();
+  const auto certificate = nlohmann::json::parse(text.substr(text.find('{')));
+  EXPECT_EQ(certificate.at("selection"), "device mtx1");
+  ASSERT_EQ(certificate.at("axes").size(), 6U);
+  EXPECT_NEAR(certificate.at("rate_hz").get<double>(), 100.0, 0.1);
+  // The golden errors hold as many samples as the S-IMU sent while the reference was there.
+  EXPECT_GT(certificate.at("axes").at(0).at("n_samples").get<int>(), 1000);
+  ASSERT_EQ(run({capture, "--no-page", "--json"}), 0) << output();
+  EXPECT_THAT(output(), HasSubstr("device airins"));
+  EXPECT_EQ(run({capture, "--no-page", "--name", "nobody"}), 2);
+  EXPECT_THAT(output(), HasSubstr("there is airins, mtx1"));
+  std::ofstream(folder_ / "none.lcm") << "no capture";
+  EXPECT_NE(run({(folder_ / "none.lcm").string(), "--no-page"}), 0);
+  EXPECT_THAT(output(), HasSubstr("none.lcm"));
 }
 
 TEST_F(Characterize, BadInputGetsASentence) {

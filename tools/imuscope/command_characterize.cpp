@@ -5,11 +5,13 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
 #include "base/output_folder.h"
+#include "certificate/data_sheet.h"
 #include "certificate/json.h"
 #include "certificate/units.h"
 #include "certificate_table.h"
@@ -35,6 +37,8 @@ struct CharacterizeCommand {
   certificate::AxisOptions how;
   std::string sensor;
   std::filesystem::path out = "certificate";
+  std::filesystem::path data_sheet;  ///< empty: none
+  std::string part;
   bool no_page = false;
   bool pdf = false;
   std::optional<TableFormat> table;
@@ -96,6 +100,29 @@ void print_axis(const certificate::AxisCertificate& axis) {
         axis.temperature->bias_per_c_sd, unit_name(axis.unit), axis.temperature->lowest_c,
         axis.temperature->highest_c);
   }
+}
+
+void print_beside(const certificate::DataSheet& sheet, const std::vector<certificate::StatedBeside>& rows) {
+  say("\nBeside the data sheet of {}\n", sheet.part);
+  if (rows.empty()) say("  it states nothing of these axes\n");
+  for (const auto& row : rows) {
+    say("  {} {}: {}, stated {:.4g} {} ({}): {}; {}, {}, page {}\n", row.axis, symbol_of(row.measured.term),
+        shown_term(row.measured), row.stated.value, row.measured.unit,
+        row.stated.is_maximum ? "maximum" : "typical", name_of(row.verdict), row.stated.document,
+        row.stated.revision, row.stated.page);
+  }
+}
+
+Result<std::optional<certificate::DataSheet>> sheet_of(const CharacterizeCommand& options) {
+  if (options.data_sheet.empty()) {
+    if (options.part.empty()) return std::nullopt;
+    return usage_error("--part says a part of no data sheet", "give --data-sheet FILE, too");
+  }
+  std::ifstream in(options.data_sheet, std::ios::binary);
+  const auto document = nlohmann::json::parse(in, nullptr, false);
+  auto sheet = certificate::read_data_sheet(document, options.part, options.data_sheet.string());
+  if (!sheet) return tl::unexpected<Error>(sheet.error());
+  return *sheet;
 }
 
 void print_population(const std::vector<certificate::Population>& populations,
@@ -167,6 +194,8 @@ Result<std::vector<certificate::AxisCertificate>> characterize(const SensorRecor
 Result<void> run_characterize(CharacterizeCommand& options) {
   if (auto parsed = parse_axes(options); !parsed) return parsed;
   if (auto may = may_write(options); !may) return may;
+  const auto sheet = sheet_of(options);
+  if (!sheet) return tl::unexpected<Error>(sheet.error());
   ProgressBar bar;
   bar.show("reading");
   auto records = read_records(options.files, options.choice);
@@ -181,6 +210,7 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     const std::string name = options.sensor.empty() || records->size() > 1 ? record.name : options.sensor;
     documents.push_back(
         certificate::to_json({name, record.files, record.selection, now_utc(), IMUSCOPE_VERSION}, *axes));
+    if (*sheet) documents.back()["comparison"] = to_json(**sheet, beside(**sheet, *axes));
     all.push_back(std::move(*axes));
   }
   const auto populations = certificate::population_of(all, options.how.confidence);
@@ -195,6 +225,7 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     for (const auto& axis : all[i]) {
       for (const auto& limit : axis.limits) say("  {}: {}\n", axis.name, limit);
     }
+    if (*sheet) print_beside(**sheet, beside(**sheet, all[i]));
   }
   if (options.table) {
     for (const auto& document : documents) say("{}", certificate_table(document, *options.table));
@@ -236,7 +267,8 @@ void add_characterize(CLI::App& app, Work& chosen) {
       ->add_option("FILE", options->files,
                    "A log at rest: CSV in any columns; raw float64 named after its axis (gyro_x_degps.f64), "
                    "one file an axis; "
-                   "or the folder of a study. Several logs: several units of one sensor, or several days")
+                   "a capture (each of its IMUs); or the folder of a study. Several logs: several units of "
+                   "one sensor, or several days")
       ->required();
   command->add_option("--rate,-r", options->choice.signal.rate_hz,
                       "Samples per second (default: by the time stamps)");
@@ -256,7 +288,8 @@ void add_characterize(CLI::App& app, Work& chosen) {
                       "m/s^2 or g, where neither names nor the size of gravity tell");
   command->add_option("--temperature", options->choice.temperature,
                       "Column with the sensor's temperature, degC (default: by its name; none: none)");
-  command->add_option("--name,-n", options->choice.imu, "The IMU, where the folder of a study holds several");
+  command->add_option("--name,-n", options->choice.imu,
+                      "The IMU, where a capture or the folder of a study holds several");
   command->add_option("--regime", options->choice.regime, "Of the folder of a study: a regime, or all")
       ->capture_default_str();
   command->add_option("--sensor", options->sensor, "Name of the sensor on the page (default: the file's)");
@@ -267,6 +300,9 @@ void add_characterize(CLI::App& app, Work& chosen) {
       ->capture_default_str();
   command->add_option("--out,-o", options->out, "Folder for certificate.html, certificate.json and figures")
       ->capture_default_str();
+  command->add_option("--data-sheet", options->data_sheet,
+                      "Compare with the values of a data sheet, from a JSON file (docs/noise.md)");
+  command->add_option("--part", options->part, "Part of that file, where it holds several");
   command->add_flag("--no-page", options->no_page, "Print alone");
   const std::map<std::string, TableFormat> formats{
       {"latex", TableFormat::kLatex}, {"markdown", TableFormat::kMarkdown}, {"csv", TableFormat::kCsv}};

@@ -150,8 +150,17 @@ Result<void> correlate_run(const CorrelateCommand& options) {
 }
 
 Result<void> correlate_log(const CorrelateCommand& options) {
-  auto records = read_records({options.path}, options.log);
+  RecordChoice log = options.log;
+  if (!options.names.empty()) log.imu = options.names.front();
+  auto records = read_records({options.path}, log);
   if (!records) return tl::unexpected(records.error());
+  if (records->size() > 1) {
+    return usage_error(
+        fmt::format("{} holds {} IMUs, and their axes are not those of one sensor", options.path.string(),
+                    records->size()),
+        "choose one with --name; what several on one vehicle have in common is told by the folder of its "
+        "study (imuscope process)");
+  }
   auto& axes = records->front().axes;
   std::vector<certificate::JointSignal> signals;
   std::vector<std::string> names;
@@ -187,10 +196,12 @@ void add_correlate(CLI::App& app, Work& chosen) {
       "of a log, what its axes have in common");
   auto options = std::make_shared<CorrelateCommand>();
   command
-      ->add_option("PATH", options->path,
-                   "The folder of a study, or the log of one sensor at rest as characterize reads it")
+      ->add_option(
+          "PATH", options->path,
+          "The folder of a study; or the log or capture of a sensor at rest as characterize reads it")
       ->required();
-  command->add_option("--name,-n", options->names, "S-IMUs of the run to take (default: all)");
+  command->add_option("--name,-n", options->names,
+                      "S-IMUs of the run to take (default: all); the IMU of a capture");
   command->add_option("--regime", options->regime, "Of a run: static, dynamic, another regime's name, or all")
       ->capture_default_str();
   command->add_option("--from", options->how.from_s,

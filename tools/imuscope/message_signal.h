@@ -8,13 +8,10 @@
 #include <vector>
 
 #include "base/result.h"
+#include "sample_axes.h"
 #include "signal_file.h"
 
 namespace imuscope::cli {
-
-/// "gyro_x" ... "accel_z".
-inline constexpr std::array<const char*, 6> kMessageAxes{"gyro_x",  "gyro_y",  "gyro_z",
-                                                         "accel_x", "accel_y", "accel_z"};
 
 [[nodiscard]] bool is_message_log(const std::filesystem::path& file);
 

@@ -7,10 +7,12 @@
 #include <array>
 #include <cmath>
 #include <execution>
+#include <iterator>
 #include <string_view>
 
 #include "axis_columns.h"
 #include "base/units.h"
+#include "capture_axes.h"
 #include "message_signal.h"
 
 namespace imuscope::cli {
@@ -264,6 +266,12 @@ Result<std::vector<SensorRecord>> read_records(const std::vector<std::filesystem
   for (const auto& file : files) {
     if (file.extension() == ".f64") {
       raw.push_back(file);
+      continue;
+    }
+    if (is_capture(file)) {
+      auto of_devices = read_capture_axes(file, choice);
+      if (!of_devices) return tl::unexpected(of_devices.error());
+      std::move(of_devices->begin(), of_devices->end(), std::back_inserter(records));
       continue;
     }
     auto record = std::filesystem::is_directory(file) ? read_run(file, choice)

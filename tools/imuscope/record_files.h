@@ -1,7 +1,7 @@
 #pragma once
 
 /// Files of a sensor at rest as the records of its axes: CSV in anyone's columns and units, raw float64, a
-/// topic of an MCAP file, a run folder.
+/// topic of an MCAP file, the IMUs of a capture, a run folder.
 
 #include <filesystem>
 #include <map>
@@ -21,7 +21,7 @@ struct RecordChoice {
   std::string gyro_unit;                    ///< where the names do not say
   std::string accel_unit;
   std::string temperature;        ///< column; empty: by its name; "none": none
-  std::string imu;                ///< of a run folder with several
+  std::string imu;                ///< of a run folder or capture with several
   std::string regime = "static";  ///< of a run folder
 };
 
@@ -34,9 +34,10 @@ struct SensorRecord {
   std::vector<std::string> warnings{};  ///< what is missing of the file
 };
 
-/// Raw files (.f64) named after axes, as "gyro_x_degps.f64", make one sensor; every CSV file and every run
-/// folder is one of its own. Errors: those of read_signal(), a file without an axis that can be told (columns
-/// listed), units that neither names nor gravity tell, an IMU that a run folder does not have.
+/// Raw files (.f64) named after axes, as "gyro_x_degps.f64", make one sensor; every CSV file, every run
+/// folder and every IMU of a capture is one of its own. Errors: those of read_signal(), a file without an
+/// axis that can be told (columns listed), units that neither names nor gravity tell, an IMU that a run
+/// folder does not have.
 Result<std::vector<SensorRecord>> read_records(const std::vector<std::filesystem::path>& files,
                                                const RecordChoice& choice);
 
