@@ -99,7 +99,7 @@ class MetricsServer::Impl::Client : public std::enable_shared_from_this<Client> 
     const Request request = parser_.release();
     if (server_.is_loopback && !is_of_this_pc(view_of(request[http::field::host])))
       return reply(request, http::status::forbidden, "ask this PC by its address or as localhost\n");
-    if (request.method() != http::verb::get)
+    if (request.method() != http::verb::get && request.method() != http::verb::head)
       return reply(request, http::status::method_not_allowed, "GET alone\n");
     if (request.target() != "/metrics") return reply(request, http::status::not_found, "see /metrics\n");
     const auto posted = server_.board.newest();
@@ -112,8 +112,8 @@ class MetricsServer::Impl::Client : public std::enable_shared_from_this<Client> 
     const auto response = std::make_shared<Response>(status, request.version());
     response->set(http::field::content_type, type);
     response->keep_alive(false);
-    response->body() = std::move(text);
-    response->prepare_payload();
+    response->content_length(text.size());
+    if (request.method() != http::verb::head) response->body() = std::move(text);
     stream_.expires_after(std::chrono::seconds(kPatience_s));
     http::async_write(stream_, *response, [self = shared_from_this(), response](error_code, std::size_t) {
       error_code ignored;
