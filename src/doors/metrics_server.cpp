@@ -1,134 +1,184 @@
 #include "doors/metrics_server.h"
 
-#include <arpa/inet.h>
+// Boost.Beast takes long to compile: this file is built alone.
 #include <fmt/format.h>
-#include <microhttpd.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <cerrno>
-#include <optional>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <chrono>
+#include <list>
 #include <string_view>
-#include <system_error>
+#include <thread>
 #include <utility>
 
 #include "doors/metrics_text.h"
 #include "rt/host_clock.h"
+#include "rt/thread_setup.h"
 
 namespace imuscope {
 
 namespace {
 
-/// Of one connection; a request has some hundred bytes.
-constexpr std::size_t kMemoryPerClient = 16 * 1024;
-constexpr std::size_t kStackBytes = 256 * 1024;
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+using beast::error_code;
 
-struct Address {
-  sockaddr_storage storage{};
-  bool is_ipv6 = false;
-  bool is_loopback = false;
-};
+using Request = http::request<http::empty_body>;
+using Response = http::response<http::string_body>;
 
-std::optional<Address> parse(const std::string& text, std::uint16_t port) {
-  Address address;
-  auto& v4 = reinterpret_cast<sockaddr_in&>(address.storage);
-  if (inet_pton(AF_INET, text.c_str(), &v4.sin_addr) == 1) {
-    constexpr std::uint32_t kLoopbackNet = 127;
-    v4.sin_family = AF_INET;
-    v4.sin_port = htons(port);
-    address.is_loopback = ntohl(v4.sin_addr.s_addr) >> 24U == kLoopbackNet;
-    return address;
-  }
-  auto& v6 = reinterpret_cast<sockaddr_in6&>(address.storage);
-  if (inet_pton(AF_INET6, text.c_str(), &v6.sin6_addr) == 1) {
-    v6.sin6_family = AF_INET6;
-    v6.sin6_port = htons(port);
-    address.is_ipv6 = true;
-    address.is_loopback = IN6_IS_ADDR_LOOPBACK(&v6.sin6_addr);
-    return address;
-  }
-  return std::nullopt;
-}
+/// What a client may say; a request has some hundred bytes.
+constexpr std::uint32_t kRequestMax = 16 * 1024;
+constexpr std::chrono::milliseconds kAcceptAgain{100};  // after the system had no socket left
+constexpr const char* kPlainText = "text/plain; charset=utf-8";
+
+std::string_view view_of(beast::string_view text) { return {text.data(), text.size()}; }
 
 /// Whether a Host header is this PC's own name for itself. A client without one is no browser.
-bool is_of_this_pc(const char* host) {
-  if (host == nullptr) return true;
-  const std::string_view text(host);
-  if (text.starts_with("[::1]")) return true;
-  const auto name = text.substr(0, text.find(':'));
+bool is_of_this_pc(std::string_view host) {
+  if (host.empty() || host.starts_with("[::1]")) return true;
+  const auto name = host.substr(0, host.find(':'));
   return name == "localhost" || name.starts_with("127.");
 }
 
 }  // namespace
 
 struct MetricsServer::Impl {
+  class Client;
+
   explicit Impl(const StatusBoard& from) : board(from) {}
   ~Impl() {
-    if (daemon != nullptr) MHD_stop_daemon(daemon);
+    io.stop();
+    if (thread.joinable()) thread.join();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  static MHD_Result on_request(void* self, MHD_Connection* connection, const char* url, const char* method,
-                               const char* /*version*/, const char* /*body*/, std::size_t* body_size,
-                               void** /*of_request*/) {
-    // Nobody has anything to tell: what is sent is read and forgotten, up to the memory of a client.
-    if (*body_size != 0) return MHD_NO;
-    return static_cast<const Impl*>(self)->answer(connection, url, method);
+  error_code listen(const tcp::endpoint& endpoint);
+  void serve() {
+    (void)setup_this_thread({kMetricsThreadName, Scheduling::kNormal, 0, {}});
+    io.run();
   }
-
-  MHD_Result answer(MHD_Connection* connection, std::string_view url, std::string_view method) const {
-    if (is_loopback &&
-        !is_of_this_pc(MHD_lookup_connection_value(connection, MHD_HEADER_KIND, MHD_HTTP_HEADER_HOST)))
-      return reply(connection, MHD_HTTP_FORBIDDEN, "ask this PC by its address or as localhost\n");
-    if (method != MHD_HTTP_METHOD_GET && method != MHD_HTTP_METHOD_HEAD)
-      return reply(connection, MHD_HTTP_METHOD_NOT_ALLOWED, "GET alone\n");
-    if (url != "/metrics") return reply(connection, MHD_HTTP_NOT_FOUND, "see /metrics\n");
-    const auto posted = board.newest();
-    if (!posted) return reply(connection, MHD_HTTP_SERVICE_UNAVAILABLE, "the run has just begun\n");
-    return reply(connection, MHD_HTTP_OK, metrics_text(posted->status, to_seconds(host_now() - posted->at)),
-                 kMetricsContentType);
-  }
-
-  static MHD_Result reply(MHD_Connection* connection, unsigned status, std::string text,
-                          const char* type = "text/plain; charset=utf-8") {
-    MHD_Response* const response =
-        MHD_create_response_from_buffer(text.size(), text.data(), MHD_RESPMEM_MUST_COPY);
-    if (response == nullptr) return MHD_NO;
-    MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type);
-    MHD_add_response_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
-    const MHD_Result queued = MHD_queue_response(connection, status, response);
-    MHD_destroy_response(response);
-    return queued;
-  }
+  void accept();
+  void take(tcp::socket socket);
 
   const StatusBoard& board;
   bool is_loopback = true;
-  MHD_Daemon* daemon = nullptr;
+  asio::io_context io{1};
+  tcp::acceptor acceptor{io};
+  asio::steady_timer again{io};
+  std::list<std::weak_ptr<Client>> clients;  // oldest first
+  std::thread thread;
 };
+
+/// One connection: one request, one answer. Lives as long as an operation of it is under way.
+class MetricsServer::Impl::Client : public std::enable_shared_from_this<Client> {
+ public:
+  Client(const Impl& server, tcp::socket&& socket) : server_(server), stream_(std::move(socket)) {
+    parser_.header_limit(kRequestMax);
+    parser_.body_limit(0);  // nobody has anything to tell
+  }
+
+  void read() {
+    stream_.expires_after(std::chrono::seconds(kPatience_s));
+    http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](error_code error, std::size_t) {
+      if (!error) self->answer();
+    });
+  }
+
+  void drop() {
+    error_code ignored;
+    stream_.socket().close(ignored);
+  }
+
+ private:
+  void answer() {
+    const Request request = parser_.release();
+    if (server_.is_loopback && !is_of_this_pc(view_of(request[http::field::host])))
+      return reply(request, http::status::forbidden, "ask this PC by its address or as localhost\n");
+    if (request.method() != http::verb::get && request.method() != http::verb::head)
+      return reply(request, http::status::method_not_allowed, "GET alone\n");
+    if (request.target() != "/metrics") return reply(request, http::status::not_found, "see /metrics\n");
+    const auto posted = server_.board.newest();
+    if (!posted) return reply(request, http::status::service_unavailable, "the run has just begun\n");
+    reply(request, http::status::ok, metrics_text(posted->status, to_seconds(host_now() - posted->at)),
+          kMetricsContentType);
+  }
+
+  void reply(const Request& request, http::status status, std::string text, const char* type = kPlainText) {
+    const auto response = std::make_shared<Response>(status, request.version());
+    response->set(http::field::content_type, type);
+    response->keep_alive(false);
+    response->content_length(text.size());
+    if (request.method() != http::verb::head) response->body() = std::move(text);
+    stream_.expires_after(std::chrono::seconds(kPatience_s));
+    http::async_write(stream_, *response, [self = shared_from_this(), response](error_code, std::size_t) {
+      error_code ignored;
+      self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    });
+  }
+
+  const Impl& server_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_{kRequestMax};
+  http::request_parser<http::empty_body> parser_;
+};
+
+error_code MetricsServer::Impl::listen(const tcp::endpoint& endpoint) {
+  error_code error;
+  acceptor.open(endpoint.protocol(), error);
+  if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(endpoint, error);
+  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  return error;
+}
+
+void MetricsServer::Impl::accept() {
+  acceptor.async_accept([this](error_code error, tcp::socket socket) {
+    if (!error) {
+      take(std::move(socket));
+      return accept();
+    }
+    if (error == asio::error::operation_aborted) return;
+    again.expires_after(kAcceptAgain);
+    again.async_wait([this](error_code stopped) {
+      if (!stopped) accept();
+    });
+  });
+}
+
+void MetricsServer::Impl::take(tcp::socket socket) {
+  clients.remove_if([](const std::weak_ptr<Client>& one) { return one.expired(); });
+  if (clients.size() >= kClientsMax) {
+    if (const auto oldest = clients.front().lock()) oldest->drop();
+    clients.pop_front();
+  }
+  const auto one = std::make_shared<Client>(*this, std::move(socket));
+  clients.push_back(one);
+  one->read();
+}
 
 MetricsServer::MetricsServer(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
 MetricsServer::~MetricsServer() = default;
 
 Result<std::unique_ptr<MetricsServer>> MetricsServer::open(const std::string& address, std::uint16_t port,
                                                            const StatusBoard& board) {
-  const auto parsed = parse(address, port);
-  if (!parsed)
+  error_code error;
+  const auto parsed = asio::ip::make_address(address, error);
+  if (error)
     return usage_error(fmt::format("[metrics] address = '{}' is no address", address),
                        "give 127.0.0.1, ::1 or an address of this PC; 0.0.0.0 is all of them");
   auto impl = std::make_unique<Impl>(board);
-  impl->is_loopback = parsed->is_loopback;
-  unsigned flags = MHD_USE_POLL_INTERNAL_THREAD;
-  if (parsed->is_ipv6) flags |= MHD_USE_IPv6;
-  errno = 0;
-  impl->daemon =
-      MHD_start_daemon(flags, port, nullptr, nullptr, &Impl::on_request, impl.get(), MHD_OPTION_SOCK_ADDR,
-                       &parsed->storage, MHD_OPTION_CONNECTION_LIMIT, kClientsMax,
-                       MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-                       kMemoryPerClient, MHD_OPTION_THREAD_STACK_SIZE, kStackBytes, MHD_OPTION_END);
-  if (impl->daemon == nullptr)
-    return work_error(fmt::format("metrics cannot be offered at {} port {} ({})", address, port,
-                                  std::generic_category().message(errno)),
-                      "choose another port in [metrics]; ss -ltnp shows who has it");
+  impl->is_loopback = parsed.is_loopback();
+  if (error = impl->listen({parsed, port}); error)
+    return work_error(
+        fmt::format("metrics cannot be offered at {} port {} ({})", address, port, error.message()),
+        "choose another port in [metrics]; ss -ltnp shows who has it");
+  impl->accept();
+  impl->thread = std::thread([raw = impl.get()] { raw->serve(); });
   return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(impl)));
 }
 

@@ -13,9 +13,12 @@
 
 namespace imuscope {
 
+/// Of the thread that answers, as the kernel shows it.
+inline constexpr const char* kMetricsThreadName = "imuscope-metric";
+
 class MetricsServer {
  public:
-  static constexpr unsigned kClientsMax = 8;
+  static constexpr unsigned kClientsMax = 8;  ///< one more, and the oldest goes
   static constexpr unsigned kPatience_s = 5;  ///< with a client that neither asks nor takes its answer
 
   /// Listens, and answers from a thread of its own.

@@ -1,6 +1,6 @@
 #include "view/view_server.h"
 
-// The only place that knows Boost.Beast, which takes long to compile.
+// Boost.Beast takes long to compile: this file is built alone.
 #include <unistd.h>
 #include <array>
 #include <boost/asio/io_context.hpp>

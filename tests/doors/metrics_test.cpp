@@ -28,6 +28,7 @@
 namespace imuscope {
 namespace {
 
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -154,6 +155,10 @@ TEST_F(MetricsDoor, GivesTheNewestStatusAndNothingElse) {
   EXPECT_THAT(page, StartsWith("HTTP/1.1 200"));
   EXPECT_THAT(page, HasSubstr("text/plain; version=0.0.4"));
   EXPECT_THAT(page, HasSubstr("imuscope_ticks_total 6151\n"));
+  const auto head = get("HEAD /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(head, ContainsRegex("Content-Length: [1-9]"));
+  EXPECT_TRUE(head.ends_with("\r\n\r\n")) << "a body follows the header";
   EXPECT_THAT(get("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"), StartsWith("HTTP/1.1 404"));
   EXPECT_THAT(get("GET /metrics/../etc/passwd HTTP/1.1\r\nHost: localhost\r\n\r\n"),
               StartsWith("HTTP/1.1 404"));

@@ -17,6 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 struct Outcome {
   int exit_code;
@@ -82,6 +83,17 @@ TEST(CaptureCommand, DamageIsToldWithWhatItCostsByTheCheckTheReplayAndTheRunsRec
   EXPECT_THAT(cut.out, HasSubstr("the recorder was cut off"));
   EXPECT_EQ(imuscope_in(folder, "capture repair new.lcm").exit_code, 0);
   EXPECT_EQ(imuscope_in(folder, "capture check new_repaired.lcm").exit_code, 0);
+}
+
+TEST(CaptureCommand, WhatWasRepairedIsNotSentToBeRepairedAgain) {
+  const auto folder = with_golden_capture();
+  flip_byte(folder / "golden.lcm", fs::file_size(folder / "golden.lcm") / 3);
+  EXPECT_THAT(imuscope_in(folder, "capture check golden.lcm").err, HasSubstr("capture repair"));
+  ASSERT_EQ(imuscope_in(folder, "capture repair golden.lcm --out new.lcm").exit_code, 0);
+  const auto repaired = imuscope_in(folder, "capture check new.lcm");
+  ASSERT_EQ(repaired.exit_code, 1) << repaired.out;
+  EXPECT_THAT(repaired.err, HasSubstr("what it has is whole"));
+  EXPECT_THAT(repaired.err, Not(HasSubstr("capture repair")));
 }
 
 TEST(CaptureCommand, WhatIsNoCaptureIsNamed) {

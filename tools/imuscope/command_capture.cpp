@@ -47,9 +47,13 @@ void say_check(const CaptureCheck& check, const std::string& file) {
   for (const auto& sentence : damage_of(check.summary, file)) say("{}\n", sentence);
 }
 
-/// Nothing is wrong with a capture of a version without checksums in which nothing is damaged.
-bool is_damaged(const CaptureCheck& check, const std::string& file) {
-  return !damage_of(check.summary, file).empty() ||
+/// Whether there is something to be left out of a copy. Nothing is wrong with a capture of a version without
+/// checksums in which nothing is damaged.
+bool are_files_damaged(const CaptureCheck& check, const std::string& file) {
+  CaptureSummary files_alone;
+  files_alone.files = check.summary.files;
+  files_alone.breaks = check.summary.breaks;
+  return !damage_of(files_alone, file).empty() ||
          std::any_of(check.files.begin(), check.files.end(),
                      [](const FileCheck& one) { return one.index == IndexVerdict::kDisagrees; });
 }
@@ -58,9 +62,15 @@ Result<void> check(const CaptureCommand& options) {
   const auto checked = look_through(options.file);
   if (!checked) return tl::unexpected<Error>(checked.error());
   say_check(*checked, options.file);
-  if (!is_damaged(*checked, options.file)) return {};
-  return work_error(options.file + " is not whole (above)",
-                    "replay and process use what is; imuscope capture repair copies that into a new capture");
+  if (are_files_damaged(*checked, options.file))
+    return work_error(
+        options.file + " is not whole (above)",
+        "replay and process use what is; imuscope capture repair copies that into a new capture");
+  // What never came into it, or what a repair had to leave out, no repair brings back.
+  if (!damage_of(checked->summary, options.file).empty())
+    return work_error(options.file + " lacks records (above), and what it has is whole",
+                      "replay and process use it as it is");
+  return {};
 }
 
 Result<void> repair(const CaptureCommand& options) {
