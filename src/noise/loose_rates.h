@@ -21,7 +21,7 @@ inline constexpr double kLooseLogSd = 0.25;
 /// @param parameters  of the estimate, in whatever the data determine of it
 std::vector<bool> leaning_on_loose_rates(const Model& model, const ParameterCovariance& parameters);
 
-/// G-42. Replaces the intervals of those amplitudes that lean on loose rates and are not loose themselves.
+/// G-43. Replaces the intervals of those amplitudes that lean on loose rates and are not loose themselves.
 /// Under the weights of the estimate the amplitudes are linear at each rate, so that this costs some least
 /// squares of a few columns. An interval that reaches down to zero has no lower end. Precondition: optimal
 /// weights.
