@@ -37,8 +37,6 @@ std::string protocols_of(DeviceRole role) {
 }
 
 constexpr int kMaxAveraged = 50;
-/// A table's times are those of the solutions; of them and the reference's a recorder makes one clock.
-constexpr double kRecordedLatencySd_s = 0.01;
 constexpr double kMaxBaud = 4'000'000.0;
 
 template <std::size_t N>
@@ -419,11 +417,13 @@ DeviceConfig read_device(TomlReader in, AttachedFiles& files) {
     in.number("position_sd_floor_m", device.gnss.position_sd_floor_m, 1.0, 0.0, 1e3);
     in.number("velocity_sd_floor_mps", device.gnss.velocity_sd_floor_mps, 1.0, 0.0, 1e3);
     in.number("latency_ms", device.gnss.latency_s, 1e-3, 0.0, 1e4);
-    if (traits_of(device.protocol).is_text) device.gnss.latency_sd_s = kRecordedLatencySd_s;
+    if (device.protocol == Protocol::kRtklibPos) read_rtklib(in, device.gnss);
+    // A recorder made one clock of both devices' times. Where it did not, a consumer IMU whose accelerometers
+    // are late, or that a running engine shakes, would tell a wrong latency and be sure of it.
+    if (traits_of(device.protocol).is_text || device.gnss.common_clock) device.gnss.latency_sd_s = 0.0;
     in.number("latency_sd_ms", device.gnss.latency_sd_s, 1e-3, 0.0, 1e4);
     if (device.protocol == Protocol::kNmea)
       in.number("geoid_separation_m", device.gnss.geoid_separation_m, 1.0, -200.0, 200.0);
-    if (device.protocol == Protocol::kRtklibPos) read_rtklib(in, device.gnss);
   }
   if (device.protocol == Protocol::kCanOdometry)
     read_odometry(in.table("odometry"), files, device.odometry);

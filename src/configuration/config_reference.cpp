@@ -299,9 +299,10 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.velocity_sd_floor_mps", "gnss: a receiver that claims less is not believed."},
     {"device.latency_ms", "gnss: how old a solution is on arrival, where no UTC tells."},
     {"device.latency_sd_ms",
-     "gnss: of `latency_ms`, 1 sigma. The latency is estimated with this prior. `csv_gnss`: 10. Where UTC "
-     "tags of "
-     "receiver and reference carry solutions, 1 or this, whichever is less."},
+     "gnss: of `latency_ms`, 1 sigma. The latency is estimated with this prior; 0: it is as given. "
+     "`csv_gnss` "
+     "and a common clock: 0. Where UTC tags of receiver and reference carry solutions, 1 or this, whichever "
+     "is less."},
     {"device.geoid_separation_m", "nmea: geoid above the ellipsoid, for receivers that do not send it."},
     {"device.clock", "rtklib_pos: whether a file's times are UTC or of the reference's own clock."},
     {"device.base_lat_lon_height",

@@ -98,8 +98,8 @@ TEST(Odometry, FindsScaleMountingAndLeverArmWithinItsOwnSd) {
 }
 
 TEST(Odometry, AMinuteWithoutGnssDriftsFarLessThanInertiallyAlone) {
-  const auto drift_m = [](bool speed, bool non_holonomic, bool zero_velocity) {
-    WheeledDrive drive(options_of(ReferenceClass::kIndustrial, 3));
+  const auto drift_of = [](std::uint64_t seed, bool speed, bool non_holonomic, bool zero_velocity) {
+    WheeledDrive drive(options_of(ReferenceClass::kIndustrial, seed));
     EstimatorConfig config = drive.config(drive.r_bv_b_m() - kGuessError);
     config.odometry.use_speed = speed;
     config.odometry.use_non_holonomic = non_holonomic;
@@ -115,6 +115,14 @@ TEST(Odometry, AMinuteWithoutGnssDriftsFarLessThanInertiallyAlone) {
     const Vector3d sd = eigen(estimator.navigation().sd_position_m);
     EXPECT_LT(horizontal_error_m(drive, estimator), 4.0 * sd.head<2>().norm());
     return horizontal_error_m(drive, estimator);
+  };
+  // What one minute costs is a matter of luck.
+  const auto drift_m = [&](bool speed, bool non_holonomic, bool zero_velocity) {
+    constexpr std::uint64_t kDrives = 4;
+    double sum_m2 = 0.0;
+    for (std::uint64_t seed = 1; seed <= kDrives; ++seed)
+      sum_m2 += std::pow(drift_of(seed, speed, non_holonomic, zero_velocity), 2);
+    return std::sqrt(sum_m2 / static_cast<double>(kDrives));
   };
   const double inertial_m = drift_m(false, false, false);
   EXPECT_GT(inertial_m, 2.0);
