@@ -112,6 +112,12 @@ function(imuscope_embed variable room)
     DEPENDS ${files} ${script}
     COMMENT "Embedding files of src/${room}"
     VERBATIM)
+  # For those who compile units one by one.
+  add_custom_target(embedded_in_${room} DEPENDS ${output})
+  if(NOT TARGET embedded_sources)
+    add_custom_target(embedded_sources)
+  endif()
+  add_dependencies(embedded_sources embedded_in_${room})
   set(${variable} ${output} PARENT_SCOPE)
 endfunction()
 
