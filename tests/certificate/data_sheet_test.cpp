@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 namespace imuscope::certificate {
 namespace {
@@ -17,9 +18,10 @@ json value_of(const char* axes, const char* term, double value, const char* unit
           {"kind", "typical"}, {"document", "DS-1"}, {"revision", "B"}, {"page", 4}};
 }
 
-json document_of(json values) {
+/// Not json itself: of one value in braces compilers make a copy or a list.
+json document_of(const std::vector<json>& values) {
   return {{"schema", "imuscope.data_sheets/1"},
-          {"parts", json::array({{{"part", "P1"}, {"values", std::move(values)}}})}};
+          {"parts", json::array({{{"part", "P1"}, {"values", values}}})}};
 }
 
 Result<DataSheet> read(const json& document, const std::string& part = "") {
