@@ -31,6 +31,7 @@ struct StatedUnit {
 /// sqrt(h) over sqrt(s).
 constexpr double kRootHour = 60.0;
 constexpr double kMilli = 1e-3;
+constexpr double kArcsecPerDeg = 3600.0;
 
 const std::array<StatedUnit, 21>& stated_units() {
   using enum Term;
@@ -54,7 +55,7 @@ const std::array<StatedUnit, 21>& stated_units() {
       {kRamp, true, "deg/h/h", 1.0},
       {kRamp, false, "ug/h", 1.0},
       {kQuantization, true, "arcsec", 1.0},
-      {kQuantization, true, "deg", kSecondsPerHour},
+      {kQuantization, true, "deg", kArcsecPerDeg},
       {kQuantization, false, "m/s", 1.0},
   }};
   return kUnits;
