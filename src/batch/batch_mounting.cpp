@@ -21,10 +21,6 @@ using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
 
 /// Above this neither filter of the sensors nor body is to be trusted, and vibration rules.
 constexpr double kTop_hz = 8.0;
-/// Largest share of the residual noise that is taken to be the reference's.
-constexpr double kReferenceShare = 0.5;
-/// Above this an inertial sensor's noise is white, or less with frequency; below, its bias wanders.
-constexpr double kWhiteFrom_hz = 0.5;
 /// A band's first sd of deviation, before it is learned.
 constexpr double kFirstDeviation = 0.01;
 constexpr double kLeastDeviation = 1e-5;
@@ -53,79 +49,50 @@ constexpr double kWindowsPerIndependent = 1.5;
 /// Weight, in windows, of the covariance that the noise gives against that of the scatter over time.
 constexpr double kNoiseWeight = 20.0;
 
-Eigen::MatrixXd reference_series(const Grid& grid, const Eigen::RowVectorXd& mean) {
-  Eigen::MatrixXd series(grid.motion.rows(), kReferenceColumns);
-  series.leftCols<6>() = grid.motion.rowwise() - mean;
-  series.middleCols<3>(kOmegaDot) = grid.omega_dot;
-  const auto x = grid.motion.col(0).array();
-  const auto y = grid.motion.col(1).array();
-  const auto z = grid.motion.col(2).array();
-  series.col(kProducts) = x * x;
-  series.col(kProducts + 1) = y * y;
-  series.col(kProducts + 2) = z * z;
-  series.col(kProducts + 3) = x * y;
-  series.col(kProducts + 4) = x * z;
-  series.col(kProducts + 5) = y * z;
-  return series;
-}
-
-Eigen::RowVectorXd mean_of(const Grid& grid) {
-  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(6);
+/// Mean over the instants that count.
+Eigen::RowVectorXd mean_of(const Eigen::Ref<const Eigen::MatrixXd>& series, const std::vector<char>& valid) {
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(series.cols());
   double n = 0.0;
-  for (Eigen::Index i = 0; i < grid.motion.rows(); ++i) {
-    if (grid.valid[static_cast<std::size_t>(i)] == 0) continue;
-    sum += grid.motion.row(i);
+  for (Eigen::Index i = 0; i < series.rows(); ++i) {
+    if (valid[static_cast<std::size_t>(i)] == 0) continue;
+    sum += series.row(i);
     n += 1.0;
   }
   return n > 0.0 ? Eigen::RowVectorXd(sum / n) : sum;
 }
 
-/// What the smallest of `count` chi-squared numbers of `dof` degrees of freedom is to be expected to have of
-/// their mean (Wilson and Hilferty's cube).
-double least_share(double dof, double count) {
-  constexpr double kLeastShare = 0.02;
-  const double spread = 2.0 / (9.0 * dof);
-  return std::max(kLeastShare, std::pow(1.0 - spread - std::sqrt(2.0 * std::log(count) * spread), 3));
+/// Products of the columns of a vector's series: xx, yy, zz, xy, xz, yz.
+Eigen::MatrixXd products(const Eigen::Ref<const Eigen::MatrixX3d>& v) {
+  Eigen::MatrixXd out(v.rows(), 6);
+  const auto x = v.col(0).array();
+  const auto y = v.col(1).array();
+  const auto z = v.col(2).array();
+  out << x * x, y * y, z * z, x * y, x * z, y * z;
+  return out;
 }
 
-/// B-10a: above kWhiteFrom_hz noise does not grow with frequency, and motion does fall with it: what a band
-/// shows in its quietest window is no more noise than the bands above it show, by what the low-pass leaves of
-/// each.
-void bound_by_bands_above(Problem& problem) {
-  Eigen::RowVector2d white = Eigen::RowVector2d::Constant(std::numeric_limits<double>::infinity());
-  for (Eigen::Index band = problem.bands.size() - 1; band >= 0; --band) {
-    const double middle_hz =
-        0.5 * problem.plan.frequency_hz(problem.bands.first(band) + problem.bands.end(band) - 1);
-    if (middle_hz < kWhiteFrom_hz) return;
-    const double left = std::pow(low_pass_gain(middle_hz), 2);
-    white = white.cwiseMin(problem.quietest_power.row(band) / left);
-    problem.quietest_power.row(band) = white * left;
-  }
+Eigen::MatrixXd reference_series(const Grid& grid, const Eigen::RowVectorXd& mean) {
+  Eigen::MatrixXd series(grid.motion.rows(), kReferenceColumns);
+  series.leftCols<6>() = grid.motion.rowwise() - mean;
+  series.middleCols<3>(kOmegaDot) = grid.omega_dot;
+  series.middleCols<6>(kProducts) = products(grid.motion.leftCols<3>());
+  series.middleCols<6>(kForceProducts) = products(grid.motion.rightCols<3>());
+  series.middleCols<6>(kForceProducts).rowwise() -= mean_of(series.middleCols<6>(kForceProducts), grid.valid);
+  return series;
 }
 
-/// B-10: power by band in the window in which the reference shows least, which is less than its noise's mean.
-void set_reference_power(Problem& problem) {
+/// What the reference's gyros show in the mean, by band.
+void set_gyro_power(Problem& problem) {
   const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
-  Eigen::MatrixX2d& least = problem.quietest_power;
-  least.resize(problem.bands.size(), 2);
   problem.mean_gyro_power.setZero(problem.bands.size());
   for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
-    const double values = 3.0 * static_cast<double>(problem.bands.width(band));
-    for (Eigen::Index w = 0; w < n_windows; ++w) {
-      double gyro = 0.0;
-      double accel = 0.0;
-      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k) {
-        gyro += kWindowsPerInstant * problem.reference.row(w, k).segment<3>(kOmega).squaredNorm() / values;
-        accel += kWindowsPerInstant * problem.reference.row(w, k).segment<3>(kForce).squaredNorm() / values;
-      }
-      problem.mean_gyro_power[band] += gyro / static_cast<double>(n_windows);
-      least(band, 0) = w == 0 ? gyro : std::min(least(band, 0), gyro);
-      least(band, 1) = w == 0 ? accel : std::min(least(band, 1), accel);
-    }
-    const double dof = 2.0 * values - (problem.bands.first(band) == 0 ? 3.0 : 0.0);
-    least.row(band) /= least_share(dof, static_cast<double>(n_windows));
+    const double values =
+        3.0 * static_cast<double>(problem.bands.width(band) * n_windows) / kWindowsPerInstant;
+    for (Eigen::Index w = 0; w < n_windows; ++w)
+      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k)
+        problem.mean_gyro_power[band] +=
+            problem.reference.row(w, k).segment<3>(kOmega).squaredNorm() / values;
   }
-  bound_by_bands_above(problem);
 }
 
 /// The estimate of one pair of records.
@@ -142,13 +109,14 @@ class Batch {
       result.iterations = i + 1;
       result.settled = step(i);
     }
+    finish(result);
+    // A clock that jumps makes an estimate run away, too, and is the better thing to be told.
+    if (auto ok = one_clock(result); !ok) return tl::unexpected(ok.error());
     if (last_share_ > kLostShare) {
       return work_error(
           "its estimate runs away",
           "the drive tells too little: more turns, braking and accelerating, and a minute of rest");
     }
-    finish(result);
-    if (auto ok = one_clock(result); !ok) return tl::unexpected(ok.error());
     return result;
   }
 
@@ -169,10 +137,10 @@ class Batch {
                         "look at its counter and its line");
     problem_.bands = Bands(problem_.plan.n_frequencies);
     problem_.constant = window_spectrum(problem_.plan);
-    reference_mean_ = mean_of(grid);
-    study_mean_ = mean_of(study);
+    reference_mean_ = mean_of(grid.motion, grid.valid);
+    study_mean_ = mean_of(study.motion, study.valid);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
-    set_reference_power(problem_);
+    set_gyro_power(problem_);
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
     problem_.from_middle_s.resize(n);
     for (Eigen::Index w = 0; w < n; ++w) {
@@ -206,7 +174,9 @@ class Batch {
     const Residuals residual = residuals(problem_, study, estimate_);
     noise_ = NoiseBands(problem_.bands, static_cast<Eigen::Index>(problem_.plan.starts.size()),
                         problem_.plan.n_frequencies, residual, taken_);
-    const auto sums = band_sums(problem_, study, residual, estimate_, noise_, kReferenceShare, !rough);
+    const ReferenceNoise reference =
+        rough ? ReferenceNoise::even(problem_.bands, 0.0) : reference_noise(study);
+    const auto sums = band_sums(problem_, study, residual, estimate_, noise_, reference, !rough);
     ParameterVector correction;
     std::vector<DeviationVector> deviation;
     for (int inner = 0; inner < (rough ? 1 : kLearningRounds); ++inner) {
@@ -222,6 +192,13 @@ class Batch {
     const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
     last_share_ = share.head<kGyroBias>().maxCoeff();
     return !rough && last_share_ < kSettledShare;
+  }
+
+  [[nodiscard]] ReferenceNoise reference_noise(const Spectra& study) const {
+    Estimate rigid = estimate_;
+    std::ranges::fill(rigid.deviation, DeviationVector::Zero());
+    return {problem_.plan, problem_.bands, problem_.reference, residuals(problem_, study, rigid),
+            rigid.sensor,  noise_};
   }
 
   /// A clock that jumps makes a lever arm of its own: no sd is wide enough for that. Much of a jump is taken
@@ -358,6 +335,7 @@ class Batch {
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = published.sensor;
     add_change(of_noise, result);
+    add_unknown_shares(of_noise, published.derivative, result);
     add_mean_motion(result);
     const auto of_reference_errors = of_reference_axes(class_, result.sensor);
     const Covariance of_reference = of_reference_errors * of_reference_errors.transpose();
@@ -370,6 +348,25 @@ class Batch {
     result.used_s = half_s * (windows + 1.0);
     result.one_chip = scales_.one_chip();
     for (Eigen::Index band = 0; band < problem_.bands.size(); ++band) result.bands.push_back(report(band));
+  }
+
+  /// B-10b: what the estimate would be with more of the noise taken for the reference's, by one sd.
+  void add_unknown_shares(const OfNoise& of_noise, const Covariance& to_published,
+                          BatchMounting& result) const {
+    const Spectra study = study_spectra();
+    const Residuals residual = residuals(problem_, study, estimate_);
+    const ReferenceNoise reference = reference_noise(study);
+    const auto gradient = [&](const ReferenceNoise& assumed) -> ParameterVector {
+      return normal_equations(band_sums(problem_, study, residual, estimate_, noise_, assumed, true),
+                              estimate_)
+          .gradient;
+    };
+    const ParameterVector as_estimated = gradient(reference);
+    for (Eigen::Index triad = 0; triad < 2; ++triad) {
+      const ParameterVector moved =
+          to_published * (of_noise.per_slope * (gradient(reference.shifted(triad)) - as_estimated));
+      result.covariance += moved * moved.transpose();
+    }
   }
 
   /// B-25: where parts of the drive disagree, the sd reach to both.

@@ -1,6 +1,7 @@
 #include "batch/checks.h"
 
 #include <fmt/format.h>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>

@@ -96,20 +96,6 @@ Evaluated evaluate(const ImuRecord& record, double instant, std::size_t first, s
 
 }  // namespace
 
-double low_pass_gain(double frequency_hz) {
-  constexpr double kTwoPi = 6.283185307179586;
-  constexpr int kSteps = 500;
-  constexpr double kStep_s = kKernelHalf_s / kSteps;
-  double sum = 0.5;
-  double weight = 0.5;
-  for (int i = 1; i < kSteps; ++i) {
-    const double k = kernel().value(i * kStep_s) / kernel().value(0.0);
-    sum += k * std::cos(kTwoPi * frequency_hz * i * kStep_s);
-    weight += k;
-  }
-  return sum / weight;
-}
-
 double sample_period_s(const ImuRecord& record) {
   std::vector<double> steps(record.size() - 1);
   for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = record.time_s[i + 1] - record.time_s[i];

@@ -17,9 +17,6 @@ inline constexpr double kLowPass_hz = 10.0;
 /// Half the length of its kernel.
 inline constexpr double kKernelHalf_s = 0.25;
 
-/// What the low-pass leaves of an amplitude at a frequency, 0 to 1 (B-1).
-[[nodiscard]] double low_pass_gain(double frequency_hz);
-
 /// A row an instant: angular rate and specific force, and the angular rate's derivative.
 struct Grid {
   Eigen::Matrix<double, Eigen::Dynamic, 6> motion;     ///< omega, rad/s; f, m/s^2

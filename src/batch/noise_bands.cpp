@@ -70,10 +70,12 @@ NoiseBands::NoiseBands(
   const Eigen::Index n_bands = bands.size();
   power_.setZero(n_bands, 6);
   window_power_.setZero(n_windows * n_bands, 6);
+  claimed_.resize(n_bands);
   for (Eigen::Index band = 0; band < n_bands; ++band) {
     // Real and imaginary part of each frequency; zero has no imaginary part.
     const double dof = 2.0 * static_cast<double>(bands.width(band)) - (bands.first(band) == 0 ? 1.0 : 0.0);
     const double claimed = claim(dof);
+    claimed_[band] = claimed;
     const double numbers = 3.0 * dof * static_cast<double>(n_windows) / kWindowsPerInstant;
     for (Eigen::Index axis = 0; axis < 6; ++axis) {
       const double left = std::max(1.0 - taken(band, axis / 3) / numbers, kLeastLeft);

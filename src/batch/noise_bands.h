@@ -44,14 +44,28 @@ class NoiseBands {
   /// Power of axis 0 to 5 in a band over the record: variance of white noise of that density; rad^2/s^2,
   /// m^2/s^4.
   [[nodiscard]] double power(Eigen::Index band, Eigen::Index axis) const { return power_(band, axis); }
+  /// All axes.
+  [[nodiscard]] Eigen::Matrix<double, 6, 1> power(Eigen::Index band) const {
+    return power_.row(band).transpose();
+  }
   /// Of one window, drawn towards the record's: a window with more of it counts less.
   [[nodiscard]] double window_power(Eigen::Index window, Eigen::Index band, Eigen::Index axis) const {
     return window_power_(window * power_.rows() + band, axis);
+  }
+  [[nodiscard]] Eigen::Matrix<double, 6, 1> window_power(Eigen::Index window, Eigen::Index band) const {
+    return window_power_.row(window * power_.rows() + band).transpose();
+  }
+  /// By how much more than the noise's own power both are, for weights that follow the residuals not to claim
+  /// more than they know (B-11a).
+  [[nodiscard]] double claimed(Eigen::Index band) const { return claimed_[band]; }
+  [[nodiscard]] Eigen::Index windows() const {
+    return power_.rows() > 0 ? window_power_.rows() / power_.rows() : 0;
   }
 
  private:
   Eigen::Matrix<double, Eigen::Dynamic, 6> power_;
   Eigen::Matrix<double, Eigen::Dynamic, 6> window_power_;
+  Eigen::VectorXd claimed_;
 };
 
 }  // namespace imuscope::batch

@@ -13,118 +13,17 @@ namespace imuscope::batch {
 namespace {
 
 using std::complex;
-using Vector3c = Eigen::Vector3cd;
-using Matrix3c = Eigen::Matrix3cd;
-using Vector6c = Eigen::Matrix<complex<double>, 6, 1>;
 using Matrix6c = Eigen::Matrix<complex<double>, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
 constexpr Eigen::Index kColumns = BandSums::kColumns;
 using Jacobian = Eigen::Matrix<complex<double>, 6, kColumns>;
 
-/// Weight that the reference's noise may have in the covariance of a residual, for it to stay one.
-constexpr double kLargestShare = 0.9;
+/// Share that the reference's noise may have in the covariance of a residual, for it to stay one.
+constexpr double kLargestWeight = 0.9;
 /// Share of what the reference's gyros show that may be their noise, for their derivative to be a motion.
 constexpr double kNoisyMotion = 0.2;
 /// Factor of a variance that leaves no weight.
 constexpr double kTellsNothing = 1e6;
-/// Share of the accelerometers' residual noise that is theirs at least, whatever the gyros' may make of it.
-constexpr double kLeastLeftToAccels = 0.05;
-
-/// The body's motion in one window at one frequency.
-struct Motion {
-  Vector3c omega;
-  Vector3c f;
-  Matrix3c arm;  ///< acceleration of a point of the body per metre of its lever arm: [omega' x] + omega
-                 ///< omega' - |omega|^2
-
-  [[nodiscard]] Vector3c force_at(const Eigen::Vector3d& lever_arm_m) const {
-    return f + arm * lever_arm_m.cast<complex<double>>();
-  }
-};
-
-Matrix3c skew_c(const Vector3c& v) {
-  Matrix3c m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
-Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k) {
-  const auto row = reference.row(window, k);
-  Motion motion;
-  motion.omega = row.segment<3>(kOmega).transpose();
-  motion.f = row.segment<3>(kForce).transpose();
-  motion.arm = skew_c(row.segment<3>(kOmegaDot).transpose());
-  const auto p = row.segment<6>(kProducts);
-  const complex<double> square = p[0] + p[1] + p[2];
-  Matrix3c outer;
-  outer << p[0], p[3], p[4], p[3], p[1], p[5], p[4], p[5], p[2];
-  motion.arm += outer - square * Matrix3c::Identity();
-  return motion;
-}
-
-/// What does not change from window to window, worked out once a step.
-struct Transfer {
-  Eigen::Matrix3d gyro, accel, C, C_accel_rotated, g_sensitivity, flexure, gyro_deviation, accel_deviation;
-  Eigen::Vector3d arm_b_m;
-  std::array<Eigen::Vector3d, 3> place_b_m;
-  Eigen::Vector3d gyro_bias, accel_bias;
-  Eigen::Vector3d fade;
-  double delay_s;
-
-  Transfer(const SensorState& sensor, const DeviationVector& deviation)
-      : gyro(sensor.C_b_gyro()),
-        accel(sensor.C_b_accel()),
-        C(sensor.C_b_s),
-        C_accel_rotated(sensor.C_s_accel() * sensor.C_b_s),
-        g_sensitivity(sensor.g_sensitivity()),
-        flexure(sensor.flexure()),
-        arm_b_m(sensor.lever_arm_b_m()),
-        gyro_bias(sensor.x.segment<3>(kGyroBias)),
-        accel_bias(sensor.x.segment<3>(kAccelBias)),
-        fade(sensor.x.segment<3>(kAccelFade)),
-        delay_s(sensor.x[kAccelDelay]) {
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      place_b_m[static_cast<std::size_t>(i)] = C.transpose() * sensor.place_s_m(i);
-      gyro_deviation.row(i) = deviation.segment<3>(3 * i).transpose();
-      accel_deviation.row(i) = deviation.segment<3>(9 + 3 * i).transpose();
-    }
-  }
-};
-
-double flexure_gain(double frequency_hz) {
-  const double ratio = frequency_hz / kFlexure_hz;
-  return ratio * ratio;
-}
-
-complex<double> derivative(double frequency_hz) { return {0.0, 2.0 * std::numbers::pi * frequency_hz}; }
-
-/// B-8 without the delay: what the three accelerometers feel, each at its place.
-Vector3c accelerometers(const Transfer& t, const Motion& motion) {
-  const Vector3c middle = motion.force_at(t.arm_b_m);
-  Vector3c felt;
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const Vector3c there =
-        middle + motion.arm * t.place_b_m[static_cast<std::size_t>(i)].cast<complex<double>>();
-    felt[i] = (t.accel.row(i).cast<complex<double>>() * there).value();
-  }
-  return felt;
-}
-
-/// B-7: rates as the gyros show them, less bias and what forces add.
-Vector3c gyros(const Transfer& t, const Motion& motion, double frequency_hz) {
-  const Vector3c in_s = t.C * motion.omega;
-  return t.gyro * motion.omega + flexure_gain(frequency_hz) * (t.flexure * in_s) + t.gyro_deviation * in_s;
-}
-
-Vector6c predicted(const Transfer& t, const Motion& motion, const Vector3c& study_f, complex<double> constant,
-                   double frequency_hz) {
-  Vector6c y;
-  y.head<3>() = gyros(t, motion, frequency_hz) + t.g_sensitivity * study_f + constant * t.gyro_bias;
-  const Vector3c felt = accelerometers(t, motion);
-  y.tail<3>() = felt * (1.0 + derivative(frequency_hz) * t.delay_s) +
-                flexure_gain(frequency_hz) * t.fade.cast<complex<double>>().cwiseProduct(felt) +
-                t.accel_deviation * (t.C * motion.force_at(t.arm_b_m)) + constant * t.accel_bias;
-  return y;
-}
 
 /// B-9: derivatives of predicted() in every parameter, then in the band's deviation.
 void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion, const Vector3c& study_f,
@@ -155,10 +54,17 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
     }
   }
   const double flex = flexure_gain(frequency_hz);
+  for (Eigen::Index j = 0; j < 6; ++j)
+    J(3 + flexure_row(j), kAccelFlexure + j) = flex * felt[flexure_column(j)];
   for (Eigen::Index i = 0; i < 3; ++i) {
     J(i, kGyroBias + i) = constant;
     J(3 + i, kAccelBias + i) = constant;
     J(3 + i, kAccelFade + i) = flex * felt[i];
+    J.block<1, 3>(i, kCompliance + 3 * i) = derivative(frequency_hz) * force_s.transpose();
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      const Vector3c product = motion.force_products * t.C.row(j).transpose();
+      J.block<3, 1>(3, kCompliance + 3 * i + j) = -(t.accel * skew(t.C.row(i).transpose())) * product;
+    }
     J.block<1, 3>(i, kGSensitivity + 3 * i) = study_f.transpose();
     J.block<1, 3>(i, kFlexure + 3 * i) = flex * omega_s.transpose();
     J.block<1, 3>(i, kParameters + 3 * i) = omega_s.transpose();
@@ -169,39 +75,39 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
 /// Covariance of a residual at one frequency, and how the reference's noise enters it (B-10, B-12).
 struct Weight {
   Matrix6c of_reference;  ///< D: residual = S noise - D (reference's noise)
-  Eigen::Matrix<double, 6, 1> reference_power;
+  Vector6 reference_power;
   Matrix6c gain;                ///< R D^H, scaled as the covariance's blocks are
-  Eigen::LLT<Matrix6c> factor;  ///< of the covariance where every window is as the record
-  Eigen::Matrix<double, 6, 1> power;
+  Eigen::LLT<Matrix6c> factor;  ///< of the covariance
+  Vector6 power;
 };
 
-Weight weight_at(const Transfer& t, const NoiseBands& noise, const Problem& problem, Eigen::Index band,
-                 double frequency_hz, double share) {
+/// @param power    of the residual, by axis
+/// @param of_gyros, of_accels  of the reference's noise in it; the latter with what the gyros' noise makes of
+///                             accelerations at the lever arm
+Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, double of_accels, bool forces_tell,
+                 double frequency_hz) {
   Weight weight;
-  for (Eigen::Index i = 0; i < 6; ++i) weight.power[i] = noise.power(band, i);
-  const double of_gyros = std::min(share * weight.power.head<3>().mean(), problem.quietest_power(band, 0));
-  // What its gyros' noise makes of accelerations at the lever arm is not its accelerometers'.
+  weight.power = power;
   const double omega = std::abs(derivative(frequency_hz));
   const double at_arm = omega * omega * (t.accel * skew(t.arm_b_m)).squaredNorm() / 3.0 * of_gyros;
-  const double accel_power = weight.power.tail<3>().mean();
-  const double left = std::max(accel_power - at_arm, kLeastLeftToAccels * accel_power);
   weight.reference_power.head<3>().setConstant(of_gyros);
-  weight.reference_power.tail<3>().setConstant(std::min(share * left, problem.quietest_power(band, 1)));
+  weight.reference_power.tail<3>().setConstant(std::max(0.0, of_accels - at_arm));
   weight.of_reference.setZero();
   weight.of_reference.topLeftCorner<3, 3>() = t.gyro.cast<complex<double>>();
   weight.of_reference.bottomRightCorner<3, 3>() = t.accel.cast<complex<double>>();
   // [omega' x] r = -[r x] omega'
   weight.of_reference.bottomLeftCorner<3, 3>() = -derivative(frequency_hz) * (t.accel * skew(t.arm_b_m));
-  Matrix6c gain = weight.reference_power.asDiagonal() * weight.of_reference.adjoint();
+  const Matrix6c gain = weight.reference_power.asDiagonal() * weight.of_reference.adjoint();
   Matrix6c covariance = weight.of_reference * gain;
   // The total is what was learned; the reference's part is held below it.
-  Eigen::Matrix<double, 6, 1> scale;
-  for (Eigen::Index i = 0; i < 6; ++i)
-    scale[i] = std::min(1.0, std::sqrt(kLargestShare * weight.power[i] / covariance(i, i).real()));
+  Vector6 scale;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const double of_reference = covariance(i, i).real();
+    scale[i] = of_reference > 0.0 ? std::min(1.0, std::sqrt(kLargestWeight * power[i] / of_reference)) : 1.0;
+  }
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
-  for (Eigen::Index i = 0; i < 6; ++i) covariance(i, i) = weight.power[i];
-  if (of_gyros > kNoisyMotion * problem.mean_gyro_power[band])
-    covariance.diagonal().tail<3>() *= kTellsNothing;
+  for (Eigen::Index i = 0; i < 6; ++i) covariance(i, i) = power[i];
+  if (!forces_tell) covariance.diagonal().tail<3>() *= kTellsNothing;
   weight.gain = gain * scale.cwiseProduct(scale).asDiagonal();
   weight.factor.compute(covariance);
   return weight;
@@ -232,33 +138,29 @@ void put_rows(const Jacobian& J, const Vector6c& e, double frequency_hz, Eigen::
 class BandSummer {
  public:
   BandSummer(const Problem& problem, const Spectra& study, const Residuals& residual,
-             const Estimate& estimate, const NoiseBands& noise, double share, bool corrected)
+             const Estimate& estimate, const NoiseBands& noise, const ReferenceNoise& reference,
+             bool corrected)
       : problem_(problem),
         study_(study),
         residual_(residual),
         estimate_(estimate),
         noise_(noise),
-        share_(share),
+        reference_(reference),
         corrected_(corrected) {}
 
   BandSums sum(Eigen::Index band) {
     const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
     const auto n_windows = static_cast<Eigen::Index>(problem_.plan.starts.size());
-    std::vector<Weight> weights;
-    for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
-      weights.push_back(weight_at(t, noise_, problem_, band, problem_.plan.frequency_hz(k), share_));
     BandSums sums;
     sums.scores.resize(n_windows, kColumns);
     Rows rows(12 * problem_.bands.width(band), kColumns + 1);
     Rows of_gyros(6 * problem_.bands.width(band), kColumns + 1);
-    Eigen::Matrix<double, 6, 1> mean_weight = Eigen::Matrix<double, 6, 1>::Zero();
+    const Eigen::Vector2d share = reference_.mean_share(noise_, band);
+    forces_tell_ =
+        share[0] * noise_.power(band).head<3>().mean() <= kNoisyMotion * problem_.mean_gyro_power[band];
     for (Eigen::Index w = 0; w < n_windows; ++w) {
-      const Eigen::Matrix<double, 6, 1> scale = window_scale(w, band, weights.front());
-      mean_weight += scale.cwiseProduct(scale);
-      for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
-        const Eigen::Index i = k - problem_.bands.first(band);
-        fill(t, weights[static_cast<std::size_t>(i)], scale, w, k, rows, 12 * i);
-      }
+      for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
+        fill(t, band, w, k, rows, 12 * (k - problem_.bands.first(band)));
       const auto J = rows.leftCols<kColumns>();
       sums.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
       for (Eigen::Index i = 0; i < 2 * problem_.bands.width(band); ++i)
@@ -268,44 +170,38 @@ class BandSummer {
     }
     sums.information = sums.information.selfadjointView<Eigen::Lower>();
     sums.of_gyros = sums.of_gyros.selfadjointView<Eigen::Lower>();
-    if (corrected_) add_noise(t, weights, band, mean_weight.cwiseSqrt(), sums);
+    if (corrected_) add_noise(t, band, share, sums);
     return sums;
   }
 
  private:
-  /// Square root of the record's power over the window's, by axis.
-  [[nodiscard]] Eigen::Matrix<double, 6, 1> window_scale(Eigen::Index window, Eigen::Index band,
-                                                         const Weight& weight) const {
-    Eigen::Matrix<double, 6, 1> scale;
-    for (Eigen::Index i = 0; i < 6; ++i)
-      scale[i] = std::sqrt(weight.power[i] / noise_.window_power(window, band, i));
-    return scale;
-  }
-
-  void fill(const Transfer& t, const Weight& weight, const Eigen::Matrix<double, 6, 1>& scale, Eigen::Index w,
-            Eigen::Index k, Rows& rows, Eigen::Index first_row) {
+  void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, Rows& rows,
+            Eigen::Index first_row) {
     const double f_hz = problem_.plan.frequency_hz(k);
+    const Vector6 power = noise_.window_power(w, band);
+    const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
+    const Weight weight = weight_of(t, power, of_reference[0], of_reference[1], forces_tell_, f_hz);
     Vector6c e = residual_.row(w * problem_.plan.n_frequencies + k).transpose();
-    e = weight.factor.matrixL().solve((scale.asDiagonal() * e).eval());
+    weight.factor.matrixL().solveInPlace(e);
     Motion motion = motion_of(problem_.reference, w, k);
-    if (corrected_) {
-      const Vector6c weighted = scale.asDiagonal() * weight.factor.matrixU().solve(e);
-      motion = estimated_motion(motion, weight, weighted, f_hz);
-    }
+    if (corrected_) motion = estimated_motion(motion, weight, weight.factor.matrixU().solve(e), f_hz);
     const Vector3c study_f = study_.row(w, k).tail<3>().transpose();
     jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], f_hz, problem_.from_middle_s[w], J_);
-    for (Eigen::Index i = 0; i < 6; ++i) J_.row(i) *= scale[i];
     weight.factor.matrixL().solveInPlace(J_);
     put_rows(J_, e, f_hz, rows.middleRows<12>(first_row));
   }
 
-  /// B-13: derivatives that the motion's own uncertainty alone would have, all windows in one.
-  void add_noise(const Transfer& t, const std::vector<Weight>& weights, Eigen::Index band,
-                 const Eigen::Matrix<double, 6, 1>& scale, BandSums& sums) {
+  /// B-13: derivatives that the motion's own uncertainty alone would have. What counts is the reference's
+  /// share of the noise, so that all windows are as one whose share is their mean.
+  void add_noise(const Transfer& t, Eigen::Index band, const Eigen::Vector2d& share, BandSums& sums) {
+    const Vector6 power = noise_.power(band);
+    const double of_gyros = share[0] * power.head<3>().mean();
+    const double of_accels = share[1] * power.tail<3>().mean();
+    const double root_n = std::sqrt(static_cast<double>(problem_.plan.starts.size()));
     Rows rows(12 * 6, kColumns + 1);
     for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
-      const Weight& weight = weights[static_cast<std::size_t>(k - problem_.bands.first(band))];
       const double f_hz = problem_.plan.frequency_hz(k);
+      const Weight weight = weight_of(t, power, of_gyros, of_accels, forces_tell_, f_hz);
       const Matrix6c W_inverse = weight.factor.solve(Matrix6c::Identity());
       Matrix6c motion_covariance = -weight.gain * W_inverse * weight.gain.adjoint();
       for (Eigen::Index i = 0; i < 6; ++i) motion_covariance(i, i) += weight.reference_power[i];
@@ -315,10 +211,10 @@ class BandSummer {
       if (root.info() != Eigen::Success) continue;
       const Matrix6c L = root.matrixL();
       for (Eigen::Index j = 0; j < 6; ++j) {
-        Motion motion{L.col(j).head<3>(), L.col(j).tail<3>(), Matrix3c::Zero()};
+        Motion motion{L.col(j).head<3>(), L.col(j).tail<3>(), Matrix3c::Zero(), Matrix3c::Zero()};
         motion.arm = skew_c(derivative(f_hz) * motion.omega);
         jacobian(estimate_.sensor, t, motion, Vector3c::Zero(), 0.0, f_hz, 0.0, J_);
-        for (Eigen::Index i = 0; i < 6; ++i) J_.row(i) *= scale[i];
+        J_ *= root_n;
         weight.factor.matrixL().solveInPlace(J_);
         put_rows(J_, Vector6c::Zero(), f_hz, rows.middleRows<12>(12 * j));
       }
@@ -332,8 +228,9 @@ class BandSummer {
   const Residuals& residual_;
   const Estimate& estimate_;
   const NoiseBands& noise_;
-  double share_;
+  const ReferenceNoise& reference_;
   bool corrected_;
+  bool forces_tell_ = true;
   Jacobian J_;
 };
 
@@ -389,9 +286,9 @@ Residuals residuals(const Problem& problem, const Spectra& study, const Estimate
 }
 
 std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study, const Residuals& residual,
-                                const Estimate& estimate, const NoiseBands& noise, double reference_share,
-                                bool corrected) {
-  BandSummer summer(problem, study, residual, estimate, noise, reference_share, corrected);
+                                const Estimate& estimate, const NoiseBands& noise,
+                                const ReferenceNoise& reference, bool corrected) {
+  BandSummer summer(problem, study, residual, estimate, noise, reference, corrected);
   std::vector<BandSums> sums;
   for (Eigen::Index band = 0; band < problem.bands.size(); ++band) sums.push_back(summer.sum(band));
   return sums;

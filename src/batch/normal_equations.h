@@ -7,24 +7,14 @@
 #include <vector>
 
 #include "batch/noise_bands.h"
+#include "batch/reference_noise.h"
 #include "batch/sensor_model.h"
 #include "batch/spectra.h"
+#include "batch/transfer.h"
 
 namespace imuscope::batch {
 
-/// Deviations of a band from a rigid body: two 3 x 3 matrices, gyro and accelerometer, row-major.
-inline constexpr Eigen::Index kDeviations = 18;
-using DeviationVector = Eigen::Matrix<double, kDeviations, 1>;
 using Residuals = Eigen::Matrix<std::complex<double>, Eigen::Dynamic, 6, Eigen::RowMajor>;
-
-/// Columns of the reference's spectra.
-enum ReferenceColumn : Eigen::Index {
-  kOmega = 0,
-  kForce = 3,
-  kOmegaDot = 6,
-  kProducts = 9,  ///< omega_i omega_j: xx, yy, zz, xy, xz, yz
-  kReferenceColumns = 15,
-};
 
 /// Everything one step is made from. Spectra of the reference less its means; of the S-IMU likewise.
 struct Problem {
@@ -33,8 +23,6 @@ struct Problem {
   Spectra reference;              ///< kReferenceColumns
   Eigen::VectorXcd constant;      ///< window_spectrum()
   Eigen::VectorXd from_middle_s;  ///< of each window's middle, from the record's
-  /// By band: what the reference shows in its quietest window, gyro and accelerometer. Its noise is no more.
-  Eigen::MatrixX2d quietest_power;
   /// By band: what the reference's gyros show in the mean. Where most of it is their noise, accelerations at
   /// the lever arm are not known, and forces tell nothing.
   Eigen::VectorXd mean_gyro_power;
@@ -60,11 +48,11 @@ struct BandSums {
   Eigen::Matrix<double, Eigen::Dynamic, kColumns> scores;  ///< a row a window
 };
 
-/// @param reference_share  share of the residual noise that is the reference's
-/// @param corrected        whether the motion in the derivatives is the estimated one (B-12)
+/// @param reference  what of the residual noise is the reference's
+/// @param corrected  whether the motion in the derivatives is the estimated one (B-12)
 [[nodiscard]] std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study,
                                               const Residuals& residual, const Estimate& estimate,
-                                              const NoiseBands& noise, double reference_share,
+                                              const NoiseBands& noise, const ReferenceNoise& reference,
                                               bool corrected);
 
 /// Normal equations of the sensor's parameters; the bands' deviations are eliminated (B-14).

@@ -20,15 +20,17 @@ struct Kind {
   Eigen::Index count;
   bool may_be_smaller;  ///< than the class says
 };
-constexpr std::array<Kind, 9> kKinds{{{kGyroShape, 3, false},
-                                      {kGyroShape + 3, 3, false},
-                                      {kAlpha, 3, false},
-                                      {kAccelShape, 3, false},
-                                      {kAccelShape + 3, 3, false},
-                                      {kAccelDelay, 1, false},
-                                      {kGSensitivity, 9, false},
-                                      {kFlexure, 9, true},
-                                      {kAccelFade, 3, true}}};
+constexpr std::array<Kind, 11> kKinds{{{kGyroShape, 3, false},
+                                       {kGyroShape + 3, 3, false},
+                                       {kAlpha, 3, false},
+                                       {kAccelShape, 3, false},
+                                       {kAccelShape + 3, 3, false},
+                                       {kAccelDelay, 1, false},
+                                       {kGSensitivity, 9, false},
+                                       {kFlexure, 9, true},
+                                       {kAccelFade, 3, true},
+                                       {kAccelFlexure, 6, true},
+                                       {kCompliance, 9, true}}};
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;

@@ -70,6 +70,14 @@ Eigen::Matrix3d SensorState::g_sensitivity() const {
   return Row33(Eigen::Map<const Row33>(x.data() + kGSensitivity));
 }
 Eigen::Matrix3d SensorState::flexure() const { return Row33(Eigen::Map<const Row33>(x.data() + kFlexure)); }
+Eigen::Matrix3d SensorState::accel_flexure() const {
+  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+  for (Eigen::Index j = 0; j < 6; ++j) m(flexure_row(j), flexure_column(j)) = x[kAccelFlexure + j];
+  return m;
+}
+Eigen::Matrix3d SensorState::compliance() const {
+  return Row33(Eigen::Map<const Row33>(x.data() + kCompliance));
+}
 
 Eigen::Vector3d SensorState::place_s_m(Eigen::Index axis) const {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();
@@ -172,6 +180,8 @@ ParameterVector prior_sd(const SensorClass& sensor) {
   sd.segment<9>(kGSensitivity).setConstant(sensor.g_sensitivity_sd);
   sd.segment<9>(kFlexure).setConstant(sensor.flexure_sd);
   sd.segment<3>(kAccelFade).setConstant(sensor.accel_fade_sd);
+  sd.segment<6>(kAccelFlexure).setConstant(sensor.accel_flexure_sd);
+  sd.segment<9>(kCompliance).setConstant(sensor.compliance_sd);
   return sd;
 }
 

@@ -29,7 +29,10 @@ enum Parameter : Eigen::Index {
   kFlexure = 45,       ///< 9: row-major; what the body between the IMUs gives way to, at kFlexure_hz
   kAccelFade =
       54,  ///< 3: what each accelerometer shows more of forces at kFlexure_hz; its low-pass, its mount
-  kParameters = 57,
+  kAccelFlexure =
+      57,  ///< 6: what each shows of forces along the two others' axes there; a mount that gives way
+  kCompliance = 63,  ///< 9: row-major, rad per m/s^2; how far the mount turns under forces
+  kParameters = 72,
 };
 
 /// Flexure and fading grow with the square of the frequency below the body's resonances; this is where it is
@@ -37,6 +40,10 @@ enum Parameter : Eigen::Index {
 inline constexpr double kFlexure_hz = 5.0;
 
 using ParameterVector = Eigen::Matrix<double, kParameters, 1>;
+
+/// Element `j` of kAccelFlexure: row, and the column beside the diagonal.
+[[nodiscard]] constexpr Eigen::Index flexure_row(Eigen::Index j) { return j / 2; }
+[[nodiscard]] constexpr Eigen::Index flexure_column(Eigen::Index j) { return (j / 2 + 1 + j % 2) % 3; }
 
 /// What is believed of a sensor before the drive: sd of each kind of imperfection, all of zero mean. The
 /// defaults are what data sheets of industrial MEMS allow (MTx: alignment 0.1 deg, scale below 1 %); where a
@@ -56,6 +63,9 @@ struct SensorClass {
   double g_sensitivity_sd = 8.9e-5;    ///< 0.05 deg/s per g
   double flexure_sd = 0.003;
   double accel_fade_sd = 0.01;  ///< a low-pass of 35 Hz
+  double accel_flexure_sd = 0.003;
+  /// A mount with a resonance of 30 Hz gives way by 1 / (2 pi 30 Hz)^2 = 28 um per m/s^2, here over a metre.
+  double compliance_sd = 2.8e-5;
   /// What the reference's own axes may be off by: scale; each element off the diagonal; its accelerometer
   /// triad against its gyro triad. No drive shows it, as only the two together are seen, so that it stays in
   /// the sd of everything that is a direction or a scale (B-21).
@@ -82,6 +92,9 @@ struct SensorState {
   [[nodiscard]] Eigen::Vector3d place_s_m(Eigen::Index axis) const;
   [[nodiscard]] Eigen::Matrix3d g_sensitivity() const;
   [[nodiscard]] Eigen::Matrix3d flexure() const;
+  /// Zero on its diagonal; kAccelFade stands there.
+  [[nodiscard]] Eigen::Matrix3d accel_flexure() const;
+  [[nodiscard]] Eigen::Matrix3d compliance() const;
   [[nodiscard]] double time_offset_s(double seconds_from_middle) const {
     return x[kTimeOffset] + x[kClockRate] * seconds_from_middle;
   }

@@ -86,6 +86,28 @@ TEST(EstimateMounting, IsUnbiasedWhereTheReferenceIsAsNoisyAsTheSensor) {
   EXPECT_NEAR(total, 6.0 * kSeeds, 3.3 * sd);
 }
 
+/// A bracket that gives way turns the sensor wherever the vehicle brakes and turns.
+TEST(EstimateMounting, KnowsAMountThatTurnsUnderForces) {
+  PairOptions truth = crooked();
+  truth.compliance_b << -8e-5, 3e-5, 4e-5, -2e-5, 9e-5, -4e-5, -1e-5, 2e-5, 4e-5;
+  for (const double reference_white : {1e-7, 1e-4}) {
+    truth.reference_gyro_white = reference_white;
+    const auto pair = make_pair(truth, 12);
+    const auto found = estimate_mounting(pair.reference, pair.study);
+    ASSERT_TRUE(found) << found.error().text();
+    const Vector6 error = error_of(*found, truth);
+    for (Eigen::Index i = 0; i < 6; ++i)
+      EXPECT_LT(std::abs(error[i]), 4.0 * std::sqrt(found->covariance(i, i))) << i;
+    const Eigen::Matrix3d compliance_s = truth.C_b_s * truth.compliance_b * truth.C_b_s.transpose();
+    for (Eigen::Index i = 0; i < 9; ++i) {
+      EXPECT_NEAR(found->sensor.compliance()(i / 3, i % 3), compliance_s(i / 3, i % 3),
+                  4.0 * found->sd(kCompliance, i))
+          << i;
+    }
+    EXPECT_LT(found->sd(kCompliance), 2e-5);
+  }
+}
+
 TEST(EstimateMounting, LosesLittleWithSingleLostSamples) {
   PairOptions truth = crooked();
   const auto whole = make_pair(truth, 5);

@@ -38,6 +38,7 @@ struct Body {
   }
   [[nodiscard]] Vector3d omega(double t) const { return sum(rates, t, 0); }
   [[nodiscard]] Vector3d omega_dot(double t) const { return sum(rates, t, 1); }
+  [[nodiscard]] Vector3d force_dot(double t) const { return sum(forces, t, 1); }
   [[nodiscard]] Vector3d force(double t) const { return Vector3d(0.0, 0.0, -9.81) + sum(forces, t, 0); }
 
  private:
@@ -89,11 +90,14 @@ Pair make_pair(const PairOptions& o, std::uint64_t seed) {
   for (int i = 0; i < static_cast<int>(o.duration_s * o.study_rate_hz); ++i) {
     const double own = (i + 0.3) / o.study_rate_hz;
     const double t = own + o.t_d_s + o.clock_rate * (own - 0.5 * o.duration_s);
-    const Vector3d gyro = o.gyro_matrix * o.C_b_s * body.omega(t) + o.gyro_bias + study_gyro(random);
+    const Vector3d gyro = o.gyro_matrix * o.C_b_s * (body.omega(t) + o.compliance_b * body.force_dot(t)) +
+                          o.gyro_bias + study_gyro(random);
     Vector3d accel = o.accel_bias + study_accel(random);
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       const Vector3d arm = o.r_bs_b_m + o.C_b_s.transpose() * o.places_s_m.row(axis).transpose();
-      accel[axis] += (o.accel_matrix * o.C_b_s * force_at(body, t + o.accel_delay_s, arm))[axis];
+      const Vector3d force = force_at(body, t + o.accel_delay_s, arm);
+      const Vector3d turn = o.compliance_b * body.force(t + o.accel_delay_s);
+      accel[axis] += (o.accel_matrix * o.C_b_s * (force + force.cross(turn)))[axis];
     }
     if (uniform(random) < o.lost_share) continue;
     pair.study.add(own, gyro.cast<float>(), accel.cast<float>());
