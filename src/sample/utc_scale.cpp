@@ -194,15 +194,25 @@ void UtcScale::observe_pulse(HostTime time, UtcTime wall) noexcept {
     return;
   }
   if (!pulses_.is_known()) return;
+  ++scale_.pulses.used;
+  tell_pulses(time);
+}
+
+void UtcScale::observe_steering(HostTime time, HostTime unsteered, double rate) noexcept {
+  pulses_.steer(time, unsteered, rate);
+  if (pulses_.is_known()) tell_pulses(time);
+}
+
+void UtcScale::tell_pulses(HostTime time) noexcept {
   PulseState& told = scale_.pulses;
+  // A pulse may be told of after the clock was steered otherwise.
+  told.time = told.is_known ? std::max(told.time, time) : time;
   told.is_known = true;
-  told.time = time;
-  told.utc = pulses_.at(time);
-  told.sd_utc_s = pulses_.sd_s();
+  told.utc = pulses_.at(told.time);
+  told.sd_utc_s = pulses_.sd_s(told.time - pulses_.last());
   told.rate = pulses_.rate();
   told.sd_rate = pulses_.sd_rate();
   told.jitter_s = pulses_.jitter_s();
-  ++told.used;
   const bool reference_tells =
       scale_.source == UtcSource::kReference && time - last_reference_ < kReferenceHolds;
   if (!reference_tells) follow_pulses(time);
@@ -223,7 +233,8 @@ void UtcScale::follow_pulses(HostTime time) noexcept {
   }
   last_ = now;
   rate_ = pulses_.rate();
-  p_offset_ = pulses_.sd_s(now - time) * pulses_.sd_s(now - time);
+  const Duration since = now - pulses_.last();
+  p_offset_ = pulses_.sd_s(since) * pulses_.sd_s(since);
   p_rate_ = pulses_.sd_rate() * pulses_.sd_rate();
   p_both_ = 0.0;
   astray_in_a_row_ = 0;
