@@ -25,9 +25,9 @@
 
 #include "base/units.h"
 #include "calibration/filter_core.h"
+#include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/imusim/record.h"
 #include "firmware_sim/imusim/world.h"
-#include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/random/random.h"
 #include "service/estimator_setup.h"
 #include "service/recording.h"
