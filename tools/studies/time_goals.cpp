@@ -25,7 +25,6 @@
 
 #include "base/units.h"
 #include "calibration/filter_core.h"
-#include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/imusim/record.h"
 #include "firmware_sim/imusim/world.h"
 #include "firmware_sim/random/random.h"
@@ -52,7 +51,6 @@ constexpr double kKfGinsHeading_mdeg = 0.33;  ///< of KF-GINS on one drive of su
 constexpr double kEpochErrorSd_s = 1e-3;
 constexpr std::size_t kDrivesToJudge = 5;
 constexpr double kOwnSd = 3.3;
-constexpr int kConsumerClass = 5;
 
 /// The vehicle of config/demo.toml.
 constexpr std::string_view kVehicle = R"([run]
@@ -509,34 +507,21 @@ bool pps(const Options& options, bool by_ntp) {
   return is_live && is_later;
 }
 
-/// @param harsh  the reference is a consumer's, with all that data sheets allow of one and the filter is not
-/// told:
-///               scales, crooked axes, filters of its own, vibration
-bool gnss(const Options& options, bool harsh) {
-  Drives drives(options, harsh ? "gnss-harsh" : "gnss");
+bool gnss(const Options& options) {
+  Drives drives(options, "gnss");
   const auto results = drives.results([&](std::uint64_t seed) {
     imusim::Configuration configuration = scenario(kWithoutUtc, options, seed);
-    if (harsh) {
-      configuration.world = imusim::WorldKind::kHarsh;
-      configuration.reference.noise = imusim::reference_class(kConsumerClass);
-    }
     // From the epoch to the first bit: what receivers take.
     configuration.gnss.epoch_error_s = 0.0;
     configuration.gnss.latency_s = imusim::Random(seed, "receiver").uniform(0.02, 0.2);
     return drive(configuration, options.folder);
   });
-  fmt::print("UTC from a receiver's messages alone{}: {} drives of {} min\n",
-             harsh ? ", a consumer's reference in the harsh world" : "", results.size(), options.minutes);
-  for (const json& result : results)
-    fmt::print("    95 % of rows within {:.2f} ms, {:.1f} % inside; position NEES an axis {:.2f}\n",
-               1e3 * result["rows_95_s"].get<double>(), 1e2 * result["rows_inside"].get<double>(),
-               result["position"]["z2"].get<double>());
+  fmt::print("UTC from a receiver's messages alone: {} drives of {} min\n", results.size(), options.minutes);
   const Mean inside = mean_of(column(results, [](const json& r) { return r["rows_inside"].get<double>(); }));
   const Mean rows = mean_of(column(results, [](const json& r) { return r["rows_95_s"].get<double>(); }));
   const bool is_honest =
       told(fmt::format("rows within 1.96 of the stated sd: {:.1f} %", 1e2 * inside.value),
            inside.value >= kShare - (inside.n >= kDrivesToJudge ? kOwnSd * inside.sd : 0.0));
-  if (harsh) return is_honest;
   return told(fmt::format("with RTK and motion: 95 % within {:.2f} ms", 1e3 * rows.value),
               rows.value <= kFoundUtc_s) &&
          is_honest;
@@ -550,7 +535,7 @@ int main(int argc, char** argv) {
   Options options;
   options.folder = std::filesystem::temp_directory_path().string();
   app.add_option("--cell", options.cells, "what is looked at")
-      ->check(CLI::IsMember({"quartz", "nees", "pps", "pps-ntp", "gnss", "gnss-harsh"}));
+      ->check(CLI::IsMember({"quartz", "nees", "pps", "pps-ntp", "gnss"}));
   app.add_option("--drives", options.drives, "of each cell");
   app.add_option("--first", options.first, "first seed");
   app.add_option("--minutes", options.minutes, "length of each drive, above two, which settle");
@@ -565,7 +550,7 @@ int main(int argc, char** argv) {
               : cell == "nees"    ? nees(options)
               : cell == "pps"     ? pps(options, false)
               : cell == "pps-ntp" ? pps(options, true)
-                                  : gnss(options, cell == "gnss-harsh");
+                                  : gnss(options);
     }
     fmt::print("{}\n", good ? "every goal is met" : "A GOAL IS MISSED");
     return good ? 0 : 1;
