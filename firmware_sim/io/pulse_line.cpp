@@ -1,5 +1,6 @@
 #include "firmware_sim/io/pulse_line.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "firmware_sim/devices/bytes.h"
@@ -8,6 +9,7 @@ namespace imusim {
 namespace {
 
 constexpr double kAskEvery_s = 0.02;
+constexpr double kBetweenPulses_s = 1.0;
 constexpr std::int64_t kQuartzBegin_ns = 77'000'000'000'000;  // a count of its own
 constexpr double kHolds_ns = 500.0;
 constexpr std::size_t kReadingsMax = 25;
@@ -22,6 +24,7 @@ void PulseLine::send(const Emission& pulse) {
   if (options_.clock.is_asleep_at(pulse.ready_s)) return;
   const bool waits = random_.uniform() < options_.late_share;
   const double mean_s = waits ? options_.late_mean_s : options_.interrupt_mean_s;
+  newest_pulse_s_ = std::max(newest_pulse_s_, pulse.ready_s);
   waiting_.push_back(pulse.ready_s - mean_s * std::log(1.0 - random_.uniform()));
 }
 
@@ -30,7 +33,9 @@ std::int64_t PulseLine::host_ns(double t_s) const {
 }
 
 void PulseLine::deliver_until(double t_s, const OnRead& on_read) {
-  for (; static_cast<double>(asked_) * kAskEvery_s < t_s; ++asked_) {
+  // Behind the last pulse nobody asks on: a recording ends there.
+  const double until_s = std::min(t_s, newest_pulse_s_ + kBetweenPulses_s);
+  for (; static_cast<double>(asked_) * kAskEvery_s < until_s; ++asked_) {
     const double asked_s = static_cast<double>(asked_) * kAskEvery_s;
     if (!options_.clock.is_asleep_at(asked_s)) ask(asked_s, on_read);
   }

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <span>
 
 #include "firmware_sim/devices/device.h"
@@ -59,7 +60,8 @@ class PulseLine {
   Random quartz_random_;
   std::uint32_t count_ = 0;
   std::deque<double> waiting_;  ///< instants at which the kernel read its clock
-  std::int64_t asked_ = 0;      ///< times
+  double newest_pulse_s_ = -std::numeric_limits<double>::infinity();
+  std::int64_t asked_ = 0;  ///< times
   struct Reading {
     std::int64_t host_ns = 0;
     std::int64_t unsteered_ns = 0;
