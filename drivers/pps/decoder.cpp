@@ -8,7 +8,7 @@ namespace {
 
 /// A reader that lost the processor between the two clocks does not know when the pulse came.
 constexpr Duration kApartMax = std::chrono::microseconds(100);
-/// The kernel keeps the newest pulse alone, and it is looked for ten times a second.
+/// The kernel keeps the newest pulse alone, and it is looked for many times a second.
 constexpr Duration kOldest = std::chrono::seconds(5);
 /// A count that jumps by more began anew.
 constexpr std::uint32_t kLostMax = 1U << 20U;
@@ -19,15 +19,35 @@ void Decoder::push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleS
   counters_.bytes += bytes.size();
   while (!bytes.empty()) {
     const auto pulse = read_pulse_record(bytes);
-    if (!pulse) {
+    const auto steering = pulse ? std::nullopt : read_steering_record(bytes);
+    if (!pulse && !steering) {
       // Reads hold whole records: what is none is a damaged capture's.
       counters_.bytes_skipped += bytes.size();
       return;
     }
     bytes = bytes.subspan(kPulseRecordBytes);
     ++counters_.frames;
-    on_pulse(*pulse, arrival.read, sink);
+    if (pulse) {
+      on_pulse(*pulse, arrival.read, sink);
+    } else {
+      on_steering(*steering, arrival.read, sink);
+    }
   }
+}
+
+void Decoder::on_steering(const ClockSteering& steering, HostTime read, SampleSink& sink) noexcept {
+  if (steering.apart > kApartMax || steering.time > read || read - steering.time > kOldest) {
+    ++counters_.bad_contents;
+    return;
+  }
+  Sample sample{};
+  sample.kind = SampleKind::kSteering;
+  sample.device = device_;
+  sample.sequence = counters_.samples++;
+  sample.arrival = read;
+  sample.time = steering.time;
+  sample.steering = {to_ns(steering.unsteered), steering.rate};
+  sink.on_sample(sample);
 }
 
 void Decoder::on_pulse(const UtcPulse& pulse, HostTime read, SampleSink& sink) noexcept {

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Pulses of a PPS device of the kernel to kPulse samples. There is no wire: the bytes are pulse_record.h's,
-/// which the transport makes of what the kernel says.
+/// Pulses of a PPS device of the kernel to kPulse samples, and how the PC steers its clock to kSteering ones.
+/// There is no wire: the bytes are pulse_record.h's, which the transport makes of what the kernel says.
 
 #include "drivers/device/device.h"
 #include "drivers/device/pulse_record.h"
@@ -20,6 +20,7 @@ class Decoder final : public DeviceDecoder {
   [[nodiscard]] const DecoderCounters& counters() const noexcept override { return counters_; }
 
  private:
+  void on_steering(const ClockSteering& steering, HostTime read, SampleSink& sink) noexcept;
   void on_pulse(const UtcPulse& pulse, HostTime read, SampleSink& sink) noexcept;
 
   DeviceIndex device_;

@@ -13,7 +13,10 @@ constexpr Duration kSilence = std::chrono::seconds(3);
 Session::Session() noexcept : ListeningSession(kSilence) {}
 
 bool Session::hear(std::span<const std::uint8_t> bytes, HostTime) noexcept {
-  return read_pulse_record(bytes).has_value();
+  // How the clock is steered may stand before it.
+  return read_pulse_record(bytes).has_value() ||
+         (bytes.size() >= kPulseRecordBytes &&
+          read_pulse_record(bytes.subspan(kPulseRecordBytes)).has_value());
 }
 
 std::string_view Session::nothing_comes() const noexcept {

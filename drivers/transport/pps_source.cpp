@@ -17,7 +17,7 @@
 namespace imuscope {
 namespace {
 
-constexpr long kAskEvery_ns = 100'000'000;
+constexpr long kAskEvery_ns = 20'000'000;
 /// NTP slews both clocks alike: what lies between them changes by steps of the wall clock alone.
 constexpr Duration kWallStepMin = std::chrono::microseconds(200);
 
@@ -131,13 +131,21 @@ Result<void> PpsSource::choose_edge() {
 }
 
 IoResult PpsSource::read(std::span<std::uint8_t> buffer) noexcept {
-  IMUSCOPE_EXPECTS(buffer.size() >= kPulseRecordBytes);
+  IMUSCOPE_EXPECTS(buffer.size() >= kReadBytes);
   std::uint64_t expirations = 0;
   (void)!::read(timer_, &expirations, sizeof expirations);
   pps_kinfo newest{};
   const int error = device_->fetch(newest);
   if (error != 0)
     return {error == EINTR || error == ETIMEDOUT || error == EAGAIN ? IoStatus::kNothing : IoStatus::kGone};
+  const auto pulse = newest_pulse(newest);
+  std::size_t n = 0;
+  if (const auto steering = steering_.look(read_quartz())) n += write_steering_record(*steering, buffer);
+  if (pulse) n += write_pulse_record(*pulse, buffer.subspan(n));
+  return n == 0 ? IoResult{} : IoResult{IoStatus::kDone, n};
+}
+
+std::optional<UtcPulse> PpsSource::newest_pulse(const pps_kinfo& newest) noexcept {
   const BothClocks now = read_both_clocks();
   const Duration wall_minus_host = now.wall.time_since_epoch() - now.host.time_since_epoch();
   if (has_clocks_) {
@@ -155,7 +163,7 @@ IoResult PpsSource::read(std::span<std::uint8_t> buffer) noexcept {
   // The first that is seen may be of an hour ago.
   has_last_ = true;
   last_sequence_ = sequence;
-  if (!is_new) return {};
+  if (!is_new) return std::nullopt;
   UtcPulse pulse;
   pulse.edge = settings_.edge;
   pulse.sequence = sequence;
@@ -163,8 +171,8 @@ IoResult PpsSource::read(std::span<std::uint8_t> buffer) noexcept {
   pulse.time = host_time_from_ns(0) + (pulse.wall.time_since_epoch() - wall_minus_host);
   pulse.apart = now.apart;
   // Stamped by a wall clock that has been stepped since: nobody knows when it came.
-  if (pulse.time < trusted_from_ || pulse.time > now.host) return {};
-  return {IoStatus::kDone, write_pulse_record(pulse, buffer)};
+  if (pulse.time < trusted_from_ || pulse.time > now.host) return std::nullopt;
+  return pulse;
 }
 
 IoResult PpsSource::write(std::span<const std::uint8_t>) noexcept { return {}; }

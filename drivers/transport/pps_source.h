@@ -2,7 +2,8 @@
 
 /// Pulses of a PPS device of the kernel (RFC 2783; /dev/pps0 of pps-gpio, pps-ldisc or a card): each as a
 /// pulse_record.h, on the host's time scale. The kernel stamps a pulse in its interrupt, so that it does not
-/// matter when it is asked; it is asked ten times a second.
+/// matter when it is asked. It is asked fifty times a second, to notice as soon how the PC steers its clock:
+/// a pulse a second later tells of 500 ppm when they have become half a millisecond.
 
 #include <linux/pps.h>
 
@@ -13,6 +14,7 @@
 #include "base/result.h"
 #include "drivers/device/pulse_record.h"
 #include "drivers/transport/kernel_stamp.h"
+#include "drivers/transport/steering_watch.h"
 #include "drivers/transport/transport.h"
 
 namespace imuscope {
@@ -36,6 +38,8 @@ class PpsDevice {
 
 class PpsSource final : public Transport {
  public:
+  static constexpr std::size_t kReadBytes = 2 * kPulseRecordBytes;
+
   /// Errors name the remedy: a missing device lists those there are. Not for the real-time thread.
   static Result<std::unique_ptr<PpsSource>> open(const PpsSettings& settings);
   /// The same with the kernel's part already there, for tests.
@@ -46,8 +50,8 @@ class PpsSource final : public Transport {
   PpsSource& operator=(const PpsSource&) = delete;
   ~PpsSource() override;
 
-  /// One record at most a call.
-  /// @param buffer  of at least kPulseRecordBytes
+  /// The newest pulse, and before it how the PC steers its clock where that has changed: two records at most.
+  /// @param buffer  of at least kReadBytes
   [[nodiscard]] IoResult read(std::span<std::uint8_t> buffer) noexcept override;
   /// A pulse cannot be spoken to: always kNothing.
   [[nodiscard]] IoResult write(std::span<const std::uint8_t> bytes) noexcept override;
@@ -59,6 +63,7 @@ class PpsSource final : public Transport {
  private:
   PpsSource(PpsSettings settings, std::unique_ptr<PpsDevice> device, int timer);
   Result<void> choose_edge();
+  [[nodiscard]] std::optional<UtcPulse> newest_pulse(const pps_kinfo& newest) noexcept;
 
   PpsSettings settings_;
   std::unique_ptr<PpsDevice> device_;
@@ -67,6 +72,7 @@ class PpsSource final : public Transport {
   std::uint32_t last_sequence_ = 0;
   bool has_clocks_ = false;
   BothClocks clocks_;  ///< as they were last
+  SteeringWatch steering_;
   HostTime trusted_from_{
       HostTime::min()};  ///< what came before was stamped by a wall clock that was stepped since
 };

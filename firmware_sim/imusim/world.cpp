@@ -470,14 +470,18 @@ PulseLine World::pulse_line_of(const PlayedDevice& played) const {
   options.host_begin_ns = kHostBegin_ns;
   options.clock = configuration_.line.clock;
   options.wall_begin = configuration_.utc_begin;
-  return {options, Random(configuration_.scenario.seed, played.name + "/line")};
+  return {options, Random(configuration_.scenario.seed, played.name + "/line"),
+          Random(configuration_.scenario.seed, played.name + "/quartz")};
 }
 
 PulseLine World::live_pulse_line_of(const PlayedDevice& played, std::int64_t host_begin_ns) const {
   PulseLineOptions options;
   options.host_begin_ns = host_begin_ns;
   options.wall_begin = configuration_.utc_begin;
-  return {options, Random(configuration_.scenario.seed, played.name + "/line")};
+  // The PC is a real one, which reads its own quartz.
+  options.tells_steering = false;
+  return {options, Random(configuration_.scenario.seed, played.name + "/line"),
+          Random(configuration_.scenario.seed, played.name + "/quartz")};
 }
 
 CanLine World::can_line_of(const PlayedDevice& played) const {

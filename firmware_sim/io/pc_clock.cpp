@@ -37,12 +37,17 @@ PcClock PcClock::drawn(Random random, double duration_s) {
 }
 
 double PcClock::seconds_at(double t_s) const {
+  double counted_s = unsteered_seconds_at(t_s);
+  for (const Slew& slew : slews) counted_s += slew.ppm * kPpm * gone_by(t_s, slew.begin_s, slew.end_s);
+  return counted_s;
+}
+
+double PcClock::unsteered_seconds_at(double t_s) const {
   double awake_s = t_s;
   for (const Suspend& suspend : suspends) awake_s -= gone_by(t_s, suspend.begin_s, suspend.end_s);
   double counted_s = awake_s * (1.0 + rate_ppm * kPpm);
   if (warm_up_ppm != 0.0 && t_s > 0.0)
     counted_s += warm_up_ppm * kPpm * (t_s + warm_up_s * std::expm1(-t_s / warm_up_s));
-  for (const Slew& slew : slews) counted_s += slew.ppm * kPpm * gone_by(t_s, slew.begin_s, slew.end_s);
   return counted_s;
 }
 

@@ -36,6 +36,8 @@ class PcClock {
   std::vector<Slew> slews;
   std::vector<Suspend> suspends;
 
+  /// The same without what NTP does to it, s: CLOCK_MONOTONIC_RAW.
+  [[nodiscard]] double unsteered_seconds_at(double t_s) const;
   /// What the clock has counted at t_s since the scenario's time 0, s. Rises with t_s, or stands still.
   [[nodiscard]] double seconds_at(double t_s) const;
   [[nodiscard]] bool is_asleep_at(double t_s) const;

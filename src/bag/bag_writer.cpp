@@ -128,6 +128,7 @@ void BagWriter::add_sample(const Sample& sample, std::int64_t utc_ns, const Whit
       return write(channel("/time/" + name, "sensor_msgs/TimeReference"), utc_ns);
     }
     case SampleKind::kAttitude:
+    case SampleKind::kSteering:
       return;
   }
 }

@@ -63,6 +63,9 @@ class Estimator::Impl final : public EpochSink {
     } else if (sample.kind == SampleKind::kPulse) {
       navigation_.add_pulse(sample);
       return;
+    } else if (sample.kind == SampleKind::kSteering) {
+      navigation_.add_steering(sample);
+      return;
     } else if (sample.kind == SampleKind::kGnss) {
       if (config_.gnss.enabled && sample.device == config_.gnss.device) {
         navigation_.add_gnss(sample);

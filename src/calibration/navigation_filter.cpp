@@ -378,6 +378,11 @@ void NavigationFilter::add_pulse(const Sample& sample) noexcept {
   utc_scale_.observe_pulse(sample.time, utc_time_from_ns(sample.pulse.wall_ns));
 }
 
+void NavigationFilter::add_steering(const Sample& sample) noexcept {
+  utc_scale_.observe_steering(sample.time, host_time_from_ns(sample.steering.unsteered_ns),
+                              sample.steering.rate);
+}
+
 /// The solution's instant as far as it is told; its latency is not taken off.
 NavigationFilter::Met NavigationFilter::met(const Sample& gnss) const noexcept {
   const Met by_stamp{gnss.time, Meeting::kStamps};

@@ -29,6 +29,7 @@ class NavigationFilter {
   void add_attitude(const Sample& sample) noexcept;
   void add_gnss(const Sample& sample) noexcept;
   void add_pulse(const Sample& sample) noexcept;
+  void add_steering(const Sample& sample) noexcept;
 
   /// A past epoch seen from the present.
   struct Delayed {

@@ -44,8 +44,9 @@ struct Repaired {
   std::vector<std::filesystem::path> files;
 };
 
-/// Writes every record that is whole into a new capture of as many files, each with its header, seals and
-/// index. What is lost stays lost: the numbers of the devices' records tell of it as before.
+/// Writes every record that is whole into a new capture of as many files, each with its header, and with
+/// seals and an index of its own. What is lost stays lost: the numbers of the devices' records tell of it as
+/// before.
 /// @param checked  of the same capture
 /// @param out      first file of the new one; an existing file is never overwritten
 [[nodiscard]] Result<Repaired> repair_capture(const std::filesystem::path& first, const CaptureCheck& checked,

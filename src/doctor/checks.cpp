@@ -21,6 +21,8 @@
 #include "publish/lcm_url.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
+#include "service/alarms.h"
+#include "service/health.h"
 
 namespace imuscope::doctor {
 
@@ -189,20 +191,30 @@ std::vector<Finding> check_metrics(const MetricsOptions& options) {
   if (options.port == 0) return {};
   const StatusBoard nothing;
   const auto opened = MetricsServer::open(options.address, options.port, nothing);
-  if (!opened) return {refused("metrics", opened.error())};
+  const bool is_offered = !opened && offers_metrics(options.address, options.port);
+  if (!opened && !is_offered) return {refused("metrics", opened.error())};
+  const auto what = fmt::format("{} port {} {}", options.address, options.port,
+                                is_offered ? "is where a run offers them now" : "is free");
   const bool is_loopback = options.address.starts_with("127.") || options.address == "::1";
-  if (is_loopback)
-    return {
-        {"metrics", Verdict::kGood, fmt::format("{} port {} is free", options.address, options.port), {}}};
+  if (is_loopback) return {{"metrics", Verdict::kGood, what, {}}};
   return {{"metrics", Verdict::kWarning,
-           fmt::format("{} port {} is free; everybody on that network may read names, rates and alarms",
-                       options.address, options.port),
+           fmt::format("{}; everybody on that network may read names, rates and alarms", what),
            "leave out address in [metrics] where only this PC shall read them"}};
 }
 
 Finding check_line(const std::string& device, const Result<void>& opened) {
   if (opened) return {"line of " + device, Verdict::kGood, "opens", {}};
   return refused("line of " + device, opened.error());
+}
+
+Finding check_line_of_run(const device_status_t& device) {
+  const std::string check = "line of " + device.name;
+  if (streams(device))
+    return {check, Verdict::kGood, fmt::format("a run has it open: {:.4g} Hz", device.rate_hz), {}};
+  const auto problem = condition_of(alarm_kind::kDevice, device.name, device.problem);
+  return {check, Verdict::kBad,
+          fmt::format("a run has it: {}{}{}", device.state, problem.what.empty() ? "" : ": ", problem.what),
+          problem.remedy.empty() ? "imuscope status" : problem.remedy};
 }
 
 std::vector<Finding> check_ftdi_latency(const fs::path& root, const std::vector<std::string>& ports) {

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <imuscope/device_status_t.hpp>
 #include <string>
 #include <vector>
 
@@ -46,12 +47,16 @@ namespace imuscope::doctor {
 /// The PC's own clock names folders and decides which runs are old.
 [[nodiscard]] Finding check_wall_clock(UtcTime now);
 
-/// [metrics]: is the port free, and who may read?
+/// [metrics]: is the port free, or does a run offer them there already, and who may read?
 /// @return nothing where the configuration asks for none
 [[nodiscard]] std::vector<Finding> check_metrics(const MetricsOptions& options);
 
 /// One configured line: does it open? It is opened and closed again.
 [[nodiscard]] Finding check_line(const std::string& device, const Result<void>& opened);
+
+/// One configured line while a run of this configuration goes on, which has it open.
+/// @param device  as that run tells
+[[nodiscard]] Finding check_line_of_run(const device_status_t& device);
 
 /// FTDI bridges hold bytes back for 16 ms unless told otherwise.
 /// @param ports  of the configuration, as paths; empty: every USB serial port of this PC

@@ -1,8 +1,10 @@
 #include "doctor/examination.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "doctor/checks.h"
+#include "doors/status_socket.h"
 #include "rt/host_clock.h"
 #include "service/device_factory.h"
 #include "service/line_factory.h"
@@ -32,6 +34,27 @@ void append(std::vector<Finding>& to, std::vector<Finding> findings) {
   for (auto& finding : findings) to.push_back(std::move(finding));
 }
 
+/// The status of a run of this very configuration that goes on.
+std::optional<status_t> running(const Configuration& configuration) {
+  const auto sockets = find_status_sockets();
+  if (!sockets) return std::nullopt;
+  for (const auto& socket : *sockets) {
+    auto asked = ask_status(socket);
+    if (asked && asked->status.configuration_hash == configuration.sha256) return std::move(asked->status);
+  }
+  return std::nullopt;
+}
+
+Finding look_at_line(const DeviceConfig& device, DeviceIndex index, const std::optional<status_t>& run) {
+  if (run) {
+    const auto found = std::find_if(run->devices.begin(), run->devices.end(),
+                                    [&](const device_status_t& one) { return one.name == device.name; });
+    if (found != run->devices.end()) return check_line_of_run(*found);
+  }
+  const auto line = open_line(device, make_decoder(device, index, ClockMapConfig{})->ids());
+  return check_line(device.name, line ? Result<void>{} : Result<void>(tl::unexpected<Error>(line.error())));
+}
+
 }  // namespace
 
 std::vector<Finding> examine(const Examination& examination) {
@@ -50,14 +73,12 @@ std::vector<Finding> examine(const Examination& examination) {
   std::vector<std::string> ports;
   std::vector<std::string> interfaces;
   if (configuration) {
+    const auto run = running(*configuration);
     for (std::size_t i = 0; i < configuration->devices.size(); ++i) {
       const auto& device = configuration->devices[i];
       if (device.can) interfaces.push_back(device.can->interface);
       if (!has_line(device)) continue;
-      const auto line =
-          open_line(device, make_decoder(device, static_cast<DeviceIndex>(i), ClockMapConfig{})->ids());
-      findings.push_back(
-          check_line(device.name, line ? Result<void>{} : Result<void>(tl::unexpected<Error>(line.error()))));
+      findings.push_back(look_at_line(device, static_cast<DeviceIndex>(i), run));
       if (device.serial) ports.push_back(device.serial->port);
     }
   }

@@ -16,7 +16,8 @@ struct Examination {
   std::filesystem::path root = "/";            ///< where /proc and /sys lie
 };
 
-/// Takes about a second. Opens every configured line for a moment: not beside a running service.
+/// Takes about a second. Opens every configured line for a moment, but where a run of this configuration has
+/// them: there it asks that run. One of another user answers root alone.
 [[nodiscard]] std::vector<Finding> examine(const Examination& examination);
 
 }  // namespace imuscope::doctor

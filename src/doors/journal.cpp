@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/spdlog.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/uio.h>
+#include <sys/time.h>
+#include <sys/un.h>
 #include <syslog.h>
-#include <systemd/sd-journal.h>
 #include <unistd.h>
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <mutex>
 #include <utility>
 
@@ -50,34 +53,55 @@ int priority_of(spdlog::level::level_enum level) {
   }
 }
 
-/// libsystemd drops without a word what nobody hears.
-bool journal_listens() { return access("/run/systemd/journal/socket", W_OK) == 0; }
+constexpr const char* kJournalSocket = "/run/systemd/journal/socket";
+/// A longer one is cut: the kernel takes two hundred kilobytes at once.
+constexpr std::size_t kValueMax = std::size_t{64} << 10U;
+/// A journal that stands still holds a line of the log for so long, and does not get it.
+constexpr timeval kJournalPatience{1, 0};
 
-/// One entry of the journal.
+bool journal_listens() { return access(kJournalSocket, W_OK) == 0; }
+
+/// What entries are sent through, for the time of the process. The journal may be started anew meanwhile:
+/// each entry is addressed by itself.
+int journal_socket() {
+  static const int the_socket = [] {
+    const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    (void)setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &kJournalPatience, sizeof kJournalPatience);
+    return fd;
+  }();
+  return the_socket;
+}
+
+/// One entry of the journal, in its native protocol (systemd.io/JOURNAL_NATIVE_PROTOCOL): a datagram of
+/// fields.
 class Entry {
  public:
   Entry(int priority, std::string_view message) {
-    add("MESSAGE", printable(message));
+    add("MESSAGE", message);
     add("PRIORITY", fmt::format("{}", priority));
     add("SYSLOG_IDENTIFIER", "imuscope");
     auto& known = run();
     const std::lock_guard lock(known.mutex);
-    if (!known.name.empty()) add("IMUSCOPE_RUN", printable(known.name));
+    if (!known.name.empty()) add("IMUSCOPE_RUN", known.name);
     const auto device = message.substr(0, message.find(": "));
     if (std::find(known.devices.begin(), known.devices.end(), device) != known.devices.end())
       add("IMUSCOPE_DEVICE", device);
   }
+  /// A value is one line: what is of several would need its length before it.
   void add(std::string_view name, std::string_view value) {
-    fields_.push_back(fmt::format("{}={}", name, value));
+    fields_ += fmt::format("{}={}\n", name, one_line(value, kValueMax));
   }
   void send() const {
-    std::vector<iovec> parts;
-    for (const auto& field : fields_) parts.push_back({const_cast<char*>(field.data()), field.size()});
-    (void)sd_journal_sendv(parts.data(), static_cast<int>(parts.size()));
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::strcpy(address.sun_path, kJournalSocket);
+    // Lost where nobody listens: there is nobody else to tell.
+    (void)sendto(journal_socket(), fields_.data(), fields_.size(), MSG_NOSIGNAL,
+                 reinterpret_cast<const sockaddr*>(&address), sizeof address);
   }
 
  private:
-  std::vector<std::string> fields_;
+  std::string fields_;
 };
 
 class JournalSink final : public spdlog::sinks::base_sink<std::mutex> {
@@ -121,9 +145,9 @@ void tell_alarm(const alarm_t& alarm) {
                     : fmt::format("alarm over after {:.0f} s: {}", alarm.lasted_s, alarm.what));
   entry.add("MESSAGE_ID", began ? kAlarmBegan : kAlarmEnded);
   entry.add("IMUSCOPE_ALARM", alarm.kind);
-  entry.add("IMUSCOPE_SUBJECT", printable(alarm.subject));
+  entry.add("IMUSCOPE_SUBJECT", alarm.subject);
   entry.add("IMUSCOPE_ACTIVE", began ? "1" : "0");
-  entry.add("IMUSCOPE_REMEDY", printable(alarm.remedy));
+  entry.add("IMUSCOPE_REMEDY", alarm.remedy);
   entry.add("IMUSCOPE_TIMES", fmt::format("{}", alarm.times));
   entry.send();
 }

@@ -182,4 +182,58 @@ Result<std::unique_ptr<MetricsServer>> MetricsServer::open(const std::string& ad
   return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(impl)));
 }
 
+namespace {
+
+constexpr std::string_view kOwnFirstFamily = "# HELP imuscope_info";
+/// All of a run's metrics have some ten kilobytes.
+constexpr std::size_t kPageMax = std::size_t{1} << 20U;
+
+/// Asks for /metrics, and keeps what is answered.
+class Visitor {
+ public:
+  explicit Visitor(asio::io_context& io) : stream_(io) {
+    request_.set(http::field::host, "localhost");
+    parser_.body_limit(kPageMax);
+  }
+
+  void ask(const tcp::endpoint& endpoint) {
+    stream_.expires_after(std::chrono::seconds(MetricsServer::kPatience_s));
+    stream_.async_connect(endpoint, [this](error_code refused) {
+      if (refused) return;
+      http::async_write(stream_, request_, [this](error_code unsent, std::size_t) {
+        if (unsent) return;
+        http::async_read(stream_, buffer_, parser_,
+                         [this](error_code cut, std::size_t) { is_whole_ = !cut; });
+      });
+    });
+  }
+  [[nodiscard]] bool met_a_run() const {
+    return is_whole_ && std::string_view(parser_.get().body()).starts_with(kOwnFirstFamily);
+  }
+
+ private:
+  beast::tcp_stream stream_;
+  Request request_{http::verb::get, "/metrics", 11};
+  beast::flat_buffer buffer_{kPageMax};
+  http::response_parser<http::string_body> parser_;
+  bool is_whole_ = false;
+};
+
+}  // namespace
+
+bool offers_metrics(const std::string& address, std::uint16_t port) {
+  error_code error;
+  auto parsed = asio::ip::make_address(address, error);
+  if (error) return false;
+  // What is offered at every address is offered at this PC's own.
+  if (parsed.is_unspecified())
+    parsed = parsed.is_v6() ? asio::ip::address(asio::ip::address_v6::loopback())
+                            : asio::ip::address(asio::ip::address_v4::loopback());
+  asio::io_context io{1};
+  Visitor visitor(io);
+  visitor.ask({parsed, port});
+  io.run();
+  return visitor.met_a_run();
+}
+
 }  // namespace imuscope

@@ -38,4 +38,8 @@ class MetricsServer {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Whether a run offers its metrics there: whoever else has the port gives other pages. Waits at most
+/// MetricsServer::kPatience_s.
+[[nodiscard]] bool offers_metrics(const std::string& address, std::uint16_t port);
+
 }  // namespace imuscope

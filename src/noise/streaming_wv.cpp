@@ -1,6 +1,7 @@
 #include "noise/streaming_wv.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "base/contracts.h"
@@ -11,6 +12,7 @@ namespace {
 constexpr int kMaxStreamingLevels = 24;
 /// Squares are added to a short sum first: its rounding error does not grow with the length of the stream.
 constexpr std::uint64_t kSettleEvery = 1024;
+constexpr std::uint64_t kWordBits = 64;
 
 }  // namespace
 
@@ -63,7 +65,8 @@ StreamingWv::StreamingWv(const StreamingOptions& options)
     length *= 2;
   }
   rings_.assign(offset, 0.0);
-  valid_.assign(offset + 1, 0);
+  longest_ = offset + 1;
+  words_.resize(std::bit_ceil(longest_ / kWordBits + 2));
 }
 
 void StreamingWv::reset() noexcept {
@@ -94,41 +97,43 @@ void StreamingWv::push(double x) noexcept {
   }
   if (run_ == 0) {
     reference_ = x;
-    valid_[0] = 0;
+    words_[0] = {};
     whole_ = 0;
   }
   // Beyond the longest support nothing is left of what was before.
-  const auto longest = static_cast<std::uint64_t>(valid_.size());
   if (missing_ > 0) whole_ = 0;
-  for (std::uint64_t k = std::min(missing_, longest); k > 0; --k) advance(0.0, 0);
+  for (std::uint64_t k = std::min(missing_, longest_); k > 0; --k) advance(0.0, false);
   holes_.add(missing_);
   missing_ = 0;
   ++whole_;
-  advance(x - reference_, 1);
+  advance(x - reference_, true);
   if (++count_ % kSettleEvery == 0) settle();
 }
 
 /// Valid samples before `position`.
 std::uint32_t StreamingWv::valid_until(std::uint64_t position) const noexcept {
-  return valid_[position & (valid_.size() - 1)];
+  const Word& word = words_[position / kWordBits & (words_.size() - 1)];
+  const std::uint64_t before = (std::uint64_t{1} << position % kWordBits) - 1;
+  return word.valid_before + static_cast<std::uint32_t>(std::popcount(word.is_valid & before));
 }
 
 /// One position on. A missing sample adds nothing to the sums and nothing to the counts.
-void StreamingWv::advance(double x, std::uint32_t valid) noexcept {
+void StreamingWv::advance(double x, bool is_valid) noexcept {
   const std::uint64_t position = run_++;
-  // The slot that this takes is the one of a whole longest support ago, whose count is still needed.
-  const std::uint32_t oldest = valid_until(run_);
-  valid_[run_ & (valid_.size() - 1)] = valid_until(position) + valid;
-  const bool is_whole = whole_ == run_ || whole_ >= valid_.size();
+  Word& word = words_[position / kWordBits & (words_.size() - 1)];
+  if (is_valid) word.is_valid |= std::uint64_t{1} << position % kWordBits;
+  if (run_ % kWordBits == 0)
+    words_[run_ / kWordBits & (words_.size() - 1)] = {
+        0, word.valid_before + static_cast<std::uint32_t>(std::popcount(word.is_valid))};
+  const bool is_whole = whole_ == run_ || whole_ >= longest_;
   // Two loops: the one that nearly all samples take calls nothing.
   if (is_whole)
     for_each_level(position, x, [this](Level& level, double newer, double older) {
       add(level, (newer - older) * (newer - older));
     });
   else
-    for_each_level(position, x, [this, oldest](Level& level, double newer, double older) {
-      add_of_valid(level, newer, older, oldest);
-    });
+    for_each_level(position, x,
+                   [this](Level& level, double newer, double older) { add_of_valid(level, newer, older); });
 }
 
 /// G-4. Hands out, level by level, the sums of the n newest samples and of the n before them.
@@ -146,13 +151,11 @@ void StreamingWv::for_each_level(std::uint64_t position, double x, const Take& t
   }
 }
 
-/// @param oldest  valid samples up to a longest support ago
-void StreamingWv::add_of_valid(Level& level, double newer, double older,
-                               std::uint32_t oldest) const noexcept {
+void StreamingWv::add_of_valid(Level& level, double newer, double older) const noexcept {
   const std::uint64_t n = static_cast<std::uint64_t>(level.mask) + 1;
   const std::uint32_t middle = valid_until(run_ - n);
   const std::uint32_t there_newer = valid_until(run_) - middle;
-  const std::uint32_t there_older = middle - (2 * n == valid_.size() ? oldest : valid_until(run_ - 2 * n));
+  const std::uint32_t there_older = middle - valid_until(run_ - 2 * n);
   if (there_newer < least_valid(n) || there_older < least_valid(n)) return;
   const double difference = static_cast<double>(n) * (newer / there_newer - older / there_older);
   add(level, difference * difference);

@@ -28,7 +28,8 @@ constexpr double square(double x) noexcept { return x * x; }
 }  // namespace
 
 void PulseClock::begin(HostTime time, UtcTime second) noexcept {
-  origin_ = last_ = time;
+  last_ = time;
+  origin_ = last_quartz_ = steering_.unsteered(time);
   utc_origin_ = second;
   offset_s_ = rate_ = p_both_ = 0.0;
   jitter_variance_s2_ = square(kJitterFirst_s);
@@ -44,6 +45,18 @@ double PulseClock::variance_after(double step_s) const noexcept {
          square(kPulseRateWalk_per_sqrt_s) * step_s * square(step_s) / 3.0;
 }
 
+void PulseClock::steer(HostTime time, HostTime unsteered, double rate) noexcept {
+  // What was learned without it is of a clock that is another one.
+  if (!steering_.is_known()) forget();
+  steering_.observe(time, unsteered, rate);
+}
+
+void PulseClock::forget() noexcept {
+  const SteeringLine steering = steering_;
+  *this = {};
+  steering_ = steering;
+}
+
 bool PulseClock::observe(HostTime time, UtcTime second) noexcept {
   if (used_ == 0) {
     begin(time, second);
@@ -53,9 +66,10 @@ bool PulseClock::observe(HostTime time, UtcTime second) noexcept {
     ++left_out_;
     return false;
   }
-  const double step_s = to_seconds(time - last_);
+  const HostTime quartz = steering_.unsteered(time);
+  const double step_s = to_seconds(quartz - last_quartz_);
   const double predicted_s = offset_s_ + rate_ * step_s;
-  const double innovation_s = to_seconds((second - utc_origin_) - (time - origin_)) - predicted_s;
+  const double innovation_s = to_seconds((second - utc_origin_) - (quartz - origin_)) - predicted_s;
   double p_offset = variance_after(step_s);
   double p_both = p_both_ + step_s * p_rate_ + 0.5 * square(kPulseRateWalk_per_sqrt_s) * square(step_s);
   double p_rate = p_rate_ + square(kPulseRateWalk_per_sqrt_s) * step_s;
@@ -87,12 +101,20 @@ bool PulseClock::observe(HostTime time, UtcTime second) noexcept {
   p_both_ = p_both - gain_offset * p_both;
   p_offset_ = p_offset - gain_offset * p_offset;
   last_ = time;
+  last_quartz_ = quartz;
   ++used_;
   return true;
 }
 
 UtcTime PulseClock::at(HostTime time) const noexcept {
-  return utc_origin_ + (time - origin_) + from_seconds(offset_s_ + rate_ * to_seconds(time - last_));
+  const HostTime quartz = steering_.unsteered(time);
+  return utc_origin_ + (quartz - origin_) +
+         from_seconds(offset_s_ + rate_ * to_seconds(quartz - last_quartz_));
+}
+
+double PulseClock::rate() const noexcept {
+  const double steering = steering_.rate();
+  return rate_ + steering + rate_ * steering;
 }
 
 double PulseClock::sd_s(Duration after) const noexcept {

@@ -19,7 +19,7 @@ using DeviceIndex = std::uint8_t;
 
 using Vector3 = std::array<double, 3>;
 
-enum class SampleKind : std::uint8_t { kImu, kGnss, kAttitude, kOdometry, kPulse };
+enum class SampleKind : std::uint8_t { kImu, kGnss, kAttitude, kOdometry, kPulse, kSteering };
 
 /// Bits of ImuData::flags.
 enum ImuFlag : std::uint32_t {
@@ -109,6 +109,12 @@ struct PulseData {
   std::int64_t wall_ns;  ///< CLOCK_REALTIME of the same instant
 };
 
+/// How the PC steers the clock that stamps everything: from Sample.time on along a line.
+struct SteeringData {
+  std::int64_t unsteered_ns;  ///< the quartz left alone (CLOCK_MONOTONIC_RAW) at that instant
+  double rate;                ///< its seconds in one of the host's clock, minus 1
+};
+
 struct Sample {
   SampleKind kind;
   DeviceIndex device;
@@ -123,6 +129,7 @@ struct Sample {
     AttitudeData attitude;
     OdometryData odometry;
     PulseData pulse;
+    SteeringData steering;
   };
 };
 

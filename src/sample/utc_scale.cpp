@@ -24,6 +24,8 @@ constexpr double kOffsetWalk_s_per_sqrt_s = 2e-5;
 // A tag further off than this is astray; this many in a row are a step of the tags.
 constexpr double kAstray_s = 0.01;
 constexpr int kAstrayToStep = 3;
+// A tag that is further off than so many sigma shows that the clock map's line has moved.
+constexpr double kMovedSigmas = 5.0;
 // The R-IMU is believed alone for so long after its last tag.
 constexpr Duration kReferenceHolds = std::chrono::seconds{5};
 // A receiver sends its solution some 20 to 200 ms after the epoch; how much, it does not say.
@@ -150,6 +152,10 @@ void UtcScale::observe(UtcSource source, HostTime time, UtcTime utc) noexcept {
     return publish(scale_.source);
   }
   astray_in_a_row_ = 0;
+  // What a clock map's line moves by at once, as with the backlog of a line that was opened before it was
+  // read, is none of the quartz's doing: the offset follows, and the rate stays.
+  const double square_s2 = innovation_s * innovation_s;
+  if (square_s2 > kMovedSigmas * kMovedSigmas * (p_offset_ + kTagSd_s * kTagSd_s)) p_offset_ += square_s2;
   const double variance = p_offset_ + kTagSd_s * kTagSd_s;
   const double gain_offset = p_offset_ / variance;
   const double gain_rate = p_both_ / variance;
@@ -194,15 +200,25 @@ void UtcScale::observe_pulse(HostTime time, UtcTime wall) noexcept {
     return;
   }
   if (!pulses_.is_known()) return;
+  ++scale_.pulses.used;
+  tell_pulses(time);
+}
+
+void UtcScale::observe_steering(HostTime time, HostTime unsteered, double rate) noexcept {
+  pulses_.steer(time, unsteered, rate);
+  if (pulses_.is_known()) tell_pulses(time);
+}
+
+void UtcScale::tell_pulses(HostTime time) noexcept {
   PulseState& told = scale_.pulses;
+  // A pulse may be told of after the clock was steered otherwise.
+  told.time = told.is_known ? std::max(told.time, time) : time;
   told.is_known = true;
-  told.time = time;
-  told.utc = pulses_.at(time);
-  told.sd_utc_s = pulses_.sd_s();
+  told.utc = pulses_.at(told.time);
+  told.sd_utc_s = pulses_.sd_s(told.time - pulses_.last());
   told.rate = pulses_.rate();
   told.sd_rate = pulses_.sd_rate();
   told.jitter_s = pulses_.jitter_s();
-  ++told.used;
   const bool reference_tells =
       scale_.source == UtcSource::kReference && time - last_reference_ < kReferenceHolds;
   if (!reference_tells) follow_pulses(time);
@@ -223,7 +239,8 @@ void UtcScale::follow_pulses(HostTime time) noexcept {
   }
   last_ = now;
   rate_ = pulses_.rate();
-  p_offset_ = pulses_.sd_s(now - time) * pulses_.sd_s(now - time);
+  const Duration since = now - pulses_.last();
+  p_offset_ = pulses_.sd_s(since) * pulses_.sd_s(since);
   p_rate_ = pulses_.sd_rate() * pulses_.sd_rate();
   p_both_ = 0.0;
   astray_in_a_row_ = 0;

@@ -50,7 +50,7 @@ struct StreamDelay {
 struct PulseState {
   bool is_known = false;
   bool counted_by_pc_clock = false;  ///< no device told which second a pulse marks
-  HostTime time{};                   ///< of the newest pulse
+  HostTime time{};                   ///< of the newest pulse, or change of how the host's clock is steered
   UtcTime utc{};                     ///< at `time`
   double sd_utc_s = 0.0;
   double rate = 0.0;  ///< UTC seconds per host second, minus 1
@@ -98,6 +98,9 @@ class UtcScale {
   /// @param wall  what the PC's wall clock showed
   void observe_pulse(HostTime time, UtcTime wall) noexcept;
 
+  /// The host's clock is steered otherwise from here on (SteeringLine): the pulses' line bends with it.
+  void observe_steering(HostTime time, HostTime unsteered, double rate) noexcept;
+
   /// What the PC's clock showed: for those who want to know what time it is, until a device tells.
   void set_pc_clock(HostTime time, UtcTime utc) noexcept;
 
@@ -124,6 +127,7 @@ class UtcScale {
   [[nodiscard]] UtcTime second_of(HostTime time, UtcTime wall) noexcept;
   void measure_delay(UtcSource source, HostTime time, UtcTime utc) noexcept;
   void count_seconds_anew(HostTime time, Duration by, UtcTime utc) noexcept;
+  void tell_pulses(HostTime time) noexcept;
   void follow_pulses(HostTime time) noexcept;
   [[nodiscard]] double reference_delay_s() const noexcept;
   [[nodiscard]] double delay_sd_s(UtcSource source) const noexcept;

@@ -12,15 +12,21 @@ namespace imuscope {
 
 namespace {
 
+/// "1 record", "2 records".
+std::string records(std::uint64_t n) { return fmt::format("{} record{}", n, n == 1 ? "" : "s"); }
+
 /// What the files of a capture hold that is no good.
 void add_file_damage(const CaptureSummary& summary, const std::string& input,
                      std::vector<std::string>& damage) {
   const LogHealth all = health_of(summary.files);
   for (const auto& [number, health] : summary.files) {
     if (!health.is_sealed || health.index) continue;
-    damage.push_back(fmt::format(
-        "{}: {} ends without its index: the recorder was cut off, and what came then was never recorded",
-        input, capture_file(input, number).filename().string()));
+    // The recorder goes on in another file only when it has ended one.
+    const bool is_last = number == summary.files.back().number;
+    damage.push_back(fmt::format("{}: {} ends without its index: {}", input,
+                                 capture_file(input, number).filename().string(),
+                                 is_last ? "the recorder was cut off, and what came then was never recorded"
+                                         : "its end was recorded once and is lost"));
   }
   if (all.bytes_cut_off > 0) {
     damage.push_back(fmt::format("{}: its last record is cut off ({} bytes); everything before it is used",
@@ -29,16 +35,15 @@ void add_file_damage(const CaptureSummary& summary, const std::string& input,
   if (all.bytes_skipped > 0)
     damage.push_back(fmt::format("{}: {} bytes are damaged and were passed over", input, all.bytes_skipped));
   if (all.records_damaged > 0) {
-    damage.push_back(fmt::format("{}: {} records do not agree with their checksums and were passed over",
-                                 input, all.records_damaged));
+    damage.push_back(
+        fmt::format("{}: {} passed over for a wrong checksum", input, records(all.records_damaged)));
   }
   if (all.is_sealed && all.records_unsealed > 0) {
-    damage.push_back(fmt::format("{}: of {} records the checksums are lost; they were taken as they are",
-                                 input, all.records_unsealed));
+    damage.push_back(
+        fmt::format("{}: {} whose checksum is lost, taken as found", input, records(all.records_unsealed)));
   }
   if (all.records_missing > 0) {
-    damage.push_back(
-        fmt::format("{}: {} records are gone that were recorded once", input, all.records_missing));
+    damage.push_back(fmt::format("{}: {} lost that had been recorded", input, records(all.records_missing)));
   }
 }
 
@@ -75,11 +80,10 @@ std::vector<std::string> damage_of(const CaptureSummary& summary, const std::str
     of_device.seconds += std::max(0.0, to_seconds(loss.until - loss.after));
   }
   for (const auto& [device, of_device] : lost) {
-    damage.push_back(
-        fmt::format("{}: {} records are missing in {} place{}, {:.1f} s in all; the replay is not exact from "
-                    "the first on",
-                    one_line(device), of_device.records, of_device.places, of_device.places == 1 ? "" : "s",
-                    of_device.seconds));
+    damage.push_back(fmt::format(
+        "{}: {} missing in {} place{}, {:.1f} s in all; the replay is not exact from the first on",
+        one_line(device), records(static_cast<std::uint64_t>(of_device.records)), of_device.places,
+        of_device.places == 1 ? "" : "s", of_device.seconds));
   }
   add_file_damage(summary, input, damage);
   return damage;

@@ -28,8 +28,6 @@ constexpr const char* kManoeuvreForMounting =
 
 std::int64_t as_count(std::uint64_t count) { return static_cast<std::int64_t>(count); }
 
-bool streams(const device_status_t& device) { return device.state == "streaming"; }
-
 std::string device_reason(const device_status_t& device) {
   return device.problem.empty() ? fmt::format("{}: {}", device.name, device.state)
                                 : fmt::format("{}: {}: {}", device.name, device.state, device.problem);
@@ -62,6 +60,8 @@ std::string first_trouble(const status_t& status) {
 }
 
 }  // namespace
+
+bool streams(const device_status_t& device) { return device.state == "streaming"; }
 
 Health judge(const status_t& status) {
   const auto& devices = status.devices;

@@ -21,6 +21,9 @@ struct Health {
   std::string reason;
 };
 
+/// Whether samples come.
+[[nodiscard]] bool streams(const device_status_t& device);
+
 /// Judges a status whose devices, studies, threads, rings, alarms and capture are filled in. The worst
 /// thing wins: failed (nothing can come of this run as it stands), then starting, degraded (results are less
 /// than they could be, or are being lost), aligning, running.

@@ -56,7 +56,7 @@ class IoThread::Line final : public SampleSink {
   void on_sample(const Sample& sample) noexcept override {
     newest_arrival_ = std::max(newest_arrival_, sample.arrival);
     latency_.add(sample.arrival, sample.arrival - sample.time);
-    if (sample.kind != SampleKind::kAttitude) ++status_.epochs;
+    if (sample.kind != SampleKind::kAttitude && sample.kind != SampleKind::kSteering) ++status_.epochs;
     if (ring_.try_push(sample)) return;
     ++status_.refused;
     (void)exceptions_.try_push(

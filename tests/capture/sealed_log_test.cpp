@@ -274,6 +274,35 @@ TEST(CaptureRepair, ACopyHoldsAllThatIsWholeAndIsWholeItself) {
   EXPECT_THAT(refused.error().text(), testing::HasSubstr("never overwritten"));
 }
 
+TEST(CaptureRepair, ASealWhosePlaceIsDamagedIsNoRecordOfTheCopy) {
+  const auto folder = test::scratch_folder();
+  const auto first = record_files(folder, 1);
+  // The number of the seal behind the first six reads, in its record's header.
+  Bytes bytes = content_of(first);
+  const Bytes channel{'I', 'M', 'U', 'S', 'C', 'O', 'P', 'E', '_', 'S', 'E', 'A', 'L'};
+  auto place = bytes.begin();
+  for (int seal = 0; seal < 2; ++seal)
+    place = std::search(place + 1, bytes.end(), channel.begin(), channel.end());
+  ASSERT_NE(place, bytes.end());
+  constexpr std::ptrdiff_t kLastByteOfNumber = 11;
+  *(place - static_cast<std::ptrdiff_t>(kEventLogHeaderBytes) + kLastByteOfNumber) = 0;
+  put_content(first, bytes);
+
+  const auto check = check_capture(first);
+  ASSERT_TRUE(check.has_value());
+  const fs::path out = folder / "repaired.lcm";
+  const auto repaired = repair_capture(first, *check, out);
+  ASSERT_TRUE(repaired.has_value()) << repaired.error().text();
+  EXPECT_EQ(repaired->records, 1U + kReadsPerFile) << "the header and the reads";
+  auto log = SealedLog::open(out);
+  ASSERT_TRUE(log.has_value());
+  std::size_t reads = 0;
+  for (LogEvent event; log->next(event);) reads += event.channel == "IMUSCOPE_RAW_AIRINS" ? 1U : 0U;
+  EXPECT_EQ(reads, kReadsPerFile);
+  EXPECT_EQ(log->health().records_damaged, 0U);
+  EXPECT_EQ(log->health().records_missing, 0U);
+}
+
 TEST(CaptureRepair, AFirstFileWithoutItsHeaderGetsThatOfTheOthers) {
   const auto folder = test::scratch_folder();
   const auto first = record_files(folder, 2);

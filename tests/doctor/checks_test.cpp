@@ -4,15 +4,26 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <sched.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <unistd.h>
+#include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
 
 #include "doctor/examination.h"
 #include "doors/metrics_server.h"
+#include "doors/status_socket.h"
+#include "rt/host_clock.h"
 #include "service/line_factory.h"
 #include "tests/support/child_process.h"
 #include "tests/support/refused_calls.h"
@@ -292,14 +303,58 @@ TEST(DoctorMetrics, APortThatIsTakenIsBadAndOneForAllIsAWarning) {
   options.port = 29849;
   ASSERT_THAT(check_metrics(options), SizeIs(1));
   EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kGood);
-  const StatusBoard board;
+  StatusBoard board;
   const auto other = MetricsServer::open("127.0.0.1", options.port, board);
   ASSERT_TRUE(other);
-  EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kBad);
+  EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kBad) << "no run says anything there";
+  board.put(status_t{}, host_now());
+  EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kGood);
+  EXPECT_THAT(check_metrics(options)[0].what, HasSubstr("where a run offers them now"));
   options.port = 29850;
   options.address = "0.0.0.0";
   EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kWarning);
   EXPECT_THAT(check_metrics(options)[0].what, HasSubstr("everybody on that network"));
+}
+
+TEST(DoctorMetrics, AnotherProgramAtThePortIsNoRun) {
+  const int listener = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&address), size), 0);
+  ASSERT_EQ(listen(listener, 1), 0);
+  ASSERT_EQ(getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  std::thread other([listener] {
+    const int client = accept(listener, nullptr, nullptr);
+    const std::string page = "HTTP/1.1 200 OK\r\nContent-Length: 5\r\n\r\nhello";
+    EXPECT_EQ(send(client, page.data(), page.size(), MSG_NOSIGNAL), static_cast<ssize_t>(page.size()));
+    std::array<char, 1024> request{};
+    while (recv(client, request.data(), request.size(), 0) > 0) {
+    }
+    close(client);
+  });
+  MetricsOptions options;
+  options.port = ntohs(address.sin_port);
+  EXPECT_EQ(check_metrics(options)[0].verdict, Verdict::kBad);
+  other.join();
+  close(listener);
+}
+
+TEST(DoctorLines, OfARunThatGoesOnAreAsThatRunSays) {
+  device_status_t device{};
+  device.name = "mtx1";
+  device.state = "streaming";
+  device.rate_hz = 100.0;
+  EXPECT_EQ(check_line_of_run(device).verdict, Verdict::kGood);
+  EXPECT_THAT(check_line_of_run(device).what, HasSubstr("100 Hz"));
+  device.state = "connecting";
+  device.problem = "no port /dev/imu; plug it in";
+  EXPECT_EQ(check_line_of_run(device).verdict, Verdict::kBad);
+  EXPECT_THAT(check_line_of_run(device).what, HasSubstr("connecting: no port /dev/imu"));
+  EXPECT_EQ(check_line_of_run(device).fix, "plug it in");
+  device.problem.clear();
+  EXPECT_EQ(check_line_of_run(device).fix, "imuscope status");
 }
 
 TEST(DoctorExamination, WithoutAConfigurationLooksAtThePcAlone) {
@@ -336,6 +391,57 @@ transport = { kind = "can", interface = "imuscan7" }
     EXPECT_THAT(finding.what, HasSubstr("no such interface"));
   }
   EXPECT_TRUE(is_there);
+}
+
+TEST(DoctorExamination, OpensNoLineOfARunThatGoesOn) {
+  auto configuration = parse_configuration(R"(
+[[device]]
+name = "r"
+role = "reference"
+protocol = "ixblue_stdbin"
+transport = { kind = "serial", port = "/dev/imuscope-no-r" }
+[[device]]
+name = "s"
+role = "study"
+protocol = "xsens_mt"
+transport = { kind = "serial", port = "/dev/imuscope-no-s" }
+)",
+                                           "car.toml");
+  ASSERT_TRUE(configuration) << configuration.error().text();
+  configuration->record.folder = test::scratch_folder().string();
+  // A socket's name holds at most 107 characters, fewer than a scratch folder may have.
+  std::string runtime = "/tmp/imuscope-doctor-XXXXXX";
+  ASSERT_NE(mkdtemp(runtime.data()), nullptr);
+  unsetenv("RUNTIME_DIRECTORY");
+  setenv("XDG_RUNTIME_DIR", runtime.c_str(), 1);
+  StatusBoard board;
+  status_t status{};
+  status.configuration_hash = configuration->sha256;
+  for (const char* name : {"r", "s"}) {
+    device_status_t device{};
+    device.name = name;
+    device.state = "streaming";
+    device.rate_hz = 100.0;
+    status.devices.push_back(device);
+  }
+  status.n_devices = 2;
+  board.put(status, host_now());
+  std::optional<Result<std::unique_ptr<StatusSocket>>> door(StatusSocket::open(board));
+  ASSERT_TRUE(*door) << door->error().text();
+  Examination examination;
+  examination.configuration = *configuration;
+  const auto bad_lines = [&examination] {
+    const auto findings = examine(examination);
+    return std::count_if(findings.begin(), findings.end(), [](const Finding& finding) {
+      return finding.check.starts_with("line of") && finding.verdict == Verdict::kBad;
+    });
+  };
+  EXPECT_EQ(bad_lines(), 0);
+  examination.configuration->sha256 = "of another";
+  EXPECT_EQ(bad_lines(), 2) << "that run has lines of its own";
+  door.reset();
+  unsetenv("XDG_RUNTIME_DIR");
+  fs::remove_all(runtime);
 }
 
 TEST(DoctorExamination, LooksAtEverythingThatTheConfigurationNames) {

@@ -11,6 +11,7 @@
 #include <random>
 #include <vector>
 
+#include "sample/steering_line.h"
 #include "sample/utc_scale.h"
 
 namespace imuscope {
@@ -91,6 +92,64 @@ TEST(PulseClock, FollowsNtpThatSlewsTheClock) {
   pc.slew_end_s = 610.0;  // 5 ms at 500 ppm
   const Score score = run(pc, 1800);
   EXPECT_LT(score.quantile(0.95), 10e-6);
+}
+
+TEST(PulseClock, WhoIsToldHowTheClockIsSteeredKnowsUtcWhileNtpSlewsIt) {
+  Pc pc;
+  Pc unsteered = pc;
+  pc.slew_begin_s = 300.4;
+  pc.slew_end_s = 310.7;
+  Interrupts interrupts;
+  PulseClock clock;
+  // As a watcher of both clocks tells it, twenty milliseconds after each change at most.
+  const auto told = [&](double t_s, double slew_ppm) {
+    const double rate = to_seconds(unsteered.at(t_s + 0.01) - unsteered.at(t_s)) /
+                            to_seconds(pc.at(t_s + 0.01) - pc.at(t_s)) -
+                        1.0;
+    EXPECT_NEAR(rate, -slew_ppm * 1e-6, 1e-6);
+    clock.steer(pc.at(t_s), unsteered.at(t_s) + std::chrono::hours(20), rate);
+  };
+  told(-0.5, 0.0);
+  double worst_s = 0.0;
+  for (int k = 0; k < 600; ++k) {
+    (void)clock.observe(pc.at(k + interrupts.next_s()), utc_of_second(k));
+    for (int look = 1; look < 50; ++look) {
+      const double t_s = k + 0.02 * look;
+      if (k == 300 && look == 21) told(t_s, 500.0);
+      if (k == 310 && look == 36) told(t_s, 0.0);
+      if (k < 60) continue;
+      worst_s = std::max(worst_s, std::abs(to_seconds(clock.at(pc.at(t_s)) - utc_of_second(t_s))));
+    }
+  }
+  // Twenty milliseconds of 500 ppm, and what interrupts leave; without being told it is half a millisecond.
+  EXPECT_LT(worst_s, 20e-6);
+  EXPECT_NEAR(clock.rate(), -(pc.ppm + pc.warm_ppm * (1.0 - std::exp(-1.0))) * 1e-6, 0.3e-6);
+}
+
+TEST(SteeringLine, IsTheHostsClockWhereNothingIsKnownAndKeepsItsPieces) {
+  SteeringLine line;
+  const HostTime begin = kHostAtFirstPulse;
+  EXPECT_EQ(line.unsteered(begin), begin);
+  EXPECT_EQ(line.rate(), 0.0);
+  const HostTime quartz = host_time_from_ns(5'000'000'000);
+  line.observe(begin, quartz, 100e-6);
+  EXPECT_EQ(line.unsteered(begin), begin) << "it counts from where the host's clock was";
+  line.observe(begin + std::chrono::seconds(10),
+               quartz + std::chrono::seconds(10) + std::chrono::milliseconds(1), -400e-6);
+  line.observe(begin + std::chrono::seconds(5), quartz, 0.0);  // older than what is known
+  EXPECT_EQ(line.rate(), -400e-6);
+  const auto gained_s = [&](double t_s) {
+    const HostTime time = begin + from_seconds(t_s);
+    return to_seconds(line.unsteered(time) - time);
+  };
+  EXPECT_NEAR(gained_s(-1.0), -100e-6, 1e-8);
+  EXPECT_NEAR(gained_s(4.0), 400e-6, 1e-8);
+  EXPECT_NEAR(gained_s(10.0), 1e-3, 1e-8);
+  EXPECT_NEAR(gained_s(12.0), 0.2e-3, 1e-8);
+  for (int k = 0; k < 100; ++k)
+    line.observe(begin + std::chrono::seconds(20 + k), quartz + std::chrono::seconds(20 + k), 0.0);
+  EXPECT_NEAR(gained_s(119.5), 0.0, 1e-8);
+  EXPECT_NEAR(gained_s(0.0), 0.0, 1e-8) << "along the oldest that is kept";
 }
 
 TEST(PulseClock, LeavesOutALateInterruptAndGoesOnThroughMissingPulses) {

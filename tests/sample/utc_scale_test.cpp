@@ -77,6 +77,20 @@ TEST(UtcScale, AClockMapThatSettlesIsNotTakenForTheQuartz) {
   EXPECT_LT(std::abs(scale.scale().rate), 2.0 * scale.scale().sd_rate);
 }
 
+TEST(UtcScale, ABacklogAtTheBeginningIsNotTakenForTheQuartz) {
+  for (const int backlog : {2, 5, 18}) {
+    UtcScale scale;
+    for (int k = 0; k < 1000; ++k) {
+      const double t_s = k * kEpoch_s;
+      // What was read at once has the time of that read; a line follows that is right.
+      const double host_s = k < backlog ? (backlog - 1) * kEpoch_s + 1e-5 * k : t_s;
+      scale.observe(UtcSource::kReference, host_at(host_s, 20.0), utc_at(t_s));
+    }
+    EXPECT_NEAR(scale.scale().rate, -20e-6, 150e-6) << backlog;
+    EXPECT_NEAR(to_seconds(scale.scale().utc - utc_at(9.99)), 0.0, 20e-6) << backlog;
+  }
+}
+
 TEST(UtcScale, AStepOfTheTagsIsNoIntervalAndIsCounted) {
   UtcScale scale;
   double before_s = 0.0;

@@ -50,6 +50,60 @@ TEST(PulseRecord, IsNotReadWhereABitOfItsFrameIsWrong) {
   EXPECT_FALSE(read_pulse_record(std::span(kRecord).first(31)));
 }
 
+// "PPSq", 60 ns apart, 1000.000000123 s, by the quartz 77000 s later, -12.345 ppm.
+const Bytes kSteeringRecord{'P',  'P',  'S',  'q',  60,   0,    0,    0,    0x7B, 0x10, 0xA5,
+                            0xD4, 0xE8, 0x00, 0x00, 0x00, 0x7B, 0xE0, 0x4A, 0xCA, 0xF0, 0x46,
+                            0x00, 0x00, 0xC7, 0xCF, 0xFF, 0xFF, 0,    0,    0,    0};
+
+TEST(SteeringRecord, IsLaidOutAsDescribedAndNoPulse) {
+  const auto steering = read_steering_record(kSteeringRecord);
+  ASSERT_TRUE(steering);
+  EXPECT_EQ(to_ns(steering->time), 1'000'000'000'123);
+  EXPECT_EQ(to_ns(steering->unsteered), 78'000'000'000'123);
+  EXPECT_NEAR(steering->rate, -12.345e-6, 1e-15);
+  EXPECT_EQ(steering->apart, Duration{60});
+  Bytes again(kPulseRecordBytes);
+  EXPECT_EQ(write_steering_record(*steering, again), kPulseRecordBytes);
+  EXPECT_EQ(again, kSteeringRecord);
+  EXPECT_FALSE(read_pulse_record(kSteeringRecord));
+  EXPECT_FALSE(read_steering_record(kRecord));
+  for (const std::size_t at : {0U, 3U, 27U, 31U}) {
+    Bytes wrong = kSteeringRecord;
+    wrong[at] ^= 0x40U;
+    EXPECT_FALSE(read_steering_record(wrong)) << at;
+  }
+}
+
+TEST(PpsDecoder, GivesHowTheClockIsSteeredBesideThePulses) {
+  Decoder decoder({3});
+  test::CollectingSink sink;
+  const HostTime read = host_time_from_ns(1'000'000'000'123) + milliseconds(1);
+  Bytes both = kSteeringRecord;
+  both.insert(both.end(), kRecord.begin(), kRecord.end());
+  decoder.push(both, read, sink);
+  ASSERT_EQ(sink.samples.size(), 2U);
+  EXPECT_EQ(sink.samples[0].kind, SampleKind::kSteering);
+  EXPECT_EQ(sink.samples[0].steering.unsteered_ns, 78'000'000'000'123);
+  EXPECT_NEAR(sink.samples[0].steering.rate, -12.345e-6, 1e-15);
+  EXPECT_EQ(sink.samples[1].kind, SampleKind::kPulse);
+  EXPECT_EQ(sink.samples[1].sequence, 1U);
+  EXPECT_EQ(decoder.counters().samples_lost, 0U);
+  decoder.push(kSteeringRecord, read + seconds(60), sink);  // of long ago
+  EXPECT_EQ(decoder.counters().bad_contents, 1U);
+}
+
+TEST(PpsSession, StreamsByPulsesAlone) {
+  Session session;
+  const HostTime begin = host_time_from_ns(1'000'000'000'000);
+  EXPECT_TRUE(session.poll(begin).empty());
+  session.on_bytes(kSteeringRecord, begin + seconds(1));
+  EXPECT_EQ(session.state(), SessionState::kConnecting);
+  Bytes both = kSteeringRecord;
+  both.insert(both.end(), kRecord.begin(), kRecord.end());
+  session.on_bytes(both, begin + seconds(2));
+  EXPECT_EQ(session.state(), SessionState::kStreaming);
+}
+
 TEST(PpsDecoder, GivesAPulseItsTimeAndCountsThoseThatAreMissing) {
   Decoder decoder({3});
   test::CollectingSink sink;

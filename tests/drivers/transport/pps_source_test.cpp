@@ -65,14 +65,36 @@ class PpsSourceTest : public testing::Test {
     return opened ? std::move(*opened) : nullptr;
   }
   std::optional<UtcPulse> read(PpsSource& source) {
-    std::array<std::uint8_t, kPulseRecordBytes> buffer{};
+    std::array<std::uint8_t, PpsSource::kReadBytes> buffer{};
     const IoResult result = source.read(buffer);
     if (result.status != IoStatus::kDone) return std::nullopt;
-    EXPECT_EQ(result.n, kPulseRecordBytes);
-    return read_pulse_record(buffer);
+    const auto told = std::span(buffer).first(result.n);
+    if (!read_steering_record(told)) return read_pulse_record(told);
+    ++steered_;
+    return read_pulse_record(told.subspan(kPulseRecordBytes));
   }
   PlayedEdges edges_;
+  int steered_ = 0;
 };
+
+TEST_F(PpsSourceTest, TellsHowThisPcSteersItsClockAndThenIsSilent) {
+  auto source = open();
+  std::optional<ClockSteering> told;
+  for (int k = 0; k < 50; ++k) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    std::array<std::uint8_t, PpsSource::kReadBytes> buffer{};
+    const IoResult result = source->read(buffer);
+    if (result.status == IoStatus::kDone) {
+      told = read_steering_record(std::span(buffer).first(result.n));
+      ASSERT_TRUE(told);
+    }
+  }
+  const ClockSteering now = read_quartz();
+  if (now.apart > std::chrono::microseconds(2)) GTEST_SKIP() << "this PC reads its clocks too slowly";
+  ASSERT_TRUE(told);
+  const double since_s = to_seconds(now.time - told->time);
+  EXPECT_NEAR(to_seconds(now.unsteered - told->unsteered) - since_s, told->rate * since_s, 20e-6);
+}
 
 TEST_F(PpsSourceTest, TellsEachPulseOnceOnTheHostsClock) {
   auto source = open();
@@ -140,7 +162,7 @@ TEST_F(PpsSourceTest, ADeviceThatVanishesIsGone) {
   auto source = open();
   EXPECT_FALSE(read(*source));
   edges_.fetch_error = ENODEV;
-  std::array<std::uint8_t, kPulseRecordBytes> buffer{};
+  std::array<std::uint8_t, PpsSource::kReadBytes> buffer{};
   EXPECT_EQ(source->read(buffer).status, IoStatus::kGone);
   edges_.fetch_error = EINTR;
   EXPECT_EQ(source->read(buffer).status, IoStatus::kNothing);

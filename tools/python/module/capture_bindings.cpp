@@ -148,6 +148,11 @@ class Gatherer final : public SampleSink {
         kinds["pulse"].add(sample);
         kinds["pulse"].counts["wall_ns"].push_back(sample.pulse.wall_ns);
         return;
+      case SampleKind::kSteering:
+        kinds["steering"].add(sample);
+        kinds["steering"].counts["unsteered_ns"].push_back(sample.steering.unsteered_ns);
+        kinds["steering"].add_number("rate", sample.steering.rate);
+        return;
     }
   }
   std::map<std::string, Columns> kinds;
