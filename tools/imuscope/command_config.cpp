@@ -60,9 +60,6 @@ Result<void> check_with_data(const std::filesystem::path& file, const std::vecto
   std::vector<check::Finding> findings;
   const auto opened = open_recording(data, file, {}, &findings);
   print_findings(findings);
-  for (const check::Finding& finding : findings) {
-    if (finding.harm == check::Harm::kNote) say("NOTE   {}\n", check::sentence(finding));
-  }
   if (!fix.empty()) {
     const auto configuration = load_configuration(file);
     if (!configuration) return tl::unexpected<Error>(configuration.error());
