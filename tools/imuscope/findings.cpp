@@ -9,6 +9,7 @@
 #include "print.h"
 #include "progress.h"
 #include "report/json_file.h"
+#include "service/recorded_look.h"
 #include "service/run_folder.h"
 #include "service/run_record.h"
 
@@ -63,12 +64,13 @@ std::string harm_in_short(const std::vector<check::Finding>& findings) {
 
 std::vector<check::Finding> look_at_capture(const std::filesystem::path& capture) {
   ProgressBar bar;
-  std::vector<check::Finding> findings;
-  // What cannot be opened has been looked at as far as it could be.
-  static_cast<void>(open_recording(
-      {capture.string()}, {}, [&bar](const std::string& what, double share) { bar.show(what, share); },
-      &findings));
-  return findings;
+  const auto opened = open_recording(
+      {capture.string()}, {}, [&bar](const std::string& what, double share) { bar.show(what, share); });
+  if (!opened) return {};
+  // A mistake is there from the beginning; a command of little memory keeps to that.
+  constexpr double kLongest_s = 900.0;
+  const std::vector<bool> run_time(opened->configuration.devices.size());
+  return look_at_recording(opened->configuration, opened->recording, run_time, kLongest_s);
 }
 
 void print_look(const std::vector<check::Finding>& findings) {
