@@ -245,9 +245,9 @@ void warn_of_no_navigation(const Configuration& configuration, const Snapshot& l
   if (!gnss || status == NavigationStatus::kNotOffered || status == NavigationStatus::kNavigating) return;
   const char* why =
       status == NavigationStatus::kAligning
-          ? "the vehicle's heading was not found: it shows by the reference's own attitude, by a minute of "
-            "rest "
-            "with a reference that feels the Earth turn, or by braking and turning between good positions"
+          ? "the vehicle's heading was not found: it shows by the reference's own attitude, by a "
+            "minute of rest with a reference that feels the Earth turn, or by braking and "
+            "turning between good positions"
           : "the vehicle never stood still for two seconds, by which it is levelled, or no position came";
   warnings.push_back(
       fmt::format("{}: the navigation did not start: {}; mountings do not need it, positions and speeds do",
@@ -261,9 +261,9 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
   const EstimatorCounters& counters = last.counters;
   if (const auto gnss = configuration.gnss_index(); gnss && contradicts_motion(counters)) {
     warnings.push_back(fmt::format(
-        "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its times are "
-        "of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, and do not trust "
-        "this run before",
+        "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its "
+        "times are of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, "
+        "and do not trust this run before",
         configuration.devices[*gnss].name, counters.gnss_positions_rejected,
         counters.gnss_used + counters.gnss_rejected));
   }
