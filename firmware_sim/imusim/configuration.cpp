@@ -132,7 +132,7 @@ PlayedDevice read_device(TableReader& in) {
   in.whole("bus_id", bus_id, 1, kBusIdMax);
   device.bus_id = static_cast<int>(bus_id);
   if (device.bus_id > 0 && (device.role != Role::kStudy || device.protocol != Protocol::kXsensMt))
-    in.fail("xsens", "has a bus_id: only a S-IMU with protocol = \"xsens_mt\" behind an Xbus Master");
+    in.fail("xsens", "has a bus_id: only an S-IMU with protocol = \"xsens_mt\" behind an Xbus Master");
   return device;
 }
 

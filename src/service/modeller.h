@@ -55,7 +55,7 @@ class Modeller {
   Modeller& operator=(const Modeller&) = delete;
 
   void start(const ThreadPlan& plan);
-  /// Another model or refit interval, from the next refit on. Any thread of the soft world.
+  /// Another model or refit interval, from the next refit on. Any non-real-time thread.
   void set_options(noise::ModelSpec spec, double refit_interval_s);
   /// Fits what is due and ends.
   void stop();
