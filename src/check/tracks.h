@@ -1,6 +1,6 @@
 #pragma once
 
-/// What every device of a drive said, as the checks look at it. Soft world: allocates.
+/// What every device of a drive said, as the checks look at it. Non-real-time: allocates.
 
 #include <Eigen/Core>
 #include <cstddef>

@@ -1,7 +1,7 @@
 #pragma once
 
 /// The publisher's thread: takes what the core and the I/O thread put out, publishes it over LCM, writes the
-/// run folder and feeds the modeller. Soft world.
+/// run folder and feeds the modeller. Non-real-time.
 
 #include <atomic>
 #include <memory>

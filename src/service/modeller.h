@@ -1,7 +1,7 @@
 #pragma once
 
 /// Refits the noise models of every S-IMU, axis and regime while the run goes on, in a thread of the lowest
-/// priority. Soft world.
+/// priority. Non-real-time.
 
 #include <atomic>
 #include <filesystem>
