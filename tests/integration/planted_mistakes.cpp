@@ -194,7 +194,7 @@ auto frozen(double seconds) {
   };
 }
 
-/// Several samples of a packet with the time of the last one.
+/// Several samples of one batch with the time of the last one.
 auto packed(std::size_t device, std::size_t size) {
   return [=](DriveInMemory& drive) {
     Samples& samples = drive.samples[device];
@@ -295,7 +295,7 @@ void add_imu_mistakes(std::vector<Mistake>& all) {
     add("an accelerometer that stands", stuck(device, 4, 0.5, 1.0), "stuck axis");
     add("every sample twice", repeated(device, 2), "repeated samples");
     add("every sample five times", repeated(device, 5), "repeated samples");
-    add("packets of four under one time", packed(device, 4), "repeated samples");
+    add("batches of four under one time", packed(device, 4), "repeated samples");
     add("forces without gravity", without_gravity(device), "gravity norm");
     add("accelerometers in thousandths of g", scaled(device, 1.0, 1e3 / kMps2PerG), "gravity norm");
     add("gyros at the end of their range by their own word", says_clipped(device, kGyroClipZ, 50),
