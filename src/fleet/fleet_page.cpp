@@ -173,8 +173,10 @@ Html standing_out(Reader& in) {
   FoldedTable outliers({"what", "unit", "quantity", "where", "is off by", "p"});
   in.each(
       "SELECT o.kind, o.unit, c.key, o.capture, q.quantity, q.regime, q.axis, o.deviation, o.p_corrected, "
-      "q.is_log, q.unit_of_value FROM outliers o JOIN quantities q USING (quantity_id) LEFT JOIN captures c "
-      "USING (capture) ORDER BY o.p_corrected, o.unit, q.quantity, q.regime, q.axis, o.capture",
+      "q.is_log, q.unit_of_value "
+      "FROM outliers o JOIN quantities q USING (quantity_id) LEFT JOIN captures c USING (capture) ORDER BY "
+      "o.p_corrected, o.unit, "
+      "q.quantity, q.regime, q.axis, o.capture",
       [&](const Statement& row) {
         const double d = row.number(7);
         const Html off = row.integer(9) != 0 ? text(fmt::format("{:+.1f} %", 100.0 * std::expm1(d)))
@@ -230,8 +232,8 @@ Html map_section(Reader& in) {
   std::vector<MapTrack> tracks;
   std::string last;
   in.each(
-      "SELECT t.capture, d.worst, t.lat_deg, t.lon_deg FROM tracks t JOIN drives d USING "
-      "(capture) ORDER BY t.capture, t.point",
+      "SELECT t.capture, d.worst, t.lat_deg, t.lon_deg FROM tracks t JOIN drives d USING (capture) ORDER BY "
+      "t.capture, t.point",
       [&](const Statement& row) {
         const std::string capture = row.text(0);
         if (tracks.empty() || capture != last) tracks.push_back({row.text(1), {}});
@@ -259,13 +261,16 @@ Html distributions(Reader& in) {
   std::map<std::tuple<std::string, std::string, std::string>, Of> all;
   // A mean of a unit's drives, weighted by their errors and by what drives differ by.
   in.each(
-      "SELECT q.quantity, q.regime, q.axis, q.unit_of_value, q.is_log, p.tolerance_low, "
-      "p.tolerance_high, p.data_sheet, m.unit, sum(m.value / (m.sd * m.sd + ifnull(p.drive_sd * "
-      "p.drive_sd, 0))) / sum(1 / (m.sd * m.sd + ifnull(p.drive_sd * p.drive_sd, 0))), EXISTS (SELECT 1 "
-      "FROM outliers o WHERE o.kind = 'unit' AND o.unit = m.unit AND o.quantity_id = q.quantity_id) FROM "
-      "quantities q JOIN population p USING (quantity_id) JOIN measurements m USING (quantity_id) WHERE "
-      "q.quantity IN ('angle random walk', 'velocity random walk', 'bias instability', 'gyro bias', "
-      "'accelerometer bias') GROUP BY q.quantity_id, m.unit",
+      "SELECT q.quantity, q.regime, q.axis, q.unit_of_value, q.is_log, p.tolerance_low, p.tolerance_high, "
+      "p.data_sheet, m.unit, "
+      "sum(m.value / (m.sd * m.sd + ifnull(p.drive_sd * p.drive_sd, 0))) / sum(1 / (m.sd * m.sd + "
+      "ifnull(p.drive_sd * p.drive_sd, 0))), "
+      "EXISTS (SELECT 1 FROM outliers o WHERE o.kind = 'unit' AND o.unit = m.unit AND o.quantity_id = "
+      "q.quantity_id) "
+      "FROM quantities q JOIN population p USING (quantity_id) JOIN measurements m USING (quantity_id) WHERE "
+      "q.quantity IN "
+      "('angle random walk', 'velocity random walk', 'bias instability', 'gyro bias', 'accelerometer bias') "
+      "GROUP BY q.quantity_id, m.unit",
       [&](const Statement& row) {
         Of& it = all[{row.text(0), row.text(1), row.text(2)}];
         it.unit_of_value = row.text(3);
@@ -304,8 +309,10 @@ Html distributions(Reader& in) {
   return page::heading("distributions", "What the units are like") +
          page::paragraph(
              "A dot is what the drives of a unit showed, their errors included; where units are many, a bar "
-             "says how many lie there. Red ones stand out. The band holds 95 % of all such units, at a "
-             "confidence of 95 %, as they are without errors.",
+             "says "
+             "how many lie there. Red ones stand out. The band holds 95 % of all such units, at a confidence "
+             "of "
+             "95 %, as they are without errors.",
              "quiet") +
          element("div", pictures, "pictures");
 }
@@ -315,9 +322,11 @@ Html population(Reader& in) {
                      "drives differ by", "unit"});
   in.each(
       "SELECT q.quantity, q.regime, q.axis, p.units, p.drives, p.mean, p.mean_low, p.mean_high, "
-      "p.tolerance_low, p.tolerance_high, p.unit_sd, p.drive_sd, q.is_log, q.unit_of_value FROM population "
-      "p JOIN quantities q USING (quantity_id) WHERE p.units > 1 AND NOT (q.quantity GLOB '[A-Z][A-Z]*') "
-      "ORDER BY p.mean IS NULL, q.quantity, q.regime = 'dynamic', q.regime, q.axis",
+      "p.tolerance_low, p.tolerance_high, "
+      "p.unit_sd, p.drive_sd, q.is_log, q.unit_of_value FROM population p JOIN quantities q USING "
+      "(quantity_id) WHERE p.units > 1 AND "
+      "NOT (q.quantity GLOB '[A-Z][A-Z]*') ORDER BY p.mean IS NULL, q.quantity, q.regime = 'dynamic', "
+      "q.regime, q.axis",
       [&](const Statement& row) {
         const bool is_log = row.integer(12) != 0;
         const auto natural = [&](int i) { return is_log ? std::exp(row.number(i)) : row.number(i); };
@@ -344,21 +353,28 @@ Html population(Reader& in) {
 json units_data(Reader& in) {
   json rows = json::array();
   in.each(
-      "WITH noise AS (SELECT m.unit, q.quantity, avg(m.value) AS value FROM measurements m JOIN quantities "
-      "q USING (quantity_id) WHERE q.quantity IN ('angle random walk', 'velocity random walk') AND q.regime "
-      "= (SELECT min(regime) FROM quantities WHERE quantity = q.quantity AND regime IN ('static', 'all') "
-      "ORDER BY regime DESC) GROUP BY m.unit, q.quantity), arw AS (SELECT unit, exp(value) AS value FROM "
-      "noise WHERE quantity = 'angle random walk'), vrw AS (SELECT unit, exp(value) AS value FROM noise "
-      "WHERE quantity = 'velocity random walk'), place AS (SELECT unit, group_concat(DISTINCT vehicle) AS "
-      "vehicles FROM mountings GROUP BY unit), use AS (SELECT unit, count(*) AS drives, sum(usability = "
-      "'usable') AS usable FROM calibrations GROUP BY unit), off AS (SELECT unit, sum(kind = 'unit') AS "
-      "units, sum(kind = 'drive') AS drives FROM outliers GROUP BY unit), bad AS (SELECT unit, count(*) AS "
-      "n FROM not_holding GROUP BY unit), moves AS (SELECT unit, count(*) AS n FROM drifting GROUP BY unit) "
+      "WITH noise AS (SELECT m.unit, q.quantity, avg(m.value) AS value FROM measurements m JOIN quantities q "
+      "USING (quantity_id) WHERE "
+      "q.quantity IN ('angle random walk', 'velocity random walk') AND q.regime = (SELECT min(regime) FROM "
+      "quantities WHERE quantity = "
+      "q.quantity AND regime IN ('static', 'all') ORDER BY regime DESC) GROUP BY m.unit, q.quantity), "
+      "arw AS (SELECT unit, exp(value) AS value FROM noise WHERE quantity = 'angle random walk'), "
+      "vrw AS (SELECT unit, exp(value) AS value FROM noise WHERE quantity = 'velocity random walk'), "
+      "place AS (SELECT unit, group_concat(DISTINCT vehicle) AS vehicles FROM mountings GROUP BY unit), "
+      "use AS (SELECT unit, count(*) AS drives, sum(usability = 'usable') AS usable FROM calibrations GROUP "
+      "BY unit), "
+      "off AS (SELECT unit, sum(kind = 'unit') AS units, sum(kind = 'drive') AS drives FROM outliers GROUP "
+      "BY unit), "
+      "bad AS (SELECT unit, count(*) AS n FROM not_holding GROUP BY unit), "
+      "moves AS (SELECT unit, count(*) AS n FROM drifting GROUP BY unit) "
       "SELECT u.unit, place.vehicles, use.drives, use.usable, arw.value, vrw.value, losses.samples_lost, "
-      "losses.bad_frames, ifnull(off.units, 0), ifnull(off.drives, 0), ifnull(bad.n, 0), ifnull(moves.n, 0) "
-      "FROM units u LEFT JOIN place USING (unit) LEFT JOIN use USING (unit) LEFT JOIN arw USING (unit) LEFT "
-      "JOIN vrw USING (unit) LEFT JOIN losses USING (unit) LEFT JOIN off USING (unit) LEFT JOIN bad USING "
-      "(unit) LEFT JOIN moves USING (unit) ORDER BY (ifnull(off.units, 0) + ifnull(bad.n, 0) + "
+      "losses.bad_frames, "
+      "ifnull(off.units, 0), ifnull(off.drives, 0), ifnull(bad.n, 0), ifnull(moves.n, 0) FROM units u LEFT "
+      "JOIN place USING (unit) LEFT "
+      "JOIN use USING (unit) LEFT JOIN arw USING (unit) LEFT JOIN vrw USING (unit) LEFT JOIN losses USING "
+      "(unit) LEFT JOIN off USING "
+      "(unit) LEFT JOIN bad USING (unit) LEFT JOIN moves USING (unit) ORDER BY (ifnull(off.units, 0) + "
+      "ifnull(bad.n, 0) + "
       "ifnull(moves.n, 0)) DESC, u.unit",
       [&](const Statement& row) {
         const auto number = [&](int i) {
@@ -383,9 +399,10 @@ json drives_data(Reader& in) {
   json rows = json::array();
   in.each(
       "SELECT c.capture, c.key, c.vehicle, c.mounting, d.begin_utc, d.duration_s, d.distance_m, d.worst, "
-      "(SELECT count(*) FROM calibrations k WHERE k.capture = c.capture AND k.usability = 'usable'), "
-      "d.gnss_used FROM captures c JOIN drives d USING (capture) ORDER BY d.worst = 'wrong' DESC, "
-      "d.worst = 'limits' DESC, c.capture",
+      "(SELECT count(*) FROM "
+      "calibrations k WHERE k.capture = c.capture AND k.usability = 'usable'), d.gnss_used FROM captures c "
+      "JOIN drives d USING (capture) "
+      "ORDER BY d.worst = 'wrong' DESC, d.worst = 'limits' DESC, c.capture",
       [&](const Statement& row) {
         const auto number = [&](int i) {
           return std::isfinite(row.number(i)) ? json(row.number(i)) : json(nullptr);
