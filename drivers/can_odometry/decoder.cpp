@@ -236,8 +236,7 @@ void Decoder::on_short_frame(const dbc::Message& message, const CanFrame& frame)
   remarked_ = frame.stamp;
   remark_.say(
       "frames of {} are too short for a chosen signal ({} bytes received, {} in the DBC file); check that "
-      "the "
-      "DBC file is this vehicle's",
+      "the DBC file is this vehicle's",
       message.name, frame.length, message.length);
 }
 

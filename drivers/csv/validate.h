@@ -1,7 +1,7 @@
 #pragma once
 
 /// Looks at a CSV file before it is used, so that a mistake is told with file, line and column instead of
-/// showing up as missing samples. Soft world: allocates, reads files.
+/// showing up as missing samples. Non-real-time: allocates, reads files.
 
 #include <filesystem>
 

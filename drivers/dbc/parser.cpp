@@ -514,8 +514,8 @@ Result<Database> parse(std::string_view text, const std::string& name) { return 
 
 Result<std::string> read_text(const std::filesystem::path& file) {
   auto text = read_text_file(file, "DBC file",
-                             "give the path of the vehicle's DBC file; a relative one starts at the "
-                             "configuration's folder");
+                             "give the path of the vehicle's DBC file; a relative one "
+                             "starts at the configuration's folder");
   if (text && !is_utf8(*text)) return utf8_of_latin1(*text);
   return text;
 }

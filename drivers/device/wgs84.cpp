@@ -2,13 +2,14 @@
 
 #include <cmath>
 
+#include "base/wgs84_ellipsoid.h"
+
 namespace imuscope {
 namespace {
 
-// Defining parameters of WGS-84.
-constexpr double kSemiMajor_m = 6378137.0;
-constexpr double kFlattening = 1.0 / 298.257223563;
-constexpr double kE2 = kFlattening * (2.0 - kFlattening);
+constexpr double kSemiMajor_m = kWgs84SemiMajorAxis_m;
+constexpr double kFlattening = kWgs84Flattening;
+constexpr double kE2 = kWgs84EccentricitySquared;
 
 /// Bowring's iteration gains about three digits near the ellipsoid and more than one far above it.
 constexpr int kIterations = 5;

@@ -24,9 +24,8 @@ constexpr std::string_view kMessages = "{RT,RD,ST,PG,VG,SG,TO,UO,DP,ET}";
 constexpr std::string_view kNoBytes =
     "no data from the receiver: check cable and port, and that the port's input mode is 'cmd'";
 constexpr std::string_view kNoEpoch =
-    "bytes arrive but no complete GREIS epoch: check the baud rate, and that the receiver puts out RT, PG or "
-    "PV, "
-    "and ET";
+    "bytes arrive but no complete GREIS epoch: check the baud rate, and that the "
+    "receiver puts out RT, PG or PV, and ET";
 
 /// Writes text and numbers one behind the other.
 class TextWriter {

@@ -44,12 +44,11 @@ std::string_view describe(RawBlocks state) noexcept {
              "(extended bit 2) and RAW ACCELERATION (bit 28) in the unit's StdBin output";
     case RawBlocks::kZero:
       return "the raw rotation rate or raw acceleration is all zero, so nothing can be calibrated on this "
-             "unit; "
-             "it is export-limited or simulating: ask its maker for an output with raw data";
+             "unit; it is export-limited or simulating: ask its maker for an output with raw data";
     case RawBlocks::kFrozen:
-      return "the raw rotation rate or raw acceleration does not change, so nothing can be calibrated on "
-             "this "
-             "unit; it is export-limited, simulating or faulty: ask its maker for an output with raw data";
+      return "the raw rotation rate or raw acceleration does not change, so nothing can be "
+             "calibrated on this unit; it is export-limited, simulating or faulty: ask its "
+             "maker for an output with raw data";
   }
   return {};
 }

@@ -23,9 +23,8 @@ std::string_view Session::nothing_is_understood() const noexcept {
   if (scanner_.unsupported_versions() > 0) {
     return "the unit sends StdBin V6, which is not read: set its output protocol to STDBIN V5 or lower";
   }
-  return "bytes arrive but no StdBin telegram: check the baud rate, and that the unit's output protocol is "
-         "STDBIN "
-         "V2 to V5";
+  return "bytes arrive but no StdBin telegram: check the baud rate, and that the unit's "
+         "output protocol is STDBIN V2 to V5";
 }
 
 }  // namespace imuscope::ixblue_stdbin

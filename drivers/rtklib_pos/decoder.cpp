@@ -83,8 +83,8 @@ std::string_view Decoder::remark() const noexcept {
   if (base_is_missing_)
     return "the solutions are relative to a base whose place is not known; set base_lat_lon_height";
   if (format_.geodetic_height)
-    return "the heights are above the geoid; set RTKLIB's output height to ellipsoidal (out-height "
-           "=ellipsoidal)";
+    return "the heights are above the geoid; set RTKLIB's output height to "
+           "ellipsoidal (out-height =ellipsoidal)";
   return {};
 }
 

@@ -21,8 +21,8 @@ bool Session::hear(std::span<const std::uint8_t> bytes, HostTime now) noexcept {
 }
 
 std::string_view Session::nothing_comes() const noexcept {
-  return "no solution comes: check that rtkrcv (or str2str) runs, and that its output stream is a TCP server "
-         "here";
+  return "no solution comes: check that rtkrcv (or str2str) runs, and that its "
+         "output stream is a TCP server here";
 }
 
 std::string_view Session::nothing_is_understood() const noexcept {

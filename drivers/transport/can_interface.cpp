@@ -179,8 +179,7 @@ std::string silence_text(const CanInterface& interface, const CanObservation& se
   if (errors && seen.other_frames <= seen.error_frames) {
     return fmt::format(
         "{} hears only errors{} (state {}): the bit rate is probably not the bus's; sudo ip link set {} "
-        "down, then "
-        "up with another bitrate",
+        "down, then up with another bitrate",
         interface.name, rate_text(interface), name_of(interface.state), interface.name);
   }
   if (seen.other_frames > 0) {

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What the system knows of a CAN interface, and what is wrong with it in words for a person. Soft world
+/// What the system knows of a CAN interface, and what is wrong with it in words for a person. Non-real-time
 /// only.
 
 #include <cstdint>

@@ -43,7 +43,7 @@ struct CandumpLine {
 [[nodiscard]] CandumpLine read_candump_line(std::string_view line);
 
 /// Iterates over the frames of a log. Lines that cannot be read are passed over and counted: a log that was
-/// cut off or damaged is still a log. Thread: one, of the soft world.
+/// cut off or damaged is still a log. Thread: one, non-real-time.
 class CandumpLog {
  public:
   /// Errors name the file: it cannot be read, or its beginning holds no frame at all (with the first line and

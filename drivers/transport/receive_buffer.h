@@ -1,6 +1,6 @@
 #pragma once
 
-/// Kernel memory for what has arrived at a socket and waits to be read. Soft world only.
+/// Kernel memory for what has arrived at a socket and waits to be read. Non-real-time only.
 
 #include <string>
 

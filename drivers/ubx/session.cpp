@@ -22,8 +22,7 @@ std::string_view Session::nothing_comes() const noexcept {
 
 std::string_view Session::nothing_is_understood() const noexcept {
   return "bytes arrive but no UBX-NAV-PVT: check the baud rate, and switch the message on for this port "
-         "(CFG-MSG, or "
-         "CFG-MSGOUT-UBX_NAV_PVT)";
+         "(CFG-MSG, or CFG-MSGOUT-UBX_NAV_PVT)";
 }
 
 }  // namespace imuscope::ubx

@@ -286,11 +286,11 @@ Vector3 Decoder::rotated(const Triad& v) const noexcept {
 
 std::string_view Decoder::remark() const noexcept {
   if (overflows_ > 0)
-    return "its CAN output buffer overflowed: lower its output rate, send fewer messages or raise the bit "
-           "rate";
+    return "its CAN output buffer overflowed: lower its output rate, send fewer "
+           "messages or raise the bit rate";
   if (counters_.bad_lengths > 0)
-    return "frames with its identifiers are too short for its messages: does another device use these "
-           "identifiers?";
+    return "frames with its identifiers are too short for its messages: does "
+           "another device use these identifiers?";
   // A stream may be joined in the midst of a group.
   constexpr std::uint64_t kFramesOfAGroup = 8;
   if (untimed_ > kFramesOfAGroup)

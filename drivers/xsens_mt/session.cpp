@@ -191,9 +191,8 @@ void MtSession::fail_round(HostTime now) noexcept {
 }
 
 void MtSession::refuse_device() noexcept {
-  say("this is device %08X, and %08X was expected: are two sensors' plugs exchanged? Exchange them again, or "
-      "their "
-      "device_id",
+  say("this is device %08X, and %08X was expected: are two sensors' plugs exchanged? Exchange "
+      "them again, or their device_id",
       static_cast<unsigned>(*device_id_), static_cast<unsigned>(*config_.device_id));
   step_ = Step::kFailed;
   to_send_ = false;
@@ -448,8 +447,8 @@ void MtSession::on_configuration_read(HostTime now) noexcept {
     fail_round(now);
   } else if (configuration_->n_devices != expected ||
              configuration_->is_xbus_master() != (config_.bus_devices > 0)) {
-    say("%zu devices answer behind this line, the configuration has %zu; check the bus cables, and give each "
-        "[[device]] its bus_id",
+    say("%zu devices answer behind this line, the configuration has %zu; check the bus cables, and "
+        "give each [[device]] its bus_id",
         configuration_->n_devices, expected);
     fail_round(now);
   } else if (!sync_in_is_wanted()) {
@@ -478,9 +477,8 @@ bool MtSession::sync_in_is_wanted() const noexcept {
 void MtSession::on_configuration_checked(HostTime now) noexcept {
   sync_in_written_ = false;
   if (!sync_in_is_wanted()) {
-    say("the device took SyncIn mode 0x%04X, skip %u, offset %u; wanted are 0x%04X, %u, %u: check what its "
-        "manual "
-        "allows",
+    say("the device took SyncIn mode 0x%04X, skip %u, offset %u; wanted are 0x%04X, %u, "
+        "%u: check what its manual allows",
         static_cast<unsigned>(configuration_->sync_in_mode),
         static_cast<unsigned>(configuration_->sync_in_skip),
         static_cast<unsigned>(configuration_->sync_in_offset), static_cast<unsigned>(config_.sync_in->mode),
@@ -615,8 +613,8 @@ void MtSession::watch_stream(HostTime now) noexcept {
 
 void MtSession::say_why_there_is_no_answer() noexcept {
   if (data_frames_ > 0) {
-    say("the device sends data but does not hear commands; check the transmit line (and two stop bits for a "
-        "device made before 2008)");
+    say("the device sends data but does not hear commands; check the transmit line (and two stop bits "
+        "for a device made before 2008)");
   } else if (frames_ > 0) {
     say("the device does not go to its configuration state; it will be reset");
   } else if (bytes_ > 0) {

@@ -98,10 +98,9 @@ PlayedDevice read_device(TableReader& in) {
       {"xsens_mt", "ixblue_stdbin", "greis", "nmea", "ubx", "rtklib_pos", "xsens_can", "can_odometry", "pps"},
       0));
   if (!fits(device.protocol, device.role))
-    in.fail(
-        "protocol",
-        "does not fit the role: xsens_mt, ixblue_stdbin and xsens_can are IMUs, can_odometry odometry, pps "
-        "time, the others gnss");
+    in.fail("protocol",
+            "does not fit the role: xsens_mt, ixblue_stdbin and xsens_can are IMUs, can_odometry "
+            "odometry, pps time, the others gnss");
   if (device.protocol == Protocol::kXsensCan && device.role == Role::kReference)
     in.fail("protocol", "is played for an S-IMU only");
   device.rate_hz = default_rate_hz(device.role);
@@ -133,7 +132,7 @@ PlayedDevice read_device(TableReader& in) {
   in.whole("bus_id", bus_id, 1, kBusIdMax);
   device.bus_id = static_cast<int>(bus_id);
   if (device.bus_id > 0 && (device.role != Role::kStudy || device.protocol != Protocol::kXsensMt))
-    in.fail("xsens", "has a bus_id: only a S-IMU with protocol = \"xsens_mt\" behind an Xbus Master");
+    in.fail("xsens", "has a bus_id: only an S-IMU with protocol = \"xsens_mt\" behind an Xbus Master");
   return device;
 }
 

@@ -61,7 +61,7 @@ enum class Protocol {
   kCanOdometry,
   kPps
 };
-/// Which XSens device plays a S-IMU: an MTx with legacy MTData, or an MTi with MTData2.
+/// Which XSens device plays an S-IMU: an MTx with legacy MTData, or an MTi with MTData2.
 enum class XsensModel { kMtx, kMti };
 
 struct PlayedDevice {

@@ -177,8 +177,8 @@ Outcome<std::vector<CanEnd>> open_can_ends(World& world, const LiveOptions& opti
     if (!Configuration::is_on_can(played)) continue;
     if (played.can_interface.empty())
       return wrong_usage(
-          fmt::format("{}: device '{}' has no CAN interface to play on; give transport = {{ kind = \"can\", "
-                      "interface = \"...\" }}",
+          fmt::format("{}: device '{}' has no CAN interface to play on; give transport = {{ kind = "
+                      "\"can\", interface = \"...\" }}",
                       world.configuration().file.string(), played.name));
     auto port = CanPort::open(played.can_interface);
     if (!port) return failed_work(fmt::format("device '{}': {}", played.name, port.error()));

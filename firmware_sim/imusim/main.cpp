@@ -55,8 +55,8 @@ struct Common {
             std::map<std::string, WorldKind>{{"ideal", WorldKind::kIdeal}, {"harsh", WorldKind::kHarsh}}));
     command
         .add_option("--reference-class", reference,
-                    "noise of the reference, from 1 (0.0015 deg/sqrt(h)) to 5 (4.8), instead of the "
-                    "configuration's")
+                    "noise of the reference, from 1 (0.0015 deg/sqrt(h)) to 5 (4.8), "
+                    "instead of the configuration's")
         ->check(CLI::Range(1, kReferenceClasses));
     command.add_option("--pc-ppm", pc_ppm, "rate of the PC's clock, instead of the configuration's or drawn")
         ->check(CLI::Range(-1000.0, 1000.0));

@@ -88,8 +88,8 @@ tl::expected<PseudoTerminal, std::string> PseudoTerminal::open(const std::filesy
         fmt::format("cannot make the folder {}: {}", link.parent_path().string(), error.message()));
   if (const std::string danger = who_else_writes(link.parent_path()); !danger.empty()) {
     return tl::unexpected(
-        fmt::format("cannot put a port at {}: {}, and could put another one in its place; name a "
-                    "folder of your own",
+        fmt::format("cannot put a port at {}: {}, and could put another one in its "
+                    "place; name a folder of your own",
                     link.string(), danger));
   }
   const int near_end = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);

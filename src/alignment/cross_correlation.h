@@ -38,8 +38,8 @@ struct TimeOffset {
   bool clock_rate_estimated = false;
 };
 
-/// Soft world: allocates. Fails, with the reason, where the series do not overlap, hold too little motion or
-/// do not resemble one another.
+/// Non-real-time: allocates. Fails, with the reason, where the series do not overlap, hold too little motion
+/// or do not resemble one another.
 [[nodiscard]] Result<TimeOffset> find_time_offset(const RateMagnitudeSeries& reference,
                                                   const RateMagnitudeSeries& study,
                                                   const TimeOffsetOptions& options = {});

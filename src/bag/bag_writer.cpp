@@ -7,6 +7,7 @@
 
 #include "bag/message_json.h"
 #include "base/units.h"
+#include "base/wgs84_ellipsoid.h"
 
 namespace imuscope::bag {
 namespace {
@@ -61,12 +62,10 @@ mcap::Diagnostic diagnostic_of(const Mounting& mounting) {
 /// Metres from the first position in its tangent plane, on the sphere of its own radii: enough for a picture
 /// of a drive.
 Vector3 local_enu_m(const Navigation& origin, const Navigation& now) {
-  constexpr double kA_m = 6378137.0;  // WGS-84
-  constexpr double kE2 = 6.69437999014e-3;
   const double latitude = origin.latitude_deg * kRadPerDeg;
-  const double w2 = 1.0 - kE2 * square(std::sin(latitude));
-  const double meridian_m = kA_m * (1.0 - kE2) / (w2 * std::sqrt(w2)) + origin.height_m;
-  const double normal_m = kA_m / std::sqrt(w2) + origin.height_m;
+  const RadiiOfCurvature radii = radii_of_curvature(latitude);
+  const double meridian_m = radii.meridian_m + origin.height_m;
+  const double normal_m = radii.transverse_m + origin.height_m;
   const double turn_deg = std::remainder(now.longitude_deg - origin.longitude_deg, 360.0);
   return {turn_deg * kRadPerDeg * normal_m * std::cos(latitude),
           (now.latitude_deg - origin.latitude_deg) * kRadPerDeg * meridian_m, now.height_m - origin.height_m};

@@ -4,7 +4,7 @@
 /// messages as JSON. docs/doors.md lists topics, types and frames. A message's log and publish time are its
 /// time of validity.
 ///
-/// Soft world: allocates. Thread: one.
+/// Non-real-time: allocates. Thread: one.
 
 #include <cstdint>
 #include <map>

@@ -22,9 +22,8 @@ constexpr std::array<std::pair<std::string_view, MountingFormat>, 5> kFormats{
 /// What is known of the numbers, as a comment. XML forbids two hyphens in one, which "e-05" has not.
 std::string knowledge(const Mounting& m) {
   return fmt::format(
-      "sd: boresight about forward, right, down {:.3g} {:.3g} {:.3g} deg; lever arm {:.3g} {:.3g} {:.3g} m; "
-      "time offset "
-      "{:.3g} ms; {}",
+      "sd: boresight about forward, right, down {:.3g} {:.3g} {:.3g} deg; lever arm {:.3g} {:.3g} "
+      "{:.3g} m; time offset {:.3g} ms; {}",
       m.sd_boresight_rad[0] * kDegPerRad, m.sd_boresight_rad[1] * kDegPerRad,
       m.sd_boresight_rad[2] * kDegPerRad, m.sd_r_bs_b_m[0], m.sd_r_bs_b_m[1], m.sd_r_bs_b_m[2],
       m.sd_t_d_s * kMsPerS, m.status);
@@ -58,8 +57,7 @@ std::string tf(const Mounting& m) {
   const auto q = sensor_in_base_link(m.C_b_s);
   return fmt::format(
       "# imuscope: {}\nros2 run tf2_ros static_transform_publisher --x {:.9g} --y {:.9g} --z {:.9g} --qx "
-      "{:.12g} --qy "
-      "{:.12g} --qz {:.12g} --qw {:.12g} --frame-id {} --child-frame-id {}\n",
+      "{:.12g} --qy {:.12g} --qz {:.12g} --qw {:.12g} --frame-id {} --child-frame-id {}\n",
       knowledge(m), place[0], place[1], place[2], q[0], q[1], q[2], q[3], kBaseLink, m.name);
 }
 

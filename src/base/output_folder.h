@@ -32,7 +32,7 @@ class Descriptor {
 
 /// A file of lines that is being written. Whole lines are collected and written in blocks. A block that the
 /// disk refuses is lost as a whole, so that no line is torn, and the file goes on where there is room again.
-/// Thread: one, of the soft world.
+/// Thread: one, non-real-time.
 class OutputFile {
  public:
   /// @param lines  whole ones

@@ -4,7 +4,7 @@
 /// both IMUs measure it, so that noise of the reference is no error in the variables. The noise is learned
 /// from the residuals. No filter, no GNSS, no noise figure, no tuning. EQUATIONS.md.
 ///
-/// Soft world: allocates. Deterministic: the same records give the same bits. Reentrant.
+/// Non-real-time: allocates. Deterministic: the same records give the same bits. Reentrant.
 
 #include <Eigen/Core>
 #include <functional>

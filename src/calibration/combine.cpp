@@ -162,7 +162,7 @@ Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, Co
     out.weights = intersection_weights(all);
     x = weighted_mean(all, out.weights, P);
   }
-  out.estimate.C_b_s = to_array(orthonormalised(C_first * exp_so3(-x.head<3>())));
+  out.estimate.C_b_s = to_array(reorthonormalized(C_first * exp_so3(-x.head<3>())));
   out.estimate.r_bs_b_m = to_array(Eigen::Vector3d(x.tail<3>()));
   Eigen::Map<Matrix6>(out.estimate.covariance_psi_r.data()) = 0.5 * (P + P.transpose());
   return out;

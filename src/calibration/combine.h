@@ -1,7 +1,7 @@
 #pragma once
 
 /// Several estimates of one mounting made into one, and the question whether they are of one mounting at all.
-/// Soft world: allocates. EQUATIONS.md E-20 to E-27.
+/// Non-real-time: allocates. EQUATIONS.md E-20 to E-27.
 
 #include <array>
 #include <cstddef>

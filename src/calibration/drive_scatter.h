@@ -2,7 +2,7 @@
 
 /// By how much a mounting differs from drive to drive beyond what each drive's own sd says: a bracket gives
 /// way, a plate is screwed on anew, axes move with temperature. Each drive sees its own mounting, and its
-/// parts agree on that one; only several drives tell. E-25 to E-27 in EQUATIONS.md. Soft world: allocates.
+/// parts agree on that one; only several drives tell. E-25 to E-27 in EQUATIONS.md. Non-real-time: allocates.
 
 #include <Eigen/Core>
 #include <cstddef>

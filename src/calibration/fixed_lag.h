@@ -2,7 +2,7 @@
 
 /// Smoothing while a run goes on: the state of some seconds ago, with what was measured since. The window of
 /// the newest epochs of the history is smoothed backwards every few seconds; what has left it is final.
-/// EQUATIONS.md E-16. Soft world: allocates in the constructor and in smoothed().
+/// EQUATIONS.md E-16. Non-real-time: allocates in the constructor and in smoothed().
 
 #include <cstddef>
 #include <functional>

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Records of one size, kept in memory up to a bound and beyond it in a file that has no name (it vanishes
-/// with the program, however that ends). Soft world: allocates, writes files. Thread: one.
+/// with the program, however that ends). Non-real-time: allocates, writes files. Thread: one.
 
 #include <cstddef>
 #include <filesystem>

@@ -4,7 +4,7 @@
 /// times a second: R navigation, R biases and S biases with the uncertainty of the mounting carried along. A
 /// constant without process noise has one smoothed value, the filter's last. EQUATIONS.md E-10 to E-15.
 ///
-/// Soft world: allocates, and writes a file where the memory that it was given does not suffice.
+/// Non-real-time: allocates, and writes a file where the memory that it was given does not suffice.
 
 #include <Eigen/Core>
 #include <array>

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Names of the filter's states, for messages to people. Soft world: allocates.
+/// Names of the filter's states, for messages to people. Non-real-time: allocates.
 
 #include <cstddef>
 #include <optional>

@@ -402,7 +402,7 @@ void StudyFilter::begin(StudyContext& context, HostTime now, const Matrix3d& C_b
   FilterCore& core = context.core;
   reset_to_prior(core, index_, config_);
   StudyState& state = core.study(index_);
-  state.C_b_s = orthonormalised(C_b_s);
+  state.C_b_s = reorthonormalized(C_b_s);
   state.t_d_s = t_d_s;
   const StudyLayout& layout = core.layout(index_);
   CovarianceKernel& P = core.covariance();

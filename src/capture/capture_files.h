@@ -37,7 +37,7 @@ struct CapturedFile {
 /// capture if it begins with a run header of the same t0; what lies beside it from another run is left alone.
 /// Files that are missing or unreadable in between are passed over, and so is the damaged beginning of one
 /// whose records follow in time: breaks() tells of them. Records that a seal says are damaged are passed
-/// over, too: files() tells of them. Thread: one, of the soft world.
+/// over, too: files() tells of them. Thread: one, non-real-time.
 class CaptureFiles {
  public:
   /// @param beginning  of the first file

@@ -71,7 +71,7 @@ struct CaptureSummary {
 [[nodiscard]] LogHealth health_of(const std::vector<CapturedFile>& files);
 
 /// Iterates over reads and writes ordered by arrival, equal arrivals by the order of the configuration, then
-/// in the order in which they happened. Thread: one, of the soft world.
+/// in the order in which they happened. Thread: one, non-real-time.
 ///
 /// The file is in the order in which the recorder emptied its rings, which is nearly that of arrival. Reads
 /// are held until the file is kReorderWindow further; what is out of order by more is given late and counted.

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What a capture on disk is worth, and a copy of all that is whole in it. Soft world.
+/// What a capture on disk is worth, and a copy of all that is whole in it. Non-real-time.
 
 #include <cstdint>
 #include <filesystem>

@@ -18,7 +18,7 @@
 namespace imuscope {
 
 /// Collects records in memory and hands them to the kernel in whole records at flush(): what was flushed
-/// survives the death of the process. Thread: one, of the soft world.
+/// survives the death of the process. Thread: one, non-real-time.
 ///
 /// When the disk refuses (full, removed), the file is cut back to its last whole record, what could not be
 /// written is counted as lost, and the next flush tries again. When somebody removed the file, all that was

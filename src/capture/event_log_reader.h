@@ -19,7 +19,7 @@ namespace imuscope {
 
 /// Iterates over the events in file order. Damage never stops it: after bytes that are no record it goes on
 /// at the next whole record and counts what lay between. A record that the end of the file cuts off is the
-/// normal end of a capture whose recorder was killed: it is counted apart. Thread: one, of the soft world.
+/// normal end of a capture whose recorder was killed: it is counted apart. Thread: one, non-real-time.
 class EventLogReader {
  public:
   /// Whether a file that does not begin with a record is another kind of file, or may be one of ours whose

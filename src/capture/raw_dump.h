@@ -18,7 +18,7 @@
 
 namespace imuscope {
 
-/// Iterates over the reads of a dump in order. Thread: one, of the soft world.
+/// Iterates over the reads of a dump in order. Thread: one, non-real-time.
 ///
 /// The columns of X.arrivals.csv are byte_offset, n_bytes, arrival_ns (CLOCK_MONOTONIC); its reads cover the
 /// dump without gaps and their arrivals never go back. A dump without it is given in blocks of arbitrary size

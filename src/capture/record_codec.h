@@ -1,6 +1,6 @@
 #pragma once
 
-/// Between the records of a capture and their LCM messages. Any thread of the soft world.
+/// Between the records of a capture and their LCM messages. Any non-real-time thread.
 
 #include <cstdint>
 #include <imuscope/applied_model_t.hpp>

@@ -45,8 +45,8 @@ inline constexpr const char* kRecorderThreadName = "imuscope-rec";
 /// Back-pressure ends here: a slow or full disk makes the recorder lose records (counted, visible to the
 /// capture's reader as gaps in the sequences), never an I/O thread wait.
 ///
-/// Threads: start(), stop() and the destructor from one; status() from any of the soft world. The rings must
-/// outlive the recorder, whose thread is their only consumer.
+/// Threads: start(), stop() and the destructor from one; status() from any non-real-time thread. The rings
+/// must outlive the recorder, whose thread is their only consumer.
 class Recorder {
  public:
   /// Where the capture goes, and when it goes on in another file.
@@ -73,7 +73,7 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   /// Adds a published message, so that the capture shows the run in lcm-logplayer and lcm-spy, too. A replay
-  /// passes over it. Any thread of the soft world. A message that finds too many waiting is counted as lost.
+  /// passes over it. Any non-real-time thread. A message that finds too many waiting is counted as lost.
   void record_message(std::string_view channel, std::int64_t utime, std::span<const std::uint8_t> message);
   /// The same for a message of somebody else's that was heard at `heard`: stamped as the capture's reader
   /// maps times back, whatever the PC's wall clock was set to meanwhile.

@@ -31,7 +31,7 @@ struct LogHealth {
 
 /// Iterates over the records of a log in file order, without the seals and the index. Records are held until
 /// their seal, which follows within the writer's flush; in a log without seals they are given at once.
-/// Thread: one, of the soft world.
+/// Thread: one, non-real-time.
 class SealedLog {
  public:
   static Result<SealedLog> open(const std::filesystem::path& path,

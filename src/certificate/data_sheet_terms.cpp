@@ -135,8 +135,8 @@ TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoi
     out.value = shown(place.ci_high);
     out.ci_high = out.value;
     out.note = fmt::format(
-        "not reached within this record: the Allan deviation still falls at {:.3g} s, the longest averaging "
-        "time",
+        "not reached within this record: the Allan deviation still falls at "
+        "{:.3g} s, the longest averaging time",
         allan.back().tau_s);
     return out;
   }

@@ -2,7 +2,7 @@
 
 /// The look at the data before anything is estimated from them. Thresholds come from physics, data sheets and
 /// statistics and stand with their source beside each check; healthy drives have no finding that harms.
-/// Thread: one, of the soft world; allocates.
+/// Thread: one, non-real-time; allocates.
 
 #include <vector>
 

@@ -322,8 +322,8 @@ Finding not_alike(const DeviceConfig& config, double correlation) {
           correlation,
           1.0,
           "(correlation of their rates)",
-          "both must sit on one rigid body and record the same drive: check the files, gyro_columns and the "
-          "mounting",
+          "both must sit on one rigid body and record the same drive: check the "
+          "files, gyro_columns and the mounting",
           {}};
 }
 

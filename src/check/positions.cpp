@@ -91,8 +91,8 @@ void check_jumps(const DeviceConfig& config, const GnssTrack& track, double peri
                       largest_m,
                       0.0,
                       "m",
-                      "use the receiver's own sd and solution type; where it lost its fix, those positions "
-                      "are refused",
+                      "use the receiver's own sd and solution type; where it lost its "
+                      "fix, those positions are refused",
                       {}});
 }
 

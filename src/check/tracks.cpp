@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.h"
+
 namespace imuscope::check {
 
 namespace {
@@ -39,8 +41,9 @@ void add_gnss(const GnssData& data, const GnssOptions& options, double time_s, G
 
 }  // namespace
 
-Drive::Drive(const Configuration& configuration)
+Drive::Drive(const Configuration& configuration, double longest_s)
     : configuration_(&configuration),
+      longest_s_(std::min(longest_s, kLongest_s)),
       imus_(configuration.devices.size()),
       gnss_(configuration.devices.size()),
       scales_(configuration.devices.size(), TimeScale::kShared),
@@ -55,7 +58,8 @@ void Drive::add(const Sample& sample) {
   has_origin_ = true;
   if (!has_first_[device]) first_[device] = sample.time;
   has_first_[device] = true;
-  if (to_seconds(sample.time - first_[device]) > kLongest_s) {
+  const auto taken = static_cast<double>(imus_[device].size() + gnss_[device].size());
+  if (to_seconds(sample.time - first_[device]) > longest_s_ || taken >= longest_s_ * kMaxRate_hz) {
     full_[device] = true;
     return;
   }

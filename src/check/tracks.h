@@ -1,6 +1,6 @@
 #pragma once
 
-/// What every device of a drive said, as the checks look at it. Soft world: allocates.
+/// What every device of a drive said, as the checks look at it. Non-real-time: allocates.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -44,9 +44,10 @@ enum class TimeScale : std::uint8_t {
 /// All devices of one drive, in the order of the configuration.
 class Drive {
  public:
-  explicit Drive(const Configuration& configuration);
+  /// @param longest_s  of each device's samples that it takes, at most kLongest_s
+  explicit Drive(const Configuration& configuration, double longest_s = kLongest_s);
 
-  /// Takes a sample of a device in stream order. A drive takes no more than kLongest_s of each.
+  /// Takes a sample of a device in stream order, and no more than the fastest device has in that time.
   void add(const Sample& sample);
   [[nodiscard]] bool is_full(std::size_t device) const { return full_[device]; }
   void set_time_scale(std::size_t device, TimeScale scale) { scales_[device] = scale; }
@@ -60,6 +61,7 @@ class Drive {
 
  private:
   const Configuration* configuration_;
+  double longest_s_;
   std::vector<ImuTrack> imus_;
   std::vector<GnssTrack> gnss_;
   std::vector<TimeScale> scales_;

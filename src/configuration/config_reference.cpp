@@ -96,13 +96,11 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"estimator.mounting",
      "What `process` publishes of a mounting. `batch`: an estimate of the whole drive in which nobody knows "
      "the true motion; it learns the noise, so that it needs no `[device.noise]`, and its sd hold what "
-     "crooked "
-     "axes and the reference's own errors leave open. `filter`: the filter's end value, which is as good as "
-     "the configured noise; with `states = \"paper\"` the default."},
+     "crooked axes and the reference's own errors leave open. `filter`: the filter's end value, which is as "
+     "good as the configured noise; with `states = \"paper\"` the default."},
     {"estimator.navigation",
      "Navigation of the R-IMU with GNSS. Without it (or without a receiver) the mounting is calibrated all "
-     "the "
-     "same, from the two IMUs alone."},
+     "the same, from the two IMUs alone."},
     {"estimator.differentiator_points",
      "Samples of the reference from which its angular acceleration is found: 5, 7, 9 or 11. What an update "
      "averages decides more, so that this may stay as it is."},
@@ -133,8 +131,8 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"regimes.bins", "With `intensity`: bins, each with as much of the drive as the others."},
     {"regimes.block_s", "With `intensity`: the drive is looked at in blocks of so many seconds."},
     {"regimes.window_s",
-     "Noise parameters are held against rate, vibration, speed and temperature over windows of so many "
-     "seconds."},
+     "Noise parameters are held against rate, vibration, speed and temperature "
+     "over windows of so many seconds."},
     {"error_process.low_pass_hz",
      "A low-pass for errors and reference alike, so that sensors of different bandwidth compare; 0 is none. "
      "At most 0.4 of the slowest S-IMU's rate."},
@@ -143,27 +141,25 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "Without it: `runs`. `--out` comes first."},
     {"record.mcap",
      "Live: writes run.mcap into the run's folder, too, for Foxglove, PlotJuggler and rosbag2 "
-     "(docs/doors.md). The "
-     "capture stays the record of the run."},
+     "(docs/doors.md). The capture stays the record of the run."},
     {"record.sync_s",
      "Live: what was recorded is on the disk after so many seconds, and safe from the ignition key then. A "
      "cut of the power costs this and the time that the disk takes to write it."},
     {"record.file_gb", "A capture goes on in another file when one has this size."},
     {"record.file_hours", "The same when one is as old."},
     {"record.remove_older_than_days",
-     "Live: runs in the folder that ended longer ago are removed. Never one that `imuscope keep` marked, one "
-     "that "
-     "is being recorded, or a folder that no live run made. Without it: none."},
+     "Live: runs in the folder that ended longer ago are removed. Never one that `imuscope keep` marked, "
+     "one that is being recorded, or a folder that no live run made. Without it: none."},
     {"record.remove_beyond_gb",
      "Live: the oldest runs are removed while all together are larger. Without it: none."},
     {"record.remove_below_free_gb",
      "Live: the oldest runs are removed while less of the disk is free. Without it: none."},
     {"metrics.port",
-     "Live: numbers of the service for Prometheus, at `http://ADDRESS:PORT/metrics` (docs/metrics.md). 0: "
-     "none."},
+     "Live: numbers of the service for Prometheus, at "
+     "`http://ADDRESS:PORT/metrics` (docs/metrics.md). 0: none."},
     {"metrics.address",
-     "Where they are offered: an address of this PC in numbers. Beyond a loopback address everybody on that "
-     "network may read them."},
+     "Where they are offered: an address of this PC in numbers. Beyond a loopback address everybody "
+     "on that network may read them."},
     {"threads.io_cores", "Live: processor cores that the I/O thread keeps to; empty: any."},
     {"threads.estimator_cores", "Live: processor cores that the estimator's thread keeps to; empty: any."},
     {"device.name", "Becomes part of file names: letters, digits, `_`, `-`."},
@@ -175,8 +171,8 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "has a receiver inside. An `odometry` device: can_odometry. A `time` device: pps. An IMU: any other. "
      "mcap, rosbag, ulog and dataflash, for messages in a file of many topics, have every role."},
     {"device.rate_hz",
-     "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, 50 of wheel "
-     "speeds, 1 of pulses."},
+     "Samples per second that the device sends. Without it 100 of an IMU, 10 of a receiver, "
+     "50 of wheel speeds, 1 of pulses."},
     {"device.axes",
      "Rotates the device's components to its frame; the reference's and the vehicle's is forward-right-down. "
      "Three signed axes, or the rows of a rotation matrix. Without it an ixblue_stdbin telegram, which is "
@@ -184,9 +180,8 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.transport.kind",
      "How the bytes come in. Only a device that is never run live, but given as a file, needs no transport."},
     {"device.transport.port",
-     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number. pps: the path, "
-     "such as "
-     "`/dev/pps0`."},
+     "serial: the device's path, best one under `/dev/serial/by-id/`. tcp, udp: the number. pps: "
+     "the path, such as `/dev/pps0`."},
     {"device.transport.edge",
      "pps: the edge of the pulse at which the second begins, as `ppstest` names them."},
     {"device.transport.baud", "serial: bits per second; any rate that the hardware can make."},
@@ -242,14 +237,14 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.data_sheet.bias_time_s",
      "study: the correlation time that such a bias is given, seconds; data sheets do not say."},
     {"device.prior.rotation_vector_b_s_deg",
-     "study: the boresight, where it is known: the rotation that takes b to s. Without it any mounting is "
-     "found."},
+     "study: the boresight, where it is known: the rotation that takes b to s. "
+     "Without it any mounting is found."},
     {"device.prior.boresight_sd_deg", "study: how well the boresight is known, 1 sigma and axis."},
     {"device.prior.lever_arm_b_m", "study: from the R-IMU to the S-IMU, in b."},
     {"device.prior.lever_arm_sd_m", "study: how well the lever arm is known, 1 sigma and axis."},
     {"device.prior.time_offset_ms",
-     "study: to be added to the S-IMU's times; a latency of its stream makes it negative. Searched for where "
-     "absent."},
+     "study: to be added to the S-IMU's times; a latency of its stream makes it "
+     "negative. Searched for where absent."},
     {"device.prior.time_offset_sd_ms", "study: how well the time offset is known, 1 sigma."},
     {"device.prior.accel_boresight_sd_deg",
      "study: gives the accelerometers a boresight of their own, this far from the gyros'."},
@@ -299,10 +294,9 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.velocity_sd_floor_mps", "gnss: a receiver that claims less is not believed."},
     {"device.latency_ms", "gnss: how old a solution is on arrival, where no UTC tells."},
     {"device.latency_sd_ms",
-     "gnss: of `latency_ms`, 1 sigma. The latency is estimated with this prior; 0: it is as given. "
-     "`csv_gnss` "
-     "and a common clock: 0. Where UTC tags of receiver and reference carry solutions, 1 or this, whichever "
-     "is less."},
+     "gnss: of `latency_ms`, 1 sigma. The latency is estimated with this prior; 0: it is as "
+     "given. `csv_gnss` and a common clock: 0. Where UTC tags of receiver and reference carry "
+     "solutions, 1 or this, whichever is less."},
     {"device.geoid_separation_m", "nmea: geoid above the ellipsoid, for receivers that do not send it."},
     {"device.clock", "rtklib_pos: whether a file's times are UTC or of the reference's own clock."},
     {"device.base_lat_lon_height",
@@ -310,11 +304,11 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.odometry.dbc",
      "The vehicle's DBC file, beside the configuration. Its text is kept in captures."},
     {"device.odometry.speed_signals",
-     "`MESSAGE.SIGNAL`, or `SIGNAL` where it is unique; the speed is their mean. Take the wheels of the axle "
-     "that does not steer."},
+     "`MESSAGE.SIGNAL`, or `SIGNAL` where it is unique; the speed is their mean. Take the wheels "
+     "of the axle that does not steer."},
     {"device.odometry.speed_unit",
-     "Where the DBC's own unit is missing or wrong. Without it the DBC's own unit holds, whatever stands in "
-     "the last column."},
+     "Where the DBC's own unit is missing or wrong. Without it the DBC's own unit holds, "
+     "whatever stands in the last column."},
     {"device.odometry.wheel_radius_m", "For signals in rad/s, which need it."},
     {"device.odometry.speed_has_no_sign",
      "The signals are magnitudes; the filter's own speed gives the sign."},
@@ -342,8 +336,8 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"device.odometry.zero_velocity_sd_mps", "Of standstill, 1 sigma."},
     {"device.odometry.dead_band_mps", "Slower wheels may show zero: such a speed is not used as one."},
     {"device.xsens_can.ids.error",
-     "Identifier of the message: 3 hexadecimal digits for 11 bits, 8 for 29. Without it the MTi's own "
-     "default."},
+     "Identifier of the message: 3 hexadecimal digits for 11 bits, 8 for 29. "
+     "Without it the MTi's own default."},
     {"device.xsens_can.ids.sample_time", "As above."},
     {"device.xsens_can.ids.group_counter", "As above."},
     {"device.xsens_can.ids.status_word", "As above."},

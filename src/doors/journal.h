@@ -21,7 +21,7 @@ namespace imuscope {
 /// line that begins with the name of a device and a colon has IMUSCOPE_DEVICE.
 [[nodiscard]] std::shared_ptr<spdlog::sinks::sink> journal_sink();
 
-/// Of the run whose log it is. Any thread of the soft world; nothing where the log does not go to the
+/// Of the run whose log it is. Any non-real-time thread; nothing where the log does not go to the
 /// journal.
 void set_journal_run(const std::string& run, std::vector<std::string> devices);
 

@@ -11,7 +11,7 @@
 
 namespace imuscope {
 
-/// Threads: any of the soft world. Nobody waits for a reader: what was read stays whole, whatever is put up
+/// Threads: any non-real-time one. Nobody waits for a reader: what was read stays whole, whatever is put up
 /// after.
 class StatusBoard {
  public:

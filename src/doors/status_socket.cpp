@@ -227,10 +227,9 @@ Result<std::vector<std::filesystem::path>> find_status_sockets() {
   if (!closed.empty())
     return work_error(fmt::format("this user may not look into {}", closed),
                       "ask as root: sudo imuscope status");
-  return work_error(
-      "no run was found on this PC",
-      "start one: systemctl start imuscope, or imuscope run; a run of another user answers that "
-      "user and root alone");
+  return work_error("no run was found on this PC",
+                    "start one: systemctl start imuscope, or imuscope run; a run of another user "
+                    "answers that user and root alone");
 }
 
 Result<AskedStatus> ask_status(const std::filesystem::path& socket) {

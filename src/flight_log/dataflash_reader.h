@@ -4,7 +4,7 @@
 /// UTC as topics NAME/INSTANCE. What begins no record is passed over to the next that does; every length is
 /// held against the file's.
 ///
-/// Soft world: allocates. Thread: one.
+/// Non-real-time: allocates. Thread: one.
 
 #include <array>
 #include <cstdint>

@@ -4,7 +4,7 @@
 /// appended data, damage up to the next synchronisation and a cut at the end are followed; every length is
 /// held against the file's.
 ///
-/// Soft world: allocates. Thread: one.
+/// Non-real-time: allocates. Thread: one.
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
 #pragma once
 
-/// The piece of a file that is being looked at. Soft world: allocates. Thread: one.
+/// The piece of a file that is being looked at. Non-real-time: allocates. Thread: one.
 
 #include <cstdint>
 #include <filesystem>

@@ -28,7 +28,7 @@ struct Message {
   Bytes data;
 };
 
-/// Soft world: allocates. Thread: one.
+/// Non-real-time: allocates. Thread: one.
 class MessageReader {
  public:
   virtual ~MessageReader() = default;

@@ -4,7 +4,7 @@
 /// far as it goes where it is damaged or was cut off. Every length is held against the file's before memory
 /// is made.
 ///
-/// Soft world: allocates. Thread: one.
+/// Non-real-time: allocates. Thread: one.
 
 #include <cstdint>
 #include <filesystem>

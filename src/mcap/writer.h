@@ -3,7 +3,7 @@
 /// Writes an MCAP file: messages in packed chunks, indexes of messages, chunks, attachments and metadata,
 /// statistics, all CRCs. What was written before a cut of the power is read without the index.
 ///
-/// Soft world: allocates. Thread: one, and one more for packing where that is asked for.
+/// Non-real-time: allocates. Thread: one, and one more for packing where that is asked for.
 
 #include <cstdint>
 #include <functional>

@@ -126,7 +126,7 @@ void InitialAligner::add_imu(HostTime time, const InertialRates& measured,
 // N-42: attitude by the gyros, less what they showed at rest; velocity and position by trapezoids.
 void InitialAligner::integrate(const InertialRates& end, double dt_s) noexcept {
   const Vector3d omega = 0.5 * (imu_.omega_ib_b_radps + end.omega_ib_b_radps) - rest_rate_b_radps_;
-  C_b_a_ = orthonormalised(C_b_a_ * exp_so3(omega * dt_s));
+  C_b_a_ = reorthonormalized(C_b_a_ * exp_so3(omega * dt_s));
   const Vector3d a = C_b_a_ * end.f_b_mps2 + Vector3d(0.0, 0.0, gravity_mps2_);
   const Vector3d mean_a = 0.5 * (a_a_mps2_ + a);
   felt_a_m_ += dt_s * felt_velocity_a_mps_ + 0.5 * dt_s * dt_s * mean_a;

@@ -55,7 +55,7 @@ ZeroVelocityInnovation zero_velocity_innovation(const NavigationState& state) no
 // N-55
 void inject(OdometryState& odometry, const OdometryErrorVector& error) noexcept {
   const Vector3d mu(0.0, error(kVehicleMountError), error(kVehicleMountError + 1));
-  odometry.C_b_v = orthonormalised(odometry.C_b_v * exp_so3(-mu));
+  odometry.C_b_v = reorthonormalized(odometry.C_b_v * exp_so3(-mu));
   odometry.r_bv_b_m += error.segment<3>(kVehicleLeverArmError);
   odometry.scale += error(kWheelScaleError);
 }

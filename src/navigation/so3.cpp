@@ -56,7 +56,7 @@ Eigen::Matrix3d right_jacobian_so3(const Eigen::Vector3d& phi_rad) noexcept {
   return Eigen::Matrix3d::Identity() - k.b * X + k.c * (X * X);
 }
 
-Eigen::Matrix3d orthonormalised(const Eigen::Matrix3d& C) noexcept {
+Eigen::Matrix3d reorthonormalized(const Eigen::Matrix3d& C) noexcept {
   return quaternion_from_rotation(C).toRotationMatrix();
 }
 

@@ -26,7 +26,7 @@ inline Eigen::Matrix3d skew(const Eigen::Vector3d& v) noexcept {
 [[nodiscard]] Eigen::Matrix3d right_jacobian_so3(const Eigen::Vector3d& phi_rad) noexcept;
 
 /// Nearest rotation matrix, through the quaternion: for matrices of any origin.
-[[nodiscard]] Eigen::Matrix3d orthonormalised(const Eigen::Matrix3d& C) noexcept;
+[[nodiscard]] Eigen::Matrix3d reorthonormalized(const Eigen::Matrix3d& C) noexcept;
 
 /// One Newton step towards the nearest rotation matrix (N-16): for products of rotations, whose rounding it
 /// removes.

@@ -6,11 +6,10 @@
 
 #include <Eigen/Core>
 
+#include "base/wgs84_ellipsoid.h"
+
 namespace imuscope {
 
-inline constexpr double kWgs84SemiMajorAxis_m = 6378137.0;       ///< TR8350.2 table 3.1
-inline constexpr double kWgs84Flattening = 1.0 / 298.257223563;  ///< TR8350.2 table 3.1
-inline constexpr double kWgs84EccentricitySquared = kWgs84Flattening * (2.0 - kWgs84Flattening);
 /// Angular velocity of the Earth relative to inertial space, TR8350.2 table 3.1.
 inline constexpr double kEarthRate_radps = 7.292115e-5;
 

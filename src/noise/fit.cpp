@@ -140,8 +140,7 @@ void add_warnings(FitResult& result, const FixedPoint& point) {
   if (is_biased_by_quantization(result)) {
     result.warnings.emplace_back(
         "QN by a robust wavelet variance: its coefficients are not Gaussian, so that q2 and what stands "
-        "beside it are "
-        "biased; fit without --robust");
+        "beside it are biased; fit without --robust");
   }
   if (!point.settled) {
     result.warnings.emplace_back(

@@ -146,11 +146,10 @@ class Verdict {
       } else if (c.shape[0] >= kWhiteRate) {
         undetermined_[i] = true;
         const std::string simpler = simpler_name(result_.spec, {c.kind}, ProcessKind::kWhiteNoise);
-        not_identifiable(
-            fmt::format("{}: its correlation time is below a quarter of a sample, it is white noise; the "
-                        "simpler model is {}",
-                        names_[i], simpler),
-            simpler);
+        not_identifiable(fmt::format("{}: its correlation time is below a quarter of a sample, it is white "
+                                     "noise; the simpler model is {}",
+                                     names_[i], simpler),
+                         simpler);
       }
       if (i > 0 && components[i - 1].kind == c.kind && components[i - 1].amplitude > 0.0 &&
           components[i - 1].shape[0] < kSameRate * c.shape[0]) {

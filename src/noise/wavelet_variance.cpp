@@ -209,8 +209,7 @@ Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const W
   }
   if (const auto possible = static_cast<int>(wv.levels.size()); options.levels > possible) {
     return work_error(
-        fmt::format("{} levels need {} samples with few missing, and the longest run of valid "
-                    "samples has {}",
+        fmt::format("{} levels need {} samples with few missing, and the longest run of valid samples has {}",
                     options.levels, std::uint64_t{1} << static_cast<unsigned>(options.levels), longest),
         fmt::format("ask for at most {} levels", possible));
   }

@@ -18,7 +18,7 @@
 
 namespace imuscope {
 
-/// Thread: one, of the soft world.
+/// Thread: one, non-real-time.
 class LcmListener {
  public:
   /// The bytes are valid during the call; decode_message() (message_codec.h) turns them into a message.

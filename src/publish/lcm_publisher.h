@@ -27,7 +27,7 @@ struct PublishCounters {
   std::uint64_t too_large = 0;  ///< above kMaxMessageBytes; not sent
 };
 
-/// Thread: one, of the soft world (publishing allocates and makes system calls). A message that cannot be
+/// Thread: one, non-real-time (publishing allocates and makes system calls). A message that cannot be
 /// sent is counted and given up: what is live is not worth waiting for.
 class LcmPublisher {
  public:

@@ -98,10 +98,8 @@ Picture overview_picture(const json& certificate, bool gyro) {
     if (!plots.empty()) plots.add(", ");
     plots.add(
         "${0} using 1:3:4 with filledcurves fillcolor rgb '{1}' fillstyle transparent solid 0.25 noborder "
-        "notitle, ${0} using "
-        "1:2 with linespoints pointtype 7 pointsize 0.3 linecolor rgb '{1}' title {2} noenhanced, ${0} using "
-        "1:5 with lines "
-        "dashtype 2 linecolor rgb '{1}' notitle",
+        "notitle, ${0} using 1:2 with linespoints pointtype 7 pointsize 0.3 linecolor rgb '{1}' title {2} "
+        "noenhanced, ${0} using 1:5 with lines dashtype 2 linecolor rgb '{1}' notitle",
         block, colour, GnuplotText(axis_words(text_at(axis, "name"))));
     ++n;
   }
@@ -119,11 +117,10 @@ Picture axis_picture(const json& axis, std::size_t place) {
   const auto allan = GnuplotScript::of("allan");
   picture.body += allan_block(allan, axis, factor);
   picture.body.add(
-      "set xlabel 'averaging time τ, s'\nset ylabel {}\nplot $allan using 1:3:4 with filledcurves fillcolor "
-      "rgb '{}' fillstyle "
-      "transparent solid 0.3 noborder notitle, $allan using 1:2 with points pointtype 7 pointsize 0.3 "
-      "linecolor rgb '{}' title "
-      "'Allan deviation', $allan using 1:5 with lines linecolor rgb '#000000' title 'model'\n",
+      "set xlabel 'averaging time τ, s'\nset ylabel {}\nplot $allan using 1:3:4 with filledcurves "
+      "fillcolor rgb '{}' fillstyle transparent solid 0.3 noborder notitle, $allan using 1:2 with points "
+      "pointtype 7 pointsize 0.3 linecolor rgb '{}' title 'Allan deviation', $allan using 1:5 with lines "
+      "linecolor rgb '#000000' title 'model'\n",
       GnuplotText(unit), kPictureColours[2], kPictureColours[2]);
   json entry = field(axis, "fit");
   entry["axis"] = text_at(axis, "name");
@@ -144,9 +141,8 @@ Picture axis_picture(const json& axis, std::size_t place) {
   picture.body += density_block(density, axis, factor);
   picture.body.add(
       "set xlabel 'frequency, Hz'\nset ylabel {}\nplot $density using 1:3:4 with filledcurves fillcolor rgb "
-      "'{}' fillstyle "
-      "transparent solid 0.3 noborder notitle, $density using 1:2 with lines linecolor rgb '{}' title "
-      "'spectral density'\n",
+      "'{}' fillstyle transparent solid 0.3 noborder notitle, $density using 1:2 with lines linecolor rgb "
+      "'{}' title 'spectral density'\n",
       GnuplotText("(" + unit + ")²/Hz"), kPictureColours[0], kPictureColours[0]);
   return picture;
 }

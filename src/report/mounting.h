@@ -1,6 +1,6 @@
 #pragma once
 
-/// How a S-IMU sits, for people: the right-angled mounting it is nearest to, and the small angles that
+/// How an S-IMU sits, for people: the right-angled mounting it is nearest to, and the small angles that
 /// remain.
 
 #include <array>

@@ -7,6 +7,7 @@
 
 #include "base/text.h"
 #include "base/units.h"
+#include "base/wgs84_ellipsoid.h"
 #include "report/csv_reader.h"
 #include "report/json_fields.h"
 #include "report/json_file.h"
@@ -49,17 +50,14 @@ bool present(const std::filesystem::path& file, std::vector<std::string>& absent
   return false;
 }
 
-/// Metres north and east of an origin. Radii of curvature of the WGS-84 ellipsoid (NIMA TR8350.2) at the
-/// origin: good to a metre over a drive of tens of kilometres, finer than the map shows.
+/// Metres north and east of an origin. Radii of curvature of the WGS-84 ellipsoid at the origin:
+/// good to a metre over a drive of tens of kilometres, finer than the map shows.
 class LocalPlane {
  public:
   LocalPlane(double latitude_deg, double longitude_deg) : lat0_deg_(latitude_deg), lon0_deg_(longitude_deg) {
-    constexpr double kSemiMajor_m = 6378137.0;
-    constexpr double kEccentricity2 = 6.69437999014e-3;
-    const double sine = std::sin(latitude_deg * kRadPerDeg);
-    const double w2 = 1.0 - kEccentricity2 * sine * sine;
-    north_m_per_deg_ = kRadPerDeg * kSemiMajor_m * (1.0 - kEccentricity2) / (w2 * std::sqrt(w2));
-    east_m_per_deg_ = kRadPerDeg * kSemiMajor_m / std::sqrt(w2) * std::cos(latitude_deg * kRadPerDeg);
+    const RadiiOfCurvature radii = radii_of_curvature(latitude_deg * kRadPerDeg);
+    north_m_per_deg_ = kRadPerDeg * radii.meridian_m;
+    east_m_per_deg_ = kRadPerDeg * radii.transverse_m * std::cos(latitude_deg * kRadPerDeg);
   }
   [[nodiscard]] double north_m(double latitude_deg) const {
     return (latitude_deg - lat0_deg_) * north_m_per_deg_;

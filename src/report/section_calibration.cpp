@@ -367,10 +367,8 @@ Html calibration_section(const RunFiles& run, FigureSheet& figures) {
   Html section = heading("mounting", "The mounting of each S-IMU");
   section += paragraph(
       "b is the frame of the reference IMU (x forward, y right, z down), s that of the sensor under study. "
-      "The "
-      "boresight ψ is what is left beside the nearest square mounting, a rotation vector in b; the lever arm "
-      "r leads "
-      "from b to s, in b. A positive time offset is added to the sensor's time stamps.");
+      "The boresight ψ is what is left beside the nearest square mounting, a rotation vector in b; the "
+      "lever arm r leads from b to s, in b. A positive time offset is added to the sensor's time stamps.");
   section += mounting_table(run);
   if (!run.has_truth)
     section += paragraph("No truth.json in this run: nothing to compare the estimates with.", "note");
@@ -383,8 +381,7 @@ Html calibration_section(const RunFiles& run, FigureSheet& figures) {
   section += element("p", text("Line: the estimate at that time; band: ± one sd") +
                               text(run.has_truth ? "; dashed: the truth" : "") +
                               text("; darker ground: at rest. Heights are chosen to show the settled "
-                                   "estimates; drag to zoom, double "
-                                   "click to return. ") +
+                                   "estimates; drag to zoom, double click to return. ") +
                               Html::markup("<button type=\"button\" id=\"whole-range\" "
                                            "aria-pressed=\"false\">show the whole range</button>"));
   for (const StudyFiles& study : run.studies)

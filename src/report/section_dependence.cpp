@@ -152,16 +152,14 @@ Html dependence_section(const RunFiles& run, FigureSheet& figures) {
   Html section = heading("dependence", "How the noise depends on the motion");
   if (run.dependence.is_null()) {
     return section +
-           paragraph(
-               "No dependence.json in this run: parameters were not studied against the "
-               "motion.") +
+           paragraph("No dependence.json in this run: parameters were not studied against the motion.") +
            vibration_lines(run);
   }
   const auto window_s = number_at(run.dependence, "window_s");
   section += paragraph(fmt::format(
-      "Parameters fitted to windows{} of the drive, the logarithm of each against the mean of a driver over "
-      "its window, with 95 % intervals. p: chance of such a slope without a dependence, corrected for the "
-      "number of tests (Holm).",
+      "Parameters fitted to windows{} of the drive, the logarithm of each against the mean of a driver "
+      "over its window, with 95 % intervals. p: chance of such a slope without a dependence, corrected "
+      "for the number of tests (Holm).",
       window_s ? fmt::format(" of {:g} s", *window_s) : ""));
   section += list_of_remarks(run, run.dependence);
   for (const StudyFiles& study : run.studies) {

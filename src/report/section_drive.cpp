@@ -34,8 +34,7 @@ Html odometry_part(const RunFiles& run, FigureSheet& figures) {
   Html part = element("h3", text("Odometry"));
   part += paragraph(
       fmt::format("The wheels show {:+.2f} % (sd {:.2f} %) of the speed too much. They stood for {}; for {} "
-                  "of it the R-IMU was "
-                  "quiet, too, and rest was used as zero velocity.",
+                  "of it the R-IMU was quiet, too, and rest was used as zero velocity.",
                   odometry.bin(kScale_percent, last).last, odometry.bin(kSdScale_percent, last).last,
                   duration_words(run.wheels_stood_s), duration_words(run.zero_velocity_s)));
   const auto& wheels = field(run.run, "odometry");

@@ -170,8 +170,7 @@ Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
   if (any) {
     section += paragraph(
         "Samples spread evenly over the drive: the error of an axis against the motion about or along the "
-        "same axis. r: "
-        "correlation of the points shown.");
+        "same axis. r: correlation of the points shown.");
   }
   for (const StudyFiles& study : run.studies) {
     if (study.scatter) section += fold(study.name + strongest_pair(study), scatter_panels(study, figures));
@@ -185,14 +184,11 @@ Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
   }
   section += paragraph(
       "Linear regression on fifteen covariates: angular rate, acceleration and jerk, specific force and "
-      "linear jerk. "
-      "R², F and the first p are those of ordinary least squares, which takes slow noise for dependence. The "
-      "second p "
-      "counts the noise's memory, by the model fitted to the residual. Projected: what errors of the "
-      "calibration "
-      "(boresight, scale, time offset, lever arm) would produce is taken out first; what is left is the "
-      "sensor's own. "
-      "The last column names the fault that a coefficient would stand for, where it is clear of chance.");
+      "linear jerk. R², F and the first p are those of ordinary least squares, which takes slow noise for "
+      "dependence. The second p counts the noise's memory, by the model fitted to the residual. Projected: "
+      "what errors of the calibration (boresight, scale, time offset, lever arm) would produce is taken out "
+      "first; what is left is the sensor's own. The last column names the fault that a coefficient would "
+      "stand for, where it is clear of chance.");
   for (const auto& remark : run.regression_remarks) {
     if (remark.is_string()) section += paragraph(remark.get<std::string>(), "note");
   }

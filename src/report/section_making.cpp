@@ -117,14 +117,10 @@ Html time_budget(const nlohmann::json& devices) {
   return element("h3", text("Time")) + table.html() +
          paragraph(
              "Stamps are dated back by the time on the wire, and late reads have no influence. The constant "
-             "delay "
-             "that is left, of device, adapter and line, is estimated for an S-IMU against the reference and "
-             "taken "
-             "out; of that its sd remains. That of any other device nobody measures, unless pulses of UTC "
-             "(PPS) "
-             "come into the PC and the device tags its data with UTC. Where kernel or card stamp what "
-             "arrives, the "
-             "jitter of reads does not reach the times.");
+             "delay that is left, of device, adapter and line, is estimated for an S-IMU against the "
+             "reference and taken out; of that its sd remains. That of any other device nobody measures, "
+             "unless pulses of UTC (PPS) come into the PC and the device tags its data with UTC. Where "
+             "kernel or card stamp what arrives, the jitter of reads does not reach the times.");
 }
 
 }  // namespace

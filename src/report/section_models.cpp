@@ -292,11 +292,9 @@ Html interval_words(const RunFiles& run) {
   if (!has_quick) return {};
   return paragraph(
       "The intervals are the quick ones of a run: from the estimate's own covariance, without one for a "
-      "process that "
-      "lasts less than 20 correlation times, and with “below” where a fast process may hold any part of the "
-      "white "
-      "noise. “imuscope fit” of an errors file inverts a test instead, which holds for slow and weak "
-      "processes.");
+      "process that lasts less than 20 correlation times, and with “below” where a fast process may "
+      "hold any part of the white noise. “imuscope fit” of an errors file inverts a test instead, which "
+      "holds for slow and weak processes.");
 }
 
 }  // namespace
@@ -304,11 +302,10 @@ Html interval_words(const RunFiles& run) {
 Html errors_section(const RunFiles& run, FigureSheet& figures) {
   Html section = heading("errors", "Figure 2: the error signals");
   section += paragraph(
-      "Sample of the S-IMU minus the reference at the same instant, turned into the sensor's axes and moved "
-      "to its "
-      "place. The sensor's own bias is part of it. Line: mean over a short stretch of time; band: smallest "
-      "to largest "
-      "sample in it; darker ground: at rest. Where there is a gap in the record there is a gap in the line.");
+      "Sample of the S-IMU minus the reference at the same instant, turned into the sensor's axes and "
+      "moved to its place. The sensor's own bias is part of it. Line: mean over a short stretch of time; "
+      "band: smallest to largest sample in it; darker ground: at rest. Where there is a gap in the "
+      "record there is a gap in the line.");
   section += rms_table(run);
   for (const StudyFiles& study : run.studies) {
     section +=
@@ -343,8 +340,7 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
                        "side without a test of difference.")
                  : paragraph(
                        "Whether rest and motion differ is tested with all parameters of an axis together, "
-                       "corrected for "
-                       "the number of tests (Holm); “no difference shown” is not “equal”.");
+                       "corrected for the number of tests (Holm); “no difference shown” is not “equal”.");
   for (const StudyFiles& study : run.studies) {
     section += fold(
         fmt::format("Every parameter of {}, with 95 % intervals", study.name),

@@ -61,16 +61,16 @@ Html outages_section(const RunFiles& run) {
   Html section = heading("outages", "Does it matter? Coasting through GNSS outages");
   if (run.evaluation.is_null()) {
     return section + paragraph(
-                         "No evaluation.json in this run: `imuscope evaluate` on this folder puts the "
-                         "models to the test.");
+                         "No evaluation.json in this run: `imuscope evaluate` on this "
+                         "folder puts the models to the test.");
   }
   section += paragraph(
-      "The S-IMU alone navigates with GNSS, loses it, and is held against the reference after each duration. "
-      "Error: root mean square of the horizontal position; predicted sd: what the filter thought of it. "
-      "NEES: "
-      "mean squared error in units of the predicted covariance, per degree of freedom: 1 where the model is "
-      "right; ▲ the filter trusts itself too much, ▼ too little. Surprise: mean −log density of the position "
-      "error; the model with the smallest predicts best. Outages: those that do not overlap / all.");
+      "The S-IMU alone navigates with GNSS, loses it, and is held against the reference after each "
+      "duration. Error: root mean square of the horizontal position; predicted sd: what the filter "
+      "thought of it. NEES: mean squared error in units of the predicted covariance, per degree of "
+      "freedom: 1 where the model is right; ▲ the filter trusts itself too much, ▼ too little. Surprise: "
+      "mean −log density of the position error; the model with the smallest predicts best. Outages: "
+      "those that do not overlap / all.");
   for (const StudyFiles& study : run.studies) {
     section +=
         element("h3", text(study.name)) + outage_table(run, study.name) + absent_models(run, study.name);

@@ -131,9 +131,8 @@ Html agreement(const RunFiles& run, const std::vector<Fit>& fits) {
   if (const Html chart = agreement_chart(of_outages(run), "duration of the outage, s"); !chart.empty()) {
     return element("h3", text("Error over predicted sd, after GNSS outages")) + chart +
            paragraph(
-               "One: the filter knows how wrong it is. Above: it trusts the sensor too much. A point for "
-               "each "
-               "S-IMU.",
+               "One: the filter knows how wrong it is. Above: it trusts the sensor "
+               "too much. A point for each S-IMU.",
                "note");
   }
   const Html chart = agreement_chart(of_models(run, fits), "time scale τ, s");
@@ -141,8 +140,7 @@ Html agreement(const RunFiles& run, const std::vector<Fit>& fits) {
   return element("h3", text("Measured error over the model's, by time scale")) + chart +
          paragraph(
              "One: the noise model is right at that scale. Above: the sensor is worse. Points of all axes "
-             "and "
-             "regimes with their 95 % intervals.",
+             "and regimes with their 95 % intervals.",
              "note");
 }
 

@@ -203,8 +203,7 @@ void manoeuvres(const RunFiles& run, std::vector<std::string>& steps) {
   if (turns) {
     steps.emplace_back(
         "Drive figures of eight or roundabouts both ways at 0.3 to 0.5 rad/s: turning shows the boresight "
-        "about "
-        "the level axes, the level lever arm and the time offset.");
+        "about the level axes, the level lever arm and the time offset.");
   }
   if (brakes)
     steps.emplace_back(
@@ -232,9 +231,8 @@ void model_steps(const RunFiles& run, const std::vector<Fit>& fits, std::vector<
   const double level = fits.empty() ? kTestLevel : kTestLevel / static_cast<double>(fits.size());
   if (count_rejected(fits, level) > 0) {
     steps.emplace_back(
-        "Try another composition of the noise model for the signals that the test rejects; Figure 4 shows at "
-        "which "
-        "scales the fitted line leaves the intervals.");
+        "Try another composition of the noise model for the signals that the test rejects; Figure 4 shows "
+        "at which scales the fitted line leaves the intervals.");
   }
   const auto vague = those(fits, [](const Fit& fit) { return !fit.identifiable; });
   const auto records = records_needed(fits);
@@ -341,8 +339,8 @@ Verdict calibration_verdict(const RunFiles& run) {
     verdict.answer = Answer::kNo;
     verdict.headline = "Not usable: the receiver's positions contradict the motion.";
     verdict.reasons.push_back(
-        "The warnings of the run say what to check: whose clock the receiver's times are of, its antenna's "
-        "lever arm, its sd.");
+        "The warnings of the run say what to check: whose clock the receiver's times are of, "
+        "its antenna's lever arm, its sd.");
   }
   judge_by_findings(run, verdict);
   return verdict;
@@ -413,8 +411,7 @@ std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>&
   if (steps.empty()) {
     steps.emplace_back(
         "Nothing has to be repeated. The mounting is in calibration.json and the noise models are in "
-        "models.json of this "
-        "run, ready for a filter.");
+        "models.json of this run, ready for a filter.");
   }
   return steps;
 }

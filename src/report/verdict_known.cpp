@@ -172,12 +172,12 @@ std::vector<std::string> records_needed(const std::vector<Fit>& fits) {
           fmt::format("more than {} in {} models, whose slow process is slower than this record is long",
                       duration_words(std::round(kCorrelationTimes * regime.record_s)), regime.unseen));
     }
-    sentences.push_back(fmt::format(
-        "Record longer ({}) where rate and variance of the slow process are wanted: it takes {:.0f} of its "
-        "correlation times, {}. This run has {}. For times shorter than this record the models hold as they "
-        "are.",
-        name.empty() ? "all" : name, kCorrelationTimes, fmt::join(parts, "; "),
-        duration_words(regime.record_s)));
+    sentences.push_back(
+        fmt::format("Record longer ({}) where rate and variance of the slow process are wanted: it takes "
+                    "{:.0f} of its correlation times, {}. This run has {}. For times shorter than this "
+                    "record the models hold as they are.",
+                    name.empty() ? "all" : name, kCorrelationTimes, fmt::join(parts, "; "),
+                    duration_words(regime.record_s)));
   }
   return sentences;
 }

@@ -25,8 +25,7 @@ GnuplotScript wavelet_plots(const GnuplotScript& block, const Fit& fit, const Gn
   constexpr std::size_t kFirstComponent = 6;
   auto plots = GnuplotScript::of(
       "${0} using 1:2:3:4 with yerrorbars pointtype 7 pointsize 0.4 linecolor rgb '{1}' title {2} "
-      "noenhanced, "
-      "${0} using 1:5 with lines linewidth 1.5 linecolor rgb '{1}' notitle",
+      "noenhanced, ${0} using 1:5 with lines linewidth 1.5 linecolor rgb '{1}' notitle",
       block, colour, GnuplotText(fit.regime.empty() ? "all" : fit.regime));
   for (std::size_t i = 0; i < fit.components.size(); ++i) {
     if (fit.components[i].values.size() != fit.levels.size()) continue;

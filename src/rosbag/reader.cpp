@@ -289,8 +289,8 @@ std::vector<std::string> Reader::losses() const {
     losses.push_back(fmt::format("{}: {} bytes are damaged and were passed over", name_, loss_.bytes));
   if (loss_.cut_off || !has_index_) {
     losses.push_back(
-        fmt::format("{}: is cut off or was not closed (rosbag reindex would say so); what stands "
-                    "before the cut is used",
+        fmt::format("{}: is cut off or was not closed (rosbag reindex would say so); "
+                    "what stands before the cut is used",
                     name_));
   }
   return losses;

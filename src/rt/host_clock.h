@@ -1,7 +1,7 @@
 #pragma once
 
-/// Reads the PC's clocks. For I/O threads, the periodic loop and the soft world; the estimator is handed its
-/// time (base/time.h).
+/// Reads the PC's clocks. For I/O threads, the periodic loop and non-real-time threads; the estimator is
+/// handed its time (base/time.h).
 
 #include "base/time.h"
 

@@ -17,7 +17,7 @@ void TickSchedule::finish(HostTime now) noexcept {
   statistics_.done.add(now - (next_deadline_ - period_));
 }
 
-Tick TickSchedule::wake(HostTime now) noexcept {
+Tick TickSchedule::deadline_reached(HostTime now) noexcept {
   IMUSCOPE_EXPECTS(now >= next_deadline_);
   const Duration lateness = now - next_deadline_;
   const std::int64_t skipped = lateness / period_;
@@ -36,7 +36,7 @@ Tick PeriodicLoop::wait() noexcept {
   if (!first_) schedule_.finish(host_now());
   first_ = false;
   sleep_until(schedule_.deadline());
-  return schedule_.wake(host_now());
+  return schedule_.deadline_reached(host_now());
 }
 
 void sleep_until(HostTime deadline) noexcept {

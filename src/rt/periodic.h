@@ -39,13 +39,13 @@ class TickSchedule {
   /// Deadline of the next tick.
   [[nodiscard]] HostTime deadline() const noexcept { return next_deadline_; }
 
-  /// The work of the tick that wake() delivered last is over at `now`. Counts an overrun if the next deadline
-  /// has passed.
+  /// The work of the tick that deadline_reached() delivered last is over at `now`. Counts an overrun if the
+  /// next deadline has passed.
   void finish(HostTime now) noexcept;
 
   /// The tick that a wake-up at `now` delivers.
   /// @param now at or after deadline()
-  [[nodiscard]] Tick wake(HostTime now) noexcept;
+  [[nodiscard]] Tick deadline_reached(HostTime now) noexcept;
 
   [[nodiscard]] const PeriodicStatistics& statistics() const noexcept { return statistics_; }
 

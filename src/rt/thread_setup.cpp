@@ -31,9 +31,9 @@ std::string errno_text(int error) { return std::strerror(error); }
 std::string fifo_remedy(int priority) {
   const std::string number = std::to_string(priority);
   if (geteuid() == 0) {
-    return "root itself is refused, so a container or control group withholds real time: grant it "
-           "CAP_SYS_NICE, "
-           "or run 'sysctl -w kernel.sched_rt_runtime_us=-1' where RT group scheduling is built in";
+    return "root itself is refused, so a container or control group withholds real time: "
+           "grant it CAP_SYS_NICE, or run 'sysctl -w kernel.sched_rt_runtime_us=-1' where "
+           "RT group scheduling is built in";
   }
   return "put LimitRTPRIO=" + number + " into the systemd unit, or the line '" + std::to_string(geteuid()) +
          " - rtprio " + number +

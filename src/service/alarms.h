@@ -1,6 +1,6 @@
 #pragma once
 
-/// What wants a person: since when, how often, and what to do. Soft world.
+/// What wants a person: since when, how often, and what to do. Non-real-time.
 
 #include <imuscope/alarm_t.hpp>
 #include <span>

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What a run says over LCM while it goes on, live and in a replay alike. Soft world.
+/// What a run says over LCM while it goes on, live and in a replay alike. Non-real-time.
 
 #include <imuscope/status_t.hpp>
 #include <optional>

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Watches the interface of a CAN device beside its line: whether it is up, what its controller says, and
-/// what else travels on the bus. Soft world.
+/// what else travels on the bus. Non-real-time.
 
 #include <string>
 #include <vector>

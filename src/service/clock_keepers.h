@@ -1,8 +1,8 @@
 #pragma once
 
 /// Who keeps the PC's clock, and how well it says it does: chrony and ptp4l, asked through their own
-/// programs, and the clocks of network cards (PTP), read against the wall clock. Soft world: starts programs,
-/// each for two seconds at most, in a thread of its own.
+/// programs, and the clocks of network cards (PTP), read against the wall clock. Non-real-time: starts
+/// programs, each for two seconds at most, in a thread of its own.
 
 #include <atomic>
 #include <cstdint>

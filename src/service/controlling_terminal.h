@@ -9,7 +9,7 @@ namespace imuscope {
 class ControllingTerminal {
  public:
   ControllingTerminal();
-  /// Whether there was one at the start and it can no longer be reached. Soft world: opens a file.
+  /// Whether there was one at the start and it can no longer be reached. Non-real-time: opens a file.
   [[nodiscard]] bool is_gone() const;
 
  private:

@@ -84,8 +84,7 @@ struct EventSentence {
   std::string operator()(const event::OdometryRejected& e) const {
     return fmt::format(
         "{}: the wheels contradict the motion by {:+.2f} m/s and are not used: slip, or a wrong unit, "
-        "factor or "
-        "direction in the configuration or its DBC file",
+        "factor or direction in the configuration or its DBC file",
         name, e.excess_mps);
   }
   std::string operator()(const event::OdometryAccepted& e) const {
@@ -99,9 +98,8 @@ struct EventSentence {
             .devices[state.study ? estimator.studies[*state.study].device : estimator.reference.device]
             .name;
     return fmt::format(
-        "{}: numerical trouble: the variance of {} was no longer positive and starts again; please keep "
-        "the "
-        "capture",
+        "{}: numerical trouble: the variance of {} was no longer positive and starts "
+        "again; please keep the capture",
         owner, state.name);
   }
   std::string operator()(const event::GravityMagnitudeWrong& e) const {
@@ -146,9 +144,8 @@ struct EventSentence {
     const std::string line = e.gyro ? fmt::format("gyro_white_sd_degps = {:.2g}", e.white_sd * kDegPerRad)
                                     : fmt::format("accel_white_sd_mps2 = {:.2g}", e.white_sd);
     return fmt::format(
-        "{}: its {} differ from the reference's by {:.1f} times the configured noise, so that its sd are too "
-        "small; "
-        "[device.noise] {} would fit",
+        "{}: its {} differ from the reference's by {:.1f} times the configured noise, so that its sd are "
+        "too small; [device.noise] {} would fit",
         name, e.gyro ? "rates" : "forces", e.factor, line);
   }
 };

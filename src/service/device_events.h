@@ -1,6 +1,6 @@
 #pragma once
 
-/// Tells when a device comes: what udev announces of serial ports and network interfaces. Soft world.
+/// Tells when a device comes: what udev announces of serial ports and network interfaces. Non-real-time.
 
 #include "base/time.h"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// The health of a live run in words and numbers: what STATUS carries beyond plain counts. Soft world.
+/// The health of a live run in words and numbers: what STATUS carries beyond plain counts. Non-real-time.
 
 #include <imuscope/status_t.hpp>
 #include <map>

@@ -326,7 +326,7 @@ void IoThread::loop() {
     const HostTime now = host_now();
     heartbeat_.beat(now);
     const bool beaten = now >= beat.deadline();
-    if (beaten) (void)beat.wake(now);
+    if (beaten) (void)beat.deadline_reached(now);
     for (int i = 0; i < n; ++i) {
       auto* const line = static_cast<Line*>(events[static_cast<std::size_t>(i)].data.ptr);
       line->on_event(tap_, epoll, now);

@@ -12,7 +12,7 @@
 
 namespace imuscope {
 
-/// Thread: one, of the soft world. An attempt that is under way when this ends is left to itself: what it
+/// Thread: one, non-real-time. An attempt that is under way when this ends is left to itself: what it
 /// opens it closes again.
 class LineOpener {
  public:

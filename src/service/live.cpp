@@ -124,8 +124,7 @@ class Supervisor {
     if (!device.net) return "its port has not opened for seconds; unplug the device and plug it in again";
     return fmt::format(
         "{} has not been found for seconds: the name server does not answer; give the host's address in "
-        "place "
-        "of its name, or check the network",
+        "place of its name, or check the network",
         device.net->host);
   }
 

@@ -38,8 +38,8 @@ inline constexpr const char* kBagThreadName = "imuscope-bag";
 /// In the run's folder.
 inline constexpr const char* kBagFileName = "run.mcap";
 
-/// Threads: on_...() from any of the soft world, the rest from the caller's. What comes while too much waits
-/// (a disk that stands still) is lost and counted; nobody waits for this file.
+/// Threads: on_...() from any non-real-time thread, the rest from the caller's. What comes while too much
+/// waits (a disk that stands still) is lost and counted; nobody waits for this file.
 class LiveBag {
  public:
   /// Begins the file and the thread. The configuration must outlive it.

@@ -534,9 +534,8 @@ void LivePublisher::watch_pc_clock(HostTime now) {
   clock_keepers_.begin();
   if (news->suspend) {
     spdlog::warn(
-        "this PC was suspended for {:.1f} s: what the devices sent meanwhile is lost, and their clocks begin "
-        "anew; "
-        "keep it awake while it records (systemd-inhibit)",
+        "this PC was suspended for {:.1f} s: what the devices sent meanwhile is lost, and their clocks "
+        "begin anew; keep it awake while it records (systemd-inhibit)",
         news->suspend->length_s);
   }
   if (news->step) {

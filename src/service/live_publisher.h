@@ -1,7 +1,7 @@
 #pragma once
 
 /// The publisher's thread: takes what the core and the I/O thread put out, publishes it over LCM, writes the
-/// run folder and feeds the modeller. Soft world.
+/// run folder and feeds the modeller. Non-real-time.
 
 #include <atomic>
 #include <memory>
@@ -59,7 +59,7 @@ class LivePublisher {
   void set_refusals(const std::vector<Error>& refusals);
   /// What the decoders need of their CAN buses, per device; for those watched. Call before start().
   void watch_can(const std::vector<std::vector<CanId>>& ids);
-  /// Why a device's line does not open; empty once it is open. Any thread of the soft world.
+  /// Why a device's line does not open; empty once it is open. Any non-real-time thread.
   void set_line_problem(DeviceIndex device, const std::string& problem);
   void start();
   /// Takes over what changed, at the thread's next turn. Any thread.
@@ -151,7 +151,7 @@ class LivePublisher {
   StatusBoard board_;
   HostTime started_;
   HostTime last_status_{};
-  mutable std::mutex shared_mutex_;  ///< what other threads of the soft world ask for or hand in
+  mutable std::mutex shared_mutex_;  ///< what other non-real-time threads ask for or hand in
   std::vector<Error> refusals_;
   std::optional<Tunables> new_tunables_;
   Health health_{"starting", "the threads start"};

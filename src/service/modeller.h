@@ -1,7 +1,7 @@
 #pragma once
 
 /// Refits the noise models of every S-IMU, axis and regime while the run goes on, in a thread of the lowest
-/// priority. Soft world.
+/// priority. Non-real-time.
 
 #include <atomic>
 #include <filesystem>
@@ -55,7 +55,7 @@ class Modeller {
   Modeller& operator=(const Modeller&) = delete;
 
   void start(const ThreadPlan& plan);
-  /// Another model or refit interval, from the next refit on. Any thread of the soft world.
+  /// Another model or refit interval, from the next refit on. Any non-real-time thread.
   void set_options(noise::ModelSpec spec, double refit_interval_s);
   /// Fits what is due and ends.
   void stop();

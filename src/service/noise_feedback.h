@@ -1,6 +1,6 @@
 #pragma once
 
-/// Fitted noise models on their way back to the estimator, and into captures. Soft world.
+/// Fitted noise models on their way back to the estimator, and into captures. Non-real-time.
 
 #include <imuscope/applied_model_t.hpp>
 #include <optional>

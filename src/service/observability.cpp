@@ -42,8 +42,8 @@ const char* manoeuvre_for(std::size_t state) {
       return "brake and accelerate firmly half a dozen times, and take some corners";
     case 3:
     case 4:
-      return "turn tightly in both directions with quick changes of the steering: yaw rate and yaw "
-             "acceleration";
+      return "turn tightly in both directions with quick changes of the "
+             "steering: yaw rate and yaw acceleration";
     case 5:
       return "drive a rough piece of road or over bumps: roll and pitch acceleration";
     default:

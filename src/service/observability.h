@@ -1,7 +1,7 @@
 #pragma once
 
 /// What a drive has shown of a mounting so far, in words for people: sd against goal per state, the direction
-/// of which least is known, and the manoeuvre that would help. Soft world: allocates.
+/// of which least is known, and the manoeuvre that would help. Non-real-time: allocates.
 
 #include <array>
 #include <nlohmann/json.hpp>

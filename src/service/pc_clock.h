@@ -81,7 +81,7 @@ struct PcClockRecord {
   std::vector<PcSuspend> suspends;   ///< not more than steps either
 };
 
-/// Looks at the clock as often as a run has to. Thread: one, of the soft world.
+/// Looks at the clock as often as a run has to. Thread: one, non-real-time.
 class PcClockLog {
  public:
   static constexpr Duration kStatePeriod = std::chrono::minutes(1);

@@ -185,13 +185,12 @@ ProbedPort probe_port(const std::string& path) {
   for (const ProtocolTraits& protocol : kProtocols) {
     if (protocol.is_stream) names.push_back(protocol.name);
   }
-  result.problem =
-      most_bytes >= kSpeaks
-          ? fmt::format(
-                "{} bytes came at best, and no message of {} at any baud rate; set the device to one "
-                "of these",
-                most_bytes, fmt::join(names, ", "))
-          : "nothing was heard at any baud rate; check the device's power and cable";
+  result.problem = most_bytes >= kSpeaks
+                       ? fmt::format(
+                             "{} bytes came at best, and no message of {} at any baud rate; "
+                             "set the device to one of these",
+                             most_bytes, fmt::join(names, ", "))
+                       : "nothing was heard at any baud rate; check the device's power and cable";
   return result;
 }
 

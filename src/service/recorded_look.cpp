@@ -67,8 +67,8 @@ std::optional<Duration> utc_of(const Configuration& configuration, const Recordi
 }  // namespace
 
 std::vector<check::Finding> look_at_recording(const Configuration& configuration, const Recording& recording,
-                                              const std::vector<bool>& has_own_clock) {
-  check::Drive drive(configuration);
+                                              const std::vector<bool>& has_own_clock, double longest_s) {
+  check::Drive drive(configuration, longest_s);
   std::optional<Duration> utc_of_reference;
   for (std::size_t i = 0; i < configuration.devices.size(); ++i) {
     if (has_own_clock[i] && recording.present[i])

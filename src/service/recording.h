@@ -26,12 +26,10 @@ struct OpenedRecording {
 using OpeningProgress = std::function<void(const std::string& what, double share)>;
 
 /// @param inputs         either one capture (an LCM event log), or raw dumps as NAME=FILE, NAME being a
-/// device of
-///                       the configuration
+///                       device of the configuration
 /// @param configuration  absent: the one kept in the capture; required with raw dumps
-/// @param findings  what the data show to be wrong, also where clocks that it hides cannot be brought
-/// together;
-///                  null: nobody looks
+/// @param findings       what the data show to be wrong, also where it keeps clocks from being brought
+///                       together; null: nobody looks
 /// Errors of kind kUsage for what was typed or configured, kWork for files that cannot be used.
 Result<OpenedRecording> open_recording(const std::vector<std::string>& inputs,
                                        const std::optional<std::filesystem::path>& configuration,

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What a refit of the noise models says. Soft world.
+/// What a refit of the noise models says. Non-real-time.
 
 #include <cstdint>
 #include <imuscope/dynamics_t.hpp>

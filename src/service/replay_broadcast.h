@@ -1,7 +1,7 @@
 #pragma once
 
 /// A replay on the bus: what the live run published, so that top, lcm-spy and any other listener can watch a
-/// recording. Soft world.
+/// recording. Non-real-time.
 
 #include <string>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Which runs of a folder may go when it grows, and their removal. Soft world.
+/// Which runs of a folder may go when it grows, and their removal. Non-real-time.
 ///
 /// A folder is a run that may go only where all of this holds: it lies in the folder of [record] itself and
 /// is no link; nothing is in it but regular files that a live run writes, a capture with the header of a run

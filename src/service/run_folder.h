@@ -2,7 +2,7 @@
 
 /// The files of a run: navigation.csv, odometry.csv (where there is odometry), calibration_NAME.csv,
 /// errors_NAME.csv while it goes, calibration.json and run.json at its end. Columns and keys are promised to
-/// users; see docs/files.md. Soft world: one thread, allocates, writes files.
+/// users; see docs/files.md. Non-real-time: one thread, allocates, writes files.
 
 #include <fmt/format.h>
 #include <cstdint>

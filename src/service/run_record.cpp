@@ -1,5 +1,6 @@
 #include "service/run_record.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <algorithm>
 #include <chrono>
@@ -25,11 +26,7 @@ nlohmann::json antenna_json(const NavigationOutput& found) {
 std::string utc_text(UtcTime utc) {
   const auto whole = std::chrono::round<std::chrono::microseconds>(utc);
   const auto since_epoch = std::chrono::floor<std::chrono::seconds>(whole);
-  const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(since_epoch));
-  const std::chrono::hh_mm_ss time(since_epoch - std::chrono::floor<std::chrono::days>(since_epoch));
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:06}Z", static_cast<int>(date.year()),
-                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
-                     time.hours().count(), time.minutes().count(), time.seconds().count(),
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:06}Z", fmt::gmtime(since_epoch.time_since_epoch().count()),
                      (whole - since_epoch).count());
 }
 
@@ -103,26 +100,6 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
   if (device.role == DeviceRole::kStudy) entry["data_sheet"] = data_sheet_json(device.data_sheet);
   if (record.time_budget) entry["time_budget"] = time_budget_json(*record.time_budget);
   return entry;
-}
-
-nlohmann::json findings_json(const std::vector<check::Finding>& findings) {
-  auto json = nlohmann::json::array();
-  for (const check::Finding& finding : findings) {
-    auto mends = nlohmann::json::array();
-    for (const check::ConfigLine& line : finding.mends)
-      mends.push_back({{"device", line.device}, {"key", line.key}, {"value", line.value}});
-    json.push_back({{"harm", check::key_of(finding.harm)},
-                    {"check", finding.check},
-                    {"device", finding.device},
-                    {"what", finding.what},
-                    {"value", finding.value},
-                    {"expected", finding.expected},
-                    {"unit", finding.unit},
-                    {"remedy", finding.remedy},
-                    {"mends", std::move(mends)},
-                    {"text", check::sentence(finding)}});
-  }
-  return json;
 }
 
 /// What was learned of the wheels, and what became of their speeds.
@@ -268,9 +245,9 @@ void warn_of_no_navigation(const Configuration& configuration, const Snapshot& l
   if (!gnss || status == NavigationStatus::kNotOffered || status == NavigationStatus::kNavigating) return;
   const char* why =
       status == NavigationStatus::kAligning
-          ? "the vehicle's heading was not found: it shows by the reference's own attitude, by a minute of "
-            "rest "
-            "with a reference that feels the Earth turn, or by braking and turning between good positions"
+          ? "the vehicle's heading was not found: it shows by the reference's own attitude, by a "
+            "minute of rest with a reference that feels the Earth turn, or by braking and "
+            "turning between good positions"
           : "the vehicle never stood still for two seconds, by which it is levelled, or no position came";
   warnings.push_back(
       fmt::format("{}: the navigation did not start: {}; mountings do not need it, positions and speeds do",
@@ -284,9 +261,9 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
   const EstimatorCounters& counters = last.counters;
   if (const auto gnss = configuration.gnss_index(); gnss && contradicts_motion(counters)) {
     warnings.push_back(fmt::format(
-        "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its times are "
-        "of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, and do not trust "
-        "this run before",
+        "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its "
+        "times are of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, "
+        "and do not trust this run before",
         configuration.devices[*gnss].name, counters.gnss_positions_rejected,
         counters.gnss_used + counters.gnss_rejected));
   }
@@ -303,6 +280,26 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
   return warnings;
 }
 
+nlohmann::json findings_json(const std::vector<check::Finding>& findings) {
+  auto json = nlohmann::json::array();
+  for (const check::Finding& finding : findings) {
+    auto mends = nlohmann::json::array();
+    for (const check::ConfigLine& line : finding.mends)
+      mends.push_back({{"device", line.device}, {"key", line.key}, {"value", line.value}});
+    json.push_back({{"harm", check::key_of(finding.harm)},
+                    {"check", finding.check},
+                    {"device", finding.device},
+                    {"what", finding.what},
+                    {"value", finding.value},
+                    {"expected", finding.expected},
+                    {"unit", finding.unit},
+                    {"remedy", finding.remedy},
+                    {"mends", std::move(mends)},
+                    {"text", check::sentence(finding)}});
+  }
+  return json;
+}
+
 nlohmann::json run_json(const RunRecord& run) {
   nlohmann::json json{{"schema", "imuscope.run/1"},
                       {"name", run.configuration.run_name},
@@ -314,7 +311,7 @@ nlohmann::json run_json(const RunRecord& run) {
                       {"inputs", run.inputs},
                       {"ticks", run.ticks},
                       {"duration_s", static_cast<double>(run.ticks) / kTickRate_hz},
-                      {"findings", findings_json(run.findings)},
+                      {"findings", run.findings ? findings_json(*run.findings) : nlohmann::json(nullptr)},
                       {"warnings", run.warnings}};
   json["t0_utc"] = run.last != nullptr && run.last->has_utc
                        ? nlohmann::json(utc_text(run.last->first_reference_utc))

@@ -41,8 +41,9 @@ struct RunRecord {
   const Snapshot* last = nullptr;     ///< absent where there was no tick
   std::vector<EstimatorEvent> events{};
   std::vector<std::string> warnings{};
-  std::vector<check::Finding> findings{};  ///< of the look at the data before
-  std::optional<double> static_s{};        ///< of a study, which tells rest from motion
+  /// Of the look at the data before; absent where nobody has looked yet.
+  std::optional<std::vector<check::Finding>> findings{};
+  std::optional<double> static_s{};  ///< of a study, which tells rest from motion
   std::optional<double> dynamic_s{};
   const UtcTrack* utc = nullptr;            ///< of the run, for its events
   const PcClockRecord* pc_clock = nullptr;  ///< of a live run
@@ -52,6 +53,9 @@ struct RunRecord {
 /// run.json's content.
 nlohmann::json run_json(const RunRecord& run);
 Result<void> write_run_record(const OutputFolder& folder, const RunRecord& run);
+
+/// As run.json has them.
+nlohmann::json findings_json(const std::vector<check::Finding>& findings);
 
 /// What a person should know of a finished run: GNSS that contradicts the motion, S-IMUs without a mounting.
 [[nodiscard]] std::vector<std::string> warnings_of(const Configuration& configuration, const Snapshot& last);

@@ -1,7 +1,7 @@
 #pragma once
 
 /// LCM messages straight from what the core and the modeller put out, in the units of the wire. Pure
-/// functions; any thread of the soft world (they allocate). The publisher adds the sequence.
+/// functions; any non-real-time thread (they allocate). The publisher adds the sequence.
 
 #include <imuscope/calibration_t.hpp>
 #include <imuscope/dynamics_t.hpp>

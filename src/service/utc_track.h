@@ -1,7 +1,7 @@
 #pragma once
 
 /// The UTC of a run from its beginning to now: what the time scale said second by second, so that an instant
-/// of long ago, or one that a person names in UTC, is found. Soft world: allocates.
+/// of long ago, or one that a person names in UTC, is found. Non-real-time: allocates.
 
 #include <optional>
 #include <vector>

@@ -364,8 +364,7 @@ std::string batch_remark(const std::string& name, const batch::BatchMounting& mo
   if (mounting.change.is_told()) {
     return fmt::format(
         "{}: before and after {:.0f} s its mounting differs by {:.2g} deg and {:.0f} mm: it has moved, or "
-        "the "
-        "two IMUs do not sit on one rigid body; the sd reach to both, and each part by itself tells more",
+        "the two IMUs do not sit on one rigid body; the sd reach to both, and each part by itself tells more",
         name, mounting.change_s, mounting.change.difference.head<3>().norm() * kDegPerRad,
         mounting.change.difference.segment<3>(batch::kLeverArm).norm() * kMmPerM);
   }
@@ -388,9 +387,8 @@ std::string batch_remark(const std::string& name, const batch::BatchMounting& mo
                    [](const batch::BandReport& band) { return band.gyro_deviation_sd > kDeviationTold; });
   if (loose == mounting.bands.end()) return {};
   return fmt::format(
-      "{}: above {:.1f} Hz the two IMUs do not move as one rigid body (by {:.1f} % of the rates there); "
-      "those "
-      "frequencies count less",
+      "{}: above {:.1f} Hz the two IMUs do not move as one rigid body (by {:.1f} % of the rates "
+      "there); those frequencies count less",
       name, loose->from_hz, 100.0 * loose->gyro_deviation_sd);
 }
 

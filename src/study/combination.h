@@ -1,6 +1,6 @@
 #pragma once
 
-/// Run folders of several drives made into one mounting per S-IMU. Soft world: allocates, reads files.
+/// Run folders of several drives made into one mounting per S-IMU. Non-real-time: allocates, reads files.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>

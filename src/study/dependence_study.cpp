@@ -300,8 +300,8 @@ class ImuStudy {
     const double change_degC = warmest->drivers[0] - coldest->drivers[0];
     if (change_degC >= kLeastWarming_degC) return true;
     say(
-        fmt::format("{}: its temperature changed by {:.1f} degC over the drive, too little to hold its noise "
-                    "parameters against it",
+        fmt::format("{}: its temperature changed by {:.1f} degC over the drive, too little to hold "
+                    "its noise parameters against it",
                     name_, change_degC));
     return false;
   }
@@ -313,8 +313,7 @@ class ImuStudy {
     if (most == slopes_.end() || most->n_far == 0) return;
     remark(
         fmt::format("{} {}: windows far from what the others say of the noise (a blow, a fault) count less "
-                    "than half: {} of "
-                    "{}; no axis has more",
+                    "than half: {} of {}; no axis has more",
                     name_, axis_name(most->axis), most->n_far, most->n_windows));
   }
 

@@ -23,7 +23,7 @@ struct DependenceStudy {
 /// Over windows that lie wholly inside the dynamic part, against rms rate, rms vibration, mean speed and the
 /// sensor's own temperature: each by itself, and all of them together ("beside_others"). Holm's correction
 /// holds over all slopes of one S-IMU, each way.
-/// @param temperatures  one a S-IMU, in the order of `series`
+/// @param temperatures  one an S-IMU, in the order of `series`
 /// @param models        where the search begins: the dynamic model of the axis, or that of the whole run
 DependenceStudy study_dependence(const Configuration& configuration, const std::vector<NoiseSeries>& series,
                                  const std::vector<TemperatureTrack>& temperatures,

@@ -2,7 +2,7 @@
 
 /// Does the noise model matter? The S-IMU navigates alone with GNSS, coasts through outages of it, and what
 /// its filter predicts under each noise model is held against the errors it makes. Writes evaluation.json
-/// into the run folder. Soft world.
+/// into the run folder. Non-real-time.
 
 #include <filesystem>
 #include <functional>

@@ -1,7 +1,7 @@
 #pragma once
 
 /// A recorded drive as the outage evaluation wants it: S samples, GNSS solutions and the reference trajectory
-/// of a finished run, all on the run's time and at the S-IMU's place. Soft world.
+/// of a finished run, all on the run's time and at the S-IMU's place. Non-real-time.
 
 #include <filesystem>
 #include <functional>

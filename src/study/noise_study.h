@@ -33,7 +33,7 @@ struct NoiseStudy {
   std::vector<std::string> remarks;                ///< what could not be fitted, levels that are left out
 };
 
-/// A sentence where a S-IMU has samples for less than kWholeRunShare of the run; empty otherwise.
+/// A sentence where an S-IMU has samples for less than kWholeRunShare of the run; empty otherwise.
 inline constexpr double kWholeRunShare = 0.9;
 std::string coverage_remark(const std::string& name, const NoiseSeries& series, double rate_hz, double run_s,
                             HostTime origin);

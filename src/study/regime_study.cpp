@@ -28,14 +28,13 @@ std::vector<std::string> missing_parts(const RegimeTrack& motion, const MotionLi
   }
   if (motion.total_s(kDynamic) <= 0.0) {
     remarks.emplace_back(
-        "there is no dynamic part: the vehicle stood all the time; no dynamic noise model and no regression "
-        "on the "
-        "dynamics is made");
+        "there is no dynamic part: the vehicle stood all the time; no dynamic noise model and no "
+        "regression on the dynamics is made");
   }
   if (!has_speed) {
     remarks.emplace_back(
-        "no speed was known: static and dynamic were told apart by the reference's rates, forces and "
-        "vibration alone");
+        "no speed was known: static and dynamic were told apart by the reference's "
+        "rates, forces and vibration alone");
   }
   return remarks;
 }
@@ -85,9 +84,8 @@ Result<RunRegimes> find_regimes(const RegimeOptions& options, const MotionWatch&
       }
       if (const auto n_left_out = keep_first_names(named, kMaxRegimes); n_left_out > 0) {
         regimes.remarks.push_back(
-            fmt::format("{} different regimes are named and a run can have {}: what the last {} names hold "
-                        "for belongs to no "
-                        "regime",
+            fmt::format("{} different regimes are named and a run can have {}: what the last {} "
+                        "names hold for belongs to no regime",
                         kMaxRegimes + n_left_out, kMaxRegimes, n_left_out));
       }
       regimes.chosen = labelled_regimes(named, origin);

@@ -1,6 +1,6 @@
 #pragma once
 
-/// A run folder and the recording that it was made of, as one MCAP file (bag/bag_writer.h). Soft world.
+/// A run folder and the recording that it was made of, as one MCAP file (bag/bag_writer.h). Non-real-time.
 
 #include <cstdint>
 #include <filesystem>

@@ -1,7 +1,7 @@
 #pragma once
 
 /// The smoothed drive of a study: a pass of its own over the recording, linearised about the mounting that
-/// was found, whose history is smoothed. Soft world: allocates, writes files.
+/// was found, whose history is smoothed. Non-real-time: allocates, writes files.
 
 #include <filesystem>
 #include <functional>

@@ -27,8 +27,8 @@ namespace {
 class ErrorCollector final : public CoreSink {
  public:
   /// @param former    mountings that the rows leave out; must outlive the collector, as must what follows
-  /// @param rows      one spool a S-IMU
-  /// @param low_pass  one a S-IMU, or none
+  /// @param rows      one spool an S-IMU
+  /// @param low_pass  one an S-IMU, or none
   ErrorCollector(const FormerMountings& former, const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows,
                  std::vector<RowLowPass> low_pass)
       : former_(former),

@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "base/units.h"
+#include "base/wgs84_ellipsoid.h"
 #include "page/mounting_drawing.h"
 #include "publish/message_codec.h"
 #include "view/message_json.h"
@@ -17,10 +19,6 @@ namespace imuscope::view {
 
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180.0;
-// WGS-84 (NIMA TR8350.2): semi-major axis, first eccentricity squared.
-constexpr double kSemiMajor_m = 6'378'137.0;
-constexpr double kEccentricity2 = 6.69437999014e-3;
 constexpr std::size_t kFingerprintBytes = 8;
 
 std::uint64_t fingerprint_of(std::span<const std::uint8_t> message) {
@@ -165,12 +163,9 @@ void Picture::take(const navigation_t& navigation) {
   advance(navigation.time_s);
   if (std::abs(navigation.lat_deg) <= 90.0 && std::abs(navigation.lon_deg) <= 360.0) {
     if (!origin_) {
-      const double sine = std::sin(navigation.lat_deg * kRadPerDeg);
-      const double w2 = 1.0 - kEccentricity2 * sine * sine;
-      const double meridian_m = kSemiMajor_m * (1.0 - kEccentricity2) / (w2 * std::sqrt(w2));
-      const double normal_m = kSemiMajor_m / std::sqrt(w2);
-      origin_ = Origin{navigation.lat_deg, navigation.lon_deg, meridian_m * kRadPerDeg,
-                       normal_m * std::cos(navigation.lat_deg * kRadPerDeg) * kRadPerDeg};
+      const RadiiOfCurvature radii = radii_of_curvature(navigation.lat_deg * kRadPerDeg);
+      origin_ = Origin{navigation.lat_deg, navigation.lon_deg, radii.meridian_m * kRadPerDeg,
+                       radii.transverse_m * std::cos(navigation.lat_deg * kRadPerDeg) * kRadPerDeg};
     }
     const std::array<double, 2> here{
         std::remainder(navigation.lon_deg - origin_->lon_deg, 360.0) * origin_->east_m_per_deg,

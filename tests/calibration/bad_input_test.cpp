@@ -437,6 +437,7 @@ TEST_P(TaggedSolutions, AreTakenBackToValidityByTheirTags) {
       on_the_way.erase(on_the_way.begin());
     }
     estimator.advance(samples.back().arrival);
+    EXPECT_EQ(estimator.navigation().has_utc, t_s >= GetParam().reference_from_s) << t_s;
     if (t_s < 70.0) {
       rejected_before = estimator.counters().gnss_rejected;
       continue;
@@ -454,6 +455,51 @@ INSTANTIATE_TEST_SUITE_P(Reference, TaggedSolutions,
                          testing::Values(Tags{"TaggedThroughout", 0.0, 0.0},
                                          Tags{"TaggedFromSomewhereOn", 80.1, 0.3}),
                          [](const testing::TestParamInfo<Tags>& param) { return param.param.name; });
+
+/// From then on its solutions are tagged as if they were solved after they arrive. They are stamped 0.3 s late,
+/// which was seen while the tags were right.
+TEST(BadInput, AReceiverWhoseUtcJumpsAheadIsTimedByItsOwnClock) {
+  constexpr UtcTime kNoon{std::chrono::hours{12}};
+  constexpr std::size_t kDelay = 35;
+  constexpr double kJump_s = 80.0;
+  SimulatedDrive drive(120.0, {}, 55);
+  Estimator estimator(drive.config());
+  std::vector<std::pair<std::size_t, Sample>> on_the_way;
+  double worst_m = 0.0;
+  double fastest_mps = 0.0;
+  std::uint64_t rejected_before = 0;
+  for (std::size_t k = 0; !drive.done(); ++k) {
+    const double t_s = drive.time_s();
+    const std::vector<Sample> samples = drive.next();
+    for (Sample sample : samples) {
+      sample.has_utc = true;
+      sample.utc = utc_at(kNoon, t_s);
+      if (sample.kind != SampleKind::kGnss) {
+        estimator.add(sample);
+        continue;
+      }
+      if (t_s >= kJump_s) sample.utc += std::chrono::seconds{5};
+      sample.time += std::chrono::milliseconds{300};
+      sample.arrival += std::chrono::milliseconds{350};
+      on_the_way.emplace_back(k + kDelay, sample);
+    }
+    while (!on_the_way.empty() && on_the_way.front().first <= k) {
+      estimator.add(on_the_way.front().second);
+      on_the_way.erase(on_the_way.begin());
+    }
+    estimator.advance(samples.back().arrival);
+    if (t_s < kJump_s) {
+      rejected_before = estimator.counters().gnss_rejected;
+      continue;
+    }
+    const imusim::MotionState truth = drive.motion().state_at(t_s);
+    worst_m = std::max(worst_m, horizontal_error_m(estimator.navigation(), truth));
+    fastest_mps = std::max(fastest_mps, truth.v_n_mps.norm());
+  }
+  ASSERT_GT(fastest_mps, 1.0) << "a third of a second must matter";
+  EXPECT_LE(estimator.counters().gnss_rejected, rejected_before + 1);
+  EXPECT_LT(worst_m, 0.1);
+}
 
 /// UTC that cannot write 23:59:60 repeats a second: some devices the last of the day, others the first of the
 /// next.

@@ -584,6 +584,12 @@ TEST(Estimator, ANoiseModelThatLetsTheBiasWanderMoreMakesItLessCertain) {
               1e-6 * gyro_before[1]);
   EXPECT_NEAR(estimator.study(0).sd_gyro_bias_radps[0], gyro_before[0], 1e-6 * gyro_before[0]);
   EXPECT_EQ(estimator.study(0).sd_accel_bias_mps2, accel_before);
+  restless.accel_bias[2].sd *= 100.0;
+  estimator.set_noise(0, restless);
+  estimator.advance(drive.next().back().arrival);
+  EXPECT_NEAR(estimator.study(0).sd_accel_bias_mps2[2], std::sqrt(2.0) * accel_before[2],
+              1e-3 * accel_before[2]);
+  EXPECT_NEAR(estimator.study(0).sd_accel_bias_mps2[1], accel_before[1], 1e-3 * accel_before[1]);
 }
 
 TEST(Estimator, AtRestAGoodReferenceFindsNorthByItself) {

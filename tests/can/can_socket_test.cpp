@@ -320,8 +320,7 @@ TEST(CanSocket, FullBusLosesNothingOrCountsIt) {
   EXPECT_EQ(out_of_order, 0U);
   std::printf(
       "full bus: %llu frames sent in %.2f s (%.0f/s), %llu received, %llu counted as dropped, %llu reads, "
-      "longest wait "
-      "from stamp to read %.1f ms, reader %.0f %% of a core\n",
+      "longest wait from stamp to read %.1f ms, reader %.0f %% of a core\n",
       static_cast<unsigned long long>(kSent), seconds, static_cast<double>(kSent) / seconds,
       static_cast<unsigned long long>(received),
       static_cast<unsigned long long>(socket->health().frames_dropped),
@@ -340,8 +339,7 @@ TEST(CanUtils, GeneratorLoggerAndPlayerAgreeWithTheSocketOnEveryFrame) {
   std::this_thread::sleep_for(milliseconds(500));
   shell(
       "generate() { cangen vcan0 -g 1 -n 100 -D r \"$@\"; }; generate -L i -I 100; generate -L i -e -I "
-      "18FF0100; "
-      "generate -f -b -L r -I 102; generate -L i -I 103");
+      "18FF0100; generate -f -b -L r -I 102; generate -L i -I 103");
   logger.join();
   const auto heard = read_all(*socket);
   auto file = CandumpLog::open(log);

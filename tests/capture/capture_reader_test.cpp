@@ -620,6 +620,29 @@ TEST(CaptureReader, GoesOnBehindTheDamagedBeginningOfAFileAndTellsIt) {
   EXPECT_GT(health_of(summary->files).bytes_skipped, 0U);
 }
 
+TEST(CaptureReader, WhatIsWrongWithItsFilesIsSummed) {
+  LogHealth first;
+  first.bytes_skipped = 1;
+  first.bytes_cut_off = 2;
+  first.records_damaged = 3;
+  first.records_missing = 4;
+  first.records_unsealed = 5;
+  LogHealth second;
+  second.bytes_skipped = 10;
+  second.bytes_cut_off = 20;
+  second.records_damaged = 30;
+  second.records_missing = 40;
+  second.records_unsealed = 50;
+  second.is_sealed = true;
+  const LogHealth sum = health_of({{0, first}, {1, second}});
+  EXPECT_EQ(sum.bytes_skipped, 11U);
+  EXPECT_EQ(sum.bytes_cut_off, 22U);
+  EXPECT_EQ(sum.records_damaged, 33U);
+  EXPECT_EQ(sum.records_missing, 44U);
+  EXPECT_EQ(sum.records_unsealed, 55U);
+  EXPECT_TRUE(sum.is_sealed);
+}
+
 TEST(CaptureReader, LeavesFilesOfAnotherRunAloneWhereverTheyLie) {
   const auto first = five_files();
   RunHeader run = example_run();

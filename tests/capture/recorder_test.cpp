@@ -234,6 +234,24 @@ TEST(Recorder, KeepsPublishedMessagesBesideTheBytesAndReplayPassesOverThem) {
   EXPECT_EQ(summary->other_messages, 1U);
 }
 
+TEST(Recorder, WaitingMessagesMayTakeSixteenMebibytesAndAgainOnceTheyAreWritten) {
+  constexpr std::size_t kMost = std::size_t{16} << 20U;
+  const auto ring = std::make_unique<RawRing>();
+  auto recorder = Recorder::start(options_for(test::scratch_folder() / "capture.lcm"), {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value());
+  const std::uint64_t before = (*recorder)->status().records;
+  const HostTime give_up = host_now() + std::chrono::seconds(30);
+  for (std::uint64_t n = 1; n <= 2; ++n) {
+    (*recorder)->record_message("IMUSCOPE_STATUS", 1, Bytes(kMost));
+    EXPECT_EQ((*recorder)->status().messages_lost, 0U);
+    while ((*recorder)->status().records < before + n && host_now() < give_up)
+      std::this_thread::sleep_for(milliseconds(5));
+  }
+  (*recorder)->record_message("IMUSCOPE_STATUS", 1, Bytes(kMost + 1));
+  EXPECT_EQ((*recorder)->status().messages_lost, 1U);
+  ASSERT_TRUE((*recorder)->stop().has_value());
+}
+
 /// Records 1500 numbered reads, in 1.5 s at least, with limits that split them into three files or more.
 void expect_files_that_join(std::uint64_t max_file_bytes, Duration max_file_age) {
   const auto folder = test::scratch_folder();
@@ -266,7 +284,12 @@ void expect_files_that_join(std::uint64_t max_file_bytes, Duration max_file_age)
   EXPECT_TRUE(summary->losses.empty());
   std::uintmax_t bytes = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) bytes += entry.file_size();
-  EXPECT_EQ((*recorder)->status().bytes, bytes);
+  const RecorderStatus status = (*recorder)->status();
+  EXPECT_EQ(status.bytes, bytes);
+  EXPECT_EQ(status.path, capture_file(folder / "capture.lcm", static_cast<int>(summary->files.size()) - 1))
+      << "the file that is written now";
+  EXPECT_EQ(status.records, kReads + summary->files.size()) << "each file begins with the run's header";
+  EXPECT_EQ(status.records_lost, 0U);
 }
 
 TEST(Recorder, AFullFileGoesOnInAnotherAndTheReaderJoinsThem) {

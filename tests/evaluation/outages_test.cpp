@@ -159,6 +159,51 @@ bool lies_where_a_right_model_does(double nees, std::size_t n) {
          nees < noise::chi_squared_quantile(dof, 1.0 - 5e-4) / dof;
 }
 
+TEST(Outages, EveryNumberOfTheTableIsThatOfItsErrorsAndVariances) {
+  std::vector<OutageResult> results;
+  for (int i = 0; i < 2; ++i) {
+    OutageResult result;
+    result.start_s = 5.0 * i;  // the second begins within the first
+    result.duration_s = 10.0;
+    for (Eigen::Index k = 0; k < kNavigationKinematicSize; ++k)
+      result.error[k] = (i == 0 ? 1.0 : -2.0) * static_cast<double>(k + 1);
+    result.reference_sd.setConstant(i == 0 ? 0.0 : 2.0);
+    KinematicVector variance;
+    for (Eigen::Index k = 0; k < kNavigationKinematicSize; ++k) variance[k] = 1.0 + static_cast<double>(k);
+    result.covariance = variance.asDiagonal();
+    results.push_back(result);
+  }
+  const auto table = consistency_of(results, {10.0});
+  ASSERT_EQ(table.size(), 1U);
+  const Consistency& row = table[0];
+  EXPECT_EQ(row.n, 2U);
+  EXPECT_EQ(row.n_independent, 1U);
+  // Errors k + 1 and -2 (k + 1): the mean of their squares is 2.5 (k + 1)^2. Variances 1 + k and 5 + k: 3 + k.
+  EXPECT_DOUBLE_EQ(row.horizontal_rms_m, std::sqrt(2.5 * (1 + 4)));
+  EXPECT_DOUBLE_EQ(row.horizontal_sd_m, std::sqrt(3.0 + 4.0));
+  EXPECT_DOUBLE_EQ(row.vertical_rms_m, std::sqrt(2.5 * 9));
+  EXPECT_DOUBLE_EQ(row.vertical_sd_m, std::sqrt(5.0));
+  EXPECT_DOUBLE_EQ(row.velocity_rms_mps, std::sqrt(2.5 * (16 + 25 + 36)));
+  EXPECT_DOUBLE_EQ(row.velocity_sd_mps, std::sqrt(6.0 + 7.0 + 8.0));
+  EXPECT_DOUBLE_EQ(row.attitude_rms_rad, std::sqrt(2.5 * (49 + 64 + 81)));
+  EXPECT_DOUBLE_EQ(row.attitude_sd_rad, std::sqrt(9.0 + 10.0 + 11.0));
+  const auto nees = [](double first) {
+    double sum = 0.0;
+    for (int k = 0; k < 3; ++k) {
+      const double e2 = (first + k) * (first + k);
+      sum += e2 / (first + k) + 4.0 * e2 / (4.0 + first + k);
+    }
+    return sum / 6.0;
+  };
+  EXPECT_DOUBLE_EQ(row.nees_position, nees(1.0));
+  EXPECT_DOUBLE_EQ(row.nees_velocity, nees(4.0));
+  EXPECT_DOUBLE_EQ(row.nees_attitude, nees(7.0));
+  EXPECT_NEAR(row.surprise,
+              0.5 * (3.0 * nees(1.0) + 0.5 * std::log(1.0 * 2.0 * 3.0 * 5.0 * 6.0 * 7.0) +
+                     3.0 * std::log(2.0 * 3.14159265358979324)),
+              1e-12);
+}
+
 TEST(Outages, AFilterThatHoldsTheTrueModelPredictsItsErrors) {
   const CoastingModel model = mtx_like();
   const auto table = over_drives(

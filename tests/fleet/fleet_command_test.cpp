@@ -59,9 +59,8 @@ class FleetCommand : public testing::Test {
     toml << fmt::format("[fleet]\nname = \"trial\"\ncaptures = [\"captures\"]\nout = \"{}\"\n", out);
     for (int van = 0; van < 2; ++van)
       toml << fmt::format(
-          "[[mounting]]\nvehicle = \"van{0}\"\nname = \"spring\"\ncaptures = [\"van{0}/*\"]\nunits = {{ mtx1 "
-          "= \"A{0}\", "
-          "mtx2 = \"B{0}\", mtx3 = \"C{0}\" }}\n",
+          "[[mounting]]\nvehicle = \"van{0}\"\nname = \"spring\"\ncaptures = [\"van{0}/*\"]\nunits = {{ "
+          "mtx1 = \"A{0}\", mtx2 = \"B{0}\", mtx3 = \"C{0}\" }}\n",
           van);
     return file.string();
   }

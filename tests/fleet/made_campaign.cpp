@@ -20,9 +20,8 @@ fleet::FleetFile make_fleet(const std::filesystem::path& folder, int units, int 
   std::string toml = "[fleet]\ncaptures = [\"captures\"]\n";
   for (int u = 0; u < units; ++u) {
     toml += fmt::format(
-        "[[mounting]]\nvehicle = \"van {0}\"\nname = \"spring\"\ncaptures = [\"v{0:02}/*\"]\nunits = {{ imu "
-        "= "
-        "\"unit{0:02}\" }}\n",
+        "[[mounting]]\nvehicle = \"van {0}\"\nname = \"spring\"\ncaptures = [\"v{0:02}/*\"]\nunits "
+        "= {{ imu = \"unit{0:02}\" }}\n",
         u);
     for (int d = 0; d < drives; ++d)
       write_file(folder / "captures" / fmt::format("v{:02}", u) / fmt::format("d{:02}.lcm", d),

@@ -194,6 +194,80 @@ auto frozen(double seconds) {
   };
 }
 
+/// Several samples of one batch with the time of the last one.
+auto packed(std::size_t device, std::size_t size) {
+  return [=](DriveInMemory& drive) {
+    Samples& samples = drive.samples[device];
+    for (std::size_t i = 0; i < samples.size(); ++i)
+      samples[i].time = samples[std::min(i - i % size + size - 1, samples.size() - 1)].time;
+  };
+}
+
+/// What a phone calls linear acceleration.
+auto without_gravity(std::size_t device) {
+  return [=](DriveInMemory& drive) {
+    Vector3 mean{};
+    for (const Sample& sample : drive.samples[device]) {
+      for (std::size_t k = 0; k < 3; ++k)
+        mean[k] += sample.imu.f_mps2[k] / static_cast<double>(drive.samples[device].size());
+    }
+    each(drive.samples[device], [&](Sample& sample) {
+      for (std::size_t k = 0; k < 3; ++k) sample.imu.f_mps2[k] -= mean[k];
+    });
+  };
+}
+
+/// One sample in `every` says of itself that it is at the end of its range.
+auto says_clipped(std::size_t device, std::uint32_t flag, std::size_t every) {
+  return [=](DriveInMemory& drive) {
+    for (std::size_t i = 0; i < drive.samples[device].size(); i += every)
+      drive.samples[device][i].imu.flags |= flag;
+  };
+}
+
+/// Only the `length_s` of the drive that begin `begin_s` behind its first sample, of every device.
+void cut(DriveInMemory& drive, double begin_s, double length_s) {
+  HostTime first = drive.samples[kReference].front().time;
+  for (std::size_t device = 0; device < drive.samples.size(); ++device) {
+    Samples& samples = drive.samples[device];
+    // A clock of its own begins anywhere.
+    const HostTime zero = drive.has_own_clock[device] ? samples.front().time : first;
+    Samples out;
+    for (const Sample& sample : samples) {
+      const double time_s = to_seconds(sample.time - zero) - begin_s;
+      if (time_s >= 0.0 && time_s < length_s) out.push_back(sample);
+    }
+    samples = std::move(out);
+  }
+}
+
+double turned_rad(const Samples& samples, double begin_s, double length_s) {
+  double rad = 0.0;
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const double time_s = to_seconds(samples[i].time - samples.front().time) - begin_s;
+    if (time_s < 0.0 || time_s >= length_s) continue;
+    rad += std::abs(samples[i].imu.omega_radps[2]) * to_seconds(samples[i].time - samples[i - 1].time);
+  }
+  return rad;
+}
+
+/// The seconds of the drive with the least or the most of turning, as one who records too little has them.
+auto a_part(double length_s, bool with_turns) {
+  return [=](DriveInMemory& drive) {
+    const Samples& reference = drive.samples[kReference];
+    const double span_s = to_seconds(reference.back().time - reference.front().time);
+    double best_s = 0.0;
+    double best_rad = turned_rad(reference, 0.0, length_s);
+    for (double begin_s = 5.0; begin_s + length_s < span_s; begin_s += 5.0) {
+      const double rad = turned_rad(reference, begin_s, length_s);
+      if (with_turns ? rad <= best_rad : rad >= best_rad) continue;
+      best_rad = rad;
+      best_s = begin_s;
+    }
+    cut(drive, best_s, length_s);
+  };
+}
+
 void add_imu_mistakes(std::vector<Mistake>& all) {
   for (const std::size_t device : {kReference, kStudy}) {
     const std::string who = device == kReference ? "reference" : "study";
@@ -221,6 +295,13 @@ void add_imu_mistakes(std::vector<Mistake>& all) {
     add("an accelerometer that stands", stuck(device, 4, 0.5, 1.0), "stuck axis");
     add("every sample twice", repeated(device, 2), "repeated samples");
     add("every sample five times", repeated(device, 5), "repeated samples");
+    add("batches of four under one time", packed(device, 4), "repeated samples");
+    add("forces without gravity", without_gravity(device), "gravity norm");
+    add("accelerometers in thousandths of g", scaled(device, 1.0, 1e3 / kMps2PerG), "gravity norm");
+    add("gyros at the end of their range by their own word", says_clipped(device, kGyroClipZ, 50),
+        "saturation");
+    add("accelerometers at the end of their range by their own word", says_clipped(device, kAccelClipX, 200),
+        "saturation");
     add("a hole of ten seconds",
         kept(device, [](std::size_t i, std::size_t n) { return i < n / 2 || i > n / 2 + 1000; }),
         "missing samples");
@@ -295,6 +376,10 @@ void add_other_mistakes(std::vector<Mistake>& all) {
   all.push_back({"study: 7 s late", common_but_late(7.0), kStudy, "time of rates", "csv.clock", "\"own\""});
   all.push_back(
       {"study: 20 s early", common_but_late(-20.0), kStudy, "time of rates", "csv.clock", "\"own\""});
+  all.push_back({"drive: half a minute without turns", a_part(30.0, false), kReference, "turns", "", ""});
+  all.push_back({"drive: twenty seconds without turns", a_part(20.0, false), kReference, "turns", "", ""});
+  all.push_back({"drive: curves alone", a_part(20.0, true), kReference, "rest", "", ""});
+  all.push_back({"drive: a few curves alone", a_part(15.0, true), kReference, "rest", "", ""});
   all.push_back({"study: a copy of the reference", copy_of_reference, kStudy, "copy", "", ""});
   all.push_back({"study: of another drive", another_drive, kStudy, "one body", "", ""});
   all.push_back({"study: noise alone", noise_alone, kStudy, "one body", "", ""});
@@ -325,8 +410,7 @@ bool is_named(const Mistake& mistake, const DriveInMemory& drive,
   constexpr std::size_t kLines = 3;
   for (std::size_t i = 0; i < std::min(findings.size(), kLines); ++i) {
     const check::Finding& finding = findings[i];
-    if (finding.harm == check::Harm::kNote || finding.check != mistake.check ||
-        finding.device != drive.configuration.devices[mistake.device].name)
+    if (finding.check != mistake.check || finding.device != drive.configuration.devices[mistake.device].name)
       continue;
     if (mistake.key.empty()) return true;
     return std::any_of(finding.mends.begin(), finding.mends.end(), [&](const check::ConfigLine& line) {

@@ -390,6 +390,30 @@ TEST(ReferenceAttitudeAlignment, StartsInMotionWithTheDevicesOwnAttitude) {
   EXPECT_DOUBLE_EQ(start.sd(kAttitudeError + 2), 5e-4);
 }
 
+TEST(ReferenceAttitudeAlignment, ReplacesWhatWasFoundInMotionBefore) {
+  Simulation s;
+  Car tilted;
+  tilted.mounting = {0.05, -0.08, 1.0};
+  Outcome run = simulate(11, s, tilted);
+  ASSERT_NE(run.aligner->result(), nullptr);
+  ASSERT_EQ(run.aligner->result()->method, AlignmentMethod::kInMotion);
+  for (int i = 0; i < 500; ++i) {
+    run.car.advance(0.01);
+    const HostTime now = host_time_at(run.car.t);
+    run.aligner->add_imu(now, run.car.rates());
+    run.aligner->add_attitude(now, euler_from_rotation(run.car.C_b_n()), Vector3d(1e-4, 2e-4, 5e-4));
+    if (i % 20 == 19)
+      run.aligner->add_gnss_position(now, displaced(kOrigin, run.car.position + run.car.C_b_n() * s.arm),
+                                     Vector3d::Constant(0.01));
+  }
+  const InitialNavigation& start = *run.aligner->result();
+  EXPECT_EQ(start.method, AlignmentMethod::kReferenceAttitude);
+  EXPECT_LT(log_so3(start.state.C_b_n * run.car.C_b_n().transpose()).norm(), 1e-6);
+  EXPECT_LT((start.state.v_n_mps - run.car.velocity()).norm(), 0.02);
+  EXPECT_DOUBLE_EQ(start.sd(kAttitudeError + 2), 5e-4);
+  EXPECT_DOUBLE_EQ(start.sd(kAttitudeError), 2e-4) << "the worse of roll and pitch";
+}
+
 TEST(ReferenceAttitudeAlignment, TakesTheGnssVelocityWhereThereIsOne) {
   Car car;
   car.rest_s = -5.0;

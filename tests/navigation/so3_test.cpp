@@ -98,7 +98,7 @@ TEST(So3, OrthonormalisedRemovesASmallDeformationOnly) {
   const Matrix3d C = exp_so3({0.3, -0.8, 0.5});
   Matrix3d deformed = C;
   deformed(0, 1) += 1e-7;
-  const Matrix3d tidy = orthonormalised(deformed);
+  const Matrix3d tidy = reorthonormalized(deformed);
   EXPECT_LT((tidy.transpose() * tidy - Matrix3d::Identity()).norm(), 1e-15);
   EXPECT_LT((tidy - C).norm(), 1e-7);
 }

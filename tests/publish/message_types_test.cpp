@@ -35,12 +35,10 @@ std::vector<std::string> words(const std::string& text) {
 }
 
 TEST(MessageTypes, FieldsAreThoseOfTheFilesOfARun) {
-  EXPECT_EQ(
-      fields_of("navigation_t"),
-      words("utime sequence time_s gps_week gps_tow_s lat_deg lon_deg height_m v_n_mps v_e_mps v_d_mps "
-            "roll_deg pitch_deg "
-            "heading_deg sd_n_m sd_e_m sd_d_m sd_v_n_mps sd_v_e_mps sd_v_d_mps sd_roll_deg sd_pitch_deg "
-            "sd_heading_deg validity reference_age_s gnss_age_s"));
+  EXPECT_EQ(fields_of("navigation_t"),
+            words("utime sequence time_s gps_week gps_tow_s lat_deg lon_deg height_m v_n_mps v_e_mps v_d_mps "
+                  "roll_deg pitch_deg heading_deg sd_n_m sd_e_m sd_d_m sd_v_n_mps sd_v_e_mps sd_v_d_mps "
+                  "sd_roll_deg sd_pitch_deg sd_heading_deg validity reference_age_s gnss_age_s"));
   EXPECT_EQ(fields_of("error_t"),
             words("utime sequence name regime validity reference_age_s gnss_age_s n_rows"));
   EXPECT_EQ(fields_of("error_row_t"),

@@ -24,7 +24,7 @@ TEST(TickSchedule, CutsAreT0PlusKPeriodsWhateverTheWakeUp) {
   std::mt19937 random(1);
   for (std::int64_t k = 0; k < 1000; ++k) {
     ASSERT_EQ(schedule.deadline(), kStart + k * kPeriod);
-    const Tick tick = schedule.wake(schedule.deadline() + microseconds(random() % 9999));
+    const Tick tick = schedule.deadline_reached(schedule.deadline() + microseconds(random() % 9999));
     ASSERT_EQ(tick.index, k);
     ASSERT_EQ(tick.cut, kStart + k * kPeriod);
     ASSERT_EQ(tick.skipped, 0);
@@ -35,7 +35,7 @@ TEST(TickSchedule, CutsAreT0PlusKPeriodsWhateverTheWakeUp) {
 
 TEST(TickSchedule, ALateWakeUpDeliversTheNewestDueTickAndCountsTheOthers) {
   TickSchedule schedule(kStart, kPeriod);
-  const Tick tick = schedule.wake(kStart + milliseconds(35));
+  const Tick tick = schedule.deadline_reached(kStart + milliseconds(35));
   EXPECT_EQ(tick.index, 3);
   EXPECT_EQ(tick.cut, kStart + 3 * kPeriod);
   EXPECT_EQ(tick.skipped, 3);
@@ -46,20 +46,20 @@ TEST(TickSchedule, ALateWakeUpDeliversTheNewestDueTickAndCountsTheOthers) {
 
 TEST(TickSchedule, AWakeUpExactlyOnTheNextDeadlineDeliversThatTick) {
   TickSchedule schedule(kStart, kPeriod);
-  const Tick tick = schedule.wake(kStart + kPeriod);
+  const Tick tick = schedule.deadline_reached(kStart + kPeriod);
   EXPECT_EQ(tick.index, 1);
   EXPECT_EQ(tick.skipped, 1);
 }
 
 TEST(TickSchedule, WorkBeyondTheNextDeadlineIsOneOverrun) {
   TickSchedule schedule(kStart, kPeriod);
-  (void)schedule.wake(kStart);
+  (void)schedule.deadline_reached(kStart);
   schedule.finish(kStart + milliseconds(9));
   EXPECT_EQ(schedule.statistics().overruns, 0U);
-  (void)schedule.wake(kStart + kPeriod);
+  (void)schedule.deadline_reached(kStart + kPeriod);
   schedule.finish(kStart + milliseconds(57));
   EXPECT_EQ(schedule.statistics().overruns, 1U);
-  const Tick tick = schedule.wake(kStart + milliseconds(57));
+  const Tick tick = schedule.deadline_reached(kStart + milliseconds(57));
   EXPECT_EQ(tick.index, 5);
   EXPECT_EQ(tick.skipped, 3);
   EXPECT_EQ(schedule.statistics().ticks + schedule.statistics().skipped, 6U)
@@ -68,7 +68,7 @@ TEST(TickSchedule, WorkBeyondTheNextDeadlineIsOneOverrun) {
 
 TEST(TickSchedule, TheEndOfTheWorkIsTimedFromTheCutOfTheTickDelivered) {
   TickSchedule schedule(kStart, kPeriod);
-  (void)schedule.wake(kStart + milliseconds(21));
+  (void)schedule.deadline_reached(kStart + milliseconds(21));
   schedule.finish(kStart + milliseconds(23));
   EXPECT_EQ(schedule.statistics().done.max(), Duration(milliseconds(3))) << "tick 2 was cut at 20 ms";
   EXPECT_EQ(schedule.statistics().done.count(), 1U);
@@ -82,7 +82,7 @@ TEST(TickSchedule, EveryTickIsDeliveredOrSkippedInARandomWalk) {
   for (int i = 0; i < 10'000; ++i) {
     now = std::max(now, schedule.deadline()) + microseconds(random() % 100);
     if (random() % 50 == 0) now += microseconds(random() % 100'000);
-    const Tick tick = schedule.wake(now);
+    const Tick tick = schedule.deadline_reached(now);
     ASSERT_EQ(tick.index, expected + tick.skipped);
     ASSERT_LE(tick.cut, now);
     ASSERT_GT(tick.cut + kPeriod, now);

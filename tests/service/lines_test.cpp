@@ -124,8 +124,7 @@ TEST(Lines, SolutionsRelativeToAnUnknownBaseAreToldWithTheRemedy) {
   } sink;
   const std::string text =
       "%  GPST  e-baseline(m)  n-baseline(m)  u-baseline(m)  Q ns sde(m) sdn(m) sdu(m) sden(m) sdnu(m) "
-      "sdue(m) "
-      "age(s) ratio\n2026/03/14 12:34:56.100 1 2 3 1 12 0.01 0.01 0.02 0 0 0 0.1 12\n";
+      "sdue(m) age(s) ratio\n2026/03/14 12:34:56.100 1 2 3 1 12 0.01 0.01 0.02 0 0 0 0.1 12\n";
   const std::vector<std::uint8_t> bytes(text.begin(), text.end());
   const auto decoder = make_decoder(c->devices[3], 3, ClockMapConfig::fixed(HostTime{}, 1.0));
   decoder->push(bytes, HostTime{}, sink);

@@ -35,10 +35,9 @@ TEST(MinuteLine, SaysOnceAMinuteHowWellEverythingIsKnown) {
   const Configuration configuration = vehicle();
   MinuteLine line(configuration);
   EXPECT_FALSE(line.look(driving(5999)));
-  EXPECT_EQ(
-      line.look(driving(6000)),
-      "1 min: no navigation yet; front boresight 0.032 deg, lever arm 1.1 mm, time 0.12 ms; rear looking for "
-      "its mounting");
+  EXPECT_EQ(line.look(driving(6000)),
+            "1 min: no navigation yet; front boresight 0.032 deg, lever arm 1.1 mm, time 0.12 "
+            "ms; rear looking for its mounting");
   EXPECT_FALSE(line.look(driving(6010)));
   Snapshot later = driving(18005);
   later.navigation.status = NavigationStatus::kNavigating;

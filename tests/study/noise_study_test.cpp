@@ -186,8 +186,7 @@ TEST(NoiseStudy, AnImuThatMissesHalfOfTheRunIsSaid) {
   EXPECT_EQ(coverage_remark("mtx1", series, kNoiseRate_hz, 200.0, HostTime{}), "");
   EXPECT_EQ(coverage_remark("mtx1", series, kNoiseRate_hz, 400.0, HostTime{}),
             "mtx1: has samples for 200 s of the run's 400 s, between 0 s and 200 s; its models and "
-            "regressions are of "
-            "that part alone");
+            "regressions are of that part alone");
   EXPECT_THAT(coverage_remark("mtx2", NoiseSeries{}, kNoiseRate_hz, 400.0, HostTime{}),
               HasSubstr("has no sample"));
 }

@@ -266,16 +266,14 @@ void add_characterize(CLI::App& app, Work& chosen) {
   command
       ->add_option("FILE", options->files,
                    "A log at rest: CSV in any columns; raw float64 named after its axis (gyro_x_degps.f64), "
-                   "one file an axis; "
-                   "a capture (each of its IMUs); or the folder of a study. Several logs: several units of "
-                   "one sensor, or several days")
+                   "one file an axis; a capture (each of its IMUs); or the folder of a study. Several logs: "
+                   "several units of one sensor, or several days")
       ->required();
   command->add_option("--rate,-r", options->choice.signal.rate_hz,
                       "Samples per second (default: by the time stamps)");
-  command->add_option(
-      "--time", options->choice.signal.time,
-      "Column with time stamps: seconds, ISO 8601, or WEEK,SECONDS of GPS (default: by its name; none: no "
-      "times)");
+  command->add_option("--time", options->choice.signal.time,
+                      "Column with time stamps: seconds, ISO 8601, or WEEK,SECONDS of GPS "
+                      "(default: by its name; none: no times)");
   command->add_option("--topic", options->choice.signal.topic,
                       "Topic of an MCAP file, bag or flight log that holds several IMUs");
   command->add_option("--counter", options->choice.signal.counter, "Column that counts the samples");

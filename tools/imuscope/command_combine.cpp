@@ -51,10 +51,9 @@ void add_combine(CLI::App& app, Work& chosen) {
       "--correlated", options->correlated,
       "the drives may share errors (one recording cut in two, one turn-on): covariance intersection");
   command
-      ->add_flag(
-          "--independent", options->independent,
-          "the drives' errors are independent: inverse variance (the default, unless they read the same "
-          "files)")
+      ->add_flag("--independent", options->independent,
+                 "the drives' errors are independent: inverse variance (the default, "
+                 "unless they read the same files)")
       ->excludes(correlated);
   command->add_flag("--json", options->json, "print JSON");
   on_chosen(*command, chosen, [options] { return combine_runs(*options); });

@@ -19,14 +19,12 @@ std::string code(const std::string& text) { return fmt::format("`{}`", text); }
 
 void print_reference() {
   say("# Configuration\n\n"
-      "This page is what `imuscope config` prints. Angles are in degrees and times in milliseconds where the "
-      "key says "
-      "so. A key that does not exist is refused with the nearest one that does. "
+      "This page is what `imuscope config` prints. Angles are in degrees and times in milliseconds where "
+      "the key says so. A key that does not exist is refused with the nearest one that does. "
       "`[device.noise]` and its like belong to the `[[device]]` above them. Where the last column is empty, "
       "a key that is left out is off, or what it says is taken as three MTx beside an Airins have it. "
       "`config/` holds configurations to begin with; `imuscope config FILE` checks one; `[simulation]` is "
-      "for `imusim` "
-      "alone, and `config/demo.toml` shows it.\n");
+      "for `imusim` alone, and `config/demo.toml` shows it.\n");
   std::string table;
   for (const auto& key : configuration_reference()) {
     const auto dot = key.name.rfind('.');
@@ -60,9 +58,6 @@ Result<void> check_with_data(const std::filesystem::path& file, const std::vecto
   std::vector<check::Finding> findings;
   const auto opened = open_recording(data, file, {}, &findings);
   print_findings(findings);
-  for (const check::Finding& finding : findings) {
-    if (finding.harm == check::Harm::kNote) say("NOTE   {}\n", check::sentence(finding));
-  }
   if (!fix.empty()) {
     const auto configuration = load_configuration(file);
     if (!configuration) return tl::unexpected<Error>(configuration.error());

@@ -158,8 +158,8 @@ Result<void> correlate_log(const CorrelateCommand& options) {
     return usage_error(
         fmt::format("{} holds {} IMUs, and their axes are not those of one sensor", options.path.string(),
                     records->size()),
-        "choose one with --name; what several on one vehicle have in common is told by the folder of its "
-        "study (imuscope process)");
+        "choose one with --name; what several on one vehicle have in common is told by the folder "
+        "of its study (imuscope process)");
   }
   auto& axes = records->front().axes;
   std::vector<certificate::JointSignal> signals;

@@ -50,9 +50,8 @@ void print_table(const nlohmann::json& document) {
         absent.at("why").get<std::string>());
   }
   say("\nn: outages that do not overlap / all. sd: predicted. NEES per degree of freedom: 1 where the model "
-      "is "
-      "right,\n+ above, - below where 95 % of right models lie. surprise: mean -log density of the position "
-      "error; the smallest predicts best.\n");
+      "is right,\n+ above, - below where 95 % of right models lie. surprise: mean -log density of the "
+      "position error; the smallest predicts best.\n");
 }
 
 Result<void> evaluate(const EvaluateCommand& options) {

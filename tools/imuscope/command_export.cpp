@@ -95,17 +95,13 @@ void add_export(CLI::App& app, Work& chosen) {
   command
       ->add_option("MODEL", options->files,
                    "A run's folder; what `imuscope fit --json` printed (one file an axis), a run's "
-                   "models.json, or the "
-                   "certificate.json of "
-                   "`imuscope characterize`")
+                   "models.json, or the certificate.json of `imuscope characterize`")
       ->required();
   command
       ->add_option(
           "--to,-t", options->format,
           "Of a run: mcap or hdf5, all of it in one file; urdf, tf, kalibr, openvins or json, a mounting. "
-          "Of noise models: kalibr, openvins, vins-fusion, "
-          "lio-sam, gtsam, "
-          "ros, px4, kf-gins or state-space")
+          "Of noise models: kalibr, openvins, vins-fusion, lio-sam, gtsam, ros, px4, kf-gins or state-space")
       ->required();
   command->add_option("--name,-n", options->name, "The S-IMU to export, where the file holds several");
   command->add_option("--regime", options->regime, "all, static or dynamic, where the file holds several");
@@ -113,10 +109,9 @@ void add_export(CLI::App& app, Work& chosen) {
                       "Unit of the signal, where the file does not say: rad/s, deg/s, m/s^2 or g");
   command->add_flag("--conservative", options->how.conservative,
                     "Upper ends of the intervals, for a filter that must not be optimistic");
-  command->add_flag(
-      "--force", options->how.force,
-      "Write even what does not hold: the file then says why it should not be used; of hdf5: write over a "
-      "file that is there");
+  command->add_flag("--force", options->how.force,
+                    "Write even what does not hold: the file then says why it should not be used; of hdf5: "
+                    "write over a file that is there");
   command->add_option("--out,-o", options->of_run.out,
                       "mcap, hdf5: the file; without it run.mcap or run.h5 in the run's folder");
   options->of_run.compression = "zstd";

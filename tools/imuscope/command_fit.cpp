@@ -63,9 +63,8 @@ void report(const Task& task, noise::FitResult fit, const nlohmann::json& extra)
     if (const double increase = noise::largest_increase(fit, *bound); increase > noise::kMostIncrease) {
       bound.reset();
       fit.warnings.push_back(
-          fmt::format("no over-bounding model: an amplitude would have to be {:.3g} times the fitted one, as "
-                      "the model misses "
-                      "levels by factors; give it the terms that they show",
+          fmt::format("no over-bounding model: an amplitude would have to be {:.3g} times the fitted one, "
+                      "as the model misses levels by factors; give it the terms that they show",
                       increase));
     }
   }
@@ -169,11 +168,10 @@ void add_fit(CLI::App& app, Work& chosen) {
       ->check(CLI::Range(0.51, 0.9999));
   command->add_flag(
       "--quick-intervals", options->quick_intervals,
-      "Intervals from the estimate's own covariance, none for slow processes, as the live refits have "
-      "them");
+      "Intervals from the estimate's own covariance, none for slow processes, as the live refits have them");
   command->add_flag("--keep-lines", options->keep_lines,
-                    "Leave sinusoids (an engine, a fan) in the signal instead of taking them out before the "
-                    "fit");
+                    "Leave sinusoids (an engine, a fan) in the signal instead of "
+                    "taking them out before the fit");
   command->add_flag("--plot", options->plot, "Draw wavelet variance and model, too, in the terminal");
   command->add_flag("--select", options->select,
                     "Rank the sub-models and report the best; of three or more files by cross-validation");

@@ -5,6 +5,7 @@
 
 #include "base/output_folder.h"
 #include "commands.h"
+#include "findings.h"
 #include "page/printed_page.h"
 #include "print.h"
 #include "progress.h"
@@ -43,6 +44,7 @@ Result<void> compare_runs(const ReportCommand& options) {
 
 Result<void> report_of_run(const ReportCommand& options) {
   const auto& run_dir = options.runs.front();
+  if (auto looked = look_at_live_run(run_dir); !looked) return looked;
   if (auto written = write_report(run_dir); !written) return written;
   say("{}\n", (run_dir / "report.html").string());
   if (options.pdf) {

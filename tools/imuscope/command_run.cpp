@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "commands.h"
+#include "findings.h"
 #include "print.h"
 #include "report/report.h"
 #include "service/live.h"
@@ -48,6 +49,7 @@ Result<void> run(const RunCommand& options) {
     say("Results: {}\nReport:  imuscope report {}\n", folder->string(), folder->string());
     return {};
   }
+  if (auto looked = look_at_live_run(*folder); !looked) return looked;
   if (auto written = write_report(*folder); !written) return written;
   say("Results: {}\nReport:  {}\n", folder->string(), (*folder / "report.html").string());
   return {};

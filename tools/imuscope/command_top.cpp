@@ -97,11 +97,10 @@ class Top {
     const HostTime end = host_now() + from_seconds(wait_s);
     while (!heard_.status && host_now() < end && !top_stopped.load()) (void)ear_.wait(kRedraw);
     if (!heard_.status) {
-      return work_error(
-          fmt::format("no service was heard within {:g} s{}", wait_s,
-                      heard_.note.empty() ? "" : "; " + heard_.note),
-          "start `imuscope run`, and give the --lcm URL and --prefix of its configuration; from another "
-          "PC its ttl must be 1");
+      return work_error(fmt::format("no service was heard within {:g} s{}", wait_s,
+                                    heard_.note.empty() ? "" : "; " + heard_.note),
+                        "start `imuscope run`, and give the --lcm URL and --prefix of its configuration; "
+                        "from another PC its ttl must be 1");
     }
     if (as_json) {
       say("{}\n", top::json_of(heard_));

@@ -13,8 +13,8 @@ namespace {
 
 constexpr const char* kModule = "lib/imuscope/imuscope_hdf5.so";
 constexpr const char* kRemedy =
-    "install it: sudo apt install ./imuscope-hdf5_*.deb, or in a source tree tools/setup --doors, then build "
-    "again";
+    "install it: sudo apt install ./imuscope-hdf5_*.deb, or in a source tree "
+    "tools/setup --doors, then build again";
 
 /// The module lies beside the program's own folder, installed or built.
 Result<hdf5::ExportFunction> load() {

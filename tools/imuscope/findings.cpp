@@ -7,14 +7,27 @@
 #include "base/text.h"
 #include "check/config_lines.h"
 #include "print.h"
+#include "progress.h"
+#include "report/json_file.h"
+#include "service/recorded_look.h"
+#include "service/run_folder.h"
+#include "service/run_record.h"
 
 namespace imuscope::cli {
 
 namespace {
 
-const char* words_of(check::Harm harm) { return harm == check::Harm::kWrong ? "WRONG  " : "LIMITS "; }
-
-bool harms(const check::Finding& finding) { return finding.harm != check::Harm::kNote; }
+const char* words_of(check::Harm harm) {
+  switch (harm) {
+    case check::Harm::kWrong:
+      return "WRONG  ";
+    case check::Harm::kLimits:
+      return "LIMITS ";
+    case check::Harm::kNote:
+      break;
+  }
+  return "NOTE   ";
+}
 
 std::ptrdiff_t count(const std::vector<check::Finding>& findings, check::Harm harm) {
   return std::count_if(findings.begin(), findings.end(),
@@ -33,9 +46,8 @@ std::string text_of(const Configuration& configuration) {
 }  // namespace
 
 void print_findings(const std::vector<check::Finding>& findings) {
-  for (const check::Finding& finding : findings) {
-    if (harms(finding)) say("{}{}\n", words_of(finding.harm), check::sentence(finding));
-  }
+  for (const check::Finding& finding : findings)
+    say("{}{}\n", words_of(finding.harm), check::sentence(finding));
 }
 
 std::string harm_in_short(const std::vector<check::Finding>& findings) {
@@ -47,6 +59,38 @@ std::string harm_in_short(const std::vector<check::Finding>& findings) {
                        check::sentence(findings.front()));
   }
   if (limits > 0) return fmt::format("The data limit these results: {}", check::sentence(findings.front()));
+  return {};
+}
+
+std::vector<check::Finding> look_at_capture(const std::filesystem::path& capture) {
+  ProgressBar bar;
+  const auto opened = open_recording(
+      {capture.string()}, {}, [&bar](const std::string& what, double share) { bar.show(what, share); });
+  if (!opened) return {};
+  // A mistake is there from the beginning; a command of little memory keeps to that.
+  constexpr double kLongest_s = 900.0;
+  const std::vector<bool> run_time(opened->configuration.devices.size());
+  return look_at_recording(opened->configuration, opened->recording, run_time, kLongest_s);
+}
+
+void print_look(const std::vector<check::Finding>& findings) {
+  print_findings(findings);
+  if (count(findings, check::Harm::kWrong) > 0)
+    say("Correct these before you study it: `imuscope process` takes --fix FILE.toml and --config FILE.toml\n");
+}
+
+Result<void> look_at_live_run(const std::filesystem::path& run_dir) {
+  nlohmann::json run = report::read_json_file(run_dir / "run.json");
+  const auto capture = run_dir / "capture.lcm";
+  if (!run.is_object() || run.value("inputs", nlohmann::json{}) != nlohmann::json{"live"} ||
+      !run.value("findings", nlohmann::json{}).is_null() || !std::filesystem::is_regular_file(capture))
+    return {};
+  const auto findings = look_at_capture(capture);
+  run["findings"] = findings_json(findings);
+  const auto folder = OutputFolder::open(run_dir);
+  if (!folder) return tl::unexpected<Error>(folder.error());
+  if (auto written = write_json(*folder, "run.json", run); !written) return written;
+  print_look(findings);
   return {};
 }
 

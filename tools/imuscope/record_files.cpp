@@ -68,12 +68,10 @@ Result<void> units_by_gravity(SensorRecord& sensor, const std::string& file) {
   if (n == 3 && near(1.0)) unit = noise::SignalUnit::kG;
   if (n == 3 && near(kThousand)) unit = noise::SignalUnit::kG, factor = 1.0 / kThousand;
   if (unit == noise::SignalUnit::kNone) {
-    return usage_error(
-        fmt::format(
-            "{} does not say the unit of its accelerometers, and {:.4g} is no size of gravity in m/s^2, "
-            "g or mg",
-            file, size),
-        "give --accel-unit m/s^2 or g");
+    return usage_error(fmt::format("{} does not say the unit of its accelerometers, and {:.4g} is no "
+                                   "size of gravity in m/s^2, g or mg",
+                                   file, size),
+                       "give --accel-unit m/s^2 or g");
   }
   for (auto& axis : sensor.axes) {
     if (is_gyro_name(axis.name)) continue;

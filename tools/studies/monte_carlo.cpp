@@ -414,11 +414,11 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads, "runs at a time")->check(CLI::Range(1, 256));
   app.add_option("--drive", options.drive, "seed of the drive itself: road, turns and stops");
   app.add_option("--scenarios", options.names,
-                 "letters: K all states, V vibration, D paper's states, S standstill, G straight road, "
-                 "N no prior, L 5 min");
+                 "letters: K all states, V vibration, D paper's states, S standstill, G "
+                 "straight road, N no prior, L 5 min");
   app.add_option("--world", options.world,
-                 "harsh: sensors with all that data sheets allow and the filter is not told; ideal: bias, "
-                 "scale and noise alone")
+                 "harsh: sensors with all that data sheets allow and the filter is not told; "
+                 "ideal: bias, scale and noise alone")
       ->transform(CLI::CheckedTransformer(std::map<std::string, imusim::WorldKind>{
           {"ideal", imusim::WorldKind::kIdeal}, {"harsh", imusim::WorldKind::kHarsh}}))
       ->default_str("harsh");

@@ -165,8 +165,8 @@ imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& t
   const auto& recording = own.path();
   const std::string pc_clock = options.pc_ppm ? fmt::format("--pc-ppm {}", *options.pc_ppm) : "";
   const std::string command = fmt::format(
-      "'{}' record '{}' --minutes {} --seed {} --world {} --reference-class {} --truth-hz 100 {} --out '{}' "
-      ">/dev/null",
+      "'{}' record '{}' --minutes {} --seed {} --world {} --reference-class {} "
+      "--truth-hz 100 {} --out '{}' >/dev/null",
       options.simulator, options.config, options.minutes, seed, options.world, options.reference_class,
       pc_clock, recording.string());
   if (std::system(command.c_str()) != 0) return imuscope::work_error("this failed: " + command);
@@ -297,8 +297,8 @@ int main(int argc, char** argv) {
   app.add_option("--folder", options.folder,
                  "where a folder for one recording at a time (80 MB) is made, and removed again");
   app.add_option("--world", options.world,
-                 "harsh: sensors with all that data sheets allow and the filter is not told; ideal: bias, "
-                 "scale and noise alone")
+                 "harsh: sensors with all that data sheets allow and the filter is not told; "
+                 "ideal: bias, scale and noise alone")
       ->check(CLI::IsMember({"ideal", "harsh"}));
   app.add_option("--pc-ppm", options.pc_ppm, "rate of the PC's clock; 0 in the ideal world, else drawn");
   app.add_option("--reference-class", options.reference_class,

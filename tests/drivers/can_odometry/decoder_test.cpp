@@ -315,10 +315,9 @@ TEST(CanOdometry, WhatCannotBeChosenIsRefusedWithTheRemedy) {
   choice.speed_signals = {"REAR.RX"};
   EXPECT_EQ(refused(choice), "car.dbc: no signal 'REAR.RX'; did you mean 'REAR.RL'?");
   choice.speed_signals = {"FRONT.FR"};
-  EXPECT_EQ(
-      refused(choice),
-      "car.dbc: signal FRONT.FR is in \"counts\", which is no unit of speed; give speed_unit: m/s, km/h, mph "
-      "or rad/s");
+  EXPECT_EQ(refused(choice),
+            "car.dbc: signal FRONT.FR is in \"counts\", which is no unit of speed; give "
+            "speed_unit: m/s, km/h, mph or rad/s");
   choice.speed_signals = {"FRONT.FL"};
   EXPECT_EQ(refused(choice), "car.dbc: signal FRONT.FL is an angular rate; give wheel_radius_m");
   choice = rear_wheels();

@@ -135,8 +135,8 @@ INSTANTIATE_TEST_SUITE_P(
         Broken{"CutOff", "BO_ 1 A: 8 X\n SG_ S : 0|8@1+ (1,",
                "car.dbc:2: SG_ S: expected the offset, found the end of the file"},
         Broken{"OpenText", "BO_ 1 A: 8 X\n SG_ S : 0|8@1+ (1,0) [0|0] \"km/h X\n",
-               "car.dbc:2: SG_ S: expected the unit in quotation marks, found a text without its closing "
-               "quotation mark"},
+               "car.dbc:2: SG_ S: expected the unit in quotation marks, found a text "
+               "without its closing quotation mark"},
         Broken{"ByteOrder", "BO_ 1 A: 8 X\n SG_ S : 0|8@2+ (1,0) [0|0] \"\" X\n",
                "car.dbc:2: SG_ S: byte order 2 is neither 0 (Motorola) nor 1 (Intel)"},
         Broken{"BeyondTheFrame", "BO_ 1 A: 2 X\n SG_ S : 8|16@1+ (1,0) [0|0] \"\" X\n",

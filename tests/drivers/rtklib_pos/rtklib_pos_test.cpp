@@ -31,8 +31,7 @@ struct Rig {
 
 constexpr std::string_view kLlhHeader =
     "%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   sdu(m)  "
-    "sdne(m)  "
-    "sdeu(m)  sdun(m) age(s)  ratio\n";
+    "sdne(m)  sdeu(m)  sdun(m) age(s)  ratio\n";
 constexpr std::string_view kRow =
     "2026/03/14 12:34:56.100   45.5   -5.25    81.5   1  12   0.01   0.02   0.03  0 0 0 0.1 12.3\n";
 const UtcTime kDay = std::chrono::sys_days{std::chrono::year{2026} / 3 / 14};

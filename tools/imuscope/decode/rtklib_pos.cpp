@@ -1,7 +1,8 @@
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
+#include <ctime>
 #include <string_view>
 
 #include "drivers/rtklib_pos/messages.h"
@@ -39,13 +40,9 @@ std::string_view name_of(TimeSystem system) {
 
 /// "2026-03-14T12:34:56.100 GPST"
 std::string time_text(std::int64_t time_ns, TimeSystem system) {
-  using namespace std::chrono;
-  const std::int64_t days_since_1970 = time_ns / kNsPerDay;
-  const year_month_day date{sys_days{days{days_since_1970}}};
-  const std::int64_t ms = (time_ns - days_since_1970 * kNsPerDay + kNsPerMs / 2) / kNsPerMs;
-  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}.{:03} {}", static_cast<int>(date.year()),
-                     static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()), ms / 3'600'000,
-                     ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, name_of(system));
+  const std::int64_t ms = (time_ns + kNsPerMs / 2) / kNsPerMs;
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03} {}", fmt::gmtime(static_cast<std::time_t>(ms / 1000)),
+                     ms % 1000, name_of(system));
 }
 
 /// As the line writes it: a calendar date, or week and time of week.
