@@ -130,6 +130,16 @@ void add_limits(AxisCertificate& out) {
   }
 }
 
+std::optional<double> largest_miss_of(const FitResult& fit) {
+  std::optional<double> largest;
+  for (const noise::FittedLevel& level : fit.wv) {
+    const bool is_told = level.model_ci_high > level.model_ci_low;
+    if (!is_told || (level.fitted >= level.model_ci_low && level.fitted <= level.model_ci_high)) continue;
+    largest = std::max(largest.value_or(0.0), std::abs(level.fitted / level.observed.value - 1.0));
+  }
+  return largest;
+}
+
 Error named(const AxisRecord& record, Error error) {
   error.what = fmt::format("{}: {}", record.name, error.what);
   return error;
@@ -171,6 +181,7 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   auto grown = model_of(*wv, record, !out.resonances.empty(), options, covariances);
   if (!grown) return tl::unexpected(named(record, grown.error()));
   out.fit = std::move(grown->best);
+  out.largest_miss = largest_miss_of(out.fit);
   for (const FitResult& rival : grown->rivals) out.rivals.push_back(rival.spec.name());
 
   out.allan = noise::allan_deviation(x, *wv, record.rate_hz);
