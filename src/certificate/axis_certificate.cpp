@@ -130,12 +130,12 @@ void add_limits(AxisCertificate& out) {
   }
 }
 
-std::optional<double> largest_miss_of(const FitResult& fit) {
-  std::optional<double> largest;
+double largest_miss_of(const FitResult& fit) {
+  double largest = 0.0;
   for (const noise::FittedLevel& level : fit.wv) {
-    const bool is_told = level.model_ci_high > level.model_ci_low;
-    if (!is_told || (level.fitted >= level.model_ci_low && level.fitted <= level.model_ci_high)) continue;
-    largest = std::max(largest.value_or(0.0), std::abs(level.fitted / level.observed.value - 1.0));
+    if (!(level.model_ci_low > 0.0) || !(level.fitted > 0.0)) continue;
+    largest = std::max(
+        {largest, level.fitted / level.model_ci_high - 1.0, level.model_ci_low / level.fitted - 1.0});
   }
   return largest;
 }

@@ -53,9 +53,9 @@ struct AxisCertificate {
   std::optional<double> low_pass_hz;
   noise::FitResult fit;
   std::vector<std::string> rivals;  ///< models that the record takes for as good
-  /// Largest error of the model's curve, of the value, among the scales whose own interval does not hold it;
-  /// nothing where all do.
-  std::optional<double> largest_miss;
+  /// The most by which the model's curve lies beyond the interval of a scale, of that interval's end; zero
+  /// where it leaves none.
+  double largest_miss = 0.0;
   std::vector<noise::AllanPoint> allan;
   std::vector<noise::DensityPoint> density;
   std::vector<TermValue> terms;

@@ -130,7 +130,8 @@ json pairs_json(const JointAxes& joint, const std::vector<std::string>& names) {
                    {"coherence", number(pair.coherence.value)},
                    {"ci_low", number(pair.coherence.ci_low)},
                    {"ci_high", number(pair.coherence.ci_high)},
-                   {"p_holm", number(pair.p_holm)}});
+                   {"p_holm", number(pair.p_holm)},
+                   {"shows", pair.shows()}});
   }
   return out;
 }

@@ -24,12 +24,12 @@ struct Origin {
 /// "duration_s",
 ///  "confidence", "axes": [{"name", "unit", "n_samples", "n_missing", "mean", "sd", "resolution", "terms":
 ///  [{"symbol", "name", "unit", "value", "ci_low", "ci_high", "known", "note"}], "lines", "resonances",
-///  "low_pass_hz", "largest_miss", "models_as_good", "fit" (as noise::fit_to_json()), "allan": [{"tau_s", "deviation",
-///  "ci_low", "ci_high", "model"}], "density": [{"frequency_hz", "density", "ci_low", "ci_high"}], "halves",
-///  "spikes", "temperature", "warnings", "limits"}]}. What is not known is null.
+///  "low_pass_hz", "largest_miss", "models_as_good", "fit" (as noise::fit_to_json()), "allan": [{"tau_s",
+///  "deviation", "ci_low", "ci_high", "model"}], "density": [{"frequency_hz", "density", "ci_low",
+///  "ci_high"}], "halves", "spikes", "temperature", "warnings", "limits"}]}. What is not known is null.
 nlohmann::json to_json(const Origin& origin, const std::vector<AxisCertificate>& axes);
 
-/// [{"signals": [one, the other], "tau_s", "coherence", "ci_low", "ci_high", "p_holm"}]
+/// [{"signals": [one, the other], "tau_s", "coherence", "ci_low", "ci_high", "p_holm", "shows"}]
 /// @param names  of the signals of `joint`
 nlohmann::json pairs_json(const JointAxes& joint, const std::vector<std::string>& names);
 

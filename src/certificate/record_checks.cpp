@@ -159,7 +159,8 @@ std::vector<std::string> record_warnings(const AxisRecord& record, std::span<con
   const bool has_insides = static_cast<double>(e.at_low + e.at_high) < 0.9 * n;
   const auto clipped = [&](std::size_t at, double end, double inwards) {
     if (!has_insides || static_cast<double>(at) <= kClipped * n || at <= 10) return false;
-    return static_cast<double>(at) > 1.5 * static_cast<double>(count_near(record.values, mask, end + inwards, 0.5 * step));
+    return static_cast<double>(at) >
+           1.5 * static_cast<double>(count_near(record.values, mask, end + inwards, 0.5 * step));
   };
   const bool high = clipped(e.at_high, e.high, -step);
   if (high || clipped(e.at_low, e.low, step)) {

@@ -329,8 +329,8 @@ struct CovarianceTable::Sums {
   struct OfProcess {
     double weight = 0.0;
     const Eigen::VectorXd* with_white = nullptr;
-    const Eigen::VectorXd* mean = nullptr;                ///< where the model has a ramp
-    std::shared_ptr<const Eigen::VectorXd> at_nodes;      ///< where it rings
+    const Eigen::VectorXd* mean = nullptr;                 ///< where the model has a ramp
+    std::shared_ptr<const Eigen::VectorXd> at_nodes;       ///< where it rings
     std::vector<const Eigen::VectorXd*> with_it_and_next;  ///< products with itself and those that follow
   };
   std::vector<OfProcess> processes;

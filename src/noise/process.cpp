@@ -26,8 +26,8 @@ double half_support(int level) noexcept {
 CurvePoint white_noise(double tau) noexcept { return {1.0 / tau, {}}; }
 
 /// Below kSeriesBelow the numerator of G-6 is exp(-a) (2 n r(a) + h(n a)) with r(a) = sinh(a) - a and
-/// h(x) = 2 x - (1 - exp(-x)) (3 - exp(-x)), each by its power series: nothing is left to cancel. That of h is
-/// sum_{k>=3} -(-x)^k (2^k - 4) / k!.
+/// h(x) = 2 x - (1 - exp(-x)) (3 - exp(-x)), each by its power series: nothing is left to cancel. That of h
+/// is sum_{k>=3} -(-x)^k (2^k - 4) / k!.
 constexpr int kSeriesTerms = 17;
 constexpr std::array<double, kSeriesTerms> kFallSeries = [] {
   std::array<double, kSeriesTerms> c{};
@@ -100,8 +100,7 @@ class MarkovCurve {
     } else {
       const double u = 1.0 - left;
       numerator.value = n * fall_ * (1.0 + phi_) - phi_ * u * (2.0 + u);
-      numerator.derivative =
-          2.0 * n * phi_ * phi_ + phi_ * u * (2.0 + u) - phi_ * (2.0 + 2.0 * u) * n * left;
+      numerator.derivative = 2.0 * n * phi_ * phi_ + phi_ * u * (2.0 + u) - phi_ * (2.0 + 2.0 * u) * n * left;
     }
     const double scale = 1.0 / (2.0 * n * n * fall_ * fall_);
     const double value = numerator.value * scale;
@@ -426,10 +425,12 @@ CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
 void unit_curve(ProcessKind kind, const Shape& shape, std::span<CurvePoint> out) noexcept {
   IMUSCOPE_EXPECTS(out.size() <= static_cast<std::size_t>(kMaxLevel));
   if (kind == ProcessKind::kGaussMarkov) {
-    fill_by_squares(MarkovCurve(shape[0]), [&](double n) { return std::exp(-n * shape[0]); }, 0.0, out);
+    fill_by_squares(
+        MarkovCurve(shape[0]), [&](double n) { return std::exp(-n * shape[0]); }, 0.0, out);
   } else if (kind == ProcessKind::kResonance) {
     const RingingCurve curve(shape[0], shape[1]);
-    fill_by_squares(curve, [&](double n) { return curve.left(n); }, Complex{}, out);
+    fill_by_squares(
+        curve, [&](double n) { return curve.left(n); }, Complex{}, out);
   } else {
     for (std::size_t i = 0; i < out.size(); ++i) out[i] = unit_wv(kind, shape, static_cast<int>(i) + 1);
   }

@@ -68,7 +68,8 @@ bool is_in_range(ProcessKind kind, const Shape& shape) noexcept;
 /// Unit curve at `level` (1..kMaxLevel). `shape` must lie in the range given above.
 CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept;
 
-/// unit_wv() at levels 1, 2, 3...: one exponential serves all levels of a Gauss-Markov process or a resonance.
+/// unit_wv() at levels 1, 2, 3...: one exponential serves all levels of a Gauss-Markov process or a
+/// resonance.
 /// @param out  at most kMaxLevel
 void unit_curve(ProcessKind kind, const Shape& shape, std::span<CurvePoint> out) noexcept;
 

@@ -229,8 +229,8 @@ class Grower {
       const bool already_rejected = is_rejected(*best_);
       const double before = best_->criterion;
       const FitResult kept = *best_;
-      if (consider(std::move(less), -kEquivalent, std::nullopt, &*start) && is_rejected(*best_) == already_rejected &&
-          best_->criterion < before + kEquivalent)
+      if (consider(std::move(less), -kEquivalent, std::nullopt, &*start) &&
+          is_rejected(*best_) == already_rejected && best_->criterion < before + kEquivalent)
         return true;
       best_ = kept;
     }

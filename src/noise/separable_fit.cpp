@@ -53,7 +53,8 @@ Curve curve_of(const SeparableProblem& problem, ProcessKind kind, const Shape& s
   std::array<CurvePoint, kMaxLevel> points;
   unit_curve(kind, shape, std::span(points).first(static_cast<std::size_t>(problem.levels.back())));
   for (Eigen::Index r = 0; r < curve.value.size(); ++r) {
-    const CurvePoint& point = points[static_cast<std::size_t>(problem.levels[static_cast<std::size_t>(r)] - 1)];
+    const CurvePoint& point =
+        points[static_cast<std::size_t>(problem.levels[static_cast<std::size_t>(r)] - 1)];
     curve.value[r] = point.value;
     for (std::size_t i = 0; i < shapes; ++i) curve.slope[i][r] = point.derivative[i];
   }

@@ -54,7 +54,8 @@ TEST(RankModels, ARejectedModelStandsBehindEveryOneThatIsNot) {
   EXPECT_THAT(ranked.back().reason, HasSubstr("rejected: J-test p = "));
 }
 
-WaveletVariance made(const char* terms, const std::vector<std::pair<double, Shape>>& parameters, unsigned seed) {
+WaveletVariance made(const char* terms, const std::vector<std::pair<double, Shape>>& parameters,
+                     unsigned seed) {
   Model model;
   const ModelSpec spec = parse_model(terms).value();
   for (std::size_t i = 0; i < spec.processes.size(); ++i)
@@ -89,8 +90,7 @@ TEST(GrowModel, FindsWhatTheSearchOfAllSubModelsFinds) {
 
 // No step of one term leads there: white noise alone is no help, nor is the resonance.
 TEST(GrowModel, SplitsAFastGaussMarkovProcessIntoWhiteNoiseBeneathAResonance) {
-  const WaveletVariance wv =
-      made("WN+RES+RW", {{1.0, {}}, {0.5, {0.15, 0.63}}, {1e-8, {}}}, 5);
+  const WaveletVariance wv = made("WN+RES+RW", {{1.0, {}}, {0.5, {0.15, 0.63}}, {1e-8, {}}}, 5);
   const std::array terms{ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov, ProcessKind::kRandomWalk,
                          ProcessKind::kResonance};
   const auto grown = grow_model(wv, terms, 100.0).value();

@@ -87,8 +87,8 @@ std::string shown_term(const certificate::TermValue& term) {
 
 void print_axis(const certificate::AxisCertificate& axis) {
   say("{}: {}", axis.name, axis.fit.spec.name());
-  if (axis.largest_miss)
-    say(", which follows every scale within {:.2g} % or within its interval", 100.0 * *axis.largest_miss);
+  if (axis.largest_miss > 0.0)
+    say(", which stays within {:.2g} % of the interval of every scale", 100.0 * axis.largest_miss);
   say("\n");
   for (const auto& term : axis.terms) {
     say("  {} {:<24} {:<28} {:<16} {}\n", symbol_of(term.term), name_of(term.term, is_gyro(axis.unit)),
@@ -131,7 +131,7 @@ std::optional<certificate::JointAxes> correlation_of(const SensorRecord& record,
 
 void print_correlation(const nlohmann::json& pairs) {
   for (const auto& pair : pairs) {
-    if (!(pair["p_holm"].is_number() && pair["p_holm"].get<double>() < noise::kSignificance)) continue;
+    if (!pair["shows"].get<bool>()) continue;
     say("  {} and {} correlate: {:.2f} [{:.2f}, {:.2f}] at {:.3g} s (p = {:.2g}, corrected)\n",
         pair["signals"][0].get<std::string>(), pair["signals"][1].get<std::string>(),
         pair["coherence"].get<double>(), pair["ci_low"].get<double>(), pair["ci_high"].get<double>(),

@@ -101,8 +101,9 @@ Result<void> fit_one(const Task& task, const noise::ModelSpec& spec) {
   if (!task.options.signal.json) print_ranking(*ranked);
   const auto& test = ranked->front().fit.j_test;
   if (test && test->p_value < noise::kRejectedOutright) {
-    say_aside("warning: the data reject every one of these models; `imuscope characterize` also looks for "
-              "resonances and flicker noise, or name them: --model WN+RES+GM+FN+RW\n");
+    say_aside(
+        "warning: the data reject every one of these models; `imuscope characterize` also looks for "
+        "resonances and flicker noise, or name them: --model WN+RES+GM+FN+RW\n");
   }
   noise::FitOptions again = task.fit_options;
   again.warm_start = &ranked->front().fit;
