@@ -51,7 +51,7 @@ AxisCertificate axis_of(const char* name, std::vector<TermValue> terms) {
 
 // Each value has its document and page, in units that are its term's.
 TEST(DataSheet, PartsThatAreShippedAreRead) {
-  std::ifstream in(test::source_path("docs/examples/data_sheets.json"));
+  std::ifstream in(imuscope::test::source_path("docs/examples/data_sheets.json"));
   const json document = json::parse(in, nullptr, false);
   ASSERT_TRUE(document.is_object());
   for (const auto& part : document.at("parts")) {
