@@ -90,7 +90,7 @@ TEST(GrowModel, FindsWhatTheSearchOfAllSubModelsFinds) {
 
 // No step of one term leads there: white noise alone is no help, nor is the resonance.
 TEST(GrowModel, SplitsAFastGaussMarkovProcessIntoWhiteNoiseBeneathAResonance) {
-  const WaveletVariance wv = made("WN+RES+RW", {{1.0, {}}, {0.5, {0.15, 0.63}}, {1e-8, {}}}, 5);
+  const WaveletVariance wv = made("WN+RES+RW", {{1.0, {}}, {0.5, {0.15, 0.63}}, {1e-6, {}}}, 5);
   const std::array terms{ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov, ProcessKind::kRandomWalk,
                          ProcessKind::kResonance};
   const auto grown = grow_model(wv, terms, 100.0).value();
