@@ -130,6 +130,16 @@ void add_limits(AxisCertificate& out) {
   }
 }
 
+double largest_miss_of(const FitResult& fit) {
+  double largest = 0.0;
+  for (const noise::FittedLevel& level : fit.wv) {
+    if (!(level.model_ci_low > 0.0) || !(level.fitted > 0.0)) continue;
+    largest = std::max(
+        {largest, level.fitted / level.model_ci_high - 1.0, level.model_ci_low / level.fitted - 1.0});
+  }
+  return largest;
+}
+
 Error named(const AxisRecord& record, Error error) {
   error.what = fmt::format("{}: {}", record.name, error.what);
   return error;
@@ -171,6 +181,7 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   auto grown = model_of(*wv, record, !out.resonances.empty(), options, covariances);
   if (!grown) return tl::unexpected(named(record, grown.error()));
   out.fit = std::move(grown->best);
+  out.largest_miss = largest_miss_of(out.fit);
   for (const FitResult& rival : grown->rivals) out.rivals.push_back(rival.spec.name());
 
   out.allan = noise::allan_deviation(x, *wv, record.rate_hz);

@@ -53,6 +53,9 @@ struct AxisCertificate {
   std::optional<double> low_pass_hz;
   noise::FitResult fit;
   std::vector<std::string> rivals;  ///< models that the record takes for as good
+  /// The most by which the model's curve lies beyond the interval of a scale, of that interval's end; zero
+  /// where it leaves none.
+  double largest_miss = 0.0;
   std::vector<noise::AllanPoint> allan;
   std::vector<noise::DensityPoint> density;
   std::vector<TermValue> terms;

@@ -144,6 +144,11 @@ std::vector<JointPair> pairs_of(std::span<const CrossLevel> levels, const JointO
 
 }  // namespace
 
+bool JointPair::shows() const {
+  constexpr double kSmall = 0.1;
+  return p_holm < noise::kSignificance && (coherence.ci_low > kSmall || coherence.ci_high < -kSmall);
+}
+
 Result<JointAxes> joint_axes(std::span<const JointSignal> signals, const JointOptions& options) {
   if (signals.size() < 2)
     return work_error("there is one signal alone",

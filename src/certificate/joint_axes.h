@@ -35,6 +35,10 @@ struct JointPair {
   double tau_s = 0.0;
   noise::Coherence coherence;
   double p_holm = 1.0;  ///< of no coherence at any scale of any pair, corrected for their number (Holm 1979)
+
+  /// Whether there is coherence, and its interval says more than a tenth: what long records prove of less is
+  /// worth nobody's while.
+  [[nodiscard]] bool shows() const;
 };
 
 struct JointAxes {

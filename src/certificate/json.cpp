@@ -104,6 +104,7 @@ json axis_json(const AxisCertificate& axis) {
            {"resonances", resonances_json(axis)},
            {"low_pass_hz", number(axis.low_pass_hz)},
            {"fit", fit_to_json(axis.fit)},
+           {"largest_miss", number(axis.largest_miss)},
            {"models_as_good", axis.rivals},
            {"allan", allan_json(axis)},
            {"density", density_json(axis)},
@@ -120,6 +121,20 @@ json axis_json(const AxisCertificate& axis) {
 }
 
 }  // namespace
+
+json pairs_json(const JointAxes& joint, const std::vector<std::string>& names) {
+  json out = json::array();
+  for (const JointPair& pair : joint.pairs) {
+    out.push_back({{"signals", {names[pair.first], names[pair.second]}},
+                   {"tau_s", pair.tau_s},
+                   {"coherence", number(pair.coherence.value)},
+                   {"ci_low", number(pair.coherence.ci_low)},
+                   {"ci_high", number(pair.coherence.ci_high)},
+                   {"p_holm", number(pair.p_holm)},
+                   {"shows", pair.shows()}});
+  }
+  return out;
+}
 
 json to_json(const Origin& origin, const std::vector<AxisCertificate>& axes) {
   json out{{"schema", "imuscope.certificate/1"}, {"sensor", origin.sensor},     {"files", origin.files},

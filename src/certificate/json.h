@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "certificate/axis_certificate.h"
+#include "certificate/joint_axes.h"
 
 namespace imuscope::certificate {
 
@@ -23,9 +24,13 @@ struct Origin {
 /// "duration_s",
 ///  "confidence", "axes": [{"name", "unit", "n_samples", "n_missing", "mean", "sd", "resolution", "terms":
 ///  [{"symbol", "name", "unit", "value", "ci_low", "ci_high", "known", "note"}], "lines", "resonances",
-///  "low_pass_hz", "models_as_good", "fit" (as noise::fit_to_json()), "allan": [{"tau_s", "deviation",
-///  "ci_low", "ci_high", "model"}], "density": [{"frequency_hz", "density", "ci_low", "ci_high"}], "halves",
-///  "spikes", "temperature", "warnings", "limits"}]}. What is not known is null.
+///  "low_pass_hz", "largest_miss", "models_as_good", "fit" (as noise::fit_to_json()), "allan": [{"tau_s",
+///  "deviation", "ci_low", "ci_high", "model"}], "density": [{"frequency_hz", "density", "ci_low",
+///  "ci_high"}], "halves", "spikes", "temperature", "warnings", "limits"}]}. What is not known is null.
 nlohmann::json to_json(const Origin& origin, const std::vector<AxisCertificate>& axes);
+
+/// [{"signals": [one, the other], "tau_s", "coherence", "ci_low", "ci_high", "p_holm", "shows"}]
+/// @param names  of the signals of `joint`
+nlohmann::json pairs_json(const JointAxes& joint, const std::vector<std::string>& names);
 
 }  // namespace imuscope::certificate

@@ -46,6 +46,15 @@ Extremes extremes_of(std::span<const double> x, std::span<const std::uint8_t> ma
   return e;
 }
 
+/// Samples within `reach` of a value; of no reach, none.
+std::size_t count_near(std::span<const double> x, std::span<const std::uint8_t> mask, double value,
+                       double reach) {
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < x.size() && reach > 0.0; ++i)
+    n += mask[i] != 0 && std::abs(x[i] - value) < reach ? 1 : 0;
+  return n;
+}
+
 /// Sd of each second, or of so many samples that a tenth of them tells something.
 struct Blocks {
   std::vector<double> mean;
@@ -145,13 +154,16 @@ std::vector<std::string> record_warnings(const AxisRecord& record, std::span<con
   const auto n = static_cast<double>(so_far.n_samples);
   constexpr double kClipped = 1e-3;
   const double step = so_far.resolution.value_or(0.0);
-  // Of a coarse grid many samples share a value; of a clipped signal the last one more than any inside.
-  const auto clipped = [&](std::size_t at, double end) {
-    return static_cast<double>(at) > kClipped * n && at > 10 &&
-           std::abs(end - so_far.mean) > 2.0 * so_far.sd && std::abs(end - so_far.mean) > 5.0 * step;
+  // Two values alone are a coarse grid. Of a grid many samples share a value, but noise has fewer the further
+  // out it is: of a clipped signal the last value has more than the one beside it.
+  const bool has_insides = static_cast<double>(e.at_low + e.at_high) < 0.9 * n;
+  const auto clipped = [&](std::size_t at, double end, double inwards) {
+    if (!has_insides || static_cast<double>(at) <= kClipped * n || at <= 10) return false;
+    return static_cast<double>(at) >
+           1.5 * static_cast<double>(count_near(record.values, mask, end + inwards, 0.5 * step));
   };
-  if (clipped(e.at_high, e.high) || clipped(e.at_low, e.low)) {
-    const bool high = clipped(e.at_high, e.high);
+  const bool high = clipped(e.at_high, e.high, -step);
+  if (high || clipped(e.at_low, e.low, step)) {
     warnings.push_back(
         fmt::format("{} samples are exactly {:.6g}: the end of the sensor's range; what lies beyond is lost",
                     high ? e.at_high : e.at_low, high ? e.high : e.low));

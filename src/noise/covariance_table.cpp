@@ -14,10 +14,12 @@
 namespace imuscope::noise {
 namespace {
 
-/// Processes of the table by number: these three, then Gauss-Markov ones of the grid.
+/// Processes of the table by number: these four, then Gauss-Markov ones of the grid. Flicker noise is one, as
+/// the sum that stands for it (G-39) has one form: a dozen processes would be read for it each time.
 constexpr int kWhite = 0;
 constexpr int kWalk = 1;
 constexpr int kQuantizationNumber = 2;
+constexpr int kFlickerNumber = 3;
 constexpr int kMarkov = 1000;  ///< plus the place on the grid, which may be negative
 
 /// The grid of rates, on the logarithm: an eighth of the step of the sum that stands for a power law
@@ -30,14 +32,15 @@ constexpr double kWhiteAbove = 40.0;
 /// Lags that are summed one by one about a break point; longer ringing is left to wv_covariance().
 constexpr double kMostRinging = 512.0;
 /// Values that one set of nodes may hold of all processes.
-constexpr std::size_t kMostHeld = 6'000'000;
+constexpr std::size_t kMostHeld = 8'000'000;
 
 Parts unit_process(int number) {
   Parts parts;
   if (number == kWhite) parts.white = 1.0;
   if (number == kWalk) parts.walk = 1.0;
   if (number == kQuantizationNumber) parts.quantization = 1.0;
-  if (number > kQuantizationNumber)
+  if (number == kFlickerNumber) return parts_of({{{ProcessKind::kFlicker, 1.0, {}}}});
+  if (number > kFlickerNumber)
     parts.exponentials.push_back(
         exponential_of_rate(std::exp(kGridOrigin + (number - kMarkov) * kGridStep), 1.0));
   return parts;
@@ -67,8 +70,10 @@ void add_markov(Weights& weights, const Exponential& e) {
     weights[kMarkov + static_cast<int>(below) - 1 + i] += e.variance * lagrange[static_cast<std::size_t>(i)];
 }
 
-Weights weights_of(const Parts& parts) {
+/// @param flicker  amplitude of flicker noise, which is no part of `parts`
+Weights weights_of(const Parts& parts, double flicker) {
   Weights weights;
+  if (flicker > 0.0) weights[kFlickerNumber] = flicker;
   if (parts.white != 0.0) weights[kWhite] += parts.white;
   if (parts.walk != 0.0) weights[kWalk] += parts.walk;
   if (parts.quantization != 0.0) weights[kQuantizationNumber] += parts.quantization;
@@ -138,7 +143,7 @@ class CovarianceTable::Nodes {
   }
 
   /// C_jk(h) of a process at all nodes.
-  const Eigen::VectorXd& values(int process) {
+  std::shared_ptr<const Eigen::VectorXd> values(int process) {
     if (const auto at = values_.find(process); at != values_.end()) return at->second;
     Eigen::VectorXd out(static_cast<Eigen::Index>(x_.size()));
     const Parts parts = unit_process(process);
@@ -152,26 +157,26 @@ class CovarianceTable::Nodes {
           out[static_cast<Eigen::Index>(i)] = run.is_break ? c(centre + x_[i]) : c.inside(centre + x_[i]);
       }
     }
-    return values_.emplace(process, std::move(out)).first->second;
+    return values_.emplace(process, std::make_shared<Eigen::VectorXd>(std::move(out))).first->second;
   }
 
   /// Sum of weight 2 a b, pair by pair.
   Eigen::VectorXd product(int a, int b) {
     make_room(2);
-    const Eigen::VectorXd& of_a = values(a);
-    const Eigen::VectorXd& of_b = values(b);
+    const auto of_a = values(a);
+    const auto of_b = values(b);
     return over_pairs([&](Eigen::Index begin, Eigen::Index n) {
       return 2.0 *
-             weights().segment(begin, n).cwiseProduct(of_a.segment(begin, n)).dot(of_b.segment(begin, n));
+             weights().segment(begin, n).cwiseProduct(of_a->segment(begin, n)).dot(of_b->segment(begin, n));
     });
   }
 
   /// Sum of weight a, pair by pair.
   Eigen::VectorXd mean(int a) {
     make_room(1);
-    const Eigen::VectorXd& of_a = values(a);
+    const auto of_a = values(a);
     return over_pairs([&](Eigen::Index begin, Eigen::Index n) {
-      return weights().segment(begin, n).dot(of_a.segment(begin, n));
+      return weights().segment(begin, n).dot(of_a->segment(begin, n));
     });
   }
 
@@ -317,7 +322,22 @@ class CovarianceTable::Nodes {
   std::vector<Run> runs_;
   std::vector<double> x_;       ///< distances from the centre
   std::vector<double> weight_;  ///< with the pairs of coefficients there
-  std::map<int, Eigen::VectorXd> values_;
+  std::map<int, std::shared_ptr<const Eigen::VectorXd>> values_;
+};
+
+struct CovarianceTable::Sums {
+  struct OfProcess {
+    double weight = 0.0;
+    const Eigen::VectorXd* with_white = nullptr;
+    const Eigen::VectorXd* mean = nullptr;                 ///< where the model has a ramp
+    std::shared_ptr<const Eigen::VectorXd> at_nodes;       ///< where it rings
+    std::vector<const Eigen::VectorXd*> with_it_and_next;  ///< products with itself and those that follow
+  };
+  std::vector<OfProcess> processes;
+  const Eigen::VectorXd* white_squares = nullptr;
+  const Eigen::VectorXd* white_mean = nullptr;
+  const Nodes* ringing = nullptr;
+  std::shared_ptr<const Eigen::VectorXd> white_at_nodes;
 };
 
 CovarianceTable::CovarianceTable(const WaveletVariance& wv, std::size_t levels)
@@ -363,24 +383,50 @@ CovarianceTable::Nodes& CovarianceTable::ringing(const Parts& parts) const {
   return *nodes;
 }
 
-Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& wv) const {
-  const Parts parts = parts_of(model);
-  if (!is_held(parts)) return wv_covariance(model, wv, levels_);
-  const Weights weights = weights_of(parts);
+CovarianceTable::Sums CovarianceTable::sums_of(const Weights& weights, const Parts& parts) const {
   const std::lock_guard lock(mutex_);
+  Nodes* nodes = parts.oscillations.empty() ? nullptr : &ringing(parts);
+  if (nodes != nullptr) nodes->make_room(weights.size() + 1);
+  Sums out;
+  out.ringing = nodes;
+  for (auto a = weights.begin(); a != weights.end(); ++a) {
+    Sums::OfProcess& process = out.processes.emplace_back();
+    process.weight = a->second;
+    process.with_white = &product(kWhite, a->first);
+    if (parts.ramp != 0.0) process.mean = &mean(a->first);
+    if (nodes != nullptr) process.at_nodes = nodes->values(a->first);
+    for (auto b = a; b != weights.end(); ++b)
+      process.with_it_and_next.push_back(&product(a->first, b->first));
+  }
+  out.white_squares = &product(kWhite, kWhite);
+  if (parts.ramp != 0.0) out.white_mean = &mean(kWhite);
+  if (nodes != nullptr) out.white_at_nodes = nodes->values(kWhite);
+  return out;
+}
+
+Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& wv) const {
+  Model others;
+  double flicker = 0.0;
+  for (const Component& c : model.components) {
+    if (c.kind == ProcessKind::kFlicker) flicker += c.amplitude;
+    if (c.kind != ProcessKind::kFlicker) others.components.push_back(c);
+  }
+  const Parts parts = parts_of(others);
+  if (!is_held(parts)) return wv_covariance(model, wv, levels_);
+  const Sums sums = sums_of(weights_of(parts, flicker), parts);
   const auto& pairs = nodes_->pairs();
   const auto count = static_cast<Eigen::Index>(pairs.size());
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(count);
   Eigen::VectorXd means = Eigen::VectorXd::Zero(count);
   Eigen::VectorXd with_white = Eigen::VectorXd::Zero(count);
-  for (auto a = weights.begin(); a != weights.end(); ++a) {
-    squares += a->second * a->second * product(a->first, a->first);
-    for (auto b = std::next(a); b != weights.end(); ++b)
-      squares += 2.0 * a->second * b->second * product(a->first, b->first);
-    with_white += 2.0 * a->second * product(kWhite, a->first);
-    if (parts.ramp != 0.0) means += a->second * mean(a->first);
+  for (std::size_t a = 0; a < sums.processes.size(); ++a) {
+    const Sums::OfProcess& process = sums.processes[a];
+    squares += process.weight * process.weight * *process.with_it_and_next.front();
+    for (std::size_t b = 1; b < process.with_it_and_next.size(); ++b)
+      squares += 2.0 * process.weight * sums.processes[a + b].weight * *process.with_it_and_next[b];
+    with_white += 2.0 * process.weight * *process.with_white;
+    if (process.mean != nullptr) means += process.weight * *process.mean;
   }
-  const Eigen::VectorXd& white_squares = product(kWhite, kWhite);
   const auto of_means = [&](const PairOfLevels& pair) {
     return 4.0 * (0.5 * parts.ramp * pair.n_j) * (0.5 * parts.ramp * pair.n_k);
   };
@@ -394,27 +440,23 @@ Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& w
     for (std::size_t o = 0; o < white_at.size(); ++o) {
       if (pair.shorter() >= white_at[o]) white[p] += 2.0 * parts.oscillations[o].linear;
     }
-    squares[p] += white[p] * with_white[p] + white[p] * white[p] * white_squares[p];
-    if (parts.ramp != 0.0) squares[p] += of_means(pair) * (means[p] + white[p] * mean(kWhite)[p]);
+    squares[p] += white[p] * with_white[p] + white[p] * white[p] * (*sums.white_squares)[p];
+    if (sums.white_mean != nullptr)
+      squares[p] += of_means(pair) * (means[p] + white[p] * (*sums.white_mean)[p]);
   }
-  if (!parts.oscillations.empty()) {
-    Nodes& nodes = ringing(parts);
-    nodes.make_room(weights.size() + 1);
-    std::vector<std::pair<double, const Eigen::VectorXd*>> rest;
-    for (const auto& [process, weight] : weights) rest.emplace_back(weight, &nodes.values(process));
-    const Eigen::VectorXd& of_white = nodes.values(kWhite);
-    for (std::size_t i = 0; i < nodes.pairs().size(); ++i) {
-      const PairOfLevels& pair = nodes.pairs()[i];
-      const auto p = static_cast<Eigen::Index>(nodes.numbers()[i]);
-      if (std::ranges::all_of(white_at, [&](double at) { return pair.shorter() >= at; })) continue;
-      Eigen::VectorXd c = white[p] * of_white.segment(nodes.begin(i), nodes.size(i));
-      for (const auto& [weight, values] : rest) c += weight * values->segment(nodes.begin(i), nodes.size(i));
-      for (std::size_t o = 0; o < white_at.size(); ++o) {
-        if (pair.shorter() < white_at[o]) nodes.add_oscillation(parts.oscillations[o], i, c);
-      }
-      const auto w = nodes.weights().segment(nodes.begin(i), nodes.size(i));
-      squares[p] = 2.0 * w.cwiseProduct(c).dot(c) + of_means(pair) * w.dot(c);
+  for (std::size_t i = 0; sums.ringing != nullptr && i < sums.ringing->pairs().size(); ++i) {
+    const Nodes& nodes = *sums.ringing;
+    const PairOfLevels& pair = nodes.pairs()[i];
+    const auto p = static_cast<Eigen::Index>(nodes.numbers()[i]);
+    if (std::ranges::all_of(white_at, [&](double at) { return pair.shorter() >= at; })) continue;
+    Eigen::VectorXd c = white[p] * sums.white_at_nodes->segment(nodes.begin(i), nodes.size(i));
+    for (const Sums::OfProcess& process : sums.processes)
+      c += process.weight * process.at_nodes->segment(nodes.begin(i), nodes.size(i));
+    for (std::size_t o = 0; o < white_at.size(); ++o) {
+      if (pair.shorter() < white_at[o]) nodes.add_oscillation(parts.oscillations[o], i, c);
     }
+    const auto w = nodes.weights().segment(nodes.begin(i), nodes.size(i));
+    squares[p] = 2.0 * w.cwiseProduct(c).dot(c) + of_means(pair) * w.dot(c);
   }
   const auto size = static_cast<Eigen::Index>(levels_);
   Eigen::MatrixXd v(size, size);

@@ -42,6 +42,10 @@ class CovarianceTable {
   class Nodes;
   using Ringing = std::pair<int, int>;
 
+  struct Sums;
+
+  /// What of() needs of the table, summed where it is not there yet. Values stay while the sums live.
+  [[nodiscard]] Sums sums_of(const std::map<int, double>& weights, const Parts& parts) const;
   [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;
   [[nodiscard]] const Eigen::VectorXd& mean(int a) const;
   [[nodiscard]] Nodes& ringing(const Parts& parts) const;
@@ -49,7 +53,7 @@ class CovarianceTable {
   WaveletVariance record_;  ///< levels and their numbers of coefficients
   std::size_t levels_;
   std::unique_ptr<Nodes> nodes_;
-  mutable std::mutex mutex_;
+  mutable std::mutex mutex_;  ///< held while the table is looked up or filled, not while it is used
   mutable std::map<std::pair<int, int>, Eigen::VectorXd> products_;  ///< of two processes, by pair of levels
   mutable std::map<int, Eigen::VectorXd> means_;
   mutable std::map<Ringing, std::unique_ptr<Nodes>> ringing_;

@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
 #include "noise/wv_covariance.h"
 
@@ -150,8 +152,14 @@ int parameters_in_use(const Model& model) {
 
 Eigen::VectorXd residual_of(const SeparableProblem& problem, const Model& model) {
   Eigen::VectorXd residual = problem.y;
-  for (Eigen::Index i = 0; i < residual.size(); ++i) {
-    residual[i] -= model_wv(model, problem.levels[static_cast<std::size_t>(i)]);
+  std::array<CurvePoint, kMaxLevel> points;
+  for (const Component& c : model.components) {
+    if (!(c.amplitude > 0.0)) continue;
+    unit_curve(c.kind, c.shape, std::span(points).first(static_cast<std::size_t>(problem.levels.back())));
+    for (Eigen::Index i = 0; i < residual.size(); ++i) {
+      const auto level = static_cast<std::size_t>(problem.levels[static_cast<std::size_t>(i)]);
+      residual[i] -= c.amplitude * points[level - 1].value;
+    }
   }
   return residual;
 }

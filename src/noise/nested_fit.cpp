@@ -10,6 +10,9 @@
 namespace imuscope::noise {
 namespace {
 
+/// Share of an objective below which a start is worth settling.
+constexpr double kWorthwhile = 0.97;
+
 /// Beyond so many sub-models those of sub-models are not solved only to be started from.
 constexpr int kMostSubModels = 32;
 
@@ -164,6 +167,22 @@ TestedPoint NestedFit::refine(const ModelSpec& spec, const Model& start, double 
   return tested(settle_with_model_error(problem, start, 0.0));
 }
 
+bool NestedFit::improve(const ModelSpec& spec, const Model& start) {
+  solve(spec);
+  TestedPoint& best = known_.at(spec.name());
+  WeightedProblem problem = problem_of(spec);
+  problem.problem.whitener = whitener_of(best.point.v);
+  if (problem.problem.whitener.size() == 0) return false;
+  const double to_beat =
+      (problem.problem.whitener * residual_of(problem.problem, best.point.model)).squaredNorm();
+  const SeparableSolution from_start = polish(problem.problem, start);
+  if (from_start.objective >= kWorthwhile * to_beat) return false;
+  TestedPoint found = refine(spec, from_start.model, best.point.model_error);
+  if (!is_better(found, best, problem.problem)) return false;
+  best = std::move(found);
+  return true;
+}
+
 TestedPoint NestedFit::search(const ModelSpec& spec, bool with_sub_models) {
   WeightedProblem problem = problem_of(spec);
   TestedPoint best = tested(settle(problem, find_global_minimum(problem.problem).model, true));
@@ -173,12 +192,13 @@ TestedPoint NestedFit::search(const ModelSpec& spec, bool with_sub_models) {
   TestedPoint again = tested(settle(problem, with_error.point.model, false));
   best = again.rejected() ? std::move(with_error) : std::move(again);
   if (!with_sub_models) return best;
-  const bool deep = count_sub_models(spec) <= kMostSubModels;
+  const bool with_unknown = starts_ == Starts::kSubModels;
+  const bool deep = with_unknown && count_sub_models(spec) <= kMostSubModels;
   for (const auto& [part, kind] : without_one_term(spec)) {
     const auto at = known_.find(part.name());
     if (at != known_.end() || deep) {
       improve_from(solve(part), part, problem, best);
-    } else {
+    } else if (with_unknown) {
       improve_from(search(part, false), part, problem, best);
     }
   }
@@ -208,7 +228,6 @@ void NestedFit::improve_from(const TestedPoint& part, const ModelSpec& part_spec
   const double to_beat = part_is_better
                              ? std::numeric_limits<double>::infinity()
                              : (whitener * residual_of(problem.problem, best.point.model)).squaredNorm();
-  constexpr double kWorthwhile = 0.97;
   SeparableSolution grown;
   grown.objective = std::numeric_limits<double>::infinity();
   std::vector<Model> starts = with_one_more(problem.problem, part.point.model, kind);

@@ -3,6 +3,7 @@
 /// Models of one wavelet variance that contain each other: each starts from what its sub-models found, so
 /// that a model never explains the data worse than a part of itself does.
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
@@ -27,16 +28,27 @@ struct TestedPoint {
 /// Solves models of one wavelet variance, and remembers them.
 class NestedFit {
  public:
+  /// Of which sub-models a rejected model starts: all of a model of few terms, solved for that where need be,
+  /// or those that were solved before. A search that grows its models knows what they grew from.
+  enum class Starts : std::uint8_t { kSubModels, kKnownSubModels };
+
   /// The first `levels` of `wv`, which must outlive this.
   /// @param tables  to take covariances from; nothing: each is computed by itself
-  NestedFit(const WaveletVariance& wv, std::size_t levels, CovarianceTables* tables)
-      : wv_(wv), levels_(levels), table_(tables != nullptr ? tables->of(wv, levels) : nullptr) {}
+  NestedFit(const WaveletVariance& wv, std::size_t levels, CovarianceTables* tables,
+            Starts starts = Starts::kSubModels)
+      : wv_(wv),
+        levels_(levels),
+        table_(tables != nullptr ? tables->of(wv, levels) : nullptr),
+        starts_(starts) {}
 
   [[nodiscard]] std::size_t levels() const { return levels_; }
 
   /// Best fixed point of the model, over all rates and from its sub-models. One that the J-test does not
   /// reject comes before one that it does; of those the likelier; of rejected ones that with less error.
   const TestedPoint& solve(const ModelSpec& spec);
+
+  /// Tries one more start for a model that solve() knows or finds. True where its solution is better by it.
+  bool improve(const ModelSpec& spec, const Model& start);
 
   /// From an earlier solution of the same model alone.
   /// @param model_error  of that solution
@@ -52,6 +64,7 @@ class NestedFit {
   const WaveletVariance& wv_;
   std::size_t levels_;
   std::shared_ptr<const CovarianceTable> table_;
+  Starts starts_;
   std::map<std::string, TestedPoint> known_;
 };
 

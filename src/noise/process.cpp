@@ -25,57 +25,94 @@ double half_support(int level) noexcept {
 
 CurvePoint white_noise(double tau) noexcept { return {1.0 / tau, {}}; }
 
-/// sum_{k>=3} (-a)^k / k! (4 (1+n)^k - (1+2n)^k - 3 - n 2^k): the numerator of gauss_markov_wv() for small n
-/// a. The terms k < 3 vanish identically; that is the cancellation.
-CurvePoint series_numerator(double a, double n) noexcept {
-  constexpr double kRelativeStop = 1e-18;
-  constexpr int kMaxTerms = 80;
-  double p_next = 1.0;    // ((1+n) a)^k / k!
-  double p_double = 1.0;  // ((1+2n) a)^k / k!
-  double p_one = 1.0;     // a^k / k!
-  double p_two = 1.0;     // (2a)^k / k!
-  CurvePoint sum;
+/// Below kSeriesBelow the numerator of G-6 is exp(-a) (2 n r(a) + h(n a)) with r(a) = sinh(a) - a and
+/// h(x) = 2 x - (1 - exp(-x)) (3 - exp(-x)), each by its power series: nothing is left to cancel. That of h
+/// is sum_{k>=3} -(-x)^k (2^k - 4) / k!.
+constexpr int kSeriesTerms = 17;
+constexpr std::array<double, kSeriesTerms> kFallSeries = [] {
+  std::array<double, kSeriesTerms> c{};
+  double factorial = 2.0;
+  double power = 4.0;
   double sign = 1.0;
-  for (int k = 1; k < kMaxTerms; ++k) {
-    p_next *= (1.0 + n) * a / k;
-    p_double *= (1.0 + 2.0 * n) * a / k;
-    p_one *= a / k;
-    p_two *= 2.0 * a / k;
+  for (int i = 0; i < kSeriesTerms; ++i) {
+    factorial *= i + 3;
+    power *= 2.0;
+    c[static_cast<std::size_t>(i)] = sign * (power - 4.0) / factorial;
     sign = -sign;
-    if (k < 3) continue;
-    const double term = sign * (4.0 * p_next - p_double - 3.0 * p_one - n * p_two);
-    sum.value += term;
-    sum.derivative[0] += term * k / a;
-    if (std::abs(term) * k < kRelativeStop * std::abs(sum.value)) break;
   }
-  return sum;
-}
+  return c;
+}();
 
-/// exp(-x) and what it lacks to one, both to the last digit, by one evaluation.
-struct Decay {
-  double left = 1.0;
-  double lost = 0.0;
+/// A function and its derivative.
+template <typename T>
+struct Slope {
+  T value{};
+  T derivative{};
 };
 
-Decay decay_of(double x) noexcept {
-  constexpr double kHalf = 0.5;
-  if (x < kHalf) {
-    const double lost = -std::expm1(-x);
-    return {1.0 - lost, lost};
+/// h(x), |x| < kSeriesBelow.
+template <typename T>
+Slope<T> fall_series(T x) noexcept {
+  T sum{};
+  T slope{};
+  for (int i = kSeriesTerms - 1; i >= 0; --i) {
+    const double c = kFallSeries[static_cast<std::size_t>(i)];
+    sum = sum * x + c;
+    slope = slope * x + c * (i + 3.0);
   }
-  const double left = std::exp(-x);
-  return {left, 1.0 - left};
+  const T square = x * x;
+  return {sum * square * x, slope * square};
 }
 
-CurvePoint closed_numerator(double a, double n, const Decay& one) noexcept {
-  const auto [phi, v] = one;
-  const auto [phi_n, u] = decay_of(n * a);
-  const double du = n * phi_n;
-  CurvePoint numerator;
-  numerator.value = n * v * (1.0 + phi) - phi * u * (2.0 + u);
-  numerator.derivative[0] = 2.0 * n * phi * phi + phi * u * (2.0 + u) - phi * (2.0 + 2.0 * u) * du;
-  return numerator;
+/// r(a), |a| < kSeriesBelow.
+template <typename T>
+Slope<T> sinh_series(T a) noexcept {
+  constexpr int kTerms = 7;
+  const T square = a * a;
+  T sum{};
+  T slope{};
+  for (int i = kTerms; i >= 1; --i) {
+    const double even = 2.0 * i;
+    sum = (sum * square + 1.0) / (even * (even + 1.0));
+    slope = (slope * square + 1.0) / (even * (even - 1.0));
+  }
+  return {sum * square * a, slope * square};
 }
+
+/// One Gauss-Markov process at any n.
+class MarkovCurve {
+ public:
+  explicit MarkovCurve(double a) noexcept
+      : a_(a),
+        phi_(std::exp(-a)),
+        fall_(-std::expm1(-a)),
+        rest_(a < kSeriesBelow ? sinh_series(a) : Slope<double>{}) {}
+
+  [[nodiscard]] bool is_series(double n) const noexcept { return n * a_ < kSeriesBelow; }
+
+  /// @param left  exp(-n a), where it is no series
+  [[nodiscard]] CurvePoint at(double n, double left) const noexcept {
+    Slope<double> numerator;
+    if (is_series(n)) {
+      const Slope<double> h = fall_series(n * a_);
+      numerator.value = phi_ * (2.0 * n * rest_.value + h.value);
+      numerator.derivative = phi_ * n * (2.0 * rest_.derivative + h.derivative) - numerator.value;
+    } else {
+      const double u = 1.0 - left;
+      numerator.value = n * fall_ * (1.0 + phi_) - phi_ * u * (2.0 + u);
+      numerator.derivative = 2.0 * n * phi_ * phi_ + phi_ * u * (2.0 + u) - phi_ * (2.0 + 2.0 * u) * n * left;
+    }
+    const double scale = 1.0 / (2.0 * n * n * fall_ * fall_);
+    const double value = numerator.value * scale;
+    return {value, {numerator.derivative * scale - value * 2.0 * phi_ / fall_, 0.0}};
+  }
+
+ private:
+  double a_;
+  double phi_;
+  double fall_;
+  Slope<double> rest_;
+};
 
 CurvePoint moving_average(double theta, double tau) noexcept {
   const double tau2 = tau * tau;
@@ -134,47 +171,77 @@ CurvePoint sinusoid(double b, double n) noexcept {
 
 using Complex = std::complex<double>;
 
-/// G-6 for a complex rate s, z = exp(-s): the curve and its derivative by s. Of small n |s| the numerator is
-/// summed as the series of series_numerator(), which holds for complex s as well.
-struct ComplexCurve {
-  Complex value;
-  Complex slope;
+/// G-6 for a complex rate s = a - i b with the weight 1 - i a/b: a resonance (G-37) at any n. Of small n |s|
+/// the numerator is the series of MarkovCurve, which holds for complex s as well.
+class RingingCurve {
+ public:
+  RingingCurve(double a, double b) noexcept
+      : a_(a),
+        b_(b),
+        s_(a, -b),
+        z_(std::exp(-s_)),
+        rest_(is_series(1.0) ? sinh_series(s_) : Slope<Complex>{}) {
+    const Complex one_less = 1.0 - z_;
+    inverse_ = std::conj(one_less) / std::norm(one_less);
+  }
+
+  [[nodiscard]] bool is_series(double n) const noexcept {
+    return n * n * std::norm(s_) < kSeriesBelow * kSeriesBelow;
+  }
+
+  /// exp(-n s); nothing where it is lost beside one.
+  [[nodiscard]] Complex left(double n) const noexcept {
+    constexpr double kNothing = 60.0;
+    return n * a_ < kNothing ? std::exp(-n * s_) : 0.0;
+  }
+
+  /// @param left  that of n, where it is no series
+  [[nodiscard]] CurvePoint at(double n, Complex left) const noexcept {
+    Slope<Complex> numerator;
+    if (is_series(n)) {
+      const Slope<Complex> h = fall_series(n * s_);
+      numerator.value = z_ * (2.0 * n * rest_.value + h.value);
+      numerator.derivative = z_ * n * (2.0 * rest_.derivative + h.derivative) - numerator.value;
+    } else {
+      const Complex power = (1.0 - left) * (3.0 - left);
+      numerator.value = n * (1.0 - z_ * z_) - z_ * power;
+      numerator.derivative = 2.0 * n * z_ * z_ + z_ * power - z_ * n * left * (4.0 - 2.0 * left);
+    }
+    const Complex scale = inverse_ * inverse_ / (2.0 * n * n);
+    const Complex value = numerator.value * scale;
+    const Complex slope = numerator.derivative * scale - value * 2.0 * z_ * inverse_;
+    const Complex weight(1.0, -a_ / b_);
+    CurvePoint out;
+    out.value = (weight * value).real();
+    out.derivative[0] = (weight * slope - Complex(0.0, 1.0 / b_) * value).real();
+    out.derivative[1] = (weight * slope * Complex(0.0, -1.0) + Complex(0.0, a_ / (b_ * b_)) * value).real();
+    return out;
+  }
+
+ private:
+  double a_;
+  double b_;
+  Complex s_;
+  Complex z_;
+  Complex inverse_;
+  Slope<Complex> rest_;
 };
 
-ComplexCurve complex_exponential_wv(Complex s, double n) {
-  Complex numerator;
-  Complex d_numerator;
-  const Complex z = std::exp(-s);
-  if (n * n * std::norm(s) < kSeriesBelow * kSeriesBelow) {
-    constexpr double kRelativeStop = 1e-18;
-    constexpr int kMaxTerms = 80;
-    Complex p_next = 1.0, p_double = 1.0, p_one = 1.0, p_two = 1.0;
-    double sign = 1.0;
-    for (int k = 1; k < kMaxTerms; ++k) {
-      const auto order = static_cast<double>(k);
-      p_next *= (1.0 + n) * s / order;
-      p_double *= (1.0 + 2.0 * n) * s / order;
-      p_one *= s / order;
-      p_two *= 2.0 * s / order;
-      sign = -sign;
-      if (k < 3) continue;
-      const Complex term = sign * (4.0 * p_next - p_double - 3.0 * p_one - n * p_two);
-      numerator += term;
-      d_numerator += term * order / s;
-      if (std::abs(term) * order < kRelativeStop * std::abs(numerator)) break;
+/// A process whose curve needs exp(-n rate), at n = 1, 2, 4...: squares of one exponential, which is taken
+/// where the series ends, so that few squarings follow until nothing is left.
+template <typename Curve, typename Exponential, typename Power>
+void fill_by_squares(const Curve& curve, Exponential exponential, Power none, std::span<CurvePoint> out) {
+  Power left = none;
+  bool begun = false;
+  double n = 1.0;
+  for (CurvePoint& point : out) {
+    if (!curve.is_series(n)) {
+      left = begun ? left * left : exponential(n);
+      begun = true;
     }
-  } else {
-    // Below this the power is lost beside one.
-    constexpr double kNothing = 60.0;
-    const Complex z_n = n * s.real() < kNothing ? std::exp(-n * s) : 0.0;
-    numerator = n * (1.0 - z * z) - z * (1.0 - z_n) * (3.0 - z_n);
-    d_numerator = 2.0 * n * z * z + z * (1.0 - z_n) * (3.0 - z_n) - z * n * z_n * (4.0 - 2.0 * z_n);
+    point = curve.at(n, left);
+    n *= 2.0;
   }
-  const Complex one_less = 1.0 - z;
-  const Complex inverse = std::conj(one_less) / std::norm(one_less);
-  const Complex scale = inverse * inverse / (2.0 * n * n);
-  const Complex value = numerator * scale;
-  return {value, d_numerator * scale - value * 2.0 * z * inverse};
 }
 
 /// ln of Gamma(m + 1/2 + x) / Gamma(m + 1/2 - x) over m^(2x), by Stirling's series in 1/m^2; m >=
@@ -269,23 +336,15 @@ bool is_in_range(ProcessKind kind, const Shape& shape) noexcept {
 CurvePoint gauss_markov_wv(double a, int level) noexcept {
   IMUSCOPE_EXPECTS(a > 0.0 && level >= 1 && level <= kMaxLevel);
   const double n = half_support(level);
-  const Decay one = decay_of(a);
-  const auto [phi, v] = one;
-  const CurvePoint numerator = n * a < kSeriesBelow ? series_numerator(a, n) : closed_numerator(a, n, one);
-  const double denominator = 2.0 * n * n * v * v;
-  const double value = numerator.value / denominator;
-  return {value, {numerator.derivative[0] / denominator - value * 2.0 * phi / v, 0.0}};
+  const MarkovCurve curve(a);
+  return curve.at(n, curve.is_series(n) ? 0.0 : std::exp(-n * a));
 }
 
 CurvePoint resonance_wv(double a, double b, int level) noexcept {
   IMUSCOPE_EXPECTS(a > 0.0 && b > 0.0 && level >= 1 && level <= kMaxLevel);
-  const Complex weight(1.0, -a / b);
-  const auto [value, slope] = complex_exponential_wv(Complex(a, -b), half_support(level));
-  CurvePoint out;
-  out.value = (weight * value).real();
-  out.derivative[0] = (weight * slope - Complex(0.0, 1.0 / b) * value).real();
-  out.derivative[1] = (weight * slope * Complex(0.0, -1.0) + Complex(0.0, a / (b * b)) * value).real();
-  return out;
+  const double n = half_support(level);
+  const RingingCurve curve(a, b);
+  return curve.at(n, curve.is_series(n) ? 0.0 : curve.left(n));
 }
 
 double power_law_sum_covariance(double alpha, double m) noexcept {
@@ -361,6 +420,20 @@ CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
                                            : arma_closed(shape[0], shape[1], n);
   }
   return {};
+}
+
+void unit_curve(ProcessKind kind, const Shape& shape, std::span<CurvePoint> out) noexcept {
+  IMUSCOPE_EXPECTS(out.size() <= static_cast<std::size_t>(kMaxLevel));
+  if (kind == ProcessKind::kGaussMarkov) {
+    fill_by_squares(
+        MarkovCurve(shape[0]), [&](double n) { return std::exp(-n * shape[0]); }, 0.0, out);
+  } else if (kind == ProcessKind::kResonance) {
+    const RingingCurve curve(shape[0], shape[1]);
+    fill_by_squares(
+        curve, [&](double n) { return curve.left(n); }, Complex{}, out);
+  } else {
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] = unit_wv(kind, shape, static_cast<int>(i) + 1);
+  }
 }
 
 }  // namespace imuscope::noise

@@ -26,6 +26,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace imuscope::noise {
@@ -66,6 +67,11 @@ bool is_in_range(ProcessKind kind, const Shape& shape) noexcept;
 
 /// Unit curve at `level` (1..kMaxLevel). `shape` must lie in the range given above.
 CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept;
+
+/// unit_wv() at levels 1, 2, 3...: one exponential serves all levels of a Gauss-Markov process or a
+/// resonance.
+/// @param out  at most kMaxLevel
+void unit_curve(ProcessKind kind, const Shape& shape, std::span<CurvePoint> out) noexcept;
 
 /// Wavelet variance of a first-order Gauss-Markov process of variance 1, and d/da, a = beta / rate > 0:
 ///   [n (1-phi^2) - phi (1-phi^n)(3-phi^n)] / (2 n^2 (1-phi)^2),  phi = exp(-a), n = 2^(level-1),

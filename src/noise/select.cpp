@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -85,7 +86,7 @@ class Grower {
         rate_hz_(rate_hz),
         options_(options),
         wv_(wv),
-        models_(wv, fitted_levels(wv, options), options.covariances) {
+        models_(wv, fitted_levels(wv, options), options.covariances, NestedFit::Starts::kKnownSubModels) {
     options_.intervals = Intervals::kQuick;
   }
 
@@ -97,12 +98,15 @@ class Grower {
       if (kind != ProcessKind::kWhiteNoise)
         consider(ModelSpec{{ProcessKind::kWhiteNoise, kind}}, kEquivalent);
     }
-    while (add_one()) {
+    // A model that cannot be right may grow by small steps.
+    while (add_one(is_rejected(*best_) ? 0.0 : kEquivalent)) {
     }
-    do {
+    constexpr int kMostRounds = 20;
+    for (int round = 0; round < kMostRounds; ++round) {
       while (drop_one()) {
       }
-    } while (exchange_one() || split_flicker());
+      if (!exchange_one() && !split_one() && !add_one(kEquivalent)) break;
+    }
     return GrownModel{*best_, rivals()};
   }
 
@@ -114,10 +118,10 @@ class Grower {
   /// alone. What contains the best is always as likely.
   [[nodiscard]] std::vector<FitResult> rivals() const {
     std::vector<FitResult> out;
-    for (const auto& [name, fitted] : tried_) {
-      if (name == best_->spec.name() || is_rejected(fitted) != is_rejected(*best_)) continue;
-      const bool is_as_likely = !contains(fitted.spec, best_->spec) && deviance(fitted) <= deviance(*best_);
-      if (is_as_likely || fitted.criterion < best_->criterion + kEquivalent) out.push_back(fitted);
+    for (const auto& [name, tried] : tried_) {
+      if (!tried || name == best_->spec.name() || is_rejected(*tried) != is_rejected(*best_)) continue;
+      const bool is_as_likely = !contains(tried->spec, best_->spec) && deviance(*tried) <= deviance(*best_);
+      if (is_as_likely || tried->criterion < best_->criterion + kEquivalent) out.push_back(*tried);
     }
     std::stable_sort(out.begin(), out.end(),
                      [](const FitResult& a, const FitResult& b) { return a.criterion < b.criterion; });
@@ -136,25 +140,62 @@ class Grower {
   }
 
   /// Takes the model where it is better than the best by `margin`.
+  /// @param start  nothing: those of the search alone
   /// @param added  the kind that it has more than the best; fast or steep ones that get no amplitude are not
   /// tried again
-  bool consider(ModelSpec spec, double margin, std::optional<ProcessKind> added = std::nullopt) {
+  bool consider(ModelSpec spec, double margin, std::optional<ProcessKind> added = std::nullopt,
+                const Model* start = nullptr) {
     std::sort(spec.processes.begin(), spec.processes.end());
-    auto fitted = fit(wv_, spec, rate_hz_, options_, models_);
+    if (start != nullptr && models_.improve(spec, *start)) tried_.erase(spec.name());
+    const auto known = tried_.find(spec.name());
+    auto fitted = known != tried_.end() ? known->second : fit(wv_, spec, rate_hz_, options_, models_);
     if (!fitted) {
       why_none_ = fitted.error();
+      tried_.emplace(spec.name(), std::move(fitted));
       return false;
     }
     if (added && is_fast_or_steep(*added) &&
         std::any_of(fitted->model.components.begin(), fitted->model.components.end(),
                     [&](const Component& c) { return c.kind == *added && c.amplitude <= 0.0; }))
       unsupported_.insert(*added);
-    tried_[fitted->spec.name()] = *fitted;
+    tried_.emplace(fitted->spec.name(), fitted);
     const bool is_better = !best_ || (is_rejected(*fitted) != is_rejected(*best_)
                                           ? is_rejected(*best_)
                                           : fitted->criterion < best_->criterion - margin);
     if (is_better) best_ = std::move(*fitted);
     return is_better;
+  }
+
+  /// The best model without its component `out`, and with a term of each of `in` in its place, by the best
+  /// model's weights, which needs no search; nothing where it stays so far from the data that no weights of
+  /// its own could make it as likely. Most neighbours of a good model end here.
+  std::optional<Model> neighbour(std::size_t out, std::span<const ProcessKind> in) {
+    /// In squares of sds: what is so much further is rejected where the best is not, and errs twice as much
+    /// where the best errs.
+    constexpr double kFar = 50.0;
+    const FixedPoint& now = models_.solve(best_->spec).point;
+    SeparableProblem problem = unweighted_problem(wv_, best_->spec, models_.levels());
+    problem.whitener = whitener_of(now.v);
+    if (problem.whitener.size() == 0) return std::nullopt;
+    const double far = (problem.whitener * residual_of(problem, now.model)).squaredNorm() + kFar;
+    SeparableSolution found;
+    found.model = now.model;
+    found.model.components.erase(found.model.components.begin() + static_cast<std::ptrdiff_t>(out));
+    problem.spec.processes.erase(problem.spec.processes.begin() + static_cast<std::ptrdiff_t>(out));
+    if (!found.model.components.empty()) found = polish(problem, found.model);
+    for (const ProcessKind kind : in) {
+      problem.spec.processes.push_back(kind);
+      std::sort(problem.spec.processes.begin(), problem.spec.processes.end());
+      SeparableSolution grown;
+      grown.objective = std::numeric_limits<double>::infinity();
+      for (const Model& start : with_one_more(problem, found.model, kind)) {
+        SeparableSolution candidate = polish(problem, start);
+        if (candidate.objective < grown.objective) grown = std::move(candidate);
+      }
+      found = std::move(grown);
+    }
+    if (found.objective > far) return std::nullopt;
+    return std::move(found.model);
   }
 
   /// White noise, quantization and a ramp stand at the ends of the scales: what is added later leaves even
@@ -164,10 +205,8 @@ class Grower {
            kind == ProcessKind::kRamp;
   }
 
-  bool add_one() {
+  bool add_one(double margin) {
     const ModelSpec base = best_->spec;
-    // A model that cannot be right may grow by small steps.
-    const double margin = is_rejected(*best_) ? 0.0 : kEquivalent;
     bool grown = false;
     for (const ProcessKind kind : terms_) {
       const int most = kind == ProcessKind::kGaussMarkov ? kMostAlike : 1;
@@ -185,11 +224,13 @@ class Grower {
     for (std::size_t i = 0; i < base.processes.size(); ++i) {
       ModelSpec less = base;
       less.processes.erase(less.processes.begin() + static_cast<std::ptrdiff_t>(i));
+      const auto start = neighbour(i, {});
+      if (!start) continue;
       const bool already_rejected = is_rejected(*best_);
       const double before = best_->criterion;
       const FitResult kept = *best_;
-      if (consider(std::move(less), -kEquivalent) && is_rejected(*best_) == already_rejected &&
-          best_->criterion < before + kEquivalent)
+      if (consider(std::move(less), -kEquivalent, std::nullopt, &*start) &&
+          is_rejected(*best_) == already_rejected && best_->criterion < before + kEquivalent)
         return true;
       best_ = kept;
     }
@@ -206,29 +247,47 @@ class Grower {
         if (alike || base.count(kind) >= kMostAlike) continue;
         ModelSpec other = base;
         other.processes[i] = kind;
+        const auto start = neighbour(i, std::array{kind});
+        if (!start) continue;
         const double margin = other.parameter_count() > base.parameter_count() ? kEquivalent : 0.0;
-        if (consider(std::move(other), margin)) return true;
+        if (consider(std::move(other), margin, std::nullopt, &*start)) return true;
       }
     }
     return false;
   }
 
-  /// Over a few octaves flicker noise is like a Gauss-Markov process and one that is slower; no step of one
-  /// term leads from one to the other.
-  bool split_flicker() {
+  /// Two in the place of one, where no step of one term leads from one to the other: over a few octaves
+  /// flicker noise is like a Gauss-Markov process and one that is slower, and a fast Gauss-Markov process
+  /// like white noise beneath a resonance.
+  bool split_one() {
+    using enum ProcessKind;
+    static constexpr std::array<std::pair<ProcessKind, std::array<ProcessKind, 2>>, 3> kSplits{
+        {{kFlicker, {kGaussMarkov, kRandomWalk}},
+         {kFlicker, {kGaussMarkov, kGaussMarkov}},
+         {kGaussMarkov, {kWhiteNoise, kResonance}}}};
     const ModelSpec base = best_->spec;
-    const auto at = std::find(base.processes.begin(), base.processes.end(), ProcessKind::kFlicker);
-    if (at == base.processes.end() || base.count(ProcessKind::kGaussMarkov) >= kMostAlike) return false;
-    for (const ProcessKind slower : {ProcessKind::kRandomWalk, ProcessKind::kGaussMarkov}) {
-      ModelSpec other = base;
-      other.processes.erase(other.processes.begin() + (at - base.processes.begin()));
-      if (slower == ProcessKind::kRandomWalk && other.count(slower) > 0) continue;
-      other.processes.push_back(ProcessKind::kGaussMarkov);
-      other.processes.push_back(slower);
-      if (other.count(ProcessKind::kGaussMarkov) > kMostAlike) continue;
-      if (consider(std::move(other), kEquivalent)) return true;
+    for (const auto& [one, two] : kSplits) {
+      for (std::size_t i = 0; i < base.processes.size(); ++i) {
+        if (base.processes[i] != one) continue;
+        ModelSpec other = base;
+        other.processes.erase(other.processes.begin() + static_cast<std::ptrdiff_t>(i));
+        other.processes.insert(other.processes.end(), two.begin(), two.end());
+        if (!may_hold(other)) continue;
+        const auto start = neighbour(i, two);
+        // As when it grows.
+        const double margin = is_rejected(*best_) ? 0.0 : kEquivalent;
+        if (start && consider(std::move(other), margin, std::nullopt, &*start)) return true;
+      }
     }
     return false;
+  }
+
+  /// Whether there may be a term of each kind as often as in the model.
+  [[nodiscard]] bool may_hold(const ModelSpec& spec) const {
+    return std::ranges::all_of(spec.processes, [&](ProcessKind kind) {
+      return spec.count(kind) <= (kind == ProcessKind::kGaussMarkov ? kMostAlike : 1) &&
+             std::find(terms_.begin(), terms_.end(), kind) != terms_.end();
+    });
   }
 
   std::span<const ProcessKind> terms_;
@@ -237,7 +296,7 @@ class Grower {
   const WaveletVariance& wv_;
   NestedFit models_;
   std::set<ProcessKind> unsupported_;
-  std::map<std::string, FitResult> tried_;
+  std::map<std::string, Result<FitResult>> tried_;
   std::optional<FitResult> best_;
   Error why_none_;
 };

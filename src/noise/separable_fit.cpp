@@ -50,8 +50,11 @@ Curve curve_of(const SeparableProblem& problem, ProcessKind kind, const Shape& s
   const auto shapes = static_cast<std::size_t>(shape_count(kind));
   curve.value.resize(problem.y.size());
   for (std::size_t i = 0; i < shapes; ++i) curve.slope[i].resize(problem.y.size());
+  std::array<CurvePoint, kMaxLevel> points;
+  unit_curve(kind, shape, std::span(points).first(static_cast<std::size_t>(problem.levels.back())));
   for (Eigen::Index r = 0; r < curve.value.size(); ++r) {
-    const CurvePoint point = unit_wv(kind, shape, problem.levels[static_cast<std::size_t>(r)]);
+    const CurvePoint& point =
+        points[static_cast<std::size_t>(problem.levels[static_cast<std::size_t>(r)] - 1)];
     curve.value[r] = point.value;
     for (std::size_t i = 0; i < shapes; ++i) curve.slope[i][r] = point.derivative[i];
   }

@@ -59,6 +59,7 @@ Spectrum spectrum_of(std::span<const double> x, const Present& present, std::siz
   out.length = length;
   out.power.assign(length / 2 + 1, 0.0);
   Eigen::FFT<double> fft;
+  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
   std::vector<double> piece(length);
   std::vector<std::complex<double>> transform;
   for (const std::size_t begin : present.segments(length)) {

@@ -111,6 +111,37 @@ Html data_sheet_section(const json& certificate) {
   return heading + (table.empty() ? paragraph("It states nothing of these axes.") : table.html());
 }
 
+/// Which axes move together, at the scale where it is plainest.
+Html correlation_section(const json& certificate) {
+  const json& pairs = field(certificate, "correlation");
+  if (!pairs.is_array() || pairs.empty()) return {};
+  Table table({text("axes"), text("correlation"), text("at, s"), text("p, corrected")});
+  std::size_t without = 0;
+  for (const auto& pair : pairs) {
+    const auto value = number_at(pair, "coherence");
+    const auto p = number_at(pair, "p_holm");
+    const json& names = field(pair, "signals");
+    const bool has_names = names.size() == 2 && names[0].is_string() && names[1].is_string();
+    const json& shows = field(pair, "shows");
+    if (!value || !p || !has_names || !shows.is_boolean() || !shows.get<bool>()) {
+      ++without;
+      continue;
+    }
+    table.add_row(
+        {text(axis_words(names[0].get<std::string>()) + ", " + axis_words(names[1].get<std::string>())),
+         with_interval(*value, number_at(pair, "ci_low"), number_at(pair, "ci_high")),
+         number(number_at(pair, "tau_s"), 3), number(*p, 2)});
+  }
+  Html out = element("h2", text("What axes have in common"));
+  if (!table.empty()) out += table.html();
+  const std::string rest =
+      table.empty()
+          ? "No two axes correlate by more than a tenth at the scale where it is plainest."
+          : fmt::format("The other {} pairs correlate by less than a tenth, or not at all.", without);
+  if (without > 0) out += paragraph(rest);
+  return out;
+}
+
 /// Sentences of all axes; one that several axes share stands once, with their names.
 std::vector<std::string> grouped_at(const json& certificate, const char* key) {
   std::vector<Named> sentences;
@@ -150,6 +181,7 @@ Html summary(const json& certificate, const CertificateFigures& figures) {
   for (const auto& [file, words] : figures.overview) overview += figure(file, words);
   out += element("div", overview, "panels wide");
   out += data_sheet_section(certificate);
+  out += correlation_section(certificate);
   out += units_section(certificate);
   const auto limits = grouped_at(certificate, "limits");
   if (!limits.empty()) out += element("h2", text("What limits the numbers")) + list_of(limits, "limits");
@@ -196,8 +228,8 @@ Html axis_section(const json& axis, const std::filesystem::path& drawn) {
                        number_at(axis, "sd").value_or(0.0), text_at(axis, "unit"));
   if (const auto step = number_at(axis, "resolution")) words += fmt::format(", resolution {:.4g}", *step);
   words += ". Model " + text_at(fit, "model");
-  if (const double error = number_at(fit, "model_error").value_or(0.0); error > 0.0)
-    words += fmt::format(", which follows every scale within about {:.2g} %", 100.0 * error);
+  if (const double miss = number_at(axis, "largest_miss").value_or(0.0); miss > 0.0)
+    words += fmt::format(", which stays within {:.2g} % of the interval of every scale", 100.0 * miss);
   out += paragraph(words + ".");
   out += figure(
       drawn,

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <vector>
+
+#include "tests/support/shared_data.h"
 
 namespace imuscope::certificate {
 namespace {
@@ -44,6 +47,18 @@ AxisCertificate axis_of(const char* name, std::vector<TermValue> terms) {
   axis.name = name;
   axis.terms = std::move(terms);
   return axis;
+}
+
+// Each value has its document and page, in units that are its term's.
+TEST(DataSheet, PartsThatAreShippedAreRead) {
+  std::ifstream in(imuscope::test::source_path("docs/examples/data_sheets.json"));
+  const json document = json::parse(in, nullptr, false);
+  ASSERT_TRUE(document.is_object());
+  for (const auto& part : document.at("parts")) {
+    const auto sheet = read(document, part.at("part").get<std::string>());
+    ASSERT_TRUE(sheet) << sheet.error().text();
+    EXPECT_EQ(sheet->values.size(), part.at("values").size());
+  }
 }
 
 // Once by hand: 2.8 mdeg/s/sqrt(Hz) are 0.0028 * 60 deg/sqrt(h); 70 ug/sqrt(Hz) are 70e-6 * 9.80665 * 60.

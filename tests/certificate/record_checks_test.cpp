@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "made_record.h"
@@ -13,6 +14,7 @@ namespace {
 using test::made_gyro;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 std::vector<std::string> warnings_of(const AxisRecord& record) {
   const auto axis = characterize_axis(record, {});
@@ -41,6 +43,22 @@ TEST(RecordChecks, ClippedValuesAreTold) {
   AxisRecord record = made_gyro(60'000, 3);
   for (double& v : record.values) v = std::min(v, 0.92);
   EXPECT_THAT(warnings_of(record), Contains(HasSubstr("the end of the sensor's range")));
+}
+
+// Clipped so hard that the ends are near the mean, in sds of what is left; with and without a grid.
+TEST(RecordChecks, HardClippingIsToldAndACoarseGridIsNone) {
+  for (const double step : {0.0, 0.01, 0.05, 0.2, 0.5}) {
+    AxisRecord record = made_gyro(60'000, 7);
+    double mean = 0.0;
+    for (const double v : record.values) mean += v / static_cast<double>(record.values.size());
+    for (double& v : record.values) {
+      if (step > 0.0) v = step * std::round(v / step);
+    }
+    EXPECT_THAT(warnings_of(record), Not(Contains(HasSubstr("the end of the sensor's range")))) << step;
+    if (step > 0.1) continue;
+    for (double& v : record.values) v = std::clamp(v, mean - 0.2, mean + 0.2);
+    EXPECT_THAT(warnings_of(record), Contains(HasSubstr("the end of the sensor's range"))) << step;
+  }
 }
 
 TEST(RecordChecks, ManyMissingSamplesAreTold) {

@@ -51,6 +51,32 @@ TEST(Process, GaussMarkovCurveAndDerivativeAgreeWithTheExactValuesTo1em13) {
   }
 }
 
+// Squares of one exponential instead of one a level: from the slowest process to the fastest, and across the
+// end of the series.
+TEST(Process, ACurveOfAllLevelsIsThatOfEachLevelByItself) {
+  std::vector<CurvePoint> curve(kMaxLevel);
+  const auto agree = [&](ProcessKind kind, const Shape& shape) {
+    unit_curve(kind, shape, curve);
+    for (int level = 1; level <= kMaxLevel; ++level) {
+      const CurvePoint& all = curve[static_cast<std::size_t>(level - 1)];
+      const CurvePoint one = unit_wv(kind, shape, level);
+      EXPECT_LT(relative(all.value, one.value), 1e-12) << shape[0] << ' ' << shape[1] << " level " << level;
+      for (std::size_t i = 0; i < 2; ++i) {
+        // It passes zero, where it is to be small beside the curve.
+        const double slope = one.derivative[i] * shape[i];
+        EXPECT_NEAR(all.derivative[i] * shape[i], slope, 1e-12 * (std::abs(one.value) + std::abs(slope)))
+            << shape[0] << ' ' << shape[1] << " level " << level;
+      }
+    }
+  };
+  for (double a = 1e-9; a < 20.0; a *= 1.7) agree(ProcessKind::kGaussMarkov, {a, 0.0});
+  for (double a = 1e-3; a < 1.5; a *= 2.3) {
+    for (double b = 0.01; b < 3.1; b *= 1.9) agree(ProcessKind::kResonance, {a, b});
+  }
+  agree(ProcessKind::kSinusoid, {0.3, 0.0});
+  agree(ProcessKind::kFlicker, {});
+}
+
 TEST(Process, GaussMarkovCurveKeepsItsDigitsWherePhiIsNearlyOne) {
   IMUSCOPE_NEEDS_SHARED("oracle/gmwm/ar1_cancellation.csv");
   const auto rows = read_table("ar1_cancellation.csv");

@@ -4,8 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <random>
+
+#include "noise/simulated_noise.h"
 
 namespace imuscope::noise {
 namespace {
@@ -48,6 +52,50 @@ TEST(RankModels, ARejectedModelStandsBehindEveryOneThatIsNot) {
   EXPECT_FALSE(rejected(ranked.front()));
   EXPECT_TRUE(std::is_partitioned(ranked.begin(), ranked.end(), [&](const auto& m) { return !rejected(m); }));
   EXPECT_THAT(ranked.back().reason, HasSubstr("rejected: J-test p = "));
+}
+
+WaveletVariance made(const char* terms, const std::vector<std::pair<double, Shape>>& parameters,
+                     unsigned seed) {
+  Model model;
+  const ModelSpec spec = parse_model(terms).value();
+  for (std::size_t i = 0; i < spec.processes.size(); ++i)
+    model.components.push_back({spec.processes[i], parameters[i].first, parameters[i].second});
+  std::mt19937_64 random(seed);
+  return haar_wavelet_variance(simulated_noise(model, 1U << 16U, random)).value();
+}
+
+// What it leaves out is what could not have won: the search of all sub-models finds nothing that is better.
+TEST(GrowModel, FindsWhatTheSearchOfAllSubModelsFinds) {
+  const std::array terms{ProcessKind::kQuantization, ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov,
+                         ProcessKind::kRandomWalk};
+  const auto all = parse_model("QN+WN+2*GM+RW").value();
+  int same = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const WaveletVariance wv =
+        seed % 2 == 0 ? made("WN+GM+RW", {{1.0, {}}, {0.05, {0.03, 0.0}}, {1e-8, {}}}, seed)
+                      : made("WN+2*GM", {{1.0, {}}, {0.3, {0.2, 0.0}}, {0.02, {0.004, 0.0}}}, seed);
+    const auto grown = grow_model(wv, terms, 100.0).value();
+    const auto ranked = rank_models(wv, all, 100.0).value();
+    double least = std::numeric_limits<double>::infinity();
+    for (const RankedModel& model : ranked) {
+      if (model.fit.j_test && model.fit.j_test->p_value >= 0.001) least = std::min(least, model.criterion);
+    }
+    ASSERT_TRUE(grown.best.j_test);
+    EXPECT_GE(grown.best.j_test->p_value, 0.001) << seed;
+    EXPECT_LT(grown.best.criterion, least + 4.0) << seed << ": " << grown.best.spec.name();
+    same += grown.best.spec == ranked.front().fit.spec ? 1 : 0;
+  }
+  EXPECT_GE(same, 4) << "of 6";
+}
+
+// No step of one term leads there: white noise alone is no help, nor is the resonance.
+TEST(GrowModel, SplitsAFastGaussMarkovProcessIntoWhiteNoiseBeneathAResonance) {
+  const WaveletVariance wv = made("WN+RES+RW", {{1.0, {}}, {0.5, {0.15, 0.63}}, {1e-6, {}}}, 5);
+  const std::array terms{ProcessKind::kWhiteNoise, ProcessKind::kGaussMarkov, ProcessKind::kRandomWalk,
+                         ProcessKind::kResonance};
+  const auto grown = grow_model(wv, terms, 100.0).value();
+  EXPECT_EQ(grown.best.spec.name(), "WN+RES+RW");
+  EXPECT_EQ(grown.best.model_error, 0.0);
 }
 
 TEST(CrossValidation, ARightModelMissesAReplicateByOneVarianceALevel) {

@@ -21,6 +21,7 @@ namespace imuscope::test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 struct Columns {
   std::string header;
@@ -245,6 +246,19 @@ TEST_F(Characterize, BadInputGetsASentence) {
   refuses({(folder_ / "text.csv").string()}, 1, "'zero' is not a number");
   std::ofstream(folder_ / "sound.f64") << "12345678";
   refuses({(folder_ / "sound.f64").string(), "--rate", "100"}, 2, "tells no axis");
+}
+
+TEST_F(Characterize, UnitsThatDoNotGoTogetherAreTold) {
+  const std::string mixed = log(
+      "mixed.csv", {"time_s,gyro_x_degps,gyro_y_radps,gyro_z_degps,accel_x_mps2,accel_y_mps2,accel_z_mps2"});
+  EXPECT_EQ(run({mixed, "--no-page"}), 0) << output();
+  EXPECT_THAT(output(), HasSubstr("gyro_x is in deg/s and gyro_y in rad/s by their names"));
+  EXPECT_THAT(output(), Not(HasSubstr("and gravity is")));
+  const std::string in_g =
+      log("in_g.csv", {"time_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_g,accel_y_g,accel_z_g"});
+  EXPECT_EQ(run({in_g, "--no-page"}), 0) << output();
+  EXPECT_THAT(output(), HasSubstr("and gravity is 9.81"));
+  EXPECT_THAT(output(), Not(HasSubstr("by their names")));
 }
 
 // A real sensor: the resonance of its z gyroscope near 20 Hz, and a random walk that is no white noise's.

@@ -6,12 +6,14 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "base/json_text.h"
 #include "base/output_folder.h"
 #include "certificate/data_sheet.h"
+#include "certificate/joint_axes.h"
 #include "certificate/json.h"
 #include "certificate/units.h"
 #include "certificate_table.h"
@@ -85,8 +87,8 @@ std::string shown_term(const certificate::TermValue& term) {
 
 void print_axis(const certificate::AxisCertificate& axis) {
   say("{}: {}", axis.name, axis.fit.spec.name());
-  if (axis.fit.model_error > 0.0)
-    say(", which follows every scale within about {:.2g} %", 100.0 * axis.fit.model_error);
+  if (axis.largest_miss > 0.0)
+    say(", which stays within {:.2g} % of the interval of every scale", 100.0 * axis.largest_miss);
   say("\n");
   for (const auto& term : axis.terms) {
     say("  {} {:<24} {:<28} {:<16} {}\n", symbol_of(term.term), name_of(term.term, is_gyro(axis.unit)),
@@ -99,6 +101,41 @@ void print_axis(const certificate::AxisCertificate& axis) {
     say("  bias {:.3g} +- {:.2g} {} per degC, {:.1f} to {:.1f} degC\n", axis.temperature->bias_per_c,
         axis.temperature->bias_per_c_sd, unit_name(axis.unit), axis.temperature->lowest_c,
         axis.temperature->highest_c);
+  }
+}
+
+/// Of the axes of one record with each other; nothing where they were not sampled together.
+std::optional<certificate::JointAxes> correlation_of(const SensorRecord& record, double confidence) {
+  std::vector<std::vector<double>> values;  // NaN where a sample is missing
+  for (const auto& axis : record.axes) {
+    values.push_back(axis.values);
+    for (std::size_t i = 0; i < axis.mask.size(); ++i) {
+      if (axis.mask[i] == 0) values.back()[i] = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  std::vector<certificate::JointSignal> signals;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i].size() != values.front().size() || record.axes[i].rate_hz != record.axes.front().rate_hz)
+      return std::nullopt;
+    signals.push_back({record.axes[i].name, values[i]});
+  }
+  certificate::JointOptions how;
+  how.confidence = confidence;
+  how.share_a_reference = false;
+  if (signals.empty()) return std::nullopt;
+  how.rate_hz = record.axes.front().rate_hz;
+  auto joint = joint_axes(signals, how);
+  if (!joint) return std::nullopt;  // a single axis, or one that is stuck
+  return std::move(*joint);
+}
+
+void print_correlation(const nlohmann::json& pairs) {
+  for (const auto& pair : pairs) {
+    if (!pair["shows"].get<bool>()) continue;
+    say("  {} and {} correlate: {:.2f} [{:.2f}, {:.2f}] at {:.3g} s (p = {:.2g}, corrected)\n",
+        pair["signals"][0].get<std::string>(), pair["signals"][1].get<std::string>(),
+        pair["coherence"].get<double>(), pair["ci_low"].get<double>(), pair["ci_high"].get<double>(),
+        pair["tau_s"].get<double>(), pair["p_holm"].get<double>());
   }
 }
 
@@ -210,6 +247,11 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     const std::string name = options.sensor.empty() || records->size() > 1 ? record.name : options.sensor;
     documents.push_back(
         certificate::to_json({name, record.files, record.selection, now_utc(), IMUSCOPE_VERSION}, *axes));
+    if (const auto joint = correlation_of(record, options.how.confidence)) {
+      std::vector<std::string> names;
+      for (const auto& axis : record.axes) names.push_back(axis.name);
+      documents.back()["correlation"] = certificate::pairs_json(*joint, names);
+    }
     if (*sheet) documents.back()["comparison"] = to_json(**sheet, beside(**sheet, *axes));
     all.push_back(std::move(*axes));
   }
@@ -225,6 +267,7 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     for (const auto& axis : all[i]) {
       for (const auto& limit : axis.limits) say("  {}: {}\n", axis.name, limit);
     }
+    if (documents[i].contains("correlation")) print_correlation(documents[i]["correlation"]);
     if (*sheet) print_beside(**sheet, beside(**sheet, all[i]));
   }
   if (options.table) {

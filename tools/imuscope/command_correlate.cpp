@@ -10,6 +10,7 @@
 #include "base/json_text.h"
 #include "base/units.h"
 #include "certificate/joint_axes.h"
+#include "certificate/json.h"
 #include "commands.h"
 #include "joint_run.h"
 #include "noise/holm.h"
@@ -103,15 +104,7 @@ nlohmann::json json_of(const certificate::JointAxes& joint, const std::vector<st
     }
     out["scales"].push_back(std::move(row));
   }
-  out["pairs"] = nlohmann::json::array();
-  for (const auto& pair : joint.pairs) {
-    out["pairs"].push_back({{"signals", {names[pair.first], names[pair.second]}},
-                            {"tau_s", pair.tau_s},
-                            {"coherence", number(pair.coherence.value)},
-                            {"ci_low", number(pair.coherence.ci_low)},
-                            {"ci_high", number(pair.coherence.ci_high)},
-                            {"p_holm", number(pair.p_holm)}});
-  }
+  out["pairs"] = certificate::pairs_json(joint, names);
   if (common) {
     out["mean"] = {{"weights", joint.weights},
                    {"from_s", joint.from_s},

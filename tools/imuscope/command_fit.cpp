@@ -11,6 +11,7 @@
 #include "log_plot.h"
 #include "noise/conservative.h"
 #include "noise/json.h"
+#include "noise/nested_fit.h"
 #include "print.h"
 #include "signal_options.h"
 
@@ -97,6 +98,12 @@ Result<void> fit_one(const Task& task, const noise::ModelSpec& spec) {
   const auto ranked = noise::rank_models(wv, spec, rate_hz, quick);
   if (!ranked) return tl::unexpected(ranked.error());
   if (!task.options.signal.json) print_ranking(*ranked);
+  const auto& test = ranked->front().fit.j_test;
+  if (test && test->p_value < noise::kRejectedOutright) {
+    say_aside(
+        "warning: the data reject every one of these models; `imuscope characterize` also looks for "
+        "resonances and flicker noise, or name them: --model WN+RES+GM+FN+RW\n");
+  }
   noise::FitOptions again = task.fit_options;
   again.warm_start = &ranked->front().fit;
   const auto best = noise::fit(wv, ranked->front().fit.spec, rate_hz, again);

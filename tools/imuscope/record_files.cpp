@@ -81,6 +81,33 @@ Result<void> units_by_gravity(SensorRecord& sensor, const std::string& file) {
   return {};
 }
 
+/// A triad whose axes have different units by their names, and one that shows no gravity in its own.
+void look_at_units(SensorRecord& sensor) {
+  const certificate::AxisRecord* first_gyro = nullptr;
+  const certificate::AxisRecord* first_accel = nullptr;
+  double square = 0.0;
+  int n = 0;
+  for (const auto& axis : sensor.axes) {
+    const auto*& first = is_gyro_name(axis.name) ? first_gyro : first_accel;
+    if (first == nullptr) first = &axis;
+    if (axis.unit != first->unit) {
+      sensor.warnings.push_back(
+          fmt::format("{} is in {} and {} in {} by their names, and taken so; is one of them wrong?",
+                      first->name, unit_name(first->unit), axis.name, unit_name(axis.unit)));
+    }
+    if (is_gyro_name(axis.name)) continue;
+    const double mean = mean_of(axis) * si_factor(axis.unit);
+    square += mean * mean;
+    ++n;
+  }
+  constexpr double kSlack = 0.15;
+  if (n != 3 || std::abs(std::sqrt(square) / kMps2PerG - 1.0) < kSlack) return;
+  sensor.warnings.push_back(
+      fmt::format("the accelerometers show {:.3g} m/s^2, and gravity is {:.3g}: a wrong unit, a swapped "
+                  "column, or no rest",
+                  std::sqrt(square), kMps2PerG));
+}
+
 Result<noise::SignalUnit> given_unit(const AxisColumn& column, const RecordChoice& choice) {
   const std::string& text = is_gyro_name(column.axis) ? choice.gyro_unit : choice.accel_unit;
   if (text.empty()) return column.unit;
@@ -137,7 +164,9 @@ Result<void> read_axes(SensorRecord& sensor, const std::vector<AxisSource>& sour
     sensor.axes.push_back(std::move(axis));
   }
   if (!temperature.empty() && !jobs.back().signal) return tl::unexpected(jobs.back().signal.error());
-  return units_by_gravity(sensor, sources.front().file.string());
+  if (auto known = units_by_gravity(sensor, sources.front().file.string()); !known) return known;
+  look_at_units(sensor);
+  return {};
 }
 
 void in_order(std::vector<AxisSource>& sources) {
