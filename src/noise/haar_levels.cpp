@@ -6,6 +6,8 @@
 #include <cstring>
 #include <numeric>
 
+#include "noise/work_memory.h"
+
 // Other processors than x86 have their widest registers anyhow. What chooses between clones runs before
 // ThreadSanitizer has set itself up, and would end the program.
 #if defined(__SANITIZE_THREAD__) || !defined(__x86_64__)
@@ -138,7 +140,7 @@ constexpr std::size_t kBlock = 32768;
 /// the sums of 2^kLowLevels samples. `add` takes level, sum and count. Precondition: the run has levels
 /// beyond these.
 template <typename Add>
-void low_level_squares(std::span<const double> run, std::vector<double>& work, const Add& add) {
+void low_level_squares(std::span<const double> run, double* work, const Add& add) {
   constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
   std::vector<double> local;
   for (std::size_t start = 0; start < run.size(); start += kBlock) {
@@ -149,7 +151,7 @@ void low_level_squares(std::span<const double> run, std::vector<double>& work, c
     stretch(local, 0, length) = in - run.front();
     const std::size_t kept = length >= kSupport ? std::min(own, length - kSupport + 1) : 0;
     take_levels(local.data(), 1, kLowLevels, 1, length, own, add);
-    std::copy_n(local.begin(), kept, work.begin() + static_cast<std::ptrdiff_t>(start));
+    std::copy_n(local.begin(), kept, work + start);
   }
 }
 
@@ -241,7 +243,7 @@ double HoleLengths::variance_of(const MissingExcess& excess, std::span<const dou
   return excess.own * within - excess.common * of_length(std::max(1.0, n / 8.0));
 }
 
-void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vector<double>& work) {
+void add_squares(std::span<const double> run, std::span<LevelSum> sums) {
   const int levels = std::min(static_cast<int>(sums.size()), highest_level(run.size()));
   if (levels < 1) return;
   const auto add = [&](int level, double sum, std::size_t count) {
@@ -250,12 +252,13 @@ void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vec
     total.count += count;
   };
   if (levels <= kLowLevels) {
+    std::vector<double> work;
     subtract_first(run, work);
     take_levels(work.data(), 1, levels, 1, run.size(), run.size(), add);
     return;
   }
-  work.resize(run.size() + strip_doubles(run.size()));
-  low_level_squares(run, work, add);
+  const WorkMemory work(run.size() + strip_doubles(run.size()));
+  low_level_squares(run, work.data(), add);
   constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
   const std::size_t sums_left = run.size() - kSupport + 1;
   high_level_squares({work.data(), sums_left}, levels, work.data() + run.size(), add);

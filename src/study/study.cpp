@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 
@@ -287,17 +288,27 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   }
 
   const auto& names = regimes->chosen.names();
-  // The regressions need no noise model of the error process: both at once.
+  // The regressions need no noise model of the error process: another thread begins with them at once, as
+  // each of them takes longer than a noise model.
   DynamicsRegressions regressions;
-  NoiseStudy noise_study;
-  tbb::parallel_invoke([&] { regressions = regressions_of(configuration, *studied, regimes->motion, *spec); },
-                       [&] {
-                         noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
-                           if (options.progress) options.progress("noise models", share);
-                         });
-                       });
-  const auto dependence = study_dependence(configuration, series, epochs->temperatures(),
-                                           epochs->watch().levels(), regimes->motion, noise_study, origin);
+  tbb::task_group beside;
+  beside.run([&] { regressions = regressions_of(configuration, *studied, regimes->motion, *spec); });
+  const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
+    if (options.progress) options.progress("noise models", share);
+  });
+  beside.wait();
+  DependenceStudy dependence;
+  nlohmann::json models;
+  nlohmann::json comparison;
+  Result<void> scatter;
+  tbb::parallel_invoke(
+      [&] {
+        dependence = study_dependence(configuration, series, epochs->temperatures(), epochs->watch().levels(),
+                                      regimes->motion, noise_study, origin);
+      },
+      [&] { models = models_json(noise_study); }, [&] { comparison = comparison_json(noise_study, names); },
+      [&] { scatter = write_scatter(configuration, *studied, origin, (*folder)->folder()); });
+  if (!scatter) return scatter;
   auto regime_document = regimes_json(*regimes, origin);
   regime_document["left_out"] = noise_study.left_out;
   for (const std::vector<std::string>& remarks :
@@ -305,18 +316,15 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     run.warnings.insert(run.warnings.end(), remarks.begin(), remarks.end());
   run.static_s = regimes->motion.total_s(0);
   run.dynamic_s = regimes->motion.total_s(1);
-  if (auto written = write_scatter(configuration, *studied, origin, (*folder)->folder()); !written)
-    return written;
-
   if (auto written = (*folder)->write_calibration(
           calibration_entries(finals, of_filter, outcomes, infos, smoothed->means));
       !written)
     return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
-  if (auto written = write_models((*folder)->folder(), models_json(noise_study)); !written) return written;
+  if (auto written = write_models((*folder)->folder(), models); !written) return written;
   const std::pair<const char*, nlohmann::json> documents[] = {
       {"regimes.json", std::move(regime_document)},
-      {"comparison.json", comparison_json(noise_study, names)},
+      {"comparison.json", std::move(comparison)},
       {"dependence.json", dependence.document},
       {"vibration.json", {{"schema", "imuscope.vibration/1"}, {"lines", noise_study.lines}}},
       {"regression.json",
