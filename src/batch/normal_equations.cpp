@@ -1,5 +1,7 @@
 #include "batch/normal_equations.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -288,9 +290,11 @@ Residuals residuals(const Problem& problem, const Spectra& study, const Estimate
 std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study, const Residuals& residual,
                                 const Estimate& estimate, const NoiseBands& noise,
                                 const ReferenceNoise& reference, bool corrected) {
-  BandSummer summer(problem, study, residual, estimate, noise, reference, corrected);
-  std::vector<BandSums> sums;
-  for (Eigen::Index band = 0; band < problem.bands.size(); ++band) sums.push_back(summer.sum(band));
+  std::vector<BandSums> sums(static_cast<std::size_t>(problem.bands.size()));
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t band) {
+    BandSummer summer(problem, study, residual, estimate, noise, reference, corrected);
+    sums[band] = summer.sum(static_cast<Eigen::Index>(band));
+  });
   return sums;
 }
 

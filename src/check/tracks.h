@@ -50,6 +50,8 @@ class Drive {
   /// Takes a sample of a device in stream order, and no more than the fastest device has in that time.
   void add(const Sample& sample);
   [[nodiscard]] bool is_full(std::size_t device) const { return full_[device]; }
+  /// Whether a sample has come, from whose time the seconds of all tracks count.
+  [[nodiscard]] bool has_origin() const noexcept { return has_origin_; }
   void set_time_scale(std::size_t device, TimeScale scale) { scales_[device] = scale; }
 
   [[nodiscard]] const Configuration& configuration() const noexcept { return *configuration_; }

@@ -6,6 +6,8 @@
 #include <cstring>
 #include <numeric>
 
+#include "noise/work_memory.h"
+
 // Other processors than x86 have their widest registers anyhow. What chooses between clones runs before
 // ThreadSanitizer has set itself up, and would end the program.
 #if defined(__SANITIZE_THREAD__) || !defined(__x86_64__)
@@ -39,12 +41,12 @@ using Lanes = double __attribute__((vector_size(32)));
 constexpr std::size_t kLanes = 4;
 
 /// G-1. Squares of one level over [from, to), without moving on to the next.
-double squares(const std::vector<double>& f, std::size_t n, std::size_t from, std::size_t to) {
+double squares(const double* f, std::size_t n, std::size_t from, std::size_t to) {
   double sum = 0.0;
   for (std::size_t s = from; s < to; s += kStretch) {
     const auto length = static_cast<Eigen::Index>(std::min(kStretch, to - s));
-    const Eigen::Map<const Eigen::ArrayXd> older(f.data() + s, length);
-    const Eigen::Map<const Eigen::ArrayXd> newer(f.data() + s + n, length);
+    const Eigen::Map<const Eigen::ArrayXd> older(f + s, length);
+    const Eigen::Map<const Eigen::ArrayXd> newer(f + s + n, length);
     sum += (older - newer).square().sum();
   }
   return sum;
@@ -92,40 +94,41 @@ IMUSCOPE_CLONES PairOfSums two_levels_of_stretch(double* f, std::size_t n, std::
   return sums;
 }
 
-/// Takes the levels of n and 2n from `length` block sums of n samples at `f`, and leaves the length - 3n sums
-/// of 4n samples there. Squares count for the first `own` positions only, sums go on beyond them.
-/// Precondition: length > 3n.
+/// Takes `level` and the next one from `length` block sums at `f`, n places from a sum to the one behind it,
+/// and leaves the length - 3n sums of the level after them there. Squares count for the first `own` positions
+/// only, sums go on beyond them. Precondition: length > 3n.
 template <typename Add>
-void take_two_levels(std::vector<double>& f, int level, std::size_t length, std::size_t own, const Add& add) {
-  const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
+void take_two_levels(double* f, int level, std::size_t n, std::size_t length, std::size_t own,
+                     const Add& add) {
   const std::size_t lower_count = std::min(own, length - n);
   const std::size_t upper_count = std::min(own, length - 3 * n);
   // The lower level reaches further than the upper one; its last part comes first, before the sums move on.
   PairOfSums total{squares(f, n, upper_count, lower_count), 0.0};
   for (std::size_t s = 0; s < upper_count; s += kStretch) {
-    const PairOfSums sums = two_levels_of_stretch(f.data() + s, n, std::min(kStretch, upper_count - s));
+    const PairOfSums sums = two_levels_of_stretch(f + s, n, std::min(kStretch, upper_count - s));
     total.lower += sums.lower;
     total.upper += sums.upper;
   }
   for (std::size_t s = upper_count; s < length - 3 * n; s += kStretch) {
-    (void)two_levels_of_stretch(f.data() + s, n, std::min(kStretch, length - 3 * n - s));
+    (void)two_levels_of_stretch(f + s, n, std::min(kStretch, length - 3 * n - s));
   }
   add(level, total.lower, lower_count);
   add(level + 1, total.upper, upper_count);
 }
 
-/// Levels first..last, as far as `length` sums of 2^(first-1) samples reach.
+/// Levels first..last, as far as `length` sums of 2^(first-1) samples reach, n places from a sum to the one
+/// behind it.
 template <typename Add>
-void take_levels(std::vector<double>& f, int first, int last, std::size_t length, std::size_t own,
+void take_levels(double* f, int first, int last, std::size_t n, std::size_t length, std::size_t own,
                  const Add& add) {
   for (int level = first; level <= last; level += 2) {
-    const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
     if (level == last || length <= 3 * n) {
       if (length > n) add(level, squares(f, n, 0, std::min(own, length - n)), std::min(own, length - n));
       return;
     }
-    take_two_levels(f, level, length, own, add);
+    take_two_levels(f, level, n, length, own, add);
     length -= 3 * n;
+    n *= 4;
   }
 }
 
@@ -137,9 +140,8 @@ constexpr std::size_t kBlock = 32768;
 /// the sums of 2^kLowLevels samples. `add` takes level, sum and count. Precondition: the run has levels
 /// beyond these.
 template <typename Add>
-void low_level_squares(std::span<const double> run, std::vector<double>& work, const Add& add) {
+void low_level_squares(std::span<const double> run, double* work, const Add& add) {
   constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
-  work.resize(run.size());
   std::vector<double> local;
   for (std::size_t start = 0; start < run.size(); start += kBlock) {
     const std::size_t own = std::min(kBlock, run.size() - start);
@@ -148,8 +150,39 @@ void low_level_squares(std::span<const double> run, std::vector<double>& work, c
     const Eigen::Map<const Eigen::ArrayXd> in(run.data() + start, static_cast<Eigen::Index>(length));
     stretch(local, 0, length) = in - run.front();
     const std::size_t kept = length >= kSupport ? std::min(own, length - kSupport + 1) : 0;
-    take_levels(local, 1, kLowLevels, length, own, add);
-    std::copy_n(local.begin(), kept, work.begin() + static_cast<std::ptrdiff_t>(start));
+    take_levels(local.data(), 1, kLowLevels, 1, length, own, add);
+    std::copy_n(local.begin(), kept, work + start);
+  }
+}
+
+/// Doubles of a strip, which stays in the second-level cache; no narrower than a line of it.
+constexpr std::size_t kStripDoubles = 65536;
+constexpr std::size_t kLeastWidth = 8;
+
+/// What the longest strip of a run takes.
+std::size_t strip_doubles(std::size_t length) {
+  const std::size_t rows = (length >> static_cast<unsigned>(kLowLevels)) + 1;
+  return std::max(kStripDoubles, rows * kLeastWidth);
+}
+
+/// Levels kLowLevels + 1..last from the sums of 2^kLowLevels samples. Positions a whole number of such sums
+/// apart meet on all these levels and meet no others: strip by strip of them, every level in cache, with the
+/// strip's width for the distance of two sums.
+/// @param strip  strip_doubles(run.size()) of them
+template <typename Add>
+void high_level_squares(std::span<const double> sums, int last, double* strip, const Add& add) {
+  constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
+  const std::size_t longer = sums.size() % kSupport;  // strips before it have a row more
+  for (std::size_t begin = 0; begin < std::min(kSupport, sums.size());) {
+    const std::size_t rows = sums.size() / kSupport + (begin < longer ? 1 : 0);
+    const std::size_t width =
+        std::min((begin < longer ? longer : kSupport) - begin, std::max(kLeastWidth, kStripDoubles / rows));
+    for (std::size_t row = 0; row < rows; ++row) {
+      std::copy_n(sums.begin() + static_cast<std::ptrdiff_t>(begin + row * kSupport), width,
+                  strip + row * width);
+    }
+    take_levels(strip, kLowLevels + 1, last, width, rows * width, rows * width, add);
+    begin += width;
   }
 }
 
@@ -210,7 +243,7 @@ double HoleLengths::variance_of(const MissingExcess& excess, std::span<const dou
   return excess.own * within - excess.common * of_length(std::max(1.0, n / 8.0));
 }
 
-void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vector<double>& work) {
+void add_squares(std::span<const double> run, std::span<LevelSum> sums) {
   const int levels = std::min(static_cast<int>(sums.size()), highest_level(run.size()));
   if (levels < 1) return;
   const auto add = [&](int level, double sum, std::size_t count) {
@@ -219,14 +252,16 @@ void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vec
     total.count += count;
   };
   if (levels <= kLowLevels) {
+    std::vector<double> work;
     subtract_first(run, work);
-    take_levels(work, 1, levels, run.size(), run.size(), add);
+    take_levels(work.data(), 1, levels, 1, run.size(), run.size(), add);
     return;
   }
-  low_level_squares(run, work, add);
+  const WorkMemory work(run.size() + strip_doubles(run.size()));
+  low_level_squares(run, work.data(), add);
   constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
   const std::size_t sums_left = run.size() - kSupport + 1;
-  take_levels(work, kLowLevels + 1, levels, sums_left, sums_left, add);
+  high_level_squares({work.data(), sums_left}, levels, work.data() + run.size(), add);
 }
 
 HaarLevels::HaarLevels(std::span<const double> x, std::span<const Segment> runs)

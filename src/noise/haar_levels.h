@@ -71,8 +71,8 @@ struct LevelSum {
 int highest_level(std::size_t length) noexcept;
 
 /// Adds the run's squared coefficients to `sums` (index 0 = level 1), as far as the run is long enough.
-/// `work` is scratch; it grows to the run's length.
-void add_squares(std::span<const double> run, std::span<LevelSum> sums, std::vector<double>& work);
+/// Memory: one copy of the run.
+void add_squares(std::span<const double> run, std::span<LevelSum> sums);
 
 /// Walks the levels of one run, or of several with missing samples between them, and hands out the
 /// coefficients themselves: half the difference of the means of the samples that are there.

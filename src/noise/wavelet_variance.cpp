@@ -61,8 +61,7 @@ WvLevel level_of(int j, double value, std::uint64_t count) {
 /// Of one run, block by block in cache.
 std::vector<WvLevel> whole_levels(std::span<const double> run, int levels) {
   std::vector<LevelSum> sums(static_cast<std::size_t>(std::min(levels, highest_level(run.size()))));
-  std::vector<double> work;
-  add_squares(run, sums, work);
+  add_squares(run, sums);
   std::vector<WvLevel> result;
   for (const LevelSum& sum : sums) {
     result.push_back(level_of(static_cast<int>(result.size()) + 1,

@@ -1,4 +1,6 @@
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
 #include <array>
 #include <string_view>
 
@@ -91,14 +93,20 @@ Html take_away_section(const RunFiles& run, const std::vector<Fit>& all_fits) {
       "In the terms of data sheets, and as the configuration of other tools. `imuscope export models.json` "
       "writes the same as files, the whole model as state space, and with --conservative the upper ends of "
       "the intervals. What does not hold is not written, with the reason in its place.");
+  std::vector<std::pair<std::string, std::string>> parts;
   for (const StudyFiles& study : run.studies) {
-    for (const std::string& regime : particular_regimes(regimes_of(all_fits))) {
-      const auto fits = axis_fits(run, study.name, regime);
-      if (fits.empty()) continue;
-      section +=
-          fold(study.name + ", " + (regime.empty() ? "all" : regime), quantity_table(fits) + exports(fits));
-    }
+    for (const std::string& regime : particular_regimes(regimes_of(all_fits)))
+      parts.emplace_back(study.name, regime);
   }
+  // What a filter feels of a model takes a while to find: each part by itself, on any thread.
+  std::vector<Html> made(parts.size());
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+    const auto& [name, regime] = parts[i];
+    const auto fits = axis_fits(run, name, regime);
+    if (fits.empty()) return;
+    made[i] = fold(name + ", " + (regime.empty() ? "all" : regime), quantity_table(fits) + exports(fits));
+  });
+  for (const Html& part : made) section += part;
   return section;
 }
 

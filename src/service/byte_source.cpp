@@ -12,6 +12,7 @@
 #include "capture/capture_reader.h"
 #include "capture/raw_dump.h"
 #include "drivers/xsens_mt/mtb_file.h"
+#include "service/read_ahead.h"
 
 namespace imuscope {
 
@@ -58,7 +59,9 @@ class RawDumpSource final : public ByteSource {
 /// The reads of several devices, taken from one pass over a capture and kept until they are asked for.
 class SharedReads {
  public:
-  SharedReads(CaptureReader reader, const std::vector<std::string>& devices) : reader_(std::move(reader)) {
+  /// @param take  the next of the capture, of any device
+  SharedReads(std::function<std::optional<RawRead>()> take, const std::vector<std::string>& devices)
+      : take_(std::move(take)) {
     for (const auto& device : devices) lines_.push_back({device, {}, true});
   }
 
@@ -66,9 +69,9 @@ class SharedReads {
   std::optional<RawRead> next(std::size_t i) {
     auto& waiting = lines_[i].waiting;
     while (waiting.empty() && !is_far_ahead()) {
-      auto read = reader_.next();
+      auto read = take_();
       if (!read) return std::nullopt;
-      take(*read);
+      keep(*read);
     }
     if (waiting.empty()) return std::nullopt;
     RawRead read = std::move(waiting.front());
@@ -91,7 +94,7 @@ class SharedReads {
     std::deque<RawRead> waiting;
     bool is_wanted;
   };
-  void take(RawRead& read) {
+  void keep(RawRead& read) {
     Line* last = nullptr;
     for (Line& line : lines_) {
       if (!line.is_wanted || line.device != read.device) continue;
@@ -101,7 +104,7 @@ class SharedReads {
     }
     if (last != nullptr) last->waiting.push_back(std::move(read));
   }
-  CaptureReader reader_;
+  std::function<std::optional<RawRead>()> take_;
   std::vector<Line> lines_;
   std::size_t held_ = 0;
 };
@@ -186,6 +189,13 @@ class SharedLine {
   std::optional<OwnReads> own_;
 };
 
+std::function<std::optional<RawRead>()> reads_of(CaptureReader reader, Reading reading) {
+  if (reading == Reading::kAhead) {
+    return [ahead = std::make_shared<ReadAhead>(std::move(reader))] { return ahead->next(); };
+  }
+  return [own = std::make_shared<CaptureReader>(std::move(reader))] { return own->next(); };
+}
+
 /// Bytes of the header of a .mtb log; 0 for any other file.
 Result<std::size_t> header_of(const std::filesystem::path& file) {
   std::string extension = file.extension().string();
@@ -225,12 +235,13 @@ Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::
 }
 
 Result<std::vector<std::unique_ptr<ByteSource>>> open_captured_lines(const std::filesystem::path& capture,
-                                                                     const std::vector<CapturedLine>& lines) {
+                                                                     const std::vector<CapturedLine>& lines,
+                                                                     Reading reading) {
   auto reader = CaptureReader::open(capture);
   if (!reader) return tl::unexpected<Error>(reader.error());
   std::vector<std::string> devices;
   for (const auto& line : lines) devices.push_back(line.device);
-  const auto shared = std::make_shared<SharedReads>(std::move(*reader), devices);
+  const auto shared = std::make_shared<SharedReads>(reads_of(std::move(*reader), reading), devices);
   std::vector<std::unique_ptr<ByteSource>> sources;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     sources.push_back(

@@ -48,9 +48,14 @@ struct CapturedLine {
   std::uint64_t bytes = 0;
 };
 
+/// Who reads a recording: the thread that asks for the bytes, or another one ahead of it, where the recording
+/// can be read so. What is read is the same.
+enum class Reading : std::uint8_t { kWhenAsked, kAhead };
+
 /// The reads of several devices by one pass over the capture, for those who go through them side by side; a
 /// device may be named twice. One that is asked for far ahead of the others reads the capture by itself.
 Result<std::vector<std::unique_ptr<ByteSource>>> open_captured_lines(const std::filesystem::path& capture,
-                                                                     const std::vector<CapturedLine>& lines);
+                                                                     const std::vector<CapturedLine>& lines,
+                                                                     Reading reading);
 
 }  // namespace imuscope

@@ -28,16 +28,18 @@ constexpr UtcTime kNoClock = utc_time_from_ns(946'684'800'000'000'000);
 
 using Sources = Result<std::vector<std::unique_ptr<ByteSource>>>;
 
-/// One after the other, of a recording in several files.
-Sources open_each(const OpenSource& open, const std::vector<bool>& present) {
-  std::vector<std::unique_ptr<ByteSource>> sources(present.size());
-  for (std::size_t i = 0; i < present.size(); ++i) {
-    if (!present[i]) continue;
-    auto source = open(static_cast<DeviceIndex>(i));
-    if (!source) return tl::unexpected<Error>(source.error());
-    sources[i] = std::move(*source);
-  }
-  return sources;
+/// Of a recording in several files, each by itself; nobody reads them ahead.
+std::function<Sources(Reading)> one_by_one(const Recording& recording) {
+  return [open = recording.open, present = recording.present](Reading) -> Sources {
+    std::vector<std::unique_ptr<ByteSource>> sources(present.size());
+    for (std::size_t i = 0; i < present.size(); ++i) {
+      if (!present[i]) continue;
+      auto source = open(static_cast<DeviceIndex>(i));
+      if (!source) return tl::unexpected<Error>(source.error());
+      sources[i] = std::move(*source);
+    }
+    return sources;
+  };
 }
 
 class SampleCollector final : public SampleSink {
@@ -317,6 +319,7 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   }
   opened.remarks.insert(opened.remarks.end(), recording.damage.begin(), recording.damage.end());
   recording.open = open_plain(configuration, *files, std::move(bags));
+  recording.open_side_by_side = one_by_one(recording);
   const bool has_log = std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.has_value(); });
   if (findings != nullptr && !has_log) *findings = look_at_dumps(configuration, recording, unstamped);
   auto clocks = align_clocks(configuration, unstamped, [&](DeviceIndex index) -> Result<std::vector<Sample>> {
@@ -330,6 +333,7 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   if (auto aligned = LogAlignment(configuration, inputs, *files, logs, progress, opened).run(); !aligned) {
     return tl::unexpected<Error>(aligned.error());
   }
+  recording.open_side_by_side = one_by_one(recording);
   if (findings != nullptr && has_log)
     *findings = look_at_recording(configuration, recording, std::vector<bool>(n));
   for (std::size_t i = 0; i < n; ++i) {
@@ -337,9 +341,6 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
     opened.remarks.push_back(fmt::format("{}: times from {}, {:+.3f} s", configuration.devices[i].name,
                                          recording.clocks[i].how, recording.clocks[i].shift_s));
   }
-  recording.open_side_by_side = [open = recording.open, present = recording.present] {
-    return open_each(open, present);
-  };
   opened.configuration = std::move(configuration);
   return opened;
 }
@@ -421,12 +422,13 @@ Result<OpenedRecording> open_capture(const std::string& input,
   recording.open = [input, names, bytes](DeviceIndex index) {
     return open_captured_device(input, names[index], bytes[index]);
   };
-  recording.open_side_by_side = [input, names, bytes, present = recording.present]() -> Sources {
+  recording.open_side_by_side = [input, names, bytes,
+                                 present = recording.present](Reading reading) -> Sources {
     std::vector<CapturedLine> lines;
     for (std::size_t i = 0; i < names.size(); ++i) {
       if (present[i]) lines.push_back({names[i], bytes[i]});
     }
-    auto opened_lines = open_captured_lines(input, lines);
+    auto opened_lines = open_captured_lines(input, lines, reading);
     if (!opened_lines) return tl::unexpected<Error>(opened_lines.error());
     std::vector<std::unique_ptr<ByteSource>> sources(names.size());
     auto next = opened_lines->begin();

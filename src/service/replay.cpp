@@ -142,13 +142,14 @@ class Replayer {
 
  private:
   Result<void> open() {
+    // All devices in the order of their arrivals: one pass over a capture serves them all.
+    auto sources = recording_.open_side_by_side(options_.reading);
+    if (!sources) return tl::unexpected<Error>(sources.error());
     for (std::size_t i = 0; i < feeds_.size(); ++i) {
       if (!recording_.present[i]) continue;
       const auto index = static_cast<DeviceIndex>(i);
-      auto source = recording_.open(index);
-      if (!source) return tl::unexpected<Error>(source.error());
       feeds_[i] = std::make_unique<Feed>(
-          std::move(*source), make_decoder(configuration_.devices[i], index, recording_.clocks[i].map),
+          std::move((*sources)[i]), make_decoder(configuration_.devices[i], index, recording_.clocks[i].map),
           RingSink(core_.ring(index), refused(index), options_.on_sample));
       if (auto started = feeds_[i]->start(); !started) return started;
     }

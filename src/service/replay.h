@@ -48,7 +48,7 @@ struct Recording {
   OpenSource open;
   /// The same of all devices, null for those that are not present, by one pass where the recording is one
   /// file: for those who go through them side by side.
-  std::function<Result<std::vector<std::unique_ptr<ByteSource>>>()> open_side_by_side;
+  std::function<Result<std::vector<std::unique_ptr<ByteSource>>>(Reading)> open_side_by_side;
   std::vector<bool> present;                 ///< per device of the configuration
   std::vector<DeviceClock> clocks;           ///< per device
   std::optional<RecordedSchedule> schedule;  ///< of a capture of a live run
@@ -86,6 +86,7 @@ struct ReplayOptions {
   bool realtime = false;                 ///< paced as recorded
   std::function<void(double)> progress;  ///< share of the bytes read, 0 to 1; called now and then
   HistorySink* history = nullptr;
+  Reading reading = Reading::kWhenAsked;
   /// Sees every sample as it was decoded, device by device in stream order; may be empty.
   std::function<void(const Sample&)> on_sample;
 };

@@ -65,6 +65,7 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   for (const auto& file : of_a_study) (*folder)->folder().remove(file);
   ReplayOptions replay_options;
   replay_options.realtime = options.realtime;
+  replay_options.reading = Reading::kAhead;
   replay_options.progress = options.progress;
   const auto spec = noise::parse_model(configuration.noise.model);
   if (!spec) return tl::unexpected<Error>(spec.error());

@@ -2,30 +2,27 @@
 
 #include <cerrno>
 #include <cstring>
-#include <type_traits>
 
 namespace imuscope {
 
-static_assert(std::is_trivially_copyable_v<ErrorRow>);
-
-Result<RowSpool> RowSpool::create(const OutputFolder& folder) {
+Result<ScratchRecords> ScratchRecords::create(const OutputFolder& folder, std::size_t record_bytes) {
   auto scratch = folder.scratch_file();
   if (!scratch) return tl::unexpected<Error>(scratch.error());
   std::FILE* file = ::fdopen(scratch->get(), "w+b");
   if (file == nullptr) return work_error(folder.path().string() + ": " + std::strerror(errno));
   (void)scratch->release();
-  return RowSpool(file);
+  return ScratchRecords(file, record_bytes);
 }
 
-void RowSpool::add(const ErrorRow& row) noexcept {
-  whole_ = std::fwrite(&row, sizeof row, 1, file_.get()) == 1 && whole_;
+void ScratchRecords::add(const void* record) noexcept {
+  whole_ = std::fwrite(record, record_bytes_, 1, file_.get()) == 1 && whole_;
 }
 
-void RowSpool::rewind() {
+void ScratchRecords::rewind() {
   whole_ = std::fflush(file_.get()) == 0 && whole_;
   std::rewind(file_.get());
 }
 
-bool RowSpool::next(ErrorRow& row) { return std::fread(&row, sizeof row, 1, file_.get()) == 1; }
+bool ScratchRecords::next(void* record) { return std::fread(record, record_bytes_, 1, file_.get()) == 1; }
 
 }  // namespace imuscope

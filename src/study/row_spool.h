@@ -1,10 +1,13 @@
 #pragma once
 
-/// Error rows of one S-IMU on their way through several passes: kept in a file of the run folder that has no
-/// name any more, so that memory does not grow with the drive and nothing is left behind.
+/// What a pass over the recording makes of its samples, on its way through further passes: kept in a file of
+/// the run folder that has no name any more, so that memory does not grow with the drive and nothing is left
+/// behind.
 
+#include <cstddef>
 #include <cstdio>
 #include <memory>
+#include <type_traits>
 
 #include "base/output_folder.h"
 #include "base/result.h"
@@ -12,26 +15,68 @@
 
 namespace imuscope {
 
-class RowSpool final : public ErrorRowSource {
+/// Records of one size, first written and then read.
+class ScratchRecords {
  public:
   /// Errors (kWork): no file can be made in `folder`.
-  static Result<RowSpool> create(const OutputFolder& folder);
+  static Result<ScratchRecords> create(const OutputFolder& folder, std::size_t record_bytes);
 
-  void add(const ErrorRow& row) noexcept;
-  /// False once a row could not be kept (disk full): what is read then is not the whole.
+  void add(const void* record) noexcept;
+  /// False once a record could not be kept (disk full): what is read then is not the whole.
   [[nodiscard]] bool whole() const noexcept { return whole_; }
-
-  void rewind() override;
-  bool next(ErrorRow& row) override;
+  /// To the first; from here on they are read.
+  void rewind();
+  /// False at the end.
+  bool next(void* record);
 
  private:
   struct Close {
     void operator()(std::FILE* file) const noexcept { (void)std::fclose(file); }
   };
-  explicit RowSpool(std::FILE* file) : file_(file) {}
+  ScratchRecords(std::FILE* file, std::size_t record_bytes) : file_(file), record_bytes_(record_bytes) {}
 
   std::unique_ptr<std::FILE, Close> file_;
+  std::size_t record_bytes_;
   bool whole_ = true;
+};
+
+/// Records of one type.
+template <typename Record>
+class Spool {
+ public:
+  static_assert(std::is_trivially_copyable_v<Record>);
+  static Result<Spool> create(const OutputFolder& folder) {
+    return ScratchRecords::create(folder, sizeof(Record)).map([](ScratchRecords&& records) {
+      return Spool(std::move(records));
+    });
+  }
+  void add(const Record& record) noexcept { records_.add(&record); }
+  [[nodiscard]] bool whole() const noexcept { return records_.whole(); }
+  void rewind() { records_.rewind(); }
+  bool next(Record& record) { return records_.next(&record); }
+
+ private:
+  explicit Spool(ScratchRecords records) : records_(std::move(records)) {}
+  ScratchRecords records_;
+};
+
+/// Error rows of one S-IMU.
+class RowSpool final : public ErrorRowSource {
+ public:
+  /// Errors (kWork): no file can be made in `folder`.
+  static Result<RowSpool> create(const OutputFolder& folder) {
+    return Spool<ErrorRow>::create(folder).map(
+        [](Spool<ErrorRow>&& rows) { return RowSpool(std::move(rows)); });
+  }
+
+  void add(const ErrorRow& row) noexcept { rows_.add(row); }
+  [[nodiscard]] bool whole() const noexcept { return rows_.whole(); }
+  void rewind() override { rows_.rewind(); }
+  bool next(ErrorRow& row) override { return rows_.next(row); }
+
+ private:
+  explicit RowSpool(Spool<ErrorRow> rows) : rows_(std::move(rows)) {}
+  Spool<ErrorRow> rows_;
 };
 
 }  // namespace imuscope

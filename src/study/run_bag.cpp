@@ -538,7 +538,7 @@ class RunBagMaker {
   Result<void> open_streams() {
     const auto& devices = opened_.configuration.devices;
     streams_.resize(devices.size());
-    auto sources = opened_.recording.open_side_by_side();
+    auto sources = opened_.recording.open_side_by_side(Reading::kAhead);
     if (!sources) return tl::unexpected<Error>(sources.error());
     for (std::size_t i = 0; i < devices.size(); ++i) {
       if (!opened_.recording.present[i]) continue;

@@ -7,6 +7,7 @@
 #include "calibration/events.h"
 #include "service/estimator_setup.h"
 #include "study/batch_study.h"
+#include "study/side_by_side.h"
 
 namespace imuscope {
 
@@ -115,6 +116,7 @@ Result<Combination> run_studies(const std::vector<OpenedRecording>& drives, cons
   std::vector<DriveMountings> mountings;
   for (std::size_t i = 0; i < drives.size(); ++i) {
     ReplayOptions replay_options;
+    replay_options.reading = reading_of_study();
     replay_options.progress = [progress = progress_of(i)](double share) { progress("calibration", share); };
     auto found = calibrate(drives[i], drive_folder(options.out, i), replay_options);
     if (!found) return tl::unexpected<Error>(found.error());

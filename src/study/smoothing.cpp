@@ -13,6 +13,7 @@
 #include "calibration/navigation_output.h"
 #include "navigation/so3.h"
 #include "service/live_smoothing.h"
+#include "study/side_by_side.h"
 
 namespace imuscope {
 
@@ -161,6 +162,7 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
   ReplayOptions options;
   options.history = &smoother;
   options.progress = progress;
+  options.reading = reading_of_study();
   const auto replayed =
       replay(configuration, relinearised(estimator, finals, former), recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());

@@ -1,11 +1,12 @@
 #include "study/study.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
 
-#include "error_process/row_low_pass.h"
 #include "service/estimator_setup.h"
 #include "service/models_file.h"
 #include "service/noise_series.h"
@@ -14,55 +15,15 @@
 #include "study/batch_study.h"
 #include "study/dependence_study.h"
 #include "study/dynamics_files.h"
+#include "study/error_pass.h"
 #include "study/noise_study.h"
 #include "study/regime_study.h"
+#include "study/side_by_side.h"
 #include "study/smoothing.h"
 
 namespace imuscope {
 
 namespace {
-
-/// Rows of the last pass: mounting frozen at its final value, the reference compensated with its smoothed
-/// biases, the whole drive covered.
-class ErrorCollector final : public CoreSink {
- public:
-  /// @param former    mountings that the rows leave out; must outlive the collector, as must what follows
-  /// @param rows      one spool an S-IMU
-  /// @param low_pass  one an S-IMU, or none
-  ErrorCollector(const FormerMountings& former, const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows,
-                 std::vector<RowLowPass> low_pass)
-      : former_(former),
-        biases_(biases),
-        rows_(rows),
-        low_pass_(std::move(low_pass)),
-        temperatures_(rows.size()) {}
-
-  void on_epoch(const StudyEpoch& epoch, const TickFacts&) noexcept override {
-    const ReferenceBias bias = biases_.at(epoch.time + from_seconds(epoch.t_d_s));
-    watch_.add(epoch, bias);
-    if ((epoch.sample.flags & kHasTemperature) != 0)
-      temperatures_[epoch.study].add(epoch.time, epoch.sample.temperature_degC);
-    if (!is_final_mounting(former_[epoch.study], epoch.time)) return;
-    ErrorRow row = error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, bias);
-    if (!low_pass_.empty()) low_pass_[epoch.study].apply(row);
-    rows_[epoch.study].add(row);
-  }
-  void on_error(const ErrorRecord&) noexcept override {}
-  void on_event(const EstimatorEvent&) noexcept override {}
-  void on_snapshot(const Snapshot& snapshot) noexcept override { watch_.add(snapshot); }
-  void on_late_sample(const LateSample&) noexcept override {}
-
-  [[nodiscard]] const MotionWatch& watch() const { return watch_; }
-  [[nodiscard]] const std::vector<TemperatureTrack>& temperatures() const { return temperatures_; }
-
- private:
-  const FormerMountings& former_;
-  const ReferenceBiasTrack& biases_;
-  std::vector<RowSpool>& rows_;
-  std::vector<RowLowPass> low_pass_;
-  MotionWatch watch_;
-  std::vector<TemperatureTrack> temperatures_;
-};
 
 /// First pass: everything but errors goes to the folder.
 class CalibrationPass final : public CoreSink {
@@ -87,15 +48,6 @@ class CalibrationPass final : public CoreSink {
   std::vector<std::size_t> studies_;
   FormerMountings former_;
 };
-
-/// The common low-pass of every S-IMU; none where none is configured.
-std::vector<RowLowPass> low_passes(const Configuration& configuration) {
-  std::vector<RowLowPass> filters;
-  if (configuration.error_process.low_pass_hz <= 0.0) return filters;
-  for (const auto index : configuration.study_indices())
-    filters.emplace_back(configuration.devices[index].rate_hz, configuration.error_process.low_pass_hz);
-  return filters;
-}
 
 /// errors_NAME.csv under the names of the regimes, with the scale error; and without it the series for the
 /// noise models and the rows for everything that follows.
@@ -138,6 +90,21 @@ EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& f
 
 std::vector<StudyOutput> final_studies(const Snapshot& last) {
   return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
+}
+
+/// What is taken from the smoothed drive.
+struct SmoothedDrive {
+  std::vector<nlohmann::json> means;  ///< weighted, of each S-IMU's mounting
+  ReferenceBiasTrack biases;
+};
+
+Result<SmoothedDrive> smoothed_drive(const SmoothedTrack& track, const std::vector<StudyOutput>& finals,
+                                     const FormerMountings& former) {
+  auto means = weighted_means(track, finals, former);
+  if (!means) return tl::unexpected<Error>(means.error());
+  auto biases = ReferenceBiasTrack::of(track);
+  if (!biases) return tl::unexpected<Error>(biases.error());
+  return SmoothedDrive{std::move(*means), std::move(*biases)};
 }
 
 /// The drive's own mountings, replaced by those that several drives settled.
@@ -236,6 +203,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
 
   CalibrationPass first(**folder, configuration);
   ReplayOptions replay_options;
+  replay_options.reading = reading_of_study();
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
   BatchRecords records(configuration);
@@ -243,7 +211,6 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     replay_options.on_sample = [&records](const Sample& sample) { records.add(sample); };
   const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
   if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
-  replay_options.on_sample = nullptr;
   if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
   Snapshot last = *(*folder)->last_snapshot();
   const auto infos = study_file_infos(configuration, recording);
@@ -269,45 +236,49 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
   }
 
-  const RecordStorage storage{Smoother::kMemory_bytes, options.out};
-  const auto track =
-      smooth_drive(configuration, estimator, recording, finals, former, storage, [&](double share) {
-        if (options.progress) options.progress("smoothing", share);
-      });
-  if (!track) return tl::unexpected<Error>(track.error());
-  if (auto written = write_smoothed(*track, last, (*folder)->utc(), former, infos, (*folder)->folder());
-      !written)
-    return written;
-  const auto means = weighted_means(*track, finals, former);
-  if (!means) return tl::unexpected<Error>(means.error());
-  const auto biases = ReferenceBiasTrack::of(*track);
-  if (!biases) return tl::unexpected<Error>(biases.error());
-
   const auto settled = with_settled(finals, infos, options.mountings);
+  auto epochs = EpochGatherer::create((*folder)->folder(), finals.size());
+  if (!epochs) return tl::unexpected<Error>(epochs.error());
+  const auto smooth = [&]() -> Result<SmoothedDrive> {
+    const RecordStorage storage{Smoother::kMemory_bytes, options.out};
+    const auto track =
+        smooth_drive(configuration, estimator, recording, finals, former, storage, [&](double share) {
+          if (options.progress) options.progress("smoothing", share);
+        });
+    if (!track) return tl::unexpected<Error>(track.error());
+    if (auto written = write_smoothed(*track, last, (*folder)->utc(), former, infos, (*folder)->folder());
+        !written)
+      return tl::unexpected<Error>(written.error());
+    return smoothed_drive(*track, finals, former);
+  };
+  // The filter with every mounting known needs no smoothed bias: both passes side by side.
+  Result<SmoothedDrive> smoothed;
+  Result<ReplayResult> second;
+  tbb::parallel_invoke(
+      [&] { smoothed = smooth(); },
+      [&] { second = replay(configuration, frozen(estimator, settled), recording, *epochs); });
+  if (!smoothed) return tl::unexpected<Error>(smoothed.error());
+  if (!second) return tl::unexpected<Error>(second.error());
+  if (options.progress) options.progress("error process", 0.0);
   auto rows = make_spools(finals.size(), (*folder)->folder());
   if (!rows) return tl::unexpected<Error>(rows.error());
-  ErrorCollector collector(former, *biases, *rows, low_passes(configuration));
-  if (options.progress)
-    replay_options.progress = [&](double share) { options.progress("error process", share); };
-  const auto second = replay(configuration, frozen(estimator, settled), recording, collector, replay_options);
-  if (!second) return tl::unexpected<Error>(second.error());
+  if (auto made = epochs->make_rows(configuration, former, smoothed->biases, *rows); !made) return made;
 
   const HostTime origin = last.first_reference_time;
   const UtcTrack& utc = (*folder)->utc();
   const auto labels = labels_of_run(options.labels, origin, [&](UtcTime time) { return utc.time_of(time); });
   if (!labels) return tl::unexpected<Error>(labels.error());
-  auto regimes = find_regimes(configuration.regimes, collector.watch(), *labels, recording.moments, origin);
+  auto regimes = find_regimes(configuration.regimes, epochs->watch(), *labels, recording.moments, origin);
   if (!regimes) return tl::unexpected<Error>(regimes.error());
   auto studied = make_spools(finals.size(), (*folder)->folder());
   if (!studied) return tl::unexpected<Error>(studied.error());
-  std::vector<NoiseSeries> series;
-  for (std::size_t i = 0; i < finals.size(); ++i) {
+  std::vector<NoiseSeries> series(finals.size());
+  tbb::parallel_for(std::size_t{0}, finals.size(), [&](std::size_t i) {
     const ScaleError scale = configuration.noise.remove_scale_error
                                  ? ScaleError{settled[i].gyro_scale, settled[i].accel_scale}
                                  : ScaleError{};
-    series.push_back(
-        write_errors({i, origin, {}, {}, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]));
-  }
+    series[i] = write_errors({i, origin, {}, {}, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]);
+  });
 
   const double run_s = regimes->motion.total_s(0) + regimes->motion.total_s(1);
   for (std::size_t i = 0; i < series.size(); ++i) {
@@ -317,16 +288,27 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   }
 
   const auto& names = regimes->chosen.names();
-  // The regressions need no noise model of the error process: both at once.
+  // The regressions need no noise model of the error process: another thread begins with them at once, as
+  // each of them takes longer than a noise model.
   DynamicsRegressions regressions;
   tbb::task_group beside;
   beside.run([&] { regressions = regressions_of(configuration, *studied, regimes->motion, *spec); });
   const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
     if (options.progress) options.progress("noise models", share);
   });
-  const auto dependence = study_dependence(configuration, series, collector.temperatures(),
-                                           collector.watch().levels(), regimes->motion, noise_study, origin);
   beside.wait();
+  DependenceStudy dependence;
+  nlohmann::json models;
+  nlohmann::json comparison;
+  Result<void> scatter;
+  tbb::parallel_invoke(
+      [&] {
+        dependence = study_dependence(configuration, series, epochs->temperatures(), epochs->watch().levels(),
+                                      regimes->motion, noise_study, origin);
+      },
+      [&] { models = models_json(noise_study); }, [&] { comparison = comparison_json(noise_study, names); },
+      [&] { scatter = write_scatter(configuration, *studied, origin, (*folder)->folder()); });
+  if (!scatter) return scatter;
   auto regime_document = regimes_json(*regimes, origin);
   regime_document["left_out"] = noise_study.left_out;
   for (const std::vector<std::string>& remarks :
@@ -334,18 +316,15 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     run.warnings.insert(run.warnings.end(), remarks.begin(), remarks.end());
   run.static_s = regimes->motion.total_s(0);
   run.dynamic_s = regimes->motion.total_s(1);
-  if (auto written = write_scatter(configuration, *studied, origin, (*folder)->folder()); !written)
-    return written;
-
-  if (auto written =
-          (*folder)->write_calibration(calibration_entries(finals, of_filter, outcomes, infos, *means));
+  if (auto written = (*folder)->write_calibration(
+          calibration_entries(finals, of_filter, outcomes, infos, smoothed->means));
       !written)
     return written;
   if (auto closed = (*folder)->close(); !closed) return closed;
-  if (auto written = write_models((*folder)->folder(), models_json(noise_study)); !written) return written;
+  if (auto written = write_models((*folder)->folder(), models); !written) return written;
   const std::pair<const char*, nlohmann::json> documents[] = {
       {"regimes.json", std::move(regime_document)},
-      {"comparison.json", comparison_json(noise_study, names)},
+      {"comparison.json", std::move(comparison)},
       {"dependence.json", dependence.document},
       {"vibration.json", {{"schema", "imuscope.vibration/1"}, {"lines", noise_study.lines}}},
       {"regression.json",

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -55,6 +56,34 @@ TEST(WaveletVariance, AgreesWithItsDefinitionOnWhiteNoiseOfOddLength) {
   for (const auto& level : wv->levels) {
     EXPECT_LT(relative(level.value, by_definition(x, level.level)), 1e-13) << "level " << level.level;
     EXPECT_EQ(level.n_coefficients, x.size() - (std::size_t{1} << static_cast<unsigned>(level.level)) + 1);
+  }
+}
+
+/// The same by sums from the beginning, in long double: quick for long supports.
+double by_sums(const std::vector<double>& x, int level) {
+  std::vector<long double> sums{0};
+  for (const double value : x) sums.push_back(sums.back() + value);
+  const std::size_t n = std::size_t{1} << static_cast<unsigned>(level - 1);
+  long double squares = 0;
+  for (std::size_t t = 2 * n; t <= x.size(); ++t) {
+    const long double w = (sums[t] - 2 * sums[t - n] + sums[t - 2 * n]) / static_cast<long double>(2 * n);
+    squares += w * w;
+  }
+  return static_cast<double>(squares / static_cast<long double>(x.size() - 2 * n + 1));
+}
+
+TEST(WaveletVariance, LongSupportsThatAreTakenInStripsAgreeWithTheDefinitionWhateverTheLength) {
+  // One sum of 4096 samples beyond the low levels; strips with a row more than others, and with none; strips
+  // narrower than the sums are apart.
+  for (const std::size_t length : {8192U, 8193U, 12'287U, 12'288U, 12'289U, 40'961U, 200'003U}) {
+    const auto x = white(length, 5);
+    const auto wv = haar_wavelet_variance(x);
+    ASSERT_TRUE(wv) << wv.error().text();
+    ASSERT_EQ(wv->levels.size(), static_cast<std::size_t>(std::bit_width(length)) - 1);
+    for (const auto& level : wv->levels) {
+      EXPECT_LT(relative(level.value, by_sums(x, level.level)), 1e-12) << length << ", level " << level.level;
+      EXPECT_EQ(level.n_coefficients, length - (std::size_t{1} << static_cast<unsigned>(level.level)) + 1);
+    }
   }
 }
 

@@ -194,7 +194,8 @@ void add_process(CLI::App& app, Work& chosen) {
   command->add_flag("--json", options->json, "print the summary as JSON");
   command
       ->add_option("--threads", options->threads,
-                   "at most so many at once (default: as many as there are cores)")
+                   "at most so many compute at once (default: as many as there are cores); from 2 on, "
+                   "another reads ahead")
       ->check(CLI::Range(1, kThreadsMax));
   command->add_flag("--force", options->force, "write over a report.html that no run of imuscope made");
   on_chosen(*command, chosen, [options] { return process(*options); });
