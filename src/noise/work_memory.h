@@ -18,16 +18,17 @@ class WorkMemory {
  public:
   /// Throws std::bad_alloc, as a vector does.
   explicit WorkMemory(std::size_t doubles) {
-    constexpr std::size_t kLine = 64;
     constexpr std::size_t kLargePage = std::size_t{2} << 20U;
     const std::size_t wanted = doubles * sizeof(double);
-    const std::size_t unit = wanted >= 2 * kLargePage ? kLargePage : kLine;
-    const std::size_t bytes = (wanted / unit + 1) * unit;
-    memory_.reset(static_cast<double*>(std::aligned_alloc(unit, bytes)));
+    const bool is_large = wanted >= 2 * kLargePage;
+    const std::size_t bytes = is_large ? (wanted / kLargePage + 1) * kLargePage : wanted;
+    // The library keeps small memory for the next call, but not where it was asked to align it.
+    memory_.reset(
+        static_cast<double*>(is_large ? std::aligned_alloc(kLargePage, bytes) : std::malloc(bytes)));
     if (!memory_) throw std::bad_alloc();
 #if defined(__linux__)
     // Advice: where it is not taken, the memory is as good.
-    if (unit == kLargePage) (void)madvise(memory_.get(), bytes, MADV_HUGEPAGE);
+    if (is_large) (void)madvise(memory_.get(), bytes, MADV_HUGEPAGE);
 #endif
   }
   [[nodiscard]] double* data() const noexcept { return memory_.get(); }
