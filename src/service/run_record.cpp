@@ -254,6 +254,14 @@ void warn_of_no_navigation(const Configuration& configuration, const Snapshot& l
                   configuration.devices[*gnss].name, why));
 }
 
+/// The likeliest reason why good positions are refused, where it is one.
+const char* taken_for_navigation_grade(const Configuration& configuration) {
+  const ImuNoiseConfig& noise = configuration.devices[configuration.reference_index()].noise;
+  if (noise.gyro_white_sd_radps && noise.gyro_bias_sd_radps) return "";
+  return "without [device.noise] the reference is taken for one of navigation grade: if it is not, write what "
+         "its data sheet says; else ";
+}
+
 }  // namespace
 
 std::vector<std::string> warnings_of(const Configuration& configuration, const Snapshot& last) {
@@ -261,11 +269,11 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
   const EstimatorCounters& counters = last.counters;
   if (const auto gnss = configuration.gnss_index(); gnss && contradicts_motion(counters)) {
     warnings.push_back(fmt::format(
-        "{}: {} of {} positions were refused, as they contradict the motion; check whose clock its "
+        "{}: {} of {} positions were refused, as they contradict the motion; {}check whose clock its "
         "times are of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, "
-        "and do not trust this run before",
+        "and do not trust this run's navigation before",
         configuration.devices[*gnss].name, counters.gnss_positions_rejected,
-        counters.gnss_used + counters.gnss_rejected));
+        counters.gnss_used + counters.gnss_rejected, taken_for_navigation_grade(configuration)));
   }
   warn_of_host_seconds(last, warnings);
   warn_of_no_navigation(configuration, last, warnings);
