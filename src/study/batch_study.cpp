@@ -31,6 +31,10 @@ constexpr double kShownShare = 0.5;
 constexpr double kInconsistencyTold = 2.0;
 /// Axes that lean by so many sd of their class are worth a sentence.
 constexpr double kBeyondClass = 5.0;
+/// A mount that turns by this under hard braking is worth a sentence: half of what is still usable.
+constexpr double kHardBraking_mps2 = 5.0;
+constexpr double kTurnTold_rad = 0.05 * kRadPerDeg;
+constexpr double kSureSds = 5.0;
 /// A band that differs from a rigid body by this (half a degree) is worth a sentence.
 constexpr double kDeviationTold = 0.01;
 
@@ -333,6 +337,7 @@ nlohmann::json batch_json(const batch::BatchMounting& mounting) {
       {"C_gyro_accel", matrix_of(sensor.C_s_accel())},
       {"g_sensitivity_radps_per_mps2", matrix_of(sensor.g_sensitivity())},
       {"flexure_at_5_hz", matrix_of(sensor.flexure())},
+      {"mount_turn_rad_per_mps2", matrix_of(sensor.compliance())},
       {"share_of_sensor_psi_r", shares_json(mounting.limits.sensor)},
       {"share_of_reference_psi_r", shares_json(mounting.limits.reference)},
       {"shared_psi_r", estimate_of(mounting).shared_psi_r},
@@ -381,6 +386,13 @@ std::string batch_remark(const std::string& name, const batch::BatchMounting& mo
         "sheets allow: which of the two are crooked no drive of theirs tells, and the boresight is about the "
         "axes that the reference's gyroscopes have",
         name, leaning_rad * kDegPerRad);
+  }
+  const double yields = mounting.sensor.compliance().rowwise().norm().maxCoeff();
+  if (yields * kHardBraking_mps2 > kTurnTold_rad && yields > kSureSds * mounting.sd(batch::kCompliance)) {
+    return fmt::format(
+        "{}: its gyroscopes answer to forces as on a mount that turns by {:.2g} deg when the vehicle brakes "
+        "hard; the mounting is that without forces, but fasten it more stiffly",
+        name, yields * kHardBraking_mps2 * kDegPerRad);
   }
   const auto loose =
       std::find_if(mounting.bands.begin(), mounting.bands.end(),
