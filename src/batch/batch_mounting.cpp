@@ -61,23 +61,24 @@ Eigen::RowVectorXd mean_of(const Eigen::Ref<const Eigen::MatrixXd>& series, cons
   return n > 0.0 ? Eigen::RowVectorXd(sum / n) : sum;
 }
 
-/// Products of the columns of a vector's series: xx, yy, zz, xy, xz, yz.
-Eigen::MatrixXd products(const Eigen::Ref<const Eigen::MatrixX3d>& v) {
-  Eigen::MatrixXd out(v.rows(), 6);
-  const auto x = v.col(0).array();
-  const auto y = v.col(1).array();
-  const auto z = v.col(2).array();
-  out << x * x, y * y, z * z, x * y, x * z, y * z;
-  return out;
-}
-
 Eigen::MatrixXd reference_series(const Grid& grid, const Eigen::RowVectorXd& mean) {
   Eigen::MatrixXd series(grid.motion.rows(), kReferenceColumns);
   series.leftCols<6>() = grid.motion.rowwise() - mean;
   series.middleCols<3>(kOmegaDot) = grid.omega_dot;
-  series.middleCols<6>(kProducts) = products(grid.motion.leftCols<3>());
-  series.middleCols<6>(kForceProducts) = products(grid.motion.rightCols<3>());
-  series.middleCols<6>(kForceProducts).rowwise() -= mean_of(series.middleCols<6>(kForceProducts), grid.valid);
+  const auto x = grid.motion.col(0).array();
+  const auto y = grid.motion.col(1).array();
+  const auto z = grid.motion.col(2).array();
+  series.col(kProducts) = x * x;
+  series.col(kProducts + 1) = y * y;
+  series.col(kProducts + 2) = z * z;
+  series.col(kProducts + 3) = x * y;
+  series.col(kProducts + 4) = x * z;
+  series.col(kProducts + 5) = y * z;
+  for (Eigen::Index i = 0; i < 9; ++i) {
+    auto column = series.col(kForceProducts + i);
+    column = grid.motion.col(3 + i / 3).cwiseProduct(series.col(kForce + i % 3));
+    column.array() -= mean_of(column, grid.valid)[0];
+  }
   return series;
 }
 

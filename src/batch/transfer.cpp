@@ -14,15 +14,7 @@ Matrix3c skew_c(const Vector3c& v) {
 
 namespace {
 
-/// xx, yy, zz, xy, xz, yz as a matrix.
-template <typename Row>
-Matrix3c symmetric(const Row& p) {
-  Matrix3c m;
-  m << p[0], p[3], p[4], p[3], p[1], p[5], p[4], p[5], p[2];
-  return m;
-}
-
-/// B-8a: what the turned mount makes of the forces, f x (S f), in b.
+/// B-8a: what the turned mount makes of the forces, f x (S (f - f_0)), in b.
 Vector3c of_turned_mount(const Transfer& t, const Motion& motion) {
   const Matrix3c product = motion.force_products * t.compliance_b.transpose();
   return {product(1, 2) - product(2, 1), product(2, 0) - product(0, 2), product(0, 1) - product(1, 0)};
@@ -36,9 +28,11 @@ Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k) 
   motion.omega = row.segment<3>(kOmega).transpose();
   motion.f = row.segment<3>(kForce).transpose();
   motion.arm = skew_c(row.segment<3>(kOmegaDot).transpose());
-  const Matrix3c outer = symmetric(row.segment<6>(kProducts));
+  const auto p = row.segment<6>(kProducts);
+  Matrix3c outer;
+  outer << p[0], p[3], p[4], p[3], p[1], p[5], p[4], p[5], p[2];
   motion.arm += outer - outer.trace() * Matrix3c::Identity();
-  motion.force_products = symmetric(row.segment<6>(kForceProducts));
+  for (Eigen::Index i = 0; i < 3; ++i) motion.force_products.row(i) = row.segment<3>(kForceProducts + 3 * i);
   return motion;
 }
 

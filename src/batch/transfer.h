@@ -26,8 +26,8 @@ enum ReferenceColumn : Eigen::Index {
   kForce = 3,
   kOmegaDot = 6,
   kProducts = 9,        ///< omega_i omega_j: xx, yy, zz, xy, xz, yz
-  kForceProducts = 15,  ///< f_i f_j, with gravity in f, less its mean: xx, yy, zz, xy, xz, yz
-  kReferenceColumns = 21,
+  kForceProducts = 15,  ///< 9: f_i (f_j - its mean), with gravity in f, less its mean; row-major
+  kReferenceColumns = 24,
 };
 
 /// The body's motion in one window at one frequency.
@@ -37,7 +37,7 @@ struct Motion {
   Matrix3c arm;  ///< acceleration of a point of the body per metre of its lever arm: [omega' x] + omega
                  ///< omega' - |omega|^2 (B-6)
 
-  Matrix3c force_products;  ///< f f', with gravity in f
+  Matrix3c force_products;  ///< f (f - f_0)', with gravity in f; f_0: its mean
 
   [[nodiscard]] Vector3c force_at(const Eigen::Vector3d& lever_arm_m) const {
     return f + arm * lever_arm_m.cast<std::complex<double>>();

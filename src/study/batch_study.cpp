@@ -391,7 +391,7 @@ std::string batch_remark(const std::string& name, const batch::BatchMounting& mo
   if (yields * kHardBraking_mps2 > kTurnTold_rad && yields > kSureSds * mounting.sd(batch::kCompliance)) {
     return fmt::format(
         "{}: its gyroscopes answer to forces as on a mount that turns by {:.2g} deg when the vehicle brakes "
-        "hard; the mounting is that without forces, but fasten it more stiffly",
+        "hard; the mounting is that in the mean, but fasten it more stiffly",
         name, yields * kHardBraking_mps2 * kDegPerRad);
   }
   const auto loose =

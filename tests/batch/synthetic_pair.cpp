@@ -96,7 +96,7 @@ Pair make_pair(const PairOptions& o, std::uint64_t seed) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       const Vector3d arm = o.r_bs_b_m + o.C_b_s.transpose() * o.places_s_m.row(axis).transpose();
       const Vector3d force = force_at(body, t + o.accel_delay_s, arm);
-      const Vector3d turn = o.compliance_b * body.force(t + o.accel_delay_s);
+      const Vector3d turn = o.compliance_b * (body.force(t + o.accel_delay_s) - Vector3d(0.0, 0.0, -9.81));
       accel[axis] += (o.accel_matrix * o.C_b_s * (force + force.cross(turn)))[axis];
     }
     if (uniform(random) < o.lost_share) continue;

@@ -31,7 +31,7 @@ struct PairOptions {
   double motion = 1.0;      ///< factor of all rates and forces but gravity
   bool turns = true;        ///< false: the body never turns
   double lost_share = 0.0;  ///< of the S-IMU's samples, singly
-  /// How far the S-IMU's mount turns under forces, in b, rad per m/s^2.
+  /// How far the S-IMU's mount turns under other forces than gravity's, in b, rad per m/s^2.
   Eigen::Matrix3d compliance_b = Eigen::Matrix3d::Zero();
 };
 
