@@ -1,7 +1,7 @@
 #pragma once
 
 /// A capture read in a thread of its own, some thousand reads ahead of those who use them. What comes out,
-/// and in which order, is what the reader itself would give. Soft world: threads, a lock, allocates.
+/// and in which order, is what the reader itself would give. Non-real-time: threads, a lock, allocates.
 
 #include <condition_variable>
 #include <cstddef>

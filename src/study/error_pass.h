@@ -55,7 +55,7 @@ class EpochGatherer final : public CoreSink {
 
   /// Second step: the rows of each S-IMU from its last mounting on, and the motion of the whole drive.
   /// @param former  mountings that the rows leave out
-  /// @param rows    one spool a S-IMU
+  /// @param rows    one spool an S-IMU
   /// Errors (kWork): the disk had no room for the epochs.
   [[nodiscard]] Result<void> make_rows(const Configuration& configuration, const FormerMountings& former,
                                        const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows);
