@@ -129,6 +129,7 @@ ReferenceNoise::ReferenceNoise(
   const auto n_windows = static_cast<Eigen::Index>(plan.starts.size());
   const Transfer t(sensor, DeviationVector::Zero());
   std::array<std::vector<Told>, 2> told;
+  shown_.resize(n_windows * bands.size(), 2);
   for (Eigen::Index band = 0; band < bands.size(); ++band) {
     const double values = 3.0 * static_cast<double>(bands.width(band)) / kWindowsPerInstant;
     std::array<BandRegression, 2> regressions;
@@ -146,6 +147,7 @@ ReferenceNoise::ReferenceNoise(
       }
       motion_power /= values;
       against /= values;
+      shown_.row(w * bands.size() + band) = motion_power.transpose();
       for (Eigen::Index triad = 0; triad < 2; ++triad) {
         const Parts parts = parts_of(noise, w, band, triad);
         const double claimed = noise.claimed(band);
@@ -185,7 +187,8 @@ Eigen::Vector2d ReferenceNoise::power(const NoiseBands& noise, Eigen::Index wind
     const Parts parts = parts_of(noise, window, band, triad);
     power[triad] = of_record_(band, triad) * parts.record + of_excess_(band, triad) * parts.excess;
   }
-  return power;
+  if (shown_.rows() == 0) return power;
+  return power.cwiseMin(shown_.row(window * of_record_.rows() + band).transpose());
 }
 
 Eigen::Vector2d ReferenceNoise::mean_share(const NoiseBands& noise, Eigen::Index band) const {

@@ -45,6 +45,8 @@ class ReferenceNoise {
   Eigen::MatrixX2d of_excess_;
   Eigen::MatrixX2d of_record_sd_;
   Eigen::MatrixX2d of_excess_sd_;
+  /// Window by window, band by band: what the reference shows, which its noise is no more than. Empty: no bound.
+  Eigen::MatrixX2d shown_;
 };
 
 }  // namespace imuscope::batch
