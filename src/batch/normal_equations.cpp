@@ -83,17 +83,29 @@ struct Weight {
   Vector6 power;
 };
 
-/// @param power    of the residual, by axis
-/// @param of_gyros, of_accels  of the reference's noise in it; the latter with what the gyros' noise makes of
-///                             accelerations at the lever arm
+/// Power of the reference's noise at one frequency, mean over axes, where both triads agree on it (B-10c).
+struct ReferencePower {
+  double gyro;
+  double accel;
+};
+/// @param of_gyros   as the gyros' residual tells it
+/// @param of_accels  as the accelerometers' does, with what the gyros' noise makes of accelerations at the
+///                   lever arm
+ReferencePower reference_power(const Transfer& t, double of_gyros, double of_accels, double frequency_hz) {
+  const double omega = std::abs(derivative(frequency_hz));
+  const double arm_gain = omega * omega * (t.accel * skew(t.arm_b_m)).squaredNorm() / 3.0;
+  if (arm_gain * of_gyros > of_accels) return {of_accels / arm_gain, 0.0};
+  return {of_gyros, of_accels - arm_gain * of_gyros};
+}
+
+/// @param power  of the residual, by axis
 Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, double of_accels, bool forces_tell,
                  double frequency_hz) {
   Weight weight;
   weight.power = power;
-  const double omega = std::abs(derivative(frequency_hz));
-  const double at_arm = omega * omega * (t.accel * skew(t.arm_b_m)).squaredNorm() / 3.0 * of_gyros;
-  weight.reference_power.head<3>().setConstant(of_gyros);
-  weight.reference_power.tail<3>().setConstant(std::max(0.0, of_accels - at_arm));
+  const ReferencePower of_reference = reference_power(t, of_gyros, of_accels, frequency_hz);
+  weight.reference_power.head<3>().setConstant(of_reference.gyro);
+  weight.reference_power.tail<3>().setConstant(of_reference.accel);
   weight.of_reference.setZero();
   weight.of_reference.topLeftCorner<3, 3>() = t.gyro.cast<complex<double>>();
   weight.of_reference.bottomRightCorner<3, 3>() = t.accel.cast<complex<double>>();

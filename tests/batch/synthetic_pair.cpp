@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <span>
+#include <vector>
 
 namespace synthetic {
 
@@ -20,8 +22,10 @@ struct Sine {
 
 /// Rates below 3 Hz and forces below 4 Hz of a car on a winding, uneven road.
 struct Body {
+  const Vector3d kAboveAxle_m{0.1, 0.0, -0.5};
   std::array<Sine, 14> rates;
   std::array<Sine, 14> forces;
+  std::vector<Sine> road;  ///< rates; the forces that go with them are those of a point above the axle
 
   Body(const PairOptions& options, std::mt19937_64& random) {
     std::uniform_real_distribution<double> phase(0.0, 6.28);
@@ -35,19 +39,28 @@ struct Body {
       forces[i] = {options.motion * 0.4 * Vector3d(normal(random), normal(random), normal(random)),
                    6.283185307179586 * f_hz * 1.07, phase(random)};
     }
+    if (options.road_rate == 0.0) return;
+    for (int i = 0; i < 40; ++i) {
+      const Vector3d amplitude(normal(random), normal(random), 0.2 * normal(random));
+      road.push_back({options.road_rate * amplitude, 6.283185307179586 * (1.03 + 0.2 * i), phase(random)});
+    }
   }
-  [[nodiscard]] Vector3d omega(double t) const { return sum(rates, t, 0); }
-  [[nodiscard]] Vector3d omega_dot(double t) const { return sum(rates, t, 1); }
-  [[nodiscard]] Vector3d force_dot(double t) const { return sum(forces, t, 1); }
-  [[nodiscard]] Vector3d force(double t) const { return Vector3d(0.0, 0.0, -9.81) + sum(forces, t, 0); }
+  [[nodiscard]] Vector3d omega(double t) const { return sum(rates, t, 0) + sum(road, t, 0); }
+  [[nodiscard]] Vector3d omega_dot(double t) const { return sum(rates, t, 1) + sum(road, t, 1); }
+  [[nodiscard]] Vector3d force_dot(double t) const {
+    return sum(forces, t, 1) + sum(road, t, 2).cross(kAboveAxle_m);
+  }
+  [[nodiscard]] Vector3d force(double t) const {
+    return Vector3d(0.0, 0.0, -9.81) + sum(forces, t, 0) + sum(road, t, 1).cross(kAboveAxle_m);
+  }
 
  private:
-  static Vector3d sum(const std::array<Sine, 14>& sines, double t, int derivative) {
+  static Vector3d sum(std::span<const Sine> sines, double t, int derivative) {
+    constexpr double kQuarter = 1.5707963267948966;
     Vector3d total = Vector3d::Zero();
-    for (const Sine& s : sines) {
-      total += derivative == 0 ? Vector3d(s.amplitude * std::sin(s.omega * t + s.phase))
-                               : Vector3d(s.amplitude * s.omega * std::cos(s.omega * t + s.phase));
-    }
+    for (const Sine& s : sines)
+      total += s.amplitude * std::pow(s.omega, derivative) *
+               std::sin(s.omega * t + s.phase + derivative * kQuarter);
     return total;
   }
 };

@@ -29,6 +29,7 @@ struct PairOptions {
   double study_gyro_white = 2e-4;
   double study_accel_white = 2e-3;
   double motion = 1.0;      ///< factor of all rates and forces but gravity
+  double road_rate = 0.0;   ///< an uneven road's part above 1 Hz, rad/s each of forty lines to 9 Hz
   bool turns = true;        ///< false: the body never turns
   double lost_share = 0.0;  ///< of the S-IMU's samples, singly
   /// How far the S-IMU's mount turns under other forces than gravity's, in b, rad per m/s^2.
