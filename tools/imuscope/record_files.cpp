@@ -33,8 +33,12 @@ std::size_t place_of(const std::string& axis) {
   return static_cast<std::size_t>(std::find(kAxisOrder.begin(), kAxisOrder.end(), axis) - kAxisOrder.begin());
 }
 
-/// Mean of what is there.
+/// Mean of what is there; NaN where it cannot be read.
 double mean_of(const certificate::AxisRecord& record) {
+  if (record.fetch) {
+    const auto values = record.fetch();
+    return values ? mean_of({record.name, record.unit, record.rate_hz, *values, record.mask}) : std::nan("");
+  }
   double sum = 0.0;
   double n = 0.0;
   for (std::size_t i = 0; i < record.values.size(); ++i) {
@@ -43,6 +47,17 @@ double mean_of(const certificate::AxisRecord& record) {
     n += 1.0;
   }
   return n > 0.0 ? sum / n : 0.0;
+}
+
+void multiply(certificate::AxisRecord& record, double factor) {
+  if (factor == 1.0) return;
+  for (double& v : record.values) v *= factor;
+  if (!record.fetch) return;
+  record.fetch = [fetch = std::move(record.fetch), factor]() -> Result<std::vector<double>> {
+    auto values = fetch();
+    if (values) std::for_each(values->begin(), values->end(), [factor](double& v) { v *= factor; });
+    return values;
+  };
 }
 
 /// The unit of accelerometers at rest, by the size of gravity, where names do not tell.
@@ -76,7 +91,7 @@ Result<void> units_by_gravity(SensorRecord& sensor, const std::string& file) {
   for (auto& axis : sensor.axes) {
     if (is_gyro_name(axis.name)) continue;
     axis.unit = unit;
-    for (double& v : axis.values) v *= factor;
+    multiply(axis, factor);
   }
   return {};
 }
@@ -124,7 +139,8 @@ Result<noise::SignalUnit> given_unit(const AxisColumn& column, const RecordChoic
 /// What is read of the axes' sources, one a source.
 struct ReadAxes {
   std::vector<Signal> signals;
-  std::vector<double> temperature_c;  ///< empty: none
+  std::vector<certificate::FetchSamples> fetches{};  ///< of raw files that stay where they are; else empty
+  std::vector<float> temperature_c;                  ///< empty: none
 };
 
 /// Columns of one table.
@@ -136,14 +152,40 @@ Result<ReadAxes> read_table(const std::vector<AxisSource>& sources, const std::s
   auto table = read_signals(sources.front().file, choice, columns);
   if (!table) return tl::unexpected(table.error());
   ReadAxes out;
-  if (!temperature.empty()) out.temperature_c = std::move(table->columns.back());
+  if (!temperature.empty())
+    out.temperature_c.assign(table->columns.back().begin(), table->columns.back().end());
   for (std::size_t i = 0; i < sources.size(); ++i)
     out.signals.push_back({std::move(table->columns[i]), table->mask, table->rate_hz});
   return out;
 }
 
+/// Raw files that together are larger are read axis by axis, when they are needed.
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{96} << 20U;
+
+bool are_long(const std::vector<AxisSource>& sources) {
+  std::uintmax_t bytes = 0;
+  for (const AxisSource& source : sources) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(source.file, error);
+    if (!error) bytes += size;
+  }
+  return bytes > kMostBytes;
+}
+
 /// Raw files side by side.
 Result<ReadAxes> read_raw_axes(const std::vector<AxisSource>& sources, const SignalChoice& choice) {
+  if (are_long(sources)) {
+    ReadAxes out;
+    for (const AxisSource& source : sources) {
+      out.signals.push_back({{}, {}, choice.rate_hz});
+      out.fetches.emplace_back([file = source.file, choice]() -> Result<std::vector<double>> {
+        auto signal = read_signal(file, choice);
+        if (!signal) return tl::unexpected(signal.error());
+        return std::move(signal->values);
+      });
+    }
+    return out;
+  }
   std::vector<Result<Signal>> read(sources.size(), work_error("not read"));
   std::transform(std::execution::par, sources.begin(), sources.end(), read.begin(),
                  [&](const AxisSource& source) { return read_signal(source.file, choice); });
@@ -178,9 +220,8 @@ Result<void> take_axes(SensorRecord& sensor, const std::vector<AxisSource>& sour
     axis.rate_hz = *signal.rate_hz;
     axis.values = std::move(signal.values);
     axis.mask = std::move(signal.mask);
-    if (sources[i].column.factor != 1.0) {
-      for (double& v : axis.values) v *= sources[i].column.factor;
-    }
+    if (!read.fetches.empty()) axis.fetch = std::move(read.fetches[i]);
+    multiply(axis, sources[i].column.factor);
     axis.temperature_c = read.temperature_c;
     sensor.axes.push_back(std::move(axis));
   }

@@ -421,6 +421,7 @@ Result<Signal> read_raw(std::istream& in, std::uintmax_t size, const std::string
   }
   Signal signal;
   signal.rate_hz = choice.rate_hz;
+  signal.values.reserve(size / sizeof(double) + 1);  // sums of them take one more place
   signal.values.resize(size / sizeof(double));
   if (!in.read(reinterpret_cast<char*>(signal.values.data()), static_cast<std::streamsize>(size))) {
     return work_error(fmt::format("{} could not be read to its end", file));
