@@ -25,12 +25,21 @@ using noise::Intervals;
 /// p below which the halves of a record are said to differ.
 constexpr double kDiffer = 0.01;
 
+/// A copy that may be written to, with room for one more.
+Result<std::vector<double>> samples_of(const AxisRecord& record) {
+  if (record.fetch) return record.fetch();
+  std::vector<double> x;
+  x.reserve(record.values.size() + 1);
+  x.assign(record.values.begin(), record.values.end());
+  return x;
+}
+
 /// Marks what is there.
-std::vector<std::uint8_t> mask_of(const AxisRecord& record) {
+std::vector<std::uint8_t> mask_of(const AxisRecord& record, std::span<const double> x) {
   std::vector<std::uint8_t> mask = record.mask;
-  if (mask.empty()) mask.assign(record.values.size(), 1);
+  if (mask.empty()) mask.assign(x.size(), 1);
   for (std::size_t i = 0; i < mask.size(); ++i) {
-    if (!std::isfinite(record.values[i])) mask[i] = 0;
+    if (!std::isfinite(x[i])) mask[i] = 0;
   }
   return mask;
 }
@@ -66,21 +75,27 @@ Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisR
   return select_model(wv, record.rate_hz, has_resonance, fit_options);
 }
 
-std::optional<HalvesTest> halves_of(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                    const FitResult& fit) {
+/// Wavelet variances of the halves of a record; empty where one has none.
+std::vector<noise::WaveletVariance> halves_of(std::span<const double> x, std::span<const std::uint8_t> mask) {
   const std::size_t middle = x.size() / 2;
-  const auto half = [&](std::size_t begin, std::size_t end) {
+  std::vector<noise::WaveletVariance> halves;
+  for (const auto& [begin, end] : {std::pair{std::size_t{0}, middle}, std::pair{middle, x.size()}}) {
     noise::WvOptions options;
     options.mask = mask.subspan(begin, end - begin);
-    return noise::haar_wavelet_variance(x.subspan(begin, end - begin), options);
-  };
-  const auto first = half(0, middle);
-  const auto second = half(middle, x.size());
-  if (!first || !second) return std::nullopt;
-  const std::array records{*first, *second};
+    auto half = noise::haar_wavelet_variance(x.subspan(begin, end - begin), options);
+    if (!half) return {};
+    halves.push_back(std::move(*half));
+  }
+  return halves;
+}
+
+std::optional<HalvesTest> compared(const std::vector<noise::WaveletVariance>& halves, const FitResult& fit) {
+  if (halves.empty()) return std::nullopt;
   const std::array errors{fit.model_error, fit.model_error};
-  const auto test = noise::test_homogeneity(records, fit.model, errors).test;
+  const auto test = noise::test_homogeneity(halves, fit.model, errors).test;
   if (!test) return std::nullopt;
+  const auto* first = &halves.front();
+  const auto* second = &halves.back();
   HalvesTest out;
   out.p_value = test->p_value;
   double largest = 0.0;
@@ -145,13 +160,10 @@ Error named(const AxisRecord& record, Error error) {
   return error;
 }
 
-Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions& options,
-                                     noise::CovarianceTables& covariances) {
-  const std::vector<std::uint8_t> mask = mask_of(record);
-  AxisCertificate out;
-  out.name = record.name;
-  out.unit = record.unit;
-  add_moments(out, record.values, mask);
+/// What has to be told before anything else.
+Result<void> look_at(const AxisRecord& record, std::span<const double> x, std::span<const std::uint8_t> mask,
+                     AxisCertificate& out) {
+  add_moments(out, x, mask);
   if (out.n_samples < kFewestSamples) {
     return tl::unexpected(named(
         record,
@@ -162,35 +174,70 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
     return tl::unexpected(named(record, {ErrorKind::kWork, fmt::format("all values are {:.6g}", out.mean),
                                          "the axis is stuck, or the wrong column was chosen"}));
   }
-  out.resolution = resolution_of(record.values, mask);
-  out.warnings = record_warnings(record, mask, out);
+  out.resolution = resolution_of(x, mask);
+  out.warnings = record_warnings(record, x, mask, out);
+  return {};
+}
 
-  std::vector<double> x = record.values;
+/// What the samples are asked for beside their Allan deviations; the rest needs no samples.
+struct Kept {
+  noise::WaveletVariance wv;
+  std::vector<noise::WaveletVariance> halves;
+  noise::TailExcerpt tails;
+};
+
+/// @param x  used up
+Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span<const std::uint8_t> mask,
+                        double confidence, AxisCertificate& out) {
   noise::LineOptions line_options;
   line_options.rate_hz = record.rate_hz;
-  out.lines = noise::find_lines(x, mask, line_options);
+  const std::array<std::function<void()>, 2> looks{
+      [&] { out.lines = noise::find_lines(x, mask, line_options); },
+      [&] {  // the spectrum shows the lines, too
+        out.density = noise::density_of(x, noise::Present(x, mask), record.rate_hz, confidence);
+      }};
+  std::for_each(std::execution::par, looks.begin(), looks.end(), [](const auto& look) { look(); });
   noise::remove_lines(x, mask, out.lines, record.rate_hz);
   out.resonances = noise::find_resonances(x, mask, record.rate_hz);
   out.low_pass_hz = noise::low_pass_hz(x, mask, record.rate_hz);
-
   noise::WvOptions wv_options;
   wv_options.mask = mask;
-  wv_options.confidence = options.confidence;
-  const auto wv = noise::haar_wavelet_variance(x, wv_options);
+  wv_options.confidence = confidence;
+  Kept kept{{}, halves_of(x, mask), noise::tail_excerpt(x, mask)};
+  auto wv = noise::haar_wavelet_variance_in_place(x, wv_options);
   if (!wv) return tl::unexpected(named(record, wv.error()));
-  auto grown = model_of(*wv, record, !out.resonances.empty(), options, covariances);
+  kept.wv = std::move(*wv);
+  return kept;
+}
+
+Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions& options,
+                                     noise::CovarianceTables& covariances) {
+  AxisCertificate out;
+  out.name = record.name;
+  out.unit = record.unit;
+  auto x = samples_of(record);
+  if (!x) return tl::unexpected(named(record, x.error()));
+  const std::vector<std::uint8_t> mask = mask_of(record, *x);
+  if (auto looked = look_at(record, *x, mask, out); !looked) return tl::unexpected(looked.error());
+  const auto kept = take_apart(record, *x, mask, options.confidence, out);
+  if (!kept) return tl::unexpected(kept.error());
+
+  *x = {};  // what follows needs memory of its own
+  x = samples_of(record);
+  if (!x) return tl::unexpected(named(record, x.error()));
+  noise::remove_lines(*x, mask, out.lines, record.rate_hz);
+  out.allan = noise::allan_deviation(std::move(*x), kept->wv, record.rate_hz);
+  *x = {};
+
+  auto grown = model_of(kept->wv, record, !out.resonances.empty(), options, covariances);
   if (!grown) return tl::unexpected(named(record, grown.error()));
   out.fit = std::move(grown->best);
   out.largest_miss = largest_miss_of(out.fit);
   for (const FitResult& rival : grown->rivals) out.rivals.push_back(rival.spec.name());
-
-  out.allan = noise::allan_deviation(x, *wv, record.rate_hz);
-  noise::set_allan_intervals(out.allan, &out.fit, options.confidence);
-  // The spectrum shows the lines, too.
-  out.density = noise::density_of(record.values, noise::Present(record.values, mask), record.rate_hz,
-                                  options.confidence);
+  noise::set_allan_intervals(out.allan, &out.fit, options.confidence,
+                             covariances.of(kept->wv, out.fit.wv.size()).get());
   out.terms = data_sheet_terms(out.fit, grown->rivals, out.allan, record.unit);
-  out.halves = halves_of(x, mask, out.fit);
+  out.halves = compared(kept->halves, out.fit);
   if (out.halves && out.halves->p_value < kDiffer) {
     out.warnings.push_back(fmt::format(
         "the halves of the record differ (p = {:.2g}): at averaging times around {:.3g} s the second has "
@@ -198,9 +245,15 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
         "variance of the first; the numbers are a mean of both",
         out.halves->p_value, std::ldexp(0.5, out.halves->level) / record.rate_hz, out.halves->ratio));
   }
-  out.tails = noise::test_tails(x, wv_options, out.fit.model);
+  noise::WvOptions of_excerpt;
+  of_excerpt.confidence = options.confidence;
+  out.tails = noise::test_tails(kept->tails, of_excerpt, out.fit.model);
   if (const auto spikes = noise::spike_warning(out.tails, record.rate_hz)) out.warnings.push_back(*spikes);
-  out.temperature = temperature_of(record.values, mask, record.temperature_c, out.fit);
+  if (!record.temperature_c.empty()) {
+    x = samples_of(record);
+    if (!x) return tl::unexpected(named(record, x.error()));
+    out.temperature = temperature_of(*x, mask, record.temperature_c, out.fit);
+  }
   add_limits(out);
   return out;
 }
@@ -208,8 +261,8 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
 }  // namespace
 
 Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOptions& options) {
-  noise::CovarianceTables covariances;
-  return characterize(record, options, covariances);
+  noise::CovarianceTables own;
+  return characterize(record, options, options.covariances != nullptr ? *options.covariances : own);
 }
 
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
@@ -217,15 +270,21 @@ std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecor
   std::vector<Result<AxisCertificate>> out(records.size(), work_error("not looked at"));
   std::vector<std::size_t> index(records.size());
   std::iota(index.begin(), index.end(), std::size_t{0});
-  noise::CovarianceTables covariances;
+  noise::CovarianceTables own;
+  AxisOptions shared = options;
+  if (shared.covariances == nullptr) shared.covariances = &own;
   std::mutex telling;
   std::size_t done = 0;
-  std::for_each(std::execution::par, index.begin(), index.end(), [&](std::size_t i) {
-    out[i] = characterize(records[i], options, covariances);
+  const auto look = [&](std::size_t i) {
+    out[i] = characterize_axis(records[i], shared);
     if (!told) return;
     const std::scoped_lock lock(telling);
     told(++done);
-  });
+  };
+  if (std::ranges::any_of(records, [](const AxisRecord& r) { return static_cast<bool>(r.fetch); }))
+    std::for_each(index.begin(), index.end(), look);
+  else
+    std::for_each(std::execution::par, index.begin(), index.end(), look);
   return out;
 }
 

@@ -23,14 +23,19 @@
 
 namespace imuscope::certificate {
 
+/// Hands out the samples of an axis. Asked several times, by one thread at a time.
+using FetchSamples = std::function<Result<std::vector<double>>()>;
+
 /// One axis as recorded.
 struct AxisRecord {
   std::string name;  ///< "gyro_x"
   noise::SignalUnit unit = noise::SignalUnit::kNone;
   double rate_hz = 0.0;
   std::vector<double> values;
-  std::vector<std::uint8_t> mask;       ///< empty: all are there; NaN and infinity count as missing
-  std::vector<double> temperature_c{};  ///< one a sample, degrees Celsius; empty where not recorded
+  std::vector<std::uint8_t> mask;      ///< empty: all are there; NaN and infinity count as missing
+  std::vector<float> temperature_c{};  ///< one a sample, degrees Celsius; empty where not recorded
+  FetchSamples
+      fetch{};  ///< in the place of `values`, of a record that is too long to lie in memory as a whole
 };
 
 /// Do the two halves of the record come from one model?
@@ -69,6 +74,7 @@ struct AxisCertificate {
 struct AxisOptions {
   double confidence = 0.95;
   std::string model;  ///< as for parse_model(); empty: selected among those of candidate_models()
+  noise::CovarianceTables* covariances = nullptr;  ///< of other fits, too; nothing: the axes' own
 };
 
 /// Errors (kWork), each naming the axis: fewer than kFewestSamples valid samples, a constant signal. kUsage:
@@ -82,6 +88,7 @@ inline constexpr std::uint64_t kFewestSamples = 200;
 using AxisDone = std::function<void(std::size_t done)>;
 
 /// Axes side by side on all cores; the result does not depend on their number. One entry a record, in order.
+/// Records that are fetched are taken one after the other: no more than one of them is in memory.
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
                                                        const AxisOptions& options, const AxisDone& told = {});
 

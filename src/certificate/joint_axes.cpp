@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <execution>
 #include <limits>
 
+#include "noise/covariance_table.h"
 #include "noise/holm.h"
 
 namespace imuscope::certificate {
@@ -19,13 +21,15 @@ constexpr const char* kShape = "WN+2*GM+RW";
 constexpr const char* kSimpleShape = "WN";
 
 Result<noise::FitResult> shape_of(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                  double rate_hz) {
+                                  double rate_hz, noise::CovarianceTables& covariances) {
   noise::WvOptions options;
   options.mask = mask;
   const auto wv = noise::haar_wavelet_variance(x, options);
   if (!wv) return tl::unexpected(wv.error());
-  auto fit = noise::fit(*wv, *noise::parse_model(kShape), rate_hz);
-  if (!fit) fit = noise::fit(*wv, *noise::parse_model(kSimpleShape), rate_hz);
+  noise::FitOptions fit_options;
+  fit_options.covariances = &covariances;
+  auto fit = noise::fit(*wv, *noise::parse_model(kShape), rate_hz, fit_options);
+  if (!fit) fit = noise::fit(*wv, *noise::parse_model(kSimpleShape), rate_hz, fit_options);
   return fit;
 }
 
@@ -40,20 +44,25 @@ std::vector<std::uint8_t> where_all_are(std::span<const JointSignal> signals) {
 }
 
 Result<std::vector<CrossLevel>> levels_of(std::span<const JointSignal> signals,
-                                          std::span<const std::uint8_t> mask, double rate_hz) {
+                                          std::span<const std::uint8_t> mask, double rate_hz,
+                                          noise::CovarianceTables* shared) {
+  noise::CovarianceTables own;
+  noise::CovarianceTables& covariances = shared != nullptr ? *shared : own;
+  std::vector<Result<noise::FitResult>> shapes(signals.size(), work_error("not looked at"));
+  std::transform(std::execution::par, signals.begin(), signals.end(), shapes.begin(),
+                 [&](const JointSignal& s) { return shape_of(s.values, mask, rate_hz, covariances); });
   std::vector<std::span<const double>> values;
   std::vector<noise::FitResult> fits;
-  for (const JointSignal& signal : signals) {
-    auto fit = shape_of(signal.values, mask, rate_hz);
-    if (!fit) {
-      Error error = fit.error();
-      error.what = fmt::format("{}: {}", signal.name, error.what);
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    if (!shapes[i]) {
+      Error error = shapes[i].error();
+      error.what = fmt::format("{}: {}", signals[i].name, error.what);
       return tl::unexpected(error);
     }
-    values.push_back(signal.values);
-    fits.push_back(std::move(*fit));
+    values.push_back(signals[i].values);
+    fits.push_back(std::move(*shapes[i]));
   }
-  return noise::cross_variance(values, mask, fits);
+  return noise::cross_variance(values, mask, fits, &covariances);
 }
 
 std::vector<CrossLevel> chosen(std::span<const CrossLevel> levels, const JointOptions& options) {
@@ -94,7 +103,7 @@ double held_out_ratio(std::span<const JointSignal> signals, std::span<const std:
     const auto middle = static_cast<std::ptrdiff_t>(half.size() / 2);
     std::fill(second ? half.begin() : half.begin() + middle, second ? half.begin() + middle : half.end(),
               std::uint8_t{0});
-    auto levels = levels_of(signals, half, options.rate_hz);
+    auto levels = levels_of(signals, half, options.rate_hz, nullptr);
     if (!levels) return std::numeric_limits<double>::quiet_NaN();
     std::vector<CrossLevel> kept;
     for (const CrossLevel& level : *levels) {
@@ -154,7 +163,7 @@ Result<JointAxes> joint_axes(std::span<const JointSignal> signals, const JointOp
     return work_error("there is one signal alone",
                       "give a run with several S-IMUs, or a log with several axes");
   const auto mask = where_all_are(signals);
-  const auto levels = levels_of(signals, mask, options.rate_hz);
+  const auto levels = levels_of(signals, mask, options.rate_hz, options.covariances);
   if (!levels) return tl::unexpected(levels.error());
   JointAxes out;
   out.rate_hz = options.rate_hz;

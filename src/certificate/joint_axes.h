@@ -60,6 +60,8 @@ struct JointOptions {
   double confidence = 0.95;
   double from_s = 0.0;  ///< scales at which the mean shall be quiet
   double to_s = 1e9;
+  /// Of other fits of the same record; nothing: the signals share tables of their own.
+  noise::CovarianceTables* covariances = nullptr;
   bool share_a_reference = true;  ///< false: no common part and no mean, as for axes of one sensor
 };
 

@@ -62,21 +62,21 @@ struct Blocks {
   double seconds = 1.0;
 };
 
-Blocks blocks_of(const AxisRecord& record, std::span<const std::uint8_t> mask) {
+Blocks blocks_of(double rate_hz, std::span<const double> x, std::span<const std::uint8_t> mask) {
   Blocks out;
   constexpr double kFewest = 20.0;
-  out.seconds = std::max(1.0, kFewest / record.rate_hz);
-  const auto length = static_cast<std::size_t>(out.seconds * record.rate_hz);
-  for (std::size_t begin = 0; begin + length <= record.values.size(); begin += length) {
+  out.seconds = std::max(1.0, kFewest / rate_hz);
+  const auto length = static_cast<std::size_t>(out.seconds * rate_hz);
+  for (std::size_t begin = 0; begin + length <= x.size(); begin += length) {
     double mean = 0.0;
     double squares = 0.0;
     double n = 0.0;
     for (std::size_t i = begin; i < begin + length; ++i) {
       if (mask[i] == 0) continue;
       n += 1.0;
-      const double before = record.values[i] - mean;
+      const double before = x[i] - mean;
       mean += before / n;
-      squares += before * (record.values[i] - mean);
+      squares += before * (x[i] - mean);
     }
     const bool enough = n >= 0.5 * static_cast<double>(length) && n > 2.0;
     out.mean.push_back(enough ? mean : std::nan(""));
@@ -94,9 +94,10 @@ double median_of(std::vector<double> values) {
 }
 
 /// Motion: seconds whose spread is many times that of the others, or whose mean leaps.
-std::optional<std::string> motion_in(const AxisRecord& record, std::span<const std::uint8_t> mask) {
+std::optional<std::string> motion_in(double rate_hz, std::span<const double> x,
+                                     std::span<const std::uint8_t> mask) {
   constexpr double kTimes = 6.0;
-  const Blocks blocks = blocks_of(record, mask);
+  const Blocks blocks = blocks_of(rate_hz, x, mask);
   const double usual = median_of(blocks.sd);
   const double centre = median_of(blocks.mean);
   std::size_t n = 0;
@@ -146,11 +147,11 @@ std::optional<double> resolution_of(std::span<const double> x, std::span<const s
   return spread / step >= 2.0 ? std::optional(step) : std::nullopt;
 }
 
-std::vector<std::string> record_warnings(const AxisRecord& record, std::span<const std::uint8_t> mask,
-                                         const AxisCertificate& so_far) {
+std::vector<std::string> record_warnings(const AxisRecord& record, std::span<const double> x,
+                                         std::span<const std::uint8_t> mask, const AxisCertificate& so_far) {
   std::vector<std::string> warnings;
-  if (const auto motion = motion_in(record, mask)) warnings.push_back(*motion);
-  const Extremes e = extremes_of(record.values, mask);
+  if (const auto motion = motion_in(record.rate_hz, x, mask)) warnings.push_back(*motion);
+  const Extremes e = extremes_of(x, mask);
   const auto n = static_cast<double>(so_far.n_samples);
   constexpr double kClipped = 1e-3;
   const double step = so_far.resolution.value_or(0.0);
@@ -160,7 +161,7 @@ std::vector<std::string> record_warnings(const AxisRecord& record, std::span<con
   const auto clipped = [&](std::size_t at, double end, double inwards) {
     if (!has_insides || static_cast<double>(at) <= kClipped * n || at <= 10) return false;
     return static_cast<double>(at) >
-           1.5 * static_cast<double>(count_near(record.values, mask, end + inwards, 0.5 * step));
+           1.5 * static_cast<double>(count_near(x, mask, end + inwards, 0.5 * step));
   };
   const bool high = clipped(e.at_high, e.high, -step);
   if (high || clipped(e.at_low, e.low, step)) {
@@ -176,7 +177,7 @@ std::vector<std::string> record_warnings(const AxisRecord& record, std::span<con
         static_cast<double>(e.longest_run) / record.rate_hz, static_cast<double>(e.run_at) / record.rate_hz));
   }
   constexpr double kManyMissing = 0.05;
-  const double missing = static_cast<double>(so_far.n_missing) / static_cast<double>(record.values.size());
+  const double missing = static_cast<double>(so_far.n_missing) / static_cast<double>(x.size());
   if (missing > kManyMissing)
     warnings.push_back(fmt::format("{:.2g} % of the samples are missing", 100.0 * missing));
   if (step > so_far.sd) {

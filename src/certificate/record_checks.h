@@ -19,8 +19,9 @@ std::optional<double> resolution_of(std::span<const double> x, std::span<const s
 
 /// Sentences: the sensor was moved, values at the end of the range, runs of one value, samples missing, a
 /// resolution that is coarser than the noise.
+/// @param x       the samples of the record
 /// @param so_far  with n_samples, n_missing, mean, sd, resolution
-std::vector<std::string> record_warnings(const AxisRecord& record, std::span<const std::uint8_t> mask,
-                                         const AxisCertificate& so_far);
+std::vector<std::string> record_warnings(const AxisRecord& record, std::span<const double> x,
+                                         std::span<const std::uint8_t> mask, const AxisCertificate& so_far);
 
 }  // namespace imuscope::certificate

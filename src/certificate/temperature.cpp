@@ -23,18 +23,19 @@ struct Range {
   std::size_t n = 0;
 };
 
-bool is_there(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const double> t,
+bool is_there(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const float> t,
               std::size_t i) {
   return (mask.empty() || mask[i] != 0) && std::isfinite(x[i]) && std::isfinite(t[i]);
 }
 
-Range range_of(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const double> t) {
+Range range_of(std::span<const double> x, std::span<const std::uint8_t> mask, std::span<const float> t) {
   Range range;
   for (std::size_t i = 0; i < t.size(); ++i) {
     if (!is_there(x, mask, t, i)) continue;
-    range.lowest = range.n == 0 ? t[i] : std::min(range.lowest, t[i]);
-    range.highest = range.n == 0 ? t[i] : std::max(range.highest, t[i]);
-    range.mean += (t[i] - range.mean) / static_cast<double>(++range.n);
+    const auto now = static_cast<double>(t[i]);
+    range.lowest = range.n == 0 ? now : std::min(range.lowest, now);
+    range.highest = range.n == 0 ? now : std::max(range.highest, now);
+    range.mean += (now - range.mean) / static_cast<double>(++range.n);
   }
   return range;
 }
@@ -74,7 +75,7 @@ std::optional<Slope> slope_of(const std::vector<double>& x, const std::vector<do
 
 /// Bias by generalised least squares: both columns go through the noise's own whitening filter (T-2).
 void add_bias(Temperature& out, std::span<const double> x, std::span<const std::uint8_t> mask,
-              std::span<const double> t, const noise::Model& model) {
+              std::span<const float> t, const noise::Model& model) {
   constexpr std::size_t kColumns = 3;  // signal, constant, temperature
   noise::Whitener whitener(model, kColumns);
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
@@ -84,7 +85,7 @@ void add_bias(Temperature& out, std::span<const double> x, std::span<const std::
       whitener.skip();
       continue;
     }
-    std::array<double, kColumns> row{x[i], 1.0, t[i] - out.mean_c};
+    std::array<double, kColumns> row{x[i], 1.0, static_cast<double>(t[i]) - out.mean_c};
     if (!whitener.push(row)) continue;
     const Eigen::Vector2d a(row[1], row[2]);
     normal += a * a.transpose();
@@ -102,7 +103,7 @@ void add_bias(Temperature& out, std::span<const double> x, std::span<const std::
 
 /// Logarithm of the mean square of successive differences, window by window, on the windows' temperature.
 void add_noise(Temperature& out, std::span<const double> x, std::span<const std::uint8_t> mask,
-               std::span<const double> t) {
+               std::span<const float> t) {
   const std::size_t length = x.size() / kWindows;
   if (length < kLeastWindow) return;
   std::vector<double> temperature;
@@ -114,7 +115,7 @@ void add_noise(Temperature& out, std::span<const double> x, std::span<const std:
     for (std::size_t i = w * length + 1; i < (w + 1) * length; ++i) {
       if (!is_there(x, mask, t, i) || !is_there(x, mask, t, i - 1)) continue;
       square += (x[i] - x[i - 1]) * (x[i] - x[i - 1]);
-      mean_t += t[i];
+      mean_t += static_cast<double>(t[i]);
       ++n;
     }
     if (n < kLeastWindow / 2 || !(square > 0.0)) continue;
@@ -130,8 +131,7 @@ void add_noise(Temperature& out, std::span<const double> x, std::span<const std:
 }  // namespace
 
 std::optional<Temperature> temperature_of(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                          std::span<const double> temperature_c,
-                                          const noise::FitResult& fit) {
+                                          std::span<const float> temperature_c, const noise::FitResult& fit) {
   if (temperature_c.size() != x.size()) return std::nullopt;
   const Range range = range_of(x, mask, temperature_c);
   if (range.n == 0 || range.highest - range.lowest < kLeastRange_c) return std::nullopt;

@@ -25,7 +25,7 @@ struct Temperature {
 
 /// Absent where the temperature is missing, or does not vary by kLeastRange_c.
 std::optional<Temperature> temperature_of(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                          std::span<const double> temperature_c, const noise::FitResult& fit);
+                                          std::span<const float> temperature_c, const noise::FitResult& fit);
 
 inline constexpr double kLeastRange_c = 0.5;
 

@@ -1,7 +1,9 @@
 #include "noise/allan.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "noise/chi_squared.h"
 #include "noise/fixed_point.h"
@@ -13,28 +15,29 @@ namespace {
 /// Places of neighbouring differences are apart by up to this share of a mean: nearer ones tell nothing new.
 constexpr std::size_t kPlacesPerMean = 32;
 
-/// Sums of the samples before every `step`-th place, and how many of them are there.
+/// Sums of the samples before every `step`-th place, and how many of them are there, in the samples' place.
 class RunningSums {
  public:
-  RunningSums(std::span<const double> x, const std::vector<Segment>& runs) : sums_{0.0}, counts_{0} {
-    sums_.reserve(x.size() + 1);
-    counts_.reserve(x.size() + 1);
-    const double offset = runs.empty() ? 0.0 : x[runs.front().begin];
-    std::size_t at = 0;
-    const auto pass_over = [&](std::size_t to) {
-      for (; at < to; ++at) {
-        sums_.push_back(sums_.back());
-        counts_.push_back(counts_.back());
-      }
-    };
-    for (const Segment& run : runs) {
-      pass_over(run.begin);
-      for (; at < run.end; ++at) {
-        sums_.push_back(sums_.back() + (x[at] - offset));
-        counts_.push_back(counts_.back() + 1);
-      }
+  RunningSums(std::vector<double> x, const std::vector<Segment>& runs) : sums_(std::move(x)) {
+    const std::size_t length = sums_.size();
+    is_whole_ = runs.size() == 1 && runs.front().begin == 0 && runs.front().end == length;
+    if (!is_whole_) counts_.reserve(length + 1);
+    sums_.push_back(0.0);
+    const double offset = runs.empty() ? 0.0 : sums_[runs.front().begin];
+    double sum = 0.0;
+    std::uint32_t count = 0;
+    auto run = runs.begin();
+    for (std::size_t i = 0; i < length; ++i) {
+      while (run != runs.end() && run->end <= i) ++run;
+      const bool is_there = run != runs.end() && run->begin <= i;
+      const double sample = std::exchange(sums_[i], sum);
+      if (!is_whole_) counts_.push_back(count);
+      if (!is_there) continue;
+      sum += sample - offset;
+      ++count;
     }
-    pass_over(x.size());
+    sums_[length] = sum;
+    if (!is_whole_) counts_.push_back(count);
   }
 
   [[nodiscard]] std::size_t step() const { return step_; }
@@ -44,15 +47,32 @@ class RunningSums {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < sums_.size(); i += 2, ++kept) {
       sums_[kept] = sums_[i];
-      counts_[kept] = counts_[i];
+      if (!is_whole_) counts_[kept] = counts_[i];
     }
     sums_.resize(kept);
-    counts_.resize(kept);
+    if (!is_whole_) counts_.resize(kept);
     step_ *= 2;
   }
 
   /// Mean square of the differences of neighbouring means of n samples, n a multiple of step().
   [[nodiscard]] double mean_square(std::size_t n, std::uint64_t& count) const {
+    return is_whole_ ? mean_square_of_whole(n, count) : mean_square_of_valid(n, count);
+  }
+
+ private:
+  [[nodiscard]] double mean_square_of_whole(std::size_t n, std::uint64_t& count) const {
+    const std::size_t k = n / step_;
+    const auto places = static_cast<std::ptrdiff_t>(sums_.size()) - static_cast<std::ptrdiff_t>(2 * k);
+    count = static_cast<std::uint64_t>(std::max<std::ptrdiff_t>(places, 0));
+    if (count == 0) return 0.0;
+    const auto at = [&](std::size_t from) {
+      return Eigen::Map<const Eigen::ArrayXd>(sums_.data() + from, places);
+    };
+    const double squares = ((at(2 * k) - at(k)) - (at(k) - at(0))).square().sum();
+    return squares / (static_cast<double>(n) * static_cast<double>(n)) / static_cast<double>(count);
+  }
+
+  [[nodiscard]] double mean_square_of_valid(std::size_t n, std::uint64_t& count) const {
     const std::size_t k = n / step_;
     const auto least = static_cast<std::uint32_t>(least_valid(n));
     double sum = 0.0;
@@ -68,9 +88,9 @@ class RunningSums {
     return count > 0 ? sum / static_cast<double>(count) : 0.0;
   }
 
- private:
   std::vector<double> sums_;
-  std::vector<std::uint32_t> counts_;
+  std::vector<std::uint32_t> counts_;  ///< of a whole record empty
+  bool is_whole_ = false;
   std::size_t step_ = 1;
 };
 
@@ -94,11 +114,11 @@ double between(double low, double high, double share) { return low + share * (hi
 
 }  // namespace
 
-std::vector<AllanPoint> allan_deviation(std::span<const double> x, const WaveletVariance& wv, double rate_hz,
+std::vector<AllanPoint> allan_deviation(std::vector<double> x, const WaveletVariance& wv, double rate_hz,
                                         int points_per_octave) {
   std::vector<AllanPoint> points;
   const std::size_t shown = shown_levels(wv);
-  RunningSums sums(x, wv.segments);
+  RunningSums sums(std::move(x), wv.segments);
   std::uint64_t previous = 0;
   for (std::size_t i = 0; i < shown; ++i) {
     points.push_back(of_level(wv.levels[i], rate_hz));
@@ -128,10 +148,11 @@ std::vector<AllanPoint> allan_deviation(std::span<const double> x, const Wavelet
   return points;
 }
 
-void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, double confidence) {
+void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, double confidence,
+                         const CovarianceTable* table) {
   std::vector<double> log_dof;  // of the levels
   if (fit != nullptr) {
-    const Eigen::MatrixXd v = sampling_covariance(fit->model, observed_wv(*fit), fit->wv.size());
+    const Eigen::MatrixXd v = sampling_covariance(fit->model, observed_wv(*fit), fit->wv.size(), table);
     for (std::size_t i = 0; i < fit->wv.size(); ++i) {
       const auto k = static_cast<Eigen::Index>(i);
       log_dof.push_back(std::log(2.0 * fit->wv[i].fitted * fit->wv[i].fitted / v(k, k)));

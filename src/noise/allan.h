@@ -10,6 +10,8 @@
 
 namespace imuscope::noise {
 
+class CovarianceTable;
+
 /// AVAR(n) = half the mean square of the difference of neighbouring means of n samples, over all places (IEEE
 /// Std 952, annex C): twice the wavelet variance at n = 2^(level-1) (G-40).
 struct AllanPoint {
@@ -26,13 +28,16 @@ struct AllanPoint {
 /// up to the longest level with enough coefficients (wavelet_variance.h) or, without one, the longest at all.
 /// Missing samples are borne as in haar_wavelet_variance(), and what they add is taken out by the
 /// neighbouring levels' inflation.
+/// @param x   used up: its sums take its place (one more than samples: reserve that, and nothing is moved)
 /// @param wv  of the same signal and mask, classical
-std::vector<AllanPoint> allan_deviation(std::span<const double> x, const WaveletVariance& wv, double rate_hz,
+std::vector<AllanPoint> allan_deviation(std::vector<double> x, const WaveletVariance& wv, double rate_hz,
                                         int points_per_octave = 4);
 
 /// Chi-square intervals. Their degrees of freedom are those of the wavelet variance under the fitted model
 /// (G-8), between levels on a logarithmic scale; without a fit max(N / 2n, 1).
-void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, double confidence);
+/// @param table  of the fit's record; nothing: its covariance is computed by itself
+void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, double confidence,
+                         const CovarianceTable* table = nullptr);
 
 /// Allan deviation of the model for means of n samples; n need not be a power of two.
 double model_allan_deviation(const Model& model, double n);

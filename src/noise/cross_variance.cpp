@@ -10,7 +10,8 @@
 #include <cmath>
 
 #include "noise/chi_squared.h"
-#include "noise/wv_covariance.h"
+#include "noise/covariance_table.h"
+#include "noise/fixed_point.h"
 
 namespace imuscope::noise {
 namespace {
@@ -20,9 +21,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// G-61 of one signal: independent squares of each level, by its model.
-VectorXd dof_of(const FitResult& fit, const WaveletVariance& wv) {
+VectorXd dof_of(const FitResult& fit, const WaveletVariance& wv, CovarianceTables* tables) {
   const auto n = static_cast<Index>(std::min(wv.levels.size(), fit.wv.size()));
-  const MatrixXd covariance = wv_covariance(fit.model, wv, static_cast<std::size_t>(n));
+  const auto table = tables != nullptr ? tables->of(wv, static_cast<std::size_t>(n)) : nullptr;
+  const MatrixXd covariance = sampling_covariance(fit.model, wv, static_cast<std::size_t>(n), table.get());
   VectorXd dof(n);
   for (Index j = 0; j < n; ++j) {
     const double nu = fit.wv[static_cast<std::size_t>(j)].fitted;
@@ -80,7 +82,7 @@ MatrixXd common_form(Index n) {
 
 Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const double>> signals,
                                                std::span<const std::uint8_t> mask,
-                                               std::span<const FitResult> fits) {
+                                               std::span<const FitResult> fits, CovarianceTables* tables) {
   const auto n = static_cast<Index>(signals.size());
   for (const auto& signal : signals) {
     if (signal.size() != signals.front().size())
@@ -100,7 +102,7 @@ Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const d
   std::size_t levels = own.front().levels.size();
   std::vector<VectorXd> dof;
   for (std::size_t i = 0; i < own.size(); ++i) {
-    dof.push_back(dof_of(fits[i], own[i]));
+    dof.push_back(dof_of(fits[i], own[i], tables));
     levels = std::min(levels, static_cast<std::size_t>(dof.back().size()));
   }
   std::vector<CrossLevel> out(levels);

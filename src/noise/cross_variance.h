@@ -46,10 +46,12 @@ struct Coherence {
 /// @param signals  two or more of one length
 /// @param mask     one entry a sample, non-zero where all signals are valid; empty: everywhere
 /// @param fits     a model of each, by which its coefficients hang together in time
+/// @param tables   to take covariances from; nothing: each is computed by itself
 /// Errors (kWork): those of haar_wavelet_variance(); signals of different lengths.
 Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const double>> signals,
                                                std::span<const std::uint8_t> mask,
-                                               std::span<const FitResult> fits);
+                                               std::span<const FitResult> fits,
+                                               CovarianceTables* tables = nullptr);
 
 /// tr(A gamma) with its interval (G-62).
 /// @param form  A, symmetric, of as many rows as there are signals

@@ -139,16 +139,18 @@ constexpr std::size_t kBlock = 32768;
 /// Levels 1..kLowLevels, block by block in cache (neighbouring blocks share one support). Leaves in `work`
 /// the sums of 2^kLowLevels samples. `add` takes level, sum and count. Precondition: the run has levels
 /// beyond these.
+/// @param work  as long as the run, or the run itself: a block is read before it is written
 template <typename Add>
 void low_level_squares(std::span<const double> run, double* work, const Add& add) {
   constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
   std::vector<double> local;
+  const double first = run.front();
   for (std::size_t start = 0; start < run.size(); start += kBlock) {
     const std::size_t own = std::min(kBlock, run.size() - start);
     std::size_t length = std::min(own + kSupport - 1, run.size() - start);
     local.resize(length);
     const Eigen::Map<const Eigen::ArrayXd> in(run.data() + start, static_cast<Eigen::Index>(length));
-    stretch(local, 0, length) = in - run.front();
+    stretch(local, 0, length) = in - first;
     const std::size_t kept = length >= kSupport ? std::min(own, length - kSupport + 1) : 0;
     take_levels(local.data(), 1, kLowLevels, 1, length, own, add);
     std::copy_n(local.begin(), kept, work + start);
@@ -243,7 +245,10 @@ double HoleLengths::variance_of(const MissingExcess& excess, std::span<const dou
   return excess.own * within - excess.common * of_length(std::max(1.0, n / 8.0));
 }
 
-void add_squares(std::span<const double> run, std::span<LevelSum> sums) {
+namespace {
+
+/// @param work  as that of low_level_squares()
+void add_squares_by(std::span<const double> run, double* work, std::span<LevelSum> sums) {
   const int levels = std::min(static_cast<int>(sums.size()), highest_level(run.size()));
   if (levels < 1) return;
   const auto add = [&](int level, double sum, std::size_t count) {
@@ -252,16 +257,27 @@ void add_squares(std::span<const double> run, std::span<LevelSum> sums) {
     total.count += count;
   };
   if (levels <= kLowLevels) {
-    std::vector<double> work;
-    subtract_first(run, work);
-    take_levels(work.data(), 1, levels, 1, run.size(), run.size(), add);
+    std::vector<double> short_run;
+    subtract_first(run, short_run);
+    take_levels(short_run.data(), 1, levels, 1, run.size(), run.size(), add);
     return;
   }
-  const WorkMemory work(run.size() + strip_doubles(run.size()));
-  low_level_squares(run, work.data(), add);
+  const WorkMemory strip(strip_doubles(run.size()));
+  low_level_squares(run, work, add);
   constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
   const std::size_t sums_left = run.size() - kSupport + 1;
-  high_level_squares({work.data(), sums_left}, levels, work.data() + run.size(), add);
+  high_level_squares({work, sums_left}, levels, strip.data(), add);
+}
+
+}  // namespace
+
+void add_squares(std::span<const double> run, std::span<LevelSum> sums) {
+  const WorkMemory work(run.size());
+  add_squares_by(run, work.data(), sums);
+}
+
+void add_squares_in_place(std::span<double> run, std::span<LevelSum> sums) {
+  add_squares_by(run, run.data(), sums);
 }
 
 HaarLevels::HaarLevels(std::span<const double> x, std::span<const Segment> runs)

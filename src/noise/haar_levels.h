@@ -74,6 +74,9 @@ int highest_level(std::size_t length) noexcept;
 /// Memory: one copy of the run.
 void add_squares(std::span<const double> run, std::span<LevelSum> sums);
 
+/// The same without the copy: `run` is used up.
+void add_squares_in_place(std::span<double> run, std::span<LevelSum> sums);
+
 /// Walks the levels of one run, or of several with missing samples between them, and hands out the
 /// coefficients themselves: half the difference of the means of the samples that are there.
 class HaarLevels {

@@ -31,7 +31,9 @@ double window_power(std::size_t n) { return 0.375 * static_cast<double>(n); }
 }  // namespace
 
 Present::Present(std::span<const double> x, std::span<const std::uint8_t> mask)
-    : runs_(valid_segments(x, mask)), before_(x.size() + 1, 0) {
+    : runs_(valid_segments(x, mask)), size_(x.size()) {
+  if (runs_.size() == 1 && runs_.front().begin == 0 && runs_.front().end == size_) return;
+  before_.assign(size_ + 1, 0);
   for (const Segment& run : runs_) {
     for (std::size_t i = run.begin; i < run.end; ++i) before_[i + 1] = 1;
   }
@@ -45,7 +47,7 @@ std::vector<std::size_t> Present::segments(std::size_t length) const {
   for (const Segment& run : runs_) {
     // From the beginning of a run on, as long as there is enough; else from the next run.
     for (begin = std::max(begin, run.begin);
-         begin < run.end && begin + length < before_.size() && count(begin, begin + length) >= least;
+         begin < run.end && begin + length <= size_ && count(begin, begin + length) >= least;
          begin += length / 2)
       begins.push_back(begin);
   }
@@ -96,13 +98,16 @@ std::vector<DensityPoint> density_of(std::span<const double> x, const Present& p
   // there.
   constexpr std::size_t kFirstBin = 8;
   constexpr std::size_t kLonger = 4;
+  // Beyond, memory grows for a single look at what is slow, which the wavelet variance shows better.
+  constexpr std::size_t kLongest = std::size_t{1} << 20U;
   const double tail = 0.5 * (1.0 - confidence);
   std::vector<DensityPoint> points;  // from high frequencies to low
   std::size_t last = shortest / 2 - 1;
-  for (std::size_t length = shortest; length <= x.size(); length *= kLonger) {
+  for (std::size_t length = shortest; length <= std::min(x.size(), kLongest); length *= kLonger) {
     const Spectrum spectrum = spectrum_of(x, present, length);
     if (spectrum.segments == 0) break;
-    const bool is_longest = length * kLonger > x.size() || present.segments(length * kLonger).empty();
+    const bool is_longest =
+        length * kLonger > std::min(x.size(), kLongest) || present.segments(length * kLonger).empty();
     const std::size_t first = is_longest ? 1 : kFirstBin;
     const double dof_of_bin = degrees_of_freedom(static_cast<double>(spectrum.segments));
     std::size_t high = last;

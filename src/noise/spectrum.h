@@ -17,17 +17,20 @@ class Present {
   Present(std::span<const double> x, std::span<const std::uint8_t> mask);
 
   [[nodiscard]] const std::vector<Segment>& runs() const { return runs_; }
-  [[nodiscard]] bool at(std::size_t i) const { return before_[i + 1] > before_[i]; }
+  [[nodiscard]] bool at(std::size_t i) const { return before(i + 1) > before(i); }
   [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
-    return before_[end] - before_[begin];
+    return before(end) - before(begin);
   }
 
   /// Where segments of `length` begin, half overlapping, of which at most an eighth is missing.
   [[nodiscard]] std::vector<std::size_t> segments(std::size_t length) const;
 
  private:
+  [[nodiscard]] std::size_t before(std::size_t i) const { return before_.empty() ? i : before_[i]; }
+
   std::vector<Segment> runs_;
-  std::vector<std::uint32_t> before_;
+  std::vector<std::uint32_t> before_;  ///< empty where all are there
+  std::size_t size_ = 0;
 };
 
 /// Mean periodogram of overlapping segments under a Hann window.
@@ -53,7 +56,7 @@ struct DensityPoint {
 };
 
 /// Density over the whole range that the record tells, equally dense on a logarithmic scale: short segments
-/// for what is fast, longer ones below. Empty for a signal without a segment of `shortest` samples.
+/// for what is fast, longer ones below, up to a million samples. Empty for a signal without a segment of `shortest` samples.
 std::vector<DensityPoint> density_of(std::span<const double> x, const Present& present, double rate_hz,
                                      double confidence = 0.95, int points_per_octave = 8,
                                      std::size_t shortest = 256);

@@ -33,15 +33,11 @@ constexpr std::size_t kBlock = std::size_t{1} << 13U;
 /// Between two blocks: more than half a support of the last level bears.
 constexpr std::size_t kApart = std::size_t{1} << (kTailLevels - 3U);
 
-/// Blocks spread over a signal, of kMostSamples together; what lies between them is missing.
-struct Excerpt {
-  std::vector<double> values;
-  std::vector<std::uint8_t> mask;
-};
+}  // namespace
 
-Excerpt excerpt_of(std::span<const double> x, std::span<const std::uint8_t> mask) {
+TailExcerpt tail_excerpt(std::span<const double> x, std::span<const std::uint8_t> mask) {
   const std::size_t stride = kBlock * ((x.size() + kMostSamples - 1) / kMostSamples);
-  Excerpt out;
+  TailExcerpt out;
   for (std::size_t begin = 0; begin < x.size(); begin += stride) {
     const std::size_t length = std::min(kBlock, x.size() - begin);
     out.values.insert(out.values.end(), x.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -55,13 +51,14 @@ Excerpt excerpt_of(std::span<const double> x, std::span<const std::uint8_t> mask
   return out;
 }
 
-}  // namespace
-
 std::optional<TailTest> test_tails(std::span<const double> x, const WvOptions& options, const Model& model) {
+  return test_tails(tail_excerpt(x, options.mask), options, model);
+}
+
+std::optional<TailTest> test_tails(const TailExcerpt& excerpt, const WvOptions& options, const Model& model) {
   WvOptions looked_at = options;
   looked_at.levels = 0;
   looked_at.robust.reset();
-  const Excerpt excerpt = excerpt_of(x, options.mask);
   looked_at.mask = excerpt.mask;
   const auto all_levels = haar_wavelet_variance(excerpt.values, looked_at);
   if (!all_levels) return std::nullopt;

@@ -4,9 +4,11 @@
 /// wavelet variance and leave the robust one alone, so that their difference tells (Hausman 1978). Its
 /// covariance follows from the model, because of Gaussian signals the classical one is the better (G-35).
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "noise/model.h"
 #include "noise/wavelet_variance.h"
@@ -26,11 +28,23 @@ inline constexpr double kSpikesBelow = 0.01;
 /// Slower levels hold so many samples in a coefficient that spikes are no outliers of theirs.
 inline constexpr int kTailLevels = 8;
 
+/// What the test looks at of a signal.
+struct TailExcerpt {
+  std::vector<double> values;
+  std::vector<std::uint8_t> mask;  ///< one a value; zero between blocks, too
+};
+
+/// A quarter of a million samples at most, in blocks spread over the signal.
+TailExcerpt tail_excerpt(std::span<const double> x, std::span<const std::uint8_t> mask);
+
 /// Absent where quantization, which is no Gaussian process, makes a part of every level, or where no level
-/// has coefficients enough. Looks at a quarter of a million samples at most, in blocks spread over the
-/// signal.
-/// @param options  mask and gaps
+/// has coefficients enough.
+/// @param options  gaps; its mask is not used
 /// @param model    of that signal, in sample terms; the first eight levels count
+std::optional<TailTest> test_tails(const TailExcerpt& excerpt, const WvOptions& options, const Model& model);
+
+/// The same of a signal's excerpt.
+/// @param options  mask and gaps
 std::optional<TailTest> test_tails(std::span<const double> x, const WvOptions& options, const Model& model);
 
 /// The sentence for a person, with what to do; absent where the test does not tell of spikes.

@@ -59,9 +59,13 @@ WvLevel level_of(int j, double value, std::uint64_t count) {
 }
 
 /// Of one run, block by block in cache.
-std::vector<WvLevel> whole_levels(std::span<const double> run, int levels) {
+/// @param run_is_used_up  its memory, where it may be written to; else empty
+std::vector<WvLevel> whole_levels(std::span<const double> run, std::span<double> run_is_used_up, int levels) {
   std::vector<LevelSum> sums(static_cast<std::size_t>(std::min(levels, highest_level(run.size()))));
-  add_squares(run, sums);
+  if (run_is_used_up.empty())
+    add_squares(run, sums);
+  else
+    add_squares_in_place(run_is_used_up, sums);
   std::vector<WvLevel> result;
   for (const LevelSum& sum : sums) {
     result.push_back(level_of(static_cast<int>(result.size()) + 1,
@@ -181,7 +185,11 @@ void set_intervals(std::vector<WvLevel>& levels, double efficiency, double confi
   }
 }
 
-Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const WvOptions& options) {
+namespace {
+
+/// @param used_up  the memory of x, where it may be written to; else empty
+Result<WaveletVariance> wavelet_variance(std::span<const double> x, std::span<double> used_up,
+                                         const WvOptions& options) {
   if (auto checked = check(x, options); !checked) return tl::unexpected(checked.error());
   WaveletVariance wv;
   wv.n_samples = x.size();
@@ -204,7 +212,9 @@ Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const W
   } else if (wv.segments.size() > 1) {
     wv.levels = levels_by_coefficients(x, wv.segments, wanted, std::nullopt);
   } else {
-    wv.levels = whole_levels(x.subspan(wv.segments.front().begin, longest), wanted);
+    const std::size_t begin = wv.segments.front().begin;
+    wv.levels = whole_levels(x.subspan(begin, longest),
+                             used_up.empty() ? used_up : used_up.subspan(begin, longest), wanted);
   }
   if (const auto possible = static_cast<int>(wv.levels.size()); options.levels > possible) {
     return work_error(
@@ -214,6 +224,16 @@ Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const W
   }
   set_intervals(wv.levels, wv.efficiency, options.confidence);
   return wv;
+}
+
+}  // namespace
+
+Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const WvOptions& options) {
+  return wavelet_variance(x, {}, options);
+}
+
+Result<WaveletVariance> haar_wavelet_variance_in_place(std::span<double> x, const WvOptions& options) {
+  return wavelet_variance(x, x, options);
 }
 
 }  // namespace imuscope::noise

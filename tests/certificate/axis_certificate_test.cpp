@@ -105,7 +105,7 @@ TEST(AxisCertificate, ABiasThatGoesWithTheTemperatureIsToldWithItsSd) {
   AxisRecord record = made_gyro(1U << 16U, 6);
   for (std::size_t i = 0; i < record.values.size(); ++i) {
     const double t = 30.0 + 5.0 * std::sin(2.0 * std::numbers::pi * static_cast<double>(i) / 40'000.0);
-    record.temperature_c.push_back(t);
+    record.temperature_c.push_back(static_cast<float>(t));
     record.values[i] += 0.01 * (t - 30.0);
   }
   const auto axis = characterize_axis(record, {});
@@ -113,6 +113,33 @@ TEST(AxisCertificate, ABiasThatGoesWithTheTemperatureIsToldWithItsSd) {
   ASSERT_TRUE(axis->temperature);
   EXPECT_NEAR(axis->temperature->bias_per_c, 0.01, 4.0 * axis->temperature->bias_per_c_sd);
   EXPECT_NEAR(axis->temperature->highest_c, 35.0, 0.01);
+}
+
+TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
+  AxisRecord record = made_gyro(40'000, 8, 0.2, 2e-4);
+  for (std::size_t i = 0; i < record.values.size(); ++i) {
+    record.values[i] += 0.05 * std::sin(2.0 * std::numbers::pi * 3.0 * static_cast<double>(i) / 100.0);
+    record.temperature_c.push_back(30.0F + static_cast<float>(i) * 1e-4F);
+  }
+  AxisRecord fetched = record;
+  fetched.values.clear();
+  fetched.fetch = [values = record.values]() -> Result<std::vector<double>> { return values; };
+  const std::vector records{fetched};
+  const auto there = characterize_axis(record, {});
+  const auto later = characterize_axes(records, {}).front();
+  ASSERT_TRUE(there && later);
+  const Origin origin{"a", {}, {}, "2026-01-01T00:00:00Z", "1"};
+  EXPECT_EQ(to_json(origin, {*there}), to_json(origin, {*later}));
+  EXPECT_FALSE(there->lines.empty());
+  EXPECT_TRUE(there->temperature);
+}
+
+TEST(AxisCertificate, ARecordThatCannotBeFetchedIsAnError) {
+  AxisRecord record = made_gyro(0, 1);
+  record.fetch = []() -> Result<std::vector<double>> { return work_error("the disk is gone"); };
+  const auto axis = characterize_axis(record, {});
+  ASSERT_FALSE(axis);
+  EXPECT_THAT(axis.error().text(), HasSubstr("gyro_x: the disk is gone"));
 }
 
 TEST(AxisCertificate, HalvesThatDifferAreTold) {

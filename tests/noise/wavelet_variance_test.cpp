@@ -364,5 +364,23 @@ TEST(WaveletVariance, MoreLevelsThanTheDataAllowAreRefusedWithTheNumberThatWorks
   EXPECT_THAT(refused.error().text(), HasSubstr("at most 9"));
 }
 
+TEST(WaveletVariance, InPlaceIsTheSameToTheBit) {
+  for (const std::size_t n : {std::size_t{1000}, std::size_t{100'003}}) {
+    auto x = white(n, 10);
+    for (double& v : x) v += 1e3;
+    std::vector<std::uint8_t> mask(n, 1);
+    mask.front() = mask.back() = 0;
+    WvOptions options;
+    options.mask = mask;
+    const auto wv = haar_wavelet_variance(x, options).value();
+    const auto in_place = haar_wavelet_variance_in_place(x, options).value();
+    ASSERT_EQ(in_place.levels.size(), wv.levels.size());
+    for (std::size_t i = 0; i < wv.levels.size(); ++i) {
+      EXPECT_EQ(in_place.levels[i].value, wv.levels[i].value) << n << ", level " << i + 1;
+      EXPECT_EQ(in_place.levels[i].n_coefficients, wv.levels[i].n_coefficients);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace imuscope::noise

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
 #include "base/json_text.h"
 #include "base/output_folder.h"
@@ -18,6 +19,7 @@
 #include "certificate/units.h"
 #include "certificate_table.h"
 #include "commands.h"
+#include "noise/covariance_table.h"
 #include "noise/holm.h"
 #include "page/printed_page.h"
 #include "print.h"
@@ -104,10 +106,40 @@ void print_axis(const certificate::AxisCertificate& axis) {
   }
 }
 
-/// Of the axes of one record with each other; nothing where they were not sampled together.
-std::optional<certificate::JointAxes> correlation_of(const SensorRecord& record, double confidence) {
+/// Samples a mean, so that a long record's axes lie in memory side by side. A power of two.
+constexpr std::size_t kMostTogether = std::size_t{1} << 21U;
+
+std::size_t samples_a_mean(std::size_t samples) {
+  std::size_t together = 1;
+  while (samples / together > kMostTogether) together *= 2;
+  return together;
+}
+
+/// Means of so many samples, one after the other.
+std::vector<double> means_of(const std::vector<double>& x, std::size_t together) {
+  std::vector<double> means(x.size() / together);
+  for (std::size_t i = 0; i < means.size(); ++i) {
+    const auto begin = x.begin() + static_cast<std::ptrdiff_t>(i * together);
+    means[i] = std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(together), 0.0) /
+               static_cast<double>(together);
+  }
+  return means;
+}
+
+/// Of the axes of one record with each other; nothing where they were not sampled together. Of axes that are
+/// fetched, at the scales of means.
+std::optional<certificate::JointAxes> correlation_of(const SensorRecord& record,
+                                                     const certificate::AxisOptions& options) {
   std::vector<std::vector<double>> values;  // NaN where a sample is missing
+  std::size_t together = 1;
   for (const auto& axis : record.axes) {
+    if (axis.fetch) {
+      const auto samples = axis.fetch();
+      if (!samples) return std::nullopt;
+      together = samples_a_mean(samples->size());
+      values.push_back(means_of(*samples, together));
+      continue;
+    }
     values.push_back(axis.values);
     for (std::size_t i = 0; i < axis.mask.size(); ++i) {
       if (axis.mask[i] == 0) values.back()[i] = std::numeric_limits<double>::quiet_NaN();
@@ -120,10 +152,11 @@ std::optional<certificate::JointAxes> correlation_of(const SensorRecord& record,
     signals.push_back({record.axes[i].name, values[i]});
   }
   certificate::JointOptions how;
-  how.confidence = confidence;
+  how.confidence = options.confidence;
+  how.covariances = options.covariances;
   how.share_a_reference = false;
   if (signals.empty()) return std::nullopt;
-  how.rate_hz = record.axes.front().rate_hz;
+  how.rate_hz = record.axes.front().rate_hz / static_cast<double>(together);
   auto joint = joint_axes(signals, how);
   if (!joint) return std::nullopt;  // a single axis, or one that is stuck
   return std::move(*joint);
@@ -239,6 +272,8 @@ Result<void> run_characterize(CharacterizeCommand& options) {
   bar.clear();
   if (!records) return tl::unexpected(records.error());
   std::vector<std::vector<certificate::AxisCertificate>> all;
+  noise::CovarianceTables covariances;
+  options.how.covariances = &covariances;
   auto documents = nlohmann::json::array();
   for (const SensorRecord& record : *records) {
     for (const auto& warning : record.warnings) say_aside("warning: {}\n", warning);
@@ -247,7 +282,7 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     const std::string name = options.sensor.empty() || records->size() > 1 ? record.name : options.sensor;
     documents.push_back(
         certificate::to_json({name, record.files, record.selection, now_utc(), IMUSCOPE_VERSION}, *axes));
-    if (const auto joint = correlation_of(record, options.how.confidence)) {
+    if (const auto joint = correlation_of(record, options.how)) {
       std::vector<std::string> names;
       for (const auto& axis : record.axes) names.push_back(axis.name);
       documents.back()["correlation"] = certificate::pairs_json(*joint, names);

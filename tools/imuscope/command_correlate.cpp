@@ -158,6 +158,11 @@ Result<void> correlate_log(const CorrelateCommand& options) {
   std::vector<certificate::JointSignal> signals;
   std::vector<std::string> names;
   for (auto& axis : axes) {
+    if (axis.fetch) {
+      auto samples = axis.fetch();
+      if (!samples) return tl::unexpected(samples.error());
+      axis.values = std::move(*samples);
+    }
     for (std::size_t t = 0; t < axis.mask.size(); ++t) {
       if (axis.mask[t] == 0) axis.values[t] = std::nan("");
     }

@@ -33,8 +33,12 @@ std::size_t place_of(const std::string& axis) {
   return static_cast<std::size_t>(std::find(kAxisOrder.begin(), kAxisOrder.end(), axis) - kAxisOrder.begin());
 }
 
-/// Mean of what is there.
+/// Mean of what is there; NaN where it cannot be read.
 double mean_of(const certificate::AxisRecord& record) {
+  if (record.fetch) {
+    const auto values = record.fetch();
+    return values ? mean_of({record.name, record.unit, record.rate_hz, *values, record.mask}) : std::nan("");
+  }
   double sum = 0.0;
   double n = 0.0;
   for (std::size_t i = 0; i < record.values.size(); ++i) {
@@ -43,6 +47,17 @@ double mean_of(const certificate::AxisRecord& record) {
     n += 1.0;
   }
   return n > 0.0 ? sum / n : 0.0;
+}
+
+void multiply(certificate::AxisRecord& record, double factor) {
+  if (factor == 1.0) return;
+  for (double& v : record.values) v *= factor;
+  if (!record.fetch) return;
+  record.fetch = [fetch = std::move(record.fetch), factor]() -> Result<std::vector<double>> {
+    auto values = fetch();
+    if (values) std::for_each(values->begin(), values->end(), [factor](double& v) { v *= factor; });
+    return values;
+  };
 }
 
 /// The unit of accelerometers at rest, by the size of gravity, where names do not tell.
@@ -76,7 +91,7 @@ Result<void> units_by_gravity(SensorRecord& sensor, const std::string& file) {
   for (auto& axis : sensor.axes) {
     if (is_gyro_name(axis.name)) continue;
     axis.unit = unit;
-    for (double& v : axis.values) v *= factor;
+    multiply(axis, factor);
   }
   return {};
 }
@@ -121,30 +136,78 @@ Result<noise::SignalUnit> given_unit(const AxisColumn& column, const RecordChoic
   return *unit;
 }
 
-/// Reads all axes side by side.
-Result<void> read_axes(SensorRecord& sensor, const std::vector<AxisSource>& sources,
-                       const std::string& temperature, const RecordChoice& choice) {
-  struct Job {
-    AxisSource source;
-    Result<Signal> signal = work_error("not read");
-  };
-  std::vector<Job> jobs;
-  for (const auto& source : sources) jobs.push_back({source});
-  if (!temperature.empty()) jobs.push_back({{sources.front().file, {"", temperature}}});
-  std::for_each(std::execution::par, jobs.begin(), jobs.end(), [&](Job& job) {
-    SignalChoice signal = choice.signal;
-    signal.column = job.source.column.column;
-    job.signal = read_signal(job.source.file, signal);
-  });
-  for (std::size_t i = 0; i < sources.size(); ++i) {
-    auto& signal = jobs[i].signal;
+/// What is read of the axes' sources, one a source.
+struct ReadAxes {
+  std::vector<Signal> signals;
+  std::vector<certificate::FetchSamples> fetches{};  ///< of raw files that stay where they are; else empty
+  std::vector<float> temperature_c;                  ///< empty: none
+};
+
+/// Columns of one table.
+Result<ReadAxes> read_table(const std::vector<AxisSource>& sources, const std::string& temperature,
+                            const SignalChoice& choice) {
+  std::vector<std::string> columns;
+  for (const AxisSource& source : sources) columns.push_back(source.column.column);
+  if (!temperature.empty()) columns.push_back(temperature);
+  auto table = read_signals(sources.front().file, choice, columns);
+  if (!table) return tl::unexpected(table.error());
+  ReadAxes out;
+  if (!temperature.empty())
+    out.temperature_c.assign(table->columns.back().begin(), table->columns.back().end());
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    out.signals.push_back({std::move(table->columns[i]), table->mask, table->rate_hz});
+  return out;
+}
+
+/// Raw files that together are larger are read axis by axis, when they are needed.
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{96} << 20U;
+
+bool are_long(const std::vector<AxisSource>& sources) {
+  std::uintmax_t bytes = 0;
+  for (const AxisSource& source : sources) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(source.file, error);
+    if (!error) bytes += size;
+  }
+  return bytes > kMostBytes;
+}
+
+/// Raw files side by side.
+Result<ReadAxes> read_raw_axes(const std::vector<AxisSource>& sources, const SignalChoice& choice) {
+  if (are_long(sources)) {
+    ReadAxes out;
+    for (const AxisSource& source : sources) {
+      out.signals.push_back({{}, {}, choice.rate_hz});
+      out.fetches.emplace_back([file = source.file, choice]() -> Result<std::vector<double>> {
+        auto signal = read_signal(file, choice);
+        if (!signal) return tl::unexpected(signal.error());
+        return std::move(signal->values);
+      });
+    }
+    return out;
+  }
+  std::vector<Result<Signal>> read(sources.size(), work_error("not read"));
+  std::transform(std::execution::par, sources.begin(), sources.end(), read.begin(),
+                 [&](const AxisSource& source) { return read_signal(source.file, choice); });
+  ReadAxes out;
+  for (auto& signal : read) {
     if (!signal) return tl::unexpected(signal.error());
+    out.signals.push_back(std::move(*signal));
+  }
+  return out;
+}
+
+/// Names, units and rates of what was read.
+Result<void> take_axes(SensorRecord& sensor, const std::vector<AxisSource>& sources, ReadAxes&& read,
+                       const RecordChoice& choice) {
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    Signal& signal = read.signals[i];
     const std::string file = sources[i].file.string();
-    if (!signal->rate_hz)
+    if (!signal.rate_hz)
       return usage_error(fmt::format("{} has no time stamps that would tell its rate", file),
                          "give the samples per second, --rate");
-    if (!(*signal->rate_hz > 0.0) || !std::isfinite(*signal->rate_hz))
-      return usage_error(fmt::format("--rate {} is impossible", *signal->rate_hz),
+    if (!(*signal.rate_hz > 0.0) || !std::isfinite(*signal.rate_hz))
+      return usage_error(fmt::format("--rate {} is impossible", *signal.rate_hz),
                          "give the samples per second");
     const auto unit = given_unit(sources[i].column, choice);
     if (!unit) return tl::unexpected(unit.error());
@@ -154,16 +217,14 @@ Result<void> read_axes(SensorRecord& sensor, const std::vector<AxisSource>& sour
     certificate::AxisRecord axis;
     axis.name = sources[i].column.axis;
     axis.unit = *unit;
-    axis.rate_hz = *signal->rate_hz;
-    axis.values = std::move(signal->values);
-    axis.mask = std::move(signal->mask);
-    if (sources[i].column.factor != 1.0) {
-      for (double& v : axis.values) v *= sources[i].column.factor;
-    }
-    if (!temperature.empty() && jobs.back().signal) axis.temperature_c = jobs.back().signal->values;
+    axis.rate_hz = *signal.rate_hz;
+    axis.values = std::move(signal.values);
+    axis.mask = std::move(signal.mask);
+    if (!read.fetches.empty()) axis.fetch = std::move(read.fetches[i]);
+    multiply(axis, sources[i].column.factor);
+    axis.temperature_c = read.temperature_c;
     sensor.axes.push_back(std::move(axis));
   }
-  if (!temperature.empty() && !jobs.back().signal) return tl::unexpected(jobs.back().signal.error());
   if (auto known = units_by_gravity(sensor, sources.front().file.string()); !known) return known;
   look_at_units(sensor);
   return {};
@@ -202,7 +263,10 @@ Result<SensorRecord> read_csv(const std::filesystem::path& file, const RecordCho
   }
   in_order(sources);
   SensorRecord sensor{file.stem().string(), {file.filename().string()}, {}, {}};
-  if (auto read = read_axes(sensor, sources, temperature, choice); !read) return tl::unexpected(read.error());
+  auto read = read_table(sources, temperature, choice.signal);
+  if (!read) return tl::unexpected(read.error());
+  if (auto taken = take_axes(sensor, sources, std::move(*read), choice); !taken)
+    return tl::unexpected(taken.error());
   return sensor;
 }
 
@@ -226,7 +290,10 @@ Result<SensorRecord> read_raw_files(const std::vector<std::filesystem::path>& fi
   in_order(sources);
   const auto folder = std::filesystem::absolute(files.front()).parent_path().filename().string();
   sensor.name = folder.empty() ? files.front().stem().string() : folder;
-  if (auto read = read_axes(sensor, sources, "", choice); !read) return tl::unexpected(read.error());
+  auto read = read_raw_axes(sources, choice.signal);
+  if (!read) return tl::unexpected(read.error());
+  if (auto taken = take_axes(sensor, sources, std::move(*read), choice); !taken)
+    return tl::unexpected(taken.error());
   return sensor;
 }
 

@@ -35,7 +35,8 @@ struct SensorRecord {
 };
 
 /// Raw files (.f64) named after axes, as "gyro_x_degps.f64", make one sensor; every CSV file, every run
-/// folder and every IMU of a capture is one of its own. Errors: those of read_signal(), a file without an
+/// folder and every IMU of a capture is one of its own. Raw files beyond a hundred megabytes stay where they
+/// are until an axis is fetched. Errors: those of read_signal(), a file without an
 /// axis that can be told (columns listed), units that neither names nor gravity tell, an IMU that a run
 /// folder does not have.
 Result<std::vector<SensorRecord>> read_records(const std::vector<std::filesystem::path>& files,

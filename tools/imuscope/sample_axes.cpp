@@ -55,8 +55,8 @@ Result<SampleAxes> AxesSink::axes(std::optional<double> rate_hz) && {
       signal.values.push_back(is_there ? values_[axis][i] : 0.0);
       signal.mask.push_back(is_there ? 1 : 0);
       if (axis > 0 || !has_temperature) continue;
-      out.temperature_c.insert(out.temperature_c.end(), hole, std::numeric_limits<double>::quiet_NaN());
-      out.temperature_c.push_back(static_cast<double>(temperature_c_[i]));
+      out.temperature_c.insert(out.temperature_c.end(), hole, std::numeric_limits<float>::quiet_NaN());
+      out.temperature_c.push_back(temperature_c_[i]);
     }
     values_[axis] = {};
   }

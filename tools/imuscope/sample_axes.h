@@ -20,7 +20,7 @@ inline constexpr std::array<const char*, 6> kMessageAxes{"gyro_x",  "gyro_y",  "
 /// Axes sample by sample in the order of kMessageAxes; times left out are gaps. rad/s and m/s^2.
 struct SampleAxes {
   std::array<Signal, kMessageAxes.size()> axes;
-  std::vector<double> temperature_c;  ///< one a sample, the last that was sent; empty where none was
+  std::vector<float> temperature_c;  ///< one a sample, the last that was sent; empty where none was
 };
 
 /// Takes an IMU's samples, in order, and keeps what the axes need of them.

@@ -44,8 +44,10 @@ std::size_t find_unquoted(std::string_view line, char wanted) {
   return std::string_view::npos;
 }
 
+bool has_quotes(std::string_view line) { return line.find('"') != std::string_view::npos; }
+
 std::string_view without_comment(std::string_view line) {
-  return trimmed(line.substr(0, find_unquoted(line, '#')));
+  return trimmed(line.substr(0, has_quotes(line) ? find_unquoted(line, '#') : line.find('#')));
 }
 
 /// ',' or ';' where the line has one, else tab, else blanks.
@@ -67,10 +69,13 @@ std::size_t end_of_cell(std::string_view line, char separator) {
              : end;
 }
 
-void split(std::string_view line, char separator, std::vector<std::string_view>& cells) {
+/// @param most  cells behind these are left out
+void split(std::string_view line, char separator, std::vector<std::string_view>& cells,
+           std::size_t most = std::numeric_limits<std::size_t>::max()) {
   cells.clear();
-  while (true) {
-    const std::size_t at = end_of_cell(line, separator);
+  const bool quoted = has_quotes(line);
+  while (cells.size() < most) {
+    const std::size_t at = quoted ? end_of_cell(line, separator) : line.find(separator);
     const std::string_view cell = trimmed(line.substr(0, at));
     if (separator != ' ' || !cell.empty()) cells.push_back(cell);
     if (at == std::string_view::npos) return;
@@ -147,9 +152,12 @@ constexpr std::size_t kLongestLine = std::size_t{1} << 20U;
 
 class CsvReader {
  public:
-  CsvReader(std::string file, const SignalChoice& choice) : file_(std::move(file)), choice_(choice) {}
+  CsvReader(std::string file, const SignalChoice& choice, std::vector<std::string> columns)
+      : file_(std::move(file)), choice_(choice), wanted_columns_(std::move(columns)) {
+    table_.columns.resize(wanted_columns_.size());
+  }
 
-  Result<Signal> read(std::istream& in) {
+  Result<SignalTable> read(std::istream& in) {
     std::string line;
     while (read_line(in, line, kLongestLine)) {
       ++line_number_;
@@ -161,18 +169,18 @@ class CsvReader {
       if (content.empty()) continue;
       if (auto taken = take(content); !taken) return tl::unexpected(taken.error());
     }
-    if (signal_.values.empty()) return work_error(fmt::format("{} holds no numbers", file_));
-    signal_.rate_hz = choice_.rate_hz;
+    if (table_.columns.front().empty()) return work_error(fmt::format("{} holds no numbers", file_));
+    table_.rate_hz = choice_.rate_hz;
     if (!stamps_s_.empty()) {
       if (auto placed = place_by_time(); !placed) return tl::unexpected(placed.error());
     }
-    return std::move(signal_);
+    return std::move(table_);
   }
 
  private:
   Result<void> take(std::string_view line) {
     if (!started_) return start(line);
-    split(line, separator_, cells_);
+    split(line, separator_, cells_, last_read_ + 1);
     return add_row();
   }
 
@@ -190,9 +198,11 @@ class CsvReader {
   }
 
   Result<void> find_columns(const std::vector<std::string>& names, bool has_header) {
-    const auto index = find_column(names, has_header, choice_.column, file_);
-    if (!index) return tl::unexpected(index.error());
-    index_ = *index;
+    for (const std::string& wanted : wanted_columns_) {
+      const auto index = find_column(names, has_header, wanted, file_);
+      if (!index) return tl::unexpected(index.error());
+      indices_.push_back(*index);
+    }
     if (!choice_.where.empty()) {
       const std::size_t equals = choice_.where.find('=');
       if (equals == std::string::npos || equals == 0) {
@@ -209,7 +219,11 @@ class CsvReader {
       if (!column) return tl::unexpected(column.error());
       counter_index_ = *column;
     }
-    return find_time(names, has_header);
+    if (auto found = find_time(names, has_header); !found) return found;
+    last_read_ = *std::max_element(indices_.begin(), indices_.end());
+    for (const auto& index : {where_index_, counter_index_, time_index_, week_index_})
+      last_read_ = std::max(last_read_, index.value_or(0));
+    return {};
   }
 
   Result<void> find_time(const std::vector<std::string>& names, bool has_header) {
@@ -234,7 +248,7 @@ class CsvReader {
   void find_time_by_name(const std::vector<std::string>& names) {
     const auto at = [&](bool (*is)(std::string_view)) -> std::optional<std::size_t> {
       for (std::size_t i = 0; i < names.size(); ++i) {
-        if (i != index_ && is(names[i])) return i;
+        if (std::find(indices_.begin(), indices_.end(), i) == indices_.end() && is(names[i])) return i;
       }
       return std::nullopt;
     };
@@ -274,7 +288,7 @@ class CsvReader {
       error.what = fmt::format("{}: {}", file_, error.what);
       return tl::unexpected(error);
     }
-    signal_.rate_hz = rows->rate_hz;
+    table_.rate_hz = rows->rate_hz;
     std::int64_t missing = 0;
     for (const std::int64_t n : rows->missing_before) missing = std::min(missing + n, kHolesMax + 1);
     if (missing == 0) return {};
@@ -282,17 +296,22 @@ class CsvReader {
       return work_error(fmt::format("{}: the times leave out more than {} samples", file_, kHolesMax),
                         "cut the file where the long gaps are");
     }
-    Signal placed;
-    placed.rate_hz = rows->rate_hz;
-    for (std::size_t i = 0; i < signal_.values.size(); ++i) {
-      const auto hole = static_cast<std::size_t>(rows->missing_before[i]);
-      placed.values.insert(placed.values.end(), hole, 0.0);
-      placed.mask.insert(placed.mask.end(), hole, 0);
-      placed.values.push_back(signal_.values[i]);
-      placed.mask.push_back(signal_.mask.empty() ? 1 : signal_.mask[i]);
-    }
-    signal_ = std::move(placed);
+    if (table_.mask.empty()) table_.mask.assign(table_.columns.front().size(), 1);
+    table_.mask = with_holes(table_.mask, rows->missing_before);
+    for (auto& column : table_.columns) column = with_holes(column, rows->missing_before);
     return {};
+  }
+
+  /// Zeros where the times say that samples are missing.
+  template <typename T>
+  static std::vector<T> with_holes(const std::vector<T>& rows,
+                                   const std::vector<std::int64_t>& missing_before) {
+    std::vector<T> placed;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      placed.insert(placed.end(), static_cast<std::size_t>(missing_before[i]), T{});
+      placed.push_back(rows[i]);
+    }
+    return placed;
   }
 
   Result<std::string_view> cell(std::size_t index) const {
@@ -310,15 +329,19 @@ class CsvReader {
   }
 
   /// NaN where the table says that it has none.
-  Result<double> signal_value() const {
-    const auto text = cell(index_);
+  Result<double> signal_value(std::size_t index) const {
+    const auto text = cell(index);
     if (text && is_missing(*text)) return std::numeric_limits<double>::quiet_NaN();
-    return number(index_);
+    return number(index);
   }
 
   Result<void> add_row() {
-    const auto value = signal_value();
-    if (!value) return tl::unexpected(value.error());
+    row_.clear();
+    for (const std::size_t index : indices_) {
+      const auto value = signal_value(index);
+      if (!value) return tl::unexpected(value.error());
+      row_.push_back(*value);
+    }
     if (counter_index_) {
       if (auto padded = pad_hole(); !padded) return padded;
     }
@@ -331,7 +354,8 @@ class CsvReader {
       if (!text) return tl::unexpected(text.error());
       valid = *text == wanted_;
     }
-    add(*value, valid);
+    for (std::size_t i = 0; i < row_.size(); ++i) table_.columns[i].push_back(row_[i]);
+    add_to_mask(valid);
     return {};
   }
 
@@ -351,22 +375,27 @@ class CsvReader {
                                     *next_counter_ - 1, counter),
                         "it must rise from row to row");
     }
-    for (std::int64_t i = 0; i < hole; ++i) add(0.0, false);
+    for (std::int64_t i = 0; i < hole; ++i) {
+      for (auto& column : table_.columns) column.push_back(0.0);
+      add_to_mask(false);
+    }
     next_counter_ = counter + 1;
     counts_.push_back(counter);
     return {};
   }
 
-  void add(double value, bool valid) {
-    signal_.values.push_back(value);
-    if (where_index_ || counter_index_) signal_.mask.push_back(valid ? 1 : 0);
+  void add_to_mask(bool valid) {
+    if (where_index_ || counter_index_) table_.mask.push_back(valid ? 1 : 0);
   }
 
   std::string file_;
   const SignalChoice& choice_;
+  std::vector<std::string> wanted_columns_;
   std::vector<std::string_view> cells_;
-  Signal signal_;
-  std::size_t index_ = 0;
+  SignalTable table_;
+  std::vector<std::size_t> indices_;  ///< of the wanted columns
+  std::size_t last_read_ = 0;         ///< nothing behind this cell is looked at
+  std::vector<double> row_;
   std::optional<std::size_t> where_index_;
   std::string wanted_;
   std::optional<std::size_t> counter_index_;
@@ -392,6 +421,7 @@ Result<Signal> read_raw(std::istream& in, std::uintmax_t size, const std::string
   }
   Signal signal;
   signal.rate_hz = choice.rate_hz;
+  signal.values.reserve(size / sizeof(double) + 1);  // sums of them take one more place
   signal.values.resize(size / sizeof(double));
   if (!in.read(reinterpret_cast<char*>(signal.values.data()), static_cast<std::streamsize>(size))) {
     return work_error(fmt::format("{} could not be read to its end", file));
@@ -411,7 +441,10 @@ std::vector<std::string> cells_of(std::string_view line) {
   return out;
 }
 
-Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice& choice) {
+namespace {
+
+/// Opens a file that holds something.
+Result<std::ifstream> open_signal(const std::filesystem::path& file) {
   const std::string name = file.string();
   std::error_code error;
   const auto status = std::filesystem::status(file, error);
@@ -422,8 +455,27 @@ Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice
   std::ifstream in(file, std::ios::binary);
   if (!in) return work_error(fmt::format("{} cannot be opened: {}", name, std::strerror(errno)));
   if (in.peek() == std::ifstream::traits_type::eof()) return work_error(fmt::format("{} is empty", name));
-  if (file.extension() == ".f64") return read_raw(in, std::filesystem::file_size(file, error), name, choice);
-  return CsvReader(name, choice).read(in);
+  return in;
+}
+
+}  // namespace
+
+Result<SignalTable> read_signals(const std::filesystem::path& file, const SignalChoice& choice,
+                                 const std::vector<std::string>& columns) {
+  auto in = open_signal(file);
+  if (!in) return tl::unexpected(in.error());
+  return CsvReader(file.string(), choice, columns).read(*in);
+}
+
+Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice& choice) {
+  auto in = open_signal(file);
+  if (!in) return tl::unexpected(in.error());
+  std::error_code error;
+  if (file.extension() == ".f64")
+    return read_raw(*in, std::filesystem::file_size(file, error), file.string(), choice);
+  auto table = CsvReader(file.string(), choice, {choice.column}).read(*in);
+  if (!table) return tl::unexpected(table.error());
+  return Signal{std::move(table->columns.front()), std::move(table->mask), table->rate_hz};
 }
 
 }  // namespace imuscope::cli

@@ -30,6 +30,13 @@ struct Signal {
   std::optional<double> rate_hz;   ///< as asked for, or as the times have it; absent where neither tells
 };
 
+/// Several columns of one table, read in one go.
+struct SignalTable {
+  std::vector<std::vector<double>> columns;
+  std::vector<std::uint8_t> mask;  ///< of all columns, as Signal::mask
+  std::optional<double> rate_hz;   ///< as Signal::rate_hz
+};
+
 /// The cells of a line of a CSV file, quotes taken off; empty for an empty line or a comment.
 std::vector<std::string> cells_of(std::string_view line);
 
@@ -39,5 +46,10 @@ std::vector<std::string> cells_of(std::string_view line);
 /// back. kUsage: a column that does not exist (columns listed, nearest name suggested), a choice of columns
 /// in a raw file, a rate that contradicts the times (with the one that fits).
 Result<Signal> read_signal(const std::filesystem::path& file, const SignalChoice& choice);
+
+/// Columns of a CSV file, each as read_signal() would read it, in their order.
+/// @param columns  in the place of `choice.column`; at least one
+Result<SignalTable> read_signals(const std::filesystem::path& file, const SignalChoice& choice,
+                                 const std::vector<std::string>& columns);
 
 }  // namespace imuscope::cli

@@ -132,7 +132,7 @@ py::dict allan_deviation(const SignalChoice& choice, int points_per_octave, cons
   {
     const py::gil_scoped_release unlocked;
     const auto wv = take(noise::haar_wavelet_variance(x, options));
-    points = noise::allan_deviation(x, wv, choice.rate_hz, points_per_octave);
+    points = noise::allan_deviation({x.begin(), x.end()}, wv, choice.rate_hz, points_per_octave);
     std::optional<noise::FitResult> fitted;
     if (!fit_document.empty()) fitted = take(noise::fit_from_json(parsed(fit_document)));
     noise::set_allan_intervals(points, fitted ? &*fitted : nullptr, choice.confidence);
