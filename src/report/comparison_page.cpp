@@ -21,6 +21,7 @@ namespace report {
 namespace {
 
 using tables::number_at;
+using tables::numbers_at;
 using tables::text_at;
 
 using Three = std::array<double, 3>;

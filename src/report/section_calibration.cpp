@@ -13,6 +13,7 @@ namespace {
 
 using tables::field;
 using tables::number_at;
+using tables::numbers_at;
 using tables::text_at;
 
 using Three = std::array<double, 3>;

@@ -17,6 +17,7 @@ namespace {
 
 using tables::field;
 using tables::number_at;
+using tables::numbers_at;
 using tables::text_at;
 
 /// An error beyond this many sd is not chance.
