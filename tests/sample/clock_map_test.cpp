@@ -400,7 +400,8 @@ double drift_of_a_clock_that_turns_ppm(double turn_s, int intervals) {
   for (int i = 0; i <= intervals; ++i) {
     const bool holds_turn = std::floor(turn_s / kInterval_s) == i;
     const double device_s = holds_turn ? turn_s : kInterval_s * i + 1.9;
-    (void)map.observe(std::llround(device_s * 1e9), host_at(0.9 + device_s + kRate * std::abs(device_s - turn_s)));
+    (void)map.observe(std::llround(device_s * 1e9),
+                      host_at(0.9 + device_s + kRate * std::abs(device_s - turn_s)));
   }
   EXPECT_EQ(map.restarts(), 0U);
   return map.drift_ppm();
