@@ -6,6 +6,7 @@ Usage: tests/campaigns/demo.py FILE [--study NAME]...
 Writes the vehicle to FILE.
 """
 import argparse
+import datetime
 import json
 import pathlib
 import re
@@ -18,7 +19,7 @@ TURNS_DEG = {"mtx1": [0.0, 0.0, 0.0], "mtx2": [0.0, 0.0, 91.0], "mtx3": [179.0, 
 
 
 def demo(*, ports=None, duration_s=None, start_utc=None, studies=None, with_priors=False):
-    """The demo's tables. ports: the folder of its pseudo-terminals. studies: the names of the S-IMUs that stay."""
+    """The demo's tables. ports: the folder of its pseudo-terminals. start_utc: a datetime. studies: the names of the S-IMUs that stay."""
     vehicle = tomllib.loads((ROOT / "config" / "demo.toml").read_text())
     simulation = vehicle["simulation"]
     if studies is not None:
@@ -47,7 +48,9 @@ def _value(value):
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, (bool, str)):
         return json.dumps(value)  # TOML's strings take JSON's escapes
-    return value.isoformat() if hasattr(value, "isoformat") else repr(value)
+    if isinstance(value, datetime.datetime):
+        return value.isoformat().replace("+00:00", "Z")
+    return repr(value)
 
 
 def toml(tables, path=""):

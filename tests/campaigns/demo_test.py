@@ -1,4 +1,5 @@
 """Usage: demo_test.py BIN     with the folder of the programs"""
+import datetime
 import pathlib
 import subprocess
 import sys
@@ -11,6 +12,7 @@ sys.dont_write_bytecode = True
 from campaigns.demo import ROOT, TURNS_DEG, demo, toml, write  # noqa: E402
 
 BIN = pathlib.Path(sys.argv.pop(1))
+BEGIN = datetime.datetime(2016, 12, 31, 23, tzinfo=datetime.timezone.utc)
 
 
 class Demo(unittest.TestCase):
@@ -18,11 +20,11 @@ class Demo(unittest.TestCase):
         self.assertEqual(tomllib.loads(toml(demo())), tomllib.loads((ROOT / "config" / "demo.toml").read_text()))
 
     def test_changes_are_where_they_belong_and_nowhere_else(self):
-        changed = demo(ports="/run/x", duration_s=30, start_utc="2016-12-31T23:00:00Z", with_priors=True)
+        changed = demo(ports="/run/x", duration_s=30, start_utc=BEGIN, with_priors=True)
         read = tomllib.loads(toml(changed))
         self.assertEqual([device["transport"]["port"] for device in read["device"]],
                          [f"/run/x/{device['name']}" for device in demo()["device"]])
-        self.assertEqual((read["simulation"]["duration_s"], read["simulation"]["start_utc"]), (30.0, "2016-12-31T23:00:00Z"))
+        self.assertEqual((read["simulation"]["duration_s"], read["simulation"]["start_utc"]), (30.0, BEGIN))
         priors = {device["name"]: device["prior"]["rotation_vector_b_s_deg"] for device in read["device"] if "prior" in device}
         self.assertEqual(priors, TURNS_DEG)
         for device in read["device"]:
@@ -51,7 +53,7 @@ class Demo(unittest.TestCase):
     def test_the_programs_take_it(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "demo.toml"
-            write(demo(ports=folder, with_priors=True, start_utc="2016-12-31T23:00:00Z"), file)
+            write(demo(ports=folder, with_priors=True, start_utc=BEGIN), file)
             for words in (["imuscope", "config", file], ["imusim", "record", file, "--minutes", "0.05", "--out", f"{folder}/drive"]):
                 done = subprocess.run([BIN / words[0], *words[1:]], capture_output=True, text=True)
                 self.assertEqual(done.returncode, 0, done.stderr)

@@ -6,7 +6,7 @@ import math
 import statistics
 
 # Saturday, the last second of a GPS week, before a leap second (23:59:60 UTC), midnight and a new year.
-LEAP_DAY_END = datetime.datetime(2017, 1, 1)
+LEAP_DAY_END = datetime.datetime(2017, 1, 1, tzinfo=datetime.timezone.utc)
 # Steps of a row: a count of the S-IMU, and a hundredth of a second.
 LONGEST_STEP_S = 0.011
 TOLD_AT_MOST = 5
@@ -30,7 +30,7 @@ class Verdict:
 
 def begin_utc(seconds):
     """Begin of a drive of so many seconds in whose middle the year ends."""
-    return (LEAP_DAY_END - datetime.timedelta(seconds=seconds // 2)).strftime("%Y-%m-%dT%H:%M:%SZ")
+    return LEAP_DAY_END - datetime.timedelta(seconds=seconds // 2)
 
 
 def growth(what, unit, values, allowed):
