@@ -2,13 +2,7 @@
 
 // Boost.Beast takes long to compile: this file is built alone.
 #include <fmt/format.h>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
 #include <chrono>
-#include <list>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -16,6 +10,8 @@
 #include "doors/metrics_text.h"
 #include "rt/host_clock.h"
 #include "rt/thread_setup.h"
+#include "web/http_listener.h"
+#include "web/request_rules.h"
 
 namespace imuscope {
 
@@ -27,22 +23,16 @@ namespace http = beast::http;
 using asio::ip::tcp;
 using beast::error_code;
 
-using Request = http::request<http::empty_body>;
-using Response = http::response<http::string_body>;
+using web::Request;
+using web::Response;
+using web::view_of;
 
 /// What a client may say; a request has some hundred bytes.
 constexpr std::uint32_t kRequestMax = 16 * 1024;
-constexpr std::chrono::milliseconds kAcceptAgain{100};  // after the system had no socket left
 constexpr const char* kPlainText = "text/plain; charset=utf-8";
 
-std::string_view view_of(beast::string_view text) { return {text.data(), text.size()}; }
-
-/// Whether a Host header is this PC's own name for itself. A client without one is no browser.
-bool is_of_this_pc(std::string_view host) {
-  if (host.empty() || host.starts_with("[::1]")) return true;
-  const auto name = host.substr(0, host.find(':'));
-  return name == "localhost" || name.starts_with("127.");
-}
+/// A client that names no host is no browser, where a page could have its own name lead here.
+bool is_of_this_pc(std::string_view host) { return host.empty() || web::is_host_allowed(host, {}); }
 
 }  // namespace
 
@@ -57,20 +47,17 @@ struct MetricsServer::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  error_code listen(const tcp::endpoint& endpoint);
+  std::shared_ptr<Client> begin(tcp::socket&& socket);
   void serve() {
     (void)setup_this_thread({kMetricsThreadName, Scheduling::kNormal, 0, {}});
     io.run();
   }
-  void accept();
-  void take(tcp::socket socket);
 
   const StatusBoard& board;
   bool is_loopback = true;
   asio::io_context io{1};
-  tcp::acceptor acceptor{io};
-  asio::steady_timer again{io};
-  std::list<std::weak_ptr<Client>> clients;  // oldest first
+  web::HttpListener<Client> listener{io, kClientsMax,
+                                     [this](tcp::socket&& socket) { return begin(std::move(socket)); }};
   std::thread thread;
 };
 
@@ -109,16 +96,10 @@ class MetricsServer::Impl::Client : public std::enable_shared_from_this<Client> 
   }
 
   void reply(const Request& request, http::status status, std::string text, const char* type = kPlainText) {
-    const auto response = std::make_shared<Response>(status, request.version());
-    response->set(http::field::content_type, type);
-    response->keep_alive(false);
-    response->content_length(text.size());
-    if (request.method() != http::verb::head) response->body() = std::move(text);
-    stream_.expires_after(std::chrono::seconds(kPatience_s));
-    http::async_write(stream_, *response, [self = shared_from_this(), response](error_code, std::size_t) {
-      error_code ignored;
-      self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-    });
+    Response response(status, request.version());
+    response.set(http::field::content_type, type);
+    response.body() = std::move(text);
+    web::answer(stream_, request, std::move(response), shared_from_this(), std::chrono::seconds(kPatience_s));
   }
 
   const Impl& server_;
@@ -127,38 +108,8 @@ class MetricsServer::Impl::Client : public std::enable_shared_from_this<Client> 
   http::request_parser<http::empty_body> parser_;
 };
 
-error_code MetricsServer::Impl::listen(const tcp::endpoint& endpoint) {
-  error_code error;
-  acceptor.open(endpoint.protocol(), error);
-  if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
-  if (!error) acceptor.bind(endpoint, error);
-  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
-  return error;
-}
-
-void MetricsServer::Impl::accept() {
-  acceptor.async_accept([this](error_code error, tcp::socket socket) {
-    if (!error) {
-      take(std::move(socket));
-      return accept();
-    }
-    if (error == asio::error::operation_aborted) return;
-    again.expires_after(kAcceptAgain);
-    again.async_wait([this](error_code stopped) {
-      if (!stopped) accept();
-    });
-  });
-}
-
-void MetricsServer::Impl::take(tcp::socket socket) {
-  clients.remove_if([](const std::weak_ptr<Client>& one) { return one.expired(); });
-  if (clients.size() >= kClientsMax) {
-    if (const auto oldest = clients.front().lock()) oldest->drop();
-    clients.pop_front();
-  }
-  const auto one = std::make_shared<Client>(*this, std::move(socket));
-  clients.push_back(one);
-  one->read();
+std::shared_ptr<MetricsServer::Impl::Client> MetricsServer::Impl::begin(tcp::socket&& socket) {
+  return std::make_shared<Client>(*this, std::move(socket));
 }
 
 MetricsServer::MetricsServer(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
@@ -173,11 +124,10 @@ Result<std::unique_ptr<MetricsServer>> MetricsServer::open(const std::string& ad
                        "give 127.0.0.1, ::1 or an address of this PC; 0.0.0.0 is all of them");
   auto impl = std::make_unique<Impl>(board);
   impl->is_loopback = parsed.is_loopback();
-  if (error = impl->listen({parsed, port}); error)
+  if (error = impl->listener.open({parsed, port}); error)
     return work_error(
         fmt::format("metrics cannot be offered at {} port {} ({})", address, port, error.message()),
         "choose another port in [metrics]; ss -ltnp shows who has it");
-  impl->accept();
   impl->thread = std::thread([raw = impl.get()] { raw->serve(); });
   return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(impl)));
 }

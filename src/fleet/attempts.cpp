@@ -14,8 +14,8 @@
 #include <sstream>
 
 #include "base/json_text.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {
@@ -80,8 +80,8 @@ json to_json(const Attempt& attempt) {
 }
 
 std::optional<Attempt> from_json(const json& document) {
-  using report::number_at;
-  using report::text_at;
+  using tables::number_at;
+  using tables::text_at;
   if (text_at(document, "schema") != kSchema) return std::nullopt;
   Attempt attempt;
   attempt.key = text_at(document, "key");
@@ -166,7 +166,7 @@ std::vector<Attempt> Attempts::of(const std::string& key) const {
     const auto file = folder_.path() / attempt_file(key, number);
     std::error_code error;
     if (!std::filesystem::exists(file, error)) break;
-    if (auto attempt = from_json(report::read_json_file(file))) {
+    if (auto attempt = from_json(tables::read_json_file(file))) {
       found.push_back(std::move(*attempt));
     } else {
       // Begun, and killed before it could say so.
@@ -185,7 +185,7 @@ std::vector<Attempt> Attempts::all() const {
   std::vector<Attempt> found;
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder_.path(), error)) {
-    if (auto attempt = from_json(report::read_json_file(entry.path()))) found.push_back(std::move(*attempt));
+    if (auto attempt = from_json(tables::read_json_file(entry.path()))) found.push_back(std::move(*attempt));
   }
   std::sort(found.begin(), found.end(), [](const Attempt& a, const Attempt& b) {
     return std::tie(a.key, a.number) < std::tie(b.key, b.number);

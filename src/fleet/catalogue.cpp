@@ -26,17 +26,17 @@
 #include "fleet/study_task.h"
 #include "fleet/unit_task.h"
 #include "noise/holm.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {
 
 using nlohmann::json;
-using report::field;
-using report::number_at;
-using report::numbers_at;
-using report::text_at;
+using tables::field;
+using tables::number_at;
+using tables::numbers_at;
+using tables::text_at;
 namespace fs = std::filesystem;
 
 constexpr double kConfidenceInSd = 1.959964;
@@ -182,7 +182,7 @@ class Reducer {
   [[nodiscard]] json result_of(const Capture& capture) const {
     const fs::path file = fleet_.out / "studies" / capture.key / "result.json";
     std::error_code error;
-    return !capture.key.empty() && fs::exists(file, error) ? report::read_json_file(file) : json();
+    return !capture.key.empty() && fs::exists(file, error) ? tables::read_json_file(file) : json();
   }
 
   Result<void> add_capture(const Capture& capture, const json& result) {
@@ -204,7 +204,7 @@ class Reducer {
                      mounting != nullptr ? Cell(mounting->name) : Cell(), capture.key, state, reason});
     const json& summary = field(result, "summary");
     if (mounting == nullptr || !summary.is_object()) return {};
-    return report::with_documents_of(fleet_.out, [&]() -> Result<void> {
+    return tables::with_documents_of(fleet_.out, [&]() -> Result<void> {
       add_drive(capture.name, place, *mounting, summary);
       return {};
     });
@@ -310,7 +310,7 @@ class Reducer {
       }
     }
     for (const auto& [serial, file] : fleet_.certificates) {
-      const json certificate = report::read_json_file(file);
+      const json certificate = tables::read_json_file(file);
       for (const json& axis : field(certificate, "axes")) {
         const bool gyro = text_at(axis, "name").starts_with("gyro");
         for (const json& term : field(axis, "terms")) {
@@ -405,7 +405,7 @@ class Reducer {
   }
 
   void add_unit(const UnitTask& task) {
-    const json result = report::read_json_file(task.out / "units" / (task.key + ".json"));
+    const json result = tables::read_json_file(task.out / "units" / (task.key + ".json"));
     units_(task.unit);
     for (const json& q : field(result, "quantities")) {
       const auto id = quantity_ids_.find({text_at(q, "quantity"), text_at(q, "regime"), text_at(q, "axis")});
@@ -451,7 +451,7 @@ class Reducer {
     for (const auto& entry : fs::directory_iterator(fleet_.out / "studies", error)) {
       const std::string key = entry.path().filename().string();
       if (planned_.count(key) > 0) continue;
-      const json result = report::read_json_file(entry.path() / "result.json");
+      const json result = tables::read_json_file(entry.path() / "result.json");
       row("other_results",
           {key, text_at(result, "program"), text_at(result, "state"), text_at(result, "reason")});
     }

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "report/json_fields.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::fleet {
 
@@ -39,13 +39,13 @@ inline std::optional<MeasurementRow> measurement_of(const nlohmann::json& cells)
 inline std::vector<MeasurementRow> measurements_of(const nlohmann::json& imu) {
   enum Place : std::size_t { kProcess, kName, kUnit, kValue, kSd };
   std::vector<MeasurementRow> rows;
-  for (const auto& cells : report::field(imu, "measurements")) {
+  for (const auto& cells : tables::field(imu, "measurements")) {
     if (auto row = measurement_of(cells)) rows.push_back(std::move(*row));
   }
-  for (const auto& model : report::field(imu, "models")) {
-    const std::string regime = report::text_at(model, "regime");
-    const std::string axis = report::text_at(model, "axis");
-    for (const auto& p : report::field(model, "parameters")) {
+  for (const auto& model : tables::field(imu, "models")) {
+    const std::string regime = tables::text_at(model, "regime");
+    const std::string axis = tables::text_at(model, "axis");
+    for (const auto& p : tables::field(model, "parameters")) {
       if (!p.is_array() || p.size() <= kSd || !p[kValue].is_number() || !p[kSd].is_number()) continue;
       const double value = p[kValue];
       const double sd = p[kSd];

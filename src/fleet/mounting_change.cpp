@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/units.h"
-#include "report/json_fields.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::fleet {
 namespace {
@@ -28,10 +28,10 @@ Eigen::Vector3d change_deg(const std::array<double, 9>& first, const std::array<
 
 void MountingChange::take(const std::string& mounting, const Place& place, double day,
                           const nlohmann::json& imu) {
-  const auto C = report::numbers_at<9>(imu, "C_b_s");
-  const auto psi_sd = report::numbers_at<3>(imu, "boresight_sd_deg");
-  const auto r = report::numbers_at<3>(imu, "r_bs_b_m");
-  const auto r_sd = report::numbers_at<3>(imu, "r_bs_b_sd_m");
+  const auto C = tables::numbers_at<9>(imu, "C_b_s");
+  const auto psi_sd = tables::numbers_at<3>(imu, "boresight_sd_deg");
+  const auto r = tables::numbers_at<3>(imu, "r_bs_b_m");
+  const auto r_sd = tables::numbers_at<3>(imu, "r_bs_b_sd_m");
   if (!C || !psi_sd || !r || !r_sd) return;
   const auto positive = [](const std::array<double, 3>& sd) {
     return std::all_of(sd.begin(), sd.end(), [](double one) { return std::isfinite(one) && one > 0.0; });

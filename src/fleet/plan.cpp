@@ -16,8 +16,8 @@
 #include "base/text.h"
 #include "capture/capture_files.h"
 #include "fleet/content_hash.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {
@@ -123,16 +123,16 @@ json stamp_of(const std::vector<fs::path>& files, std::uintmax_t& bytes) {
 }
 
 Result<void> hash_captures(std::vector<Capture>& captures, const OutputFolder& out) {
-  const json kept = report::read_json_file(out.path() / kHashes);
-  const json& known = report::field(kept, "captures");
+  const json kept = tables::read_json_file(out.path() / kHashes);
+  const json& known = tables::field(kept, "captures");
   std::vector<json> stamps(captures.size());
   std::vector<std::optional<Error>> errors(captures.size());
   tbb::parallel_for(std::size_t{0}, captures.size(), [&](std::size_t i) {
     Capture& capture = captures[i];
     stamps[i] = stamp_of(capture.files, capture.bytes);
-    const json& before = report::field(known, capture.name.c_str());
-    if (!stamps[i].is_null() && report::field(before, "files") == stamps[i]) {
-      capture.sha256 = report::text_at(before, "sha256");
+    const json& before = tables::field(known, capture.name.c_str());
+    if (!stamps[i].is_null() && tables::field(before, "files") == stamps[i]) {
+      capture.sha256 = tables::text_at(before, "sha256");
       return;
     }
     const auto hash = sha256_of_files(capture.files);

@@ -12,18 +12,18 @@
 #include "base/units.h"
 #include "noise/json.h"
 #include "noise/quantities.h"
-#include "report/csv_reader.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
+#include "tables/csv_reader.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {
 
 using nlohmann::json;
-using report::field;
-using report::number_at;
-using report::numbers_at;
-using report::text_at;
+using tables::field;
+using tables::number_at;
+using tables::numbers_at;
+using tables::text_at;
 
 constexpr std::array<const char*, 3> kXyz{"x", "y", "z"};
 /// Points of a track on the map.
@@ -148,7 +148,7 @@ json imu_of(const json& imu, const json& run, const json& models, const json& de
            {"status", text_at(imu, "status")},
            {"usability", usability_words(imu)},
            {"temperature_degC", temperature_of(dependence, device)},
-           {"data_sheet", field(report::named(field(run, "devices"), device), "data_sheet")},
+           {"data_sheet", field(tables::named(field(run, "devices"), device), "data_sheet")},
            {"measurements", measurements.take()},
            {"models", std::move(fits)}};
   for (const char* key : {"C_b_s", "boresight_sd_deg", "r_bs_b_m", "r_bs_b_sd_m", "t_d_s", "t_d_sd_s"})
@@ -196,7 +196,7 @@ Track track_of(const std::filesystem::path& run) {
   const auto smoothed = run / "smoothed_navigation.csv";
   const bool is_smoothed = std::filesystem::exists(smoothed, error);
   auto reader =
-      report::CsvReader::open(is_smoothed ? smoothed : run / "navigation.csv", {"lat_deg", "lon_deg"});
+      tables::CsvReader::open(is_smoothed ? smoothed : run / "navigation.csv", {"lat_deg", "lon_deg"});
   if (!reader) return track;
   std::vector<std::array<double, 2>> all;
   while (reader->next()) {
@@ -218,7 +218,7 @@ Track track_of(const std::filesystem::path& run) {
 }
 
 Result<json> document(const std::filesystem::path& run, const char* name) {
-  json out = report::read_json_file(run / name);
+  json out = tables::read_json_file(run / name);
   if (!out.is_object()) return work_error(fmt::format("{} is no document of a run", (run / name).string()));
   return out;
 }
@@ -226,13 +226,13 @@ Result<json> document(const std::filesystem::path& run, const char* name) {
 }  // namespace
 
 Result<json> summary_of_run(const std::filesystem::path& folder) {
-  return report::with_documents_of(folder, [&]() -> Result<json> {
+  return tables::with_documents_of(folder, [&]() -> Result<json> {
     const auto run = document(folder, "run.json");
     if (!run) return tl::unexpected<Error>(run.error());
     const auto calibration = document(folder, "calibration.json");
     if (!calibration) return tl::unexpected<Error>(calibration.error());
-    const json models = report::read_json_file(folder / "models.json");
-    const json dependence = report::read_json_file(folder / "dependence.json");
+    const json models = tables::read_json_file(folder / "models.json");
+    const json dependence = tables::read_json_file(folder / "dependence.json");
     Track track = track_of(folder);
     const json& regimes = field(*run, "regimes");
     json out{{"t0_utc", text_at(*run, "t0_utc")},

@@ -16,8 +16,8 @@
 #include "fleet/child.h"
 #include "fleet/content_hash.h"
 #include "fleet/study_summary.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {
@@ -216,13 +216,13 @@ TaskOutcome study_state(const fs::path& out, const std::string& key) {
   const fs::path file = out / "studies" / key / kResult;
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return {};
-  const json result = report::read_json_file(file);
+  const json result = tables::read_json_file(file);
   TaskOutcome outcome;
-  const auto state = std::find(kStates.begin(), kStates.end(), report::text_at(result, "state"));
+  const auto state = std::find(kStates.begin(), kStates.end(), tables::text_at(result, "state"));
   if (state == kStates.end()) return outcome;
   outcome.state = static_cast<TaskState>(state - kStates.begin());
   outcome.was_there = true;
-  outcome.reason = report::text_at(result, "reason");
+  outcome.reason = tables::text_at(result, "reason");
   return outcome;
 }
 

@@ -13,16 +13,16 @@
 #include "fleet/measurement_row.h"
 #include "fleet/study_task.h"
 #include "noise/random_effects.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
 #include "study/combination.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {
 
 using nlohmann::json;
-using report::field;
-using report::text_at;
+using tables::field;
+using tables::text_at;
 namespace fs = std::filesystem;
 
 constexpr double kConfidence = 0.95;
@@ -98,19 +98,19 @@ json mounting_of_drives(const std::string& mounting, const std::string& device,
 }  // namespace
 
 bool unit_is_done(const UnitTask& task) {
-  const json result = report::read_json_file(file_of(task));
+  const json result = tables::read_json_file(file_of(task));
   return text_at(result, "schema") == kUnitSchema && field(result, "inputs") == inputs_of(task);
 }
 
 Result<void> do_unit(const UnitTask& task, const std::string& program) {
   if (unit_is_done(task)) return {};
-  return report::with_documents_of(task.out, [&]() -> Result<void> {
+  return tables::with_documents_of(task.out, [&]() -> Result<void> {
     json inputs = inputs_of(task);
     std::map<Name, Values> values;
     std::map<std::pair<std::string, std::string>, std::vector<fs::path>> runs;
     for (const auto& drive : task.drives) {
       const fs::path study = task.out / "studies" / drive.study_key;
-      const json result = report::read_json_file(study / "result.json");
+      const json result = tables::read_json_file(study / "result.json");
       for (const json& one : field(field(result, "summary"), "imus")) {
         if (text_at(one, "device") != drive.device) continue;
         runs[{drive.mounting, drive.device}].push_back(study / "run");

@@ -12,7 +12,7 @@
 #include "base/text.h"
 #include "hdf5/h5_file.h"
 #include "hdf5/json_tree.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 #include "tables/table_reader.h"
 
 namespace imuscope::hdf5 {
@@ -139,7 +139,7 @@ Result<void> write_table(const Handle& tables_group, const std::filesystem::path
 /// @return whether the document could be read
 Result<bool> write_document(const Handle& documents, const Handle& results,
                             const std::filesystem::path& file) {
-  const auto document = report::read_json_file(file);
+  const auto document = tables::read_json_file(file);
   if (document.is_discarded()) return false;
   const std::string stem = file.stem().string();
   if (const auto written = write_text(documents, stem, json_text(document)); !written)

@@ -10,12 +10,16 @@
 #include "base/text.h"
 #include "base/units.h"
 #include "report/fits.h"
-#include "report/json_fields.h"
 #include "report/picture.h"
 #include "report/wavelet_plots.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 
 using nlohmann::json;
 

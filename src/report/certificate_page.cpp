@@ -13,14 +13,19 @@
 #include "base/units.h"
 #include "report/certificate_figures.h"
 #include "report/grouped.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
 #include "report/page_parts.h"
 #include "report/people.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope {
 namespace report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::numbers_at;
+using tables::text_at;
 
 using nlohmann::json;
 
@@ -266,7 +271,7 @@ std::string page_of(const json& certificate, const CertificateFigures& figures) 
 Result<std::vector<std::filesystem::path>> write_certificate_page(const std::filesystem::path& folder,
                                                                   const nlohmann::json& certificate) {
   using Files = std::vector<std::filesystem::path>;
-  return report::with_documents_of(folder, [&]() -> Result<Files> {
+  return tables::with_documents_of(folder, [&]() -> Result<Files> {
     const auto out = OutputFolder::open(folder);
     if (!out) return tl::unexpected<Error>(out.error());
     const auto figures = report::draw_certificate(*out, certificate);

@@ -9,16 +9,20 @@
 #include "base/units.h"
 #include "report/assets.h"
 #include "report/data_sheet_table.h"
-#include "report/json_fields.h"
 #include "report/mounting.h"
 #include "report/people.h"
 #include "report/run_files.h"
 #include "report/sections.h"
 #include "report/verdict.h"
+#include "tables/json_fields.h"
 
 namespace imuscope {
 namespace report {
 namespace {
+
+using tables::number_at;
+using tables::numbers_at;
+using tables::text_at;
 
 using Three = std::array<double, 3>;
 

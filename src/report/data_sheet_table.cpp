@@ -10,11 +10,16 @@
 #include "base/units.h"
 #include "noise/json.h"
 #include "noise/quantities.h"
-#include "report/json_fields.h"
 #include "report/people.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::named;
+using tables::number_at;
+using tables::text_at;
 
 using nlohmann::json;
 

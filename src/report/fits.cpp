@@ -6,10 +6,14 @@
 #include "base/units.h"
 #include "noise/json.h"
 #include "noise/process.h"
-#include "report/json_fields.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 
 using nlohmann::json;
 

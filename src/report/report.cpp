@@ -10,16 +10,19 @@
 #include "report/assets.h"
 #include "report/figures.h"
 #include "report/fits.h"
-#include "report/json_fields.h"
 #include "report/page_parts.h"
 #include "report/people.h"
 #include "report/run_files.h"
 #include "report/sections.h"
 #include "report/verdict.h"
+#include "tables/json_fields.h"
 
 namespace imuscope {
 namespace report {
 namespace {
+
+using tables::number_at;
+using tables::text_at;
 
 Html page_heading(const RunFiles& run) {
   const std::string vehicle = text_at(run.run, "name");

@@ -8,12 +8,18 @@
 #include "base/text.h"
 #include "base/units.h"
 #include "base/wgs84_ellipsoid.h"
-#include "report/csv_reader.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
+#include "tables/csv_reader.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::CsvReader;
+using tables::field;
+using tables::named;
+using tables::read_json_file;
+using tables::text_at;
 
 using nlohmann::json;
 

@@ -3,10 +3,12 @@
 #include <cmath>
 
 #include "base/units.h"
-#include "report/csv_reader.h"
+#include "tables/csv_reader.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::CsvReader;
 
 constexpr std::array<const char*, kScatterErrors> kErrorColumns{"e_gyro_x_radps", "e_gyro_y_radps",
                                                                 "e_gyro_z_radps", "e_accel_x_mps2",

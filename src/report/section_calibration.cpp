@@ -3,13 +3,18 @@
 #include <cmath>
 
 #include "base/units.h"
-#include "report/json_fields.h"
 #include "report/mounting.h"
 #include "report/people.h"
 #include "report/sections.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::numbers_at;
+using tables::text_at;
 
 using Three = std::array<double, 3>;
 

@@ -2,12 +2,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::text_at;
 
 constexpr int kColour = 2;
 constexpr double kMetresPerKm = 1e3;

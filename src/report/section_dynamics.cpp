@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 
 using nlohmann::json;
 

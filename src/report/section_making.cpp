@@ -4,12 +4,16 @@
 
 #include "base/json_text.h"
 #include "report/grouped.h"
-#include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 
 constexpr const char* kNoRunFile = "No run.json in this run folder: nothing is known of it.";
 

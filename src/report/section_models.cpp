@@ -4,13 +4,17 @@
 
 #include "report/data_sheet_table.h"
 #include "report/grouped.h"
-#include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
 #include "report/verdict.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 
 const char* signal_unit(std::size_t signal) { return signal < kTriad ? "deg/s" : "m/s²"; }
 

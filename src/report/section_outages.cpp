@@ -1,11 +1,15 @@
 #include <fmt/format.h>
 
-#include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 
 using nlohmann::json;
 

@@ -5,13 +5,18 @@
 #include "base/calibration_levels.h"
 #include "base/units.h"
 #include "report/data_sheet_table.h"
-#include "report/json_fields.h"
 #include "report/page_parts.h"
 #include "report/sections.h"
 #include "report/verdict.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::numbers_at;
+using tables::text_at;
 
 using nlohmann::json;
 

@@ -8,9 +8,9 @@
 #include "noise/json.h"
 #include "noise/quantities.h"
 #include "report/data_sheet_table.h"
-#include "report/json_fields.h"
 #include "report/people.h"
 #include "report/sections.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {

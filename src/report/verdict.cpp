@@ -8,12 +8,17 @@
 
 #include "base/calibration_levels.h"
 #include "base/units.h"
-#include "report/json_fields.h"
 #include "report/mounting.h"
 #include "report/people.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::numbers_at;
+using tables::text_at;
 
 /// An error beyond this many sd is not chance.
 constexpr double kSdMax = 4.0;

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <map>
 
-#include "report/json_fields.h"
 #include "report/verdict.h"
+#include "tables/json_fields.h"
 
 namespace imuscope::report {
 namespace {
+
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 
 using nlohmann::json;
 

@@ -10,7 +10,7 @@
 #include "base/units.h"
 #include "calibration/filter_core.h"
 #include "navigation/so3.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 
 namespace imuscope {
 
@@ -24,7 +24,7 @@ Result<json> read_document(const std::filesystem::path& file, const std::string&
     return work_error(fmt::format("{} cannot be read", file.string()),
                       "name folders that `imuscope process`, `run` or `replay` wrote");
   }
-  auto document = report::read_json_file(file);
+  auto document = tables::read_json_file(file);
   if (!document.is_object()) return work_error(fmt::format("{} is not a JSON object", file.string()));
   if (document.value("schema", std::string()) != schema) {
     return work_error(fmt::format("{} is not of schema {}", file.string(), schema),
@@ -175,7 +175,7 @@ Result<DriveMountings> mountings_of(const std::filesystem::path& run) {
 }  // namespace
 
 Result<DriveMountings> read_mountings(const std::filesystem::path& run) {
-  return report::with_documents_of(run, [&] { return mountings_of(run); });
+  return tables::with_documents_of(run, [&] { return mountings_of(run); });
 }
 
 const char* name_of(CombineMethod method) {

@@ -4,13 +4,13 @@
 #include <fstream>
 
 #include "base/units.h"
-#include "report/json_file.h"
 #include "service/estimator_setup.h"
 #include "service/recording.h"
 #include "service/run_folder.h"
 #include "study/evaluation_drive.h"
 #include "study/evaluation_models.h"
 #include "study/recording_of_run.h"
+#include "tables/json_file.h"
 
 namespace imuscope {
 namespace {
@@ -23,7 +23,7 @@ Result<json> read_document(const std::filesystem::path& file) {
     return work_error(file.string() + " cannot be read",
                       "give the folder that `imuscope process` wrote with --out");
   }
-  auto document = report::read_json_file(file);
+  auto document = tables::read_json_file(file);
   if (document.is_discarded()) return work_error(file.string() + " is no JSON", "make the run again");
   return document;
 }
@@ -139,7 +139,7 @@ Result<json> evaluate_documents(const EvaluationRunOptions& options) {
 }  // namespace
 
 Result<json> evaluate_run(const EvaluationRunOptions& options) {
-  return report::with_documents_of(options.run_dir, [&] { return evaluate_documents(options); });
+  return tables::with_documents_of(options.run_dir, [&] { return evaluate_documents(options); });
 }
 
 }  // namespace imuscope

@@ -7,8 +7,8 @@
 #include "base/units.h"
 #include "calibration/gnss_trust.h"
 #include "navigation/so3.h"
-#include "report/csv_reader.h"
 #include "service/estimator_setup.h"
+#include "tables/csv_reader.h"
 
 namespace imuscope {
 namespace {
@@ -163,7 +163,7 @@ class Gatherer final : public CoreSink {
 Result<std::vector<TrajectoryRow>> read_trajectory(const std::filesystem::path& run_dir) {
   auto file = run_dir / "smoothed_navigation.csv";
   if (!std::filesystem::exists(file)) file = run_dir / "navigation.csv";
-  auto reader = report::CsvReader::open(
+  auto reader = tables::CsvReader::open(
       file, {"time_s", "lat_deg", "lon_deg", "height_m", "v_n_mps", "v_e_mps", "v_d_mps", "roll_deg",
              "pitch_deg", "heading_deg", "sd_n_m", "sd_e_m", "sd_d_m", "sd_v_n_mps", "sd_v_e_mps",
              "sd_v_d_mps", "sd_roll_deg", "sd_pitch_deg", "sd_heading_deg"});

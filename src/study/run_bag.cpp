@@ -21,20 +21,20 @@
 #include "base/text.h"
 #include "base/units.h"
 #include "noise/export.h"
-#include "report/csv_reader.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
 #include "service/bag_noise.h"
 #include "service/device_factory.h"
 #include "service/models_file.h"
 #include "service/noise_series.h"
 #include "study/mountings.h"
+#include "tables/csv_reader.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope {
 namespace {
 
 using nlohmann::json;
-using report::CsvReader;
+using tables::CsvReader;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 /// Files of a run may come from elsewhere: what is no time of a run would not fit into nanoseconds either.
@@ -71,9 +71,9 @@ class RunUtc {
       while (rows->next()) add(rows->number(0), rows->number(1), kBetween_s);
     }
     if (points_.size() > 1) return;
-    const auto begin = parse_utc(report::text_at(run, "t0_utc"));
+    const auto begin = parse_utc(tables::text_at(run, "t0_utc"));
     if (!begin) return;
-    const double ppm = report::number_at(report::field(run, "time_scale"), "host_clock_ppm").value_or(0.0);
+    const double ppm = tables::number_at(tables::field(run, "time_scale"), "host_clock_ppm").value_or(0.0);
     constexpr double kPpmMost = 1e4;  // of a quartz
     if (!(std::abs(ppm) < kPpmMost)) return;
     points_ = {{0.0, *begin}, {1e3, *begin + 1e3 - ppm * 1e-3}};
@@ -301,10 +301,10 @@ class BiasTrack {
 class RegimeNoise {
  public:
   RegimeNoise(const json& models, const json& regimes, const std::string& name) {
-    for (const json& regime : report::field(regimes, "regimes")) {
-      const bag::WhiteVariance variance = variance_of(models, name, report::text_at(regime, "name"));
-      for (const json& stretch : report::field(regime, "stretches")) {
-        const auto begin = report::number_at(stretch, "begin_s");
+    for (const json& regime : tables::field(regimes, "regimes")) {
+      const bag::WhiteVariance variance = variance_of(models, name, tables::text_at(regime, "name"));
+      for (const json& stretch : tables::field(regime, "stretches")) {
+        const auto begin = tables::number_at(stretch, "begin_s");
         if (begin) stretches_.push_back({*begin, variance});
       }
     }
@@ -344,11 +344,11 @@ class RegimeNoise {
 using RegimeNoises = std::map<std::string, RegimeNoise>;
 
 RegimeNoises regime_noises(const std::filesystem::path& folder, const std::vector<std::string>& names) {
-  const json models = report::read_json_file(folder / "models.json");
-  const json regimes = report::read_json_file(folder / "regimes.json");
+  const json models = tables::read_json_file(folder / "models.json");
+  const json regimes = tables::read_json_file(folder / "regimes.json");
   RegimeNoises noises;
   for (const std::string& name : names)
-    noises.emplace(name, RegimeNoise(report::field(models, "models"), regimes, name));
+    noises.emplace(name, RegimeNoise(tables::field(models, "models"), regimes, name));
   return noises;
 }
 
@@ -642,10 +642,10 @@ class RunBagMaker {
   void add_metadata() {
     writer_.add_metadata(
         "imuscope", {{"version", options_.version},
-                     {"run", one_line(report::text_at(run_, "name"))},
-                     {"configuration_sha256", one_line(report::text_at(run_, "configuration_sha256"))},
+                     {"run", one_line(tables::text_at(run_, "name"))},
+                     {"configuration_sha256", one_line(tables::text_at(run_, "configuration_sha256"))},
                      {"times", utc_.is_known() ? "UTC" : "since the run's first reference sample"},
-                     {"utc_from", one_line(report::text_at(report::field(run_, "time_scale"), "utc_from"))}});
+                     {"utc_from", one_line(tables::text_at(tables::field(run_, "time_scale"), "utc_from"))}});
   }
 
   void attach() {
@@ -686,7 +686,7 @@ class RunBagMaker {
 Result<json> document(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file))
     return usage_error(fmt::format("{} is not there", file.string()), "give the folder of a run");
-  auto read = report::read_json_file(file);
+  auto read = tables::read_json_file(file);
   if (read.is_discarded()) return work_error(file.string() + " is no JSON", "make the run again");
   return read;
 }
@@ -698,7 +698,7 @@ Result<RunBag> write_run_bag(const RunBagOptions& options) {
   if (!run) return tl::unexpected<Error>(run.error());
   const auto calibration = document(options.source.run_dir / "calibration.json");
   if (!calibration) return tl::unexpected<Error>(calibration.error());
-  return report::with_documents_of(options.source.run_dir, [&]() -> Result<RunBag> {
+  return tables::with_documents_of(options.source.run_dir, [&]() -> Result<RunBag> {
     const auto found = found_calibrations(*calibration);
     std::vector<std::string> names;
     for (const FoundCalibration& one : found) names.push_back(one.mounting.name);

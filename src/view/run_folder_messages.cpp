@@ -21,19 +21,19 @@
 #include "base/units.h"
 #include "publish/message_codec.h"
 #include "publish/message_values.h"
-#include "report/csv_reader.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
+#include "tables/csv_reader.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::view {
 
 namespace {
 
 using nlohmann::json;
-using report::CsvReader;
-using report::field;
-using report::number_at;
-using report::text_at;
+using tables::CsvReader;
+using tables::field;
+using tables::number_at;
+using tables::text_at;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -196,7 +196,7 @@ class ErrorTable final : public Table {
 
 /// The models of the whole run, one message of each kind for every S-IMU.
 std::vector<Bytes> model_messages(const std::filesystem::path& folder) {
-  const json document = report::read_json_file(folder / "models.json");
+  const json document = tables::read_json_file(folder / "models.json");
   const json& models = field(document, "models");
   std::map<std::string, std::pair<wavelet_variance_t, noise_model_t>> by_name;
   std::size_t read = 0;
@@ -320,7 +320,7 @@ class RunFolderMessages final : public RecordedMessages {
     if (!navigation) return tl::unexpected<Error>(navigation.error());
     tables_.push_back(
         std::make_unique<PlainTable<navigation_t>>(std::move(*navigation), columns, navigation_t{}));
-    const json run = report::read_json_file(folder_ / "run.json");
+    const json run = tables::read_json_file(folder_ / "run.json");
     if (first_.empty()) {
       first_ = model_messages(folder_);
       first_.push_back(status_message(run));

@@ -3,16 +3,10 @@
 // Boost.Beast takes long to compile: this file is built alone.
 #include <unistd.h>
 #include <array>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <deque>
-#include <list>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -21,7 +15,8 @@
 #include "base/text.h"
 #include "view/content_policy.h"
 #include "view/page_command.h"
-#include "view/request_rules.h"
+#include "web/http_listener.h"
+#include "web/request_rules.h"
 
 namespace imuscope::view {
 
@@ -36,15 +31,13 @@ using beast::error_code;
 using std::chrono::seconds;
 using std::chrono::steady_clock;
 
-using Request = http::request<http::empty_body>;
-using Response = http::response<http::string_body>;
+using web::Request;
+using web::Response;
+using web::view_of;
 using Part = std::shared_ptr<const std::string>;
 
 /// What the system keeps for a page that takes nothing: more would only be older.
 constexpr int kSendBufferBytes = 128 * 1024;
-constexpr std::chrono::milliseconds kAcceptAgain{100};  // after the system had no socket left
-
-std::string_view view_of(beast::string_view text) { return {text.data(), text.size()}; }
 
 /// This PC's own names, lower case.
 std::vector<std::string> own_names() {
@@ -78,8 +71,7 @@ struct ViewServer::Impl {
   Impl& operator=(const Impl&) = delete;
 
   Result<void> listen();
-  void accept();
-  void take(tcp::socket socket);
+  std::shared_ptr<Asking> begin(tcp::socket&& socket);
   void count(const std::function<void(ViewCounters&)>& change) {
     const std::scoped_lock lock(counters_mutex);
     change(counters);
@@ -90,13 +82,12 @@ struct ViewServer::Impl {
   std::string policy;
   Whole whole;
   Said said;
-  HostNames hosts;
+  web::HostNames hosts;
   std::uint16_t port = 0;
   // Connections hold sockets of io: they go first.
   asio::io_context io{1};
-  tcp::acceptor acceptor{io};
-  asio::steady_timer again{io};
-  std::list<std::weak_ptr<Asking>> asking;  // oldest first
+  web::HttpListener<Asking> listener{io, kAskingMax,
+                                     [this](tcp::socket&& socket) { return begin(std::move(socket)); }};
   std::set<std::shared_ptr<Page>> pages;
   std::thread thread;
   std::mutex counters_mutex;
@@ -238,18 +229,19 @@ class ViewServer::Impl::Asking : public std::enable_shared_from_this<Asking> {
     const Request request = parser_.release();
     const auto target = view_of(request.target());
     const auto host = view_of(request[http::field::host]);
-    if (!is_host_allowed(host, server_.hosts))
+    if (!web::is_host_allowed(host, server_.hosts))
       return refuse(request, http::status::forbidden, "ask this PC by its address or its own name\n");
     const auto origin = request.find(http::field::origin);
-    if (origin != request.end() && !is_own_origin(view_of(origin->value()), host))
+    if (origin != request.end() && !web::is_own_origin(view_of(origin->value()), host))
       return refuse(request, http::status::forbidden, "a page of another origin may not ask\n");
-    if (!server_.door.token.empty() && !is_same_token(token_of(target), server_.door.token))
+    if (!server_.door.token.empty() && !web::is_same_token(web::token_of(target), server_.door.token))
       return refuse(request, http::status::unauthorized,
                     "this page wants the token that `imuscope view` was started with: /?token=...\n");
-    if (path_of(target) == "/live") return upgrade(request);
+    if (web::path_of(target) == "/live") return upgrade(request);
     if (request.method() != http::verb::get && request.method() != http::verb::head)
       return refuse(request, http::status::method_not_allowed, "GET alone\n");
-    if (path_of(target) != "/") return refuse(request, http::status::not_found, "there is one page: /\n");
+    if (web::path_of(target) != "/")
+      return refuse(request, http::status::not_found, "there is one page: /\n");
     reply(request, http::status::ok, server_.page, "text/html; charset=utf-8");
   }
 
@@ -270,31 +262,17 @@ class ViewServer::Impl::Asking : public std::enable_shared_from_this<Asking> {
   }
 
   void reply(const Request& request, http::status status, std::string body, const char* type) {
-    auto response = std::make_shared<Response>(status, request.version());
-    response->set(http::field::content_type, type);
-    response->set(http::field::cache_control, "no-store");
-    response->set("Content-Security-Policy", server_.policy);
-    response->set(http::field::x_frame_options, "DENY");
-    response->set("X-Content-Type-Options", "nosniff");
-    response->set("Referrer-Policy", "no-referrer");
-    response->set("Cross-Origin-Opener-Policy", "same-origin");
-    response->set("Cross-Origin-Resource-Policy", "same-origin");
-    response->keep_alive(false);
-    response->content_length(body.size());
-    if (request.method() != http::verb::head) response->body() = std::move(body);
-    stream_.expires_after(seconds(kPatience_s));
-    const auto written = [self = shared_from_this(), response](error_code, std::size_t) {
-      error_code ignored;
-      self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-    };
-    if (request.method() == http::verb::head) {
-      // The header says how long the page is and nothing follows it.
-      auto serializer = std::make_shared<http::response_serializer<http::string_body>>(*response);
-      http::async_write_header(stream_, *serializer,
-                               [written, serializer](error_code error, std::size_t n) { written(error, n); });
-      return;
-    }
-    http::async_write(stream_, *response, written);
+    Response response(status, request.version());
+    response.set(http::field::content_type, type);
+    response.set(http::field::cache_control, "no-store");
+    response.set("Content-Security-Policy", server_.policy);
+    response.set(http::field::x_frame_options, "DENY");
+    response.set("X-Content-Type-Options", "nosniff");
+    response.set("Referrer-Policy", "no-referrer");
+    response.set("Cross-Origin-Opener-Policy", "same-origin");
+    response.set("Cross-Origin-Resource-Policy", "same-origin");
+    response.body() = std::move(body);
+    web::answer(stream_, request, std::move(response), shared_from_this(), seconds(kPatience_s));
   }
 
   Impl& server_;
@@ -304,7 +282,7 @@ class ViewServer::Impl::Asking : public std::enable_shared_from_this<Asking> {
 };
 
 Result<void> ViewServer::Impl::listen() {
-  if (!door.token.empty() && !is_token(door.token))
+  if (!door.token.empty() && !web::is_token(door.token))
     return usage_error("this is no token for a page", "give 8 to 128 letters, digits, '-', '_', '.' or '~'");
   error_code error;
   const auto address = asio::ip::make_address(door.address, error);
@@ -312,47 +290,21 @@ Result<void> ViewServer::Impl::listen() {
     return usage_error("'" + one_line(door.address) + "' is no address to open the page at",
                        "give 127.0.0.1, ::1 or an address of this PC; 0.0.0.0 is all of them");
   hosts.loopback_alone = address.is_loopback();
-  const tcp::endpoint endpoint(address, door.port);
-  acceptor.open(endpoint.protocol(), error);
-  if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
-  if (!error) acceptor.bind(endpoint, error);
-  if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
+  error = listener.open({address, door.port});
   if (error)
     return work_error("the page cannot be opened at " + door.address + " port " + std::to_string(door.port) +
                           " (" + error.message() + ")",
                       "choose another --port; ss -ltnp shows who has it");
-  port = acceptor.local_endpoint().port();
-  accept();
+  port = listener.port();
   thread = std::thread([this] { io.run(); });
   return {};
 }
 
-void ViewServer::Impl::accept() {
-  acceptor.async_accept([this](error_code error, tcp::socket socket) {
-    if (!error) {
-      take(std::move(socket));
-      return accept();
-    }
-    if (error == asio::error::operation_aborted) return;
-    again.expires_after(kAcceptAgain);
-    again.async_wait([this](error_code stopped) {
-      if (!stopped) accept();
-    });
-  });
-}
-
-void ViewServer::Impl::take(tcp::socket socket) {
+std::shared_ptr<ViewServer::Impl::Asking> ViewServer::Impl::begin(tcp::socket&& socket) {
   error_code ignored;
   socket.set_option(tcp::no_delay(true), ignored);
   socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
-  asking.remove_if([](const std::weak_ptr<Asking>& one) { return one.expired(); });
-  if (asking.size() >= kAskingMax) {
-    if (const auto oldest = asking.front().lock()) oldest->drop();
-    asking.pop_front();
-  }
-  const auto one = std::make_shared<Asking>(*this, std::move(socket));
-  asking.push_back(one);
-  one->read();
+  return std::make_shared<Asking>(*this, std::move(socket));
 }
 
 ViewServer::ViewServer(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}

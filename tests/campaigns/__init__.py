@@ -1,1 +1,2 @@
-"""What the campaigns (tools/faults, tools/big_inputs) share: programs that run imuscope and imusim many times over."""
+"""What the campaigns (tools/faults, tools/big_inputs, tools/soak, tools/latency, ...) share: programs that run imuscope
+and imusim many times over, or for long."""

@@ -167,7 +167,12 @@ TEST_F(MetricsDoor, GivesTheNewestStatusAndNothingElse) {
 
 TEST_F(MetricsDoor, APageOfABrowserWhoseNameLeadsHereIsRefused) {
   board_.put(test::example_status(), host_now());
-  EXPECT_THAT(get("GET /metrics HTTP/1.1\r\nHost: forged.example\r\n\r\n"), StartsWith("HTTP/1.1 403"));
+  for (const char* host :
+       {"forged.example", "127.forged.example", "127.0.0.1.forged.example", "[::1].forged.example"})
+    EXPECT_THAT(get(std::string("GET /metrics HTTP/1.1\r\nHost: ") + host + "\r\n\r\n"),
+                StartsWith("HTTP/1.1 403"))
+        << host;
+  EXPECT_THAT(get("GET /metrics HTTP/1.0\r\n\r\n"), StartsWith("HTTP/1.1 200"));  // no browser leaves it out
 }
 
 TEST_F(MetricsDoor, WhoeverHoldsItOpenHoldsItForItsTimeAlone) {

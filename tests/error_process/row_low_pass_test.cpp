@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -69,6 +70,34 @@ TEST(RowLowPass, AfterAGapRowsAreNotValidUntilItHasSettled) {
   EXPECT_FALSE(valid_at(103)) << "two samples are missing";
   for (std::int64_t k = 104; k < 200; ++k) (void)valid_at(k);
   EXPECT_TRUE(valid_at(200));
+}
+
+// A step's answer lacks at most sqrt(2) exp(-t / T), T = sqrt(2) / (2 pi corner): after seven T a permille.
+TEST(RowLowPass, IsTrustedOnceAStepHasSettledAndNoSooner) {
+  for (const double corner_hz : {3.0, 10.0, 20.0}) {
+    const double time_constant_s = std::numbers::sqrt2 / (2.0 * std::numbers::pi * corner_hz);
+    RowLowPass filter(kRate_hz, corner_hz);
+    std::int64_t k = 0;
+    const auto next = [&](double value) {
+      ErrorRow row = row_at(k++, value);
+      filter.apply(row);
+      return row;
+    };
+    while (!next(0.0).gyro_valid) {
+    }
+    const std::int64_t waited = k - 1;
+    EXPECT_EQ(waited, static_cast<std::int64_t>(std::ceil(7.0 * time_constant_s * kRate_hz))) << corner_hz;
+    const double still_lacking = std::numbers::sqrt2 * std::exp(-7.0);
+    double largest_before = 0.0;
+    for (std::int64_t i = 1; i <= 2 * waited; ++i) {
+      const double left = std::abs(next(1.0).e_gyro_radps[0] - 1.0);
+      if (2 * i >= waited && i < waited) largest_before = std::max(largest_before, left);
+      if (i > waited) {
+        EXPECT_LT(left, still_lacking) << corner_hz;
+      }
+    }
+    EXPECT_GT(largest_before, still_lacking) << corner_hz;
+  }
 }
 
 TEST(RowLowPass, WhatAnInvalidTriadHeldReachesNoRowThatIsValid) {

@@ -22,7 +22,7 @@
 #include "view/picture.h"
 #include "view/player.h"
 #include "view/recorded_messages.h"
-#include "view/request_rules.h"
+#include "web/request_rules.h"
 
 namespace imuscope::fuzz {
 namespace {
@@ -73,13 +73,13 @@ void ask(std::string_view text) {
     if (const auto* play = std::get_if<view::Play>(&*command))
       require(play->speed >= view::kSlowest && play->speed <= view::kFastest, "a speed is bounded");
   }
-  const view::HostNames loopback{{"car"}, true};
-  const view::HostNames network{{"car"}, false};
-  require(!view::is_host_allowed(text, loopback) || view::is_host_allowed(text, network),
+  const web::HostNames loopback{{"car"}, true};
+  const web::HostNames network{{"car"}, false};
+  require(!web::is_host_allowed(text, loopback) || web::is_host_allowed(text, network),
           "whoever may ask on this PC may ask from the network");
-  require(!view::is_own_origin(text, "127.0.0.1:8088") || text.size() == 21,
+  require(!web::is_own_origin(text, "127.0.0.1:8088") || text.size() == 21,
           "one origin alone is the page's own");
-  require(view::token_of(text).size() <= text.size(), "a token is a part of the target");
+  require(web::token_of(text).size() <= text.size(), "a token is a part of the target");
 }
 
 struct File {

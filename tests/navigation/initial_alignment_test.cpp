@@ -390,6 +390,32 @@ TEST(ReferenceAttitudeAlignment, StartsInMotionWithTheDevicesOwnAttitude) {
   EXPECT_DOUBLE_EQ(start.sd(kAttitudeError + 2), 5e-4);
 }
 
+// A device that tells its attitude has compensated its gyros since; what they showed at rest before was before that.
+TEST(ReferenceAttitudeAlignment, IsCarriedByTheGyrosAsTheyAreWhateverTheyShowedAtRest) {
+  const Vector3d bias_at_rest_radps(0.002, 0.0, 0.003);
+  Car car;
+  car.rest_s = 18.0;
+  InitialAlignmentOptions options;
+  options.reference_noise = mems_noise();
+  InitialAligner aligner(options);
+  constexpr int kSteps = 2600;
+  for (int i = 0; i < kSteps; ++i) {
+    const HostTime now = host_time_at(car.t);
+    InertialRates measured = car.rates();
+    if (i < 1500) measured.omega_ib_b_radps += bias_at_rest_radps;
+    aligner.add_imu(now, measured);
+    if (i >= 1600 && i % 100 == 0)
+      aligner.add_attitude(now, euler_from_rotation(car.C_b_n()), Vector3d::Constant(1e-4));
+    if (i % 20 == 19)
+      aligner.add_gnss_position(now, displaced(kOrigin, car.position), Vector3d::Constant(0.01));
+    if (i + 1 < kSteps) car.advance(0.01);
+  }
+  ASSERT_NE(aligner.result(), nullptr);
+  EXPECT_EQ(aligner.result()->method, AlignmentMethod::kReferenceAttitude);
+  // A second after the last attitude; the rest's rate would have turned it by 3.6e-3.
+  EXPECT_LT(log_so3(aligner.result()->state.C_b_n * car.C_b_n().transpose()).norm(), 3e-4);
+}
+
 TEST(ReferenceAttitudeAlignment, ReplacesWhatWasFoundInMotionBefore) {
   Simulation s;
   Car tilted;

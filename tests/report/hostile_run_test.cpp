@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "report/gnuplot.h"
-#include "report/json_file.h"
 #include "report/paper_figures.h"
 #include "report/report.h"
+#include "tables/json_file.h"
 #include "tests/report/synthetic_run.h"
 #include "tests/support/file_content.h"
 #include "tests/support/shared_data.h"
@@ -104,7 +104,7 @@ TEST_F(HostileRun, TextsOfADocumentAreLinesWithoutWhatATerminalObeys) {
     document["configuration_text"] = "[run]\nname = \"\x1b[31m\"\n";
     document["long"] = std::string(100'000, 'x');
   });
-  const json document = report::read_json_file(run_ / "run.json");
+  const json document = tables::read_json_file(run_ / "run.json");
   ASSERT_TRUE(document.is_object());
   EXPECT_EQ(document.at("problem?[2J"), "one?two?]0;title?");
   EXPECT_EQ(document.at("configuration_text"), "[run]\nname = \"?[31m\"\n");

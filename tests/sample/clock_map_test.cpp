@@ -149,8 +149,9 @@ TEST(ClockMap, ScatterIsThatOfTheEarliestFrames) {
     const double delay_s = interval % 2 * 0.4e-3 + (earliest ? 0.0 : 5e-3);
     (void)map.observe(k * kPeriod.count(), host_at(k * kPeriod_s * (1.0 + kSkew) + delay_s));
   }
-  EXPECT_NEAR(map.scatter_s(), 0.2e-3, 0.01e-3);
-  EXPECT_NEAR(map.drift_ppm(), -20.0, 1.0);
+  // Of the 59 closed intervals 29 are late, and which ones tells nothing of the rate: sd over 58 degrees of freedom.
+  EXPECT_NEAR(map.scatter_s(), 0.4e-3 * std::sqrt(29.0 * 30.0 / (59.0 * 58.0)), 1e-8);
+  EXPECT_NEAR(map.drift_ppm(), -20.0, 0.001);
   map.restart();
   (void)map.observe(0, host_at(0.0));
   EXPECT_TRUE(std::isnan(map.scatter_s()));
@@ -386,6 +387,34 @@ TEST(ClockMap, TheSameInstantIsMappedToTheSameTime) {
   ClockMap map;
   const HostTime first = map.observe(1000, host_at(1.0));
   EXPECT_EQ(map.observe(1000, host_at(1.5)), first);
+  EXPECT_EQ(map.restarts(), 0U);
+}
+
+/// A clock that is fast until device time `turn_s` and slow after it, 60 ppm each, seen once in each interval of two
+/// seconds of device time but for the one that holds the turn, where it is seen at the turn: in ppm, after so many intervals.
+double drift_of_a_clock_that_turns_ppm(double turn_s, int intervals) {
+  constexpr double kRate = 60e-6;
+  constexpr double kInterval_s = 2.0;
+  ClockMap map;
+  (void)map.observe(0, host_at(1.0));  // late: no point of the envelope
+  for (int i = 0; i <= intervals; ++i) {
+    const bool holds_turn = std::floor(turn_s / kInterval_s) == i;
+    const double device_s = holds_turn ? turn_s : kInterval_s * i + 1.9;
+    (void)map.observe(std::llround(device_s * 1e9),
+                      host_at(0.9 + device_s + kRate * std::abs(device_s - turn_s)));
+  }
+  EXPECT_EQ(map.restarts(), 0U);
+  return map.drift_ppm();
+}
+
+// The turn is a corner of the envelope: its time against the mean of all decides which side the rate is of.
+TEST(ClockMap, TheRateIsThatOfTheEnvelopeAtTheMeanTime) {
+  // Intervals 0 to 40: seen at 1.9 to 81.9 s, in the mean at 41.9 s.
+  EXPECT_LT(drift_of_a_clock_that_turns_ppm(41.89, 41), -30.0);
+  EXPECT_GT(drift_of_a_clock_that_turns_ppm(41.91, 41), 30.0);
+  // More intervals than are kept, 1 to 256: in the mean at 258.896 s.
+  EXPECT_LT(drift_of_a_clock_that_turns_ppm(258.89, 257), -30.0);
+  EXPECT_GT(drift_of_a_clock_that_turns_ppm(258.905, 257), 30.0);
 }
 
 TEST(ClockMap, TheSameObservationsGiveTheSameBits) {

@@ -26,7 +26,7 @@
 #include "progress.h"
 #include "record_files.h"
 #include "report/certificate_page.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 
 namespace imuscope::cli {
 namespace {
@@ -73,7 +73,7 @@ Result<void> parse_axes(CharacterizeCommand& options) {
 /// A page of somebody else's is left alone.
 Result<void> may_write(const CharacterizeCommand& options) {
   if (options.no_page || options.force || !std::filesystem::exists(options.out / kPage)) return {};
-  const auto ours = report::read_json_file(options.out / kDocument);
+  const auto ours = tables::read_json_file(options.out / kDocument);
   if (ours.is_object() && ours.value("schema", "").starts_with("imuscope.certificate/")) return {};
   return usage_error(
       fmt::format("{} is there and was not written by this command", (options.out / kPage).string()),

@@ -12,13 +12,13 @@
 #include "findings.h"
 #include "print.h"
 #include "progress.h"
-#include "report/json_file.h"
 #include "report/report.h"
 #include "service/recording.h"
 #include "service/replay_run.h"
 #include "study/several_drives.h"
 #include "study/study.h"
 #include "study_table.h"
+#include "tables/json_file.h"
 
 namespace imuscope::cli {
 
@@ -117,7 +117,7 @@ Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
   // A link is replaced, and what it leads to stays as it is.
   if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(out / "report.html", error)))
     return {};
-  const auto run = report::read_json_file(out / "run.json");
+  const auto run = tables::read_json_file(out / "run.json");
   if (run.is_object() && run.value("schema", "").starts_with("imuscope.run/")) return {};
   return usage_error(fmt::format("{} exists, and no run of imuscope made it", (out / "report.html").string()),
                      "give another --out, or --force to write over it");

@@ -11,7 +11,7 @@
 #include "base/units.h"
 #include "commands.h"
 #include "print.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 
 namespace imuscope::cli {
 namespace {
@@ -26,7 +26,7 @@ struct TablesCommand {
 };
 
 Result<json> read(const std::filesystem::path& file, const std::string& remedy) {
-  auto document = report::read_json_file(file);
+  auto document = tables::read_json_file(file);
   if (document.is_discarded()) return work_error(file.string() + " is absent or no JSON", remedy);
   return document;
 }
@@ -236,7 +236,7 @@ void add_tables(CLI::App& app, Work& chosen) {
   command->add_option("--axis", options->axes, "axes to show: gyro_x .. accel_z")->capture_default_str();
   command->add_flag("--json", options->json, "print JSON");
   on_chosen(*command, chosen,
-            [options] { return report::with_documents_of(options->run, [&] { return tables(*options); }); });
+            [options] { return tables::with_documents_of(options->run, [&] { return tables(*options); }); });
 }
 
 }  // namespace imuscope::cli

@@ -9,10 +9,10 @@
 #include "base/text.h"
 #include "print.h"
 #include "progress.h"
-#include "report/json_fields.h"
-#include "report/json_file.h"
 #include "study/mountings.h"
 #include "study/run_bag.h"
+#include "tables/json_fields.h"
+#include "tables/json_file.h"
 
 namespace imuscope::cli {
 
@@ -44,18 +44,18 @@ Result<void> export_mcap(const ExportRun& options) {
 bool has_mountings(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) return true;
   if (!std::filesystem::is_regular_file(path)) return false;
-  const auto document = report::read_json_file(path);
-  return report::text_at(document, "schema").starts_with("imuscope.calibration/");
+  const auto document = tables::read_json_file(path);
+  return tables::text_at(document, "schema").starts_with("imuscope.calibration/");
 }
 
 namespace {
 
 /// The reference's name, of the run that the calibration belongs to.
 std::string reference_of(const std::filesystem::path& folder) {
-  const auto run = report::read_json_file(folder / "run.json");
-  for (const auto& device : report::field(run, "devices")) {
-    std::string name = report::text_at(device, "name");
-    if (report::text_at(device, "role") == "reference" && is_device_name(name)) return name;
+  const auto run = tables::read_json_file(folder / "run.json");
+  for (const auto& device : tables::field(run, "devices")) {
+    std::string name = tables::text_at(device, "name");
+    if (tables::text_at(device, "role") == "reference" && is_device_name(name)) return name;
   }
   return "the reference IMU";
 }
@@ -68,7 +68,7 @@ Result<void> export_mounting(const std::filesystem::path& path, const std::strin
   if (!how) return tl::unexpected<Error>(how.error());
   const bool is_folder = std::filesystem::is_directory(path);
   const auto file = is_folder ? path / "calibration.json" : path;
-  const auto document = report::read_json_file(file);
+  const auto document = tables::read_json_file(file);
   if (document.is_discarded())
     return work_error(fmt::format("{} cannot be read", file.string()),
                       "give the folder of a run or its calibration.json");

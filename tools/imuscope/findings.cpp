@@ -8,10 +8,10 @@
 #include "check/config_lines.h"
 #include "print.h"
 #include "progress.h"
-#include "report/json_file.h"
 #include "service/recorded_look.h"
 #include "service/run_folder.h"
 #include "service/run_record.h"
+#include "tables/json_file.h"
 
 namespace imuscope::cli {
 
@@ -80,7 +80,7 @@ void print_look(const std::vector<check::Finding>& findings) {
 }
 
 Result<void> look_at_live_run(const std::filesystem::path& run_dir) {
-  nlohmann::json run = report::read_json_file(run_dir / "run.json");
+  nlohmann::json run = tables::read_json_file(run_dir / "run.json");
   const auto capture = run_dir / "capture.lcm";
   if (!run.is_object() || run.value("inputs", nlohmann::json{}) != nlohmann::json{"live"} ||
       !run.value("findings", nlohmann::json{}).is_null() || !std::filesystem::is_regular_file(capture))

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "noise/json.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 
 namespace imuscope::cli {
 namespace {
@@ -54,7 +54,7 @@ Result<std::vector<StoredFit>> read_fits(const std::filesystem::path& file) {
     return work_error(fmt::format("{} is not a file that can be read", file.string()),
                       "give what `imuscope fit --json` printed or a run's models.json");
   }
-  const auto json = report::read_json_file(file);
+  const auto json = tables::read_json_file(file);
   if (json.is_discarded()) return work_error(fmt::format("{} is not JSON", file.string()));
   const bool is_certificate =
       json.is_object() && json.value("schema", "").starts_with("imuscope.certificate/");

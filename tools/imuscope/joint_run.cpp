@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "base/text.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 #include "tables/table_reader.h"
 
 namespace imuscope::cli {
@@ -134,7 +134,7 @@ Result<JointRun> read_joint_run(const std::filesystem::path& folder, const std::
       return usage_error(fmt::format("{} holds no S-IMU {}", folder.string(), name),
                          fmt::format("there is {}", fmt::join(there, ", ")));
   }
-  const auto calibration = report::read_json_file(folder / "calibration.json");
+  const auto calibration = tables::read_json_file(folder / "calibration.json");
   std::vector<ErrorRows> all;
   for (const auto& name : out.names) {
     const auto C_b_s = mounting_of(calibration, name);

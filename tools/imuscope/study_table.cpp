@@ -15,7 +15,7 @@
 #include "base/units.h"
 #include "print.h"
 #include "report/grouped.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 
 namespace imuscope::cli {
 
@@ -24,7 +24,7 @@ namespace {
 using nlohmann::json;
 
 std::optional<json> read(const std::filesystem::path& file) {
-  auto document = report::read_json_file(file);
+  auto document = tables::read_json_file(file);
   if (document.is_discarded()) return std::nullopt;
   return document;
 }
@@ -224,7 +224,7 @@ Result<void> print_documents(const std::filesystem::path& run_folder, bool as_js
 }  // namespace
 
 Result<void> print_study(const std::filesystem::path& run_folder, bool as_json) {
-  return report::with_documents_of(run_folder, [&] { return print_documents(run_folder, as_json); });
+  return tables::with_documents_of(run_folder, [&] { return print_documents(run_folder, as_json); });
 }
 
 }  // namespace imuscope::cli

@@ -2,6 +2,7 @@
 """The tables of a drive (read_mcap.mjs) as bags of ROS 1, by Debian's python3-rosbag: none, lz4 and bz2.
 
 Usage: write_bags.py CSV_FOLDER BAG_FOLDER TESTS_VECTORS
+Exits with 77 where python3-rosbag is not installed.
 """
 import csv
 import pathlib
@@ -11,7 +12,13 @@ from decimal import Decimal
 tables, bags, vectors = map(pathlib.Path, sys.argv[1:4])
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(vectors))
-import make_bags  # noqa: E402
+try:
+    import make_bags  # noqa: E402
+except ModuleNotFoundError as missing:
+    if missing.name not in ("genpy", "rosbag"):
+        raise
+    print("write_bags: without bags of ROS 1, as there is no python3-rosbag", file=sys.stderr)
+    sys.exit(77)
 
 
 def rows(name):

@@ -2,7 +2,7 @@
 
 #include "base/json_text.h"
 #include "conversions.h"
-#include "report/json_file.h"
+#include "tables/json_file.h"
 #include "tables/table_reader.h"
 
 namespace imuscope::python {
@@ -58,7 +58,7 @@ py::list read_table(const std::string& file) {
 
 std::string read_document(const std::string& file) {
   const py::gil_scoped_release unlocked;
-  const auto document = report::read_json_file(file);
+  const auto document = tables::read_json_file(file);
   if (document.is_discarded())
     throw Failure({ErrorKind::kWork, file + " cannot be read, or is no JSON document that a run would write",
                    "make the run again"});

@@ -1,8 +1,8 @@
-#include "report/json_fields.h"
+#include "tables/json_fields.h"
 
 #include "base/json_text.h"
 
-namespace imuscope::report {
+namespace imuscope::tables {
 namespace {
 
 const nlohmann::json& nothing() {
@@ -38,4 +38,4 @@ const nlohmann::json& named(const nlohmann::json& list, const std::string& name)
   return nothing();
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope::tables

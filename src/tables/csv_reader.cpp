@@ -1,4 +1,4 @@
-#include "report/csv_reader.h"
+#include "tables/csv_reader.h"
 
 #include <algorithm>
 #include <charconv>
@@ -6,7 +6,7 @@
 
 #include "base/line_reader.h"
 
-namespace imuscope::report {
+namespace imuscope::tables {
 namespace {
 
 /// No row of a run is as long: longer ones are damage.
@@ -78,4 +78,4 @@ double CsvReader::number(std::size_t i) const {
   return value;
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope::tables

@@ -11,7 +11,7 @@
 
 #include "base/result.h"
 
-namespace imuscope::report {
+namespace imuscope::tables {
 
 class CsvReader {
  public:
@@ -32,4 +32,4 @@ class CsvReader {
   std::vector<std::string_view> cells_;
 };
 
-}  // namespace imuscope::report
+}  // namespace imuscope::tables

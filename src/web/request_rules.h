@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace imuscope::view {
+namespace imuscope::web {
 
 /// Names by which the page may be asked for, beside numeric addresses and localhost: a name that leads here
 /// by somebody else's name server is none of them.
@@ -35,4 +35,4 @@ struct HostNames {
 /// A token is 8 to 128 letters of ASCII, digits, '-', '_', '.' or '~': what a URL holds without escapes.
 [[nodiscard]] bool is_token(std::string_view text);
 
-}  // namespace imuscope::view
+}  // namespace imuscope::web

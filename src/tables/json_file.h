@@ -7,7 +7,7 @@
 
 #include "base/result.h"
 
-namespace imuscope::report {
+namespace imuscope::tables {
 
 /// Deepest nesting of a document: those of a run have about ten levels.
 inline constexpr std::size_t kJsonDepthMax = 64;
@@ -34,4 +34,4 @@ auto with_documents_of(const std::filesystem::path& run_folder, Work&& work) -> 
   }
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope::tables

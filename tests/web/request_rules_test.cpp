@@ -1,10 +1,10 @@
 /// Who may have the page, by what a request says.
 
-#include "view/request_rules.h"
+#include "web/request_rules.h"
 
 #include <gtest/gtest.h>
 
-namespace imuscope::view {
+namespace imuscope::web {
 namespace {
 
 TEST(RequestRules, OnLoopbackThisPcsOwnNamesAloneMayBeAskedFor) {
@@ -59,4 +59,4 @@ TEST(RequestRules, TheTokenIsAWholeOne) {
 }
 
 }  // namespace
-}  // namespace imuscope::view
+}  // namespace imuscope::web

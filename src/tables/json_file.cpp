@@ -1,11 +1,11 @@
-#include "report/json_file.h"
+#include "tables/json_file.h"
 
 #include <fmt/format.h>
 #include <string_view>
 
 #include "base/text.h"
 
-namespace imuscope::report {
+namespace imuscope::tables {
 
 namespace {
 
@@ -87,4 +87,4 @@ Error malformed(const std::filesystem::path& run_folder, const nlohmann::json::e
       "make the run again"};
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope::tables

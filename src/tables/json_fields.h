@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-namespace imuscope::report {
+namespace imuscope::tables {
 
 /// The member `key`; null where absent or where `object` is no object.
 const nlohmann::json& field(const nlohmann::json& object, const char* key);
@@ -32,4 +32,4 @@ std::optional<std::array<double, N>> numbers_at(const nlohmann::json& object, co
 /// The entry of the array `list` whose "name" is `name`; null where there is none.
 const nlohmann::json& named(const nlohmann::json& list, const std::string& name);
 
-}  // namespace imuscope::report
+}  // namespace imuscope::tables

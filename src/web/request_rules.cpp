@@ -1,10 +1,10 @@
-#include "view/request_rules.h"
+#include "web/request_rules.h"
 
 #include <arpa/inet.h>
 #include <algorithm>
 #include <cstddef>
 
-namespace imuscope::view {
+namespace imuscope::web {
 
 namespace {
 
@@ -94,4 +94,4 @@ bool is_token(std::string_view text) {
          });
 }
 
-}  // namespace imuscope::view
+}  // namespace imuscope::web
