@@ -2,45 +2,59 @@
 include_guard(GLOBAL)
 
 install(TARGETS imuscope imusim RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS imuscope_live RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT live)
 install(PROGRAMS tools/spy DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME imuscope-spy)
-install(FILES config/imuscope.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
-# What the program itself says of its commands, where each shell looks for it.
-set(completions ${CMAKE_BINARY_DIR}/completions)
-foreach(shell bash zsh fish)
-  add_custom_command(OUTPUT ${completions}/${shell}
-    COMMAND ${CMAKE_COMMAND} -E make_directory ${completions}
-    COMMAND imuscope completion ${shell} > ${completions}/${shell}
-    DEPENDS imuscope VERBATIM)
-  list(APPEND completion_files ${completions}/${shell})
-endforeach()
-add_custom_target(completions ALL DEPENDS ${completion_files})
-install(FILES ${completions}/bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME imuscope)
-install(FILES ${completions}/zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions RENAME _imuscope)
-install(FILES ${completions}/fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d
-        RENAME imuscope.fish)
-install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples
-        FILES_MATCHING PATTERN *.toml PATTERN *.dbc PATTERN vehicle.toml EXCLUDE)
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs
-        FILES_MATCHING PATTERN *.md PATTERN *.png PATTERN examples/*.toml
-        PATTERN index.md EXCLUDE PATTERN developer.md EXCLUDE PATTERN api.md EXCLUDE)
-foreach(driver csv can_odometry rtklib_pos)
-  install(FILES drivers/${driver}/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/drivers/${driver})
-endforeach()
-install(FILES CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+# What a program itself says of its commands, where each shell looks for it.
+function(install_completions program component)
+  set(completions ${CMAKE_BINARY_DIR}/completions/${program})
+  foreach(shell bash zsh fish)
+    add_custom_command(OUTPUT ${completions}/${shell}
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${completions}
+      COMMAND ${program} completion ${shell} > ${completions}/${shell}
+      DEPENDS ${program} VERBATIM)
+    list(APPEND completion_files ${completions}/${shell})
+  endforeach()
+  add_custom_target(completions_of_${program} ALL DEPENDS ${completion_files})
+  add_dependencies(completions completions_of_${program})
+  install(FILES ${completions}/bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME imuscope
+          COMPONENT ${component})
+  install(FILES ${completions}/zsh DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions RENAME _imuscope
+          COMPONENT ${component})
+  install(FILES ${completions}/fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d
+          RENAME imuscope.fish COMPONENT ${component})
+endfunction()
+add_custom_target(completions)
+install_completions(imuscope Unspecified)
+install_completions(imuscope_live live)
 
+# What an office and a vehicle have alike.
+foreach(component Unspecified live)
+  install(FILES config/imuscope.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT ${component})
+  install(DIRECTORY config/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/examples COMPONENT ${component}
+          FILES_MATCHING PATTERN *.toml PATTERN *.dbc PATTERN vehicle.toml EXCLUDE)
+  install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs COMPONENT ${component}
+          FILES_MATCHING PATTERN *.md PATTERN *.png PATTERN examples/*.toml
+          PATTERN index.md EXCLUDE PATTERN developer.md EXCLUDE PATTERN api.md EXCLUDE)
+  foreach(driver csv can_odometry rtklib_pos)
+    install(FILES drivers/${driver}/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR}/drivers/${driver} COMPONENT ${component})
+  endforeach()
+  install(FILES CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT ${component})
+  # These three have their place whatever the prefix.
+  install(FILES config/vehicle.toml DESTINATION /etc/imuscope COMPONENT ${component})
+  install(FILES config/imuscope.service DESTINATION /lib/systemd/system COMPONENT ${component})
+  install(FILES config/60-imuscope.rules DESTINATION /lib/udev/rules.d COMPONENT ${component})
+endforeach()
 configure_file(${CMAKE_CURRENT_LIST_DIR}/debian/README.md.in ${CMAKE_BINARY_DIR}/package/README.md @ONLY)
 install(FILES ${CMAKE_BINARY_DIR}/package/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+configure_file(${CMAKE_CURRENT_LIST_DIR}/debian/live/README.md.in ${CMAKE_BINARY_DIR}/package/live/README.md @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/package/live/README.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT live)
 
-# These three have their place whatever the prefix.
-install(FILES config/vehicle.toml DESTINATION /etc/imuscope)
-install(FILES config/imuscope.service DESTINATION /lib/systemd/system)
-install(FILES config/60-imuscope.rules DESTINATION /lib/udev/rules.d)
-
-# Three packages where the parts are built: what a vehicle needs, and beside it what only an office does.
+# imuscope is all of it, imuscope-live what a vehicle needs; a PC has one of them. Beside imuscope, where the parts are
+# built, what only some want.
 set(CPACK_GENERATOR DEB)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_GROUPING ONE_PER_GROUP)
-set(CPACK_COMPONENTS_ALL Unspecified)
+set(CPACK_COMPONENTS_ALL Unspecified live)
 set(CPACK_PACKAGE_NAME imuscope)
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
@@ -62,6 +76,17 @@ set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_CONTROL_EXTRA
     ${CMAKE_CURRENT_LIST_DIR}/debian/postinst
     ${CMAKE_CURRENT_LIST_DIR}/debian/prerm
     ${CMAKE_CURRENT_LIST_DIR}/debian/postrm)
+
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_CONFLICTS imuscope-live)
+set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_REPLACES imuscope-live)
+
+set(CPACK_DEBIAN_LIVE_PACKAGE_NAME imuscope-live)
+set(CPACK_DEBIAN_LIVE_DESCRIPTION "imuscope's live service alone, for the PC of a vehicle")
+set(CPACK_DEBIAN_LIVE_PACKAGE_RECOMMENDS "iproute2")
+set(CPACK_DEBIAN_LIVE_PACKAGE_SUGGESTS "can-utils")
+set(CPACK_DEBIAN_LIVE_PACKAGE_CONTROL_EXTRA ${CPACK_DEBIAN_UNSPECIFIED_PACKAGE_CONTROL_EXTRA})
+set(CPACK_DEBIAN_LIVE_PACKAGE_CONFLICTS imuscope)
+set(CPACK_DEBIAN_LIVE_PACKAGE_REPLACES imuscope)
 
 if(TARGET _imuscope)
   list(APPEND CPACK_COMPONENTS_ALL python)

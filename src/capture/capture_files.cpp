@@ -19,6 +19,17 @@ constexpr double kSecondsPerMicrosecond = 1e-6;
 constexpr double kDisorderMax_s = 10.0;
 constexpr double kBreakMax_s = 24.0 * 3600.0;
 
+/// When the first read came, by the recorder's clock, from this record on. A header and what was published do not
+/// tell: the one has the time of the run's beginning, the others that of GNSS.
+std::optional<std::int64_t> first_read_from(LogEvent& event, SealedLog& log) {
+  constexpr int kRecordsMost = 10000;
+  for (int i = 0; i < kRecordsMost; ++i) {
+    if (is_raw(event.data)) return event.utime;
+    if (!log.next(event)) break;
+  }
+  return std::nullopt;
+}
+
 std::optional<HostTime> t0_of(const LogEvent& event) {
   const auto record = decode_record(event.data);
   if (!record) return std::nullopt;
@@ -68,7 +79,8 @@ bool CaptureFiles::next(LogEvent& event) {
     t0_ = t0_of(event);
     if (!t0_ && log_.health().is_sealed) t0_ = t0_of_others();
   }
-  last_utime_ = event.utime;
+  // Published messages have the time that they are valid at, by GNSS where there is one.
+  if (is_raw(event.data)) last_utime_ = event.utime;
   return true;
 }
 
@@ -119,10 +131,12 @@ std::optional<CaptureBreak> CaptureFiles::joins(int number) const {
   if (!log || !log->next(event)) return std::nullopt;
   const auto t0 = t0_of(event);
   if (t0 && t0 != t0_) return std::nullopt;
-  // A header has the time of the run's beginning: what follows it tells how much is missing.
-  if (t0 && !log->next(event)) event.utime = last_utime_;
+  const auto begins = first_read_from(event, *log);
+  // Without a header, what a device sent is all that tells whose it is.
+  if (!t0 && !begins) return std::nullopt;
   const double seconds =
-      (static_cast<double>(event.utime) - static_cast<double>(last_utime_)) * kSecondsPerMicrosecond;
+      (static_cast<double>(begins.value_or(last_utime_)) - static_cast<double>(last_utime_)) *
+      kSecondsPerMicrosecond;
   // Where the header is among what is damaged, the records say whether they follow.
   const LogHealth health = log->health();
   const bool is_damaged = health.bytes_skipped + health.records_damaged > 0;

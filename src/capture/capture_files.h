@@ -24,7 +24,7 @@ struct CaptureBreak {
   int n_missing = 0;                  ///< files in a row
   int behind = 0;                     ///< number of the file with which it goes on
   bool beginning_is_damaged = false;  ///< of that file
-  double seconds = 0.0;  ///< between the last record before and the first behind, by the recorder's clock
+  double seconds = 0.0;  ///< between the last read before and the first behind, by the recorder's clock
 };
 
 /// One file of a capture that was read to its end.
@@ -81,7 +81,7 @@ class CaptureFiles {
   SealedLog log_;
   bool at_beginning_ = true;
   std::optional<HostTime> t0_;
-  std::int64_t last_utime_ = 0;
+  std::int64_t last_utime_ = 0;  ///< of the last read, by the recorder's clock
   std::vector<CaptureBreak> breaks_;
   std::vector<CapturedFile> finished_;
 };

@@ -234,6 +234,11 @@ std::optional<RawView> view_raw(std::span<const std::uint8_t> message) noexcept 
   return view;
 }
 
+bool is_raw(std::span<const std::uint8_t> message) noexcept {
+  static const std::int64_t kFingerprint = raw_t::getHash();
+  return message.size() > sizeof(std::int64_t) && fingerprint_of(message) == kFingerprint;
+}
+
 RawRead to_read(const RawView& view) {
   return {std::string(view.device),
           view.direction,

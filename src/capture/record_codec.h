@@ -66,6 +66,9 @@ struct RecordClock {
 
 /// Bytes of a device, without a copy; nothing for any other message and for one that is damaged.
 [[nodiscard]] std::optional<RawView> view_raw(std::span<const std::uint8_t> message) noexcept;
+
+/// Whether a message is one of device bytes, by what it says of itself.
+[[nodiscard]] bool is_raw(std::span<const std::uint8_t> message) noexcept;
 [[nodiscard]] RawRead to_read(const RawView& view);
 
 }  // namespace imuscope

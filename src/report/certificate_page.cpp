@@ -12,7 +12,7 @@
 #include "base/text.h"
 #include "base/units.h"
 #include "report/certificate_figures.h"
-#include "report/grouped.h"
+#include "base/grouped.h"
 #include "report/page_parts.h"
 #include "report/people.h"
 #include "tables/json_fields.h"

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/grouped.h"
+#include "base/grouped.h"
 #include "report/people.h"
 #include "report/sections.h"
 #include "tables/json_fields.h"

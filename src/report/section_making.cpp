@@ -3,7 +3,7 @@
 #include <iterator>
 
 #include "base/json_text.h"
-#include "report/grouped.h"
+#include "base/grouped.h"
 #include "report/people.h"
 #include "report/sections.h"
 #include "tables/json_fields.h"

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "report/data_sheet_table.h"
-#include "report/grouped.h"
+#include "base/grouped.h"
 #include "report/people.h"
 #include "report/sections.h"
 #include "report/verdict.h"

@@ -519,8 +519,16 @@ void LivePublisher::add_alarms(status_t& status, HostTime now) {
   }
   for (auto& condition : conditions_of(status, growing_, now)) add(std::move(condition));
   const auto news = alarms_.look(holding, utc_at(now), now);
-  for (const auto& alarm : news.began) tell_alarm(alarm);
-  for (const auto& alarm : news.ended) tell_alarm(alarm);
+  for (const auto& alarm : news.began) {
+    tell_alarm(alarm);
+    // The others have their words in the log where they happen.
+    if (alarm.kind == alarm_kind::kDisk) spdlog::warn("{}: {}; {}", alarm.subject, alarm.what, alarm.remedy);
+  }
+  for (const auto& alarm : news.ended) {
+    tell_alarm(alarm);
+    if (alarm.kind == alarm_kind::kDisk)
+      spdlog::info("{}: can be written again after {:.0f} s", alarm.subject, alarm.lasted_s);
+  }
   status.alarms = alarms_.list();
 }
 

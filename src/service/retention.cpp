@@ -186,9 +186,9 @@ std::vector<Removal> runs_to_remove(const std::vector<RemovableRun>& runs, const
     if (limits.remove_older_than_s && clock_is_set && age_s > *limits.remove_older_than_s) {
       reason = fmt::format("it ended {:.1f} days ago (remove_older_than_days)", age_s / kSPerDay);
     } else if (limits.remove_beyond_bytes && all > *limits.remove_beyond_bytes) {
-      reason = fmt::format("all runs had {:.1f} GB (remove_beyond_gb)", all / kBytesPerGb);
+      reason = fmt::format("all runs had {:.3g} GB (remove_beyond_gb)", all / kBytesPerGb);
     } else if (limits.remove_below_free_bytes && free < *limits.remove_below_free_bytes) {
-      reason = fmt::format("{:.1f} GB of the disk were free (remove_below_free_gb)", free / kBytesPerGb);
+      reason = fmt::format("{:.3g} GB of the disk were free (remove_below_free_gb)", free / kBytesPerGb);
     }
     if (reason.empty()) continue;
     all -= static_cast<double>(run.bytes);
@@ -213,7 +213,7 @@ void apply_retention(const std::filesystem::path& folder, const RecordOptions& l
       spdlog::warn("{}", removed.error().text());
       continue;
     }
-    spdlog::info("the run {} ({:.2f} GB) was removed: {}", removal.run.name,
+    spdlog::info("the run {} ({:.3g} GB) was removed: {}", removal.run.name,
                  static_cast<double>(removal.run.bytes) / kBytesPerGb, removal.reason);
   }
 }

@@ -563,14 +563,20 @@ TEST(CaptureReader, TellsHowFarItHasComeInEveryFile) {
   EXPECT_EQ(shares.back(), 1.0);
 }
 
-/// A capture of five files, ten reads in each, a second apart; returns the first.
+/// A capture of five files, ten reads in each, a second apart, between messages that were published; returns the
+/// first. The PC's clock is half a year ahead of GNSS, by which the messages have their times.
 std::filesystem::path five_files() {
+  constexpr std::int64_t kHalfAYear_us = std::int64_t{180} * 86'400 * 1'000'000;
   const auto first = test::scratch_folder() / "drive.lcm";
   const RunHeader run = example_run();
   const RecordClock clock{run.t0, run.t0_wall};
   for (int file = 0; file < 5; ++file) {
     auto writer = std::move(*CaptureWriter::create(capture_file(first, file)));
+    const auto publish = [&] {
+      writer.append("IMUSCOPE_STATUS", clock.utime(kT0) - kHalfAYear_us, Bytes{1, 2, 3});
+    };
     writer.append("IMUSCOPE_RUN", clock.utime(run.t0), encode(run, file));
+    if (file % 2 == 1) publish();
     for (int i = 0; i < 10; ++i) {
       const std::int64_t sequence = 10 * file + i;
       const HostTime arrival = kT0 + std::chrono::seconds(sequence);
@@ -579,6 +585,7 @@ std::filesystem::path five_files() {
           "IMUSCOPE_RAW_X", clock.utime(arrival),
           encode(RawChunk{{sequence, arrival, 0, Direction::kRead, false}, bytes}, "airins", clock));
     }
+    publish();
     EXPECT_TRUE(writer.close().has_value());
   }
   return first;
@@ -618,6 +625,18 @@ TEST(CaptureReader, GoesOnBehindTheDamagedBeginningOfAFileAndTellsIt) {
   EXPECT_EQ(summary->breaks[0].behind, 1);
   EXPECT_NEAR(summary->breaks[0].seconds, 1.0, 1e-6);
   EXPECT_GT(health_of(summary->files).bytes_skipped, 0U);
+}
+
+TEST(CaptureReader, TheDamagedBeginningOfTheLastFileIsToldToo) {
+  const auto first = five_files();
+  // Of the last one nothing that follows would show that it is missing.
+  std::fstream(capture_file(first, 4), std::ios::in | std::ios::out | std::ios::binary).put('\0');
+  EXPECT_EQ(reads_of(first), 50U);
+  const auto summary = summarise_capture(first);
+  ASSERT_TRUE(summary.has_value());
+  ASSERT_EQ(summary->breaks.size(), 1U);
+  EXPECT_EQ(summary->breaks[0].behind, 4);
+  EXPECT_TRUE(summary->breaks[0].beginning_is_damaged);
 }
 
 TEST(CaptureReader, WhatIsWrongWithItsFilesIsSummed) {

@@ -7,7 +7,7 @@
 #include <regex>
 
 #include "report/data_sheet_table.h"
-#include "report/grouped.h"
+#include "base/grouped.h"
 #include "report/mounting.h"
 #include "report/page_parts.h"
 #include "tests/report/synthetic_run.h"

@@ -96,6 +96,16 @@ TEST(CaptureCommand, WhatWasRepairedIsNotSentToBeRepairedAgain) {
   EXPECT_THAT(repaired.err, Not(HasSubstr("capture repair")));
 }
 
+TEST(CaptureCommand, AFileThatIsMissingIsNoReasonToRepair) {
+  const auto folder = with_golden_capture();
+  fs::copy_file(folder / "golden.lcm", folder / "golden_002.lcm");
+  const auto checked = imuscope_in(folder, "capture check golden.lcm");
+  ASSERT_EQ(checked.exit_code, 1) << checked.out;
+  EXPECT_THAT(checked.out, HasSubstr("golden_001.lcm"));
+  EXPECT_THAT(checked.err, HasSubstr("what it has is whole"));
+  EXPECT_THAT(checked.err, Not(HasSubstr("capture repair")));
+}
+
 TEST(CaptureCommand, WhatIsNoCaptureIsNamed) {
   const auto folder = scratch_folder();
   std::ofstream(folder / "text.lcm") << "hello";

@@ -21,9 +21,9 @@ using testing::HasSubstr;
 using testing::Not;
 
 /// The commands that `imuscope --help` lists: two spaces, a word, at least two spaces.
-std::set<std::string> commands_of_the_program() {
+std::set<std::string> commands_of_the_program(const std::string& program = "imuscope") {
   const auto log = scratch_folder() / "help.txt";
-  EXPECT_EQ(run_program("imuscope", {"--help"}, log), 0);
+  EXPECT_EQ(run_program(program, {"--help"}, log), 0);
   const std::string text = read_text(log);
   std::istringstream lines(text.substr(text.find("Subcommands:")));
   std::set<std::string> commands;
@@ -48,6 +48,22 @@ TEST(ManualPage, NamesEveryCommandAndNoOther) {
   const auto commands = commands_of_the_program();
   EXPECT_GT(commands.size(), 10U);
   EXPECT_EQ(commands_of_the_manual(), commands);
+}
+
+TEST(LiveProgram, HasWhatAVehicleNeedsAndNamesThePackageOfAllElse) {
+  const auto live = commands_of_the_program("live/imuscope");
+  for (const char* needed : {"run", "top", "doctor", "replay", "status", "capture", "keep", "probe", "config"})
+    EXPECT_TRUE(live.contains(needed)) << needed;
+  const auto log = scratch_folder() / "said.txt";
+  std::set<std::string> all = live;
+  for (const std::string& command : commands_of_the_program()) {
+    if (live.contains(command)) continue;
+    all.insert(command);
+    EXPECT_EQ(run_program("live/imuscope", {command}, log), 2) << command;
+    EXPECT_THAT(read_text(log), HasSubstr("is a command of the package imuscope")) << command;
+  }
+  EXPECT_EQ(all, commands_of_the_program()) << "it has no command that the other has not";
+  EXPECT_LT(live.size(), all.size());
 }
 
 TEST(Help, OfACommandIsWhatTheCommandItselfPrints) {

@@ -52,7 +52,10 @@ void say_check(const CaptureCheck& check, const std::string& file) {
 bool are_files_damaged(const CaptureCheck& check, const std::string& file) {
   CaptureSummary files_alone;
   files_alone.files = check.summary.files;
-  files_alone.breaks = check.summary.breaks;
+  for (const CaptureBreak& gap : check.summary.breaks) {
+    // A file that is not there is in no copy either.
+    if (gap.beginning_is_damaged) files_alone.breaks.push_back(gap);
+  }
   return !damage_of(files_alone, file).empty() ||
          std::any_of(check.files.begin(), check.files.end(),
                      [](const FileCheck& one) { return one.index == IndexVerdict::kDisagrees; });

@@ -9,6 +9,13 @@
 namespace imuscope::cli {
 
 std::string no_such_command(const CLI::App& app, const std::string& word) {
+  for (const std::string& other : commands_of_another_package()) {
+    if (word == other)
+      return fmt::format(
+          "'{}' is a command of the package imuscope, and this is imuscope-live; run it on a PC with "
+          "that one",
+          word);
+  }
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
   const std::string nearest = nearest_word(word, names);

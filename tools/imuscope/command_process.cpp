@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
 #include <tbb/global_control.h>
 
 #include <memory>
@@ -10,11 +9,10 @@
 #include "combination_table.h"
 #include "commands.h"
 #include "findings.h"
+#include "inputs.h"
 #include "print.h"
 #include "progress.h"
 #include "report/report.h"
-#include "service/recording.h"
-#include "service/replay_run.h"
 #include "study/several_drives.h"
 #include "study/study.h"
 #include "study_table.h"
@@ -33,49 +31,17 @@ struct ProcessCommand {
   std::string out;
   std::string labels;
   std::string fix;
-  bool realtime = false;
-  std::string lcm;
   bool json = false;
   bool force = false;
   int threads = 0;  ///< 0: all cores
 };
-
-/// @param look  at the data before anything is estimated from them, and say what is wrong
-Result<OpenedRecording> open(const ProcessCommand& options, const std::vector<std::string>& inputs,
-                             bool look) {
-  std::optional<std::filesystem::path> config;
-  if (!options.config.empty()) config = options.config;
-  ProgressBar bar;
-  std::vector<check::Finding> findings;
-  auto opened = open_recording(
-      inputs, config, [&](const std::string& what, double share) { bar.show(what, share); },
-      look ? &findings : nullptr);
-  bar.clear();
-  if (!options.json) print_findings(findings);
-  if (!opened) return tl::unexpected<Error>(explained(opened.error(), findings));
-  opened->findings = std::move(findings);
-  const auto& damage = opened->recording.damage;
-  for (const auto& remark : opened->remarks) {
-    const bool is_damage = std::find(damage.begin(), damage.end(), remark) != damage.end();
-    spdlog::log(is_damage ? spdlog::level::warn : spdlog::level::info, "{}", remark);
-  }
-  return opened;
-}
-
-void add_inputs(CLI::App& command, ProcessCommand& options) {
-  command.add_option("input", options.inputs, "a capture, or raw dumps as NAME=FILE (NAME of a device)")
-      ->required()
-      ->type_name("INPUT");
-  command.add_option("--config,-c", options.config, "configuration (TOML); a capture holds its own")
-      ->type_name("FILE");
-}
 
 /// Several drives of one mounting: a run folder each, and one mounting of all.
 Result<void> process_drives(const ProcessCommand& options,
                             const std::vector<std::vector<std::string>>& inputs) {
   std::vector<OpenedRecording> drives;
   for (const auto& of_drive : inputs) {
-    auto opened = open(options, of_drive, true);
+    auto opened = open_and_look(of_drive, options.config, options.json);
     if (!opened) return tl::unexpected<Error>(opened.error());
     drives.push_back(std::move(*opened));
   }
@@ -138,7 +104,7 @@ Result<void> process(const ProcessCommand& options) {
   if (drives.size() > 1) return process_drives(options, drives);
   const auto labels = read_labels(options.labels);
   if (!labels) return tl::unexpected<Error>(labels.error());
-  const auto opened = open(options, options.inputs, true);
+  const auto opened = open_and_look(options.inputs, options.config, options.json);
   if (!opened) return tl::unexpected<Error>(opened.error());
   if (!options.fix.empty()) {
     if (auto written = write_fixed(opened->configuration, opened->findings, options.fix); !written)
@@ -159,19 +125,6 @@ Result<void> process(const ProcessCommand& options) {
   return {};
 }
 
-Result<void> replay_command(const ProcessCommand& options) {
-  const auto opened = open(options, options.inputs, false);
-  if (!opened) return tl::unexpected<Error>(opened.error());
-  {
-    ProgressBar bar;
-    const ReplayRunOptions run{options.out, IMUSCOPE_VERSION,
-                               [&](double share) { bar.show("replay", share); }, options.realtime,
-                               options.lcm};
-    if (auto done = run_replay(opened->configuration, opened->recording, run); !done) return done;
-  }
-  return print_study(options.out, options.json);
-}
-
 }  // namespace
 
 void add_process(CLI::App& app, Work& chosen) {
@@ -180,7 +133,7 @@ void add_process(CLI::App& app, Work& chosen) {
       "The study: calibration, error process, noise models, report; of several captures (or "
       "several files of every NAME), one mounting of all drives");
   auto options = std::make_shared<ProcessCommand>();
-  add_inputs(*command, *options);
+  add_inputs(*command, options->inputs, options->config);
   command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
   command
       ->add_option("--labels", options->labels,
@@ -199,18 +152,6 @@ void add_process(CLI::App& app, Work& chosen) {
       ->check(CLI::Range(1, kThreadsMax));
   command->add_flag("--force", options->force, "write over a report.html that no run of imuscope made");
   on_chosen(*command, chosen, [options] { return process(*options); });
-}
-
-void add_replay(CLI::App& app, Work& chosen) {
-  auto* command = app.add_subcommand("replay", "The live pipeline again, fed from a recording");
-  auto options = std::make_shared<ProcessCommand>();
-  add_inputs(*command, *options);
-  command->add_option("--out,-o", options->out, "folder for the results")->required()->type_name("DIR");
-  command->add_flag("--realtime", options->realtime, "paced as recorded");
-  command->add_option("--lcm", options->lcm, "publish here what the live run published, for top and lcm-spy")
-      ->type_name("URL");
-  command->add_flag("--json", options->json, "print the summary as JSON");
-  on_chosen(*command, chosen, [options] { return replay_command(*options); });
 }
 
 }  // namespace imuscope::cli

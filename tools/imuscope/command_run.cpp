@@ -5,7 +5,6 @@
 #include "commands.h"
 #include "findings.h"
 #include "print.h"
-#include "report/report.h"
 #include "service/live.h"
 
 namespace imuscope::cli {
@@ -29,7 +28,7 @@ struct RunCommand {
   bool no_report = false;
 };
 
-Result<void> run(const RunCommand& options) {
+Result<void> run(const RunCommand& options, const ReportWriter& write_report) {
   const auto configuration = load_configuration(options.config);
   if (!configuration) return tl::unexpected<Error>(configuration.error());
   LiveOptions live;
@@ -45,19 +44,21 @@ Result<void> run(const RunCommand& options) {
   std::signal(SIGPIPE, SIG_IGN);
   const auto folder = run_live(*configuration, live, signals);
   if (!folder) return tl::unexpected<Error>(folder.error());
-  if (options.no_report) {
+  if (!options.no_report) {
+    if (auto looked = look_at_live_run(*folder); !looked) return looked;
+  }
+  if (options.no_report || !write_report) {
     say("Results: {}\nReport:  imuscope report {}\n", folder->string(), folder->string());
     return {};
   }
-  if (auto looked = look_at_live_run(*folder); !looked) return looked;
-  if (auto written = write_report(*folder); !written) return written;
+  if (auto written = write_report(*folder); !written) return tl::unexpected<Error>(written.error());
   say("Results: {}\nReport:  {}\n", folder->string(), (*folder / "report.html").string());
   return {};
 }
 
 }  // namespace
 
-void add_run(CLI::App& app, Work& chosen) {
+void add_run(CLI::App& app, Work& chosen, ReportWriter write_report) {
   auto* command = app.add_subcommand("run", "The live service: devices, estimator, recording, LCM");
   auto options = std::make_shared<RunCommand>();
   command->add_option("config", options->config, "configuration (TOML)")->required()->type_name("CONFIG");
@@ -71,7 +72,7 @@ void add_run(CLI::App& app, Work& chosen) {
   command->add_flag(
       "--no-report", options->no_report,
       "end without report.html, which takes a while after a long run; `imuscope report` makes it later");
-  on_chosen(*command, chosen, [options] { return run(*options); });
+  on_chosen(*command, chosen, [options, write_report] { return run(*options, write_report); });
 }
 
 }  // namespace imuscope::cli

@@ -4,8 +4,10 @@
 /// work runs after parsing, so that every wrong option is told before anything starts.
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "base/result.h"
 
@@ -19,6 +21,15 @@ using Work = std::function<Result<void>()>;
 inline void on_chosen(CLI::App& subcommand, Work& chosen, Work work) {
   subcommand.callback([&chosen, work = std::move(work)] { chosen = work; });
 }
+
+/// All subcommands of the program: all_commands.cpp or live_commands.cpp, whichever it is built with.
+void add_commands(CLI::App& app, Work& chosen);
+
+/// Those that the other package has beyond these.
+[[nodiscard]] std::vector<std::string> commands_of_another_package();
+
+/// Makes a report of a run folder.
+using ReportWriter = std::function<Result<void>(const std::filesystem::path& run_dir)>;
 
 // One function a subcommand, one file a function (command_NAME.cpp).
 
@@ -44,7 +55,8 @@ void add_compare(CLI::App& app, Work& chosen);
 void add_export(CLI::App& app, Work& chosen);
 
 /// `imuscope run CONFIG`
-void add_run(CLI::App& app, Work& chosen);
+/// @param write_report  called at the end; empty where the program makes no reports
+void add_run(CLI::App& app, Work& chosen, ReportWriter write_report);
 
 /// `imuscope replay INPUT...`
 void add_replay(CLI::App& app, Work& chosen);

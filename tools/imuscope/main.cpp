@@ -32,32 +32,7 @@ int run(int argc, char** argv) {
   app.failure_message(usage_sentence);
   app.set_version_flag("--version", IMUSCOPE_VERSION);
   imuscope::cli::Work work;
-  imuscope::cli::add_wv(app, work);
-  imuscope::cli::add_fit(app, work);
-  imuscope::cli::add_characterize(app, work);
-  imuscope::cli::add_correlate(app, work);
-  imuscope::cli::add_compare(app, work);
-  imuscope::cli::add_export(app, work);
-  imuscope::cli::add_run(app, work);
-  imuscope::cli::add_replay(app, work);
-  imuscope::cli::add_process(app, work);
-  imuscope::cli::add_combine(app, work);
-  imuscope::cli::add_evaluate(app, work);
-  imuscope::cli::add_report(app, work);
-  imuscope::cli::add_tables(app, work);
-  imuscope::cli::add_fleet(app, work);
-  imuscope::cli::add_decode(app, work);
-  imuscope::cli::add_import(app, work);
-  imuscope::cli::add_capture(app, work);
-  imuscope::cli::add_probe(app, work);
-  imuscope::cli::add_top(app, work);
-  imuscope::cli::add_view(app, work);
-  imuscope::cli::add_status(app, work);
-  imuscope::cli::add_keep(app, work);
-  imuscope::cli::add_doctor(app, work);
-  imuscope::cli::add_config(app, work);
-  imuscope::cli::add_completion(app, work);
-  imuscope::cli::add_help(app, work);
+  imuscope::cli::add_commands(app, work);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -14,7 +14,7 @@
 #include "base/json_text.h"
 #include "base/units.h"
 #include "print.h"
-#include "report/grouped.h"
+#include "base/grouped.h"
 #include "tables/json_file.h"
 
 namespace imuscope::cli {
@@ -187,7 +187,7 @@ void print_devices(const json& devices) {
 /// The first of them; a short record can have one for every axis and regime, all of them in the report.
 void print_warnings(const json& warnings, const std::vector<std::string>& names) {
   constexpr std::size_t kPrintedMax = 8;
-  const auto sentences = report::grouped_by_name(warnings.get<std::vector<std::string>>(), names);
+  const auto sentences = grouped_by_name(warnings.get<std::vector<std::string>>(), names);
   const std::size_t printed = std::min(sentences.size(), kPrintedMax);
   if (printed > 0) say("\n");
   for (std::size_t i = 0; i < printed; ++i) say("Note: {}\n", sentences[i]);

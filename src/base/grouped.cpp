@@ -1,11 +1,11 @@
-#include "report/grouped.h"
+#include "base/grouped.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
-namespace imuscope::report {
+namespace imuscope {
 namespace {
 
 /// A sentence, and all whose it is.
@@ -65,4 +65,4 @@ std::vector<std::string> grouped_by_name(const std::vector<std::string>& sentenc
   return out;
 }
 
-}  // namespace imuscope::report
+}  // namespace imuscope

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace imuscope::report {
+namespace imuscope {
 
 /// A sentence and whose it is.
 struct Named {
@@ -22,4 +22,4 @@ std::vector<std::string> grouped(const std::vector<Named>& sentences);
 std::vector<std::string> grouped_by_name(const std::vector<std::string>& sentences,
                                          const std::vector<std::string>& names);
 
-}  // namespace imuscope::report
+}  // namespace imuscope
