@@ -48,6 +48,19 @@ double median_step(const std::vector<double>& time_s) {
 
 }  // namespace
 
+Eigen::Vector3f usual_rate(const ImuTrack& track) {
+  Eigen::Vector3f usual;
+  std::vector<float> values(track.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    std::transform(track.omega_radps.begin(), track.omega_radps.end(), values.begin(),
+                   [axis](const Eigen::Vector3f& omega) { return omega[axis]; });
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    usual[axis] = *middle;
+  }
+  return usual;
+}
+
 ImuBins bins_of(const ImuTrack& track, int width) {
   ImuBins bins;
   if (track.size() == 0) return bins;
