@@ -8,6 +8,8 @@ namespace imuscope::check {
 
 namespace {
 
+/// A degree a second: an offset of less hides no motion that two sensors are compared by.
+constexpr float kPlainOffset_radps = 0.0175F;
 /// Below a walk a course is mostly noise of the positions.
 constexpr double kCourseSpeedMin_mps = 2.0;
 /// Of the parabola: a second each side, or what holds five positions.
@@ -59,6 +61,11 @@ Eigen::Vector3f usual_rate(const ImuTrack& track) {
     usual[axis] = *middle;
   }
   return usual;
+}
+
+Eigen::Vector3f plain_offset(const ImuTrack& track) {
+  const Eigen::Vector3f usual = usual_rate(track);
+  return usual.norm() > kPlainOffset_radps ? usual : Eigen::Vector3f::Zero();
 }
 
 ImuBins bins_of(const ImuTrack& track, int width) {

@@ -62,7 +62,7 @@ struct Norms {
 /// |omega| over bins: what differs in size by noise alone is not motion.
 double motion_spread(const ImuTrack& track) {
   const ImuBins bins = bins_of(track, kPairMeanBins);
-  const Eigen::Vector3d usual = usual_rate(track).cast<double>();
+  const Eigen::Vector3d usual = plain_offset(track).cast<double>();
   double sum = 0.0;
   double squares = 0.0;
   double n = 0.0;
@@ -80,7 +80,7 @@ Norms norms_of(const ImuTrack& track, double factor) {
   Norms norms;
   norms.time_s = track.time_s;
   norms.rate_radps.reserve(track.size());
-  const Eigen::Vector3f usual = usual_rate(track);
+  const Eigen::Vector3f usual = plain_offset(track);
   for (const Eigen::Vector3f& omega : track.omega_radps)
     norms.rate_radps.push_back(factor * static_cast<double>((omega - usual).norm()));
   return norms;
@@ -379,8 +379,7 @@ bool moves_alike(const Moments& m) {
 }
 
 /// Gravity that wanders in the S-IMU and not in the reference: it has turned on its place.
-/// @return whether it has
-bool check_moved(const DeviceConfig& config, const Moments& m, std::vector<Finding>& findings) {
+void check_moved(const DeviceConfig& config, const Moments& m, std::vector<Finding>& findings) {
   const Eigen::Matrix3d C = nearest_orthogonal(m.rates / m.rates_b + m.forces / m.forces_b, 1);
   double moved_mps2 = 0.0;
   std::array<Eigen::Vector3d, kParts> off{};
@@ -392,7 +391,7 @@ bool check_moved(const DeviceConfig& config, const Moments& m, std::vector<Findi
         moved_mps2 = std::max(moved_mps2, (off[i] - off[k]).norm());
     }
   }
-  if (moved_mps2 < kMovedMin_mps2) return false;
+  if (moved_mps2 < kMovedMin_mps2) return;
   findings.push_back({Harm::kWrong,
                       "moved",
                       config.name,
@@ -402,7 +401,6 @@ bool check_moved(const DeviceConfig& config, const Moments& m, std::vector<Findi
                       "deg",
                       "fasten it and drive again, or process the parts before and after by themselves",
                       {}});
-  return true;
 }
 
 /// A constant that is added to the forces turns gravity away from where the motion says it is.
@@ -503,9 +501,9 @@ PairAxes check_pair(Drive& drive, std::size_t study, std::vector<Finding>& findi
   check_time(config, drive.time_scale(study), *offset, findings);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> forces(m.forces_bb / m.n);
   if (std::sqrt(std::max(forces.eigenvalues()[1], 0.0)) < kForcesMin_mps2) return axes;
-  if (check_moved(config, m, findings)) return axes;
   axes.compared = true;
   AxisSearch(m).search(axes);
+  if (axes.fits) check_moved(config, m, findings);
   // Where accelerations fit as they are, it is not the axes that gravity contradicts.
   if (!axes.fits && moves_alike(m) && check_accel_offset(config, m, findings)) axes.fits = true;
   return axes;

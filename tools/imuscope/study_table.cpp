@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/calibration_levels.h"
+#include "base/digits.h"
 #include "base/json_text.h"
 #include "base/units.h"
 #include "print.h"
@@ -114,18 +115,6 @@ double largest(const json& imu, const char* key) {
   return most;
 }
 
-/// Two digits, without a power of ten; more where two would read as what is wanted.
-std::string beside(double value, double wanted) {
-  if (value >= 100.0) return fmt::format("{:.0f}", value);
-  constexpr int kDigitsMost = 4;
-  std::string text;
-  for (int digits = 2; digits <= kDigitsMost; ++digits) {
-    text = fmt::format("{:.{}g}", value, digits);
-    if (text != fmt::format("{:.{}g}", wanted, digits)) break;
-  }
-  return text;
-}
-
 /// "usable with limits: boresight 0.25 deg (0.1 wanted)".
 std::string usability_words(const json& imu) {
   if (!has_estimate(imu.at("status").get<std::string>())) return "not usable: no mounting was found";
@@ -136,7 +125,7 @@ std::string usability_words(const json& imu) {
   std::vector<std::string> limits;
   const auto limit = [&](const char* what, double sd, double wanted, double unit, const char* name) {
     if (!(sd <= wanted))
-      limits.push_back(fmt::format("{} sd {} {} ({:g} wanted)", what, beside(sd * unit, wanted * unit), name,
+      limits.push_back(fmt::format("{} sd {} {} ({:g} wanted)", what, digits_beside(sd * unit, wanted * unit), name,
                                    wanted * unit));
   };
   limit("boresight", boresight_rad, kUsableBoresightSd_rad, kDegPerRad, "deg");
