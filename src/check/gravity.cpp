@@ -69,7 +69,7 @@ void report_exchanged(const DeviceConfig& config, ImuTrack& track, double rates,
                   "its gyros show gravity: gyros and accelerometers are exchanged",
                   rates,
                   0.0,
-                  "is the size of its rates",
+                  "rad/s by its gyros",
                   "exchange them where they are written",
                   {}};
   if (traits_of(config.protocol).is_text) {
