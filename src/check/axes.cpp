@@ -63,6 +63,7 @@ void report_triads(const DeviceConfig& config, const Matrix3d& gyro, const Matri
                    std::vector<Finding>& findings) {
   const bool of_gyro = gyro != Matrix3d::Identity();
   const bool of_accel = accel != Matrix3d::Identity();
+  if (!of_gyro && !of_accel) return;
   Finding finding{Harm::kWrong,
                   "order of axes",
                   config.name,

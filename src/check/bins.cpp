@@ -8,6 +8,8 @@ namespace imuscope::check {
 
 namespace {
 
+/// A degree a second: an offset of less hides no motion that two sensors are compared by.
+constexpr float kPlainOffset_radps = 0.0175F;
 /// Below a walk a course is mostly noise of the positions.
 constexpr double kCourseSpeedMin_mps = 2.0;
 /// Of the parabola: a second each side, or what holds five positions.
@@ -47,6 +49,24 @@ double median_step(const std::vector<double>& time_s) {
 }
 
 }  // namespace
+
+Eigen::Vector3f usual_rate(const ImuTrack& track) {
+  Eigen::Vector3f usual;
+  std::vector<float> values(track.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    std::transform(track.omega_radps.begin(), track.omega_radps.end(), values.begin(),
+                   [axis](const Eigen::Vector3f& omega) { return omega[axis]; });
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    usual[axis] = *middle;
+  }
+  return usual;
+}
+
+Eigen::Vector3f plain_offset(const ImuTrack& track) {
+  const Eigen::Vector3f usual = usual_rate(track);
+  return usual.norm() > kPlainOffset_radps ? usual : Eigen::Vector3f::Zero();
+}
 
 ImuBins bins_of(const ImuTrack& track, int width) {
   ImuBins bins;

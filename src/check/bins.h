@@ -23,6 +23,12 @@ struct ImuBins {
   [[nodiscard]] std::size_t index(std::int64_t bin) const { return static_cast<std::size_t>(bin - first); }
 };
 
+/// Rate that a sensor shows most of the time: its offset, as a vehicle goes straight on or stands. It turns with
+/// the sensor's axes as every rate does, so that what is left of two sensors can still be compared.
+[[nodiscard]] Eigen::Vector3f usual_rate(const ImuTrack& track);
+/// The same, or nothing where it is small.
+[[nodiscard]] Eigen::Vector3f plain_offset(const ImuTrack& track);
+
 /// Means over bins, then over `width` (odd) of them, so that nothing is delayed.
 [[nodiscard]] ImuBins bins_of(const ImuTrack& track, int width);
 

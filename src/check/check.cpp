@@ -31,23 +31,38 @@ std::string sentence(const Finding& finding) {
 std::vector<Finding> look_at(Drive& drive) {
   const Configuration& configuration = drive.configuration();
   std::vector<Finding> findings;
+  std::vector<bool> comparable(configuration.devices.size(), true);
   for (std::size_t i = 0; i < configuration.devices.size(); ++i) {
     check_stamps(drive, i, findings);
+    comparable[i] = !found(findings, configuration.devices[i].name, kStandingStamps);
     if (drive.imu(i).size() == 0) continue;
     if (!found(findings, configuration.devices[i].name, "repeated samples"))
       check_signals(drive, i, findings);
     check_gravity_norm(drive, i, findings);
   }
+  if (check_files(drive, findings)) comparable[configuration.reference_index()] = false;
   ReferenceAxes reference = reference_down(drive);
+  const bool has_reference = comparable[configuration.reference_index()];
+  for (std::size_t i = 0; i < configuration.devices.size(); ++i)
+    comparable[i] = comparable[i] && has_reference && check_overlap(drive, i, findings);
   if (const auto gnss = configuration.gnss_index()) {
     check_positions(drive, *gnss, findings);
-    reference = check_motion(drive, *gnss, findings);
+    if (comparable[*gnss]) reference = check_motion(drive, *gnss, findings);
   }
   std::vector<std::pair<std::size_t, PairAxes>> pairs;
   for (const std::size_t study : configuration.study_indices()) {
-    if (drive.imu(study).size() > 0) pairs.emplace_back(study, check_pair(drive, study, findings));
+    if (comparable[study] && drive.imu(study).size() > 0)
+      pairs.emplace_back(study, check_pair(drive, study, findings));
+    // Samples that share their times with others move as nothing does.
+    const std::string& name = configuration.devices[study].name;
+    if (found(findings, name, "repeated samples"))
+      std::erase_if(findings, [&](const Finding& f) { return f.device == name && f.check == "one body"; });
   }
   check_axes(drive, reference, pairs, findings);
+  const bool units = std::none_of(findings.begin(), findings.end(),
+                                  [](const Finding& f) { return f.check == "rate unit" && f.mends.empty(); });
+  for (std::size_t i = 0; i < configuration.devices.size() && units; ++i)
+    check_gyro_offset(drive, i, findings);
   check_drive(drive, reference, findings);
   std::stable_sort(findings.begin(), findings.end(),
                    [](const Finding& a, const Finding& b) { return a.harm < b.harm; });

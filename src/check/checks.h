@@ -3,6 +3,7 @@
 /// The checks, each of one kind of mistake. They add to `findings`; those that find a unit or a time that is
 /// wrong put it right in the drive, so that what follows looks at what was meant.
 
+#include <string>
 #include <vector>
 
 #include "check/finding.h"
@@ -10,13 +11,24 @@
 
 namespace imuscope::check {
 
+/// The name of the check of a device all of whose samples have one time: nothing else can be seen of it.
+inline constexpr const char* kStandingStamps = "standing times";
+
+/// Whether two IMUs were given each other's file.
+/// @return whether they were
+bool check_files(const Drive& drive, std::vector<Finding>& findings);
+
+/// Whether devices that share a clock with the reference were there when it was.
+/// @return whether this one was
+bool check_overlap(Drive& drive, std::size_t device, std::vector<Finding>& findings);
+
 /// Rate against the configuration and the stamps, gaps, repeated samples, lost counters.
 void check_stamps(Drive& drive, std::size_t device, std::vector<Finding>& findings);
 
 /// Ends of the range, steps coarser than the noise, axes that do not move.
 void check_signals(const Drive& drive, std::size_t device, std::vector<Finding>& findings);
 
-/// The size of gravity. Corrects a unit.
+/// The size of gravity. Corrects a unit, and puts exchanged triads in their place.
 void check_gravity_norm(Drive& drive, std::size_t device, std::vector<Finding>& findings);
 
 /// Jumps, positions that stand while the vehicle moves, claimed sd.
@@ -34,8 +46,15 @@ struct ReferenceAxes {
   bool mirrored = false;                             ///< its forces turn left where the vehicle turns right
 };
 
-/// Positions against the reference's motion: whose time they are of, units of the reference's rates.
-/// Corrects both. @param gnss  device
+/// A gyro that does not return to zero, where its unit is known to be right.
+void check_gyro_offset(const Drive& drive, std::size_t device, std::vector<Finding>& findings);
+
+/// Of rates or forces that are what a sample adds, and what mends them.
+inline constexpr const char* kIncrements = "its rates are increments of angle from sample to sample";
+[[nodiscard]] std::string divide_by_the_time_of_a_sample(const DeviceConfig& config);
+
+/// Positions against the reference's motion: whose time they are of, whether they are of this drive, units of
+/// the positions and of the reference's rates, a mirrored map. Corrects time, rates and map. @param gnss  device
 [[nodiscard]] ReferenceAxes check_motion(Drive& drive, std::size_t gnss, std::vector<Finding>& findings);
 
 /// Directions of the reference's axes without a receiver: which one is down.

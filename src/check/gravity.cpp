@@ -1,7 +1,10 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "base/units.h"
 #include "check/bins.h"
@@ -18,6 +21,8 @@ constexpr int kGravityMeanBins = 11;
 constexpr double kNormTolerance = 0.1;
 constexpr std::size_t kGravityBinsMin = 50;
 constexpr double kGravityUnitTolerance = 0.15;
+/// Of gravity's size: below it is not in the data.
+constexpr double kNoGravity = 0.3;
 
 /// What a norm is in units of gravity, if a unit explains it.
 struct GravityUnit {
@@ -32,22 +37,79 @@ constexpr std::array kUnits{
     GravityUnit{1e3, "its accelerometers are in mm/s2 or thousandths of g, read a thousand times too large",
                 nullptr}};
 
+/// The median length of a triad's means; nothing where there are too few.
+std::optional<double> median_norm(const ImuBins& bins, const std::vector<Eigen::Vector3d>& triad) {
+  std::vector<double> norms;
+  for (std::size_t i = 0; i < bins.valid.size(); ++i) {
+    if (bins.valid[i]) norms.push_back(triad[i].norm());
+  }
+  if (norms.size() < kGravityBinsMin) return std::nullopt;
+  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
+  std::nth_element(norms.begin(), middle, norms.end());
+  return *middle;
+}
+
+/// The rates are of gravity's size, and the forces are not: in m/s2, or in g.
+bool are_exchanged(double rates, double forces) {
+  const auto is_gravity = [](double size) {
+    return std::abs(size / kMps2PerG - 1.0) < kNormTolerance || std::abs(size - 1.0) < kNormTolerance;
+  };
+  return is_gravity(rates) && !is_gravity(forces) && forces < kNoGravity * kMps2PerG;
+}
+
+std::string columns_of(const std::array<std::string, 3>& columns) {
+  return fmt::format("[\"{}\"]", fmt::join(columns, "\", \""));
+}
+
+void report_exchanged(const DeviceConfig& config, ImuTrack& track, double rates,
+                      std::vector<Finding>& findings) {
+  Finding finding{Harm::kWrong,
+                  "gyros and accelerometers",
+                  config.name,
+                  "its gyros show gravity: gyros and accelerometers are exchanged",
+                  rates,
+                  0.0,
+                  "rad/s by its gyros",
+                  "exchange them where they are written",
+                  {}};
+  if (traits_of(config.protocol).is_text) {
+    const std::string gyro = columns_of(config.csv.accel_columns);
+    const std::string accel = columns_of(config.csv.gyro_columns);
+    finding.remedy = fmt::format("write gyro_columns = {} and accel_columns = {}", gyro, accel);
+    finding.mends = {{config.name, "csv.gyro_columns", gyro}, {config.name, "csv.accel_columns", accel}};
+  }
+  std::swap(track.omega_radps, track.f_mps2);
+  findings.push_back(std::move(finding));
+}
+
 }  // namespace
+
+std::string divide_by_the_time_of_a_sample(const DeviceConfig& config) {
+  return fmt::format("divide them by the time of a sample (1/{:g} s) where they are written", config.rate_hz);
+}
 
 void check_gravity_norm(Drive& drive, std::size_t device, std::vector<Finding>& findings) {
   const DeviceConfig& config = drive.configuration().devices[device];
   ImuTrack& track = drive.imu(device);
   const ImuBins bins = bins_of(track, kGravityMeanBins);
-  std::vector<double> norms;
-  for (std::size_t i = 0; i < bins.valid.size(); ++i) {
-    if (bins.valid[i]) norms.push_back(bins.f_mps2[i].norm());
+  const auto rates = median_norm(bins, bins.omega_radps);
+  const auto forces = median_norm(bins, bins.f_mps2);
+  if (!rates || !forces) return;
+  if (are_exchanged(*rates, *forces)) {
+    report_exchanged(config, track, *rates, findings);
+    return;
   }
-  if (norms.size() < kGravityBinsMin) return;
-  const auto middle = norms.begin() + static_cast<std::ptrdiff_t>(norms.size() / 2);
-  std::nth_element(norms.begin(), middle, norms.end());
-  const double ratio = *middle / kMps2PerG;
+  const double ratio = *forces / kMps2PerG;
   if (std::abs(ratio - 1.0) < kNormTolerance) return;
-  Finding finding{Harm::kWrong, "gravity norm", config.name, {}, *middle, kMps2PerG, "m/s2", {}, {}};
+  Finding finding{Harm::kWrong, "gravity norm", config.name, {}, *forces, kMps2PerG, "m/s2", {}, {}};
+  if (std::abs(ratio * config.rate_hz - 1.0) < kGravityUnitTolerance) {
+    // What a sample adds: inertial units that deliver increments in place of means.
+    finding.what = "its forces are increments of velocity from sample to sample";
+    finding.remedy = divide_by_the_time_of_a_sample(config);
+    for (Eigen::Vector3f& f : track.f_mps2) f *= static_cast<float>(config.rate_hz);
+    findings.push_back(std::move(finding));
+    return;
+  }
   for (const GravityUnit& unit : kUnits) {
     if (std::abs(ratio / unit.factor - 1.0) > kGravityUnitTolerance) continue;
     finding.what = unit.what;
@@ -60,7 +122,6 @@ void check_gravity_norm(Drive& drive, std::size_t device, std::vector<Finding>& 
     findings.push_back(std::move(finding));
     return;
   }
-  constexpr double kNoGravity = 0.3;
   if (ratio < kNoGravity) {
     finding.what = "its accelerometers do not show gravity: it was taken out (\"linear acceleration\")";
     finding.remedy = "record the specific force with gravity in it";

@@ -45,6 +45,14 @@ constexpr double kPerAxis = 0.01;
 /// Without this (m/s2, rms, of a direction that is not gravity's) forces do not tell handedness.
 constexpr double kForcesMin_mps2 = 0.15;
 
+/// The largest offset of consumer accelerometers, nearly (0.08 g, data sheet of the MPU-6050, z).
+constexpr double kAccelOffsetMax_mps2 = 1.0;
+/// More is gravity: a sign, or an axis.
+constexpr double kAccelOffsetMost_mps2 = 4.0;
+/// Three degrees of gravity: no body of a vehicle bends so far, no accelerometer drifts so far.
+constexpr double kMovedMin_mps2 = 0.5;
+constexpr std::size_t kParts = 4;
+
 struct Norms {
   std::vector<double> time_s;
   std::vector<double> rate_radps;
@@ -54,12 +62,13 @@ struct Norms {
 /// |omega| over bins: what differs in size by noise alone is not motion.
 double motion_spread(const ImuTrack& track) {
   const ImuBins bins = bins_of(track, kPairMeanBins);
+  const Eigen::Vector3d usual = plain_offset(track).cast<double>();
   double sum = 0.0;
   double squares = 0.0;
   double n = 0.0;
   for (std::size_t i = 0; i < bins.valid.size(); ++i) {
     if (!bins.valid[i]) continue;
-    const double rate = bins.omega_radps[i].norm();
+    const double rate = (bins.omega_radps[i] - usual).norm();
     sum += rate;
     squares += rate * rate;
     n += 1.0;
@@ -71,8 +80,9 @@ Norms norms_of(const ImuTrack& track, double factor) {
   Norms norms;
   norms.time_s = track.time_s;
   norms.rate_radps.reserve(track.size());
+  const Eigen::Vector3f usual = plain_offset(track);
   for (const Eigen::Vector3f& omega : track.omega_radps)
-    norms.rate_radps.push_back(factor * static_cast<double>(omega.norm()));
+    norms.rate_radps.push_back(factor * static_cast<double>((omega - usual).norm()));
   return norms;
 }
 
@@ -119,7 +129,20 @@ struct Moments {
   Eigen::Matrix3d forces_bb = Eigen::Matrix3d::Zero();
   double rates_b = 0.0, rates_s = 0.0, forces_b = 0.0, forces_s = 0.0;
   Eigen::Vector3d mean_f_b = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_f_s = Eigen::Vector3d::Zero();
   double n = 0.0;
+  /// The same with gravity out of both, and by part of the drive.
+  [[nodiscard]] Eigen::Matrix3d forces_moving() const { return forces - n * mean_f_s * mean_f_b.transpose(); }
+  std::array<Eigen::Vector3d, kParts> part_f_b = zeros();
+  std::array<Eigen::Vector3d, kParts> part_f_s = zeros();
+  std::array<double, kParts> part_n{};
+
+ private:
+  static std::array<Eigen::Vector3d, kParts> zeros() {
+    std::array<Eigen::Vector3d, kParts> all;
+    all.fill(Eigen::Vector3d::Zero());
+    return all;
+  }
 };
 
 Moments moments_of(const ImuBins& reference, const ImuBins& study) {
@@ -135,7 +158,12 @@ Moments moments_of(const ImuBins& reference, const ImuBins& study) {
         mean_b += reference.omega_radps[i];
         mean_s += study.omega_radps[j];
         m.mean_f_b += reference.f_mps2[i];
+        m.mean_f_s += study.f_mps2[j];
         m.n += 1.0;
+        const std::size_t part = i * kParts / reference.valid.size();
+        m.part_f_b[part] += reference.f_mps2[i];
+        m.part_f_s[part] += study.f_mps2[j];
+        m.part_n[part] += 1.0;
         continue;
       }
       const Eigen::Vector3d b = reference.omega_radps[i] - mean_b;
@@ -156,6 +184,7 @@ Moments moments_of(const ImuBins& reference, const ImuBins& study) {
       mean_b /= m.n;
       mean_s /= m.n;
       m.mean_f_b /= m.n;
+      m.mean_f_s /= m.n;
     }
   }
   return m;
@@ -244,8 +273,13 @@ class AxisSearch {
 
 void report_unit(Drive& drive, std::size_t study, double ratio, std::vector<Finding>& findings) {
   const DeviceConfig& config = drive.configuration().devices[study];
+  const DeviceConfig& reference = drive.configuration().devices[drive.configuration().reference_index()];
   Finding finding{Harm::kWrong, "rate unit", config.name, {}, ratio, 1.0, "times the reference's rates",
                   {},           {}};
+  constexpr double kThousandths = 1e3;
+  const bool increments = std::abs(ratio * config.rate_hz - 1.0) < kRateUnitTolerance;
+  const bool of_reference = std::abs(ratio / reference.rate_hz - 1.0) < kRateUnitTolerance;
+  const bool thousandths = std::abs(ratio / (kThousandths * kDegPerRad) - 1.0) < kRateUnitTolerance;
   const bool degrees = std::abs(ratio / kDegPerRad - 1.0) < kRateUnitTolerance;
   const bool radians = std::abs(ratio * kDegPerRad - 1.0) < kRateUnitTolerance;
   if (degrees || radians) {
@@ -254,6 +288,16 @@ void report_unit(Drive& drive, std::size_t study, double ratio, std::vector<Find
     finding.remedy = fmt::format("write gyro_unit = \"{}\" in its [device.csv]", unit);
     if (traits_of(config.protocol).is_text)
       finding.mends.push_back({config.name, "csv.gyro_unit", fmt::format("\"{}\"", unit)});
+  } else if (increments) {
+    finding.what = kIncrements;
+    finding.remedy = divide_by_the_time_of_a_sample(config);
+  } else if (of_reference) {
+    finding.device = reference.name;
+    finding.what = kIncrements;
+    finding.remedy = divide_by_the_time_of_a_sample(reference);
+  } else if (thousandths) {
+    finding.what = "its gyros are in thousandths of a degree a second, read as rad/s";
+    finding.remedy = "divide them by a thousand where they are written, and write gyro_unit = \"deg/s\"";
   } else {
     finding.what = "its rates are not of the size of the reference's";
     finding.remedy = "check gyro_unit and gyro_columns of both, and that both sit on one rigid body";
@@ -312,6 +356,70 @@ void check_time(const DeviceConfig& config, TimeScale scale, const TimeOffset& o
     }
     findings.push_back(std::move(finding));
   }
+}
+
+/// The rotation that rates and accelerations tell, without what gravity tells.
+Eigen::Matrix3d rotation_by_motion(const Moments& m) {
+  const Eigen::Matrix3d moving = m.forces_moving();
+  return nearest_orthogonal(
+      m.rates / std::max(m.rates_b, 1e-12) + moving / std::max(m.forces_bb.trace(), 1e-12), 1);
+}
+
+/// Whether the rotation of the motion leaves of the accelerations no more than any orthogonal one.
+bool moves_alike(const Moments& m) {
+  const Eigen::Matrix3d moving = m.forces_moving();
+  const double s = m.forces_s - m.n * m.mean_f_s.squaredNorm();
+  const double b = m.forces_b - m.n * m.mean_f_b.squaredNorm();
+  const double left = residual(s, b, moving, rotation_by_motion(m));
+  const double least = residual(s, b, moving, nearest_orthogonal(moving, 0));
+  const double rates_left = residual(m.rates_s, m.rates_b, m.rates, rotation_by_motion(m));
+  const double rates_least = residual(m.rates_s, m.rates_b, m.rates, nearest_orthogonal(m.rates, 0));
+  return left + 1e-9 * s < kCostFactor * (least + 1e-9 * s) &&
+         rates_left + 1e-9 * m.rates_s < kCostFactor * (rates_least + 1e-9 * m.rates_s);
+}
+
+/// Gravity that wanders in the S-IMU and not in the reference: it has turned on its place.
+void check_moved(const DeviceConfig& config, const Moments& m, std::vector<Finding>& findings) {
+  const Eigen::Matrix3d C = nearest_orthogonal(m.rates / m.rates_b + m.forces / m.forces_b, 1);
+  double moved_mps2 = 0.0;
+  std::array<Eigen::Vector3d, kParts> off{};
+  for (std::size_t i = 0; i < kParts; ++i) {
+    if (m.part_n[i] < static_cast<double>(kPairBinsMin) / kParts) continue;
+    off[i] = (m.part_f_s[i] - C * m.part_f_b[i]) / m.part_n[i];
+    for (std::size_t k = 0; k < i; ++k) {
+      if (m.part_n[k] >= static_cast<double>(kPairBinsMin) / kParts)
+        moved_mps2 = std::max(moved_mps2, (off[i] - off[k]).norm());
+    }
+  }
+  if (moved_mps2 < kMovedMin_mps2) return;
+  findings.push_back({Harm::kWrong,
+                      "moved",
+                      config.name,
+                      "it turned on its place during the drive, or its accelerometers drifted far",
+                      std::asin(std::min(moved_mps2 / kMps2PerG, 1.0)) * kDegPerRad,
+                      0.0,
+                      "deg",
+                      "fasten it and drive again, or process the parts before and after by themselves",
+                      {}});
+}
+
+/// A constant that is added to the forces turns gravity away from where the motion says it is.
+/// @return whether there is one
+bool check_accel_offset(const DeviceConfig& config, const Moments& m, std::vector<Finding>& findings) {
+  const Eigen::Vector3d off = m.mean_f_s - rotation_by_motion(m) * m.mean_f_b;
+  if (off.norm() < kAccelOffsetMax_mps2 || off.norm() > kAccelOffsetMost_mps2) return false;
+  int axis = 0;
+  off.cwiseAbs().maxCoeff(&axis);
+  findings.push_back({Harm::kWrong,
+                      "accelerometer offset",
+                      config.name,
+                      fmt::format("its {} accelerometer is off by a constant", "xyz"[axis]),
+                      off[axis],
+                      0.0,
+                      "m/s2",
+                      "take the offset out where it is written, and check that axis and its range",
+                      {}});
+  return true;
 }
 
 Finding not_alike(const DeviceConfig& config, double correlation) {
@@ -395,6 +503,9 @@ PairAxes check_pair(Drive& drive, std::size_t study, std::vector<Finding>& findi
   if (std::sqrt(std::max(forces.eigenvalues()[1], 0.0)) < kForcesMin_mps2) return axes;
   axes.compared = true;
   AxisSearch(m).search(axes);
+  if (axes.fits) check_moved(config, m, findings);
+  // Where accelerations fit as they are, it is not the axes that gravity contradicts.
+  if (!axes.fits && moves_alike(m) && check_accel_offset(config, m, findings)) axes.fits = true;
   return axes;
 }
 

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "check/checks.h"
 
@@ -23,6 +24,11 @@ constexpr double kFrozenJump_m = 3.0;
 constexpr double kStandingSpeed_mps = 0.05;
 /// Errors that a receiver has for longer make its scatter smaller than its sd, never larger.
 constexpr double kSdRatioMax = 5.0;
+
+/// A millimetre is what the curvature of the Earth makes of equal digits within a drive.
+constexpr double kSameDigits_m = 1e-3;
+/// Noise and motion make steps of every size; where the least one is beyond so many sd, digits are missing.
+constexpr double kStepSdMax = 5.0;
 
 /// More positions than this do not jump: they scatter.
 constexpr double kJumpsShareMax = 0.1;
@@ -78,10 +84,11 @@ void check_jumps(const DeviceConfig& config, const GnssTrack& track, double peri
     largest_m = std::max(largest_m, off_m);
   }
   if (jumps == 0) return;
-  if (static_cast<double>(jumps) > kJumpsShareMax * static_cast<double>(all_m.size())) {
-    // Of even steps: the error of three positions with the weights 1, -2, 1.
-    report_sd(config, median(all_m) / (kRayleighMedian * std::sqrt(6.0)), track.claimed_sd_m.front(),
-              findings);
+  // Of even steps: the error of three positions with the weights 1, -2, 1.
+  const double sd_m = median(all_m) / (kRayleighMedian * std::sqrt(6.0));
+  if (static_cast<double>(jumps) > kJumpsShareMax * static_cast<double>(all_m.size()) &&
+      sd_m > track.claimed_sd_m.front()) {
+    report_sd(config, sd_m, track.claimed_sd_m.front(), findings);
     return;
   }
   findings.push_back({Harm::kLimits,
@@ -93,6 +100,34 @@ void check_jumps(const DeviceConfig& config, const GnssTrack& track, double peri
                       "m",
                       "use the receiver's own sd and solution type; where it lost its "
                       "fix, those positions are refused",
+                      {}});
+}
+
+/// The least step between positions that differ, along one axis.
+double least_step(const GnssTrack& track, int axis, std::size_t& steps) {
+  double least_m = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < track.size(); ++i) {
+    const double step_m = std::abs(track.position_m[i][axis] - track.position_m[i - 1][axis]);
+    if (step_m < kSameDigits_m) continue;
+    least_m = std::min(least_m, step_m);
+    ++steps;
+  }
+  return least_m;
+}
+
+/// Positions with too few digits: nothing between a step and none.
+void check_steps(const DeviceConfig& config, const GnssTrack& track, std::vector<Finding>& findings) {
+  std::size_t steps = 0;
+  const double least_m = std::min(least_step(track, 0, steps), least_step(track, 1, steps));
+  if (steps < kTrackMin || !(least_m > kStepSdMax * median(track.claimed_sd_m))) return;
+  findings.push_back({Harm::kLimits,
+                      "position steps",
+                      config.name,
+                      "its positions have too few digits: they move in steps",
+                      least_m,
+                      0.0,
+                      "m",
+                      "write latitude and longitude with eight decimals (a millimetre)",
                       {}});
 }
 
@@ -152,6 +187,8 @@ void check_positions(const Drive& drive, std::size_t device, std::vector<Finding
   if (track.size() < kTrackMin) return;
   const double period_s = period_of(track);
   const std::size_t before = findings.size();
+  check_steps(config, track, findings);
+  if (findings.size() > before) return;  // between its steps it would stand, and jump
   check_frozen(config, track, findings);
   if (findings.size() == before) check_claimed_sd(config, track, period_s, findings);
   if (findings.size() == before) check_jumps(config, track, period_s, findings);

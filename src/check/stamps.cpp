@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 
 #include "check/checks.h"
+#include "configuration/protocols.h"
 
 namespace imuscope::check {
 
@@ -84,13 +86,12 @@ void scale_times(Drive& drive, std::size_t device, double factor) {
   for (double& time : drive.gnss(device).time_s) time *= factor;
 }
 
-/// @return whether the rate is as configured
-bool check_rate(Drive& drive, std::size_t device, const Steps& steps, std::vector<Finding>& findings) {
+void check_rate(Drive& drive, std::size_t device, const Steps& steps, std::vector<Finding>& findings) {
   const DeviceConfig& config = drive.configuration().devices[device];
   const bool gnss = config.role == DeviceRole::kGnss;
   const double ratio = steps.rate_hz / config.rate_hz;
   const double tolerance = gnss ? kGnssRateFactor : 1.0 + kRateTolerance;
-  if (ratio < tolerance && ratio > 1.0 / tolerance) return true;
+  if (ratio < tolerance && ratio > 1.0 / tolerance) return;
   Finding finding{gnss ? Harm::kLimits : Harm::kWrong,
                   "rate",
                   config.name,
@@ -118,7 +119,11 @@ bool check_rate(Drive& drive, std::size_t device, const Steps& steps, std::vecto
       finding.mends.back().value += ".0";
   }
   findings.push_back(std::move(finding));
-  return false;
+}
+
+bool rate_matches(double rate_hz, const DeviceConfig& config) {
+  const double ratio = rate_hz / config.rate_hz;
+  return ratio < 1.0 + kRateTolerance && ratio > 1.0 / (1.0 + kRateTolerance);
 }
 
 void check_gaps(const DeviceConfig& config, const Steps& steps, std::vector<Finding>& findings) {
@@ -147,6 +152,12 @@ void check_repetitions(const DeviceConfig& config, const ImuTrack& track, const 
   }
   const double share = repeated / static_cast<double>(track.size() - 1);
   if (share < kRepeatedShareMax && steps.same_share < kRepeatedShareMax) return;
+  // A rate that is as configured without its repetitions is no second mistake.
+  if (!rate_matches(steps.rate_hz, config) && rate_matches(steps.rate_hz * (1.0 - share), config)) {
+    std::erase_if(findings, [&](const Finding& finding) {
+      return finding.device == config.name && finding.check == "rate";
+    });
+  }
   Finding finding{
       Harm::kWrong, "repeated samples", config.name, {}, 100.0 * std::max(share, steps.same_share),
       0.0,          "% of the samples", {},          {}};
@@ -154,9 +165,28 @@ void check_repetitions(const DeviceConfig& config, const ImuTrack& track, const 
   if (share >= kRepeatedShareMax) {
     finding.what = "samples are repeated: it was logged faster than it measures";
     finding.remedy = fmt::format("take the repetitions out of the file and write rate_hz = {:.4g}", rate_hz);
+    if (rate_matches(rate_hz, config)) finding.remedy = "take the repetitions out of the file";
   } else {
     finding.what = "several samples have the same time";
-    finding.remedy = "let the logger write the time of each sample";
+    finding.remedy = "let the logger write the time of each sample, with all of its digits";
+  }
+  findings.push_back(std::move(finding));
+}
+
+/// A device whose samples all have one time, such as messages whose stamps nobody filled in.
+void report_standing(const DeviceConfig& config, std::size_t samples, std::vector<Finding>& findings) {
+  Finding finding{Harm::kWrong,
+                  kStandingStamps,
+                  config.name,
+                  "all of its samples have the same time",
+                  static_cast<double>(samples),
+                  0.0,
+                  "samples",
+                  "let the logger write the time of each sample",
+                  {}};
+  if (is_message_log(config.protocol)) {
+    finding.remedy = "write time = \"log\" in its [device.messages], to take the times of their recording";
+    finding.mends.push_back({config.name, "messages.time", "\"log\""});
   }
   findings.push_back(std::move(finding));
 }
@@ -180,7 +210,41 @@ void check_counter(const DeviceConfig& config, const ImuTrack& track, std::vecto
                       {}});
 }
 
+/// Where each of two IMUs has the other's rate, it has the other's file.
+bool rates_exchanged(const Drive& drive, std::size_t one, std::size_t other) {
+  const auto& devices = drive.configuration().devices;
+  const auto& [a, b] = std::tie(drive.imu(one).time_s, drive.imu(other).time_s);
+  if (a.size() < kStampsMin || b.size() < kStampsMin) return false;
+  const double a_hz = steps_of(a).rate_hz;
+  const double b_hz = steps_of(b).rate_hz;
+  return !rate_matches(a_hz, devices[one]) && !rate_matches(b_hz, devices[other]) &&
+         rate_matches(a_hz, devices[other]) && rate_matches(b_hz, devices[one]);
+}
+
 }  // namespace
+
+bool check_files(const Drive& drive, std::vector<Finding>& findings) {
+  const std::size_t reference = drive.configuration().reference_index();
+  const std::string& name = drive.configuration().devices[reference].name;
+  for (const std::size_t study : drive.configuration().study_indices()) {
+    if (!rates_exchanged(drive, reference, study)) continue;
+    const DeviceConfig& config = drive.configuration().devices[study];
+    std::erase_if(findings, [&](const Finding& finding) {
+      return finding.check == "rate" && (finding.device == config.name || finding.device == name);
+    });
+    findings.push_back({Harm::kWrong,
+                        "exchanged files",
+                        config.name,
+                        fmt::format("its file and that of {} are exchanged: each has the other's rate", name),
+                        steps_of(drive.imu(study).time_s).rate_hz,
+                        config.rate_hz,
+                        "Hz",
+                        "exchange the two files where they are given",
+                        {}});
+    return true;
+  }
+  return false;
+}
 
 void check_stamps(Drive& drive, std::size_t device, std::vector<Finding>& findings) {
   const DeviceConfig& config = drive.configuration().devices[device];
@@ -188,6 +252,7 @@ void check_stamps(Drive& drive, std::size_t device, std::vector<Finding>& findin
   const auto& time_s = gnss ? drive.gnss(device).time_s : drive.imu(device).time_s;
   if (time_s.size() < kStampsMin) return;
   const Steps steps = steps_of(time_s);
+  if (!(time_s.back() > time_s.front())) report_standing(config, time_s.size(), findings);
   if (!(steps.rate_hz > 0.0)) return;
   check_rate(drive, device, steps, findings);
   const std::size_t before = findings.size();

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/calibration_levels.h"
+#include "base/digits.h"
 #include "base/units.h"
 #include "report/mounting.h"
 #include "report/people.h"
@@ -130,7 +131,7 @@ std::string accuracy_sentence(const StudyFiles& study) {
       parts.push_back(fmt::format("{} unknown", part.what));
     } else {
       parts.push_back(fmt::format(
-          "{} {:.2g} {}{}", part.what, *part.sd, part.unit,
+          "{} {} {}{}", part.what, digits_beside(*part.sd, part.usable), part.unit,
           *part.sd <= part.usable ? "" : fmt::format(" (wanted: {:g} {})", part.usable, part.unit)));
     }
   }

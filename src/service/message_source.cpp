@@ -24,6 +24,9 @@ constexpr std::size_t kKeptMost = std::size_t{64} << 20U;
 constexpr std::size_t kPiece = 4096;
 constexpr std::uint64_t kMessagesPerProgress = 4096;
 constexpr std::int64_t kNsPerS = 1'000'000'000;
+/// Messages of one device are mixed by less than this, and no more of them are held for it.
+constexpr double kDisorder_ns = 0.1 * kNsPerS;
+constexpr std::size_t kEarlyMost = 1024;
 /// A velocity belongs to the position of the same instant.
 constexpr std::int64_t kSameInstant_ns = 1'000'000;
 /// sensor_msgs/NavSatStatus: ground-based augmentation is what receivers with fixed and with float
@@ -84,7 +87,8 @@ struct Velocity {
   bool has_sd = false;
 };
 
-/// Takes the messages of one device out of a file, in their order in it.
+/// Takes the messages of one device out of a file. Recorders write what comes on several connections as it comes:
+/// messages that are a little out of order are put back.
 class Extractor {
  public:
   Extractor(std::unique_ptr<mcap::MessageReader> reader, const DeviceConfig& device)
@@ -92,10 +96,12 @@ class Extractor {
 
   /// The next content; nothing at the end.
   std::optional<ros_message::Content> next() {
-    while (const auto message = reader_->next()) {
-      if (auto content = take(*message)) return content;
+    for (;;) {
+      while (!held_ && !ended_ && early_.size() < kEarlyMost && spread_ns() < kDisorder_ns) read_on();
+      if (!early_.empty()) return early_.extract(early_.begin()).mapped();
+      if (!held_) return std::nullopt;
+      take_in();
     }
-    return std::exchange(waiting_, std::nullopt);
   }
 
   [[nodiscard]] const mcap::MessageReader& reader() const { return *reader_; }
@@ -104,8 +110,37 @@ class Extractor {
   [[nodiscard]] const std::set<std::string>& frames() const { return frames_; }
   [[nodiscard]] std::uint64_t bad() const { return bad_; }
   [[nodiscard]] std::uint64_t unreadable() const { return unreadable_; }
+  [[nodiscard]] std::uint64_t out_of_order() const { return out_of_order_; }
 
  private:
+  /// In doubles, as times of a stranger may be anything.
+  [[nodiscard]] double spread_ns() const {
+    if (early_.empty()) return 0.0;
+    return static_cast<double>(early_.rbegin()->first) - static_cast<double>(early_.begin()->first);
+  }
+  void read_on() {
+    held_ = next_of_file();
+    ended_ = !held_;
+    if (ended_) return;
+    const double ahead_ns =
+        early_.empty() ? 0.0
+                       : static_cast<double>(held_->time_ns) - static_cast<double>(early_.rbegin()->first);
+    // Farther back its clock was set: what is there goes out before.
+    if (ahead_ns <= -kDisorder_ns) return;
+    if (ahead_ns < 0.0) ++out_of_order_;
+    take_in();
+  }
+  void take_in() {
+    early_.emplace(held_->time_ns, *held_);
+    held_.reset();
+  }
+  std::optional<ros_message::Content> next_of_file() {
+    while (const auto message = reader_->next()) {
+      if (auto content = take(*message)) return content;
+    }
+    return std::exchange(waiting_, std::nullopt);
+  }
+
   std::optional<ros_message::Content> take(const mcap::Message& message) {
     const mcap::Topic& topic = *message.topic;
     if (&topic != last_topic_) {
@@ -262,6 +297,10 @@ class Extractor {
   std::set<std::string> frames_;
   std::uint64_t bad_ = 0;
   std::uint64_t unreadable_ = 0;
+  std::multimap<std::int64_t, ros_message::Content> early_;  ///< equal times in the order of the file
+  std::optional<ros_message::Content> held_;                 ///< behind what is early
+  bool ended_ = false;
+  std::uint64_t out_of_order_ = 0;
 };
 
 void append_frame(const ros_message::Content& content, std::vector<std::uint8_t>& frames) {
@@ -387,8 +426,14 @@ Result<MessageSurvey> survey_messages(
   MessageSurvey survey;
   std::vector<std::uint8_t> frames;
   bool keeps = true;
+  std::uint64_t without_rates = 0;
+  std::uint64_t without_forces = 0;
   while (const auto content = extractor.next()) {
     ++survey.messages;
+    if (content->kind == ros_message::Kind::kImu) {
+      if ((content->flags & ros_message::kHasGyro) == 0) ++without_rates;
+      if ((content->flags & ros_message::kHasAccel) == 0) ++without_forces;
+    }
     if (keeps) append_frame(*content, frames);
     if (frames.size() > kKeptMost) {
       keeps = false;
@@ -414,6 +459,17 @@ Result<MessageSurvey> survey_messages(
     survey.losses.push_back(
         fmt::format("{}: {} messages in {} are not what their schema says, and were left out", device.name,
                     extractor.bad(), name));
+  if (extractor.out_of_order() > 0)
+    survey.losses.push_back(fmt::format("{}: {} messages in {} were out of order, and were put in order",
+                                        device.name, extractor.out_of_order(), name));
+  const auto say_missing = [&](std::uint64_t messages, const char* what) {
+    if (messages == 0) return;
+    survey.losses.push_back(
+        fmt::format("{}: {} of {} messages in {} say that they hold no {}, as its covariance begins with -1",
+                    device.name, messages, survey.messages, name, what));
+  };
+  say_missing(without_rates, "angular velocity");
+  say_missing(without_forces, "linear acceleration");
   if (keeps) survey.frames = std::make_shared<const std::vector<std::uint8_t>>(std::move(frames));
   return survey;
 }

@@ -35,6 +35,7 @@ Result<CsvReader> CsvReader::open(const std::filesystem::path& file,
     return work_error(file.string() + " cannot be read or is empty",
                       "make the run again, or remove the file");
   }
+  reader.next_place_ = header.size() + 1;
   drop_carriage_return(header);
   reader.cells_.resize(columns.size());
   std::string_view rest = header;
@@ -56,8 +57,16 @@ Result<CsvReader> CsvReader::open(const std::filesystem::path& file,
   return reader;
 }
 
+void CsvReader::go_to(std::uint64_t place) {
+  stream_.clear();
+  stream_.seekg(static_cast<std::streamoff>(place));
+  place_ = next_place_ = place;
+}
+
 bool CsvReader::next() {
+  place_ = next_place_;
   if (!read_line(stream_, row_, kLongestRow) || row_.size() > kLongestRow) return false;
+  next_place_ += row_.size() + 1;
   drop_carriage_return(row_);
   std::string_view rest = row_;
   for (std::size_t i = 0; i < wanted_.size(); ++i) {

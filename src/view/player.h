@@ -1,7 +1,7 @@
 #pragma once
 
 /// Plays a recording into a picture: at every time it is the picture that a page would have had live. A jump
-/// costs at most what a sixtieth of a capture does.
+/// costs at most what a sixtieth of the recording does.
 
 #include <cstdint>
 #include <memory>

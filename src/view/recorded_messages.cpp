@@ -33,9 +33,12 @@ class CaptureMessages final : public RecordedMessages {
 
   [[nodiscard]] std::optional<Place> place() const override {
     const auto place = files_->place();
-    return place ? std::optional(Place{place->number, place->offset}) : std::nullopt;
+    if (!place) return std::nullopt;
+    return Place{{static_cast<std::uint64_t>(place->number), place->offset}};
   }
-  Result<void> go_to(const Place& place) override { return files_->go_to({place.file, place.offset}); }
+  Result<void> go_to(const Place& place) override {
+    return files_->go_to({static_cast<int>(place.at.at(0)), place.at.at(1)});
+  }
 
  private:
   std::filesystem::path file_;

@@ -26,8 +26,7 @@ class RecordedMessages {
   [[nodiscard]] virtual Result<void> rewind() = 0;
   /// Somewhere in the recording that is gone to without what stands before it.
   struct Place {
-    int file = 0;
-    std::uint64_t offset = 0;
+    std::vector<std::uint64_t> at;  ///< offsets in files, as the recording means them
   };
   /// Before the next message; nothing where the recording cannot be entered here.
   [[nodiscard]] virtual std::optional<Place> place() const { return std::nullopt; }

@@ -73,6 +73,13 @@ class Table {
   virtual ~Table() = default;
   [[nodiscard]] virtual double time_s() const = 0;
   virtual Bytes take() = 0;
+  /// Of the row under way, and back to it.
+  struct Row {
+    std::uint64_t place;
+    std::int64_t sequence;  ///< of the message that begins with it
+  };
+  [[nodiscard]] virtual Row row() const = 0;
+  virtual void go_to(const Row& row) = 0;
 };
 
 /// Tables whose rows are messages: each column is a field.
@@ -90,6 +97,12 @@ class PlainTable final : public Table {
     ++message_.sequence;
     advance();
     return bytes;
+  }
+  [[nodiscard]] Row row() const override { return {reader_.place(), message_.sequence}; }
+  void go_to(const Row& row) override {
+    reader_.go_to(row.place);
+    message_.sequence = row.sequence;
+    advance();
   }
 
  private:
@@ -183,6 +196,12 @@ class ErrorTable final : public Table {
     Bytes bytes = encode_message(message_);
     ++message_.sequence;
     return bytes;
+  }
+  [[nodiscard]] Row row() const override { return {reader_.place(), message_.sequence}; }
+  void go_to(const Row& row) override {
+    reader_.go_to(row.place);
+    message_.sequence = row.sequence;
+    advance();
   }
 
  private:
@@ -310,6 +329,25 @@ class RunFolderMessages final : public RecordedMessages {
     if (earliest == tables_.end() || !((*earliest)->time_s() < kNever)) return false;
     message = (*earliest)->take();
     return true;
+  }
+
+  [[nodiscard]] std::optional<Place> place() const override {
+    if (at_ < first_.size()) return std::nullopt;
+    Place place;
+    for (const auto& table : tables_) {
+      const Table::Row row = table->row();
+      place.at.push_back(row.place);
+      place.at.push_back(static_cast<std::uint64_t>(row.sequence));
+    }
+    return place;
+  }
+
+  Result<void> go_to(const Place& place) override {
+    if (place.at.size() != 2 * tables_.size()) return rewind();
+    at_ = first_.size();
+    for (std::size_t i = 0; i < tables_.size(); ++i)
+      tables_[i]->go_to({place.at[2 * i], static_cast<std::int64_t>(place.at[2 * i + 1])});
+    return {};
   }
 
   Result<void> rewind() override {

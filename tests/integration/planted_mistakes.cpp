@@ -348,6 +348,116 @@ void add_axis_mistakes(std::vector<Mistake>& all) {
   triads(kReference, "gyro x and z swapped", kSwapXz, kSame, "csv.gyro_columns");
 }
 
+/// What a sample adds, as inertial units of navigation grade deliver it.
+auto increments(std::size_t device, bool of_forces) {
+  return [=](DriveInMemory& drive) {
+    const double dt_s = 1.0 / drive.configuration.devices[device].rate_hz;
+    scaled(device, dt_s, of_forces ? dt_s : 1.0)(drive);
+  };
+}
+
+auto offset(std::size_t device, const Vector3& gyro_radps, const Vector3& accel_mps2) {
+  return [=](DriveInMemory& drive) {
+    each(drive.samples[device], [&](Sample& sample) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        sample.imu.omega_radps[i] += gyro_radps[i];
+        sample.imu.f_mps2[i] += accel_mps2[i];
+      }
+    });
+  };
+}
+
+auto exchanged_triads(std::size_t device) {
+  return [=](DriveInMemory& drive) {
+    each(drive.samples[device], [](Sample& sample) { std::swap(sample.imu.omega_radps, sample.imu.f_mps2); });
+  };
+}
+
+/// A holder that gives way: from this share of the drive on the sensor is turned about its x or y axis.
+auto turns_on_its_place(double share, std::size_t axis, double turn_rad) {
+  return [=](DriveInMemory& drive) {
+    Samples& samples = drive.samples[kStudy];
+    const std::size_t a = (axis + 1) % 3;
+    const std::size_t b = (axis + 2) % 3;
+    for (auto i = static_cast<std::size_t>(share * static_cast<double>(samples.size())); i < samples.size();
+         ++i) {
+      for (Vector3* v : {&samples[i].imu.omega_radps, &samples[i].imu.f_mps2}) {
+        const Vector3 was = *v;
+        (*v)[a] = std::cos(turn_rad) * was[a] - std::sin(turn_rad) * was[b];
+        (*v)[b] = std::sin(turn_rad) * was[a] + std::cos(turn_rad) * was[b];
+      }
+    }
+  };
+}
+
+auto positions(const std::function<void(GnssData&)>& change) {
+  return
+      [=](DriveInMemory& drive) { each(drive.samples[kGnss], [&](Sample& sample) { change(sample.gnss); }); };
+}
+
+/// Positions that came in another order than this drive has them.
+void positions_of_another_drive(DriveInMemory& drive) {
+  Samples& samples = drive.samples[kGnss];
+  for (std::size_t i = 0; i < samples.size() / 2; ++i)
+    std::swap(samples[i].gnss, samples[samples.size() - 1 - i].gnss);
+}
+
+auto one_time(std::size_t device) {
+  return [=](DriveInMemory& drive) {
+    const HostTime first = drive.samples[device].front().time;
+    each(drive.samples[device], [&](Sample& sample) { sample.time = first; });
+  };
+}
+
+void add_mistakes_of_files(std::vector<Mistake>& all) {
+  for (const std::size_t device : {kReference, kStudy}) {
+    const std::string who = device == kReference ? "reference: " : "study: ";
+    all.push_back({who + "rates as increments", increments(device, false), device, "rate unit", "", ""});
+    all.push_back(
+        {who + "rates and forces as increments", increments(device, true), device, "gravity norm", "", ""});
+    all.push_back({who + "gyros and accelerometers exchanged", exchanged_triads(device), device,
+                   "gyros and accelerometers", "csv.gyro_columns", ""});
+    all.push_back({who + "a gyro that is off by 17 deg/s", offset(device, {0.0, 0.3, 0.0}, {}), device,
+                   "gyro offset", "", ""});
+    all.push_back({who + "all samples of one time", one_time(device), device, "standing times", "", ""});
+  }
+  all.push_back({"study: gyros in thousandths of a degree a second", scaled(kStudy, 1e3 * kDegPerRad, 1.0),
+                 kStudy, "rate unit", "", ""});
+  all.push_back(
+      {"study: it turns on its place by 20 deg", turns_on_its_place(0.5, 0, 0.35), kStudy, "moved", "", ""});
+  all.push_back(
+      {"study: it turns on its place by 6 deg", turns_on_its_place(0.3, 1, 0.1), kStudy, "moved", "", ""});
+  all.push_back({"gnss: west counted positive",
+                 positions([](GnssData& g) { g.longitude_rad = -g.longitude_rad; }), kGnss, "mirrored map",
+                 "", ""});
+  all.push_back({"gnss: latitude and longitude exchanged",
+                 positions([](GnssData& g) { std::swap(g.latitude_rad, g.longitude_rad); }), kGnss,
+                 "mirrored map", "", ""});
+  const auto as_radians = [](GnssData& g) {
+    g.latitude_rad *= kRadPerDeg;
+    g.longitude_rad *= kRadPerDeg;
+  };
+  all.push_back(
+      {"gnss: radians read as degrees", positions(as_radians), kGnss, "standing positions", "", ""});
+  const auto three_digits = [](GnssData& g) {
+    constexpr double kPerRad = 1e4 * kDegPerRad;
+    g.latitude_rad = std::round(g.latitude_rad * kPerRad) / kPerRad;
+    g.longitude_rad = std::round(g.longitude_rad * kPerRad) / kPerRad;
+  };
+  all.push_back(
+      {"gnss: positions of four decimals", positions(three_digits), kGnss, "position steps", "", ""});
+  all.push_back(
+      {"gnss: an hour late", times(kGnss, 1.0, 3600.0), kGnss, "other time", "csv.time_offset_s", "-3600.0"});
+  all.push_back({"gnss: two hours early", times(kGnss, 1.0, -7200.0), kGnss, "other time",
+                 "csv.time_offset_s", "7200.0"});
+  all.push_back({"gnss: of another drive", positions_of_another_drive, kGnss, "other drive", "", ""});
+  const auto epoch = [](DriveInMemory& drive) {
+    times(kStudy, 1.0, 1.7e8)(drive);
+    drive.has_own_clock[kStudy] = false;
+  };
+  all.push_back({"study: times of another epoch", epoch, kStudy, "other time", "csv.clock", "\"own\""});
+}
+
 void add_other_mistakes(std::vector<Mistake>& all) {
   for (const double late_s : {18.0, -18.0, 5.0, -37.0, 2.0}) {
     char value[16];
@@ -392,6 +502,7 @@ std::vector<Mistake> planted_mistakes() {
   add_imu_mistakes(all);
   add_axis_mistakes(all);
   add_other_mistakes(all);
+  add_mistakes_of_files(all);
   return all;
 }
 

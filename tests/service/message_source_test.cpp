@@ -139,6 +139,45 @@ TEST(MessageSource, WhatIsNotMeasuredIsNotValid) {
   EXPECT_EQ(samples_of(bag.finish(), device_of(DeviceRole::kReference))[0].imu.flags, kGyroValid);
 }
 
+TEST(MessageSource, WhatNoMessageHoldsIsTold) {
+  Bag bag;
+  auto imu = imu_at(kTime_ns, "", 1.0);
+  imu.linear_acceleration_covariance[0] = -1.0;
+  bag.add("/imu", "sensor_msgs/msg/Imu", imu);
+  const auto survey = survey_messages(bag.finish(), device_of(DeviceRole::kStudy));
+  ASSERT_TRUE(survey);
+  ASSERT_EQ(survey->losses.size(), 1U);
+  EXPECT_NE(survey->losses[0].find("1 of 1 messages"), std::string::npos) << survey->losses[0];
+  EXPECT_NE(survey->losses[0].find("no linear acceleration"), std::string::npos) << survey->losses[0];
+}
+
+/// Recorders write what comes on several connections as it comes.
+TEST(MessageSource, MessagesALittleOutOfOrderArePutInOrder) {
+  Bag bag;
+  for (const std::int64_t at : {0, 3, 1, 2, 4, 7, 6, 5, 9, 8, 30})
+    bag.add("/imu", "sensor_msgs/msg/Imu", imu_at(kTime_ns + at * 10'000'000, "", static_cast<double>(at)));
+  auto device = device_of(DeviceRole::kStudy);
+  device.rate_hz = 100.0;
+  const auto path = bag.finish();
+  const auto samples = samples_of(path, device);
+  ASSERT_EQ(samples.size(), 11U);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(samples[i].imu.omega_radps[0], static_cast<double>(i));
+  const auto survey = survey_messages(path, device);
+  ASSERT_EQ(survey->losses.size(), 1U);
+  EXPECT_NE(survey->losses[0].find("5 messages"), std::string::npos) << survey->losses[0];
+}
+
+/// A clock that was set back is no disorder: both of its sides stay as they came.
+TEST(MessageSource, AClockThatWasSetBackStaysOne) {
+  Bag bag;
+  for (const std::int64_t at : {100, 101, 102, 0, 1, 2})
+    bag.add("/imu", "sensor_msgs/msg/Imu", imu_at(kTime_ns + at * 10'000'000, "", static_cast<double>(at)));
+  const auto survey = survey_messages(bag.finish(), device_of(DeviceRole::kStudy));
+  ASSERT_TRUE(survey);
+  EXPECT_EQ(survey->messages, 6U);
+  EXPECT_TRUE(survey->losses.empty());
+}
+
 TEST(MessageSource, GapsAndTimesThatGoBackAreTold) {
   Bag bag;
   for (const std::int64_t at : {0, 1, 5, 4, 6})

@@ -173,6 +173,28 @@ TEST(Player, AJumpReadsLittleOfALongCaptureAndShowsWhatPlayingShows) {
   }
 }
 
+/// The tables of a run folder have places, too, each its own.
+TEST(Player, AJumpInARunFolderReadsFromTheLastPictureAndShowsWhatPlayingShows) {
+  const auto folder = test::scratch_folder();
+  test::write_synthetic_run(folder, {});
+  std::size_t read = 0;
+  std::size_t read_by_playing = 0;
+  auto jumping = Player::open(std::make_unique<Counted>(std::move(*open_recording(folder)), true, read));
+  auto playing =
+      Player::open(std::make_unique<Counted>(std::move(*open_recording(folder)), false, read_by_playing));
+  ASSERT_TRUE(jumping && playing);
+  const std::size_t all = read;
+  for (const double to_s : {52.0, 58.0, 12.0, 41.0, 35.0}) {
+    read = 0;
+    for (auto* player : {&*jumping, &*playing}) {
+      (*player)->on_said(seek(to_s));
+      (void)(*player)->turn(0.0);
+    }
+    EXPECT_LT(read, all / 4) << "a jump to " << to_s << " s";
+    EXPECT_EQ(content_of(**jumping), content_of(**playing)) << to_s;
+  }
+}
+
 TEST(Player, OfSeveralSeeksTheLastOneHolds) {
   auto player = player_of(write_capture());
   ASSERT_TRUE(player);

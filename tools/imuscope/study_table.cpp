@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/calibration_levels.h"
+#include "base/digits.h"
 #include "base/json_text.h"
 #include "base/units.h"
 #include "print.h"
@@ -124,7 +125,8 @@ std::string usability_words(const json& imu) {
   std::vector<std::string> limits;
   const auto limit = [&](const char* what, double sd, double wanted, double unit, const char* name) {
     if (!(sd <= wanted))
-      limits.push_back(fmt::format("{} sd {:.2g} {} ({:g} wanted)", what, sd * unit, name, wanted * unit));
+      limits.push_back(fmt::format("{} sd {} {} ({:g} wanted)", what, digits_beside(sd * unit, wanted * unit), name,
+                                   wanted * unit));
   };
   limit("boresight", boresight_rad, kUsableBoresightSd_rad, kDegPerRad, "deg");
   limit("lever arm", lever_arm_m, kUsableLeverArmSd_m, kMmPerM, "mm");
