@@ -10,6 +10,8 @@ namespace imuscope::view {
 namespace {
 
 constexpr double kToTheEnd = std::numeric_limits<double>::infinity();
+/// Messages of several tables, each of which begins at its first row, are mixed by no more than this.
+constexpr double kMixed_s = 1.0;
 /// So many pictures of a recording are kept, of some hundred kB each.
 constexpr std::size_t kStopsMost = 120;
 
@@ -26,7 +28,7 @@ Result<void> Player::read_through() {
   while (recording_->next(message_)) {
     if (!picture_.hear(message_)) continue;
     // Behind a service that began anew times come twice: a jump means the first.
-    if (picture_.time_s() < newest_s) stop_every_s_ = kToTheEnd;
+    if (picture_.time_s() < newest_s - kMixed_s) stop_every_s_ = kToTheEnd;
     newest_s = std::max(newest_s, picture_.time_s());
     if (newest_s >= (stops_.empty() ? 0.0 : stops_.back().time_s) + stop_every_s_) add_stop();
   }

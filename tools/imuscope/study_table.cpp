@@ -125,8 +125,8 @@ std::string usability_words(const json& imu) {
   std::vector<std::string> limits;
   const auto limit = [&](const char* what, double sd, double wanted, double unit, const char* name) {
     if (!(sd <= wanted))
-      limits.push_back(fmt::format("{} sd {} {} ({:g} wanted)", what, digits_beside(sd * unit, wanted * unit), name,
-                                   wanted * unit));
+      limits.push_back(fmt::format("{} sd {} {} ({:g} wanted)", what, digits_beside(sd * unit, wanted * unit),
+                                   name, wanted * unit));
   };
   limit("boresight", boresight_rad, kUsableBoresightSd_rad, kDegPerRad, "deg");
   limit("lever arm", lever_arm_m, kUsableLeverArmSd_m, kMmPerM, "mm");
