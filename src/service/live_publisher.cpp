@@ -522,7 +522,7 @@ void LivePublisher::add_alarms(status_t& status, HostTime now) {
   for (const auto& alarm : news.began) {
     tell_alarm(alarm);
     // The others have their words in the log where they happen.
-    if (alarm.kind == alarm_kind::kDisk) spdlog::warn("{}: {}; {}", alarm.subject, alarm.what, alarm.remedy);
+    if (alarm.kind == alarm_kind::kDisk) spdlog::warn("{}; {}", alarm.what, alarm.remedy);
   }
   for (const auto& alarm : news.ended) {
     tell_alarm(alarm);

@@ -106,7 +106,8 @@ TEST_F(CaptureFaults, ASlowAFullAndAnAbsentDiskAreToldAndSurvivedAndAKillLosesLe
       wait_for("a full disk told", [](const status_t& s) { return tells(s, "No space left on device"); });
   EXPECT_EQ(full.state, "degraded");
   EXPECT_TRUE(tells(full, "free space on that disk"));
-  EXPECT_NE(read_text(folder_ / "imuscope.log").find("No space left on device; "), std::string::npos)
+  EXPECT_NE(read_text(folder_ / "imuscope.log").find("(No space left on device); free space on that disk"),
+            std::string::npos)
       << "whoever reads the log alone is told why records are missing, too";
 
   set_disk("gone");

@@ -52,7 +52,8 @@ TEST(ManualPage, NamesEveryCommandAndNoOther) {
 
 TEST(LiveProgram, HasWhatAVehicleNeedsAndNamesThePackageOfAllElse) {
   const auto live = commands_of_the_program("live/imuscope");
-  for (const char* needed : {"run", "top", "doctor", "replay", "status", "capture", "keep", "probe", "config"})
+  for (const char* needed :
+       {"run", "top", "doctor", "replay", "status", "capture", "keep", "probe", "config"})
     EXPECT_TRUE(live.contains(needed)) << needed;
   const auto log = scratch_folder() / "said.txt";
   std::set<std::string> all = live;
