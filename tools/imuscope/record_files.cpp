@@ -36,8 +36,9 @@ std::size_t place_of(const std::string& axis) {
 /// Mean of what is there; NaN where it cannot be read.
 double mean_of(const certificate::AxisRecord& record) {
   if (record.fetch) {
-    const auto values = record.fetch();
-    return values ? mean_of({record.name, record.unit, record.rate_hz, *values, record.mask}) : std::nan("");
+    auto values = record.fetch();
+    return values ? mean_of({record.name, record.unit, record.rate_hz, std::move(*values), record.mask})
+                  : std::nan("");
   }
   double sum = 0.0;
   double n = 0.0;

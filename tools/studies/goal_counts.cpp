@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <iomanip>
 #include <sstream>
 
 namespace imuscope {
@@ -22,10 +23,10 @@ Results::Results(const std::string& file) : file_(file) {
     std::string cell;
     int first = 0;
     int end = 0;
-    if (!(words >> cell >> first >> end) || first != done_[cell]) continue;
+    if (!(words >> std::quoted(cell) >> first >> end) || first != done_[cell]) continue;
     Counts read;
     std::string name;
-    for (Count c; words >> name >> c.hits >> c.of;) read[name] = c;
+    for (Count c; words >> std::quoted(name) >> c.hits >> c.of;) read[name] = c;
     add(cell, end, read);
   }
 }
@@ -37,9 +38,10 @@ int Results::done(const std::string& cell) const {
 
 void Results::keep(const std::string& cell, int end, const Counts& counts) {
   if (!file_.empty()) {
-    std::string line = fmt::format("{} {} {}", cell, done(cell), end);
-    for (const auto& [name, c] : counts) line += fmt::format(" {} {} {}", name, c.hits, c.of);
-    std::ofstream(file_, std::ios::app) << line << '\n';
+    std::ostringstream line;  // names may have blanks
+    line << std::quoted(cell) << ' ' << done(cell) << ' ' << end;
+    for (const auto& [name, c] : counts) line << ' ' << std::quoted(name) << ' ' << c.hits << ' ' << c.of;
+    std::ofstream(file_, std::ios::app) << line.str() << '\n';
   }
   add(cell, end, counts);
 }
