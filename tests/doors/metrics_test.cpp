@@ -172,7 +172,7 @@ TEST_F(MetricsDoor, APageOfABrowserWhoseNameLeadsHereIsRefused) {
     EXPECT_THAT(get(std::string("GET /metrics HTTP/1.1\r\nHost: ") + host + "\r\n\r\n"),
                 StartsWith("HTTP/1.1 403"))
         << host;
-  EXPECT_THAT(get("GET /metrics HTTP/1.0\r\n\r\n"), StartsWith("HTTP/1.1 200"));  // no browser leaves it out
+  EXPECT_THAT(get("GET /metrics HTTP/1.0\r\n\r\n"), StartsWith("HTTP/1.0 200"));  // no browser leaves it out
 }
 
 TEST_F(MetricsDoor, WhoeverHoldsItOpenHoldsItForItsTimeAlone) {
