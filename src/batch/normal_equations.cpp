@@ -103,9 +103,9 @@ Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, doubl
                  double frequency_hz) {
   Weight weight;
   weight.power = power;
-  const ReferencePower of_reference = reference_power(t, of_gyros, of_accels, frequency_hz);
-  weight.reference_power.head<3>().setConstant(of_reference.gyro);
-  weight.reference_power.tail<3>().setConstant(of_reference.accel);
+  const ReferencePower agreed = reference_power(t, of_gyros, of_accels, frequency_hz);
+  weight.reference_power.head<3>().setConstant(agreed.gyro);
+  weight.reference_power.tail<3>().setConstant(agreed.accel);
   weight.of_reference.setZero();
   weight.of_reference.topLeftCorner<3, 3>() = t.gyro.cast<complex<double>>();
   weight.of_reference.bottomRightCorner<3, 3>() = t.accel.cast<complex<double>>();
