@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "base/grouped.h"
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "base/units.h"
 #include "report/certificate_figures.h"
-#include "base/grouped.h"
 #include "report/page_parts.h"
 #include "report/people.h"
 #include "tables/json_fields.h"

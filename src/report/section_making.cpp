@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "base/json_text.h"
 #include "base/grouped.h"
+#include "base/json_text.h"
 #include "report/people.h"
 #include "report/sections.h"
 #include "tables/json_fields.h"

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/data_sheet_table.h"
 #include "base/grouped.h"
+#include "report/data_sheet_table.h"
 #include "report/people.h"
 #include "report/sections.h"
 #include "report/verdict.h"

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "report/data_sheet_table.h"
 #include "base/grouped.h"
+#include "report/data_sheet_table.h"
 #include "report/mounting.h"
 #include "report/page_parts.h"
 #include "tests/report/synthetic_run.h"

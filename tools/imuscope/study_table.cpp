@@ -12,10 +12,10 @@
 
 #include "base/calibration_levels.h"
 #include "base/digits.h"
+#include "base/grouped.h"
 #include "base/json_text.h"
 #include "base/units.h"
 #include "print.h"
-#include "base/grouped.h"
 #include "tables/json_file.h"
 
 namespace imuscope::cli {
