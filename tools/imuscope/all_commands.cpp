@@ -22,16 +22,8 @@ void add_commands(CLI::App& app, Work& work) {
   add_fleet(app, work);
   add_decode(app, work);
   add_import(app, work);
-  add_capture(app, work);
-  add_probe(app, work);
-  add_top(app, work);
   add_view(app, work);
-  add_status(app, work);
-  add_keep(app, work);
-  add_doctor(app, work);
-  add_config(app, work);
-  add_completion(app, work);
-  add_help(app, work);
+  add_care_commands(app, work);
 }
 
 std::vector<std::string> commands_of_another_package() { return {}; }

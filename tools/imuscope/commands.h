@@ -24,6 +24,8 @@ inline void on_chosen(CLI::App& subcommand, Work& chosen, Work work) {
 
 /// All subcommands of the program: all_commands.cpp or live_commands.cpp, whichever it is built with.
 void add_commands(CLI::App& app, Work& chosen);
+/// Of those, what looks after recordings, devices and a running service; both packages have it.
+void add_care_commands(CLI::App& app, Work& chosen);
 
 /// Those that the other package has beyond these.
 [[nodiscard]] std::vector<std::string> commands_of_another_package();

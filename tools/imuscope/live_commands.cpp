@@ -7,15 +7,7 @@ namespace imuscope::cli {
 void add_commands(CLI::App& app, Work& work) {
   add_run(app, work, nullptr);
   add_replay(app, work);
-  add_capture(app, work);
-  add_probe(app, work);
-  add_top(app, work);
-  add_status(app, work);
-  add_keep(app, work);
-  add_doctor(app, work);
-  add_config(app, work);
-  add_completion(app, work);
-  add_help(app, work);
+  add_care_commands(app, work);
 }
 
 std::vector<std::string> commands_of_another_package() {
