@@ -2,7 +2,9 @@
 include_guard(GLOBAL)
 
 install(TARGETS imuscope imusim RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(TARGETS imuscope_live RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT live)
+# Installed under the same name, as a vehicle has one of them. In the build its file has its own: `--target imuscope` would
+# build either of two files of one name.
+install(PROGRAMS $<TARGET_FILE:imuscope_live> DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME imuscope COMPONENT live)
 install(PROGRAMS tools/spy DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME imuscope-spy)
 # What a program itself says of its commands, where each shell looks for it.
 function(install_completions program component)

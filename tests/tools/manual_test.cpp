@@ -51,7 +51,7 @@ TEST(ManualPage, NamesEveryCommandAndNoOther) {
 }
 
 TEST(LiveProgram, HasWhatAVehicleNeedsAndNamesThePackageOfAllElse) {
-  const auto live = commands_of_the_program("live/imuscope");
+  const auto live = commands_of_the_program("imuscope_live");
   for (const char* needed :
        {"run", "top", "doctor", "replay", "status", "capture", "keep", "probe", "config"})
     EXPECT_TRUE(live.contains(needed)) << needed;
@@ -60,7 +60,7 @@ TEST(LiveProgram, HasWhatAVehicleNeedsAndNamesThePackageOfAllElse) {
   for (const std::string& command : commands_of_the_program()) {
     if (live.contains(command)) continue;
     all.insert(command);
-    EXPECT_EQ(run_program("live/imuscope", {command}, log), 2) << command;
+    EXPECT_EQ(run_program("imuscope_live", {command}, log), 2) << command;
     EXPECT_THAT(read_text(log), HasSubstr("is a command of the package imuscope")) << command;
   }
   EXPECT_EQ(all, commands_of_the_program()) << "it has no command that the other has not";
