@@ -22,6 +22,7 @@ constexpr double kBreakMax_s = 24.0 * 3600.0;
 /// When the first read came, by the recorder's clock, from this record on. A header and what was published do not
 /// tell: the one has the time of the run's beginning, the others that of GNSS.
 std::optional<std::int64_t> first_read_from(LogEvent& event, SealedLog& log) {
+  // Minutes in which no device sends hold fewer.
   constexpr int kRecordsMost = 10000;
   for (int i = 0; i < kRecordsMost; ++i) {
     if (is_raw(event.data)) return event.utime;
@@ -80,7 +81,7 @@ bool CaptureFiles::next(LogEvent& event) {
     if (!t0_ && log_.health().is_sealed) t0_ = t0_of_others();
   }
   // Published messages have the time that they are valid at, by GNSS where there is one.
-  if (is_raw(event.data)) last_utime_ = event.utime;
+  if (is_raw(event.data)) last_read_utime_ = event.utime;
   return true;
 }
 
@@ -134,9 +135,11 @@ std::optional<CaptureBreak> CaptureFiles::joins(int number) const {
   const auto begins = first_read_from(event, *log);
   // Without a header, what a device sent is all that tells whose it is.
   if (!t0 && !begins) return std::nullopt;
+  // Where no device has sent anything yet, nothing is known to be missing.
   const double seconds =
-      (static_cast<double>(begins.value_or(last_utime_)) - static_cast<double>(last_utime_)) *
-      kSecondsPerMicrosecond;
+      begins && last_read_utime_
+          ? (static_cast<double>(*begins) - static_cast<double>(*last_read_utime_)) * kSecondsPerMicrosecond
+          : 0.0;
   // Where the header is among what is damaged, the records say whether they follow.
   const LogHealth health = log->health();
   const bool is_damaged = health.bytes_skipped + health.records_damaged > 0;

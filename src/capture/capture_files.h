@@ -81,7 +81,7 @@ class CaptureFiles {
   SealedLog log_;
   bool at_beginning_ = true;
   std::optional<HostTime> t0_;
-  std::int64_t last_utime_ = 0;  ///< of the last read, by the recorder's clock
+  std::optional<std::int64_t> last_read_utime_;  ///< by the recorder's clock; none: no device has sent yet
   std::vector<CaptureBreak> breaks_;
   std::vector<CapturedFile> finished_;
 };

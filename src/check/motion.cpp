@@ -205,8 +205,7 @@ void find_forward(const GnssMotion& motion, const ImuBins& imu, ReferenceAxes& a
   axes.right = right;
 }
 
-/// The acceleration across the course that the reference's turning makes at the speed of the positions, and
-/// the forces along and across gravity beside it.
+/// The acceleration across the course that the reference's turning makes at the speed of the positions.
 struct Turns {
   double turn_mps2 = 0.0;  ///< rms
   double n = 0.0;
@@ -262,9 +261,9 @@ void check_standing(const Drive& drive, std::size_t gnss, const ImuBins& imu, co
     const double rate = std::abs(imu.omega_radps[i].dot(down));
     if (imu.valid[i] && rate > kTurning_radps) turned_rad += rate * kBin_s;
   }
+  // Around the origin of both there is nothing but sea.
   const bool as_radians = std::abs(track.first.latitude_rad) < 0.5 * kPi * kRadPerDeg &&
                           std::abs(track.first.longitude_rad) < kPi * kRadPerDeg;
-  // Around the origin of both there is nothing but sea.
   if (!as_radians && (farthest_m > kStands_m || turned_rad < kTurned_rad)) return;
   const DeviceConfig& config = drive.configuration().devices[gnss];
   Finding finding{Harm::kWrong,

@@ -17,6 +17,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/digits.h"
 #include "base/text.h"
 #include "capture/capture_files.h"
 #include "rt/host_clock.h"
@@ -186,9 +187,11 @@ std::vector<Removal> runs_to_remove(const std::vector<RemovableRun>& runs, const
     if (limits.remove_older_than_s && clock_is_set && age_s > *limits.remove_older_than_s) {
       reason = fmt::format("it ended {:.1f} days ago (remove_older_than_days)", age_s / kSPerDay);
     } else if (limits.remove_beyond_bytes && all > *limits.remove_beyond_bytes) {
-      reason = fmt::format("all runs had {:.3g} GB (remove_beyond_gb)", all / kBytesPerGb);
+      reason = fmt::format("all runs had {} GB (remove_beyond_gb)",
+                           digits_beside(all / kBytesPerGb, *limits.remove_beyond_bytes / kBytesPerGb));
     } else if (limits.remove_below_free_bytes && free < *limits.remove_below_free_bytes) {
-      reason = fmt::format("{:.3g} GB of the disk were free (remove_below_free_gb)", free / kBytesPerGb);
+      reason = fmt::format("{} GB of the disk were free (remove_below_free_gb)",
+                           digits_beside(free / kBytesPerGb, *limits.remove_below_free_bytes / kBytesPerGb));
     }
     if (reason.empty()) continue;
     all -= static_cast<double>(run.bytes);
@@ -213,8 +216,8 @@ void apply_retention(const std::filesystem::path& folder, const RecordOptions& l
       spdlog::warn("{}", removed.error().text());
       continue;
     }
-    spdlog::info("the run {} ({:.3g} GB) was removed: {}", removal.run.name,
-                 static_cast<double>(removal.run.bytes) / kBytesPerGb, removal.reason);
+    spdlog::info("the run {} ({} GB) was removed: {}", removal.run.name,
+                 digits_beside(static_cast<double>(removal.run.bytes) / kBytesPerGb, 0.0), removal.reason);
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Who may have the page. A browser runs scripts of every page that its user has open: such a script can
+/// Who is answered. A browser runs scripts of every page that its user has open: such a script can
 /// reach a server on this PC, and a name of its own can lead there. Pure functions of what a request says.
 
 #include <optional>
@@ -10,7 +10,7 @@
 
 namespace imuscope::web {
 
-/// Names by which the page may be asked for, beside numeric addresses and localhost: a name that leads here
+/// Names by which a server may be asked for, beside numeric addresses and localhost: a name that leads here
 /// by somebody else's name server is none of them.
 struct HostNames {
   std::vector<std::string> names;  ///< in lower case
@@ -20,7 +20,7 @@ struct HostNames {
 /// @param host  a Host header: name or address, and perhaps a port
 [[nodiscard]] bool is_host_allowed(std::string_view host, const HostNames& known);
 
-/// Whether a script of that origin comes from the page itself: http:// and the same Host.
+/// Whether a script of that origin comes from the server's own page: http:// and the same Host.
 [[nodiscard]] bool is_own_origin(std::string_view origin, std::string_view host);
 
 /// Path of a request's target, without its query.

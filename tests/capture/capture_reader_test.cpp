@@ -565,7 +565,8 @@ TEST(CaptureReader, TellsHowFarItHasComeInEveryFile) {
 
 /// A capture of five files, ten reads in each, a second apart, between messages that were published; returns the
 /// first. The PC's clock is half a year ahead of GNSS, by which the messages have their times.
-std::filesystem::path five_files() {
+/// @param silent  so many files at the beginning hold no read
+std::filesystem::path five_files(int silent = 0) {
   constexpr std::int64_t kHalfAYear_us = std::int64_t{180} * 86'400 * 1'000'000;
   const auto first = test::scratch_folder() / "drive.lcm";
   const RunHeader run = example_run();
@@ -577,7 +578,7 @@ std::filesystem::path five_files() {
     };
     writer.append("IMUSCOPE_RUN", clock.utime(run.t0), encode(run, file));
     if (file % 2 == 1) publish();
-    for (int i = 0; i < 10; ++i) {
+    for (int i = 0; i < 10 && file >= silent; ++i) {
       const std::int64_t sequence = 10 * file + i;
       const HostTime arrival = kT0 + std::chrono::seconds(sequence);
       const Bytes bytes{static_cast<std::uint8_t>(sequence)};
@@ -637,6 +638,17 @@ TEST(CaptureReader, TheDamagedBeginningOfTheLastFileIsToldToo) {
   ASSERT_EQ(summary->breaks.size(), 1U);
   EXPECT_EQ(summary->breaks[0].behind, 4);
   EXPECT_TRUE(summary->breaks[0].beginning_is_damaged);
+}
+
+TEST(CaptureReader, GoesOnBehindADamagedBeginningBeforeAnyDeviceHasSent) {
+  const auto first = five_files(1);
+  std::fstream(capture_file(first, 1), std::ios::in | std::ios::out | std::ios::binary).put('\0');
+  EXPECT_EQ(reads_of(first), 40U);
+  const auto summary = summarise_capture(first);
+  ASSERT_TRUE(summary.has_value());
+  ASSERT_EQ(summary->breaks.size(), 1U);
+  EXPECT_EQ(summary->breaks[0].behind, 1);
+  EXPECT_EQ(summary->breaks[0].seconds, 0.0) << "nothing came before";
 }
 
 TEST(CaptureReader, WhatIsWrongWithItsFilesIsSummed) {
