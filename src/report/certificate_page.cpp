@@ -138,6 +138,10 @@ Html correlation_section(const json& certificate) {
          number(number_at(pair, "tau_s"), 3), number(*p, 2)});
   }
   Html out = element("h2", text("What axes have in common"));
+  if (const auto means_s = number_at(certificate, "correlation_of_means_s")) {
+    out += paragraph(fmt::format(
+        "Looked for in means of {:.3g} s, as the record is long; faster ones would not show.", *means_s));
+  }
   if (!table.empty()) out += table.html();
   const std::string rest =
       table.empty()

@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <random>
 #include <sstream>
 #include <vector>
@@ -259,6 +261,32 @@ TEST_F(Characterize, UnitsThatDoNotGoTogetherAreTold) {
   EXPECT_EQ(run({in_g, "--no-page"}), 0) << output();
   EXPECT_THAT(output(), HasSubstr("and gravity is 9.81"));
   EXPECT_THAT(output(), Not(HasSubstr("by their names")));
+}
+
+// Raw files of more than 96 MB together are fetched axis by axis, and what they have in common is looked for in means.
+TEST_F(Characterize, ALongRecordIsFetchedAndSaysInWhatItsAxesWereCompared) {
+  constexpr std::size_t kSamples = 6'400'000;
+  constexpr double kSd_radps = 1e-3;
+  constexpr double kRate_hz = 200.0;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> white(0.0, kSd_radps);
+  std::vector<double> samples(kSamples);
+  for (const char* name : {"gyro_x_radps.f64", "gyro_y_radps.f64"}) {
+    std::ranges::generate(samples, [&] { return white(random); });
+    std::ofstream file(folder_ / name, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(samples.data()),
+               static_cast<std::streamsize>(samples.size() * sizeof(double)));
+  }
+  ASSERT_EQ(run({(folder_ / "gyro_x_radps.f64").string(), (folder_ / "gyro_y_radps.f64").string(), "--rate",
+                 "200", "--no-page", "--json"}),
+            0)
+      << output();
+  const auto page = nlohmann::json::parse(output());
+  EXPECT_EQ(page.at("correlation_of_means_s").get<double>(), 4.0 / kRate_hz)
+      << "the least power of two below 2^21";
+  const double n = page.at("axes").at(0).at("terms").at(0).at("value").get<double>();
+  const double truth = kSd_radps / std::sqrt(kRate_hz) * 60.0 * 180.0 / std::numbers::pi;
+  EXPECT_NEAR(n, truth, 0.02 * truth);
 }
 
 // A real sensor: the resonance of its z gyroscope near 20 Hz, and a random walk that is no white noise's.

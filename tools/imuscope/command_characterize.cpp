@@ -126,10 +126,16 @@ std::vector<double> means_of(const std::vector<double>& x, std::size_t together)
   return means;
 }
 
+/// What the axes of one record have in common.
+struct Correlation {
+  certificate::JointAxes joint;
+  std::optional<double> of_means_s;  ///< looked at in means of so long; empty: in samples
+};
+
 /// Of the axes of one record with each other; nothing where they were not sampled together. Of axes that are
 /// fetched, at the scales of means.
-std::optional<certificate::JointAxes> correlation_of(const SensorRecord& record,
-                                                     const certificate::AxisOptions& options) {
+std::optional<Correlation> correlation_of(const SensorRecord& record,
+                                          const certificate::AxisOptions& options) {
   std::vector<std::vector<double>> values;  // NaN where a sample is missing
   std::size_t together = 1;
   for (const auto& axis : record.axes) {
@@ -159,10 +165,16 @@ std::optional<certificate::JointAxes> correlation_of(const SensorRecord& record,
   how.rate_hz = record.axes.front().rate_hz / static_cast<double>(together);
   auto joint = joint_axes(signals, how);
   if (!joint) return std::nullopt;  // a single axis, or one that is stuck
-  return std::move(*joint);
+  Correlation out{std::move(*joint), std::nullopt};
+  if (together > 1) out.of_means_s = 1.0 / how.rate_hz;
+  return out;
 }
 
-void print_correlation(const nlohmann::json& pairs) {
+/// Of a document with "correlation".
+void print_correlation(const nlohmann::json& document) {
+  const auto& pairs = document["correlation"];
+  if (const auto means = document.find("correlation_of_means_s"); means != document.end())
+    say("  correlations: in means of {:.3g} s, faster ones were not looked for\n", means->get<double>());
   for (const auto& pair : pairs) {
     if (!pair["shows"].get<bool>()) continue;
     say("  {} and {} correlate: {:.2f} [{:.2f}, {:.2f}] at {:.3g} s (p = {:.2g}, corrected)\n",
@@ -282,10 +294,11 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     const std::string name = options.sensor.empty() || records->size() > 1 ? record.name : options.sensor;
     documents.push_back(
         certificate::to_json({name, record.files, record.selection, now_utc(), IMUSCOPE_VERSION}, *axes));
-    if (const auto joint = correlation_of(record, options.how)) {
+    if (const auto found = correlation_of(record, options.how)) {
       std::vector<std::string> names;
       for (const auto& axis : record.axes) names.push_back(axis.name);
-      documents.back()["correlation"] = certificate::pairs_json(*joint, names);
+      documents.back()["correlation"] = certificate::pairs_json(found->joint, names);
+      if (found->of_means_s) documents.back()["correlation_of_means_s"] = *found->of_means_s;
     }
     if (*sheet) documents.back()["comparison"] = to_json(**sheet, beside(**sheet, *axes));
     all.push_back(std::move(*axes));
@@ -302,7 +315,7 @@ Result<void> run_characterize(CharacterizeCommand& options) {
     for (const auto& axis : all[i]) {
       for (const auto& limit : axis.limits) say("  {}: {}\n", axis.name, limit);
     }
-    if (documents[i].contains("correlation")) print_correlation(documents[i]["correlation"]);
+    if (documents[i].contains("correlation")) print_correlation(documents[i]);
     if (*sheet) print_beside(**sheet, beside(**sheet, all[i]));
   }
   if (options.table) {
