@@ -4,7 +4,9 @@ include_guard(GLOBAL)
 install(TARGETS imuscope imusim RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 # Installed under the same name, as a vehicle has one of them. In the build its file has its own: `--target imuscope` would
 # build either of two files of one name.
-install(PROGRAMS $<TARGET_FILE:imuscope_live> DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME imuscope COMPONENT live)
+install(TARGETS imuscope_live RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT live)
+install(CODE "set(folder \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}\")
+              file(RENAME \"\${folder}/imuscope_live\" \"\${folder}/imuscope\")" COMPONENT live)
 install(PROGRAMS tools/spy DESTINATION ${CMAKE_INSTALL_BINDIR} RENAME imuscope-spy)
 # What a program itself says of its commands, where each shell looks for it.
 function(install_completions program component)
