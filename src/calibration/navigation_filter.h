@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "calibration/estimator.h"
 #include "calibration/event_log.h"
 #include "calibration/filter_core.h"
 #include "navigation/gnss_gate.h"

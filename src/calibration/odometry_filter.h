@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 
+#include "calibration/estimator.h"
 #include "calibration/event_log.h"
 #include "calibration/filter_core.h"
 #include "calibration/navigation_filter.h"
