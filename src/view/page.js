@@ -297,7 +297,7 @@ function goalRow(goal) {
 
 function showCalibration() {
   const studies = new Map((known.status ? known.status.studies : []).map((s) => [s.name, s]));
-  const names = [...new Set([...studies.keys(), ...[...known.imus.keys()].filter((n) => known.imus.get(n).calibration)])].sort();
+  const names = [...new Set([...studies.keys(), ...known.imus.keys()])].sort();
   const tiles = children(byId('calibration'), names, (name) => {
     const tile = element('div', 'tile'), head = element('div', 'head');
     head.append(element('h3', '', name), element('span', 'quiet'));
@@ -308,7 +308,7 @@ function showCalibration() {
   });
   names.forEach((name, i) => {
     const tile = tiles[i], study = studies.get(name), imu = known.imus.get(name), c = imu ? imu.calibration : null;
-    const state = study ? study.state : c ? kValidities[c.validity] ?? '' : '';
+    const state = study ? study.state : c ? kValidities[c.validity] ?? '' : 'not begun';
     const reached = c && kGoals.every((g) => g.sd(c) !== null && g.sd(c) <= g.goal(c));
     dress(tile, 'tile ' + (reached ? 'yes' : c && c.validity === 3 ? 'no' : 'partly'));
     say(tile.querySelector('.head span'), [state, imu ? imu.regime : ''].filter(Boolean).join(' · '));
