@@ -23,10 +23,10 @@ void add_resonance(const Component& c, std::mt19937_64& random, std::span<double
   const Eigen::Matrix2d P = c.amplitude * Eigen::Vector2d(1.0, a * a + b * b).asDiagonal().toDenseMatrix();
   const Eigen::Matrix2d drive = Eigen::Matrix2d(P - F * P * F.transpose()).llt().matrixL();
   Eigen::Vector2d state =
-      Eigen::Matrix2d(P.llt().matrixL()) * Eigen::Vector2d(normal(random), normal(random));
+      Eigen::Matrix2d(P.llt().matrixL()) * Eigen::Vector2d{normal(random), normal(random)};
   for (double& v : x) {
     v += state[0];
-    state = F * state + drive * Eigen::Vector2d(normal(random), normal(random));
+    state = F * state + drive * Eigen::Vector2d{normal(random), normal(random)};
   }
 }
 
@@ -40,7 +40,7 @@ void add_power_law(double alpha, double sd, std::mt19937_64& random, std::span<d
     const double f = static_cast<double>(k) / static_cast<double>(n);
     const double scale = sd * std::pow(2.0 * std::sin(std::numbers::pi * f), -0.5 * alpha) *
                          std::sqrt(0.5 * static_cast<double>(n));
-    spectrum[k] = scale * std::complex<double>(normal(random), normal(random));
+    spectrum[k] = scale * std::complex<double>{normal(random), normal(random)};
     spectrum[n - k] = std::conj(spectrum[k]);
   }
   spectrum[n / 2] = sd * std::pow(2.0, -0.5 * alpha) * std::sqrt(static_cast<double>(n)) * normal(random);

@@ -34,7 +34,7 @@ std::vector<Matrix3d> mountings() {
   std::mt19937 random(5);
   std::normal_distribution<> normal;
   for (int i = 0; i < 26; ++i) {
-    Eigen::Quaterniond q(normal(random), normal(random), normal(random), normal(random));
+    Eigen::Quaterniond q{normal(random), normal(random), normal(random), normal(random)};
     out.push_back(q.normalized().toRotationMatrix());
   }
   return out;
@@ -58,7 +58,7 @@ void drive(CoarseMountingEstimator& estimator, const StudyImu& imu, double secon
   std::mt19937 random(seed);
   std::normal_distribution<> normal;
   const auto noise = [&](double sd) {
-    return Vector3d(sd * normal(random), sd * normal(random), sd * normal(random));
+    return Vector3d{sd * normal(random), sd * normal(random), sd * normal(random)};
   };
   for (double t = 0.0; t < seconds; t += 0.01) {
     const double ts = t - study_delay_s;
@@ -103,7 +103,7 @@ TEST(CoarseMounting, ItsCovarianceIsNotOptimistic) {
   for (std::size_t i = 0; i < all.size(); ++i) {
     StudyImu imu;
     imu.C_b_s = all[i];
-    imu.accel_bias = 0.15 * Vector3d(normal(random), normal(random), normal(random));
+    imu.accel_bias = 0.15 * Vector3d{normal(random), normal(random), normal(random)};
     CoarseMountingEstimator estimator;
     drive(estimator, imu, 60.0, 300 + static_cast<unsigned>(i));
     CoarseMounting out;

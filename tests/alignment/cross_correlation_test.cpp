@@ -29,7 +29,7 @@ Series recorded(const test::SineSum& omega, double start_s, double end_s, double
   Series out;
   for (int k = 0; start_s + k / rate_hz < end_s; ++k) {
     const double t = start_s + k / rate_hz;
-    const Eigen::Vector3d w = omega(t) + Eigen::Vector3d(normal(random), normal(random), normal(random));
+    const Eigen::Vector3d w = omega(t) + Eigen::Vector3d{normal(random), normal(random), normal(random)};
     out.time_s.push_back(stamp(t));
     out.rate.push_back(w.norm());
   }

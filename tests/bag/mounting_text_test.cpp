@@ -41,7 +41,7 @@ std::vector<Case> cases() {
   std::normal_distribution<double> normal;
   std::vector<Case> all;
   for (int i = 0; i < 40; ++i) {
-    Eigen::Quaterniond q(normal(random), normal(random), normal(random), normal(random));
+    Eigen::Quaterniond q{normal(random), normal(random), normal(random), normal(random)};
     q.normalize();
     // The poles of roll, pitch and yaw, too: s points up or down.
     if (i == 0) q = Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2.0, Vector3d::UnitY()));
@@ -164,7 +164,7 @@ TEST(MountingText, TriadsMakeTheSameReadingsByEveryonesEquations) {
       }
     }
     const Matrix3d C_s_accel =
-        Eigen::AngleAxisd(0.05, Vector3d(normal(random), normal(random), normal(random)).normalized())
+        Eigen::AngleAxisd(0.05, Vector3d{normal(random), normal(random), normal(random)}.normalized())
             .toRotationMatrix();
     Triads triads;
     Eigen::Map<Matrix3Row>(triads.gyro_matrix.data()) = gyro;

@@ -34,14 +34,14 @@ struct Body {
       const double f_hz = 0.04 * std::pow(1.4, static_cast<double>(i));
       const double yaw = f_hz < 0.3 ? 0.12 : 0.02;
       const double size = options.turns ? options.motion : 0.0;
-      rates[i] = {size * Vector3d(0.02 * normal(random), 0.02 * normal(random), yaw * normal(random)),
+      rates[i] = {size * Vector3d{0.02 * normal(random), 0.02 * normal(random), yaw * normal(random)},
                   6.283185307179586 * f_hz, phase(random)};
-      forces[i] = {options.motion * 0.4 * Vector3d(normal(random), normal(random), normal(random)),
+      forces[i] = {options.motion * 0.4 * Vector3d{normal(random), normal(random), normal(random)},
                    6.283185307179586 * f_hz * 1.07, phase(random)};
     }
     if (options.road_rate == 0.0) return;
     for (int i = 0; i < 40; ++i) {
-      const Vector3d amplitude(normal(random), normal(random), 0.2 * normal(random));
+      const Vector3d amplitude{normal(random), normal(random), 0.2 * normal(random)};
       road.push_back({options.road_rate * amplitude, 6.283185307179586 * (1.03 + 0.2 * i), phase(random)});
     }
   }
@@ -69,7 +69,7 @@ class White {
  public:
   White(double density, double rate_hz) : sd_(density * std::sqrt(rate_hz)) {}
   Vector3d operator()(std::mt19937_64& random) {
-    return sd_ * Vector3d(normal_(random), normal_(random), normal_(random));
+    return sd_ * Vector3d{normal_(random), normal_(random), normal_(random)};
   }
 
  private:

@@ -63,10 +63,10 @@ TEST(ErrorRow, OfAPointOnATurningBodyIsTheErrorThatWasPutIn) {
   std::normal_distribution<double> normal;
   for (int trial = 0; trial < 50; ++trial) {
     const Eigen::Matrix3d C =
-        Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+        Eigen::Quaterniond{normal(random), normal(random), normal(random), normal(random)}
             .normalized()
             .toRotationMatrix();
-    const Vector3d r_b(normal(random), normal(random), normal(random));
+    const Vector3d r_b{normal(random), normal(random), normal(random)};
     const Vector3d e_g(0.01, -0.02, 0.03);
     const Vector3d e_a(-0.1, 0.2, 0.3);
     const auto row = error_row(epoch_at(0.1 * trial, C, r_b, e_g, e_a), {row_major(C), array(r_b)}, {});

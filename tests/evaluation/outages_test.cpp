@@ -110,7 +110,7 @@ Drive simulated(const CoastingModel& truth, std::uint64_t seed, double duration_
       fix.time_s = t;
       fix.antenna =
           displaced(state.position, state.C_b_n * drive.r_sa_s_m +
-                                        kFixSd_m * Vector3d(normal(random), normal(random), normal(random)));
+                                        kFixSd_m * Vector3d{normal(random), normal(random), normal(random)});
       fix.sd_position_m = Vector3d::Constant(kFixSd_m);
       drive.fixes.push_back(fix);
     }
@@ -244,7 +244,7 @@ TEST(CoastingFilter, KnowsWhatATiltDoesToTheVerticalInSecondOrder) {
   KinematicCovariance predicted;
   for (int draw = 0; draw < kDraws; ++draw) {
     NavigationState start = truth;
-    start.C_b_n = exp_so3(kTilt_rad * Vector3d(normal(random), normal(random), 0.0));
+    start.C_b_n = exp_so3(kTilt_rad * Vector3d{normal(random), normal(random), 0.0});
     CoastingFilter filter(ideal, start, sd);
     constexpr double kStep_s = 0.05;
     for (int k = 0; k < static_cast<int>(kCoast_s / kStep_s); ++k)
@@ -439,7 +439,7 @@ TEST(Outages, VelocityFixesAreTakenAndTheFilterKnowsWhatTheyGave) {
       fix.has_velocity = true;
       // Of the antenna, which turns about the sensor; the Earth's own rotation is some 0.1 mm/s of it.
       fix.v_n_mps = at.v_n_mps + at.C_b_n * Road::omega(fix.time_s).cross(drive.r_sa_s_m) +
-                    kVelocitySd_mps * Vector3d(normal(random), normal(random), normal(random));
+                    kVelocitySd_mps * Vector3d{normal(random), normal(random), normal(random)};
       fix.sd_velocity_mps.setConstant(kVelocitySd_mps);
     }
     return drive;

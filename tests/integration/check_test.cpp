@@ -206,7 +206,7 @@ TEST(HealthyDrives, OfManySeedsAndMountingsHaveNothingThatHarms) {
         seed % 2 == 0 ? simulate(seed, {"--world", "harsh", "--reference-class", "4"}) : simulate(seed);
     for (const char* imu : {"mtx1", "mtx2", "mtx3"}) {
       DriveInMemory drive = drive_of(opened, {"airins", imu, "gnss"}, kSimulated);
-      const Eigen::Quaterniond any(normal(random), normal(random), normal(random), normal(random));
+      const Eigen::Quaterniond any{normal(random), normal(random), normal(random), normal(random)};
       const Eigen::Matrix3d C = any.normalized().toRotationMatrix();
       for (Sample& sample : drive.samples[kStudy]) {
         for (Vector3* v : {&sample.imu.omega_radps, &sample.imu.f_mps2}) {

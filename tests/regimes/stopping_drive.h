@@ -59,7 +59,7 @@ inline Driven driven(const StoppingDrive& drive) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
   std::normal_distribution<double> normal;
-  const auto vector = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  const auto vector = [&] { return Eigen::Vector3d{normal(random), normal(random), normal(random)}; };
 
   // The acceleration along the road: stand, speed up, cruise, brake; the brake ends by a jolt or softly.
   std::vector<double> speed_mps;
