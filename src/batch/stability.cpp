@@ -16,20 +16,19 @@ struct Bridge {
   WatchedVector sum = WatchedVector::Zero();
   WatchedVector share = WatchedVector::Zero();  ///< t, of the earlier part
 
-  [[nodiscard]] bool is_inside(Eigen::Index i) const {
-    return share[i] >= kLeastShare && share[i] <= 1.0 - kLeastShare;
+  /// The components that both parts know something of.
+  [[nodiscard]] Eigen::Array<bool, kWatched, 1> inside() const {
+    return share.array() >= kLeastShare && share.array() <= 1.0 - kLeastShare;
   }
   [[nodiscard]] WatchedVector between() const {
     const WatchedVector t = share.cwiseMax(kLeastShare).cwiseMin(1.0 - kLeastShare);
     return t.cwiseProduct(WatchedVector::Ones() - t);
   }
-  /// The component that is farthest from zero, and by how many sd.
-  [[nodiscard]] double statistic(const WatchedVector& variance) const {
-    const WatchedVector sd = variance.cwiseProduct(between()).cwiseSqrt();
-    double largest = 0.0;
-    for (Eigen::Index i = 0; i < kWatched; ++i)
-      if (is_inside(i)) largest = std::max(largest, std::abs(sum[i]) / sd[i]);
-    return largest;
+  /// Of the components `seen`, by how many sd that is from zero which is farthest.
+  [[nodiscard]] double statistic(const WatchedVector& variance,
+                                 const Eigen::Array<bool, kWatched, 1>& seen) const {
+    const WatchedVector sds = sum.cwiseAbs().cwiseQuotient(variance.cwiseProduct(between()).cwiseSqrt());
+    return seen.select(sds.array(), 0.0).maxCoeff();
   }
 };
 
@@ -55,14 +54,16 @@ Change largest_change(const WindowInfluences& influences, const WatchedVector& v
   for (Eigen::Index w = 0; w + 1 < influences.rows(); ++w) {
     at.sum += influences.row(w).transpose() - mean;
     at.share += influences.row(w).cwiseAbs2().transpose().cwiseQuotient(all);
-    const double statistic = at.statistic(variance);
+    const double statistic = at.statistic(variance, at.inside());
     if (!(statistic > largest)) continue;
     largest = statistic;
     widest = at;
     change.window = w + 1;
   }
   if (change.window == 0) return change;
-  // A change adds to the scatter, more so in the shorter part: without it.
+  // A change adds to the scatter, more so in the shorter part: without it. A large one leaves a part that the mounting
+  // fits worse; what scatters there is no share of what the part knows.
+  const auto seen = widest.inside();
   const WindowInfluences within = within_parts(influences, change.window);
   widest.share = within.topRows(change.window)
                      .cwiseAbs2()
@@ -70,7 +71,8 @@ Change largest_change(const WindowInfluences& influences, const WatchedVector& v
                      .sum()
                      .transpose()
                      .cwiseQuotient(within.cwiseAbs2().colwise().sum().transpose());
-  change.statistic = widest.statistic(variance.cwiseMax(variance_of_sum(within, kLags).diagonal().eval()));
+  change.statistic =
+      widest.statistic(variance.cwiseMax(variance_of_sum(within, kLags).diagonal().eval()), seen);
   change.difference = -widest.sum.cwiseQuotient(widest.between());
   const WatchedVector farther = widest.share.cwiseMax(WatchedVector::Ones() - widest.share);
   change.reach = change.difference.cwiseProduct(farther);
