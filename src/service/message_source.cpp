@@ -371,9 +371,11 @@ Result<void> check_topics(const std::string& file, const DeviceConfig& device, c
     const auto n =
         std::count_if(topics.begin(), topics.end(), [&](const auto& topic) { return topic.second == type; });
     if (n == 1) return {};
+    std::map<std::string, std::string> choice = topics;
+    if (n > 0) std::erase_if(choice, [&](const auto& topic) { return topic.second != type; });
     return usage_error(
         fmt::format("{}: {} has {} topics of {}", device.name, file, n == 0 ? "no" : std::to_string(n), type),
-        fmt::format("give topic in its [device.messages]; {}", list_of_topics(topics)));
+        fmt::format("give topic in its [device.messages]; {}", list_of_topics(choice)));
   }
   for (const std::string& wanted : {device.messages.topic, device.messages.velocity_topic}) {
     if (wanted.empty() || topics.contains(wanted)) continue;

@@ -12,6 +12,14 @@
 namespace imuscope::cli {
 namespace {
 
+/// Of a device, messages begin with its name; here the file has none but its own, which they tell once.
+std::string of_file(const std::string& text, const std::filesystem::path& file) {
+  const std::string name = file.filename().string();
+  if (!text.starts_with(name + ": ")) return text;
+  const std::string rest = text.substr(name.size() + 2);
+  return rest.find(name) != std::string::npos ? rest : fmt::format("{}: {}", file.string(), rest);
+}
+
 Result<AxesSink> samples_of(const std::filesystem::path& file, const std::string& topic,
                             std::vector<std::string>& warnings) {
   DeviceConfig device;
@@ -23,13 +31,14 @@ Result<AxesSink> samples_of(const std::filesystem::path& file, const std::string
   const auto survey = survey_messages(file, device);
   if (!survey) {
     Error error = survey.error();
+    error.what = of_file(error.what, file);
     // There is no configuration here.
     if (const auto at = error.remedy.find("give topic in its [device.messages]"); at != std::string::npos)
       error.remedy.replace(at, std::string_view("give topic in its [device.messages]").size(),
                            "give --topic");
     return tl::unexpected<Error>(error);
   }
-  warnings.insert(warnings.end(), survey->losses.begin(), survey->losses.end());
+  for (const std::string& loss : survey->losses) warnings.push_back(of_file(loss, file));
   auto source = open_messages(file, device, *survey);
   if (!source) return tl::unexpected<Error>(source.error());
   const auto decoder = make_decoder(device, 0, ClockMapConfig::fixed(HostTime{}, 1.0));
