@@ -266,7 +266,8 @@ TEST_F(McapDrive, WhatIsWrongIsSaidWithItsRemedy) {
   std::ofstream(file("text.mcap")) << "time_s,gyro_x\n";
   says(study("text.mcap", "none"), 1, {"is no MCAP file"});
   says(study("absent.mcap", "none"), 1, {"no such file"});
-  says(run({"wv", file("run.mcap").string(), "--column", "gyro_x"}), 2, {"give --topic; its topics are /imu/"});
+  says(run({"wv", file("run.mcap").string(), "--column", "gyro_x"}), 2,
+       {"give --topic; its topics are /imu/"});
   says(run({"wv", file("run.mcap").string(), "--topic", "/imu/mtx1/raw"}), 2, {"give --column", "accel_z"});
   says(run({"export", file("drive").string(), "--to", "mcap"}), 2, {"run.json", "give the folder of a run"});
   says(run({"export", file("run").string(), "--to", "sdf"}), 2, {"urdf"});
