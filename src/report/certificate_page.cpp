@@ -13,6 +13,7 @@
 #include "base/text.h"
 #include "base/units.h"
 #include "report/certificate_figures.h"
+#include "report/fits.h"
 #include "report/page_parts.h"
 #include "report/people.h"
 #include "tables/json_fields.h"
