@@ -61,8 +61,8 @@ Change largest_change(const WindowInfluences& influences, const WatchedVector& v
     change.window = w + 1;
   }
   if (change.window == 0) return change;
-  // A change adds to the scatter, more so in the shorter part: without it. A large one leaves a part that the mounting
-  // fits worse; what scatters there is no share of what the part knows.
+  // A change adds to the scatter, more so in the shorter part: without it. A large one makes one part fit worse and
+  // scatter more, which says nothing of what the other knows: the components are those of the search.
   const auto seen = widest.inside();
   const WindowInfluences within = within_parts(influences, change.window);
   widest.share = within.topRows(change.window)

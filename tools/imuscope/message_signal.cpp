@@ -12,7 +12,7 @@
 namespace imuscope::cli {
 namespace {
 
-/// Of a device, messages begin with its name; here the file has none but its own, which they tell once.
+/// Messages begin with the device's name. Here no device is configured: the name is the file's, and is told once.
 std::string of_file(const std::string& text, const std::filesystem::path& file) {
   const std::string name = file.filename().string();
   if (!text.starts_with(name + ": ")) return text;
