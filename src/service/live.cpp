@@ -385,18 +385,23 @@ Result<void> run_into(const Configuration& configuration, const LiveOptions& opt
   estimator.finish(tail);
   auto written = (*publisher)->finish(estimator.last_tick());
   auto recorded = (*recorder)->stop();
+  const bool came = io.newest_arrival() != HostTime::min();
+  Result<void> documents;
+  if (recorded && written && came) {
+    const auto status = (*recorder)->status();
+    spdlog::info("recorded {} ({:.1f} MB); study it with: imuscope process {} --out study",
+                 status.path.string(), static_cast<double>(status.bytes) * 1e-6, status.path.string());
+    if (options.add_documents) documents = options.add_documents(options.out);
+  }
   auto bagged = bag ? bag->finish((*publisher)->folder()) : Result<void>{};
   if (!recorded) return recorded;
   if (!written) return written;
-  if (!bagged) return bagged;
-  if (io.newest_arrival() == HostTime::min()) {
+  if (!came) {
     return work_error("no device ever sent a sample",
                       "check power, cables and baud rates; the log above names each line");
   }
-  spdlog::info("recorded {} ({:.1f} MB); study it with: imuscope process {} --out study",
-               (*recorder)->status().path.string(), static_cast<double>((*recorder)->status().bytes) * 1e-6,
-               (*recorder)->status().path.string());
-  return {};
+  if (!documents) return documents;
+  return bagged;
 }
 
 }  // namespace

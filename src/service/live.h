@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -29,6 +30,10 @@ struct LiveOptions {
   std::filesystem::path parent;  ///< of a new folder (new_folder.h)
   std::string version;
   std::optional<double> duration_s;  ///< ends by itself after this time
+  /// Called at the end with the run folder, when the recording and all results are in it and before run.mcap
+  /// takes its documents up: makes those that come from above this room. Its error fails the run, and nothing
+  /// is lost by it.
+  std::function<Result<void>(const std::filesystem::path& folder)> add_documents;
 };
 
 /// What the outside asks for; a signal handler may set these.

@@ -294,9 +294,14 @@ Result<void> LiveBag::finish(const OutputFolder& folder) {
   write_mountings();
   const std::int64_t now_ns = last_ ? to_ns(last_->time_scale.at(last_->cut).utc) : 0;
   writer_.attach("configuration.toml", "application/toml", now_ns, configuration_.text);
-  for (const char* name : {"calibration.json", "run.json", "models.json"}) {
+  constexpr std::array<std::pair<const char*, const char*>, 4> kDocuments{
+      {{"calibration.json", "application/json"},
+       {"run.json", "application/json"},
+       {"models.json", "application/json"},
+       {"report.html", "text/html"}}};
+  for (const auto& [name, type] : kDocuments) {
     const auto text = read_text_file(folder.path() / name, "file of a run", "");
-    if (text) writer_.attach(name, "application/json", now_ns, *text);
+    if (text) writer_.attach(name, type, now_ns, *text);
   }
   // After a hole the places of an index would be wrong: without one readers go through what is there.
   if (!disk_problem_) writer_.finish();

@@ -352,6 +352,17 @@ class LiveRun : public testing::Test {
     EXPECT_GT(turns.norm() / n, 0.5 / kDeg) << "the vehicle moved";
   }
 
+  /// Attachments stand in the file as they are: those of the whole run, made when it had ended.
+  void check_attachments(const std::filesystem::path& live) {
+    const std::string bag = read_text(live / "run.mcap");
+    for (const char* name : {"calibration.json", "run.json", "models.json", "report.html"}) {
+      const std::string document = read_text(live / name);
+      EXPECT_GT(document.size(), 100U) << name;
+      EXPECT_NE(bag.find(document), std::string::npos) << name << " is not attached, or not as it is";
+    }
+    EXPECT_TRUE(read_json(live / "run.json").at("findings").is_array());
+  }
+
   Listener heard_;
 };
 
@@ -404,6 +415,7 @@ TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
   }
   check_models();
   check_bag(folder / "live");
+  check_attachments(folder / "live");
   // The modeller runs when nothing else wants to: on a loaded machine the last S-IMU's turn may come too
   // late.
   ASSERT_FALSE(heard_.dynamics.empty());

@@ -42,17 +42,16 @@ Result<void> run(const RunCommand& options, const ReportWriter& write_report) {
   if (std::signal(SIGHUP, hang_up) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
   // Ctrl-C ends `tee` behind a pipe, too: what is lost then is the log's end and not the run's.
   std::signal(SIGPIPE, SIG_IGN);
+  const bool has_report = write_report && !options.no_report;
+  live.add_documents = [&](const std::filesystem::path& folder) -> Result<void> {
+    if (options.no_report) return {};
+    if (auto looked = look_at_live_run(folder); !looked) return looked;
+    return has_report ? write_report(folder) : Result<void>{};
+  };
   const auto folder = run_live(*configuration, live, signals);
   if (!folder) return tl::unexpected<Error>(folder.error());
-  if (!options.no_report) {
-    if (auto looked = look_at_live_run(*folder); !looked) return looked;
-  }
-  if (options.no_report || !write_report) {
-    say("Results: {}\nReport:  imuscope report {}\n", folder->string(), folder->string());
-    return {};
-  }
-  if (auto written = write_report(*folder); !written) return tl::unexpected<Error>(written.error());
-  say("Results: {}\nReport:  {}\n", folder->string(), (*folder / "report.html").string());
+  say("Results: {}\nReport:  {}\n", folder->string(),
+      has_report ? (*folder / "report.html").string() : "imuscope report " + folder->string());
   return {};
 }
 
