@@ -1,6 +1,7 @@
 /// A committed capture guards the numbers over time, and shows that replay does not depend on speed or on the
 /// way by which the capture came.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <unistd.h>
@@ -9,6 +10,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdlib>
+#include <fstream>
 #include <imuscope/error_t.hpp>
 #include <map>
 #include <sstream>
@@ -71,6 +73,26 @@ double tolerance(const Table& expected, std::size_t c, const std::vector<double>
   return kShareOfSd * largest;
 }
 
+/// Two loggers listen, one to the devices' bytes alone, while a player plays. On a busy PC a logger needs more than a
+/// moment to open its socket, and to write what it has heard: both are waited for, 30 s at most.
+constexpr const char* kPlayAndLog = R"sh(
+port_hex=$1 bus=$2 speed=$3 capture=$4 all=$5 raw=$6
+lcm-logger -f -q --lcm-url="$bus" "$all" & a=$!
+lcm-logger -f -q --lcm-url="$bus" -c "IMUSCOPE_RAW_.*" "$raw" & b=$!
+for _ in {1..300}; do
+  [ "$(grep -c ":$port_hex " /proc/net/udp)" -ge 2 ] && break
+  sleep 0.1
+done
+lcm-logplayer -s "$speed" --lcm-url="$bus" "$capture" >/dev/null
+for _ in {1..30}; do
+  sizes=$(stat -c %s "$all" "$raw")
+  sleep 1
+  [ "$sizes" = "$(stat -c %s "$all" "$raw")" ] && break
+done
+kill -INT $a $b
+wait $a $b
+)sh";
+
 class Golden : public testing::Test {
  protected:
   /// The data of the events of a log whose channel begins so. Layout: LCM's log format, big-endian, 28 bytes
@@ -114,16 +136,14 @@ class Golden : public testing::Test {
   void play_and_log(const std::string& speed, const std::filesystem::path& all,
                     const std::filesystem::path& raw) const {
     constexpr int kFirstPort = 20000;
-    const std::string bus =
-        " --lcm-url=\"udpm://239.255.76.67:" + std::to_string(kFirstPort + getpid() % 10000) +
-        "?ttl=0&recv_buf_size=4194304\" ";
-    const std::string command = "lcm-logger -f -q" + bus + all.string() + " & a=$!; lcm-logger -f -q" + bus +
-                                "-c \"IMUSCOPE_RAW_.*\" " + raw.string() +
-                                " & b=$!; sleep 1; lcm-logplayer -s " + speed + bus + capture_.string() +
-                                " >/dev/null; sleep 1; kill -INT $a $b; wait $a $b";
-    ASSERT_EQ(
-        std::system(("bash -c '" + command + "' >" + (folder_ / "tools.log").string() + " 2>&1").c_str()), 0)
-        << read_text(folder_ / "tools.log");
+    const int port = kFirstPort + getpid() % 10000;
+    const auto script = folder_ / "play_and_log.sh";
+    std::ofstream{script} << kPlayAndLog;
+    const std::string command = fmt::format(
+        "bash {} {:04X} 'udpm://239.255.76.67:{}?ttl=0&recv_buf_size=4194304' {} {} {} {} >{} 2>&1",
+        script.string(), port, port, speed, capture_.string(), all.string(), raw.string(),
+        (folder_ / "tools.log").string());
+    ASSERT_EQ(std::system(command.c_str()), 0) << read_text(folder_ / "tools.log");
   }
 
   void SetUp() override {
