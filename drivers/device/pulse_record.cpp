@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/bytes.h"
 #include "base/contracts.h"
-#include "drivers/device/bytes.h"
 
 namespace imuscope {
 

@@ -1,6 +1,6 @@
 #include "drivers/greis/messages.h"
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 
 namespace imuscope::greis {
 namespace {

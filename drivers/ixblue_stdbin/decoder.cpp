@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/bytes.h"
 #include "base/units.h"
 #include "drivers/device/attitude_angles.h"
-#include "drivers/device/bytes.h"
 #include "drivers/device/calendar.h"
 #include "drivers/device/feed.h"
 

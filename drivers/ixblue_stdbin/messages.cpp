@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 
 namespace imuscope::ixblue_stdbin {
 namespace {

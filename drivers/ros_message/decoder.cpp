@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/bytes.h"
 #include "base/units.h"
-#include "drivers/device/bytes.h"
 #include "drivers/device/feed.h"
 #include "mcap/records.h"
 

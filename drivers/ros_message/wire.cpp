@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "mcap/records.h"
 
 namespace imuscope::ros_message {

@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/device/nav_pvt.h"
 #include "drivers/ubx/wire.h"
 

@@ -1,6 +1,6 @@
 #include "drivers/ubx/scanner.h"
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/nmea/scanner.h"
 
 namespace imuscope::ubx {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 
 namespace imuscope::xsens_can {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/bytes.h"
 #include "base/contracts.h"
-#include "drivers/device/bytes.h"
 #include "drivers/device/feed.h"
 
 namespace imuscope::xsens {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "base/bytes.h"
 #include "base/contracts.h"
-#include "drivers/device/bytes.h"
 
 namespace imuscope::xsens {
 namespace {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <span>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/xsens_mt/wire.h"
 
 namespace imuscope::xsens {

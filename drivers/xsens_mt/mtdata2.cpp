@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 
 namespace imuscope::xsens {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 
 namespace imuscope::xsens {
 

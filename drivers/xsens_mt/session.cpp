@@ -5,8 +5,8 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "base/bytes.h"
 #include "base/contracts.h"
-#include "drivers/device/bytes.h"
 #include "drivers/xsens_mt/inertial.h"
 
 namespace imuscope::xsens {

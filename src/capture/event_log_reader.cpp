@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/bytes.h"
 #include "base/missing_file.h"
 
 namespace imuscope {
@@ -22,10 +23,9 @@ constexpr std::size_t kUtimeAt = 12;
 constexpr std::size_t kChannelLengthAt = 20;
 constexpr std::size_t kDataLengthAt = 24;
 
-std::uint64_t big_endian(const std::uint8_t* bytes, std::size_t n) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < n; ++i) value = value << 8U | bytes[i];
-  return value;
+template <typename Integer>
+Integer number_at(const std::uint8_t* at) noexcept {
+  return read_be<Integer>({at, sizeof(Integer)});
 }
 
 struct Lengths {
@@ -38,11 +38,16 @@ struct Lengths {
 };
 
 Lengths lengths_of(const std::uint8_t* header) {
-  return {static_cast<std::size_t>(big_endian(header + kChannelLengthAt, 4)),
-          static_cast<std::size_t>(big_endian(header + kDataLengthAt, 4))};
+  return {number_at<std::uint32_t>(header + kChannelLengthAt),
+          number_at<std::uint32_t>(header + kDataLengthAt)};
 }
 
-bool is_sync(const std::uint8_t* bytes) { return big_endian(bytes, sizeof kEventLogSync) == kEventLogSync; }
+/// As it stands in a file.
+constexpr std::array<std::uint8_t, sizeof kEventLogSync> kSyncWord{
+    kEventLogSync >> 24U & 0xFFU, kEventLogSync >> 16U & 0xFFU, kEventLogSync >> 8U & 0xFFU,
+    kEventLogSync & 0xFFU};
+
+bool is_sync(const std::uint8_t* bytes) { return number_at<std::uint32_t>(bytes) == kEventLogSync; }
 
 bool is_text(const std::vector<std::uint8_t>& bytes) {
   return std::all_of(bytes.begin(), bytes.end(),
@@ -109,8 +114,7 @@ Result<EventLogReader> EventLogReader::open(const std::filesystem::path& path, B
                       "check that recording ran and the disk had space");
   }
   constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
-  const bool has_sync =
-      reader.buffer_.size() >= kSyncBytes && big_endian(reader.buffer_.data(), kSyncBytes) == kEventLogSync;
+  const bool has_sync = reader.buffer_.size() >= kSyncBytes && is_sync(reader.buffer_.data());
   if (!has_sync && beginning == Beginning::kIsARecord) {
     const std::vector<std::uint8_t> first(
         reader.buffer_.begin(),
@@ -162,8 +166,8 @@ bool EventLogReader::may_begin_record(std::size_t position) {
   constexpr std::size_t kSyncBytes = sizeof kEventLogSync;
   (void)ensure(position + kSyncBytes);
   const std::size_t available = std::min(buffer_.size() - begin_ - position, kSyncBytes);
-  const std::uint64_t expected = std::uint64_t{kEventLogSync} >> (8 * (kSyncBytes - available));
-  return big_endian(buffer_.data() + begin_ + position, available) == expected;
+  const std::uint8_t* at = buffer_.data() + begin_ + position;
+  return std::equal(at, at + available, kSyncWord.begin());
 }
 
 /// Where a sync word may begin at the earliest, `position` or later: what lies before it in the buffer is
@@ -241,8 +245,8 @@ void EventLogReader::go_to(std::uint64_t place) {
 void EventLogReader::take(LogEvent& event) {
   const std::uint8_t* record = buffer_.data() + begin_;
   const Lengths lengths = lengths_of(record);
-  event.number = static_cast<std::int64_t>(big_endian(record + kNumberAt, 8));
-  event.utime = static_cast<std::int64_t>(big_endian(record + kUtimeAt, 8));
+  event.number = number_at<std::int64_t>(record + kNumberAt);
+  event.utime = number_at<std::int64_t>(record + kUtimeAt);
   const std::uint8_t* channel = record + kEventLogHeaderBytes;
   const std::uint8_t* data = channel + lengths.channel;
   event.channel.assign(channel, data);

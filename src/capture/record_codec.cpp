@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "base/bytes.h"
 #include "capture/stamp_range.h"
 #include "publish/message_codec.h"
 #include "publish/message_values.h"
@@ -26,12 +27,10 @@ class FieldReader {
   explicit FieldReader(std::span<const std::uint8_t> message) : rest_(message) {}
   template <typename Integer>
   Integer number() noexcept {
-    std::make_unsigned_t<Integer> value = 0;
-    if (!has(sizeof value)) return 0;
-    for (std::size_t i = 0; i < sizeof value; ++i)
-      value = static_cast<std::make_unsigned_t<Integer>>(std::uint64_t{value} << 8U | rest_[i]);
-    rest_ = rest_.subspan(sizeof value);
-    return static_cast<Integer>(value);
+    if (!has(sizeof(Integer))) return 0;
+    const auto value = read_be<Integer>(rest_);
+    rest_ = rest_.subspan(sizeof(Integer));
+    return value;
   }
   std::span<const std::uint8_t> bytes(std::int32_t n) noexcept {
     if (n < 0 || !has(static_cast<std::size_t>(n))) {
@@ -209,28 +208,36 @@ std::optional<CaptureRecord> decode_record(const std::vector<std::uint8_t>& mess
 
 std::optional<RawView> view_raw(std::span<const std::uint8_t> message) noexcept {
   static const std::int64_t kFingerprint = raw_t::getHash();
+  // One object, named by every return and so filled where it is wanted: it is asked for with every read, and a
+  // copy of fields that were just written costs more than to find them.
+  std::optional<RawView> view;
   FieldReader fields(message);
-  if (fields.number<std::int64_t>() != kFingerprint) return std::nullopt;
-  RawView view;
+  if (fields.number<std::int64_t>() != kFingerprint) return view;
   (void)fields.number<std::int64_t>();  // utime
-  view.sequence = fields.number<std::int64_t>();
+  const auto sequence = fields.number<std::int64_t>();
   const auto device = fields.bytes(fields.number<std::int32_t>());  // and the zero at its end
   const auto direction = fields.number<std::int8_t>();
   const auto arrival_ns = fields.number<std::int64_t>();
-  view.continues = fields.number<std::int8_t>() != 0;
-  view.bytes = fields.bytes(fields.number<std::int32_t>());
-  if (!fields.is_whole() || device.empty()) return std::nullopt;
-  if (!is_stamp_ns(arrival_ns) || !is_count(view.sequence)) return std::nullopt;
-  view.device = {reinterpret_cast<const char*>(device.data()), device.size() - 1};
-  view.direction = direction_of(direction);
-  view.arrival = host_time_from_ns(arrival_ns);
+  const bool continues = fields.number<std::int8_t>() != 0;
+  auto bytes = fields.bytes(fields.number<std::int32_t>());
+  if (!fields.is_whole() || device.empty()) return view;
+  if (!is_stamp_ns(arrival_ns) || !is_count(sequence)) return view;
+  std::optional<HostTime> received;
   if (direction == raw_t::STAMPED_READ) {
-    if (view.bytes.size() < kReceivedBytes) return std::nullopt;
-    const std::int64_t received_ns = nanoseconds_of(view.bytes.first<kReceivedBytes>());
-    if (!is_stamp_ns(received_ns)) return std::nullopt;
-    view.received = std::min(host_time_from_ns(received_ns), view.arrival);
-    view.bytes = view.bytes.subspan(kReceivedBytes);
+    if (bytes.size() < kReceivedBytes) return view;
+    const std::int64_t received_ns = nanoseconds_of(bytes.first<kReceivedBytes>());
+    if (!is_stamp_ns(received_ns)) return view;
+    received = host_time_from_ns(std::min(received_ns, arrival_ns));
+    bytes = bytes.subspan(kReceivedBytes);
   }
+  view.emplace();
+  view->device = {reinterpret_cast<const char*>(device.data()), device.size() - 1};
+  view->direction = direction_of(direction);
+  view->arrival = host_time_from_ns(arrival_ns);
+  view->sequence = sequence;
+  view->continues = continues;
+  view->bytes = bytes;
+  view->received = received;
   return view;
 }
 

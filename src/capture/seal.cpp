@@ -2,10 +2,9 @@
 
 #include <zlib.h>
 
-#include <bit>
-#include <cstring>
 #include <utility>
 
+#include "base/bytes.h"
 #include "base/contracts.h"
 #include "capture/event_log.h"
 #include "publish/message_codec.h"
@@ -27,17 +26,13 @@ std::vector<std::uint8_t> encode_checked(Message& message) {
 }
 
 /// The type of a message, or what stands in its place.
-std::uint64_t fingerprint_of(std::span<const std::uint8_t> message) noexcept {
-  std::uint64_t fingerprint = 0;
-  if (message.size() < sizeof fingerprint) return 0;
-  std::memcpy(&fingerprint, message.data(), sizeof fingerprint);
-  if constexpr (std::endian::native == std::endian::little) fingerprint = __builtin_bswap64(fingerprint);
-  return fingerprint;
+std::int64_t fingerprint_of(std::span<const std::uint8_t> message) noexcept {
+  return message.size() < sizeof(std::int64_t) ? 0 : read_be<std::int64_t>(message);
 }
 
 template <typename Message>
 bool claims_to_be(std::span<const std::uint8_t> message) noexcept {
-  static const auto kFingerprint = static_cast<std::uint64_t>(Message::getHash());
+  static const std::int64_t kFingerprint = Message::getHash();
   return fingerprint_of(message) == kFingerprint;
 }
 

@@ -5,18 +5,11 @@
 namespace imuscope::mcap {
 namespace {
 
-/// Representation identifier (big-endian, least bit: little-endian) and two bytes of options.
-constexpr std::size_t kHead = 4;
 constexpr char kPlainLittleEndian = 1;
 
 }  // namespace
 
 void CdrWriter::begin() { out_.assign({0, kPlainLittleEndian, 0, 0}); }
-
-void CdrWriter::align(std::size_t size) {
-  const std::size_t over = (out_.size() - kHead) % size;
-  if (over > 0) out_.append(size - over, '\0');
-}
 
 void CdrWriter::text(std::string_view text) {
   number(static_cast<std::uint32_t>(text.size() + 1));
@@ -31,10 +24,10 @@ CdrReader::CdrReader(Bytes message, Wire wire) noexcept : wire_(wire) {
   }
   // 0 and 1 are plain CDR; what else there is (parameter lists, XCDR2) no ROS message of these types is
   // written in.
-  good_ = message.size() >= kHead && message[0] == 0 && message[1] <= kPlainLittleEndian;
+  good_ = message.size() >= kCdrHead && message[0] == 0 && message[1] <= kPlainLittleEndian;
   if (!good_) return;
   swap_ = message[1] != kPlainLittleEndian;
-  body_ = message.subspan(kHead);
+  body_ = message.subspan(kCdrHead);
 }
 
 void CdrReader::align(std::size_t size) noexcept {

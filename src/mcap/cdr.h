@@ -14,7 +14,9 @@
 
 namespace imuscope::mcap {
 
-static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
+/// Bytes before the fields: representation identifier (big-endian, least bit: little-endian) and two bytes of
+/// options.
+inline constexpr std::size_t kCdrHead = 4;
 
 /// Writes one message after the other into the same buffer; little-endian.
 class CdrWriter {
@@ -22,23 +24,27 @@ class CdrWriter {
   void begin();
   template <typename Number>
   void number(Number value) {
-    align(sizeof value);
-    const std::size_t at = out_.size();
-    out_.resize(at + sizeof value);
-    std::memcpy(out_.data() + at, &value, sizeof value);
+    align<sizeof value>();
+    std::array<char, sizeof value> bytes;
+    std::memcpy(bytes.data(), &value, sizeof value);
+    out_.append(bytes.data(), bytes.size());
   }
   template <std::size_t N>
   void numbers(const std::array<double, N>& values) {
-    align(sizeof(double));
-    const std::size_t at = out_.size();
-    out_.resize(at + sizeof values);
-    std::memcpy(out_.data() + at, values.data(), sizeof values);
+    align<sizeof(double)>();
+    std::array<char, sizeof values> bytes;
+    std::memcpy(bytes.data(), values.data(), sizeof values);
+    out_.append(bytes.data(), bytes.size());
   }
   void text(std::string_view text);
   [[nodiscard]] Bytes bytes() const { return bytes_of(out_); }
 
  private:
-  void align(std::size_t size);
+  template <std::size_t Size>
+  void align() {
+    const std::size_t over = (out_.size() - kCdrHead) % Size;
+    if (over > 0) out_.append(Size - over, '\0');
+  }
   std::string out_;
 };
 

@@ -2,6 +2,8 @@
 
 /// Numbers, texts and maps of MCAP records: little-endian, lengths before what they count.
 
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <map>
@@ -14,6 +16,8 @@
 
 namespace imuscope::mcap {
 
+static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
+
 using Bytes = std::span<const std::uint8_t>;
 using Texts = std::map<std::string, std::string>;
 
@@ -23,10 +27,9 @@ class RecordWriter {
   explicit RecordWriter(std::string& out) : out_(out) {}
   template <typename Integer>
   void number(Integer value) {
-    for (std::size_t i = 0; i < sizeof value; ++i) {
-      constexpr unsigned kByte = 8;
-      out_.push_back(static_cast<char>(static_cast<std::uint64_t>(value) >> (kByte * i) & 0xFFU));
-    }
+    std::array<char, sizeof value> bytes;
+    std::memcpy(bytes.data(), &value, sizeof value);
+    out_.append(bytes.data(), bytes.size());
   }
   void text(std::string_view text);
   void texts(const Texts& texts);

@@ -546,7 +546,7 @@ Result<std::string> export_models(const std::vector<AxisFit>& axes, ExportFormat
 }
 
 double white_variance_of_sample(const FitResult& fit) {
-  return felt_with_bias(fit, kBiasBand).white_density.value * fit.rate_hz;
+  return felt_white_beside_bias(fit, kBiasBand).value * fit.rate_hz;
 }
 
 }  // namespace imuscope::noise

@@ -430,6 +430,10 @@ Felt felt_walk_density(const FitResult& fit, const FilterBand& band) {
   return walk_density(fit, band.from_s, band);
 }
 
+Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band) {
+  return told_white_density(fit, fast_beside_bias_s(fit, band));
+}
+
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band) {
   const double fast_s = fast_beside_bias_s(fit, band);
   FeltWithBias out;

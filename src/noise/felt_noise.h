@@ -69,6 +69,8 @@ struct FeltWithBias {
   FeltBias bias;
 };
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band);
+/// Its white density alone, which is quick to find.
+Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band);
 /// The same with a given correlation time, for filters that have one for several axes.
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double tau_s);
 

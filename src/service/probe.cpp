@@ -9,7 +9,7 @@
 #include <span>
 #include <string_view>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/greis/scanner.h"
 #include "drivers/transport/serial_port.h"
 #include "drivers/xsens_mt/messages.h"

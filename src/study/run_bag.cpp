@@ -310,12 +310,13 @@ class RegimeNoise {
     }
     std::sort(stretches_.begin(), stretches_.end(),
               [](const auto& a, const auto& b) { return a.begin_s < b.begin_s; });
-    whole_ = variance_of(models, name, "all");
+    if (stretches_.empty()) whole_ = variance_of(models, name, "all");
   }
-  /// Rising times.
+  /// Rising times; before the first stretch as in it.
   const bag::WhiteVariance& at(double time_s) {
     while (next_ < stretches_.size() && stretches_[next_].begin_s <= time_s) ++next_;
-    return next_ == 0 ? whole_ : stretches_[next_ - 1].variance;
+    if (stretches_.empty()) return whole_;
+    return stretches_[next_ == 0 ? 0 : next_ - 1].variance;
   }
 
  private:
@@ -335,7 +336,7 @@ class RegimeNoise {
     return variance;
   }
   std::vector<Stretch> stretches_;
-  bag::WhiteVariance whole_;
+  bag::WhiteVariance whole_;  ///< where the drive was not divided
   std::size_t next_ = 0;
 };
 

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <map>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/ixblue_stdbin/messages.h"
 #include "drivers/ixblue_stdbin/scanner.h"
 #include "drivers/ixblue_stdbin/status_names.h"

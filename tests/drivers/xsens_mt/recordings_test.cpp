@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/xsens_mt/decoder.h"
 #include "drivers/xsens_mt/mtdata2.h"
 #include "drivers/xsens_mt/scanner.h"

@@ -6,7 +6,7 @@
 #include <map>
 #include <optional>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "tests/drivers/xsens_mt/mt_frames.h"
 
 namespace imuscope::xsens {

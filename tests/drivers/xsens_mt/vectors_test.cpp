@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/xsens_mt/decoder.h"
 #include "drivers/xsens_mt/messages.h"
 #include "drivers/xsens_mt/mtdata.h"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 #include "drivers/xsens_mt/layout_guess.h"
 #include "drivers/xsens_mt/messages.h"
 #include "drivers/xsens_mt/mtdata.h"

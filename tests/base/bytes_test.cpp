@@ -1,4 +1,4 @@
-#include "drivers/device/bytes.h"
+#include "base/bytes.h"
 
 #include <gtest/gtest.h>
 
