@@ -269,6 +269,10 @@ void judge_by_findings(const RunFiles& run, Verdict& verdict) {
   }
 }
 
+std::string counted(std::size_t n, const char* thing) {
+  return fmt::format("{} {}{}", n, thing, n == 1 ? "" : "s");
+}
+
 }  // namespace
 
 std::vector<std::string> findings_of(const RunFiles& run, std::string_view harm) {
@@ -297,11 +301,20 @@ Verdict data_verdict(const RunFiles& run) {
   Verdict verdict;
   const std::size_t wrong = findings_of(run, "wrong").size();
   const std::size_t limits = findings_of(run, "limits").size();
-  verdict.answer = wrong > 0 ? Answer::kNo : limits > 0 ? Answer::kPartly : Answer::kYes;
-  verdict.headline = wrong > 0
-                         ? fmt::format("No: {} {} wrong.", wrong, wrong == 1 ? "thing is" : "things are")
-                     : limits > 0 ? fmt::format("Yes, with {} limit{}.", limits, limits == 1 ? "" : "s")
-                                  : "Yes: nothing wrong was found.";
+  for (const auto& warning : field(run.run, "warnings"))
+    if (warning.is_string()) verdict.reasons.push_back(warning.get<std::string>());
+  const std::size_t warnings = verdict.reasons.size();
+  verdict.answer = wrong > 0 ? Answer::kNo : limits > 0 || warnings > 0 ? Answer::kPartly : Answer::kYes;
+  if (wrong > 0) {
+    verdict.headline =
+        fmt::format("No: {} wrong.", wrong == 1 ? "1 thing is" : fmt::format("{} things are", wrong));
+  } else if (limits > 0) {
+    verdict.headline = fmt::format("Yes, with {}.", counted(limits, "limit"));
+  } else if (warnings > 0) {
+    verdict.headline = fmt::format("Yes, but the run gave {}.", counted(warnings, "warning"));
+  } else {
+    verdict.headline = "Yes: nothing wrong was found.";
+  }
   return verdict;
 }
 

@@ -96,6 +96,18 @@ TEST(Verdict, WhatTheLookAtTheDataFoundStandsFirstAndJudgesTheRest) {
   EXPECT_EQ(page.find("a: never rests"), std::string::npos);
 }
 
+TEST(Verdict, DataAreNotCalledFlawlessWhereTheRunWarned) {
+  auto run = run_with({});
+  run.run["findings"] = nlohmann::json::array();
+  run.run["warnings"] = nlohmann::json::array();
+  EXPECT_EQ(data_verdict(run).answer, Answer::kYes);
+  run.run["warnings"] = {"mtx1: 12 samples were lost"};
+  const Verdict verdict = data_verdict(run);
+  EXPECT_EQ(verdict.answer, Answer::kPartly);
+  EXPECT_EQ(verdict.headline, "Yes, but the run gave 1 warning.");
+  EXPECT_EQ(verdict.reasons, std::vector<std::string>{"mtx1: 12 samples were lost"});
+}
+
 TEST(Verdict, ModelsThatTheDataDoNotContradictAreAdequate) {
   EXPECT_EQ(model_verdict(read_fits(run_with({}).models)).answer, Answer::kYes);
 }
