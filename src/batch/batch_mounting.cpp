@@ -113,11 +113,7 @@ class Batch {
     finish(result);
     // A clock that jumps makes an estimate run away, too, and is the better thing to be told.
     if (auto ok = one_clock(result); !ok) return tl::unexpected(ok.error());
-    if (last_share_ > kLostShare) {
-      return work_error(
-          "its estimate runs away",
-          "the drive tells too little: more turns, braking and accelerating, and a minute of rest");
-    }
+    if (auto ok = one_mounting(result); !ok) return tl::unexpected(ok.error());
     return result;
   }
 
@@ -220,6 +216,21 @@ class Batch {
                     "does: it jumps, about {:.0f} s into the recording",
                     1e6 * rate, result.change_s - instants_.front()),
         kRemedy);
+  }
+
+  /// Nothing that settles fits two mountings that differ by much.
+  [[nodiscard]] Result<void> one_mounting(const BatchMounting& result) const {
+    if (last_share_ <= kLostShare) return {};
+    if (!result.change.is_told()) {
+      return work_error(
+          "its estimate runs away",
+          "the drive tells too little: more turns, braking and accelerating, and a minute of rest");
+    }
+    // By how much, an estimate that fits neither part does not tell well.
+    return work_error(
+        fmt::format("about {:.0f} s into the recording its mounting changes, and no estimate fits both parts",
+                    result.change_s - instants_.front()),
+        "cut the recording there and study each part, and look whether it sits firmly");
   }
 
   /// The correction of the parameters and the deviations that go with it, with the sizes as they are known.
