@@ -33,13 +33,19 @@ Html duration_cell(std::optional<double> seconds) {
 }
 
 /// What several S-IMUs share stands once.
-Html warnings_of(const RunFiles& run) {
-  std::vector<std::string> warnings;
-  for (const auto& warning : field(run.run, "warnings")) {
-    if (warning.is_string()) warnings.push_back(warning.get<std::string>());
+Html sentences_of(const RunFiles& run, const char* key) {
+  std::vector<std::string> sentences;
+  for (const auto& sentence : field(run.run, key)) {
+    if (sentence.is_string()) sentences.push_back(sentence.get<std::string>());
   }
-  return warnings.empty() ? paragraph("The run gave no warning.")
-                          : list_of(grouped_by_name(warnings, names_of(run)));
+  return sentences.empty() ? Html() : list_of(grouped_by_name(sentences, names_of(run)));
+}
+
+Html warnings_of(const RunFiles& run) {
+  const Html warnings = sentences_of(run, "warnings");
+  const Html notes = sentences_of(run, "notes");
+  return (warnings.empty() ? paragraph("The run gave no warning.") : warnings) +
+         (notes.empty() ? Html() : fold("What was left out, and why", notes));
 }
 
 Html absent_files(const RunFiles& run) {

@@ -320,7 +320,8 @@ nlohmann::json run_json(const RunRecord& run) {
                       {"ticks", run.ticks},
                       {"duration_s", static_cast<double>(run.ticks) / kTickRate_hz},
                       {"findings", run.findings ? findings_json(*run.findings) : nlohmann::json(nullptr)},
-                      {"warnings", run.warnings}};
+                      {"warnings", run.warnings},
+                      {"notes", run.notes}};
   json["t0_utc"] = run.last != nullptr && run.last->has_utc
                        ? nlohmann::json(utc_text(run.last->first_reference_utc))
                        : nlohmann::json(nullptr);

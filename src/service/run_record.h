@@ -41,6 +41,7 @@ struct RunRecord {
   const Snapshot* last = nullptr;     ///< absent where there was no tick
   std::vector<EstimatorEvent> events{};
   std::vector<std::string> warnings{};
+  std::vector<std::string> notes{};  ///< what was left out of a study, and why; nothing is wrong for that
   /// Of the look at the data before; absent where nobody has looked yet.
   std::optional<std::vector<check::Finding>> findings{};
   std::optional<double> static_s{};  ///< of a study, which tells rest from motion

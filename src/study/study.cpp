@@ -311,9 +311,10 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   if (!scatter) return scatter;
   auto regime_document = regimes_json(*regimes, origin);
   regime_document["left_out"] = noise_study.left_out;
+  run.warnings.insert(run.warnings.end(), regimes->remarks.begin(), regimes->remarks.end());
   for (const std::vector<std::string>& remarks :
-       {regimes->remarks, noise_study.remarks, dependence.remarks, regressions.remarks})
-    run.warnings.insert(run.warnings.end(), remarks.begin(), remarks.end());
+       {noise_study.remarks, dependence.remarks, regressions.remarks})
+    run.notes.insert(run.notes.end(), remarks.begin(), remarks.end());
   run.static_s = regimes->motion.total_s(0);
   run.dynamic_s = regimes->motion.total_s(1);
   if (auto written = (*folder)->write_calibration(

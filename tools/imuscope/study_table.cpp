@@ -187,14 +187,14 @@ void print_devices(const json& devices) {
 }
 
 /// The first of them; a short record can have one for every axis and regime, all of them in the report.
-void print_warnings(const json& warnings, const std::vector<std::string>& names) {
+void print_sentences(const char* word, const json& all, const std::vector<std::string>& names) {
   constexpr std::size_t kPrintedMax = 8;
-  const auto sentences = grouped_by_name(warnings.get<std::vector<std::string>>(), names);
+  const auto sentences = grouped_by_name(all.get<std::vector<std::string>>(), names);
   const std::size_t printed = std::min(sentences.size(), kPrintedMax);
   if (printed > 0) say("\n");
-  for (std::size_t i = 0; i < printed; ++i) say("Note: {}\n", sentences[i]);
+  for (std::size_t i = 0; i < printed; ++i) say("{}: {}\n", word, sentences[i]);
   if (printed < sentences.size())
-    say("Note: {} more, in run.json and the report\n", sentences.size() - printed);
+    say("{}: {} more, in run.json and the report\n", word, sentences.size() - printed);
 }
 
 Result<void> print_documents(const std::filesystem::path& run_folder, bool as_json) {
@@ -216,7 +216,8 @@ Result<void> print_documents(const std::filesystem::path& run_folder, bool as_js
   if (models) print_model(*models);
   std::vector<std::string> names;
   for (const auto& imu : calibration->at("imus")) names.push_back(imu.at("name"));
-  print_warnings(run->at("warnings"), names);
+  print_sentences("Warning", run->at("warnings"), names);
+  print_sentences("Note", run->value("notes", json::array()), names);
   const auto report = run_folder / "report.html";
   say("\nResults: {}\n", run_folder.string());
   if (std::filesystem::exists(report)) say("Report:  {}\n", report.string());
