@@ -386,8 +386,9 @@
     for (const fold of folds) {
       const mark = document.createElement('span');
       const words = document.createElement('h3');
-      const section = fold.closest('section').querySelector('h2');
-      words.textContent = (section ? section.textContent + ': ' : '') + fold.querySelector('summary').textContent;
+      const tile = fold.closest('.tile');
+      const of = tile ? tile.querySelector('h3') : fold.closest('section').querySelector('h2');
+      words.textContent = (of ? of.textContent + (tile ? ' ' : ': ') : '') + fold.querySelector('summary').textContent;
       fold.before(mark);
       appendix.append(words, fold);
       fold.open = true;
