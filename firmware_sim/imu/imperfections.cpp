@@ -1,6 +1,8 @@
 #include "firmware_sim/imu/imperfections.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 
 #include "firmware_sim/motion/degrees.h"
 #include "firmware_sim/motion/draw.h"
@@ -41,13 +43,26 @@ Imperfections study_imperfections(WorldKind world) {
   return mtx;
 }
 
-Imperfections reference_imperfections(WorldKind world) {
+Imperfections reference_imperfections(WorldKind world, const ReferenceClass& of) {
   if (world == WorldKind::kIdeal) return {};
-  constexpr double kSd = 300e-6;
+  struct Grade {
+    double gyro_white_deg_per_sqrt_h;  ///< below
+    double axes_rad;
+    double scale;
+  };
+  // Navigation grade, fibre-optic AHRS, tactical MEMS, and whatever is worse.
+  constexpr std::array<Grade, 4> kGrades{{{0.01, 300e-6, 300e-6},
+                                          {0.05, 0.02 * kRadPerDeg, 500e-6},
+                                          {0.2, 0.05 * kRadPerDeg, 1e-3},
+                                          {std::numeric_limits<double>::infinity(), 0.1 * kRadPerDeg, 5e-3}}};
+  constexpr double kPerSqrtHour = kRadPerDeg / 60.0;
+  const auto& grade = *std::find_if(kGrades.begin(), kGrades.end(), [&](const Grade& g) {
+    return of.gyro_white_radps_per_sqrt_hz < g.gyro_white_deg_per_sqrt_h * kPerSqrtHour;
+  });
   Imperfections reference;
-  reference.non_orthogonality_sd_rad = kSd;
-  reference.triads_apart_sd_rad = kSd;
-  reference.scale_sd = kSd;
+  reference.non_orthogonality_sd_rad = grade.axes_rad;
+  reference.triads_apart_sd_rad = grade.axes_rad;
+  reference.scale_sd = grade.scale;
   reference.own_vibration = 0.25;
   return reference;
 }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "firmware_sim/imu/imu_model.h"
+#include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/random/random.h"
 
 namespace imusim {
@@ -35,8 +36,9 @@ struct Imperfections {
 
 /// An MTx class sensor: 0.1 deg, 2 cm, 0.05 deg/s/g, 1 ms, 40 Hz, half of the vehicle's vibration.
 Imperfections study_imperfections(WorldKind world);
-/// The R-IMU: 300 ppm of scale and misalignment, a quarter of the vehicle's vibration.
-Imperfections reference_imperfections(WorldKind world);
+/// The R-IMU: scale and misalignment as makers of its class of gyros state them, a quarter of the vehicle's
+/// vibration.
+Imperfections reference_imperfections(WorldKind world, const ReferenceClass& of);
 
 /// Adds what is drawn to a sensor's errors. The gyro triad's departure from orthogonality is symmetric: its
 /// axes lean about the nominal ones (for the frame that its mounting is told in, see triad_frame()); the

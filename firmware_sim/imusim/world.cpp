@@ -221,7 +221,8 @@ void World::add_reference(const PlayedDevice& played, Beginning beginning, doubl
   Random random(configuration_.scenario.seed, played.name + "/unit");
   ImuErrors errors = draw_reference(configuration_.reference.noise, played.rate_hz, random);
   Random unseen(configuration_.scenario.seed, played.name + "/imperfections");
-  draw_imperfections(reference_imperfections(configuration_.world), unseen, errors);
+  draw_imperfections(reference_imperfections(configuration_.world, configuration_.reference.noise), unseen,
+                     errors);
   StudyTruth clock;
   clock.name = played.name;
   clock.latency_s = configuration_.reference.latency_s;

@@ -96,11 +96,41 @@ void set_gyro_power(Problem& problem) {
   }
 }
 
+/// The angle random walk that the reference's gyros have at most, rad/sqrt(s): what they show in the band
+/// where they show least, in the quietest twentieth of the windows.
+double quietest_gyros(const Problem& problem) {
+  constexpr double kFrom_hz = 1.0;
+  constexpr double kTo_hz = 10.0;
+  constexpr std::size_t kQuietest = 20;
+  std::vector<double> least;
+  for (Eigen::Index w = 0; w < static_cast<Eigen::Index>(problem.plan.starts.size()); ++w) {
+    double power = std::numeric_limits<double>::infinity();
+    for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
+      if (problem.plan.frequency_hz(problem.bands.first(band)) < kFrom_hz ||
+          problem.plan.frequency_hz(problem.bands.end(band)) > kTo_hz)
+        continue;
+      double sum = 0.0;
+      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k)
+        sum += problem.reference.row(w, k).segment<3>(kOmega).squaredNorm();
+      power =
+          std::min(power, kWindowsPerInstant * sum / (3.0 * static_cast<double>(problem.bands.width(band))));
+    }
+    least.push_back(power);
+  }
+  const auto place = least.begin() + static_cast<std::ptrdiff_t>(least.size() / kQuietest);
+  std::ranges::nth_element(least, place);
+  return std::sqrt(*place / kGridRate_hz);
+}
+
 /// The estimate of one pair of records.
 class Batch {
  public:
   Batch(const ImuRecord& reference, const ImuRecord& study, const BatchOptions& options)
-      : reference_(reference), study_(study), class_(options.sensor), scales_(options.sensor) {}
+      : reference_(reference),
+        study_(study),
+        class_(options.sensor),
+        reference_gyro_white_(options.reference_gyro_white),
+        scales_(options.sensor) {}
 
   Result<BatchMounting> run(const Start& start) {
     if (auto set = set_up(start); !set) return tl::unexpected<Error>(set.error());
@@ -138,6 +168,7 @@ class Batch {
     study_mean_ = mean_of(study.motion, study.valid);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
     set_gyro_power(problem_);
+    class_.set_reference(reference_gyro_white_.value_or(quietest_gyros(problem_)));
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
     problem_.from_middle_s.resize(n);
     for (Eigen::Index w = 0; w < n; ++w) {
@@ -427,6 +458,7 @@ class Batch {
   const ImuRecord& reference_;
   const ImuRecord& study_;
   SensorClass class_;
+  std::optional<double> reference_gyro_white_;
   PriorScales scales_;
   std::vector<double> instants_;
   double middle_s_ = 0.0;

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "base/result.h"
@@ -20,6 +21,9 @@ namespace imuscope::batch {
 struct BatchOptions {
   SensorClass sensor;
   double search_s = 3.0;  ///< time offsets from -search_s to +search_s are tried
+  /// Angle random walk of the reference's gyros, rad/sqrt(s), where somebody told; it says how straight its
+  /// axes are. Elsewhere its quietest readings tell, which are no less than it.
+  std::optional<double> reference_gyro_white{};
 };
 
 /// One band of frequency: noise that is left, and how far the pair is from a rigid body there.

@@ -1,11 +1,14 @@
 #include "batch/sensor_model.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "alignment/accelerometer_places.h"
+#include "base/units.h"
 #include "navigation/so3.h"
 
 namespace imuscope::batch {
@@ -134,6 +137,23 @@ struct AxisShift {
 
 }  // namespace
 
+void SensorClass::set_reference(double gyro_white_radps_per_sqrt_hz) {
+  // B-21a: from fibre-optic and laser gyros of navigation grade to an industrial MEMS unit, whose alignment is
+  // that of an S-IMU (0.1 deg) and whose scale is calibrated to half a per cent; tactical units lie between.
+  constexpr double kNavigation = 0.005 * kRadPerDeg / 60.0;
+  constexpr double kMems = 0.3 * kRadPerDeg / 60.0;
+  constexpr double kMemsScale = 5e-3;
+  const double place = std::log(gyro_white_radps_per_sqrt_hz / kNavigation) / std::log(kMems / kNavigation);
+  const auto between = [share = std::clamp(place, 0.0, 1.0)](double navigation, double mems) {
+    return navigation * std::pow(mems / navigation, share);
+  };
+  const SensorClass navigation;
+  reference_scale_sd = between(navigation.reference_scale_sd, kMemsScale);
+  // Of each of the two axes whose departure from a right angle has axis_sd_rad.
+  reference_axis_sd_rad = between(navigation.reference_axis_sd_rad, axis_sd_rad / std::numbers::sqrt2);
+  reference_triad_sd_rad = between(navigation.reference_triad_sd_rad, triad_sd_rad);
+}
+
 Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const SensorClass& sensor,
                                                                        const SensorState& state) {
   Eigen::Matrix<double, kParameters, kReferenceErrors> factor;
@@ -158,6 +178,16 @@ Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const Sen
       add(none, E);
     }
     add(none, skew(sensor.reference_triad_sd_rad * Eigen::Vector3d::Unit(i)));
+  }
+  // B-21b: too large a rate makes too short an arm of the same force, by its scale where forces come from
+  // angular acceleration, by twice that where they come from the square of the rate; a leaning axis takes of
+  // the other components.
+  constexpr double kBetween = 1.5;
+  const Eigen::Vector3d r = state.lever_arm_b_m();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double across_m = std::sqrt(std::max(0.0, r.squaredNorm() - r[i] * r[i]));
+    factor(kLeverArm + i, next++) =
+        std::hypot(kBetween * sensor.reference_scale_sd * r[i], sensor.reference_axis_sd_rad * across_m);
   }
   return factor;
 }

@@ -72,6 +72,10 @@ struct SensorClass {
   double reference_scale_sd = 3e-4;
   double reference_axis_sd_rad = 2e-4;
   double reference_triad_sd_rad = 3e-4;
+
+  /// The class of a reference by its gyros' white noise (angle random walk, rad/sqrt(s)): who makes quieter
+  /// gyros turns their axes better, too (B-21a). The defaults are navigation grade.
+  void set_reference(double gyro_white_radps_per_sqrt_hz);
 };
 
 /// The estimate as it stands.
@@ -114,8 +118,9 @@ struct AxesFrame {
 };
 [[nodiscard]] AxesFrame in_axes_frame(const SensorState& symmetric);
 
-/// Scale and axes of both triads of the reference, and the rotation between them.
-inline constexpr Eigen::Index kReferenceErrors = 21;
+/// Scale and axes of both triads of the reference, and the rotation between them; what they make of each
+/// component of the lever arm.
+inline constexpr Eigen::Index kReferenceErrors = 24;
 
 /// What each error of the reference's own axes, off by its sd, makes of the published parameters (B-21): F,
 /// of which F F' is the covariance.

@@ -35,16 +35,17 @@ enum class Protocol : std::uint8_t {
 /// What the rest of the service has to know of a protocol.
 struct ProtocolTraits {
   Protocol protocol;
-  std::string_view name;  ///< as the configuration writes it
-  SampleKind purpose;     ///< what its devices are there for: kImu, kGnss, kOdometry or kPulse
-  double rate_hz;         ///< where the configuration gives none
-  bool is_stream;         ///< its bytes can be told from any others: probe and import look for it
-  bool is_text = false;   ///< rows with named columns, read from files alone
+  std::string_view name;           ///< as the configuration writes it
+  SampleKind purpose;              ///< what its devices are there for: kImu, kGnss, kOdometry or kPulse
+  double rate_hz;                  ///< where the configuration gives none
+  bool is_stream;                  ///< its bytes can be told from any others: probe and import look for it
+  bool is_text = false;            ///< rows with named columns, read from files alone
+  bool has_optical_gyros = false;  ///< all that speak it: navigation grade where nobody says otherwise
 };
 
 inline constexpr std::array<ProtocolTraits, 15> kProtocols{
     {{Protocol::kXsensMt, "xsens_mt", SampleKind::kImu, 100.0, true},
-     {Protocol::kIxblueStdbin, "ixblue_stdbin", SampleKind::kImu, 100.0, true},
+     {Protocol::kIxblueStdbin, "ixblue_stdbin", SampleKind::kImu, 100.0, true, false, true},
      {Protocol::kGreis, "greis", SampleKind::kGnss, 10.0, true},
      {Protocol::kNmea, "nmea", SampleKind::kGnss, 10.0, true},
      {Protocol::kUbx, "ubx", SampleKind::kGnss, 10.0, true},

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <random>
 
 #include "navigation/so3.h"
 #include "synthetic_pair.h"
@@ -63,16 +64,29 @@ TEST(EstimateMounting, FindsACrookedSensorWithinItsSd) {
     near(found->sensor.x[kGyroBias + i], truth.gyro_bias[i], found->sd(kGyroBias, i));
 }
 
-/// Where the reference is as noisy as the S-IMU, least squares on its rates and their derivative attenuate.
+/// Scale and axes as a data sheet of an industrial MEMS unit has them: 0.5 %, 0.1 deg between two axes.
+Eigen::Matrix3d crooked_mems(std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
+  for (Eigen::Index i = 0; i < 3; ++i)
+    for (Eigen::Index j = 0; j < 3; ++j) matrix(i, j) += (i == j ? 5e-3 : 1.24e-3) * normal(random);
+  return matrix;
+}
+
+/// Where the reference is as noisy as the S-IMU, least squares on its rates and their derivative attenuate; and
+/// its axes are as crooked.
 TEST(EstimateMounting, IsUnbiasedWhereTheReferenceIsAsNoisyAsTheSensor) {
   Vector6 sum = Vector6::Zero();
   Vector6 variance = Vector6::Zero();
   double total = 0.0;
+  std::mt19937_64 random(5);
   constexpr int kSeeds = 8;
   for (int seed = 0; seed < kSeeds; ++seed) {
     PairOptions truth = crooked();
     truth.reference_gyro_white = truth.study_gyro_white = 4e-4;  // 1 deg/sqrt(h)
     truth.reference_accel_white = truth.study_accel_white = 5e-3;
+    truth.reference_gyro_matrix = crooked_mems(random);
+    truth.reference_accel_matrix = crooked_mems(random);
     const auto pair = make_pair(truth, 100 + static_cast<std::uint64_t>(seed));
     const auto found = estimate_mounting(pair.reference, pair.study);
     ASSERT_TRUE(found) << found.error().text();

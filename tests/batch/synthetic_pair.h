@@ -26,6 +26,8 @@ struct PairOptions {
   Eigen::Matrix3d places_s_m = Eigen::Matrix3d::Zero();  ///< a row an accelerometer
   double reference_gyro_white = 1e-4;                    ///< rad/s/sqrt(Hz)
   double reference_accel_white = 1e-3;                   ///< m/s^2/sqrt(Hz)
+  Eigen::Matrix3d reference_gyro_matrix = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d reference_accel_matrix = Eigen::Matrix3d::Identity();
   double study_gyro_white = 2e-4;
   double study_accel_white = 2e-3;
   double motion = 1.0;      ///< factor of all rates and forces but gravity

@@ -229,21 +229,26 @@ TEST(Imperfections, TheIdealWorldHasNone) {
   EXPECT_EQ(errors.own_vibration, 0.0);
 }
 
-TEST(Imperfections, TheReferenceHas300PartsPerMillion) {
+TEST(Imperfections, AReferenceIsAsStraightAsItsGyrosAreQuiet) {
   constexpr int kUnits = 3000;
-  double scale2 = 0.0;
-  double lean2 = 0.0;
-  for (int unit = 0; unit < kUnits; ++unit) {
-    Random random(static_cast<std::uint64_t>(unit), "reference");
-    ImuErrors errors;
-    draw_imperfections(reference_imperfections(WorldKind::kHarsh), random, errors);
-    scale2 += (errors.gyro.scale.squaredNorm() + errors.accel.scale.squaredNorm()) / (6 * kUnits);
-    lean2 += std::pow(2.0 * errors.accel.misalignment(0, 1), 2) / kUnits;
-    EXPECT_EQ(slow_delay_s(errors.gyro), 0.0);
-    EXPECT_TRUE(errors.accel_places_s_m.isZero(0.0));
+  constexpr std::array<double, kReferenceClasses> kAxes_mrad{0.3, 0.349, 0.873, 1.745, 1.745};
+  constexpr std::array<double, kReferenceClasses> kScale_ppm{300.0, 500.0, 1000.0, 5000.0, 5000.0};
+  for (std::size_t i = 0; i < kReferenceClasses; ++i) {
+    const ReferenceClass of = reference_class(static_cast<int>(i) + 1);
+    double scale2 = 0.0;
+    double lean2 = 0.0;
+    for (int unit = 0; unit < kUnits; ++unit) {
+      Random random(static_cast<std::uint64_t>(unit), "reference");
+      ImuErrors errors;
+      draw_imperfections(reference_imperfections(WorldKind::kHarsh, of), random, errors);
+      scale2 += (errors.gyro.scale.squaredNorm() + errors.accel.scale.squaredNorm()) / (6 * kUnits);
+      lean2 += std::pow(2.0 * errors.accel.misalignment(0, 1), 2) / kUnits;
+      EXPECT_EQ(slow_delay_s(errors.gyro), 0.0);
+      EXPECT_TRUE(errors.accel_places_s_m.isZero(0.0));
+    }
+    EXPECT_NEAR(std::sqrt(scale2) * 1e6, kScale_ppm[i], 0.017 * kScale_ppm[i]);
+    EXPECT_NEAR(std::sqrt(lean2) * 1e3, kAxes_mrad[i], 0.067 * kAxes_mrad[i]);
   }
-  EXPECT_NEAR(std::sqrt(scale2), 300e-6, 5e-6);
-  EXPECT_NEAR(std::sqrt(lean2), 300e-6, 20e-6);
 }
 
 TEST(ReferenceClasses, HaveTheirAngularRandomWalksAndEndAtTheMtx) {

@@ -175,7 +175,7 @@ class Results {
 using Variances6 = Eigen::Matrix<double, 6, 1>;
 
 /// Posterior Cramer-Rao bound of (psi, r): variances that the same states and priors have where the motion is
-/// as it was, the noise is known and everything is linear and Gaussian. A Kalman filter tells just these; its
+/// as it was, the noise is known and everything is linear and Gaussian, and what the reference's own axes add to them. A Kalman filter tells just these; its
 /// covariance hangs on the motion and hardly on the draw, so that one run does. Where the reference is as
 /// noisy as the sensors (class 5), the filter's windows lose a little, and the bound is an upper one.
 Variances6 bound_of(const study_drive::Truth& truth, const Options& options) {
@@ -224,6 +224,15 @@ Variances6 bound_of(const study_drive::Truth& truth, const Options& options) {
       mean[k] += psi[axis] * psi[axis] / study_drive::kStudies;
       mean[3 + k] += r[axis] * r[axis] / study_drive::kStudies;
     }
+  }
+  // What no drive shows: each axis of the reference leans by half of a pair's departure, and its scale is the
+  // lever arm's where forces come from angular acceleration.
+  const imusim::Imperfections unseen =
+      imusim::reference_imperfections(options.pair.world, imusim::reference_class(reference_class));
+  for (std::size_t i = 0; i < study_drive::kStudies; ++i) {
+    mean.head<3>().array() += std::pow(0.5 * unseen.non_orthogonality_sd_rad, 2) / study_drive::kStudies;
+    mean.tail<3>().array() +=
+        (unseen.scale_sd * study_drive::lever_arm_of(i)).array().square() / study_drive::kStudies;
   }
   return mean;
 }

@@ -107,7 +107,9 @@ Draw draw(const DrawOptions& options, imusim::Random& random, std::uint64_t seed
       imusim::draw_reference(imusim::reference_class(options.reference_class), kRate_hz, random);
   for (imusim::ImuErrors& study : errors.studies) study = imusim::draw_mtx(options.mtx, random);
   imusim::Random unseen(seed, "imperfections");
-  imusim::draw_imperfections(imusim::reference_imperfections(options.world), unseen, errors.reference);
+  imusim::draw_imperfections(
+      imusim::reference_imperfections(options.world, imusim::reference_class(options.reference_class)),
+      unseen, errors.reference);
   for (imusim::ImuErrors& study : errors.studies)
     imusim::draw_imperfections(imusim::study_imperfections(options.world), unseen, study);
   return errors;
