@@ -32,7 +32,8 @@ struct Believable {
 Believable believable(const std::string& recording) {
   if (recording.starts_with("car")) return {0.5, 0.02, 0.1};
   if (recording.starts_with("rc")) return {0.5, 0.002, 0.02};
-  return {0.05, 0.002, 0.02};
+  // Two equal units, the axes of each good to 0.1 deg.
+  return {0.25, 0.002, 0.02};
 }
 
 json table_of_real_drives() {
