@@ -20,7 +20,7 @@ std::string no_such_command(const CLI::App& app, const std::string& word) {
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
   const std::string nearest = nearest_word(word, names);
   return fmt::format("there is no command '{}'{}", word,
-                     nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest));
+                     nearest.empty() ? "" : fmt::format("; the nearest is '{}'", nearest));
 }
 
 void add_help(CLI::App& app, Work& chosen) {
