@@ -215,7 +215,7 @@ TEST_F(BadInput, ConfigurationsAndArgumentsAreUsageWithARemedy) {
       {"imuscope process rec/mtx1.bin --out x --nonsense", kUsage, "--nonsense"},
       {"imuscope nonsense", kUsage, "there is no command 'nonsense'; see imuscope --help"},
       {"imuscope proces a.lcm", kUsage, "there is no command 'proces'; the nearest is 'process'; see"},
-      {"imuscope help proces", kUsage, "there is no command 'proces'; the nearest is 'process'; see"},
+      {"imuscope help proces", kUsage, "there is no command 'proces'; the nearest is 'process'; imuscope help"},
       {"imuscope completion csh", kUsage, "SHELL: csh not in {bash,zsh,fish}"},
       {"imuscope", kUsage, "see imuscope --help"},
       {"imusim", kUsage, "see imusim --help"},
