@@ -4,8 +4,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "batch/checks.h"
 #include "batch/grid.h"
@@ -42,6 +44,9 @@ constexpr int kRoughIterations = 2;
 constexpr double kSettledShare = 0.1;
 /// After the last step one of more than this is no approach to anything.
 constexpr double kLostShare = 1.0;
+/// Data sheets have a per cent, cheap parts three; known to so many sd.
+constexpr double kNoSensorsScale = 0.2;
+constexpr double kSureSds = 5.0;
 /// Share of the information that the noise in the derivatives may be.
 constexpr double kMostNoise = 0.9;
 /// Windows overlap by half, so that neighbours share information: so many of them are one that stands alone.
@@ -144,6 +149,7 @@ class Batch {
     // A clock that jumps makes an estimate run away, too, and is the better thing to be told.
     if (auto ok = one_clock(result); !ok) return tl::unexpected(ok.error());
     if (auto ok = one_mounting(result); !ok) return tl::unexpected(ok.error());
+    if (auto ok = same_sizes(result); !ok) return tl::unexpected(ok.error());
     return result;
   }
 
@@ -262,6 +268,21 @@ class Batch {
         fmt::format("about {:.0f} s into the recording its mounting changes, and no estimate fits both parts",
                     result.change_s - instants_.front()),
         "cut the recording there and study each part, and look whether it sits firmly");
+  }
+
+  /// One axis of one triad that is in another unit than the others, or cut off, or no axis of that sensor.
+  [[nodiscard]] static Result<void> same_sizes(const BatchMounting& result) {
+    constexpr std::array kTriads{std::pair{kGyroShape, "gyroscope"}, std::pair{kAccelShape, "accelerometer"}};
+    for (const auto& [first, what] : kTriads) {
+      Eigen::Index axis = 0;
+      const double scale = result.sensor.x.segment<3>(first).cwiseAbs().maxCoeff(&axis);
+      if (scale < kNoSensorsScale || scale < kSureSds * result.sd(first, axis)) continue;
+      return usage_error(
+          fmt::format("its {} {} shows {:.2f} times what the reference shows along it, as no sensor does",
+                      what, "xyz"[axis], 1.0 + result.sensor.x[first + axis]),
+          "look at that column, its unit and its range, and at the reference's");
+    }
+    return {};
   }
 
   /// The correction of the parameters and the deviations that go with it, with the sizes as they are known.

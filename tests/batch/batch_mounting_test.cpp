@@ -125,6 +125,22 @@ TEST(EstimateMounting, StaysAtTheLeverArmOfQuietAccelerometersFarFromAPerfectRef
   EXPECT_LT(total, 6.0 * kSeeds + 3.3 * std::sqrt(2.0 * 6.0 * kSeeds));
 }
 
+TEST(EstimateMounting, RefusesAnAxisThatIsNoSensorsByName) {
+  for (const bool of_reference : {false, true}) {
+    PairOptions truth = crooked();
+    truth.C_b_s.setIdentity();
+    Eigen::Matrix3d& matrix = of_reference ? truth.reference_accel_matrix : truth.accel_matrix;
+    matrix.row(1) *= 0.5;
+    const auto pair = make_pair(truth, 21);
+    const auto found = estimate_mounting(pair.reference, pair.study);
+    ASSERT_FALSE(found);
+    EXPECT_NE(
+        found.error().what.find(of_reference ? "accelerometer y shows 2.0" : "accelerometer y shows 0.5"),
+        std::string::npos)
+        << found.error().text();
+  }
+}
+
 /// A bracket that gives way turns the sensor wherever the vehicle brakes and turns.
 TEST(EstimateMounting, KnowsAMountThatTurnsUnderForces) {
   PairOptions truth = crooked();
