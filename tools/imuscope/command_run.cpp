@@ -57,7 +57,7 @@ Result<void> run(const RunCommand& options, const ReportWriter& write_report) {
 
 }  // namespace
 
-void add_run(CLI::App& app, Work& chosen, ReportWriter write_report) {
+void add_run(CLI::App& app, Work& chosen, const ReportWriter& write_report) {
   auto* command = app.add_subcommand("run", "The live service: devices, estimator, recording, LCM");
   auto options = std::make_shared<RunCommand>();
   command->add_option("config", options->config, "configuration (TOML)")->required()->type_name("CONFIG");

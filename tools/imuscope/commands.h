@@ -58,7 +58,7 @@ void add_export(CLI::App& app, Work& chosen);
 
 /// `imuscope run CONFIG`
 /// @param write_report  called at the end; empty where the program makes no reports
-void add_run(CLI::App& app, Work& chosen, ReportWriter write_report);
+void add_run(CLI::App& app, Work& chosen, const ReportWriter& write_report);
 
 /// `imuscope replay INPUT...`
 void add_replay(CLI::App& app, Work& chosen);
