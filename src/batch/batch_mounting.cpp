@@ -103,7 +103,7 @@ void set_gyro_power(Problem& problem) {
 
 /// The angle random walk that the reference's gyros have at most, rad/sqrt(s): what they show in the band
 /// where they show least, in the quietest twentieth of the windows.
-double quietest_gyros(const Problem& problem) {
+double quietest_gyro_white_radps_per_sqrt_hz(const Problem& problem) {
   constexpr double kFrom_hz = 1.0;
   constexpr double kTo_hz = 10.0;
   constexpr std::size_t kQuietest = 20;
@@ -134,7 +134,7 @@ class Batch {
       : reference_(reference),
         study_(study),
         class_(options.sensor),
-        reference_gyro_white_(options.reference_gyro_white),
+        reference_gyro_white_radps_per_sqrt_hz_(options.reference_gyro_white_radps_per_sqrt_hz),
         scales_(options.sensor) {}
 
   Result<BatchMounting> run(const Start& start) {
@@ -174,7 +174,8 @@ class Batch {
     study_mean_ = mean_of(study.motion, study.valid);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
     set_gyro_power(problem_);
-    class_.set_reference(reference_gyro_white_.value_or(quietest_gyros(problem_)));
+    class_.set_reference(
+        reference_gyro_white_radps_per_sqrt_hz_.value_or(quietest_gyro_white_radps_per_sqrt_hz(problem_)));
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
     problem_.from_middle_s.resize(n);
     for (Eigen::Index w = 0; w < n; ++w) {
@@ -479,7 +480,7 @@ class Batch {
   const ImuRecord& reference_;
   const ImuRecord& study_;
   SensorClass class_;
-  std::optional<double> reference_gyro_white_;
+  std::optional<double> reference_gyro_white_radps_per_sqrt_hz_;
   PriorScales scales_;
   std::vector<double> instants_;
   double middle_s_ = 0.0;

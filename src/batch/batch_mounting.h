@@ -23,7 +23,7 @@ struct BatchOptions {
   double search_s = 3.0;  ///< time offsets from -search_s to +search_s are tried
   /// Angle random walk of the reference's gyros, rad/sqrt(s), where somebody told; it says how straight its
   /// axes are. Elsewhere its quietest readings tell, which are no less than it.
-  std::optional<double> reference_gyro_white{};
+  std::optional<double> reference_gyro_white_radps_per_sqrt_hz{};
 };
 
 /// One band of frequency: noise that is left, and how far the pair is from a rigid body there.

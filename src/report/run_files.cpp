@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "base/grouped.h"
 #include "base/text.h"
 #include "base/units.h"
 #include "base/wgs84_ellipsoid.h"
@@ -250,6 +251,14 @@ std::vector<std::string> names_of(const RunFiles& run) {
   std::vector<std::string> names;
   for (const StudyFiles& study : run.studies) names.push_back(study.name);
   return names;
+}
+
+std::vector<std::string> sentences_of(const RunFiles& run, const char* key) {
+  std::vector<std::string> sentences;
+  for (const auto& sentence : field(run.run, key)) {
+    if (sentence.is_string()) sentences.push_back(sentence.get<std::string>());
+  }
+  return grouped_by_name(sentences, names_of(run));
 }
 
 Result<RunFiles> read_run_files(const std::filesystem::path& folder) {

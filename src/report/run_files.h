@@ -84,6 +84,8 @@ struct RunFiles {
 
 /// Of all S-IMUs.
 std::vector<std::string> names_of(const RunFiles& run);
+/// Of run.json's `key` ("warnings", "notes"); what several S-IMUs share is one sentence.
+std::vector<std::string> sentences_of(const RunFiles& run, const char* key);
 
 /// Errors as write_report().
 Result<RunFiles> read_run_files(const std::filesystem::path& folder);

@@ -32,20 +32,11 @@ Html duration_cell(std::optional<double> seconds) {
   return text(seconds ? duration_words(*seconds) : std::string(kUnknown));
 }
 
-/// What several S-IMUs share stands once.
-Html sentences_of(const RunFiles& run, const char* key) {
-  std::vector<std::string> sentences;
-  for (const auto& sentence : field(run.run, key)) {
-    if (sentence.is_string()) sentences.push_back(sentence.get<std::string>());
-  }
-  return sentences.empty() ? Html() : list_of(grouped_by_name(sentences, names_of(run)));
-}
-
 Html warnings_of(const RunFiles& run) {
-  const Html warnings = sentences_of(run, "warnings");
-  const Html notes = sentences_of(run, "notes");
-  return (warnings.empty() ? paragraph("The run gave no warning.") : warnings) +
-         (notes.empty() ? Html() : fold("What was left out, and why", notes));
+  const auto warnings = sentences_of(run, "warnings");
+  const auto notes = sentences_of(run, "notes");
+  return (warnings.empty() ? paragraph("The run gave no warning.") : list_of(warnings)) +
+         (notes.empty() ? Html() : fold("What was left out, and why", list_of(notes)));
 }
 
 Html absent_files(const RunFiles& run) {

@@ -301,8 +301,7 @@ Verdict data_verdict(const RunFiles& run) {
   Verdict verdict;
   const std::size_t wrong = findings_of(run, "wrong").size();
   const std::size_t limits = findings_of(run, "limits").size();
-  for (const auto& warning : field(run.run, "warnings"))
-    if (warning.is_string()) verdict.reasons.push_back(warning.get<std::string>());
+  verdict.reasons = sentences_of(run, "warnings");
   const std::size_t warnings = verdict.reasons.size();
   verdict.answer = wrong > 0 ? Answer::kNo : limits > 0 || warnings > 0 ? Answer::kPartly : Answer::kYes;
   if (wrong > 0) {
@@ -424,7 +423,7 @@ std::vector<std::string> next_steps(const RunFiles& run, const std::vector<Fit>&
   } else {
     model_steps(run, fits, steps);
   }
-  if (const std::size_t n = field(run.run, "warnings").size(); n > 0) {
+  if (const std::size_t n = sentences_of(run, "warnings").size(); n > 0) {
     steps.push_back(fmt::format("Read the warnings of the run ({}) under “Warnings”.", n));
   }
   if (steps.empty()) {

@@ -54,7 +54,7 @@ Vector3 sd_of(const batch::BatchMounting& mounting, batch::Parameter first) {
 
 /// What is known of the reference's gyros before the drive: what the configuration says, and what all
 /// units have that speak its protocol.
-std::optional<double> told_gyro_white(const DeviceConfig& reference) {
+std::optional<double> told_gyro_white_radps_per_sqrt_hz(const DeviceConfig& reference) {
   if (const auto sd_radps = reference.noise.gyro_white_sd_radps)
     return *sd_radps / std::sqrt(reference.rate_hz);
   if (traits_of(reference.protocol).has_optical_gyros) return ReferenceConfig{}.gyro_white_radps_per_sqrt_hz;
@@ -82,12 +82,12 @@ struct Pair {
   const BatchRecords& records;
   std::size_t reference;
   std::size_t study;
-  std::optional<double> reference_gyro_white;
+  std::optional<double> reference_gyro_white_radps_per_sqrt_hz;
 
   [[nodiscard]] Result<batch::BatchMounting> estimate(double from_s, double to_s) const {
     batch::BatchOptions options;
     options.search_s = StudyConfig{}.coarse_search_s + kSearchMargin_s;
-    options.reference_gyro_white = reference_gyro_white;
+    options.reference_gyro_white_radps_per_sqrt_hz = reference_gyro_white_radps_per_sqrt_hz;
     return batch::estimate_mounting(
         records.part(reference, from_s - options.search_s, to_s + options.search_s),
         records.part(study, from_s, to_s), options);
@@ -239,7 +239,8 @@ std::vector<BatchOutcome> estimate_mountings(const Configuration& configuration,
     std::optional<double> moved_s;
     if (!former[i].empty()) moved_s = to_seconds(former[i].back().until - records.origin());
     outcomes[i] = estimate_one(
-        {records, reference, studies[i], told_gyro_white(configuration.devices[reference])}, moved_s);
+        {records, reference, studies[i], told_gyro_white_radps_per_sqrt_hz(configuration.devices[reference])},
+        moved_s);
   });
   return outcomes;
 }

@@ -290,8 +290,7 @@ class ImuStudy {
   /// Whether its temperature changed enough to be held against; says why where it did not.
   bool warms_up(const std::vector<noise::DrivenWindow>& windows) {
     if (windows.empty()) {
-      say(fmt::format("{}: no temperature in this record: its noise parameters are not held against it",
-                      name_));
+      say(fmt::format("{}: no temperature in this record: noise parameters are not held against it", name_));
       return false;
     }
     const auto [coldest, warmest] =

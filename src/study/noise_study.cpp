@@ -174,7 +174,7 @@ std::vector<noise::Line> take_out_lines(const DeviceConfig& device, std::size_t 
 void summarise_left_out(NoiseStudy& study) {
   for (const auto& entry : study.left_out) {
     const std::string of_imu =
-        fmt::format("{}, {}: its stretches are too short for scales above {:.4g} s, which are left out",
+        fmt::format("{}, {}: no stretch is long enough for scales above {:.4g} s, which are left out",
                     entry.at("name").get<std::string>(), entry.at("regime").get<std::string>(),
                     entry.at("above_tau_s").get<double>());
     if (std::find(study.remarks.begin(), study.remarks.end(), of_imu) == study.remarks.end())

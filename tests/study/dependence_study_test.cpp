@@ -104,7 +104,7 @@ TEST(DependenceStudy, ABlowOfTwoSecondsMakesNoDependenceAndIsToldOnce) {
 TEST(DependenceStudy, ARecordWithoutTemperatureSaysSoOnceForTheSensor) {
   const auto study = study_of(30.0, false);
   EXPECT_THAT(study.remarks,
-              Contains("mtx1: no temperature in this record: its noise parameters are not held against it"));
+              Contains("mtx1: no temperature in this record: noise parameters are not held against it"));
   EXPECT_EQ(std::count_if(study.remarks.begin(), study.remarks.end(),
                           [](const std::string& r) { return r.find("temperature") != std::string::npos; }),
             1);
