@@ -84,7 +84,7 @@ TEST(NoiseStudy, LevelsThatARegimesStretchesAreTooShortForAreLeftOutAndSaid) {
   EXPECT_EQ(first.at("above_level"), 11);  // 2^11 = 2048 of 3000 samples
   EXPECT_DOUBLE_EQ(first.at("above_tau_s").get<double>(), 20.48);
   EXPECT_THAT(study.remarks,
-              Contains(HasSubstr("mtx1, static: its stretches are too short for scales above 20.48 s")));
+              Contains(HasSubstr("mtx1, static: no stretch is long enough for scales above 20.48 s")));
 }
 
 TEST(NoiseStudy, ARegimeTooShortForAModelHasNoneAndThatIsSaid) {
