@@ -223,7 +223,10 @@ class Batch {
     for (std::size_t band = 0; band < sums.size(); ++band)
       taken_.row(static_cast<Eigen::Index>(band)) =
           numbers_taken(sums[band], equations_.bands[band], covariance_).transpose();
-    if (!rough) scales_.learn(estimate_.sensor.x, covariance_);
+    if (!rough) {
+      scales_.learn_sizes(estimate_.sensor.x, covariance_);
+      scales_.choose_places(estimate_.sensor.x, honest_covariance().per_slope);
+    }
     const ParameterVector share = correction.cwiseAbs().cwiseQuotient(covariance_.diagonal().cwiseSqrt());
     last_share_ = share.head<kGyroBias>().maxCoeff();
     return !rough && last_share_ < kSettledShare;
@@ -396,7 +399,9 @@ class Batch {
     }
     const AxesFrame published = in_axes_frame(estimate_.sensor);
     const Covariance grown = published.derivative * growth.asDiagonal();
-    result.covariance = grown * by_noise * grown.transpose();
+    result.covariance = grown * by_noise * grown.transpose() +
+                        published.derivative * scales_.doubt(estimate_.sensor.x, of_noise.per_slope) *
+                            published.derivative.transpose();
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = published.sensor;
     add_change(of_noise, result);

@@ -1,6 +1,7 @@
 #include "batch/prior_scales.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <array>
 #include <cmath>
@@ -11,8 +12,10 @@ namespace {
 
 /// Weight of the class, in imperfections seen, against what the drive shows.
 constexpr double kClassWeight = 3.0;
-/// By how much (natural logarithm) one chip must be likelier than three to be believed: one to twenty.
-constexpr double kEvidenceMin = 3.0;
+/// By how much (natural logarithm) one chip must be likelier than three to be believed: 150 to one. Of sensors with
+/// three, at most one in as many is then taken for one chip, whatever their noise: the mean of a ratio of likelihoods
+/// is one where the denominator is true (Markov's inequality).
+constexpr double kLogOddsMin = 5.0;
 
 /// Parameters that are of one kind, and so of one size.
 struct Kind {
@@ -55,8 +58,7 @@ ParameterVector PriorScales::precision() const {
   return precision;
 }
 
-void PriorScales::learn(const ParameterVector& x,
-                        const Eigen::Matrix<double, kParameters, kParameters>& covariance) {
+void PriorScales::learn_sizes(const ParameterVector& x, const Covariance& covariance) {
   for (const Kind& kind : kKinds) {
     const double of_class = class_sd_[kind.first] * class_sd_[kind.first];
     const double seen = x.segment(kind.first, kind.count).squaredNorm() +
@@ -65,18 +67,36 @@ void PriorScales::learn(const ParameterVector& x,
     if (!kind.may_be_smaller) variance = std::max(variance, of_class);
     sd_.segment(kind.first, kind.count).setConstant(std::sqrt(variance));
   }
-  choose_places(x, covariance);
 }
 
-void PriorScales::choose_places(const ParameterVector& x,
-                                const Eigen::Matrix<double, kParameters, kParameters>& covariance) {
-  const Matrix6 posterior = covariance.block<6, 6>(kPlaces, kPlaces).inverse();
+void PriorScales::choose_places(const ParameterVector& x, const Covariance& per_slope) {
+  const Matrix6 posterior = per_slope.block<6, 6>(kPlaces, kPlaces).inverse();
   const Vector6 score = posterior * x.segment<6>(kPlaces);
   const Matrix6 information = posterior - Matrix6::Identity() / (sd_[kPlaces] * sd_[kPlaces]);
   const double chip = log_evidence(information, score, sensor_.one_chip_place_sd_m);
   const double chips = log_evidence(information, score, sensor_.place_sd_m);
-  one_chip_ = chip - chips > kEvidenceMin;
+  log_odds_ = chip - chips;
+  one_chip_ = log_odds_ > kLogOddsMin;
   sd_.segment<6>(kPlaces).setConstant(one_chip_ ? sensor_.one_chip_place_sd_m : sensor_.place_sd_m);
+}
+
+PriorScales::Covariance PriorScales::doubt(const ParameterVector& x, const Covariance& per_slope) const {
+  if (!one_chip_) return Covariance::Zero();
+  const double chip = std::pow(sensor_.one_chip_place_sd_m, 2);
+  const double chips = std::pow(sensor_.place_sd_m, 2);
+  const double less_precision = 1.0 / chip - 1.0 / chips;
+  // per_slope of three places, by Woodbury: only six of the parameters have another prior. At least what the prior
+  // of three leaves: no drive knows less.
+  const auto to_places = per_slope.middleCols<6>(kPlaces);
+  const Eigen::SelfAdjointEigenSolver<Matrix6> inner(
+      Matrix6(Matrix6::Identity() / less_precision - per_slope.block<6, 6>(kPlaces, kPlaces)));
+  const Vector6 inverse = inner.eigenvalues().cwiseMax(chip * chip / chips).cwiseInverse();
+  const Eigen::Matrix<double, kParameters, 6> across = to_places * inner.eigenvectors();
+  const Covariance growth = across * inverse.asDiagonal() * across.transpose();
+  const ParameterVector move =
+      less_precision * (to_places + growth.middleCols<6>(kPlaces)) * x.segment<6>(kPlaces);
+  const double probability = 1.0 / (1.0 + std::exp(log_odds_));
+  return probability * (growth + move * move.transpose());
 }
 
 }  // namespace imuscope::batch

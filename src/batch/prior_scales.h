@@ -17,20 +17,33 @@ class PriorScales {
   /// Inverse variances in force; 0 for psi and t_d.
   [[nodiscard]] ParameterVector precision() const;
 
+  using Covariance = Eigen::Matrix<double, kParameters, kParameters>;
+
+  /// B-16.
   /// @param x           the estimate
   /// @param covariance  of it, with precision() in it
-  void learn(const ParameterVector& x, const Eigen::Matrix<double, kParameters, kParameters>& covariance);
+  void learn_sizes(const ParameterVector& x, const Covariance& covariance);
+
+  /// B-17.
+  /// @param x          the estimate
+  /// @param per_slope  inverse of the information that the drive really gives and precision(): without what the
+  ///                   reference's noise only seems to tell
+  void choose_places(const ParameterVector& x, const Covariance& per_slope);
 
   [[nodiscard]] bool one_chip() const { return one_chip_; }
 
- private:
-  void choose_places(const ParameterVector& x,
-                     const Eigen::Matrix<double, kParameters, kParameters>& covariance);
+  /// B-17a: by how much the covariance grows for the doubt in the choice: as much as the estimate would move,
+  /// and its covariance grow, were the accelerometers in three places; by the probability that they are.
+  /// Zero where three places were chosen: these reach to one.
+  /// @param x, per_slope  as of choose_places(), in the choice made there
+  [[nodiscard]] Covariance doubt(const ParameterVector& x, const Covariance& per_slope) const;
 
+ private:
   SensorClass sensor_;
   ParameterVector class_sd_;
   ParameterVector sd_;
   bool one_chip_ = false;
+  double log_odds_ = 0.0;  ///< of one chip against three, by the drive alone
 };
 
 }  // namespace imuscope::batch
