@@ -104,7 +104,8 @@ bool any_type(With&& with) {
          with(static_cast<error_t*>(nullptr)) || with(static_cast<odometry_t*>(nullptr)) ||
          with(static_cast<status_t*>(nullptr)) || with(static_cast<noise_model_t*>(nullptr)) ||
          with(static_cast<wavelet_variance_t*>(nullptr)) || with(static_cast<dynamics_t*>(nullptr)) ||
-         with(static_cast<pc_clock_t*>(nullptr)) || with(static_cast<event_t*>(nullptr));
+         with(static_cast<pc_clock_t*>(nullptr)) || with(static_cast<event_t*>(nullptr)) ||
+         with(static_cast<virtual_imu_t*>(nullptr));
 }
 
 }  // namespace

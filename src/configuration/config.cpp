@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "base/limits.h"
 #include "base/text.h"
@@ -66,6 +67,58 @@ void read_error_process(TomlReader in, double slowest_rate_hz, ErrorProcessOptio
   constexpr double kHighestShare = 0.4;  // of the rate: below half of it the filter still is what it says
   in.number("low_pass_hz", options.low_pass_hz, 1.0, 0.0, kHighestShare * slowest_rate_hz);
   in.finish();
+}
+
+/// The weights of one axis, their sum made one exactly: people round them.
+std::vector<double> read_weights(TomlReader& in, std::string_view key, std::size_t members) {
+  constexpr double kRounding = 0.01;
+  std::vector<double> weights;
+  in.numbers(key, weights);
+  if (weights.empty()) return std::vector<double>(members, 1.0 / static_cast<double>(members));
+  if (weights.size() != members) {
+    in.fail(key, fmt::format("has {} weights for {} IMUs", weights.size(), members),
+            "give one for each of imus, in their order");
+    return {};
+  }
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  if (!(std::abs(sum - 1.0) <= kRounding)) {
+    in.fail(key, fmt::format("has weights whose sum is {:.4g}", sum),
+            "they make a mean: their sum is 1; imuscope correlate writes them");
+    return {};
+  }
+  for (double& weight : weights) weight /= sum;
+  return weights;
+}
+
+void read_virtual_imu(TomlReader in, const std::vector<DeviceConfig>& devices,
+                      std::vector<VirtualImuMember>& virtual_imu) {
+  std::vector<std::string> names;
+  in.texts("imus", names);
+  if (in.present()) in.require("imus", "name the S-IMUs that it is made of");
+  std::vector<VirtualImuMember> members;
+  for (const auto& name : names) {
+    const auto found = std::find_if(devices.begin(), devices.end(), [&](const DeviceConfig& device) {
+      return device.name == name && device.role == DeviceRole::kStudy;
+    });
+    if (found == devices.end()) {
+      in.fail("imus", fmt::format("names '{}', which is no device of role study", name));
+      continue;
+    }
+    const auto index = static_cast<std::size_t>(found - devices.begin());
+    if (std::any_of(members.begin(), members.end(), [&](const auto& other) { return other.device == index; }))
+      in.fail("imus", fmt::format("names '{}' twice", name));
+    members.push_back({index, {}, {}});
+  }
+  if (!names.empty() && names.size() < 2) in.fail("imus", "names one IMU", "a mean takes two or more");
+  constexpr std::array kKeys{"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
+  for (std::size_t axis = 0; axis < kKeys.size(); ++axis) {
+    const auto weights = read_weights(in, kKeys[axis], members.size());
+    if (in.failed()) continue;
+    for (std::size_t i = 0; i < members.size(); ++i)
+      (axis < 3 ? members[i].gyro : members[i].accel)[axis % 3] = weights[i];
+  }
+  in.finish();
+  virtual_imu = std::move(members);
 }
 
 /// A list of processor cores.
@@ -211,6 +264,7 @@ Result<Configuration> parse(const std::string& text, const std::filesystem::path
   for (const auto index : configuration.study_indices())
     slowest_rate_hz = std::min(slowest_rate_hz, configuration.devices[index].rate_hz);
   read_error_process(root.table("error_process"), slowest_rate_hz, configuration.error_process);
+  read_virtual_imu(root.table("virtual_imu"), configuration.devices, configuration.virtual_imu);
   root.finish();
   if (problem.error) return tl::unexpected<Error>(*problem.error);
   configuration.text = is_whole ? text : text + attached_text(files);

@@ -228,6 +228,13 @@ struct ErrorProcessOptions {
   double low_pass_hz = 0.0;  ///< corner of the common low-pass of errors and prediction; 0: none
 };
 
+/// [virtual_imu]: an S-IMU that a virtual one is made of.
+struct VirtualImuMember {
+  std::size_t device = 0;        ///< index of the S-IMU
+  std::array<double, 3> gyro{};  ///< weights by axis of b; over all members their sum is one
+  std::array<double, 3> accel{};
+};
+
 /// [lcm]: where and under which names results are published.
 struct LcmOptions {
   std::string url = "udpm://239.255.76.67:7667?ttl=0";
@@ -274,6 +281,7 @@ struct Configuration {
   NoiseOptions noise;
   RegimeOptions regimes;
   ErrorProcessOptions error_process;
+  std::vector<VirtualImuMember> virtual_imu;  ///< empty: there is none
   LcmOptions lcm;
   RecordOptions record;
   MetricsOptions metrics;

@@ -136,6 +136,17 @@ constexpr auto kSentences = std::to_array<KeySentence>({
     {"error_process.low_pass_hz",
      "A low-pass for errors and reference alike, so that sensors of different bandwidth compare; 0 is none. "
      "At most 0.4 of the slowest S-IMU's rate."},
+    {"virtual_imu.imus",
+     "Live and in a replay on the bus: one IMU is made of these S-IMUs and published as `IMUSCOPE_VIRTUAL`, "
+     "their weighted mean in the axes of the reference. Two or more of role `study`."},
+    {"virtual_imu.gyro_x",
+     "Their weights, in the order of `imus`; the sum is 1. `imuscope correlate` writes this table with the "
+     "weights of the quietest mean. Without it all weigh the same."},
+    {"virtual_imu.gyro_y", "Likewise."},
+    {"virtual_imu.gyro_z", "Likewise."},
+    {"virtual_imu.accel_x", "Likewise."},
+    {"virtual_imu.accel_y", "Likewise."},
+    {"virtual_imu.accel_z", "Likewise."},
     {"record.folder",
      "Where live runs are recorded, relative to the working folder; each makes a folder `NAME-TIME` there. "
      "Without it: `runs`. `--out` comes first."},

@@ -9,6 +9,7 @@ namespace imuscope {
 Broadcast::Broadcast(const Configuration& configuration)
     : configuration_(configuration), study_devices_(configuration.study_indices()) {
   for (const auto index : study_devices_) errors_.emplace_back(configuration.devices[index].name);
+  if (!configuration.virtual_imu.empty()) virtual_imu_.emplace(configuration);
 }
 
 void Broadcast::open(LcmPublisher bus, bool bridge) {
@@ -26,20 +27,30 @@ void Broadcast::send(std::optional<error_t> rows) {
   bus_->publish(std::move(*rows), "ERROR", name);
 }
 
+void Broadcast::send(std::optional<virtual_imu_t> rows) {
+  if (rows) bus_->publish(std::move(*rows), "VIRTUAL");
+}
+
 void Broadcast::on_error(const ErrorRecord& record) {
-  if (bus_) send(errors_[record.study].add(record));
+  if (!bus_) return;
+  send(errors_[record.study].add(record));
+  if (!virtual_imu_) return;
+  for (auto& rows : virtual_imu_->add(record)) send(std::move(rows));
 }
 
 void Broadcast::finish() {
   if (!bus_) return;
   for (auto& rows : errors_) send(rows.take());
+  if (virtual_imu_) send(virtual_imu_->take());
 }
 
 void Broadcast::on_snapshot(const Snapshot& snapshot) {
   scale_ = snapshot.time_scale;
   if (!bus_) return;
   if (snapshot.has_reference) {
-    for (auto& rows : errors_) send(rows.take_old(to_seconds(snapshot.cut - snapshot.first_reference_time)));
+    const double time_s = to_seconds(snapshot.cut - snapshot.first_reference_time);
+    for (auto& rows : errors_) send(rows.take_old(time_s));
+    if (virtual_imu_) send(virtual_imu_->take_old(time_s));
   }
   if (snapshot.has_new_navigation) {
     bus_->publish(navigation_message(snapshot), "NAVIGATION");

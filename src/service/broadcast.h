@@ -11,6 +11,7 @@
 #include "publish/lcm_publisher.h"
 #include "service/refit.h"
 #include "service/telemetry.h"
+#include "service/virtual_imu.h"
 
 namespace imuscope {
 
@@ -41,6 +42,7 @@ class Broadcast {
 
  private:
   void send(std::optional<error_t> rows);
+  void send(std::optional<virtual_imu_t> rows);
 
   const Configuration& configuration_;
   std::vector<std::size_t> study_devices_;
@@ -48,6 +50,7 @@ class Broadcast {
   bool bridge_ = false;
   std::optional<Snapshot> bridge_origin_;
   std::vector<ErrorBatch> errors_;  ///< per study
+  std::optional<VirtualImu> virtual_imu_;
   TimeScale scale_;
 };
 

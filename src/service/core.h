@@ -73,6 +73,9 @@ struct ErrorRecord {
   DataAges ages{};
   Validity validity = Validity::kUsable;  ///< of the calibration that it was made with
   std::optional<VehicleSpeed> speed{};
+  /// That the row was made with.
+  Mounting mounting{};
+  double t_d_s = 0.0;
 };
 static_assert(std::is_trivially_copyable_v<ErrorRecord>);
 
@@ -113,8 +116,14 @@ class CoreSink {
   /// One S sample of a calibrated S-IMU. Unless overridden, its row goes to on_error(), made with the
   /// estimate as it stands.
   virtual void on_epoch(const StudyEpoch& epoch, const TickFacts& facts) noexcept {
-    on_error({epoch.study, facts.first_reference_time, live_error_row(epoch), facts.ages, facts.validity,
-              facts.speed});
+    on_error({epoch.study,
+              facts.first_reference_time,
+              live_error_row(epoch),
+              facts.ages,
+              facts.validity,
+              facts.speed,
+              {epoch.C_b_s, epoch.r_bs_b_m},
+              epoch.t_d_s});
   }
   virtual void on_error(const ErrorRecord& record) noexcept = 0;
   virtual void on_event(const EstimatorEvent& event) noexcept = 0;

@@ -204,8 +204,6 @@ constexpr double kBatch_s = 0.1;
 /// Rows wait for their reference a tenth of a second, and a stalled core or line brings them later still.
 constexpr double kBatchWaits_s = 1.0;
 
-std::int64_t tenth_of(double time_s) { return static_cast<std::int64_t>(std::floor(time_s / kBatch_s)); }
-
 }  // namespace
 
 std::int64_t utime_of(const UtcStamp& stamp) { return stamp.is_known ? to_utime(stamp.utc) : 0; }
@@ -313,12 +311,19 @@ calibration_t calibration_message(const Snapshot& snapshot, std::size_t study, c
   return m;
 }
 
+MessageTenth::MessageTenth(double time_s)
+    : number_(static_cast<std::int64_t>(std::floor(time_s / kBatch_s))) {}
+
+bool MessageTenth::is_old(double time_s) const {
+  return time_s >= kBatch_s * static_cast<double>(number_ + 1) + kBatchWaits_s;
+}
+
 std::optional<error_t> ErrorBatch::add(const ErrorRecord& record) {
   const double time_s = to_seconds(record.row.time - record.first_reference_time);
   const auto validity = static_cast<std::int8_t>(record.validity);
   const auto regime = regime_name(record.row.regime);
   std::optional<error_t> whole;
-  if (pending_ && (tenth_of(time_s) != tenth_ || pending_->validity != validity ||
+  if (pending_ && (MessageTenth(time_s) != tenth_ || pending_->validity != validity ||
                    pending_->regime != regime || pending_->rows.size() == kRowsMax))
     whole = take();
   if (!pending_) {
@@ -326,7 +331,7 @@ std::optional<error_t> ErrorBatch::add(const ErrorRecord& record) {
     pending_->name = name_;
     pending_->regime = regime;
     set_freshness(record.ages, record.validity, *pending_);
-    tenth_ = tenth_of(time_s);
+    tenth_ = MessageTenth(time_s);
   }
   pending_->rows.push_back(error_row_message(record));
   // fmax() passes over NaN: an age that one row knows counts.
@@ -345,8 +350,7 @@ std::optional<error_t> ErrorBatch::take() {
 }
 
 std::optional<error_t> ErrorBatch::take_old(double time_s) {
-  if (!pending_ || time_s < kBatch_s * static_cast<double>(tenth_ + 1) + kBatchWaits_s) return std::nullopt;
-  return take();
+  return pending_ && tenth_.is_old(time_s) ? take() : std::nullopt;
 }
 
 wavelet_variance_t wavelet_variance_message(const Refit& refit) {

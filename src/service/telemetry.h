@@ -35,6 +35,20 @@ namespace imuscope {
 [[nodiscard]] calibration_t calibration_message(const Snapshot& snapshot, std::size_t study,
                                                 const std::string& name);
 
+/// The tenth of a second whose rows a message holds.
+class MessageTenth {
+ public:
+  MessageTenth() = default;
+  /// That of a row, since the run's first R-IMU epoch.
+  explicit MessageTenth(double time_s);
+  /// Every row of it must have come.
+  [[nodiscard]] bool is_old(double time_s) const;
+  bool operator==(const MessageTenth&) const = default;
+
+ private:
+  std::int64_t number_ = 0;
+};
+
 /// Gathers the error rows of one S-IMU into messages: what a message holds depends on the rows alone, so that
 /// live run and replay send the same.
 class ErrorBatch {
@@ -53,7 +67,7 @@ class ErrorBatch {
  private:
   std::string name_;
   std::optional<error_t> pending_;
-  std::int64_t tenth_ = 0;  ///< of a second, of the rows
+  MessageTenth tenth_;
 };
 
 [[nodiscard]] wavelet_variance_t wavelet_variance_message(const Refit& refit);

@@ -57,6 +57,37 @@ TEST(Configuration, ADeviceWithoutAxesOfAStdbinUnitIsTurnedToForwardRightDown) {
   EXPECT_EQ(configuration.devices[1].axes, (std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}));
 }
 
+std::string with_virtual_imu(const std::string& keys) {
+  return std::string(kMinimal) +
+         "[[device]]\nname = \"s2\"\nrole = \"study\"\nprotocol = \"xsens_mt\"\n[virtual_imu]\n" + keys;
+}
+
+TEST(Configuration, AVirtualImuHasWeightsOfSumOneOrEqualOnes) {
+  EXPECT_TRUE(parsed(kMinimal).virtual_imu.empty());
+  const auto members =
+      parsed(with_virtual_imu("imus = [\"s2\", \"s\"]\ngyro_y = [1.251, -0.25]\n")).virtual_imu;
+  ASSERT_EQ(members.size(), 2U);
+  EXPECT_EQ(members[0].device, 2U);
+  EXPECT_EQ(members[1].device, 1U);
+  EXPECT_EQ(members[0].gyro[0], 0.5);
+  EXPECT_EQ(members[1].accel[2], 0.5);
+  EXPECT_DOUBLE_EQ(members[0].gyro[1], 1.251 / 1.001);
+  EXPECT_DOUBLE_EQ(members[0].gyro[1] + members[1].gyro[1], 1.0);
+}
+
+TEST(Configuration, AVirtualImuThatCannotBeIsRefusedWithWhatIsWrong) {
+  EXPECT_THAT(refused(with_virtual_imu("gyro_x = [0.5, 0.5]")), HasSubstr("virtual_imu"));
+  EXPECT_THAT(refused(with_virtual_imu("imus = [\"s\"]")), HasSubstr("a mean takes two or more"));
+  EXPECT_THAT(refused(with_virtual_imu("imus = [\"s\", \"s\"]")), HasSubstr("names 's' twice"));
+  EXPECT_THAT(refused(with_virtual_imu("imus = [\"s\", \"r\"]")),
+              HasSubstr("names 'r', which is no device of role study"));
+  EXPECT_THAT(refused(with_virtual_imu("imus = [\"s\", \"s2\"]\ngyro_x = [1.0]")),
+              HasSubstr("has 1 weights for 2 IMUs"));
+  EXPECT_THAT(refused(with_virtual_imu("imus = [\"s\", \"s2\"]\ngyro_x = [0.5, 0.4]")),
+              HasSubstr("has weights whose sum is 0.9"));
+  EXPECT_THAT(refused(with_virtual_imu("imus = [\"s\", \"s2\"]\ngyro_w = [0.5, 0.5]")), HasSubstr("gyro_w"));
+}
+
 TEST(Configuration, PulsesOfUtcAreADeviceOfTheirOwn) {
   const std::string pps = R"(
 [[device]]

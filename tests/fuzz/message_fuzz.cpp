@@ -14,6 +14,7 @@
 #include <imuscope/raw_t.hpp>
 #include <imuscope/run_t.hpp>
 #include <imuscope/status_t.hpp>
+#include <imuscope/virtual_imu_t.hpp>
 #include <imuscope/wavelet_variance_t.hpp>
 
 #include "publish/message_codec.h"
@@ -50,6 +51,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::decode_as<navigation_t>(bytes);
   fuzz::decode_as<noise_model_t>(bytes);
   fuzz::decode_as<odometry_t>(bytes);
+  fuzz::decode_as<virtual_imu_t>(bytes);
   fuzz::decode_as<pc_clock_t>(bytes);
   fuzz::decode_as<raw_t>(bytes);
   fuzz::decode_as<run_t>(bytes);

@@ -14,6 +14,7 @@
 #include <imuscope/navigation_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <imuscope/status_t.hpp>
+#include <imuscope/virtual_imu_t.hpp>
 #include <lcm/lcm-cpp.hpp>
 #include <map>
 #include <regex>
@@ -92,11 +93,27 @@ std::vector<std::int64_t> counters_of(const std::filesystem::path& file) {
   return counters;
 }
 
-/// The demo's configuration with its ports in `folder`, a refit every 15 s and regimes that a person names.
+/// What a log of LCM events has on a channel, as it was sent.
+std::vector<std::vector<std::uint8_t>> messages_in(const std::filesystem::path& file,
+                                                   const std::string& channel) {
+  std::vector<std::vector<std::uint8_t>> messages;
+  lcm::LogFile log(file.string(), "r");
+  EXPECT_TRUE(log.good()) << file;
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    const auto* bytes = static_cast<const std::uint8_t*>(event->data);
+    if (event->channel == channel) messages.emplace_back(bytes, bytes + event->datalen);
+  }
+  return messages;
+}
+
+/// The demo's configuration with its ports in `folder`, a refit every 15 s, regimes that a person names, and a
+/// virtual IMU of two unlike thirds.
 std::filesystem::path configuration_in(const std::filesystem::path& folder) {
   std::string text = read_text(source_path("config/demo.toml"));
   text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder / "ports").string());
-  text += "\n[noise]\nrefit_interval_s = 15.0\n\n[regimes]\nby = \"labels\"\n\n[record]\nmcap = true\n";
+  text +=
+      "\n[noise]\nrefit_interval_s = 15.0\n\n[regimes]\nby = \"labels\"\n\n[record]\nmcap = true\n"
+      "\n[virtual_imu]\nimus = [\"mtx1\", \"mtx3\"]\ngyro_x = [0.25, 0.75]\n";
   auto file = folder / "live.toml";
   std::ofstream(file) << text;
   return file;
@@ -352,6 +369,39 @@ class LiveRun : public testing::Test {
     EXPECT_GT(turns.norm() / n, 0.5 / kDeg) << "the vehicle moved";
   }
 
+  /// The virtual IMU shows the reference's motion and the mean of its IMUs' biases, in b; the replay sends what the
+  /// live run sent, to the bit.
+  static void check_virtual_imu(const nlohmann::json& truth, const std::filesystem::path& folder) {
+    const auto live = messages_in(folder / "live" / "capture.lcm", "IMUSCOPE_VIRTUAL");
+    EXPECT_TRUE(live == messages_in(folder / "replay.events", "IMUSCOPE_VIRTUAL"));
+    std::map<std::string, Vector3d> bias_b;
+    std::map<std::string, Vector3d> place_b;
+    for (const auto& imu : truth.at("imus")) {
+      bias_b[imu.at("name")] = matrix_of(imu.at("C_b_s")).transpose() * vector_of(imu.at("gyro_bias_radps"));
+      place_b[imu.at("name")] = vector_of(imu.at("r_bs_b_m"));
+    }
+    Vector3d sum = Vector3d::Zero();
+    std::size_t rows = 0;
+    virtual_imu_t last{};
+    for (const auto& bytes : live) {
+      ASSERT_GT(last.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
+      for (const auto& row : last.rows) {
+        if (!std::isfinite(row.e_gyro_x_radps)) continue;
+        sum += Vector3d(row.e_gyro_x_radps, row.e_gyro_y_radps, row.e_gyro_z_radps);
+        ++rows;
+      }
+    }
+    ASSERT_GT(rows, 1500U);
+    const Vector3d mean = sum / static_cast<double>(rows);
+    const Vector3d of_mtx1(0.25, 0.5, 0.5);
+    const Vector3d expected =
+        of_mtx1.cwiseProduct(bias_b["mtx1"]) + (Vector3d::Ones() - of_mtx1).cwiseProduct(bias_b["mtx3"]);
+    // As of each IMU alone, by the root of two less: 4 sd of turn-on bias and wandering bias.
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(mean[i] * kDeg, expected[i] * kDeg, 0.3) << i;
+    for (int i = 0; i < 3; ++i)
+      EXPECT_NEAR(last.place_of_x_m[i], 0.5 * (place_b["mtx1"][i] + place_b["mtx3"][i]), 0.1) << i;
+  }
+
   /// Attachments stand in the file as they are: those of the whole run, made when it had ended.
   void check_attachments(const std::filesystem::path& live) {
     const std::string bag = read_text(live / "run.mcap");
@@ -425,7 +475,8 @@ TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
   // The recording gives the same estimates, to the last digit of every file.
   ASSERT_EQ(run_program(
                 "imuscope",
-                {"replay", (folder / "live" / "capture.lcm").string(), "--out", (folder / "replay").string()},
+                {"replay", (folder / "live" / "capture.lcm").string(), "--out", (folder / "replay").string(),
+                 "--lcm", "file://" + (folder / "replay.events").string() + "?mode=w"},
                 folder / "replay.log"),
             0)
       << read_text(folder / "replay.log");
@@ -437,6 +488,7 @@ TEST_F(LiveRun, PublishesWhatTheSimulatorKnowsAndReplaysToTheSameFiles) {
     EXPECT_TRUE(live == read_text(folder / "replay" / name))
         << name << " differs between live run and replay";
   }
+  check_virtual_imu(truth, folder);
 }
 
 }  // namespace

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
     bus->publish(test::example_noise_model(), "NOISE_MODEL", "mtx1");
     bus->publish(test::example_dynamics(), "DYNAMICS", "mtx1");
     bus->publish(test::example_event(), "EVENT");
+    bus->publish(test::example_virtual_imu(), "VIRTUAL");
     bus->publish(pose_t{}, "POSE");
     bus->publish(ins_t{}, "INS");
     std::this_thread::sleep_for(std::chrono::milliseconds(100));

@@ -13,6 +13,7 @@
 #include <imuscope/pc_clock_t.hpp>
 #include <imuscope/pose_t.hpp>
 #include <imuscope/status_t.hpp>
+#include <imuscope/virtual_imu_t.hpp>
 #include <imuscope/wavelet_variance_t.hpp>
 #include <string>
 
@@ -93,6 +94,22 @@ inline error_t example_error(const std::string& name = "mtx1") {
   row.time_s = 7.75;
   row.counter = 70'001;
   row.e_gyro_x_radps = 1e-3;
+  m.rows = {row};
+  m.n_rows = element_count(m.rows);
+  return m;
+}
+
+inline virtual_imu_t example_virtual_imu() {
+  virtual_imu_t m{};
+  m.utime = kExampleUtime;
+  m.imus = {"mtx1", "mtx2"};
+  m.n_imus = element_count(m.imus);
+  m.place_of_x_m[1] = 0.25;
+  virtual_imu_row_t row{};
+  row.utime = kExampleUtime;
+  row.time_s = 7.75;
+  row.omega_z_radps = 0.125;
+  row.e_gyro_z_radps = 1e-3;
   m.rows = {row};
   m.n_rows = element_count(m.rows);
   return m;

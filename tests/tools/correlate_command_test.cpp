@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "configuration/config.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
 
@@ -103,6 +105,27 @@ TEST_F(CorrelateCommand, PrintsATableThatAPersonReads) {
   EXPECT_THAT(said(), HasSubstr("mtx2 alone"));
   EXPECT_THAT(said(), HasSubstr("quietest mean from 0.02 to"));
   EXPECT_NE(said().find("mtx1 and mtx2: coherence 0.4"), std::string::npos);
+}
+
+TEST_F(CorrelateCommand, WhatItWritesForTheConfigurationIsOne) {
+  ASSERT_EQ(run({folder_.string(), "--json"}), 0) << said();
+  const json axes = json::parse(said()).at("axes");
+  ASSERT_EQ(run({folder_.string()}), 0) << said();
+  const std::string printed = said();
+  const auto begin = printed.find("[virtual_imu]");
+  ASSERT_NE(begin, std::string::npos) << printed;
+  std::string text = "[[device]]\nname = \"airins\"\nrole = \"reference\"\nprotocol = \"csv_imu\"\n";
+  for (const char* name : {"mtx1", "mtx2", "mtx3"})
+    text += fmt::format("[[device]]\nname = \"{}\"\nrole = \"study\"\nprotocol = \"csv_imu\"\n", name);
+  const auto configuration = parse_configuration(text + printed.substr(begin), "printed.toml");
+  ASSERT_TRUE(configuration) << configuration.error().text();
+  ASSERT_EQ(configuration->virtual_imu.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(configuration->virtual_imu[i].gyro[0],
+                axes.at("gyro_x").at("mean").at("weights").at(i).get<double>(), 2e-4);
+    EXPECT_NEAR(configuration->virtual_imu[i].accel[2],
+                axes.at("accel_z").at("mean").at("weights").at(i).get<double>(), 2e-4);
+  }
 }
 
 TEST_F(CorrelateCommand, OfALogTheAxesAreHeldAgainstEachOther) {

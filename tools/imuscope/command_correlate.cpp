@@ -1,5 +1,8 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -115,6 +118,19 @@ nlohmann::json json_of(const certificate::JointAxes& joint, const std::vector<st
   return out;
 }
 
+/// What has the quietest mean published live. Nothing where an axis has no weights.
+void print_virtual_imu(const std::vector<std::string>& names,
+                       const std::array<std::vector<double>, kErrorAxes>& weights) {
+  if (names.size() < 2 ||
+      std::any_of(weights.begin(), weights.end(), [](const auto& of_axis) { return of_axis.empty(); }))
+    return;
+  say("\nTo have this mean published live as IMUSCOPE_VIRTUAL, add to the configuration:\n\n[virtual_imu]\n"
+      "imus = [\"{}\"]\n",
+      fmt::join(names, "\", \""));
+  for (std::size_t axis = 0; axis < kErrorAxes; ++axis)
+    say("{} = [{:.4f}]\n", kErrorAxisNames[axis], fmt::join(weights[axis], ", "));
+}
+
 Result<void> correlate_run(const CorrelateCommand& options) {
   ProgressBar bar;
   bar.show("reading");
@@ -123,6 +139,7 @@ Result<void> correlate_run(const CorrelateCommand& options) {
   if (!run) return tl::unexpected(run.error());
   nlohmann::json document{
       {"schema", "imuscope.correlation/1"}, {"regime", options.regime}, {"axes", nlohmann::json::object()}};
+  std::array<std::vector<double>, kErrorAxes> weights;
   for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
     bar.show("axes", static_cast<double>(axis) / static_cast<double>(kErrorAxes));
     std::vector<certificate::JointSignal> signals;
@@ -133,12 +150,16 @@ Result<void> correlate_run(const CorrelateCommand& options) {
     const auto joint = joint_axes(signals, how);
     bar.clear();
     if (!joint) return tl::unexpected(joint.error());
+    weights[axis].assign(joint->weights.begin(), joint->weights.end());
     document["axes"][kErrorAxisNames[axis]] = json_of(*joint, run->names, true);
     if (options.json) continue;
     if (axis > 0) say("\n");
     print_run_axis(*joint, run->names, kErrorAxisNames[axis]);
   }
-  if (options.json) say("{}\n", json_text(document));
+  if (options.json)
+    say("{}\n", json_text(document));
+  else
+    print_virtual_imu(run->names, weights);
   return {};
 }
 
