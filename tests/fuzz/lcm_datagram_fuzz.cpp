@@ -36,6 +36,7 @@ void show(const std::vector<std::uint8_t>& bytes) {
   top::Heard heard;
   heard.status = decode_as<status_t>(bytes).value_or(status_t{});  // JSON is of a status
   heard.odometry = decode_as<odometry_t>(bytes);
+  heard.virtual_imu = decode_as<virtual_imu_t>(bytes);
   if (auto message = decode_as<calibration_t>(bytes)) heard.calibrations.emplace(message->name, *message);
   if (auto message = decode_as<noise_model_t>(bytes)) heard.models.emplace(message->name, *message);
   for (const auto& line : top::lines_of(heard))

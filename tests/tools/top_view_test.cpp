@@ -105,6 +105,24 @@ TEST(TopView, OdometryShowsSpeedStateAndScaleWhereThereIsAny) {
   EXPECT_EQ(nlohmann::json::parse(json_of(heard)).at("odometry").at("speed_rejected"), 22);
 }
 
+TEST(TopView, AVirtualImuShowsItsErrorAndWhyItSaysNothing) {
+  auto heard = example();
+  EXPECT_THAT(page(heard), Not(HasSubstr("VIRTUAL")));
+  heard.virtual_imu = test::example_virtual_imu();
+  heard.virtual_imu->rows.push_back(heard.virtual_imu->rows.front());
+  heard.virtual_imu->rows.back().e_gyro_z_radps = 3e-3;
+  heard.status->utime = heard.virtual_imu->utime + 1'000'000;
+  EXPECT_THAT(page(heard), HasSubstr("VIRTUAL     of mtx1, mtx2  usable"));
+  EXPECT_THAT(page(heard), HasSubstr("errs by 0 0 0.115 deg/s"));  // 2 mrad/s
+  EXPECT_EQ(nlohmann::json::parse(json_of(heard)).at("virtual_imu").at("mean_error_si").at(2), 2e-3);
+  heard.virtual_imu->validity = virtual_imu_t::CONVERGING;
+  EXPECT_THAT(page(heard), HasSubstr("converging"));
+  heard.status->utime += 5'000'000;
+  EXPECT_THAT(page(heard), AllOf(HasSubstr("silent"), Not(HasSubstr("errs by"))));
+  heard.virtual_imu->rows.clear();
+  EXPECT_EQ(nlohmann::json::parse(json_of(heard)).at("virtual_imu").at("mean_error_si").at(0), nullptr);
+}
+
 TEST(TopView, FramesThatThisPcLostAreShown) {
   auto heard = example();
   heard.status->devices[0].frames_dropped = 4711;

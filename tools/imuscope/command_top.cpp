@@ -74,12 +74,16 @@ class Top {
     const auto keep_odometry = [this](const auto&, auto bytes) {
       if (auto message = decode_message<odometry_t>(bytes)) heard_.odometry = *message;
     };
+    const auto keep_virtual_imu = [this](const auto&, auto bytes) {
+      if (auto message = decode_message<virtual_imu_t>(bytes)) heard_.virtual_imu = std::move(*message);
+    };
     const auto keep_model = [this](const auto&, auto bytes) {
       if (auto message = decode_message<noise_model_t>(bytes)) keep(heard_.models, std::move(*message));
     };
     return ear_.subscribe("STATUS", keep_status)
         .and_then([&] { return ear_.subscribe("CALIBRATION_.*", keep_calibration); })
         .and_then([&] { return ear_.subscribe("ODOMETRY", keep_odometry); })
+        .and_then([&] { return ear_.subscribe("VIRTUAL", keep_virtual_imu); })
         .and_then([&] { return ear_.subscribe("NOISE_MODEL_.*", keep_model); });
   }
 

@@ -1,11 +1,13 @@
 #include "tools/imuscope/top/view.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <utility>
 
 #include "base/calibration_levels.h"
@@ -149,6 +151,60 @@ void add_odometry(const Heard& heard, std::vector<std::string>& lines) {
   lines.push_back(fmt::format("  used/rejected: speed {}/{}  no slip {}/{}  zero velocity {}/{}",
                               o.speed_used, o.speed_rejected, o.non_holonomic_used, o.non_holonomic_rejected,
                               o.zero_velocity_used, o.zero_velocity_rejected));
+}
+
+/// The mean error of the newest message's rows: gyro, then accelerometer.
+std::array<double, 6> mean_error(const virtual_imu_t& imu) {
+  std::array<double, 6> sum{};
+  for (const auto& row : imu.rows) {
+    const std::array error{row.e_gyro_x_radps, row.e_gyro_y_radps, row.e_gyro_z_radps,
+                           row.e_accel_x_mps2, row.e_accel_y_mps2, row.e_accel_z_mps2};
+    for (std::size_t i = 0; i < error.size(); ++i) sum[i] += error[i];
+  }
+  for (double& value : sum) value /= static_cast<double>(imu.rows.size());
+  return sum;
+}
+
+/// Without rows for so long by the service's own time: one of its IMUs says nothing.
+bool is_silent(const virtual_imu_t& imu, const status_t& status) {
+  constexpr double kUsPerS = 1e6;
+  return imu.utime > 0 && static_cast<double>(status.utime - imu.utime) > kSilent_s * kUsPerS;
+}
+
+std::string_view state_of(const virtual_imu_t& imu, const status_t& status) {
+  if (is_silent(imu, status)) return "silent: not all of its IMUs have samples and a mounting";
+  switch (imu.validity) {
+    case virtual_imu_t::USABLE:
+      return "usable";
+    case virtual_imu_t::CONVERGING:
+      return "converging: a mounting is not known well enough yet";
+    case virtual_imu_t::CONTRADICTED:
+      return "contradicted: an IMU does not fit the reference";
+    default:
+      return "stale: the reference is silent";
+  }
+}
+
+void add_virtual_imu(const Heard& heard, const status_t& status, std::vector<std::string>& lines) {
+  if (!heard.virtual_imu) return;
+  const virtual_imu_t& imu = *heard.virtual_imu;
+  lines.emplace_back();
+  lines.push_back(fmt::format("VIRTUAL     of {}  {}", fmt::join(imu.imus, ", "), state_of(imu, status)));
+  if (is_silent(imu, status)) return;
+  const auto e = mean_error(imu);
+  lines.push_back(fmt::format("  errs by {} {} {} deg/s  {} {} {} m/s2  instants without it {}",
+                              brief(e[0] * kDegPerRad), brief(e[1] * kDegPerRad), brief(e[2] * kDegPerRad),
+                              brief(e[3]), brief(e[4]), brief(e[5]), imu.missing));
+}
+
+nlohmann::json virtual_imu_json(const virtual_imu_t& imu) {
+  nlohmann::json error = nlohmann::json::array();
+  for (const double value : mean_error(imu)) error.push_back(known(value));
+  return {{"utime", imu.utime},
+          {"imus", imu.imus},
+          {"validity", imu.validity},
+          {"missing", imu.missing},
+          {"mean_error_si", error}};
 }
 
 nlohmann::json odometry_json(const odometry_t& o) {
@@ -332,6 +388,7 @@ std::vector<std::string> lines_of(const Heard& heard) {
     add_devices(status, lines);
     add_studies(heard, status, lines);
     add_odometry(heard, lines);
+    add_virtual_imu(heard, status, lines);
     add_threads(status, lines);
     add_rings(status, lines);
     add_models(heard, lines);
@@ -368,6 +425,7 @@ std::string json_of(const Heard& heard) {
                       {"rings", nlohmann::json::array()},
                       {"alarms", nlohmann::json::array()}};
   if (heard.odometry) json["odometry"] = odometry_json(*heard.odometry);
+  if (heard.virtual_imu) json["virtual_imu"] = virtual_imu_json(*heard.virtual_imu);
   for (const auto& device : s.devices) json["devices"].push_back(device_json(device));
   for (const auto& study : s.studies) json["studies"].push_back(study_json(study));
   for (const auto& thread : s.threads) json["threads"].push_back(thread_json(thread));

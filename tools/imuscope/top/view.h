@@ -6,6 +6,7 @@
 #include <imuscope/noise_model_t.hpp>
 #include <imuscope/odometry_t.hpp>
 #include <imuscope/status_t.hpp>
+#include <imuscope/virtual_imu_t.hpp>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,6 +21,7 @@ struct Heard {
   std::map<std::string, calibration_t> calibrations;  ///< by S-IMU
   std::map<std::string, noise_model_t> models;        ///< by S-IMU
   std::optional<odometry_t> odometry;
+  std::optional<virtual_imu_t> virtual_imu;
   std::string note;  ///< of the program itself: an event sent, a text being typed
 };
 
