@@ -399,9 +399,9 @@ class Batch {
     }
     const AxesFrame published = in_axes_frame(estimate_.sensor);
     const Covariance grown = published.derivative * growth.asDiagonal();
-    result.covariance = grown * by_noise * grown.transpose() +
-                        published.derivative * scales_.doubt(estimate_.sensor.x, of_noise.per_slope) *
-                            published.derivative.transpose();
+    const Covariance of_estimate = growth.asDiagonal() * by_noise * growth.asDiagonal() +
+                                   scales_.doubt(estimate_.sensor.x, of_noise.per_slope);
+    result.covariance = published.derivative * of_estimate * published.derivative.transpose();
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = published.sensor;
     add_change(of_noise, result);

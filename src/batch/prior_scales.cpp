@@ -13,8 +13,8 @@ namespace {
 /// Weight of the class, in imperfections seen, against what the drive shows.
 constexpr double kClassWeight = 3.0;
 /// By how much (natural logarithm) one chip must be likelier than three to be believed: 150 to one. Of sensors with
-/// three, at most one in as many is then taken for one chip, whatever their noise: the mean of a ratio of likelihoods
-/// is one where the denominator is true (Markov's inequality).
+/// three, at most one in 150 is then taken for one chip, whatever their noise: the likelihood ratio has mean one where
+/// its denominator is true (Markov's inequality).
 constexpr double kLogOddsMin = 5.0;
 
 /// Parameters that are of one kind, and so of one size.

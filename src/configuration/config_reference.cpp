@@ -137,11 +137,11 @@ constexpr auto kSentences = std::to_array<KeySentence>({
      "A low-pass for errors and reference alike, so that sensors of different bandwidth compare; 0 is none. "
      "At most 0.4 of the slowest S-IMU's rate."},
     {"virtual_imu.imus",
-     "Live and in a replay on the bus: one IMU is made of these S-IMUs and published as `IMUSCOPE_VIRTUAL`, "
-     "their weighted mean in the axes of the reference. Two or more of role `study`."},
+     "Live, and in a replay with `--lcm`: the weighted mean of these S-IMUs, in the axes of the reference, is "
+     "published on `IMUSCOPE_VIRTUAL`. Two or more of role `study`."},
     {"virtual_imu.gyro_x",
      "Their weights, in the order of `imus`; the sum is 1. `imuscope correlate` writes this table with the "
-     "weights of the quietest mean. Without it all weigh the same."},
+     "weights of the quietest mean. Without it all weigh the same. Negative ones are possible."},
     {"virtual_imu.gyro_y", "Likewise."},
     {"virtual_imu.gyro_z", "Likewise."},
     {"virtual_imu.accel_x", "Likewise."},

@@ -4,12 +4,12 @@
 ///
 /// What each S-IMU says is turned into b by its mounting and moved to the motion's time by its time offset. The
 /// first one's samples are the instants; the others are interpolated linearly between their own, so that the mean
-/// does not hang on the reference but for the mountings. At scales of a few samples interpolation makes it a little
+/// depends on the reference through the mountings alone. At scales of a few samples interpolation makes it a little
 /// quieter than the mean of samples taken together would be; a motion that turns within a sample interval is off by
 /// up to an eighth of its second derivative times that interval's square.
 ///
-/// Weights are by axis, and so an axis' accelerometers stand at the same mean of the lever arms: forces need no
-/// derivative of the rate. Biases are not taken off.
+/// Forces are not moved to one point, which would take the derivative of the rate: each component is the force at the
+/// weighted mean of the lever arms, which is published with it. Biases are not removed.
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -47,7 +47,6 @@ class VirtualImu {
   /// By triad, component: what an S-IMU says in b.
   using Triads = Eigen::Matrix<double, 3, 2>;
 
-  /// A sample in b.
   struct Sample {
     double time_s = 0.0;  ///< of the motion, since the run's first R-IMU epoch
     std::int64_t utime = 0;

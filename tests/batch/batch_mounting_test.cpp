@@ -95,7 +95,7 @@ TEST(EstimateMounting, IsUnbiasedWhereTheReferenceIsAsNoisyAsTheSensor) {
     total += nees(*found, truth);
   }
   for (Eigen::Index i = 0; i < 6; ++i) EXPECT_LT(std::abs(sum[i]), 3.3 * std::sqrt(variance[i])) << i;
-  // Chi-square of 6 * 12 degrees of freedom: 3.3 sd about its mean, widened for sd that are estimates.
+  // Chi-square of 6 * kSeeds degrees of freedom: 3.3 sd about its mean, widened for sd that are estimates.
   const double sd = std::sqrt(2.0 * 6.0 * kSeeds) * 1.15;
   EXPECT_NEAR(total, 6.0 * kSeeds, 3.3 * sd);
 }

@@ -121,24 +121,40 @@ struct Rows {
   }
 };
 
-/// All three say everything, whatever the order of a tick.
-Rows all_of(VirtualImu& imu, int samples, const std::array<Vector3d, 3>& errors_b) {
-  Rows out;
-  for (int k = 0; k < samples; ++k) {
-    for (const std::size_t study : {2, 0, 1}) out.take(imu.add(row_of(study, k, errors_b[study])));
+/// The samples from one count to another of all three, in any order within a tick.
+/// @param change  of a record: false leaves it out
+template <typename Change>
+void feed(VirtualImu& imu, int begin, int end, Rows& out, Change&& change) {
+  for (int k = begin; k < end; ++k) {
+    for (const std::size_t study : {2, 0, 1}) {
+      auto record = row_of(study, k, Vector3d::Zero());
+      if (change(study, k, record)) out.take(imu.add(record));
+    }
   }
+}
+
+/// All that is said of this many samples.
+template <typename Change>
+Rows all_of(int samples, Change&& change) {
+  const Configuration configuration = vehicle();
+  VirtualImu imu(configuration);
+  Rows out;
+  feed(imu, 0, samples, out, change);
   out.end(imu);
   return out;
 }
 
+bool as_it_is(std::size_t, int, ErrorRecord&) { return true; }
+
 constexpr double kThird = 1.0 / 3.0;
 
 TEST(VirtualImu, IsTheWeightedMeanInTheReferencesAxesAtTheMotionsTime) {
-  const Configuration configuration = vehicle();
-  VirtualImu imu(configuration);
   const std::array<Vector3d, 3> errors{Vector3d(1e-3, 2e-3, 3e-3), Vector3d(-4e-3, 5e-3, 6e-3),
                                        Vector3d(7e-3, 8e-3, -9e-3)};
-  const Rows out = all_of(imu, 1000, errors);
+  const Rows out = all_of(1000, [&](std::size_t study, int k, ErrorRecord& record) {
+    record = row_of(study, k, errors[study]);
+    return true;
+  });
   ASSERT_GT(out.rows.size(), 990U);
   EXPECT_EQ(out.messages.front().imus, (std::vector<std::string>{"mtx2", "mtx1", "mtx3"}));
   EXPECT_LE(out.messages.back().missing, 2);  // the first and the last, of which one side is missing
@@ -176,9 +192,7 @@ TEST(VirtualImu, IsTheWeightedMeanInTheReferencesAxesAtTheMotionsTime) {
 }
 
 TEST(VirtualImu, AMessageHoldsATenthOfASecondAndArrivesWhole) {
-  const Configuration configuration = vehicle();
-  VirtualImu imu(configuration);
-  const Rows out = all_of(imu, 300, {Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()});
+  const Rows out = all_of(300, as_it_is);
   for (const auto& message : out.messages) {
     EXPECT_LE(message.n_rows, 10);
     EXPECT_EQ(std::floor(10.0 * message.rows.front().time_s), std::floor(10.0 * message.rows.back().time_s));
@@ -190,17 +204,10 @@ TEST(VirtualImu, AMessageHoldsATenthOfASecondAndArrivesWhole) {
 }
 
 TEST(VirtualImu, BridgesOneLostSampleButNoGap) {
-  const Configuration configuration = vehicle();
-  VirtualImu imu(configuration);
-  Rows out;
-  for (int k = 0; k < 400; ++k) {
+  const Rows out = all_of(400, [](std::size_t study, int k, ErrorRecord&) {
     const bool lost = k == 100 || (k >= 200 && k < 205);
-    for (const std::size_t study : {0, 1, 2}) {
-      if (study == 0 && lost) continue;
-      out.take(imu.add(row_of(study, k, Vector3d::Zero())));
-    }
-  }
-  out.end(imu);
+    return study != 0 || !lost;
+  });
   // The gap of six intervals holds six instants of the first IMU.
   EXPECT_GE(out.messages.back().missing, 6);
   EXPECT_LE(out.messages.back().missing, 8);
@@ -212,16 +219,8 @@ TEST(VirtualImu, BridgesOneLostSampleButNoGap) {
 }
 
 TEST(VirtualImu, IsSilentWhileAMemberIsAndGoesOnWithIt) {
-  const Configuration configuration = vehicle();
-  VirtualImu imu(configuration);
-  Rows out;
-  for (int k = 0; k < 2000; ++k) {
-    for (const std::size_t study : {0, 1, 2}) {
-      if (study == 2 && k >= 500 && k < 1500) continue;
-      out.take(imu.add(row_of(study, k, Vector3d::Zero())));
-    }
-  }
-  out.end(imu);
+  const Rows out =
+      all_of(2000, [](std::size_t study, int k, ErrorRecord&) { return study != 2 || k < 500 || k >= 1500; });
   for (const auto& row : out.rows) EXPECT_FALSE(row.time_s > 5.01 && row.time_s < 14.99) << row.time_s;
   EXPECT_NEAR(static_cast<double>(out.rows.size()), 1000.0, 4.0);
   EXPECT_NEAR(out.rows.back().time_s, 19.98, 0.02);
@@ -231,26 +230,17 @@ TEST(VirtualImu, GoesOnAfterAClockThatBeginsAnew) {
   const Configuration configuration = vehicle();
   VirtualImu imu(configuration);
   Rows out;
-  for (int k = 1000; k < 1200; ++k)
-    for (const std::size_t study : {0, 1, 2}) out.take(imu.add(row_of(study, k, Vector3d::Zero())));
-  for (int k = 0; k < 200; ++k)
-    for (const std::size_t study : {0, 1, 2}) out.take(imu.add(row_of(study, k, Vector3d::Zero())));
+  feed(imu, 1000, 1200, out, as_it_is);
+  feed(imu, 0, 200, out, as_it_is);
   out.end(imu);
   EXPECT_NEAR(static_cast<double>(out.rows.size()), 400.0, 8.0);
 }
 
 TEST(VirtualImu, ATriadThatSaysNothingSpoilsOnlyWhereItHasWeight) {
-  const Configuration configuration = vehicle();
-  VirtualImu imu(configuration);
-  Rows out;
-  for (int k = 0; k < 200; ++k) {
-    for (const std::size_t study : {0, 1, 2}) {
-      auto record = row_of(study, k, Vector3d::Zero());
-      if (study == 2) record.row.gyro_valid = false;
-      out.take(imu.add(record));
-    }
-  }
-  out.end(imu);
+  const Rows out = all_of(200, [](std::size_t study, int, ErrorRecord& record) {
+    record.row.gyro_valid = study != 2;
+    return true;
+  });
   ASSERT_FALSE(out.rows.empty());
   for (const auto& row : out.rows) {
     EXPECT_TRUE(std::isfinite(row.omega_x_radps));
@@ -260,17 +250,10 @@ TEST(VirtualImu, ATriadThatSaysNothingSpoilsOnlyWhereItHasWeight) {
 }
 
 TEST(VirtualImu, IsAsUsableAsTheWorstOfItsMountings) {
-  const Configuration configuration = vehicle();
-  VirtualImu imu(configuration);
-  Rows out;
-  for (int k = 0; k < 200; ++k) {
-    for (const std::size_t study : {0, 1, 2}) {
-      auto record = row_of(study, k, Vector3d::Zero());
-      if (study == 0 && k < 100) record.validity = Validity::kConverging;
-      out.take(imu.add(record));
-    }
-  }
-  out.end(imu);
+  const Rows out = all_of(200, [](std::size_t study, int k, ErrorRecord& record) {
+    if (study == 0 && k < 100) record.validity = Validity::kConverging;
+    return true;
+  });
   for (const auto& message : out.messages) {
     const bool early = message.rows.back().time_s < 0.99;
     if (early) {
@@ -283,17 +266,14 @@ TEST(VirtualImu, IsAsUsableAsTheWorstOfItsMountings) {
 }
 
 TEST(VirtualImu, HasTheNoiseThatItsWeightsPromise) {
-  const Configuration configuration = vehicle();
-  VirtualImu imu(configuration);
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
-  Rows out;
-  constexpr int kSamples = 20000;
-  for (int k = 0; k < kSamples; ++k) {
-    for (const std::size_t study : {0, 1, 2})
-      out.take(imu.add(row_of(study, k, 1e-3 * Vector3d(normal(random), normal(random), normal(random)))));
-  }
-  out.end(imu);
+  const Rows out = all_of(20000, [&](std::size_t study, int k, ErrorRecord& record) {
+    Vector3d noise;
+    for (double& value : noise) value = 1e-3 * normal(random);
+    record = row_of(study, k, noise);
+    return true;
+  });
   // Means over a second hide what interpolation does to neighbours.
   constexpr std::size_t kMean = 100;
   double square = 0.0;

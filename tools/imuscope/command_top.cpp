@@ -75,7 +75,10 @@ class Top {
       if (auto message = decode_message<odometry_t>(bytes)) heard_.odometry = *message;
     };
     const auto keep_virtual_imu = [this](const auto&, auto bytes) {
-      if (auto message = decode_message<virtual_imu_t>(bytes)) heard_.virtual_imu = std::move(*message);
+      auto message = decode_message<virtual_imu_t>(bytes);
+      if (!message) return;
+      heard_.virtual_imu = std::move(*message);
+      virtual_imu_heard_at_ = host_now();
     };
     const auto keep_model = [this](const auto&, auto bytes) {
       if (auto message = decode_message<noise_model_t>(bytes)) keep(heard_.models, std::move(*message));
@@ -120,7 +123,9 @@ class Top {
     while (!over && !top_stopped.load()) {
       (void)ear_.wait(kRedraw);
       while (const auto key = terminal.key()) over = press(*key) || over;
-      if (heard_.status) heard_.status_age_s = to_seconds(host_now() - heard_at_);
+      const HostTime now = host_now();
+      if (heard_.status) heard_.status_age_s = to_seconds(now - heard_at_);
+      if (heard_.virtual_imu) heard_.virtual_imu_age_s = to_seconds(now - virtual_imu_heard_at_);
       auto lines = top::lines_of(heard_);
       lines.push_back(typing_ ? fmt::format("event: {}_   (Enter sends, Esc forgets)", typed_)
                               : "e: mark an event   q: quit");
@@ -159,6 +164,7 @@ class Top {
   std::string source_;
   top::Heard heard_;
   HostTime heard_at_{};
+  HostTime virtual_imu_heard_at_{};
   bool typing_ = false;
   std::string typed_;
 };

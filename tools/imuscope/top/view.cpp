@@ -165,14 +165,7 @@ std::array<double, 6> mean_error(const virtual_imu_t& imu) {
   return sum;
 }
 
-/// Without rows for so long by the service's own time: one of its IMUs says nothing.
-bool is_silent(const virtual_imu_t& imu, const status_t& status) {
-  constexpr double kUsPerS = 1e6;
-  return imu.utime > 0 && static_cast<double>(status.utime - imu.utime) > kSilent_s * kUsPerS;
-}
-
-std::string_view state_of(const virtual_imu_t& imu, const status_t& status) {
-  if (is_silent(imu, status)) return "silent: not all of its IMUs have samples and a mounting";
+std::string_view state_of(const virtual_imu_t& imu) {
   switch (imu.validity) {
     case virtual_imu_t::USABLE:
       return "usable";
@@ -185,26 +178,29 @@ std::string_view state_of(const virtual_imu_t& imu, const status_t& status) {
   }
 }
 
-void add_virtual_imu(const Heard& heard, const status_t& status, std::vector<std::string>& lines) {
+void add_virtual_imu(const Heard& heard, std::vector<std::string>& lines) {
   if (!heard.virtual_imu) return;
   const virtual_imu_t& imu = *heard.virtual_imu;
+  const bool is_silent = heard.virtual_imu_age_s > kSilent_s;
   lines.emplace_back();
-  lines.push_back(fmt::format("VIRTUAL     of {}  {}", fmt::join(imu.imus, ", "), state_of(imu, status)));
-  if (is_silent(imu, status)) return;
+  lines.push_back(
+      fmt::format("VIRTUAL     of {}  {}", fmt::join(imu.imus, ", "),
+                  is_silent ? "silent: one of its IMUs has no samples or no mounting" : state_of(imu)));
+  if (is_silent) return;
   const auto e = mean_error(imu);
-  lines.push_back(fmt::format("  errs by {} {} {} deg/s  {} {} {} m/s2  instants without it {}",
+  lines.push_back(fmt::format("  error {} {} {} deg/s  {} {} {} m/s2  rows missing {}",
                               brief(e[0] * kDegPerRad), brief(e[1] * kDegPerRad), brief(e[2] * kDegPerRad),
                               brief(e[3]), brief(e[4]), brief(e[5]), imu.missing));
 }
 
 nlohmann::json virtual_imu_json(const virtual_imu_t& imu) {
-  nlohmann::json error = nlohmann::json::array();
-  for (const double value : mean_error(imu)) error.push_back(known(value));
+  const auto e = mean_error(imu);
   return {{"utime", imu.utime},
           {"imus", imu.imus},
           {"validity", imu.validity},
           {"missing", imu.missing},
-          {"mean_error_si", error}};
+          {"e_gyro_radps", {known(e[0]), known(e[1]), known(e[2])}},
+          {"e_accel_mps2", {known(e[3]), known(e[4]), known(e[5])}}};
 }
 
 nlohmann::json odometry_json(const odometry_t& o) {
@@ -388,7 +384,7 @@ std::vector<std::string> lines_of(const Heard& heard) {
     add_devices(status, lines);
     add_studies(heard, status, lines);
     add_odometry(heard, lines);
-    add_virtual_imu(heard, status, lines);
+    add_virtual_imu(heard, lines);
     add_threads(status, lines);
     add_rings(status, lines);
     add_models(heard, lines);

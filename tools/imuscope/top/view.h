@@ -22,6 +22,7 @@ struct Heard {
   std::map<std::string, noise_model_t> models;        ///< by S-IMU
   std::optional<odometry_t> odometry;
   std::optional<virtual_imu_t> virtual_imu;
+  double virtual_imu_age_s = 0.0;  ///< since it was heard
   std::string note;  ///< of the program itself: an event sent, a text being typed
 };
 
