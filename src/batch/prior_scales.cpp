@@ -16,6 +16,8 @@ constexpr double kClassWeight = 3.0;
 /// three, at most one in 150 is then taken for one chip, whatever their noise: the likelihood ratio has mean one where
 /// its denominator is true (Markov's inequality).
 constexpr double kLogOddsMin = 5.0;
+/// The first fall may be of an estimate that has not settled.
+constexpr int kFallsMost = 2;
 
 /// Parameters that are of one kind, and so of one size.
 struct Kind {
@@ -76,7 +78,9 @@ void PriorScales::choose_places(const ParameterVector& x, const Covariance& per_
   const double chip = log_evidence(information, score, sensor_.one_chip_place_sd_m);
   const double chips = log_evidence(information, score, sensor_.place_sd_m);
   log_odds_ = chip - chips;
-  one_chip_ = log_odds_ > kLogOddsMin;
+  const bool is_likelier = log_odds_ > kLogOddsMin;
+  if (one_chip_ && !is_likelier) ++falls_;
+  one_chip_ = is_likelier && falls_ < kFallsMost;
   sd_.segment<6>(kPlaces).setConstant(one_chip_ ? sensor_.one_chip_place_sd_m : sensor_.place_sd_m);
 }
 

@@ -24,7 +24,8 @@ class PriorScales {
   /// @param covariance  of it, with precision() in it
   void learn_sizes(const ParameterVector& x, const Covariance& covariance);
 
-  /// B-17.
+  /// B-17. Each belief moves the estimate, and with it the odds: where one chip does not hold under its own belief,
+  /// twice, it is three, which reach to one.
   /// @param x          the estimate
   /// @param per_slope  inverse of the information that the drive really gives and precision(): without what the
   ///                   reference's noise only seems to tell
@@ -44,6 +45,7 @@ class PriorScales {
   ParameterVector sd_;
   bool one_chip_ = false;
   double log_odds_ = 0.0;  ///< of one chip against three, by the drive alone
+  int falls_ = 0;          ///< how often one chip was believed and then not
 };
 
 }  // namespace imuscope::batch

@@ -90,6 +90,7 @@ TEST(EstimateMounting, IsUnbiasedWhereTheReferenceIsAsNoisyAsTheSensor) {
     const auto pair = make_pair(truth, 100 + static_cast<std::uint64_t>(seed));
     const auto found = estimate_mounting(pair.reference, pair.study);
     ASSERT_TRUE(found) << found.error().text();
+    EXPECT_TRUE(found->settled) << seed;
     sum += error_of(*found, truth);
     variance += found->covariance.diagonal().head<6>();
     total += nees(*found, truth);

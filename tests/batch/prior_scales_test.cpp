@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <random>
 
 namespace imuscope::batch {
@@ -93,6 +94,25 @@ TEST(PriorScales, ThreePlacesHaveNoDoubtAsTheyReachToOne) {
   ASSERT_TRUE(settle(drive, truth, Vector9::Zero(), scales, x));
   EXPECT_FALSE(scales.one_chip());
   EXPECT_EQ(scales.doubt(x, drive.per_slope(scales)), Covariance::Zero());
+}
+
+TEST(PriorScales, OddsThatTurnWithEachBeliefEndAtThreePlaces) {
+  std::mt19937_64 random(4);
+  const Drive drive(1.0, random);
+  PriorScales scales{SensorClass{}};
+  ParameterVector like_one = ParameterVector::Zero();
+  ParameterVector like_three = ParameterVector::Zero();
+  like_three.segment<6>(kPlaces).setConstant(0.02);
+  const auto choose = [&](const ParameterVector& x) {
+    scales.choose_places(x, drive.per_slope(scales));
+    return scales.one_chip();
+  };
+  EXPECT_TRUE(choose(like_one));
+  EXPECT_FALSE(choose(like_three));
+  EXPECT_TRUE(choose(like_one)) << "the first may be of an estimate that has not settled";
+  EXPECT_FALSE(choose(like_three));
+  EXPECT_FALSE(choose(like_one));
+  EXPECT_EQ(scales.precision()[kPlaces], std::pow(SensorClass{}.place_sd_m, -2));
 }
 
 // Three places of drives that tell them badly now and then look like one: the sd must still hold over all sensors.
