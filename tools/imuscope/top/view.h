@@ -23,7 +23,7 @@ struct Heard {
   std::optional<odometry_t> odometry;
   std::optional<virtual_imu_t> virtual_imu;
   double virtual_imu_age_s = 0.0;  ///< since it was heard
-  std::string note;  ///< of the program itself: an event sent, a text being typed
+  std::string note;                ///< of the program itself: an event sent, a text being typed
 };
 
 /// A service that publishes once a second and is not heard for this long is told to be silent.
