@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "base/units.h"
+#include "certificate/averaged_interval.h"
 #include "noise/inference.h"
 
 namespace imuscope::certificate {
@@ -164,11 +165,12 @@ std::vector<TermValue> terms_of(const FitResult& fit, std::span<const noise::All
   return terms;
 }
 
-/// The interval reaches over the rival's, where both give a value.
-void reach_over(TermValue& term, const TermValue& rival) {
-  if (term.knowledge != Knowledge::kFitted || rival.knowledge != Knowledge::kFitted) return;
-  if (term.ci_low && rival.ci_low) term.ci_low = std::min(*term.ci_low, *rival.ci_low);
-  if (term.ci_high && rival.ci_high) term.ci_high = std::max(*term.ci_high, *rival.ci_high);
+bool has_interval(const TermValue& term) {
+  return term.knowledge == Knowledge::kFitted && term.ci_low && term.ci_high;
+}
+
+ModelsValue as_told_by(const FitResult& fit, const TermValue& term) {
+  return {fit.criterion, term.value, *term.ci_low, *term.ci_high};
 }
 
 }  // namespace
@@ -190,9 +192,21 @@ const char* name_of(Term term, bool gyro) noexcept {
 std::vector<TermValue> data_sheet_terms(const FitResult& fit, std::span<const FitResult> rivals,
                                         std::span<const noise::AllanPoint> allan, noise::SignalUnit unit) {
   std::vector<TermValue> terms = terms_of(fit, allan, unit);
+  std::vector<std::vector<ModelsValue>> told(terms.size());
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    if (has_interval(terms[i])) told[i].push_back(as_told_by(fit, terms[i]));
+  }
   for (const FitResult& rival : rivals) {
     const std::vector<TermValue> others = terms_of(rival, allan, unit);
-    for (std::size_t i = 0; i < terms.size(); ++i) reach_over(terms[i], others[i]);
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      if (!told[i].empty() && has_interval(others[i])) told[i].push_back(as_told_by(rival, others[i]));
+    }
+  }
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    if (told[i].empty()) continue;
+    const Interval interval = averaged_interval(told[i], fit.confidence);
+    terms[i].ci_low = interval.low;
+    terms[i].ci_high = interval.high;
   }
   for (TermValue& term : terms) {
     if (term.term != Term::kBiasInstability && term.knowledge == Knowledge::kBound)
