@@ -222,12 +222,12 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   const auto kept = take_apart(record, *x, mask, options.confidence, out);
   if (!kept) return tl::unexpected(kept.error());
 
-  *x = {};  // what follows needs memory of its own
+  *x = std::vector<double>();  // assigning {} would keep its memory, which what follows needs
   x = samples_of(record);
   if (!x) return tl::unexpected(named(record, x.error()));
   noise::remove_lines(*x, mask, out.lines, record.rate_hz);
   out.allan = noise::allan_deviation(std::move(*x), kept->wv, record.rate_hz);
-  *x = {};
+  *x = std::vector<double>();
 
   auto grown = model_of(kept->wv, record, !out.resonances.empty(), options, covariances);
   if (!grown) return tl::unexpected(named(record, grown.error()));

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "base/units.h"
-#include "certificate/averaged_interval.h"
+#include "certificate/models_interval.h"
 #include "noise/inference.h"
 
 namespace imuscope::certificate {
@@ -170,7 +170,9 @@ bool has_interval(const TermValue& term) {
 }
 
 ModelsValue as_told_by(const FitResult& fit, const TermValue& term) {
-  return {fit.criterion, term.value, *term.ci_low, *term.ci_high};
+  const auto parameters = static_cast<double>(fit.spec.parameter_count());
+  const double price = std::log(static_cast<double>(fit.wv.size()));  // of a parameter, in the criterion
+  return {fit.criterion + (1.0 - price) * parameters, term.value, *term.ci_low, *term.ci_high};
 }
 
 }  // namespace
@@ -204,7 +206,7 @@ std::vector<TermValue> data_sheet_terms(const FitResult& fit, std::span<const Fi
   }
   for (std::size_t i = 0; i < terms.size(); ++i) {
     if (told[i].empty()) continue;
-    const Interval interval = averaged_interval(told[i], fit.confidence);
+    const Interval interval = models_interval(told[i], fit.confidence);
     terms[i].ci_low = interval.low;
     terms[i].ci_high = interval.high;
   }
