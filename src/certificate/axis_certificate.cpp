@@ -249,10 +249,10 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   of_excerpt.confidence = options.confidence;
   out.tails = noise::test_tails(kept->tails, of_excerpt, out.fit.model);
   if (const auto spikes = noise::spike_warning(out.tails, record.rate_hz)) out.warnings.push_back(*spikes);
-  if (!record.temperature_c.empty()) {
+  if (record.temperature_c != nullptr) {
     x = samples_of(record);
     if (!x) return tl::unexpected(named(record, x.error()));
-    out.temperature = temperature_of(*x, mask, record.temperature_c, out.fit);
+    out.temperature = temperature_of(*x, mask, *record.temperature_c, out.fit);
   }
   add_limits(out);
   return out;

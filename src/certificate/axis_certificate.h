@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -33,7 +34,7 @@ struct AxisRecord {
   double rate_hz = 0.0;
   std::vector<double> values;
   std::vector<std::uint8_t> mask;      ///< empty: all are there; NaN and infinity count as missing
-  std::vector<float> temperature_c{};  ///< one a sample, degrees Celsius; empty where not recorded
+  std::shared_ptr<const std::vector<float>> temperature_c{};  ///< one a sample, deg C; null where not recorded
   FetchSamples
       fetch{};  ///< in the place of `values`, of a record that is too long to lie in memory as a whole
 };

@@ -103,11 +103,13 @@ TEST(AxisCertificate, ALineAndAResonanceAreNamed) {
 
 TEST(AxisCertificate, ABiasThatGoesWithTheTemperatureIsToldWithItsSd) {
   AxisRecord record = made_gyro(1U << 16U, 6);
+  std::vector<float> temperature_c;
   for (std::size_t i = 0; i < record.values.size(); ++i) {
     const double t = 30.0 + 5.0 * std::sin(2.0 * std::numbers::pi * static_cast<double>(i) / 40'000.0);
-    record.temperature_c.push_back(static_cast<float>(t));
+    temperature_c.push_back(static_cast<float>(t));
     record.values[i] += 0.01 * (t - 30.0);
   }
+  record.temperature_c = std::make_shared<const std::vector<float>>(std::move(temperature_c));
   const auto axis = characterize_axis(record, {});
   ASSERT_TRUE(axis) << axis.error().text();
   ASSERT_TRUE(axis->temperature);
@@ -117,10 +119,12 @@ TEST(AxisCertificate, ABiasThatGoesWithTheTemperatureIsToldWithItsSd) {
 
 TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
   AxisRecord record = made_gyro(40'000, 8, 0.2, 2e-4);
+  std::vector<float> temperature_c;
   for (std::size_t i = 0; i < record.values.size(); ++i) {
     record.values[i] += 0.05 * std::sin(2.0 * std::numbers::pi * 3.0 * static_cast<double>(i) / 100.0);
-    record.temperature_c.push_back(30.0F + static_cast<float>(i) * 1e-4F);
+    temperature_c.push_back(30.0F + static_cast<float>(i) * 1e-4F);
   }
+  record.temperature_c = std::make_shared<const std::vector<float>>(std::move(temperature_c));
   AxisRecord fetched = record;
   fetched.values.clear();
   fetched.fetch = [values = record.values]() -> Result<std::vector<double>> { return values; };

@@ -42,13 +42,14 @@ SensorRecord record_of(const std::filesystem::path& file, const std::string& dev
   for (std::size_t i = 0; i < read.axes.size(); ++i) {
     Signal& signal = read.axes[i];
     // A triad that the device does not send is none of the record's.
-    if (std::ranges::none_of(signal.mask, [](std::uint8_t there) { return there != 0; })) continue;
+    if (!read.is_sent[i]) continue;
     certificate::AxisRecord axis;
     axis.name = kMessageAxes[i];
     axis.unit = axis.name.starts_with("gyro") ? noise::SignalUnit::kRadps : noise::SignalUnit::kMps2;
     axis.rate_hz = *signal.rate_hz;
     axis.values = std::move(signal.values);
     axis.mask = std::move(signal.mask);
+    axis.fetch = std::move(read.fetches[i]);
     axis.temperature_c = read.temperature_c;
     sensor.axes.push_back(std::move(axis));
   }
@@ -79,7 +80,7 @@ Result<std::vector<SensorRecord>> read_capture_axes(const std::filesystem::path&
     const std::string& name = devices[i].name;
     if (!is_imu(devices[i]) || !opened->recording.present[i]) continue;
     if (!choice.imu.empty() && name != choice.imu) continue;
-    AxesSink sink;
+    AxesSink sink(AxesSink::Keeps::kLongOnesOnDisk);
     if (auto decoded = decode(*opened, i, sink); !decoded) return tl::unexpected(decoded.error());
     if (sink.empty()) continue;
     auto read = std::move(sink).axes(choice.signal.rate_hz);

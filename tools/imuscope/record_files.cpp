@@ -8,6 +8,7 @@
 #include <cmath>
 #include <execution>
 #include <iterator>
+#include <memory>
 #include <string_view>
 
 #include "axis_columns.h"
@@ -141,7 +142,7 @@ Result<noise::SignalUnit> given_unit(const AxisColumn& column, const RecordChoic
 struct ReadAxes {
   std::vector<Signal> signals;
   std::vector<certificate::FetchSamples> fetches{};  ///< of raw files that stay where they are; else empty
-  std::vector<float> temperature_c;                  ///< empty: none
+  std::shared_ptr<const std::vector<float>> temperature_c{};  ///< null: none
 };
 
 /// Columns of one table.
@@ -154,7 +155,8 @@ Result<ReadAxes> read_table(const std::vector<AxisSource>& sources, const std::s
   if (!table) return tl::unexpected(table.error());
   ReadAxes out;
   if (!temperature.empty())
-    out.temperature_c.assign(table->columns.back().begin(), table->columns.back().end());
+    out.temperature_c =
+        std::make_shared<const std::vector<float>>(table->columns.back().begin(), table->columns.back().end());
   for (std::size_t i = 0; i < sources.size(); ++i)
     out.signals.push_back({std::move(table->columns[i]), table->mask, table->rate_hz});
   return out;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <utility>
 
 #include "time_column.h"
 
@@ -14,51 +16,188 @@ namespace {
 /// Holes longer than this, alone or together, are not filled sample by sample.
 constexpr std::int64_t kHolesMost = 10'000'000;
 constexpr std::size_t kTriad = 3;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// Samples that are missing before a row.
+struct Hole {
+  std::size_t before_row = 0;
+  std::size_t samples = 0;
+};
+
+/// Rows of the record, and where samples are missing between them.
+struct RowPlaces {
+  double rate_hz = 0.0;
+  std::size_t rows = 0;
+  std::vector<Hole> holes;
+  std::size_t samples = 0;  ///< with those that are missing
+};
+
+/// @param first_row  of which the first of `rows` is row 0
+Result<void> add_holes(RowPlaces& places, std::size_t first_row, std::span<const std::int64_t> missing_before) {
+  for (std::size_t i = 0; i < missing_before.size(); ++i) {
+    if (missing_before[i] == 0) continue;
+    places.holes.push_back({first_row + i, static_cast<std::size_t>(missing_before[i])});
+    places.samples += places.holes.back().samples;
+    if (places.samples <= places.rows + static_cast<std::size_t>(kHolesMost)) continue;
+    return work_error(fmt::format("the times leave out more than {} samples", kHolesMost),
+                      "cut the file where the long gaps are");
+  }
+  return {};
+}
+
+/// A column with NaN where samples are missing; `read` gives rows [first, first + size) of it.
+template <typename Value, typename Read>
+Result<std::vector<Value>> filled(const RowPlaces& places, Read&& read) {
+  std::vector<Value> out;
+  out.reserve(places.samples + 1);  // who fetches adds one
+  std::size_t row = 0;
+  const auto up_to = [&](std::size_t end) -> Result<void> {
+    const std::size_t at = out.size();
+    out.resize(at + (end - row));
+    auto done = read(row, std::span<Value>(out).subspan(at));
+    row = end;
+    return done;
+  };
+  for (const Hole& hole : places.holes) {
+    if (auto done = up_to(hole.before_row); !done) return tl::unexpected(done.error());
+    out.insert(out.end(), hole.samples, std::numeric_limits<Value>::quiet_NaN());
+  }
+  if (auto done = up_to(places.rows); !done) return tl::unexpected(done.error());
+  return out;
+}
+
+/// Rows of a spool as floats, piece by piece.
+Result<void> read_floats(const Spool& spool, std::size_t first, std::span<float> values) {
+  constexpr std::size_t kPiece = std::size_t{1} << 16U;
+  std::vector<double> piece(std::min(values.size(), kPiece));
+  for (std::size_t at = 0; at < values.size(); at += kPiece) {
+    const auto part = std::span(piece).first(std::min(kPiece, values.size() - at));
+    if (auto done = spool.read(first + at, part); !done) return done;
+    std::ranges::transform(part, values.begin() + static_cast<std::ptrdiff_t>(at),
+                           [](double v) { return static_cast<float>(v); });
+  }
+  return {};
+}
+
+/// Where samples are missing, window by window: each tells its own rate, so that a clock's drift over a day is
+/// no loss. A window's second half only shows how late the rows of its first one are.
+Result<RowPlaces> row_places_of(const Spool& stamps, std::size_t window, std::optional<double> rate_hz) {
+  RowPlaces places;
+  places.rows = places.samples = stamps.size();
+  std::vector<double> stamps_s(std::min(places.rows, window));
+  for (std::size_t first = 0;;) {
+    const auto part = std::span(stamps_s).first(std::min(window, places.rows - first));
+    if (auto done = stamps.read(first, part); !done) return tl::unexpected(done.error());
+    const auto rows = rows_of_stamps(part, {}, rate_hz, first);
+    if (!rows) return tl::unexpected<Error>(rows.error());
+    if (first == 0) places.rate_hz = rows->rate_hz;
+    const bool is_last = first + part.size() == places.rows;
+    // The first row's holes are the window's before it to tell: it is in both.
+    const std::size_t told = is_last ? part.size() : window / 2 + 1;
+    if (auto done = add_holes(places, first, std::span(rows->missing_before).first(told)); !done)
+      return tl::unexpected(done.error());
+    if (is_last) return places;
+    first += window / 2;
+  }
+}
 
 }  // namespace
 
 void AxesSink::on_sample(const Sample& sample) noexcept {
-  if (sample.kind != SampleKind::kImu) return;
+  if (sample.kind != SampleKind::kImu || failure_) return;
   if (!first_) first_ = sample.time;
-  stamps_s_.push_back(to_seconds(sample.time - *first_));
+  const bool has_gyros = (sample.imu.flags & kGyroValid) != 0;
+  const bool has_accelerometers = (sample.imu.flags & kAccelValid) != 0;
   for (std::size_t axis = 0; axis < kTriad; ++axis) {
-    values_[axis].push_back(sample.imu.omega_radps[axis]);
-    values_[kTriad + axis].push_back(sample.imu.f_mps2[axis]);
+    columns_[axis].push_back(has_gyros ? sample.imu.omega_radps[axis] : kNan);
+    columns_[kTriad + axis].push_back(has_accelerometers ? sample.imu.f_mps2[axis] : kNan);
+    is_sent_[axis] = is_sent_[axis] || has_gyros;
+    is_sent_[kTriad + axis] = is_sent_[kTriad + axis] || has_accelerometers;
   }
-  flags_.push_back(sample.imu.flags);
+  columns_[kStamps].push_back(to_seconds(sample.time - *first_));
   const bool has_temperature = (sample.imu.flags & kHasTemperature) != 0;
-  const float before =
-      temperature_c_.empty() ? std::numeric_limits<float>::quiet_NaN() : temperature_c_.back();
-  temperature_c_.push_back(has_temperature ? sample.imu.temperature_degC : before);
+  auto& temperature = columns_[kTemperature];
+  temperature.push_back(has_temperature       ? static_cast<double>(sample.imu.temperature_degC)
+                        : temperature.empty() ? kNan
+                                              : temperature.back());
+  ++rows_;
+  if (keeps_ == Keeps::kAllInMemory || columns_.front().size() <= rows_together_) return;
+  if (auto spilled = spill(); !spilled) failure_ = spilled.error();
+}
+
+Result<void> AxesSink::spill() {
+  while (spools_.size() < kColumns) {
+    auto spool = Spool::create();
+    if (!spool) return tl::unexpected<Error>(spool.error());
+    spools_.push_back(std::move(*spool));
+  }
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    // All but the last row, by which the next temperature is known.
+    if (auto done = spools_[i].append(std::span(columns_[i]).first(columns_[i].size() - 1)); !done) return done;
+    columns_[i] = {columns_[i].back()};
+  }
+  return {};
 }
 
 Result<SampleAxes> AxesSink::axes(std::optional<double> rate_hz) && {
-  const auto rows = rows_of_stamps(stamps_s_, {}, rate_hz);
+  if (failure_) return tl::unexpected<Error>(*failure_);
+  auto axes = spools_.empty() ? axes_in_memory(rate_hz) : axes_on_disk(rate_hz);
+  if (axes) axes->is_sent = is_sent_;
+  return axes;
+}
+
+Result<SampleAxes> AxesSink::axes_in_memory(std::optional<double> rate_hz) {
+  const auto rows = rows_of_stamps(columns_[kStamps], {}, rate_hz);
   if (!rows) return tl::unexpected<Error>(rows.error());
-  std::int64_t holes = 0;
-  for (const std::int64_t n : rows->missing_before) holes = std::min(holes + n, kHolesMost + 1);
-  if (holes > kHolesMost) {
-    return work_error(fmt::format("the times leave out more than {} samples", kHolesMost),
-                      "cut the file where the long gaps are");
-  }
+  RowPlaces places{rows->rate_hz, rows_, {}, rows_};
+  if (auto done = add_holes(places, 0, rows->missing_before); !done) return tl::unexpected(done.error());
+  const auto column = [&]<typename Value>(std::size_t i, Value) {
+    return *filled<Value>(places, [&](std::size_t first, std::span<Value> values) -> Result<void> {
+      std::ranges::transform(std::span(columns_[i]).subspan(first, values.size()), values.begin(),
+                             [](double v) { return static_cast<Value>(v); });
+      return {};
+    });
+  };
   SampleAxes out;
-  const bool has_temperature = !temperature_c_.empty() && std::isfinite(temperature_c_.back());
+  if (std::isfinite(columns_[kTemperature].back()))
+    out.temperature_c = std::make_shared<const std::vector<float>>(column(kTemperature, float{}));
   for (std::size_t axis = 0; axis < out.axes.size(); ++axis) {
     Signal& signal = out.axes[axis];
-    signal.rate_hz = rows->rate_hz;
-    const std::uint32_t needed = axis < kTriad ? kGyroValid : kAccelValid;
-    for (std::size_t i = 0; i < stamps_s_.size(); ++i) {
-      const auto hole = static_cast<std::size_t>(rows->missing_before[i]);
-      signal.values.insert(signal.values.end(), hole, 0.0);
-      signal.mask.insert(signal.mask.end(), hole, 0);
-      const bool is_there = (flags_[i] & needed) != 0;
-      signal.values.push_back(is_there ? values_[axis][i] : 0.0);
-      signal.mask.push_back(is_there ? 1 : 0);
-      if (axis > 0 || !has_temperature) continue;
-      out.temperature_c.insert(out.temperature_c.end(), hole, std::numeric_limits<float>::quiet_NaN());
-      out.temperature_c.push_back(temperature_c_[i]);
+    signal.rate_hz = places.rate_hz;
+    signal.values = column(axis, double{});
+    columns_[axis] = std::vector<double>();
+    for (double& value : signal.values) {
+      signal.mask.push_back(std::isnan(value) ? 0 : 1);
+      if (std::isnan(value)) value = 0.0;
     }
-    values_[axis] = {};
+  }
+  return out;
+}
+
+Result<SampleAxes> AxesSink::axes_on_disk(std::optional<double> rate_hz) {
+  const bool has_temperature = std::isfinite(columns_[kTemperature].back());
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    if (auto done = spools_[i].append(columns_[i]); !done) return tl::unexpected(done.error());
+    columns_[i] = std::vector<double>();
+  }
+  auto found = row_places_of(spools_[kStamps], 2 * rows_together_, rate_hz);
+  if (!found) return tl::unexpected<Error>(found.error());
+  const auto places = std::make_shared<const RowPlaces>(std::move(*found));
+  SampleAxes out;
+  if (has_temperature) {
+    auto temperature = filled<float>(*places, [&](std::size_t first, std::span<float> values) {
+      return read_floats(spools_[kTemperature], first, values);
+    });
+    if (!temperature) return tl::unexpected<Error>(temperature.error());
+    out.temperature_c = std::make_shared<const std::vector<float>>(std::move(*temperature));
+  }
+  for (std::size_t axis = 0; axis < out.axes.size(); ++axis) {
+    out.axes[axis].rate_hz = places->rate_hz;
+    out.fetches[axis] = [places, spool = std::make_shared<const Spool>(std::move(spools_[axis]))] {
+      return filled<double>(*places, [&](std::size_t first, std::span<double> values) {
+        return spool->read(first, values);
+      });
+    };
   }
   return out;
 }

@@ -181,7 +181,7 @@ bool is_week_seconds_name(std::string_view name) {
 }
 
 Result<StampedRows> rows_of_stamps(std::span<const double> stamps_s, std::span<const std::int64_t> counts,
-                                   std::optional<double> rate_hz) {
+                                   std::optional<double> rate_hz, std::size_t first_row) {
   constexpr std::size_t kFewest = 3;
   if (stamps_s.size() < kFewest) {
     return work_error(fmt::format("{} time stamps tell no rate", stamps_s.size()),
@@ -190,7 +190,7 @@ Result<StampedRows> rows_of_stamps(std::span<const double> stamps_s, std::span<c
   for (std::size_t i = 1; i < stamps_s.size(); ++i) {
     if (stamps_s[i] >= stamps_s[i - 1]) continue;
     return work_error(fmt::format("the time goes back, from {:.6f} to {:.6f}, at row {}", stamps_s[i - 1],
-                                  stamps_s[i], i + 1),
+                                  stamps_s[i], first_row + i + 1),
                       "sort the rows, or leave the times out (--time none)");
   }
   const auto steps = steps_of(stamps_s, counts);

@@ -32,9 +32,10 @@ struct StampedRows {
 /// Stamps may be late by as much as a burst of rows is long (arrival times): what counts is by how much all
 /// the next rows are late. `counts` are the rows' sample numbers where a counter tells them, else empty; then
 /// nothing is missing beside what the counter says.
-/// Errors (kWork): fewer than three rows, a stamp that goes back (with its row, counted from 0), no rate to
+/// `first_row` is the number of the first one in what is read, for messages.
+/// Errors (kWork): fewer than three rows, a stamp that goes back (with its row, counted from 1), no rate to
 /// be had. kUsage: `rate_hz`, where given, contradicts the stamps, with the one that fits.
 Result<StampedRows> rows_of_stamps(std::span<const double> stamps_s, std::span<const std::int64_t> counts,
-                                   std::optional<double> rate_hz);
+                                   std::optional<double> rate_hz, std::size_t first_row = 0);
 
 }  // namespace imuscope::cli
