@@ -33,8 +33,9 @@ struct AxisRecord {
   noise::SignalUnit unit = noise::SignalUnit::kNone;
   double rate_hz = 0.0;
   std::vector<double> values;
-  std::vector<std::uint8_t> mask;      ///< empty: all are there; NaN and infinity count as missing
-  std::shared_ptr<const std::vector<float>> temperature_c{};  ///< one a sample, deg C; null where not recorded
+  std::vector<std::uint8_t> mask;  ///< empty: all are there; NaN and infinity count as missing
+  std::shared_ptr<const std::vector<float>>
+      temperature_c{};  ///< one a sample, deg C; null where not recorded
   FetchSamples
       fetch{};  ///< in the place of `values`, of a record that is too long to lie in memory as a whole
 };

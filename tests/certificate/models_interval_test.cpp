@@ -20,7 +20,8 @@ TEST(ModelsInterval, OfOneModelIsItsOwn) {
 }
 
 TEST(ModelsInterval, ReachesOverAModelThatFitsAsWell) {
-  const std::vector<ModelsValue> models{{3.0, 10.0, 8.0, 15.0}, {3.0, 14.0, 13.0, 17.0}, {1.0, 6.0, 5.0, 7.0}};
+  const std::vector<ModelsValue> models{
+      {3.0, 10.0, 8.0, 15.0}, {3.0, 14.0, 13.0, 17.0}, {1.0, 6.0, 5.0, 7.0}};
   const Interval interval = models_interval(models, kConfidence);
   EXPECT_DOUBLE_EQ(interval.low, 5.0);
   EXPECT_DOUBLE_EQ(interval.high, 17.0);

@@ -38,7 +38,8 @@ std::vector<Sample> made_samples(std::size_t n, std::mt19937_64& random) {
   return samples;
 }
 
-Result<SampleAxes> axes_of(const std::vector<Sample>& samples, AxesSink sink, std::optional<double> rate_hz = {}) {
+Result<SampleAxes> axes_of(const std::vector<Sample>& samples, AxesSink sink,
+                           std::optional<double> rate_hz = {}) {
   for (const Sample& sample : samples) sink.on_sample(sample);
   return std::move(sink).axes(rate_hz);
 }

@@ -155,8 +155,8 @@ Result<ReadAxes> read_table(const std::vector<AxisSource>& sources, const std::s
   if (!table) return tl::unexpected(table.error());
   ReadAxes out;
   if (!temperature.empty())
-    out.temperature_c =
-        std::make_shared<const std::vector<float>>(table->columns.back().begin(), table->columns.back().end());
+    out.temperature_c = std::make_shared<const std::vector<float>>(table->columns.back().begin(),
+                                                                   table->columns.back().end());
   for (std::size_t i = 0; i < sources.size(); ++i)
     out.signals.push_back({std::move(table->columns[i]), table->mask, table->rate_hz});
   return out;

@@ -33,7 +33,8 @@ struct RowPlaces {
 };
 
 /// @param first_row  of which the first of `rows` is row 0
-Result<void> add_holes(RowPlaces& places, std::size_t first_row, std::span<const std::int64_t> missing_before) {
+Result<void> add_holes(RowPlaces& places, std::size_t first_row,
+                       std::span<const std::int64_t> missing_before) {
   for (std::size_t i = 0; i < missing_before.size(); ++i) {
     if (missing_before[i] == 0) continue;
     places.holes.push_back({first_row + i, static_cast<std::size_t>(missing_before[i])});
@@ -133,7 +134,8 @@ Result<void> AxesSink::spill() {
   }
   for (std::size_t i = 0; i < kColumns; ++i) {
     // All but the last row, by which the next temperature is known.
-    if (auto done = spools_[i].append(std::span(columns_[i]).first(columns_[i].size() - 1)); !done) return done;
+    if (auto done = spools_[i].append(std::span(columns_[i]).first(columns_[i].size() - 1)); !done)
+      return done;
     columns_[i] = {columns_[i].back()};
   }
   return {};
@@ -194,9 +196,8 @@ Result<SampleAxes> AxesSink::axes_on_disk(std::optional<double> rate_hz) {
   for (std::size_t axis = 0; axis < out.axes.size(); ++axis) {
     out.axes[axis].rate_hz = places->rate_hz;
     out.fetches[axis] = [places, spool = std::make_shared<const Spool>(std::move(spools_[axis]))] {
-      return filled<double>(*places, [&](std::size_t first, std::span<double> values) {
-        return spool->read(first, values);
-      });
+      return filled<double>(
+          *places, [&](std::size_t first, std::span<double> values) { return spool->read(first, values); });
     };
   }
   return out;
