@@ -34,10 +34,10 @@ struct AxisRecord {
   double rate_hz = 0.0;
   std::vector<double> values;
   std::vector<std::uint8_t> mask;  ///< empty: all are there; NaN and infinity count as missing
-  std::shared_ptr<const std::vector<float>>
-      temperature_c{};  ///< one a sample, deg C; null where not recorded
-  FetchSamples
-      fetch{};  ///< in the place of `values`, of a record that is too long to lie in memory as a whole
+  /// One a sample, degrees Celsius, shared by the axes of a sensor; null where not recorded.
+  std::shared_ptr<const std::vector<float>> temperature_c{};
+  /// In the place of `values`, of a record that is too long to lie in memory as a whole.
+  FetchSamples fetch{};
 };
 
 /// Do the two halves of the record come from one model?

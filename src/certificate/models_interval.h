@@ -8,8 +8,8 @@ namespace imuscope::certificate {
 
 /// What one model says.
 struct ModelsValue {
-  /// -2 log likelihood and the number of parameters, by which that of a right model is smaller than it would be
-  /// with the true ones: models of any size can be compared.
+  /// -2 log likelihood plus the number of parameters: fitting them lowers it by their number in the mean, so
+  /// that models of any size can be compared.
   double misfit = 0.0;
   double value = 0.0;
   double ci_low = 0.0;  ///< of the same confidence as is asked for
@@ -21,9 +21,8 @@ struct Interval {
   double high = 0.0;
 };
 
-/// Ends of the likelihood's profile over the numbers and the models (T-4): the first model's interval whole, of
-/// each other one what its larger misfit leaves of it, and so never less than the first one's and never more
-/// than what all of them reach over.
+/// The profile likelihood over the models (T-4): all of the chosen model's interval, and of every other model's
+/// what its larger misfit leaves of it.
 /// @param models  not empty, finite; the first is the chosen one
 Interval models_interval(std::span<const ModelsValue> models, double confidence);
 

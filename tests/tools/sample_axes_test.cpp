@@ -103,6 +103,17 @@ TEST(AxesSink, ATimeThatGoesBackIsToldWithItsRowWhereverItIs) {
   EXPECT_NE(on_disk.error().text().find("at row 7001"), std::string::npos) << on_disk.error().text();
 }
 
+TEST(AxesSink, AChangeOfTheRateIsToldAsOne) {
+  std::mt19937_64 random(3);
+  auto samples = made_samples(9000, random);
+  for (std::size_t i = 5000; i < samples.size(); ++i)
+    samples[i].time = samples[5000].time + 2 * (samples[i].time - samples[5000].time);
+  const auto on_disk = axes_on_disk(samples);
+  ASSERT_FALSE(on_disk);
+  EXPECT_NE(on_disk.error().text().find("the rate changes from 199.9"), std::string::npos)
+      << on_disk.error().text();
+}
+
 TEST(AxesSink, ADiskThatTakesNothingIsAnErrorWithARemedy) {
   std::mt19937_64 random(3);
   const auto samples = made_samples(3000, random);

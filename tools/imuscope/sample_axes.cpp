@@ -80,6 +80,9 @@ Result<void> read_floats(const Spool& spool, std::size_t first, std::span<float>
   return {};
 }
 
+/// A sensor's clock drifts by far less in a day; what differs by more was set to another rate.
+constexpr double kDriftMost = 0.01;
+
 /// Where samples are missing, window by window: each tells its own rate, so that a clock's drift over a day is
 /// no loss. A window's second half only shows how late the rows of its first one are.
 Result<RowPlaces> row_places_of(const Spool& stamps, std::size_t window, std::optional<double> rate_hz) {
@@ -92,8 +95,14 @@ Result<RowPlaces> row_places_of(const Spool& stamps, std::size_t window, std::op
     const auto rows = rows_of_stamps(part, {}, rate_hz, first);
     if (!rows) return tl::unexpected<Error>(rows.error());
     if (first == 0) places.rate_hz = rows->rate_hz;
+    if (std::abs(rows->rate_hz / places.rate_hz - 1.0) > kDriftMost) {
+      return work_error(fmt::format("the rate changes from {:g} to {:g} Hz, by row {}", places.rate_hz,
+                                    rows->rate_hz, first + part.size()),
+                        "cut the record where the sensor was set to another rate");
+    }
     const bool is_last = first + part.size() == places.rows;
-    // The first row's holes are the window's before it to tell: it is in both.
+    // The next window begins with the last row that is told here: what is missing before its first row, it
+    // cannot know.
     const std::size_t told = is_last ? part.size() : window / 2 + 1;
     if (auto done = add_holes(places, first, std::span(rows->missing_before).first(told)); !done)
       return tl::unexpected(done.error());

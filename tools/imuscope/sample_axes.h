@@ -26,8 +26,8 @@ struct SampleAxes {
   /// In the place of values and mask, of samples that lie on the disk; missing ones are NaN.
   std::array<certificate::FetchSamples, kMessageAxes.size()> fetches;
   std::array<bool, kMessageAxes.size()> is_sent{};  ///< at least one sample has it
-  std::shared_ptr<const std::vector<float>>
-      temperature_c{};  ///< one a sample, the last that was sent; null: none
+  /// One a sample, the last that was sent; null: none.
+  std::shared_ptr<const std::vector<float>> temperature_c{};
 };
 
 /// Takes an IMU's samples, in order, and keeps what the axes need of them.
