@@ -104,11 +104,12 @@ function(imuscope_embed variable room)
     list(APPEND files ${file})
   endforeach()
   set(output ${CMAKE_CURRENT_BINARY_DIR}/${room}_assets.cpp)
+  file(RELATIVE_PATH header ${CMAKE_SOURCE_DIR}/src ${CMAKE_CURRENT_SOURCE_DIR}/assets.h)
   set(script ${CMAKE_SOURCE_DIR}/cmake/embed_assets.cmake)
   string(REPLACE ";" "|" assets "${assets}")
   add_custom_command(
     OUTPUT ${output}
-    COMMAND ${CMAKE_COMMAND} -D "ASSETS=${assets}" -D ROOM=${room} -D OUTPUT=${output} -P ${script}
+    COMMAND ${CMAKE_COMMAND} -D "ASSETS=${assets}" -D ROOM=${room} -D HEADER=${header} -D OUTPUT=${output} -P ${script}
     DEPENDS ${files} ${script}
     COMMENT "Embedding files of src/${room}"
     VERBATIM)

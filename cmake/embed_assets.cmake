@@ -1,5 +1,6 @@
-# Writes the files named in ASSETS ("name=path|name=path...") as string constants of C++ to OUTPUT, of the room ROOM.
-set(text "#include \"${ROOM}/assets.h\"\n\nnamespace imuscope::${ROOM} {\n")
+# Writes the files named in ASSETS ("name=path|name=path...") as string constants of C++ to OUTPUT, of the
+# room ROOM, whose header is HEADER.
+set(text "#include \"${HEADER}\"\n\nnamespace imuscope::${ROOM} {\n")
 string(REPLACE "|" ";" assets "${ASSETS}")
 foreach(asset ${assets})
   string(REGEX MATCH "^([^=]*)=(.*)$" matched "${asset}")

@@ -6,7 +6,7 @@
 #include "base/bytes.h"
 #include "base/units.h"
 #include "drivers/device/feed.h"
-#include "mcap/records.h"
+#include "logs/mcap/records.h"
 
 namespace imuscope::ros_message {
 namespace {

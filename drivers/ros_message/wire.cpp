@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "base/bytes.h"
-#include "mcap/records.h"
+#include "logs/mcap/records.h"
 
 namespace imuscope::ros_message {
 

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <limits>
 
-#include "alignment/cross_correlation.h"
 #include "base/units.h"
 #include "check/bins.h"
 #include "check/checks.h"
 #include "check/signed_axes.h"
+#include "estimation/alignment/cross_correlation.h"
 
 namespace imuscope::check {
 
@@ -28,7 +28,7 @@ constexpr double kCorrelationMin = 0.9;
 /// No two sensors give the same six numbers but where all are quantised beyond their noise.
 constexpr double kCopyShare = 0.9;
 constexpr std::size_t kCopySamples = 2000;
-/// What the live estimator searches for by itself (alignment/cross_correlation.h, LiveTimeOffset) is 2 s.
+/// What the live estimator searches for by itself (estimation/alignment/cross_correlation.h, LiveTimeOffset) is 2 s.
 constexpr double kSharedOffsetMax_s = 1.5;
 /// Quartz is good to 100 ppm over temperature; three times that is no quartz, or another unit of time.
 constexpr double kClockRateMax = 300e-6;

@@ -11,7 +11,7 @@ namespace imuscope::check {
 
 namespace {
 
-/// A step of more periods than this is a gap, as for the reference window (alignment/reference_window.h).
+/// A step of more periods than this is a gap, as for the reference window (estimation/alignment/reference_window.h).
 constexpr double kGapPeriods = 1.5;
 /// Oscillators of MEMS sensors keep their rate to a few per cent; a density goes with its root, so that a
 /// tenth is 5 % of it, which short records do not know better.

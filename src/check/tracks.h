@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "configuration/config.h"
-#include "navigation/wgs84.h"
+#include "estimation/navigation/wgs84.h"
 #include "sample/sample.h"
 
 namespace imuscope::check {

@@ -14,7 +14,7 @@
 #include "base/result.h"
 #include "configuration/config_vehicle.h"
 #include "configuration/protocols.h"
-#include "regimes/motion_regimes.h"
+#include "estimation/regimes/motion_regimes.h"
 #include "sample/sample.h"
 
 namespace imuscope {

@@ -5,9 +5,9 @@
 #include <charconv>
 
 #include "base/units.h"
-#include "calibration/estimator_config.h"
 #include "configuration/toml_reader.h"
 #include "drivers/dbc/parser.h"
+#include "estimation/calibration/estimator_config.h"
 
 namespace imuscope {
 

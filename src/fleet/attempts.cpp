@@ -14,8 +14,8 @@
 #include <sstream>
 
 #include "base/json_text.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {

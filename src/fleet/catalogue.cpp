@@ -25,9 +25,9 @@
 #include "fleet/population.h"
 #include "fleet/study_task.h"
 #include "fleet/unit_task.h"
-#include "noise/holm.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
+#include "models/noise/holm.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {

@@ -15,8 +15,8 @@
 #include "fleet/catalogue.h"
 #include "fleet/database.h"
 #include "fleet/page_pictures.h"
-#include "page/html.h"
-#include "report/people.h"
+#include "results/page/html.h"
+#include "results/report/people.h"
 
 namespace imuscope::fleet {
 namespace {

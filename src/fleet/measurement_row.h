@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tables/json_fields.h"
+#include "results/tables/json_fields.h"
 
 namespace imuscope::fleet {
 

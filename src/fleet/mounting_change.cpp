@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/units.h"
-#include "tables/json_fields.h"
+#include "results/tables/json_fields.h"
 
 namespace imuscope::fleet {
 namespace {

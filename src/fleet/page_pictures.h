@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "page/html.h"
+#include "results/page/html.h"
 
 namespace imuscope::fleet {
 

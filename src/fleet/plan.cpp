@@ -16,8 +16,8 @@
 #include "base/text.h"
 #include "capture/capture_files.h"
 #include "fleet/content_hash.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "noise/holm.h"
+#include "models/noise/holm.h"
 
 namespace imuscope::fleet {
 namespace {

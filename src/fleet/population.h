@@ -1,7 +1,7 @@
 #pragma once
 
 /// What all units and drives of a fleet tell together: one random-effects model a quantity
-/// (noise/nested_effects.h), units and drives that stand out, units that drift, units that do not hold what
+/// (models/noise/nested_effects.h), units and drives that stand out, units that drift, units that do not hold what
 /// their certificate or their data sheet says.
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "noise/nested_effects.h"
+#include "models/noise/nested_effects.h"
 
 namespace imuscope::fleet {
 

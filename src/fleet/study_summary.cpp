@@ -10,11 +10,11 @@
 
 #include "base/calibration_levels.h"
 #include "base/units.h"
-#include "noise/json.h"
-#include "noise/quantities.h"
-#include "tables/csv_reader.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
+#include "models/noise/json.h"
+#include "models/noise/quantities.h"
+#include "results/tables/csv_reader.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {

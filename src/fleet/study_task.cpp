@@ -16,8 +16,8 @@
 #include "fleet/child.h"
 #include "fleet/content_hash.h"
 #include "fleet/study_summary.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {

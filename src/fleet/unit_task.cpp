@@ -12,10 +12,10 @@
 #include "base/output_folder.h"
 #include "fleet/measurement_row.h"
 #include "fleet/study_task.h"
-#include "noise/random_effects.h"
+#include "models/noise/random_effects.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 #include "study/combination.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
 
 namespace imuscope::fleet {
 namespace {

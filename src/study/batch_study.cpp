@@ -8,8 +8,8 @@
 
 #include "base/calibration_levels.h"
 #include "base/units.h"
-#include "navigation/so3.h"
-#include "service/observability.h"
+#include "estimation/navigation/so3.h"
+#include "service/pipeline/observability.h"
 
 namespace imuscope {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// The batch estimate of every S-IMU of a recording (src/batch), and what of it a study publishes. Soft
+/// The batch estimate of every S-IMU of a recording (src/estimation/batch), and what of it a study publishes. Soft
 /// world: allocates, uses a thread an S-IMU; the result does not depend on how many there are.
 
 #include <nlohmann/json.hpp>
@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "base/result.h"
-#include "batch/batch_mounting.h"
-#include "calibration/combine.h"
-#include "calibration/estimator.h"
 #include "configuration/config.h"
+#include "estimation/batch/batch_mounting.h"
+#include "estimation/calibration/combine.h"
+#include "estimation/calibration/estimator.h"
 #include "sample/sample.h"
 #include "study/smoothing.h"
 

@@ -8,9 +8,9 @@
 
 #include "base/calibration_levels.h"
 #include "base/units.h"
-#include "calibration/filter_core.h"
-#include "navigation/so3.h"
-#include "tables/json_file.h"
+#include "estimation/calibration/filter_core.h"
+#include "estimation/navigation/so3.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "calibration/combine.h"
+#include "estimation/calibration/combine.h"
 
 namespace imuscope {
 

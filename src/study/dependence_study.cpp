@@ -7,10 +7,10 @@
 #include <optional>
 
 #include "base/units.h"
-#include "noise/dependence.h"
-#include "noise/holm.h"
-#include "noise/wavelet_variance.h"
-#include "regimes/motion_regimes.h"
+#include "estimation/regimes/motion_regimes.h"
+#include "models/noise/dependence.h"
+#include "models/noise/holm.h"
+#include "models/noise/wavelet_variance.h"
 
 namespace imuscope {
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "configuration/config.h"
-#include "regimes/motion_levels.h"
-#include "regimes/regime_track.h"
-#include "service/noise_series.h"
+#include "estimation/regimes/motion_levels.h"
+#include "estimation/regimes/regime_track.h"
+#include "service/pipeline/noise_series.h"
 #include "study/noise_study.h"
 #include "study/temperature_track.h"
 

@@ -8,12 +8,12 @@
 #include <iterator>
 
 #include "base/text.h"
-#include "dynamics/covariates.h"
-#include "dynamics/json.h"
-#include "regimes/motion_regimes.h"
-#include "service/noise_series.h"
-#include "service/run_folder.h"
-#include "tables/columns.h"
+#include "estimation/regimes/motion_regimes.h"
+#include "models/dynamics/covariates.h"
+#include "models/dynamics/json.h"
+#include "results/tables/columns.h"
+#include "service/pipeline/noise_series.h"
+#include "service/run/run_folder.h"
 
 namespace imuscope {
 namespace {

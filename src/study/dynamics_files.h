@@ -10,8 +10,8 @@
 #include "base/output_folder.h"
 #include "base/result.h"
 #include "configuration/config.h"
-#include "noise/model.h"
-#include "regimes/regime_track.h"
+#include "estimation/regimes/regime_track.h"
+#include "models/noise/model.h"
 #include "study/row_spool.h"
 
 namespace imuscope {

@@ -1,6 +1,6 @@
 #include "study/error_pass.h"
 
-#include "error_process/row_low_pass.h"
+#include "estimation/error_process/row_low_pass.h"
 
 namespace imuscope {
 

@@ -8,9 +8,9 @@
 
 #include "base/output_folder.h"
 #include "base/result.h"
-#include "calibration/estimator.h"
 #include "configuration/config.h"
-#include "service/core.h"
+#include "estimation/calibration/estimator.h"
+#include "service/pipeline/core.h"
 #include "study/regime_study.h"
 #include "study/row_spool.h"
 #include "study/smoothing.h"

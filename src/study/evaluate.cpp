@@ -4,13 +4,13 @@
 #include <fstream>
 
 #include "base/units.h"
-#include "service/estimator_setup.h"
-#include "service/recording.h"
-#include "service/run_folder.h"
+#include "results/tables/json_file.h"
+#include "service/pipeline/estimator_setup.h"
+#include "service/recording/recording.h"
+#include "service/run/run_folder.h"
 #include "study/evaluation_drive.h"
 #include "study/evaluation_models.h"
 #include "study/recording_of_run.h"
-#include "tables/json_file.h"
 
 namespace imuscope {
 namespace {

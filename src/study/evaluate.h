@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "evaluation/outages.h"
+#include "study/evaluation/outages.h"
 
 namespace imuscope {
 

@@ -5,10 +5,10 @@
 #include <optional>
 
 #include "base/units.h"
-#include "calibration/gnss_trust.h"
-#include "navigation/so3.h"
-#include "service/estimator_setup.h"
-#include "tables/csv_reader.h"
+#include "estimation/calibration/gnss_trust.h"
+#include "estimation/navigation/so3.h"
+#include "results/tables/csv_reader.h"
+#include "service/pipeline/estimator_setup.h"
 
 namespace imuscope {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/result.h"
-#include "evaluation/outages.h"
-#include "service/recording.h"
+#include "service/recording/recording.h"
+#include "study/evaluation/outages.h"
 
 namespace imuscope {
 

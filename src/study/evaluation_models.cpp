@@ -6,10 +6,10 @@
 #include <limits>
 #include <map>
 
-#include "noise/filter_form.h"
-#include "noise/holm.h"
-#include "service/models_file.h"
-#include "service/noise_series.h"
+#include "models/noise/filter_form.h"
+#include "models/noise/holm.h"
+#include "service/pipeline/noise_series.h"
+#include "service/run/models_file.h"
 
 namespace imuscope {
 namespace {

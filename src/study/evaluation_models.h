@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "configuration/config.h"
-#include "evaluation/coasting_model.h"
+#include "study/evaluation/coasting_model.h"
 #include "study/evaluation_drive.h"
 
 namespace imuscope {

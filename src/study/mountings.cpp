@@ -5,7 +5,7 @@
 
 #include "base/text.h"
 #include "base/units.h"
-#include "tables/json_fields.h"
+#include "results/tables/json_fields.h"
 
 namespace imuscope {
 

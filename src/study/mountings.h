@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "bag/bag_writer.h"
-#include "bag/mounting_text.h"
+#include "logs/bag/bag_writer.h"
+#include "logs/bag/mounting_text.h"
 
 namespace imuscope {
 

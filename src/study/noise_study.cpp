@@ -8,14 +8,14 @@
 #include <iterator>
 #include <mutex>
 
-#include "noise/compare.h"
-#include "noise/holm.h"
-#include "noise/json.h"
-#include "noise/lines.h"
-#include "noise/replicates.h"
-#include "noise/tails.h"
-#include "noise/wavelet_variance.h"
-#include "service/models_file.h"
+#include "models/noise/compare.h"
+#include "models/noise/holm.h"
+#include "models/noise/json.h"
+#include "models/noise/lines.h"
+#include "models/noise/replicates.h"
+#include "models/noise/tails.h"
+#include "models/noise/wavelet_variance.h"
+#include "service/run/models_file.h"
 
 namespace imuscope {
 

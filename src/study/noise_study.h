@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "configuration/config.h"
-#include "noise/fit.h"
-#include "noise/lines.h"
-#include "service/noise_series.h"
+#include "models/noise/fit.h"
+#include "models/noise/lines.h"
+#include "service/pipeline/noise_series.h"
 
 namespace imuscope {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "service/recording.h"
+#include "service/recording/recording.h"
 
 namespace imuscope {
 

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "service/noise_series.h"
-#include "service/vehicle_speed.h"
+#include "service/pipeline/noise_series.h"
+#include "service/pipeline/vehicle_speed.h"
 
 namespace imuscope {
 

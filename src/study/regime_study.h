@@ -8,9 +8,9 @@
 
 #include "base/result.h"
 #include "configuration/config.h"
-#include "regimes/labels.h"
-#include "regimes/motion_levels.h"
-#include "service/core.h"
+#include "estimation/regimes/labels.h"
+#include "estimation/regimes/motion_levels.h"
+#include "service/pipeline/core.h"
 
 namespace imuscope {
 

@@ -11,7 +11,7 @@
 
 #include "base/output_folder.h"
 #include "base/result.h"
-#include "dynamics/study.h"
+#include "models/dynamics/study.h"
 
 namespace imuscope {
 

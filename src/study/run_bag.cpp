@@ -14,21 +14,21 @@
 #include <mutex>
 #include <thread>
 
-#include "bag/bag_writer.h"
-#include "bag/message_json.h"
 #include "base/line_reader.h"
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "base/units.h"
-#include "noise/export.h"
-#include "service/bag_noise.h"
-#include "service/device_factory.h"
-#include "service/models_file.h"
-#include "service/noise_series.h"
+#include "logs/bag/bag_writer.h"
+#include "logs/bag/message_json.h"
+#include "models/noise/export.h"
+#include "results/tables/csv_reader.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
+#include "service/pipeline/device_factory.h"
+#include "service/pipeline/noise_series.h"
+#include "service/run/bag_noise.h"
+#include "service/run/models_file.h"
 #include "study/mountings.h"
-#include "tables/csv_reader.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
 
 namespace imuscope {
 namespace {

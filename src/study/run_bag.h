@@ -1,6 +1,6 @@
 #pragma once
 
-/// A run folder and the recording that it was made of, as one MCAP file (bag/bag_writer.h). Non-real-time.
+/// A run folder and the recording that it was made of, as one MCAP file (logs/bag/bag_writer.h). Non-real-time.
 
 #include <cstdint>
 #include <filesystem>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "mcap/compression.h"
+#include "logs/mcap/compression.h"
 #include "study/recording_of_run.h"
 
 namespace imuscope {

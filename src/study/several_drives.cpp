@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <map>
 
-#include "calibration/events.h"
-#include "service/estimator_setup.h"
+#include "estimation/calibration/events.h"
+#include "service/pipeline/estimator_setup.h"
 #include "study/batch_study.h"
 #include "study/side_by_side.h"
 

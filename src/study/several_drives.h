@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "service/recording.h"
+#include "service/recording/recording.h"
 #include "study/combination.h"
 #include "study/study.h"
 

@@ -2,7 +2,7 @@
 
 /// What a study may do at once.
 
-#include "service/byte_source.h"
+#include "service/recording/byte_source.h"
 
 namespace imuscope {
 

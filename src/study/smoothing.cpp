@@ -8,11 +8,11 @@
 #include "base/contracts.h"
 #include "base/text.h"
 #include "base/units.h"
-#include "calibration/combine.h"
-#include "calibration/filter_core.h"
-#include "calibration/navigation_output.h"
-#include "navigation/so3.h"
-#include "service/live_smoothing.h"
+#include "estimation/calibration/combine.h"
+#include "estimation/calibration/filter_core.h"
+#include "estimation/calibration/navigation_output.h"
+#include "estimation/navigation/so3.h"
+#include "service/run/live_smoothing.h"
 #include "study/side_by_side.h"
 
 namespace imuscope {

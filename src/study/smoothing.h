@@ -10,10 +10,10 @@
 
 #include "base/output_folder.h"
 #include "base/result.h"
-#include "calibration/smoother.h"
-#include "error_process/error_row.h"
-#include "service/replay.h"
-#include "service/run_folder.h"
+#include "estimation/calibration/smoother.h"
+#include "estimation/error_process/error_row.h"
+#include "service/recording/replay.h"
+#include "service/run/run_folder.h"
 
 namespace imuscope {
 

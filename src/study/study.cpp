@@ -7,11 +7,11 @@
 
 #include <algorithm>
 
-#include "service/estimator_setup.h"
-#include "service/models_file.h"
-#include "service/noise_series.h"
-#include "service/run_folder.h"
-#include "service/run_record.h"
+#include "service/pipeline/estimator_setup.h"
+#include "service/pipeline/noise_series.h"
+#include "service/run/models_file.h"
+#include "service/run/run_folder.h"
+#include "service/run/run_record.h"
 #include "study/batch_study.h"
 #include "study/dependence_study.h"
 #include "study/dynamics_files.h"

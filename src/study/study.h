@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "base/result.h"
-#include "calibration/combine.h"
-#include "regimes/labels.h"
-#include "service/replay.h"
+#include "estimation/calibration/combine.h"
+#include "estimation/regimes/labels.h"
+#include "service/recording/replay.h"
 
 namespace imuscope {
 

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "page/template.h"
+#include "results/page/template.h"
 
 namespace imuscope::view {
 

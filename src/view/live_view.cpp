@@ -30,7 +30,7 @@ using std::chrono::milliseconds;
 constexpr auto kPartEvery = milliseconds(100);
 /// A part without news tells that this program lives, and how long the service has been silent.
 constexpr auto kSignOfLifeEvery = milliseconds(1000);
-/// As many marks as the service takes (service/event_gate.h): two a second, twenty at once.
+/// As many marks as the service takes (service/live/event_gate.h): two a second, twenty at once.
 constexpr double kMarksPerSecond = 2.0;
 constexpr double kMarksAtOnce = 20.0;
 

@@ -1,7 +1,7 @@
 #include "view/page.h"
 
-#include "page/assets.h"
-#include "page/template.h"
+#include "results/page/assets.h"
+#include "results/page/template.h"
 #include "view/assets.h"
 
 namespace imuscope::view {

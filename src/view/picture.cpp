@@ -11,8 +11,8 @@
 #include "base/json_text.h"
 #include "base/units.h"
 #include "base/wgs84_ellipsoid.h"
-#include "page/mounting_drawing.h"
 #include "publish/message_codec.h"
+#include "results/page/mounting_drawing.h"
 #include "view/message_json.h"
 
 namespace imuscope::view {

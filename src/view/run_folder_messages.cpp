@@ -21,9 +21,9 @@
 #include "base/units.h"
 #include "publish/message_codec.h"
 #include "publish/message_values.h"
-#include "tables/csv_reader.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
+#include "results/tables/csv_reader.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::view {
 

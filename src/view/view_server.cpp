@@ -13,10 +13,10 @@
 #include <utility>
 
 #include "base/text.h"
+#include "service/web/http_listener.h"
+#include "service/web/request_rules.h"
 #include "view/content_policy.h"
 #include "view/page_command.h"
-#include "web/http_listener.h"
-#include "web/request_rules.h"
 
 namespace imuscope::view {
 

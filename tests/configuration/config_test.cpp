@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "base/units.h"
-#include "service/estimator_setup.h"
+#include "service/pipeline/estimator_setup.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {

@@ -5,8 +5,8 @@
 
 #include "base/units.h"
 #include "configuration/config.h"
-#include "service/device_factory.h"
-#include "service/estimator_setup.h"
+#include "service/pipeline/device_factory.h"
+#include "service/pipeline/estimator_setup.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "noise/random_effects.h"
+#include "models/noise/random_effects.h"
 
 namespace imuscope::test {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "regimes/labels.h"
+#include "estimation/regimes/labels.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -2,8 +2,8 @@
 
 /// A file from anywhere as one of many topics: all its messages, and what every role takes out of it.
 
-#include "service/message_log.h"
-#include "service/message_source.h"
+#include "service/recording/message_log.h"
+#include "service/recording/message_source.h"
 #include "tests/fuzz/file_in_memory.h"
 
 namespace imuscope::fuzz {

@@ -1,6 +1,6 @@
 /// One message of ROS, in CDR and in JSON, as every type.
 
-#include "mcap/ros_messages.h"
+#include "logs/mcap/ros_messages.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace {

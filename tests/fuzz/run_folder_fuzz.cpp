@@ -4,7 +4,7 @@
 #include <array>
 #include <string_view>
 
-#include "report/report.h"
+#include "results/report/report.h"
 #include "tests/fuzz/folder_in_memory.h"
 
 namespace imuscope::fuzz {

@@ -9,7 +9,7 @@
 #include "tests/fuzz/choices.h"
 #include "tests/fuzz/command_line.h"
 #include "tests/fuzz/folder_in_memory.h"
-#include "tests/report/synthetic_run.h"
+#include "tests/results/report/synthetic_run.h"
 
 namespace imuscope::fuzz {
 namespace {

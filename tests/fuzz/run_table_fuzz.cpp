@@ -1,7 +1,7 @@
 /// A table of a run folder that anybody wrote.
 
 #include "base/text.h"
-#include "tables/table_reader.h"
+#include "results/tables/table_reader.h"
 #include "tests/fuzz/file_in_memory.h"
 
 namespace imuscope::fuzz {

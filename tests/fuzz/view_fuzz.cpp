@@ -17,12 +17,12 @@
 #include <utility>
 
 #include "base/text.h"
+#include "service/web/request_rules.h"
 #include "tests/fuzz/folder_in_memory.h"
 #include "view/page_command.h"
 #include "view/picture.h"
 #include "view/player.h"
 #include "view/recorded_messages.h"
-#include "web/request_rules.h"
 
 namespace imuscope::fuzz {
 namespace {

@@ -14,8 +14,8 @@
 #include "check/config_lines.h"
 #include "planted_mistakes.h"
 #include "programs.h"
-#include "service/device_factory.h"
-#include "service/recording.h"
+#include "service/pipeline/device_factory.h"
+#include "service/recording/recording.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::test {

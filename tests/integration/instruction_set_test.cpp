@@ -7,10 +7,10 @@
 #include <iostream>
 #include <vector>
 
-#include "calibration/covariance_loops.h"
-#include "service/estimator_setup.h"
-#include "service/recording.h"
-#include "service/replay.h"
+#include "estimation/calibration/covariance_loops.h"
+#include "service/pipeline/estimator_setup.h"
+#include "service/recording/recording.h"
+#include "service/recording/replay.h"
 #include "tests/support/output_difference.h"
 #include "tests/support/shared_data.h"
 

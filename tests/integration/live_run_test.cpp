@@ -20,8 +20,8 @@
 #include <regex>
 #include <sstream>
 
-#include "mcap/reader.h"
-#include "mcap/ros_messages.h"
+#include "logs/mcap/reader.h"
+#include "logs/mcap/ros_messages.h"
 #include "mounting_compare.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"

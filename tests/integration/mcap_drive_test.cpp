@@ -6,8 +6,8 @@
 #include <cstring>
 #include <fstream>
 
-#include "mcap/reader.h"
-#include "mcap/ros_messages.h"
+#include "logs/mcap/reader.h"
+#include "logs/mcap/ros_messages.h"
 #include "mounting_compare.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"

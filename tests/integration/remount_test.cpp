@@ -9,9 +9,9 @@
 #include <sstream>
 
 #include "base/units.h"
-#include "navigation/so3.h"
+#include "estimation/navigation/so3.h"
 #include "programs.h"
-#include "tests/calibration/simulated_drive.h"
+#include "tests/estimation/calibration/simulated_drive.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::test {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "calibration/estimator.h"
+#include "estimation/calibration/estimator.h"
 
 namespace imuscope::test {
 

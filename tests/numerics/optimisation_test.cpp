@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "estimator_run.h"
-#include "service/estimator_setup.h"
-#include "service/recording.h"
-#include "service/replay.h"
+#include "service/pipeline/estimator_setup.h"
+#include "service/recording/recording.h"
+#include "service/recording/replay.h"
 #include "tests/support/output_difference.h"
 #include "tests/support/shared_data.h"
 

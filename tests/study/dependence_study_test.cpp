@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "noise/model.h"
+#include "models/noise/model.h"
 
 namespace imuscope {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "noise/model.h"
+#include "models/noise/model.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {

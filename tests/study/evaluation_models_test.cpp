@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/units.h"
-#include "service/models_file.h"
+#include "service/run/models_file.h"
 
 namespace imuscope {
 namespace {

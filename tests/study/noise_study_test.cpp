@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "noise/model.h"
+#include "models/noise/model.h"
 
 namespace imuscope {
 namespace {

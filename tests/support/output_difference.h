@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/estimator.h"
+#include "estimation/calibration/estimator.h"
 
 namespace imuscope::test {
 

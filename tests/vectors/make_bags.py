@@ -2,7 +2,7 @@
 """Writes bag_none.bag, bag_lz4.bag and bag_bz2.bag with Debian's python3-rosbag, which is not ours.
 
 Usage: make_bags.py FOLDER
-Half a second of an IMU at 100 Hz, of a receiver at 10 Hz, of wheels at 50 Hz and of UTC at 1 Hz, numbers that tests/rosbag
+Half a second of an IMU at 100 Hz, of a receiver at 10 Hz, of wheels at 50 Hz and of UTC at 1 Hz, numbers that tests/logs/rosbag
 computes again. tools/mcap_proof/write_bags.py makes bags of a whole drive in the same way.
 """
 import argparse

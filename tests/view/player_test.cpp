@@ -12,7 +12,7 @@
 #include "example_messages.h"
 #include "publish/lcm_publisher.h"
 #include "publish/message_codec.h"
-#include "tests/report/synthetic_run.h"
+#include "tests/results/report/synthetic_run.h"
 #include "tests/support/shared_data.h"
 #include "view/recorded_messages.h"
 

@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "bag/bag_writer.h"
-#include "bag/message_json.h"
 #include "base/output_folder.h"
-#include "mcap/reader.h"
-#include "mcap/ros_messages.h"
+#include "logs/bag/bag_writer.h"
+#include "logs/bag/message_json.h"
+#include "logs/mcap/reader.h"
+#include "logs/mcap/ros_messages.h"
 #include "tools/benchmarks/bench_report.h"
 
 namespace {

@@ -12,11 +12,11 @@
 #include <vector>
 
 #include "configuration/config.h"
-#include "noise/model.h"
+#include "models/noise/model.h"
 #include "publish/lcm_publisher.h"
-#include "service/broadcast.h"
-#include "service/live_models.h"
-#include "service/run_folder.h"
+#include "service/pipeline/live_models.h"
+#include "service/run/broadcast.h"
+#include "service/run/run_folder.h"
 #include "tools/benchmarks/bench_report.h"
 #include "tools/benchmarks/own_folder.h"
 

@@ -1,7 +1,7 @@
 /// The commands of the package imuscope: all there are.
 
 #include "commands.h"
-#include "report/report.h"
+#include "results/report/report.h"
 
 namespace imuscope::cli {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "noise/quantities.h"
+#include "models/noise/quantities.h"
 
 namespace imuscope::cli {
 

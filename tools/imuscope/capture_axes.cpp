@@ -7,8 +7,8 @@
 #include <string>
 
 #include "sample_axes.h"
-#include "service/device_factory.h"
-#include "service/recording.h"
+#include "service/pipeline/device_factory.h"
+#include "service/recording/recording.h"
 
 namespace imuscope::cli {
 namespace {

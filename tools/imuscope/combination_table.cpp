@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/units.h"
-#include "calibration/filter_core.h"
-#include "navigation/so3.h"
+#include "estimation/calibration/filter_core.h"
+#include "estimation/navigation/so3.h"
 #include "print.h"
 
 namespace imuscope::cli {

@@ -8,7 +8,7 @@
 #include "commands.h"
 #include "print.h"
 #include "progress.h"
-#include "service/capture_damage.h"
+#include "service/recording/capture_damage.h"
 
 namespace imuscope::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include "base/json_text.h"
 #include "commands.h"
 #include "fit_file.h"
-#include "noise/compare.h"
+#include "models/noise/compare.h"
 #include "print.h"
 
 namespace imuscope::cli {

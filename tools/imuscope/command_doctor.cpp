@@ -6,8 +6,8 @@
 
 #include "base/json_text.h"
 #include "commands.h"
-#include "doctor/examination.h"
 #include "print.h"
+#include "service/doctor/examination.h"
 
 namespace imuscope::cli {
 

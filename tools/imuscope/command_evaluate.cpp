@@ -7,7 +7,7 @@
 #include "commands.h"
 #include "print.h"
 #include "progress.h"
-#include "report/report.h"
+#include "results/report/report.h"
 #include "study/evaluate.h"
 
 namespace imuscope::cli {

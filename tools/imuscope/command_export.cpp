@@ -10,7 +10,7 @@
 #include "export_hdf5.h"
 #include "export_run.h"
 #include "fit_file.h"
-#include "noise/export.h"
+#include "models/noise/export.h"
 #include "print.h"
 
 namespace imuscope::cli {

@@ -9,9 +9,9 @@
 #include "commands.h"
 #include "fit_output.h"
 #include "log_plot.h"
-#include "noise/conservative.h"
-#include "noise/json.h"
-#include "noise/nested_fit.h"
+#include "models/noise/conservative.h"
+#include "models/noise/json.h"
+#include "models/noise/nested_fit.h"
 #include "print.h"
 #include "signal_options.h"
 

@@ -7,7 +7,7 @@
 #include "findings.h"
 #include "print.h"
 #include "progress.h"
-#include "service/import.h"
+#include "service/intake/import.h"
 
 namespace imuscope::cli {
 namespace {

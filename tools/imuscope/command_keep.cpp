@@ -5,7 +5,7 @@
 #include "base/text.h"
 #include "commands.h"
 #include "print.h"
-#include "service/retention.h"
+#include "service/live/retention.h"
 
 namespace imuscope::cli {
 

@@ -10,8 +10,8 @@
 #include "drivers/transport/can_interface.h"
 #include "drivers/transport/port_problems.h"
 #include "print.h"
-#include "service/draft.h"
-#include "service/probe.h"
+#include "service/intake/draft.h"
+#include "service/intake/probe.h"
 
 namespace imuscope::cli {
 namespace {

@@ -12,11 +12,11 @@
 #include "inputs.h"
 #include "print.h"
 #include "progress.h"
-#include "report/report.h"
+#include "results/report/report.h"
+#include "results/tables/json_file.h"
 #include "study/several_drives.h"
 #include "study/study.h"
 #include "study_table.h"
-#include "tables/json_file.h"
 
 namespace imuscope::cli {
 

@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "inputs.h"
 #include "progress.h"
-#include "service/replay_run.h"
+#include "service/recording/replay_run.h"
 #include "study_table.h"
 
 namespace imuscope::cli {

@@ -6,12 +6,12 @@
 #include "base/output_folder.h"
 #include "commands.h"
 #include "findings.h"
-#include "page/printed_page.h"
 #include "print.h"
 #include "progress.h"
-#include "report/comparison_page.h"
-#include "report/paper_figures.h"
-#include "report/report.h"
+#include "results/page/printed_page.h"
+#include "results/report/comparison_page.h"
+#include "results/report/paper_figures.h"
+#include "results/report/report.h"
 
 namespace imuscope::cli {
 

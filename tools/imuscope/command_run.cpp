@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "findings.h"
 #include "print.h"
-#include "service/live.h"
+#include "service/live/live.h"
 
 namespace imuscope::cli {
 

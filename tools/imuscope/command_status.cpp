@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "commands.h"
-#include "doors/status_socket.h"
 #include "print.h"
+#include "service/doors/status_socket.h"
 #include "tools/imuscope/top/view.h"
 
 namespace imuscope::cli {

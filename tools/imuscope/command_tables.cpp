@@ -11,7 +11,7 @@
 #include "base/units.h"
 #include "commands.h"
 #include "print.h"
-#include "tables/json_file.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include "base/json_text.h"
 #include "commands.h"
 #include "log_plot.h"
-#include "noise/json.h"
+#include "models/noise/json.h"
 #include "print.h"
 #include "signal_options.h"
 

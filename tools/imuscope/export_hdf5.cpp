@@ -5,8 +5,8 @@
 
 #include <array>
 
-#include "hdf5/module.h"
 #include "print.h"
+#include "results/hdf5/module.h"
 
 namespace imuscope::cli {
 namespace {

@@ -5,14 +5,14 @@
 
 #include <algorithm>
 
-#include "bag/mounting_text.h"
 #include "base/text.h"
+#include "logs/bag/mounting_text.h"
 #include "print.h"
 #include "progress.h"
+#include "results/tables/json_fields.h"
+#include "results/tables/json_file.h"
 #include "study/mountings.h"
 #include "study/run_bag.h"
-#include "tables/json_fields.h"
-#include "tables/json_file.h"
 
 namespace imuscope::cli {
 

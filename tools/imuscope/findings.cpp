@@ -8,10 +8,10 @@
 #include "check/config_lines.h"
 #include "print.h"
 #include "progress.h"
-#include "service/recorded_look.h"
-#include "service/run_folder.h"
-#include "service/run_record.h"
-#include "tables/json_file.h"
+#include "results/tables/json_file.h"
+#include "service/recording/recorded_look.h"
+#include "service/run/run_folder.h"
+#include "service/run/run_record.h"
 
 namespace imuscope::cli {
 

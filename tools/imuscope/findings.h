@@ -8,7 +8,7 @@
 
 #include "base/result.h"
 #include "check/finding.h"
-#include "service/recording.h"
+#include "service/recording/recording.h"
 
 namespace imuscope::cli {
 

@@ -5,8 +5,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "noise/json.h"
-#include "tables/json_file.h"
+#include "models/noise/json.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::cli {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/result.h"
-#include "noise/fit.h"
-#include "noise/quantities.h"
+#include "models/noise/fit.h"
+#include "models/noise/quantities.h"
 
 namespace imuscope::cli {
 

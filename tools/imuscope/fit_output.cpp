@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "noise/json.h"
+#include "models/noise/json.h"
 #include "print.h"
 
 namespace imuscope::cli {

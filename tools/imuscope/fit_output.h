@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "noise/fit.h"
-#include "noise/quantities.h"
-#include "noise/replicates.h"
-#include "noise/select.h"
+#include "models/noise/fit.h"
+#include "models/noise/quantities.h"
+#include "models/noise/replicates.h"
+#include "models/noise/select.h"
 
 namespace imuscope::cli {
 

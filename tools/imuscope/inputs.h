@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "service/recording.h"
+#include "service/recording/recording.h"
 
 namespace imuscope::cli {
 

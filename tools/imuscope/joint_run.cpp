@@ -9,8 +9,8 @@
 #include <limits>
 
 #include "base/text.h"
-#include "tables/json_file.h"
-#include "tables/table_reader.h"
+#include "results/tables/json_file.h"
+#include "results/tables/table_reader.h"
 
 namespace imuscope::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "base/text.h"
-#include "doors/journal.h"
+#include "service/doors/journal.h"
 
 namespace imuscope::cli {
 

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "service/device_factory.h"
-#include "service/message_log.h"
-#include "service/message_source.h"
+#include "service/pipeline/device_factory.h"
+#include "service/recording/message_log.h"
+#include "service/recording/message_source.h"
 
 namespace imuscope::cli {
 namespace {

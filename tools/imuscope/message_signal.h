@@ -22,7 +22,7 @@ struct MessageAxes {
 };
 
 /// @param topic  may be empty where there is one IMU only
-/// Errors: those of the file and the topic (service/message_source.h), too few messages, times that go back,
+/// Errors: those of the file and the topic (service/recording/message_source.h), too few messages, times that go back,
 /// a rate that contradicts them.
 Result<MessageAxes> read_message_axes(const std::filesystem::path& file, const std::string& topic,
                                       std::optional<double> rate_hz);

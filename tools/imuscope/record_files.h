@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "certificate/axis_certificate.h"
+#include "models/certificate/axis_certificate.h"
 #include "signal_file.h"
 
 namespace imuscope::cli {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "certificate/axis_certificate.h"
+#include "models/certificate/axis_certificate.h"
 #include "sample/sample.h"
 #include "signal_file.h"
 #include "spool.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "message_signal.h"
-#include "noise/quantities.h"
+#include "models/noise/quantities.h"
 
 namespace imuscope::cli {
 namespace {

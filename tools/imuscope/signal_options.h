@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "base/result.h"
-#include "noise/quantities.h"
-#include "noise/signal.h"
-#include "noise/wavelet_variance.h"
+#include "models/noise/quantities.h"
+#include "models/noise/signal.h"
+#include "models/noise/wavelet_variance.h"
 #include "signal_file.h"
 
 namespace imuscope::cli {

@@ -16,7 +16,7 @@
 #include "base/json_text.h"
 #include "base/units.h"
 #include "print.h"
-#include "tables/json_file.h"
+#include "results/tables/json_file.h"
 
 namespace imuscope::cli {
 

@@ -8,8 +8,8 @@
 #include <fstream>
 #include <vector>
 
-#include "noise/fit.h"
-#include "noise/signal.h"
+#include "models/noise/fit.h"
+#include "models/noise/signal.h"
 
 namespace {
 

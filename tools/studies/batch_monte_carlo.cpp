@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "base/units.h"
-#include "batch/batch_mounting.h"
-#include "calibration/estimator.h"
+#include "estimation/batch/batch_mounting.h"
+#include "estimation/calibration/estimator.h"
 #include "tools/studies/batch_pairs.h"
 #include "tools/studies/study_drive.h"
 

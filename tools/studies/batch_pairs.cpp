@@ -2,8 +2,8 @@
 
 #include <Eigen/Cholesky>
 
-#include "alignment/accelerometer_places.h"
-#include "navigation/so3.h"
+#include "estimation/alignment/accelerometer_places.h"
+#include "estimation/navigation/so3.h"
 
 namespace batch_pairs {
 

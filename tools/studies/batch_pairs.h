@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "batch/batch_mounting.h"
+#include "estimation/batch/batch_mounting.h"
 #include "tools/studies/study_drive.h"
 
 namespace batch_pairs {

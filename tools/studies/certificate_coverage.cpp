@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "base/units.h"
-#include "certificate/axis_certificate.h"
 #include "goal_counts.h"
-#include "noise/felt_noise.h"
-#include "noise/simulated_noise.h"
+#include "models/certificate/axis_certificate.h"
+#include "models/noise/felt_noise.h"
+#include "models/noise/simulated_noise.h"
 
 namespace {
 

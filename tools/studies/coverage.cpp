@@ -20,10 +20,10 @@
 #include <string>
 #include <vector>
 
-#include "noise/fit.h"
-#include "noise/inference.h"
-#include "noise/simulated_noise.h"
-#include "noise/wv_covariance.h"
+#include "models/noise/fit.h"
+#include "models/noise/inference.h"
+#include "models/noise/simulated_noise.h"
+#include "models/noise/wv_covariance.h"
 
 namespace {
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "goal_counts.h"
-#include "noise/cross_variance.h"
-#include "noise/model.h"
-#include "noise/simulated_noise.h"
+#include "models/noise/cross_variance.h"
+#include "models/noise/model.h"
+#include "models/noise/simulated_noise.h"
 
 namespace {
 

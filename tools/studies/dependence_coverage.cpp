@@ -24,7 +24,7 @@
 #include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/motion/motion.h"
 #include "firmware_sim/random/random.h"
-#include "noise/dependence.h"
+#include "models/noise/dependence.h"
 
 namespace {
 

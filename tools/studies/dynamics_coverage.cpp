@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "base/units.h"
-#include "dynamics/covariates.h"
-#include "dynamics/study.h"
 #include "firmware_sim/imu/noise.h"
 #include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/motion/motion.h"
+#include "models/dynamics/covariates.h"
+#include "models/dynamics/study.h"
 
 namespace {
 

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "calibration/covariance_kernel.h"
-#include "calibration/estimator.h"
-#include "calibration/study_model.h"
+#include "estimation/calibration/covariance_kernel.h"
+#include "estimation/calibration/estimator.h"
+#include "estimation/calibration/study_model.h"
 #include "tools/benchmarks/bench_report.h"
 #include "tools/studies/dense_joseph.h"
 #include "tools/studies/study_drive.h"

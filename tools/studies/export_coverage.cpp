@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "noise/export.h"
-#include "noise/felt_noise.h"
-#include "noise/fit.h"
-#include "noise/simulated_noise.h"
-#include "noise/wavelet_variance.h"
+#include "models/noise/export.h"
+#include "models/noise/felt_noise.h"
+#include "models/noise/fit.h"
+#include "models/noise/simulated_noise.h"
+#include "models/noise/wavelet_variance.h"
 
 namespace {
 

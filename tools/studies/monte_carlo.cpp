@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "base/units.h"
-#include "calibration/combine.h"
+#include "estimation/calibration/combine.h"
+#include "estimation/navigation/so3.h"
 #include "firmware_sim/imu/sensor_classes.h"
-#include "navigation/so3.h"
 #include "tools/benchmarks/bench_report.h"
 #include "tools/studies/six_states.h"
 #include "tools/studies/study_drive.h"

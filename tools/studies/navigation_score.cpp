@@ -8,9 +8,9 @@
 #include <sstream>
 
 #include "base/units.h"
-#include "calibration/filter_core.h"
-#include "navigation/so3.h"
-#include "navigation/wgs84.h"
+#include "estimation/calibration/filter_core.h"
+#include "estimation/navigation/so3.h"
+#include "estimation/navigation/wgs84.h"
 
 namespace study_score {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "calibration/estimator.h"
+#include "estimation/calibration/estimator.h"
 #include "tools/studies/study_score.h"
 
 namespace study_score {

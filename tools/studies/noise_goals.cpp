@@ -17,12 +17,12 @@
 #include <vector>
 
 #include "goal_counts.h"
-#include "noise/compare.h"
-#include "noise/inference.h"
-#include "noise/replicates.h"
-#include "noise/select.h"
-#include "noise/simulated_noise.h"
-#include "noise/tails.h"
+#include "models/noise/compare.h"
+#include "models/noise/inference.h"
+#include "models/noise/replicates.h"
+#include "models/noise/select.h"
+#include "models/noise/simulated_noise.h"
+#include "models/noise/tails.h"
 
 namespace {
 

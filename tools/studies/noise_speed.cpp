@@ -18,10 +18,10 @@
 #include <string>
 #include <vector>
 
-#include "noise/fit.h"
-#include "noise/select.h"
-#include "noise/streaming_wv.h"
-#include "noise/wv_covariance.h"
+#include "models/noise/fit.h"
+#include "models/noise/select.h"
+#include "models/noise/streaming_wv.h"
+#include "models/noise/wv_covariance.h"
 #include "tools/benchmarks/bench_report.h"
 
 namespace {

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "base/units.h"
-#include "navigation/so3.h"
+#include "estimation/navigation/so3.h"
 #include "tools/studies/wheeled_drive.h"
 
 namespace {

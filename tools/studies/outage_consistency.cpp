@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/outages.h"
 #include "firmware_sim/imu/imu_model.h"
 #include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/motion/motion.h"
 #include "firmware_sim/random/random.h"
+#include "study/evaluation/outages.h"
 
 namespace {
 

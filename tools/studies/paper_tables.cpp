@@ -16,9 +16,9 @@
 
 #include "firmware_sim/imu/noise.h"
 #include "firmware_sim/imu/sensor_classes.h"
-#include "noise/compare.h"
-#include "noise/fit.h"
-#include "noise/holm.h"
+#include "models/noise/compare.h"
+#include "models/noise/fit.h"
+#include "models/noise/holm.h"
 
 namespace {
 

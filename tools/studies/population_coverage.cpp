@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
-#include "noise/holm.h"
-#include "noise/nested_effects.h"
+#include "models/noise/holm.h"
+#include "models/noise/nested_effects.h"
 
 namespace {
 

@@ -18,13 +18,13 @@
 #include <vector>
 
 #include "base/units.h"
-#include "calibration/combine.h"
-#include "calibration/filter_core.h"
-#include "navigation/so3.h"
+#include "estimation/calibration/combine.h"
+#include "estimation/calibration/filter_core.h"
+#include "estimation/navigation/so3.h"
 #include "real_recordings.h"
-#include "service/estimator_setup.h"
-#include "service/recording.h"
-#include "service/replay.h"
+#include "service/pipeline/estimator_setup.h"
+#include "service/recording/recording.h"
+#include "service/recording/replay.h"
 #include "study/batch_study.h"
 
 namespace {

@@ -3,8 +3,8 @@
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "calibration/study_model.h"
-#include "navigation/so3.h"
+#include "estimation/calibration/study_model.h"
+#include "estimation/navigation/so3.h"
 
 namespace study_drive {
 namespace {

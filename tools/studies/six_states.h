@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "calibration/estimator_config.h"
+#include "estimation/calibration/estimator_config.h"
 #include "firmware_sim/motion/motion.h"
 
 namespace study_drive {

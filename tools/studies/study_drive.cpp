@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <cmath>
 
-#include "navigation/so3.h"
+#include "estimation/navigation/so3.h"
 
 namespace study_drive {
 

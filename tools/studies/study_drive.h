@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "base/units.h"
-#include "calibration/estimator.h"
+#include "estimation/calibration/estimator.h"
 #include "firmware_sim/imu/imperfections.h"
 #include "firmware_sim/imu/imu_model.h"
 #include "firmware_sim/imu/sensor_classes.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "calibration/estimator.h"
+#include "estimation/calibration/estimator.h"
 
 namespace study_score {
 

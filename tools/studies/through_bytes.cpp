@@ -23,12 +23,12 @@
 #include <vector>
 
 #include "base/units.h"
-#include "calibration/filter_core.h"
+#include "estimation/calibration/filter_core.h"
+#include "estimation/navigation/so3.h"
 #include "firmware_sim/imu/sensor_classes.h"
-#include "navigation/so3.h"
-#include "service/estimator_setup.h"
-#include "service/recording.h"
-#include "service/replay.h"
+#include "service/pipeline/estimator_setup.h"
+#include "service/recording/recording.h"
+#include "service/recording/replay.h"
 #include "tools/benchmarks/own_folder.h"
 #include "tools/studies/navigation_score.h"
 #include "tools/studies/study_score.h"

@@ -24,13 +24,13 @@
 #include <vector>
 
 #include "base/units.h"
-#include "calibration/filter_core.h"
+#include "estimation/calibration/filter_core.h"
 #include "firmware_sim/imusim/record.h"
 #include "firmware_sim/imusim/world.h"
 #include "firmware_sim/random/random.h"
-#include "service/estimator_setup.h"
-#include "service/recording.h"
-#include "service/replay.h"
+#include "service/pipeline/estimator_setup.h"
+#include "service/recording/recording.h"
+#include "service/recording/replay.h"
 #include "tools/benchmarks/own_folder.h"
 #include "tools/studies/navigation_score.h"
 #include "tools/studies/study_score.h"

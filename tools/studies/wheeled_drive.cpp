@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "base/units.h"
+#include "estimation/navigation/so3.h"
+#include "estimation/navigation/wgs84.h"
 #include "firmware_sim/imu/sensor_classes.h"
-#include "navigation/so3.h"
-#include "navigation/wgs84.h"
 
 namespace imuscope::study {
 namespace {

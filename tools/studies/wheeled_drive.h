@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "calibration/estimator.h"
+#include "estimation/calibration/estimator.h"
 #include "firmware_sim/imu/imu_model.h"
 #include "firmware_sim/imu/wheel_speed.h"
 #include "firmware_sim/motion/motion.h"

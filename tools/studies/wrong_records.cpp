@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "base/units.h"
-#include "batch/batch_mounting.h"
-#include "navigation/so3.h"
+#include "estimation/batch/batch_mounting.h"
+#include "estimation/navigation/so3.h"
 #include "tools/studies/batch_pairs.h"
 
 namespace {

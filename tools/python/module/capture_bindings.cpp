@@ -4,8 +4,8 @@
 
 #include "capture/capture_reader.h"
 #include "conversions.h"
-#include "service/device_factory.h"
-#include "service/recording.h"
+#include "service/pipeline/device_factory.h"
+#include "service/recording/recording.h"
 #include "stream_protocols.h"
 
 namespace imuscope::python {

@@ -2,12 +2,12 @@
 
 #include "base/json_text.h"
 #include "conversions.h"
-#include "noise/allan.h"
-#include "noise/export.h"
-#include "noise/json.h"
-#include "noise/select.h"
-#include "noise/signal.h"
-#include "noise/simulated_noise.h"
+#include "models/noise/allan.h"
+#include "models/noise/export.h"
+#include "models/noise/json.h"
+#include "models/noise/select.h"
+#include "models/noise/signal.h"
+#include "models/noise/simulated_noise.h"
 
 namespace imuscope::python {
 namespace {

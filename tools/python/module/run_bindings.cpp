@@ -2,8 +2,8 @@
 
 #include "base/json_text.h"
 #include "conversions.h"
-#include "tables/json_file.h"
-#include "tables/table_reader.h"
+#include "results/tables/json_file.h"
+#include "results/tables/table_reader.h"
 
 namespace imuscope::python {
 namespace {

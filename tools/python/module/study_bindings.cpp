@@ -2,8 +2,8 @@
 
 #include "base/text.h"
 #include "conversions.h"
-#include "report/report.h"
-#include "service/recording.h"
+#include "results/report/report.h"
+#include "service/recording/recording.h"
 #include "study/several_drives.h"
 #include "study/study.h"
 

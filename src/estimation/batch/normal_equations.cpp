@@ -1,0 +1,346 @@
+#include "estimation/batch/normal_equations.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimation/alignment/accelerometer_places.h"
+#include "estimation/navigation/so3.h"
+
+namespace imuscope::batch {
+
+namespace {
+
+using std::complex;
+using Matrix6c = Eigen::Matrix<complex<double>, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+constexpr Eigen::Index kColumns = BandSums::kColumns;
+using Jacobian = Eigen::Matrix<complex<double>, 6, kColumns>;
+
+/// Share that the reference's noise may have in the covariance of a residual, for it to stay one.
+constexpr double kLargestWeight = 0.9;
+/// Share of what the reference's gyros show that may be their noise, for their derivative to be a motion.
+constexpr double kNoisyMotion = 0.2;
+/// Factor of a variance that leaves no weight.
+constexpr double kTellsNothing = 1e6;
+
+/// B-9: derivatives of predicted() in every parameter, then in the band's deviation.
+void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion, const Vector3c& study_f,
+              complex<double> constant, double frequency_hz, double from_middle_s, Jacobian& J) {
+  J.setZero();
+  const Vector3c force = motion.force_at(t.arm_b_m);
+  const Vector3c omega_s = t.C * motion.omega;
+  const Vector3c force_s = t.C * force;
+  const Vector3c force_a = t.C_accel_rotated * force;
+  const Eigen::Matrix3d accel_shape = sensor.accel_shape();
+  J.block<3, 3>(0, kPsi) = t.gyro * skew_c(motion.omega);
+  J.block<3, 3>(3, kPsi) = t.accel * skew_c(force);
+  J.block<3, 3>(3, kLeverArm) = t.accel * motion.arm;
+  J.block<3, 1>(0, kTimeOffset) = derivative(frequency_hz) * gyros(t, motion, frequency_hz);
+  const Vector3c felt = accelerometers(t, motion);
+  J.block<3, 1>(3, kTimeOffset) = derivative(frequency_hz) * felt;
+  J.col(kClockRate) = from_middle_s * J.col(kTimeOffset);
+  J.block<3, 1>(3, kAccelDelay) = J.block<3, 1>(3, kTimeOffset);
+  J.block<3, 3>(3, kAlpha) = accel_shape * skew_c(force_a);
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    const Eigen::Matrix3d d = shape_derivative(j, sensor.above);
+    J.block<3, 1>(0, kGyroShape + j) = d * omega_s;
+    J.block<3, 1>(3, kAccelShape + j) = d * force_a;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const Eigen::Vector3d place_b = t.C.transpose() * place_basis(i, j);
+      J(3 + i, kPlaces + j) =
+          (t.accel.row(i).cast<complex<double>>() * (motion.arm * place_b.cast<complex<double>>())).value();
+    }
+  }
+  const double flex = flexure_gain(frequency_hz);
+  for (Eigen::Index j = 0; j < 6; ++j)
+    J(3 + flexure_row(j), kAccelFlexure + j) = flex * felt[flexure_column(j)];
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    J(i, kGyroBias + i) = constant;
+    J(3 + i, kAccelBias + i) = constant;
+    J(3 + i, kAccelFade + i) = flex * felt[i];
+    J.block<1, 3>(i, kCompliance + 3 * i) = derivative(frequency_hz) * force_s.transpose();
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      const Vector3c product = motion.force_products * t.C.row(j).transpose();
+      J.block<3, 1>(3, kCompliance + 3 * i + j) = -(t.accel * skew(t.C.row(i).transpose())) * product;
+    }
+    J.block<1, 3>(i, kGSensitivity + 3 * i) = study_f.transpose();
+    J.block<1, 3>(i, kFlexure + 3 * i) = flex * omega_s.transpose();
+    J.block<1, 3>(i, kParameters + 3 * i) = omega_s.transpose();
+    J.block<1, 3>(3 + i, kParameters + 9 + 3 * i) = force_s.transpose();
+  }
+}
+
+/// Covariance of a residual at one frequency, and how the reference's noise enters it (B-10, B-12).
+struct Weight {
+  Matrix6c of_reference;  ///< D: residual = S noise - D (reference's noise)
+  Vector6 reference_power;
+  Matrix6c gain;                ///< R D^H, scaled as the covariance's blocks are
+  Eigen::LLT<Matrix6c> factor;  ///< of the covariance
+  Vector6 power;
+};
+
+/// Power of the reference's noise at one frequency, mean over axes, where both triads agree on it (B-10c).
+struct ReferencePower {
+  double gyro;
+  double accel;
+};
+/// @param of_gyros   as the gyros' residual tells it
+/// @param of_accels  as the accelerometers' does, with what the gyros' noise makes of accelerations at the
+///                   lever arm
+ReferencePower reference_power(const Transfer& t, double of_gyros, double of_accels, double frequency_hz) {
+  const double omega = std::abs(derivative(frequency_hz));
+  const double arm_gain = omega * omega * (t.accel * skew(t.arm_b_m)).squaredNorm() / 3.0;
+  if (arm_gain * of_gyros > of_accels) return {of_accels / arm_gain, 0.0};
+  return {of_gyros, of_accels - arm_gain * of_gyros};
+}
+
+/// @param power  of the residual, by axis
+Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, double of_accels, bool forces_tell,
+                 double frequency_hz) {
+  Weight weight;
+  weight.power = power;
+  const ReferencePower agreed = reference_power(t, of_gyros, of_accels, frequency_hz);
+  weight.reference_power.head<3>().setConstant(agreed.gyro);
+  weight.reference_power.tail<3>().setConstant(agreed.accel);
+  weight.of_reference.setZero();
+  weight.of_reference.topLeftCorner<3, 3>() = t.gyro.cast<complex<double>>();
+  weight.of_reference.bottomRightCorner<3, 3>() = t.accel.cast<complex<double>>();
+  // [omega' x] r = -[r x] omega'
+  weight.of_reference.bottomLeftCorner<3, 3>() = -derivative(frequency_hz) * (t.accel * skew(t.arm_b_m));
+  const Matrix6c gain = weight.reference_power.asDiagonal() * weight.of_reference.adjoint();
+  Matrix6c covariance = weight.of_reference * gain;
+  // The total is what was learned; the reference's part is held below it.
+  Vector6 scale;
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const double of_reference = covariance(i, i).real();
+    scale[i] = of_reference > 0.0 ? std::min(1.0, std::sqrt(kLargestWeight * power[i] / of_reference)) : 1.0;
+  }
+  covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
+  for (Eigen::Index i = 0; i < 6; ++i) covariance(i, i) = power[i];
+  if (!forces_tell) covariance.diagonal().tail<3>() *= kTellsNothing;
+  weight.gain = gain * scale.cwiseProduct(scale).asDiagonal();
+  weight.factor.compute(covariance);
+  return weight;
+}
+
+/// The motion that both IMUs together make most likely (B-12).
+Motion estimated_motion(Motion motion, const Weight& weight, const Vector6c& weighted_residual,
+                        double frequency_hz) {
+  const Vector6c correction = weight.gain * weighted_residual;
+  motion.omega += correction.head<3>();
+  motion.f += correction.tail<3>();
+  motion.arm += skew_c(derivative(frequency_hz) * correction.head<3>());
+  return motion;
+}
+
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, kColumns + 1, Eigen::RowMajor>;
+
+/// Real and imaginary rows of a whitened derivative and its residual.
+void put_rows(const Jacobian& J, const Vector6c& e, double frequency_hz, Eigen::Ref<Rows> rows) {
+  // One-sided: every frequency but zero stands for its negative, too.
+  const double weight = frequency_hz > 0.0 ? std::numbers::sqrt2 : 1.0;
+  rows.topLeftCorner<6, kColumns>() = weight * J.real();
+  rows.bottomLeftCorner(6, kColumns) = weight * J.imag();
+  rows.col(kColumns).head<6>() = weight * e.real();
+  rows.col(kColumns).tail<6>() = weight * e.imag();
+}
+
+class BandSummer {
+ public:
+  BandSummer(const Problem& problem, const Spectra& study, const Residuals& residual,
+             const Estimate& estimate, const NoiseBands& noise, const ReferenceNoise& reference,
+             bool corrected)
+      : problem_(problem),
+        study_(study),
+        residual_(residual),
+        estimate_(estimate),
+        noise_(noise),
+        reference_(reference),
+        corrected_(corrected) {}
+
+  BandSums sum(Eigen::Index band) {
+    const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
+    const auto n_windows = static_cast<Eigen::Index>(problem_.plan.starts.size());
+    BandSums sums;
+    sums.scores.resize(n_windows, kColumns);
+    Rows rows(12 * problem_.bands.width(band), kColumns + 1);
+    Rows of_gyros(6 * problem_.bands.width(band), kColumns + 1);
+    const Eigen::Vector2d share = reference_.mean_share(noise_, band);
+    forces_tell_ =
+        share[0] * noise_.power(band).head<3>().mean() <= kNoisyMotion * problem_.mean_gyro_power[band];
+    for (Eigen::Index w = 0; w < n_windows; ++w) {
+      for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
+        fill(t, band, w, k, rows, 12 * (k - problem_.bands.first(band)));
+      const auto J = rows.leftCols<kColumns>();
+      sums.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
+      for (Eigen::Index i = 0; i < 2 * problem_.bands.width(band); ++i)
+        of_gyros.middleRows<3>(3 * i) = rows.middleRows<3>(6 * i);
+      sums.of_gyros.selfadjointView<Eigen::Lower>().rankUpdate(of_gyros.leftCols<kColumns>().transpose());
+      sums.scores.row(w) = (J.transpose() * rows.col(kColumns)).transpose();
+    }
+    sums.information = sums.information.selfadjointView<Eigen::Lower>();
+    sums.of_gyros = sums.of_gyros.selfadjointView<Eigen::Lower>();
+    if (corrected_) add_noise(t, band, share, sums);
+    return sums;
+  }
+
+ private:
+  void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, Rows& rows,
+            Eigen::Index first_row) {
+    const double f_hz = problem_.plan.frequency_hz(k);
+    const Vector6 power = noise_.window_power(w, band);
+    const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
+    const Weight weight = weight_of(t, power, of_reference[0], of_reference[1], forces_tell_, f_hz);
+    Vector6c e = residual_.row(w * problem_.plan.n_frequencies + k).transpose();
+    weight.factor.matrixL().solveInPlace(e);
+    Motion motion = motion_of(problem_.reference, w, k);
+    if (corrected_) motion = estimated_motion(motion, weight, weight.factor.matrixU().solve(e), f_hz);
+    const Vector3c study_f = study_.row(w, k).tail<3>().transpose();
+    jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], f_hz, problem_.from_middle_s[w], J_);
+    weight.factor.matrixL().solveInPlace(J_);
+    put_rows(J_, e, f_hz, rows.middleRows<12>(first_row));
+  }
+
+  /// B-13: derivatives that the motion's own uncertainty alone would have. What counts is the reference's
+  /// share of the noise, so that all windows are as one whose share is their mean.
+  void add_noise(const Transfer& t, Eigen::Index band, const Eigen::Vector2d& share, BandSums& sums) {
+    const Vector6 power = noise_.power(band);
+    const double of_gyros = share[0] * power.head<3>().mean();
+    const double of_accels = share[1] * power.tail<3>().mean();
+    const double root_n = std::sqrt(static_cast<double>(problem_.plan.starts.size()));
+    Rows rows(12 * 6, kColumns + 1);
+    for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
+      const double f_hz = problem_.plan.frequency_hz(k);
+      const Weight weight = weight_of(t, power, of_gyros, of_accels, forces_tell_, f_hz);
+      const Matrix6c W_inverse = weight.factor.solve(Matrix6c::Identity());
+      Matrix6c motion_covariance = -weight.gain * W_inverse * weight.gain.adjoint();
+      for (Eigen::Index i = 0; i < 6; ++i) motion_covariance(i, i) += weight.reference_power[i];
+      motion_covariance /=
+          kWindowsPerInstant;  // the transforms' mean square is that much smaller than the power
+      const Eigen::LLT<Matrix6c> root(motion_covariance);
+      if (root.info() != Eigen::Success) continue;
+      const Matrix6c L = root.matrixL();
+      for (Eigen::Index j = 0; j < 6; ++j) {
+        Motion motion{L.col(j).head<3>(), L.col(j).tail<3>(), Matrix3c::Zero(), Matrix3c::Zero()};
+        motion.arm = skew_c(derivative(f_hz) * motion.omega);
+        jacobian(estimate_.sensor, t, motion, Vector3c::Zero(), 0.0, f_hz, 0.0, J_);
+        J_ *= root_n;
+        weight.factor.matrixL().solveInPlace(J_);
+        put_rows(J_, Vector6c::Zero(), f_hz, rows.middleRows<12>(12 * j));
+      }
+      sums.of_noise.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols<kColumns>().transpose());
+    }
+    sums.of_noise = sums.of_noise.selfadjointView<Eigen::Lower>();
+  }
+
+  const Problem& problem_;
+  const Spectra& study_;
+  const Residuals& residual_;
+  const Estimate& estimate_;
+  const NoiseBands& noise_;
+  const ReferenceNoise& reference_;
+  bool corrected_;
+  bool forces_tell_ = true;
+  Jacobian J_;
+};
+
+/// B-14: the band's deviation eliminated, as a random effect of known sd.
+void eliminate(const BandSums& sums, const DeviationVector& deviation, double gyro_sd, double accel_sd,
+               NormalEquations& equations, NormalEquations::Elimination& elimination) {
+  DeviationVector precision;
+  precision.head<9>().setConstant(1.0 / (gyro_sd * gyro_sd));
+  precision.tail<9>().setConstant(1.0 / (accel_sd * accel_sd));
+  Eigen::Matrix<double, kDeviations, kDeviations> own =
+      sums.information.bottomRightCorner<kDeviations, kDeviations>();
+  own.diagonal() += precision;
+  const Eigen::Matrix<double, kDeviations, kDeviations> covariance =
+      own.llt().solve(Eigen::Matrix<double, kDeviations, kDeviations>::Identity());
+  const auto cross = sums.information.topRightCorner<kParameters, kDeviations>();
+  elimination.coupling = cross * covariance;
+  elimination.covariance = covariance;
+  const DeviationVector gradient =
+      sums.scores.rightCols<kDeviations>().colwise().sum().transpose() - precision.cwiseProduct(deviation);
+  elimination.own = covariance * gradient;
+  equations.information +=
+      sums.information.topLeftCorner<kParameters, kParameters>() - elimination.coupling * cross.transpose();
+  // How the elimination combines the rows holds for the noise in them as well.
+  Eigen::Matrix<double, kColumns, kParameters> combine;
+  combine.topRows<kParameters>().setIdentity();
+  combine.bottomRows<kDeviations>() = -elimination.coupling.transpose();
+  equations.of_noise += combine.transpose() * sums.of_noise * combine;
+  equations.gradient +=
+      sums.scores.leftCols<kParameters>().colwise().sum().transpose() - elimination.coupling * gradient;
+  equations.window_scores += sums.scores.leftCols<kParameters>() -
+                             sums.scores.rightCols<kDeviations>() * elimination.coupling.transpose();
+}
+
+}  // namespace
+
+Residuals residuals(const Problem& problem, const Spectra& study, const Estimate& estimate) {
+  const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
+  Residuals all(n_windows * problem.plan.n_frequencies, 6);
+  for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
+    const Transfer t(estimate.sensor, estimate.deviation[static_cast<std::size_t>(band)]);
+    for (Eigen::Index w = 0; w < n_windows; ++w) {
+      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k) {
+        const auto measured = study.row(w, k);
+        const Vector3c study_f = measured.tail<3>().transpose();
+        all.row(w * problem.plan.n_frequencies + k) =
+            measured - predicted(t, motion_of(problem.reference, w, k), study_f, problem.constant[k],
+                                 problem.plan.frequency_hz(k))
+                           .transpose();
+      }
+    }
+  }
+  return all;
+}
+
+std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study, const Residuals& residual,
+                                const Estimate& estimate, const NoiseBands& noise,
+                                const ReferenceNoise& reference, bool corrected) {
+  std::vector<BandSums> sums(static_cast<std::size_t>(problem.bands.size()));
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t band) {
+    BandSummer summer(problem, study, residual, estimate, noise, reference, corrected);
+    sums[band] = summer.sum(static_cast<Eigen::Index>(band));
+  });
+  return sums;
+}
+
+Eigen::Vector2d numbers_taken(const BandSums& sums, const NormalEquations::Elimination& elimination,
+                              const Eigen::Matrix<double, kParameters, kParameters>& covariance) {
+  Eigen::Matrix<double, kColumns, kColumns> joint;
+  joint.topLeftCorner<kParameters, kParameters>() = covariance;
+  joint.topRightCorner<kParameters, kDeviations>() = -covariance * elimination.coupling;
+  joint.bottomLeftCorner<kDeviations, kParameters>() =
+      joint.topRightCorner<kParameters, kDeviations>().transpose();
+  joint.bottomRightCorner<kDeviations, kDeviations>() =
+      elimination.covariance + elimination.coupling.transpose() * covariance * elimination.coupling;
+  const double gyros = sums.of_gyros.cwiseProduct(joint).sum();
+  return {gyros, sums.information.cwiseProduct(joint).sum() - gyros};
+}
+
+NormalEquations normal_equations(const std::vector<BandSums>& sums, const Estimate& estimate) {
+  NormalEquations equations;
+  equations.information.setZero();
+  equations.of_noise.setZero();
+  equations.gradient.setZero();
+  equations.window_scores.setZero(sums.front().scores.rows(), kParameters);
+  equations.bands.resize(sums.size());
+  // At zero frequency a deviation is a bias.
+  equations.information += sums.front().information.topLeftCorner<kParameters, kParameters>();
+  equations.of_noise += sums.front().of_noise.topLeftCorner<kParameters, kParameters>();
+  equations.gradient += sums.front().scores.leftCols<kParameters>().colwise().sum().transpose();
+  equations.window_scores += sums.front().scores.leftCols<kParameters>();
+  for (std::size_t band = 1; band < sums.size(); ++band) {
+    const auto i = static_cast<Eigen::Index>(band);
+    eliminate(sums[band], estimate.deviation[band], estimate.deviation_sd(i, 0), estimate.deviation_sd(i, 1),
+              equations, equations.bands[band]);
+  }
+  return equations;
+}
+
+}  // namespace imuscope::batch

@@ -1,0 +1,122 @@
+#include "estimation/batch/pair_moments.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace imuscope::batch {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Svd = Eigen::JacobiSVD<Matrix3d>;
+
+Svd svd_of(const Matrix3d& m) { return Svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV); }
+
+double handedness(const Svd& svd) { return (svd.matrixU() * svd.matrixV().transpose()).determinant(); }
+
+/// B-18
+Matrix3d rotation_of(const Matrix3d& study_reference) {
+  const Svd svd = svd_of(study_reference);
+  const Vector3d signs(1.0, 1.0, handedness(svd) < 0.0 ? -1.0 : 1.0);
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
+/// Correlation of what the S-IMU shows along u with what the R-IMU shows along v.
+double correlation_along(const TriadMoments& m, const Vector3d& u, const Vector3d& v) {
+  const double size = std::sqrt(u.dot(m.study * u) * v.dot(m.reference * v));
+  return size > 0.0 ? u.dot(m.study_reference * v) / size : 0.0;
+}
+
+struct Means {
+  Eigen::Matrix<double, 6, 1> reference = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 1> study = Eigen::Matrix<double, 6, 1>::Zero();
+  double n = 0.0;
+};
+
+bool both_valid(const Grid& reference, const Grid& study, Eigen::Index row) {
+  const auto i = static_cast<std::size_t>(row);
+  return reference.valid[i] != 0 && study.valid[i] != 0;
+}
+
+Means means_of(const Grid& reference, const Grid& study) {
+  Means means;
+  for (Eigen::Index i = 0; i < reference.motion.rows(); ++i) {
+    if (!both_valid(reference, study, i)) continue;
+    means.n += 1.0;
+    means.reference += reference.motion.row(i).transpose();
+    means.study += study.motion.row(i).transpose();
+  }
+  if (means.n > 0.0) {
+    means.reference /= means.n;
+    means.study /= means.n;
+  }
+  return means;
+}
+
+void add(const Vector3d& s, const Vector3d& b, TriadMoments& moments) {
+  moments.study_reference += s * b.transpose();
+  moments.study += s * s.transpose();
+  moments.reference += b * b.transpose();
+}
+
+/// A triad's moments, as if all it shows were of size one.
+Matrix3d scaled(const TriadMoments& m) {
+  const double size = std::sqrt(m.study.trace() * m.reference.trace());
+  return size > 0.0 ? Matrix3d(m.study_reference / size) : Matrix3d::Zero();
+}
+
+}  // namespace
+
+double TriadMoments::size_ratio() const { return std::sqrt(study.trace() / reference.trace()); }
+
+Matrix3d TriadMoments::best_rotation() const { return rotation_of(study_reference); }
+
+double TriadMoments::correlation_at(const Matrix3d& C_b_s) const {
+  return (C_b_s.transpose() * study_reference).trace() / std::sqrt(study.trace() * reference.trace());
+}
+
+double TriadMoments::mirrored() const {
+  const Svd svd = svd_of(study_reference);
+  if (handedness(svd) > 0.0) return 0.0;
+  return correlation_along(*this, svd.matrixU().col(2), svd.matrixV().col(2));
+}
+
+double TriadMoments::most_lost(const Matrix3d& C_b_s, double from) const {
+  const Svd svd = svd_of(study_reference);
+  double most = 0.0;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Vector3d u = svd.matrixU().col(i);
+    const double own = correlation_along(*this, u, svd.matrixV().col(i));
+    if (own < from) continue;
+    most = std::max(most, own - correlation_along(*this, u, C_b_s.transpose() * u));
+  }
+  return most;
+}
+
+PairMoments::PairMoments(const Grid& reference, const Grid& study) {
+  const Means means = means_of(reference, study);
+  mean_force_b_ = means.reference.tail<3>();
+  mean_force_s_ = means.study.tail<3>();
+  for (Eigen::Index i = 0; i < reference.motion.rows(); ++i) {
+    if (!both_valid(reference, study, i)) continue;
+    const Eigen::Matrix<double, 6, 1> b = reference.motion.row(i).transpose() - means.reference;
+    const Eigen::Matrix<double, 6, 1> s = study.motion.row(i).transpose() - means.study;
+    add(s.head<3>(), b.head<3>(), rates);
+    add(s.tail<3>(), b.tail<3>(), forces);
+    add(s.tail<3>() + mean_force_s_, b.tail<3>() + mean_force_b_, forces_with_gravity);
+  }
+}
+
+Matrix3d PairMoments::common_rotation() const {
+  const Matrix3d gravity = mean_force_s_.normalized() * mean_force_b_.normalized().transpose();
+  return rotation_of(scaled(rates) + scaled(forces) + gravity);
+}
+
+double PairMoments::mean_force_cosine(const Matrix3d& C_b_s) const {
+  return mean_force_s_.normalized().dot(C_b_s * mean_force_b_.normalized());
+}
+
+}  // namespace imuscope::batch

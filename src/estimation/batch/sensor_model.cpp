@@ -1,0 +1,218 @@
+#include "estimation/batch/sensor_model.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "base/units.h"
+#include "estimation/alignment/accelerometer_places.h"
+#include "estimation/navigation/so3.h"
+
+namespace imuscope::batch {
+
+namespace {
+
+using Row33 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// Row and column of each of the six parameters of a lower triangle.
+constexpr std::array<std::array<Eigen::Index, 2>, 6> kTriangle{
+    {{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 0}, {2, 1}}};
+
+Eigen::Matrix3d shape(const ParameterVector& x, Eigen::Index first, double above) {
+  Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
+  for (Eigen::Index j = 0; j < 6; ++j) m += x[first + j] * shape_derivative(j, above);
+  return m;
+}
+
+/// The frame with x along a triad's x axis and y in the plane of its x and y axes, which are its rows.
+Eigen::Matrix3d axes_frame(const Eigen::Matrix3d& triad) {
+  Eigen::Matrix3d frame;
+  frame.row(0) = triad.row(0).normalized();
+  frame.row(1) = (triad.row(1) - triad.row(1).dot(frame.row(0)) * frame.row(0)).normalized();
+  frame.row(2) = frame.row(0).cross(frame.row(1));
+  return frame;
+}
+
+Eigen::Matrix<double, 6, 1> triangle_of(const Eigen::Matrix3d& triangular) {
+  Eigen::Matrix<double, 6, 1> shape;
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    const auto& [row, column] = kTriangle[static_cast<std::size_t>(j)];
+    shape[j] = triangular(row, column) - (row == column ? 1.0 : 0.0);
+  }
+  return shape;
+}
+
+/// Derivative of the rotation vector, in s, from a triad's symmetric frame to that of its axes in its three
+/// departures yx, zx, zy.
+Eigen::Matrix3d turn_derivative() {
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+  turn(0, 2) = 0.5;
+  turn(1, 1) = -0.5;
+  turn(2, 0) = 0.5;
+  return turn;
+}
+
+}  // namespace
+
+Eigen::Matrix3d shape_derivative(Eigen::Index j, double above) {
+  const auto& [row, column] = kTriangle[static_cast<std::size_t>(j)];
+  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+  m(row, column) = row == column ? 1.0 : 1.0 - above;
+  if (row != column) m(column, row) = above;
+  return m;
+}
+
+Eigen::Matrix3d SensorState::gyro_shape() const { return shape(x, kGyroShape, above); }
+Eigen::Matrix3d SensorState::accel_shape() const { return shape(x, kAccelShape, above); }
+Eigen::Matrix3d SensorState::C_s_accel() const { return exp_so3(-x.segment<3>(kAlpha)); }
+Eigen::Matrix3d SensorState::C_b_accel() const { return accel_shape() * C_s_accel() * C_b_s; }
+Eigen::Matrix3d SensorState::g_sensitivity() const {
+  return Row33(Eigen::Map<const Row33>(x.data() + kGSensitivity));
+}
+Eigen::Matrix3d SensorState::flexure() const { return Row33(Eigen::Map<const Row33>(x.data() + kFlexure)); }
+Eigen::Matrix3d SensorState::accel_flexure() const {
+  Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+  for (Eigen::Index j = 0; j < 6; ++j) m(flexure_row(j), flexure_column(j)) = x[kAccelFlexure + j];
+  return m;
+}
+Eigen::Matrix3d SensorState::compliance() const {
+  return Row33(Eigen::Map<const Row33>(x.data() + kCompliance));
+}
+
+Eigen::Vector3d SensorState::place_s_m(Eigen::Index axis) const {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();
+  for (Eigen::Index j = 0; j < 6; ++j) place += x[kPlaces + j] * place_basis(axis, j);
+  return place;
+}
+
+void SensorState::add(const ParameterVector& correction) {
+  C_b_s = C_b_s * exp_so3(-correction.segment<3>(kPsi));
+  // A product of many rotations drifts from one.
+  C_b_s = Eigen::Quaterniond(C_b_s).normalized().toRotationMatrix();
+  // alpha is turned as a rotation, too, so that large ones stay exact.
+  const Eigen::Matrix3d turned = exp_so3(-correction.segment<3>(kAlpha)) * C_s_accel();
+  x += correction;
+  x.segment<3>(kPsi).setZero();
+  x.segment<3>(kAlpha) = -log_so3(turned);
+}
+
+AxesFrame in_axes_frame(const SensorState& symmetric) {
+  AxesFrame out{symmetric, {}};
+  const Eigen::Matrix3d gyros = symmetric.C_b_gyro();
+  const Eigen::Matrix3d accels = symmetric.C_b_accel();
+  SensorState& sensor = out.sensor;
+  sensor.above = 0.0;
+  sensor.C_b_s = axes_frame(gyros);
+  const Eigen::Matrix3d C_b_accel_axes = axes_frame(accels);
+  sensor.x.segment<6>(kGyroShape) = triangle_of(gyros * sensor.C_b_s.transpose());
+  sensor.x.segment<3>(kAlpha) = -log_so3(C_b_accel_axes * sensor.C_b_s.transpose());
+  sensor.x.segment<6>(kAccelShape) = triangle_of(accels * C_b_accel_axes.transpose());
+  out.derivative.setIdentity();
+  const Eigen::Matrix3d turn = turn_derivative();
+  out.derivative.block<3, 3>(kPsi, kGyroShape + 3) = symmetric.C_b_s.transpose() * turn;
+  out.derivative.block<3, 3>(kAlpha, kGyroShape + 3) = -turn;
+  out.derivative.block<3, 3>(kAlpha, kAccelShape + 3) = turn;
+  return out;
+}
+
+namespace {
+
+/// How axes and scales of a triad in s move where the reference's triad is off by E (in s): (I - E) is split
+/// into a rotation and a lower triangle.
+struct AxisShift {
+  Eigen::Vector3d rotation;
+  Eigen::Matrix<double, 6, 1> shape;
+
+  explicit AxisShift(const Eigen::Matrix3d& E) : rotation(-E(1, 2), E(0, 2), -E(0, 1)) {
+    for (Eigen::Index j = 0; j < 6; ++j) {
+      const auto row = kTriangle[static_cast<std::size_t>(j)][0];
+      const auto column = kTriangle[static_cast<std::size_t>(j)][1];
+      shape[j] = row == column ? -E(row, row) : -E(row, column) - E(column, row);
+    }
+  }
+};
+
+}  // namespace
+
+void SensorClass::set_reference(double gyro_white_radps_per_sqrt_hz) {
+  // B-21a: from fibre-optic and laser gyros of navigation grade to an industrial MEMS unit, whose alignment is
+  // that of an S-IMU (0.1 deg) and whose scale is calibrated to half a per cent; tactical units lie between.
+  constexpr double kNavigation = 0.005 * kRadPerDeg / 60.0;
+  constexpr double kMems = 0.3 * kRadPerDeg / 60.0;
+  constexpr double kMemsScale = 5e-3;
+  const double place = std::log(gyro_white_radps_per_sqrt_hz / kNavigation) / std::log(kMems / kNavigation);
+  const auto between = [share = std::clamp(place, 0.0, 1.0)](double navigation, double mems) {
+    return navigation * std::pow(mems / navigation, share);
+  };
+  const SensorClass navigation;
+  reference_scale_sd = between(navigation.reference_scale_sd, kMemsScale);
+  // Of each of the two axes whose departure from a right angle has axis_sd_rad.
+  reference_axis_sd_rad = between(navigation.reference_axis_sd_rad, axis_sd_rad / std::numbers::sqrt2);
+  reference_triad_sd_rad = between(navigation.reference_triad_sd_rad, triad_sd_rad);
+}
+
+Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const SensorClass& sensor,
+                                                                       const SensorState& state) {
+  Eigen::Matrix<double, kParameters, kReferenceErrors> factor;
+  factor.setZero();
+  Eigen::Index next = 0;
+  const Eigen::Matrix3d& C = state.C_b_s;
+  const auto add = [&](const Eigen::Matrix3d& of_gyros_b, const Eigen::Matrix3d& of_accels_b) {
+    const AxisShift gyro(C * of_gyros_b * C.transpose());
+    const AxisShift accel(C * of_accels_b * C.transpose());
+    factor.col(next).segment<3>(kPsi) = C.transpose() * gyro.rotation;
+    factor.col(next).segment<6>(kGyroShape) = gyro.shape;
+    factor.col(next).segment<3>(kAlpha) = accel.rotation - gyro.rotation;
+    factor.col(next).segment<6>(kAccelShape) = accel.shape;
+    ++next;
+  };
+  const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      Eigen::Matrix3d E = none;
+      E(i, j) = i == j ? sensor.reference_scale_sd : sensor.reference_axis_sd_rad;
+      add(E, none);
+      add(none, E);
+    }
+    add(none, skew(sensor.reference_triad_sd_rad * Eigen::Vector3d::Unit(i)));
+  }
+  // B-21b: too large a rate makes too short an arm of the same force, by its scale where forces come from
+  // angular acceleration, by twice that where they come from the square of the rate; a leaning axis takes of
+  // the other components.
+  constexpr double kBetween = 1.5;
+  const Eigen::Vector3d r = state.lever_arm_b_m();
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double across_m = std::sqrt(std::max(0.0, r.squaredNorm() - r[i] * r[i]));
+    factor(kLeverArm + i, next++) =
+        std::hypot(kBetween * sensor.reference_scale_sd * r[i], sensor.reference_axis_sd_rad * across_m);
+  }
+  return factor;
+}
+
+ParameterVector prior_sd(const SensorClass& sensor) {
+  ParameterVector sd;
+  sd.segment<3>(kPsi).setConstant(std::numeric_limits<double>::infinity());
+  sd.segment<3>(kLeverArm).setConstant(sensor.lever_arm_sd_m);
+  sd[kTimeOffset] = std::numeric_limits<double>::infinity();
+  sd[kClockRate] = sensor.clock_rate_sd;
+  sd.segment<3>(kGyroBias).setConstant(sensor.gyro_bias_sd_radps);
+  sd.segment<3>(kAccelBias).setConstant(sensor.accel_bias_sd_mps2);
+  sd.segment<3>(kGyroShape).setConstant(sensor.gyro_scale_sd);
+  sd.segment<3>(kGyroShape + 3).setConstant(sensor.axis_sd_rad);
+  sd.segment<3>(kAlpha).setConstant(sensor.triad_sd_rad);
+  sd.segment<3>(kAccelShape).setConstant(sensor.accel_scale_sd);
+  sd.segment<3>(kAccelShape + 3).setConstant(sensor.axis_sd_rad);
+  sd[kAccelDelay] = sensor.accel_delay_sd_s;
+  sd.segment<6>(kPlaces).setConstant(sensor.place_sd_m);
+  sd.segment<9>(kGSensitivity).setConstant(sensor.g_sensitivity_sd);
+  sd.segment<9>(kFlexure).setConstant(sensor.flexure_sd);
+  sd.segment<3>(kAccelFade).setConstant(sensor.accel_fade_sd);
+  sd.segment<6>(kAccelFlexure).setConstant(sensor.accel_flexure_sd);
+  sd.segment<9>(kCompliance).setConstant(sensor.compliance_sd);
+  return sd;
+}
+
+}  // namespace imuscope::batch

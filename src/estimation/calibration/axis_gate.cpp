@@ -1,0 +1,11 @@
+#include "estimation/calibration/axis_gate.h"
+
+#include <boost/math/distributions/chi_squared.hpp>
+
+namespace imuscope {
+
+double axis_gate(double probability) {
+  return boost::math::quantile(boost::math::chi_squared(1.0), probability);
+}
+
+}  // namespace imuscope

@@ -1,0 +1,291 @@
+#include "models/certificate/axis_certificate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <execution>
+#include <mutex>
+#include <numeric>
+
+#include "base/units.h"
+#include "models/certificate/candidate_models.h"
+#include "models/certificate/record_checks.h"
+#include "models/noise/covariance_table.h"
+#include "models/noise/fixed_point.h"
+#include "models/noise/homogeneity.h"
+
+namespace imuscope::certificate {
+namespace {
+
+using noise::FitResult;
+using noise::Intervals;
+
+/// p below which the halves of a record are said to differ.
+constexpr double kDiffer = 0.01;
+
+/// A copy that may be written to, with room for one more.
+Result<std::vector<double>> samples_of(const AxisRecord& record) {
+  if (record.fetch) return record.fetch();
+  std::vector<double> x;
+  x.reserve(record.values.size() + 1);
+  x.assign(record.values.begin(), record.values.end());
+  return x;
+}
+
+/// Marks what is there.
+std::vector<std::uint8_t> mask_of(const AxisRecord& record, std::span<const double> x) {
+  std::vector<std::uint8_t> mask = record.mask;
+  if (mask.empty()) mask.assign(x.size(), 1);
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (!std::isfinite(x[i])) mask[i] = 0;
+  }
+  return mask;
+}
+
+/// Mean and sd of what is there, numerically safe for a large mean.
+void add_moments(AxisCertificate& out, std::span<const double> x, std::span<const std::uint8_t> mask) {
+  double squares = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (mask[i] == 0) continue;
+    const double before = x[i] - out.mean;
+    out.mean += before / static_cast<double>(++out.n_samples);
+    squares += before * (x[i] - out.mean);
+  }
+  out.n_missing = x.size() - out.n_samples;
+  out.sd = out.n_samples > 1 ? std::sqrt(squares / static_cast<double>(out.n_samples - 1)) : 0.0;
+}
+
+Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisRecord& record,
+                                   bool has_resonance, const AxisOptions& options,
+                                   noise::CovarianceTables& covariances) {
+  noise::FitOptions fit_options;
+  fit_options.confidence = options.confidence;
+  fit_options.signal_unit = noise::unit_name(record.unit);
+  fit_options.intervals = Intervals::kInverted;
+  fit_options.covariances = &covariances;
+  if (!options.model.empty()) {
+    const auto spec = noise::parse_model(options.model);
+    if (!spec) return tl::unexpected(spec.error());
+    auto fit = noise::fit(wv, *spec, record.rate_hz, fit_options);
+    if (!fit) return tl::unexpected(fit.error());
+    return noise::GrownModel{std::move(*fit), {}};
+  }
+  return select_model(wv, record.rate_hz, has_resonance, fit_options);
+}
+
+/// Wavelet variances of the halves of a record; empty where one has none.
+std::vector<noise::WaveletVariance> halves_of(std::span<const double> x, std::span<const std::uint8_t> mask) {
+  const std::size_t middle = x.size() / 2;
+  std::vector<noise::WaveletVariance> halves;
+  for (const auto& [begin, end] : {std::pair{std::size_t{0}, middle}, std::pair{middle, x.size()}}) {
+    noise::WvOptions options;
+    options.mask = mask.subspan(begin, end - begin);
+    auto half = noise::haar_wavelet_variance(x.subspan(begin, end - begin), options);
+    if (!half) return {};
+    halves.push_back(std::move(*half));
+  }
+  return halves;
+}
+
+std::optional<HalvesTest> compared(const std::vector<noise::WaveletVariance>& halves, const FitResult& fit) {
+  if (halves.empty()) return std::nullopt;
+  const std::array errors{fit.model_error, fit.model_error};
+  const auto test = noise::test_homogeneity(halves, fit.model, errors).test;
+  if (!test) return std::nullopt;
+  const auto* first = &halves.front();
+  const auto* second = &halves.back();
+  HalvesTest out;
+  out.p_value = test->p_value;
+  double largest = 0.0;
+  for (std::size_t i = 0; i < std::min(first->levels.size(), second->levels.size()); ++i) {
+    const auto& a = first->levels[i];
+    const auto& b = second->levels[i];
+    if (!has_enough_coefficients(a, 1.0) || !has_enough_coefficients(b, 1.0)) break;
+    const double distance = std::abs(std::log(b.value / a.value)) *
+                            std::sqrt(static_cast<double>(a.n_coefficients) / a.tau_samples);
+    if (distance <= largest) continue;
+    largest = distance;
+    out.level = a.level;
+    out.ratio = b.value / a.value;
+  }
+  return out;
+}
+
+/// A length that is known to two digits and is no power of ten to a reader: 120, not 1.2e+02.
+std::string rounded(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
+  return fmt::format("{:.10g}", std::round(value / unit) * unit);
+}
+
+void add_limits(AxisCertificate& out) {
+  const double seconds = static_cast<double>(out.n_samples) / out.fit.rate_hz;
+  const auto& bias = *std::find_if(out.terms.begin(), out.terms.end(),
+                                   [](const auto& t) { return t.term == Term::kBiasInstability; });
+  if (bias.knowledge == noise::Knowledge::kBound) {
+    constexpr double kLonger = 4.0;
+    out.limits.push_back(fmt::format(
+        "bias instability: the Allan deviation still falls at {} s, the longest averaging time of "
+        "this record of {} h; a record of {} h shows {} s",
+        rounded(out.allan.back().tau_s), rounded(seconds / kSecondsPerHour),
+        rounded(kLonger * seconds / kSecondsPerHour), rounded(kLonger * out.allan.back().tau_s)));
+  }
+  constexpr double kWide = 0.3;  // of the value, half an interval
+  for (const TermValue& term : out.terms) {
+    if (term.knowledge != noise::Knowledge::kFitted || !term.ci_low || !term.ci_high || !(term.value > 0.0))
+      continue;
+    const double half = 0.5 * (*term.ci_high - *term.ci_low) / term.value;
+    if (half <= kWide) continue;
+    constexpr double kWanted = 0.1;
+    out.limits.push_back(
+        fmt::format("{}: known within {:.0f} %; within 10 % takes a record of about {} h",
+                    name_of(term.term, is_gyro(out.unit)), 100.0 * half,
+                    rounded(seconds * (half / kWanted) * (half / kWanted) / kSecondsPerHour)));
+  }
+}
+
+double largest_miss_of(const FitResult& fit) {
+  double largest = 0.0;
+  for (const noise::FittedLevel& level : fit.wv) {
+    if (!(level.model_ci_low > 0.0) || !(level.fitted > 0.0)) continue;
+    largest = std::max(
+        {largest, level.fitted / level.model_ci_high - 1.0, level.model_ci_low / level.fitted - 1.0});
+  }
+  return largest;
+}
+
+Error named(const AxisRecord& record, Error error) {
+  error.what = fmt::format("{}: {}", record.name, error.what);
+  return error;
+}
+
+/// What has to be told before anything else.
+Result<void> look_at(const AxisRecord& record, std::span<const double> x, std::span<const std::uint8_t> mask,
+                     AxisCertificate& out) {
+  add_moments(out, x, mask);
+  if (out.n_samples < kFewestSamples) {
+    return tl::unexpected(named(
+        record,
+        {ErrorKind::kWork, fmt::format("{} valid samples are too few", out.n_samples),
+         fmt::format("a record needs {} at least, and some minutes to be worth reading", kFewestSamples)}));
+  }
+  if (!(out.sd > 0.0)) {
+    return tl::unexpected(named(record, {ErrorKind::kWork, fmt::format("all values are {:.6g}", out.mean),
+                                         "the axis is stuck, or the wrong column was chosen"}));
+  }
+  out.resolution = resolution_of(x, mask);
+  out.warnings = record_warnings(record, x, mask, out);
+  return {};
+}
+
+/// What the samples are asked for beside their Allan deviations; the rest needs no samples.
+struct Kept {
+  noise::WaveletVariance wv;
+  std::vector<noise::WaveletVariance> halves;
+  noise::TailExcerpt tails;
+};
+
+/// @param x  used up
+Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span<const std::uint8_t> mask,
+                        double confidence, AxisCertificate& out) {
+  noise::LineOptions line_options;
+  line_options.rate_hz = record.rate_hz;
+  const std::array<std::function<void()>, 2> looks{
+      [&] { out.lines = noise::find_lines(x, mask, line_options); },
+      [&] {  // the spectrum shows the lines, too
+        out.density = noise::density_of(x, noise::Present(x, mask), record.rate_hz, confidence);
+      }};
+  std::for_each(std::execution::par, looks.begin(), looks.end(), [](const auto& look) { look(); });
+  noise::remove_lines(x, mask, out.lines, record.rate_hz);
+  out.resonances = noise::find_resonances(x, mask, record.rate_hz);
+  out.low_pass_hz = noise::low_pass_hz(x, mask, record.rate_hz);
+  noise::WvOptions wv_options;
+  wv_options.mask = mask;
+  wv_options.confidence = confidence;
+  Kept kept{{}, halves_of(x, mask), noise::tail_excerpt(x, mask)};
+  auto wv = noise::haar_wavelet_variance_in_place(x, wv_options);
+  if (!wv) return tl::unexpected(named(record, wv.error()));
+  kept.wv = std::move(*wv);
+  return kept;
+}
+
+Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions& options,
+                                     noise::CovarianceTables& covariances) {
+  AxisCertificate out;
+  out.name = record.name;
+  out.unit = record.unit;
+  auto x = samples_of(record);
+  if (!x) return tl::unexpected(named(record, x.error()));
+  const std::vector<std::uint8_t> mask = mask_of(record, *x);
+  if (auto looked = look_at(record, *x, mask, out); !looked) return tl::unexpected(looked.error());
+  const auto kept = take_apart(record, *x, mask, options.confidence, out);
+  if (!kept) return tl::unexpected(kept.error());
+
+  *x = std::vector<double>();  // assigning {} would keep its memory, which what follows needs
+  x = samples_of(record);
+  if (!x) return tl::unexpected(named(record, x.error()));
+  noise::remove_lines(*x, mask, out.lines, record.rate_hz);
+  out.allan = noise::allan_deviation(std::move(*x), kept->wv, record.rate_hz);
+  *x = std::vector<double>();
+
+  auto grown = model_of(kept->wv, record, !out.resonances.empty(), options, covariances);
+  if (!grown) return tl::unexpected(named(record, grown.error()));
+  out.fit = std::move(grown->best);
+  out.largest_miss = largest_miss_of(out.fit);
+  for (const FitResult& rival : grown->rivals) out.rivals.push_back(rival.spec.name());
+  noise::set_allan_intervals(out.allan, &out.fit, options.confidence,
+                             covariances.of(kept->wv, out.fit.wv.size()).get());
+  out.terms = data_sheet_terms(out.fit, grown->rivals, out.allan, record.unit);
+  out.halves = compared(kept->halves, out.fit);
+  if (out.halves && out.halves->p_value < kDiffer) {
+    out.warnings.push_back(fmt::format(
+        "the halves of the record differ (p = {:.2g}): at averaging times around {:.3g} s the second has "
+        "{:.2f} times the "
+        "variance of the first; the numbers are a mean of both",
+        out.halves->p_value, std::ldexp(0.5, out.halves->level) / record.rate_hz, out.halves->ratio));
+  }
+  noise::WvOptions of_excerpt;
+  of_excerpt.confidence = options.confidence;
+  out.tails = noise::test_tails(kept->tails, of_excerpt, out.fit.model);
+  if (const auto spikes = noise::spike_warning(out.tails, record.rate_hz)) out.warnings.push_back(*spikes);
+  if (record.temperature_c != nullptr) {
+    x = samples_of(record);
+    if (!x) return tl::unexpected(named(record, x.error()));
+    out.temperature = temperature_of(*x, mask, *record.temperature_c, out.fit);
+  }
+  add_limits(out);
+  return out;
+}
+
+}  // namespace
+
+Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOptions& options) {
+  noise::CovarianceTables own;
+  return characterize(record, options, options.covariances != nullptr ? *options.covariances : own);
+}
+
+std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
+                                                       const AxisOptions& options, const AxisDone& told) {
+  std::vector<Result<AxisCertificate>> out(records.size(), work_error("not looked at"));
+  std::vector<std::size_t> index(records.size());
+  std::iota(index.begin(), index.end(), std::size_t{0});
+  noise::CovarianceTables own;
+  AxisOptions shared = options;
+  if (shared.covariances == nullptr) shared.covariances = &own;
+  std::mutex telling;
+  std::size_t done = 0;
+  const auto look = [&](std::size_t i) {
+    out[i] = characterize_axis(records[i], shared);
+    if (!told) return;
+    const std::scoped_lock lock(telling);
+    told(++done);
+  };
+  if (std::ranges::any_of(records, [](const AxisRecord& r) { return static_cast<bool>(r.fetch); }))
+    std::for_each(index.begin(), index.end(), look);
+  else
+    std::for_each(std::execution::par, index.begin(), index.end(), look);
+  return out;
+}
+
+}  // namespace imuscope::certificate

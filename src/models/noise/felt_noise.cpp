@@ -1,0 +1,509 @@
+#include "models/noise/felt_noise.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "models/noise/chi_squared.h"
+#include "models/noise/filter_form.h"
+#include "models/noise/inference.h"
+#include "models/noise/parameter_scale.h"
+#include "models/noise/power_law.h"
+#include "models/noise/separable_fit.h"
+#include "models/noise/wv_covariance.h"
+
+namespace imuscope::noise {
+namespace {
+
+using OfModel = std::function<double(const Model&)>;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// Times of the band at which growths are compared.
+constexpr int kBandPoints = 50;
+/// A process of so many samples' memory can be told from white noise, and takes a bias' place.
+constexpr double kBiasSamples = 10.0;
+/// Longest correlation time in the place of a random walk, in lengths of the band: over the band it is one.
+constexpr double kLongestTau = 10.0;
+/// A logarithm with a larger sd is not determined (as for the fit's own parameters).
+constexpr double kUndetermined = 1.5;
+/// Share of the slow terms' growth below which a term does not count.
+constexpr double kNegligibleShare = 0.01;
+constexpr double kNegligibleUntold = 0.2;  ///< of one that the data do not tell
+
+/// A Gauss-Markov process of at most 1/kEdge times the time at which noise is asked for is white to it, one
+/// of kEdge times that time is not.
+constexpr double kEdge = 2.0;
+
+/// Share of a process that is white at `fast_s` (G-28): it moves without a step as a time constant crosses
+/// it.
+double white_share(const Component& c, double rate_hz, double fast_s) {
+  switch (c.kind) {
+    case ProcessKind::kRandomWalk:
+    case ProcessKind::kRamp:
+    case ProcessKind::kFlicker:
+    case ProcessKind::kPowerLaw:
+      return 0.0;
+    case ProcessKind::kGaussMarkov: {
+      const double in_edges = -std::log(c.shape[0] * rate_hz * fast_s) / std::log(kEdge);
+      const double x = std::clamp(0.5 * (1.0 + in_edges), 0.0, 1.0);
+      return 1.0 - x * x * (3.0 - 2.0 * x);
+    }
+    default:
+      return 1.0;
+  }
+}
+
+/// Less than half of it is white.
+bool is_slow(const Component& c, double rate_hz, double fast_s) {
+  return white_share(c, rate_hz, fast_s) < 0.5;
+}
+
+/// G-28.
+double white_of(const Model& model, double rate_hz, double fast_s) {
+  double sum = 0.0;
+  for (const Component& c : without_power_laws(model).components)
+    sum += white_share(c, rate_hz, fast_s) * low_frequency_variance(c) / rate_hz;
+  return sum;
+}
+
+/// G-29: variance of what a process grows by in `time_s`.
+double growth_of(const Component& c, double rate_hz, double time_s) {
+  const double samples = time_s * rate_hz;
+  switch (c.kind) {
+    case ProcessKind::kRandomWalk:
+      return c.amplitude * samples;
+    case ProcessKind::kRamp:
+      return c.amplitude * samples * samples;
+    case ProcessKind::kGaussMarkov:
+      return -2.0 * c.amplitude * std::expm1(-c.shape[0] * samples);
+    default:
+      return 0.0;
+  }
+}
+
+double slow_growth(const Model& any, double rate_hz, double fast_s, double time_s) {
+  const Model model = without_power_laws(any);
+  double sum = 0.0;
+  for (const Component& c : model.components)
+    sum += (1.0 - white_share(c, rate_hz, fast_s)) * growth_of(c, rate_hz, time_s);
+  return sum;
+}
+
+/// The middle of part `i` of kBandPoints parts that are alike in the logarithm.
+double band_time_s(const FilterBand& band, int i) {
+  return band.from_s * std::pow(band.to_s / band.from_s, (i + 0.5) / kBandPoints);
+}
+
+/// Mean over the band, on a logarithmic scale of time, of ln(growth / unit growth).
+double mean_log_growth(const Model& model, double rate_hz, double fast_s, const FilterBand& band,
+                       const std::function<double(double)>& unit) {
+  double sum = 0.0;
+  for (int i = 0; i < kBandPoints; ++i) {
+    const double time_s = band_time_s(band, i);
+    sum += std::log(slow_growth(model, rate_hz, fast_s, time_s) / unit(time_s));
+  }
+  return sum / kBandPoints;
+}
+
+double gauss_markov_growth(double tau_s, double time_s) { return -2.0 * std::expm1(-time_s / tau_s); }
+
+/// G-30.
+double walk_of(const Model& model, double rate_hz, double fast_s, const FilterBand& band) {
+  return std::exp(mean_log_growth(model, rate_hz, fast_s, band, [](double t) { return t; }));
+}
+
+/// G-31.
+double bias_variance_of(const Model& model, double rate_hz, double fast_s, const FilterBand& band,
+                        double tau_s) {
+  return std::exp(
+      mean_log_growth(model, rate_hz, fast_s, band, [&](double t) { return gauss_markov_growth(tau_s, t); }));
+}
+
+/// The correlation time with which one Gauss-Markov process follows the slow terms' growth best.
+double best_tau(const Model& model, double rate_hz, double fast_s, const FilterBand& band) {
+  constexpr int kSteps = 200;
+  double best = band.to_s;
+  double least = kInfinity;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double tau_s =
+        band.from_s * std::pow(kLongestTau * band.to_s / band.from_s, i / static_cast<double>(kSteps));
+    const double level = std::log(bias_variance_of(model, rate_hz, fast_s, band, tau_s));
+    double squares = 0.0;
+    for (int k = 0; k < kBandPoints; ++k) {
+      const double time_s = band_time_s(band, k);
+      squares += std::pow(
+          std::log(slow_growth(model, rate_hz, fast_s, time_s) / gauss_markov_growth(tau_s, time_s)) - level,
+          2);
+    }
+    if (squares < least) {
+      least = squares;
+      best = tau_s;
+    }
+  }
+  return best;
+}
+
+/// Degrees of freedom of a level's value (G-2), fewer where the estimator is less efficient.
+double freedom_of(const WvLevel& level, double efficiency) {
+  return std::max(efficiency * static_cast<double>(level.n_coefficients) / level.tau_samples, 1.0);
+}
+
+/// The sd of functions of a fit's parameters, by their gradient and the covariance of the wavelet variance
+/// under the fitted model, whether or not each parameter by itself is told.
+class Uncertainty {
+ public:
+  explicit Uncertainty(const FitResult& fit) : fit_(fit), places_(parameter_places(fit.model)) {
+    std::vector<int> levels;
+    for (const FittedLevel& level : fit.wv) levels.push_back(level.observed.level);
+    for (std::size_t p = 0; p < places_.size(); ++p) {
+      if (fit.model.components[places_[p].component].amplitude > 0.0) present_.push_back(p);
+    }
+    if (levels.empty() || present_.empty() || levels.size() < present_.size()) return;
+    const Eigen::MatrixXd v = covariance(levels.size());
+    const Eigen::VectorXd scale = v.diagonal().cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd relative = scale.asDiagonal() * v * scale.asDiagonal();
+    constexpr double kRidge = 1e-10;
+    relative.diagonal().array() += kRidge;
+    const Eigen::LLT<Eigen::MatrixXd> llt(relative);
+    if (llt.info() != Eigen::Success) return;
+    std::vector<Eigen::Index> columns(present_.begin(), present_.end());
+    const Eigen::MatrixXd all = wv_jacobian(fit.model, levels, places_);
+    const Eigen::MatrixXd d =
+        llt.matrixL().solve(Eigen::MatrixXd(scale.asDiagonal() * all(Eigen::all, columns)));
+    const Eigen::MatrixXd information = d.transpose() * d;
+    eigen_.compute(information);
+    known_ = true;
+  }
+
+  /// Sd of ln(f(model)); infinite where the data do not tell.
+  [[nodiscard]] double log_sd(const OfModel& f) const {
+    if (!known_) return kInfinity;
+    const Eigen::VectorXd slope = gradient(f);
+    const Eigen::VectorXd along = eigen_.eigenvectors().transpose() * slope;
+    double variance = 0.0;
+    for (std::size_t i = 0; i < present_.size() && present_[i] < fit_.parameters.size(); ++i)
+      variance += std::pow(slope[static_cast<Eigen::Index>(i)] * fit_.parameters[present_[i]].spread_sd, 2);
+    for (Eigen::Index i = 0; i < along.size(); ++i) {
+      constexpr double kNothing = 1e-9;
+      if (std::abs(along[i]) < kNothing) continue;
+      if (!(eigen_.eigenvalues()[i] > 0.0)) return kInfinity;
+      variance += along[i] * along[i] / eigen_.eigenvalues()[i];
+    }
+    return std::sqrt(variance);
+  }
+
+ private:
+  [[nodiscard]] Eigen::MatrixXd covariance(std::size_t levels) const {
+    Eigen::MatrixXd v = wv_covariance(fit_.model, observed_wv(fit_), levels);
+    for (std::size_t i = 0; i < levels; ++i) {
+      const double y = fit_.wv[i].observed.value;
+      const double m = fit_.wv[i].fitted;
+      const auto k = static_cast<Eigen::Index>(i);
+      if (y + m > 0.0) v(k, k) += fit_.model_error * fit_.model_error * 2.0 * y * m * m / (y + m);  // G-15
+    }
+    return v;
+  }
+
+  [[nodiscard]] Eigen::VectorXd gradient(const OfModel& f) const {
+    constexpr double kStep = 1e-4;
+    Eigen::VectorXd g(static_cast<Eigen::Index>(present_.size()));
+    for (std::size_t i = 0; i < present_.size(); ++i) {
+      const auto at = [&](double step) {
+        Model moved = fit_.model;
+        const ParameterPlace& place = places_[present_[i]];
+        Component& c = moved.components[place.component];
+        if (place.shape < 0) {
+          c.amplitude *= std::exp(step);
+        } else {
+          double& shape = c.shape[static_cast<std::size_t>(place.shape)];
+          shape = shape_of_coordinate(c.kind, place.shape,
+                                      coordinate_of_shape(c.kind, place.shape, shape) + step);
+        }
+        return std::log(f(moved));
+      };
+      g[static_cast<Eigen::Index>(i)] = (at(kStep) - at(-kStep)) / (2.0 * kStep);
+    }
+    return g;
+  }
+
+  const FitResult& fit_;
+  std::vector<ParameterPlace> places_;
+  std::vector<std::size_t> present_;
+  Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen_;
+  bool known_ = false;
+};
+
+/// G-32: the most of a term with this unit curve that every level allows beside the rest of the model.
+/// Infinite without a level. What the rest of a rejected model takes of a level is not known.
+double most_of(const FitResult& fit, const std::function<double(int)>& unit, const Model& rest) {
+  double most = kInfinity;
+  const double tail = (1.0 - fit.confidence) / static_cast<double>(std::max<std::size_t>(1, fit.wv.size()));
+  for (const FittedLevel& level : fit.wv) {
+    const double dof = freedom_of(level.observed, fit.efficiency);
+    const double upper = level.observed.value * dof / chi_squared_quantile(dof, tail);
+    const double room = upper - (fit.model_error > 0.0 ? 0.0 : model_wv(rest, level.observed.level));
+    if (room > 0.0) most = std::min(most, room / unit(level.observed.level));
+  }
+  return most;
+}
+
+double normal_quantile_of(double confidence) {
+  return boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + confidence));
+}
+
+Felt as_bound(double fitted, double bound) {
+  if (!std::isfinite(bound)) return {fitted, fitted, 0.0, Knowledge::kUnknown};
+  return {bound, bound, 0.0, Knowledge::kBound};
+}
+
+/// A function of the model as value and interval where the data tell it, else the most that they allow.
+Felt felt(const FitResult& fit, const OfModel& f, const std::function<double()>& bound) {
+  const double value = f(fit.model);
+  if (value > 0.0) {
+    const double log_sd = Uncertainty(fit).log_sd(f);
+    if (log_sd < kUndetermined) {
+      const double factor = std::exp(normal_quantile_of(fit.confidence) * log_sd);
+      return {value, value * factor, value / factor, Knowledge::kFitted};
+    }
+  }
+  return as_bound(value, bound());
+}
+
+/// The model without (or with only) what is slow.
+Model part_of(const Model& model, double rate_hz, double fast_s, bool slow) {
+  Model part;
+  for (const Component& c : without_power_laws(model).components) {
+    if (is_slow(c, rate_hz, fast_s) == slow) part.components.push_back(c);
+  }
+  return part;
+}
+
+Felt told_white_density(const FitResult& fit, double fast_s) {
+  const double f = fit.rate_hz;
+  return felt(
+      fit, [&](const Model& m) { return white_of(m, f, fast_s); },
+      [&] {
+        // What is white but no white noise (quantization) has its own curve, and stays beside it.
+        Model rest;
+        for (const Component& c : without_power_laws(fit.model).components) {
+          if (is_slow(c, f, fast_s) || low_frequency_variance(c) <= 0.0) rest.components.push_back(c);
+        }
+        return most_of(
+            fit, [&](int level) { return f * unit_wv(ProcessKind::kWhiteNoise, {}, level).value; }, rest);
+      });
+}
+
+/// A fit's own parameter of one component; nullptr where there is none of that name.
+const ParameterEstimate* parameter_of(const FitResult& fit, std::size_t component, int shape) {
+  const auto places = parameter_places(fit.model);
+  for (std::size_t p = 0; p < places.size() && p < fit.parameters.size(); ++p) {
+    if (places[p].component == component && places[p].shape == shape) return &fit.parameters[p];
+  }
+  return nullptr;
+}
+
+bool has_interval(const ParameterEstimate* p) {
+  return p != nullptr && p->ci_low && p->ci_high && std::isfinite(*p->ci_low) && std::isfinite(*p->ci_high) &&
+         *p->ci_low > 0.0;
+}
+
+/// An amplitude by its own interval: a value, or a bound where that has an upper end alone. A rejected
+/// model's bound trusts the rest of the model, and is none.
+std::optional<Felt> own_amplitude(const FitResult& fit, std::size_t component) {
+  const ParameterEstimate* p = parameter_of(fit, component, -1);
+  if (p == nullptr) return std::nullopt;
+  const bool is_root = parameter_scale_of(p->name) == ParameterScale::kLogSquare;
+  const auto squared = [&](double v) { return is_root ? v * v : v; };
+  if (has_interval(p))
+    return Felt{fit.model.components[component].amplitude, squared(*p->ci_high), squared(*p->ci_low),
+                Knowledge::kFitted};
+  if (p->ci_low || !p->ci_high || !std::isfinite(*p->ci_high) || fit.model_error > 0.0) return std::nullopt;
+  return Felt{squared(*p->ci_high), squared(*p->ci_high), 0.0, Knowledge::kBound};
+}
+
+/// Where a random walk is all that is slow, it is its own walk. A quick interval knows no more than the
+/// covariance.
+std::optional<Felt> own_walk(const FitResult& fit, double fast_s) {
+  if (fit.intervals != Intervals::kInverted) return std::nullopt;
+  std::optional<std::size_t> only;
+  for (std::size_t i = 0; i < fit.model.components.size(); ++i) {
+    const Component& c = fit.model.components[i];
+    const bool is_walk = c.kind == ProcessKind::kRandomWalk;
+    if (white_share(c, fit.rate_hz, fast_s) >= 1.0 || (!is_walk && c.amplitude <= 0.0)) continue;
+    if (only || !is_walk) return std::nullopt;
+    only = i;
+  }
+  if (!only) return std::nullopt;
+  auto own = own_amplitude(fit, *only);
+  if (own) {
+    for (double* v : {&own->value, &own->upper, &own->lower}) *v *= fit.rate_hz;
+  }
+  return own;
+}
+
+Felt walk_density(const FitResult& fit, double fast_s, const FilterBand& band) {
+  const double f = fit.rate_hz;
+  if (const auto own = own_walk(fit, fast_s)) return *own;
+  const auto value = [&](const Model& m) {
+    return slow_growth(m, f, fast_s, band.to_s) > 0.0 ? walk_of(m, f, fast_s, band) : 0.0;
+  };
+  return felt(fit, value, [&] {
+    return most_of(
+        fit, [&](int level) { return unit_wv(ProcessKind::kRandomWalk, {}, level).value / f; },
+        part_of(fit.model, f, fast_s, false));
+  });
+}
+
+/// What counts as white beside a bias: the slowest process is the bias where nothing is slower than the band.
+double fast_beside_bias_s(const FitResult& fit, const FilterBand& band) {
+  double slowest_s = 0.0;
+  for (const Component& c : fit.model.components) {
+    if (c.amplitude <= 0.0) continue;
+    if (c.kind != ProcessKind::kGaussMarkov && is_slow(c, fit.rate_hz, band.from_s)) return band.from_s;
+    if (c.kind == ProcessKind::kGaussMarkov && c.shape[0] * kBiasSamples <= 1.0)
+      slowest_s = std::max(slowest_s, 1.0 / (c.shape[0] * fit.rate_hz));
+  }
+  return slowest_s > 0.0 ? std::min(band.from_s, slowest_s / kEdge) : band.from_s;
+}
+
+/// The one Gauss-Markov process that makes the slow growth, told by the data; absent where there is none.
+std::optional<FeltBias> own_process(const FitResult& fit, double fast_s, const FilterBand& band) {
+  const double f = fit.rate_hz;
+  std::optional<std::size_t> only;
+  for (std::size_t i = 0; i < fit.model.components.size(); ++i) {
+    const Component& c = fit.model.components[i];
+    if (white_share(c, f, fast_s) >= 1.0 || c.amplitude <= 0.0) continue;
+    const auto share = [&](double time_s) {
+      return slow_growth(Model{{c}}, f, fast_s, time_s) / slow_growth(fit.model, f, fast_s, time_s);
+    };
+    const bool is_told = has_interval(parameter_of(fit, i, -1));
+    if (std::max(share(band.from_s), share(band.to_s)) < (is_told ? kNegligibleShare : kNegligibleUntold))
+      continue;
+    if (only || c.kind != ProcessKind::kGaussMarkov || white_share(c, f, fast_s) > 0.0) return std::nullopt;
+    only = i;
+  }
+  if (!only) return std::nullopt;
+  const ParameterEstimate* beta = parameter_of(fit, *only, 0);
+  const ParameterEstimate* variance = parameter_of(fit, *only, -1);
+  if (!has_interval(beta) || !has_interval(variance)) return std::nullopt;
+  FeltBias bias;
+  bias.tau_s = 1.0 / beta->value;
+  bias.tau_log_sd = std::log(*beta->ci_high / *beta->ci_low) / (2.0 * normal_quantile_of(fit.confidence));
+  bias.variance = {variance->value, *variance->ci_high, *variance->ci_low, Knowledge::kFitted};
+  bias.as_fitted = true;
+  return bias;
+}
+
+Felt bias_variance(const FitResult& fit, double fast_s, const FilterBand& band, double tau_s) {
+  const double f = fit.rate_hz;
+  const auto value = [&](const Model& m) {
+    return slow_growth(m, f, fast_s, band.to_s) > 0.0 ? bias_variance_of(m, f, fast_s, band, tau_s) : 0.0;
+  };
+  return felt(fit, value, [&] {
+    return most_of(
+        fit, [&](int level) { return gauss_markov_wv(1.0 / (tau_s * f), level).value; },
+        part_of(fit.model, f, fast_s, false));
+  });
+}
+
+}  // namespace
+
+const char* knowledge_name(Knowledge knowledge) noexcept {
+  constexpr const char* kNames[] = {"fitted", "bound", "unknown"};
+  return kNames[static_cast<std::size_t>(knowledge)];
+}
+
+double white_density(const Model& model, double rate_hz, const FilterBand& band) {
+  return white_of(model, rate_hz, band.from_s);
+}
+
+Felt felt_white_density(const FitResult& fit, const FilterBand& band) {
+  return told_white_density(fit, band.from_s);
+}
+
+Felt felt_walk_density(const FitResult& fit, const FilterBand& band) {
+  return walk_density(fit, band.from_s, band);
+}
+
+Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band) {
+  return told_white_density(fit, fast_beside_bias_s(fit, band));
+}
+
+FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band) {
+  const double fast_s = fast_beside_bias_s(fit, band);
+  FeltWithBias out;
+  out.white_density = told_white_density(fit, fast_s);
+  if (const auto own = own_process(fit, fast_s, band)) {
+    out.bias = *own;
+    return out;
+  }
+  const bool has_slow = slow_growth(fit.model, fit.rate_hz, fast_s, band.to_s) > 0.0;
+  out.bias.tau_s = has_slow ? best_tau(fit.model, fit.rate_hz, fast_s, band) : band.to_s;
+  out.bias.variance = bias_variance(fit, fast_s, band, out.bias.tau_s);
+  return out;
+}
+
+FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double tau_s) {
+  FeltWithBias out = felt_with_bias(fit, band);
+  const double z = normal_quantile_of(fit.confidence);
+  const bool is_own_time =
+      out.bias.tau_log_sd && std::abs(std::log(tau_s / out.bias.tau_s)) <= z * *out.bias.tau_log_sd;
+  if (!is_own_time) {
+    out.bias.variance = bias_variance(fit, fast_beside_bias_s(fit, band), band, tau_s);
+    out.bias.as_fitted = false;
+  }
+  out.bias.tau_s = tau_s;
+  return out;
+}
+
+Felt felt_amplitude(const FitResult& fit, std::size_t component) {
+  if (const auto own = own_amplitude(fit, component)) return *own;
+  const Component& c = fit.model.components[component];
+  Model rest = fit.model;
+  rest.components.erase(rest.components.begin() + static_cast<std::ptrdiff_t>(component));
+  return as_bound(c.amplitude,
+                  most_of(
+                      fit, [&](int level) { return unit_wv(c.kind, c.shape, level).value; }, rest));
+}
+
+std::string slow_terms(const FitResult& fit, const FilterBand& band) {
+  std::string names;
+  const std::vector<std::string> of_components = component_names(fit.model);
+  for (std::size_t i = 0; i < of_components.size(); ++i) {
+    const Component& c = fit.model.components[i];
+    if (c.amplitude <= 0.0 || white_share(c, fit.rate_hz, band.from_s) >= 1.0) continue;
+    names += (names.empty() ? "" : "+") + of_components[i];
+  }
+  return names;
+}
+
+std::string missed_level(const FitResult& fit, const FilterBand& band) {
+  if (fit.model_error >= kMostModelError)
+    return fmt::format("the model misses every level by {:.3g} % or so", 100.0 * fit.model_error);
+  constexpr double kIntervals = 2.0;  // so that one level of many is not missed by chance
+  std::string worst;
+  double worst_excess = 0.0;
+  for (const FittedLevel& level : fit.wv) {
+    const double tau_s = level.observed.tau_samples / fit.rate_hz;
+    if (tau_s < band.from_s || tau_s > band.to_s || !has_enough_coefficients(level.observed, fit.efficiency))
+      continue;
+    const double miss = std::log(level.fitted / level.observed.value);
+    const double interval = miss > 0.0 ? std::log(level.observed.ci_high / level.observed.value)
+                                       : std::log(level.observed.value / level.observed.ci_low);
+    const double excess = std::abs(miss) - kIntervals * (interval + std::log1p(fit.model_error));
+    if (!(excess > worst_excess) && std::isfinite(excess)) continue;
+    worst_excess = excess;
+    worst = fmt::format("the model is {:.3g} times the wavelet variance at tau = {:.4g} s, and states {}",
+                        level.fitted / level.observed.value, tau_s,
+                        fit.model_error > 0.0 ? fmt::format("{:.2g} %", 100.0 * fit.model_error)
+                                              : std::string("no error of its own"));
+  }
+  return worst;
+}
+
+}  // namespace imuscope::noise

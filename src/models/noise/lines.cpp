@@ -1,0 +1,312 @@
+#include "models/noise/lines.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "models/noise/process.h"
+#include "models/noise/spectrum.h"
+#include "models/noise/wavelet_variance.h"
+
+namespace imuscope::noise {
+namespace {
+
+/// Half-width of the main lobe of a Hann window, in bins.
+constexpr std::size_t kLobe = 2;
+/// The noise beside a bin: so many bins to either side, outside of the lobe.
+constexpr std::size_t kFloorBins = 40;
+/// The first bin with a floor on both sides. Nearer to zero the noise of sensors rises within its floor.
+constexpr std::size_t kFirstBin = kLobe + kFloorBins + 1;
+/// From one length of segments to the next.
+constexpr std::size_t kLonger = 4;
+/// Fewer of a longer segment than these are one look at slow noise, not a spectrum.
+constexpr std::size_t kFewestSegments = 3;
+/// Median of bins [first, last), as a mean.
+double median_power(const Spectrum& spectrum, std::size_t first, std::size_t last, double dof) {
+  std::vector<double> bins(spectrum.power.begin() + static_cast<std::ptrdiff_t>(first),
+                           spectrum.power.begin() + static_cast<std::ptrdiff_t>(last));
+  const auto middle = bins.begin() + static_cast<std::ptrdiff_t>(bins.size() / 2);
+  std::nth_element(bins.begin(), middle, bins.end());
+  return *middle * dof / boost::math::quantile(boost::math::chi_squared(dof), 0.5);
+}
+
+/// Power of the noise at bin k: the geometric mean of what is to its left and to its right, so that a slope
+/// does not make a line. At the upper end the left side alone: noise falls with frequency.
+double floor_at(const Spectrum& spectrum, std::size_t k, double dof) {
+  const double left = median_power(spectrum, k - kLobe - kFloorBins, k - kLobe, dof);
+  const std::size_t end = k + kLobe + 1 + kFloorBins;
+  if (end > spectrum.power.size()) return left;
+  return std::sqrt(left * median_power(spectrum, k + kLobe + 1, end, dof));
+}
+
+/// Mean power right beside the window's main lobe. A line leaks a hundredth of its power there at most; of a
+/// resonance it is as high as the peak.
+double power_beside(const Spectrum& spectrum, std::size_t k) {
+  constexpr std::size_t kBeside = 6;
+  double sum = 0.0;
+  double n = 0.0;
+  for (std::size_t d = kLobe + 1; d <= kLobe + kBeside; ++d) {
+    sum += spectrum.power[k - d];
+    n += 1.0;
+    if (k + d >= spectrum.power.size()) continue;
+    sum += spectrum.power[k + d];
+    n += 1.0;
+  }
+  return sum / n;
+}
+
+/// Offset of a peak from its bin, for a Hann window: (b - a) / (a + 2 c + b) times 2 of the neighbours'
+/// magnitudes (Grandke 1983 in symmetric form).
+double offset_of(double left, double peak, double right) {
+  const double a = std::sqrt(std::max(left, 0.0));
+  const double c = std::sqrt(peak);
+  const double b = std::sqrt(std::max(right, 0.0));
+  return std::clamp(2.0 * (b - a) / (a + 2.0 * c + b), -0.5, 0.5);
+}
+
+/// A sinusoid's power in the bins of the lobe: sum over them of |X|^2 is A^2/4 sum(w)^2 (1 + 2/4) for Hann.
+double amplitude_of(const Spectrum& spectrum, std::size_t k, double floor) {
+  double power = 0.0;
+  for (std::size_t i = k - kLobe; i <= std::min(k + kLobe, spectrum.power.size() - 1); ++i)
+    power += spectrum.power[i] - floor;
+  const double sum_of_window_squared =
+      0.25 * static_cast<double>(spectrum.length) * static_cast<double>(spectrum.length);
+  constexpr double kLobePower = 1.5;
+  return std::sqrt(std::max(0.0, 4.0 * power / (kLobePower * sum_of_window_squared)));
+}
+
+double variance_of(std::span<const double> x, const std::vector<Segment>& runs) {
+  double mean = 0.0;
+  double squares = 0.0;
+  double n = 0.0;
+  for (const auto& run : runs) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      n += 1.0;
+      const double before = x[i] - mean;
+      mean += before / n;
+      squares += before * (x[i] - mean);
+    }
+  }
+  return n > 1.0 ? squares / (n - 1.0) : 0.0;
+}
+
+/// Variance a sample of white noise with this floor: E|X|^2 = sigma^2 sum(w^2), sum(w^2) = 3/8 n.
+double noise_variance_of(double floor, const Spectrum& spectrum) {
+  return floor / (0.375 * static_cast<double>(spectrum.length));
+}
+
+/// Half of the overlapping segments are new.
+double independent_segments(const Spectrum& spectrum) {
+  return std::max(1.0, 0.5 * static_cast<double>(spectrum.segments));
+}
+
+/// Cramer and Rao's bound for one segment, averaged over them (independent phases).
+double frequency_sd_hz(double amplitude, double floor, const Spectrum& spectrum, double rate_hz) {
+  const auto length = static_cast<double>(spectrum.length);
+  const double var_omega =
+      24.0 * noise_variance_of(floor, spectrum) / (amplitude * amplitude * length * length * length);
+  return std::sqrt(var_omega / independent_segments(spectrum)) * rate_hz / (2.0 * std::numbers::pi);
+}
+
+/// The same bound, 2 sigma^2 / n, times what the window gives away (its equivalent noise bandwidth, 3/2
+/// bins).
+double amplitude_sd_of(double floor, const Spectrum& spectrum) {
+  constexpr double kBandwidth = 1.5;
+  return std::sqrt(2.0 * kBandwidth * noise_variance_of(floor, spectrum) /
+                   static_cast<double>(spectrum.length) / independent_segments(spectrum));
+}
+
+/// Bins [first, last] of one spectrum in which lines are looked for.
+struct Band {
+  Spectrum spectrum;
+  std::size_t first;
+  std::size_t last;
+};
+
+/// From the highest frequencies down.
+std::vector<Band> bands_of(std::span<const double> x, const Present& present, const LineOptions& options) {
+  std::vector<Band> bands;
+  for (std::size_t length = options.segment; length <= x.size(); length *= kLonger) {
+    const bool is_first = bands.empty();
+    if (!is_first && present.segments(length).size() < kFewestSegments) break;
+    Spectrum spectrum = spectrum_of(x, present, length);
+    if (spectrum.segments == 0) break;
+    const double bin_hz = options.rate_hz / static_cast<double>(length);
+    const auto lowest = static_cast<std::size_t>(std::ceil(options.lowest_hz / bin_hz));
+    const std::size_t last = is_first ? spectrum.power.size() - 1 - kLobe : kLonger * kFirstBin - 1;
+    const std::size_t first = std::max(lowest, kFirstBin);
+    if (first <= last) bands.push_back({std::move(spectrum), first, last});
+    if (lowest >= kFirstBin) break;
+  }
+  return bands;
+}
+
+/// Lines of one band.
+class Search {
+ public:
+  /// @param bins   of all bands: each is a chance for noise
+  /// @param total  variance of the signal
+  Search(const Band& band, const LineOptions& options, double bins, double total)
+      : band_(band),
+        options_(options),
+        bins_(bins),
+        total_(total),
+        dof_(degrees_of_freedom(static_cast<double>(band.spectrum.segments))),
+        // The floor is itself a median of some bins: its spread widens the threshold (variance of a median,
+        // pi/2 times that of a mean of as many).
+        floor_spread_(1.0 + 3.0 * std::sqrt(0.5 * std::numbers::pi * 2.0 /
+                                            (dof_ * static_cast<double>(2 * kFloorBins)))),
+        threshold_(floor_spread_ *
+                   boost::math::quantile(
+                       boost::math::complement(boost::math::chi_squared(dof_), options.false_alarm / bins)) /
+                   dof_) {}
+
+  [[nodiscard]] std::vector<Line> lines() const {
+    std::vector<Line> out;
+    for (std::size_t k = band_.first; k <= band_.last; ++k) {
+      if (auto line = at(k)) out.push_back(*line);
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] std::optional<Line> at(std::size_t k) const {
+    const Spectrum& spectrum = band_.spectrum;
+    const double power = spectrum.power[k];
+    if (power < spectrum.power[k - 1] || power <= spectrum.power[k + 1]) return std::nullopt;
+    const double floor = floor_at(spectrum, k, dof_);
+    if (!(floor > 0.0) || power < threshold_ * floor) return std::nullopt;
+    if (power < threshold_ * power_beside(spectrum, k)) return std::nullopt;
+    Line line;
+    line.segment = spectrum.length;
+    const double offset = offset_of(spectrum.power[k - 1] - floor, power, spectrum.power[k + 1] - floor);
+    line.frequency_hz =
+        (static_cast<double>(k) + offset) * options_.rate_hz / static_cast<double>(spectrum.length);
+    line.amplitude = amplitude_of(spectrum, k, floor);
+    if (!(line.amplitude > 0.0)) return std::nullopt;
+    line.frequency_sd_hz = frequency_sd_hz(line.amplitude, floor, spectrum, options_.rate_hz);
+    line.amplitude_sd = amplitude_sd_of(floor, spectrum);
+    line.share_of_variance = total_ > 0.0 ? 0.5 * line.amplitude * line.amplitude / total_ : 0.0;
+    line.p_value =
+        std::min(1.0, bins_ * boost::math::cdf(boost::math::complement(
+                                  boost::math::chi_squared(dof_), dof_ * power / (floor * floor_spread_))));
+    return line;
+  }
+
+  const Band& band_;
+  const LineOptions& options_;
+  double bins_;
+  double total_;
+  double dof_;
+  double floor_spread_;
+  double threshold_;
+};
+
+/// A line at the border of two bands is one.
+bool is_known(const std::vector<Line>& lines, const Line& line, double rate_hz) {
+  return std::any_of(lines.begin(), lines.end(), [&](const Line& other) {
+    const auto shorter = static_cast<double>(std::min(line.segment, other.segment));
+    return std::abs(line.frequency_hz - other.frequency_hz) < static_cast<double>(kLobe) * rate_hz / shorter;
+  });
+}
+
+/// Takes the lines out of [begin, end), by those of its samples that are there.
+void remove_from(std::span<double> x, const Present& present, std::size_t begin, std::size_t end,
+                 std::span<const Line> lines, double rate_hz) {
+  const auto columns = static_cast<Eigen::Index>(2 * lines.size());
+  Eigen::MatrixXd waves(static_cast<Eigen::Index>(present.count(begin, end)), columns);
+  Eigen::VectorXd piece(waves.rows());
+  Eigen::Index row = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    if (!present.at(i)) continue;
+    piece[row] = x[i];
+    for (std::size_t l = 0; l < lines.size(); ++l) {
+      const double phase =
+          2.0 * std::numbers::pi * lines[l].frequency_hz / rate_hz * static_cast<double>(i - begin);
+      waves(row, static_cast<Eigen::Index>(2 * l)) = std::cos(phase);
+      waves(row, static_cast<Eigen::Index>(2 * l + 1)) = std::sin(phase);
+    }
+    ++row;
+  }
+  const Eigen::VectorXd right = waves.transpose() * (piece.array() - piece.mean()).matrix();
+  piece -= waves * (waves.transpose() * waves).eval().ldlt().solve(right);
+  row = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    if (present.at(i)) x[i] = piece[row++];
+  }
+}
+
+/// Runs joined over holes shorter than `hole`.
+std::vector<Segment> joined(const std::vector<Segment>& runs, std::size_t hole) {
+  std::vector<Segment> out;
+  for (const Segment& run : runs) {
+    if (!out.empty() && run.begin - out.back().end < hole)
+      out.back().end = run.end;
+    else
+      out.push_back(run);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
+                             const LineOptions& options) {
+  const Present present(x, mask);
+  const std::vector<Band> bands = bands_of(x, present, options);
+  double bins = 0.0;
+  for (const Band& band : bands) bins += static_cast<double>(band.last - band.first + 1);
+  const double total = bands.empty() ? 0.0 : variance_of(x, present.runs());
+  std::vector<Line> lines;
+  for (const Band& band : bands) {
+    for (const Line& line : Search(band, options, bins, total).lines()) {
+      if (!is_known(lines, line, options.rate_hz)) lines.push_back(line);
+    }
+  }
+  std::sort(lines.begin(), lines.end(),
+            [](const Line& a, const Line& b) { return a.amplitude > b.amplitude; });
+  if (lines.size() > options.most_lines) lines.resize(options.most_lines);
+  return lines;
+}
+
+double line_wv(const Line& line, double rate_hz, int level) {
+  Shape shape{};
+  shape[0] = 2.0 * std::numbers::pi * line.frequency_hz / rate_hz;
+  return line.amplitude * line.amplitude * unit_wv(ProcessKind::kSinusoid, shape, level).value;
+}
+
+std::string in_words(const Line& line, std::string_view unit) {
+  return fmt::format("a line at {:.4g} Hz, amplitude {:.3g} {} ({:.2g} % of the variance)", line.frequency_hz,
+                     line.amplitude, unit, 100.0 * line.share_of_variance);
+}
+
+void remove_lines(std::span<double> x, std::span<const std::uint8_t> mask, const std::vector<Line>& lines,
+                  double rate_hz) {
+  if (lines.empty()) return;
+  const Present present(x, mask);
+  std::map<std::size_t, std::vector<Line>, std::greater<>> by_segment;
+  for (const Line& line : lines) by_segment[line.segment].push_back(line);
+  for (const auto& [segment, alike] : by_segment) {
+    // Shorter pieces would lose too much of their noise to the sinusoids.
+    const std::size_t shortest = segment / 4;
+    for (const Segment& stretch : joined(present.runs(), shortest)) {
+      for (std::size_t begin = stretch.begin; begin < stretch.end;) {
+        const std::size_t left = stretch.end - begin;
+        const std::size_t length = left < segment + shortest ? left : segment;
+        if (present.count(begin, begin + length) >= shortest)
+          remove_from(x, present, begin, begin + length, alike, rate_hz);
+        begin += length;
+      }
+    }
+  }
+}
+
+}  // namespace imuscope::noise

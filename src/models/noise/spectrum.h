@@ -1,0 +1,67 @@
+#pragma once
+
+/// Welch's mean periodogram of a signal with missing samples: what lines and resonances are looked for in,
+/// and what is drawn beside a wavelet variance (G-23).
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "models/noise/haar_levels.h"
+
+namespace imuscope::noise {
+
+/// Samples that are there, and how many of them before each place.
+class Present {
+ public:
+  Present(std::span<const double> x, std::span<const std::uint8_t> mask);
+
+  [[nodiscard]] const std::vector<Segment>& runs() const { return runs_; }
+  [[nodiscard]] bool at(std::size_t i) const { return before(i + 1) > before(i); }
+  [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
+    return before(end) - before(begin);
+  }
+
+  /// Where segments of `length` begin, half overlapping, of which at most an eighth is missing.
+  [[nodiscard]] std::vector<std::size_t> segments(std::size_t length) const;
+
+ private:
+  [[nodiscard]] std::size_t before(std::size_t i) const { return before_.empty() ? i : before_[i]; }
+
+  std::vector<Segment> runs_;
+  std::vector<std::uint32_t> before_;  ///< empty where all are there
+  std::size_t size_ = 0;
+};
+
+/// Mean periodogram of overlapping segments under a Hann window.
+struct Spectrum {
+  std::size_t length = 0;     ///< samples a segment
+  std::vector<double> power;  ///< mean |X_k|^2 of the windowed segments, k = 0 .. length / 2
+  std::size_t segments = 0;
+};
+
+/// A missing sample counts as the segment's mean; what the window loses by that is made up for, so that a
+/// line keeps its amplitude.
+Spectrum spectrum_of(std::span<const double> x, const Present& present, std::size_t length);
+
+/// Degrees of freedom of a bin: Hann windows that overlap by half (Welch 1967), 36 K^2 / (19 K - 1).
+double degrees_of_freedom(double segments);
+
+/// One-sided power spectral density with its interval.
+struct DensityPoint {
+  double frequency_hz = 0.0;
+  double density = 0.0;  ///< signal unit^2 / Hz
+  double ci_low = 0.0;
+  double ci_high = 0.0;
+};
+
+/// Density over the whole range that the record tells, equally dense on a logarithmic scale: short segments
+/// for what is fast, longer ones below, up to a million samples. Empty for a signal without a segment of `shortest` samples.
+std::vector<DensityPoint> density_of(std::span<const double> x, const Present& present, double rate_hz,
+                                     double confidence = 0.95, int points_per_octave = 8,
+                                     std::size_t shortest = 256);
+
+/// One-sided density of a bin of `spectrum`, signal unit^2 / Hz.
+double density_at(const Spectrum& spectrum, std::size_t bin, double rate_hz);
+
+}  // namespace imuscope::noise

@@ -1,0 +1,196 @@
+#include "estimation/batch/normal_equations.h"
+
+#include <gtest/gtest.h>
+#include <random>
+
+#include "estimation/navigation/so3.h"
+
+namespace {
+
+using namespace imuscope::batch;
+
+/// Of all imperfections: products of two of them are left out of the derivatives.
+constexpr double kSmall = 1e-3;
+
+/// Spectra of drawn motion: what is tested is algebra, which must hold for any.
+struct Drawn {
+  Problem problem;
+  Spectra study;
+  Estimate estimate;
+
+  Drawn() {
+    std::mt19937_64 random(7);
+    std::normal_distribution<double> normal;
+    problem.plan.length = 256;
+    problem.plan.starts = {0, 128};
+    problem.plan.n_frequencies = 12;
+    problem.plan.frequency_step_hz = 50.0 / 256.0;
+    problem.bands = Bands(problem.plan.n_frequencies);
+    problem.constant = window_spectrum(problem.plan);
+    problem.from_middle_s = Eigen::Vector2d(-2.0, 3.0);
+    problem.mean_gyro_power.setConstant(problem.bands.size(), 1e9);
+    const auto draw = [&](Eigen::Index columns, double size) {
+      Eigen::MatrixXd series(384, columns);
+      for (Eigen::Index i = 0; i < series.size(); ++i) series.data()[i] = size * normal(random);
+      return series;
+    };
+    problem.reference = Spectra(problem.plan, draw(kReferenceColumns, 1.0));
+    study = Spectra(problem.plan, draw(6, 1.0));
+    for (Eigen::Index i = 3; i < kParameters; ++i) estimate.sensor.x[i] = kSmall * normal(random);
+    estimate.sensor.C_b_s = imuscope::exp_so3(Eigen::Vector3d(0.4, -1.1, 2.0));
+    estimate.deviation.assign(static_cast<std::size_t>(problem.bands.size()), DeviationVector::Zero());
+    estimate.deviation_sd.setConstant(problem.bands.size(), 2, 1e-9);
+  }
+
+  [[nodiscard]] NoiseBands noise() const {
+    return {problem.bands, 2, problem.plan.n_frequencies, residuals(problem, study, estimate),
+            Eigen::MatrixX2d::Zero(problem.bands.size(), 2)};
+  }
+
+  [[nodiscard]] NormalEquations equations(const NoiseBands& noise, double reference_share,
+                                          bool corrected) const {
+    return normal_equations(band_sums(problem, study, residuals(problem, study, estimate), estimate, noise,
+                                      ReferenceNoise::even(problem.bands, reference_share), corrected),
+                            estimate);
+  }
+
+  /// Weighted sum of squares; the noise stays what it was.
+  [[nodiscard]] double cost(const Estimate& at, const NoiseBands& noise) const {
+    const Residuals e = residuals(problem, study, at);
+    double sum = 0.0;
+    for (Eigen::Index band = 0; band < problem.bands.size(); ++band)
+      for (Eigen::Index w = 0; w < 2; ++w)
+        for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k)
+          for (Eigen::Index i = 0; i < 6; ++i)
+            sum += (k == 0 ? 1.0 : 2.0) * std::norm(e(w * problem.plan.n_frequencies + k, i)) /
+                   noise.window_power(w, band, i);
+    return sum;
+  }
+};
+
+/// The time offset and the clock's rate act on the samples before the transform, so that no difference of
+/// residuals shows them; every other derivative is held against one.
+TEST(NormalEquations, GradientIsThatOfTheSumOfSquares) {
+  Drawn drawn;
+  const NoiseBands noise = drawn.noise();
+  // Hardly any noise is the reference's: the weights then do not depend on the parameters.
+  const auto equations = drawn.equations(noise, 1e-12, false);
+  for (Eigen::Index i = 0; i < kParameters; ++i) {
+    if (i == kTimeOffset || i == kClockRate) continue;
+    constexpr double kStep = 1e-6;
+    ParameterVector step = ParameterVector::Zero();
+    step[i] = kStep;
+    Estimate more = drawn.estimate;
+    more.sensor.add(step);
+    Estimate less = drawn.estimate;
+    less.sensor.add(-step);
+    const double difference = -0.25 * (drawn.cost(more, noise) - drawn.cost(less, noise)) / kStep;
+    const double scale = std::sqrt(equations.information(i, i) * drawn.cost(drawn.estimate, noise));
+    EXPECT_NEAR(equations.gradient[i], difference, 10.0 * kSmall * scale) << "parameter " << i;
+  }
+}
+
+/// Windows overlap, and neighbouring frequencies of a window are correlated; all of it has to come out as if
+/// every instant had been counted once.
+TEST(NormalEquations, ScoresOfWhiteNoiseVaryAsTheInformationSays) {
+  constexpr Eigen::Index kInstants = 6'000;
+  constexpr double kRate_hz = 50.0;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  const auto white = [&](Eigen::Index columns) {
+    return Eigen::MatrixXd::NullaryExpr(kInstants, columns, [&] { return normal(random); }).eval();
+  };
+  // A vehicle's motion is slow.
+  const auto slow = [&](Eigen::Index columns) {
+    Eigen::MatrixXd series = white(columns);
+    for (Eigen::Index i = 1; i < kInstants; ++i) series.row(i) += 0.99 * series.row(i - 1);
+    return series;
+  };
+  Problem problem;
+  problem.plan = plan_windows(std::vector<char>(kInstants, 1), kRate_hz, 8.0);
+  problem.bands = Bands(problem.plan.n_frequencies);
+  problem.constant = window_spectrum(problem.plan);
+  problem.reference = Spectra(problem.plan, slow(kReferenceColumns));
+  const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
+  problem.from_middle_s.setLinSpaced(n_windows, -1.0, 1.0);
+  problem.mean_gyro_power.setOnes(problem.bands.size());
+  Estimate estimate;
+  estimate.deviation.assign(static_cast<std::size_t>(problem.bands.size()), DeviationVector::Zero());
+  estimate.deviation_sd.setConstant(problem.bands.size(), 2, 1e-9);
+  const Eigen::MatrixX2d none = Eigen::MatrixX2d::Zero(problem.bands.size(), 2);
+  ParameterVector sum = ParameterVector::Zero();
+  constexpr int kDraws = 30;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    // What the S-IMU shows only enters through its g-sensitivity.
+    const Spectra study(problem.plan, slow(6));
+    Residuals noise(n_windows * problem.plan.n_frequencies, 6);
+    const Spectra drawn(problem.plan, white(6));
+    for (Eigen::Index w = 0; w < n_windows; ++w)
+      for (Eigen::Index k = 0; k < problem.plan.n_frequencies; ++k)
+        noise.row(w * problem.plan.n_frequencies + k) = drawn.row(w, k);
+    const NoiseBands bands(problem.bands, n_windows, problem.plan.n_frequencies, noise, none);
+    const auto equations = normal_equations(
+        band_sums(problem, study, noise, estimate, bands, ReferenceNoise::even(problem.bands, 0.0), false),
+        estimate);
+    sum += equations.gradient.cwiseAbs2().cwiseQuotient(equations.information.diagonal());
+  }
+  const ParameterVector ratio = sum / kDraws;
+  // The ends of the record lie in one window instead of two and count half, so that a little less than one is
+  // right: twelve windows have two ends.
+  EXPECT_LT(ratio.mean(), 1.05);
+  EXPECT_GT(ratio.mean(), 0.7);
+}
+
+TEST(NormalEquations, ABandThatMayDeviateFreelyTellsNothingOfTheAxes) {
+  Drawn drawn;
+  const NoiseBands noise = drawn.noise();
+  const auto rigid = drawn.equations(noise, 0.0, false);
+  drawn.estimate.deviation_sd.setConstant(1e3);
+  const auto loose = drawn.equations(noise, 0.0, false);
+  // What is left is what zero frequency says, which has no deviation.
+  const auto at_zero =
+      band_sums(drawn.problem, drawn.study, residuals(drawn.problem, drawn.study, drawn.estimate),
+                drawn.estimate, noise, ReferenceNoise::even(drawn.problem.bands, 0.0), false)
+          .front();
+  for (const Eigen::Index i : {Eigen::Index{kPsi}, Eigen::Index{kGyroShape}, Eigen::Index{kAlpha}}) {
+    EXPECT_GT(rigid.information(i, i), 1.2 * at_zero.information(i, i)) << i;
+    EXPECT_NEAR(loose.information(i, i), at_zero.information(i, i), 1e-3 * rigid.information(i, i)) << i;
+  }
+}
+
+TEST(NormalEquations, NoiseOfTheReferenceIsNoInformation) {
+  Drawn drawn;
+  const NoiseBands noise = drawn.noise();
+  const auto equations = drawn.equations(noise, 0.5, true);
+  EXPECT_GT(equations.of_noise(kLeverArm, kLeverArm), 0.0);
+  EXPECT_LT(equations.of_noise(kLeverArm, kLeverArm), equations.information(kLeverArm, kLeverArm));
+  const auto without = drawn.equations(noise, 1e-12, true);
+  EXPECT_LT(without.of_noise(kLeverArm, kLeverArm), 1e-9 * without.information(kLeverArm, kLeverArm));
+}
+
+/// B-24: the published frame describes the same sensor, and its derivative is that of the parameters.
+TEST(AxesFrame, IsTheSameSensorWithTriangularMatrices) {
+  const SensorState symmetric = Drawn().estimate.sensor;
+  const SensorState axes = in_axes_frame(symmetric).sensor;
+  EXPECT_LT((axes.C_b_gyro() - symmetric.C_b_gyro()).norm(), 1e-14);
+  EXPECT_LT((axes.C_b_accel() - symmetric.C_b_accel()).norm(), 1e-14);
+  for (const auto& matrix : {axes.gyro_shape(), axes.accel_shape()})
+    for (const auto& [row, column] : {std::pair(0, 1), std::pair(0, 2), std::pair(1, 2)})
+      EXPECT_EQ(matrix(row, column), 0.0);
+
+  const auto derivative = in_axes_frame(symmetric).derivative;
+  constexpr double kStep = 1e-5;
+  for (Eigen::Index i = kGyroShape; i < kAccelDelay; ++i) {
+    SensorState moved = symmetric;
+    ParameterVector step = ParameterVector::Zero();
+    step[i] = kStep;
+    moved.add(step);
+    const SensorState there = in_axes_frame(moved).sensor;
+    ParameterVector change = (there.x - axes.x) / kStep;
+    change.segment<3>(kPsi) = -imuscope::log_so3(axes.C_b_s.transpose() * there.C_b_s) / kStep;
+    // Departures are of the size kSmall, and products of two of them are left out.
+    EXPECT_LT((change - derivative.col(i)).cwiseAbs().maxCoeff(), 10.0 * kSmall) << i;
+  }
+}
+
+}  // namespace

@@ -1,0 +1,116 @@
+/// What is not known at the start is in the sd: antenna, latency, and the level that rest gives.
+
+#include <gtest/gtest.h>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "estimation/calibration/eigen_types.h"
+#include "estimation/navigation/so3.h"
+#include "tests/estimation/calibration/simulated_drive.h"
+
+namespace imuscope::test {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A mean of squares over n errors that are normal with the sd claimed lies within this many of its own sd.
+constexpr double kOwnSd = 3.3;
+
+struct Squares {
+  double sum = 0.0;
+  int n = 0;
+  void add(double error, double sd) {
+    sum += error * error / (sd * sd);
+    ++n;
+  }
+  void expect_not_too_sure(const char* name) const {
+    EXPECT_LT(sum / n, 1.0 + kOwnSd * std::sqrt(2.0 / n)) << name;
+    testing::Test::RecordProperty(name, std::to_string(sum / n));
+  }
+  void expect_normal(const char* name) const {
+    expect_not_too_sure(name);
+    EXPECT_GT(sum / n, 1.0 - kOwnSd * std::sqrt(2.0 / n)) << name;
+  }
+};
+
+TEST(Antenna, LeverArmAndLatencyThatAreWrongAreFoundWithinTheirSd) {
+  constexpr int kDrives = 24;
+  constexpr double kLatency_s = 0.1;
+  std::mt19937 random(71);
+  std::normal_distribution<> normal;
+  Squares arm;
+  Squares latency;
+  Squares position;
+  for (int drive_number = 0; drive_number < kDrives; ++drive_number) {
+    SimulatedDrive drive(200.0, {}, static_cast<std::uint64_t>(200 + drive_number));
+    EstimatorConfig config = drive.config();
+    // In this simulation the antenna is at b's origin.
+    for (std::size_t i = 0; i < 3; ++i)
+      config.gnss.antenna_lever_arm_b_m[i] = config.gnss.antenna_lever_arm_sd_m[i] * normal(random);
+    config.gnss.latency_s = kLatency_s;
+    config.gnss.latency_sd_s = 0.5 * kLatency_s;
+    const double late_s = std::max(0.01, kLatency_s + config.gnss.latency_sd_s * normal(random));
+    Estimator estimator(config);
+    while (!drive.done()) {
+      std::vector<Sample> samples = drive.next();
+      for (Sample& sample : samples) {
+        if (sample.kind == SampleKind::kGnss) sample.time += from_seconds(late_s);
+        estimator.add(sample);
+      }
+      estimator.advance(samples.front().arrival);
+    }
+    const NavigationOutput& out = estimator.navigation();
+    ASSERT_EQ(out.status, NavigationStatus::kNavigating);
+    for (std::size_t i = 0; i < 3; ++i) arm.add(out.antenna_lever_arm_b_m[i], out.sd_antenna_lever_arm_m[i]);
+    EXPECT_LT(out.sd_receiver_latency_s, 1e-3);
+    latency.add(out.receiver_latency_s - late_s, out.sd_receiver_latency_s);
+    position.add(horizontal_error_m(out, drive.motion().state_at(drive.time_s() - 0.01)),
+                 std::hypot(out.sd_position_m[0], out.sd_position_m[1]));
+  }
+  arm.expect_normal("arm");
+  latency.expect_normal("latency");
+  position.expect_normal("position");
+}
+
+TEST(Antenna, ThatIsKnownExactlyStaysWhereItIs) {
+  SimulatedDrive drive(60.0, {}, 5);
+  EstimatorConfig config = drive.config();
+  config.gnss.antenna_lever_arm_sd_m = {};
+  config.gnss.latency_sd_s = 0.0;
+  Estimator estimator(config);
+  run(drive, estimator);
+  EXPECT_EQ(estimator.navigation().antenna_lever_arm_b_m, Vector3{});
+  EXPECT_EQ(estimator.navigation().receiver_latency_s, 0.0);
+  EXPECT_EQ(estimator.navigation().sd_antenna_lever_arm_m, Vector3{});
+}
+
+/// Level and heading from rest; the vehicle stands on. Its accelerometers' bias is all that is wrong with the
+/// level, its gyros' with the heading.
+TEST(Start, OfAGyrocompassKnowsThatTiltAndBiasAreOneError) {
+  constexpr int kRuns = 30;
+  Squares level;
+  Squares heading;
+  for (int run_number = 0; run_number < kRuns; ++run_number) {
+    SimulatedDrive drive(90.0, {}, static_cast<std::uint64_t>(300 + run_number),
+                         imusim::ScenarioKind::kStatic);
+    EstimatorConfig config = drive.config();
+    config.navigation.initial_rpy_rad.reset();
+    Estimator estimator(config);
+    run(drive, estimator);
+    const NavigationOutput& out = estimator.navigation();
+    ASSERT_EQ(out.status, NavigationStatus::kNavigating);
+    ASSERT_EQ(out.method, InitialisationMethod::kGyrocompass);
+    const imusim::MotionState truth = drive.motion().state_at(drive.time_s() - 0.01);
+    const Vector3d phi_b = log_so3(to_eigen(out.C_b_n).transpose() * truth.C_b_n);
+    level.add(phi_b.x(), out.sd_rpy_rad[0]);
+    level.add(phi_b.y(), out.sd_rpy_rad[1]);
+    heading.add(phi_b.z(), out.sd_rpy_rad[2]);
+  }
+  level.expect_normal("level");
+  // The filter allows for a parked vehicle that sways, which this one does not.
+  heading.expect_not_too_sure("heading");
+}
+
+}  // namespace
+}  // namespace imuscope::test

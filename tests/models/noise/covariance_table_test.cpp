@@ -1,0 +1,120 @@
+#include "models/noise/covariance_table.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "models/noise/wv_covariance.h"
+
+namespace imuscope::noise {
+namespace {
+
+/// As of one run of `n` samples.
+WaveletVariance record_of(std::uint64_t n, int levels) {
+  WaveletVariance wv;
+  wv.n_samples = wv.n_valid = n;
+  for (int level = 1; level <= levels; ++level) {
+    WvLevel l;
+    l.level = level;
+    l.tau_samples = std::ldexp(1.0, level);
+    l.n_coefficients = n - (std::uint64_t{1} << static_cast<unsigned>(level)) + 1;
+    l.value = 1.0 / l.tau_samples;
+    wv.levels.push_back(l);
+  }
+  wv.segments = {{0, n}};
+  return wv;
+}
+
+/// Largest difference of an entry in the sds of its levels.
+double distance(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  const Eigen::VectorXd sd = b.diagonal().cwiseSqrt();
+  return (a - b).cwiseQuotient(sd * sd.transpose()).cwiseAbs().maxCoeff();
+}
+
+Component gm(double rate, double variance) { return {ProcessKind::kGaussMarkov, variance, {rate, 0.0}}; }
+
+constexpr double kAgree = 1e-3;
+
+TEST(CovarianceTable, AgreesWithTheSumForEachModelByItself) {
+  const Component wn{ProcessKind::kWhiteNoise, 1.0, {}};
+  const Component qn{ProcessKind::kQuantization, 2.0, {}};
+  const Component rw{ProcessKind::kRandomWalk, 1e-7, {}};
+  const Component dr{ProcessKind::kRamp, 1e-12, {}};
+  const Component fn{ProcessKind::kFlicker, 1e-3, {}};
+  const Component pl{ProcessKind::kPowerLaw, 1e-3, {1.3, 0.0}};
+  const Component ma{ProcessKind::kMa1, 1.0, {-0.4, 0.0}};
+  const Component arma{ProcessKind::kArma11, 1.0, {0.9, 0.2}};
+  const Component sine{ProcessKind::kSinusoid, 0.01, {0.0355, 0.0}};
+  const std::vector<std::pair<std::string, Model>> models{
+      {"WN", {{wn}}},
+      {"QN+WN+RW", {{qn, wn, rw}}},
+      {"GM fast", {{gm(3.1, 1.0)}}},
+      {"GM", {{gm(0.0713, 1.0)}}},
+      {"GM slow", {{gm(2.3e-5, 1.0)}}},
+      {"3 GM + DR", {{gm(0.71, 1.0), gm(0.013, 0.01), gm(1.7e-4, 0.02), dr}}},
+      {"WN+FN+RW", {{wn, fn, rw}}},
+      {"WN+PL", {{wn, pl}}},
+      {"MA1+RW", {{ma, rw}}},
+      {"ARMA11+RW", {{arma, rw}}},
+      {"WN+SIN", {{wn, sine}}},
+  };
+  const WaveletVariance wv = record_of(300'001, 17);
+  const CovarianceTable table(wv, wv.levels.size());
+  for (const auto& [name, model] : models) {
+    SCOPED_TRACE(name);
+    EXPECT_LT(distance(table.of(model, wv), wv_covariance(model, wv, wv.levels.size())), kAgree);
+  }
+}
+
+TEST(CovarianceTable, ResonancesAreSummedByThemselves) {
+  const WaveletVariance wv = record_of(200'000, 16);
+  const CovarianceTable table(wv, wv.levels.size());
+  const Component wn{ProcessKind::kWhiteNoise, 1.0, {}};
+  const Component fn{ProcessKind::kFlicker, 1e-3, {}};
+  for (const Shape shape : {Shape{0.06, 1.25}, Shape{0.025, 0.6}, Shape{0.9, 0.4}, Shape{0.3, 3.1}}) {
+    const Component res{ProcessKind::kResonance, 0.7, shape};
+    for (const Model& model :
+         {Model{{res}}, Model{{wn, res, gm(0.3, 0.4), gm(1e-3, 0.02)}}, Model{{res, fn}}}) {
+      SCOPED_TRACE(std::to_string(shape[0]) + " " + std::to_string(model.components.size()));
+      EXPECT_LT(distance(table.of(model, wv), wv_covariance(model, wv, wv.levels.size())), kAgree);
+    }
+  }
+}
+
+TEST(CovarianceTable, GivesTheSameWhoeverAskedBefore) {
+  const WaveletVariance wv = record_of(50'000, 14);
+  const CovarianceTable used(wv, wv.levels.size());
+  const Model first{{gm(0.2, 1.0), {ProcessKind::kResonance, 0.7, {0.06, 1.25}}}};
+  const Model second{{gm(0.02, 1.0), {ProcessKind::kResonance, 0.7, {0.07, 1.2}}}};
+  (void)used.of(second, wv);
+  const CovarianceTable fresh(wv, wv.levels.size());
+  EXPECT_EQ(used.of(first, wv), fresh.of(first, wv));
+}
+
+TEST(CovarianceTable, OneIsSharedByRecordsOfOneLengthAndNoOthers) {
+  CovarianceTables tables;
+  const WaveletVariance wv = record_of(50'000, 12);
+  const auto table = tables.of(wv, 12);
+  WaveletVariance other = wv;
+  for (WvLevel& level : other.levels) level.value *= 3.0;
+  EXPECT_EQ(tables.of(other, 12), table);
+  EXPECT_NE(tables.of(wv, 11), table);
+  EXPECT_NE(tables.of(record_of(50'001, 12), 12), table);
+  other.segments = {{0, 20'000}, {20'100, 50'000}};
+  EXPECT_EQ(tables.of(other, 12), nullptr) << "stretches have no table";
+  other = wv;
+  other.efficiency = 0.6;
+  EXPECT_EQ(tables.of(other, 12), nullptr) << "nor has a robust one";
+}
+
+TEST(CovarianceTable, AsksTheSumForWhatItDoesNotHold) {
+  const WaveletVariance wv = record_of(5'000, 10);
+  const CovarianceTable table(wv, wv.levels.size());
+  const Model alternating{{{ProcessKind::kArma11, 1.0, {-0.5, 0.2}}}};
+  EXPECT_EQ(table.of(alternating, wv), wv_covariance(alternating, wv, wv.levels.size()));
+}
+
+}  // namespace
+}  // namespace imuscope::noise
