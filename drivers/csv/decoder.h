@@ -1,7 +1,7 @@
 #pragma once
 
-/// CSV recordings as devices: an IMU or a GNSS receiver whose samples are rows. README.md in this folder says
-/// it for users.
+/// CSV recordings as devices: an IMU or a GNSS receiver whose samples are rows. README.md in this folder
+/// explains it to users.
 ///
 /// The time column is the device's own time. The clock map brings it to the host's scale: kFixed for files
 /// (a clock in common with other files has their origin; an own clock gets one from whoever aligns the

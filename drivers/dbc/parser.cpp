@@ -297,7 +297,7 @@ class Parser {
     if (take_sign('-')) {
       layout.coding = Coding::kSigned;
     } else if (!take_sign('+')) {
-      fail_expected("'+' or '-' behind the byte order");
+      fail_expected("'+' or '-' after the byte order");
     }
   }
 

@@ -3,7 +3,7 @@
 /// One frame of a CAN bus, classic or FD, and its form as bytes: the form in which frames travel from a
 /// socket or a log to a decoder and into the capture, so that a CAN device is a device like any other.
 ///
-/// A read of a CAN device holds whole records, one a frame, oldest first. A record, least significant byte
+/// A read of a CAN device holds whole records, one per frame, oldest first. A record, least significant byte
 /// first:
 ///
 ///     offset 0  u32   identifier; bit 31: of 29 bits, bit 30: remote frame, bit 29: error frame

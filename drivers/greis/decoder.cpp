@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/wgs84.h"
 #include "drivers/device/calendar.h"
 #include "drivers/device/feed.h"
-#include "drivers/device/wgs84.h"
 #include "sample/gps_time.h"
 
 namespace imuscope::greis {

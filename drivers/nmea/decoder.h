@@ -3,7 +3,7 @@
 /// GNSS receivers that send NMEA 0183: the sentences of an epoch to one kGnss sample.
 ///
 /// The sentences of an epoch share the time field; those without one (VTG) belong to the epoch around them.
-/// An epoch ends when the sentence comes that was the last one of the epoch before, or when the time changes.
+/// An epoch ends with the sentence that was the last one of the epoch before, or when the time changes.
 ///
 /// - Position and solution from GGA. The height above the ellipsoid is MSL height plus geoid separation;
 ///   where the receiver leaves the separation out, the configured one is taken, and without one the position

@@ -20,9 +20,8 @@ bool Session::hear(std::span<const std::uint8_t> bytes, HostTime) noexcept {
 }
 
 std::string_view Session::nothing_comes() const noexcept {
-  return "no pulse comes; check that the receiver has a fix and its pulse is switched on, the wire, and the "
-         "other "
-         "edge (sudo ppstest DEVICE shows both)";
+  return "no pulse comes; check that the receiver has a fix and its pulse is switched on, the wire, "
+         "and the other edge (sudo ppstest DEVICE shows both)";
 }
 
 std::string_view Session::nothing_is_understood() const noexcept { return nothing_comes(); }

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "base/units.h"
+#include "base/wgs84.h"
 #include "drivers/device/feed.h"
-#include "drivers/device/wgs84.h"
 #include "sample/gps_time.h"
 
 namespace imuscope::rtklib_pos {

@@ -138,10 +138,10 @@ void read_data(Cursor& in, CanFrame& frame) {
 
 /// "#..." behind the identifier.
 void read_content(Cursor& in, CanFrame& frame) {
-  in.expect('#', "behind the identifier stands a #");
+  in.expect('#', "after the identifier stands a #");
   if (in.skip('#')) {
     const int flags = in.rest().empty() ? -1 : hex_digit(in.rest()[0]);
-    if (flags < 0) return in.fail("behind ## stands one digit of CAN FD flags");
+    if (flags < 0) return in.fail("after ## stands one digit of CAN FD flags");
     (void)in.skip(in.rest()[0]);
     frame.is_fd = true;
     frame.bit_rate_switched = (flags & kFdBitRateSwitch) != 0;
@@ -199,7 +199,7 @@ CandumpLine read_candump_line(std::string_view line) {
   if (in.ok()) read_id(in, frame);
   if (in.ok()) read_content(in, frame);
   if (in.ok() && !in.rest().empty() && in.rest() != " R" && in.rest() != " T") {
-    in.fail("behind the data stands nothing but a direction, R or T");
+    in.fail("after the data stands nothing but a direction, R or T");
   }
   read.kind = in.ok() ? CandumpLine::Kind::kFrame : CandumpLine::Kind::kError;
   read.why = in.why();

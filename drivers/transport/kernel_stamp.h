@@ -46,7 +46,7 @@ struct BothClocks {
 /// The best of a few tries. Core: no allocation.
 [[nodiscard]] BothClocks read_both_clocks() noexcept;
 
-/// Core: no allocation after construction. One map a socket.
+/// Core: no allocation after construction. One map per socket.
 class KernelStampMap {
  public:
   /// Call before the stamps of each read are mapped, with both clocks as they are now.

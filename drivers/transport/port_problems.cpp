@@ -161,8 +161,8 @@ Error explain_open_failure(const std::string& path, int error) {
       return {
           ErrorKind::kWork, fmt::format("no permission for port {}", path),
           fmt::format(
-              "add yourself to its group (sudo usermod -aG {0} $USER, then log in again), or give it away "
-              "by a udev rule: SUBSYSTEM==\"tty\", GROUP=\"{0}\", MODE=\"0660\"",
+              "add yourself to its group (sudo usermod -aG {0} $USER, then log in again), or open it up to "
+              "that group by a udev rule: SUBSYSTEM==\"tty\", GROUP=\"{0}\", MODE=\"0660\"",
               group)};
     }
     case EBUSY: {

@@ -58,9 +58,8 @@ std::string devices_there() {
   }
   std::sort(names.begin(), names.end());
   if (names.empty())
-    return "this PC has none; load pps-gpio, or attach a serial port whose DCD pin the pulse is on: sudo "
-           "ldattach pps "
-           "/dev/ttyS0";
+    return "this PC has none; load pps-gpio, or attach a serial port whose DCD pin the pulse is on: "
+           "sudo ldattach pps /dev/ttyS0";
   return fmt::format("there are: {}", fmt::join(names, ", "));
 }
 

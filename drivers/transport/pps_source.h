@@ -1,9 +1,9 @@
 #pragma once
 
 /// Pulses of a PPS device of the kernel (RFC 2783; /dev/pps0 of pps-gpio, pps-ldisc or a card): each as a
-/// pulse_record.h, on the host's time scale. The kernel stamps a pulse in its interrupt, so that it does not
-/// matter when it is asked. It is asked fifty times a second, to notice as soon how the PC steers its clock:
-/// a pulse a second later tells of 500 ppm when they have become half a millisecond.
+/// pulse_record.h, on the host's time scale. The kernel stamps a pulse in its interrupt, so it does not
+/// matter when the kernel is asked. It is asked fifty times a second, to notice at once how the PC steers its
+/// clock: a pulse a second later tells of 500 ppm only when they have become half a millisecond.
 
 #include <linux/pps.h>
 

@@ -1,8 +1,7 @@
 #pragma once
 
 /// Samples out of the CAN output of an XSens MTi-600. SampleTime and GroupCounter open a group; it is closed
-/// by the next one that opens, never by a count of frames, so that a sample comes one period after its
-/// instant.
+/// by the next one that opens, never by a count of frames, so a sample comes one period after its instant.
 ///
 /// Rates and forces are taken from the increments (delta_q, delta_v) where both are sent: the rate of turn
 /// has steps of 0.11 deg/s. Then from rate_of_turn and acceleration, then from the two high-rate messages,
@@ -22,7 +21,7 @@
 
 namespace imuscope::xsens_can {
 
-/// How the device was set up: its rate and the identifiers of its messages are not to be read off the bus.
+/// How the device was set up: its rate and the identifiers of its messages cannot be read off the bus.
 struct DecoderConfig {
   DeviceIndex device = 0;
   double rate_hz = 100.0;  ///< of the groups

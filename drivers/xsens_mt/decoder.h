@@ -10,7 +10,7 @@
 /// Legacy data does not say what it holds. The decoder takes the layout it is given, until a Configuration
 /// message in the stream names the real one (a session asks for it before every measurement).
 ///
-/// Lost is what the device's own count misses, but for the pause that begins with its acknowledgement of
+/// What the device's own count misses is lost, but for the pause that begins with its acknowledgement of
 /// GoToConfig.
 ///
 /// Time: the sample counter (MTData, period of the configuration) or SampleTimeFine (MTData2) through the

@@ -3,7 +3,7 @@
 /// Finds frames of the XSens MT protocol in a byte stream. After a bad checksum or length the search goes on
 /// at the byte behind the false preamble.
 ///
-/// The checksum has 8 bits only, so that one false start in 256 passes it and covers what lies in its length.
+/// The checksum has only 8 bits, so one false start in 256 passes it and covers what lies in its length.
 /// No good frame is lost to that:
 /// - A frame that lies whole inside another one is given as well, marked `nested`: one of the two is false,
 ///   and only their contents tell which. Those who act on frames take data out of nested ones, and no

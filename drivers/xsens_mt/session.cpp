@@ -477,8 +477,8 @@ bool MtSession::sync_in_is_wanted() const noexcept {
 void MtSession::on_configuration_checked(HostTime now) noexcept {
   sync_in_written_ = false;
   if (!sync_in_is_wanted()) {
-    say("the device took SyncIn mode 0x%04X, skip %u, offset %u; wanted are 0x%04X, %u, "
-        "%u: check what its manual allows",
+    say("the device took SyncIn mode 0x%04X, skip %u, offset %u; wanted: 0x%04X, %u, %u; "
+        "check what its manual allows",
         static_cast<unsigned>(configuration_->sync_in_mode),
         static_cast<unsigned>(configuration_->sync_in_skip),
         static_cast<unsigned>(configuration_->sync_in_offset), static_cast<unsigned>(config_.sync_in->mode),
@@ -491,7 +491,7 @@ void MtSession::on_configuration_checked(HostTime now) noexcept {
     return;
   }
   const DeviceRecord& device = configuration_->devices[0];
-  say("the device took mode 0x%04X, settings 0x%08X at %.6g Hz; wanted are 0x%04X, 0x%08X at %.6g Hz",
+  say("the device took mode 0x%04X, settings 0x%08X at %.6g Hz; wanted: 0x%04X, 0x%08X at %.6g Hz",
       static_cast<unsigned>(device.output_mode), static_cast<unsigned>(device.output_settings),
       configuration_->rate_hz(), static_cast<unsigned>(config_.layout.mode),
       static_cast<unsigned>(config_.layout.settings), config_.rate_hz);
@@ -606,7 +606,7 @@ void MtSession::watch_stream(HostTime now) noexcept {
     say("the device stopped sending; check its power and cable");
     enter(Step::kSilent, now);
   } else if (now - last_wanted_ > patience) {
-    say("the device sends other data than was asked for; it is set up again");
+    say("the device sends data other than what was asked for; it is set up again");
     enter(Step::kGoToConfig, now);
   }
 }

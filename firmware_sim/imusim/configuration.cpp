@@ -187,7 +187,7 @@ void read_optional_vector(TableReader& in, std::string_view key, double unit,
 }
 
 /// What the noise follows.
-void read_dependence(TableReader& in, StudySimulation& study) {
+void read_dependence(TableReader& in, SImuSimulation& study) {
   constexpr double kAny = 10.0;
   constexpr double kColdest_degC = -55.0;
   constexpr double kWarmest_degC = 125.0;
@@ -201,8 +201,8 @@ void read_dependence(TableReader& in, StudySimulation& study) {
   in.number("warm_up_s", temperature.time_constant_s, 1.0, 1.0, 1e5);
 }
 
-StudySimulation read_study(TableReader& in, const MtxClass& common) {
-  StudySimulation study;
+SImuSimulation read_study(TableReader& in, const MtxClass& common) {
+  SImuSimulation study;
   study.draw = common;
   in.text("name", study.name);
   study.model = static_cast<XsensModel>(in.choice("model", {"mtx", "mti"}, 0));
@@ -236,7 +236,7 @@ StudySimulation read_study(TableReader& in, const MtxClass& common) {
 
 /// Brings the [[simulation.imu]] tables into the order of the S-IMUs.
 void read_studies(TableReader& in, const MtxClass& common, Configuration& configuration) {
-  std::vector<StudySimulation> found;
+  std::vector<SImuSimulation> found;
   for (TableReader& table : in.tables("imu")) {
     found.push_back(read_study(table, common));
     const std::string& name = found.back().name;
@@ -244,14 +244,14 @@ void read_studies(TableReader& in, const MtxClass& common, Configuration& config
         configuration.devices.begin(), configuration.devices.end(),
         [&](const PlayedDevice& device) { return device.role == Role::kStudy && device.name == name; });
     if (!known) table.fail("name", "must be that of a device with role = \"study\"");
-    const auto same = [&](const StudySimulation& other) { return other.name == name; };
+    const auto same = [&](const SImuSimulation& other) { return other.name == name; };
     if (std::count_if(found.begin(), found.end(), same) > 1) table.fail("name", "is used twice");
   }
   for (const PlayedDevice& device : configuration.devices) {
     if (device.role != Role::kStudy) continue;
     const auto place = std::find_if(found.begin(), found.end(),
-                                    [&](const StudySimulation& study) { return study.name == device.name; });
-    StudySimulation drawn;
+                                    [&](const SImuSimulation& study) { return study.name == device.name; });
+    SImuSimulation drawn;
     drawn.name = device.name;
     drawn.draw = common;
     configuration.studies.push_back(place == found.end() ? drawn : *place);

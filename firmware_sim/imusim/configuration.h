@@ -108,7 +108,7 @@ struct WheelSimulation {
   double latency_s = 0.002;
 };
 
-struct StudySimulation {
+struct SImuSimulation {
   std::string name;
   XsensModel model = XsensModel::kMtx;
   MtiOutput can_output = MtiOutput::kIncrements;
@@ -144,11 +144,11 @@ struct Configuration {
   GnssSimulation gnss;
   WheelSimulation wheels;
   CanLineOptions can;
-  LineOptions line;                      ///< all but the baud rate
-  bool has_pc_rate = false;              ///< line.clock has a rate that is given, not drawn
-  std::vector<StudySimulation> studies;  ///< one for each device with role study, in its order
-  std::vector<Fault> faults;             ///< of a fault script
-  std::string fault_text;                ///< the script as read; empty where there is none
+  LineOptions line;                     ///< all but the baud rate
+  bool has_pc_rate = false;             ///< line.clock has a rate that is given, not drawn
+  std::vector<SImuSimulation> studies;  ///< one for each device with role study, in its order
+  std::vector<Fault> faults;            ///< of a fault script
+  std::string fault_text;               ///< the script as read; empty where there is none
 
   [[nodiscard]] static bool is_on_can(const PlayedDevice& device) {
     return device.protocol == Protocol::kXsensCan || device.protocol == Protocol::kCanOdometry;

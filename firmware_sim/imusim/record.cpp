@@ -230,7 +230,7 @@ Outcome<std::vector<Recorded>> record(const Configuration& configuration, const 
 
   std::vector<std::unique_ptr<OutputFile>> error_files;
   if (options.true_errors) {
-    for (const StudyTruth& study : world.studies()) {
+    for (const SImuTruth& study : world.studies()) {
       error_files.push_back(
           std::make_unique<OutputFile>(options.folder / fmt::format("errors_truth_{}.csv", study.name)));
       error_files.back()->write(error_header());

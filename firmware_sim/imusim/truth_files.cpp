@@ -86,7 +86,7 @@ void add_sensor(const ImuErrors& errors, json& imu) {
   imu["noise"] = noise_models(errors);
 }
 
-json study_json(const World& world, const StudyTruth& study) {
+json study_json(const World& world, const SImuTruth& study) {
   // s is the frame of the gyro triad, as calibration.json has it; the sensor's own errors are told about its
   // nominal axes.
   const Eigen::Matrix3d gyros = triad_matrix(study.errors.gyro) * study.mounting.C_b_s;
@@ -164,7 +164,7 @@ Outcome<void> write_truth_json(const World& world, const std::filesystem::path& 
   truth["reference"] = {{"name", world.reference().name}};
   add_sensor(world.reference().errors, truth["reference"]);
   truth["imus"] = json::array();
-  for (const StudyTruth& study : world.studies()) truth["imus"].push_back(study_json(world, study));
+  for (const SImuTruth& study : world.studies()) truth["imus"].push_back(study_json(world, study));
   return write_file(folder / "truth.json", truth.dump(1) + "\n");
 }
 

@@ -36,7 +36,7 @@ const Eigen::DiagonalMatrix<double, 3>& C_ned_nwu() {
   return flip;
 }
 
-ImuErrors errors_of(const StudySimulation& study, RegimeSwitch regime_switch, Random& random) {
+ImuErrors errors_of(const SImuSimulation& study, RegimeSwitch regime_switch, Random& random) {
   ImuErrors errors = draw_mtx(study.draw, random);
   errors.regime_switch = regime_switch;
   const auto take_over = [](TriadErrors& drawn, const TriadErrors& given,
@@ -178,7 +178,7 @@ void World::add(const PlayedDevice& played, std::unique_ptr<Device> device) {
   devices_.push_back({played, std::move(device)});
 }
 
-void World::add_study(const PlayedDevice& played, const StudySimulation& study, Beginning beginning,
+void World::add_study(const PlayedDevice& played, const SImuSimulation& study, Beginning beginning,
                       double begin_s) {
   // Every property is drawn in the same order whether it is given or not: giving one changes no other.
   Random random(configuration_.scenario.seed, played.name + "/unit");
@@ -188,7 +188,7 @@ void World::add_study(const PlayedDevice& played, const StudySimulation& study, 
   const auto drawn_counter = static_cast<std::uint16_t>(random.bits() & 0xFFFFU);
   const double drawn_phase = random.uniform();
 
-  StudyTruth truth;
+  SImuTruth truth;
   truth.name = played.name;
   truth.model = study.model;
   truth.sends_temperature = study.temperature.has_value();
@@ -223,7 +223,7 @@ void World::add_reference(const PlayedDevice& played, Beginning beginning, doubl
   Random unseen(configuration_.scenario.seed, played.name + "/imperfections");
   draw_imperfections(reference_imperfections(configuration_.world, configuration_.reference.noise), unseen,
                      errors);
-  StudyTruth clock;
+  SImuTruth clock;
   clock.name = played.name;
   clock.latency_s = configuration_.reference.latency_s;
   clock.first_counter = static_cast<std::uint16_t>(random.bits() & 0xFFFFU);
@@ -240,7 +240,7 @@ void World::add_reference(const PlayedDevice& played, Beginning beginning, doubl
           clock, beginning, begin_s);
 }
 
-void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const StudyTruth& clock,
+void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const SImuTruth& clock,
                     Beginning beginning, double begin_s) {
   auto observer = std::make_shared<OnTrueSample>();
   observers_.emplace_back(played.name, observer);
@@ -351,7 +351,7 @@ void World::add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>&
   add(played, std::move(unit));
 }
 
-void World::join_bus(const PlayedDevice& played, XbusSampler sampler, const StudyTruth& clock) {
+void World::join_bus(const PlayedDevice& played, XbusSampler sampler, const SImuTruth& clock) {
   auto bus = bus_of(buses_, played);
   if (bus == buses_.end()) bus = buses_.insert(bus, XbusLine{played, clock, {}});
   bus->by_bus_id.emplace(played.bus_id, std::move(sampler));

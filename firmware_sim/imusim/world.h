@@ -33,7 +33,7 @@ struct TrueSample {
 using OnTrueSample = std::function<void(const TrueSample&)>;
 
 /// What is true of one S-IMU.
-struct StudyTruth {
+struct SImuTruth {
   std::string name;
   Mounting mounting;
   ImuErrors errors;
@@ -67,7 +67,7 @@ using XbusSampler = std::function<xsens::MtSample(double t_s, std::int64_t count
 /// An Xbus Master's line, while its devices are being found.
 struct XbusLine {
   PlayedDevice owner;
-  StudyTruth clock;  ///< the head's, which all share
+  SImuTruth clock;  ///< the head's, which all share
   std::map<int, XbusSampler> by_bus_id;
 };
 
@@ -82,7 +82,7 @@ class World {
   [[nodiscard]] const Configuration& configuration() const { return configuration_; }
   [[nodiscard]] const Motion& motion() const { return *motion_; }
   [[nodiscard]] std::vector<WorldDevice>& devices() { return devices_; }
-  [[nodiscard]] const std::vector<StudyTruth>& studies() const { return studies_; }
+  [[nodiscard]] const std::vector<SImuTruth>& studies() const { return studies_; }
   [[nodiscard]] const ReferenceTruth& reference() const { return reference_; }
 
   /// Latency of the R-IMU, from the sampling instant to the first bit on the line.
@@ -108,22 +108,22 @@ class World {
 
  private:
   void add(const PlayedDevice& played, std::unique_ptr<Device> device);
-  void add_study(const PlayedDevice& played, const StudySimulation& study, Beginning beginning,
+  void add_study(const PlayedDevice& played, const SImuSimulation& study, Beginning beginning,
                  double begin_s);
   void add_reference(const PlayedDevice& played, Beginning beginning, double begin_s);
   void add_gnss(const PlayedDevice& played, double begin_s);
   void add_pulses(const PlayedDevice& played, double begin_s);
   void add_wheels(const PlayedDevice& played, double begin_s);
-  void join_bus(const PlayedDevice& played, XbusSampler sampler, const StudyTruth& clock);
+  void join_bus(const PlayedDevice& played, XbusSampler sampler, const SImuTruth& clock);
   void add_buses(Beginning beginning, double begin_s);
-  void add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const StudyTruth& clock,
+  void add_imu(const PlayedDevice& played, const std::shared_ptr<ImuModel>& imu, const SImuTruth& clock,
                Beginning beginning, double begin_s);
 
   Configuration configuration_;
   std::shared_ptr<const Motion> motion_;
   std::vector<WorldDevice> devices_;
   std::vector<XbusLine> buses_;
-  std::vector<StudyTruth> studies_;
+  std::vector<SImuTruth> studies_;
   ReferenceTruth reference_;
   std::vector<std::pair<std::string, std::shared_ptr<OnTrueSample>>> observers_;
   double first_reference_sample_s_ = 0.0;
@@ -135,7 +135,7 @@ Outcome<void> check_faults(World& world);
 /// The instant on the R-IMU's time scale that an S-IMU's sample shows is its stamp plus this, where both
 /// stamps are the host times of the first bit of a message: z_S(t) = h(R at t + t_d). For a motion that is
 /// slow beside the low-pass of the S-IMU's gyros.
-inline double true_time_offset_s(const World& world, const StudyTruth& study) {
+inline double true_time_offset_s(const World& world, const SImuTruth& study) {
   return world.reference_latency_s() - study.latency_s - slow_delay_s(study.errors.gyro);
 }
 

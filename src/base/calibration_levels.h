@@ -41,7 +41,7 @@ enum class CalibrationStatus : std::uint8_t {
 [[nodiscard]] constexpr bool has_estimate(CalibrationStatus status) noexcept {
   return status >= CalibrationStatus::kConverging;
 }
-/// The same of a status that was read, by key or words; files of before had the words.
+/// The same of a status that was read, by key or words; earlier files had the words.
 [[nodiscard]] constexpr bool has_estimate(std::string_view status) noexcept {
   return status == key_of(CalibrationStatus::kConverging) ||
          status == words_of(CalibrationStatus::kConverging) ||

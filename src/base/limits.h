@@ -10,8 +10,8 @@
 namespace imuscope {
 
 /// Most S-IMUs that one run can hold, and beside them the R-IMU, a GNSS receiver and an odometry device.
-inline constexpr std::size_t kMaxStudies = 6;
-inline constexpr std::size_t kMaxDevices = kMaxStudies + 3;
+inline constexpr std::size_t kMaxSImus = 6;
+inline constexpr std::size_t kMaxDevices = kMaxSImus + 3;
 /// Fastest samples that a device may be configured to send.
 inline constexpr double kMaxRate_hz = 2000.0;
 /// What most IMUs send; stalls may last longer then.
@@ -53,7 +53,7 @@ inline constexpr double kCoreStall_s = kBehind_s;
 static_assert(kCaughtUp_s + kCatchUpStep_s <= kCoreStall_s);
 /// S samples that one tick can show.
 inline constexpr std::size_t kEpochsPerTick =
-    kMaxStudies * static_cast<std::size_t>(kMaxRate_hz * kCoreStall_s);
+    kMaxSImus * static_cast<std::size_t>(kMaxRate_hz * kCoreStall_s);
 
 /// An S sample waits at most this long for the reference at its instant.
 inline constexpr double kReferenceWait_s = 0.1;
@@ -83,7 +83,7 @@ static_assert(kBehind_s > kCatchUpStep_s + kReferenceWait_s,
 inline constexpr double kPublisherStall_s = 6.0;
 /// Rows of the error process on their way to the publisher: of a stall, and all of a tick that catches up.
 inline constexpr std::size_t kErrorRingCapacity =
-    std::max(ring_capacity(static_cast<double>(kMaxStudies) * kCommonRate_hz, kPublisherStall_s),
+    std::max(ring_capacity(static_cast<double>(kMaxSImus) * kCommonRate_hz, kPublisherStall_s),
              std::bit_ceil(kEpochsPerTick));
 inline constexpr double kSnapshotRate_hz = 10.0;
 inline constexpr std::size_t kSnapshotRingCapacity = ring_capacity(kSnapshotRate_hz, kPublisherStall_s);
@@ -91,16 +91,28 @@ inline constexpr std::size_t kSnapshotRingCapacity = ring_capacity(kSnapshotRate
 inline constexpr std::size_t kEventsPerTick = 64;
 inline constexpr std::size_t kEventRingCapacity = 4 * kEventsPerTick;
 inline constexpr std::size_t kAppliedNoiseRingCapacity = 16;
-static_assert(kAppliedNoiseRingCapacity >= 2 * kMaxStudies);
+static_assert(kAppliedNoiseRingCapacity >= 2 * kMaxSImus);
 /// History of the filter on its way to the live smoother.
 inline constexpr double kHistoryRate_hz = 5.0;
 inline constexpr std::size_t kHistoryRingCapacity = ring_capacity(kHistoryRate_hz, 3.0);
 
-/// Serial lines are read once a tick. The recorder's disk may stand still for two seconds with every device
-/// that there can be, for four with five of them.
+/// Serial lines are read once a tick.
 inline constexpr double kReadRate_hz = 100.0;
-inline constexpr std::size_t kRawRingCapacity =
-    ring_capacity(static_cast<double>(kMaxDevices) * kReadRate_hz, 2.0);
+/// The recorder's disk may stand still for so long before a read is lost (capture/raw_chunk.h).
+inline constexpr double kRecordStall_s = 60.0;
+inline constexpr std::size_t kRawRingBytesMin = std::size_t{1} << 20U;
+/// Bounds the memory that is locked; only rates that no serial line carries get there.
+inline constexpr std::size_t kRawRingBytesMax = std::size_t{64} << 20U;
+/// Blocks of rows on their way to the modeller, which runs when nothing else wants to: on a busy PC a fit of every
+/// S-IMU takes minutes.
+inline constexpr double kModellerStall_s = 300.0;
+inline constexpr std::size_t kRowsPerModellerBlock = 64;
+inline constexpr std::size_t kModellerBlocks = ring_capacity(
+    static_cast<double>(kMaxSImus) * kCommonRate_hz / static_cast<double>(kRowsPerModellerBlock),
+    kModellerStall_s);
+static_assert(kModellerBlocks * kRowsPerModellerBlock >=
+                  kMaxSImus * static_cast<std::size_t>(kMaxRate_hz * 20.0),
+              "twenty seconds at the highest rate");
 /// What breaks the rule of the ticks: every sample of a stall at the highest rate of one device.
 inline constexpr std::size_t kExceptionRingCapacity = ring_capacity(kMaxRate_hz, kCoreStall_s);
 

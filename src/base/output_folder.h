@@ -94,7 +94,7 @@ class OutputFolder {
   /// Takes a file over from another folder, in place of whatever had its name here.
   [[nodiscard]] Result<void> take(const OutputFolder& from, const std::string& name) const;
 
-  /// Takes a name away, also that of an empty folder. What is absent is well.
+  /// Takes a name away, also that of an empty folder. What is absent is no error.
   void remove(const std::string& name) const noexcept;
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

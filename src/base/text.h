@@ -38,15 +38,14 @@ inline constexpr std::size_t kDeviceNameMax = 32;
 [[nodiscard]] std::string device_file_name(std::string_view stem, std::string_view name,
                                            std::string_view suffix);
 
-/// No text file that a person writes, a vehicle's DBC file included, is as large.
+/// No text file that a person writes, a vehicle's DBC file included, is this large.
 inline constexpr std::size_t kTextFileMax = std::size_t{64} << 20U;
 
 /// The content of a regular file, at most kTextFileMax bytes.
 /// @param what    the kind of file, for the error: "configuration", "DBC file"
 /// @param remedy  of a wrong path: "give the path of ..."
 /// @return a usage error that names the file where it is missing, a folder, a device or a pipe, unreadable,
-/// or
-///         larger
+///         or larger
 [[nodiscard]] Result<std::string> read_text_file(const std::filesystem::path& file, std::string_view what,
                                                  const std::string& remedy);
 

@@ -89,11 +89,6 @@ struct RawChunk {
   std::span<const std::uint8_t> bytes;
 };
 
-/// The recorder's disk may stand still for so long before a read is lost.
-inline constexpr double kRecordStall_s = 60.0;
-inline constexpr std::size_t kRawRingBytesMin = std::size_t{1} << 20U;
-/// Bounds the memory that is locked; only rates that no serial line carries get there.
-inline constexpr std::size_t kRawRingBytesMax = std::size_t{64} << 20U;
 /// Beside its bytes a chunk has what is said of it, its length, and up to a length of padding.
 inline constexpr std::size_t kRawChunkExtraBytes = sizeof(RawChunkInfo) + 2 * sizeof(std::uint64_t);
 

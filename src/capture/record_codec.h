@@ -55,7 +55,7 @@ struct RecordClock {
 [[nodiscard]] std::vector<std::uint8_t> encode(const RunHeader& header, std::int64_t file);
 [[nodiscard]] std::vector<std::uint8_t> encode(const RawChunk& chunk, const std::string& device,
                                                const RecordClock& clock);
-/// @param at       when the recorder got to know of it
+/// @param at       when the recorder learned of it
 /// @param sequence counts the exceptions of the run
 [[nodiscard]] std::vector<std::uint8_t> encode(const RunException& exception, const std::string& device,
                                                HostTime at, std::int64_t sequence, const RecordClock& clock);

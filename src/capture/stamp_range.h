@@ -6,7 +6,7 @@
 
 namespace imuscope {
 
-/// No clock of a PC has counted as far (146 years), and differences of such times fit their type: a stamp
+/// No clock of a PC has counted this far (146 years), and differences of such times fit their type: a stamp
 /// beyond is damage.
 inline constexpr std::int64_t kStampEnd_ns = std::int64_t{1} << 62U;
 

@@ -240,7 +240,7 @@ void check_same_drive(const Drive& drive, std::size_t gnss, const Curves& curves
       {Harm::kWrong,
        "other drive",
        config.name,
-       fmt::format("its positions do not turn as {} does, at no time within {:g} s",
+       fmt::format("its positions do not turn as {} does, at any time within {:g} s",
                    drive.configuration().devices[drive.configuration().reference_index()].name, kLagMax_s),
        100.0 * curves.explained,
        0.0,

@@ -178,7 +178,7 @@ struct DeviceConfig {
   ImuNoiseConfig noise;        ///< reference and study
   MountingPriorConfig prior;   ///< study
   DataSheetConfig data_sheet;  ///< study
-  int average_samples = 0;     ///< study: samples from one update to the next, see StudyConfig
+  int average_samples = 0;     ///< study: samples from one update to the next, see SImuConfig
   CsvConfig csv;               ///< csv_imu, csv_gnss
   MessagesConfig messages;     ///< mcap, rosbag, ulog, dataflash
   GnssOptions gnss;            ///< gnss
@@ -246,12 +246,12 @@ struct LcmOptions {
 struct RecordOptions {
   std::string folder;   ///< where live runs are recorded; relative to the working folder
   double sync_s = 0.5;  ///< a cut of the power costs what came in this time and while it was written
-  /// A capture goes on in another file when one is as large or as old.
+  /// A capture goes on in another file when one is this large or this old.
   double file_bytes = 2e9;
   double file_s = 3600.0;
   bool mcap = false;  ///< run.mcap beside the capture, for other people's tools
-  /// Runs that are over and not marked kept are removed, oldest first: those that ended longer ago, as many
-  /// as are more than this together, and until so much of the disk is free. Absent: never.
+  /// Runs that are over and not marked kept are removed, oldest first: those that ended longer ago than
+  /// this, while all together are larger than this, and while less of the disk is free than this. Absent: never.
   std::optional<double> remove_older_than_s;
   std::optional<double> remove_beyond_bytes;
   std::optional<double> remove_below_free_bytes;

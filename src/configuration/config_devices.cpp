@@ -504,9 +504,9 @@ void read_devices(TomlReader& root, TomlProblem& problem, AttachedFiles& files,
     root.fail("device", fmt::format("lists {} devices with role reference", count(DeviceRole::kReference)),
               "exactly one IMU is the reference");
   } else if (count(DeviceRole::kStudy) < 1 ||
-             static_cast<std::size_t>(count(DeviceRole::kStudy)) > kMaxStudies) {
+             static_cast<std::size_t>(count(DeviceRole::kStudy)) > kMaxSImus) {
     root.fail("device", fmt::format("lists {} devices with role study", count(DeviceRole::kStudy)),
-              fmt::format("1 to {} IMUs can be under study", kMaxStudies));
+              fmt::format("1 to {} IMUs can be under study", kMaxSImus));
   } else if (count(DeviceRole::kGnss) > 1) {
     root.fail("device", "lists more than one gnss device", "keep the better one");
   } else if (count(DeviceRole::kOdometry) > 1) {

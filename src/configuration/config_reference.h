@@ -20,7 +20,7 @@ struct KeyReference {
   std::string_view about;  ///< empty where nobody has written it yet
 };
 
-/// In the order of the readers. Soft.
+/// In the order of the readers. Non-real-time.
 [[nodiscard]] std::vector<KeyReference> configuration_reference();
 
 /// Sentences whose key no reader asks for.

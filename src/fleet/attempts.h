@@ -1,7 +1,7 @@
 #pragma once
 
-/// What was tried: one file an attempt, written when it begins and again when it ends. They are no part of
-/// the results; who died without a word leaves one that only began.
+/// What was tried: one file per attempt, written when it begins and again when it ends. They are no part of
+/// the results; whoever died without a word leaves one that only began.
 
 #include <cstdint>
 #include <filesystem>

@@ -47,7 +47,7 @@ class Statement {
 /// A file of SQLite. Thread: one.
 class Database {
  public:
-  /// A new one in the place of whatever was there. Nothing protects it from a cut of the power while it is
+  /// A new one in place of whatever was there. Nothing protects it from a cut of the power while it is
   /// written: whoever makes it gives it its name when it is whole.
   static Result<Database> create(const std::filesystem::path& file);
   /// One that exists, and cannot be changed through this.

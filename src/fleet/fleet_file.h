@@ -34,10 +34,10 @@ struct FleetFile {
   std::string name;
   std::vector<std::filesystem::path> captures;  ///< folders, which are searched, and files
   std::filesystem::path out;
-  std::optional<std::filesystem::path> config;  ///< in the place of the captures' own
+  std::optional<std::filesystem::path> config;  ///< in place of the captures' own
   bool keep_all_files = false;                  ///< of every run folder, its rows included
   TaskLimits limits;
-  /// A unit holds its certificate, or its data sheet, where no axis' noise is above this many times of it.
+  /// A unit meets its certificate, or its data sheet, where no axis' noise is above this many times it.
   double certificate_factor = 1.25;
   std::vector<MountingCampaign> mountings;  ///< the first that a capture fits is its own; at least one
   std::map<std::string, std::filesystem::path> certificates;  ///< by serial number

@@ -97,7 +97,7 @@ Html tiles(Reader& in) {
               : studied < captures ? "tile partly"
                                    : "tile yes",
               fmt::format("{} of {} captures studied", studied, captures),
-              open > 0             ? fmt::format("{} are open: imuscope fleet run goes on", open)
+              open > 0             ? fmt::format("{} are open: imuscope fleet run goes on with them", open)
               : studied < captures ? "the others have their reason below"
                                    : "all of them");
   out += tile(out_units > 0 ? "tile partly" : "tile yes", of(out_units, "unit stands out", "units stand out"),
@@ -308,11 +308,9 @@ Html distributions(Reader& in) {
   if (pictures.empty()) return {};
   return page::heading("distributions", "What the units are like") +
          page::paragraph(
-             "A dot is what the drives of a unit showed, their errors included; where units are many, a bar "
-             "says "
-             "how many lie there. Red ones stand out. The band holds 95 % of all such units, at a confidence "
-             "of "
-             "95 %, as they are without errors.",
+             "A dot is what the drives of a unit showed, their errors included; where units are many, "
+             "a bar says how many lie there. Red ones stand out. The band holds 95 % of all such units, "
+             "at a confidence of 95 %, as they are without errors.",
              "quiet") +
          element("div", pictures, "pictures");
 }

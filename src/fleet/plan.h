@@ -1,7 +1,7 @@
 #pragma once
 
-/// The tasks of a campaign: one study a capture, then one summary a unit. A task is named by its key, a hash
-/// of all that its result depends on: the capture's content, configuration, options and the program itself.
+/// The tasks of a campaign: one study per capture, then one summary per unit. A task is named by its key, a
+/// hash of all that its result depends on: the capture's content, configuration, options and the program itself.
 /// What stands under the key is the result, so that the folder of results is all the state that a campaign
 /// has.
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// What all units and drives of a fleet tell together: one random-effects model a quantity
+/// What all units and drives of a fleet tell together: one random-effects model per quantity
 /// (models/noise/nested_effects.h), units and drives that stand out, units that drift, units that do not hold what
 /// their certificate or their data sheet says.
 
@@ -89,7 +89,7 @@ struct QuantityResult {
   std::vector<Holding> holdings;
 };
 
-/// One result a quantity. P-values are corrected over all quantities (Holm): of units, of drives, of drifts,
+/// One result per quantity. P-values are corrected over all quantities (Holm): of units, of drives, of drifts,
 /// of what does not hold, each as a family. Parameters of the processes of a model ("GM1 beta") are
 /// described, not tested: what two processes of one model are called is chance.
 std::vector<QuantityResult> population_of(const Fleet& fleet);

@@ -13,8 +13,7 @@ namespace imuscope::fleet {
 inline constexpr const char* kStudySchema = "imuscope.fleet-study/1";
 
 /// {"t0_utc", "duration_s", "static_s", "dynamic_s", "gnss_used" (null without a receiver), "distance_m",
-/// "track":
-///  [[lat_deg, lon_deg]], "findings": [{"harm", "check", "device", "text"}], "warnings", "devices":
+///  "track": [[lat_deg, lon_deg]], "findings": [{"harm", "check", "device", "text"}], "warnings", "devices":
 ///  [{"device", "role", "protocol", "samples", "samples_lost", "bad_frames", "late", "problem"}], "imus":
 ///  [{"device", "status", "usability", "temperature_degC", "data_sheet", "C_b_s", "boresight_sd_deg",
 ///  "r_bs_b_m", "r_bs_b_sd_m", "t_d_s", "t_d_sd_s", "measurements": [[quantity, regime, axis, unit, is_log,

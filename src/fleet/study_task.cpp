@@ -203,7 +203,7 @@ Result<void> check_key(const StudyTask& task, const std::string& program) {
   if (!key) return tl::unexpected<Error>(key.error());
   if (*key == task.key) return {};
   return usage_error(
-      fmt::format("{}: capture, configuration or program ({}) are others than when the tasks were listed",
+      fmt::format("{}: capture, configuration or program ({}) is not what it was when the tasks were listed",
                   task.name, program),
       "list them again with the program that every node has: imuscope fleet tasks");
 }

@@ -43,8 +43,7 @@ class LcmListener {
   /// The kernel keeps what may wait (net.core.rmem_default bytes), and drops what comes when that is full.
   /// @param kind  of channels, without the prefix: "STATUS", or "CALIBRATION_.*" for every name of that kind
   /// @return kUsage for a name longer than a channel's can be, kWork where the kernel refuses the filter;
-  /// then
-  ///         this kind is not heard
+  ///         then this kind is not heard
   [[nodiscard]] Result<void> subscribe(std::string_view kind, Handler handler);
 
   /// Handles what has come, waiting for the first message at most for `timeout`. Returns how many messages

@@ -40,7 +40,7 @@ class LcmPublisher {
 
   /// Sends nothing before connect(); the tap gets every message all the same.
   static LcmPublisher unconnected(std::string_view prefix);
-  /// Takes this bus, in place of one of before; sequences go on.
+  /// Takes this bus, in place of an earlier one; sequences go on.
   /// @return the errors of check_lcm_url(); then all stays as it was
   [[nodiscard]] Result<void> connect(std::string_view url);
 

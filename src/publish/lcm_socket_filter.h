@@ -26,8 +26,8 @@ struct ChannelPattern {
 
 /// Lets only whole messages (LC02) on these channels through to a UDP socket. Everything else, fragments of
 /// long messages above all, is dropped by the kernel and counted in /proc/net/udp. With kThisPc a datagram
-/// must have been sent on this PC, which the kernel knows by its way, not by an address that a sender may
-/// choose.
+/// must have been sent on this PC, which the kernel knows by the way it came, not by an address that a
+/// sender may choose.
 /// @param channels  none: nothing passes
 /// @return an error of kind kWork where the kernel refuses; what was attached before then stays
 [[nodiscard]] Result<void> attach_lcm_filter(int socket, const std::vector<ChannelPattern>& channels,

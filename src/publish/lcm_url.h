@@ -1,7 +1,7 @@
 #pragma once
 
-/// Which LCM URLs serve, asked before the library is, which would print advice of its own to the terminal,
-/// abort the process, or write over a file.
+/// Which LCM URLs serve: checked before the library gets them, which would print advice of its own to the
+/// terminal, abort the process, or write over a file.
 
 #include <cstdint>
 #include <string>
@@ -32,14 +32,12 @@ struct UdpmBus {
 
 /// Of a bus to hear and to speak on.
 /// @return the errors of parse_udpm_url(); one of kind kWork where this PC has no multicast route, with the
-/// two
-///         commands that make one
+///         two commands that make one
 [[nodiscard]] Result<UdpmBus> check_lcm_bus(std::string_view url);
 
 /// Of anything to publish into: a bus, or file://PATH?mode=w, an LCM log that is not there yet.
 /// @return the errors of check_lcm_bus(); kUsage for a log that exists, which the library would empty, and
-/// for
-///         what else cannot serve (tcpq's library call aborts the process when the server goes)
+///         for what else cannot serve (tcpq's library call aborts the process when the server goes)
 [[nodiscard]] Result<void> check_lcm_url(std::string_view url);
 
 }  // namespace imuscope

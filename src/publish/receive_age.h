@@ -12,7 +12,7 @@ namespace imuscope {
 class ReceiveAge {
  public:
   using Time = std::chrono::nanoseconds;
-  /// A wall clock that went another way than the monotonic one by more than this was stepped. A step that is
+  /// A wall clock that departed from the monotonic one by more than this was stepped. A step that is
   /// shorter than what the datagram waited cannot be told from waiting: the age is wrong by it at most.
   static constexpr Time kStepMin = std::chrono::milliseconds(2);
 

@@ -135,7 +135,7 @@ class ByteRing {
   void copy_to(std::size_t place, std::span<const std::uint8_t> bytes) noexcept {
     if (!bytes.empty()) std::memcpy(storage_.data() + place, bytes.data(), bytes.size());
   }
-  /// Where the record begins that the consumer finds at `read`.
+  /// Where the record that the consumer finds at `read` begins.
   [[nodiscard]] std::uint64_t begin_of(std::uint64_t read) const noexcept {
     const std::size_t place = place_of(read);
     return length_at(place) == kPassed ? read + (storage_.size() - place) : read;

@@ -8,7 +8,7 @@
 /// envelope of (arrival - device_time): late bytes, bursts and stalls lie above it and have no influence.
 /// A constant latency of the stream stays in the mapped time; it is part of the time offset t_d.
 ///
-/// Deterministic: the mapped times are a function of the observations alone. One map a device.
+/// Deterministic: the mapped times are a function of the observations alone. One map per device.
 
 #include <array>
 #include <cstddef>
@@ -51,8 +51,7 @@ class ClockMap {
   ///
   /// @param device_time_ns  the device's time of the sample, unwrapped by the driver, any origin; |.| < 2^62
   /// @param first_byte      host time of the first byte of the sample's frame (upper bound: the read's
-  /// arrival
-  ///                        minus the time on the wire of the bytes from the first on)
+  ///                        arrival minus the time on the wire of the bytes from the first on)
   HostTime observe(std::int64_t device_time_ns, HostTime first_byte) noexcept;
 
   /// Forgets the line: the device restarted, or its count was not continuable. The rate is kept as a start.

@@ -6,8 +6,8 @@
 /// Kalman filter of two states, UTC minus host time and its rate. A pulse is stamped late where an interrupt
 /// had to wait: one that lies off by itself is left out, two in a row are the clock's own. NTP slews
 /// CLOCK_MONOTONIC, by up to 500 ppm from one moment to the next; the next pulse is too late to tell of it,
-/// and who tells how the clock is steered (steer()) tells it at once: the line is one over the quartz then.
-/// The pulses' jitter is learned from what they scatter.
+/// and whoever tells how the clock is steered (steer()) tells it at once: the line is one over the quartz then.
+/// The pulses' jitter is learned from their scatter.
 ///
 /// Deterministic: a function of the observations alone.
 

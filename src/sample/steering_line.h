@@ -35,7 +35,7 @@ class SteeringLine {
     HostTime unsteered{};
     double rate = 0.0;
   };
-  /// A pulse is told less than a second after it came, and rates change some times a minute.
+  /// A pulse is told less than a second after it came, and rates change a few times a minute.
   static constexpr std::size_t kPieces = 8;
 
   std::array<Piece, kPieces> pieces_{};  ///< the newest is the (n_ - 1)th, counted around

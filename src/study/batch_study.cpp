@@ -86,7 +86,7 @@ struct Pair {
 
   [[nodiscard]] Result<batch::BatchMounting> estimate(double from_s, double to_s) const {
     batch::BatchOptions options;
-    options.search_s = StudyConfig{}.coarse_search_s + kSearchMargin_s;
+    options.search_s = SImuConfig{}.coarse_search_s + kSearchMargin_s;
     options.reference_gyro_white_radps_per_sqrt_hz = reference_gyro_white_radps_per_sqrt_hz;
     return batch::estimate_mounting(
         records.part(reference, from_s - options.search_s, to_s + options.search_s),
@@ -125,7 +125,7 @@ BatchOutcome estimate_one(const Pair& pair, std::optional<double> moved_s) {
 
 /// Sets the direction of (psi, r) of which the drive shows least: nothing was assumed of the rotation, and of
 /// the lever arm its prior.
-void set_weakest(const batch::BatchMounting& mounting, StudyOutput& study) {
+void set_weakest(const batch::BatchMounting& mounting, SImuOutput& study) {
   Eigen::Matrix<double, 6, 1> assumed = Eigen::Matrix<double, 6, 1>::Ones();
   assumed.tail<3>().setConstant(batch::SensorClass{}.lever_arm_sd_m);
   const Eigen::Matrix<double, 6, 1> scale = assumed.cwiseInverse();
@@ -135,7 +135,7 @@ void set_weakest(const batch::BatchMounting& mounting, StudyOutput& study) {
   Eigen::Index largest = 0;
   weakest.cwiseAbs().maxCoeff(&largest);
   Eigen::Map<Eigen::Matrix<double, 6, 1>>(study.weakest_direction.data()) = weakest;
-  study.weakest_component = static_cast<StudyDirection>(largest);
+  study.weakest_component = static_cast<SImuDirection>(largest);
   study.weakest_relative_sd = std::sqrt(std::max(0.0, solver.eigenvalues()[5]));
 }
 
@@ -245,7 +245,7 @@ std::vector<BatchOutcome> estimate_mountings(const Configuration& configuration,
   return outcomes;
 }
 
-void take_over(const batch::BatchMounting& mounting, StudyOutput& study) {
+void take_over(const batch::BatchMounting& mounting, SImuOutput& study) {
   const auto& sensor = mounting.sensor;
   const Eigen::Matrix3d C_prior = Eigen::Map<const Matrix3Row>(study.C_prior.data());
   study.C_b_s = matrix_of(sensor.C_b_s);
@@ -287,8 +287,8 @@ void take_over(const batch::BatchMounting& mounting, StudyOutput& study) {
   study.status = usable ? CalibrationStatus::kCalibrated : CalibrationStatus::kConverging;
 }
 
-std::vector<StudyOutput> with_batch(std::vector<StudyOutput> studies,
-                                    const std::vector<BatchOutcome>& outcomes) {
+std::vector<SImuOutput> with_batch(std::vector<SImuOutput> studies,
+                                   const std::vector<BatchOutcome>& outcomes) {
   for (std::size_t i = 0; i < studies.size(); ++i) {
     if (outcomes[i].mounting) {
       take_over(*outcomes[i].mounting, studies[i]);
@@ -313,7 +313,7 @@ MountingEstimate estimate_of(const batch::BatchMounting& mounting) {
   return estimate;
 }
 
-nlohmann::json batch_observability_json(const StudyOutput& study, const batch::BatchMounting& mounting) {
+nlohmann::json batch_observability_json(const SImuOutput& study, const batch::BatchMounting& mounting) {
   auto json = observability_json(observability_of(study));
   const auto& limits = mounting.limits;
   const Eigen::Matrix<double, 6, 1> drive = limits.drive();
@@ -364,7 +364,7 @@ nlohmann::json batch_json(const batch::BatchMounting& mounting) {
   return json;
 }
 
-nlohmann::json filter_json(const StudyOutput& study, double clock_shift_s) {
+nlohmann::json filter_json(const SImuOutput& study, double clock_shift_s) {
   if (!has_estimate(study.status)) return nullptr;
   const auto deg = [](const Vector3& v) {
     return nlohmann::json{v[0] * kDegPerRad, v[1] * kDegPerRad, v[2] * kDegPerRad};
@@ -389,7 +389,7 @@ std::string batch_remark(const std::string& name, const batch::BatchMounting& mo
   if (mounting.inconsistency > kInconsistencyTold) {
     return fmt::format(
         "{}: parts of the drive disagree by {:.1f} times what the noise explains; the sd allows for it, but "
-        "look whether the sensor sits firmly",
+        "check that the sensor sits firmly",
         name, mounting.inconsistency);
   }
   const double leaning_rad = mounting.sensor.x.segment<3>(batch::kGyroShape + 3).cwiseAbs().maxCoeff();
@@ -404,7 +404,7 @@ std::string batch_remark(const std::string& name, const batch::BatchMounting& mo
   if (yields * kHardBraking_mps2 > kTurnTold_rad && yields > kSureSds * mounting.sd(batch::kCompliance)) {
     return fmt::format(
         "{}: its gyroscopes answer to forces as on a mount that turns by {:.2g} deg when the vehicle brakes "
-        "hard; the mounting is that in the mean, but fasten it more stiffly",
+        "hard; the mounting found is the mean one, but fasten it more stiffly",
         name, yields * kHardBraking_mps2 * kDegPerRad);
   }
   const auto loose =

@@ -1,7 +1,7 @@
 #pragma once
 
-/// The batch estimate of every S-IMU of a recording (src/estimation/batch), and what of it a study publishes. Soft
-/// world: allocates, uses a thread an S-IMU; the result does not depend on how many there are.
+/// The batch estimate of every S-IMU of a recording (src/estimation/batch), and what of it a study publishes.
+/// Non-real-time: allocates, uses one thread per S-IMU; the result does not depend on how many there are.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -66,23 +66,23 @@ struct BatchOutcome {
 /// What combine() takes of a mounting that the batch gave.
 [[nodiscard]] MountingEstimate estimate_of(const batch::BatchMounting& mounting);
 
-/// Puts the batch's values and sd in the place of the filter's.
-void take_over(const batch::BatchMounting& mounting, StudyOutput& study);
+/// Puts the batch's values and sd in place of the filter's.
+void take_over(const batch::BatchMounting& mounting, SImuOutput& study);
 
 /// What the study publishes: the batch's values where it found any. Where it found the data to be wrong,
 /// nothing of them is believed.
-[[nodiscard]] std::vector<StudyOutput> with_batch(std::vector<StudyOutput> studies,
-                                                  const std::vector<BatchOutcome>& outcomes);
+[[nodiscard]] std::vector<SImuOutput> with_batch(std::vector<SImuOutput> studies,
+                                                 const std::vector<BatchOutcome>& outcomes);
 
 /// calibration.json's "batch": what has no place among the filter's quantities.
 [[nodiscard]] nlohmann::json batch_json(const batch::BatchMounting& mounting);
 
 /// calibration.json's "filter": what the filter had ended with.
-[[nodiscard]] nlohmann::json filter_json(const StudyOutput& study, double clock_shift_s);
+[[nodiscard]] nlohmann::json filter_json(const SImuOutput& study, double clock_shift_s);
 
 /// calibration.json's "observability" of a mounting that the batch gave: goals are what makes it usable, and
 /// where more motion would not help, no manoeuvre is advised.
-[[nodiscard]] nlohmann::json batch_observability_json(const StudyOutput& study,
+[[nodiscard]] nlohmann::json batch_observability_json(const SImuOutput& study,
                                                       const batch::BatchMounting& mounting);
 
 /// What is odd about the result, in a sentence for a person; empty where nothing stands out.

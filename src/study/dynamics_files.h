@@ -23,7 +23,7 @@ struct DynamicsRegressions {
 };
 
 /// For every S-IMU, over the dynamic part of the run: at rest there are no dynamics, and the noise is
-/// another.
+/// different.
 DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
                                    const RegimeTrack& motion, const noise::ModelSpec& residual_model);
 

@@ -6,7 +6,7 @@ namespace imuscope {
 
 namespace {
 
-KeptEpoch kept(const StudyEpoch& epoch) {
+KeptEpoch kept(const SImuEpoch& epoch) {
   return {epoch.study,
           epoch.time,
           epoch.t_d_s,
@@ -24,8 +24,8 @@ KeptEpoch kept(const StudyEpoch& epoch) {
           epoch.regime};
 }
 
-StudyEpoch epoch_of(const KeptEpoch& kept) {
-  StudyEpoch epoch;
+SImuEpoch epoch_of(const KeptEpoch& kept) {
+  SImuEpoch epoch;
   epoch.study = kept.study;
   epoch.time = kept.time;
   epoch.t_d_s = kept.t_d_s;
@@ -60,7 +60,7 @@ Result<EpochGatherer> EpochGatherer::create(const OutputFolder& folder, std::siz
       [&](Spool<KeptEpoch>&& epochs) { return EpochGatherer(std::move(epochs), n_studies); });
 }
 
-void EpochGatherer::on_epoch(const StudyEpoch& epoch, const TickFacts&) noexcept {
+void EpochGatherer::on_epoch(const SImuEpoch& epoch, const TickFacts&) noexcept {
   if ((epoch.sample.flags & kHasTemperature) != 0)
     temperatures_[epoch.study].add(epoch.time, epoch.sample.temperature_degC);
   epochs_.add(kept(epoch));
@@ -74,7 +74,7 @@ Result<void> EpochGatherer::make_rows(const Configuration& configuration, const 
     return work_error("the error process could not be kept on the disk of the run folder",
                       "make room there, or choose another --out folder");
   for (KeptEpoch next{}; epochs_.next(next);) {
-    const StudyEpoch epoch = epoch_of(next);
+    const SImuEpoch epoch = epoch_of(next);
     const ReferenceBias bias = biases.at(epoch.time + from_seconds(epoch.t_d_s));
     watch_.add(epoch, bias);
     if (!is_final_mounting(former[epoch.study], epoch.time)) continue;

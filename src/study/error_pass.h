@@ -43,7 +43,7 @@ class EpochGatherer final : public CoreSink {
   /// Errors (kWork): no file can be made in `folder`.
   static Result<EpochGatherer> create(const OutputFolder& folder, std::size_t n_studies);
 
-  void on_epoch(const StudyEpoch& epoch, const TickFacts&) noexcept override;
+  void on_epoch(const SImuEpoch& epoch, const TickFacts&) noexcept override;
   void on_error(const ErrorRecord&) noexcept override {}
   void on_event(const EstimatorEvent&) noexcept override {}
   void on_snapshot(const Snapshot& snapshot) noexcept override { watch_.add(snapshot); }

@@ -28,7 +28,7 @@ Result<json> read_document(const std::filesystem::path& file) {
   return document;
 }
 
-std::array<double, kImuAxes> turn_on_sd(const StudyConfig& study) {
+std::array<double, kImuAxes> turn_on_sd(const SImuConfig& study) {
   std::array<double, kImuAxes> sd{};
   for (std::size_t i = 0; i < 3; ++i) {
     sd[i] = study.turn_on_gyro_sd_radps[i];

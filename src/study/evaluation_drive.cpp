@@ -8,6 +8,7 @@
 #include "estimation/calibration/gnss_trust.h"
 #include "estimation/navigation/so3.h"
 #include "results/tables/csv_reader.h"
+#include "sample/eigen_arrays.h"
 #include "service/pipeline/estimator_setup.h"
 
 namespace imuscope {
@@ -16,12 +17,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using nlohmann::json;
-
-Vector3d vector(const Vector3& v) { return {v[0], v[1], v[2]}; }
-
-Matrix3d matrix(const Matrix3& m) {
-  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(m.data());
-}
 
 /// What calibration.json says of one S-IMU.
 struct FoundMounting {
@@ -62,25 +57,25 @@ class StudyDriveMaker {
   StudyDriveMaker(const FoundMounting& found, const std::vector<TrajectoryRow>& rows,
                   const Vector3d& r_ba_b_m)
       : rows_(rows),
-        C_b_s_(matrix(found.mounting.C_b_s)),
-        r_bs_b_m_(vector(found.mounting.r_bs_b_m)),
-        gyro_gain_(Vector3d::Ones() + vector(found.mounting.gyro_scale)),
-        accel_gain_(Vector3d::Ones() + vector(found.mounting.accel_scale)) {
+        C_b_s_(to_eigen(found.mounting.C_b_s)),
+        r_bs_b_m_(to_eigen(found.mounting.r_bs_b_m)),
+        gyro_gain_(Vector3d::Ones() + to_eigen(found.mounting.gyro_scale)),
+        accel_gain_(Vector3d::Ones() + to_eigen(found.mounting.accel_scale)) {
     made_.name = found.name;
     made_.drive.r_sa_s_m = C_b_s_ * (r_ba_b_m - r_bs_b_m_);
   }
 
-  void add(const StudyEpoch& epoch, HostTime origin) {
+  void add(const SImuEpoch& epoch, HostTime origin) {
     const HostTime shown = epoch.time + from_seconds(epoch.t_d_s);  // the motion's instant
     const double time_s = to_seconds(shown - origin);
     for (; next_row_ < rows_.size() && origin + from_seconds(rows_[next_row_].time_s) <= shown; ++next_row_)
-      made_.drive.reference.push_back(at_study(rows_[next_row_], vector(epoch.omega_ib_b_radps)));
+      made_.drive.reference.push_back(at_study(rows_[next_row_], to_eigen(epoch.omega_ib_b_radps)));
     if (made_.regimes.empty() || made_.regimes.back().second != epoch.regime)
       made_.regimes.emplace_back(time_s, epoch.regime);
     if (!is_whole(epoch.sample.flags)) return;
     made_.drive.samples.push_back({time_s,
-                                   {vector(epoch.sample.omega_radps).cwiseQuotient(gyro_gain_),
-                                    vector(epoch.sample.f_mps2).cwiseQuotient(accel_gain_)}});
+                                   {to_eigen(epoch.sample.omega_radps).cwiseQuotient(gyro_gain_),
+                                    to_eigen(epoch.sample.f_mps2).cwiseQuotient(accel_gain_)}});
   }
 
   [[nodiscard]] StudyDrive& made() noexcept { return made_; }
@@ -129,7 +124,7 @@ class Gatherer final : public CoreSink {
 
   explicit Gatherer(std::size_t n_studies) : makers(n_studies) {}
 
-  void on_epoch(const StudyEpoch& epoch, const TickFacts& facts) noexcept override {
+  void on_epoch(const SImuEpoch& epoch, const TickFacts& facts) noexcept override {
     first_reference_time = facts.first_reference_time;
     if (makers[epoch.study]) makers[epoch.study]->add(epoch, first_reference_time);
   }
@@ -204,7 +199,7 @@ std::vector<DriveFix> drive_fixes(const Gatherer& gathered, const GnssConfig& co
     out.sd_position_m =
         correlated_sd_factor(gnss.solution, out.time_s - last_s) * trusted_position_sd(gnss, config);
     out.has_velocity = config.use_velocity && (gnss.flags & kVelocityValid) != 0;
-    out.v_n_mps = vector(gnss.v_n_mps);
+    out.v_n_mps = to_eigen(gnss.v_n_mps);
     out.sd_velocity_mps = trusted_velocity_sd(gnss, config);
     last_s = out.time_s;
     fixes.push_back(out);
@@ -230,7 +225,7 @@ Result<std::vector<StudyDrive>> evaluation_drives(const OpenedRecording& opened,
 
   Gatherer gathered(estimator.studies.size());
   for (const FoundMounting& study : found)
-    gathered.makers[study.study].emplace(study, *rows, vector(estimator.gnss.antenna_lever_arm_b_m));
+    gathered.makers[study.study].emplace(study, *rows, to_eigen(estimator.gnss.antenna_lever_arm_b_m));
   ReplayOptions options;
   options.progress = progress;
   const auto reference = static_cast<DeviceIndex>(configuration.reference_index());

@@ -27,6 +27,7 @@ AxisNoise axis_noise(const noise::FilterTerms& terms) {
   noise.walk_density = terms.walk_density;
   for (const auto& process : terms.gauss_markov) {
     if (!(process.rate_per_s > 0.0) || !(process.variance > 0.0)) continue;
+    // V-3: what is fast enters the density; V-1: what is slow is a state.
     if (process.is_fast() || noise.slow.size() == kSlowMax) {
       noise.white_density += terms.low_frequency_density(process);
     } else {

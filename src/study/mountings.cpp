@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/calibration_levels.h"
 #include "base/text.h"
 #include "base/units.h"
 #include "results/tables/json_fields.h"
@@ -35,14 +36,14 @@ std::vector<FoundCalibration> found_calibrations(const nlohmann::json& calibrati
     // A file from elsewhere may call a sensor what no configuration lets it be called.
     constexpr double kOffsetMost_s = 4e9;
     if (!is_device_name(name) || !C_b_s || !r_bs_b || !t_d || !(std::abs(*t_d) < kOffsetMost_s) ||
-        status == "waiting" || status == "coarse")
+        !has_estimate(status))
       continue;
     Vector3 sd_boresight = tables::numbers_at<3>(imu, "boresight_sd_deg").value_or(none);
     for (double& sd : sd_boresight) sd *= kRadPerDeg;
     const double sd_t_d =
         tables::number_at(imu, "t_d_sd_s").value_or(std::numeric_limits<double>::quiet_NaN());
     // Two hyphens would end the comment that it is written into.
-    const bool is_usable = status == "calibrated";
+    const bool is_usable = status == key_of(CalibrationStatus::kCalibrated);
     found.push_back(
         {{name, *C_b_s, *r_bs_b, *t_d, sd_boresight, tables::numbers_at<3>(imu, "r_bs_b_sd_m").value_or(none),
           sd_t_d, is_usable ? "calibrated" : "estimated, not known well enough yet", is_usable},

@@ -304,8 +304,7 @@ std::string coverage_remark(const std::string& name, const NoiseSeries& series, 
   if (has_s >= kWholeRunShare * run_s) return {};
   return fmt::format(
       "{}: has samples for {:.0f} s of the run's {:.0f} s, between {:.0f} s and {:.0f} s; its models and "
-      "regressions "
-      "are of that part alone",
+      "regressions are of that part alone",
       name, has_s, run_s, to_seconds(series.time(0) - origin),
       to_seconds(series.time(series.size() - 1) - origin));
 }

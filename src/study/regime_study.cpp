@@ -41,7 +41,7 @@ std::vector<std::string> missing_parts(const RegimeTrack& motion, const MotionLi
 
 }  // namespace
 
-void MotionWatch::add(const StudyEpoch& epoch, const ReferenceBias& bias) {
+void MotionWatch::add(const SImuEpoch& epoch, const ReferenceBias& bias) {
   Vector3 omega{};
   Vector3 f{};
   for (std::size_t i = 0; i < 3; ++i) {

@@ -17,7 +17,7 @@ namespace imuscope {
 /// Gathers what regimes are found from while a recording is replayed.
 class MotionWatch {
  public:
-  void add(const StudyEpoch& epoch, const ReferenceBias& bias);
+  void add(const SImuEpoch& epoch, const ReferenceBias& bias);
   void add(const Snapshot& snapshot);
   [[nodiscard]] const MotionLevels& levels() const noexcept { return levels_; }
   /// Speed known at one time at least.

@@ -27,7 +27,7 @@ class LastSnapshot final : public CoreSink {
   }
   void on_snapshot(const Snapshot& snapshot) noexcept override { last_ = snapshot; }
   void on_late_sample(const LateSample&) noexcept override {}
-  [[nodiscard]] std::vector<StudyOutput> studies() const {
+  [[nodiscard]] std::vector<SImuOutput> studies() const {
     return {last_.studies.begin(), last_.studies.begin() + static_cast<std::ptrdiff_t>(studies_.size())};
   }
   [[nodiscard]] const FormerMountings& former_mountings() const { return former_; }
@@ -56,7 +56,7 @@ Result<DriveMountings> calibrate(const OpenedRecording& drive, const std::filesy
   out.run = folder;
   out.inputs = drive.recording.inputs;
   for (std::size_t i = 0; i < indices.size(); ++i) {
-    const StudyOutput& study = studies[i];
+    const SImuOutput& study = studies[i];
     const auto& name = configuration.devices[indices[i]].name;
     if (outcomes[i].mounting) {
       out.studies.push_back({name, estimate_of(*outcomes[i].mounting)});

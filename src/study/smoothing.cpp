@@ -37,14 +37,14 @@ Vector3 interpolated(const Vector3& a, const Vector3& b, double share) {
 }
 
 /// Priors stay as wide as they were; only where the filter is linearised changes.
-EstimatorConfig relinearised(EstimatorConfig config, const std::vector<StudyOutput>& finals,
+EstimatorConfig relinearised(EstimatorConfig config, const std::vector<SImuOutput>& finals,
                              const FormerMountings& former) {
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
-    const StudyOutput& at_start = former[i].empty() ? finals[i] : former[i].front().estimate;
+    const SImuOutput& at_start = former[i].empty() ? finals[i] : former[i].front().estimate;
     if (!has_estimate(at_start.status)) continue;
-    StudyConfig& study = config.studies[i];
+    SImuConfig& study = config.studies[i];
     // Linearised about the answer, what crooked axes add is below the noise of what is smoothed.
-    study.blocks &= ~kSensorStudyBlocks;
+    study.blocks &= ~kSensorSImuBlocks;
     study.prior_C_b_s = at_start.C_b_s;
     study.prior_r_bs_b_m = at_start.r_bs_b_m;
     study.prior_t_d_s = at_start.t_d_s;
@@ -53,13 +53,13 @@ EstimatorConfig relinearised(EstimatorConfig config, const std::vector<StudyOutp
 }
 
 /// The end values, with the biases of one smoothed epoch.
-StudyOutput with_smoothed_biases(StudyOutput study, const SmoothedEpoch& epoch, std::size_t index,
-                                 const StudyLayout& layout) {
+SImuOutput with_smoothed_biases(SImuOutput study, const SmoothedEpoch& epoch, std::size_t index,
+                                const SImuLayout& layout) {
   study.time = epoch.time;
   study.gyro_bias_radps = to_array(epoch.studies[index].gyro_bias_s_radps);
   study.accel_bias_mps2 = to_array(epoch.studies[index].accel_bias_s_mps2);
   const auto take_sd = [&](std::size_t first, Vector3& sd) {
-    if (first == StudyLayout::kAbsent) return;
+    if (first == SImuLayout::kAbsent) return;
     for (std::size_t i = 0; i < sd.size(); ++i) sd[i] = epoch.sd(static_cast<Eigen::Index>(first + i));
   };
   take_sd(layout.gyro_bias, study.sd_gyro_bias_radps);
@@ -77,9 +77,8 @@ const FormerMounting* in_force(const std::vector<FormerMounting>& former, HostTi
 /// Means of (psi, r) of one S-IMU; psi relative to its end value.
 class MountingMean {
  public:
-  void add(const SmoothedEpoch& epoch, std::size_t study, const StudyLayout& layout,
-           const StudyOutput& final) {
-    const StudyState& state = epoch.studies[study];
+  void add(const SmoothedEpoch& epoch, std::size_t study, const SImuLayout& layout, const SImuOutput& final) {
+    const SImuState& state = epoch.studies[study];
     const Vector3d psi = -log_so3(to_eigen(final.C_b_s).transpose() * state.C_b_s);
     for (std::size_t i = 0; i < 3; ++i) {
       const auto k = static_cast<Eigen::Index>(i);
@@ -89,7 +88,7 @@ class MountingMean {
     ++n_;
   }
 
-  [[nodiscard]] nlohmann::json json(const StudyOutput& final) const {
+  [[nodiscard]] nlohmann::json json(const SImuOutput& final) const {
     if (n_ == 0) return nullptr;
     Vector3d psi = Vector3d::Zero();
     std::array<double, 3> r{};
@@ -115,7 +114,7 @@ class MountingMean {
  private:
   static void add_one(WeightedMean& mean, double value, std::size_t first, std::size_t i,
                       const Eigen::VectorXd& sd) {
-    if (first == StudyLayout::kAbsent) return;
+    if (first == SImuLayout::kAbsent) return;
     const double sd_i = sd(static_cast<Eigen::Index>(first + i));
     if (sd_i > 0.0) mean.add(value, sd_i);
   }
@@ -154,7 +153,7 @@ bool is_final_mounting(const std::vector<FormerMounting>& former, HostTime time)
 }
 
 Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const EstimatorConfig& estimator,
-                                   const Recording& recording, const std::vector<StudyOutput>& finals,
+                                   const Recording& recording, const std::vector<SImuOutput>& finals,
                                    const FormerMountings& former, const RecordStorage& storage,
                                    const std::function<void(double)>& progress) {
   Smoother smoother(storage);
@@ -170,7 +169,7 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
 }
 
 Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const UtcTrack& utc,
-                            const FormerMountings& former, const std::vector<StudyFileInfo>& infos,
+                            const FormerMountings& former, const std::vector<SImuFileInfo>& infos,
                             const OutputFolder& folder) {
   CsvFile navigation;
   if (auto opened = navigation.open(folder, "smoothed_navigation.csv", navigation_csv_header()); !opened)
@@ -193,7 +192,7 @@ Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, co
     }
     for (std::size_t i = 0; i < files.size(); ++i) {
       if (!epoch->calibrating[i]) continue;
-      StudyOutput shown;
+      SImuOutput shown;
       if (const FormerMounting* then = in_force(former[i], epoch->time)) {
         shown = smoothed_output(then->estimate, *epoch, i, track.layout(i));
       } else {
@@ -213,7 +212,7 @@ Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, co
 }
 
 Result<std::vector<nlohmann::json>> weighted_means(const SmoothedTrack& track,
-                                                   const std::vector<StudyOutput>& finals,
+                                                   const std::vector<SImuOutput>& finals,
                                                    const FormerMountings& former) {
   std::vector<MountingMean> means(finals.size());
   for (std::size_t k = 0; k < track.size(); ++k) {

@@ -34,8 +34,8 @@ class ReferenceBiasTrack {
 
 /// A mounting that an S-IMU had before it was found to sit differently.
 struct FormerMounting {
-  HostTime until;        ///< when the change was noticed
-  StudyOutput estimate;  ///< the last one of that mounting
+  HostTime until;       ///< when the change was noticed
+  SImuOutput estimate;  ///< the last one of that mounting
 };
 /// Per S-IMU, in order of time; none where it stayed where it was.
 using FormerMountings = std::vector<std::vector<FormerMounting>>;
@@ -46,7 +46,7 @@ using FormerMountings = std::vector<std::vector<FormerMounting>>;
 /// Replays `recording` with every state free, the mounting's first values being those in force at its start,
 /// so that the whole drive is covered from its first sample on, and smooths what the filter saw.
 Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const EstimatorConfig& estimator,
-                                   const Recording& recording, const std::vector<StudyOutput>& finals,
+                                   const Recording& recording, const std::vector<SImuOutput>& finals,
                                    const FormerMountings& former, const RecordStorage& storage,
                                    const std::function<void(double)>& progress);
 
@@ -55,14 +55,14 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
 /// their end values, with the end value's sd; while a former mounting was in force, its own.
 /// @param utc  of the run
 Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const UtcTrack& utc,
-                            const FormerMountings& former, const std::vector<StudyFileInfo>& infos,
+                            const FormerMountings& former, const std::vector<SImuFileInfo>& infos,
                             const OutputFolder& folder);
 
 /// The paper's final value of each S-IMU: mean over the drive of the smoothed values, weighted by their
 /// inverse variances, of the final mounting; calibration.json's "weighted_mean". Null for an S-IMU that was
 /// never calibrated.
 Result<std::vector<nlohmann::json>> weighted_means(const SmoothedTrack& track,
-                                                   const std::vector<StudyOutput>& finals,
+                                                   const std::vector<SImuOutput>& finals,
                                                    const FormerMountings& former);
 
 }  // namespace imuscope

@@ -78,7 +78,7 @@ Result<std::vector<RowSpool>> make_spools(std::size_t n, const OutputFolder& fol
 }
 
 /// The estimator of the last pass: every mounting that was found is known.
-EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& finals) {
+EstimatorConfig frozen(EstimatorConfig config, const std::vector<SImuOutput>& finals) {
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
     const auto& final = finals[i];
     if (!has_estimate(final.status)) continue;
@@ -88,7 +88,7 @@ EstimatorConfig frozen(EstimatorConfig config, const std::vector<StudyOutput>& f
   return config;
 }
 
-std::vector<StudyOutput> final_studies(const Snapshot& last) {
+std::vector<SImuOutput> final_studies(const Snapshot& last) {
   return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
 }
 
@@ -98,7 +98,7 @@ struct SmoothedDrive {
   ReferenceBiasTrack biases;
 };
 
-Result<SmoothedDrive> smoothed_drive(const SmoothedTrack& track, const std::vector<StudyOutput>& finals,
+Result<SmoothedDrive> smoothed_drive(const SmoothedTrack& track, const std::vector<SImuOutput>& finals,
                                      const FormerMountings& former) {
   auto means = weighted_means(track, finals, former);
   if (!means) return tl::unexpected<Error>(means.error());
@@ -108,9 +108,8 @@ Result<SmoothedDrive> smoothed_drive(const SmoothedTrack& track, const std::vect
 }
 
 /// The drive's own mountings, replaced by those that several drives settled.
-std::vector<StudyOutput> with_settled(std::vector<StudyOutput> finals,
-                                      const std::vector<StudyFileInfo>& infos,
-                                      const std::map<std::string, MountingEstimate>& settled) {
+std::vector<SImuOutput> with_settled(std::vector<SImuOutput> finals, const std::vector<SImuFileInfo>& infos,
+                                     const std::map<std::string, MountingEstimate>& settled) {
   for (std::size_t i = 0; i < finals.size(); ++i) {
     const auto found = settled.find(infos[i].name);
     if (found == settled.end()) continue;
@@ -130,8 +129,8 @@ FormerMountings confirmed(FormerMountings former, const std::vector<BatchOutcome
 }
 
 /// What the batch has to say, refusals first.
-std::vector<std::string> remarks_of_batch(const std::vector<StudyFileInfo>& infos,
-                                          const std::vector<StudyOutput>& of_filter,
+std::vector<std::string> remarks_of_batch(const std::vector<SImuFileInfo>& infos,
+                                          const std::vector<SImuOutput>& of_filter,
                                           const std::vector<BatchOutcome>& outcomes) {
   std::vector<std::string> refusals;
   std::vector<std::string> remarks;
@@ -152,10 +151,10 @@ std::vector<std::string> remarks_of_batch(const std::vector<StudyFileInfo>& info
 }
 
 /// What calibration.json says of each S-IMU beside the published values.
-std::vector<CalibrationEntry> calibration_entries(const std::vector<StudyOutput>& finals,
-                                                  const std::vector<StudyOutput>& of_filter,
+std::vector<CalibrationEntry> calibration_entries(const std::vector<SImuOutput>& finals,
+                                                  const std::vector<SImuOutput>& of_filter,
                                                   const std::vector<BatchOutcome>& outcomes,
-                                                  const std::vector<StudyFileInfo>& infos,
+                                                  const std::vector<SImuFileInfo>& infos,
                                                   const std::vector<nlohmann::json>& weighted_means) {
   std::vector<CalibrationEntry> entries;
   for (std::size_t i = 0; i < finals.size(); ++i) {
@@ -171,7 +170,7 @@ std::vector<CalibrationEntry> calibration_entries(const std::vector<StudyOutput>
   return entries;
 }
 
-void warn_of_remounted(const std::vector<StudyFileInfo>& infos, const FormerMountings& former,
+void warn_of_remounted(const std::vector<SImuFileInfo>& infos, const FormerMountings& former,
                        HostTime first_reference_time, std::vector<std::string>& warnings) {
   for (std::size_t i = 0; i < former.size(); ++i) {
     if (former[i].empty()) continue;
@@ -232,7 +231,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const FormerMountings former = confirmed(first.former_mountings(), outcomes);
   warn_of_remounted(infos, former, last.first_reference_time, run.warnings);
   if (std::none_of(finals.begin(), finals.end(),
-                   [](const StudyOutput& final) { return has_estimate(final.status); })) {
+                   [](const SImuOutput& final) { return has_estimate(final.status); })) {
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
   }
 

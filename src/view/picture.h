@@ -1,7 +1,7 @@
 #pragma once
 
 /// What the page shows: the newest messages of a service or of a recording, and as much of the past as a
-/// page needs that was opened late. Bounded, whatever comes.
+/// page that was opened late needs. Bounded, whatever comes.
 
 #include <array>
 #include <cstddef>

@@ -24,7 +24,7 @@ class RecordedMessages {
   [[nodiscard]] virtual bool next(std::vector<std::uint8_t>& message) = 0;
   /// Goes back to the first one.
   [[nodiscard]] virtual Result<void> rewind() = 0;
-  /// Somewhere in the recording that is gone to without what stands before it.
+  /// A place in the recording that can be gone to without reading what stands before it.
   struct Place {
     std::vector<std::uint64_t> at;  ///< offsets in files, as the recording means them
   };

@@ -9,6 +9,7 @@
 #include <iomanip>
 #include <sstream>
 
+#include "demo_vehicle.h"
 #include "mounting_compare.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
@@ -22,12 +23,6 @@ using Eigen::Vector3d;
 constexpr double kDeg = 180.0 / 3.14159265358979323846;
 /// Published sd that a found value may be off.
 constexpr double kSigmas = 4.0;
-
-void replace(std::string& text, const std::string& what, const std::string& by) {
-  const auto at = text.find(what);
-  ASSERT_NE(at, std::string::npos) << what;
-  text.replace(at, what.size(), by);
-}
 
 void write_text(const fs::path& file, const std::string& text) { std::ofstream(file) << text; }
 
@@ -314,10 +309,8 @@ class HighRate : public testing::TestWithParam<const char*> {};
 
 /// Which of 061 and 062 is the acceleration shows in the rest before the drive.
 TEST_P(HighRate, WhichMessageIsTheAccelerationIsFoundAtRestAndTheMountingWithIt) {
-  std::string configuration = read_text(source_path("config/can_vehicle.toml"));
-  replace(configuration, "lever_arm_b_m = [-0.30, 0.25, 0.10]",
-          std::string("lever_arm_b_m = [-0.30, 0.25, 0.10]\ncan_output = \"") + GetParam() + "\"");
-  const auto drive = recorded(configuration);
+  DemoVehicle vehicle(source_path("config/can_vehicle.toml"));
+  const auto drive = recorded(vehicle.set_truth("mti", "can_output", GetParam()).text());
   ASSERT_EQ(run_there(drive, "imuscope", std::string("replay ") + kFiles + " --config config.toml --out run"),
             0)
       << log_of(drive);

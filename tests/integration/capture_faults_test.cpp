@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -13,11 +12,11 @@
 #include <imuscope/status_t.hpp>
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
-#include <regex>
 #include <sstream>
 #include <string_view>
 
 #include "capture/capture_reader.h"
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "rt/host_clock.h"
 #include "tests/support/child_process.h"
@@ -35,9 +34,7 @@ class CaptureFaults : public testing::Test {
     ASSERT_EQ(std::system("ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo"), 0);
     bus_.emplace("udpm://239.255.76.67:7667?ttl=0");
     bus_->subscribe("IMUSCOPE_STATUS", &CaptureFaults::on_status, this);
-    const auto text = std::regex_replace(read_text(source_path("config/demo.toml")),
-                                         std::regex("/tmp/imuscope-demo"), (folder_ / "ports").string());
-    std::ofstream(folder_ / "car.toml") << text;
+    DemoVehicle().ports_in(folder_ / "ports").write(folder_ / "car.toml");
   }
 
   void on_status(const lcm::ReceiveBuffer*, const std::string&, const status_t* message) {
@@ -147,20 +144,6 @@ TEST_F(CaptureFaults, ASlowAFullAndAnAbsentDiskAreToldAndSurvivedAndAKillLosesLe
   EXPECT_THAT(read_text(folder_ / "replay.log"), HasSubstr("the replay is not exact from the first on"));
 }
 
-/// The demo's vehicle, its S-IMUs roughly known, so that every file has rows from the first seconds on.
-std::string known_mountings(std::string text) {
-  const std::array<std::pair<const char*, const char*>, 3> turns{
-      {{"mtx1", "0.0, 0.0, 0.0"}, {"mtx2", "0.0, 0.0, 91.0"}, {"mtx3", "179.0, 0.0, 0.0"}}};
-  for (const auto& [name, turn] : turns) {
-    const std::string role = std::string("name = \"") + name + "\"\nrole = \"study\"";
-    text.replace(text.find(role), role.size(),
-                 role + "\nprior = { rotation_vector_b_s_deg = [" + turn +
-                     "], boresight_sd_deg = 3.0, lever_arm_sd_m = 0.5, time_offset_ms = 0.0, "
-                     "time_offset_sd_ms = 10.0 }");
-  }
-  return text;
-}
-
 /// Whether every line has as many fields as the first.
 bool is_whole_table(const std::string& csv) {
   const auto fields = [](std::string_view line) { return std::count(line.begin(), line.end(), ','); };
@@ -178,8 +161,8 @@ TEST_F(CaptureFaults, AFullDiskThatHasRoomAgainCostsLinesThatAreToldAndTheRunEnd
   const auto disk = folder_ / "disk";
   std::filesystem::create_directory(disk);
   if (!mount_disk(disk, "24m")) GTEST_SKIP() << "mounting needs root";
-  const auto text = known_mountings(read_text(folder_ / "car.toml"));
-  std::ofstream(folder_ / "car.toml") << text;
+  // With mountings roughly known every file has rows from the first seconds on.
+  DemoVehicle().ports_in(folder_ / "ports").with_priors().write(folder_ / "car.toml");
   BackgroundProgram vehicle("imusim",
                             {"live", (folder_ / "car.toml").string(), "--skip-static", "--seconds", "120"},
                             folder_ / "imusim.log");

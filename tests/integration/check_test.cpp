@@ -12,6 +12,7 @@
 
 #include "check/check.h"
 #include "check/config_lines.h"
+#include "demo_vehicle.h"
 #include "planted_mistakes.h"
 #include "programs.h"
 #include "service/pipeline/device_factory.h"
@@ -345,16 +346,13 @@ TEST(TheProgram, LooksAtWhatItImports) {
 
 TEST(TheProgram, LooksOnceAtWhatALiveRunRecorded) {
   const auto folder = scratch_folder();
-  std::string toml = read_text(source_path("config/demo.toml"));
   const auto recorded_to = folder / "recorded";
   ASSERT_EQ(run_program("imusim",
                         {"record", source_path("config/demo.toml").string(), "--minutes", "3", "--out",
                          recorded_to.string()},
                         folder / "record.log"),
             0);
-  toml.replace(toml.find("axes = \"+x -y -z\""), 17, "axes = \"+x +y +z\"");
-  const auto wrong = folder / "wrong.toml";
-  std::ofstream(wrong) << toml;
+  const auto wrong = DemoVehicle().set_device("airins", "axes", "+x +y +z").write(folder / "wrong.toml");
   // What a live run with this configuration would have left.
   const auto run = folder / "run";
   std::vector<std::string> import{"import"};

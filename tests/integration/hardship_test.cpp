@@ -23,6 +23,7 @@
 #include "capture/capture_reader.h"
 #include "capture/capture_writer.h"
 #include "capture/event_log_reader.h"
+#include "demo_vehicle.h"
 #include "guard_report.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
@@ -104,21 +105,12 @@ class Load {
 /// The demo's configuration with ports in `folder`, frequent refits that go back to the filter, and mountings
 /// that are roughly known, so that the filter works from the first seconds on.
 std::filesystem::path configuration_in(const std::filesystem::path& folder) {
-  std::string text = read_text(source_path("config/demo.toml"));
-  text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder / "ports").string());
-  const std::map<std::string, std::string> rotations{
-      {"mtx1", "[0.0, 0.0, 0.0]"}, {"mtx2", "[0.0, 0.0, 91.0]"}, {"mtx3", "[179.0, 0.0, 0.0]"}};
-  for (const auto& [name, rotation] : rotations) {
-    const std::string head = "name = \"" + name + "\"\nrole = \"study\"\n";
-    text.replace(text.find(head), head.size(),
-                 head + "prior = { rotation_vector_b_s_deg = " + rotation +
-                     ", boresight_sd_deg = 3.0, lever_arm_sd_m = 0.5, time_offset_ms = 0.0, "
-                     "time_offset_sd_ms = 10.0 }\n");
-  }
-  text += "\n[noise]\nrefit_interval_s = 8.0\napply_to_filter = true\n";
-  const auto file = folder / "hardship.toml";
-  std::ofstream(file) << text;
-  return file;
+  return DemoVehicle()
+      .ports_in(folder / "ports")
+      .with_priors()
+      .set("noise.refit_interval_s", 8.0)
+      .set("noise.apply_to_filter", true)
+      .write(folder / "hardship.toml");
 }
 
 /// The capture again, event by event; `change` may alter an event, or leave it out by returning false.

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <chrono>
 #include <fstream>
-#include <regex>
 
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "status_listener.h"
 #include "tests/support/shared_data.h"
@@ -55,9 +55,7 @@ class LiveFaults : public testing::Test {
  protected:
   void SetUp() override {
     if (!enter_private_network()) GTEST_SKIP() << "a private network namespace needs root";
-    std::string text = read_text(source_path("config/demo.toml"));
-    text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder_ / "ports").string());
-    std::ofstream(folder_ / "live.toml") << text;
+    DemoVehicle().ports_in(folder_ / "ports").write(folder_ / "live.toml");
     std::ofstream(folder_ / "faults.toml") << kFaults;
   }
 

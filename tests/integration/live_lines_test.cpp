@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <regex>
 #include <sstream>
 
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "status_listener.h"
 #include "tests/support/shared_data.h"
@@ -89,47 +89,38 @@ at_s = 90.0
 for_s = 1.5
 )";
 
+// What imusim serves on this machine.
+constexpr int kAirinsPort = 29200;
+constexpr int kGnssPort = 29201;
+constexpr int kIns2Port = 29202;
+/// Of the one line behind which the three MTx sit.
+constexpr int kXbusBaud = 460800;
+
 /// The demo with its lines of other kinds and two more S-IMUs.
+/// @param file      beside which `ports` has its serial ports
 /// @param mti_baud  that the configuration gives the MTi
-std::string configuration_in(const std::filesystem::path& folder, int mti_baud) {
-  std::string text = read_text(source_path("config/demo.toml"));
-  const std::string ports = (folder / "ports").string();
-  const auto line = [&](const std::string& name, const std::string& with) {
-    const std::regex old(R"(transport = \{ kind = "serial", port = "/tmp/imuscope-demo/)" + name +
-                         R"("[^\n]*)");
-    ASSERT_TRUE(std::regex_search(text, old)) << name;
-    text = std::regex_replace(text, old, with);
-  };
-  line("airins", R"(transport = { kind = "udp", port = 29200 })");
-  line("gnss", R"(transport = { kind = "tcp", host = "127.0.0.1", port = 29201 })");
-  text = std::regex_replace(text, std::regex(R"(protocol = "greis")"), R"(protocol = "rtklib_pos")");
-  for (const char* bus_id : {"1", "2", "3"}) {
-    line("mtx" + std::string(bus_id), "transport = { kind = \"serial\", port = \"" + ports +
-                                          "/xbus\", baud = 460800 }\nbus_id = " + bus_id);
+void write_configuration(const std::filesystem::path& file, int mti_baud) {
+  const auto ports = file.parent_path() / "ports";
+  DemoVehicle vehicle;
+  vehicle.put_on_line("airins", udp_line(kAirinsPort));
+  vehicle.put_on_line("gnss", tcp_line(kGnssPort)).set_device("gnss", "protocol", "rtklib_pos");
+  for (const int bus_id : {1, 2, 3}) {
+    const std::string name = "mtx" + std::to_string(bus_id);
+    vehicle.put_on_line(name, serial_line(ports / "xbus", kXbusBaud)).set_device(name, "bus_id", bus_id);
   }
-  const std::string more = R"([[device]]
-name = "ins2"
-role = "study"
-protocol = "ixblue_stdbin"
-rate_hz = 100.0
-transport = { kind = "tcp", host = "127.0.0.1", port = 29202 }
-[[device]]
-name = "mti"
-role = "study"
-protocol = "xsens_mt"
-rate_hz = 100.0
-transport = { kind = "serial", port = ")" +
-                           ports + "/mti\", baud = " + std::to_string(mti_baud) + " }\n";
-  text.insert(text.find("# Read by imusim alone"), more);
-  return text + "\n[[simulation.imu]]\nname = \"mti\"\nmodel = \"mti\"\n";
+  vehicle.add_device({{"name", "ins2"}, {"role", "study"}, {"protocol", "ixblue_stdbin"}, {"rate_hz", 100.0}},
+                     tcp_line(kIns2Port));
+  vehicle.add_device({{"name", "mti"}, {"role", "study"}, {"protocol", "xsens_mt"}, {"rate_hz", 100.0}},
+                     serial_line(ports / "mti", mti_baud));
+  vehicle.set_truth("mti", "model", "mti").write(file);
 }
 
 class LiveLines : public testing::Test {
  protected:
   void SetUp() override {
     if (!enter_private_network()) GTEST_SKIP() << "a private network namespace needs root";
-    std::ofstream(folder_ / "vehicle.toml") << configuration_in(folder_, 921600);
-    std::ofstream(folder_ / "live.toml") << configuration_in(folder_, 115200);
+    write_configuration(folder_ / "vehicle.toml", 921600);
+    write_configuration(folder_ / "live.toml", 115200);
     std::ofstream(folder_ / "faults.toml") << kFaults;
   }
 

@@ -20,6 +20,7 @@
 #include <regex>
 #include <sstream>
 
+#include "demo_vehicle.h"
 #include "logs/mcap/reader.h"
 #include "logs/mcap/ros_messages.h"
 #include "mounting_compare.h"
@@ -109,14 +110,14 @@ std::vector<std::vector<std::uint8_t>> messages_in(const std::filesystem::path& 
 /// The demo's configuration with its ports in `folder`, a refit every 15 s, regimes that a person names, and a
 /// virtual IMU of two unlike thirds.
 std::filesystem::path configuration_in(const std::filesystem::path& folder) {
-  std::string text = read_text(source_path("config/demo.toml"));
-  text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder / "ports").string());
-  text +=
-      "\n[noise]\nrefit_interval_s = 15.0\n\n[regimes]\nby = \"labels\"\n\n[record]\nmcap = true\n"
-      "\n[virtual_imu]\nimus = [\"mtx1\", \"mtx3\"]\ngyro_x = [0.25, 0.75]\n";
-  auto file = folder / "live.toml";
-  std::ofstream(file) << text;
-  return file;
+  return DemoVehicle()
+      .ports_in(folder / "ports")
+      .set("noise.refit_interval_s", 15.0)
+      .set("regimes.by", "labels")
+      .set("record.mcap", true)
+      .set("virtual_imu.imus", std::vector<std::string>{"mtx1", "mtx3"})
+      .set("virtual_imu.gyro_x", std::vector<double>{0.25, 0.75})
+      .write(folder / "live.toml");
 }
 
 double wrapped_deg(double angle) { return std::remainder(angle, 360.0); }

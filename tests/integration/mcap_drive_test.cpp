@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "demo_vehicle.h"
 #include "logs/mcap/reader.h"
 #include "logs/mcap/ros_messages.h"
 #include "mounting_compare.h"
@@ -60,16 +61,8 @@ class McapDrive : public testing::Test {
     if (!folder_.empty()) return;
     folder_ = scratch_folder();
     const auto at = [](const char* name) { return (folder_ / name).string(); };
-    std::string demo = read_text(source_path("config/demo.toml"));
     // One S-IMU of the three: it is quicker.
-    for (const char* name : {"mtx2", "mtx3"}) {
-      for (const char* table : {"[[device]]", "[[simulation.imu]]"}) {
-        const auto begin = demo.find(std::string(table) + "\nname = \"" + name);
-        ASSERT_NE(begin, std::string::npos);
-        demo.erase(begin, std::min(demo.find("\n[", begin + 4), demo.size()) - begin);
-      }
-    }
-    std::ofstream(at("demo.toml")) << demo;
+    DemoVehicle().without("mtx2").without("mtx3").write(at("demo.toml"));
     std::ofstream(at("bag.toml")) << kConfiguration;
     ASSERT_EQ(run_program("imusim",
                           {"record", at("demo.toml"), "--minutes", "4", "--seed", "9", "--out", at("drive")},

@@ -2,10 +2,9 @@
 /// configuration put to use.
 
 #include <gtest/gtest.h>
-#include <fstream>
-#include <regex>
 #include <thread>
 
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
 
@@ -22,11 +21,10 @@ bool wait_for(const fs::path& path) {
 
 /// The demo with its ports in `folder`, one MTx at another speed.
 fs::path configuration_in(const fs::path& folder) {
-  std::string text = read_text(source_path("config/demo.toml"));
-  text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder / "ports").string());
-  text = std::regex_replace(text, std::regex("(ports/mtx2\", baud = )115200"), "$01921600");
-  std::ofstream(folder / "vehicle.toml") << text;
-  return folder / "vehicle.toml";
+  return DemoVehicle()
+      .ports_in(folder / "ports")
+      .set_device("mtx2", "transport.baud", 921600)
+      .write(folder / "vehicle.toml");
 }
 
 TEST(Probe, FindsSpeedsProtocolsAndIdsAndDraftsAConfigurationThatRuns) {

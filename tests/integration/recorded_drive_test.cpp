@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "demo_vehicle.h"
 #include "mounting_compare.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
@@ -270,12 +271,7 @@ TEST(SimulatedDrive, FromRawBytesFindsTheTruthWithinItsStandardDeviations) {
   };
   process_with(recording / "config.toml", "run");
   // These sensors are as straight as the filter of 19 states takes them to be: it has the goals of before.
-  std::string rigid = read_text(recording / "config.toml");
-  const std::string states = "states = \"full\"";
-  ASSERT_NE(rigid.find(states), std::string::npos);
-  rigid.replace(rigid.find(states), states.size(), "states = \"rigid\"");
-  std::ofstream(recording / "rigid.toml") << rigid;
-  process_with(recording / "rigid.toml", "rigid");
+  process_with(DemoVehicle().set("estimator.states", "rigid").write(recording / "rigid.toml"), "rigid");
 
   const auto found = read_json(folder / "run" / "calibration.json").at("imus");
   const auto straight = read_json(folder / "rigid" / "calibration.json").at("imus");

@@ -20,6 +20,7 @@
 #include <sstream>
 
 #include "capture/event_log_reader.h"
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "publish/message_codec.h"
 #include "status_listener.h"
@@ -133,11 +134,11 @@ class StatusTruth : public testing::Test {
  protected:
   void SetUp() override {
     if (!enter_private_network()) GTEST_SKIP() << "a private network namespace needs root";
-    std::string text = read_text(source_path("config/demo.toml"));
-    text = std::regex_replace(text, std::regex("/tmp/imuscope-demo"), (folder_ / "ports").string());
-    text = std::regex_replace(text, std::regex("\\n\\[simulation\\]\n"),
-                              std::string("\n[simulation]\nstart_utc = ") + kSimulatedStart + "\n");
-    std::ofstream(folder_ / "live.toml") << text << "\n[noise]\nrefit_interval_s = 5.0\n";
+    DemoVehicle()
+        .ports_in(folder_ / "ports")
+        .start_at(kSimulatedStart)
+        .set("noise.refit_interval_s", 5.0)
+        .write(folder_ / "live.toml");
     do_to_service('-');
   }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
 
@@ -84,10 +85,10 @@ int process(const std::filesystem::path& recording, const std::filesystem::path&
   return run_program("imuscope", arguments, out.string() + ".log");
 }
 
-void record(const std::filesystem::path& folder, const char* minutes) {
+void record(const std::filesystem::path& vehicle, const std::filesystem::path& folder, const char* minutes) {
   ASSERT_EQ(run_program("imusim",
-                        {"record", source_path("config/demo.toml").string(), "--minutes", minutes, "--seed",
-                         "11", "--errors", "--out", folder.string()},
+                        {"record", vehicle.string(), "--minutes", minutes, "--seed", "11", "--errors",
+                         "--out", folder.string()},
                         folder.string() + ".log"),
             0)
       << read_text(folder.string() + ".log");
@@ -117,14 +118,12 @@ Rest true_rest_of(const std::filesystem::path& recording) {
   return rest;
 }
 
-/// The mounting of a filter that takes each sensor to have straight axes.
-void take_the_mounting_of_the_rigid_filter(const std::filesystem::path& recording) {
-  const auto file = recording / "config.toml";
-  std::string text = read_text(file);
-  const std::string states = "states = \"full\"\n";
-  const auto at = text.find(states);
-  ASSERT_NE(at, std::string::npos) << text;
-  std::ofstream(file) << text.replace(at, states.size(), "states = \"rigid\"\nmounting = \"filter\"\n");
+/// The demo with the mounting of a filter that takes each sensor to have straight axes.
+std::filesystem::path vehicle_of_the_rigid_filter(const std::filesystem::path& folder) {
+  return DemoVehicle()
+      .set("estimator.states", "rigid")
+      .set("estimator.mounting", "filter")
+      .write(folder / "vehicle.toml");
 }
 
 /// Keeps the first half of a device's bytes and of its reads.
@@ -159,10 +158,9 @@ nlohmann::json tables_of(const std::filesystem::path& run, const std::filesystem
 TEST(StudyOfADrive, TheErrorProcessIsTheTrueErrorToAHundredthOfTheNoise) {
   const auto scratch = scratch_folder();
   const auto folder = scratch / "drive";
-  record(folder, "6");
   // These sensors' axes are straight, which is not taken for granted: what that leaves open of them
   // is in its sd, and not what is looked at here.
-  take_the_mounting_of_the_rigid_filter(folder);
+  record(vehicle_of_the_rigid_filter(scratch), folder, "6");
   const auto out = scratch / "run";
   ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
   const auto truth = read_json(folder / "truth.json");
@@ -192,7 +190,7 @@ TEST(StudyOfADrive, TheErrorProcessIsTheTrueErrorToAHundredthOfTheNoise) {
 TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
   const auto scratch = scratch_folder();
   const auto folder = scratch / "drive";
-  record(folder, "4");
+  record(source_path("config/demo.toml"), folder, "4");
   cut_in_half(folder, "mtx3");
   const auto out = scratch / "run";
   ASSERT_EQ(process(folder, out), 0) << read_text(out.string() + ".log");
@@ -247,23 +245,19 @@ TEST(StudyOfADrive, RegimesTablesAndLabelsAndHalfADevice) {
   EXPECT_EQ(read_json(labelled / "comparison.json").at("comparisons")[0].at("first"), "parked");
 }
 
+/// By how much the logarithm of mtx1's white noise follows its temperature.
+constexpr double kLogPer_degC = 0.04;
+
 /// The demo with gyroscopes whose white noise follows what they go through: of mtx1 its own temperature,
 /// which it sends, of mtx2 the rate; mtx3 does neither.
 std::filesystem::path dependent_vehicle(const std::filesystem::path& folder) {
-  std::string text = read_text(source_path("config/demo.toml"));
-  const auto add = [&](const char* name, const char* keys) {
-    const std::string head = std::string("[[simulation.imu]]\nname = \"") + name + "\"\n";
-    const auto at = text.find(head);
-    ASSERT_NE(at, std::string::npos);
-    text.insert(at + head.size(), keys);
-  };
-  add("mtx1",
-      "begin_temperature_degC = 20.0\nend_temperature_degC = 60.0\nwarm_up_s = 200.0\n"
-      "gyro_white_log_per_degC = 0.04\n");
-  add("mtx2", "gyro_white_log_per_deg_per_s = 0.05\n");
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "vehicle.toml") << text;
-  return folder / "vehicle.toml";
+  return DemoVehicle()
+      .set_truth("mtx1", "begin_temperature_degC", 20.0)
+      .set_truth("mtx1", "end_temperature_degC", 60.0)
+      .set_truth("mtx1", "warm_up_s", 200.0)
+      .set_truth("mtx1", "gyro_white_log_per_degC", kLogPer_degC)
+      .set_truth("mtx2", "gyro_white_log_per_deg_per_s", 0.05)
+      .write(folder / "vehicle.toml");
 }
 
 TEST(StudyOfADrive, WhatTheNoiseFollowsIsFoundThroughBytesAndTheFilterOfAnOutageFollowsIt) {
@@ -288,7 +282,7 @@ TEST(StudyOfADrive, WhatTheNoiseFollowsIsFoundThroughBytesAndTheFilterOfAnOutage
     const double sd = entry.at("slope_sd").get<double>();
     if (name == "mtx1" && entry.at("driver") == "temperature") {
       ++of_temperature;
-      EXPECT_NEAR(slope, 0.04, 4.0 * sd) << axis;
+      EXPECT_NEAR(slope, kLogPer_degC, 4.0 * sd) << axis;
       EXPECT_LT(entry.at("p_holm").get<double>(), 0.01) << axis;
     }
     // The driver is the rms of the rate over a window, the truth follows it sample by sample: the same sign.

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
 
@@ -18,11 +19,10 @@ constexpr double kSuspendFor_s = 30.0;
 
 TEST(Suspend, LeavesMountingsAloneAndUtcRight) {
   const auto folder = scratch_folder();
-  const auto config = folder / "car.toml";
-  auto text = read_text(source_path("config/demo.toml"));
-  text.insert(text.find("[[simulation.imu]]"),
-              "[simulation.line]\nsuspend_at_s = 200.0\nsuspend_for_s = 30.0\n");
-  std::ofstream(config) << text;
+  const auto config = DemoVehicle()
+                          .set("simulation.line.suspend_at_s", kSuspendAt_s)
+                          .set("simulation.line.suspend_for_s", kSuspendFor_s)
+                          .write(folder / "car.toml");
   const auto drive = folder / "drive";
   ASSERT_EQ(run_program("imusim", {"record", config.string(), "--minutes", "6", "--out", drive.string()},
                         folder / "imusim.log"),

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "demo_vehicle.h"
 #include "programs.h"
 #include "tests/support/shared_data.h"
 
@@ -20,18 +21,14 @@ namespace fs = std::filesystem;
 constexpr const char* kStart = "2016-12-31T23:57:30Z";
 constexpr double kLength_min = 4.0;
 constexpr double kLeap_s = 150.0;
+/// Of mtx1: its counter of 16 bits wraps with the leap second.
+constexpr int kFirstCounter = 50536;
 
 struct Receiver {
   const char* name;
   const char* protocol;
 };
 void PrintTo(const Receiver& receiver, std::ostream* out) { *out << receiver.name; }
-
-void replace(std::string& text, const std::string& what, const std::string& by) {
-  const auto at = text.find(what);
-  ASSERT_NE(at, std::string::npos) << what;
-  text.replace(at, what.size(), by);
-}
 
 /// One column of a run's CSV file.
 std::vector<double> column(const fs::path& file, const std::string& name) {
@@ -55,15 +52,14 @@ class Wraps : public testing::TestWithParam<Receiver> {};
 
 TEST_P(Wraps, NothingIsLostAndNavigationNoticesNothing) {
   const auto folder = scratch_folder();
-  std::string text = read_text(source_path("config/demo.toml"));
-  replace(text, "[simulation]\n", std::string("[simulation]\nstart_utc = ") + kStart + "\n");
-  replace(text, "latency_ms = 2.0\n",
-          "latency_ms = 2.0\nfirst_counter = 50536\n");  // wraps with the leap second
-  replace(text, R"(protocol = "greis")", std::string(R"(protocol = ")") + GetParam().protocol + '"');
-  std::ofstream(folder / "vehicle.toml") << text;
+  const auto vehicle = DemoVehicle()
+                           .start_at(kStart)
+                           .set_truth("mtx1", "first_counter", kFirstCounter)
+                           .set_device("gnss", "protocol", GetParam().protocol)
+                           .write(folder / "vehicle.toml");
   ASSERT_EQ(run_program("imusim",
-                        {"record", (folder / "vehicle.toml").string(), "--minutes",
-                         std::to_string(kLength_min), "--seed", "3", "--out", (folder / "drive").string()},
+                        {"record", vehicle.string(), "--minutes", std::to_string(kLength_min), "--seed", "3",
+                         "--out", (folder / "drive").string()},
                         folder / "imusim.log"),
             0)
       << read_text(folder / "imusim.log");

@@ -1,6 +1,6 @@
 #include "estimator_run.h"
 
-using imuscope::StudyOutput;
+using imuscope::SImuOutput;
 
 extern "C" __attribute__((visibility("default"))) void IMUSCOPE_ESTIMATOR_RUN(
     const imuscope::EstimatorConfig& config, const std::vector<imuscope::Sample>& samples,
@@ -8,7 +8,7 @@ extern "C" __attribute__((visibility("default"))) void IMUSCOPE_ESTIMATOR_RUN(
   constexpr imuscope::Duration kTick{10'000'000};
   constexpr std::size_t kTicksPerOutput = 10;
   imuscope::Estimator estimator(config);
-  std::vector<StudyOutput> studies(config.studies.size());
+  std::vector<SImuOutput> studies(config.studies.size());
   std::size_t next = 0;
   std::size_t tick = 0;
   for (imuscope::HostTime cut = samples.front().arrival; next < samples.size(); cut += kTick, ++tick) {

@@ -11,7 +11,7 @@
 namespace imuscope::test {
 
 /// Takes the estimates of one tick; what is pointed at is valid for the call alone.
-using KeepOutputs = void (*)(void* context, const NavigationOutput& navigation, const StudyOutput* studies,
+using KeepOutputs = void (*)(void* context, const NavigationOutput& navigation, const SImuOutput* studies,
                              std::size_t n_studies);
 
 }  // namespace imuscope::test

@@ -21,10 +21,10 @@ namespace {
 
 struct Outputs {
   NavigationOutput navigation;
-  std::vector<StudyOutput> studies;
+  std::vector<SImuOutput> studies;
 };
 
-void keep(void* context, const NavigationOutput& navigation, const StudyOutput* studies, std::size_t n) {
+void keep(void* context, const NavigationOutput& navigation, const SImuOutput* studies, std::size_t n) {
   static_cast<std::vector<Outputs>*>(context)->push_back({navigation, {studies, studies + n}});
 }
 

@@ -21,7 +21,7 @@ MotionWatch run_with(double size_radps, double begin_s, double end_s, bool with_
   for (int k = 0; k < 6000; ++k) {
     const double t_s = k / 100.0;
     const bool moves = t_s >= begin_s && t_s < end_s;
-    StudyEpoch epoch{};
+    SImuEpoch epoch{};
     epoch.time = drive_time(t_s);
     epoch.omega_ib_b_radps = {0.0, 0.0, moves ? size_radps * std::sin(2.0 * t_s) : 0.0};
     epoch.f_b_mps2 = {moves ? std::sin(1.3 * t_s) : 0.0, 0.0, -9.81};

@@ -23,7 +23,7 @@ inline double share_of_sd(const Vector3& a, const Vector3& b, const Vector3& sd)
 }
 
 /// Infinite where they are not in the same state; 0 where neither has an estimate yet.
-inline double difference(const StudyOutput& a, const StudyOutput& b) {
+inline double difference(const SImuOutput& a, const SImuOutput& b) {
   if (a.status != b.status) return HUGE_VAL;
   if (!has_estimate(a.status)) return 0.0;
   return std::max({share_of_sd(a.psi_rad, b.psi_rad, b.sd_psi_rad),

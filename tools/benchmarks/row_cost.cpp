@@ -106,7 +106,7 @@ double modeller_ns(int studies, double rate_hz, double seconds) {
 double publisher_ns(int studies, double rate_hz, double seconds, const std::filesystem::path& scratch) {
   const Configuration configuration = vehicle(studies, rate_hz);
   const bench::OwnFolder own(scratch);
-  std::vector<StudyFileInfo> infos;
+  std::vector<SImuFileInfo> infos;
   for (const auto index : configuration.study_indices())
     infos.push_back({configuration.devices[index].name, 0.0});
   auto folder = RunFolder::create(own.path() / "run", infos, true);

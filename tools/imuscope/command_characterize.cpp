@@ -198,7 +198,7 @@ void print_beside(const certificate::DataSheet& sheet, const std::vector<certifi
 Result<std::optional<certificate::DataSheet>> sheet_of(const CharacterizeCommand& options) {
   if (options.data_sheet.empty()) {
     if (options.part.empty()) return std::nullopt;
-    return usage_error("--part says a part of no data sheet", "give --data-sheet FILE, too");
+    return usage_error("--part names a part, and there is no data sheet", "give --data-sheet FILE, too");
   }
   std::ifstream in(options.data_sheet, std::ios::binary);
   const auto document = nlohmann::json::parse(in, nullptr, false);

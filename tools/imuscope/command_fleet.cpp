@@ -97,7 +97,7 @@ Result<void> say_count(const fleet::Plan& plan, const std::string& file) {
   if (count.gave_up > 0)
     return work_error("tasks were given up",
                       fmt::format("mend the cause, then imuscope fleet run {} --retry", file));
-  return work_error("the campaign is not at its end", fmt::format("go on with imuscope fleet run {}", file));
+  return work_error("the campaign is not finished", fmt::format("go on with imuscope fleet run {}", file));
 }
 
 /// Catalogue and report of what there is.

@@ -144,7 +144,7 @@ void print_table1(const TablesCommand& options, const json& regressions) {
 }
 
 void print_table2(const TablesCommand& options, const json& comparisons, const Truth& truth) {
-  say("\nTable II: noise models per regime (95 % intervals; p corrected after Holm over the S-IMU)\n");
+  say("\nTable II: noise models per regime (95 % intervals; p corrected by Holm's method over the S-IMU)\n");
   std::map<std::string, Held> held;
   for (const auto& c : comparisons) {
     if (!wanted(options, c)) continue;

@@ -31,16 +31,15 @@ Result<noise::SignalLook> look_at(const std::filesystem::path& file, const Signa
 std::string line_warning(const noise::Line& line, const std::string& unit, noise::Lines lines) {
   return noise::in_words(line, unit) + (lines == noise::Lines::kTakenOut
                                             ? ": taken out before the fit (--keep-lines leaves it in)"
-                                            : ": it raises the levels around half its period; `fit` takes it "
-                                              "out");
+                                            : ": it raises the levels around half its period; "
+                                              "`fit` takes it out");
 }
 
 }  // namespace
 
 void add_signal_options(CLI::App& command, SignalOptions& options, bool several) {
   const char* what = several ? "Signal: CSV, a file of topics (MCAP, ROS bag, PX4 ULog, ArduPilot .bin), or "
-                               "raw little-endian float64 (.f64); "
-                               "several are replicates of one sensor"
+                               "raw little-endian float64 (.f64); several are replicates of one sensor"
                              : "Signal: CSV, a file of topics (MCAP, ROS bag, PX4 ULog, ArduPilot .bin), or "
                                "raw little-endian float64 (.f64)";
   auto* file = command.add_option("FILE", options.files, what)->required();

@@ -46,6 +46,7 @@ Matrix3d rotation_information(const Matrix3d& bb) noexcept { return bb.trace() *
 
 }  // namespace
 
+// running means and second moments
 void CoarseMountingEstimator::Moments::add(const Vector3d& b, const Vector3d& s, double n) noexcept {
   const Vector3d db = b - mean_b;
   const Vector3d ds = s - mean_s;
@@ -69,6 +70,7 @@ void CoarseMountingEstimator::add(const Vector3d& omega_b_radps, const Vector3d&
   waiting_.omega_s += omega_s_radps;
   waiting_.f_s += f_s_mps2;
   if (++waiting_.count < kPairsPerObservation) return;
+  // the mean of some pairs as one observation
   constexpr double kShare = 1.0 / kPairsPerObservation;
   ++observations_;
   const auto n = static_cast<double>(observations_);
@@ -88,7 +90,7 @@ void CoarseMountingEstimator::clear() noexcept {
 MountingResult CoarseMountingEstimator::solve(CoarseMounting& out) const noexcept {
   if (pairs_ < options_.pairs_min) return MountingResult::kTooFewPairs;
   const auto n = static_cast<double>(observations_);
-  // What turns the mean force: the accelerometer's bias, and the mean centripetal force over a lever arm.
+  // What turns the mean force: the accelerometer's bias, and the mean centripetal force over a lever arm.
   const double mean_square_rate = rate_.bb.trace() / n + rate_.mean_b.squaredNorm();
   const double gravity_sd = std::hypot(options_.accel_bias_sd_mps2, options_.arm_m * mean_square_rate);
   const double gravity_weight = 1.0 / (gravity_sd * gravity_sd);
@@ -127,7 +129,9 @@ MountingResult CoarseMountingEstimator::solve(CoarseMounting& out) const noexcep
   out.gyro_bias_s_radps = rate_.mean_s - C * rate_.mean_b;
 
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  //
   if (std::sqrt(eigen.eigenvalues()(2)) > options_.sd_limit_rad) return MountingResult::kTooLittleExcitation;
+  // rates that are not alike, or mean forces of two gravities
   const double gravity_mismatch = (force_.mean_s - C * force_.mean_b).norm();
   if (correlation < kCorrelationMin || gravity_mismatch > kGravityMismatchSds * gravity_sd) {
     return MountingResult::kInconsistent;
@@ -135,6 +139,7 @@ MountingResult CoarseMountingEstimator::solve(CoarseMounting& out) const noexcep
   return MountingResult::kOk;
 }
 
+// a mirror
 bool CoarseMountingEstimator::is_mirrored(const Matrix3d& B, const Matrix3d& C) const noexcept {
   const Matrix3d mirror = best_orthogonal(B, -1.0);
   return residual_sum(rate_.bb, rate_.sb, rate_.ss, mirror) <

@@ -124,22 +124,13 @@ std::size_t ReferenceWindow::nearest(HostTime time) const noexcept {
   return time - at(low - 1).time < at(low).time - time ? low - 1 : low;
 }
 
-HostTime ReferenceWindow::newest_time() const noexcept {
-  const auto half = static_cast<std::size_t>(options_.points / 2);
-  if (size_ <= half + 1) return HostTime::min();
-  // Half-way between the newest centre that has its window and the one after: beyond it the next is nearer.
-  const HostTime centre = at(size_ - 1 - half).time;
-  const HostTime next = at(size_ - half).time;
-  return centre + (next - centre) / 2 - Duration{1};
-}
-
 ReferenceResult ReferenceWindow::evaluate(HostTime time, ReferenceKinematics& out) const noexcept {
   const auto half = static_cast<std::size_t>(options_.points / 2);
   const auto points = static_cast<std::size_t>(options_.points);
   if (size_ < points) return ReferenceResult::kTooNew;
   const std::size_t centre = nearest(time);
   if (centre < half) return ReferenceResult::kTooOld;
-  if (centre + half >= size_) return ReferenceResult::kTooNew;
+  if (centre + half >= size_) return ReferenceResult::kTooNew;  // E-2
 
   // Half the window as the unit of x keeps the normal equations well conditioned for any width.
   const double scale_s = options_.period_s * static_cast<double>(half);

@@ -61,8 +61,6 @@ class ReferenceWindow {
   /// The motion at an instant. `out` is written only with kOk.
   [[nodiscard]] ReferenceResult evaluate(HostTime time, ReferenceKinematics& out) const noexcept;
 
-  /// The newest instant that evaluate() can answer now: half the window's width behind the newest sample.
-  [[nodiscard]] HostTime newest_time() const noexcept;
   /// Of the newest sample; HostTime::min() before the first.
   [[nodiscard]] HostTime newest_sample() const noexcept {
     return size_ > 0 ? at(size_ - 1).time : HostTime::min();

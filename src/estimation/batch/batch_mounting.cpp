@@ -101,7 +101,7 @@ void set_gyro_power(Problem& problem) {
   }
 }
 
-/// The angle random walk that the reference's gyros have at most, rad/sqrt(s): what they show in the band
+/// B-21a: the angle random walk that the reference's gyros have at most, rad/sqrt(s): what they show in the band
 /// where they show least, in the quietest twentieth of the windows.
 double quietest_gyro_white_radps_per_sqrt_hz(const Problem& problem) {
   constexpr double kFrom_hz = 1.0;
@@ -271,7 +271,7 @@ class Batch {
     return work_error(
         fmt::format("about {:.0f} s into the recording its mounting changes, and no estimate fits both parts",
                     result.change_s - instants_.front()),
-        "cut the recording there and study each part, and look whether it sits firmly");
+        "cut the recording there and study each part, and check that it sits firmly");
   }
 
   /// One axis of one triad that is in another unit than the others, or cut off, or no axis of that sensor.
@@ -410,6 +410,7 @@ class Batch {
     const auto of_reference_errors = of_reference_axes(class_, result.sensor);
     const Covariance of_reference = of_reference_errors * of_reference_errors.transpose();
     result.limits = limit_shares(result.covariance, of_reference);
+    // B-23: F
     result.shared << of_lasting_priors(grown * of_noise.per_slope), of_reference_errors.topRows<6>();
     result.covariance += of_reference;  // B-21
     result.middle_s = middle_s_;
@@ -449,7 +450,7 @@ class Batch {
     result.covariance.topLeftCorner<kWatched, kWatched>() += reach * reach.transpose();
   }
 
-  /// Biases were those of records without their means. That of the gyros stays what they show at the drive's
+  /// B-26. Biases were those of records without their means. That of the gyros stays what they show at the drive's
   /// mean force; in that of the accelerometers the uncertain axes are multiplied by gravity.
   void add_mean_motion(BatchMounting& result) const {
     SensorState& sensor = result.sensor;

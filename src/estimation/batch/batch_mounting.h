@@ -21,8 +21,8 @@ namespace imuscope::batch {
 struct BatchOptions {
   SensorClass sensor;
   double search_s = 3.0;  ///< time offsets from -search_s to +search_s are tried
-  /// Angle random walk of the reference's gyros, rad/sqrt(s), where somebody told; it says how straight its
-  /// axes are. Elsewhere its quietest readings tell, which are no less than it.
+  /// Angle random walk of the reference's gyros, rad/sqrt(s), where it is known; it says how straight its
+  /// axes are. Otherwise its quietest readings tell, which are no less than it.
   std::optional<double> reference_gyro_white_radps_per_sqrt_hz{};
 };
 
@@ -56,8 +56,8 @@ struct BatchMounting {
   double used_s = 0.0;    ///< time inside windows
   std::size_t windows = 0;
   double degrees_of_freedom = 0.0;  ///< of the sd, for Student's t
-  /// Largest sd of a component of (psi, r) by its scatter over time, by the sd that the noise alone would
-  /// give.
+  /// Largest sd of a component of (psi, r) by its scatter over time, divided by the sd that the noise alone
+  /// would give.
   double inconsistency = 1.0;
   LimitShares limits;
   /// Whether the drive's parts agree. Where they do not, the sd reach to the mountings of both.

@@ -106,7 +106,7 @@ double sample_period_s(const ImuRecord& record) {
 
 namespace {
 
-/// The record with single lost samples, and two in a row, put in by the cubic through their neighbours: left
+/// B-2: the record with single lost samples, and two in a row, put in by the cubic through their neighbours: left
 /// out, they would shift the mean under the kernel by a part of the motion.
 ImuRecord bridged(const ImuRecord& record, double period_s) {
   ImuRecord out;

@@ -17,7 +17,7 @@ inline constexpr double kLowPass_hz = 10.0;
 /// Half the length of its kernel.
 inline constexpr double kKernelHalf_s = 0.25;
 
-/// A row an instant: angular rate and specific force, and the angular rate's derivative.
+/// One row per instant: angular rate and specific force, and the angular rate's derivative.
 struct Grid {
   Eigen::Matrix<double, Eigen::Dynamic, 6> motion;     ///< omega, rad/s; f, m/s^2
   Eigen::Matrix<double, Eigen::Dynamic, 3> omega_dot;  ///< rad/s^2; only where it was asked for

@@ -78,8 +78,10 @@ NoiseBands::NoiseBands(
     claimed_[band] = claimed;
     const double numbers = 3.0 * dof * static_cast<double>(n_windows) / kWindowsPerInstant;
     for (Eigen::Index axis = 0; axis < 6; ++axis) {
+      // B-11b
       const double left = std::max(1.0 - taken(band, axis / 3) / numbers, kLeastLeft);
       Eigen::VectorXd mean(n_windows);
+      // B-10: T of each window
       for (Eigen::Index w = 0; w < n_windows; ++w)
         mean[w] = residuals.col(axis)
                       .segment(w * n_frequencies + bands.first(band), bands.width(band))

@@ -64,6 +64,7 @@ void jacobian(const SensorState& sensor, const Transfer& t, const Motion& motion
     J(3 + i, kAccelFade + i) = flex * felt[i];
     J.block<1, 3>(i, kCompliance + 3 * i) = derivative(frequency_hz) * force_s.transpose();
     for (Eigen::Index j = 0; j < 3; ++j) {
+      // B-8a
       const Vector3c product = motion.force_products * t.C.row(j).transpose();
       J.block<3, 1>(3, kCompliance + 3 * i + j) = -(t.accel * skew(t.C.row(i).transpose())) * product;
     }
@@ -106,11 +107,13 @@ Weight weight_of(const Transfer& t, const Vector6& power, double of_gyros, doubl
   const ReferencePower agreed = reference_power(t, of_gyros, of_accels, frequency_hz);
   weight.reference_power.head<3>().setConstant(agreed.gyro);
   weight.reference_power.tail<3>().setConstant(agreed.accel);
+  // B-10: D
   weight.of_reference.setZero();
   weight.of_reference.topLeftCorner<3, 3>() = t.gyro.cast<complex<double>>();
   weight.of_reference.bottomRightCorner<3, 3>() = t.accel.cast<complex<double>>();
   // [omega' x] r = -[r x] omega'
   weight.of_reference.bottomLeftCorner<3, 3>() = -derivative(frequency_hz) * (t.accel * skew(t.arm_b_m));
+  // B-10: the covariance; B-12: the gain
   const Matrix6c gain = weight.reference_power.asDiagonal() * weight.of_reference.adjoint();
   Matrix6c covariance = weight.of_reference * gain;
   // The total is what was learned; the reference's part is held below it.
@@ -176,6 +179,7 @@ class BandSummer {
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
         fill(t, band, w, k, rows, 12 * (k - problem_.bands.first(band)));
       const auto J = rows.leftCols<kColumns>();
+      // B-13: I, and the windows' scores
       sums.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
       for (Eigen::Index i = 0; i < 2 * problem_.bands.width(band); ++i)
         of_gyros.middleRows<3>(3 * i) = rows.middleRows<3>(6 * i);
@@ -280,6 +284,7 @@ void eliminate(const BandSums& sums, const DeviationVector& deviation, double gy
 
 }  // namespace
 
+// B-7, B-8: residuals
 Residuals residuals(const Problem& problem, const Spectra& study, const Estimate& estimate) {
   const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());
   Residuals all(n_windows * problem.plan.n_frequencies, 6);
@@ -310,6 +315,7 @@ std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study, co
   return sums;
 }
 
+// B-11b: the trace, by triad
 Eigen::Vector2d numbers_taken(const BandSums& sums, const NormalEquations::Elimination& elimination,
                               const Eigen::Matrix<double, kParameters, kParameters>& covariance) {
   Eigen::Matrix<double, kColumns, kColumns> joint;

@@ -24,7 +24,7 @@ Matrix3d rotation_of(const Matrix3d& study_reference) {
   return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
 }
 
-/// Correlation of what the S-IMU shows along u with what the R-IMU shows along v.
+/// B-18a: correlation of what the S-IMU shows along u with what the R-IMU shows along v.
 double correlation_along(const TriadMoments& m, const Vector3d& u, const Vector3d& v) {
   const double size = std::sqrt(u.dot(m.study * u) * v.dot(m.reference * v));
   return size > 0.0 ? u.dot(m.study_reference * v) / size : 0.0;
@@ -110,6 +110,7 @@ PairMoments::PairMoments(const Grid& reference, const Grid& study) {
   }
 }
 
+// B-18: rates, forces and mean forces together
 Matrix3d PairMoments::common_rotation() const {
   const Matrix3d gravity = mean_force_s_.normalized() * mean_force_b_.normalized().transpose();
   return rotation_of(scaled(rates) + scaled(forces) + gravity);

@@ -60,6 +60,7 @@ ParameterVector PriorScales::precision() const {
   return precision;
 }
 
+// B-16
 void PriorScales::learn_sizes(const ParameterVector& x, const Covariance& covariance) {
   for (const Kind& kind : kKinds) {
     const double of_class = class_sd_[kind.first] * class_sd_[kind.first];
@@ -71,6 +72,7 @@ void PriorScales::learn_sizes(const ParameterVector& x, const Covariance& covari
   }
 }
 
+// B-17: information and score of the places, and the choice
 void PriorScales::choose_places(const ParameterVector& x, const Covariance& per_slope) {
   const Matrix6 posterior = per_slope.block<6, 6>(kPlaces, kPlaces).inverse();
   const Vector6 score = posterior * x.segment<6>(kPlaces);
@@ -84,6 +86,7 @@ void PriorScales::choose_places(const ParameterVector& x, const Covariance& per_
   sd_.segment<6>(kPlaces).setConstant(one_chip_ ? sensor_.one_chip_place_sd_m : sensor_.place_sd_m);
 }
 
+// B-17a
 PriorScales::Covariance PriorScales::doubt(const ParameterVector& x, const Covariance& per_slope) const {
   if (!one_chip_) return Covariance::Zero();
   const double chip = std::pow(sensor_.one_chip_place_sd_m, 2);

@@ -81,7 +81,7 @@ struct Shares {
   Eigen::Vector2d sd;
 };
 
-/// Each band's shares with what its neighbours tell of them: a random walk over the bands, both ways.
+/// B-10a: each band's shares with what its neighbours tell of them: a random walk over the bands, both ways.
 std::vector<Shares> smoothed(const std::vector<Told>& bands) {
   const std::size_t n = bands.size();
   std::vector<Told> below(n);
@@ -138,6 +138,7 @@ ReferenceNoise::ReferenceNoise(
       Eigen::Vector2d against = Eigen::Vector2d::Zero();
       for (Eigen::Index k = bands.first(band); k < bands.end(band); ++k) {
         const Motion motion = motion_of(reference, w, k);
+        // B-10a: power of u, and what of it stands in e with the other sign
         const Vector3c rates = t.gyro * motion.omega;
         const Vector3c forces = accelerometers(t, motion);
         const auto e = residual.row(w * plan.n_frequencies + k);
@@ -181,6 +182,7 @@ ReferenceNoise ReferenceNoise::shifted(Eigen::Index triad) const {
   return out;
 }
 
+// B-10a: R of a window
 Eigen::Vector2d ReferenceNoise::power(const NoiseBands& noise, Eigen::Index window, Eigen::Index band) const {
   Eigen::Vector2d power;
   for (Eigen::Index triad = 0; triad < 2; ++triad) {

@@ -18,7 +18,7 @@ namespace imuscope::batch {
 
 class ReferenceNoise {
  public:
-  /// The same share of every band, known exactly; 0: the reference is taken for the motion itself.
+  /// The same share of every band, known exactly; 0: the reference is taken as the motion itself.
   static ReferenceNoise even(const Bands& bands, double share);
 
   /// @param reference, study  spectra; of the reference as `ReferenceColumn` has them

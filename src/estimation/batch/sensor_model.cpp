@@ -21,6 +21,7 @@ using Row33 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 constexpr std::array<std::array<Eigen::Index, 2>, 6> kTriangle{
     {{0, 0}, {1, 1}, {2, 2}, {1, 0}, {2, 0}, {2, 1}}};
 
+/// Of B-4 and B-5: the identity with scales and departures from right angles.
 Eigen::Matrix3d shape(const ParameterVector& x, Eigen::Index first, double above) {
   Eigen::Matrix3d m = Eigen::Matrix3d::Identity();
   for (Eigen::Index j = 0; j < 6; ++j) m += x[first + j] * shape_derivative(j, above);
@@ -45,7 +46,7 @@ Eigen::Matrix<double, 6, 1> triangle_of(const Eigen::Matrix3d& triangular) {
   return shape;
 }
 
-/// Derivative of the rotation vector, in s, from a triad's symmetric frame to that of its axes in its three
+/// w of B-24: derivative of the rotation vector, in s, from a triad's symmetric frame to that of its axes in its three
 /// departures yx, zx, zy.
 Eigen::Matrix3d turn_derivative() {
   Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
@@ -67,6 +68,7 @@ Eigen::Matrix3d shape_derivative(Eigen::Index j, double above) {
 
 Eigen::Matrix3d SensorState::gyro_shape() const { return shape(x, kGyroShape, above); }
 Eigen::Matrix3d SensorState::accel_shape() const { return shape(x, kAccelShape, above); }
+// B-5
 Eigen::Matrix3d SensorState::C_s_accel() const { return exp_so3(-x.segment<3>(kAlpha)); }
 Eigen::Matrix3d SensorState::C_b_accel() const { return accel_shape() * C_s_accel() * C_b_s; }
 Eigen::Matrix3d SensorState::g_sensitivity() const {
@@ -99,6 +101,7 @@ void SensorState::add(const ParameterVector& correction) {
   x.segment<3>(kAlpha) = -log_so3(turned);
 }
 
+// B-24
 AxesFrame in_axes_frame(const SensorState& symmetric) {
   AxesFrame out{symmetric, {}};
   const Eigen::Matrix3d gyros = symmetric.C_b_gyro();
@@ -110,6 +113,7 @@ AxesFrame in_axes_frame(const SensorState& symmetric) {
   sensor.x.segment<6>(kGyroShape) = triangle_of(gyros * sensor.C_b_s.transpose());
   sensor.x.segment<3>(kAlpha) = -log_so3(C_b_accel_axes * sensor.C_b_s.transpose());
   sensor.x.segment<6>(kAccelShape) = triangle_of(accels * C_b_accel_axes.transpose());
+  // B-24, to first order
   out.derivative.setIdentity();
   const Eigen::Matrix3d turn = turn_derivative();
   out.derivative.block<3, 3>(kPsi, kGyroShape + 3) = symmetric.C_b_s.transpose() * turn;
@@ -120,7 +124,7 @@ AxesFrame in_axes_frame(const SensorState& symmetric) {
 
 namespace {
 
-/// How axes and scales of a triad in s move where the reference's triad is off by E (in s): (I - E) is split
+/// B-21: how axes and scales of a triad in s move where the reference's triad is off by E (in s): (I - E) is split
 /// into a rotation and a lower triangle.
 struct AxisShift {
   Eigen::Vector3d rotation;
@@ -138,20 +142,33 @@ struct AxisShift {
 }  // namespace
 
 void SensorClass::set_reference(double gyro_white_radps_per_sqrt_hz) {
-  // B-21a: from fibre-optic and laser gyros of navigation grade to an industrial MEMS unit, whose alignment is
-  // that of an S-IMU (0.1 deg) and whose scale is calibrated to half a per cent; tactical units lie between.
-  constexpr double kNavigation = 0.005 * kRadPerDeg / 60.0;
-  constexpr double kMems = 0.3 * kRadPerDeg / 60.0;
-  constexpr double kMemsScale = 5e-3;
-  const double place = std::log(gyro_white_radps_per_sqrt_hz / kNavigation) / std::log(kMems / kNavigation);
-  const auto between = [share = std::clamp(place, 0.0, 1.0)](double navigation, double mems) {
-    return navigation * std::pow(mems / navigation, share);
+  struct Grade {
+    double gyro_white_radps_per_sqrt_hz;
+    double scale_sd, axis_sd_rad, triad_sd_rad;
   };
+  constexpr double kPerRootHour = kRadPerDeg / 60.0;
   const SensorClass navigation;
-  reference_scale_sd = between(navigation.reference_scale_sd, kMemsScale);
-  // Of each of the two axes whose departure from a right angle has axis_sd_rad.
-  reference_axis_sd_rad = between(navigation.reference_axis_sd_rad, axis_sd_rad / std::numbers::sqrt2);
-  reference_triad_sd_rad = between(navigation.reference_triad_sd_rad, triad_sd_rad);
+  // Two axes make one departure from a right angle: each leans by the share of it that has its sd.
+  const auto each = [](double departure_sd_rad) { return departure_sd_rad / std::numbers::sqrt2; };
+  // Tactical MEMS: STIM300 (Sensonor TS1524: .15 deg/sqrt(h), scale 500 ppm, axes 1 mrad), its scale taken twice, as it is
+  // among the best of its class. Industrial MEMS: aligned as an S-IMU is, scale calibrated to half a per cent.
+  constexpr double kTacticalAxes_rad = 0.05 * kRadPerDeg;
+  const std::array<Grade, 3> grades{{{0.005 * kPerRootHour, navigation.reference_scale_sd,
+                                      navigation.reference_axis_sd_rad, navigation.reference_triad_sd_rad},
+                                     {0.15 * kPerRootHour, 1e-3, each(kTacticalAxes_rad), kTacticalAxes_rad},
+                                     {0.3 * kPerRootHour, 5e-3, each(axis_sd_rad), triad_sd_rad}}};
+  // B-21a
+  const std::size_t next = gyro_white_radps_per_sqrt_hz < grades[1].gyro_white_radps_per_sqrt_hz ? 1 : 2;
+  const Grade& low = grades[next - 1];
+  const Grade& high = grades[next];
+  const double place = std::log(gyro_white_radps_per_sqrt_hz / low.gyro_white_radps_per_sqrt_hz) /
+                       std::log(high.gyro_white_radps_per_sqrt_hz / low.gyro_white_radps_per_sqrt_hz);
+  const auto between = [share = std::clamp(place, 0.0, 1.0)](double from, double to) {
+    return from * std::pow(to / from, share);
+  };
+  reference_scale_sd = between(low.scale_sd, high.scale_sd);
+  reference_axis_sd_rad = between(low.axis_sd_rad, high.axis_sd_rad);
+  reference_triad_sd_rad = between(low.triad_sd_rad, high.triad_sd_rad);
 }
 
 Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const SensorClass& sensor,

@@ -73,8 +73,8 @@ struct SensorClass {
   double reference_axis_sd_rad = 2e-4;
   double reference_triad_sd_rad = 3e-4;
 
-  /// The class of a reference by its gyros' white noise (angle random walk, rad/sqrt(s)): who makes quieter
-  /// gyros turns their axes better, too (B-21a). The defaults are navigation grade.
+  /// The class of a reference by its gyros' white noise (angle random walk, rad/sqrt(s)): whoever makes
+  /// quieter gyros aligns their axes better, too (B-21a). The defaults are navigation grade.
   void set_reference(double gyro_white_radps_per_sqrt_hz);
 };
 

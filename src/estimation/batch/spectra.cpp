@@ -11,7 +11,7 @@ namespace {
 /// Twenty seconds resolve the motion of a vehicle; more of them tell more of the noise.
 constexpr Eigen::Index kLongestWindow = 1024;
 constexpr Eigen::Index kShortestWindow = 256;
-/// As few windows as this make a sd of their scatter no more than a guess; shorter ones are taken before.
+/// As few windows as this make an sd of their scatter no more than a guess; shorter ones are taken first.
 constexpr std::size_t kFewWindows = 12;
 
 std::vector<Eigen::Index> starts_of(const std::vector<char>& valid, Eigen::Index length) {
@@ -21,12 +21,14 @@ std::vector<Eigen::Index> starts_of(const std::vector<char>& valid, Eigen::Index
   for (Eigen::Index i = 0; i <= n; ++i) {
     const bool ends = i == n || valid[static_cast<std::size_t>(i)] == 0;
     if (!ends) continue;
+    // B-3: windows overlap by half.
     for (Eigen::Index start = run_start; start + length <= i; start += length / 2) starts.push_back(start);
     run_start = i + 1;
   }
   return starts;
 }
 
+/// B-3: the window.
 Eigen::VectorXd half_sine(Eigen::Index length) {
   Eigen::VectorXd window(length);
   for (Eigen::Index i = 0; i < length; ++i)
@@ -67,6 +69,7 @@ WindowPlan plan_windows(const std::vector<char>& valid, double rate_hz, double t
   return plan;
 }
 
+// B-3
 Spectra::Spectra(const WindowPlan& plan, const Eigen::MatrixXd& series) : n_frequencies_(plan.n_frequencies) {
   const auto n_windows = static_cast<Eigen::Index>(plan.starts.size());
   values_.resize(n_windows * n_frequencies_, series.cols());

@@ -32,7 +32,7 @@ struct WindowPlan {
 class Spectra {
  public:
   Spectra() = default;
-  /// @param series  a row an instant, of the grid that `plan` was made for
+  /// @param series  one row per instant, of the grid that `plan` was made for
   Spectra(const WindowPlan& plan, const Eigen::MatrixXd& series);
 
   /// Column `column`, window `window`, frequency `k`.

@@ -52,6 +52,7 @@ Change largest_change(const WindowInfluences& influences, const WatchedVector& v
   Bridge widest;
   double largest = 0.0;
   for (Eigen::Index w = 0; w + 1 < influences.rows(); ++w) {
+    // B-25: the bridge up to this window
     at.sum += influences.row(w).transpose() - mean;
     at.share += influences.row(w).cwiseAbs2().transpose().cwiseQuotient(all);
     const double statistic = at.statistic(variance, at.inside());
@@ -73,6 +74,7 @@ Change largest_change(const WindowInfluences& influences, const WatchedVector& v
                      .cwiseQuotient(within.cwiseAbs2().colwise().sum().transpose());
   change.statistic =
       widest.statistic(variance.cwiseMax(variance_of_sum(within, kLags).diagonal().eval()), seen);
+  // B-25: d and s
   change.difference = -widest.sum.cwiseQuotient(widest.between());
   const WatchedVector farther = widest.share.cwiseMax(WatchedVector::Ones() - widest.share);
   change.reach = change.difference.cwiseProduct(farther);

@@ -11,7 +11,7 @@ namespace imuscope::batch {
 /// What is looked at: psi, r and t_d, as they stand in the vector of parameters.
 inline constexpr Eigen::Index kWatched = 7;
 using WatchedVector = Eigen::Matrix<double, kWatched, 1>;
-/// What each window adds to the estimate of them: its score times the covariance. A row a window.
+/// What each window adds to the estimate of them: its score times the covariance. One row per window.
 using WindowInfluences = Eigen::Matrix<double, Eigen::Dynamic, kWatched>;
 
 /// Where the drive falls into two parts that differ most.
@@ -27,8 +27,7 @@ struct Change {
 };
 
 /// @param variance  of the estimate of each component, as the noise gives it; what the windows scatter by
-/// within
-///                  the two parts takes its place where that is more
+///                  within the two parts takes its place where that is more
 /// Zero where there are too few windows for two parts.
 [[nodiscard]] Change largest_change(const WindowInfluences& influences, const WatchedVector& variance);
 

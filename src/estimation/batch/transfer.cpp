@@ -27,6 +27,7 @@ Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k) 
   Motion motion;
   motion.omega = row.segment<3>(kOmega).transpose();
   motion.f = row.segment<3>(kForce).transpose();
+  // B-6
   motion.arm = skew_c(row.segment<3>(kOmegaDot).transpose());
   const auto p = row.segment<6>(kProducts);
   Matrix3c outer;
@@ -58,6 +59,7 @@ Transfer::Transfer(const SensorState& sensor, const DeviationVector& deviation)
   }
 }
 
+// B-7: phi
 double flexure_gain(double frequency_hz) {
   const double ratio = frequency_hz / kFlexure_hz;
   return ratio * ratio;
@@ -65,6 +67,7 @@ double flexure_gain(double frequency_hz) {
 
 complex<double> derivative(double frequency_hz) { return {0.0, 2.0 * std::numbers::pi * frequency_hz}; }
 
+// B-8: each at its place, B-8a added
 Vector3c accelerometers(const Transfer& t, const Motion& motion) {
   const Vector3c middle = motion.force_at(t.arm_b_m) + of_turned_mount(t, motion);
   Vector3c felt;
@@ -76,6 +79,7 @@ Vector3c accelerometers(const Transfer& t, const Motion& motion) {
   return felt;
 }
 
+// B-7: what motion alone makes
 Vector3c gyros(const Transfer& t, const Motion& motion, double frequency_hz) {
   const Vector3c in_s = t.C * motion.omega;
   return t.gyro * motion.omega + flexure_gain(frequency_hz) * (t.flexure * in_s) + t.gyro_deviation * in_s;
@@ -85,9 +89,11 @@ Vector6c predicted(const Transfer& t, const Motion& motion, const Vector3c& stud
                    double frequency_hz) {
   Vector6c y;
   const Vector3c force_s = t.C * motion.force_at(t.arm_b_m);
+  // B-7
   y.head<3>() = gyros(t, motion, frequency_hz) + derivative(frequency_hz) * (t.compliance * force_s) +
                 t.g_sensitivity * study_f + constant * t.gyro_bias;
   const Vector3c felt = accelerometers(t, motion);
+  // B-8; the other axes' forces by B-8a
   y.tail<3>() = felt * (1.0 + derivative(frequency_hz) * t.delay_s) +
                 flexure_gain(frequency_hz) *
                     (t.fade.cast<complex<double>>().cwiseProduct(felt) + t.accel_flexure * felt) +

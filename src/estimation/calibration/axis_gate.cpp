@@ -4,6 +4,7 @@
 
 namespace imuscope {
 
+// E-3
 double axis_gate(double probability) {
   return boost::math::quantile(boost::math::chi_squared(1.0), probability);
 }

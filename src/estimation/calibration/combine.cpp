@@ -29,7 +29,7 @@ struct Information {
   RowFactor shared;  ///< E-20; no column where nothing is shared
 };
 
-/// Sum of w I and its weighted mean.
+/// Sum of w I and its weighted mean. E-22.
 Vector6 weighted_mean(const std::vector<Information>& all, const std::vector<double>& weights,
                       Matrix6& covariance) {
   Matrix6 sum = Matrix6::Zero();
@@ -119,6 +119,7 @@ Result<CombinedMounting> combine(std::span<const MountingEstimate> estimates, Co
                         "leave that run out");
     }
     Information one;
+    // E-20: the mounting as a vector about the first drive's
     one.x.head<3>() = -log_so3(C_first.transpose() * to_eigen(estimates[i].C_b_s));
     one.x.tail<3>() = to_eigen(estimates[i].r_bs_b_m);
     one.covariance = P;
@@ -174,6 +175,7 @@ double CombinedMounting::one_mounting_p_value() const {
   return std::min(1.0, least * static_cast<double>(drives.size()));
 }
 
+// E-23
 void WeightedMean::add(double value, double sd) noexcept {
   IMUSCOPE_EXPECTS(sd > 0.0);
   const double weight = 1.0 / (sd * sd);

@@ -62,11 +62,13 @@ void CovarianceKernel::reset_state(std::size_t i, double variance) noexcept {
   set(i, i, variance);
 }
 
+// K-1
 void CovarianceKernel::predict_navigation(const KernelTransition& transition) noexcept {
   IMUSCOPE_EXPECTS(dimension_ >= kN);
   loops_->transition(transition.phi.data(), transition.noise.data(), p_, scratch_, padded_);
 }
 
+// K-2
 void CovarianceKernel::predict_states(std::size_t first, std::span<const double> decay,
                                       std::span<const double> variance) noexcept {
   IMUSCOPE_EXPECTS(decay.size() == variance.size() && first + decay.size() <= dimension_);
@@ -78,6 +80,7 @@ void CovarianceKernel::predict_states(std::size_t first, std::span<const double>
   for (std::size_t i = 0; i < variance.size(); ++i) p_[(first + i) * padded_ + first + i] += variance[i];
 }
 
+// K-3
 void CovarianceKernel::project(const SparseMeasurement& H, const std::array<double, 9>& R) noexcept {
   std::array<std::size_t, 3 * kMaxMeasurementBlocks> columns{};
   std::array<double, 9 * kMaxMeasurementBlocks> h{};

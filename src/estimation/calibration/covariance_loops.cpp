@@ -10,6 +10,7 @@ extern const CovarianceLoops kAvx2Loops;
 extern const CovarianceLoops kAvx512Loops;
 #endif
 
+// K-5
 const CovarianceLoops* covariance_loops(InstructionSet set) noexcept {
   if (set == InstructionSet::kBaseline) return &kBaselineLoops;
 #if defined(IMUSCOPE_WIDE_LOOPS)

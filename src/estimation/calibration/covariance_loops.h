@@ -1,7 +1,7 @@
 #pragma once
 
 /// The inner loops of the covariance (K-5): the same source compiled once per instruction set, each version
-/// in a file of its own, and the widest that the processor has chosen at start. Fused multiply-add is used
+/// in a file of its own, and the widest that the processor has is chosen at start. Fused multiply-add is used
 /// where the instruction set has it, so that results repeat to the bit on one model of processor and to
 /// rounding (1e-12 of an sd) between models.
 ///

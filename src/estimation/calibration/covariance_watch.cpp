@@ -21,6 +21,7 @@ double dot(const double* a, const double* b, std::size_t n) noexcept {
 
 }  // namespace
 
+// K-6
 std::optional<std::size_t> CovarianceWatch::first_bad_state(const CovarianceKernel& P) noexcept {
   const std::size_t n = P.dimension();
   IMUSCOPE_EXPECTS(n * n == factor_.size());

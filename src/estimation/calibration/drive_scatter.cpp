@@ -33,6 +33,7 @@ struct Size {
   double prior = kRepeats;
 };
 
+/// E-25: sizes of the scatter, and what is believed of each before the drives.
 std::vector<Size> sizes() {
   std::vector<Size> all{Size{}};
   const double ratio = std::pow(kLargest / kSmallest, 1.0 / (kSizes - 1));
@@ -73,6 +74,7 @@ Case weigh(const Eigen::VectorXd& x, Eigen::MatrixXd S, const Size& psi, const S
   out.psi_sd_rad = psi.share * kGive_rad;
   out.r_sd_m = r.share * kGive_m;
   const Eigen::Index n = x.size() / 6;
+  // E-25: more of S by what the mounting does between drives.
   Eigen::MatrixXd ones(x.size(), 6);
   for (Eigen::Index i = 0; i < n; ++i) {
     ones.middleRows<6>(6 * i).setIdentity();
@@ -83,6 +85,7 @@ Case weigh(const Eigen::VectorXd& x, Eigen::MatrixXd S, const Size& psi, const S
   const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(x.size(), x.size()));
   const Eigen::MatrixXd whitened = inverse * ones;
   const Matrix6 information = ones.transpose() * whitened;
+  // E-20, with that S
   out.covariance = information.ldlt().solve(Matrix6::Identity());
   out.mean = out.covariance * (whitened.transpose() * x);
   // What is left of the weights once the mean is free (E-26).
@@ -94,6 +97,7 @@ Case weigh(const Eigen::VectorXd& x, Eigen::MatrixXd S, const Size& psi, const S
   for (Eigen::Index i = 0; i < n; ++i) {
     const Matrix6 own = Q.block<6, 6>(6 * i, 6 * i);
     Case::Drive drive;
+    // E-24, E-27: from the mean of the others
     drive.covariance = own.ldlt().solve(Matrix6::Identity());
     drive.deviation = drive.covariance * pull.segment<6>(6 * i);
     drive.chi2 = drive.deviation.dot(pull.segment<6>(6 * i));
@@ -125,6 +129,7 @@ std::vector<double> normalised(const std::vector<Case>& cases, Log log_weight) {
   return weights;
 }
 
+/// E-27: over all sizes, by what the others say of them.
 DriveScatter::Drive against_others(const std::vector<Case>& cases, std::size_t i) {
   DriveScatter::Drive out;
   const auto weights = normalised(cases, [i](const Case& one) { return one.drives[i].log_weight; });
@@ -147,6 +152,7 @@ DriveScatter drive_scatter(const Eigen::VectorXd& x, const Eigen::MatrixXd& cova
   std::vector<Case> cases;
   for (const Size& psi : sizes())
     for (const Size& r : sizes()) cases.push_back(weigh(x, covariance, psi, r));
+  // E-26: over all sizes
   const auto weights = normalised(cases, [](const Case& one) { return one.log_weight; });
   DriveScatter out;
   double psi_square = 0.0;

@@ -11,8 +11,8 @@
 #include "estimation/calibration/navigation_filter.h"
 #include "estimation/calibration/odometry_filter.h"
 #include "estimation/calibration/regime_detector.h"
+#include "estimation/calibration/s_imu_filter.h"
 #include "estimation/calibration/smoother.h"
-#include "estimation/calibration/study_filter.h"
 
 namespace imuscope {
 namespace {
@@ -21,15 +21,15 @@ namespace {
 constexpr double kGravityWrong_mps2 = -8.0;
 /// And its magnitude, whatever the axes, is gravity's to this.
 constexpr double kGravityTolerance_mps2 = 0.5;
-/// The covariance's definiteness is looked at this often.
+/// The covariance's definiteness is looked at this often. K-6.
 constexpr Duration kWatchEvery = std::chrono::seconds{1};
 
 void check(const EstimatorConfig& config) {
-  IMUSCOPE_EXPECTS(config.studies.size() <= kMaxStudies);
+  IMUSCOPE_EXPECTS(config.studies.size() <= kMaxSImus);
   IMUSCOPE_EXPECTS(config.reference.rate_hz > 0.0);
   IMUSCOPE_EXPECTS(!config.odometry.enabled || config.odometry.rate_hz > 0.0);
   IMUSCOPE_EXPECTS(config.gate_probability > 0.5 && config.gate_probability < 1.0);
-  for (const StudyConfig& study : config.studies) {
+  for (const SImuConfig& study : config.studies) {
     IMUSCOPE_EXPECTS(study.rate_hz > 0.0);
     IMUSCOPE_EXPECTS(study.blocks != 0);
     IMUSCOPE_EXPECTS(study.average_samples >= 0 && study.average_samples <= 50);
@@ -79,7 +79,7 @@ class Estimator::Impl final : public EpochSink {
       }
       return;
     } else if (sample.kind == SampleKind::kImu) {
-      for (StudyFilter& study : studies_) {
+      for (SImuFilter& study : studies_) {
         if (study.config().device != sample.device) continue;
         study.add(sample);
         return;
@@ -93,25 +93,25 @@ class Estimator::Impl final : public EpochSink {
     last_cut_ = cut;
     ++counters_.ticks;
     epochs_.clear();
-    StudyContext context{core_, window_, log_, *this, regime_.regime()};
-    for (StudyFilter& study : studies_) study.process(context, cut);
+    SImuContext context{core_, window_, log_, *this, regime_.regime()};
+    for (SImuFilter& study : studies_) study.process(context, cut);
     watch_covariance(cut);
     core_.settle();
     hand_out_history();
     navigation_.update_output();
     odometry_.update_output();
-    for (StudyFilter& study : studies_) study.update_output(core_, log_);
+    for (SImuFilter& study : studies_) study.update_output(core_, log_);
     watch_swaps(cut);
     counters_.events_lost = log_.lost();
     shown_.take(log_);
   }
 
-  void set_noise(std::size_t study, const StudyNoise& noise) noexcept {
+  void set_noise(std::size_t study, const SImuNoise& noise) noexcept {
     IMUSCOPE_EXPECTS(study < studies_.size());
     studies_[study].set_noise(core_, noise);
   }
 
-  void on_epoch(const StudyEpoch& epoch) noexcept override {
+  void on_epoch(const SImuEpoch& epoch) noexcept override {
     if (epochs_.size() == kEpochsPerTick) {
       ++counters_.epochs_lost;
       return;
@@ -126,8 +126,8 @@ class Estimator::Impl final : public EpochSink {
   [[nodiscard]] const OdometryOutput& odometry() const noexcept { return odometry_.output(); }
   [[nodiscard]] const TimeScale& time_scale() const noexcept { return navigation_.time_scale(); }
   [[nodiscard]] std::size_t study_count() const noexcept { return studies_.size(); }
-  [[nodiscard]] const StudyOutput& study(std::size_t i) const noexcept { return studies_[i].output(); }
-  [[nodiscard]] std::span<const StudyEpoch> epochs() const noexcept { return epochs_; }
+  [[nodiscard]] const SImuOutput& study(std::size_t i) const noexcept { return studies_[i].output(); }
+  [[nodiscard]] std::span<const SImuEpoch> epochs() const noexcept { return epochs_; }
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept { return shown_.events(); }
   [[nodiscard]] const EstimatorCounters& counters() const noexcept { return counters_; }
 
@@ -152,15 +152,16 @@ class Estimator::Impl final : public EpochSink {
     const Eigen::Vector3d omega = to_eigen(sample.imu.omega_radps);
     regime_.add(omega, to_eigen(sample.imu.f_mps2), dt_s);
     watch_gravity(sample);
-    for (StudyFilter& study : studies_) study.add_reference(sample.time, omega.norm());
+    for (SImuFilter& study : studies_) study.add_reference(sample.time, omega.norm());
     navigation_.add_reference(sample);
     odometry_.process(sample.time, regime_.regime());
   }
 
+  // E-10
   void hand_out_history() noexcept {
     if (history_ == nullptr || !has_reference_ || last_reference_ < next_history_) return;
     next_history_ = last_reference_ + history_->interval();
-    std::array<bool, kMaxStudies> calibrating{};
+    std::array<bool, kMaxSImus> calibrating{};
     for (std::size_t i = 0; i < studies_.size(); ++i)
       calibrating[i] = has_estimate(studies_[i].output().status);
     history_->on_history(
@@ -186,6 +187,7 @@ class Estimator::Impl final : public EpochSink {
       for (std::size_t j = 0; j < i; ++j) {
         const bool told = swap_told_[i] || swap_told_[j];
         if (told || !studies_[i].contradicts_prior() || !studies_[j].contradicts_prior()) continue;
+        // E-8: each fits the other's prior
         if (!studies_[i].fits_prior_of(studies_[j].config()) ||
             !studies_[j].fits_prior_of(studies_[i].config()))
           continue;
@@ -217,7 +219,7 @@ class Estimator::Impl final : public EpochSink {
   FilterCore core_;
   CovarianceWatch watch_;
   HostTime next_watch_{HostTime::min()};
-  std::array<bool, kMaxStudies> swap_told_{};
+  std::array<bool, kMaxSImus> swap_told_{};
   ReferenceWindow window_;
   EventLog log_;
   EventLog shown_;
@@ -225,8 +227,8 @@ class Estimator::Impl final : public EpochSink {
   NavigationFilter navigation_;
   OdometryFilter odometry_;
   RegimeDetector regime_;
-  std::vector<StudyFilter> studies_;
-  std::vector<StudyEpoch> epochs_;
+  std::vector<SImuFilter> studies_;
+  std::vector<SImuEpoch> epochs_;
   HostTime last_cut_{HostTime::min()};
   bool has_reference_ = false;
   HostTime last_reference_{};
@@ -243,7 +245,7 @@ Estimator& Estimator::operator=(Estimator&&) noexcept = default;
 
 void Estimator::add(const Sample& sample) noexcept { impl_->add(sample); }
 void Estimator::advance(HostTime cut) noexcept { impl_->advance(cut); }
-void Estimator::set_noise(std::size_t study, const StudyNoise& noise) noexcept {
+void Estimator::set_noise(std::size_t study, const SImuNoise& noise) noexcept {
   impl_->set_noise(study, noise);
 }
 void Estimator::set_pc_clock(HostTime time, UtcTime utc) noexcept { impl_->set_pc_clock(time, utc); }
@@ -251,8 +253,8 @@ const TimeScale& Estimator::time_scale() const noexcept { return impl_->time_sca
 const NavigationOutput& Estimator::navigation() const noexcept { return impl_->navigation(); }
 const OdometryOutput& Estimator::odometry() const noexcept { return impl_->odometry(); }
 std::size_t Estimator::study_count() const noexcept { return impl_->study_count(); }
-const StudyOutput& Estimator::study(std::size_t index) const noexcept { return impl_->study(index); }
-std::span<const StudyEpoch> Estimator::epochs() const noexcept { return impl_->epochs(); }
+const SImuOutput& Estimator::study(std::size_t index) const noexcept { return impl_->study(index); }
+std::span<const SImuEpoch> Estimator::epochs() const noexcept { return impl_->epochs(); }
 std::span<const EstimatorEvent> Estimator::events() const noexcept { return impl_->events(); }
 const EstimatorCounters& Estimator::counters() const noexcept { return impl_->counters(); }
 

@@ -80,10 +80,10 @@ struct OdometryOutput {
 };
 
 /// Directions of the 6-dim (psi, r) space, for naming the weakest one.
-enum class StudyDirection : std::uint8_t { kPsiX, kPsiY, kPsiZ, kRX, kRY, kRZ };
+enum class SImuDirection : std::uint8_t { kPsiX, kPsiY, kPsiZ, kRX, kRY, kRZ };
 
 /// Counts since the start.
-struct StudyCounters {
+struct SImuCounters {
   std::uint64_t samples = 0;                  ///< received
   std::uint64_t used = 0;                     ///< went through a measurement update
   std::uint64_t late = 0;                     ///< reference did not come within late_after
@@ -101,7 +101,7 @@ struct StudyCounters {
 };
 
 /// The estimate of one S-IMU at the newest processed S sample.
-struct StudyOutput {
+struct SImuOutput {
   CalibrationStatus status = CalibrationStatus::kWaiting;
   MountingGoal goal = kFinestGoal;  ///< what `kCalibrated` asks for
   Regime regime = Regime::kStatic;
@@ -133,18 +133,18 @@ struct StudyOutput {
   /// Unit vector in (psi, r), each scaled by its prior sd, in which least has been learned, the largest of
   /// its components, and sd left there relative to the prior (1 = nothing learned).
   std::array<double, 6> weakest_direction{};
-  StudyDirection weakest_component = StudyDirection::kPsiX;
+  SImuDirection weakest_component = SImuDirection::kPsiX;
   double weakest_relative_sd = 1.0;
   /// Per component of (psi, r): sd below half of its prior, and 10 s of motion fitted this mounting; none
   /// while the samples contradict the reference (kStudyInconsistent). Otherwise: not observable yet.
   std::array<bool, 6> observable{};
   bool t_d_observable = false;
   bool contradicts = false;  ///< its samples do not fit the reference, whatever the mounting
-  StudyCounters counters;
+  SImuCounters counters;
 };
 
 /// One S sample with the reference at its instant: the raw material of the error process.
-struct StudyEpoch {
+struct SImuEpoch {
   std::size_t study = 0;
   HostTime time;       ///< of validity of the S sample
   double t_d_s = 0.0;  ///< reference below is taken at time + t_d_s
@@ -228,17 +228,17 @@ class Estimator {
   /// of the configured. Where the bias process became larger, the bias variance grows by the difference (at
   /// most twofold); it is never reset and correlations stay. Precondition: every sd finite, every white sd
   /// positive.
-  void set_noise(std::size_t study, const StudyNoise& noise) noexcept;
+  void set_noise(std::size_t study, const SImuNoise& noise) noexcept;
 
   [[nodiscard]] const NavigationOutput& navigation() const noexcept;
   [[nodiscard]] const OdometryOutput& odometry() const noexcept;
   /// UTC against the host's clock, as the devices tell it; what rates are integrated over.
   [[nodiscard]] const TimeScale& time_scale() const noexcept;
   [[nodiscard]] std::size_t study_count() const noexcept;
-  [[nodiscard]] const StudyOutput& study(std::size_t index) const noexcept;
+  [[nodiscard]] const SImuOutput& study(std::size_t index) const noexcept;
   /// S samples processed by the last advance(), per S-IMU in the order of time. Valid until the next
   /// advance().
-  [[nodiscard]] std::span<const StudyEpoch> epochs() const noexcept;
+  [[nodiscard]] std::span<const SImuEpoch> epochs() const noexcept;
   /// Since the advance() before the last.
   [[nodiscard]] std::span<const EstimatorEvent> events() const noexcept;
   [[nodiscard]] const EstimatorCounters& counters() const noexcept;

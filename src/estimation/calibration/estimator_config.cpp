@@ -31,8 +31,8 @@ TriadNoise gyro_noise(const TableTwo& model) {
 
 }  // namespace
 
-StudyNoise mtx_class_noise() {
-  StudyNoise noise;
+SImuNoise mtx_class_noise() {
+  SImuNoise noise;
   noise.gyro[static_cast<std::size_t>(Regime::kStatic)] = gyro_noise(kStaticModel);
   noise.gyro[static_cast<std::size_t>(Regime::kDynamic)] = gyro_noise(kDynamicModel);
   for (TriadNoise& accel : noise.accel) accel.white_sd.fill(kAccelWhite_mps2);

@@ -25,7 +25,7 @@ using Matrix3 = std::array<double, 9>;
 inline constexpr double kNominalGravity_mps2 = 9.81;
 
 /// Parts of the state of one S-IMU. Each can be left out; its quantity then stays at its prior value.
-enum StudyBlock : std::uint32_t {
+enum SImuBlock : std::uint32_t {
   kBoresightBlock = 1U << 0U,   ///< psi, rotation vector in b, C_b_s = C^_b_s Exp(-psi)
   kLeverArmBlock = 1U << 1U,    ///< r_bs_b
   kGyroBiasBlock = 1U << 2U,    ///< b_g, in s
@@ -44,17 +44,17 @@ enum StudyBlock : std::uint32_t {
   kGSensitivityBlock = 1U << 12U,  ///< rate that the gyros show per specific force
 };
 /// What data sheets allow a sensor to be beyond bias, scale and noise: 25 states.
-inline constexpr std::uint32_t kSensorStudyBlocks = kAccelBoresightBlock | kAccelTimeOffsetBlock |
-                                                    kGyroAxesBlock | kAccelAxesBlock | kAccelPlacesBlock |
-                                                    kGSensitivityBlock;
+inline constexpr std::uint32_t kSensorSImuBlocks = kAccelBoresightBlock | kAccelTimeOffsetBlock |
+                                                   kGyroAxesBlock | kAccelAxesBlock | kAccelPlacesBlock |
+                                                   kGSensitivityBlock;
 /// The 19 states of a sensor that is exactly rigid, orthogonal and of one delay.
-inline constexpr std::uint32_t kFullStudyBlocks = 0x7FU;
+inline constexpr std::uint32_t kFullSImuBlocks = 0x7FU;
 /// All 44: the default.
-inline constexpr std::uint32_t kCompleteStudyBlocks = kFullStudyBlocks | kSensorStudyBlocks;
+inline constexpr std::uint32_t kCompleteSImuBlocks = kFullSImuBlocks | kSensorSImuBlocks;
 /// The paper's own 6 states: boresight and lever arm.
-inline constexpr std::uint32_t kPaperStudyBlocks = kBoresightBlock | kLeverArmBlock;
+inline constexpr std::uint32_t kPaperSImuBlocks = kBoresightBlock | kLeverArmBlock;
 /// Biases alone, with everything else known: the second pass of a study, whose history is smoothed.
-inline constexpr std::uint32_t kBiasStudyBlocks = kGyroBiasBlock | kAccelBiasBlock;
+inline constexpr std::uint32_t kBiasSImuBlocks = kGyroBiasBlock | kAccelBiasBlock;
 
 /// First-order Gauss-Markov process; an infinite time constant is a random constant.
 struct GaussMarkovConfig {
@@ -150,25 +150,25 @@ struct TriadNoise {
 };
 
 /// The stochastic model of one S-IMU. This is what a fitted noise model replaces (Estimator::set_noise).
-struct StudyNoise {
+struct SImuNoise {
   std::array<TriadNoise, kRegimeCount> gyro;   ///< rad/s
   std::array<TriadNoise, kRegimeCount> accel;  ///< m/s^2
   /// Slow part of the bias: Gauss-Markov, per axis.
   std::array<GaussMarkovConfig, 3> gyro_bias;
   std::array<GaussMarkovConfig, 3> accel_bias;
-  friend bool operator==(const StudyNoise&, const StudyNoise&) = default;
+  friend bool operator==(const SImuNoise&, const SImuNoise&) = default;
 };
 
 /// MTx class: the dynamic and static gyro models of the paper's Table II, accelerometer of its data sheet's
 /// class.
-StudyNoise mtx_class_noise();
+SImuNoise mtx_class_noise();
 
 /// One S-IMU: priors, noise and which states it has.
-struct StudyConfig {
+struct SImuConfig {
   DeviceIndex device = 0;
   double rate_hz = 100.0;
-  std::uint32_t blocks = kFullStudyBlocks;
-  StudyNoise noise = mtx_class_noise();
+  std::uint32_t blocks = kFullSImuBlocks;
+  SImuNoise noise = mtx_class_noise();
   /// A model that is handed in later is not believed where its white noise lies below this share of what is
   /// configured: the filter's own residuals must not talk it into over-confidence.
   double noise_floor_share = 0.5;
@@ -215,7 +215,7 @@ struct EstimatorConfig {
   GnssConfig gnss;
   OdometryConfig odometry;
   NavigationConfig navigation;
-  std::vector<StudyConfig> studies;  ///< at most kMaxStudies; outputs are in this order
+  std::vector<SImuConfig> studies;  ///< at most kMaxSImus; outputs are in this order
 
   /// Probability with which a good measurement of one axis passes the gate.
   double gate_probability = 0.99999;

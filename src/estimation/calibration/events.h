@@ -54,7 +54,7 @@ struct MountingChanged {
   double mean_nis;
 };
 /// After a gap; its biases are uncertain again.
-struct StudyReturned {
+struct SImuReturned {
   double gap_s;
 };
 /// Start of a streak of rejected solutions.
@@ -110,7 +110,7 @@ struct AccelBiasChanged {
 };
 /// An S-IMU's samples keep contradicting the reference whatever the mounting: axes, signs, unit or range.
 /// Nothing of it is called observable until they have fitted for minutes.
-struct StudyInconsistent {
+struct SImuInconsistent {
   double share;  ///< of its samples
 };
 
@@ -127,12 +127,12 @@ struct NoiseTooSmall {
 using EventPayload =
     std::variant<event::NavigationStarted, event::NavigationStopped, event::ReferenceGap,
                  event::ReferenceGravityWrong, event::GravityMagnitudeWrong, event::CoarseAlignmentDone,
-                 event::CoarseAlignmentPoor, event::MountingChanged, event::StudyReturned,
-                 event::GnssRejected, event::GnssReacquired, event::GnssInconsistent, event::OdometryLost,
-                 event::OdometryReturned, event::OdometryRejected, event::OdometryAccepted,
-                 event::CovarianceRepaired, event::BoresightPriorWrong, event::LeverArmPriorWrong,
-                 event::StudiesSwapped, event::GyroBiasChanged, event::AccelBiasChanged,
-                 event::StudyInconsistent, event::NoiseTooSmall>;
+                 event::CoarseAlignmentPoor, event::MountingChanged, event::SImuReturned, event::GnssRejected,
+                 event::GnssReacquired, event::GnssInconsistent, event::OdometryLost, event::OdometryReturned,
+                 event::OdometryRejected, event::OdometryAccepted, event::CovarianceRepaired,
+                 event::BoresightPriorWrong, event::LeverArmPriorWrong, event::StudiesSwapped,
+                 event::GyroBiasChanged, event::AccelBiasChanged, event::SImuInconsistent,
+                 event::NoiseTooSmall>;
 
 /// What happened, to which device, at which time on the host's scale.
 struct EstimatorEvent {

@@ -8,7 +8,7 @@ namespace {
 
 std::size_t filter_dimension(const EstimatorConfig& config) {
   std::size_t dimension = kNavigationStates;
-  for (const StudyConfig& study : config.studies) dimension += StudyLayout::make(study.blocks, 0).size;
+  for (const SImuConfig& study : config.studies) dimension += SImuLayout::make(study.blocks, 0).size;
   if (config.odometry.enabled) dimension += kOdometryErrorSize;
   if (config.gnss.enabled) dimension += kAntennaErrorSize;
   return dimension;
@@ -23,12 +23,13 @@ std::array<double, kOdometryErrorSize> odometry_prior(const OdometryConfig& conf
 
 /// Calls f(state index, prior sd) for every state of one S-IMU.
 template <typename Function>
-void for_each_prior(const StudyLayout& layout, const StudyConfig& config, Function f) {
+void for_each_prior(const SImuLayout& layout, const SImuConfig& config, Function f) {
   const auto block = [&](std::size_t first, const Vector3& sd) {
-    if (first == StudyLayout::kAbsent) return;
+    if (first == SImuLayout::kAbsent) return;
     for (std::size_t i = 0; i < 3; ++i) f(first + i, sd[i]);
   };
   const auto bias = [&](std::size_t first, const Vector3& turn_on, const auto& process) {
+    // C-17: turn-on and slow process together
     block(first, {std::hypot(turn_on[0], process[0].sd), std::hypot(turn_on[1], process[1].sd),
                   std::hypot(turn_on[2], process[2].sd)});
   };
@@ -36,13 +37,13 @@ void for_each_prior(const StudyLayout& layout, const StudyConfig& config, Functi
   block(layout.r, config.prior_r_bs_b_sd_m);
   bias(layout.gyro_bias, config.turn_on_gyro_sd_radps, config.noise.gyro_bias);
   bias(layout.accel_bias, config.turn_on_accel_sd_mps2, config.noise.accel_bias);
-  if (layout.t_d != StudyLayout::kAbsent) f(layout.t_d, config.prior_t_d_sd_s);
+  if (layout.t_d != SImuLayout::kAbsent) f(layout.t_d, config.prior_t_d_sd_s);
   block(layout.gyro_scale, config.prior_gyro_scale_sd);
   block(layout.accel_scale, config.prior_accel_scale_sd);
   block(layout.accel_boresight, config.prior_accel_boresight_sd_rad);
-  if (layout.accel_t_d != StudyLayout::kAbsent) f(layout.accel_t_d, config.prior_accel_t_d_sd_s);
+  if (layout.accel_t_d != SImuLayout::kAbsent) f(layout.accel_t_d, config.prior_accel_t_d_sd_s);
   const auto alike = [&](std::size_t first, std::size_t count, double sd) {
-    if (first == StudyLayout::kAbsent) return;
+    if (first == SImuLayout::kAbsent) return;
     for (std::size_t i = 0; i < count; ++i) f(first + i, sd);
   };
   alike(layout.gyro_axes, 3, config.prior_axes_sd_rad);
@@ -74,10 +75,11 @@ FilterCore::FilterCore(const EstimatorConfig& config)
     covariance_.reset_state(kGyroBiasError + i, repair_variance_[kGyroBiasError + i]);
     covariance_.reset_state(kAccelBiasError + i, repair_variance_[kAccelBiasError + i]);
   }
+  // E-1; behind the S-IMUs the odometry's states (E-33) and the antenna's (N-34).
   std::size_t first = kNavigationStates;
   studies_.resize(config.studies.size());
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
-    layouts_.push_back(StudyLayout::make(config.studies[i].blocks, first));
+    layouts_.push_back(SImuLayout::make(config.studies[i].blocks, first));
     first += layouts_.back().size;
     for_each_prior(layouts_.back(), config.studies[i],
                    [this](std::size_t state, double sd) { repair_variance_[state] = sd * sd; });
@@ -102,13 +104,14 @@ FilterCore::FilterCore(const EstimatorConfig& config)
 }
 
 double FilterCore::sd(std::size_t state) const noexcept {
-  return state == StudyLayout::kAbsent ? 0.0 : std::sqrt(covariance_(state, state));
+  return state == SImuLayout::kAbsent ? 0.0 : std::sqrt(covariance_(state, state));
 }
 
 bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use) noexcept {
   if (!covariance_.update(to_array(innovation), use)) return false;
   const std::span<const double> correction = covariance_.correction();
   const Eigen::Map<const NavigationErrorVector> navigation_correction(correction.data());
+  // E-4: as errors of now
   injected_ += navigation_correction;
   navigation_.gyro_bias_b_radps += navigation_correction.segment<3>(kGyroBiasError);
   navigation_.accel_bias_b_mps2 += navigation_correction.segment<3>(kAccelBiasError);
@@ -118,15 +121,15 @@ bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool
   for (std::size_t i = 0; i < correction.size(); ++i) waiting_[i] += correction[i];
   navigation_waits_ = true;
   std::fill(study_waits_.begin(), study_waits_.end(), 1);
-  if (odometry_states_ != StudyLayout::kAbsent)
+  if (odometry_states_ != SImuLayout::kAbsent)
     inject(odometry_, Eigen::Map<const OdometryErrorVector>(correction.data() + odometry_states_));
-  if (antenna_states_ != StudyLayout::kAbsent)
+  if (antenna_states_ != SImuLayout::kAbsent)
     inject(antenna_, Eigen::Map<const AntennaErrorVector>(correction.data() + antenna_states_));
   return true;
 }
 
 void FilterCore::reset_latency(double latency_s, double sd_s) noexcept {
-  IMUSCOPE_EXPECTS(antenna_states_ != StudyLayout::kAbsent);
+  IMUSCOPE_EXPECTS(antenna_states_ != SImuLayout::kAbsent);
   antenna_.latency_s = latency_s;
   repair_variance_[antenna_states_ + kReceiverLatencyError] = sd_s * sd_s;
   reset_state(antenna_states_ + kReceiverLatencyError, sd_s * sd_s);
@@ -151,7 +154,7 @@ void FilterCore::settle_navigation() noexcept {
 void FilterCore::settle_study(std::size_t i) noexcept {
   if (study_waits_[i] == 0) return;
   study_waits_[i] = 0;
-  const StudyLayout& layout = layouts_[i];
+  const SImuLayout& layout = layouts_[i];
   inject(studies_[i], layout, waiting_);
   std::fill_n(waiting_.begin() + static_cast<std::ptrdiff_t>(layout.first), layout.size, 0.0);
 }
@@ -182,6 +185,7 @@ void FilterCore::predict_navigation(const NavigationTransition& step) noexcept {
     out.middleRows<3>(kAccelBiasError) = step.accel_bias_decay * M.middleRows<3>(kAccelBiasError);
     return out;
   };
+  // E-10: since the epoch of the history before
   accumulated_.transition = carried_matrix(accumulated_.transition);
   accumulated_.noise =
       carried_matrix(carried_matrix(accumulated_.noise).transpose()) + step.process_covariance;
@@ -205,7 +209,7 @@ void FilterCore::predict_states(std::size_t first, std::span<const double> decay
 
 void FilterCore::reset_state(std::size_t i, double variance) noexcept {
   covariance_.reset_state(i, variance);
-  // A decay to nothing: what was known before tells nothing of what comes after.
+  // E-11. A decay to nothing: what was known before tells nothing of what comes after.
   if (keeps_history_) accumulate(i, 0.0, variance);
 }
 
@@ -248,9 +252,9 @@ std::size_t FilterCore::repair(std::size_t& first) noexcept {
   return count;
 }
 
-void reset_to_prior(FilterCore& core, std::size_t study, const StudyConfig& config) noexcept {
-  StudyState& state = core.study(study);
-  state = StudyState{};
+void reset_to_prior(FilterCore& core, std::size_t study, const SImuConfig& config) noexcept {
+  SImuState& state = core.study(study);
+  state = SImuState{};
   if (config.prior_C_b_s) state.C_b_s = to_eigen(*config.prior_C_b_s);
   state.r_bs_b_m = to_eigen(config.prior_r_bs_b_m);
   state.gyro_bias_s_radps = to_eigen(config.prior_gyro_bias_radps);

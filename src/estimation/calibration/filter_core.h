@@ -11,13 +11,14 @@
 
 #include "base/contracts.h"
 #include "estimation/calibration/covariance_kernel.h"
-#include "estimation/calibration/eigen_types.h"
 #include "estimation/calibration/estimator_config.h"
-#include "estimation/calibration/study_model.h"
+#include "estimation/calibration/measurement_columns.h"
+#include "estimation/calibration/s_imu_model.h"
 #include "estimation/navigation/antenna.h"
 #include "estimation/navigation/error_model.h"
 #include "estimation/navigation/navigation_state.h"
 #include "estimation/navigation/odometry_measurement.h"
+#include "sample/eigen_arrays.h"
 
 namespace imuscope {
 
@@ -41,11 +42,11 @@ class FilterCore {
     IMUSCOPE_EXPECTS(!navigation_waits_);
     return navigation_;
   }
-  [[nodiscard]] StudyState& study(std::size_t i) noexcept {
+  [[nodiscard]] SImuState& study(std::size_t i) noexcept {
     settle_study(i);
     return studies_[i];
   }
-  [[nodiscard]] const StudyState& study(std::size_t i) const noexcept {
+  [[nodiscard]] const SImuState& study(std::size_t i) const noexcept {
     IMUSCOPE_EXPECTS(study_waits_[i] == 0);
     return studies_[i];
   }
@@ -57,13 +58,13 @@ class FilterCore {
   [[nodiscard]] const Eigen::Vector3d& reference_accel_bias_mps2() const noexcept {
     return navigation_.accel_bias_b_mps2;
   }
-  [[nodiscard]] const StudyLayout& layout(std::size_t i) const noexcept { return layouts_[i]; }
+  [[nodiscard]] const SImuLayout& layout(std::size_t i) const noexcept { return layouts_[i]; }
   [[nodiscard]] std::size_t study_count() const noexcept { return studies_.size(); }
   [[nodiscard]] const OdometryState& odometry() const noexcept { return odometry_; }
-  /// First index of the odometry's states; StudyLayout::kAbsent where there are none.
+  /// First index of the odometry's states; SImuLayout::kAbsent where there are none.
   [[nodiscard]] std::size_t odometry_states() const noexcept { return odometry_states_; }
   [[nodiscard]] const AntennaState& antenna() const noexcept { return antenna_; }
-  /// First index of the antenna's states; StudyLayout::kAbsent where there are none.
+  /// First index of the antenna's states; SImuLayout::kAbsent where there are none.
   [[nodiscard]] std::size_t antenna_states() const noexcept { return antenna_states_; }
   /// A receiver's latency of which nothing else is known yet.
   void reset_latency(double latency_s, double sd_s) noexcept;
@@ -111,21 +112,21 @@ class FilterCore {
   CovarianceKernel covariance_;
   NavigationState navigation_;
   NavigationErrorVector injected_ = NavigationErrorVector::Zero();
-  std::vector<StudyState> studies_;
+  std::vector<SImuState> studies_;
   std::vector<double> waiting_;  ///< corrections of every state that are not yet in it
   bool navigation_waits_ = false;
   std::vector<unsigned char> study_waits_;
-  std::vector<StudyLayout> layouts_;
+  std::vector<SImuLayout> layouts_;
   OdometryState odometry_;
-  std::size_t odometry_states_ = StudyLayout::kAbsent;
+  std::size_t odometry_states_ = SImuLayout::kAbsent;
   AntennaState antenna_;
-  std::size_t antenna_states_ = StudyLayout::kAbsent;
+  std::size_t antenna_states_ = SImuLayout::kAbsent;
   std::vector<double> repair_variance_;  ///< prior variance of every state
   bool keeps_history_ = false;
   Accumulated accumulated_;
 };
 
 /// Prior variances of one S-IMU's states, written to P with no correlation.
-void reset_to_prior(FilterCore& core, std::size_t study, const StudyConfig& config) noexcept;
+void reset_to_prior(FilterCore& core, std::size_t study, const SImuConfig& config) noexcept;
 
 }  // namespace imuscope

@@ -5,7 +5,7 @@
 
 namespace imuscope {
 
-FixedLagSmoother::FixedLagSmoother(std::vector<StudyLayout> layouts, std::size_t states)
+FixedLagSmoother::FixedLagSmoother(std::vector<SImuLayout> layouts, std::size_t states)
     : layouts_(std::move(layouts)), states_(states) {}
 
 void FixedLagSmoother::add(std::span<const double> record,
@@ -18,6 +18,7 @@ void FixedLagSmoother::add(std::span<const double> record,
   smooth(give);
 }
 
+// E-16
 void FixedLagSmoother::smooth(const std::function<void(const SmoothedEpoch&)>& give) {
   const HostTime final_before = window_.back().state.time - kLag;
   const auto first_kept = std::find_if(window_.begin(), window_.end(), [final_before](const auto& epoch) {

@@ -25,7 +25,7 @@ class FixedLagSmoother {
 
   /// @param layouts  of the S-IMUs, in order
   /// @param states   dimension of the filter
-  FixedLagSmoother(std::vector<StudyLayout> layouts, std::size_t states);
+  FixedLagSmoother(std::vector<SImuLayout> layouts, std::size_t states);
 
   /// Takes one epoch, packed (history::pack), in order of time. Epochs that have become old enough are handed
   /// to `give`, oldest first.
@@ -34,7 +34,7 @@ class FixedLagSmoother {
  private:
   void smooth(const std::function<void(const SmoothedEpoch&)>& give);
 
-  std::vector<StudyLayout> layouts_;
+  std::vector<SImuLayout> layouts_;
   std::size_t states_;
   std::vector<history::Filtered> window_;  ///< oldest first
   HostTime next_{HostTime::min()};

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimation/navigation/gnss_gate.h"
+#include "sample/eigen_arrays.h"
 
 namespace imuscope {
 namespace {
@@ -50,14 +51,12 @@ double sd_factor(GnssSolution solution) noexcept {
   return 150.0;
 }
 
-Vector3d vector(const Vector3& v) noexcept { return {v[0], v[1], v[2]}; }
-
 Vector3d trusted_sd(bool given, const Vector3& reported, const Vector3& fallback, const Vector3& floor,
                     GnssSolution solution) noexcept {
   // An sd that is no number is none: the floor alone would trust that solution most of all.
-  const bool usable = given && vector(reported).allFinite();
-  const Vector3d sd = usable ? vector(reported) : Vector3d(sd_factor(solution) * vector(fallback));
-  return floored_sd(sd, vector(floor));
+  const bool usable = given && to_eigen(reported).allFinite();
+  const Vector3d sd = usable ? to_eigen(reported) : Vector3d(sd_factor(solution) * to_eigen(fallback));
+  return floored_sd(sd, to_eigen(floor));
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ void take_navigation(Reader& in, NavigationState& state) {
   in.take(state.accel_bias_b_mps2);
 }
 
-void put_study(Writer& out, const StudyState& state) {
+void put_study(Writer& out, const SImuState& state) {
   out.put(state.C_b_s);
   out.put(state.r_bs_b_m);
   out.put(state.gyro_bias_s_radps);
@@ -43,7 +43,7 @@ void put_study(Writer& out, const StudyState& state) {
   out.put(state.accel_scale);
 }
 
-void take_study(Reader& in, StudyState& state) {
+void take_study(Reader& in, SImuState& state) {
   in.take(state.C_b_s);
   in.take(state.r_bs_b_m);
   in.take(state.gyro_bias_s_radps);
@@ -137,7 +137,7 @@ void step_back(const Filtered& now, const Filtered* after, Eigen::VectorXd& d, E
 }
 
 SmoothedEpoch smoothed_epoch(const Filtered& now, const Eigen::VectorXd& d, const Eigen::MatrixXd& P,
-                             std::span<const StudyLayout> layouts) {
+                             std::span<const SImuLayout> layouts) {
   SmoothedEpoch smoothed = now.state;
   NavigationErrorVector navigation_error = d.head<kNavigationErrorSize>();
   // Without navigation the R biases alone have a meaning.

@@ -84,6 +84,6 @@ struct Filtered {
 void step_back(const Filtered& now, const Filtered* after, Eigen::VectorXd& d, Eigen::MatrixXd& P);
 /// The filtered state with the smoothed error added, sd and P_phi with it.
 SmoothedEpoch smoothed_epoch(const Filtered& now, const Eigen::VectorXd& d, const Eigen::MatrixXd& P,
-                             std::span<const StudyLayout> layouts);
+                             std::span<const SImuLayout> layouts);
 
 }  // namespace imuscope::history

@@ -186,6 +186,7 @@ void NavigationFilter::carry_over_interval(const InertialRates& measured, bool i
               is_mean ? increment_from_means(start, end, dt_s) : increment_from_samples(start, end, dt_s));
     return;
   }
+  // E-6: rates between those of both ends
   const int steps = static_cast<int>(std::ceil(dt_s / kStep_s));
   const double step_s = dt_s / steps;
   for (int i = 0; i < steps; ++i) {
@@ -201,6 +202,7 @@ void NavigationFilter::carry_over_interval(const InertialRates& measured, bool i
 
 void NavigationFilter::predict(const InertialRates& rates, double dt_s, double unseen) noexcept {
   NavigationProcessNoise noise = noise_;
+  // E-6: what nobody saw
   noise.gyro_noise_radps_per_sqrt_hz += unseen * kUnseenRate;
   noise.accel_noise_mps2_per_sqrt_hz += unseen * kUnseenForce;
   const NavigationTransition step = transition(core_.navigation(), rates, noise, dt_s);
@@ -215,6 +217,7 @@ void NavigationFilter::predict(const InertialRates& rates, double dt_s, double u
 
 void NavigationFilter::predict_biases_only(double dt_s) noexcept {
   const auto decay_block = [&](std::size_t first, const GaussMarkovConfig& process, Vector3d& bias) {
+    // N-25, N-26: the biases' own
     const double decay = std::exp(-dt_s / process.time_constant_s);
     const double variance = process.sd * process.sd * (1.0 - decay * decay);
     for (std::size_t i = 0; i < 3; ++i) core_.predict_state(first + i, decay, variance);
@@ -323,11 +326,13 @@ void NavigationFilter::take_rest(const AlignmentRest& rest, InitialisationMethod
   if (method == InitialisationMethod::kGyrocompass) {
     for (std::size_t i = 0; i < 3; ++i)
       core_.reset_state(kAttitudeError + i, kRestAttitudeSd_rad * kRestAttitudeSd_rad);
+    // N-49
     const Vector3d force_n = -LocalEarth(state.position).gravity_n();
     // Down tells of gravity and scale as much as of a bias.
     take(rest.mean.f_b_mps2 - state.accel_bias_b_mps2, force_n, kAccelBiasError,
          variance(noise_.accel_noise_mps2_per_sqrt_hz, 0.0, reference_.accel_bias), {true, true, false});
   }
+  // N-47
   take(rest.mean.omega_ib_b_radps - state.gyro_bias_b_radps, earth_rate_n(state.position.latitude_rad),
        kGyroBiasError, variance(noise_.gyro_noise_radps_per_sqrt_hz, rest.sway_radps, reference_.gyro_bias),
        {true, true, true});
@@ -451,7 +456,7 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
   if (past_size_ == 0 || time > past(0).time + kGnssAhead) return Lookup::kTooNew;
   if (time < past(past_size_ - 1).time) return Lookup::kTooOld;
   out.back.setIdentity();
-  // What has been learned since epoch k was written, as an error then. Only the ring's span is walked:
+  // E-4: what has been learned since epoch k was written, as an error then. Only the ring's span is walked:
   // carried along for hours instead, the vertical channel would grow by e every ten minutes.
   NavigationErrorVector learned = core_.injected();
   std::size_t k = 0;
@@ -474,6 +479,7 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
   const PastEpoch& epoch = past(k);
   out.state = epoch.state;
   out.measured = epoch.measured;
+  // E-5: the state then
   inject(out.state, learned);
   const double rest_s = to_seconds(time - epoch.time);
   if (rest_s > 0.0) {
@@ -586,6 +592,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
 bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured, const AntennaMatrix& of_antenna,
                              const NavigationErrorCovariance& back, const Vector3d& sd, HostTime time,
                              Vector3& nis) noexcept {
+  // E-5: by the errors of now
   const NavigationMeasurementMatrix H = measured.H * back;
   SparseMeasurement sparse;
   append_columns(H, 0, sparse);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "estimation/calibration/axis_gate.h"
-#include "estimation/calibration/study_model.h"
+#include "estimation/calibration/s_imu_model.h"
 #include "estimation/navigation/so3.h"
 
 namespace imuscope {

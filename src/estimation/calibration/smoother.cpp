@@ -87,7 +87,7 @@ void smooth_back(const SmootherStep& step, VectorXd& d, MatrixXd& P) {
   P(moving, moving) = 0.5 * (block + block.transpose());
 }
 
-SmoothedTrack::SmoothedTrack(std::vector<StudyLayout> layouts, std::size_t states, RecordStorage storage)
+SmoothedTrack::SmoothedTrack(std::vector<SImuLayout> layouts, std::size_t states, RecordStorage storage)
     : layouts_(std::move(layouts)),
       states_(states),
       records_(smoothed_doubles(states_, layouts_.size()), std::move(storage)) {}

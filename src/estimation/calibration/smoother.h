@@ -23,8 +23,8 @@ namespace imuscope {
 /// State of the filter at one instant and what led to it from the epoch of the history before.
 struct HistoryEpoch {
   HostTime time;
-  bool navigating;                            ///< the navigation's state has a meaning
-  std::array<bool, kMaxStudies> calibrating;  ///< the S-IMU's state has a meaning
+  bool navigating;                          ///< the navigation's state has a meaning
+  std::array<bool, kMaxSImus> calibrating;  ///< the S-IMU's state has a meaning
   const FilterCore& core;
   const FilterCore::Accumulated& since;
 };
@@ -46,7 +46,7 @@ struct SmoothedEpoch {
   NavigationState navigation;
   Eigen::VectorXd sd;                               ///< of every state of the filter, in its order
   Eigen::Matrix3d P_phi = Eigen::Matrix3d::Zero();  ///< covariance of the attitude error, NED
-  std::vector<StudyState> studies;
+  std::vector<SImuState> studies;
   std::vector<bool> calibrating;  ///< per S-IMU
 };
 
@@ -56,15 +56,15 @@ class SmoothedTrack {
   [[nodiscard]] std::size_t size() const noexcept { return records_.size(); }
   /// Precondition: index < size(). Fails where the disk does.
   [[nodiscard]] Result<SmoothedEpoch> at(std::size_t index) const;
-  [[nodiscard]] const StudyLayout& layout(std::size_t study) const noexcept { return layouts_[study]; }
+  [[nodiscard]] const SImuLayout& layout(std::size_t study) const noexcept { return layouts_[study]; }
   [[nodiscard]] std::size_t study_count() const noexcept { return layouts_.size(); }
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return records_.memory_bytes(); }
 
  private:
   friend class Smoother;
-  SmoothedTrack(std::vector<StudyLayout> layouts, std::size_t states, RecordStorage storage);
+  SmoothedTrack(std::vector<SImuLayout> layouts, std::size_t states, RecordStorage storage);
 
-  std::vector<StudyLayout> layouts_;
+  std::vector<SImuLayout> layouts_;
   std::size_t states_;
   RecordStore records_;  ///< newest first, as smoothing makes them
 };
@@ -86,7 +86,7 @@ class Smoother final : public HistorySink {
 
  private:
   RecordStorage storage_;
-  std::vector<StudyLayout> layouts_;
+  std::vector<SImuLayout> layouts_;
   std::size_t states_ = 0;
   std::optional<RecordStore> records_;
   std::optional<Error> problem_;

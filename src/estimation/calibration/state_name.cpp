@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "estimation/calibration/study_model.h"
+#include "estimation/calibration/s_imu_model.h"
 #include "estimation/navigation/antenna.h"
 #include "estimation/navigation/odometry_measurement.h"
 
@@ -21,10 +21,10 @@ constexpr std::array kAntennaNames{"antenna_lever_arm_x", "antenna_lever_arm_y",
 static_assert(kOdometryNames.size() == kOdometryErrorSize);
 static_assert(kAntennaNames.size() == kAntennaErrorSize);
 
-std::optional<std::string> study_state(const StudyLayout& layout, std::size_t index) {
+std::optional<std::string> study_state(const SImuLayout& layout, std::size_t index) {
   std::optional<std::string> found;
   const auto triple = [&](std::size_t first, const char* name) {
-    if (first == StudyLayout::kAbsent || index < first || index >= first + 3) return;
+    if (first == SImuLayout::kAbsent || index < first || index >= first + 3) return;
     found = std::string(name) + "_" + "xyz"[index - first];
   };
   triple(layout.psi, "psi");
@@ -37,7 +37,7 @@ std::optional<std::string> study_state(const StudyLayout& layout, std::size_t in
   triple(layout.gyro_axes, "gyro_axes");
   triple(layout.accel_axes, "accel_axes");
   const auto numbered = [&](std::size_t first, std::size_t count, const char* name) {
-    if (first == StudyLayout::kAbsent || index < first || index >= first + count) return;
+    if (first == SImuLayout::kAbsent || index < first || index >= first + count) return;
     found = std::string(name) + "_" + std::to_string(index - first + 1);
   };
   numbered(layout.places, 6, "accel_places");
@@ -53,7 +53,7 @@ StateName state_name(const EstimatorConfig& config, std::size_t index) {
   if (index < kNavigationNames.size()) return {std::nullopt, kNavigationNames[index]};
   std::size_t first = kNavigationNames.size();
   for (std::size_t i = 0; i < config.studies.size(); ++i) {
-    const StudyLayout layout = StudyLayout::make(config.studies[i].blocks, first);
+    const SImuLayout layout = SImuLayout::make(config.studies[i].blocks, first);
     if (const auto name = study_state(layout, index)) return {i, *name};
     first += layout.size;
   }

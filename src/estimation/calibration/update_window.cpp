@@ -12,7 +12,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// From one update to the next; vehicles as wholes move below 3 Hz, of which the first takes little. The
+/// C-15. From one update to the next; vehicles as wholes move below 3 Hz, of which the first takes little. The
 /// longest is for a reference as noisy as the sensors it is to judge.
 constexpr std::array<double, 3> kSpacings_s{0.1, 0.2, 0.5};
 /// A share of noise above this asks for a longer window, one below for a shorter.
@@ -59,13 +59,16 @@ std::array<std::vector<double>, 3> derivative_weights_of(const ReferenceWindowOp
 
 }  // namespace
 
+// C-15: the window
 double window_weight(int n, int position) noexcept {
   const double s = std::sin(0.5 * kPi * static_cast<double>(position) / n);
   return s * s;
 }
 
+// C-15: one window alone against its share of all
 double window_white_share(int n) noexcept { return n == 1 ? 1.0 : 0.75; }
 
+// C-15: noise of a window's mean
 NoiseGains noise_gains(const ReferenceWindowOptions& reference, double study_rate_hz, int n) {
   // On the grid of the faster of the two.
   const double ratio = 1.0 / (reference.period_s * study_rate_hz);
@@ -90,6 +93,7 @@ NoiseGains noise_gains(const ReferenceWindowOptions& reference, double study_rat
 
 void MotionShare::clear() noexcept { *this = MotionShare{}; }
 
+// C-13: N
 void MotionShare::set_noise(double rate_sd_radps, double force_sd_mps2, const NoiseGains& gains) noexcept {
   const auto square = [](double x) { return x * x; };
   noise_.row(kRate).setConstant(square(rate_sd_radps * gains.value));
@@ -104,6 +108,7 @@ void MotionShare::set_noise(double rate_sd_radps, double force_sd_mps2, const No
   moving_ = false;
 }
 
+// C-13: P, over motion
 void MotionShare::add(const ReferenceMean& b, const Vector3d& gyro_bias_radps,
                       const Vector3d& accel_bias_mps2, double spacing_s) noexcept {
   const Vector3d omega = b.omega_radps + gyro_bias_radps;
@@ -130,6 +135,7 @@ void MotionShare::add(const ReferenceMean& b, const Vector3d& gyro_bias_radps,
   motion_ += std::min(1.0, spacing_s / std::min(seen_s_, kMotionMean_s)) * (power - noise_ - motion_);
 }
 
+// C-13: s
 double MotionShare::share(Quantity quantity, Eigen::Index axis) const noexcept {
   if (!moving_) return 0.0;
   const double motion = motion_(quantity, axis);
@@ -137,6 +143,7 @@ double MotionShare::share(Quantity quantity, Eigen::Index axis) const noexcept {
   return share < kShareMin ? 0.0 : share;
 }
 
+// C-13: the motion in H
 ReferenceMean MotionShare::believed(const ReferenceMean& b) const noexcept {
   ReferenceMean out = b;
   Vector3d of_rate;
@@ -152,6 +159,7 @@ ReferenceMean MotionShare::believed(const ReferenceMean& b) const noexcept {
   return out;
 }
 
+// C-13: the motion in the prediction
 ReferenceMean MotionShare::expected(const ReferenceMean& b) const noexcept {
   ReferenceMean out = b;
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -186,6 +194,7 @@ void WindowChoice::fix(int configured) {
   windows_[0] = {configured, noise_gains(reference_, rate_hz_, configured)};
 }
 
+// C-15: n, by the noise in the angular acceleration
 bool WindowChoice::choose(const MotionShare& share) noexcept {
   if (fixed_ || share.motion_s() < kJudged_s) return false;
   const double noise = share.noise_in_rate_slope();

@@ -9,7 +9,7 @@
 #include <cstdint>
 
 #include "estimation/alignment/reference_window.h"
-#include "estimation/calibration/study_model.h"
+#include "estimation/calibration/s_imu_model.h"
 
 namespace imuscope {
 

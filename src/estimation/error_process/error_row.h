@@ -48,10 +48,10 @@ struct ReferenceBias {
 
 /// The row of one epoch, for a mounting and R biases of the caller's choice.
 /// Thread: any. Allocates: never.
-ErrorRow error_row(const StudyEpoch& epoch, const Mounting& mounting, const ReferenceBias& bias) noexcept;
+ErrorRow error_row(const SImuEpoch& epoch, const Mounting& mounting, const ReferenceBias& bias) noexcept;
 
 /// The row with the estimate as it stood at the epoch: what is published live.
-ErrorRow live_error_row(const StudyEpoch& epoch) noexcept;
+ErrorRow live_error_row(const SImuEpoch& epoch) noexcept;
 
 /// Scale error of a triad, fraction per axis.
 struct ScaleError {

@@ -186,14 +186,6 @@ NavigationTransition transition(const NavigationState& state, const InertialRate
   return out;
 }
 
-NavigationErrorCovariance full_matrix(const NavigationTransition& transition) noexcept {
-  NavigationErrorCovariance Phi = NavigationErrorCovariance::Zero();
-  Phi.topRows<kNavigationKinematicSize>() = transition.kinematic_rows;
-  Phi.diagonal().segment<3>(kGyroBiasError).setConstant(transition.gyro_bias_decay);
-  Phi.diagonal().segment<3>(kAccelBiasError).setConstant(transition.accel_bias_decay);
-  return Phi;
-}
-
 // N-20
 void inject(NavigationState& state, const NavigationErrorVector& error) noexcept {
   const double cos_L = std::cos(state.position.latitude_rad);
@@ -208,6 +200,7 @@ void inject(NavigationState& state, const NavigationErrorVector& error) noexcept
   state.accel_bias_b_mps2 += error.segment<3>(kAccelBiasError);
 }
 
+// N-20
 NavigationErrorVector error_between(const NavigationState& truth, const NavigationState& estimate) noexcept {
   const LocalEarth earth(estimate.position);
   NavigationErrorVector error;

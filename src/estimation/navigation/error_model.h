@@ -60,9 +60,6 @@ struct NavigationTransition {
 [[nodiscard]] NavigationTransition transition(const NavigationState& state, const InertialRates& rates,
                                               const NavigationProcessNoise& noise, double dt_s) noexcept;
 
-/// The whole 15 x 15 Phi, for tests and for accumulated transitions.
-[[nodiscard]] NavigationErrorCovariance full_matrix(const NavigationTransition& transition) noexcept;
-
 /// Adds an estimated error to the state.
 void inject(NavigationState& state, const NavigationErrorVector& error) noexcept;
 

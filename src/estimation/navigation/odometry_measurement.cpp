@@ -15,6 +15,7 @@ OdometryInnovation odometry_innovation(const NavigationState& state, const Odome
   const Matrix3d C_n_b = state.C_b_n.transpose();
   const Vector3d& arm = odometry.r_bv_b_m;
   const Vector3d omega_eb_b = omega_ib_b_measured_radps - state.gyro_bias_b_radps - C_n_b * earth.w_ie;
+  // N-50: the velocity where the axle is, then in v
   const Vector3d v_b = C_n_b * state.v_n_mps + omega_eb_b.cross(arm);
   const Matrix3d& C = odometry.C_b_v;
   const Vector3d v_v = C * v_b;
@@ -22,6 +23,7 @@ OdometryInnovation odometry_innovation(const NavigationState& state, const Odome
 
   OdometryInnovation out;
   out.H.setZero();
+  // N-52: by the navigation's errors
   const Vector3d w_ie_by_north(-kEarthRate_radps * earth.sin_L / earth.M, 0.0,
                                -kEarthRate_radps * earth.cos_L / earth.M);
   out.H.col(kPositionError) = C * arm_x * C_n_b * w_ie_by_north;
@@ -29,11 +31,13 @@ OdometryInnovation odometry_innovation(const NavigationState& state, const Odome
   out.H.middleCols<3>(kAttitudeError) = C * (C_n_b * skew(state.v_n_mps) + arm_x * C_n_b * skew(earth.w_ie));
   out.H.middleCols<3>(kGyroBiasError) = C * arm_x;
 
+  // N-51: by mounting and lever arm
   const Matrix3d by_mount = C * skew(v_b);
   out.H_odometry.setZero();
   out.H_odometry.middleCols<2>(kVehicleMountError) = by_mount.rightCols<2>();
   out.H_odometry.middleCols<3>(kVehicleLeverArmError) = C * skew(omega_eb_b);
 
+  // N-53: what the wheels show
   const double wheel = 1.0 + odometry.scale;
   out.H.row(0) *= wheel;
   out.H_odometry.row(0) *= wheel;

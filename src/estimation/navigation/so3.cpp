@@ -11,23 +11,20 @@ namespace {
 /// Below this angle the series to fourth order is exact in double precision.
 constexpr double kSmallAngle_rad = 1e-3;
 
-/// sin(x)/x, (1 - cos x)/x^2 and (x - sin x)/x^3.
+/// sin(x)/x and (1 - cos x)/x^2.
 struct RotationCoefficients {
   double a;
   double b;
-  double c;
 };
 
 RotationCoefficients coefficients(double angle) noexcept {
   const double x2 = angle * angle;
   if (angle < kSmallAngle_rad) {
-    return {1.0 - x2 / 6.0 * (1.0 - x2 / 20.0), 0.5 - x2 / 24.0 * (1.0 - x2 / 30.0),
-            1.0 / 6.0 - x2 / 120.0 * (1.0 - x2 / 42.0)};
+    return {1.0 - x2 / 6.0 * (1.0 - x2 / 20.0), 0.5 - x2 / 24.0 * (1.0 - x2 / 30.0)};
   }
   // Half angles: 1 - cos x would cancel.
   const double half_sine = std::sin(0.5 * angle);
-  const double sine = std::sin(angle);
-  return {sine / angle, 2.0 * half_sine * half_sine / x2, (angle - sine) / (x2 * angle)};
+  return {std::sin(angle) / angle, 2.0 * half_sine * half_sine / x2};
 }
 
 }  // namespace
@@ -47,13 +44,6 @@ Eigen::Vector3d log_so3(const Eigen::Matrix3d& C) noexcept {
     return q.vec() * (2.0 / q.w() * (1.0 - sine * sine / (3.0 * q.w() * q.w())));
   }
   return q.vec() * (2.0 * std::atan2(sine, q.w()) / sine);
-}
-
-// N-3
-Eigen::Matrix3d right_jacobian_so3(const Eigen::Vector3d& phi_rad) noexcept {
-  const RotationCoefficients k = coefficients(phi_rad.norm());
-  const Eigen::Matrix3d X = skew(phi_rad);
-  return Eigen::Matrix3d::Identity() - k.b * X + k.c * (X * X);
 }
 
 Eigen::Matrix3d reorthonormalized(const Eigen::Matrix3d& C) noexcept {

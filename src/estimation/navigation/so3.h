@@ -22,9 +22,6 @@ inline Eigen::Matrix3d skew(const Eigen::Vector3d& v) noexcept {
 /// Log: rotation matrix to the rotation vector of length [0, pi] (N-2). Well conditioned at 0 and at pi.
 [[nodiscard]] Eigen::Vector3d log_so3(const Eigen::Matrix3d& C) noexcept;
 
-/// Right Jacobian J with Exp(phi + d) = Exp(phi) Exp(J d) to first order in d (N-3).
-[[nodiscard]] Eigen::Matrix3d right_jacobian_so3(const Eigen::Vector3d& phi_rad) noexcept;
-
 /// Nearest rotation matrix, through the quaternion: for matrices of any origin.
 [[nodiscard]] Eigen::Matrix3d reorthonormalized(const Eigen::Matrix3d& C) noexcept;
 

@@ -3,11 +3,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/wgs84.h"
+
 namespace imuscope {
 
 namespace {
 constexpr double kE2 = kWgs84EccentricitySquared;
-constexpr double kSemiMinorAxis_m = kWgs84SemiMajorAxis_m * (1.0 - kWgs84Flattening);
 constexpr double kDeepestSea_m = -11e3;
 constexpr double kEdgeOfSpace_m = 100e3;  // as the FAI has it
 }  // namespace
@@ -37,46 +38,19 @@ Curvature curvature_at(double latitude_rad) noexcept {
 
 // N-6
 Eigen::Vector3d ecef_from_geodetic(const GeodeticPosition& position) noexcept {
-  const double radius = curvature_at(position.latitude_rad).transverse_m;
-  const double s = std::sin(position.latitude_rad);
-  const double from_axis = (radius + position.height_m) * std::cos(position.latitude_rad);
-  return {from_axis * std::cos(position.longitude_rad), from_axis * std::sin(position.longitude_rad),
-          (radius * (1.0 - kE2) + position.height_m) * s};
+  const auto r_e_m = ecef_of({position.latitude_rad, position.longitude_rad, position.height_m});
+  return Eigen::Vector3d::Map(r_e_m.data());
 }
 
-// Bowring's closed start for the reduced latitude, repeated until it no longer moves: twice is enough up to
-// 1000 km of height.
 GeodeticPosition geodetic_from_ecef(const Eigen::Vector3d& r_e_m) noexcept {
-  constexpr int kRepeats = 3;
-  constexpr double kSecondEccentricitySquared = kE2 / (1.0 - kE2);
-  const double from_axis = std::hypot(r_e_m.x(), r_e_m.y());
-  double reduced = std::atan2(r_e_m.z(), from_axis * (1.0 - kWgs84Flattening));
-  double latitude = 0.0;
-  for (int i = 0; i < kRepeats; ++i) {
-    const double s = std::sin(reduced);
-    const double c = std::cos(reduced);
-    latitude = std::atan2(r_e_m.z() + kSecondEccentricitySquared * kSemiMinorAxis_m * s * s * s,
-                          from_axis - kE2 * kWgs84SemiMajorAxis_m * c * c * c);
-    reduced = std::atan2((1.0 - kWgs84Flattening) * std::sin(latitude), std::cos(latitude));
-  }
-  const double s = std::sin(latitude);
-  const double w = std::sqrt(1.0 - kE2 * s * s);
-  // Well conditioned at any latitude, unlike a division by the cosine.
-  const double height = from_axis * std::cos(latitude) + r_e_m.z() * s - kWgs84SemiMajorAxis_m * w;
-  return {latitude, std::atan2(r_e_m.y(), r_e_m.x()), height};
+  const Geodetic at = geodetic_of({r_e_m.x(), r_e_m.y(), r_e_m.z()});
+  return {at.lat_rad, at.lon_rad, at.height_m};
 }
 
 // N-7
 Eigen::Matrix3d rotation_ned_to_ecef(double latitude_rad, double longitude_rad) noexcept {
-  const double sl = std::sin(latitude_rad);
-  const double cl = std::cos(latitude_rad);
-  const double so = std::sin(longitude_rad);
-  const double co = std::cos(longitude_rad);
-  Eigen::Matrix3d C_n_e;
-  C_n_e << -sl * co, -so, -cl * co,  //
-      -sl * so, co, -cl * so,        //
-      cl, 0.0, -sl;
-  return C_n_e;
+  const auto C_e_n = rotation_ecef_to_ned({latitude_rad, longitude_rad, 0.0});
+  return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(C_e_n.data()).transpose();
 }
 
 Eigen::Vector3d ned_offset(const GeodeticPosition& origin, const GeodeticPosition& point) noexcept {
@@ -89,16 +63,9 @@ GeodeticPosition displaced(const GeodeticPosition& origin, const Eigen::Vector3d
                             rotation_ned_to_ecef(origin.latitude_rad, origin.longitude_rad) * offset_n_m);
 }
 
+// N-9: w_ie
 Eigen::Vector3d earth_rate_n(double latitude_rad) noexcept {
   return {kEarthRate_radps * std::cos(latitude_rad), 0.0, -kEarthRate_radps * std::sin(latitude_rad)};
-}
-
-// N-9
-Eigen::Vector3d transport_rate_n(const GeodeticPosition& position, const Eigen::Vector3d& v_n_mps) noexcept {
-  const Curvature k = curvature_at(position.latitude_rad);
-  const double M = k.meridian_m + position.height_m;
-  const double N = k.transverse_m + position.height_m;
-  return {v_n_mps.y() / N, -v_n_mps.x() / M, -v_n_mps.y() * std::tan(position.latitude_rad) / N};
 }
 
 }  // namespace imuscope

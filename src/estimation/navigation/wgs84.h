@@ -55,8 +55,4 @@ struct Curvature {
 /// Earth rate in NED, rad/s.
 [[nodiscard]] Eigen::Vector3d earth_rate_n(double latitude_rad) noexcept;
 
-/// Rate of NED relative to the Earth while travelling with v_n, resolved in NED, rad/s (N-9).
-[[nodiscard]] Eigen::Vector3d transport_rate_n(const GeodeticPosition& position,
-                                               const Eigen::Vector3d& v_n_mps) noexcept;
-
 }  // namespace imuscope

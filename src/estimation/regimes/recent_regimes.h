@@ -28,7 +28,7 @@ class RecentRegimes {
   [[nodiscard]] bool follows(HostTime time) const;
   /// The reference, compensated with its biases, at one instant. Precondition: follows(time).
   void add(HostTime time, const Vector3& omega_ib_b_radps, const Vector3& f_b_mps2);
-  /// A speed of before the window is no longer of use.
+  /// A speed from before the window is no longer of use.
   void add_speed(HostTime time, double speed_mps, double sd_mps);
   /// Settles everything up to the newest sample: the run ends.
   void settle();

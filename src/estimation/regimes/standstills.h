@@ -13,7 +13,7 @@
 /// one that stands, and counts as standing.
 ///
 /// Between the limits for rest and those for motion the state stays (hysteresis). The edges are placed where
-/// force and rate leave the level that they have inside the stop, which shows a brake that is let go earlier
+/// force and rate leave the level that they have inside the stop, which shows the release of a brake earlier
 /// than the speed does. The noise of the reference itself is allowed for: the limits grow with the scatter
 /// within cells, as the quietest tenth of them shows it.
 

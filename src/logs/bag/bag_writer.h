@@ -85,7 +85,7 @@ class BagWriter {
   void attach(const std::string& name, const std::string& media_type, std::int64_t utc_ns,
               std::string_view data);
   void add_metadata(const std::string& name, const mcap::Texts& texts) { writer_.add_metadata(name, texts); }
-  /// What came until now can be read, whatever happens.
+  /// What has come so far can be read, whatever happens.
   void end_chunk() { writer_.end_chunk(); }
   void finish() { writer_.finish(); }
   [[nodiscard]] std::uint64_t messages() const noexcept { return writer_.messages(); }

@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 
+#include "sample/eigen_arrays.h"
+
 namespace imuscope::bag {
 namespace {
 
@@ -9,8 +11,6 @@ using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// Forward-right-down to forward-left-up, and back.
 Eigen::Matrix3d half_turn() { return Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal(); }
-
-Eigen::Matrix3d matrix(const Rotation& rotation) { return Eigen::Map<const RowMajor>(rotation.data()); }
 
 mcap::Quaternion quaternion(const Eigen::Matrix3d& rotation) {
   Eigen::Quaterniond q(rotation);
@@ -33,13 +33,12 @@ mcap::Quaternion base_link_in_map(const Vector3& rpy_rad) {
 }
 
 mcap::Quaternion sensor_in_base_link(const Rotation& C_b_s) {
-  return quaternion(half_turn() * matrix(C_b_s).transpose());
+  return quaternion(half_turn() * to_eigen(C_b_s).transpose());
 }
 
 mcap::Covariance3 covariance_in_base_link(const Rotation& C_b_s, const Vector3& variance_s) {
-  const Eigen::Matrix3d turn = half_turn() * matrix(C_b_s).transpose();
-  const RowMajor covariance =
-      turn * Eigen::Vector3d(variance_s[0], variance_s[1], variance_s[2]).asDiagonal() * turn.transpose();
+  const Eigen::Matrix3d turn = half_turn() * to_eigen(C_b_s).transpose();
+  const RowMajor covariance = turn * to_eigen(variance_s).asDiagonal() * turn.transpose();
   mcap::Covariance3 out{};
   Eigen::Map<RowMajor>(out.data()) = covariance;
   return out;

@@ -102,7 +102,7 @@ Result<DataflashReader> DataflashReader::open(const std::filesystem::path& file)
   const Bytes head = window->peek(kRecordHead);
   if (!begins_record(head) || head[2] != kDataflashFormat)
     return work_error(fmt::format("{}: is no DataFlash log of ArduPilot", file.string()),
-                      "check how it was made; a .log of text is converted back by nobody");
+                      "check how it was made; nothing converts a text .log back");
   return DataflashReader(std::move(*window), file.string());
 }
 

@@ -48,7 +48,7 @@ class Writer {
   void attach(const std::string& name, const std::string& media_type, std::uint64_t time,
               std::string_view data);
   void add_metadata(const std::string& name, const Texts& texts);
-  /// What was written until now is in the file and can be read, whatever happens.
+  /// What has been written so far is in the file and can be read, whatever happens.
   void end_chunk();
   /// Completes the file. No other call after it.
   void finish();

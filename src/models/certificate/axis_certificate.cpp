@@ -241,8 +241,7 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   if (out.halves && out.halves->p_value < kDiffer) {
     out.warnings.push_back(fmt::format(
         "the halves of the record differ (p = {:.2g}): at averaging times around {:.3g} s the second has "
-        "{:.2f} times the "
-        "variance of the first; the numbers are a mean of both",
+        "{:.2f} times the variance of the first; the numbers are a mean of both",
         out.halves->p_value, std::ldexp(0.5, out.halves->level) / record.rate_hz, out.halves->ratio));
   }
   noise::WvOptions of_excerpt;

@@ -36,7 +36,7 @@ struct AxisRecord {
   std::vector<std::uint8_t> mask;  ///< empty: all are there; NaN and infinity count as missing
   /// One a sample, degrees Celsius, shared by the axes of a sensor; null where not recorded.
   std::shared_ptr<const std::vector<float>> temperature_c{};
-  /// In the place of `values`, of a record that is too long to lie in memory as a whole.
+  /// In place of `values`, of a record that is too long to lie in memory as a whole.
   FetchSamples fetch{};
 };
 
@@ -59,7 +59,7 @@ struct AxisCertificate {
   std::vector<noise::Resonance> resonances;
   std::optional<double> low_pass_hz;
   noise::FitResult fit;
-  std::vector<std::string> rivals;  ///< models that the record takes for as good
+  std::vector<std::string> rivals;  ///< models that fit the record as well
   /// The most by which the model's curve lies beyond the interval of a scale, of that interval's end; zero
   /// where it leaves none.
   double largest_miss = 0.0;

@@ -96,7 +96,7 @@ Result<StatedValue> read_value(const json& value, const std::string& where) {
     *text = text_of(value, key);
     if (text->empty())
       return wrong(fmt::format("has no {}", key),
-                   "a value counts with the document, its revision and the page that it stands on alone");
+                   "a value counts only with the document, its revision and the page that it stands on");
   }
   const std::string kind = text_of(value, "kind");
   if (!kind.empty() && kind != "typical" && kind != "maximum")

@@ -78,7 +78,7 @@ noise::Felt amplitude_of(const FitResult& fit, ProcessKind kind) {
   return felt_amplitude(with, with.model.components.size() - 1);
 }
 
-/// Where the Allan deviation of the model is lowest over the averaging times of the record.
+/// T-1: where the Allan deviation of the model is lowest over the averaging times of the record.
 struct Lowest {
   std::size_t at = 0;
   double deviation = 0.0;
@@ -120,6 +120,7 @@ std::optional<double> log_sd_at(const FitResult& fit, double n) {
   return 0.5 * std::sqrt(variance) / value;
 }
 
+/// T-1: B.
 TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoint> allan,
                            noise::SignalUnit unit) {
   const SheetUnit sheet = sheet_unit(Term::kBiasInstability, unit);
@@ -152,6 +153,7 @@ TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoi
   return out;
 }
 
+/// T-1: N, B, K, R, Q.
 std::vector<TermValue> terms_of(const FitResult& fit, std::span<const noise::AllanPoint> allan,
                                 noise::SignalUnit unit) {
   const double f = fit.rate_hz;
@@ -169,6 +171,7 @@ bool has_interval(const TermValue& term) {
   return term.knowledge == Knowledge::kFitted && term.ci_low && term.ci_high;
 }
 
+/// T-4: D + p of a model, with its own interval of the term.
 ModelsValue as_told_by(const FitResult& fit, const TermValue& term) {
   const auto parameters = static_cast<double>(fit.spec.parameter_count());
   const double price = std::log(static_cast<double>(fit.wv.size()));  // of a parameter, in the criterion

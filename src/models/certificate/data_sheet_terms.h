@@ -35,8 +35,8 @@ const char* name_of(Term term, bool gyro) noexcept;
 /// N: root of the density of all that is white to a filter that integrates for a second (G-28). B: lowest
 /// point of the Allan deviation over 0.664, where it is a minimum and not the end of the record (T-1). K, R,
 /// Q: of the model's own RW, DR and QN; without the term the most that the record allows (G-32).
-/// What a filter feels hangs little on the model, but more than its interval says: intervals are those of the
-/// models together that the record does not tell apart, as far as each of them has the term (T-4).
+/// What a filter feels depends little on the model, but more than its interval says: intervals are those of
+/// the models together that the record does not tell apart, as far as each of them has the term (T-4).
 /// @param fit    fitted to the axis, quick or inverted intervals
 /// @param allan  of the same record, its intervals by that fit
 /// @param unit   not kNone

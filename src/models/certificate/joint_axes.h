@@ -58,7 +58,7 @@ struct JointAxes {
 struct JointOptions {
   double rate_hz = 0.0;
   double confidence = 0.95;
-  double from_s = 0.0;  ///< scales at which the mean shall be quiet
+  double from_s = 0.0;  ///< scales at which the mean is to be quiet
   double to_s = 1e9;
   /// Of other fits of the same record; nothing: the signals share tables of their own.
   noise::CovarianceTables* covariances = nullptr;

@@ -21,9 +21,8 @@ struct Origin {
 };
 
 /// {"schema": "imuscope.certificate/1", "sensor", "files", "selection", "made_utc", "version", "rate_hz",
-/// "duration_s",
-///  "confidence", "axes": [{"name", "unit", "n_samples", "n_missing", "mean", "sd", "resolution", "terms":
-///  [{"symbol", "name", "unit", "value", "ci_low", "ci_high", "known", "note"}], "lines", "resonances",
+///  "duration_s", "confidence", "axes": [{"name", "unit", "n_samples", "n_missing", "mean", "sd", "resolution",
+///  "terms": [{"symbol", "name", "unit", "value", "ci_low", "ci_high", "known", "note"}], "lines", "resonances",
 ///  "low_pass_hz", "largest_miss", "models_as_good", "fit" (as noise::fit_to_json()), "allan": [{"tau_s",
 ///  "deviation", "ci_low", "ci_high", "model"}], "density": [{"frequency_hz", "density", "ci_low",
 ///  "ci_high"}], "halves", "spikes", "temperature", "warnings", "limits"}]}. What is not known is null.

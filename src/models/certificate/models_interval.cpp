@@ -6,6 +6,7 @@
 
 namespace imuscope::certificate {
 
+// T-4
 Interval models_interval(std::span<const ModelsValue> models, double confidence) {
   using boost::math::normal;
   const double z = quantile(normal(), 0.5 * (1.0 + confidence));

@@ -114,8 +114,7 @@ std::optional<std::string> motion_in(double rate_hz, std::span<const double> x,
   if (n < 2 || share < kFew) return std::nullopt;
   return fmt::format(
       "the sensor was not at rest: {:.3g} % of the record is shaken or turned, first at {:.0f} s; cut the "
-      "record to its "
-      "rest, or the numbers are those of the motion",
+      "record down to its rest, or the numbers are those of the motion",
       100.0 * share, static_cast<double>(first) * blocks.seconds);
 }
 

@@ -101,7 +101,7 @@ void add_bias(Temperature& out, std::span<const double> x, std::span<const std::
   }
 }
 
-/// Logarithm of the mean square of successive differences, window by window, on the windows' temperature.
+/// T-2: logarithm of the mean square of successive differences, window by window, on the windows' temperature.
 void add_noise(Temperature& out, std::span<const double> x, std::span<const std::uint8_t> mask,
                std::span<const float> t) {
   const std::size_t length = x.size() / kWindows;

@@ -1,6 +1,6 @@
 #pragma once
 
-/// How bias and noise of an axis go with its temperature.
+/// How bias and noise of an axis vary with its temperature.
 
 #include <cstdint>
 #include <optional>

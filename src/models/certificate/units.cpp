@@ -24,7 +24,7 @@ std::optional<Estimate> estimate_of(const TermValue& term, double z) {
   return Estimate{std::log(term.value), std::log(*term.ci_high / *term.ci_low) / (2.0 * z)};
 }
 
-/// p of each value's deviation from the others, by Student's t of the value left out.
+/// T-3: p of each value's deviation from the others, by Student's t of the value left out.
 std::vector<std::optional<double>> deviations(const std::vector<Estimate>& estimates) {
   const auto n = static_cast<double>(estimates.size());
   constexpr std::size_t kFewest = 4;  // three others tell a spread
@@ -92,6 +92,7 @@ Population population_of_term(const std::string& axis, Term term, const std::vec
 
 }  // namespace
 
+// T-3: k
 double tolerance_factor(std::size_t n, double share, double confidence) {
   const auto count = static_cast<double>(n);
   const double z = boost::math::quantile(boost::math::normal(), share);

@@ -67,6 +67,7 @@ std::vector<ColumnLevel> ColumnWavelets::levels() const {
     }
     if (n == 0) break;
     const auto used = coefficients.leftCols(n);
+    // D-7: G_j
     out.push_back({level, used * used.transpose() / static_cast<double>(n)});
   }
   return out;

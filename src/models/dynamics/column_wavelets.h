@@ -1,7 +1,7 @@
 #pragma once
 
 /// Haar wavelet variances and covariances of the columns of a regression, scale by scale: where in the
-/// spectrum the columns have what they tell by. Coarse scales only, from means of blocks of samples: at the
+/// spectrum the columns carry information. Coarse scales only, from means of blocks of samples: at the
 /// finer ones a few columns are nothing beside the number of samples (D-7, D-8 in EQUATIONS.md). Missing rows
 /// cost what missing samples cost the wavelet variance of the errors (models/noise/haar_levels.h).
 

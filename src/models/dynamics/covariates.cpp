@@ -21,6 +21,7 @@ constexpr Covariate rate_kind(std::size_t axis) {
 std::string_view covariate_name(std::size_t index) noexcept { return kNames[index]; }
 std::string_view covariate_unit(std::size_t index) noexcept { return kUnits[index / 3]; }
 
+// D-1
 std::array<double, kCovariates> covariates(const ErrorRow& row) noexcept {
   std::array<double, kCovariates> all{};
   const std::array<const Vector3*, kCovariateKinds> kinds{&row.predicted_omega_s_radps,
@@ -39,12 +40,13 @@ void calibration_columns(const ErrorRow& row, std::size_t axis,
   const std::size_t i = axis % 3;
   const Vector3& value = axis < 3 ? row.predicted_omega_s_radps : row.predicted_f_s_mps2;
   const Vector3& rate = axis < 3 ? row.omega_dot_s_radps2 : row.f_dot_s_mps3;
+  // D-2, D-3: boresight, scale, time offset
   out[0] = value[(i + 1) % 3];
   out[1] = value[(i + 2) % 3];
   out[2] = value[i];
   out[3] = rate[i];
   if (axis < 3) return;
-  // Row i of [omega' x] + [omega x]^2, in s axes.
+  // D-3: lever arm; row i of [omega' x] + [omega x]^2, in s axes.
   const Vector3& w = row.predicted_omega_s_radps;
   const Vector3& a = row.omega_dot_s_radps2;
   const std::size_t j = (i + 1) % 3;

@@ -38,6 +38,7 @@ NoiseUncertainty::NoiseUncertainty(const std::vector<ColumnLevel>& columns, cons
   const auto places = noise::parameter_places(fit.model);
   covariance_ = parameter_covariance(fit, wv, wv_levels, noise::wv_jacobian(fit.model, wv_levels, places));
   for (const ColumnLevel& column : columns) {
+    // D-8: the scale's weight in I_j, and how nu_j follows the parameters
     const double nu = noise::model_wv(fit.model, column.level);
     const double samples_per_coefficient = static_cast<double>(std::uint64_t{1} << unsigned(column.level));
     const double weight = static_cast<double>(wv.n_valid) / (samples_per_coefficient * nu);
@@ -54,6 +55,7 @@ NoiseUncertainty NoiseUncertainty::of(const std::vector<Index>& columns) const {
   return some;
 }
 
+// D-8: g, then g' C g
 double NoiseUncertainty::relative_variance(const MatrixXd& phi, const VectorXd& a) const {
   const VectorXd b = phi * a;
   VectorXd gradient = VectorXd::Zero(covariance_.rows());

@@ -54,7 +54,7 @@ struct Solution {
   double rss = 0.0;
 };
 
-/// Least squares on the columns `kept`, from the sums, columns scaled to one.
+/// D-4: least squares on the columns `kept`, from the sums, columns scaled to one.
 Solution least_squares(const MatrixXd& gram, const std::vector<Index>& kept) {
   const auto n = static_cast<Index>(kept.size());
   const Index y = gram.rows() - 1;
@@ -77,13 +77,13 @@ Solution least_squares(const MatrixXd& gram, const std::vector<Index>& kept) {
           gram(y, y) - right.dot(scaled)};
 }
 
-/// Degrees of freedom of a variance from its relative variance by the noise's model and from the residual's
+/// D-8: degrees of freedom of a variance from its relative variance by the noise's model and from the residual's
 /// own (Satterthwaite 1946).
 double degrees_of_freedom(double relative_variance, double of_residual) {
   return 1.0 / (0.5 * relative_variance + 1.0 / of_residual);
 }
 
-/// Denominator of the F test of the columns from `first` on: independent contrasts, each with its degrees of
+/// D-8: denominator of the F test of the columns from `first` on: independent contrasts, each with its degrees of
 /// freedom, give an F of that expectation (Fai and Cornelius 1996).
 double f_degrees_of_freedom(const MatrixXd& phi, Index first, const NoiseUncertainty& noise,
                             double of_residual) {
@@ -169,7 +169,8 @@ std::optional<Regression> RegressionSums::solve(double confidence, const NoiseUn
   result.left_out = columns.left_out;
   result.dof_model = static_cast<int>(tested);
   result.dof_rest = static_cast<double>(n_ - columns.kept.size());
-  result.residual_variance = full.rss / result.dof_rest;
+  result.residual_variance = full.rss / result.dof_rest;  // D-4: s^2
+  // D-5
   result.r2 = null_rss > 0.0 ? 1.0 - full.rss / null_rss : 0.0;
   if (!(result.residual_variance > 0.0)) return std::nullopt;
   result.f = (null_rss - full.rss) / static_cast<double>(tested) / result.residual_variance;

@@ -19,7 +19,7 @@ constexpr std::int64_t kLongestHole = 60'000;
 /// Of the residual's wavelet variance; the fit does not use them.
 constexpr double kIntervals = 0.95;
 
-/// Layout of one axis' row: intercept, calibration columns, covariates, error.
+/// D-4: layout of one axis' row: intercept, calibration columns, covariates, error.
 class AxisColumns {
  public:
   explicit AxisColumns(std::size_t axis) : axis_(axis), calibration_(calibration_column_count(axis)) {}
@@ -200,7 +200,7 @@ std::optional<ResidualNoise> fit_residual(noise::WaveletVariance wv, const Dynam
 
 using AllNoise = std::array<std::optional<ResidualNoise>, kErrorAxes>;
 
-/// Sums of the whitened rows, of the axes whose noise is known.
+/// D-6: sums of the whitened rows, of the axes whose noise is known.
 std::vector<AxisSums> whitened_sums(ErrorRowSource& rows, const AllNoise& noises) {
   auto columns = all_columns();
   auto sums = all_sums(columns);

@@ -54,7 +54,7 @@ class RunningSums {
     step_ *= 2;
   }
 
-  /// Mean square of the differences of neighbouring means of n samples, n a multiple of step().
+  /// G-40: mean square of the differences of neighbouring means of n samples, n a multiple of step().
   [[nodiscard]] double mean_square(std::size_t n, std::uint64_t& count) const {
     return is_whole_ ? mean_square_of_whole(n, count) : mean_square_of_valid(n, count);
   }
@@ -148,6 +148,7 @@ std::vector<AllanPoint> allan_deviation(std::vector<double> x, const WaveletVari
   return points;
 }
 
+// G-40: degrees of freedom
 void set_allan_intervals(std::vector<AllanPoint>& points, const FitResult* fit, double confidence,
                          const CovarianceTable* table) {
   std::vector<double> log_dof;  // of the levels

@@ -18,10 +18,10 @@ struct ComparedParameter {
   std::optional<double> first;  ///< absent where that fit does not have the parameter
   std::optional<double> second;
   std::optional<double> ratio;  ///< second / first
-  /// Interval of the ratio at the first fit's confidence; absent where a sd is, and for theta and phi.
+  /// Interval of the ratio at the first fit's confidence; absent where an sd is, and for theta and phi.
   std::optional<double> ratio_ci_low;
   std::optional<double> ratio_ci_high;
-  /// Of no difference; absent where a sd is, and where one record is too short for the process of the other.
+  /// Of no difference; absent where an sd is, and where one record is too short for the process of the other.
   std::optional<double> p_value;
 };
 

@@ -31,6 +31,7 @@ constexpr double kLeastEigenvalue = 0.01;
 
 }  // namespace
 
+// G-44
 double sinusoid_covariance(const Parts& parts, const WvLevel& j, const WvLevel& k) {
   double sum = 0.0;
   const auto count = static_cast<double>(std::max(j.n_coefficients, k.n_coefficients));
@@ -42,6 +43,7 @@ double sinusoid_covariance(const Parts& parts, const WvLevel& j, const WvLevel& 
   return sum;
 }
 
+// G-10
 double uniform_correction(double q2, const std::vector<Segment>& runs, const WvLevel& j, const WvLevel& k) {
   constexpr double kExcessKurtosis = -1.2;
   const double n_j = 0.5 * j.tau_samples;
@@ -71,6 +73,7 @@ double uniform_correction(double q2, const std::vector<Segment>& runs, const WvL
   return kExcessKurtosis * q2 * q2 * scale * sum / (count_j * count_k);
 }
 
+// G-34
 double white_of_missing(const WvLevel& j, const WvLevel& k) {
   const auto white_of = [](const WvLevel& level) {
     return (level.inflation - 1.0) * level.value * level.tau_samples;

@@ -10,7 +10,7 @@
 
 namespace imuscope::noise {
 
-/// What the product of a sinusoid with the rest of the model adds.
+/// G-44: what the product of a sinusoid with the rest of the model adds.
 double sinusoid_covariance(const Parts& parts, const WvLevel& j, const WvLevel& k);
 
 /// G-10. Quantization is a difference of uniform numbers, whose fourth cumulant narrows the wavelet

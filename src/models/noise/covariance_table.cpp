@@ -34,6 +34,7 @@ constexpr double kMostRinging = 512.0;
 /// Values that one set of nodes may hold of all processes.
 constexpr std::size_t kMostHeld = 8'000'000;
 
+/// G-42: one process of amplitude 1.
 Parts unit_process(int number) {
   Parts parts;
   if (number == kWhite) parts.white = 1.0;
@@ -49,6 +50,7 @@ Parts unit_process(int number) {
 /// A model as a sum over the processes of the table.
 using Weights = std::map<int, double>;
 
+/// G-42: a rate between those of the grid by the cubic through four of them.
 void add_markov(Weights& weights, const Exponential& e) {
   if (e.a > kWhiteAbove) {
     weights[kWhite] += 2.0 * e.linear * e.variance;
@@ -142,7 +144,7 @@ class CovarianceTable::Nodes {
     if ((values_.size() + processes) * x_.size() > kMostHeld) values_.clear();
   }
 
-  /// C_jk(h) of a process at all nodes.
+  /// G-9: C_jk(h) of a process at all nodes.
   std::shared_ptr<const Eigen::VectorXd> values(int process) {
     if (const auto at = values_.find(process); at != values_.end()) return at->second;
     Eigen::VectorXd out(static_cast<Eigen::Index>(x_.size()));
@@ -160,7 +162,7 @@ class CovarianceTable::Nodes {
     return values_.emplace(process, std::make_shared<Eigen::VectorXd>(std::move(out))).first->second;
   }
 
-  /// Sum of weight 2 a b, pair by pair.
+  /// G-42: sum of weight 2 a b, pair by pair: K.
   Eigen::VectorXd product(int a, int b) {
     make_room(2);
     const auto of_a = values(a);
@@ -190,7 +192,7 @@ class CovarianceTable::Nodes {
     return {weight_.data(), static_cast<Eigen::Index>(weight_.size())};
   }
 
-  /// Adds C_jk(h) of a resonance at the nodes of a pair. Lags that follow each other cost two products.
+  /// G-37 in G-9: adds C_jk(h) of a resonance at the nodes of a pair. Lags that follow each other cost two products.
   void add_oscillation(const Oscillation& o, std::size_t pair, Eigen::VectorXd& values) const {
     const auto [j, k, n_j, n_k] = pairs_[pair];
     const double centre = n_k - n_j;
@@ -404,6 +406,7 @@ CovarianceTable::Sums CovarianceTable::sums_of(const Weights& weights, const Par
   return out;
 }
 
+// G-42
 Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& wv) const {
   Model others;
   double flicker = 0.0;
@@ -456,6 +459,7 @@ Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& w
       if (pair.shorter() < white_at[o]) nodes.add_oscillation(parts.oscillations[o], i, c);
     }
     const auto w = nodes.weights().segment(nodes.begin(i), nodes.size(i));
+    // G-8, lag by lag
     squares[p] = 2.0 * w.cwiseProduct(c).dot(c) + of_means(pair) * w.dot(c);
   }
   const auto size = static_cast<Eigen::Index>(levels_);
@@ -464,6 +468,7 @@ Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& w
     const PairOfLevels& pair = pairs[static_cast<std::size_t>(p)];
     const WvLevel& j = wv.levels[pair.j];
     const WvLevel& k = wv.levels[pair.k];
+    // G-44, G-10
     double value = squares[p] + sinusoid_covariance(parts, j, k);
     if (parts.uniform > 0.0) value += uniform_correction(parts.uniform, wv.segments, j, k);
     v(static_cast<Eigen::Index>(pair.j), static_cast<Eigen::Index>(pair.k)) = value;

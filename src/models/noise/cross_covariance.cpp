@@ -8,6 +8,7 @@
 namespace imuscope::noise {
 namespace {
 
+// G-37: the same with a complex rate
 Oscillation oscillation_of(const Component& c) {
   const Complex rate(c.shape[0], -c.shape[1]);
   const Complex variance = c.amplitude * Complex(1.0, -c.shape[0] / c.shape[1]);
@@ -28,6 +29,7 @@ Exponential exponential_of_phi(double phi, double variance) {
 
 }  // namespace
 
+// G-9: an exponential's coefficients without cancellation
 Exponential exponential_of_rate(double a, double variance) {
   Exponential e;
   e.a = a;
@@ -41,6 +43,7 @@ Exponential exponential_of_rate(double a, double variance) {
   return e;
 }
 
+// G-9: G, sorted by its shape
 Parts parts_of(const Model& model) {
   Parts parts;
   for (const Component& c : model.components) {
@@ -107,12 +110,14 @@ double rings_for(const Oscillation& o) {
   return kRinging / o.rate.real();
 }
 
+// G-39
 double white_from(const Oscillation& o) {
   constexpr double kRung = 60.0;  // radians
   constexpr double kFaded = 8.0;  // time constants
   return std::max(kRung / std::abs(o.rate), kFaded / o.rate.real());
 }
 
+// G-9: break points, as distances from the centre of symmetry
 std::vector<double> breaks_of(double n_j, double n_k) {
   std::vector<double> breaks;
   for (int a = 0; a < 3; ++a) {
@@ -123,6 +128,7 @@ std::vector<double> breaks_of(double n_j, double n_k) {
   return breaks;
 }
 
+// G-9: R
 double exponential_remainder(double z) {
   constexpr double kSeriesBelow = 0.7;
   if (z >= kSeriesBelow) return std::expm1(-z) + z - 0.5 * z * z;

@@ -72,7 +72,7 @@ std::vector<std::uint8_t> joint_mask(std::span<const std::span<const double>> si
   return joint;
 }
 
-/// The mean over the pairs.
+/// G-63: the mean over the pairs.
 MatrixXd common_form(Index n) {
   const auto count = static_cast<double>(n);
   return (MatrixXd::Ones(n, n) - MatrixXd::Identity(n, n)) / (count * (count - 1.0));
@@ -110,7 +110,7 @@ Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const d
     out[j].level = own.front().levels[j].level;
     out[j].tau_samples = own.front().levels[j].tau_samples;
     out[j].covariance = MatrixXd::Zero(n, n);
-    // Of signals whose coefficients hang together in time differently: the mean of 1/dof.
+    // G-61. Of signals whose coefficients hang together in time differently: the mean of 1/dof.
     double inverse = 0.0;
     for (const auto& one : dof) inverse += 1.0 / one[static_cast<Index>(j)];
     out[j].dof = static_cast<double>(n) / inverse;
@@ -129,6 +129,7 @@ Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const d
   return out;
 }
 
+// G-62
 Estimate estimate_of(const CrossLevel& level, const MatrixXd& form, double confidence) {
   const double alpha = 1.0 - confidence;
   const MatrixXd root = root_of(level.covariance);
@@ -184,12 +185,14 @@ Estimate common_of(const CrossLevel& level, double confidence) {
   return estimate_of(level, common_form(level.covariance.rows()), confidence);
 }
 
+// G-63: one signal's own
 Estimate own_of(const CrossLevel& level, Index i, double confidence) {
   MatrixXd form = -common_form(level.covariance.rows());
   form(i, i) += 1.0;
   return estimate_of(level, form, confidence);
 }
 
+// G-64
 VectorXd quietest_weights(std::span<const CrossLevel> scales) {
   const Index n = scales.front().covariance.rows();
   MatrixXd sum = MatrixXd::Zero(n, n);

@@ -45,7 +45,7 @@ struct Coherence {
 /// Covariance of all scales that have a coefficient.
 /// @param signals  two or more of one length
 /// @param mask     one entry a sample, non-zero where all signals are valid; empty: everywhere
-/// @param fits     a model of each, by which its coefficients hang together in time
+/// @param fits     a model of each, by which its coefficients are correlated in time
 /// @param tables   to take covariances from; nothing: each is computed by itself
 /// Errors (kWork): those of haar_wavelet_variance(); signals of different lengths.
 Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const double>> signals,

@@ -72,6 +72,7 @@ struct Values {
   MatrixXd slope;  ///< a row a place, a column a driver
 };
 
+/// G-24: the model of a window.
 Model model_at(const Model& start, const std::vector<ParameterPlace>& places, const Values& values,
                const Eigen::RowVectorXd& x) {
   Model model = start;
@@ -102,7 +103,7 @@ Values start_values(const Model& model, const std::vector<ParameterPlace>& place
   return values;
 }
 
-/// Scores of all windows and the information, at one point.
+/// G-24: scores of all windows and the information, at one point.
 struct Scores {
   VectorXd gradient;
   MatrixXd information;
@@ -160,7 +161,7 @@ MatrixXd inverse_of(const MatrixXd& information) {
          MatrixXd(scaled.ldlt().solve(MatrixXd::Identity(scaled.rows(), scaled.cols()))) * scale.asDiagonal();
 }
 
-/// Covariance of the unknowns from the scatter of the windows' scores, each freed of the part by which its
+/// G-24: covariance of the unknowns from the scatter of the windows' scores, each freed of the part by which its
 /// own window has drawn the fit to itself (Mancl and DeRouen 2001): it holds where windows vary more than the
 /// model says, and with few of them.
 MatrixXd scatter_covariance(const Scores& scores) {
@@ -175,7 +176,7 @@ MatrixXd scatter_covariance(const Scores& scores) {
   return inverse * outer * inverse;
 }
 
-/// Huber's weights: the distances' scale is their median's, since windows vary more than the model says.
+/// G-24: Huber's weights: the distances' scale is their median's, since windows vary more than the model says.
 VectorXd weights_of(const VectorXd& distance2, std::size_t levels) {
   std::vector<double> sorted(distance2.begin(), distance2.end());
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -188,7 +189,7 @@ VectorXd weights_of(const VectorXd& distance2, std::size_t levels) {
   return weights;
 }
 
-/// Leaves out, one by one, what is known worst, as long as it is not determined.
+/// G-24: leaves out, one by one, what is known worst, as long as it is not determined.
 void leave_out_undetermined(const Problem& problem, const Model& start, const Values& values,
                             Unknowns& unknowns) {
   while (unknowns.count() > 0) {
@@ -231,7 +232,7 @@ void add_to(const Unknowns& unknowns, const VectorXd& move, Values& values) {
   }
 }
 
-/// Fisher scoring; a step after which the scores are no smaller (in the metric of the information) is halved.
+/// G-24: Fisher scoring; a step after which the scores are no smaller (in the metric of the information) is halved.
 /// False where it does not settle.
 bool search(const Problem& problem, const Model& start, const Unknowns& unknowns, Values& values,
             Scores& last) {
@@ -300,7 +301,7 @@ Result<void> set_drivers(std::span<const DrivenWindow> windows, Problem& problem
     const double variance = problem.x.col(k).squaredNorm() / static_cast<double>(n);
     constexpr double kConstant = 1e-9;
     if (!(variance > kConstant * kConstant * (mean * mean + variance)))
-      return work_error("the driver does not vary", "a dependence shows only where what it is on changes");
+      return work_error("the driver does not vary", "a dependence shows only where its driver changes");
     problem.x_scale(k) = std::sqrt(variance);
     problem.x.col(k) /= problem.x_scale(k);
   }

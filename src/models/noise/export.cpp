@@ -128,16 +128,18 @@ class Writer {
     if (against_.empty() || options_.force) return text;
     return work_error(
         fmt::format("{}", fmt::join(against_, "; ")),
-        "fit a model that holds (fit --select), record for longer, or take it as it is by --force");
+        "fit a model that holds (fit --select), record for longer, or take it as it is with --force");
   }
 
  private:
   [[nodiscard]] std::string slow_part(const FitResult& fit) const {
-    const std::string terms = slow_terms(fit, band_);
-    if (terms.empty()) return "; it has no slow term";
-    if (format_ == ExportFormat::kStateSpace || (has_walk(format_) && terms == "RW")) return "";
-    if (!has_walk(format_) && terms.find('+') == std::string::npos && terms.starts_with("GM")) return "";
-    return fmt::format("; in place of {} a {} that grows alike over {:g} s to {:g} s", terms,
+    const SlowTerms terms = slow_terms(fit, band_);
+    if (terms.kinds.empty()) return "; it has no slow term";
+    if (format_ == ExportFormat::kStateSpace ||
+        (has_walk(format_) && terms.are_just(ProcessKind::kRandomWalk)))
+      return "";
+    if (!has_walk(format_) && terms.are_just(ProcessKind::kGaussMarkov)) return "";
+    return fmt::format("; in place of {} a {} that grows alike over {:g} s to {:g} s", terms.names,
                        has_walk(format_) ? "random walk" : "Gauss-Markov process", band_.from_s, band_.to_s);
   }
 

@@ -4,8 +4,8 @@
 ///
 /// - kalibr: imu.yaml, white noise and random walk of each triad
 /// - openvins: kalibr_imu_chain.yaml; vins-fusion: acc_n, gyr_n, acc_w, gyr_w, of a sample; lio-sam:
-/// params.yaml; gtsam: a
-///   piece of C++ that fills PreintegrationCombinedParams; each white noise and random walk of each triad
+///   params.yaml; gtsam: a piece of C++ that fills PreintegrationCombinedParams; each white noise and random
+///   walk of each triad
 /// - ros: ROS 2 parameters, covariances as in sensor_msgs/Imu; white noise and one Gauss-Markov bias a triad,
 ///   as IMU simulation plugins take them
 /// - px4: EKF2 parameters, white noise and bias random walk of each triad

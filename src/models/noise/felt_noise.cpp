@@ -471,15 +471,16 @@ Felt felt_amplitude(const FitResult& fit, std::size_t component) {
                       fit, [&](int level) { return unit_wv(c.kind, c.shape, level).value; }, rest));
 }
 
-std::string slow_terms(const FitResult& fit, const FilterBand& band) {
-  std::string names;
+SlowTerms slow_terms(const FitResult& fit, const FilterBand& band) {
+  SlowTerms slow;
   const std::vector<std::string> of_components = component_names(fit.model);
   for (std::size_t i = 0; i < of_components.size(); ++i) {
     const Component& c = fit.model.components[i];
     if (c.amplitude <= 0.0 || white_share(c, fit.rate_hz, band.from_s) >= 1.0) continue;
-    names += (names.empty() ? "" : "+") + of_components[i];
+    slow.names += (slow.names.empty() ? "" : "+") + of_components[i];
+    slow.kinds.push_back(c.kind);
   }
-  return names;
+  return slow;
 }
 
 std::string missed_level(const FitResult& fit, const FilterBand& band) {

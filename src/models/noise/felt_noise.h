@@ -1,7 +1,8 @@
 #pragma once
 
-/// What a filter feels of a noise model: the one way from a fit to the numbers of a filter's configuration,
-/// whether they are exported, printed as data-sheet rows or shown in a report (G-28 to G-32 in EQUATIONS.md).
+/// What a filter feels of a noise model: from a fit the few numbers of a filter's configuration, whether they are
+/// exported, printed as data-sheet rows or shown in a report (G-28 to G-32 in EQUATIONS.md). The terms one by one, for a
+/// filter that takes each, are in filter_form.h.
 ///
 /// A filter works in a band of times, from the shortest over which it integrates to the longest over which it
 /// has to know how its biases grow. In that band a process is white (white noise, and a moving average, a
@@ -77,10 +78,17 @@ FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double
 /// Amplitude of one component of the model as it stands, in sample terms.
 Felt felt_amplitude(const FitResult& fit, std::size_t component);
 
-/// Names of the slow terms that the fit has ("GM2+RW"); empty without any.
-std::string slow_terms(const FitResult& fit, const FilterBand& band);
+/// The slow terms that a fit has.
+struct SlowTerms {
+  std::string names;  ///< "GM2+RW"; empty without any
+  std::vector<ProcessKind> kinds;
 
-/// A model that states to miss every level by as much as this tells no filter how strong its noise is.
+  /// One term alone, and it is of this kind.
+  [[nodiscard]] bool are_just(ProcessKind kind) const { return kinds.size() == 1 && kinds.front() == kind; }
+};
+SlowTerms slow_terms(const FitResult& fit, const FilterBand& band);
+
+/// A model that states that it misses every level by this much tells no filter how strong its noise is.
 inline constexpr double kMostModelError = 1.0;
 
 /// A level of the band that the model misses by more than it states: by more than twice the level's own

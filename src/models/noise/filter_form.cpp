@@ -8,6 +8,7 @@
 #include "models/noise/power_law.h"
 
 namespace imuscope::noise {
+// G-28: each process at low frequencies, f times its density
 double low_frequency_variance(const Component& component) noexcept {
   const Shape& shape = component.shape;
   switch (component.kind) {

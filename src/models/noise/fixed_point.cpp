@@ -60,7 +60,7 @@ class Roaming {
   Eigen::VectorXd high_;
 };
 
-/// The share^2 at which r' (V + share^2 diag(scale2))^-1 r = dof; 0 where the sampling errors alone explain
+/// G-15: the share^2 at which r' (V + share^2 diag(scale2))^-1 r = dof; 0 where the sampling errors alone explain
 /// the residuals.
 double share2_at(const Eigen::VectorXd& residual, const Eigen::MatrixXd& sampling,
                  const Eigen::VectorXd& scale2, double dof) {
@@ -82,6 +82,7 @@ double share2_at(const Eigen::VectorXd& residual, const Eigen::MatrixXd& samplin
   return std::sqrt(low * high);
 }
 
+/// G-15: what delta^2 is multiplied by, level by level.
 Eigen::VectorXd scale2_of(const Eigen::VectorXd& y, const Eigen::VectorXd& fitted) {
   const Eigen::VectorXd m = fitted.cwiseMax(kRidge * y);
   return 2.0 * y.cwiseProduct(m.cwiseAbs2()).cwiseQuotient(y + m);
@@ -104,7 +105,7 @@ void complete_with_model_error(const WeightedProblem& problem, FixedPoint& point
   point.objective = share2 > 0.0 ? dof : residual.dot(Eigen::VectorXd(point.v.llt().solve(residual)));
 }
 
-/// Rounds of weights and fit in which the covariance of `point`, exact at its model when they begin, follows
+/// G-15: rounds of weights and fit in which the covariance of `point`, exact at its model when they begin, follows
 /// the curve by its scale alone: every level's sd goes with its value. `point.v` becomes that of the last
 /// round. False where the weights have no inverse.
 bool follow_with_scaled_covariance(WeightedProblem& problem, FixedPoint& point, double& share2, bool search) {
@@ -174,6 +175,7 @@ Eigen::MatrixXd sampling_covariance(const Model& model, const WaveletVariance& w
   return v;
 }
 
+// G-12: weights by the model's own covariance, iterated
 FixedPoint settle(WeightedProblem& problem, const Model& start, bool search) {
   FixedPoint point;
   point.model = start;

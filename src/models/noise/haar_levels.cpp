@@ -194,6 +194,7 @@ int highest_level(std::size_t length) noexcept {
   return length < 2 ? 0 : static_cast<int>(std::bit_width(length)) - 1;
 }
 
+// G-33: of one coefficient, in units of m B_m and of w
 MissingExcess missing_excess(std::size_t n, std::size_t older, std::size_t newer) noexcept {
   MissingExcess out;
   for (const std::size_t there : {older, newer}) {
@@ -219,6 +220,7 @@ void HoleLengths::merge(const HoleLengths& other) noexcept {
   }
 }
 
+// G-33: m B_m of the holes, less w
 double HoleLengths::variance_of(const MissingExcess& excess, std::span<const double> below) const noexcept {
   const double n = std::ldexp(1.0, static_cast<int>(below.size()));
   // m times the sum of the levels above scale log2(m), straight in log2(m) between two of them; the last

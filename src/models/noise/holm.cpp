@@ -5,6 +5,7 @@
 
 namespace imuscope::noise {
 
+// G-22
 std::vector<std::optional<double>> holm_adjusted(const std::vector<std::optional<double>>& p_values) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < p_values.size(); ++i) {

@@ -17,7 +17,7 @@ namespace {
 constexpr int kDraws = 999;
 constexpr double kSingular = 1e-9;
 
-/// One record under the common model.
+/// G-17: one record under the common model: s, I.
 class Unit {
  public:
   Unit(const WaveletVariance& wv, const Model& common, const std::vector<Eigen::Index>& in_use,
@@ -125,6 +125,7 @@ Homogeneity test_homogeneity(std::span<const WaveletVariance> records, const Mod
   const auto all = static_cast<Eigen::Index>(places.size());
   for (const Unit& unit : units) {
     UnitEstimate estimate{Eigen::VectorXd::Constant(all, kNan), Eigen::MatrixXd::Constant(all, all, kNan)};
+    // G-17: the record's own step
     estimate.step(in_use) = unit.inverse() * unit.score();
     estimate.covariance(in_use, in_use) = unit.inverse();
     out.units.push_back(std::move(estimate));

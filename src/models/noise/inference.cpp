@@ -85,6 +85,7 @@ Presentation present(const Component& c, int shape, double rate_hz, const std::s
   }
 }
 
+// G-13: intervals on the parameter's own scale
 void set_interval(ParameterEstimate& p, const Presentation& shown, double sd, double z) {
   const ParameterScale scale = parameter_scale_of(shown.name);
   p.sd = std::abs(shown.slope) * sd;
@@ -138,8 +139,8 @@ class Verdict {
         undetermined_[i] = true;
         const std::string simpler = simpler_name(result_.spec, {c.kind}, ProcessKind::kRandomWalk);
         not_identifiable(fmt::format("{}: the signal lasts {:.2g} of its correlation times, and rate and "
-                                     "variance can be told apart "
-                                     "from about {:.0f} on; the simpler model is {}",
+                                     "variance can be told apart from about {:.0f} on; "
+                                     "the simpler model is {}",
                                      names_[i], c.shape[0] * static_cast<double>(result_.n),
                                      kFewestCorrelationTimes, simpler),
                          simpler);
@@ -225,6 +226,7 @@ Eigen::MatrixXd wv_jacobian(const Model& model, const std::vector<int>& levels,
   return jacobian;
 }
 
+// G-13
 ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
                                          const Eigen::MatrixXd& omega, const std::vector<bool>& present) {
   const auto n = static_cast<Eigen::Index>(present.size());
@@ -314,6 +316,7 @@ std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& re
   return test;
 }
 
+// G-18: a level's residual
 double near_gaussian_residual(double value, double expected, double variance) {
   const double dof = 2.0 * expected * expected / variance;
   return 3.0 * expected * (std::cbrt(value / expected) - 1.0 + 2.0 / (9.0 * dof));

@@ -44,8 +44,7 @@ ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const 
 /// Test of the model on the levels with enough coefficients (wavelet_variance.h). The part of the residual
 /// that the parameters could still follow is projected out, so the test holds for every weighting of the fit.
 /// @param by_these_weights  the model is the best by the weights v^-1 of all levels: no more of the residual
-/// than
-///                          the other levels explain can be followed, and what is beyond that counts
+///                          than the other levels explain can be followed, and what is beyond that counts
 std::optional<JTest> j_test(const WaveletVariance& wv, const Eigen::VectorXd& residual,
                             const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& v,
                             const std::vector<bool>& present, bool by_these_weights);

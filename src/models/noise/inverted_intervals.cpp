@@ -116,7 +116,7 @@ class Inversion {
     estimate_[static_cast<Eigen::Index>(p)] = coordinate(p);
   }
 
-  /// The same with terms of amplitude zero as terms that no level shows yet: what the others may be is not
+  /// G-36: the same with terms of amplitude zero as terms that no level shows yet: what the others may be is not
   /// bounded by a zero. Nothing where there is none, or it has a shape that nothing tells.
   [[nodiscard]] std::optional<Inversion> with_zeros_present() const {
     Inversion out = *this;
@@ -132,7 +132,7 @@ class Inversion {
     return out;
   }
 
-  /// Test that parameter p is `value`, ~ chi2 with one degree of freedom. `others` is where the search for
+  /// G-20: test that parameter p is `value`, ~ chi2 with one degree of freedom. `others` is where the search for
   /// the other parameters starts and becomes where it ends.
   double statistic(std::size_t p, double value, Eigen::VectorXd& others) const {
     constexpr int kWeightRounds = 2;
@@ -162,7 +162,7 @@ class Inversion {
     return false;
   }
 
-  /// The same problem about other sets of parameters that the data reject no more than the estimate: one
+  /// G-36: the same problem about other sets of parameters that the data reject no more than the estimate: one
   /// process stands elsewhere, and the others, in order of their rates again, have taken over its part.
   [[nodiscard]] std::vector<Inversion> rivals(double critical) const {
     constexpr int kPlaces = 7;
@@ -293,7 +293,7 @@ class Inversion {
     for (Eigen::Index i = 0; i < m.size(); ++i)
       problem.y[i] = m[i] + near_gaussian_residual(y_[i], m[i], v(i, i));
     for (Eigen::Index i = 0; i < m.size(); ++i)
-      v(i, i) += model_error_ * model_error_ * 2.0 * y_[i] * m[i] * m[i] / (y_[i] + m[i]);
+      v(i, i) += model_error_ * model_error_ * 2.0 * y_[i] * m[i] * m[i] / (y_[i] + m[i]);  // G-15
     problem.whitener = whitener_of(v);
     return problem;
   }
@@ -413,7 +413,7 @@ std::optional<double> end_of_interval(const Inversion& inversion, std::size_t p,
 /// The estimate and its rivals.
 using Candidates = std::vector<Inversion>;
 
-/// The furthest end of all candidates in one direction; absent where one of them has none.
+/// G-36: the furthest end of all candidates in one direction; absent where one of them has none.
 std::optional<double> furthest_end(const Candidates& candidates, std::size_t place, double sign, double step,
                                    double critical) {
   std::optional<double> furthest;

@@ -38,7 +38,7 @@ double median_power(const Spectrum& spectrum, std::size_t first, std::size_t las
   return *middle * dof / boost::math::quantile(boost::math::chi_squared(dof), 0.5);
 }
 
-/// Power of the noise at bin k: the geometric mean of what is to its left and to its right, so that a slope
+/// G-23: power of the noise at bin k: the geometric mean of what is to its left and to its right, so that a slope
 /// does not make a line. At the upper end the left side alone: noise falls with frequency.
 double floor_at(const Spectrum& spectrum, std::size_t k, double dof) {
   const double left = median_power(spectrum, k - kLobe - kFloorBins, k - kLobe, dof);
@@ -63,7 +63,7 @@ double power_beside(const Spectrum& spectrum, std::size_t k) {
   return sum / n;
 }
 
-/// Offset of a peak from its bin, for a Hann window: (b - a) / (a + 2 c + b) times 2 of the neighbours'
+/// G-23: offset of a peak from its bin, for a Hann window: (b - a) / (a + 2 c + b) times 2 of the neighbours'
 /// magnitudes (Grandke 1983 in symmetric form).
 double offset_of(double left, double peak, double right) {
   const double a = std::sqrt(std::max(left, 0.0));
@@ -108,7 +108,7 @@ double independent_segments(const Spectrum& spectrum) {
   return std::max(1.0, 0.5 * static_cast<double>(spectrum.segments));
 }
 
-/// Cramer and Rao's bound for one segment, averaged over them (independent phases).
+/// G-23: Cramer and Rao's bound for one segment, averaged over them (independent phases).
 double frequency_sd_hz(double amplitude, double floor, const Spectrum& spectrum, double rate_hz) {
   const auto length = static_cast<double>(spectrum.length);
   const double var_omega =
@@ -164,6 +164,7 @@ class Search {
         // pi/2 times that of a mean of as many).
         floor_spread_(1.0 + 3.0 * std::sqrt(0.5 * std::numbers::pi * 2.0 /
                                             (dof_ * static_cast<double>(2 * kFloorBins)))),
+        // G-23: the bound
         threshold_(floor_spread_ *
                    boost::math::quantile(
                        boost::math::complement(boost::math::chi_squared(dof_), options.false_alarm / bins)) /
@@ -218,7 +219,7 @@ bool is_known(const std::vector<Line>& lines, const Line& line, double rate_hz) 
   });
 }
 
-/// Takes the lines out of [begin, end), by those of its samples that are there.
+/// G-23: takes the lines out of [begin, end), by those of its samples that are there.
 void remove_from(std::span<double> x, const Present& present, std::size_t begin, std::size_t end,
                  std::span<const Line> lines, double rate_hz) {
   const auto columns = static_cast<Eigen::Index>(2 * lines.size());

@@ -19,7 +19,7 @@ constexpr double kShareOfVariance = 0.1;
 /// Rates that are tried, evenly over the logarithm of those that the levels can tell apart.
 constexpr int kTriedRates = 40;
 
-/// Places of the rates of Gauss-Markov processes whose logarithms are determined, but badly.
+/// G-43: places of the rates of Gauss-Markov processes whose logarithms are determined, but badly.
 std::vector<std::size_t> loose_rates(const Model& model, const ParameterCovariance& parameters) {
   const auto places = parameter_places(model);
   std::vector<std::size_t> out;
@@ -32,6 +32,7 @@ std::vector<std::size_t> loose_rates(const Model& model, const ParameterCovarian
   return out;
 }
 
+/// G-43: whether a parameter owes enough of its variance to that rate.
 bool leans(const ParameterCovariance& parameters, std::size_t p, std::size_t rate) {
   const auto i = static_cast<Eigen::Index>(p);
   const auto r = static_cast<Eigen::Index>(rate);
@@ -115,7 +116,7 @@ struct Ends {
   double high = 0.0;
 };
 
-/// What all parabolas allow that come within `critical` of the least of all.
+/// G-43: what all parabolas allow that come within `critical` of the least of all.
 Ends ends_of(const std::vector<Parabola>& parabolas, double critical) {
   double least = std::numeric_limits<double>::infinity();
   for (const Parabola& p : parabolas) least = std::min(least, p.least);
@@ -143,6 +144,7 @@ std::vector<bool> leaning_on_loose_rates(const Model& model, const ParameterCova
   return out;
 }
 
+// G-43
 void profile_loose_rates(FitResult& result, const ParameterCovariance& parameters,
                          const Eigen::MatrixXd& whitener) {
   const auto places = parameter_places(result.model);

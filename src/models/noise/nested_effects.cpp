@@ -75,6 +75,7 @@ class Drives {
     return static_cast<double>(size()) - static_cast<double>(units_) - static_cast<double>(used_.size());
   }
 
+  /// G-70: sum of squares within the units, and slopes; G-71: the units' means and their variances.
   [[nodiscard]] Within at(double between_drives) const {
     const auto p = static_cast<Eigen::Index>(used_.size());
     const auto n_units = static_cast<Eigen::Index>(units_);
@@ -127,7 +128,7 @@ class Drives {
     return out;
   }
 
-  /// The variance between drives at which the sum of squares is `q`.
+  /// G-70: the variance between drives at which the sum of squares is `q`.
   [[nodiscard]] double variance(double q) const {
     const auto fast = variance_by_newton(
         [&](double between) {
@@ -172,7 +173,7 @@ class Drives {
   Vector centre_;
 };
 
-/// Units weighted by one value of the variance between them.
+/// G-71: units weighted by one value of the variance between them.
 struct Between {
   double mean = 0.0;
   double weight = 0.0;
@@ -196,6 +197,7 @@ Between between_units(const Within& within, double between) {
   return out;
 }
 
+/// G-71: the variance between units at which their sum of squares is `q`.
 double unit_variance(const Within& within, double q) {
   return variance_at([&](double between) { return between_units(within, between).q; }, q,
                      within.variances.maxCoeff());
@@ -259,6 +261,7 @@ double quantile_of(const Share& share_below, double share, double low, double hi
 
 double normal_below(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
+/// G-72: quantiles of the mean.
 Spread95 mean_of(const std::vector<Possible>& truths, double mean) {
   Spread95 out;
   out.value = mean;
@@ -277,6 +280,7 @@ Spread95 mean_of(const std::vector<Possible>& truths, double mean) {
   return out;
 }
 
+/// G-72: quantiles of the spread between units.
 Spread95 unit_sd_of(std::vector<Possible> truths, double variance) {
   std::sort(truths.begin(), truths.end(),
             [](const Possible& a, const Possible& b) { return a.unit_variance < b.unit_variance; });
@@ -327,7 +331,7 @@ double half_width(double centre, double mean, double sd) {
   return sd * ((1.0 - share) * kWidths[at] + share * kWidths[at + 1]);
 }
 
-/// The half width that is wide enough in kConfidence of the possible truths.
+/// G-73: the half width that is wide enough in kConfidence of the possible truths.
 double tolerance_of(const std::vector<Possible>& truths, double centre) {
   std::vector<std::pair<double, double>> widths;  // and their weights
   widths.reserve(truths.size() * kMeans);
@@ -351,7 +355,7 @@ double tolerance_of(const std::vector<Possible>& truths, double centre) {
   return widths.back().first;
 }
 
-/// Of a residual in sd that were estimated together with it from `dof` degrees of freedom.
+/// G-74: of a residual in sd that were estimated together with it from `dof` degrees of freedom.
 Deviation deviation_of(double deviation, double r, double dof, bool known) {
   Deviation out;
   out.deviation = deviation;
@@ -372,6 +376,7 @@ Deviation deviation_of(double deviation, double r, double dof, bool known) {
 /// A share of the weight that leaves nothing to be held against.
 constexpr double kAllOfIt = 1.0 - 1e-9;
 
+/// G-74: units.
 void judge_units(const Within& within, const Between& between, double variance, double dof,
                  NestedEffects& out) {
   for (Eigen::Index u = 0; u < within.means.size(); ++u) {
@@ -384,6 +389,7 @@ void judge_units(const Within& within, const Between& between, double variance, 
   }
 }
 
+/// G-74: drives.
 void judge_drives(std::span<const DriveValue> values, const Drives& drives, const Within& within,
                   double variance, double dof, NestedEffects& out) {
   for (std::size_t j = 0; j < values.size(); ++j) {
@@ -450,6 +456,7 @@ std::optional<NestedEffects> nested_effects(std::span<const DriveValue> values) 
   return out;
 }
 
+// G-74: drift of each unit
 std::vector<std::optional<Deviation>> unit_drifts(std::span<const DriveValue> values,
                                                   std::span<const double> time) {
   std::size_t units = 0;

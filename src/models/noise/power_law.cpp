@@ -10,7 +10,7 @@ constexpr double kFastest = 2.0;  // of a sample: nearly white
 constexpr double kFactor = 8.0;   // between neighbouring rates
 constexpr int kRates = 10;        // the slowest: 2 / 8^9 a sample, 2^26 samples
 
-/// The sum for an amplitude of 1.
+/// G-39: the sum for an amplitude of 1.
 std::vector<Component> unit_sum(const Component& power_law) {
   std::vector<Component> terms{{ProcessKind::kWhiteNoise, 0.0, {}}};
   double rate = kFastest;

@@ -79,7 +79,7 @@ Slope<T> sinh_series(T a) noexcept {
   return {sum * square * a, slope * square};
 }
 
-/// One Gauss-Markov process at any n.
+/// G-6: one Gauss-Markov process at any n.
 class MarkovCurve {
  public:
   explicit MarkovCurve(double a) noexcept
@@ -114,6 +114,7 @@ class MarkovCurve {
   Slope<double> rest_;
 };
 
+// G-5: MA1
 CurvePoint moving_average(double theta, double tau) noexcept {
   const double tau2 = tau * tau;
   return {((1.0 + theta) * (1.0 + theta) * tau - 6.0 * theta) / tau2,
@@ -158,6 +159,7 @@ CurvePoint arma_split(double phi, double theta, int level) noexcept {
            dshare_dtheta * gm.value - 1.0 / (phi * tau)}};
 }
 
+// G-5: sinusoid of random phase
 CurvePoint sinusoid(double b, double n) noexcept {
   const double half = 0.5 * b;
   const double s1 = std::sin(half);
@@ -347,6 +349,7 @@ CurvePoint resonance_wv(double a, double b, int level) noexcept {
   return curve.at(n, curve.is_series(n) ? 0.0 : curve.left(n));
 }
 
+// G-38: G(m)
 double power_law_sum_covariance(double alpha, double m) noexcept {
   // Gamma(m + D) / Gamma(m + 1 - D) / (2 cos(pi D) Gamma(2D)), D = 1 + alpha / 2 = 3/2 + off. At alpha = 1
   // the cosine is zero and the ratio a square of m, which is taken out beforehand.
@@ -363,6 +366,7 @@ double power_law_sum_covariance(double alpha, double m) noexcept {
 
 namespace {
 
+// G-38 in G-9, at h = 0 of one level
 double power_law_value(double alpha, double n) {
   const double sum = 6.0 * power_law_sum_covariance(alpha, 0.0) - 8.0 * power_law_sum_covariance(alpha, n) +
                      2.0 * power_law_sum_covariance(alpha, 2.0 * n);
@@ -394,7 +398,7 @@ CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
   IMUSCOPE_EXPECTS(level >= 1 && level <= kMaxLevel);
   const double n = half_support(level);
   const double tau = 2.0 * n;
-  switch (kind) {
+  switch (kind) {  // G-5, where it is no function of its own
     case ProcessKind::kWhiteNoise:
       return white_noise(tau);
     case ProcessKind::kQuantization:

@@ -41,6 +41,7 @@ double between_at(std::span<const double> values, std::span<const double> varian
 
 }  // namespace
 
+// G-17: tau, the mean and their intervals
 std::optional<RandomEffects> random_effects(std::span<const double> values, std::span<const double> variances,
                                             double confidence) {
   IMUSCOPE_EXPECTS(values.size() == variances.size());

@@ -19,7 +19,7 @@ namespace {
 /// Level of the J-test from which a model counts as explaining its samples.
 constexpr double kExplained = 0.01;
 
-/// Covariance of the model's curve at `levels` from that of its parameters.
+/// A S A' of G-18: covariance of the model's curve at `levels` from that of its parameters.
 Eigen::MatrixXd curve_covariance(const FitResult& fit, const std::vector<int>& levels) {
   const auto places = parameter_places(fit.model);
   const auto size = static_cast<Eigen::Index>(places.size());
@@ -158,6 +158,7 @@ Result<JointFit> fit_jointly(std::span<const WaveletVariance> replicates, const 
   return joint;
 }
 
+// G-18
 std::optional<JTest> distance_from_model(const WaveletVariance& window, const FitResult& reference) {
   const bool explained = !reference.j_test || reference.j_test->p_value >= kExplained;
   std::vector<int> levels;

@@ -114,7 +114,7 @@ class Grower {
   static constexpr int kMostAlike = 3;
   static constexpr std::size_t kMostRivals = 8;
 
-  /// Models that were tried and are as good as the best, or as likely, and rejected for their parameters
+  /// T-4: models that were tried and are as good as the best, or as likely, and rejected for their parameters
   /// alone. What contains the best is always as likely.
   [[nodiscard]] std::vector<FitResult> rivals() const {
     std::vector<FitResult> out;

@@ -25,14 +25,14 @@ struct RankedModel {
 Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const ModelSpec& full, double rate_hz,
                                              const FitOptions& options = {});
 
-/// A model and those that the record takes for as good: what is said of the sensor has to hold for them, too.
+/// A model and those that fit the record as well: what is said of the sensor has to hold for them, too.
 struct GrownModel {
   FitResult best;
   std::vector<FitResult> rivals;  ///< with quick intervals, the best criterion first, at most eight
 };
 
-/// Term by term: from the best single process, or white noise and one more, on, each round adds the one of
-/// `terms` that gains most, while the criterion falls by more than two models' as good as each other may
+/// Term by term: beginning with the best single process, or white noise and one more, each round adds the one
+/// of `terms` that gains most, while the criterion falls by more than those of two equally good models may
 /// differ (or the data reject what there is); in the end terms without which it is as good go again, and
 /// others take the places of those that explain less. A few dozen fits where rank_models() makes all
 /// sub-models.

@@ -40,6 +40,7 @@ Present::Present(std::span<const double> x, std::span<const std::uint8_t> mask)
   for (std::size_t i = 0; i < x.size(); ++i) before_[i + 1] += before_[i];
 }
 
+// G-23: half overlap, an eighth missing at most
 std::vector<std::size_t> Present::segments(std::size_t length) const {
   std::vector<std::size_t> begins;
   const auto least = static_cast<std::size_t>((1.0 - kMostMissing) * static_cast<double>(length));
@@ -54,6 +55,7 @@ std::vector<std::size_t> Present::segments(std::size_t length) const {
   return begins;
 }
 
+// G-23: mean periodogram
 Spectrum spectrum_of(std::span<const double> x, const Present& present, std::size_t length) {
   const auto window = hann(length);
   const double whole = std::accumulate(window.begin(), window.end(), 0.0);
@@ -84,6 +86,7 @@ Spectrum spectrum_of(std::span<const double> x, const Present& present, std::siz
   return out;
 }
 
+// G-23: dof
 double degrees_of_freedom(double segments) { return 36.0 * segments * segments / (19.0 * segments - 1.0); }
 
 double density_at(const Spectrum& spectrum, std::size_t bin, double rate_hz) {

@@ -2,7 +2,7 @@
 
 /// Heavy tails: are there more large values in a signal than in a Gaussian one? Spikes raise the classical
 /// wavelet variance and leave the robust one alone, so that their difference tells (Hausman 1978). Its
-/// covariance follows from the model, because of Gaussian signals the classical one is the better (G-35).
+/// covariance follows from the model, as for Gaussian signals the classical one is the better (G-35).
 
 #include <cstdint>
 #include <optional>
@@ -38,7 +38,7 @@ struct TailExcerpt {
 TailExcerpt tail_excerpt(std::span<const double> x, std::span<const std::uint8_t> mask);
 
 /// Absent where quantization, which is no Gaussian process, makes a part of every level, or where no level
-/// has coefficients enough.
+/// has enough coefficients.
 /// @param options  gaps; its mask is not used
 /// @param model    of that signal, in sample terms; the first eight levels count
 std::optional<TailTest> test_tails(const TailExcerpt& excerpt, const WvOptions& options, const Model& model);

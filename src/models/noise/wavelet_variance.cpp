@@ -87,7 +87,7 @@ WvLevel with_scale(int j, const std::vector<double>& coefficients, const std::op
   return level;
 }
 
-/// Joins stretches over the shortest holes, until there are kMostPlaces of them.
+/// G-34: joins stretches over the shortest holes, until there are kMostPlaces of them.
 std::vector<Segment> joined(const std::vector<Segment>& places) {
   if (places.size() <= kMostPlaces) return places;
   std::vector<std::size_t> holes;
@@ -132,6 +132,7 @@ std::vector<WvLevel> levels_by_coefficients(std::span<const double> x, const std
 
 }  // namespace
 
+// G-33: from the first level on
 void take_out_missing(std::vector<WvLevel>& levels, std::span<const MissingExcess> excess,
                       const HoleLengths& holes) {
   // Where missing samples make nearly all of a level (of quantization alone), its own part is not told better
@@ -165,6 +166,7 @@ std::vector<Segment> valid_segments(std::span<const double> x, std::span<const s
   return segments;
 }
 
+// G-2
 void set_intervals(std::vector<WvLevel>& levels, double efficiency, double confidence) {
   const double tail = 0.5 * (1.0 - confidence);
   const double widening = 1.0 / std::sqrt(efficiency);

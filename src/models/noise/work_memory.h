@@ -1,7 +1,7 @@
 #pragma once
 
 /// Scratch memory for numbers, unset. Where it is large, in large pages: the first touch of a page is a fault
-/// of the processor, and of pages of 4 kB those of ten million samples cost as much as all their levels.
+/// of the processor, and with pages of 4 kB the faults of ten million samples cost as much as all their levels.
 
 #include <cstddef>
 #include <cstdlib>

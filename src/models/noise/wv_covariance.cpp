@@ -24,7 +24,7 @@ struct RobustTerms {
   std::vector<double> terms;
 };
 
-/// Sums N_jk(h) [2 C^2 + 4 m_j m_k C] at distances x >= 0 from the centre lag n_k - n_j, both sides together:
+/// G-8: sums N_jk(h) [2 C^2 + 4 m_j m_k C] at distances x >= 0 from the centre lag n_k - n_j, both sides together:
 /// C is symmetric about that lag. In the form that LagSum takes.
 class PairTerm {
  public:
@@ -41,7 +41,7 @@ class PairTerm {
     return pairs_.at_distance(centre_, x) * (covariance_of_squares(c) + means_ * c);
   }
   [[nodiscard]] double covariance_of_squares(double c) const {
-    if (robust_.terms.empty()) return 2.0 * c * c;
+    if (robust_.terms.empty()) return 2.0 * c * c;  // G-8; else G-11
     const double scale = robust_.variance_j * robust_.variance_k;
     const double rho2 = c * c / scale;
     double sum = 0.0;
@@ -64,7 +64,7 @@ Parts with_missing(const Parts& parts, const WvLevel& j, const WvLevel& k) {
   return out;
 }
 
-/// What acts like a simpler process on both levels becomes that, where the model is approximate or the
+/// G-39: what acts like a simpler process on both levels becomes that, where the model is approximate or the
 /// difference small: of the processes that stand for a power law, those that are a random walk to both
 /// levels, or white noise to both, become just that: to within what the sum itself deviates by.
 Parts folded(Parts parts, double n_j, double n_k) {
@@ -93,6 +93,7 @@ double covariance_of_pair(const Parts& whole, const WvLevel& j, const WvLevel& k
   const double n_k = 0.5 * k.tau_samples;
   const Parts parts = folded(with_missing(whole, j, k), n_j, n_k);
   const PairCounts pairs(j, k, at_j, at_k);
+  // G-8: the means that a ramp causes
   const double means = 4.0 * (0.5 * parts.ramp * n_j) * (0.5 * parts.ramp * n_k);
   const double centre = n_k - n_j;
   RobustTerms robust;
@@ -127,6 +128,7 @@ double covariance_of_pair(const Parts& whole, const WvLevel& j, const WvLevel& k
   const double count_j = static_cast<double>(j.n_coefficients);
   const double count_k = static_cast<double>(k.n_coefficients);
   double result = term.sum() / (count_j * count_k);
+  // G-10, G-44
   if (parts.uniform > 0.0) result += uniform_correction(parts.uniform, runs, j, k);
   return result + sinusoid_covariance(parts, j, k);
 }

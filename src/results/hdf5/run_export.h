@@ -3,11 +3,9 @@
 /// A run folder as one HDF5 file, for MATLAB, h5py, Julia, R, Octave.
 ///
 /// /tables/NAME/COLUMN    the CSV files, a data set a column, with attributes `unit` and `description`;
-/// chunked,
-///                        deflated, checksummed; text as strings of one length; empty cells NaN
+///                        chunked, deflated, checksummed; text as strings of one length; empty cells NaN
 /// /results/NAME/...      the JSON documents, key by key: objects are groups, arrays of numbers data sets,
-/// arrays
-///                        of flat objects groups of columns; null is NaN
+///                        arrays of flat objects groups of columns; null is NaN
 /// /documents/NAME        the JSON documents as they are
 ///
 /// Text is UTF-8. What stays a file of its own (capture, report, figures) is named in the root's attribute

@@ -152,8 +152,8 @@ std::string page_without_script(std::string_view title, const Html& body) {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
       "form-action 'none'; style-src 'unsafe-inline'; img-src data:\">\n"
-      "<meta name=\"color-scheme\" content=\"light "
-      "dark\">\n<title>{}</title>\n<style>\n{}{}</style>\n</head>\n"
+      "<meta name=\"color-scheme\" content=\"light dark\">\n"
+      "<title>{}</title>\n<style>\n{}{}</style>\n</head>\n"
       "<body>\n<main>\n{}\n</main>\n</body>\n</html>\n",
       text(title).str(), kit_style(), document_style(), body.str());
 }
@@ -164,8 +164,8 @@ std::string page_with_script(std::string_view title, const Html& body, std::stri
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri 'none'; "
-      "form-action 'none'; "
-      "style-src 'unsafe-inline'; script-src {}\">\n<meta name=\"color-scheme\" content=\"light dark\">\n"
+      "form-action 'none'; style-src 'unsafe-inline'; script-src {}\">\n"
+      "<meta name=\"color-scheme\" content=\"light dark\">\n"
       "<title>{}</title>\n<style>\n{}{}</style>\n</head>\n<body>\n<main>\n{}\n</main>\n"
       "<script type=\"application/json\" id=\"data\">{}</script>\n<script>{}</script>\n</body>\n</html>\n",
       hash_source(script), text(title).str(), kit_style(), style, body.str(), json_for_script(data), script);

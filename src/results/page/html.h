@@ -52,7 +52,7 @@ Html link_to_heading(std::string_view id, std::string_view words);
 Html inline_svg(std::string_view css_class, double width, double height, std::string_view words,
                 const std::string& inner);
 
-/// What a reader opens who wants all of it; `summary` says what is inside. On paper it stands in the
+/// What a reader who wants all of it opens; `summary` says what is inside. On paper it stands in the
 /// appendix. Nothing where `content` is empty.
 /// @param open  from the beginning, where it differs from what is normal; it then stays in its place on paper
 Html fold(std::string_view summary, const Html& content, bool open = false);

@@ -183,8 +183,8 @@ Html summary(const json& certificate, const CertificateFigures& figures) {
   out += list_of(warnings, "answer partly");
   out += terms_table(certificate, true) + terms_table(certificate, false);
   out += paragraph(fmt::format("Intervals at {:.0f} % confidence, if the model or one as good is right. "
-                               "\"Below\" is the most that this record "
-                               "allows. Symbols as in IEEE Std 952 and 1293.",
+                               "\"Below\" is the most that this record allows. "
+                               "Symbols as in IEEE Std 952 and 1293.",
                                100.0 * number_at(certificate, "confidence").value_or(0.0)),
                    "quiet");
   Html overview;

@@ -75,7 +75,7 @@ void add_row(Table& table, const char* name, std::optional<double> a, std::optio
 }
 
 /// The mounting of one S-IMU in both runs. Boresights are shown from the first run's nearest square mounting.
-void add_mounting(Table& table, const StudyFiles& first, const StudyFiles& second) {
+void add_mounting(Table& table, const SImuFiles& first, const SImuFiles& second) {
   constexpr std::array<const char*, 3> kBoresight{"boresight about forward, deg", "about right, deg",
                                                   "about down, deg"};
   constexpr std::array<const char*, 3> kLeverArm{"lever arm forward, mm", "right, mm", "down, mm"};
@@ -111,17 +111,17 @@ void add_mounting(Table& table, const StudyFiles& first, const StudyFiles& secon
           in_ms(number_at(second.calibration, "t_d_sd_s")));
 }
 
-const StudyFiles* find_study(const RunFiles& run, const std::string& name) {
+const SImuFiles* find_study(const RunFiles& run, const std::string& name) {
   const auto found = std::find_if(run.studies.begin(), run.studies.end(),
-                                  [&](const StudyFiles& study) { return study.name == name; });
+                                  [&](const SImuFiles& study) { return study.name == name; });
   return found == run.studies.end() ? nullptr : &*found;
 }
 
 Html mountings(const RunFiles& first, const RunFiles& second) {
   Table table({text("± one sd"), text(name_of(first)), text(name_of(second)), text("second minus first")});
   std::vector<std::string> alone;
-  for (const StudyFiles& study : first.studies) {
-    const StudyFiles* other = find_study(second, study.name);
+  for (const SImuFiles& study : first.studies) {
+    const SImuFiles* other = find_study(second, study.name);
     if (other == nullptr) {
       alone.push_back(fmt::format("{} is in {} only.", study.name, name_of(first)));
       continue;
@@ -129,7 +129,7 @@ Html mountings(const RunFiles& first, const RunFiles& second) {
     table.add_group(text(study.name));
     add_mounting(table, study, *other);
   }
-  for (const StudyFiles& study : second.studies) {
+  for (const SImuFiles& study : second.studies) {
     if (find_study(first, study.name) == nullptr)
       alone.push_back(fmt::format("{} is in {} only.", study.name, name_of(second)));
   }
@@ -140,7 +140,7 @@ Html mountings(const RunFiles& first, const RunFiles& second) {
 Html noises(const RunFiles& first, const RunFiles& second) {
   const auto regimes = particular_regimes(regimes_of(read_fits(first.models)));
   Table table({text("random walk"), text(name_of(first)), text(name_of(second))});
-  for (const StudyFiles& study : first.studies) {
+  for (const SImuFiles& study : first.studies) {
     if (find_study(second, study.name) == nullptr) continue;
     for (const std::string& regime : regimes) {
       const auto a = axis_fits(first, study.name, regime);

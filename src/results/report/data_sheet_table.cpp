@@ -139,7 +139,7 @@ Html data_sheet_table(const RunFiles& run, const std::vector<Fit>& fits) {
   headings.push_back(text("maker"));
   headings.push_back(text("worst axis"));
   Table table(std::move(headings));
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     std::vector<std::vector<noise::AxisFit>> by_regime;
     for (const std::string& regime : regimes) by_regime.push_back(axis_fits(run, study.name, regime));
     if (std::all_of(by_regime.begin(), by_regime.end(), [](const auto& of) { return of.empty(); })) continue;

@@ -82,7 +82,7 @@ Picture drive_picture(const RunFiles& run) {
 }
 
 /// The paper's Figure 1: three angles, three lengths.
-Picture estimate_picture(const StudyFiles& study) {
+Picture estimate_picture(const SImuFiles& study) {
   Picture picture{device_file_name("figure1", study.name, ""), 2, 3, {}};
   constexpr GnuplotWord kAxisNames[] = {"x", "y", "z"};
   constexpr GnuplotWord kAngle = "{/Symbol y}";
@@ -106,7 +106,7 @@ Picture estimate_picture(const StudyFiles& study) {
   return picture;
 }
 
-Picture error_picture(const StudyFiles& study) {
+Picture error_picture(const SImuFiles& study) {
   Picture picture{device_file_name("figure2", study.name, ""), 2, 3, {}};
   picture.body.add("set autoscale xfix\nset xlabel 'time, s'\n");
   for (std::size_t i = 0; i < kErrorSignals; ++i) {
@@ -120,7 +120,7 @@ Picture error_picture(const StudyFiles& study) {
 }
 
 /// The paper's Figure 3: errors of gyroscope x and accelerometer z against their own axes' motion.
-Picture scatter_picture(const StudyFiles& study) {
+Picture scatter_picture(const SImuFiles& study) {
   struct Panel {
     std::size_t error;
     std::size_t covariate;
@@ -193,7 +193,7 @@ std::vector<Picture> pictures_of(const RunFiles& run) {
   std::vector<Picture> pictures;
   if (run.navigation) pictures.push_back(drive_picture(run));
   const auto fits = read_fits(run.models);
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     if (study.calibration_series) pictures.push_back(estimate_picture(study));
     if (study.errors) pictures.push_back(error_picture(study));
     if (study.scatter) pictures.push_back(scatter_picture(study));

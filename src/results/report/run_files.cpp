@@ -136,7 +136,7 @@ Result<void> read_odometry(RunFiles& run) {
   return {};
 }
 
-Result<void> read_calibration_series(const RunFiles& run, StudyFiles& study,
+Result<void> read_calibration_series(const RunFiles& run, SImuFiles& study,
                                      std::vector<std::string>& absent) {
   const auto file = run.folder / device_file_name("calibration", study.name, ".csv");
   if (!present(file, absent)) return {};
@@ -184,7 +184,7 @@ class StaticStretches {
   bool inside_ = false;
 };
 
-Result<void> read_errors(const RunFiles& run, StudyFiles& study, std::vector<std::string>& absent) {
+Result<void> read_errors(const RunFiles& run, SImuFiles& study, std::vector<std::string>& absent) {
   const auto file = run.folder / device_file_name("errors", study.name, ".csv");
   if (!present(file, absent)) return {};
   auto reader = CsvReader::open(file, {"time_s", "e_gyro_x_radps", "e_gyro_y_radps", "e_gyro_z_radps",
@@ -221,7 +221,7 @@ Result<void> read_studies(RunFiles& run, const json& calibration) {
   if (!truth) return passed_on(truth);
   run.has_truth = !truth->is_null();
   for (const json& imu : field(calibration, "imus")) {
-    StudyFiles study;
+    SImuFiles study;
     study.name = text_at(imu, "name");
     if (!is_device_name(study.name)) {
       return work_error(
@@ -249,7 +249,7 @@ Result<void> read_studies(RunFiles& run, const json& calibration) {
 
 std::vector<std::string> names_of(const RunFiles& run) {
   std::vector<std::string> names;
-  for (const StudyFiles& study : run.studies) names.push_back(study.name);
+  for (const SImuFiles& study : run.studies) names.push_back(study.name);
   return names;
 }
 

@@ -31,11 +31,11 @@ enum NavigationSignal : std::size_t {
 /// Signals of RunFiles::odometry.
 enum OdometrySignal : std::size_t { kWheelSpeed_mps, kScale_percent, kSdScale_percent, kOdometrySignals };
 
-/// Signals of StudyFiles::calibration; the sd of signal i is signal i + kSdOffset.
+/// Signals of SImuFiles::calibration; the sd of signal i is signal i + kSdOffset.
 enum CalibrationSignal : std::size_t { kPsi_deg = 0, kLeverArm_m = 3, kTimeOffset_ms = 6, kSdOffset = 7 };
 inline constexpr std::size_t kCalibrationSignals = 14;
 
-/// Signals of StudyFiles::errors: three of the gyroscope in deg/s, three of the accelerometer in m/s².
+/// Signals of SImuFiles::errors: three of the gyroscope in deg/s, three of the accelerometer in m/s².
 inline constexpr std::size_t kErrorSignals = 6;
 /// Axes of one sensor: the first three signals are the gyroscope's.
 inline constexpr std::size_t kTriad = 3;
@@ -47,7 +47,7 @@ struct Stretch {
 };
 
 /// The files of one S-IMU.
-struct StudyFiles {
+struct SImuFiles {
   std::string name;
   nlohmann::json calibration;  ///< its entry in calibration.json
   nlohmann::json truth;        ///< its entry in truth.json; null where there is none
@@ -78,7 +78,7 @@ struct RunFiles {
   double zero_velocity_s = 0.0;           ///< rest that the filter used
   std::array<double, 2> origin_deg{};     ///< latitude and longitude of the first position
   double distance_m = 0.0;                ///< driven, from the speed
-  std::vector<StudyFiles> studies;        ///< in the order of calibration.json
+  std::vector<SImuFiles> studies;         ///< in the order of calibration.json
   std::vector<std::string> absent;        ///< names of files that a run may have and this one has not
 };
 

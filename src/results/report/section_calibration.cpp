@@ -74,7 +74,7 @@ Html error_cell(double error, const char* unit, std::optional<double> sd) {
 }
 
 /// Found, true and difference of one quantity.
-void add_quantity(Table& table, const StudyFiles& study, const Quantity& quantity, const char* error_unit,
+void add_quantity(Table& table, const SImuFiles& study, const Quantity& quantity, const char* error_unit,
                   double error_factor) {
   const auto found = numbers_at<3>(study.calibration, quantity.value_key);
   const auto sd = numbers_at<3>(study.calibration, quantity.sd_key);
@@ -94,7 +94,7 @@ void add_quantity(Table& table, const StudyFiles& study, const Quantity& quantit
   table.add_row(std::move(row));
 }
 
-void add_boresight(Table& table, const StudyFiles& study, const Rotation& C_b_s) {
+void add_boresight(Table& table, const SImuFiles& study, const Rotation& C_b_s) {
   const auto sd_deg = numbers_at<3>(study.calibration, "boresight_sd_deg");
   const Rotation square = nearest_square_mounting(C_b_s);
   const auto observable = observable_axes(study.calibration, "psi");
@@ -117,7 +117,7 @@ void add_boresight(Table& table, const StudyFiles& study, const Rotation& C_b_s)
   table.add_row(std::move(row));
 }
 
-void add_time_offset(Table& table, const StudyFiles& study) {
+void add_time_offset(Table& table, const SImuFiles& study) {
   const auto t_d_s = number_at(study.calibration, "t_d_s");
   const auto sd_s = number_at(study.calibration, "t_d_sd_s");
   if (!t_d_s) return;
@@ -135,7 +135,7 @@ void add_time_offset(Table& table, const StudyFiles& study) {
   table.add_row({subordinate("error"), error_cell(kMsPerS * (*t_d_s - *known_s), "ms", in_ms(sd_s)), {}, {}});
 }
 
-Html study_table(const StudyFiles& study) {
+Html study_table(const SImuFiles& study) {
   Table table({text("± one sd"), text("x"), text("y"), text("z")});
   if (const auto C_b_s = numbers_at<9>(study.calibration, "C_b_s")) add_boresight(table, study, *C_b_s);
   add_quantity(table, study,
@@ -163,7 +163,7 @@ Html study_table(const StudyFiles& study) {
 }
 
 /// What each axis of a triad reads of the others' directions: the matrix less scale and right angles.
-Html axes_table(const StudyFiles& study) {
+Html axes_table(const SImuFiles& study) {
   const auto& batch = field(study.calibration, "batch");
   Table table(
       {text("leaning axes, deg ± one sd"), text("y towards x"), text("z towards x"), text("z towards y")});
@@ -179,7 +179,7 @@ Html axes_table(const StudyFiles& study) {
   return gyro || accel ? table.html() : Html{};
 }
 
-Html mounting_words(const StudyFiles& study) {
+Html mounting_words(const SImuFiles& study) {
   const auto C_b_s = numbers_at<9>(study.calibration, "C_b_s");
   if (!C_b_s) return paragraph("The mounting is not known.");
   std::string words = fmt::format("Mounted with its {} of the reference, but for the small angles below.",
@@ -207,7 +207,7 @@ double small_unit(std::string& unit) {
 }
 
 /// What is known least and what would help.
-Html limits_words(const StudyFiles& study) {
+Html limits_words(const SImuFiles& study) {
   const auto& observability = field(study.calibration, "observability");
   if (!observability.is_object()) return {};
   std::string words =
@@ -220,7 +220,7 @@ Html limits_words(const StudyFiles& study) {
 }
 
 /// sd against goal of every state.
-Html observability_table(const StudyFiles& study) {
+Html observability_table(const SImuFiles& study) {
   const auto& observability = field(study.calibration, "observability");
   if (!observability.is_object()) return {};
   Table table({text("what the drive has shown"), text("sd"), text("goal"), text("")});
@@ -268,7 +268,7 @@ std::array<Html, 3> found_cells(const std::optional<Three>& values, const std::o
 }
 
 /// Boresight from the square mounting, lever arm and time offset of one S-IMU, in the order of kMountingRows.
-std::vector<Html> mounting_cells(const StudyFiles& study) {
+std::vector<Html> mounting_cells(const SImuFiles& study) {
   std::vector<Html> cells;
   const auto add = [&](const std::array<Html, 3>& three) {
     cells.insert(cells.end(), three.begin(), three.end());
@@ -309,7 +309,7 @@ Html mounting_table(const RunFiles& run) {
                                            "time offset t_d, ms"};
   std::vector<Html> headings{text("± one sd")};
   std::vector<std::vector<Html>> columns;
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     headings.push_back(text(study.name));
     columns.push_back(mounting_cells(study));
   }
@@ -322,7 +322,7 @@ Html mounting_table(const RunFiles& run) {
   return columns.empty() ? Html{} : table.html();
 }
 
-Html estimate_panels(const StudyFiles& study, FigureSheet& figures) {
+Html estimate_panels(const SImuFiles& study, FigureSheet& figures) {
   if (!study.calibration_series) {
     return paragraph(fmt::format(
         "No calibration_{}.csv with estimates in this run folder: Figure 1 has nothing to show for it.",
@@ -360,7 +360,7 @@ Html estimate_panels(const StudyFiles& study, FigureSheet& figures) {
 }
 
 /// Whether the mounting is not as it should be: then all that is known of it is open from the beginning.
-bool is_notable(const StudyFiles& study) {
+bool is_notable(const SImuFiles& study) {
   const auto& states = field(field(study.calibration, "observability"), "states");
   return std::any_of(states.begin(), states.end(),
                      [](const auto& state) { return field(state, "observable") != nlohmann::json(true); });
@@ -377,7 +377,7 @@ Html calibration_section(const RunFiles& run, FigureSheet& figures) {
   section += mounting_table(run);
   if (!run.has_truth)
     section += paragraph("No truth.json in this run: nothing to compare the estimates with.", "note");
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     section += element("h3", text(study.name)) + mounting_words(study) + limits_words(study) +
                fold(fmt::format("All that is estimated of {}, and what the drive has shown", study.name),
                     study_table(study) + axes_table(study) + observability_table(study), is_notable(study));
@@ -389,7 +389,7 @@ Html calibration_section(const RunFiles& run, FigureSheet& figures) {
                                    "estimates; drag to zoom, double click to return. ") +
                               Html::markup("<button type=\"button\" id=\"whole-range\" "
                                            "aria-pressed=\"false\">show the whole range</button>"));
-  for (const StudyFiles& study : run.studies)
+  for (const SImuFiles& study : run.studies)
     section += fold(study.name, estimate_panels(study, figures), &study == &run.studies.front());
   return section;
 }

@@ -166,7 +166,7 @@ Html dependence_section(const RunFiles& run, FigureSheet& figures) {
       "for the number of tests (Holm).",
       window_s ? fmt::format(" of {:g} s", *window_s) : ""));
   section += list_of_remarks(run, run.dependence);
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     const Html clear = dependence_table(run, study.name, true);
     section += element("h3", text(study.name));
     section += clear.empty() ? paragraph("No parameter follows the motion clear of chance.") : clear;

@@ -24,7 +24,7 @@ double largest_of(const BinnedSignals& signals, std::size_t signal) {
 
 /// Times at rest, from the first S-IMU that has errors: all of them share the vehicle.
 std::vector<Stretch> standstills(const RunFiles& run) {
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     if (study.errors) return study.static_stretches;
   }
   return {};
@@ -80,8 +80,8 @@ Html drive_section(const RunFiles& run, FigureSheet& figures) {
   constexpr double kKmhPerMps = 3.6;
   section +=
       paragraph(fmt::format("{:.2f} km in {}, at most {:.0f} km/h. The map's origin is at latitude {:.5f} "
-                            "deg, longitude {:.5f} deg. Largest sd of the "
-                            "position: {:.2f} m north, {:.2f} m east, {:.2f} m down.",
+                            "deg, longitude {:.5f} deg. "
+                            "Largest sd of the position: {:.2f} m north, {:.2f} m east, {:.2f} m down.",
                             run.distance_m / kMetresPerKm,
                             duration_words(navigation.time_s(navigation.size() - 1) - navigation.time_s(0)),
                             kKmhPerMps * largest_of(navigation, kSpeed_mps), run.origin_deg[0],

@@ -115,7 +115,7 @@ std::vector<double> thinned(const std::vector<double>& values) {
   return kept;
 }
 
-Html scatter_panels(const StudyFiles& study, FigureSheet& figures) {
+Html scatter_panels(const SImuFiles& study, FigureSheet& figures) {
   std::array<std::size_t, kScatterCovariates> x_columns{};
   std::array<std::size_t, kScatterErrors> y_columns{};
   for (std::size_t i = 0; i < x_columns.size(); ++i)
@@ -141,7 +141,7 @@ Html scatter_panels(const StudyFiles& study, FigureSheet& figures) {
 }
 
 /// "gyroscope z against angular rate, r = 0.41": the strongest of the figure's pairs.
-std::string strongest_pair(const StudyFiles& study) {
+std::string strongest_pair(const SImuFiles& study) {
   std::string words;
   double strongest = 0.0;
   for (const Pair& pair : kPairs) {
@@ -170,13 +170,13 @@ std::vector<std::string> axes_that_depend(const json& regressions, const std::st
 Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
   Html section = heading("motion", "Figure 3: errors against the motion");
   const bool any = std::any_of(run.studies.begin(), run.studies.end(),
-                               [](const StudyFiles& study) { return study.scatter.has_value(); });
+                               [](const SImuFiles& study) { return study.scatter.has_value(); });
   if (any) {
     section += paragraph(
         "Samples spread evenly over the drive: the error of an axis against the motion about or along the "
         "same axis. r: correlation of the points shown.");
   }
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     if (study.scatter) section += fold(study.name + strongest_pair(study), scatter_panels(study, figures));
   }
   if (!any) section += paragraph("No scatter_NAME.csv in this run: the figure is left out.");
@@ -196,7 +196,7 @@ Html dynamics_section(const RunFiles& run, FigureSheet& figures) {
   for (const auto& remark : run.regression_remarks) {
     if (remark.is_string()) section += paragraph(remark.get<std::string>(), "note");
   }
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     const auto axes = axes_that_depend(run.regressions, study.name);
     const std::string words = axes.empty()
                                   ? study.name + ": nothing of the sensor's own stands out on any axis"

@@ -18,7 +18,7 @@ using tables::text_at;
 
 const char* signal_unit(std::size_t signal) { return signal < kTriad ? "deg/s" : "m/s²"; }
 
-Html error_panels(const StudyFiles& study, FigureSheet& figures) {
+Html error_panels(const SImuFiles& study, FigureSheet& figures) {
   Html panels;
   for (std::size_t signal = 0; signal < kErrorSignals; ++signal) {
     Figure figure;
@@ -35,7 +35,7 @@ Html error_panels(const StudyFiles& study, FigureSheet& figures) {
 Html rms_table(const RunFiles& run) {
   Table table({text("root mean square"), text("gyro x, deg/s"), text("y"), text("z"), text("accel x, m/s²"),
                text("y"), text("z"), text("samples")});
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     if (!study.errors) continue;
     std::vector<Html> row{text(study.name)};
     for (const double rms : study.rms) row.push_back(number(rms, 3));
@@ -240,7 +240,7 @@ Html overview_table(const RunFiles& run, const std::vector<Fit>& fits,
   headings.push_back(text("model"));
   headings.push_back(text("against the data"));
   Table table(std::move(headings));
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     table.add_group(text(study.name));
     std::vector<std::vector<noise::AxisFit>> walks;
     for (const std::string& regime : regimes) walks.push_back(axis_fits(run, study.name, regime));
@@ -311,7 +311,7 @@ Html errors_section(const RunFiles& run, FigureSheet& figures) {
       "band: smallest to largest sample in it; darker ground: at rest. Where there is a gap in the "
       "record there is a gap in the line.");
   section += rms_table(run);
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     section +=
         fold(study.name,
              study.errors
@@ -332,7 +332,7 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
       "Haar wavelet variance of the error signals at the scales τ, in s: points with their 95 % intervals; "
       "line: the variance that the fitted model implies; dashed: its processes one by one. Where the line "
       "leaves the intervals the model does not explain the signal.");
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     section +=
         fold(study.name, wavelet_panels(fits, study.name, regimes, figures), &study == &run.studies.front());
   }
@@ -345,7 +345,7 @@ Html models_section(const RunFiles& run, const std::vector<Fit>& fits, FigureShe
                  : paragraph(
                        "Whether rest and motion differ is tested with all parameters of an axis together, "
                        "corrected for the number of tests (Holm); “no difference shown” is not “equal”.");
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     section += fold(
         fmt::format("Every parameter of {}, with 95 % intervals", study.name),
         paragraph(

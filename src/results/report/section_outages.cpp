@@ -75,7 +75,7 @@ Html outages_section(const RunFiles& run) {
       "freedom: 1 where the model is right; ▲ the filter trusts itself too much, ▼ too little. Surprise: "
       "mean −log density of the position error; the model with the smallest predicts best. Outages: "
       "those that do not overlap / all.");
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     section +=
         element("h3", text(study.name)) + outage_table(run, study.name) + absent_models(run, study.name);
   }

@@ -54,7 +54,7 @@ Html tiles(const RunFiles& run, const std::vector<Fit>& fits) {
 }
 
 /// Largest of three sd, in another unit.
-std::string largest_words(const StudyFiles& study, const char* key, double factor, const char* unit) {
+std::string largest_words(const SImuFiles& study, const char* key, double factor, const char* unit) {
   const auto sd = numbers_at<3>(study.calibration, key);
   if (!sd) return "?";
   return fmt::format("{:.2g} {}", factor * std::max({(*sd)[0], (*sd)[1], (*sd)[2]}), unit);
@@ -63,7 +63,7 @@ std::string largest_words(const StudyFiles& study, const char* key, double facto
 Html drawing(const RunFiles& run) {
   std::vector<DrawnImu> imus;
   std::string known;
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     const auto C_b_s = numbers_at<9>(study.calibration, "C_b_s");
     const auto r_bs_b_m = numbers_at<3>(study.calibration, "r_bs_b_m");
     if (!C_b_s || !r_bs_b_m) continue;

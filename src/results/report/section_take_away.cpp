@@ -94,7 +94,7 @@ Html take_away_section(const RunFiles& run, const std::vector<Fit>& all_fits) {
       "writes the same as files, the whole model as state space, and with --conservative the upper ends of "
       "the intervals. What does not hold is not written, with the reason in its place.");
   std::vector<std::pair<std::string, std::string>> parts;
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     for (const std::string& regime : particular_regimes(regimes_of(all_fits)))
       parts.emplace_back(study.name, regime);
   }

@@ -8,6 +8,7 @@
 
 #include "base/calibration_levels.h"
 #include "base/digits.h"
+#include "base/manoeuvres.h"
 #include "base/units.h"
 #include "results/report/mounting.h"
 #include "results/report/people.h"
@@ -41,7 +42,7 @@ struct Accuracy {
   std::optional<double> time_offset_ms;
 };
 
-Accuracy accuracy_of(const StudyFiles& study) {
+Accuracy accuracy_of(const SImuFiles& study) {
   Accuracy accuracy;
   accuracy.boresight_deg = largest(numbers_at<3>(study.calibration, "boresight_sd_deg"));
   accuracy.lever_arm_mm = largest(numbers_at<3>(study.calibration, "r_bs_b_sd_m"));
@@ -58,7 +59,7 @@ std::string direction_words(const std::string& direction) {
 }
 
 /// Names of what the run says it has not observed.
-std::vector<std::string> not_observed(const StudyFiles& study) {
+std::vector<std::string> not_observed(const SImuFiles& study) {
   std::vector<std::string> names;
   for (const auto& [name, observed] : field(study.calibration, "observable").items()) {
     if (observed == nlohmann::json(false)) names.push_back(name);
@@ -73,7 +74,7 @@ std::vector<std::string> words_of(const std::vector<std::string>& directions) {
 }
 
 /// One kind of sd beside what makes a mounting usable (base/calibration_levels.h).
-struct Usability {
+struct SdBesideLimit {
   const char* what;
   std::optional<double> sd;
   double usable;
@@ -84,26 +85,25 @@ constexpr double kUsableBoresightSd_deg = kUsableBoresightSd_rad * kDegPerRad;
 constexpr double kUsableLeverArmSd_mm = kUsableLeverArmSd_m * kMmPerM;
 constexpr double kUsableTimeOffsetSd_ms = kUsableTimeOffsetSd_s * kMsPerS;
 
-std::array<Usability, 3> usability_of(const StudyFiles& study) {
+std::array<SdBesideLimit, 3> sds_beside_limits(const SImuFiles& study) {
   const Accuracy accuracy = accuracy_of(study);
-  return {Usability{"boresight", accuracy.boresight_deg, kUsableBoresightSd_deg, "deg"},
-          Usability{"lever arm", accuracy.lever_arm_mm, kUsableLeverArmSd_mm, "mm"},
-          Usability{"time offset", accuracy.time_offset_ms, kUsableTimeOffsetSd_ms, "ms"}};
+  return {SdBesideLimit{"boresight", accuracy.boresight_deg, kUsableBoresightSd_deg, "deg"},
+          SdBesideLimit{"lever arm", accuracy.lever_arm_mm, kUsableLeverArmSd_mm, "mm"},
+          SdBesideLimit{"time offset", accuracy.time_offset_ms, kUsableTimeOffsetSd_ms, "ms"}};
 }
 
-imuscope::Usability usability(const StudyFiles& study) {
+Usability usability(const SImuFiles& study) {
   constexpr double kUnknownSd = std::numeric_limits<double>::quiet_NaN();
   const Accuracy accuracy = accuracy_of(study);
-  const auto by_sd = imuscope::usability_of(accuracy.boresight_deg.value_or(kUnknownSd) * kRadPerDeg,
-                                            accuracy.lever_arm_mm.value_or(kUnknownSd) / kMmPerM,
-                                            accuracy.time_offset_ms.value_or(kUnknownSd) / kMsPerS);
-  if (by_sd == imuscope::Usability::kUsable && !not_observed(study).empty())
-    return imuscope::Usability::kWithLimits;
+  const auto by_sd = usability_of(accuracy.boresight_deg.value_or(kUnknownSd) * kRadPerDeg,
+                                  accuracy.lever_arm_mm.value_or(kUnknownSd) / kMmPerM,
+                                  accuracy.time_offset_ms.value_or(kUnknownSd) / kMsPerS);
+  if (by_sd == Usability::kUsable && !not_observed(study).empty()) return Usability::kWithLimits;
   return by_sd;
 }
 
 /// Largest error against truth.json in units of its sd; empty where either is not known.
-std::optional<double> worst_error_sd(const StudyFiles& study) {
+std::optional<double> worst_error_sd(const SImuFiles& study) {
   std::optional<double> worst;
   const auto take = [&](double error, double sd) {
     if (sd > 0.0) worst = std::max(worst.value_or(0.0), std::abs(error) / sd);
@@ -124,9 +124,9 @@ std::optional<double> worst_error_sd(const StudyFiles& study) {
   return worst;
 }
 
-std::string accuracy_sentence(const StudyFiles& study) {
+std::string accuracy_sentence(const SImuFiles& study) {
   std::vector<std::string> parts;
-  for (const Usability& part : usability_of(study)) {
+  for (const SdBesideLimit& part : sds_beside_limits(study)) {
     if (!part.sd) {
       parts.push_back(fmt::format("{} unknown", part.what));
     } else {
@@ -194,28 +194,25 @@ void manoeuvres(const RunFiles& run, std::vector<std::string>& steps) {
   bool turns = false;
   bool brakes = false;
   bool rough = false;
-  for (const StudyFiles& study : run.studies) {
+  for (const SImuFiles& study : run.studies) {
     const auto missing = not_observed(study);
     const auto misses = [&](std::string_view name) {
       return std::find(missing.begin(), missing.end(), name) != missing.end();
     };
-    const auto parts = usability_of(study);
+    const auto parts = sds_beside_limits(study);
     const auto short_of = [&](std::size_t i) { return parts[i].sd && *parts[i].sd > parts[i].usable; };
     turns = turns || misses("psi_x") || misses("psi_y") || misses("r_x") || misses("r_y") || misses("t_d") ||
             short_of(0) || short_of(1) || short_of(2);
     brakes = brakes || misses("psi_z") || short_of(0);
     rough = rough || misses("r_z") || short_of(1);
   }
-  if (turns) {
-    steps.emplace_back(
-        "Drive figures of eight or roundabouts both ways at 0.3 to 0.5 rad/s: turning shows the boresight "
-        "about the level axes, the level lever arm and the time offset.");
-  }
-  if (brakes)
-    steps.emplace_back(
-        "Brake and start firmly, some six times: it shows the boresight about the vertical axis.");
-  if (rough)
-    steps.emplace_back("Include a piece of rough road: pitching and rolling shows the vertical lever arm.");
+  const auto advise = [&](const char* what, const char* manoeuvre) {
+    steps.push_back(fmt::format("To show {}: {}.", what, manoeuvre));
+  };
+  if (turns)
+    advise("the boresight about the level axes, the level lever arm and the time offset", kTurnBothWays);
+  if (brakes) advise("the boresight about the vertical axis", kBrakeFirmly);
+  if (rough) advise("the vertical lever arm", kRoughRoad);
 }
 
 void device_steps(const RunFiles& run, std::vector<std::string>& steps) {
@@ -227,9 +224,8 @@ void device_steps(const RunFiles& run, std::vector<std::string>& steps) {
     if (samples_lost > 0.0) what.push_back(fmt::format("{:.0f} samples lost", samples_lost));
     if (bad_checksums > 0.0)
       what.push_back(fmt::format("{:.0f} frames with a wrong checksum", bad_checksums));
-    steps.push_back(
-        fmt::format("Look after device {}: {} (cable, baud rate, reception, load of the computer).",
-                    text_at(device, "name"), fmt::join(what, ", ")));
+    steps.push_back(fmt::format("See to device {}: {} (cable, baud rate, reception, load of the computer).",
+                                text_at(device, "name"), fmt::join(what, ", ")));
   }
 }
 
@@ -325,10 +321,10 @@ Verdict calibration_verdict(const RunFiles& run) {
   }
   std::size_t usable = 0;
   std::size_t not_usable = 0;
-  for (const StudyFiles& study : run.studies) {
-    const imuscope::Usability of_study = usability(study);
-    if (of_study == imuscope::Usability::kUsable) ++usable;
-    if (of_study == imuscope::Usability::kNotUsable) ++not_usable;
+  for (const SImuFiles& study : run.studies) {
+    const Usability of_study = usability(study);
+    if (of_study == Usability::kUsable) ++usable;
+    if (of_study == Usability::kNotUsable) ++not_usable;
     verdict.reasons.push_back(accuracy_sentence(study));
   }
   const std::size_t n = run.studies.size();
@@ -345,7 +341,7 @@ Verdict calibration_verdict(const RunFiles& run) {
                : fmt::format("Usable with limits: {} of {} S-IMUs are usable, {} with limits, {} not.",
                              usable, n, n - usable - not_usable, not_usable);
   }
-  const bool overconfident = std::any_of(run.studies.begin(), run.studies.end(), [](const StudyFiles& study) {
+  const bool overconfident = std::any_of(run.studies.begin(), run.studies.end(), [](const SImuFiles& study) {
     return worst_error_sd(study).value_or(0.0) > kSdMax;
   });
   if (overconfident && verdict.answer == Answer::kYes) {

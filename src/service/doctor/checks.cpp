@@ -173,7 +173,7 @@ std::vector<Finding> check_unit(const fs::path& root) {
   if (fs::is_symlink(fs::symlink_status(wanted, ignored)))
     return {{"start", Verdict::kGood, "the service starts with the PC", {}}};
   return {{"start", Verdict::kWarning, "the service is installed and does not start with the PC",
-           "systemctl enable imuscope, where it shall record every drive (docs/vehicle.md)"}};
+           "systemctl enable imuscope, where it is to record every drive (docs/vehicle.md)"}};
 }
 
 Finding check_wall_clock(UtcTime now) {
@@ -199,7 +199,7 @@ std::vector<Finding> check_metrics(const MetricsOptions& options) {
   if (is_loopback) return {{"metrics", Verdict::kGood, what, {}}};
   return {{"metrics", Verdict::kWarning,
            fmt::format("{}; everybody on that network may read names, rates and alarms", what),
-           "leave out address in [metrics] where only this PC shall read them"}};
+           "leave out address in [metrics] where only this PC is to read them"}};
 }
 
 Finding check_line(const std::string& device, const Result<void>& opened) {

@@ -23,8 +23,7 @@ class MetricsServer {
 
   /// Listens, and answers from a thread of its own.
   /// @param address  numeric, IPv4 or IPv6. On a loopback address requests whose Host is another name are
-  /// refused:
-  ///                 a page in a browser may have its name lead here.
+  ///                 refused: a page in a browser may have its name lead here.
   /// @return kUsage for what is no address, kWork where it cannot be listened to
   static Result<std::unique_ptr<MetricsServer>> open(const std::string& address, std::uint16_t port,
                                                      const StatusBoard& board);

@@ -25,8 +25,8 @@ struct FoundDevice {
   bool is_flu = false;
 };
 
-/// Roles: GNSS protocols are gnss; of the IMUs the first StdBin unit, else the first at all, is the
-/// reference, the others are under study.
+/// Roles: GNSS protocols are gnss; of the IMUs the first StdBin unit, else the first of any kind, is
+/// the reference, the others are under study.
 /// @return TOML that load_configuration() takes
 /// Errors (kWork): fewer than two IMUs, more of a kind than a run can have
 Result<std::string> draft_configuration(const std::string& run_name, const std::vector<FoundDevice>& devices);

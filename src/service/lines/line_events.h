@@ -1,7 +1,7 @@
 #pragma once
 
-/// Waits for bytes on lines until an instant. Core: no allocation, no lock; never turns without waiting,
-/// whatever the kernel answers.
+/// Waits for bytes on lines until an instant. Core: no allocation, no lock; never spins, whatever the
+/// kernel answers.
 
 #include <sys/epoll.h>
 #include <span>

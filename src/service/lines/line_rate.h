@@ -18,7 +18,7 @@ struct LineRate {
 [[nodiscard]] LineRate line_rate(const DeviceConfig& device);
 
 /// Bytes of the ring to the recorder that holds what these devices bring while the disk stands still for
-/// kRecordStall_s (capture/raw_chunk.h).
+/// kRecordStall_s (base/limits.h).
 [[nodiscard]] std::size_t raw_ring_bytes(std::span<const DeviceConfig> devices);
 
 }  // namespace imuscope

@@ -47,7 +47,7 @@ Vector3 assumed(const TriadNoise& noise, double rate_hz) {
   return variance;
 }
 
-std::array<bag::WhiteVariance, kRegimeCount> assumed_variances(const StudyConfig& study) {
+std::array<bag::WhiteVariance, kRegimeCount> assumed_variances(const SImuConfig& study) {
   std::array<bag::WhiteVariance, kRegimeCount> variances;
   for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
     variances[regime] = {assumed(study.noise.gyro[regime], study.rate_hz),
@@ -56,7 +56,7 @@ std::array<bag::WhiteVariance, kRegimeCount> assumed_variances(const StudyConfig
   return variances;
 }
 
-bag::Correction correction_of(const StudyOutput& study) {
+bag::Correction correction_of(const SImuOutput& study) {
   return {study.C_b_s,      study.gyro_bias_radps, study.accel_bias_mps2,
           study.gyro_scale, study.accel_scale,     study.t_d_s};
 }
@@ -214,7 +214,7 @@ void LiveBag::write_mountings() {
   if (!last_ || last_->time_scale.source == UtcSource::kNone) return;
   std::vector<bag::Mounting> mountings;
   for (std::size_t i = 0; i < last_->n_studies; ++i) {
-    const StudyOutput& study = last_->studies[i];
+    const SImuOutput& study = last_->studies[i];
     if (!has_estimate(study.status)) continue;
     mountings.push_back({configuration_.devices[study_devices_[i]].name, study.C_b_s, study.r_bs_b_m,
                          study.t_d_s, study.sd_psi_rad, study.sd_r_bs_b_m, study.sd_t_d_s,
@@ -278,7 +278,7 @@ void LiveBag::write_samples(bool at_end) {
     writer_.add_sample(sample, utc_ns, configured_variance(configuration_.devices[sample.device].noise));
     if (sample.kind != SampleKind::kImu) continue;
     for (std::size_t i = 0; i < last_->n_studies; ++i) {
-      const StudyOutput& study = last_->studies[i];
+      const SImuOutput& study = last_->studies[i];
       if (study_devices_[i] == sample.device && has_estimate(study.status))
         writer_.add_corrected(sample, utc_ns, correction_of(study),
                               variances_[i][static_cast<std::size_t>(study.regime)]);

@@ -107,7 +107,7 @@ Result<std::unique_ptr<LivePublisher>> LivePublisher::create(const Configuration
                                                              CoreThread& estimator) {
   std::unique_ptr<LivePublisher> publisher(
       new LivePublisher(configuration, std::move(spec), options, io, estimator));
-  std::vector<StudyFileInfo> infos;
+  std::vector<SImuFileInfo> infos;
   for (const auto index : publisher->study_devices_)
     infos.push_back({configuration.devices[index].name, 0.0});
   auto folder = RunFolder::create(options.out, std::move(infos), true);
@@ -122,7 +122,7 @@ Result<void> LivePublisher::smooth(LiveHistory& history, const EstimatorConfig& 
   std::vector<std::uint32_t> blocks;
   for (const auto& study : estimator.studies) blocks.push_back(study.blocks);
   smoothing_.emplace(history, blocks);
-  std::vector<StudyFileInfo> infos;
+  std::vector<SImuFileInfo> infos;
   for (const auto index : study_devices_) infos.push_back({configuration_.devices[index].name, 0.0});
   return smoothing_->open(folder_->folder(), std::move(infos));
 }
@@ -418,7 +418,7 @@ void LivePublisher::fill_device(std::size_t index, device_status_t& device, Host
   device.samples_lost = as_count(line.counters.samples_lost);
   device.samples_refused = as_count(line.refused);
   device.clock_resets = as_count(line.counters.clock_resets);
-  const StudyOutput* const study = study_of(index);
+  const SImuOutput* const study = study_of(index);
   if (study != nullptr) device.samples_late = as_count(study->counters.late);
   set_time_budget(time_budget(line, study, configuration_.devices[index].role,
                               last_ ? last_->time_scale.pulses : PulseState{}),
@@ -426,7 +426,7 @@ void LivePublisher::fill_device(std::size_t index, device_status_t& device, Host
 }
 
 /// The newest estimate of an S-IMU; null for other devices and before the first.
-const StudyOutput* LivePublisher::study_of(std::size_t index) const {
+const SImuOutput* LivePublisher::study_of(std::size_t index) const {
   const auto study = std::find(study_devices_.begin(), study_devices_.end(), index);
   if (!last_ || study == study_devices_.end()) return nullptr;
   return &last_->studies[static_cast<std::size_t>(study - study_devices_.begin())];
@@ -490,7 +490,7 @@ status_t LivePublisher::status(HostTime now) {
   for (std::size_t i = 0; i < lines_.size(); ++i) fill_device(i, status.devices[i], now);
   for (std::size_t i = 0; i < study_devices_.size(); ++i) {
     status.studies.push_back(study_status(configuration_.devices[study_devices_[i]].name,
-                                          last_ ? last_->studies[i] : StudyOutput{}));
+                                          last_ ? last_->studies[i] : SImuOutput{}));
   }
   add_threads(status, now);
   add_rings(status);

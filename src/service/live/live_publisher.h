@@ -91,7 +91,7 @@ class LivePublisher {
   void watch_devices(HostTime now);
   void watch_pc_clock(HostTime now);
   void publish_status(HostTime now);
-  [[nodiscard]] const StudyOutput* study_of(std::size_t index) const;
+  [[nodiscard]] const SImuOutput* study_of(std::size_t index) const;
   [[nodiscard]] std::string problem_of(std::size_t device, HostTime now);
   [[nodiscard]] UtcTime utc_at(HostTime time) const;
   [[nodiscard]] status_t status(HostTime now);

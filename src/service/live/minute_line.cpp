@@ -22,7 +22,7 @@ std::string vehicle_words(const NavigationOutput& navigation) {
   return fmt::format("{:.0f} km/h, position {:.2g} m", speed_kmh, largest(navigation.sd_position_m));
 }
 
-std::string study_words(const std::string& name, const StudyOutput& study) {
+std::string study_words(const std::string& name, const SImuOutput& study) {
   if (!has_estimate(study.status)) return fmt::format("{} {}", name, words_of(study.status));
   return fmt::format("{} boresight {:.2g} deg, lever arm {:.2g} mm, time {:.2g} ms", name,
                      kDegPerRad * largest(study.sd_psi_rad), kMmPerM * largest(study.sd_r_bs_b_m),

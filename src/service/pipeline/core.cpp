@@ -11,7 +11,7 @@ namespace {
 
 std::size_t ring_capacity_of(const EstimatorConfig& config, std::size_t device) noexcept {
   if (device == config.reference.device) return sample_ring_capacity(config.reference.rate_hz);
-  for (const StudyConfig& study : config.studies) {
+  for (const SImuConfig& study : config.studies) {
     if (study.device == device) return sample_ring_capacity(study.rate_hz);
   }
   return sample_ring_capacity(kCommonRate_hz);  // GNSS and wheels send no faster
@@ -31,7 +31,7 @@ Core::Core(const EstimatorConfig& config, std::size_t n_devices, CoreSchedule sc
   for (std::size_t i = 0; i < n_devices; ++i) {
     rings_.push_back(std::make_unique<SampleRing>(ring_capacity_of(config, i)));
     is_study_.push_back(std::any_of(config.studies.begin(), config.studies.end(),
-                                    [i](const StudyConfig& study) { return study.device == i; }));
+                                    [i](const SImuConfig& study) { return study.device == i; }));
   }
   reaches_.resize(n_devices);
   for (std::size_t i = 0; i < config.studies.size(); ++i)
@@ -204,7 +204,7 @@ void Core::take_snapshot(std::int64_t index, HostTime cut) noexcept {
   snapshot_.has_new_odometry = odometry.has_speed && odometry.time != snapshot_.odometry.time;
   snapshot_.odometry = odometry;
   for (std::size_t i = 0; i < snapshot_.n_studies; ++i) {
-    const StudyOutput& study = estimator_.study(i);
+    const SImuOutput& study = estimator_.study(i);
     snapshot_.has_new_study[i] = has_estimate(study.status) && study.time != snapshot_.studies[i].time;
     snapshot_.studies[i] = study;
   }

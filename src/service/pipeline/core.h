@@ -48,11 +48,11 @@ struct Snapshot {
   /// nor sent.
   bool has_new_navigation;
   bool has_new_odometry;
-  std::array<bool, kMaxStudies> has_new_study;
+  std::array<bool, kMaxSImus> has_new_study;
   NavigationOutput navigation;
   OdometryOutput odometry;
   ImuData reference;  ///< newest sample of the R-IMU as measured; zero before the first
-  std::array<StudyOutput, kMaxStudies> studies;
+  std::array<SImuOutput, kMaxSImus> studies;
   EstimatorCounters counters;
 };
 static_assert(std::is_trivially_copyable_v<Snapshot>);
@@ -90,7 +90,7 @@ struct LateSample {
 /// A noise model on its way from a refit to the estimator.
 struct NewNoise {
   std::int64_t samples;  ///< of the S-IMU's error process that the refit had seen
-  StudyNoise noise;
+  SImuNoise noise;
   std::int64_t version = 0;  ///< counts the models given back to this S-IMU's filter, from 1
 };
 static_assert(std::is_trivially_copyable_v<NewNoise>);
@@ -115,7 +115,7 @@ class CoreSink {
   virtual ~CoreSink() = default;
   /// One S sample of a calibrated S-IMU. Unless overridden, its row goes to on_error(), made with the
   /// estimate as it stands.
-  virtual void on_epoch(const StudyEpoch& epoch, const TickFacts& facts) noexcept {
+  virtual void on_epoch(const SImuEpoch& epoch, const TickFacts& facts) noexcept {
     on_error({epoch.study,
               facts.first_reference_time,
               live_error_row(epoch),
@@ -154,8 +154,7 @@ class Core {
   /// Producer side of device `device`'s ring.
   [[nodiscard]] SampleRing& ring(DeviceIndex device) noexcept { return *rings_[device]; }
 
-  /// Hands in the noise model of a refit; the next tick takes over the newest. Thread: one, of the soft
-  /// world.
+  /// Hands in the noise model of a refit; the next tick takes over the newest. Thread: one, non-real-time.
   void offer_noise(std::size_t study, const NewNoise& model) noexcept { noises_[study]->write(model); }
 
   /// What the PC's clock showed (Estimator). Call before the first tick.

@@ -57,17 +57,17 @@ void set_bias(const std::optional<double>& sd, const std::optional<double>& tau_
 std::uint32_t blocks_of(FilterStates states) {
   switch (states) {
     case FilterStates::kRigid:
-      return kFullStudyBlocks;
+      return kFullSImuBlocks;
     case FilterStates::kPaper:
-      return kPaperStudyBlocks;
+      return kPaperSImuBlocks;
     case FilterStates::kFull:
       break;
   }
-  return kCompleteStudyBlocks;
+  return kCompleteSImuBlocks;
 }
 
-StudyConfig study_config(const DeviceConfig& device, std::size_t index, FilterStates states) {
-  StudyConfig study;
+SImuConfig study_config(const DeviceConfig& device, std::size_t index, FilterStates states) {
+  SImuConfig study;
   study.device = static_cast<DeviceIndex>(index);
   study.rate_hz = device.rate_hz;
   study.average_samples = device.average_samples;
@@ -156,8 +156,8 @@ EstimatorConfig estimator_config(const Configuration& configuration) {
   return config;
 }
 
-StudyConfig with_mounting(StudyConfig study, const KnownMounting& known) {
-  study.blocks = kBiasStudyBlocks;
+SImuConfig with_mounting(SImuConfig study, const KnownMounting& known) {
+  study.blocks = kBiasSImuBlocks;
   study.prior_C_b_s = known.C_b_s;
   study.prior_r_bs_b_m = known.r_bs_b_m;
   study.prior_t_d_s = known.t_d_s;

@@ -22,6 +22,6 @@ struct KnownMounting {
 
 /// The S-IMU with its mounting, time offset and scales known and its biases free, so that the reference is
 /// evaluated at the right instant from the first sample on.
-StudyConfig with_mounting(StudyConfig study, const KnownMounting& known);
+SImuConfig with_mounting(SImuConfig study, const KnownMounting& known);
 
 }  // namespace imuscope

@@ -104,7 +104,7 @@ Refit ModelBook::fit(std::size_t index) {
   refit.time = study.last_time;
   refit.utc = study.last_utc;
   refit.first_reference_time = study.first_reference_time;
-  refit.motion = study.motion.message();
+  refit.motion = study.motion.summary();
   refit.samples = study.samples;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {

@@ -18,8 +18,8 @@
 
 namespace imuscope {
 
-/// Refits fall due by sample count. Memory is bounded: one
-/// streaming wavelet variance of 16 levels (512 KiB) an axis and regime, whatever the length of the run.
+/// Refits fall due by sample count. Memory is bounded: one streaming wavelet variance of 16 levels (544 KiB)
+/// per axis and regime, whatever the length of the run.
 ///
 /// A refit starts from the earlier model; a search over all rates is made at the first, whenever the samples
 /// have doubled, and after a change. What came in since the last refit is held against the model of before: a

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
-
-#include "publish/message_values.h"
 
 namespace imuscope {
 
@@ -20,22 +17,19 @@ void MotionSums::add(double prediction, double error) noexcept {
   largest_p_ = std::max(largest_p_, std::abs(prediction));
 }
 
-axis_dynamics_t MotionSums::message() const {
-  axis_dynamics_t message{};
-  for (double* unknown : {&message.mean, &message.rms, &message.largest, &message.slope, &message.slope_sd,
-                          &message.correlation, &message.r2, &message.f, &message.p_value})
-    *unknown = kUnknown;
-  if (n_ == 0.0) return message;
-  message.mean = mean_p_;
-  message.rms = std::sqrt(sum_pp_ / n_);
-  message.largest = largest_p_;
+MotionFit MotionSums::fit() const {
+  MotionFit fit;
+  if (n_ == 0.0) return fit;
+  fit.mean = mean_p_;
+  fit.rms = std::sqrt(sum_pp_ / n_);
+  fit.largest = largest_p_;
   constexpr double kParameters = 2.0;  // slope and constant
-  if (n_ <= kParameters || sum_pp_ <= 0.0) return message;
-  message.slope = sum_pe_ / sum_pp_;
-  const double residual = std::max(0.0, sum_ee_ - message.slope * sum_pe_);
-  message.slope_sd = std::sqrt(residual / (n_ - kParameters) / sum_pp_);
-  if (sum_ee_ > 0.0) message.correlation = sum_pe_ / std::sqrt(sum_pp_ * sum_ee_);
-  return message;
+  if (n_ <= kParameters || sum_pp_ <= 0.0) return fit;
+  fit.slope = sum_pe_ / sum_pp_;
+  const double residual = std::max(0.0, sum_ee_ - fit.slope * sum_pe_);
+  fit.slope_sd = std::sqrt(residual / (n_ - kParameters) / sum_pp_);
+  if (sum_ee_ > 0.0) fit.correlation = sum_pe_ / std::sqrt(sum_pp_ * sum_ee_);
+  return fit;
 }
 
 MotionBook::MotionBook() : regressions_(kAxisCount, RegressionSums(1, kCovariates)) {}
@@ -61,35 +55,21 @@ void MotionBook::add_to_regression(const ErrorRow& row) {
   for (std::size_t i = 0; i < kCovariates; ++i) covariates_[i].add(x[i], 0.0);
 }
 
-dynamics_t MotionBook::message() const {
-  dynamics_t message{};
-  message.n_static = rows_[static_cast<std::size_t>(Regime::kStatic)];
-  message.n_dynamic = rows_[static_cast<std::size_t>(Regime::kDynamic)];
+MotionSummary MotionBook::summary() const {
+  MotionSummary summary;
+  summary.n_static = rows_[static_cast<std::size_t>(Regime::kStatic)];
+  summary.n_dynamic = rows_[static_cast<std::size_t>(Regime::kDynamic)];
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    axis_dynamics_t motion = axes_[axis].message();
-    motion.axis = axis_name(axis);
-    motion.unit = axis_unit(axis);
+    MotionFit& fit = summary.axes[axis];
+    fit = axes_[axis].fit();
     if (const auto regression = regressions_[axis].solve()) {
-      motion.r2 = regression->r2;
-      motion.f = regression->f;
-      motion.p_value = regression->p_value;
+      fit.r2 = regression->r2;
+      fit.f = regression->f;
+      fit.p_value = regression->p_value;
     }
-    message.axes.push_back(std::move(motion));
   }
-  message.n_axes = element_count(message.axes);
-  if (message.n_dynamic == 0) return message;
-  for (std::size_t i = 0; i < kCovariates; ++i) {
-    const axis_dynamics_t motion = covariates_[i].message();
-    covariate_motion_t covariate{};
-    covariate.name = covariate_name(i);
-    covariate.unit = covariate_unit(i);
-    covariate.mean = motion.mean;
-    covariate.rms = motion.rms;
-    covariate.largest = motion.largest;
-    message.covariates.push_back(std::move(covariate));
-  }
-  message.n_covariates = element_count(message.covariates);
-  return message;
+  for (std::size_t i = 0; i < kCovariates; ++i) summary.covariates[i] = covariates_[i].fit();
+  return summary;
 }
 
 }  // namespace imuscope

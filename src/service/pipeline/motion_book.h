@@ -4,7 +4,7 @@
 
 #include <array>
 #include <cstdint>
-#include <imuscope/dynamics_t.hpp>
+#include <limits>
 #include <vector>
 
 #include "estimation/error_process/error_row.h"
@@ -14,14 +14,35 @@
 
 namespace imuscope {
 
+/// Motion about or along one axis, and how the error follows it; NaN: unknown. Units: those of the axis.
+struct MotionFit {
+  static constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  double mean = kNone;         ///< of the prediction, as the next two
+  double rms = kNone;          ///< about the mean
+  double largest = kNone;      ///< absolute
+  double slope = kNone;        ///< of the error on the prediction
+  double slope_sd = kNone;     ///< as for white errors
+  double correlation = kNone;  ///< of error and prediction
+  double r2 = kNone;           ///< of the regression on all covariates, as the next two
+  double f = kNone;
+  double p_value = kNone;
+};
+
+/// The motion of one S-IMU.
+struct MotionSummary {
+  std::int64_t n_static = 0;   ///< samples at rest
+  std::int64_t n_dynamic = 0;  ///< in motion
+  std::array<MotionFit, kAxisCount> axes;
+  std::array<MotionFit, kCovariates> covariates;  ///< mean, rms, largest; known where n_dynamic > 0
+};
+
 /// Sums of (prediction p, error e) pairs about their running means (Welford), so that nothing cancels in a
 /// long run.
 class MotionSums {
  public:
   void add(double prediction, double error) noexcept;
-  /// Slope of e on p, least squares with a constant; its sd as for white errors. NaN where unknown; axis
-  /// and unit are left to the caller.
-  [[nodiscard]] axis_dynamics_t message() const;
+  /// Slope of e on p, least squares with a constant. What the regression on covariates says is left unknown.
+  [[nodiscard]] MotionFit fit() const;
 
  private:
   double n_ = 0.0;
@@ -39,8 +60,7 @@ class MotionBook {
   /// @param regime  that holds at the row, whatever the row says
   /// Thread: modeller. Allocates: never.
   void add(const ErrorRow& row, Regime regime);
-  /// name, utime, sequence and time_s are left to the caller.
-  [[nodiscard]] dynamics_t message() const;
+  [[nodiscard]] MotionSummary summary() const;
 
  private:
   /// Of the samples in motion every fifth enters the regression: neighbours tell the same of the motion.

@@ -70,8 +70,8 @@ void copy_fields(Message& message, Noise& noise, const Copy& copy) {
 
 }  // namespace
 
-StudyNoise updated_noise(const StudyNoise& current, const std::vector<AxisRefit>& axes) {
-  StudyNoise updated = current;
+SImuNoise updated_noise(const SImuNoise& current, const std::vector<AxisRefit>& axes) {
+  SImuNoise updated = current;
   for (const Regime regime : {Regime::kStatic, Regime::kDynamic}) {  // the later one's bias process stays
     for (const AxisRefit& refit : axes) {
       if (refit.regime != regime || !refit.fit) continue;
@@ -114,7 +114,7 @@ bool moved(const std::array<GaussMarkovConfig, 3>& now, const std::array<GaussMa
   return false;
 }
 
-bool moved(const StudyNoise& now, const StudyNoise& before) {
+bool moved(const SImuNoise& now, const SImuNoise& before) {
   for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
     if (moved(now.gyro[regime], before.gyro[regime]) || moved(now.accel[regime], before.accel[regime]))
       return true;
@@ -137,10 +137,10 @@ void raise(std::array<GaussMarkovConfig, 3>& bias, const std::array<GaussMarkovC
 
 }  // namespace
 
-NoiseFeedback::NoiseFeedback(const StudyNoise& configured, double floor_share)
+NoiseFeedback::NoiseFeedback(const SImuNoise& configured, double floor_share)
     : configured_(configured), in_force_(configured), floor_share_(floor_share) {}
 
-StudyNoise NoiseFeedback::floored(StudyNoise noise) const {
+SImuNoise NoiseFeedback::floored(SImuNoise noise) const {
   for (std::size_t regime = 0; regime < kRegimeCount; ++regime) {
     raise(noise.gyro[regime], configured_.gyro[regime], floor_share_);
     raise(noise.accel[regime], configured_.accel[regime], floor_share_);
@@ -151,9 +151,9 @@ StudyNoise NoiseFeedback::floored(StudyNoise noise) const {
 }
 
 std::optional<NewNoise> NoiseFeedback::consider(const Refit& refit) {
-  const StudyNoise proposed = updated_noise(in_force_, refit.axes);
+  const SImuNoise proposed = updated_noise(in_force_, refit.axes);
   const bool anything_new = !(proposed == in_force_);
-  const StudyNoise candidate = floored(proposed);
+  const SImuNoise candidate = floored(proposed);
   if (!anything_new || (version_ > 0 && !moved(candidate, in_force_))) return std::nullopt;
   in_force_ = candidate;
   ++version_;

@@ -16,7 +16,7 @@ namespace imuscope {
 /// the bias process (of the dynamic regime where there is one). Without its white noise a model says nothing
 /// of the noise. A variance more than a hundred times, or less than a hundredth, of the present one is not
 /// believed: the filter keeps what it has for that axis.
-[[nodiscard]] StudyNoise updated_noise(const StudyNoise& current, const std::vector<AxisRefit>& axes);
+[[nodiscard]] SImuNoise updated_noise(const SImuNoise& current, const std::vector<AxisRefit>& axes);
 
 /// Decides, refit by refit, what goes back to the filter of one S-IMU. Four rules keep the loop from talking
 /// the filter into confidence:
@@ -33,23 +33,23 @@ namespace imuscope {
 /// The tick boundary is the core's to keep: it takes a model over before anything of a tick is computed.
 class NoiseFeedback {
  public:
-  NoiseFeedback(const StudyNoise& configured, double floor_share);
+  NoiseFeedback(const SImuNoise& configured, double floor_share);
 
   /// What the estimator shall be given after this refit; nothing where what it has may stay.
   [[nodiscard]] std::optional<NewNoise> consider(const Refit& refit);
 
   /// Given out last, the configured one before that.
-  [[nodiscard]] const StudyNoise& in_force() const { return in_force_; }
+  [[nodiscard]] const SImuNoise& in_force() const { return in_force_; }
   [[nodiscard]] std::int64_t version() const { return version_; }
 
   static constexpr double kVarianceStep = 1.2;
   static constexpr double kBiasStep = 2.0;
 
  private:
-  [[nodiscard]] StudyNoise floored(StudyNoise noise) const;
+  [[nodiscard]] SImuNoise floored(SImuNoise noise) const;
 
-  StudyNoise configured_;
-  StudyNoise in_force_;
+  SImuNoise configured_;
+  SImuNoise in_force_;
   double floor_share_;
   std::int64_t version_ = 0;
 };

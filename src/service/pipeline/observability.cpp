@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/manoeuvres.h"
 #include "base/units.h"
 
 namespace imuscope {
@@ -35,19 +36,16 @@ const char* manoeuvre_for(std::size_t state) {
   switch (state) {
     case 0:
     case 1:
-      // Level boresight looks like an accelerometer bias until the yaw rate shows it through the gyroscopes.
-      return "turn in both directions, figures of eight or roundabouts at 20 to 30 deg/s";
+      return kTurnBothWays;
     case 2:
-      // Heading boresight shows in the direction of horizontal acceleration.
-      return "brake and accelerate firmly half a dozen times, and take some corners";
+      return kBrakeFirmly;
     case 3:
     case 4:
-      return "turn tightly in both directions with quick changes of the "
-             "steering: yaw rate and yaw acceleration";
+      return kTurnTightly;
     case 5:
-      return "drive a rough piece of road or over bumps: roll and pitch acceleration";
+      return kRoughRoad;
     default:
-      return "change the motion quickly: a slalom, abrupt braking, bumps";
+      return kChangeQuickly;
   }
 }
 
@@ -107,7 +105,7 @@ std::string value_text(const StateObservability& state) {
 
 }  // namespace
 
-Observability observability_of(const StudyOutput& study) {
+Observability observability_of(const SImuOutput& study) {
   Observability out;
   for (std::size_t i = 0; i < kObservedStates; ++i) {
     StateObservability& state = out.states[i];
@@ -158,7 +156,7 @@ nlohmann::json observability_json(const Observability& observability) {
            observability.advice.empty() ? nlohmann::json(nullptr) : nlohmann::json(observability.advice)}};
 }
 
-std::vector<std::string> ObservabilityWatch::update(const StudyOutput& study) {
+std::vector<std::string> ObservabilityWatch::update(const SImuOutput& study) {
   std::vector<std::string> sentences;
   if (!has_estimate(study.status)) {
     started_ = false;

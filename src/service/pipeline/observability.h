@@ -39,7 +39,7 @@ struct Observability {
 };
 
 /// Precondition: the S-IMU has an estimate (base/calibration_levels.h).
-Observability observability_of(const StudyOutput& study);
+Observability observability_of(const SImuOutput& study);
 
 /// calibration.json's "observability".
 nlohmann::json observability_json(const Observability& observability);
@@ -48,7 +48,7 @@ nlohmann::json observability_json(const Observability& observability);
 class ObservabilityWatch {
  public:
   /// @return sentences; mostly none
-  std::vector<std::string> update(const StudyOutput& study);
+  std::vector<std::string> update(const SImuOutput& study);
 
  private:
   bool started_ = false;

@@ -3,7 +3,6 @@
 /// What a refit of the noise models says. Non-real-time.
 
 #include <cstdint>
-#include <imuscope/dynamics_t.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "models/noise/wavelet_variance.h"
 #include "sample/regime.h"
 #include "sample/utc_scale.h"
+#include "service/pipeline/motion_book.h"
 
 namespace imuscope {
 
@@ -35,7 +35,7 @@ struct Refit {
   UtcStamp utc{};    ///< of the same
   HostTime first_reference_time{};
   std::vector<AxisRefit> axes;
-  dynamics_t motion{};       ///< its name, utime and time_s are left to the publisher
+  MotionSummary motion;
   std::int64_t samples = 0;  ///< of the error process so far
   double duration_s = 0.0;
 };

@@ -25,7 +25,7 @@ Validity validity_of(const NavigationOutput& navigation, const DataAges& ages) n
   return ages.gnss_s <= kCoasting_s ? Validity::kUsable : Validity::kCoasting;
 }
 
-Validity validity_of(const StudyOutput& study, const DataAges& ages) noexcept {
+Validity validity_of(const SImuOutput& study, const DataAges& ages) noexcept {
   if (!(ages.reference_s <= kStaleReference_s)) return Validity::kStale;
   if (study.contradicts) return Validity::kContradicted;
   const bool usable = has_estimate(study.status) &&

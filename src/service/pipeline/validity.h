@@ -33,6 +33,6 @@ inline constexpr double kCoasting_s = 5.0;
 [[nodiscard]] DataAges data_ages(const NavigationOutput& navigation, bool has_reference,
                                  HostTime cut) noexcept;
 [[nodiscard]] Validity validity_of(const NavigationOutput& navigation, const DataAges& ages) noexcept;
-[[nodiscard]] Validity validity_of(const StudyOutput& study, const DataAges& ages) noexcept;
+[[nodiscard]] Validity validity_of(const SImuOutput& study, const DataAges& ages) noexcept;
 
 }  // namespace imuscope

@@ -125,8 +125,7 @@ Result<CandumpSurvey> survey_candump(
   if (put_back.times > 0) {
     survey.remarks.push_back(
         fmt::format("{}: the stamps go back {} times, by {:.3f} s in all: the PC's clock was set while "
-                    "candump ran; they are taken "
-                    "to go on from where they were",
+                    "candump ran; they are taken to go on from where they were",
                     file.string(), put_back.times, to_seconds(put_back.by)));
   }
   if (log->drops_total() > 0) {

@@ -31,7 +31,7 @@ Result<CandumpSurvey> survey_candump(
     const std::filesystem::path& file, const DeviceConfig& device,
     const std::function<void(const std::string& what, double share)>& progress = {});
 
-/// The frames of a log, one a read, stamped and arriving at `clock` of the log's stamp.
+/// The frames of a log, one per read, stamped and arriving at `clock` of the log's stamp.
 /// @param interface  empty: of every interface
 /// @param clock      of mode kFixed: host time of the log's time
 Result<std::unique_ptr<ByteSource>> open_candump(const std::filesystem::path& file,

@@ -315,8 +315,8 @@ class Replayer {
 
 }  // namespace
 
-std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording) {
-  std::vector<StudyFileInfo> infos;
+std::vector<SImuFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording) {
+  std::vector<SImuFileInfo> infos;
   for (const auto index : configuration.study_indices()) {
     infos.push_back({configuration.devices[index].name, recording.clocks[index].shift_s});
   }

@@ -27,7 +27,7 @@ namespace imuscope {
 using OpenSource = std::function<Result<std::unique_ptr<ByteSource>>(DeviceIndex index)>;
 
 /// A pause is when no device has said anything for longer than the core's tail (kTailTicks). All pauses of a
-/// drive together are not as long as this.
+/// drive together are shorter than this.
 inline constexpr Duration kLongestPause = std::chrono::hours(24);
 
 /// Of a longer pause the rest is stepped over: every filter has settled by then, and a tick does nothing.
@@ -63,7 +63,7 @@ struct Recording {
 };
 
 /// Names and clock shifts of the S-IMUs, in the order of the configuration.
-std::vector<StudyFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording);
+std::vector<SImuFileInfo> study_file_infos(const Configuration& configuration, const Recording& recording);
 
 /// Pauses of which a part was stepped over.
 struct SteppedPauses {

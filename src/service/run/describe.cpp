@@ -63,7 +63,7 @@ struct EventSentence {
     return fmt::format("{}: it sits differently than before (mean NIS {:.1f}); its calibration starts again",
                        name, e.mean_nis);
   }
-  std::string operator()(const event::StudyReturned& e) const {
+  std::string operator()(const event::SImuReturned& e) const {
     return fmt::format("{}: back after {:.2f} s of silence", name, e.gap_s);
   }
   std::string operator()(const event::GnssRejected& e) const {
@@ -134,7 +134,7 @@ struct EventSentence {
         "receiver's sd and whose clock its times are of (GPS time is 18 s ahead of UTC)",
         name, 100.0 * e.share);
   }
-  std::string operator()(const event::StudyInconsistent& e) const {
+  std::string operator()(const event::SImuInconsistent& e) const {
     return fmt::format(
         "{}: {:.0f} % of its samples contradict the reference; its numbers are not usable: check its axes, "
         "signs and units in the configuration, and that it is bolted to the reference's vehicle",

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <utility>
 
+#include "base/manoeuvres.h"
 #include "base/units.h"
 #include "publish/message_values.h"
 #include "service/pipeline/observability.h"
@@ -22,9 +23,6 @@ constexpr double kPercent = 100.0;
 constexpr double kUsPerS = 1e6;
 constexpr std::string_view kReference = "reference";
 constexpr std::string_view kStudy = "study";
-/// The coarse mounting comes from the rates of both IMUs about more than one axis.
-constexpr const char* kManoeuvreForMounting =
-    "turn both ways: figures of eight or roundabouts at 20 to 30 deg/s";
 
 std::int64_t as_count(std::uint64_t count) { return static_cast<std::int64_t>(count); }
 
@@ -120,7 +118,7 @@ std::vector<Condition> conditions_of(const status_t& status, GrowingCounts& coun
   return conditions;
 }
 
-study_status_t study_status(const std::string& name, const StudyOutput& study) {
+study_status_t study_status(const std::string& name, const SImuOutput& study) {
   const auto largest = [](const Vector3& sd) { return *std::max_element(sd.begin(), sd.end()); };
   study_status_t status{};
   status.name = name;
@@ -137,7 +135,7 @@ study_status_t study_status(const std::string& name, const StudyOutput& study) {
   if (!has_estimate(study.status)) {
     for (double* unknown : {&status.sd_psi_deg, &status.sd_r_m, &status.sd_t_d_ms, &status.weakest_relative})
       *unknown = kUnknown;
-    status.manoeuvre = kManoeuvreForMounting;
+    status.manoeuvre = kTurnBothWays;
     return status;
   }
   const auto observability = observability_of(study);

@@ -45,7 +45,7 @@ void set_time_scale(const TimeScale& scale, status_t& status);
 /// Where a device's times come from.
 void set_time_budget(const TimeBudget& budget, device_status_t& device);
 /// Calibration of one S-IMU beside its goals.
-[[nodiscard]] study_status_t study_status(const std::string& name, const StudyOutput& study);
+[[nodiscard]] study_status_t study_status(const std::string& name, const SImuOutput& study);
 
 /// Ticks and lateness of a thread with deadlines.
 /// @param before_deadline  from the instant that its work is of to its deadline

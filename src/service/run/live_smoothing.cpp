@@ -23,12 +23,12 @@ LiveSmoothing::LiveSmoothing(LiveHistory& history, const std::vector<std::uint32
     : history_(history) {
   std::size_t first = kNavigationStates;
   for (const std::uint32_t of_study : blocks) {
-    layouts_.push_back(StudyLayout::make(of_study, first));
+    layouts_.push_back(SImuLayout::make(of_study, first));
     first += layouts_.back().size;
   }
 }
 
-Result<void> LiveSmoothing::open(const OutputFolder& folder, std::vector<StudyFileInfo> infos) {
+Result<void> LiveSmoothing::open(const OutputFolder& folder, std::vector<SImuFileInfo> infos) {
   infos_ = std::move(infos);
   studies_.resize(infos_.size());
   auto opened = navigation_.open(folder, "smoothed_navigation.csv", navigation_csv_header());
@@ -64,7 +64,7 @@ void LiveSmoothing::write(const SmoothedEpoch& epoch, const Snapshot& last, cons
   }
   for (std::size_t i = 0; i < studies_.size(); ++i) {
     if (!epoch.calibrating[i]) continue;
-    const StudyOutput shown = smoothed_output(last.studies[i], epoch, i, layouts_[i]);
+    const SImuOutput shown = smoothed_output(last.studies[i], epoch, i, layouts_[i]);
     studies_[i].append(
         calibration_csv_row(shown, infos_[i], {time_s, utc.at(epoch.time + from_seconds(shown.t_d_s))}));
   }
@@ -79,10 +79,10 @@ Result<void> LiveSmoothing::close() {
   return result;
 }
 
-StudyOutput smoothed_output(const StudyOutput& base, const SmoothedEpoch& epoch, std::size_t index,
-                            const StudyLayout& layout) {
-  StudyOutput out = base;
-  const StudyState& state = epoch.studies[index];
+SImuOutput smoothed_output(const SImuOutput& base, const SmoothedEpoch& epoch, std::size_t index,
+                           const SImuLayout& layout) {
+  SImuOutput out = base;
+  const SImuState& state = epoch.studies[index];
   out.time = epoch.time;
   out.C_b_s = to_array(state.C_b_s);
   out.psi_rad = to_array(Eigen::Vector3d(-log_so3(to_eigen(out.C_prior).transpose() * state.C_b_s)));
@@ -93,7 +93,7 @@ StudyOutput smoothed_output(const StudyOutput& base, const SmoothedEpoch& epoch,
   out.gyro_scale = to_array(state.gyro_scale);
   out.accel_scale = to_array(state.accel_scale);
   const auto take_sd = [&epoch](std::size_t first, Vector3& sd) {
-    if (first == StudyLayout::kAbsent) return;
+    if (first == SImuLayout::kAbsent) return;
     for (std::size_t i = 0; i < sd.size(); ++i) sd[i] = epoch.sd(static_cast<Eigen::Index>(first + i));
   };
   take_sd(layout.psi, out.sd_psi_rad);
@@ -102,7 +102,7 @@ StudyOutput smoothed_output(const StudyOutput& base, const SmoothedEpoch& epoch,
   take_sd(layout.accel_bias, out.sd_accel_bias_mps2);
   take_sd(layout.gyro_scale, out.sd_gyro_scale);
   take_sd(layout.accel_scale, out.sd_accel_scale);
-  if (layout.t_d != StudyLayout::kAbsent) out.sd_t_d_s = epoch.sd(static_cast<Eigen::Index>(layout.t_d));
+  if (layout.t_d != SImuLayout::kAbsent) out.sd_t_d_s = epoch.sd(static_cast<Eigen::Index>(layout.t_d));
   return out;
 }
 

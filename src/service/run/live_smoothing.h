@@ -44,13 +44,13 @@ class LiveHistory final : public HistorySink {
   bool refused_ = false;
 };
 
-/// The soft end: writes smoothed_navigation.csv and smoothed_NAME.csv of a live run.
+/// The non-real-time end: writes smoothed_navigation.csv and smoothed_NAME.csv of a live run.
 class LiveSmoothing {
  public:
-  /// @param blocks  state blocks of every S-IMU (StudyConfig::blocks)
+  /// @param blocks  state blocks of every S-IMU (SImuConfig::blocks)
   LiveSmoothing(LiveHistory& history, const std::vector<std::uint32_t>& blocks);
 
-  [[nodiscard]] Result<void> open(const OutputFolder& folder, std::vector<StudyFileInfo> infos);
+  [[nodiscard]] Result<void> open(const OutputFolder& folder, std::vector<SImuFileInfo> infos);
   /// Empties the ring. @param last  newest snapshot, for what smoothing does not change
   /// @param utc   of the run so far
   void drain(const Snapshot& last, const UtcTrack& utc);
@@ -60,15 +60,15 @@ class LiveSmoothing {
   void write(const SmoothedEpoch& epoch, const Snapshot& last, const UtcTrack& utc);
 
   LiveHistory& history_;
-  std::vector<StudyLayout> layouts_;
+  std::vector<SImuLayout> layouts_;
   std::optional<FixedLagSmoother> smoother_;
-  std::vector<StudyFileInfo> infos_;
+  std::vector<SImuFileInfo> infos_;
   CsvFile navigation_;
   std::vector<CsvFile> studies_;
 };
 
 /// The estimate of one S-IMU at a smoothed epoch; what is not a state of the filter is as in `base`.
-StudyOutput smoothed_output(const StudyOutput& base, const SmoothedEpoch& epoch, std::size_t index,
-                            const StudyLayout& layout);
+SImuOutput smoothed_output(const SImuOutput& base, const SmoothedEpoch& epoch, std::size_t index,
+                           const SImuLayout& layout);
 
 }  // namespace imuscope

@@ -74,11 +74,11 @@ void Modeller::stop() {
 void Modeller::add(const ErrorRecord& record) {
   if (!filling_) {
     filling_ = std::make_unique<RowBlock>();
-    filling_->reserve(kRowsPerBlock);
+    filling_->reserve(kRowsPerModellerBlock);
   }
   filling_->push_back(record);
   ++rows_added_;
-  if (filling_->size() == kRowsPerBlock) hand_over();
+  if (filling_->size() == kRowsPerModellerBlock) hand_over();
 }
 
 void Modeller::hand_over() {
@@ -106,8 +106,8 @@ void Modeller::keep_up() {
 
 RingCounters Modeller::rows() const {
   const auto blocks = blocks_->counters();
-  return {rows_added_ - rows_refused_, rows_refused_, blocks.level * kRowsPerBlock,
-          blocks.high_water * kRowsPerBlock};
+  return {rows_added_ - rows_refused_, rows_refused_, blocks.level * kRowsPerModellerBlock,
+          blocks.high_water * kRowsPerModellerBlock};
 }
 
 std::vector<Refit> Modeller::take() {

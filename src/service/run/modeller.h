@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "base/limits.h"
 #include "base/output_folder.h"
 #include "configuration/config.h"
 #include "models/noise/model.h"
@@ -41,12 +42,10 @@ class NewestModels {
 ///
 /// The thread runs when nothing else wants to, and on a busy PC a fit may take minutes. Rows are handed over
 /// in blocks made on demand, so that they wait for it without a ring that is large all the time. A thread
-/// that falls half a minute behind runs as any other until it has caught up.
+/// that falls half a minute behind runs like any other until it has caught up.
 class Modeller {
   using RowBlock = std::vector<ErrorRecord>;
-  static constexpr std::size_t kRowsPerBlock = 64;
-  static constexpr std::size_t kBlocks = 4096;
-  using BlockRing = SpscRing<RowBlock*, kBlocks>;
+  using BlockRing = SpscRing<RowBlock*, kModellerBlocks>;
 
  public:
   Modeller(const Configuration& configuration, noise::ModelSpec spec);
@@ -66,7 +65,7 @@ class Modeller {
   /// Refits since the last call.
   [[nodiscard]] std::vector<Refit> take();
   /// What waits for the thread and what was refused, in rows. Thread: that of add().
-  static constexpr std::size_t row_capacity() { return kBlocks * kRowsPerBlock; }
+  static constexpr std::size_t row_capacity() { return kModellerBlocks * kRowsPerModellerBlock; }
   [[nodiscard]] RingCounters rows() const;
   [[nodiscard]] const Heartbeat& heartbeat() const { return heartbeat_; }
 

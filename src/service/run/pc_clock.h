@@ -2,8 +2,7 @@
 
 /// The PC's own clock: what the kernel knows of it, and steps of the wall clock, which nothing of the core
 /// looks at and which everything that a person compares with the run is stamped by. And whether the PC slept:
-/// CLOCK_MONOTONIC, by which everything is stamped, stands still meanwhile, and the devices go on. Soft
-/// world.
+/// CLOCK_MONOTONIC, by which everything is stamped, stands still meanwhile, and the devices go on. Non-real-time.
 
 #include <cstdint>
 #include <functional>
@@ -30,7 +29,7 @@ struct KernelClockState {
 /// every call about clocks).
 [[nodiscard]] std::optional<KernelClockState> read_kernel_clock() noexcept;
 
-/// The wall clock went another way than CLOCK_MONOTONIC between two looks.
+/// The wall clock departed from CLOCK_MONOTONIC between two looks.
 struct WallClockStep {
   HostTime after{};     ///< it was not stepped yet
   HostTime before{};    ///< it was

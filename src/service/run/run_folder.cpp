@@ -12,19 +12,13 @@
 #include "results/tables/columns.h"
 #include "sample/gps_time.h"
 #include "service/pipeline/observability.h"
+#include "service/run/mounting_quaternion.h"
 
 namespace imuscope {
 
 namespace {
 
 constexpr const char* kOdometryFile = "odometry.csv";
-
-Eigen::Quaterniond quaternion_of(const Matrix3& C_b_s) {
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(C_b_s.data());
-  Eigen::Quaterniond q(Eigen::Matrix3d{C});
-  if (q.w() < 0.0) q.coeffs() = -q.coeffs();
-  return q;
-}
 
 void append(fmt::memory_buffer& row, const Vector3& v, double unit) {
   for (const double value : v) fmt::format_to(fmt::appender(row), FMT_COMPILE(",{}"), value * unit);
@@ -116,8 +110,8 @@ std::string odometry_csv_row(const OdometryOutput& odometry, const RowTime& time
 
 std::string calibration_csv_header() { return tables::csv_header(tables::run_table("calibration")); }
 
-std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, const RowTime& time) {
-  const auto q = quaternion_of(study.C_b_s);
+std::string calibration_csv_row(const SImuOutput& study, const SImuFileInfo& info, const RowTime& time) {
+  const auto q = mounting_quaternion(study.C_b_s);
   fmt::memory_buffer row;
   append_time(time, row);
   append(row, study.psi_rad, kDegPerRad);
@@ -158,9 +152,9 @@ std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view r
   return fmt::to_string(text);
 }
 
-nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& study,
+nlohmann::json calibration_json(const SImuFileInfo& info, const SImuOutput& study,
                                 const SampleTimeLine& times) {
-  const auto q = quaternion_of(study.C_b_s);
+  const auto q = mounting_quaternion(study.C_b_s);
   nlohmann::json imu;
   imu["name"] = info.name;
   imu["C_b_s"] = study.C_b_s;
@@ -215,7 +209,7 @@ nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& st
 }
 
 Result<std::unique_ptr<RunFolder>> RunFolder::create(const std::filesystem::path& folder,
-                                                     std::vector<StudyFileInfo> studies, bool write_errors) {
+                                                     std::vector<SImuFileInfo> studies, bool write_errors) {
   auto opened_folder = OutputFolder::open(folder);
   if (!opened_folder) return tl::unexpected<Error>(opened_folder.error());
   std::unique_ptr<RunFolder> run(new RunFolder(std::move(*opened_folder)));

@@ -65,7 +65,7 @@ class SampleTimeLine {
 };
 
 /// What a file needs to know of one S-IMU beyond its estimate.
-struct StudyFileInfo {
+struct SImuFileInfo {
   std::string name;
   /// Seconds that were added to the device's own times before the estimator saw them (recordings with a clock
   /// of their own). Written time offsets include it, so that they refer to the times as recorded.
@@ -75,7 +75,7 @@ struct StudyFileInfo {
 /// Writes the series of a run as the core produces them. Errors of the disk are kept and told by close().
 /// What calibration.json says of one S-IMU: the estimate, and keys that are added to it or replace its own.
 struct CalibrationEntry {
-  StudyOutput study;
+  SImuOutput study;
   nlohmann::json more = nlohmann::json::object();
 };
 
@@ -83,7 +83,7 @@ class RunFolder final : public CoreSink {
  public:
   /// Creates the folder if needed. Existing files of an earlier run in it are replaced.
   static Result<std::unique_ptr<RunFolder>> create(const std::filesystem::path& folder,
-                                                   std::vector<StudyFileInfo> studies, bool write_errors);
+                                                   std::vector<SImuFileInfo> studies, bool write_errors);
 
   void on_error(const ErrorRecord& record) noexcept override;
   void on_event(const EstimatorEvent& event) noexcept override;
@@ -114,7 +114,7 @@ class RunFolder final : public CoreSink {
   void add_odometry();
 
   OutputFolder folder_;
-  std::vector<StudyFileInfo> studies_;
+  std::vector<SImuFileInfo> studies_;
   CsvFile navigation_;
   CsvFile odometry_;
   Result<void> odometry_opened_;
@@ -137,7 +137,7 @@ std::string odometry_csv_header();
 std::string odometry_csv_row(const OdometryOutput& odometry, const RowTime& time);
 /// Header and rows of calibration_NAME.csv.
 std::string calibration_csv_header();
-std::string calibration_csv_row(const StudyOutput& study, const StudyFileInfo& info, const RowTime& time);
+std::string calibration_csv_row(const SImuOutput& study, const SImuFileInfo& info, const RowTime& time);
 /// Row of errors_NAME.csv.
 /// @param regime  its last column; empty where none holds
 std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view regime);
@@ -145,7 +145,7 @@ std::string error_csv_row(const ErrorRow& row, double time_s, std::string_view r
 std::string error_csv_header();
 
 /// One entry of calibration.json's "imus".
-nlohmann::json calibration_json(const StudyFileInfo& info, const StudyOutput& study,
+nlohmann::json calibration_json(const SImuFileInfo& info, const SImuOutput& study,
                                 const SampleTimeLine& times);
 
 }  // namespace imuscope

@@ -90,8 +90,7 @@ nlohmann::json device_json(const RunRecord& run, std::size_t i) {
   const bool is_study = found != studies.end() && run.last != nullptr;
   entry["late"] = nullptr;
   if (is_study) {
-    const StudyCounters& study =
-        run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters;
+    const SImuCounters& study = run.last->studies[static_cast<std::size_t>(found - studies.begin())].counters;
     entry["late"] = study.late + study.refused_full;
     entry["waiting"] = study.waiting;
   }
@@ -234,7 +233,7 @@ void warn_of_host_seconds(const Snapshot& last, std::vector<std::string>& warnin
   if (last.navigation.status != NavigationStatus::kNavigating) return;
   warnings.push_back(
       "no device tells UTC: rates were integrated over seconds of the arrivals' clock, which may be wrong by "
-      "50 ppm, and headings turn by as much of every turn");
+      "50 ppm, and headings err by as much of every turn");
 }
 
 /// GNSS was given, and there is no position: says what was missing.
@@ -245,10 +244,10 @@ void warn_of_no_navigation(const Configuration& configuration, const Snapshot& l
   if (!gnss || status == NavigationStatus::kNotOffered || status == NavigationStatus::kNavigating) return;
   const char* why =
       status == NavigationStatus::kAligning
-          ? "the vehicle's heading was not found: it shows by the reference's own attitude, by a "
-            "minute of rest with a reference that feels the Earth turn, or by braking and "
+          ? "the vehicle's heading was not found: it shows in the reference's own attitude, in a "
+            "minute of rest with a reference that feels the Earth turn, or in braking and "
             "turning between good positions"
-          : "the vehicle never stood still for two seconds, by which it is levelled, or no position came";
+          : "the vehicle never stood still for two seconds, which levelling takes, or no position came";
   warnings.push_back(
       fmt::format("{}: the navigation did not start: {}; mountings do not need it, positions and speeds do",
                   configuration.devices[*gnss].name, why));
@@ -258,7 +257,7 @@ void warn_of_no_navigation(const Configuration& configuration, const Snapshot& l
 const char* taken_for_navigation_grade(const Configuration& configuration) {
   const ImuNoiseConfig& noise = configuration.devices[configuration.reference_index()].noise;
   if (noise.gyro_white_sd_radps && noise.gyro_bias_sd_radps) return "";
-  return "without [device.noise] the reference is taken for one of navigation grade: if it is not, write what "
+  return "without [device.noise] the reference is taken to be of navigation grade: if it is not, write what "
          "its data sheet says; else ";
 }
 
@@ -271,7 +270,7 @@ std::vector<std::string> warnings_of(const Configuration& configuration, const S
     warnings.push_back(fmt::format(
         "{}: {} of {} positions were refused, as they contradict the motion; {}check whose clock its "
         "times are of (GPS time is 18 s ahead of UTC), antenna_lever_arm_b_m and the receiver's sd, "
-        "and do not trust this run's navigation before",
+        "and do not trust this run's navigation until then",
         configuration.devices[*gnss].name, counters.gnss_positions_rejected,
         counters.gnss_used + counters.gnss_rejected, taken_for_navigation_grade(configuration)));
   }

@@ -6,13 +6,14 @@
 #include <cmath>
 
 #include "base/units.h"
-#include "estimation/calibration/eigen_types.h"
 #include "estimation/navigation/gravity.h"
 #include "estimation/navigation/wgs84.h"
 #include "publish/message_values.h"
+#include "sample/eigen_arrays.h"
 #include "sample/gps_time.h"
 #include "service/pipeline/noise_series.h"
 #include "service/pipeline/observability.h"
+#include "service/run/mounting_quaternion.h"
 
 namespace imuscope {
 
@@ -107,12 +108,24 @@ axis_noise_model_t model_message(const AxisRefit& refit) {
   return message;
 }
 
-void set_values(const StudyOutput& study, calibration_t& m) {
-  const Eigen::Quaterniond q = [&] {
-    Eigen::Quaterniond of_mounting(to_eigen(study.C_b_s));
-    if (of_mounting.w() < 0.0) of_mounting.coeffs() = -of_mounting.coeffs();
-    return of_mounting;
-  }();
+axis_dynamics_t axis_motion(std::size_t axis, const MotionFit& fit) {
+  axis_dynamics_t m{};
+  m.axis = axis_name(axis);
+  m.unit = axis_unit(axis);
+  m.mean = fit.mean;
+  m.rms = fit.rms;
+  m.largest = fit.largest;
+  m.slope = fit.slope;
+  m.slope_sd = fit.slope_sd;
+  m.correlation = fit.correlation;
+  m.r2 = fit.r2;
+  m.f = fit.f;
+  m.p_value = fit.p_value;
+  return m;
+}
+
+void set_values(const SImuOutput& study, calibration_t& m) {
+  const Eigen::Quaterniond q = mounting_quaternion(study.C_b_s);
   m.q_w = q.w();
   m.q_x = q.x();
   m.q_y = q.y();
@@ -126,7 +139,7 @@ void set_values(const StudyOutput& study, calibration_t& m) {
   Fields{m.sa_x, m.sa_y, m.sa_z}.set(study.accel_scale);
 }
 
-void set_sds(const StudyOutput& study, calibration_t& m) {
+void set_sds(const SImuOutput& study, calibration_t& m) {
   Fields{m.sd_psi_x_deg, m.sd_psi_y_deg, m.sd_psi_z_deg}.set(study.sd_psi_rad, kDegPerRad);
   Fields{m.sd_r_x_m, m.sd_r_y_m, m.sd_r_z_m}.set(study.sd_r_bs_b_m);
   m.sd_t_d_ms = study.sd_t_d_s * kMsPerS;
@@ -137,7 +150,7 @@ void set_sds(const StudyOutput& study, calibration_t& m) {
 }
 
 /// Where the motion has shown nothing of a state, its number would say something that nobody knows.
-void set_observability(const StudyOutput& study, calibration_t& m) {
+void set_observability(const SImuOutput& study, calibration_t& m) {
   const Observability observability = observability_of(study);
   const std::array<double*, kObservedStates> values{&m.psi_x_deg, &m.psi_y_deg, &m.psi_z_deg, &m.r_x_m,
                                                     &m.r_y_m,     &m.r_z_m,     &m.t_d_ms};
@@ -299,7 +312,7 @@ pc_clock_t pc_clock_message(const PcClockLog::News& news, UtcTime utc) {
 }
 
 calibration_t calibration_message(const Snapshot& snapshot, std::size_t study, const std::string& name) {
-  const StudyOutput& estimate = snapshot.studies[study];
+  const SImuOutput& estimate = snapshot.studies[study];
   calibration_t m{};
   m.utime = utime_of(snapshot.time_scale.at(estimate.time + from_seconds(estimate.t_d_s)));
   m.name = name;
@@ -369,7 +382,27 @@ noise_model_t noise_model_message(const Refit& refit) {
   return m;
 }
 
-dynamics_t dynamics_message(const Refit& refit) { return stamped(refit.motion, refit); }
+dynamics_t dynamics_message(const Refit& refit) {
+  auto m = stamped(dynamics_t{}, refit);
+  const MotionSummary& motion = refit.motion;
+  m.n_static = motion.n_static;
+  m.n_dynamic = motion.n_dynamic;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    m.axes.push_back(axis_motion(axis, motion.axes[axis]));
+  m.n_axes = element_count(m.axes);
+  if (motion.n_dynamic == 0) return m;
+  for (std::size_t i = 0; i < kCovariates; ++i) {
+    covariate_motion_t covariate{};
+    covariate.name = covariate_name(i);
+    covariate.unit = covariate_unit(i);
+    covariate.mean = motion.covariates[i].mean;
+    covariate.rms = motion.covariates[i].rms;
+    covariate.largest = motion.covariates[i].largest;
+    m.covariates.push_back(std::move(covariate));
+  }
+  m.n_covariates = element_count(m.covariates);
+  return m;
+}
 
 pose_t pose_message(const Snapshot& snapshot, const Snapshot& origin) {
   const NavigationOutput& navigation = snapshot.navigation;

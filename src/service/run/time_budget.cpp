@@ -12,7 +12,7 @@ std::string_view name_of(StampedBy by) noexcept {
   return kNames[static_cast<std::size_t>(by)];
 }
 
-TimeBudget time_budget(const LineStatus& line, const StudyOutput* study, DeviceRole role,
+TimeBudget time_budget(const LineStatus& line, const SImuOutput* study, DeviceRole role,
                        const PulseState& pulses) noexcept {
   TimeBudget budget;
   budget.stamped_by = line.stamps.by;

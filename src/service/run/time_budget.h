@@ -39,7 +39,7 @@ struct TimeBudget {
 
 /// @param study   the newest estimate of an S-IMU; null for other devices and before the first
 /// @param pulses  what they tell of the run's clock
-[[nodiscard]] TimeBudget time_budget(const LineStatus& line, const StudyOutput* study,
+[[nodiscard]] TimeBudget time_budget(const LineStatus& line, const SImuOutput* study,
                                      DeviceRole role = DeviceRole::kStudy,
                                      const PulseState& pulses = {}) noexcept;
 [[nodiscard]] std::string_view name_of(StampedBy by) noexcept;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "estimation/calibration/eigen_types.h"
 #include "publish/message_values.h"
+#include "sample/eigen_arrays.h"
 #include "service/run/telemetry.h"
 
 namespace imuscope {

@@ -32,6 +32,7 @@ double mean_decay(double x) { return x > 0.0 ? -std::expm1(-x) / x : 1.0; }
 CoastingFilter::CoastingFilter(const CoastingModel& model, const NavigationState& start,
                                const KinematicVector& sd)
     : state_(start) {
+  // V-1: a constant and the slow processes of every axis
   std::vector<double> variances;
   for (std::size_t axis = 0; axis < kImuAxes; ++axis) {
     const AxisNoise& noise = model.axes[axis];
@@ -54,6 +55,7 @@ CoastingFilter::CoastingFilter(const CoastingModel& model, const NavigationState
   pending_.begin = state_;
 }
 
+// V-1: b
 void CoastingFilter::sum_biases() {
   state_.gyro_bias_b_radps.setZero();
   state_.accel_bias_b_mps2.setZero();
@@ -91,6 +93,7 @@ void CoastingFilter::settle() {
 
   const Eigen::Index n = P_.rows();
   const auto m = n - kKinematic;
+  // V-2: Phi
   Eigen::Matrix<double, kKinematic, Eigen::Dynamic> rows(kKinematic, n);
   rows.leftCols<kKinematic>() = step.kinematic_rows.leftCols<kKinematic>();
   Eigen::VectorXd decay(m);
@@ -108,6 +111,7 @@ void CoastingFilter::settle() {
   P_.bottomLeftCorner(m, kKinematic) = P_.topRightCorner(kKinematic, m).transpose();
   P_.bottomRightCorner(m, m) = decay.asDiagonal() * P_.bottomRightCorner(m, m) * decay.asDiagonal();
 
+  // V-3: Q
   KinematicCovariance white = KinematicCovariance::Zero();
   white.block<3, 3>(kVelocityError, kVelocityError) = turned_density(middle.C_b_n, &pending_.density_sum[3]);
   white.block<3, 3>(kAttitudeError, kAttitudeError) =

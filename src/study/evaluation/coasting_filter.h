@@ -47,7 +47,6 @@ class CoastingFilter {
   /// Of position, velocity and attitude; with what a tilt does to the vertical in second order, which grows
   /// where nothing is measured (V-7).
   [[nodiscard]] KinematicCovariance covariance();
-  [[nodiscard]] std::size_t state_count() const noexcept { return static_cast<std::size_t>(P_.rows()); }
 
  private:
   struct Bias {

@@ -94,7 +94,7 @@ struct Consistency {
   double surprise = 0.0;
 };
 
-/// One entry a duration, those without an outage left out.
+/// One entry per duration, those without an outage left out.
 std::vector<Consistency> consistency_of(const std::vector<OutageResult>& results,
                                         const std::vector<double>& durations_s);
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/units.h"
-#include "drivers/device/wgs84.h"
+#include "base/wgs84.h"
 #include "drivers/rtklib_pos/decoder.h"
 #include "drivers/rtklib_pos/session.h"
 #include "tests/drivers/support/streams.h"

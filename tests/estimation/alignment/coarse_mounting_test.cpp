@@ -41,7 +41,7 @@ std::vector<Matrix3d> mountings() {
 }
 
 /// An MTx-like sensor: noise, biases and lever arm of the navigation sheet's simulated study.
-struct StudyImu {
+struct PairedImu {
   Matrix3d C_b_s = Matrix3d::Identity();
   Vector3d gyro_bias = Vector3d(0.005, -0.004, 0.006);
   Vector3d accel_bias = Vector3d(0.05, -0.04, 0.05);
@@ -50,7 +50,7 @@ struct StudyImu {
   double accel_noise = 0.15;
 };
 
-void drive(CoarseMountingEstimator& estimator, const StudyImu& imu, double seconds, unsigned seed,
+void drive(CoarseMountingEstimator& estimator, const PairedImu& imu, double seconds, unsigned seed,
            double study_delay_s = 0.0, double motion = 1.0) {
   const test::SineSum rates = test::car_rates(seed);
   const test::SineSum forces = test::car_forces(seed);
@@ -81,7 +81,7 @@ Vector3d boresight_error(const Matrix3d& estimate, const Matrix3d& truth) {
 TEST(CoarseMounting, FindsAnyMountingWithinTwoDegreesInAMinuteOfDriving) {
   unsigned seed = 100;
   for (const Matrix3d& C : mountings()) {
-    StudyImu imu;
+    PairedImu imu;
     imu.C_b_s = C;
     CoarseMountingEstimator estimator;
     drive(estimator, imu, 60.0, seed++);
@@ -101,7 +101,7 @@ TEST(CoarseMounting, ItsCovarianceIsNotOptimistic) {
   double sum = 0.0;
   const std::vector<Matrix3d> all = mountings();
   for (std::size_t i = 0; i < all.size(); ++i) {
-    StudyImu imu;
+    PairedImu imu;
     imu.C_b_s = all[i];
     imu.accel_bias = 0.15 * Vector3d{normal(random), normal(random), normal(random)};
     CoarseMountingEstimator estimator;
@@ -115,7 +115,7 @@ TEST(CoarseMounting, ItsCovarianceIsNotOptimistic) {
 }
 
 TEST(CoarseMounting, AtRestItSaysThatTheAngleAboutGravityIsUnknown) {
-  StudyImu imu;
+  PairedImu imu;
   imu.C_b_s = Eigen::AngleAxisd(1.0, Vector3d(0.3, -0.5, 0.8).normalized()).toRotationMatrix();
   CoarseMountingEstimator estimator;
   drive(estimator, imu, 60.0, 7, 0.0, 0.0);
@@ -129,7 +129,7 @@ TEST(CoarseMounting, AtRestItSaysThatTheAngleAboutGravityIsUnknown) {
 }
 
 TEST(CoarseMounting, AMirroredTriadIsCalledInconsistent) {
-  StudyImu imu;
+  PairedImu imu;
   imu.C_b_s = -Matrix3d::Identity();  // all three axes flipped: no rotation does that
   CoarseMountingEstimator flipped;
   drive(flipped, imu, 60.0, 11);
@@ -142,7 +142,7 @@ TEST(CoarseMounting, AMirroredTriadIsCalledInconsistent) {
 }
 
 TEST(CoarseMounting, AWrongTimeOffsetOfSecondsNeverPassesAsGood) {
-  StudyImu imu;
+  PairedImu imu;
   CoarseMountingEstimator estimator;
   drive(estimator, imu, 60.0, 13, 7.0);
   CoarseMounting out;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "base/limits.h"
+#include "sample/eigen_arrays.h"
 #include "tests/estimation/alignment/analytic_motion.h"
 
 namespace imuscope {
@@ -15,15 +16,14 @@ using Eigen::Vector3d;
 
 constexpr double kPeriod_s = 0.01;
 
-Vector3 array(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 HostTime at(double seconds) { return HostTime{from_seconds(seconds)}; }
 
 Sample imu_sample(double t, const Vector3d& omega, const Vector3d& f, std::uint32_t flags = 0) {
   Sample sample{};
   sample.kind = SampleKind::kImu;
   sample.time = at(t);
-  sample.imu.omega_radps = array(omega);
-  sample.imu.f_mps2 = array(f);
+  sample.imu.omega_radps = to_array(omega);
+  sample.imu.f_mps2 = to_array(f);
   sample.imu.flags = flags | kGyroValid | kAccelValid;
   return sample;
 }
@@ -188,8 +188,9 @@ TEST(ReferenceWindow, SaysWhenToWaitAndWhenItIsTooLate) {
   EXPECT_EQ(window.evaluate(at(10.0), out), ReferenceResult::kTooNew);
   EXPECT_EQ(window.evaluate(at(9.99), out), ReferenceResult::kTooNew);
   EXPECT_EQ(window.evaluate(at(9.98), out), ReferenceResult::kOk);
-  EXPECT_EQ(window.evaluate(window.newest_time(), out), ReferenceResult::kOk);
-  EXPECT_EQ(window.evaluate(window.newest_time() + Duration{2}, out), ReferenceResult::kTooNew);
+  // Of the five points' centres the newest is at 9.98 s; beyond half a period after it the next is nearer.
+  EXPECT_EQ(window.evaluate(at(9.9849), out), ReferenceResult::kOk);
+  EXPECT_EQ(window.evaluate(at(9.9851), out), ReferenceResult::kTooNew);
   EXPECT_EQ(window.evaluate(at(1.0), out), ReferenceResult::kOk);  // two minutes are kept
   EXPECT_EQ(window.evaluate(at(-0.1), out), ReferenceResult::kTooOld);
   EXPECT_EQ(ReferenceWindow({5, kPeriod_s}).evaluate(at(1.0), out), ReferenceResult::kTooNew);

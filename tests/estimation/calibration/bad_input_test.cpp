@@ -68,7 +68,7 @@ Told told_by(SimulatedDrive& drive, Estimator& estimator, const Spoiler& spoil =
   return told;
 }
 
-bool finite(const StudyOutput& out) {
+bool finite(const SImuOutput& out) {
   double sum = out.t_d_s + out.sd_t_d_s;
   for (const double value : out.C_b_s) sum += value;
   for (const double value : out.covariance_psi_r) sum += value;
@@ -136,7 +136,7 @@ TEST(BadInput, ASensorFarMoreCrookedThanItsClassIsNotCalledCalibratedAndItsSdAre
   for (const bool crooked : {false, true}) {
     SimulatedDrive drive(400.0, {tilted()}, 48);
     EstimatorConfig config = drive.config();
-    config.studies[0].blocks = kCompleteStudyBlocks;
+    config.studies[0].blocks = kCompleteSImuBlocks;
     Estimator estimator(config);
     told_by(drive, estimator, [&](Sample& sample, double) {
       // The z gyro leans towards x: along x and in the plane of x and y, the frame stays what it is.
@@ -144,7 +144,7 @@ TEST(BadInput, ASensorFarMoreCrookedThanItsClassIsNotCalledCalibratedAndItsSdAre
         sample.imu.omega_radps[2] += 0.05 * sample.imu.omega_radps[0];
       return true;
     });
-    const StudyOutput& out = estimator.study(0);
+    const SImuOutput& out = estimator.study(0);
     if (!crooked) {
       straight_sd_rad = out.sd_psi_rad;
       continue;
@@ -170,7 +170,7 @@ TEST_P(SilentStudy, ThatReturnsIsToldAndItsBiasesAreComparedWithThoseBefore) {
     }
     return t_s < 160.0 || t_s > 170.0;
   });
-  EXPECT_TRUE(told.has<event::StudyReturned>());
+  EXPECT_TRUE(told.has<event::SImuReturned>());
   EXPECT_EQ(told.has<event::GyroBiasChanged>(), changed);
   EXPECT_EQ(told.has<event::AccelBiasChanged>(), changed);
   EXPECT_FALSE(told.has<event::MountingChanged>());
@@ -188,7 +188,7 @@ TEST(BadInput, AStudyThatReturnsTurnedIsFoundAnew) {
   const Told told = told_by(drive, estimator, [](Sample& sample, double t_s) {
     return sample.device != SimulatedDrive::kFirstStudy || t_s > 170.0;
   });
-  EXPECT_TRUE(told.has<event::StudyReturned>());
+  EXPECT_TRUE(told.has<event::SImuReturned>());
   EXPECT_TRUE(told.has<event::MountingChanged>());
   ASSERT_GE(estimator.study(0).status, CalibrationStatus::kConverging);
   EXPECT_LT(test::mounting_error_rad(estimator.study(0), turned).norm(), 0.5 * kRadPerDeg);
@@ -278,12 +278,12 @@ TEST_P(Mirrored, StudyIsToldAndNoneOfItsNumbersIsEverCalledUsable) {
     }
     estimator.advance(samples.back().arrival);
     told.take(estimator.events());
-    const StudyOutput& out = estimator.study(0);
+    const SImuOutput& out = estimator.study(0);
     ASSERT_NE(out.status, CalibrationStatus::kCalibrated) << "at " << drive.time_s() << " s";
     ASSERT_FALSE(out.t_d_observable) << "at " << drive.time_s() << " s";
     for (const bool observable : out.observable) ASSERT_FALSE(observable) << "at " << drive.time_s() << " s";
   }
-  EXPECT_TRUE(told.has<event::CoarseAlignmentPoor>() || told.has<event::StudyInconsistent>());
+  EXPECT_TRUE(told.has<event::CoarseAlignmentPoor>() || told.has<event::SImuInconsistent>());
 }
 INSTANTIATE_TEST_SUITE_P(WrongSigns, Mirrored,
                          testing::Values(WrongSigns{"XOfBoth", {-1, 1, 1}, {-1, 1, 1}},
@@ -298,7 +298,7 @@ TEST(BadInput, AStudyThatFitsIsCalledUsable) {
   SimulatedDrive drive(300.0, {tilted()}, 47);
   Estimator estimator(drive.config());
   const Told told = told_by(drive, estimator);
-  EXPECT_FALSE(told.has<event::StudyInconsistent>());
+  EXPECT_FALSE(told.has<event::SImuInconsistent>());
   EXPECT_FALSE(told.has<event::NoiseTooSmall>());
   for (const bool observable : estimator.study(0).observable) EXPECT_TRUE(observable);
 }
@@ -309,7 +309,7 @@ TEST(BadInput, ANoiseThatIsConfiguredTooSmallIsToldWithTheOneThatFitsAndNothingI
     SCOPED_TRACE(gyro ? "gyro" : "accel");
     SimulatedDrive drive(400.0, {tilted()}, 47);
     EstimatorConfig config = drive.config();
-    StudyNoise& noise = config.studies[0].noise;
+    SImuNoise& noise = config.studies[0].noise;
     const double simulated = (gyro ? noise.gyro : noise.accel)[1].white_sd[0];
     for (TriadNoise& regime : gyro ? noise.gyro : noise.accel)
       for (std::size_t i = 0; i < 3; ++i) {
@@ -750,7 +750,7 @@ TEST(BadInput, AReferenceThatIsNoisierThanConfiguredCostsNoMountingAndIsTold) {
     for (double& f : sample.imu.f_mps2) f += kAccelNoise_mps2 * normal(random);
     return true;
   });
-  const StudyOutput& out = estimator.study(0);
+  const SImuOutput& out = estimator.study(0);
   EXPECT_EQ(out.counters.resets, 0U);
   EXPECT_TRUE(told.has<event::NoiseTooSmall>());
   EXPECT_EQ(out.status, CalibrationStatus::kConverging) << "never calibrated on a noise that does not fit";
@@ -774,7 +774,7 @@ TEST(BadInput, OfALeverArmThatTheReferencesNoiseTakesPartOfNothingIsCalledObserv
     for (double& w : sample.imu.omega_radps) w += kGyroNoise_radps * normal(random);
     return true;
   });
-  const StudyOutput& out = estimator.study(0);
+  const SImuOutput& out = estimator.study(0);
   EXPECT_FALSE(told.has<event::NoiseTooSmall>());
   EXPECT_LT(worst_in_sd(out, tilted()), 4.0);
   EXPECT_NE(out.status, CalibrationStatus::kCalibrated);
@@ -785,10 +785,10 @@ TEST(BadInput, OfALeverArmThatTheReferencesNoiseTakesPartOfNothingIsCalledObserv
 }
 
 TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
-  const std::vector<SimulatedStudy> truth(kMaxStudies, tilted());
+  const std::vector<SimulatedStudy> truth(kMaxSImus, tilted());
   SimulatedDrive drive(120.0, truth, 55);
   EstimatorConfig config = drive.config();
-  for (StudyConfig& study : config.studies) {
+  for (SImuConfig& study : config.studies) {
     study.prior_C_b_s = row_major(tilted().C_b_s);
     study.prior_t_d_s = tilted().t_d_s;
   }
@@ -819,16 +819,16 @@ TEST(BadInput, ATickThatComesLateShowsWhatItCanAndCountsTheRest) {
 }
 
 TEST(BadInput, ATickThatComesMuchLaterGivesUpNothing) {
-  const std::vector<SimulatedStudy> truth(kMaxStudies, tilted());
+  const std::vector<SimulatedStudy> truth(kMaxSImus, tilted());
   SimulatedDrive drive(120.0, truth, 55);
   EstimatorConfig config = drive.config();
-  for (StudyConfig& study : config.studies) {
+  for (SImuConfig& study : config.studies) {
     study.prior_C_b_s = row_major(tilted().C_b_s);
     study.prior_t_d_s = tilted().t_d_s;
   }
   Estimator estimator(config);
   test::run(drive, estimator, 72.4);
-  const StudyCounters before = estimator.study(0).counters;
+  const SImuCounters before = estimator.study(0).counters;
   std::vector<Sample> samples;
   std::uint64_t added = 0;
   while (drive.time_s() < 116.0) {
@@ -837,7 +837,7 @@ TEST(BadInput, ATickThatComesMuchLaterGivesUpNothing) {
     ++added;
   }
   estimator.advance(samples.back().arrival);
-  const StudyCounters& after = estimator.study(0).counters;
+  const SImuCounters& after = estimator.study(0).counters;
   EXPECT_EQ(after.refused_full, 0U);
   EXPECT_EQ(after.no_reference, before.no_reference);
   EXPECT_EQ(after.samples - before.samples, added);
@@ -863,7 +863,7 @@ TEST(BadInput, MoreSamplesThanMayWaitForAReferenceAreCounted) {
     }
   }
   estimator.advance(samples.back().arrival);
-  const StudyCounters& counters = estimator.study(0).counters;
+  const SImuCounters& counters = estimator.study(0).counters;
   EXPECT_EQ(counters.samples, added);
   EXPECT_EQ(counters.refused_full, added - waiting_samples_capacity(20.0));
 }

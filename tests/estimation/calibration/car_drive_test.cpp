@@ -101,7 +101,7 @@ EstimatorConfig car_config() {
   config.gnss.enabled = true;
   config.gnss.device = kGnss;
   config.gnss.default_sd_position_m = {0.1, 0.1, 0.2};
-  StudyConfig study;
+  SImuConfig study;
   study.device = kStudy;
   study.rate_hz = 120.0;
   for (TriadNoise& gyro : study.noise.gyro) {
@@ -143,7 +143,7 @@ TEST_P(CarDrive, FindsTheKnownMountingLeverArmAndTimeOffsetWithoutPrior) {
   }
   for (int i = 0; i < 100; ++i) tick();
 
-  const StudyOutput& out = estimator.study(0);
+  const SImuOutput& out = estimator.study(0);
   EXPECT_EQ(estimator.navigation().status, NavigationStatus::kNavigating);
   EXPECT_EQ(out.counters.resets, 0U);
   EXPECT_EQ(estimator.counters().covariance_repairs, 0U);

@@ -56,7 +56,7 @@ TEST(CovarianceKernel, RefusesACorrectionThatIsNotFinite) {
 TEST(StateName, FollowsTheOrderOfTheErrorState) {
   EstimatorConfig config;
   config.studies.resize(2);
-  config.studies[0].blocks = kPaperStudyBlocks;
+  config.studies[0].blocks = kPaperSImuBlocks;
   EXPECT_EQ(state_name(config, 4).name, "velocity_e");
   EXPECT_FALSE(state_name(config, 4).study.has_value());
   EXPECT_EQ(state_name(config, 15 + 4).name, "r_y");

@@ -9,6 +9,7 @@
 #include "base/units.h"
 #include "estimation/calibration/filter_core.h"
 #include "estimation/navigation/so3.h"
+#include "sample/eigen_arrays.h"
 #include "tests/estimation/calibration/simulated_drive.h"
 #include "tests/support/allocation_counter.h"
 
@@ -21,8 +22,6 @@ using test::horizontal_error_m;
 using test::SimulatedDrive;
 using test::SimulatedStudy;
 using test::worst_in_sd;
-
-Vector3d eigen(const Vector3& v) { return {v[0], v[1], v[2]}; }
 
 template <typename Kind>
 bool has_event(const Estimator& estimator) {
@@ -50,11 +49,11 @@ TEST(Estimator, FindsUnknownMountingsTimeOffsetsAndLeverArmsWithinItsOwnSd) {
   Estimator estimator(drive.config());
   test::run(drive, estimator);
   for (std::size_t i = 0; i < truth.size(); ++i) {
-    const StudyOutput& out = estimator.study(i);
+    const SImuOutput& out = estimator.study(i);
     ASSERT_GE(out.status, CalibrationStatus::kConverging) << "S-IMU " << i;
     EXPECT_LT(worst_in_sd(out, truth[i]), 4.0) << "S-IMU " << i;
     EXPECT_LT(kDegPerRad * test::mounting_error_rad(out, truth[i].C_b_s).norm(), 0.2);
-    EXPECT_LT((truth[i].r_bs_b_m - eigen(out.r_bs_b_m)).norm(), 0.01);
+    EXPECT_LT((truth[i].r_bs_b_m - to_eigen(out.r_bs_b_m)).norm(), 0.01);
     EXPECT_NEAR(out.t_d_s, truth[i].t_d_s, 4.0 * out.sd_t_d_s);
     EXPECT_LT(out.sd_t_d_s, 1e-3);
     for (std::size_t a = 0; a < 3; ++a) {
@@ -83,14 +82,14 @@ TEST(Estimator, AllTwentyFourAxisPermutationsAreFoundWithinSixtySecondsOfDriving
   }
   ASSERT_EQ(permutations.size(), 24U);
   constexpr double kStandstill_s = 10.0;
-  for (std::size_t first = 0; first < permutations.size(); first += kMaxStudies) {
-    std::vector<SimulatedStudy> truth(kMaxStudies);
-    for (std::size_t i = 0; i < kMaxStudies; ++i)
+  for (std::size_t first = 0; first < permutations.size(); first += kMaxSImus) {
+    std::vector<SimulatedStudy> truth(kMaxSImus);
+    for (std::size_t i = 0; i < kMaxSImus; ++i)
       truth[i].C_b_s = exp_so3(Vector3d(0.02, -0.03, 0.01)) * permutations[first + i];
     SimulatedDrive drive(150.0, truth, 30 + first);
     Estimator estimator(drive.config());
     test::run(drive, estimator, kStandstill_s + 60.0);
-    for (std::size_t i = 0; i < kMaxStudies; ++i) {
+    for (std::size_t i = 0; i < kMaxSImus; ++i) {
       ASSERT_GE(estimator.study(i).status, CalibrationStatus::kConverging) << "permutation " << first + i;
       EXPECT_LT(kDegPerRad * test::mounting_error_rad(estimator.study(i), truth[i].C_b_s).norm(), 2.0);
       EXPECT_LT(worst_in_sd(estimator.study(i), truth[i]), 5.0) << "permutation " << first + i;
@@ -99,11 +98,11 @@ TEST(Estimator, AllTwentyFourAxisPermutationsAreFoundWithinSixtySecondsOfDriving
 }
 
 TEST(Estimator, RandomRotationsAreFoundWithinSixtySecondsOfDriving) {
-  std::vector<SimulatedStudy> truth(kMaxStudies);
-  for (std::size_t i = 0; i < kMaxStudies; ++i) {
+  std::vector<SimulatedStudy> truth(kMaxSImus);
+  for (std::size_t i = 0; i < kMaxSImus; ++i) {
     // Golden-angle turns about axes that spiral over the sphere.
     const double k = static_cast<double>(i);
-    const double z = 1.0 - (2.0 * k + 1.0) / static_cast<double>(kMaxStudies);
+    const double z = 1.0 - (2.0 * k + 1.0) / static_cast<double>(kMaxSImus);
     const double radius = std::sqrt(1.0 - z * z);
     truth[i].C_b_s =
         exp_so3((0.5 + 0.5 * k) * Vector3d(radius * std::cos(2.4 * k), radius * std::sin(2.4 * k), z));
@@ -111,7 +110,7 @@ TEST(Estimator, RandomRotationsAreFoundWithinSixtySecondsOfDriving) {
   SimulatedDrive drive(150.0, truth, 36);
   Estimator estimator(drive.config());
   test::run(drive, estimator, 10.0 + 60.0);
-  for (std::size_t i = 0; i < kMaxStudies; ++i) {
+  for (std::size_t i = 0; i < kMaxSImus; ++i) {
     ASSERT_GE(estimator.study(i).status, CalibrationStatus::kConverging) << "rotation " << i;
     EXPECT_LT(kDegPerRad * test::mounting_error_rad(estimator.study(i), truth[i].C_b_s).norm(), 2.0);
     EXPECT_LT(worst_in_sd(estimator.study(i), truth[i]), 5.0) << "rotation " << i;
@@ -144,7 +143,7 @@ TEST(Estimator, OnAStraightRoadItsSdSaysWhatCannotBeSeen) {
 TEST(Estimator, BiasesDecayExactlyAsTheirProcessSays) {
   SimulatedDrive drive(60.0, {{}}, 17);
   EstimatorConfig config = drive.config();
-  StudyConfig& study = config.studies[0];
+  SImuConfig& study = config.studies[0];
   study.prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
   study.prior_t_d_s = 0.0;
   study.prior_gyro_bias_radps = {0.01, 0.01, 0.01};
@@ -162,7 +161,7 @@ TEST(Estimator, BiasesDecayExactlyAsTheirProcessSays) {
       if (heard || sample.device != SimulatedDrive::kFirstStudy) estimator.add(sample);
     }
     estimator.advance(samples.back().arrival);
-    for (const StudyEpoch& epoch : estimator.epochs()) {
+    for (const SImuEpoch& epoch : estimator.epochs()) {
       last_s = static_cast<double>(to_ns(epoch.time)) * 1e-9;
       if (first_s < 0.0) first_s = last_s;
     }
@@ -184,7 +183,7 @@ TEST(Estimator, AnAccelerometerTriadOfItsOwnIsFoundWhereItIsAskedFor) {
   config.studies[0].blocks |= kAccelBoresightBlock | kAccelTimeOffsetBlock;
   Estimator estimator(config);
   test::run(drive, estimator);
-  const StudyOutput& out = estimator.study(0);
+  const SImuOutput& out = estimator.study(0);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(out.accel_boresight_rad[i], truth.alpha_rad(static_cast<Eigen::Index>(i)),
                 4.0 * out.sd_accel_boresight_rad[i]);
@@ -203,7 +202,7 @@ TEST(Estimator, ANoiseModelBelowTheFloorIsNotBelieved) {
   config.studies[0].prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
   config.studies[0].prior_t_d_s = 0.0;
   Estimator estimator(config);
-  StudyNoise bold = config.studies[0].noise;
+  SImuNoise bold = config.studies[0].noise;
   for (TriadNoise& gyro : bold.gyro) {
     for (double& sd : gyro.white_sd) sd *= 0.01;
   }
@@ -219,7 +218,7 @@ TEST(Estimator, ANoiseModelHandedInLaterTakesForce) {
   EstimatorConfig config = drive.config();
   config.studies[0].prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
   config.studies[0].prior_t_d_s = 0.0;
-  const StudyNoise right = config.studies[0].noise;
+  const SImuNoise right = config.studies[0].noise;
   for (TriadNoise& gyro : config.studies[0].noise.gyro) {
     for (double& sd : gyro.white_sd) sd *= 2.0;
   }
@@ -252,7 +251,7 @@ TEST(Estimator, AtStandstillNothingIsLearnedAboutTheAngleAboutGravityNorAboutThe
   config.studies[0].prior_t_d_s = 0.0;
   Estimator estimator(config);
   test::run(drive, estimator, 59.0);
-  const StudyOutput& out = estimator.study(0);
+  const SImuOutput& out = estimator.study(0);
   EXPECT_EQ(out.regime, Regime::kStatic);
   const Eigen::Map<const Eigen::Matrix<double, 6, 6>> P(out.covariance_psi_r.data());
   const Vector3d about_gravity = drive.motion().state_at(59.0).f_b_mps2.normalized();
@@ -290,7 +289,7 @@ TEST(Estimator, GivesTheSameBitsForTheSameSamplesAndCuts) {
     SimulatedDrive drive(100.0, truth, 6);
     Estimator estimator(drive.config());
     test::run(drive, estimator);
-    std::pair<StudyOutput, NavigationOutput> out{estimator.study(0), estimator.navigation()};
+    std::pair<SImuOutput, NavigationOutput> out{estimator.study(0), estimator.navigation()};
     return out;
   };
   const auto first = result();
@@ -439,7 +438,7 @@ TEST(Estimator, BadSamplesAreCountedAndLeaveTheStateAlone) {
   clipped.imu.flags |= kAccelClipY;
   estimator.add(clipped);
   test::run(drive, estimator);
-  const StudyCounters& counters = estimator.study(0).counters;
+  const SImuCounters& counters = estimator.study(0).counters;
   EXPECT_EQ(counters.not_finite, 1U);
   EXPECT_EQ(counters.not_increasing, 1U);
   EXPECT_EQ(counters.gated_gyro[2], 2U) << "the two windows that share the sample";
@@ -497,18 +496,18 @@ TEST(Estimator, EpochsCarryEverySampleOnceWithTheReferenceAtItsInstant) {
     const std::vector<Sample> samples = drive.next();
     for (const Sample& sample : samples) estimator.add(sample);
     estimator.advance(samples.back().arrival);
-    for (const StudyEpoch& epoch : estimator.epochs()) {
+    for (const SImuEpoch& epoch : estimator.epochs()) {
       if (expected_counter >= 0) {
         ASSERT_EQ(epoch.sample.counter, expected_counter);
       }
       expected_counter = epoch.sample.counter + 1;
       const double t_s = static_cast<double>(to_ns(epoch.time)) * 1e-9 - 10.0 + epoch.t_d_s;
       const imusim::MotionState state = drive.motion().state_at(t_s);
-      worst_rate = std::max(worst_rate,
-                            (eigen(epoch.omega_ib_b_radps) - state.omega_ib_b_radps).cwiseAbs().maxCoeff());
-      worst_acceleration =
-          std::max(worst_acceleration,
-                   (eigen(epoch.omega_dot_ib_b_radps2) - state.omega_dot_ib_b_radps2).cwiseAbs().maxCoeff());
+      worst_rate = std::max(
+          worst_rate, (to_eigen(epoch.omega_ib_b_radps) - state.omega_ib_b_radps).cwiseAbs().maxCoeff());
+      worst_acceleration = std::max(
+          worst_acceleration,
+          (to_eigen(epoch.omega_dot_ib_b_radps2) - state.omega_dot_ib_b_radps2).cwiseAbs().maxCoeff());
     }
   }
   EXPECT_GT(expected_counter, 9990);
@@ -534,7 +533,7 @@ TEST(Estimator, AKnownMountingBeginsOnceTheTimeOffsetIsFound) {
   }
   ASSERT_FALSE(drive.done());
   EXPECT_FALSE(told_coarse) << "the mounting is the configured one, not a new one";
-  const StudyOutput& out = estimator.study(0);
+  const SImuOutput& out = estimator.study(0);
   for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(out.C_prior[i], (*config.studies[0].prior_C_b_s)[i], 1e-12);
   EXPECT_NEAR(out.t_d_s, truth[0].t_d_s, 4.0 * out.sd_t_d_s);
   EXPECT_NEAR(out.sd_psi_rad[2], kRadPerDeg, 0.1 * kRadPerDeg);
@@ -547,16 +546,16 @@ TEST(Estimator, AFrozenMountingStaysAsGivenWhateverTheSamplesSay) {
   const std::vector<SimulatedStudy> truth{{exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.22, 0.12}, 0.004}};
   SimulatedDrive drive(200.0, truth, 21);
   EstimatorConfig config = drive.config();
-  StudyConfig& study = config.studies[0];
-  study.blocks = kFullStudyBlocks & ~static_cast<std::uint32_t>(kBoresightBlock);
+  SImuConfig& study = config.studies[0];
+  study.blocks = kFullSImuBlocks & ~static_cast<std::uint32_t>(kBoresightBlock);
   study.prior_C_b_s = to_array(truth[0].C_b_s);
   study.prior_t_d_s = 0.0;
   Estimator estimator(config);
   test::run(drive, estimator, 120.0);
-  const StudyOutput& out = estimator.study(0);
-  const Vector3d arm_error = truth[0].r_bs_b_m - eigen(out.r_bs_b_m);
-  EXPECT_LT(arm_error.cwiseQuotient(eigen(out.sd_r_bs_b_m)).cwiseAbs().maxCoeff(), 4.0);
-  EXPECT_LT(eigen(out.sd_r_bs_b_m).maxCoeff(), 0.05);
+  const SImuOutput& out = estimator.study(0);
+  const Vector3d arm_error = truth[0].r_bs_b_m - to_eigen(out.r_bs_b_m);
+  EXPECT_LT(arm_error.cwiseQuotient(to_eigen(out.sd_r_bs_b_m)).cwiseAbs().maxCoeff(), 4.0);
+  EXPECT_LT(to_eigen(out.sd_r_bs_b_m).maxCoeff(), 0.05);
   EXPECT_NEAR(out.t_d_s, truth[0].t_d_s, 4.0 * out.sd_t_d_s);
   drive.remount(0, exp_so3(Vector3d(0.0, 0.0, 0.3)) * truth[0].C_b_s);
   EXPECT_FALSE(run_until_event<event::MountingChanged>(drive, estimator, 200.0));
@@ -576,7 +575,7 @@ TEST(Estimator, ANoiseModelThatLetsTheBiasWanderMoreMakesItLessCertain) {
   test::run(drive, estimator, 80.0);
   const Vector3 gyro_before = estimator.study(0).sd_gyro_bias_radps;
   const Vector3 accel_before = estimator.study(0).sd_accel_bias_mps2;
-  StudyNoise restless = config.studies[0].noise;
+  SImuNoise restless = config.studies[0].noise;
   restless.gyro_bias[1].sd *= 100.0;  // more than the filter's own: as much again, no more
   estimator.set_noise(0, restless);
   estimator.advance(drive.next().back().arrival);

@@ -24,7 +24,7 @@ class LiveSink final : public HistorySink {
     const FilterCore& core = epoch.core;
     const std::size_t states = core.covariance().dimension();
     if (!smoother_) {
-      smoother_.emplace(std::vector<StudyLayout>{core.layout(0)}, states);
+      smoother_.emplace(std::vector<SImuLayout>{core.layout(0)}, states);
       record_.resize(history::history_doubles(states, 1));
     }
     history::pack(epoch, record_);

@@ -9,8 +9,9 @@
 
 #include "estimation/calibration/regime_detector.h"
 #include "estimation/navigation/so3.h"
+#include "sample/eigen_arrays.h"
 #include "tests/support/allocation_counter.h"
-#include "tools/studies/wheeled_drive.h"
+#include "tools/trials/wheeled_drive.h"
 
 namespace imuscope {
 namespace {
@@ -19,8 +20,6 @@ using Eigen::Vector3d;
 using study::ReferenceClass;
 using study::WheeledDrive;
 using study::WheeledDriveOptions;
-
-Vector3d eigen(const Vector3& v) { return {v[0], v[1], v[2]}; }
 
 /// What the wheels of the test do with a sample; false takes it away.
 using Tamper = std::function<bool(double t_s, Sample& sample)>;
@@ -77,8 +76,8 @@ TEST(Odometry, FindsScaleMountingAndLeverArmWithinItsOwnSd) {
     run(drive, estimator, 1e9);
     const OdometryOutput& out = estimator.odometry();
     const double scale = (options.wheels.scale - out.scale) / out.sd_scale;
-    const Vector3d mount = options.mount_rad - eigen(out.mount_rad);
-    const Vector3d arm = (drive.r_bv_b_m() - eigen(out.r_bv_b_m)).cwiseQuotient(eigen(out.sd_r_bv_b_m));
+    const Vector3d mount = options.mount_rad - to_eigen(out.mount_rad);
+    const Vector3d arm = (drive.r_bv_b_m() - to_eigen(out.r_bv_b_m)).cwiseQuotient(to_eigen(out.sd_r_bv_b_m));
     EXPECT_LT(std::abs(scale), 4.0);
     EXPECT_LT(std::abs(mount.y()), 4.0 * out.sd_mount_rad[1]);
     EXPECT_LT(std::abs(mount.z()), 4.0 * out.sd_mount_rad[2]);
@@ -112,7 +111,7 @@ TEST(Odometry, AMinuteWithoutGnssDriftsFarLessThanInertiallyAlone) {
     EXPECT_EQ(counters.odometry_slip_used > 0, non_holonomic);
     EXPECT_EQ(counters.zero_velocity_used > 0, zero_velocity);
     // The filter knows how far off it may be.
-    const Vector3d sd = eigen(estimator.navigation().sd_position_m);
+    const Vector3d sd = to_eigen(estimator.navigation().sd_position_m);
     EXPECT_LT(horizontal_error_m(drive, estimator), 4.0 * sd.head<2>().norm());
     return horizontal_error_m(drive, estimator);
   };
@@ -277,11 +276,11 @@ TEST(Odometry, AVelocityThatALongRestContradictsIsGivenUp) {
       if (sample.kind == SampleKind::kImu && t_s > 20.0 && t_s < 21.0) sample.imu.f_mps2[0] += 3.0;
       return sample.kind != SampleKind::kGnss;
     });
-    wrong_mps = std::max(wrong_mps, eigen(estimator.navigation().v_n_mps).norm());
+    wrong_mps = std::max(wrong_mps, to_eigen(estimator.navigation().v_n_mps).norm());
   }
   EXPECT_GT(wrong_mps, 2.0);
   EXPECT_GT(estimator.counters().zero_velocity_rejected, 0U);
-  EXPECT_LT(eigen(estimator.navigation().v_n_mps).norm(), 0.02);
+  EXPECT_LT(to_eigen(estimator.navigation().v_n_mps).norm(), 0.02);
 }
 
 // The R-IMU looks forward and the vehicle reverses all the way; the wheels know no sign.

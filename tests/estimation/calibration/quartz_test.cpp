@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 #include <cmath>
 
-#include "estimation/calibration/eigen_types.h"
 #include "estimation/navigation/so3.h"
+#include "sample/eigen_arrays.h"
 #include "tests/estimation/calibration/simulated_drive.h"
 
 namespace imuscope::test {

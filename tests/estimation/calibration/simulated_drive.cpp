@@ -100,7 +100,7 @@ EstimatorConfig SimulatedDrive::config() const {
   const imusim::MotionState start = motion_.state_at(0.0);
   config.navigation.initial_rpy_rad = Vector3{start.roll_rad, start.pitch_rad, start.heading_rad};
   for (std::size_t i = 0; i < truth_.size(); ++i) {
-    StudyConfig study;
+    SImuConfig study;
     study.device = static_cast<DeviceIndex>(kFirstStudy + i);
     study.noise.gyro[0] = study.noise.gyro[1];  // the simulated noise is dynamic throughout
     config.studies.push_back(study);
@@ -114,12 +114,12 @@ void SimulatedDrive::remount(std::size_t study, const Eigen::Matrix3d& C_b_s) {
                                      seed_, "remounted" + std::to_string(study));
 }
 
-Eigen::Vector3d mounting_error_rad(const StudyOutput& out, const Eigen::Matrix3d& C_b_s_true) {
+Eigen::Vector3d mounting_error_rad(const SImuOutput& out, const Eigen::Matrix3d& C_b_s_true) {
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> C(out.C_b_s.data());
   return -log_so3(C.transpose() * C_b_s_true);
 }
 
-double worst_in_sd(const StudyOutput& out, const SimulatedStudy& truth) {
+double worst_in_sd(const SImuOutput& out, const SimulatedStudy& truth) {
   const Eigen::Vector3d psi = mounting_error_rad(out, truth.C_b_s);
   double worst = 0.0;
   for (std::size_t i = 0; i < 3; ++i) {

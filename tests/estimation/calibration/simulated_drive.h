@@ -60,9 +60,9 @@ class SimulatedDrive {
 };
 
 /// Error of the estimated mounting: psi with C_true = C_estimated Exp(-psi).
-Eigen::Vector3d mounting_error_rad(const StudyOutput& out, const Eigen::Matrix3d& C_b_s_true);
+Eigen::Vector3d mounting_error_rad(const SImuOutput& out, const Eigen::Matrix3d& C_b_s_true);
 /// Largest error of boresight and lever arm, in their sd.
-double worst_in_sd(const StudyOutput& out, const SimulatedStudy& truth);
+double worst_in_sd(const SImuOutput& out, const SimulatedStudy& truth);
 double horizontal_error_m(const NavigationOutput& out, const imusim::MotionState& truth);
 
 /// Feeds `drive` to `estimator` until its end or until `until_s`, ticking after every 10 ms.

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/estimation/calibration/simulated_drive.h"
+#include "tests/support/full_matrix.h"
 
 namespace imuscope {
 namespace {
@@ -88,7 +89,7 @@ class LinearSystem {
     core_.predict_navigation(step);
 
     MatrixXd Phi = MatrixXd::Identity(kStates, kStates);
-    Phi.topLeftCorner<15, 15>() = full_matrix(step);
+    Phi.topLeftCorner<15, 15>() = test::full_matrix(step);
     MatrixXd Q = MatrixXd::Zero(kStates, kStates);
     Q.topLeftCorner<15, 15>() = step.process_covariance;
     for (Index i = 15; i < 18; ++i) {
@@ -204,7 +205,7 @@ class DenseSmoother final : public HistorySink {
   struct Epoch {
     HostTime time;
     NavigationState navigation;
-    StudyState study;
+    SImuState study;
     Matrix P;
     Matrix Phi;
     Matrix Q;
@@ -254,7 +255,7 @@ EstimatorConfig known_roughly(const SimulatedDrive& drive, const SimulatedStudy&
   const VectorXd attitude = normals(random, 3);
   for (std::size_t i = 0; i < 3; ++i)
     rpy[i] += config.navigation.initial_rpy_sd_rad[i] * attitude(static_cast<Index>(i));
-  for (StudyConfig& study : config.studies) {
+  for (SImuConfig& study : config.studies) {
     study.prior_C_b_s = to_array(truth.C_b_s);
     study.prior_t_d_s = truth.t_d_s;
     study.prior_r_bs_b_m = to_array(truth.r_bs_b_m);
@@ -287,7 +288,7 @@ TEST(Smoother, FiveEpochsASecondEqualTextbookSmoothingOfTheWholeStateAtEveryEpoc
     ASSERT_EQ(dense.epochs[at].time, smoothed->time);
     const DenseSmoother::Epoch& exact = dense.epochs[at];
     NavigationState navigation = exact.navigation;
-    StudyState study = exact.study;
+    SImuState study = exact.study;
     const VectorXd d = exact.d.cast<double>();
     inject(navigation, NavigationErrorVector(d.head<15>()));
     inject(study, track->layout(0), {d.data(), static_cast<std::size_t>(d.size())});
@@ -295,7 +296,7 @@ TEST(Smoother, FiveEpochsASecondEqualTextbookSmoothingOfTheWholeStateAtEveryEpoc
     difference.head<15>() = error_between(navigation, smoothed->navigation);
     difference.segment<3>(15) = study.gyro_bias_s_radps - smoothed->studies[0].gyro_bias_s_radps;
     difference.segment<3>(18) = study.accel_bias_s_mps2 - smoothed->studies[0].accel_bias_s_mps2;
-    const StudyLayout& layout = track->layout(0);
+    const SImuLayout& layout = track->layout(0);
     for (Index i = 0; i < difference.size(); ++i) {
       const std::size_t state = i < 15   ? static_cast<std::size_t>(i)
                                 : i < 18 ? layout.gyro_bias + static_cast<std::size_t>(i - 15)

@@ -19,7 +19,7 @@ using test::SimulatedStudy;
 
 const Matrix3d kMounting = exp_so3(Vector3d(0.1, 0.2, -1.5));
 
-double worst_boresight_in_sd(const StudyOutput& out, const Matrix3d& C_b_s) {
+double worst_boresight_in_sd(const SImuOutput& out, const Matrix3d& C_b_s) {
   const Vector3d psi = test::mounting_error_rad(out, C_b_s);
   double worst = 0.0;
   for (std::size_t i = 0; i < 3; ++i)
@@ -64,7 +64,7 @@ TEST(States, ThePapersSixTakeBiasesForBoresightWithoutKnowingIt) {
     SimulatedDrive drive(400.0, {{kMounting, {0.35, -0.22, 0.12}, 0.0}}, 72);
     EstimatorConfig config = drive.config();
     config.studies[0].prior_t_d_s = 0.0;
-    if (paper) config.studies[0].blocks = kPaperStudyBlocks;
+    if (paper) config.studies[0].blocks = kPaperSImuBlocks;
     Estimator estimator(config);
     while (!drive.done()) {
       const std::vector<Sample> samples = drive.next();

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/units.h"
-#include "estimation/calibration/eigen_types.h"
+#include "sample/eigen_arrays.h"
 
 namespace imuscope {
 namespace {

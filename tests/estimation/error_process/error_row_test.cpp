@@ -1,4 +1,5 @@
 #include "estimation/error_process/error_row.h"
+#include "sample/eigen_arrays.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -8,8 +9,6 @@ namespace imuscope {
 namespace {
 
 using Eigen::Vector3d;
-
-Vector3 array(const Vector3d& v) { return {v[0], v[1], v[2]}; }
 
 /// A point fixed to a body that turns by a known rotation R(t) about a moving origin: its acceleration by
 /// numerical differentiation of its position is the independent check of the lever-arm terms.
@@ -37,15 +36,15 @@ struct TurningBody {
   }
 };
 
-StudyEpoch epoch_at(double t, const Eigen::Matrix3d& C_b_s, const Vector3d& r_b, const Vector3d& error_gyro,
-                    const Vector3d& error_accel) {
-  StudyEpoch epoch{};
-  epoch.omega_ib_b_radps = array(TurningBody::omega_b(t));
-  epoch.omega_dot_ib_b_radps2 = array(TurningBody::omega_dot_b(t));
-  epoch.f_b_mps2 = array(TurningBody::R(t).transpose() * TurningBody::acceleration(t, Vector3d::Zero()));
-  epoch.sample.omega_radps = array(C_b_s * TurningBody::omega_b(t) + error_gyro);
+SImuEpoch epoch_at(double t, const Eigen::Matrix3d& C_b_s, const Vector3d& r_b, const Vector3d& error_gyro,
+                   const Vector3d& error_accel) {
+  SImuEpoch epoch{};
+  epoch.omega_ib_b_radps = to_array(TurningBody::omega_b(t));
+  epoch.omega_dot_ib_b_radps2 = to_array(TurningBody::omega_dot_b(t));
+  epoch.f_b_mps2 = to_array(TurningBody::R(t).transpose() * TurningBody::acceleration(t, Vector3d::Zero()));
+  epoch.sample.omega_radps = to_array(C_b_s * TurningBody::omega_b(t) + error_gyro);
   epoch.sample.f_mps2 =
-      array(C_b_s * TurningBody::R(t).transpose() * TurningBody::acceleration(t, r_b) + error_accel);
+      to_array(C_b_s * TurningBody::R(t).transpose() * TurningBody::acceleration(t, r_b) + error_accel);
   epoch.sample.flags = kGyroValid | kAccelValid;
   return epoch;
 }
@@ -69,7 +68,7 @@ TEST(ErrorRow, OfAPointOnATurningBodyIsTheErrorThatWasPutIn) {
     const Vector3d r_b{normal(random), normal(random), normal(random)};
     const Vector3d e_g(0.01, -0.02, 0.03);
     const Vector3d e_a(-0.1, 0.2, 0.3);
-    const auto row = error_row(epoch_at(0.1 * trial, C, r_b, e_g, e_a), {row_major(C), array(r_b)}, {});
+    const auto row = error_row(epoch_at(0.1 * trial, C, r_b, e_g, e_a), {row_major(C), to_array(r_b)}, {});
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(row.e_gyro_radps[static_cast<std::size_t>(i)], e_g[i], 1e-12);
       // Second differences of a 1e-4 s step carry rounding of order 1e-16 * 100 m / 1e-8 s^2.
@@ -79,7 +78,7 @@ TEST(ErrorRow, OfAPointOnATurningBodyIsTheErrorThatWasPutIn) {
 }
 
 TEST(ErrorRow, BearsTheDerivativesInTheAxesOfTheSensor) {
-  StudyEpoch epoch{};
+  SImuEpoch epoch{};
   epoch.time = HostTime{} + Duration{1234};
   epoch.regime = Regime::kDynamic;
   epoch.omega_dot_ib_b_radps2 = {1.0, 2.0, 3.0};
@@ -95,7 +94,7 @@ TEST(ErrorRow, BearsTheDerivativesInTheAxesOfTheSensor) {
 }
 
 TEST(ErrorRow, TakesTheReferenceBiasOfTheCallersChoice) {
-  StudyEpoch epoch{};
+  SImuEpoch epoch{};
   epoch.sample.flags = kGyroValid | kAccelValid;
   epoch.omega_ib_b_radps = {1.0, 0.0, 0.0};  // compensated with 0.1
   epoch.reference_gyro_bias_radps = {0.1, 0.0, 0.0};
@@ -106,7 +105,7 @@ TEST(ErrorRow, TakesTheReferenceBiasOfTheCallersChoice) {
 }
 
 TEST(ErrorRow, AClippedTriadIsNotValid) {
-  StudyEpoch epoch{};
+  SImuEpoch epoch{};
   epoch.sample.flags = kGyroValid | kAccelValid | kAccelClipY;
   const auto row = error_row(epoch, {}, {});
   EXPECT_TRUE(row.gyro_valid);
@@ -122,7 +121,7 @@ TEST(ErrorRow, WithoutScaleErrorTheRemainderNoLongerFollowsThePrediction) {
 }
 
 TEST(ErrorRow, LiveIsThatOfTheEstimateAsItStood) {
-  StudyEpoch epoch{};
+  SImuEpoch epoch{};
   epoch.sample.flags = kGyroValid | kAccelValid;
   epoch.sample.counter = 77;
   epoch.sample.omega_radps = {0.5, 0.0, 0.0};

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "estimation/navigation/gravity.h"
+#include "estimation/navigation/local_earth.h"
 #include "estimation/navigation/so3.h"
 #include "estimation/navigation/wgs84.h"
 #include "tests/estimation/navigation/random_states.h"
@@ -115,7 +116,7 @@ TEST(Wgs84, TransportRateIsTheTurningOfLocalNed) {
   const Eigen::Matrix3d forward = rotation_ned_to_ecef(p.latitude_rad + dL, p.longitude_rad + dl);
   const Eigen::Matrix3d back = rotation_ned_to_ecef(p.latitude_rad - dL, p.longitude_rad - dl);
   const Vector3d turned = log_so3(back.transpose() * forward) / (2.0 * kStep_s);
-  EXPECT_LT((transport_rate_n(p, v) - turned).norm(), 1e-6 * turned.norm());
+  EXPECT_LT((LocalEarth(p).transport_rate(v) - turned).norm(), 1e-6 * turned.norm());
 }
 
 TEST(NormalGravity, HasThePublishedValuesAtEquatorAndPole) {

@@ -14,6 +14,7 @@
 #include "estimation/navigation/so3.h"
 #include "estimation/navigation/strapdown.h"
 #include "tests/estimation/navigation/random_states.h"
+#include "tests/support/full_matrix.h"
 
 namespace imuscope {
 namespace {
@@ -142,7 +143,7 @@ TEST(NavigationTransition, PhiIsTheMatrixExponentialToTheThirdOrder) {
     A.diagonal().segment<3>(9).setConstant(-1.0 / noise.gyro_bias.correlation_time_s);
     A.diagonal().segment<3>(12).setConstant(-1.0 / noise.accel_bias.correlation_time_s);
     const Eigen::Matrix<double, 15, 15> expected = (A * kDt_s).exp();
-    const Eigen::Matrix<double, 15, 15> Phi = full_matrix(transition(state, rates, noise, kDt_s));
+    const Eigen::Matrix<double, 15, 15> Phi = test::full_matrix(transition(state, rates, noise, kDt_s));
     // What is left out is F^3 dt^3/6: its largest entry is f dt^3/6, tilt rate into position.
     const double left_out = (A * A * A).cwiseAbs().maxCoeff() * kDt_s * kDt_s * kDt_s / 6.0;
     EXPECT_LT((Phi - expected).cwiseAbs().maxCoeff(), 1.01 * left_out);
@@ -247,7 +248,8 @@ TEST(NavigationTransition, CarriesTheErrorOfARealMechanisationOverTenSeconds) {
                             Vector3d(std::sin(t), std::cos(0.7 * t), -9.8 + 0.3 * std::sin(5.0 * t))};
     const InertialRates middle{0.5 * (previous.omega_ib_b_radps + now.omega_ib_b_radps),
                                0.5 * (previous.f_b_mps2 + now.f_b_mps2)};
-    predicted = full_matrix(transition(estimate, compensated(middle, estimate), noise, kDt_s)) * predicted;
+    predicted =
+        test::full_matrix(transition(estimate, compensated(middle, estimate), noise, kDt_s)) * predicted;
     propagate(estimate,
               increment_from_samples(compensated(previous, estimate), compensated(now, estimate), kDt_s));
     propagate(truth, increment_from_samples(compensated(previous, truth), compensated(now, truth), kDt_s));

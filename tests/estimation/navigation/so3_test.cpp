@@ -47,22 +47,6 @@ TEST(So3, LogOfHalfATurnIsAnAxisOfThatTurn) {
   }
 }
 
-TEST(So3, RightJacobianMatchesCentralDifferences) {
-  test::RandomStates random(4);
-  constexpr double kStep = 1e-6;
-  for (const double angle : {0.0, 1e-4, 0.5, 2.5}) {
-    const Vector3d phi = angle * random.normal3(1.0).normalized();
-    Matrix3d numeric;
-    for (int i = 0; i < 3; ++i) {
-      const Vector3d d = kStep * Vector3d::Unit(i);
-      numeric.col(i) = (log_so3(exp_so3(phi).transpose() * exp_so3(phi + d)) -
-                        log_so3(exp_so3(phi).transpose() * exp_so3(phi - d))) /
-                       (2.0 * kStep);
-    }
-    EXPECT_LT((right_jacobian_so3(phi) - numeric).norm(), 1e-9) << "angle " << angle;
-  }
-}
-
 TEST(So3, EulerAnglesAreHeadingThenPitchThenRoll) {
   const EulerAngles angles{0.1, -0.2, 5.0};
   // The definition: turn about down, then about the new right, then about the new forward.

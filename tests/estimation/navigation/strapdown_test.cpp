@@ -1,4 +1,5 @@
 #include "estimation/navigation/strapdown.h"
+#include "estimation/navigation/local_earth.h"
 
 #include <gtest/gtest.h>
 #include <cmath>
@@ -92,7 +93,7 @@ Continuous derivative(const Continuous& s, double t) {
   const InertialRates r = lively(t);
   const Curvature k = curvature_at(s.L);
   const Vector3d w_ie = earth_rate_n(s.L);
-  const Vector3d w_en = transport_rate_n({s.L, s.lambda, s.h}, s.v);
+  const Vector3d w_en = LocalEarth({s.L, s.lambda, s.h}).transport_rate(s.v);
   return {s.v.x() / (k.meridian_m + s.h), s.v.y() / ((k.transverse_m + s.h) * std::cos(s.L)), -s.v.z(),
           s.C * r.f_b_mps2 + Vector3d(0, 0, normal_gravity(s.L, s.h).g_mps2) - (2.0 * w_ie + w_en).cross(s.v),
           s.C * skew(r.omega_ib_b_radps) - skew(w_ie + w_en) * s.C};

@@ -1,4 +1,5 @@
 #include "models/dynamics/covariates.h"
+#include "sample/eigen_arrays.h"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +16,6 @@ Vector3d random_vector(std::mt19937& generator) {
   std::normal_distribution<double> normal;
   return {normal(generator), normal(generator), normal(generator)};
 }
-Vector3 array(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 TEST(Covariates, StandInTheOrderOfTheirNames) {
   ErrorRow row{};
@@ -46,10 +46,10 @@ TEST(Covariates, CalibrationColumnsCarryWhatCalibrationErrorsProduce) {
     const double t_d = random_vector(generator).x();
     const Vector3d lever = random_vector(generator);
     ErrorRow row{};
-    row.predicted_omega_s_radps = array(omega);
-    row.omega_dot_s_radps2 = array(omega_dot);
-    row.predicted_f_s_mps2 = array(f);
-    row.f_dot_s_mps3 = array(f_dot);
+    row.predicted_omega_s_radps = to_array(omega);
+    row.omega_dot_s_radps2 = to_array(omega_dot);
+    row.predicted_f_s_mps2 = to_array(f);
+    row.f_dot_s_mps3 = to_array(f_dot);
     const Vector3d gyro = phi.cross(omega) + scale.cwiseProduct(omega) + t_d * omega_dot;
     const Vector3d accel = phi.cross(f) + scale.cwiseProduct(f) + t_d * f_dot + omega_dot.cross(lever) +
                            omega.cross(omega.cross(lever));

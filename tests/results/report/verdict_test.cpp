@@ -52,7 +52,7 @@ TEST(Verdict, WhatIsNotObservableIsNamedWithTheManoeuvreThatShowsIt) {
   const Verdict verdict = calibration_verdict(run);
   EXPECT_EQ(verdict.answer, Answer::kPartly);
   EXPECT_THAT(verdict.reasons, Contains(HasSubstr("Not observable in this drive: boresight about z")));
-  EXPECT_THAT(next_steps(run, {}), Contains(HasSubstr("Brake and start firmly")));
+  EXPECT_THAT(next_steps(run, {}), Contains(HasSubstr("brake and accelerate firmly")));
 }
 
 TEST(Verdict, AnErrorFarBeyondItsSdIsTold) {

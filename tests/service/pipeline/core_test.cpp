@@ -87,7 +87,7 @@ TEST(Core, ASamplePushedAfterItsTickIsNotedAndAReplayTakesItAtTheSameTick) {
 TEST(Core, ARefitsModelIsTakenOverAtTheNextTickAndAReplayTakesItThere) {
   Notes live;
   Core first(one_study(), 2);
-  StudyNoise noise = mtx_class_noise();
+  SImuNoise noise = mtx_class_noise();
   noise.gyro[0].white_sd[1] = 0.123;
   first.tick(1, at_ms(10.0), live);
   first.offer_noise(0, {6000, mtx_class_noise()});
@@ -161,11 +161,11 @@ void run_ticks(Core& core, std::int64_t first, std::int64_t n, Notes& notes) {
     core.tick(tick, at_ms(kPeriod_ms * static_cast<double>(tick)), notes);
 }
 
-const StudyCounters& counters_of(const Core& core) { return core.estimator().study(0).counters; }
+const SImuCounters& counters_of(const Core& core) { return core.estimator().study(0).counters; }
 
 /// Samples that went neither to the reference's instant nor to a loss.
 std::uint64_t given_up(const Core& core) {
-  const StudyCounters& counters = counters_of(core);
+  const SImuCounters& counters = counters_of(core);
   return counters.late + counters.no_reference + counters.refused_full;
 }
 

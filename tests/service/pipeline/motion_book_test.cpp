@@ -43,23 +43,23 @@ TEST(MotionSums, AgreeWithTheClosedFormOfTheRegression) {
     const double r = e[i] - mean_e - slope * (p[i] - mean_p);
     residual += r * r;
   }
-  const auto message = sums.message();
-  EXPECT_NEAR(message.mean, mean_p, 1e-12);
-  EXPECT_NEAR(message.rms, std::sqrt(pp / n), 1e-12);
-  EXPECT_DOUBLE_EQ(message.largest, largest);
-  EXPECT_NEAR(message.slope, slope, 1e-12);
-  EXPECT_NEAR(message.slope_sd, std::sqrt(residual / (n - 2.0) / pp), 1e-12);
-  EXPECT_NEAR(message.correlation, pe / std::sqrt(pp * ee), 1e-12);
-  EXPECT_NEAR(message.slope, 0.01, 4.0 * message.slope_sd);
+  const auto fit = sums.fit();
+  EXPECT_NEAR(fit.mean, mean_p, 1e-12);
+  EXPECT_NEAR(fit.rms, std::sqrt(pp / n), 1e-12);
+  EXPECT_DOUBLE_EQ(fit.largest, largest);
+  EXPECT_NEAR(fit.slope, slope, 1e-12);
+  EXPECT_NEAR(fit.slope_sd, std::sqrt(residual / (n - 2.0) / pp), 1e-12);
+  EXPECT_NEAR(fit.correlation, pe / std::sqrt(pp * ee), 1e-12);
+  EXPECT_NEAR(fit.slope, 0.01, 4.0 * fit.slope_sd);
 }
 
 TEST(MotionSums, WithoutMotionTheSlopeIsUnknown) {
   MotionSums sums;
-  EXPECT_TRUE(std::isnan(sums.message().mean));
+  EXPECT_TRUE(std::isnan(sums.fit().mean));
   for (int i = 0; i < 10; ++i) sums.add(1.0, i);
-  EXPECT_DOUBLE_EQ(sums.message().mean, 1.0);
-  EXPECT_TRUE(std::isnan(sums.message().slope));
-  EXPECT_TRUE(std::isnan(sums.message().correlation));
+  EXPECT_DOUBLE_EQ(sums.fit().mean, 1.0);
+  EXPECT_TRUE(std::isnan(sums.fit().slope));
+  EXPECT_TRUE(std::isnan(sums.fit().correlation));
 }
 
 TEST(MotionBook, CountsRegimesAndLeavesOutAxesWithoutAValue) {
@@ -73,15 +73,12 @@ TEST(MotionBook, CountsRegimesAndLeavesOutAxesWithoutAValue) {
   row.regime = Regime::kStatic;
   book.add(row, row.regime);
   book.add(row, row.regime);
-  const auto message = book.message();
-  EXPECT_EQ(message.n_static, 2);
-  EXPECT_EQ(message.n_dynamic, 1);
-  EXPECT_TRUE(std::isnan(message.axes[0].r2)) << "one sample makes no regression";
-  ASSERT_EQ(message.axes.size(), 6U);
-  EXPECT_EQ(message.axes[2].axis, "gyro_z");
-  EXPECT_EQ(message.axes[2].unit, "rad/s");
-  EXPECT_DOUBLE_EQ(message.axes[2].largest, 3.0);
-  EXPECT_TRUE(std::isnan(message.axes[3].mean)) << "no specific force was ever valid";
+  const auto summary = book.summary();
+  EXPECT_EQ(summary.n_static, 2);
+  EXPECT_EQ(summary.n_dynamic, 1);
+  EXPECT_TRUE(std::isnan(summary.axes[0].r2)) << "one sample makes no regression";
+  EXPECT_DOUBLE_EQ(summary.axes[2].largest, 3.0);
+  EXPECT_TRUE(std::isnan(summary.axes[3].mean)) << "no specific force was ever valid";
 }
 
 /// Held against the regression itself: in motion alone, every fifth sample.
@@ -110,17 +107,17 @@ TEST(MotionBook, RegressesEveryAxisOnTheFifteenCovariatesInMotion) {
     expected.add(columns);
     largest = std::max(largest, std::abs(x[13]));
   }
-  const auto message = book.message();
+  const auto summary = book.summary();
   const auto regression = expected.solve().value();
-  EXPECT_DOUBLE_EQ(message.axes[0].r2, regression.r2);
-  EXPECT_DOUBLE_EQ(message.axes[0].f, regression.f);
-  EXPECT_DOUBLE_EQ(message.axes[0].p_value, regression.p_value);
-  EXPECT_LT(message.axes[0].p_value, 0.01) << "it depends on the jerk";
-  ASSERT_EQ(message.covariates.size(), kCovariates);
-  EXPECT_EQ(message.covariates[13].name, "f_dot_y");
-  EXPECT_EQ(message.covariates[13].unit, "m/s^3");
-  EXPECT_DOUBLE_EQ(message.covariates[13].largest, largest);
-  EXPECT_NEAR(message.covariates[13].rms, 1.0, 0.2);
+  EXPECT_DOUBLE_EQ(summary.axes[0].r2, regression.r2);
+  EXPECT_DOUBLE_EQ(summary.axes[0].f, regression.f);
+  EXPECT_DOUBLE_EQ(summary.axes[0].p_value, regression.p_value);
+  EXPECT_LT(summary.axes[0].p_value, 0.01) << "it depends on the jerk";
+  ASSERT_EQ(summary.covariates.size(), kCovariates);
+  EXPECT_EQ(summary.covariates[13].name, "f_dot_y");
+  EXPECT_EQ(summary.covariates[13].unit, "m/s^3");
+  EXPECT_DOUBLE_EQ(summary.covariates[13].largest, largest);
+  EXPECT_NEAR(summary.covariates[13].rms, 1.0, 0.2);
 }
 
 }  // namespace

@@ -87,7 +87,7 @@ TEST(NoiseFeedback, ARecordTooShortForTheSlowProcessesStillTellsTheWhiteNoise) {
 }
 
 /// A refit that says `factor` times the present sd of every axis of the gyroscope in motion.
-Refit louder(const StudyNoise& base, std::int64_t samples, double factor, double slow_factor = 1.0) {
+Refit louder(const SImuNoise& base, std::int64_t samples, double factor, double slow_factor = 1.0) {
   Refit refit;
   refit.samples = samples;
   for (std::size_t i = 0; i < 3; ++i) {

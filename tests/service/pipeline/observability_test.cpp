@@ -13,8 +13,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 /// Everything at its goal.
-StudyOutput calibrated() {
-  StudyOutput study;
+SImuOutput calibrated() {
+  SImuOutput study;
   study.status = CalibrationStatus::kCalibrated;
   study.sd_psi_rad.fill(0.005 * kRadPerDeg);
   study.sd_r_bs_b_m.fill(5e-4);
@@ -39,7 +39,7 @@ TEST(Observability, WithEveryGoalReachedGivesNumbersAndNoAdvice) {
 }
 
 TEST(Observability, AtStandstillSaysThatTheAngleAboutGravityIsNotObservableAndWhatWouldShowIt) {
-  StudyOutput study = calibrated();
+  SImuOutput study = calibrated();
   study.status = CalibrationStatus::kConverging;
   study.sd_psi_rad[2] = 2.0 * kRadPerDeg;
   study.observable[2] = false;
@@ -54,7 +54,7 @@ TEST(Observability, AtStandstillSaysThatTheAngleAboutGravityIsNotObservableAndWh
 }
 
 TEST(Observability, TranslatesADirectionBetweenAxesAndAMixedOne) {
-  StudyOutput study = calibrated();
+  SImuOutput study = calibrated();
   const double c = std::cos(30.0 * kRadPerDeg);
   const double s = std::sin(30.0 * kRadPerDeg);
   study.weakest_direction = {c, 0, s, 0, 0, 0};
@@ -71,7 +71,7 @@ TEST(Observability, TranslatesADirectionBetweenAxesAndAMixedOne) {
 }
 
 TEST(Observability, AdvisesForWhatIsFurthestFromItsGoal) {
-  StudyOutput study = calibrated();
+  SImuOutput study = calibrated();
   study.sd_r_bs_b_m[2] = 5e-3;
   EXPECT_THAT(observability_of(study).advice, HasSubstr("rough"));
   study.sd_psi_rad[0] = 1.0 * kRadPerDeg;
@@ -83,7 +83,7 @@ TEST(Observability, AdvisesForWhatIsFurthestFromItsGoal) {
 
 TEST(ObservabilityWatch, SpeaksWhenSomethingChangesAndOnceAMinuteWhileSomethingIsMissing) {
   ObservabilityWatch watch;
-  StudyOutput study = calibrated();
+  SImuOutput study = calibrated();
   study.status = CalibrationStatus::kCoarse;
   EXPECT_THAT(watch.update(study), IsEmpty());
   study.status = CalibrationStatus::kConverging;

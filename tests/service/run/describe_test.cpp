@@ -42,7 +42,7 @@ TEST(Describe, SpeaksInTheUnitsOfPeople) {
   EXPECT_THAT(told(event::GyroBiasChanged{0.5 * kRadPerDeg}), HasSubstr("changed by 0.500 deg/s"));
   EXPECT_THAT(told(event::AccelBiasChanged{0.5}), HasSubstr("changed by 0.500 m/s^2"));
   EXPECT_THAT(told(event::GnssInconsistent{0.25}), HasSubstr("25 % of its positions"));
-  EXPECT_THAT(told(event::StudyInconsistent{0.75}), HasSubstr("75 % of its samples"));
+  EXPECT_THAT(told(event::SImuInconsistent{0.75}), HasSubstr("75 % of its samples"));
   EXPECT_THAT(told(event::NoiseTooSmall{true, 3.1, 0.6 * kRadPerDeg}),
               HasSubstr("gyro_white_sd_degps = 0.6 would"));
   EXPECT_THAT(told(event::NoiseTooSmall{false, 3.1, 0.05}),

@@ -176,7 +176,7 @@ TEST(Beat, QuantilesAreUnknownWithoutAValue) {
 }
 
 TEST(CalibrationStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDirection) {
-  StudyOutput study;
+  SImuOutput study;
   study.status = CalibrationStatus::kConverging;
   study.sd_psi_rad = {0.1, 0.3, 0.2};
   study.sd_r_bs_b_m = {0.6, 0.4, 0.5};

@@ -116,7 +116,7 @@ TEST(Telemetry, MessagesSayHowOldTheirDataAreAndWhetherTheyMayBeUsed) {
   s.ages = data_ages(s.navigation, false, kThen);
   EXPECT_EQ(navigation_message(s).validity, navigation_t::STALE);
 
-  StudyOutput& study = s.studies[1];
+  SImuOutput& study = s.studies[1];
   study.status = CalibrationStatus::kConverging;
   study.sd_psi_rad = {kUsableBoresightSd_rad, 0, 0};
   study.sd_r_bs_b_m = {0, kUsableLeverArmSd_m, 0};
@@ -180,7 +180,7 @@ TEST(Telemetry, OdometryArrivesInPercentAndDegreesWithEveryFieldInItsPlace) {
 /// scale, t_d, and their sd from 101 on.
 Snapshot calibrated_snapshot() {
   Snapshot s = snapshot();
-  StudyOutput& study = s.studies[1];
+  SImuOutput& study = s.studies[1];
   study.status = CalibrationStatus::kConverging;
   study.time = kThen;
   study.C_b_s = {0, 1, 0, -1, 0, 0, 0, 0, 1};
@@ -460,21 +460,41 @@ TEST(Telemetry, TheFirstModelHasNothingToBeComparedWith) {
 
 TEST(Telemetry, DynamicsAreStampedLikeTheModels) {
   Refit with_motion = refit();
-  axis_dynamics_t axis{};
-  axis.axis = "gyro_x";
-  axis.slope = 4.0;
   with_motion.motion.n_static = 5;
   with_motion.motion.n_dynamic = 7;
-  with_motion.motion.axes = {axis};
-  with_motion.motion.n_axes = 1;
+  MotionFit& yaw = with_motion.motion.axes[2];
+  yaw = {.mean = 1.0,
+         .rms = 2.0,
+         .largest = 3.0,
+         .slope = 4.0,
+         .slope_sd = 5.0,
+         .correlation = 0.6,
+         .r2 = 0.7,
+         .f = 8.0,
+         .p_value = 0.9};
+  with_motion.motion.covariates[1] = {.mean = 11.0, .rms = 12.0, .largest = 13.0};
   const auto m = over_the_wire(dynamics_message(with_motion));
   EXPECT_EQ(m.utime, kUtime);
   EXPECT_EQ(m.name, "mtx1");
   EXPECT_EQ(m.time_s, 12.5);
   EXPECT_EQ(m.n_static, 5);
   EXPECT_EQ(m.n_dynamic, 7);
-  ASSERT_EQ(m.axes.size(), 1U);
-  EXPECT_EQ(m.axes[0].slope, 4.0);
+  ASSERT_EQ(m.axes.size(), kAxisCount);
+  const axis_dynamics_t& axis = m.axes[2];
+  EXPECT_EQ(axis.axis, "gyro_z");
+  EXPECT_EQ(axis.unit, "rad/s");
+  EXPECT_THAT((std::array{axis.mean, axis.rms, axis.largest, axis.slope, axis.slope_sd, axis.correlation,
+                          axis.r2, axis.f, axis.p_value}),
+              ElementsAre(1.0, 2.0, 3.0, 4.0, 5.0, 0.6, 0.7, 8.0, 0.9));
+  EXPECT_TRUE(std::isnan(m.axes[0].slope)) << "nothing is known of it";
+  ASSERT_EQ(m.covariates.size(), kCovariates);
+  EXPECT_EQ(m.covariates[1].name, covariate_name(1));
+  EXPECT_EQ(m.covariates[1].unit, covariate_unit(1));
+  EXPECT_EQ(m.covariates[1].mean, 11.0);
+  EXPECT_EQ(m.covariates[1].rms, 12.0);
+  EXPECT_EQ(m.covariates[1].largest, 13.0);
+  with_motion.motion.n_dynamic = 0;
+  EXPECT_TRUE(dynamics_message(with_motion).covariates.empty()) << "there was no motion";
 }
 
 /// On the equator at longitude zero, nose to the east and level: n's axes are known by hand.

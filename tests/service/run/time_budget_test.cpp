@@ -34,7 +34,7 @@ TEST(TimeBudget, TellsWhatTheLineTakesAndLeavesOpenWhatNobodyMeasures) {
 }
 
 TEST(TimeBudget, HasTheConstantDelayOfAnImuOnceItIsEstimated) {
-  StudyOutput study;
+  SImuOutput study;
   study.t_d_s = -4e-3;
   study.sd_t_d_s = 3e-5;
   study.status = CalibrationStatus::kWaiting;
@@ -64,7 +64,7 @@ TEST(TimeBudget, TellsWhoStampsAndWhatThatSaves) {
 
 TEST(TimeBudget, HasTheConstantDelayOfEachDeviceThatPulsesMeasure) {
   PulseState pulses;
-  StudyOutput study;
+  SImuOutput study;
   study.status = CalibrationStatus::kCalibrated;
   study.t_d_s = -3e-3;
   study.sd_t_d_s = 30e-6;

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <random>
 
-#include "estimation/calibration/eigen_types.h"
 #include "publish/message_codec.h"
+#include "sample/eigen_arrays.h"
 
 namespace imuscope {
 namespace {
