@@ -208,7 +208,7 @@ TEST(CalibrationStatus, ShowsTheLargestSdTheGoalsAndTheManoeuvreForTheWeakestDir
   study.status = CalibrationStatus::kCoarse;
   const auto coarse = study_status("mtx1", study);
   EXPECT_TRUE(std::isnan(coarse.sd_psi_deg)) << "what is not estimated has no sd";
-  EXPECT_THAT(coarse.manoeuvre, HasSubstr("turn both ways"));
+  EXPECT_THAT(coarse.manoeuvre, HasSubstr("turn in both directions"));
 }
 
 TEST(ThreadWatch, KnowsEachThreadsNameSchedulingAndProcessorTime) {

@@ -78,9 +78,9 @@ TEST(ModelBook, RefitsByCountAndAgreesWithTheBatchOverTheSameGapsAndRegimes) {
   }
 }
 
-/// Feeds `seconds` of 100 Hz rows of sd `sd` and returns the refit at their end, which is due.
-Refit fed(ModelBook& book, std::int64_t& counter, int seconds, double sd, std::mt19937& random) {
-  for (int i = 0; i < 100 * seconds; ++i) {
+/// Feeds `seconds_of_rows` seconds of 100 Hz rows of sd `sd` and returns the refit at their end, which is due.
+Refit fed(ModelBook& book, std::int64_t& counter, int seconds_of_rows, double sd, std::mt19937& random) {
+  for (int i = 0; i < 100 * seconds_of_rows; ++i) {
     auto row = row_of(counter++, Regime::kStatic, random);
     for (auto* triad : {&row.e_gyro_radps, &row.e_accel_mps2}) {
       for (double& e : *triad) e *= sd;
