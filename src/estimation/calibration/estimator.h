@@ -135,8 +135,8 @@ struct SImuOutput {
   std::array<double, 6> weakest_direction{};
   SImuDirection weakest_component = SImuDirection::kPsiX;
   double weakest_relative_sd = 1.0;
-  /// Per component of (psi, r): sd below half of its prior, and 10 s of motion fitted this mounting; none
-  /// while the samples contradict the reference (kStudyInconsistent). Otherwise: not observable yet.
+  /// Per component of (psi, r): sd below half of its prior or at its goal, and 20 s of motion fitted this
+  /// mounting; none while samples or noise contradict the model. Otherwise: not observable yet.
   std::array<bool, 6> observable{};
   bool t_d_observable = false;
   bool contradicts = false;  ///< its samples do not fit the reference, whatever the mounting

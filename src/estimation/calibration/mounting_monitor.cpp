@@ -39,6 +39,9 @@ constexpr double kSurplusMax = 100.0;
 /// When this share of the samples of the last seconds had a gated axis, the S-IMU sits differently.
 constexpr double kMountingChangedShare = 0.8;
 constexpr double kMountingWatch_s = 3.0;
+/// A silence counts as no more than this: what nobody saw speaks neither for a mounting nor against it. A cable that is
+/// pulled out with a jerk, and put back, has not moved the S-IMU.
+constexpr double kUnseenMost_s = 0.5;
 /// A good S-IMU has one sample in 20 000 gated. Above the first share of half a minute's motion its samples
 /// do not fit any mounting; below the second, which takes two minutes of motion that fits, they do again.
 constexpr double kMisfitMean_s = 30.0;
@@ -219,12 +222,12 @@ void MountingMonitor::note_poor_alignment() noexcept {
   misfits_ = true;
 }
 
-void MountingMonitor::watch_fit(Regime regime, bool gated, HostTime now, double dt_s,
+void MountingMonitor::watch_fit(Regime regime, bool gated, HostTime now, double seen_s,
                                 const SImuConfig& config, EventLog& log) noexcept {
   // At rest everything fits: that is no evidence.
   if (regime == Regime::kStatic && !gated) return;
-  proof_s_ += dt_s;
-  misfit_share_ += std::min(1.0, dt_s / kMisfitMean_s) * ((gated ? 1.0 : 0.0) - misfit_share_);
+  proof_s_ += seen_s;
+  misfit_share_ += seen_s / kMisfitMean_s * ((gated ? 1.0 : 0.0) - misfit_share_);
   if (misfit_share_ < kFitShare) misfits_ = misfit_told_ = false;
   misfits_ = misfits_ || misfit_share_ >= kMisfitShare;
   if (misfit_told_ || misfit_share_ < kMisfitToldShare) return;
@@ -235,10 +238,11 @@ void MountingMonitor::watch_fit(Regime regime, bool gated, HostTime now, double 
 bool MountingMonitor::watch_mounting(const SImuOutput& now, const SImuLayout& layout, double dt_s,
                                      const SImuConfig& config, EventLog& log) noexcept {
   const bool gated = gated_[0] || gated_[1];
-  watch_fit(now.regime, gated, now.time, dt_s, config, log);
+  const double seen_s = std::min(dt_s, kUnseenMost_s);
+  watch_fit(now.regime, gated, now.time, seen_s, config, log);
   // A frozen mounting cannot be found anew.
   if (layout.psi == SImuLayout::kAbsent) return false;
-  gated_share_ += std::min(1.0, dt_s / kMountingWatch_s) * ((gated ? 1.0 : 0.0) - gated_share_);
+  gated_share_ += seen_s / kMountingWatch_s * ((gated ? 1.0 : 0.0) - gated_share_);
   if (gated_share_ < kMountingChangedShare) return false;
   double worst = 0.0;
   for (std::size_t i = 0; i < 3; ++i) worst = std::max({worst, now.nis_gyro[i], now.nis_accel[i]});

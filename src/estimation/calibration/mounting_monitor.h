@@ -120,7 +120,7 @@ class MountingMonitor {
   [[nodiscard]] static bool fits_prior_of(const SImuConfig& other, const SImuOutput& now) noexcept;
 
  private:
-  void watch_fit(Regime regime, bool gated, HostTime now, double dt_s, const SImuConfig& config,
+  void watch_fit(Regime regime, bool gated, HostTime now, double seen_s, const SImuConfig& config,
                  EventLog& log) noexcept;
   void watch_noise(const Update& update, const SImuConfig& config, EventLog& log) noexcept;
 

@@ -542,6 +542,32 @@ TEST(Estimator, AKnownMountingBeginsOnceTheTimeOffsetIsFound) {
   EXPECT_NEAR(out.t_d_s, truth[0].t_d_s, 4.0 * out.sd_t_d_s);
 }
 
+/// A cable that is pulled out with a jerk and put back: the S-IMU sits where it sat.
+TEST(Estimator, ADisturbanceBeforeASilenceIsNoNewMounting) {
+  const SimulatedStudy truth{exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.22, 0.12}, 0.004};
+  constexpr double kPulled_s = 200.0;
+  for (const double silence_s : {3.0, 30.0}) {
+    SimulatedDrive drive(260.0, {truth}, 47);
+    Estimator estimator(drive.config());
+    while (!drive.done()) {
+      const double t_s = drive.time_s();
+      HostTime arrival{};
+      for (Sample sample : drive.next()) {
+        arrival = sample.arrival;
+        if (sample.device == SimulatedDrive::kFirstStudy && sample.kind == SampleKind::kImu) {
+          if (t_s >= kPulled_s - 0.2 && t_s < kPulled_s) sample.imu.omega_radps[0] += 1.0;
+          if (t_s >= kPulled_s && t_s < kPulled_s + silence_s) continue;
+        }
+        estimator.add(sample);
+      }
+      estimator.advance(arrival);
+      ASSERT_FALSE(has_event<event::MountingChanged>(estimator)) << silence_s << " s of silence, at " << t_s;
+    }
+    EXPECT_GT(estimator.study(0).counters.gated_gyro[0], 0U) << "it was disturbed";
+    EXPECT_TRUE(has_estimate(estimator.study(0).status));
+  }
+}
+
 TEST(Estimator, AFrozenMountingStaysAsGivenWhateverTheSamplesSay) {
   const std::vector<SimulatedStudy> truth{{exp_so3(Vector3d(0.1, 0.2, -1.5)), {0.35, -0.22, 0.12}, 0.004}};
   SimulatedDrive drive(200.0, truth, 21);
