@@ -30,13 +30,37 @@ TEST(RecordChecks, MotionIsTold) {
   AxisRecord record = made_gyro(60'000, 1);
   for (std::size_t i = 20'000; i < 24'000; ++i)
     record.values[i] += 20.0 * std::sin(0.05 * static_cast<double>(i));
-  EXPECT_THAT(warnings_of(record), Contains(HasSubstr("the sensor was not at rest")));
+  EXPECT_THAT(warnings_of(record),
+              Contains(HasSubstr("the sensor was not at rest: 6.67 % of the record is shaken or "
+                                 "turned, first at 200 s;")));
 }
 
 TEST(RecordChecks, AValueThatStandsStillIsTold) {
   AxisRecord record = made_gyro(60'000, 2);
   for (std::size_t i = 30'000; i < 30'500; ++i) record.values[i] = record.values[30'000];
   EXPECT_THAT(warnings_of(record), Contains(HasSubstr("stands still for 5 s at 300 s")));
+}
+
+// A slow log: what noise and its grid would not make is told before it lasts for a second.
+TEST(RecordChecks, OfASlowLogTheGridSaysHowLongAValueMayStand) {
+  for (const double step : {0.0, 0.001, 0.8}) {
+    AxisRecord record = made_gyro(20'000, 9);
+    record.rate_hz = 1.0;
+    for (double& v : record.values) {
+      if (step > 0.0) v = step * std::round(v / step);
+    }
+    // Five in a row without a grid; forty with one, and as many times that as the grid is coarser than the noise.
+    const std::size_t noise = step == 0.0 ? 4 : step == 0.001 ? 39 : 80;
+    for (const std::size_t run : {noise, 2 * noise + 40}) {
+      AxisRecord stuck = record;
+      std::fill_n(stuck.values.begin() + 10'000, run, record.values[10'000]);
+      const auto warnings = warnings_of(stuck);
+      const bool told = std::any_of(warnings.begin(), warnings.end(), [](const std::string& warning) {
+        return warning.find("stands still for") != std::string::npos;
+      });
+      EXPECT_EQ(told, run > noise) << step << " deg/s, " << run << " in a row";
+    }
+  }
 }
 
 TEST(RecordChecks, ClippedValuesAreTold) {
