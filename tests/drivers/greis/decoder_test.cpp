@@ -215,8 +215,11 @@ TEST(GreisDecoder, APositionThatIsNotANumberIsNoSolution) {
   Rig rig;
   rig.push({rt(1000), pg(NAN, 0.04, 106.5, 0.5F, 4), vg(1.5F, -0.5F, 0.25F, 0.5F, 0), et(1000)});
   ASSERT_EQ(rig.sink.samples.size(), 1U);
-  EXPECT_EQ(rig.sink.samples[0].gnss.solution, GnssSolution::kNone);
-  EXPECT_EQ(rig.sink.samples[0].gnss.flags, 0U);
+  const GnssData& gnss = rig.sink.samples[0].gnss;
+  EXPECT_EQ(gnss.solution, GnssSolution::kNone);
+  EXPECT_EQ(gnss.flags, 0U);
+  EXPECT_EQ((std::array{gnss.latitude_rad, gnss.longitude_rad, gnss.height_m}), (std::array{0.0, 0.0, 0.0}))
+      << "what is no number goes no further, nor half of a position";
 }
 
 TEST(GreisDecoder, ADateThatCannotBeGivesNoUtc) {

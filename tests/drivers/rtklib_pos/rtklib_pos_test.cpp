@@ -298,6 +298,33 @@ TEST(RtklibPosDecoder, ColumnsOfVelocityThatTheHeaderNamesAreNeeded) {
   EXPECT_EQ(cut.decoder.counters().bad_contents, 2U);
 }
 
+TEST(RtklibPosDecoder, VelocityAlongTheAxesOfTheEarthIsTurnedToNorthEastDown) {
+  const Geodetic at{45.5 * kRadPerDeg, -5.25 * kRadPerDeg, 81.5};
+  const auto xyz_m = ecef_of(at);
+  const auto c = rotation_ecef_to_ned(at);
+  const Vector3 v_n_mps{3.0, -2.0, 0.5};
+  std::string row = "2026/03/14 12:34:56.100";
+  for (const double value : xyz_m) row += " " + std::to_string(value);
+  row += " 1 12 0.1 0.1 0.1 0 0 0 0.1 12.3";
+  for (std::size_t i = 0; i < 3; ++i)
+    row += " " + std::to_string(c[i] * v_n_mps[0] + c[3 + i] * v_n_mps[1] + c[6 + i] * v_n_mps[2]);
+  Rig rig;
+  const auto& samples = rig.push("%  GPST  x-ecef(m)  y-ecef(m)  z-ecef(m)   Q  vx(m/s)  vy(m/s)  vz(m/s)\n" +
+                                 row + " 0.2 0.2 0.2 0 0 0\n");
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].gnss.flags & kVelocityValid, kVelocityValid);
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(samples[0].gnss.v_n_mps[i], v_n_mps[i], 2e-6) << i;  // written with 6 decimals
+}
+
+TEST(RtklibPosDecoder, AnEpochRoundedUpToTheEndOfItsWeekIsTheBeginningOfTheNext) {
+  // As 604799.9996 s is printed with three decimals.
+  Rig rig;
+  const auto& samples = rig.push("2409 604800.000 45.5 -5.25 81.5 1 12 1 1 1 0 0 0 0 0\n");
+  ASSERT_EQ(samples.size(), 1U);
+  EXPECT_EQ(samples[0].utc, kDay + 24h - 18s);
+}
+
 TEST(RtklibPosDecoder, StandardDeviationsOfZeroAreNone) {
   Rig rig;
   const auto& samples = rig.push("2026/03/14 12:34:56.100 45.5 -5.25 81.5 1 12 0.1 0 0.1 0 0 0 0 0\n");

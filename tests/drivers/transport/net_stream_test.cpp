@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -307,6 +308,24 @@ TEST(NetStream, AServerThatDoesNotAnswerWithinASecondIsToldWithWhatMayBeTheReaso
   ASSERT_FALSE(last);
   EXPECT_NE(last.error().text().find(std::strerror(ETIMEDOUT)), std::string::npos) << last.error().text();
   EXPECT_NE(last.error().remedy.find("network cable"), std::string::npos);
+}
+
+TEST(NetStream, AServerThatLostItsPowerIsFoundOutWithinSeconds) {
+  // It says nothing more, not even that it is gone: the kernel has to ask it.
+  FarEnd server(SOCK_STREAM);
+  auto stream = NetStream::open({NetKind::kTcp, "127.0.0.1", server.port()});
+  ASSERT_TRUE(stream) << stream.error().text();
+  const auto option = [&](int level, int name) {
+    int value = 0;
+    socklen_t size = sizeof value;
+    EXPECT_EQ(getsockopt((*stream)->fd(), level, name, &value, &size), 0);
+    return value;
+  };
+  EXPECT_NE(option(SOL_SOCKET, SO_KEEPALIVE), 0);
+  const int found_out_s = option(IPPROTO_TCP, TCP_KEEPIDLE) +
+                          option(IPPROTO_TCP, TCP_KEEPINTVL) * option(IPPROTO_TCP, TCP_KEEPCNT);
+  EXPECT_EQ(found_out_s, 11);
+  EXPECT_NE(option(IPPROTO_TCP, TCP_NODELAY), 0) << "a command waits for no other";
 }
 
 TEST(NetStream, AnAddressOfAnotherPcCannotBeListenedTo) {

@@ -295,7 +295,9 @@ TEST_F(SerialPortTest, UnplugIsNoticedAndTheSameNameOpensTheNewDevice) {
   PluggedDevice again(name_);
   auto reopened = SerialPort::open(settings_);
   ASSERT_TRUE(reopened) << reopened.error().text();
+  const int unplugged = port->fd();
   port = std::move(reopened);
+  EXPECT_EQ(fcntl(unplugged, F_GETFD), -1) << "the old one is closed, so that its name comes free";
   ASSERT_EQ(write(again.near_end(), "x", 1), 1);
   ASSERT_TRUE(becomes_readable(port->fd()));
   EXPECT_EQ(port->read(buffer).n, 1U);

@@ -192,6 +192,21 @@ TEST(UbxSession, OnlyNavPvtIsWhatItWaitsFor) {
   EXPECT_EQ(session.problem(), "");
 }
 
+TEST(UbxDecoder, WhatTheLineDamagedIsCountedByItsKind) {
+  const auto vectors = test::load_vectors(test::source_path("tests/vectors/ubx_nav_pvt.hex"));
+  const Bytes& good = vectors.front().bytes;
+  Bytes damaged = good;
+  damaged[10] ^= 0x01U;
+  const Bytes endless{0xB5, 0x62, 0x01, 0x07, 0xFF, 0xFF};  // a payload longer than any message's
+  Rig rig;
+  for (const Bytes& bytes : {damaged, endless, good}) rig.push(bytes);
+  rig.decoder.finish({}, rig.sink);
+  EXPECT_EQ(rig.decoder.counters().bad_checksums, 1U);
+  EXPECT_EQ(rig.decoder.counters().bad_lengths, 1U);
+  EXPECT_EQ(rig.decoder.counters().bytes_skipped, damaged.size() + endless.size());
+  EXPECT_EQ(rig.decoder.counters().frames, 1U);
+}
+
 TEST(UbxCapture, TheWalkWithNmeaMixedInLosesNoByte) {
   IMUSCOPE_NEEDS_SHARED("data/streams/ubx/walk.ubx");
   const Bytes bytes = test::load_bytes(test::shared_path("data/streams/ubx/walk.ubx"));

@@ -114,6 +114,20 @@ TEST(Container, CrcsOffsetsAndCountsAreRight) {
     }
     if (record->opcode == Opcode::kStatistics) {
       EXPECT_EQ(fields.number<std::uint64_t>(), 60U);
+      EXPECT_EQ(fields.number<std::uint16_t>(), 1U) << "schemas";
+      EXPECT_EQ(fields.number<std::uint32_t>(), 2U) << "channels";
+      EXPECT_EQ(fields.number<std::uint32_t>(), 1U) << "attachments";
+      EXPECT_EQ(fields.number<std::uint32_t>(), 1U) << "metadata";
+      EXPECT_EQ(fields.number<std::uint32_t>(), static_cast<std::uint32_t>(counts[Opcode::kChunk]));
+      EXPECT_EQ(fields.number<std::uint64_t>(), 1000U) << "the first message's time";
+      EXPECT_EQ(fields.number<std::uint64_t>(), 1059U) << "the last message's time";
+      // The messages of each channel.
+      EXPECT_EQ(fields.number<std::uint32_t>(), 2 * (sizeof(std::uint16_t) + sizeof(std::uint64_t)));
+      for (const auto channel : {std::uint16_t{1}, std::uint16_t{2}}) {
+        EXPECT_EQ(fields.number<std::uint16_t>(), channel);
+        EXPECT_EQ(fields.number<std::uint64_t>(), 30U) << "channel " << channel;
+      }
+      EXPECT_TRUE(fields.good() && fields.rest().empty());
     }
     if (record->opcode == Opcode::kFooter) {
       EXPECT_EQ(fields.number<std::uint64_t>(), summary_start);

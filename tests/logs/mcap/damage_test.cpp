@@ -91,6 +91,17 @@ TEST(Damage, AMessageLongerThanItsChunkIsLost) {
   const auto read = read_file(with_chunk(inside.size(), "", inside, inside.size()));
   EXPECT_TRUE(read.messages.empty());
   EXPECT_FALSE(read.losses.empty());
+
+  std::string goes_on = with_chunk(inside.size(), "", inside, inside.size());
+  RecordWriter writer(goes_on);
+  for (int i = 0; i < 3; ++i) {
+    const auto begun = writer.begin(Opcode::kMetadata);
+    writer.text("note"), writer.texts({});
+    writer.end(begun);
+  }
+  const auto once = read_file(goes_on);
+  ASSERT_FALSE(once.losses.empty());
+  EXPECT_NE(once.losses.front().find(": 1 messages are damaged"), std::string::npos) << once.losses.front();
 }
 
 }  // namespace

@@ -96,6 +96,92 @@ TEST(Json, WhatIsNoImuIsRefused) {
   }
 }
 
+/// An array of `n` numbers from `first` on, as JSON.
+std::string counted(std::size_t n, int first) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < n; ++i)
+    text += (i == 0 ? "" : ",") + std::to_string(first + static_cast<int>(i));
+  return text + "]";
+}
+
+constexpr const char* kHeader = R"({"header":{"frame_id":"here","stamp":{"sec":7,"nanosec":8}},)";
+
+TEST(Json, EveryValueOfAFixIsRead) {
+  const std::string text = std::string(kHeader) +
+                           R"("status":{"status":2},"latitude":48.5,"longitude":-2.25,"altitude":81.5,)"
+                           R"("position_covariance":)" +
+                           counted(9, 1) + R"(,"position_covariance_type":3})";
+  NavSatFix fix;
+  ASSERT_TRUE(read_json(bytes_of(text), fix));
+  EXPECT_EQ(fix.header.stamp_ns, 7'000'000'008);
+  EXPECT_EQ(fix.header.frame_id, "here");
+  EXPECT_EQ(fix.status, 2);
+  EXPECT_EQ(fix.latitude_deg, 48.5);
+  EXPECT_EQ(fix.longitude_deg, -2.25);
+  EXPECT_EQ(fix.altitude_m, 81.5);
+  EXPECT_EQ(fix.position_covariance, (Covariance3{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  EXPECT_EQ(fix.position_covariance_type, 3);
+}
+
+TEST(Json, AFixThatSaysNothingOfItsCovarianceIsReadAndOneWithoutAPlaceIsRefused) {
+  NavSatFix fix;
+  ASSERT_TRUE(read_json(bytes_of(std::string(kHeader) + R"("status":{"status":0},"latitude":1,)"
+                                                        R"("longitude":2,"altitude":3})"),
+                        fix));
+  EXPECT_EQ(fix.position_covariance, Covariance3{});
+  EXPECT_EQ(fix.position_covariance_type, 0);
+  for (const char* rest : {R"("longitude":2,"altitude":3})", R"("latitude":1,"altitude":3})",
+                           R"("latitude":1,"longitude":2})"}) {
+    EXPECT_FALSE(read_json(bytes_of(std::string(kHeader) + R"("status":{"status":0},)" + rest), fix)) << rest;
+  }
+}
+
+TEST(Json, EveryValueOfAnOdometryIsRead) {
+  const std::string text =
+      std::string(kHeader) +
+      R"("child_frame_id":"car","pose":{"pose":{"position":{"x":1,"y":2,"z":3},)"
+      R"("orientation":{"x":0.1,"y":0.2,"z":0.3,"w":0.9}},"covariance":)" +
+      counted(36, 100) +
+      R"(},"twist":{"twist":{"linear":{"x":4,"y":5,"z":6},"angular":{"x":7,"y":8,"z":9}},"covariance":)" +
+      counted(36, 200) + "}}";
+  Odometry odometry;
+  ASSERT_TRUE(read_json(bytes_of(text), odometry));
+  EXPECT_EQ(odometry.header.stamp_ns, 7'000'000'008);
+  EXPECT_EQ(odometry.child_frame_id, "car");
+  EXPECT_EQ(odometry.position_m, (Vector{1, 2, 3}));
+  EXPECT_EQ(odometry.orientation, (Quaternion{0.1, 0.2, 0.3, 0.9}));
+  EXPECT_EQ(odometry.linear_mps, (Vector{4, 5, 6}));
+  EXPECT_EQ(odometry.angular_radps, (Vector{7, 8, 9}));
+  EXPECT_EQ(odometry.pose_covariance[35], 135.0);
+  EXPECT_EQ(odometry.twist_covariance[1], 201.0);
+}
+
+TEST(Json, ATwistIsReadWithItsCovarianceAndWithoutOne) {
+  const std::string twist = R"({"linear":{"x":4,"y":5,"z":6},"angular":{"x":7,"y":8,"z":9}})";
+  TwistStamped bare;
+  ASSERT_TRUE(read_json(bytes_of(std::string(kHeader) + R"("twist":)" + twist + "}"), bare));
+  EXPECT_EQ(bare.linear_mps, (Vector{4, 5, 6}));
+  EXPECT_EQ(bare.angular_radps, (Vector{7, 8, 9}));
+  EXPECT_EQ(bare.covariance, Covariance6{});
+  TwistStamped known;
+  ASSERT_TRUE(read_json(bytes_of(std::string(kHeader) + R"("twist":{"twist":)" + twist + R"(,"covariance":)" +
+                                 counted(36, 100) + "}}"),
+                        known));
+  EXPECT_EQ(known.header.stamp_ns, 7'000'000'008);
+  EXPECT_EQ(known.linear_mps, (Vector{4, 5, 6}));
+  EXPECT_EQ(known.angular_radps, (Vector{7, 8, 9}));
+  EXPECT_EQ(known.covariance[7], 107.0);
+}
+
+TEST(Json, EveryValueOfATimeReferenceIsRead) {
+  TimeReference reference;
+  ASSERT_TRUE(read_json(
+      bytes_of(std::string(kHeader) + R"("time_ref":{"sec":5,"nanosec":6},"source":"gps"})"), reference));
+  EXPECT_EQ(reference.header.stamp_ns, 7'000'000'008);
+  EXPECT_EQ(reference.time_ref_ns, 5'000'000'006);
+  EXPECT_EQ(reference.source, "gps");
+}
+
 TEST(Schema, EveryTypeThatIsUsedIsDefinedOnce) {
   for (const char* type : {"sensor_msgs/Imu", "sensor_msgs/NavSatFix", "sensor_msgs/TimeReference",
                            "nav_msgs/Odometry", "tf2_msgs/TFMessage", "diagnostic_msgs/DiagnosticArray"}) {
