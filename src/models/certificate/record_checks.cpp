@@ -169,7 +169,7 @@ std::vector<std::string> record_warnings(const AxisRecord& record, std::span<con
                     high ? e.at_high : e.at_low, high ? e.high : e.low));
   }
   // Runs that noise of this spread and resolution would not make.
-  const double in_a_row = step > 0.0 ? std::max(10.0, 40.0 * std::max(1.0, step / so_far.sd)) : 5.0;
+  const double in_a_row = step > 0.0 ? 40.0 * std::max(1.0, step / so_far.sd) : 5.0;
   if (static_cast<double>(e.longest_run) > std::max(in_a_row, record.rate_hz)) {
     warnings.push_back(fmt::format(
         "the value stands still for {:.3g} s at {:.0f} s: the sensor or the log was stuck",

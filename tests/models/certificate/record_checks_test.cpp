@@ -51,7 +51,8 @@ TEST(RecordChecks, OfASlowLogTheGridSaysHowLongAValueMayStand) {
     }
     // Five in a row without a grid; forty with one, and as many times that as the grid is coarser than the noise.
     const std::size_t noise = step == 0.0 ? 4 : step == 0.001 ? 39 : 80;
-    for (const std::size_t run : {noise, 2 * noise + 40}) {
+    const std::size_t stands = step == 0.8 ? 160 : noise + 6;
+    for (const std::size_t run : {noise, stands}) {
       AxisRecord stuck = record;
       std::fill_n(stuck.values.begin() + 10'000, run, record.values[10'000]);
       const auto warnings = warnings_of(stuck);
