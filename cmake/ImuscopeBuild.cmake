@@ -6,7 +6,7 @@ include(GoogleTest)
 option(IMUSCOPE_TESTS "Build the tests" ON)
 option(IMUSCOPE_WERROR "Treat warnings as errors" ON)
 option(IMUSCOPE_FUZZ "Build the libFuzzer targets (clang only)" OFF)
-option(IMUSCOPE_TRIALS "Build the studies and benchmarks that no test runs, too" OFF)
+option(IMUSCOPE_TRIALS "Build the trials and benchmarks that no test runs, too" OFF)
 set(IMUSCOPE_SANITIZE "" CACHE STRING "Sanitizers to build with: empty, 'address,undefined' or 'thread'")
 
 set(CMAKE_CXX_STANDARD 20)

@@ -59,7 +59,7 @@ class DemoVehicle {
 
   /// Another line in place of the device's own.
   DemoVehicle& put_on_line(const std::string& name, const TomlKeys& line);
-  /// One more device, behind the others.
+  /// One more device, after the others.
   DemoVehicle& add_device(const TomlKeys& keys, const TomlKeys& line);
   /// Takes out a device and its truth.
   DemoVehicle& without(const std::string& name);

@@ -135,7 +135,7 @@ Seed run(const standard_drive::Truth& truth, const Options& options, std::uint64
   return outcomes;
 }
 
-/// Seeds that were run, kept in a text file, so that a long study may be broken off and taken up again.
+/// Seeds that were run, kept in a text file, so that a long run may be broken off and taken up again.
 class Results {
  public:
   explicit Results(const Options& options) : file_(options.results) {

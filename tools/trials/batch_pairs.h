@@ -1,6 +1,6 @@
 #pragma once
 
-/// The study drive as the records that the batch estimate takes, and what it should find in them.
+/// The standard drive as the records that the batch estimate takes, and what it should find in them.
 ///
 /// A gyro triad whose axes are not at right angles has several frames that could be called its own. The truth
 /// is turned to the one that the estimate publishes: x along the x gyro, y in the plane of the x and y gyros.

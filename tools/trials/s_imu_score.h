@@ -48,7 +48,7 @@ Eigen::Matrix<double, 6, 1> mounting_error(const imuscope::SImuOutput& out, cons
 /// Its square in units of the published covariance: 6 in the mean where that is right.
 double mounting_nees(const imuscope::SImuOutput& out, const SImuTruth& truth);
 
-/// All kinds of one study.
+/// All kinds of one S-IMU.
 class SImuScore {
  public:
   void add(const imuscope::SImuOutput& out, const SImuTruth& truth);

@@ -132,7 +132,7 @@ Instruments::Instruments(const Truth& truth, const Draw& draw, std::uint64_t see
 }
 
 const Tick& Instruments::next() {
-  // The noise of the studies does not depend on the regime.
+  // The noise of the S-IMUs does not depend on the regime.
   constexpr imusim::Regime kAny = imusim::Regime::kDynamic;
   tick_.clear();
   const bool harsh = truth_.world_ == imusim::WorldKind::kHarsh;

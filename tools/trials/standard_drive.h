@@ -1,6 +1,6 @@
 #pragma once
 
-/// The drive of the estimator's studies as samples: a fibre-optic R-IMU, three S-IMUs of MTx class at 0, 90
+/// The drive of the estimator's trials as samples: a fibre-optic R-IMU, three S-IMUs of MTx class at 0, 90
 /// and 180 degrees, GNSS fixes at 5 Hz. Clocks are perfect; the trajectory is one and the same, every error
 /// is drawn anew from the seed. In the ideal world samples are instantaneous and the body is rigid; in the
 /// harsh one sensors have all that imu/imperfections.h draws.

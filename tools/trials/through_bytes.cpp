@@ -222,7 +222,7 @@ void print(const std::string& name, const Device& device) {
              three(mean.head<3>(), 1), three(mean.tail<3>(), 1));
 }
 
-/// @return  whether every goal is met: a NEES that a consistent filter shows in 999 of 1000 studies, and in
+/// @return  whether every goal is met: a NEES that a consistent filter shows in 999 of 1000 runs, and in
 /// the ideal world the mounting within the samples' goals and a fifth, and the time offset from drive to
 /// drive
 bool print(const Options& options, const Totals& t) {

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Samples of a simulated vehicle with wheel sensors: R-IMU anywhere on it, GNSS that can be cut, wheels.
-/// For the odometry's study and its tests.
+/// For the odometry's trial and its tests.
 
 #include <Eigen/Core>
 #include <cstdint>
