@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "tests/support/recorded_answer.h"
+
 namespace imuscope {
 namespace {
 
@@ -128,6 +130,55 @@ TEST(CanErrorFrame, IsDescribedInWords) {
   EXPECT_EQ(describe_can_error(error_frame(0x004, {})), "controller") << "without a status";
   EXPECT_EQ(describe_can_error(error_frame(0x200, {0, 0, 0, 0, 0, 0, 7, 9})),
             "errors: transmit 7, receive 9");
+}
+
+/// Every class and every status alone and together with a neighbour, as it is reported, described and told.
+TEST(CanSession, WholeAnswers) {
+  std::string text;
+  const auto add = [&](const CanFrame& frame) {
+    const CanErrorReport r = read_can_error(frame);
+    text += describe_can_error(frame) + " | " + (r.state ? std::to_string(static_cast<int>(*r.state)) : "-") +
+            (r.restarted ? " restarted" : "") + (r.receive_overflow ? " rx" : "") +
+            (r.transmit_overflow ? " tx" : "") + (r.not_acknowledged ? " nack" : "") +
+            (r.bus_error ? " bus" : "") + ' ' + std::to_string(r.has_counts) + ' ' +
+            std::to_string(r.transmit_errors) + ' ' + std::to_string(r.receive_errors) + '\n';
+  };
+  for (unsigned bit = 0; bit < 12; ++bit) {
+    add(error_frame(1U << bit, {0, 0x15, 3, 4, 5, 6, 70, 80}));
+    add(error_frame(1U << bit | 0x04U, {0, 0x2A, 3, 4, 5, 6, 70, 80}));
+    add(error_frame(1U << bit | 0x240U, {0, 0, 3, 4, 5, 6, 70, 80}));
+  }
+  for (unsigned status = 0; status < 256; ++status)
+    add(error_frame(0x04, {0, static_cast<std::uint8_t>(status), 0, 0, 0, 0, 1, 2}));
+  test::expect_recorded("drivers/can_bus/errors.txt", text);
+
+  std::string told;
+  const std::vector<CanFrame> frames{kWarning,  kPassive,         kActive,    kBusOff,
+                                     kBusError, kReceiveOverflow, kRestarted, data_frame()};
+  for (const CanFrame& first : frames) {
+    for (const CanFrame& second : frames) {
+      CanSession session;
+      HostTime now{};
+      const auto step = [&](Duration wait, const CanFrame* frame) {
+        now += wait;
+        if (frame != nullptr) {
+          std::vector<std::uint8_t> record(kCanRecordMaxBytes);
+          record.resize(write_can_record(*frame, record));
+          session.on_bytes(record, now);
+        }
+        static_cast<void>(session.poll(now));
+        told += std::to_string(static_cast<int>(session.state())) +
+                std::to_string(static_cast<int>(session.bus_state())) + ' ' +
+                std::to_string(session.error_frames()) + std::to_string(session.overflows()) + ' ' +
+                std::string(session.problem().substr(0, 30)) + " | ";
+      };
+      step(seconds{1}, &first), step(milliseconds{500}, &second), step(seconds{1}, nullptr),
+          step(milliseconds{1}, nullptr), step(seconds{8} + milliseconds{999}, nullptr),
+          step(milliseconds{1}, nullptr), step(milliseconds{1}, &second);
+      told += '\n';
+    }
+  }
+  test::expect_recorded("drivers/can_bus/told.txt", told);
 }
 
 }  // namespace

@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <sstream>
 
 #include "drivers/dbc/parser.h"
+#include "tests/drivers/support/sample_text.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/recorded_answer.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::can_odometry {
@@ -425,6 +428,173 @@ TEST(CanOdometry, SignalsThatAreNotInTheFileAreRefusedByName) {
     ASSERT_FALSE(made) << name;
     EXPECT_NE(made.error().text().find(name), std::string::npos) << made.error().text();
   }
+}
+
+// Everything that comes out of rich streams, held as it once was.
+
+std::string all_of(Rig& rig) {
+  std::string text;
+  for (const Sample& sample : rig.sink.samples) text += test::sample_text(sample) + '\n';
+  const OdometryCounters& c = rig.decoder->odometry_counters();
+  return text + test::counts_text(rig.decoder->counters()) + " short " + std::to_string(c.too_short) +
+         " invalid " + std::to_string(c.invalid) + " impossible " + std::to_string(c.impossible) +
+         " incomplete " + std::to_string(c.incomplete) + '\n' + std::string(rig.decoder->remark()) + "\n--\n";
+}
+
+Choice whole_choice() {
+  Choice choice = rear_wheels();
+  choice.direction_signal = "LEVER";
+  choice.backward_values = {"reverse", "7"};
+  choice.fault_signals = {"BROKEN"};
+  choice.invalid_raw = {-500.0, 123.4};
+  choice.counter_signal = "COUNT";
+  return choice;
+}
+
+TEST(CanOdometryWhole, FaultsDirectionsInvalidNumbersAndCounts) {
+  DecoderConfig config;
+  config.device = 3;
+  config.latency = 15ms;
+  Rig rig(whole_choice(), config);
+  std::uint8_t count = 0;
+  const auto rear = [&](int left, int right, unsigned broken = 0, int step = 1) {
+    count = static_cast<std::uint8_t>((count + step) & 0xF);
+    rig.rear(left, right, static_cast<std::uint8_t>(broken << 7U | count));
+  };
+  rear(32767, 100), rear(100, 32767), rear(-500, 100), rear(123, 100), rear(124, 100), rear(100, 123);
+  rear(3600, 3960), rear(3610, 3970, 1), rear(3620, 3980), rear(3630, 3990, 0, 3), rear(3640, 4000, 0, 0);
+  for (int i = 0; i < 14; ++i) rear(3640 + i, 4000);
+  for (const int lever : {1, 2, 7, 0, 8}) {
+    rig.frame(2, {static_cast<std::uint8_t>(lever)}, rig.now, true);
+    rig.frame(2, {1}, rig.now);
+    rear(360, 364), rear(-360, 364), rear(-360, -364);
+  }
+  rig.frame(170, {1, 2, 3}, rig.now);
+  rig.frame(170, {1, 2, 3, 4}, rig.now);
+  rear(360, 364);
+  rig.now += 61s;
+  rear(360, 364);
+  for (int i = 0; i < 13; ++i) rear(20'000, 20'004);
+  for (int i = 0; i < 3; ++i) rear(32'000, -32'001);
+  rear(20'000, 20'004);
+  std::string text = all_of(rig);
+  Choice magnitudes = rear_wheels();
+  magnitudes.has_no_sign = true;
+  Rig another(magnitudes);
+  another.rear(3600, 3960), another.rear(32'767, 3960);
+  text += all_of(another);
+  test::expect_recorded("drivers/can_odometry/faults.txt", text, test::kSampleShare);
+}
+
+TEST(CanOdometryWhole, WheelsOfSeveralFrames) {
+  Choice choice;
+  choice.speed_signals = {"RL", "FL", "MUXED.V"};
+  choice.wheel_radius_m = 0.3;
+  DecoderConfig config;
+  config.rate_hz = 50.0;
+  Rig rig(choice, config);
+  const auto wheels = [&](Duration rear, Duration front, Duration third, std::uint8_t page = 1) {
+    rig.frame(170, {0x0E, 0x10, 0, 0, 0, 0, 0, 0}, rig.now + rear);
+    rig.frame(171, {66, 0, 0, 0}, rig.now + front);
+    rig.frame(300, {page, 9, 0}, rig.now + third);
+    rig.now += 20ms;
+  };
+  wheels(0ms, 1ms, 2ms);
+  wheels(2ms, 1ms, 0ms);
+  wheels(0ms, 1ms, 2ms, 2);
+  wheels(0ms, 1ms, 2ms);
+  wheels(0ms, 1ms, 30ms);
+  wheels(0ms, 1ms, Duration{30ms} + Duration{1});
+  wheels(-31ms, 1ms, 0ms);
+  wheels(0ms, 1ms, 2ms);
+  rig.frame(300, {1, 9}, rig.now);
+  rig.frame(300, {2, 9}, rig.now);
+  rig.frame(171, {66}, rig.now);
+  test::expect_recorded("drivers/can_odometry/several_frames.txt", all_of(rig), test::kSampleShare);
+}
+
+TEST(CanOdometryWhole, GapsAreLearnedFromTheStamps) {
+  std::string text;
+  for (const double rate_hz : {50.0, 20.0, 100.0}) {
+    for (const int jitter_us : {0, 3000}) {
+      DecoderConfig config;
+      config.rate_hz = rate_hz;
+      Rig rig(rear_wheels(), config);
+      std::string line;
+      for (int i = 0; i < 260; ++i) {
+        const auto off = std::chrono::microseconds(jitter_us * ((i * 7) % 11 - 5) / 5);
+        rig.now += off;
+        rig.rear(3600, 3960);
+        rig.now -= off;
+        if (i == 40 || i == 100 || i % 50 == 49) rig.now += 20ms * (i % 7);
+        if (i == 130) rig.now += 31ms;
+        if (i > 200) rig.now += 20ms;
+        if (i % 5 == 4) line += ' ' + std::to_string(rig.decoder->counters().samples_lost);
+      }
+      text += test::real_text(rate_hz) + ' ' + std::to_string(jitter_us) + ':' + line + '\n';
+    }
+  }
+  test::expect_recorded("drivers/can_odometry/gaps.txt", text);
+}
+
+TEST(CanOdometryWhole, WhatIsPossible) {
+  std::string text;
+  for (const int after : {3600, 3600 + 359, 3600 + 361, 3600 + 503, 3600 + 505, 7300, 35'900, -3600}) {
+    for (const Duration pause :
+         {Duration{0ms}, Duration{80ms}, Duration{979ms}, Duration{980ms}, Duration{981ms}}) {
+      Rig rig(rear_wheels());
+      rig.rear(3600, 3600);
+      rig.now += pause;
+      for (int i = 0; i < 12; ++i) rig.rear(std::min(after, 32'700), std::min(after, 32'700));
+      text += std::to_string(after) + ' ' + test::in_groups(pause.count()) + ' ' +
+              std::to_string(rig.sink.samples.size()) + ' ' +
+              std::to_string(rig.decoder->odometry_counters().impossible) + ' ' +
+              std::string(rig.decoder->remark()) + '\n';
+    }
+  }
+  for (const double most : {99.9, 100.0, 100.1}) {
+    DecoderConfig config;
+    config.max_speed_mps = most;
+    config.max_acceleration_mps2 = 1e6;
+    Choice choice = rear_wheels();
+    choice.unit = SpeedUnit::kMps;
+    Rig rig(choice, config);
+    rig.rear(10'000, 10'000), rig.rear(-10'000, -10'000), rig.rear(10'001, 10'001);
+    text += all_of(rig);
+  }
+  test::expect_recorded("drivers/can_odometry/possible.txt", text, test::kSampleShare);
+}
+
+TEST(CanOdometryWhole, SentencesAboutChoices) {
+  std::string text;
+  const auto add = [&](const std::function<void(Choice&)>& change) {
+    Choice choice = rear_wheels();
+    change(choice);
+    const auto made = Decoder::make(car(), choice, {});
+    if (!made) {
+      text += made.error().text() + '\n';
+      return;
+    }
+    for (const CanId& id : (*made)->ids()) text += std::to_string(id.id) + (id.is_extended ? "x " : " ");
+    text += '\n';
+  };
+  add([](Choice&) {});
+  add([](Choice& c) { c.speed_signals.clear(); });
+  add([](Choice& c) { c.speed_signals = {"RLL"}; });
+  add([](Choice& c) { c.speed_signals = {"FR"}; });
+  add([](Choice& c) { c.speed_signals = {"FL"}; });
+  add([](Choice& c) { c.speed_signals = {"FL"}, c.wheel_radius_m = -1.0; });
+  add([](Choice& c) { c.speed_signals = {"FL"}, c.wheel_radius_m = 0.3; });
+  add([](Choice& c) { c.speed_signals = {"FR"}, c.unit = SpeedUnit::kRadps; });
+  add([](Choice& c) { c.direction_signal = "LEVERR"; });
+  add([](Choice& c) { c.direction_signal = "LEVER", c.backward_values = {"back"}; });
+  add([](Choice& c) { c.direction_signal = "LEVER", c.backward_values = {"1x"}; });
+  add([](Choice& c) { c.direction_signal = "LEVER", c.backward_values = {"1", "reverse"}; });
+  add([](Choice& c) { c.direction_signal = "PAGE", c.backward_values = {"back"}; });
+  add([](Choice& c) { c.fault_signals = {"BROKE"}; });
+  add([](Choice& c) { c.counter_signal = "COUN"; });
+  add([](Choice& c) { c = whole_choice(); });
+  test::expect_recorded("drivers/can_odometry/choices.txt", text);
 }
 
 }  // namespace

@@ -8,8 +8,10 @@
 #include <optional>
 
 #include "drivers/dbc/parser.h"
+#include "tests/drivers/support/sample_text.h"
 #include "tests/drivers/support/streams.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/recorded_answer.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope::xsens_can {
@@ -451,6 +453,195 @@ TEST(XsensCanDecoder, GroupsWithoutTimeAndCountGiveNoSampleAndTheRemedyIsSaid) {
   for (int i = 0; i < 10; ++i, unit.next_period()) unit.increments();
   EXPECT_TRUE(unit.samples().empty());
   EXPECT_NE(unit.decoder.remark().find("SampleTime"), std::string_view::npos);
+}
+
+// Everything that comes out of rich streams, held as it once was.
+
+std::string all_of(Unit& unit) {
+  std::string text;
+  for (const Sample& sample : unit.samples()) text += test::sample_text(sample) + '\n';
+  text += test::counts_text(unit.decoder.counters()) + " source " +
+          std::to_string(static_cast<int>(unit.decoder.source())) + " tick " +
+          std::to_string(unit.decoder.tick_ns()) + " order " +
+          std::to_string(static_cast<int>(unit.decoder.high_rate_order())) + " drift " +
+          test::real_text(unit.decoder.clock_drift_ppm()) + '\n';
+  return text + std::string(unit.decoder.remark()) + "\n--\n";
+}
+
+DecoderConfig whole_config() {
+  DecoderConfig config;
+  config.device = 3;
+  config.axes = {0, 1, 0, 0, 0, -1, -1, 0, 0};
+  return config;
+}
+
+/// Numbers that change from group to group and are all different.
+void moving_increments(Unit& unit) {
+  const auto k = unit.period;
+  unit.frame(Item::kDeltaV, be({{100 + k, 2}, {-200 - k, 2}, {3200 + k, 2}, {15, 1}}));
+  unit.frame(Item::kDeltaQ, be({{32700, 2}, {300 + k, 2}, {-400, 2}, {500 - k, 2}}));
+}
+void moving_rates(Unit& unit) {
+  const auto k = static_cast<int>(unit.period);
+  unit.frame(Item::kRateOfTurn, triad(10 + k, -20, 256 - k));
+  unit.frame(Item::kAcceleration, triad(30 + k, -40 - k, 2511));
+}
+
+TEST(XsensCanWhole, GroupsOfEveryKind) {
+  std::string text;
+  for (const std::int64_t ticks : {1, 100}) {
+    Unit unit(whole_config());
+    unit.ticks_per_100us = ticks;
+    unit.groups(4, [&] { moving_increments(unit); });
+    unit.groups(2, [&] { moving_rates(unit); });
+    unit.groups(2, [&] {
+      unit.frame(Item::kStatusWord, be({{0x2900, 4}}));
+      moving_increments(unit);
+    });
+    unit.counter += 3;  // lost groups
+    unit.sample_time += 300 * ticks;
+    unit.groups(2, [&] { moving_increments(unit); });
+    unit.sample_time += 7 * ticks;  // another step than the period
+    unit.groups(2, [&] { moving_increments(unit); });
+    unit.groups(1, [&] { unit.frame(Item::kError, be({{1, 1}})); });
+    unit.groups(2, [&] { moving_increments(unit); });
+    unit.groups(1, [&] { unit.frame(Item::kDeltaV, be({{1, 2}, {2, 2}, {3, 2}, {15, 1}})); });
+    unit.groups(1, [&] { unit.frame(Item::kDeltaQ, be({{1, 2}})); });
+    unit.groups(2, [&] { moving_increments(unit); });
+    // Without one of the two that open a group.
+    for (int i = 0; i < 2; ++i, unit.next_period()) {
+      unit.frame(Item::kSampleTime, be({{unit.sample_time, 4}}));
+      moving_increments(unit);
+    }
+    for (int i = 0; i < 2; ++i, unit.next_period()) {
+      unit.frame(Item::kGroupCounter, be({{unit.counter, 2}}));
+      moving_increments(unit);
+    }
+    unit.groups(2, [&] { moving_increments(unit); });
+    // Repeated openings, and one of another group.
+    unit.opening();
+    unit.opening();
+    moving_increments(unit);
+    unit.opening();
+    unit.next_period();
+    unit.frame(Item::kSampleTime, be({{unit.sample_time, 4}}));
+    unit.frame(Item::kSampleTime, be({{unit.sample_time + 100 * ticks, 4}}));
+    moving_increments(unit);
+    unit.next_period(), unit.next_period();
+    unit.groups(2, [&] { moving_increments(unit); });
+    // Starts anew.
+    unit.counter = 0;
+    unit.sample_time = 50;
+    unit.groups(4, [&] { moving_increments(unit); });
+    unit.sample_time = 4'294'967'296 - 150 * ticks;
+    unit.groups(5, [&] { moving_increments(unit); });
+    text += all_of(unit);
+  }
+  test::expect_recorded("drivers/xsens_can/groups.txt", text, test::kSampleShare);
+}
+
+TEST(XsensCanWhole, TimeAloneCountAloneAndABetterSourceThatGoes) {
+  std::string text;
+  {
+    Unit unit(whole_config());
+    for (int i = 0; i < 6; ++i, unit.next_period()) {
+      unit.frame(Item::kSampleTime, be({{unit.sample_time, 4}}));
+      moving_rates(unit);
+      if (i == 3) unit.next_period(), unit.next_period();
+    }
+    text += all_of(unit);
+  }
+  {
+    Unit unit(whole_config());
+    for (int i = 0; i < 6; ++i, unit.next_period()) {
+      unit.frame(Item::kGroupCounter, be({{unit.counter, 2}}));
+      moving_rates(unit);
+      if (i == 3) unit.next_period(), unit.next_period();
+    }
+    text += all_of(unit);
+  }
+  for (const int without : {99, 100, 101}) {
+    Unit unit(whole_config());
+    unit.groups(3, [&] { moving_increments(unit); });
+    unit.groups(without, [&] { moving_rates(unit); });
+    unit.groups(3, [&] { moving_rates(unit); });
+    text += all_of(unit);
+  }
+  for (const double rate_hz : {50.0, 400.0}) {
+    DecoderConfig config = whole_config();
+    config.rate_hz = rate_hz;
+    config.clock = ClockMapConfig::fixed(HostTime{5s}, 1.0);
+    Unit unit(config);
+    unit.groups(4, [&] { moving_increments(unit); });
+    text += all_of(unit);
+  }
+  // The tick is told by the side of a step.
+  for (const std::int64_t ticks : {1, 9, 10, 11, 100}) {
+    Unit unit(whole_config());
+    unit.ticks_per_100us = ticks;
+    unit.groups(3, [&] { moving_rates(unit); });
+    text += std::to_string(ticks) + ' ' + all_of(unit);
+  }
+  test::expect_recorded("drivers/xsens_can/sources.txt", text, test::kSampleShare);
+}
+
+TEST(XsensCanWhole, HighRateFramesAndWhichOfThemIsTheForce) {
+  std::string text;
+  struct Case {
+    int force, rate;
+    bool force_first;
+    int frames;
+  };
+  for (const Case& one :
+       {Case{2511, 10, true, 1}, Case{2511, 10, false, 2}, Case{2637, 10, true, 1}, Case{2640, 10, true, 1},
+        Case{2384, 10, true, 1}, Case{2382, 10, true, 1}, Case{2511, 17, true, 1}, Case{2511, 18, true, 1}}) {
+    Unit unit(whole_config());
+    unit.groups(54, [&] {
+      for (int i = 0; i < one.frames; ++i) {
+        const auto k = static_cast<int>(unit.period % 3);
+        unit.frame(one.force_first ? Item::kHighRateFirst : Item::kHighRateSecond,
+                   triad(3 * i, k, one.force));
+        unit.frame(one.force_first ? Item::kHighRateSecond : Item::kHighRateFirst,
+                   triad(one.rate, 1 - k, 2 * i));
+      }
+    });
+    text += std::to_string(one.force) + ' ' + std::to_string(one.rate) + ' ' + all_of(unit);
+  }
+  test::expect_recorded("drivers/xsens_can/high_rate.txt", text, test::kSampleShare);
+}
+
+TEST(XsensCanWhole, FramesOfEveryLengthAndWhatIsRemarked) {
+  std::string text;
+  for (std::size_t item = 0; item < kItemCount; ++item) {
+    for (std::size_t size = 0; size <= 8; ++size) {
+      Unit unit(whole_config());
+      unit.opening();
+      unit.frame(static_cast<Item>(item), Data(size, 1));
+      text += std::to_string(item) + ' ' + std::to_string(size) + ' ' +
+              test::counts_text(unit.decoder.counters()) + ' ' + std::string(unit.decoder.remark()) + '\n';
+    }
+  }
+  for (const int frames : {7, 8, 9, 10}) {
+    Unit unit(whole_config());
+    for (int i = 0; i < frames; ++i) unit.frame(Item::kStatusWord, be({{1, 4}}));
+    text += std::to_string(frames) + ' ' + std::string(unit.decoder.remark()) + '\n';
+    unit.opening();
+    text += std::string(unit.decoder.remark()) + '\n';
+  }
+  Unit forces(whole_config());
+  forces.groups(3, [&] { forces.frame(Item::kAcceleration, triad(1, 2, 3)); });
+  text += all_of(forces);
+  Unit other(whole_config());
+  other.frame(CanId{0x123, false}, Data(8, 1));
+  other.frame(CanId{0x005, true}, Data(8, 1));
+  other.frame(Item::kError, be({{0, 1}}));
+  text += all_of(other);
+  for (const Data& data :
+       {be({{0x8001, 2}, {0x7FFF, 2}, {-3, 2}, {200, 1}}), be({{1, 2}, {2, 2}, {3, 2}, {0, 1}})}) {
+    text += test::real_text(read_delta_v(data).value_or(Triad{})) + ' ' +
+            test::real_text(read_delta_q(data).value_or(std::array<double, 4>{})) + '\n';
+  }
+  test::expect_recorded("drivers/xsens_can/lengths.txt", text, test::kSampleShare);
 }
 
 }  // namespace

@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <optional>
 
 #include "base/bytes.h"
+#include "tests/drivers/support/sample_text.h"
 #include "tests/drivers/xsens_mt/mt_frames.h"
+#include "tests/support/recorded_answer.h"
 
 namespace imuscope::xsens {
 namespace {
@@ -153,7 +156,7 @@ struct Bench {
     for (const HostTime end = now + duration; now < end; now += milliseconds{1}) step();
   }
   void step() {
-    const auto written = session.poll(now);
+    const Bytes written = diary.step(now);
     if (!written.empty() && device.powered) {
       to_device.append(written, now);
       Frame f;
@@ -175,6 +178,7 @@ struct Bench {
   HostTime now = host_time_from_ns(1'000'000'000'000);
   ScriptedDevice device;
   MtSession session;
+  test::SessionDiary diary{session};  ///< of all that was said
   Scanner to_device;
 };
 
@@ -600,6 +604,311 @@ TEST(MtSession, AsksAnMtData2DeviceForItemsAndChecksTheRatesThatItTook) {
       EXPECT_NE(session.problem().find("took 40 Hz"), std::string_view::npos);
     }
   }
+}
+
+// Whole conversations, word by word: every message in its order, its repetitions and their times, every state and every
+// sentence.
+
+struct Conversation {
+  std::string_view name;
+  MtSessionConfig config;
+  std::function<void(Bench&)> run;
+};
+
+void run_measuring(Bench& bench) {
+  bench.device.measuring = true;
+  bench.run(seconds{3});
+}
+
+MtSessionConfig config_with(const std::function<void(MtSessionConfig&)>& change) {
+  MtSessionConfig config;
+  change(config);
+  return config;
+}
+
+void set_up_already(ScriptedDevice& device) {
+  device.mode = kDefaultLayout.mode;
+  device.settings = kDefaultLayout.settings;
+}
+
+/// What a device that sends MTData2 says in one message.
+Bytes wanted_mtdata2(std::uint32_t fine, double force_z_mps2 = 9.8) {
+  Bytes data;
+  append_item(data, xdi::kSampleTimeFine, u32(fine));
+  append_item(data, xdi::kAcceleration, floats({0.1, 0.2, force_z_mps2}));
+  append_item(data, xdi::kRateOfTurn, floats({0.01, 0.02, 0.03}));
+  return frame(mid::kMtData2, data);
+}
+
+/// Hears nothing; what it sends is given.
+void run_deaf(Bench& bench, const std::function<Bytes(int)>& sent, Duration period, int n) {
+  bench.device.powered = false;
+  for (int i = 0; i < n; ++i) {
+    bench.session.on_bytes(sent(i), bench.now);
+    bench.run(period);
+  }
+}
+
+std::vector<Conversation> conversations() {
+  std::vector<Conversation> all;
+  const auto add = [&](std::string_view name, const MtSessionConfig& config,
+                       const std::function<void(Bench&)>& run) {
+    all.push_back({name, config, run});
+  };
+  add("from the factory", {}, run_measuring);
+  add("silent from the factory", {}, [](Bench& bench) { bench.run(seconds{3}); });
+  add("as wanted", {}, [](Bench& bench) {
+    set_up_already(bench.device);
+    run_measuring(bench);
+  });
+  add("as wanted but for the period", {}, [](Bench& bench) {
+    set_up_already(bench.device);
+    bench.device.period = 1400;
+    run_measuring(bench);
+  });
+  add("with a skip factor", {}, [](Bench& bench) {
+    set_up_already(bench.device);
+    bench.device.skip = 1;
+    run_measuring(bench);
+  });
+  add("at 50 Hz", config_with([](auto& c) { c.rate_hz = 50.0; }), run_measuring);
+  add("no power", {}, [](Bench& bench) {
+    bench.device.powered = false;
+    bench.run(seconds{15});
+  });
+  add("no power, searching", config_with([](auto& c) { c.searching_baud = true; }), [](Bench& bench) {
+    bench.device.powered = false;
+    bench.run(seconds{8});
+  });
+  add("data without ears", {}, [](Bench& bench) {
+    run_deaf(
+        bench, [](int) { return frame(mid::kMtData, Bytes(5)); }, milliseconds{100}, 100);
+  });
+  add("messages without ears", {}, [](Bench& bench) {
+    run_deaf(
+        bench, [](int) { return frame(0x31, {}, 3); }, milliseconds{100}, 50);
+  });
+  add("noise", {}, [](Bench& bench) {
+    run_deaf(
+        bench, [](int) { return Bytes(10, 0x55); }, milliseconds{100}, 60);
+  });
+  add("slow to hear", {}, [](Bench& bench) {
+    bench.device.ignores_go_to_config = 5;
+    run_measuring(bench);
+  });
+  add("never goes to config before a reset", {}, [](Bench& bench) {
+    bench.device.ignores_go_to_config = 1000;
+    bench.device.measuring = true;
+    bench.run(seconds{8});
+  });
+  for (const std::uint8_t id :
+       {mid::kReqDid, mid::kReqConfiguration, mid::kPeriod, mid::kOutputSkipFactor, mid::kOutputMode,
+        mid::kOutputSettings, mid::kReqDataLength, mid::kGoToMeasurement}) {
+    add("one message is never answered", {}, [id](Bench& bench) {
+      bench.device.never_answers = id;
+      bench.run(seconds{12});
+    });
+    add("one message is refused once", {}, [id](Bench& bench) {
+      bench.device.refuses[id] = 0x21;
+      bench.run(seconds{3});
+    });
+  }
+  add("measures nothing", {}, [](Bench& bench) {
+    bench.device.sends_nothing = true;
+    bench.run(seconds{14});
+  });
+  add("drops a bit of the mode", {}, [](Bench& bench) {
+    bench.device.modes_known = output_mode::kOrientation | output_mode::kTemperature;
+    bench.run(seconds{4});
+  });
+  add("text", {}, [](Bench& bench) {
+    bench.device.sends_text = true;
+    run_measuring(bench);
+  });
+  add("sync in", config_with([](auto& c) { c.sync_in = SyncIn{0x5, 3, 29491}; }), run_measuring);
+  add("sync in, set up already", config_with([](auto& c) {
+        c.sync_in = SyncIn{0x5, 3, 29491};
+      }),
+      [](Bench& bench) {
+        set_up_already(bench.device);
+        run_measuring(bench);
+      });
+  add("sync in that it does not know", config_with([](auto& c) {
+        c.sync_in = SyncIn{0x15, 3, 29491};
+      }),
+      [](Bench& bench) {
+        set_up_already(bench.device);
+        bench.device.sync_modes_known = 0x7;
+        bench.run(seconds{5});
+      });
+  add("sync in as it is", config_with([](auto& c) {
+        c.sync_in = SyncIn{2, 4, 5};
+      }),
+      [](Bench& bench) {
+        set_up_already(bench.device);
+        bench.device.sync_mode = 2, bench.device.sync_skip = 4, bench.device.sync_offset = 5;
+        bench.run(seconds{3});
+      });
+  add("the right device", config_with([](auto& c) { c.device_id = 0x00300123; }), run_measuring);
+  add("another device", config_with([](auto& c) { c.device_id = 0x00300124; }), run_measuring);
+  const auto on_a_bus = [](std::size_t devices) {
+    return config_with([devices](auto& c) { c.bus_devices = devices; });
+  };
+  const auto xbus = [](std::uint16_t devices, bool measuring, bool set_up) {
+    return [devices, measuring, set_up](Bench& bench) {
+      bench.device.id = 0x00100042;
+      bench.device.n_devices = devices;
+      bench.device.measuring = measuring;
+      if (set_up) set_up_already(bench.device);
+      bench.run(seconds{3});
+    };
+  };
+  add("three on a bus", on_a_bus(3), xbus(3, false, false));
+  add("three on a bus that measure", on_a_bus(3), xbus(3, true, true));
+  add("two of three on a bus", on_a_bus(3), xbus(2, false, false));
+  add("none on a bus", on_a_bus(1), xbus(0, false, false));
+  add("a bus instead of a device", {}, xbus(1, false, false));
+  add("a device instead of a bus", on_a_bus(1), [](Bench& bench) { bench.run(seconds{3}); });
+  add("stalls", {}, [](Bench& bench) {
+    run_measuring(bench);
+    bench.stalled = true;
+    bench.run(milliseconds{3500});
+    bench.stalled = false;
+    bench.run(seconds{1});
+  });
+  add("loses power", {}, [](Bench& bench) {
+    run_measuring(bench);
+    bench.device.powered = false;
+    bench.run(seconds{18});
+    bench.device.powered = true;
+    bench.device.measuring = false;
+    bench.run(seconds{4});
+  });
+  add("slow and silent", config_with([](auto& c) { c.rate_hz = 10.0; }), [](Bench& bench) {
+    bench.run(seconds{3});
+    bench.device.measuring = false;
+    bench.device.powered = false;
+    bench.run(seconds{4});
+  });
+  add("starts anew", {}, [](Bench& bench) {
+    run_measuring(bench);
+    bench.device.measuring = false;
+    bench.device.mode = output_mode::kOrientation;
+    bench.device.send(frame(mid::kWakeUp));
+    bench.run(seconds{2});
+  });
+  add("sends something else", {}, [](Bench& bench) {
+    run_measuring(bench);
+    bench.device.mode = output_mode::kOrientation;
+    bench.run(seconds{3});
+  });
+  add("wakes up after it was given up", {}, [](Bench& bench) {
+    bench.device.never_answers = mid::kReqDid;
+    bench.run(seconds{10});
+    bench.device.never_answers.reset();
+    bench.device.send(frame(mid::kWakeUp));
+    bench.run(seconds{2});
+  });
+  for (const double rate_hz : {100.0, 333.0, 350.0, 399.0, 400.0}) {
+    add("rates", config_with([rate_hz](auto& c) { c.rate_hz = rate_hz; }),
+        [](Bench& bench) { bench.run(milliseconds{700}); });
+  }
+  for (const double baud : {0.0, 47'700.0, 47'800.0, 52'400.0, 52'600.0}) {
+    add("lines", config_with([baud](auto& c) { c.baud = baud, c.stop_bits = baud > 50'000.0 ? 2 : 1; }),
+        [](Bench& bench) { bench.run(milliseconds{700}); });
+  }
+  add("long frames on a bus", config_with([](auto& c) { c.bus_devices = 7, c.baud = 300'000.0; }),
+      [](Bench& bench) { bench.run(milliseconds{700}); });
+  add("a bus too long for its line", config_with([](auto& c) { c.bus_devices = 7; }),
+      [](Bench& bench) { bench.run(milliseconds{700}); });
+  const auto mtdata2 = [](MtSessionConfig::Output output) {
+    return config_with([output](auto& c) { c.output = output; });
+  };
+  for (const auto output : {MtSessionConfig::Output::kAsDevice, MtSessionConfig::Output::kLegacy,
+                            MtSessionConfig::Output::kMtData2}) {
+    for (const std::uint32_t step : {100U, 99U, 118U, 200U}) {
+      add("MTData2 comes", mtdata2(output), [step](Bench& bench) {
+        run_deaf(
+            bench, [step](int i) { return wanted_mtdata2(5000U + step * static_cast<std::uint32_t>(i)); },
+            milliseconds{10}, 58);
+      });
+    }
+    add("a device of MTData2", mtdata2(output), [](Bench& bench) {
+      bench.device.mode = 0;
+      bench.device.settings =
+          output_settings::kNoAcceleration | output_settings::kNoRate | output_settings::kNoField;
+      bench.device.refuses[mid::kOutputConfiguration] = 0x04;
+      bench.run(seconds{3});
+    });
+  }
+  for (const int permille : {840, 860, 1000, 1140, 1160, 1300}) {
+    add("data at another rate", {}, [permille](Bench& bench) {
+      run_deaf(
+          bench, [](int i) { return mtdata(static_cast<std::uint16_t>(65530 + i)); },
+          milliseconds{10} * permille / 1000, 45);
+    });
+  }
+  for (const double force_mps2 : {0.9, 1.1, 499.0, 501.0}) {
+    for (const double rate_radps : {0.0, 49.9, 50.1}) {
+      add("data that may be none", {}, [force_mps2, rate_radps](Bench& bench) {
+        run_deaf(
+            bench,
+            [&](int i) {
+              return mtdata(static_cast<std::uint16_t>(i), {0.0, force_mps2, 0.0}, {rate_radps, 0.0, 0.0});
+            },
+            milliseconds{10}, 45);
+      });
+    }
+  }
+  return all;
+}
+
+TEST(MtSession, WholeConversations) {
+  std::string text;
+  for (const Conversation& one : conversations()) {
+    Bench bench(one.config);
+    one.run(bench);
+    text += "-- " + std::string(one.name) + '\n' + bench.diary.text() + "id " +
+            std::to_string(bench.session.device_id().value_or(0)) + '\n';
+  }
+  test::expect_recorded("drivers/xsens_mt/conversations.txt", text);
+}
+
+TEST(MtSession, AcknowledgedOutputsOfEveryKind) {
+  std::string text;
+  MtSessionConfig config;
+  config.output = MtSessionConfig::Output::kMtData2;
+  const std::vector<std::vector<std::uint16_t>> lists{
+      {0x1020, 0xFFFF, 0x1060, 0xFFFF, 0x4020, 100, 0x8020, 100, 0xE020, 0xFFFF},
+      {0x4020, 100, 0x8020, 50},
+      {0x8020, 100},
+      {0x4020, 99, 0x8020, 100},
+      {0x4020, 100},
+      {}};
+  for (const auto& list : lists) {
+    MtSession session(config);
+    test::SessionDiary diary(session);
+    Bytes acknowledged;
+    for (const std::uint16_t word : list) append(acknowledged, be16(word));
+    Scanner to_device;
+    for (int ms = 0; ms < 2000; ++ms) {
+      const HostTime now = host_time_from_ns(1'000'000LL * ms);
+      to_device.append(diary.step(now), now);
+      Frame f;
+      while (to_device.next(f)) {
+        if (f.mid == mid::kGoToConfig) session.on_bytes(frame(0x31), now);
+        if (f.mid == mid::kReqDid) session.on_bytes(frame(mid::kDeviceId, u32(7)), now);
+        if (f.mid == mid::kReqConfiguration) session.on_bytes(configuration(1152, 0, 1, 0, 0, 0, 7), now);
+        if (f.mid == mid::kOutputConfiguration) session.on_bytes(frame(0xC1, acknowledged), now);
+        if (f.mid == mid::kGoToMeasurement) {
+          session.on_bytes(frame(0x11), now);
+          session.on_bytes(wanted_mtdata2(1000), now);
+        }
+      }
+    }
+    text += "--\n" + diary.text();
+  }
+  test::expect_recorded("drivers/xsens_mt/acknowledged_outputs.txt", text);
 }
 
 }  // namespace
