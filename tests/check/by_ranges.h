@@ -34,7 +34,7 @@ inline std::vector<double> steps(double first, double last, int n) {
 
 /// What is found of each value, by ranges of values of which the same is found.
 inline std::string by_ranges(const std::string& title, const std::vector<double>& values,
-                      const std::function<std::string(double)>& answer) {
+                             const std::function<std::string(double)>& answer) {
   std::string text = title + '\n';
   std::string before;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -49,14 +49,17 @@ inline std::string by_ranges(const std::string& title, const std::vector<double>
 inline std::string words_of(const std::vector<Finding>& findings) {
   std::string text;
   for (const Finding& f : findings)
-    text += fmt::format("{}[{} {} {}: {}]", text.empty() ? "" : " ", key_of(f.harm), f.device, f.check, f.what);
+    text +=
+        fmt::format("{}[{} {} {}: {}]", text.empty() ? "" : " ", key_of(f.harm), f.device, f.check, f.what);
   return text.empty() ? "-" : text;
 }
 
 /// Three devices without samples; the rates of the configuration are 100, 50 and 10 Hz.
 class Empty {
  public:
-  Empty() : made_(made_drive({.length_s = 0.0, .reference_hz = 100.0, .study_hz = 50.0, .gnss_hz = 10.0})), drive_(made_.configuration) {}
+  Empty()
+      : made_(made_drive({.length_s = 0.0, .reference_hz = 100.0, .study_hz = 50.0, .gnss_hz = 10.0})),
+        drive_(made_.configuration) {}
   Empty(const Empty&) = delete;
   Empty& operator=(const Empty&) = delete;
 

@@ -117,15 +117,32 @@ name = "last"
 
 TEST(ConfigLines, AreWrittenIntoAnyTomlAsTheyOnceWere) {
   const std::vector<std::vector<ConfigLine>> all{
-      {{"a#b", "axes", "1"}}, {{"a#b", "rate_hz", "2"}}, {{"a#b", "new", "3"}}, {{"a#b", "csv.a", "4"}}, {{"a#b", "csv.b", "5"}},
-      {{"a#b", "csv.clock", "6"}}, {{"a#b", "csv.new", "7"}}, {{"a#b", "noise.x", "8"}}, {{"a#b", "prior.x", "9"}}, {{"s", "csv.clock", "10"}},
-      {{"s", "csv.new", "11"}}, {{"s", "noise.a", "12"}}, {{"s", "prior.y", "13"}}, {{"s", "name", "14"}}, {{"last", "name", "15"}},
-      {{"last", "rate_hz", "16"}}, {{"last", "new", "17"}}, {{"last", "csv.new", "18"}}, {{"nobody", "x", "19"}}, {{"b", "x", "20"}},
+      {{"a#b", "axes", "1"}},
+      {{"a#b", "rate_hz", "2"}},
+      {{"a#b", "new", "3"}},
+      {{"a#b", "csv.a", "4"}},
+      {{"a#b", "csv.b", "5"}},
+      {{"a#b", "csv.clock", "6"}},
+      {{"a#b", "csv.new", "7"}},
+      {{"a#b", "noise.x", "8"}},
+      {{"a#b", "prior.x", "9"}},
+      {{"s", "csv.clock", "10"}},
+      {{"s", "csv.new", "11"}},
+      {{"s", "noise.a", "12"}},
+      {{"s", "prior.y", "13"}},
+      {{"s", "name", "14"}},
+      {{"last", "name", "15"}},
+      {{"last", "rate_hz", "16"}},
+      {{"last", "new", "17"}},
+      {{"last", "csv.new", "18"}},
+      {{"nobody", "x", "19"}},
+      {{"b", "x", "20"}},
       {{"s", "csv.gyro_unit", "21"}, {"last", "x.y", "22"}, {"last", "x.z", "23"}, {"last", "x.y", "24"}}};
   std::string text;
   for (const auto& lines : all) {
     const auto written = with_lines(kUntidy, lines);
-    text += "---- " + lines[0].device + ' ' + lines[0].key + '\n' + (written ? *written : written.error().text() + '\n');
+    text += "---- " + lines[0].device + ' ' + lines[0].key + '\n' +
+            (written ? *written : written.error().text() + '\n');
   }
   text += with_lines("[[device]]\nname = \"a\"", {{"a", "x", "1"}}).value();
   text += with_lines("[[device]]\nname = \"a\"\nx = [\n1,\n", {{"a", "x", "1"}}).value();

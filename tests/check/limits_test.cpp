@@ -12,11 +12,12 @@ namespace {
 TEST(LimitsOfStamps, AreWhereTheyWere) {
   std::string text;
   for (const std::size_t device : {kReference, kGnss}) {
-    text += by_ranges(fmt::format("rate of device {}, of that configured", device), ratios(5e-10, 20.0, 1000), [&](double ratio) {
-      Empty empty;
-      empty.fill(device, 80, ratio * (device == kGnss ? 10.0 : 100.0));
-      return empty.stamps(device);
-    });
+    text += by_ranges(fmt::format("rate of device {}, of that configured", device), ratios(5e-10, 20.0, 1000),
+                      [&](double ratio) {
+                        Empty empty;
+                        empty.fill(device, 80, ratio * (device == kGnss ? 10.0 : 100.0));
+                        return empty.stamps(device);
+                      });
   }
   text += by_ranges("number of stamps", steps(40, 60, 20), [](double n) {
     Empty empty;
@@ -52,7 +53,8 @@ TEST(LimitsOfStamps, AreWhereTheyWere) {
   text += by_ranges("samples of 1000 with the time of another", steps(0, 120, 120), [](double same) {
     Empty empty;
     empty.fill(kReference, 1001, 100.0);
-    for (std::size_t i = 1; i < 2 * static_cast<std::size_t>(same); i += 2) empty.imu().time_s[i] = empty.imu().time_s[i - 1];
+    for (std::size_t i = 1; i < 2 * static_cast<std::size_t>(same); i += 2)
+      empty.imu().time_s[i] = empty.imu().time_s[i - 1];
     return empty.stamps();
   });
   text += by_ranges("samples of 1000 that the counter misses", steps(0, 60, 60), [](double lost) {
@@ -84,7 +86,9 @@ TEST(LimitsOfStamps, NumbersOfStampsAreThoseOfTheSeries) {
   }
   {
     Empty empty;
-    for (std::size_t i = 0; i < 400; ++i) empty.add_imu(kReference, 0.01 * static_cast<double>(i) + (i > 100 ? 0.3 : 0.0) + (i > 300 ? 0.2 : 0.0));
+    for (std::size_t i = 0; i < 400; ++i)
+      empty.add_imu(kReference,
+                    0.01 * static_cast<double>(i) + (i > 100 ? 0.3 : 0.0) + (i > 300 ? 0.2 : 0.0));
     tell("gaps of 0.31 and 0.21 s in 4.49 s", empty);
   }
   {
@@ -131,13 +135,21 @@ TEST(LimitsOfStamps, TwoFilesAreExchangedWhereEachHasTheOthersRate) {
     empty.fill(kReference, n, reference_hz);
     empty.fill(kStudy, n, study_hz);
     std::vector<Finding> findings;
-    for (const std::size_t device : {kReference, kStudy, kGnss}) check_stamps(empty.drive(), device, findings);
+    for (const std::size_t device : {kReference, kStudy, kGnss})
+      check_stamps(empty.drive(), device, findings);
     findings.push_back({.check = "rate", .device = "other"});
     const bool exchanged = check_files(empty.drive(), findings);
     return fmt::format("{}\n{}", exchanged, findings_text(findings));
   };
   std::string text;
-  for (const auto& [a, b] : {std::pair(50.0, 100.0), {54.0, 108.0}, {46.0, 93.0}, {56.0, 100.0}, {50.0, 112.0}, {50.0, 50.0}, {100.0, 100.0}, {100.0, 50.0}})
+  for (const auto& [a, b] : {std::pair(50.0, 100.0),
+                             {54.0, 108.0},
+                             {46.0, 93.0},
+                             {56.0, 100.0},
+                             {50.0, 112.0},
+                             {50.0, 50.0},
+                             {100.0, 100.0},
+                             {100.0, 50.0}})
     text += fmt::format("{} and {} Hz: {}", a, b, answer(a, b));
   text += "49 stamps: " + answer(50.0, 100.0, 49) + "50 stamps: " + answer(50.0, 100.0, 50);
   test::expect_recorded("check/exchanged_files.txt", text);
@@ -154,7 +166,8 @@ TEST(LimitsOfSignals, AreWhereTheyWere) {
   text += by_ranges("samples at the largest value, in threes", steps(3, 40, 37), [](double n) {
     Empty empty;
     empty.fill(kReference, 1000, 100.0);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) empty.imu().omega_radps[20 * (i / 3) + i % 3].x() = 0.5F;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i)
+      empty.imu().omega_radps[20 * (i / 3) + i % 3].x() = 0.5F;
     return signals_of(empty);
   });
   text += by_ranges("the same one by one, in pairs, in threes ...", steps(1, 6, 5), [](double together) {
@@ -168,22 +181,28 @@ TEST(LimitsOfSignals, AreWhereTheyWere) {
     Empty empty;
     empty.fill(kReference, 1000, 100.0);
     for (std::size_t i = 0; i < 60; ++i) empty.imu().omega_radps[i].z() = 1.0F;
-    for (std::size_t i = 100; i < 100 + static_cast<std::size_t>(n); ++i) empty.imu().omega_radps[i].z() = 0.998F + 1e-6F * static_cast<float>(i);
+    for (std::size_t i = 100; i < 100 + static_cast<std::size_t>(n); ++i)
+      empty.imu().omega_radps[i].z() = 0.998F + 1e-6F * static_cast<float>(i);
     return signals_of(empty);
   });
-  text += by_ranges("how far below 40 of 60 at the end are, of the range", ratios(1e-4, 0.02, 200), [](double share) {
-    Empty empty;
-    empty.fill(kReference, 1000, 100.0);
-    for (std::size_t i = 0; i < 60; ++i) empty.imu().omega_radps[i].z() = 0.9F;
-    for (std::size_t i = 100; i < 140; ++i) empty.imu().omega_radps[i].z() = 0.9F - static_cast<float>(share) - 1e-5F * static_cast<float>(i - 100);
-    return signals_of(empty);
-  });
+  text += by_ranges("how far below 40 of 60 at the end are, of the range", ratios(1e-4, 0.02, 200),
+                    [](double share) {
+                      Empty empty;
+                      empty.fill(kReference, 1000, 100.0);
+                      for (std::size_t i = 0; i < 60; ++i) empty.imu().omega_radps[i].z() = 0.9F;
+                      for (std::size_t i = 100; i < 140; ++i)
+                        empty.imu().omega_radps[i].z() =
+                            0.9F - static_cast<float>(share) - 1e-5F * static_cast<float>(i - 100);
+                      return signals_of(empty);
+                    });
   text += by_ranges("steps below the end that 40 of 60 are", ratios(0.5, 5.0, 100), [](double at) {
     Empty empty;
     empty.fill(kReference, 1000, 100.0);
-    for (std::size_t i = 0; i < 1000; ++i) empty.imu().omega_radps[i].z() = 0.01F * std::round(empty.imu().omega_radps[i].z() / 0.01F);
+    for (std::size_t i = 0; i < 1000; ++i)
+      empty.imu().omega_radps[i].z() = 0.01F * std::round(empty.imu().omega_radps[i].z() / 0.01F);
     for (std::size_t i = 0; i < 60; ++i) empty.imu().omega_radps[i].z() = 0.2F;
-    for (std::size_t i = 100; i < 140; ++i) empty.imu().omega_radps[i].z() = 0.2F - 0.01F * static_cast<float>(at);
+    for (std::size_t i = 100; i < 140; ++i)
+      empty.imu().omega_radps[i].z() = 0.2F - 0.01F * static_cast<float>(at);
     return signals_of(empty);
   });
   text += by_ranges("share of samples with the value before", steps(0.3, 0.8, 100), [](double share) {
@@ -227,7 +246,8 @@ TEST(LimitsOfSignals, AreWhereTheyWere) {
 
 TEST(LimitsOfSignals, EveryAxisIsNamedWithTheWorst) {
   std::string text;
-  const auto tell = [&](const std::string& title, const std::function<void(Eigen::Vector3f&, Eigen::Vector3f&, std::size_t)>& change) {
+  const auto tell = [&](const std::string& title,
+                        const std::function<void(Eigen::Vector3f&, Eigen::Vector3f&, std::size_t)>& change) {
     Empty empty;
     empty.fill(kReference, 1200, 100.0);
     for (std::size_t i = 0; i < 1200; ++i) change(empty.imu().omega_radps[i], empty.imu().f_mps2[i], i);
@@ -298,7 +318,8 @@ TEST(LimitsOfGravity, AreWhereTheyWere) {
   });
   text += by_ranges("forces beside rates of gravity's size, m/s2", ratios(0.3, 20.0, 400), [](double f_mps2) {
     Empty empty;
-    still(empty, 70, Eigen::Vector3f(0.0F, 9.8F, 0.0F), Eigen::Vector3f(static_cast<float>(f_mps2), 0.0F, 0.0F));
+    still(empty, 70, Eigen::Vector3f(0.0F, 9.8F, 0.0F),
+          Eigen::Vector3f(static_cast<float>(f_mps2), 0.0F, 0.0F));
     std::vector<Finding> findings;
     check_gravity_norm(empty.drive(), kReference, findings);
     return words_of(findings);
@@ -316,12 +337,22 @@ TEST(LimitsOfGravity, AreWhereTheyWere) {
 TEST(LimitsOfGravity, WhatIsFoundIsPutRightInTheDrive) {
   std::string text;
   for (const Protocol protocol : {Protocol::kCsvImu, Protocol::kXsensMt}) {
-    for (const auto& [w, f] : {std::pair(0.1F, 1.0F), {0.1F, 96.2F}, {0.1F, 1000.0F}, {0.1F, 9806.0F}, {0.1F, 0.098F}, {9.8F, 0.2F}, {1.0F, 0.2F}, {0.1F, 2.0F}, {0.1F, 30.0F}}) {
+    for (const auto& [w, f] : {std::pair(0.1F, 1.0F),
+                               {0.1F, 96.2F},
+                               {0.1F, 1000.0F},
+                               {0.1F, 9806.0F},
+                               {0.1F, 0.098F},
+                               {9.8F, 0.2F},
+                               {1.0F, 0.2F},
+                               {0.1F, 2.0F},
+                               {0.1F, 30.0F}}) {
       Empty empty;
       empty.configuration().devices[kReference].protocol = protocol;
-      still(empty, 65, Eigen::Vector3f(0.0F, 0.6F * w, 0.8F * w), Eigen::Vector3f(0.36F * f, -0.48F * f, 0.8F * f));
+      still(empty, 65, Eigen::Vector3f(0.0F, 0.6F * w, 0.8F * w),
+            Eigen::Vector3f(0.36F * f, -0.48F * f, 0.8F * f));
       text += fmt::format("{} {}\n{}", w, f, gravity_of(empty));
-      text += fmt::format("  then {:.5g} {:.5g} {:.5g} {:.5g}\n", empty.imu().omega_radps[7].y(), empty.imu().f_mps2[7].x(), empty.imu().f_mps2[7].y(), empty.imu().f_mps2[64].z());
+      text += fmt::format("  then {:.5g} {:.5g} {:.5g} {:.5g}\n", empty.imu().omega_radps[7].y(),
+                          empty.imu().f_mps2[7].x(), empty.imu().f_mps2[7].y(), empty.imu().f_mps2[64].z());
     }
   }
   test::expect_recorded("check/gravity.txt", text);

@@ -88,11 +88,10 @@ RatesAndForces imu_at(const Motion& m) {
                                            Eigen::AngleAxisd(m.roll_rad, Eigen::Vector3d::UnitX()))
                                               .toRotationMatrix();
   const Eigen::Vector3d f_level(m.acceleration_mps2, m.speed_mps * m.turn_radps, -kMps2PerG);
-  const Eigen::Vector3d omega(m.roll_radps - std::sin(m.pitch_rad) * m.turn_radps,
-                              std::cos(m.roll_rad) * m.pitch_radps +
-                                  std::sin(m.roll_rad) * std::cos(m.pitch_rad) * m.turn_radps,
-                              -std::sin(m.roll_rad) * m.pitch_radps +
-                                  std::cos(m.roll_rad) * std::cos(m.pitch_rad) * m.turn_radps);
+  const Eigen::Vector3d omega(
+      m.roll_radps - std::sin(m.pitch_rad) * m.turn_radps,
+      std::cos(m.roll_rad) * m.pitch_radps + std::sin(m.roll_rad) * std::cos(m.pitch_rad) * m.turn_radps,
+      -std::sin(m.roll_rad) * m.pitch_radps + std::cos(m.roll_rad) * std::cos(m.pitch_rad) * m.turn_radps);
   return {omega, level_from_body.transpose() * f_level};
 }
 
@@ -168,7 +167,8 @@ std::vector<Sample> gnss_samples(const MadeDrive& how) {
     }
     const Motion m = motion_at(how, (step + 0.5) / kStepsPerSecond);
     course_rad += 0.5 * m.turn_radps / kStepsPerSecond;
-    place_m += m.speed_mps / kStepsPerSecond * Eigen::Vector3d(std::cos(course_rad), std::sin(course_rad), 0.0);
+    place_m +=
+        m.speed_mps / kStepsPerSecond * Eigen::Vector3d(std::cos(course_rad), std::sin(course_rad), 0.0);
     course_rad += 0.5 * m.turn_radps / kStepsPerSecond;
   }
   return samples;
@@ -188,9 +188,10 @@ test::DriveInMemory made_drive(const MadeDrive& how) {
 std::string findings_text(const std::vector<Finding>& findings) {
   std::string text;
   for (const Finding& f : findings) {
-    text += fmt::format("  {} | {} | {} | {} | {:.7g} | {:.7g} | {} | {}", key_of(f.harm), f.check, f.device, f.what,
-                        f.value, f.expected, f.unit, f.remedy);
-    for (const ConfigLine& line : f.mends) text += fmt::format(" | {}.{} = {}", line.device, line.key, line.value);
+    text += fmt::format("  {} | {} | {} | {} | {:.7g} | {:.7g} | {} | {}", key_of(f.harm), f.check, f.device,
+                        f.what, f.value, f.expected, f.unit, f.remedy);
+    for (const ConfigLine& line : f.mends)
+      text += fmt::format(" | {}.{} = {}", line.device, line.key, line.value);
     text += '\n';
   }
   return text.empty() ? "  nothing\n" : text;

@@ -20,7 +20,7 @@ struct MadeDrive {
   /// Turns of the course and tilts of the body, as a share of the usual ones.
   double turns = 1.0;
   double tilts = 1.0;
-  double rest_s = 12.0;   ///< standing, before it begins to move
+  double rest_s = 12.0;    ///< standing, before it begins to move
   bool straights = false;  ///< turns and tilts in the last quarter of each minute alone
 };
 

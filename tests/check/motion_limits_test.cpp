@@ -54,7 +54,8 @@ TEST(Tracks, TakeWhatIsWholeAndFinite) {
       drive.add(sample);
     }
   }
-  for (const std::uint32_t clip : {kGyroClipX, kGyroClipY, kGyroClipZ, kAccelClipX, kAccelClipY, kAccelClipZ, kGapBefore})
+  for (const std::uint32_t clip :
+       {kGyroClipX, kGyroClipY, kGyroClipZ, kAccelClipX, kAccelClipY, kAccelClipZ, kGapBefore})
     drive.add(imu_sample_at(52.0, valid | clip));
   drive.add(sample_of(kReference, SampleKind::kOdometry, 53.0));
   const ImuTrack& track = drive.imu(kReference);
@@ -136,14 +137,17 @@ ImuTrack numbered_track(const std::vector<double>& times_s) {
 }
 
 TEST(Bins, AreMeansOverTenthsOfASecondAndThenOverSoManyOfThem) {
-  const ImuTrack track = numbered_track({-0.31, -0.29, -0.21, -0.15, 0.05, 0.11, 0.12, 0.19, 0.25, 0.33, 0.45, 0.51, 0.02, -0.5, 0.65, 0.79});
+  const ImuTrack track = numbered_track(
+      {-0.31, -0.29, -0.21, -0.15, 0.05, 0.11, 0.12, 0.19, 0.25, 0.33, 0.45, 0.51, 0.02, -0.5, 0.65, 0.79});
   std::string text;
   for (const int width : {1, 3, 5}) {
     const ImuBins bins = bins_of(track, width);
     text += fmt::format("width {}, first {}\n", width, bins.first);
     for (std::size_t i = 0; i < bins.valid.size(); ++i)
-      text += fmt::format("  {}{} |{}\n", static_cast<int>(bins.valid[i]), of(bins.omega_radps[i]), of(bins.f_mps2[i]));
-    for (std::int64_t bin = bins.first - 1; bin < 10; ++bin) text += bins.has(bin) ? fmt::format(" {}:{}", bin, bins.index(bin)) : " -";
+      text += fmt::format("  {}{} |{}\n", static_cast<int>(bins.valid[i]), of(bins.omega_radps[i]),
+                          of(bins.f_mps2[i]));
+    for (std::int64_t bin = bins.first - 1; bin < 10; ++bin)
+      text += bins.has(bin) ? fmt::format(" {}:{}", bin, bins.index(bin)) : " -";
     text += '\n';
   }
   const ImuBins one = bins_of(numbered_track({3.0}), 1);
@@ -187,9 +191,11 @@ TEST(Bins, PositionsTellSpeedAndTheAccelerationAlongAndAcrossTheCourse) {
   std::string text;
   const auto tell = [&](const std::string& title, const GnssTrack& track) {
     const GnssMotion motion = motion_of(track);
-    text += fmt::format("{}: first {}, half a window {:.6g} s, {} bins\n", title, motion.first, motion.half_window_s, motion.valid.size());
+    text += fmt::format("{}: first {}, half a window {:.6g} s, {} bins\n", title, motion.first,
+                        motion.half_window_s, motion.valid.size());
     for (std::size_t k = 0; k < motion.valid.size(); k += 3)
-      text += fmt::format("  {} {:.7g} {:.7g} {:.7g}\n", static_cast<int>(motion.valid[k]), motion.speed_mps[k], motion.forward_mps2[k], motion.right_mps2[k]);
+      text += fmt::format("  {} {:.7g} {:.7g} {:.7g}\n", static_cast<int>(motion.valid[k]),
+                          motion.speed_mps[k], motion.forward_mps2[k], motion.right_mps2[k]);
   };
   tell("5 Hz", circle(0.2, 40, 8.0));
   tell("1 Hz", circle(1.0, 9, 5.0));
@@ -197,7 +203,8 @@ TEST(Bins, PositionsTellSpeedAndTheAccelerationAlongAndAcrossTheCourse) {
   tell("three", circle(0.2, 3, 8.0));
   tell("four", circle(0.5, 4, 8.0));
   GnssTrack hole = circle(0.2, 60, 8.0);
-  for (std::vector<double>* values : {&hole.time_s, &hole.claimed_sd_m}) values->erase(values->begin() + 20, values->begin() + 34);
+  for (std::vector<double>* values : {&hole.time_s, &hole.claimed_sd_m})
+    values->erase(values->begin() + 20, values->begin() + 34);
   hole.position_m.erase(hole.position_m.begin() + 20, hole.position_m.begin() + 34);
   tell("with a hole", hole);
   test::expect_recorded("check/motion_of_positions.txt", text, 1e-6, 1e-9);
@@ -209,12 +216,17 @@ std::string positions_of(Empty& empty) {
   return words_of(findings);
 }
 
-double wiggle(std::size_t i, double frequency) { return std::sin(frequency * static_cast<double>(i) * static_cast<double>(i)); }
+double wiggle(std::size_t i, double frequency) {
+  return std::sin(frequency * static_cast<double>(i) * static_cast<double>(i));
+}
 
 /// Errors that nobody foresees, at the speed that is asked for.
-void drive_on(Empty& empty, std::size_t n, double period_s, double speed_mps, double error_m, double sd_m = 0.02) {
+void drive_on(Empty& empty, std::size_t n, double period_s, double speed_mps, double error_m,
+              double sd_m = 0.02) {
   for (std::size_t i = 0; i < n; ++i)
-    empty.add_gnss(period_s * static_cast<double>(i), speed_mps * period_s * static_cast<double>(i) + error_m * wiggle(i, 0.7), error_m * wiggle(i, 1.1), sd_m);
+    empty.add_gnss(period_s * static_cast<double>(i),
+                   speed_mps * period_s * static_cast<double>(i) + error_m * wiggle(i, 0.7),
+                   error_m * wiggle(i, 1.1), sd_m);
 }
 
 TEST(LimitsOfPositions, AreWhereTheyWere) {
@@ -252,35 +264,50 @@ TEST(LimitsOfPositions, AreWhereTheyWere) {
   text += by_ranges("jumps among 100 positions", steps(0, 25, 25), [](double n) {
     Empty empty;
     drive_on(empty, 100, 0.1, 12.0, 0.01);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) empty.gnss().position_m[4 * i + 3].y() += 30.0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i)
+      empty.gnss().position_m[4 * i + 3].y() += 30.0;
     return positions_of(empty);
   });
   text += by_ranges("decimal step, m", ratios(1e-4, 3.0, 400), [](double step_m) {
     Empty empty;
     drive_on(empty, 60, 0.1, 6.0, 0.3);
-    for (Eigen::Vector2d& position : empty.gnss().position_m) position = step_m * (position / step_m).array().round();
+    for (Eigen::Vector2d& position : empty.gnss().position_m)
+      position = step_m * (position / step_m).array().round();
     return positions_of(empty);
   });
   text += by_ranges("share of steps between digits, of 100", steps(0, 30, 30), [](double n) {
     Empty empty;
-    for (std::size_t i = 0; i <= 100; ++i) empty.add_gnss(0.1 * static_cast<double>(i), static_cast<double>(i % 2), 0.0);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i) empty.gnss().position_m[100 - i].x() += 10.5 * static_cast<double>(n - static_cast<double>(i));
+    for (std::size_t i = 0; i <= 100; ++i)
+      empty.add_gnss(0.1 * static_cast<double>(i), static_cast<double>(i % 2), 0.0);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(n); ++i)
+      empty.gnss().position_m[100 - i].x() += 10.5 * static_cast<double>(n - static_cast<double>(i));
     return positions_of(empty);
   });
   text += by_ranges("stretch of a step, of its length", ratios(1e-4, 0.1, 300), [](double share) {
     Empty empty;
-    for (std::size_t i = 0; i <= 100; ++i) empty.add_gnss(0.1 * static_cast<double>(i), i % 4 < 2 ? 0.0 : 2.0 + (i % 8 < 4 ? 2.0 * share : 0.0), 0.0);
+    for (std::size_t i = 0; i <= 100; ++i)
+      empty.add_gnss(0.1 * static_cast<double>(i), i % 4 < 2 ? 0.0 : 2.0 + (i % 8 < 4 ? 2.0 * share : 0.0),
+                     0.0);
     return positions_of(empty);
   });
   text += by_ranges("time without a new position, s", steps(0.5, 6.0, 110), [](double held_s) {
     Empty empty;
     drive_on(empty, 120, 0.1, 12.0, 0.01);
-    for (std::size_t i = 31; i < 120 && empty.gnss().time_s[i] <= empty.gnss().time_s[30] + held_s; ++i) empty.gnss().position_m[i] = empty.gnss().position_m[30];
+    for (std::size_t i = 31; i < 120 && empty.gnss().time_s[i] <= empty.gnss().time_s[30] + held_s; ++i)
+      empty.gnss().position_m[i] = empty.gnss().position_m[30];
     return positions_of(empty);
   });
   text += by_ranges("distance after four seconds without, m", ratios(0.5, 20.0, 200), [](double jump_m) {
     Empty empty;
-    for (std::size_t i = 0; i < 80; ++i) empty.add_gnss(0.1 * static_cast<double>(i), i < 20 ? 0.1 * wiggle(i, 0.3) : i < 60 ? 0.5 : 0.5 + jump_m, 0.1 * wiggle(i < 20 ? i : i < 60 ? 20 : i, 0.5));
+    for (std::size_t i = 0; i < 80; ++i)
+      empty.add_gnss(0.1 * static_cast<double>(i),
+                     i < 20   ? 0.1 * wiggle(i, 0.3)
+                     : i < 60 ? 0.5
+                              : 0.5 + jump_m,
+                     0.1 * wiggle(i < 20   ? i
+                                  : i < 60 ? 20
+                                           : i,
+                                  0.5));
     return positions_of(empty);
   });
   text += by_ranges("positions", steps(15, 30, 15), [](double n) {
@@ -319,22 +346,27 @@ TEST(LimitsOfPositions, NumbersAreThoseOfTheTrack) {
 TEST(LimitsOfTime, OfTwoFilesOfOneClockAreWhereTheyWere) {
   const auto answer = [](double apart_s, std::size_t device, bool text_file = true, bool with_shift = false) {
     Empty empty;
-    if (!text_file) empty.configuration().devices[device].protocol = device == kGnss ? Protocol::kUbx : Protocol::kXsensMt;
+    if (!text_file)
+      empty.configuration().devices[device].protocol = device == kGnss ? Protocol::kUbx : Protocol::kXsensMt;
     empty.configuration().devices[device].csv.time_offset_s = 2.5;
     empty.fill(kReference, 101, 1.0, 20000.0);
     empty.fill(device, 51, 1.0, 20000.0 + apart_s);
     std::vector<Finding> findings;
     const bool there = check_overlap(empty.drive(), device, findings);
     const double first_s = device == kGnss ? empty.gnss().time_s[0] : empty.imu(device).time_s[0];
-    return with_shift ? fmt::format("{} {:.6g}\n{}", there, first_s, findings_text(findings)) : fmt::format("{} {}", there, findings.size());
+    return with_shift ? fmt::format("{} {:.6g}\n{}", there, first_s, findings_text(findings))
+                      : fmt::format("{} {}", there, findings.size());
   };
   std::string text;
   for (const std::size_t device : {kStudy, kGnss}) {
-    text += by_ranges(fmt::format("device {} so much later, s", device), steps(-120.0, 180.0, 600), [&](double apart_s) { return answer(apart_s, device); });
-    for (const double apart_s : {3600.0, -5400.0, 1790.0, 50400.0, 51300.0, -50400.0, 250.0}) text += fmt::format("{} {}: {}", device, apart_s, answer(apart_s, device, true, true));
+    text += by_ranges(fmt::format("device {} so much later, s", device), steps(-120.0, 180.0, 600),
+                      [&](double apart_s) { return answer(apart_s, device); });
+    for (const double apart_s : {3600.0, -5400.0, 1790.0, 50400.0, 51300.0, -50400.0, 250.0})
+      text += fmt::format("{} {}: {}", device, apart_s, answer(apart_s, device, true, true));
     text += answer(3600.0, device, false, true);
   }
-  text += by_ranges("off the hour, s", steps(3400.0, 3800.0, 400), [&](double apart_s) { return answer(apart_s, kStudy); });
+  text += by_ranges("off the hour, s", steps(3400.0, 3800.0, 400),
+                    [&](double apart_s) { return answer(apart_s, kStudy); });
   Empty empty;
   empty.fill(kReference, 30, 1.0);
   std::vector<Finding> findings;
@@ -354,21 +386,28 @@ TEST(LimitsOfOffsets, AGyroIsOffWhereItStaysFarFromZero) {
   const auto answer = [](double offset_degps, std::size_t away = 0) {
     Empty empty;
     empty.fill(kReference, 100, 100.0);
-    for (std::size_t i = 0; i < 100; ++i) empty.imu().omega_radps[i] = Eigen::Vector3f(0.0F, 0.0F, -static_cast<float>(offset_degps * kRadPerDeg)) * (i < away ? 1.6F : 1.0F);
+    for (std::size_t i = 0; i < 100; ++i)
+      empty.imu().omega_radps[i] =
+          Eigen::Vector3f(0.0F, 0.0F, -static_cast<float>(offset_degps * kRadPerDeg)) *
+          (i < away ? 1.6F : 1.0F);
     std::vector<Finding> findings;
     check_gyro_offset(empty.drive(), kReference, findings);
-    return findings.empty() ? "-" : fmt::format("{} {:.6g}", findings[0].what, findings[0].value / offset_degps);
+    return findings.empty() ? "-"
+                            : fmt::format("{} {:.6g}", findings[0].what, findings[0].value / offset_degps);
   };
   test::expect_recorded("check/limits_of_offsets.txt",
-                        by_ranges("offset, deg/s", ratios(1.0, 100.0, 500), [&](double offset) { return answer(offset); }) +
-                            by_ranges("samples of 100 that are away", steps(0, 49, 49), [&](double n) { return answer(15.0, static_cast<std::size_t>(n)); }));
+                        by_ranges("offset, deg/s", ratios(1.0, 100.0, 500), [&](double offset) {
+                          return answer(offset);
+                        }) + by_ranges("samples of 100 that are away", steps(0, 49, 49), [&](double n) {
+                          return answer(15.0, static_cast<std::size_t>(n));
+                        }));
 }
 
 using Change = std::function<void(test::DriveInMemory&, double)>;
 
 /// Of a healthy drive with one thing that grows.
-std::string grown(const std::string& title, const test::DriveInMemory& healthy, const std::vector<double>& values,
-                  const Change& change) {
+std::string grown(const std::string& title, const test::DriveInMemory& healthy,
+                  const std::vector<double>& values, const Change& change) {
   return by_ranges(title, values, [&](double value) {
     test::DriveInMemory drive = healthy;
     change(drive, value);
@@ -390,7 +429,8 @@ void scale(std::vector<Sample>& samples, double gyro, double accel) {
 
 void shift(std::vector<Sample>& samples, double shift_s, double stretch = 1.0) {
   for (Sample& sample : samples)
-    sample.time = HostTime{} + from_seconds(100.0 + stretch * (to_seconds(sample.time - HostTime{}) - 100.0) + shift_s);
+    sample.time =
+        HostTime{} + from_seconds(100.0 + stretch * (to_seconds(sample.time - HostTime{}) - 100.0) + shift_s);
 }
 
 void mix_in_the_reference(test::DriveInMemory& drive, double share) {
@@ -427,21 +467,23 @@ constexpr MadeDrive kBrief{.length_s = 50.0, .reference_hz = 20.0, .study_hz = 2
 TEST(LimitsOfMotion, OfUnitsAreWhereTheyWere) {
   const test::DriveInMemory healthy = made_drive({.length_s = 50.0, .reference_hz = 100.0, .study_hz = 20.0});
   const test::DriveInMemory two = without_receiver(healthy);
-  test::expect_recorded(
-      "check/limits_of_units.txt",
-      grown("rates of the reference, of their size", healthy, ratios(4e-3, 150.0, 90),
-            [](auto& drive, double size) { scale(drive.samples[kReference], size, 1.0); }) +
-          grown("rates of the S-IMU, of their size", two, ratios(4e-3, 150.0, 80),
-                [](auto& drive, double size) { scale(drive.samples[kStudy], size, 1.0); }) +
-          grown("thousandths of a degree, of their size", two, ratios(0.4, 2.0, 20),
-                [](auto& drive, double size) { scale(drive.samples[kStudy], 1e3 * kDegPerRad * size, 1.0); }));
+  test::expect_recorded("check/limits_of_units.txt",
+                        grown("rates of the reference, of their size", healthy, ratios(4e-3, 150.0, 90),
+                              [](auto& drive, double size) { scale(drive.samples[kReference], size, 1.0); }) +
+                            grown("rates of the S-IMU, of their size", two, ratios(4e-3, 150.0, 80),
+                                  [](auto& drive, double size) { scale(drive.samples[kStudy], size, 1.0); }) +
+                            grown("thousandths of a degree, of their size", two, ratios(0.4, 2.0, 20),
+                                  [](auto& drive, double size) {
+                                    scale(drive.samples[kStudy], 1e3 * kDegPerRad * size, 1.0);
+                                  }));
 }
 
 TEST(LimitsOfMotion, OfTimesAreWhereTheyWere) {
   const test::DriveInMemory healthy = made_drive(kBrief);
   test::DriveInMemory common = without_receiver(healthy);
   common.has_own_clock[kStudy] = false;
-  const test::DriveInMemory lengthy = without_receiver(made_drive({.length_s = 200.0, .reference_hz = 25.0, .study_hz = 20.0}));
+  const test::DriveInMemory lengthy =
+      without_receiver(made_drive({.length_s = 200.0, .reference_hz = 25.0, .study_hz = 20.0}));
   const Change later = [](auto& drive, double late_s) { shift(drive.samples[kGnss], late_s); };
   test::expect_recorded(
       "check/limits_of_times.txt",
@@ -457,38 +499,38 @@ TEST(LimitsOfMotion, OfTheDriveAreWhereTheyWere) {
   const auto seen = [](const MadeDrive& how) { return words_of(look_at(made_drive(how))); };
   test::expect_recorded(
       "check/limits_of_drives.txt",
-      by_ranges("turns and tilts, of the usual ones", ratios(0.01, 1.0, 40),
-                [&](double share) {
-                  return seen({.length_s = 50.0, .reference_hz = 20.0, .study_hz = 25.0, .turns = share, .tilts = share});
-                }) +
-          by_ranges("time at rest, s", steps(0.0, 24.0, 48),
-                    [&](double rest_s) {
-                      return seen({.length_s = 60.0, .reference_hz = 20.0, .study_hz = 25.0, .rest_s = rest_s});
-                    }) +
-          by_ranges("length, s", steps(15.0, 60.0, 45), [&](double length_s) {
-            return seen({.length_s = length_s, .reference_hz = 20.0, .study_hz = 25.0});
-          }));
+      by_ranges("turns and tilts, of the usual ones", ratios(0.01, 1.0, 40), [&](double share) {
+        return seen(
+            {.length_s = 50.0, .reference_hz = 20.0, .study_hz = 25.0, .turns = share, .tilts = share});
+      }) + by_ranges("time at rest, s", steps(0.0, 24.0, 48), [&](double rest_s) {
+        return seen({.length_s = 60.0, .reference_hz = 20.0, .study_hz = 25.0, .rest_s = rest_s});
+      }) + by_ranges("length, s", steps(15.0, 60.0, 45), [&](double length_s) {
+        return seen({.length_s = length_s, .reference_hz = 20.0, .study_hz = 25.0});
+      }));
 }
 
 TEST(LimitsOfMotion, OfPairsAreWhereTheyWere) {
   const test::DriveInMemory two = without_receiver(made_drive(kBrief));
-  const test::DriveInMemory alike = without_receiver(made_drive({.length_s = 30.0, .reference_hz = 20.0, .study_hz = 20.0}));
+  const test::DriveInMemory alike =
+      without_receiver(made_drive({.length_s = 30.0, .reference_hz = 20.0, .study_hz = 20.0}));
   const Change offset = [](auto& drive, double offset_mps2) {
     for (Sample& sample : drive.samples[kStudy]) sample.imu.f_mps2[1] += offset_mps2;
   };
   const Change noise = [](auto& drive, double sd_radps) {
     for (std::size_t i = 0; i < drive.samples[kStudy].size(); ++i) {
       for (std::size_t k = 0; k < 3; ++k)
-        drive.samples[kStudy][i].imu.omega_radps[k] += sd_radps * wiggle(i, 0.7 + 0.2 * static_cast<double>(k));
+        drive.samples[kStudy][i].imu.omega_radps[k] +=
+            sd_radps * wiggle(i, 0.7 + 0.2 * static_cast<double>(k));
     }
   };
-  test::expect_recorded("check/limits_of_pairs.txt",
-                        grown("offset of the S-IMU's y forces, m/s2", two, steps(-9.0, 9.0, 180), offset) +
-                            grown("share of the S-IMU's samples that are the reference's", alike, steps(0.8, 1.0, 40),
-                                  mix_in_the_reference) +
-                            grown("noise of the S-IMU's rates, rad/s", two, ratios(0.01, 1.0, 60), noise) +
-                            grown("turn of the S-IMU half-way, deg", two, steps(0.0, 12.0, 60), turn_half_way) +
-                            grown("scatter of the positions, m", made_drive(kBrief), ratios(0.01, 5.0, 40), scatter));
+  test::expect_recorded(
+      "check/limits_of_pairs.txt",
+      grown("offset of the S-IMU's y forces, m/s2", two, steps(-9.0, 9.0, 180), offset) +
+          grown("share of the S-IMU's samples that are the reference's", alike, steps(0.8, 1.0, 40),
+                mix_in_the_reference) +
+          grown("noise of the S-IMU's rates, rad/s", two, ratios(0.01, 1.0, 60), noise) +
+          grown("turn of the S-IMU half-way, deg", two, steps(0.0, 12.0, 60), turn_half_way) +
+          grown("scatter of the positions, m", made_drive(kBrief), ratios(0.01, 5.0, 40), scatter));
 }
 
 }  // namespace

@@ -25,7 +25,8 @@ TEST(PlantedMistakes, AreAllFoundAsTheyOnceWere) {
 
 // What shows only where a drive has straights, or is long.
 TEST(PlantedMistakes, OfALongDriveWithStraightsAreFoundAsTheyOnceWere) {
-  const test::DriveInMemory healthy = made_drive({.length_s = 300.0, .reference_hz = 40.0, .study_hz = 50.0, .straights = true});
+  const test::DriveInMemory healthy =
+      made_drive({.length_s = 300.0, .reference_hz = 40.0, .study_hz = 50.0, .straights = true});
   std::string text;
   for (const char* only : {"deg/s", "its clock", "its place", "without turns"})
     text += with_mistakes(healthy, only);
@@ -45,7 +46,8 @@ TEST(PlantedMistakes, AUnitThatWasPutRightIsNoSecondMistake) {
 // At an even speed on a straight road no step is small, and none is a multiple of another.
 TEST(PlantedMistakes, AnEvenSpeedMakesNoStepsOfDigits) {
   test::DriveInMemory drive = made_drive({.length_s = 60.0, .turns = 0.0});
-  std::erase_if(drive.samples[test::kGnss], [](const Sample& sample) { return to_seconds(sample.time - HostTime{}) < 140.0; });
+  std::erase_if(drive.samples[test::kGnss],
+                [](const Sample& sample) { return to_seconds(sample.time - HostTime{}) < 140.0; });
   for (const Finding& finding : look_at(drive)) EXPECT_NE(finding.check, "position steps");
 }
 
