@@ -195,7 +195,8 @@ void check_axes(const Drive& drive, const ReferenceAxes& reference,
       return;
     }
   }
-  check_reference(config, reference, inverted, findings);
+  // A left-handed reference fits no S-IMU, which is not theirs to mend.
+  if (check_reference(config, reference, inverted, findings)) return;
   for (const auto& [study, pair] : misfits) {
     report_triads(drive.configuration().devices[study], pair.study_gyro, pair.study_accel, pair.healthy_cost,
                   findings);

@@ -18,19 +18,21 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
+bool is_quote(char c) { return c == '"' || c == '\''; }
+
+/// One past the string that begins with the quote at `at`.
+std::size_t end_of_string(std::string_view line, std::size_t at) {
+  const char quote = line[at];
+  for (++at; at < line.size() && line[at] != quote; ++at) {
+    if (line[at] == '\\' && quote == '"') ++at;
+  }
+  return at + 1;
+}
+
 /// The text of a line before its comment.
 std::string_view code_of(std::string_view line) {
-  char quote = 0;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (quote != 0) {
-      if (c == '\\' && quote == '"') ++i;
-      if (c == quote) quote = 0;
-    } else if (c == '"' || c == '\'') {
-      quote = c;
-    } else if (c == '#') {
-      return trimmed(line.substr(0, i));
-    }
+  for (std::size_t i = 0; i < line.size(); i = is_quote(line[i]) ? end_of_string(line, i) : i + 1) {
+    if (line[i] == '#') return trimmed(line.substr(0, i));
   }
   return trimmed(line);
 }
@@ -53,9 +55,14 @@ std::string_view key_of(std::string_view code) {
                                                              : trimmed(code.substr(0, equals));
 }
 
+/// Of lists, not of what stands in quotes.
 int open_brackets(std::string_view code) {
-  return static_cast<int>(std::count(code.begin(), code.end(), '[')) -
-         static_cast<int>(std::count(code.begin(), code.end(), ']'));
+  int open = 0;
+  for (std::size_t i = 0; i < code.size(); i = is_quote(code[i]) ? end_of_string(code, i) : i + 1) {
+    if (code[i] == '[') ++open;
+    if (code[i] == ']') --open;
+  }
+  return open;
 }
 
 /// First line of a value that goes over several, to one past its last.

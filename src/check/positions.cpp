@@ -29,6 +29,10 @@ constexpr double kSdRatioMax = 5.0;
 constexpr double kSameDigits_m = 1e-3;
 /// Noise and motion make steps of every size; where the least one is beyond so many sd, digits are missing.
 constexpr double kStepSdMax = 5.0;
+/// A degree of longitude is shorter farther north: of a digit's step, by so much within a drive ...
+constexpr double kMultipleTolerance = 0.005;
+/// ... for so many of the steps.
+constexpr double kMultiplesShare = 0.9;
 
 /// More positions than this do not jump: they scatter.
 constexpr double kJumpsShareMax = 0.1;
@@ -103,22 +107,37 @@ void check_jumps(const DeviceConfig& config, const GnssTrack& track, double peri
                       {}});
 }
 
-/// The least step between positions that differ, along one axis.
-double least_step(const GnssTrack& track, int axis, std::size_t& steps) {
-  double least_m = std::numeric_limits<double>::infinity();
+/// Steps between positions that differ, along one axis.
+std::vector<double> steps_along(const GnssTrack& track, int axis) {
+  std::vector<double> steps_m;
   for (std::size_t i = 1; i < track.size(); ++i) {
     const double step_m = std::abs(track.position_m[i][axis] - track.position_m[i - 1][axis]);
-    if (step_m < kSameDigits_m) continue;
-    least_m = std::min(least_m, step_m);
-    ++steps;
+    if (step_m >= kSameDigits_m) steps_m.push_back(step_m);
   }
-  return least_m;
+  return steps_m;
+}
+
+/// Whether nearly all are multiples of the least of them: digits make such steps, an even speed does not.
+bool are_multiples(const std::vector<double>& steps_m, double least_m) {
+  const auto whole = std::count_if(steps_m.begin(), steps_m.end(), [&](double step_m) {
+    const double nearest_m = least_m * std::round(step_m / least_m);
+    return std::abs(step_m - nearest_m) < kSameDigits_m + kMultipleTolerance * nearest_m;
+  });
+  return static_cast<double>(whole) >= kMultiplesShare * static_cast<double>(steps_m.size());
 }
 
 /// Positions with too few digits: nothing between a step and none.
 void check_steps(const DeviceConfig& config, const GnssTrack& track, std::vector<Finding>& findings) {
   std::size_t steps = 0;
-  const double least_m = std::min(least_step(track, 0, steps), least_step(track, 1, steps));
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const int axis : {0, 1}) {
+    const std::vector<double> steps_m = steps_along(track, axis);
+    if (steps_m.empty()) continue;
+    const double of_axis_m = *std::min_element(steps_m.begin(), steps_m.end());
+    if (!are_multiples(steps_m, of_axis_m)) return;
+    steps += steps_m.size();
+    least_m = std::min(least_m, of_axis_m);
+  }
   if (steps < kTrackMin || !(least_m > kStepSdMax * median(track.claimed_sd_m))) return;
   findings.push_back({Harm::kLimits,
                       "position steps",

@@ -44,6 +44,7 @@ std::vector<float> axis_of(const ImuTrack& track, std::size_t axis) {
 
 /// Whether values pile up at `end`, the largest or smallest of them.
 bool piles_up(const std::vector<float>& values, float end, float range, float step) {
+  if (range == 0.0F) return false;  // it stands
   const float band = std::max(static_cast<float>(kBelow) * range, static_cast<float>(kSteps) * step);
   std::size_t at_end = 0;
   std::size_t below = 0;

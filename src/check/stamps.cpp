@@ -251,10 +251,12 @@ void check_stamps(Drive& drive, std::size_t device, std::vector<Finding>& findin
   const bool gnss = config.role == DeviceRole::kGnss;
   const auto& time_s = gnss ? drive.gnss(device).time_s : drive.imu(device).time_s;
   if (time_s.size() < kStampsMin) return;
-  const Steps steps = steps_of(time_s);
+  const Steps as_read = steps_of(time_s);
   if (!(time_s.back() > time_s.front())) report_standing(config, time_s.size(), findings);
-  if (!(steps.rate_hz > 0.0)) return;
-  check_rate(drive, device, steps, findings);
+  if (!(as_read.rate_hz > 0.0)) return;
+  check_rate(drive, device, as_read, findings);
+  // Of times whose unit was put right: a millisecond read as a second is no gap.
+  const Steps steps = steps_of(time_s);
   const std::size_t before = findings.size();
   if (!gnss) check_repetitions(config, drive.imu(device), steps, findings);
   if (!gnss && findings.size() == before) check_counter(config, drive.imu(device), findings);

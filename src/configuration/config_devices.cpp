@@ -212,7 +212,7 @@ void read_axes(TomlReader& in, std::array<double, 9>& axes) {
       if (!shape || row > 2) break;
       read[3 * row + static_cast<std::size_t>(word[1] - 'x')] = word[0] == '+' ? 1.0 : -1.0;
     }
-    good = row == 3 && words.eof();
+    good = row == 3 && words.fail();  // no fourth word
   } else if (const auto* rows = node->as_array(); rows != nullptr && rows->size() == 3) {
     good = true;
     for (std::size_t i = 0; i < 3 && good; ++i) {

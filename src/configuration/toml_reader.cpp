@@ -46,7 +46,7 @@ toml::source_region TomlReader::where(std::string_view key) const {
 }
 
 const toml::node* TomlReader::find(std::string_view key) {
-  known_.emplace_back(key);
+  if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.emplace_back(key);
   return table_ != nullptr ? table_->get(key) : nullptr;
 }
 

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "check/check.h"
+#include "tests/support/recorded_answer.h"
+
 namespace imuscope::check {
 namespace {
 
@@ -75,6 +78,96 @@ TEST(ConfigLines, WhatCannotBeWrittenIsToldWithTheLine) {
   ASSERT_FALSE(inline_table.has_value());
   EXPECT_NE(inline_table.error().text().find("gyro_unit = \"deg/s\""), std::string::npos);
   EXPECT_FALSE(with_lines(kToml, {{"u", "rate_hz", "1.0"}}).has_value());
+}
+
+// Blanks, comments, quotes, lists over lines and tables in every form that TOML allows.
+constexpr const char* kUntidy = R"(  # first
+[[device]]   # one
+	name	=	"a#b"  # not "s"
+  axes = [ # "]"
+    "+x", '-y]',	# [
+    [1, 2], "\"]",
+  ]
+rate_hz=1
+
+
+# of the table
+  [ device . csv ]  # here
+a = 'x#'
+clock = "own"  # where
+b = [
+]
+
+# of the next
+[device.noise]
+
+[[ device ]]
+name = 's'
+csv.clock = "common"
+csv.gyro_unit = "g"
+noise = {a = 1}
+[device.prior]
+[other]
+name = "a#b"
+rate_hz = 7
+[[device]]
+rate_hz = 5
+name = "last"
+)";
+
+TEST(ConfigLines, AreWrittenIntoAnyTomlAsTheyOnceWere) {
+  const std::vector<std::vector<ConfigLine>> all{
+      {{"a#b", "axes", "1"}},
+      {{"a#b", "rate_hz", "2"}},
+      {{"a#b", "new", "3"}},
+      {{"a#b", "csv.a", "4"}},
+      {{"a#b", "csv.b", "5"}},
+      {{"a#b", "csv.clock", "6"}},
+      {{"a#b", "csv.new", "7"}},
+      {{"a#b", "noise.x", "8"}},
+      {{"a#b", "prior.x", "9"}},
+      {{"s", "csv.clock", "10"}},
+      {{"s", "csv.new", "11"}},
+      {{"s", "noise.a", "12"}},
+      {{"s", "prior.y", "13"}},
+      {{"s", "name", "14"}},
+      {{"last", "name", "15"}},
+      {{"last", "rate_hz", "16"}},
+      {{"last", "new", "17"}},
+      {{"last", "csv.new", "18"}},
+      {{"nobody", "x", "19"}},
+      {{"b", "x", "20"}},
+      {{"s", "csv.gyro_unit", "21"}, {"last", "x.y", "22"}, {"last", "x.z", "23"}, {"last", "x.y", "24"}}};
+  std::string text;
+  for (const auto& lines : all) {
+    const auto written = with_lines(kUntidy, lines);
+    text += "---- " + lines[0].device + ' ' + lines[0].key + '\n' +
+            (written ? *written : written.error().text() + '\n');
+  }
+  text += with_lines("[[device]]\nname = \"a\"", {{"a", "x", "1"}}).value();
+  text += with_lines("[[device]]\nname = \"a\"\nx = [\n1,\n", {{"a", "x", "1"}}).value();
+  text += with_lines("", {}).value();
+  test::expect_recorded("check/config_lines.txt", text);
+}
+
+TEST(ConfigLines, OfFindingsAreAllThatTheyAskFor) {
+  Finding one;
+  one.mends = {{"a", "k", "1"}, {"b", "l", "2"}};
+  Finding other;
+  other.mends = {{"c", "m", "3"}};
+  const auto lines = lines_of({one, Finding{}, other});
+  ASSERT_EQ(lines.size(), 3U);
+  EXPECT_EQ(lines[0].device + lines[0].key + lines[0].value, "ak1");
+  EXPECT_EQ(lines[2].device + lines[2].key + lines[2].value, "cm3");
+}
+
+TEST(Findings, AreSentencesWithTheirEvidence) {
+  Finding finding{Harm::kWrong, "check", "dot", "it is so", 0.123456, 9.80665, "m/s2", "do that", {}};
+  EXPECT_EQ(sentence(finding), "dot: it is so (0.1235 m/s2, expected 9.807); do that");
+  finding.expected = 0.0;
+  EXPECT_EQ(sentence(finding), "dot: it is so (0.1235 m/s2); do that");
+  finding.unit.clear();
+  EXPECT_EQ(sentence(finding), "dot: it is so; do that");
 }
 
 }  // namespace
