@@ -11,6 +11,8 @@
 #include <ranges>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 #include "models/noise/fit.h"
 #include "models/noise/haar_levels.h"
@@ -82,6 +84,35 @@ inline void add_model(Answer& answer, const Model& model) {
   const auto names = component_names(model);
   for (std::size_t i = 0; i < names.size(); ++i)
     answer.line(names[i], model.components[i].amplitude, model.components[i].shape);
+}
+
+inline void add_j_test(Answer& answer, const std::optional<JTest>& test) {
+  if (test)
+    answer.line("j test", test->statistic, test->dof, test->p_value);
+  else
+    answer.line("no j test");
+}
+
+inline void add_parameters(Answer& answer, const FitResult& fit) {
+  for (const ParameterEstimate& p : fit.parameters) {
+    answer.line(p.process, p.name, '[' + p.unit + ']', p.value, p.sd, p.ci_low, p.ci_high, p.log_sd,
+                p.spread_sd);
+  }
+}
+
+/// What is said of a fit, but the observed wavelet variance.
+inline void add_fit(Answer& answer, const FitResult& fit) {
+  answer.line("fit", fit.spec.name(), fit.n, fit.stretches, fit.rate_hz, static_cast<int>(fit.weighting),
+              static_cast<int>(fit.intervals), fit.confidence, fit.efficiency);
+  answer.line("objective", fit.objective, "error", fit.model_error, "criterion", fit.criterion,
+              fit.identifiable, fit.simpler_model);
+  add_j_test(answer, fit.j_test);
+  add_model(answer, fit.model);
+  add_parameters(answer, fit);
+  answer.line("covariance", fit.covariance);
+  for (const FittedLevel& level : fit.wv)
+    answer.line(level.observed.level, level.fitted, level.model_ci_low, level.model_ci_high);
+  for (const std::string& warning : fit.warnings) answer.line(warning);
 }
 
 }  // namespace imuscope::noise::test
