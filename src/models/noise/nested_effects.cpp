@@ -456,6 +456,32 @@ std::optional<NestedEffects> nested_effects(std::span<const DriveValue> values) 
   return out;
 }
 
+namespace {
+
+/// Units of three drives and more, at times that differ.
+std::vector<bool> units_with_a_line(std::span<const DriveValue> values, std::span<const double> time,
+                                    std::size_t units) {
+  std::vector<double> counts(units, 0.0);
+  std::vector<double> means(units, 0.0);
+  for (std::size_t j = 0; j < values.size(); ++j) {
+    const std::size_t u = values[j].unit;
+    counts[u] += 1.0;
+    means[u] += (time[j] - means[u]) / counts[u];
+  }
+  std::vector<double> change(units, 0.0);
+  std::vector<double> size_of(units, 0.0);
+  for (std::size_t j = 0; j < values.size(); ++j) {
+    const double d = time[j] - means[values[j].unit];
+    change[values[j].unit] += d * d;
+    size_of[values[j].unit] += time[j] * time[j];
+  }
+  std::vector<bool> out(units);
+  for (std::size_t u = 0; u < units; ++u) out[u] = counts[u] >= 3.0 && change[u] > kNoChange * size_of[u];
+  return out;
+}
+
+}  // namespace
+
 // G-74: drift of each unit
 std::vector<std::optional<Deviation>> unit_drifts(std::span<const DriveValue> values,
                                                   std::span<const double> time) {
@@ -463,12 +489,15 @@ std::vector<std::optional<Deviation>> unit_drifts(std::span<const DriveValue> va
   for (const DriveValue& value : values) units = std::max(units, value.unit + 1);
   std::vector<std::optional<Deviation>> out(units);
   if (!is_usable(values) || values.empty()) return out;
-  std::vector<std::size_t> counts(units, 0);
+  const std::vector<bool> has_line = units_with_a_line(values, time, units);
   double first = 0.0;
+  double dof = 0.0;
   for (const DriveValue& value : values) {
-    ++counts[value.unit];
     first = std::max(first, value.variance);
+    dof += has_line[value.unit] ? 1.0 : 0.0;
   }
+  dof -= 2.0 * static_cast<double>(std::count(has_line.begin(), has_line.end(), true));
+  if (dof < 1.0) return out;
   struct UnitLine {
     double w = 0.0, t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;
   };
@@ -485,7 +514,7 @@ std::vector<std::optional<Deviation>> unit_drifts(std::span<const DriveValue> va
     }
     double squares = 0.0;
     for (std::size_t j = 0; j < values.size(); ++j) {
-      if (counts[values[j].unit] < 3) continue;
+      if (!has_line[values[j].unit]) continue;
       UnitLine& line = lines[values[j].unit];
       const double w = 1.0 / (values[j].variance + variance);
       const double t = time[j] - line.t / line.w;
@@ -497,13 +526,10 @@ std::vector<std::optional<Deviation>> unit_drifts(std::span<const DriveValue> va
     for (const UnitLine& line : lines) squares -= line.tt > 0.0 ? line.ty * line.ty / line.tt : 0.0;
     return squares;
   };
-  double dof = 0.0;
-  for (const std::size_t n : counts) dof += n < 3 ? 0.0 : static_cast<double>(n) - 2.0;
-  if (dof < 1.0) return out;
   const double variance = variance_at(left, dof, first);
   (void)left(variance);
   for (std::size_t u = 0; u < units; ++u) {
-    if (counts[u] < 3 || !(lines[u].tt > 0.0)) continue;
+    if (!has_line[u]) continue;
     Deviation drift;
     drift.deviation = lines[u].ty / lines[u].tt;
     drift.t = drift.deviation * std::sqrt(lines[u].tt);

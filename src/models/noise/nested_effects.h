@@ -68,7 +68,7 @@ struct NestedEffects {
 std::optional<NestedEffects> nested_effects(std::span<const DriveValue> values);
 
 /// How every unit changes with `time`, judged by what drives differ by beside that: slope, its sd, test.
-/// Absent for a unit of fewer than three drives.
+/// Absent for a unit of fewer than three drives, and where all of them are of one time.
 /// @param values  their covariates are taken out before
 /// @param time    one a value
 std::vector<std::optional<Deviation>> unit_drifts(std::span<const DriveValue> values,
