@@ -41,6 +41,8 @@ class Answer {
   void add(const Value& value) {
     if constexpr (std::is_same_v<Value, bool>) {
       word(value ? "true" : "false");
+    } else if constexpr (std::is_same_v<Value, char>) {
+      word({&value, 1});
     } else if constexpr (std::convertible_to<Value, std::string_view>) {
       word(value);
     } else if constexpr (std::integral<Value>) {
