@@ -234,14 +234,6 @@ bool EventLogReader::next(LogEvent& event) {
   return false;
 }
 
-void EventLogReader::go_to(std::uint64_t place) {
-  buffer_.clear();
-  begin_ = 0;
-  read_ = place;
-  file_.clear();
-  file_.seekg(static_cast<std::streamoff>(place));
-}
-
 void EventLogReader::take(LogEvent& event) {
   const std::uint8_t* record = buffer_.data() + begin_;
   const Lengths lengths = lengths_of(record);
@@ -252,7 +244,6 @@ void EventLogReader::take(LogEvent& event) {
   event.channel.assign(channel, data);
   event.data.assign(data, data + lengths.data);
   begin_ += lengths.record();
-  events_ += 1;
 }
 
 }  // namespace imuscope

@@ -109,6 +109,18 @@ TEST(RefusingDisk, ADiskThatTakesTheBytesAndLosesThemIsToldAtTheEnd) {
   EXPECT_THAT(closed.error().remedy, HasSubstr("cable"));
 }
 
+TEST(RefusingDisk, OfTwoRefusalsAtTheEndTheFirstIsTold) {
+  const auto path = test::scratch_folder() / "capture.lcm";
+  auto writer = CaptureWriter::create(path);
+  ASSERT_TRUE(writer);
+  writer->append("CHANNEL", 1, std::vector<std::uint8_t>(100, 7));
+  const RefusedCalls full(Call::kWrite, ENOSPC);
+  const RefusedCalls lost(Call::kFdatasync, EIO);
+  const auto closed = writer->close();
+  ASSERT_FALSE(closed);
+  EXPECT_THAT(closed.error().text(), AllOf(HasSubstr("records were lost"), HasSubstr(std::strerror(ENOSPC))));
+}
+
 TEST(RefusingDisk, AWriterThatIsDroppedHasWrittenWhatItHeld) {
   const auto path = test::scratch_folder() / "capture.lcm";
   {

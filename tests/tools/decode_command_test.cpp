@@ -327,6 +327,7 @@ TEST(DecodeCommand, FindsACanLogByItselfAndShowsItsFrames) {
   EXPECT_EQ(outcome.lines[1]["fd"], true);
   EXPECT_EQ(outcome.lines[2]["message"], "remote 7FF");
   EXPECT_EQ(outcome.lines[3]["message"], "error frame");
+  EXPECT_EQ(outcome.lines[3]["error"], "bus-off");
   EXPECT_EQ(outcome.lines[4], (json{{"messages", 4}, {"bytes_skipped", 9}}));
 }
 

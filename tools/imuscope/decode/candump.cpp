@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 
+#include "drivers/can_bus/error_frame.h"
 #include "drivers/transport/candump.h"
 #include "whole_stream.h"
 
@@ -56,6 +57,7 @@ void describe_frame(std::string_view line, const CandumpFrame& logged, const dbc
   out.fields["id"] = frame.id;
   if (frame.is_error) {
     out.message = "error frame";
+    out.fields["error"] = describe_can_error(frame);
     out.fields["data"] = hex(frame.payload());
     return;
   }
