@@ -224,6 +224,27 @@ TEST_F(WholeFleet, ThePageShowsTheCatalogue) {
   expect_recorded("fleet/page_data.txt", data.dump(1), 1e-4);
 }
 
+// The made runs say no status, so that there is no mounting to combine.
+TEST(WholeUnit, HoldsTheMeansOfItsDrives) {
+  const auto folder = scratch_folder();
+  const auto fleet = make_fleet(folder, 1, 3);
+  const auto plan = *fleet::plan_campaign(fleet, kMadeProgram);
+  int drive = 0;
+  for (const auto& task : plan.studies) {
+    publish(task, result_of_drive(task, 0, drive));
+    const auto run = task.out / "studies" / task.key / "run";
+    fs::create_directories(run);
+    write_synthetic_run(
+        run, {.duration_s = 13.0, .names = {"imu", "other"}, .boresight_sd_deg = 0.01 + 0.002 * drive});
+    ++drive;
+  }
+  ASSERT_TRUE(fleet::do_unit(plan.units.front(), kMadeProgram));
+  EXPECT_TRUE(fleet::unit_is_done(plan.units.front()));
+  const json unit =
+      json::parse(content_of(plan.units.front().out / "units" / (plan.units.front().key + ".json")));
+  expect_recorded("fleet/unit.txt", unit.dump(1), 1e-4, 1e-9);
+}
+
 TEST(FleetPictures, DrawTheMapToItsScale) {
   std::string text;
   const auto draw = [&](const std::string& title, const std::vector<fleet::MapTrack>& tracks) {
