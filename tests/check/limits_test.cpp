@@ -137,7 +137,9 @@ TEST(LimitsOfStamps, TwoFilesAreExchangedWhereEachHasTheOthersRate) {
     std::vector<Finding> findings;
     for (const std::size_t device : {kReference, kStudy, kGnss})
       check_stamps(empty.drive(), device, findings);
-    findings.push_back({.check = "rate", .device = "other"});
+    findings.emplace_back();
+    findings.back().check = "rate";
+    findings.back().device = "other";
     const bool exchanged = check_files(empty.drive(), findings);
     return fmt::format("{}\n{}", exchanged, findings_text(findings));
   };

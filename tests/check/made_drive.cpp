@@ -12,7 +12,7 @@ namespace imuscope::check {
 
 namespace {
 
-constexpr const char* kToml = R"([[device]]
+constexpr const char* kThreeDevices = R"([[device]]
 name = "reference"
 role = "reference"
 protocol = "csv_imu"
@@ -178,7 +178,7 @@ std::vector<Sample> gnss_samples(const MadeDrive& how) {
 
 test::DriveInMemory made_drive(const MadeDrive& how) {
   test::DriveInMemory drive;
-  drive.toml = fmt::format(fmt::runtime(kToml), how.reference_hz, how.study_hz, how.gnss_hz);
+  drive.toml = fmt::format(fmt::runtime(kThreeDevices), how.reference_hz, how.study_hz, how.gnss_hz);
   drive.configuration = parse_configuration(drive.toml, "drive.toml").value();
   drive.samples = {imu_samples(how, false), imu_samples(how, true), gnss_samples(how)};
   drive.has_own_clock = {false, true, false};
