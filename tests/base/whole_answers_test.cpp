@@ -259,5 +259,15 @@ TEST(BaseWhole, NamesThatAreTakenAndFoldersOfTheirOwn) {
   EXPECT_FALSE(OutputFolder::open(folder / "b.txt"));
 }
 
+TEST(BaseWhole, ADescriptorClosesAlsoTheFirst) {
+  const int kept = ::dup(0);
+  { const Descriptor first(0); }
+  EXPECT_EQ(::fcntl(0, F_GETFD), -1);
+  if (kept >= 0) {
+    EXPECT_EQ(::dup2(kept, 0), 0);
+    ::close(kept);
+  }
+}
+
 }  // namespace
 }  // namespace imuscope

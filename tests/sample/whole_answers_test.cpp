@@ -16,8 +16,8 @@ using namespace std::chrono_literals;
 using test::in_groups;
 using test::real_text;
 
-constexpr HostTime kBegin = host_time_from_ns(5'000'000'000'000);
-constexpr UtcTime kUtcBegin = utc_time_from_ns(1'773'480'600'000'000'000);
+constexpr HostTime kWholeBegin = host_time_from_ns(5'000'000'000'000);
+constexpr UtcTime kWholeUtcBegin = utc_time_from_ns(1'773'480'600'000'000'000);
 
 /// Pseudo-random, the same everywhere: between 0 and 1.
 double scatter(int k) { return static_cast<double>((k * 7919 + 104'729) % 9973) / 9973.0; }
@@ -30,14 +30,14 @@ std::string mapped(const ClockMapConfig& config, int n, double period_s,
   std::string text;
   std::uint64_t restarts = 0;
   for (int k = 0; k < n; ++k) {
-    const HostTime arrival = kBegin + from_seconds(arrives_s(k));
+    const HostTime arrival = kWholeBegin + from_seconds(arrives_s(k));
     const auto device_ns = static_cast<std::int64_t>(std::llround(1e9 * device_s(k)));
     const HostTime time = map.observe(device_ns, arrival);
     const bool changed = map.restarts() != restarts;
     restarts = map.restarts();
     if (k % shown_every != 0 && !changed) continue;
     text += std::to_string(k) + ": " +
-            in_groups((time - kBegin).count() - from_seconds(k * period_s).count()) + " drift " +
+            in_groups((time - kWholeBegin).count() - from_seconds(k * period_s).count()) + " drift " +
             real_text(map.drift_ppm()) + " sd " + real_text(map.scatter_s()) + " restarts " +
             std::to_string(restarts) + '\n';
   }
@@ -108,28 +108,28 @@ TEST(SampleWhole, ClockMapsOfDevicesOfEveryKind) {
   text += "far off\n" + mapped(
                             online, 1500, 0.01, even(0.01, 350.0), [](int k) { return 0.01 * k; }, 100);
   text += "fixed\n" + mapped(
-                          ClockMapConfig::fixed(kBegin + 1s, 1.0001), 300, 1.0, even(1.0, 0.0),
+                          ClockMapConfig::fixed(kWholeBegin + 1s, 1.0001), 300, 1.0, even(1.0, 0.0),
                           [](int) { return 0.0; }, 30);
   test::expect_recorded("sample/clock_maps.txt", text, test::kSampleShare);
 }
 
 TEST(SampleWhole, ALineOfSteering) {
   SteeringLine line;
-  std::string text = in_groups(to_ns(line.unsteered(kBegin))) + ' ' + real_text(line.rate()) + '\n';
+  std::string text = in_groups(to_ns(line.unsteered(kWholeBegin))) + ' ' + real_text(line.rate()) + '\n';
   for (int k = 0; k < 40; ++k) {
-    line.observe(kBegin + k * 10s, kBegin + k * 10s - 77s + Duration{k * k * 1000}, 1e-6 * k);
-    if (k % 7 == 3) line.observe(kBegin + k * 10s - 1s, kBegin, 1.0);
-    if (k % 7 == 4) line.observe(kBegin + k * 10s, kBegin, 1.0);
+    line.observe(kWholeBegin + k * 10s, kWholeBegin + k * 10s - 77s + Duration{k * k * 1000}, 1e-6 * k);
+    if (k % 7 == 3) line.observe(kWholeBegin + k * 10s - 1s, kWholeBegin, 1.0);
+    if (k % 7 == 4) line.observe(kWholeBegin + k * 10s, kWholeBegin, 1.0);
     for (const Duration off : {Duration{-400s}, Duration{-25s}, Duration{-10s}, Duration{0s}, Duration{3s}})
-      text += in_groups((line.unsteered(kBegin + k * 10s + off) - kBegin).count()) + ' ';
+      text += in_groups((line.unsteered(kWholeBegin + k * 10s + off) - kWholeBegin).count()) + ' ';
     text += real_text(line.rate()) + '\n';
   }
   test::expect_recorded("sample/steering.txt", text, test::kSampleShare);
 }
 
 std::string pulses_text(const PulseClock& clock, HostTime time) {
-  return in_groups((clock.at(time) - kUtcBegin).count()) + " rate " + real_text(1e6 * clock.rate()) + " sd " +
-         real_text(1e6 * clock.sd_s(1s)) + ' ' + real_text(1e6 * clock.sd_s(-100s)) + ' ' +
+  return in_groups((clock.at(time) - kWholeUtcBegin).count()) + " rate " + real_text(1e6 * clock.rate()) +
+         " sd " + real_text(1e6 * clock.sd_s(1s)) + ' ' + real_text(1e6 * clock.sd_s(-100s)) + ' ' +
          real_text(1e6 * clock.sd_rate()) + " jitter " + real_text(1e6 * clock.jitter_s()) +
          (clock.is_known() ? " known" : "") + (clock.has_begun() ? " begun" : "");
 }
@@ -138,11 +138,11 @@ TEST(SampleWhole, PulsesThroughEveryKindOfTrouble) {
   std::string text;
   PulseClock clock;
   const auto pulse = [&](int second, double late_s) {
-    const HostTime time = kBegin + from_seconds(second * (1.0 + 2e-5) + late_s);
-    const bool believed = clock.observe(time, kUtcBegin + std::chrono::seconds(second));
+    const HostTime time = kWholeBegin + from_seconds(second * (1.0 + 2e-5) + late_s);
+    const bool believed = clock.observe(time, kWholeUtcBegin + std::chrono::seconds(second));
     text += std::to_string(second) + (believed ? " + " : " - ") + pulses_text(clock, time) + '\n';
   };
-  text += pulses_text(clock, kBegin) + '\n';
+  text += pulses_text(clock, kWholeBegin) + '\n';
   for (int k = 0; k < 70; ++k) pulse(k, 5e-6 * scatter(k));
   pulse(69, 0.0);
   pulse(71, 400e-6);
@@ -153,13 +153,13 @@ TEST(SampleWhole, PulsesThroughEveryKindOfTrouble) {
   for (int k = 95; k < 130; ++k) pulse(k, 500e-6 + 2e-3 * scatter(k));
   clock.shift(-1s);
   pulse(131, 500e-6);
-  clock.steer(kBegin + 140s, kBegin + 60s, 1e-5);
-  text += pulses_text(clock, kBegin + 140s) + '\n';
+  clock.steer(kWholeBegin + 140s, kWholeBegin + 60s, 1e-5);
+  text += pulses_text(clock, kWholeBegin + 140s) + '\n';
   for (int k = 141; k < 150; ++k) pulse(k, 500e-6 + 3e-6 * scatter(k));
-  clock.steer(kBegin + 150s, kBegin + 70s + 10us, -3e-4);
+  clock.steer(kWholeBegin + 150s, kWholeBegin + 70s + 10us, -3e-4);
   for (int k = 151; k < 158; ++k) pulse(k, 500e-6 + 3e-6 * scatter(k) - 3.1e-4 * (k - 150));
   clock.forget();
-  text += pulses_text(clock, kBegin + 160s) + '\n';
+  text += pulses_text(clock, kWholeBegin + 160s) + '\n';
   for (int k = 161; k < 165; ++k) pulse(k, 0.0);
   test::expect_recorded("sample/pulses.txt", text, test::kSampleShare);
 }
@@ -169,9 +169,9 @@ TEST(SampleWhole, PulsesThroughEveryKindOfTrouble) {
 struct Scale {
   UtcScale scale;
   std::string text;
-  UtcTime utc_begin = kUtcBegin;
+  UtcTime utc_begin = kWholeUtcBegin;
 
-  static HostTime host(double t_s) { return kBegin + from_seconds(t_s * (1.0 - 2e-5)); }
+  static HostTime host(double t_s) { return kWholeBegin + from_seconds(t_s * (1.0 - 2e-5)); }
   [[nodiscard]] UtcTime utc(double t_s) const { return utc_begin + from_seconds(t_s); }
   void tag(UtcSource source, double t_s, double late_s = 0.0, double told_off_s = 0.0) {
     scale.observe(source, host(t_s + late_s), utc(t_s + told_off_s));
@@ -183,13 +183,13 @@ struct Scale {
     const TimeScale& s = scale.scale();
     const PulseState& p = s.pulses;
     text += real_text(t_s) + ": " + std::to_string(static_cast<int>(s.source)) + " t " +
-            in_groups((s.time - kBegin).count()) + " utc " + in_groups((s.utc - utc_begin).count()) + " sd " +
-            real_text(s.sd_utc_s) + " rate " + real_text(1e6 * s.rate) + ' ' + real_text(1e6 * s.sd_rate) +
-            " steps " + std::to_string(s.steps) + " leap " + std::to_string(s.gps_minus_utc_s) + " s " +
-            real_text(scale.seconds_at(host(t_s)));
+            in_groups((s.time - kWholeBegin).count()) + " utc " + in_groups((s.utc - utc_begin).count()) +
+            " sd " + real_text(s.sd_utc_s) + " rate " + real_text(1e6 * s.rate) + ' ' +
+            real_text(1e6 * s.sd_rate) + " steps " + std::to_string(s.steps) + " leap " +
+            std::to_string(s.gps_minus_utc_s) + " s " + real_text(scale.seconds_at(host(t_s)));
     if (p.is_known || p.used + p.left_out > 0) {
       text += " pulses " + std::string(p.is_known ? "+" : "-") + (p.counted_by_pc_clock ? "pc " : " ") +
-              in_groups((p.time - kBegin).count()) + ' ' + in_groups((p.utc - utc_begin).count()) + ' ' +
+              in_groups((p.time - kWholeBegin).count()) + ' ' + in_groups((p.utc - utc_begin).count()) + ' ' +
               real_text(1e6 * p.sd_utc_s) + ' ' + real_text(1e6 * p.rate) + ' ' + real_text(1e6 * p.sd_rate) +
               ' ' + real_text(1e6 * p.jitter_s) + ' ' + std::to_string(p.used) + ' ' +
               std::to_string(p.left_out) + " delays " + real_text(p.reference_delay.mean_s) + ' ' +
@@ -271,7 +271,7 @@ TEST(SampleWhole, UtcByPulses) {
       // A receiver tells another second, and the pulses end.
       for (int k = 0; k < 8; ++k) s.tag(UtcSource::kGnss, 86.0 + 0.2 * k, 0.12, -1.0), s.tell(86.0 + 0.2 * k);
       s.scale.set_found_delay(UtcSource::kPulses, 0.003, 0.0005), s.tell(88.0);
-      text += in_groups((s.scale.host_time_by_pulses(s.utc(88.0)) - kBegin).count()) + '\n';
+      text += in_groups((s.scale.host_time_by_pulses(s.utc(88.0)) - kWholeBegin).count()) + '\n';
       s.pulse(88.0), s.tell(88.0);
       for (const double later_s : {100.0, 680.0, 687.9, 688.1, 690.0, 700.0})
         s.tag(UtcSource::kGnss, later_s, 0.12, -1.0), s.tell(later_s);
