@@ -1,4 +1,4 @@
-#include "tests/drivers/transport/made_can_kernel.h"
+#include "made_can_kernel.h"
 
 #include <linux/can/raw.h>
 #include <net/if.h>

@@ -18,8 +18,8 @@
 #include "drivers/device/can_frame.h"
 #include "drivers/transport/can_interface.h"
 #include "drivers/transport/can_socket.h"
+#include "made_can_kernel.h"
 #include "tests/drivers/support/sample_text.h"
-#include "tests/drivers/transport/made_can_kernel.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
