@@ -130,6 +130,14 @@ TEST(GreisWhole, StreamsWithoutAnEndOfEpochMidnightsAndWeeks) {
     text += whole_text(whole_config(), {lines({rt(tod_ms), rd(2026, 12, 31, 1), st(solution_ms, 4),
                                                pg(0.85, 0.04, 106.5, 0.012F, 4), et(tod_ms)})});
   }
+  for (const double offset_s : {0.4999, 0.5, -0.4999, -0.5}) {
+    text += whole_text(
+        whole_config(),
+        {lines({rt(1000), rd(2026, 12, 31, 1), pg(0.85, 0.04, 106.5, 0.012F, 4), to(offset_s), et(1000)})});
+  }
+  for (const U32 tod_ms : {43'200'999U, 43'201'000U, 43'201'001U}) {
+    text += whole_text(whole_config(), {usual(1000), usual(tod_ms)});
+  }
   expect_recorded("drivers/greis/midnights.txt", text, kSampleShare);
 }
 

@@ -155,6 +155,9 @@ TEST(RtklibWhole, SeparatorsBlanksAndTimes) {
   }
   text += whole_text(whole_config(), "%  GPST    \n%  latitude(deg) JST\n" +
                                          row(" \t2026/03/14   12:34:56.1", kPlace, 1, " \t\r"));
+  text += whole_text(
+      whole_config(),
+      "%  GPST,latitude(deg)\n 2026/03/14   12:34:56.1 \t, 48.5\t,\t2.25 , 81.5 \t,1 ,12,0.01,0.02 ,0.03,0,0,0,0.1,12.3 \t\r\n");
   std::string lines = llh_header();
   for (const char* time : {"1979/12/31 00:00:00",
                            "1980/01/01 00:00:00",

@@ -118,18 +118,11 @@ std::string hex_text(std::span<const std::uint8_t> bytes) {
   constexpr std::string_view kHex = "0123456789abcdef";
   std::string text = "x";
   for (const std::uint8_t byte : bytes) {
+    text += ' ';
     text += kHex[byte >> 4U];
     text += kHex[byte & 0xFU];
   }
   return text;
-}
-
-Bytes bytes_of_hex(std::string_view text) {
-  Bytes bytes;
-  for (std::size_t at = 0; at + 1 < text.size(); at += 2) {
-    bytes.push_back(static_cast<std::uint8_t>(std::stoi(std::string(text.substr(at, 2)), nullptr, 16)));
-  }
-  return bytes;
 }
 
 std::string sample_text(const Sample& sample) {

@@ -28,10 +28,8 @@ std::string in_groups(std::int64_t number);
 std::string real_text(double value, int digits = 12);
 /// Twelve digits each.
 std::string real_text(std::span<const double> values);
-/// Two digits a byte.
+/// Two digits a byte, and a blank before each: no run of digits is one number to whoever compares.
 std::string hex_text(std::span<const std::uint8_t> bytes);
-/// Bytes of two digits each.
-Bytes bytes_of_hex(std::string_view text);
 
 /// One line, every field.
 std::string sample_text(const Sample& sample);

@@ -518,9 +518,9 @@ std::string counted_text(const UnwrapConfig& config,
   constexpr std::array<std::string_view, 5> kSteps{"first", "forward", "repeated", "restarted", "rejected"};
   CountUnwrapper unwrapper(config);
   std::string text;
-  for (const auto& [raw, seconds] : taken) {
-    const CountStep step = unwrapper.take(raw, kBegin + from_seconds(seconds));
-    text += std::to_string(raw) + " at " + test::real_text(seconds) + ": " +
+  for (const auto& [raw, time_s] : taken) {
+    const CountStep step = unwrapper.take(raw, kBegin + from_seconds(time_s));
+    text += std::to_string(raw) + " at " + test::real_text(time_s) + ": " +
             std::string(kSteps.at(static_cast<std::size_t>(step))) + ' ' + std::to_string(unwrapper.step()) +
             " to " + test::in_groups(unwrapper.count()) + '\n';
   }

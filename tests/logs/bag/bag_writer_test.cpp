@@ -7,8 +7,11 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "logs/mcap/reader.h"
+#include "tests/support/messages_text.h"
+#include "tests/support/recorded_answer.h"
 
 namespace imuscope::bag {
 namespace {
@@ -188,6 +191,120 @@ TEST(Bag, NavigationHeadsWhereTheVehicleDoes) {
   EXPECT_NEAR(odometry.linear_mps[1], 0.0, 1e-9);
   // East is x of the map, so a vehicle that heads there is not turned.
   EXPECT_NEAR(odometry.orientation[3], 1.0, 1e-12);
+}
+
+// Everything that a bag may hold, as it once was written.
+
+/// The file itself, record by record, byte by byte.
+std::string bytes_of_bag(const std::function<void(BagWriter&)>& fill) {
+  std::string file;
+  BagWriter writer({"ros2", "test", mcap::Compression::kNone},
+                   [&file](std::string_view bytes) { file += bytes; }, {"airins", "mtx1", "gnss"});
+  fill(writer);
+  writer.finish();
+  std::string text;
+  mcap::Bytes rest = mcap::bytes_of(file).subspan(mcap::kMagic.size());
+  for (auto record = mcap::record_at(rest); record; record = mcap::record_at(rest)) {
+    text += fmt::format("{}:", static_cast<int>(record->opcode));
+    for (const std::uint8_t byte : record->content) text += fmt::format(" {:02x}", byte);
+    text += '\n';
+    rest = rest.subspan(record->size);
+  }
+  return text;
+}
+
+std::string content_of_bag(const std::function<void(BagWriter&)>& fill) {
+  std::string file;
+  BagWriter writer({"ros2", "test", mcap::Compression::kNone},
+                   [&file](std::string_view bytes) { file += bytes; }, {"airins", "mtx1", "gnss"});
+  fill(writer);
+  writer.finish();
+  return test::whole_log_text<mcap::Reader>(file) + fmt::format("{} messages\n", writer.messages());
+}
+
+Sample sample_of(SampleKind kind, DeviceIndex device) {
+  Sample sample{};
+  sample.kind = kind;
+  sample.device = device;
+  return sample;
+}
+
+Navigation some_navigation(int i) {
+  Navigation at;
+  at.latitude_deg = 46.0 + 1e-4 * i;
+  at.longitude_deg = 179.9999 + 1e-4 * i - (i > 0 ? 360.0 : 0.0);
+  at.height_m = 450.0 - i;
+  at.v_n_mps = {1.5, 10.0 - i, -0.25};
+  at.rpy_rad = {0.1, -0.2, 0.7 + i};
+  at.sd_position_m = {0.1, 0.2, 0.3};
+  at.sd_velocity_mps = {0.01, i == 0 ? 0.02 : 0.005, 0.03};
+  at.sd_rpy_rad = {0.001, 0.002, 0.003};
+  return at;
+}
+
+TEST(BagWhole, SamplesOfEveryKind) {
+  std::string text = content_of_bag([](BagWriter& bag) {
+    Sample imu = imu_sample(1, {1, 2, 3}, {4, 5, 6});
+    for (const std::uint32_t flags : {std::uint32_t{kGyroValid}, std::uint32_t{kAccelValid}, std::uint32_t{0},
+                                      std::uint32_t{kGyroValid | kAccelValid}}) {
+      imu.imu.flags = flags;
+      bag.add_sample(imu, kTime_ns, {{1e-4, 2e-4, 3e-4}, {1e-2, 2e-2, 3e-2}});
+      Correction correction;
+      correction.C_b_s = row_major(some_mounting());
+      correction.gyro_bias_radps = {0.01, -0.02, 0.03};
+      correction.accel_bias_mps2 = {0.1, 0.2, -0.3};
+      correction.gyro_scale = {0.01, 0.02, -0.03};
+      correction.accel_scale = {-0.01, 0.005, 0.002};
+      correction.t_d_s = -0.004;
+      bag.add_corrected(imu, kTime_ns, correction, {{1e-4, 2e-4, 3e-4}, {1e-2, 2e-2, 3e-2}});
+    }
+    Sample gnss = sample_of(SampleKind::kGnss, 2);
+    for (std::uint32_t flags = 0; flags < 16; ++flags) {
+      gnss.gnss = GnssData{
+          0.8,  0.1, 450.0, {1, 2, 3}, {0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}, static_cast<GnssSolution>(flags % 5),
+          flags};
+      bag.add_sample(gnss, kTime_ns + static_cast<std::int64_t>(flags));
+    }
+    Sample wheels = sample_of(SampleKind::kOdometry, 0);
+    wheels.odometry = {13.5, 0};
+    bag.add_sample(wheels, kTime_ns);
+    Sample pulse = sample_of(SampleKind::kPulse, 2);
+    for (const std::int64_t off_ns : {std::int64_t{0}, std::int64_t{499'999'999}, std::int64_t{500'000'000},
+                                      std::int64_t{-1}, std::int64_t{-500'000'001}}) {
+      pulse.pulse.wall_ns = 1'700'000'000'000'000'000 + off_ns;
+      bag.add_sample(pulse, -5);
+    }
+    bag.add_sample(sample_of(SampleKind::kAttitude, 0), kTime_ns);
+    bag.add_sample(sample_of(SampleKind::kSteering, 0), kTime_ns);
+    for (int i = 0; i < 3; ++i) bag.add_navigation(some_navigation(i), kTime_ns + i);
+    bag.add_message("/imuscope/navigation", "navigation_t", "{}", -3);
+    bag.add_message("/imuscope/navigation", "navigation_t", "{\"a\":1}", 7);
+    bag.add_message("/imuscope/other", "navigation_t", "{}", 8);
+  });
+  test::expect_recorded("logs/bag_samples.txt", text, 1e-8);
+}
+
+TEST(BagWhole, MountingsByteByByte) {
+  Mounting good;
+  good.name = "mtx1";
+  good.C_b_s = {0, 1, 0, 0, 0, 1, 1, 0, 0};
+  good.r_bs_b_m = {1.5, -2.5, 0.25};
+  good.t_d_s = -0.0123;
+  good.sd_boresight_rad = {0.01, 0.02, 0.03};
+  good.sd_r_bs_b_m = {0.001, 0.002, 0.003};
+  good.sd_t_d_s = 0.0005;
+  good.status = "calibrated";
+  good.is_usable = true;
+  Mounting poor = good;
+  poor.name = "mtx2";
+  poor.is_usable = false;
+  const auto fill = [&](BagWriter& bag) {
+    bag.add_mountings({good, poor}, "airins", 1'000'000'002);
+    bag.attach("a.txt", "text/plain", -4, "content");
+    bag.attach("b.txt", "text/plain", 9, "content");
+    bag.end_chunk();
+  };
+  test::expect_recorded("logs/bag_mountings.txt", bytes_of_bag(fill));
 }
 
 }  // namespace

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 #include <cmath>
+#include <imuscope/calibration_t.hpp>
 #include <imuscope/error_t.hpp>
+#include <imuscope/event_t.hpp>
 #include <imuscope/navigation_t.hpp>
 #include <imuscope/noise_model_t.hpp>
 #include <nlohmann/json.hpp>
 
 #include "publish/message_codec.h"
+#include "tests/support/recorded_answer.h"
 
 namespace imuscope::bag {
 namespace {
@@ -64,6 +67,26 @@ TEST(MessageJson, TheSchemaDescribesTheMessage) {
   EXPECT_EQ(models.at("properties").at("models").at("items").at("properties").at("rate_hz").at("type"),
             "number");
   EXPECT_TRUE(schema_text("nothing_t").empty());
+}
+
+TEST(MessageJsonWhole, EveryTypeHasItsSchema) {
+  std::string text;
+  for (const char* type :
+       {"calibration_t", "navigation_t", "error_t", "odometry_t", "status_t", "noise_model_t",
+        "wavelet_variance_t", "dynamics_t", "pc_clock_t", "event_t", "virtual_imu_t", "nothing_t"})
+    text += schema_text(type) + '\n';
+  error_t errors{};
+  errors.name = "a \"b\"\n";
+  errors.n_rows = 2;
+  errors.rows.resize(2);
+  errors.rows[0].e_gyro_x_radps = -0.5;
+  errors.rows[1].e_gyro_z_radps = std::nan("");
+  text += json_of(errors) + '\n' + json_of(event_t{}) + '\n' + json_of(calibration_t{}) + '\n';
+  const auto bytes = encode_message(errors);
+  for (std::size_t size = 0; size < bytes.size(); size += 7) {
+    if (message_text(std::span(bytes).first(size))) text += std::to_string(size) + '\n';
+  }
+  test::expect_recorded("logs/message_json.txt", text);
 }
 
 }  // namespace

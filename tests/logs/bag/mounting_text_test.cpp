@@ -10,6 +10,8 @@
 #include <random>
 #include <regex>
 
+#include "tests/support/recorded_answer.h"
+
 namespace imuscope::bag {
 namespace {
 
@@ -218,6 +220,38 @@ TEST(MountingText, AnUnknownFormatNamesThoseThatExist) {
   const auto format = parse_mounting_format("sdf");
   ASSERT_FALSE(format);
   EXPECT_NE(format.error().text().find("urdf"), std::string::npos);
+}
+
+TEST(MountingTextWhole, EveryFormat) {
+  std::string text;
+  Triads triads;
+  triads.gyro_matrix = {1.01, 0, 0, 0.002, 0.99, 0, 0.003, -0.004, 1.02};
+  triads.accel_matrix = {0.98, 0, 0, -0.005, 1.03, 0, 0.006, 0.007, 0.97};
+  triads.C_s_accel = {0.36, 0.48, -0.8, -0.8, 0.6, 0.0, 0.48, 0.64, 0.6};
+  triads.g_sensitivity = {1e-4, 2e-4, 3e-4, 4e-4, 5e-4, 6e-4, 7e-4, 8e-4, 9e-4};
+  Correction scale;
+  scale.gyro_scale = {0.01, 0.02, -0.03};
+  scale.accel_scale = {-0.01, 0.005, 0.002};
+  const auto all = cases();
+  for (const std::size_t i : {0U, 1U, 2U, 3U}) {
+    Mounting mounting = all[i].mounting;
+    mounting.sd_boresight_rad = {0.01, 0.02, 0.03};
+    mounting.sd_r_bs_b_m = {0.001, 0.002, 0.003};
+    mounting.sd_t_d_s = i == 2 ? std::nan("") : 0.0005;
+    if (i == 2) mounting.r_bs_b_m = {1.5, -2.5, 0.25};
+    if (i == 3)
+      mounting.C_b_s = {0.36, 0.48, -0.8, -0.8, 0.6, 0.0, 0.48, 0.64, 0.6},
+      mounting.r_bs_b_m = {1.5, -2.5, 0.25};
+    if (i < 2) mounting.r_bs_b_m = {0.5, 0.25, -0.125};
+    for (const char* name : {"urdf", "tf", "kalibr", "openvins", "json"}) {
+      const auto format = parse_mounting_format(name);
+      ASSERT_TRUE(format);
+      text += mounting_text(mounting, scale, std::nullopt, "airins", *format) +
+              mounting_text(mounting, scale, triads, "airins", *format);
+    }
+  }
+  text += parse_mounting_format("xml").error().text() + '\n';
+  test::expect_recorded("logs/mountings.txt", text, 1e-8, 1e-9);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "logs.h"
+#include "tests/support/messages_text.h"
+#include "tests/support/recorded_answer.h"
 
 namespace imuscope::flight_log {
 namespace {
@@ -237,6 +239,147 @@ TEST(Ulog, FormatsThatLieAreRefused) {
   EXPECT_EQ(nested.imus[0].first, "sensor_gyro/2");
   EXPECT_EQ(nested.imus[0].second.angular_velocity, (mcap::Vector{1, 2, 3}));
   EXPECT_EQ(nested.imus[0].second.linear_acceleration_covariance[0], mcap::kNotMeasured);
+}
+
+/// Every message that is taken, with fields that are all different, and what each may lack.
+std::string rich_ulog() {
+  std::string log = ulog_begin() + kCombined + kVehicleImu;
+  const std::string sensor = "uint64_t timestamp;uint64_t timestamp_sample;float x;float y;float z;";
+  log += format("sensor_gyro:" + sensor) + format("sensor_accel:" + sensor) +
+         format("sensor_baro:" + sensor) + format("part:float[2] a;int16_t b;") +
+         format("vehicle_imu_old:x y;");
+  log += subscription(0, 1, "sensor_combined") + subscription(0, 2, "vehicle_imu") +
+         subscription(1, 3, "vehicle_imu") + subscription(0, 4, "sensor_gyro") +
+         subscription(2, 5, "sensor_accel") + subscription(0, 6, "sensor_baro");
+  log += data(1, combined(1'000'000, 1.0F)) + data(1, combined(1'004'000, 1.5F, 2'147'483'647)) +
+         data(1, combined(1'008'000, 1.75F, -1500));
+  Bytes spans;
+  spans << std::uint64_t{1'010'000} << 1.0F << 2.0F << 3.0F << std::uint32_t{2000} << std::int32_t{250}
+        << 4.0F << 5.0F << -9.5F << std::uint32_t{6000} << std::uint8_t{0};
+  log += data(1, spans);
+  const auto increments = [](std::uint16_t gyro_us, std::uint16_t accel_us) {
+    Bytes fields;
+    fields << std::uint64_t{2'000'500} << std::uint64_t{2'000'000} << std::uint32_t{1} << std::uint32_t{2}
+           << 0.005F << 0.01F << -0.01F << 0.02F << 0.05F << -0.049F << gyro_us << accel_us
+           << std::uint8_t{0};
+    return fields;
+  };
+  log += data(2, increments(5000, 4000)) + data(3, increments(5000, 0)) + data(2, increments(0, 5000));
+  Bytes value;
+  value << std::uint64_t{3'000'500} << std::uint64_t{3'000'000} << 0.5F << 0.25F << 0.125F;
+  for (const std::uint16_t id : {std::uint16_t{4}, std::uint16_t{5}, std::uint16_t{6}, std::uint16_t{77}})
+    log += data(id, value);
+  Bytes too_short;
+  too_short << std::uint64_t{3'000'500} << std::uint64_t{3'000'000} << 0.5F << 0.25F;
+  log += data(4, too_short);
+  const std::string rest =
+      "float s_variance_m_s;float eph;float epv;float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;int32_t timestamp_time_relative;uint8_t fix_type;bool vel_ned_valid;";
+  log +=
+      format(
+          "vehicle_gps_position:uint64_t timestamp;uint64_t time_utc_usec;int32_t lat;int32_t lon;int32_t alt;" +
+          rest) +
+      format(
+          "sensor_gps:uint64_t timestamp;part[2] parts;uint64_t time_utc_usec;double latitude_deg;double longitude_deg;double altitude_ellipsoid_m;" +
+          rest);
+  log += subscription(0, 10, "vehicle_gps_position") + subscription(3, 11, "sensor_gps");
+  for (std::uint8_t fix_type = 0; fix_type < 8; ++fix_type) {
+    Bytes old;
+    old << std::uint64_t{5'000'000} << std::uint64_t{fix_type % 2 == 0 ? 1'700'000'000'123'456U : 0U}
+        << std::int32_t{473'977'419} << std::int32_t{-1'218'000'000} << std::int32_t{500'000}
+        << (fix_type == 4 ? 0.0F : 0.3F) << (fix_type == 5 ? -1.0F : 1.0F) << 0.2F << 1.0F
+        << (fix_type == 3 ? NAN : -2.0F) << 0.5F << std::int32_t{-100'000} << fix_type
+        << static_cast<std::uint8_t>(fix_type == 6 ? 0 : 1);
+    log += data(10, old);
+    Bytes fresh;
+    fresh << std::uint64_t{5'200'000};
+    for (int i = 0; i < 2; ++i) fresh << 1.0F << 2.0F << std::int16_t{3};
+    fresh << std::uint64_t{1'700'000'000'323'456U} << 47.3977419 << -121.8 << 548.25 << 0.3F << 1.0F << 0.2F
+          << 1.0F << -2.0F << 0.5F << std::int32_t{0} << fix_type << std::uint8_t{1};
+    log += data(11, fresh);
+  }
+  Bytes dropout;
+  dropout << std::uint16_t{250};
+  log += message('O', dropout.text) + message('I', "info") + message('P', "parameter") + message('L', "log") +
+         synchronisation() + data(1, combined(6'000'000, 2.0F));
+  return log;
+}
+
+TEST(UlogWhole, MessagesOfEveryKind) {
+  test::expect_recorded("logs/ulog.txt", test::whole_log_text<UlogReader>(rich_ulog()));
+}
+
+/// A field of every type before those that are read: their places show how long it is.
+TEST(UlogWhole, FieldsOfEveryType) {
+  std::string text;
+  for (const char* type :
+       {"int8_t",     "uint8_t",  "bool",           "char",           "int16_t",   "uint16_t",
+        "int32_t",    "uint32_t", "int64_t",        "uint64_t",       "float",     "double",
+        "uint8_t[3]", "float[0]", "uint8_t[65535]", "uint8_t[65536]", "uint8_t[3", "uint8_t[]",
+        "uint8_t[x]", "part",     "part[2]",        "part[70]",       "other"}) {
+    Bytes fields;
+    for (int i = 0; i < 60; ++i) fields << static_cast<std::uint8_t>(i < 20 ? 3 * i : 1);
+    const std::string head =
+        ulog_begin() + format("part:float[2] a;int16_t b;;") +
+        format(std::string("sensor_gyro:") + type + " extra;uint32_t timestamp;float x;float y;float z");
+    text += std::string(type) + ' ' +
+            test::whole_log_text<UlogReader>(head + subscription(0, 1, "sensor_gyro") + data(1, fields));
+    const std::string span = ulog_begin() + format("part:float[2] a;int16_t b;;") +
+                             format(std::string("sensor_combined:uint64_t timestamp;float[3] gyro_rad;") +
+                                    type + " gyro_integral_dt;");
+    text += test::whole_log_text<UlogReader>(span + subscription(0, 1, "sensor_combined") + data(1, fields));
+  }
+  for (int depth = 6; depth < 12; ++depth) {
+    std::string log = ulog_begin() + format("p0:uint32_t timestamp;");
+    for (int i = 1; i <= depth; ++i) log += format(fmt::format("p{}:p{} inner;", i, i - 1));
+    log += format(fmt::format("sensor_gyro:p{} first;uint32_t timestamp;float x;float y;float z;", depth));
+    Bytes fields;
+    for (int i = 0; i < 40; ++i) fields << static_cast<std::uint8_t>(3 * i);
+    text += fmt::format("{} ", depth) +
+            test::whole_log_text<UlogReader>(log + subscription(0, 1, "sensor_gyro") + data(1, fields));
+  }
+  for (const int fields_n : {4090, 4091, 4092, 4093}) {
+    std::string many = "sensor_gyro:uint32_t timestamp;float x;float y;float z;";
+    for (int i = 0; i < fields_n; ++i) many += "bool f;";
+    Bytes fields;
+    for (int i = 0; i < 40; ++i) fields << static_cast<std::uint8_t>(3 * i);
+    text += fmt::format("{} ", fields_n) +
+            test::short_log_text<UlogReader>(ulog_begin() + format(many) + subscription(0, 1, "sensor_gyro") +
+                                             data(1, fields)) +
+            '\n';
+  }
+  test::expect_recorded("logs/ulog_fields.txt", text);
+}
+
+TEST(UlogWhole, DamageCutsAndAppendedParts) {
+  const std::string log = rich_ulog();
+  std::string text = test::damaged_log_text<UlogReader>(log.size(), 23, [&](std::size_t at) {
+    std::string bytes = log;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x15);
+    return bytes;
+  });
+  text +=
+      test::damaged_log_text<UlogReader>(log.size(), 71, [&](std::size_t at) { return log.substr(0, at); });
+  const std::string body = kCombined + subscription(0, 7, "sensor_combined") + data(7, combined(4000, 1.0F)) +
+                           data(7, combined(8000, 2.0F));
+  const std::string behind = data(7, combined(12'000, 3.0F)) + data(7, combined(16'000, 4.0F));
+  const std::size_t head = ulog_begin().size();
+  text += test::damaged_log_text<UlogReader>(
+      body.size(), 1, [&](std::size_t at) { return ulog_begin(1, head + at) + body.substr(0, at) + behind; });
+  text += test::damaged_log_text<UlogReader>(
+      60, 1, [&](std::size_t at) { return ulog_begin(1, head + body.size() + at - 30) + body + behind; });
+  for (const std::uint8_t incompatible :
+       {std::uint8_t{0}, std::uint8_t{1}, std::uint8_t{2}, std::uint8_t{3}, std::uint8_t{128}})
+    text += test::short_log_text<UlogReader>(ulog_begin(incompatible, 5) + body) + '\n';
+  for (std::size_t at = 0; at < head; ++at) {
+    std::string bytes = ulog_begin() + body;
+    bytes[at] = static_cast<char>(bytes[at] + 2);
+    text += fmt::format("{} ", at) + test::short_log_text<UlogReader>(bytes) + '\n';
+  }
+  for (const std::size_t n : {1U, 65'520U, 65'530U, 65'536U, 65'546U, 131'072U})
+    text += test::short_log_text<UlogReader>(ulog_begin() + body + std::string(n, '\xEE') +
+                                             synchronisation() + behind) +
+            '\n';
+  test::expect_recorded("logs/ulog_damage.txt", text);
 }
 
 }  // namespace

@@ -10,6 +10,8 @@
 #include <map>
 
 #include "logs/mcap/ros_messages.h"
+#include "tests/support/messages_text.h"
+#include "tests/support/recorded_answer.h"
 #include "tests/support/shared_data.h"
 #include "tests/support/temporary_file.h"
 
@@ -192,6 +194,51 @@ TEST(Rosbag, WhatIsNoBagIsRefused) {
   EXPECT_NE(read_bag("#ROSRECORD V1.1\n").error.find("another version"), std::string::npos);
   EXPECT_FALSE(Reader::open("/nowhere/at_all.bag"));
   EXPECT_FALSE(Reader::open("/tmp"));
+}
+
+TEST(RosbagWhole, MessagesOfEveryKind) {
+  std::string text;
+  for (const char* compression : {"none", "lz4", "bz2"}) {
+    const std::string all = test::whole_log_text<Reader>(bag(compression));
+    text += all.substr(0, 12'000) + "...\n" + all.substr(all.size() - 1'500);
+  }
+  test::expect_recorded("logs/rosbag.txt", text);
+}
+
+TEST(RosbagWhole, DamageAndCuts) {
+  std::string text;
+  for (const char* compression : {"none", "lz4", "bz2"}) {
+    const std::string whole = bag(compression);
+    const std::size_t step = whole.size() / 260;
+    text += std::string(compression) + '\n' +
+            test::damaged_log_text<Reader>(whole.size(), step, [&](std::size_t at) {
+              std::string bytes = whole;
+              bytes[at] = static_cast<char>(bytes[at] ^ 0x15);
+              return bytes;
+            });
+    text += "cut\n" + test::damaged_log_text<Reader>(whole.size(), 3 * step,
+                                                     [&](std::size_t at) { return whole.substr(0, at); });
+  }
+  // The heads, byte by byte.
+  const std::string whole = bag("lz4");
+  text += "heads\n" + test::damaged_log_text<Reader>(200, 1, [&](std::size_t at) {
+            std::string bytes = whole;
+            bytes[at] = static_cast<char>(bytes[at] ^ 0x15);
+            return bytes;
+          });
+  text += "first chunk\n" + test::damaged_log_text<Reader>(120, 1, [&](std::size_t at) {
+            std::string bytes = whole;
+            const std::size_t place = 4096 + 13 + at;
+            bytes[place] = static_cast<char>(bytes[place] + 1);
+            return bytes;
+          });
+  text += "end\n" + test::damaged_log_text<Reader>(400, 3, [&](std::size_t at) {
+            std::string bytes = whole;
+            const std::size_t place = whole.size() - 1 - at;
+            bytes[place] = static_cast<char>(bytes[place] ^ 0x15);
+            return bytes;
+          });
+  test::expect_recorded("logs/rosbag_damage.txt", text);
 }
 
 }  // namespace
