@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "../noise/answer.h"
 #include "made_record.h"
 #include "models/certificate/data_sheet.h"
 #include "models/certificate/joint_axes.h"
@@ -22,15 +21,16 @@
 #include "models/certificate/units.h"
 #include "models/noise/inference.h"
 #include "models/noise/simulated_noise.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::certificate {
+namespace imuscope::certificate::certificate_answers {
 namespace {
 
+using imuscope::test::Answer;
 using imuscope::test::expect_recorded;
 using nlohmann::json;
 using noise::ProcessKind;
-using noise::test::Answer;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 /// Of numbers that a search for a model ends at.
@@ -643,4 +643,4 @@ TEST(CertificateAnswers, WhichPairsShow) {
 }
 
 }  // namespace
-}  // namespace imuscope::certificate
+}  // namespace imuscope::certificate::certificate_answers

@@ -27,7 +27,7 @@
 #include "models/noise/simulated_noise.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::noise {
+namespace imuscope::noise::fit_answers {
 namespace {
 
 using imuscope::test::expect_recorded;
@@ -575,4 +575,4 @@ TEST(FitAnswers, Dependences) {
 }
 
 }  // namespace
-}  // namespace imuscope::noise
+}  // namespace imuscope::noise::fit_answers
