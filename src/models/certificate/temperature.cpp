@@ -135,6 +135,8 @@ std::optional<Temperature> temperature_of(std::span<const double> x, std::span<c
   if (temperature_c.size() != x.size()) return std::nullopt;
   const Range range = range_of(x, mask, temperature_c);
   if (range.n == 0 || range.highest - range.lowest < kLeastRange_c) return std::nullopt;
+  const auto& terms = fit.model.components;
+  if (std::ranges::none_of(terms, [](const auto& term) { return term.amplitude > 0.0; })) return std::nullopt;
   Temperature out;
   out.mean_c = range.mean;
   out.lowest_c = range.lowest;

@@ -23,7 +23,8 @@ struct Temperature {
   double noise_per_c_sd = 0.0;
 };
 
-/// Absent where the temperature is missing, or does not vary by kLeastRange_c.
+/// Absent where the temperature is missing, or does not vary by kLeastRange_c, and where no term of the fit has an
+/// amplitude.
 std::optional<Temperature> temperature_of(std::span<const double> x, std::span<const std::uint8_t> mask,
                                           std::span<const float> temperature_c, const noise::FitResult& fit);
 

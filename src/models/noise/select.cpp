@@ -42,7 +42,13 @@ std::vector<ModelSpec> sub_models(const ModelSpec& full) {
 
 bool is_rejected(const FitResult& fit) { return fit.j_test && fit.j_test->p_value < kRejectedOutright; }
 
+/// A model of which no term has an amplitude: nothing that a test could reject, and nothing that is compared.
+bool is_without_noise(const FitResult& fit) {
+  return std::ranges::none_of(fit.model.components, [](const Component& c) { return c.amplitude > 0.0; });
+}
+
 bool before(const RankedModel& a, const RankedModel& b) {
+  if (is_without_noise(a.fit) || is_without_noise(b.fit)) return !is_without_noise(a.fit);
   if (is_rejected(a.fit) != is_rejected(b.fit)) return is_rejected(b.fit);
   if (a.fit.identifiable != b.fit.identifiable) return a.fit.identifiable;
   return a.criterion < b.criterion;
@@ -151,6 +157,11 @@ class Grower {
     auto fitted = known != tried_.end() ? known->second : fit(wv_, spec, rate_hz_, options_, models_);
     if (!fitted) {
       why_none_ = fitted.error();
+      tried_.emplace(spec.name(), std::move(fitted));
+      return false;
+    }
+    if (is_without_noise(*fitted)) {
+      why_none_ = Error{ErrorKind::kWork, fmt::format("the record supports no {}", spec.name()), {}};
       tried_.emplace(spec.name(), std::move(fitted));
       return false;
     }

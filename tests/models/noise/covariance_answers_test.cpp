@@ -15,7 +15,7 @@
 #include "models/noise/wv_covariance.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::noise {
+namespace imuscope::noise::covariance_answers {
 namespace {
 
 using imuscope::test::expect_recorded;
@@ -288,4 +288,4 @@ TEST(CovarianceAnswers, MadePositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace imuscope::noise
+}  // namespace imuscope::noise::covariance_answers

@@ -13,7 +13,7 @@
 #include "models/noise/spread_solver.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::noise {
+namespace imuscope::noise::effects_answers {
 namespace {
 
 using imuscope::test::expect_recorded;
@@ -196,4 +196,4 @@ TEST(EffectsAnswers, TheVarianceOfASumOfSquares) {
 }
 
 }  // namespace
-}  // namespace imuscope::noise
+}  // namespace imuscope::noise::effects_answers

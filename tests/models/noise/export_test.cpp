@@ -21,13 +21,13 @@ namespace {
 using testing::HasSubstr;
 
 constexpr double kRateHz = 200.0;
-constexpr std::size_t kLength = 1U << 14U;
+constexpr std::size_t kSeriesLength = 1U << 14U;
 constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 
 /// A signal of white noise, a Gauss-Markov or (rate 0) a random-walk bias; variances of one sample.
 std::vector<double> signal(double white, double bias, double rate_per_sample, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
-  std::vector<double> x(kLength);
+  std::vector<double> x(kSeriesLength);
   const double phi = std::exp(-rate_per_sample);
   const double step = rate_per_sample > 0.0 ? bias * (1.0 - phi * phi) : bias;
   double state = rate_per_sample > 0.0 ? std::sqrt(bias) * normal(random) : 0.0;

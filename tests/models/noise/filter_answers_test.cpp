@@ -20,7 +20,7 @@
 #include "models/noise/select.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::noise {
+namespace imuscope::noise::filter_answers {
 namespace {
 
 using imuscope::test::expect_recorded;
@@ -508,4 +508,4 @@ TEST(FilterAnswers, ModelsFromValues) {
 }
 
 }  // namespace
-}  // namespace imuscope::noise
+}  // namespace imuscope::noise::filter_answers

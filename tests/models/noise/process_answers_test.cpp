@@ -25,7 +25,7 @@
 #include "models/noise/whitener.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::noise {
+namespace imuscope::noise::process_answers {
 namespace {
 
 using imuscope::test::expect_recorded;
@@ -300,4 +300,4 @@ TEST(ProcessAnswers, ChancesOfChiSquaredAndManyTests) {
 }
 
 }  // namespace
-}  // namespace imuscope::noise
+}  // namespace imuscope::noise::process_answers

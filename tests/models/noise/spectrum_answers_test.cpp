@@ -22,7 +22,7 @@
 #include "models/noise/tails.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::noise {
+namespace imuscope::noise::spectrum_answers {
 namespace {
 
 using imuscope::test::expect_recorded;
@@ -346,4 +346,4 @@ TEST(SpectrumAnswers, CoherenceOfFewSquares) {
 }
 
 }  // namespace
-}  // namespace imuscope::noise
+}  // namespace imuscope::noise::spectrum_answers

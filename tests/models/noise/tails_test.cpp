@@ -10,7 +10,7 @@
 namespace imuscope::noise {
 namespace {
 
-constexpr double kRate_hz = 100.0;
+constexpr double kTailsRate_hz = 100.0;
 
 /// White noise, a Gauss-Markov process, and spikes of 15 sd in a share of the samples.
 std::vector<double> spiked(std::size_t n, double share, unsigned seed) {
@@ -29,7 +29,7 @@ std::vector<double> spiked(std::size_t n, double share, unsigned seed) {
 
 std::optional<TailTest> test_of(const std::vector<double>& x, const WvOptions& options = {}) {
   const auto wv = haar_wavelet_variance(x, options).value();
-  const auto fitted = fit(wv, parse_model("WN+GM").value(), kRate_hz).value();
+  const auto fitted = fit(wv, parse_model("WN+GM").value(), kTailsRate_hz).value();
   return test_tails(x, options, fitted.model);
 }
 
@@ -37,7 +37,7 @@ std::optional<TailTest> test_of(const std::vector<double>& x, const WvOptions& o
 int called(std::size_t n, double share) {
   int count = 0;
   for (unsigned seed = 1; seed <= 200; ++seed)
-    count += spike_warning(test_of(spiked(n, share, seed)), kRate_hz) ? 1 : 0;
+    count += spike_warning(test_of(spiked(n, share, seed)), kTailsRate_hz) ? 1 : 0;
   return count;
 }
 
@@ -50,7 +50,7 @@ TEST(Tails, CleanSeriesAreSeldomCalledSpiky) {
 TEST(Tails, OneSpikeInAThousandIsTold) {
   EXPECT_GE(called(1U << 14U, 0.001), 190);
   const auto test = test_of(spiked(1U << 16U, 0.001, 7));
-  const auto warning = spike_warning(test, kRate_hz);
+  const auto warning = spike_warning(test, kTailsRate_hz);
   ASSERT_TRUE(warning);
   EXPECT_NE(warning->find("fit --robust"), std::string::npos);
   // 0.001 * 15^2 beside a variance of one, of 65 spikes.
@@ -59,14 +59,14 @@ TEST(Tails, OneSpikeInAThousandIsTold) {
 
 TEST(Tails, AreLookedForWithSamplesMissingAndInTheWholeOfALongSignal) {
   auto x = spiked(1U << 19U, 0.0, 3);
-  EXPECT_FALSE(spike_warning(test_of(x), kRate_hz));
+  EXPECT_FALSE(spike_warning(test_of(x), kTailsRate_hz));
   std::mt19937_64 random(9);
   for (std::size_t i = x.size() / 2; i < x.size(); ++i) x[i] += random() % 500 == 0 ? 15.0 : 0.0;
   std::vector<std::uint8_t> mask(x.size(), 1);
   for (auto& m : mask) m = random() % 100 == 0 ? 0 : 1;
   WvOptions options;
   options.mask = mask;
-  EXPECT_TRUE(spike_warning(test_of(x, options), kRate_hz));
+  EXPECT_TRUE(spike_warning(test_of(x, options), kTailsRate_hz));
 }
 
 TEST(Tails, OfFewerLargeValuesThanAGaussianSignalHasNothingIsSaid) {
@@ -74,7 +74,7 @@ TEST(Tails, OfFewerLargeValuesThanAGaussianSignalHasNothingIsSaid) {
   std::uniform_real_distribution<double> uniform(-1.0, 1.0);
   std::vector<double> x(1U << 16U);
   for (double& v : x) v = uniform(random);
-  EXPECT_FALSE(spike_warning(test_of(x), kRate_hz));
+  EXPECT_FALSE(spike_warning(test_of(x), kTailsRate_hz));
 }
 
 TEST(Tails, QuantizationAloneIsNotTested) {
@@ -88,7 +88,7 @@ TEST(Tails, QuantizationAloneIsNotTested) {
     before = now;
   }
   const auto wv = haar_wavelet_variance(x).value();
-  const auto fitted = fit(wv, parse_model("QN").value(), kRate_hz).value();
+  const auto fitted = fit(wv, parse_model("QN").value(), kTailsRate_hz).value();
   EXPECT_FALSE(test_tails(x, {}, fitted.model));
 }
 

@@ -17,7 +17,7 @@
 #include "models/noise/wavelet_variance.h"
 #include "tests/support/recorded_answer.h"
 
-namespace imuscope::noise {
+namespace imuscope::noise::wavelet_answers {
 namespace {
 
 using imuscope::test::expect_recorded;
@@ -353,4 +353,4 @@ TEST(WaveletAnswers, WhatMissingSamplesAdd) {
 }
 
 }  // namespace
-}  // namespace imuscope::noise
+}  // namespace imuscope::noise::wavelet_answers
