@@ -1,5 +1,6 @@
 #include "firmware_sim/imu/imu_model.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
