@@ -35,7 +35,7 @@ using test::AnswerLines;
 
 constexpr double kDrive_s = 130.0;
 constexpr double kTurned_s = 65.0;
-constexpr double kRate_hz = 100.0;
+constexpr double kImuRate_hz = 100.0;
 constexpr double kDegPerRadian = 180.0 / std::numbers::pi;
 /// Iterations of the batch estimate and of the noise fits end where a step no longer matters.
 constexpr double kShare = 1e-3;
@@ -113,7 +113,7 @@ void write_drive(const std::filesystem::path& folder) {
   imusim::Random random(31, "whole study");
   imusim::ReferenceClass fog;
   fog.gyro_white_radps_per_sqrt_hz = 3e-5;
-  imusim::ImuModel reference(motion, {}, imusim::draw_reference(fog, kRate_hz, random), 31, "reference");
+  imusim::ImuModel reference(motion, {}, imusim::draw_reference(fog, kImuRate_hz, random), 31, "reference");
   imusim::MtxClass mtx;
   mtx.gyro_noise = imusim::GyroNoiseChoice::kAllDynamic;
   const Eigen::Matrix3d C1 = exp_so3({0.02, -0.03, 1.6});
@@ -132,8 +132,8 @@ void write_drive(const std::filesystem::path& folder) {
   of_mtx1 << "n,t_s," << columns;
   of_mtx2 << "t_s," << columns;
   of_gnss << "t_s,lat_deg,lon_deg,height_m,vn,ve,vd\n";
-  for (int i = 0; i < static_cast<int>(kDrive_s * kRate_hz); ++i) {
-    const double t_s = i / kRate_hz;
+  for (int i = 0; i < static_cast<int>(kDrive_s * kImuRate_hz); ++i) {
+    const double t_s = i / kImuRate_hz;
     write_row(of_reference, t_s, reference.sample_at(t_s));
     of_reference << '\n';
     const bool lost = i == 4000 || (i >= 9000 && i < 9030);
