@@ -421,8 +421,10 @@ LinearisationSpread SImuFilter::linearisation_spread(const FilterCore& core, Tri
   spread.psi_rad2 = block_of(P, layout.psi, layout.psi);
   spread.r_m2 = block_of(P, layout.r, layout.r);
   if (layout.t_d != SImuLayout::kAbsent) spread.t_d_s2 = P(layout.t_d, layout.t_d);
-  if (triad == Triad::kAccel && layout.accel_t_d != SImuLayout::kAbsent)
-    spread.t_d_s2 += P(layout.accel_t_d, layout.accel_t_d) + 2.0 * P(layout.t_d, layout.accel_t_d);
+  if (triad == Triad::kAccel && layout.accel_t_d != SImuLayout::kAbsent) {
+    spread.t_d_s2 += P(layout.accel_t_d, layout.accel_t_d);
+    if (layout.t_d != SImuLayout::kAbsent) spread.t_d_s2 += 2.0 * P(layout.t_d, layout.accel_t_d);
+  }
   return spread;
 }
 

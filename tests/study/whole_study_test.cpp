@@ -1,0 +1,350 @@
+/// A whole study of a simulated drive, from files to documents: two S-IMUs, of which one is turned on its mount half way,
+/// and GNSS. What is right about it, the tests of the parts and tests/integration prove.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <numbers>
+#include <string>
+
+#include "configuration/config.h"
+#include "estimation/navigation/so3.h"
+#include "firmware_sim/imu/imu_model.h"
+#include "firmware_sim/imu/sensor_classes.h"
+#include "firmware_sim/motion/motion.h"
+#include "logs/mcap/reader.h"
+#include "service/recording/recording.h"
+#include "study/evaluate.h"
+#include "study/run_bag.h"
+#include "study/study.h"
+#include "tests/support/answer_lines.h"
+#include "tests/support/recorded_answer.h"
+
+namespace imuscope {
+namespace {
+
+using Eigen::Vector3d;
+using nlohmann::json;
+using test::AnswerLines;
+
+constexpr double kDrive_s = 130.0;
+constexpr double kTurned_s = 65.0;
+constexpr double kImuRate_hz = 100.0;
+constexpr double kDegPerRadian = 180.0 / std::numbers::pi;
+/// Iterations of the batch estimate and of the noise fits end where a step no longer matters.
+constexpr double kShare = 1e-3;
+constexpr double kNothing = 1e-8;
+
+constexpr const char* kConfiguration = R"(
+[run]
+name = "whole"
+
+[noise]
+model = "WN"
+
+[[device]]
+name = "reference"
+role = "reference"
+protocol = "csv_imu"
+rate_hz = 100.0
+[device.noise]
+gyro_white_sd_degps = 0.02
+accel_white_sd_mps2 = 0.004
+
+[[device]]
+name = "mtx1"
+role = "study"
+protocol = "csv_imu"
+rate_hz = 100.0
+[device.csv]
+counter_column = "n"
+[device.data_sheet]
+gyro_density_degps_per_sqrt_hz = 0.05
+gyro_bias_stability_deg_per_h = 20.0
+accel_density_ug_per_sqrt_hz = 250.0
+accel_bias_stability_ug = 30.0
+
+[[device]]
+name = "mtx2"
+role = "study"
+protocol = "csv_imu"
+rate_hz = 100.0
+[device.csv]
+clock = "own"
+
+[[device]]
+name = "gnss"
+role = "gnss"
+protocol = "csv_gnss"
+rate_hz = 5.0
+position_sd_m = [0.02, 0.02, 0.04]
+[device.csv]
+velocity_columns = ["vn", "ve", "vd"]
+)";
+
+/// A folder that is gone at the end.
+struct ScratchFolder {
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path() / ("whole_study_" + std::to_string(::getpid()));
+  ScratchFolder() { std::filesystem::create_directories(path); }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  ~ScratchFolder() { std::filesystem::remove_all(path); }
+};
+
+void write_row(std::ofstream& out, double t_s, const imusim::ImuReading& r) {
+  char row[256];
+  std::snprintf(row, sizeof row, "%.4f,%.9f,%.9f,%.9f,%.8f,%.8f,%.8f", t_s, r.omega_radps.x(),
+                r.omega_radps.y(), r.omega_radps.z(), r.f_mps2.x(), r.f_mps2.y(), r.f_mps2.z());
+  out << row;
+}
+
+/// reference.csv, mtx1.csv, mtx2.csv and gnss.csv.
+void write_drive(const std::filesystem::path& folder) {
+  imusim::Scenario scenario;
+  scenario.duration_s = kDrive_s + 2.0;
+  const imusim::Motion motion(scenario);
+  imusim::Random random(31, "whole study");
+  imusim::ReferenceClass fog;
+  fog.gyro_white_radps_per_sqrt_hz = 3e-5;
+  imusim::ImuModel reference(motion, {}, imusim::draw_reference(fog, kImuRate_hz, random), 31, "reference");
+  imusim::MtxClass mtx;
+  mtx.gyro_noise = imusim::GyroNoiseChoice::kAllDynamic;
+  const Eigen::Matrix3d C1 = exp_so3({0.02, -0.03, 1.6});
+  const Eigen::Matrix3d C2 = exp_so3({-0.01, 0.02, -0.7});
+  imusim::ImuModel mtx1(motion, {C1, {0.35, -0.22, 0.12}}, imusim::draw_mtx(mtx, random), 31, "mtx1");
+  const imusim::ImuErrors errors = imusim::draw_mtx(mtx, random);
+  imusim::ImuModel before(motion, {C2, {-0.4, 0.3, 0.2}}, errors, 31, "mtx2");
+  imusim::ImuModel after(motion, {exp_so3({0.0, 0.35, 0.0}) * C2, {-0.4, 0.3, 0.2}}, errors, 31, "turned");
+  const std::string columns =
+      "gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2\n";
+  std::ofstream of_reference(folder / "reference.csv");
+  std::ofstream of_mtx1(folder / "mtx1.csv");
+  std::ofstream of_mtx2(folder / "mtx2.csv");
+  std::ofstream of_gnss(folder / "gnss.csv");
+  of_reference << "t_s," << columns;
+  of_mtx1 << "n,t_s," << columns;
+  of_mtx2 << "t_s," << columns;
+  of_gnss << "t_s,lat_deg,lon_deg,height_m,vn,ve,vd\n";
+  for (int i = 0; i < static_cast<int>(kDrive_s * kImuRate_hz); ++i) {
+    const double t_s = i / kImuRate_hz;
+    write_row(of_reference, t_s, reference.sample_at(t_s));
+    of_reference << '\n';
+    const bool lost = i == 4000 || (i >= 9000 && i < 9030);
+    const imusim::ImuReading first = mtx1.sample_at(t_s + 0.003);
+    if (!lost) {
+      of_mtx1 << i << ',';
+      write_row(of_mtx1, t_s, first);
+      of_mtx1 << '\n';
+    }
+    write_row(of_mtx2, t_s + 10.0, (t_s < kTurned_s ? before : after).sample_at(t_s + 0.25));
+    of_mtx2 << '\n';
+    if (i % 20 != 0) continue;
+    const imusim::MotionState state = motion.state_at(t_s);
+    const double north = random.normal();
+    const double east = random.normal();
+    const imusim::GeodeticPosition p =
+        imusim::displaced(state.position, Vector3d(0.02 * north, 0.02 * east, 0.0));
+    char row[256];
+    std::snprintf(row, sizeof row, "%.3f,%.11f,%.11f,%.4f,%.4f,%.4f,%.4f\n", t_s,
+                  p.latitude_rad * kDegPerRadian, p.longitude_rad * kDegPerRadian, p.height_m,
+                  state.v_n_mps.x(), state.v_n_mps.y(), state.v_n_mps.z());
+    of_gnss << row;
+  }
+}
+
+/// A leaf of a document, or an array of numbers, a line.
+void add_json(AnswerLines& lines, const std::string& path, const json& value) {
+  const auto is_leaf = [](const json& one) { return !one.is_structured(); };
+  if (value.is_object()) {
+    for (const auto& [key, inner] : value.items()) add_json(lines, path + "/" + key, inner);
+  } else if (value.is_array() && std::all_of(value.begin(), value.end(), is_leaf)) {
+    std::string row;
+    for (const json& one : value) row += " " + one.dump();
+    lines.add(path, row);
+  } else if (value.is_array()) {
+    for (std::size_t i = 0; i < value.size(); ++i) add_json(lines, path + "/" + std::to_string(i), value[i]);
+  } else {
+    lines.add(path, value.dump());
+  }
+}
+
+json read_document(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return json::parse(in);
+}
+
+/// The header and every `every`-th row of a table.
+void add_table(AnswerLines& lines, const std::filesystem::path& file, std::size_t every) {
+  std::ifstream in(file);
+  std::string line;
+  std::size_t n = 0;
+  for (; std::getline(in, line); ++n)
+    if (n == 0 || n % every == 1) lines.title(line);
+  lines.add(file.filename().string(), n);
+}
+
+/// Without what depends on the machine: the folder's name.
+std::string without(std::string text, const std::string& folder) {
+  for (auto at = text.find(folder); at != std::string::npos; at = text.find(folder))
+    text.erase(at, folder.size());
+  return text;
+}
+
+/// The study, made once for all tests.
+class WholeStudy : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scratch_ = new ScratchFolder;
+    write_drive(scratch_->path);
+    std::vector<std::string> inputs;
+    for (const char* name : {"reference", "mtx1", "mtx2", "gnss"})
+      inputs.push_back(std::string(name) + "=" + (scratch_->path / (std::string(name) + ".csv")).string());
+    auto configuration = parse_configuration(kConfiguration, "whole.toml");
+    ASSERT_TRUE(configuration) << configuration.error().text();
+    const auto opened = open_dumps(inputs, std::move(*configuration));
+    ASSERT_TRUE(opened) << opened.error().text();
+    StudyRunOptions options;
+    options.out = run();
+    options.version = "0";
+    options.progress = [](const std::string& step, double share) { progress_[step] = share; };
+    const auto done = run_study(opened->configuration, opened->recording, options);
+    ASSERT_TRUE(done) << done.error().text();
+  }
+  static void TearDownTestSuite() {
+    delete scratch_;
+    scratch_ = nullptr;
+  }
+  static std::filesystem::path run() { return scratch_->path / "run"; }
+  static std::string folder() { return scratch_->path.string(); }
+
+  static inline ScratchFolder* scratch_ = nullptr;
+  static inline std::map<std::string, double> progress_;
+};
+
+TEST_F(WholeStudy, Calibration) {
+  AnswerLines lines;
+  json calibration = read_document(run() / "calibration.json");
+  // Once is enough of the longest list.
+  calibration.at("imus").at(1).at("batch").erase("shared_psi_r");
+  add_json(lines, "", calibration);
+  const json record = read_document(run() / "run.json");
+  for (const char* key :
+       {"warnings", "notes", "static_s", "dynamic_s", "error_process_mounting", "schema", "name"})
+    if (record.contains(key)) add_json(lines, key, record.at(key));
+  for (const auto& [step, share] : progress_) lines.add(step, share);
+  test::expect_recorded("study/calibration.txt", without(lines.text(), folder()), kShare, kNothing);
+}
+
+TEST_F(WholeStudy, Tables) {
+  AnswerLines lines;
+  for (const char* name : {"mtx1", "mtx2"}) {
+    add_table(lines, run() / (std::string("errors_") + name + ".csv"), 1500);
+    add_table(lines, run() / (std::string("smoothed_") + name + ".csv"), 90);
+    add_table(lines, run() / (std::string("scatter_") + name + ".csv"), 500);
+  }
+  add_table(lines, run() / "smoothed_navigation.csv", 90);
+  test::expect_recorded("study/tables.txt", lines.text(), kShare, 1e-6);
+}
+
+TEST_F(WholeStudy, NoiseAndRegimes) {
+  AnswerLines lines;
+  for (const char* name : {"regimes.json", "comparison.json", "vibration.json"})
+    add_json(lines, name, read_document(run() / name));
+  for (const json& model : read_document(run() / "models.json").at("models")) {
+    if (model.at("name") == "mtx1" && model.at("axis") == "gyro_x")
+      add_json(lines, "model", model);
+    else
+      lines.add("model", model.at("name").dump(), model.at("axis").dump(), model.at("regime").dump(),
+                model.at("parameters").dump());
+  }
+  test::expect_recorded("study/noise.txt", lines.text(), kShare, kNothing);
+}
+
+TEST_F(WholeStudy, DynamicsAndDependence) {
+  AnswerLines lines;
+  const json regression = read_document(run() / "regression.json");
+  lines.add("regressions", regression.at("regressions").size(), regression.at("remarks").dump());
+  for (const json& r : regression.at("regressions"))
+    lines.add("regression", r.at("name").dump(), r.at("axis").dump(), r.at("method").dump(),
+              r.at("projected").dump(), r.at("n").dump(), r.at("r2").get<double>(), r.at("f").get<double>());
+  const json dependence = read_document(run() / "dependence.json");
+  for (const auto& [key, value] : dependence.items())
+    if (key != "points") add_json(lines, key, value);
+  lines.add("points", dependence.at("points").size());
+  for (std::size_t i = 0; i < dependence.at("points").size(); i += 7)
+    add_json(lines, "point", dependence.at("points")[i]);
+  test::expect_recorded("study/dynamics.txt", lines.text(), kShare, kNothing);
+}
+
+TEST_F(WholeStudy, Evaluation) {
+  EvaluationRunOptions options;
+  options.run_dir = run();
+  options.outages = {{4.0, 10.0}, 8.0, 20.0, {}};
+  const auto evaluation = evaluate_run(options);
+  ASSERT_TRUE(evaluation) << evaluation.error().text();
+  EXPECT_EQ(*evaluation, read_document(run() / "evaluation.json"));
+  AnswerLines lines;
+  add_json(lines, "", *evaluation);
+  options.outages.settle_s = 1e4;
+  lines.add("too long", without(evaluate_run(options).error().text(), folder()));
+  options.run_dir = scratch_->path / "none";
+  lines.add("no run", without(evaluate_run(options).error().text(), folder()));
+  test::expect_recorded("study/evaluation.txt", lines.text(), kShare, kNothing);
+}
+
+/// Of a CDR message, what stands where doubles may stand.
+void add_doubles(AnswerLines& lines, std::string_view data) {
+  constexpr std::size_t kHeader = 4;
+  std::vector<double> values;
+  for (std::size_t at = kHeader; at + sizeof(double) <= data.size() && values.size() < 60;
+       at += sizeof(double)) {
+    double value = 0.0;
+    std::memcpy(&value, data.data() + at, sizeof value);
+    values.push_back(std::isfinite(value) && std::abs(value) < 1e12 && std::abs(value) > 1e-12 ? value : 0.0);
+  }
+  lines.add(" holds", values);
+}
+
+TEST_F(WholeStudy, Bag) {
+  RunBagOptions options;
+  options.source.run_dir = run();
+  options.out = scratch_->path / "run.mcap";
+  options.version = "0";
+  options.compression = mcap::Compression::kNone;
+  options.with_errors = true;
+  double last_share = 0.0;
+  options.progress = [&](double share) { last_share = share; };
+  const auto bag = write_run_bag(options);
+  ASSERT_TRUE(bag) << bag.error().text();
+  AnswerLines lines;
+  lines.add("bag", bag->messages, bag->times_are_utc, last_share > 0.5, bag->remarks);
+  EXPECT_EQ(bag->bytes, std::filesystem::file_size(options.out));
+  auto reader = mcap::Reader::open(options.out);
+  ASSERT_TRUE(reader);
+  std::map<std::string, std::size_t> seen;
+  while (const auto message = reader->next()) {
+    const std::size_t n = seen[message->topic->name]++;
+    if (n != 0 && n != 3 && n % 5000 != 77) continue;
+    lines.add(message->topic->name, n, message->topic->schema, message->topic->encoding,
+              1e-9 * static_cast<double>(message->log_time),
+              1e-9 * static_cast<double>(message->publish_time));
+    const std::string_view data = mcap::text_of(message->data);
+    if (message->topic->encoding == "json") {
+      lines.title(data.substr(0, 1200));
+    } else {
+      add_doubles(lines, data);
+    }
+  }
+  for (const auto& [topic, n] : seen) lines.add(topic, n);
+  test::expect_recorded("study/bag.txt", without(lines.text(), folder()), kShare, 1e-6);
+}
+
+}  // namespace
+}  // namespace imuscope
