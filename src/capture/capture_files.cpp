@@ -85,6 +85,23 @@ bool CaptureFiles::next(LogEvent& event) {
   return true;
 }
 
+std::optional<CaptureFiles::Place> CaptureFiles::place() const {
+  const auto offset = log_.place();
+  if (!offset || at_beginning_) return std::nullopt;
+  return Place{number_, *offset};
+}
+
+Result<void> CaptureFiles::go_to(const Place& place) {
+  if (place.number != number_) {
+    auto log = SealedLog::open(capture_file(first_, place.number), EventLogReader::Beginning::kMayBeDamaged);
+    if (!log) return tl::unexpected<Error>(log.error());
+    log_ = std::move(*log);
+    number_ = place.number;
+  }
+  log_.go_to(place.offset);
+  return {};
+}
+
 std::vector<CapturedFile> CaptureFiles::files() const {
   auto files = finished_;
   files.push_back({number_, log_.health()});

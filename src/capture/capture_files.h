@@ -51,6 +51,16 @@ class CaptureFiles {
   /// Fetches the next event. Returns false at the end of the last file.
   [[nodiscard]] bool next(LogEvent& event);
 
+  /// Somewhere in a capture that is read again from there.
+  struct Place {
+    int number = 0;            ///< of the file
+    std::uint64_t offset = 0;  ///< in it
+  };
+  /// Of the next event, where the reader stands between what its seals cover.
+  [[nodiscard]] std::optional<Place> place() const;
+  /// Goes on from there. Errors: those of a file that is no longer there.
+  Result<void> go_to(const Place& place);
+
   /// Those that were begun so far.
   [[nodiscard]] std::vector<CapturedFile> files() const;
   /// Of the present one.

@@ -234,6 +234,14 @@ bool EventLogReader::next(LogEvent& event) {
   return false;
 }
 
+void EventLogReader::go_to(std::uint64_t place) {
+  buffer_.clear();
+  begin_ = 0;
+  read_ = place;
+  file_.clear();
+  file_.seekg(static_cast<std::streamoff>(place));
+}
+
 void EventLogReader::take(LogEvent& event) {
   const std::uint8_t* record = buffer_.data() + begin_;
   const Lengths lengths = lengths_of(record);

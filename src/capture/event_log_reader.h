@@ -36,6 +36,10 @@ class EventLogReader {
   /// Fetches the next event. Returns false at the end of the file.
   [[nodiscard]] bool next(LogEvent& event);
 
+  /// Bytes of the file before the next event; go_to() goes on from such a place.
+  [[nodiscard]] std::uint64_t place() const noexcept { return read_ - (buffer_.size() - begin_); }
+  void go_to(std::uint64_t place);
+
   /// Bytes in the midst of the file that belong to no whole record.
   [[nodiscard]] std::uint64_t bytes_skipped() const noexcept { return bytes_skipped_; }
   /// Bytes of the record that the end of the file cuts off; 0 for a complete log. Known after next() returned

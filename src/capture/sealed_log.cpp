@@ -50,6 +50,20 @@ bool SealedLog::next(LogEvent& event) {
   return true;
 }
 
+std::optional<std::uint64_t> SealedLog::place() const {
+  if (!held_.empty() || index_ || (health_.is_sealed && given_unsealed_ > 0)) return std::nullopt;
+  return log_.place();
+}
+
+void SealedLog::go_to(std::uint64_t place) {
+  held_.clear();
+  index_.reset();
+  released_ = 0;
+  waiting_bytes_ = 0;
+  given_unsealed_ = 0;
+  log_.go_to(place);
+}
+
 LogHealth SealedLog::health() const {
   LogHealth health = health_;
   health.bytes_skipped = log_.bytes_skipped();

@@ -37,6 +37,11 @@ class SealedLog {
   static Result<SealedLog> open(const std::filesystem::path& path,
                                 EventLogReader::Beginning beginning = EventLogReader::Beginning::kIsARecord);
 
+  /// Where the next record begins, if nothing is held between here and what was given: a place for go_to().
+  [[nodiscard]] std::optional<std::uint64_t> place() const;
+  /// Goes on from there. What is told of the file's health is of what was read.
+  void go_to(std::uint64_t place);
+
   /// See EventLogReader.
   void on_read(std::function<void(std::uint64_t bytes)> listener) { log_.on_read(std::move(listener)); }
 

@@ -130,6 +130,33 @@ TEST(SealedLog, GivesWhatWasAppendedAndKnowsThatItIsWhole) {
   EXPECT_TRUE(check->is_whole());
 }
 
+/// Wherever the reader knows its place, it goes on from there with the same records when it is sent back.
+TEST(SealedLog, OfAPlaceTheRestIsReadAgain) {
+  const auto first = record_files(test::scratch_folder(), 2);
+  std::vector<LogEvent> all;
+  std::vector<std::pair<std::size_t, CaptureFiles::Place>> places;
+  auto files = CaptureFiles::open(first);
+  ASSERT_TRUE(files.has_value());
+  EXPECT_FALSE(files->place()) << "before the first record nobody knows what capture it is";
+  for (LogEvent event; files->next(event);) {
+    all.push_back(event);
+    if (const auto place = files->place()) places.emplace_back(all.size(), *place);
+  }
+  ASSERT_EQ(all.size(), 2U * (kReadsPerFile + 1));
+  // A place follows every seal but those that the index follows.
+  ASSERT_GE(places.size(), 6U);
+  EXPECT_EQ(places.back().second.number, 1);
+  for (const auto& [n, place] : places) {
+    ASSERT_TRUE(files->go_to(place).has_value());
+    std::size_t at = n;
+    for (LogEvent event; files->next(event); ++at) {
+      ASSERT_LT(at, all.size());
+      EXPECT_EQ(event.data, all[at].data) << n << " of file " << place.number;
+    }
+    EXPECT_EQ(at, all.size()) << n << " of file " << place.number;
+  }
+}
+
 /// As lcm-logplayer and lcm-logger do: other stamps, other numbers, the seals among the rest.
 TEST(SealedLog, ACaptureThatWasPlayedAndRecordedAnewLosesNothingToItsOldSeals) {
   const auto folder = test::scratch_folder();

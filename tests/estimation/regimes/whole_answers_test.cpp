@@ -67,31 +67,32 @@ void add_cells(AnswerLines& lines, const std::vector<MotionCell>& cells, std::si
 
 TEST(RegimeAnswers, StoppingDrives) {
   AnswerLines lines;
-  struct World {
+  struct StoppingWorld {
     const char* name;
     test::StoppingDrive drive;
   };
-  const std::array worlds{World{"mems", {.duration_s = 300.0, .seed = 3}},
-                          World{"mems without speed", {.duration_s = 300.0, .has_speed = false, .seed = 4}},
-                          World{"noisy",
-                                {.duration_s = 300.0,
-                                 .gyro_density_radps = 0.08 * kRadPerDeg,
-                                 .accel_density_mps2 = 4e-3,
-                                 .seed = 5}},
-                          World{"noisy without speed",
-                                {.duration_s = 300.0,
-                                 .has_speed = false,
-                                 .gyro_density_radps = 0.08 * kRadPerDeg,
-                                 .accel_density_mps2 = 4e-3,
-                                 .seed = 6}},
-                          World{"quiet, short stops",
-                                {.duration_s = 300.0,
-                                 .longest_stop_s = 1.6,
-                                 .engine_runs = false,
-                                 .gyro_density_radps = 1e-6,
-                                 .accel_density_mps2 = 5e-5,
-                                 .seed = 7}}};
-  for (const World& world : worlds) {
+  const std::array worlds{
+      StoppingWorld{"mems", {.duration_s = 300.0, .seed = 3}},
+      StoppingWorld{"mems without speed", {.duration_s = 300.0, .has_speed = false, .seed = 4}},
+      StoppingWorld{"noisy",
+                    {.duration_s = 300.0,
+                     .gyro_density_radps = 0.08 * kRadPerDeg,
+                     .accel_density_mps2 = 4e-3,
+                     .seed = 5}},
+      StoppingWorld{"noisy without speed",
+                    {.duration_s = 300.0,
+                     .has_speed = false,
+                     .gyro_density_radps = 0.08 * kRadPerDeg,
+                     .accel_density_mps2 = 4e-3,
+                     .seed = 6}},
+      StoppingWorld{"quiet, short stops",
+                    {.duration_s = 300.0,
+                     .longest_stop_s = 1.6,
+                     .engine_runs = false,
+                     .gyro_density_radps = 1e-6,
+                     .accel_density_mps2 = 5e-5,
+                     .seed = 7}}};
+  for (const StoppingWorld& world : worlds) {
     lines.title(world.name);
     const test::Driven driven = test::driven(world.drive);
     const std::vector<MotionCell> cells = driven.levels.cells();
