@@ -48,10 +48,10 @@ class HostileCapture : public testing::Test {
       ASSERT_EQ(forged.writeEvent(&out), 0);
     };
     LogEvent event;
-    while (reader->next(event)) {
+    for (int n = 0; reader->next(event); ++n) {
       change(event);
       write(event);
-      if (reader->events() == 1) std::for_each(added_.begin(), added_.end(), write);
+      if (n == 0) std::for_each(added_.begin(), added_.end(), write);
     }
   }
 

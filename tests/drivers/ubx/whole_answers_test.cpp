@@ -23,11 +23,11 @@ test::Bytes pvt_payload(std::uint32_t itow_ms) {
   test::Bytes payload(message.begin() + 6, message.end() - 2);
   const auto put = [&](std::size_t at, std::int32_t value) {
     for (std::size_t i = 0; i < 4; ++i)
-      payload[at + i] = static_cast<std::uint8_t>(static_cast<std::uint32_t>(value) >> (8 * i));
+      payload.at(at + i) = static_cast<std::uint8_t>(static_cast<std::uint32_t>(value) >> (8 * i));
   };
   put(12, 25), put(16, -125'000'000), put(52, -500), put(56, -125), put(60, 1346), put(64, 33'812'300),
       put(72, 180'000);
-  payload[76] = 112;
+  payload.at(76) = 112;
   return payload;
 }
 
