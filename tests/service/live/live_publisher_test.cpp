@@ -44,8 +44,10 @@ status_t of_any_time(status_t status) {
   EXPECT_GT(status.threads.size(), 0U);
   status.threads.clear();
   for (auto& alarm : status.alarms) alarm.since_utime = 0;
-  // Whether there is a bus is another matter.
-  std::erase_if(status.alarms, [](const alarm_t& alarm) { return alarm.kind == alarm_kind::kBus; });
+  // Whether there is a bus is another matter, and threads that were not started stand still.
+  std::erase_if(status.alarms, [](const alarm_t& alarm) {
+    return alarm.kind == alarm_kind::kBus || alarm.kind == alarm_kind::kThread;
+  });
   count_elements(status);
   return status;
 }
