@@ -200,6 +200,22 @@ TEST(DoctorDisk, JudgesRoomAndSpeedByWhatARunWrites) {
   EXPECT_EQ(check_disk(small, kRate).verdict, Verdict::kBad);
 }
 
+TEST(DoctorDisk, ADayOfRecordingIsWantedAnHourNeededAndTenTimesTheSpeedOfARun) {
+  constexpr double kBytesPerHour = 3600.0 * kRate;
+  const auto verdict = [](double hours, double speed_ratio) {
+    return check_disk({"/data", {}, hours * kBytesPerHour, speed_ratio * kRate}, kRate).verdict;
+  };
+  EXPECT_EQ(verdict(24.0, 10.0), Verdict::kGood);
+  EXPECT_EQ(verdict(23.999, 10.0), Verdict::kWarning);
+  EXPECT_EQ(verdict(1.0, 10.0), Verdict::kWarning);
+  EXPECT_EQ(verdict(0.999, 10.0), Verdict::kBad);
+  EXPECT_EQ(verdict(24.0, 9.999), Verdict::kBad);
+  const Finding slow = check_disk({"/data", {}, 250.04e9, 2.6e6}, 0.5e6);
+  EXPECT_EQ(slow.what, "250.0 GB free in /data, 139 h of recording; 3 MB/s; a run writes 0.50 MB/s");
+  EXPECT_EQ(check_disk({"/data", "no room", 1e12, 1e9}, kRate).what,
+            "nothing can be recorded in /data: no room");
+}
+
 TEST(DoctorDisk, MeasuresAFolderThatIsStillToBeMadeAndLeavesNothing) {
   const auto folder = test::scratch_folder();
   const auto disk = measure_disk(folder / "runs" / "monday");
@@ -363,6 +379,46 @@ TEST(DoctorExamination, WithoutAConfigurationLooksAtThePcAlone) {
   for (const char* check : {"real time", "memory lock", "cores", "LCM", "disk", "udev", "wall clock"})
     EXPECT_THAT(checks, testing::Contains(check));
   for (const auto& check : checks) EXPECT_THAT(check, testing::Not(HasSubstr("line of")));
+}
+
+/// Bytes that a run is taken to write in a second, by the room and the hours of the disk's sentence, and how well
+/// these tell it.
+std::pair<double, double> reckoned_bytes_per_s(const Examination& examination) {
+  for (const auto& finding : examine(examination)) {
+    if (finding.check != "disk") continue;
+    const auto hours_at = finding.what.rfind(", ", finding.what.find(" h of recording"));
+    if (hours_at == std::string::npos) return {};
+    const double free_gb = std::strtod(finding.what.c_str(), nullptr);
+    const double hours = std::strtod(finding.what.c_str() + hours_at + 2, nullptr);
+    const double bytes_per_s = 1e9 * free_gb / hours / 3600.0;
+    return {bytes_per_s, bytes_per_s * (0.05 / free_gb + 0.5 / hours)};
+  }
+  return {};
+}
+
+TEST(DoctorExamination, ARunWritesWhatItsLinesBringAndWhatItPublishes) {
+  Examination examination;
+  const auto usual = reckoned_bytes_per_s(examination);
+  EXPECT_NEAR(usual.first, 120e3, usual.second) << "of the room that is free here";
+  auto configuration = parse_configuration(R"(
+[[device]]
+name = "r"
+role = "reference"
+protocol = "ixblue_stdbin"
+transport = { kind = "serial", port = "/dev/imuscope-no-r", baud = 921600 }
+[[device]]
+name = "s"
+role = "study"
+protocol = "xsens_mt"
+transport = { kind = "serial", port = "/dev/imuscope-no-s", baud = 460800 }
+)",
+                                           "car.toml");
+  ASSERT_TRUE(configuration) << configuration.error().text();
+  configuration->record.folder = test::scratch_folder().string();
+  examination.configuration = *configuration;
+  const auto of_two = reckoned_bytes_per_s(examination);
+  // Published messages; records around a hundred reads a second of each line; their bytes, ten bits each.
+  EXPECT_NEAR(of_two.first, 60e3 + 2 * 7.5e3 + 92'160 + 46'080, of_two.second);
 }
 
 TEST(DoctorExamination, ADeviceOnACanBusIsLookedForByItsInterface) {

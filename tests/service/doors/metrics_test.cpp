@@ -23,6 +23,7 @@
 #include "rt/host_clock.h"
 #include "service/doors/metrics_server.h"
 #include "service/doors/metrics_text.h"
+#include "tests/support/recorded_answer.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -86,6 +87,19 @@ TEST(MetricsText, SaysWhatTheStatusSaysInBaseUnits) {
         "imuscope_ring_high_water{ring=\"samples\"} 18"})
     EXPECT_THAT(text, HasSubstr(line));
   EXPECT_THAT(text, HasSubstr("imuscope_device_latency_seconds{device=\"mtx1\"} 0.0042"));
+}
+
+TEST(MetricsText, TheWholePage) {
+  status_t status = test::example_status();
+  status.devices[1].name = "mtx2";
+  status.devices[1].state = "failed";
+  status.devices[1].data_age_s = 3.5;
+  status.devices[1].clock_drift_ppm = std::nan("");
+  status.alarms.push_back(status.alarms[0]);
+  status.alarms[1].kind = "disk";
+  status.alarms[1].active = 0;
+  status.alarms[1].times = 33;
+  test::expect_recorded("service/doors/metrics.txt", metrics_text(status, 0.25));
 }
 
 TEST(MetricsText, ThePageOfTheDocumentsHasEveryFamilyAndNoOther) {
