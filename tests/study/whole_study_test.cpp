@@ -23,7 +23,7 @@
 #include "study/evaluate.h"
 #include "study/run_bag.h"
 #include "study/study.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
@@ -31,7 +31,7 @@ namespace {
 
 using Eigen::Vector3d;
 using nlohmann::json;
-using test::AnswerLines;
+using test::Answer;
 
 constexpr double kDrive_s = 130.0;
 constexpr double kTurned_s = 65.0;
@@ -160,18 +160,18 @@ void write_drive(const std::filesystem::path& folder) {
 }
 
 /// A leaf of a document, or an array of numbers, a line.
-void add_json(AnswerLines& lines, const std::string& path, const json& value) {
+void add_json(Answer& lines, const std::string& path, const json& value) {
   const auto is_leaf = [](const json& one) { return !one.is_structured(); };
   if (value.is_object()) {
     for (const auto& [key, inner] : value.items()) add_json(lines, path + "/" + key, inner);
   } else if (value.is_array() && std::all_of(value.begin(), value.end(), is_leaf)) {
     std::string row;
     for (const json& one : value) row += " " + one.dump();
-    lines.add(path, row);
+    lines.line(path, row);
   } else if (value.is_array()) {
     for (std::size_t i = 0; i < value.size(); ++i) add_json(lines, path + "/" + std::to_string(i), value[i]);
   } else {
-    lines.add(path, value.dump());
+    lines.line(path, value.dump());
   }
 }
 
@@ -181,13 +181,13 @@ json read_document(const std::filesystem::path& file) {
 }
 
 /// The header and every `every`-th row of a table.
-void add_table(AnswerLines& lines, const std::filesystem::path& file, std::size_t every) {
+void add_table(Answer& lines, const std::filesystem::path& file, std::size_t every) {
   std::ifstream in(file);
   std::string line;
   std::size_t n = 0;
   for (; std::getline(in, line); ++n)
-    if (n == 0 || n % every == 1) lines.title(line);
-  lines.add(file.filename().string(), n);
+    if (n == 0 || n % every == 1) lines.line(line);
+  lines.line(file.filename().string(), n);
 }
 
 /// Without what depends on the machine: the folder's name.
@@ -229,7 +229,7 @@ class WholeStudy : public testing::Test {
 };
 
 TEST_F(WholeStudy, Calibration) {
-  AnswerLines lines;
+  Answer lines;
   json calibration = read_document(run() / "calibration.json");
   // Once is enough of the longest list.
   calibration.at("imus").at(1).at("batch").erase("shared_psi_r");
@@ -238,12 +238,12 @@ TEST_F(WholeStudy, Calibration) {
   for (const char* key :
        {"warnings", "notes", "static_s", "dynamic_s", "error_process_mounting", "schema", "name"})
     if (record.contains(key)) add_json(lines, key, record.at(key));
-  for (const auto& [step, share] : progress_) lines.add(step, share);
+  for (const auto& [step, share] : progress_) lines.line(step, share);
   test::expect_recorded("study/calibration.txt", without(lines.text(), folder()), kShare, kNothing);
 }
 
 TEST_F(WholeStudy, Tables) {
-  AnswerLines lines;
+  Answer lines;
   for (const char* name : {"mtx1", "mtx2"}) {
     add_table(lines, run() / (std::string("errors_") + name + ".csv"), 1500);
     add_table(lines, run() / (std::string("smoothed_") + name + ".csv"), 90);
@@ -254,30 +254,30 @@ TEST_F(WholeStudy, Tables) {
 }
 
 TEST_F(WholeStudy, NoiseAndRegimes) {
-  AnswerLines lines;
+  Answer lines;
   for (const char* name : {"regimes.json", "comparison.json", "vibration.json"})
     add_json(lines, name, read_document(run() / name));
   for (const json& model : read_document(run() / "models.json").at("models")) {
     if (model.at("name") == "mtx1" && model.at("axis") == "gyro_x")
       add_json(lines, "model", model);
     else
-      lines.add("model", model.at("name").dump(), model.at("axis").dump(), model.at("regime").dump(),
-                model.at("parameters").dump());
+      lines.line("model", model.at("name").dump(), model.at("axis").dump(), model.at("regime").dump(),
+                 model.at("parameters").dump());
   }
   test::expect_recorded("study/noise.txt", lines.text(), kShare, kNothing);
 }
 
 TEST_F(WholeStudy, DynamicsAndDependence) {
-  AnswerLines lines;
+  Answer lines;
   const json regression = read_document(run() / "regression.json");
-  lines.add("regressions", regression.at("regressions").size(), regression.at("remarks").dump());
+  lines.line("regressions", regression.at("regressions").size(), regression.at("remarks").dump());
   for (const json& r : regression.at("regressions"))
-    lines.add("regression", r.at("name").dump(), r.at("axis").dump(), r.at("method").dump(),
-              r.at("projected").dump(), r.at("n").dump(), r.at("r2").get<double>(), r.at("f").get<double>());
+    lines.line("regression", r.at("name").dump(), r.at("axis").dump(), r.at("method").dump(),
+               r.at("projected").dump(), r.at("n").dump(), r.at("r2").get<double>(), r.at("f").get<double>());
   const json dependence = read_document(run() / "dependence.json");
   for (const auto& [key, value] : dependence.items())
     if (key != "points") add_json(lines, key, value);
-  lines.add("points", dependence.at("points").size());
+  lines.line("points", dependence.at("points").size());
   for (std::size_t i = 0; i < dependence.at("points").size(); i += 7)
     add_json(lines, "point", dependence.at("points")[i]);
   test::expect_recorded("study/dynamics.txt", lines.text(), kShare, kNothing);
@@ -290,17 +290,17 @@ TEST_F(WholeStudy, Evaluation) {
   const auto evaluation = evaluate_run(options);
   ASSERT_TRUE(evaluation) << evaluation.error().text();
   EXPECT_EQ(*evaluation, read_document(run() / "evaluation.json"));
-  AnswerLines lines;
+  Answer lines;
   add_json(lines, "", *evaluation);
   options.outages.settle_s = 1e4;
-  lines.add("too long", without(evaluate_run(options).error().text(), folder()));
+  lines.line("too long", without(evaluate_run(options).error().text(), folder()));
   options.run_dir = scratch_->path / "none";
-  lines.add("no run", without(evaluate_run(options).error().text(), folder()));
+  lines.line("no run", without(evaluate_run(options).error().text(), folder()));
   test::expect_recorded("study/evaluation.txt", lines.text(), kShare, kNothing);
 }
 
 /// Of a CDR message, what stands where doubles may stand.
-void add_doubles(AnswerLines& lines, std::string_view data) {
+void add_doubles(Answer& lines, std::string_view data) {
   constexpr std::size_t kHeader = 4;
   std::vector<double> values;
   for (std::size_t at = kHeader; at + sizeof(double) <= data.size() && values.size() < 60;
@@ -309,7 +309,7 @@ void add_doubles(AnswerLines& lines, std::string_view data) {
     std::memcpy(&value, data.data() + at, sizeof value);
     values.push_back(std::isfinite(value) && std::abs(value) < 1e12 && std::abs(value) > 1e-12 ? value : 0.0);
   }
-  lines.add(" holds", values);
+  lines.line(" holds", values);
 }
 
 TEST_F(WholeStudy, Bag) {
@@ -323,8 +323,8 @@ TEST_F(WholeStudy, Bag) {
   options.progress = [&](double share) { last_share = share; };
   const auto bag = write_run_bag(options);
   ASSERT_TRUE(bag) << bag.error().text();
-  AnswerLines lines;
-  lines.add("bag", bag->messages, bag->times_are_utc, last_share > 0.5, bag->remarks);
+  Answer lines;
+  lines.line("bag", bag->messages, bag->times_are_utc, last_share > 0.5, bag->remarks);
   EXPECT_EQ(bag->bytes, std::filesystem::file_size(options.out));
   auto reader = mcap::Reader::open(options.out);
   ASSERT_TRUE(reader);
@@ -332,17 +332,17 @@ TEST_F(WholeStudy, Bag) {
   while (const auto message = reader->next()) {
     const std::size_t n = seen[message->topic->name]++;
     if (n != 0 && n != 3 && n % 5000 != 77) continue;
-    lines.add(message->topic->name, n, message->topic->schema, message->topic->encoding,
-              1e-9 * static_cast<double>(message->log_time),
-              1e-9 * static_cast<double>(message->publish_time));
+    lines.line(message->topic->name, n, message->topic->schema, message->topic->encoding,
+               1e-9 * static_cast<double>(message->log_time),
+               1e-9 * static_cast<double>(message->publish_time));
     const std::string_view data = mcap::text_of(message->data);
     if (message->topic->encoding == "json") {
-      lines.title(data.substr(0, 1200));
+      lines.line(data.substr(0, 1200));
     } else {
       add_doubles(lines, data);
     }
   }
-  for (const auto& [topic, n] : seen) lines.add(topic, n);
+  for (const auto& [topic, n] : seen) lines.line(topic, n);
   test::expect_recorded("study/bag.txt", without(lines.text(), folder()), kShare, 1e-6);
 }
 

@@ -15,7 +15,8 @@ namespace imuscope::test {
 
 class Answer {
  public:
-  /// One line of all of them, a space before each but the first.
+  /// One line of all of them, a space before each but the first: words, numbers at nine significant digits, ranges, what
+  /// is optional, matrices column by column.
   template <typename... Values>
   void line(const Values&... values) {
     (add(values), ...);
@@ -31,7 +32,9 @@ class Answer {
 
   template <typename Value>
   void add(const Value& value) {
-    if constexpr (std::is_same_v<Value, bool>) {
+    if constexpr (std::is_enum_v<Value>) {
+      add(static_cast<std::underlying_type_t<Value>>(value));
+    } else if constexpr (std::is_same_v<Value, bool>) {
       word(value ? "true" : "false");
     } else if constexpr (std::is_same_v<Value, char>) {
       word({&value, 1});

@@ -14,7 +14,7 @@
 #include "estimation/alignment/reference_window.h"
 #include "sample/eigen_arrays.h"
 #include "tests/estimation/alignment/analytic_motion.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
@@ -22,7 +22,7 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using test::AnswerLines;
+using test::Answer;
 
 HostTime instant(double seconds) { return HostTime{from_seconds(seconds)}; }
 
@@ -59,16 +59,16 @@ void add_drive(CoarseMountingEstimator& estimator, const MountedImu& imu, int n)
   }
 }
 
-void add_solution(AnswerLines& lines, std::string_view name, const CoarseMountingEstimator& estimator) {
+void add_solution(Answer& lines, std::string_view name, const CoarseMountingEstimator& estimator) {
   CoarseMounting out;
   const MountingResult result = estimator.solve(out);
-  lines.add(name, result, estimator.pairs(), out.rate_correlation, out.gyro_bias_s_radps);
-  lines.add("mounting", out.C_b_s);
-  lines.add("covariance", Matrix3d(1e4 * out.covariance_rad2));
+  lines.line(name, result, estimator.pairs(), out.rate_correlation, out.gyro_bias_s_radps);
+  lines.line("mounting", out.C_b_s);
+  lines.line("covariance", Matrix3d(1e4 * out.covariance_rad2));
 }
 
 TEST(AlignmentAnswers, CoarseMounting) {
-  AnswerLines lines;
+  Answer lines;
   const auto solve = [&](std::string_view name, const MountedImu& imu, int n,
                          const CoarseMountingOptions& options) {
     CoarseMountingEstimator estimator(options);
@@ -155,19 +155,19 @@ RateSeries series_of(const test::SineSum& omega, const SeriesOptions& o) {
   return out;
 }
 
-void add_offset(AnswerLines& lines, std::string_view name, const RateSeries& reference,
-                const RateSeries& study, const TimeOffsetOptions& options = {}) {
+void add_offset(Answer& lines, std::string_view name, const RateSeries& reference, const RateSeries& study,
+                const TimeOffsetOptions& options = {}) {
   const Result<TimeOffset> found = find_time_offset(reference.view(), study.view(), options);
   if (!found) {
-    lines.add(name, found.error().text());
+    lines.line(name, found.error().text());
     return;
   }
-  lines.add(name, found->offset_s, 1e3 * found->clock_rate, found->study_origin_s, found->correlation,
-            found->distinctness, 1e3 * found->sd_s, found->clock_rate_estimated);
+  lines.line(name, found->offset_s, 1e3 * found->clock_rate, found->study_origin_s, found->correlation,
+             found->distinctness, 1e3 * found->sd_s, found->clock_rate_estimated);
 }
 
 TEST(AlignmentAnswers, TimeOffset) {
-  AnswerLines lines;
+  Answer lines;
   const test::SineSum omega = test::car_rates(40);
   const RateSeries reference = series_of(omega, {.end_s = 300.0});
   const auto study = [&](SeriesOptions o) {
@@ -205,7 +205,7 @@ TEST(AlignmentAnswers, TimeOffset) {
 }
 
 TEST(AlignmentAnswers, LiveTimeOffset) {
-  AnswerLines lines;
+  Answer lines;
   const test::SineSum omega = test::car_rates(45);
   struct Run {
     const char* name;
@@ -222,7 +222,7 @@ TEST(AlignmentAnswers, LiveTimeOffset) {
     const auto live = std::make_unique<LiveTimeOffset>();
     std::mt19937 random(3);
     std::normal_distribution<> noise(0.0, run.noise_radps);
-    lines.title(run.name);
+    lines.line(run.name);
     double next_s = 20.0;
     for (int i = 0; run.period_s * i < 60.0; ++i) {
       const double t = run.period_s * i + 3.0;
@@ -235,7 +235,7 @@ TEST(AlignmentAnswers, LiveTimeOffset) {
       next_s += 4.0;
       TimeOffset out;
       const bool found = live->estimate(out);
-      lines.add("at", t, found, out.offset_s, out.correlation, out.distinctness, 1e3 * out.sd_s);
+      lines.line("at", t, found, out.offset_s, out.correlation, out.distinctness, 1e3 * out.sd_s);
     }
   }
   test::expect_recorded("estimation/alignment/live_time_offset.txt", lines.text(), 1e-5, 1e-7);
@@ -272,24 +272,24 @@ Sample imu_at(double t, const Vector3d& omega, const Vector3d& f, std::uint32_t 
   return sample;
 }
 
-void add_motion(AnswerLines& lines, const ReferenceWindow& window, double t) {
+void add_motion(Answer& lines, const ReferenceWindow& window, double t) {
   ReferenceKinematics out;
   const ReferenceResult result = window.evaluate(instant(t), out);
-  lines.add("at", t, result, window.size(), out.angular_acceleration_is_measured, out.value_noise_gain,
-            out.derivative_noise_gain_per_s);
+  lines.line("at", t, result, window.size(), out.angular_acceleration_is_measured, out.value_noise_gain,
+             out.derivative_noise_gain_per_s);
   if (result != ReferenceResult::kOk) return;
-  lines.add("rates", out.omega_radps, out.omega_dot_radps2, out.omega_ddot_radps3);
-  lines.add("forces", out.f_mps2, out.f_dot_mps3);
+  lines.line("rates", out.omega_radps, out.omega_dot_radps2, out.omega_ddot_radps3);
+  lines.line("forces", out.f_mps2, out.f_dot_mps3);
 }
 
 TEST(AlignmentAnswers, ReferenceWindow) {
-  AnswerLines lines;
+  Answer lines;
   const test::SineSum omega = test::car_rates(5);
   const test::SineSum f = test::car_forces(5);
   for (const int points : {5, 7, 9, 11}) {
     for (const std::uint32_t flags : {0U, static_cast<std::uint32_t>(kIsIncrement),
                                       static_cast<std::uint32_t>(kHasAngularAcceleration)}) {
-      lines.add("window", points, flags);
+      lines.line("window", points, flags);
       ReferenceWindow window({points, 0.01});
       for (int i = 0; i <= 100; ++i) {
         if (i == 60) continue;

@@ -17,13 +17,13 @@
 #include "estimation/batch/stability.h"
 #include "estimation/navigation/so3.h"
 #include "synthetic_pair.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace {
 
 using namespace imuscope::batch;
-using imuscope::test::AnswerLines;
+using imuscope::test::Answer;
 using imuscope::test::expect_recorded;
 
 /// Numbers that are all unlike, between -1 and 1.
@@ -36,48 +36,48 @@ SensorState crooked_state() {
   return state;
 }
 
-void add_state(AnswerLines& lines, std::string_view name, const SensorState& state) {
-  lines.add(name, state.above, state.C_b_s);
-  lines.add(" gyro shape", state.gyro_shape());
-  lines.add(" accel shape", state.accel_shape());
-  lines.add(" b to gyro", state.C_b_gyro());
-  lines.add(" b to accel", state.C_b_accel());
-  lines.add(" g sensitivity", state.g_sensitivity());
-  lines.add(" flexure", state.flexure());
-  lines.add(" accel flexure", state.accel_flexure());
-  lines.add(" compliance", state.compliance());
-  for (Eigen::Index axis = 0; axis < 3; ++axis) lines.add(" place", state.place_s_m(axis));
-  lines.add(" offset", state.time_offset_s(7.0), state.lever_arm_b_m());
+void add_state(Answer& lines, std::string_view name, const SensorState& state) {
+  lines.line(name, state.above, state.C_b_s);
+  lines.line(" gyro shape", state.gyro_shape());
+  lines.line(" accel shape", state.accel_shape());
+  lines.line(" b to gyro", state.C_b_gyro());
+  lines.line(" b to accel", state.C_b_accel());
+  lines.line(" g sensitivity", state.g_sensitivity());
+  lines.line(" flexure", state.flexure());
+  lines.line(" accel flexure", state.accel_flexure());
+  lines.line(" compliance", state.compliance());
+  for (Eigen::Index axis = 0; axis < 3; ++axis) lines.line(" place", state.place_s_m(axis));
+  lines.line(" offset", state.time_offset_s(7.0), state.lever_arm_b_m());
 }
 
 TEST(BatchPartsAnswers, SensorModel) {
-  AnswerLines lines;
+  Answer lines;
   SensorState state = crooked_state();
   add_state(lines, "symmetric", state);
   const AxesFrame axes = in_axes_frame(state);
   add_state(lines, "axes", axes.sensor);
-  lines.add("parameters", axes.sensor.x);
-  lines.add("derivative", Eigen::MatrixXd(axes.derivative.topRows<3>().middleCols<15>(kGyroShape)));
-  lines.add("derivative", Eigen::MatrixXd(axes.derivative.middleRows<3>(kAlpha).middleCols<15>(kGyroShape)));
-  lines.add("derivative", axes.derivative.diagonal(), axes.derivative.sum());
+  lines.line("parameters", axes.sensor.x);
+  lines.line("derivative", Eigen::MatrixXd(axes.derivative.topRows<3>().middleCols<15>(kGyroShape)));
+  lines.line("derivative", Eigen::MatrixXd(axes.derivative.middleRows<3>(kAlpha).middleCols<15>(kGyroShape)));
+  lines.line("derivative", axes.derivative.diagonal(), axes.derivative.sum());
   ParameterVector correction;
   for (Eigen::Index i = 0; i < kParameters; ++i) correction[i] = 0.01 * unlike(3 * i);
   state.add(correction);
   add_state(lines, "corrected", state);
-  lines.add("parameters", state.x);
+  lines.line("parameters", state.x);
   for (const double above : {0.0, 0.5})
-    for (Eigen::Index j = 0; j < 6; ++j) lines.add("shape", j, above, shape_derivative(j, above));
+    for (Eigen::Index j = 0; j < 6; ++j) lines.line("shape", j, above, shape_derivative(j, above));
 
   SensorClass sensor;
-  lines.add("prior", prior_sd(sensor));
+  lines.line("prior", prior_sd(sensor));
   const double per_root_hour = std::numbers::pi / 180.0 / 60.0;
   for (const double white : {1e-9, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 30.0}) {
     sensor.set_reference(white * per_root_hour);
-    lines.add("reference", white, 1e3 * sensor.reference_scale_sd, 1e3 * sensor.reference_axis_sd_rad,
-              1e3 * sensor.reference_triad_sd_rad);
+    lines.line("reference", white, 1e3 * sensor.reference_scale_sd, 1e3 * sensor.reference_axis_sd_rad,
+               1e3 * sensor.reference_triad_sd_rad);
   }
-  lines.add("of its axes",
-            Eigen::MatrixXd(1e3 * of_reference_axes(sensor, crooked_state()).topRows<30>().transpose()));
+  lines.line("of its axes",
+             Eigen::MatrixXd(1e3 * of_reference_axes(sensor, crooked_state()).topRows<30>().transpose()));
   expect_recorded("estimation/batch/sensor_model.txt", lines.text(), 1e-6, 1e-10);
 }
 
@@ -117,36 +117,36 @@ struct DrawnProblem {
 };
 
 TEST(BatchPartsAnswers, Transfer) {
-  AnswerLines lines;
+  Answer lines;
   const DrawnProblem drawn;
   const Transfer t(drawn.estimate.sensor, drawn.estimate.deviation[3]);
-  lines.add("rotated", t.C_accel_rotated, t.compliance_b, t.delay_s);
+  lines.line("rotated", t.C_accel_rotated, t.compliance_b, t.delay_s);
   for (const Eigen::Index k : {Eigen::Index{0}, Eigen::Index{2}, Eigen::Index{13}}) {
     const double hz = drawn.problem.plan.frequency_hz(k);
     const Motion motion = motion_of(drawn.problem.reference, 1, k);
-    lines.add("arm", motion.arm.real(), motion.arm.imag());
-    lines.add("force products", motion.force_products.real());
-    lines.add("force at", motion.force_at({0.3, -0.2, 0.7}).real());
+    lines.line("arm", motion.arm.real(), motion.arm.imag());
+    lines.line("force products", motion.force_products.real());
+    lines.line("force at", motion.force_at({0.3, -0.2, 0.7}).real());
     const Vector3c felt = accelerometers(t, motion);
-    lines.add("felt", felt.real(), felt.imag());
+    lines.line("felt", felt.real(), felt.imag());
     const Vector3c turned = gyros(t, motion, hz);
-    lines.add("turned", turned.real(), turned.imag());
+    lines.line("turned", turned.real(), turned.imag());
     const Vector6c all =
         predicted(t, motion, Vector3c(1.0, std::complex<double>(0.0, 2.0), 3.0), {0.4, 0.1}, hz);
-    lines.add("predicted", all.real(), all.imag());
-    lines.add("gain", flexure_gain(hz), derivative(hz).real(), derivative(hz).imag());
+    lines.line("predicted", all.real(), all.imag());
+    lines.line("gain", flexure_gain(hz), derivative(hz).real(), derivative(hz).imag());
   }
   expect_recorded("estimation/batch/transfer.txt", lines.text());
 }
 
 TEST(BatchPartsAnswers, WindowsBandsAndNoise) {
-  AnswerLines lines;
+  Answer lines;
   const auto plan = [&](std::size_t n, std::vector<std::size_t> holes) {
     std::vector<char> valid(n, 1);
     for (const std::size_t hole : holes) valid[hole] = 0;
     const WindowPlan p = plan_windows(valid, 50.0, 8.0);
-    lines.add("plan", n, holes, p.length, p.n_frequencies, p.frequency_step_hz, p.frequency_hz(3));
-    lines.add(" starts", p.starts);
+    lines.line("plan", n, holes, p.length, p.n_frequencies, p.frequency_step_hz, p.frequency_hz(3));
+    lines.line(" starts", p.starts);
   };
   // Thirteen half windows of 512 instants make twelve windows.
   plan(13 * 512 - 1, {});
@@ -162,28 +162,28 @@ TEST(BatchPartsAnswers, WindowsBandsAndNoise) {
     const Bands bands(n);
     std::vector<Eigen::Index> edges;
     for (Eigen::Index band = 0; band < bands.size(); ++band) edges.push_back(bands.first(band));
-    lines.add("bands", n, bands.size(), edges, bands.end(bands.size() - 1), bands.width(bands.size() - 1));
+    lines.line("bands", n, bands.size(), edges, bands.end(bands.size() - 1), bands.width(bands.size() - 1));
   }
   const DrawnProblem drawn;
-  lines.add("window", drawn.problem.constant.real(), drawn.problem.constant.imag());
-  lines.add("spectrum", drawn.problem.reference.row(2, 5).real(), drawn.problem.reference.row(2, 5).imag());
+  lines.line("window", drawn.problem.constant.real(), drawn.problem.constant.imag());
+  lines.line("spectrum", drawn.problem.reference.row(2, 5).real(), drawn.problem.reference.row(2, 5).imag());
   Residuals e = residuals(drawn.problem, drawn.study, drawn.estimate);
   e.middleRows(28, 14) *= 3.0;  // one window is louder
-  lines.add("residuals", Eigen::MatrixXd(e.real()));
+  lines.line("residuals", Eigen::MatrixXd(e.real()));
   e.col(4).segment(0, 14) *= 1e-12;
   Eigen::MatrixX2d taken(drawn.problem.bands.size(), 2);
   for (Eigen::Index band = 0; band < taken.rows(); ++band)
     taken.row(band) << 0.4 * static_cast<double>(band), 9.0;
   const NoiseBands noise(drawn.problem.bands, 3, drawn.problem.plan.n_frequencies, e, taken);
   for (Eigen::Index band = 0; band < drawn.problem.bands.size(); ++band) {
-    lines.add("noise", noise.windows(), noise.claimed(band), noise.power(band), noise.power(band, 4));
+    lines.line("noise", noise.windows(), noise.claimed(band), noise.power(band), noise.power(band, 4));
     for (Eigen::Index w = 0; w < 3; ++w)
-      lines.add(" window", noise.window_power(w, band), noise.window_power(w, band, 2));
+      lines.line(" window", noise.window_power(w, band), noise.window_power(w, band, 2));
   }
   Residuals silent = e;
   silent.col(1).setZero();
   const NoiseBands quiet(drawn.problem.bands, 3, drawn.problem.plan.n_frequencies, silent, taken);
-  lines.add("silent", 1e30 * quiet.power(2, 1), 1e30 * quiet.window_power(1, 2, 1));
+  lines.line("silent", 1e30 * quiet.power(2, 1), 1e30 * quiet.window_power(1, 2, 1));
   expect_recorded("estimation/batch/windows_and_noise.txt", lines.text());
 }
 
@@ -193,7 +193,7 @@ Eigen::VectorXd through_unlike(const Eigen::MatrixXd& matrix) {
 }
 
 TEST(BatchPartsAnswers, NormalEquations) {
-  AnswerLines lines;
+  Answer lines;
   const DrawnProblem drawn;
   const Residuals e = residuals(drawn.problem, drawn.study, drawn.estimate);
   const NoiseBands noise(drawn.problem.bands, 3, drawn.problem.plan.n_frequencies, e,
@@ -202,33 +202,33 @@ TEST(BatchPartsAnswers, NormalEquations) {
     const auto sums = band_sums(drawn.problem, drawn.study, e, drawn.estimate, noise,
                                 ReferenceNoise::even(drawn.problem.bands, 0.3), corrected);
     for (const std::size_t band : {std::size_t{0}, std::size_t{4}}) {
-      lines.add("band", corrected, band);
-      lines.add(" information", through_unlike(sums[band].information));
-      lines.add(" of gyros", through_unlike(sums[band].of_gyros));
-      lines.add(" of noise", through_unlike(sums[band].of_noise));
-      lines.add(" scores", sums[band].scores.rows(), through_unlike(sums[band].scores.transpose()));
+      lines.line("band", corrected, band);
+      lines.line(" information", through_unlike(sums[band].information));
+      lines.line(" of gyros", through_unlike(sums[band].of_gyros));
+      lines.line(" of noise", through_unlike(sums[band].of_noise));
+      lines.line(" scores", sums[band].scores.rows(), through_unlike(sums[band].scores.transpose()));
     }
     const NormalEquations equations = normal_equations(sums, drawn.estimate);
-    lines.add("information", through_unlike(equations.information));
-    lines.add("of noise", through_unlike(equations.of_noise));
-    lines.add("gradient", equations.gradient);
-    lines.add("scores", through_unlike(equations.window_scores.transpose()));
+    lines.line("information", through_unlike(equations.information));
+    lines.line("of noise", through_unlike(equations.of_noise));
+    lines.line("gradient", equations.gradient);
+    lines.line("scores", through_unlike(equations.window_scores.transpose()));
     Eigen::Matrix<double, kParameters, kParameters> covariance = equations.information;
     covariance.diagonal().array() += 1.0;
     covariance = covariance.inverse().eval();
     for (std::size_t band = 0; band < sums.size(); ++band) {
       const auto& own = equations.bands[band];
-      lines.add("elimination", band, own.own);
-      lines.add(" coupling", through_unlike(own.coupling));
-      lines.add(" covariance", through_unlike(own.covariance));
-      lines.add(" taken", numbers_taken(sums[band], own, covariance));
+      lines.line("elimination", band, own.own);
+      lines.line(" coupling", through_unlike(own.coupling));
+      lines.line(" covariance", through_unlike(own.covariance));
+      lines.line(" taken", numbers_taken(sums[band], own, covariance));
     }
   }
   expect_recorded("estimation/batch/normal_equations.txt", lines.text(), 1e-5, 1e-9);
 }
 
 TEST(BatchPartsAnswers, ReferenceNoise) {
-  AnswerLines lines;
+  Answer lines;
   const DrawnProblem drawn;
   Estimate rigid = drawn.estimate;
   for (DeviationVector& deviation : rigid.deviation) deviation.setZero();
@@ -241,41 +241,41 @@ TEST(BatchPartsAnswers, ReferenceNoise) {
   for (const auto& [name, one] : {std::pair{"found", found}, std::pair{"more of gyros", found.shifted(0)},
                                   std::pair{"more of accelerometers", found.shifted(1)},
                                   std::pair{"even", ReferenceNoise::even(drawn.problem.bands, 0.4)}}) {
-    lines.title(name);
+    lines.line(name);
     for (Eigen::Index band = 0; band < drawn.problem.bands.size(); ++band) {
-      lines.add(" share", one.mean_share(noise, band));
-      for (Eigen::Index w = 0; w < 3; ++w) lines.add("  power", one.power(noise, w, band));
+      lines.line(" share", one.mean_share(noise, band));
+      for (Eigen::Index w = 0; w < 3; ++w) lines.line("  power", one.power(noise, w, band));
     }
   }
   expect_recorded("estimation/batch/reference_noise.txt", lines.text());
 }
 
 TEST(BatchPartsAnswers, PriorScales) {
-  AnswerLines lines;
+  Answer lines;
   using Covariance = PriorScales::Covariance;
   const Covariance root =
       Covariance::NullaryExpr([](Eigen::Index i, Eigen::Index j) { return unlike(i * kParameters + j); });
   PriorScales scales{SensorClass{}};
-  lines.add("class", scales.precision());
+  lines.line("class", scales.precision());
   ParameterVector x;
   for (Eigen::Index i = 0; i < kParameters; ++i) x[i] = 0.004 * unlike(i);
   const Covariance small = 1e-8 * root * root.transpose();
   scales.learn_sizes(x, small);
-  lines.add("learned", scales.precision());
+  lines.line("learned", scales.precision());
   // Places of nothing, known to a tenth of a millimetre: one chip; of centimetres: three; and back, twice.
   for (const double size : {0.0, 0.0, 1.0, 0.0, 1.0, 0.0}) {
     x.segment<6>(kPlaces).setConstant(0.01 * size);
     scales.choose_places(x, small);
-    lines.add("places", size, scales.one_chip(), scales.precision()[kPlaces]);
+    lines.line("places", size, scales.one_chip(), scales.precision()[kPlaces]);
     x.segment<6>(kPlaces) = 1e-4 * x.segment<6>(kGyroShape) / 0.004;
     const Covariance doubt = scales.doubt(x, 0.3 * small);
-    lines.add(" doubt", 1e12 * through_unlike(doubt));
+    lines.line(" doubt", 1e12 * through_unlike(doubt));
   }
   expect_recorded("estimation/batch/prior_scales.txt", lines.text(), 1e-5, 1e-9);
 }
 
 TEST(BatchPartsAnswers, LargestChange) {
-  AnswerLines lines;
+  Answer lines;
   for (const Eigen::Index n : {9, 10, 30}) {
     for (const double jump : {0.0, 1.0, 6.0}) {
       WindowInfluences influences(n, kWatched);
@@ -285,9 +285,9 @@ TEST(BatchPartsAnswers, LargestChange) {
       WatchedVector variance;
       for (Eigen::Index i = 0; i < kWatched; ++i) variance[i] = 10.0 + static_cast<double>(i);
       const Change change = largest_change(influences, variance);
-      lines.add("change", n, jump, change.window, change.statistic, change.is_told(), change.difference,
-                change.reach);
-      lines.add(" variance of sum", Eigen::MatrixXd(variance_of_sum(influences, 3)));
+      lines.line("change", n, jump, change.window, change.statistic, change.is_told(), change.difference,
+                 change.reach);
+      lines.line(" variance of sum", Eigen::MatrixXd(variance_of_sum(influences, 3)));
     }
   }
   expect_recorded("estimation/batch/largest_change.txt", lines.text());
@@ -308,23 +308,23 @@ ImuRecord wavy_record() {
 }
 
 TEST(BatchPartsAnswers, Grid) {
-  AnswerLines lines;
+  Answer lines;
   const ImuRecord record = wavy_record();
-  lines.add("period", sample_period_s(record));
+  lines.line("period", sample_period_s(record));
   std::vector<double> instants;
   for (int i = 0; i < 400; ++i) instants.push_back(0.02 * i);
   const Grid grid = make_grid(record, instants, true);
   std::string valid;
   for (const char one : grid.valid) valid += one != 0 ? '1' : '0';
-  lines.add("valid", valid);
-  for (Eigen::Index i = 0; i < 400; i += 6) lines.add("at", i, grid.motion.row(i), grid.omega_dot.row(i));
+  lines.line("valid", valid);
+  for (Eigen::Index i = 0; i < 400; i += 6) lines.line("at", i, grid.motion.row(i), grid.omega_dot.row(i));
   const Grid without = make_grid(record, instants, false);
-  lines.add("without derivative", without.omega_dot.rows(), (without.motion - grid.motion).norm());
+  lines.line("without derivative", without.omega_dot.rows(), (without.motion - grid.motion).norm());
   expect_recorded("estimation/batch/grid.txt", lines.text(), 1e-6, 1e-9);
 }
 
 TEST(BatchPartsAnswers, PairMoments) {
-  AnswerLines lines;
+  Answer lines;
   std::vector<double> instants;
   for (int i = 0; i < 300; ++i) instants.push_back(0.3 + 0.02 * i);
   const Grid reference = make_grid(wavy_record(), instants, false);
@@ -338,30 +338,30 @@ TEST(BatchPartsAnswers, PairMoments) {
   const PairMoments moments(reference, make_grid(turned, instants, false));
   for (const auto& [name, m] : {std::pair{"rates", moments.rates}, std::pair{"forces", moments.forces},
                                 std::pair{"with gravity", moments.forces_with_gravity}}) {
-    lines.add(name, m.study_reference, m.study);
-    lines.add(" reference", m.reference);
-    lines.add(" sizes", m.size_ratio(), m.mirrored(), m.correlation_at(m.best_rotation()),
-              m.most_lost(C.cast<double>(), 0.5), m.most_lost(Eigen::Matrix3d::Identity(), 0.2),
-              m.best_rotation());
+    lines.line(name, m.study_reference, m.study);
+    lines.line(" reference", m.reference);
+    lines.line(" sizes", m.size_ratio(), m.mirrored(), m.correlation_at(m.best_rotation()),
+               m.most_lost(C.cast<double>(), 0.5), m.most_lost(Eigen::Matrix3d::Identity(), 0.2),
+               m.best_rotation());
   }
-  lines.add("common", moments.common_rotation(), moments.mean_force_cosine(C.cast<double>()),
-            moments.mean_force_cosine(Eigen::Matrix3d::Identity()));
+  lines.line("common", moments.common_rotation(), moments.mean_force_cosine(C.cast<double>()),
+             moments.mean_force_cosine(Eigen::Matrix3d::Identity()));
   TriadMoments mirrored = moments.rates;
   mirrored.study_reference.row(0) *= -1.0;
-  lines.add("mirrored", mirrored.mirrored(), mirrored.best_rotation());
+  lines.line("mirrored", mirrored.mirrored(), mirrored.best_rotation());
   expect_recorded("estimation/batch/pair_moments.txt", lines.text(), 1e-6, 1e-9);
 }
 
 using synthetic::Pair;
 using synthetic::PairOptions;
 
-void add_start(AnswerLines& lines, std::string_view name, const Pair& pair, double search_s = 3.0) {
+void add_start(Answer& lines, std::string_view name, const Pair& pair, double search_s = 3.0) {
   const auto start = find_start(pair.reference, pair.study, search_s);
   if (!start) {
-    lines.add(name, start.error().kind, start.error().text());
+    lines.line(name, start.error().kind, start.error().text());
     return;
   }
-  lines.add(name, start->time_offset_s, start->rate_correlation, start->C_b_s);
+  lines.line(name, start->time_offset_s, start->rate_correlation, start->C_b_s);
 }
 
 /// The S-IMU's triads through matrices that need not be rotations.
@@ -382,7 +382,7 @@ ImuRecord cut(const ImuRecord& record, double from_s, double to_s) {
 }
 
 TEST(BatchPartsAnswers, Start) {
-  AnswerLines lines;
+  Answer lines;
   PairOptions options;
   options.duration_s = 60.0;
   options.C_b_s = imuscope::exp_so3({0.5, -2.0, 1.0});

@@ -8,13 +8,13 @@
 #include "estimation/batch/batch_mounting.h"
 #include "estimation/navigation/so3.h"
 #include "synthetic_pair.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace {
 
 using namespace imuscope::batch;
-using imuscope::test::AnswerLines;
+using imuscope::test::Answer;
 using synthetic::Pair;
 using synthetic::PairOptions;
 
@@ -36,43 +36,42 @@ PairOptions bent_sensor() {
   return options;
 }
 
-void add_estimate(AnswerLines& lines, const BatchMounting& found) {
-  lines.add("mounting", found.sensor.C_b_s, found.sensor.above);
-  lines.add("parameters", found.sensor.x);
-  lines.add("sd", found.covariance.diagonal().cwiseSqrt());
-  lines.add("correlations", Eigen::MatrixXd(1e6 * found.covariance.topLeftCorner<8, 8>()));
-  lines.add("biases and shapes", Eigen::VectorXd(1e6 * found.covariance.rowwise().sum()));
-  lines.add("named sd", found.sd(kPsi, 2), found.sd(kTimeOffset));
-  lines.add("numbers", found.rate_correlation, found.middle_s, found.used_s, found.windows,
-            found.degrees_of_freedom, found.inconsistency, found.one_chip, found.iterations, found.settled);
-  lines.add("limits", found.limits.sensor, found.limits.reference, found.limits.drive());
-  lines.add("change", found.change.window, found.change.statistic, found.change_s, found.change.difference,
-            found.change.reach);
-  lines.add("shared", Eigen::MatrixXd(1e6 * found.shared * found.shared.transpose()));
+void add_estimate(Answer& lines, const BatchMounting& found) {
+  lines.line("mounting", found.sensor.C_b_s, found.sensor.above);
+  lines.line("parameters", found.sensor.x);
+  lines.line("sd", found.covariance.diagonal().cwiseSqrt());
+  lines.line("correlations", Eigen::MatrixXd(1e6 * found.covariance.topLeftCorner<8, 8>()));
+  lines.line("biases and shapes", Eigen::VectorXd(1e6 * found.covariance.rowwise().sum()));
+  lines.line("named sd", found.sd(kPsi, 2), found.sd(kTimeOffset));
+  lines.line("numbers", found.rate_correlation, found.middle_s, found.used_s, found.windows,
+             found.degrees_of_freedom, found.inconsistency, found.one_chip, found.iterations, found.settled);
+  lines.line("limits", found.limits.sensor, found.limits.reference, found.limits.drive());
+  lines.line("change", found.change.window, found.change.statistic, found.change_s, found.change.difference,
+             found.change.reach);
+  lines.line("shared", Eigen::MatrixXd(1e6 * found.shared * found.shared.transpose()));
   for (const BandReport& band : found.bands)
-    lines.add("band", band.from_hz, band.to_hz, 1e3 * band.gyro_density, 1e3 * band.accel_density,
-              band.gyro_deviation_sd, band.accel_deviation_sd);
+    lines.line("band", band.from_hz, band.to_hz, 1e3 * band.gyro_density, 1e3 * band.accel_density,
+               band.gyro_deviation_sd, band.accel_deviation_sd);
 }
 
-void add_answer(AnswerLines& lines, std::string_view name, const Pair& pair,
-                const BatchOptions& options = {}) {
-  lines.title(name);
+void add_answer(Answer& lines, std::string_view name, const Pair& pair, const BatchOptions& options = {}) {
+  lines.line(name);
   const auto found = estimate_mounting(pair.reference, pair.study, options);
   if (found) {
     add_estimate(lines, *found);
   } else {
-    lines.add("error", found.error().kind, found.error().text());
+    lines.line("error", found.error().kind, found.error().text());
   }
 }
 
 TEST(BatchAnswers, BentSensor) {
-  AnswerLines lines;
+  Answer lines;
   add_answer(lines, "bent", synthetic::make_pair(bent_sensor(), 1));
   imuscope::test::expect_recorded("estimation/batch/bent_sensor.txt", lines.text(), kShare, kNothing);
 }
 
 TEST(BatchAnswers, NoisyReferenceOfAGivenClass) {
-  AnswerLines lines;
+  Answer lines;
   PairOptions options = bent_sensor();
   options.reference_gyro_white = 4e-4;
   options.reference_accel_white = 5e-3;
@@ -95,7 +94,7 @@ Pair changed_from(Pair pair, double from_s, const Change& change) {
 }
 
 TEST(BatchAnswers, DriveOnWhichTheSensorTurns) {
-  AnswerLines lines;
+  Answer lines;
   const Pair pair = synthetic::make_pair(bent_sensor(), 4);
   const auto turned_by = [&](double angle_rad) {
     const Eigen::Matrix3f turn = imuscope::exp_so3(Eigen::Vector3d(0.0, angle_rad, 0.0)).cast<float>();
@@ -109,14 +108,14 @@ TEST(BatchAnswers, DriveOnWhichTheSensorTurns) {
 }
 
 TEST(BatchAnswers, Refusals) {
-  AnswerLines lines;
+  Answer lines;
   PairOptions options = bent_sensor();
   options.duration_s = 70.0;
   options.road_rate = 0.0;
   const Pair pair = synthetic::make_pair(options, 4);
   const auto words = [&](std::string_view name, const Pair& one) {
     const auto found = estimate_mounting(one.reference, one.study);
-    lines.add(name, found ? std::string("none") : found.error().text());
+    lines.line(name, found ? std::string("none") : found.error().text());
   };
   for (const double jump_s : {0.002, 0.03})
     words("clock jumps",

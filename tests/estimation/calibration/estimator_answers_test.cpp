@@ -21,7 +21,7 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using test::AnswerLines;
+using test::Answer;
 using test::SimulatedDrive;
 using test::SimulatedStudy;
 
@@ -40,7 +40,7 @@ struct Story {
   std::function<void(double t_s, Estimator& estimator)> act = [](double, Estimator&) {};
 };
 
-void tell(AnswerLines& lines, SimulatedDrive& drive, Estimator& estimator, const Story& story,
+void tell(Answer& lines, SimulatedDrive& drive, Estimator& estimator, const Story& story,
           const Trouble& trouble) {
   int epochs = 0;
   while (!drive.done()) {
@@ -56,7 +56,7 @@ void tell(AnswerLines& lines, SimulatedDrive& drive, Estimator& estimator, const
       if (++epochs % story.epoch_every == 0) test::add_epoch(lines, epoch);
     const auto epoch = std::lround(t_s * SimulatedDrive::kRate_hz);
     if (epoch % 100 == 99 && story.tell_at_s.contains(static_cast<int>((epoch + 1) / 100))) {
-      lines.add("after", (epoch + 1) / 100);
+      lines.line("after", (epoch + 1) / 100);
       test::add_estimator(lines, estimator);
     }
   }
@@ -121,7 +121,7 @@ TEST(EstimatorAnswers, DriveWithEveryKindOfTrouble) {
     }
     if (std::lround(t_s * 100.0) == 9400) drive.remount(1, exp_so3(Vector3d(0.3, -0.2, 0.1)));
   };
-  AnswerLines lines;
+  Answer lines;
   tell(lines, drive, estimator, story, [](double t_s, Sample& sample) {
     if (sample.kind == SampleKind::kGnss) {
       if (within(t_s, 40.0, 45.0)) return false;
@@ -156,7 +156,7 @@ TEST(EstimatorAnswers, TagsPulsesAndVelocities) {
   config.studies[0].prior_t_d_s = 0.0;
   Estimator estimator(config);
   estimator.set_pc_clock(host_time_from_ns(10'000'000'000), utc_time_from_ns(1'767'225'590'000'000'000));
-  AnswerLines lines;
+  Answer lines;
   const auto utc_of = [](HostTime time) {
     return utc_time_from_ns(1'767'225'580'500'000'000 + to_ns(time) + to_ns(time) / 50'000);
   };
@@ -208,7 +208,7 @@ TEST(EstimatorAnswers, NoisyReferenceOfIncrementsWithItsOwnAttitude) {
   config.studies[1].prior_C_b_s = Matrix3{1, 0, 0, 0, 1, 0, 0, 0, 1};
   config.studies[1].prior_t_d_s = 0.0;
   Estimator estimator(config);
-  AnswerLines lines;
+  Answer lines;
   tell(lines, drive, estimator, {.tell_at_s = {6, 24, 45, 75}}, [&](double t_s, Sample& sample) {
     if (sample.device == SimulatedDrive::kReference) {
       sample.imu.flags |= kIsIncrement;
@@ -257,7 +257,7 @@ TEST(EstimatorAnswers, WithoutNavigationSwappedSensorsOfWrongNoise) {
   }
   config.studies[1].blocks = kCompleteSImuBlocks;
   Estimator estimator(config);
-  AnswerLines lines;
+  Answer lines;
   tell(lines, drive, estimator, {.tell_at_s = {20, 60, 100}}, [](double t_s, Sample& sample) {
     // Late beyond what is waited for, before there is an estimate.
     return sample.device != SimulatedDrive::kReference || !within(t_s, 0.2, 1.5);
@@ -266,27 +266,28 @@ TEST(EstimatorAnswers, WithoutNavigationSwappedSensorsOfWrongNoise) {
 }
 
 /// Notes the smoothed track in full.
-void add_smoothed(AnswerLines& lines, const SmoothedEpoch& epoch) {
-  lines.add("smoothed", test::seconds_of(epoch.time), epoch.navigating);
-  lines.add(" height and velocity", epoch.navigation.position.height_m, epoch.navigation.v_n_mps);
-  lines.add(" attitude", epoch.navigation.C_b_n);
-  lines.add(" biases e3", 1e3 * epoch.navigation.gyro_bias_b_radps, 1e3 * epoch.navigation.accel_bias_b_mps2);
-  lines.add(" sd e3", 1e3 * epoch.sd);
-  lines.add(" P_phi", 1e9 * epoch.P_phi);
+void add_smoothed(Answer& lines, const SmoothedEpoch& epoch) {
+  lines.line("smoothed", test::seconds_of(epoch.time), epoch.navigating);
+  lines.line(" height and velocity", epoch.navigation.position.height_m, epoch.navigation.v_n_mps);
+  lines.line(" attitude", epoch.navigation.C_b_n);
+  lines.line(" biases e3", 1e3 * epoch.navigation.gyro_bias_b_radps,
+             1e3 * epoch.navigation.accel_bias_b_mps2);
+  lines.line(" sd e3", 1e3 * epoch.sd);
+  lines.line(" P_phi", 1e9 * epoch.P_phi);
   for (std::size_t i = 0; i < epoch.studies.size(); ++i) {
     const SImuState& s = epoch.studies[i];
-    lines.add(" study", epoch.calibrating[i] ? 1 : 0, s.t_d_s, s.accel_t_d_s, s.r_bs_b_m, s.gyro_bias_s_radps,
-              s.accel_bias_s_mps2);
-    lines.add("  shapes", s.gyro_scale, s.accel_scale, s.gyro_axes, s.accel_axes, s.places_s_m);
-    lines.add("  turns", s.C_b_s, s.accel_turn);
-    lines.add("  g", 1e3 * s.g_sensitivity);
+    lines.line(" study", epoch.calibrating[i] ? 1 : 0, s.t_d_s, s.accel_t_d_s, s.r_bs_b_m,
+               s.gyro_bias_s_radps, s.accel_bias_s_mps2);
+    lines.line("  shapes", s.gyro_scale, s.accel_scale, s.gyro_axes, s.accel_axes, s.places_s_m);
+    lines.line("  turns", s.C_b_s, s.accel_turn);
+    lines.line("  g", 1e3 * s.g_sensitivity);
   }
 }
 
 /// Hands the history to a smoother of the whole run and to one of some seconds.
 class BothSmoothers final : public HistorySink {
  public:
-  explicit BothSmoothers(AnswerLines& lines) : lines_(lines) {}
+  explicit BothSmoothers(Answer& lines) : lines_(lines) {}
   void on_history(const HistoryEpoch& epoch) noexcept override {
     whole.on_history(epoch);
     const std::size_t states = epoch.core.covariance().dimension();
@@ -302,7 +303,7 @@ class BothSmoothers final : public HistorySink {
   Smoother whole{{std::size_t{1} << 30U, testing::TempDir()}};
 
  private:
-  AnswerLines& lines_;
+  Answer& lines_;
   std::optional<FixedLagSmoother> lagged_;
   std::vector<double> record_;
   std::size_t given_ = 0;
@@ -313,7 +314,7 @@ TEST(EstimatorAnswers, SmoothedTracks) {
   EstimatorConfig config = drive.config();
   config.instruction_set = InstructionSet::kBaseline;
   config.studies[0].blocks = kCompleteSImuBlocks;
-  AnswerLines lines;
+  Answer lines;
   BothSmoothers smoothers(lines);
   Estimator estimator(config, &smoothers);
   tell(lines, drive, estimator, {.epoch_every = 1 << 30}, [](double t_s, Sample& sample) {
@@ -321,7 +322,7 @@ TEST(EstimatorAnswers, SmoothedTracks) {
   });
   const Result<SmoothedTrack> track = smoothers.whole.smooth();
   ASSERT_TRUE(track) << track.error().text();
-  lines.add("track", track->size(), track->study_count(), track->layout(0).size);
+  lines.line("track", track->size(), track->study_count(), track->layout(0).size);
   for (std::size_t i = 0; i < track->size(); i += 31) add_smoothed(lines, track->at(i).value());
   test::expect_recorded("estimation/calibration/smoothed.txt", lines.text(), 1e-5, kNothing);
 }

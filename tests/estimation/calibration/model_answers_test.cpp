@@ -30,7 +30,7 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using test::AnswerLines;
+using test::Answer;
 
 /// Numbers that are all unlike, between -1 and 1.
 double unlike(std::size_t i) { return std::sin(12.9898 * static_cast<double>(i + 1)); }
@@ -67,24 +67,24 @@ SImuState lively_state() {
   return s;
 }
 
-void add_measurement(AnswerLines& lines, std::string_view name, const SImuMeasurement& m) {
-  lines.add(name, m.predicted, m.H.count);
-  lines.add(" of reference", Matrix3d(1e6 * m.reference_covariance));
+void add_measurement(Answer& lines, std::string_view name, const SImuMeasurement& m) {
+  lines.line(name, m.predicted, m.H.count);
+  lines.line(" of reference", Matrix3d(1e6 * m.reference_covariance));
   for (std::size_t i = 0; i < m.H.count; ++i) {
     const MeasurementBlock& block = m.H.blocks[i];
-    lines.add(" block", block.column, block.width, block.h[0], block.h[1], block.h[2]);
+    lines.line(" block", block.column, block.width, block.h[0], block.h[1], block.h[2]);
   }
 }
 
-void add_state(AnswerLines& lines, const SImuState& s) {
-  lines.add("state", s.C_b_s, s.accel_turn);
-  lines.add(" vectors", s.r_bs_b_m, s.gyro_bias_s_radps, s.accel_bias_s_mps2, s.t_d_s, s.accel_t_d_s);
-  lines.add(" shapes", s.gyro_scale, s.accel_scale, s.gyro_axes, s.accel_axes, s.places_s_m);
-  lines.add(" g", s.g_sensitivity);
+void add_state(Answer& lines, const SImuState& s) {
+  lines.line("state", s.C_b_s, s.accel_turn);
+  lines.line(" vectors", s.r_bs_b_m, s.gyro_bias_s_radps, s.accel_bias_s_mps2, s.t_d_s, s.accel_t_d_s);
+  lines.line(" shapes", s.gyro_scale, s.accel_scale, s.gyro_axes, s.accel_axes, s.places_s_m);
+  lines.line(" g", s.g_sensitivity);
 }
 
 TEST(CalibrationParts, SImuModel) {
-  AnswerLines lines;
+  Answer lines;
   const SImuState state = lively_state();
   ReferenceMean mean;
   mean.add(0.5, lively_motion(0));
@@ -92,9 +92,9 @@ TEST(CalibrationParts, SImuModel) {
   mean.scale(0.4);
   mean.move(0.03);
   mean.compensate({0.01, 0.02, -0.03}, {0.1, -0.2, 0.3});
-  lines.add("mean", mean.omega_radps, mean.omega_dot_radps2, mean.omega_ddot_radps3, mean.f_mps2,
-            mean.f_dot_mps3);
-  lines.add("products", mean.omega_omega);
+  lines.line("mean", mean.omega_radps, mean.omega_dot_radps2, mean.omega_ddot_radps3, mean.f_mps2,
+             mean.f_dot_mps3);
+  lines.line("products", mean.omega_omega);
   const ReferenceMean other(lively_motion(200));
   for (const std::uint32_t blocks :
        {kCompleteSImuBlocks, kFullSImuBlocks, kPaperSImuBlocks, kBiasSImuBlocks,
@@ -104,9 +104,9 @@ TEST(CalibrationParts, SImuModel) {
     const auto at = [](std::size_t first) {
       return first == SImuLayout::kAbsent ? -1.0 : static_cast<double>(first);
     };
-    lines.add("layout", blocks, l.first, l.size, at(l.psi), at(l.r), at(l.gyro_bias), at(l.accel_bias),
-              at(l.t_d), at(l.gyro_scale), at(l.accel_scale), at(l.accel_boresight), at(l.accel_t_d),
-              at(l.gyro_axes), at(l.accel_axes), at(l.places), at(l.g_sensitivity));
+    lines.line("layout", blocks, l.first, l.size, at(l.psi), at(l.r), at(l.gyro_bias), at(l.accel_bias),
+               at(l.t_d), at(l.gyro_scale), at(l.accel_scale), at(l.accel_boresight), at(l.accel_t_d),
+               at(l.gyro_axes), at(l.accel_axes), at(l.places), at(l.g_sensitivity));
     const ReferenceBiasColumns columns =
         blocks == kPaperSImuBlocks ? ReferenceBiasColumns{} : ReferenceBiasColumns{9, 12};
     add_measurement(lines, "gyro", gyro_measurement(state, l, columns, mean, other, {1e-3, 2e-2, 3e-3}));
@@ -117,32 +117,32 @@ TEST(CalibrationParts, SImuModel) {
     inject(corrected, l, error);
     add_state(lines, corrected);
   }
-  lines.add("rate", predicted_rate(state, mean), "force", predicted_force(state, mean));
+  lines.line("rate", predicted_rate(state, mean), "force", predicted_force(state, mean));
   LinearisationSpread spread;
   spread.psi_rad2 << 0.02, 0.001, -0.003, 0.001, 0.03, 0.002, -0.003, 0.002, 0.05;
   spread.r_m2 << 0.3, 0.02, -0.05, 0.02, 0.2, 0.04, -0.05, 0.04, 0.4;
   spread.t_d_s2 = 1e-4;
-  lines.add("second order of rates", second_order_rate(state, mean, spread));
-  lines.add("second order of forces", second_order_force(state, mean, spread));
+  lines.line("second order of rates", second_order_rate(state, mean, spread));
+  lines.line("second order of forces", second_order_force(state, mean, spread));
   for (const double tau_s : {0.0, 0.01, 0.6})
-    lines.add("inflated", tau_s, inflated_variance(0.1, 0.05, tau_s, 0.01));
+    lines.line("inflated", tau_s, inflated_variance(0.1, 0.05, tau_s, 0.01));
   test::expect_recorded("estimation/calibration/s_imu_model.txt", lines.text(), 1e-6, 1e-11);
 }
 
 TEST(CalibrationParts, UpdateWindows) {
-  AnswerLines lines;
+  Answer lines;
   for (const int n : {1, 4, 10})
     for (int k = 0; k <= 2 * n; k += std::max(1, n / 2))
-      lines.add("weight", n, k, window_weight(n, k), window_white_share(n));
+      lines.line("weight", n, k, window_weight(n, k), window_white_share(n));
   for (const int points : {5, 9}) {
     for (const double rate_hz : {100.0, 30.0, 400.0}) {
       const ReferenceWindowOptions reference{points, 0.01};
       for (const int n : {1, 3, 20}) {
         const NoiseGains g = noise_gains(reference, rate_hz, n);
-        lines.add("gains", points, rate_hz, n, g.value, g.slope_per_s, g.curvature_per_s2);
+        lines.line("gains", points, rate_hz, n, g.value, g.slope_per_s, g.curvature_per_s2);
       }
       WindowChoice choice(reference, rate_hz);
-      lines.add("first", choice.now().n, choice.now().gains.slope_per_s);
+      lines.line("first", choice.now().n, choice.now().gains.slope_per_s);
       choice.fix(0);
       MotionShare share;
       share.set_noise(0.02, 0.03, choice.now().gains);
@@ -156,22 +156,22 @@ TEST(CalibrationParts, UpdateWindows) {
         share.add(ReferenceMean(b), {0.01, -0.02, 0.03}, {0.1, 0.0, -0.1}, 0.1);
         const bool changed = choice.choose(share);
         if (changed) {
-          lines.add("changed", i, choice.now().n, choice.now().gains.slope_per_s);
+          lines.line("changed", i, choice.now().n, choice.now().gains.slope_per_s);
           share.set_noise(0.02, 0.03, choice.now().gains);
         }
         if (i % 75 != 2) continue;
-        lines.add("share", i, share.can_tell(), share.moving(), share.rate_slope_share(),
-                  share.noise_in_rate_slope(), share.motion_s());
+        lines.line("share", i, share.can_tell(), share.moving(), share.rate_slope_share(),
+                   share.noise_in_rate_slope(), share.motion_s());
         const ReferenceMean believed = share.believed(ReferenceMean(b));
-        lines.add(" believed", believed.omega_radps, believed.omega_dot_radps2, believed.omega_ddot_radps3,
-                  believed.f_mps2, believed.f_dot_mps3, believed.omega_omega.diagonal());
+        lines.line(" believed", believed.omega_radps, believed.omega_dot_radps2, believed.omega_ddot_radps3,
+                   believed.f_mps2, believed.f_dot_mps3, believed.omega_omega.diagonal());
         const ReferenceMean expected = share.expected(ReferenceMean(b));
-        lines.add(" expected", expected.omega_radps, expected.omega_dot_radps2, expected.f_mps2);
+        lines.line(" expected", expected.omega_radps, expected.omega_dot_radps2, expected.f_mps2);
       }
       share.clear();
-      lines.add("cleared", share.can_tell(), share.moving(), share.motion_s(), share.noise_in_rate_slope());
+      lines.line("cleared", share.can_tell(), share.moving(), share.motion_s(), share.noise_in_rate_slope());
       choice.fix(7);
-      lines.add("fixed", choice.now().n, choice.now().gains.value);
+      lines.line("fixed", choice.now().n, choice.now().gains.value);
     }
   }
   test::expect_recorded("estimation/calibration/update_windows.txt", lines.text(), 1e-6, 1e-9);
@@ -202,27 +202,28 @@ MountingEstimate drive_estimate(std::size_t seed, double off, bool shares) {
   return e;
 }
 
-void add_combined(AnswerLines& lines, std::string_view name, const std::vector<MountingEstimate>& estimates) {
+void add_combined(Answer& lines, std::string_view name, const std::vector<MountingEstimate>& estimates) {
   for (const CombineMethod method :
        {CombineMethod::kInverseVariance, CombineMethod::kCovarianceIntersection}) {
     const Result<CombinedMounting> found = combine(estimates, method);
     if (!found) {
-      lines.add(name, found.error().text());
+      lines.line(name, found.error().text());
       continue;
     }
-    lines.add(name, estimates.size(), found->estimate.C_b_s, found->estimate.r_bs_b_m);
+    lines.line(name, estimates.size(), found->estimate.C_b_s, found->estimate.r_bs_b_m);
     std::array<double, 36> scaled = found->estimate.covariance_psi_r;
     for (double& value : scaled) value *= 1e6;
-    lines.add(" covariance", scaled);
-    lines.add(" weights", found->weights);
-    lines.add(" homogeneity", found->homogeneity_chi2, found->homogeneity_dof, found->homogeneity_p_value,
-              found->between_drives_psi_sd_rad, found->between_drives_r_sd_m, found->one_mounting_p_value());
-    for (const DriveDeviation& d : found->drives) lines.add(" drive", d.deviation, d.deviation_sd, d.p_value);
+    lines.line(" covariance", scaled);
+    lines.line(" weights", found->weights);
+    lines.line(" homogeneity", found->homogeneity_chi2, found->homogeneity_dof, found->homogeneity_p_value,
+               found->between_drives_psi_sd_rad, found->between_drives_r_sd_m, found->one_mounting_p_value());
+    for (const DriveDeviation& d : found->drives)
+      lines.line(" drive", d.deviation, d.deviation_sd, d.p_value);
   }
 }
 
 TEST(CalibrationParts, Combination) {
-  AnswerLines lines;
+  Answer lines;
   for (const bool shares : {false, true}) {
     for (const double off : {5e-4, 6e-3}) {
       for (const std::size_t n : {1U, 2U, 3U, 5U}) {
@@ -260,7 +261,7 @@ TEST(CalibrationParts, WeightedMeanOfTheLiterature) {
 }
 
 TEST(CalibrationParts, TrustInGnssAndGates) {
-  AnswerLines lines;
+  Answer lines;
   GnssConfig config;
   config.default_sd_velocity_mps = {0.03, 0.04, 0.06};
   for (const GnssSolution solution : {GnssSolution::kNone, GnssSolution::kSingle, GnssSolution::kDifferential,
@@ -272,17 +273,17 @@ TEST(CalibrationParts, TrustInGnssAndGates) {
     for (const std::uint32_t flags :
          {0U, static_cast<std::uint32_t>(kHasPositionSd), static_cast<std::uint32_t>(kHasVelocitySd)}) {
       gnss.flags = flags;
-      lines.add("sd", solution, flags, trusted_position_sd(gnss, config), trusted_velocity_sd(gnss, config));
+      lines.line("sd", solution, flags, trusted_position_sd(gnss, config), trusted_velocity_sd(gnss, config));
     }
     for (const double since_s : {-1.0, 0.0, 0.2, 1.0, 59.0, 61.0, 300.0})
-      lines.add("factor", solution, since_s, correlated_sd_factor(solution, since_s));
+      lines.line("factor", solution, since_s, correlated_sd_factor(solution, since_s));
   }
-  for (const double p : {0.9, 0.95, 0.99999}) lines.add("gate", p, axis_gate(p));
+  for (const double p : {0.9, 0.95, 0.99999}) lines.line("gate", p, axis_gate(p));
   test::expect_recorded("estimation/calibration/gnss_trust.txt", lines.text());
 }
 
 TEST(CalibrationParts, StateNames) {
-  AnswerLines lines;
+  Answer lines;
   EstimatorConfig config;
   config.studies.resize(2);
   config.studies[0].blocks = kCompleteSImuBlocks;
@@ -292,24 +293,24 @@ TEST(CalibrationParts, StateNames) {
     config.gnss.enabled = true;
     for (std::size_t i = more ? 59 : 0; i < 80; ++i) {
       const StateName name = state_name(config, i);
-      lines.add(name.name, i, name.study ? static_cast<double>(*name.study) : -1.0);
+      lines.line(name.name, i, name.study ? static_cast<double>(*name.study) : -1.0);
     }
   }
   test::expect_recorded("estimation/calibration/state_names.txt", lines.text());
 }
 
 TEST(CalibrationParts, NoiseOfTheMtxClass) {
-  AnswerLines lines;
+  Answer lines;
   const SImuNoise noise = mtx_class_noise();
   for (const auto& triads : {noise.gyro, noise.accel})
-    for (const TriadNoise& t : triads) lines.add("triad", t.white_sd, t.fast_sd, t.fast_time_constant_s);
+    for (const TriadNoise& t : triads) lines.line("triad", t.white_sd, t.fast_sd, t.fast_time_constant_s);
   for (const auto& biases : {noise.gyro_bias, noise.accel_bias})
-    for (const GaussMarkovConfig& b : biases) lines.add("bias", b.sd, b.time_constant_s);
+    for (const GaussMarkovConfig& b : biases) lines.line("bias", b.sd, b.time_constant_s);
   test::expect_recorded("estimation/calibration/mtx_class.txt", lines.text());
 }
 
 TEST(CalibrationParts, RegimeDetector) {
-  AnswerLines lines;
+  Answer lines;
   for (const bool wheels : {false, true}) {
     RegimeDetector detector;
     Regime before = detector.regime();
@@ -322,16 +323,16 @@ TEST(CalibrationParts, RegimeDetector) {
         detector.add_wheel_speed(t > 20.0 && t < 35.0 ? -5.0 : t > 5.0 && t < 6.0 ? 0.06 : 0.05);
       detector.add({shake * 0.02 * std::sin(3.0 * t), 0.0, turn * std::sin(2.0 * t)},
                    {shake * std::sin(4.0 * t), 0.1 * std::sin(200.0 * t), -9.8}, 0.01);
-      if (detector.regime() != before) lines.add("becomes", wheels, t, detector.regime());
+      if (detector.regime() != before) lines.line("becomes", wheels, t, detector.regime());
       before = detector.regime();
-      if (i % 500 == 499) lines.add("mean", t, detector.mean_f_mps2());
+      if (i % 500 == 499) lines.line("mean", t, detector.mean_f_mps2());
     }
   }
   test::expect_recorded("estimation/calibration/regime_detector.txt", lines.text());
 }
 
 TEST(CalibrationParts, NavigationAsItIsShown) {
-  AnswerLines lines;
+  Answer lines;
   std::array<double, 15> sd{};
   for (std::size_t i = 0; i < sd.size(); ++i) sd[i] = 0.1 * static_cast<double>(i + 1);
   Matrix3d P_phi;
@@ -345,11 +346,11 @@ TEST(CalibrationParts, NavigationAsItIsShown) {
     state.accel_bias_b_mps2 = {0.1, 0.2, 0.3};
     NavigationOutput out;
     write_state(state, sd, P_phi, out);
-    lines.add("shown", out.latitude_rad, out.longitude_rad, out.height_m, out.v_n_mps, out.rpy_rad,
-              out.C_b_n);
-    lines.add(" biases", out.gyro_bias_radps, out.accel_bias_mps2);
-    lines.add(" sd", out.sd_position_m, out.sd_velocity_mps, out.sd_rpy_rad, out.sd_gyro_bias_radps,
-              out.sd_accel_bias_mps2);
+    lines.line("shown", out.latitude_rad, out.longitude_rad, out.height_m, out.v_n_mps, out.rpy_rad,
+               out.C_b_n);
+    lines.line(" biases", out.gyro_bias_radps, out.accel_bias_mps2);
+    lines.line(" sd", out.sd_position_m, out.sd_velocity_mps, out.sd_rpy_rad, out.sd_gyro_bias_radps,
+               out.sd_accel_bias_mps2);
   }
   test::expect_recorded("estimation/calibration/navigation_output.txt", lines.text(), 1e-5, 1e-9);
 }
@@ -385,7 +386,7 @@ struct LivelyCore {
         P.set(i, j, (i == j ? 1.0 + 0.1 * unlike(i) : 0.3 / static_cast<double>(n) * unlike(31 * i + j)));
   }
   /// Every element of the covariance counts in one of these.
-  void add(AnswerLines& lines, std::string_view name) const {
+  void add(Answer& lines, std::string_view name) const {
     const CovarianceKernel& P = core->covariance();
     std::vector<double> sums;
     for (std::size_t i = 0; i < P.dimension(); ++i) {
@@ -393,31 +394,31 @@ struct LivelyCore {
       for (std::size_t j = 0; j < P.dimension(); ++j) sum += P(i, j) * unlike(j);
       sums.push_back(sum);
     }
-    lines.add(name, P.dimension(), P.padded_dimension(), sums);
+    lines.line(name, P.dimension(), P.padded_dimension(), sums);
   }
 };
 
-void add_states(AnswerLines& lines, FilterCore& core) {
+void add_states(Answer& lines, FilterCore& core) {
   core.settle();
   const NavigationState& n = core.navigation();
-  lines.add("navigation", 1e6 * n.position.latitude_rad, 1e6 * n.position.longitude_rad, n.position.height_m,
-            n.v_n_mps, n.C_b_n);
-  lines.add(" biases", core.reference_gyro_bias_radps(), core.reference_accel_bias_mps2());
+  lines.line("navigation", 1e6 * n.position.latitude_rad, 1e6 * n.position.longitude_rad, n.position.height_m,
+             n.v_n_mps, n.C_b_n);
+  lines.line(" biases", core.reference_gyro_bias_radps(), core.reference_accel_bias_mps2());
   for (std::size_t i = 0; i < core.study_count(); ++i) add_state(lines, core.study(i));
-  lines.add("odometry", core.odometry_states(), core.odometry().C_b_v, core.odometry().r_bv_b_m,
-            core.odometry().scale);
-  lines.add("antenna", core.antenna_states(), core.antenna().r_ba_b_m, core.antenna().latency_s);
+  lines.line("odometry", core.odometry_states(), core.odometry().C_b_v, core.odometry().r_bv_b_m,
+             core.odometry().scale);
+  lines.line("antenna", core.antenna_states(), core.antenna().r_ba_b_m, core.antenna().latency_s);
 }
 
 TEST(CalibrationParts, FilterCore) {
-  AnswerLines lines;
+  Answer lines;
   LivelyCore lively;
   FilterCore& core = *lively.core;
   add_states(lines, core);
   lively.add(lines, "at first");
   std::vector<double> sd;
   for (std::size_t i = 0; i < core.covariance().dimension(); ++i) sd.push_back(core.sd(i));
-  lines.add("sd", sd, core.sd(SImuLayout::kAbsent));
+  lines.line("sd", sd, core.sd(SImuLayout::kAbsent));
   lively.correlate();
   NavigationState& state = core.navigation();
   state.position = {0.8, 0.1, 400.0};
@@ -444,29 +445,29 @@ TEST(CalibrationParts, FilterCore) {
   for (const std::array<bool, 3>& use : {std::array{true, true, true}, std::array{false, true, true},
                                          std::array{true, false, false}, std::array{false, false, false}}) {
     core.covariance().project(H, R);
-    lines.add("S", core.covariance().innovation_covariance());
-    lines.add("updated", core.update({0.3, -0.2, 0.1}, use));
-    lines.add("injected", core.injected());
+    lines.line("S", core.covariance().innovation_covariance());
+    lines.line("updated", core.update({0.3, -0.2, 0.1}, use));
+    lines.line("injected", core.injected());
     lively.add(lines, "P");
     add_states(lines, core);
   }
   core.predict_navigation(transition(core.navigation(), {{0.3, 0.1, 0.2}, {2.0, 1.0, -9.5}},
                                      {0.1, 0.2, {0.3, 50.0}, {0.4, 70.0}}, 0.05));
   const FilterCore::Accumulated& accumulated = core.accumulated();
-  lines.add("transition", Eigen::MatrixXd(accumulated.transition));
-  lines.add("noise", Eigen::MatrixXd(accumulated.noise));
-  lines.add("decay", accumulated.decay);
-  lines.add("decay noise", accumulated.decay_noise);
-  lines.add("accumulated corrections", accumulated.injected);
-  lines.add("taken", core.take_injected(), core.injected());
+  lines.line("transition", Eigen::MatrixXd(accumulated.transition));
+  lines.line("noise", Eigen::MatrixXd(accumulated.noise));
+  lines.line("decay", accumulated.decay);
+  lines.line("decay noise", accumulated.decay_noise);
+  lines.line("accumulated corrections", accumulated.injected);
+  lines.line("taken", core.take_injected(), core.injected());
   core.restart_accumulation();
-  lines.add("anew", core.accumulated().transition.sum(), core.accumulated().noise.sum(),
-            std::accumulate(core.accumulated().decay.begin(), core.accumulated().decay.end(), 0.0),
-            std::accumulate(core.accumulated().injected.begin(), core.accumulated().injected.end(), 0.0));
+  lines.line("anew", core.accumulated().transition.sum(), core.accumulated().noise.sum(),
+             std::accumulate(core.accumulated().decay.begin(), core.accumulated().decay.end(), 0.0),
+             std::accumulate(core.accumulated().injected.begin(), core.accumulated().injected.end(), 0.0));
   core.reset_state(core.layout(0).r, 4.0);
   core.reset_latency(0.07, 0.02);
   lively.add(lines, "reset");
-  lines.add("latency", core.antenna().latency_s, core.accumulated().decay[core.antenna_states() + 3 - 15]);
+  lines.line("latency", core.antenna().latency_s, core.accumulated().decay[core.antenna_states() + 3 - 15]);
   reset_to_prior(core, 0, lively.config.studies[0]);
   lively.add(lines, "to its prior");
   add_states(lines, core);
@@ -474,16 +475,16 @@ TEST(CalibrationParts, FilterCore) {
   core.covariance().set(20, 20, std::nan(""));
   std::size_t first = 0;
   const std::size_t repaired = core.repair(first);
-  lines.add("repaired", repaired, first);
+  lines.line("repaired", repaired, first);
   lively.add(lines, "after that");
   core.repair_state(30);
-  lines.add("repaired one", core.sd(30));
-  lines.add("nothing more", core.repair(first));
+  lines.line("repaired one", core.sd(30));
+  lines.line("nothing more", core.repair(first));
   test::expect_recorded("estimation/calibration/filter_core.txt", lines.text(), 1e-6, 1e-10);
 }
 
 TEST(CalibrationParts, SmoothingStep) {
-  AnswerLines lines;
+  Answer lines;
   constexpr Eigen::Index kN = 19;
   const auto matrix = [](Eigen::Index n, std::size_t seed) {
     return Eigen::MatrixXd::NullaryExpr(n, n,
@@ -509,8 +510,8 @@ TEST(CalibrationParts, SmoothingStep) {
   Eigen::VectorXd d = 2.0 * injected.reverse();
   Eigen::MatrixXd smoothed = 0.5 * positive(kN, 2000);
   smooth_back({P, transition, noise, decay, decay_noise, injected}, d, smoothed);
-  lines.add("d", d);
-  lines.add("P", smoothed);
+  lines.line("d", d);
+  lines.line("P", smoothed);
   test::expect_recorded("estimation/calibration/smoothing_step.txt", lines.text(), 1e-6, 1e-8);
 }
 

@@ -32,8 +32,7 @@ bool trouble_wheels(double t_s, Sample& sample) {
   return !lies_within(t_s, 60.0, 61.0);
 }
 
-void tell_wheels(test::AnswerLines& lines, WheeledDrive& drive, Estimator& estimator,
-                 const std::set<int>& at_s) {
+void tell_wheels(test::Answer& lines, WheeledDrive& drive, Estimator& estimator, const std::set<int>& at_s) {
   while (!drive.done()) {
     const double t_s = drive.time_s();
     std::vector<Sample> samples = drive.next();
@@ -46,13 +45,13 @@ void tell_wheels(test::AnswerLines& lines, WheeledDrive& drive, Estimator& estim
     for (const EstimatorEvent& event : estimator.events()) test::add_event(lines, event);
     const auto epoch = std::lround(t_s * WheeledDrive::kRate_hz);
     if (epoch % 100 != 99 || !at_s.contains(static_cast<int>((epoch + 1) / 100))) continue;
-    lines.add("after", (epoch + 1) / 100);
+    lines.line("after", (epoch + 1) / 100);
     test::add_estimator(lines, estimator);
   }
 }
 
 TEST(OdometryAnswers, WheelsWithEveryKindOfTrouble) {
-  test::AnswerLines lines;
+  test::Answer lines;
   for (const ReferenceClass reference : {ReferenceClass::kNavigationGrade, ReferenceClass::kIndustrial}) {
     study::WheeledDriveOptions options;
     options.duration_s = 110.0;
@@ -72,7 +71,7 @@ TEST(OdometryAnswers, WheelsWithEveryKindOfTrouble) {
 }
 
 TEST(OdometryAnswers, WheelsThatStandWhileTheNavigationMoves) {
-  test::AnswerLines lines;
+  test::Answer lines;
   study::WheeledDriveOptions options;
   options.duration_s = 30.0;
   options.seed = 6;
@@ -99,7 +98,7 @@ TEST(OdometryAnswers, WheelsThatStandWhileTheNavigationMoves) {
     for (const EstimatorEvent& event : estimator.events()) test::add_event(lines, event);
     if (std::lround(t_s * 100.0) % 200 == 150) {
       test::add_odometry(lines, estimator.odometry());
-      lines.add("velocity", estimator.navigation().v_n_mps, estimator.navigation().sd_velocity_mps);
+      lines.line("velocity", estimator.navigation().v_n_mps, estimator.navigation().sd_velocity_mps);
       test::add_counters(lines, estimator.counters());
     }
   }

@@ -6,20 +6,20 @@
 
 #include "estimation/error_process/error_row.h"
 #include "estimation/error_process/row_low_pass.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
 namespace {
 
-using test::AnswerLines;
+using test::Answer;
 
-void add_row(AnswerLines& lines, std::string_view name, const ErrorRow& row) {
-  lines.add(name, to_seconds(row.time - HostTime{}), row.counter, row.regime, row.gyro_valid,
-            row.accel_valid);
-  lines.add(" errors", row.e_gyro_radps, row.e_accel_mps2);
-  lines.add(" predicted", row.predicted_omega_s_radps, row.predicted_f_s_mps2);
-  lines.add(" derivatives", row.omega_dot_s_radps2, row.omega_ddot_s_radps3, row.f_dot_s_mps3);
+void add_row(Answer& lines, std::string_view name, const ErrorRow& row) {
+  lines.line(name, to_seconds(row.time - HostTime{}), row.counter, row.regime, row.gyro_valid,
+             row.accel_valid);
+  lines.line(" errors", row.e_gyro_radps, row.e_accel_mps2);
+  lines.line(" predicted", row.predicted_omega_s_radps, row.predicted_f_s_mps2);
+  lines.line(" derivatives", row.omega_dot_s_radps2, row.omega_ddot_s_radps3, row.f_dot_s_mps3);
 }
 
 SImuEpoch full_epoch() {
@@ -43,7 +43,7 @@ SImuEpoch full_epoch() {
 }
 
 TEST(ErrorProcessAnswers, Rows) {
-  AnswerLines lines;
+  Answer lines;
   const SImuEpoch epoch = full_epoch();
   add_row(lines, "live", live_error_row(epoch));
   const Mounting mounting{{0.0, 0.6, 0.8, -1.0, 0.0, 0.0, 0.0, -0.8, 0.6}, {-0.3, 0.9, 1.3}};
@@ -74,10 +74,10 @@ TEST(ErrorProcessAnswers, EachAxisAtTheEndOfItsRangeMakesItsTriadInvalid) {
 }
 
 TEST(ErrorProcessAnswers, LowPass) {
-  AnswerLines lines;
+  Answer lines;
   for (const double corner_hz : {7.0, 40.0}) {
     RowLowPass filter(100.0, corner_hz);
-    lines.add("corner", corner_hz);
+    lines.line("corner", corner_hz);
     for (int k = 0; k < 120; ++k) {
       SImuEpoch epoch = full_epoch();
       epoch.time = host_time_from_ns(10'000'000LL * k);
@@ -93,7 +93,7 @@ TEST(ErrorProcessAnswers, LowPass) {
       if (k % 10 == 3 || k == 60 || k == 90 || k == 91)
         add_row(lines, "row", row);
       else
-        lines.add("valid", k, row.gyro_valid, row.accel_valid);
+        lines.line("valid", k, row.gyro_valid, row.accel_valid);
     }
   }
   test::expect_recorded("estimation/error_process/low_pass.txt", lines.text());

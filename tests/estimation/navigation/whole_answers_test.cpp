@@ -19,7 +19,7 @@
 #include "estimation/navigation/strapdown.h"
 #include "estimation/navigation/wgs84.h"
 #include "tests/estimation/navigation/random_states.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
@@ -28,7 +28,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-using test::AnswerLines;
+using test::Answer;
 
 /// Elements of a matrix may be smaller than what counts as nothing elsewhere: only zero is.
 constexpr double kNothing = 1e-22;
@@ -49,41 +49,41 @@ const InertialRates kRates{{0.11, -0.23, 0.37}, {1.3, -2.1, -9.2}};
 const std::array kPlaces{state_of(46.5, 6.6, 420.0), state_of(-33.9, 151.2, 20.0),
                          state_of(68.0, -133.0, 2900.0)};
 
-void add_position(AnswerLines& lines, std::string_view name, const GeodeticPosition& position) {
-  lines.add(name, 1e3 * position.latitude_rad, 1e3 * position.longitude_rad, position.height_m);
+void add_position(Answer& lines, std::string_view name, const GeodeticPosition& position) {
+  lines.line(name, 1e3 * position.latitude_rad, 1e3 * position.longitude_rad, position.height_m);
 }
 
-void add_state(AnswerLines& lines, const NavigationState& state) {
+void add_state(Answer& lines, const NavigationState& state) {
   add_position(lines, "position", state.position);
-  lines.add("velocity", state.v_n_mps);
-  lines.add("attitude", state.C_b_n);
-  lines.add("biases", state.gyro_bias_b_radps, state.accel_bias_b_mps2);
+  lines.line("velocity", state.v_n_mps);
+  lines.line("attitude", state.C_b_n);
+  lines.line("biases", state.gyro_bias_b_radps, state.accel_bias_b_mps2);
 }
 
 TEST(NavigationAnswers, Rotations) {
-  AnswerLines lines;
+  Answer lines;
   for (const Vector3d& phi :
        {Vector3d(0.0, 0.0, 0.0), Vector3d(4e-4, -5e-4, 3e-4), Vector3d(8e-4, -9e-4, 4e-4),
         Vector3d(0.3, -0.2, 0.9), Vector3d(1.7, 2.1, -1.5), Vector3d(3.0, -0.9, 0.1)}) {
     const Matrix3d C = exp_so3(phi);
-    lines.add("exp", C);
-    lines.add("log", log_so3(C));
+    lines.line("exp", C);
+    lines.line("log", log_so3(C));
     const Eigen::Quaterniond q = quaternion_from_rotation(C);
-    lines.add("quaternion", q.w(), q.vec());
+    lines.line("quaternion", q.w(), q.vec());
     const EulerAngles angles = euler_from_rotation(C);
-    lines.add("angles", angles.roll_rad, angles.pitch_rad, angles.heading_rad);
+    lines.line("angles", angles.roll_rad, angles.pitch_rad, angles.heading_rad);
     Matrix3d bent = C;
     bent(0, 1) += 0.02;
     bent(2, 1) -= 0.01;
-    lines.add("nearest", reorthonormalized(bent));
-    lines.add("tidied", tidied(bent));
+    lines.line("nearest", reorthonormalized(bent));
+    lines.line("tidied", tidied(bent));
   }
   for (const double pitch : {1.570796326, -1.570796326, 0.5 * kPi, -0.5 * kPi}) {
     const EulerAngles angles = euler_from_rotation(rotation_from_euler({0.3, pitch, 1.1}));
-    lines.add("upright", angles.roll_rad, angles.pitch_rad, angles.heading_rad);
+    lines.line("upright", angles.roll_rad, angles.pitch_rad, angles.heading_rad);
   }
   for (const double angle : {-9.0, -3.2, -3.1, 0.5, 3.1, 3.2, 12.0})
-    lines.add("wrapped", wrapped_angle(angle));
+    lines.line("wrapped", wrapped_angle(angle));
   test::expect_recorded("estimation/navigation/rotations.txt", lines.text(), test::kShareOfNumber, 1e-8);
 }
 
@@ -94,19 +94,19 @@ TEST(NavigationAnswers, AngleOfHalfATurnIsPositiveWhicheverSideItComesFrom) {
 }
 
 TEST(NavigationAnswers, Earth) {
-  AnswerLines lines;
+  Answer lines;
   for (const double latitude_deg : {-71.0, -33.0, 0.0, 12.0, 46.5, 85.0}) {
     for (const double height_m : {-50.0, 1200.0}) {
       const GeodeticPosition at{latitude_deg * kRadPerDeg, -1.9, height_m};
       const Gravity gravity = normal_gravity(at.latitude_rad, height_m);
       const Curvature k = curvature_at(at.latitude_rad);
-      lines.add("gravity", gravity.g_mps2, gravity.latitude_slope_mps2, gravity.height_slope_per_s2);
-      lines.add("curvature", k.meridian_m, k.transverse_m, k.meridian_slope_m, k.transverse_slope_m);
-      lines.add("rate", earth_rate_n(at.latitude_rad));
-      lines.add("ecef", ecef_from_geodetic(at));
+      lines.line("gravity", gravity.g_mps2, gravity.latitude_slope_mps2, gravity.height_slope_per_s2);
+      lines.line("curvature", k.meridian_m, k.transverse_m, k.meridian_slope_m, k.transverse_slope_m);
+      lines.line("rate", earth_rate_n(at.latitude_rad));
+      lines.line("ecef", ecef_from_geodetic(at));
       const GeodeticPosition there = displaced(at, {3000.0, -2000.0, 150.0});
       add_position(lines, "displaced", there);
-      lines.add("offset", ned_offset(at, {at.latitude_rad + 1e-4, at.longitude_rad - 2e-4, height_m + 7.0}));
+      lines.line("offset", ned_offset(at, {at.latitude_rad + 1e-4, at.longitude_rad - 2e-4, height_m + 7.0}));
     }
   }
   test::expect_recorded("estimation/navigation/earth.txt", lines.text(), test::kShareOfNumber, 1e-18);
@@ -126,37 +126,38 @@ TEST(NavigationAnswers, OnEarthEndsAtThePolesTheDateLineTheDeepestSeaAndTheEdgeO
 }
 
 TEST(NavigationAnswers, ErrorModel) {
-  AnswerLines lines;
+  Answer lines;
   const NavigationProcessNoise noise{0.02, 0.3, {0.05, 40.0}, {0.7, 90.0}};
   NavigationProcessNoise constant = noise;
   constant.gyro_bias.correlation_time_s = std::numeric_limits<double>::infinity();
   for (const NavigationState& state : kPlaces) {
-    lines.add("dynamics", error_dynamics(state, kRates));
+    lines.line("dynamics", error_dynamics(state, kRates));
     const NavigationTransition step = transition(state, kRates, noise, 0.1);
-    lines.add("transition", step.kinematic_rows);
-    lines.add("decay", step.gyro_bias_decay, step.accel_bias_decay);
-    lines.add("noise", step.process_covariance);
+    lines.line("transition", step.kinematic_rows);
+    lines.line("decay", step.gyro_bias_decay, step.accel_bias_decay);
+    lines.line("noise", step.process_covariance);
   }
   const NavigationTransition step = transition(kPlaces[0], kRates, constant, 0.05);
-  lines.add("constant bias", step.gyro_bias_decay, step.accel_bias_decay, step.process_covariance.diagonal());
+  lines.line("constant bias", step.gyro_bias_decay, step.accel_bias_decay,
+             step.process_covariance.diagonal());
   NavigationErrorVector error;
   error << 1.1, -2.2, 3.3, 0.4, -0.5, 0.6, 0.01, -0.02, 0.03, 1e-3, 2e-3, -3e-3, 0.1, -0.2, 0.3;
   NavigationState moved = kPlaces[2];
   inject(moved, error);
   add_state(lines, moved);
-  lines.add("between", error_between(moved, kPlaces[2]));
+  lines.line("between", error_between(moved, kPlaces[2]));
   test::expect_recorded("estimation/navigation/error_model.txt", lines.text(), test::kShareOfNumber,
                         kNothing);
 }
 
 TEST(NavigationAnswers, Strapdown) {
-  AnswerLines lines;
+  Answer lines;
   const InertialRates next{{0.25, -0.4, 0.6}, {-2.0, 1.5, -11.0}};
   for (const NavigationState& place : kPlaces) {
     for (const bool of_means : {false, true}) {
       const InertialIncrement step =
           of_means ? increment_from_means(kRates, next, 0.1) : increment_from_samples(kRates, next, 0.1);
-      lines.add("increment", step.rotation_rad, step.delta_v_b_mps, step.dt_s);
+      lines.line("increment", step.rotation_rad, step.delta_v_b_mps, step.dt_s);
       NavigationState state = place;
       for (int i = 0; i < 50; ++i) propagate(state, step);
       add_state(lines, state);
@@ -171,46 +172,46 @@ TEST(NavigationAnswers, Strapdown) {
 }
 
 TEST(NavigationAnswers, Measurements) {
-  AnswerLines lines;
+  Answer lines;
   const Vector3d arm(1.4, -0.8, -2.2);
   for (const NavigationState& state : kPlaces) {
     const GeodeticPosition antenna = displaced(state.position, {3.0, -4.0, 5.0});
     const GnssInnovation position = gnss_position_innovation(state, antenna, arm);
-    lines.add("position", position.innovation, position.H);
+    lines.line("position", position.innovation, position.H);
     const GnssInnovation velocity =
         gnss_velocity_innovation(state, {20.0, -12.0, 2.0}, kRates.omega_ib_b_radps, arm);
-    lines.add("velocity", velocity.innovation, velocity.H);
-    lines.add("antenna in position", antenna_in_position(state, kRates, arm));
-    lines.add("antenna in velocity", antenna_in_velocity(state, kRates, arm));
+    lines.line("velocity", velocity.innovation, velocity.H);
+    lines.line("antenna in position", antenna_in_position(state, kRates, arm));
+    lines.line("antenna in velocity", antenna_in_velocity(state, kRates, arm));
     const OdometryState vehicle{exp_so3({0.02, -0.05, 0.3}), {1.1, 0.3, 0.6}, 0.02};
     const OdometryInnovation wheels = odometry_innovation(state, vehicle, 17.0, kRates.omega_ib_b_radps);
-    lines.add("wheels", wheels.innovation, wheels.predicted, wheels.H);
-    lines.add("wheels' own", wheels.H_odometry);
+    lines.line("wheels", wheels.innovation, wheels.predicted, wheels.H);
+    lines.line("wheels' own", wheels.H_odometry);
     const ZeroVelocityInnovation still = zero_velocity_innovation(state);
-    lines.add("standing", still.innovation, still.H);
+    lines.line("standing", still.innovation, still.H);
   }
   AntennaState antenna{{1.0, 2.0, 3.0}, 0.01};
   inject(antenna, AntennaErrorVector(0.1, -0.2, 0.3, 0.004));
-  lines.add("antenna", antenna.r_ba_b_m, antenna.latency_s);
+  lines.line("antenna", antenna.r_ba_b_m, antenna.latency_s);
   OdometryState odometry{exp_so3({0.1, 0.2, 0.3}), {1.0, 2.0, 3.0}, 0.01};
   OdometryErrorVector error;
   error << 0.003, 0.02, -0.03, 0.1, -0.2, 0.4;
   inject(odometry, error);
-  lines.add("odometry", odometry.C_b_v, odometry.r_bv_b_m, odometry.scale);
+  lines.line("odometry", odometry.C_b_v, odometry.r_bv_b_m, odometry.scale);
   test::expect_recorded("estimation/navigation/measurements.txt", lines.text(), test::kShareOfNumber,
                         kNothing);
 }
 
 TEST(NavigationAnswers, GnssGate) {
   GnssGate gate({16.0, 4, 3.0});
-  AnswerLines lines;
+  Answer lines;
   Matrix3d S = Vector3d(1.0, 2.0, 4.0).asDiagonal();
   S(0, 1) = S(1, 0) = 0.3;
   const Matrix3d R = 0.01 * Matrix3d::Identity();
   const auto ask = [&](double t, const Vector3d& innovation, const Matrix3d& covariance) {
     const GateDecision decision = gate.decide(instant(t), innovation, covariance, R);
-    lines.add("decision", t, decision, gate.last_nis(), gate.streak(), gate.accepted(), gate.rejected(),
-              gate.reacquisitions());
+    lines.line("decision", t, decision, gate.last_nis(), gate.streak(), gate.accepted(), gate.rejected(),
+               gate.reacquisitions());
   };
   ask(0.0, {1.0, -1.0, 2.0}, S);
   ask(1.0, {0.0, 0.0, 8.0}, S);  // at the bound
@@ -256,16 +257,16 @@ std::vector<VelocityChange> windows_of(std::size_t n, double noise_mps) {
   return windows;
 }
 
-void add_heading(AnswerLines& lines, std::string_view name, const std::vector<VelocityChange>& windows,
+void add_heading(Answer& lines, std::string_view name, const std::vector<VelocityChange>& windows,
                  const HeadingPriors& priors) {
   HeadingSolution out;
   const bool found = solve_heading(windows, priors, out);
-  lines.add(name, found, out.heading_rad, out.sd_rad, out.acceleration_error_a_mps2,
-            out.acceleration_error_sd_mps2, out.scale, out.weight_share);
+  lines.line(name, found, out.heading_rad, out.sd_rad, out.acceleration_error_a_mps2,
+             out.acceleration_error_sd_mps2, out.scale, out.weight_share);
 }
 
 TEST(NavigationAnswers, HeadingSolver) {
-  AnswerLines lines;
+  Answer lines;
   const HeadingPriors priors{2e-3, 0.1, 4.0};
   for (const std::size_t n : {7U, 8U, 9U, 40U, 256U, 300U}) {
     add_heading(lines, "plain", windows_of(n, 0.0), priors);
@@ -354,19 +355,19 @@ struct AlignerRun {
   int tell_every = 350;
 };
 
-void add_result(AnswerLines& lines, const InitialAligner& aligner, double t) {
-  lines.add("stage", t, aligner.stage(), aligner.heading_sd_rad());
+void add_result(Answer& lines, const InitialAligner& aligner, double t) {
+  lines.line("stage", t, aligner.stage(), aligner.heading_sd_rad());
   const InitialNavigation* const found = aligner.result();
   if (found == nullptr) return;
-  lines.add("start", to_seconds(found->time - HostTime{}), found->method, found->sd.head<9>());
+  lines.line("start", to_seconds(found->time - HostTime{}), found->method, found->sd.head<9>());
   add_state(lines, found->state);
   const AlignmentRest& rest = found->rest;
-  lines.add("rest", rest.length_s, rest.age_s, 1e3 * rest.sway_radps, rest.mean.omega_ib_b_radps,
-            rest.mean.f_b_mps2, rest.C_b_n);
+  lines.line("rest", rest.length_s, rest.age_s, 1e3 * rest.sway_radps, rest.mean.omega_ib_b_radps,
+             rest.mean.f_b_mps2, rest.C_b_n);
 }
 
-void add_run(AnswerLines& lines, std::string_view name, const AlignerRun& run) {
-  lines.title(name);
+void add_run(Answer& lines, std::string_view name, const AlignerRun& run) {
+  lines.line(name);
   InitialAlignmentOptions options;
   options.reference_noise = {
       run.gyro_white_radps_per_sqrt_hz, 1e-3, {run.gyro_bias_sd_radps, 1000.0}, {0.05, 1000.0}};
@@ -402,7 +403,7 @@ void add_run(AnswerLines& lines, std::string_view name, const AlignerRun& run) {
 }
 
 TEST(NavigationAnswers, InitialAligner) {
-  AnswerLines lines;
+  Answer lines;
   add_run(lines, "in motion", {});
   add_run(lines, "in motion, velocities, a host second that is long",
           {.with_velocity = true, .host_scale = 1.001});
@@ -455,13 +456,13 @@ TEST(NavigationAnswers, HalfASecondIsNoGapYetAndNotTooOld) {
 }
 
 TEST(NavigationAnswers, LevelAndGyrocompass) {
-  AnswerLines lines;
+  Answer lines;
   for (const Vector3d& f : {Vector3d(0.0, 0.0, -9.8), Vector3d(3.0, -4.0, -8.0), Vector3d(-9.0, 1.0, 3.0)}) {
     const InitialAttitude level = level_from_rest(f, 0.05, 1.3);
-    lines.add("level", level.sd_n_rad, level.C_b_n);
+    lines.line("level", level.sd_n_rad, level.C_b_n);
     for (const double latitude_rad : {0.8, -1.2, 1.5707}) {
       const InitialAttitude found = gyrocompass({3e-5, -4e-5, -5e-5}, f, 2e-7, 0.02, latitude_rad);
-      lines.add("gyrocompass", found.sd_n_rad, found.C_b_n);
+      lines.line("gyrocompass", found.sd_n_rad, found.C_b_n);
     }
   }
   test::expect_recorded("estimation/navigation/level.txt", lines.text());

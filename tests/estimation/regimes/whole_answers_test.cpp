@@ -10,28 +10,28 @@
 #include "estimation/regimes/motion_regimes.h"
 #include "estimation/regimes/recent_regimes.h"
 #include "stopping_drive.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
 namespace {
 
-using test::AnswerLines;
+using test::Answer;
 
 constexpr double kOrigin_s = 1000.0;
 
 double since_origin_s(HostTime time) { return to_seconds(time - HostTime{}) - kOrigin_s; }
 
-void add_track(AnswerLines& lines, std::string_view name, const RegimeTrack& track) {
-  lines.add(name, track.names());
+void add_track(Answer& lines, std::string_view name, const RegimeTrack& track) {
+  lines.line(name, track.names());
   for (std::size_t i = 0; i < track.names().size(); ++i)
-    lines.add("total", i, track.total_s(i), track.longest_s(i));
+    lines.line("total", i, track.total_s(i), track.longest_s(i));
   for (const RegimeStretch& s : track.stretches())
-    lines.add(" ", since_origin_s(s.begin), since_origin_s(s.end), s.regime);
+    lines.line(" ", since_origin_s(s.begin), since_origin_s(s.end), s.regime);
 }
 
 /// Changes of the regime as it settles while the drive goes on.
-void add_settled(AnswerLines& lines, const test::Driven& driven) {
+void add_settled(Answer& lines, const test::Driven& driven) {
   RecentRegimes recent({});
   std::optional<HostTime> told_until;
   std::size_t next = 0;
@@ -40,7 +40,7 @@ void add_settled(AnswerLines& lines, const test::Driven& driven) {
     for (; next < driven.samples.size() && driven.samples[next].time < *recent.settled_until(); next += 10) {
       const auto now = recent.at(driven.samples[next].time);
       if (now != before)
-        lines.add("settled", since_origin_s(driven.samples[next].time), now ? double(*now) : -1.0);
+        lines.line("settled", since_origin_s(driven.samples[next].time), now ? double(*now) : -1.0);
       before = now;
     }
   };
@@ -49,24 +49,24 @@ void add_settled(AnswerLines& lines, const test::Driven& driven) {
     if (sample.speed_mps) recent.add_speed(sample.time, *sample.speed_mps, test::kDrivenSpeedSd_mps);
     if (recent.settled_until() == told_until) continue;
     told_until = recent.settled_until();
-    lines.add("until", since_origin_s(*told_until));
+    lines.line("until", since_origin_s(*told_until));
     tell();
   }
   recent.settle();
-  lines.add("until", since_origin_s(*recent.settled_until()));
+  lines.line("until", since_origin_s(*recent.settled_until()));
   tell();
 }
 
-void add_cells(AnswerLines& lines, const std::vector<MotionCell>& cells, std::size_t every) {
+void add_cells(Answer& lines, const std::vector<MotionCell>& cells, std::size_t every) {
   for (std::size_t i = 0; i < cells.size(); i += every) {
     const MotionCell& c = cells[i];
-    lines.add("cell", i, c.n, c.omega_radps, c.f_mps2, c.vibration_mps2, c.rate_rms_radps,
-              c.rate_scatter_radps, c.speed_mps.value_or(-1.0), c.speed_sd_mps);
+    lines.line("cell", i, c.n, c.omega_radps, c.f_mps2, c.vibration_mps2, c.rate_rms_radps,
+               c.rate_scatter_radps, c.speed_mps.value_or(-1.0), c.speed_sd_mps);
   }
 }
 
 TEST(RegimeAnswers, StoppingDrives) {
-  AnswerLines lines;
+  Answer lines;
   struct StoppingWorld {
     const char* name;
     test::StoppingDrive drive;
@@ -93,13 +93,13 @@ TEST(RegimeAnswers, StoppingDrives) {
                      .accel_density_mps2 = 5e-5,
                      .seed = 7}}};
   for (const StoppingWorld& world : worlds) {
-    lines.title(world.name);
+    lines.line(world.name);
     const test::Driven driven = test::driven(world.drive);
     const std::vector<MotionCell> cells = driven.levels.cells();
     const CellNoise noise = cell_noise(cells);
-    lines.add("noise", noise.omega_radps, noise.f_mps2);
+    lines.line("noise", noise.omega_radps, noise.f_mps2);
     for (const Standstill& stop : find_standstills(cells, {}, noise))
-      lines.add("stands", stop.first, stop.last);
+      lines.line("stands", stop.first, stop.last);
     const RegimeTrack motion = static_and_dynamic(driven.levels, {});
     add_track(lines, "motion", motion);
     const MotionLimits others{0.3, 0.5, 0.004, 0.009, 0.05, 0.3, 0.2, 0.5, 2.5, 0.5};
@@ -113,7 +113,7 @@ TEST(RegimeAnswers, StoppingDrives) {
 }
 
 TEST(RegimeAnswers, HolesAndSpeedsThatCome) {
-  AnswerLines lines;
+  Answer lines;
   MotionLevels levels;
   const auto at = [](double t) { return HostTime{} + from_seconds(kOrigin_s + t); };
   for (int k = 0; k < 9000; ++k) {
@@ -133,31 +133,31 @@ TEST(RegimeAnswers, HolesAndSpeedsThatCome) {
   add_track(lines, "motion", motion);
   add_track(lines, "speed", intensity_bins(levels, motion, Intensity::kSpeed, 2, 3.0));
   levels.forget_before(at(31.05));
-  lines.add("begins", since_origin_s(levels.begin_of(0)), levels.cells().size());
+  lines.line("begins", since_origin_s(levels.begin_of(0)), levels.cells().size());
   add_cells(lines, levels.cells(), 41);
   levels.forget_before(at(10.0));
-  lines.add("forgets no more", since_origin_s(levels.begin_of(0)), levels.cells().size());
+  lines.line("forgets no more", since_origin_s(levels.begin_of(0)), levels.cells().size());
   levels.forget_before(at(500.0));
-  lines.add("forgets all", levels.cells().size());
+  lines.line("forgets all", levels.cells().size());
   test::expect_recorded("estimation/regimes/holes.txt", lines.text());
 }
 
-void add_labels(AnswerLines& lines, std::string_view text) {
+void add_labels(Answer& lines, std::string_view text) {
   const Result<std::vector<Label>> labels = parse_labels(text, "l.csv");
   if (!labels) {
-    lines.add("error", labels.error().text());
+    lines.line("error", labels.error().text());
     return;
   }
-  lines.title("labels");
+  lines.line("labels");
   // UTC since 2026-03-14: of the whole number, nine digits are no second.
   for (const Label& label : *labels) {
     const double since_s = label.in_utc ? 1'773'446'400.0 : 0.0;
-    lines.add(" ", label.begin_s - since_s, label.end_s - since_s, label.name, label.in_utc);
+    lines.line(" ", label.begin_s - since_s, label.end_s - since_s, label.name, label.in_utc);
   }
 }
 
 TEST(RegimeAnswers, FilesOfLabels) {
-  AnswerLines lines;
+  Answer lines;
   const std::string in_seconds = "begin_s,end_s,regime\n";
   for (const char* rows :
        {"1,2,a", "-1e9,1e9,long", "-1.0000001e9,2,a", "1,1.0000001e9,a", "1,1,a", "2,1,a", "1,2,a\n2,3,b",

@@ -17,13 +17,13 @@
 #include "models/dynamics/regression.h"
 #include "models/dynamics/study.h"
 #include "models/noise/wavelet_variance.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
 namespace {
 
-using test::AnswerLines;
+using test::Answer;
 
 ErrorRow distinct_row() {
   ErrorRow row{};
@@ -36,30 +36,30 @@ ErrorRow distinct_row() {
 }
 
 TEST(DynamicsAnswers, CovariatesColumnsAndMeanings) {
-  AnswerLines lines;
+  Answer lines;
   const ErrorRow row = distinct_row();
-  lines.add("covariates", covariates(row));
+  lines.line("covariates", covariates(row));
   for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
     std::array<double, kAccelCalibrationColumns> columns{};
     columns.fill(99.0);
     calibration_columns(row, axis, columns);
-    lines.add("calibration", axis, calibration_column_count(axis), columns);
+    lines.line("calibration", axis, calibration_column_count(axis), columns);
     for (std::size_t k = 0; k < kCovariates; ++k)
-      lines.add(covariate_name(k), covariate_unit(k), is_calibration_column(axis, k),
-                describe_coefficient(axis, k, -0.0123));
+      lines.line(covariate_name(k), covariate_unit(k), is_calibration_column(axis, k),
+                 describe_coefficient(axis, k, -0.0123));
   }
   test::expect_recorded("models/dynamics/covariates.txt", lines.text());
 }
 
-void add_regression(AnswerLines& lines, std::string_view name, const std::optional<Regression>& r) {
+void add_regression(Answer& lines, std::string_view name, const std::optional<Regression>& r) {
   if (!r) {
-    lines.add(name, "none");
+    lines.line(name, "none");
     return;
   }
-  lines.add(name, r->n, r->r2, r->f, r->dof_model, r->dof_rest, r->p_value, r->residual_variance);
+  lines.line(name, r->n, r->r2, r->f, r->dof_model, r->dof_rest, r->p_value, r->residual_variance);
   for (const RegressionCoefficient& c : r->coefficients)
-    lines.add(" ", c.covariate, c.value, c.sd, c.ci_low, c.ci_high, c.dof, c.p_value);
-  for (const auto& [covariate, why] : r->left_out) lines.add(" left out", covariate, why);
+    lines.line(" ", c.covariate, c.value, c.sd, c.ci_low, c.ci_high, c.dof, c.p_value);
+  for (const auto& [covariate, why] : r->left_out) lines.line(" left out", covariate, why);
 }
 
 /// Rows of one column of ones, one nuisance, five covariates (one constant, one a sum of two others) and the answer.
@@ -77,13 +77,13 @@ RegressionSums few_sums(int n) {
 }
 
 TEST(DynamicsAnswers, Regression) {
-  AnswerLines lines;
+  Answer lines;
   for (const int n : {0, 1, 7, 40, 255, 256, 257, 600}) {
     const RegressionSums sums = few_sums(n);
-    lines.add("rows", n, sums.count());
-    lines.add("coefficients", sums.all_coefficients());
+    lines.line("rows", n, sums.count());
+    lines.line("coefficients", sums.all_coefficients());
     if (n < 7) continue;
-    lines.add("covariances", sums.all_covariances());
+    lines.line("covariances", sums.all_covariances());
     add_regression(lines, "at 0.95", sums.solve());
     add_regression(lines, "at 0.5", sums.solve(0.5));
   }
@@ -94,7 +94,7 @@ TEST(DynamicsAnswers, Regression) {
 }
 
 TEST(DynamicsAnswers, ColumnWaveletsAndTheUncertaintyOfTheNoise) {
-  AnswerLines lines;
+  Answer lines;
   ColumnWavelets wavelets(3);
   std::vector<double> errors;
   std::mt19937 random(2);
@@ -109,7 +109,7 @@ TEST(DynamicsAnswers, ColumnWaveletsAndTheUncertaintyOfTheNoise) {
     wavelets.add(std::array<double, 3>{1.0, std::sin(0.02 * i) + 0.001 * i, std::cos(0.11 * i)});
   }
   const std::vector<ColumnLevel> levels = wavelets.levels();
-  for (const ColumnLevel& level : levels) lines.add("level", level.level, level.products);
+  for (const ColumnLevel& level : levels) lines.line("level", level.level, level.products);
 
   const noise::WaveletVariance wv = noise::haar_wavelet_variance(errors).value();
   noise::FitResult fit;
@@ -121,9 +121,9 @@ TEST(DynamicsAnswers, ColumnWaveletsAndTheUncertaintyOfTheNoise) {
   phi << 2.0, 0.1, -0.2, 0.1, 0.5, 0.3, -0.2, 0.3, 1.4;
   for (const Eigen::Vector3d& a :
        {Eigen::Vector3d(1.0, 0.0, 0.0), Eigen::Vector3d(0.0, 1.0, 0.0), Eigen::Vector3d(0.3, -2.0, 1.0)})
-    lines.add("relative variance", noise.relative_variance(phi, a));
-  lines.add("of two columns",
-            noise.of({2, 0}).relative_variance(Eigen::Matrix2d::Identity(), Eigen::Vector2d(1.0, 2.0)));
+    lines.line("relative variance", noise.relative_variance(phi, a));
+  lines.line("of two columns",
+             noise.of({2, 0}).relative_variance(Eigen::Matrix2d::Identity(), Eigen::Vector2d(1.0, 2.0)));
   test::expect_recorded("models/dynamics/uncertainty.txt", lines.text());
 }
 
@@ -178,19 +178,19 @@ GivenRows winding_rows() {
 TEST(DynamicsAnswers, WholeStudy) {
   GivenRows rows = winding_rows();
   const auto result = study_dynamics(rows, {50.0, *noise::parse_model("WN+GM"), 0.9});
-  AnswerLines ordinary;
-  AnswerLines generalised;
+  Answer ordinary;
+  Answer generalised;
   for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
     const AxisDynamics& a = result[axis];
-    ordinary.add("axis", axis);
+    ordinary.line("axis", axis);
     add_regression(ordinary, "ols", a.ols);
     add_regression(ordinary, "ols projected", a.ols_projected);
-    generalised.add("axis", axis, a.no_gls_because);
+    generalised.line("axis", axis, a.no_gls_because);
     add_regression(generalised, "gls", a.gls);
     add_regression(generalised, "gls projected", a.gls_projected);
     if (!a.residual_noise) continue;
     for (const noise::ParameterEstimate& p : a.residual_noise->parameters)
-      generalised.add(p.process + " " + p.name + " " + p.unit, p.value);
+      generalised.line(p.process + " " + p.name + " " + p.unit, p.value);
   }
   test::expect_recorded("models/dynamics/ordinary.txt", ordinary.text(), 1e-6, 1e-9);
   // The noise's fit ends where a step no longer changes it.

@@ -9,14 +9,14 @@
 #include "base/units.h"
 #include "estimation/navigation/so3.h"
 #include "study/evaluation/outages.h"
-#include "tests/support/answer_lines.h"
+#include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 
 namespace imuscope {
 namespace {
 
 using Eigen::Vector3d;
-using test::AnswerLines;
+using test::Answer;
 
 HostTime instant(double t_s) { return HostTime{from_seconds(t_s)}; }
 
@@ -54,17 +54,17 @@ InertialRates winding(double t_s) {
           {1.2 * std::sin(0.4 * t_s), 2.0 * std::sin(0.3 * t_s), -9.8 + 0.5 * std::cos(1.3 * t_s)}};
 }
 
-void add_filter(AnswerLines& lines, std::string_view name, CoastingFilter& filter) {
-  lines.add(name, 1e6 * (filter.state().position.latitude_rad - 0.81),
-            1e6 * (filter.state().position.longitude_rad - 0.115), filter.state().position.height_m,
-            filter.state().v_n_mps);
-  lines.add(" attitude", filter.state().C_b_n);
-  lines.add(" biases", filter.state().gyro_bias_b_radps, filter.state().accel_bias_b_mps2);
-  lines.add(" covariance", filter.covariance());
+void add_filter(Answer& lines, std::string_view name, CoastingFilter& filter) {
+  lines.line(name, 1e6 * (filter.state().position.latitude_rad - 0.81),
+             1e6 * (filter.state().position.longitude_rad - 0.115), filter.state().position.height_m,
+             filter.state().v_n_mps);
+  lines.line(" attitude", filter.state().C_b_n);
+  lines.line(" biases", filter.state().gyro_bias_b_radps, filter.state().accel_bias_b_mps2);
+  lines.line(" covariance", filter.covariance());
 }
 
 TEST(EvaluationAnswers, CoastingFilter) {
-  AnswerLines lines;
+  Answer lines;
   const CoastingModel model = uneven_model();
   KinematicVector sd;
   sd << 0.5, 0.6, 0.7, 0.1, 0.2, 0.3, 0.01, 0.02, 0.03;
@@ -83,21 +83,21 @@ TEST(EvaluationAnswers, CoastingFilter) {
   const auto antenna = [&](const Vector3d& off_n_m) {
     return displaced(filter.state().position, filter.state().C_b_n * arm + off_n_m);
   };
-  lines.add("position",
-            filter.update_position(instant(t_s), antenna({0.1, -0.2, 0.3}), {0.05, 0.06, 0.1}, arm));
+  lines.line("position",
+             filter.update_position(instant(t_s), antenna({0.1, -0.2, 0.3}), {0.05, 0.06, 0.1}, arm));
   add_filter(lines, "corrected", filter);
   drive(12, 0.03);
-  lines.add("velocity",
-            filter.update_velocity(instant(t_s), filter.state().v_n_mps + Vector3d(0.05, -0.02, 0.03),
-                                   {0.03, 0.04, 0.05}, winding(t_s), arm));
+  lines.line("velocity",
+             filter.update_velocity(instant(t_s), filter.state().v_n_mps + Vector3d(0.05, -0.02, 0.03),
+                                    {0.03, 0.04, 0.05}, winding(t_s), arm));
   add_filter(lines, "corrected", filter);
-  lines.add("refused",
-            filter.update_position(instant(t_s), antenna({30.0, 0.0, 0.0}), {0.05, 0.06, 0.1}, arm),
-            filter.update_velocity(instant(t_s), {40.0, 0.0, 0.0}, {0.03, 0.04, 0.05}, winding(t_s), arm));
+  lines.line("refused",
+             filter.update_position(instant(t_s), antenna({30.0, 0.0, 0.0}), {0.05, 0.06, 0.1}, arm),
+             filter.update_velocity(instant(t_s), {40.0, 0.0, 0.0}, {0.03, 0.04, 0.05}, winding(t_s), arm));
   for (int i = 0; i < 14; ++i) {
     drive(10, 0.1);
-    lines.add("insists", i,
-              filter.update_position(instant(t_s), antenna({40.0, 20.0, 0.0}), {0.05, 0.06, 0.1}, arm));
+    lines.line("insists", i,
+               filter.update_position(instant(t_s), antenna({40.0, 20.0, 0.0}), {0.05, 0.06, 0.1}, arm));
   }
   add_filter(lines, "taken at last", filter);
   drive(300, 0.1);
@@ -146,24 +146,24 @@ Drive holed_drive() {
 }
 
 TEST(EvaluationAnswers, OutagesOfADriveWithHoles) {
-  AnswerLines lines;
+  Answer lines;
   const Drive drive = holed_drive();
   std::vector<double> progress;
   OutageOptions options{{2.0, 5.0, 12.0}, 6.0, 15.0, [&](double share) { progress.push_back(share); }};
   const std::vector<OutageResult> results = play_outages(drive, uneven_model(), options);
-  lines.add("outages", results.size());
+  lines.line("outages", results.size());
   for (std::size_t i = 0; i < results.size(); ++i) {
     const OutageResult& r = results[i];
-    lines.add("outage", r.start_s, r.duration_s, r.error, r.covariance.diagonal(), r.reference_sd[4]);
-    if (i % 9 == 0) lines.add(" covariance", r.covariance);
+    lines.line("outage", r.start_s, r.duration_s, r.error, r.covariance.diagonal(), r.reference_sd[4]);
+    if (i % 9 == 0) lines.line(" covariance", r.covariance);
   }
-  lines.add("progress", progress);
+  lines.line("progress", progress);
   for (const Consistency& c : consistency_of(results, {2.0, 3.0, 5.0, 12.0})) {
-    lines.add("after", c.duration_s, c.n, c.n_independent);
-    lines.add(" rms", c.horizontal_rms_m, c.vertical_rms_m, c.velocity_rms_mps, c.attitude_rms_rad);
-    lines.add(" sd", c.horizontal_sd_m, c.vertical_sd_m, c.velocity_sd_mps, c.attitude_sd_rad);
-    lines.add(" nees", c.nees_position, c.nees_velocity, c.nees_attitude, c.nees_low, c.nees_high,
-              c.surprise);
+    lines.line("after", c.duration_s, c.n, c.n_independent);
+    lines.line(" rms", c.horizontal_rms_m, c.vertical_rms_m, c.velocity_rms_mps, c.attitude_rms_rad);
+    lines.line(" sd", c.horizontal_sd_m, c.vertical_sd_m, c.velocity_sd_mps, c.attitude_sd_rad);
+    lines.line(" nees", c.nees_position, c.nees_velocity, c.nees_attitude, c.nees_low, c.nees_high,
+               c.surprise);
   }
   test::expect_recorded("study/evaluation/outages.txt", lines.text(), 1e-6, 1e-10);
 }
