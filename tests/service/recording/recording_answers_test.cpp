@@ -323,9 +323,13 @@ TEST(RecordingWhole, LogsOfMessagesByTheirFirstBytes) {
     for (const auto& topic : *topics) answer.line(topic.name, topic.type, topic.messages, topic.rate_hz);
     auto reader = open_message_log(log, Protocol::kMcap);
     ASSERT_TRUE(reader);
-    answer.line("read", (*reader)->bytes_read() <= (*reader)->bytes_total(), (*reader)->bytes_total());
+    // Whole files, of which the size depends on who packed their chunks.
+    const auto size_of_one = std::filesystem::file_size(folder / "whole.mcap");
+    const auto size = (*reader)->bytes_total();
+    answer.line("files", size / size_of_one, "rest", size % size_of_one, (*reader)->bytes_read() <= size);
     while ((*reader)->next()) continue;
-    answer.line("read", (*reader)->bytes_read(), "losses", (*reader)->losses().size());
+    answer.line("read beyond a quarter", (*reader)->bytes_read() > size / 4, "losses",
+                (*reader)->losses().size());
   };
   tell_topics(folder / "whole.mcap");
   tell_topics(folder);
