@@ -20,8 +20,8 @@ const std::string kImuHeader =
     "t_s,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2,n\n";
 
 std::string whole_text(RowDecoder& decoder, const std::string& file, std::size_t read_size = 200) {
-  return test::decoded_text(decoder, bytes_of(file), read_size, kWholeBegin, 20ms) +
-         describe(decoder.error()) + '\n';
+  const std::string decoded = test::decoded_text(decoder, bytes_of(file), read_size, kWholeBegin, 20ms);
+  return decoded + describe(decoder.error()) + '\n';
 }
 
 std::string imu_row(double time_s, const std::string& rest = "0.1,-0.2,0.3,1.5,-2.5,9.75",
