@@ -10,7 +10,7 @@ namespace imuscope::csv {
 namespace {
 
 std::filesystem::path file_with(std::string_view text) {
-  const auto file = test::scratch_folder() / "imu.csv";
+  auto file = test::scratch_folder() / "imu.csv";
   std::ofstream(file, std::ios::binary) << text;
   return file;
 }

@@ -140,7 +140,9 @@ TEST(CsvWhole, HeadersOfEveryKind) {
         std::string("gyro_z_radps,t_s,gyro_x_radps,gyro_y_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2,n"),
         many + ",gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2"}) {
     ImuDecoder decoder({});
-    text += whole_text(decoder, header + '\n' + rows, 100'000);
+    std::string file = header;
+    file.append("\n").append(rows);
+    text += whole_text(decoder, file, 100'000);
     for (std::size_t column = 0; column < 9; ++column) text += decoder.reader().is_wanted(column) ? "w" : ".";
     text += '\n' + std::to_string(decoder.reader().line()) + '\n';
   }

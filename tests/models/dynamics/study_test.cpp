@@ -8,26 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "given_rows.h"
 #include "models/dynamics/covariates.h"
 #include "models/dynamics/json.h"
 
 namespace imuscope {
 namespace {
-
-class Rows final : public ErrorRowSource {
- public:
-  explicit Rows(std::vector<ErrorRow> rows) : rows_(std::move(rows)) {}
-  void rewind() override { at_ = 0; }
-  bool next(ErrorRow& row) override {
-    if (at_ == rows_.size()) return false;
-    row = rows_[at_++];
-    return true;
-  }
-
- private:
-  std::vector<ErrorRow> rows_;
-  std::size_t at_ = 0;
-};
 
 /// A drive of band-limited motion; the error of every axis is white noise and a slow Gauss-Markov process.
 struct Drive {
@@ -75,7 +61,7 @@ TEST(StudyDynamics, FindsAPlantedGSensitivityAndLeavesOtherAxesAlone) {
   Drive drive(1);
   constexpr double kPlanted = 0.5;
   for (auto& row : drive.rows) row.e_gyro_radps[0] += kPlanted * row.predicted_f_s_mps2[1];
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   const auto result = study_dynamics(rows, options());
   const auto* const c = find(result[0].gls_projected, 10);
   ASSERT_NE(c, nullptr);
@@ -91,7 +77,7 @@ TEST(StudyDynamics, ProjectionTakesCalibrationErrorsAway) {
   for (auto& row : drive.rows) {
     row.e_gyro_radps[0] += 0.8 * row.predicted_omega_s_radps[0] - 0.6 * row.omega_dot_s_radps2[0];
   }
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   const auto result = study_dynamics(rows, options());
   EXPECT_LT(result[0].gls->p_value, 1e-6);
   EXPECT_GT(result[0].gls_projected->p_value, 1e-3);
@@ -111,7 +97,7 @@ TEST(StudyDynamics, GapsAndClippedSamplesAreLeftOut) {
     }
     rows.push_back(row);
   }
-  Rows source(rows);
+  test::GivenRows source(rows);
   const auto result = study_dynamics(source, options());
   ASSERT_TRUE(result[0].gls);
   EXPECT_EQ(result[0].ols->n, rows.size() - 1);
@@ -127,7 +113,7 @@ TEST(StudyDynamics, StandstillGivesNoRegressionAndNothingIsInvented) {
     row.predicted_omega_s_radps = row.omega_dot_s_radps2 = row.omega_ddot_s_radps3 = row.f_dot_s_mps3 = {};
     row.predicted_f_s_mps2 = {0.0, 0.0, -9.8};
   }
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   const auto result = study_dynamics(rows, options());
   for (const auto& axis : result) {
     EXPECT_FALSE(axis.ols);
@@ -153,7 +139,7 @@ TEST(StudyDynamics, ConstantAndCollinearCovariatesAreLeftOutAndTheOthersKeepThei
   Drive drive = on_rails(6);
   constexpr double kPlanted = 0.5;
   for (auto& row : drive.rows) row.e_gyro_radps[0] += kPlanted * row.predicted_f_s_mps2[2];
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   const auto result = study_dynamics(rows, options());
   using Entry = std::pair<std::size_t, LeftOut>;
   const std::vector<Entry> expected{{0, LeftOut::kConstant},
@@ -184,7 +170,7 @@ TEST(StudyDynamics, DegreesOfFreedomAreThoseOfTheNoiseAtTheScalesOfTheCovariate)
   Drive drive(7);
   double fast = 0.0;
   for (auto& row : drive.rows) row.omega_ddot_s_radps3[0] = fast = drive.normal(drive.generator);
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   const auto result = study_dynamics(rows, options());
   const auto& gls = *result[0].gls;
   const auto* slow_covariate = find(result[0].gls, 0);
@@ -200,7 +186,7 @@ TEST(StudyDynamics, DegreesOfFreedomAreThoseOfTheNoiseAtTheScalesOfTheCovariate)
 
 TEST(StudyDynamics, JsonHasTheFieldsOfTheInterface) {
   Drive drive(5);
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   nlohmann::json json = nlohmann::json::array();
   append_regressions("mtx1", study_dynamics(rows, options()), json);
   ASSERT_EQ(json.size(), 4 * kErrorAxes);
@@ -229,7 +215,7 @@ TEST(StudyDynamics, AnImuWithoutAccelerometersIsStudiedAsFarAsItGoesAndTheRestSa
     row.accel_valid = false;
     row.e_accel_mps2 = {std::nan(""), std::nan(""), std::nan("")};
   }
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   const auto result = study_dynamics(rows, options());
   for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
     const auto& a = result[axis];
@@ -246,7 +232,7 @@ TEST(StudyDynamics, AnImuWithoutAccelerometersIsStudiedAsFarAsItGoesAndTheRestSa
 
 TEST(StudyDynamics, ADriveTooShortForANoiseModelKeepsItsLeastSquaresAndSaysWhyThereIsNoMore) {
   const Drive drive(9, 30);
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   auto demanding = options();
   demanding.noise_model = *noise::parse_model("WN+GM+GM+RW");
   const auto result = study_dynamics(rows, demanding);
@@ -260,7 +246,7 @@ TEST(StudyDynamics, ADriveTooShortForANoiseModelKeepsItsLeastSquaresAndSaysWhyTh
 }
 
 TEST(StudyDynamics, WithoutAnyRowNothingIsSaidButWhy) {
-  Rows rows({});
+  test::GivenRows rows({});
   for (const auto& axis : study_dynamics(rows, options())) {
     EXPECT_FALSE(axis.ols || axis.ols_projected || axis.gls || axis.gls_projected || axis.residual_noise);
     EXPECT_FALSE(axis.no_gls_because.empty());
@@ -274,8 +260,8 @@ TEST(StudyDynamics, ARowThatComesTwiceCountsOnce) {
     doubled.push_back(row);
     if (row.counter % 3 == 0) doubled.push_back(row);
   }
-  Rows once(drive.rows);
-  Rows twice(doubled);
+  test::GivenRows once(drive.rows);
+  test::GivenRows twice(doubled);
   const auto expected = study_dynamics(once, options());
   const auto result = study_dynamics(twice, options());
   for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
@@ -293,7 +279,7 @@ TEST(StudyDynamics, AHoleOfYearsCostsNoMoreThanOneAfterWhichNothingIsKnownOfTheN
   const auto with_hole = [&](std::int64_t missing) {
     auto rows = drive.rows;
     for (std::size_t i = rows.size() / 2; i < rows.size(); ++i) rows[i].counter += missing;
-    Rows source(rows);
+    test::GivenRows source(rows);
     return study_dynamics(source, options());
   };
   const auto minutes = with_hole(60'000);
@@ -312,7 +298,7 @@ TEST(StudyDynamics, AnErrorThatIsExplainedWholeOrNotThereGivesNumbersOrNothing) 
     row.e_gyro_radps = {0.0, 0.25 * row.predicted_f_s_mps2[0], 7.0};
     row.e_accel_mps2 = {};
   }
-  Rows rows(drive.rows);
+  test::GivenRows rows(drive.rows);
   const auto result = study_dynamics(rows, options());
   EXPECT_FALSE(result[0].ols) << "nothing is left to compare with";
   EXPECT_FALSE(result[0].gls);

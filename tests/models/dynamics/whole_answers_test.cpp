@@ -24,6 +24,7 @@ namespace imuscope {
 namespace {
 
 using test::Answer;
+using test::GivenRows;
 
 ErrorRow distinct_row() {
   ErrorRow row{};
@@ -126,21 +127,6 @@ TEST(DynamicsAnswers, ColumnWaveletsAndTheUncertaintyOfTheNoise) {
              noise.of({2, 0}).relative_variance(Eigen::Matrix2d::Identity(), Eigen::Vector2d(1.0, 2.0)));
   test::expect_recorded("models/dynamics/uncertainty.txt", lines.text());
 }
-
-class GivenRows final : public ErrorRowSource {
- public:
-  explicit GivenRows(std::vector<ErrorRow> rows) : rows_(std::move(rows)) {}
-  void rewind() override { at_ = 0; }
-  bool next(ErrorRow& row) override {
-    if (at_ == rows_.size()) return false;
-    row = rows_[at_++];
-    return true;
-  }
-
- private:
-  std::vector<ErrorRow> rows_;
-  std::size_t at_ = 0;
-};
 
 /// Motion in closed form, errors that depend on it, gaps, doubled rows and rows without one of the triads.
 GivenRows winding_rows() {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/units.h"
+#include "fitted_axis.h"
 #include "service/pipeline/motion_book.h"
 #include "service/pipeline/noise_feedback.h"
 #include "service/pipeline/noise_series.h"
@@ -175,29 +176,6 @@ TEST(PipelineWhole, WhatIsSaidOfAMountingWhileItIsLearned) {
   test::expect_recorded("service/pipeline/observability_told.txt", answer.text());
 }
 
-AxisRefit fitted(std::size_t axis, Regime regime, double white_sd, double fast_sd, double slow_sd,
-                 double slow_tau_s) {
-  using noise::ProcessKind;
-  constexpr double kRate_hz = 100.0;
-  noise::FitResult fit;
-  fit.rate_hz = kRate_hz;
-  const auto add = [&](ProcessKind kind, double sd, double tau_s) {
-    fit.spec.processes.push_back(kind);
-    fit.model.components.push_back({kind, sd * sd, {1.0 / (tau_s * kRate_hz)}});
-    if (kind == ProcessKind::kGaussMarkov)
-      fit.parameters.push_back({"GM", "beta", "", 1.0 / tau_s, {}, {}, {}, {}});
-    fit.parameters.push_back({"", "sigma2", "", sd * sd, {}, {}, {}, {}});
-  };
-  add(ProcessKind::kWhiteNoise, white_sd, 1.0);
-  add(ProcessKind::kGaussMarkov, fast_sd, 0.05);
-  add(ProcessKind::kGaussMarkov, slow_sd, slow_tau_s);
-  AxisRefit refit;
-  refit.axis = axis;
-  refit.regime = regime;
-  refit.fit = std::move(fit);
-  return refit;
-}
-
 TEST(PipelineWhole, ModelsThatGoBackToTheFilter) {
   const test::LcmText reader;
   const SImuNoise configured = mtx_class_noise();
@@ -213,8 +191,9 @@ TEST(PipelineWhole, ModelsThatGoBackToTheFilter) {
         const auto r = static_cast<std::size_t>(regime);
         const double white = (axis < 3 ? configured.gyro : configured.accel)[r].white_sd[axis % 3];
         const GaussMarkovConfig& bias = (axis < 3 ? configured.gyro_bias : configured.accel_bias)[axis % 3];
-        refit.axes.push_back(fitted(axis, regime, share * more * white, 0.5 * share * white,
-                                    bias_share * more * bias.sd, tau_share * more * bias.time_constant_s));
+        refit.axes.push_back(test::refit_of(axis, regime, share * more * white, 0.5 * share * white, 0.05,
+                                            bias_share * more * bias.sd,
+                                            tau_share * more * bias.time_constant_s));
       }
     }
     const auto given = feedback.consider(refit);
