@@ -47,7 +47,7 @@ class Answer {
     } else if constexpr (requires { value.has_value(); }) {
       value ? add(*value) : word("none");
     } else if constexpr (requires { value.eval().cols(); }) {
-      const auto matrix = value.eval();
+      const auto& matrix = value.eval();
       for (auto c = 0 * matrix.cols(); c < matrix.cols(); ++c) {
         for (auto r = 0 * matrix.rows(); r < matrix.rows(); ++r) add(matrix(r, c));
       }

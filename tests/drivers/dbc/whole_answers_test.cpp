@@ -90,7 +90,7 @@ TEST(DbcWhole, SentencesAboutBrokenFiles) {
                                   std::string("BO_ 1 M: 64 E"),
                                   std::string("BO_ 1 M: 65 E"),
                                   message + message,
-                                  message + signal + signal,
+                                  std::string(message).append(signal).append(signal),
                                   message + " SG_ S X : 0|8@1+ (1,0) [0|0] \"\" N",
                                   message + " SG_ S m : 0|8@1+ (1,0) [0|0] \"\" N",
                                   message + " SG_ S mX : 0|8@1+ (1,0) [0|0] \"\" N",

@@ -270,8 +270,8 @@ TEST(RtklibWhole, LinesOfEveryLength) {
     for (const char* end : {"\n", ""}) {
       const std::string line = '%' + std::string(size - 1, 'x') + end;
       text += std::to_string(size) + ' ' + whole_outcome(bytes_of(line)) + " | " +
-              whole_outcome(bytes_of(good + line + good)) + " | " +
-              whole_outcome(bytes_of(line + "\n \t\r\n\n" + good)) + '\n';
+              whole_outcome(bytes_of(std::string(good).append(line).append(good))) + " | " +
+              whole_outcome(bytes_of(std::string(line).append("\n \t\r\n\n").append(good))) + '\n';
     }
   }
   text += whole_outcome(bytes_of(good.substr(0, good.size() - 1))) + '\n';

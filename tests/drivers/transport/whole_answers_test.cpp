@@ -143,14 +143,15 @@ TEST(TransportWhole, FilesOfCandump) {
   const std::string good = "(1.0) can0 0AA#01\n";
   std::string junk;
   for (int i = 0; i < 99; ++i) junk += "junk\n";
+  const auto after = [&](std::string before) { return before.append(good); };
+  const auto after_line_of = [&](std::size_t length) { return after(std::string(length, 'x').append("\n")); };
   for (const std::string& content :
        {std::string(), good,
-        good + "junk\n\nmore junk\n" + good +
-            "DROPCOUNT (total drops 5)\nDROPCOUNT (total drops 3)\n(2.0) can0 0AA#01",
-        std::string("junk\n"), std::string("\n\n"), junk + good, junk + "junk\n" + good,
-        std::string(510, 'x') + '\n' + good, std::string(511, 'x') + '\n' + good,
-        std::string(512, 'x') + '\n' + good, std::string(600, 'x') + '\n' + good,
-        good + std::string(600, 'x') + '\n' + good, std::string("(1.0) can0 0AA#01")}) {
+        after(good + "junk\n\nmore junk\n")
+            .append("DROPCOUNT (total drops 5)\nDROPCOUNT (total drops 3)\n(2.0) can0 0AA#01"),
+        std::string("junk\n"), std::string("\n\n"), after(junk), after(junk + "junk\n"), after_line_of(510),
+        after_line_of(511), after_line_of(512), after_line_of(600), good + after_line_of(600),
+        std::string("(1.0) can0 0AA#01")}) {
     std::ofstream(file, std::ios::binary) << content;
     auto log = CandumpLog::open(file);
     text += fmt::format("{} looks {}: ", content.size(), CandumpLog::looks_like_one(file));

@@ -20,7 +20,7 @@ class SineSum {
     int count;
   };
 
-  SineSum(unsigned seed, Eigen::Vector3d mean, std::initializer_list<Band> bands) : mean_(mean) {
+  SineSum(unsigned seed, const Eigen::Vector3d& mean, std::initializer_list<Band> bands) : mean_(mean) {
     std::mt19937 random(seed);
     for (const Band& band : bands) {
       for (int i = 0; i < band.count; ++i) {
