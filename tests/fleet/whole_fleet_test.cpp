@@ -18,6 +18,7 @@
 #include "made_campaign.h"
 #include "tests/results/report/synthetic_run.h"
 #include "tests/support/file_content.h"
+#include "tests/support/markup.h"
 #include "tests/support/recorded_answer.h"
 #include "tests/support/shared_data.h"
 
@@ -29,13 +30,6 @@ namespace fs = std::filesystem;
 
 /// Between -1 and 1, the same wherever it is asked for.
 double chance(int a, int b = 0, int c = 0) { return std::sin(12.9898 * a + 78.233 * b + 37.719 * c + 0.5); }
-
-/// Markup with a line for each element, without what is inside <style> and <script>.
-std::string markup_of(const std::string& page) {
-  std::string text = std::regex_replace(page, std::regex("<(style|script)([^>]*)>[^<]*</"), "<$1$2></");
-  text = std::regex_replace(text, std::regex("sha256-[^']*"), "HASH");
-  return std::regex_replace(text, std::regex("><"), ">\n<") + '\n';
-}
 
 constexpr int kUnitsMade = 5;
 constexpr int kDrivesMade = 5;
@@ -218,7 +212,8 @@ TEST_F(WholeFleet, ThePageShowsTheCatalogue) {
   const auto page = fleet::write_fleet_page(fleet_.out, "the fleet");
   ASSERT_TRUE(page) << page.error().text();
   const std::string html = content_of(*page);
-  expect_recorded("fleet/page.txt", markup_of(html), 1e-3);
+  const std::string markup = std::regex_replace(lines_of_markup(html), std::regex("sha256-[^']*"), "HASH");
+  expect_recorded("fleet/page.txt", markup, 1e-3);
   const std::size_t begin = html.find('{', html.find("application/json"));
   const json data = json::parse(html.substr(begin, html.find("</script>", begin) - begin));
   expect_recorded("fleet/page_data.txt", data.dump(1), 1e-4);
@@ -248,7 +243,7 @@ TEST(WholeUnit, HoldsTheMeansOfItsDrives) {
 TEST(FleetPictures, DrawTheMapToItsScale) {
   std::string text;
   const auto draw = [&](const std::string& title, const std::vector<fleet::MapTrack>& tracks) {
-    text += title + '\n' + markup_of(fleet::map_of(tracks).str());
+    text += title + "\n" + lines_of_markup(fleet::map_of(tracks).str()) + "\n";
   };
   draw("nothing", {});
   draw("no points", {{"wrong", {}}});
@@ -277,7 +272,8 @@ TEST(FleetPictures, DrawDistributionsAsDotsOrBars) {
   std::string text;
   const auto draw = [&](const std::string& title, bool is_log, const std::vector<fleet::AxisValues>& axes,
                         std::optional<double> sheet) {
-    text += title + '\n' + markup_of(fleet::distribution_of("words <of> it", is_log, axes, sheet).str());
+    text += title + "\n" +
+            lines_of_markup(fleet::distribution_of("words <of> it", is_log, axes, sheet).str()) + "\n";
   };
   const auto values = [](std::size_t n, double scale) {
     std::vector<double> all;

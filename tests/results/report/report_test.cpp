@@ -9,6 +9,7 @@
 #include "results/report/page_parts.h"
 #include "tests/results/report/synthetic_run.h"
 #include "tests/support/file_content.h"
+#include "tests/support/markup.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {
@@ -35,30 +36,6 @@ std::string page_of(const test::SyntheticRun& options) {
   const auto folder = test::scratch_folder();
   test::write_synthetic_run(folder, options);
   return page_of(folder);
-}
-
-/// The page without comments and without what is inside <script> and <style>.
-std::string markup_of(const std::string& page) {
-  std::string markup;
-  std::size_t begin = 0;
-  const auto skip = [&](std::size_t from, const char* end_mark) {
-    const std::size_t end = page.find(end_mark, from);
-    EXPECT_NE(end, std::string::npos) << "unclosed before " << end_mark;
-    return end;
-  };
-  while (begin < page.size()) {
-    if (page.compare(begin, 4, "<!--") == 0) {
-      begin = skip(begin, "-->") + 3;
-    } else if (page.compare(begin, 7, "<script") == 0 || page.compare(begin, 6, "<style") == 0) {
-      const bool script = page[begin + 2] == 'c';
-      const std::size_t open_end = skip(begin, ">") + 1;
-      markup += page.substr(begin, open_end - begin);
-      begin = skip(open_end, script ? "</script>" : "</style>");
-    } else {
-      markup += page[begin++];
-    }
-  }
-  return markup;
 }
 
 /// Names of elements left open or closed out of order; empty for well-formed markup.
@@ -96,7 +73,7 @@ TEST(Report, PageIsWellFormedAndHoldsEverySImu) {
   test::SyntheticRun options;
   options.names = {"mtx1", "mtx2", "left_rear"};
   const std::string page = page_of(options);
-  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  EXPECT_EQ(nesting_fault(test::markup_of(page)), "");
   for (const std::string& name : options.names) {
     EXPECT_TRUE(holds(page, "<h3>" + name + "</h3>"));
     for (const char* figure : {"psi-x-", "r-z-", "error-gyro_x-", "error-accel_z-", "wavelet-gyro_z-"}) {
@@ -112,7 +89,7 @@ TEST(Report, EveryFigureThatThePageNamesIsInTheSheetOnce) {
   std::multiset<std::string> drawn;
   for (const auto& figure : figures) drawn.insert(figure.at("id").get<std::string>());
   static const std::regex kPlace("data-figure=\"([^\"]*)\"");
-  const std::string markup = markup_of(page);
+  const std::string markup = test::markup_of(page);
   std::size_t n_places = 0;
   for (std::sregex_iterator place(markup.begin(), markup.end(), kPlace), end; place != end;
        ++place, ++n_places) {
@@ -126,7 +103,7 @@ TEST(Report, EveryFigureThatThePageNamesIsInTheSheetOnce) {
 
 TEST(Report, ThePageLoadsNothing) {
   const std::string page = page_of(test::SyntheticRun{});
-  const std::string markup = markup_of(page);
+  const std::string markup = test::markup_of(page);
   EXPECT_FALSE(std::regex_search(markup, std::regex("\\s(src|action|data|poster|srcset)\\s*=")));
   EXPECT_FALSE(std::regex_search(markup, std::regex("\\shref\\s*=\\s*\"[^#]")))
       << "links lead within the page only";
@@ -158,7 +135,7 @@ TEST(Report, TextsWithMarkupAreTextInThePageAndInItsScripts) {
   EXPECT_FALSE(holds(page, "<img"));
   EXPECT_FALSE(holds(page, "<!--<script>"));
   EXPECT_TRUE(holds(page, "&lt;img onerror=alert(1)&gt;&amp;&quot;&#39;"));
-  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  EXPECT_EQ(nesting_fault(test::markup_of(page)), "");
   const auto figures = figures_of(page);
   ASSERT_FALSE(figures.is_discarded());
   EXPECT_THAT(figures.dump(), HasSubstr("<img onerror=alert(1)>"));
@@ -210,7 +187,7 @@ TEST(Report, WheelsOfADriveWithOdometryAreDrawnAndSummedUp) {
   const std::string page = page_of(folder);
   EXPECT_TRUE(holds(page, "+1.20 % (sd 0.05 %)"));
   EXPECT_TRUE(holds(page, "They stood for 20 s; for 15 s of it"));
-  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  EXPECT_EQ(nesting_fault(test::markup_of(page)), "");
   int found = 0;
   for (const auto& figure : figures_of(page)) {
     if (figure["id"] != "wheel_speed" && figure["id"] != "wheel_scale") continue;
@@ -232,7 +209,7 @@ TEST(Report, ALiveRunHasABudgetOfTimeForEachDevice) {
   const std::string page = page_of(folder);
   for (const char* cell : {"3.733", "16", "9.80", "21", "-4.800", "–"})
     EXPECT_TRUE(holds(page, std::string("\">") + cell + "</td>")) << cell;
-  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  EXPECT_EQ(nesting_fault(test::markup_of(page)), "");
 }
 
 TEST(Report, AGapInTheErrorsIsAGapInTheFigure) {
@@ -295,7 +272,7 @@ TEST(Report, ACalibrationAloneMakesAReportThatNamesWhatIsAbsent) {
     if (entry.path().filename() != "calibration.json") std::filesystem::remove(entry.path());
   }
   const std::string page = page_of(folder);
-  EXPECT_EQ(nesting_fault(markup_of(page)), "");
+  EXPECT_EQ(nesting_fault(test::markup_of(page)), "");
   for (const char* file : {"run.json", "navigation.csv", "calibration_mtx1.csv", "errors_mtx2.csv",
                            "scatter_mtx1.csv", "models.json", "regression.json", "truth.json"}) {
     EXPECT_TRUE(holds(page, "<li>" + std::string(file) + "</li>"));
@@ -356,7 +333,7 @@ TEST(Report, CsvFilesWithAHeaderAloneLeaveTheirFiguresOut) {
   const std::string page = page_of(folder);
   EXPECT_FALSE(holds(page, "data-figure=\"map\""));
   EXPECT_TRUE(holds(page, "No errors_mtx1.csv with samples"));
-  EXPECT_FALSE(holds(markup_of(page), "nan"));
+  EXPECT_FALSE(holds(test::markup_of(page), "nan"));
 }
 
 TEST(Report, UnknownNumbersAreNotDrawnNorCalculatedWith) {

@@ -21,6 +21,7 @@
 #include "results/report/verdict.h"
 #include "tests/results/report/synthetic_run.h"
 #include "tests/support/file_content.h"
+#include "tests/support/markup.h"
 #include "tests/support/recorded_answer.h"
 #include "tests/support/shared_data.h"
 
@@ -38,19 +39,9 @@ void edit(const fs::path& file, const std::function<void(json&)>& change) {
   std::ofstream(file) << document.dump();
 }
 
-/// Markup with a line for each element, without styles, scripts and the numbers of pictures.
-std::string markup_of(const std::string& page) {
-  std::string text;
-  for (std::size_t at = 0; at < page.size();) {
-    const bool hidden = page.compare(at, 6, "<style") == 0 || page.compare(at, 7, "<script") == 0;
-    if (!hidden) {
-      text += page[at++];
-      if (text.back() == '>' && at < page.size() && page[at] == '<') text += '\n';
-      continue;
-    }
-    const bool style = page[at + 2] == 't';
-    at = page.find(style ? "</style>" : "</script>", at) + (style ? 8 : 9);
-  }
+/// Markup with a line for each element, without the numbers of pictures.
+std::string readable(const std::string& page) {
+  std::string text = test::lines_of_markup(page);
   text = std::regex_replace(text, std::regex("data:image/[^\"]*"), "PICTURE");
   text = std::regex_replace(text, std::regex("sha256-[^']*"), "HASH");
   // Lines of elements that say nothing by themselves only make it long.
@@ -121,7 +112,7 @@ void hold_page(const std::string& name, const fs::path& folder) {
   const auto written = write_report(folder);
   ASSERT_TRUE(written) << written.error().text();
   const std::string page = test::content_of(folder / "report.html");
-  std::string markup = markup_of(page);
+  std::string markup = readable(page);
   without_folder(markup, folder);
   // In files of a size that can be looked at.
   constexpr std::size_t kPart = 50'000;
@@ -318,7 +309,7 @@ TEST(WholeReport, OfTwoRunsBesideEachOther) {
   });
   const auto page = comparison_page(folder / "monday", folder / "friday");
   ASSERT_TRUE(page) << page.error().text();
-  test::expect_recorded("report/comparison_page.txt", markup_of(*page), kShare, 1e-9);
+  test::expect_recorded("report/comparison_page.txt", readable(*page), kShare, 1e-9);
 }
 
 /// In the place of gnuplot: what it is given is held, not what it draws.
@@ -540,7 +531,7 @@ TEST(WholeCertificate, IsAPageWithItsFigures) {
   std::string text;
   for (const fs::path& file : *files) text += file.lexically_relative(folder).string() + '\n';
   test::expect_recorded("report/certificate_page.txt",
-                        text + markup_of(test::content_of(folder / "certificate.html")), kShare, 1e-9);
+                        text + readable(test::content_of(folder / "certificate.html")), kShare, 1e-9);
   test::expect_recorded("report/certificate_figures.txt", scripts_text(folder / "figures"), 1e-5, 1e-9);
 }
 
@@ -562,11 +553,11 @@ TEST(WholeCertificate, OfLittleSaysLittle) {
   certificate["axes"][0].erase("mean");
   const auto folder = scratch / "certificate";
   ASSERT_TRUE(write_certificate_page(folder, certificate));
-  std::string text = markup_of(test::content_of(folder / "certificate.html"));
+  std::string text = readable(test::content_of(folder / "certificate.html"));
   certificate["correlation"] = json::array();
   certificate.erase("comparison");
   ASSERT_TRUE(write_certificate_page(folder, certificate));
-  const std::string page = markup_of(test::content_of(folder / "certificate.html"));
+  const std::string page = readable(test::content_of(folder / "certificate.html"));
   test::expect_recorded("report/small_certificate.txt", text + page.substr(0, page.size() / 2), kShare, 1e-9);
 }
 
