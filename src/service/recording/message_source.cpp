@@ -59,17 +59,16 @@ bool read_message(const mcap::Topic& topic, mcap::Bytes data, Message& message) 
   return mcap::read(data, message, topic.encoding == "ros1" ? mcap::Wire::kRos1 : mcap::Wire::kCdr);
 }
 
-/// Square roots of a covariance's diagonal, east-north-up to north, east, down; false where they are no sd.
+/// Square roots of a covariance's diagonal, east-north-up to north, east, down; false, and `sd` as it was, where they are
+/// no sd.
 template <std::size_t N>
 bool sd_ned(const std::array<double, N>& covariance, std::size_t side, double* sd) {
-  const double east = covariance[0];
-  const double north = covariance[side + 1];
-  const double up = covariance[2 * side + 2];
-  if (!(east > 0.0 && north > 0.0 && up > 0.0)) return false;
-  sd[0] = std::sqrt(north);
-  sd[1] = std::sqrt(east);
-  sd[2] = std::sqrt(up);
-  return std::isfinite(sd[0]) && std::isfinite(sd[1]) && std::isfinite(sd[2]);
+  const std::array<double, 3> ned{std::sqrt(covariance[side + 1]), std::sqrt(covariance[0]),
+                                  std::sqrt(covariance[2 * side + 2])};
+  const auto is_sd = [](double value) { return value > 0.0 && std::isfinite(value); };
+  if (!std::ranges::all_of(ned, is_sd)) return false;
+  std::ranges::copy(ned, sd);
+  return true;
 }
 
 GnssSolution solution_of(const mcap::NavSatFix& fix, bool has_sd, double sd_m) {
@@ -298,7 +297,7 @@ class Extractor {
   std::uint64_t bad_ = 0;
   std::uint64_t unreadable_ = 0;
   std::multimap<std::int64_t, ros_message::Content> early_;  ///< equal times in the order of the file
-  std::optional<ros_message::Content> held_;                 ///< behind what is early
+  std::optional<ros_message::Content> held_;                 ///< after what is early
   bool ended_ = false;
   std::uint64_t out_of_order_ = 0;
 };

@@ -6,6 +6,7 @@
 #include <unistd.h>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <tuple>
 
@@ -188,7 +189,7 @@ TEST(MessageSource, GapsAndTimesThatGoBackAreTold) {
   EXPECT_NE(samples[2].imu.flags & kGapBefore, 0U);
 }
 
-/// The velocity may stand before or behind its position; one of another instant belongs to neither.
+/// The velocity may stand before or after its position; one of another instant belongs to neither.
 TEST(MessageSource, AVelocityMeetsThePositionOfItsInstant) {
   for (const bool before : {true, false}) {
     Bag bag;
@@ -246,6 +247,24 @@ TEST(MessageSource, SolutionsSayHowGoodTheyAre) {
   EXPECT_EQ(solutions, (std::vector<GnssSolution>{GnssSolution::kNone, GnssSolution::kSingle,
                                                   GnssSolution::kDifferential, GnssSolution::kFixed,
                                                   GnssSolution::kFloat, GnssSolution::kFloat}));
+}
+
+TEST(MessageSource, ACovarianceThatIsInfiniteAlongOneAxisIsNone) {
+  Bag bag;
+  for (std::size_t axis = 0; axis < 4; ++axis) {
+    mcap::NavSatFix fix;
+    fix.header.stamp_ns = kTime_ns + 100'000'000 * static_cast<std::int64_t>(axis);
+    fix.status = 2;
+    fix.position_covariance = {0.0004, 0, 0, 0, 0.0004, 0, 0, 0, 0.0004};
+    if (axis < 3) fix.position_covariance[4 * axis] = std::numeric_limits<double>::infinity();
+    fix.position_covariance_type = 2;
+    bag.add("/fix", "sensor_msgs/msg/NavSatFix", fix);
+  }
+  std::vector<GnssSolution> solutions;
+  for (const auto& sample : samples_of(bag.finish(), device_of(DeviceRole::kGnss)))
+    solutions.push_back(sample.gnss.solution);
+  EXPECT_EQ(solutions, (std::vector<GnssSolution>{GnssSolution::kFloat, GnssSolution::kFloat,
+                                                  GnssSolution::kFloat, GnssSolution::kFixed}));
 }
 
 TEST(MessageSource, SpeedsAndPulses) {

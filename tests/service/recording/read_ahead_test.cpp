@@ -23,7 +23,8 @@ constexpr std::int64_t kMinute_ms = 60'000;
 const std::vector<CapturedLine> kLines{{"fast", 0}, {"slow", 0}, {"late", 0}};
 
 /// A minute of three devices: one every 2 ms, one every second, one that begins at the end.
-std::filesystem::path capture() {
+/// @param more_bytes  of every read of the first
+std::filesystem::path capture(std::size_t more_bytes = 0) {
   const auto path = test::scratch_folder() / "capture.lcm";
   auto writer = CaptureWriter::create(path);
   std::int64_t sequence = 0;
@@ -33,7 +34,9 @@ std::filesystem::path capture() {
     message.device = device;
     message.direction = raw_t::READ;
     message.arrival_ns = 5'000'000'000 + at_ms * 1'000'000;
-    message.bytes.assign(1 + static_cast<std::size_t>(at_ms) % 90, static_cast<std::uint8_t>(sequence));
+    const std::size_t more = device == kLines[0].device ? more_bytes : 0;
+    message.bytes.assign(1 + more + static_cast<std::size_t>(at_ms) % 90,
+                         static_cast<std::uint8_t>(sequence));
     message.n_bytes = static_cast<std::int32_t>(message.bytes.size());
     writer->append("IMUSCOPE_RAW", sequence, encode_message(message));
   };
@@ -100,6 +103,22 @@ TEST(ReadAhead, LinesSideBySideAreThoseOfEachDeviceAlone) {
       EXPECT_EQ(rest(*(*lines)[i]), expected) << kLines[i].device;
     }
   }
+}
+
+TEST(ReadAhead, ALineThatIsFarAheadOfAnotherGoesItsOwnWayAndMissesNothing) {
+  constexpr std::size_t kSoMuchThatNobodyKeepsIt = 1500;  // 45 MB in all
+  const auto path = capture(kSoMuchThatNobodyKeepsIt);
+  auto lines = open_captured_lines(path, kLines, Reading::kWhenAsked);
+  ASSERT_TRUE(lines);
+  for (const std::size_t i : {1U, 2U}) {
+    auto alone = open_captured_device(path, kLines[i].device, 0);
+    ASSERT_TRUE(alone);
+    const auto expected = rest(**alone);
+    EXPECT_EQ(rest(*(*lines)[i]), expected) << kLines[i].device;
+  }
+  std::size_t reads = 0;
+  while (next(*(*lines)[0])) ++reads;
+  EXPECT_EQ(reads, 30'000U);
 }
 
 }  // namespace
