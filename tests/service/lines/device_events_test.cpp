@@ -22,7 +22,7 @@ using std::chrono::steady_clock;
 
 constexpr unsigned kKernelGroup = 1;
 
-/// An event as the kernel sends it: "ACTION@DEVPATH" and properties, each with a zero behind.
+/// An event as the kernel sends it: "ACTION@DEVPATH" and properties, each with a zero after.
 void announce(const std::string& action, const std::string& subsystem) {
   const int line = socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_KOBJECT_UEVENT);
   sockaddr_nl address{};
