@@ -1,4 +1,4 @@
-"""Usage: demo_test.py BIN     with the folder of the programs"""
+"""Usage, in tests/: python3 -m campaigns.demo_test BIN     with the folder of the programs"""
 import datetime
 import pathlib
 import subprocess
@@ -7,9 +7,7 @@ import tempfile
 import tomllib
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-sys.dont_write_bytecode = True
-from campaigns.demo import ROOT, TURNS_DEG, demo, toml, write  # noqa: E402
+from campaigns.demo import ROOT, TURNS_DEG, demo, toml, write
 
 BIN = pathlib.Path(sys.argv.pop(1))
 BEGIN = datetime.datetime(2016, 12, 31, 23, tzinfo=datetime.timezone.utc)

@@ -1,12 +1,8 @@
 import datetime
 import io
-import pathlib
-import sys
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-sys.dont_write_bytecode = True
-from campaigns import endurance  # noqa: E402
+from campaigns import endurance
 
 COUNTS = {"samples_lost": 0, "samples_refused": 0, "frames_dropped": 0, "bad_checksums": 0, "clock_resets": 0,
           "samples": 1000, "samples_late": 0}

@@ -6,9 +6,7 @@ import tempfile
 import time
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-sys.dont_write_bytecode = True
-from campaigns import run  # noqa: E402
+from campaigns import run
 
 
 class Processes(unittest.TestCase):
@@ -62,8 +60,8 @@ class Processes(unittest.TestCase):
             raise run.Failed("this went wrong")
 
         with self.subTest("on stderr"):
-            done = subprocess.run([sys.executable, "-c", f"import sys; sys.path.insert(0, {str(run.ROOT / 'tests')!r})\n"
-                                   "from campaigns import run\n\ndef fails():\n    raise run.Failed('this went wrong')\n\n"
+            done = subprocess.run([sys.executable, "-B", "-c", "import sys\nfrom campaigns import run\n\n"
+                                   "def fails():\n    raise run.Failed('this went wrong')\n\n"
                                    "sys.exit(run.ending('soak', fails))"], capture_output=True, text=True)
             self.assertEqual((done.returncode, done.stderr), (1, "soak: this went wrong\n"))
 

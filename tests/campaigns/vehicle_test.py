@@ -1,13 +1,11 @@
-"""Usage: vehicle_test.py BIN     with the folder of the programs"""
+"""Usage, in tests/: python3 -m campaigns.vehicle_test BIN     with the folder of the programs"""
 import pathlib
 import subprocess
 import sys
 import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-sys.dont_write_bytecode = True
-from campaigns.vehicle import KINDS, configuration  # noqa: E402
+from campaigns.vehicle import KINDS, configuration
 
 BIN = pathlib.Path(sys.argv.pop(1))
 

@@ -1,10 +1,6 @@
-import pathlib
-import sys
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-sys.dont_write_bytecode = True
-from campaigns import wake_ups  # noqa: E402
+from campaigns import wake_ups
 
 # As cyclictest 2.x prints it: two threads, 1,000 wake-ups.
 CYCLICTEST = """# /dev/cpu_dma_latency set to 0us
