@@ -22,7 +22,7 @@ namespace imuscope::csv {
 
 /// Longest line that is read.
 inline constexpr std::size_t kLineMax = 4096;
-/// Columns behind this one cannot be asked for.
+/// Columns after this one cannot be asked for.
 inline constexpr std::size_t kColumnsMax = 256;
 
 /// A column that is asked for.

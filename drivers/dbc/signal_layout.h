@@ -11,7 +11,7 @@ namespace imuscope::dbc {
 
 enum class ByteOrder : std::uint8_t {
   kIntel,     ///< start = least significant bit, the next bit is one higher
-  kMotorola,  ///< start = most significant bit; from bit 0 of a byte on to bit 7 of the byte behind it
+  kMotorola,  ///< start = most significant bit; from bit 0 of a byte on to bit 7 of the byte after it
 };
 enum class Coding : std::uint8_t { kUnsigned, kSigned, kFloat, kDouble };
 

@@ -53,7 +53,7 @@ class DeviceDecoder {
   virtual void push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept = 0;
 
   /// The stream has ended (end of a recording, never needed live): decodes what waited for more bytes, such
-  /// as a last line without its end, or a frame behind a false start that announced more than came.
+  /// as a last line without its end, or a frame after a false start that announced more than came.
   virtual void finish(HostTime arrival, SampleSink& sink) noexcept {
     (void)arrival;
     (void)sink;

@@ -86,7 +86,7 @@ class FrameBuffer {
   /// one read: a stamp is later then, never earlier.
   static constexpr std::size_t kReads = 64;
   struct Read {
-    std::uint64_t end = 0;  ///< stream offset behind the read's last byte
+    std::uint64_t end = 0;  ///< stream offset after the read's last byte
     HostTime arrival{};
   };
 

@@ -1,7 +1,7 @@
 #pragma once
 
 /// The loop that finds frames in a stream, shared by protocols whose frame begins with a mark and proves
-/// itself by a checksum: after a bad checksum or length the search goes on at the byte behind the false
+/// itself by a checksum: after a bad checksum or length the search goes on at the byte after the false
 /// start, so that no good frame inside garbage is lost. Core: bounded memory, no allocation, noexcept.
 
 #include <cstddef>
@@ -54,7 +54,7 @@ class ScanLoop {
   /// The next frame, or nothing where more bytes are needed. bytes(), position() and first_byte() are about
   /// it until the next call.
   /// @param examine  of the pending bytes (not empty) to Examined
-  /// @param at_end   no more bytes will come: look for frames behind a start that announced more
+  /// @param at_end   no more bytes will come: look for frames after a start that announced more
   template <typename Examine>
   [[nodiscard]] std::optional<Examined> next(Examine&& examine, bool at_end) noexcept {
     buffer_.consume(taken_);

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Finds GREIS messages and lines of text in a byte stream. After a false start the search goes on at the
-/// byte behind it. CR and LF between messages are separators. Core: bounded memory, no allocation, noexcept.
+/// byte after it. CR and LF between messages are separators. Core: bounded memory, no allocation, noexcept.
 ///
 /// A message counts as found when its checksum is right: the last byte of the body, its last two hex digits
 /// ([MF], [PM]), or its last two bytes ([rE], [rM], [rV]: CRC-16). [JP], [RE] and [ER] have none; they must
@@ -43,7 +43,7 @@ class Scanner {
   }
 
   /// The next frame, or false where more bytes are needed.
-  /// @param at_end  no more bytes will come: look for frames behind a start that announced more
+  /// @param at_end  no more bytes will come: look for frames after a start that announced more
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
   [[nodiscard]] const ScanCounters& counters() const noexcept { return loop_.counters(); }

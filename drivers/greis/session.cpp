@@ -27,7 +27,7 @@ constexpr std::string_view kNoEpoch =
     "bytes arrive but no complete GREIS epoch: check the baud rate, and that the "
     "receiver puts out RT, PG or PV, and ET";
 
-/// Writes text and numbers one behind the other.
+/// Writes text and numbers one after the other.
 class TextWriter {
  public:
   explicit TextWriter(std::span<char> out) noexcept : out_(out) {}

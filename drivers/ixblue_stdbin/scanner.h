@@ -1,7 +1,7 @@
 #pragma once
 
 /// Finds telegrams ("IX") and answers ("AN") in a byte stream. The checksum is the only proof of a frame;
-/// after a false start the search goes on at the byte behind it, so that no good frame inside garbage is
+/// after a false start the search goes on at the byte after it, so that no good frame inside garbage is
 /// lost. Core: bounded memory, no allocation, noexcept.
 
 #include <array>
@@ -39,7 +39,7 @@ class Scanner {
   }
 
   /// The next frame, or false where more bytes are needed.
-  /// @param at_end  no more bytes will come: look for frames behind a start that announced more
+  /// @param at_end  no more bytes will come: look for frames after a start that announced more
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
   [[nodiscard]] const ScanCounters& counters() const noexcept { return loop_.counters(); }

@@ -40,7 +40,7 @@ constexpr const HeaderLayout& header_layout(std::uint8_t version) noexcept {
   return version == 2 ? kHeaderV2 : version == 3 ? kHeaderV3 : kHeaderV4;
 }
 
-/// Behind the last size in the longest header; in shorter ones what follows is the validity.
+/// After the last size in the longest header; in shorter ones what follows is the validity.
 inline constexpr std::size_t kSizesEnd = 19;
 
 /// The unit of validity and of every block's own time.

@@ -35,7 +35,7 @@ class Fields {
   /// "GGA", "RMC", ... ; of proprietary ones "PASHR", and "PIXSE,ATITUD" and the like; empty for other
   /// addresses.
   [[nodiscard]] std::string_view type() const noexcept { return type_; }
-  /// Field behind the address, from 0; empty behind the last one.
+  /// Field after the address, from 0; empty after the last one.
   [[nodiscard]] std::string_view at(std::size_t index) const noexcept;
   [[nodiscard]] std::optional<double> number(std::size_t index) const noexcept;
   [[nodiscard]] std::optional<int> integer(std::size_t index) const noexcept;
@@ -43,7 +43,7 @@ class Fields {
   [[nodiscard]] std::optional<TimeOfDay> time(std::size_t index) const noexcept;
   /// ddmmyy
   [[nodiscard]] std::optional<Date> date(std::size_t index) const noexcept;
-  /// ddmm.mmmm or dddmm.mmmm, and the hemisphere in the field behind it.
+  /// ddmm.mmmm or dddmm.mmmm, and the hemisphere in the field after it.
   [[nodiscard]] std::optional<double> degrees(std::size_t index) const noexcept;
 
  private:
@@ -180,7 +180,7 @@ inline constexpr std::array<std::string_view, 3> kPhinsWordSentences{"PIXSE,ALGS
 [[nodiscard]] ShortText phins_time_text(std::string_view field) noexcept;
 [[nodiscard]] std::optional<std::uint32_t> hex_word(std::string_view field) noexcept;
 
-/// Fields of a $PIXSE sentence begin behind its kind.
+/// Fields of a $PIXSE sentence begin after its kind.
 template <typename Visit>
 void for_each_phins_field(const Fields& fields, Visit&& visit) {
   using Kind = NamedValue::Kind;

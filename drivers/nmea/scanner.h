@@ -1,7 +1,7 @@
 #pragma once
 
 /// Finds NMEA 0183 sentences in a byte stream: '$' or '!', text, '*', two hex digits of checksum. After a
-/// false start the search goes on at the byte behind it. Core: bounded memory, no allocation, noexcept.
+/// false start the search goes on at the byte after it. Core: bounded memory, no allocation, noexcept.
 
 #include <cstddef>
 #include <cstdint>

@@ -136,7 +136,7 @@ void read_data(Cursor& in, CanFrame& frame) {
   if (!is_can_length(n, frame.is_fd)) in.fail("no CAN FD frame has this length");
 }
 
-/// "#..." behind the identifier.
+/// "#..." after the identifier.
 void read_content(Cursor& in, CanFrame& frame) {
   in.expect('#', "after the identifier stands a #");
   if (in.skip('#')) {

@@ -1,7 +1,7 @@
 #pragma once
 
 /// Finds UBX messages in a byte stream, and the NMEA sentences that most receivers mix in. After a false
-/// start the search goes on at the byte behind it. Core: bounded memory, no allocation, noexcept.
+/// start the search goes on at the byte after it. Core: bounded memory, no allocation, noexcept.
 
 #include <cstddef>
 #include <cstdint>
@@ -40,7 +40,7 @@ class Scanner {
   }
 
   /// The next frame, or false where more bytes are needed.
-  /// @param at_end  no more bytes will come: look for frames behind a start that announced more
+  /// @param at_end  no more bytes will come: look for frames after a start that announced more
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
   [[nodiscard]] const ScanCounters& counters() const noexcept { return loop_.counters(); }

@@ -8,7 +8,7 @@ namespace imuscope::xsens_can {
 namespace {
 
 constexpr double kUnitQuaternion = 1.0 / 32767.0;
-/// Behind the three numbers of delta_v.
+/// After the three numbers of delta_v.
 constexpr std::size_t kExponentAt = 6;
 
 constexpr std::size_t size_of(Item item) noexcept { return kItemKinds[static_cast<std::size_t>(item)].size; }

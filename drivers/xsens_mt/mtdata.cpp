@@ -23,7 +23,7 @@ constexpr std::size_t numbers_of_orientation(std::uint32_t settings) {
   }
 }
 
-/// Reads one field behind the other.
+/// Reads one field after the other.
 class Cursor {
  public:
   Cursor(std::span<const std::uint8_t> data, NumberFormat format) noexcept : data_(data), format_(format) {}

@@ -93,7 +93,7 @@ Scanner::Examined Scanner::examine(std::span<const std::uint8_t> bytes) noexcept
   return {Verdict::kFrame, header, size};
 }
 
-// Behind the last frame comes no frame, so it may have been a false one that swallowed the start of a good
+// After the last frame comes no frame, so it may have been a false one that swallowed the start of a good
 // one. Where there is such a good one, drops what is before it and says kFrame.
 Scanner::Verdict Scanner::look_back(bool at_end) noexcept {
   const auto bytes = buffer_.pending();

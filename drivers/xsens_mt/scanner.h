@@ -1,14 +1,14 @@
 #pragma once
 
 /// Finds frames of the XSens MT protocol in a byte stream. After a bad checksum or length the search goes on
-/// at the byte behind the false preamble.
+/// at the byte after the false preamble.
 ///
 /// The checksum has only 8 bits, so one false start in 256 passes it and covers what lies in its length.
 /// No good frame is lost to that:
 /// - A frame that lies whole inside another one is given as well, marked `nested`: one of the two is false,
 ///   and only their contents tell which. Those who act on frames take data out of nested ones, and no
 ///   command.
-/// - Where the bytes behind a taken frame are no frame, a good one that began inside it and ends behind it is
+/// - Where the bytes after a taken frame are no frame, a good one that began inside it and ends after it is
 ///   found. What remains is a false frame that passes, covers the beginning of a good one, and is followed,
 ///   inside that good one, by a second false start that passes too: 2^-16 for each false start whose length
 ///   does so.
@@ -58,7 +58,7 @@ class Scanner {
   }
 
   /// The next frame, or false where more bytes are needed.
-  /// @param at_end  no more bytes will come: look for frames behind a preamble that announced more
+  /// @param at_end  no more bytes will come: look for frames after a preamble that announced more
   [[nodiscard]] bool next(Frame& frame, bool at_end = false) noexcept;
 
   [[nodiscard]] const ScanCounters& counters() const noexcept { return counters_; }

@@ -14,7 +14,7 @@ enum class CountStep : std::uint8_t {
   kFirst,
   kForward,    ///< continues; step() counts further than before
   kRepeated,   ///< the same count again
-  kRestarted,  ///< a new segment: counts on behind the last one, what lies between is not known
+  kRestarted,  ///< a new segment: counts on after the last one, what lies between is not known
   kRejected,   ///< not to be believed; nothing was taken over
 };
 

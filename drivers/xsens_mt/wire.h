@@ -4,7 +4,7 @@
 /// first. Wire units live here; SI begins in the decoder.
 ///
 /// Frame: preamble, bus id (BID), message id (MID), length, data, checksum. Length 255 announces a 16-bit
-/// length in the next two bytes. The sum of all bytes behind the preamble is 0 modulo 256.
+/// length in the next two bytes. The sum of all bytes after the preamble is 0 modulo 256.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #pragma once
 
 /// A recording as one capture: an LCM event log in which every read of every device is a message of type
-/// imuscope.raw_t, ordered by arrival, behind one of type imuscope.run_t that holds the configuration.
+/// imuscope.raw_t, ordered by arrival, after one of type imuscope.run_t that holds the configuration.
 /// Written from the two types' description (the .lcm files) and from the log format:
 ///   uint32 0xEDA1DA01, int64 number, int64 utime, int32 channel length, int32 data length, channel, data
 /// with every number big-endian.

@@ -6,7 +6,7 @@
 namespace imusim {
 namespace {
 
-/// A classic frame of 11 bits without data, with the space behind it; stuffing adds about a tenth.
+/// A classic frame of 11 bits without data, with the space after it; stuffing adds about a tenth.
 constexpr double kFrameBits = 47.0;
 constexpr double kStuffing = 1.1;
 constexpr std::size_t kOthersBytes = 8;

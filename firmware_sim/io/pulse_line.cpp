@@ -33,7 +33,7 @@ std::int64_t PulseLine::host_ns(double t_s) const {
 }
 
 void PulseLine::deliver_until(double t_s, const OnRead& on_read) {
-  // Behind the last pulse nobody asks on: a recording ends there.
+  // After the last pulse nobody asks on: a recording ends there.
   const double until_s = std::min(t_s, newest_pulse_s_ + kBetweenPulses_s);
   for (; static_cast<double>(asked_) * kAskEvery_s < until_s; ++asked_) {
     const double asked_s = static_cast<double>(asked_) * kAskEvery_s;

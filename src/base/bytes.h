@@ -36,7 +36,7 @@ template <typename T>
 }  // namespace detail
 
 /// Most significant byte first. T is an integer or a floating point type of 1, 2, 4 or 8 bytes; `bytes` holds
-/// at least sizeof(T) behind `offset` (the caller has checked the length of the frame).
+/// at least sizeof(T) after `offset` (the caller has checked the length of the frame).
 template <typename T>
 [[nodiscard]] T read_be(std::span<const std::uint8_t> bytes, std::size_t offset = 0) noexcept {
   return detail::read_ordered<T>(bytes.data() + offset, std::endian::big);

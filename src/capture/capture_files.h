@@ -24,7 +24,7 @@ struct CaptureBreak {
   int n_missing = 0;                  ///< files in a row
   int behind = 0;                     ///< number of the file with which it goes on
   bool beginning_is_damaged = false;  ///< of that file
-  double seconds = 0.0;  ///< between the last read before and the first behind, by the recorder's clock
+  double seconds = 0.0;  ///< between the last read before and the first after, by the recorder's clock
 };
 
 /// One file of a capture that was read to its end.

@@ -25,7 +25,7 @@ namespace imuscope {
 struct CaptureLoss {
   std::string device;
   HostTime after{};          ///< arrival of the last record before the gap
-  HostTime until{};          ///< of the first record behind it
+  HostTime until{};          ///< of the first record after it
   std::int64_t records = 0;  ///< missing
 };
 

@@ -211,7 +211,7 @@ bool EventLogReader::next(LogEvent& event) {
     std::size_t length = 0;
     const Look look = look_at(0, length);
     if (look == Look::kRecord) {
-      // A damaged length makes a record swallow those behind it; then one of them shows inside.
+      // A damaged length makes a record swallow those after it; then one of them shows inside.
       const auto inside = may_begin_record(length) ? std::nullopt : next_sure_record(0, length);
       if (!inside) {
         take(event);

@@ -46,7 +46,7 @@ std::optional<Message> decode_checked(std::span<const std::uint8_t> bytes) {
   return checksum == message->checksum ? std::move(message) : std::nullopt;
 }
 
-/// A device's name comes behind the kind: a device called SEAL is none.
+/// A device's name comes after the kind: a device called SEAL is none.
 bool is_of_kind(std::string_view channel, std::string_view kind) {
   if (!channel.ends_with(kind)) return false;
   channel.remove_suffix(kind.size());

@@ -3,7 +3,7 @@
 namespace imuscope {
 namespace {
 
-/// The first seal stands right behind the header, however long that is. Where there is none, the log is one
+/// The first seal stands right after the header, however long that is. Where there is none, the log is one
 /// without seals, and nothing is held for long.
 constexpr std::size_t kWaitForFirstSealBytes = std::size_t{64} << 10U;
 /// Seals are nearer to each other than any record is long.

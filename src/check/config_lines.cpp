@@ -75,7 +75,7 @@ std::size_t end_of_value(const Lines& lines, std::size_t at) {
 }
 
 struct Range {
-  std::size_t begin = 0;  ///< of the lines behind the header
+  std::size_t begin = 0;  ///< of the lines after the header
   std::size_t end = 0;
 };
 

@@ -124,8 +124,6 @@ Result<TimeOffset> bring_together(const Norms& reference, ImuTrack& track, doubl
 struct Moments {
   Eigen::Matrix3d rates = Eigen::Matrix3d::Zero();   ///< study times reference', about the means
   Eigen::Matrix3d forces = Eigen::Matrix3d::Zero();  ///< the same, gravity and all
-  Eigen::Matrix3d rates_bb = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d rates_ss = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d forces_bb = Eigen::Matrix3d::Zero();
   double rates_b = 0.0, rates_s = 0.0, forces_b = 0.0, forces_s = 0.0;
   Eigen::Vector3d mean_f_b = Eigen::Vector3d::Zero();
@@ -171,8 +169,6 @@ Moments moments_of(const ImuBins& reference, const ImuBins& study) {
       const Eigen::Vector3d f_b = reference.f_mps2[i];
       const Eigen::Vector3d f_s = study.f_mps2[j];
       m.rates += s * b.transpose();
-      m.rates_bb += b * b.transpose();
-      m.rates_ss += s * s.transpose();
       m.rates_b += b.squaredNorm();
       m.rates_s += s.squaredNorm();
       m.forces += f_s * f_b.transpose();

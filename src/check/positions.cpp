@@ -13,7 +13,7 @@ namespace {
 constexpr double kAccelerationMax_mps2 = 15.0;
 /// An honest error is beyond this many sd once in 10^6.
 constexpr double kSdMax = 5.0;
-/// Neighbours are compared over no more periods than this: behind a gap anything may be.
+/// Neighbours are compared over no more periods than this: after a gap anything may be.
 constexpr double kPeriodsMax = 2.5;
 constexpr std::size_t kTrackMin = 20;
 /// Of a receiver that repeats its last position: so long, ...

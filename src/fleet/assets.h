@@ -7,7 +7,7 @@
 namespace imuscope::fleet {
 
 std::string_view schema();       ///< schema.sql
-std::string_view page_style();   ///< page.css, behind the kit that all pages share
+std::string_view page_style();   ///< page.css, after the kit that all pages share
 std::string_view page_script();  ///< page.js
 
 }  // namespace imuscope::fleet

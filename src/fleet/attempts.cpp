@@ -27,7 +27,7 @@ constexpr std::array<const char*, 5> kEnds{"running", "done", "died", "interrupt
 /// No task is tried more often.
 constexpr int kAttemptsMax = 10000;
 constexpr std::size_t kHostMax = 256;
-/// proc_pid_stat(5): the field of the start, counted behind the closing bracket of the name.
+/// proc_pid_stat(5): the field of the start, counted after the closing bracket of the name.
 constexpr int kStartBehindName = 20;
 
 std::string utc_now() {

@@ -63,7 +63,7 @@ Result<std::map<std::string, std::vector<fs::path>>> captures_below(const fs::pa
     const auto& of = first && found.count(*first) > 0 ? *first : file;
     captures[of.lexically_relative(folder).generic_string()].push_back(file);
   }
-  // The first file of a capture may stand behind its numbered ones in the order of the alphabet.
+  // The first file of a capture may stand after its numbered ones in the order of the alphabet.
   for (auto& [name, files] : captures)
     std::stable_sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
       return a.string().size() < b.string().size();

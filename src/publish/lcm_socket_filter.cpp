@@ -49,7 +49,7 @@ void append_kind(Program& program) {
   program.push_back(drop());
 }
 
-/// Passes a datagram whose channel begins with `bytes`; otherwise goes on behind these steps.
+/// Passes a datagram whose channel begins with `bytes`; otherwise goes on after these steps.
 void append_channel(const std::string& bytes, Program& program) {
   struct Comparison {
     std::uint16_t size;

@@ -24,7 +24,7 @@ namespace imuscope {
 /// later.
 ///
 /// How it works: each record stands whole, after its length and at a multiple of kAlign, so that the consumer
-/// reads it where it lies. One that the end of the storage would part begins at the start again, behind a
+/// reads it where it lies. One that the end of the storage would part begins at the start again, after a
 /// mark that says so. Indices run freely, as those of SpscRing.
 class ByteRing {
  public:

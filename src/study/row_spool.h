@@ -2,7 +2,7 @@
 
 /// What a pass over the recording makes of its samples, on its way through further passes: kept in a file of
 /// the run folder that has no name any more, so that memory does not grow with the drive and nothing is left
-/// behind.
+/// after.
 
 #include <cstddef>
 #include <cstdio>

@@ -49,7 +49,7 @@ class Picture {
   void tell_all_next() noexcept { all_next_ = news_ = true; }
 
   /// What was heard since the last part, as one JSON object; all of it after begin_anew() or tell_all_next().
-  /// `extra` are members of the object, each behind a comma.
+  /// `extra` are members of the object, each after a comma.
   [[nodiscard]] std::string part(std::string_view extra = {});
   /// All of it, for a page that knows nothing. The parts that follow go on from the last part().
   [[nodiscard]] std::string whole(std::string_view extra = {}) const;

@@ -27,7 +27,7 @@ Result<void> Player::read_through() {
   double newest_s = 0.0;
   while (recording_->next(message_)) {
     if (!picture_.hear(message_)) continue;
-    // Behind a service that began anew times come twice: a jump means the first.
+    // After a service that began anew times come twice: a jump means the first.
     if (picture_.time_s() < newest_s - kMixed_s) stop_every_s_ = kToTheEnd;
     newest_s = std::max(newest_s, picture_.time_s());
     if (newest_s >= (stops_.empty() ? 0.0 : stops_.back().time_s) + stop_every_s_) add_stop();

@@ -88,6 +88,23 @@ std::vector<std::size_t> write_example(const std::filesystem::path& path, int n)
   return ends;
 }
 
+// The last read fills what was missing, and not a byte more.
+TEST(EventLog, ALastRecordThatLiesAcrossTwoReadsIsWhole) {
+  const auto path = test::scratch_folder() / "two.lcm";
+  for (unsigned power = 10; power <= 20; ++power) {
+    Bytes file;
+    for (const std::size_t size : {(std::size_t{1} << power) - 100, std::size_t{200}}) {
+      append_record_head(file, 0, 1'700'000'000'000'000, "C", size);
+      file.resize(file.size() + size, 7);
+    }
+    write_file(path, file);
+    auto reader = EventLogReader::open(path);
+    ASSERT_TRUE(reader);
+    EXPECT_EQ(read_all(*reader).size(), 2U) << power;
+    EXPECT_EQ(reader->bytes_cut_off(), 0U) << power;
+  }
+}
+
 TEST(CaptureWriter, WritesWhatTheLcmLibraryReads) {
   const auto path = test::scratch_folder() / "new" / "capture.lcm";
   write_example(path, 20);
@@ -233,7 +250,7 @@ TEST(EventLogReader, EveryByteIsAccountedForInRandomDamage) {
   }
 }
 
-/// Each claims more than the file has, and each has a whole record behind it: what is left is not moved once
+/// Each claims more than the file has, and each has a whole record after it: what is left is not moved once
 /// for every one of them.
 TEST(EventLogReader, ClaimsBeyondTheEndCostNoMoreThanTheyAreLong) {
   const auto folder = test::scratch_folder();

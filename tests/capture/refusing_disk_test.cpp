@@ -255,7 +255,7 @@ TEST(RefusingDisk, ADiskThatStandsStillForAMinuteCostsNothingAndWhatIsLostBeyond
   EXPECT_EQ((*recorder)->status().records, kept + 1);
   std::int64_t missing = 0;
   for (const auto& loss : summary->losses) missing += loss.records;
-  // Behind the last read of a device nothing tells that more were to come.
+  // After the last read of a device nothing tells that more were to come.
   EXPECT_LE(missing, static_cast<std::int64_t>(ring->counters().refused));
 }
 

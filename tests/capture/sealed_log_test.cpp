@@ -204,7 +204,7 @@ TEST(SealedLog, AFlippedByteAnywhereCostsItsRecordAndNeverGoesUnnoticed) {
     ASSERT_GE(in_both(read.events, recorded) + std::min<std::size_t>(read.health.records_unsealed, 1),
               read.events.size())
         << "byte " << at << ": a wrong record was given";
-    // A damaged length may swallow just the record behind.
+    // A damaged length may swallow just the record after.
     ASSERT_GE(read.events.size() + 2, recorded.size()) << "byte " << at;
     if (at >= index_begin) continue;  // number and stamp of the index itself are nothing that anybody uses
     const auto check = check_capture(damaged);
@@ -304,7 +304,7 @@ TEST(CaptureRepair, ACopyHoldsAllThatIsWholeAndIsWholeItself) {
 TEST(CaptureRepair, ASealWhosePlaceIsDamagedIsNoRecordOfTheCopy) {
   const auto folder = test::scratch_folder();
   const auto first = record_files(folder, 1);
-  // The number of the seal behind the first six reads, in its record's header.
+  // The number of the seal after the first six reads, in its record's header.
   Bytes bytes = content_of(first);
   const Bytes channel{'I', 'M', 'U', 'S', 'C', 'O', 'P', 'E', '_', 'S', 'E', 'A', 'L'};
   auto place = bytes.begin();

@@ -52,7 +52,7 @@ double share_of_curves(const MadeDrive& how, double t) {
   return curve_s > 0.0 ? std::pow(std::sin(kPi * curve_s / (kMinute_s - kStraight_s)), 2) : 0.0;
 }
 
-/// Speed, turn and tilts so many seconds behind the rest; their sines do not repeat together.
+/// Speed, turn and tilts so many seconds after the rest; their sines do not repeat together.
 Motion without_derivatives(const MadeDrive& how, double t) {
   Motion m;
   if (t <= 0.0) return m;

@@ -65,7 +65,7 @@ class FleetCommand : public testing::Test {
     return file.string();
   }
 
-  /// All tables of results, one behind the other.
+  /// All tables of results, one after the other.
   std::string results(const std::string& file) {
     const auto tables = folder_ / "tables";
     std::filesystem::remove_all(tables);

@@ -240,6 +240,46 @@ TEST(WholeUnit, HoldsTheMeansOfItsDrives) {
   expect_recorded("fleet/unit.txt", unit.dump(1), 1e-4, 1e-9);
 }
 
+/// What a study writes of two S-IMUs that sat alike in all drives.
+void write_mountings(const fs::path& run, int drive, double variance) {
+  json covariance = json::array();
+  for (int i = 0; i < 36; ++i) covariance.push_back(i % 7 == 0 ? variance * (1 + i) : 1e-8);
+  const double turn = 0.3 + 1e-3 * chance(drive);
+  json imus = json::array();
+  for (const char* name : {"other", "imu"}) {
+    imus.push_back(
+        {{"name", name},
+         {"status", "calibrated"},
+         {"C_b_s", {std::cos(turn), -std::sin(turn), 0, std::sin(turn), std::cos(turn), 0, 0, 0, 1}},
+         {"r_bs_b_m", {0.35, -0.22 + 3e-3 * chance(drive, 1), 0.12}},
+         {"covariance_psi_r", covariance}});
+  }
+  fs::create_directories(run);
+  write_file(run / "calibration.json", json{{"schema", "imuscope.calibration/1"}, {"imus", imus}}.dump());
+  write_file(run / "run.json",
+             json{{"schema", "imuscope.run/1"}, {"inputs", {fmt::format("drive{}", drive)}}}.dump());
+}
+
+TEST(WholeUnit, CombinesTheMountingsOfItsDrives) {
+  std::string text;
+  for (const double variance : {1e-6, -1.0}) {
+    const auto folder = scratch_folder() / (variance > 0.0 ? "right" : "wrong");
+    fs::create_directories(folder);
+    const auto fleet = make_fleet(folder, 1, 3);
+    const auto plan = *fleet::plan_campaign(fleet, kMadeProgram);
+    int drive = 0;
+    for (const auto& task : plan.studies) {
+      publish(task, result_of_drive(task, 0, drive));
+      write_mountings(task.out / "studies" / task.key / "run", drive, variance);
+      ++drive;
+    }
+    ASSERT_TRUE(fleet::do_unit(plan.units.front(), kMadeProgram));
+    const auto file = plan.units.front().out / "units" / (plan.units.front().key + ".json");
+    text += json::parse(content_of(file))["mountings"].dump(1) + "\n";
+  }
+  expect_recorded("fleet/unit_mountings.txt", text, 1e-4, 1e-9);
+}
+
 TEST(FleetPictures, DrawTheMapToItsScale) {
   std::string text;
   const auto draw = [&](const std::string& title, const std::vector<fleet::MapTrack>& tracks) {

@@ -70,7 +70,7 @@ void forge(raw_t& raw, Choices& choices) {
   }
 }
 
-/// Another value behind one '=' of the configuration, or another key.
+/// Another value after one '=' of the configuration, or another key.
 void forge(run_t& run, Choices& choices) {
   switch (choices.below(4)) {
     case 0:

@@ -13,7 +13,7 @@
 
 namespace imuscope::fuzz {
 
-/// Choices in the order of the input's bytes; zeros behind its end.
+/// Choices in the order of the input's bytes; zeros after its end.
 class Choices {
  public:
   explicit Choices(std::span<const std::uint8_t> input) : rest_(input) {}

@@ -108,7 +108,7 @@ class HostileCapture : public testing::Test {
       text.replace(at, from.size(), to);
   }
 
-  std::vector<LogEvent> added_;  ///< behind the first one
+  std::vector<LogEvent> added_;  ///< after the first one
   std::filesystem::path scratch_ = scratch_folder();
   std::filesystem::path home_ = scratch_ / "one" / "two";
 };

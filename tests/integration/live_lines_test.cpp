@@ -19,7 +19,7 @@ namespace {
 constexpr std::chrono::seconds kRun{38};
 /// Before the first fault; by then every line is open and the baud rate found.
 constexpr double kSettled_s = 83.0;
-/// Behind those of the first group.
+/// After those of the first group.
 constexpr double kBetween_s = 89.5;
 
 constexpr const char* kFaults = R"(

@@ -109,7 +109,7 @@ double processor_s(pid_t process) {
   if (!std::getline(stat, text)) return std::numeric_limits<double>::quiet_NaN();
   std::istringstream fields(text.substr(text.rfind(')') + 2));
   std::string field;
-  constexpr int kUserTime = 11;  // of those behind the name: utime, then stime (proc(5))
+  constexpr int kUserTime = 11;  // of those after the name: utime, then stime (proc(5))
   for (int i = 0; i <= kUserTime; ++i) fields >> field;
   double ticks = std::stod(field);
   if (fields >> field) ticks += std::stod(field);

@@ -1,6 +1,6 @@
 /// The PC is suspended for half a minute in the midst of a drive: its clock stands still, the devices go on,
 /// what they send is lost. The run knows of the time that is missing, loses no mounting, and UTC is right
-/// behind it.
+/// after it.
 
 #include <gtest/gtest.h>
 #include <cmath>

@@ -51,7 +51,7 @@ TEST(MessageCodec, AClaimedLengthTakesNoMemoryThatTheMessageCannotFill) {
 }
 
 TEST(MessageCodec, AStringHasAtLeastItsZero) {
-  constexpr std::size_t kNameLengthAt = 24;  // behind fingerprint, utime and sequence
+  constexpr std::size_t kNameLengthAt = 24;  // after fingerprint, utime and sequence
   const std::vector<std::uint8_t> message = encode_message(raw_of(0));
   ASSERT_EQ(message[kNameLengthAt + 3], std::string("mtx1").size() + 1);
   for (const unsigned sign : {0x00U, 0x80U, 0xFFU}) {  // 0, the least number there is, one of the negative

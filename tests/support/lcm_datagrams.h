@@ -66,7 +66,7 @@ class BusSender {
                   sizeof bus) == static_cast<ssize_t>(datagram.size());
   }
 
-  /// The two that make liblcm 1.3.1 write 4 GiB behind its buffer: the sum of the second one's offset and
+  /// The two that make liblcm 1.3.1 write 4 GiB past its buffer: the sum of the second one's offset and
   /// size is taken in 32 bits.
   [[nodiscard]] bool send_two_that_kill(std::string_view channel) const {
     constexpr std::uint32_t kMessageBytes = 1000;

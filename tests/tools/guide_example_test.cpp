@@ -41,7 +41,7 @@ void write_signal(const std::filesystem::path& file, unsigned seed, double noisi
 
 class GuideExample : public testing::Test {
  protected:
-  /// The first block in this language behind the example's heading.
+  /// The first block in this language after the example's heading.
   std::string block(const std::string& language) const {
     const std::string begin = "```" + language + "\n";
     const auto from = guide_.find(begin, guide_.find("## A worked example"));

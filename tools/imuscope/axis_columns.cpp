@@ -70,7 +70,7 @@ struct Unit {
   double factor = 1.0;
 };
 
-/// The unit at the end of a name, by the words behind the axis.
+/// The unit at the end of a name, by the words after the axis.
 Unit unit_of(const Tokens& tokens, std::size_t behind, bool gyro) {
   std::string rest;
   for (std::size_t i = behind; i < tokens.size(); ++i) rest += tokens[i];

@@ -69,7 +69,7 @@ std::size_t end_of_cell(std::string_view line, char separator) {
              : end;
 }
 
-/// @param most  cells behind these are left out
+/// @param most  cells after these are left out
 void split(std::string_view line, char separator, std::vector<std::string_view>& cells,
            std::size_t most = std::numeric_limits<std::size_t>::max()) {
   cells.clear();
@@ -394,7 +394,7 @@ class CsvReader {
   std::vector<std::string_view> cells_;
   SignalTable table_;
   std::vector<std::size_t> indices_;  ///< of the wanted columns
-  std::size_t last_read_ = 0;         ///< nothing behind this cell is looked at
+  std::size_t last_read_ = 0;         ///< nothing after this cell is looked at
   std::vector<double> row_;
   std::optional<std::size_t> where_index_;
   std::string wanted_;

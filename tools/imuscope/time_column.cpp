@@ -129,7 +129,7 @@ double period_of(std::span<const double> stamps_s, const std::vector<double>& st
   return sum / static_cast<double>(n);
 }
 
-/// Samples missing before every row: by how many periods it and the rows behind it are late.
+/// Samples missing before every row: by how many periods it and the rows after it are late.
 std::vector<std::int64_t> holes_of(std::span<const double> stamps_s, double period_s) {
   std::vector<std::int64_t> missing(stamps_s.size(), 0);
   const auto lateness = [&](std::size_t i) {

@@ -88,7 +88,7 @@ class Forger {
     throw std::runtime_error("the honest capture is shorter than what is to be made of it");
   }
 
-  /// A share of the size in honest records; what is put behind them has a run to belong to.
+  /// A share of the size in honest records; what is put after them has a run to belong to.
   void put_honest() {
     const std::size_t bytes = bytes_;
     constexpr std::size_t kShare = 4;

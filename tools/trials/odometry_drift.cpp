@@ -3,7 +3,7 @@
 /// class of reference, beside the filter's own sd.
 ///
 /// Every drive is another road and other sensors. In each, GNSS is cut at 130 s + k * 120 s + a part of a
-/// minute that differs from drive to drive, and the minute behind a cut lets the filter settle again.
+/// minute that differs from drive to drive, and the minute after a cut lets the filter settle again.
 ///
 /// Exits 0 only where all three together drift less than the inertial sensors alone, for either reference.
 

@@ -192,7 +192,7 @@ class Estimator::Impl final : public EpochSink {
             !studies_[j].fits_prior_of(studies_[i].config()))
           continue;
         swap_told_[i] = swap_told_[j] = true;
-        log_.add(event::StudiesSwapped{studies_[i].config().device}, studies_[j].config().device, now);
+        log_.add(event::SImusSwapped{studies_[i].config().device}, studies_[j].config().device, now);
       }
     }
   }

@@ -97,7 +97,7 @@ struct LeverArmPriorWrong {
   double distance_m;
 };
 /// Two S-IMUs sit where the configuration has the other.
-struct StudiesSwapped {
+struct SImusSwapped {
   DeviceIndex other;
 };
 /// Since before a silence.
@@ -130,7 +130,7 @@ using EventPayload =
                  event::CoarseAlignmentPoor, event::MountingChanged, event::SImuReturned, event::GnssRejected,
                  event::GnssReacquired, event::GnssInconsistent, event::OdometryLost, event::OdometryReturned,
                  event::OdometryRejected, event::OdometryAccepted, event::CovarianceRepaired,
-                 event::BoresightPriorWrong, event::LeverArmPriorWrong, event::StudiesSwapped,
+                 event::BoresightPriorWrong, event::LeverArmPriorWrong, event::SImusSwapped,
                  event::GyroBiasChanged, event::AccelBiasChanged, event::SImuInconsistent,
                  event::NoiseTooSmall>;
 

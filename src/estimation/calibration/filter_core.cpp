@@ -75,7 +75,7 @@ FilterCore::FilterCore(const EstimatorConfig& config)
     covariance_.reset_state(kGyroBiasError + i, repair_variance_[kGyroBiasError + i]);
     covariance_.reset_state(kAccelBiasError + i, repair_variance_[kAccelBiasError + i]);
   }
-  // E-1; behind the S-IMUs the odometry's states (E-33) and the antenna's (N-34).
+  // E-1; after the S-IMUs the odometry's states (E-33) and the antenna's (N-34).
   std::size_t first = kNavigationStates;
   studies_.resize(config.studies.size());
   for (std::size_t i = 0; i < config.studies.size(); ++i) {

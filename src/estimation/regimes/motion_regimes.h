@@ -31,7 +31,7 @@ RegimeTrack static_and_dynamic(const MotionLevels& levels, const std::vector<Mot
 enum class Intensity : std::uint8_t { kRate, kVibration, kSpeed };
 
 /// "static", then "intensity 1 of n" (least) to "intensity n of n": the dynamic stretches in blocks of
-/// `block_s`, split at the quantiles of their rms rate, vibration or mean speed. Behind another block, a
+/// `block_s`, split at the quantiles of their rms rate, vibration or mean speed. After another block, a
 /// block crosses an edge between two bins only where it lies clear of it by kIntensityEdge of the edge's
 /// value (hysteresis). Blocks without a measure belong to no regime. Precondition: bins >= 2, block_s > 0.
 inline constexpr double kIntensityEdge = 0.05;

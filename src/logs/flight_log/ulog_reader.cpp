@@ -133,7 +133,7 @@ bool UlogReader::read_message() {
   const char kind = static_cast<char>(head[2]);
   const bool is_unknown = kKinds.find(kind) == std::string_view::npos;
   if (is_unknown || kHead + size > left) {
-    // A message that leads beyond the end is damage where the file goes on, and else the cut. Behind a cut
+    // A message that leads beyond the end is damage where the file goes on, and else the cut. After a cut
     // may stand what was appended.
     const std::uint64_t begin = window_.position();
     const bool goes_on = find_synchronisation();

@@ -51,7 +51,7 @@ class CdrWriter {
 /// How the fields of a message of ROS lie in its bytes.
 enum class Wire : std::uint8_t {
   kCdr,   ///< ROS 2
-  kRos1,  ///< one after the other, little-endian, no head, no zero behind texts
+  kRos1,  ///< one after the other, little-endian, no head, no zero after texts
 };
 
 /// Takes fields one after the other; what is asked for beyond the end is zero, and good() says so.

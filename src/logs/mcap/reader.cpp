@@ -40,39 +40,28 @@ Result<Reader> Reader::open(const std::filesystem::path& file) {
 Reader::Reader(std::ifstream in, std::uint64_t size, std::string name)
     : in_(std::move(in)), size_(size), name_(std::move(name)), position_(kMagic.size()) {}
 
-bool Reader::read_exactly(std::uint64_t n, std::string& out) {
-  out.resize(n);
-  in_.read(out.data(), static_cast<std::streamsize>(n));
-  const bool all = in_.gcount() == static_cast<std::streamsize>(n);
-  if (!all) {
-    out.resize(static_cast<std::size_t>(std::max<std::streamsize>(in_.gcount(), 0)));
-    in_.clear();
-  }
-  return all;
-}
-
 void Reader::skip(std::uint64_t n) {
   position_ += n;
   in_.seekg(static_cast<std::streamoff>(position_));
 }
 
-/// Where the summary says that chunks begin: the way on behind damage.
+/// Where the summary says that chunks begin: the way on after damage.
 void Reader::find_chunks() {
   constexpr std::uint64_t kEnd = kRecordHead + kFooterContent + kMagic.size();
   if (size_ >= kMagic.size() + kEnd) {
     in_.seekg(static_cast<std::streamoff>(size_ - kEnd));
     std::string end;
-    if (read_exactly(kEnd, end)) {
+    if (read_exactly(in_, kEnd, end)) {
       const auto footer = record_at(bytes_of(end));
       has_footer_ = footer && footer->opcode == Opcode::kFooter && footer->content.size() == kFooterContent &&
                     std::memcmp(end.data() + footer->size, kMagic.data(), kMagic.size()) == 0;
       if (has_footer_) {
         const auto start = RecordReader(footer->content).number<std::uint64_t>();
-        const std::uint64_t behind = size_ - kEnd;
+        const std::uint64_t end_at = size_ - kEnd;
         std::string summary;
-        if (start >= kMagic.size() && start < behind && behind - start <= kSummaryMost) {
+        if (start >= kMagic.size() && start < end_at && end_at - start <= kSummaryMost) {
           in_.seekg(static_cast<std::streamoff>(start));
-          (void)read_exactly(behind - start, summary);
+          (void)read_exactly(in_, end_at - start, summary);
         }
         Bytes rest = bytes_of(summary);
         for (auto record = record_at(rest); record; record = record_at(rest)) {
@@ -92,7 +81,7 @@ void Reader::find_chunks() {
   in_.seekg(static_cast<std::streamoff>(position_));
 }
 
-bool Reader::go_on_behind_damage(std::uint64_t from) {
+bool Reader::go_on_after_damage(std::uint64_t from) {
   const auto next = std::upper_bound(chunk_offsets_.begin(), chunk_offsets_.end(), from);
   if (next == chunk_offsets_.end() || *next >= size_) {
     loss_.bytes += size_ - std::min(size_, from);
@@ -110,7 +99,7 @@ bool Reader::go_on_behind_damage(std::uint64_t from) {
 bool Reader::read_record() {
   const std::uint64_t begin = position_;
   std::string head;
-  if (!read_exactly(kRecordHead, head)) {
+  if (!read_exactly(in_, kRecordHead, head)) {
     loss_.cut_off = true;
     return false;
   }
@@ -121,10 +110,10 @@ bool Reader::read_record() {
   if (opcode == Opcode::kDataEnd || opcode == Opcode::kFooter) return false;
   const bool is_known = opcode >= Opcode::kHeader && opcode <= Opcode::kDataEnd;
   constexpr std::uint8_t kFirstPrivate = 0x80;
-  if (!is_known && static_cast<std::uint8_t>(opcode) < kFirstPrivate) return go_on_behind_damage(begin);
+  if (!is_known && static_cast<std::uint8_t>(opcode) < kFirstPrivate) return go_on_after_damage(begin);
   // What is cut off at the end of the file is damage where the file goes on by its index.
   const bool is_cut = length > left;
-  if (is_cut && has_footer_) return go_on_behind_damage(begin);
+  if (is_cut && has_footer_) return go_on_after_damage(begin);
   position_ = begin + kRecordHead;
   if (is_cut) loss_.cut_off = true;
   const bool is_wanted = opcode == Opcode::kChunk || opcode == Opcode::kMessage ||
@@ -136,7 +125,7 @@ bool Reader::read_record() {
     skip(there);
     return !is_cut;
   }
-  (void)read_exactly(there, record_);
+  (void)read_exactly(in_, there, record_);
   position_ += record_.size();
   const Bytes content = bytes_of(record_);
   if (opcode == Opcode::kChunk) take_chunk(content, !is_cut);

@@ -42,10 +42,9 @@ class Reader final : public MessageReader {
   };
   explicit Reader(std::ifstream in, std::uint64_t size, std::string name);
   bool read_record();
-  bool read_exactly(std::uint64_t n, std::string& out);
   void skip(std::uint64_t n);
   void find_chunks();
-  bool go_on_behind_damage(std::uint64_t from);
+  bool go_on_after_damage(std::uint64_t from);
   void take_chunk(Bytes content, bool is_whole);
   void lose_chunk(std::string why);
   void take_definition(const Record& record);
@@ -69,7 +68,7 @@ class Reader final : public MessageReader {
   std::map<std::uint16_t, std::unique_ptr<Topic>> topics_;
   std::string record_;   ///< content of the record that was read
   std::string chunk_;    ///< unpacked
-  Bytes rest_of_chunk_;  ///< behind the message that was handed out
+  Bytes rest_of_chunk_;  ///< after the message that was handed out
   Bytes single_;         ///< a message outside a chunk
   Loss loss_;
 };

@@ -2,7 +2,20 @@
 
 #include <zlib.h>
 
+#include <algorithm>
+
 namespace imuscope::mcap {
+
+bool read_exactly(std::istream& in, std::uint64_t n, std::string& out) {
+  out.resize(n);
+  in.read(out.data(), static_cast<std::streamsize>(n));
+  const bool all = in.gcount() == static_cast<std::streamsize>(n);
+  if (!all) {
+    out.resize(static_cast<std::size_t>(std::max<std::streamsize>(in.gcount(), 0)));
+    in.clear();
+  }
+  return all;
+}
 
 void RecordWriter::text(std::string_view text) {
   number(static_cast<std::uint32_t>(text.size()));

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <istream>
 #include <map>
 #include <optional>
 #include <span>
@@ -20,6 +21,9 @@ static_assert(std::endian::native == std::endian::little, "numbers are written a
 
 using Bytes = std::span<const std::uint8_t>;
 using Texts = std::map<std::string, std::string>;
+
+/// Reads `n` bytes; what there is, and false, where there are fewer. The stream can be read on in either case.
+bool read_exactly(std::istream& in, std::uint64_t n, std::string& out);
 
 /// Appends the fields of records.
 class RecordWriter {

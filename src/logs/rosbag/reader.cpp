@@ -94,37 +94,26 @@ Result<Reader> Reader::open(const std::filesystem::path& file) {
 Reader::Reader(std::ifstream in, std::uint64_t size, std::string name)
     : in_(std::move(in)), size_(size), name_(std::move(name)) {}
 
-bool Reader::read_exactly(std::uint64_t n, std::string& out) {
-  out.resize(n);
-  in_.read(out.data(), static_cast<std::streamsize>(n));
-  const bool all = in_.gcount() == static_cast<std::streamsize>(n);
-  if (!all) {
-    out.resize(static_cast<std::size_t>(std::max<std::streamsize>(in_.gcount(), 0)));
-    in_.clear();
-  }
-  return all;
-}
-
 void Reader::go_to(std::uint64_t position) {
   position_ = position;
   in_.clear();
   in_.seekg(static_cast<std::streamoff>(position_));
 }
 
-/// Where the index says that chunks begin: the way on behind damage.
+/// Where the index says that chunks begin: the way on after damage.
 void Reader::find_chunks() {
   std::string length;
   std::uint64_t index = 0;
-  if (read_exactly(sizeof(std::uint32_t), length)) {
+  if (mcap::read_exactly(in_, sizeof(std::uint32_t), length)) {
     const auto n = mcap::RecordReader(bytes_of(length)).number<std::uint32_t>();
-    if (n <= kHeaderMost && read_exactly(n, header_))
+    if (n <= kHeaderMost && mcap::read_exactly(in_, n, header_))
       index = number<std::uint64_t>(header_, "index_pos").value_or(0);
   }
   has_index_ = index > kMagic.size() && index < size_;
   if (has_index_ && size_ - index <= mcap::kSummaryMost) {
     std::string summary;
     go_to(index);
-    (void)read_exactly(size_ - index, summary);
+    (void)mcap::read_exactly(in_, size_ - index, summary);
     Bytes rest = bytes_of(summary);
     for (;;) {
       const auto header = take_sized(rest);
@@ -138,7 +127,7 @@ void Reader::find_chunks() {
   go_to(kMagic.size());
 }
 
-void Reader::go_on_behind_damage(std::uint64_t from) {
+void Reader::go_on_after_damage(std::uint64_t from) {
   const auto next = std::upper_bound(chunk_offsets_.begin(), chunk_offsets_.end(), from);
   const bool is_there = next != chunk_offsets_.end() && *next < size_;
   const std::uint64_t to = is_there ? *next : size_;
@@ -153,7 +142,7 @@ bool Reader::read_record() {
   if (begin >= size_) return false;
   std::string length;
   const auto read_length = [&](std::uint32_t most, std::uint32_t& n) {
-    if (!read_exactly(sizeof n, length)) return false;
+    if (!mcap::read_exactly(in_, sizeof n, length)) return false;
     n = mcap::RecordReader(bytes_of(length)).number<std::uint32_t>();
     position_ += sizeof n;
     return n <= most;
@@ -164,12 +153,12 @@ bool Reader::read_record() {
       position_ = size_;
       return false;
     }
-    go_on_behind_damage(begin);
+    go_on_after_damage(begin);
     return !at_end_;
   };
   std::uint32_t n = 0;
   if (!read_length(kHeaderMost, n)) return cut_or_damaged(size_ - begin < 2 * sizeof n);
-  if (!read_exactly(n, header_))
+  if (!mcap::read_exactly(in_, n, header_))
     return cut_or_damaged(chunk_offsets_.empty() || begin > chunk_offsets_.back());
   position_ += n;
   const auto op = number<std::uint8_t>(header_, "op");
@@ -177,7 +166,7 @@ bool Reader::read_record() {
   if (!read_length(~std::uint32_t{0}, n)) return cut_or_damaged(true);
   const std::uint64_t left = size_ - std::min(size_, position_);
   const bool is_cut = n > left;
-  // What leads behind the end is damage where the file goes on by its index.
+  // What leads beyond the end is damage where the file goes on by its index.
   if (is_cut && std::upper_bound(chunk_offsets_.begin(), chunk_offsets_.end(), begin) != chunk_offsets_.end())
     return cut_or_damaged(false);
   const std::uint64_t there = std::min<std::uint64_t>(n, left);
@@ -189,7 +178,7 @@ bool Reader::read_record() {
     go_to(position_ + there);
     return !is_cut;
   }
-  (void)read_exactly(there, data_);
+  (void)mcap::read_exactly(in_, there, data_);
   position_ += data_.size();
   if (*op == kChunk) take_chunk(header_, bytes_of(data_), !is_cut);
   if (*op == kConnection && !is_cut) take_connection(header_, bytes_of(data_));

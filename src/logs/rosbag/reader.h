@@ -45,9 +45,8 @@ class Reader final : public mcap::MessageReader {
   Reader(std::ifstream in, std::uint64_t size, std::string name);
   void find_chunks();
   bool read_record();
-  bool read_exactly(std::uint64_t n, std::string& out);
   void go_to(std::uint64_t position);
-  void go_on_behind_damage(std::uint64_t from);
+  void go_on_after_damage(std::uint64_t from);
   void take_chunk(std::string_view header, mcap::Bytes packed, bool is_whole);
   void lose_chunk(std::string why);
   void take_connection(std::string_view header, mcap::Bytes data);

@@ -93,7 +93,7 @@ Lowest lowest_of(const noise::Model& model, std::span<const noise::AllanPoint> a
   return lowest;
 }
 
-/// Whether the record shows that the curve rises behind its lowest point: some later interval lies above the
+/// Whether the record shows that the curve rises after its lowest point: some later interval lies above the
 /// lowest point's.
 bool rises_after(std::span<const noise::AllanPoint> allan, std::size_t lowest) {
   return std::any_of(allan.begin() + static_cast<std::ptrdiff_t>(lowest), allan.end(),

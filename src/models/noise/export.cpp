@@ -51,7 +51,7 @@ struct Written {
   Knowledge knowledge = Knowledge::kFitted;
 };
 
-/// Behind a number in a comment.
+/// After a number in a comment.
 std::string mark(const Written& written) {
   if (written.knowledge == Knowledge::kBound) return "; an upper bound, the record tells no more";
   return written.knowledge == Knowledge::kUnknown ? "; not known from this record" : "";

@@ -94,7 +94,7 @@ IMUSCOPE_CLONES PairOfSums two_levels_of_stretch(double* f, std::size_t n, std::
   return sums;
 }
 
-/// Takes `level` and the next one from `length` block sums at `f`, n places from a sum to the one behind it,
+/// Takes `level` and the next one from `length` block sums at `f`, n places from a sum to the one after it,
 /// and leaves the length - 3n sums of the level after them there. Squares count for the first `own` positions
 /// only, sums go on beyond them. Precondition: length > 3n.
 template <typename Add>
@@ -117,7 +117,7 @@ void take_two_levels(double* f, int level, std::size_t n, std::size_t length, st
 }
 
 /// Levels first..last, as far as `length` sums of 2^(first-1) samples reach, n places from a sum to the one
-/// behind it.
+/// after it.
 template <typename Add>
 void take_levels(double* f, int first, int last, std::size_t n, std::size_t length, std::size_t own,
                  const Add& add) {

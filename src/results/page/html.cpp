@@ -136,7 +136,7 @@ Html Table::html() const {
 }
 
 Html svg_image(const std::string& svg, std::string_view words) {
-  // Four characters for three bytes, and the zero that the encoder writes behind them.
+  // Four characters for three bytes, and the zero that the encoder writes after them.
   std::string base64(4 * ((svg.size() + 2) / 3) + 1, '\0');
   const int length =
       EVP_EncodeBlock(reinterpret_cast<unsigned char*>(base64.data()),

@@ -61,7 +61,7 @@ Html fold(std::string_view summary, const Html& content, bool open = false);
 std::string json_for_script(const std::string& json);
 
 /// A table with a heading row. The first cell of a row is its heading. Where the page is too narrow for it,
-/// every row becomes a list of its cells, each behind its heading.
+/// every row becomes a list of its cells, each after its heading.
 class Table {
  public:
   explicit Table(std::vector<Html> headings) : headings_(std::move(headings)) {}
@@ -84,7 +84,7 @@ Html svg_image(const std::string& svg, std::string_view words);
 std::string page_without_script(std::string_view title, const Html& body);
 
 /// A whole page that runs the script given and no other, and loads nothing.
-/// @param style  behind the kit's
+/// @param style  after the kit's
 /// @param data   JSON that the script finds in the element `data`
 std::string page_with_script(std::string_view title, const Html& body, std::string_view style,
                              const std::string& data, std::string_view script);

@@ -7,7 +7,7 @@
 namespace imuscope::report {
 
 std::string_view page_template();    ///< page.html, with {{placeholders}}
-std::string_view page_style();       ///< page.css: plots, behind the kit's styles
+std::string_view page_style();       ///< page.css: plots, after the kit's styles
 std::string_view page_script();      ///< page.js
 std::string_view plotting_notice();  ///< licence of the plotting library
 std::string_view plotting_style();   ///< dygraph.min.css

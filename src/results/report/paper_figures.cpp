@@ -51,7 +51,7 @@ GnuplotScript block_of(const GnuplotScript& name, const BinnedSignals& signals, 
   return block.add("EOD\n");
 }
 
-/// Band of columns 3 and 4 behind the line of column 2.
+/// Band of columns 3 and 4 after the line of column 2.
 GnuplotScript band_plot(const GnuplotScript& block, const GnuplotWord& colour) {
   return GnuplotScript::of(
       "plot ${0} using 1:3:4 with filledcurves fillcolor rgb '{1}' fillstyle transparent solid 0.25 noborder "

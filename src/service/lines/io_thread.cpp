@@ -124,7 +124,7 @@ class IoThread::Line final : public SampleSink {
     }
   }
 
-  /// The bytes of a read, which lie behind room for its stamp.
+  /// The bytes of a read, which lie after room for its stamp.
   std::span<const std::uint8_t> record(RawTap& tap, std::size_t n, const Arrival& arrival) noexcept {
     const std::span<const std::uint8_t> all(buffer_.data(), kReceivedBytes + n);
     if (arrival.received == arrival.read) {
@@ -246,7 +246,7 @@ class IoThread::Line final : public SampleSink {
   HostTime listens_since_{};
   std::optional<HostTime> since_;  ///< in the midst of a frame, rests since then
   int beats_ = 0;                  ///< of rest that are left
-  std::array<std::uint8_t, kReceivedBytes + kReadBytes> buffer_{};  ///< a read, behind room for its stamp
+  std::array<std::uint8_t, kReceivedBytes + kReadBytes> buffer_{};  ///< a read, after room for its stamp
   LineStatus status_;
   std::uint64_t dropped_before_ = 0;  ///< on the connections before this one
   LatencyWindow latency_;

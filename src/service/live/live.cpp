@@ -214,14 +214,6 @@ class StandingThreads {
   std::size_t told_ = 0;
 };
 
-/// A count that grows is the same thing said again.
-bool says_the_same(std::string a, std::string b) {
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::erase_if(a, is_digit);
-  std::erase_if(b, is_digit);
-  return a == b;
-}
-
 void reload(const Configuration& configuration, LivePublisher& publisher) {
   const auto read = reload_configuration(configuration);
   if (!read) {

@@ -116,7 +116,7 @@ struct EventSentence {
         "{}: its lever arm is {:.2f} m from what [device.prior] says; check mounting and prior", name,
         e.distance_m);
   }
-  std::string operator()(const event::StudiesSwapped& e) const {
+  std::string operator()(const event::SImusSwapped& e) const {
     return fmt::format("{} and {} sit where the configuration has the other: swapped cables, ports or names?",
                        name, configuration.devices[e.other].name);
   }

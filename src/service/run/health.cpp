@@ -59,6 +59,13 @@ std::string first_trouble(const status_t& status) {
 
 }  // namespace
 
+bool says_the_same(std::string a, std::string b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::erase_if(a, is_digit);
+  std::erase_if(b, is_digit);
+  return a == b;
+}
+
 bool streams(const device_status_t& device) { return device.state == "streaming"; }
 
 Health judge(const status_t& status) {

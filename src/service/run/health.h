@@ -21,6 +21,9 @@ struct Health {
   std::string reason;
 };
 
+/// Whether two reasons differ in their numbers at most: a count that grows is the same thing said again.
+[[nodiscard]] bool says_the_same(std::string a, std::string b);
+
 /// Whether samples come.
 [[nodiscard]] bool streams(const device_status_t& device);
 

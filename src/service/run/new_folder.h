@@ -10,7 +10,7 @@
 
 namespace imuscope {
 
-/// Makes PARENT/NAME-YYYYMMDD-HHMMSS, with "-2", "-3" and so on behind it where that is there already: a PC
+/// Makes PARENT/NAME-YYYYMMDD-HHMMSS, with "-2", "-3" and so on after it where that is there already: a PC
 /// without a battery for its clock begins at the same time again and again, and summer time ends. Missing
 /// parents are made.
 /// @param name  of the run

@@ -35,7 +35,7 @@ class NumberRanges {
 
  private:
   std::map<std::int64_t, std::int64_t>
-      rows_;  ///< first number, and the one behind the last; apart from each other
+      rows_;  ///< first number, and the one after the last; apart from each other
 };
 
 }  // namespace imuscope

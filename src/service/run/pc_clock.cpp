@@ -35,7 +35,7 @@ std::optional<KernelClockState> read_kernel_clock() noexcept {
   if (state < 0) return std::nullopt;
   constexpr double kMicro = 1e-6;
   constexpr double kNano = 1e-9;
-  constexpr double kPpmPerUnit = 1.0 / 65536.0;  // 16 bits behind the point
+  constexpr double kPpmPerUnit = 1.0 / 65536.0;  // 16 bits after the point
   KernelClockState told;
   told.status = clock.status;
   told.is_synchronised = state != TIME_ERROR && (clock.status & STA_UNSYNC) == 0;

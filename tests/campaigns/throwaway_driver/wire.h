@@ -1,7 +1,7 @@
 #pragma once
 
 /// The wire of a device that nobody makes: sync AC 3E, sample counter (16 bits), angular rate in rad/s and specific
-/// force in m/s^2 (x, y, z; 32-bit floats), sum of the bytes behind the sync modulo 256. Little-endian.
+/// force in m/s^2 (x, y, z; 32-bit floats), sum of the bytes after the sync modulo 256. Little-endian.
 
 #include <cstddef>
 #include <cstdint>

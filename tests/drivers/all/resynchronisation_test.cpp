@@ -1,4 +1,4 @@
-// After any fault the search goes on at the byte behind the false start: for every protocol, at every
+// After any fault the search goes on at the byte after the false start: for every protocol, at every
 // position of a stream, a fault loses only the frames that it touches.
 #include <gtest/gtest.h>
 

@@ -537,6 +537,16 @@ TEST(CanOdometryWhole, GapsAreLearnedFromTheStamps) {
   test::expect_recorded("drivers/can_odometry/gaps.txt", text);
 }
 
+// The configured rate is the first idea of it, however little was learned.
+TEST(CanOdometry, ALossIsSeenAsSoonAsARateIsLearned) {
+  constexpr int kSetsToLearn = 64;
+  Rig rig(rear_wheels(), {.rate_hz = 50.0});
+  for (int i = 0; i < kSetsToLearn + 1; ++i) rig.rear(3600, 3960);
+  rig.now += 14ms;
+  rig.rear(3600, 3960);
+  EXPECT_EQ(rig.decoder->counters().samples_lost, 1U);
+}
+
 TEST(CanOdometryWhole, WhatIsPossible) {
   std::string text;
   for (const int after : {3600, 3600 + 359, 3600 + 361, 3600 + 503, 3600 + 505, 7300, 35'900, -3600}) {

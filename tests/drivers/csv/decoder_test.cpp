@@ -125,7 +125,7 @@ TEST(CsvImu, ThePeriodIsLearnedWhereNoneIsConfigured) {
   ImuDecoder decoder({});
   std::string text(kHeader);
   for (int i = 0; i < 30; ++i) text += std::to_string(0.02 * i) + ",1,2,3,4,5,6\n";
-  text += "0.70,1,2,3,4,5,6\n";  // row 35 of the 50 Hz grid behind row 29
+  text += "0.70,1,2,3,4,5,6\n";  // row 35 of the 50 Hz grid after row 29
   const auto samples = decode(decoder, text);
   ASSERT_EQ(samples.size(), 31U);
   EXPECT_EQ(decoder.counters().samples_lost, 5U);

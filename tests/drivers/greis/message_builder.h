@@ -76,7 +76,7 @@ inline Bytes sg(float hpos, float vpos, float hvel, float vvel, U8 type) {
   return greis_message("SG", Body().put(hpos).put(vpos).put(hvel).put(vvel).put(type));
 }
 
-/// Messages one behind the other, CR LF after each.
+/// Messages one after the other, CR LF after each.
 inline Bytes lines(std::initializer_list<Bytes> messages) {
   Bytes all;
   for (const Bytes& message : messages) {

@@ -40,7 +40,7 @@ class CollectingSink final : public SampleSink {
 /// Scans a stream that comes in the given reads, to its end; returns the bytes of each valid frame.
 using Scan = std::function<std::vector<Bytes>(std::span<const Bytes> reads)>;
 
-/// The properties. `frames` stand one behind the other, each followed by `separator`; they must be distinct.
+/// The properties. `frames` stand one after the other, each followed by `separator`; they must be distinct.
 /// Required: a frame that a fault does not touch is found; no frame appears that was not sent, unless
 /// `may_appear` allows it (a protocol whose messages are not all protected).
 struct StreamUnderTest {
@@ -62,7 +62,7 @@ void expect_every_split_keeps_all_frames(const StreamUnderTest& stream);
 void expect_every_bit_flip_loses_only_its_frame(const StreamUnderTest& stream);
 void expect_every_cut_loses_only_its_frames(const StreamUnderTest& stream);
 void expect_every_insertion_loses_only_its_frame(const StreamUnderTest& stream, std::uint32_t seed);
-/// Random bytes, rich in the stream's lures, before, between and behind the frames.
+/// Random bytes, rich in the stream's lures, before, between and after the frames.
 void expect_no_frame_in_garbage_is_lost(const StreamUnderTest& stream, std::uint32_t seed);
 
 }  // namespace imuscope::test

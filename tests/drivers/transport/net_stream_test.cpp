@@ -204,7 +204,7 @@ TEST(NetStream, ADatagramWithoutBytesIsPassedOverAndWhatIsSaidToASenderGoesNowhe
   EXPECT_EQ((*stream)->read(buffer).status, IoStatus::kNothing);
   EXPECT_EQ((*stream)->write(buffer).status, IoStatus::kNothing);
   EXPECT_EQ((*stream)->health().frames_dropped, 0U);
-  // Behind it stands what the system does not grant.
+  // After it stands what the system does not grant.
   EXPECT_EQ((*stream)->describe().rfind("udp://127.0.0.1:" + std::to_string(port), 0), 0U);
 }
 

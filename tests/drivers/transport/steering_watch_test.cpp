@@ -10,8 +10,14 @@
 #include <random>
 #include <vector>
 
+#include "tests/support/answer.h"
+#include "tests/support/recorded_answer.h"
+
 namespace imuscope {
 namespace {
+
+using test::Answer;
+using test::expect_recorded;
 
 constexpr double kPeriod_s = 0.02;
 
@@ -80,6 +86,33 @@ TEST(SteeringWatch, SmallCorrectionsFillNoCapture) {
   });
   EXPECT_LT(outcome.quantile(1.0), 1.2e-6);
   EXPECT_LT(outcome.told, 1200);
+}
+
+// A slow clock that is slewed, stepped by little, swings, and now and then is read badly.
+TEST(SteeringWatch, WhatItTellsOfOneClock) {
+  constexpr int kReadings = 4000;
+  const HostTime begin = host_time_from_ns(1'000'000'000'000);
+  const HostTime quartz_begin = host_time_from_ns(77'000'000'000'000);
+  SteeringWatch watch;
+  Answer answer;
+  double gained_s = 0.0;
+  for (int k = 0; k < kReadings; ++k) {
+    const double t_s = k * kPeriod_s;
+    const double ppm = k < 700    ? -20.0
+                       : k < 720  ? 480.0
+                       : k < 1500 ? 3.0
+                       : k < 2600 ? 12.0 * std::sin(0.01 * k)
+                                  : 1.0;
+    gained_s += ppm * 1e-6 * kPeriod_s + (k % 311 == 310 ? 1.7e-6 : 0.0);
+    const double noise_s = 0.15e-6 * std::sin(12.9898 * k) + (k % 97 == 96 ? 3e-6 : 0.0);
+    const Duration apart{100 + 37 * (k % 29)};
+    const HostTime host = begin + from_seconds(t_s + gained_s);
+    const HostTime quartz = quartz_begin + from_seconds(t_s + noise_s);
+    if (const auto news = watch.look({host, quartz, 0.0, apart}))
+      answer.line(k, (news->time - begin).count(), (news->unsteered - quartz_begin).count(),
+                  1e6 * news->rate);
+  }
+  expect_recorded("drivers/transport/steering_of_a_clock.txt", answer.text());
 }
 
 TEST(SteeringWatch, AReadingWhoseClocksLieApartIsNone) {

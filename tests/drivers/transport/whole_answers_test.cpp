@@ -151,7 +151,7 @@ TEST(TransportWhole, FilesOfCandump) {
             .append("DROPCOUNT (total drops 5)\nDROPCOUNT (total drops 3)\n(2.0) can0 0AA#01"),
         std::string("junk\n"), std::string("\n\n"), after(junk), after(junk + "junk\n"), after_line_of(510),
         after_line_of(511), after_line_of(512), after_line_of(600), good + after_line_of(600),
-        std::string("(1.0) can0 0AA#01")}) {
+        std::string("(1.0) can0 0AA#01"), std::string("(1.0) can0 0AA#01").append(600, ' ').append("\n")}) {
     std::ofstream(file, std::ios::binary) << content;
     auto log = CandumpLog::open(file);
     text += fmt::format("{} looks {}: ", content.size(), CandumpLog::looks_like_one(file));
@@ -264,7 +264,7 @@ TEST(TransportWhole, ASteeredClockLookedAtFiftyTimesASecond) {
   expect_recorded("drivers/transport/steering.txt", text);
 }
 
-/// A message with the kernel's words behind it.
+/// A message with the kernel's words after it.
 struct Told {
   alignas(cmsghdr) std::array<std::uint8_t, 256> control{};
   msghdr message{};

@@ -466,7 +466,47 @@ TEST(MtDecoder, AReceiverInsideGivesSolutionsWithUtcAndItsRtkState) {
   EXPECT_EQ(s.utc, day + std::chrono::seconds{45296} - std::chrono::microseconds{1});
 }
 
-/// Status byte, counter and, where wanted, UTC behind the orientation of a legacy message.
+TEST(XsensDecoder, TheReceiversSolutionKeepsEveryNumber) {
+  const GnssPvt pvt{.time_of_week_ms = 400'000'250,
+                    .year = 2026,
+                    .month = 3,
+                    .day = 14,
+                    .hour = 12,
+                    .minute = 34,
+                    .second = 56,
+                    .valid = 0x37,
+                    .time_accuracy_ns = 25,
+                    .nanoseconds = -125,
+                    .fix_type = 4,
+                    .flags = 0xFF,
+                    .n_satellites = 17,
+                    .reserved = 99,
+                    .longitude_1e7_deg = -66'000'001,
+                    .latitude_1e7_deg = 465'000'002,
+                    .height_mm = 450'003,
+                    .height_msl_mm = 400'004,
+                    .horizontal_accuracy_mm = 15,
+                    .vertical_accuracy_mm = 26,
+                    .velocity_ned_mmps = {1001, -1002, 1003},
+                    .ground_speed_mmps = 1417,
+                    .course_1e5_deg = 31'500'018,
+                    .speed_accuracy_mmps = 79,
+                    .course_accuracy_1e5_deg = 180'020,
+                    .vehicle_heading_1e5_deg = 21,
+                    .dop_centi = {1, 2, 3, 4, 5, 6, 7}};
+  const NavPvt nav = nav_pvt_of(pvt, 2);
+  const std::vector<std::int64_t> found{
+      nav.itow, nav.year,  nav.month,  nav.day, nav.hour, nav.minute, nav.sec, nav.valid, nav.tacc, nav.nano,
+      nav.fix,  nav.flags, nav.flags2, nav.nsv, nav.lon,  nav.lat,    nav.h,   nav.hmsl,  nav.hacc, nav.vacc,
+      nav.vn,   nav.ve,    nav.vd,     nav.gs,  nav.hm,   nav.sacc,   nav.hda, nav.pdop};
+  const std::vector<std::int64_t> expected{400'000'250, 2026,        3,       14,         12,   34,      56,
+                                           0x37,        25,          -125,    4,          0x83, 0,       17,
+                                           -66'000'001, 465'000'002, 450'003, 400'004,    15,   26,      1001,
+                                           -1002,       1003,        1417,    31'500'018, 79,   180'020, 2};
+  EXPECT_EQ(found, expected);
+}
+
+/// Status byte, counter and, where wanted, UTC after the orientation of a legacy message.
 Bytes legacy_orientation(const Bytes& orientation, std::uint8_t status, std::uint16_t counter) {
   Bytes data = orientation;
   data.push_back(status);

@@ -39,7 +39,7 @@ TEST(MtbFile, TheDevicesBytesBeginAtTheFirstMessageBehindTheHeader) {
 }
 
 TEST(MtbFile, AMessageThatTheHeaderHoldsByChanceIsNoBeginning) {
-  // Alone, and two in a row with bytes behind them that are no message.
+  // Alone, and two in a row with bytes after them that are no message.
   for (const int n : {1, 2}) {
     Bytes file = header_of(40, 2);
     for (int i = 0; i < n; ++i) add_to(file, frame(0x3E, {1, 2, 3}));

@@ -259,6 +259,24 @@ TEST(AlignmentAnswers, LiveTimeOffsetTakesSamplesFromEightMillisecondsApartOn) {
   EXPECT_TRUE(offset_with_spacing(0.0079));
 }
 
+TEST(AlignmentAnswers, LiveTimeOffsetTakesTheFirstSampleOfAClockThatBeginsAtZeroToo) {
+  const test::SineSum omega = test::car_rates(45);
+  const auto samples_needed = [&](HostTime begin) {
+    const auto live = std::make_unique<LiveTimeOffset>();
+    TimeOffset out;
+    int i = 0;
+    for (; i < 4000; ++i) {
+      const double t = 0.01 * i;
+      live->add_reference(begin + from_seconds(t), omega(t).norm());
+      live->add_study(begin + from_seconds(t), omega(t).norm());
+      if (i > 2000 && live->estimate(out)) break;
+    }
+    return i;
+  };
+  EXPECT_EQ(samples_needed(HostTime{}), samples_needed(HostTime{from_seconds(1000.0)}));
+  EXPECT_LT(samples_needed(HostTime{}), 3000);
+}
+
 // ---- reference window
 
 Sample imu_at(double t, const Vector3d& omega, const Vector3d& f, std::uint32_t flags) {

@@ -93,11 +93,33 @@ TEST(BadInput, TwoSwappedStudiesAreToldByName) {
     }
     Estimator estimator(config);
     const Told told = told_by(drive, estimator);
-    EXPECT_EQ(told.has<event::StudiesSwapped>(), swapped);
+    EXPECT_EQ(told.has<event::SImusSwapped>(), swapped);
     EXPECT_EQ(told.has<event::BoresightPriorWrong>(), swapped);
     EXPECT_EQ(told.has<event::LeverArmPriorWrong>(), swapped);
     for (std::size_t i = 0; i < 2; ++i)
       EXPECT_LT(test::mounting_error_rad(estimator.study(i), truth[i].C_b_s).norm(), 0.5 * kRadPerDeg);
+  }
+}
+
+TEST(BadInput, TwoStudiesOfWhichOneSitsWhereTheOtherShouldAreNotSwapped) {
+  const std::vector<SimulatedStudy> truth{{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.0},
+                                          {exp_so3(Vector3d(0, 0, 1.5)), {-0.30, 0.25, 0.10}, 0.0}};
+  const SimulatedStudy elsewhere{exp_so3(Vector3d(0, 0, -1.2)), {1.2, 0.9, -0.7}, 0.0};
+  for (const std::size_t which : {0U, 1U}) {
+    SimulatedDrive drive(240.0, truth, 41);
+    EstimatorConfig config = drive.config();
+    for (std::size_t i = 0; i < 2; ++i) {
+      const SimulatedStudy& believed = i == which ? elsewhere : truth[which];
+      config.studies[i].prior_C_b_s = row_major(believed.C_b_s);
+      config.studies[i].prior_r_bs_b_m = {believed.r_bs_b_m.x(), believed.r_bs_b_m.y(),
+                                          believed.r_bs_b_m.z()};
+      config.studies[i].prior_r_bs_b_sd_m = {0.05, 0.05, 0.05};
+      config.studies[i].prior_t_d_s = 0.0;
+    }
+    Estimator estimator(config);
+    const Told told = told_by(drive, estimator);
+    EXPECT_TRUE(told.has<event::BoresightPriorWrong>());
+    EXPECT_FALSE(told.has<event::SImusSwapped>()) << which;
   }
 }
 

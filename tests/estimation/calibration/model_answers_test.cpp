@@ -480,6 +480,11 @@ TEST(CalibrationParts, FilterCore) {
   core.repair_state(30);
   lines.line("repaired one", core.sd(30));
   lines.line("nothing more", core.repair(first));
+  lines.line("every one");
+  for (std::size_t i = 0; i < core.covariance().dimension(); ++i) {
+    core.repair_state(i);
+    lines.line(i, core.sd(i));
+  }
   test::expect_recorded("estimation/calibration/filter_core.txt", lines.text(), 1e-6, 1e-10);
 }
 

@@ -18,7 +18,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Numbers of a text behind `key`.
+/// Numbers of a text after `key`.
 std::vector<double> numbers_behind(const std::string& text, const std::string& key, std::size_t n) {
   const auto at = text.find(key);
   EXPECT_NE(at, std::string::npos) << key << " is not in\n" << text;

@@ -285,7 +285,7 @@ TEST(DataflashWhole, FieldsOfEveryCharacter) {
   const std::string values("\x21\x43\x65\x87\x12\x34\x56\x3F\x21\x43\x65\x47\x12\x34\x56\x41\x21\x43\x65\x87",
                            20);
   for (const char character : std::string("abBcCdefEghHiILMnNqQZx")) {
-    // The time stands behind the field, so that its place shows how long the field is.
+    // The time stands after the field, so that its place shows how long the field is.
     for (const std::size_t size : {31U, 40U, 60U, 90U}) {
       std::string content;
       for (std::size_t i = 0; i + 3 < size; ++i)

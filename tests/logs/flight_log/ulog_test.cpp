@@ -198,7 +198,7 @@ TEST(Ulog, BehindDamageTheNextSynchronisationLeadsOn) {
   EXPECT_TRUE(taken.says("passed over"));
 }
 
-/// A crash log is written behind what was logged, whose last message may be torn.
+/// A crash log is written after what was logged, whose last message may be torn.
 TEST(Ulog, AppendedDataIsReadBehindATornMessage) {
   const std::string body = kCombined + subscription(0, 7, "sensor_combined") + data(7, combined(4000, 1.0F));
   const std::string torn = data(7, combined(8000, 2.0F)).substr(0, 20);

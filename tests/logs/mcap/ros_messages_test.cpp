@@ -31,7 +31,7 @@ TEST(Cdr, ATimeReferenceLiesInMemoryAsTheStandardSays) {
 TEST(Cdr, DoublesStandAtMultiplesOfEight) {
   CdrWriter out;
   write(out, Imu{{0, "ab"}, {}, {}, {}, {}, {}, {}});
-  // Head 4, stamp 8, length 4, "ab" and its end 3: 15 behind the head, so the first double is at 16.
+  // Head 4, stamp 8, length 4, "ab" and its end 3: 15 after the head, so the first double is at 16.
   EXPECT_EQ(out.bytes().size(), 4U + 16U + (4 + 9 + 3 + 9 + 3 + 9) * 8U);
 }
 

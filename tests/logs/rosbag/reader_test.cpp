@@ -184,7 +184,7 @@ TEST(Rosbag, ChunksThatClaimTooMuchAreRefusedBeforeMemoryIsMade) {
   for (const char* compression : {"lz4", "bz2", "none"})
     EXPECT_TRUE(says(read_bag(chunk(compression, bomb, "abc")).losses, "thousand times"));
   EXPECT_TRUE(says(read_bag(chunk("7z", number32(3), "abc")).losses, "packed by '7z'"));
-  // A length that leads behind the end.
+  // A length that leads beyond the end.
   EXPECT_TRUE(says(read_bag(std::string(kMagic) + "\xFF\xFF\xFF\x7F" + "some bytes").losses, "damaged"));
 }
 

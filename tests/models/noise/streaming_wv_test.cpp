@@ -56,7 +56,7 @@ TEST(StreamingWv, EqualsTheMaskedBatchResultOverMissingSamplesNotANumberAndOther
     else
       stream.miss(1);
   }
-  stream.miss(100);  // behind the last one neither
+  stream.miss(100);  // after the last one neither
   WvOptions options;
   options.levels = 11;
   options.mask = mask;

@@ -74,6 +74,23 @@ TEST_F(RetentionTest, WithoutLimitsNothingGoes) {
   EXPECT_TRUE(exists("old"));
 }
 
+TEST_F(RetentionTest, ByTheirSizeNoMoreGoThanMakeRoom) {
+  constexpr std::size_t kBytes = 300'000;
+  for (const auto& [name, age] : {std::pair{"old", 72}, std::pair{"newer", 48}, std::pair{"new", 24}}) {
+    const auto file = make_run(name, hours(age)) / "capture_002.lcm";
+    std::ofstream(file) << std::string(kBytes, 'x');
+    std::filesystem::last_write_time(file, std::filesystem::file_time_type::clock::now() - hours(age));
+  }
+  for (const auto& run : removable_runs(folder_)) {
+    EXPECT_GT(run.bytes, kBytes);
+    EXPECT_LT(run.bytes, 2 * kBytes);
+  }
+  RecordOptions limits;
+  limits.remove_beyond_bytes = 2.5 * kBytes;
+  apply_retention(folder_, limits);
+  EXPECT_THAT(removable(), ElementsAre("newer", "new"));
+}
+
 TEST_F(RetentionTest, AKeptRunStaysUntilTheMarkIsTakenAway) {
   const auto run = make_run("old", hours(72));
   ASSERT_TRUE(set_kept(run, true));

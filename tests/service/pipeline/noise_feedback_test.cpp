@@ -51,6 +51,14 @@ TEST(NoiseFeedback, WhatIsNotIdentifiableNotPositiveOrBeyondBeliefIsLeftAside) {
   EXPECT_TRUE(same(refit));
 }
 
+TEST(NoiseFeedback, WhereNoNoiseWasConfiguredTheFirstOneIsBelieved) {
+  auto current = mtx_class_noise();
+  current.gyro[kDynamic].white_sd[0] = current.gyro[kDynamic].fast_sd[0] = 0.0;
+  const auto updated = updated_noise(
+      current, {refit_of(0, Regime::kDynamic, 1e-3, 5e-4, 0.05, current.gyro_bias[0].sd, 80.0)});
+  EXPECT_NEAR(updated.gyro[kDynamic].white_sd[0], 1e-3, 1e-15);
+}
+
 TEST(NoiseFeedback, ARecordTooShortForTheSlowProcessesStillTellsTheWhiteNoise) {
   const auto current = mtx_class_noise();
   const double white = 1.5 * current.gyro[kDynamic].white_sd[0];

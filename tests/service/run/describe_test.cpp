@@ -56,7 +56,7 @@ TEST(Describe, NamesWhatTheEventCarries) {
               HasSubstr("gyrocompassing"));
   EXPECT_THAT(told(event::NavigationStarted{InitialisationMethod::kInMotion}, 0),
               HasSubstr("heading from the motion"));
-  EXPECT_THAT(told(event::StudiesSwapped{2}), HasSubstr("left and right sit where"));
+  EXPECT_THAT(told(event::SImusSwapped{2}), HasSubstr("left and right sit where"));
   EXPECT_THAT(told(event::GnssRejected{250.0}), HasSubstr("NIS 250"));
   EXPECT_THAT(told(event::GnssRejected{std::numeric_limits<double>::infinity()}),
               HasSubstr("nowhere on Earth"));

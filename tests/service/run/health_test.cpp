@@ -58,6 +58,12 @@ status_t healthy() {
 
 TEST(Health, RunningWhenAllStreamAndCalibrate) { EXPECT_EQ(judge(healthy()).state, "running"); }
 
+TEST(Health, ACountThatGrowsIsNoNews) {
+  EXPECT_TRUE(says_the_same("degraded: mtx1 lost 9 samples", "degraded: mtx1 lost 1234 samples"));
+  EXPECT_FALSE(says_the_same("degraded: left lost 9 samples", "degraded: right lost 9 samples"));
+  EXPECT_FALSE(says_the_same("running: all is well", ""));
+}
+
 TEST(Health, AligningUntilOneMountingIsFound) {
   auto report = healthy();
   for (auto& study : report.studies) study.state = "looking for its mounting";
@@ -109,7 +115,7 @@ TEST(Health, DegradedWhenAnythingIsLostOrRefused) {
 }
 
 TEST(Health, SaysOneReasonForEachState) {
-  // Ordered as they are looked for: each stands behind all that may come before it.
+  // Ordered as they are looked for: each stands after all that may come before it.
   auto report = healthy();
   EXPECT_EQ(judge(report).reason, "all devices stream");
   for (auto& study : report.studies) study.state = "waiting for samples";

@@ -387,7 +387,7 @@ TEST(RunWhole, EveryEventInWords) {
   for (const std::size_t state : {0U, 8U, 15U, 20U, 27U, 40U}) tell(event::CovarianceRepaired{state});
   tell(event::BoresightPriorWrong{0.1});
   tell(event::LeverArmPriorWrong{0.4});
-  tell(event::StudiesSwapped{2});
+  tell(event::SImusSwapped{2});
   tell(event::GyroBiasChanged{0.01});
   tell(event::AccelBiasChanged{0.5});
   tell(event::SImuInconsistent{0.75});

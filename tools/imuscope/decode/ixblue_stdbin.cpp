@@ -42,7 +42,7 @@ Json status_json(const Telegram& telegram) {
   return status;
 }
 
-/// Behind the last block of a group that was read, or `from` where it has none.
+/// After the last block of a group that was read, or `from` where it has none.
 template <typename Layouts, typename Offsets>
 std::size_t end_of(const Layouts& layouts, const Offsets& offsets, std::size_t from) {
   for (std::size_t i = 0; i < offsets.size(); ++i) {

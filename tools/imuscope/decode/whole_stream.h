@@ -43,7 +43,7 @@ inline std::size_t line_end(std::string_view text, std::size_t at, std::string_v
   return at + std::min(window.find_first_of(ends), window.size());
 }
 
-/// `end`, behind the CR and LF that stand there: they end the line, and belong to nobody else.
+/// `end`, after the CR and LF that stand there: they end the line, and belong to nobody else.
 inline std::uint64_t behind_line_end(std::span<const std::uint8_t> stream, std::uint64_t end) {
   while (end < stream.size() && (stream[end] == '\r' || stream[end] == '\n')) ++end;
   return end;
