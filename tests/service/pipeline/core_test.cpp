@@ -264,6 +264,28 @@ TEST(Core, SamplesWaitWhileNobodyIsHeardAndAreGivenUpWhereTheReferenceAloneIsSil
   }
 }
 
+// A solution has nothing to be applied to before the reference has come that far; a speed is of its moment.
+TEST(Core, ASolutionWaitsForTheReferenceAndASpeedDoesNot) {
+  constexpr int kAhead = 2 * kStart;
+  for (const SampleKind kind : {SampleKind::kGnss, SampleKind::kOdometry}) {
+    Core core(one_study(), 3);
+    Notes notes;
+    fill(core, 0, 0, kStart, std::nullopt);
+    run_ticks(core, 0, kStart + 1, notes);
+    Sample sample = imu_sample(2, 0, kPeriod_ms * (kStart + kAhead));
+    sample.kind = kind;
+    if (kind == SampleKind::kGnss) sample.gnss = {};
+    if (kind == SampleKind::kOdometry) sample.odometry = {};
+    ASSERT_TRUE(core.ring(2).try_push(sample));
+    run_ticks(core, kStart + 1, kAhead, notes);
+    EXPECT_EQ(core.ring(2).front() != nullptr, kind == SampleKind::kGnss);
+    fill(core, 0, kStart, kStart + kAhead, kPeriod_ms * (kStart + kAhead) + 1.0);
+    run_ticks(core, kStart + kAhead + 1, kAhead, notes);
+    EXPECT_EQ(core.ring(2).front(), nullptr);
+    EXPECT_TRUE(notes.late.empty());
+  }
+}
+
 TEST(Core, AReplayCatchesUpAtTheSameTicks) {
   constexpr int kEnd = kStart + 1500;
   constexpr int kTicks = 400;
