@@ -19,6 +19,7 @@
 #include "drivers/transport/can_interface.h"
 #include "drivers/transport/can_socket.h"
 #include "made_can_kernel.h"
+#include "made_can_link.h"
 #include "tests/drivers/support/sample_text.h"
 #include "tests/support/recorded_answer.h"
 
@@ -27,81 +28,16 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::Bytes;
+using test::bytes_as;
+using test::join;
+using test::link_answer;
+using test::MadeLink;
 
 /// A kernel as it is at first, for each test.
 test::MadeCanKernel& fresh_kernel() {
   auto& kernel = test::made_can_kernel();
   kernel = {};
   return kernel;
-}
-
-template <typename T>
-Bytes bytes_as(const T& value, std::size_t size = sizeof(T)) {
-  Bytes bytes(sizeof(T));
-  std::memcpy(bytes.data(), &value, sizeof(T));
-  bytes.resize(size);
-  return bytes;
-}
-
-Bytes attribute(unsigned type, const Bytes& content) {
-  rtattr head{};
-  head.rta_type = static_cast<unsigned short>(type);
-  head.rta_len = static_cast<unsigned short>(RTA_LENGTH(content.size()));
-  Bytes bytes = bytes_as(head);
-  bytes.insert(bytes.end(), content.begin(), content.end());
-  bytes.resize(RTA_ALIGN(bytes.size()));
-  return bytes;
-}
-
-void join(Bytes& bytes, const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); }
-
-struct MadeLink {
-  std::string kind = "can";
-  unsigned short type = ARPHRD_CAN;
-  unsigned flags = IFF_UP;
-  std::uint32_t mtu = CANFD_MTU;
-  std::uint32_t state = CAN_STATE_ERROR_WARNING;
-  std::uint32_t mode = CAN_CTRLMODE_LISTENONLY;
-  bool has_controller = true;
-  bool has_counts = true;
-  std::size_t timing_bytes = sizeof(can_bittiming);
-};
-
-Bytes answer_of(const MadeLink& link) {
-  ifinfomsg info{};
-  info.ifi_type = link.type;
-  info.ifi_flags = link.flags;
-  Bytes content = bytes_as(info);
-  join(content, attribute(IFLA_MTU, bytes_as(link.mtu)));
-  rtnl_link_stats64 counts{};
-  counts.rx_packets = 1234;
-  counts.rx_over_errors = 56;
-  join(content, attribute(IFLA_STATS64, bytes_as(counts)));
-  Bytes controller;
-  if (link.has_controller) {
-    can_bittiming timing{};
-    timing.bitrate = 250'000;
-    join(controller, attribute(IFLA_CAN_STATE, bytes_as(link.state)));
-    join(controller, attribute(IFLA_CAN_BITTIMING, bytes_as(timing, link.timing_bytes)));
-    timing.bitrate = 2'000'000;
-    join(controller, attribute(IFLA_CAN_DATA_BITTIMING, bytes_as(timing)));
-    join(controller, attribute(IFLA_CAN_RESTART_MS, bytes_as(std::uint32_t{100})));
-    join(controller, attribute(IFLA_CAN_CTRLMODE | NLA_F_NESTED, bytes_as(can_ctrlmode{0xFF, link.mode})));
-    if (link.has_counts)
-      join(controller, attribute(IFLA_CAN_BERR_COUNTER, bytes_as(can_berr_counter{17, 19})));
-  }
-  Bytes details = attribute(IFLA_INFO_KIND,
-                            bytes_as(std::array<char, 8>{link.kind.at(0), link.kind.at(1), link.kind.at(2),
-                                                         link.kind.size() > 3 ? link.kind.at(3) : '\0'},
-                                     link.kind.size() + 1));
-  if (link.has_controller) join(details, attribute(IFLA_INFO_DATA, controller));
-  join(content, attribute(IFLA_LINKINFO, details));
-  nlmsghdr head{};
-  head.nlmsg_type = RTM_NEWLINK;
-  head.nlmsg_len = static_cast<std::uint32_t>(NLMSG_LENGTH(content.size()));
-  Bytes bytes = bytes_as(head);
-  join(bytes, content);
-  return bytes;
 }
 
 Bytes refusal_of(int error) {
@@ -141,7 +77,7 @@ TEST(MadeCan, WhatNetlinkSaysOfAnInterface) {
   auto& kernel = fresh_kernel();
   std::string text;
   const auto add = [&](const MadeLink& link) {
-    kernel.answer = answer_of(link);
+    kernel.answer = link_answer(link);
     text += seen() + '\n';
   };
   add({});
@@ -156,7 +92,7 @@ TEST(MadeCan, WhatNetlinkSaysOfAnInterface) {
     kernel.answer = refusal_of(error);
     text += seen() + '\n';
   }
-  const Bytes whole = answer_of({});
+  const Bytes whole = link_answer({});
   std::string before;
   for (std::size_t size = 0; size <= whole.size(); ++size) {
     kernel.answer.assign(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
@@ -194,12 +130,12 @@ TEST(MadeCan, HowASocketIsOpened) {
                 : fmt::format("{} {}\n", static_cast<int>(socket.error().kind), first_words(socket.error()));
     text += kernel.said.substr(0, 400);
   };
-  kernel.answer = answer_of({});
+  kernel.answer = link_answer({});
   add(settings_of(kIds));
   add(settings_of({})), add(settings_of(std::vector<CanId>(512))), add(settings_of(std::vector<CanId>(513)));
-  kernel.answer = answer_of({.kind = "vcan", .flags = 0, .mtu = CAN_MTU, .has_controller = false});
+  kernel.answer = link_answer({.kind = "vcan", .flags = 0, .mtu = CAN_MTU, .has_controller = false});
   add(settings_of(kIds));
-  kernel.answer = answer_of({.mode = 0});
+  kernel.answer = link_answer({.mode = 0});
   for (int option = 1; option < 6; ++option) {
     kernel.option_that_fails = option;
     add(settings_of(kIds));
@@ -240,7 +176,7 @@ Bytes overflow_told(std::uint32_t total, int level = SOL_SOCKET, int type = SO_R
 
 TEST(MadeCan, FramesOfEveryKind) {
   auto& kernel = fresh_kernel();
-  kernel.answer = answer_of({});
+  kernel.answer = link_answer({});
   const auto socket = CanSocket::open(settings_of(kIds));
   ASSERT_TRUE(socket);
   kernel.said.clear();
