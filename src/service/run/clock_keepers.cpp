@@ -117,35 +117,25 @@ std::optional<ClockKeeper> ask_ptp(const std::filesystem::path& socket_folder) {
   return std::nullopt;
 }
 
-double seconds_of(const ptp_clock_time& time) {
-  return static_cast<double>(time.sec) + kNanosecond_s * static_cast<double>(time.nsec);
+std::int64_t ns_of(const ptp_clock_time& time) {
+  return std::chrono::nanoseconds(std::chrono::seconds(time.sec)).count() + time.nsec;
 }
 
-/// The card's clock is read between two readings of the wall clock, some times; the closest pair counts.
+/// The card's clock is read between two readings of the wall clock, some times.
 std::optional<ClockKeeper> read_card_clock(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return std::nullopt;
-  ptp_sys_offset_extended readings{};
-  readings.n_samples = kCardReadings;
-  const bool is_read = ::ioctl(fd, PTP_SYS_OFFSET_EXTENDED, &readings) == 0;
+  ptp_sys_offset_extended read{};
+  read.n_samples = kCardReadings;
+  const bool is_read = ::ioctl(fd, PTP_SYS_OFFSET_EXTENDED, &read) == 0;
   ::close(fd);
   if (!is_read) return std::nullopt;
-  double closest_s = std::numeric_limits<double>::infinity();
-  double difference_s = 0.0;
-  for (unsigned i = 0; i < std::min(readings.n_samples, kCardReadings); ++i) {
-    const auto& [before, card, after] = readings.ts[i];
-    // Whole seconds apart: a double holds the nanoseconds of a difference, not of a date.
-    const double apart_s =
-        static_cast<double>(after.sec - before.sec) +
-        kNanosecond_s * (static_cast<double>(after.nsec) - static_cast<double>(before.nsec));
-    if (apart_s < 0.0 || apart_s >= closest_s) continue;
-    closest_s = apart_s;
-    const ptp_clock_time since_before{card.sec - before.sec, card.nsec, 0};
-    difference_s =
-        seconds_of(since_before) - kNanosecond_s * static_cast<double>(before.nsec) - apart_s / 2.0;
-  }
-  if (!std::isfinite(closest_s)) return std::nullopt;
-  return card_clock(path, difference_s, closest_s);
+  std::vector<CardReading> readings;
+  for (unsigned i = 0; i < std::min(read.n_samples, kCardReadings); ++i)
+    readings.push_back({ns_of(read.ts[i][0]), ns_of(read.ts[i][1]), ns_of(read.ts[i][2])});
+  const auto found = card_difference(readings);
+  if (!found) return std::nullopt;
+  return card_clock(path, found->card_minus_wall_s, found->apart_s);
 }
 
 }  // namespace
@@ -204,6 +194,21 @@ std::optional<ClockKeeper> read_ptp_management(std::string_view text) {
   // The way to the source is measured there and back: what the two differ by is at most all of it.
   keeper.max_error_s = kNanosecond_s * (std::abs(*offset_ns) + std::abs(*path_ns));
   return keeper;
+}
+
+std::optional<CardDifference> card_difference(std::span<const CardReading> readings) {
+  const CardReading* closest = nullptr;
+  for (const CardReading& reading : readings) {
+    const std::int64_t apart_ns = reading.after_ns - reading.before_ns;
+    if (apart_ns >= 0 && (closest == nullptr || apart_ns < closest->after_ns - closest->before_ns))
+      closest = &reading;
+  }
+  if (closest == nullptr) return std::nullopt;
+  // As whole nanoseconds: a double holds those of a difference, not of a date.
+  const auto apart_ns = static_cast<double>(closest->after_ns - closest->before_ns);
+  return CardDifference{
+      kNanosecond_s * (static_cast<double>(closest->card_ns - closest->before_ns) - 0.5 * apart_ns),
+      kNanosecond_s * apart_ns};
 }
 
 ClockKeeper card_clock(const std::string& path, double card_minus_wall_s, double apart_s) {

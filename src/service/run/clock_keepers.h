@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -36,6 +37,19 @@ struct ClockKeeper {
 [[nodiscard]] std::optional<ClockKeeper> read_chrony_tracking(std::string_view text);
 /// What `pmc` answers to GET CURRENT_DATA_SET and GET PARENT_DATA_SET.
 [[nodiscard]] std::optional<ClockKeeper> read_ptp_management(std::string_view text);
+/// A card's clock, read between two readings of the wall clock; ns since the epoch of each.
+struct CardReading {
+  std::int64_t before_ns;
+  std::int64_t card_ns;
+  std::int64_t after_ns;
+};
+/// The card's clock less the wall clock, s, by the reading whose two others lie closest, and how far apart they lie.
+struct CardDifference {
+  double card_minus_wall_s;
+  double apart_s;
+};
+/// Nothing where no reading has its two others in their order.
+[[nodiscard]] std::optional<CardDifference> card_difference(std::span<const CardReading> readings);
 /// A card's clock against the wall clock.
 /// @param card_minus_wall_s  as read, with the seconds that TAI is ahead of UTC
 /// @param apart_s            from the reading of one before to that of the other after

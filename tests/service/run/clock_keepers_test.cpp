@@ -69,6 +69,21 @@ TEST(ClockKeepers, TheClockOfACardIsOfTaiOrOfUtcOrOfNobody) {
   EXPECT_DOUBLE_EQ(unset.offset_s, 1.7e9);
 }
 
+TEST(ClockKeepers, OfTheReadingsOfACardTheClosestPairCounts) {
+  constexpr std::int64_t kNow = 1'763'961'600'123'456'789;
+  constexpr std::int64_t kTai = 37'000'000'000;
+  const std::vector<CardReading> readings{{kNow, kNow + kTai + 900, kNow + 2500},
+                                          {kNow + 3000, kNow + kTai + 4100, kNow + 4500},
+                                          {kNow + 9000, kNow + kTai, kNow + 8000},
+                                          {kNow + 10000, kNow + kTai + 900'000, kNow + 12000}};
+  const auto found = card_difference(readings);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->card_minus_wall_s, 37.0 + 350e-9, 1e-12);
+  EXPECT_NEAR(found->apart_s, 1500e-9, 1e-15);
+  EXPECT_FALSE(card_difference(std::span(readings).subspan(2, 1)));
+  EXPECT_FALSE(card_difference({}));
+}
+
 TEST(ClockKeepers, AProgramThatHangsIsEndedAndOneThatFailsTellsNothing) {
   const auto said = output_of({"/bin/sh", "-c", "echo $HOME one"});
   ASSERT_TRUE(said);
