@@ -112,7 +112,7 @@ void Decoder::close(HostTime arrival, SampleSink& sink) noexcept {
   if (group_.high_rate[0].n > 0 && group_.high_rate[1].n > 0) {
     const auto mean = [](const Mean& sum) {
       RawTriad out{};
-      for (std::size_t i = 0; i < 3; ++i) out[i] = static_cast<std::int16_t>(sum.sum[i] / sum.n);
+      for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_cast<std::int16_t>(sum.sum[i] / sum.n);
       return out;
     };
     high_rate_.add(mean(group_.high_rate[0]), mean(group_.high_rate[1]));

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 
 #include "base/units.h"
 #include "estimation/regimes/motion_regimes.h"
@@ -278,8 +279,7 @@ class ImuStudy {
     const auto found = noise::fit_dependence(driven_windows(windows, drivers), start);
     if (!found) return;
     for (const noise::ParameterSlope& beside : found->slopes) {
-      for (std::size_t i = first_slope; i < slopes_.size(); ++i) {
-        Slope& s = slopes_[i];
+      for (Slope& s : std::span(slopes_).subspan(first_slope)) {
         if (s.driver == drivers[beside.driver] && s.slope.process == beside.process &&
             s.slope.name == beside.name)
           s.beside_others = beside;

@@ -310,6 +310,18 @@ TEST(LimitsOfPositions, AreWhereTheyWere) {
                                   0.5));
     return positions_of(empty);
   });
+  text += by_ranges("rows of one position within four seconds", steps(1, 7, 6), [](double rows) {
+    constexpr double kHeld_s = 4.0;
+    Empty empty;
+    drive_on(empty, 60, 0.1, 12.0, 0.01);
+    const auto end = 30 + static_cast<std::size_t>(rows);
+    for (std::size_t i = 31; i < 60; ++i) {
+      empty.gnss().time_s[i] += kHeld_s;
+      if (i < end) empty.gnss().position_m[i] = empty.gnss().position_m[30];
+      if (i < end) empty.gnss().time_s[i] = empty.gnss().time_s[30] + 0.1 * static_cast<double>(i - 30);
+    }
+    return positions_of(empty);
+  });
   text += by_ranges("positions", steps(15, 30, 15), [](double n) {
     Empty empty;
     drive_on(empty, static_cast<std::size_t>(n), 0.1, 0.0, 2.0);
@@ -380,6 +392,17 @@ TEST(LimitsOfTime, OfTwoFilesOfOneClockAreWhereTheyWere) {
   empty.drive().set_time_scale(kStudy, TimeScale::kShared);
   EXPECT_FALSE(check_overlap(empty.drive(), kStudy, findings));
   test::expect_recorded("check/limits_of_overlap.txt", text);
+}
+
+TEST(LimitsOfTime, HalfOfTheShorterFileIsEnoughWhicheverThatIs) {
+  for (const auto& [longer, shorter] : {std::pair{kReference, kStudy}, std::pair{kStudy, kReference}}) {
+    Empty empty;
+    empty.fill(longer, 601, 1.0, 20000.0);
+    empty.fill(shorter, 11, 1.0, 20595.0);
+    std::vector<Finding> findings;
+    EXPECT_TRUE(check_overlap(empty.drive(), kStudy, findings));
+    EXPECT_TRUE(findings.empty());
+  }
 }
 
 TEST(LimitsOfOffsets, AGyroIsOffWhereItStaysFarFromZero) {

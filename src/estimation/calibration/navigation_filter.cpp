@@ -84,10 +84,9 @@ InertialRates mixed(const InertialRates& a, const InertialRates& b, double share
 }
 
 bool is_finite(const GnssData& gnss) noexcept {
-  bool finite =
-      std::isfinite(gnss.latitude_rad) && std::isfinite(gnss.longitude_rad) && std::isfinite(gnss.height_m);
-  for (std::size_t i = 0; i < 3; ++i) finite = finite && std::isfinite(gnss.v_n_mps[i]);
-  return finite;
+  return std::isfinite(gnss.latitude_rad) && std::isfinite(gnss.longitude_rad) &&
+         std::isfinite(gnss.height_m) &&
+         std::ranges::all_of(gnss.v_n_mps, [](double value) { return std::isfinite(value); });
 }
 
 InitialisationMethod method_of(AlignmentMethod method) noexcept {

@@ -53,6 +53,12 @@ json fields_of(std::string_view text) {
   return fields;
 }
 
+TEST(NmeaText, ATimeHasAsManyDecimalsAsThereIsRoomFor) {
+  EXPECT_EQ(detail::phins_time_text("123456.100").view(), "12:34:56.100");
+  EXPECT_EQ(detail::phins_time_text("123456.78901234567890123456").view(), "12:34:56.7890123456789");
+  EXPECT_EQ(detail::phins_time_text("noon").view(), "");
+}
+
 TEST(NmeaVectors, EveryVectorDecodesToItsPublishedValues) {
   const auto vectors = test::load_vectors(test::source_path("tests/vectors/nmea.hex"));
   const json expected = test::load_json(test::source_path("tests/vectors/nmea.json"));

@@ -46,6 +46,31 @@ TEST(MtDecoder, GivesRatesAndForcesInSiAndInTheRotatedAxes) {
   EXPECT_NEAR(to_seconds(s.arrival - s.time), 430.0 / 115200.0, 43 * 0.5e-9);
 }
 
+// What a device lists without any inertial item says nothing of the rate, and one of 1 Hz is a rate.
+TEST(MtDecoder, AnOutputConfigurationOfNoInertialItemLeavesTheRate) {
+  for (const int rate_hz : {0, 1}) {
+    MtDecoderConfig config;
+    config.rate_hz = 100.0;
+    config.clock = ClockMapConfig::fixed(HostTime{}, 1.0);
+    Line line(config);
+    Bytes taken;
+    append(taken, be16(0x1020));
+    append(taken, be16(0xFFFF));
+    append(taken, be16(rate_hz == 0 ? 0x2010 : 0x4020));
+    append(taken, be16(1));
+    line.send(frame(0xC1, taken), Duration{});
+    for (std::uint16_t i = 0; i < 3; ++i) {
+      Bytes data;
+      append_item(data, xdi::kPacketCounter, u16(i));
+      append_item(data, xdi::kAcceleration, floats({0.5, 0.25, 9.75}));
+      line.send(frame(mid::kMtData2, data), kPeriod);
+    }
+    ASSERT_EQ(line.sink.samples.size(), 3U);
+    const double step_s = to_seconds(line.sink.samples[2].time - line.sink.samples[1].time);
+    EXPECT_NEAR(step_s, rate_hz == 0 ? 0.01 : 1.0, 1e-6);
+  }
+}
+
 // Devices with an output configuration report period 1152 (100 Hz) in Configuration, whatever they send.
 TEST(MtDecoder, TakesTheRateOfMtData2FromTheOutputConfigurationAndNotFromThePeriod) {
   for (const bool told : {false, true}) {

@@ -36,6 +36,7 @@ struct ScriptedDevice {
   std::uint16_t sync_skip = 0;
   std::uint32_t sync_offset = 0;
   std::uint16_t sync_modes_known = 0xFFFF;
+  std::uint16_t shortest_period = 0;             ///< a shorter one is not taken
   std::uint16_t modes_known = 0xFFFF;            ///< other bits of an output mode are dropped
   std::map<std::uint8_t, std::uint8_t> refuses;  ///< message id to error code, each once
   std::optional<std::uint8_t> never_answers;     ///< this message id
@@ -80,7 +81,7 @@ struct ScriptedDevice {
                            sync_offset));
         break;
       case mid::kPeriod:
-        period = read_be<std::uint16_t>(f.data);
+        period = std::max(read_be<std::uint16_t>(f.data), shortest_period);
         send(frame(0x05));
         break;
       case mid::kOutputSkipFactor:
@@ -301,6 +302,19 @@ TEST(MtSession, GivesUpWithTheReasonWhenTheDeviceTakesSomethingElse) {
   EXPECT_EQ(bench.session.state(), SessionState::kFailed);
   EXPECT_NE(bench.session.problem().find("38 bytes a message, 39 were asked for"), std::string_view::npos)
       << bench.session.problem();
+}
+
+TEST(MtSession, TriesThreeTimesAndGivesUpWhenTheDeviceTakesAnotherRate) {
+  MtSessionConfig config;
+  config.rate_hz = 200.0;
+  Bench bench(config);
+  bench.device.shortest_period = 1152;
+  bench.run(seconds{10});
+  EXPECT_EQ(bench.session.state(), SessionState::kFailed);
+  EXPECT_NE(bench.session.problem().find("at 100 Hz; wanted"), std::string_view::npos)
+      << bench.session.problem();
+  EXPECT_EQ(bench.times_heard(mid::kPeriod), 3U);
+  EXPECT_EQ(bench.times_heard(mid::kReqConfiguration), 6U) << "before and after, each time";
 }
 
 TEST(MtSession, SaysWhatToCheckWhenNothingComesAndGoesOnTrying) {
