@@ -118,7 +118,10 @@ std::optional<ClockKeeper> ask_ptp(const std::filesystem::path& socket_folder) {
 }
 
 std::int64_t ns_of(const ptp_clock_time& time) {
-  return std::chrono::nanoseconds(std::chrono::seconds(time.sec)).count() + time.nsec;
+  // A card may show anything; the difference of two such times fits 64 bits of nanoseconds.
+  constexpr std::int64_t kSecondsMost = 4'000'000'000;
+  const auto seconds = std::clamp<std::int64_t>(time.sec, -kSecondsMost, kSecondsMost);
+  return std::chrono::nanoseconds(std::chrono::seconds(seconds)).count() + time.nsec;
 }
 
 /// The card's clock is read between two readings of the wall clock, some times.
