@@ -491,7 +491,7 @@ TEST(MtDecoder, AReceiverInsideGivesSolutionsWithUtcAndItsRtkState) {
   EXPECT_EQ(s.utc, day + std::chrono::seconds{45296} - std::chrono::microseconds{1});
 }
 
-TEST(XsensDecoder, TheReceiversSolutionKeepsEveryNumber) {
+TEST(MtDecoder, TheReceiversSolutionKeepsEveryNumber) {
   const GnssPvt pvt{.time_of_week_ms = 400'000'250,
                     .year = 2026,
                     .month = 3,

@@ -77,20 +77,25 @@ bool finite(const SImuOutput& out) {
   return std::isfinite(sum);
 }
 
+std::vector<SimulatedStudy> left_and_right() {
+  return {{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.0},
+          {exp_so3(Vector3d(0, 0, 1.5)), {-0.30, 0.25, 0.10}, 0.0}};
+}
+
+/// Configures a mounting as somebody measured it.
+void believe(const SimulatedStudy& mounting, SImuConfig& config) {
+  config.prior_C_b_s = row_major(mounting.C_b_s);
+  config.prior_r_bs_b_m = {mounting.r_bs_b_m.x(), mounting.r_bs_b_m.y(), mounting.r_bs_b_m.z()};
+  config.prior_r_bs_b_sd_m = {0.05, 0.05, 0.05};
+  config.prior_t_d_s = 0.0;
+}
+
 TEST(BadInput, TwoSwappedStudiesAreToldByName) {
-  const std::vector<SimulatedStudy> truth{{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.0},
-                                          {exp_so3(Vector3d(0, 0, 1.5)), {-0.30, 0.25, 0.10}, 0.0}};
+  const std::vector<SimulatedStudy> truth = left_and_right();
   for (const bool swapped : {true, false}) {
     SimulatedDrive drive(240.0, truth, 41);
     EstimatorConfig config = drive.config();
-    for (std::size_t i = 0; i < 2; ++i) {
-      const SimulatedStudy& believed = truth[swapped ? 1 - i : i];
-      config.studies[i].prior_C_b_s = row_major(believed.C_b_s);
-      config.studies[i].prior_r_bs_b_m = {believed.r_bs_b_m.x(), believed.r_bs_b_m.y(),
-                                          believed.r_bs_b_m.z()};
-      config.studies[i].prior_r_bs_b_sd_m = {0.05, 0.05, 0.05};
-      config.studies[i].prior_t_d_s = 0.0;
-    }
+    for (std::size_t i = 0; i < 2; ++i) believe(truth[swapped ? 1 - i : i], config.studies[i]);
     Estimator estimator(config);
     const Told told = told_by(drive, estimator);
     EXPECT_EQ(told.has<event::SImusSwapped>(), swapped);
@@ -102,20 +107,12 @@ TEST(BadInput, TwoSwappedStudiesAreToldByName) {
 }
 
 TEST(BadInput, TwoStudiesOfWhichOneSitsWhereTheOtherShouldAreNotSwapped) {
-  const std::vector<SimulatedStudy> truth{{Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.0},
-                                          {exp_so3(Vector3d(0, 0, 1.5)), {-0.30, 0.25, 0.10}, 0.0}};
+  const std::vector<SimulatedStudy> truth = left_and_right();
   const SimulatedStudy elsewhere{exp_so3(Vector3d(0, 0, -1.2)), {1.2, 0.9, -0.7}, 0.0};
   for (const std::size_t which : {0U, 1U}) {
     SimulatedDrive drive(240.0, truth, 41);
     EstimatorConfig config = drive.config();
-    for (std::size_t i = 0; i < 2; ++i) {
-      const SimulatedStudy& believed = i == which ? elsewhere : truth[which];
-      config.studies[i].prior_C_b_s = row_major(believed.C_b_s);
-      config.studies[i].prior_r_bs_b_m = {believed.r_bs_b_m.x(), believed.r_bs_b_m.y(),
-                                          believed.r_bs_b_m.z()};
-      config.studies[i].prior_r_bs_b_sd_m = {0.05, 0.05, 0.05};
-      config.studies[i].prior_t_d_s = 0.0;
-    }
+    for (std::size_t i = 0; i < 2; ++i) believe(i == which ? elsewhere : truth[which], config.studies[i]);
     Estimator estimator(config);
     const Told told = told_by(drive, estimator);
     EXPECT_TRUE(told.has<event::BoresightPriorWrong>());

@@ -3,7 +3,6 @@
 #include "service/lines/io_thread.h"
 
 #include <fcntl.h>
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -15,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-#include "service/pipeline/estimator_setup.h"
+#include "one_study.h"
 
 namespace imuscope {
 namespace {
@@ -40,6 +39,7 @@ struct Device {
 
   std::array<int, 2> ends{};
   // Of the line.
+  int lines = 0;  ///< of it that are open
   std::atomic<bool> is_gone{false};
   LineHealth health;
   LineTiming timing;
@@ -62,7 +62,10 @@ struct Device {
 
 class TestLine final : public Transport {
  public:
-  explicit TestLine(Device& device) : device_(device) {}
+  explicit TestLine(Device& device) : device_(device) { ++device_.lines; }
+  ~TestLine() override { --device_.lines; }
+  TestLine(const TestLine&) = delete;
+  TestLine& operator=(const TestLine&) = delete;
   IoResult read(std::span<std::uint8_t> buffer) noexcept override {
     if (device_.is_gone) return {IoStatus::kGone};
     const std::size_t most = std::min(buffer.size(), device_.read_most);
@@ -138,20 +141,6 @@ class TestDecoder final : public DeviceDecoder {
   DecoderCounters counters_;
 };
 
-EstimatorConfig two_imus() {
-  return estimator_config(*parse_configuration(R"(
-[[device]]
-name = "r"
-role = "reference"
-protocol = "csv_imu"
-[[device]]
-name = "s"
-role = "study"
-protocol = "csv_imu"
-)",
-                                               "test.toml"));
-}
-
 class IoThreadTest : public testing::Test {
  protected:
   void start(const std::vector<std::size_t>& line_owners = {0, 1}) {
@@ -206,7 +195,7 @@ class IoThreadTest : public testing::Test {
   }
 
   std::array<Device, 2> devices_;
-  Core core_{two_imus(), 2};
+  Core core_{test::one_study(), 2};
   std::unique_ptr<IoThread> io_;
 };
 
@@ -476,18 +465,16 @@ TEST_F(IoThreadTest, SamplesThatTheCoreHasNoRoomForAreCountedAndNoted) {
   EXPECT_FALSE(io_->exceptions().try_pop(noted));
 }
 
-// A connection that was offered and never taken over, and one that nobody took back, go with the thread.
-TEST_F(IoThreadTest, OfSeveralOffersTheNewestHolds) {
-  devices_[1].to_say = "second";
+TEST_F(IoThreadTest, AnOfferThatNobodyTakesOverGoesWithTheNextOneOrTheThread) {
   start();
-  auto first = std::make_unique<Connection>();
-  first->line = std::make_unique<TestLine>(devices_[0]);
-  first->session = std::make_unique<TestSession>(devices_[0]);
-  io_->stop();  // nobody takes it over
-  io_->offer(0, std::move(first));
+  io_->stop();
   offer(0);
+  offer(0);
+  EXPECT_EQ(devices_[0].lines, 1);
   EXPECT_EQ(io_->take_back(0), nullptr);
   EXPECT_EQ(io_->newest_arrival(), HostTime::min());
+  io_.reset();
+  EXPECT_EQ(devices_[0].lines, 0);
 }
 
 }  // namespace

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 #include <optional>
 
-#include "service/pipeline/estimator_setup.h"
+#include "one_study.h"
 
 namespace imuscope {
 namespace {
+
+using test::one_study;
 
 class Notes final : public CoreSink {
  public:
@@ -19,20 +21,6 @@ class Notes final : public CoreSink {
   std::vector<LateSample> late;
   std::vector<AppliedNoise> noises;
 };
-
-EstimatorConfig one_study() {
-  return estimator_config(*parse_configuration(R"(
-[[device]]
-name = "r"
-role = "reference"
-protocol = "csv_imu"
-[[device]]
-name = "s"
-role = "study"
-protocol = "csv_imu"
-)",
-                                               "test.toml"));
-}
 
 HostTime at_ms(double ms) { return HostTime{from_seconds(1.0 + ms * 1e-3)}; }
 
