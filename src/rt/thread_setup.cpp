@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <future>
 #include <optional>
 #include <utility>
 
@@ -21,6 +22,7 @@ namespace {
 
 constexpr std::size_t kThreadNameMax = 15;          // Linux: 16 bytes with the terminating zero
 constexpr unsigned long kShortTimerSlackNs = 1000;  // default is 50 us
+constexpr std::size_t kPrefaultedStack = 128 * 1024;  // what the core's threads use of theirs, with room to spare
 
 Error refusal(std::string what, std::string remedy) {
   return {ErrorKind::kWork, std::move(what), std::move(remedy)};
@@ -167,6 +169,20 @@ void prefault_stack(std::size_t bytes) noexcept {
   auto* const block = static_cast<volatile unsigned char*>(alloca(bytes));
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   for (std::size_t offset = 0; offset < bytes; offset += page) block[offset] = 0;
+}
+
+std::thread start_core_thread(const ThreadPlan& plan, std::vector<Error>& refusals,
+                              std::function<void()> work) {
+  std::promise<std::vector<Error>> ready;
+  auto refused = ready.get_future();
+  std::thread thread([plan, ready = std::move(ready), work = std::move(work)]() mutable {
+    auto errors = setup_this_thread(plan);
+    prefault_stack(kPrefaultedStack);
+    ready.set_value(std::move(errors));
+    work();
+  });
+  for (auto& error : refused.get()) refusals.push_back(std::move(error));
+  return thread;
 }
 
 }  // namespace imuscope

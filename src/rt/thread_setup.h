@@ -5,6 +5,7 @@
 /// Called at start, before the real-time line; none of this is for the core's loop.
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -44,11 +45,14 @@ void run_as(std::thread& thread, Scheduling scheduling) noexcept;
 /// Stack size of all threads created from now on. The default of 8 MB each would be locked in full.
 [[nodiscard]] Result<void> set_thread_stack_size(std::size_t bytes);
 
-/// What a thread of the core touches of its stack before its loop.
-inline constexpr std::size_t kPrefaultedStack = 128 * 1024;
-
 /// Touches this much of the calling thread's stack, so that no page fault is left for the core's loop. Must
 /// be well below the thread's stack size.
 void prefault_stack(std::size_t bytes) noexcept;
+
+/// Starts a thread of the real-time line. It has been set up as planned, and its stack touched, when this returns;
+/// what was refused is then among `refusals`.
+/// @param work  what it does then; the thread ends with it
+[[nodiscard]] std::thread start_core_thread(const ThreadPlan& plan, std::vector<Error>& refusals,
+                                            std::function<void()> work);
 
 }  // namespace imuscope

@@ -144,6 +144,23 @@ TEST(ThreadSetup, AnIdleThreadWhoseEndIsWaitedForIsIdleNoMore) {
   thread.join();
 }
 
+TEST(ThreadSetup, ACoreThreadIsSetUpWhenItsStartReturnsAndTellsWhatWasRefused) {
+  std::vector<Error> refusals{{ErrorKind::kWork, "what was refused before", "stays"}};
+  std::atomic<bool> goes_on{false};
+  std::string name(16, '\0');
+  std::thread thread = start_core_thread({"of-the-core", Scheduling::kNormal, 0, {0, 1023}}, refusals, [&] {
+    while (!goes_on.load()) std::this_thread::yield();
+    pthread_getname_np(pthread_self(), name.data(), name.size());
+  });
+  // It has not gone on yet: what is known here was known before its work.
+  ASSERT_EQ(refusals.size(), 2U);
+  EXPECT_EQ(refusals[0].what, "what was refused before");
+  EXPECT_THAT(refusals[1].what, HasSubstr("thread of-the-core: core 1023 refused"));
+  goes_on.store(true);
+  thread.join();
+  EXPECT_STREQ(name.c_str(), "of-the-core");
+}
+
 TEST(ThreadSetup, StackSizeHoldsForLaterThreads) {
 #if defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "ThreadSanitizer keeps more of its own for a thread than this stack holds";

@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -13,12 +12,12 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "base/units.h"
 #include "estimation/batch/batch_mounting.h"
 #include "estimation/calibration/estimator.h"
+#include "tools/trials/all_threads.h"
 #include "tools/trials/batch_pairs.h"
 #include "tools/trials/standard_drive.h"
 
@@ -260,15 +259,8 @@ Sums run_all(const standard_drive::Truth& truth, const Options& options) {
   std::vector<std::uint64_t> missing;
   for (std::uint64_t seed = options.first; seed < options.first + options.seeds; ++seed)
     if (!results.has(seed)) missing.push_back(seed);
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < missing.size(); i = next++)
-      results.add(missing[i], run(truth, options, missing[i]));
-  };
-  std::vector<std::thread> helpers;
-  for (std::size_t i = 1; i < options.threads; ++i) helpers.emplace_back(work);
-  work();
-  for (std::thread& helper : helpers) helper.join();
+  on_all_threads(missing.size(), options.threads,
+                 [&](std::size_t i) { results.add(missing[i], run(truth, options, missing[i])); });
   Sums sum;
   for (std::uint64_t seed = options.first; seed < options.first + options.seeds; ++seed) {
     Totals of_seed;

@@ -4,11 +4,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <Eigen/Dense>
-#include <atomic>
 #include <cmath>
 #include <map>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "base/units.h"
@@ -16,6 +14,7 @@
 #include "estimation/navigation/so3.h"
 #include "firmware_sim/imu/sensor_classes.h"
 #include "tools/benchmarks/bench_report.h"
+#include "tools/trials/all_threads.h"
 #include "tools/trials/six_states.h"
 #include "tools/trials/standard_drive.h"
 
@@ -302,25 +301,18 @@ Totals run_all(const Scenario& scenario, const Options& options) {
   drive.seed = options.drive;
   const standard_drive::Truth common(drive, scenario.paper ? 1.0 : scenario.duration_s, options.world);
   std::vector<Totals> each(seeds);
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < seeds; i = next++) {
-      const std::uint64_t seed = options.first + i;
-      if (!scenario.paper) {
-        each[i] = run(scenario, options, common, seed);
-        continue;
-      }
-      imusim::Scenario own = drive;
-      own.seed = options.drive + seed;
-      const standard_drive::Truth truth(own, scenario.duration_s, options.world);
-      each[i] = run(scenario, options, truth, seed);
-      account_closed_form(scenario, truth.motion(), each[i]);
+  imuscope::on_all_threads(seeds, options.threads, [&](std::size_t i) {
+    const std::uint64_t seed = options.first + i;
+    if (!scenario.paper) {
+      each[i] = run(scenario, options, common, seed);
+      return;
     }
-  };
-  std::vector<std::thread> helpers;
-  for (std::size_t i = 1; i < options.threads; ++i) helpers.emplace_back(work);
-  work();
-  for (std::thread& helper : helpers) helper.join();
+    imusim::Scenario own = drive;
+    own.seed = options.drive + seed;
+    const standard_drive::Truth truth(own, scenario.duration_s, options.world);
+    each[i] = run(scenario, options, truth, seed);
+    account_closed_form(scenario, truth.motion(), each[i]);
+  });
   Totals sum;
   for (const Totals& totals : each) sum.add(totals);
   return sum;

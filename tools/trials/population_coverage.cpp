@@ -7,18 +7,17 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <optional>
 #include <random>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "models/noise/holm.h"
 #include "models/noise/nested_effects.h"
+#include "tools/trials/all_threads.h"
 
 namespace {
 
@@ -149,28 +148,25 @@ Hits try_fleet(const World& world, std::size_t units, std::uint64_t seed) {
   return hits;
 }
 
-Hits try_fleets(const World& world, std::size_t units, int fleets, int threads, std::uint64_t seed) {
-  std::vector<Hits> of_thread(static_cast<std::size_t>(threads));
-  std::vector<std::thread> workers;
-  for (int thread = 0; thread < threads; ++thread) {
-    workers.emplace_back([&, thread] {
-      for (int i = thread; i < fleets; i += threads)
-        of_thread[static_cast<std::size_t>(thread)] +=
-            try_fleet(world, units, seed + static_cast<std::uint64_t>(i));
-    });
-  }
-  for (auto& worker : workers) worker.join();
+Hits try_fleets(const World& world, std::size_t units, std::size_t fleets, std::size_t threads,
+                std::uint64_t seed) {
+  std::vector<Hits> each(fleets);
+  imuscope::on_all_threads(fleets, threads,
+                           [&](std::size_t i) { each[i] = try_fleet(world, units, seed + i); });
   Hits all;
-  for (const Hits& hits : of_thread) all += hits;
+  for (const Hits& hits : each) all += hits;
   return all;
 }
 
 /// Goals: 93 to 97 % and 3 to 7 %, as far as so many fleets can tell: two sd of chance more, where fewer than
 /// a thousand were asked for.
-bool within(double percent, double low, double high, double expected, int fleets) {
-  constexpr int kEnough = 1000;
+bool within(double percent, double low, double high, double expected, std::size_t fleets) {
+  constexpr std::size_t kEnough = 1000;
   const double chance =
-      fleets >= kEnough ? 0.0 : 100.0 * kZ95 * std::sqrt(expected * (1.0 - expected) / std::max(fleets, 1));
+      fleets >= kEnough ? 0.0
+                        : 100.0 * kZ95 *
+                              std::sqrt(expected * (1.0 - expected) /
+                                        static_cast<double>(std::max<std::size_t>(fleets, 1)));
   return percent >= low - chance && percent <= high + chance;
 }
 
@@ -178,8 +174,8 @@ bool within(double percent, double low, double high, double expected, int fleets
 
 int main(int argc, char** argv) {
   CLI::App app{"How often intervals of a fleet's population hold, and false outliers"};
-  int fleets = 1000;
-  int threads = 2;
+  std::size_t fleets = 1000;
+  std::size_t threads = 2;
   std::uint64_t seed = 1;
   app.add_option("--fleets", fleets, "of each size and world");
   app.add_option("--threads", threads, "at once");
@@ -192,7 +188,7 @@ int main(int argc, char** argv) {
   for (const World& world : kWorlds) {
     for (const std::size_t units : {std::size_t{5}, std::size_t{20}, std::size_t{100}}) {
       const Hits hits = try_fleets(world, units, fleets, threads, seed);
-      seed += static_cast<std::uint64_t>(fleets);
+      seed += fleets;
       const auto percent = [&](int n) { return 100.0 * n / std::max(hits.fleets, 1); };
       bool here = true;
       for (const int n : {hits.mean, hits.unit_sd, hits.drive_sd, hits.tolerance})

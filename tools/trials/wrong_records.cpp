@@ -6,15 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/Core>
 #include <algorithm>
-#include <atomic>
 #include <functional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "base/units.h"
 #include "estimation/batch/batch_mounting.h"
 #include "estimation/navigation/so3.h"
+#include "tools/trials/all_threads.h"
 #include "tools/trials/batch_pairs.h"
 
 namespace {
@@ -270,15 +269,8 @@ std::vector<Totals> run(const standard_drive::Truth& truth, const std::vector<Ca
 std::vector<Totals> run_all(const std::vector<Case>& cases, const Options& options) {
   const standard_drive::Truth truth(imusim::Scenario{}, options.duration_s, imusim::WorldKind::kHarsh);
   std::vector<std::vector<Totals>> each(options.seeds);
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < options.seeds; i = next++)
-      each[i] = run(truth, cases, options, options.first + i);
-  };
-  std::vector<std::thread> helpers;
-  for (std::size_t i = 1; i < options.threads; ++i) helpers.emplace_back(work);
-  work();
-  for (std::thread& helper : helpers) helper.join();
+  on_all_threads(options.seeds, options.threads,
+                 [&](std::size_t i) { each[i] = run(truth, cases, options, options.first + i); });
   std::vector<Totals> sums(cases.size());
   for (const auto& one : each)
     for (std::size_t c = 0; c < cases.size(); ++c) sums[c].add(one[c]);

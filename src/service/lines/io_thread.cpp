@@ -2,7 +2,6 @@
 
 #include <sys/epoll.h>
 #include <algorithm>
-#include <future>
 #include <optional>
 
 #include "rt/host_clock.h"
@@ -275,15 +274,7 @@ Result<void> IoThread::start(const ThreadPlan& plan, HostTime first_cut, std::ve
   first_cut_ = first_cut;
   if (auto opened = events_.open(); !opened) return opened;
   running_.store(true, std::memory_order_release);
-  std::promise<std::vector<Error>> ready;
-  auto refused = ready.get_future();
-  thread_ = std::thread([this, plan, &ready] {
-    auto errors = setup_this_thread(plan);
-    prefault_stack(kPrefaultedStack);
-    ready.set_value(std::move(errors));
-    loop();
-  });
-  for (auto& error : refused.get()) refusals.push_back(std::move(error));
+  thread_ = start_core_thread(plan, refusals, [this] { loop(); });
   return {};
 }
 

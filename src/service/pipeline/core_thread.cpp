@@ -1,7 +1,5 @@
 #include "service/pipeline/core_thread.h"
 
-#include <future>
-
 namespace imuscope {
 
 CoreThread::CoreThread(Core& core, HostTime t0)
@@ -13,15 +11,7 @@ CoreThread::~CoreThread() {
 }
 
 void CoreThread::start(const ThreadPlan& plan, std::vector<Error>& refusals) {
-  std::promise<std::vector<Error>> ready;
-  auto refused = ready.get_future();
-  thread_ = std::thread([this, plan, &ready] {
-    auto errors = setup_this_thread(plan);
-    prefault_stack(kPrefaultedStack);
-    ready.set_value(std::move(errors));
-    loop();
-  });
-  for (auto& error : refused.get()) refusals.push_back(std::move(error));
+  thread_ = start_core_thread(plan, refusals, [this] { loop(); });
 }
 
 void CoreThread::finish(std::int64_t last) {
