@@ -18,6 +18,7 @@
 #include "base/output_folder.h"
 #include "base/text.h"
 #include "base/units.h"
+#include "base/utc_text.h"
 #include "logs/bag/bag_writer.h"
 #include "logs/bag/message_json.h"
 #include "models/noise/export.h"
@@ -71,12 +72,13 @@ class RunUtc {
       while (rows->next()) add(rows->number(0), rows->number(1), kBetween_s);
     }
     if (points_.size() > 1) return;
-    const auto begin = parse_utc(tables::text_at(run, "t0_utc"));
-    if (!begin) return;
+    const auto begin = parse_utc_text(tables::text_at(run, "t0_utc"));
+    if (!begin || !is_time(begin->since_1970_s)) return;
+    const double begin_s = begin->since_1970_s;
     const double ppm = tables::number_at(tables::field(run, "time_scale"), "host_clock_ppm").value_or(0.0);
     constexpr double kPpmMost = 1e4;  // of a quartz
     if (!(std::abs(ppm) < kPpmMost)) return;
-    points_ = {{0.0, *begin}, {1e3, *begin + 1e3 - ppm * 1e-3}};
+    points_ = {{0.0, begin_s}, {1e3, begin_s + 1e3 - ppm * 1e-3}};
   }
 
   [[nodiscard]] bool is_known() const { return points_.size() > 1; }
@@ -113,22 +115,6 @@ class RunUtc {
     const double utc_step_s = utc_s - points_.back().utc_s;
     if (step_s >= between_s && std::abs(utc_step_s / step_s - 1.0) < kRateMost)
       points_.push_back({time_s, utc_s});
-  }
-  /// "2026-03-14T09:30:12.004913Z", as run.json has it.
-  static std::optional<double> parse_utc(const std::string& text) {
-    int year = 0, month = 0, day = 0, hour = 0, minute = 0;
-    double second = 0.0;
-    if (std::sscanf(text.c_str(), "%d-%d-%dT%d:%d:%lfZ", &year, &month, &day, &hour, &minute, &second) != 6)
-      return {};
-    const std::chrono::year_month_day date{std::chrono::year(year),
-                                           std::chrono::month(static_cast<unsigned>(month)),
-                                           std::chrono::day(static_cast<unsigned>(day))};
-    if (!date.ok()) return {};
-    const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-    const double utc_s =
-        static_cast<double>(days) * 86400.0 + hour * kSecondsPerHour + minute * 60.0 + second;
-    if (!is_time(utc_s)) return {};
-    return utc_s;
   }
 
   std::vector<Point> points_;

@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <imuscope/raw_t.hpp>
+#include <imuscope/run_t.hpp>
 #include <random>
+#include <variant>
 
 #include "publish/message_codec.h"
 
@@ -91,6 +93,25 @@ TEST(RawView, IsNoneOfATimeThatNoClockHas) {
   EXPECT_FALSE(view_raw(encode_message(message)));
   message.sequence = 0;
   EXPECT_TRUE(view_raw(encode_message(message)));
+}
+
+TEST(RunRecord, BeginsAtAnyTimeFrom1970OnThatAClockCanHave) {
+  run_t message{};
+  message.t0_ns = 1;
+  message.t0_utime = 0;
+  const auto at_1970 = decode_record(encode_message(message));
+  ASSERT_TRUE(at_1970);
+  EXPECT_EQ(to_ns(std::get<RunHeader>(*at_1970).t0_wall), 0);
+  message.t0_utime = 1'700'000'000'000'001;
+  EXPECT_EQ(to_ns(std::get<RunHeader>(*decode_record(encode_message(message))).t0_wall),
+            1'700'000'000'000'001'000);
+  message.t0_utime = -1;
+  EXPECT_FALSE(decode_record(encode_message(message)));
+  message.t0_utime = std::int64_t{1} << 62U;
+  EXPECT_FALSE(decode_record(encode_message(message)));
+  message.t0_utime = 0;
+  message.t0_ns = std::int64_t{1} << 62U;
+  EXPECT_FALSE(decode_record(encode_message(message)));
 }
 
 }  // namespace

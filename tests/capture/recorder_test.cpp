@@ -300,6 +300,24 @@ TEST(Recorder, AnOldFileGoesOnInAnotherAndTheReaderJoinsThem) {
   expect_files_that_join(0, milliseconds(400));
 }
 
+TEST(Recorder, WithoutLimitsOneFileHoldsAll) {
+  const auto folder = test::scratch_folder();
+  const auto ring = std::make_unique<RawRing>();
+  auto options = options_for(folder / "capture.lcm");
+  options.max_file_bytes = 0;
+  options.max_file_age = Duration::zero();
+  auto recorder = Recorder::start(options, {ring.get()}, {});
+  ASSERT_TRUE(recorder.has_value()) << recorder.error().text();
+  RawTap tap(*ring);
+  for (std::uint32_t i = 0; i < 120; ++i) {  // 1.2 s at least: flushed several times
+    tap.record(0, Direction::kRead, numbered_bytes(i, 40), host_now());
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  ASSERT_TRUE((*recorder)->stop().has_value());
+  EXPECT_FALSE(std::filesystem::exists(folder / "capture_001.lcm"));
+  EXPECT_EQ(summarise_capture(folder / "capture.lcm")->devices.at("airins").reads, 120U);
+}
+
 TEST(Recorder, AFileInTheWayOfTheNextOneIsToldAndThePresentOneGoesOn) {
   const auto folder = test::scratch_folder();
   std::ofstream(folder / "capture_001.lcm") << "from another run";

@@ -113,6 +113,20 @@ TEST(DependenceStudy, ARecordWithoutTemperatureSaysSoOnceForTheSensor) {
     EXPECT_TRUE(point.at("driver").at("temperature").is_null());
 }
 
+TEST(DependenceStudy, ASensorThatNeverSentAnythingIsPassedOver) {
+  Configuration configuration = one_imu();
+  configuration.devices.push_back(configuration.devices.front());
+  configuration.devices.back().name = "mtx2";
+  const std::vector<std::string> names{"static", "dynamic"};
+  const RegimeTrack motion(names, {{at(0.0), at(kLength_s), 1}});
+  MotionLevels levels;
+  for (int k = 0; k < static_cast<int>(kLength_s * kRate_hz); ++k)
+    levels.add(at(k / kRate_hz), {0.1 * std::sin(0.1 * k), 0.0, 0.0}, {0.0, 0.0, -9.8});
+  const auto study = study_dependence(configuration, {{}, {}}, {{}, {}}, levels, motion, {}, at(0.0));
+  EXPECT_THAT(study.remarks, ::testing::IsEmpty());
+  EXPECT_TRUE(study.document.at("points").empty());
+}
+
 TEST(DependenceStudy, ATemperatureThatStaysIsNoDriverAndThatIsSaidOnce) {
   const auto study = study_of(0.4, true);
   EXPECT_THAT(study.remarks, Contains(HasSubstr("mtx1: its temperature changed by 0.4 degC over the drive")));

@@ -1,10 +1,12 @@
 /// A whole study of a simulated drive, from files to documents: two S-IMUs, of which one is turned on its mount half way,
 /// and GNSS. What is right about it, the tests of the parts and tests/integration prove.
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -12,6 +14,7 @@
 #include <map>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "configuration/config.h"
 #include "estimation/navigation/so3.h"
@@ -344,6 +347,78 @@ TEST_F(WholeStudy, Bag) {
   }
   for (const auto& [topic, n] : seen) lines.line(topic, n);
   test::expect_recorded("study/bag.txt", without(lines.text(), folder()), kShare, 1e-6);
+}
+
+/// The times of all messages of a bag of the run in this folder, ns, by topic.
+std::map<std::string, std::vector<std::int64_t>> times_of_bag(const std::filesystem::path& run,
+                                                              bool are_utc) {
+  RunBagOptions options;
+  options.source.run_dir = run;
+  options.out = run.string() + ".mcap";
+  options.version = "0";
+  options.compression = mcap::Compression::kNone;
+  const auto bag = write_run_bag(options);
+  EXPECT_TRUE(bag) << bag.error().text();
+  EXPECT_EQ(bag->times_are_utc, are_utc);
+  std::map<std::string, std::vector<std::int64_t>> times;
+  auto reader = mcap::Reader::open(options.out);
+  if (!reader) return times;
+  while (const auto message = reader->next())
+    times[message->topic->name].push_back(static_cast<std::int64_t>(message->log_time));
+  return times;
+}
+
+/// navigation.csv of the run with another `utc_s`: a clock that is 50 ppm slow up to the bend, and as much fast after it.
+constexpr std::int64_t kBegin_ns = 1'773'480'672'250'000'000;  // 2026-03-14T09:31:12.25Z
+constexpr double kBend_s = 60.0;
+constexpr double kRate = 50e-6;
+double ahead_ns(double time_s) { return 1e9 * kRate * (kBend_s - std::abs(time_s - kBend_s)); }
+
+void write_utc(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::ifstream in(from);
+  std::ofstream out(to);
+  std::string line;
+  std::getline(in, line);
+  out << line << '\n';
+  const auto comma = line.find(",utc_s,");
+  const auto column = std::count(line.begin(), line.begin() + static_cast<std::ptrdiff_t>(comma) + 1, ',');
+  ASSERT_TRUE(line.starts_with("time_s,") && comma != std::string::npos) << line;
+  while (std::getline(in, line)) {
+    std::size_t begin = 0;
+    for (std::ptrdiff_t i = 0; i < column; ++i) begin = line.find(',', begin) + 1;
+    const double time_s = std::stod(line);
+    const double utc_s = 1e-9 * static_cast<double>(kBegin_ns) + time_s + 1e-9 * ahead_ns(time_s);
+    out << line.substr(0, begin) << fmt::format("{:.6f}", utc_s) << line.substr(line.find(',', begin)) << '\n';
+  }
+}
+
+TEST_F(WholeStudy, ABagsTimesAreUtcByTheNavigationsRowsOrFromTheBeginningByTheClocksRate) {
+  const auto of_run = times_of_bag(run(), false);
+  const auto copy = scratch_->path / "utc";
+  std::filesystem::copy(run(), copy, std::filesystem::copy_options::recursive);
+  json record = read_document(copy / "run.json");
+  record["t0_utc"] = "2026-03-14T09:31:12.25Z";
+  record["time_scale"]["host_clock_ppm"] = 40.0;
+  std::ofstream(copy / "run.json") << record.dump();
+  const auto by_beginning = times_of_bag(copy, true);
+  write_utc(run() / "navigation.csv", copy / "navigation.csv");
+  const auto by_rows = times_of_bag(copy, true);
+
+  for (const char* topic : {"/imu/reference/raw", "/imu/mtx1/corrected"}) {
+    const auto& times = of_run.at(topic);
+    ASSERT_EQ(by_beginning.at(topic).size(), times.size()) << topic;
+    ASSERT_EQ(by_rows.at(topic).size(), times.size()) << topic;
+    for (std::size_t i = 0; i < times.size(); i += 50) {
+      const double time_s = 1e-9 * static_cast<double>(times[i]);
+      // A PC's clock that gains 40 ppm shows more seconds than have passed.
+      ASSERT_NEAR(static_cast<double>(by_beginning.at(topic)[i] - kBegin_ns - times[i]), -40e3 * time_s, 1e3)
+          << topic << " at " << time_s;
+      // Rows ten seconds apart cut the bend's corner; a double of seconds since 1970 is good to 0.24 us.
+      if (std::abs(time_s - kBend_s) < 10.0) continue;
+      ASSERT_NEAR(static_cast<double>(by_rows.at(topic)[i] - kBegin_ns - times[i]), ahead_ns(time_s), 5e3)
+          << topic << " at " << time_s;
+    }
+  }
 }
 
 }  // namespace

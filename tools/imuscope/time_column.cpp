@@ -6,9 +6,10 @@
 #include <array>
 #include <cctype>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <deque>
+
+#include "base/utc_text.h"
 
 namespace imuscope::cli {
 namespace {
@@ -25,60 +26,6 @@ bool is_one_of(std::string_view name, std::span<const std::string_view> names) {
   std::transform(lower.begin(), lower.end(), lower.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return std::find(names.begin(), names.end(), lower) != names.end();
-}
-
-/// Reads `digits` digits at the front of `text` and drops them.
-std::optional<int> take_number(std::string_view& text, std::size_t digits) {
-  if (text.size() < digits) return std::nullopt;
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + digits, value);
-  if (error != std::errc() || end != text.data() + digits || text.front() == '-') return std::nullopt;
-  text.remove_prefix(digits);
-  return value;
-}
-
-bool take_char(std::string_view& text, std::string_view wanted) {
-  if (text.empty() || wanted.find(text.front()) == std::string_view::npos) return false;
-  text.remove_prefix(1);
-  return true;
-}
-
-/// Seconds that a zone such as "+01:00", "-0530" or "Z" is ahead of UTC.
-std::optional<double> zone_offset_s(std::string_view text) {
-  if (text.empty() || text == "Z" || text == "z") return 0.0;
-  const double sign = text.front() == '-' ? -1.0 : 1.0;
-  if (!take_char(text, "+-")) return std::nullopt;
-  const auto hours = take_number(text, 2);
-  if (!hours) return std::nullopt;
-  take_char(text, ":");
-  const auto minutes = text.empty() ? std::optional(0) : take_number(text, 2);
-  if (!minutes || !text.empty()) return std::nullopt;
-  return sign * (3600.0 * *hours + 60.0 * *minutes);
-}
-
-std::optional<double> iso_8601(std::string_view text) {
-  const auto year = take_number(text, 4);
-  if (!year || !take_char(text, "-")) return std::nullopt;
-  const auto month = take_number(text, 2);
-  if (!month || !take_char(text, "-")) return std::nullopt;
-  const auto day = take_number(text, 2);
-  if (!day || !take_char(text, "Tt ")) return std::nullopt;
-  const auto hour = take_number(text, 2);
-  if (!hour || !take_char(text, ":")) return std::nullopt;
-  const auto minute = take_number(text, 2);
-  if (!minute || !take_char(text, ":")) return std::nullopt;
-  const std::size_t end_of_seconds = std::min(text.find_first_not_of("0123456789."), text.size());
-  double second = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + end_of_seconds, second);
-  if (error != std::errc() || end != text.data() + end_of_seconds) return std::nullopt;
-  const auto zone = zone_offset_s(text.substr(end_of_seconds));
-  const std::chrono::year_month_day date{std::chrono::year{*year},
-                                         std::chrono::month{static_cast<unsigned>(*month)},
-                                         std::chrono::day{static_cast<unsigned>(*day)}};
-  constexpr double kLeapSecondEnd = 61.0;
-  if (!zone || !date.ok() || *hour > 23 || *minute > 59 || second >= kLeapSecondEnd) return std::nullopt;
-  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-  return 86'400.0 * static_cast<double>(days) + 3600.0 * *hour + 60.0 * *minute + second - *zone;
 }
 
 double median_of(std::vector<double> values) {
@@ -159,7 +106,8 @@ std::optional<double> parse_stamp(std::string_view text) {
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
-  return iso_8601(text);
+  const auto utc = parse_utc_text(text);
+  return utc ? std::optional(utc->since_1970_s) : std::nullopt;
 }
 
 bool is_time_name(std::string_view name) {

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <sstream>
 
 #include "base/units.h"
+#include "base/utc_text.h"
 #include "estimation/calibration/filter_core.h"
 #include "estimation/navigation/so3.h"
 #include "estimation/navigation/wgs84.h"
@@ -19,20 +19,10 @@ using Eigen::Vector3d;
 
 constexpr double kSameInstant_s = 0.5e-3;
 
-/// "2026-03-14T09:30:00.004500Z"
 imuscope::UtcTime utc_of(const std::string& text) {
-  int year = 0;
-  unsigned month = 0;
-  unsigned day = 0;
-  int hour = 0;
-  int minute = 0;
-  double second = 0.0;
-  if (std::sscanf(text.c_str(), "%d-%u-%uT%d:%d:%lfZ", &year, &month, &day, &hour, &minute, &second) != 6)
-    return {};
-  const std::chrono::sys_days date =
-      std::chrono::year(year) / static_cast<int>(month) / static_cast<int>(day);
-  return imuscope::UtcTime(date) + std::chrono::hours(hour) + std::chrono::minutes(minute) +
-         imuscope::from_seconds(second);
+  const auto utc = imuscope::parse_utc_text(text);
+  if (!utc) return {};
+  return imuscope::UtcTime(imuscope::from_seconds(utc->since_1970_s));
 }
 
 }  // namespace

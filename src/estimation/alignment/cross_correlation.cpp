@@ -62,10 +62,11 @@ double correlation_at(std::span<const double> a, std::span<const double> b, std:
   return m.correlation();
 }
 
-/// top of the parabola through three equally spaced values, in steps from the middle one.
+/// top of the parabola through three equally spaced values, in steps from the middle one, which is the highest:
+/// half a step at most.
 double parabola_top(double left, double middle, double right) noexcept {
   const double bend = left - 2.0 * middle + right;
-  return bend < 0.0 ? std::clamp(0.5 * (left - right) / bend, -0.5, 0.5) : 0.0;
+  return bend < 0.0 ? 0.5 * (left - right) / bend : 0.0;
 }
 
 /// Peak over the highest value that is not on the same hill (the hill ends where half the peak is reached).

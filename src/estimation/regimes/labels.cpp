@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <set>
 
 #include "base/text.h"
+#include "base/utc_text.h"
 
 namespace imuscope {
 
@@ -52,42 +52,10 @@ std::optional<double> number(std::string_view text) {
   return value;
 }
 
-/// Two or four digits and what ends them.
-bool take_digits(std::string_view& text, std::size_t n, char end, int& value) {
-  if (text.size() <= n || text[n] != end) return false;
-  const auto [stopped, code] = std::from_chars(text.data(), text.data() + n, value);
-  if (code != std::errc{} || stopped != text.data() + n) return false;
-  text.remove_prefix(n + 1);
-  return true;
-}
-
-/// Seconds since 1970-01-01 of a text such as 2026-03-14T09:30:00.25Z.
-std::optional<double> utc_date(std::string_view text) {
-  int year = 0;
-  int month = 0;
-  int day = 0;
-  int hour = 0;
-  int minute = 0;
-  if (!take_digits(text, 4, '-', year) || !take_digits(text, 2, '-', month) ||
-      !take_digits(text, 2, 'T', day) || !take_digits(text, 2, ':', hour) ||
-      !take_digits(text, 2, ':', minute) || !text.ends_with('Z'))
-    return std::nullopt;
-  const auto second = number(text.substr(0, text.size() - 1));
-  const std::chrono::year_month_day date{std::chrono::year{year},
-                                         std::chrono::month{static_cast<unsigned>(month)},
-                                         std::chrono::day{static_cast<unsigned>(day)}};
-  // Second 60 is a leap second's, and the first of the next minute here.
-  if (!second || !date.ok() || hour > 23 || minute > 59 || *second < 0.0 || *second >= 61.0)
-    return std::nullopt;
-  const auto days = std::chrono::sys_days(date).time_since_epoch();
-  return std::chrono::duration<double>(days + std::chrono::hours(hour) + std::chrono::minutes(minute))
-             .count() +
-         *second;
-}
-
+/// Seconds since 1970. A date without a zone may be meant in the time of whoever wrote it.
 std::optional<double> utc_number(std::string_view text) {
-  const auto date = utc_date(text);
-  return date ? date : number(text);
+  if (const auto date = parse_utc_text(text); date && date->has_zone) return date->since_1970_s;
+  return number(text);
 }
 
 std::optional<Label> parse_line(std::string_view line, bool in_utc) {

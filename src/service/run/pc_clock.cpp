@@ -32,6 +32,10 @@ Duration boot_time() noexcept {
 std::optional<KernelClockState> read_kernel_clock() noexcept {
   timex clock{};  // no mode is set: nothing is changed
   const int state = adjtimex(&clock);
+  return kernel_clock_of(state, clock);
+}
+
+std::optional<KernelClockState> kernel_clock_of(int state, const timex& clock) noexcept {
   if (state < 0) return std::nullopt;
   constexpr double kMicro = 1e-6;
   constexpr double kNano = 1e-9;

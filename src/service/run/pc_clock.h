@@ -12,6 +12,8 @@
 #include "base/time.h"
 #include "service/run/clock_keepers.h"
 
+struct timex;
+
 namespace imuscope {
 
 /// What adjtimex(2) says of the clock that CLOCK_REALTIME shows.
@@ -28,6 +30,10 @@ struct KernelClockState {
 /// Reads it; changes nothing and needs no right. Nothing where the system refuses (a sandbox that forbids
 /// every call about clocks).
 [[nodiscard]] std::optional<KernelClockState> read_kernel_clock() noexcept;
+
+/// The same of an answer of adjtimex(2).
+/// @param state  what the call returned
+[[nodiscard]] std::optional<KernelClockState> kernel_clock_of(int state, const timex& clock) noexcept;
 
 /// The wall clock departed from CLOCK_MONOTONIC between two looks.
 struct WallClockStep {

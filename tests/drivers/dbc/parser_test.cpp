@@ -93,6 +93,16 @@ TEST(DbcParser, ASignalLongerThanTheFrameIsAbsentAndNotZero) {
   EXPECT_EQ(read(database, "GEAR_29.DIR", {1, 2}), 0x0201U);
 }
 
+TEST(DbcParser, ASignalWhoseSwitchIsBeyondTheFrameIsAbsent) {
+  const auto database = parse(
+      "BO_ 5 GEAR: 8 ECU\n SG_ PAGE M : 56|8@1+ (1,0) [0|0] \"\" NAV\n SG_ DIR m0 : 0|8@1+ (1,0) [0|0] \"\" NAV\n",
+      "far.dbc");
+  ASSERT_TRUE(database) << database.error().text();
+  EXPECT_EQ(read(*database, "GEAR.DIR", {7, 0, 0, 0, 0, 0, 0, 0}), 7U);
+  EXPECT_FALSE(read(*database, "GEAR.DIR", {7, 0, 0, 0, 0, 0, 0, 1}));
+  EXPECT_FALSE(read(*database, "GEAR.DIR", {7, 0}));
+}
+
 TEST(DbcParser, AnUnknownSignalIsAnsweredWithTheNearestName) {
   const Database database = whole();
   EXPECT_EQ(database.choose("GEAR.DIRR").error().text(),
@@ -216,6 +226,18 @@ TEST(DbcParser, RemarksAndWholeNumbersWithAPointAreRead) {
   EXPECT_EQ(database->messages[0].id, 100U);
   ASSERT_EQ(database->messages[0].signals.at(0).names.size(), 1U);
   EXPECT_EQ(database->messages[0].signals[0].names[0].number, 1);
+}
+
+TEST(DbcParser, NumbersOfSixtyFourBitsAreExact) {
+  const auto database = parse(
+      "BO_ 5 GEAR: 8 ECU\n SG_ DIR : 0|64@1- (1,0) [0|0] \"\" NAV\n"
+      "VAL_ 5 DIR -9007199254740993 \"backward\" +9223372036854775807 \"forward\" ;",
+      "large.dbc");
+  ASSERT_TRUE(database) << database.error().text();
+  const auto& names = database->messages.at(0).signals.at(0).names;
+  ASSERT_EQ(names.size(), 2U);
+  EXPECT_EQ(names[0].number, -9007199254740993);
+  EXPECT_EQ(names[1].number, 9223372036854775807);
 }
 
 TEST(DbcParser, NumbersThatAreNotWholeOrDoNotFitAreRefused) {

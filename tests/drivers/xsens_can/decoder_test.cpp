@@ -330,6 +330,23 @@ TEST(XsensCan, SeveralHighRateFramesOfAGroupAreAveraged) {
   EXPECT_NE(unit.samples().back().imu.flags & kIsIncrement, 0U);
 }
 
+TEST(XsensCan, AGroupWithOneOfTheTwoHighRateMessagesTellsNothingAndIsAGap) {
+  for (const Item alone : {Item::kHighRateFirst, Item::kHighRateSecond}) {
+    Unit unit;
+    unit.groups(60, [&] { rest(unit, Item::kHighRateFirst, Item::kHighRateSecond); });
+    const auto before = unit.samples().size();
+    const auto lost_before = unit.decoder.counters().samples_lost;
+    unit.groups(1, [&] { unit.frame(alone, triad(2, 0, 2511)); });
+    unit.groups(2, [&] { rest(unit, Item::kHighRateFirst, Item::kHighRateSecond); });
+    unit.opening();
+    // The group that was open before, and the two after the one that lacks a message.
+    ASSERT_EQ(unit.samples().size(), before + 3);
+    EXPECT_EQ(unit.decoder.counters().samples_lost, lost_before + 1);
+    EXPECT_NE(unit.samples()[before + 1].imu.flags & kGapBefore, 0U);
+    EXPECT_EQ(unit.decoder.high_rate_order(), HighRateOrder::kAccelerationFirst);
+  }
+}
+
 TEST(XsensCan, OtherIdentifiersTheAxesAndTheClippedAxesAreHeeded) {
   DecoderConfig config;
   config.device = 4;

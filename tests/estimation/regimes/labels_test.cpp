@@ -46,7 +46,7 @@ TEST(Labels, WhatIsWrongInAFileIsToldWithItsLine) {
 TEST(Labels, UtcIsADateOrSecondsAndBecomesSecondsOfTheRun) {
   const auto labels = parse_labels(
       "begin_utc,end_utc,regime\n2026-03-14T09:30:00.25Z,2026-03-14T09:30:10Z,motorway\n"
-      "1773480620.5,1773480630,gravel\n",
+      "1773480620.5,2026-03-14 10:30:30+01:00,gravel\n",
       "l.csv");
   ASSERT_TRUE(labels) << labels.error().text();
   ASSERT_EQ(labels->size(), 2U);
@@ -59,10 +59,11 @@ TEST(Labels, UtcIsADateOrSecondsAndBecomesSecondsOfTheRun) {
   ASSERT_TRUE(of_run);
   EXPECT_NEAR((*of_run)[0].begin_s, 5.25, 1e-6);
   EXPECT_NEAR((*of_run)[1].end_s, 35.0, 1e-6);
+  EXPECT_DOUBLE_EQ((*labels)[1].end_s, 1773480630.0);
   EXPECT_FALSE((*of_run)[0].in_utc);
   EXPECT_FALSE(labels_of_run(*labels, at(100.0), [](UtcTime) { return std::optional<HostTime>(); }));
   for (const char* wrong :
-       {"2026-03-14T09:30:00", "2026-13-14T09:30:00Z", "2026-03-14 09:30:00Z", "2026-03-14T24:30:00Z",
+       {"2026-03-14T09:30:00", "2026-13-14T09:30:00Z", "2026-03-14T09:30Z", "2026-03-14T24:30:00Z",
         "2026-02-30T09:30:00Z", "2026-03-14T09:30:xxZ", "-26-03-14T09:30:00Z"}) {
     EXPECT_FALSE(
         parse_labels(std::string("begin_utc,end_utc,regime\n") + wrong + ",1773480630,gravel\n", "l.csv"))

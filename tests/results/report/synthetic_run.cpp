@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -22,18 +23,13 @@ constexpr double kSeriesRate_hz = 10.0;
 constexpr unsigned kSeed = 20240607;
 constexpr const char* kAxes[] = {"gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"};
 
-/// Rodrigues: rotation by a rotation vector.
+/// Rotation by a rotation vector.
 Matrix exp_matrix(const Vector& v) {
-  const double angle = std::hypot(v[0], v[1], v[2]);
-  if (angle == 0.0) return {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  const double x = v[0] / angle;
-  const double y = v[1] / angle;
-  const double z = v[2] / angle;
-  const double s = std::sin(angle);
-  const double c = std::cos(angle);
-  const double d = 1.0 - c;
-  return {c + x * x * d,     x * y * d - z * s, x * z * d + y * s, x * y * d + z * s, c + y * y * d,
-          y * z * d - x * s, x * z * d - y * s, y * z * d + x * s, c + z * z * d};
+  const Eigen::Vector3d turn(v[0], v[1], v[2]);
+  Matrix out{};
+  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(out.data()) =
+      Eigen::AngleAxisd(turn.norm(), turn.stableNormalized()).toRotationMatrix();
+  return out;
 }
 
 Matrix product(const Matrix& A, const Matrix& B) {

@@ -89,6 +89,7 @@ TEST(EstimatorSetup, WhatAConfigurationSaysAndWhatItLeavesOut) {
   tell("nothing", kTwo);
   for (const char* states : {"rigid", "paper", "full"})
     tell(states, std::string("[estimator]\nstates = \"") + states + "\"\ndifferentiator_points = 9\n" + kTwo);
+  tell("a slow one", std::string(kTwo) + "rate_hz = 50\naverage_samples = 3\n");
   const std::string noise = R"(
 [device.noise]
 gyro_white_sd_degps = 0.11

@@ -124,5 +124,35 @@ topic = "/imu/data"
   test::expect_recorded("service/recording/opened.txt", answer_.text(), 1e-4, 1e-7);
 }
 
+/// Wheels that candump logged, beside a reference in a file: by what the log's stamps are brought to the run's.
+TEST_F(OpenedRecordings, ALogOfCandumpBesideOtherFiles) {
+  put(folder_ / "ref.csv", imu_rows(0.0, 1.0));
+  put(folder_ / "study.csv", imu_rows(0.37, -1.0));
+  std::string frames;
+  for (int i = 0; i < 200; ++i)
+    frames += fmt::format("({:.6f}) can0 0AA#1A6F1A6F1A6F1A6F\n", 946684800.0 + 0.02 * i);
+  put(folder_ / "wheels.log", frames);
+  const auto wheels = [](const std::string& clock) {
+    return fmt::format(R"(
+[[device]]
+name = "wheels"
+role = "odometry"
+protocol = "can_odometry"
+rate_hz = 50
+transport = {{ kind = "can", interface = "can0"{} }}
+[device.odometry]
+dbc = "{}"
+speed_signals = ["WHEEL_SPEEDS.RL", "WHEEL_SPEEDS.RR"]
+)",
+                       clock, test::source_path("config/toyota_rav4.dbc").string());
+  };
+  const std::vector<std::string> files{input("ref", "ref.csv"), input("imu", "study.csv"),
+                                       input("wheels", "wheels.log")};
+  const std::string others = imu("ref", "reference", "common") + imu("imu", "study", "common");
+  open("UTC that nobody else tells", files, others + wheels(""));
+  open("the reference's clock", files, others + wheels(", log_clock = \"common\""));
+  test::expect_recorded("service/recording/opened_candump.txt", answer_.text(), 1e-4, 1e-7);
+}
+
 }  // namespace
 }  // namespace imuscope

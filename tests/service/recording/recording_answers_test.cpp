@@ -186,6 +186,28 @@ TEST(RecordingWhole, TheClockOfALongDriveHasARate) {
   }
 }
 
+/// Clocks that only count begin anywhere: hours apart, the recordings are taken to have begun together.
+TEST(RecordingWhole, AClockThatBeganHoursBeforeIsFoundWithItsRate) {
+  const Configuration configuration = three_devices();
+  constexpr double kFast = 40e-6;
+  constexpr double kBegun_s = 20'000.0;
+  const auto clocks = align_clocks(
+      configuration, {true, true, false}, [&](DeviceIndex device) -> Result<std::vector<Sample>> {
+        if (device == 0) return turning(device, 400.0, 0.0, 0.0);
+        auto samples = turning(device, 400.0, 3.25, kFast);
+        for (auto& sample : samples) sample.time += from_seconds(kBegun_s);
+        return samples;
+      });
+  ASSERT_TRUE(clocks) << clocks.error().text();
+  const ClockMapConfig& map = (*clocks)[1].map;
+  EXPECT_NEAR(map.rate_ratio - 1.0, kFast, 5e-6);
+  // Anywhere in the drive it shows the reference's time.
+  for (const double t : {20.0, 200.0, 380.0}) {
+    const double shown_s = kBegun_s + (t - 3.25) / (1.0 + kFast);
+    EXPECT_NEAR(to_seconds(map.origin.time_since_epoch()) + map.rate_ratio * shown_s, t, 2e-3);
+  }
+}
+
 TEST(RecordingWhole, UtcLessTimeIsTheMedian) {
   auto samples = turning(0, 0.1, 0.0, 0.0, true);
   ASSERT_EQ(samples.size(), 5U);

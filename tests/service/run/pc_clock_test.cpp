@@ -1,6 +1,7 @@
 #include "service/run/pc_clock.h"
 
 #include <gtest/gtest.h>
+#include <sys/timex.h>
 #include <cmath>
 
 #include "rt/host_clock.h"
@@ -78,6 +79,31 @@ TEST(PcClock, AClockThatIsSteppedForEverFillsNoMemory) {
   EXPECT_EQ(record.steps.size(), PcClockLog::kStepsMax);
   EXPECT_GT(record.steps_left_out, 0U);
   EXPECT_GT(told, 1000);
+}
+
+TEST(PcClock, WhatTheKernelSaysIsInSecondsAndMillionths) {
+  timex clock{};
+  clock.status = STA_NANO;
+  clock.offset = -1500;
+  clock.freq = -25 * 65536 - 32768;
+  clock.maxerror = 16000;
+  clock.esterror = 250;
+  clock.tai = 37;
+  const auto told = kernel_clock_of(TIME_OK, clock);
+  ASSERT_TRUE(told);
+  EXPECT_EQ(told->status, STA_NANO);
+  EXPECT_TRUE(told->is_synchronised);
+  EXPECT_NEAR(told->offset_s, -1.5e-6, 1e-15);
+  EXPECT_EQ(told->frequency_ppm, -25.5);
+  EXPECT_NEAR(told->max_error_s, 0.016, 1e-12);
+  EXPECT_NEAR(told->estimated_error_s, 250e-6, 1e-12);
+  EXPECT_EQ(told->tai_minus_utc_s, 37);
+  EXPECT_TRUE(kernel_clock_of(TIME_INS, clock)->is_synchronised) << "a leap second is announced";
+  EXPECT_FALSE(kernel_clock_of(TIME_ERROR, clock)->is_synchronised);
+  EXPECT_FALSE(kernel_clock_of(-1, clock)) << "the system refuses";
+  clock.status = STA_UNSYNC;
+  EXPECT_FALSE(kernel_clock_of(TIME_OK, clock)->is_synchronised);
+  EXPECT_NEAR(kernel_clock_of(TIME_OK, clock)->offset_s, -1.5e-3, 1e-12) << "microseconds where it has no finer ones";
 }
 
 TEST(PcClock, TheKernelTellsItsStateAndBothClocksAreReadTogether) {

@@ -439,6 +439,14 @@ TEST(Telemetry, NoiseModelsKeepTheirParametersAndWhatIsUnknown) {
   EXPECT_THAT(model.warnings, ElementsAre("the slowest process is longer than the data"));
 }
 
+TEST(Telemetry, OneDegreeOfFreedomIsTakenAndNoneIsUnknown) {
+  Refit one = refit();
+  one.axes[1].change->dof = 1;
+  EXPECT_EQ(noise_model_message(one).models[0].change_dof, 1.0);
+  one.axes[1].change->dof = 0;
+  EXPECT_TRUE(std::isnan(noise_model_message(one).models[0].change_dof));
+}
+
 TEST(Telemetry, TheFirstModelHasNothingToBeComparedWith) {
   Refit first = refit();
   first.axes[1].change.reset();
