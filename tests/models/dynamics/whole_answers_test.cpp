@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "given_rows.h"
 #include "models/dynamics/column_wavelets.h"
 #include "models/dynamics/covariates.h"
 #include "models/dynamics/json.h"
