@@ -22,7 +22,8 @@ namespace {
 
 constexpr std::size_t kThreadNameMax = 15;          // Linux: 16 bytes with the terminating zero
 constexpr unsigned long kShortTimerSlackNs = 1000;  // default is 50 us
-constexpr std::size_t kPrefaultedStack = 128 * 1024;  // what the core's threads use of theirs, with room to spare
+constexpr std::size_t kPrefaultedStack =
+    128 * 1024;  // what the core's threads use of theirs, with room to spare
 
 Error refusal(std::string what, std::string remedy) {
   return {ErrorKind::kWork, std::move(what), std::move(remedy)};

@@ -97,6 +97,7 @@ TEST(RawView, IsNoneOfATimeThatNoClockHas) {
 
 TEST(RunRecord, BeginsAtAnyTimeFrom1970OnThatAClockCanHave) {
   run_t message{};
+  message.format = kCaptureFormat;
   message.t0_ns = 1;
   message.t0_utime = 0;
   const auto at_1970 = decode_record(encode_message(message));

@@ -24,7 +24,9 @@ BatchMounting flawless() {
   return mounting;
 }
 
-TEST(BatchRemark, NothingIsSaidWhereNothingIsWrong) { EXPECT_THAT(batch_remark("mtx1", flawless()), IsEmpty()); }
+TEST(BatchRemark, NothingIsSaidWhereNothingIsWrong) {
+  EXPECT_THAT(batch_remark("mtx1", flawless()), IsEmpty());
+}
 
 TEST(BatchRemark, AMountingThatMovedIsToldWithWhenAndHowFar) {
   BatchMounting mounting = flawless();
@@ -57,7 +59,8 @@ TEST(BatchRemark, AxesThatLeanAreToldByTheirAngleAndScalesAreNot) {
     mounting.sensor.x[batch::kGyroShape + departure] = -0.49 * kRadPerDegree;
     EXPECT_THAT(batch_remark("mtx1", mounting), IsEmpty()) << departure;
     mounting.sensor.x[batch::kGyroShape + departure] = -0.55 * kRadPerDegree;
-    EXPECT_THAT(batch_remark("mtx1", mounting), HasSubstr("differ from right angles by 0.55 deg")) << departure;
+    EXPECT_THAT(batch_remark("mtx1", mounting), HasSubstr("differ from right angles by 0.55 deg"))
+        << departure;
   }
 }
 
@@ -79,11 +82,9 @@ TEST(BatchRemark, AMountThatYieldsIsToldWhereThatIsSure) {
 TEST(BatchRemark, TheLowestBandInWhichTheBodyIsNotRigidIsNamed) {
   BatchMounting mounting = flawless();
   for (const double deviation : {0.002, 0.0099, 0.0125, 0.08}) {
-    batch::BandReport band{};
-    band.from_hz = 2.5 * static_cast<double>(mounting.bands.size());
-    band.gyro_deviation_sd = deviation;
-    band.accel_deviation_sd = 1.0;
-    mounting.bands.push_back(band);
+    const double from_hz = 2.5 * static_cast<double>(mounting.bands.size());
+    mounting.bands.push_back(
+        {from_hz, from_hz + 2.5, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(), deviation, 1.0});
   }
   EXPECT_THAT(batch_remark("mtx1", mounting), HasSubstr("above 5.0 Hz"));
   EXPECT_THAT(batch_remark("mtx1", mounting), HasSubstr("by 1.2 % of the rates"));

@@ -388,7 +388,8 @@ void write_utc(const std::filesystem::path& from, const std::filesystem::path& t
     for (std::ptrdiff_t i = 0; i < column; ++i) begin = line.find(',', begin) + 1;
     const double time_s = std::stod(line);
     const double utc_s = 1e-9 * static_cast<double>(kBegin_ns) + time_s + 1e-9 * ahead_ns(time_s);
-    out << line.substr(0, begin) << fmt::format("{:.6f}", utc_s) << line.substr(line.find(',', begin)) << '\n';
+    out << line.substr(0, begin) << fmt::format("{:.6f}", utc_s) << line.substr(line.find(',', begin))
+        << '\n';
   }
 }
 

@@ -162,11 +162,11 @@ Hits try_fleets(const World& world, std::size_t units, std::size_t fleets, std::
 /// a thousand were asked for.
 bool within(double percent, double low, double high, double expected, std::size_t fleets) {
   constexpr std::size_t kEnough = 1000;
-  const double chance =
-      fleets >= kEnough ? 0.0
-                        : 100.0 * kZ95 *
-                              std::sqrt(expected * (1.0 - expected) /
-                                        static_cast<double>(std::max<std::size_t>(fleets, 1)));
+  const double chance = fleets >= kEnough
+                            ? 0.0
+                            : 100.0 * kZ95 *
+                                  std::sqrt(expected * (1.0 - expected) /
+                                            static_cast<double>(std::max<std::size_t>(fleets, 1)));
   return percent >= low - chance && percent <= high + chance;
 }
 

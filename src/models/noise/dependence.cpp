@@ -84,7 +84,7 @@ Model model_at(const Model& start, const std::vector<ParameterPlace>& places, co
       c.amplitude = std::exp(u);
     } else {
       const auto s = static_cast<std::size_t>(places[p].shape);
-      c.shape[s] = shape_of_coordinate(c.kind, places[p].shape, u);
+      c.shape[s] = shape_of_coordinate(c.kind, u);
     }
   }
   return model;
@@ -97,8 +97,7 @@ Values start_values(const Model& model, const std::vector<ParameterPlace>& place
     const Component& c = model.components[places[p].component];
     values.level(static_cast<Index>(p)) =
         places[p].shape < 0 ? std::log(c.amplitude)
-                            : coordinate_of_shape(c.kind, places[p].shape,
-                                                  c.shape[static_cast<std::size_t>(places[p].shape)]);
+                            : coordinate_of_shape(c.kind, c.shape[static_cast<std::size_t>(places[p].shape)]);
   }
   return values;
 }

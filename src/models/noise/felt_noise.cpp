@@ -221,8 +221,7 @@ class Uncertainty {
           c.amplitude *= std::exp(step);
         } else {
           double& shape = c.shape[static_cast<std::size_t>(place.shape)];
-          shape = shape_of_coordinate(c.kind, place.shape,
-                                      coordinate_of_shape(c.kind, place.shape, shape) + step);
+          shape = shape_of_coordinate(c.kind, coordinate_of_shape(c.kind, shape) + step);
         }
         return std::log(f(moved));
       };

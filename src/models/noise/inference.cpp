@@ -218,7 +218,7 @@ Eigen::MatrixXd wv_jacobian(const Model& model, const std::vector<int>& levels,
       if (places[p].shape >= 0) {
         const double shape = c.shape[static_cast<std::size_t>(places[p].shape)];
         slope = point.derivative[static_cast<std::size_t>(places[p].shape)] *
-                shape_slope(c.kind, places[p].shape, coordinate_of_shape(c.kind, places[p].shape, shape));
+                shape_slope(c.kind, coordinate_of_shape(c.kind, shape));
       }
       jacobian(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(p)) = c.amplitude * slope;
     }

@@ -195,7 +195,7 @@ class Inversion {
   /// A process of that coordinate of its rate, with an amplitude that levels show a little.
   void move_markov(std::size_t component, double rate_coordinate) {
     Component& c = base_.components[component];
-    c.shape[0] = shape_of_coordinate(c.kind, 0, rate_coordinate);
+    c.shape[0] = shape_of_coordinate(c.kind, rate_coordinate);
     for (std::size_t p = 0; p < places_.size(); ++p) {
       if (places_[p].component != component) continue;
       if (places_[p].shape < 0)
@@ -235,7 +235,7 @@ class Inversion {
   }
 
   [[nodiscard]] double beta_at(Eigen::Index rate) const {
-    return shape_of_coordinate(ProcessKind::kGaussMarkov, 0, estimate_[rate]);
+    return shape_of_coordinate(ProcessKind::kGaussMarkov, estimate_[rate]);
   }
 
   /// All rates within half an octave or so.
@@ -257,7 +257,7 @@ class Inversion {
   [[nodiscard]] double coordinate(std::size_t p) const {
     const Component& c = component(p);
     const int s = places_[p].shape;
-    if (s >= 0) return coordinate_of_shape(c.kind, s, c.shape[static_cast<std::size_t>(s)]);
+    if (s >= 0) return coordinate_of_shape(c.kind, c.shape[static_cast<std::size_t>(s)]);
     return c.amplitude > 0.0 ? std::log(c.amplitude) : 0.0;
   }
 
@@ -271,7 +271,7 @@ class Inversion {
       if (s < 0) {
         c.amplitude = std::exp(v);
       } else {
-        c.shape[static_cast<std::size_t>(s)] = shape_of_coordinate(c.kind, s, v);
+        c.shape[static_cast<std::size_t>(s)] = shape_of_coordinate(c.kind, v);
       }
     }
     return model;

@@ -66,7 +66,7 @@ class Profile {
   [[nodiscard]] Parabola parabola(std::size_t component, std::size_t loose, double at) const {
     Model model = model_;
     Component& moved = model.components[loose];
-    moved.shape[0] = shape_of_coordinate(moved.kind, 0, at);
+    moved.shape[0] = shape_of_coordinate(moved.kind, at);
     Design columns(y_.size(), static_cast<Eigen::Index>(model.components.size()));
     std::vector<Eigen::Index> present;
     double scale = 1.0;
@@ -163,7 +163,7 @@ void profile_loose_rates(FitResult& result, const ParameterCovariance& parameter
       if (loose == places[p].component || !leans(parameters, p, rate)) continue;
       const Component& c = result.model.components[loose];
       parabolas.push_back(
-          profile->parabola(places[p].component, loose, coordinate_of_shape(c.kind, 0, c.shape[0])));
+          profile->parabola(places[p].component, loose, coordinate_of_shape(c.kind, c.shape[0])));
       const CoordinateRange range = profile->rates();
       for (int k = 0; k <= kTriedRates; ++k) {
         const double share = static_cast<double>(k) / kTriedRates;

@@ -68,7 +68,7 @@ std::vector<Shape> shapes_at(const SeparableProblem& problem, const std::vector<
   for (std::size_t c = 0; c < coordinates.size(); ++c) {
     const Coordinate& k = coordinates[c];
     shapes[k.process][static_cast<std::size_t>(k.shape)] =
-        shape_of_coordinate(k.kind, k.shape, u[static_cast<Eigen::Index>(c)]);
+        shape_of_coordinate(k.kind, u[static_cast<Eigen::Index>(c)]);
   }
   return shapes;
 }
@@ -193,7 +193,7 @@ class Polisher {
       if (e.amplitude[p] <= 0.0) continue;
       const double v = u[static_cast<Eigen::Index>(c)];
       RowVector column = problem_.whitener * e.slope[k.process][static_cast<std::size_t>(k.shape)];
-      column *= e.amplitude[p] / e.length[p] * shape_slope(k.kind, k.shape, v);
+      column *= e.amplitude[p] / e.length[p] * shape_slope(k.kind, v);
       column -= active * ColumnVector(qr.solve(column));
       const double downhill = column.dot(e.residual);
       if ((v <= k.range.low && downhill < 0.0) || (v >= k.range.high && downhill > 0.0)) continue;
@@ -297,8 +297,8 @@ class GridSearch {
       for (int j = 0; j < n1; ++j) {
         for (int i = 0; i < n0; ++i) {
           Shape shape{};
-          if (!own.empty()) shape[0] = shape_of_coordinate(kind, 0, value(own[0], i));
-          if (own.size() > 1) shape[1] = shape_of_coordinate(kind, 1, value(own[1], j));
+          if (!own.empty()) shape[0] = shape_of_coordinate(kind, value(own[0], i));
+          if (own.size() > 1) shape[1] = shape_of_coordinate(kind, value(own[1], j));
           columns.push_back(
               RowVector(problem_.whitener * curve_of(problem_, kind, shape).value).normalized());
         }
@@ -408,7 +408,7 @@ std::vector<Shape> tried_shapes(ProcessKind kind, int highest_level) {
   if (shape_count(kind) == 0 || kind == ProcessKind::kArma11) return {Shape{}};
   const auto place = [&](int i, int k, int n) {
     const CoordinateRange range = coordinate_range(kind, i, highest_level);
-    return shape_of_coordinate(kind, i, range.low + (range.high - range.low) * k / n);
+    return shape_of_coordinate(kind, range.low + (range.high - range.low) * k / n);
   };
   std::vector<Shape> shapes;
   for (int k = 0; k <= kRates; ++k) {
@@ -423,18 +423,18 @@ std::vector<Shape> tried_shapes(ProcessKind kind, int highest_level) {
 
 }  // namespace
 
-double coordinate_of_shape(ProcessKind kind, int /*i*/, double shape) noexcept {
+double coordinate_of_shape(ProcessKind kind, double shape) noexcept {
   const auto middle = middle_of_bounded(kind);
   return middle ? std::atanh(shape - *middle) : std::log(shape);
 }
 
-double shape_of_coordinate(ProcessKind kind, int /*i*/, double coordinate) noexcept {
+double shape_of_coordinate(ProcessKind kind, double coordinate) noexcept {
   const auto middle = middle_of_bounded(kind);
   return middle ? *middle + std::tanh(coordinate) : std::exp(coordinate);
 }
 
-double shape_slope(ProcessKind kind, int i, double coordinate) noexcept {
-  const double shape = shape_of_coordinate(kind, i, coordinate);
+double shape_slope(ProcessKind kind, double coordinate) noexcept {
+  const double shape = shape_of_coordinate(kind, coordinate);
   const auto middle = middle_of_bounded(kind);
   return middle ? 1.0 - (shape - *middle) * (shape - *middle) : shape;
 }
@@ -527,7 +527,7 @@ SeparableSolution polish(const SeparableProblem& problem, const Model& start) {
     const Coordinate& k = coordinates[c];
     const double shape = start.components.at(k.process).shape[static_cast<std::size_t>(k.shape)];
     u[static_cast<Eigen::Index>(c)] =
-        std::clamp(coordinate_of_shape(k.kind, k.shape, shape), k.range.low, k.range.high);
+        std::clamp(coordinate_of_shape(k.kind, shape), k.range.low, k.range.high);
   }
   const Evaluation e = Polisher(problem, coordinates).run(u);
   return solution_of(problem, coordinates, u, e);

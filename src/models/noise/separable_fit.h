@@ -19,10 +19,10 @@ struct CoordinateRange {
   double high = 0.0;
 };
 
-/// Coordinate of shape value i of a kind, its inverse, and d(shape)/d(coordinate).
-double coordinate_of_shape(ProcessKind kind, int i, double shape) noexcept;
-double shape_of_coordinate(ProcessKind kind, int i, double coordinate) noexcept;
-double shape_slope(ProcessKind kind, int i, double coordinate) noexcept;
+/// Coordinate of a shape value of a kind, its inverse, and d(shape)/d(coordinate).
+double coordinate_of_shape(ProcessKind kind, double shape) noexcept;
+double shape_of_coordinate(ProcessKind kind, double coordinate) noexcept;
+double shape_slope(ProcessKind kind, double coordinate) noexcept;
 /// What the levels 1..highest_level can tell apart from the process at the end of the range.
 CoordinateRange coordinate_range(ProcessKind kind, int i, int highest_level) noexcept;
 

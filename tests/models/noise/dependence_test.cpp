@@ -89,6 +89,13 @@ TEST(Dependence, WindowsThatDoNotVaryAndTooFewOfThemAreRefused) {
   const auto constant = fit_dependence(example.windows, example.start);
   ASSERT_FALSE(constant);
   EXPECT_THAT(constant.error().text(), ::testing::HasSubstr("does not vary"));
+  // What rounding makes of a large constant is no variation, either.
+  for (std::size_t i = 0; i < example.windows.size(); ++i)
+    example.windows[i].drivers[0] = 1e6 + (i % 2 == 0 ? 1e-4 : 0.0);
+  EXPECT_FALSE(fit_dependence(example.windows, example.start));
+  for (std::size_t i = 0; i < example.windows.size(); ++i)
+    example.windows[i].drivers[0] = 1e6 + (i % 2 == 0 ? 1e-2 : 0.0);
+  EXPECT_TRUE(fit_dependence(example.windows, example.start));
 }
 
 TEST(Dependence, WindowsTooShortForAnyLevelAreRefused) {

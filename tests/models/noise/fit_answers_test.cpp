@@ -163,6 +163,9 @@ TEST(FitAnswers, InvertedIntervals) {
     options.confidence = 0.8;
     add(wv_of({kWhite, kFast, kWalk}, 4'000, 27), "WN+GM+RW");
     options.confidence = 0.95;
+    const auto of_more = wv_of({kWhite, kFast, kSlow}, 60'000, 31);
+    EXPECT_GT(fit(of_more, parse_model("WN+GM").value(), kRate_hz, options)->model_error, 0.02);
+    add(of_more, "WN+GM");
   }
   expect_recorded("models/noise/fits_inverted.txt", answer.text(), 1e-4, 1e-9);
 }

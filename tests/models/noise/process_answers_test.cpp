@@ -243,8 +243,8 @@ TEST(ProcessAnswers, ScalesOfParametersAndOfTheSearch) {
       const CoordinateRange range = coordinate_range(kind, i, 11);
       answer.line(short_name(kind), i, range.low, range.high);
       for (const double shape : {0.05, 0.6, 0.95}) {
-        const double u = coordinate_of_shape(kind, i, shape);
-        answer.line(shape, u, shape_of_coordinate(kind, i, u + 0.1), shape_slope(kind, i, u));
+        const double u = coordinate_of_shape(kind, shape);
+        answer.line(shape, u, shape_of_coordinate(kind, u + 0.1), shape_slope(kind, u));
       }
     }
   }

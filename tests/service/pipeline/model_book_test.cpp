@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "error_rows.h"
 #include "models/noise/wavelet_variance.h"
 #include "service/pipeline/live_models.h"
 #include "service/pipeline/noise_series.h"
+#include "tests/support/error_rows.h"
 
 namespace imuscope {
 namespace {

@@ -191,13 +191,13 @@ TEST(RecordingWhole, AClockThatBeganHoursBeforeIsFoundWithItsRate) {
   const Configuration configuration = three_devices();
   constexpr double kFast = 40e-6;
   constexpr double kBegun_s = 20'000.0;
-  const auto clocks = align_clocks(
-      configuration, {true, true, false}, [&](DeviceIndex device) -> Result<std::vector<Sample>> {
-        if (device == 0) return turning(device, 400.0, 0.0, 0.0);
-        auto samples = turning(device, 400.0, 3.25, kFast);
-        for (auto& sample : samples) sample.time += from_seconds(kBegun_s);
-        return samples;
-      });
+  const auto clocks = align_clocks(configuration, {true, true, false},
+                                   [&](DeviceIndex device) -> Result<std::vector<Sample>> {
+                                     if (device == 0) return turning(device, 400.0, 0.0, 0.0);
+                                     auto samples = turning(device, 400.0, 3.25, kFast);
+                                     for (auto& sample : samples) sample.time += from_seconds(kBegun_s);
+                                     return samples;
+                                   });
   ASSERT_TRUE(clocks) << clocks.error().text();
   const ClockMapConfig& map = (*clocks)[1].map;
   EXPECT_NEAR(map.rate_ratio - 1.0, kFast, 5e-6);

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "service/run/models_file.h"
-#include "tests/service/pipeline/error_rows.h"
+#include "tests/support/error_rows.h"
 #include "tests/support/shared_data.h"
 
 namespace imuscope {

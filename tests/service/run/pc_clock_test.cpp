@@ -103,7 +103,8 @@ TEST(PcClock, WhatTheKernelSaysIsInSecondsAndMillionths) {
   EXPECT_FALSE(kernel_clock_of(-1, clock)) << "the system refuses";
   clock.status = STA_UNSYNC;
   EXPECT_FALSE(kernel_clock_of(TIME_OK, clock)->is_synchronised);
-  EXPECT_NEAR(kernel_clock_of(TIME_OK, clock)->offset_s, -1.5e-3, 1e-12) << "microseconds where it has no finer ones";
+  EXPECT_NEAR(kernel_clock_of(TIME_OK, clock)->offset_s, -1.5e-3, 1e-12)
+      << "microseconds where it has no finer ones";
 }
 
 TEST(PcClock, TheKernelTellsItsStateAndBothClocksAreReadTogether) {

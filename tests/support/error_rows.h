@@ -42,7 +42,8 @@ inline ErrorRow row_of(std::int64_t counter, Regime regime, std::mt19937& random
 }
 
 /// Feeds `seconds_of_rows` seconds of 100 Hz rows of sd `sd` and returns the refit at their end, which is due.
-inline Refit fed(ModelBook& book, std::int64_t& counter, int seconds_of_rows, double sd, std::mt19937& random) {
+inline Refit fed(ModelBook& book, std::int64_t& counter, int seconds_of_rows, double sd,
+                 std::mt19937& random) {
   for (int i = 0; i < 100 * seconds_of_rows; ++i) {
     auto row = row_of(counter++, Regime::kStatic, random);
     for (auto* triad : {&row.e_gyro_radps, &row.e_accel_mps2}) {
