@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
+#include "all_threads.h"
 #include "models/noise/holm.h"
 #include "models/noise/nested_effects.h"
-#include "tools/trials/all_threads.h"
 
 namespace {
 
