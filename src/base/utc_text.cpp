@@ -35,9 +35,9 @@ std::optional<double> zone_offset_s(std::string_view text) {
   if (!take_char(text, "+-")) return std::nullopt;
   const auto hours = take_number(text, 2);
   if (!hours) return std::nullopt;
-  take_char(text, ":");
-  const auto minutes = text.empty() ? std::optional(0) : take_number(text, 2);
-  if (!minutes || !text.empty()) return std::nullopt;
+  const bool has_minutes = take_char(text, ":") || !text.empty();
+  const auto minutes = has_minutes ? take_number(text, 2) : std::optional(0);
+  if (!minutes || !text.empty() || *hours > 23 || *minutes > 59) return std::nullopt;
   return sign * (kSecondsPerHour * *hours + kSecondsPerMinute * *minutes);
 }
 

@@ -6,27 +6,17 @@
 
 #include <optional>
 #include <random>
+#include <string>
 #include <utility>
 
 #include "configuration/config.h"
 #include "service/pipeline/model_book.h"
+#include "tests/support/two_devices.h"
 
 namespace imuscope::test {
 
 inline Configuration two_devices() {
-  return *parse_configuration(R"(
-[noise]
-refit_interval_s = 10.0
-[[device]]
-name = "r"
-role = "reference"
-protocol = "csv_imu"
-[[device]]
-name = "s"
-role = "study"
-protocol = "csv_imu"
-)",
-                              "test.toml");
+  return *parse_configuration(std::string("[noise]\nrefit_interval_s = 10.0\n") + kTwoDevices, "test.toml");
 }
 
 inline ErrorRow row_of(std::int64_t counter, Regime regime, std::mt19937& random) {

@@ -29,9 +29,8 @@ struct Label {
 
 /// Reads a table begin_s,end_s,regime or begin_utc,end_utc,regime with such a header, # comments allowed,
 /// sorted by begin. UTC is written as in 2026-03-14T09:30:00.25Z, or with another zone (+01:00), or in seconds
-/// since 1970-01-01. Errors
-/// (kUsage): what is wrong and in which line; stretches that overlap; names that are no line of UTF-8 of at
-/// most kRegimeNameMax bytes.
+/// since 1970-01-01. Errors (kUsage): what is wrong and in which line; stretches that overlap; names that are no
+/// line of UTF-8 of at most kRegimeNameMax bytes.
 Result<std::vector<Label>> parse_labels(std::string_view text, const std::string& file);
 
 /// A moment that a person marked.

@@ -5,24 +5,15 @@
 #include <fstream>
 
 #include "tests/support/shared_data.h"
+#include "tests/support/two_devices.h"
 
 namespace imuscope {
 namespace {
 
+using test::kTwoDevices;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-constexpr const char* kDevices = R"(
-[[device]]
-name = "r"
-role = "reference"
-protocol = "csv_imu"
-[[device]]
-name = "s"
-role = "study"
-protocol = "csv_imu"
-)";
 
 class ReloadTest : public testing::Test {
  protected:
@@ -31,12 +22,12 @@ class ReloadTest : public testing::Test {
 };
 
 TEST_F(ReloadTest, BusAndNoiseChangeAtOnceTheRestIsNamed) {
-  write(std::string("[lcm]\nchannel_prefix = \"A\"\n") + kDevices);
+  write(std::string("[lcm]\nchannel_prefix = \"A\"\n") + kTwoDevices);
   const auto running = load_configuration(file_);
   ASSERT_TRUE(running);
   write(std::string("[lcm]\nchannel_prefix = \"B\"\n[noise]\nmodel = \"WN\"\nrefit_interval_s = 5.0\n"
                     "[estimator]\nstates = \"paper\"\n") +
-        kDevices + "rate_hz = 50.0\n");
+        kTwoDevices + "rate_hz = 50.0\n");
   const auto reload = reload_configuration(*running);
   ASSERT_TRUE(reload) << reload.error().text();
   EXPECT_EQ(reload->tunables.lcm.channel_prefix, "B");
@@ -46,24 +37,24 @@ TEST_F(ReloadTest, BusAndNoiseChangeAtOnceTheRestIsNamed) {
 }
 
 TEST_F(ReloadTest, CommentsAndOrderAreNoChange) {
-  write(kDevices);
+  write(kTwoDevices);
   const auto running = load_configuration(file_);
   ASSERT_TRUE(running);
-  write(std::string("# a comment\n") + kDevices);
+  write(std::string("# a comment\n") + kTwoDevices);
   const auto reload = reload_configuration(*running);
   ASSERT_TRUE(reload);
   EXPECT_THAT(reload->at_next_start, IsEmpty());
 }
 
 TEST_F(ReloadTest, AFileThatIsWrongNowIsAnErrorWithItsLine) {
-  write(kDevices);
+  write(kTwoDevices);
   const auto running = load_configuration(file_);
   ASSERT_TRUE(running);
-  write("[lcm]\nurll = 1\n" + std::string(kDevices));
+  write("[lcm]\nurll = 1\n" + std::string(kTwoDevices));
   const auto reload = reload_configuration(*running);
   ASSERT_FALSE(reload);
   EXPECT_THAT(reload.error().text(), HasSubstr("car.toml:2"));
-  write("[noise]\nmodel = \"nonsense\"\n" + std::string(kDevices));
+  write("[noise]\nmodel = \"nonsense\"\n" + std::string(kTwoDevices));
   EXPECT_FALSE(reload_configuration(*running));
   std::filesystem::remove(file_);
   EXPECT_FALSE(reload_configuration(*running));

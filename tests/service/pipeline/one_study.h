@@ -1,22 +1,13 @@
 #pragma once
 
 #include "service/pipeline/estimator_setup.h"
+#include "tests/support/two_devices.h"
 
 namespace imuscope::test {
 
-/// A reference (device 0) and an S-IMU (device 1), with nothing else said of them.
+/// kTwoDevices as the estimator takes them.
 inline EstimatorConfig one_study() {
-  return estimator_config(*parse_configuration(R"(
-[[device]]
-name = "r"
-role = "reference"
-protocol = "csv_imu"
-[[device]]
-name = "s"
-role = "study"
-protocol = "csv_imu"
-)",
-                                               "test.toml"));
+  return estimator_config(*parse_configuration(kTwoDevices, "test.toml"));
 }
 
 }  // namespace imuscope::test

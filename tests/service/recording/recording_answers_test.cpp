@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <string>
 
 #include "logs/mcap/ros_messages.h"
 #include "logs/mcap/writer.h"
@@ -16,6 +17,7 @@
 #include "tests/support/answer.h"
 #include "tests/support/recorded_answer.h"
 #include "tests/support/shared_data.h"
+#include "tests/support/two_devices.h"
 
 namespace imuscope {
 namespace {
@@ -106,16 +108,7 @@ std::vector<Sample> turning(DeviceIndex device, double length_s, double late_s, 
 }
 
 Configuration three_devices() {
-  return *parse_configuration(R"(
-[[device]]
-name = "r"
-role = "reference"
-protocol = "csv_imu"
-[[device]]
-name = "s"
-role = "study"
-protocol = "csv_imu"
-csv = { clock = "own" }
+  return *parse_configuration(std::string(test::kTwoDevices) + R"(csv = { clock = "own" }
 [[device]]
 name = "g"
 role = "gnss"
