@@ -80,6 +80,29 @@ TEST_F(NoiseCommands, WvPrintsTheDocumentedJsonForAColumnByNameAndByNumber) {
   EXPECT_EQ(run("wv " + file + " --rate 100 --column 2 --json").out, by_name.out);
 }
 
+TEST_F(NoiseCommands, TheOneColumnBesideTimesAndCounterNeedsNoName) {
+  std::string iso = "time,count,x\n";
+  std::string gps = "gps_week,tow,x\n";
+  std::string alone = "x\n";
+  for (int i = 0; i < 64; ++i) {
+    const auto value = std::to_string((i * 37 % 11) - 5.0);
+    iso += fmt::format("2026-01-02T03:04:{:04.1f}Z,{},{}\n", 0.1 * i, i, value);
+    gps += fmt::format("2400,{:.1f},{}\n", 100'000.0 + 0.1 * i, value);
+    alone += value + "\n";
+  }
+  const auto of = [&](const std::string& name, const std::string& text, const std::string& options) {
+    return run("wv " + write(name, text) + " --json " + options);
+  };
+  const auto wanted = of("alone.csv", alone, "-r 10");
+  ASSERT_EQ(wanted.exit_code, 0) << wanted.err;
+  EXPECT_EQ(of("gps.csv", gps, "").out, wanted.out);
+  EXPECT_EQ(of("iso.csv", iso, "--counter count").exit_code, 0);
+  EXPECT_EQ(of("time.csv", "time_s\n" + alone.substr(2), "-r 10").out, wanted.out);
+  const auto two = of("iso.csv", iso, "");
+  EXPECT_EQ(two.exit_code, 2);
+  EXPECT_THAT(two.err, HasSubstr("give --column; its columns are time, count, x"));
+}
+
 TEST_F(NoiseCommands, FitPrintsEveryDocumentedField) {
   const auto result =
       run("fit " + white("white.csv", 2) + " -c gyro_x --rate 100 --model WN+GM --unit rad/s --json");

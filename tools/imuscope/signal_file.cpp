@@ -128,7 +128,6 @@ Result<std::size_t> find_column(const std::vector<std::string>& names, bool has_
   const std::string list = has_header ? fmt::format("its columns are {}", fmt::join(names, ", "))
                                       : fmt::format("it has {} columns without names", names.size());
   if (wanted.empty()) {
-    if (names.size() == 1) return 0;
     return usage_error(fmt::format("{} has {} columns and none is chosen", file, names.size()),
                        fmt::format("give --column; {}", list));
   }
@@ -199,7 +198,8 @@ class CsvReader {
 
   Result<void> find_columns(const std::vector<std::string>& names, bool has_header) {
     for (const std::string& wanted : wanted_columns_) {
-      const auto index = find_column(names, has_header, wanted, file_);
+      const auto only = wanted.empty() ? only_signal(names, has_header) : std::nullopt;
+      const auto index = only ? Result<std::size_t>(*only) : find_column(names, has_header, wanted, file_);
       if (!index) return tl::unexpected(index.error());
       indices_.push_back(*index);
     }
@@ -224,6 +224,26 @@ class CsvReader {
     for (const auto& index : {where_index_, counter_index_, time_index_, week_index_})
       last_read_ = std::max(last_read_, index.value_or(0));
     return {};
+  }
+
+  /// The one column that is not for something else: time by its name, or what the choice names.
+  [[nodiscard]] std::optional<std::size_t> only_signal(const std::vector<std::string>& names,
+                                                       bool has_header) const {
+    const auto is_chosen = [&](const std::string& name) {
+      const std::size_t comma = choice_.time.find(',');
+      return name == choice_.counter || choice_.where.starts_with(name + "=") ||
+             name == choice_.time.substr(0, comma) ||
+             (comma != std::string::npos && name == choice_.time.substr(comma + 1));
+    };
+    std::optional<std::size_t> only;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const bool is_time =
+          has_header && (is_time_name(names[i]) || is_week_name(names[i]) || is_week_seconds_name(names[i]));
+      if ((is_time && names.size() > 1) || is_chosen(names[i])) continue;
+      if (only) return std::nullopt;
+      only = i;
+    }
+    return only;
   }
 
   Result<void> find_time(const std::vector<std::string>& names, bool has_header) {

@@ -14,7 +14,9 @@
 namespace imuscope::cli {
 
 struct SignalChoice {
-  std::string column;   ///< a header name, or a number from 1; may be empty where there is one column only
+  /// A header name, or a number from 1; may be empty where there is one column only beside times, counter
+  /// and what `where` names.
+  std::string column;
   std::string where;    ///< "COLUMN=VALUE": rows whose cell is something else count as gaps; may be empty
   std::string counter;  ///< column that counts the samples: numbers left out are gaps; may be empty
   /// Column of time stamps, or WEEK,SECONDS of GPS: times left out are gaps. Empty: a column whose name says
