@@ -16,6 +16,7 @@
 #include "models/noise/fit.h"
 #include "models/noise/simulated_noise.h"
 #include "models/noise/wavelet_variance.h"
+#include "own_sd.h"
 
 namespace {
 
@@ -75,10 +76,10 @@ struct Count {
   }
 };
 
-/// The share lies above `least`, or below it by chance (3.3 binomial sd).
+/// The share lies above `least`, or below it by chance.
 bool is_at_least(int part, int whole, double least) {
   if (whole == 0) return true;
-  return part >= whole * least - 3.3 * std::sqrt(whole * least * (1.0 - least));
+  return part >= whole * least - imuscope::kOwnSd * std::sqrt(whole * least * (1.0 - least));
 }
 
 /// Goals: intervals hold 91 % at least, conservative values lie below the truth in 5 % at most.

@@ -8,6 +8,8 @@
 #include <iomanip>
 #include <sstream>
 
+#include "own_sd.h"
+
 namespace imuscope {
 
 void count(Counts& counts, const std::string& name, bool hit) {
@@ -55,7 +57,6 @@ void Results::add(const std::string& cell, int end, const Counts& counts) {
 }
 
 bool judge(const std::string& cell, const std::vector<Band>& bands, const Counts& counts) {
-  constexpr double kSd = 3.3;
   bool good = true;
   fmt::print("{}\n", cell);
   for (const auto& count : counts) {
@@ -66,8 +67,8 @@ bool judge(const std::string& cell, const std::vector<Band>& bands, const Counts
     }
     const double share = 100.0 * c.hits / c.of;
     const auto sd_at = [of = c.of](double percent) { return std::sqrt(percent * (100.0 - percent) / of); };
-    const bool holds_here = band == nullptr || (share >= band->low - kSd * sd_at(band->low) &&
-                                                share <= band->high + kSd * sd_at(band->high));
+    const bool holds_here = band == nullptr || (share >= band->low - kOwnSd * sd_at(band->low) &&
+                                                share <= band->high + kOwnSd * sd_at(band->high));
     good = good && holds_here;
     fmt::print("  {:<18} {:>6} of {:>6}  {:>6.2f} % (sd {:.2f})  {}\n", name, c.hits, c.of, share,
                sd_at(share),

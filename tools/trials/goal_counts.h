@@ -44,7 +44,7 @@ class Results {
   std::map<std::string, Counts> counts_;
 };
 
-/// Prints a cell's counts beside its bands. A band is missed where the share lies beyond it by more than 3.3
+/// Prints a cell's counts beside its bands. A band is missed where the share lies beyond it by more than kOwnSd
 /// of its binomial sd. False where one is.
 bool judge(const std::string& cell, const std::vector<Band>& bands, const Counts& counts);
 

@@ -33,10 +33,12 @@
 #include "service/recording/replay.h"
 #include "tools/benchmarks/own_folder.h"
 #include "tools/trials/navigation_score.h"
+#include "tools/trials/own_sd.h"
 #include "tools/trials/s_imu_score.h"
 
 namespace {
 
+using imuscope::kOwnSd;
 using nlohmann::json;
 
 constexpr double kEqualInSd = 0.1;
@@ -50,7 +52,6 @@ constexpr double kKfGinsHeading_mdeg = 0.33;  ///< of KF-GINS on one drive of su
 /// Between a receiver's idea of an instant and the R-IMU's.
 constexpr double kEpochErrorSd_s = 1e-3;
 constexpr std::size_t kDrivesToJudge = 5;
-constexpr double kOwnSd = 3.3;
 
 /// The vehicle of config/demo.toml.
 constexpr std::string_view kVehicle = R"([run]

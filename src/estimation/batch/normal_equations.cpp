@@ -142,14 +142,37 @@ Motion estimated_motion(Motion motion, const Weight& weight, const Vector6c& wei
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, kColumns + 1, Eigen::RowMajor>;
 
-/// Real and imaginary rows of a whitened derivative and its residual.
-void put_rows(const Jacobian& J, const Vector6c& e, double frequency_hz, Eigen::Ref<Rows> rows) {
-  // One-sided: every frequency but zero stands for its negative, too.
-  const double weight = frequency_hz > 0.0 ? std::numbers::sqrt2 : 1.0;
-  rows.topLeftCorner<6, kColumns>() = weight * J.real();
-  rows.bottomLeftCorner(6, kColumns) = weight * J.imag();
-  rows.col(kColumns).head<6>() = weight * e.real();
-  rows.col(kColumns).tail<6>() = weight * e.imag();
+/// Whitened derivatives and, in the last column, residuals of both triads: of each frequency three real and
+/// three imaginary rows. Each triad has rows of its own, as its share of the information is asked for, too.
+struct WhitenedRows {
+  explicit WhitenedRows(Eigen::Index n_frequencies)
+      : gyros(6 * n_frequencies, kColumns + 1), accels(6 * n_frequencies, kColumns + 1) {}
+
+  /// @param k  place of the frequency
+  void put(Eigen::Index k, const Jacobian& J, const Vector6c& e, double frequency_hz) {
+    // One-sided: every frequency but zero stands for its negative, too.
+    const double weight = frequency_hz > 0.0 ? std::numbers::sqrt2 : 1.0;
+    put_triad(J.topRows<3>(), e.head<3>(), weight, gyros.middleRows<6>(6 * k));
+    put_triad(J.bottomRows<3>(), e.tail<3>(), weight, accels.middleRows<6>(6 * k));
+  }
+
+  Rows gyros;
+  Rows accels;
+
+ private:
+  template <typename Derivatives, typename Residual, typename Target>
+  static void put_triad(const Derivatives& J, const Residual& e, double weight, Target&& rows) {
+    rows.template topLeftCorner<3, kColumns>() = weight * J.real();
+    rows.template bottomLeftCorner<3, kColumns>() = weight * J.imag();
+    rows.col(kColumns).template head<3>() = weight * e.real();
+    rows.col(kColumns).template tail<3>() = weight * e.imag();
+  }
+};
+
+/// Lower triangle: the information of these rows, added.
+template <typename Sum>
+void add_information(const Rows& rows, Sum& sum) {
+  sum.template selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols<kColumns>().transpose());
 }
 
 class BandSummer {
@@ -170,31 +193,31 @@ class BandSummer {
     const auto n_windows = static_cast<Eigen::Index>(problem_.plan.starts.size());
     BandSums sums;
     sums.scores.resize(n_windows, kColumns);
-    Rows rows(12 * problem_.bands.width(band), kColumns + 1);
-    Rows of_gyros(6 * problem_.bands.width(band), kColumns + 1);
+    decltype(sums.information) of_accels = sums.information;
+    WhitenedRows rows(problem_.bands.width(band));
     const Eigen::Vector2d share = reference_.mean_share(noise_, band);
     forces_tell_ =
         share[0] * noise_.power(band).head<3>().mean() <= kNoisyMotion * problem_.mean_gyro_power[band];
     for (Eigen::Index w = 0; w < n_windows; ++w) {
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
-        fill(t, band, w, k, rows, 12 * (k - problem_.bands.first(band)));
-      const auto J = rows.leftCols<kColumns>();
-      // B-13: I, and the windows' scores
-      sums.information.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
-      for (Eigen::Index i = 0; i < 2 * problem_.bands.width(band); ++i)
-        of_gyros.middleRows<3>(3 * i) = rows.middleRows<3>(6 * i);
-      sums.of_gyros.selfadjointView<Eigen::Lower>().rankUpdate(of_gyros.leftCols<kColumns>().transpose());
-      sums.scores.row(w) = (J.transpose() * rows.col(kColumns)).transpose();
+        fill(t, band, w, k, rows, k - problem_.bands.first(band));
+      // B-13: I by triad, and the windows' scores
+      add_information(rows.gyros, sums.of_gyros);
+      add_information(rows.accels, of_accels);
+      sums.scores.row(w).setZero();
+      for (const Rows* triad : {&rows.gyros, &rows.accels})
+        sums.scores.row(w) += triad->col(kColumns).transpose() * triad->leftCols<kColumns>();
     }
-    sums.information = sums.information.selfadjointView<Eigen::Lower>();
     sums.of_gyros = sums.of_gyros.selfadjointView<Eigen::Lower>();
+    sums.information = of_accels.selfadjointView<Eigen::Lower>();
+    sums.information += sums.of_gyros;
     if (corrected_) add_noise(t, band, share, sums);
     return sums;
   }
 
  private:
-  void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, Rows& rows,
-            Eigen::Index first_row) {
+  void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, WhitenedRows& rows,
+            Eigen::Index place) {
     const double f_hz = problem_.plan.frequency_hz(k);
     const Vector6 power = noise_.window_power(w, band);
     const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
@@ -206,7 +229,7 @@ class BandSummer {
     const Vector3c study_f = study_.row(w, k).tail<3>().transpose();
     jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], f_hz, problem_.from_middle_s[w], J_);
     weight.factor.matrixL().solveInPlace(J_);
-    put_rows(J_, e, f_hz, rows.middleRows<12>(first_row));
+    rows.put(place, J_, e, f_hz);
   }
 
   /// B-13: derivatives that the motion's own uncertainty alone would have. What counts is the reference's
@@ -216,7 +239,7 @@ class BandSummer {
     const double of_gyros = share[0] * power.head<3>().mean();
     const double of_accels = share[1] * power.tail<3>().mean();
     const double root_n = std::sqrt(static_cast<double>(problem_.plan.starts.size()));
-    Rows rows(12 * 6, kColumns + 1);
+    WhitenedRows rows(6);
     for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
       const double f_hz = problem_.plan.frequency_hz(k);
       const Weight weight = weight_of(t, power, of_gyros, of_accels, forces_tell_, f_hz);
@@ -234,9 +257,10 @@ class BandSummer {
         jacobian(estimate_.sensor, t, motion, Vector3c::Zero(), 0.0, f_hz, 0.0, J_);
         J_ *= root_n;
         weight.factor.matrixL().solveInPlace(J_);
-        put_rows(J_, Vector6c::Zero(), f_hz, rows.middleRows<12>(12 * j));
+        rows.put(j, J_, Vector6c::Zero(), f_hz);
       }
-      sums.of_noise.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols<kColumns>().transpose());
+      add_information(rows.gyros, sums.of_noise);
+      add_information(rows.accels, sums.of_noise);
     }
     sums.of_noise = sums.of_noise.selfadjointView<Eigen::Lower>();
   }
