@@ -249,9 +249,19 @@ double HoleLengths::variance_of(const MissingExcess& excess, std::span<const dou
 
 namespace {
 
-/// @param work  as that of low_level_squares()
-void add_squares_by(std::span<const double> run, double* work, std::span<LevelSum> sums) {
-  const int levels = std::min(static_cast<int>(sums.size()), highest_level(run.size()));
+int levels_of(std::span<const double> run, std::span<const LevelSum> sums) {
+  return std::min(static_cast<int>(sums.size()), highest_level(run.size()));
+}
+
+/// Doubles that add_squares_by() needs for its strip.
+std::size_t strip_of(std::span<const double> run, std::span<const LevelSum> sums) {
+  return levels_of(run, sums) > kLowLevels ? strip_doubles(run.size()) : 0;
+}
+
+/// @param work   as that of low_level_squares()
+/// @param strip  strip_of() doubles
+void add_squares_by(std::span<const double> run, double* work, double* strip, std::span<LevelSum> sums) {
+  const int levels = levels_of(run, sums);
   if (levels < 1) return;
   const auto add = [&](int level, double sum, std::size_t count) {
     auto& total = sums[static_cast<std::size_t>(level - 1)];
@@ -264,22 +274,24 @@ void add_squares_by(std::span<const double> run, double* work, std::span<LevelSu
     take_levels(short_run.data(), 1, levels, 1, run.size(), run.size(), add);
     return;
   }
-  const WorkMemory strip(strip_doubles(run.size()));
   low_level_squares(run, work, add);
   constexpr std::size_t kSupport = std::size_t{1} << static_cast<unsigned>(kLowLevels);
   const std::size_t sums_left = run.size() - kSupport + 1;
-  high_level_squares({work, sums_left}, levels, strip.data(), add);
+  high_level_squares({work, sums_left}, levels, strip, add);
 }
 
 }  // namespace
 
 void add_squares(std::span<const double> run, std::span<LevelSum> sums) {
-  const WorkMemory work(run.size());
-  add_squares_by(run, work.data(), sums);
+  // In one piece: the library gives memory back to the system where more than twice the largest piece is free,
+  // and takes it anew, page by page, at the next call.
+  const WorkMemory memory(run.size() + strip_of(run, sums));
+  add_squares_by(run, memory.data(), memory.data() + run.size(), sums);
 }
 
 void add_squares_in_place(std::span<double> run, std::span<LevelSum> sums) {
-  add_squares_by(run, run.data(), sums);
+  const WorkMemory strip(strip_of(run, sums));
+  add_squares_by(run, run.data(), strip.data(), sums);
 }
 
 HaarLevels::HaarLevels(std::span<const double> x, std::span<const Segment> runs)

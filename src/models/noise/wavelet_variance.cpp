@@ -195,7 +195,9 @@ Result<WaveletVariance> wavelet_variance(std::span<const double> x, std::span<do
   if (auto checked = check(x, options); !checked) return tl::unexpected(checked.error());
   WaveletVariance wv;
   wv.n_samples = x.size();
-  wv.segments = valid_segments(x, options.mask);
+  // Without a mask what was checked is finite: one look at every sample is enough.
+  const bool is_whole = options.mask.empty() && !options.nan_is_gap && !x.empty();
+  wv.segments = is_whole ? std::vector<Segment>{{0, x.size()}} : valid_segments(x, options.mask);
   std::size_t longest = 0;
   for (const Segment& s : wv.segments) {
     wv.n_valid += s.end - s.begin;

@@ -25,7 +25,7 @@ class WorkMemory {
     // The library keeps small memory for the next call, but not where it was asked to align it.
     memory_.reset(
         static_cast<double*>(is_large ? std::aligned_alloc(kLargePage, bytes) : std::malloc(bytes)));
-    if (!memory_) throw std::bad_alloc();
+    if (!memory_ && bytes > 0) throw std::bad_alloc();
 #if defined(__linux__)
     // Advice: where it is not taken, the memory is as good.
     if (is_large) (void)madvise(memory_.get(), bytes, MADV_HUGEPAGE);
