@@ -315,6 +315,17 @@ void add_doubles(Answer& lines, std::string_view data) {
   lines.line(" holds", values);
 }
 
+/// The first values of a message, counted by their commas: a number's digits differ from processor to processor.
+std::string_view first_values(std::string_view text) {
+  constexpr int kValues = 60;
+  std::size_t end = 0;
+  for (int i = 0; i < kValues; ++i) {
+    end = text.find(',', end + 1);
+    if (end == std::string_view::npos) return text;
+  }
+  return text.substr(0, end);
+}
+
 TEST_F(WholeStudy, Bag) {
   RunBagOptions options;
   options.source.run_dir = run();
@@ -340,7 +351,7 @@ TEST_F(WholeStudy, Bag) {
                1e-9 * static_cast<double>(message->publish_time));
     const std::string_view data = mcap::text_of(message->data);
     if (message->topic->encoding == "json") {
-      lines.line(data.substr(0, 1200));
+      lines.line(first_values(data));
     } else {
       add_doubles(lines, data);
     }
