@@ -13,6 +13,7 @@
 #include "estimation/batch/grid.h"
 #include "estimation/batch/normal_equations.h"
 #include "estimation/batch/prior_scales.h"
+#include "estimation/batch/quietest_rates.h"
 #include "estimation/navigation/so3.h"
 
 namespace imuscope::batch {
@@ -99,32 +100,6 @@ void set_gyro_power(Problem& problem) {
         problem.mean_gyro_power[band] +=
             problem.reference.row(w, k).segment<3>(kOmega).squaredNorm() / values;
   }
-}
-
-/// B-21a: the angle random walk that the reference's gyros have at most, rad/sqrt(s): what they show in the band
-/// where they show least, in the quietest twentieth of the windows.
-double quietest_gyro_white_radps_per_sqrt_hz(const Problem& problem) {
-  constexpr double kFrom_hz = 1.0;
-  constexpr double kTo_hz = 10.0;
-  constexpr std::size_t kQuietest = 20;
-  std::vector<double> least;
-  for (Eigen::Index w = 0; w < static_cast<Eigen::Index>(problem.plan.starts.size()); ++w) {
-    double power = std::numeric_limits<double>::infinity();
-    for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
-      if (problem.plan.frequency_hz(problem.bands.first(band)) < kFrom_hz ||
-          problem.plan.frequency_hz(problem.bands.end(band)) > kTo_hz)
-        continue;
-      double sum = 0.0;
-      for (Eigen::Index k = problem.bands.first(band); k < problem.bands.end(band); ++k)
-        sum += problem.reference.row(w, k).segment<3>(kOmega).squaredNorm();
-      power =
-          std::min(power, kWindowsPerInstant * sum / (3.0 * static_cast<double>(problem.bands.width(band))));
-    }
-    least.push_back(power);
-  }
-  const auto place = least.begin() + static_cast<std::ptrdiff_t>(least.size() / kQuietest);
-  std::ranges::nth_element(least, place);
-  return std::sqrt(*place / kGridRate_hz);
 }
 
 /// The estimate of one pair of records.

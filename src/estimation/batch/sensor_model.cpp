@@ -188,12 +188,17 @@ Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const Sen
   };
   const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
   for (Eigen::Index i = 0; i < 3; ++i) {
-    for (Eigen::Index j = 0; j < 3; ++j) {
-      Eigen::Matrix3d E = none;
-      E(i, j) = i == j ? sensor.reference_scale_sd : sensor.reference_axis_sd_rad;
-      add(E, none);
-      add(none, E);
-    }
+    Eigen::Matrix3d E = none;
+    E(i, i) = sensor.reference_scale_sd;
+    add(E, none);
+    add(none, E);
+    // b is what the reference's gyros say: a departure from a right angle is shared by both axes. What turns all
+    // three together turns b, and what turns the accelerometers against it is the triads'.
+    const Eigen::Index j = (i + 1) % 3;
+    E = none;
+    E(i, j) = E(j, i) = sensor.reference_axis_sd_rad / std::numbers::sqrt2;
+    add(E, none);
+    add(none, E);
     add(none, skew(sensor.reference_triad_sd_rad * Eigen::Vector3d::Unit(i)));
   }
   // B-21b: too large a rate makes too short an arm of the same force, by its scale where forces come from

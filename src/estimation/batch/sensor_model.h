@@ -66,8 +66,8 @@ struct SensorClass {
   double accel_flexure_sd = 0.003;
   /// A mount with a resonance of 30 Hz gives way by 1 / (2 pi 30 Hz)^2 = 28 um per m/s^2, here over a metre.
   double compliance_sd = 2.8e-5;
-  /// What the reference's own axes may be off by: scale; each element off the diagonal; its accelerometer
-  /// triad against its gyro triad. No drive shows it, as only the two together are seen, so that it stays in
+  /// What the reference's own axes may be off by: scale; each axis, of a departure that two of them share; its
+  /// accelerometer triad against its gyro triad. No drive shows it, as only the two together are seen, so that it stays in
   /// the sd of everything that is a direction or a scale (B-21).
   double reference_scale_sd = 3e-4;
   double reference_axis_sd_rad = 2e-4;
@@ -120,7 +120,7 @@ struct AxesFrame {
 
 /// Scale and axes of both triads of the reference, and the rotation between them; what they make of each
 /// component of the lever arm.
-inline constexpr Eigen::Index kReferenceErrors = 24;
+inline constexpr Eigen::Index kReferenceErrors = 18;
 
 /// What each error of the reference's own axes, off by its sd, makes of the published parameters (B-21): F,
 /// of which F F' is the covariance.

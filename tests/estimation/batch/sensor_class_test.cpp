@@ -45,5 +45,29 @@ TEST(SensorClass, BetweenTwoGradesTheBeliefIsBetweenTheirs) {
   }
 }
 
+/// b is what the reference's gyros say: axes that lean towards each other make their triad crooked, and no more.
+TEST(SensorClass, CrookedAxesOfTheReferenceDoNotTurnItsFrame) {
+  const SensorClass sensor = of_reference(0.3);
+  SensorState state;
+  state.above = 0.5;
+  const auto factor = of_reference_axes(sensor, state);
+  const Eigen::Matrix<double, kParameters, kParameters> covariance = factor * factor.transpose();
+  const double departure_sd_rad = std::sqrt(2.0) * sensor.reference_axis_sd_rad;
+  for (Eigen::Index i = 3; i < 6; ++i) {
+    EXPECT_NEAR(std::sqrt(covariance(kGyroShape + i, kGyroShape + i)), departure_sd_rad,
+                1e-3 * departure_sd_rad);
+    EXPECT_NEAR(std::sqrt(covariance(kAccelShape + i, kAccelShape + i)), departure_sd_rad,
+                1e-3 * departure_sd_rad);
+  }
+  // In the frame of the x gyro, each of whose axes leans by half of a departure (B-24).
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    EXPECT_NEAR(std::sqrt(covariance(kPsi + i, kPsi + i)), 0.5 * departure_sd_rad, 1e-3 * departure_sd_rad);
+    // Both triads are crooked, each by itself, and they are turned against each other.
+    EXPECT_NEAR(std::sqrt(covariance(kAlpha + i, kAlpha + i)),
+                std::hypot(sensor.reference_triad_sd_rad, std::sqrt(0.5) * departure_sd_rad),
+                1e-3 * departure_sd_rad);
+  }
+}
+
 }  // namespace
 }  // namespace imuscope::batch
