@@ -17,8 +17,10 @@ Problem problem_of(double white_radps_per_sqrt_hz, double minutes, double motion
   const auto n = static_cast<Eigen::Index>(60.0 * minutes * kGridRate_hz);
   std::normal_distribution<double> normal;
   Eigen::MatrixXd series = Eigen::MatrixXd::Zero(n, kReferenceColumns);
-  for (double& rate : series.middleCols<3>(kOmega).reshaped())
-    rate = white_radps_per_sqrt_hz * std::sqrt(kGridRate_hz) * normal(random);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      series(i, kOmega + axis) = white_radps_per_sqrt_hz * std::sqrt(kGridRate_hz) * normal(random);
+  }
   Eigen::RowVector3d motion = Eigen::RowVector3d::Zero();
   for (Eigen::Index i = 0; i < n * 9 / 10; ++i) {
     const Eigen::RowVector3d kick(normal(random), normal(random), normal(random));
