@@ -297,7 +297,8 @@ TEST_F(NoiseCommands, StampsOfArrivalInBurstsMakeNoGapsAndALostSampleOfEvenOnesD
   std::string lost = bursts;
   for (int i = 0; i < 400; ++i) {
     // Eight rows arrive together, after the last of them.
-    bursts += fmt::format("{:.4f},{}\n", 0.01 * (8 * (i / 8) + 8), (i * 37) % 11);
+    const int last = 8 * (i / 8) + 8;
+    bursts += fmt::format("{:.4f},{}\n", 0.01 * last, (i * 37) % 11);
     if (i % 100 != 50) lost += fmt::format("{:.4f},{}\n", 0.01 * i + 0.001 * ((i * 7) % 3), (i * 37) % 11);
   }
   const auto together = run("wv " + write("b.csv", bursts) + " -c x --rate 100 --json");
