@@ -21,12 +21,12 @@ struct HalvesOfRates {
 HalvesOfRates halves_of_rates(const Problem& problem) {
   constexpr double kFrom_hz = 1.0;
   constexpr double kTo_hz = 10.0;
-  constexpr Eigen::Index kBothHalves = 8;
+  constexpr Eigen::Index kFewestFrequencies = 8;  // each half has three at least
   std::vector<Eigen::Index> bands;
   for (Eigen::Index band = 0; band < problem.bands.size(); ++band) {
     if (problem.plan.frequency_hz(problem.bands.first(band)) >= kFrom_hz &&
         problem.plan.frequency_hz(problem.bands.end(band)) <= kTo_hz &&
-        problem.bands.width(band) >= kBothHalves)
+        problem.bands.width(band) >= kFewestFrequencies)
       bands.push_back(band);
   }
   const auto n_windows = static_cast<Eigen::Index>(problem.plan.starts.size());

@@ -59,7 +59,7 @@ TEST(SensorClass, CrookedAxesOfTheReferenceDoNotTurnItsFrame) {
     EXPECT_NEAR(std::sqrt(covariance(kAccelShape + i, kAccelShape + i)), departure_sd_rad,
                 1e-3 * departure_sd_rad);
   }
-  // In the frame of the x gyro, each of whose axes leans by half of a departure (B-24).
+  // What is published follows the x gyro (B-24), which leans by half of each departure.
   for (Eigen::Index i = 0; i < 3; ++i) {
     EXPECT_NEAR(std::sqrt(covariance(kPsi + i, kPsi + i)), 0.5 * departure_sd_rad, 1e-3 * departure_sd_rad);
     // Both triads are crooked, each by itself, and they are turned against each other.
