@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "models/noise/compare.h"
+#include "models/noise/covariance_table.h"
 #include "models/noise/holm.h"
 #include "models/noise/json.h"
 #include "models/noise/lines.h"
@@ -32,6 +33,7 @@ struct Job {
   const DeviceConfig& device;
   const std::vector<double>& values;  ///< of the axis, vibration lines taken out
   const noise::ModelSpec& spec;
+  noise::CovarianceTables& covariances;
   NoiseStudy& study;
 };
 
@@ -127,6 +129,8 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
   say_left_out(job, axis, regime, *wv, levels_of_whole);
   noise::FitOptions fit_options;
   fit_options.signal_unit = axis_unit(axis);
+  fit_options.intervals = noise::Intervals::kInverted;
+  fit_options.covariances = &job.covariances;
   auto fit = noise::fit(*wv, job.spec, job.device.rate_hz, fit_options);
   if (!fit) {
     remark(fmt::format("no noise model: {}{}", fit.error().what,
@@ -274,13 +278,14 @@ void append_comparisons(const std::vector<AxisComparison>& all, nlohmann::json& 
 }
 
 NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std::size_t axis,
-                      const std::vector<std::string>& regimes, const noise::ModelSpec& spec) {
+                      const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
+                      noise::CovarianceTables& covariances) {
   NoiseStudy study;
   std::vector<double> values = series.values(axis);
   std::vector<std::vector<noise::Line>> lines;
   for (std::size_t regime = 0; regime < regimes.size(); ++regime)
     lines.push_back(take_out_lines(device, axis, regimes[regime], series.mask(axis, regime), values, study));
-  const Job job{device, values, spec, study};
+  const Job job{device, values, spec, covariances, study};
   const std::size_t levels = fit_axis(job, axis, series.mask(axis), kWholeRun, {}, 0);
   for (std::size_t regime = 0; regime < regimes.size(); ++regime)
     fit_axis(job, axis, series.mask(axis, regime), regimes[regime], lines[regime], levels);
@@ -316,12 +321,14 @@ NoiseStudy study_noise(const Configuration& configuration, const std::vector<Noi
   const std::size_t total = series.size() * kAxisCount;
   // Each axis of each S-IMU by itself, on any thread; what came of them stands in their order.
   std::vector<NoiseStudy> parts(total);
+  noise::CovarianceTables covariances;
   std::mutex told;
   std::size_t done = 0;
   const auto study_one = [&](std::size_t job) {
     const std::size_t i = job / kAxisCount;
     if (series[i].size() == 0) return;
-    parts[job] = study_axis(configuration.devices[indices[i]], series[i], job % kAxisCount, regimes, spec);
+    parts[job] = study_axis(configuration.devices[indices[i]], series[i], job % kAxisCount, regimes, spec,
+                            covariances);
     if (!progress) return;
     const std::lock_guard lock(told);
     progress(static_cast<double>(++done) / static_cast<double>(total));

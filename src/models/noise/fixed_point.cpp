@@ -3,10 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <span>
 
+#include "models/noise/inference.h"
 #include "models/noise/wv_covariance.h"
 
 namespace imuscope::noise {
@@ -152,26 +151,15 @@ int parameters_in_use(const Model& model) {
 }
 
 Eigen::VectorXd residual_of(const SeparableProblem& problem, const Model& model) {
-  Eigen::VectorXd residual = problem.y;
-  std::array<CurvePoint, kMaxLevel> points;
-  for (const Component& c : model.components) {
-    if (!(c.amplitude > 0.0)) continue;
-    unit_curve(c.kind, c.shape, std::span(points).first(static_cast<std::size_t>(problem.levels.back())));
-    for (Eigen::Index i = 0; i < residual.size(); ++i) {
-      const auto level = static_cast<std::size_t>(problem.levels[static_cast<std::size_t>(i)]);
-      residual[i] -= c.amplitude * points[level - 1].value;
-    }
-  }
-  return residual;
+  return problem.y - wv_curve(model, problem.levels);
 }
 
 Eigen::MatrixXd sampling_covariance(const Model& model, const WaveletVariance& wv, std::size_t levels,
                                     const CovarianceTable* table) {
   Eigen::MatrixXd v = table != nullptr ? table->of(model, wv) : wv_covariance(model, wv, levels);
-  for (Eigen::Index i = 0; i < v.rows(); ++i) {
-    const double value = model_wv(model, wv.levels[static_cast<std::size_t>(i)].level);
-    v(i, i) += kRidge * (v(i, i) + kRidge * value * value);
-  }
+  std::vector<int> of_levels;
+  for (std::size_t i = 0; i < levels; ++i) of_levels.push_back(wv.levels[i].level);
+  v.diagonal() += kRidge * (v.diagonal() + kRidge * wv_curve(model, of_levels).cwiseAbs2());
   return v;
 }
 

@@ -6,10 +6,12 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "models/noise/chi_squared.h"
 #include "models/noise/parameter_scale.h"
@@ -195,6 +197,26 @@ std::vector<Eigen::Index> indices_of(const std::vector<bool>& present) {
   return out;
 }
 
+/// One process of amplitude 1 at some levels: many in one go, which costs a few of them.
+class UnitPoints {
+ public:
+  UnitPoints(const Component& c, const std::vector<int>& levels) {
+    if (levels.size() == 1) {
+      points_[index(levels[0])] = unit_wv(c.kind, c.shape, levels[0]);
+    } else if (!levels.empty()) {
+      const int highest = *std::max_element(levels.begin(), levels.end());
+      unit_curve(c.kind, c.shape, std::span(points_).first(static_cast<std::size_t>(highest)));
+    }
+  }
+
+  [[nodiscard]] const CurvePoint& at(int level) const { return points_[index(level)]; }
+
+ private:
+  static std::size_t index(int level) { return static_cast<std::size_t>(level) - 1; }
+
+  std::array<CurvePoint, kMaxLevel> points_;
+};
+
 }  // namespace
 
 std::vector<ParameterPlace> parameter_places(const Model& model) {
@@ -206,14 +228,26 @@ std::vector<ParameterPlace> parameter_places(const Model& model) {
   return places;
 }
 
+Eigen::VectorXd wv_curve(const Model& model, const std::vector<int>& levels) {
+  Eigen::VectorXd curve = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(levels.size()));
+  for (const Component& c : model.components) {
+    if (!(c.amplitude > 0.0)) continue;
+    const UnitPoints points(c, levels);
+    for (std::size_t r = 0; r < levels.size(); ++r)
+      curve[static_cast<Eigen::Index>(r)] += c.amplitude * points.at(levels[r]).value;
+  }
+  return curve;
+}
+
 Eigen::MatrixXd wv_jacobian(const Model& model, const std::vector<int>& levels,
                             const std::vector<ParameterPlace>& places) {
   Eigen::MatrixXd jacobian(static_cast<Eigen::Index>(levels.size()),
                            static_cast<Eigen::Index>(places.size()));
   for (std::size_t p = 0; p < places.size(); ++p) {
     const Component& c = model.components[places[p].component];
+    const UnitPoints points(c, levels);
     for (std::size_t r = 0; r < levels.size(); ++r) {
-      const CurvePoint point = unit_wv(c.kind, c.shape, levels[r]);
+      const CurvePoint& point = points.at(levels[r]);
       double slope = point.value;
       if (places[p].shape >= 0) {
         const double shape = c.shape[static_cast<std::size_t>(places[p].shape)];

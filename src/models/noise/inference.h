@@ -26,6 +26,9 @@ struct ParameterPlace {
 /// Places in the order of FitResult::parameters: for each component its shapes, then its amplitude.
 std::vector<ParameterPlace> parameter_places(const Model& model);
 
+/// Wavelet variance of the model, one value a level.
+Eigen::VectorXd wv_curve(const Model& model, const std::vector<int>& levels);
+
 /// d(model wv)/d(parameter on its interval scale: log of amplitudes, search coordinate of shapes), one row a
 /// level.
 Eigen::MatrixXd wv_jacobian(const Model& model, const std::vector<int>& levels,

@@ -278,9 +278,7 @@ class Inversion {
   }
 
   [[nodiscard]] Eigen::VectorXd curve(const Model& model) const {
-    Eigen::VectorXd m(y_.size());
-    for (Eigen::Index i = 0; i < m.size(); ++i) m[i] = model_wv(model, levels_[static_cast<std::size_t>(i)]);
-    return m;
+    return wv_curve(model, levels_);
   }
 
   /// Weights of the model at u. The levels' residuals are brought to a Gaussian's by cube roots (G-18).
