@@ -157,6 +157,7 @@ void tell_noise_of(int reference_class, imuscope::ReferenceConfig& reference) {
   reference.accel_white_mps2_per_sqrt_hz = noise.accel_white_mps2_per_sqrt_hz;
   reference.gyro_bias.sd = noise.gyro_bias_sd_radps;
   reference.accel_bias.sd = noise.accel_bias_sd_mps2;
+  reference.grade = imuscope::reference_grade(noise.gyro_white_radps_per_sqrt_hz);
 }
 
 /// One drive: recorded, read back, accounted for.
@@ -185,11 +186,12 @@ imuscope::Result<void> run(const Options& options, std::uint64_t seed, Totals& t
   if (!opened) return tl::unexpected<imuscope::Error>(opened.error());
   Last sink(*known);
   imuscope::EstimatorConfig estimator = imuscope::estimator_config(opened->configuration);
+  tell_noise_of(options.reference_class, estimator.reference);
   // What can be reached where axes are straight and known to be.
   if (options.world == "ideal") {
     for (imuscope::SImuConfig& study : estimator.studies) study.blocks = imuscope::kFullSImuBlocks;
+    estimator.reference.grade = {};
   }
-  tell_noise_of(options.reference_class, estimator.reference);
   const auto replayed = imuscope::replay(opened->configuration, estimator, opened->recording, sink);
   if (!replayed) return tl::unexpected<imuscope::Error>(replayed.error());
   totals.navigation.add(sink.navigation);

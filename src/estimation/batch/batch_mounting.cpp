@@ -149,7 +149,7 @@ class Batch {
     study_mean_ = mean_of(study.motion, study.valid);
     problem_.reference = Spectra(problem_.plan, reference_series(grid, reference_mean_));
     set_gyro_power(problem_);
-    class_.set_reference(
+    class_.reference = reference_grade(
         reference_gyro_white_radps_per_sqrt_hz_.value_or(quietest_gyro_white_radps_per_sqrt_hz(problem_)));
     const auto n = static_cast<Eigen::Index>(problem_.plan.starts.size());
     problem_.from_middle_s.resize(n);

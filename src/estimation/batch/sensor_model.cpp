@@ -141,36 +141,6 @@ struct AxisShift {
 
 }  // namespace
 
-void SensorClass::set_reference(double gyro_white_radps_per_sqrt_hz) {
-  struct Grade {
-    double gyro_white_radps_per_sqrt_hz;
-    double scale_sd, axis_sd_rad, triad_sd_rad;
-  };
-  constexpr double kPerRootHour = kRadPerDeg / 60.0;
-  const SensorClass navigation;
-  // Two axes make one departure from a right angle: each leans by the share of it that has its sd.
-  const auto each = [](double departure_sd_rad) { return departure_sd_rad / std::numbers::sqrt2; };
-  // Tactical MEMS: STIM300 (Sensonor TS1524: .15 deg/sqrt(h), scale 500 ppm, axes 1 mrad), its scale taken twice, as it is
-  // among the best of its class. Industrial MEMS: aligned as an S-IMU is, scale calibrated to half a per cent.
-  constexpr double kTacticalAxes_rad = 0.05 * kRadPerDeg;
-  const std::array<Grade, 3> grades{{{0.005 * kPerRootHour, navigation.reference_scale_sd,
-                                      navigation.reference_axis_sd_rad, navigation.reference_triad_sd_rad},
-                                     {0.15 * kPerRootHour, 1e-3, each(kTacticalAxes_rad), kTacticalAxes_rad},
-                                     {0.3 * kPerRootHour, 5e-3, each(axis_sd_rad), triad_sd_rad}}};
-  // B-21a
-  const std::size_t next = gyro_white_radps_per_sqrt_hz < grades[1].gyro_white_radps_per_sqrt_hz ? 1 : 2;
-  const Grade& low = grades[next - 1];
-  const Grade& high = grades[next];
-  const double place = std::log(gyro_white_radps_per_sqrt_hz / low.gyro_white_radps_per_sqrt_hz) /
-                       std::log(high.gyro_white_radps_per_sqrt_hz / low.gyro_white_radps_per_sqrt_hz);
-  const auto between = [share = std::clamp(place, 0.0, 1.0)](double from, double to) {
-    return from * std::pow(to / from, share);
-  };
-  reference_scale_sd = between(low.scale_sd, high.scale_sd);
-  reference_axis_sd_rad = between(low.axis_sd_rad, high.axis_sd_rad);
-  reference_triad_sd_rad = between(low.triad_sd_rad, high.triad_sd_rad);
-}
-
 Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const SensorClass& sensor,
                                                                        const SensorState& state) {
   Eigen::Matrix<double, kParameters, kReferenceErrors> factor;
@@ -189,17 +159,17 @@ Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const Sen
   const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
   for (Eigen::Index i = 0; i < 3; ++i) {
     Eigen::Matrix3d E = none;
-    E(i, i) = sensor.reference_scale_sd;
+    E(i, i) = sensor.reference.scale_sd;
     add(E, none);
     add(none, E);
     // b is what the reference's gyros say: a departure from a right angle is shared by both axes. What turns all
     // three together turns b, and what turns the accelerometers against it is the triads'.
     const Eigen::Index j = (i + 1) % 3;
     E = none;
-    E(i, j) = E(j, i) = sensor.reference_axis_sd_rad / std::numbers::sqrt2;
+    E(i, j) = E(j, i) = sensor.reference.axis_sd_rad / std::numbers::sqrt2;
     add(E, none);
     add(none, E);
-    add(none, skew(sensor.reference_triad_sd_rad * Eigen::Vector3d::Unit(i)));
+    add(none, skew(sensor.reference.triad_sd_rad * Eigen::Vector3d::Unit(i)));
   }
   // B-21b: too large a rate makes too short an arm of the same force, by its scale where forces come from
   // angular acceleration, by twice that where they come from the square of the rate; a leaning axis takes of
@@ -209,7 +179,7 @@ Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const Sen
   for (Eigen::Index i = 0; i < 3; ++i) {
     const double across_m = std::sqrt(std::max(0.0, r.squaredNorm() - r[i] * r[i]));
     factor(kLeverArm + i, next++) =
-        std::hypot(kBetween * sensor.reference_scale_sd * r[i], sensor.reference_axis_sd_rad * across_m);
+        std::hypot(kBetween * sensor.reference.scale_sd * r[i], sensor.reference.axis_sd_rad * across_m);
   }
   return factor;
 }

@@ -10,6 +10,8 @@
 
 #include <Eigen/Core>
 
+#include "estimation/navigation/reference_grade.h"
+
 namespace imuscope::batch {
 
 /// Where each quantity stands in the vector of parameters.
@@ -69,13 +71,7 @@ struct SensorClass {
   /// What the reference's own axes may be off by: scale; each axis, of a departure that two of them share; its
   /// accelerometer triad against its gyro triad. No drive shows it, as only the two together are seen, so that it stays in
   /// the sd of everything that is a direction or a scale (B-21).
-  double reference_scale_sd = 3e-4;
-  double reference_axis_sd_rad = 2e-4;
-  double reference_triad_sd_rad = 3e-4;
-
-  /// The class of a reference by its gyros' white noise (angle random walk, rad/sqrt(s)): whoever makes
-  /// quieter gyros aligns their axes better, too (B-21a). The defaults are navigation grade.
-  void set_reference(double gyro_white_radps_per_sqrt_hz);
+  ReferenceGrade reference = kNavigationGrade;
 };
 
 /// The estimate as it stands.

@@ -13,6 +13,7 @@
 #include "base/limits.h"
 #include "base/units.h"
 #include "estimation/calibration/covariance_loops.h"
+#include "estimation/navigation/reference_grade.h"
 #include "sample/regime.h"
 #include "sample/sample.h"
 
@@ -74,11 +75,13 @@ struct ReferenceConfig {
   double accel_white_mps2_per_sqrt_hz = 10.0 * kMps2PerMicroG;       ///< velocity random walk
   GaussMarkovConfig gyro_bias{0.005 * kRadPerDeg / kSecondsPerHour, 3600.0};
   GaussMarkovConfig accel_bias{5e-4, 3600.0};
-  /// Its own scale, and its accelerometer triad against its gyro triad (rad): no motion shows them, so that
-  /// they stay in the sd of scales and of the S-IMU's accelerometer triad, where that is estimated.
-  double scale_sd = 3e-4;
-  double triad_sd_rad = 3e-4;
+  /// Its own scale and axes: no motion shows them, so that they stay in the sd of scales and of the S-IMU's
+  /// accelerometer triad, where that is estimated, and in that of attitude, velocity and position (N-27, N-28).
+  ReferenceGrade grade = kNavigationGrade;
 };
+
+/// N-28. What a start knows of the accelerometers' biases in b, m/s^2: turn-on, and what gravity shows of scale and axes.
+[[nodiscard]] Vector3 start_accel_bias_sd_mps2(const ReferenceConfig& config) noexcept;
 
 /// How far GNSS solutions are trusted, per solution kind (kSingle .. kFixed).
 struct GnssConfig {

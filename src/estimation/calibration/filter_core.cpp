@@ -69,9 +69,10 @@ FilterCore::FilterCore(const EstimatorConfig& config)
   for (std::size_t i = 0; i < 9; ++i)
     repair_variance_[i] = kRepairNavigationSd[i / 3] * kRepairNavigationSd[i / 3];
   const ReferenceConfig& reference = config.reference;
+  const Vector3 accel_bias_sd = start_accel_bias_sd_mps2(reference);
   for (std::size_t i = 0; i < 3; ++i) {
     repair_variance_[kGyroBiasError + i] = reference.gyro_bias.sd * reference.gyro_bias.sd;
-    repair_variance_[kAccelBiasError + i] = reference.accel_bias.sd * reference.accel_bias.sd;
+    repair_variance_[kAccelBiasError + i] = accel_bias_sd[i] * accel_bias_sd[i];
     covariance_.reset_state(kGyroBiasError + i, repair_variance_[kGyroBiasError + i]);
     covariance_.reset_state(kAccelBiasError + i, repair_variance_[kAccelBiasError + i]);
   }

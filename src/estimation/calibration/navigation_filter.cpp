@@ -58,12 +58,15 @@ NavigationProcessNoise process_noise(const ReferenceConfig& config) noexcept {
   return {config.gyro_white_radps_per_sqrt_hz,
           config.accel_white_mps2_per_sqrt_hz,
           {config.gyro_bias.sd, config.gyro_bias.time_constant_s},
-          {config.accel_bias.sd, config.accel_bias.time_constant_s}};
+          {config.accel_bias.sd, config.accel_bias.time_constant_s},
+          config.grade};
 }
 
 InitialAlignmentOptions alignment_options(const EstimatorConfig& config) noexcept {
   InitialAlignmentOptions options;
   options.reference_noise = process_noise(config.reference);
+  // What levels are told by.
+  options.reference_noise.accel_bias.sd = start_accel_bias_sd_mps2(config.reference)[0];
   options.r_ba_b_m = to_eigen(config.gnss.antenna_lever_arm_b_m);
   return options;
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/units.h"
 #include "estimation/navigation/local_earth.h"
 #include "estimation/navigation/so3.h"
 
@@ -68,6 +69,17 @@ double decay_rate(const BiasProcess& bias) noexcept {
   return std::isinf(bias.correlation_time_s) ? 0.0 : 1.0 / bias.correlation_time_s;
 }
 
+/// N-27. How long a turn, a braking or an acceleration of a road vehicle lasts.
+constexpr double kManoeuvre_s = 5.0;
+
+/// N-27: intensity on each axis of b.
+Vector3d shown_by_motion(const Vector3d& motion_b, double scale_sd, double lean_variance) noexcept {
+  const Vector3d squares = motion_b.cwiseAbs2();
+  const double all = squares.sum();
+  return kManoeuvre_s *
+         (scale_sd * scale_sd * squares + lean_variance * (Vector3d::Constant(all) - squares));
+}
+
 /// F F, with the bias rows that F leaves out (plain decay), from the blocks that are not zero.
 NavigationDynamics squared(const NavigationDynamics& F, double beta_g, double beta_a) noexcept {
   const Matrix3d r_r = block(F, kPositionError, kPositionError);
@@ -99,11 +111,34 @@ NavigationDynamics squared(const NavigationDynamics& F, double beta_g, double be
   return S;
 }
 
+/// White noise of rates and forces as it enters attitude and velocity: roots of the intensities, in n.
+struct WhiteNoise {
+  Matrix3d gyro_root_n;
+  Matrix3d accel_root_n;
+};
+
+// N-26, N-27
+WhiteNoise white_noise(const NavigationState& state, const InertialRates& rates,
+                       const NavigationProcessNoise& noise) noexcept {
+  const ReferenceGrade& grade = noise.grade;
+  const double axis_variance = grade.axis_sd_rad * grade.axis_sd_rad;
+  const Matrix3d& C = state.C_b_n;
+  const auto root_n = [&C](double white, const Vector3d& by_motion) -> Matrix3d {
+    const Vector3d root = (by_motion.array() + white * white).sqrt();
+    return C * root.asDiagonal();
+  };
+  // Gravity's standard value does: the rest is a hundredth of what a manoeuvre accelerates by.
+  const Vector3d acceleration_b = rates.f_b_mps2 + kMps2PerG * C.row(2).transpose();
+  return {root_n(noise.gyro_noise_radps_per_sqrt_hz,
+                 shown_by_motion(rates.omega_ib_b_radps, grade.scale_sd, axis_variance)),
+          root_n(noise.accel_noise_mps2_per_sqrt_hz,
+                 shown_by_motion(acceleration_b, grade.scale_sd,
+                                 axis_variance + grade.triad_sd_rad * grade.triad_sd_rad))};
+}
+
 // N-26: trapezoid of the intensities, the biases' own blocks exact.
-void set_process_covariance(const NavigationProcessNoise& noise, double beta_g, double beta_a, double dt_s,
-                            NavigationTransition& step) noexcept {
-  const double gyro_intensity = noise.gyro_noise_radps_per_sqrt_hz * noise.gyro_noise_radps_per_sqrt_hz;
-  const double accel_intensity = noise.accel_noise_mps2_per_sqrt_hz * noise.accel_noise_mps2_per_sqrt_hz;
+void set_process_covariance(const WhiteNoise& white, const NavigationProcessNoise& noise, double beta_g,
+                            double beta_a, double dt_s, NavigationTransition& step) noexcept {
   const double gyro_variance = noise.gyro_bias.sd * noise.gyro_bias.sd;
   const double accel_variance = noise.accel_bias.sd * noise.accel_bias.sd;
   const double gyro_bias_intensity = 2.0 * beta_g * gyro_variance;
@@ -113,8 +148,9 @@ void set_process_covariance(const NavigationProcessNoise& noise, double beta_g, 
 
   // Columns of Phi times the root of their intensity: what noise enters through them. None enters through dr.
   Eigen::Matrix<double, kNavigationKinematicSize, 12> G;
-  G.middleCols<3>(0) = std::sqrt(half * accel_intensity) * column(kVelocityError);
-  G.middleCols<3>(3) = std::sqrt(half * gyro_intensity) * column(kAttitudeError);
+  const double root_half = std::sqrt(half);
+  G.middleCols<3>(0) = (root_half * column(kVelocityError)).lazyProduct(white.accel_root_n);
+  G.middleCols<3>(3) = (root_half * column(kAttitudeError)).lazyProduct(white.gyro_root_n);
   G.middleCols<3>(6) = std::sqrt(half * gyro_bias_intensity) * column(kGyroBiasError);
   G.middleCols<3>(9) = std::sqrt(half * accel_bias_intensity) * column(kAccelBiasError);
 
@@ -127,8 +163,10 @@ void set_process_covariance(const NavigationProcessNoise& noise, double beta_g, 
       Q(j, i) = sum;
     }
   }
-  Q.diagonal().segment<3>(kVelocityError).array() += half * accel_intensity;
-  Q.diagonal().segment<3>(kAttitudeError).array() += half * gyro_intensity;
+  Q.block<3, 3>(kVelocityError, kVelocityError) +=
+      half * white.accel_root_n.lazyProduct(white.accel_root_n.transpose());
+  Q.block<3, 3>(kAttitudeError, kAttitudeError) +=
+      half * white.gyro_root_n.lazyProduct(white.gyro_root_n.transpose());
   Q.block<9, 3>(0, kGyroBiasError) =
       (half * gyro_bias_intensity * step.gyro_bias_decay) * column(kGyroBiasError);
   Q.block<9, 3>(0, kAccelBiasError) =
@@ -182,7 +220,7 @@ NavigationTransition transition(const NavigationState& state, const InertialRate
   out.kinematic_rows.diagonal().array() += 1.0;
   out.gyro_bias_decay = std::exp(-beta_g * dt_s);
   out.accel_bias_decay = std::exp(-beta_a * dt_s);
-  set_process_covariance(noise, beta_g, beta_a, dt_s, out);
+  set_process_covariance(white_noise(state, rates, noise), noise, beta_g, beta_a, dt_s, out);
   return out;
 }
 

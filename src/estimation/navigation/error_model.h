@@ -8,6 +8,7 @@
 /// N-26; exact first-order linearisation, gravity's change with latitude included. Core: no allocation.
 
 #include "estimation/navigation/navigation_state.h"
+#include "estimation/navigation/reference_grade.h"
 
 namespace imuscope {
 
@@ -41,6 +42,7 @@ struct NavigationProcessNoise {
   double accel_noise_mps2_per_sqrt_hz = 0.0;  ///< white force noise (velocity random walk)
   BiasProcess gyro_bias;                      ///< per axis, rad/s
   BiasProcess accel_bias;                     ///< per axis, m/s^2
+  ReferenceGrade grade{};                     ///< N-27: what scale and axes make of a motion
 };
 
 /// d(dr, dv, phi)/dt = F [dr, dv, phi, db_g, db_a] about the state (N-20 to N-24).

@@ -72,9 +72,9 @@ TEST(BatchPartsAnswers, SensorModel) {
   lines.line("prior", prior_sd(sensor));
   const double per_root_hour = std::numbers::pi / 180.0 / 60.0;
   for (const double white : {1e-9, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 30.0}) {
-    sensor.set_reference(white * per_root_hour);
-    lines.line("reference", white, 1e3 * sensor.reference_scale_sd, 1e3 * sensor.reference_axis_sd_rad,
-               1e3 * sensor.reference_triad_sd_rad);
+    sensor.reference = reference_grade(white * per_root_hour);
+    lines.line("reference", white, 1e3 * sensor.reference.scale_sd, 1e3 * sensor.reference.axis_sd_rad,
+               1e3 * sensor.reference.triad_sd_rad);
   }
   lines.line("of its axes",
              Eigen::MatrixXd(1e3 * of_reference_axes(sensor, crooked_state()).topRows<30>().transpose()));
