@@ -98,6 +98,11 @@ void NavigationScore::add(const NavigationScore& other) {
   utc_errors_s_.insert(utc_errors_s_.end(), other.utc_errors_s_.begin(), other.utc_errors_s_.end());
 }
 
+bool NavigationScore::is_honest() const {
+  constexpr double kLeast = 0.9;  // of 95 %: errors of one drive hang together
+  return std::ranges::all_of(scores(), [](const auto& kind) { return kind.second->coverage() >= kLeast; });
+}
+
 std::string NavigationScore::table() const {
   constexpr double kMdeg = 1e3 * imuscope::kDegPerRad;
   std::string text;

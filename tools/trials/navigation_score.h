@@ -49,6 +49,8 @@ class NavigationScore {
            const NavigationTruth& truth);
   void add(const NavigationScore& other);
   [[nodiscard]] std::string table() const;
+  /// Whether nine tenths of the errors of every kind are within their 95 % intervals.
+  [[nodiscard]] bool is_honest() const;
   [[nodiscard]] const StateScore& heading() const { return heading_; }
   /// By name: heading, level, velocity, position.
   [[nodiscard]] std::vector<std::pair<const char*, const StateScore*>> scores() const {

@@ -226,7 +226,7 @@ void print(const std::string& name, const Device& device) {
 
 /// @return  whether every goal is met: a NEES that a consistent filter shows in 999 of 1000 runs, and in
 /// the ideal world the mounting within the samples' goals and a fifth, and the time offset from drive to
-/// drive
+/// drive; and a navigation that is not too sure of itself
 bool print(const Options& options, const Totals& t) {
   constexpr double kMdeg = 1e3 * imuscope::kDegPerRad;
   constexpr double kMm = 1e3;
@@ -280,7 +280,8 @@ bool print(const Options& options, const Totals& t) {
                         (kMm * rms(t.r2, t.n) - kThroughBytes * kGoalR_mm).maxCoeff() <= 0.0 &&
                         from_drive_to_drive_us <= kGoalTimeOffset_us;
   const bool consistent = std::abs(t.score.nees6() - 6.0) <= kOnceInAThousand * nees_sd;
-  const bool met = consistent && (accurate || !judged);
+  const bool navigates = t.navigation.is_honest();
+  const bool met = consistent && navigates && (accurate || !judged);
   fmt::print("{}\n", met ? "every goal is met" : "A GOAL IS MISSED");
   return met;
 }

@@ -86,6 +86,13 @@ InertialRates mixed(const InertialRates& a, const InertialRates& b, double share
           a.f_b_mps2 + share_of_b * (b.f_b_mps2 - a.f_b_mps2)};
 }
 
+/// Faster than this a vehicle turns, too; slower, what a noisy gyro shows is noise.
+constexpr double kMoves_mps = 1.0;
+
+bool moves(const NavigationState& state) noexcept {
+  return state.v_n_mps.squaredNorm() > kMoves_mps * kMoves_mps;
+}
+
 bool is_finite(const GnssData& gnss) noexcept {
   return std::isfinite(gnss.latitude_rad) && std::isfinite(gnss.longitude_rad) &&
          std::isfinite(gnss.height_m) &&
@@ -115,6 +122,7 @@ NavigationFilter::NavigationFilter(const EstimatorConfig& config, FilterCore& co
       core_(core),
       log_(log),
       counters_(counters),
+      arm_rate_(noise_.gyro_noise_radps_per_sqrt_hz * std::sqrt(reference_.rate_hz), reference_.rate_hz),
       aligner_(alignment_options(config)),
       past_(reference_past_capacity(config.reference.rate_hz)) {
   const bool offered = navigation_.enabled && gnss_.enabled;
@@ -238,6 +246,33 @@ void NavigationFilter::remember(const Sample& sample, const InertialRates& measu
   next.measured = measured;
   past_head_ = (past_head_ + 1) % past_.size();
   past_size_ = std::min(past_size_ + 1, past_.size());
+  const std::size_t half_width = arm_rate_.half_width();
+  if (half_width > 0 && past_size_ > 2 * half_width && moves(core_.navigation()))
+    arm_rate_.learn(mean_rate(half_width, half_width) - core_.reference_gyro_bias_radps());
+}
+
+Vector3d NavigationFilter::mean_rate(std::size_t centre, std::size_t half_width) const noexcept {
+  Vector3d sum = Vector3d::Zero();
+  for (std::size_t k = centre - half_width; k <= centre + half_width; ++k)
+    sum += past(k).measured.omega_ib_b_radps;
+  return sum / static_cast<double>(2 * half_width + 1);
+}
+
+/// E-29, at an instant that lies by a share of the interval behind epoch k.
+void NavigationFilter::set_arm_rate(std::size_t k, double share_of_newer, Delayed& out) const noexcept {
+  out.rate_share.setOnes();
+  out.sd_rate_radps = 0.0;
+  if (arm_rate_.half_width() == 0) return;
+  const std::size_t newer = share_of_newer > 0.0 && k > 0 ? k - 1 : k;
+  // The newest are not there yet.
+  const std::size_t half_width = std::min({arm_rate_.half_width(), newer, past_size_ - 1 - k});
+  const Vector3d mean = (1.0 - share_of_newer) * mean_rate(k, half_width) +
+                        share_of_newer * mean_rate(newer, half_width);
+  const Vector3d& bias = out.state.gyro_bias_b_radps;
+  const ArmRate::Estimate rate = arm_rate_.estimate(mean - bias, 2 * half_width + 1, moves(out.state));
+  out.measured.omega_ib_b_radps = bias + rate.omega_b_radps;
+  out.rate_share = rate.share;
+  out.sd_rate_radps = rate.sd_radps;
 }
 
 void NavigationFilter::try_start(const Sample& sample) noexcept {
@@ -484,14 +519,17 @@ NavigationFilter::Lookup NavigationFilter::look_back(HostTime time, Delayed& out
   // E-5: the state then
   inject(out.state, learned);
   const double rest_s = to_seconds(time - epoch.time);
+  double share_of_newer = 0.0;
   if (rest_s > 0.0) {
     if (k > 0) {
       const PastEpoch& after = past(k - 1);
-      out.measured = mixed(epoch.measured, after.measured, rest_s / to_seconds(after.time - epoch.time));
+      share_of_newer = rest_s / to_seconds(after.time - epoch.time);
+      out.measured = mixed(epoch.measured, after.measured, share_of_newer);
     }
     propagate(out.state, increment_from_samples(compensated(epoch.measured, out.state),
                                                 compensated(out.measured, out.state), rest_s));
   }
+  set_arm_rate(k, share_of_newer, out);
   return Lookup::kFound;
 }
 
@@ -562,10 +600,12 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     const Vector3d arm_now = core_.antenna().r_ba_b_m;
     GnssInnovation velocity =
         gnss_velocity_innovation(then.state, to_eigen(gnss.v_n_mps), then.measured.omega_ib_b_radps, arm_now);
+    velocity.H.middleCols<3>(kGyroBiasError) *= then.rate_share.asDiagonal();
     const AntennaMatrix of_antenna = antenna_in_velocity(then.state, then.measured, arm_now);
+    const Vector3d sd = (sd_velocity.array().square() + then.swing_variance(arm_now)).sqrt();
     // The state then is of the latency that was believed before the position told more of it.
     velocity.innovation -= of_antenna.col(kReceiverLatencyError) * (core_.antenna().latency_s - latency_s);
-    used = apply(velocity_gate_, velocity, of_antenna, then.back, sd_velocity, time, output_.nis_velocity) ||
+    used = apply(velocity_gate_, velocity, of_antenna, then.back, sd, time, output_.nis_velocity) ||
            used;
   }
   tell_latency();
@@ -649,6 +689,12 @@ void NavigationFilter::update_output() noexcept {
       P_phi(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
           core_.covariance()(kAttitudeError + i, kAttitudeError + j);
   }
+  // N-27a
+  const ReferenceGrade& grade = reference_.grade;
+  const double lean = grade.axis_sd_rad * grade.axis_sd_rad;
+  const Vector3d floor(lean, lean, lean + grade.triad_sd_rad * grade.triad_sd_rad);
+  const Matrix3d& C = core_.navigation().C_b_n;
+  P_phi += C * floor.asDiagonal() * C.transpose();
   write_state(core_.navigation(), sd, P_phi, output_);
   const std::size_t antenna = core_.antenna_states();
   output_.antenna_lever_arm_b_m = to_array(core_.antenna().r_ba_b_m);

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimation/calibration/arm_rate.h"
 #include "estimation/calibration/estimator.h"
 #include "estimation/calibration/event_log.h"
 #include "estimation/calibration/filter_core.h"
@@ -35,8 +36,15 @@ class NavigationFilter {
   /// A past epoch seen from the present.
   struct Delayed {
     NavigationState state;
-    InertialRates measured;
+    InertialRates measured;          ///< of the rate, where the gyros are noisy, what an arm swings by (E-29)
     NavigationErrorCovariance back;  ///< Phi^-1: error then = back * error now
+    Eigen::Vector3d rate_share;      ///< of the measured rate that is in `measured`, each axis
+    double sd_rate_radps;            ///< what that leaves unknown of the true one
+
+    /// Variance of the velocity at an arm's end that comes from there, (m/s)^2.
+    [[nodiscard]] double swing_variance(const Eigen::Vector3d& arm_b_m) const noexcept {
+      return sd_rate_radps * sd_rate_radps * arm_b_m.squaredNorm();
+    }
   };
   enum class Lookup : std::uint8_t { kFound, kTooNew, kTooOld };
   /// The state at a past time, with everything learned since. E-5.
@@ -69,6 +77,8 @@ class NavigationFilter {
   void predict(const InertialRates& rates, double dt_s, double extra_rate_noise) noexcept;
   void predict_biases_only(double dt_s) noexcept;
   void remember(const Sample& sample, const InertialRates& measured) noexcept;
+  [[nodiscard]] Eigen::Vector3d mean_rate(std::size_t centre, std::size_t half_width) const noexcept;
+  void set_arm_rate(std::size_t k, double share_of_newer, Delayed& out) const noexcept;
   void try_start(const Sample& sample) noexcept;
   void start(const NavigationState& state, const NavigationErrorVector& sd, InitialisationMethod method,
              HostTime time) noexcept;
@@ -103,6 +113,7 @@ class NavigationFilter {
   FilterCore& core_;
   EventLog& log_;
   EstimatorCounters& counters_;
+  ArmRate arm_rate_;
   InitialAligner aligner_;
   GnssGate position_gate_;
   GnssGate velocity_gate_;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "estimation/navigation/so3.h"
+#include "estimation/navigation/wgs84.h"
 #include "sample/eigen_arrays.h"
 #include "tests/estimation/calibration/simulated_drive.h"
 
@@ -110,6 +111,114 @@ TEST(Start, OfAGyrocompassKnowsThatTiltAndBiasAreOneError) {
   level.expect_normal("level");
   // The filter allows for a parked vehicle that sways, which this one does not.
   heading.expect_not_too_sure("heading");
+}
+
+/// One R-IMU's own scale and axes, as draws of the grade of its class.
+struct OwnAxes {
+  Eigen::Matrix3d gyro = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d accel = Eigen::Matrix3d::Identity();
+
+  OwnAxes(const ReferenceGrade& grade, std::mt19937& random) {
+    std::normal_distribution<> normal;
+    const auto drawn = [&](double sd) {
+      return Vector3d(sd * normal(random), sd * normal(random), sd * normal(random));
+    };
+    for (Eigen::Matrix3d* triad : {&gyro, &accel}) {
+      triad->diagonal() += drawn(grade.scale_sd);
+      const Vector3d lean = drawn(grade.axis_sd_rad / std::sqrt(2.0));
+      *triad += Eigen::Matrix3d{{0.0, lean.z(), lean.y()}, {lean.z(), 0.0, lean.x()}, {lean.y(), lean.x(), 0.0}};
+    }
+    accel = accel * exp_so3(drawn(grade.triad_sd_rad));
+  }
+};
+
+TEST(ReferenceAxes, ThatAreCrookedMakeNoNavigationTooSure) {
+  constexpr int kDrives = 24;
+  std::mt19937 random(81);
+  Squares level;
+  Squares heading;
+  Squares velocity;
+  Squares position;
+  for (int drive_number = 0; drive_number < kDrives; ++drive_number) {
+    SimulatedDrive drive(240.0, {}, static_cast<std::uint64_t>(400 + drive_number));
+    EstimatorConfig config = drive.config();
+    config.reference.grade = kNavigationGrade;
+    const OwnAxes axes(kNavigationGrade, random);
+    Estimator estimator(config);
+    while (!drive.done()) {
+      std::vector<Sample> samples = drive.next();
+      for (Sample& sample : samples) {
+        if (sample.kind == SampleKind::kImu) {
+          sample.imu.omega_radps = to_array(Vector3d(axes.gyro * to_eigen(sample.imu.omega_radps)));
+          sample.imu.f_mps2 = to_array(Vector3d(axes.accel * to_eigen(sample.imu.f_mps2)));
+        }
+        estimator.add(sample);
+      }
+      estimator.advance(samples.front().arrival);
+    }
+    const NavigationOutput& out = estimator.navigation();
+    ASSERT_EQ(out.status, NavigationStatus::kNavigating);
+    const imusim::MotionState truth = drive.motion().state_at(drive.time_s() - 0.01);
+    const Vector3d phi_b = log_so3(to_eigen(out.C_b_n).transpose() * truth.C_b_n);
+    level.add(phi_b.x(), out.sd_rpy_rad[0]);
+    level.add(phi_b.y(), out.sd_rpy_rad[1]);
+    heading.add(phi_b.z(), out.sd_rpy_rad[2]);
+    for (std::size_t i = 0; i < 3; ++i)
+      velocity.add(out.v_n_mps[i] - truth.v_n_mps[static_cast<Eigen::Index>(i)], out.sd_velocity_mps[i]);
+    position.add(horizontal_error_m(out, truth), std::hypot(out.sd_position_m[0], out.sd_position_m[1]));
+  }
+  level.expect_not_too_sure("level");
+  heading.expect_not_too_sure("heading");
+  velocity.expect_not_too_sure("velocity");
+  position.expect_not_too_sure("position");
+}
+
+/// The swing of the antenna is seen through the rate: noise of an MTx in it would shorten the arm by a sixth.
+TEST(Antenna, ArmIsNotShortenedByTheNoiseOfTheGyros) {
+  constexpr int kDrives = 6;
+  const Vector3d arm_b_m(-0.5, 0.2, -1.3);
+  constexpr double kRateNoise_radps = 0.8 * kRadPerDeg;
+  std::mt19937 random(91);
+  std::normal_distribution<> normal;
+  double squares_m2 = 0.0;
+  double along_m = 0.0;
+  for (int drive_number = 0; drive_number < kDrives; ++drive_number) {
+    SimulatedDrive drive(400.0, {}, static_cast<std::uint64_t>(500 + drive_number));
+    EstimatorConfig config = drive.config();
+    config.reference.gyro_white_radps_per_sqrt_hz = kRateNoise_radps / std::sqrt(SimulatedDrive::kRate_hz);
+    for (std::size_t i = 0; i < 3; ++i)
+      config.gnss.antenna_lever_arm_b_m[i] = arm_b_m[static_cast<Eigen::Index>(i)] + 0.02 * normal(random);
+    Estimator estimator(config);
+    while (!drive.done()) {
+      const imusim::MotionState truth = drive.motion().state_at(drive.time_s());
+      std::vector<Sample> samples = drive.next();
+      for (Sample& sample : samples) {
+        if (sample.kind == SampleKind::kImu) {
+          for (double& rate : sample.imu.omega_radps) rate += kRateNoise_radps * normal(random);
+        } else if (sample.kind == SampleKind::kGnss) {
+          const GeodeticPosition at = displaced(
+              {sample.gnss.latitude_rad, sample.gnss.longitude_rad, sample.gnss.height_m}, truth.C_b_n * arm_b_m);
+          sample.gnss.latitude_rad = at.latitude_rad;
+          sample.gnss.longitude_rad = at.longitude_rad;
+          sample.gnss.height_m = at.height_m;
+          Vector3d v_n_mps = truth.v_n_mps + truth.C_b_n * truth.omega_nb_b_radps.cross(arm_b_m);
+          for (double& v : v_n_mps) v += 0.02 * normal(random);
+          sample.gnss.v_n_mps = to_array(v_n_mps);
+          sample.gnss.flags |= kVelocityValid;
+        }
+        estimator.add(sample);
+      }
+      estimator.advance(samples.front().arrival);
+    }
+    const NavigationOutput& out = estimator.navigation();
+    ASSERT_EQ(out.status, NavigationStatus::kNavigating);
+    const Vector3d error_m = to_eigen(out.antenna_lever_arm_b_m) - arm_b_m;
+    squares_m2 += error_m.squaredNorm() / kDrives;
+    along_m += error_m.dot(arm_b_m.normalized()) / kDrives;
+  }
+  // A sixth would be 0.23 m; two hundredths are what is believed of the arm before.
+  EXPECT_LT(std::sqrt(squares_m2), 0.05);
+  EXPECT_LT(std::abs(along_m), 0.03);
 }
 
 }  // namespace

@@ -95,6 +95,7 @@ std::vector<Sample> SimulatedDrive::next() {
 EstimatorConfig SimulatedDrive::config() const {
   EstimatorConfig config;
   config.reference.device = kReference;
+  config.reference.grade = {};  // this reference has straight axes and no scale
   config.gnss.enabled = true;
   config.gnss.device = kGnss;
   const imusim::MotionState start = motion_.state_at(0.0);

@@ -214,6 +214,34 @@ TEST(NavigationTransition, ProcessCovarianceAgreesWithVanLoan) {
   }
 }
 
+/// N-27: after a manoeuvre of five seconds the sd is what scale and leaning axes make of it.
+TEST(NavigationTransition, OwnScaleAndAxesMakeOfATurnWhatTheyMakeOfItsAngle) {
+  NavigationProcessNoise noise;
+  noise.grade = {1e-3, 2e-3, 3e-3};
+  constexpr double kDt_s = 0.01;
+  constexpr int kSteps = 500;
+  constexpr double kTurn_radps = 0.3;
+  constexpr double kBraking_mps2 = 3.0;
+  const NavigationState level;
+  const auto sd_after = [&](const InertialRates& rates) {
+    NavigationErrorVector variance = NavigationErrorVector::Zero();
+    for (int i = 0; i < kSteps; ++i)
+      variance += transition(level, rates, noise, kDt_s).process_covariance.diagonal();
+    return NavigationErrorVector(variance.cwiseSqrt());
+  };
+  const double T = kSteps * kDt_s;
+  const NavigationErrorVector turned = sd_after({Vector3d(0.0, 0.0, kTurn_radps), Vector3d(0.0, 0.0, -kMps2PerG)});
+  EXPECT_NEAR(turned(kAttitudeError + 2), 1e-3 * kTurn_radps * T, 1e-2 * 1e-3 * kTurn_radps * T);
+  EXPECT_NEAR(turned(kAttitudeError), 2e-3 * kTurn_radps * T, 1e-2 * 2e-3 * kTurn_radps * T);
+  const NavigationErrorVector braked =
+      sd_after({Vector3d::Zero(), Vector3d(-kBraking_mps2, 0.0, -kMps2PerG)});
+  EXPECT_NEAR(braked(kVelocityError), 1e-3 * kBraking_mps2 * T, 1e-2 * 1e-3 * kBraking_mps2 * T);
+  const double across = std::hypot(2e-3, 3e-3) * kBraking_mps2 * T;
+  EXPECT_NEAR(braked(kVelocityError + 1), across, 1e-2 * across);
+  // At rest there is nothing to misread.
+  EXPECT_LT(sd_after({Vector3d::Zero(), Vector3d(0.0, 0.0, -kMps2PerG)}).maxCoeff(), 1e-12);
+}
+
 TEST(NavigationTransition, ProcessCovarianceIsSymmetricAndPositiveSemiDefinite) {
   test::RandomStates random(24);
   for (int trial = 0; trial < 20; ++trial) {
