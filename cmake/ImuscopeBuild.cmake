@@ -155,12 +155,11 @@ function(imuscope_test name)
     list(APPEND labels ENVIRONMENT TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/tests/tsan.supp)
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  # With a sanitizer, most of a test program's build is the optimisation of what runs once.
+  # Much of a test program's build is the optimisation of what runs once: a fifth, with a sanitizer most. What it tests
+  # is optimised as in every build.
   if(IMUSCOPE_SANITIZE)
     target_compile_options(${name} PRIVATE -O0)
-  endif()
-  # Of one for another processor, a fifth is; what it tests is optimised as in every build.
-  if(CMAKE_CROSSCOMPILING)
+  else()
     target_compile_options(${name} PRIVATE -O1)
   endif()
   target_link_libraries(${name} PRIVATE imuscope_flags ${ARG_LIBS} test_support

@@ -163,10 +163,16 @@ void set_process_covariance(const WhiteNoise& white, const NavigationProcessNois
       Q(j, i) = sum;
     }
   }
-  Q.block<3, 3>(kVelocityError, kVelocityError) +=
-      half * white.accel_root_n.lazyProduct(white.accel_root_n.transpose());
-  Q.block<3, 3>(kAttitudeError, kAttitudeError) +=
-      half * white.gyro_root_n.lazyProduct(white.gyro_root_n.transpose());
+  const auto add_square = [&Q, half](NavigationErrorBlock first, const Matrix3d& root) {
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        Q(first + i, first + j) += half * root.row(i).dot(root.row(j));
+        Q(first + j, first + i) = Q(first + i, first + j);
+      }
+    }
+  };
+  add_square(kVelocityError, white.accel_root_n);
+  add_square(kAttitudeError, white.gyro_root_n);
   Q.block<9, 3>(0, kGyroBiasError) =
       (half * gyro_bias_intensity * step.gyro_bias_decay) * column(kGyroBiasError);
   Q.block<9, 3>(0, kAccelBiasError) =

@@ -216,7 +216,8 @@ TEST(NavigationTransition, ProcessCovarianceAgreesWithVanLoan) {
 
 /// N-27: after a manoeuvre of five seconds the sd is what scale and leaning axes make of it.
 TEST(NavigationTransition, OwnScaleAndAxesMakeOfATurnWhatTheyMakeOfItsAngle) {
-  NavigationProcessNoise noise;
+  constexpr double kForEver_s = std::numeric_limits<double>::infinity();
+  NavigationProcessNoise noise{0.0, 0.0, {0.0, kForEver_s}, {0.0, kForEver_s}};
   noise.grade = {1e-3, 2e-3, 3e-3};
   constexpr double kDt_s = 0.01;
   constexpr int kSteps = 500;
