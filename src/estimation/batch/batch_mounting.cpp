@@ -380,9 +380,16 @@ class Batch {
     result.degrees_of_freedom = kNoiseWeight + independent;
     result.sensor = published.sensor;
     add_change(of_noise, result);
-    add_unknown_shares(of_noise, published.derivative, result);
+    const Spectra study = study_spectra();
+    const Residuals residual = residuals(problem_, study, estimate_);
+    const ReferenceNoise reference = reference_noise(study);
+    add_unknown_shares(of_noise, published.derivative, study, residual, reference, result);
     add_mean_motion(result);
-    const auto of_reference_errors = of_reference_axes(class_, result.sensor);
+    // B-21
+    const Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_errors =
+        published.derivative *
+        (of_noise.per_slope * reference_slopes(problem_, study, residual, estimate_, noise_, reference,
+                                               class_.reference, equations_));
     const Covariance of_reference = of_reference_errors * of_reference_errors.transpose();
     result.limits = limit_shares(result.covariance, of_reference);
     // B-23: F
@@ -397,11 +404,9 @@ class Batch {
   }
 
   /// B-10b: what the estimate would be with more of the noise taken for the reference's, by one sd.
-  void add_unknown_shares(const OfNoise& of_noise, const Covariance& to_published,
+  void add_unknown_shares(const OfNoise& of_noise, const Covariance& to_published, const Spectra& study,
+                          const Residuals& residual, const ReferenceNoise& reference,
                           BatchMounting& result) const {
-    const Spectra study = study_spectra();
-    const Residuals residual = residuals(problem_, study, estimate_);
-    const ReferenceNoise reference = reference_noise(study);
     const auto gradient = [&](const ReferenceNoise& assumed) -> ParameterVector {
       return normal_equations(band_sums(problem_, study, residual, estimate_, noise_, assumed, true),
                               estimate_)

@@ -4,8 +4,8 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
 
 #include "estimation/alignment/accelerometer_places.h"
 #include "estimation/navigation/so3.h"
@@ -141,6 +141,25 @@ Motion estimated_motion(Motion motion, const Weight& weight, const Vector6c& wei
 }
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, kColumns + 1, Eigen::RowMajor>;
+/// One-sided: every frequency but zero stands for its negative, too.
+double sides(double frequency_hz) { return frequency_hz > 0.0 ? 2.0 : 1.0; }
+
+/// B-21: each error by itself, off by its sd.
+std::array<ReferenceError, kReferenceErrors> reference_errors(const ReferenceGrade& grade) {
+  std::array<ReferenceError, kReferenceErrors> errors;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Index j = (i + 1) % 3;
+    const auto k = 5 * static_cast<std::size_t>(i);
+    errors[k].gyro(i, i) = grade.scale_sd;
+    errors[k + 1].accel(i, i) = grade.scale_sd;
+    // b is what the reference's gyros say: what turns all three together turns b, and what turns the accelerometers
+    // against it is the triads'.
+    errors[k + 2].gyro(i, j) = errors[k + 2].gyro(j, i) = grade.lean_sd_rad;
+    errors[k + 3].accel(i, j) = errors[k + 3].accel(j, i) = grade.lean_sd_rad;
+    errors[k + 4].accel = skew(grade.triad_sd_rad * Eigen::Vector3d::Unit(i));
+  }
+  return errors;
+}
 
 /// Whitened derivatives and, in the last column, residuals of both triads: of each frequency three real and
 /// three imaginary rows. Each triad has rows of its own, as its share of the information is asked for, too.
@@ -150,8 +169,7 @@ struct WhitenedRows {
 
   /// @param k  place of the frequency
   void put(Eigen::Index k, const Jacobian& J, const Vector6c& e, double frequency_hz) {
-    // One-sided: every frequency but zero stands for its negative, too.
-    const double weight = frequency_hz > 0.0 ? std::numbers::sqrt2 : 1.0;
+    const double weight = std::sqrt(sides(frequency_hz));
     put_triad(J.topRows<3>(), e.head<3>(), weight, gyros.middleRows<6>(6 * k));
     put_triad(J.bottomRows<3>(), e.tail<3>(), weight, accels.middleRows<6>(6 * k));
   }
@@ -188,6 +206,28 @@ class BandSummer {
         reference_(reference),
         corrected_(corrected) {}
 
+  using Slopes = Eigen::Matrix<double, kColumns, kReferenceErrors>;
+  /// B-21
+  Slopes slopes(Eigen::Index band, const std::array<ReferenceError, kReferenceErrors>& errors) {
+    const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
+    set_forces_tell(band);
+    Slopes sum = Slopes::Zero();
+    Eigen::Matrix<complex<double>, 6, kReferenceErrors> excess;
+    for (Eigen::Index w = 0; w < static_cast<Eigen::Index>(problem_.plan.starts.size()); ++w) {
+      for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
+        const double f_hz = problem_.plan.frequency_hz(k);
+        const auto [weight, motion, e] = whitened(t, band, w, k);
+        for (Eigen::Index i = 0; i < kReferenceErrors; ++i)
+          excess.col(i) = predicted(t, excess_motion(errors[static_cast<std::size_t>(i)], motion),
+                                    Vector3c::Zero(), 0.0, f_hz);
+        weight.factor.matrixL().solveInPlace(excess);
+        sum -= sides(f_hz) *
+               (J_.real().transpose() * excess.real() + J_.imag().transpose() * excess.imag());
+      }
+    }
+    return sum;
+  }
+
   BandSums sum(Eigen::Index band) {
     const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
     const auto n_windows = static_cast<Eigen::Index>(problem_.plan.starts.size());
@@ -195,9 +235,7 @@ class BandSummer {
     sums.scores.resize(n_windows, kColumns);
     decltype(sums.information) of_accels = sums.information;
     WhitenedRows rows(problem_.bands.width(band));
-    const Eigen::Vector2d share = reference_.mean_share(noise_, band);
-    forces_tell_ =
-        share[0] * noise_.power(band).head<3>().mean() <= kNoisyMotion * problem_.mean_gyro_power[band];
+    const Eigen::Vector2d share = set_forces_tell(band);
     for (Eigen::Index w = 0; w < n_windows; ++w) {
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k)
         fill(t, band, w, k, rows, k - problem_.bands.first(band));
@@ -216,8 +254,21 @@ class BandSummer {
   }
 
  private:
-  void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, WhitenedRows& rows,
-            Eigen::Index place) {
+  /// @return  the reference's mean share of the band's noise
+  Eigen::Vector2d set_forces_tell(Eigen::Index band) {
+    const Eigen::Vector2d share = reference_.mean_share(noise_, band);
+    forces_tell_ =
+        share[0] * noise_.power(band).head<3>().mean() <= kNoisyMotion * problem_.mean_gyro_power[band];
+    return share;
+  }
+
+  struct Whitened {
+    Weight weight;
+    Motion motion;
+    Vector6c e;
+  };
+  /// Residual and, in J_, derivatives of one window at one frequency.
+  Whitened whitened(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k) {
     const double f_hz = problem_.plan.frequency_hz(k);
     const Vector6 power = noise_.window_power(w, band);
     const Eigen::Vector2d of_reference = reference_.power(noise_, w, band);
@@ -229,7 +280,13 @@ class BandSummer {
     const Vector3c study_f = study_.row(w, k).tail<3>().transpose();
     jacobian(estimate_.sensor, t, motion, study_f, problem_.constant[k], f_hz, problem_.from_middle_s[w], J_);
     weight.factor.matrixL().solveInPlace(J_);
-    rows.put(place, J_, e, f_hz);
+    return {weight, motion, e};
+  }
+
+  void fill(const Transfer& t, Eigen::Index band, Eigen::Index w, Eigen::Index k, WhitenedRows& rows,
+            Eigen::Index place) {
+    const Whitened at = whitened(t, band, w, k);
+    rows.put(place, J_, at.e, problem_.plan.frequency_hz(k));
   }
 
   /// B-13: derivatives that the motion's own uncertainty alone would have. What counts is the reference's
@@ -337,6 +394,25 @@ std::vector<BandSums> band_sums(const Problem& problem, const Spectra& study, co
     sums[band] = summer.sum(static_cast<Eigen::Index>(band));
   });
   return sums;
+}
+
+// B-21, B-14
+ReferenceSlopes reference_slopes(const Problem& problem, const Spectra& study, const Residuals& residual,
+                                 const Estimate& estimate, const NoiseBands& noise,
+                                 const ReferenceNoise& reference, const ReferenceGrade& grade,
+                                 const NormalEquations& equations) {
+  const auto errors = reference_errors(grade);
+  std::vector<BandSummer::Slopes> of_bands(static_cast<std::size_t>(problem.bands.size()));
+  tbb::parallel_for(std::size_t{0}, of_bands.size(), [&](std::size_t band) {
+    BandSummer summer(problem, study, residual, estimate, noise, reference, true);
+    of_bands[band] = summer.slopes(static_cast<Eigen::Index>(band), errors);
+  });
+  ReferenceSlopes sum = of_bands.front().topRows<kParameters>();
+  for (std::size_t band = 1; band < of_bands.size(); ++band) {
+    sum += of_bands[band].topRows<kParameters>() -
+           equations.bands[band].coupling * of_bands[band].bottomRows<kDeviations>();
+  }
+  return sum;
 }
 
 // B-11b: the trace, by triad

@@ -74,6 +74,15 @@ struct NormalEquations {
   std::vector<Elimination> bands;
 };
 
+using ReferenceSlopes = Eigen::Matrix<double, kParameters, kReferenceErrors>;
+
+/// B-21: what each error of the reference's own axes, off by its sd, makes of the gradient.
+/// @param equations  of the same estimate
+[[nodiscard]] ReferenceSlopes reference_slopes(const Problem& problem, const Spectra& study,
+                                               const Residuals& residual, const Estimate& estimate,
+                                               const NoiseBands& noise, const ReferenceNoise& reference,
+                                               const ReferenceGrade& grade, const NormalEquations& equations);
+
 [[nodiscard]] NormalEquations normal_equations(const std::vector<BandSums>& sums, const Estimate& estimate);
 
 /// B-11b: how many of a band's numbers the parameters and its deviation take, gyros' and accelerometers'.

@@ -122,68 +122,6 @@ AxesFrame in_axes_frame(const SensorState& symmetric) {
   return out;
 }
 
-namespace {
-
-/// B-21: how axes and scales of a triad in s move where the reference's triad is off by E (in s): (I - E) is split
-/// into a rotation and a lower triangle.
-struct AxisShift {
-  Eigen::Vector3d rotation;
-  Eigen::Matrix<double, 6, 1> shape;
-
-  explicit AxisShift(const Eigen::Matrix3d& E) : rotation(-E(1, 2), E(0, 2), -E(0, 1)) {
-    for (Eigen::Index j = 0; j < 6; ++j) {
-      const auto row = kTriangle[static_cast<std::size_t>(j)][0];
-      const auto column = kTriangle[static_cast<std::size_t>(j)][1];
-      shape[j] = row == column ? -E(row, row) : -E(row, column) - E(column, row);
-    }
-  }
-};
-
-}  // namespace
-
-Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(const SensorClass& sensor,
-                                                                       const SensorState& state) {
-  Eigen::Matrix<double, kParameters, kReferenceErrors> factor;
-  factor.setZero();
-  Eigen::Index next = 0;
-  const Eigen::Matrix3d& C = state.C_b_s;
-  const auto add = [&](const Eigen::Matrix3d& of_gyros_b, const Eigen::Matrix3d& of_accels_b) {
-    const AxisShift gyro(C * of_gyros_b * C.transpose());
-    const AxisShift accel(C * of_accels_b * C.transpose());
-    factor.col(next).segment<3>(kPsi) = C.transpose() * gyro.rotation;
-    factor.col(next).segment<6>(kGyroShape) = gyro.shape;
-    factor.col(next).segment<3>(kAlpha) = accel.rotation - gyro.rotation;
-    factor.col(next).segment<6>(kAccelShape) = accel.shape;
-    ++next;
-  };
-  const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    Eigen::Matrix3d E = none;
-    E(i, i) = sensor.reference.scale_sd;
-    add(E, none);
-    add(none, E);
-    // b is what the reference's gyros say: a departure from a right angle is shared by both axes. What turns all
-    // three together turns b, and what turns the accelerometers against it is the triads'.
-    const Eigen::Index j = (i + 1) % 3;
-    E = none;
-    E(i, j) = E(j, i) = sensor.reference.axis_sd_rad / std::numbers::sqrt2;
-    add(E, none);
-    add(none, E);
-    add(none, skew(sensor.reference.triad_sd_rad * Eigen::Vector3d::Unit(i)));
-  }
-  // B-21b: too large a rate makes too short an arm of the same force, by its scale where forces come from
-  // angular acceleration, by twice that where they come from the square of the rate; a leaning axis takes of
-  // the other components.
-  constexpr double kBetween = 1.5;
-  const Eigen::Vector3d r = state.lever_arm_b_m();
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const double across_m = std::sqrt(std::max(0.0, r.squaredNorm() - r[i] * r[i]));
-    factor(kLeverArm + i, next++) =
-        std::hypot(kBetween * sensor.reference.scale_sd * r[i], sensor.reference.axis_sd_rad * across_m);
-  }
-  return factor;
-}
-
 ParameterVector prior_sd(const SensorClass& sensor) {
   ParameterVector sd;
   sd.segment<3>(kPsi).setConstant(std::numeric_limits<double>::infinity());

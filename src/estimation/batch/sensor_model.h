@@ -114,14 +114,8 @@ struct AxesFrame {
 };
 [[nodiscard]] AxesFrame in_axes_frame(const SensorState& symmetric);
 
-/// Scale and axes of both triads of the reference, and the rotation between them; what they make of each
-/// component of the lever arm.
-inline constexpr Eigen::Index kReferenceErrors = 18;
-
-/// What each error of the reference's own axes, off by its sd, makes of the published parameters (B-21): F,
-/// of which F F' is the covariance.
-[[nodiscard]] Eigen::Matrix<double, kParameters, kReferenceErrors> of_reference_axes(
-    const SensorClass& sensor, const SensorState& state);
+/// Errors of the reference's own axes: scales of both triads, leaning axes of both, the rotation between them (B-21).
+inline constexpr Eigen::Index kReferenceErrors = 15;
 
 /// sd of each parameter before the drive; infinite for psi and t_d, which the start gives.
 [[nodiscard]] ParameterVector prior_sd(const SensorClass& sensor);

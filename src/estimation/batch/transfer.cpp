@@ -37,6 +37,24 @@ Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k) 
   return motion;
 }
 
+// B-21: with [w' x] and w w' taken apart again
+Motion excess_motion(const ReferenceError& error, const Motion& motion) {
+  const auto of_product = [](const Eigen::Matrix3d& E, const Matrix3c& product) -> Matrix3c {
+    return E * product + product * E.transpose();
+  };
+  const Matrix3c turning = 0.5 * (motion.arm - motion.arm.transpose());
+  Matrix3c outer = 0.5 * (motion.arm + motion.arm.transpose());
+  outer -= 0.5 * outer.trace() * Matrix3c::Identity();
+  const Vector3c omega_dot(turning(2, 1), turning(0, 2), turning(1, 0));
+  const Matrix3c d_outer = of_product(error.gyro, outer);
+  Motion excess;
+  excess.omega = error.gyro * motion.omega;
+  excess.f = error.accel * motion.f;
+  excess.arm = skew_c(error.gyro * omega_dot) + d_outer - d_outer.trace() * Matrix3c::Identity();
+  excess.force_products = of_product(error.accel, motion.force_products);
+  return excess;
+}
+
 Transfer::Transfer(const SensorState& sensor, const DeviationVector& deviation)
     : gyro(sensor.C_b_gyro()),
       accel(sensor.C_b_accel()),

@@ -49,6 +49,14 @@ struct Motion {
 /// As the reference shows it.
 [[nodiscard]] Motion motion_of(const Spectra& reference, Eigen::Index window, Eigen::Index k);
 
+/// What the reference would be off by if its rates were (I + E_gyro) and its forces (I + E_accel) of the true ones,
+/// to first order (B-21).
+struct ReferenceError {
+  Eigen::Matrix3d gyro = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d accel = Eigen::Matrix3d::Zero();
+};
+[[nodiscard]] Motion excess_motion(const ReferenceError& error, const Motion& motion);
+
 /// A sensor with what does not change from window to window worked out.
 struct Transfer {
   Eigen::Matrix3d gyro, accel, C, C_accel_rotated, g_sensitivity, flexure, accel_flexure, compliance,

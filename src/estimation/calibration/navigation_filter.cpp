@@ -691,7 +691,7 @@ void NavigationFilter::update_output() noexcept {
   }
   // N-27a
   const ReferenceGrade& grade = reference_.grade;
-  const double lean = grade.axis_sd_rad * grade.axis_sd_rad;
+  const double lean = grade.lean_sd_rad * grade.lean_sd_rad;
   const Vector3d floor(lean, lean, lean + grade.triad_sd_rad * grade.triad_sd_rad);
   const Matrix3d& C = core_.navigation().C_b_n;
   P_phi += C * floor.asDiagonal() * C.transpose();

@@ -121,7 +121,7 @@ struct WhiteNoise {
 WhiteNoise white_noise(const NavigationState& state, const InertialRates& rates,
                        const NavigationProcessNoise& noise) noexcept {
   const ReferenceGrade& grade = noise.grade;
-  const double axis_variance = grade.axis_sd_rad * grade.axis_sd_rad;
+  const double axes_variance = grade.lean_sd_rad * grade.lean_sd_rad;
   const Matrix3d& C = state.C_b_n;
   const auto root_n = [&C](double white, const Vector3d& by_motion) -> Matrix3d {
     const Vector3d root = (by_motion.array() + white * white).sqrt();
@@ -130,10 +130,10 @@ WhiteNoise white_noise(const NavigationState& state, const InertialRates& rates,
   // Gravity's standard value does: the rest is a hundredth of what a manoeuvre accelerates by.
   const Vector3d acceleration_b = rates.f_b_mps2 + kMps2PerG * C.row(2).transpose();
   return {root_n(noise.gyro_noise_radps_per_sqrt_hz,
-                 shown_by_motion(rates.omega_ib_b_radps, grade.scale_sd, axis_variance)),
+                 shown_by_motion(rates.omega_ib_b_radps, grade.scale_sd, axes_variance)),
           root_n(noise.accel_noise_mps2_per_sqrt_hz,
                  shown_by_motion(acceleration_b, grade.scale_sd,
-                                 axis_variance + grade.triad_sd_rad * grade.triad_sd_rad))};
+                                 axes_variance + grade.triad_sd_rad * grade.triad_sd_rad))};
 }
 
 // N-26: trapezoid of the intensities, the biases' own blocks exact.

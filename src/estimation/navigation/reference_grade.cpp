@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include "base/units.h"
 
@@ -22,13 +21,10 @@ constexpr double kTacticalAxes_rad = 0.05 * kRadPerDeg;
 // Industrial MEMS: aligned to 0.1 deg, as their data sheets state (MTx, ADIS16405), scale calibrated to half a per cent.
 constexpr double kIndustrialAxes_rad = 0.1 * kRadPerDeg;
 
-/// Two axes make one departure from a right angle: each leans by the share of it that has its sd.
-constexpr double each(double departure_sd_rad) { return departure_sd_rad / std::numbers::sqrt2; }
-
 constexpr std::array<Known, 3> kKnown{
     {{0.005 * kPerRootHour, kNavigationGrade},
-     {0.15 * kPerRootHour, {1e-3, each(kTacticalAxes_rad), kTacticalAxes_rad}},
-     {0.3 * kPerRootHour, {5e-3, each(kIndustrialAxes_rad), kIndustrialAxes_rad}}}};
+     {0.15 * kPerRootHour, {1e-3, 0.5 * kTacticalAxes_rad, kTacticalAxes_rad}},
+     {0.3 * kPerRootHour, {5e-3, 0.5 * kIndustrialAxes_rad, kIndustrialAxes_rad}}}};
 
 }  // namespace
 
@@ -42,7 +38,7 @@ ReferenceGrade reference_grade(double gyro_white_radps_per_sqrt_hz) noexcept {
     return from * std::pow(to / from, share);
   };
   return {between(low.grade.scale_sd, high.grade.scale_sd),
-          between(low.grade.axis_sd_rad, high.grade.axis_sd_rad),
+          between(low.grade.lean_sd_rad, high.grade.lean_sd_rad),
           between(low.grade.triad_sd_rad, high.grade.triad_sd_rad)};
 }
 

@@ -8,12 +8,12 @@ namespace imuscope {
 /// Standard deviations. All zero: an ideal sensor.
 struct ReferenceGrade {
   double scale_sd = 0.0;      ///< of each axis
-  double axis_sd_rad = 0.0;   ///< lean of each axis of a triad towards another
+  double lean_sd_rad = 0.0;   ///< of each axis of a triad towards another, half of their departure from a right angle
   double triad_sd_rad = 0.0;  ///< accelerometer triad against gyro triad, about each axis
 };
 
 /// Navigation grade: what the best land vehicle references are, and none is taken to be better.
-inline constexpr ReferenceGrade kNavigationGrade{3e-4, 2e-4, 3e-4};
+inline constexpr ReferenceGrade kNavigationGrade{3e-4, 1.5e-4, 3e-4};
 
 /// N-29. @param gyro_white_radps_per_sqrt_hz  angle random walk, rad/sqrt(s), > 0
 [[nodiscard]] ReferenceGrade reference_grade(double gyro_white_radps_per_sqrt_hz) noexcept;

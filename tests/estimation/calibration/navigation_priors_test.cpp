@@ -125,7 +125,7 @@ struct OwnAxes {
     };
     for (Eigen::Matrix3d* triad : {&gyro, &accel}) {
       triad->diagonal() += drawn(grade.scale_sd);
-      const Vector3d lean = drawn(grade.axis_sd_rad / std::sqrt(2.0));
+      const Vector3d lean = drawn(grade.lean_sd_rad);
       *triad += Eigen::Matrix3d{{0.0, lean.z(), lean.y()}, {lean.z(), 0.0, lean.x()}, {lean.y(), lean.x(), 0.0}};
     }
     accel = accel * exp_so3(drawn(grade.triad_sd_rad));
