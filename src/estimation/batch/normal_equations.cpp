@@ -221,8 +221,7 @@ class BandSummer {
           excess.col(i) = predicted(t, excess_motion(errors[static_cast<std::size_t>(i)], motion),
                                     Vector3c::Zero(), 0.0, f_hz);
         weight.factor.matrixL().solveInPlace(excess);
-        sum -= sides(f_hz) *
-               (J_.real().transpose() * excess.real() + J_.imag().transpose() * excess.imag());
+        sum -= sides(f_hz) * (J_.real().transpose() * excess.real() + J_.imag().transpose() * excess.imag());
       }
     }
     return sum;

@@ -266,8 +266,8 @@ void NavigationFilter::set_arm_rate(std::size_t k, double share_of_newer, Delaye
   const std::size_t newer = share_of_newer > 0.0 && k > 0 ? k - 1 : k;
   // The newest are not there yet.
   const std::size_t half_width = std::min({arm_rate_.half_width(), newer, past_size_ - 1 - k});
-  const Vector3d mean = (1.0 - share_of_newer) * mean_rate(k, half_width) +
-                        share_of_newer * mean_rate(newer, half_width);
+  const Vector3d mean =
+      (1.0 - share_of_newer) * mean_rate(k, half_width) + share_of_newer * mean_rate(newer, half_width);
   const Vector3d& bias = out.state.gyro_bias_b_radps;
   const ArmRate::Estimate rate = arm_rate_.estimate(mean - bias, 2 * half_width + 1, moves(out.state));
   out.measured.omega_ib_b_radps = bias + rate.omega_b_radps;
@@ -605,8 +605,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     const Vector3d sd = (sd_velocity.array().square() + then.swing_variance(arm_now)).sqrt();
     // The state then is of the latency that was believed before the position told more of it.
     velocity.innovation -= of_antenna.col(kReceiverLatencyError) * (core_.antenna().latency_s - latency_s);
-    used = apply(velocity_gate_, velocity, of_antenna, then.back, sd, time, output_.nis_velocity) ||
-           used;
+    used = apply(velocity_gate_, velocity, of_antenna, then.back, sd, time, output_.nis_velocity) || used;
   }
   tell_latency();
   if (used) {

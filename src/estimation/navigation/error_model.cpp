@@ -76,8 +76,7 @@ constexpr double kManoeuvre_s = 5.0;
 Vector3d shown_by_motion(const Vector3d& motion_b, double scale_sd, double lean_variance) noexcept {
   const Vector3d squares = motion_b.cwiseAbs2();
   const double all = squares.sum();
-  return kManoeuvre_s *
-         (scale_sd * scale_sd * squares + lean_variance * (Vector3d::Constant(all) - squares));
+  return kManoeuvre_s * (scale_sd * scale_sd * squares + lean_variance * (Vector3d::Constant(all) - squares));
 }
 
 /// F F, with the bias rows that F leaves out (plain decay), from the blocks that are not zero.

@@ -7,8 +7,9 @@ namespace imuscope {
 
 /// Standard deviations. All zero: an ideal sensor.
 struct ReferenceGrade {
-  double scale_sd = 0.0;      ///< of each axis
-  double lean_sd_rad = 0.0;   ///< of each axis of a triad towards another, half of their departure from a right angle
+  double scale_sd = 0.0;  ///< of each axis
+  double lean_sd_rad =
+      0.0;  ///< of each axis of a triad towards another, half of their departure from a right angle
   double triad_sd_rad = 0.0;  ///< accelerometer triad against gyro triad, about each axis
 };
 

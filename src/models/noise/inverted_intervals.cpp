@@ -277,9 +277,7 @@ class Inversion {
     return model;
   }
 
-  [[nodiscard]] Eigen::VectorXd curve(const Model& model) const {
-    return wv_curve(model, levels_);
-  }
+  [[nodiscard]] Eigen::VectorXd curve(const Model& model) const { return wv_curve(model, levels_); }
 
   /// Weights of the model at u. The levels' residuals are brought to a Gaussian's by cube roots (G-18).
   [[nodiscard]] Problem problem_at(const Eigen::VectorXd& u) const {

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <random>
+#include <utility>
 
+#include "base/units.h"
 #include "estimation/navigation/so3.h"
 #include "synthetic_pair.h"
 
@@ -62,6 +65,47 @@ TEST(EstimateMounting, FindsACrookedSensorWithinItsSd) {
   near(accel(0, 0), truth.accel_matrix(0, 0), found->sd(kAccelShape, 0) + found->sd(kAlpha));
   for (Eigen::Index i = 0; i < 3; ++i)
     near(found->sensor.x[kGyroBias + i], truth.gyro_bias[i], found->sd(kGyroBias, i));
+}
+
+/// B-21, against estimates from references that are off by each error in turn.
+TEST(EstimateMounting, KnowsWhatTheReferencesOwnAxesMakeOfIt) {
+  BatchOptions options;
+  options.reference_gyro_white_radps_per_sqrt_hz = 0.3 * imuscope::kRadPerDeg / 60.0;
+  const imuscope::ReferenceGrade grade =
+      imuscope::reference_grade(*options.reference_gyro_white_radps_per_sqrt_hz);
+  const auto found_with = [&](const Eigen::Matrix3d& gyro, const Eigen::Matrix3d& accel) {
+    PairOptions pair_options = crooked();
+    pair_options.reference_gyro_matrix += gyro;
+    pair_options.reference_accel_matrix += accel;
+    const auto pair = make_pair(pair_options, 11);
+    auto found = estimate_mounting(pair.reference, pair.study, options);
+    EXPECT_TRUE(found);
+    return *found;
+  };
+  const Eigen::Matrix3d none = Eigen::Matrix3d::Zero();
+  const BatchMounting straight = found_with(none, none);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Index j = (i + 1) % 3;
+    Eigen::Matrix3d scale = none;
+    scale(i, i) = grade.scale_sd;
+    Eigen::Matrix3d lean = none;
+    lean(i, j) = lean(j, i) = grade.lean_sd_rad;
+    const Eigen::Matrix3d turn = imuscope::skew(grade.triad_sd_rad * Eigen::Vector3d::Unit(i));
+    const std::array<std::pair<Eigen::Matrix3d, Eigen::Matrix3d>, 5> errors{
+        {{scale, none}, {none, scale}, {lean, none}, {none, lean}, {none, turn}}};
+    for (Eigen::Index kind = 0; kind < 5; ++kind) {
+      const auto& [gyro, accel] = errors[static_cast<std::size_t>(kind)];
+      const BatchMounting off = found_with(gyro, accel);
+      Vector6 moved;
+      moved << imuscope::log_so3(off.sensor.C_b_s.transpose() * straight.sensor.C_b_s),
+          off.sensor.lever_arm_b_m() - straight.sensor.lever_arm_b_m();
+      const Vector6 said = straight.shared.col(kParameters + 5 * i + kind);
+      const Vector6 sd = straight.covariance.topLeftCorner<6, 6>().diagonal().cwiseSqrt();
+      for (Eigen::Index k = 0; k < 6; ++k)
+        EXPECT_NEAR(moved[k], said[k], 0.15 * std::abs(said[k]) + 0.1 * sd[k])
+            << i << " " << kind << " " << k;
+    }
+  }
 }
 
 /// Scale and axes as a data sheet of an industrial MEMS unit has them: 0.5 %, 0.1 deg between two axes.

@@ -72,12 +72,10 @@ TEST(BatchPartsAnswers, SensorModel) {
   lines.line("prior", prior_sd(sensor));
   const double per_root_hour = std::numbers::pi / 180.0 / 60.0;
   for (const double white : {1e-9, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 30.0}) {
-    sensor.reference = reference_grade(white * per_root_hour);
-    lines.line("reference", white, 1e3 * sensor.reference.scale_sd, 1e3 * sensor.reference.axis_sd_rad,
+    sensor.reference = imuscope::reference_grade(white * per_root_hour);
+    lines.line("reference", white, 1e3 * sensor.reference.scale_sd, 1e3 * sensor.reference.lean_sd_rad,
                1e3 * sensor.reference.triad_sd_rad);
   }
-  lines.line("of its axes",
-             Eigen::MatrixXd(1e3 * of_reference_axes(sensor, crooked_state()).topRows<30>().transpose()));
   expect_recorded("estimation/batch/sensor_model.txt", lines.text(), 1e-6, 1e-10);
 }
 
@@ -213,6 +211,11 @@ TEST(BatchPartsAnswers, NormalEquations) {
     lines.line("of noise", through_unlike(equations.of_noise));
     lines.line("gradient", equations.gradient);
     lines.line("scores", through_unlike(equations.window_scores.transpose()));
+    lines.line("reference's axes",
+               through_unlike(reference_slopes(drawn.problem, drawn.study, e, drawn.estimate, noise,
+                                               ReferenceNoise::even(drawn.problem.bands, 0.3),
+                                               imuscope::kNavigationGrade, equations)
+                                  .transpose()));
     Eigen::Matrix<double, kParameters, kParameters> covariance = equations.information;
     covariance.diagonal().array() += 1.0;
     covariance = covariance.inverse().eval();

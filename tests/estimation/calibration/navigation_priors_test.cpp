@@ -126,7 +126,8 @@ struct OwnAxes {
     for (Eigen::Matrix3d* triad : {&gyro, &accel}) {
       triad->diagonal() += drawn(grade.scale_sd);
       const Vector3d lean = drawn(grade.lean_sd_rad);
-      *triad += Eigen::Matrix3d{{0.0, lean.z(), lean.y()}, {lean.z(), 0.0, lean.x()}, {lean.y(), lean.x(), 0.0}};
+      *triad +=
+          Eigen::Matrix3d{{0.0, lean.z(), lean.y()}, {lean.z(), 0.0, lean.x()}, {lean.y(), lean.x(), 0.0}};
     }
     accel = accel * exp_so3(drawn(grade.triad_sd_rad));
   }
@@ -196,8 +197,9 @@ TEST(Antenna, ArmIsNotShortenedByTheNoiseOfTheGyros) {
         if (sample.kind == SampleKind::kImu) {
           for (double& rate : sample.imu.omega_radps) rate += kRateNoise_radps * normal(random);
         } else if (sample.kind == SampleKind::kGnss) {
-          const GeodeticPosition at = displaced(
-              {sample.gnss.latitude_rad, sample.gnss.longitude_rad, sample.gnss.height_m}, truth.C_b_n * arm_b_m);
+          const GeodeticPosition at =
+              displaced({sample.gnss.latitude_rad, sample.gnss.longitude_rad, sample.gnss.height_m},
+                        truth.C_b_n * arm_b_m);
           sample.gnss.latitude_rad = at.latitude_rad;
           sample.gnss.longitude_rad = at.longitude_rad;
           sample.gnss.height_m = at.height_m;

@@ -231,7 +231,8 @@ TEST(NavigationTransition, OwnScaleAndAxesMakeOfATurnWhatTheyMakeOfItsAngle) {
     return NavigationErrorVector(variance.cwiseSqrt());
   };
   const double T = kSteps * kDt_s;
-  const NavigationErrorVector turned = sd_after({Vector3d(0.0, 0.0, kTurn_radps), Vector3d(0.0, 0.0, -kMps2PerG)});
+  const NavigationErrorVector turned =
+      sd_after({Vector3d(0.0, 0.0, kTurn_radps), Vector3d(0.0, 0.0, -kMps2PerG)});
   EXPECT_NEAR(turned(kAttitudeError + 2), 1e-3 * kTurn_radps * T, 1e-2 * 1e-3 * kTurn_radps * T);
   EXPECT_NEAR(turned(kAttitudeError), 2e-3 * kTurn_radps * T, 1e-2 * 2e-3 * kTurn_radps * T);
   const NavigationErrorVector braked =
