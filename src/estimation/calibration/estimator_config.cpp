@@ -42,6 +42,7 @@ SImuNoise mtx_class_noise() {
   return noise;
 }
 
+// N-28
 Vector3 start_accel_bias_sd_mps2(const ReferenceConfig& config) noexcept {
   const double level = kMps2PerG * std::hypot(config.grade.lean_sd_rad, config.grade.triad_sd_rad);
   const double turn_on = config.accel_bias.sd;

@@ -28,6 +28,7 @@ constexpr std::array<Known, 3> kKnown{
 
 }  // namespace
 
+// N-29
 ReferenceGrade reference_grade(double gyro_white_radps_per_sqrt_hz) noexcept {
   const std::size_t next = gyro_white_radps_per_sqrt_hz < kKnown[1].gyro_white_radps_per_sqrt_hz ? 1 : 2;
   const Known& low = kKnown[next - 1];
