@@ -212,16 +212,16 @@ class BandSummer {
     const Transfer t(estimate_.sensor, estimate_.deviation[static_cast<std::size_t>(band)]);
     set_forces_tell(band);
     Slopes sum = Slopes::Zero();
-    Eigen::Matrix<complex<double>, 6, kReferenceErrors> excess;
     for (Eigen::Index w = 0; w < static_cast<Eigen::Index>(problem_.plan.starts.size()); ++w) {
       for (Eigen::Index k = problem_.bands.first(band); k < problem_.bands.end(band); ++k) {
         const double f_hz = problem_.plan.frequency_hz(k);
         const auto [weight, motion, e] = whitened(t, band, w, k);
-        for (Eigen::Index i = 0; i < kReferenceErrors; ++i)
-          excess.col(i) = predicted(t, excess_motion(errors[static_cast<std::size_t>(i)], motion),
-                                    Vector3c::Zero(), 0.0, f_hz);
-        weight.factor.matrixL().solveInPlace(excess);
-        sum -= sides(f_hz) * (J_.real().transpose() * excess.real() + J_.imag().transpose() * excess.imag());
+        for (Eigen::Index i = 0; i < kReferenceErrors; ++i) {
+          Vector6c excess = predicted(t, excess_motion(errors[static_cast<std::size_t>(i)], motion),
+                                      Vector3c::Zero(), 0.0, f_hz);
+          weight.factor.matrixL().solveInPlace(excess);
+          sum.col(i) -= sides(f_hz) * (J_.adjoint() * excess).real();
+        }
       }
     }
     return sum;
