@@ -186,7 +186,8 @@ TEST_F(McapDrive, OfADamagedFileWhatIsReadableIsUsedAndTheLossIsSaid) {
   EXPECT_NE(read_text(file("of_cut/report.html")).find("is cut off"), std::string::npos);
 
   std::string damaged = whole;
-  std::memset(damaged.data() + damaged.size() / 2, 0x55, 1000);
+  // A chunk of the samples, and not the one whose turns the mounting of so short a drive hangs on.
+  std::memset(damaged.data() + damaged.size() / 4, 0x55, 1000);
   std::ofstream(file("damaged.mcap"), std::ios::binary) << damaged;
   const auto answer = study("damaged.mcap", "of_damaged");
   ASSERT_EQ(answer.code, 0) << answer.text;
