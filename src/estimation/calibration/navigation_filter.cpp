@@ -58,8 +58,7 @@ NavigationProcessNoise process_noise(const ReferenceConfig& config) noexcept {
   return {config.gyro_white_radps_per_sqrt_hz,
           config.accel_white_mps2_per_sqrt_hz,
           {config.gyro_bias.sd, config.gyro_bias.time_constant_s},
-          {config.accel_bias.sd, config.accel_bias.time_constant_s},
-          config.grade};
+          {config.accel_bias.sd, config.accel_bias.time_constant_s}};
 }
 
 InitialAlignmentOptions alignment_options(const EstimatorConfig& config) noexcept {
@@ -86,6 +85,8 @@ InertialRates mixed(const InertialRates& a, const InertialRates& b, double share
           a.f_b_mps2 + share_of_b * (b.f_b_mps2 - a.f_b_mps2)};
 }
 
+/// N-27. A first-order low-pass of this time constant leaves a twelfth of an engine at 8 Hz, and a manoeuvre.
+constexpr double kVibrationGone_s = 0.25;
 /// Faster than this a vehicle turns, too; slower, what a noisy gyro shows is noise.
 constexpr double kMoves_mps = 1.0;
 
@@ -212,6 +213,8 @@ void NavigationFilter::carry_over_interval(const InertialRates& measured, bool i
 
 void NavigationFilter::predict(const InertialRates& rates, double dt_s, double unseen) noexcept {
   NavigationProcessNoise noise = noise_;
+  manoeuvre_ = mixed(manoeuvre_, rates, -std::expm1(-dt_s / kVibrationGone_s));
+  noise.set_motion(reference_.grade, core_.navigation(), manoeuvre_);
   // E-6: what nobody saw
   noise.gyro_noise_radps_per_sqrt_hz += unseen * kUnseenRate;
   noise.accel_noise_mps2_per_sqrt_hz += unseen * kUnseenForce;
@@ -297,6 +300,7 @@ void NavigationFilter::start(const NavigationState& state, const NavigationError
   // The R biases live on in the filter, with what the S-IMUs know of them.
   now.gyro_bias_b_radps = gyro_bias;
   now.accel_bias_b_mps2 = accel_bias;
+  manoeuvre_ = compensated(last_, now);
   for (std::size_t i = 0; i < kNavigationKinematicSize; ++i) {
     const double value = sd(static_cast<Eigen::Index>(i));
     core_.reset_state(i, value * value);

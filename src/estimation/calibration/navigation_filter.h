@@ -134,6 +134,7 @@ class NavigationFilter {
   HostTime latency_time_{};           ///< up to which the latency has wandered
   std::optional<Duration> gnss_lag_;  ///< of the last solution that was not near a UTC midnight
   InertialRates last_;
+  InertialRates manoeuvre_;  ///< compensated rates, vibration taken off (N-27)
 
   std::vector<PastEpoch> past_;
   std::size_t past_head_ = 0;

@@ -117,22 +117,13 @@ struct WhiteNoise {
 };
 
 // N-26, N-27
-WhiteNoise white_noise(const NavigationState& state, const InertialRates& rates,
-                       const NavigationProcessNoise& noise) noexcept {
-  const ReferenceGrade& grade = noise.grade;
-  const double axes_variance = grade.lean_sd_rad * grade.lean_sd_rad;
-  const Matrix3d& C = state.C_b_n;
-  const auto root_n = [&C](double white, const Vector3d& by_motion) -> Matrix3d {
+WhiteNoise white_noise(const NavigationState& state, const NavigationProcessNoise& noise) noexcept {
+  const auto root_n = [&C = state.C_b_n](double white, const Vector3d& by_motion) -> Matrix3d {
     const Vector3d root = (by_motion.array() + white * white).sqrt();
     return C * root.asDiagonal();
   };
-  // Gravity's standard value does: the rest is a hundredth of what a manoeuvre accelerates by.
-  const Vector3d acceleration_b = rates.f_b_mps2 + kMps2PerG * C.row(2).transpose();
-  return {root_n(noise.gyro_noise_radps_per_sqrt_hz,
-                 shown_by_motion(rates.omega_ib_b_radps, grade.scale_sd, axes_variance)),
-          root_n(noise.accel_noise_mps2_per_sqrt_hz,
-                 shown_by_motion(acceleration_b, grade.scale_sd,
-                                 axes_variance + grade.triad_sd_rad * grade.triad_sd_rad))};
+  return {root_n(noise.gyro_noise_radps_per_sqrt_hz, noise.gyro_by_motion),
+          root_n(noise.accel_noise_mps2_per_sqrt_hz, noise.accel_by_motion)};
 }
 
 // N-26: trapezoid of the intensities, the biases' own blocks exact.
@@ -183,6 +174,17 @@ void set_process_covariance(const WhiteNoise& white, const NavigationProcessNois
 
 }  // namespace
 
+// N-27
+void NavigationProcessNoise::set_motion(const ReferenceGrade& grade, const NavigationState& state,
+                                        const InertialRates& manoeuvre) noexcept {
+  const double lean_variance = grade.lean_sd_rad * grade.lean_sd_rad;
+  // Gravity's standard value does: the rest is a hundredth of what a manoeuvre accelerates by.
+  const Vector3d acceleration_b = manoeuvre.f_b_mps2 + kMps2PerG * state.C_b_n.row(2).transpose();
+  gyro_by_motion = shown_by_motion(manoeuvre.omega_ib_b_radps, grade.scale_sd, lean_variance);
+  accel_by_motion = shown_by_motion(acceleration_b, grade.scale_sd,
+                                    lean_variance + grade.triad_sd_rad * grade.triad_sd_rad);
+}
+
 NavigationDynamics error_dynamics(const NavigationState& state, const InertialRates& rates) noexcept {
   const LocalEarth earth(state.position);
   const Vector3d& v = state.v_n_mps;
@@ -225,7 +227,7 @@ NavigationTransition transition(const NavigationState& state, const InertialRate
   out.kinematic_rows.diagonal().array() += 1.0;
   out.gyro_bias_decay = std::exp(-beta_g * dt_s);
   out.accel_bias_decay = std::exp(-beta_a * dt_s);
-  set_process_covariance(white_noise(state, rates, noise), noise, beta_g, beta_a, dt_s, out);
+  set_process_covariance(white_noise(state, noise), noise, beta_g, beta_a, dt_s, out);
   return out;
 }
 

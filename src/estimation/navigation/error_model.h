@@ -42,7 +42,13 @@ struct NavigationProcessNoise {
   double accel_noise_mps2_per_sqrt_hz = 0.0;  ///< white force noise (velocity random walk)
   BiasProcess gyro_bias;                      ///< per axis, rad/s
   BiasProcess accel_bias;                     ///< per axis, m/s^2
-  ReferenceGrade grade{};                     ///< N-27: what scale and axes make of a motion
+  /// N-27: what scale and axes make of a manoeuvre, intensity on each axis of b, (rad/s)^2/Hz and (m/s^2)^2/Hz.
+  Eigen::Vector3d gyro_by_motion = Eigen::Vector3d::Zero();
+  Eigen::Vector3d accel_by_motion = Eigen::Vector3d::Zero();
+
+  /// @param manoeuvre  compensated rates without vibration, which comes and goes too fast to leave anything
+  void set_motion(const ReferenceGrade& grade, const NavigationState& state,
+                  const InertialRates& manoeuvre) noexcept;
 };
 
 /// d(dr, dv, phi)/dt = F [dr, dv, phi, db_g, db_a] about the state (N-20 to N-24).

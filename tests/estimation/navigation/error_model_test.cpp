@@ -218,7 +218,7 @@ TEST(NavigationTransition, ProcessCovarianceAgreesWithVanLoan) {
 TEST(NavigationTransition, OwnScaleAndAxesMakeOfATurnWhatTheyMakeOfItsAngle) {
   constexpr double kForEver_s = std::numeric_limits<double>::infinity();
   NavigationProcessNoise noise{0.0, 0.0, {0.0, kForEver_s}, {0.0, kForEver_s}};
-  noise.grade = {1e-3, 2e-3, 3e-3};
+  const ReferenceGrade grade{1e-3, 2e-3, 3e-3};
   constexpr double kDt_s = 0.01;
   constexpr int kSteps = 500;
   constexpr double kTurn_radps = 0.3;
@@ -226,6 +226,7 @@ TEST(NavigationTransition, OwnScaleAndAxesMakeOfATurnWhatTheyMakeOfItsAngle) {
   const NavigationState level;
   const auto sd_after = [&](const InertialRates& rates) {
     NavigationErrorVector variance = NavigationErrorVector::Zero();
+    noise.set_motion(grade, level, rates);
     for (int i = 0; i < kSteps; ++i)
       variance += transition(level, rates, noise, kDt_s).process_covariance.diagonal();
     return NavigationErrorVector(variance.cwiseSqrt());
