@@ -1,13 +1,9 @@
 #include "estimation/batch/sensor_model.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
-#include <numbers>
 
-#include "base/units.h"
 #include "estimation/alignment/accelerometer_places.h"
 #include "estimation/navigation/so3.h"
 

@@ -24,10 +24,6 @@ constexpr int kRoamingRounds = 6;
 /// Added to the diagonal of the covariance, relative: an exact ramp has none of its own.
 constexpr double kRidge = 1e-10;
 
-Eigen::VectorXd curve_of_model(const SeparableProblem& problem, const Model& model) {
-  return problem.y - residual_of(problem, model);
-}
-
 /// The most that a level moved between two curves, in its sd.
 double moved_in_sd(const Eigen::VectorXd& before, const Eigen::VectorXd& after, const Eigen::MatrixXd& v) {
   return (after - before).cwiseQuotient(v.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff();
@@ -111,7 +107,7 @@ bool follow_with_scaled_covariance(WeightedProblem& problem, FixedPoint& point, 
   constexpr int kRounds = 12;
   constexpr int kSearchRounds = 2;
   SeparableProblem& p = problem.problem;
-  Eigen::VectorXd fitted = curve_of_model(p, point.model);
+  Eigen::VectorXd fitted = wv_curve(point.model, p.levels);
   const Eigen::VectorXd exact_at = fitted.cwiseMax(kRidge * p.y);
   Eigen::VectorXd anchor = exact_at;
   for (int round = 0; round < kRounds; ++round) {
@@ -128,7 +124,7 @@ bool follow_with_scaled_covariance(WeightedProblem& problem, FixedPoint& point, 
     p.whitener = whitener;
     const bool searches = search && round < kSearchRounds;
     point.model = searches ? find_global_minimum(p).model : polish(p, point.model).model;
-    const Eigen::VectorXd now = curve_of_model(p, point.model);
+    const Eigen::VectorXd now = wv_curve(point.model, p.levels);
     const double moved = relative_move(fitted, now);
     fitted = now;
     if (!searches && moved < kNearEnough && std::abs(wanted - share2) <= kNearEnough * share2) break;
@@ -170,7 +166,7 @@ FixedPoint settle(WeightedProblem& problem, const Model& start, bool search) {
   point.sampling = sampling_covariance(start, problem.wv, problem.levels(), problem.table);
   point.settled = false;
   Eigen::MatrixXd weights = point.sampling;
-  Eigen::VectorXd curve = curve_of_model(problem.problem, start);
+  Eigen::VectorXd curve = wv_curve(start, problem.problem.levels);
   Roaming roaming;
   for (int round = 0; round < kMaxReweighting; ++round) {
     const Eigen::MatrixXd whitener = whitener_of(weights);
@@ -178,7 +174,7 @@ FixedPoint settle(WeightedProblem& problem, const Model& start, bool search) {
     problem.problem.whitener = whitener;
     const SeparableSolution next =
         search && round == 0 ? find_global_minimum(problem.problem) : polish(problem.problem, point.model);
-    const Eigen::VectorXd now = curve_of_model(problem.problem, next.model);
+    const Eigen::VectorXd now = wv_curve(next.model, problem.problem.levels);
     const double moved = moved_in_sd(curve, now, weights);
     point.model = next.model;
     point.objective = next.objective;
@@ -213,9 +209,9 @@ FixedPoint settle_with_model_error(WeightedProblem& problem, const std::optional
   Roaming roaming;
   for (int i = 0; i < kCovariances && !point.settled; ++i) {
     point.sampling = sampling_covariance(point.model, problem.wv, problem.levels(), problem.table);
-    const Eigen::VectorXd before = curve_of_model(p, point.model);
+    const Eigen::VectorXd before = wv_curve(point.model, p.levels);
     if (!follow_with_scaled_covariance(problem, point, share2, !start && i == 0)) break;
-    const Eigen::VectorXd now = curve_of_model(p, point.model);
+    const Eigen::VectorXd now = wv_curve(point.model, p.levels);
     roaming.add(now);
     point.settled =
         relative_move(before, now) < kNearEnough || moved_in_sd(before, now, point.v) < kSettledShareOfSd;

@@ -7,6 +7,7 @@
 
 #include "estimation/navigation/so3.h"
 #include "estimation/navigation/wgs84.h"
+#include "firmware_sim/imu/imperfections.h"
 #include "sample/eigen_arrays.h"
 #include "tests/estimation/calibration/simulated_drive.h"
 
@@ -14,6 +15,20 @@ namespace imuscope::test {
 namespace {
 
 using Eigen::Vector3d;
+
+/// Feeds the drive to its end, each sample changed before; `truth` is the motion at its epoch.
+template <typename Change>
+void run_changed(SimulatedDrive& drive, Estimator& estimator, Change change) {
+  while (!drive.done()) {
+    const imusim::MotionState truth = drive.motion().state_at(drive.time_s());
+    std::vector<Sample> samples = drive.next();
+    for (Sample& sample : samples) {
+      change(sample, truth);
+      estimator.add(sample);
+    }
+    estimator.advance(samples.front().arrival);
+  }
+}
 
 /// A mean of squares over n errors that are normal with the sd claimed lies within this many of its own sd.
 constexpr double kOwnSd = 3.3;
@@ -53,14 +68,9 @@ TEST(Antenna, LeverArmAndLatencyThatAreWrongAreFoundWithinTheirSd) {
     config.gnss.latency_sd_s = 0.5 * kLatency_s;
     const double late_s = std::max(0.01, kLatency_s + config.gnss.latency_sd_s * normal(random));
     Estimator estimator(config);
-    while (!drive.done()) {
-      std::vector<Sample> samples = drive.next();
-      for (Sample& sample : samples) {
-        if (sample.kind == SampleKind::kGnss) sample.time += from_seconds(late_s);
-        estimator.add(sample);
-      }
-      estimator.advance(samples.front().arrival);
-    }
+    run_changed(drive, estimator, [&](Sample& sample, const imusim::MotionState&) {
+      if (sample.kind == SampleKind::kGnss) sample.time += from_seconds(late_s);
+    });
     const NavigationOutput& out = estimator.navigation();
     ASSERT_EQ(out.status, NavigationStatus::kNavigating);
     for (std::size_t i = 0; i < 3; ++i) arm.add(out.antenna_lever_arm_b_m[i], out.sd_antenna_lever_arm_m[i]);
@@ -113,29 +123,26 @@ TEST(Start, OfAGyrocompassKnowsThatTiltAndBiasAreOneError) {
   heading.expect_not_too_sure("heading");
 }
 
-/// One R-IMU's own scale and axes, as draws of the grade of its class.
+/// Scale and axes of one R-IMU, as the simulator draws them: the filter is told their class alone.
 struct OwnAxes {
-  Eigen::Matrix3d gyro = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d accel = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d gyro;
+  Eigen::Matrix3d accel;
 
-  OwnAxes(const ReferenceGrade& grade, std::mt19937& random) {
-    std::normal_distribution<> normal;
-    const auto drawn = [&](double sd) {
-      return Vector3d(sd * normal(random), sd * normal(random), sd * normal(random));
+  explicit OwnAxes(imusim::Random& random) {
+    imusim::ImuErrors errors;
+    imusim::draw_imperfections(
+        imusim::reference_imperfections(imusim::WorldKind::kHarsh, imusim::ReferenceClass{}), random, errors);
+    const auto matrix_of = [](const imusim::TriadErrors& triad) -> Eigen::Matrix3d {
+      return Eigen::Matrix3d::Identity() + triad.misalignment + Eigen::Matrix3d(triad.scale.asDiagonal());
     };
-    for (Eigen::Matrix3d* triad : {&gyro, &accel}) {
-      triad->diagonal() += drawn(grade.scale_sd);
-      const Vector3d lean = drawn(grade.lean_sd_rad);
-      *triad +=
-          Eigen::Matrix3d{{0.0, lean.z(), lean.y()}, {lean.z(), 0.0, lean.x()}, {lean.y(), lean.x(), 0.0}};
-    }
-    accel = accel * exp_so3(drawn(grade.triad_sd_rad));
+    gyro = matrix_of(errors.gyro);
+    accel = matrix_of(errors.accel) * errors.accel.C_s_triad;
   }
 };
 
 TEST(ReferenceAxes, ThatAreCrookedMakeNoNavigationTooSure) {
   constexpr int kDrives = 24;
-  std::mt19937 random(81);
+  imusim::Random random(81, "own axes");
   Squares level;
   Squares heading;
   Squares velocity;
@@ -144,19 +151,13 @@ TEST(ReferenceAxes, ThatAreCrookedMakeNoNavigationTooSure) {
     SimulatedDrive drive(240.0, {}, static_cast<std::uint64_t>(400 + drive_number));
     EstimatorConfig config = drive.config();
     config.reference.grade = kNavigationGrade;
-    const OwnAxes axes(kNavigationGrade, random);
+    const OwnAxes axes(random);
     Estimator estimator(config);
-    while (!drive.done()) {
-      std::vector<Sample> samples = drive.next();
-      for (Sample& sample : samples) {
-        if (sample.kind == SampleKind::kImu) {
-          sample.imu.omega_radps = to_array(Vector3d(axes.gyro * to_eigen(sample.imu.omega_radps)));
-          sample.imu.f_mps2 = to_array(Vector3d(axes.accel * to_eigen(sample.imu.f_mps2)));
-        }
-        estimator.add(sample);
-      }
-      estimator.advance(samples.front().arrival);
-    }
+    run_changed(drive, estimator, [&](Sample& sample, const imusim::MotionState&) {
+      if (sample.kind != SampleKind::kImu) return;
+      sample.imu.omega_radps = to_array(Vector3d(axes.gyro * to_eigen(sample.imu.omega_radps)));
+      sample.imu.f_mps2 = to_array(Vector3d(axes.accel * to_eigen(sample.imu.f_mps2)));
+    });
     const NavigationOutput& out = estimator.navigation();
     ASSERT_EQ(out.status, NavigationStatus::kNavigating);
     const imusim::MotionState truth = drive.motion().state_at(drive.time_s() - 0.01);
@@ -190,28 +191,22 @@ TEST(Antenna, ArmIsNotShortenedByTheNoiseOfTheGyros) {
     for (std::size_t i = 0; i < 3; ++i)
       config.gnss.antenna_lever_arm_b_m[i] = arm_b_m[static_cast<Eigen::Index>(i)] + 0.02 * normal(random);
     Estimator estimator(config);
-    while (!drive.done()) {
-      const imusim::MotionState truth = drive.motion().state_at(drive.time_s());
-      std::vector<Sample> samples = drive.next();
-      for (Sample& sample : samples) {
-        if (sample.kind == SampleKind::kImu) {
-          for (double& rate : sample.imu.omega_radps) rate += kRateNoise_radps * normal(random);
-        } else if (sample.kind == SampleKind::kGnss) {
-          const GeodeticPosition at =
-              displaced({sample.gnss.latitude_rad, sample.gnss.longitude_rad, sample.gnss.height_m},
-                        truth.C_b_n * arm_b_m);
-          sample.gnss.latitude_rad = at.latitude_rad;
-          sample.gnss.longitude_rad = at.longitude_rad;
-          sample.gnss.height_m = at.height_m;
-          Vector3d v_n_mps = truth.v_n_mps + truth.C_b_n * truth.omega_nb_b_radps.cross(arm_b_m);
-          for (double& v : v_n_mps) v += 0.02 * normal(random);
-          sample.gnss.v_n_mps = to_array(v_n_mps);
-          sample.gnss.flags |= kVelocityValid;
-        }
-        estimator.add(sample);
+    run_changed(drive, estimator, [&](Sample& sample, const imusim::MotionState& truth) {
+      if (sample.kind == SampleKind::kImu) {
+        for (double& rate : sample.imu.omega_radps) rate += kRateNoise_radps * normal(random);
+      } else if (sample.kind == SampleKind::kGnss) {
+        const GeodeticPosition at =
+            displaced({sample.gnss.latitude_rad, sample.gnss.longitude_rad, sample.gnss.height_m},
+                      truth.C_b_n * arm_b_m);
+        sample.gnss.latitude_rad = at.latitude_rad;
+        sample.gnss.longitude_rad = at.longitude_rad;
+        sample.gnss.height_m = at.height_m;
+        Vector3d v_n_mps = truth.v_n_mps + truth.C_b_n * truth.omega_nb_b_radps.cross(arm_b_m);
+        for (double& v : v_n_mps) v += 0.02 * normal(random);
+        sample.gnss.v_n_mps = to_array(v_n_mps);
+        sample.gnss.flags |= kVelocityValid;
       }
-      estimator.advance(samples.front().arrival);
-    }
+    });
     const NavigationOutput& out = estimator.navigation();
     ASSERT_EQ(out.status, NavigationStatus::kNavigating);
     const Vector3d error_m = to_eigen(out.antenna_lever_arm_b_m) - arm_b_m;
