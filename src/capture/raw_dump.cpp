@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstring>
+#include <fstream>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
-#include "base/line_reader.h"
 #include "base/missing_file.h"
 #include "capture/stamp_range.h"
 
@@ -20,6 +22,25 @@ constexpr std::size_t kColumns = 3;
 constexpr std::size_t kLongestLine = 256;
 /// No read of a device brings as much at once; a dump that is claimed to be one is given in pieces of this.
 constexpr std::uint64_t kLongestPiece = std::uint64_t{1} << 20U;
+
+/// The next line, without its end; of one longer than kLongestLine the first kLongestLine + 1 bytes, and the
+/// rest is passed over.
+/// @param has_end  false for a last line without its end
+/// @return false where nothing is left
+bool next_line(FileWindow& file, std::string& line, bool& has_end) {
+  line.clear();
+  has_end = false;
+  for (auto there = file.look(kLongestLine); !there.empty(); there = file.look(kLongestLine)) {
+    const auto* const end = static_cast<const std::uint8_t*>(std::memchr(there.data(), '\n', there.size()));
+    has_end = end != nullptr;
+    const std::size_t length = has_end ? static_cast<std::size_t>(end - there.data()) : there.size();
+    line.append(reinterpret_cast<const char*>(there.data()),
+                std::min(length, kLongestLine + 1 - line.size()));
+    file.pass(has_end ? length + 1 : length);
+    if (has_end) break;
+  }
+  return has_end || !line.empty();
+}
 
 std::string_view without_line_end(std::string_view line) {
   while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
@@ -52,7 +73,7 @@ std::filesystem::path RawDump::arrivals_path(const std::filesystem::path& dump) 
   return path;
 }
 
-Result<RawDump> RawDump::open(const std::filesystem::path& path) {
+Result<RawDump> RawDump::open(const std::filesystem::path& path, Arrivals arrivals) {
   const std::string name = path.string();
   std::error_code error;
   const auto status = std::filesystem::status(path, error);
@@ -66,17 +87,19 @@ Result<RawDump> RawDump::open(const std::filesystem::path& path) {
   const auto size = std::filesystem::is_regular_file(status) ? std::filesystem::file_size(path, error) : 0;
   if (size == 0) return work_error(name + " is empty: it holds no device bytes", "check how it was recorded");
 
-  std::optional<std::ifstream> arrivals;
+  std::optional<FileWindow> stamps;
   if (std::filesystem::exists(arrivals_path(path), error)) {
-    if (auto checked = check_arrivals(arrivals_path(path), size); !checked)
-      return tl::unexpected(checked.error());
-    arrivals.emplace(arrivals_path(path));
+    if (arrivals == Arrivals::kToCheck) {
+      if (auto checked = check_arrivals(arrivals_path(path), size); !checked)
+        return tl::unexpected(checked.error());
+    }
+    stamps.emplace(std::ifstream(arrivals_path(path), std::ios::binary));
   }
-  return RawDump(std::move(file), std::move(arrivals));
+  return RawDump(FileWindow(std::move(file)), std::move(stamps));
 }
 
 Result<void> RawDump::check_arrivals(const std::filesystem::path& path, std::uint64_t dump_bytes) {
-  std::ifstream file(path);
+  FileWindow file(std::ifstream(path, std::ios::binary));
   std::size_t line_number = 0;
   const auto wrong = [&](const std::string& what) {
     return usage_error(path.string() + ":" + std::to_string(line_number) + ": " + what,
@@ -85,9 +108,10 @@ Result<void> RawDump::check_arrivals(const std::filesystem::path& path, std::uin
   HostTime newest = HostTime::min();
   std::uint64_t offset = 0;
   std::string text;
-  while (read_line(file, text, kLongestLine)) {
+  bool has_end = false;
+  while (next_line(file, text, has_end)) {
     // A last line without its end is what a kill leaves of it.
-    const bool is_unfinished = file.eof() && offset > 0;
+    const bool is_unfinished = !has_end && offset > 0;
     line_number += 1;
     const std::string_view line = without_line_end(text);
     if (line_number == 1) {
@@ -124,7 +148,8 @@ Result<void> RawDump::check_arrivals(const std::filesystem::path& path, std::uin
 
 /// Goes on to the next line that tells of a read; what stands there was checked when the dump was opened.
 bool RawDump::next_arrival() {
-  while (read_line(*arrivals_, line_, kLongestLine)) {
+  bool has_end = false;
+  while (next_line(*arrivals_, line_, has_end)) {
     const auto numbers = parse_line(without_line_end(line_));
     if (!numbers) continue;
     current_ = {static_cast<std::uint64_t>((*numbers)[1]), host_time_from_ns((*numbers)[2])};
@@ -134,6 +159,7 @@ bool RawDump::next_arrival() {
 }
 
 std::optional<RawDump::Read> RawDump::next() {
+  bytes_.pass(std::exchange(given_, 0));
   Read read;
   std::uint64_t wanted = kBlockBytes;
   if (has_arrivals()) {
@@ -142,17 +168,10 @@ std::optional<RawDump::Read> RawDump::next() {
     current_.n_bytes -= wanted;
     read.arrival = current_.arrival;
   }
-  // In blocks, since n_bytes is only what a file says.
-  buffer_.clear();
-  while (buffer_.size() < wanted && file_) {
-    const std::size_t have = buffer_.size();
-    buffer_.resize(have + static_cast<std::size_t>(std::min<std::uint64_t>(wanted - have, kBlockBytes)));
-    file_.read(reinterpret_cast<char*>(buffer_.data() + have),
-               static_cast<std::streamsize>(buffer_.size() - have));
-    buffer_.resize(have + static_cast<std::size_t>(file_.gcount()));
-  }
-  if (buffer_.empty()) return std::nullopt;
-  read.bytes = buffer_;
+  const auto there = bytes_.look(static_cast<std::size_t>(wanted));
+  if (there.empty()) return std::nullopt;
+  given_ = std::min(there.size(), static_cast<std::size_t>(wanted));
+  read.bytes = there.first(given_);
   return read;
 }
 

@@ -6,15 +6,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "base/result.h"
 #include "base/time.h"
+#include "capture/file_window.h"
 
 namespace imuscope {
 
@@ -31,10 +30,14 @@ class RawDump {
     std::span<const std::uint8_t> bytes;  ///< valid until the next call
   };
 
+  /// Whether the arrivals file is read to its end before the first read is given. One that this program has
+  /// checked before need not be checked again.
+  enum class Arrivals : std::uint8_t { kToCheck, kChecked };
+
   /// Errors name file and line, what is wrong and what is expected.
   /// An arrivals file that speaks of more bytes than the dump has (both were cut off by a kill) is no error:
   /// the dump ends where its bytes end.
-  static Result<RawDump> open(const std::filesystem::path& path);
+  static Result<RawDump> open(const std::filesystem::path& path, Arrivals arrivals = Arrivals::kToCheck);
 
   /// The next read; nothing at the end.
   [[nodiscard]] std::optional<Read> next();
@@ -49,16 +52,16 @@ class RawDump {
     std::uint64_t n_bytes;  ///< still to be given
     HostTime arrival;
   };
-  RawDump(std::ifstream file, std::optional<std::ifstream> arrivals)
-      : file_(std::move(file)), arrivals_(std::move(arrivals)) {}
+  RawDump(FileWindow bytes, std::optional<FileWindow> arrivals)
+      : bytes_(std::move(bytes)), arrivals_(std::move(arrivals)) {}
   static Result<void> check_arrivals(const std::filesystem::path& path, std::uint64_t dump_bytes);
   bool next_arrival();
 
-  std::ifstream file_;
-  std::optional<std::ifstream> arrivals_;  ///< read along with the dump: of ten hours they are many
+  FileWindow bytes_;
+  std::optional<FileWindow> arrivals_;  ///< read along with the dump: of ten hours they are many
   Arrival current_{};
   std::string line_;
-  std::vector<std::uint8_t> buffer_;
+  std::size_t given_ = 0;  ///< bytes of the last read
 };
 
 }  // namespace imuscope

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/bytes.h"
+#include "capture/fingerprint.h"
 #include "capture/stamp_range.h"
 #include "publish/message_codec.h"
 #include "publish/message_values.h"
@@ -49,10 +50,6 @@ class FieldReader {
   std::span<const std::uint8_t> rest_;
   bool is_good_ = true;
 };
-
-std::int64_t fingerprint_of(std::span<const std::uint8_t> message) noexcept {
-  return FieldReader(message).number<std::int64_t>();
-}
 
 std::optional<CaptureRecord> to_record(const run_t& message) {
   if (!is_stamp_ns(message.t0_ns) || message.t0_utime < 0 || !is_stamp_us(message.t0_utime))

@@ -7,6 +7,7 @@
 #include "base/bytes.h"
 #include "base/contracts.h"
 #include "capture/event_log.h"
+#include "capture/fingerprint.h"
 #include "publish/message_codec.h"
 
 namespace imuscope {
@@ -23,11 +24,6 @@ std::vector<std::uint8_t> encode_checked(Message& message) {
   const std::span<const std::uint8_t> all(bytes);
   message.checksum = static_cast<std::int32_t>(crc32_of(all.first(all.size() - kChecksumBytes)));
   return encode_message(message);
-}
-
-/// The type of a message, or what stands in its place.
-std::int64_t fingerprint_of(std::span<const std::uint8_t> message) noexcept {
-  return message.size() < sizeof(std::int64_t) ? 0 : read_be<std::int64_t>(message);
 }
 
 template <typename Message>

@@ -368,11 +368,12 @@ nlohmann::json comparison_json(const NoiseStudy& study, const std::vector<std::s
         for (std::size_t b = a + 1; b < regimes.size(); ++b) {
           const auto* first = find(study, name, axis, regimes[a]);
           const auto* second = find(study, name, axis, regimes[b]);
-          if (first == nullptr || second == nullptr) continue;
-          all.push_back({first, second, compared(*first, *second)});
+          if (first != nullptr && second != nullptr) all.push_back({first, second, {}});
         }
       }
     }
+    tbb::parallel_for(std::size_t{0}, all.size(),
+                      [&](std::size_t i) { all[i].comparison = compared(*all[i].first, *all[i].second); });
     append_comparisons(all, document["comparisons"]);
   }
   return document;

@@ -6,8 +6,8 @@
 
 #include "estimation/calibration/events.h"
 #include "service/pipeline/estimator_setup.h"
+#include "service/recording/side_by_side.h"
 #include "study/batch_study.h"
-#include "study/side_by_side.h"
 
 namespace imuscope {
 
@@ -116,7 +116,8 @@ Result<Combination> run_studies(const std::vector<OpenedRecording>& drives, cons
   std::vector<DriveMountings> mountings;
   for (std::size_t i = 0; i < drives.size(); ++i) {
     ReplayOptions replay_options;
-    replay_options.reading = reading_of_study();
+    replay_options.reading = reading_by_threads();
+    replay_options.has_sink_beside = may_use_threads();
     replay_options.progress = [progress = progress_of(i)](double share) { progress("calibration", share); };
     auto found = calibrate(drives[i], drive_folder(options.out, i), replay_options);
     if (!found) return tl::unexpected<Error>(found.error());

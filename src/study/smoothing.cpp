@@ -12,8 +12,8 @@
 #include "estimation/calibration/filter_core.h"
 #include "estimation/calibration/navigation_output.h"
 #include "estimation/navigation/so3.h"
+#include "service/recording/side_by_side.h"
 #include "service/run/live_smoothing.h"
-#include "study/side_by_side.h"
 
 namespace imuscope {
 
@@ -161,7 +161,7 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
   ReplayOptions options;
   options.history = &smoother;
   options.progress = progress;
-  options.reading = reading_of_study();
+  options.reading = reading_by_threads();
   const auto replayed =
       replay(configuration, relinearised(estimator, finals, former), recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());

@@ -6,9 +6,12 @@
 #include <tbb/task_group.h>
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 #include "service/pipeline/estimator_setup.h"
 #include "service/pipeline/noise_series.h"
+#include "service/recording/side_by_side.h"
 #include "service/run/models_file.h"
 #include "service/run/run_folder.h"
 #include "service/run/run_record.h"
@@ -18,7 +21,6 @@
 #include "study/error_pass.h"
 #include "study/noise_study.h"
 #include "study/regime_study.h"
-#include "study/side_by_side.h"
 #include "study/smoothing.h"
 
 namespace imuscope {
@@ -190,6 +192,22 @@ tl::unexpected<Error> nothing_was_run(const ReplayResult& result) {
       "forged");
 }
 
+/// Work beside the caller's. It has ended when this is gone.
+class Beside {
+ public:
+  template <typename Work>
+  explicit Beside(Work work) {
+    group_.run(std::move(work));
+  }
+  ~Beside() { group_.wait(); }
+  Beside(const Beside&) = delete;
+  Beside& operator=(const Beside&) = delete;
+  void wait() { group_.wait(); }
+
+ private:
+  tbb::task_group group_;
+};
+
 }  // namespace
 
 Result<void> run_study(const Configuration& configuration, const Recording& recording,
@@ -202,7 +220,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
 
   CalibrationPass first(**folder, configuration);
   ReplayOptions replay_options;
-  replay_options.reading = reading_of_study();
+  replay_options.reading = reading_by_threads();
+  replay_options.has_sink_beside = may_use_threads();
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
   BatchRecords records(configuration);
@@ -238,26 +257,27 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const auto settled = with_settled(finals, infos, options.mountings);
   auto epochs = EpochGatherer::create((*folder)->folder(), finals.size());
   if (!epochs) return tl::unexpected<Error>(epochs.error());
-  const auto smooth = [&]() -> Result<SmoothedDrive> {
-    const RecordStorage storage{Smoother::kMemory_bytes, options.out};
-    const auto track =
-        smooth_drive(configuration, estimator, recording, finals, former, storage, [&](double share) {
-          if (options.progress) options.progress("smoothing", share);
-        });
-    if (!track) return tl::unexpected<Error>(track.error());
-    if (auto written = write_smoothed(*track, last, (*folder)->utc(), former, infos, (*folder)->folder());
-        !written)
-      return tl::unexpected<Error>(written.error());
-    return smoothed_drive(*track, finals, former);
-  };
   // The filter with every mounting known needs no smoothed bias: both passes side by side.
-  Result<SmoothedDrive> smoothed;
+  std::optional<Result<SmoothedTrack>> track;
   Result<ReplayResult> second;
   tbb::parallel_invoke(
-      [&] { smoothed = smooth(); },
+      [&] {
+        const RecordStorage storage{Smoother::kMemory_bytes, options.out};
+        track.emplace(
+            smooth_drive(configuration, estimator, recording, finals, former, storage, [&](double share) {
+              if (options.progress) options.progress("smoothing", share);
+            }));
+      },
       [&] { second = replay(configuration, frozen(estimator, settled), recording, *epochs); });
-  if (!smoothed) return tl::unexpected<Error>(smoothed.error());
+  if (!*track) return tl::unexpected<Error>(track->error());
   if (!second) return tl::unexpected<Error>(second.error());
+  // Nothing below needs the smoothed drive's files.
+  Result<void> smoothed_files;
+  Beside writer([&] {
+    smoothed_files = write_smoothed(**track, last, (*folder)->utc(), former, infos, (*folder)->folder());
+  });
+  const auto smoothed = smoothed_drive(**track, finals, former);
+  if (!smoothed) return tl::unexpected<Error>(smoothed.error());
   if (options.progress) options.progress("error process", 0.0);
   auto rows = make_spools(finals.size(), (*folder)->folder());
   if (!rows) return tl::unexpected<Error>(rows.error());
@@ -279,6 +299,10 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     series[i] = write_errors({i, origin, {}, {}, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]);
   });
 
+  writer.wait();
+  track.reset();
+  if (!smoothed_files) return smoothed_files;
+
   const double run_s = regimes->motion.total_s(0) + regimes->motion.total_s(1);
   for (std::size_t i = 0; i < series.size(); ++i) {
     const auto& device = configuration.devices[configuration.study_indices()[i]];
@@ -290,8 +314,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   // The regressions need no noise model of the error process: another thread begins with them at once, as
   // each of them takes longer than a noise model.
   DynamicsRegressions regressions;
-  tbb::task_group beside;
-  beside.run([&] { regressions = regressions_of(configuration, *studied, regimes->motion, *spec); });
+  Beside beside([&] { regressions = regressions_of(configuration, *studied, regimes->motion, *spec); });
   const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
     if (options.progress) options.progress("noise models", share);
   });

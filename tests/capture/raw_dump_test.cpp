@@ -75,6 +75,32 @@ TEST_F(RawDumpTest, AKilledRecordingEndsWhereItsBytesEnd) {
   EXPECT_FALSE(dump->next().has_value());
 }
 
+TEST_F(RawDumpTest, ReadsAndCommentsOfAnyLengthAreFollowedToTheEnd) {
+  constexpr std::size_t kReads = 20'000;  // their lines alone are several windows of the file
+  std::string bytes;
+  std::string arrivals = "byte_offset,n_bytes,arrival_ns\n";
+  for (std::size_t i = 0; i < kReads; ++i) {
+    if (i % 100 == 0) arrivals += "#" + std::string(i, 'c') + ",1,2\n";
+    const std::size_t n = 1 + i % 37;
+    arrivals += std::to_string(bytes.size()) + "," + std::to_string(n) + "," + std::to_string(1000 + i) + "\n";
+    bytes += std::string(n, static_cast<char>('a' + i % 26));
+  }
+  write("mtx1.bin", bytes);
+  write("mtx1.arrivals.csv", arrivals);
+  for (const auto how : {RawDump::Arrivals::kToCheck, RawDump::Arrivals::kChecked}) {
+    auto dump = RawDump::open(folder_ / "mtx1.bin", how);
+    ASSERT_TRUE(dump.has_value()) << dump.error().text();
+    for (std::size_t i = 0; i < kReads; ++i) {
+      const auto read = dump->next();
+      ASSERT_TRUE(read) << i;
+      ASSERT_EQ(read->arrival, host_time_from_ns(static_cast<std::int64_t>(1000 + i)));
+      ASSERT_EQ(std::string(read->bytes.begin(), read->bytes.end()),
+                std::string(1 + i % 37, static_cast<char>('a' + i % 26)));
+    }
+    EXPECT_FALSE(dump->next());
+  }
+}
+
 TEST_F(RawDumpTest, NamesTheLineThatCannotBe) {
   write("mtx1.bin", "abcdefgh");
   const std::string header = "byte_offset,n_bytes,arrival_ns\n";

@@ -41,7 +41,7 @@ CovarianceKernel::CovarianceKernel(std::size_t dimension, std::optional<Instruct
   IMUSCOPE_EXPECTS(dimension > 0);
   // predict_navigation() reads and writes 15 rows, whatever the dimension.
   padded_ = std::max(padded_, kLoopNavigationPadded);
-  const std::size_t rows = padded_ + kLoopNavigationPadded + 2 * kMaxMeasurementRows + 1;
+  const std::size_t rows = 2 * padded_ + kLoopNavigationPadded + 2 * kMaxMeasurementRows + 3;
   memory_.reset(static_cast<double*>(::operator new[](rows* padded_ * sizeof(double), kAlignment)));
   std::fill_n(memory_.get(), rows * padded_, 0.0);
   p_ = memory_.get();
@@ -49,6 +49,9 @@ CovarianceKernel::CovarianceKernel(std::size_t dimension, std::optional<Instruct
   pht_ = scratch_ + kLoopNavigationPadded * padded_;
   w_ = pht_ + kMaxMeasurementRows * padded_;
   correction_ = w_ + kMaxMeasurementRows * padded_;
+  factor_ = correction_ + padded_;
+  per_sd_ = factor_ + padded_ * padded_;
+  pivot_ = per_sd_ + padded_;
 }
 
 void CovarianceKernel::set(std::size_t i, std::size_t j, double value) noexcept {
@@ -143,6 +146,16 @@ bool CovarianceKernel::update(const std::array<double, 3>& innovation,
   if (!loops_->whiten(pht_, m.data(), whitened.data(), w_, correction_, padded_)) return false;
   loops_->downdate(p_, w_, padded_);
   return true;
+}
+
+// K-6
+std::optional<std::size_t> CovarianceKernel::first_bad_state() noexcept {
+  for (std::size_t i = 0; i < dimension_; ++i) {
+    const double variance = p_[i * padded_ + i];
+    per_sd_[i] = variance > 0.0 ? 1.0 / std::sqrt(variance) : 0.0;
+  }
+  const std::size_t bad = loops_->factorise(p_, per_sd_, kPivotMin, factor_, pivot_, dimension_, padded_);
+  return bad == dimension_ ? std::nullopt : std::optional(bad);
 }
 
 }  // namespace imuscope

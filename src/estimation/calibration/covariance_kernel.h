@@ -81,6 +81,13 @@ class CovarianceKernel {
   /// Correction of the error state by the last successful update(): P H^T S^-1 y.
   [[nodiscard]] std::span<const double> correction() const noexcept { return {correction_, dimension_}; }
 
+  /// First state that has become a combination of the ones before it, by its pivot in Cholesky's factor of the
+  /// correlation matrix, or whose variance is negative or no number; none where all is well. States of zero
+  /// variance (known exactly, or not in use) are passed over. Costs n^3 / 6 multiplications. K-6.
+  [[nodiscard]] std::optional<std::size_t> first_bad_state() noexcept;
+  /// Of a correlation matrix, whose diagonal is 1.
+  static constexpr double kPivotMin = 1e-12;
+
  private:
   struct AlignedDelete {
     void operator()(double* memory) const noexcept;
@@ -95,6 +102,9 @@ class CovarianceKernel {
   double* pht_;         ///< kMaxMeasurementRows rows: (P H^T)^T
   double* w_;           ///< kMaxMeasurementRows rows: (P H^T L^-T)^T
   double* correction_;  ///< one row
+  double* factor_;      ///< as many rows as p_
+  double* per_sd_;      ///< one row: 1 / sd of each state; 0 where it has none
+  double* pivot_;       ///< one row
   std::array<double, 9> s_{};
 };
 

@@ -42,6 +42,12 @@ struct CovarianceLoops {
   /// @return whether every correction is finite
   bool (*whiten)(const double* pht, const double* m, const double* whitened, double* w, double* correction,
                  std::size_t padded);
+  /// Cholesky's factor of P's correlation matrix, rows of `padded`. K-6.
+  /// @param per_sd  1 / sd of each state; 0 leaves it out
+  /// @param pivot   room for n
+  /// @return the first state whose pivot is not above `least` or whose variance is none, or `n`
+  std::size_t (*factorise)(const double* p, const double* per_sd, double least, double* factor, double* pivot,
+                           std::size_t n, std::size_t padded);
 };
 
 /// The loops for an instruction set; nullptr where this processor or this build has none.

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "base/contracts.h"
-#include "estimation/calibration/covariance_watch.h"
 #include "estimation/calibration/event_log.h"
 #include "estimation/calibration/filter_core.h"
 #include "estimation/calibration/finite_imu.h"
@@ -44,7 +43,6 @@ class Estimator::Impl final : public EpochSink {
       : config_(config),
         history_(history),
         core_(config),
-        watch_(core_.covariance().dimension()),
         window_({config.reference.differentiator_points, 1.0 / config.reference.rate_hz}),
         navigation_(config, core_, log_, counters_),
         odometry_(config, core_, navigation_, log_, counters_) {
@@ -202,7 +200,7 @@ class Estimator::Impl final : public EpochSink {
     std::size_t repaired = core_.repair(state);
     if (repaired == 0 && time >= next_watch_) {
       next_watch_ = time + kWatchEvery;
-      if (const auto bad = watch_.first_bad_state(core_.covariance())) {
+      if (const auto bad = core_.covariance().first_bad_state()) {
         state = *bad;
         core_.repair_state(state);
         repaired = 1;
@@ -217,7 +215,6 @@ class Estimator::Impl final : public EpochSink {
   HistorySink* history_;
   HostTime next_history_{HostTime::min()};
   FilterCore core_;
-  CovarianceWatch watch_;
   HostTime next_watch_{HostTime::min()};
   std::array<bool, kMaxSImus> swap_told_{};
   ReferenceWindow window_;

@@ -41,9 +41,13 @@ double lower_tenth(std::vector<double> values) {
   return *at;
 }
 
-double distance(const Vector3& a, const Vector3& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+double squared_distance(const Vector3& a, const Vector3& b) {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+  return sum;
 }
+
+double distance(const Vector3& a, const Vector3& b) { return std::sqrt(squared_distance(a, b)); }
 
 /// Mean over the known cells of [first, last); absent without any.
 std::optional<Vector3> mean_of(const std::vector<MotionCell>& cells, Vector3 MotionCell::*what,
@@ -72,8 +76,7 @@ double spread_at(const std::vector<MotionCell>& cells, Vector3 MotionCell::*what
   for (std::size_t j = first; j < last; ++j) {
     if (cells[j].n == 0) continue;
     ++n;
-    const double away = distance(cells[j].*what, *mean);
-    squares += away * away;
+    squares += squared_distance(cells[j].*what, *mean);
   }
   // Of n cells about their own mean n - 1 are free.
   return n > 1 ? std::sqrt(squares / (n - 1)) : 0.0;
@@ -84,26 +87,32 @@ class Judge {
   Judge(const std::vector<MotionCell>& cells, const MotionLimits& limits, const CellNoise& noise)
       : cells_(cells), limits_(limits), noise_(noise) {}
 
+  /// Around one cell, of rate and of force.
+  struct Spread {
+    double omega_radps;
+    double f_mps2;
+  };
+  [[nodiscard]] Spread spread(std::size_t i) const {
+    return {spread_at(cells_, &MotionCell::omega_radps, i), spread_at(cells_, &MotionCell::f_mps2, i)};
+  }
   /// Still in all measures together: their squares, each against its limit for rest, sum to less than one.
-  [[nodiscard]] bool rests(std::size_t i) const {
-    const MotionCell& cell = cells_[i];
+  [[nodiscard]] bool rests(const MotionCell& cell, const Spread& spread) const {
     const double room = room_of(cell);
-    const double rate = rate_spread(i) / std::hypot(room * limits_.rest_rate_spread_radps,
-                                                    kNoiseInSpread * noise_.omega_radps);
+    const double rate = spread.omega_radps / std::hypot(room * limits_.rest_rate_spread_radps,
+                                                        kNoiseInSpread * noise_.omega_radps);
     const double force =
-        force_spread(i) / std::hypot(room * limits_.rest_force_spread_mps2, kNoiseInSpread * noise_.f_mps2);
+        spread.f_mps2 / std::hypot(room * limits_.rest_force_spread_mps2, kNoiseInSpread * noise_.f_mps2);
     const double vibration = cell.vibration_mps2 / (room * limits_.rest_vibration_mps2);
     return is_slow(cell) && rate * rate + force * force + vibration * vibration < 1.0;
   }
   /// Above one limit for motion.
-  [[nodiscard]] bool moves(std::size_t i) const {
-    const MotionCell& cell = cells_[i];
+  [[nodiscard]] bool moves(const MotionCell& cell, const Spread& spread) const {
     const double room = room_of(cell);
     return cell.speed_mps.value_or(0.0) > std::max(limits_.motion_speed_mps, kSpeedSds * cell.speed_sd_mps) ||
            cell.vibration_mps2 > room * limits_.motion_vibration_mps2 ||
-           rate_spread(i) >
+           spread.omega_radps >
                std::hypot(room * limits_.motion_rate_spread_radps, kNoiseInSpread * noise_.omega_radps) ||
-           force_spread(i) >
+           spread.f_mps2 >
                std::hypot(room * limits_.motion_force_spread_mps2, kNoiseInSpread * noise_.f_mps2);
   }
   /// One cell by itself: as still as a stop with that level of rate and force.
@@ -128,10 +137,6 @@ class Judge {
   [[nodiscard]] bool is_slow(const MotionCell& cell) const {
     return cell.speed_mps.value_or(0.0) < std::max(limits_.rest_speed_mps, kSpeedSds * cell.speed_sd_mps);
   }
-  [[nodiscard]] double rate_spread(std::size_t i) const {
-    return spread_at(cells_, &MotionCell::omega_radps, i);
-  }
-  [[nodiscard]] double force_spread(std::size_t i) const { return spread_at(cells_, &MotionCell::f_mps2, i); }
 
   const std::vector<MotionCell>& cells_;
   const MotionLimits& limits_;
@@ -146,11 +151,12 @@ std::vector<Standstill> with_hysteresis(const std::vector<MotionCell>& cells, co
     if (cells[i].n == 0) {
       continue;  // what surrounds it decides
     }
-    if (judge.rests(i)) {
+    const Judge::Spread spread = judge.spread(i);
+    if (judge.rests(cells[i], spread)) {
       if (!stands) found.push_back({i, i + 1});
       found.back().last = i + 1;
       stands = true;
-    } else if (judge.moves(i)) {
+    } else if (judge.moves(cells[i], spread)) {
       stands = false;
     }
   }

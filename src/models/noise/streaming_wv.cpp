@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #include "base/contracts.h"
 
@@ -13,6 +14,17 @@ constexpr int kMaxStreamingLevels = 24;
 /// Squares are added to a short sum first: its rounding error does not grow with the length of the stream.
 constexpr std::uint64_t kSettleEvery = 1024;
 constexpr std::uint64_t kWordBits = 64;
+
+/// Bits of a word. Without the processor's own instruction the standard library's is a call.
+std::uint32_t valid_in(std::uint64_t bits) noexcept {
+  constexpr std::uint64_t kPairs = 0x5555'5555'5555'5555;
+  constexpr std::uint64_t kNibbles = 0x3333'3333'3333'3333;
+  constexpr std::uint64_t kBytes = 0x0f0f'0f0f'0f0f'0f0f;
+  constexpr std::uint64_t kOnes = 0x0101'0101'0101'0101;
+  bits -= (bits >> 1U) & kPairs;
+  bits = (bits & kNibbles) + ((bits >> 2U) & kNibbles);
+  return static_cast<std::uint32_t>((((bits + (bits >> 4U)) & kBytes) * kOnes) >> 56U);
+}
 
 }  // namespace
 
@@ -114,48 +126,46 @@ void StreamingWv::push(double x) noexcept {
 std::uint32_t StreamingWv::valid_until(std::uint64_t position) const noexcept {
   const Word& word = words_[position / kWordBits & (words_.size() - 1)];
   const std::uint64_t before = (std::uint64_t{1} << position % kWordBits) - 1;
-  return word.valid_before + static_cast<std::uint32_t>(std::popcount(word.is_valid & before));
+  return word.valid_before + valid_in(word.is_valid & before);
 }
 
-/// One position on. A missing sample adds nothing to the sums and nothing to the counts.
+/// G-4. One position on: level by level, the sums of the n newest samples and of the n before them. A missing
+/// sample adds nothing to the sums and nothing to the counts.
 void StreamingWv::advance(double x, bool is_valid) noexcept {
   const std::uint64_t position = run_++;
   Word& word = words_[position / kWordBits & (words_.size() - 1)];
   if (is_valid) word.is_valid |= std::uint64_t{1} << position % kWordBits;
+  empty_ = is_valid ? 0 : empty_ + 1;
   if (run_ % kWordBits == 0)
-    words_[run_ / kWordBits & (words_.size() - 1)] = {
-        0, word.valid_before + static_cast<std::uint32_t>(std::popcount(word.is_valid))};
-  const bool is_whole = whole_ == run_ || whole_ >= longest_;
-  // Two loops: the one that nearly all samples take calls nothing.
-  if (is_whole)
-    for_each_level(position, x, [this](Level& level, double newer, double older) {
-      add(level, (newer - older) * (newer - older));
-    });
-  else
-    for_each_level(position, x,
-                   [this](Level& level, double newer, double older) { add_of_valid(level, newer, older); });
-}
-
-/// G-4. Hands out, level by level, the sums of the n newest samples and of the n before them.
-template <typename Take>
-void StreamingWv::for_each_level(std::uint64_t position, double x, const Take& take) noexcept {
+    words_[run_ / kWordBits & (words_.size() - 1)] = {0, word.valid_before + valid_in(word.is_valid)};
   double block = x;  // sum of the n newest samples, n = 1
+  std::optional<Valid> valid;
   for (Level& level : levels_) {
     double& slot = rings_[level.offset + (position & level.mask)];
     const double before = slot;  // sum of the n samples before those
     slot = block;
     // The ring of the next level takes only complete sums.
-    if (position + 1 < 2 * (static_cast<std::uint64_t>(level.mask) + 1)) break;
-    take(level, block, before);
+    const std::uint64_t support = 2 * (static_cast<std::uint64_t>(level.mask) + 1);
+    if (run_ < support) break;
+    // Supports without a hole, which nearly all are at the lower levels, need no counts; nor do those whose
+    // newer half is nothing but a hole, as they have no coefficient.
+    if (support <= whole_) {
+      add(level, (block - before) * (block - before));
+    } else if (support / 2 > empty_) {
+      if (!valid) valid = Valid{valid_until(run_), valid_until(run_ - support / 2)};
+      add_of_valid(level, block, before, *valid);
+    }
     block += before;
   }
 }
 
-void StreamingWv::add_of_valid(Level& level, double newer, double older) const noexcept {
+/// @param valid  moved on to the next level
+void StreamingWv::add_of_valid(Level& level, double newer, double older, Valid& valid) const noexcept {
   const std::uint64_t n = static_cast<std::uint64_t>(level.mask) + 1;
-  const std::uint32_t middle = valid_until(run_ - n);
-  const std::uint32_t there_newer = valid_until(run_) - middle;
-  const std::uint32_t there_older = middle - valid_until(run_ - 2 * n);
+  const std::uint32_t oldest = valid_until(run_ - 2 * n);
+  const std::uint32_t there_newer = valid.until_end - valid.until_middle;
+  const std::uint32_t there_older = valid.until_middle - oldest;
+  valid.until_middle = oldest;
   if (there_newer < least_valid(n) || there_older < least_valid(n)) return;
   const double difference = static_cast<double>(n) * (newer / there_newer - older / there_older);
   add(level, difference * difference);

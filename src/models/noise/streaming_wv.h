@@ -72,9 +72,12 @@ class StreamingWv {
 
   void advance(double x, bool is_valid) noexcept;
   [[nodiscard]] std::uint32_t valid_until(std::uint64_t position) const noexcept;
-  template <typename Take>
-  void for_each_level(std::uint64_t position, double x, const Take& take) noexcept;
-  void add_of_valid(Level& level, double newer, double older) const noexcept;
+  /// Valid samples before the end and before the middle of a level's support.
+  struct Valid {
+    std::uint32_t until_end;
+    std::uint32_t until_middle;
+  };
+  void add_of_valid(Level& level, double newer, double older, Valid& valid) const noexcept;
   void add(Level& level, double square) const noexcept;
   void settle() noexcept;
 
@@ -95,6 +98,7 @@ class StreamingWv {
   std::uint64_t run_ = 0;      ///< positions since the last gap
   std::uint64_t missing_ = 0;  ///< positions that wait for the next sample
   std::uint64_t whole_ = 0;    ///< positions since the last missing sample
+  std::uint64_t empty_ = 0;    ///< positions since the last valid sample
   std::uint64_t count_ = 0;    ///< samples taken
 };
 

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "capture/capture_reader.h"
-#include "capture/raw_dump.h"
 #include "drivers/xsens_mt/mtb_file.h"
 #include "service/recording/read_ahead.h"
 
@@ -217,8 +216,9 @@ Result<std::size_t> header_of(const std::filesystem::path& file) {
 
 }  // namespace
 
-Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file) {
-  auto dump = RawDump::open(file);
+Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file,
+                                                  RawDump::Arrivals arrivals) {
+  auto dump = RawDump::open(file, arrivals);
   if (!dump) return tl::unexpected<Error>(dump.error());
   std::error_code code;
   const auto size = std::filesystem::file_size(file, code);

@@ -12,6 +12,7 @@
 
 #include "base/result.h"
 #include "base/time.h"
+#include "capture/raw_dump.h"
 
 namespace imuscope {
 
@@ -35,7 +36,8 @@ class ByteSource {
 
 /// A raw dump: X.bin or a text file, with X.arrivals.csv beside it where the arrivals were kept; or a .mtb
 /// log, whose header is passed over.
-Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file);
+Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file,
+                                                  RawDump::Arrivals arrivals = RawDump::Arrivals::kToCheck);
 
 /// The reads of one device out of a capture.
 /// @param bytes  of this device in the capture, as CaptureSummary says

@@ -14,27 +14,20 @@ constexpr std::size_t kReadyBlocks = 4;
 
 }  // namespace
 
-ReadAhead::ReadAhead(CaptureReader reader) : reader_(std::move(reader)), thread_([this] { read_all(); }) {}
+ReadAhead::ReadAhead(CaptureReader reader)
+    : reader_(std::move(reader)), ready_(kReadyBlocks), thread_([this] { read_all(); }) {}
 
 ReadAhead::~ReadAhead() {
-  {
-    const std::lock_guard lock(mutex_);
-    unwanted_ = true;
-  }
-  changed_.notify_all();
+  ready_.refuse();
   thread_.join();
 }
 
 std::optional<RawRead> ReadAhead::next() {
   if (at_ == current_.size()) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return ended_ || !ready_.empty(); });
-    if (ready_.empty()) return std::nullopt;
-    current_ = std::move(ready_.front());
-    ready_.pop_front();
+    auto block = ready_.pop();
+    if (!block) return std::nullopt;
+    current_ = std::move(*block);
     at_ = 0;
-    lock.unlock();
-    changed_.notify_all();
   }
   return std::move(current_[at_++]);
 }
@@ -46,23 +39,11 @@ void ReadAhead::read_all() {
     bytes += read->bytes.size();
     block.push_back(std::move(*read));
     if (block.size() < kBlockReads && bytes < kBlockBytes) continue;
-    if (!hand_on(std::exchange(block, {}))) return;
+    if (!ready_.push(std::exchange(block, {}))) return;
     bytes = 0;
   }
-  if (!block.empty() && !hand_on(std::move(block))) return;
-  const std::lock_guard lock(mutex_);
-  ended_ = true;
-  changed_.notify_all();
-}
-
-bool ReadAhead::hand_on(Block&& block) {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return unwanted_ || ready_.size() < kReadyBlocks; });
-  if (unwanted_) return false;
-  ready_.push_back(std::move(block));
-  lock.unlock();
-  changed_.notify_all();
-  return true;
+  if (!block.empty() && !ready_.push(std::move(block))) return;
+  ready_.end();
 }
 
 }  // namespace imuscope

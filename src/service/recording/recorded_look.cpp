@@ -8,6 +8,7 @@
 
 #include "check/check.h"
 #include "service/pipeline/device_factory.h"
+#include "service/recording/side_by_side.h"
 
 namespace imuscope {
 
@@ -92,7 +93,7 @@ struct Line {
 /// first device has the first sample: seconds of the drive count from there.
 void gather(const Configuration& configuration, const Recording& recording,
             const std::vector<Duration>& shifts, check::Drive& drive) {
-  auto sources = recording.open_side_by_side(Reading::kWhenAsked);
+  auto sources = recording.open_side_by_side(reading_by_threads());
   if (!sources) return;
   std::list<Line> lines;
   for (std::size_t i = 0; i < sources->size(); ++i) {

@@ -17,6 +17,7 @@
 #include "service/recording/capture_damage.h"
 #include "service/recording/message_source.h"
 #include "service/recording/recorded_look.h"
+#include "service/recording/source_ahead.h"
 
 namespace imuscope {
 
@@ -28,15 +29,16 @@ constexpr UtcTime kNoClock = utc_time_from_ns(946'684'800'000'000'000);
 
 using Sources = Result<std::vector<std::unique_ptr<ByteSource>>>;
 
-/// Of a recording in several files, each by itself; nobody reads them ahead.
+/// Of a recording in several files, each by itself.
 std::function<Sources(Reading)> one_by_one(const Recording& recording) {
-  return [open = recording.open, present = recording.present](Reading) -> Sources {
+  return [open = recording.open, present = recording.present](Reading reading) -> Sources {
     std::vector<std::unique_ptr<ByteSource>> sources(present.size());
     for (std::size_t i = 0; i < present.size(); ++i) {
       if (!present[i]) continue;
       auto source = open(static_cast<DeviceIndex>(i));
       if (!source) return tl::unexpected<Error>(source.error());
       sources[i] = std::move(*source);
+      if (reading == Reading::kAhead) sources[i] = std::make_unique<SourceAhead>(std::move(sources[i]));
     }
     return sources;
   };
@@ -123,7 +125,7 @@ OpenSource open_plain(const Configuration& configuration, const std::vector<std:
                       Bags bags) {
   return [devices = configuration.devices, files, bags = std::move(bags)](DeviceIndex index) {
     return bags[index] ? open_messages(files[index], devices[index], *bags[index])
-                       : open_raw_dump(files[index]);
+                       : open_raw_dump(files[index], RawDump::Arrivals::kChecked);
   };
 }
 

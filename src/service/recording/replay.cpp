@@ -7,6 +7,7 @@
 #include "rt/host_clock.h"
 #include "rt/periodic.h"
 #include "service/pipeline/device_factory.h"
+#include "service/recording/sink_beside.h"
 
 namespace imuscope {
 
@@ -325,7 +326,9 @@ std::vector<SImuFileInfo> study_file_infos(const Configuration& configuration, c
 
 Result<ReplayResult> replay(const Configuration& configuration, const EstimatorConfig& estimator,
                             const Recording& recording, CoreSink& sink, const ReplayOptions& options) {
-  return Replayer(configuration, estimator, recording, sink, options).run();
+  if (!options.has_sink_beside) return Replayer(configuration, estimator, recording, sink, options).run();
+  SinkBeside beside(sink);
+  return Replayer(configuration, estimator, recording, beside, options).run();
 }
 
 std::vector<std::string> warnings_of(const Recording& recording, const ReplayResult& result) {

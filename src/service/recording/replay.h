@@ -81,12 +81,15 @@ struct ReplayResult {
   SteppedPauses pauses;
 };
 
-/// How a recording is run through the core; replay() calls the callbacks from its caller's thread.
+/// How a recording is run through the core; replay() calls the callbacks from its caller's thread, and the sink
+/// unless another is asked for.
 struct ReplayOptions {
   bool realtime = false;                 ///< paced as recorded
   std::function<void(double)> progress;  ///< share of the bytes read, 0 to 1; called now and then
   HistorySink* history = nullptr;
   Reading reading = Reading::kWhenAsked;
+  /// The sink works in a thread of its own, beside the core, and has done all of it when replay() returns.
+  bool has_sink_beside = false;
   /// Sees every sample as it was decoded, device by device in stream order; may be empty.
   std::function<void(const Sample&)> on_sample;
 };

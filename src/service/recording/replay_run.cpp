@@ -66,6 +66,8 @@ Result<void> run_replay(const Configuration& configuration, const Recording& rec
   ReplayOptions replay_options;
   replay_options.realtime = options.realtime;
   replay_options.reading = Reading::kAhead;
+  // Who watches the bus of a paced replay sees each message when its time has come.
+  replay_options.has_sink_beside = !options.realtime;
   replay_options.progress = options.progress;
   const auto spec = noise::parse_model(configuration.noise.model);
   if (!spec) return tl::unexpected<Error>(spec.error());

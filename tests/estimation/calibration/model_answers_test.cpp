@@ -12,7 +12,6 @@
 
 #include "estimation/calibration/axis_gate.h"
 #include "estimation/calibration/combine.h"
-#include "estimation/calibration/covariance_watch.h"
 #include "estimation/calibration/drive_scatter.h"
 #include "estimation/calibration/filter_core.h"
 #include "estimation/calibration/gnss_trust.h"
@@ -522,23 +521,22 @@ TEST(CalibrationParts, SmoothingStep) {
 
 TEST(CalibrationParts, TheFirstStateThatIsACombinationOfOthersIsNamed) {
   CovarianceKernel P(19, InstructionSet::kBaseline);
-  CovarianceWatch watch(19);
   for (std::size_t i = 0; i < 19; ++i)
     for (std::size_t j = 0; j <= i; ++j) P.set(i, j, i == j ? 2.0 : 0.05 * unlike(19 * i + j));
-  EXPECT_FALSE(watch.first_bad_state(P));
+  EXPECT_FALSE(P.first_bad_state());
   P.reset_state(3, 0.0);
-  EXPECT_FALSE(watch.first_bad_state(P)) << "known exactly";
+  EXPECT_FALSE(P.first_bad_state()) << "known exactly";
   P.set(11, 11, P(10, 10));
   for (std::size_t j = 0; j < 19; ++j)
     if (j != 11 && j != 10) P.set(11, j, P(10, j));
   P.set(11, 10, P(10, 10));
-  EXPECT_EQ(watch.first_bad_state(P), 11U);
+  EXPECT_EQ(P.first_bad_state(), 11U);
   P.reset_state(11, 1.0);
-  EXPECT_FALSE(watch.first_bad_state(P));
+  EXPECT_FALSE(P.first_bad_state());
   P.set(16, 16, -1e-9);
-  EXPECT_EQ(watch.first_bad_state(P), 16U);
+  EXPECT_EQ(P.first_bad_state(), 16U);
   P.set(5, 5, std::nan(""));
-  EXPECT_EQ(watch.first_bad_state(P), 5U);
+  EXPECT_EQ(P.first_bad_state(), 5U);
 }
 
 }  // namespace
