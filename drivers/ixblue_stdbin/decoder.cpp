@@ -54,7 +54,7 @@ std::string_view describe(RawBlocks state) noexcept {
 }
 
 Decoder::Decoder(const DecoderConfig& config) noexcept
-    : config_(config), scanner_(config.per_byte), clock_(config.clock) {}
+    : config_(config), is_turned_(config.axes != kXvToFrd), scanner_(config.per_byte), clock_(config.clock) {}
 
 void Decoder::push(std::span<const std::uint8_t> bytes, Arrival arrival, SampleSink& sink) noexcept {
   counters_.bytes += bytes.size();
@@ -189,7 +189,8 @@ void Decoder::update_utc(const Telegram& telegram) noexcept {
   utc_at_ticks_ = ticks_;
 }
 
-RawBlocks Decoder::RepeatedBlock::take(std::span<const std::uint8_t> bytes) noexcept {
+RawBlocks Decoder::RepeatedBlock::take(std::span<const std::uint8_t> block) noexcept {
+  const auto bytes = block.first<kSize>();  // of known size: compared and copied without a call
   const bool same = in_a_row > 0 && std::equal(bytes.begin(), bytes.end(), last.begin());
   in_a_row = same ? in_a_row + 1 : 1;
   std::copy(bytes.begin(), bytes.end(), last.begin());
@@ -261,8 +262,7 @@ void Decoder::emit_attitude(const Telegram& telegram, Sample& sample, SampleSink
   sample.kind = SampleKind::kAttitude;
   AttitudeData& attitude = sample.attitude;
   attitude = AttitudeData{};
-  const bool turned = config_.axes != kXvToFrd;
-  if (turned) {
+  if (is_turned_) {
     const Matrix3 frd_to_b = multiply(config_.axes, transpose(kXvToFrd));
     rph = angles_of(multiply(rotation_of(rph), transpose(frd_to_b)));
   }
@@ -279,7 +279,7 @@ void Decoder::emit_attitude(const Telegram& telegram, Sample& sample, SampleSink
   if (const auto std_block = telegram.block(Nav::kAttitudeStd); !std_block.empty()) {
     attitude.sd_rpy_rad = {angle(std_block, 1), angle(std_block, 2), angle(std_block, 0)};
     // In turned axes a tilt of the unit is part roll, part pitch: the larger sd holds for both.
-    if (turned) {
+    if (is_turned_) {
       const double tilt = std::max(attitude.sd_rpy_rad[0], attitude.sd_rpy_rad[1]);
       attitude.sd_rpy_rad[0] = attitude.sd_rpy_rad[1] = tilt;
     }

@@ -75,9 +75,10 @@ class Decoder final : public DeviceDecoder {
  private:
   /// A raw block that stays the same to the last bit.
   struct RepeatedBlock {
-    std::array<std::uint8_t, 12> last{};
+    static constexpr std::size_t kSize = 3 * sizeof(float);
+    std::array<std::uint8_t, kSize> last{};
     std::uint64_t in_a_row = 0;
-    RawBlocks take(std::span<const std::uint8_t> bytes) noexcept;
+    RawBlocks take(std::span<const std::uint8_t> block) noexcept;
   };
 
   void drain(HostTime arrival, SampleSink& sink, bool at_end) noexcept;
@@ -93,6 +94,7 @@ class Decoder final : public DeviceDecoder {
   void mirror_scan_counters() noexcept;
 
   DecoderConfig config_;
+  bool is_turned_;  ///< b is not the unit's forward-right-down
   Scanner scanner_;
   ClockMap clock_;
   DecoderCounters counters_;

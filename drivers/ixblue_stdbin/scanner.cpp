@@ -101,7 +101,7 @@ Examined Scanner::examine_telegram(std::span<const std::uint8_t> pending) noexce
   if (sum_of_bytes(pending.first(summed)) != read_be<std::uint32_t>(pending, summed)) {
     return {Verdict::kBadChecksum};
   }
-  std::copy_n(pending.begin(), sizes_end, possible_.begin());
+  if (!as_before) std::copy_n(pending.begin(), sizes_end, possible_.begin());
   return {Verdict::kFrame, total, kTelegramKind};
 }
 

@@ -64,17 +64,13 @@ std::optional<Date> to_date(std::string_view text) noexcept {
 
 constexpr std::size_t kWord = sizeof(std::uint64_t);
 
-/// Eight characters at once: bit 8 i + 7 is set where character i is a comma (the exact search for a zero
-/// byte, Warren, Hacker's Delight, 6-1).
-std::uint64_t commas(std::string_view text) noexcept {
+/// Eight characters at once, or the last few: bit 8 i + 7 is set where character i is a comma (the exact search for
+/// a zero byte, Warren, Hacker's Delight, 6-1).
+std::uint64_t commas(const char* text, std::size_t size) noexcept {
   constexpr std::uint64_t kEveryByte = 0x0101010101010101ULL;
   constexpr std::uint64_t kLow = 0x7F * kEveryByte;
   std::uint64_t word = 0;
-  if (text.size() == kWord) {
-    std::memcpy(&word, text.data(), kWord);
-  } else {
-    std::memcpy(&word, text.data(), text.size());
-  }
+  std::memcpy(&word, text, size);
   if constexpr (std::endian::native == std::endian::big) word = __builtin_bswap64(word);
   word ^= static_cast<std::uint64_t>(',') * kEveryByte;
   return ~(((word & kLow) + kLow) | word | kLow);
@@ -93,13 +89,15 @@ void put_digits(detail::ShortText& text, int value, int digits) noexcept {
 Fields::Fields(std::string_view sentence) noexcept : sentence_(sentence) {
   std::size_t n = 0;  // commas; the address stands before the first one
   const std::size_t end = std::min(sentence.rfind('*'), sentence.size());
-  for (std::size_t at = 0; at < end; at += kWord) {
-    for (std::uint64_t marks = commas(sentence.substr(at, std::min(kWord, end - at))); marks != 0;
-         marks &= marks - 1) {
+  const auto note = [&](std::size_t at, std::uint64_t marks) {
+    for (; marks != 0; marks &= marks - 1) {
       begin_[n] = static_cast<std::uint16_t>(at + static_cast<std::size_t>(std::countr_zero(marks)) / 8 + 1);
       n += n <= kMax ? 1 : 0;
     }
-  }
+  };
+  std::size_t at = 0;
+  for (; at + kWord <= end; at += kWord) note(at, commas(sentence.data() + at, kWord));
+  if (at < end) note(at, commas(sentence.data() + at, end - at));
   begin_[n] = static_cast<std::uint16_t>(end + 1);
   size_ = std::min(n, kMax);
   address_ = sentence.substr(1, begin_[0] - 2U);

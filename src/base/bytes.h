@@ -3,6 +3,7 @@
 /// Numbers out of bytes, by copying and turning them round: no overlay, so alignment and the host's byte
 /// order do not matter. And the sums over bytes that several protocols end their frames with.
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -60,20 +61,22 @@ void write_le(T value, std::span<std::uint8_t> out, std::size_t offset = 0) noex
   constexpr std::uint64_t kEvenBytes = 0x00FF00FF00FF00FFULL;
   constexpr std::size_t kWordsUntilFull = 128;
   constexpr std::size_t kWord = sizeof(std::uint64_t);
+  constexpr std::uint64_t kEvenLanes = 0x0000FFFF0000FFFFULL;
   std::uint32_t sum = 0;
   const std::uint8_t* at = bytes.data();
-  std::size_t left = bytes.size();
-  while (left >= kWord) {
+  for (std::size_t words = bytes.size() / kWord; words > 0;) {
+    const std::size_t n = std::min(words, kWordsUntilFull);
     std::uint64_t lanes = 0;
-    for (std::size_t n = 0; n < kWordsUntilFull && left >= kWord; ++n, at += kWord, left -= kWord) {
+    for (const std::uint8_t* end = at + n * kWord; at != end; at += kWord) {
       std::uint64_t word;
       std::memcpy(&word, at, kWord);
       lanes += (word & kEvenBytes) + (word >> 8U & kEvenBytes);
     }
-    sum += static_cast<std::uint32_t>((lanes & 0xFFFFU) + (lanes >> 16U & 0xFFFFU) +
-                                      (lanes >> 32U & 0xFFFFU) + (lanes >> 48U));
+    lanes = (lanes & kEvenLanes) + (lanes >> 16U & kEvenLanes);
+    sum += static_cast<std::uint32_t>(lanes + (lanes >> 32U));
+    words -= n;
   }
-  for (; left > 0; ++at, --left) sum += *at;
+  for (const std::uint8_t* end = bytes.data() + bytes.size(); at != end; ++at) sum += *at;
   return sum;
 }
 

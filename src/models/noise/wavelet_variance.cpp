@@ -26,7 +26,7 @@ bool all_finite(std::span<const double> x) {
   return (values * 0.0).sum() == 0.0;
 }
 
-Result<void> check(std::span<const double> x, const WvOptions& options) {
+Result<void> check_options(std::span<const double> x, const WvOptions& options) {
   if (!options.mask.empty() && options.mask.size() != x.size()) {
     return work_error(
         fmt::format("the mask has {} entries and the signal {}", options.mask.size(), x.size()));
@@ -39,6 +39,10 @@ Result<void> check(std::span<const double> x, const WvOptions& options) {
     return usage_error(
         fmt::format("a robust efficiency of {} is outside 0.2..0.99", options.robust->efficiency));
   }
+  return {};
+}
+
+Result<void> check_samples(std::span<const double> x, const WvOptions& options) {
   if (options.nan_is_gap || all_finite(x)) return {};
   for (std::size_t i = 0; i < x.size(); ++i) {
     if (!std::isfinite(x[i]) && (options.mask.empty() || options.mask[i] != 0)) {
@@ -192,11 +196,17 @@ namespace {
 /// @param used_up  the memory of x, where it may be written to; else empty
 Result<WaveletVariance> wavelet_variance(std::span<const double> x, std::span<double> used_up,
                                          const WvOptions& options) {
-  if (auto checked = check(x, options); !checked) return tl::unexpected(checked.error());
+  if (auto checked = check_options(x, options); !checked) return tl::unexpected(checked.error());
+  const bool is_whole = options.mask.empty() && !options.nan_is_gap && !x.empty();
+  // What is not finite makes a first level that is not: where the samples are still there afterwards, a look at
+  // each of them before would cost what a level costs.
+  const bool first_level_tells = is_whole && !options.robust && used_up.empty() && x.size() > 1;
+  if (!first_level_tells) {
+    if (auto checked = check_samples(x, options); !checked) return tl::unexpected(checked.error());
+  }
   WaveletVariance wv;
   wv.n_samples = x.size();
-  // Without a mask what was checked is finite: one look at every sample is enough.
-  const bool is_whole = options.mask.empty() && !options.nan_is_gap && !x.empty();
+  // Without a mask what was or will be checked is finite: one look at every sample is enough.
   wv.segments = is_whole ? std::vector<Segment>{{0, x.size()}} : valid_segments(x, options.mask);
   std::size_t longest = 0;
   for (const Segment& s : wv.segments) {
@@ -219,6 +229,9 @@ Result<WaveletVariance> wavelet_variance(std::span<const double> x, std::span<do
     const std::size_t begin = wv.segments.front().begin;
     wv.levels = whole_levels(x.subspan(begin, longest),
                              used_up.empty() ? used_up : used_up.subspan(begin, longest), wanted);
+  }
+  if (first_level_tells && !std::isfinite(wv.levels.front().value)) {
+    if (auto checked = check_samples(x, options); !checked) return tl::unexpected(checked.error());
   }
   if (const auto possible = static_cast<int>(wv.levels.size()); options.levels > possible) {
     return work_error(

@@ -69,7 +69,8 @@ std::vector<bench::Row> measure(const ProtocolStream& stream, int repetitions, b
   row.unit = "MB/s";
   row.memory_mb = bench::peak_memory_mb([&] {
     const auto decoder = stream.make_decoder();
-    push_in_reads(stream, kReadSize, *decoder, sink);
+    KeepingSink other;
+    push_in_reads(stream, kReadSize, *decoder, other);
   });
   if (stream.checksum) {
     row.ratio = decode_s / floor_s;
@@ -84,6 +85,16 @@ std::vector<bench::Row> measure(const ProtocolStream& stream, int repetitions, b
   sample.unit = "ns";
   sample.memory_mb.reset();
   return {row, sample};
+}
+
+/// Decoder and checksum once over the stream, and what they found: tools/benchmarks/decode_instructions counts.
+void decode_once(const ProtocolStream& stream) {
+  const auto decoder = stream.make_decoder();
+  KeepingSink sink;
+  push_in_reads(stream, kReadSize, *decoder, sink);
+  const std::uint32_t checksum = stream.checksum ? stream.checksum(stream.bytes) : 0;
+  fmt::print("{}\t{}\t{}\t{}\t{}\n", stream.name, stream.bytes.size(), decoder->counters().frames, sink.n,
+             checksum);
 }
 
 /// What every decoder pays for a sample, whatever its bytes are: clock map and sink, ns.
@@ -118,6 +129,8 @@ int main(int argc, char** argv) {
   app.add_option("--repetitions", repetitions, "of which the fastest counts")->check(CLI::Range(1, 10000));
   app.add_option("--only", only, "only protocols whose name holds this");
   app.add_option("--json", json, "write the rows here")->type_name("FILE");
+  bool once = false;
+  app.add_flag("--once", once, "measure nothing: decode each once, print bytes, frames, samples, checksum");
   CLI11_PARSE(app, argc, argv);
 
   bool complete = true;
@@ -125,10 +138,15 @@ int main(int argc, char** argv) {
   std::vector<bench::Row> samples;
   for (const ProtocolStream& stream : imuscope::test::protocol_streams(kSeconds)) {
     if (stream.name.find(only) == std::string::npos) continue;
+    if (once) {
+      decode_once(stream);
+      continue;
+    }
     const auto rows = measure(stream, repetitions, complete);
     throughput.push_back(rows[0]);
     samples.push_back(rows[1]);
   }
+  if (once) return 0;
   const double alone_ns = sample_alone_ns(repetitions);
   for (bench::Row& row : samples) {
     row.ratio = row.value / alone_ns;

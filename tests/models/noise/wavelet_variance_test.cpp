@@ -9,6 +9,7 @@
 #include <map>
 #include <numeric>
 #include <random>
+#include <string>
 
 #include "made_series.h"
 #include "models/noise/robust_scale.h"
@@ -72,19 +73,59 @@ double by_sums(const std::vector<double>& x, int level) {
   return static_cast<double>(squares / static_cast<long double>(x.size() - 2 * n + 1));
 }
 
+void expect_sums_at_every_level(std::size_t length) {
+  const auto x = white(length, 5);
+  const auto wv = haar_wavelet_variance(x);
+  ASSERT_TRUE(wv) << wv.error().text();
+  ASSERT_EQ(wv->levels.size(), static_cast<std::size_t>(std::bit_width(length)) - 1);
+  for (const auto& level : wv->levels) {
+    EXPECT_LT(relative(level.value, by_sums(x, level.level)), 1e-12) << length << ", level " << level.level;
+    EXPECT_EQ(level.n_coefficients, length - (std::size_t{1} << static_cast<unsigned>(level.level)) + 1);
+  }
+}
+
+TEST(WaveletVariance, LengthsAboutTheEndsOfTilesAgreeWithTheDefinition) {
+  // Tiles of 1024 samples, steps of eight: a last tile of every length up to two steps, and one that is not full.
+  for (const std::size_t tiles : {1U, 2U, 3U, 8U, 32U}) {
+    for (std::size_t more = 0; more <= 16; ++more) expect_sums_at_every_level(1024 * tiles + more);
+    for (std::size_t less = 1; less <= 9; ++less) expect_sums_at_every_level(1024 * tiles - less);
+  }
+}
+
 TEST(WaveletVariance, LongSupportsThatAreTakenInStripsAgreeWithTheDefinitionWhateverTheLength) {
-  // One sum of 4096 samples beyond the low levels; strips with a row more than others, and with none; strips
-  // narrower than the sums are apart.
-  for (const std::size_t length : {8192U, 8193U, 12'287U, 12'288U, 12'289U, 40'961U, 200'003U}) {
-    const auto x = white(length, 5);
-    const auto wv = haar_wavelet_variance(x);
-    ASSERT_TRUE(wv) << wv.error().text();
-    ASSERT_EQ(wv->levels.size(), static_cast<std::size_t>(std::bit_width(length)) - 1);
-    for (const auto& level : wv->levels) {
-      EXPECT_LT(relative(level.value, by_sums(x, level.level)), 1e-12) << length << ", level " << level.level;
-      EXPECT_EQ(level.n_coefficients, length - (std::size_t{1} << static_cast<unsigned>(level.level)) + 1);
+  // One sum of 32768 samples beyond the low levels, and a few more or less; strips with a row more than others, and
+  // with none; strips narrower than the others, and not as wide as a line of the cache.
+  for (const std::size_t length :
+       {8192U, 12'289U, 40'961U, 65'535U, 65'536U, 65'537U, 65'543U, 65'544U, 98'303U, 98'304U, 98'305U,
+        98'313U, 131'071U, 131'072U, 200'003U, 524'289U})
+    expect_sums_at_every_level(length);
+}
+
+TEST(WaveletVariance, ASampleThatIsNoNumberIsToldWhereverItStands) {
+  for (const std::size_t length : {2U, 1030U, 70'000U}) {
+    for (const std::size_t place : {std::size_t{0}, std::size_t{1}, length / 2, length - 1}) {
+      for (const double no_number :
+           {std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity()}) {
+        auto x = white(length, 6);
+        x[place] = no_number;
+        const std::string told = "sample " + std::to_string(place) + " (counted from 0)";
+        const auto refused = haar_wavelet_variance(x);
+        ASSERT_FALSE(refused) << length;
+        EXPECT_THAT(refused.error().text(), HasSubstr(told));
+        const auto refused_in_place = haar_wavelet_variance_in_place(x);
+        ASSERT_FALSE(refused_in_place) << length;
+        EXPECT_THAT(refused_in_place.error().text(), HasSubstr(told));
+      }
     }
   }
+}
+
+TEST(WaveletVariance, SquaresBeyondAllNumbersAreNoReasonToRefuseSamplesThatAreNumbers) {
+  auto x = white(100, 6);
+  x[50] = 1e200;
+  const auto wv = haar_wavelet_variance(x);
+  ASSERT_TRUE(wv) << wv.error().text();
+  EXPECT_TRUE(std::isinf(wv->levels.front().value));
 }
 
 TEST(WaveletVariance, EveryClassicalLevelAndIntervalOfTheOracleIsReproducedTo1em10) {
