@@ -148,7 +148,7 @@ class Grower {
   /// Takes the model where it is better than the best by `margin`.
   /// @param start  nothing: those of the search alone
   /// @param added  the kind that it has more than the best; fast or steep ones that get no amplitude are not
-  /// tried again
+  /// tried again, but where the error of a rejected model may hide them
   bool consider(ModelSpec spec, double margin, std::optional<ProcessKind> added = std::nullopt,
                 const Model* start = nullptr) {
     std::sort(spec.processes.begin(), spec.processes.end());
@@ -165,7 +165,7 @@ class Grower {
       tried_.emplace(spec.name(), std::move(fitted));
       return false;
     }
-    if (added && is_fast_or_steep(*added) &&
+    if (added && is_fast_or_steep(*added) && !is_rejected(*fitted) &&
         std::any_of(fitted->model.components.begin(), fitted->model.components.end(),
                     [&](const Component& c) { return c.kind == *added && c.amplitude <= 0.0; }))
       unsupported_.insert(*added);
