@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <execution>
+#include <iterator>
 #include <mutex>
-#include <numeric>
 
+#include "base/for_each_index.h"
 #include "base/units.h"
+#include "models/certificate/all_cores.h"
 #include "models/certificate/candidate_models.h"
 #include "models/certificate/record_checks.h"
 #include "models/noise/covariance_table.h"
@@ -191,15 +192,18 @@ Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span
                         double confidence, AxisCertificate& out) {
   noise::LineOptions line_options;
   line_options.rate_hz = record.rate_hz;
-  const std::array<std::function<void()>, 2> looks{
-      [&] { out.lines = noise::find_lines(x, mask, line_options); },
-      [&] {  // the spectrum shows the lines, too
-        out.density = noise::density_of(x, noise::Present(x, mask), record.rate_hz, confidence);
-      }};
-  std::for_each(std::execution::par, looks.begin(), looks.end(), [](const auto& look) { look(); });
-  noise::remove_lines(x, mask, out.lines, record.rate_hz);
-  out.resonances = noise::find_resonances(x, mask, record.rate_hz);
-  out.low_pass_hz = noise::low_pass_hz(x, mask, record.rate_hz);
+  noise::Spectra spectra(x, mask);
+  std::vector<std::size_t> lengths = segments_of_lines(spectra, line_options);
+  std::ranges::copy(segments_of_density(spectra), std::back_inserter(lengths));
+  spectra.make(lengths, on_all_cores);
+  out.lines = find_lines(spectra, line_options);
+  out.density = density_of(spectra, record.rate_hz, confidence);  // with the lines
+  if (!out.lines.empty()) {
+    noise::remove_lines(x, mask, out.lines, record.rate_hz);
+    spectra = noise::Spectra(x, mask);
+  }
+  out.resonances = find_resonances(spectra, record.rate_hz);
+  out.low_pass_hz = low_pass_hz(spectra, record.rate_hz);
   noise::WvOptions wv_options;
   wv_options.mask = mask;
   wv_options.confidence = confidence;
@@ -267,8 +271,6 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
                                                        const AxisOptions& options, const AxisDone& told) {
   std::vector<Result<AxisCertificate>> out(records.size(), work_error("not looked at"));
-  std::vector<std::size_t> index(records.size());
-  std::iota(index.begin(), index.end(), std::size_t{0});
   noise::CovarianceTables own;
   AxisOptions shared = options;
   if (shared.covariances == nullptr) shared.covariances = &own;
@@ -281,9 +283,9 @@ std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecor
     told(++done);
   };
   if (std::ranges::any_of(records, [](const AxisRecord& r) { return static_cast<bool>(r.fetch); }))
-    std::for_each(index.begin(), index.end(), look);
+    one_by_one(records.size(), look);
   else
-    std::for_each(std::execution::par, index.begin(), index.end(), look);
+    on_all_cores(records.size(), look);
   return out;
 }
 
