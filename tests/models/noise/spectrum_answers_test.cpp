@@ -151,7 +151,7 @@ TEST(Spectra, NoSpectrumIsAskedForBeyondThoseThatAreNamed) {
   const Spectra spectra(x, {});
   EXPECT_EQ(segments_of_lines(spectra, options), (std::vector<std::size_t>{4096, 16'384}));
   EXPECT_EQ(segments_of_density(spectra), (std::vector<std::size_t>{256, 1024, 4096, 16'384, 65'536}));
-  EXPECT_TRUE(segments_of_density(Spectra(std::span(x).first(255), {})).empty());
+  EXPECT_TRUE(segments_of_density(Spectra(std::span<const double>(x).first(255), {})).empty());
 }
 
 TEST(SpectrumAnswers, NoiseAloneHasNoLines) {
@@ -183,7 +183,7 @@ TEST(SpectrumAnswers, Densities) {
     Spectra spectra(x, there);
     add_density(density_of(spectra, kRate_hz));
     add_density(density_of(spectra, kRate_hz, 0.8, 2, 64));
-    Spectra of_few(std::span(x).first(200), there.first(std::min<std::size_t>(there.size(), 200)));
+    Spectra of_few{std::span(x).first(200), there.first(std::min<std::size_t>(there.size(), 200))};
     answer.line("of too few", density_of(of_few, kRate_hz).size());
   }
   answer.line(degrees_of_freedom(1.0), degrees_of_freedom(2.0), degrees_of_freedom(100.0));
