@@ -350,6 +350,10 @@ class CsvReader {
 
   /// NaN where the table says that it has none.
   Result<double> signal_value(std::size_t index) const {
+    // Nearly all cells are plain numbers.
+    if (index < cells_.size()) {
+      if (const auto value = to_number(cells_[index])) return *value;
+    }
     const auto text = cell(index);
     if (text && is_missing(*text)) return std::numeric_limits<double>::quiet_NaN();
     return number(index);

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <execution>
+#include <future>
+#include <iterator>
 #include <mutex>
-#include <numeric>
 
 #include "base/units.h"
+#include "models/certificate/all_cores.h"
 #include "models/certificate/candidate_models.h"
 #include "models/certificate/record_checks.h"
 #include "models/noise/covariance_table.h"
@@ -191,15 +192,18 @@ Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span
                         double confidence, AxisCertificate& out) {
   noise::LineOptions line_options;
   line_options.rate_hz = record.rate_hz;
-  const std::array<std::function<void()>, 2> looks{
-      [&] { out.lines = noise::find_lines(x, mask, line_options); },
-      [&] {  // the spectrum shows the lines, too
-        out.density = noise::density_of(x, noise::Present(x, mask), record.rate_hz, confidence);
-      }};
-  std::for_each(std::execution::par, looks.begin(), looks.end(), [](const auto& look) { look(); });
-  noise::remove_lines(x, mask, out.lines, record.rate_hz);
-  out.resonances = noise::find_resonances(x, mask, record.rate_hz);
-  out.low_pass_hz = noise::low_pass_hz(x, mask, record.rate_hz);
+  noise::Spectra spectra(x, mask);
+  std::vector<std::size_t> lengths = segments_of_lines(spectra, line_options);
+  std::ranges::copy(segments_of_density(spectra), std::back_inserter(lengths));
+  spectra.make(lengths, on_all_cores);
+  out.lines = find_lines(spectra, line_options);
+  out.density = density_of(spectra, record.rate_hz, confidence);  // with the lines
+  if (!out.lines.empty()) {
+    noise::remove_lines(x, mask, out.lines, record.rate_hz);
+    spectra = noise::Spectra(x, mask);
+  }
+  out.resonances = find_resonances(spectra, record.rate_hz);
+  out.low_pass_hz = low_pass_hz(spectra, record.rate_hz);
   noise::WvOptions wv_options;
   wv_options.mask = mask;
   wv_options.confidence = confidence;
@@ -210,8 +214,13 @@ Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span
   return kept;
 }
 
-Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions& options,
-                                     noise::CovarianceTables& covariances) {
+/// All that the samples are needed for before there is a model.
+struct Reduced {
+  AxisCertificate certificate;  ///< without what the model tells
+  Kept kept;
+};
+
+Result<Reduced> reduced(const AxisRecord& record, double confidence) {
   AxisCertificate out;
   out.name = record.name;
   out.unit = record.unit;
@@ -219,7 +228,7 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   if (!x) return tl::unexpected(named(record, x.error()));
   const std::vector<std::uint8_t> mask = mask_of(record, *x);
   if (auto looked = look_at(record, *x, mask, out); !looked) return tl::unexpected(looked.error());
-  const auto kept = take_apart(record, *x, mask, options.confidence, out);
+  auto kept = take_apart(record, *x, mask, confidence, out);
   if (!kept) return tl::unexpected(kept.error());
 
   *x = std::vector<double>();  // assigning {} would keep its memory, which what follows needs
@@ -227,17 +236,23 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   if (!x) return tl::unexpected(named(record, x.error()));
   noise::remove_lines(*x, mask, out.lines, record.rate_hz);
   out.allan = noise::allan_deviation(std::move(*x), kept->wv, record.rate_hz);
-  *x = std::vector<double>();
+  return Reduced{std::move(out), std::move(*kept)};
+}
 
-  auto grown = model_of(kept->wv, record, !out.resonances.empty(), options, covariances);
+/// The model and what it tells: without samples, so that those of another axis may be in memory meanwhile.
+Result<AxisCertificate> modelled(Reduced&& axis, const AxisRecord& record, const AxisOptions& options,
+                                 noise::CovarianceTables& covariances) {
+  AxisCertificate& out = axis.certificate;
+  const Kept& kept = axis.kept;
+  auto grown = model_of(kept.wv, record, !out.resonances.empty(), options, covariances);
   if (!grown) return tl::unexpected(named(record, grown.error()));
   out.fit = std::move(grown->best);
   out.largest_miss = largest_miss_of(out.fit);
   for (const FitResult& rival : grown->rivals) out.rivals.push_back(rival.spec.name());
   noise::set_allan_intervals(out.allan, &out.fit, options.confidence,
-                             covariances.of(kept->wv, out.fit.wv.size()).get());
+                             covariances.of(kept.wv, out.fit.wv.size()).get());
   out.terms = data_sheet_terms(out.fit, grown->rivals, out.allan, record.unit);
-  out.halves = compared(kept->halves, out.fit);
+  out.halves = compared(kept.halves, out.fit);
   if (out.halves && out.halves->p_value < kDiffer) {
     out.warnings.push_back(fmt::format(
         "the halves of the record differ (p = {:.2g}): at averaging times around {:.3g} s the second has "
@@ -246,15 +261,46 @@ Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions
   }
   noise::WvOptions of_excerpt;
   of_excerpt.confidence = options.confidence;
-  out.tails = noise::test_tails(kept->tails, of_excerpt, out.fit.model);
+  out.tails = noise::test_tails(kept.tails, of_excerpt, out.fit.model);
   if (const auto spikes = noise::spike_warning(out.tails, record.rate_hz)) out.warnings.push_back(*spikes);
-  if (record.temperature_c != nullptr) {
-    x = samples_of(record);
-    if (!x) return tl::unexpected(named(record, x.error()));
-    out.temperature = temperature_of(*x, mask, *record.temperature_c, out.fit);
-  }
   add_limits(out);
-  return out;
+  return std::move(out);
+}
+
+/// What only the samples and the model together tell.
+Result<AxisCertificate> with_temperature(Result<AxisCertificate>&& axis, const AxisRecord& record) {
+  if (!axis || record.temperature_c == nullptr) return std::move(axis);
+  const auto x = samples_of(record);
+  if (!x) return tl::unexpected(named(record, x.error()));
+  axis->temperature = temperature_of(*x, mask_of(record, *x), *record.temperature_c, axis->fit);
+  return std::move(axis);
+}
+
+Result<AxisCertificate> characterize(const AxisRecord& record, const AxisOptions& options,
+                                     noise::CovarianceTables& covariances) {
+  auto axis = reduced(record, options.confidence);
+  if (!axis) return tl::unexpected(axis.error());
+  return with_temperature(modelled(std::move(*axis), record, options, covariances), record);
+}
+
+/// One record's samples after the other, while models of those before are looked for.
+void characterize_fetched(std::span<const AxisRecord> records, const AxisOptions& options,
+                          noise::CovarianceTables& covariances, std::vector<Result<AxisCertificate>>& out,
+                          const AxisDone& told) {
+  std::vector<std::future<Result<AxisCertificate>>> models;
+  for (const AxisRecord& record : records) {
+    models.push_back(std::async(
+        std::launch::async,
+        [&](Result<Reduced>&& axis) -> Result<AxisCertificate> {
+          if (!axis) return tl::unexpected(axis.error());
+          return modelled(std::move(*axis), record, options, covariances);
+        },
+        reduced(record, options.confidence)));
+  }
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    out[i] = with_temperature(models[i].get(), records[i]);
+    if (told) told(i + 1);
+  }
 }
 
 }  // namespace
@@ -267,23 +313,21 @@ Result<AxisCertificate> characterize_axis(const AxisRecord& record, const AxisOp
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
                                                        const AxisOptions& options, const AxisDone& told) {
   std::vector<Result<AxisCertificate>> out(records.size(), work_error("not looked at"));
-  std::vector<std::size_t> index(records.size());
-  std::iota(index.begin(), index.end(), std::size_t{0});
   noise::CovarianceTables own;
   AxisOptions shared = options;
   if (shared.covariances == nullptr) shared.covariances = &own;
+  if (std::ranges::any_of(records, [](const AxisRecord& r) { return static_cast<bool>(r.fetch); })) {
+    characterize_fetched(records, shared, *shared.covariances, out, told);
+    return out;
+  }
   std::mutex telling;
   std::size_t done = 0;
-  const auto look = [&](std::size_t i) {
+  on_all_cores(records.size(), [&](std::size_t i) {
     out[i] = characterize_axis(records[i], shared);
     if (!told) return;
     const std::scoped_lock lock(telling);
     told(++done);
-  };
-  if (std::ranges::any_of(records, [](const AxisRecord& r) { return static_cast<bool>(r.fetch); }))
-    std::for_each(index.begin(), index.end(), look);
-  else
-    std::for_each(std::execution::par, index.begin(), index.end(), look);
+  });
   return out;
 }
 

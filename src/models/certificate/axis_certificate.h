@@ -90,7 +90,8 @@ inline constexpr std::uint64_t kFewestSamples = 200;
 using AxisDone = std::function<void(std::size_t done)>;
 
 /// Axes side by side on all cores; the result does not depend on their number. One entry a record, in order.
-/// Records that are fetched are taken one after the other: no more than one of them is in memory.
+/// Records that are fetched are taken one after the other: no more than one of them is in memory, while models
+/// of those before are looked for.
 std::vector<Result<AxisCertificate>> characterize_axes(std::span<const AxisRecord> records,
                                                        const AxisOptions& options, const AxisDone& told = {});
 

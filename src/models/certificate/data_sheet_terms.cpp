@@ -9,7 +9,6 @@
 
 #include "base/units.h"
 #include "models/certificate/models_interval.h"
-#include "models/noise/inference.h"
 
 namespace imuscope::certificate {
 namespace {
@@ -100,26 +99,6 @@ bool rises_after(std::span<const noise::AllanPoint> allan, std::size_t lowest) {
                      [&](const auto& point) { return point.ci_low > allan[lowest].deviation; });
 }
 
-/// Sd of the logarithm of the model's Allan deviation at n samples, by the parameters' covariance.
-std::optional<double> log_sd_at(const FitResult& fit, double n) {
-  const auto places = noise::parameter_places(fit.model);
-  const auto size = static_cast<Eigen::Index>(places.size());
-  if (static_cast<Eigen::Index>(fit.covariance.size()) != size * size || fit.wv.empty()) return std::nullopt;
-  const int level = std::clamp(static_cast<int>(std::lround(std::log2(n))) + 1, 1,
-                               static_cast<int>(fit.wv.back().observed.level));
-  const Eigen::RowVectorXd slope = noise::wv_jacobian(fit.model, {level}, places).row(0);
-  const Eigen::Map<const Eigen::MatrixXd> covariance(fit.covariance.data(), size, size);
-  double variance = 0.0;
-  for (Eigen::Index i = 0; i < size; ++i) {
-    for (Eigen::Index k = 0; k < size; ++k) {
-      if (slope[i] != 0.0 && slope[k] != 0.0) variance += slope[i] * slope[k] * covariance(i, k);
-    }
-  }
-  const double value = model_wv(fit.model, level);
-  if (!(variance >= 0.0) || !(value > 0.0)) return std::nullopt;  // NaN where a parameter is not told
-  return 0.5 * std::sqrt(variance) / value;
-}
-
 /// T-1: B.
 TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoint> allan,
                            noise::SignalUnit unit) {
@@ -145,8 +124,11 @@ TermValue bias_instability(const FitResult& fit, std::span<const noise::AllanPoi
   out.knowledge = Knowledge::kFitted;
   out.value = shown(lowest.deviation);
   const double z = boost::math::quantile(boost::math::normal(), 0.5 * (1.0 + fit.confidence));
-  // Without the model's own sd, that of the observed deviation at this averaging time.
-  const auto log_sd = log_sd_at(fit, static_cast<double>(place.n));
+  // What the record tells of the curve, whether or not it tells each parameter; else what it tells of the
+  // observed deviation at this averaging time.
+  const auto log_sd = noise::told_log_sd(fit, [&](const noise::Model& model) {
+    return model_allan_deviation(model, static_cast<double>(place.n));
+  });
   out.ci_low = log_sd ? out.value * std::exp(-z * *log_sd) : shown(place.ci_low);
   out.ci_high = log_sd ? out.value * std::exp(z * *log_sd) : shown(place.ci_high);
   out.note = fmt::format("at {:.3g} s", place.tau_s);

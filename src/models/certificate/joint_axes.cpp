@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <execution>
 #include <limits>
 
+#include "models/certificate/all_cores.h"
 #include "models/noise/covariance_table.h"
 #include "models/noise/holm.h"
 
@@ -49,8 +49,8 @@ Result<std::vector<CrossLevel>> levels_of(std::span<const JointSignal> signals,
   noise::CovarianceTables own;
   noise::CovarianceTables& covariances = shared != nullptr ? *shared : own;
   std::vector<Result<noise::FitResult>> shapes(signals.size(), work_error("not looked at"));
-  std::transform(std::execution::par, signals.begin(), signals.end(), shapes.begin(),
-                 [&](const JointSignal& s) { return shape_of(s.values, mask, rate_hz, covariances); });
+  on_all_cores(signals.size(),
+               [&](std::size_t i) { shapes[i] = shape_of(signals[i].values, mask, rate_hz, covariances); });
   std::vector<std::span<const double>> values;
   std::vector<noise::FitResult> fits;
   for (std::size_t i = 0; i < signals.size(); ++i) {
@@ -62,7 +62,7 @@ Result<std::vector<CrossLevel>> levels_of(std::span<const JointSignal> signals,
     values.push_back(signals[i].values);
     fits.push_back(std::move(*shapes[i]));
   }
-  return noise::cross_variance(values, mask, fits, &covariances);
+  return noise::cross_variance(values, mask, fits, &covariances, on_all_cores);
 }
 
 std::vector<CrossLevel> chosen(std::span<const CrossLevel> levels, const JointOptions& options) {

@@ -37,14 +37,11 @@ VectorXd dof_of(const FitResult& fit, const WaveletVariance& wv, CovarianceTable
 /// drowns.
 std::vector<double> pair_covariance(std::span<const double> x, std::span<const double> y, double scale,
                                     const WvOptions& options, std::size_t levels) {
-  std::vector<double> sum(x.size());
-  std::vector<double> difference(x.size());
-  for (std::size_t t = 0; t < x.size(); ++t) {
-    sum[t] = x[t] + scale * y[t];
-    difference[t] = x[t] - scale * y[t];
-  }
-  const auto of_sum = haar_wavelet_variance(sum, options);
-  const auto of_difference = haar_wavelet_variance(difference, options);
+  std::vector<double> both(x.size());
+  for (std::size_t t = 0; t < x.size(); ++t) both[t] = x[t] + scale * y[t];
+  const auto of_sum = haar_wavelet_variance_in_place(both, options);
+  for (std::size_t t = 0; t < x.size(); ++t) both[t] = x[t] - scale * y[t];
+  const auto of_difference = haar_wavelet_variance_in_place(both, options);
   std::vector<double> gamma(levels, 0.0);
   if (!of_sum || !of_difference) return gamma;
   for (std::size_t j = 0; j < levels; ++j)
@@ -82,7 +79,8 @@ MatrixXd common_form(Index n) {
 
 Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const double>> signals,
                                                std::span<const std::uint8_t> mask,
-                                               std::span<const FitResult> fits, CovarianceTables* tables) {
+                                               std::span<const FitResult> fits, CovarianceTables* tables,
+                                               const ForEachIndex& for_each) {
   const auto n = static_cast<Index>(signals.size());
   for (const auto& signal : signals) {
     if (signal.size() != signals.front().size())
@@ -93,9 +91,10 @@ Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const d
   const std::vector<std::uint8_t> joint = joint_mask(signals, mask);
   WvOptions options;
   options.mask = joint;
+  std::vector<Result<WaveletVariance>> looked_at(signals.size(), work_error("not looked at"));
+  for_each(signals.size(), [&](std::size_t i) { looked_at[i] = haar_wavelet_variance(signals[i], options); });
   std::vector<WaveletVariance> own;
-  for (const auto& signal : signals) {
-    auto wv = haar_wavelet_variance(signal, options);
+  for (auto& wv : looked_at) {
     if (!wv) return tl::unexpected(wv.error());
     own.push_back(std::move(*wv));
   }
@@ -116,16 +115,19 @@ Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const d
     out[j].dof = static_cast<double>(n) / inverse;
     for (Index i = 0; i < n; ++i) out[j].covariance(i, i) = own[static_cast<std::size_t>(i)].levels[j].value;
   }
+  std::vector<std::pair<Index, Index>> pairs;
   for (Index i = 0; i < n; ++i) {
-    for (Index k = 0; k < i; ++k) {
-      const auto& x = own[static_cast<std::size_t>(i)].levels.front();
-      const auto& y = own[static_cast<std::size_t>(k)].levels.front();
-      const double scale = y.value > 0.0 && x.value > 0.0 ? std::sqrt(x.value / y.value) : 1.0;
-      const auto gamma = pair_covariance(signals[static_cast<std::size_t>(i)],
-                                         signals[static_cast<std::size_t>(k)], scale, options, levels);
-      for (std::size_t j = 0; j < levels; ++j) out[j].covariance(i, k) = out[j].covariance(k, i) = gamma[j];
-    }
+    for (Index k = 0; k < i; ++k) pairs.emplace_back(i, k);
   }
+  for_each(pairs.size(), [&](std::size_t p) {
+    const auto [i, k] = pairs[p];
+    const auto& x = own[static_cast<std::size_t>(i)].levels.front();
+    const auto& y = own[static_cast<std::size_t>(k)].levels.front();
+    const double scale = y.value > 0.0 && x.value > 0.0 ? std::sqrt(x.value / y.value) : 1.0;
+    const auto gamma = pair_covariance(signals[static_cast<std::size_t>(i)],
+                                       signals[static_cast<std::size_t>(k)], scale, options, levels);
+    for (std::size_t j = 0; j < levels; ++j) out[j].covariance(i, k) = out[j].covariance(k, i) = gamma[j];
+  });
   return out;
 }
 

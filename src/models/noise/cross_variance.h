@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "base/for_each_index.h"
 #include "base/result.h"
 #include "models/noise/fit.h"
 #include "models/noise/wavelet_variance.h"
@@ -47,11 +48,13 @@ struct Coherence {
 /// @param mask     one entry a sample, non-zero where all signals are valid; empty: everywhere
 /// @param fits     a model of each, by which its coefficients are correlated in time
 /// @param tables   to take covariances from; nothing: each is computed by itself
+/// @param for_each  how the pairs are gone through
 /// Errors (kWork): those of haar_wavelet_variance(); signals of different lengths.
 Result<std::vector<CrossLevel>> cross_variance(std::span<const std::span<const double>> signals,
                                                std::span<const std::uint8_t> mask,
                                                std::span<const FitResult> fits,
-                                               CovarianceTables* tables = nullptr);
+                                               CovarianceTables* tables = nullptr,
+                                               const ForEachIndex& for_each = one_by_one);
 
 /// tr(A gamma) with its interval (G-62).
 /// @param form  A, symmetric, of as many rows as there are signals

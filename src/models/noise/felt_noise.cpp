@@ -460,6 +460,12 @@ FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double
   return out;
 }
 
+std::optional<double> told_log_sd(const FitResult& fit, const OfModel& function) {
+  const double log_sd = Uncertainty(fit).log_sd(function);
+  if (!(log_sd < kUndetermined)) return std::nullopt;
+  return log_sd;
+}
+
 Felt felt_amplitude(const FitResult& fit, std::size_t component) {
   if (const auto own = own_amplitude(fit, component)) return *own;
   const Component& c = fit.model.components[component];

@@ -12,6 +12,7 @@
 /// them; else they are replaced by the form's own term that grows alike over the band.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -74,6 +75,10 @@ FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band);
 Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band);
 /// The same with a given correlation time, for filters that have one for several axes.
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double tau_s);
+
+/// Sd of the logarithm of a positive function of the model, whether or not each parameter is told (G-32).
+/// Empty where the data do not tell the function.
+std::optional<double> told_log_sd(const FitResult& fit, const std::function<double(const Model&)>& function);
 
 /// Amplitude of one component of the model as it stands, in sample terms.
 Felt felt_amplitude(const FitResult& fit, std::size_t component);

@@ -11,9 +11,9 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "models/noise/process.h"
-#include "models/noise/spectrum.h"
 #include "models/noise/wavelet_variance.h"
 
 namespace imuscope::noise {
@@ -126,25 +126,25 @@ double amplitude_sd_of(double floor, const Spectrum& spectrum) {
 
 /// Bins [first, last] of one spectrum in which lines are looked for.
 struct Band {
-  Spectrum spectrum;
+  const Spectrum& spectrum;
   std::size_t first;
   std::size_t last;
 };
 
+/// The bin of LineOptions::lowest_hz.
+std::size_t lowest_bin(std::size_t length, const LineOptions& options) {
+  const double bin_hz = options.rate_hz / static_cast<double>(length);
+  return static_cast<std::size_t>(std::ceil(options.lowest_hz / bin_hz));
+}
+
 /// From the highest frequencies down.
-std::vector<Band> bands_of(std::span<const double> x, const Present& present, const LineOptions& options) {
+std::vector<Band> bands_of(Spectra& spectra, const LineOptions& options) {
   std::vector<Band> bands;
-  for (std::size_t length = options.segment; length <= x.size(); length *= kLonger) {
-    const bool is_first = bands.empty();
-    if (!is_first && present.segments(length).size() < kFewestSegments) break;
-    Spectrum spectrum = spectrum_of(x, present, length);
-    if (spectrum.segments == 0) break;
-    const double bin_hz = options.rate_hz / static_cast<double>(length);
-    const auto lowest = static_cast<std::size_t>(std::ceil(options.lowest_hz / bin_hz));
-    const std::size_t last = is_first ? spectrum.power.size() - 1 - kLobe : kLonger * kFirstBin - 1;
-    const std::size_t first = std::max(lowest, kFirstBin);
-    if (first <= last) bands.push_back({std::move(spectrum), first, last});
-    if (lowest >= kFirstBin) break;
+  for (const std::size_t length : segments_of_lines(spectra, options)) {
+    const Spectrum& spectrum = spectra.of(length);
+    const std::size_t last = bands.empty() ? spectrum.power.size() - 1 - kLobe : kLonger * kFirstBin - 1;
+    const std::size_t first = std::max(lowest_bin(length, options), kFirstBin);
+    if (first <= last) bands.push_back({spectrum, first, last});
   }
   return bands;
 }
@@ -219,31 +219,69 @@ bool is_known(const std::vector<Line>& lines, const Line& line, double rate_hz) 
   });
 }
 
-/// G-23: takes the lines out of [begin, end), by those of its samples that are there.
-void remove_from(std::span<double> x, const Present& present, std::size_t begin, std::size_t end,
-                 std::span<const Line> lines, double rate_hz) {
-  const auto columns = static_cast<Eigen::Index>(2 * lines.size());
-  Eigen::MatrixXd waves(static_cast<Eigen::Index>(present.count(begin, end)), columns);
-  Eigen::VectorXd piece(waves.rows());
-  Eigen::Index row = 0;
-  for (std::size_t i = begin; i < end; ++i) {
-    if (!present.at(i)) continue;
-    piece[row] = x[i];
-    for (std::size_t l = 0; l < lines.size(); ++l) {
-      const double phase =
-          2.0 * std::numbers::pi * lines[l].frequency_hz / rate_hz * static_cast<double>(i - begin);
-      waves(row, static_cast<Eigen::Index>(2 * l)) = std::cos(phase);
-      waves(row, static_cast<Eigen::Index>(2 * l + 1)) = std::sin(phase);
+/// G-23: sines and cosines of some lines over a block, and what least squares by them takes.
+struct Waves {
+  Eigen::MatrixXd columns;
+  Eigen::LDLT<Eigen::MatrixXd> normal;
+};
+
+/// Takes lines that were found in segments of one length out of the blocks of a signal.
+class LineRemover {
+ public:
+  LineRemover(const Present& present, std::span<const Line> lines, double rate_hz)
+      : present_(present), lines_(lines), rate_hz_(rate_hz) {}
+
+  /// Out of [begin, end), by those of its samples that are there.
+  void remove_from(std::span<double> x, std::size_t begin, std::size_t end) {
+    Eigen::VectorXd piece(static_cast<Eigen::Index>(present_.count(begin, end)));
+    Eigen::Index row = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (present_.at(i)) piece[row++] = x[i];
     }
-    ++row;
+    const Waves& waves = waves_of(begin, end);
+    const Eigen::VectorXd right = waves.columns.transpose() * (piece.array() - piece.mean()).matrix();
+    piece -= waves.columns * waves.normal.solve(right);
+    row = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (present_.at(i)) x[i] = piece[row++];
+    }
   }
-  const Eigen::VectorXd right = waves.transpose() * (piece.array() - piece.mean()).matrix();
-  piece -= waves * (waves.transpose() * waves).eval().ldlt().solve(right);
-  row = 0;
-  for (std::size_t i = begin; i < end; ++i) {
-    if (present.at(i)) x[i] = piece[row++];
+
+ private:
+  /// All blocks of one length in which no sample is missing have the same.
+  const Waves& waves_of(std::size_t begin, std::size_t end) {
+    const bool is_whole = present_.count(begin, end) == end - begin;
+    if (is_whole && end - begin == whole_length_) return *waves_;
+    waves_.reset();  // long ones are not held twice
+    waves_.emplace(waves_at(begin, end));
+    whole_length_ = is_whole ? end - begin : 0;
+    return *waves_;
   }
-}
+
+  [[nodiscard]] Waves waves_at(std::size_t begin, std::size_t end) const {
+    Eigen::MatrixXd columns(static_cast<Eigen::Index>(present_.count(begin, end)),
+                            static_cast<Eigen::Index>(2 * lines_.size()));
+    Eigen::Index row = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!present_.at(i)) continue;
+      for (std::size_t l = 0; l < lines_.size(); ++l) {
+        const double phase =
+            2.0 * std::numbers::pi * lines_[l].frequency_hz / rate_hz_ * static_cast<double>(i - begin);
+        columns(row, static_cast<Eigen::Index>(2 * l)) = std::cos(phase);
+        columns(row, static_cast<Eigen::Index>(2 * l + 1)) = std::sin(phase);
+      }
+      ++row;
+    }
+    const Eigen::MatrixXd normal = columns.transpose() * columns;
+    return {std::move(columns), normal.ldlt()};
+  }
+
+  const Present& present_;
+  std::span<const Line> lines_;
+  double rate_hz_;
+  std::optional<Waves> waves_;
+  std::size_t whole_length_ = 0;  ///< of the block that they belong to; 0: of one with missing samples
+};
 
 /// Runs joined over holes shorter than `hole`.
 std::vector<Segment> joined(const std::vector<Segment>& runs, std::size_t hole) {
@@ -259,13 +297,28 @@ std::vector<Segment> joined(const std::vector<Segment>& runs, std::size_t hole) 
 
 }  // namespace
 
+std::vector<std::size_t> segments_of_lines(const Spectra& spectra, const LineOptions& options) {
+  std::vector<std::size_t> lengths;
+  for (std::size_t length = options.segment; length <= spectra.samples().size(); length *= kLonger) {
+    const std::size_t fewest = lengths.empty() ? 1 : kFewestSegments;
+    if (spectra.present().segments(length).size() < fewest) break;
+    lengths.push_back(length);
+    if (lowest_bin(length, options) >= kFirstBin) break;
+  }
+  return lengths;
+}
+
 std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
                              const LineOptions& options) {
-  const Present present(x, mask);
-  const std::vector<Band> bands = bands_of(x, present, options);
+  Spectra spectra(x, mask);
+  return find_lines(spectra, options);
+}
+
+std::vector<Line> find_lines(Spectra& spectra, const LineOptions& options) {
+  const std::vector<Band> bands = bands_of(spectra, options);
   double bins = 0.0;
   for (const Band& band : bands) bins += static_cast<double>(band.last - band.first + 1);
-  const double total = bands.empty() ? 0.0 : variance_of(x, present.runs());
+  const double total = bands.empty() ? 0.0 : variance_of(spectra.samples(), spectra.present().runs());
   std::vector<Line> lines;
   for (const Band& band : bands) {
     for (const Line& line : Search(band, options, bins, total).lines()) {
@@ -298,12 +351,12 @@ void remove_lines(std::span<double> x, std::span<const std::uint8_t> mask, const
   for (const auto& [segment, alike] : by_segment) {
     // Shorter pieces would lose too much of their noise to the sinusoids.
     const std::size_t shortest = segment / 4;
+    LineRemover remover(present, alike, rate_hz);
     for (const Segment& stretch : joined(present.runs(), shortest)) {
       for (std::size_t begin = stretch.begin; begin < stretch.end;) {
         const std::size_t left = stretch.end - begin;
         const std::size_t length = left < segment + shortest ? left : segment;
-        if (present.count(begin, begin + length) >= shortest)
-          remove_from(x, present, begin, begin + length, alike, rate_hz);
+        if (present.count(begin, begin + length) >= shortest) remover.remove_from(x, begin, begin + length);
         begin += length;
       }
     }

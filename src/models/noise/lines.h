@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "models/noise/spectrum.h"
+
 namespace imuscope::noise {
 
 /// A sinusoid that stands out of the spectrum, as it was over all segments of the signal.
@@ -39,6 +41,12 @@ struct LineOptions {
 /// than the window's main lobe is a band, not a line, and is passed over.
 std::vector<Line> find_lines(std::span<const double> x, std::span<const std::uint8_t> mask,
                              const LineOptions& options);
+
+/// The same by spectra that others look at, too.
+std::vector<Line> find_lines(Spectra& spectra, const LineOptions& options);
+
+/// Segments whose spectra find_lines() asks for.
+std::vector<std::size_t> segments_of_lines(const Spectra& spectra, const LineOptions& options);
 
 /// What a line contributes to the wavelet variance of a level, as a sinusoid of random phase (G-5).
 double line_wv(const Line& line, double rate_hz, int level);

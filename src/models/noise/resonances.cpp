@@ -7,8 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/noise/spectrum.h"
-
 namespace imuscope::noise {
 namespace {
 
@@ -70,11 +68,9 @@ double half_height(const std::vector<double>& y, std::size_t peak, double floor_
 
 }  // namespace
 
-std::vector<Resonance> find_resonances(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                       double rate_hz, double false_alarm) {
-  const Present present(x, mask);
-  if (x.size() < kSegment) return {};
-  const Spectrum spectrum = spectrum_of(x, present, kSegment);
+std::vector<Resonance> find_resonances(Spectra& spectra, double rate_hz, double false_alarm) {
+  if (spectra.samples().size() < kSegment) return {};
+  const Spectrum& spectrum = spectra.of(kSegment);
   constexpr std::size_t kFewest = 20;  // fewer tell no height
   if (spectrum.segments < kFewest) return {};
   const Smoothed s = smoothed(spectrum, rate_hz);
@@ -113,11 +109,9 @@ std::vector<Resonance> find_resonances(std::span<const double> x, std::span<cons
   return found;
 }
 
-std::optional<double> low_pass_hz(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                  double rate_hz) {
-  const Present present(x, mask);
-  if (x.size() < kSegment) return std::nullopt;
-  const Spectrum spectrum = spectrum_of(x, present, kSegment);
+std::optional<double> low_pass_hz(Spectra& spectra, double rate_hz) {
+  if (spectra.samples().size() < kSegment) return std::nullopt;
+  const Spectrum& spectrum = spectra.of(kSegment);
   constexpr std::size_t kFewest = 20;
   if (spectrum.segments < kFewest) return std::nullopt;
   const std::vector<double> y = smoothed(spectrum, rate_hz).log_density;

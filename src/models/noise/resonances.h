@@ -3,12 +3,12 @@
 /// Resonances (of a sensing element, of a housing) and the end of the bandwidth, seen in the spectrum: bands
 /// that are wider than a line.
 
-#include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "models/noise/spectrum.h"
 
 namespace imuscope::noise {
 
@@ -22,13 +22,11 @@ struct Resonance {
 };
 
 /// Strongest first. Lines are to be taken out before (lines.h).
-std::vector<Resonance> find_resonances(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                       double rate_hz, double false_alarm = 1e-3);
+std::vector<Resonance> find_resonances(Spectra& spectra, double rate_hz, double false_alarm = 1e-3);
 
 /// Frequency beyond which the density stays below half of the plateau before it: where a low-pass of the
 /// sensor ends its band. Absent where it does not show below the highest tenth of the range.
-std::optional<double> low_pass_hz(std::span<const double> x, std::span<const std::uint8_t> mask,
-                                  double rate_hz);
+std::optional<double> low_pass_hz(Spectra& spectra, double rate_hz);
 
 /// "a resonance at 20.1 Hz, 3.2 Hz wide, 0.012 deg/s rms, 1.4 times the floor".
 std::string in_words(const Resonance& resonance, std::string_view unit);

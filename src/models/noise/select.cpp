@@ -126,18 +126,20 @@ class Grower {
     std::vector<FitResult> out;
     for (const auto& [name, tried] : tried_) {
       if (!tried || name == best_->spec.name() || is_rejected(*tried) != is_rejected(*best_)) continue;
-      const bool is_as_likely = !contains(tried->spec, best_->spec) && deviance(*tried) <= deviance(*best_);
+      const bool is_as_likely =
+          !contains(tried->spec, best_->spec) && misfit(*tried) < misfit(*best_) + kEquivalent;
       if (is_as_likely || tried->criterion < best_->criterion + kEquivalent) out.push_back(*tried);
     }
     std::stable_sort(out.begin(), out.end(),
-                     [](const FitResult& a, const FitResult& b) { return a.criterion < b.criterion; });
+                     [](const FitResult& a, const FitResult& b) { return misfit(a) < misfit(b); });
     if (out.size() > kMostRivals) out.resize(kMostRivals);
     return out;
   }
 
-  /// The criterion without what it takes for parameters (G-16).
-  static double deviance(const FitResult& fitted) {
-    return fitted.criterion - std::log(static_cast<double>(fitted.wv.size())) * fitted.spec.parameter_count();
+  /// The criterion with no more for a parameter than it takes off the deviance of a right model (G-16).
+  static double misfit(const FitResult& fitted) {
+    const double price = std::log(static_cast<double>(fitted.wv.size()));
+    return fitted.criterion + (1.0 - price) * fitted.spec.parameter_count();
   }
 
   static bool contains(const ModelSpec& whole, const ModelSpec& part) {
@@ -148,7 +150,7 @@ class Grower {
   /// Takes the model where it is better than the best by `margin`.
   /// @param start  nothing: those of the search alone
   /// @param added  the kind that it has more than the best; fast or steep ones that get no amplitude are not
-  /// tried again
+  /// tried again, but where the error of a rejected model may hide them
   bool consider(ModelSpec spec, double margin, std::optional<ProcessKind> added = std::nullopt,
                 const Model* start = nullptr) {
     std::sort(spec.processes.begin(), spec.processes.end());
@@ -165,7 +167,7 @@ class Grower {
       tried_.emplace(spec.name(), std::move(fitted));
       return false;
     }
-    if (added && is_fast_or_steep(*added) &&
+    if (added && is_fast_or_steep(*added) && !is_rejected(*fitted) &&
         std::any_of(fitted->model.components.begin(), fitted->model.components.end(),
                     [&](const Component& c) { return c.kind == *added && c.amplitude <= 0.0; }))
       unsupported_.insert(*added);

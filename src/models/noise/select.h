@@ -28,7 +28,7 @@ Result<std::vector<RankedModel>> rank_models(const WaveletVariance& wv, const Mo
 /// A model and those that fit the record as well: what is said of the sensor has to hold for them, too.
 struct GrownModel {
   FitResult best;
-  std::vector<FitResult> rivals;  ///< with quick intervals, the best criterion first, at most eight
+  std::vector<FitResult> rivals;  ///< with quick intervals, at most eight, the likeliest first (T-4)
 };
 
 /// Term by term: beginning with the best single process, or white noise and one more, each round adds the one

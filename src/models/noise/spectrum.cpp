@@ -15,6 +15,8 @@ namespace {
 
 /// Of a segment's samples so many may be missing.
 constexpr double kMostMissing = 0.125;
+/// From one length of a density's segments to the next.
+constexpr std::size_t kLongerOfDensity = 4;
 
 std::vector<double> hann(std::size_t n) {
   std::vector<double> window(n);
@@ -86,6 +88,22 @@ Spectrum spectrum_of(std::span<const double> x, const Present& present, std::siz
   return out;
 }
 
+const Spectrum& Spectra::of(std::size_t length) {
+  const auto at = made_.find(length);
+  if (at != made_.end()) return at->second;
+  return made_.emplace(length, spectrum_of(x_, present_, length)).first->second;
+}
+
+void Spectra::make(std::span<const std::size_t> lengths, const ForEachIndex& for_each) {
+  std::vector<std::map<std::size_t, Spectrum>::value_type*> empty;
+  for (const std::size_t length : lengths) {
+    const auto [at, is_new] = made_.try_emplace(length);
+    if (is_new) empty.push_back(&*at);
+  }
+  for_each(empty.size(),
+           [&](std::size_t i) { empty[i]->second = spectrum_of(x_, present_, empty[i]->first); });
+}
+
 // G-23: dof
 double degrees_of_freedom(double segments) { return 36.0 * segments * segments / (19.0 * segments - 1.0); }
 
@@ -95,22 +113,30 @@ double density_at(const Spectrum& spectrum, std::size_t bin, double rate_hz) {
   return (is_end ? 1.0 : 2.0) * spectrum.power[bin] / (rate_hz * window_power(spectrum.length));
 }
 
-std::vector<DensityPoint> density_of(std::span<const double> x, const Present& present, double rate_hz,
-                                     double confidence, int points_per_octave, std::size_t shortest) {
+std::vector<std::size_t> segments_of_density(const Spectra& spectra, std::size_t shortest) {
+  // Beyond, memory grows for a single look at what is slow, which the wavelet variance shows better.
+  constexpr std::size_t kLongest = std::size_t{1} << 20U;
+  std::vector<std::size_t> lengths;
+  for (std::size_t length = shortest; length <= std::min(spectra.samples().size(), kLongest);
+       length *= kLongerOfDensity) {
+    if (spectra.present().segments(length).empty()) break;
+    lengths.push_back(length);
+  }
+  return lengths;
+}
+
+std::vector<DensityPoint> density_of(Spectra& spectra, double rate_hz, double confidence,
+                                     int points_per_octave, std::size_t shortest) {
   // From this bin on a segment's spectrum is not bent by what leaks from below; longer segments take over
   // there.
   constexpr std::size_t kFirstBin = 8;
-  constexpr std::size_t kLonger = 4;
-  // Beyond, memory grows for a single look at what is slow, which the wavelet variance shows better.
-  constexpr std::size_t kLongest = std::size_t{1} << 20U;
   const double tail = 0.5 * (1.0 - confidence);
   std::vector<DensityPoint> points;  // from high frequencies to low
   std::size_t last = shortest / 2 - 1;
-  for (std::size_t length = shortest; length <= std::min(x.size(), kLongest); length *= kLonger) {
-    const Spectrum spectrum = spectrum_of(x, present, length);
-    if (spectrum.segments == 0) break;
-    const bool is_longest =
-        length * kLonger > std::min(x.size(), kLongest) || present.segments(length * kLonger).empty();
+  const std::vector<std::size_t> lengths = segments_of_density(spectra, shortest);
+  for (const std::size_t length : lengths) {
+    const Spectrum& spectrum = spectra.of(length);
+    const bool is_longest = length == lengths.back();
     const std::size_t first = is_longest ? 1 : kFirstBin;
     const double dof_of_bin = degrees_of_freedom(static_cast<double>(spectrum.segments));
     std::size_t high = last;
@@ -134,7 +160,7 @@ std::vector<DensityPoint> density_of(std::span<const double> x, const Present& p
       if (low == 0) break;
       high = low - 1;
     }
-    last = kFirstBin * kLonger - 1;
+    last = kFirstBin * kLongerOfDensity - 1;
   }
   std::reverse(points.begin(), points.end());
   return points;

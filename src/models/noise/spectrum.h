@@ -4,9 +4,11 @@
 /// and what is drawn beside a wavelet variance (G-23).
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
+#include "base/for_each_index.h"
 #include "models/noise/haar_levels.h"
 
 namespace imuscope::noise {
@@ -44,8 +46,31 @@ struct Spectrum {
 /// line keeps its amplitude.
 Spectrum spectrum_of(std::span<const double> x, const Present& present, std::size_t length);
 
+/// Spectra of one signal, each made when it is first asked for, so that all that looks at segments of one length
+/// shares them. For one thread.
+class Spectra {
+ public:
+  /// What is handed in must outlive this, as it is.
+  Spectra(std::span<const double> x, std::span<const std::uint8_t> mask) : x_(x), present_(x, mask) {}
+
+  [[nodiscard]] std::span<const double> samples() const { return x_; }
+  [[nodiscard]] const Present& present() const { return present_; }
+  const Spectrum& of(std::size_t length);
+
+  /// Makes those of all these lengths.
+  void make(std::span<const std::size_t> lengths, const ForEachIndex& for_each = one_by_one);
+
+ private:
+  std::span<const double> x_;
+  Present present_;
+  std::map<std::size_t, Spectrum> made_;
+};
+
 /// Degrees of freedom of a bin: Hann windows that overlap by half (Welch 1967), 36 K^2 / (19 K - 1).
 double degrees_of_freedom(double segments);
+
+/// Samples of the shortest segments of a density.
+inline constexpr std::size_t kShortestOfDensity = 256;
 
 /// One-sided power spectral density with its interval.
 struct DensityPoint {
@@ -57,9 +82,12 @@ struct DensityPoint {
 
 /// Density over the whole range that the record tells, equally dense on a logarithmic scale: short segments
 /// for what is fast, longer ones below, up to a million samples. Empty for a signal without a segment of `shortest` samples.
-std::vector<DensityPoint> density_of(std::span<const double> x, const Present& present, double rate_hz,
-                                     double confidence = 0.95, int points_per_octave = 8,
-                                     std::size_t shortest = 256);
+std::vector<DensityPoint> density_of(Spectra& spectra, double rate_hz, double confidence = 0.95,
+                                     int points_per_octave = 8, std::size_t shortest = kShortestOfDensity);
+
+/// Segments whose spectra density_of() asks for.
+std::vector<std::size_t> segments_of_density(const Spectra& spectra,
+                                             std::size_t shortest = kShortestOfDensity);
 
 /// One-sided density of a bin of `spectrum`, signal unit^2 / Hz.
 double density_at(const Spectrum& spectrum, std::size_t bin, double rate_hz);

@@ -9,6 +9,7 @@
 
 #include "made_record.h"
 #include "models/certificate/json.h"
+#include "models/noise/simulated_noise.h"
 
 namespace imuscope::certificate {
 namespace {
@@ -117,6 +118,49 @@ TEST(AxisCertificate, ABiasThatGoesWithTheTemperatureIsToldWithItsSd) {
   EXPECT_NEAR(axis->temperature->highest_c, 35.0, 0.01);
 }
 
+AxisRecord simulated_gyro(const noise::Model& model, std::size_t samples, unsigned seed) {
+  std::mt19937_64 random(seed);
+  AxisRecord record;
+  record.name = "gyro_x";
+  record.unit = noise::SignalUnit::kDegps;
+  record.rate_hz = 100.0;
+  record.values = noise::simulated_noise(model, samples, random);
+  return record;
+}
+
+// Beside white noise and a ramp stand models as good in which a Gauss-Markov process is white: its rate is not told,
+// and the curve is told as well as without it.
+TEST(AxisCertificate, BIsKnownAsWellWhereAModelAsGoodHasARateThatIsNotTold) {
+  using enum noise::ProcessKind;
+  const auto axis = characterize_axis(
+      simulated_gyro({{{kWhiteNoise, 0.04, {}}, {kRamp, 1e-14, {}}}}, std::size_t{1} << 18U, 40'000), {});
+  ASSERT_TRUE(axis) << axis.error().text();
+  EXPECT_THAT(axis->rivals, testing::Contains("GM+DR"));
+  const TermValue& bias = term_of(*axis, Term::kBiasInstability);
+  ASSERT_EQ(bias.knowledge, Knowledge::kFitted);
+  // The curve is lowest at tau^3 = 8 WN/DR, and a third of its variance there is the ramp's: of that the record
+  // tells the root within 2 sqrt(12 WN/(DR n^3)) at best, B within a third of it, 3.5 %.
+  EXPECT_GT(*bias.ci_low, 0.95 * bias.value);
+  EXPECT_LT(*bias.ci_high, 1.05 * bias.value);
+}
+
+// No model of two terms is near this one, and what is first added to them gets nothing in them.
+TEST(AxisCertificate, QuantizationBesideManySlowTermsIsFound) {
+  using enum noise::ProcessKind;
+  const noise::Model truth{{{kQuantization, 0.02, {}},
+                            {kWhiteNoise, 0.04, {}},
+                            {kGaussMarkov, 4e-5, {0.005, 0.0}},
+                            {kFlicker, 1e-5, {}},
+                            {kRandomWalk, 1e-9, {}}}};
+  const auto axis = characterize_axis(simulated_gyro(truth, std::size_t{1} << 18U, 40'010), {});
+  ASSERT_TRUE(axis) << axis.error().text();
+  EXPECT_EQ(axis->fit.spec.count(kQuantization), 1) << axis->fit.spec.name();
+  // Arc seconds: sqrt(0.02) deg/s over 100 Hz.
+  const TermValue& q = term_of(*axis, Term::kQuantization);
+  ASSERT_EQ(q.knowledge, Knowledge::kFitted);
+  EXPECT_NEAR(q.value, 3600.0 * std::sqrt(0.02) / 100.0, 0.05 * q.value);
+}
+
 TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
   AxisRecord record = made_gyro(40'000, 8, 0.2, 2e-4);
   std::vector<float> temperature_c;
@@ -136,6 +180,29 @@ TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
   EXPECT_EQ(to_json(origin, {*there}), to_json(origin, {*later}));
   EXPECT_FALSE(there->lines.empty());
   EXPECT_TRUE(there->temperature);
+}
+
+TEST(AxisCertificate, RecordsThatAreFetchedOneAfterTheOtherKeepTheirPlacesAndAreToldInOrder) {
+  std::vector<AxisRecord> records;
+  for (const unsigned seed : {51U, 52U, 53U}) {
+    records.push_back(made_gyro(1U << 15U, seed));
+    records.back().fetch = [values = records.back().values]() -> Result<std::vector<double>> {
+      return values;
+    };
+  }
+  records[1].fetch = []() -> Result<std::vector<double>> { return work_error("the disk is gone"); };
+  std::vector<std::size_t> told;
+  const auto axes = characterize_axes(records, {}, [&](std::size_t done) { told.push_back(done); });
+  EXPECT_EQ(told, (std::vector<std::size_t>{1, 2, 3}));
+  ASSERT_EQ(axes.size(), 3U);
+  EXPECT_FALSE(axes[1]);
+  for (const std::size_t i : {std::size_t{0}, std::size_t{2}}) {
+    records[i].fetch = {};
+    const auto alone = characterize_axis(records[i], {});
+    ASSERT_TRUE(axes[i] && alone);
+    EXPECT_EQ(axes[i]->fit.criterion, alone->fit.criterion);
+    EXPECT_EQ(axes[i]->terms.front().value, alone->terms.front().value);
+  }
 }
 
 TEST(AxisCertificate, ARecordThatCannotBeFetchedIsAnError) {

@@ -119,6 +119,41 @@ TEST(SpectrumAnswers, Lines) {
   expect_recorded("models/noise/lines.txt", answer.text(), 1e-6, 1e-10);
 }
 
+TEST(Spectra, MadeInAnyOrderAreThoseOfEachLengthAlone) {
+  const auto x = with_lines(80'000);
+  const auto mask = with_holes(x.size());
+  LineOptions options;
+  options.rate_hz = kRate_hz;
+  Spectra spectra(x, mask);
+  spectra.make(segments_of_lines(spectra, options));
+  spectra.make(segments_of_density(spectra), [](std::size_t n, const std::function<void(std::size_t)>& work) {
+    for (std::size_t i = n; i > 0; --i) work(i - 1);
+  });
+  const Present present(x, mask);
+  for (const std::size_t length : {256, 1024, 4096, 16'384, 512}) {
+    const Spectrum alone = spectrum_of(x, present, length);
+    EXPECT_EQ(spectra.of(length).power, alone.power) << length;
+    EXPECT_EQ(spectra.of(length).segments, alone.segments) << length;
+  }
+  const auto shared = find_lines(spectra, options);
+  const auto alone = find_lines(x, mask, options);
+  ASSERT_EQ(shared.size(), alone.size());
+  ASSERT_FALSE(alone.empty());
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_EQ(shared[i].frequency_hz, alone[i].frequency_hz);
+    EXPECT_EQ(shared[i].amplitude, alone[i].amplitude);
+  }
+}
+
+TEST(Spectra, NoSpectrumIsAskedForBeyondThoseThatAreNamed) {
+  const auto x = with_lines(80'000);
+  const LineOptions options;
+  const Spectra spectra(x, {});
+  EXPECT_EQ(segments_of_lines(spectra, options), (std::vector<std::size_t>{4096, 16'384}));
+  EXPECT_EQ(segments_of_density(spectra), (std::vector<std::size_t>{256, 1024, 4096, 16'384, 65'536}));
+  EXPECT_TRUE(segments_of_density(Spectra(std::span<const double>(x).first(255), {})).empty());
+}
+
 TEST(SpectrumAnswers, NoiseAloneHasNoLines) {
   LineOptions options;
   options.rate_hz = kRate_hz;
@@ -134,7 +169,8 @@ TEST(SpectrumAnswers, Densities) {
     for (const DensityPoint& p : points) answer.line(p.frequency_hz, p.density, p.ci_low, p.ci_high);
   };
   for (const bool whole : {true, false}) {
-    const Present present(x, whole ? std::span<const std::uint8_t>{} : mask);
+    const std::span<const std::uint8_t> there = whole ? std::span<const std::uint8_t>{} : mask;
+    const Present present(x, there);
     test::add_places(answer, "runs", present.runs());
     answer.line(present.at(5), present.at(6), present.count(0, 100), present.count(4'000, 4'100));
     for (const std::size_t length : {64, 256, 1000, 8'000, 12'000, 12'001})
@@ -144,9 +180,11 @@ TEST(SpectrumAnswers, Densities) {
     answer.line(spectrum.length, spectrum.segments);
     for (std::size_t k = 0; k < spectrum.power.size(); ++k)
       answer.line(k, spectrum.power[k], density_at(spectrum, k, kRate_hz));
-    add_density(density_of(x, present, kRate_hz));
-    add_density(density_of(x, present, kRate_hz, 0.8, 2, 64));
-    answer.line("of too few", density_of(std::span(x).first(200), present, kRate_hz).size());
+    Spectra spectra(x, there);
+    add_density(density_of(spectra, kRate_hz));
+    add_density(density_of(spectra, kRate_hz, 0.8, 2, 64));
+    Spectra of_few{std::span(x).first(200), there.first(std::min<std::size_t>(there.size(), 200))};
+    answer.line("of too few", density_of(of_few, kRate_hz).size());
   }
   answer.line(degrees_of_freedom(1.0), degrees_of_freedom(2.0), degrees_of_freedom(100.0));
   answer.line("none", spectrum_of(std::span(x).first(10), Present(std::span(x).first(10), {}), 64).power);
@@ -155,11 +193,12 @@ TEST(SpectrumAnswers, Densities) {
 
 void add_resonances(Answer& answer, const std::vector<double>& x, std::span<const std::uint8_t> mask,
                     double false_alarm) {
-  for (const Resonance& r : find_resonances(x, mask, kRate_hz, false_alarm)) {
+  Spectra spectra(x, mask);
+  for (const Resonance& r : find_resonances(spectra, kRate_hz, false_alarm)) {
     answer.line(r.frequency_hz, r.width_hz, r.rms, r.height, r.p_value);
     answer.line(in_words(r, "rad/s"));
   }
-  answer.line("low pass", low_pass_hz(x, mask, kRate_hz));
+  answer.line("low pass", low_pass_hz(spectra, kRate_hz));
 }
 
 TEST(SpectrumAnswers, ResonancesAndTheEndOfTheBand) {
