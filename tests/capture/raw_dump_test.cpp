@@ -82,7 +82,8 @@ TEST_F(RawDumpTest, ReadsAndCommentsOfAnyLengthAreFollowedToTheEnd) {
   for (std::size_t i = 0; i < kReads; ++i) {
     if (i % 100 == 0) arrivals += "#" + std::string(i, 'c') + ",1,2\n";
     const std::size_t n = 1 + i % 37;
-    arrivals += std::to_string(bytes.size()) + "," + std::to_string(n) + "," + std::to_string(1000 + i) + "\n";
+    arrivals +=
+        std::to_string(bytes.size()) + "," + std::to_string(n) + "," + std::to_string(1000 + i) + "\n";
     bytes += std::string(n, static_cast<char>('a' + i % 26));
   }
   write("mtx1.bin", bytes);

@@ -14,7 +14,9 @@ class Notes final : public CoreSink {
     note("epoch " + std::to_string(epoch.study) + " of " +
          std::to_string(facts.first_reference_time.time_since_epoch().count()));
   }
-  void on_error(const ErrorRecord& record) noexcept override { note("error " + std::to_string(record.study)); }
+  void on_error(const ErrorRecord& record) noexcept override {
+    note("error " + std::to_string(record.study));
+  }
   void on_event(const EstimatorEvent& event) noexcept override {
     note("event " + std::to_string(event.time.time_since_epoch().count()));
   }

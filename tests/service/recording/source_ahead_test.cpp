@@ -15,7 +15,8 @@ class MadeSource final : public ByteSource {
   explicit MadeSource(int reads, int fails_after = -1) : reads_(reads), fails_after_(fails_after) {}
 
   Result<std::optional<RecordedRead>> next() override {
-    if (at_ == fails_after_) return tl::unexpected<Error>(Error{ErrorKind::kWork, "the disk is gone", "look"});
+    if (at_ == fails_after_)
+      return tl::unexpected<Error>(Error{ErrorKind::kWork, "the disk is gone", "look"});
     if (at_ == reads_) return std::optional<RecordedRead>{};
     bytes_.assign(static_cast<std::size_t>(at_ % 700), static_cast<std::uint8_t>(at_));
     RecordedRead read{host_time_from_ns(1'000'000'000 + at_), bytes_};
