@@ -1,7 +1,7 @@
 /// Whole programs from raw bytes: how many times faster than real time a replay and a study of a simulated
 /// drive are, what memory they take, and how both grow with the number of S-IMUs and with the length of the
 /// drive. Every run is a process of its own, so that its memory is its own; processor time of all its
-/// threads.
+/// threads, but wall time where threads, or two builds, are compared.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -26,8 +27,12 @@ namespace fs = std::filesystem;
 constexpr double kGoalReplay = 830.0;  // times real time, 72 states, without refits
 constexpr double kGoalStudy = 90.0;    // a drive of 15 minutes in 10 s, refits and report included
 
+constexpr double kGoalBeside = 1.4;      // times as fast as the program as it was, without refits
+constexpr double kGoalTwoThreads = 0.6;  // of one thread's wall time
+
 struct Cost {
   double processor_s = std::numeric_limits<double>::infinity();
+  double wall_s = std::numeric_limits<double>::infinity();
   double memory_mb = 0.0;
 };
 
@@ -37,6 +42,7 @@ Cost run(const std::vector<std::string>& command) {
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
+  const auto begun = std::chrono::steady_clock::now();
   const pid_t child = fork();
   if (child < 0) throw std::runtime_error("no process can be started");
   if (child == 0) {
@@ -54,7 +60,8 @@ Cost run(const std::vector<std::string>& command) {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   constexpr double kMbPerKib = 1024.0 * 1e-6;
-  return {seconds(usage.ru_utime) + seconds(usage.ru_stime),
+  const std::chrono::duration<double> wall_s = std::chrono::steady_clock::now() - begun;
+  return {seconds(usage.ru_utime) + seconds(usage.ru_stime), wall_s.count(),
           static_cast<double>(usage.ru_maxrss) * kMbPerKib};
 }
 
@@ -96,9 +103,8 @@ struct Drive {
 
 class Programs {
  public:
-  explicit Programs(fs::path scratch) : scratch_(std::move(scratch)) {
-    bin_ = fs::read_symlink("/proc/self/exe").parent_path();
-  }
+  /// @param bin  folder of imuscope and imusim
+  Programs(fs::path scratch, fs::path bin) : scratch_(std::move(scratch)), bin_(std::move(bin)) {}
 
   [[nodiscard]] Drive record(int studies, double minutes) const {
     Drive drive{studies, minutes, scratch_ / fmt::format("drive_{}_{:g}", studies, minutes), {}, {}, {}};
@@ -130,6 +136,9 @@ class Programs {
   [[nodiscard]] Cost process(const Drive& drive) const {
     return work("process", drive.inputs, drive.with_refits);
   }
+  [[nodiscard]] Cost process_by(const Drive& drive, const char* threads) const {
+    return work("process", drive.inputs, drive.with_refits, {"--threads", threads});
+  }
 
  private:
   static void write(const fs::path& file, const std::string& text) {
@@ -137,10 +146,11 @@ class Programs {
     if (!(out << text).flush()) throw std::runtime_error(file.string() + " cannot be written");
   }
 
-  [[nodiscard]] Cost work(const char* command, const std::vector<std::string>& inputs,
-                          const fs::path& config) const {
+  [[nodiscard]] Cost work(const char* command, const std::vector<std::string>& inputs, const fs::path& config,
+                          const std::vector<std::string>& more = {}) const {
     std::vector<std::string> words{bin_ / "imuscope", command};
     words.insert(words.end(), inputs.begin(), inputs.end());
+    words.insert(words.end(), more.begin(), more.end());
     words.insert(words.end(), {"--config", config, "--out", scratch_ / "run"});
     return run(words);
   }
@@ -152,6 +162,7 @@ class Programs {
 /// The fastest of the rounds: what other programs take from the caches makes a run slower, never faster.
 void keep_fastest(Cost& kept, const Cost& now) {
   kept.processor_s = std::min(kept.processor_s, now.processor_s);
+  kept.wall_s = std::min(kept.wall_s, now.wall_s);
   kept.memory_mb = std::max(kept.memory_mb, now.memory_mb);
 }
 
@@ -182,6 +193,45 @@ struct Growth {
   }
 };
 
+/// Wall time of one against another that ran in turn with it.
+bench::Row row_of_walls(const std::string& what, const Cost& cost, const Cost& other, const char* against,
+                        double ratio, bench::Goal goal) {
+  bench::Row row;
+  row.group = "replay";
+  row.what = what;
+  row.ratio = ratio;
+  row.against = against;
+  row.value = cost.wall_s;
+  row.reference = other.wall_s;
+  row.unit = "s of wall";
+  row.memory_mb = cost.memory_mb;
+  row.goal = goal;
+  return row;
+}
+
+/// The programs beside those of another build, in turn.
+std::vector<bench::Row> measure_beside(const Programs& programs, const Programs& others, double minutes,
+                                       int rounds) {
+  const Drive drive = programs.record(3, minutes);
+  Cost raw;
+  Cost raw_of_others;
+  Cost capture;
+  Cost capture_of_others;
+  for (int round = 0; round < rounds; ++round) {
+    keep_fastest(raw_of_others, others.replay(drive, false));
+    keep_fastest(raw, programs.replay(drive, false));
+    keep_fastest(capture_of_others, others.replay_capture(drive));
+    keep_fastest(capture, programs.replay_capture(drive));
+  }
+  const auto row = [&](const char* what, const Cost& cost, const Cost& other) {
+    return row_of_walls(fmt::format("{}, 3 S-IMUs, {:g} min", what, minutes), cost, other,
+                        "times as fast as the other build", other.wall_s / cost.wall_s,
+                        {bench::Goal::Side::kAtLeast, kGoalBeside});
+  };
+  return {row("raw bytes, no refits", raw, raw_of_others),
+          row("capture, no refits", capture, capture_of_others)};
+}
+
 std::vector<bench::Row> measure(const Programs& programs, double minutes, int rounds) {
   const std::vector<int> crowds{1, 2, 3, 6};
   std::vector<Drive> by_studies;
@@ -194,6 +244,8 @@ std::vector<bench::Row> measure(const Programs& programs, double minutes, int ro
   Cost refits;
   Cost capture;
   Cost study;
+  Cost one_thread;
+  Cost two_threads;
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < by_studies.size(); ++i)
       keep_fastest(crowd_costs[i], programs.replay(by_studies[i], false));
@@ -202,6 +254,8 @@ std::vector<bench::Row> measure(const Programs& programs, double minutes, int ro
     keep_fastest(refits, programs.replay(usual, true));
     keep_fastest(capture, programs.replay_capture(usual));
     keep_fastest(study, programs.process(usual));
+    keep_fastest(one_thread, programs.process_by(usual, "1"));
+    keep_fastest(two_threads, programs.process_by(usual, "2"));
   }
   std::vector<bench::Row> rows;
   const auto of = [&](const char* what) { return fmt::format("{}, 3 S-IMUs, {:g} min", what, minutes); };
@@ -209,6 +263,9 @@ std::vector<bench::Row> measure(const Programs& programs, double minutes, int ro
   rows.push_back(row_of(of("raw bytes, refits every minute"), minutes, refits, kGoalStudy));
   rows.push_back(row_of(of("capture, no refits"), minutes, capture, 0.0));
   rows.push_back(row_of(of("whole study with report"), minutes, study, kGoalStudy));
+  rows.push_back(row_of_walls(of("whole study, two threads"), two_threads, one_thread,
+                              "of the wall time of one thread", two_threads.wall_s / one_thread.wall_s,
+                              {bench::Goal::Side::kAtMost, kGoalTwoThreads}));
   Growth studies;
   for (std::size_t i = 0; i < by_studies.size(); ++i) {
     studies.add(crowds[i], crowd_costs[i]);
@@ -239,17 +296,23 @@ int main(int argc, char** argv) {
   int rounds = 3;
   std::string scratch = fs::temp_directory_path().string();
   std::string json;
+  std::string beside;
   app.add_option("--minutes", minutes, "length of the drive; half and twice it are also driven")
       ->check(CLI::Range(0.5, 240.0));
   app.add_option("--rounds", rounds, "of which the fastest counts")->check(CLI::Range(1, 100));
   app.add_option("--scratch", scratch,
                  "where a folder for recordings and results is made, and removed at the end")
       ->type_name("DIR");
+  app.add_option("--beside", beside, "bin folder of another build: nothing but the two in turn, by wall time")
+      ->type_name("DIR")
+      ->check(CLI::ExistingDirectory);
   app.add_option("--json", json, "write the rows here")->type_name("FILE");
   CLI11_PARSE(app, argc, argv);
   try {
     const bench::OwnFolder folder(scratch);
-    const auto rows = measure(Programs(folder.path()), minutes, rounds);
+    const Programs programs(folder.path(), fs::read_symlink("/proc/self/exe").parent_path());
+    const auto rows = beside.empty() ? measure(programs, minutes, rounds)
+                                     : measure_beside(programs, {folder.path(), beside}, minutes, rounds);
     return bench::finish(rows, json);
   } catch (const std::exception& error) {
     fmt::print(stderr, "replay_speed: {}\n", error.what());
