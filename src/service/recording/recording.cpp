@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <algorithm>
+#include <future>
 #include <utility>
 
 #include "base/nearest_word.h"
@@ -17,7 +18,7 @@
 #include "service/recording/capture_damage.h"
 #include "service/recording/message_source.h"
 #include "service/recording/recorded_look.h"
-#include "service/recording/source_ahead.h"
+#include "service/recording/side_by_side.h"
 
 namespace imuscope {
 
@@ -31,14 +32,13 @@ using Sources = Result<std::vector<std::unique_ptr<ByteSource>>>;
 
 /// Of a recording in several files, each by itself.
 std::function<Sources(Reading)> one_by_one(const Recording& recording) {
-  return [open = recording.open, present = recording.present](Reading reading) -> Sources {
+  return [open = recording.open, present = recording.present](Reading) -> Sources {
     std::vector<std::unique_ptr<ByteSource>> sources(present.size());
     for (std::size_t i = 0; i < present.size(); ++i) {
       if (!present[i]) continue;
       auto source = open(static_cast<DeviceIndex>(i));
       if (!source) return tl::unexpected<Error>(source.error());
       sources[i] = std::move(*source);
-      if (reading == Reading::kAhead) sources[i] = std::make_unique<SourceAhead>(std::move(sources[i]));
     }
     return sources;
   };
@@ -275,6 +275,7 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   std::vector<bool> unstamped(n);
   Logs logs(n);
   Bags bags(n);
+  std::vector<std::future<Result<std::unique_ptr<ByteSource>>>> dumps(n);
   for (std::size_t i = 0; i < n; ++i) {
     auto& file = (*files)[i];
     if (file.empty()) file = (*files)[configuration.devices[i].line_owner];
@@ -300,7 +301,12 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
       continue;
     }
     // Opened here already, so that a wrong path is told before anything is computed.
-    auto source = open_raw_dump((*files)[i]);
+    dumps[i] = std::async(may_use_threads() ? std::launch::async : std::launch::deferred,
+                          [file] { return open_raw_dump(file); });
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!dumps[i].valid()) continue;
+    auto source = dumps[i].get();
     if (!source) return tl::unexpected<Error>(source.error());
     const auto first = (*source)->next();
     if (!first) return tl::unexpected<Error>(first.error());
@@ -322,6 +328,7 @@ Result<OpenedRecording> open_raw_dumps(const std::vector<std::string>& inputs, C
   opened.remarks.insert(opened.remarks.end(), recording.damage.begin(), recording.damage.end());
   recording.open = open_plain(configuration, *files, std::move(bags));
   recording.open_side_by_side = one_by_one(recording);
+  recording.has_lines_apart = true;
   const bool has_log = std::any_of(logs.begin(), logs.end(), [](const auto& log) { return log.has_value(); });
   if (findings != nullptr && !has_log) *findings = look_at_dumps(configuration, recording, unstamped);
   auto clocks = align_clocks(configuration, unstamped, [&](DeviceIndex index) -> Result<std::vector<Sample>> {

@@ -7,6 +7,7 @@
 #include "rt/host_clock.h"
 #include "rt/periodic.h"
 #include "service/pipeline/device_factory.h"
+#include "service/recording/decoded_reads.h"
 #include "service/recording/sink_beside.h"
 
 namespace imuscope {
@@ -39,11 +40,11 @@ class RingSink final : public SampleSink {
   std::uint64_t refused_ = 0;
 };
 
-/// One device of the recording: its bytes, its decoder, its ring.
+/// One device of the recording: its decoded reads and its ring.
 class Feed {
  public:
-  Feed(std::unique_ptr<ByteSource> source, std::unique_ptr<DeviceDecoder> decoder, RingSink sink)
-      : source_(std::move(source)), decoder_(std::move(decoder)), sink_(std::move(sink)) {}
+  Feed(std::unique_ptr<DecodedReads> reads, RingSink sink)
+      : reads_(std::move(reads)), sink_(std::move(sink)) {}
 
   /// Reads the first bytes, so that first_arrival() can be asked.
   Result<void> start() {
@@ -60,8 +61,7 @@ class Feed {
     return sink_.newest_arrival() == HostTime::min() ? std::nullopt : std::optional(sink_.newest_arrival());
   }
 
-  /// Decodes everything that had arrived by `cut`, and a little more where arrivals come from the device's
-  /// time.
+  /// Takes everything that had arrived by `cut`, and a little more where arrivals come from the device's time.
   Result<void> feed(HostTime cut) {
     has_fed_ = false;
     while (pending_ && due(cut)) {
@@ -79,8 +79,11 @@ class Feed {
     if (!pending_) return std::nullopt;
     return pending_->arrival.value_or(sink_.newest_arrival());
   }
-  [[nodiscard]] const ByteSource& source() const { return *source_; }
-  [[nodiscard]] const DeviceDecoder& decoder() const { return *decoder_; }
+  [[nodiscard]] std::uint64_t bytes_read() const { return bytes_; }
+  [[nodiscard]] std::uint64_t bytes_total() const { return reads_->bytes_total(); }
+  /// Reads that were taken; of a feed that was left before its end the decoder has seen more.
+  [[nodiscard]] std::uint64_t taken() const { return taken_; }
+  [[nodiscard]] const DeviceDecoder& decoder() const { return reads_->decoder(); }
   [[nodiscard]] const RingSink& sink() const { return sink_; }
 
  private:
@@ -90,26 +93,24 @@ class Feed {
   }
 
   Result<void> fetch() {
-    auto read = source_->next();
+    auto read = reads_->next();
     if (!read) return tl::unexpected<Error>(read.error());
     pending_ = *read;
     return {};
   }
 
   Result<void> push_pending() {
-    last_arrival_ = pending_->arrival.value_or(HostTime{});
-    if (pending_->per_byte) decoder_->set_per_byte(*pending_->per_byte);
-    decoder_->push(pending_->bytes, {last_arrival_, pending_->received.value_or(last_arrival_)}, sink_);
-    if (auto fetched = fetch(); !fetched) return fetched;
-    if (!pending_) decoder_->finish(last_arrival_, sink_);
-    return {};
+    for (const Sample& sample : pending_->samples) sink_.on_sample(sample);
+    bytes_ = pending_->bytes_so_far;
+    ++taken_;
+    return fetch();
   }
 
-  std::unique_ptr<ByteSource> source_;
-  std::unique_ptr<DeviceDecoder> decoder_;
+  std::unique_ptr<DecodedReads> reads_;
   RingSink sink_;
-  std::optional<RecordedRead> pending_;
-  HostTime last_arrival_{};
+  std::optional<DecodedRead> pending_;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t taken_ = 0;
   bool has_fed_ = false;
 };
 
@@ -146,15 +147,20 @@ class Replayer {
     // All devices in the order of their arrivals: one pass over a capture serves them all.
     auto sources = recording_.open_side_by_side(options_.reading);
     if (!sources) return tl::unexpected<Error>(sources.error());
+    const bool is_ahead = options_.reading == Reading::kAhead && recording_.has_lines_apart;
     for (std::size_t i = 0; i < feeds_.size(); ++i) {
       if (!recording_.present[i]) continue;
       const auto index = static_cast<DeviceIndex>(i);
       feeds_[i] = std::make_unique<Feed>(
-          std::move((*sources)[i]), make_decoder(configuration_.devices[i], index, recording_.clocks[i].map),
+          std::make_unique<DecodedReads>(std::move((*sources)[i]), decoder_of(index), is_ahead),
           RingSink(core_.ring(index), refused(index), options_.on_sample));
       if (auto started = feeds_[i]->start(); !started) return started;
     }
     return {};
+  }
+
+  [[nodiscard]] std::unique_ptr<DeviceDecoder> decoder_of(DeviceIndex index) const {
+    return make_decoder(configuration_.devices[index], index, recording_.clocks[index].map);
   }
 
   [[nodiscard]] NumberRanges refused(DeviceIndex device) const {
@@ -267,10 +273,22 @@ class Replayer {
     double total = 0.0;
     for (const auto& feed : feeds_) {
       if (!feed) continue;
-      read += static_cast<double>(feed->source().bytes_read());
-      total += static_cast<double>(feed->source().bytes_total());
+      read += static_cast<double>(feed->bytes_read());
+      total += static_cast<double>(feed->bytes_total());
     }
     return total > 0.0 ? read / total : 1.0;
+  }
+
+  /// What the decoder counted in the reads that were taken, of a feed that was left before its end.
+  [[nodiscard]] DecoderCounters counted_so_far(std::size_t i) const {
+    const auto index = static_cast<DeviceIndex>(i);
+    auto source = recording_.open(index);
+    if (!source) return {};
+    DecodedReads again(std::move(*source), decoder_of(index), false);
+    for (std::uint64_t n = 0; n < feeds_[i]->taken(); ++n) {
+      if (!again.next()) break;
+    }
+    return again.decoder().counters();
   }
 
   [[nodiscard]] DeviceRecord device_record(std::size_t i) const {
@@ -278,13 +296,14 @@ class Replayer {
     record.clock = recording_.clocks[i].how;
     record.clock_shift_s = recording_.clocks[i].shift_s;
     if (!feeds_[i]) return record;
-    record.counters = feeds_[i]->decoder().counters();
-    record.refused = feeds_[i]->sink().refused();
+    const Feed& feed = *feeds_[i];
+    record.refused = feed.sink().refused();
+    record.counters = feed.at_end() ? feed.decoder().counters() : counted_so_far(i);
     record.problem =
-        feeds_[i]->at_end()
-            ? decoder_problem(configuration_.devices[i], feeds_[i]->decoder())
-            : fmt::format("only {} of {} bytes are used: {} more than {} h{}",
-                          feeds_[i]->decoder().counters().bytes, feeds_[i]->source().bytes_total(),
+        feed.at_end()
+            ? decoder_problem(configuration_.devices[i], feed.decoder())
+            : fmt::format("only {} of {} bytes are used: {} more than {} h{}", record.counters.bytes,
+                          feed.bytes_total(),
                           pauses_.n == 0 ? "the next stamp lies" : "with the next stamp, the pauses are",
                           std::chrono::duration_cast<std::chrono::hours>(kLongestPause).count(),
                           pauses_.n == 0 ? " ahead" : " together");

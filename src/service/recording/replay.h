@@ -49,6 +49,8 @@ struct Recording {
   /// The same of all devices, null for those that are not present, by one pass where the recording is one
   /// file: for those who go through them side by side.
   std::function<Result<std::vector<std::unique_ptr<ByteSource>>>(Reading)> open_side_by_side;
+  /// Lines of open_side_by_side() have nothing in common: each may be read by a thread of its own.
+  bool has_lines_apart = false;
   std::vector<bool> present;                 ///< per device of the configuration
   std::vector<DeviceClock> clocks;           ///< per device
   std::optional<RecordedSchedule> schedule;  ///< of a capture of a live run
