@@ -224,9 +224,9 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   replay_options.has_sink_beside = may_use_threads();
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
-  BatchRecords records(configuration);
+  std::optional<BatchRecords> records(configuration);
   if (configuration.estimator.batch_mounting)
-    replay_options.on_sample = [&records](const Sample& sample) { records.add(sample); };
+    replay_options.on_sample = [&records](const Sample& sample) { records->add(sample); };
   const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
   if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
   if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
@@ -236,7 +236,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const bool by_batch = configuration.estimator.batch_mounting;
   if (by_batch && options.progress) options.progress("batch estimate", 0.0);
   std::vector<BatchOutcome> outcomes(of_filter.size());
-  if (by_batch) outcomes = estimate_mountings(configuration, records, first.former_mountings());
+  if (by_batch) outcomes = estimate_mountings(configuration, *records, first.former_mountings());
+  records.reset();
   const auto finals = by_batch ? with_batch(of_filter, outcomes) : of_filter;
   std::copy(finals.begin(), finals.end(), last.studies.begin());
 

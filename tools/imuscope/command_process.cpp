@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <malloc.h>
 #include <tbb/global_control.h>
 
 #include <memory>
@@ -89,7 +90,15 @@ Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
                      "give another --out, or --force to write over it");
 }
 
+/// Axes of long records come and go on every thread. What the C library keeps of such pieces for later is as
+/// much again as is in use; beyond this size each goes back to the system, and shorter records are no slower.
+void give_long_pieces_back() {
+  constexpr int kLongPiece_bytes = 4 << 20;
+  mallopt(M_MMAP_THRESHOLD, kLongPiece_bytes);
+}
+
 Result<void> process(const ProcessCommand& options) {
+  give_long_pieces_back();
   std::optional<tbb::global_control> limit;
   if (options.threads > 0)
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
