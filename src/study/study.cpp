@@ -1,6 +1,7 @@
 #include "study/study.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_group.h>
@@ -302,6 +303,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
 
   writer.wait();
   track.reset();
+  // Calibration and smoothing leave a heap full of small holes; what the noise models need are long pieces.
+  malloc_trim(0);
   if (!smoothed_files) return smoothed_files;
 
   const double run_s = regimes->motion.total_s(0) + regimes->motion.total_s(1);

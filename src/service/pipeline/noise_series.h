@@ -52,7 +52,7 @@ class NoiseSeries {
   std::size_t missing_ = 0;
   std::vector<HostTime> times_;
   std::array<std::vector<double>, kAxisCount> values_;
-  std::array<std::vector<std::uint8_t>, kAxisCount> valid_;
+  std::vector<std::uint8_t> valid_;    ///< a bit for each triad
   std::vector<std::uint8_t> regimes_;  ///< kNoRegime where there is none, or no sample
 };
 

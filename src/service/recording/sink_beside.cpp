@@ -8,7 +8,7 @@ namespace {
 
 /// Handed on at once: so much that the lock costs nothing beside it. What waits stays below kReadyResults times
 /// this.
-constexpr std::size_t kBlockOfResults_bytes = std::size_t{1} << 20U;
+constexpr std::size_t kBlockOfResults_bytes = std::size_t{1} << 18U;
 constexpr std::size_t kReadyResults = 4;
 
 }  // namespace
