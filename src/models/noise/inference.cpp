@@ -276,13 +276,13 @@ ParameterCovariance parameter_covariance(const Eigen::MatrixXd& jacobian, const 
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  constexpr double kSingular = 1e-12;
+  constexpr double kSingularShare = 1e-12;
   const Eigen::VectorXd& values = eigen.eigenvalues();
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Zero(values.size(), values.size());
   std::vector<bool> in_null_space(index.size(), false);
   for (Eigen::Index i = 0; i < values.size(); ++i) {
     const Eigen::VectorXd direction = eigen.eigenvectors().col(i);
-    if (values[i] > kSingular) {
+    if (values[i] > kSingularShare) {
       inverse += direction * direction.transpose() / values[i];
       continue;
     }

@@ -129,7 +129,7 @@ std::vector<DensityPoint> density_of(Spectra& spectra, double rate_hz, double co
                                      int points_per_octave, std::size_t shortest) {
   // From this bin on a segment's spectrum is not bent by what leaks from below; longer segments take over
   // there.
-  constexpr std::size_t kFirstBin = 8;
+  constexpr std::size_t kFirstUnbentBin = 8;
   const double tail = 0.5 * (1.0 - confidence);
   std::vector<DensityPoint> points;  // from high frequencies to low
   std::size_t last = shortest / 2 - 1;
@@ -137,7 +137,7 @@ std::vector<DensityPoint> density_of(Spectra& spectra, double rate_hz, double co
   for (const std::size_t length : lengths) {
     const Spectrum& spectrum = spectra.of(length);
     const bool is_longest = length == lengths.back();
-    const std::size_t first = is_longest ? 1 : kFirstBin;
+    const std::size_t first = is_longest ? 1 : kFirstUnbentBin;
     const double dof_of_bin = degrees_of_freedom(static_cast<double>(spectrum.segments));
     std::size_t high = last;
     while (high >= first) {
@@ -160,7 +160,7 @@ std::vector<DensityPoint> density_of(Spectra& spectra, double rate_hz, double co
       if (low == 0) break;
       high = low - 1;
     }
-    last = kFirstBin * kLongerOfDensity - 1;
+    last = kFirstUnbentBin * kLongerOfDensity - 1;
   }
   std::reverse(points.begin(), points.end());
   return points;
