@@ -93,7 +93,7 @@ Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
 /// Axes of long records come and go on every thread. What the C library keeps of such pieces for later is as
 /// much again as is in use; beyond this size each goes back to the system, and shorter records are no slower.
 void give_long_pieces_back() {
-  constexpr int kLongPiece_bytes = 4 << 20;
+  constexpr int kLongPiece_bytes = 2 << 20;
   mallopt(M_MMAP_THRESHOLD, kLongPiece_bytes);
 }
 
