@@ -86,8 +86,8 @@ TEST(Bench, EveryPromisedRowIsInTheOneTable) {
       EXPECT_TRUE(has_row(table, "noise", std::string(job) + size)) << job << size;
   }
   EXPECT_TRUE(has_row(table, "noise", "streaming, a sample at 16 levels"));
-  for (const char* what : {"raw bytes, no refits", "raw bytes, refits every minute", "capture", "whole study",
-                           "two threads", "report.html"})
+  for (const char* what : {"raw bytes, no refits", "raw bytes, refits every minute", "capture",
+                           "whole study with", "whole study, two threads", "report.html"})
     EXPECT_TRUE(has_row(table, "replay", what)) << what;
   for (const char* what : {"out, ", "in, "}) EXPECT_TRUE(has_row(table, "mcap", what)) << what;
   for (const char* what : {"replay, with S-IMUs", "replay, with the drive's length", "streaming, with levels",
