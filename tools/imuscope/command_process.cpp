@@ -90,8 +90,8 @@ Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
                      "give another --out, or --force to write over it");
 }
 
-/// Axes of long records come and go on every thread. What the C library keeps of such pieces for later is as
-/// much again as is in use; beyond this size each goes back to the system, and shorter records are no slower.
+/// Axes of long records come and go on every thread, and what the C library keeps of them for later stands in
+/// memory beside what is in use. Beyond this size each piece goes back to the system at once.
 void give_long_pieces_back() {
   constexpr int kLongPiece_bytes = 2 << 20;
   mallopt(M_MMAP_THRESHOLD, kLongPiece_bytes);

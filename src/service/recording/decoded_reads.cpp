@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "service/recording/sample_collector.h"
+
 namespace imuscope {
 
 namespace {
@@ -11,15 +13,6 @@ constexpr std::size_t kPieceReads = 4096;
 /// Or fewer where they bring more samples than that.
 constexpr std::size_t kPieceSamples = 1024;
 constexpr std::size_t kReadyPieces = 4;
-
-class Collector final : public SampleSink {
- public:
-  explicit Collector(std::vector<Sample>& samples) : samples_(samples) {}
-  void on_sample(const Sample& sample) noexcept override { samples_.push_back(sample); }
-
- private:
-  std::vector<Sample>& samples_;
-};
 
 }  // namespace
 
@@ -54,7 +47,7 @@ const DeviceDecoder& DecodedReads::decoder() {
 }
 
 bool DecodedReads::fill(Block& block, std::size_t reads) {
-  Collector collector(block.samples);
+  SampleCollector collector(block.samples);
   const auto fetch = [&] {
     auto read = source_->next();
     if (!read) block.error = read.error();

@@ -18,6 +18,7 @@
 #include "service/recording/capture_damage.h"
 #include "service/recording/message_source.h"
 #include "service/recording/recorded_look.h"
+#include "service/recording/sample_collector.h"
 #include "service/recording/side_by_side.h"
 
 namespace imuscope {
@@ -43,15 +44,6 @@ std::function<Sources(Reading)> one_by_one(const Recording& recording) {
     return sources;
   };
 }
-
-class SampleCollector final : public SampleSink {
- public:
-  explicit SampleCollector(std::vector<Sample>& samples) : samples_(samples) {}
-  void on_sample(const Sample& sample) noexcept override { samples_.push_back(sample); }
-
- private:
-  std::vector<Sample>& samples_;
-};
 
 /// @param clock  fixed for a source without arrivals
 Result<std::vector<Sample>> decode_all(const DeviceConfig& device, DeviceIndex index,

@@ -11,35 +11,47 @@ namespace {
 
 constexpr std::size_t kWatchedStates = 34;
 
-CovarianceKernel diagonal() {
-  CovarianceKernel P(kWatchedStates);
+CovarianceKernel diagonal(std::optional<InstructionSet> set = {}) {
+  CovarianceKernel P(kWatchedStates, set);
   for (std::size_t i = 0; i < kWatchedStates; ++i) P.set(i, i, std::pow(10.0, -static_cast<double>(i % 7)));
   return P;
 }
 
-TEST(CovarianceWatch, FindsNothingInACovarianceWhateverItsScales) {
-  CovarianceKernel P = diagonal();
+/// By the loops of every instruction set that this processor has.
+class CovarianceWatch : public testing::TestWithParam<InstructionSet> {
+ protected:
+  void SetUp() override {
+    if (covariance_loops(GetParam()) == nullptr) GTEST_SKIP() << "this processor has no such instructions";
+  }
+};
+
+TEST_P(CovarianceWatch, FindsNothingInACovarianceWhateverItsScales) {
+  CovarianceKernel P = diagonal(GetParam());
   P.set(3, 20, 0.999 * std::sqrt(P(3, 3) * P(20, 20)));
   P.reset_state(5, 0.0);
   EXPECT_EQ(P.first_bad_state(), std::nullopt);
 }
 
-TEST(CovarianceWatch, NamesTheStateThatIsACombinationOfOthers) {
-  CovarianceKernel P = diagonal();
+TEST_P(CovarianceWatch, NamesTheStateThatIsACombinationOfOthers) {
+  CovarianceKernel P = diagonal(GetParam());
   // 21 = 3 + 20, each scaled: one variance too little.
   P.set(3, 21, std::sqrt(0.5 * P(3, 3) * P(21, 21)));
   P.set(20, 21, std::sqrt(0.5 * P(20, 20) * P(21, 21)));
   EXPECT_EQ(P.first_bad_state(), 21U);
 }
 
-TEST(CovarianceWatch, NamesNegativeVariancesAndNumbersThatAreNone) {
-  CovarianceKernel P = diagonal();
+TEST_P(CovarianceWatch, NamesNegativeVariancesAndNumbersThatAreNone) {
+  CovarianceKernel P = diagonal(GetParam());
   P.set(9, 9, -1e-12);
   EXPECT_EQ(P.first_bad_state(), 9U);
-  P = diagonal();
+  P = diagonal(GetParam());
   P.set(4, 11, std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(P.first_bad_state(), 11U);
 }
+
+INSTANTIATE_TEST_SUITE_P(EveryInstructionSet, CovarianceWatch,
+                         testing::Values(InstructionSet::kBaseline, InstructionSet::kAvx2,
+                                         InstructionSet::kAvx512));
 
 TEST(CovarianceKernel, RefusesACorrectionThatIsNotFinite) {
   CovarianceKernel P = diagonal();
