@@ -91,9 +91,10 @@ Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
 }
 
 /// Axes of long records come and go on every thread, and what the C library keeps of them for later stands in
-/// memory beside what is in use. Beyond this size each piece goes back to the system at once.
+/// memory beside what is in use. Beyond this size each piece goes back to the system at once; smaller ones are
+/// taken too often for that, and two threads would wait for each other's pages.
 void give_long_pieces_back() {
-  constexpr int kLongPiece_bytes = 2 << 20;
+  constexpr int kLongPiece_bytes = 4 << 20;
   mallopt(M_MMAP_THRESHOLD, kLongPiece_bytes);
 }
 
