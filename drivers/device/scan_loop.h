@@ -29,8 +29,10 @@ struct Examined {
   std::uint8_t kind = 0;  ///< of a frame, the protocol's own
 };
 
-/// What a scanner met between good frames since its construction: bytes that belong to none, and frames that
-/// failed their checksum or announced an impossible length.
+/// What a scanner met since its construction: bytes that belong to no good frame, and frames that failed their
+/// checksum or announced an impossible length. A line is opened in the midst of a message more often than not,
+/// and the rest of it may look like the start of another: until the first good frame bytes are skipped, and
+/// nothing is called damaged.
 struct ScanCounters {
   std::uint64_t bytes_skipped = 0;
   std::uint64_t bad_checksums = 0;
@@ -64,6 +66,7 @@ class ScanLoop {
       switch (found.verdict) {
         case Verdict::kFrame:
           taken_ = found.size;
+          in_step_ = true;
           return found;
         case Verdict::kSeparator:
           buffer_.consume(1);
@@ -72,10 +75,10 @@ class ScanLoop {
           if (!at_end) return std::nullopt;
           break;
         case Verdict::kBadChecksum:
-          ++counters_.bad_checksums;
+          counters_.bad_checksums += in_step_ ? 1 : 0;
           break;
         case Verdict::kBadLength:
-          ++counters_.bad_lengths;
+          counters_.bad_lengths += in_step_ ? 1 : 0;
           break;
         case Verdict::kFalseStart:
           break;
@@ -96,6 +99,7 @@ class ScanLoop {
  private:
   FrameBuffer<Capacity> buffer_;
   std::size_t taken_ = 0;
+  bool in_step_ = false;  ///< a good frame has come
   ScanCounters counters_;
 };
 

@@ -16,6 +16,7 @@ bool Scanner::next(Frame& frame, bool at_end) noexcept {
     if (found.verdict == Verdict::kFrame) {
       buffer_.consume(taken_);
       taken_ = found.size;
+      in_step_ = true;
       nested_at_ = 1;
       fill(frame, 0, found);
       return true;
@@ -111,6 +112,7 @@ Scanner::Verdict Scanner::look_back(bool at_end) noexcept {
 }
 
 void Scanner::count(Verdict verdict) noexcept {
+  if (!in_step_) return;
   if (verdict == Verdict::kBadChecksum) ++counters_.bad_checksums;
   if (verdict == Verdict::kBadLength) ++counters_.bad_lengths;
 }

@@ -36,7 +36,8 @@ struct Frame {
   bool nested = false;                 ///< lies inside the frame that was given before
 };
 
-/// What the scanner met between good frames since its construction.
+/// What the scanner met since its construction. Until the first good frame bytes are skipped, and nothing is
+/// called damaged: it may be the rest of a message that the line was opened in.
 struct ScanCounters {
   std::uint64_t bytes_skipped = 0;
   std::uint64_t bad_checksums = 0;
@@ -80,6 +81,7 @@ class Scanner {
   // Pending bytes: the last frame taken (taken_ bytes; zero: none to look back into), then what follows it.
   FrameBuffer<2 * kFrameMax> buffer_;
   std::size_t taken_ = 0;
+  bool in_step_ = false;       ///< a good frame has come
   std::size_t nested_at_ = 0;  ///< in the frame taken: where to look on for frames inside it
   ScanCounters counters_;
 };

@@ -276,8 +276,30 @@ TEST(GreisDecoder, WhatTheLineDamagedIsCountedByItsKind) {
   EXPECT_GE(rig.decoder.counters().bytes_skipped, damaged.size() - 2 + 40U);
   EXPECT_EQ(rig.decoder.counters().frames, 2 * clean.frames);
   Rig impossible;
+  impossible.decoder.push(good, {}, impossible.sink);
   impossible.decoder.push(bytes_of("PG000"), {}, impossible.sink);
   EXPECT_EQ(impossible.decoder.counters().bad_lengths, 1U);
+}
+
+// The rest of DP012<...> begins with what could be the header of a message of 0x12C bytes, for one.
+TEST(GreisDecoder, ALineOpenedInTheMidstOfAMessageHasNoDamage) {
+  Bytes epochs;
+  for (const U32 tod : {1000U, 1100U, 1200U, 1300U}) {
+    const Bytes epoch =
+        lines({rt(tod), pg(0.85, 0.04, 106.5, 0.5F, 4),
+               greis_message("DP", test::Body().put(0x43434343U).put(1.0F).put(1.0F).put(1.0F).put(U8{4})),
+               et(tod)});
+    epochs.insert(epochs.end(), epoch.begin(), epoch.end());
+  }
+  const std::size_t epoch_size = epochs.size() / 4;
+  for (std::size_t cut = 1; cut < epoch_size; ++cut) {
+    Rig rig;
+    rig.decoder.push(std::span(epochs).subspan(cut), {}, rig.sink);
+    rig.decoder.finish({}, rig.sink);
+    const auto& counters = rig.decoder.counters();
+    EXPECT_EQ(counters.bad_checksums + counters.bad_lengths, 0U) << cut;
+    EXPECT_GE(counters.frames, 3U * 4U) << cut;
+  }
 }
 
 TEST(GreisDecoder, MissingEpochsAreCountedByTime) {

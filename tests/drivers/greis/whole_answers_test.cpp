@@ -185,10 +185,13 @@ TEST(GreisWhole, DamageAtEveryPlace) {
   expect_recorded("drivers/greis/damage.txt", text);
 }
 
+/// Of bytes that follow a good message.
 std::string frames_text(const Bytes& bytes) {
   Scanner scanner;
   std::string text;
   Frame frame;
+  scanner.append(et(0), kWholeBegin);
+  EXPECT_TRUE(scanner.next(frame));
   std::span<const std::uint8_t> rest(bytes);
   const auto drain = [&](bool at_end) {
     while (scanner.next(frame, at_end)) {

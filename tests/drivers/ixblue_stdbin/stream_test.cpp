@@ -44,13 +44,20 @@ TEST(StdBinStream, EveryByteBelongsToATelegramOrIsSkipped) {
 }
 
 TEST(StdBinStream, AHeaderThatContradictsItselfIsRefusedWithoutWaitingForItsBytes) {
-  Bytes bytes = TelegramBuilder(3, 1, 1).nav(0, TelegramBuilder::floats({1, 2, 3})).build();
-  bytes[15] = 7;  // announces 1800 bytes more than its blocks need
-  const Bytes good = TelegramBuilder(3, 2, 2).nav(0, TelegramBuilder::floats({1, 2, 3})).build();
-  bytes.insert(bytes.end(), good.begin(), good.end());
+  const auto telegram = [](std::uint32_t counter) {
+    return TelegramBuilder(3, counter, counter).nav(0, TelegramBuilder::floats({1, 2, 3})).build();
+  };
+  Bytes bytes = telegram(0);
+  const std::size_t changed = bytes.size() + 15;
+  for (const std::uint32_t counter : {1U, 2U}) {
+    const Bytes next = telegram(counter);
+    bytes.insert(bytes.end(), next.begin(), next.end());
+  }
+  bytes[changed] = 7;  // announces 1800 bytes more than its blocks need
   Scanner scanner;
   Frame frame;
   ASSERT_EQ(scanner.append(bytes, {}), bytes.size());
+  ASSERT_TRUE(scanner.next(frame));
   ASSERT_TRUE(scanner.next(frame));
   EXPECT_EQ(parse_telegram(frame.bytes).counter, 2U);
   EXPECT_EQ(scanner.counters().bad_lengths, 1U);

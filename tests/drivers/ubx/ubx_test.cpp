@@ -199,12 +199,12 @@ TEST(UbxDecoder, WhatTheLineDamagedIsCountedByItsKind) {
   damaged[10] ^= 0x01U;
   const Bytes endless{0xB5, 0x62, 0x01, 0x07, 0xFF, 0xFF};  // a payload longer than any message's
   Rig rig;
-  for (const Bytes& bytes : {damaged, endless, good}) rig.push(bytes);
+  for (const Bytes& bytes : {good, damaged, endless, good}) rig.push(bytes);
   rig.decoder.finish({}, rig.sink);
   EXPECT_EQ(rig.decoder.counters().bad_checksums, 1U);
   EXPECT_EQ(rig.decoder.counters().bad_lengths, 1U);
   EXPECT_EQ(rig.decoder.counters().bytes_skipped, damaged.size() + endless.size());
-  EXPECT_EQ(rig.decoder.counters().frames, 1U);
+  EXPECT_EQ(rig.decoder.counters().frames, 2U);
 }
 
 TEST(UbxCapture, TheWalkWithNmeaMixedInLosesNoByte) {

@@ -152,12 +152,15 @@ TEST(MtScanner, CountsEveryByteAsFrameOrSkipped) {
 }
 
 TEST(MtScanner, RefusesALengthBeyondTheDocumentedCeilingAtOnce) {
-  Bytes bytes{kPreamble, kMasterBid, mid::kMtData, kExtendedLength, 0x08, 0x01};  // 2049
+  Bytes bytes = frame_of(0x30, {});
+  const Bytes endless{kPreamble, kMasterBid, mid::kMtData, kExtendedLength, 0x08, 0x01};  // 2049
   const Bytes good = frame_of(0x31, {});
+  bytes.insert(bytes.end(), endless.begin(), endless.end());
   bytes.insert(bytes.end(), good.begin(), good.end());
   Scanner scanner;
   ASSERT_EQ(scanner.append(bytes, HostTime{}), bytes.size());
   Frame frame;
+  ASSERT_TRUE(scanner.next(frame));
   ASSERT_TRUE(scanner.next(frame));
   EXPECT_EQ(frame.mid, 0x31);
   EXPECT_EQ(scanner.counters().bad_lengths, 1U);
