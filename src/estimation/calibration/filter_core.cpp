@@ -110,6 +110,7 @@ double FilterCore::sd(std::size_t state) const noexcept {
 
 bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use) noexcept {
   if (!covariance_.update(to_array(innovation), use)) return false;
+  ++changes_;
   const std::span<const double> correction = covariance_.correction();
   const Eigen::Map<const NavigationErrorVector> navigation_correction(correction.data());
   // E-4: as errors of now
@@ -209,6 +210,7 @@ void FilterCore::predict_states(std::size_t first, std::span<const double> decay
 }
 
 void FilterCore::reset_state(std::size_t i, double variance) noexcept {
+  ++changes_;
   covariance_.reset_state(i, variance);
   // E-11. A decay to nothing: what was known before tells nothing of what comes after.
   if (keeps_history_) accumulate(i, 0.0, variance);

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "base/contracts.h"
@@ -73,6 +74,9 @@ class FilterCore {
   /// @return false where nothing was changed
   bool update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use) noexcept;
 
+  /// How often an update or a reset has changed states and covariance; the passing of time does not count.
+  [[nodiscard]] std::uint64_t changes() const noexcept { return changes_; }
+
   /// Carries the covariance of the navigation over one interval (not its state).
   void predict_navigation(const NavigationTransition& step) noexcept;
   /// Covariance of one state: decay, then white noise of the given variance.
@@ -122,6 +126,7 @@ class FilterCore {
   AntennaState antenna_;
   std::size_t antenna_states_ = SImuLayout::kAbsent;
   std::vector<double> repair_variance_;  ///< prior variance of every state
+  std::uint64_t changes_ = 0;
   bool keeps_history_ = false;
   Accumulated accumulated_;
 };

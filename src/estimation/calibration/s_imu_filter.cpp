@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "estimation/calibration/axis_gate.h"
 #include "estimation/calibration/finite_imu.h"
@@ -612,7 +613,7 @@ void SImuFilter::update_output(const FilterCore& core, EventLog& log) noexcept {
   if (!calibrating_) return;
   const SImuState& state = core.study(index_);
   const SImuLayout& layout = core.layout(index_);
-  publish_mounting(core);
+  if (mounting_may_have_moved(core)) publish_mounting(core);
   output_.t_d_s = state.t_d_s;
   output_.gyro_bias_radps = to_array(state.gyro_bias_s_radps);
   output_.accel_bias_mps2 = to_array(state.accel_bias_s_mps2);
@@ -634,8 +635,6 @@ void SImuFilter::update_output(const FilterCore& core, EventLog& log) noexcept {
     for (std::size_t i = 0; i < 3; ++i) {
       output_.sd_gyro_scale[i] = std::hypot(output_.sd_gyro_scale[i], reference_scale_sd_, kLowPassShare);
       output_.sd_accel_scale[i] = std::hypot(output_.sd_accel_scale[i], reference_scale_sd_, kLowPassShare);
-      output_.sd_accel_boresight_rad[i] =
-          std::hypot(output_.sd_accel_boresight_rad[i], reference_triad_sd_rad_);
     }
   }
   const MountingMonitor::Verdict verdict = monitor_.judge(output_, layout);
@@ -650,6 +649,13 @@ void SImuFilter::update_output(const FilterCore& core, EventLog& log) noexcept {
     output_.weakest_relative_sd = weakest.relative_sd;
     if (has_biases_) monitor_.watch_priors(output_, config_, log);
   }
+}
+
+// A mounting does not age: most ticks bring no update, and it stays what it was.
+bool SImuFilter::mounting_may_have_moved(const FilterCore& core) noexcept {
+  const bool creeps = config_.boresight_creep_rad_per_sqrt_s > 0.0;
+  const PublishedAt now{core.changes(), noise_share_};
+  return std::exchange(published_at_, now) != now || creeps;
 }
 
 void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
@@ -701,8 +707,10 @@ void SImuFilter::publish_mounting(const FilterCore& core) noexcept {
                          by_axes * (a_a + g_g - g_a - g_a.transpose()) * by_axes.transpose();
   for (std::size_t i = 0; i < 3; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    output_.sd_accel_boresight_rad[i] =
-        layout.accel_boresight == SImuLayout::kAbsent ? 0.0 : std::sqrt(alpha(k, k));
+    // C-21
+    output_.sd_accel_boresight_rad[i] = layout.accel_boresight == SImuLayout::kAbsent
+                                            ? 0.0
+                                            : std::hypot(std::sqrt(alpha(k, k)), reference_triad_sd_rad_);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "estimation/alignment/coarse_mounting.h"
@@ -89,6 +90,7 @@ class SImuFilter {
                                                 const Eigen::Vector3d& plain) const noexcept;
   void restart_windows() noexcept;
   void set_window_noise() noexcept;
+  [[nodiscard]] bool mounting_may_have_moved(const FilterCore& core) noexcept;
   /// Mounting and accelerometer triad in the frames of their axes. C-22.
   void publish_mounting(const FilterCore& core) noexcept;
   void precompute_noise() noexcept;
@@ -160,6 +162,14 @@ class SImuFilter {
 
   std::array<TriadNoise, kRegimeCount> gyro_floor_;  ///< as configured
   std::array<TriadNoise, kRegimeCount> accel_floor_;
+
+  /// All that the published mounting follows from.
+  struct PublishedAt {
+    std::uint64_t changes = 0;  ///< FilterCore::changes()
+    double noise_share = 0.0;
+    bool operator==(const PublishedAt&) const = default;
+  };
+  PublishedAt published_at_;
 
   MountingMonitor monitor_;
   HostTime next_direction_{};

@@ -46,6 +46,15 @@ class BoundedQueue {
     changed_.notify_all();
     return item;
   }
+  /// Waits for nothing. Thread: the one that takes them.
+  [[nodiscard]] std::optional<T> pop_if_ready() {
+    const std::lock_guard lock(mutex_);
+    if (ready_.empty()) return std::nullopt;
+    std::optional<T> item(std::move(ready_.front()));
+    ready_.pop_front();
+    changed_.notify_all();
+    return item;
+  }
   /// Nobody wants more: push() waits no longer. Thread: the one that takes them.
   void refuse() {
     const std::lock_guard lock(mutex_);

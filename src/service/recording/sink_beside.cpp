@@ -10,24 +10,36 @@ namespace {
 /// this.
 constexpr std::size_t kBlockOfResults_bytes = std::size_t{1} << 18U;
 constexpr std::size_t kReadyResults = 4;
+/// Besides those that wait: one is worked off, one is full, and one is to follow it.
+constexpr std::size_t kBlocks = kReadyResults + 3;
 
 }  // namespace
 
 SinkBeside::SinkBeside(CoreSink& behind)
-    : behind_(behind), block_(with_room()), ready_(kReadyResults), thread_([this] {
-        while (const auto block = ready_.pop()) work_off(*block);
+    : behind_(behind), ready_(kReadyResults), worked_off_(kBlocks), thread_([this] {
+        while (auto block = ready_.pop()) {
+          work_off(*block);
+          worked_off_.push(std::move(*block));
+        }
       }) {}
 
-/// Epochs are nearly all of it.
-SinkBeside::Block SinkBeside::with_room() {
-  Block block;
-  block.epochs.reserve(kBlockOfResults_bytes / sizeof(Epoch) + 1);
+SinkBeside::Block SinkBeside::empty_block() {
+  Block block = worked_off_.pop_if_ready().value_or(Block{});
+  block.order.clear();
+  block.epochs.clear();
+  block.errors.clear();
+  block.events.clear();
+  block.snapshots.clear();
+  block.late_samples.clear();
+  block.applied_noises.clear();
+  block.bytes = 0;
   return block;
 }
 
 SinkBeside::~SinkBeside() {
   ready_.push(std::move(block_));
   ready_.end();
+  worked_off_.refuse();
   thread_.join();
 }
 
@@ -36,7 +48,7 @@ void SinkBeside::keep(Kind kind, std::vector<T>& of_kind, const T& one) {
   block_.order.push_back(kind);
   of_kind.push_back(one);
   block_.bytes += sizeof(T);
-  if (block_.bytes >= kBlockOfResults_bytes) ready_.push(std::exchange(block_, with_room()));
+  if (block_.bytes >= kBlockOfResults_bytes) ready_.push(std::exchange(block_, empty_block()));
 }
 
 void SinkBeside::on_epoch(const SImuEpoch& epoch, const TickFacts& facts) noexcept {

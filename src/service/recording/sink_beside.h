@@ -45,14 +45,16 @@ class SinkBeside final : public CoreSink {
     std::vector<AppliedNoise> applied_noises;
     std::size_t bytes = 0;
   };
-  static Block with_room();
+  /// One that has been worked off, where there is one: its vectors have grown to what a block needs.
+  Block empty_block();
   template <typename T>
   void keep(Kind kind, std::vector<T>& of_kind, const T& one);
   void work_off(const Block& block);
 
   CoreSink& behind_;
-  Block block_;
   BoundedQueue<Block> ready_;
+  BoundedQueue<Block> worked_off_;
+  Block block_;
   std::thread thread_;  ///< last, as it uses the others
 };
 
