@@ -1,6 +1,7 @@
 #include "service/recording/sink_beside.h"
 
 #include <gtest/gtest.h>
+#include <chrono>
 #include <string>
 #include <thread>
 
@@ -30,11 +31,13 @@ class Notes final : public CoreSink {
     note("noise " + std::to_string(applied.tick));
   }
 
+  std::chrono::milliseconds first_pause{0};
   std::vector<std::string> all;
   std::vector<std::thread::id> threads;
 
  private:
   void note(std::string what) {
+    if (all.empty()) std::this_thread::sleep_for(first_pause);
     all.push_back(std::move(what));
     if (threads.empty() || threads.back() != std::this_thread::get_id())
       threads.push_back(std::this_thread::get_id());
@@ -86,6 +89,21 @@ TEST(SinkBeside, TellsAllInTheOrderInWhichItCameFromOneOtherThread) {
     if (n == 0) continue;
     ASSERT_EQ(notes.threads.size(), 1U) << n;
     EXPECT_NE(notes.threads.front(), std::this_thread::get_id());
+  }
+}
+
+// All blocks there can be are full before the first is worked off, and none is asked back after.
+TEST(SinkBeside, EndsWhereItsThreadBeganLate) {
+  for (const int n : {500, 2'000, 5'000}) {
+    Notes direct;
+    tell(direct, n);
+    Notes notes;
+    notes.first_pause = std::chrono::milliseconds(50);
+    {
+      SinkBeside beside(notes);
+      tell(beside, n);
+    }
+    EXPECT_EQ(notes.all, direct.all) << n;
   }
 }
 
