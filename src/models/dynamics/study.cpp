@@ -13,6 +13,7 @@
 namespace imuscope {
 namespace {
 
+constexpr std::size_t kTriadAxes = 3;
 /// A hole in the counters longer than this (10 min at 100 Hz) starts the whitening filter's prediction no
 /// further: by then nothing is known of the noise.
 constexpr std::int64_t kLongestHole = 60'000;
@@ -124,25 +125,29 @@ std::vector<AxisSums> ordinary_sums(ErrorRowSource& rows) {
   return sums;
 }
 
-std::vector<ResidualSeries> residuals(ErrorRowSource& rows, const std::vector<AxisSums>& sums) {
+/// Of the three axes from `first` on. A triad at a time: those of all six would be the most that a study of a
+/// long drive keeps, and its rows are read twice in less time than they are worked on.
+std::array<ResidualSeries, kTriadAxes> residuals(ErrorRowSource& rows, const std::vector<AxisSums>& sums,
+                                                 std::size_t first) {
   auto columns = all_columns();
-  std::vector<ResidualSeries> series(kErrorAxes);
-  std::vector<Eigen::VectorXd> solutions;
-  for (const auto& axis : sums) solutions.push_back(axis.projected().all_coefficients());
-  const auto append = [&](std::size_t axis, double value, bool valid) {
-    series[axis].values.push_back(value);
-    series[axis].mask.push_back(valid ? 1 : 0);
+  std::array<ResidualSeries, kTriadAxes> series;
+  std::array<Eigen::VectorXd, kTriadAxes> solutions;
+  for (std::size_t k = 0; k < kTriadAxes; ++k) solutions[k] = sums[first + k].projected().all_coefficients();
+  const auto append = [&](std::size_t k, double value, bool valid) {
+    series[k].values.push_back(value);
+    series[k].mask.push_back(valid ? 1 : 0);
   };
   for_each_counter(
       rows,
       [&](const ErrorRow& row) {
-        for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
-          const bool valid = columns[axis].fill(row);
-          append(axis, valid ? residual_of(columns[axis].all(), solutions[axis]) : 0.0, valid);
+        for (std::size_t k = 0; k < kTriadAxes; ++k) {
+          AxisColumns& of_axis = columns[first + k];
+          const bool valid = of_axis.fill(row);
+          append(k, valid ? residual_of(of_axis.all(), solutions[k]) : 0.0, valid);
         }
       },
       [&] {
-        for (std::size_t axis = 0; axis < kErrorAxes; ++axis) append(axis, 0.0, false);
+        for (std::size_t k = 0; k < kTriadAxes; ++k) append(k, 0.0, false);
       });
   return series;
 }
@@ -239,19 +244,22 @@ struct Whitened {
 /// @param by  null where the rows of the regression were not whitened
 AllNoise fit_residuals(ErrorRowSource& rows, const std::vector<AxisSums>& sums, const Whitened* by,
                        const DynamicsOptions& options, std::array<AxisDynamics, kErrorAxes>& result) {
-  const auto series = residuals(rows, sums);
   AllNoise noises;
-  for (std::size_t axis = 0; axis < kErrorAxes; ++axis) {
-    if (by != nullptr && !by->noises[axis]) continue;  // why is said already
-    noise::WvOptions wv_options;
-    wv_options.mask = series[axis].mask;
-    auto wv = noise::haar_wavelet_variance(series[axis].values, wv_options);
-    if (!wv) {
-      result[axis].no_gls_because = wv.error().what;
-      continue;
+  for (std::size_t first = 0; first < kErrorAxes; first += kTriadAxes) {
+    const auto series = residuals(rows, sums, first);
+    for (std::size_t axis = first; axis < first + kTriadAxes; ++axis) {
+      if (by != nullptr && !by->noises[axis]) continue;  // why is said already
+      const ResidualSeries& left = series[axis - first];
+      noise::WvOptions wv_options;
+      wv_options.mask = left.mask;
+      auto wv = noise::haar_wavelet_variance(left.values, wv_options);
+      if (!wv) {
+        result[axis].no_gls_because = wv.error().what;
+        continue;
+      }
+      if (by != nullptr) give_back(by->columns[axis], sums[axis].projected().all_covariances(), *wv);
+      noises[axis] = fit_residual(std::move(*wv), options, result[axis].no_gls_because);
     }
-    if (by != nullptr) give_back(by->columns[axis], sums[axis].projected().all_covariances(), *wv);
-    noises[axis] = fit_residual(std::move(*wv), options, result[axis].no_gls_because);
   }
   return noises;
 }

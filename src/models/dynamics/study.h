@@ -48,7 +48,7 @@ struct DynamicsOptions {
 /// Least squares; the noise of its residual; least squares on rows whitened by that; and again with the noise
 /// of what the generalised fit leaves, the noise that the fit itself took being given back. Tests and
 /// intervals count what is not known of the noise.
-/// Memory: one double a row and axis, and one a column, axis and sixteen rows.
+/// Memory: one double a row and axis of a triad, and one a column, axis and sixteen rows.
 std::array<AxisDynamics, kErrorAxes> study_dynamics(ErrorRowSource& rows, const DynamicsOptions& options);
 
 }  // namespace imuscope
