@@ -110,10 +110,27 @@ bool look_at_parts(const Job& job, const std::vector<std::uint8_t>& mask, noise:
   return true;
 }
 
+/// What of a series is fitted: a regime, or all of it.
+struct Part {
+  std::string regime;
+  std::vector<std::uint8_t> mask;
+  std::vector<noise::Line> lines;  ///< that belong to its model
+  noise::Remainders remainders;    ///< of all lines that were taken out of it
+};
+
+Part part_of(const Job& job, const std::string& regime, std::vector<std::uint8_t> mask,
+             const std::vector<noise::Line>& taken_out) {
+  Part part{regime, std::move(mask), regime == kWholeRun ? std::vector<noise::Line>{} : taken_out, {}};
+  if (taken_out.empty()) return part;
+  noise::Spectra spectra(job.values, part.mask);
+  part.remainders = noise::Remainders(spectra, taken_out, job.device.rate_hz);
+  return part;
+}
+
 /// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
-std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::uint8_t>& mask,
-                     const std::string& regime, const std::vector<noise::Line>& lines,
-                     std::size_t levels_of_whole) {
+std::size_t fit_axis(const Job& job, std::size_t axis, const Part& part, std::size_t levels_of_whole) {
+  const std::vector<std::uint8_t>& mask = part.mask;
+  const std::string& regime = part.regime;
   // A regime that the run does not have is said once, not for every axis.
   if (std::none_of(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; })) return 0;
   const auto remark = [&](const std::string& what) {
@@ -121,11 +138,12 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
   };
   noise::WvOptions options;
   options.mask = mask;
-  const auto wv = noise::haar_wavelet_variance(job.values, options);
+  auto wv = noise::haar_wavelet_variance(job.values, options);
   if (!wv) {
     remark("no wavelet variance: " + wv.error().what);
     return 0;
   }
+  part.remainders.take_out_of(*wv, options.confidence);
   say_left_out(job, axis, regime, *wv, levels_of_whole);
   noise::FitOptions fit_options;
   fit_options.signal_unit = axis_unit(axis);
@@ -144,7 +162,7 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const std::vector<std::ui
           : noise::spike_warning(noise::test_tails(job.values, options, fit->model), job.device.rate_hz);
   const bool parts_differ = regime != kWholeRun && look_at_parts(job, mask, *fit);
   if (spikes) fit->warnings.insert(fit->warnings.begin(), *spikes);
-  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), lines, parts_differ});
+  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), part.lines, parts_differ});
   return wv->levels.size();
 }
 
@@ -286,9 +304,11 @@ NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std
   for (std::size_t regime = 0; regime < regimes.size(); ++regime)
     lines.push_back(take_out_lines(device, axis, regimes[regime], series.mask(axis, regime), values, study));
   const Job job{device, values, spec, covariances, study};
-  const std::size_t levels = fit_axis(job, axis, series.mask(axis), kWholeRun, {}, 0);
-  for (std::size_t regime = 0; regime < regimes.size(); ++regime)
-    fit_axis(job, axis, series.mask(axis, regime), regimes[regime], lines[regime], levels);
+  std::vector<noise::Line> of_all;
+  for (const auto& of_regime : lines) of_all.insert(of_all.end(), of_regime.begin(), of_regime.end());
+  const std::size_t levels = fit_axis(job, axis, part_of(job, kWholeRun, series.mask(axis), of_all), 0);
+  for (std::size_t r = 0; r < regimes.size(); ++r)
+    fit_axis(job, axis, part_of(job, regimes[r], series.mask(axis, r), lines[r]), levels);
   return study;
 }
 

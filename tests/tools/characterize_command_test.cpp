@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
@@ -303,6 +304,71 @@ TEST_F(Characterize, ARealGyroscopeHasItsResonanceNamed) {
     if (tau_s < 1.0 || tau_s > 4.0) continue;
     EXPECT_NEAR(60.0 * point.at("deviation").get<double>() * std::sqrt(tau_s), n, 0.05 * n) << tau_s;
   }
+}
+
+double named(const nlohmann::json& axis, const char* symbol) {
+  for (const auto& term : axis.at("terms")) {
+    if (term.at("symbol") == symbol) return term.at("value").get<double>();
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+bool is_named(const nlohmann::json& of_axis, double frequency_hz, double within_hz) {
+  return std::ranges::any_of(of_axis, [&](const nlohmann::json& one) {
+    return std::abs(one.at("frequency_hz").get<double>() - frequency_hz) < within_hz;
+  });
+}
+
+/// A model near every level, N and B as the curve has them.
+void expect_honest(const nlohmann::json& axis) {
+  constexpr double kNear = 0.05;
+  for (const auto& level : axis.at("fit").at("wv")) {
+    const double fitted = level.at("fitted").get<double>();
+    const double value = level.at("value").get<double>();
+    const bool in_interval =
+        fitted >= level.at("ci_low").get<double>() && fitted <= level.at("ci_high").get<double>();
+    EXPECT_TRUE(std::abs(fitted - value) <= kNear * value || in_interval)
+        << level.at("level") << ": " << fitted / value;
+  }
+  const bool is_gyro = axis.at("unit") == "deg/s";
+  const double per_root_hour = is_gyro ? 60.0 : 60.0 * 9.80665;
+  const double per_hour = is_gyro ? 3600.0 : 1e6;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const auto& point : axis.at("allan")) {
+    const double deviation = point.at("deviation").get<double>();
+    smallest = std::min(smallest, deviation);
+    const double tau_s = point.at("tau_s").get<double>();
+    if (tau_s < 0.8 || tau_s > 1.3) continue;  // as a filter feels it: at a second
+    EXPECT_NEAR(per_root_hour * deviation * std::sqrt(tau_s), named(axis, "N"), kNear * named(axis, "N"))
+        << tau_s;
+  }
+  for (const auto& term : axis.at("terms")) {
+    if (term.at("symbol") != "B" || term.at("known") == "bound") continue;
+    constexpr double kFlickerOfMinimum = 0.664;  // IEEE Std 952
+    const double of_curve = per_hour * smallest / kFlickerOfMinimum;
+    EXPECT_NEAR(term.at("value").get<double>(), of_curve, 0.1 * of_curve);
+  }
+}
+
+TEST_F(Characterize, SixRealAxesAreDescribedAsTheyAre) {
+  IMUSCOPE_NEEDS_SHARED("data/adis16405_static/gyro_z_degps.f64");
+  std::vector<std::string> arguments;
+  for (const char* name :
+       {"gyro_x_degps", "gyro_y_degps", "gyro_z_degps", "accel_x_g", "accel_y_g", "accel_z_g"})
+    arguments.push_back(shared_path(std::string("data/adis16405_static/") + name + ".f64").string());
+  for (const char* option : {"--rate", "100", "--no-page", "--json"}) arguments.emplace_back(option);
+  ASSERT_EQ(run(arguments), 0) << output();
+  const auto axes = nlohmann::json::parse(output()).at("axes");
+  ASSERT_EQ(axes.size(), 6U);
+  for (const auto& axis : axes) {
+    SCOPED_TRACE(axis.at("name").get<std::string>());
+    expect_honest(axis);
+    if (axis.at("unit") == "deg/s") continue;
+    EXPECT_TRUE(is_named(axis.at("lines"), 0.565, 0.005));
+    EXPECT_TRUE(is_named(axis.at("lines"), 1.69, 0.01));
+  }
+  EXPECT_TRUE(is_named(axes.at(2).at("resonances"), 20.0, 0.5));
+  EXPECT_TRUE(is_named(axes.at(3).at("resonances"), 10.0, 0.5));
 }
 
 }  // namespace

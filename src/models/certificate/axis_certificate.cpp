@@ -23,6 +23,7 @@ namespace {
 using noise::FitResult;
 using noise::Intervals;
 
+constexpr int kAllanPointsPerOctave = 4;
 /// p below which the halves of a record are said to differ.
 constexpr double kDiffer = 0.01;
 
@@ -183,6 +184,7 @@ Result<void> look_at(const AxisRecord& record, std::span<const double> x, std::s
 /// What the samples are asked for beside their Allan deviations; the rest needs no samples.
 struct Kept {
   noise::WaveletVariance wv;
+  noise::Remainders remainders;
   std::vector<noise::WaveletVariance> halves;
   noise::TailExcerpt tails;
 };
@@ -204,13 +206,18 @@ Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span
   }
   out.resonances = find_resonances(spectra, record.rate_hz);
   out.low_pass_hz = low_pass_hz(spectra, record.rate_hz);
+  Kept kept{{},
+            noise::Remainders(spectra, out.lines, record.rate_hz),
+            halves_of(x, mask),
+            noise::tail_excerpt(x, mask)};
   noise::WvOptions wv_options;
   wv_options.mask = mask;
   wv_options.confidence = confidence;
-  Kept kept{{}, halves_of(x, mask), noise::tail_excerpt(x, mask)};
   auto wv = noise::haar_wavelet_variance_in_place(x, wv_options);
   if (!wv) return tl::unexpected(named(record, wv.error()));
   kept.wv = std::move(*wv);
+  kept.remainders.take_out_of(kept.wv, confidence);
+  for (noise::WaveletVariance& half : kept.halves) kept.remainders.take_out_of(half, confidence);
   return kept;
 }
 
@@ -235,7 +242,8 @@ Result<Reduced> reduced(const AxisRecord& record, double confidence) {
   x = samples_of(record);
   if (!x) return tl::unexpected(named(record, x.error()));
   noise::remove_lines(*x, mask, out.lines, record.rate_hz);
-  out.allan = noise::allan_deviation(std::move(*x), kept->wv, record.rate_hz);
+  out.allan = noise::allan_deviation(std::move(*x), kept->wv, record.rate_hz, kAllanPointsPerOctave,
+                                     kept->remainders);
   return Reduced{std::move(out), std::move(*kept)};
 }
 

@@ -115,7 +115,7 @@ double between(double low, double high, double share) { return low + share * (hi
 }  // namespace
 
 std::vector<AllanPoint> allan_deviation(std::vector<double> x, const WaveletVariance& wv, double rate_hz,
-                                        int points_per_octave) {
+                                        int points_per_octave, const Remainders& remainders) {
   std::vector<AllanPoint> points;
   const std::size_t shown = shown_levels(wv);
   RunningSums sums(std::move(x), wv.segments);
@@ -140,7 +140,11 @@ std::vector<AllanPoint> allan_deviation(std::vector<double> x, const WaveletVari
       const double exact_share = std::log2(static_cast<double>(n) / static_cast<double>(octave));
       const double inflation = std::exp(
           between(std::log(wv.levels[i].inflation), std::log(wv.levels[i + 1].inflation), exact_share));
-      point.deviation = std::sqrt(0.5 * square / inflation);
+      const double variance = 0.5 * square / inflation;
+      point.deviation =
+          remainders.empty()
+              ? std::sqrt(variance)
+              : std::sqrt(2.0 * remainders.taken_out_of(0.5 * variance, static_cast<double>(n)));  // G-40
       if (point.n_differences > 0) points.push_back(point);
     }
   }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "models/noise/fit.h"
+#include "models/noise/lines.h"
 
 namespace imuscope::noise {
 
@@ -30,8 +31,9 @@ struct AllanPoint {
 /// neighbouring levels' inflation.
 /// @param x   used up: its sums take its place (one more than samples: reserve that, and nothing is moved)
 /// @param wv  of the same signal and mask, classical
+/// @param remainders  of the lines that were taken out of the signal, and out of `wv`
 std::vector<AllanPoint> allan_deviation(std::vector<double> x, const WaveletVariance& wv, double rate_hz,
-                                        int points_per_octave = 4);
+                                        int points_per_octave = 4, const Remainders& remainders = {});
 
 /// Chi-square intervals. Their degrees of freedom are those of the wavelet variance under the fitted model
 /// (G-8), between levels on a logarithmic scale; without a fit max(N / 2n, 1).

@@ -21,6 +21,8 @@ namespace {
 
 /// Half-width of the main lobe of a Hann window, in bins.
 constexpr std::size_t kLobe = 2;
+/// What may belong to a line, on either side of its peak: the lobe, and where a line that wanders leaks to.
+constexpr std::size_t kBeside = kLobe + 6;
 /// The noise beside a bin: so many bins to either side, outside of the lobe.
 constexpr std::size_t kFloorBins = 40;
 /// The first bin with a floor on both sides. Nearer to zero the noise of sensors rises within its floor.
@@ -50,10 +52,9 @@ double floor_at(const Spectrum& spectrum, std::size_t k, double dof) {
 /// Mean power right beside the window's main lobe. A line leaks a hundredth of its power there at most; of a
 /// resonance it is as high as the peak.
 double power_beside(const Spectrum& spectrum, std::size_t k) {
-  constexpr std::size_t kBeside = 6;
   double sum = 0.0;
   double n = 0.0;
-  for (std::size_t d = kLobe + 1; d <= kLobe + kBeside; ++d) {
+  for (std::size_t d = kLobe + 1; d <= kBeside; ++d) {
     sum += spectrum.power[k - d];
     n += 1.0;
     if (k + d >= spectrum.power.size()) continue;
@@ -335,6 +336,66 @@ double line_wv(const Line& line, double rate_hz, int level) {
   Shape shape{};
   shape[0] = 2.0 * std::numbers::pi * line.frequency_hz / rate_hz;
   return line.amplitude * line.amplitude * unit_wv(ProcessKind::kSinusoid, shape, level).value;
+}
+
+namespace {
+
+/// G-23: bins on either side of a line's peak that are not its neighbours' noise. Every bin that is put right costs the
+/// variance what it knows of the noise there: the lobe alone, unless the line is seen beside it.
+std::size_t reach_of(const Spectrum& without, std::size_t peak, double floor, double dof) {
+  constexpr double kBeyondChance = 3.09;  // sd: one in a thousand
+  // Bins of a Hann window share half of what they tell with their neighbours.
+  const double bins = 2.0 * static_cast<double>(kBeside - kLobe) / 1.5;
+  const double floor_bins = 2.0 * static_cast<double>(kFloorBins) / 1.5 / (0.5 * std::numbers::pi);
+  const double sd = std::sqrt(2.0 / dof * (1.0 / bins + 1.0 / floor_bins));
+  return power_beside(without, peak) > floor * (1.0 + kBeyondChance * sd) ? kBeside : kLobe;
+}
+
+}  // namespace
+
+// G-23: of two lines a bin belongs to the nearer.
+Remainders::Remainders(Spectra& without, const std::vector<Line>& lines, double rate_hz) {
+  std::map<std::size_t, std::vector<std::size_t>> peaks_of_segment;
+  for (const Line& line : lines) {
+    const double bin = line.frequency_hz / rate_hz * static_cast<double>(line.segment);
+    peaks_of_segment[line.segment].push_back(static_cast<std::size_t>(std::lround(bin)));
+  }
+  for (auto& [segment, peaks] : peaks_of_segment) {
+    std::sort(peaks.begin(), peaks.end());
+    const Spectrum& spectrum = without.of(segment);
+    const double dof = degrees_of_freedom(static_cast<double>(spectrum.segments));
+    const double bin_hz = rate_hz / static_cast<double>(segment);
+    for (std::size_t p = 0; p < peaks.size(); ++p) {
+      const double floor = floor_at(spectrum, peaks[p], dof);
+      const std::size_t reach = reach_of(spectrum, peaks[p], floor, dof);
+      const std::size_t after_before = p == 0 ? 0 : (peaks[p - 1] + peaks[p]) / 2 + 1;
+      const std::size_t before_next =
+          p + 1 == peaks.size() ? spectrum.power.size() - 1 : (peaks[p] + peaks[p + 1]) / 2;
+      const std::size_t first = std::max(peaks[p] - reach, after_before);
+      const std::size_t last = std::min(peaks[p] + reach, before_next);
+      for (std::size_t k = first; k <= last; ++k) {
+        const double share = 1.0 - floor / spectrum.power[k];
+        bins_.push_back({2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(segment),
+                         share * density_at(spectrum, k, rate_hz) * bin_hz});
+      }
+    }
+  }
+}
+
+double Remainders::wv(double n) const {
+  double sum = 0.0;
+  for (const Bin& bin : bins_) sum += 2.0 * bin.variance * sinusoid_wv(bin.omega_rad, n);
+  return sum;
+}
+
+double Remainders::taken_out_of(double variance, double n) const {
+  return std::max(variance - wv(n), 0.5 * variance);
+}
+
+void Remainders::take_out_of(WaveletVariance& wv, double confidence) const {
+  if (empty()) return;
+  for (WvLevel& level : wv.levels) level.value = taken_out_of(level.value, 0.5 * level.tau_samples);
+  set_intervals(wv.levels, wv.efficiency, confidence);
 }
 
 std::string in_words(const Line& line, std::string_view unit) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "models/noise/spectrum.h"
+#include "models/noise/wavelet_variance.h"
 
 namespace imuscope::noise {
 
@@ -58,5 +59,31 @@ std::string in_words(const Line& line, std::string_view unit);
 /// samples that are there, so that amplitude and phase may wander from block to block.
 void remove_lines(std::span<double> x, std::span<const std::uint8_t> mask, const std::vector<Line>& lines,
                   double rate_hz);
+
+/// About a line, a signal without it is not its noise: what the line wandered within a block is still there, and the
+/// sinusoids took some of the noise. Both are told by the spectrum beside the line. Empty without lines.
+class Remainders {
+ public:
+  Remainders() = default;
+  /// @param without  the signal without the lines
+  Remainders(Spectra& without, const std::vector<Line>& lines, double rate_hz);
+
+  [[nodiscard]] bool empty() const { return bins_.empty(); }
+  /// What they contribute to the wavelet variance whose neighbouring means are of n samples: half the Allan variance.
+  /// Negative where more is missing than was left.
+  [[nodiscard]] double wv(double n) const;
+  /// A variance that they are part of, without them. Where they are most of it, half of it: the noise is not known so
+  /// much better than that.
+  [[nodiscard]] double taken_out_of(double variance, double n) const;
+  /// The same of all levels, with their intervals.
+  void take_out_of(WaveletVariance& wv, double confidence) const;
+
+ private:
+  struct Bin {
+    double omega_rad;  ///< a sample
+    double variance;   ///< above the noise beside the line, or below it
+  };
+  std::vector<Bin> bins_;
+};
 
 }  // namespace imuscope::noise

@@ -394,6 +394,8 @@ CurvePoint power_law_wv(double alpha, int level) noexcept {
           {(power_law_value(alpha + step, n) - power_law_value(alpha - step, n)) / (2.0 * step), 0.0}};
 }
 
+double sinusoid_wv(double omega_rad, double n) noexcept { return sinusoid(omega_rad, n).value; }
+
 CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept {
   IMUSCOPE_EXPECTS(level >= 1 && level <= kMaxLevel);
   const double n = half_support(level);

@@ -73,6 +73,11 @@ CurvePoint unit_wv(ProcessKind kind, const Shape& shape, int level) noexcept;
 /// @param out  at most kMaxLevel
 void unit_curve(ProcessKind kind, const Shape& shape, std::span<CurvePoint> out) noexcept;
 
+/// Wavelet variance of a sinusoid of amplitude 1 and random phase for neighbouring means of n samples, which need be
+/// no power of two.
+/// @param omega_rad  a sample, above 0 and below pi
+double sinusoid_wv(double omega_rad, double n) noexcept;
+
 /// Wavelet variance of a first-order Gauss-Markov process of variance 1, and d/da, a = beta / rate > 0:
 ///   [n (1-phi^2) - phi (1-phi^n)(3-phi^n)] / (2 n^2 (1-phi)^2),  phi = exp(-a), n = 2^(level-1),
 /// evaluated without cancellation for every a (relative error a few 1e-16; the naive form is negative at

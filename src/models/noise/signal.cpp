@@ -44,6 +44,8 @@ Result<SignalLook> look_at_signal(std::span<const double> x, const WvOptions& op
     x = without;
     wv = haar_wavelet_variance(x, options);
     if (!wv) return tl::unexpected(wv.error());
+    Spectra spectra(without, mask);
+    Remainders(spectra, look.lines, rate_hz).take_out_of(*wv, options.confidence);
   }
   look.spikes = spikes_in(x, *wv, rate_hz, options);
   look.wv = std::move(*wv);

@@ -2,11 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <random>
 #include <string>
 
+#include "models/noise/allan.h"
+#include "models/noise/process.h"
 #include "models/noise/wavelet_variance.h"
 
 namespace imuscope::noise {
@@ -223,6 +227,110 @@ TEST(Lines, ASignalShorterThanASegmentHasNone) {
   auto x = noise_of(4000, 1);
   add_line(x, 20.0, 3.0);
   EXPECT_TRUE(find_lines(x, all_valid(x.size()), {}).empty());
+}
+
+/// The variance of one level, mean over records: of noise, of the same with a line that was taken out, and of that
+/// with what was left and taken put right.
+struct LevelMeans {
+  double noise = 0.0;
+  double without = 0.0;
+  double put_right = 0.0;
+};
+
+/// @param wander_rad  sd of the phase's step from sample to sample
+LevelMeans means_about_a_line(int level, double frequency_hz, double amplitude, double wander_rad,
+                              int records) {
+  LevelMeans means;
+  for (int record = 0; record < records; ++record) {
+    auto x = noise_of(200'000, 900U + static_cast<unsigned>(record));
+    const auto at = static_cast<std::size_t>(level - 1);
+    means.noise += haar_wavelet_variance(x).value().levels[at].value / records;
+    std::mt19937 random(70U + static_cast<unsigned>(record));
+    std::normal_distribution<double> step(0.0, wander_rad);
+    double phase = 0.0;
+    for (double& value : x) {
+      phase += 2.0 * std::numbers::pi * frequency_hz / kLineRate_hz + step(random);
+      value += amplitude * std::sin(phase);
+    }
+    const auto mask = all_valid(x.size());
+    const auto lines = find_lines(x, mask, {});
+    EXPECT_FALSE(lines.empty()) << record;
+    remove_lines(x, mask, lines, kLineRate_hz);
+    auto wv = haar_wavelet_variance(x).value();
+    means.without += wv.levels[at].value / records;
+    Spectra spectra(x, mask);
+    Remainders(spectra, lines, kLineRate_hz).take_out_of(wv, 0.95);
+    means.put_right += wv.levels[at].value / records;
+  }
+  return means;
+}
+
+// 0.56 Hz lies in the midst of level 7. A phase that walks at random has a spectrum whose skirts have no end: most of
+// what a block leaves is found.
+TEST(Lines, OneThatWandersLeavesLittleInTheWaveletVariance) {
+  for (const double wander_rad : {1.5e-3, 2.5e-3, 3.5e-3}) {
+    const LevelMeans means = means_about_a_line(7, 0.56, 1.0, wander_rad, 40);
+    EXPECT_GT(means.without, 1.01 * means.noise) << wander_rad;
+    EXPECT_NEAR(means.put_right, means.noise, 0.4 * (means.without - means.noise)) << wander_rad;
+  }
+}
+
+TEST(Lines, OneThatStandsStillTakesNoNoiseAlong) {
+  const LevelMeans means = means_about_a_line(7, 0.56, 1.0, 0.0, 40);
+  EXPECT_LT(means.without, 0.997 * means.noise);
+  EXPECT_NEAR(means.put_right, means.noise, 0.002 * means.noise);
+}
+
+TEST(Lines, RemaindersAreTakenOutOfTheAllanDeviationToo) {
+  auto x = noise_of(200'000, 5);
+  const auto mask = all_valid(x.size());
+  add_line(x, 0.56, 1.0);
+  const auto lines = find_lines(x, mask, {});
+  ASSERT_EQ(lines.size(), 1U);
+  remove_lines(x, mask, lines, kLineRate_hz);
+  Spectra spectra(x, mask);
+  const Remainders remainders(spectra, lines, kLineRate_hz);
+  auto wv = haar_wavelet_variance(x).value();
+  const auto without = allan_deviation(x, wv, kLineRate_hz);
+  remainders.take_out_of(wv, 0.95);
+  const auto put_right = allan_deviation(x, wv, kLineRate_hz, 4, remainders);
+  ASSERT_EQ(put_right.size(), without.size());
+  const auto square = [](double value) { return value * value; };
+  for (std::size_t i = 0; i < without.size(); ++i) {
+    const double remainder = 2.0 * remainders.wv(static_cast<double>(put_right[i].n));
+    EXPECT_NEAR(square(put_right[i].deviation), square(without[i].deviation) - remainder, 1e-12) << i;
+  }
+  // Between the levels, too.
+  EXPECT_LT(remainders.wv(76.0), 0.0);
+  EXPECT_GT(std::count_if(without.begin(), without.end(),
+                          [](const AllanPoint& point) { return !std::has_single_bit(point.n); }),
+            10);
+}
+
+TEST(Lines, NoLineLeavesNothing) {
+  auto x = noise_of(40'000, 6);
+  Spectra spectra(x, {});
+  const Remainders none(spectra, {}, kLineRate_hz);
+  EXPECT_TRUE(none.empty());
+  EXPECT_EQ(none.wv(64.0), 0.0);
+}
+
+// Means of 48 samples against their neighbours, by the sum over a whole number of periods.
+TEST(Lines, ASinusoidsWaveletVarianceAtAnyLength) {
+  constexpr double kOmega_rad = 2.0 * std::numbers::pi / 75.0;
+  for (const std::size_t n : {std::size_t{1}, std::size_t{3}, std::size_t{48}}) {
+    double sum = 0.0;
+    for (std::size_t place = 0; place < 75; ++place) {
+      double difference = 0.0;
+      for (std::size_t i = 0; i < n; ++i) {
+        difference += std::sin(kOmega_rad * static_cast<double>(place + n + i)) -
+                      std::sin(kOmega_rad * static_cast<double>(place + i));
+      }
+      const double half_of_means = 0.5 * difference / static_cast<double>(n);
+      sum += half_of_means * half_of_means / 75.0;
+    }
+    EXPECT_NEAR(sinusoid_wv(kOmega_rad, static_cast<double>(n)), sum, 1e-12) << n;
+  }
 }
 
 }  // namespace
