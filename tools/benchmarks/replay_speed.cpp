@@ -27,9 +27,10 @@ namespace fs = std::filesystem;
 constexpr double kGoalReplay = 830.0;  // times real time, 72 states, without refits
 constexpr double kGoalStudy = 90.0;    // a drive of 15 minutes in 10 s, refits and report included
 
-constexpr double kGoalBeside = 1.4;      // times as fast as the program as it was, without refits
-constexpr double kGoalTwoThreads = 0.6;  // of one thread's wall time
-constexpr double kGoalReport = 0.05;     // of a study's processor time
+constexpr double kGoalBeside = 1.4;        // times as fast as the program as it was, without refits
+constexpr double kGoalTwoThreads = 0.6;    // of one thread's wall time
+constexpr double kGoalMemory_mb = 1500.0;  // of a study of ten hours by two threads
+constexpr double kGoalReport = 0.05;       // of a study's processor time
 
 struct Cost {
   double processor_s = std::numeric_limits<double>::infinity();
@@ -235,6 +236,27 @@ std::vector<bench::Row> measure_beside(const Programs& programs, const Programs&
           row("capture, no refits", capture, capture_of_others)};
 }
 
+/// A study that takes minutes, by two threads and by one.
+std::vector<bench::Row> measure_long(const Programs& programs, double hours) {
+  constexpr double kMinutesPerHour = 60.0;
+  const Drive drive = programs.record(3, kMinutesPerHour * hours);
+  const Cost two_threads = programs.process_by(drive, "2");
+  const Cost one_thread = programs.process_by(drive, "1");
+  const auto what = fmt::format("whole study, two threads, 3 S-IMUs, {:g} h", hours);
+  bench::Row memory;
+  memory.group = "replay";
+  memory.what = "memory of the " + what;
+  memory.ratio = two_threads.memory_mb / kGoalMemory_mb;
+  memory.against = "of what ten hours may take";
+  memory.value = two_threads.memory_mb;
+  memory.reference = kGoalMemory_mb;
+  memory.unit = "MB";
+  memory.goal = bench::Goal{bench::Goal::Side::kAtMost, 1.0};
+  return {row_of_walls(what, two_threads, one_thread, "of the wall time of one thread",
+                       two_threads.wall_s / one_thread.wall_s, {bench::Goal::Side::kAtMost, kGoalTwoThreads}),
+          memory};
+}
+
 std::vector<bench::Row> measure(const Programs& programs, double minutes, int rounds) {
   const std::vector<int> crowds{1, 2, 3, 6};
   std::vector<Drive> by_studies;
@@ -317,13 +339,19 @@ int main(int argc, char** argv) {
   app.add_option("--beside", beside, "bin folder of another build: nothing but the two in turn, by wall time")
       ->type_name("DIR")
       ->check(CLI::ExistingDirectory);
+  double hours = 0.0;
+  app.add_option("--hours", hours,
+                 "nothing but a study of a drive that long, by two threads and by one (1 GB an hour)")
+      ->check(CLI::Range(0.1, 24.0))
+      ->excludes("--beside");
   app.add_option("--json", json, "write the rows here")->type_name("FILE");
   CLI11_PARSE(app, argc, argv);
   try {
     const bench::OwnFolder folder(scratch);
     const Programs programs(folder.path(), fs::read_symlink("/proc/self/exe").parent_path());
-    const auto rows = beside.empty() ? measure(programs, minutes, rounds)
-                                     : measure_beside(programs, {folder.path(), beside}, minutes, rounds);
+    const auto rows = hours > 0.0      ? measure_long(programs, hours)
+                      : beside.empty() ? measure(programs, minutes, rounds)
+                                       : measure_beside(programs, {folder.path(), beside}, minutes, rounds);
     return bench::finish(rows, json);
   } catch (const std::exception& error) {
     fmt::print(stderr, "replay_speed: {}\n", error.what());

@@ -351,9 +351,32 @@ std::size_t reach_of(const Spectrum& without, std::size_t peak, double floor, do
   return power_beside(without, peak) > floor * (1.0 + kBeyondChance * sd) ? kBeside : kLobe;
 }
 
+/// Bins [first, last] of a line, and the noise's power there.
+struct Stretch {
+  std::size_t first;
+  std::size_t last;
+  double floor;
+};
+
+/// G-23: of two lines a bin belongs to the nearer.
+/// @param peaks  in order
+std::vector<Stretch> stretches_of(const Spectrum& without, const std::vector<std::size_t>& peaks) {
+  const double dof = degrees_of_freedom(static_cast<double>(without.segments));
+  std::vector<Stretch> stretches;
+  for (std::size_t p = 0; p < peaks.size(); ++p) {
+    const std::size_t peak = peaks[p];
+    const double floor = floor_at(without, peak, dof);
+    const std::size_t reach = reach_of(without, peak, floor, dof);
+    const std::size_t after_before = p == 0 ? 0 : (peaks[p - 1] + peak) / 2 + 1;
+    const std::size_t before_next =
+        p + 1 == peaks.size() ? without.power.size() - 1 : (peak + peaks[p + 1]) / 2;
+    stretches.push_back({std::max(peak - reach, after_before), std::min(peak + reach, before_next), floor});
+  }
+  return stretches;
+}
+
 }  // namespace
 
-// G-23: of two lines a bin belongs to the nearer.
 Remainders::Remainders(Spectra& without, const std::vector<Line>& lines, double rate_hz) {
   std::map<std::size_t, std::vector<std::size_t>> peaks_of_segment;
   for (const Line& line : lines) {
@@ -363,18 +386,11 @@ Remainders::Remainders(Spectra& without, const std::vector<Line>& lines, double 
   for (auto& [segment, peaks] : peaks_of_segment) {
     std::sort(peaks.begin(), peaks.end());
     const Spectrum& spectrum = without.of(segment);
-    const double dof = degrees_of_freedom(static_cast<double>(spectrum.segments));
     const double bin_hz = rate_hz / static_cast<double>(segment);
-    for (std::size_t p = 0; p < peaks.size(); ++p) {
-      const double floor = floor_at(spectrum, peaks[p], dof);
-      const std::size_t reach = reach_of(spectrum, peaks[p], floor, dof);
-      const std::size_t after_before = p == 0 ? 0 : (peaks[p - 1] + peaks[p]) / 2 + 1;
-      const std::size_t before_next =
-          p + 1 == peaks.size() ? spectrum.power.size() - 1 : (peaks[p] + peaks[p + 1]) / 2;
-      const std::size_t first = std::max(peaks[p] - reach, after_before);
-      const std::size_t last = std::min(peaks[p] + reach, before_next);
-      for (std::size_t k = first; k <= last; ++k) {
-        const double share = 1.0 - floor / spectrum.power[k];
+    for (const Stretch& stretch : stretches_of(spectrum, peaks)) {
+      for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
+        if (!(spectrum.power[k] > 0.0)) continue;
+        const double share = 1.0 - stretch.floor / spectrum.power[k];
         bins_.push_back({2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(segment),
                          share * density_at(spectrum, k, rate_hz) * bin_hz});
       }

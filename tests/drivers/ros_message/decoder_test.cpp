@@ -159,9 +159,10 @@ TEST(RosMessageDecoder, ADamagedFrameIsCountedAndTheNextOneIsRead) {
   Bytes no_kind = frame_of(imu_at(0ms));
   no_kind[4] = 9;
   Rig rig;
+  rig.push({imu_at(0ms)});
   rig.decoder.push(damaged, {}, rig.sink);
   rig.decoder.push(no_kind, {}, rig.sink);
-  EXPECT_EQ(rig.push({imu_at(10ms)}).size(), 1U);
+  EXPECT_EQ(rig.push({imu_at(10ms)}).size(), 2U);
   EXPECT_EQ(rig.decoder.counters().bad_checksums, 1U);
   EXPECT_EQ(rig.decoder.counters().bad_lengths, 1U);
   EXPECT_EQ(rig.decoder.counters().bytes_skipped, damaged.size() + no_kind.size());
