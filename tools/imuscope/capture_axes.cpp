@@ -8,18 +8,23 @@
 
 #include "sample_axes.h"
 #include "service/pipeline/device_factory.h"
+#include "service/recording/byte_source.h"
 #include "service/recording/recording.h"
+#include "service/recording/side_by_side.h"
 
 namespace imuscope::cli {
 namespace {
 
-/// Decodes one device from its first byte to its last.
-Result<void> decode(const OpenedRecording& opened, std::size_t device, SampleSink& sink) {
+/// Decodes one device of a capture from its first byte to its last, while another thread reads ahead.
+Result<void> decode(const std::filesystem::path& capture, const OpenedRecording& opened, std::size_t device,
+                    SampleSink& sink) {
   const auto index = static_cast<DeviceIndex>(device);
-  auto source = opened.recording.open(index);
+  const auto& devices = opened.configuration.devices;
+  constexpr std::uint64_t kNobodyAsksHowFar = 0;
+  auto source = open_captured_device(capture, devices[devices[device].line_owner].name, kNobodyAsksHowFar,
+                                     reading_by_threads());
   if (!source) return tl::unexpected<Error>(source.error());
-  const auto decoder =
-      make_decoder(opened.configuration.devices[device], index, opened.recording.clocks[device].map);
+  const auto decoder = make_decoder(devices[device], index, opened.recording.clocks[device].map);
   while (true) {
     const auto read = (*source)->next();
     if (!read) return tl::unexpected<Error>(read.error());
@@ -81,7 +86,7 @@ Result<std::vector<SensorRecord>> read_capture_axes(const std::filesystem::path&
     if (!is_imu(devices[i]) || !opened->recording.present[i]) continue;
     if (!choice.imu.empty() && name != choice.imu) continue;
     AxesSink sink(AxesSink::Keeps::kLongOnesOnDisk);
-    if (auto decoded = decode(*opened, i, sink); !decoded) return tl::unexpected(decoded.error());
+    if (auto decoded = decode(file, *opened, i, sink); !decoded) return tl::unexpected(decoded.error());
     if (sink.empty()) continue;
     auto read = std::move(sink).axes(choice.signal.rate_hz);
     if (!read) {

@@ -15,6 +15,7 @@
 #include "base/output_folder.h"
 #include "certificate_table.h"
 #include "commands.h"
+#include "long_pieces.h"
 #include "models/certificate/data_sheet.h"
 #include "models/certificate/joint_axes.h"
 #include "models/certificate/json.h"
@@ -274,6 +275,7 @@ Result<std::vector<certificate::AxisCertificate>> characterize(const SensorRecor
 }
 
 Result<void> run_characterize(CharacterizeCommand& options) {
+  give_long_pieces_back();
   if (auto parsed = parse_axes(options); !parsed) return parsed;
   if (auto may = may_write(options); !may) return may;
   const auto sheet = sheet_of(options);

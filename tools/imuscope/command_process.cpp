@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <malloc.h>
 #include <tbb/global_control.h>
 
 #include <memory>
@@ -11,6 +10,7 @@
 #include "commands.h"
 #include "findings.h"
 #include "inputs.h"
+#include "long_pieces.h"
 #include "print.h"
 #include "progress.h"
 #include "results/report/report.h"
@@ -88,14 +88,6 @@ Result<void> check_nothing_is_lost(const std::filesystem::path& out) {
   if (run.is_object() && run.value("schema", "").starts_with("imuscope.run/")) return {};
   return usage_error(fmt::format("{} exists, and no run of imuscope made it", (out / "report.html").string()),
                      "give another --out, or --force to write over it");
-}
-
-/// Axes of long records come and go on every thread, and what the C library keeps of them for later stands in
-/// memory beside what is in use. Beyond this size each piece goes back to the system at once; smaller ones are
-/// taken too often for that, and two threads would wait for each other's pages.
-void give_long_pieces_back() {
-  constexpr int kLongPiece_bytes = 4 << 20;
-  mallopt(M_MMAP_THRESHOLD, kLongPiece_bytes);
 }
 
 Result<void> process(const ProcessCommand& options) {

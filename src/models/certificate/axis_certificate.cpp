@@ -78,13 +78,14 @@ Result<noise::GrownModel> model_of(const noise::WaveletVariance& wv, const AxisR
 }
 
 /// Wavelet variances of the halves of a record; empty where one has none.
-std::vector<noise::WaveletVariance> halves_of(std::span<const double> x, std::span<const std::uint8_t> mask) {
+/// @param x  used up
+std::vector<noise::WaveletVariance> halves_of(std::span<double> x, std::span<const std::uint8_t> mask) {
   const std::size_t middle = x.size() / 2;
   std::vector<noise::WaveletVariance> halves;
   for (const auto& [begin, end] : {std::pair{std::size_t{0}, middle}, std::pair{middle, x.size()}}) {
     noise::WvOptions options;
     options.mask = mask.subspan(begin, end - begin);
-    auto half = noise::haar_wavelet_variance(x.subspan(begin, end - begin), options);
+    auto half = noise::haar_wavelet_variance_in_place(x.subspan(begin, end - begin), options);
     if (!half) return {};
     halves.push_back(std::move(*half));
   }
@@ -181,17 +182,18 @@ Result<void> look_at(const AxisRecord& record, std::span<const double> x, std::s
   return {};
 }
 
-/// What the samples are asked for beside their Allan deviations; the rest needs no samples.
+/// What the samples are asked for beside the certificate; the rest needs no samples.
 struct Kept {
   noise::WaveletVariance wv;
-  noise::Remainders remainders;
   std::vector<noise::WaveletVariance> halves;
   noise::TailExcerpt tails;
 };
 
-/// @param x  used up
-Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span<const std::uint8_t> mask,
-                        double confidence, AxisCertificate& out) {
+/// What spectra tell; takes the lines out of `x`.
+/// @return of the lines
+noise::Remainders look_at_spectra(const AxisRecord& record, std::span<double> x,
+                                  std::span<const std::uint8_t> mask, double confidence,
+                                  AxisCertificate& out) {
   noise::LineOptions line_options;
   line_options.rate_hz = record.rate_hz;
   noise::Spectra spectra(x, mask);
@@ -206,19 +208,7 @@ Result<Kept> take_apart(const AxisRecord& record, std::span<double> x, std::span
   }
   out.resonances = find_resonances(spectra, record.rate_hz);
   out.low_pass_hz = low_pass_hz(spectra, record.rate_hz);
-  Kept kept{{},
-            noise::Remainders(spectra, out.lines, record.rate_hz),
-            halves_of(x, mask),
-            noise::tail_excerpt(x, mask)};
-  noise::WvOptions wv_options;
-  wv_options.mask = mask;
-  wv_options.confidence = confidence;
-  auto wv = noise::haar_wavelet_variance_in_place(x, wv_options);
-  if (!wv) return tl::unexpected(named(record, wv.error()));
-  kept.wv = std::move(*wv);
-  kept.remainders.take_out_of(kept.wv, confidence);
-  for (noise::WaveletVariance& half : kept.halves) kept.remainders.take_out_of(half, confidence);
-  return kept;
+  return noise::Remainders(spectra, out.lines, record.rate_hz);
 }
 
 /// All that the samples are needed for before there is a model.
@@ -227,24 +217,44 @@ struct Reduced {
   Kept kept;
 };
 
-Result<Reduced> reduced(const AxisRecord& record, double confidence) {
-  AxisCertificate out;
-  out.name = record.name;
-  out.unit = record.unit;
-  auto x = samples_of(record);
-  if (!x) return tl::unexpected(named(record, x.error()));
-  const std::vector<std::uint8_t> mask = mask_of(record, *x);
-  if (auto looked = look_at(record, *x, mask, out); !looked) return tl::unexpected(looked.error());
-  auto kept = take_apart(record, *x, mask, confidence, out);
-  if (!kept) return tl::unexpected(kept.error());
+/// The samples once more, without lines. Of a day they are all that the memory has room for: what was made of
+/// them goes first.
+Result<void> fetch_again(const AxisRecord& record, std::span<const std::uint8_t> mask,
+                         const std::vector<noise::Line>& lines, std::vector<double>& x) {
+  x = std::vector<double>();  // assigning {} would keep its memory
+  auto samples = samples_of(record);
+  if (!samples) return tl::unexpected(named(record, samples.error()));
+  x = std::move(*samples);
+  noise::remove_lines(x, mask, lines, record.rate_hz);
+  return {};
+}
 
-  *x = std::vector<double>();  // assigning {} would keep its memory, which what follows needs
-  x = samples_of(record);
-  if (!x) return tl::unexpected(named(record, x.error()));
-  noise::remove_lines(*x, mask, out.lines, record.rate_hz);
-  out.allan = noise::allan_deviation(std::move(*x), kept->wv, record.rate_hz, kAllanPointsPerOctave,
-                                     kept->remainders);
-  return Reduced{std::move(out), std::move(*kept)};
+Result<Reduced> reduced(const AxisRecord& record, double confidence) {
+  Reduced out;
+  AxisCertificate& axis = out.certificate;
+  axis.name = record.name;
+  axis.unit = record.unit;
+  auto samples = samples_of(record);
+  if (!samples) return tl::unexpected(named(record, samples.error()));
+  std::vector<double> x = std::move(*samples);
+  const std::vector<std::uint8_t> mask = mask_of(record, x);
+  if (auto looked = look_at(record, x, mask, axis); !looked) return tl::unexpected(looked.error());
+  const noise::Remainders remainders = look_at_spectra(record, x, mask, confidence, axis);
+  out.kept.tails = noise::tail_excerpt(x, mask);
+  out.kept.halves = halves_of(x, mask);
+  for (noise::WaveletVariance& half : out.kept.halves) remainders.take_out_of(half, confidence);
+  if (auto again = fetch_again(record, mask, axis.lines, x); !again) return tl::unexpected(again.error());
+  noise::WvOptions wv_options;
+  wv_options.mask = mask;
+  wv_options.confidence = confidence;
+  auto wv = noise::haar_wavelet_variance_in_place(x, wv_options);
+  if (!wv) return tl::unexpected(named(record, wv.error()));
+  out.kept.wv = std::move(*wv);
+  remainders.take_out_of(out.kept.wv, confidence);
+  if (auto again = fetch_again(record, mask, axis.lines, x); !again) return tl::unexpected(again.error());
+  axis.allan =
+      noise::allan_deviation(std::move(x), out.kept.wv, record.rate_hz, kAllanPointsPerOctave, remainders);
+  return out;
 }
 
 /// The model and what it tells: without samples, so that those of another axis may be in memory meanwhile.

@@ -12,6 +12,8 @@
 #include <mutex>
 #include <vector>
 
+#include "models/noise/covariance_memory.h"
+#include "models/noise/covariance_places.h"
 #include "models/noise/cross_covariance.h"
 #include "models/noise/wavelet_variance.h"
 
@@ -21,7 +23,9 @@ class CovarianceTable {
  public:
   /// For the first `levels` of records whose coefficients are counted as those of `wv`. Costs little before
   /// the first model.
-  CovarianceTable(const WaveletVariance& wv, std::size_t levels);
+  /// @param memory  for what models ask for again and again, shared with other tables
+  CovarianceTable(const WaveletVariance& wv, std::size_t levels,
+                  std::shared_ptr<CovarianceMemory> memory = std::make_shared<CovarianceMemory>());
   ~CovarianceTable();
   CovarianceTable(const CovarianceTable&) = delete;
   CovarianceTable& operator=(const CovarianceTable&) = delete;
@@ -38,35 +42,46 @@ class CovarianceTable {
   [[nodiscard]] Eigen::MatrixXd of(const Model& model, const WaveletVariance& wv) const;
 
  private:
-  struct PairOfLevels;
-  class Nodes;
-  using Ringing = std::pair<int, int>;
-
   struct Sums;
 
-  /// What of() needs of the table, summed where it is not there yet. Values stay while the sums live.
-  [[nodiscard]] Sums sums_of(const std::map<int, double>& weights, const Parts& parts) const;
+  /// What products of processes tell, summed where it is not there yet.
+  [[nodiscard]] Sums sums_of(const std::map<int, double>& weights, bool has_ramp) const;
+  /// The sums over lags of a model without what rings, pair by pair.
+  /// @param weights  of the table's processes
+  /// @param white    noise that is white on each pair alone
+  [[nodiscard]] Eigen::VectorXd from_products(const std::map<int, double>& weights, double ramp,
+                                              const Eigen::VectorXd& white,
+                                              const std::vector<PairOfLevels>& pairs) const;
+  /// Sets the sums of pairs on which the model rings.
+  void sum_what_rings(const std::map<int, double>& weights, const Parts& parts, const Eigen::VectorXd& white,
+                      Eigen::VectorXd& squares) const;
   [[nodiscard]] const Eigen::VectorXd& product(int a, int b) const;
   [[nodiscard]] const Eigen::VectorXd& mean(int a) const;
-  [[nodiscard]] Nodes& ringing(const Parts& parts) const;
+  [[nodiscard]] std::shared_ptr<const CovariancePlaces> places(const Lags& lags) const;
+  /// Of a process of amplitude 1 at these places.
+  [[nodiscard]] std::shared_ptr<const Eigen::VectorXd> values(const Lags& lags, int process) const;
 
   WaveletVariance record_;  ///< levels and their numbers of coefficients
   std::size_t levels_;
-  std::unique_ptr<Nodes> nodes_;
-  mutable std::mutex mutex_;  ///< held while the table is looked up or filled, not while it is used
+  std::shared_ptr<CovarianceMemory> memory_;
+  std::size_t number_;        ///< of this table in the memory
+  mutable std::mutex mutex_;  ///< of the two below, while they are looked up or filled
   mutable std::map<std::pair<int, int>, Eigen::VectorXd> products_;  ///< of two processes, by pair of levels
   mutable std::map<int, Eigen::VectorXd> means_;
-  mutable std::map<Ringing, std::unique_ptr<Nodes>> ringing_;
 };
 
 /// Tables that fits of several axes share: axes of one record have the same numbers of coefficients.
 /// Thread-safe.
 class CovarianceTables {
  public:
+  explicit CovarianceTables(std::shared_ptr<CovarianceMemory> memory = std::make_shared<CovarianceMemory>())
+      : memory_(std::move(memory)) {}
+
   /// The table of `wv`; nothing where none can be made.
   std::shared_ptr<const CovarianceTable> of(const WaveletVariance& wv, std::size_t levels);
 
  private:
+  std::shared_ptr<CovarianceMemory> memory_;
   std::mutex mutex_;
   std::vector<std::shared_ptr<const CovarianceTable>> tables_;
 };

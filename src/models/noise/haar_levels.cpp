@@ -1,23 +1,43 @@
 #include "models/noise/haar_levels.h"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
 
 namespace imuscope::noise {
 namespace {
 
 using Array = Eigen::Map<Eigen::ArrayXd>;
 
-Array stretch(std::vector<double>& blocks, std::size_t at, std::size_t length) {
+Array stretch(std::span<double> blocks, std::size_t at, std::size_t length) {
   return {blocks.data() + at, static_cast<Eigen::Index>(length)};
 }
 
-void subtract_first(std::span<const double> run, std::vector<double>& out) {
-  out.resize(run.size());
-  const Eigen::Map<const Eigen::ArrayXd> in(run.data(), static_cast<Eigen::Index>(run.size()));
-  stretch(out, 0, out.size()) = in - run.front();
+/// Whether samples are there, asked in the order of their places.
+class Presence {
+ public:
+  explicit Presence(const std::vector<Segment>& runs) : run_(runs.begin()), end_(runs.end()) {}
+
+  bool at(std::size_t i) {
+    while (run_ != end_ && run_->end <= i) ++run_;
+    return run_ != end_ && run_->begin <= i;
+  }
+
+ private:
+  std::vector<Segment>::const_iterator run_;
+  std::vector<Segment>::const_iterator end_;
+};
+
+/// How many of the samples [begin, end) are there.
+std::size_t count_of(const std::vector<Segment>& runs, std::size_t begin, std::size_t end) {
+  std::size_t count = 0;
+  for (const Segment& run : runs) {
+    const std::size_t first = std::max(run.begin, begin);
+    const std::size_t last = std::min(run.end, end);
+    if (first < last) count += last - first;
+  }
+  return count;
 }
 
 }  // namespace
@@ -79,23 +99,48 @@ double HoleLengths::variance_of(const MissingExcess& excess, std::span<const dou
   return excess.own * within - excess.common * of_length(std::max(1.0, n / 8.0));
 }
 
+double SquareSum::mean() const noexcept {
+  const std::size_t left = count_ % kSideBySide;
+  double even = sums_[0] + sums_[2];
+  double odd = sums_[1] + sums_[3];
+  if (left >= 2) {
+    even += squares_[0];
+    odd += squares_[1];
+  }
+  double sum = even + odd;
+  if (left % 2 == 1) sum += squares_[left - 1];
+  return sum / static_cast<double>(count_);
+}
+
+HaarLevels::HaarLevels(std::span<const Segment> runs, std::size_t begin)
+    : begin_(begin), runs_(runs.begin(), runs.end()) {
+  for (Segment& run : runs_) run = {run.begin - begin, run.end - begin};
+}
+
 HaarLevels::HaarLevels(std::span<const double> x, std::span<const Segment> runs)
-    : begin_(runs.front().begin) {
-  const std::size_t begin = begin_;
-  const std::size_t length = runs.back().end - begin;
-  if (runs.size() == 1) {
-    subtract_first(x.subspan(begin, length), blocks_);
-    return;
+    : HaarLevels(runs, runs.front().begin) {
+  copy_.resize(runs_.back().end);
+  begin_with(x.subspan(begin_, copy_.size()), copy_);
+}
+
+HaarLevels HaarLevels::in_place(std::span<double> x, std::span<const Segment> runs) {
+  HaarLevels levels(runs, runs.front().begin);
+  const std::span<double> used = x.subspan(levels.begin_, levels.runs_.back().end);
+  levels.begin_with(used, used);
+  return levels;
+}
+
+/// @param memory  as long as x, or the same
+void HaarLevels::begin_with(std::span<const double> x, std::span<double> memory) {
+  blocks_ = memory;
+  const double first = x.front();
+  std::size_t end = 0;
+  for (const Segment& run : runs_) {
+    std::fill(memory.begin() + static_cast<std::ptrdiff_t>(end),
+              memory.begin() + static_cast<std::ptrdiff_t>(run.begin), 0.0);
+    for (std::size_t i = run.begin; i < run.end; ++i) memory[i] = x[i] - first;
+    end = run.end;
   }
-  blocks_.resize(length, 0.0);
-  before_.resize(length + 1, 0);
-  for (const Segment& run : runs) {
-    for (std::size_t i = run.begin; i < run.end; ++i) {
-      blocks_[i - begin] = x[i] - x[begin];
-      before_[i - begin + 1] = 1;
-    }
-  }
-  std::partial_sum(before_.begin(), before_.end(), before_.begin());
 }
 
 void HaarLevels::append_whole(std::size_t n, std::vector<double>& coefficients) {
@@ -107,37 +152,56 @@ void HaarLevels::append_whole(std::size_t n, std::vector<double>& coefficients) 
   stretch(blocks_, 0, count) += stretch(blocks_, n, count);
 }
 
-void HaarLevels::append_of_valid(std::size_t n, std::vector<double>& coefficients, MissingExcess& excess,
-                                 std::vector<Segment>& places) {
+template <typename Take>
+void HaarLevels::take_valid(std::size_t n, const Take& take, MissingExcess& excess,
+                            std::vector<Segment>& places) {
   const std::size_t count = blocks_.size() - n;
   const std::size_t least = least_valid(n);
+  std::size_t older = count_of(runs_, 0, n);
+  std::size_t newer = count_of(runs_, n, 2 * n);
+  Presence leaves(runs_);
+  Presence passes(runs_);
+  Presence comes(runs_);
   for (std::size_t s = 0; s < count; ++s) {
-    const std::size_t older = before_[s + n] - before_[s];
-    const std::size_t newer = before_[s + 2 * n] - before_[s + n];
     if (older >= least && newer >= least) {
-      coefficients.push_back(
-          0.5 * (blocks_[s + n] / static_cast<double>(newer) - blocks_[s] / static_cast<double>(older)));
+      take(0.5 * (blocks_[s + n] / static_cast<double>(newer) - blocks_[s] / static_cast<double>(older)));
       excess += missing_excess(n, older, newer);
       const std::size_t newest = begin_ + s + 2 * n - 1;
       if (places.empty() || places.back().end != newest) places.push_back({newest, newest});
       ++places.back().end;
     }
     blocks_[s] += blocks_[s + n];
+    const std::size_t between = passes.at(s + n) ? 1 : 0;
+    older = older + between - (leaves.at(s) ? 1 : 0);
+    newer = newer + (comes.at(s + 2 * n) ? 1 : 0) - between;
   }
+}
+
+void HaarLevels::end_level() {
+  blocks_ = blocks_.first(blocks_.size() - half());
+  ++level_;
 }
 
 bool HaarLevels::append_next(std::vector<double>& coefficients, MissingExcess& excess,
                              std::vector<Segment>& places) {
-  const std::size_t n = std::size_t{1} << static_cast<unsigned>(level_);
-  if (blocks_.size() < n + 1) return false;
+  if (!has_next()) return false;
   const std::size_t had = coefficients.size();
-  if (before_.empty())
-    append_whole(n, coefficients);
+  if (runs_.size() == 1)
+    append_whole(half(), coefficients);
   else
-    append_of_valid(n, coefficients, excess, places);
-  blocks_.resize(blocks_.size() - n);
-  ++level_;
+    take_valid(
+        half(), [&](double coefficient) { coefficients.push_back(coefficient); }, excess, places);
+  end_level();
   return coefficients.size() > had;
+}
+
+bool HaarLevels::add_next(SquareSum& squares, MissingExcess& excess, std::vector<Segment>& places) {
+  if (!has_next()) return false;
+  const std::uint64_t had = squares.count();
+  take_valid(
+      half(), [&](double coefficient) { squares.add(coefficient); }, excess, places);
+  end_level();
+  return squares.count() > had;
 }
 
 }  // namespace imuscope::noise

@@ -77,26 +77,61 @@ void add_squares(std::span<const double> run, std::span<LevelSum> sums);
 /// The same without the copy: `run` is used up.
 void add_squares_in_place(std::span<double> run, std::span<LevelSum> sums);
 
+/// Sum of squares, the order of its additions a part of the result: four sums side by side, those of even and of
+/// odd places brought together at the end.
+class SquareSum {
+ public:
+  void add(double value) noexcept {
+    squares_[count_ % kSideBySide] = value * value;
+    if (++count_ % kSideBySide != 0) return;
+    for (std::size_t i = 0; i < kSideBySide; ++i) sums_[i] += squares_[i];
+  }
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  /// Precondition: one at least.
+  [[nodiscard]] double mean() const noexcept;
+
+ private:
+  static constexpr std::size_t kSideBySide = 4;
+  std::array<double, kSideBySide> sums_{};
+  std::array<double, kSideBySide> squares_{};  ///< not added yet, as many as are beyond the last four
+  std::uint64_t count_ = 0;
+};
+
 /// Walks the levels of one run, or of several with missing samples between them, and hands out the
 /// coefficients themselves: half the difference of the means of the samples that are there.
 class HaarLevels {
  public:
-  /// Precondition: at least one run, in order, without overlap.
+  /// Takes a copy of the samples. Precondition: at least one run, in order, without overlap.
   HaarLevels(std::span<const double> x, std::span<const Segment> runs);
+  /// Works in the memory of `x`, which is used up and has to stay.
+  static HaarLevels in_place(std::span<double> x, std::span<const Segment> runs);
+  HaarLevels(HaarLevels&&) noexcept = default;
+  HaarLevels& operator=(HaarLevels&&) noexcept = default;
+  HaarLevels(const HaarLevels&) = delete;
+  HaarLevels& operator=(const HaarLevels&) = delete;
+  ~HaarLevels() = default;
+
   /// Computes the next level into `coefficients` (appended). False when there is none at it.
   /// @param excess  the sum of missing_excess() over them is added
   /// @param places  of several runs: the stretches of the coefficients' newest samples are appended
   bool append_next(std::vector<double>& coefficients, MissingExcess& excess, std::vector<Segment>& places);
+  /// The same where their squares are all that is wanted. Of several runs.
+  bool add_next(SquareSum& squares, MissingExcess& excess, std::vector<Segment>& places);
 
  private:
+  HaarLevels(std::span<const Segment> runs, std::size_t begin);
+  void begin_with(std::span<const double> x, std::span<double> memory);
+  [[nodiscard]] std::size_t half() const { return std::size_t{1} << static_cast<unsigned>(level_); }
+  [[nodiscard]] bool has_next() const { return blocks_.size() >= half() + 1; }
+  void end_level();
   void append_whole(std::size_t n, std::vector<double>& coefficients);
-  void append_of_valid(std::size_t n, std::vector<double>& coefficients, MissingExcess& excess,
-                       std::vector<Segment>& places);
+  template <typename Take>
+  void take_valid(std::size_t n, const Take& take, MissingExcess& excess, std::vector<Segment>& places);
 
   std::size_t begin_;
-  std::vector<double> blocks_;  ///< sums of 2^level_ neighbouring samples, missing ones as zero
-  std::vector<std::uint32_t>
-      before_;  ///< number of valid samples before each and before the end; of one run empty
+  std::vector<Segment> runs_;  ///< from begin_ on
+  std::vector<double> copy_;   ///< empty where the samples' own memory is used
+  std::span<double> blocks_;   ///< sums of 2^level_ neighbouring samples, missing ones as zero
   int level_ = 0;
 };
 

@@ -11,9 +11,16 @@
 
 namespace imuscope::noise {
 
+/// A run of places, [begin, end), as numbers to add lags to: they are asked for so often that turning them
+/// into doubles each time would cost as much as the rest.
+struct Stretch {
+  double begin = 0.0;
+  double end = 0.0;
+};
+
 /// Where a level has coefficients: stretches of their newest samples, and the share of these that it keeps.
 struct LevelPlaces {
-  std::vector<Segment> places;  ///< empty: one stretch, that ends at the newest sample
+  std::vector<Stretch> places;  ///< empty: one stretch, that ends at the newest sample
   double kept = 1.0;
   double width = 0.0;        ///< 2^j
   bool bears_holes = false;  ///< single missing samples; where not, what it loses depends on the overlap
@@ -50,15 +57,14 @@ class PairCounts {
     constexpr std::size_t kMostKinks = 64;
     std::vector<double> out;
     auto first = k_.places.begin();
-    for (const Segment& run : j_.places) {
-      const double low = static_cast<double>(run.begin) + centre - reach;
-      const double high = static_cast<double>(run.end) + centre + reach;
-      while (first != k_.places.end() && static_cast<double>(first->end) < low) ++first;
-      for (auto other = first; other != k_.places.end() && static_cast<double>(other->begin) <= high;
-           ++other) {
-        for (const std::size_t to : {other->begin, other->end}) {
-          for (const std::size_t from : {run.begin, run.end}) {
-            const double lag = static_cast<double>(to) - static_cast<double>(from);
+    for (const Stretch& run : j_.places) {
+      const double low = run.begin + centre - reach;
+      const double high = run.end + centre + reach;
+      while (first != k_.places.end() && first->end < low) ++first;
+      for (auto other = first; other != k_.places.end() && other->begin <= high; ++other) {
+        for (const double to : {other->begin, other->end}) {
+          for (const double from : {run.begin, run.end}) {
+            const double lag = to - from;
             if (std::abs(lag - centre) <= reach) out.push_back(lag);
           }
         }
@@ -76,14 +82,14 @@ class PairCounts {
   [[nodiscard]] double positions(double h) const {
     double sum = 0.0;
     std::size_t first = 0;
-    for (const Segment& s : j_.places) {
-      const double begin = static_cast<double>(s.begin) + h;
-      const double end = static_cast<double>(s.end) + h;
-      while (first < k_.places.size() && static_cast<double>(k_.places[first].end) <= begin) ++first;
+    for (const Stretch& s : j_.places) {
+      const double begin = s.begin + h;
+      const double end = s.end + h;
+      while (first < k_.places.size() && k_.places[first].end <= begin) ++first;
       for (std::size_t i = first; i < k_.places.size(); ++i) {
-        const auto from = static_cast<double>(k_.places[i].begin);
-        if (from >= end) break;
-        sum += std::max(0.0, std::min(end, static_cast<double>(k_.places[i].end)) - std::max(begin, from));
+        const Stretch& other = k_.places[i];
+        if (other.begin >= end) break;
+        sum += std::max(0.0, std::min(end, other.end) - std::max(begin, other.begin));
       }
     }
     return sum;
@@ -103,8 +109,8 @@ class PairCounts {
 
   [[nodiscard]] double extent() const {
     if (j_.places.empty() || k_.places.empty()) return std::max(m_j_, m_k_);
-    return static_cast<double>(std::max(j_.places.back().end, k_.places.back().end) -
-                               std::min(j_.places.front().begin, k_.places.front().begin));
+    return std::max(j_.places.back().end, k_.places.back().end) -
+           std::min(j_.places.front().begin, k_.places.front().begin);
   }
 
   const LevelPlaces& j_;

@@ -35,11 +35,13 @@ double window_power(std::size_t n) { return 0.375 * static_cast<double>(n); }
 Present::Present(std::span<const double> x, std::span<const std::uint8_t> mask)
     : runs_(valid_segments(x, mask)), size_(x.size()) {
   if (runs_.size() == 1 && runs_.front().begin == 0 && runs_.front().end == size_) return;
-  before_.assign(size_ + 1, 0);
+  words_.resize(size_ / kWord + 1);
   for (const Segment& run : runs_) {
-    for (std::size_t i = run.begin; i < run.end; ++i) before_[i + 1] = 1;
+    for (std::size_t i = run.begin; i < run.end; ++i)
+      words_[i / kWord].there |= std::uint64_t{1} << (i % kWord);
   }
-  for (std::size_t i = 0; i < x.size(); ++i) before_[i + 1] += before_[i];
+  for (std::size_t w = 1; w < words_.size(); ++w)
+    words_[w].before = words_[w - 1].before + static_cast<std::uint64_t>(std::popcount(words_[w - 1].there));
 }
 
 // G-23: half overlap, an eighth missing at most

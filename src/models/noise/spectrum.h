@@ -3,6 +3,8 @@
 /// Welch's mean periodogram of a signal with missing samples: what lines and resonances are looked for in,
 /// and what is drawn beside a wavelet variance (G-23).
 
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -19,7 +21,9 @@ class Present {
   Present(std::span<const double> x, std::span<const std::uint8_t> mask);
 
   [[nodiscard]] const std::vector<Segment>& runs() const { return runs_; }
-  [[nodiscard]] bool at(std::size_t i) const { return before(i + 1) > before(i); }
+  [[nodiscard]] bool at(std::size_t i) const {
+    return words_.empty() || (words_[i / kWord].there >> (i % kWord) & 1U) != 0;
+  }
   [[nodiscard]] std::size_t count(std::size_t begin, std::size_t end) const {
     return before(end) - before(begin);
   }
@@ -28,10 +32,22 @@ class Present {
   [[nodiscard]] std::vector<std::size_t> segments(std::size_t length) const;
 
  private:
-  [[nodiscard]] std::size_t before(std::size_t i) const { return before_.empty() ? i : before_[i]; }
+  /// A bit for each of so many neighbouring samples. A count for every sample would take half their memory.
+  static constexpr std::size_t kWord = 64;
+  struct Word {
+    std::uint64_t there = 0;
+    std::uint64_t before = 0;  ///< that are there before its first sample
+  };
+
+  [[nodiscard]] std::size_t before(std::size_t i) const {
+    if (words_.empty()) return i;
+    const Word& word = words_[i / kWord];
+    const std::uint64_t earlier = (std::uint64_t{1} << (i % kWord)) - 1;
+    return word.before + static_cast<std::size_t>(std::popcount(word.there & earlier));
+  }
 
   std::vector<Segment> runs_;
-  std::vector<std::uint32_t> before_;  ///< empty where all are there
+  std::vector<Word> words_;  ///< empty where all are there
   std::size_t size_ = 0;
 };
 

@@ -78,19 +78,6 @@ std::vector<WvLevel> whole_levels(std::span<const double> run, std::span<double>
   return result;
 }
 
-double mean_square(const std::vector<double>& values) {
-  const Eigen::Map<const Eigen::ArrayXd> all(values.data(), static_cast<Eigen::Index>(values.size()));
-  return all.square().sum() / static_cast<double>(values.size());
-}
-
-WvLevel with_scale(int j, const std::vector<double>& coefficients, const std::optional<double>& c) {
-  if (!c) return level_of(j, mean_square(coefficients), coefficients.size());
-  const RobustScale scale = biweight_scale(coefficients, *c);
-  WvLevel level = level_of(j, scale.s2, coefficients.size());
-  level.rejected_share = scale.rejected_share;
-  return level;
-}
-
 /// G-34: joins stretches over the shortest holes, until there are kMostPlaces of them.
 std::vector<Segment> joined(const std::vector<Segment>& places) {
   if (places.size() <= kMostPlaces) return places;
@@ -109,24 +96,42 @@ std::vector<Segment> joined(const std::vector<Segment>& places) {
   return out;
 }
 
-/// Level by level, as far as there are coefficients.
+/// The next level of `haar`; nothing where it has no coefficient.
 /// @param c  the biweight's constant; absent: classical
-std::vector<WvLevel> levels_by_coefficients(std::span<const double> x, const std::vector<Segment>& segments,
-                                            int levels, const std::optional<double>& c) {
-  HaarLevels haar(x, segments);
+/// @param coefficients  room for them
+std::optional<WvLevel> next_level(HaarLevels& haar, int j, const std::optional<double>& c,
+                                  std::vector<double>& coefficients, MissingExcess& excess) {
+  std::vector<Segment> places;
+  MissingExcess sum;
+  WvLevel level;
+  if (c) {
+    coefficients.clear();
+    if (!haar.append_next(coefficients, sum, places)) return std::nullopt;
+    const RobustScale scale = biweight_scale(coefficients, *c);
+    level = level_of(j, scale.s2, coefficients.size());
+    level.rejected_share = scale.rejected_share;
+  } else {
+    SquareSum squares;
+    if (!haar.add_next(squares, sum, places)) return std::nullopt;
+    level = level_of(j, squares.mean(), squares.count());
+  }
+  level.places = joined(places);
+  excess = sum;
+  excess *= 1.0 / static_cast<double>(level.n_coefficients);
+  return level;
+}
+
+/// Level by level, as far as there are coefficients.
+/// @param c  the biweight's constant; absent: classical, of several runs
+std::vector<WvLevel> levels_by_coefficients(HaarLevels haar, const std::vector<Segment>& segments, int levels,
+                                            const std::optional<double>& c) {
   std::vector<WvLevel> result;
   std::vector<MissingExcess> excess;
   std::vector<double> coefficients;
-  std::vector<Segment> places;
-  MissingExcess sum;
-  for (int j = 1; j <= levels && haar.append_next(coefficients, sum, places); ++j) {
-    result.push_back(with_scale(j, coefficients, c));
-    result.back().places = joined(places);
-    places.clear();
-    excess.push_back(sum);
-    excess.back() *= 1.0 / static_cast<double>(coefficients.size());
-    coefficients.clear();
-    sum = {};
+  for (int j = 1; j <= levels; ++j) {
+    auto level = next_level(haar, j, c, coefficients, excess.emplace_back());
+    if (!level) break;
+    result.push_back(std::move(*level));
   }
   HoleLengths holes;
   for (std::size_t i = 1; i < segments.size(); ++i) holes.add(segments[i].begin - segments[i - 1].end);
@@ -222,9 +227,11 @@ Result<WaveletVariance> wavelet_variance(std::span<const double> x, std::span<do
   if (options.robust) {
     const double c = options.robust->tuning_constant.value_or(biweight_constant(options.robust->efficiency));
     wv.efficiency = options.robust->efficiency;
-    wv.levels = levels_by_coefficients(x, wv.segments, wanted, c);
+    wv.levels = levels_by_coefficients(HaarLevels(x, wv.segments), wv.segments, wanted, c);
   } else if (wv.segments.size() > 1) {
-    wv.levels = levels_by_coefficients(x, wv.segments, wanted, std::nullopt);
+    wv.levels = levels_by_coefficients(
+        used_up.empty() ? HaarLevels(x, wv.segments) : HaarLevels::in_place(used_up, wv.segments),
+        wv.segments, wanted, std::nullopt);
   } else {
     const std::size_t begin = wv.segments.front().begin;
     wv.levels = whole_levels(x.subspan(begin, longest),

@@ -75,7 +75,7 @@ struct WvOptions {
 /// Memory beyond the input: one copy of the signal (two when robust or with missing samples). Thread-safe.
 Result<WaveletVariance> haar_wavelet_variance(std::span<const double> x, const WvOptions& options = {});
 
-/// The same to the bit, without the copy where it is classical and no sample is missing: `x` is used up.
+/// The same to the bit, without the copy where it is classical: `x` is used up.
 Result<WaveletVariance> haar_wavelet_variance_in_place(std::span<double> x, const WvOptions& options = {});
 
 /// Runs of non-zero mask entries that do not hold a non-finite value.

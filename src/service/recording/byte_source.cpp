@@ -143,20 +143,27 @@ class CaptureSource final : public ByteSource {
   RawRead current_;
 };
 
+std::function<std::optional<RawRead>()> reads_of(CaptureReader reader, Reading reading) {
+  if (reading == Reading::kAhead) {
+    return [ahead = std::make_shared<ReadAhead>(std::move(reader))] { return ahead->next(); };
+  }
+  return [own = std::make_shared<CaptureReader>(std::move(reader))] { return own->next(); };
+}
+
 /// Takes the reads of one device from a reader of its own.
 class OwnReads {
  public:
-  OwnReads(CaptureReader reader, std::string device)
-      : reader_(std::make_shared<CaptureReader>(std::move(reader))), device_(std::move(device)) {}
+  OwnReads(CaptureReader reader, std::string device, Reading reading)
+      : take_(reads_of(std::move(reader), reading)), device_(std::move(device)) {}
   Result<std::optional<RawRead>> operator()() {
     for (;;) {
-      auto read = reader_->next();
+      auto read = take_();
       if (!read || read->device == device_) return read;
     }
   }
 
  private:
-  std::shared_ptr<CaptureReader> reader_;
+  std::function<std::optional<RawRead>()> take_;
   std::string device_;
 };
 
@@ -174,7 +181,7 @@ class SharedLine {
     shared_->leave(index_);
     auto reader = CaptureReader::open(capture_, device_);
     if (!reader) return tl::unexpected<Error>(reader.error());
-    own_.emplace(std::move(*reader), device_);
+    own_.emplace(std::move(*reader), device_, Reading::kWhenAsked);
     for (std::uint64_t i = 0; i < taken_; ++i) (void)(*own_)();
     return (*own_)();
   }
@@ -187,13 +194,6 @@ class SharedLine {
   std::uint64_t taken_ = 0;
   std::optional<OwnReads> own_;
 };
-
-std::function<std::optional<RawRead>()> reads_of(CaptureReader reader, Reading reading) {
-  if (reading == Reading::kAhead) {
-    return [ahead = std::make_shared<ReadAhead>(std::move(reader))] { return ahead->next(); };
-  }
-  return [own = std::make_shared<CaptureReader>(std::move(reader))] { return own->next(); };
-}
 
 /// Bytes of the header of a .mtb log; 0 for any other file.
 Result<std::size_t> header_of(const std::filesystem::path& file) {
@@ -228,10 +228,11 @@ Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& f
 }
 
 Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::path& capture,
-                                                         const std::string& device, std::uint64_t bytes) {
+                                                         const std::string& device, std::uint64_t bytes,
+                                                         Reading reading) {
   auto reader = CaptureReader::open(capture, device);
   if (!reader) return tl::unexpected<Error>(reader.error());
-  return std::make_unique<CaptureSource>(OwnReads(std::move(*reader), device), bytes);
+  return std::make_unique<CaptureSource>(OwnReads(std::move(*reader), device, reading), bytes);
 }
 
 Result<std::vector<std::unique_ptr<ByteSource>>> open_captured_lines(const std::filesystem::path& capture,

@@ -39,20 +39,21 @@ class ByteSource {
 Result<std::unique_ptr<ByteSource>> open_raw_dump(const std::filesystem::path& file,
                                                   RawDump::Arrivals arrivals = RawDump::Arrivals::kToCheck);
 
+/// Who reads a recording: the thread that asks for the bytes, or another one ahead of it, where the recording
+/// can be read so. What is read is the same.
+enum class Reading : std::uint8_t { kWhenAsked, kAhead };
+
 /// The reads of one device out of a capture.
 /// @param bytes  of this device in the capture, as CaptureSummary says
 Result<std::unique_ptr<ByteSource>> open_captured_device(const std::filesystem::path& capture,
-                                                         const std::string& device, std::uint64_t bytes);
+                                                         const std::string& device, std::uint64_t bytes,
+                                                         Reading reading = Reading::kWhenAsked);
 
 /// A device whose reads are wanted, and their bytes, as CaptureSummary says.
 struct CapturedLine {
   std::string device;
   std::uint64_t bytes = 0;
 };
-
-/// Who reads a recording: the thread that asks for the bytes, or another one ahead of it, where the recording
-/// can be read so. What is read is the same.
-enum class Reading : std::uint8_t { kWhenAsked, kAhead };
 
 /// The reads of several devices by one pass over the capture, for those who go through them side by side; a
 /// device may be named twice. One that is asked for far ahead of the others reads the capture by itself.

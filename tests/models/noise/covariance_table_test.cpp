@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -107,6 +108,93 @@ TEST(CovarianceTable, OneIsSharedByRecordsOfOneLengthAndNoOthers) {
   other = wv;
   other.efficiency = 0.6;
   EXPECT_EQ(tables.of(other, 12), nullptr) << "nor has a robust one";
+}
+
+/// Models whose resonances ring for a few lags to a few hundred.
+std::vector<Model> ringing_models() {
+  std::vector<Model> models;
+  for (double rate = 0.5; rate > 0.01; rate *= 0.7) {
+    const Component res{ProcessKind::kResonance, 0.7, {rate, 1.2 + rate}};
+    models.push_back({{{ProcessKind::kWhiteNoise, 1.0, {}}, res, gm(0.1 * rate, 0.3)}});
+  }
+  return models;
+}
+
+TEST(CovarianceTable, GivesTheSameWhateverItsMemoryHolds) {
+  const WaveletVariance wv = record_of(50'000, 14);
+  const CovarianceTable table(wv, wv.levels.size());
+  for (const std::size_t bound : {std::size_t{0}, std::size_t{1'000}, std::size_t{100'000}}) {
+    SCOPED_TRACE(bound);
+    const CovarianceTable bounded(wv, wv.levels.size(), std::make_shared<CovarianceMemory>(bound));
+    for (const Model& model : ringing_models()) EXPECT_EQ(bounded.of(model, wv), table.of(model, wv));
+  }
+}
+
+TEST(CovarianceTable, HoldsNoMoreTheMoreResonancesAreTried) {
+  constexpr std::size_t kBound = 150'000;
+  const auto memory = std::make_shared<CovarianceMemory>(kBound);
+  CovarianceTables tables(memory);
+  const auto unbounded = std::make_shared<CovarianceMemory>(100 * kBound);
+  CovarianceTables others(unbounded);
+  for (const std::uint64_t length : {50'000U, 60'000U}) {
+    const WaveletVariance wv = record_of(length, 14);
+    for (const Model& model : ringing_models()) {
+      (void)tables.of(wv, 14)->of(model, wv);
+      (void)others.of(wv, 14)->of(model, wv);
+      EXPECT_LE(memory->held(), kBound);
+      EXPECT_GT(memory->held(), 0U);
+    }
+  }
+  EXPECT_GT(unbounded->held(), 2 * kBound) << "so many were tried that the bound mattered";
+}
+
+/// Doubles that say whether they were made anew.
+class CountedEntries {
+ public:
+  explicit CountedEntries(std::size_t bound) : memory_(bound) {}
+
+  std::shared_ptr<const Eigen::VectorXd> get(int process) {
+    return memory_.get<Eigen::VectorXd>({0, {}, process}, [&] {
+      ++made_;
+      return Eigen::VectorXd(Eigen::VectorXd::Constant(kSize, process));
+    });
+  }
+  [[nodiscard]] int made() const { return made_; }
+  [[nodiscard]] std::size_t held() const { return memory_.held(); }
+
+  static constexpr std::size_t kSize = 10;
+
+ private:
+  CovarianceMemory memory_;
+  int made_ = 0;
+};
+
+TEST(CovarianceMemory, ForgetsWhatWasAskedForLongestAgo) {
+  CountedEntries entries(3 * CountedEntries::kSize);
+  for (const int process : {1, 2, 3, 1}) (void)entries.get(process);
+  EXPECT_EQ(entries.made(), 3);
+  (void)entries.get(4);  // in the place of 2
+  for (const int process : {1, 3, 4}) (void)entries.get(process);
+  EXPECT_EQ(entries.made(), 4);
+  (void)entries.get(2);
+  EXPECT_EQ(entries.made(), 5);
+  EXPECT_EQ(entries.held(), 3 * CountedEntries::kSize);
+}
+
+TEST(CovarianceMemory, AnEntryStaysWithWhoHoldsIt) {
+  CountedEntries entries(CountedEntries::kSize);
+  const auto first = entries.get(1);
+  (void)entries.get(2);
+  EXPECT_EQ((*first)[0], 1.0);
+  EXPECT_EQ(entries.held(), CountedEntries::kSize);
+}
+
+TEST(CovarianceMemory, WhatIsLargerThanTheBoundIsMadeEachTime) {
+  CountedEntries entries(CountedEntries::kSize - 1);
+  EXPECT_EQ((*entries.get(7))[0], 7.0);
+  EXPECT_EQ((*entries.get(7))[0], 7.0);
+  EXPECT_EQ(entries.made(), 2);
+  EXPECT_EQ(entries.held(), 0U);
 }
 
 TEST(CovarianceTable, AsksTheSumForWhatItDoesNotHold) {

@@ -11,6 +11,7 @@
 
 #include "models/noise/allan.h"
 #include "models/noise/process.h"
+#include "models/noise/spectrum.h"
 #include "models/noise/wavelet_variance.h"
 
 namespace imuscope::noise {
@@ -221,6 +222,26 @@ TEST(Lines, TakenOutTheyLeaveTheWaveletVarianceOfTheNoise) {
   for (std::size_t j = 0; j < 8; ++j)
     EXPECT_NEAR(after.levels[j].value, truth.levels[j].value, 0.01 * truth.levels[j].value)
         << "level " << j + 1;
+}
+
+TEST(Lines, WhoIsThereIsCountedFromAndToEveryPlace) {
+  for (const std::size_t n : {63U, 64U, 65U, 200U}) {
+    std::vector<double> x(n, 1.0);
+    auto mask = all_valid(n);
+    for (std::size_t i = 5; i < n; i += 7) mask[i] = 0;
+    x[n - 2] = std::nan("");
+    const Present present(x, mask);
+    for (std::size_t begin = 0; begin <= n; ++begin) {
+      std::size_t count = 0;
+      for (std::size_t end = begin; end <= n; ++end) {
+        EXPECT_EQ(present.count(begin, end), count) << begin << " to " << end << " of " << n;
+        if (end == n) break;
+        const bool is_there = mask[end] != 0 && std::isfinite(x[end]);
+        EXPECT_EQ(present.at(end), is_there) << end << " of " << n;
+        count += is_there ? 1 : 0;
+      }
+    }
+  }
 }
 
 TEST(Lines, ASignalShorterThanASegmentHasNone) {

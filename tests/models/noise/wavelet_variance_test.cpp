@@ -406,20 +406,41 @@ TEST(WaveletVariance, MoreLevelsThanTheDataAllowAreRefusedWithTheNumberThatWorks
 }
 
 TEST(WaveletVariance, InPlaceIsTheSameToTheBit) {
+  const std::vector<std::vector<Segment>> holes{{}, {{400, 403}}, {{17, 18}, {300, 420}, {423, 424}}};
   for (const std::size_t n : {std::size_t{1000}, std::size_t{100'003}}) {
-    auto x = white(n, 10);
-    for (double& v : x) v += 1e3;
-    std::vector<std::uint8_t> mask(n, 1);
-    mask.front() = mask.back() = 0;
-    WvOptions options;
-    options.mask = mask;
-    const auto wv = haar_wavelet_variance(x, options).value();
-    const auto in_place = haar_wavelet_variance_in_place(x, options).value();
-    ASSERT_EQ(in_place.levels.size(), wv.levels.size());
-    for (std::size_t i = 0; i < wv.levels.size(); ++i) {
-      EXPECT_EQ(in_place.levels[i].value, wv.levels[i].value) << n << ", level " << i + 1;
-      EXPECT_EQ(in_place.levels[i].n_coefficients, wv.levels[i].n_coefficients);
+    for (const auto& missing : holes) {
+      auto x = white(n, 10);
+      for (double& v : x) v += 1e3;
+      std::vector<std::uint8_t> mask(n, 1);
+      mask.front() = mask.back() = 0;
+      for (const Segment& hole : missing) {
+        for (std::size_t i = hole.begin; i < hole.end; ++i) {
+          mask[i] = 0;
+          x[i] = std::nan("");
+        }
+      }
+      WvOptions options;
+      options.mask = mask;
+      const auto wv = haar_wavelet_variance(x, options).value();
+      const auto in_place = haar_wavelet_variance_in_place(x, options).value();
+      ASSERT_EQ(in_place.levels.size(), wv.levels.size());
+      for (std::size_t i = 0; i < wv.levels.size(); ++i) {
+        EXPECT_EQ(in_place.levels[i].value, wv.levels[i].value) << n << ", level " << i + 1;
+        EXPECT_EQ(in_place.levels[i].n_coefficients, wv.levels[i].n_coefficients);
+      }
     }
+  }
+}
+
+TEST(WaveletVariance, AMeanOfSquaresLeavesNoneOut) {
+  std::vector<double> values = white(1003, 12);
+  SquareSum squares;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    squares.add(values[i]);
+    sum += values[i] * values[i];
+    EXPECT_NEAR(squares.mean(), sum / static_cast<double>(i + 1), 1e-12);
+    EXPECT_EQ(squares.count(), i + 1);
   }
 }
 

@@ -105,6 +105,16 @@ TEST(ReadAhead, LinesSideBySideAreThoseOfEachDeviceAlone) {
   }
 }
 
+TEST(ReadAhead, OneDeviceIsTheSameHoweverItIsRead) {
+  const auto path = capture();
+  for (const auto& line : kLines) {
+    auto asked = open_captured_device(path, line.device, 0);
+    auto ahead = open_captured_device(path, line.device, 0, Reading::kAhead);
+    ASSERT_TRUE(asked && ahead);
+    EXPECT_EQ(rest(**ahead), rest(**asked)) << line.device;
+  }
+}
+
 TEST(ReadAhead, ALineThatIsFarAheadOfAnotherGoesItsOwnWayAndMissesNothing) {
   constexpr std::size_t kSoMuchThatNobodyKeepsIt = 1500;  // 45 MB in all
   const auto path = capture(kSoMuchThatNobodyKeepsIt);
