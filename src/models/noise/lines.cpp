@@ -352,7 +352,7 @@ std::size_t reach_of(const Spectrum& without, std::size_t peak, double floor, do
 }
 
 /// Bins [first, last] of a line, and the noise's power there.
-struct Stretch {
+struct LineBins {
   std::size_t first;
   std::size_t last;
   double floor;
@@ -360,9 +360,9 @@ struct Stretch {
 
 /// G-23: of two lines a bin belongs to the nearer.
 /// @param peaks  in order
-std::vector<Stretch> stretches_of(const Spectrum& without, const std::vector<std::size_t>& peaks) {
+std::vector<LineBins> bins_of(const Spectrum& without, const std::vector<std::size_t>& peaks) {
   const double dof = degrees_of_freedom(static_cast<double>(without.segments));
-  std::vector<Stretch> stretches;
+  std::vector<LineBins> bins;
   for (std::size_t p = 0; p < peaks.size(); ++p) {
     const std::size_t peak = peaks[p];
     const double floor = floor_at(without, peak, dof);
@@ -370,9 +370,9 @@ std::vector<Stretch> stretches_of(const Spectrum& without, const std::vector<std
     const std::size_t after_before = p == 0 ? 0 : (peaks[p - 1] + peak) / 2 + 1;
     const std::size_t before_next =
         p + 1 == peaks.size() ? without.power.size() - 1 : (peak + peaks[p + 1]) / 2;
-    stretches.push_back({std::max(peak - reach, after_before), std::min(peak + reach, before_next), floor});
+    bins.push_back({std::max(peak - reach, after_before), std::min(peak + reach, before_next), floor});
   }
-  return stretches;
+  return bins;
 }
 
 }  // namespace
@@ -387,10 +387,10 @@ Remainders::Remainders(Spectra& without, const std::vector<Line>& lines, double 
     std::sort(peaks.begin(), peaks.end());
     const Spectrum& spectrum = without.of(segment);
     const double bin_hz = rate_hz / static_cast<double>(segment);
-    for (const Stretch& stretch : stretches_of(spectrum, peaks)) {
-      for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
+    for (const LineBins& of_line : bins_of(spectrum, peaks)) {
+      for (std::size_t k = of_line.first; k <= of_line.last; ++k) {
         if (!(spectrum.power[k] > 0.0)) continue;
-        const double share = 1.0 - stretch.floor / spectrum.power[k];
+        const double share = 1.0 - of_line.floor / spectrum.power[k];
         bins_.push_back({2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(segment),
                          share * density_at(spectrum, k, rate_hz) * bin_hz});
       }
