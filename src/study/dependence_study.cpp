@@ -1,11 +1,15 @@
 #include "study/dependence_study.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "base/units.h"
 #include "estimation/regimes/motion_regimes.h"
@@ -204,10 +208,24 @@ nlohmann::json slope_json(const std::string& name, const Slope& s, double p_holm
           {"sentence", sentence_of(name, s, p_holm, p_holm_beside)}};
 }
 
-/// One S-IMU on its way.
+DependenceStudy nothing_yet() {
+  DependenceStudy study;
+  for (const char* list : {"dependences", "points", "not_determined", "remarks"})
+    study.document[list] = nlohmann::json::array();
+  return study;
+}
+
+void append(DependenceStudy&& part, DependenceStudy& study) {
+  for (auto& [list, entries] : part.document.items()) {
+    for (auto& entry : entries) study.document[list].push_back(std::move(entry));
+  }
+  std::move(part.remarks.begin(), part.remarks.end(), std::back_inserter(study.remarks));
+}
+
+/// One S-IMU on its way, or some of its axes.
 class ImuStudy {
  public:
-  ImuStudy(std::string name, DependenceStudy& out) : name_(std::move(name)), out_(out) {}
+  explicit ImuStudy(std::string name) : name_(std::move(name)), out_(nothing_yet()) {}
 
   void axis(std::size_t axis, const std::vector<Window>& windows, const noise::FitResult& start) {
     std::vector<std::size_t> of_use;
@@ -238,7 +256,17 @@ class ImuStudy {
     points(axis, windows, start);
   }
 
-  void finish() {
+  /// What other axes told.
+  void add(ImuStudy&& part) {
+    std::move(part.slopes_.begin(), part.slopes_.end(), std::back_inserter(slopes_));
+    // What is of the sensor is said once.
+    const std::vector<std::string> sentences = std::exchange(part.out_.remarks, {});
+    part.out_.document.erase("remarks");
+    append(std::move(part.out_), out_);
+    for (const std::string& sentence : sentences) say(sentence);
+  }
+
+  DependenceStudy finish() && {
     std::vector<std::optional<double>> p;
     for (const auto& s : slopes_) p.emplace_back(s.slope.p_value);
     std::vector<std::optional<double>> p_beside;
@@ -250,6 +278,7 @@ class ImuStudy {
       out_.document["dependences"].push_back(
           slope_json(name_, slopes_[i], holm[i].value_or(1.0), holm_beside[i]));
     say_what_lies_far();
+    return std::move(out_);
   }
 
   /// Once for the sensor.
@@ -340,7 +369,7 @@ class ImuStudy {
   }
 
   std::string name_;
-  DependenceStudy& out_;
+  DependenceStudy out_;
   std::vector<Slope> slopes_;
 };
 
@@ -350,11 +379,10 @@ DependenceStudy study_dependence(const Configuration& configuration, const std::
                                  const std::vector<TemperatureTrack>& temperatures,
                                  const MotionLevels& levels, const RegimeTrack& motion,
                                  const NoiseStudy& models, HostTime origin) {
-  DependenceStudy out;
+  DependenceStudy out = nothing_yet();
   const double window_s = configuration.regimes.window_s;
-  out.document = {{"schema", "imuscope.dependence/1"},         {"window_s", window_s},
-                  {"dependences", nlohmann::json::array()},    {"points", nlohmann::json::array()},
-                  {"not_determined", nlohmann::json::array()}, {"remarks", nlohmann::json::array()}};
+  out.document["schema"] = "imuscope.dependence/1";
+  out.document["window_s"] = window_s;
   const auto dynamic = motion.index_of(kDynamicName);
   if (!dynamic || motion.total_s(*dynamic) <= 0.0) {
     out.remarks.emplace_back("no parameter is held against the dynamics: there is no dynamic part");
@@ -364,17 +392,25 @@ DependenceStudy study_dependence(const Configuration& configuration, const std::
   const auto cells = levels.cells();
   const Run run{cells, levels, motion, *dynamic, origin};
   const auto indices = configuration.study_indices();
-  for (std::size_t i = 0; i < series.size(); ++i) {
-    if (series[i].size() == 0) continue;
+  // Each axis by itself, on any thread; what came of them stands in their order.
+  std::vector<std::optional<ImuStudy>> parts(series.size() * kAxisCount);
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t job) {
+    const std::size_t i = job / kAxisCount;
+    const std::size_t axis = job % kAxisCount;
+    if (series[i].size() == 0) return;
     const auto& device = configuration.devices[indices[i]];
+    const auto* start = start_of(models, device.name, axis);
+    if (start == nullptr) return;  // why there is no model is said where it was to be made
     const auto length = static_cast<std::size_t>(std::lround(window_s * device.rate_hz));
-    ImuStudy imu(device.name, out);
+    parts[job].emplace(device.name)
+        .axis(axis, windows_of(series[i], temperatures[i], axis, length, run), with_white_noise(*start));
+  });
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    ImuStudy imu(configuration.devices[indices[i]].name);
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      const auto* start = start_of(models, device.name, axis);
-      if (start == nullptr) continue;  // why there is no model is said where it was to be made
-      imu.axis(axis, windows_of(series[i], temperatures[i], axis, length, run), with_white_noise(*start));
+      if (auto& part = parts[i * kAxisCount + axis]) imu.add(std::move(*part));
     }
-    imu.finish();
+    append(std::move(imu).finish(), out);
   }
   return out;
 }
