@@ -402,7 +402,8 @@ DependenceStudy study_dependence(const Configuration& configuration, const std::
     const auto* start = start_of(models, device.name, axis);
     if (start == nullptr) return;  // why there is no model is said where it was to be made
     const auto length = static_cast<std::size_t>(std::lround(window_s * device.rate_hz));
-    parts[job].emplace(device.name)
+    parts[job]
+        .emplace(device.name)
         .axis(axis, windows_of(series[i], temperatures[i], axis, length, run), with_white_noise(*start));
   });
   for (std::size_t i = 0; i < series.size(); ++i) {

@@ -1,8 +1,6 @@
 #include "study/dynamics_files.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -117,21 +115,36 @@ DynamicsRegressions regressions_of_device(const DeviceConfig& device, RowSpool& 
 
 }  // namespace
 
-DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
-                                   const RegimeTrack& motion, const noise::ModelSpec& residual_model) {
+Regressions::Regressions(const Configuration& configuration, std::vector<RowSpool>& rows,
+                         const RegimeTrack& motion, const noise::ModelSpec& residual_model)
+    : configuration_(configuration),
+      rows_(rows),
+      motion_(motion),
+      residual_model_(residual_model),
+      dynamic_(motion.index_of(kDynamicName)),
+      of_device_(rows.size()) {
+  if (dynamic_ && motion.total_s(*dynamic_) <= 0.0) dynamic_.reset();
+}
+
+std::vector<Job> Regressions::jobs() {
+  std::vector<Job> jobs;
+  if (!dynamic_) return jobs;
+  const auto indices = configuration_.study_indices();
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    jobs.emplace_back([this, i, &device = configuration_.devices[indices[i]]] {
+      of_device_[i] = regressions_of_device(device, rows_[i], motion_, *dynamic_, residual_model_);
+    });
+  }
+  return jobs;
+}
+
+DynamicsRegressions Regressions::result() && {
   DynamicsRegressions out;
-  const auto indices = configuration.study_indices();
-  const auto dynamic = motion.index_of(kDynamicName);
-  if (!dynamic || motion.total_s(*dynamic) <= 0.0) {
+  if (!dynamic_) {
     out.remarks.emplace_back("no regression on the dynamics: there is no dynamic part");
     return out;
   }
-  std::vector<DynamicsRegressions> parts(rows.size());
-  tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
-    parts[i] =
-        regressions_of_device(configuration.devices[indices[i]], rows[i], motion, *dynamic, residual_model);
-  });
-  for (DynamicsRegressions& part : parts) {
+  for (DynamicsRegressions& part : of_device_) {
     std::move(part.remarks.begin(), part.remarks.end(), std::back_inserter(out.remarks));
     for (auto& regression : part.regressions) out.regressions.push_back(std::move(regression));
   }

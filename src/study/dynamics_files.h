@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "configuration/config.h"
 #include "estimation/regimes/regime_track.h"
 #include "models/noise/model.h"
+#include "study/jobs.h"
 #include "study/row_spool.h"
 
 namespace imuscope {
@@ -24,8 +26,25 @@ struct DynamicsRegressions {
 
 /// For every S-IMU, over the dynamic part of the run: at rest there are no dynamics, and the noise is
 /// different.
-DynamicsRegressions regressions_of(const Configuration& configuration, std::vector<RowSpool>& rows,
-                                   const RegimeTrack& motion, const noise::ModelSpec& residual_model);
+class Regressions {
+ public:
+  /// What is handed in must outlive this.
+  Regressions(const Configuration& configuration, std::vector<RowSpool>& rows, const RegimeTrack& motion,
+              const noise::ModelSpec& residual_model);
+
+  /// One an S-IMU, each for any thread; none where the run has no dynamic part. They must not outlive this.
+  [[nodiscard]] std::vector<Job> jobs();
+  /// Once all of them are done.
+  [[nodiscard]] DynamicsRegressions result() &&;
+
+ private:
+  const Configuration& configuration_;
+  std::vector<RowSpool>& rows_;
+  const RegimeTrack& motion_;
+  const noise::ModelSpec& residual_model_;
+  std::optional<std::size_t> dynamic_;  ///< regime; absent: no dynamic part
+  std::vector<DynamicsRegressions> of_device_;
+};
 
 /// Writes scatter_NAME.csv for every S-IMU: time_s, utc_s, the fifteen covariates and the six errors of at
 /// most kScatterRows rows, evenly spaced over the drive, at rest and in motion alike.

@@ -29,7 +29,7 @@ nlohmann::json or_null(const std::optional<double>& value) {
 }
 
 /// What one S-IMU's series are fitted with, and where the results go.
-struct Job {
+struct AxisWork {
   const DeviceConfig& device;
   const std::vector<double>& values;  ///< of the axis, vibration lines taken out
   const noise::ModelSpec& spec;
@@ -42,21 +42,21 @@ double seconds_of_level(std::size_t level, double rate_hz) {
 }
 
 /// Says which levels the stretches of a regime are too short for, where the whole run has them.
-void say_left_out(const Job& job, std::size_t axis, const std::string& regime,
+void say_left_out(const AxisWork& work, std::size_t axis, const std::string& regime,
                   const noise::WaveletVariance& wv, std::size_t levels_of_whole) {
   if (regime == kWholeRun || wv.levels.size() >= levels_of_whole) return;
   std::size_t longest = 0;
   for (const auto& segment : wv.segments) longest = std::max(longest, segment.end - segment.begin);
-  const double tau_s = seconds_of_level(wv.levels.size(), job.device.rate_hz);
+  const double tau_s = seconds_of_level(wv.levels.size(), work.device.rate_hz);
   const std::string sentence = fmt::format(
-      "{} {}, {}: scales above {:.4g} s are left out, as its longest stretch lasts {:.4g} s", job.device.name,
-      axis_name(axis), regime, tau_s, static_cast<double>(longest) / job.device.rate_hz);
-  job.study.left_out.push_back({{"name", job.device.name},
-                                {"axis", axis_name(axis)},
-                                {"regime", regime},
-                                {"above_level", wv.levels.size()},
-                                {"above_tau_s", tau_s},
-                                {"sentence", sentence}});
+      "{} {}, {}: scales above {:.4g} s are left out, as its longest stretch lasts {:.4g} s",
+      work.device.name, axis_name(axis), regime, tau_s, static_cast<double>(longest) / work.device.rate_hz);
+  work.study.left_out.push_back({{"name", work.device.name},
+                                 {"axis", axis_name(axis)},
+                                 {"regime", regime},
+                                 {"above_level", wv.levels.size()},
+                                 {"above_tau_s", tau_s},
+                                 {"sentence", sentence}});
 }
 
 /// Parts of a regime, one after the other and with about as many samples each: enough to see whether they
@@ -67,10 +67,10 @@ constexpr double kPart_s = 15.0;
 /// Chance of parts that are alike being said to differ.
 constexpr double kPartsDifferBelow = 0.01;
 
-std::vector<noise::WaveletVariance> parts_of(const Job& job, const std::vector<std::uint8_t>& mask) {
+std::vector<noise::WaveletVariance> parts_of(const AxisWork& work, const std::vector<std::uint8_t>& mask) {
   const auto n = static_cast<std::size_t>(std::count(mask.begin(), mask.end(), std::uint8_t{1}));
   const auto parts =
-      std::min(kParts, static_cast<std::size_t>(static_cast<double>(n) / (kPart_s * job.device.rate_hz)));
+      std::min(kParts, static_cast<std::size_t>(static_cast<double>(n) / (kPart_s * work.device.rate_hz)));
   std::vector<noise::WaveletVariance> out;
   if (parts < kFewestParts) return out;
   std::size_t begin = 0;
@@ -80,7 +80,7 @@ std::vector<noise::WaveletVariance> parts_of(const Job& job, const std::vector<s
     if (seen * parts < (out.size() + 1) * n) continue;
     noise::WvOptions options;
     options.mask = {mask.data() + begin, i + 1 - begin};
-    auto wv = noise::haar_wavelet_variance({job.values.data() + begin, i + 1 - begin}, options);
+    auto wv = noise::haar_wavelet_variance({work.values.data() + begin, i + 1 - begin}, options);
     if (!wv) return {};
     out.push_back(std::move(*wv));
     if (out.size() == parts) break;
@@ -91,8 +91,8 @@ std::vector<noise::WaveletVariance> parts_of(const Job& job, const std::vector<s
 
 /// Where the parts of a regime differ, its intervals contain that, and it is said by how much. Returns
 /// whether they do.
-bool look_at_parts(const Job& job, const std::vector<std::uint8_t>& mask, noise::FitResult& fit) {
-  const auto parts = parts_of(job, mask);
+bool look_at_parts(const AxisWork& work, const std::vector<std::uint8_t>& mask, noise::FitResult& fit) {
+  const auto parts = parts_of(work, mask);
   if (parts.empty()) return false;
   const noise::Spread spread = noise::spread_of(fit, parts);
   if (!spread.homogeneity || spread.homogeneity->p_value >= kPartsDifferBelow) return false;
@@ -118,38 +118,39 @@ struct Part {
   noise::Remainders remainders;    ///< of all lines that were taken out of it
 };
 
-Part part_of(const Job& job, const std::string& regime, std::vector<std::uint8_t> mask,
+Part part_of(const AxisWork& work, const std::string& regime, std::vector<std::uint8_t> mask,
              const std::vector<noise::Line>& taken_out) {
   Part part{regime, std::move(mask), regime == kWholeRun ? std::vector<noise::Line>{} : taken_out, {}};
   if (taken_out.empty()) return part;
-  noise::Spectra spectra(job.values, part.mask);
-  part.remainders = noise::Remainders(spectra, taken_out, job.device.rate_hz);
+  noise::Spectra spectra(work.values, part.mask);
+  part.remainders = noise::Remainders(spectra, taken_out, work.device.rate_hz);
   return part;
 }
 
 /// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
-std::size_t fit_axis(const Job& job, std::size_t axis, const Part& part, std::size_t levels_of_whole) {
+std::size_t fit_axis(const AxisWork& work, std::size_t axis, const Part& part, std::size_t levels_of_whole) {
   const std::vector<std::uint8_t>& mask = part.mask;
   const std::string& regime = part.regime;
   // A regime that the run does not have is said once, not for every axis.
   if (std::none_of(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; })) return 0;
   const auto remark = [&](const std::string& what) {
-    job.study.remarks.push_back(fmt::format("{} {}, {}: {}", job.device.name, axis_name(axis), regime, what));
+    work.study.remarks.push_back(
+        fmt::format("{} {}, {}: {}", work.device.name, axis_name(axis), regime, what));
   };
   noise::WvOptions options;
   options.mask = mask;
-  auto wv = noise::haar_wavelet_variance(job.values, options);
+  auto wv = noise::haar_wavelet_variance(work.values, options);
   if (!wv) {
     remark("no wavelet variance: " + wv.error().what);
     return 0;
   }
   part.remainders.take_out_of(*wv, options.confidence);
-  say_left_out(job, axis, regime, *wv, levels_of_whole);
+  say_left_out(work, axis, regime, *wv, levels_of_whole);
   noise::FitOptions fit_options;
   fit_options.signal_unit = axis_unit(axis);
   fit_options.intervals = noise::Intervals::kInverted;
-  fit_options.covariances = &job.covariances;
-  auto fit = noise::fit(*wv, job.spec, job.device.rate_hz, fit_options);
+  fit_options.covariances = &work.covariances;
+  auto fit = noise::fit(*wv, work.spec, work.device.rate_hz, fit_options);
   if (!fit) {
     remark(fmt::format("no noise model: {}{}", fit.error().what,
                        wv->levels.size() < levels_of_whole ? "; its stretches are too short" : ""));
@@ -159,10 +160,10 @@ std::size_t fit_axis(const Job& job, std::size_t axis, const Part& part, std::si
   const auto spikes =
       regime == kWholeRun
           ? std::nullopt
-          : noise::spike_warning(noise::test_tails(job.values, options, fit->model), job.device.rate_hz);
-  const bool parts_differ = regime != kWholeRun && look_at_parts(job, mask, *fit);
+          : noise::spike_warning(noise::test_tails(work.values, options, fit->model), work.device.rate_hz);
+  const bool parts_differ = regime != kWholeRun && look_at_parts(work, mask, *fit);
   if (spikes) fit->warnings.insert(fit->warnings.begin(), *spikes);
-  job.study.models.push_back({job.device.name, axis, regime, std::move(*fit), part.lines, parts_differ});
+  work.study.models.push_back({work.device.name, axis, regime, std::move(*fit), part.lines, parts_differ});
   return wv->levels.size();
 }
 
@@ -303,12 +304,12 @@ NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std
   std::vector<std::vector<noise::Line>> lines;
   for (std::size_t regime = 0; regime < regimes.size(); ++regime)
     lines.push_back(take_out_lines(device, axis, regimes[regime], series.mask(axis, regime), values, study));
-  const Job job{device, values, spec, covariances, study};
+  const AxisWork work{device, values, spec, covariances, study};
   std::vector<noise::Line> of_all;
   for (const auto& of_regime : lines) of_all.insert(of_all.end(), of_regime.begin(), of_regime.end());
-  const std::size_t levels = fit_axis(job, axis, part_of(job, kWholeRun, series.mask(axis), of_all), 0);
+  const std::size_t levels = fit_axis(work, axis, part_of(work, kWholeRun, series.mask(axis), of_all), 0);
   for (std::size_t r = 0; r < regimes.size(); ++r)
-    fit_axis(job, axis, part_of(job, regimes[r], series.mask(axis, r), lines[r]), levels);
+    fit_axis(work, axis, part_of(work, regimes[r], series.mask(axis, r), lines[r]), levels);
   return study;
 }
 
@@ -336,7 +337,7 @@ std::string coverage_remark(const std::string& name, const NoiseSeries& series, 
 
 NoiseStudy study_noise(const Configuration& configuration, const std::vector<NoiseSeries>& series,
                        const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
-                       const std::function<void(double)>& progress) {
+                       const std::function<void(double)>& progress, std::vector<Job> longer) {
   const auto indices = configuration.study_indices();
   const std::size_t total = series.size() * kAxisCount;
   // Each axis of each S-IMU by itself, on any thread; what came of them stands in their order.
@@ -353,7 +354,9 @@ NoiseStudy study_noise(const Configuration& configuration, const std::vector<Noi
     const std::lock_guard lock(told);
     progress(static_cast<double>(++done) / static_cast<double>(total));
   };
-  tbb::parallel_for(std::size_t{0}, total, study_one);
+  std::vector<Job> jobs = std::move(longer);
+  for (std::size_t job = 0; job < total; ++job) jobs.emplace_back([&study_one, job] { study_one(job); });
+  work_off(jobs);
   NoiseStudy study;
   for (NoiseStudy& part : parts) append_part(std::move(part), study);
   summarise_left_out(study);

@@ -13,6 +13,7 @@
 #include "models/noise/fit.h"
 #include "models/noise/lines.h"
 #include "service/pipeline/noise_series.h"
+#include "study/jobs.h"
 
 namespace imuscope {
 
@@ -41,9 +42,10 @@ std::string coverage_remark(const std::string& name, const NoiseSeries& series, 
 /// Vibration lines are looked for in every regime and taken out before models are fitted.
 /// @param series    one an S-IMU, in the order of the configuration; regimes by their index in `regimes`
 /// @param progress  called with the share that is done
+/// @param longer    other work of the run, done beside: each takes longer than an axis, and they begin first
 NoiseStudy study_noise(const Configuration& configuration, const std::vector<NoiseSeries>& series,
                        const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
-                       const std::function<void(double)>& progress);
+                       const std::function<void(double)>& progress, std::vector<Job> longer = {});
 
 /// The content of models.json's "models": every entry holds its sinusoids, with intervals and with what they
 /// add to each level, as "sinusoids".

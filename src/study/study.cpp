@@ -315,14 +315,15 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   }
 
   const auto& names = regimes->chosen.names();
-  // The regressions need no noise model of the error process: another thread begins with them at once, as
-  // each of them takes longer than a noise model.
-  DynamicsRegressions regressions;
-  Beside beside([&] { regressions = regressions_of(configuration, *studied, regimes->motion, *spec); });
-  const auto noise_study = study_noise(configuration, series, names, *spec, [&](double share) {
-    if (options.progress) options.progress("noise models", share);
-  });
-  beside.wait();
+  // The regressions need no noise model of the error process, and each of them takes longer than one.
+  Regressions regressions_of_run(configuration, *studied, regimes->motion, *spec);
+  const auto noise_study = study_noise(
+      configuration, series, names, *spec,
+      [&](double share) {
+        if (options.progress) options.progress("noise models", share);
+      },
+      regressions_of_run.jobs());
+  const DynamicsRegressions regressions = std::move(regressions_of_run).result();
   DependenceStudy dependence;
   nlohmann::json models;
   nlohmann::json comparison;

@@ -54,7 +54,11 @@ DynamicsRegressions of_rails(double moving_s, double length_s) {
   const RegimeTrack motion({"static", "dynamic"},
                            {{study_time(0.0), study_time(length_s - moving_s), 0},
                             {study_time(length_s - moving_s), study_time(length_s), 1}});
-  return regressions_of(one_studied_imu(), rows, motion, noise::parse_model("WN").value());
+  const Configuration configuration = one_studied_imu();
+  const noise::ModelSpec model = noise::parse_model("WN").value();
+  Regressions regressions(configuration, rows, motion, model);
+  work_off(regressions.jobs());
+  return std::move(regressions).result();
 }
 
 TEST(DynamicsFiles, AConstantAndACollinearCovariateAreSaidOnceForTheSensor) {
