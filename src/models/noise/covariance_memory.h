@@ -2,12 +2,12 @@
 
 /// Of CovarianceTable alone: memory for what tables have calculated and may ask for again.
 
-#include <compare>
 #include <cstddef>
 #include <list>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <tuple>
 #include <utility>
 
 #include "models/noise/covariance_places.h"
@@ -28,7 +28,10 @@ class CovarianceMemory {
     std::size_t table = 0;
     Lags lags;
     int process = 0;  ///< of the table, or the places themselves
-    auto operator<=>(const Key&) const = default;
+
+    bool operator<(const Key& other) const {
+      return std::tie(table, lags, process) < std::tie(other.table, other.lags, other.process);
+    }
   };
 
   /// @param most_doubles  that all entries together have; a single one that is larger is not held

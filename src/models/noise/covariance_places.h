@@ -4,8 +4,8 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <compare>
 #include <cstddef>
+#include <tuple>
 #include <vector>
 
 #include "models/noise/cross_covariance.h"
@@ -27,7 +27,10 @@ struct PairOfLevels {
 struct Lags {
   double exact_near = 0.0;  ///< each one up to so far from a break point
   double below = 0.0;       ///< of the pairs whose shorter n is less
-  auto operator<=>(const Lags&) const = default;
+
+  bool operator<(const Lags& other) const {
+    return std::tie(exact_near, below) < std::tie(other.exact_near, other.below);
+  }
 };
 
 /// Lags of some pairs of levels, pair after pair, with their weights.
