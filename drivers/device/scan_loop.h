@@ -30,9 +30,9 @@ struct Examined {
 };
 
 /// What a scanner met since its construction: bytes that belong to no good frame, and frames that failed their
-/// checksum or announced an impossible length. A line is opened in the midst of a message more often than not,
-/// and the rest of it may look like the start of another: until the first good frame bytes are skipped, and
-/// nothing is called damaged.
+/// checksum or announced an impossible length. A line may be opened in the midst of a message, and the rest of
+/// it may look like the start of another: until the first good frame bytes are skipped, and nothing is called
+/// damaged.
 struct ScanCounters {
   std::uint64_t bytes_skipped = 0;
   std::uint64_t bad_checksums = 0;

@@ -111,26 +111,28 @@ bool look_at_parts(const AxisWork& work, const std::vector<std::uint8_t>& mask, 
 }
 
 /// What of a series is fitted: a regime, or all of it.
-struct Part {
+struct Selection {
   std::string regime;
   std::vector<std::uint8_t> mask;
   std::vector<noise::Line> lines;  ///< that belong to its model
   noise::Remainders remainders;    ///< of all lines that were taken out of it
 };
 
-Part part_of(const AxisWork& work, const std::string& regime, std::vector<std::uint8_t> mask,
-             const std::vector<noise::Line>& taken_out) {
-  Part part{regime, std::move(mask), regime == kWholeRun ? std::vector<noise::Line>{} : taken_out, {}};
-  if (taken_out.empty()) return part;
-  noise::Spectra spectra(work.values, part.mask);
-  part.remainders = noise::Remainders(spectra, taken_out, work.device.rate_hz);
-  return part;
+Selection selection_of(const AxisWork& work, const std::string& regime, std::vector<std::uint8_t> mask,
+                       const std::vector<noise::Line>& taken_out) {
+  Selection selection{
+      regime, std::move(mask), regime == kWholeRun ? std::vector<noise::Line>{} : taken_out, {}};
+  if (taken_out.empty()) return selection;
+  noise::Spectra spectra(work.values, selection.mask);
+  selection.remainders = noise::Remainders(spectra, taken_out, work.device.rate_hz);
+  return selection;
 }
 
 /// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
-std::size_t fit_axis(const AxisWork& work, std::size_t axis, const Part& part, std::size_t levels_of_whole) {
-  const std::vector<std::uint8_t>& mask = part.mask;
-  const std::string& regime = part.regime;
+std::size_t fit_axis(const AxisWork& work, std::size_t axis, const Selection& selection,
+                     std::size_t levels_of_whole) {
+  const std::vector<std::uint8_t>& mask = selection.mask;
+  const std::string& regime = selection.regime;
   // A regime that the run does not have is said once, not for every axis.
   if (std::none_of(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; })) return 0;
   const auto remark = [&](const std::string& what) {
@@ -144,7 +146,7 @@ std::size_t fit_axis(const AxisWork& work, std::size_t axis, const Part& part, s
     remark("no wavelet variance: " + wv.error().what);
     return 0;
   }
-  part.remainders.take_out_of(*wv, options.confidence);
+  selection.remainders.take_out_of(*wv, options.confidence);
   say_left_out(work, axis, regime, *wv, levels_of_whole);
   noise::FitOptions fit_options;
   fit_options.signal_unit = axis_unit(axis);
@@ -163,7 +165,8 @@ std::size_t fit_axis(const AxisWork& work, std::size_t axis, const Part& part, s
           : noise::spike_warning(noise::test_tails(work.values, options, fit->model), work.device.rate_hz);
   const bool parts_differ = regime != kWholeRun && look_at_parts(work, mask, *fit);
   if (spikes) fit->warnings.insert(fit->warnings.begin(), *spikes);
-  work.study.models.push_back({work.device.name, axis, regime, std::move(*fit), part.lines, parts_differ});
+  work.study.models.push_back(
+      {work.device.name, axis, regime, std::move(*fit), selection.lines, parts_differ});
   return wv->levels.size();
 }
 
@@ -307,9 +310,10 @@ NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std
   const AxisWork work{device, values, spec, covariances, study};
   std::vector<noise::Line> of_all;
   for (const auto& of_regime : lines) of_all.insert(of_all.end(), of_regime.begin(), of_regime.end());
-  const std::size_t levels = fit_axis(work, axis, part_of(work, kWholeRun, series.mask(axis), of_all), 0);
+  const std::size_t levels =
+      fit_axis(work, axis, selection_of(work, kWholeRun, series.mask(axis), of_all), 0);
   for (std::size_t r = 0; r < regimes.size(); ++r)
-    fit_axis(work, axis, part_of(work, regimes[r], series.mask(axis, r), lines[r]), levels);
+    fit_axis(work, axis, selection_of(work, regimes[r], series.mask(axis, r), lines[r]), levels);
   return study;
 }
 

@@ -371,6 +371,7 @@ void SImuFilter::begin(SImuContext& context, HostTime now, const Matrix3d& C_b_s
   motion_.clear();
   set_window_noise();
   noise_share_ = noise_share_n_ = 0.0;
+  published_at_.reset();
   next_direction_ = now;
   calibrating_ = true;
 }

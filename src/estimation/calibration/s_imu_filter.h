@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "estimation/alignment/coarse_mounting.h"
@@ -169,7 +170,7 @@ class SImuFilter {
     double noise_share = 0.0;
     bool operator==(const PublishedAt&) const = default;
   };
-  PublishedAt published_at_;
+  std::optional<PublishedAt> published_at_;  ///< absent: not yet, with the mounting that it began with
 
   MountingMonitor monitor_;
   HostTime next_direction_{};

@@ -140,11 +140,8 @@ std::vector<AllanPoint> allan_deviation(std::vector<double> x, const WaveletVari
       const double exact_share = std::log2(static_cast<double>(n) / static_cast<double>(octave));
       const double inflation = std::exp(
           between(std::log(wv.levels[i].inflation), std::log(wv.levels[i + 1].inflation), exact_share));
-      const double variance = 0.5 * square / inflation;
-      point.deviation =
-          remainders.empty()
-              ? std::sqrt(variance)
-              : std::sqrt(2.0 * remainders.taken_out_of(0.5 * variance, static_cast<double>(n)));  // G-40
+      const double wv_here = 0.25 * square / inflation;
+      point.deviation = std::sqrt(2.0 * remainders.taken_out_of(wv_here, static_cast<double>(n)));  // G-40
       if (point.n_differences > 0) points.push_back(point);
     }
   }

@@ -54,8 +54,8 @@ class CovarianceMemory {
   /// Doubles that the entries have together.
   [[nodiscard]] std::size_t held() const;
 
-  /// 32 MB. The models of six axes with resonances were found as fast with it as with the 100 MB that they ever
-  /// ask for; half of it took a tenth longer.
+  /// 32 MB: beside the samples of a long axis they do not weigh, and a search goes back to no more before it has
+  /// moved on.
   static constexpr std::size_t kMostDoubles = 4'000'000;
 
  private:

@@ -367,10 +367,9 @@ std::vector<LineBins> bins_of(const Spectrum& without, const std::vector<std::si
     const std::size_t peak = peaks[p];
     const double floor = floor_at(without, peak, dof);
     const std::size_t reach = reach_of(without, peak, floor, dof);
-    const std::size_t after_before = p == 0 ? 0 : (peaks[p - 1] + peak) / 2 + 1;
-    const std::size_t before_next =
-        p + 1 == peaks.size() ? without.power.size() - 1 : (peak + peaks[p + 1]) / 2;
-    bins.push_back({std::max(peak - reach, after_before), std::min(peak + reach, before_next), floor});
+    const std::size_t first_own = p == 0 ? 0 : (peaks[p - 1] + peak) / 2 + 1;
+    const std::size_t last_own = p + 1 == peaks.size() ? without.power.size() - 1 : (peak + peaks[p + 1]) / 2;
+    bins.push_back({std::max(peak - reach, first_own), std::min(peak + reach, last_own), floor});
   }
   return bins;
 }
@@ -378,22 +377,33 @@ std::vector<LineBins> bins_of(const Spectrum& without, const std::vector<std::si
 }  // namespace
 
 Remainders::Remainders(Spectra& without, const std::vector<Line>& lines, double rate_hz) {
-  std::map<std::size_t, std::vector<std::size_t>> peaks_of_segment;
+  std::map<std::size_t, std::vector<std::size_t>, std::greater<>> peaks_of_segment;
   for (const Line& line : lines) {
     const double bin = line.frequency_hz / rate_hz * static_cast<double>(line.segment);
     peaks_of_segment[line.segment].push_back(static_cast<std::size_t>(std::lround(bin)));
   }
+  // Long segments first: what they tell of a line, shorter ones of its neighbour would tell again.
+  std::vector<std::pair<double, double>> told_rad;
   for (auto& [segment, peaks] : peaks_of_segment) {
     std::sort(peaks.begin(), peaks.end());
     const Spectrum& spectrum = without.of(segment);
     const double bin_hz = rate_hz / static_cast<double>(segment);
-    for (const LineBins& of_line : bins_of(spectrum, peaks)) {
+    const double bin_rad = 2.0 * std::numbers::pi / static_cast<double>(segment);
+    const std::vector<LineBins> of_lines = bins_of(spectrum, peaks);
+    for (const LineBins& of_line : of_lines) {
       for (std::size_t k = of_line.first; k <= of_line.last; ++k) {
-        if (!(spectrum.power[k] > 0.0)) continue;
+        const double omega_rad = bin_rad * static_cast<double>(k);
+        const bool is_told = std::any_of(told_rad.begin(), told_rad.end(), [&](const auto& band) {
+          return omega_rad > band.first && omega_rad < band.second;
+        });
+        if (is_told || !(spectrum.power[k] > 0.0)) continue;
         const double share = 1.0 - of_line.floor / spectrum.power[k];
-        bins_.push_back({2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(segment),
-                         share * density_at(spectrum, k, rate_hz) * bin_hz});
+        bins_.push_back({omega_rad, share * density_at(spectrum, k, rate_hz) * bin_hz});
       }
+    }
+    for (const LineBins& of_line : of_lines) {
+      told_rad.emplace_back(bin_rad * (static_cast<double>(of_line.first) - 0.5),
+                            bin_rad * (static_cast<double>(of_line.last) + 0.5));
     }
   }
 }

@@ -75,7 +75,7 @@ void unit_curve(ProcessKind kind, const Shape& shape, std::span<CurvePoint> out)
 
 /// Wavelet variance of a sinusoid of amplitude 1 and random phase for neighbouring means of n samples, which need be
 /// no power of two.
-/// @param omega_rad  a sample, above 0 and below pi
+/// @param omega_rad  a sample, above 0, pi at most
 double sinusoid_wv(double omega_rad, double n) noexcept;
 
 /// Wavelet variance of a first-order Gauss-Markov process of variance 1, and d/da, a = beta / rate > 0:

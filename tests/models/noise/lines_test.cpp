@@ -328,6 +328,26 @@ TEST(Lines, RemaindersAreTakenOutOfTheAllanDeviationToo) {
             10);
 }
 
+// Segments of two lengths tell of the same bins: together they tell what one does, not the sum of both.
+TEST(Lines, TwoThatShareBinsArePutRightOnce) {
+  auto x = noise_of(200'000, 8);
+  const auto mask = all_valid(x.size());
+  Line near;
+  near.frequency_hz = 1.10;
+  near.segment = 4096;
+  Line same = near;
+  same.segment = 4 * near.segment;
+  remove_lines(x, mask, {near}, kLineRate_hz);
+  Spectra spectra(x, mask);
+  const double twice = Remainders(spectra, {near, same}, kLineRate_hz).wv(32.0);
+  const double once = Remainders(spectra, {same}, kLineRate_hz).wv(32.0);
+  const double coarse = Remainders(spectra, {near}, kLineRate_hz).wv(32.0);
+  ASSERT_LT(once, 0.0);
+  ASSERT_LT(coarse, 0.0);
+  EXPECT_NEAR(twice, coarse, 0.05 * std::abs(coarse));
+  EXPECT_EQ(Remainders(spectra, {near, near}, kLineRate_hz).wv(32.0), coarse);
+}
+
 TEST(Lines, NoLineLeavesNothing) {
   auto x = noise_of(40'000, 6);
   Spectra spectra(x, {});
