@@ -15,8 +15,6 @@ namespace imuscope {
 
 namespace {
 
-/// More tells no more of constants, and costs memory and time.
-constexpr double kLongest_s = 3600.0;
 /// Beyond the filter's own coarse search, in case it ended at its border.
 constexpr double kSearchMargin_s = 1.0;
 /// The reference is kept so much longer than the S-IMU is used: the offsets that are searched, with room.
@@ -77,23 +75,6 @@ void forget_before(double time_s, batch::ImuRecord& record) {
   record.f_mps2.erase(record.f_mps2.begin(), record.f_mps2.begin() + kept);
 }
 
-/// The two IMUs of one estimate.
-struct Pair {
-  const BatchRecords& records;
-  std::size_t reference;
-  std::size_t study;
-  std::optional<double> reference_gyro_white_radps_per_sqrt_hz;
-
-  [[nodiscard]] Result<batch::BatchMounting> estimate(double from_s, double to_s) const {
-    batch::BatchOptions options;
-    options.search_s = SImuConfig{}.coarse_search_s + kSearchMargin_s;
-    options.reference_gyro_white_radps_per_sqrt_hz = reference_gyro_white_radps_per_sqrt_hz;
-    return batch::estimate_mounting(
-        records.part(reference, from_s - options.search_s, to_s + options.search_s),
-        records.part(study, from_s, to_s), options);
-  }
-};
-
 /// Whether two estimates cannot be of one mounting.
 bool contradict(const batch::BatchMounting& a, const batch::BatchMounting& b) {
   Eigen::Matrix<double, 6, 1> difference;
@@ -102,25 +83,6 @@ bool contradict(const batch::BatchMounting& a, const batch::BatchMounting& b) {
   const Eigen::Matrix<double, 6, 6> covariance =
       a.covariance.topLeftCorner<6, 6>() + b.covariance.topLeftCorner<6, 6>();
   return difference.dot(covariance.ldlt().solve(difference)) > kContradictionChi2;
-}
-
-BatchOutcome estimate_one(const Pair& pair, std::optional<double> moved_s) {
-  BatchOutcome outcome;
-  const double first_s = pair.records.first_s(pair.study);
-  auto found = pair.estimate(first_s, first_s + kLongest_s);
-  if (moved_s) {
-    const double after_s = std::max(*moved_s, pair.records.kept_to_end_from_s(pair.study));
-    const auto before = pair.estimate(first_s, std::min(*moved_s, first_s + kLongest_s));
-    auto after = pair.estimate(after_s, after_s + kLongest_s);
-    outcome.remounted = before && after && contradict(*before, *after);
-    if (outcome.remounted) found = std::move(after);
-  }
-  if (found) {
-    outcome.mounting = std::move(*found);
-  } else {
-    outcome.why_not = found.error();
-  }
-  return outcome;
 }
 
 /// Sets the direction of (psi, r) of which the drive shows least: nothing was assumed of the rotation, and of
@@ -180,7 +142,8 @@ nlohmann::json parts_json(const batch::BatchMounting& mounting) {
 
 }  // namespace
 
-BatchRecords::BatchRecords(const Configuration& configuration) : records_(configuration.devices.size()) {
+BatchRecords::BatchRecords(const Configuration& configuration, double longest_s)
+    : longest_s_(longest_s), records_(configuration.devices.size()) {
   for (const auto& device : configuration.devices) half_period_s_.push_back(0.5 / device.rate_hz);
 }
 
@@ -201,13 +164,13 @@ void BatchRecords::add(const Sample& sample) {
   const Eigen::Vector3f f = Eigen::Map<const Eigen::Vector3d>(sample.imu.f_mps2.data()).cast<float>();
   if (!omega.allFinite() || !f.allFinite()) return;
   record.last_s = time_s;
-  if (record.first.size() == 0 || time_s <= record.first.time_s.front() + kLongest_s + kMargin_s) {
+  if (record.first.size() == 0 || time_s <= record.first.time_s.front() + longest_s_ + kMargin_s) {
     record.first.add(time_s, omega, f);
     return;
   }
   record.last.add(time_s, omega, f);
   // Seldom, as it moves an hour of samples.
-  const double longest_s = kLongest_s + 2.0 * kMargin_s;
+  const double longest_s = longest_s_ + 2.0 * kMargin_s;
   if (time_s - record.last.time_s.front() > 2.0 * longest_s) forget_before(time_s - longest_s, record.last);
 }
 
@@ -230,17 +193,110 @@ double BatchRecords::kept_to_end_from_s(std::size_t device) const {
   return gap_s > kMargin_s ? kept.last.time_s.front() : first_s(device);
 }
 
-std::vector<BatchOutcome> estimate_mountings(const Configuration& configuration, const BatchRecords& records,
-                                             const FormerMountings& former) {
-  const auto studies = configuration.study_indices();
-  const std::size_t reference = configuration.reference_index();
-  std::vector<BatchOutcome> outcomes(studies.size());
-  tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) {
+bool BatchRecords::is_whole_until(std::size_t device, double to_s) const {
+  const auto& last = records_[device].last;
+  return last.size() > 0 && last.time_s.front() > to_s;
+}
+
+batch::ImuRecord BatchRecords::part_of_first(std::size_t device, double from_s, double to_s) const {
+  batch::ImuRecord part;
+  add_part(records_[device].first, from_s, to_s, part);
+  return part;
+}
+
+/// The two IMUs of one estimate.
+class BatchEstimates::Pair {
+ public:
+  Pair(const BatchRecords& records, const Configuration& configuration, std::size_t study, double longest_s)
+      : records_(records), reference_(configuration.reference_index()), study_(study), longest_s_(longest_s) {
+    options_.search_s = SImuConfig{}.coarse_search_s + kSearchMargin_s;
+    options_.reference_gyro_white_radps_per_sqrt_hz =
+        told_gyro_white_radps_per_sqrt_hz(configuration.devices[reference_]);
+  }
+
+  [[nodiscard]] double first_s() const { return records_.first_s(study_); }
+  [[nodiscard]] double kept_to_end_from_s() const { return records_.kept_to_end_from_s(study_); }
+
+  [[nodiscard]] bool has_first_hour() const {
+    const double to_s = first_s() + longest_s_;
+    return records_.is_whole_until(study_, to_s) &&
+           records_.is_whole_until(reference_, to_s + options_.search_s);
+  }
+  /// As estimate() of the same; while samples are added, once the first hour is there.
+  [[nodiscard]] Result<batch::BatchMounting> estimate_first_hour() const {
+    const double from_s = first_s();
+    const double to_s = from_s + longest_s_;
+    return batch::estimate_mounting(
+        records_.part_of_first(reference_, from_s - options_.search_s, to_s + options_.search_s),
+        records_.part_of_first(study_, from_s, to_s), options_);
+  }
+  [[nodiscard]] Result<batch::BatchMounting> estimate(double from_s, double to_s) const {
+    return batch::estimate_mounting(
+        records_.part(reference_, from_s - options_.search_s, to_s + options_.search_s),
+        records_.part(study_, from_s, to_s), options_);
+  }
+
+ private:
+  const BatchRecords& records_;
+  std::size_t reference_;
+  std::size_t study_;
+  double longest_s_;
+  batch::BatchOptions options_;
+};
+
+BatchEstimates::BatchEstimates(const Configuration& configuration, double longest_s)
+    : configuration_(configuration),
+      longest_s_(longest_s),
+      records_(configuration, longest_s),
+      studies_(configuration.study_indices()),
+      first_hours_(studies_.size()),
+      has_begun_(studies_.size(), false) {}
+
+BatchEstimates::~BatchEstimates() { beside_.wait(); }
+
+BatchEstimates::Pair BatchEstimates::pair_of(std::size_t study) const {
+  return {records_, configuration_, studies_[study], longest_s_};
+}
+
+void BatchEstimates::add(const Sample& sample) {
+  records_.add(sample);
+  for (std::size_t i = 0; i < studies_.size(); ++i) {
+    if (has_begun_[i]) continue;
+    const Pair pair = pair_of(i);
+    if (!pair.has_first_hour()) continue;
+    has_begun_[i] = true;
+    beside_.run([pair, &of_hour = first_hours_[i]] { of_hour = pair.estimate_first_hour(); });
+  }
+}
+
+BatchOutcome BatchEstimates::outcome_of(std::size_t study, std::optional<double> moved_s) {
+  const Pair pair = pair_of(study);
+  const double first_s = pair.first_s();
+  auto found =
+      first_hours_[study] ? std::move(*first_hours_[study]) : pair.estimate(first_s, first_s + longest_s_);
+  BatchOutcome outcome;
+  if (moved_s) {
+    const double after_s = std::max(*moved_s, pair.kept_to_end_from_s());
+    const auto before = pair.estimate(first_s, std::min(*moved_s, first_s + longest_s_));
+    auto after = pair.estimate(after_s, after_s + longest_s_);
+    outcome.remounted = before && after && contradict(*before, *after);
+    if (outcome.remounted) found = std::move(after);
+  }
+  if (found) {
+    outcome.mounting = std::move(*found);
+  } else {
+    outcome.why_not = found.error();
+  }
+  return outcome;
+}
+
+std::vector<BatchOutcome> BatchEstimates::outcomes(const FormerMountings& former) {
+  beside_.wait();
+  std::vector<BatchOutcome> outcomes(studies_.size());
+  tbb::parallel_for(std::size_t{0}, studies_.size(), [&](std::size_t i) {
     std::optional<double> moved_s;
-    if (!former[i].empty()) moved_s = to_seconds(former[i].back().until - records.origin());
-    outcomes[i] = estimate_one(
-        {records, reference, studies[i], told_gyro_white_radps_per_sqrt_hz(configuration.devices[reference])},
-        moved_s);
+    if (!former[i].empty()) moved_s = to_seconds(former[i].back().until - records_.origin());
+    outcomes[i] = outcome_of(i, moved_s);
   });
   return outcomes;
 }

@@ -3,6 +3,8 @@
 /// The batch estimate of every S-IMU of a recording (src/estimation/batch), and what of it a study publishes.
 /// Non-real-time: allocates, uses one thread per S-IMU; the result does not depend on how many there are.
 
+#include <tbb/task_group.h>
+
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -18,11 +20,14 @@
 
 namespace imuscope {
 
-/// Gathers the samples of all IMUs, in stream order. Of a long recording, the first hour and at least the
-/// last one: more tells no more of constants, and costs memory.
+/// A mounting is estimated from an hour: more tells no more of constants, and costs memory and time.
+inline constexpr double kBatchLongest_s = 3600.0;
+
+/// Gathers the samples of all IMUs, in stream order. Of a long recording, the first hour and at least the last one.
 class BatchRecords {
  public:
-  explicit BatchRecords(const Configuration& configuration);
+  /// @param longest_s  in place of an hour
+  explicit BatchRecords(const Configuration& configuration, double longest_s = kBatchLongest_s);
 
   void add(const Sample& sample);
 
@@ -32,6 +37,10 @@ class BatchRecords {
   [[nodiscard]] double first_s(std::size_t device) const;
   /// From here to its end the recording was kept.
   [[nodiscard]] double kept_to_end_from_s(std::size_t device) const;
+  /// Whether no sample up to this instant is to come, and all there are lie in the first hour, which stays as it is.
+  [[nodiscard]] bool is_whole_until(std::size_t device, double to_s) const;
+  /// As part(), of the first hour alone. Where that is whole, it may be asked for while samples are added.
+  [[nodiscard]] batch::ImuRecord part_of_first(std::size_t device, double from_s, double to_s) const;
   [[nodiscard]] HostTime origin() const { return origin_; }
 
  private:
@@ -41,6 +50,7 @@ class BatchRecords {
     double last_s = 0.0;
   };
 
+  double longest_s_;
   std::vector<double> half_period_s_;  ///< of a device's samples, by which increments are centred
   std::vector<Kept> records_;
   bool has_origin_ = false;
@@ -55,13 +65,44 @@ struct BatchOutcome {
   bool remounted = false;  ///< it sat differently before; the mounting is that of the end
 };
 
-/// One outcome an S-IMU, in the order of the configuration. Where the filter found one to sit differently,
-/// the parts before and after are estimated by themselves: only where they contradict each other was it
-/// moved, and the samples since count: an hour of them, the first that was kept.
-/// @param former  what the filter found
-[[nodiscard]] std::vector<BatchOutcome> estimate_mountings(const Configuration& configuration,
-                                                           const BatchRecords& records,
-                                                           const FormerMountings& former);
+/// The batch estimates of all S-IMUs from a pass over their recording. Of a long one that of the first hour begins as
+/// soon as it is there, beside the rest of the pass. The results do not depend on that. Thread: one.
+class BatchEstimates {
+ public:
+  /// @param configuration  outlives this
+  /// @param longest_s      in place of an hour
+  explicit BatchEstimates(const Configuration& configuration, double longest_s = kBatchLongest_s);
+  ~BatchEstimates();
+  BatchEstimates(const BatchEstimates&) = delete;
+  BatchEstimates& operator=(const BatchEstimates&) = delete;
+
+  /// A sample of the pass, in stream order.
+  void add(const Sample& sample);
+  /// Whether the first hour of an S-IMU was estimated, or is being estimated, beside the pass.
+  [[nodiscard]] bool has_begun(std::size_t study) const { return has_begun_[study]; }
+
+  /// After the pass. One outcome an S-IMU, in the order of the configuration. Where the filter found one to sit
+  /// differently, the parts before and after are estimated by themselves: only where they contradict each other was
+  /// it moved, and the samples since count: an hour of them, the first that was kept.
+  /// @param former  what the filter found
+  [[nodiscard]] std::vector<BatchOutcome> outcomes(const FormerMountings& former);
+
+ private:
+  class Pair;
+  /// Of one S-IMU.
+  using FirstHour = std::optional<Result<batch::BatchMounting>>;
+
+  [[nodiscard]] Pair pair_of(std::size_t study) const;
+  [[nodiscard]] BatchOutcome outcome_of(std::size_t study, std::optional<double> moved_s);
+
+  const Configuration& configuration_;
+  double longest_s_;
+  BatchRecords records_;
+  std::vector<std::size_t> studies_;    ///< devices
+  std::vector<FirstHour> first_hours_;  ///< those that began beside the pass
+  std::vector<bool> has_begun_;
+  tbb::task_group beside_;
+};
 
 /// What combine() takes of a mounting that the batch gave.
 [[nodiscard]] MountingEstimate estimate_of(const batch::BatchMounting& mounting);

@@ -1,5 +1,7 @@
 #include "study/error_pass.h"
 
+#include <tbb/parallel_for.h>
+
 #include "estimation/error_process/row_low_pass.h"
 
 namespace imuscope {
@@ -44,6 +46,18 @@ SImuEpoch epoch_of(const KeptEpoch& kept) {
   return epoch;
 }
 
+ReferenceBias bias_at(const ReferenceBiasTrack& biases, const SImuEpoch& epoch) {
+  return biases.at(epoch.time + from_seconds(epoch.t_d_s));
+}
+
+/// The next epochs, few enough for a processor's cache; false after the last.
+bool read_block(Spool<KeptEpoch>& epochs, std::vector<KeptEpoch>& block) {
+  constexpr std::size_t kBlock = 2048;
+  block.clear();
+  for (KeptEpoch next{}; block.size() < kBlock && epochs.next(next);) block.push_back(next);
+  return !block.empty();
+}
+
 /// The common low-pass of every S-IMU; none where none is configured.
 std::vector<RowLowPass> low_passes(const Configuration& configuration) {
   std::vector<RowLowPass> filters;
@@ -73,14 +87,25 @@ Result<void> EpochGatherer::make_rows(const Configuration& configuration, const 
   if (!epochs_.whole())
     return work_error("the error process could not be kept on the disk of the run folder",
                       "make room there, or choose another --out folder");
-  for (KeptEpoch next{}; epochs_.next(next);) {
-    const SImuEpoch epoch = epoch_of(next);
-    const ReferenceBias bias = biases.at(epoch.time + from_seconds(epoch.t_d_s));
-    watch_.add(epoch, bias);
-    if (!is_final_mounting(former[epoch.study], epoch.time)) continue;
-    ErrorRow row = error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, bias);
+  const auto add_row = [&](const SImuEpoch& epoch) {
+    if (!is_final_mounting(former[epoch.study], epoch.time)) return;
+    ErrorRow row = error_row(epoch, {epoch.C_b_s, epoch.r_bs_b_m}, bias_at(biases, epoch));
     if (!low_pass.empty()) low_pass[epoch.study].apply(row);
     rows[epoch.study].add(row);
+  };
+  // Block by block: the rows of each S-IMU and the vehicle's motion side by side, each in order of time.
+  std::vector<KeptEpoch> block;
+  while (read_block(epochs_, block)) {
+    tbb::parallel_for(std::size_t{0}, rows.size() + 1, [&](std::size_t of) {
+      for (const KeptEpoch& next : block) {
+        if (of == rows.size()) {
+          const SImuEpoch epoch = epoch_of(next);
+          watch_.add(epoch, bias_at(biases, epoch));
+        } else if (next.study == of) {
+          add_row(epoch_of(next));
+        }
+      }
+    });
   }
   return {};
 }

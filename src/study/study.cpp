@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 #include <malloc.h>
+#include <sys/resource.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
+#include <future>
 #include <optional>
 #include <utility>
 
@@ -193,6 +195,22 @@ tl::unexpected<Error> nothing_was_run(const ReplayResult& result) {
       "forged");
 }
 
+/// Work in a thread of its own, which leaves the processors to its caller, whose way is the longer one; done when its
+/// result is asked for where no second thread may be used.
+template <typename Work>
+auto in_spare_time(Work work) {
+  if (!may_use_threads()) return std::async(std::launch::deferred, std::move(work));
+  return std::async(std::launch::async, [work = std::move(work)] {
+    // Enough to have the core that the caller leaves, and a share where other programs compute: SCHED_IDLE would wait
+    // for those.
+    constexpr int kNicer = 10;
+    constexpr int kNicest = 19;
+    // Linux takes this for the calling thread alone.
+    setpriority(PRIO_PROCESS, 0, std::min(getpriority(PRIO_PROCESS, 0) + kNicer, kNicest));
+    return work();
+  });
+}
+
 /// Work beside the caller's. It has ended when this is gone.
 class Beside {
  public:
@@ -225,9 +243,9 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   replay_options.has_sink_beside = may_use_threads();
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
-  std::optional<BatchRecords> records(configuration);
+  std::optional<BatchEstimates> batch(configuration);
   if (configuration.estimator.batch_mounting)
-    replay_options.on_sample = [&records](const Sample& sample) { records->add(sample); };
+    replay_options.on_sample = [&batch](const Sample& sample) { batch->add(sample); };
   const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
   if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
   if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
@@ -237,8 +255,8 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const bool by_batch = configuration.estimator.batch_mounting;
   if (by_batch && options.progress) options.progress("batch estimate", 0.0);
   std::vector<BatchOutcome> outcomes(of_filter.size());
-  if (by_batch) outcomes = estimate_mountings(configuration, *records, first.former_mountings());
-  records.reset();
+  if (by_batch) outcomes = batch->outcomes(first.former_mountings());
+  batch.reset();
   const auto finals = by_batch ? with_batch(of_filter, outcomes) : of_filter;
   std::copy(finals.begin(), finals.end(), last.studies.begin());
 
@@ -259,20 +277,18 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   const auto settled = with_settled(finals, infos, options.mountings);
   auto epochs = EpochGatherer::create((*folder)->folder(), finals.size());
   if (!epochs) return tl::unexpected<Error>(epochs.error());
-  // The filter with every mounting known needs no smoothed bias: both passes side by side.
-  std::optional<Result<SmoothedTrack>> track;
-  Result<ReplayResult> second;
-  tbb::parallel_invoke(
-      [&] {
-        const RecordStorage storage{Smoother::kMemory_bytes, options.out};
-        track.emplace(
-            smooth_drive(configuration, estimator, recording, finals, former, storage, [&](double share) {
-              if (options.progress) options.progress("smoothing", share);
-            }));
-      },
-      [&] { second = replay(configuration, frozen(estimator, settled), recording, *epochs); });
+  // The filter with every mounting known needs no smoothed bias: both passes side by side. Smoothing goes forth and
+  // back, and takes longer.
+  auto second =
+      in_spare_time([&] { return replay(configuration, frozen(estimator, settled), recording, *epochs); });
+  std::optional<Result<SmoothedTrack>> track =
+      smooth_drive(configuration, estimator, recording, finals, former,
+                   {Smoother::kMemory_bytes, options.out}, [&](double share) {
+                     if (options.progress) options.progress("smoothing", share);
+                   });
+  const Result<ReplayResult> replayed = second.get();
   if (!*track) return tl::unexpected<Error>(track->error());
-  if (!second) return tl::unexpected<Error>(second.error());
+  if (!replayed) return tl::unexpected<Error>(replayed.error());
   // Nothing below needs the smoothed drive's files.
   Result<void> smoothed_files;
   Beside writer([&] {

@@ -133,14 +133,14 @@ Result<std::vector<Found>> calibrate(const RealDrive& drive, const std::string& 
   if (!opened) return tl::unexpected<Error>(opened.error());
   const Configuration& configuration = opened->configuration;
   Last sink;
-  BatchRecords records(configuration);
+  BatchEstimates batch(configuration);
   ReplayOptions options;
-  options.on_sample = [&records](const Sample& sample) { records.add(sample); };
+  options.on_sample = [&batch](const Sample& sample) { batch.add(sample); };
   const auto replayed =
       replay(configuration, estimator_config(configuration), opened->recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());
   const auto indices = configuration.study_indices();
-  const auto outcomes = estimate_mountings(configuration, records, FormerMountings(indices.size()));
+  const auto outcomes = batch.outcomes(FormerMountings(indices.size()));
   std::vector<Found> all;
   for (const KnownMounting& known : drive.mountings) {
     for (std::size_t i = 0; i < indices.size(); ++i) {

@@ -29,7 +29,11 @@ void FixedLagSmoother::smooth(const std::function<void(const SmoothedEpoch&)>& g
   Eigen::VectorXd d;
   Eigen::MatrixXd P;
   for (std::size_t k = window_.size(); k-- > 0;) {
-    history::step_back(window_[k], k + 1 == window_.size() ? nullptr : &window_[k + 1], d, P);
+    if (k + 1 == window_.size()) {
+      history::begin_back(window_[k], d, P);
+    } else {
+      smooth_back(history::step_from(window_[k], window_[k + 1]), d, P);
+    }
     if (k < n_given) smoothed.push_back(history::smoothed_epoch(window_[k], d, P, layouts_));
   }
   for (auto epoch = smoothed.rbegin(); epoch != smoothed.rend(); ++epoch) give(*epoch);

@@ -126,14 +126,9 @@ void Filtered::unpack(std::span<const double> record) {
   in.take(injected);
 }
 
-void step_back(const Filtered& now, const Filtered* after, Eigen::VectorXd& d, Eigen::MatrixXd& P) {
-  if (after == nullptr) {
-    d = Eigen::VectorXd::Zero(now.P.rows());
-    P = now.P;
-    return;
-  }
-  smooth_back({now.P, after->transition, after->noise, after->decay, after->decay_noise, after->injected}, d,
-              P);
+void begin_back(const Filtered& newest, Eigen::VectorXd& d, Eigen::MatrixXd& P) {
+  d = Eigen::VectorXd::Zero(newest.P.rows());
+  P = newest.P;
 }
 
 SmoothedEpoch smoothed_epoch(const Filtered& now, const Eigen::VectorXd& d, const Eigen::MatrixXd& P,

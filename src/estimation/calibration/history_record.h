@@ -79,9 +79,12 @@ struct Filtered {
   void unpack(std::span<const double> record);
 };
 
-/// One step backwards: d and P of the epoch after become those of `now`; without `after`, `now` is the
-/// newest.
-void step_back(const Filtered& now, const Filtered* after, Eigen::VectorXd& d, Eigen::MatrixXd& P);
+/// Where the way back begins: the newest epoch's smoothed error and covariance.
+void begin_back(const Filtered& newest, Eigen::VectorXd& d, Eigen::MatrixXd& P);
+/// From `after` to `now`; both outlive it.
+inline SmootherStep step_from(const Filtered& now, const Filtered& after) {
+  return {now.P, after.transition, after.noise, after.decay, after.decay_noise, after.injected};
+}
 /// The filtered state with the smoothed error added, sd and P_phi with it.
 SmoothedEpoch smoothed_epoch(const Filtered& now, const Eigen::VectorXd& d, const Eigen::MatrixXd& P,
                              std::span<const SImuLayout> layouts);

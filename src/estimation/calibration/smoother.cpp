@@ -1,5 +1,7 @@
 #include "estimation/calibration/smoother.h"
 
+#include <tbb/parallel_pipeline.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -55,24 +57,37 @@ std::vector<Index> moving_states(const SmootherStep& step) {
   return moving;
 }
 
-}  // namespace
+/// E-11 and E-12 of one step, which need nothing of the epoch after: the predicted covariance, and A's rows that are not
+/// those of a constant. A constant's row is that of the identity.
+struct Gain {
+  std::vector<Index> moving;
+  MatrixXd predicted;
+  MatrixXd A;
+};
 
-void smooth_back(const SmootherStep& step, VectorXd& d, MatrixXd& P) {
+Gain gain_of(const SmootherStep& step) {
   const Index n = step.P.rows();
+  Gain gain;
   // P Phi', Phi being dense in the navigation and diagonal beyond.
   MatrixXd P_Phi = step.P;
   P_Phi.leftCols<15>() = step.P.leftCols<15>() * step.transition.transpose();
   P_Phi.rightCols(n - 15) = step.P.rightCols(n - 15) * step.decay.asDiagonal();
   // E-11
-  MatrixXd predicted = P_Phi;
+  MatrixXd& predicted = gain.predicted;
+  predicted = P_Phi;
   predicted.topRows<15>() = step.transition * P_Phi.topRows<15>();
   predicted.bottomRows(n - 15) = step.decay.asDiagonal() * P_Phi.bottomRows(n - 15);
   predicted.topLeftCorner<15, 15>() += step.noise;
   predicted.diagonal().tail(n - 15) += step.decay_noise;
+  // E-12
+  gain.moving = moving_states(step);
+  gain.A = solve_right(predicted, P_Phi(gain.moving, Eigen::all));
+  return gain;
+}
 
-  // E-12, for the rows that are not those of a constant: a constant's row of A is that of the identity.
-  const std::vector<Index> moving = moving_states(step);
-  const MatrixXd A = solve_right(predicted, P_Phi(moving, Eigen::all));
+/// E-13 to E-15.
+void smooth_by(const Gain& gain, const SmootherStep& step, VectorXd& d, MatrixXd& P) {
+  const auto& [moving, predicted, A] = gain;
   // E-13
   const VectorXd d_after = d + step.injected;
   d = d_after;
@@ -86,6 +101,10 @@ void smooth_back(const SmootherStep& step, VectorXd& d, MatrixXd& P) {
   const MatrixXd block = step.P(moving, moving) + A_more * A.transpose();
   P(moving, moving) = 0.5 * (block + block.transpose());
 }
+
+}  // namespace
+
+void smooth_back(const SmootherStep& step, VectorXd& d, MatrixXd& P) { smooth_by(gain_of(step), step, d, P); }
 
 SmoothedTrack::SmoothedTrack(std::vector<SImuLayout> layouts, std::size_t states, RecordStorage storage)
     : layouts_(std::move(layouts)),
@@ -131,25 +150,64 @@ Result<SmoothedTrack> Smoother::smooth() const {
                       {storage_.memory_bytes_max / kTrackShare, storage_.folder});
   if (size() == 0) return track;
 
-  history::Filtered now(states_, layouts_.size());
-  history::Filtered after(states_, layouts_.size());
+  // Epoch by epoch through three stages: reading, the gain, and what needs the epoch after. While the last is at work
+  // on one, others may be in the first two.
+  constexpr std::size_t kInFlight = 4;
+  struct Place {
+    history::Filtered epoch;
+    Gain gain;
+  };
+  // One more, as an epoch's step is told by the epoch after.
+  std::vector<Place> places(kInFlight + 1, Place{history::Filtered(states_, layouts_.size()), {}});
+  const auto place_of = [&](std::size_t k) -> Place& { return places[k % places.size()]; };
+  const std::size_t newest = size() - 1;
+  std::size_t left = size();
   std::vector<double> record(record_.size());
   std::vector<double> smoothed_record(smoothed_doubles(states_, layouts_.size()));
   VectorXd d;
   MatrixXd P;
-  for (std::size_t k = size(); k-- > 0;) {
-    if (auto read = records_->read(k, record); !read) return tl::unexpected<Error>(read.error());
-    now.unpack(record);
-    history::step_back(now, k + 1 == size() ? nullptr : &after, d, P);
+  // Each is written by one stage alone, which takes one epoch at a time.
+  std::optional<Error> unread;
+  std::optional<Error> unwritten;
+  const auto read = [&](tbb::flow_control& flow) -> std::size_t {
+    if (left > 0 && !unread) {
+      if (auto got = records_->read(left - 1, record)) {
+        --left;
+        place_of(left).epoch.unpack(record);
+        return left;
+      } else {
+        unread = got.error();
+      }
+    }
+    flow.stop();
+    return 0;
+  };
+  const auto find_gain = [&](std::size_t k) {
+    if (k != newest) place_of(k).gain = gain_of(history::step_from(place_of(k).epoch, place_of(k + 1).epoch));
+    return k;
+  };
+  const auto step_back = [&](std::size_t k) {
+    const auto& [now, gain] = place_of(k);
+    if (k == newest) {
+      history::begin_back(now, d, P);
+    } else {
+      smooth_by(gain, history::step_from(now, place_of(k + 1).epoch), d, P);
+    }
     const SmoothedEpoch smoothed = history::smoothed_epoch(now, d, P, layouts_);
     history::Writer out(smoothed_record);
     history::put_epoch(out, smoothed);
     out.put(smoothed.sd);
     out.put(smoothed.P_phi);
-    if (auto appended = track.records_.append(smoothed_record); !appended)
-      return tl::unexpected<Error>(appended.error());
-    std::swap(now, after);
-  }
+    if (unwritten) return;
+    if (auto appended = track.records_.append(smoothed_record); !appended) unwritten = appended.error();
+  };
+  using tbb::filter_mode;
+  tbb::parallel_pipeline(kInFlight,
+                         tbb::make_filter<void, std::size_t>(filter_mode::serial_in_order, read) &
+                             tbb::make_filter<std::size_t, std::size_t>(filter_mode::parallel, find_gain) &
+                             tbb::make_filter<std::size_t, void>(filter_mode::serial_in_order, step_back));
+  if (unread) return tl::unexpected<Error>(*unread);
+  if (unwritten) return tl::unexpected<Error>(*unwritten);
   return track;
 }
 

@@ -81,7 +81,8 @@ class Smoother final : public HistorySink {
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return records_ ? records_->memory_bytes() : 0; }
   [[nodiscard]] std::size_t file_bytes() const noexcept { return records_ ? records_->file_bytes() : 0; }
 
-  /// Backward pass over everything received. Fails where the disk could not take the history.
+  /// Backward pass over everything received, by two threads where there are as many; the result does not depend on
+  /// that. Fails where the disk could not take the history.
   [[nodiscard]] Result<SmoothedTrack> smooth() const;
 
  private:
@@ -98,9 +99,9 @@ struct SmootherStep {
   const Eigen::MatrixXd& P;                         ///< filtered, of this epoch
   const Eigen::Matrix<double, 15, 15>& transition;  ///< of the navigation, to the epoch after
   const Eigen::Matrix<double, 15, 15>& noise;       ///< of the navigation, on the way there
-  const Eigen::Ref<const Eigen::VectorXd>& decay;   ///< of the states from 15 on
-  const Eigen::Ref<const Eigen::VectorXd>& decay_noise;
-  const Eigen::Ref<const Eigen::VectorXd>& injected;  ///< corrections on the way, carried to its end
+  Eigen::Ref<const Eigen::VectorXd> decay;          ///< of the states from 15 on
+  Eigen::Ref<const Eigen::VectorXd> decay_noise;
+  Eigen::Ref<const Eigen::VectorXd> injected;  ///< corrections on the way, carried to its end
 };
 
 /// E-11 to E-15: from the smoothed error and covariance of the epoch after to those of this epoch.

@@ -1,6 +1,7 @@
 #include "estimation/calibration/smoother.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
@@ -370,6 +371,31 @@ TEST(Smoother, ImprovesOnTheFilterNeverClaimsLessAndItsSdIsHonest) {
   // Smoothed errors stay correlated over tens of seconds. Six drives, nine components: about fifty
   // independent squares, whose mean scatters by 0.2.
   EXPECT_NEAR(normalised / n, 1.0, 0.6);
+}
+
+TEST(Smoother, GivesTheSameByOneThreadAsByMany) {
+  const SimulatedStudy truth{Eigen::Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.004};
+  std::mt19937_64 random(1);
+  SimulatedDrive drive(70.0, {truth}, 5);
+  Smoother smoother(in_memory());
+  Estimator estimator(known_roughly(drive, truth, random), &smoother);
+  test::run(drive, estimator);
+  const auto smoothed_by = [&smoother](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return smoother.smooth();
+  };
+  const auto one = smoothed_by(1);
+  ASSERT_TRUE(one);
+  for (const std::size_t threads : {2U, 8U}) {
+    const auto many = smoothed_by(threads);
+    ASSERT_TRUE(many);
+    ASSERT_EQ(many->size(), one->size());
+    for (std::size_t k = 0; k < one->size(); ++k) {
+      ASSERT_EQ(many->at(k)->time, one->at(k)->time);
+      ASSERT_EQ(many->at(k)->sd, one->at(k)->sd);
+      ASSERT_EQ(many->at(k)->navigation.v_n_mps, one->at(k)->navigation.v_n_mps);
+    }
+  }
 }
 
 TEST(Smoother, GivesTheSameFromDiskAsFromMemoryAndKeepsToItsBound) {
