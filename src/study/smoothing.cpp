@@ -165,7 +165,7 @@ Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const Est
   const auto replayed =
       replay(configuration, relinearised(estimator, finals, former), recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());
-  return smoother.smooth();
+  return smoother.smooth(may_use_threads());
 }
 
 Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const UtcTrack& utc,

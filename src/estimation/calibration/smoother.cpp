@@ -1,10 +1,11 @@
 #include "estimation/calibration/smoother.h"
 
-#include <tbb/parallel_pipeline.h>
-
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <future>
+#include <semaphore>
 #include <utility>
 
 #include "base/contracts.h"
@@ -102,6 +103,79 @@ void smooth_by(const Gain& gain, const SmootherStep& step, VectorXd& d, MatrixXd
   P(moving, moving) = 0.5 * (block + block.transpose());
 }
 
+/// Epochs of the history with their gains, the newest first, made when they are asked for or ahead of that.
+class WayBack {
+ public:
+  struct Epoch {
+    history::Filtered filtered;
+    Gain gain;  ///< from the epoch after; empty of the newest
+    std::optional<Error> problem;
+  };
+
+  /// @param record_size  doubles of a record
+  /// @param ahead        by a thread of its own
+  WayBack(const RecordStore& records, std::size_t record_size, const history::Filtered& empty, bool ahead)
+      : records_(records),
+        record_(record_size),
+        // The one that is worked on, the one after it, and those that are made ahead.
+        epochs_(2 + kAhead, Epoch{empty, {}, {}}) {
+    if (ahead) maker_ = std::async(std::launch::async, [this] { make_all(); });
+  }
+  ~WayBack() {
+    is_given_up_ = true;
+    room_.release();
+  }
+  WayBack(const WayBack&) = delete;
+  WayBack& operator=(const WayBack&) = delete;
+
+  /// Epoch k, which has to be the next; it and the one after stay until the next is asked for.
+  Result<void> wait_for(std::size_t k) {
+    if (maker_.valid()) {
+      room_.release();
+      made_.acquire();
+    } else {
+      make(k);
+    }
+    if (at(k).problem) return tl::unexpected<Error>(*at(k).problem);
+    return {};
+  }
+  [[nodiscard]] const Epoch& at(std::size_t k) const { return epochs_[k % epochs_.size()]; }
+  [[nodiscard]] SmootherStep step_to(std::size_t k) const {
+    return history::step_from(at(k).filtered, at(k + 1).filtered);
+  }
+
+ private:
+  static constexpr std::size_t kAhead = 3;
+
+  void make(std::size_t k) {
+    Epoch& epoch = epochs_[k % epochs_.size()];
+    if (auto read = records_.read(k, record_); !read) {
+      epoch.problem = read.error();
+      return;
+    }
+    epoch.filtered.unpack(record_);
+    if (k + 1 < records_.size()) epoch.gain = gain_of(step_to(k));
+  }
+  void make_all() {
+    for (std::size_t k = records_.size(); k-- > 0;) {
+      room_.acquire();
+      if (is_given_up_) return;
+      make(k);
+      const bool is_last = at(k).problem.has_value();
+      made_.release();
+      if (is_last) return;
+    }
+  }
+
+  const RecordStore& records_;
+  std::vector<double> record_;
+  std::vector<Epoch> epochs_;
+  std::counting_semaphore<> room_{kAhead};
+  std::counting_semaphore<> made_{0};
+  std::atomic<bool> is_given_up_{false};
+  std::future<void> maker_;  ///< ends before all that it uses
+};
+
 }  // namespace
 
 void smooth_back(const SmootherStep& step, VectorXd& d, MatrixXd& P) { smooth_by(gain_of(step), step, d, P); }
@@ -144,70 +218,32 @@ void Smoother::on_history(const HistoryEpoch& epoch) noexcept {
   if (auto appended = records_->append(record_); !appended) problem_ = appended.error();
 }
 
-Result<SmoothedTrack> Smoother::smooth() const {
+Result<SmoothedTrack> Smoother::smooth(bool ahead) const {
   if (problem_) return tl::unexpected<Error>(*problem_);
   SmoothedTrack track(layouts_, states_ == 0 ? kNavigation : states_,
                       {storage_.memory_bytes_max / kTrackShare, storage_.folder});
   if (size() == 0) return track;
 
-  // Epoch by epoch through three stages: reading, the gain, and what needs the epoch after. While the last is at work
-  // on one, others may be in the first two.
-  constexpr std::size_t kInFlight = 4;
-  struct Place {
-    history::Filtered epoch;
-    Gain gain;
-  };
-  // One more, as an epoch's step is told by the epoch after.
-  std::vector<Place> places(kInFlight + 1, Place{history::Filtered(states_, layouts_.size()), {}});
-  const auto place_of = [&](std::size_t k) -> Place& { return places[k % places.size()]; };
-  const std::size_t newest = size() - 1;
-  std::size_t left = size();
-  std::vector<double> record(record_.size());
+  WayBack way(*records_, record_.size(), history::Filtered(states_, layouts_.size()), ahead);
   std::vector<double> smoothed_record(smoothed_doubles(states_, layouts_.size()));
   VectorXd d;
   MatrixXd P;
-  // Each is written by one stage alone, which takes one epoch at a time.
-  std::optional<Error> unread;
-  std::optional<Error> unwritten;
-  const auto read = [&](tbb::flow_control& flow) -> std::size_t {
-    if (left > 0 && !unread) {
-      if (auto got = records_->read(left - 1, record)) {
-        --left;
-        place_of(left).epoch.unpack(record);
-        return left;
-      } else {
-        unread = got.error();
-      }
-    }
-    flow.stop();
-    return 0;
-  };
-  const auto find_gain = [&](std::size_t k) {
-    if (k != newest) place_of(k).gain = gain_of(history::step_from(place_of(k).epoch, place_of(k + 1).epoch));
-    return k;
-  };
-  const auto step_back = [&](std::size_t k) {
-    const auto& [now, gain] = place_of(k);
-    if (k == newest) {
+  for (std::size_t k = size(); k-- > 0;) {
+    if (auto made = way.wait_for(k); !made) return tl::unexpected<Error>(made.error());
+    const history::Filtered& now = way.at(k).filtered;
+    if (k + 1 == size()) {
       history::begin_back(now, d, P);
     } else {
-      smooth_by(gain, history::step_from(now, place_of(k + 1).epoch), d, P);
+      smooth_by(way.at(k).gain, way.step_to(k), d, P);
     }
     const SmoothedEpoch smoothed = history::smoothed_epoch(now, d, P, layouts_);
     history::Writer out(smoothed_record);
     history::put_epoch(out, smoothed);
     out.put(smoothed.sd);
     out.put(smoothed.P_phi);
-    if (unwritten) return;
-    if (auto appended = track.records_.append(smoothed_record); !appended) unwritten = appended.error();
-  };
-  using tbb::filter_mode;
-  tbb::parallel_pipeline(kInFlight,
-                         tbb::make_filter<void, std::size_t>(filter_mode::serial_in_order, read) &
-                             tbb::make_filter<std::size_t, std::size_t>(filter_mode::parallel, find_gain) &
-                             tbb::make_filter<std::size_t, void>(filter_mode::serial_in_order, step_back));
-  if (unread) return tl::unexpected<Error>(*unread);
-  if (unwritten) return tl::unexpected<Error>(*unwritten);
+    if (auto appended = track.records_.append(smoothed_record); !appended)
+      return tl::unexpected<Error>(appended.error());
+  }
   return track;
 }
 

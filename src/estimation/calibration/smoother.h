@@ -81,9 +81,9 @@ class Smoother final : public HistorySink {
   [[nodiscard]] std::size_t memory_bytes() const noexcept { return records_ ? records_->memory_bytes() : 0; }
   [[nodiscard]] std::size_t file_bytes() const noexcept { return records_ ? records_->file_bytes() : 0; }
 
-  /// Backward pass over everything received, by two threads where there are as many; the result does not depend on
-  /// that. Fails where the disk could not take the history.
-  [[nodiscard]] Result<SmoothedTrack> smooth() const;
+  /// Backward pass over everything received. Fails where the disk could not take the history.
+  /// @param ahead  a second thread works on what the next epochs need beside the first; same result
+  [[nodiscard]] Result<SmoothedTrack> smooth(bool ahead = false) const;
 
  private:
   RecordStorage storage_;

@@ -1,12 +1,17 @@
 #include "estimation/calibration/smoother.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
+#include <unistd.h>
+
 #include <Eigen/Dense>
 #include <cmath>
+#include <filesystem>
 #include <random>
+#include <string>
 
 #include "tests/estimation/calibration/simulated_drive.h"
+#include "tests/support/file_size_limit.h"
 #include "tests/support/full_matrix.h"
 
 namespace imuscope {
@@ -373,28 +378,55 @@ TEST(Smoother, ImprovesOnTheFilterNeverClaimsLessAndItsSdIsHonest) {
   EXPECT_NEAR(normalised / n, 1.0, 0.6);
 }
 
-TEST(Smoother, GivesTheSameByOneThreadAsByMany) {
+TEST(Smoother, GivesTheSameWithAndWithoutAThreadAhead) {
   const SimulatedStudy truth{Eigen::Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.004};
   std::mt19937_64 random(1);
   SimulatedDrive drive(70.0, {truth}, 5);
   Smoother smoother(in_memory());
   Estimator estimator(known_roughly(drive, truth, random), &smoother);
   test::run(drive, estimator);
-  const auto smoothed_by = [&smoother](std::size_t threads) {
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return smoother.smooth();
-  };
-  const auto one = smoothed_by(1);
-  ASSERT_TRUE(one);
-  for (const std::size_t threads : {2U, 8U}) {
-    const auto many = smoothed_by(threads);
-    ASSERT_TRUE(many);
-    ASSERT_EQ(many->size(), one->size());
-    for (std::size_t k = 0; k < one->size(); ++k) {
-      ASSERT_EQ(many->at(k)->time, one->at(k)->time);
-      ASSERT_EQ(many->at(k)->sd, one->at(k)->sd);
-      ASSERT_EQ(many->at(k)->navigation.v_n_mps, one->at(k)->navigation.v_n_mps);
-    }
+  const auto alone = smoother.smooth();
+  const auto ahead = smoother.smooth(true);
+  ASSERT_TRUE(alone && ahead);
+  ASSERT_EQ(alone->size(), smoother.size());
+  ASSERT_EQ(ahead->size(), alone->size());
+  for (std::size_t k = 0; k < alone->size(); ++k) {
+    ASSERT_EQ(ahead->at(k)->time, alone->at(k)->time);
+    ASSERT_EQ(ahead->at(k)->sd, alone->at(k)->sd);
+    ASSERT_EQ(ahead->at(k)->navigation.v_n_mps, alone->at(k)->navigation.v_n_mps);
+  }
+}
+
+/// Cuts the files that this program has opened and that have no name any more.
+void cut_nameless_files() {
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code gone;
+    const auto target = std::filesystem::read_symlink(entry.path(), gone).string();
+    if (!target.ends_with(" (deleted)")) continue;
+    ASSERT_EQ(ftruncate(std::stoi(entry.path().filename()), 0), 0) << target;
+  }
+}
+
+TEST(Smoother, TellsWhatTheDiskRefusesOnTheWayBackWithAndWithoutAThreadAhead) {
+  const SimulatedStudy truth{Eigen::Matrix3d::Identity(), {0.35, -0.22, 0.12}, 0.004};
+  std::mt19937_64 random(1);
+  SimulatedDrive drive(70.0, {truth}, 5);
+  Smoother smoother(in_memory(20'000));
+  Estimator estimator(known_roughly(drive, truth, random), &smoother);
+  test::run(drive, estimator);
+  ASSERT_GT(smoother.file_bytes(), 0U);
+  for (const bool ahead : {false, true}) {
+    const test::FileSizeLimit limit(1000);
+    const auto track = smoother.smooth(ahead);
+    ASSERT_FALSE(track);
+    EXPECT_THAT(track.error().text(), testing::HasSubstr("cannot be written"));
+  }
+  ASSERT_TRUE(smoother.smooth(true));
+  cut_nameless_files();
+  for (const bool ahead : {false, true}) {
+    const auto track = smoother.smooth(ahead);
+    ASSERT_FALSE(track);
+    EXPECT_THAT(track.error().text(), testing::HasSubstr("cannot be read"));
   }
 }
 
