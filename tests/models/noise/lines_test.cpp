@@ -267,10 +267,10 @@ LevelMeans means_about_a_line(int level, double frequency_hz, double amplitude, 
     const auto at = static_cast<std::size_t>(level - 1);
     means.noise += haar_wavelet_variance(x).value().levels[at].value / records;
     std::mt19937 random(70U + static_cast<unsigned>(record));
-    std::normal_distribution<double> step(0.0, wander_rad);
+    std::normal_distribution<double> normal;
     double phase = 0.0;
     for (double& value : x) {
-      phase += 2.0 * std::numbers::pi * frequency_hz / kLineRate_hz + step(random);
+      phase += 2.0 * std::numbers::pi * frequency_hz / kLineRate_hz + wander_rad * normal(random);
       value += amplitude * std::sin(phase);
     }
     const auto mask = all_valid(x.size());
