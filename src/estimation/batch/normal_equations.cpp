@@ -255,7 +255,7 @@ class BandSummer {
  private:
   /// @return  the reference's mean share of the band's noise
   Eigen::Vector2d set_forces_tell(Eigen::Index band) {
-    const Eigen::Vector2d share = reference_.mean_share(noise_, band);
+    Eigen::Vector2d share = reference_.mean_share(noise_, band);
     forces_tell_ =
         share[0] * noise_.power(band).head<3>().mean() <= kNoisyMotion * problem_.mean_gyro_power[band];
     return share;
