@@ -125,8 +125,8 @@ Result<void> Attempts::write(const Attempt& attempt) const {
   return folder_.write_whole(attempt_file(attempt.key, attempt.number), json_text(to_json(attempt)) + "\n");
 }
 
-Result<Attempt> Attempts::begin(const std::string& key, const std::string& task, const std::string& program,
-                                const std::string& scratch) const {
+Result<Attempt> Attempts::begin(const std::string& key, const std::string& task,
+                                const std::string& program) const {
   Attempt attempt;
   attempt.key = key;
   attempt.task = task;
@@ -134,11 +134,11 @@ Result<Attempt> Attempts::begin(const std::string& key, const std::string& task,
   attempt.host = host_name();
   attempt.process = ::getpid();
   attempt.process_start = start_of(attempt.process).value_or(0);
-  attempt.scratch = scratch;
   attempt.began_utc = utc_now();
   for (; attempt.number <= kAttemptsMax; ++attempt.number) {
     // Whoever makes the file has the number.
     if (folder_.create_new(attempt_file(key, attempt.number)).is_open()) {
+      attempt.scratch = fmt::format("{}.{}", key, attempt.number);
       if (auto written = write(attempt); !written) return tl::unexpected<Error>(written.error());
       return attempt;
     }

@@ -53,8 +53,9 @@ class Attempts {
   static Result<Attempts> open(const std::filesystem::path& out);
 
   /// Writes down that an attempt began; its number is the next of the task, whoever else begins one.
+  /// Its scratch folder has a name, and is not there yet: whatever kills it leaves nothing that nobody knows of.
   [[nodiscard]] Result<Attempt> begin(const std::string& key, const std::string& task,
-                                      const std::string& program, const std::string& scratch) const;
+                                      const std::string& program) const;
   /// Writes down how it ended.
   [[nodiscard]] Result<void> end(Attempt& attempt, AttemptEnd how, const std::string& reason,
                                  const ChildEnd& used) const;

@@ -78,12 +78,14 @@ json result_head(const StudyTask& task, const std::string& program, TaskState st
 /// The study of one attempt, in a folder of its own that takes its place when it is whole.
 class Scratch {
  public:
-  static Result<Scratch> make(const StudyTask& task) {
+  /// @param name  one that is told before it is made, so that whoever finds what a killed attempt left knows whose it
+  ///              was; without, one that nobody has
+  static Result<Scratch> make(const StudyTask& task, const std::string& name = "") {
     const auto out = OutputFolder::open(task.out);
     if (!out) return tl::unexpected<Error>(out.error());
     const auto all = out->sub_folder("scratch");
     if (!all) return tl::unexpected<Error>(all.error());
-    auto mine = all->scratch_folder();
+    auto mine = name.empty() ? all->scratch_folder() : all->sub_folder(name);
     if (!mine) return tl::unexpected<Error>(mine.error());
     auto folder = mine->sub_folder(task.key);
     if (!folder) return tl::unexpected<Error>(folder.error());
@@ -96,7 +98,6 @@ class Scratch {
     if (!mine_.path().empty()) fs::remove_all(mine_.path(), error);
   }
 
-  [[nodiscard]] std::string name() const { return mine_.path().filename().string(); }
   [[nodiscard]] const OutputFolder& folder() const { return folder_; }
 
   /// The result gets its place. Where another was faster, that stands: it is the same.
@@ -146,10 +147,14 @@ void remove_rows(const fs::path& run) {
 Result<TaskOutcome> attempt_study(const StudyTask& task, const std::string& program,
                                   const fs::path& program_file, const Attempts& attempts,
                                   const std::atomic<bool>& stop) {
-  auto scratch = Scratch::make(task);
-  if (!scratch) return tl::unexpected<Error>(scratch.error());
-  auto attempt = attempts.begin(task.key, "study of " + task.name, program, scratch->name());
+  auto attempt = attempts.begin(task.key, "study of " + task.name, program);
   if (!attempt) return tl::unexpected<Error>(attempt.error());
+  auto scratch = Scratch::make(task, attempt->scratch);
+  if (!scratch) {
+    attempt->counts = false;
+    (void)attempts.end(*attempt, AttemptEnd::kDied, scratch.error().text(), {});
+    return tl::unexpected<Error>(scratch.error());
+  }
   const fs::path run = scratch->folder().path() / kRun;
   const auto end = run_child(process_command(task, program_file, run), scratch->folder(), kLog,
                              {task.limits.memory_mb, task.limits.timeout_s}, stop);
@@ -233,7 +238,7 @@ Result<TaskOutcome> do_study(const StudyTask& task, const std::string& program, 
   if (!attempts) return tl::unexpected<Error>(attempts.error());
   if (auto checked = check_key(task, program); !checked) {
     // Its own row, and no attempt of this task: what was listed is not what is here.
-    if (auto attempt = attempts->begin(task.key, "study of " + task.name, program, ""); attempt) {
+    if (auto attempt = attempts->begin(task.key, "study of " + task.name, program); attempt) {
       attempt->counts = false;
       (void)attempts->end(*attempt, AttemptEnd::kDied, checked.error().text(), {});
     }

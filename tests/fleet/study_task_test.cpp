@@ -122,13 +122,15 @@ TEST_F(StudyTask, ThatIsStoppedIsOpenAndLeavesNothing) {
 
 TEST_F(StudyTask, FindsThatAnEarlierAttemptDiedWithoutAWord) {
   const auto all = fleet::Attempts::open(task().out);
-  auto lost = *all->begin(task().key, "study", kMadeProgram, "left");
-  write_file(task().out / "scratch" / "left" / "file", "half");
+  auto lost = *all->begin(task().key, "study", kMadeProgram);
+  EXPECT_FALSE(std::filesystem::exists(task().out / "scratch" / lost.scratch)) << "told before it is made";
+  EXPECT_NE(all->begin(task().key, "study", kMadeProgram)->scratch, lost.scratch);
+  write_file(task().out / "scratch" / lost.scratch / "file", "half");
   // As if by a process that is no more.
   lost.process_start += 1;
   ASSERT_TRUE(all->end(lost, AttemptEnd::kRunning, "", {}));
   EXPECT_EQ(attempt("echo 'imuscope: no' >&2; exit 1")->state, TaskState::kRefused);
-  ASSERT_EQ(attempts().size(), 2U);
+  ASSERT_EQ(attempts().size(), 3U);
   EXPECT_EQ(attempts().front().end, AttemptEnd::kLost);
   EXPECT_TRUE(scratch_is_empty());
 }
