@@ -252,7 +252,10 @@ BatchEstimates::BatchEstimates(const Configuration& configuration, double longes
       first_hours_(studies_.size()),
       has_begun_(studies_.size(), false) {}
 
-BatchEstimates::~BatchEstimates() { beside_.wait(); }
+BatchEstimates::~BatchEstimates() {
+  beside_.cancel();
+  beside_.wait();
+}
 
 BatchEstimates::Pair BatchEstimates::pair_of(std::size_t study) const {
   return {records_, configuration_, studies_[study], longest_s_};

@@ -50,7 +50,7 @@ ReferenceBias bias_at(const ReferenceBiasTrack& biases, const SImuEpoch& epoch) 
   return biases.at(epoch.time + from_seconds(epoch.t_d_s));
 }
 
-/// The next epochs, few enough for a processor's cache; false after the last.
+/// The next epochs, a megabyte of them; false after the last.
 bool read_block(Spool<KeptEpoch>& epochs, std::vector<KeptEpoch>& block) {
   constexpr std::size_t kBlock = 2048;
   block.clear();

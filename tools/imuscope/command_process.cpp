@@ -150,7 +150,7 @@ void add_process(CLI::App& app, Work& chosen) {
   command
       ->add_option("--threads", options->threads,
                    "at most so many compute at once (default: as many as there are cores); from 2 on, "
-                   "another reads ahead")
+                   "others read ahead and take what those leave idle")
       ->check(CLI::Range(1, kThreadsMax));
   command->add_flag("--force", options->force, "write over a report.html that no run of imuscope made");
   on_chosen(*command, chosen, [options] { return process(*options); });
