@@ -253,7 +253,8 @@ BatchEstimates::BatchEstimates(const Configuration& configuration, double longes
       has_begun_(studies_.size(), false) {}
 
 BatchEstimates::~BatchEstimates() {
-  beside_.cancel();
+  // Not beside_.cancel(): it would stop the loops inside of an estimate that goes on to use what they made.
+  is_given_up_ = true;
   beside_.wait();
 }
 
@@ -268,7 +269,9 @@ void BatchEstimates::add(const Sample& sample) {
     const Pair pair = pair_of(i);
     if (!pair.has_first_hour()) continue;
     has_begun_[i] = true;
-    beside_.run([pair, &of_hour = first_hours_[i]] { of_hour = pair.estimate_first_hour(); });
+    beside_.run([this, pair, i] {
+      if (!is_given_up_) first_hours_[i] = pair.estimate_first_hour();
+    });
   }
 }
 

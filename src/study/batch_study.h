@@ -5,6 +5,7 @@
 
 #include <tbb/task_group.h>
 
+#include <atomic>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -101,6 +102,7 @@ class BatchEstimates {
   std::vector<std::size_t> studies_;    ///< devices
   std::vector<FirstHour> first_hours_;  ///< those that began beside the pass
   std::vector<bool> has_begun_;
+  std::atomic<bool> is_given_up_{false};  ///< what has not begun need not
   tbb::task_group beside_;
 };
 

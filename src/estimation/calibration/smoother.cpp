@@ -58,7 +58,7 @@ std::vector<Index> moving_states(const SmootherStep& step) {
   return moving;
 }
 
-/// E-11 and E-12 of one step, which need nothing of the epoch after: the predicted covariance, and A's rows that are not
+/// E-11 and E-12 of one step, which need nothing that is smoothed: the predicted covariance, and A's rows that are not
 /// those of a constant. A constant's row is that of the identity.
 struct Gain {
   std::vector<Index> moving;
