@@ -27,6 +27,10 @@ void ArmRate::learn(const Eigen::Vector3d& mean_b_radps) noexcept {
   count_ += 1.0;
 }
 
+double ArmRate::sd_of_mean_radps(std::size_t samples) const noexcept {
+  return std::sqrt(noise_variance_ / static_cast<double>(samples));
+}
+
 // E-29
 ArmRate::Estimate ArmRate::estimate(const Eigen::Vector3d& mean_b_radps, std::size_t samples,
                                     bool moves) const noexcept {

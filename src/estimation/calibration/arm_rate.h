@@ -1,6 +1,7 @@
 #pragma once
 
-/// The rate that swings a lever arm (the antenna's, the axle's), where the gyros are noisy. A measurement through an arm,
+/// The rate that swings a lever arm that is learned from how it swings (the axle's), where the gyros are noisy. A
+/// measurement through an arm,
 /// v + w x l, has the rate in its matrix: noise of the rate would shorten the arm, as in every regression on a
 /// noisy variable, and the filter would be sure of it. So the rate is a mean over some samples, brought
 /// down to the best linear estimate of the true one by its own power beside that of its noise. EQUATIONS.md E-29.
@@ -22,6 +23,9 @@ class ArmRate {
   /// Learns how much the vehicle turns while it moves.
   /// @param mean_b_radps  over 2 half_width() + 1 samples, bias taken off
   void learn(const Eigen::Vector3d& mean_b_radps) noexcept;
+
+  /// Noise of a mean over so many samples, each axis.
+  [[nodiscard]] double sd_of_mean_radps(std::size_t samples) const noexcept;
 
   struct Estimate {
     Eigen::Vector3d omega_b_radps;

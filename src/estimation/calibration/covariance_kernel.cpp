@@ -112,8 +112,9 @@ void CovarianceKernel::project(const SparseMeasurement& H, const std::array<doub
   s_ = {sum[0], sum[1], sum[2], sum[1], sum[3], sum[4], sum[2], sum[4], sum[5]};
 }
 
-bool CovarianceKernel::update(const std::array<double, 3>& innovation,
-                              const std::array<bool, 3>& use) noexcept {
+bool CovarianceKernel::update(const std::array<double, 3>& innovation, const std::array<bool, 3>& use,
+                              Considered considered) noexcept {
+  IMUSCOPE_EXPECTS(considered.count <= kMostConsidered);
   // K-4, with a zero row for an axis that is left out: M = L^-1 of the axes in use.
   std::array<double, 9> l{};
   std::array<double, 9> m{};
@@ -144,7 +145,18 @@ bool CovarianceKernel::update(const std::array<double, 3>& innovation,
   }
   if (!any) return false;
   if (!loops_->whiten(pht_, m.data(), whitened.data(), w_, correction_, padded_)) return false;
+  // K-7
+  std::array<double, kMostConsidered * kMostConsidered> kept{};
+  const auto of_considered = [&](auto what) {
+    for (std::size_t i = 0; i < considered.count; ++i) {
+      for (std::size_t j = 0; j < considered.count; ++j)
+        what(kept[kMostConsidered * i + j], p_[(considered.first + i) * padded_ + considered.first + j]);
+    }
+  };
+  of_considered([](double& keep, double p) { keep = p; });
   loops_->downdate(p_, w_, padded_);
+  of_considered([](double keep, double& p) { p = keep; });
+  std::fill_n(correction_ + considered.first, considered.count, 0.0);
   return true;
 }
 

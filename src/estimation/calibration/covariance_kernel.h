@@ -74,11 +74,23 @@ class CovarianceKernel {
   /// S of the last project(), row-major.
   [[nodiscard]] const std::array<double, 9>& innovation_covariance() const noexcept { return s_; }
 
-  /// Second half: takes the rows with use[a] into account. K-4.
+  /// States that a measurement depends on, and is to tell nothing of: Schmidt's.
+  struct Considered {
+    std::size_t first = 0;
+    std::size_t count = 0;  ///< at most kMostConsidered
+  };
+  static constexpr std::size_t kMostConsidered = 3;
+
+  /// Second half: takes the rows with use[a] into account. K-4, K-7.
   /// @return false, with nothing changed, where S of the used rows is not positive definite, the correction
   /// is not finite or no row is used.
-  [[nodiscard]] bool update(const std::array<double, 3>& innovation, const std::array<bool, 3>& use) noexcept;
-  /// Correction of the error state by the last successful update(): P H^T S^-1 y.
+  [[nodiscard]] bool update(const std::array<double, 3>& innovation, const std::array<bool, 3>& use,
+                            Considered considered) noexcept;
+  [[nodiscard]] bool update(const std::array<double, 3>& innovation,
+                            const std::array<bool, 3>& use) noexcept {
+    return update(innovation, use, {});
+  }
+  /// Correction of the error state by the last successful update(): P H^T S^-1 y, nothing of what was considered.
   [[nodiscard]] std::span<const double> correction() const noexcept { return {correction_, dimension_}; }
 
   /// First state that has become a combination of the ones before it, by its pivot in Cholesky's factor of the

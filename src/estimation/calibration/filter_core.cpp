@@ -108,8 +108,9 @@ double FilterCore::sd(std::size_t state) const noexcept {
   return state == SImuLayout::kAbsent ? 0.0 : std::sqrt(covariance_(state, state));
 }
 
-bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use) noexcept {
-  if (!covariance_.update(to_array(innovation), use)) return false;
+bool FilterCore::update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use,
+                        CovarianceKernel::Considered considered) noexcept {
+  if (!covariance_.update(to_array(innovation), use, considered)) return false;
   ++changes_;
   const std::span<const double> correction = covariance_.correction();
   const Eigen::Map<const NavigationErrorVector> navigation_correction(correction.data());

@@ -72,7 +72,8 @@ class FilterCore {
 
   /// Second half of an update (CovarianceKernel::project() is the first): corrects everything.
   /// @return false where nothing was changed
-  bool update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use) noexcept;
+  bool update(const Eigen::Vector3d& innovation, const std::array<bool, 3>& use,
+              CovarianceKernel::Considered considered = {}) noexcept;
 
   /// How often an update or a reset has changed states and covariance; the passing of time does not count.
   [[nodiscard]] std::uint64_t changes() const noexcept { return changes_; }

@@ -94,6 +94,14 @@ bool moves(const NavigationState& state) noexcept {
   return state.v_n_mps.squaredNorm() > kMoves_mps * kMoves_mps;
 }
 
+/// Slower than what noise of a GNSS velocity makes a filter believe, a vehicle stands, and does not turn about its
+/// antenna, which no GNSS would see.
+constexpr double kStands_mps = 0.1;
+
+bool stands(const NavigationState& state) noexcept {
+  return state.v_n_mps.squaredNorm() < kStands_mps * kStands_mps;
+}
+
 bool is_finite(const GnssData& gnss) noexcept {
   return std::isfinite(gnss.latitude_rad) && std::isfinite(gnss.longitude_rad) &&
          std::isfinite(gnss.height_m) &&
@@ -263,7 +271,9 @@ Vector3d NavigationFilter::mean_rate(std::size_t centre, std::size_t half_width)
 
 /// E-29, at an instant that lies by a share of the interval behind epoch k.
 void NavigationFilter::set_arm_rate(std::size_t k, double share_of_newer, Delayed& out) const noexcept {
-  out.rate_share.setOnes();
+  const Vector3d& bias = out.state.gyro_bias_b_radps;
+  out.arm_rate = {out.measured.omega_ib_b_radps - bias, Vector3d::Ones(), 0.0};
+  out.rate_share = 1.0;
   out.sd_rate_radps = 0.0;
   if (arm_rate_.half_width() == 0) return;
   const std::size_t newer = share_of_newer > 0.0 && k > 0 ? k - 1 : k;
@@ -271,11 +281,12 @@ void NavigationFilter::set_arm_rate(std::size_t k, double share_of_newer, Delaye
   const std::size_t half_width = std::min({arm_rate_.half_width(), newer, past_size_ - 1 - k});
   const Vector3d mean =
       (1.0 - share_of_newer) * mean_rate(k, half_width) + share_of_newer * mean_rate(newer, half_width);
-  const Vector3d& bias = out.state.gyro_bias_b_radps;
-  const ArmRate::Estimate rate = arm_rate_.estimate(mean - bias, 2 * half_width + 1, moves(out.state));
-  out.measured.omega_ib_b_radps = bias + rate.omega_b_radps;
-  out.rate_share = rate.share;
-  out.sd_rate_radps = rate.sd_radps;
+  const std::size_t samples = 2 * half_width + 1;
+  const bool may_turn = !stands(out.state);
+  out.arm_rate = arm_rate_.estimate(mean - bias, samples, moves(out.state));
+  out.rate_share = may_turn ? 1.0 : 0.0;
+  out.measured.omega_ib_b_radps = may_turn ? mean : bias;
+  if (may_turn) out.sd_rate_radps = arm_rate_.sd_of_mean_radps(samples);
 }
 
 void NavigationFilter::try_start(const Sample& sample) noexcept {
@@ -604,12 +615,18 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
     const Vector3d arm_now = core_.antenna().r_ba_b_m;
     GnssInnovation velocity =
         gnss_velocity_innovation(then.state, to_eigen(gnss.v_n_mps), then.measured.omega_ib_b_radps, arm_now);
-    velocity.H.middleCols<3>(kGyroBiasError) *= then.rate_share.asDiagonal();
+    velocity.H.middleCols<3>(kGyroBiasError) *= then.rate_share;
     const AntennaMatrix of_antenna = antenna_in_velocity(then.state, then.measured, arm_now);
-    const Vector3d sd = (sd_velocity.array().square() + then.swing_variance(arm_now)).sqrt();
+    const double swing_mps = then.sd_rate_radps * arm_now.norm();
+    const Vector3d sd = (sd_velocity.array().square() + swing_mps * swing_mps).sqrt();
+    // E-29: noisy gyros would shorten the arm
+    CovarianceKernel::Considered considered;
+    if (arm_rate_.half_width() > 0) considered = {core_.antenna_states() + kAntennaLeverArmError, 3};
     // The state then is of the latency that was believed before the position told more of it.
     velocity.innovation -= of_antenna.col(kReceiverLatencyError) * (core_.antenna().latency_s - latency_s);
-    used = apply(velocity_gate_, velocity, of_antenna, then.back, sd, time, output_.nis_velocity) || used;
+    used =
+        apply(velocity_gate_, velocity, of_antenna, then.back, sd, time, output_.nis_velocity, considered) ||
+        used;
   }
   tell_latency();
   if (used) {
@@ -636,7 +653,7 @@ bool NavigationFilter::apply_gnss(const Sample& sample) noexcept {
 
 bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured, const AntennaMatrix& of_antenna,
                              const NavigationErrorCovariance& back, const Vector3d& sd, HostTime time,
-                             Vector3& nis) noexcept {
+                             Vector3& nis, CovarianceKernel::Considered considered) noexcept {
   // E-5: by the errors of now
   const NavigationMeasurementMatrix H = measured.H * back;
   SparseMeasurement sparse;
@@ -654,7 +671,7 @@ bool NavigationFilter::apply(GnssGate& gate, const GnssInnovation& measured, con
     widen_for_reacquisition(measured.innovation);
     P.project(sparse, to_array(R));
   }
-  return core_.update(measured.innovation, {true, true, true});
+  return core_.update(measured.innovation, {true, true, true}, considered);
 }
 
 void NavigationFilter::watch_consistency(HostTime time) noexcept {

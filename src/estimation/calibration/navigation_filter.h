@@ -36,15 +36,11 @@ class NavigationFilter {
   /// A past epoch seen from the present.
   struct Delayed {
     NavigationState state;
-    InertialRates measured;          ///< of the rate, where the gyros are noisy, what an arm swings by (E-29)
+    InertialRates measured;  ///< the rate, where the gyros are noisy, a mean; standing, the bias (E-29)
     NavigationErrorCovariance back;  ///< Phi^-1: error then = back * error now
-    Eigen::Vector3d rate_share;      ///< of the measured rate that is in `measured`, each axis
-    double sd_rate_radps;            ///< what that leaves unknown of the true one
-
-    /// Variance of the velocity at an arm's end that comes from there, (m/s)^2.
-    [[nodiscard]] double swing_variance(const Eigen::Vector3d& arm_b_m) const noexcept {
-      return sd_rate_radps * sd_rate_radps * arm_b_m.squaredNorm();
-    }
+    double rate_share;               ///< of the gyros' reading in that rate: 1, or 0
+    double sd_rate_radps;            ///< noise of that rate
+    ArmRate::Estimate arm_rate;  ///< by which an arm swings that is learned from that (E-29), bias taken off
   };
   enum class Lookup : std::uint8_t { kFound, kTooNew, kTooOld };
   /// The state at a past time, with everything learned since. E-5.
@@ -95,8 +91,8 @@ class NavigationFilter {
   void tell_latency() noexcept;
   [[nodiscard]] HostTime plausible_time(const Sample& gnss, HostTime time) noexcept;
   bool apply(GnssGate& gate, const GnssInnovation& measured, const AntennaMatrix& of_antenna,
-             const NavigationErrorCovariance& back, const Eigen::Vector3d& sd, HostTime time,
-             Vector3& nis) noexcept;
+             const NavigationErrorCovariance& back, const Eigen::Vector3d& sd, HostTime time, Vector3& nis,
+             CovarianceKernel::Considered considered = {}) noexcept;
   void correlate_with_antenna() noexcept;
   void take_rest(const AlignmentRest& rest, InitialisationMethod method) noexcept;
   void watch_consistency(HostTime time) noexcept;

@@ -185,6 +185,33 @@ TEST_P(CovarianceKernelOfDimension, UpdateEqualsTheDenseJosephFormForEveryChoice
   }
 }
 
+TEST_P(CovarianceKernelOfDimension, WhatIsConsideredIsToldNothingAndTheRestIsJosephsOfThatGain) {
+  const auto [n, set] = GetParam();
+  std::mt19937_64 random(17);
+  const MatrixXd P = random_covariance(n, random);
+  CovarianceKernel kernel(n, set);
+  load(kernel, P);
+  const Measurement m = random_measurement(n, P, random);
+  const std::size_t first = 15;  // a block that is measured
+  const std::array<double, 3> y{0.7, -1.1, 0.4};
+  kernel.project(m.sparse, {2.0, 0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1.0});
+  ASSERT_TRUE(kernel.update(y, {true, true, true}, {first, 3}));
+
+  const MatrixXd R = Eigen::Vector3d(2.0, 1.5, 1.0).asDiagonal();
+  MatrixXd K = P * m.dense.transpose() * (m.dense * P * m.dense.transpose() + R).inverse();
+  K.middleRows(static_cast<Eigen::Index>(first), 3).setZero();
+  const MatrixXd I_KH = MatrixXd::Identity(P.rows(), P.cols()) - K * m.dense;
+  const MatrixXd oracle = I_KH * P * I_KH.transpose() + K * R * K.transpose();
+  EXPECT_LT(scaled_difference(read(kernel), oracle), 1e-11);
+  EXPECT_TRUE(read(kernel) == read(kernel).transpose());
+  const VectorXd dx = K * Eigen::Vector3d(y[0], y[1], y[2]);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    EXPECT_NEAR(kernel.correction()[i], dx(k), 1e-12 * std::sqrt(P(k, k)));
+  }
+  for (std::size_t i = first; i < first + 3; ++i) EXPECT_EQ(kernel.correction()[i], 0.0);
+}
+
 INSTANTIATE_TEST_SUITE_P(OneThreeAndSixStudies, CovarianceKernelOfDimension,
                          testing::Combine(testing::Values(27, 34, 72, 129),
                                           testing::Values(InstructionSet::kBaseline, InstructionSet::kAvx2,
