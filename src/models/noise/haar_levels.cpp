@@ -2,8 +2,10 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace imuscope::noise {
 namespace {
@@ -19,9 +21,14 @@ class Presence {
  public:
   explicit Presence(const std::vector<Segment>& runs) : run_(runs.begin()), end_(runs.end()) {}
 
-  bool at(std::size_t i) {
+  std::size_t at(std::size_t i) {
     while (run_ != end_ && run_->end <= i) ++run_;
-    return run_ != end_ && run_->begin <= i;
+    return run_ != end_ && run_->begin <= i ? 1 : 0;
+  }
+  /// The next place of which at() says something else than of the one it was asked last.
+  [[nodiscard]] std::size_t until(std::size_t i) const {
+    if (run_ == end_) return std::numeric_limits<std::size_t>::max();
+    return run_->begin <= i ? run_->end : run_->begin;
   }
 
  private:
@@ -99,6 +106,16 @@ double HoleLengths::variance_of(const MissingExcess& excess, std::span<const dou
   return excess.own * within - excess.common * of_length(std::max(1.0, n / 8.0));
 }
 
+void SquareSum::add(std::span<const double> values) noexcept {
+  std::size_t i = 0;
+  while (i < values.size() && count_ % kSideBySide != 0) add(values[i++]);
+  for (; i + kSideBySide <= values.size(); i += kSideBySide) {
+    for (std::size_t k = 0; k < kSideBySide; ++k) sums_[k] += values[i + k] * values[i + k];
+    count_ += kSideBySide;
+  }
+  while (i < values.size()) add(values[i++]);
+}
+
 double SquareSum::mean() const noexcept {
   const std::size_t left = count_ % kSideBySide;
   double even = sums_[0] + sums_[2];
@@ -152,28 +169,68 @@ void HaarLevels::append_whole(std::size_t n, std::vector<double>& coefficients) 
   stretch(blocks_, 0, count) += stretch(blocks_, n, count);
 }
 
+/// How many samples two halves of a support have, and by how many that changes from place to place.
+struct HaarLevels::Halves {
+  std::size_t older = 0;
+  std::size_t newer = 0;
+  std::ptrdiff_t older_grows = 0;
+  std::ptrdiff_t newer_grows = 0;
+
+  [[nodiscard]] bool grow() const { return older_grows != 0 || newer_grows != 0; }
+  void step() {
+    older += static_cast<std::size_t>(older_grows);
+    newer += static_cast<std::size_t>(newer_grows);
+  }
+};
+
+/// Coefficients of `length` places from `s` on, between which samples neither come nor go at the ends of the halves but
+/// as the halves say. Leaves them as they are after that.
+template <typename Take>
+void HaarLevels::take_stretch(std::size_t n, std::size_t s, std::size_t length, Halves& halves,
+                              const Take& take, MissingExcess& excess, std::vector<Segment>& places) {
+  const std::size_t least = least_valid(n);
+  const auto take_some = [&](std::size_t at, std::size_t some) {
+    if (halves.older < least || halves.newer < least) return;
+    std::array<double, kTogether> coefficients;
+    Eigen::Map<Eigen::ArrayXd>(coefficients.data(), static_cast<Eigen::Index>(some)) =
+        0.5 * (stretch(blocks_, at + n, some) / static_cast<double>(halves.newer) -
+               stretch(blocks_, at, some) / static_cast<double>(halves.older));
+    take(std::span<const double>(coefficients.data(), some));
+    const MissingExcess of_each = missing_excess(n, halves.older, halves.newer);
+    if (of_each.own != 0.0) {
+      for (std::size_t i = 0; i < some; ++i) excess += of_each;
+    }
+    const std::size_t newest = begin_ + at + 2 * n - 1;
+    if (places.empty() || places.back().end != newest) places.push_back({newest, newest});
+    places.back().end += some;
+  };
+  const std::size_t together = halves.grow() ? 1 : kTogether;
+  for (std::size_t at = s; at < s + length; at += together) {
+    const std::size_t some = std::min(together, s + length - at);
+    take_some(at, some);
+    stretch(blocks_, at, some) += stretch(blocks_, at + n, some);
+    halves.step();
+  }
+}
+
 template <typename Take>
 void HaarLevels::take_valid(std::size_t n, const Take& take, MissingExcess& excess,
                             std::vector<Segment>& places) {
   const std::size_t count = blocks_.size() - n;
-  const std::size_t least = least_valid(n);
-  std::size_t older = count_of(runs_, 0, n);
-  std::size_t newer = count_of(runs_, n, 2 * n);
+  Halves halves{count_of(runs_, 0, n), count_of(runs_, n, 2 * n)};
   Presence leaves(runs_);
   Presence passes(runs_);
   Presence comes(runs_);
-  for (std::size_t s = 0; s < count; ++s) {
-    if (older >= least && newer >= least) {
-      take(0.5 * (blocks_[s + n] / static_cast<double>(newer) - blocks_[s] / static_cast<double>(older)));
-      excess += missing_excess(n, older, newer);
-      const std::size_t newest = begin_ + s + 2 * n - 1;
-      if (places.empty() || places.back().end != newest) places.push_back({newest, newest});
-      ++places.back().end;
-    }
-    blocks_[s] += blocks_[s + n];
-    const std::size_t between = passes.at(s + n) ? 1 : 0;
-    older = older + between - (leaves.at(s) ? 1 : 0);
-    newer = newer + (comes.at(s + 2 * n) ? 1 : 0) - between;
+  for (std::size_t s = 0; s < count;) {
+    const auto leaving = static_cast<std::ptrdiff_t>(leaves.at(s));
+    const auto passing = static_cast<std::ptrdiff_t>(passes.at(s + n));
+    const auto coming = static_cast<std::ptrdiff_t>(comes.at(s + 2 * n));
+    halves.older_grows = passing - leaving;
+    halves.newer_grows = coming - passing;
+    const std::size_t end =
+        std::min({leaves.until(s), passes.until(s + n) - n, comes.until(s + 2 * n) - 2 * n, count});
+    take_stretch(n, s, end - s, halves, take, excess, places);
+    s = end;
   }
 }
 
@@ -190,7 +247,11 @@ bool HaarLevels::append_next(std::vector<double>& coefficients, MissingExcess& e
     append_whole(half(), coefficients);
   else
     take_valid(
-        half(), [&](double coefficient) { coefficients.push_back(coefficient); }, excess, places);
+        half(),
+        [&](std::span<const double> some) {
+          coefficients.insert(coefficients.end(), some.begin(), some.end());
+        },
+        excess, places);
   end_level();
   return coefficients.size() > had;
 }
@@ -199,7 +260,7 @@ bool HaarLevels::add_next(SquareSum& squares, MissingExcess& excess, std::vector
   if (!has_next()) return false;
   const std::uint64_t had = squares.count();
   take_valid(
-      half(), [&](double coefficient) { squares.add(coefficient); }, excess, places);
+      half(), [&](std::span<const double> some) { squares.add(some); }, excess, places);
   end_level();
   return squares.count() > had;
 }

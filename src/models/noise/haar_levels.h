@@ -18,6 +18,8 @@ namespace imuscope::noise {
 struct Segment {
   std::size_t begin = 0;
   std::size_t end = 0;
+
+  bool operator==(const Segment&) const = default;
 };
 
 /// Samples that half a support of n samples needs: an eighth of them may be missing. More than that, and what
@@ -86,6 +88,8 @@ class SquareSum {
     if (++count_ % kSideBySide != 0) return;
     for (std::size_t i = 0; i < kSideBySide; ++i) sums_[i] += squares_[i];
   }
+  /// One after the other.
+  void add(std::span<const double> values) noexcept;
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   /// Precondition: one at least.
   [[nodiscard]] double mean() const noexcept;
@@ -125,6 +129,11 @@ class HaarLevels {
   [[nodiscard]] bool has_next() const { return blocks_.size() >= half() + 1; }
   void end_level();
   void append_whole(std::size_t n, std::vector<double>& coefficients);
+  struct Halves;
+  static constexpr std::size_t kTogether = 1024;  ///< coefficients that are made in one go
+  template <typename Take>
+  void take_stretch(std::size_t n, std::size_t s, std::size_t length, Halves& halves, const Take& take,
+                    MissingExcess& excess, std::vector<Segment>& places);
   template <typename Take>
   void take_valid(std::size_t n, const Take& take, MissingExcess& excess, std::vector<Segment>& places);
 
