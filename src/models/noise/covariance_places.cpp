@@ -58,13 +58,13 @@ class CovariancePlaces::Collector {
   Collector(CovariancePlaces& places, const PairOfLevels& pair, PairCounts counts)
       : places_(places),
         centre_(pair.n_k - pair.n_j),
-        breaks_(breaks_of(pair.n_j, pair.n_k)),
-        counts_(counts) {}
+        counts_(counts),
+        furthest_(std::max(counts_.highest() - centre_, centre_ - counts_.lowest())),
+        breaks_(breaks_of_lags(breaks_of(pair.n_j, pair.n_k), counts_, centre_, furthest_)) {}
 
   void collect(double exact_near, double product_of_counts) {
     const std::size_t begin = places_.x_.size();
-    const double high = std::max(counts_.highest() - centre_, centre_ - counts_.lowest());
-    LagSum(*this, exact_near).between(breaks_, 0.0, high);
+    LagSum(*this, exact_near).between(breaks_, 0.0, furthest_);
     for (std::size_t i = begin; i < places_.weight_.size(); ++i) places_.weight_[i] /= product_of_counts;
   }
   void enter(double p, double q) { run_of(p, q, false); }
@@ -89,8 +89,9 @@ class CovariancePlaces::Collector {
 
   CovariancePlaces& places_;
   double centre_;
-  std::vector<double> breaks_;
   PairCounts counts_;
+  double furthest_;
+  std::vector<double> breaks_;
 };
 
 CovariancePlaces::CovariancePlaces(const WaveletVariance& record, std::size_t levels, const Lags& lags) {

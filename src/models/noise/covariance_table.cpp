@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "models/noise/covariance_corrections.h"
+#include "models/noise/pair_counts.h"
 #include "models/noise/wv_covariance.h"
 
 namespace imuscope::noise {
@@ -141,20 +142,23 @@ struct CovarianceTable::Sums {
 
 CovarianceTable::CovarianceTable(const WaveletVariance& wv, std::size_t levels,
                                  std::shared_ptr<CovarianceMemory> memory)
-    : record_(wv), levels_(levels), memory_(std::move(memory)), number_(memory_->next_table()) {}
+    : record_(wv),
+      levels_(levels),
+      has_holes_(std::ranges::any_of(
+          wv.levels, [&](const WvLevel& level) { return !places_of(wv, level).places.empty(); })),
+      memory_(std::move(memory)),
+      number_(memory_->next_table()) {}
 
 CovarianceTable::~CovarianceTable() = default;
 
-bool CovarianceTable::serves(const WaveletVariance& wv) {
-  return wv.efficiency >= 1.0 && wv.segments.size() <= 1 && !wv.levels.empty() &&
-         std::ranges::all_of(wv.levels, [](const WvLevel& level) { return level.places.empty(); });
-}
+bool CovarianceTable::serves(const WaveletVariance& wv) { return wv.efficiency >= 1.0 && !wv.levels.empty(); }
 
 bool CovarianceTable::fits(const WaveletVariance& wv, std::size_t levels) const {
-  return levels == levels_ && serves(wv) &&
+  return levels == levels_ && serves(wv) && record_.segments == wv.segments &&
          std::equal(record_.levels.begin(), record_.levels.end(), wv.levels.begin(), wv.levels.end(),
                     [](const WvLevel& a, const WvLevel& b) {
-                      return a.level == b.level && a.n_coefficients == b.n_coefficients;
+                      return a.level == b.level && a.n_coefficients == b.n_coefficients &&
+                             a.places == b.places;
                     });
 }
 
@@ -279,7 +283,7 @@ Eigen::MatrixXd CovarianceTable::of(const Model& model, const WaveletVariance& w
     v(static_cast<Eigen::Index>(pair.j), static_cast<Eigen::Index>(pair.k)) = value;
     v(static_cast<Eigen::Index>(pair.k), static_cast<Eigen::Index>(pair.j)) = value;
   }
-  return v;
+  return has_holes_ ? bounded_below(v) : v;
 }
 
 std::shared_ptr<const CovarianceTable> CovarianceTables::of(const WaveletVariance& wv, std::size_t levels) {

@@ -30,7 +30,7 @@ class CovarianceTable {
   CovarianceTable(const CovarianceTable&) = delete;
   CovarianceTable& operator=(const CovarianceTable&) = delete;
 
-  /// Whether a table can be made for `wv`: a classical wavelet variance of one run of samples.
+  /// Whether a table can be made for `wv`: a classical wavelet variance, of one run of samples or of several.
   static bool serves(const WaveletVariance& wv);
 
   /// Whether this is the table of `wv`.
@@ -61,8 +61,9 @@ class CovarianceTable {
   /// Of a process of amplitude 1 at these places.
   [[nodiscard]] std::shared_ptr<const Eigen::VectorXd> values(const Lags& lags, int process) const;
 
-  WaveletVariance record_;  ///< levels and their numbers of coefficients
+  WaveletVariance record_;  ///< levels, their numbers of coefficients and where these lie
   std::size_t levels_;
+  bool has_holes_;
   std::shared_ptr<CovarianceMemory> memory_;
   std::size_t number_;        ///< of this table in the memory
   mutable std::mutex mutex_;  ///< of the two below, while they are looked up or filled

@@ -1,6 +1,7 @@
 #include "models/noise/pair_counts.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace imuscope::noise {
 
@@ -22,6 +23,15 @@ LevelPlaces places_of(const WaveletVariance& wv, const WvLevel& level) {
   for (const Stretch& s : out.places) positions += s.end - s.begin;
   if (positions > 0.0) out.kept = std::min(1.0, static_cast<double>(level.n_coefficients) / positions);
   return out;
+}
+
+std::vector<double> breaks_of_lags(std::vector<double> of_covariance, const PairCounts& pairs, double centre,
+                                   double furthest) {
+  std::vector<double> breaks = std::move(of_covariance);
+  for (const double lag : pairs.kinks(centre, furthest)) breaks.push_back(std::abs(lag - centre));
+  std::sort(breaks.begin(), breaks.end());
+  breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
+  return breaks;
 }
 
 }  // namespace imuscope::noise

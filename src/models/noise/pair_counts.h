@@ -119,4 +119,10 @@ class PairCounts {
   double m_k_;
 };
 
+/// Distances from `centre` between which a sum over lags has no corner: those of C_jk, and of the pairs' number.
+/// @param of_covariance  breaks_of()
+/// @param furthest       lags that are summed
+std::vector<double> breaks_of_lags(std::vector<double> of_covariance, const PairCounts& pairs, double centre,
+                                   double furthest);
+
 }  // namespace imuscope::noise

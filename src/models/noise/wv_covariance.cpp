@@ -121,10 +121,7 @@ double covariance_of_pair(const Parts& whole, const WvLevel& j, const WvLevel& k
   }
   const double furthest_pair = std::max(pairs.highest() - centre, centre - pairs.lowest());
   const double high = std::min(furthest_pair, breaks.back() + std::ceil(reach));
-  for (const double lag : pairs.kinks(centre, high)) breaks.push_back(std::abs(lag - centre));
-  std::sort(breaks.begin(), breaks.end());
-  breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
-  LagSum(term, exact_near).between(breaks, 0.0, high);
+  LagSum(term, exact_near).between(breaks_of_lags(std::move(breaks), pairs, centre, high), 0.0, high);
   const double count_j = static_cast<double>(j.n_coefficients);
   const double count_k = static_cast<double>(k.n_coefficients);
   double result = term.sum() / (count_j * count_k);

@@ -188,27 +188,31 @@ TEST(CovarianceAnswers, WhichRecordsATableServes) {
   EXPECT_FALSE(table.fits(wv, 8));
   EXPECT_FALSE(table.fits(whole(3'001), 9));
   EXPECT_FALSE(table.fits(whole(5'000), 9));
-  EXPECT_FALSE(CovarianceTable::serves(two_runs(1'500)));
+  EXPECT_TRUE(CovarianceTable::serves(two_runs(1'500)));
+  EXPECT_FALSE(table.fits(two_runs(1'500), 9));
   EXPECT_FALSE(CovarianceTable::serves({}));
   auto changed = wv;
   changed.levels[4].level = 6;
   EXPECT_FALSE(table.fits(changed, 9));
   changed = wv;
   changed.levels.back().places.push_back({0, 1});
-  EXPECT_FALSE(CovarianceTable::serves(changed));
+  EXPECT_FALSE(table.fits(changed, 9));
   changed = wv;
   changed.efficiency = 0.6;
   EXPECT_FALSE(CovarianceTable::serves(changed));
   changed = wv;
   changed.segments.clear();
-  EXPECT_TRUE(table.fits(changed, 9));
+  EXPECT_FALSE(table.fits(changed, 9));
   CovarianceTables tables;
   const auto first = tables.of(wv, 9);
   ASSERT_TRUE(first);
   EXPECT_EQ(tables.of(wv, 9), first);
   EXPECT_NE(tables.of(wv, 8), first);
   EXPECT_EQ(tables.of(wv, 9), first);
-  EXPECT_FALSE(tables.of(two_runs(1'500), 6));
+  const auto of_runs = tables.of(two_runs(1'500), 6);
+  ASSERT_TRUE(of_runs);
+  EXPECT_NE(of_runs, first);
+  EXPECT_EQ(tables.of(two_runs(1'500), 6), of_runs);
 }
 
 TEST(CovarianceAnswers, Parts) {

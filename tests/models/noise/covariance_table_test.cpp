@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -104,10 +106,54 @@ TEST(CovarianceTable, OneIsSharedByRecordsOfOneLengthAndNoOthers) {
   EXPECT_NE(tables.of(wv, 11), table);
   EXPECT_NE(tables.of(record_of(50'001, 12), 12), table);
   other.segments = {{0, 20'000}, {20'100, 50'000}};
-  EXPECT_EQ(tables.of(other, 12), nullptr) << "stretches have no table";
+  const auto of_stretches = tables.of(other, 12);
+  ASSERT_NE(of_stretches, nullptr);
+  EXPECT_NE(of_stretches, table);
+  EXPECT_EQ(tables.of(other, 12), of_stretches);
+  other.levels.back().places = {{30'000, 30'500}};
+  EXPECT_NE(tables.of(other, 12), of_stretches);
   other = wv;
   other.efficiency = 0.6;
   EXPECT_EQ(tables.of(other, 12), nullptr) << "nor has a robust one";
+}
+
+/// Of white noise with holes: few, so that each of their lags is a break, or many, of which a share counts.
+WaveletVariance with_holes(std::size_t samples, int holes, std::size_t longest) {
+  std::mt19937_64 random(static_cast<unsigned>(holes));
+  std::normal_distribution<double> normal;
+  std::vector<double> x(samples);
+  for (double& v : x) v = normal(random);
+  std::uniform_int_distribution<std::size_t> place(0, samples - 1);
+  std::uniform_int_distribution<std::size_t> length(1, longest);
+  std::vector<std::uint8_t> mask(samples, 1);
+  for (int i = 0; i < holes; ++i) {
+    const std::size_t begin = place(random);
+    const std::size_t end = std::min(samples, begin + length(random));
+    std::fill(mask.begin() + static_cast<std::ptrdiff_t>(begin),
+              mask.begin() + static_cast<std::ptrdiff_t>(end), std::uint8_t{0});
+  }
+  WvOptions options;
+  options.mask = mask;
+  WaveletVariance wv = haar_wavelet_variance(x, options).value();
+  std::erase_if(wv.levels, [](const WvLevel& level) { return !has_enough_coefficients(level, 1.0); });
+  return wv;
+}
+
+TEST(CovarianceTable, AgreesWithTheSumWhereSamplesAreMissing) {
+  const Component wn{ProcessKind::kWhiteNoise, 1.0, {}};
+  const Component qn{ProcessKind::kQuantization, 2.0, {}};
+  const Component rw{ProcessKind::kRandomWalk, 1e-7, {}};
+  const Component dr{ProcessKind::kRamp, 1e-12, {}};
+  const Component fn{ProcessKind::kFlicker, 1e-3, {}};
+  const Component res{ProcessKind::kResonance, 0.7, {0.06, 1.25}};
+  for (const WaveletVariance& wv : {with_holes(60'000, 1, 2'000), with_holes(60'000, 3, 3'000),
+                                    with_holes(100'000, 60, 400), with_holes(50'000, 500, 1)}) {
+    SCOPED_TRACE(wv.segments.size());
+    const CovarianceTable table(wv, wv.levels.size());
+    for (const Model& model : {Model{{wn}}, Model{{qn, wn, rw}}, Model{{gm(0.0713, 1.0), dr}},
+                               Model{{wn, fn, rw}}, Model{{wn, gm(2.3e-4, 1e-2)}}, Model{{wn, res, rw}}})
+      EXPECT_LT(distance(table.of(model, wv), wv_covariance(model, wv, wv.levels.size())), kAgree);
+  }
 }
 
 /// Models whose resonances ring for a few lags to a few hundred.
