@@ -157,6 +157,12 @@ double freedom_of(const WvLevel& level, double efficiency) {
 /// under the fitted model, whether or not each parameter by itself is told.
 class Uncertainty {
  public:
+  /// Of a logarithm.
+  struct Range {
+    double low = 0.0;
+    double high = 0.0;
+  };
+
   explicit Uncertainty(const FitResult& fit) : fit_(fit), places_(parameter_places(fit.model)) {
     std::vector<int> levels;
     for (const FittedLevel& level : fit.wv) levels.push_back(level.observed.level);
@@ -180,10 +186,32 @@ class Uncertainty {
     known_ = true;
   }
 
+  /// G-32: what of ln(f(model)) - ln(f(the fit)) lies within z sds, by the likelihood's profile over each of the model's
+  /// correlation times in turn, along which a share moves too far for a gradient. Empty where the data tell no such time.
+  [[nodiscard]] std::optional<Range> profile(const OfModel& f, double z) const {
+    if (!known_ || !(eigen_.eigenvalues().minCoeff() > 0.0)) return std::nullopt;
+    Eigen::MatrixXd sigma = eigen_.eigenvectors() * eigen_.eigenvalues().cwiseInverse().asDiagonal() *
+                            eigen_.eigenvectors().transpose();
+    for (std::size_t i = 0; i < present_.size() && present_[i] < fit_.parameters.size(); ++i) {
+      const auto k = static_cast<Eigen::Index>(i);
+      sigma(k, k) += std::pow(fit_.parameters[present_[i]].spread_sd, 2);
+    }
+    std::optional<Range> range;
+    for (std::size_t i = 0; i < present_.size(); ++i) {
+      const ParameterPlace& place = places_[present_[i]];
+      const bool is_rate =
+          place.shape >= 0 && fit_.model.components[place.component].kind == ProcessKind::kGaussMarkov;
+      const auto k = static_cast<Eigen::Index>(i);
+      if (!is_rate || !(std::sqrt(sigma(k, k)) < kUndetermined)) continue;
+      widen(range, profile_over(k, sigma, f, z));
+    }
+    return range;
+  }
+
   /// Sd of ln(f(model)); infinite where the data do not tell.
   [[nodiscard]] double log_sd(const OfModel& f) const {
     if (!known_) return kInfinity;
-    const Eigen::VectorXd slope = gradient(f);
+    const Eigen::VectorXd slope = gradient(f, fit_.model);
     const Eigen::VectorXd along = eigen_.eigenvectors().transpose() * slope;
     double variance = 0.0;
     for (std::size_t i = 0; i < present_.size() && present_[i] < fit_.parameters.size(); ++i)
@@ -209,25 +237,58 @@ class Uncertainty {
     return v;
   }
 
-  [[nodiscard]] Eigen::VectorXd gradient(const OfModel& f) const {
+  /// The model with one present parameter's coordinate moved.
+  void move(Model& model, std::size_t present, double step) const {
+    const ParameterPlace& place = places_[present_[present]];
+    Component& c = model.components[place.component];
+    if (place.shape < 0) {
+      c.amplitude *= std::exp(step);
+    } else {
+      double& shape = c.shape[static_cast<std::size_t>(place.shape)];
+      shape = shape_of_coordinate(c.kind, coordinate_of_shape(c.kind, shape) + step);
+    }
+  }
+
+  /// Of ln(f) at a model.
+  [[nodiscard]] Eigen::VectorXd gradient(const OfModel& f, const Model& model) const {
     constexpr double kStep = 1e-4;
     Eigen::VectorXd g(static_cast<Eigen::Index>(present_.size()));
     for (std::size_t i = 0; i < present_.size(); ++i) {
       const auto at = [&](double step) {
-        Model moved = fit_.model;
-        const ParameterPlace& place = places_[present_[i]];
-        Component& c = moved.components[place.component];
-        if (place.shape < 0) {
-          c.amplitude *= std::exp(step);
-        } else {
-          double& shape = c.shape[static_cast<std::size_t>(place.shape)];
-          shape = shape_of_coordinate(c.kind, coordinate_of_shape(c.kind, shape) + step);
-        }
+        Model moved = model;
+        move(moved, i, step);
         return std::log(f(moved));
       };
       g[static_cast<Eigen::Index>(i)] = (at(kStep) - at(-kStep)) / (2.0 * kStep);
     }
     return g;
+  }
+
+  /// Of one parameter, the others following it as the data correlate them, and within what is left of z beside it.
+  [[nodiscard]] Range profile_over(Eigen::Index over, const Eigen::MatrixXd& sigma, const OfModel& f,
+                                   double z) const {
+    constexpr int kSteps = 12;
+    const double sd = std::sqrt(sigma(over, over));
+    const Eigen::VectorXd along = sigma.col(over) / sd;
+    const Eigen::MatrixXd beside = sigma - along * along.transpose();
+    const double at_fit = std::log(f(fit_.model));
+    Range range{0.0, 0.0};
+    for (int step = -kSteps; step <= kSteps; ++step) {
+      const double u = z * step / kSteps;
+      Model model = fit_.model;
+      for (std::size_t i = 0; i < present_.size(); ++i)
+        move(model, i, u * along[static_cast<Eigen::Index>(i)]);
+      const Eigen::VectorXd slope = gradient(f, model);
+      const double rest = std::sqrt(std::max(0.0, slope.dot(beside * slope) * (z * z - u * u)));
+      const double value = std::log(f(model)) - at_fit;
+      range.low = std::min(range.low, value - rest);
+      range.high = std::max(range.high, value + rest);
+    }
+    return range;
+  }
+
+  static void widen(std::optional<Range>& range, const Range& other) {
+    range = range ? Range{std::min(range->low, other.low), std::max(range->high, other.high)} : other;
   }
 
   const FitResult& fit_;
@@ -264,10 +325,13 @@ Felt as_bound(double fitted, double bound) {
 Felt felt(const FitResult& fit, const OfModel& f, const std::function<double()>& bound) {
   const double value = f(fit.model);
   if (value > 0.0) {
-    const double log_sd = Uncertainty(fit).log_sd(f);
+    const Uncertainty uncertainty(fit);
+    const double log_sd = uncertainty.log_sd(f);
     if (log_sd < kUndetermined) {
-      const double factor = std::exp(normal_quantile_of(fit.confidence) * log_sd);
-      return {value, value * factor, value / factor, Knowledge::kFitted};
+      const double z = normal_quantile_of(fit.confidence);
+      const auto profile = uncertainty.profile(f, z);
+      const auto range = profile.value_or(Uncertainty::Range{-z * log_sd, z * log_sd});
+      return {value, value * std::exp(range.high), value * std::exp(range.low), Knowledge::kFitted};
     }
   }
   return as_bound(value, bound());
