@@ -244,13 +244,15 @@ class BatchEstimates::Pair {
   batch::BatchOptions options_;
 };
 
-BatchEstimates::BatchEstimates(const Configuration& configuration, double longest_s)
+BatchEstimates::BatchEstimates(const Configuration& configuration, Foreseen foreseen, double longest_s)
     : configuration_(configuration),
+      foreseen_(std::move(foreseen)),
       longest_s_(longest_s),
       records_(configuration, longest_s),
       studies_(configuration.study_indices()),
       first_hours_(studies_.size()),
-      has_begun_(studies_.size(), false) {}
+      has_begun_(studies_.size(), false),
+      n_ahead_(studies_.size()) {}
 
 BatchEstimates::~BatchEstimates() {
   // Not beside_.cancel(): it would stop the loops inside of an estimate that goes on to use what they made.
@@ -266,13 +268,24 @@ void BatchEstimates::add(const Sample& sample) {
   records_.add(sample);
   for (std::size_t i = 0; i < studies_.size(); ++i) {
     if (has_begun_[i]) continue;
-    const Pair pair = pair_of(i);
-    if (!pair.has_first_hour()) continue;
+    if (!pair_of(i).has_first_hour()) continue;
     has_begun_[i] = true;
-    beside_.run([this, pair, i] {
-      if (!is_given_up_) first_hours_[i] = pair.estimate_first_hour();
+    beside_.run([this, i] {
+      if (!is_given_up_) estimate_first_hour(i);
     });
   }
+}
+
+void BatchEstimates::estimate_first_hour(std::size_t study) {
+  first_hours_[study] = pair_of(study).estimate_first_hour();
+  if (--n_ahead_ > 0 || !foreseen_ || is_given_up_) return;
+  std::vector<BatchOutcome> outcomes(first_hours_.size());
+  for (std::size_t i = 0; i < outcomes.size(); ++i) {
+    const auto& found = *first_hours_[i];
+    if (!found) return;
+    outcomes[i].mounting = *found;
+  }
+  foreseen_(outcomes);
 }
 
 BatchOutcome BatchEstimates::outcome_of(std::size_t study, std::optional<double> moved_s) {

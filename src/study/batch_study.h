@@ -6,6 +6,7 @@
 #include <tbb/task_group.h>
 
 #include <atomic>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -70,9 +71,15 @@ struct BatchOutcome {
 /// soon as it is there, beside the rest of the pass. The results do not depend on that. Thread: one.
 class BatchEstimates {
  public:
+  /// Takes what the outcomes are going to be, unless the filter finds that an S-IMU was moved.
+  using Foreseen = std::function<void(const std::vector<BatchOutcome>&)>;
+
   /// @param configuration  outlives this
+  /// @param foreseen       called by a thread of the pool, once and beside the pass, where the first hour gave a
+  ///                       mounting of every S-IMU; may be empty
   /// @param longest_s      in place of an hour
-  explicit BatchEstimates(const Configuration& configuration, double longest_s = kBatchLongest_s);
+  explicit BatchEstimates(const Configuration& configuration, Foreseen foreseen = {},
+                          double longest_s = kBatchLongest_s);
   ~BatchEstimates();
   BatchEstimates(const BatchEstimates&) = delete;
   BatchEstimates& operator=(const BatchEstimates&) = delete;
@@ -94,14 +101,17 @@ class BatchEstimates {
   using FirstHour = std::optional<Result<batch::BatchMounting>>;
 
   [[nodiscard]] Pair pair_of(std::size_t study) const;
+  void estimate_first_hour(std::size_t study);
   [[nodiscard]] BatchOutcome outcome_of(std::size_t study, std::optional<double> moved_s);
 
   const Configuration& configuration_;
+  Foreseen foreseen_;
   double longest_s_;
   BatchRecords records_;
   std::vector<std::size_t> studies_;    ///< devices
   std::vector<FirstHour> first_hours_;  ///< those that began beside the pass
   std::vector<bool> has_begun_;
+  std::atomic<std::size_t> n_ahead_;      ///< of which no first hour has been estimated
   std::atomic<bool> is_given_up_{false};  ///< what has not begun need not
   tbb::task_group beside_;
 };

@@ -3,6 +3,7 @@
 /// The smoothed drive of a study: a pass of its own over the recording, linearised about the mounting that
 /// was found, whose history is smoothed. Non-real-time: allocates, writes files.
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <span>
@@ -45,10 +46,12 @@ using FormerMountings = std::vector<std::vector<FormerMounting>>;
 
 /// Replays `recording` with every state free, the mounting's first values being those in force at its start,
 /// so that the whole drive is covered from its first sample on, and smooths what the filter saw.
+/// @param is_given_up  as ReplayOptions has it
 Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const EstimatorConfig& estimator,
                                    const Recording& recording, const std::vector<SImuOutput>& finals,
                                    const FormerMountings& former, const RecordStorage& storage,
-                                   const std::function<void(double)>& progress);
+                                   const std::function<void(double)>& progress,
+                                   const std::atomic<bool>* is_given_up);
 
 /// Writes smoothed_navigation.csv (columns of navigation.csv; where there was navigation) and, per S-IMU,
 /// smoothed_NAME.csv (columns of calibration_NAME.csv): biases smoothed, the constants of the mounting at

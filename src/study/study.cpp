@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 #include <malloc.h>
-#include <sys/resource.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_group.h>
 
 #include <algorithm>
-#include <future>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -22,6 +21,7 @@
 #include "study/dependence_study.h"
 #include "study/dynamics_files.h"
 #include "study/error_pass.h"
+#include "study/mounted_passes.h"
 #include "study/noise_study.h"
 #include "study/regime_study.h"
 #include "study/smoothing.h"
@@ -80,17 +80,6 @@ Result<std::vector<RowSpool>> make_spools(std::size_t n, const OutputFolder& fol
     spools.push_back(std::move(*spool));
   }
   return spools;
-}
-
-/// The estimator of the last pass: every mounting that was found is known.
-EstimatorConfig frozen(EstimatorConfig config, const std::vector<SImuOutput>& finals) {
-  for (std::size_t i = 0; i < config.studies.size(); ++i) {
-    const auto& final = finals[i];
-    if (!has_estimate(final.status)) continue;
-    config.studies[i] = with_mounting(
-        config.studies[i], {final.C_b_s, final.r_bs_b_m, final.t_d_s, final.gyro_scale, final.accel_scale});
-  }
-  return config;
 }
 
 std::vector<SImuOutput> final_studies(const Snapshot& last) {
@@ -195,22 +184,6 @@ tl::unexpected<Error> nothing_was_run(const ReplayResult& result) {
       "forged");
 }
 
-/// Work in a thread of its own, which leaves the processors to its caller, whose way is the longer one; done when its
-/// result is asked for where no second thread may be used.
-template <typename Work>
-auto in_spare_time(Work work) {
-  if (!may_use_threads()) return std::async(std::launch::deferred, std::move(work));
-  return std::async(std::launch::async, [work = std::move(work)] {
-    // Enough to have the core that the caller leaves, and a share where other programs compute: SCHED_IDLE would wait
-    // for those.
-    constexpr int kNicer = 10;
-    constexpr int kNicest = 19;
-    // Linux takes this for the calling thread alone.
-    setpriority(PRIO_PROCESS, 0, std::min(getpriority(PRIO_PROCESS, 0) + kNicer, kNicest));
-    return work();
-  });
-}
-
 /// Work beside the caller's. It has ended when this is gone.
 class Beside {
  public:
@@ -243,14 +216,28 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   replay_options.has_sink_beside = may_use_threads();
   if (options.progress)
     replay_options.progress = [&](double share) { options.progress("calibration", share); };
-  std::optional<BatchEstimates> batch(configuration);
+  const auto infos = study_file_infos(configuration, recording);
+  const MountedPasses::Drive drive{configuration, estimator, recording, (*folder)->folder(), options.out};
+  // What the batch and the passes are told before the whole of it is there is what they are told in the end, or
+  // not used.
+  std::unique_ptr<MountedPasses> passes;
+  const auto begin_ahead = [&](const std::vector<BatchOutcome>& foreseen) {
+    const auto mountings = with_batch(std::vector<SImuOutput>(foreseen.size()), foreseen);
+    auto begun = MountedPasses::begin(
+        drive,
+        {mountings, with_settled(mountings, infos, options.mountings), FormerMountings(foreseen.size())},
+        true);
+    if (begun) passes = std::move(*begun);
+  };
+  std::optional<BatchEstimates> batch;
+  batch.emplace(configuration, may_use_threads() ? BatchEstimates::Foreseen(begin_ahead) : nullptr,
+                options.batch_longest_s.value_or(kBatchLongest_s));
   if (configuration.estimator.batch_mounting)
     replay_options.on_sample = [&batch](const Sample& sample) { batch->add(sample); };
   const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
   if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
   if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
   Snapshot last = *(*folder)->last_snapshot();
-  const auto infos = study_file_infos(configuration, recording);
   const auto of_filter = final_studies(last);
   const bool by_batch = configuration.estimator.batch_mounting;
   if (by_batch && options.progress) options.progress("batch estimate", 0.0);
@@ -274,46 +261,46 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
     return work_error(run.warnings.empty() ? "no S-IMU could be calibrated" : run.warnings.front());
   }
 
-  const auto settled = with_settled(finals, infos, options.mountings);
-  auto epochs = EpochGatherer::create((*folder)->folder(), finals.size());
-  if (!epochs) return tl::unexpected<Error>(epochs.error());
-  // The filter with every mounting known needs no smoothed bias: both passes side by side. Smoothing goes forth and
-  // back, and takes longer.
-  auto second =
-      in_spare_time([&] { return replay(configuration, frozen(estimator, settled), recording, *epochs); });
-  std::optional<Result<SmoothedTrack>> track =
-      smooth_drive(configuration, estimator, recording, finals, former,
-                   {Smoother::kMemory_bytes, options.out}, [&](double share) {
-                     if (options.progress) options.progress("smoothing", share);
-                   });
-  const Result<ReplayResult> replayed = second.get();
-  if (!*track) return tl::unexpected<Error>(track->error());
-  if (!replayed) return tl::unexpected<Error>(replayed.error());
+  const StudyMountings mountings{finals, with_settled(finals, infos, options.mountings), former};
+  if (!passes || !passes->are_of(mountings)) {
+    passes.reset();
+    auto begun = MountedPasses::begin(drive, mountings, false);
+    if (!begun) return tl::unexpected<Error>(begun.error());
+    passes = std::move(*begun);
+  }
+  auto passed = passes->result([&](double share) {
+    if (options.progress) options.progress("smoothing", share);
+  });
+  passes.reset();
+  if (!passed) return tl::unexpected<Error>(passed.error());
+  std::optional<SmoothedTrack> track(std::move(passed->track));
+  EpochGatherer& epochs = passed->epochs;
   // Nothing below needs the smoothed drive's files.
   Result<void> smoothed_files;
   Beside writer([&] {
-    smoothed_files = write_smoothed(**track, last, (*folder)->utc(), former, infos, (*folder)->folder());
+    smoothed_files = write_smoothed(*track, last, (*folder)->utc(), former, infos, (*folder)->folder());
   });
-  const auto smoothed = smoothed_drive(**track, finals, former);
+  const auto smoothed = smoothed_drive(*track, finals, former);
   if (!smoothed) return tl::unexpected<Error>(smoothed.error());
   if (options.progress) options.progress("error process", 0.0);
   auto rows = make_spools(finals.size(), (*folder)->folder());
   if (!rows) return tl::unexpected<Error>(rows.error());
-  if (auto made = epochs->make_rows(configuration, former, smoothed->biases, *rows); !made) return made;
+  if (auto made = epochs.make_rows(configuration, former, smoothed->biases, *rows); !made) return made;
 
   const HostTime origin = last.first_reference_time;
   const UtcTrack& utc = (*folder)->utc();
   const auto labels = labels_of_run(options.labels, origin, [&](UtcTime time) { return utc.time_of(time); });
   if (!labels) return tl::unexpected<Error>(labels.error());
-  auto regimes = find_regimes(configuration.regimes, epochs->watch(), *labels, recording.moments, origin);
+  auto regimes = find_regimes(configuration.regimes, epochs.watch(), *labels, recording.moments, origin);
   if (!regimes) return tl::unexpected<Error>(regimes.error());
   auto studied = make_spools(finals.size(), (*folder)->folder());
   if (!studied) return tl::unexpected<Error>(studied.error());
   std::vector<NoiseSeries> series(finals.size());
   tbb::parallel_for(std::size_t{0}, finals.size(), [&](std::size_t i) {
-    const ScaleError scale = configuration.noise.remove_scale_error
-                                 ? ScaleError{settled[i].gyro_scale, settled[i].accel_scale}
-                                 : ScaleError{};
+    const ScaleError scale =
+        configuration.noise.remove_scale_error
+            ? ScaleError{mountings.settled[i].gyro_scale, mountings.settled[i].accel_scale}
+            : ScaleError{};
     series[i] = write_errors({i, origin, {}, {}, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]);
   });
 
@@ -346,7 +333,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   Result<void> scatter;
   tbb::parallel_invoke(
       [&] {
-        dependence = study_dependence(configuration, series, epochs->temperatures(), epochs->watch().levels(),
+        dependence = study_dependence(configuration, series, epochs.temperatures(), epochs.watch().levels(),
                                       regimes->motion, noise_study, origin);
       },
       [&] { models = models_json(noise_study); }, [&] { comparison = comparison_json(noise_study, names); },

@@ -29,6 +29,8 @@ struct StudyRunOptions {
   std::vector<Label> labels;
   /// Of the look at the data before, for run.json.
   std::vector<check::Finding> findings;
+  /// Of how much of a recording a mounting is estimated, in place of an hour.
+  std::optional<double> batch_longest_s{};
 };
 
 /// Runs the whole study of `recording` into options.out. Errors: what replay() refuses; a folder that cannot

@@ -45,7 +45,7 @@ synthetic::Pair long_pair() {
 batch::BatchMounting mounting_after(const synthetic::Pair& pair, double reference_until_s,
                                     double study_until_s, bool is_to_begin) {
   const Configuration configuration = two_devices();
-  BatchEstimates estimates(configuration, kLongest_s);
+  BatchEstimates estimates(configuration, {}, kLongest_s);
   add_until(pair.reference, 0, reference_until_s, estimates);
   EXPECT_FALSE(estimates.has_begun(0));
   add_until(pair.study, 1, study_until_s, estimates);
@@ -81,10 +81,41 @@ TEST(BatchEstimates, AreTheSameByOneThread) {
   expect_same(by_all, mounting_after(pair, end_s, end_s, true));
 }
 
+TEST(BatchEstimates, SayAheadWhatComesOut) {
+  const auto pair = long_pair();
+  const Configuration configuration = two_devices();
+  std::vector<std::vector<BatchOutcome>> foreseen;
+  BatchEstimates estimates(
+      configuration, [&](const std::vector<BatchOutcome>& outcomes) { foreseen.push_back(outcomes); },
+      kLongest_s);
+  add_until(pair.reference, 0, 1e9, estimates);
+  add_until(pair.study, 1, 1e9, estimates);
+  const auto outcomes = estimates.outcomes(FormerMountings(1));
+  ASSERT_EQ(foreseen.size(), 1U);
+  ASSERT_EQ(foreseen[0].size(), 1U);
+  ASSERT_TRUE(foreseen[0][0].mounting && outcomes[0].mounting);
+  expect_same(*foreseen[0][0].mounting, *outcomes[0].mounting);
+}
+
+TEST(BatchEstimates, SayNothingAheadOfASensorThatFoundNone) {
+  auto pair = long_pair();
+  // Of another vehicle.
+  pair.study = synthetic::make_pair({.duration_s = kLongest_s + 2.0 * kMargin_s}, 8).study;
+  const Configuration configuration = two_devices();
+  int foreseen = 0;
+  BatchEstimates estimates(
+      configuration, [&](const std::vector<BatchOutcome>&) { ++foreseen; }, kLongest_s);
+  add_until(pair.reference, 0, 1e9, estimates);
+  add_until(pair.study, 1, 1e9, estimates);
+  EXPECT_TRUE(estimates.has_begun(0));
+  EXPECT_FALSE(estimates.outcomes(FormerMountings(1))[0].mounting);
+  EXPECT_EQ(foreseen, 0);
+}
+
 TEST(BatchEstimates, EndWithThePassThatFailed) {
   const auto pair = long_pair();
   const Configuration configuration = two_devices();
-  BatchEstimates estimates(configuration, kLongest_s);
+  BatchEstimates estimates(configuration, {}, kLongest_s);
   add_until(pair.reference, 0, 1e9, estimates);
   add_until(pair.study, 1, 1e9, estimates);
   EXPECT_TRUE(estimates.has_begun(0));

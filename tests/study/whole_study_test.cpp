@@ -3,14 +3,17 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <unistd.h>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <string>
@@ -22,8 +25,10 @@
 #include "firmware_sim/imu/sensor_classes.h"
 #include "firmware_sim/motion/motion.h"
 #include "logs/mcap/reader.h"
+#include "service/pipeline/estimator_setup.h"
 #include "service/recording/recording.h"
 #include "study/evaluate.h"
+#include "study/mounted_passes.h"
 #include "study/run_bag.h"
 #include "study/study.h"
 #include "tests/support/answer.h"
@@ -206,19 +211,23 @@ class WholeStudy : public testing::Test {
   static void SetUpTestSuite() {
     scratch_ = new ScratchFolder;
     write_drive(scratch_->path);
-    std::vector<std::string> inputs;
-    for (const char* name : {"reference", "mtx1", "mtx2", "gnss"})
-      inputs.push_back(std::string(name) + "=" + (scratch_->path / (std::string(name) + ".csv")).string());
-    auto configuration = parse_configuration(kConfiguration, "whole.toml");
-    ASSERT_TRUE(configuration) << configuration.error().text();
-    const auto opened = open_dumps(inputs, std::move(*configuration));
-    ASSERT_TRUE(opened) << opened.error().text();
     StudyRunOptions options;
     options.out = run();
     options.version = "0";
     options.progress = [](const std::string& step, double share) { progress_[step] = share; };
-    const auto done = run_study(opened->configuration, opened->recording, options);
+    const auto done = study(kConfiguration, {"reference", "mtx1", "mtx2", "gnss"}, options);
     ASSERT_TRUE(done) << done.error().text();
+  }
+  static Result<void> study(const std::string& text, const std::vector<std::string>& devices,
+                            const StudyRunOptions& options) {
+    std::vector<std::string> inputs;
+    for (const std::string& name : devices)
+      inputs.push_back(name + "=" + (scratch_->path / (name + ".csv")).string());
+    auto configuration = parse_configuration(text, "whole.toml");
+    if (!configuration) return tl::unexpected<Error>(configuration.error());
+    const auto opened = open_dumps(inputs, std::move(*configuration));
+    if (!opened) return tl::unexpected<Error>(opened.error());
+    return run_study(opened->configuration, opened->recording, options);
   }
   static void TearDownTestSuite() {
     delete scratch_;
@@ -230,6 +239,115 @@ class WholeStudy : public testing::Test {
   static inline ScratchFolder* scratch_ = nullptr;
   static inline std::map<std::string, double> progress_;
 };
+
+/// All files of a run, by name.
+std::map<std::string, std::string> files_of(const std::filesystem::path& run) {
+  std::map<std::string, std::string> files;
+  for (const auto& file : std::filesystem::directory_iterator(run)) {
+    std::ifstream in(file.path(), std::ios::binary);
+    files[file.path().filename().string()] =
+        without({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, run.string());
+  }
+  return files;
+}
+
+/// The configuration without the S-IMU that is turned.
+std::string without_turned() {
+  std::string text = kConfiguration;
+  const auto name = text.find("name = \"mtx2\"");
+  const auto begin = text.rfind("[[device]]", name);
+  return text.erase(begin, text.find("[[device]]", name) - begin);
+}
+
+/// The passes that need the mountings begin ahead where more than one thread may be used: what they were told ahead is
+/// what comes out, or is not used, as of an S-IMU that is turned later.
+TEST_F(WholeStudy, WhatBeginsBesideTheCalibrationMakesNoDifference) {
+  StudyRunOptions options;
+  options.version = "0";
+  options.batch_longest_s = 60.0;
+  const std::vector<std::pair<std::string, std::vector<std::string>>> drives{
+      {without_turned(), {"reference", "mtx1", "gnss"}},
+      {kConfiguration, {"reference", "mtx1", "mtx2", "gnss"}}};
+  for (const auto& [configuration, devices] : drives) {
+    SCOPED_TRACE(devices.size());
+    options.out = scratch_->path / "ahead";
+    const auto ahead = study(configuration, devices, options);
+    ASSERT_TRUE(ahead) << ahead.error().text();
+    const auto files = files_of(options.out);
+    options.out = scratch_->path / "by one thread";
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    const auto in_order = study(configuration, devices, options);
+    ASSERT_TRUE(in_order) << in_order.error().text();
+    const auto same = files_of(options.out);
+    ASSERT_EQ(files.size(), same.size());
+    for (const auto& [name, text] : files) EXPECT_TRUE(same.at(name) == text) << name;
+    for (const char* folder : {"ahead", "by one thread"})
+      std::filesystem::remove_all(scratch_->path / folder);
+  }
+}
+
+/// Estimates in which both S-IMUs are as configured.
+StudyMountings some_mountings() {
+  std::vector<SImuOutput> both(2);
+  for (SImuOutput& one : both) one.status = CalibrationStatus::kCalibrated;
+  return {both, both, FormerMountings(2)};
+}
+
+TEST_F(WholeStudy, PassesAreOfTheMountingsThatTheyBeganWith) {
+  auto configuration = parse_configuration(kConfiguration, "whole.toml");
+  ASSERT_TRUE(configuration);
+  std::vector<std::string> inputs;
+  for (const char* name : {"reference", "mtx1", "mtx2", "gnss"})
+    inputs.push_back(std::string(name) + "=" + (scratch_->path / (std::string(name) + ".csv")).string());
+  const auto opened = open_dumps(inputs, std::move(*configuration));
+  ASSERT_TRUE(opened);
+  const EstimatorConfig estimator = estimator_config(opened->configuration);
+  const auto path = scratch_->path / "given up";
+  std::filesystem::create_directories(path);
+  const auto folder = OutputFolder::open(path);
+  ASSERT_TRUE(folder);
+  // Given up at once: this ends long before the passes would.
+  const auto passes = MountedPasses::begin(
+      {opened->configuration, estimator, opened->recording, *folder, path}, some_mountings(), true);
+  ASSERT_TRUE(passes);
+  EXPECT_TRUE((*passes)->are_of(some_mountings()));
+  StudyMountings others = some_mountings();
+  others.of_drive[1].sd_psi_rad[0] = 1.0;  // no matter
+  EXPECT_TRUE((*passes)->are_of(others));
+  others.of_drive[1].t_d_s += 1e-6;
+  EXPECT_FALSE((*passes)->are_of(others));
+  others = some_mountings();
+  others.settled[0].gyro_scale[2] += 1e-9;
+  EXPECT_FALSE((*passes)->are_of(others));
+  others = some_mountings();
+  others.settled[0].status = CalibrationStatus::kWaiting;
+  EXPECT_FALSE((*passes)->are_of(others));
+  others = some_mountings();
+  others.former[1].push_back({});
+  EXPECT_FALSE((*passes)->are_of(others));
+}
+
+TEST_F(WholeStudy, AReplayThatIsGivenUpEndsWithAnError) {
+  auto configuration = parse_configuration(kConfiguration, "whole.toml");
+  ASSERT_TRUE(configuration);
+  const auto opened = open_dumps({"reference=" + (scratch_->path / "reference.csv").string(),
+                                  "mtx1=" + (scratch_->path / "mtx1.csv").string()},
+                                 std::move(*configuration));
+  ASSERT_TRUE(opened);
+  struct : CoreSink {
+    void on_error(const ErrorRecord&) noexcept override {}
+    void on_event(const EstimatorEvent&) noexcept override {}
+    void on_snapshot(const Snapshot&) noexcept override { is_given_up = true; }
+    void on_late_sample(const LateSample&) noexcept override {}
+    std::atomic<bool> is_given_up{false};
+  } sink;
+  ReplayOptions options;
+  options.is_given_up = &sink.is_given_up;
+  const auto result = replay(opened->configuration, estimator_config(opened->configuration),
+                             opened->recording, sink, options);
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().what, "the replay was given up");
+}
 
 TEST_F(WholeStudy, Calibration) {
   Answer lines;

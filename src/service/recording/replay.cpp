@@ -191,6 +191,8 @@ class Replayer {
     const auto skipped = recording_.schedule ? recording_.schedule->skipped_ticks : NumberRanges{};
     const HostTime started = host_now();
     for (std::int64_t index = 0; !finished(index); ++index) {
+      if (options_.is_given_up != nullptr && *options_.is_given_up)
+        return work_error("the replay was given up");
       const HostTime cut = t0 + index * kTickPeriod;
       for (auto& feed : feeds_) {
         if (!feed) continue;

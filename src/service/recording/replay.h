@@ -4,6 +4,7 @@
 /// arrival stamps, arrival is device time plus time on the wire, and the devices' clocks are brought together
 /// by content (clock_alignment.h).
 
+#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
@@ -94,6 +95,8 @@ struct ReplayOptions {
   bool has_sink_beside = false;
   /// Sees every sample as it was decoded, device by device in stream order; may be empty.
   std::function<void(const Sample&)> on_sample;
+  /// Where it becomes true, the replay ends soon, with an error (kWork): nobody wants its result any more.
+  const std::atomic<bool>* is_given_up = nullptr;
 };
 
 /// Runs the recording through a core made from `estimator`. Errors: a recording that cannot be read, or that
