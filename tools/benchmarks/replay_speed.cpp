@@ -38,34 +38,46 @@ struct Cost {
   double memory_mb = 0.0;
 };
 
-/// Runs a program without its output to its end. Throws where it fails: a benchmark of a failure says
-/// nothing.
-Cost run(const std::vector<std::string>& command) {
-  std::vector<char*> arguments;
-  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  const auto begun = std::chrono::steady_clock::now();
-  const pid_t child = fork();
-  if (child < 0) throw std::runtime_error("no process can be started");
-  if (child == 0) {
+/// A program that runs without its output.
+class Running {
+ public:
+  explicit Running(const std::vector<std::string>& command)
+      : command_(fmt::format("{}", fmt::join(command, " "))) {
+    std::vector<char*> arguments;
+    for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+    arguments.push_back(nullptr);
+    child_ = fork();
+    if (child_ < 0) throw std::runtime_error("no process can be started");
+    if (child_ != 0) return;
     const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC);
     dup2(nowhere, STDOUT_FILENO);
     dup2(nowhere, STDERR_FILENO);
     execv(arguments[0], arguments.data());
     _exit(127);
   }
-  int status = 0;
-  rusage usage{};
-  if (wait4(child, &status, 0, &usage) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
-    throw std::runtime_error(fmt::format("this failed: {}", fmt::join(command, " ")));
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  constexpr double kMbPerKib = 1024.0 * 1e-6;
-  const std::chrono::duration<double> wall_s = std::chrono::steady_clock::now() - begun;
-  return {seconds(usage.ru_utime) + seconds(usage.ru_stime), wall_s.count(),
-          static_cast<double>(usage.ru_maxrss) * kMbPerKib};
-}
+
+  /// Waits for its end. Throws where it fails: a benchmark of a failure says nothing.
+  Cost cost() const {
+    int status = 0;
+    rusage usage{};
+    if (wait4(child_, &status, 0, &usage) != child_ || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
+      throw std::runtime_error("this failed: " + command_);
+    const auto seconds = [](const timeval& t) {
+      return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    };
+    constexpr double kMbPerKib = 1024.0 * 1e-6;
+    const std::chrono::duration<double> wall_s = std::chrono::steady_clock::now() - begun_;
+    return {seconds(usage.ru_utime) + seconds(usage.ru_stime), wall_s.count(),
+            static_cast<double>(usage.ru_maxrss) * kMbPerKib};
+  }
+
+ private:
+  std::string command_;
+  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+  pid_t child_ = -1;
+};
+
+Cost run(const std::vector<std::string>& command) { return Running(command).cost(); }
 
 /// A vehicle with `studies` MTx, a reference and a receiver; noise models refitted every `refit_s`.
 std::string configuration(int studies, double refit_s) {
@@ -143,6 +155,17 @@ class Programs {
   [[nodiscard]] Cost process_by(const Drive& drive, const char* threads) const {
     return work("process", drive.inputs, drive.with_refits, {"--threads", threads});
   }
+  /// Two studies at once, of one thread each: until both are done.
+  [[nodiscard]] Cost process_two_at_once(const Drive& drive) const {
+    const auto words = [&](const char* out) {
+      return words_of("process", drive.inputs, drive.with_refits, {"--threads", "1"}, out);
+    };
+    const Running beside(words("run_beside"));
+    const Cost one = Running(words("run")).cost();
+    const Cost other = beside.cost();
+    return {one.processor_s + other.processor_s, std::max(one.wall_s, other.wall_s),
+            one.memory_mb + other.memory_mb};
+  }
 
  private:
   static void write(const fs::path& file, const std::string& text) {
@@ -152,11 +175,18 @@ class Programs {
 
   [[nodiscard]] Cost work(const char* command, const std::vector<std::string>& inputs, const fs::path& config,
                           const std::vector<std::string>& more = {}) const {
+    return run(words_of(command, inputs, config, more, "run"));
+  }
+
+  [[nodiscard]] std::vector<std::string> words_of(const char* command, const std::vector<std::string>& inputs,
+                                                  const fs::path& config,
+                                                  const std::vector<std::string>& more,
+                                                  const char* out) const {
     std::vector<std::string> words{bin_ / "imuscope", command};
     words.insert(words.end(), inputs.begin(), inputs.end());
     words.insert(words.end(), more.begin(), more.end());
-    words.insert(words.end(), {"--config", config, "--out", scratch_ / "run"});
-    return run(words);
+    words.insert(words.end(), {"--config", config, "--out", scratch_ / out});
+    return words;
   }
 
   fs::path scratch_;
@@ -236,12 +266,27 @@ std::vector<bench::Row> measure_beside(const Programs& programs, const Programs&
           row("capture, no refits", capture, capture_of_others)};
 }
 
+/// What two threads could reach on this machine: half of it where two cores give twice of one, more where they share
+/// what one has to itself.
+bench::Row machines_row(const std::string& what, const Cost& two_at_once, const Cost& one_thread) {
+  bench::Row row;
+  row.group = "replay";
+  row.what = what;
+  row.ratio = two_at_once.wall_s / (2.0 * one_thread.wall_s);
+  row.against = "of the wall time of one after the other";
+  row.value = two_at_once.wall_s;
+  row.reference = 2.0 * one_thread.wall_s;
+  row.unit = "s of wall";
+  return row;
+}
+
 /// A study that takes minutes, by two threads and by one.
 std::vector<bench::Row> measure_long(const Programs& programs, double hours) {
   constexpr double kMinutesPerHour = 60.0;
   const Drive drive = programs.record(3, kMinutesPerHour * hours);
   const Cost two_threads = programs.process_by(drive, "2");
   const Cost one_thread = programs.process_by(drive, "1");
+  const Cost two_at_once = programs.process_two_at_once(drive);
   const auto what = fmt::format("whole study, two threads, 3 S-IMUs, {:g} h", hours);
   bench::Row memory;
   memory.group = "replay";
@@ -254,6 +299,8 @@ std::vector<bench::Row> measure_long(const Programs& programs, double hours) {
   memory.goal = bench::Goal{bench::Goal::Side::kAtMost, 1.0};
   return {row_of_walls(what, two_threads, one_thread, "of the wall time of one thread",
                        two_threads.wall_s / one_thread.wall_s, {bench::Goal::Side::kAtMost, kGoalTwoThreads}),
+          machines_row(fmt::format("two whole studies at once, a thread each, {:g} h", hours), two_at_once,
+                       one_thread),
           memory};
 }
 
@@ -272,6 +319,7 @@ std::vector<bench::Row> measure(const Programs& programs, double minutes, int ro
   Cost report;
   Cost one_thread;
   Cost two_threads;
+  Cost two_at_once;
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < by_studies.size(); ++i)
       keep_fastest(crowd_costs[i], programs.replay(by_studies[i], false));
@@ -283,6 +331,7 @@ std::vector<bench::Row> measure(const Programs& programs, double minutes, int ro
     keep_fastest(report, programs.report());
     keep_fastest(one_thread, programs.process_by(usual, "1"));
     keep_fastest(two_threads, programs.process_by(usual, "2"));
+    keep_fastest(two_at_once, programs.process_two_at_once(usual));
   }
   std::vector<bench::Row> rows;
   const auto of = [&](const char* what) { return fmt::format("{}, 3 S-IMUs, {:g} min", what, minutes); };
@@ -293,6 +342,7 @@ std::vector<bench::Row> measure(const Programs& programs, double minutes, int ro
   rows.push_back(row_of_walls(of("whole study, two threads"), two_threads, one_thread,
                               "of the wall time of one thread", two_threads.wall_s / one_thread.wall_s,
                               {bench::Goal::Side::kAtMost, kGoalTwoThreads}));
+  rows.push_back(machines_row(of("two whole studies at once, a thread each"), two_at_once, one_thread));
   bench::Row of_report = row_of(of("report.html"), minutes, report, 0.0);
   of_report.ratio = report.processor_s / study.processor_s;
   of_report.reference = study.processor_s;

@@ -1,19 +1,23 @@
 /// How often the intervals of a certificate's terms hold what the simulated sensor has: N, B, K, R and Q of
-/// sums of the processes that real sensors show, most of which the selection has to find; and of sensors that no
-/// model of ours describes: white noise through a low-pass of third order, rounded before a mean, beside a
-/// slow swing as of the temperature, or growing and fading.
+/// sums of the processes that real sensors show, most of which the selection has to find; beneath the lines of an
+/// engine whose speed wanders; of records with holes; and of sensors that no model of ours describes: white noise
+/// through a low-pass of third order, rounded before a mean, beside a slow swing as of the temperature, or
+/// growing and fading.
 
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <numbers>
 #include <random>
+#include <string>
 #include <vector>
 
+#include "all_threads.h"
 #include "base/units.h"
 #include "goal_counts.h"
 #include "models/certificate/axis_certificate.h"
@@ -22,6 +26,7 @@
 
 namespace {
 
+using imuscope::Counts;
 using imuscope::certificate::AxisCertificate;
 using imuscope::certificate::Term;
 using imuscope::noise::Component;
@@ -46,6 +51,7 @@ struct Cell {
   std::size_t samples;
   Maker beyond{};
   bool has_bias_instability = true;  ///< false: the model's is not the sensor's
+  std::vector<double> lines_hz{};
 };
 
 constexpr double kWhite = 0.2;      ///< sd a sample, deg/s
@@ -88,6 +94,61 @@ Series rounded_then_averaged(Series x) {
   Series y(x.size() - kMean + 1);
   for (std::size_t i = 0; i < y.size(); ++i) y[i] = 0.25 * (x[i] + x[i + 1] + x[i + 2] + x[i + 3]);
   return y;
+}
+
+constexpr std::array kLines_hz{0.565, 1.69};
+
+/// Adds a line and its third harmonic, of a speed that wanders by a thousandth.
+void add_lines(std::mt19937_64& random, Series& x) {
+  constexpr double kWander = 1e-3;
+  constexpr double kWander_s = 20.0;
+  constexpr std::array kAmplitudes{0.3 * kWhite, 0.1 * kWhite};
+  std::normal_distribution<double> normal;
+  const double fade = std::exp(-1.0 / (kWander_s * kRate_hz));
+  double wander = normal(random);
+  double turns = std::uniform_real_distribution<double>()(random);
+  for (double& v : x) {
+    wander = fade * wander + std::sqrt(1.0 - fade * fade) * normal(random);
+    turns += kLines_hz[0] * (1.0 + kWander * wander) / kRate_hz;
+    const double angle = 2.0 * std::numbers::pi * turns;
+    v += kAmplitudes[0] * std::sin(angle) + kAmplitudes[1] * std::sin(3.0 * angle);
+  }
+}
+
+/// Takes out so many stretches of a second to a minute each, anywhere.
+void take_holes(std::mt19937_64& random, int holes, Series& x) {
+  constexpr double kLongest_s = 60.0;
+  std::uniform_int_distribution<std::size_t> place(0, x.size() - 1);
+  std::uniform_real_distribution<double> log_length(0.0, std::log(kLongest_s));
+  for (int i = 0; i < holes; ++i) {
+    const std::size_t begin = place(random);
+    const auto length = static_cast<std::size_t>(kRate_hz * std::exp(log_length(random)));
+    const std::size_t end = std::min(begin + length, x.size());
+    std::fill(x.begin() + static_cast<std::ptrdiff_t>(begin), x.begin() + static_cast<std::ptrdiff_t>(end),
+              std::nan(""));
+  }
+}
+
+std::vector<Cell> cells_with_more_than_noise() {
+  constexpr std::size_t kLong = std::size_t{1} << 18U;
+  const Model noise{{{ProcessKind::kWhiteNoise, kWhite * kWhite, {}},
+                     {ProcessKind::kRandomWalk, kWalkStep * kWalkStep, {}}}};
+  return {{"lines",
+           noise,
+           kLong,
+           [noise](std::mt19937_64& random, std::size_t n) {
+             Series x = imuscope::noise::simulated_noise(noise, n, random);
+             add_lines(random, x);
+             return x;
+           },
+           true,
+           {kLines_hz.begin(), kLines_hz.end()}},
+          {"thirty holes", noise, kLong, [noise](std::mt19937_64& random, std::size_t n) {
+             constexpr int kHoles = 30;
+             Series x = imuscope::noise::simulated_noise(noise, n, random);
+             take_holes(random, kHoles, x);
+             return x;
+           }}};
 }
 
 std::vector<Cell> cells_beyond_models() {
@@ -189,7 +250,7 @@ double true_value(const Model& model, Term term) {
   return std::nan("");
 }
 
-void count_terms(imuscope::Counts& counts, const Cell& cell, const AxisCertificate& certificate) {
+void count_terms(Counts& counts, const Cell& cell, const AxisCertificate& certificate) {
   for (const auto& term : certificate.terms) {
     const double truth = true_value(cell.model, term.term);
     if (term.term == Term::kBiasInstability && !cell.has_bias_instability) continue;
@@ -199,6 +260,14 @@ void count_terms(imuscope::Counts& counts, const Cell& cell, const AxisCertifica
     if (term.knowledge == imuscope::noise::Knowledge::kFitted)
       count(counts, fmt::format("{}_value_holds", symbol_of(term.term)), holds);
   }
+  for (const double frequency_hz : cell.lines_hz) {
+    constexpr double kBeside = 0.01;
+    const bool named = std::ranges::any_of(certificate.lines, [&](const auto& line) {
+      return std::abs(line.frequency_hz / frequency_hz - 1.0) < kBeside;
+    });
+    count(counts, "line_named", named);
+  }
+  if (cell.lines_hz.empty()) count(counts, "no_line_named", certificate.lines.empty());
   const bool has_resonance =
       std::any_of(cell.model.components.begin(), cell.model.components.end(),
                   [](const Component& c) { return c.kind == ProcessKind::kResonance; });
@@ -212,13 +281,14 @@ void count_terms(imuscope::Counts& counts, const Cell& cell, const AxisCertifica
   count(counts, "resonance_named", named);
 }
 
+/// A line in one go: threads print side by side.
 void print(const AxisCertificate& certificate, const Model& truth) {
-  fmt::print("{}", certificate.fit.spec.name());
+  std::string line = certificate.fit.spec.name();
   for (const auto& term : certificate.terms) {
-    fmt::print("  {} {:.4g} [{:.4g}, {:.4g}] true {:.4g}", symbol_of(term.term), term.value,
-               term.ci_low.value_or(0.0), term.ci_high.value_or(0.0), true_value(truth, term.term));
+    line += fmt::format("  {} {:.4g} [{:.4g}, {:.4g}] true {:.4g}", symbol_of(term.term), term.value,
+                        term.ci_low.value_or(0.0), term.ci_high.value_or(0.0), true_value(truth, term.term));
   }
-  fmt::print("\n");
+  fmt::print("{}\n", line);
 }
 
 imuscope::certificate::AxisRecord record_of(const Cell& cell, unsigned seed) {
@@ -232,6 +302,18 @@ imuscope::certificate::AxisRecord record_of(const Cell& cell, unsigned seed) {
   return record;
 }
 
+Counts counts_of(const Cell& cell, unsigned seed, bool show) {
+  Counts counts;
+  const auto certificate = characterize_axis(record_of(cell, seed), {});
+  if (!certificate) return counts;
+  count_terms(counts, cell, *certificate);
+  if (show) print(*certificate, cell.model);
+  const bool is_wrong = cell.beyond && !cell.has_bias_instability;
+  count(counts, is_wrong ? "record_called_wrong_as_it_is" : "record_called_wrong",
+        !certificate->warnings.empty());
+  return counts;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -242,30 +324,34 @@ int main(int argc, char** argv) {
   app.add_option("--series", series, "Series a cell")->capture_default_str();
   app.add_option("--results", results_file, "Keeps what was counted, and goes on from there");
   app.add_option("--only", only, "One cell");
+  std::size_t threads = 2;
+  app.add_option("--threads", threads, "Of which each makes series")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
   bool show = false;
   app.add_flag("--show", show, "Prints the model and the terms of every series");
   CLI11_PARSE(app, argc, argv);
   imuscope::Results results(results_file);
   bool all_met = true;
   constexpr unsigned kFirstSeed = 40'000;
+  constexpr int kTogether = 32;  // between two times that results are kept
   std::vector<Cell> all = cells();
-  for (Cell& cell : cells_beyond_models()) all.push_back(std::move(cell));
+  for (auto more : {cells_with_more_than_noise(), cells_beyond_models()})
+    all.insert(all.end(), more.begin(), more.end());
   for (const Cell& cell : all) {
     if (!only.empty() && only != cell.name) continue;
-    for (int run = results.done(cell.name); run < series; ++run) {
-      imuscope::Counts counts;
-      const auto record = record_of(cell, kFirstSeed + static_cast<unsigned>(run));
-      if (const auto certificate = characterize_axis(record, {})) {
-        count_terms(counts, cell, *certificate);
-        if (show) print(*certificate, cell.model);
-        const bool is_wrong = cell.beyond && !cell.has_bias_instability;
-        count(counts, is_wrong ? "record_called_wrong_as_it_is" : "record_called_wrong",
-              !certificate->warnings.empty());
-      }
-      results.keep(cell.name, run + 1, counts);
+    for (int run = results.done(cell.name); run < series; run += kTogether) {
+      std::vector<Counts> counts(static_cast<std::size_t>(std::min(kTogether, series - run)));
+      imuscope::on_all_threads(counts.size(), threads, [&](std::size_t i) {
+        counts[i] = counts_of(cell, kFirstSeed + static_cast<unsigned>(run) + static_cast<unsigned>(i), show);
+      });
+      for (std::size_t i = 0; i < counts.size(); ++i)
+        results.keep(cell.name, run + 1 + static_cast<int>(i), counts[i]);
     }
     std::vector<imuscope::Band> bands{{"record_called_wrong", 0.0, 5.0},
                                       {"no_resonance_named", 99.0, 100.0},
+                                      {"no_line_named", 99.0, 100.0},
+                                      {"line_named", 99.0, 100.0},
                                       {"resonance_named", 99.0, 100.0}};
     // A bound holds more often than it has to.
     for (const char* symbol : {"N", "B", "K", "R", "Q"}) {
