@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <memory>
 #include <type_traits>
+#include <utility>
 
 #include "base/output_folder.h"
 #include "base/result.h"
@@ -18,6 +19,10 @@ namespace imuscope {
 /// Records of one size, first written and then read.
 class ScratchRecords {
  public:
+  ScratchRecords(ScratchRecords&&) noexcept = default;
+  // One by one its members would free the buffer of a file that is still open.
+  ScratchRecords& operator=(ScratchRecords&&) = delete;
+  ~ScratchRecords() = default;
   /// Errors (kWork): no file can be made in `folder`.
   static Result<ScratchRecords> create(const OutputFolder& folder, std::size_t record_bytes);
 
@@ -33,8 +38,10 @@ class ScratchRecords {
   struct Close {
     void operator()(std::FILE* file) const noexcept { (void)std::fclose(file); }
   };
-  ScratchRecords(std::FILE* file, std::size_t record_bytes) : file_(file), record_bytes_(record_bytes) {}
+  ScratchRecords(std::unique_ptr<char[]> buffer, std::FILE* file, std::size_t record_bytes)
+      : buffer_(std::move(buffer)), file_(file), record_bytes_(record_bytes) {}
 
+  std::unique_ptr<char[]> buffer_;  ///< the file's
   std::unique_ptr<std::FILE, Close> file_;
   std::size_t record_bytes_;
   bool whole_ = true;
