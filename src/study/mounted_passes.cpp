@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "service/pipeline/estimator_setup.h"
@@ -85,7 +86,8 @@ Result<SmoothedTrack> MountedPasses::smooth() {
       drive_.configuration, drive_.estimator, drive_.recording, mountings_.of_drive, mountings_.former,
       {Smoother::kMemory_bytes, drive_.path},
       [this](double share) {
-        if (is_awaited_ && progress_) progress_(share);
+        share_ = share;
+        if (progress_) progress_(share);
       },
       &is_given_up_);
 }
@@ -98,9 +100,14 @@ Result<ReplayResult> MountedPasses::gather() {
 }
 
 Result<MountedPasses::Passed> MountedPasses::result(const Progress& progress) {
-  progress_ = progress;
-  is_awaited_ = true;
+  constexpr std::chrono::milliseconds kTold{100};
+  std::future_status status = smoothed_.wait_for(std::chrono::seconds{0});
+  if (status == std::future_status::deferred) progress_ = progress;
+  for (; status == std::future_status::timeout; status = smoothed_.wait_for(kTold)) {
+    if (progress) progress(share_);
+  }
   auto track = smoothed_.get();
+  if (progress) progress(1.0);
   const auto gathered = gathered_.get();
   if (!track) return tl::unexpected<Error>(track.error());
   if (!gathered) return tl::unexpected<Error>(gathered.error());

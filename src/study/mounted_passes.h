@@ -54,7 +54,7 @@ class MountedPasses {
   /// Whether passes with these mountings would be the same to the bit.
   [[nodiscard]] bool are_of(const StudyMountings& mountings) const;
   /// Waits for both. Once.
-  /// @param progress  called from now on, by one thread at a time; empty: nobody asks
+  /// @param progress  called now and then, by the thread that waits; empty: nobody asks
   [[nodiscard]] Result<Passed> result(const Progress& progress);
 
  private:
@@ -65,8 +65,8 @@ class MountedPasses {
   Drive drive_;
   StudyMountings mountings_;
   EpochGatherer epochs_;
-  Progress progress_;
-  std::atomic<bool> is_awaited_{false};  ///< progress_ is set
+  Progress progress_;  ///< where the thread that waits is the one that works
+  std::atomic<double> share_{0.0};
   std::atomic<bool> is_given_up_{false};
   std::future<Result<ReplayResult>> gathered_;
   std::future<Result<SmoothedTrack>> smoothed_;
