@@ -249,6 +249,10 @@ class Uncertainty {
     }
   }
 
+  void move_all(Model& model, const Eigen::VectorXd& steps) const {
+    for (std::size_t i = 0; i < present_.size(); ++i) move(model, i, steps[static_cast<Eigen::Index>(i)]);
+  }
+
   /// Of ln(f) at a model.
   [[nodiscard]] Eigen::VectorXd gradient(const OfModel& f, const Model& model) const {
     constexpr double kStep = 1e-4;
@@ -276,13 +280,18 @@ class Uncertainty {
     for (int step = -kSteps; step <= kSteps; ++step) {
       const double u = z * step / kSteps;
       Model model = fit_.model;
-      for (std::size_t i = 0; i < present_.size(); ++i)
-        move(model, i, u * along[static_cast<Eigen::Index>(i)]);
+      move_all(model, u * along);
+      // Where the others take it furthest.
       const Eigen::VectorXd slope = gradient(f, model);
-      const double rest = std::sqrt(std::max(0.0, slope.dot(beside * slope) * (z * z - u * u)));
-      const double value = std::log(f(model)) - at_fit;
-      range.low = std::min(range.low, value - rest);
-      range.high = std::max(range.high, value + rest);
+      const Eigen::VectorXd steepest = beside * slope;
+      const double length = std::sqrt(std::max(0.0, slope.dot(steepest)));
+      for (const double sign : {-1.0, 1.0}) {
+        Model moved = model;
+        if (length > 0.0) move_all(moved, sign * std::sqrt(z * z - u * u) / length * steepest);
+        const double value = std::log(f(moved)) - at_fit;
+        range.low = std::min(range.low, value);
+        range.high = std::max(range.high, value);
+      }
     }
     return range;
   }

@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <ostream>
 #include <random>
 
 #include "models/noise/parameter_scale.h"
@@ -26,6 +27,8 @@ struct TimeCase {
   double tau_s;
   unsigned seed;
 };
+
+void PrintTo(const TimeCase& c, std::ostream* out) { *out << c.tau_s << " s"; }
 
 /// WN + GM in logarithms of their parameters.
 using Theta = Eigen::Vector3d;
