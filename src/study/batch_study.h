@@ -111,7 +111,7 @@ class BatchEstimates {
   std::vector<std::size_t> studies_;    ///< devices
   std::vector<FirstHour> first_hours_;  ///< those that began beside the pass
   std::vector<bool> has_begun_;
-  std::atomic<std::size_t> n_ahead_;      ///< of which no first hour has been estimated
+  std::atomic<std::size_t> n_ahead_;      ///< S-IMUs whose first hour is not estimated yet
   std::atomic<bool> is_given_up_{false};  ///< what has not begun need not
   tbb::task_group beside_;
 };

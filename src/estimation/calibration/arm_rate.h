@@ -1,7 +1,7 @@
 #pragma once
 
-/// The rate that swings a lever arm that is learned from how it swings (the axle's), where the gyros are noisy. A
-/// measurement through an arm,
+/// The rate that swings a lever arm that is learned from its swing (the axle's), where the gyros are noisy. A measurement
+/// through an arm,
 /// v + w x l, has the rate in its matrix: noise of the rate would shorten the arm, as in every regression on a
 /// noisy variable, and the filter would be sure of it. So the rate is a mean over some samples, brought
 /// down to the best linear estimate of the true one by its own power beside that of its noise. EQUATIONS.md E-29.

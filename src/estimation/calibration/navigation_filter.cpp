@@ -94,8 +94,8 @@ bool moves(const NavigationState& state) noexcept {
   return state.v_n_mps.squaredNorm() > kMoves_mps * kMoves_mps;
 }
 
-/// Slower than what noise of a GNSS velocity makes a filter believe, a vehicle stands, and does not turn about its
-/// antenna, which no GNSS would see.
+/// Below this a filter's velocity may be GNSS noise alone: the vehicle stands, and is not turning about its antenna,
+/// which GNSS would not see.
 constexpr double kStands_mps = 0.1;
 
 bool stands(const NavigationState& state) noexcept {
@@ -272,7 +272,9 @@ Vector3d NavigationFilter::mean_rate(std::size_t centre, std::size_t half_width)
 /// E-29, at an instant that lies by a share of the interval behind epoch k.
 void NavigationFilter::set_arm_rate(std::size_t k, double share_of_newer, Delayed& out) const noexcept {
   const Vector3d& bias = out.state.gyro_bias_b_radps;
-  out.arm_rate = {out.measured.omega_ib_b_radps - bias, Vector3d::Ones(), 0.0};
+  out.swing_omega_ib_b_radps = out.measured.omega_ib_b_radps;
+  out.swing_share.setOnes();
+  out.sd_swing_radps = 0.0;
   out.rate_share = 1.0;
   out.sd_rate_radps = 0.0;
   if (arm_rate_.half_width() == 0) return;
@@ -283,7 +285,10 @@ void NavigationFilter::set_arm_rate(std::size_t k, double share_of_newer, Delaye
       (1.0 - share_of_newer) * mean_rate(k, half_width) + share_of_newer * mean_rate(newer, half_width);
   const std::size_t samples = 2 * half_width + 1;
   const bool may_turn = !stands(out.state);
-  out.arm_rate = arm_rate_.estimate(mean - bias, samples, moves(out.state));
+  const ArmRate::Estimate swing = arm_rate_.estimate(mean - bias, samples, moves(out.state));
+  out.swing_omega_ib_b_radps = bias + swing.omega_b_radps;
+  out.swing_share = swing.share;
+  out.sd_swing_radps = swing.sd_radps;
   out.rate_share = may_turn ? 1.0 : 0.0;
   out.measured.omega_ib_b_radps = may_turn ? mean : bias;
   if (may_turn) out.sd_rate_radps = arm_rate_.sd_of_mean_radps(samples);

@@ -40,7 +40,10 @@ class NavigationFilter {
     NavigationErrorCovariance back;  ///< Phi^-1: error then = back * error now
     double rate_share;               ///< of the gyros' reading in that rate: 1, or 0
     double sd_rate_radps;            ///< noise of that rate
-    ArmRate::Estimate arm_rate;  ///< by which an arm swings that is learned from that (E-29), bias taken off
+    /// The rate by which an arm swings that is learned from its swing (E-29), as measured.
+    Eigen::Vector3d swing_omega_ib_b_radps;
+    Eigen::Vector3d swing_share;  ///< of the gyros' reading in it, each axis
+    double sd_swing_radps;        ///< what it leaves unknown of the true rate
   };
   enum class Lookup : std::uint8_t { kFound, kTooNew, kTooOld };
   /// The state at a past time, with everything learned since. E-5.

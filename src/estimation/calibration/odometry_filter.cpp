@@ -154,15 +154,15 @@ OdometryFilter::Noise OdometryFilter::noise_of(const Vector3d& sd) const noexcep
 // E-30, E-31
 void OdometryFilter::apply_motion(const Sample& sample, const NavigationFilter::Delayed& then) noexcept {
   double speed_mps = sample.odometry.speed_mps;
-  OdometryInnovation predicted = odometry_innovation(
-      then.state, core_.odometry(), speed_mps, then.arm_rate.omega_b_radps + then.state.gyro_bias_b_radps);
-  predicted.H.middleCols<3>(kGyroBiasError) *= then.arm_rate.share.asDiagonal();
+  OdometryInnovation predicted =
+      odometry_innovation(then.state, core_.odometry(), speed_mps, then.swing_omega_ib_b_radps);
+  predicted.H.middleCols<3>(kGyroBiasError) *= then.swing_share.asDiagonal();
   const double forward_mps = predicted.predicted.x();
-  const Vector3d& omega = then.arm_rate.omega_b_radps;
+  const Vector3d omega = then.swing_omega_ib_b_radps - then.state.gyro_bias_b_radps;
   // Sideways acceleration of a turn, and the slip angle that goes with it.
   const double sideways_mps2 = std::abs(forward_mps * omega.z());
   const double slip_mps = config_.slip_rad_per_mps2 * sideways_mps2 * std::abs(forward_mps);
-  const double swing_mps = then.arm_rate.sd_radps * core_.odometry().r_bv_b_m.norm();
+  const double swing_mps = then.sd_swing_radps * core_.odometry().r_bv_b_m.norm();
   const Noise noise = noise_of({std::hypot(config_.speed_sd_mps, swing_mps),
                                 std::hypot(config_.sideways_sd_mps, slip_mps, swing_mps),
                                 std::hypot(config_.upwards_sd_mps, swing_mps)});
