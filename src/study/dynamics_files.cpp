@@ -1,6 +1,7 @@
 #include "study/dynamics_files.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -30,13 +31,6 @@ std::string scatter_row(const ErrorRow& row, double time_s) {
   for (const double value : row.e_gyro_radps) append_value(line, row.gyro_valid, value);
   for (const double value : row.e_accel_mps2) append_value(line, row.accel_valid, value);
   return line + '\n';
-}
-
-std::size_t count_rows(RowSpool& rows) {
-  rows.rewind();
-  std::size_t n = 0;
-  for (ErrorRow row{}; rows.next(row);) ++n;
-  return n;
 }
 
 /// The rows of one regime.
@@ -113,6 +107,23 @@ DynamicsRegressions regressions_of_device(const DeviceConfig& device, RowSpool& 
   return out;
 }
 
+/// Every so many rows one, so that few enough are left.
+Result<void> write_scatter_of(const std::string& name, RowSpool& rows, HostTime first_reference_time,
+                              const OutputFolder& folder) {
+  const std::size_t step = rows.size() / kScatterRows + 1;
+  CsvFile file;
+  if (auto opened = file.open(folder, device_file_name("scatter", name, ".csv"),
+                              tables::csv_header(tables::run_table("scatter")));
+      !opened)
+    return opened;
+  rows.rewind();
+  std::size_t k = 0;
+  for (ErrorRow row{}; rows.next(row); ++k) {
+    if (k % step == 0) file.append(scatter_row(row, to_seconds(row.time - first_reference_time)));
+  }
+  return file.close();
+}
+
 }  // namespace
 
 Regressions::Regressions(const Configuration& configuration, std::vector<RowSpool>& rows,
@@ -155,20 +166,13 @@ DynamicsRegressions Regressions::result() && {
 Result<void> write_scatter(const Configuration& configuration, std::vector<RowSpool>& rows,
                            HostTime first_reference_time, const OutputFolder& folder) {
   const auto indices = configuration.study_indices();
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const std::size_t step = count_rows(rows[i]) / kScatterRows + 1;
-    CsvFile file;
-    const auto name = device_file_name("scatter", configuration.devices[indices[i]].name, ".csv");
-    if (auto opened = file.open(folder, name, tables::csv_header(tables::run_table("scatter"))); !opened)
-      return opened;
-    rows[i].rewind();
-    std::size_t k = 0;
-    for (ErrorRow row{}; rows[i].next(row); ++k) {
-      if (k % step == 0) file.append(scatter_row(row, to_seconds(row.time - first_reference_time)));
-    }
-    if (auto closed = file.close(); !closed) return closed;
-  }
-  return {};
+  std::vector<Result<void>> written(rows.size());
+  tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
+    written[i] =
+        write_scatter_of(configuration.devices[indices[i]].name, rows[i], first_reference_time, folder);
+  });
+  const auto failed = std::ranges::find_if(written, [](const Result<void>& one) { return !one; });
+  return failed == written.end() ? Result<void>{} : *failed;
 }
 
 }  // namespace imuscope

@@ -50,14 +50,6 @@ ReferenceBias bias_at(const ReferenceBiasTrack& biases, const SImuEpoch& epoch) 
   return biases.at(epoch.time + from_seconds(epoch.t_d_s));
 }
 
-/// The next epochs, a megabyte of them; false after the last.
-bool read_block(Spool<KeptEpoch>& epochs, std::vector<KeptEpoch>& block) {
-  constexpr std::size_t kBlock = 2048;
-  block.clear();
-  for (KeptEpoch next{}; block.size() < kBlock && epochs.next(next);) block.push_back(next);
-  return !block.empty();
-}
-
 /// The common low-pass of every S-IMU; none where none is configured.
 std::vector<RowLowPass> low_passes(const Configuration& configuration) {
   std::vector<RowLowPass> filters;
@@ -95,7 +87,7 @@ Result<void> EpochGatherer::make_rows(const Configuration& configuration, const 
   };
   // Block by block: the rows of each S-IMU and the vehicle's motion side by side, each in order of time.
   std::vector<KeptEpoch> block;
-  while (read_block(epochs_, block)) {
+  while (read_block(block, epochs_)) {
     tbb::parallel_for(std::size_t{0}, rows.size() + 1, [&](std::size_t of) {
       for (const KeptEpoch& next : block) {
         if (of == rows.size()) {

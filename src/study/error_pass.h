@@ -4,6 +4,7 @@
 /// mounting known, and its epochs are kept; then they become rows, with the reference compensated by its
 /// smoothed biases. The first step does not wait for the smoothing, so that both may run side by side.
 
+#include <utility>
 #include <vector>
 
 #include "base/output_folder.h"
@@ -59,6 +60,8 @@ class EpochGatherer final : public CoreSink {
   /// Errors (kWork): the disk had no room for the epochs.
   [[nodiscard]] Result<void> make_rows(const Configuration& configuration, const FormerMountings& former,
                                        const ReferenceBiasTrack& biases, std::vector<RowSpool>& rows);
+  /// What was kept, once rows were made: it is of no further use here.
+  [[nodiscard]] Spool<KeptEpoch> take_kept() { return std::move(epochs_); }
 
  private:
   EpochGatherer(Spool<KeptEpoch> epochs, std::size_t n_studies)

@@ -13,10 +13,11 @@ namespace imuscope {
 
 namespace {
 
-/// Steps of nice below who has the longer way: the pass that calibrates, then smoothing, which goes forth and back. Enough
-/// to leave them the processors, and to have a share where other programs compute, for which SCHED_IDLE would wait.
-constexpr int kNicerToSmoothAhead = 5;
-constexpr int kNicerToGather = 10;
+/// Steps of nice below who has to be left the processors: the pass that calibrates, and of these two the one that gathers,
+/// as smoothing's way back has work for every processor that is idle. Enough for that, and to have a share where other
+/// programs compute, for which SCHED_IDLE would wait.
+constexpr int kNicerToSmooth = 5;
+constexpr int kNicerToGatherAhead = 10;
 
 /// Work in a thread of its own; done when its result is asked for where no second thread may be used.
 template <typename Work>
@@ -60,20 +61,34 @@ bool are_none(const FormerMountings& former) {
 }  // namespace
 
 MountedPasses::MountedPasses(const Drive& drive, StudyMountings mountings, EpochGatherer epochs)
-    : drive_(drive), mountings_(std::move(mountings)), epochs_(std::move(epochs)) {}
+    : drive_(drive),
+      mountings_(std::move(mountings)),
+      epochs_(std::move(epochs)),
+      history_({Smoother::kMemory_bytes, drive_.path}) {}
 
 Result<std::unique_ptr<MountedPasses>> MountedPasses::begin(const Drive& drive, StudyMountings mountings,
                                                             bool is_ahead) {
   auto epochs = EpochGatherer::create(drive.folder, mountings.of_drive.size());
   if (!epochs) return tl::unexpected<Error>(epochs.error());
   std::unique_ptr<MountedPasses> passes(new MountedPasses(drive, std::move(mountings), std::move(*epochs)));
-  passes->smoothed_ =
-      in_spare_time(is_ahead ? kNicerToSmoothAhead : 0, [p = passes.get()] { return p->smooth(); });
-  passes->gathered_ = in_spare_time(kNicerToGather, [p = passes.get()] { return p->gather(); });
+  // Beside the pass that calibrates smoothing, which has the longer way, is enough for the second processor.
+  const bool waits = is_ahead && may_use_threads() && !may_use_third_thread();
+  if (!waits) passes->may_gather();
+  passes->smoothed_ = in_spare_time(kNicerToSmooth, [p = passes.get()] { return p->smooth(); });
+  passes->gathered_ =
+      in_spare_time(is_ahead && !waits ? kNicerToGatherAhead : 0, [p = passes.get()] { return p->gather(); });
   return passes;
 }
 
-MountedPasses::~MountedPasses() { is_given_up_ = true; }
+MountedPasses::~MountedPasses() {
+  is_given_up_ = true;
+  may_gather();
+}
+
+void MountedPasses::may_gather() {
+  may_gather_ = true;
+  may_gather_.notify_all();
+}
 
 bool MountedPasses::are_of(const StudyMountings& mountings) const {
   return are_none(mountings.former) && are_none(mountings_.former) &&
@@ -84,7 +99,7 @@ bool MountedPasses::are_of(const StudyMountings& mountings) const {
 Result<SmoothedTrack> MountedPasses::smooth() {
   return smooth_drive(
       drive_.configuration, drive_.estimator, drive_.recording, mountings_.of_drive, mountings_.former,
-      {Smoother::kMemory_bytes, drive_.path},
+      history_,
       [this](double share) {
         share_ = share;
         if (progress_) progress_(share);
@@ -93,6 +108,7 @@ Result<SmoothedTrack> MountedPasses::smooth() {
 }
 
 Result<ReplayResult> MountedPasses::gather() {
+  may_gather_.wait(false);
   ReplayOptions options;
   options.is_given_up = &is_given_up_;
   return replay(drive_.configuration, frozen(drive_.estimator, mountings_.settled), drive_.recording, epochs_,
@@ -101,6 +117,7 @@ Result<ReplayResult> MountedPasses::gather() {
 
 Result<MountedPasses::Passed> MountedPasses::result(const Progress& progress) {
   constexpr std::chrono::milliseconds kTold{100};
+  may_gather();
   std::future_status status = smoothed_.wait_for(std::chrono::seconds{0});
   if (status == std::future_status::deferred) progress_ = progress;
   for (; status == std::future_status::timeout; status = smoothed_.wait_for(kTold)) {
@@ -111,7 +128,7 @@ Result<MountedPasses::Passed> MountedPasses::result(const Progress& progress) {
   const auto gathered = gathered_.get();
   if (!track) return tl::unexpected<Error>(track.error());
   if (!gathered) return tl::unexpected<Error>(gathered.error());
-  return Passed{std::move(*track), std::move(epochs_)};
+  return Passed{std::move(*track), std::move(epochs_), std::move(history_)};
 }
 
 }  // namespace imuscope

@@ -38,6 +38,7 @@ class MountedPasses {
   struct Passed {
     SmoothedTrack track;
     EpochGatherer epochs;
+    Smoother history;  ///< of no further use; a large file ends with it
   };
   /// Called with the share of smoothing that is done.
   using Progress = std::function<void(double)>;
@@ -61,13 +62,16 @@ class MountedPasses {
   MountedPasses(const Drive& drive, StudyMountings mountings, EpochGatherer epochs);
   [[nodiscard]] Result<SmoothedTrack> smooth();
   [[nodiscard]] Result<ReplayResult> gather();
+  void may_gather();
 
   Drive drive_;
   StudyMountings mountings_;
   EpochGatherer epochs_;
+  Smoother history_;
   Progress progress_;  ///< where the thread that waits is the one that works
   std::atomic<double> share_{0.0};
   std::atomic<bool> is_given_up_{false};
+  std::atomic<bool> may_gather_{false};  ///< waits for it
   std::future<Result<ReplayResult>> gathered_;
   std::future<Result<SmoothedTrack>> smoothed_;
 };

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -128,46 +129,53 @@ Selection selection_of(const AxisWork& work, const std::string& regime, std::vec
   return selection;
 }
 
-/// Fits one axis in one regime; what cannot be fitted becomes a remark. Returns the number of levels.
-std::size_t fit_axis(const AxisWork& work, std::size_t axis, const Selection& selection,
-                     std::size_t levels_of_whole) {
-  const std::vector<std::uint8_t>& mask = selection.mask;
+/// Of a selection, without what the lines leave in it; none where it has no sample.
+std::optional<Result<noise::WaveletVariance>> variance_of(const AxisWork& work, const Selection& selection) {
+  if (std::none_of(selection.mask.begin(), selection.mask.end(), [](std::uint8_t m) { return m != 0; }))
+    return std::nullopt;
+  noise::WvOptions options;
+  options.mask = selection.mask;
+  auto wv = noise::haar_wavelet_variance(work.values, options);
+  if (wv) selection.remainders.take_out_of(*wv, options.confidence);
+  return wv;
+}
+
+std::size_t levels_of(const std::optional<Result<noise::WaveletVariance>>& wv) {
+  return wv && *wv ? (*wv)->levels.size() : 0;
+}
+
+/// Fits one axis in one regime; what cannot be fitted becomes a remark.
+/// @param wv  absent: the run does not have that regime, which is said once, not for every axis
+void fit_axis(const AxisWork& work, std::size_t axis, const Selection& selection,
+              const std::optional<Result<noise::WaveletVariance>>& wv, std::size_t levels_of_whole) {
+  if (!wv) return;
   const std::string& regime = selection.regime;
-  // A regime that the run does not have is said once, not for every axis.
-  if (std::none_of(mask.begin(), mask.end(), [](std::uint8_t m) { return m != 0; })) return 0;
   const auto remark = [&](const std::string& what) {
     work.study.remarks.push_back(
         fmt::format("{} {}, {}: {}", work.device.name, axis_name(axis), regime, what));
   };
-  noise::WvOptions options;
-  options.mask = mask;
-  auto wv = noise::haar_wavelet_variance(work.values, options);
-  if (!wv) {
-    remark("no wavelet variance: " + wv.error().what);
-    return 0;
-  }
-  selection.remainders.take_out_of(*wv, options.confidence);
-  say_left_out(work, axis, regime, *wv, levels_of_whole);
+  if (!*wv) return remark("no wavelet variance: " + wv->error().what);
+  say_left_out(work, axis, regime, **wv, levels_of_whole);
   noise::FitOptions fit_options;
   fit_options.signal_unit = axis_unit(axis);
   fit_options.intervals = noise::Intervals::kInverted;
   fit_options.covariances = &work.covariances;
-  auto fit = noise::fit(*wv, work.spec, work.device.rate_hz, fit_options);
+  auto fit = noise::fit(**wv, work.spec, work.device.rate_hz, fit_options);
   if (!fit) {
-    remark(fmt::format("no noise model: {}{}", fit.error().what,
-                       wv->levels.size() < levels_of_whole ? "; its stretches are too short" : ""));
-    return wv->levels.size();
+    return remark(fmt::format("no noise model: {}{}", fit.error().what,
+                              levels_of(wv) < levels_of_whole ? "; its stretches are too short" : ""));
   }
+  noise::WvOptions options;
+  options.mask = selection.mask;
   // The whole run is a mixture of its regimes: nobody expects one Gaussian process of it.
   const auto spikes =
       regime == kWholeRun
           ? std::nullopt
           : noise::spike_warning(noise::test_tails(work.values, options, fit->model), work.device.rate_hz);
-  const bool parts_differ = regime != kWholeRun && look_at_parts(work, mask, *fit);
+  const bool parts_differ = regime != kWholeRun && look_at_parts(work, selection.mask, *fit);
   if (spikes) fit->warnings.insert(fit->warnings.begin(), *spikes);
   work.study.models.push_back(
       {work.device.name, axis, regime, std::move(*fit), selection.lines, parts_differ});
-  return wv->levels.size();
 }
 
 /// Finds the lines of one regime, says them and takes them out of `values`.
@@ -299,6 +307,13 @@ void append_comparisons(const std::vector<AxisComparison>& all, nlohmann::json& 
   }
 }
 
+void append_part(NoiseStudy part, NoiseStudy& study) {
+  std::move(part.models.begin(), part.models.end(), std::back_inserter(study.models));
+  std::move(part.remarks.begin(), part.remarks.end(), std::back_inserter(study.remarks));
+  for (auto& one : part.lines) study.lines.push_back(std::move(one));
+  for (auto& one : part.left_out) study.left_out.push_back(std::move(one));
+}
+
 NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std::size_t axis,
                       const std::vector<std::string>& regimes, const noise::ModelSpec& spec,
                       noise::CovarianceTables& covariances) {
@@ -307,21 +322,28 @@ NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std
   std::vector<std::vector<noise::Line>> lines;
   for (std::size_t regime = 0; regime < regimes.size(); ++regime)
     lines.push_back(take_out_lines(device, axis, regimes[regime], series.mask(axis, regime), values, study));
-  const AxisWork work{device, values, spec, covariances, study};
   std::vector<noise::Line> of_all;
   for (const auto& of_regime : lines) of_all.insert(of_all.end(), of_regime.begin(), of_regime.end());
-  const std::size_t levels =
-      fit_axis(work, axis, selection_of(work, kWholeRun, series.mask(axis), of_all), 0);
+  const AxisWork work{device, values, spec, covariances, study};
+  std::vector<Selection> selections{selection_of(work, kWholeRun, series.mask(axis), of_all)};
   for (std::size_t r = 0; r < regimes.size(); ++r)
-    fit_axis(work, axis, selection_of(work, regimes[r], series.mask(axis, r), lines[r]), levels);
+    selections.push_back(selection_of(work, regimes[r], series.mask(axis, r), lines[r]));
+  std::vector<std::optional<Result<noise::WaveletVariance>>> variances;
+  for (const Selection& selection : selections) variances.push_back(variance_of(work, selection));
+  // The fits share an idle thread, so that the last axis is no long way for one alone. Who waits takes no other axis up
+  // meanwhile: its series would be memory beside this one's.
+  std::vector<NoiseStudy> parts(selections.size());
+  tbb::this_task_arena::isolate([&] {
+    tbb::parallel_for(
+        std::size_t{0}, parts.size(),
+        [&](std::size_t i) {
+          fit_axis({device, values, spec, covariances, parts[i]}, axis, selections[i], variances[i],
+                   levels_of(variances[0]));
+        },
+        tbb::simple_partitioner());
+  });
+  for (NoiseStudy& part : parts) append_part(std::move(part), study);
   return study;
-}
-
-void append_part(NoiseStudy part, NoiseStudy& study) {
-  std::move(part.models.begin(), part.models.end(), std::back_inserter(study.models));
-  std::move(part.remarks.begin(), part.remarks.end(), std::back_inserter(study.remarks));
-  for (auto& one : part.lines) study.lines.push_back(std::move(one));
-  for (auto& one : part.left_out) study.left_out.push_back(std::move(one));
 }
 
 }  // namespace

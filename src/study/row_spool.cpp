@@ -26,6 +26,7 @@ Result<ScratchRecords> ScratchRecords::create(const OutputFolder& folder, std::s
 }
 
 void ScratchRecords::add(const void* record) noexcept {
+  ++size_;
   whole_ = std::fwrite(record, record_bytes_, 1, file_.get()) == 1 && whole_;
 }
 

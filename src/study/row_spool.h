@@ -9,6 +9,7 @@
 #include <memory>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "base/output_folder.h"
 #include "base/result.h"
@@ -27,6 +28,8 @@ class ScratchRecords {
   static Result<ScratchRecords> create(const OutputFolder& folder, std::size_t record_bytes);
 
   void add(const void* record) noexcept;
+  /// Records that were added.
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
   /// False once a record could not be kept (disk full): what is read then is not the whole.
   [[nodiscard]] bool whole() const noexcept { return whole_; }
   /// To the first; from here on they are read.
@@ -44,6 +47,7 @@ class ScratchRecords {
   std::unique_ptr<char[]> buffer_;  ///< the file's
   std::unique_ptr<std::FILE, Close> file_;
   std::size_t record_bytes_;
+  std::size_t size_ = 0;
   bool whole_ = true;
 };
 
@@ -58,6 +62,7 @@ class Spool {
     });
   }
   void add(const Record& record) noexcept { records_.add(&record); }
+  [[nodiscard]] std::size_t size() const noexcept { return records_.size(); }
   [[nodiscard]] bool whole() const noexcept { return records_.whole(); }
   void rewind() { records_.rewind(); }
   bool next(Record& record) { return records_.next(&record); }
@@ -77,6 +82,7 @@ class RowSpool final : public ErrorRowSource {
   }
 
   void add(const ErrorRow& row) noexcept { rows_.add(row); }
+  [[nodiscard]] std::size_t size() const noexcept { return rows_.size(); }
   [[nodiscard]] bool whole() const noexcept { return rows_.whole(); }
   void rewind() override { rows_.rewind(); }
   bool next(ErrorRow& row) override { return rows_.next(row); }
@@ -85,5 +91,14 @@ class RowSpool final : public ErrorRowSource {
   explicit RowSpool(Spool<ErrorRow> rows) : rows_(std::move(rows)) {}
   Spool<ErrorRow> rows_;
 };
+
+/// The next records, about a megabyte of them; false after the last.
+template <typename Record, typename Records>
+bool read_block(std::vector<Record>& block, Records& records) {
+  constexpr std::size_t kBlock = 2048;
+  block.clear();
+  for (Record next{}; block.size() < kBlock && records.next(next);) block.push_back(next);
+  return !block.empty();
+}
 
 }  // namespace imuscope

@@ -154,20 +154,19 @@ bool is_final_mounting(const std::vector<FormerMounting>& former, HostTime time)
 
 Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const EstimatorConfig& estimator,
                                    const Recording& recording, const std::vector<SImuOutput>& finals,
-                                   const FormerMountings& former, const RecordStorage& storage,
+                                   const FormerMountings& former, Smoother& history,
                                    const std::function<void(double)>& progress,
                                    const std::atomic<bool>* is_given_up) {
-  Smoother smoother(storage);
   NoSink sink;
   ReplayOptions options;
-  options.history = &smoother;
+  options.history = &history;
   options.progress = progress;
   options.reading = reading_by_threads();
   options.is_given_up = is_given_up;
   const auto replayed =
       replay(configuration, relinearised(estimator, finals, former), recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());
-  return smoother.smooth(may_use_threads());
+  return history.smooth(may_use_threads());
 }
 
 Result<void> write_smoothed(const SmoothedTrack& track, const Snapshot& last, const UtcTrack& utc,

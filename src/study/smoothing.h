@@ -46,10 +46,11 @@ using FormerMountings = std::vector<std::vector<FormerMounting>>;
 
 /// Replays `recording` with every state free, the mounting's first values being those in force at its start,
 /// so that the whole drive is covered from its first sample on, and smooths what the filter saw.
+/// @param history      new; what it keeps is of no use after
 /// @param is_given_up  as ReplayOptions has it
 Result<SmoothedTrack> smooth_drive(const Configuration& configuration, const EstimatorConfig& estimator,
                                    const Recording& recording, const std::vector<SImuOutput>& finals,
-                                   const FormerMountings& former, const RecordStorage& storage,
+                                   const FormerMountings& former, Smoother& history,
                                    const std::function<void(double)>& progress,
                                    const std::atomic<bool>* is_given_up);
 

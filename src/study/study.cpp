@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <malloc.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <tbb/task_group.h>
 
@@ -12,7 +11,6 @@
 #include <utility>
 
 #include "service/pipeline/estimator_setup.h"
-#include "service/pipeline/noise_series.h"
 #include "service/recording/side_by_side.h"
 #include "service/run/models_file.h"
 #include "service/run/run_folder.h"
@@ -20,6 +18,8 @@
 #include "study/batch_study.h"
 #include "study/dependence_study.h"
 #include "study/dynamics_files.h"
+#include "study/ends_beside.h"
+#include "study/error_files.h"
 #include "study/error_pass.h"
 #include "study/mounted_passes.h"
 #include "study/noise_study.h"
@@ -54,24 +54,6 @@ class CalibrationPass final : public CoreSink {
   FormerMountings former_;
 };
 
-/// errors_NAME.csv under the names of the regimes, with the scale error; and without it the series for the
-/// noise models and the rows for everything that follows.
-/// @param of        its row is set here
-/// @param studied   takes the rows without the scale error
-NoiseSeries write_errors(ErrorRecord of, const RunRegimes& regimes, const ScaleError& scale, RowSpool& rows,
-                         RunFolder& folder, RowSpool& studied) {
-  NoiseSeries series;
-  rows.rewind();
-  while (rows.next(of.row)) {
-    const auto regime = regimes.chosen.at(of.row.time);
-    folder.write_error(of, regime ? std::string_view(regimes.chosen.names()[*regime]) : std::string_view());
-    const ErrorRow row = without_scale_error(of.row, scale);
-    series.add(row, regime);
-    studied.add(row);
-  }
-  return series;
-}
-
 Result<std::vector<RowSpool>> make_spools(std::size_t n, const OutputFolder& folder) {
   std::vector<RowSpool> spools;
   for (std::size_t i = 0; i < n; ++i) {
@@ -84,6 +66,15 @@ Result<std::vector<RowSpool>> make_spools(std::size_t n, const OutputFolder& fol
 
 std::vector<SImuOutput> final_studies(const Snapshot& last) {
   return {last.studies.begin(), last.studies.begin() + static_cast<std::ptrdiff_t>(last.n_studies)};
+}
+
+/// What is taken out of each S-IMU's error before it is studied; nothing where that is not configured.
+std::vector<ScaleError> scale_errors(const Configuration& configuration,
+                                     const std::vector<SImuOutput>& settled) {
+  std::vector<ScaleError> scales(settled.size());
+  for (std::size_t i = 0; configuration.noise.remove_scale_error && i < scales.size(); ++i)
+    scales[i] = {settled[i].gyro_scale, settled[i].accel_scale};
+  return scales;
 }
 
 /// What is taken from the smoothed drive.
@@ -229,6 +220,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
         true);
     if (begun) passes = std::move(*begun);
   };
+  EndsBeside ends;
   std::optional<BatchEstimates> batch;
   batch.emplace(configuration, may_use_threads() ? BatchEstimates::Foreseen(begin_ahead) : nullptr,
                 options.batch_longest_s.value_or(kBatchLongest_s));
@@ -275,6 +267,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   if (!passed) return tl::unexpected<Error>(passed.error());
   std::optional<SmoothedTrack> track(std::move(passed->track));
   EpochGatherer& epochs = passed->epochs;
+  ends.end(std::move(passed->history));
   // Nothing below needs the smoothed drive's files.
   Result<void> smoothed_files;
   Beside writer([&] {
@@ -286,6 +279,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   auto rows = make_spools(finals.size(), (*folder)->folder());
   if (!rows) return tl::unexpected<Error>(rows.error());
   if (auto made = epochs.make_rows(configuration, former, smoothed->biases, *rows); !made) return made;
+  ends.end(epochs.take_kept());
 
   const HostTime origin = last.first_reference_time;
   const UtcTrack& utc = (*folder)->utc();
@@ -293,18 +287,15 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   if (!labels) return tl::unexpected<Error>(labels.error());
   auto regimes = find_regimes(configuration.regimes, epochs.watch(), *labels, recording.moments, origin);
   if (!regimes) return tl::unexpected<Error>(regimes.error());
-  auto studied = make_spools(finals.size(), (*folder)->folder());
-  if (!studied) return tl::unexpected<Error>(studied.error());
-  std::vector<NoiseSeries> series(finals.size());
-  tbb::parallel_for(std::size_t{0}, finals.size(), [&](std::size_t i) {
-    const ScaleError scale =
-        configuration.noise.remove_scale_error
-            ? ScaleError{mountings.settled[i].gyro_scale, mountings.settled[i].accel_scale}
-            : ScaleError{};
-    series[i] = write_errors({i, origin, {}, {}, {}}, *regimes, scale, (*rows)[i], **folder, (*studied)[i]);
-  });
+  auto studied_rows = make_spools(finals.size(), (*folder)->folder());
+  if (!studied_rows) return tl::unexpected<Error>(studied_rows.error());
+  StudiedRows studied{std::move(*studied_rows), {}};
+  const std::vector<NoiseSeries>& series = studied.series;
+  write_errors(origin, *regimes, scale_errors(configuration, mountings.settled), *rows, **folder, studied);
+  ends.end(std::move(*rows));
 
   writer.wait();
+  ends.end(std::move(*track));
   track.reset();
   // Calibration and smoothing leave a heap full of small holes; what the noise models need are long pieces.
   malloc_trim(0);
@@ -319,7 +310,7 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
 
   const auto& names = regimes->chosen.names();
   // The regressions need no noise model of the error process, and each of them takes longer than one.
-  Regressions regressions_of_run(configuration, *studied, regimes->motion, *spec);
+  Regressions regressions_of_run(configuration, studied.rows, regimes->motion, *spec);
   const auto noise_study = study_noise(
       configuration, series, names, *spec,
       [&](double share) {
@@ -337,7 +328,10 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
                                       regimes->motion, noise_study, origin);
       },
       [&] { models = models_json(noise_study); }, [&] { comparison = comparison_json(noise_study, names); },
-      [&] { scatter = write_scatter(configuration, *studied, origin, (*folder)->folder()); });
+      [&] {
+        scatter = write_scatter(configuration, studied.rows, origin, (*folder)->folder());
+        ends.end(std::move(studied.rows));
+      });
   if (!scatter) return scatter;
   auto regime_document = regimes_json(*regimes, origin);
   regime_document["left_out"] = noise_study.left_out;

@@ -2,10 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <future>
-#include <semaphore>
+#include <mutex>
 #include <utility>
 
 #include "base/contracts.h"
@@ -103,38 +103,47 @@ void smooth_by(const Gain& gain, const SmootherStep& step, VectorXd& d, MatrixXd
   P(moving, moving) = 0.5 * (block + block.transpose());
 }
 
-/// Epochs of the history with their gains, the newest first, made when they are asked for or ahead of that.
+/// Epochs of the history with their gains, the newest first, made when they are asked for or ahead of that. A gain takes
+/// longer than what is done with it: two threads make them, each the next that nobody makes.
 class WayBack {
  public:
   struct Epoch {
     history::Filtered filtered;
     Gain gain;  ///< from the epoch after; empty of the newest
-    std::optional<Error> problem;
+    std::optional<Error> problem{};
+    std::optional<std::size_t> made{};  ///< which it is, once it is made
   };
 
   /// @param record_size  doubles of a record
-  /// @param ahead        by a thread of its own
+  /// @param ahead        by threads of their own
   WayBack(const RecordStore& records, std::size_t record_size, const history::Filtered& empty, bool ahead)
       : records_(records),
         record_(record_size),
         // The one that is worked on, the one after it, and those that are made ahead.
-        epochs_(2 + kAhead, Epoch{empty, {}, {}}) {
-    if (ahead) maker_ = std::async(std::launch::async, [this] { make_all(); });
+        epochs_(2 + kAhead, Epoch{empty, {}, {}, {}}),
+        left_(records.size()) {
+    for (std::size_t i = 0; ahead && i < kMakers; ++i)
+      makers_.push_back(std::async(std::launch::async, [this] { make_all(); }));
   }
   ~WayBack() {
-    is_given_up_ = true;
-    room_.release();
+    {
+      const std::lock_guard lock(mutex_);
+      left_ = 0;
+    }
+    changed_.notify_all();
   }
   WayBack(const WayBack&) = delete;
   WayBack& operator=(const WayBack&) = delete;
 
   /// Epoch k, which has to be the next; it and the one after stay until the next is asked for.
   Result<void> wait_for(std::size_t k) {
-    if (maker_.valid()) {
-      room_.release();
-      made_.acquire();
+    if (makers_.empty()) {
+      if (take(k)) make(k);
     } else {
-      make(k);
+      std::unique_lock lock(mutex_);
+      asked_for_ = k;
+      changed_.notify_all();
+      changed_.wait(lock, [&] { return at(k).made == k; });
     }
     if (at(k).problem) return tl::unexpected<Error>(*at(k).problem);
     return {};
@@ -145,35 +154,49 @@ class WayBack {
   }
 
  private:
-  static constexpr std::size_t kAhead = 3;
+  static constexpr std::size_t kMakers = 2;
+  static constexpr std::size_t kAhead = 6;
 
-  void make(std::size_t k) {
-    Epoch& epoch = epochs_[k % epochs_.size()];
+  Epoch& epoch(std::size_t k) { return epochs_[k % epochs_.size()]; }
+  /// The epoch as it was filtered; false where it cannot be read.
+  bool take(std::size_t k) {
+    Epoch& of = epoch(k);
     if (auto read = records_.read(k, record_); !read) {
-      epoch.problem = read.error();
-      return;
+      of.problem = read.error();
+      return false;
     }
-    epoch.filtered.unpack(record_);
-    if (k + 1 < records_.size()) epoch.gain = gain_of(step_to(k));
+    of.filtered.unpack(record_);
+    return true;
+  }
+  void make(std::size_t k) {
+    if (k + 1 < records_.size()) epoch(k).gain = gain_of(step_to(k));
   }
   void make_all() {
-    for (std::size_t k = records_.size(); k-- > 0;) {
-      room_.acquire();
-      if (is_given_up_) return;
-      make(k);
-      const bool is_last = at(k).problem.has_value();
-      made_.release();
-      if (is_last) return;
+    std::unique_lock lock(mutex_);
+    while (true) {
+      // An epoch's place was that of the one epochs_.size() after it, which those who ask need up to the next.
+      changed_.wait(lock, [this] { return left_ == 0 || left_ + kAhead > asked_for_; });
+      if (left_ == 0) return;
+      const std::size_t k = --left_;
+      // In order, one after the other: the gain of an epoch needs the one after as it was filtered.
+      const bool is_read = take(k);
+      if (!is_read) left_ = 0;
+      lock.unlock();
+      if (is_read) make(k);
+      lock.lock();
+      epoch(k).made = k;
+      changed_.notify_all();
     }
   }
 
   const RecordStore& records_;
   std::vector<double> record_;
   std::vector<Epoch> epochs_;
-  std::counting_semaphore<> room_{kAhead};
-  std::counting_semaphore<> made_{0};
-  std::atomic<bool> is_given_up_{false};
-  std::future<void> maker_;  ///< ends before all that it uses
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::size_t left_;                         ///< epochs that nobody makes yet
+  std::size_t asked_for_ = records_.size();  ///< the last
+  std::vector<std::future<void>> makers_;    ///< end before all that they use
 };
 
 }  // namespace

@@ -82,7 +82,7 @@ class Smoother final : public HistorySink {
   [[nodiscard]] std::size_t file_bytes() const noexcept { return records_ ? records_->file_bytes() : 0; }
 
   /// Backward pass over everything received. Fails where the disk could not take the history.
-  /// @param ahead  a second thread reads the next epochs and makes their gains; same result
+  /// @param ahead  two more threads read the next epochs and make their gains; same result
   [[nodiscard]] Result<SmoothedTrack> smooth(bool ahead = false) const;
 
  private:

@@ -1,9 +1,11 @@
 #include "results/report/run_files.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <functional>
 
 #include "base/grouped.h"
 #include "base/text.h"
@@ -80,9 +82,9 @@ class LocalPlane {
   double east_m_per_deg_;
 };
 
-Result<void> read_navigation(RunFiles& run) {
+Result<void> read_navigation(RunFiles& run, std::vector<std::string>& absent) {
   const auto file = run.folder / "navigation.csv";
-  if (!present(file, run.absent)) return {};
+  if (!present(file, absent)) return {};
   auto reader = CsvReader::open(
       file, {"time_s", "lat_deg", "lon_deg", "height_m", "v_n_mps", "v_e_mps", "sd_n_m", "sd_e_m", "sd_d_m"});
   if (!reader) return passed_on(reader);
@@ -216,7 +218,18 @@ Result<void> read_errors(const RunFiles& run, SImuFiles& study, std::vector<std:
   return {};
 }
 
-Result<void> read_studies(RunFiles& run, const json& calibration) {
+/// Where nothing moved there is a file without a row, and no scatter.
+Result<void> read_scatter_of(const RunFiles& run, SImuFiles& study, std::vector<std::string>& absent) {
+  const auto file = run.folder / device_file_name("scatter", study.name, ".csv");
+  if (!present(file, absent)) return {};
+  auto scatter = read_scatter(file);
+  if (!scatter) return passed_on(scatter);
+  if (!scatter->errors[0].empty()) study.scatter = std::move(*scatter);
+  return {};
+}
+
+/// The S-IMUs by name, with what the documents say of them.
+Result<void> begin_studies(RunFiles& run, const json& calibration) {
   auto truth = read_json(run.folder / "truth.json", run.absent);
   if (!truth) return passed_on(truth);
   run.has_truth = !truth->is_null();
@@ -232,17 +245,39 @@ Result<void> read_studies(RunFiles& run, const json& calibration) {
     }
     study.calibration = imu;
     study.truth = named(field(*truth, "imus"), study.name);
-    if (auto read = read_calibration_series(run, study, run.absent); !read) return read;
-    if (auto read = read_errors(run, study, run.absent); !read) return read;
-    const auto scatter_file = run.folder / device_file_name("scatter", study.name, ".csv");
-    if (present(scatter_file, run.absent)) {
-      auto scatter = read_scatter(scatter_file);
-      if (!scatter) return passed_on(scatter);
-      if (!scatter->errors[0].empty()) study.scatter = std::move(*scatter);
-    }
     run.studies.push_back(std::move(study));
   }
   return {};
+}
+
+/// Reads one file, and notes its absence.
+using FileReader = std::function<Result<void>(std::vector<std::string>& absent)>;
+
+/// Every file by itself, on any thread; of those that fail and those that are absent, as one after the other.
+Result<void> read_side_by_side(const std::vector<FileReader>& readers, std::vector<std::string>& absent) {
+  std::vector<Result<void>> read(readers.size());
+  std::vector<std::vector<std::string>> absent_of(readers.size());
+  tbb::parallel_for(
+      std::size_t{0}, readers.size(), [&](std::size_t i) { read[i] = readers[i](absent_of[i]); },
+      tbb::simple_partitioner());
+  for (std::size_t i = 0; i < readers.size(); ++i) {
+    absent.insert(absent.end(), absent_of[i].begin(), absent_of[i].end());
+    if (!read[i]) return read[i];
+  }
+  return {};
+}
+
+/// The files that grow with the drive.
+Result<void> read_series(RunFiles& run) {
+  std::vector<FileReader> readers;
+  readers.emplace_back([&](auto& absent) { return read_navigation(run, absent); });
+  readers.emplace_back([&](auto&) { return read_odometry(run); });
+  for (SImuFiles& study : run.studies) {
+    readers.emplace_back([&](auto& absent) { return read_calibration_series(run, study, absent); });
+    readers.emplace_back([&](auto& absent) { return read_errors(run, study, absent); });
+    readers.emplace_back([&](auto& absent) { return read_scatter_of(run, study, absent); });
+  }
+  return read_side_by_side(readers, run.absent);
 }
 
 }  // namespace
@@ -293,9 +328,8 @@ Result<RunFiles> read_run_files(const std::filesystem::path& folder) {
     if (!read) return passed_on(read);
     *document_of = std::move(*read);
   }
-  if (auto read = read_navigation(run); !read) return passed_on(read);
-  if (auto read = read_odometry(run); !read) return passed_on(read);
-  if (auto read = read_studies(run, *calibration); !read) return passed_on(read);
+  if (auto begun = begin_studies(run, *calibration); !begun) return passed_on(begun);
+  if (auto read = read_series(run); !read) return passed_on(read);
   return run;
 }
 
