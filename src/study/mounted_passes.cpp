@@ -71,7 +71,7 @@ Result<std::unique_ptr<MountedPasses>> MountedPasses::begin(const Drive& drive, 
   auto epochs = EpochGatherer::create(drive.folder, mountings.of_drive.size());
   if (!epochs) return tl::unexpected<Error>(epochs.error());
   std::unique_ptr<MountedPasses> passes(new MountedPasses(drive, std::move(mountings), std::move(*epochs)));
-  // Beside the pass that calibrates smoothing, which has the longer way, is enough for the second processor.
+  // The calibration pass and smoothing, which has the longer way of the two, fill two processors.
   const bool waits = is_ahead && may_use_threads() && !may_use_third_thread();
   if (!waits) passes->may_gather();
   passes->smoothed_ = in_spare_time(kNicerToSmooth, [p = passes.get()] { return p->smooth(); });

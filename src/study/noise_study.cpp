@@ -325,23 +325,21 @@ NoiseStudy study_axis(const DeviceConfig& device, const NoiseSeries& series, std
   std::vector<noise::Line> of_all;
   for (const auto& of_regime : lines) of_all.insert(of_all.end(), of_regime.begin(), of_regime.end());
   const AxisWork work{device, values, spec, covariances, study};
-  std::vector<Selection> selections{selection_of(work, kWholeRun, series.mask(axis), of_all)};
-  for (std::size_t r = 0; r < regimes.size(); ++r)
-    selections.push_back(selection_of(work, regimes[r], series.mask(axis, r), lines[r]));
-  std::vector<std::optional<Result<noise::WaveletVariance>>> variances;
-  for (const Selection& selection : selections) variances.push_back(variance_of(work, selection));
-  // The fits share an idle thread, so that the last axis is no long way for one alone. Who waits takes no other axis up
-  // meanwhile: its series would be memory beside this one's.
-  std::vector<NoiseStudy> parts(selections.size());
-  tbb::this_task_arena::isolate([&] {
-    tbb::parallel_for(
-        std::size_t{0}, parts.size(),
-        [&](std::size_t i) {
-          fit_axis({device, values, spec, covariances, parts[i]}, axis, selections[i], variances[i],
-                   levels_of(variances[0]));
-        },
-        tbb::simple_partitioner());
-  });
+  const Selection whole = selection_of(work, kWholeRun, series.mask(axis), of_all);
+  const auto wv_of_whole = variance_of(work, whole);
+  // The whole run, then its regimes. An idle thread takes its share of them, so that the last axis is no long way for one
+  // alone; a thread that waits here takes up no other axis, whose series would be memory beside this one's.
+  std::vector<NoiseStudy> parts(1 + regimes.size());
+  const auto fit_part = [&](std::size_t i) {
+    const AxisWork of_part{device, values, spec, covariances, parts[i]};
+    const std::size_t levels = levels_of(wv_of_whole);
+    if (i == 0) return fit_axis(of_part, axis, whole, wv_of_whole, levels);
+    const std::size_t r = i - 1;
+    const Selection selection = selection_of(of_part, regimes[r], series.mask(axis, r), lines[r]);
+    fit_axis(of_part, axis, selection, variance_of(of_part, selection), levels);
+  };
+  tbb::this_task_arena::isolate(
+      [&] { tbb::parallel_for(std::size_t{0}, parts.size(), fit_part, tbb::simple_partitioner()); });
   for (NoiseStudy& part : parts) append_part(std::move(part), study);
   return study;
 }

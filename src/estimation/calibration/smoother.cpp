@@ -174,7 +174,7 @@ class WayBack {
   void make_all() {
     std::unique_lock lock(mutex_);
     while (true) {
-      // An epoch's place was that of the one epochs_.size() after it, which those who ask need up to the next.
+      // The next one's place in the ring holds the epoch epochs_.size() later, until that is no longer needed.
       changed_.wait(lock, [this] { return left_ == 0 || left_ + kAhead > asked_for_; });
       if (left_ == 0) return;
       const std::size_t k = --left_;
@@ -194,8 +194,8 @@ class WayBack {
   std::vector<Epoch> epochs_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::size_t left_;                         ///< epochs that nobody makes yet
-  std::size_t asked_for_ = records_.size();  ///< the last
+  std::size_t left_;                         ///< epochs that nobody makes yet, the oldest ones
+  std::size_t asked_for_ = records_.size();  ///< the epoch that was last asked for
   std::vector<std::future<void>> makers_;    ///< end before all that they use
 };
 

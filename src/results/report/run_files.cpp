@@ -82,11 +82,12 @@ class LocalPlane {
   double east_m_per_deg_;
 };
 
-Result<void> read_navigation(RunFiles& run, std::vector<std::string>& absent) {
-  const auto file = run.folder / "navigation.csv";
-  if (!present(file, absent)) return {};
+constexpr const char* kNavigationFile = "navigation.csv";
+
+Result<void> read_navigation(RunFiles& run) {
   auto reader = CsvReader::open(
-      file, {"time_s", "lat_deg", "lon_deg", "height_m", "v_n_mps", "v_e_mps", "sd_n_m", "sd_e_m", "sd_d_m"});
+      run.folder / kNavigationFile,
+      {"time_s", "lat_deg", "lon_deg", "height_m", "v_n_mps", "v_e_mps", "sd_n_m", "sd_e_m", "sd_d_m"});
   if (!reader) return passed_on(reader);
   BinnedSignals signals(kNavigationSignals, kMapBinsMax, kFirstBin_s);
   std::optional<LocalPlane> plane;
@@ -253,7 +254,7 @@ Result<void> begin_studies(RunFiles& run, const json& calibration) {
 /// Reads one file, and notes its absence.
 using FileReader = std::function<Result<void>(std::vector<std::string>& absent)>;
 
-/// Every file by itself, on any thread; of those that fail and those that are absent, as one after the other.
+/// Every file by itself, on any thread. Absent files and the first failure are told as if they were read in order.
 Result<void> read_side_by_side(const std::vector<FileReader>& readers, std::vector<std::string>& absent) {
   std::vector<Result<void>> read(readers.size());
   std::vector<std::vector<std::string>> absent_of(readers.size());
@@ -268,9 +269,9 @@ Result<void> read_side_by_side(const std::vector<FileReader>& readers, std::vect
 }
 
 /// The files that grow with the drive.
-Result<void> read_series(RunFiles& run) {
+Result<void> read_series(RunFiles& run, bool has_navigation) {
   std::vector<FileReader> readers;
-  readers.emplace_back([&](auto& absent) { return read_navigation(run, absent); });
+  if (has_navigation) readers.emplace_back([&](auto&) { return read_navigation(run); });
   readers.emplace_back([&](auto&) { return read_odometry(run); });
   for (SImuFiles& study : run.studies) {
     readers.emplace_back([&](auto& absent) { return read_calibration_series(run, study, absent); });
@@ -328,8 +329,9 @@ Result<RunFiles> read_run_files(const std::filesystem::path& folder) {
     if (!read) return passed_on(read);
     *document_of = std::move(*read);
   }
+  const bool has_navigation = present(folder / kNavigationFile, run.absent);
   if (auto begun = begin_studies(run, *calibration); !begun) return passed_on(begun);
-  if (auto read = read_series(run); !read) return passed_on(read);
+  if (auto read = read_series(run, has_navigation); !read) return passed_on(read);
   return run;
 }
 
