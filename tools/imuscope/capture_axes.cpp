@@ -56,6 +56,7 @@ SensorRecord record_of(const std::filesystem::path& file, const std::string& dev
     axis.mask = std::move(signal.mask);
     axis.fetch = std::move(read.fetches[i]);
     axis.temperature_c = read.temperature_c;
+    axis.fetch_temperature = read.fetch_temperature;
     sensor.axes.push_back(std::move(axis));
   }
   return sensor;

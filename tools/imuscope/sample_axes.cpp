@@ -196,11 +196,12 @@ Result<SampleAxes> AxesSink::axes_on_disk(std::optional<double> rate_hz) {
   const auto places = std::make_shared<const RowPlaces>(std::move(*found));
   SampleAxes out;
   if (has_temperature) {
-    auto temperature = filled<float>(*places, [&](std::size_t first, std::span<float> values) {
-      return read_floats(spools_[kTemperature], first, values);
-    });
-    if (!temperature) return tl::unexpected<Error>(temperature.error());
-    out.temperature_c = std::make_shared<const std::vector<float>>(std::move(*temperature));
+    out.fetch_temperature = [places,
+                             spool = std::make_shared<const Spool>(std::move(spools_[kTemperature]))] {
+      return filled<float>(*places, [&](std::size_t first, std::span<float> values) {
+        return read_floats(*spool, first, values);
+      });
+    };
   }
   for (std::size_t axis = 0; axis < out.axes.size(); ++axis) {
     out.axes[axis].rate_hz = places->rate_hz;

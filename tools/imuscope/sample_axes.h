@@ -28,6 +28,7 @@ struct SampleAxes {
   std::array<bool, kMessageAxes.size()> is_sent{};  ///< at least one sample has it
   /// One a sample, the last that was sent; null: none.
   std::shared_ptr<const std::vector<float>> temperature_c{};
+  certificate::FetchTemperatures fetch_temperature{};  ///< in its place, of samples that lie on the disk
 };
 
 /// Takes an IMU's samples, in order, and keeps what the axes need of them.

@@ -287,10 +287,14 @@ Result<AxisCertificate> modelled(Reduced&& axis, const AxisRecord& record, const
 
 /// What only the samples and the model together tell.
 Result<AxisCertificate> with_temperature(Result<AxisCertificate>&& axis, const AxisRecord& record) {
-  if (!axis || record.temperature_c == nullptr) return std::move(axis);
+  if (!axis || (record.temperature_c == nullptr && !record.fetch_temperature)) return std::move(axis);
   const auto x = samples_of(record);
   if (!x) return tl::unexpected(named(record, x.error()));
-  axis->temperature = temperature_of(*x, mask_of(record, *x), *record.temperature_c, axis->fit);
+  const auto fetched =
+      record.fetch_temperature ? record.fetch_temperature() : Result<std::vector<float>>(std::in_place);
+  if (!fetched) return tl::unexpected(named(record, fetched.error()));
+  const std::span<const float> t = record.fetch_temperature ? *fetched : *record.temperature_c;
+  axis->temperature = temperature_of(*x, record.mask, t, axis->fit);
   return std::move(axis);
 }
 

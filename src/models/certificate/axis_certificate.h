@@ -27,6 +27,9 @@ namespace imuscope::certificate {
 /// Hands out the samples of an axis. Asked several times, by one thread at a time.
 using FetchSamples = std::function<Result<std::vector<double>>()>;
 
+/// Hands out temperatures, one a sample, likewise.
+using FetchTemperatures = std::function<Result<std::vector<float>>()>;
+
 /// One axis as recorded.
 struct AxisRecord {
   std::string name;  ///< "gyro_x"
@@ -38,6 +41,8 @@ struct AxisRecord {
   std::shared_ptr<const std::vector<float>> temperature_c{};
   /// In place of `values`, of a record that is too long to lie in memory as a whole.
   FetchSamples fetch{};
+  /// In place of `temperature_c`, of such a record.
+  FetchTemperatures fetch_temperature{};
 };
 
 /// Do the two halves of the record come from one model?

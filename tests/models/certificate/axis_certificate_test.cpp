@@ -172,6 +172,8 @@ TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
   AxisRecord fetched = record;
   fetched.values.clear();
   fetched.fetch = [values = record.values]() -> Result<std::vector<double>> { return values; };
+  fetched.fetch_temperature = [t = record.temperature_c]() -> Result<std::vector<float>> { return *t; };
+  fetched.temperature_c = nullptr;
   const std::vector records{fetched};
   const auto there = characterize_axis(record, {});
   const auto later = characterize_axes(records, {}).front();
@@ -180,6 +182,14 @@ TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
   EXPECT_EQ(to_json(origin, {*there}), to_json(origin, {*later}));
   EXPECT_FALSE(there->lines.empty());
   EXPECT_TRUE(there->temperature);
+}
+
+TEST(AxisCertificate, TemperaturesThatCannotBeFetchedAreTold) {
+  AxisRecord record = made_gyro(40'000, 8);
+  record.fetch_temperature = []() -> Result<std::vector<float>> { return work_error("the disk is gone"); };
+  const auto axis = characterize_axis(record, {});
+  ASSERT_FALSE(axis);
+  EXPECT_THAT(axis.error().text(), testing::HasSubstr("the disk is gone"));
 }
 
 TEST(AxisCertificate, RecordsThatAreFetchedOneAfterTheOtherKeepTheirPlacesAndAreToldInOrder) {

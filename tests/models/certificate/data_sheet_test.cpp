@@ -61,6 +61,25 @@ TEST(DataSheet, PartsThatAreShippedAreRead) {
   }
 }
 
+// BMI088: 160 ug/sqrt(Hz) along x and y, 190 along z; 0.014 deg/s/sqrt(Hz).
+TEST(DataSheet, AShippedPartWithAnAxisOfItsOwn) {
+  std::ifstream in(imuscope::test::source_path("docs/examples/data_sheets.json"));
+  const auto sheet = read(json::parse(in, nullptr, false), "BMI088");
+  ASSERT_TRUE(sheet) << sheet.error().text();
+  const auto walk_of = [](double value, double low, double high) {
+    return std::vector{term(Term::kRandomWalk, value, low, high, noise::Knowledge::kFitted)};
+  };
+  const auto rows =
+      beside(*sheet, {axis_of("gyro_x", walk_of(0.84, 0.8, 0.9)), axis_of("accel_x", walk_of(0.094, 0.09, 0.1)),
+                      axis_of("accel_z", walk_of(0.094, 0.09, 0.1))});
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_NEAR(rows[0].stated.value, 0.014 * 60.0, 1e-12);
+  EXPECT_NEAR(rows[1].stated.value, 160e-6 * 9.80665 * 60.0, 1e-12);
+  EXPECT_NEAR(rows[2].stated.value, 190e-6 * 9.80665 * 60.0, 1e-12);
+  EXPECT_EQ(rows[1].verdict, Verdict::kAgrees);
+  EXPECT_EQ(rows[2].verdict, Verdict::kBetter);
+}
+
 // Once by hand: 2.8 mdeg/s/sqrt(Hz) are 0.0028 * 60 deg/sqrt(h); 70 ug/sqrt(Hz) are 70e-6 * 9.80665 * 60.
 TEST(DataSheet, UnitsOfMakersBecomeThoseOfTheCertificate) {
   const auto sheet = read(
