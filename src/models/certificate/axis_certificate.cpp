@@ -290,8 +290,8 @@ Result<AxisCertificate> with_temperature(Result<AxisCertificate>&& axis, const A
   if (!axis || (record.temperature_c == nullptr && !record.fetch_temperature)) return std::move(axis);
   const auto x = samples_of(record);
   if (!x) return tl::unexpected(named(record, x.error()));
-  const auto fetched =
-      record.fetch_temperature ? record.fetch_temperature() : Result<std::vector<float>>(std::in_place);
+  const Result<std::vector<float>> fetched =
+      record.fetch_temperature ? record.fetch_temperature() : std::vector<float>{};
   if (!fetched) return tl::unexpected(named(record, fetched.error()));
   const std::span<const float> t = record.fetch_temperature ? *fetched : *record.temperature_c;
   axis->temperature = temperature_of(*x, record.mask, t, axis->fit);

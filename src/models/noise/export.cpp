@@ -169,8 +169,9 @@ Triad walk_triad(Writer& writer, bool gyro) {
   std::vector<Written> white;
   std::vector<Written> walk;
   for (const AxisFit& axis : of_triad(writer.axes(), gyro)) {
-    white.push_back(writer.take(axis, felt_white_density(axis.fit, writer.band()), "white noise"));
-    walk.push_back(writer.take(axis, felt_walk_density(axis.fit, writer.band()), "random walk"));
+    const FeltWithWalk felt = felt_with_walk(axis.fit, writer.band());
+    white.push_back(writer.take(axis, felt.white_density, "white noise"));
+    walk.push_back(writer.take(axis, felt.walk_density, "random walk"));
   }
   return {!white.empty(), writer.joined(white), writer.joined(walk), 0.0};
 }
@@ -188,13 +189,13 @@ CommonTime common_time(const std::vector<AxisFit>& axes, const FilterBand& band)
   double other_sum = 0.0;
   std::vector<double> told_s;
   for (const AxisFit& axis : axes) {
-    const FeltBias bias = felt_with_bias(axis.fit, band).bias;
-    other_sum += std::log(bias.tau_s);
-    if (!bias.tau_log_sd) continue;
-    const double weight = 1.0 / (*bias.tau_log_sd * *bias.tau_log_sd);
-    sum += weight * std::log(bias.tau_s);
+    const BiasTime time = felt_bias_time(axis.fit, band);
+    other_sum += std::log(time.tau_s);
+    if (!time.tau_log_sd) continue;
+    const double weight = 1.0 / (*time.tau_log_sd * *time.tau_log_sd);
+    sum += weight * std::log(time.tau_s);
     weights += weight;
-    told_s.push_back(bias.tau_s);
+    told_s.push_back(time.tau_s);
   }
   if (told_s.empty()) {
     return {std::exp(other_sum / static_cast<double>(axes.size())),

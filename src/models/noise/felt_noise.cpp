@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <functional>
@@ -71,7 +72,7 @@ double white_of(const Model& model, double rate_hz, double fast_s) {
   return sum;
 }
 
-/// G-29: variance of what a process grows by in `time_s`.
+/// Variance of what a process grows by in `time_s`.
 double growth_of(const Component& c, double rate_hz, double time_s) {
   const double samples = time_s * rate_hz;
   switch (c.kind) {
@@ -86,13 +87,27 @@ double growth_of(const Component& c, double rate_hz, double time_s) {
   }
 }
 
-double slow_growth(const Model& any, double rate_hz, double fast_s, double time_s) {
-  const Model model = without_power_laws(any);
-  double sum = 0.0;
-  for (const Component& c : model.components)
-    sum += (1.0 - white_share(c, rate_hz, fast_s)) * growth_of(c, rate_hz, time_s);
-  return sum;
-}
+/// What of a model is slow at `fast_s`.
+class SlowPart {
+ public:
+  SlowPart(const Model& model, double rate_hz, double fast_s)
+      : terms_(without_power_laws(model).components), rate_hz_(rate_hz) {
+    for (const Component& c : terms_) shares_.push_back(1.0 - white_share(c, rate_hz, fast_s));
+  }
+
+  /// G-29.
+  [[nodiscard]] double growth(double time_s) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < terms_.size(); ++i)
+      sum += shares_[i] * growth_of(terms_[i], rate_hz_, time_s);
+    return sum;
+  }
+
+ private:
+  std::vector<Component> terms_;
+  std::vector<double> shares_;
+  double rate_hz_;
+};
 
 /// The middle of part `i` of kBandPoints parts that are alike in the logarithm.
 double band_time_s(const FilterBand& band, int i) {
@@ -100,12 +115,12 @@ double band_time_s(const FilterBand& band, int i) {
 }
 
 /// Mean over the band, on a logarithmic scale of time, of ln(growth / unit growth).
-double mean_log_growth(const Model& model, double rate_hz, double fast_s, const FilterBand& band,
-                       const std::function<double(double)>& unit) {
+template <typename Unit>
+double mean_log_growth(const SlowPart& slow, const FilterBand& band, Unit&& unit) {
   double sum = 0.0;
   for (int i = 0; i < kBandPoints; ++i) {
     const double time_s = band_time_s(band, i);
-    sum += std::log(slow_growth(model, rate_hz, fast_s, time_s) / unit(time_s));
+    sum += std::log(slow.growth(time_s) / unit(time_s));
   }
   return sum / kBandPoints;
 }
@@ -113,33 +128,39 @@ double mean_log_growth(const Model& model, double rate_hz, double fast_s, const 
 double gauss_markov_growth(double tau_s, double time_s) { return -2.0 * std::expm1(-time_s / tau_s); }
 
 /// G-30.
-double walk_of(const Model& model, double rate_hz, double fast_s, const FilterBand& band) {
-  return std::exp(mean_log_growth(model, rate_hz, fast_s, band, [](double t) { return t; }));
+double walk_of(const SlowPart& slow, const FilterBand& band) {
+  return std::exp(mean_log_growth(slow, band, [](double t) { return t; }));
 }
 
 /// G-31.
-double bias_variance_of(const Model& model, double rate_hz, double fast_s, const FilterBand& band,
-                        double tau_s) {
-  return std::exp(
-      mean_log_growth(model, rate_hz, fast_s, band, [&](double t) { return gauss_markov_growth(tau_s, t); }));
+double bias_variance_of(const SlowPart& slow, const FilterBand& band, double tau_s) {
+  return std::exp(mean_log_growth(slow, band, [&](double t) { return gauss_markov_growth(tau_s, t); }));
 }
 
-/// The correlation time with which one Gauss-Markov process follows the slow terms' growth best.
-double best_tau(const Model& model, double rate_hz, double fast_s, const FilterBand& band) {
+/// The correlation time with which one Gauss-Markov process follows the slow terms' growth best: the logarithm of
+/// what one is of the other varies least over the band.
+double best_tau(const SlowPart& slow, const FilterBand& band) {
   constexpr int kSteps = 200;
+  std::array<double, kBandPoints> times_s{};
+  std::array<double, kBandPoints> growths{};
+  for (int k = 0; k < kBandPoints; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    times_s[at] = band_time_s(band, k);
+    growths[at] = slow.growth(times_s[at]);
+  }
   double best = band.to_s;
   double least = kInfinity;
   for (int i = 0; i <= kSteps; ++i) {
     const double tau_s =
         band.from_s * std::pow(kLongestTau * band.to_s / band.from_s, i / static_cast<double>(kSteps));
-    const double level = std::log(bias_variance_of(model, rate_hz, fast_s, band, tau_s));
-    double squares = 0.0;
-    for (int k = 0; k < kBandPoints; ++k) {
-      const double time_s = band_time_s(band, k);
-      squares += std::pow(
-          std::log(slow_growth(model, rate_hz, fast_s, time_s) / gauss_markov_growth(tau_s, time_s)) - level,
-          2);
+    std::array<double, kBandPoints> logs{};
+    double level = 0.0;
+    for (std::size_t k = 0; k < logs.size(); ++k) {
+      logs[k] = std::log(growths[k] / gauss_markov_growth(tau_s, times_s[k]));
+      level += logs[k] / kBandPoints;
     }
+    double squares = 0.0;
+    for (const double log : logs) squares += (log - level) * (log - level);
     if (squares < least) {
       least = squares;
       best = tau_s;
@@ -307,6 +328,22 @@ class Uncertainty {
   bool known_ = false;
 };
 
+/// A fit and its uncertainty, which costs a covariance matrix: once for all that is asked of the fit, and not before.
+class Told {
+ public:
+  explicit Told(const FitResult& result) : fit(result) {}
+
+  [[nodiscard]] const Uncertainty& uncertainty() {
+    if (!uncertainty_) uncertainty_.emplace(fit);
+    return *uncertainty_;
+  }
+
+  const FitResult& fit;
+
+ private:
+  std::optional<Uncertainty> uncertainty_;
+};
+
 /// G-32: the most of a term with this unit curve that every level allows beside the rest of the model.
 /// Infinite without a level. What the rest of a rejected model takes of a level is not known.
 double most_of(const FitResult& fit, const std::function<double(int)>& unit, const Model& rest) {
@@ -331,14 +368,13 @@ Felt as_bound(double fitted, double bound) {
 }
 
 /// A function of the model as value and interval where the data tell it, else the most that they allow.
-Felt felt(const FitResult& fit, const OfModel& f, const std::function<double()>& bound) {
-  const double value = f(fit.model);
+Felt felt(Told& told, const OfModel& f, const std::function<double()>& bound) {
+  const double value = f(told.fit.model);
   if (value > 0.0) {
-    const Uncertainty uncertainty(fit);
-    const double log_sd = uncertainty.log_sd(f);
+    const double log_sd = told.uncertainty().log_sd(f);
     if (log_sd < kUndetermined) {
-      const double z = normal_quantile_of(fit.confidence);
-      const auto profile = uncertainty.profile(f, z);
+      const double z = normal_quantile_of(told.fit.confidence);
+      const auto profile = told.uncertainty().profile(f, z);
       const auto range = profile.value_or(Uncertainty::Range{-z * log_sd, z * log_sd});
       return {value, value * std::exp(range.high), value * std::exp(range.low), Knowledge::kFitted};
     }
@@ -355,10 +391,11 @@ Model part_of(const Model& model, double rate_hz, double fast_s, bool slow) {
   return part;
 }
 
-Felt told_white_density(const FitResult& fit, double fast_s) {
+Felt told_white_density(Told& told, double fast_s) {
+  const FitResult& fit = told.fit;
   const double f = fit.rate_hz;
   return felt(
-      fit, [&](const Model& m) { return white_of(m, f, fast_s); },
+      told, [&](const Model& m) { return white_of(m, f, fast_s); },
       [&] {
         // What is white but no white noise (quantization) has its own curve, and stays beside it.
         Model rest;
@@ -418,13 +455,15 @@ std::optional<Felt> own_walk(const FitResult& fit, double fast_s) {
   return own;
 }
 
-Felt walk_density(const FitResult& fit, double fast_s, const FilterBand& band) {
+Felt walk_density(Told& told, double fast_s, const FilterBand& band) {
+  const FitResult& fit = told.fit;
   const double f = fit.rate_hz;
   if (const auto own = own_walk(fit, fast_s)) return *own;
   const auto value = [&](const Model& m) {
-    return slow_growth(m, f, fast_s, band.to_s) > 0.0 ? walk_of(m, f, fast_s, band) : 0.0;
+    const SlowPart slow(m, f, fast_s);
+    return slow.growth(band.to_s) > 0.0 ? walk_of(slow, band) : 0.0;
   };
-  return felt(fit, value, [&] {
+  return felt(told, value, [&] {
     return most_of(
         fit, [&](int level) { return unit_wv(ProcessKind::kRandomWalk, {}, level).value / f; },
         part_of(fit.model, f, fast_s, false));
@@ -446,13 +485,13 @@ double fast_beside_bias_s(const FitResult& fit, const FilterBand& band) {
 /// The one Gauss-Markov process that makes the slow growth, told by the data; absent where there is none.
 std::optional<FeltBias> own_process(const FitResult& fit, double fast_s, const FilterBand& band) {
   const double f = fit.rate_hz;
+  const SlowPart all(fit.model, f, fast_s);
   std::optional<std::size_t> only;
   for (std::size_t i = 0; i < fit.model.components.size(); ++i) {
     const Component& c = fit.model.components[i];
     if (white_share(c, f, fast_s) >= 1.0 || c.amplitude <= 0.0) continue;
-    const auto share = [&](double time_s) {
-      return slow_growth(Model{{c}}, f, fast_s, time_s) / slow_growth(fit.model, f, fast_s, time_s);
-    };
+    const SlowPart own(Model{{c}}, f, fast_s);
+    const auto share = [&](double time_s) { return own.growth(time_s) / all.growth(time_s); };
     const bool is_told = has_interval(parameter_of(fit, i, -1));
     if (std::max(share(band.from_s), share(band.to_s)) < (is_told ? kNegligibleShare : kNegligibleUntold))
       continue;
@@ -471,16 +510,24 @@ std::optional<FeltBias> own_process(const FitResult& fit, double fast_s, const F
   return bias;
 }
 
-Felt bias_variance(const FitResult& fit, double fast_s, const FilterBand& band, double tau_s) {
+Felt bias_variance(Told& told, double fast_s, const FilterBand& band, double tau_s) {
+  const FitResult& fit = told.fit;
   const double f = fit.rate_hz;
   const auto value = [&](const Model& m) {
-    return slow_growth(m, f, fast_s, band.to_s) > 0.0 ? bias_variance_of(m, f, fast_s, band, tau_s) : 0.0;
+    const SlowPart slow(m, f, fast_s);
+    return slow.growth(band.to_s) > 0.0 ? bias_variance_of(slow, band, tau_s) : 0.0;
   };
-  return felt(fit, value, [&] {
+  return felt(told, value, [&] {
     return most_of(
         fit, [&](int level) { return gauss_markov_wv(1.0 / (tau_s * f), level).value; },
         part_of(fit.model, f, fast_s, false));
   });
+}
+
+/// The correlation time of the process in the place of the slow terms.
+double time_in_place(const FitResult& fit, double fast_s, const FilterBand& band) {
+  const SlowPart slow(fit.model, fit.rate_hz, fast_s);
+  return slow.growth(band.to_s) > 0.0 ? best_tau(slow, band) : band.to_s;
 }
 
 }  // namespace
@@ -495,38 +542,59 @@ double white_density(const Model& model, double rate_hz, const FilterBand& band)
 }
 
 Felt felt_white_density(const FitResult& fit, const FilterBand& band) {
-  return told_white_density(fit, band.from_s);
+  Told told(fit);
+  return told_white_density(told, band.from_s);
 }
 
 Felt felt_walk_density(const FitResult& fit, const FilterBand& band) {
-  return walk_density(fit, band.from_s, band);
+  Told told(fit);
+  return walk_density(told, band.from_s, band);
+}
+
+FeltWithWalk felt_with_walk(const FitResult& fit, const FilterBand& band) {
+  Told told(fit);
+  FeltWithWalk out;
+  out.white_density = told_white_density(told, band.from_s);
+  out.walk_density = walk_density(told, band.from_s, band);
+  return out;
 }
 
 Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band) {
-  return told_white_density(fit, fast_beside_bias_s(fit, band));
+  Told told(fit);
+  return told_white_density(told, fast_beside_bias_s(fit, band));
+}
+
+BiasTime felt_bias_time(const FitResult& fit, const FilterBand& band) {
+  const double fast_s = fast_beside_bias_s(fit, band);
+  if (const auto own = own_process(fit, fast_s, band)) return {own->tau_s, own->tau_log_sd};
+  return {time_in_place(fit, fast_s, band), {}};
 }
 
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band) {
   const double fast_s = fast_beside_bias_s(fit, band);
+  Told told(fit);
   FeltWithBias out;
-  out.white_density = told_white_density(fit, fast_s);
+  out.white_density = told_white_density(told, fast_s);
   if (const auto own = own_process(fit, fast_s, band)) {
     out.bias = *own;
     return out;
   }
-  const bool has_slow = slow_growth(fit.model, fit.rate_hz, fast_s, band.to_s) > 0.0;
-  out.bias.tau_s = has_slow ? best_tau(fit.model, fit.rate_hz, fast_s, band) : band.to_s;
-  out.bias.variance = bias_variance(fit, fast_s, band, out.bias.tau_s);
+  out.bias.tau_s = time_in_place(fit, fast_s, band);
+  out.bias.variance = bias_variance(told, fast_s, band, out.bias.tau_s);
   return out;
 }
 
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double tau_s) {
-  FeltWithBias out = felt_with_bias(fit, band);
+  const double fast_s = fast_beside_bias_s(fit, band);
+  Told told(fit);
+  FeltWithBias out;
+  out.white_density = told_white_density(told, fast_s);
+  const auto own = own_process(fit, fast_s, band);
+  if (own) out.bias = *own;
   const double z = normal_quantile_of(fit.confidence);
-  const bool is_own_time =
-      out.bias.tau_log_sd && std::abs(std::log(tau_s / out.bias.tau_s)) <= z * *out.bias.tau_log_sd;
+  const bool is_own_time = own && std::abs(std::log(tau_s / own->tau_s)) <= z * *own->tau_log_sd;
   if (!is_own_time) {
-    out.bias.variance = bias_variance(fit, fast_beside_bias_s(fit, band), band, tau_s);
+    out.bias.variance = bias_variance(told, fast_s, band, tau_s);
     out.bias.as_fitted = false;
   }
   out.bias.tau_s = tau_s;

@@ -63,6 +63,13 @@ Felt felt_white_density(const FitResult& fit, const FilterBand& band);
 /// Density that drives a random walk in the place of the slow terms, unit^2 Hz.
 Felt felt_walk_density(const FitResult& fit, const FilterBand& band);
 
+/// Both, for a form of white noise and a random walk, in less time than one after the other.
+struct FeltWithWalk {
+  Felt white_density;
+  Felt walk_density;
+};
+FeltWithWalk felt_with_walk(const FitResult& fit, const FilterBand& band);
+
 /// For a form of white noise and one Gauss-Markov process: the density of the white noise, and the process.
 /// The slowest process is the bias, and no part of it white, even where it is faster than the band, as long
 /// as it lasts ten samples.
@@ -71,7 +78,13 @@ struct FeltWithBias {
   FeltBias bias;
 };
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band);
-/// Its white density alone, which is quick to find.
+/// Its correlation time alone, which is quick to find, and the sd of its logarithm where it is the fit's own.
+struct BiasTime {
+  double tau_s = 0.0;
+  std::optional<double> tau_log_sd{};
+};
+BiasTime felt_bias_time(const FitResult& fit, const FilterBand& band);
+/// Its white density alone.
 Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band);
 /// The same with a given correlation time, for filters that have one for several axes.
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double tau_s);
