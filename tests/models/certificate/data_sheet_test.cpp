@@ -69,9 +69,9 @@ TEST(DataSheet, AShippedPartWithAnAxisOfItsOwn) {
   const auto walk_of = [](double value, double low, double high) {
     return std::vector{term(Term::kRandomWalk, value, low, high, noise::Knowledge::kFitted)};
   };
-  const auto rows =
-      beside(*sheet, {axis_of("gyro_x", walk_of(0.84, 0.8, 0.9)), axis_of("accel_x", walk_of(0.094, 0.09, 0.1)),
-                      axis_of("accel_z", walk_of(0.094, 0.09, 0.1))});
+  const auto rows = beside(
+      *sheet, {axis_of("gyro_x", walk_of(0.84, 0.8, 0.9)), axis_of("accel_x", walk_of(0.094, 0.09, 0.1)),
+               axis_of("accel_z", walk_of(0.094, 0.09, 0.1))});
   ASSERT_EQ(rows.size(), 3U);
   EXPECT_NEAR(rows[0].stated.value, 0.014 * 60.0, 1e-12);
   EXPECT_NEAR(rows[1].stated.value, 160e-6 * 9.80665 * 60.0, 1e-12);
