@@ -74,7 +74,7 @@ set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_NAME imuscope)
 set(CPACK_DEBIAN_UNSPECIFIED_DESCRIPTION ${PROJECT_DESCRIPTION})
 set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_RECOMMENDS "liblcm-bin, iproute2")
 set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_SUGGESTS
-    "imuscope-hdf5, python3-imuscope, chromium, default-jre, liblcm-java, libjchart2d-java, can-utils")
+    "imuscope-hdf5, python3-imuscope, chromium-headless-shell | chromium, default-jre, liblcm-java, libjchart2d-java, can-utils")
 set(CPACK_DEBIAN_UNSPECIFIED_PACKAGE_CONTROL_EXTRA
     ${CMAKE_CURRENT_LIST_DIR}/debian/conffiles
     ${CMAKE_CURRENT_LIST_DIR}/debian/postinst

@@ -144,16 +144,16 @@ TEST(Html, PagesAreTheirPartsAndTheirStyles) {
   test::expect_recorded("page/pages.txt", page + other);
 }
 
-/// What stands for the browser for a while.
+/// What stands for the browser for a while, the only one that is found.
 class Chromium {
  public:
-  explicit Chromium(const std::string& script) : path_(std::getenv("PATH")) {
+  explicit Chromium(const std::string& script, const char* name = "chromium") : path_(std::getenv("PATH")) {
     const auto folder = test::scratch_folder() / "bin";
+    std::filesystem::remove_all(folder);
     std::filesystem::create_directories(folder);
-    std::ofstream(folder / "chromium") << "#!/bin/sh\n" << script;
-    std::filesystem::permissions(folder / "chromium", std::filesystem::perms::owner_all);
-    setenv("PATH", (folder.string() + ":" + path_).c_str(), 1);
-    if (script.empty()) setenv("PATH", "/nowhere", 1);
+    std::ofstream(folder / name) << "#!/bin/sh\n" << script;
+    std::filesystem::permissions(folder / name, std::filesystem::perms::owner_all);
+    setenv("PATH", script.empty() ? "/nowhere" : folder.c_str(), 1);
   }
   ~Chromium() { setenv("PATH", path_.c_str(), 1); }
   Chromium(const Chromium&) = delete;
@@ -188,6 +188,15 @@ TEST_F(PrintedPage, IsWhatTheBrowserPrinted) {
   EXPECT_EQ(std::regex_search(arguments, std::regex("--no-sandbox\n")), geteuid() == 0);
   EXPECT_NE(arguments.find("file://" + (folder_ / "a page.html").string() + "\n"), std::string::npos);
   EXPECT_NE(arguments.find("--headless\n"), std::string::npos);
+}
+
+TEST_F(PrintedPage, IsPrintedByTheBrowserWithoutWindowsWhereThatIsThere) {
+  const Chromium chromium(
+      "for a; do case \"$a\" in --print-to-pdf=*) echo '%PDF' > \"${a#*=}\";; esac; done\n",
+      "chromium-headless-shell");
+  const auto printed = print();
+  ASSERT_TRUE(printed) << printed.error().text();
+  EXPECT_EQ(test::content_of(*printed), "%PDF\n");
 }
 
 TEST_F(PrintedPage, IsNoneWhereTheBrowserPrintsNothingOrFailsOrIsNotThere) {
