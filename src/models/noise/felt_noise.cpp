@@ -310,11 +310,25 @@ class Uncertainty {
         Model moved = model;
         if (length > 0.0) move_all(moved, sign * std::sqrt(z * z - u * u) / length * steepest);
         const double value = std::log(f(moved)) - at_fit;
+        if ((value >= range.low && value <= range.high) || !is_near(moved)) continue;
         range.low = std::min(range.low, value);
         range.high = std::max(range.high, value);
       }
     }
     return range;
+  }
+
+  /// Whether a moved model's curve is anywhere near what the record shows: a gradient that leads further than an
+  /// undetermined logarithm reaches is believed no more.
+  [[nodiscard]] bool is_near(const Model& moved) const {
+    if (!std::ranges::all_of(moved.components, [](const Component& c) {
+          return std::isfinite(c.amplitude) && is_in_range(c.kind, c.shape);
+        }))
+      return false;
+    return std::ranges::none_of(fit_.wv, [&](const FittedLevel& level) {
+      const double highest = std::max(level.fitted, level.observed.ci_high);
+      return !(model_wv(moved, level.observed.level) < std::exp(kUndetermined) * highest);
+    });
   }
 
   static void widen(std::optional<Range>& range, const Range& other) {
