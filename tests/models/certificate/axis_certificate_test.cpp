@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <random>
 
 #include "made_record.h"
 #include "models/certificate/json.h"
@@ -159,6 +160,36 @@ TEST(AxisCertificate, QuantizationBesideManySlowTermsIsFound) {
   const TermValue& q = term_of(*axis, Term::kQuantization);
   ASSERT_EQ(q.knowledge, Knowledge::kFitted);
   EXPECT_NEAR(q.value, 3600.0 * std::sqrt(0.02) / 100.0, 0.05 * q.value);
+}
+
+/// Of a sensor that rounds to steps as large as its noise and sends overlapping means of four: no model of ours.
+AxisRecord rounded_then_averaged(std::size_t samples, unsigned seed) {
+  constexpr double kStep = 0.2;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> white;
+  std::vector<double> x(samples);
+  for (double& v : x) v = kStep * white(random);
+  std::normal_distribution<double> steps;
+  double walk = 0.0;
+  for (double& v : x) v = kStep * std::round((v + (walk += 1e-4 * steps(random))) / kStep);
+  AxisRecord record;
+  record.name = "gyro_x";
+  record.unit = noise::SignalUnit::kDegps;
+  record.rate_hz = 100.0;
+  for (std::size_t i = 0; i + 3 < x.size(); ++i)
+    record.values.push_back(0.25 * (x[i] + x[i + 1] + x[i + 2] + x[i + 3]));
+  return record;
+}
+
+// Along a correlation time that is hardly told, the gradient of another term leads out of all bounds: such ends were
+// infinite.
+TEST(AxisCertificate, AnEndOfNIsNeverFarFromWhatTheCurveShows) {
+  const auto axis = characterize_axis(rounded_then_averaged(std::size_t{1} << 18U, 40'004), {});
+  ASSERT_TRUE(axis) << axis.error().text();
+  const TermValue& n = term_of(*axis, Term::kRandomWalk);
+  ASSERT_EQ(n.knowledge, Knowledge::kFitted);
+  EXPECT_LT(*n.ci_high, 1.2 * n.value);
+  EXPECT_GT(*n.ci_low, 0.9 * n.value);
 }
 
 TEST(AxisCertificate, ARecordThatIsFetchedIsTheSame) {
