@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <boost/math/distributions/binomial.hpp>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -58,24 +56,6 @@ void Results::add(const std::string& cell, int end, const Counts& counts) {
   done_[cell] = end;
 }
 
-namespace {
-
-/// Whether so few, or so many, hits come by chance where the share is an edge of the band: no less often than a normal
-/// value comes kOwnSd beyond its mean. Of few counts the binomial's tail is far from the normal's.
-bool is_within(const Band& band, const Count& count) {
-  const double rare = boost::math::cdf(boost::math::complement(boost::math::normal(), kOwnSd));
-  const auto at = [&](double percent) {
-    return boost::math::binomial(static_cast<double>(count.of), percent / 100.0);
-  };
-  const auto hits = static_cast<double>(count.hits);
-  const bool has_enough = boost::math::cdf(at(band.low), hits) >= rare;
-  const bool has_too_many =
-      count.hits > 0 && boost::math::cdf(boost::math::complement(at(band.high), hits - 1.0)) < rare;
-  return has_enough && !has_too_many;
-}
-
-}  // namespace
-
 bool judge(const std::string& cell, const std::vector<Band>& bands, const Counts& counts) {
   bool good = true;
   fmt::print("{}\n", cell);
@@ -87,7 +67,8 @@ bool judge(const std::string& cell, const std::vector<Band>& bands, const Counts
     }
     const double share = 100.0 * c.hits / c.of;
     const auto sd_at = [of = c.of](double percent) { return std::sqrt(percent * (100.0 - percent) / of); };
-    const bool holds_here = band == nullptr || is_within(*band, c);
+    const bool holds_here = band == nullptr || (share >= band->low - kOwnSd * sd_at(band->low) &&
+                                                share <= band->high + kOwnSd * sd_at(band->high));
     good = good && holds_here;
     fmt::print("  {:<18} {:>6} of {:>6}  {:>6.2f} % (sd {:.2f})  {}\n", name, c.hits, c.of, share,
                sd_at(share),

@@ -44,8 +44,8 @@ class Results {
   std::map<std::string, Counts> counts_;
 };
 
-/// Prints a cell's counts beside its bands. A band is missed where the count lies beyond it by more than chance
-/// brings: 3.3 sd of many, as seldom by the binomial's tail of few. False where one is.
+/// Prints a cell's counts beside its bands. A band is missed where the share lies beyond it by more than kOwnSd
+/// of its binomial sd. False where one is.
 bool judge(const std::string& cell, const std::vector<Band>& bands, const Counts& counts);
 
 }  // namespace imuscope

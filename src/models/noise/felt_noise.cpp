@@ -318,8 +318,8 @@ class Uncertainty {
     return range;
   }
 
-  /// Whether a moved model's curve is anywhere near what the record shows: a gradient that leads further than an
-  /// undetermined logarithm reaches is believed no more.
+  /// Whether a moved model's curve is anywhere near what the record shows: beyond the logarithm that counts as
+  /// undetermined, a gradient taken nearer by says nothing.
   [[nodiscard]] bool is_near(const Model& moved) const {
     if (!std::ranges::all_of(moved.components, [](const Component& c) {
           return std::isfinite(c.amplitude) && is_in_range(c.kind, c.shape);

@@ -78,16 +78,17 @@ struct FeltWithBias {
   FeltBias bias;
 };
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band);
-/// Its correlation time alone, which is quick to find, and the sd of its logarithm where it is the fit's own.
-struct BiasTime {
-  double tau_s = 0.0;
-  std::optional<double> tau_log_sd{};
-};
-BiasTime felt_bias_time(const FitResult& fit, const FilterBand& band);
-/// Its white density alone.
-Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band);
 /// The same with a given correlation time, for filters that have one for several axes.
 FeltWithBias felt_with_bias(const FitResult& fit, const FilterBand& band, double tau_s);
+/// The white density of that form alone.
+Felt felt_white_beside_bias(const FitResult& fit, const FilterBand& band);
+
+/// The correlation time of that process alone, which is quick to find.
+struct BiasTime {
+  double tau_s = 0.0;
+  std::optional<double> tau_log_sd{};  ///< where it is the fit's own
+};
+BiasTime felt_bias_time(const FitResult& fit, const FilterBand& band);
 
 /// Sd of the logarithm of a positive function of the model, whether or not each parameter is told (G-32).
 /// Empty where the data do not tell the function.

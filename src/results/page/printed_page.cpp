@@ -64,7 +64,7 @@ bool ended_well(pid_t browser) {
 
 /// Starts the first browser that is there, silently. False where none could be started.
 bool start(std::vector<std::string> arguments, pid_t& child) {
-  arguments.insert(arguments.begin(), "");
+  arguments.insert(arguments.begin(), "");  // the place of the program's name
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
