@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "check/bins.h"
 #include "check/checks.h"
@@ -16,6 +18,35 @@ bool found(const std::vector<Finding>& findings, const std::string& device, cons
   });
 }
 
+/// Each S-IMU that can be compared with the reference. A pair changes nothing but the S-IMU's own track.
+std::vector<std::pair<std::size_t, PairAxes>> compare_pairs(Drive& drive, const std::vector<bool>& comparable,
+                                                            std::launch how, std::vector<Finding>& findings) {
+  struct Compared {
+    PairAxes axes;
+    std::vector<Finding> findings;
+  };
+  std::vector<std::pair<std::size_t, std::future<Compared>>> work;
+  for (const std::size_t study : drive.configuration().study_indices()) {
+    if (!comparable[study] || drive.imu(study).size() == 0) continue;
+    work.emplace_back(study, std::async(how, [&drive, study] {
+                        Compared compared;
+                        compared.axes = check_pair(drive, study, compared.findings);
+                        return compared;
+                      }));
+  }
+  std::vector<std::pair<std::size_t, PairAxes>> pairs;
+  for (auto& [study, future] : work) {
+    Compared compared = future.get();
+    pairs.emplace_back(study, compared.axes);
+    // Samples that share their times with others move as nothing does.
+    if (found(findings, drive.configuration().devices[study].name, "repeated samples"))
+      std::erase_if(compared.findings, [](const Finding& f) { return f.check == "one body"; });
+    findings.insert(findings.end(), std::make_move_iterator(compared.findings.begin()),
+                    std::make_move_iterator(compared.findings.end()));
+  }
+  return pairs;
+}
+
 }  // namespace
 
 std::string sentence(const Finding& finding) {
@@ -28,7 +59,7 @@ std::string sentence(const Finding& finding) {
   return fmt::format("{}: {}{}; {}", finding.device, finding.what, evidence, finding.remedy);
 }
 
-std::vector<Finding> look_at(Drive& drive) {
+std::vector<Finding> look_at(Drive& drive, std::launch pairs) {
   const Configuration& configuration = drive.configuration();
   std::vector<Finding> findings;
   std::vector<bool> comparable(configuration.devices.size(), true);
@@ -49,16 +80,8 @@ std::vector<Finding> look_at(Drive& drive) {
     check_positions(drive, *gnss, findings);
     if (comparable[*gnss]) reference = check_motion(drive, *gnss, findings);
   }
-  std::vector<std::pair<std::size_t, PairAxes>> pairs;
-  for (const std::size_t study : configuration.study_indices()) {
-    if (comparable[study] && drive.imu(study).size() > 0)
-      pairs.emplace_back(study, check_pair(drive, study, findings));
-    // Samples that share their times with others move as nothing does.
-    const std::string& name = configuration.devices[study].name;
-    if (found(findings, name, "repeated samples"))
-      std::erase_if(findings, [&](const Finding& f) { return f.device == name && f.check == "one body"; });
-  }
-  check_axes(drive, reference, pairs, findings);
+  const auto compared = compare_pairs(drive, comparable, pairs, findings);
+  check_axes(drive, reference, compared, findings);
   const bool units = std::none_of(findings.begin(), findings.end(),
                                   [](const Finding& f) { return f.check == "rate unit" && f.mends.empty(); });
   for (std::size_t i = 0; i < configuration.devices.size() && units; ++i)

@@ -10,6 +10,7 @@
 #include "base/units.h"
 #include "estimation/navigation/so3.h"
 #include "service/pipeline/observability.h"
+#include "service/recording/decoded_lines.h"
 
 namespace imuscope {
 
@@ -18,7 +19,7 @@ namespace {
 /// Beyond the filter's own coarse search, in case it ended at its border.
 constexpr double kSearchMargin_s = 1.0;
 /// The reference is kept so much longer than the S-IMU is used: the offsets that are searched, with room.
-constexpr double kMargin_s = 60.0;
+constexpr Duration kMargin = std::chrono::seconds{60};
 /// Chi-square of six degrees of freedom that chance exceeds once in a million times.
 constexpr double kContradictionChi2 = 38.3;
 /// Where noise and motion have less than this share of the variance, no manoeuvre is worth its fuel.
@@ -57,22 +58,6 @@ std::optional<double> told_gyro_white_radps_per_sqrt_hz(const DeviceConfig& refe
     return *sd_radps / std::sqrt(reference.rate_hz);
   if (traits_of(reference.protocol).has_optical_gyros) return ReferenceConfig{}.gyro_white_radps_per_sqrt_hz;
   return std::nullopt;
-}
-
-/// Adds the part of a record between two instants.
-void add_part(const batch::ImuRecord& all, double from_s, double to_s, batch::ImuRecord& part) {
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (all.time_s[i] < from_s) continue;
-    if (all.time_s[i] > to_s) break;
-    part.add(all.time_s[i], all.omega_radps[i], all.f_mps2[i]);
-  }
-}
-
-void forget_before(double time_s, batch::ImuRecord& record) {
-  const auto kept = std::ranges::lower_bound(record.time_s, time_s) - record.time_s.begin();
-  record.time_s.erase(record.time_s.begin(), record.time_s.begin() + kept);
-  record.omega_radps.erase(record.omega_radps.begin(), record.omega_radps.begin() + kept);
-  record.f_mps2.erase(record.f_mps2.begin(), record.f_mps2.begin() + kept);
 }
 
 /// Whether two estimates cannot be of one mounting.
@@ -143,65 +128,92 @@ nlohmann::json parts_json(const batch::BatchMounting& mounting) {
 }  // namespace
 
 BatchRecords::BatchRecords(const Configuration& configuration, double longest_s)
-    : longest_s_(longest_s), records_(configuration.devices.size()) {
-  for (const auto& device : configuration.devices) half_period_s_.push_back(0.5 / device.rate_hz);
+    : reference_(configuration.reference_index()),
+      longest_(from_seconds(longest_s)),
+      records_(configuration.devices.size()) {
+  for (const auto& device : configuration.devices) half_period_.push_back(from_seconds(0.5 / device.rate_hz));
 }
 
-void BatchRecords::add(const Sample& sample) {
-  if (sample.kind != SampleKind::kImu) return;
+std::optional<HostTime> BatchRecords::taken_at(const Sample& sample, Stream& stream) const {
   constexpr std::uint32_t kBoth = kGyroValid | kAccelValid;
-  if ((sample.imu.flags & kBoth) != kBoth) return;
-  if (!has_origin_) {
-    has_origin_ = true;
-    origin_ = sample.time;
-  }
-  Kept& record = records_[sample.device];
-  double time_s = to_seconds(sample.time - origin_);
-  if ((sample.imu.flags & kIsIncrement) != 0) time_s -= half_period_s_[sample.device];
-  if (record.first.size() > 0 && time_s <= record.last_s) return;
-  const Eigen::Vector3f omega =
-      Eigen::Map<const Eigen::Vector3d>(sample.imu.omega_radps.data()).cast<float>();
-  const Eigen::Vector3f f = Eigen::Map<const Eigen::Vector3d>(sample.imu.f_mps2.data()).cast<float>();
-  if (!omega.allFinite() || !f.allFinite()) return;
-  record.last_s = time_s;
-  if (record.first.size() == 0 || time_s <= record.first.time_s.front() + longest_s_ + kMargin_s) {
-    record.first.add(time_s, omega, f);
-    return;
-  }
-  record.last.add(time_s, omega, f);
+  if (sample.kind != SampleKind::kImu || (sample.imu.flags & kBoth) != kBoth) return std::nullopt;
+  HostTime time = sample.time;
+  if ((sample.imu.flags & kIsIncrement) != 0) time -= half_period_[sample.device];
+  if (stream.first && time <= stream.last) return std::nullopt;
+  const auto is_finite = [](double value) { return std::isfinite(static_cast<float>(value)); };
+  if (!std::ranges::all_of(sample.imu.omega_radps, is_finite) ||
+      !std::ranges::all_of(sample.imu.f_mps2, is_finite))
+    return std::nullopt;
+  if (!stream.first) stream.first = time;
+  stream.last = time;
+  return time;
+}
+
+void BatchRecords::Record::add(HostTime time_of_sample, const ImuData& data) {
+  time.push_back(time_of_sample);
+  omega_radps.push_back(Eigen::Map<const Eigen::Vector3d>(data.omega_radps.data()).cast<float>());
+  f_mps2.push_back(Eigen::Map<const Eigen::Vector3d>(data.f_mps2.data()).cast<float>());
+}
+
+void BatchRecords::Record::forget_before(HostTime instant) {
+  const auto kept = std::ranges::lower_bound(time, instant) - time.begin();
+  time.erase(time.begin(), time.begin() + kept);
+  omega_radps.erase(omega_radps.begin(), omega_radps.begin() + kept);
+  f_mps2.erase(f_mps2.begin(), f_mps2.begin() + kept);
+}
+
+void BatchRecords::add_to_first(const Sample& sample) {
+  Kept& kept = records_[sample.device];
+  const auto time = taken_at(sample, kept.of_first);
+  if (!time) return;
+  kept.is_first_whole = *time > *kept.of_first.first + longest_ + kMargin;
+  if (!kept.is_first_whole) kept.first.add(*time, sample.imu);
+}
+
+void BatchRecords::add_to_later(const Sample& sample) {
+  Kept& kept = records_[sample.device];
+  const auto time = taken_at(sample, kept.of_later);
+  if (!time || *time <= *kept.of_later.first + longest_ + kMargin) return;
+  kept.later.add(*time, sample.imu);
   // Seldom, as it moves an hour of samples.
-  const double longest_s = longest_s_ + 2.0 * kMargin_s;
-  if (time_s - record.last.time_s.front() > 2.0 * longest_s) forget_before(time_s - longest_s, record.last);
+  const Duration most = longest_ + 2 * kMargin;
+  if (*time - kept.later.time.front() > 2 * most) kept.later.forget_before(*time - most);
+}
+
+void BatchRecords::add_part(const Record& all, double from_s, double to_s, batch::ImuRecord& part) const {
+  const HostTime zero = origin();
+  for (std::size_t i = 0; i < all.time.size(); ++i) {
+    const double time_s = to_seconds(all.time[i] - zero);
+    if (time_s < from_s) continue;
+    if (time_s > to_s) break;
+    part.add(time_s, all.omega_radps[i], all.f_mps2[i]);
+  }
 }
 
 batch::ImuRecord BatchRecords::part(std::size_t device, double from_s, double to_s) const {
-  batch::ImuRecord part;
-  add_part(records_[device].first, from_s, to_s, part);
-  add_part(records_[device].last, from_s, to_s, part);
+  batch::ImuRecord part = part_of_first(device, from_s, to_s);
+  add_part(records_[device].later, from_s, to_s, part);
   return part;
-}
-
-double BatchRecords::first_s(std::size_t device) const {
-  const auto& first = records_[device].first;
-  return first.size() > 0 ? first.time_s.front() : 0.0;
-}
-
-double BatchRecords::kept_to_end_from_s(std::size_t device) const {
-  const Kept& kept = records_[device];
-  if (kept.last.size() == 0) return first_s(device);
-  const double gap_s = kept.last.time_s.front() - kept.first.time_s.back();
-  return gap_s > kMargin_s ? kept.last.time_s.front() : first_s(device);
-}
-
-bool BatchRecords::is_whole_until(std::size_t device, double to_s) const {
-  const auto& last = records_[device].last;
-  return last.size() > 0 && last.time_s.front() > to_s;
 }
 
 batch::ImuRecord BatchRecords::part_of_first(std::size_t device, double from_s, double to_s) const {
   batch::ImuRecord part;
   add_part(records_[device].first, from_s, to_s, part);
   return part;
+}
+
+HostTime BatchRecords::origin() const { return records_[reference_].of_first.first.value_or(HostTime{}); }
+
+double BatchRecords::first_s(std::size_t device) const {
+  const auto& first = records_[device].of_first.first;
+  return first ? to_seconds(*first - origin()) : 0.0;
+}
+
+double BatchRecords::kept_to_end_from_s(std::size_t device) const {
+  const Kept& kept = records_[device];
+  if (kept.later.time.empty() || kept.later.time.front() - kept.first.time.back() <= kMargin)
+    return first_s(device);
+  return to_seconds(kept.later.time.front() - origin());
 }
 
 /// The two IMUs of one estimate.
@@ -217,12 +229,7 @@ class BatchEstimates::Pair {
   [[nodiscard]] double first_s() const { return records_.first_s(study_); }
   [[nodiscard]] double kept_to_end_from_s() const { return records_.kept_to_end_from_s(study_); }
 
-  [[nodiscard]] bool has_first_hour() const {
-    const double to_s = first_s() + longest_s_;
-    return records_.is_whole_until(study_, to_s) &&
-           records_.is_whole_until(reference_, to_s + options_.search_s);
-  }
-  /// As estimate() of the same; while samples are added, once the first hour is there.
+  /// As estimate() of the same; the rest may still be gathered.
   [[nodiscard]] Result<batch::BatchMounting> estimate_first_hour() const {
     const double from_s = first_s();
     const double to_s = from_s + longest_s_;
@@ -244,15 +251,17 @@ class BatchEstimates::Pair {
   batch::BatchOptions options_;
 };
 
-BatchEstimates::BatchEstimates(const Configuration& configuration, Foreseen foreseen, double longest_s)
+BatchEstimates::BatchEstimates(const Configuration& configuration, Read read, Foreseen foreseen,
+                               double longest_s)
     : configuration_(configuration),
       foreseen_(std::move(foreseen)),
       longest_s_(longest_s),
       records_(configuration, longest_s),
       studies_(configuration.study_indices()),
       first_hours_(studies_.size()),
-      has_begun_(studies_.size(), false),
-      n_ahead_(studies_.size()) {}
+      n_ahead_(studies_.size()) {
+  beside_.run([this, read = std::move(read)] { estimate_first_hours(read); });
+}
 
 BatchEstimates::~BatchEstimates() {
   // Not beside_.cancel(): it would stop the loops inside of an estimate that goes on to use what they made.
@@ -264,19 +273,19 @@ BatchEstimates::Pair BatchEstimates::pair_of(std::size_t study) const {
   return {records_, configuration_, studies_[study], longest_s_};
 }
 
-void BatchEstimates::add(const Sample& sample) {
-  records_.add(sample);
+void BatchEstimates::estimate_first_hours(const Read& read) {
+  const auto done = read([this](const Sample& sample) {
+    records_.add_to_first(sample);
+    return !is_given_up_ && !records_.is_first_whole(sample.device);
+  });
   for (std::size_t i = 0; i < studies_.size(); ++i) {
-    if (has_begun_[i]) continue;
-    if (!pair_of(i).has_first_hour()) continue;
-    has_begun_[i] = true;
-    beside_.run([this, i] {
-      if (!is_given_up_) estimate_first_hour(i);
-    });
+    if (!done) first_hours_[i] = tl::unexpected<Error>(done.error());
+    if (done) beside_.run([this, i] { estimate_first_hour(i); });
   }
 }
 
 void BatchEstimates::estimate_first_hour(std::size_t study) {
+  if (is_given_up_) return;
   first_hours_[study] = pair_of(study).estimate_first_hour();
   if (--n_ahead_ > 0 || !foreseen_ || is_given_up_) return;
   std::vector<BatchOutcome> outcomes(first_hours_.size());
@@ -291,8 +300,7 @@ void BatchEstimates::estimate_first_hour(std::size_t study) {
 BatchOutcome BatchEstimates::outcome_of(std::size_t study, std::optional<double> moved_s) {
   const Pair pair = pair_of(study);
   const double first_s = pair.first_s();
-  auto found =
-      first_hours_[study] ? std::move(*first_hours_[study]) : pair.estimate(first_s, first_s + longest_s_);
+  auto found = std::move(*first_hours_[study]);
   BatchOutcome outcome;
   if (moved_s) {
     const double after_s = std::max(*moved_s, pair.kept_to_end_from_s());
@@ -318,6 +326,23 @@ std::vector<BatchOutcome> BatchEstimates::outcomes(const FormerMountings& former
     outcomes[i] = outcome_of(i, moved_s);
   });
   return outcomes;
+}
+
+BatchEstimates::Read reader_of(const Configuration& configuration, const Recording& recording) {
+  return [&configuration, &recording](const BatchEstimates::Take& take) -> Result<void> {
+    std::vector<bool> is_wanted(configuration.devices.size());
+    is_wanted[configuration.reference_index()] = true;
+    for (const std::size_t study : configuration.study_indices()) is_wanted[study] = true;
+    auto lines = DecodedLines::open(configuration, recording, is_wanted, Reading::kWhenAsked);
+    if (!lines) return tl::unexpected<Error>(lines.error());
+    for (;;) {
+      const auto read = lines->next();
+      if (!read) return tl::unexpected<Error>(read.error());
+      if (!*read) return {};
+      const auto [device, samples] = **read;
+      if (!std::ranges::all_of(samples, take)) lines->leave(device);
+    }
+  };
 }
 
 void take_over(const batch::BatchMounting& mounting, SImuOutput& study) {

@@ -18,6 +18,7 @@
 #include "estimation/calibration/combine.h"
 #include "estimation/calibration/estimator.h"
 #include "sample/sample.h"
+#include "service/recording/replay.h"
 #include "study/smoothing.h"
 
 namespace imuscope {
@@ -26,37 +27,59 @@ namespace imuscope {
 inline constexpr double kBatchLongest_s = 3600.0;
 
 /// Gathers the samples of all IMUs, in stream order. Of a long recording, the first hour and at least the last one.
+/// The first hour and the rest may be gathered by a thread each.
 class BatchRecords {
  public:
   /// @param longest_s  in place of an hour
   explicit BatchRecords(const Configuration& configuration, double longest_s = kBatchLongest_s);
 
-  void add(const Sample& sample);
+  /// Keeps a sample that lies in its device's first hour.
+  void add_to_first(const Sample& sample);
+  /// Whether no sample of a device's first hour is to come.
+  [[nodiscard]] bool is_first_whole(std::size_t device) const { return records_[device].is_first_whole; }
+  /// Keeps a sample that lies behind its device's first hour. Before it, every one of that device must have been given.
+  void add_to_later(const Sample& sample);
 
   /// The samples of a device from one instant to another, as far as they were kept; seconds since origin().
   [[nodiscard]] batch::ImuRecord part(std::size_t device, double from_s, double to_s) const;
+  /// As part(), of the first hour alone, which must be whole; the rest may still be gathered.
+  [[nodiscard]] batch::ImuRecord part_of_first(std::size_t device, double from_s, double to_s) const;
   /// Seconds since origin() of a device's first sample; 0 where it has none.
   [[nodiscard]] double first_s(std::size_t device) const;
   /// From here to its end the recording was kept.
   [[nodiscard]] double kept_to_end_from_s(std::size_t device) const;
-  /// Whether no sample up to this instant is to come, and all there are lie in the first hour, which stays as it is.
-  [[nodiscard]] bool is_whole_until(std::size_t device, double to_s) const;
-  /// As part(), of the first hour alone. Where that is whole, it may be asked for while samples are added.
-  [[nodiscard]] batch::ImuRecord part_of_first(std::size_t device, double from_s, double to_s) const;
-  [[nodiscard]] HostTime origin() const { return origin_; }
+  /// The time of the reference's first sample.
+  [[nodiscard]] HostTime origin() const;
 
  private:
-  struct Kept {
-    batch::ImuRecord first;
-    batch::ImuRecord last;  ///< what comes after `first`
-    double last_s = 0.0;
+  /// Samples by the time that they are of.
+  struct Record {
+    std::vector<HostTime> time;
+    std::vector<Eigen::Vector3f> omega_radps;
+    std::vector<Eigen::Vector3f> f_mps2;
+    void add(HostTime time_of_sample, const ImuData& data);
+    void forget_before(HostTime instant);
   };
+  /// Where one of the two who gather stands.
+  struct Stream {
+    std::optional<HostTime> first;
+    HostTime last{};
+  };
+  struct Kept {
+    Record first;
+    Record later;
+    Stream of_first;
+    Stream of_later;
+    bool is_first_whole = false;
+  };
+  /// The time that a sample is of, where it is one that counts.
+  [[nodiscard]] std::optional<HostTime> taken_at(const Sample& sample, Stream& stream) const;
+  void add_part(const Record& all, double from_s, double to_s, batch::ImuRecord& part) const;
 
-  double longest_s_;
-  std::vector<double> half_period_s_;  ///< of a device's samples, by which increments are centred
+  std::size_t reference_;
+  Duration longest_;
+  std::vector<Duration> half_period_;  ///< of a device's samples, by which increments are centred
   std::vector<Kept> records_;
-  bool has_origin_ = false;
-  HostTime origin_{};
 };
 
 /// What the batch made of one S-IMU.
@@ -67,27 +90,31 @@ struct BatchOutcome {
   bool remounted = false;  ///< it sat differently before; the mounting is that of the end
 };
 
-/// The batch estimates of all S-IMUs from a pass over their recording. Of a long one that of the first hour begins as
-/// soon as it is there, beside the rest of the pass. The results do not depend on that. Thread: one.
+/// The batch estimates of all S-IMUs of a recording. The first hour of all IMUs is read by itself, so that it is estimated
+/// beside the pass over the recording. The results do not depend on that. Thread: one.
 class BatchEstimates {
  public:
+  /// Takes a sample. @return whether more of its device are wanted
+  using Take = std::function<bool(const Sample&)>;
+  /// Hands on the samples of every IMU in stream order, as long as more of it are wanted.
+  using Read = std::function<Result<void>(const Take& take)>;
   /// Takes what the outcomes are going to be, unless the filter finds that an S-IMU was moved.
   using Foreseen = std::function<void(const std::vector<BatchOutcome>&)>;
 
+  /// Begins at once, where more than one thread may be used.
   /// @param configuration  outlives this
+  /// @param read           called once, by a thread of the pool
   /// @param foreseen       called by a thread of the pool, once and beside the pass, where the first hour gave a
   ///                       mounting of every S-IMU; may be empty
   /// @param longest_s      in place of an hour
-  explicit BatchEstimates(const Configuration& configuration, Foreseen foreseen = {},
-                          double longest_s = kBatchLongest_s);
+  BatchEstimates(const Configuration& configuration, Read read, Foreseen foreseen = {},
+                 double longest_s = kBatchLongest_s);
   ~BatchEstimates();
   BatchEstimates(const BatchEstimates&) = delete;
   BatchEstimates& operator=(const BatchEstimates&) = delete;
 
-  /// A sample of the pass, in stream order.
-  void add(const Sample& sample);
-  /// Whether the first hour of an S-IMU was estimated, or is being estimated, beside the pass.
-  [[nodiscard]] bool has_begun(std::size_t study) const { return has_begun_[study]; }
+  /// A sample of the pass, in stream order: what lies behind the first hour is wanted where an S-IMU was moved.
+  void add(const Sample& sample) { records_.add_to_later(sample); }
 
   /// After the pass. One outcome an S-IMU, in the order of the configuration. Where the filter found one to sit
   /// differently, the parts before and after are estimated by themselves: only where they contradict each other was
@@ -101,6 +128,7 @@ class BatchEstimates {
   using FirstHour = std::optional<Result<batch::BatchMounting>>;
 
   [[nodiscard]] Pair pair_of(std::size_t study) const;
+  void estimate_first_hours(const Read& read);
   void estimate_first_hour(std::size_t study);
   [[nodiscard]] BatchOutcome outcome_of(std::size_t study, std::optional<double> moved_s);
 
@@ -108,13 +136,15 @@ class BatchEstimates {
   Foreseen foreseen_;
   double longest_s_;
   BatchRecords records_;
-  std::vector<std::size_t> studies_;    ///< devices
-  std::vector<FirstHour> first_hours_;  ///< those that began beside the pass
-  std::vector<bool> has_begun_;
+  std::vector<std::size_t> studies_;  ///< devices
+  std::vector<FirstHour> first_hours_;
   std::atomic<std::size_t> n_ahead_;      ///< S-IMUs whose first hour is not estimated yet
   std::atomic<bool> is_given_up_{false};  ///< what has not begun need not
   tbb::task_group beside_;
 };
+
+/// BatchEstimates' way to the samples of a recording.
+[[nodiscard]] BatchEstimates::Read reader_of(const Configuration& configuration, const Recording& recording);
 
 /// What combine() takes of a mounting that the batch gave.
 [[nodiscard]] MountingEstimate estimate_of(const batch::BatchMounting& mounting);

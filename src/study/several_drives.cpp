@@ -43,14 +43,17 @@ Result<DriveMountings> calibrate(const OpenedRecording& drive, const std::filesy
   const auto& configuration = drive.configuration;
   LastSnapshot sink(configuration);
   const bool by_batch = configuration.estimator.batch_mounting;
-  BatchEstimates batch(configuration);
-  if (by_batch) options.on_sample = [&batch](const Sample& sample) { batch.add(sample); };
+  std::optional<BatchEstimates> batch;
+  if (by_batch) {
+    batch.emplace(configuration, reader_of(configuration, drive.recording));
+    options.on_sample = [&batch](const Sample& sample) { batch->add(sample); };
+  }
   const auto replayed =
       replay(configuration, estimator_config(configuration), drive.recording, sink, options);
   if (!replayed) return tl::unexpected<Error>(replayed.error());
   const auto indices = configuration.study_indices();
   std::vector<BatchOutcome> outcomes(indices.size());
-  if (by_batch) outcomes = batch.outcomes(sink.former_mountings());
+  if (by_batch) outcomes = batch->outcomes(sink.former_mountings());
   const auto studies = with_batch(sink.studies(), outcomes);
   DriveMountings out;
   out.run = folder;

@@ -222,16 +222,18 @@ Result<void> run_study(const Configuration& configuration, const Recording& reco
   };
   EndsBeside ends;
   std::optional<BatchEstimates> batch;
-  batch.emplace(configuration, may_use_threads() ? BatchEstimates::Foreseen(begin_ahead) : nullptr,
-                options.batch_longest_s.value_or(kBatchLongest_s));
-  if (configuration.estimator.batch_mounting)
+  const bool by_batch = configuration.estimator.batch_mounting;
+  if (by_batch) {
+    batch.emplace(configuration, reader_of(configuration, recording),
+                  may_use_threads() ? BatchEstimates::Foreseen(begin_ahead) : nullptr,
+                  options.batch_longest_s.value_or(kBatchLongest_s));
     replay_options.on_sample = [&batch](const Sample& sample) { batch->add(sample); };
+  }
   const auto calibrated_run = replay(configuration, estimator, recording, first, replay_options);
   if (!calibrated_run) return tl::unexpected<Error>(calibrated_run.error());
   if (!(*folder)->last_snapshot()) return nothing_was_run(*calibrated_run);
   Snapshot last = *(*folder)->last_snapshot();
   const auto of_filter = final_studies(last);
-  const bool by_batch = configuration.estimator.batch_mounting;
   if (by_batch && options.progress) options.progress("batch estimate", 0.0);
   std::vector<BatchOutcome> outcomes(of_filter.size());
   if (by_batch) outcomes = batch->outcomes(first.former_mountings());

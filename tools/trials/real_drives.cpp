@@ -133,7 +133,7 @@ Result<std::vector<Found>> calibrate(const RealDrive& drive, const std::string& 
   if (!opened) return tl::unexpected<Error>(opened.error());
   const Configuration& configuration = opened->configuration;
   Last sink;
-  BatchEstimates batch(configuration);
+  BatchEstimates batch(configuration, reader_of(configuration, opened->recording));
   ReplayOptions options;
   options.on_sample = [&batch](const Sample& sample) { batch.add(sample); };
   const auto replayed =

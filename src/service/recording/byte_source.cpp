@@ -82,6 +82,7 @@ class SharedReads {
   [[nodiscard]] bool is_far_ahead() const { return held_ > kHeldMost; }
   void leave(std::size_t i) {
     lines_[i].is_wanted = false;
+    for (const RawRead& read : lines_[i].waiting) held_ -= read.bytes.size();
     lines_[i].waiting = {};
   }
 
@@ -172,7 +173,11 @@ class SharedLine {
  public:
   SharedLine(std::shared_ptr<SharedReads> shared, std::size_t index, std::filesystem::path capture,
              std::string device)
-      : shared_(std::move(shared)), index_(index), capture_(std::move(capture)), device_(std::move(device)) {}
+      : shared_(std::move(shared)),
+        index_(index),
+        capture_(std::move(capture)),
+        device_(std::move(device)),
+        leaves_(nullptr, [all = shared_, index](void*) { all->leave(index); }) {}
   Result<std::optional<RawRead>> operator()() {
     if (own_) return (*own_)();
     auto read = shared_->next(index_);
@@ -191,6 +196,7 @@ class SharedLine {
   std::size_t index_;
   std::filesystem::path capture_;
   std::string device_;
+  std::shared_ptr<void> leaves_;  ///< nothing is kept for a line that is gone
   std::uint64_t taken_ = 0;
   std::optional<OwnReads> own_;
 };

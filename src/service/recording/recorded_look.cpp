@@ -1,33 +1,16 @@
 #include "service/recording/recorded_look.h"
 
-#include <algorithm>
-#include <list>
-#include <memory>
 #include <optional>
 #include <vector>
 
 #include "check/check.h"
 #include "service/pipeline/device_factory.h"
+#include "service/recording/decoded_lines.h"
 #include "service/recording/side_by_side.h"
 
 namespace imuscope {
 
 namespace {
-
-/// Passes samples on, with their times shifted.
-class Gatherer final : public SampleSink {
- public:
-  Gatherer(check::Drive& drive, Duration shift) : drive_(drive), shift_(shift) {}
-  void on_sample(const Sample& sample) noexcept override {
-    Sample shifted = sample;
-    shifted.time += shift_;
-    drive_.add(shifted);
-  }
-
- private:
-  check::Drive& drive_;
-  Duration shift_;
-};
 
 /// The first sample that has a UTC tag.
 class UtcFinder final : public SampleSink {
@@ -69,52 +52,31 @@ std::optional<Duration> utc_of(const Configuration& configuration, const Recordi
   return finder.difference();
 }
 
-/// One device on its way into the drive.
-struct Line {
-  std::size_t device;
-  std::unique_ptr<ByteSource> source;
-  std::unique_ptr<DeviceDecoder> decoder;
-  Gatherer gatherer;
-  std::optional<RecordedRead> pending{};
-  bool is_readable = true;  ///< further on
-
-  void fetch() {
-    const auto read = source->next();
-    is_readable = read.has_value();
-    pending = is_readable ? *read : std::nullopt;
-  }
-  /// Of what comes next; at its end it is the oldest, so that it is ended at once.
-  [[nodiscard]] HostTime arrival() const {
-    return pending ? pending->arrival.value_or(HostTime::min()) : HostTime::min();
-  }
-};
-
-/// All devices into the drive, oldest arrival first, so that one pass over a capture serves them all. The
-/// first device has the first sample: seconds of the drive count from there.
+/// All devices into the drive. The first device that has a sample has the first one: seconds of the drive count from
+/// there.
 void gather(const Configuration& configuration, const Recording& recording,
             const std::vector<Duration>& shifts, check::Drive& drive) {
-  auto sources = recording.open_side_by_side(reading_by_threads());
-  if (!sources) return;
-  std::list<Line> lines;
-  for (std::size_t i = 0; i < sources->size(); ++i) {
-    if (!(*sources)[i]) continue;
-    const auto index = static_cast<DeviceIndex>(i);
-    lines.push_back({i, std::move((*sources)[i]),
-                     make_decoder(configuration.devices[i], index, recording.clocks[i].map),
-                     Gatherer(drive, shifts[i])});
-    lines.back().fetch();
-  }
-  const auto is_older = [](const Line& a, const Line& b) { return a.arrival() < b.arrival(); };
-  while (!lines.empty()) {
-    const auto next =
-        drive.has_origin() ? std::min_element(lines.begin(), lines.end(), is_older) : lines.begin();
-    if (next->pending && !drive.is_full(next->device)) {
-      next->decoder->push(next->pending->bytes, next->pending->arrival.value_or(HostTime{}), next->gatherer);
-      next->fetch();
-      continue;
+  auto lines = DecodedLines::open(configuration, recording, recording.present, reading_by_threads());
+  if (!lines) return;
+  const auto take = [&](const LineRead& read) {
+    for (Sample sample : read.samples) {
+      sample.time += shifts[read.device];
+      drive.add(sample);
     }
-    if (next->is_readable) next->decoder->finish(HostTime{}, next->gatherer);
-    lines.erase(next);
+    if (drive.is_full(read.device)) lines->leave(read.device);
+  };
+  for (std::size_t i = 0; i < recording.present.size(); ++i) {
+    while (!drive.has_origin()) {
+      const auto read = lines->next_of(i);
+      if (!read || !*read) break;
+      take(**read);
+    }
+  }
+  for (;;) {
+    const auto read = lines->next();
+    if (!read) continue;  // told by those who need it
+    if (!*read) return;
+    take(**read);
   }
 }
 
@@ -141,7 +103,7 @@ std::vector<check::Finding> look_at_recording(const Configuration& configuration
     shifts[i] = shift;
   }
   gather(configuration, recording, shifts, drive);
-  return check::look_at(drive);
+  return check::look_at(drive, may_use_threads() ? std::launch::async : std::launch::deferred);
 }
 
 }  // namespace imuscope
