@@ -21,8 +21,8 @@ struct Interval {
   double high = 0.0;
 };
 
-/// The profile likelihood over the models (T-4): all of the chosen model's interval, and of every other model's
-/// what its larger misfit leaves of it.
+/// The profile likelihood over the models (T-4): of every model's interval what its misfit beyond the least of all
+/// leaves of it, and the chosen one's value.
 /// @param models  not empty, finite; the first is the chosen one
 Interval models_interval(std::span<const ModelsValue> models, double confidence);
 

@@ -21,20 +21,32 @@ TEST(ModelsInterval, OfOneModelIsItsOwn) {
 
 TEST(ModelsInterval, ReachesOverAModelThatFitsAsWell) {
   const std::vector<ModelsValue> models{
-      {3.0, 10.0, 8.0, 15.0}, {3.0, 14.0, 13.0, 17.0}, {1.0, 6.0, 5.0, 7.0}};
+      {2.0, 10.0, 8.0, 15.0}, {2.0, 14.0, 13.0, 17.0}, {1.0, 6.0, 5.0, 7.0}};
   const Interval interval = models_interval(models, kConfidence);
   EXPECT_DOUBLE_EQ(interval.low, 5.0);
   EXPECT_DOUBLE_EQ(interval.high, 17.0);
 }
 
-// A parabola of deviance that begins at 3 is at 1.96^2 where 0.8416 of 3.8416 are left.
+// A parabola of deviance that begins at 2 is at 1.96^2 where 1.8416 of 3.8416 are left.
 TEST(ModelsInterval, TakesOfAWorseModelWhatItsMisfitLeaves) {
   const std::vector<ModelsValue> models{{2.0, 0.0, -kZ, kZ}, {5.0, 10.0, 10.0 - kZ, 10.0 + kZ}};
-  EXPECT_NEAR(models_interval(models, kConfidence).high, 10.0 + std::sqrt(kZ * kZ - 3.0), 1e-9);
+  EXPECT_NEAR(models_interval(models, kConfidence).high, 10.0 + std::sqrt(kZ * kZ - 2.0), 1e-9);
+}
+
+TEST(ModelsInterval, TakesOfTheChosenModelNoMoreWhereAnotherIsLikelier) {
+  const std::vector<ModelsValue> models{{5.0, 10.0, 10.0 - kZ, 10.0 + kZ}, {2.0, 0.0, -kZ, kZ}};
+  const Interval interval = models_interval(models, kConfidence);
+  EXPECT_NEAR(interval.high, 10.0 + std::sqrt(kZ * kZ - 2.0), 1e-9);
+  EXPECT_NEAR(interval.low, -kZ, 1e-9);
+}
+
+TEST(ModelsInterval, HoldsTheChosenModelsValueHoweverUnlikely) {
+  const std::vector<ModelsValue> models{{50.0, 10.0, 10.0 - kZ, 10.0 + kZ}, {2.0, 0.0, -kZ, kZ}};
+  EXPECT_DOUBLE_EQ(models_interval(models, kConfidence).high, 10.0);
 }
 
 TEST(ModelsInterval, HasNothingOfAModelThatIsOutOfTheQuestion) {
-  const std::vector<ModelsValue> models{{2.0, 0.0, -kZ, kZ}, {5.9, 10.0, 10.0 - kZ, 10.0 + kZ}};
+  const std::vector<ModelsValue> models{{2.0, 0.0, -kZ, kZ}, {6.9, 10.0, 10.0 - kZ, 10.0 + kZ}};
   EXPECT_NEAR(models_interval(models, kConfidence).high, kZ, 1e-9);
 }
 
@@ -56,11 +68,10 @@ TEST(ModelsInterval, HoldsAboutAsOftenAsItSaysWhicheverModelIsRight) {
       const ModelsValue without{0.5 * (first - witness) * (first - witness) + 1.0, mean, mean - kZ * root,
                                 mean + kZ * root};
       const ModelsValue with{2.0, first, first - kZ, first + kZ};
-      const std::vector<ModelsValue> models{without, with};
       const bool chosen = without.misfit < with.misfit + kZ * kZ;
-      const Interval interval =
-          chosen ? models_interval(models, kConfidence) : Interval{with.ci_low, with.ci_high};
-      const Interval alone = chosen ? Interval{without.ci_low, without.ci_high} : interval;
+      const std::vector<ModelsValue> models{chosen ? without : with, chosen ? with : without};
+      const Interval interval = models_interval(models, kConfidence);
+      const Interval alone{models.front().ci_low, models.front().ci_high};
       held += interval.low <= 0.0 && 0.0 <= interval.high ? 1 : 0;
       held_alone += alone.low <= 0.0 && 0.0 <= alone.high ? 1 : 0;
     }
